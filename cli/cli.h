@@ -1,0 +1,39 @@
+// cli: one file a verb. What the verbs share: exit codes, the table of verbs, printing of faults, progress, the vessel of a scene.
+#ifndef SELDINGER_CLI_CLI_H
+#define SELDINGER_CLI_CLI_H
+
+#include "geom/geom.h"
+#include "recon/parallel.h"
+#include "sim/scene.h"
+
+#include <stdio.h>
+
+enum { EXIT_DONE = 0, EXIT_DIFFERENT = 1, EXIT_BAD_INPUT = 2, EXIT_UNTRUSTED = 3 };
+
+typedef int VerbFunction(int argc, char **argv);   // argv[0] is "seldinger VERB"
+VerbFunction verb_run, verb_check, verb_segment, verb_import, verb_fit, verb_synth, verb_query, verb_export, verb_info, verb_bench, verb_replay,
+    verb_devices, verb_nav;
+
+// Prints all faults to standard error; returns EXIT_BAD_INPUT.
+int cli_bad_input(const Faults *faults);
+// A progress bar on standard error: drawn where that is a terminal and not --quiet, else nothing.
+typedef struct ProgressBar {
+    const char *label;
+    bool shown;
+} ProgressBar;
+Progress progress_bar(ProgressBar *bar, const char *label, bool quiet);
+// Number options: the whole text must be a finite number within [least, most]; else a message that names the option and the range, and false.
+bool cli_number(const char *option, const char *text, double least, double most, double *value);
+
+// Opens what a scene's `vessel:` names (recon is not below sim): loads a model, fits a shape (cached), builds a tube or plane.
+typedef struct OpenVessel {
+    Vessel *vessel;          // NULL for SOURCE_NONE
+    VesselTree *tree;        // LIM only
+    TriangleMesh *mesh;      // filled on demand by open_vessel_mesh
+} OpenVessel;
+bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults);
+// The vessel's surface for pictures; NULL for planes.
+const TriangleMesh *open_vessel_mesh(const Scene *scene, OpenVessel *open);
+void open_vessel_close(OpenVessel *open);
+
+#endif

@@ -1,0 +1,99 @@
+// seldinger: the table of verbs and what the verbs share.
+#include "cli/cli.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static const struct Verb {
+    const char *name;
+    VerbFunction *call;
+    const char *arguments, *does;
+} verbs[] = {
+    {"run", verb_run, "SCENE", "runs a scene headless: summary, final state, recording, picture"},
+    {"check", verb_check, "PATH...", "runs every scene that has a golden tool path and compares"},
+    {"segment", verb_segment, "VOLUME --trace F.yaml -o TREE.h5", "RBT: an angiogram to a tree of centreline nodes with local points"},
+    {"fit", verb_fit, "TREE.h5 -o MODEL.h5", "LIM: a local blobby model for each node"},
+    {"synth", verb_synth, "SHAPE -o F", "synthetic shapes with known truth"},
+    {"query", verb_query, "MODEL.h5 --points F.csv -o F.csv", "field, gradient and distance of a model at points"},
+    {"export", verb_export, "FILE -o OUT", "surface, centreline or recording for other programs"},
+    {"info", verb_info, "FILE", "what a file is and its figures"},
+};
+enum { VERB_COUNT = sizeof verbs / sizeof verbs[0] };
+
+static void print_help(FILE *out)
+{
+    fprintf(out, "Usage: seldinger VERB ARGUMENTS\n\nSeldinger %s, a catheter navigation simulator for training and research, not a medical device.\n\n",
+            SELDINGER_VERSION);
+    for (int i = 0; i < VERB_COUNT; i++)
+        fprintf(out, "  %-8s %-34s %s\n", verbs[i].name, verbs[i].arguments, verbs[i].does);
+    fprintf(out, "\n`seldinger VERB --help` explains every option with its unit and default.\n"
+                 "Exit codes: 0 done; 1 a comparison failed; 2 wrong usage or bad input; 3 the simulation could not be trusted.\n");
+}
+
+int main(int argc, char **argv)
+{
+    if (argc < 2) {
+        print_help(stderr);
+        return EXIT_BAD_INPUT;
+    }
+    if (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h") || !strcmp(argv[1], "help")) {
+        print_help(stdout);
+        return EXIT_DONE;
+    }
+    if (!strcmp(argv[1], "--version")) {
+        printf("seldinger %s\n", SELDINGER_VERSION);
+        return EXIT_DONE;
+    }
+    for (int i = 0; i < VERB_COUNT; i++) {
+        if (strcmp(argv[1], verbs[i].name))
+            continue;
+        char name[64];
+        snprintf(name, sizeof name, "seldinger %s", verbs[i].name);
+        argv[1] = name;
+        return verbs[i].call(argc - 1, argv + 1);
+    }
+    fprintf(stderr, "seldinger: no verb '%s'; valid:", argv[1]);
+    for (int i = 0; i < VERB_COUNT; i++)
+        fprintf(stderr, " %s", verbs[i].name);
+    fprintf(stderr, "\n");
+    return EXIT_BAD_INPUT;
+}
+
+int cli_bad_input(const Faults *faults)
+{
+    static char text[(FAULTS_CAPACITY + 1) * FAULT_LENGTH];
+    faults_print(faults, text, sizeof text);
+    fputs(text, stderr);
+    return EXIT_BAD_INPUT;
+}
+
+static void draw_bar(void *context, long done, long total)
+{
+    ProgressBar *bar = context;
+    enum { WIDTH = 40 };
+    int filled = total > 0 ? (int)(done * WIDTH / total) : WIDTH;
+    fprintf(stderr, "\r%s [%.*s%.*s] %ld/%ld", bar->label, filled, "########################################", WIDTH - filled,
+            "                                        ", done, total);
+    if (done >= total)
+        fputc('\n', stderr);
+}
+
+Progress progress_bar(ProgressBar *bar, const char *label, bool quiet)
+{
+    bar->label = label;
+    bar->shown = !quiet && isatty(STDERR_FILENO);
+    return (Progress){.call = bar->shown ? draw_bar : NULL, .context = bar};
+}
+
+bool cli_number(const char *option, const char *text, double least, double most, double *value)
+{
+    char *end;
+    double number = strtod(text, &end);
+    if (end == text || *end || !isfinite(number) || number < least || number > most) {
+        fprintf(stderr, "%s: '%s' is not valid; a number from %g to %g\n", option, text, least, most);
+        return false;
+    }
+    *value = number;
+    return true;
+}

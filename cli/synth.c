@@ -1,0 +1,7 @@
+#include "cli/cli.h"
+
+int verb_synth(int argc, char **argv)
+{
+    (void)argc, (void)argv;
+    return EXIT_BAD_INPUT;
+}

@@ -1,0 +1,40 @@
+// A blobby model with the Cauchy kernel: f(X) = sum_j rho_j phi(|X - C_j| / rho_j) - T, phi(x) = (1 + x^2/5)^-2.
+// Kerrien et al. 2017, eq. (3), alpha_j = rho_j. f > 0 inside. With q = |X-C|^2 / (5 rho^2):
+//   grad f = sum -(4/(5 rho)) (1+q)^-3 (X-C)
+//   H      = sum -(4/(5 rho)) (1+q)^-3 I + (24/(25 rho^3)) (1+q)^-4 (X-C)(X-C)^T
+#ifndef SELDINGER_GEOM_BLOBBY_H
+#define SELDINGER_GEOM_BLOBBY_H
+
+#include "geom/linear.h"
+
+typedef struct Blobby {
+    int count;               // number of blobs
+    const Vec3 *center;      // (count) [mm]
+    const double *width;     // (count) rho > 0 [mm]
+    double iso_level;        // T
+} Blobby;
+
+double blobby_field(const Blobby *model, Vec3 x);
+double blobby_gradient(const Blobby *model, Vec3 x, Vec3 *gradient);
+double blobby_hessian(const Blobby *model, Vec3 x, Vec3 *gradient, Sym3 *hessian);
+// Mean curvature by eq. (5); +1/r on a sphere with f > 0 inside.
+double blobby_curvature(Vec3 gradient, const Sym3 *hessian);
+
+// Radius of a single blob's surface, rho sqrt(5 (sqrt(rho/T) - 1)); 0 for rho <= T.
+double blob_radius(double width, double iso_level);
+// Its inverse: the width whose surface is a sphere of radius r > 0.
+double blob_width_for_radius(double radius, double iso_level);
+
+typedef struct SurfacePoint {
+    Vec3 foot;               // on f = 0, the (locally) closest to the query
+    Vec3 normal;             // grad f / |grad f| at the foot: into the lumen
+    Sym3 shape;              // Hessian of the signed distance at the foot: P H P / |grad f| [1/mm]
+    double distance;         // signed, > 0 inside: (x - foot) . normal, the true distance once converged
+    bool converged;          // |f|/|grad f| < 1e-9 mm and x - foot parallel to the normal to 1e-4 (or |x - foot| < 1e-6)
+} SurfacePoint;
+// The closest surface point by Newton steps on (f = 0, x - foot parallel to grad f), started at `start` (x itself, or the last
+// contact). Survives points where grad f vanishes or the field is no distance: falls back to a bracketed search towards the
+// nearest blob, never returns NaN.
+SurfacePoint blobby_project(const Blobby *model, Vec3 x, Vec3 start);
+
+#endif

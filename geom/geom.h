@@ -1,0 +1,14 @@
+// geom: shapes. Vectors, the vessel tree, blobby fields, and the one interface through which the solver sees a vessel.
+// Depends on nothing; never sees a file, a device, a clock or OpenGL. Lengths mm, angles rad.
+#ifndef SELDINGER_GEOM_GEOM_H
+#define SELDINGER_GEOM_GEOM_H
+
+#include "geom/blobby.h"
+#include "geom/faults.h"
+#include "geom/isosurface.h"
+#include "geom/linear.h"
+#include "geom/power_walk.h"
+#include "geom/vessel.h"
+#include "geom/vessel_tree.h"
+
+#endif

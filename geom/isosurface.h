@@ -1,0 +1,25 @@
+// Triangles of a field's zero level (marching cubes with vertices projected onto the surface), and of a whole LIM tree: each
+// local model's surface cut to its power cell (Kerrien 2017, 5.3.3).
+#ifndef SELDINGER_GEOM_ISOSURFACE_H
+#define SELDINGER_GEOM_ISOSURFACE_H
+
+#include "geom/vessel.h"
+#include "geom/vessel_tree.h"
+
+typedef struct TriangleMesh {
+    int vertex_count, triangle_count;
+    Vec3 *vertex;            // (V) [mm]
+    Vec3 *normal;            // (V) unit, OUT of the lumen
+    int *node;               // (V) node of the tree whose model the vertex lies on
+    int (*triangle)[3];      // (T) counter-clockwise seen from outside the lumen
+} TriangleMesh;
+
+// Surface of one local model within a box around its blobs, cell size `cell_mm`.
+TriangleMesh *isosurface_of_model(const VesselTree *tree, int node, double cell_mm);
+// Surface of the tree: one sparse grid over the whole tree, the field at a grid point is that of its power-nearest node
+// (candidates limited to nodes whose tube reaches the point), so neighbouring models join without a gap. Vertices are projected
+// on their node's model. Memory grows with the surface, not with the bounding box.
+TriangleMesh *isosurface_of_tree(const VesselTree *tree, double cell_mm);
+void triangle_mesh_free(TriangleMesh *mesh);
+
+#endif

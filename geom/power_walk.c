@@ -1,0 +1,1 @@
+#include "geom/power_walk.h"

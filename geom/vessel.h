@@ -1,0 +1,78 @@
+// What the solver asks of a vessel: for tool points with their last node, the gap to the wall, the wall's normal and the
+// Hessian of the gap. One small interface; LIM, exact tube, plane (and later mesh) answer it.
+//
+// gap: signed distance from the point to the wall [mm], > 0 inside the lumen (the tool's radius is the caller's business).
+// normal: unit, gradient of the gap, pointing into the lumen. hessian: second derivative of the gap AT THE POINT [1/mm]: with S the
+// surface's Hessian of distance at the foot, S (I + gap S)^-1; 0 along the normal.
+// A vessel is immutable after creation; queries allocate nothing and may run in several threads, each with its own memory array.
+#ifndef SELDINGER_GEOM_VESSEL_H
+#define SELDINGER_GEOM_VESSEL_H
+
+#include "geom/linear.h"
+#include "geom/vessel_tree.h"
+
+// What a tool point remembers between steps.
+typedef struct VesselMemory {
+    int node;                // node of the tree, or segment of the tube; -1: not yet located
+    bool has_foot;
+    Vec3 foot;               // last projection, where Newton starts
+} VesselMemory;
+
+enum {
+    VESSEL_FAR = 1,          // certainly further from the wall than `reach`: gap is a lower bound, normal and hessian are unset (0)
+    VESSEL_OPEN_END = 2,     // beyond an open end (upstream of the inlet): there is no wall, gap = +HUGE_VAL, normal 0
+    VESSEL_UNSURE = 4,       // the projection did not converge: gap is Taubin's distance, normal the gradient's direction
+};
+
+typedef struct VesselHit {
+    double gap;
+    Vec3 normal;
+    Sym3 hessian;
+    int node;
+    unsigned flags;
+} VesselHit;
+
+typedef struct Vessel Vessel;
+struct Vessel {
+    const char *kind;        // "lim", "tube", "plane"
+    // Answers for `count` points. memory[i] is updated. reach [mm]: gaps beyond it may be answered by VESSEL_FAR.
+    void (*query)(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit);
+    // First location of a point: the best node overall where `from` is -1, else the best reached by walking from node `from`
+    // (Kerrien 2017, 6.2.1: the proximal point globally, each further one from its predecessor).
+    int (*locate)(const Vessel *vessel, Vec3 point, int from);
+    // Inlet: a point on the root's open end and the unit direction into the vessel. False where it has none (plane).
+    bool (*inlet)(const Vessel *vessel, Vec3 *point, Vec3 *direction);
+    void (*destroy)(Vessel *vessel);
+};
+
+static inline void vessel_query(const Vessel *v, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
+{
+    v->query(v, count, point, reach, memory, hit);
+}
+
+// --- LIM: the fitted tree. Borrows the tree, which must outlive the vessel. NULL where the tree has no model. ---
+Vessel *lim_vessel_create(const VesselTree *tree);
+
+// --- Exact tube: the union of spheres of one radius along lines and arcs, or along a polyline. ---
+typedef struct TubePiece {   // a line (angle 0) or an arc
+    double length;           // line [mm] > 0
+    double arc_radius;       // arc [mm] > 0
+    double angle;            // arc [rad] > 0; 0 marks a line
+    double plane;            // arc: the turning plane is first rotated by this about the tangent [rad]
+} TubePiece;
+typedef struct TubeOptions {
+    Vec3 start, direction, normal;   // arcs turn towards normal (made perpendicular to direction; the frame is carried along without twist)
+    double radius;           // lumen [mm] > 0
+    int piece_count;
+    const TubePiece *piece;  // either pieces …
+    int point_count;
+    const Vec3 *point;       // … or a polyline of >= 2 points
+    bool closed_ends;        // hemispheres instead of open ends (open at BOTH ends when false)
+} TubeOptions;
+// NULL with a fault where a radius or a length is not positive, or an arc's radius is not larger than the lumen's.
+Vessel *tube_vessel_create(const TubeOptions *options, const char *file, Faults *faults);
+
+// --- Half space: gap = (x - point) . normal. ---
+Vessel *plane_vessel_create(Vec3 point, Vec3 normal);
+
+#endif

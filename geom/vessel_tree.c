@@ -1,0 +1,1 @@
+#include "geom/vessel_tree.h"

@@ -1,0 +1,52 @@
+// The vascular tree: centreline nodes with local point sets (RBT) and, once fitted, a local blobby model per node (LIM).
+// Kerrien et al. 2017, sections 3.1 and 4.5. Lengths mm, in the frame of the volume the tree came from.
+//
+// One tree owns all its arrays. Parents stand before children; the root is node 0 with parent -1. A tree that was made or
+// loaded is read-only afterwards and may be shared by threads.
+#ifndef SELDINGER_GEOM_VESSEL_TREE_H
+#define SELDINGER_GEOM_VESSEL_TREE_H
+
+#include "geom/faults.h"
+#include "geom/linear.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum { NODE_VESSEL = 0, NODE_ANEURYSM = 1 };
+
+typedef struct VesselTree {
+    int node_count;          // N
+    Vec3 *center;            // (N)
+    double *radius;          // (N) [mm] > 0
+    Vec3 *direction;         // (N) unit, from parent towards children
+    double *height;          // (N) [mm] >= 0, extent of the cylinder along direction
+    int32_t *parent;         // (N) -1 at the root, else < own index
+    uint8_t *kind;           // (N) NODE_VESSEL or NODE_ANEURYSM
+
+    int64_t point_count;     // P
+    Vec3 *point;             // (P) on the vessel's surface
+    int64_t *point_offset;   // (N+1) node i owns points [offset[i], offset[i+1])
+
+    int64_t blob_count;      // B, 0 until fitted
+    Vec3 *blob_center;       // (B)
+    double *blob_width;      // (B) [mm] rho > 0
+    int64_t *blob_offset;    // (N+1)
+    double *error;           // (N) [mm] 90th percentile of Taubin's distance of the node's points
+    double iso_level;        // T, 0.1
+
+    int *neighbour_offset;   // (N+1) derived: parent and children of each node …
+    int *neighbour;          // … in one list of 2 (N-1) entries, parent first, children by index
+} VesselTree;
+
+// Allocates all arrays for the counts (all zeroed, offsets included, iso_level 0.1). NULL where memory or a count is unfit.
+// `blob_count` 0 gives a tree without model: blob arrays and error exist with size 0 (blob_offset all zero).
+VesselTree *vessel_tree_create(int node_count, int64_t point_count, int64_t blob_count);
+void vessel_tree_free(VesselTree *tree);
+// Checks everything the comments above promise (finite numbers, offsets monotone and closed, parents before children, one
+// root, unit directions to 1e-6, radii and widths positive). Adds one fault per broken rule with the first offending index.
+bool vessel_tree_validate(const VesselTree *tree, const char *file, Faults *faults);
+// Fills the neighbour lists; call once after parents are set.
+void vessel_tree_link(VesselTree *tree);
+static inline bool vessel_tree_is_model(const VesselTree *tree) { return tree->blob_count > 0; }
+
+#endif

@@ -1,0 +1,36 @@
+// input: what the hand does. One command (push, twist) from a script now; gamepad, HID and USB devices join here.
+// Uses geom/faults.h only.
+#ifndef SELDINGER_INPUT_INPUT_H
+#define SELDINGER_INPUT_INPUT_H
+
+#include "geom/faults.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+typedef struct Command {
+    double push_mm_s;        // > 0 into the patient
+    double twist_deg_s;      // right-handed about the direction of advance
+} Command;
+
+typedef struct ScriptRow {
+    double t_s;
+    Command command;
+} ScriptRow;
+
+typedef struct Script {      // each row holds from its time until the next; the last row's time ends the script
+    int count;
+    ScriptRow *row;
+} Script;
+
+// Parses the text of a script: CSV with the header t_s,push_mm_s,twist_deg_s, `#` comments. NULL with faults where it is wrong:
+// wrong header, not a number, times that go backwards, first time negative, |push| > 1000 mm/s, |twist| > 36,000 deg/s, no row.
+Script *script_parse(const char *text, size_t length, const char *file, Faults *faults);
+// Reads the file (at most 64 MiB) and parses it.
+Script *script_load(const char *path, Faults *faults);
+void script_free(Script *script);
+double script_duration_s(const Script *script);
+// Command at simulated time t (zero before the first row and after the end). `cursor` remembers the row between calls, start with 0.
+Command script_at(const Script *script, double t_s, int *cursor);
+
+#endif

@@ -1,0 +1,1 @@
+#include "recon/tree_file.h"

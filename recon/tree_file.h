@@ -1,0 +1,19 @@
+// Trees and models as HDF5 files (shared/CONTRACT.md "Tree and model"), float64, mm. Loading checks every size, type and rule of
+// vessel_tree_validate before it trusts the file; saving writes beside and renames, so that no half file is left.
+#ifndef SELDINGER_RECON_TREE_FILE_H
+#define SELDINGER_RECON_TREE_FILE_H
+
+#include "geom/vessel_tree.h"
+
+typedef struct TreeFileInfo {  // root attributes
+    char *source;            // what it was made from
+    char *parameters;        // YAML text of all parameters
+    char *created_by;        // "seldinger VERSION segment" …
+} TreeFileInfo;
+
+// NULL with faults. `info` may be NULL; free it with tree_file_info_free.
+VesselTree *tree_file_load(const char *path, TreeFileInfo *info, Faults *faults);
+bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char *path, Faults *faults);
+void tree_file_info_free(TreeFileInfo *info);
+
+#endif

@@ -1,0 +1,1 @@
+#include "recon/volume.h"

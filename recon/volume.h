@@ -1,0 +1,43 @@
+// Volumes: scalar voxel grids in patient coordinates. NRRD (raw, gzip; attached and detached), MetaImage, NIfTI.
+//
+// Voxel (i, j, k), i fastest, lies at origin + i axis[0] + j axis[1] + k axis[2] [mm]; axes may be oblique and anisotropic. The frame (RAS, LPS)
+// is kept as the header says, never converted. Values are held as float. Every header figure is checked before memory is taken: a lying
+// header is a fault with its line (or byte) and what would be valid.
+#ifndef SELDINGER_RECON_VOLUME_H
+#define SELDINGER_RECON_VOLUME_H
+
+#include "geom/faults.h"
+#include "geom/linear.h"
+
+#include <stddef.h>
+
+typedef struct Volume {
+    int size[3];
+    Vec3 origin;             // [mm] centre of voxel (0,0,0)
+    Vec3 axis[3];            // [mm] step from voxel to voxel
+    Mat3 to_voxel;           // inverse of the axes: voxel = to_voxel (x - origin)
+    float *value;            // (size[2], size[1], size[0])
+    float minimum, maximum;
+    char frame[32];          // "RAS", "LPS", … or "" where the header does not say
+    char format[16];         // "nrrd", "metaimage", "nifti"
+} Volume;
+
+// By content, not by extension. NULL with faults.
+Volume *volume_load(const char *path, Faults *faults);
+// A volume of the given grid, values zero. NULL where size is not positive or memory lacks.
+Volume *volume_create(const int size[3], Vec3 origin, const Vec3 axis[3]);
+void volume_free(Volume *volume);
+// Writes .nrrd (gzip, float or uint8 / int16 as `type` says: "float", "uint8", "int16").
+bool volume_save_nrrd(const Volume *volume, const char *path, const char *type, Faults *faults);
+static inline double volume_voxel_size(const Volume *v)   // mean edge [mm]
+{
+    return (vec3_norm(v->axis[0]) + vec3_norm(v->axis[1]) + vec3_norm(v->axis[2])) / 3;
+}
+// Continuous voxel coordinates of a point and back.
+static inline Vec3 volume_voxel_of(const Volume *v, Vec3 x) { return mat3_mul_vec(&v->to_voxel, vec3_sub(x, v->origin)); }
+static inline Vec3 volume_point_of(const Volume *v, Vec3 voxel)
+{
+    return vec3_add_scaled(vec3_add_scaled(vec3_add_scaled(v->origin, voxel.x, v->axis[0]), voxel.y, v->axis[1]), voxel.z, v->axis[2]);
+}
+
+#endif

@@ -1,0 +1,47 @@
+// A scene: YAML text to options in internal units. shared/CONTRACT.md "Scene" is the format's specification; every fault of a
+// file is reported in one pass. Sees the scene file and its script, but not volumes or models: what `vessel:` names is opened by
+// cli/vessel_source.c, because recon is not below sim.
+#ifndef SELDINGER_SIM_SCENE_H
+#define SELDINGER_SIM_SCENE_H
+
+#include "geom/geom.h"
+#include "input/input.h"
+#include "solver/solver.h"
+
+typedef enum { SOURCE_MODEL, SOURCE_SHAPE, SOURCE_TUBE, SOURCE_PLANE, SOURCE_NONE } VesselSourceKind;
+typedef enum { CONTACT_LIM, CONTACT_MESH, CONTACT_TUBE } ContactKind;   // `contact:` of the vessel, `--contact` on the command line
+
+typedef struct SceneTarget {
+    char name[64];
+    Vec3 point;
+    double radius;
+} SceneTarget;
+
+typedef struct Scene {
+    char *path;              // of the YAML file
+    char *text;              // its full text, as read
+    VesselSourceKind source;
+    char *model_path;        // SOURCE_MODEL: resolved against the scene's folder
+    char shape_name[64];     // SOURCE_SHAPE: name …
+    int shape_option_count;  // … and its other keys as text, checked by the synth code
+    char (*shape_option)[2][64];
+    TubeOptions tube;        // SOURCE_TUBE (pieces and points owned by the scene)
+    Vec3 plane_point, plane_normal;
+    ContactKind contact;
+    double friction;
+    WireOptions wire;        // sections, fixes, loads owned by the scene
+    bool inlet_is_root;      // sheath `inlet: root`: start and direction to be taken from vessel->inlet
+    ContactOptions contact_options;
+    double dt;               // [ms]
+    Script *script;          // NULL: none
+    char *script_path;       // NULL where inline or none
+    int target_count;
+    SceneTarget *target;
+} Scene;
+
+// `text` need not be NUL-terminated; `path` is for messages and to resolve relative files. NULL with faults.
+Scene *scene_parse(const char *text, size_t length, const char *path, Faults *faults);
+Scene *scene_load(const char *path, Faults *faults);
+void scene_free(Scene *scene);
+
+#endif

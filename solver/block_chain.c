@@ -1,0 +1,1 @@
+#include "solver/block_chain.h"

@@ -1,0 +1,34 @@
+// Contact candidates of one step: Signorini and Coulomb on gaps linearised at the start of the step, x_n.
+//
+// A candidate sits on the tool's axis, at node `node` or between nodes `node` and `node`+1 (weights 1-xi, xi). Its displacement in the step is
+//   d = (1-xi) (u_i + theta_i x a) + xi (u_j + theta_j x a),  a = -tool_radius * normal (the touching point relative to the axis).
+// Signorini:  0 <= gap + normal . d   perpendicular to   force_n >= 0.
+// Coulomb:    |force_t| <= friction * force_n, opposite to the tangential part of d where there is slip.
+// Forces in N act on the tool; `force` is the whole vector in space and is kept per material point from step to step as warm start.
+#ifndef SELDINGER_SOLVER_CONTACT_H
+#define SELDINGER_SOLVER_CONTACT_H
+
+#include "geom/linear.h"
+
+typedef struct ContactPoint {
+    int node;
+    double xi;               // [0, 1); 0: at the node, the usual case
+    Vec3 normal;             // unit, into the lumen
+    double gap;              // [mm] at x_n, tool radius already taken off
+    Sym3 hessian;            // of the gap [1/mm]; -force_n times it, clamped to its positive semi-definite tangential part, is stiffness
+    double friction;         // mu >= 0
+    double tool_radius;      // [mm]
+    Vec3 force;              // [N] on the tool; in: warm start, out: solution
+} ContactPoint;
+
+typedef struct ContactSet {
+    int count, capacity;
+    ContactPoint *point;
+} ContactSet;
+
+// Adds the curvature stiffness of the set (warm-start forces) to a node's 6x6 diagonal blocks (and couplings where xi > 0).
+// DESIGN section 4, item 1.
+struct BlockChain;
+void contact_add_curvature(const ContactSet *set, struct BlockChain *chain);
+
+#endif

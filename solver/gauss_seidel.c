@@ -1,0 +1,1 @@
+#include "solver/gauss_seidel.h"

@@ -1,0 +1,41 @@
+// The contact solve of a step. Find u and forces with   A u = b + sum_k J_k^T f_k,   Signorini and Coulomb (contact.h).
+//
+// Two forms behind one call (DESIGN section 4, items 5 and 6); both reach the same solution.
+//   pointwise: Gauss-Seidel over contacts (the paper's, and the reference), on the chain's semi-separable structure: W is never formed.
+//   block:     Gauss-Seidel between the normal and the friction field, each solved by a semismooth Newton method on the augmented
+//              Lagrangian with exact line search; an iteration is one chain factorisation.
+#ifndef SELDINGER_SOLVER_GAUSS_SEIDEL_H
+#define SELDINGER_SOLVER_GAUSS_SEIDEL_H
+
+#include "solver/block_chain.h"
+#include "solver/contact.h"
+
+#include <stdbool.h>
+
+typedef enum { CONTACT_BLOCK = 0, CONTACT_POINTWISE = 1 } ContactForm;
+
+typedef struct ContactOptions {
+    ContactForm form;        // default CONTACT_BLOCK
+    int max_iterations;      // sweeps (pointwise) or factorisations (block); from the scene's contact_iterations
+    double tolerance;        // on the residual below, default 1e-6
+} ContactOptions;
+
+typedef struct ContactReport {
+    int iterations;          // sweeps or factorisations used
+    bool converged;
+    double residual;         // natural residual: largest over contacts of |force - project_K(force - r * violation)| over the largest force (at least 1e-3 N)
+    double cone_violation;   // largest (|force_t| - mu force_n)+ over force_n
+    int active;              // contacts with force
+} ContactReport;
+
+typedef struct ContactSolver ContactSolver;   // work space
+ContactSolver *contact_solver_create(int node_count, int contact_capacity);
+void contact_solver_destroy(ContactSolver *solver);
+
+// `factor` is that of `chain`. b (M, 6) in; u (M, 6) out. Rows of constrained degrees of freedom are already unit rows in
+// `chain` with their value in b, and no contact acts on a fully constrained node.
+ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, ContactSet *set,
+                            const ContactOptions *options, double *u);
+ContactOptions contact_default_options(void);
+
+#endif

@@ -1,0 +1,87 @@
+// One implicit Euler step, in the stages in which the simulator calls and times them (sim/simulator.c reads like the paper):
+//   step_feed      take the command: advance and rotation of the driven node become this step's prescribed displacement
+//   step_detect    candidates and gaps at x_n from the vessel
+//   step_assemble  (M/h^2 + D/h + K) u = M v/h + f(x_n) + ..., with tension and curvature terms, constraints as unit rows
+//   step_factor
+//   step_contact   free motion, Gauss-Seidel
+//   step_correct   x_{n+1}, v_{n+1}, reactions; on non-finite or absurd motion keeps x_n, sets STEP_DIVERGED
+// A step allocates nothing, reads no clock. One thread per Stepper; several Steppers may share a vessel.
+#ifndef SELDINGER_SOLVER_STEP_H
+#define SELDINGER_SOLVER_STEP_H
+
+#include "geom/vessel.h"
+#include "solver/gauss_seidel.h"
+#include "solver/wire.h"
+
+typedef struct StepCommand {
+    double advance;          // [mm] in this step, > 0 into the patient
+    double twist;            // [rad] in this step, right-handed about the direction of advance
+} StepCommand;
+
+enum {
+    STEP_DIVERGED = 1,           // state kept at x_n; the run cannot be trusted
+    STEP_NOT_CONVERGED = 2,      // contact solve stopped at its cap
+    STEP_DEEP = 4,               // a node further than 0.2 mm outside the wall
+    STEP_FULLY_INSERTED = 8,     // advance was clamped: the whole tool is in
+    STEP_FULLY_WITHDRAWN = 16,   // retraction was clamped
+    STEP_OUT_OF_VESSEL = 32,     // a node beyond an open end that is not the sheath's
+    STEP_DETECTION_UNSURE = 64,  // a projection did not converge
+};
+
+typedef struct StepReport {
+    unsigned flags;
+    int candidates, active;
+    int iterations;
+    double residual, cone_violation;
+    double penetration;          // [mm] deepest, >= 0, of the state at the step's start (true distance)
+    double proximal_force;       // [N] push reaction at the driven node, > 0 when the hand pushes
+    double proximal_torque;      // [N mm]
+    double wall_force_max;       // [N] largest contact force
+    double wall_force_sum;       // [N] sum of magnitudes
+} StepReport;
+
+typedef struct Stepper Stepper;
+
+typedef struct StepperOptions {
+    WireOptions wire;
+    const Vessel *vessel;        // may be NULL: no walls
+    double wall_friction;
+    ContactOptions contact;
+    double dt;                   // [ms], default 1
+} StepperOptions;
+
+// NULL with a message in `why` (capacity >= 256) where an option is out of range.
+Stepper *stepper_create(const StepperOptions *options, char *why, int capacity);
+void stepper_destroy(Stepper *stepper);
+
+void step_feed(Stepper *stepper, StepCommand command);
+void step_detect(Stepper *stepper);
+void step_assemble(Stepper *stepper);
+void step_factor(Stepper *stepper);
+void step_contact(Stepper *stepper);
+void step_correct(Stepper *stepper);
+const StepReport *step_report(const Stepper *stepper);
+
+// State. The pointer stays valid; write through stepper_restore only.
+const WireState *stepper_state(const Stepper *stepper);
+// A checkpoint holds everything that the next step depends on (state, warm-start forces, vessel memory): restored, the run repeats bit for bit.
+typedef struct Checkpoint Checkpoint;
+Checkpoint *stepper_save(const Stepper *stepper, Checkpoint *reuse);   // reuse may be NULL
+void stepper_restore(Stepper *stepper, const Checkpoint *checkpoint);
+void checkpoint_free(Checkpoint *checkpoint);
+uint64_t stepper_hash(const Stepper *stepper);            // FNV-1a over the checkpoint's bytes
+
+// Per node, for files and pictures (arrays of M).
+typedef struct NodeReport {
+    double s;                    // [mm] arc length from the proximal end
+    double radius;               // [mm] of the tool at the node
+    Vec3 force;                  // [N] from the wall
+    double gap;                  // [mm] at the current state, tool radius taken off; +HUGE_VAL in the sheath or where nothing is near
+    int vessel_node;             // -1 in the sheath or without vessel
+} NodeReport;
+// Detects afresh at the current state (for the end of a run, not for a step).
+void stepper_node_report(Stepper *stepper, NodeReport *node);
+double stepper_elastic_energy(const Stepper *stepper);    // [mJ]
+double stepper_kinetic_energy(const Stepper *stepper);    // [mJ]
+
+#endif
