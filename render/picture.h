@@ -1,0 +1,124 @@
+// Pictures off screen, each a PNG: a run, moments of a run, an angiogram's projections with the tree, a fit, time series.
+//
+// Plain arrays in, a file out. Lengths mm, forces N, torques N mm, times s (these are borders: names carry the unit where it is not mm).
+// All arrays stay the caller's and are only read. Every function makes its own GL context (EGL, surfaceless, no X needed) and takes it down
+// again; one call at a time per thread, the same bytes for the same input on the same machine.
+//
+// Return: true, or false with one line in `message` (which may be NULL): EGL or OpenGL 3.3 is not available (say so and go on: a picture is
+// never worth a failed run), the input has nothing to draw or numbers that are not finite, or the file cannot be written (it is written beside
+// and renamed, so an older picture stays whole).
+#ifndef SELDINGER_RENDER_PICTURE_H
+#define SELDINGER_RENDER_PICTURE_H
+
+#include "geom/geom.h"
+#include "sim/scene.h"
+
+typedef struct PictureOptions {
+    int width, height;         // [pixel] 64 to 8192; default 1600 x 1000
+    const char *title;         // first words of the title line, default NULL: none
+    Vec3 view;                 // direction from the eye into the scene; zero (default): face on, along the axis of least extent
+    Vec3 up;                   // points up on paper; zero (default): the coordinate axis best seen from there, z before y before x
+    Vec3 focus;                // what the large view shows: a sphere around this point …
+    double focus_radius;       // … of this radius [mm]; 0 (default): vessel, targets and (where there is no vessel) tool, all of it
+    bool inset;                // close-up of the tip in a corner; default true
+    double inset_radius;       // [mm] of the sphere the close-up shows; 0 (default): chosen from the lumen (4 to 12 mm)
+    double force_full_scale;   // [N] top of the colour map of wall force; 0 (default): the largest force shown, rounded up to 1, 2 or 5
+    double distance_full_scale;// [mm] ends of the diverging map of `picture_of_fit`; 0 (default): the 98th percentile of |distance|, rounded up
+    int worst_count;           // `picture_of_fit`: close-ups of the local models with the largest error; 0 to 12, default 6
+    bool arrows;               // wall forces as arrows; default true
+} PictureOptions;
+PictureOptions picture_default_options(void);
+
+// Can pictures be made here at all? False with the reason.
+bool picture_available(char *message, size_t capacity);
+
+// --- a run ---
+typedef struct PictureScene {
+    const TriangleMesh *vessel;// NULL: no vessel drawn (rigs, planes)
+    int target_count;
+    const SceneTarget *target; // wire spheres with names
+    bool has_entry;            // a sheath: its mouth is marked, the tool behind it is drawn grey
+    Vec3 entry;
+} PictureScene;
+
+typedef struct PictureTool {   // the tool at one moment
+    int node_count;            // M >= 2
+    const Vec3 *position;      // (M) proximal to distal
+    const double *radius;      // (M) [mm] of the tool at each node
+    const Vec3 *force;         // (M) [N] what the wall exerts on each node; NULL: none
+    int first_free_node;       // nodes below it lie in the sheath (0: all free)
+    double time_s;
+    double inserted_mm;
+    double push_force_n;       // at the proximal end
+    double torque_n_mm;
+    const char *label;         // NULL, or words for this moment ("past the neck")
+} PictureTool;
+
+// Large view of the vessel (translucent) with the tool (coloured by wall force), arrows, targets, scale bar, legend, and a close-up of the tip.
+bool picture_of_run(const char *path, const PictureOptions *options, const PictureScene *scene, const PictureTool *tool, char *message,
+                    size_t capacity);
+// Up to 6 moments side by side, same camera, same colour scale.
+bool picture_of_moments(const char *path, const PictureOptions *options, const PictureScene *scene, int tool_count, const PictureTool *tool,
+                        char *message, size_t capacity);
+
+// Surfaces for scenes whose vessel is no tree; free with triangle_mesh_free. NULL where memory lacks or the options describe nothing.
+TriangleMesh *picture_mesh_of_tube(const TubeOptions *tube);
+TriangleMesh *picture_mesh_of_plane(Vec3 point, Vec3 normal, double half_width);
+
+// --- an angiogram and its tree ---
+typedef struct PictureProjection {
+    int width, height;
+    const float *value;        // (height, width), row 0 is drawn at the bottom
+    Vec3 origin;               // of the centre of pixel (0, 0); any depth along the projection
+    Vec3 across, up;           // steps from pixel to pixel and row to row [mm]: a point's pixel is found by dot products with them
+    const char *across_name, *up_name;   // "x", "-y"; NULL: none
+} PictureProjection;
+
+typedef struct PicturePolyline {
+    int count;
+    const Vec3 *point;         // (count) in space; drawn over each projection
+    const double *radius;      // (count) [mm]; NULL: centreline alone, else the tube's outline, faint, too
+    int color;                 // index into the qualitative map, any value >= 0
+} PicturePolyline;
+
+typedef struct PictureMark {
+    Vec3 point;
+    const char *label;         // NULL: none
+} PictureMark;
+
+// `low`, `high`: values drawn black and white; equal (0, 0): from the images' percentiles.
+bool picture_of_projections(const char *path, const PictureOptions *options, int projection_count, const PictureProjection *projection, float low,
+                            float high, int polyline_count, const PicturePolyline *polyline, int mark_count, const PictureMark *mark, char *message,
+                            size_t capacity);
+// The same from a voxel grid (layout of recon's Volume: value (size[2], size[1], size[0]), voxel (i,j,k) at origin + i axis[0] + …) and a tree:
+// three maximum-intensity projections, each branch in its own colour. `tree` may be NULL.
+bool picture_of_tree(const char *path, const PictureOptions *options, const int size[3], Vec3 origin, const Vec3 axis[3], const float *value, float low,
+                     float high, const VesselTree *tree, int mark_count, const PictureMark *mark, char *message, size_t capacity);
+
+// --- a fit ---
+// The fitted surface with the data points coloured by signed distance (blue: outside the model, red: inside), a histogram, and slices through the
+// worst local models with blobs, contour and points. `tree` must be a model; `distance` (tree->point_count) [mm] signed, > 0 inside, of each point to
+// its own node's model, NULL: Taubin's distance is computed here. `mesh` may be NULL (points alone).
+bool picture_of_fit(const char *path, const PictureOptions *options, const VesselTree *tree, const TriangleMesh *mesh, const double *distance,
+                    char *message, size_t capacity);
+
+// --- time series ---
+typedef struct PictureLine {
+    const char *label;
+    const double *value;       // (count) of the picture; values that are not finite leave a gap
+} PictureLine;
+typedef struct PicturePanel {
+    const char *title;         // with the unit: "push force [N]"
+    int line_count;
+    const PictureLine *line;
+    bool logarithmic;          // values <= 0 leave a gap
+} PicturePanel;
+typedef struct PictureEvent {  // a vertical line through all panels
+    double time_s;
+    const char *label;
+} PictureEvent;
+
+bool picture_of_series(const char *path, const PictureOptions *options, int count, const double *time_s, int panel_count, const PicturePanel *panel,
+                       int event_count, const PictureEvent *event, char *message, size_t capacity);
+
+#endif
