@@ -1,0 +1,58 @@
+// LIM: a local blobby model for every node of a tree. Kerrien et al. 2017, section 4, with the mends of DESIGN.md section 2.
+//
+// For each node: concatenate the points up to topological distance 2, start from two blobs along the vessel, then
+// select (worst point, its nearest blob), split, optimise (Polak-Ribiere, centre then width) until every point lies within the
+// target distance or the number of blobs is reached; clean up. One job a node on all cores; results do not depend on `threads`.
+#ifndef SELDINGER_RECON_LIM_FIT_H
+#define SELDINGER_RECON_LIM_FIT_H
+
+#include "geom/vessel_tree.h"
+#include "recon/parallel.h"
+
+typedef struct LimFitOptions {
+    // Table 1 of the paper by name
+    double alpha;            // weight of the Lennard-Jones cohesion E_c, 1e-5
+    double beta;             // weight of the curvature E_a [mm^4]; paper 1e-3, default 1e-4
+    double s;                // repulsive distance of E_c in widths, 2
+    double iso_level;        // T, 0.1
+    int max_blobs;           // N_s, 100
+    double target_mm;        // t_g [mm]; 0: max(0.5 voxel, min(0.2 r, 1.5 voxels)); paper 0.3
+    // what the paper fixes in its text
+    int topological_distance;   // points are concatenated up to this many steps along the tree, 2
+    int max_loops;           // centre-width loops per optimisation; paper 5, default 2
+    int line_searches;       // Polak-Ribiere steps per loop, 4
+    // departures (DESIGN.md section 2); the paper preset turns them off
+    double voxel_mm;         // for the automatic target, 0.2
+    bool weigh_distance;     // weigh E_d by mean g^2 / g_i^2: distances instead of field values
+    bool project_points;     // measure points beyond the target by projection, not by Taubin's one step
+    bool sweep_all_blobs;    // a short pass over all blobs after each split
+    int give_up_splits;      // stop when this many splits bring nothing; 0: never. 3
+    bool extend_inlet;       // the root's points are repeated outwards so that the vessel is tubular through the inlet plane
+    bool guard_shape;        // no constriction on the centreline, no ghost lobes away from the points
+    int max_points;          // a node's points are thinned evenly to this many for speed, 1500
+    int threads;             // 0: all cores
+} LimFitOptions;
+
+LimFitOptions lim_fit_default_options(void);
+LimFitOptions lim_fit_paper_options(void);   // as published: Table 1, Taubin's distance, no mends
+
+// A new tree: the input's nodes and points with a model. NULL with faults (options out of range, a node whose neighbourhood has
+// too few points).
+VesselTree *lim_fit(const VesselTree *tree, const LimFitOptions *options, const Progress *progress, Faults *faults);
+
+// One local model: points (count), the node's tube, and what the guards need: interior points (f > 0 wanted there). Blobs are
+// written to center, width (capacity max_blobs + 1). Returns the number of blobs, 0 where memory lacks.
+typedef struct LimFitTask {
+    int point_count;
+    const Vec3 *point;       // (point_count)
+    const double *weight;    // (point_count) relative weight of each point, or NULL
+    Vec3 center, direction;  // the node's; direction unit
+    double radius;           // > 0
+    int inside_count;
+    const Vec3 *inside;      // (inside_count) points that must be in the lumen, with …
+    const double *clearance; // … the distance from the wall that they should have; may be NULL where inside_count is 0
+    bool sphere_start;       // start from one central blob and not from a pair (aneurysms)
+} LimFitTask;
+int lim_fit_model(const LimFitTask *task, const LimFitOptions *options, Vec3 *center, double *width);
+
+#endif
