@@ -1,1 +1,320 @@
+// Field, gradient and Hessian of a blobby model in closed form (Kerrien et al. 2017, eq. (3) and (5)), and its closest surface point.
+//
+// With d = X - C, q = |d|^2 / (5 rho^2), u = 1 / (1 + q):
+//   f = sum rho u^2 - T,  grad f = sum A u^3 d,  H = sum A u^3 I + B u^4 d d',  A = -4/(5 rho),  B = 24/(25 rho^3)
+//
+// The closest point minimises |p - X|^2 / 2 on f = 0: a Newton method on the surface. At p with unit normal n and the shape operator
+// S = P H P / |g| the gradient of the distance's half square along the surface is P (p - X) and its Hessian there I + gap S, gap = (X - p).n.
+// Each step moves by -(I + gap S)^-1 P (p - X) in the tangent plane and falls back onto the surface along the gradient; it is taken only when it
+// brings p closer to X, else halved. Plain alternation of Taubin steps and tangential projections was tried first: it diverges beyond the focal
+// points, and one Taubin step is up to 2.3 times too long.
 #include "geom/blobby.h"
+
+double blobby_field(const Blobby *model, Vec3 x)
+{
+    double f = 0;
+    for (int j = 0; j < model->count; j++) {
+        double rho = model->width[j], u = 1 / (1 + vec3_norm2(vec3_sub(x, model->center[j])) / (5 * rho * rho));
+        f += rho * u * u;
+    }
+    return f - model->iso_level;
+}
+
+double blobby_gradient(const Blobby *model, Vec3 x, Vec3 *gradient)
+{
+    double f = 0;
+    Vec3 g = {0, 0, 0};
+    for (int j = 0; j < model->count; j++) {
+        Vec3 d = vec3_sub(x, model->center[j]);
+        double rho = model->width[j], u = 1 / (1 + vec3_norm2(d) / (5 * rho * rho)), u2 = u * u;
+        f += rho * u2;
+        g = vec3_add_scaled(g, -0.8 / rho * (u2 * u), d);
+    }
+    *gradient = g;
+    return f - model->iso_level;
+}
+
+double blobby_hessian(const Blobby *model, Vec3 x, Vec3 *gradient, Sym3 *hessian)
+{
+    double f = 0, trace = 0;
+    Vec3 g = {0, 0, 0};
+    Sym3 h = {0, 0, 0, 0, 0, 0};
+    for (int j = 0; j < model->count; j++) {
+        Vec3 d = vec3_sub(x, model->center[j]);
+        double rho = model->width[j], u = 1 / (1 + vec3_norm2(d) / (5 * rho * rho)), u2 = u * u;
+        double a = -0.8 / rho * (u2 * u), b = 0.96 / (rho * rho * rho) * (u2 * u2);
+        f += rho * u2;
+        g = vec3_add_scaled(g, a, d);
+        trace += a;
+        h.xx += b * d.x * d.x, h.xy += b * d.x * d.y, h.xz += b * d.x * d.z;
+        h.yy += b * d.y * d.y, h.yz += b * d.y * d.z, h.zz += b * d.z * d.z;
+    }
+    h.xx += trace, h.yy += trace, h.zz += trace;
+    *gradient = g;
+    *hessian = h;
+    return f - model->iso_level;
+}
+
+double blobby_curvature(Vec3 gradient, const Sym3 *hessian)
+{
+    double g2 = vec3_norm2(gradient);
+    if (!(g2 > 1e-280))
+        return 0;
+    return (sym3_quadratic(hessian, gradient) - g2 * sym3_trace(hessian)) / (2 * g2 * sqrt(g2));
+}
+
+double blob_radius(double width, double iso_level)
+{
+    return width > iso_level ? width * sqrt(5 * (sqrt(width / iso_level) - 1)) : 0;
+}
+
+// With s = sqrt(rho / T): s^5 - s^4 = r^2 / (5 T^2) = c. Convex for s > 1; both 1 + c and 1 + c^(1/5) lie above the root, from where
+// Newton comes down monotonously.
+double blob_width_for_radius(double radius, double iso_level)
+{
+    double c = radius * radius / (5 * iso_level * iso_level), fifth = pow(c, 0.2);
+    double s = 1 + (c < fifth ? c : fifth);
+    for (int i = 0; i < 100; i++) {
+        double s2 = s * s, next = s - (s2 * s2 * (s - 1) - c) / (s2 * s * (5 * s - 4));
+        if (!(next < s))
+            break;
+        s = next;
+    }
+    return iso_level * s * s;
+}
+
+// --- Closest surface point ---
+
+static double local_scale(const Blobby *model)
+{
+    double least = model->width[0];
+    for (int j = 1; j < model->count; j++)
+        least = model->width[j] < least ? model->width[j] : least;
+    return least;
+}
+
+// A zero of f between `in` (f > 0) and `out` (f < 0): false position with the Illinois rule and bisection every third time.
+static Vec3 cross_between(const Blobby *model, Vec3 in, double f_in, Vec3 out, double f_out)
+{
+    double a = 0, b = 1, fa = f_in, fb = f_out, length = vec3_distance(in, out);
+    for (int i = 0; i < 100 && (b - a) * length > 1e-10; i++) {
+        double t = i % 3 == 2 ? 0.5 * (a + b) : a + (b - a) * (fa / (fa - fb));
+        if (!(t > a && t < b))
+            t = 0.5 * (a + b);
+        double f = blobby_field(model, vec3_mix(in, out, t));
+        if (f > 0) {
+            a = t, fa = f;
+            fb *= 0.5;
+        } else {
+            b = t, fb = f;
+            fa *= 0.5;
+        }
+    }
+    return vec3_mix(in, out, 0.5 * (a + b));
+}
+
+// From x inside, out along unit d to the first crossing found with growing strides (the field falls to -T at infinity).
+static Vec3 march_out(const Blobby *model, Vec3 x, double f, Vec3 d, double scale)
+{
+    double t = 0, stride = 0.5 * scale, ft = f;
+    for (int i = 0; i < 200; i++) {
+        Vec3 next = vec3_add_scaled(x, t + stride, d);
+        double fn = blobby_field(model, next);
+        if (!(fn > 0))
+            return cross_between(model, vec3_add_scaled(x, t, d), ft, next, fn);
+        t += stride, ft = fn;
+        stride *= 1.25;
+    }
+    return x;
+}
+
+// From x outside, the nearest crossing on the way to a blob whose centre is inside. False where no centre is.
+static bool cross_towards_blobs(const Blobby *model, Vec3 x, double f, Vec3 *start)
+{
+    double best = HUGE_VAL;
+    for (int j = 0; j < model->count; j++) {
+        Vec3 c = model->center[j];
+        double fc = blobby_field(model, c);
+        if (!(fc > 0))
+            continue;
+        Vec3 p = cross_between(model, c, fc, x, f);
+        double d = vec3_norm2(vec3_sub(p, x));
+        if (d < best) {
+            best = d;
+            *start = p;
+        }
+    }
+    return best < HUGE_VAL;
+}
+
+// Falls from p onto f = 0 along the gradient, by steps f/|g| no longer than `longest`; false where it does not arrive.
+static bool fall_onto_surface(const Blobby *model, Vec3 *p, double longest)
+{
+    double before = HUGE_VAL;
+    for (int i = 0; i < 30; i++) {
+        Vec3 g;
+        double f = blobby_gradient(model, *p, &g), g2 = vec3_norm2(g);
+        if (!(g2 > 1e-200) || !isfinite(f))
+            return false;
+        double taubin = f / sqrt(g2), size = fabs(taubin);
+        // done when the step is rounding, or no longer falls (one more would only jitter)
+        if (size < 1e-14 || (size < 1e-10 && size >= before))
+            return true;
+        before = size;
+        double step = size > longest ? copysign(longest, taubin) : taubin;
+        *p = vec3_add_scaled(*p, -step / sqrt(g2), g);
+    }
+    return before < 1e-9;
+}
+
+typedef struct SurfaceFrame {
+    Vec3 foot, normal, tangent;  // tangent: P (foot - x)
+    Sym3 shape;
+    double field, slope, gap;    // slope = |grad f|
+} SurfaceFrame;
+
+static Sym3 shape_operator(Vec3 n, double slope, const Sym3 *h)
+{
+    Vec3 hn = sym3_mul_vec(h, n);
+    double nhn = vec3_dot(n, hn), s = 1 / slope;
+    // P H P = H - n (Hn)' - (Hn) n' + (n'Hn) n n'
+    return (Sym3){s * (h->xx - 2 * n.x * hn.x + nhn * n.x * n.x),
+                  s * (h->xy - n.x * hn.y - n.y * hn.x + nhn * n.x * n.y),
+                  s * (h->xz - n.x * hn.z - n.z * hn.x + nhn * n.x * n.z),
+                  s * (h->yy - 2 * n.y * hn.y + nhn * n.y * n.y),
+                  s * (h->yz - n.y * hn.z - n.z * hn.y + nhn * n.y * n.z),
+                  s * (h->zz - 2 * n.z * hn.z + nhn * n.z * n.z)};
+}
+
+static bool surface_frame(const Blobby *model, Vec3 x, Vec3 foot, SurfaceFrame *frame)
+{
+    Vec3 g;
+    Sym3 h;
+    frame->foot = foot;
+    frame->field = blobby_hessian(model, foot, &g, &h);
+    frame->slope = vec3_norm(g);
+    if (!(frame->slope > 1e-100) || !isfinite(frame->field))
+        return false;
+    Vec3 n = frame->normal = vec3_scale(g, 1 / frame->slope), away = vec3_sub(foot, x);
+    frame->gap = -vec3_dot(away, n);
+    frame->tangent = vec3_add_scaled(away, frame->gap, n);
+    frame->shape = shape_operator(n, frame->slope, &h);
+    return true;
+}
+
+// The tangential Newton step -(I + gap S)^-1 P (foot - x), each eigenvalue raised to at least `floor`. `least` gets the smallest
+// eigenvalue before that, `weak` its direction.
+static Vec3 tangential_step(const SurfaceFrame *frame, double floor, double *least, Vec3 *weak)
+{
+    Vec3 t1 = vec3_normal_to(frame->normal), t2 = vec3_cross(frame->normal, t1), s1 = sym3_mul_vec(&frame->shape, t1);
+    double a = 1 + frame->gap * vec3_dot(t1, s1), b = frame->gap * vec3_dot(t2, s1), c = 1 + frame->gap * sym3_quadratic(&frame->shape, t2);
+    double mean = 0.5 * (a + c), spread = sqrt(0.25 * (a - c) * (a - c) + b * b), low = mean - spread, high = mean + spread;
+    double angle = 0.5 * atan2(2 * b, a - c), cs = cos(angle), sn = sin(angle);   // of the higher eigenvalue's direction
+    Vec3 e_high = vec3_add_scaled(vec3_scale(t1, cs), sn, t2), e_low = vec3_add_scaled(vec3_scale(t1, -sn), cs, t2);
+    *least = low;
+    *weak = e_low;
+    double y_high = -vec3_dot(e_high, frame->tangent) / (high > floor ? high : floor);
+    double y_low = -vec3_dot(e_low, frame->tangent) / (low > floor ? low : floor);
+    return vec3_add_scaled(vec3_scale(e_high, y_high), y_low, e_low);
+}
+
+// Slides a foot on the surface to the locally closest point. False where the surface is lost at once.
+static bool slide_to_closest(const Blobby *model, Vec3 x, Vec3 foot, double scale, SurfaceFrame *best, double *least)
+{
+    enum { STEPS = 60, KICKS = 2 };
+    double trust = 4 * scale + vec3_distance(x, foot);
+    int kicks = 0;
+    if (!surface_frame(model, x, foot, best))
+        return false;
+    for (int i = 0; i < STEPS; i++) {
+        Vec3 weak;
+        Vec3 step = tangential_step(best, 0.1, least, &weak);
+        double length = vec3_norm(step), size = vec3_distance(x, best->foot);
+        if (vec3_norm(best->tangent) <= 1e-13 * (1 + size)) {
+            // a point where the distance has a maximum along the surface (x beyond its focal point): leave it sideways, the same way always
+            if (*least > -1e-3 || kicks == KICKS)
+                break;
+            kicks++;
+            step = vec3_scale(weak, 0.1 * size), length = 0.1 * size;
+        }
+        bool taken = false;
+        SurfaceFrame next;
+        double shrink = length > trust ? trust / length : 1;
+        for (int half = 0; half < 12 && !taken; half++, shrink *= 0.5) {
+            Vec3 p = vec3_add_scaled(best->foot, shrink, step);
+            if (!fall_onto_surface(model, &p, scale) || !surface_frame(model, x, p, &next))
+                continue;
+            // within rounding of the same distance the smaller tangential rest decides
+            double there = vec3_distance(x, p);
+            taken = there < size - 1e-13 * (1 + size) ||
+                    (there <= size + 1e-13 * (1 + size) && vec3_norm(next.tangent) < 0.9 * vec3_norm(best->tangent));
+        }
+        if (!taken)
+            break;
+        trust = 2 * vec3_distance(next.foot, best->foot) + 0.1 * scale;
+        *best = next;
+    }
+    return true;
+}
+
+static bool start_on_surface(const Blobby *model, Vec3 x, double f, Vec3 g, double scale, Vec3 *start)
+{
+    if (f > 0) {
+        // the closest wall lies more or less where the field falls fastest; where it is flat any direction is as good, the same one always
+        *start = march_out(model, x, f, vec3_unit_or(vec3_negate(g), vec3(1, 0, 0)), scale);
+        return true;
+    }
+    // near the surface fall onto it; from afar the field is no distance and the crossings towards the blobs are better starts
+    Vec3 near = x;
+    double slope = vec3_norm(g);
+    if (slope > 1e-100 && -f / slope < scale && fall_onto_surface(model, &near, scale)) {
+        *start = near;
+        return true;
+    }
+    return cross_towards_blobs(model, x, f, start);
+}
+
+static void keep_closer(const Blobby *model, Vec3 x, Vec3 start, double scale, SurfaceFrame *best, double *least)
+{
+    SurfaceFrame other;
+    double other_least = 1;
+    if (slide_to_closest(model, x, start, scale, &other, &other_least) && fabs(other.gap) < fabs(best->gap) - 1e-9) {
+        *best = other;
+        *least = other_least;
+    }
+}
+
+SurfacePoint blobby_project(const Blobby *model, Vec3 x, Vec3 start)
+{
+    SurfacePoint lost = {.foot = vec3(0, 0, 0), .normal = vec3(1, 0, 0)};
+    if (model->count < 1 || !vec3_is_finite(x) || !(vec3_norm2(x) < 1e200))
+        return lost;
+    double scale = local_scale(model), least = 1;
+    Vec3 g, foot = start;
+    double f = blobby_gradient(model, x, &g);
+    bool warm = vec3_is_finite(start) && vec3_norm2(vec3_sub(start, x)) > 0 && fall_onto_surface(model, &foot, scale);
+    SurfaceFrame best;
+    if ((!warm && !start_on_surface(model, x, f, g, scale, &foot)) || !slide_to_closest(model, x, foot, scale, &best, &least)) {
+        // no surface in reach: the distance to the nearest centre is all that can be said
+        Vec3 c = model->center[0];
+        for (int j = 1; j < model->count; j++)
+            if (vec3_norm2(vec3_sub(model->center[j], x)) < vec3_norm2(vec3_sub(c, x)))
+                c = model->center[j];
+        lost.foot = c;
+        lost.normal = vec3_unit(vec3_sub(c, x));
+        lost.distance = -vec3_distance(x, c);
+        return lost;
+    }
+    // Without a last contact, and more than half way to a focal point, another side may be closer.
+    if (!warm && least < 0.5) {
+        static const Vec3 way[6] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
+        Vec3 other;
+        for (int k = 0; k < 6 && f > 0; k++)
+            keep_closer(model, x, march_out(model, x, f, way[k], scale), scale, &best, &least);
+        if (f <= 0 && cross_towards_blobs(model, x, f, &other))
+            keep_closer(model, x, other, scale, &best, &least);
+    }
+    double away = vec3_distance(x, best.foot), rest = vec3_norm(best.tangent);
+    return (SurfacePoint){.foot = best.foot, .normal = best.normal, .shape = best.shape, .distance = best.gap,
+                          .converged = fabs(best.field) < 1e-9 * best.slope && (away < 1e-6 || rest <= 1e-4 * away)};
+}
