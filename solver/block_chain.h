@@ -26,6 +26,8 @@ void block_factor_destroy(BlockFactor *factor);
 bool block_chain_factor(const BlockChain *chain, BlockFactor *factor);
 // x = A^-1 b, both (M, 6); x may be b.
 void block_factor_solve(const BlockFactor *factor, const double *b, double *x);
+// Both in one pass, where only one right-hand side belongs to a matrix: b's forward half costs nothing. b must not be x.
+bool block_chain_factor_solve(const BlockChain *chain, BlockFactor *factor, const double *b, double *x);
 // The diagonal 6x6 blocks of A^-1 (M, 6, 6) by Takahashi's recursion.
 void block_factor_inverse_diagonal(const BlockFactor *factor, double *inverse);
 // y = A x, for residuals and tests.

@@ -1,0 +1,344 @@
+// Block-tridiagonal systems against dense Cholesky: random chains of many sizes and conditions, and the chain's own laws.
+#include "solver/block_chain.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include <cmocka.h>
+
+static uint64_t seed_state = 12345;
+static double uniform(void) // [-1, 1)
+{
+    seed_state ^= seed_state << 13;
+    seed_state ^= seed_state >> 7;
+    seed_state ^= seed_state << 17;
+    return (double)(seed_state >> 11) * 0x1p-52 - 1;
+}
+
+// A = B B^T of a random lower block-bidiagonal B, well conditioned but for its columns, which are scaled over decades/2: cond(A) is about 10^decades.
+static void random_chain(BlockChain *a, double decades)
+{
+    int m = a->count;
+    double *low = calloc((size_t)m * 36, sizeof *low), *off = calloc((size_t)m * 36, sizeof *off);
+    for (int i = 0; i < m; i++)
+        for (int c = 0; c < 6; c++) {
+            double scale = pow(10, decades / 4 * uniform());
+            for (int r = 0; r < 6; r++) {
+                low[36 * i + 6 * r + c] = r > c ? 0.3 * scale * uniform() : r == c ? scale * (1 + 0.3 * uniform()) : 0;
+                off[36 * i + 6 * r + c] = scale * 0.15 * uniform();
+            }
+        }
+    for (int i = 0; i < m; i++)
+        for (int r = 0; r < 6; r++)
+            for (int c = 0; c < 6; c++) {
+                double d = 0, l = 0;
+                for (int k = 0; k < 6; k++) {
+                    d += low[36 * i + 6 * r + k] * low[36 * i + 6 * c + k];
+                    if (i > 0)
+                        d += off[36 * (i - 1) + 6 * r + k] * off[36 * (i - 1) + 6 * c + k];
+                    l += off[36 * i + 6 * r + k] * low[36 * i + 6 * c + k];
+                }
+                a->diag[36 * i + 6 * r + c] = d;
+                if (i + 1 < m)
+                    a->lower[36 * i + 6 * r + c] = l;
+            }
+    free(low);
+    free(off);
+}
+
+static double *dense(const BlockChain *a)
+{
+    size_t n = (size_t)a->count * 6;
+    double *d = calloc(n * n, sizeof *d);
+    for (size_t i = 0; i < (size_t)a->count; i++)
+        for (size_t r = 0; r < 6; r++)
+            for (size_t c = 0; c < 6; c++) {
+                d[(6 * i + r) * n + 6 * i + c] = a->diag[36 * i + 6 * r + c];
+                if (i + 1 < (size_t)a->count)
+                    d[(6 * i + 6 + r) * n + 6 * i + c] = d[(6 * i + c) * n + 6 * i + 6 + r] = a->lower[36 * i + 6 * r + c];
+            }
+    return d;
+}
+
+static bool dense_cholesky(double *d, size_t n)
+{
+    for (size_t j = 0; j < n; j++) {
+        for (size_t k = 0; k < j; k++)
+            d[j * n + j] -= d[j * n + k] * d[j * n + k];
+        if (!(d[j * n + j] > 0))
+            return false;
+        d[j * n + j] = sqrt(d[j * n + j]);
+        for (size_t i = j + 1; i < n; i++) {
+            for (size_t k = 0; k < j; k++)
+                d[i * n + j] -= d[i * n + k] * d[j * n + k];
+            d[i * n + j] /= d[j * n + j];
+        }
+    }
+    return true;
+}
+
+static void dense_solve(const double *l, size_t n, double *x)
+{
+    for (size_t i = 0; i < n; i++) {
+        for (size_t k = 0; k < i; k++)
+            x[i] -= l[i * n + k] * x[k];
+        x[i] /= l[i * n + i];
+    }
+    for (size_t i = n; i-- > 0;) {
+        for (size_t k = i + 1; k < n; k++)
+            x[i] -= l[k * n + i] * x[k];
+        x[i] /= l[i * n + i];
+    }
+}
+
+static double largest(const double *x, size_t n)
+{
+    double top = 0;
+    for (size_t i = 0; i < n; i++)
+        top = fmax(top, fabs(x[i]));
+    return top;
+}
+
+static double relative_residual(const BlockChain *a, const double *x, const double *b)
+{
+    size_t n = (size_t)a->count * 6;
+    double *r = malloc(n * sizeof *r), top = fmax(largest(a->diag, n * 6), largest(a->lower, n * 6 - 36));
+    block_chain_multiply(a, x, r);
+    for (size_t i = 0; i < n; i++)
+        r[i] -= b[i];
+    double value = largest(r, n) / (top * largest(x, n) + largest(b, n));
+    free(r);
+    return value;
+}
+
+static const int counts[] = {1, 2, 3, 4, 5, 6, 7, 10, 23, 40};
+
+static void solves_as_dense(void **state)
+{
+    (void)state;
+    for (size_t t = 0; t < sizeof counts / sizeof *counts; t++)
+        for (int hard = 0; hard < 4; hard++) {
+            int m = counts[t];
+            size_t n = (size_t)m * 6;
+            BlockChain a;
+            assert_true(block_chain_create(&a, m));
+            BlockFactor *f = block_factor_create(m);
+            random_chain(&a, 4.0 * hard); // condition 1, 1e4, 1e8, 1e12
+            double *b = malloc(n * sizeof *b), *x = malloc(n * sizeof *x), *y = malloc(n * sizeof *y), *fused = malloc(n * sizeof *x);
+            for (size_t i = 0; i < n; i++)
+                y[i] = b[i] = uniform();
+            assert_true(block_chain_factor(&a, f));
+            block_factor_solve(f, b, x);
+            assert_true(relative_residual(&a, x, b) < 1e-13);
+            assert_true(block_chain_factor_solve(&a, f, b, fused));
+            assert_true(relative_residual(&a, fused, b) < 1e-13);
+            double *d = dense(&a);
+            assert_true(dense_cholesky(d, n));
+            dense_solve(d, n, y);
+            // forward error goes with the condition: compare where that is small
+            for (size_t i = 0; hard == 0 && i < n; i++) {
+                assert_true(fabs(x[i] - y[i]) < 1e-9 * largest(y, n));
+                assert_true(fabs(fused[i] - y[i]) < 1e-9 * largest(y, n));
+            }
+            memcpy(fused, b, n * sizeof *b); // in place
+            block_factor_solve(f, fused, fused);
+            assert_memory_equal(fused, x, n * sizeof *x);
+            free(d);
+            free(b);
+            free(x);
+            free(y);
+            free(fused);
+            block_factor_destroy(f);
+            block_chain_destroy(&a);
+        }
+}
+
+static void inverse_diagonal_as_dense(void **state)
+{
+    (void)state;
+    for (size_t t = 0; t + 1 < sizeof counts / sizeof *counts; t++)
+        for (int hard = 0; hard < 2; hard++) {
+            int m = counts[t];
+            size_t n = (size_t)m * 6;
+            BlockChain a;
+            assert_true(block_chain_create(&a, m));
+            BlockFactor *f = block_factor_create(m);
+            random_chain(&a, 3.0 * hard);
+            double *d = dense(&a), *s = malloc(n * 6 * sizeof *s), *e = malloc(n * sizeof *e);
+            assert_true(dense_cholesky(d, n));
+            assert_true(block_chain_factor(&a, f));
+            block_factor_inverse_diagonal(f, s);
+            for (size_t j = 0; j < n; j++) {
+                memset(e, 0, n * sizeof *e);
+                e[j] = 1;
+                dense_solve(d, n, e);
+                for (size_t r = 0; r < 6; r++)
+                    assert_true(fabs(e[j / 6 * 6 + r] - s[j / 6 * 36 + 6 * r + j % 6]) < 1e-8 * fabs(e[j]));
+            }
+            free(d);
+            free(s);
+            free(e);
+            block_factor_destroy(f);
+            block_chain_destroy(&a);
+        }
+}
+
+static void refuses_indefinite(void **state)
+{
+    (void)state;
+    for (size_t t = 0; t < sizeof counts / sizeof *counts; t++) {
+        int m = counts[t];
+        BlockChain a;
+        assert_true(block_chain_create(&a, m));
+        BlockFactor *f = block_factor_create(m);
+        double *b = calloc((size_t)m * 6, sizeof *b), *x = calloc((size_t)m * 6, sizeof *b);
+        for (int node = 0; node < m; node++) {
+            random_chain(&a, 0);
+            assert_true(block_chain_factor(&a, f));
+            double keep = a.diag[36 * node + 21];
+            a.diag[36 * node + 21] = -1e-3;
+            assert_false(block_chain_factor(&a, f));
+            assert_false(block_chain_factor_solve(&a, f, b, x));
+            a.diag[36 * node + 21] = NAN;
+            assert_false(block_chain_factor(&a, f));
+            a.diag[36 * node + 21] = keep;
+        }
+        memset(a.diag, 0, (size_t)m * 36 * sizeof *b);
+        assert_false(block_chain_factor(&a, f));
+        free(b);
+        free(x);
+        block_factor_destroy(f);
+        block_chain_destroy(&a);
+    }
+    BlockChain none;
+    assert_false(block_chain_create(&none, 0));
+    assert_null(block_factor_create(-1));
+}
+
+// The factor reads the lower half of a diagonal block and unit rows stay exact: a constrained degree of freedom gets its value to the bit.
+static void unit_rows_are_exact(void **state)
+{
+    (void)state;
+    for (int m = 1; m < 8; m++) {
+        BlockChain a;
+        assert_true(block_chain_create(&a, m));
+        BlockFactor *f = block_factor_create(m);
+        random_chain(&a, 2);
+        int node = m / 2, dof = 4;
+        for (int k = 0; k < 6; k++) {
+            a.diag[36 * node + 6 * dof + k] = a.diag[36 * node + 6 * k + dof] = k == dof;
+            if (node > 0)
+                a.lower[36 * (node - 1) + 6 * dof + k] = 0;
+            if (node + 1 < m)
+                a.lower[36 * node + 6 * k + dof] = 0;
+        }
+        double b[48], x[48];
+        for (int i = 0; i < 6 * m; i++)
+            b[i] = uniform();
+        assert_true(block_chain_factor_solve(&a, f, b, x));
+        assert_true(x[6 * node + dof] == b[6 * node + dof]);
+        block_factor_solve(f, b, x);
+        assert_true(x[6 * node + dof] == b[6 * node + dof]);
+        block_factor_destroy(f);
+        block_chain_destroy(&a);
+    }
+}
+
+static double now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return (double)t.tv_sec * 1e6 + (double)t.tv_nsec * 1e-3;
+}
+
+static int by_value(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+// The same right-hand side of a mirrored chain (signs of some degrees of freedom flipped everywhere) gives the mirrored solution to the bit.
+static void mirrored_signs_to_the_bit(void **state)
+{
+    (void)state;
+    enum { M = 9 };
+    const double sign[6] = {1, -1, 1, -1, 1, -1}; // mirror in xz: y of a vector, x and z of a rotation
+    BlockChain a, mirrored;
+    assert_true(block_chain_create(&a, M) && block_chain_create(&mirrored, M));
+    BlockFactor *f = block_factor_create(M);
+    random_chain(&a, 6);
+    double b[6 * M], x[6 * M], c[6 * M], y[6 * M];
+    for (int i = 0; i < 6 * M; i++) {
+        b[i] = uniform();
+        c[i] = sign[i % 6] * b[i];
+    }
+    for (int i = 0; i < 36 * M; i++) {
+        mirrored.diag[i] = sign[i / 6 % 6] * sign[i % 6] * a.diag[i];
+        if (i < 36 * (M - 1))
+            mirrored.lower[i] = sign[i / 6 % 6] * sign[i % 6] * a.lower[i];
+    }
+    assert_true(block_chain_factor_solve(&a, f, b, x));
+    assert_true(block_chain_factor_solve(&mirrored, f, c, y));
+    for (int i = 0; i < 6 * M; i++)
+        assert_true(y[i] == sign[i % 6] * x[i]);
+    block_factor_destroy(f);
+    block_chain_destroy(&a);
+    block_chain_destroy(&mirrored);
+}
+
+static void prints_timings(void **state)
+{
+    (void)state;
+    const int sizes[] = {51, 101, 201, 401, 801};
+    for (size_t t = 0; t < sizeof sizes / sizeof *sizes; t++) {
+        int m = sizes[t];
+        enum { RUNS = 300 };
+        BlockChain a;
+        assert_true(block_chain_create(&a, m));
+        BlockFactor *f = block_factor_create(m);
+        random_chain(&a, 4);
+        double *b = malloc((size_t)m * 6 * sizeof *b), *x = malloc((size_t)m * 6 * sizeof *b), *s = malloc((size_t)m * 36 * sizeof *b);
+        for (int i = 0; i < 6 * m; i++)
+            b[i] = uniform();
+        double factor[RUNS], solve[RUNS], fused[RUNS], diagonal[RUNS];
+        for (int i = 0; i < RUNS; i++) {
+            double t0 = now();
+            assert_true(block_chain_factor(&a, f));
+            double t1 = now();
+            block_factor_solve(f, b, x);
+            double t2 = now();
+            assert_true(block_chain_factor_solve(&a, f, b, x));
+            double t3 = now();
+            block_factor_inverse_diagonal(f, s);
+            double t4 = now();
+            factor[i] = t1 - t0, solve[i] = t2 - t1, fused[i] = t3 - t2, diagonal[i] = t4 - t3;
+        }
+        qsort(factor, RUNS, sizeof *factor, by_value);
+        qsort(solve, RUNS, sizeof *solve, by_value);
+        qsort(fused, RUNS, sizeof *fused, by_value);
+        qsort(diagonal, RUNS, sizeof *diagonal, by_value);
+        print_message("%4d blocks: factor %6.2f us, solve %6.2f us, factor and solve fused %6.2f us, diagonal of the inverse %6.2f us (medians)\n", m,
+                      factor[RUNS / 2], solve[RUNS / 2], fused[RUNS / 2], diagonal[RUNS / 2]);
+        free(b);
+        free(x);
+        free(s);
+        block_factor_destroy(f);
+        block_chain_destroy(&a);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(solves_as_dense),       cmocka_unit_test(inverse_diagonal_as_dense), cmocka_unit_test(refuses_indefinite),
+        cmocka_unit_test(unit_rows_are_exact),   cmocka_unit_test(mirrored_signs_to_the_bit), cmocka_unit_test(prints_timings),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
