@@ -1,1 +1,347 @@
-typedef int placeholder_tube_vessel;
+// The exact tube: the union of spheres of one radius along a centreline of lines and arcs, or along a polyline. The reference geometry
+// of the mechanics tests (shared/references.md "Wire in tubes").
+//
+// With d the distance from X to the centreline and F its foot there: gap = radius - d, normal = (F - X) / d, and the gap's Hessian is -Hess d:
+//   straight: 1/d about the axis, 0 along it;  arc of radius R, rho the distance to its axis of turning: also (rho - R) / (rho d) along the turn;
+//   end or corner (the nearest centreline point is a fixed point): 1/d in both directions.
+//
+// The centreline is cut into segments, arcs into parts of at most 90 degrees, so that a segment's closest point is unique near the tube. A point
+// walks from its last segment to a neighbour only where that is closer: it never jumps to another coil that crosses its own.
+#include "geom/vessel.h"
+
+#include <stdlib.h>
+
+enum { SEGMENTS_MAX = 1000000 };
+
+typedef struct Segment {
+    Vec3 start, end;
+    Vec3 tangent;            // at the start
+    Vec3 end_tangent;
+    Vec3 normal;             // carried frame at the start; an arc turns towards it
+    Vec3 binormal;           // tangent x normal, the arc's axis of turning
+    Vec3 center;             // of the arc
+    double length;           // line
+    double arc_radius;       // 0: line
+    double angle;            // arc, (0, pi/2]
+} Segment;
+
+typedef struct TubeVessel {
+    Vessel vessel;           // first: a Vessel * to us is a TubeVessel *
+    double radius;
+    bool closed_ends;
+    int count;
+    Segment *segment;
+} TubeVessel;
+
+typedef struct CentrePoint {
+    Vec3 foot, tangent, side;    // side: a unit vector across, for a point on the centreline itself
+    double distance2;
+    int end;                     // -1 before the segment's start, +1 beyond its end, 0 between
+} CentrePoint;
+
+static CentrePoint closest_on_segment(const Segment *s, Vec3 x)
+{
+    CentrePoint c = {.end = 0};
+    if (s->arc_radius == 0) {
+        double t = vec3_dot(vec3_sub(x, s->start), s->tangent);
+        c.foot = vec3_add_scaled(s->start, t, s->tangent);
+        c.tangent = s->tangent;
+        c.side = s->normal;
+        c.end = t < 0 ? -1 : t > s->length ? 1 : 0;
+    } else {
+        // angle from the arc's middle, so that the wrap of atan2 lies opposite
+        Vec3 y = vec3_sub(x, s->center);
+        double half = 0.5 * s->angle, ch = cos(half), sh = sin(half), u = -vec3_dot(y, s->normal), v = vec3_dot(y, s->tangent);
+        double phi = atan2(v * ch - u * sh, u * ch + v * sh) + half, cp = cos(phi), sp = sin(phi);
+        Vec3 out = vec3_add_scaled(vec3_scale(s->normal, -cp), sp, s->tangent);
+        c.foot = vec3_add_scaled(s->center, s->arc_radius, out);
+        c.tangent = vec3_add_scaled(vec3_scale(s->tangent, cp), sp, s->normal);
+        c.side = vec3_negate(out);
+        c.end = phi < 0 ? -1 : phi > s->angle ? 1 : 0;
+    }
+    if (c.end != 0) {
+        c.foot = c.end < 0 ? s->start : s->end;
+        c.tangent = c.end < 0 ? s->tangent : s->end_tangent;
+    }
+    c.distance2 = vec3_norm2(vec3_sub(x, c.foot));
+    return c;
+}
+
+// Walks to ever closer neighbours; ends, since the distance falls strictly.
+static int walk(const TubeVessel *tube, Vec3 x, int segment, CentrePoint *closest)
+{
+    *closest = closest_on_segment(&tube->segment[segment], x);
+    for (;;) {
+        int here = segment;
+        for (int k = here - 1; k <= here + 1; k += 2) {
+            if (k < 0 || k >= tube->count)
+                continue;
+            CentrePoint c = closest_on_segment(&tube->segment[k], x);
+            if (c.distance2 < closest->distance2) {
+                *closest = c;
+                segment = k;
+            }
+        }
+        if (segment == here)
+            return segment;
+    }
+}
+
+static int nearest_overall(const TubeVessel *tube, Vec3 x)
+{
+    int best = 0;
+    double least = HUGE_VAL;
+    for (int i = 0; i < tube->count; i++) {
+        CentrePoint c = closest_on_segment(&tube->segment[i], x);
+        if (c.distance2 < least) {
+            least = c.distance2;
+            best = i;
+        }
+    }
+    return best;
+}
+
+static void add_outer(Sym3 *h, double s, Vec3 v)
+{
+    h->xx += s * v.x * v.x, h->xy += s * v.x * v.y, h->xz += s * v.x * v.z;
+    h->yy += s * v.y * v.y, h->yz += s * v.y * v.z, h->zz += s * v.z * v.z;
+}
+
+// The gap's curvature grows without bound towards the centreline and, outside, towards the axis of an arc's turning; neither place is one
+// where a contact may sit, and both are held to what they are at a tenth of the radius.
+static Sym3 gap_hessian(const TubeVessel *tube, const Segment *s, const CentrePoint *c, Vec3 x, Vec3 normal, double distance)
+{
+    Sym3 h = {0, 0, 0, 0, 0, 0};
+    double d = fmax(distance, 0.1 * tube->radius);
+    Vec3 across = vec3_unit(vec3_cross(c->tangent, normal));
+    if (c->end != 0) {
+        // a fixed nearest point: a sphere about it, -(I - n n') / d
+        h.xx = h.yy = h.zz = -1 / d;
+        add_outer(&h, 1 / d, normal);
+        return h;
+    }
+    add_outer(&h, -1 / d, across);
+    if (s->arc_radius > 0) {
+        Vec3 y = vec3_sub(x, s->center);
+        double rho = fmax(vec3_norm(vec3_add_scaled(y, -vec3_dot(y, s->binormal), s->binormal)), 0.1 * tube->radius);
+        add_outer(&h, -(rho - s->arc_radius) / (rho * d), c->tangent);
+    }
+    return h;
+}
+
+static VesselHit hit_at(const TubeVessel *tube, Vec3 x, VesselMemory *memory)
+{
+    VesselHit hit = {.node = memory->node};
+    if (!vec3_is_finite(x) || !(vec3_norm2(x) < 1e200)) {
+        hit.flags = VESSEL_UNSURE;
+        return hit;
+    }
+    CentrePoint c;
+    if (memory->node < 0 || memory->node >= tube->count)
+        memory->node = nearest_overall(tube, x);
+    int k = hit.node = memory->node = walk(tube, x, memory->node, &c);
+    const Segment *s = &tube->segment[k];
+    double forward = vec3_dot(vec3_sub(x, c.foot), c.tangent);
+    bool before = k == 0 && c.end < 0 && forward < 0, beyond = k == tube->count - 1 && c.end > 0 && forward > 0;
+    if (!tube->closed_ends && (before || beyond)) {
+        memory->has_foot = false;
+        hit.gap = HUGE_VAL;
+        hit.flags = VESSEL_OPEN_END;
+        return hit;
+    }
+    // on the plane of a smooth joint rounding may put a point before one segment and beyond the other: that is no corner
+    if (fabs(forward) <= 1e-9 * tube->radius)
+        c.end = 0;
+    double d = sqrt(c.distance2);
+    hit.gap = tube->radius - d;
+    hit.normal = d > 1e-9 * tube->radius ? vec3_scale(vec3_sub(c.foot, x), 1 / d) : c.side;
+    hit.hessian = gap_hessian(tube, s, &c, x, hit.normal, d);
+    memory->has_foot = true;
+    memory->foot = vec3_add_scaled(c.foot, -tube->radius, hit.normal);
+    return hit;
+}
+
+static void tube_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
+{
+    (void)reach;   // the exact answer costs no more than a bound
+    for (int i = 0; i < count; i++)
+        hit[i] = hit_at((const TubeVessel *)vessel, point[i], &memory[i]);
+}
+
+static int tube_locate(const Vessel *vessel, Vec3 point, int from)
+{
+    const TubeVessel *tube = (const TubeVessel *)vessel;
+    CentrePoint c;
+    if (!vec3_is_finite(point))
+        return from < 0 || from >= tube->count ? 0 : from;
+    return from < 0 || from >= tube->count ? nearest_overall(tube, point) : walk(tube, point, from, &c);
+}
+
+static bool tube_inlet(const Vessel *vessel, Vec3 *point, Vec3 *direction)
+{
+    const TubeVessel *tube = (const TubeVessel *)vessel;
+    *point = tube->segment[0].start;
+    *direction = tube->segment[0].tangent;
+    return true;
+}
+
+static void tube_destroy(Vessel *vessel)
+{
+    if (vessel)
+        free(((TubeVessel *)vessel)->segment);
+    free(vessel);
+}
+
+// --- Making one ---
+
+static void check_pieces(const TubeOptions *o, const char *file, Faults *faults)
+{
+    double parts = 0;
+    for (int i = 0; i < o->piece_count; i++) {
+        const TubePiece *p = &o->piece[i];
+        if (!isfinite(p->angle) || p->angle < 0)
+            faults_add(faults, file, 0, 0, "tube: path[%d] turns by %g deg; an arc's angle is above 0", i, p->angle * 180 / PI);
+        else if (p->angle == 0 && (!isfinite(p->length) || !(p->length > 0)))
+            faults_add(faults, file, 0, 0, "tube: path[%d] is %g mm long; a line's length is above 0 (and an arc's angle)", i, p->length);
+        else if (p->angle > 0 && (!isfinite(p->arc_radius) || !(p->arc_radius > o->radius)))
+            faults_add(faults, file, 0, 0, "tube: path[%d] has an arc of radius %g mm; it must be larger than the lumen's radius, %g mm", i,
+                       p->arc_radius, o->radius);
+        if (!isfinite(p->plane))
+            faults_add(faults, file, 0, 0, "tube: path[%d] has an arc's plane that is no number; degrees are valid", i);
+        parts += p->angle > 0 ? 1 + p->angle / (PI / 2) : 1;
+    }
+    if (!(parts < SEGMENTS_MAX))
+        faults_add(faults, file, 0, 0, "tube: the path turns %g quarter turns; fewer than %d lines and quarter turns are valid", parts,
+                   (int)SEGMENTS_MAX);
+}
+
+static void check_polyline(const TubeOptions *o, const char *file, Faults *faults)
+{
+    if (o->point_count < 2 || o->point_count > SEGMENTS_MAX) {
+        faults_add(faults, file, 0, 0, "tube: the centreline has %d points; 2 to %d are valid", o->point_count, (int)SEGMENTS_MAX);
+        return;
+    }
+    for (int i = 0; i < o->point_count; i++) {
+        if (!vec3_is_finite(o->point[i])) {
+            faults_add(faults, file, 0, 0, "tube: point %d is (%g, %g, %g); finite coordinates in mm are valid", i, o->point[i].x, o->point[i].y,
+                       o->point[i].z);
+            return;
+        }
+        if (i > 0 && !(vec3_distance(o->point[i - 1], o->point[i]) > 1e-9)) {
+            faults_add(faults, file, 0, 0, "tube: points %d and %d coincide; neighbouring points differ", i - 1, i);
+            return;
+        }
+    }
+}
+
+static bool check_options(const TubeOptions *o, const char *file, Faults *faults)
+{
+    int before = faults->count;
+    bool pieces = o->piece_count > 0 && o->piece, points = o->point_count > 0 && o->point;
+    if (!isfinite(o->radius) || !(o->radius > 0))
+        faults_add(faults, file, 0, 0, "tube: radius_mm is %g; a number above 0 is valid", o->radius);
+    if (pieces == points)
+        faults_add(faults, file, 0, 0, "tube: %s; exactly one of `path` and `points` is valid",
+                   pieces ? "both a path and points are given" : "neither a path nor points are given");
+    else if (points)
+        check_polyline(o, file, faults);
+    else {
+        check_pieces(o, file, faults);
+        double length = vec3_norm(o->direction), across = vec3_norm(vec3_cross(o->direction, o->normal));
+        bool turns = false;
+        for (int i = 0; i < o->piece_count; i++)
+            turns = turns || o->piece[i].angle > 0;
+        if (!vec3_is_finite(o->start))
+            faults_add(faults, file, 0, 0, "tube: start_mm is not finite; coordinates in mm are valid");
+        if (!isfinite(length) || !(length > 1e-12))
+            faults_add(faults, file, 0, 0, "tube: direction has no length; a vector into the tube is valid");
+        else if (turns && !(across > 1e-9 * length * vec3_norm(o->normal)))
+            faults_add(faults, file, 0, 0, "tube: normal is zero or along direction; arcs turn towards it, a vector across direction is valid");
+    }
+    return faults->count == before;
+}
+
+static Vec3 unit_across(Vec3 v, Vec3 tangent)
+{
+    Vec3 across = vec3_add_scaled(v, -vec3_dot(v, tangent), tangent);
+    return vec3_is_finite(v) && vec3_norm(across) > 1e-9 * vec3_norm(v) ? vec3_unit(across) : vec3_normal_to(tangent);
+}
+
+static int add_arc(Segment *out, Vec3 *p, Vec3 *t, Vec3 *n, double arc_radius, double angle)
+{
+    int parts = (int)ceil(angle / (PI / 2) - 1e-9);
+    parts = parts < 1 ? 1 : parts;
+    double part = angle / parts, cs = cos(part), sn = sin(part);
+    for (int k = 0; k < parts; k++) {
+        Segment s = {.start = *p, .tangent = *t, .normal = *n, .arc_radius = arc_radius, .angle = part};
+        s.binormal = vec3_cross(*t, *n);
+        s.center = vec3_add_scaled(*p, arc_radius, *n);
+        s.end_tangent = vec3_unit(vec3_add_scaled(vec3_scale(*t, cs), sn, *n));
+        *n = unit_across(vec3_add_scaled(vec3_scale(*n, cs), -sn, *t), s.end_tangent);
+        *t = s.end_tangent;
+        *p = s.end = vec3_add_scaled(s.center, -arc_radius, *n);
+        out[k] = s;
+    }
+    return parts;
+}
+
+static int add_line(Segment *out, Vec3 *p, Vec3 t, Vec3 n, double length)
+{
+    Segment s = {.start = *p, .tangent = t, .end_tangent = t, .normal = n, .binormal = vec3_cross(t, n), .length = length};
+    *p = s.end = vec3_add_scaled(*p, length, t);
+    *out = s;
+    return 1;
+}
+
+static int lay_pieces(const TubeOptions *o, Segment *out)
+{
+    int count = 0;
+    Vec3 p = o->start, t = vec3_unit(o->direction), n = unit_across(o->normal, t);
+    for (int i = 0; i < o->piece_count; i++) {
+        const TubePiece *piece = &o->piece[i];
+        if (piece->angle > 0) {
+            n = unit_across(quat_rotate(quat_from_rotation_vector(vec3_scale(t, piece->plane)), n), t);
+            count += add_arc(out + count, &p, &t, &n, piece->arc_radius, piece->angle);
+        } else
+            count += add_line(out + count, &p, t, n, piece->length);
+    }
+    return count;
+}
+
+static int lay_polyline(const TubeOptions *o, Segment *out)
+{
+    Vec3 n = o->normal;
+    for (int i = 0; i + 1 < o->point_count; i++) {
+        Vec3 p = o->point[i], step = vec3_sub(o->point[i + 1], p), t = vec3_unit(step);
+        n = unit_across(n, t);
+        add_line(out + i, &p, t, n, vec3_norm(step));
+        out[i].end = o->point[i + 1];   // so that neighbours share their corner to the bit
+    }
+    return o->point_count - 1;
+}
+
+Vessel *tube_vessel_create(const TubeOptions *options, const char *file, Faults *faults)
+{
+    if (!check_options(options, file, faults))
+        return NULL;
+    bool pieces = options->piece_count > 0 && options->piece;
+    size_t capacity = 0;
+    for (int i = 0; pieces && i < options->piece_count; i++)
+        capacity += 2 + (size_t)(options->piece[i].angle / (PI / 2));
+    if (!pieces)
+        capacity = (size_t)options->point_count;
+    TubeVessel *tube = calloc(1, sizeof *tube);
+    Segment *segment = calloc(capacity, sizeof *segment);
+    if (!tube || !segment) {
+        faults_add(faults, file, 0, 0, "tube: no memory for %zu segments", capacity);
+        free(tube);
+        free(segment);
+        return NULL;
+    }
+    tube->vessel = (Vessel){"tube", tube_query, tube_locate, tube_inlet, tube_destroy};
+    tube->radius = options->radius;
+    tube->closed_ends = options->closed_ends;
+    tube->segment = segment;
+    tube->count = pieces ? lay_pieces(options, segment) : lay_polyline(options, segment);
+    return &tube->vessel;
+}
