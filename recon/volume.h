@@ -2,7 +2,8 @@
 //
 // Voxel (i, j, k), i fastest, lies at origin + i axis[0] + j axis[1] + k axis[2] [mm]; axes may be oblique and anisotropic. The frame (RAS, LPS)
 // is kept as the header says, never converted. Values are held as float. Every header figure is checked before memory is taken: a lying
-// header is a fault with its line (or byte) and what would be valid.
+// header is a fault with its line (or byte) and what would be valid. So is a voxel that is not a finite number: a NaN would pass silently
+// through every interpolation, and only the user knows which background it stands for.
 #ifndef SELDINGER_RECON_VOLUME_H
 #define SELDINGER_RECON_VOLUME_H
 
@@ -24,6 +25,8 @@ typedef struct Volume {
 
 // By content, not by extension. NULL with faults.
 Volume *volume_load(const char *path, Faults *faults);
+// The same from memory; `path` stands in messages, and detached data files are looked for in its folder.
+Volume *volume_parse(const void *bytes, size_t length, const char *path, Faults *faults);
 // A volume of the given grid, values zero. NULL where size is not positive or memory lacks.
 Volume *volume_create(const int size[3], Vec3 origin, const Vec3 axis[3]);
 void volume_free(Volume *volume);
