@@ -1,1 +1,441 @@
+// Trees and models in HDF5. Both directions go through memory (the core driver with a file image): a full disk is then our own write's
+// error and not one in the middle of the library, the same code serves the fuzz target, and a file cannot change under us.
+// Metadata are written in the 1.10 format, whose checksums make the library refuse damaged headers.
 #include "recon/tree_file.h"
+
+#include "recon/whole_file.h"
+
+#include <hdf5.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { FORMAT_VERSION = 1, TEXT_LIMIT = 1 << 24 };
+
+typedef struct Reader {
+    hid_t file;
+    const char *name;
+    Faults *faults;
+} Reader;
+
+typedef struct Column {      // one dataset as the contract says it
+    const char *group, *path;
+    int rank;
+    H5T_class_t class;
+    hsize_t size[2];         // found: rows, columns
+} Column;
+
+enum { CENTER, RADIUS, DIRECTION, HEIGHT, PARENT, KIND, POINT, POINT_OFFSET, BLOB_CENTER, BLOB_WIDTH, BLOB_OFFSET, ERROR_MM, COLUMN_COUNT };
+static const Column columns[COLUMN_COUNT] = {
+    [CENTER] = {"/nodes", "/nodes/center", 2, H5T_FLOAT, {0}},
+    [RADIUS] = {"/nodes", "/nodes/radius", 1, H5T_FLOAT, {0}},
+    [DIRECTION] = {"/nodes", "/nodes/direction", 2, H5T_FLOAT, {0}},
+    [HEIGHT] = {"/nodes", "/nodes/height", 1, H5T_FLOAT, {0}},
+    [PARENT] = {"/nodes", "/nodes/parent", 1, H5T_INTEGER, {0}},
+    [KIND] = {"/nodes", "/nodes/kind", 1, H5T_INTEGER, {0}},
+    [POINT] = {"/points", "/points/xyz", 2, H5T_FLOAT, {0}},
+    [POINT_OFFSET] = {"/points", "/points/offset", 1, H5T_INTEGER, {0}},
+    [BLOB_CENTER] = {"/blobs", "/blobs/center", 2, H5T_FLOAT, {0}},
+    [BLOB_WIDTH] = {"/blobs", "/blobs/width", 1, H5T_FLOAT, {0}},
+    [BLOB_OFFSET] = {"/blobs", "/blobs/offset", 1, H5T_INTEGER, {0}},
+    [ERROR_MM] = {"/blobs", "/blobs/error_mm", 1, H5T_FLOAT, {0}},
+};
+
+// The library prints nothing of its own while we work; the user's handler is put back.
+typedef struct Silence {
+    H5E_auto2_t handler;
+    void *data;
+} Silence;
+
+static Silence silence_begin(void)
+{
+    Silence kept = {0};
+    H5Eget_auto2(H5E_DEFAULT, &kept.handler, &kept.data);
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+    return kept;
+}
+static void silence_end(Silence kept) { H5Eset_auto2(H5E_DEFAULT, kept.handler, kept.data); }
+
+// --- reading ---
+
+// Only hard links are followed: a file may not make us open other files.
+static bool is_hard_link(hid_t file, const char *path)
+{
+    H5L_info_t link;
+    return H5Lexists(file, path, H5P_DEFAULT) > 0 && H5Lget_info(file, path, &link, H5P_DEFAULT) >= 0 && link.type == H5L_TYPE_HARD;
+}
+
+static hid_t open_dataset(const Reader *reader, const Column *column)
+{
+    if (!is_hard_link(reader->file, column->group) || !is_hard_link(reader->file, column->path)) {
+        faults_add(reader->faults, reader->name, 0, 0, "has no dataset %s; a tree needs /nodes and /points, a model /blobs too", column->path);
+        return -1;
+    }
+    hid_t dataset = H5Dopen2(reader->file, column->path, H5P_DEFAULT);
+    if (dataset < 0)
+        faults_add(reader->faults, reader->name, 0, 0, "%s cannot be opened; it must be a dataset", column->path);
+    return dataset;
+}
+
+// Whether the bytes that the shape promises can be in the file: no external storage, and not more than deflate can squeeze.
+static bool storage_is_plausible(hid_t dataset, hsize_t count)
+{
+    hid_t plist = H5Dget_create_plist(dataset);
+    if (plist < 0)
+        return false;
+    H5D_layout_t layout = H5Pget_layout(plist);
+    bool fits = layout == H5D_COMPACT || layout == H5D_CONTIGUOUS || layout == H5D_CHUNKED;
+    fits = fits && H5Pget_external_count(plist) == 0;
+    H5Pclose(plist);
+    hsize_t stored = H5Dget_storage_size(dataset);
+    return fits && count / 1100 <= stored && (count == 0 || stored > 0);
+}
+
+// Fills column->size; false with a fault that says what is valid.
+static bool inspect(const Reader *reader, Column *column)
+{
+    hid_t dataset = open_dataset(reader, column);
+    if (dataset < 0)
+        return false;
+    hid_t space = H5Dget_space(dataset), type = H5Dget_type(dataset);
+    const char *wanted_class = column->class == H5T_FLOAT ? "float" : "integer";
+    bool good = true;
+    if (space < 0 || type < 0 || H5Tget_class(type) != column->class || H5Tget_size(type) > 8) {
+        faults_add(reader->faults, reader->name, 0, 0, "%s has the wrong type; valid: %s of at most 64 bits", column->path, wanted_class);
+        good = false;
+    }
+    hsize_t size[H5S_MAX_RANK] = {0};
+    if (space < 0 || H5Sget_simple_extent_type(space) != H5S_SIMPLE || H5Sget_simple_extent_ndims(space) != column->rank ||
+        H5Sget_simple_extent_dims(space, size, NULL) < 0 || (column->rank == 2 && size[1] != 3)) {
+        faults_add(reader->faults, reader->name, 0, 0, "%s has the wrong shape; valid: %s", column->path, column->rank == 2 ? "(rows, 3)" : "(rows)");
+        good = false;
+    } else {
+        column->size[0] = size[0];
+        column->size[1] = column->rank == 2 ? 3 : 1;
+        if (size[0] > (hsize_t)1 << 40 || !storage_is_plausible(dataset, size[0] * column->size[1])) {
+            faults_add(reader->faults, reader->name, 0, 0, "%s promises %llu rows that the file does not hold", column->path,
+                       (unsigned long long)size[0]);
+            good = false;
+        }
+    }
+    if (space >= 0)
+        H5Sclose(space);
+    if (type >= 0)
+        H5Tclose(type);
+    H5Dclose(dataset);
+    return good;
+}
+
+static bool expect_rows(const Reader *reader, const Column *column, hsize_t rows, const char *meaning)
+{
+    if (column->size[0] == rows)
+        return true;
+    faults_add(reader->faults, reader->name, 0, 0, "%s has %llu rows; valid: %llu, %s", column->path, (unsigned long long)column->size[0],
+               (unsigned long long)rows, meaning);
+    return false;
+}
+
+static bool read_column(const Reader *reader, const Column *column, hid_t memory_type, void *out)
+{
+    hid_t dataset = H5Dopen2(reader->file, column->path, H5P_DEFAULT);
+    bool good = dataset >= 0 && (column->size[0] == 0 || H5Dread(dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, out) >= 0);
+    if (dataset >= 0)
+        H5Dclose(dataset);
+    if (!good)
+        faults_add(reader->faults, reader->name, 0, 0, "%s cannot be read: its data are damaged or cut off", column->path);
+    return good;
+}
+
+// A text attribute, of fixed or variable length; an empty text where there is none.
+static char *read_text(const Reader *reader, const char *key)
+{
+    char *text = NULL;
+    hid_t attribute = H5Aexists(reader->file, key) > 0 ? H5Aopen(reader->file, key, H5P_DEFAULT) : -1;
+    hid_t type = attribute >= 0 ? H5Aget_type(attribute) : -1, space = attribute >= 0 ? H5Aget_space(attribute) : -1;
+    if (type >= 0 && space >= 0 && H5Tget_class(type) == H5T_STRING && H5Sget_simple_extent_npoints(space) == 1) {
+        if (H5Tis_variable_str(type) > 0) {
+            char *held = NULL;
+            if (H5Aread(attribute, type, &held) >= 0 && held) {
+                text = strdup(held);
+                H5Dvlen_reclaim(type, space, H5P_DEFAULT, &held);
+            }
+        } else {
+            size_t size = H5Tget_size(type);
+            if (size < TEXT_LIMIT && (text = calloc(size + 1, 1)) && H5Aread(attribute, type, text) < 0)
+                text[0] = '\0';
+        }
+    } else if (attribute >= 0) {
+        faults_add(reader->faults, reader->name, 0, 0, "attribute %s is not a text; valid: one string", key);
+    }
+    if (space >= 0)
+        H5Sclose(space);
+    if (type >= 0)
+        H5Tclose(type);
+    if (attribute >= 0)
+        H5Aclose(attribute);
+    return text ? text : strdup("");
+}
+
+static double read_number(const Reader *reader, const char *key, double otherwise)
+{
+    if (H5Aexists(reader->file, key) <= 0)
+        return otherwise;
+    double value = NAN;
+    hid_t attribute = H5Aopen(reader->file, key, H5P_DEFAULT), space = attribute >= 0 ? H5Aget_space(attribute) : -1;
+    hid_t type = attribute >= 0 ? H5Aget_type(attribute) : -1;
+    bool numeric = type >= 0 && (H5Tget_class(type) == H5T_FLOAT || H5Tget_class(type) == H5T_INTEGER);
+    if (!numeric || space < 0 || H5Sget_simple_extent_npoints(space) != 1 || H5Aread(attribute, H5T_NATIVE_DOUBLE, &value) < 0) {
+        faults_add(reader->faults, reader->name, 0, 0, "attribute %s is not a number; valid: one number", key);
+        value = otherwise;
+    }
+    if (type >= 0)
+        H5Tclose(type);
+    if (space >= 0)
+        H5Sclose(space);
+    if (attribute >= 0)
+        H5Aclose(attribute);
+    return value;
+}
+
+static double read_attributes(const Reader *reader, TreeFileInfo *info)
+{
+    info->source = read_text(reader, "source");
+    info->parameters = read_text(reader, "parameters");
+    info->created_by = read_text(reader, "created_by");
+    char *kernel = read_text(reader, "kernel");
+    if (kernel && kernel[0] && strcmp(kernel, "cauchy"))
+        faults_add(reader->faults, reader->name, 0, 0, "attribute kernel is '%.40s'; valid: cauchy", kernel);
+    free(kernel);
+    double version = read_number(reader, "version", FORMAT_VERSION), iso_level = read_number(reader, "iso_level", 0.1);
+    if (version != FORMAT_VERSION)
+        faults_add(reader->faults, reader->name, 0, 0, "attribute version is %g; valid: %d", version, FORMAT_VERSION);
+    if (!(iso_level > 0 && iso_level < 1e6)) {
+        faults_add(reader->faults, reader->name, 0, 0, "attribute iso_level is %g; valid: a positive number", iso_level);
+        iso_level = 0.1;
+    }
+    return iso_level;
+}
+
+static VesselTree *read_tree(const Reader *reader, TreeFileInfo *info)
+{
+    int before = reader->faults->count;
+    Column found[COLUMN_COUNT];
+    memcpy(found, columns, sizeof found);
+    bool is_model = H5Lexists(reader->file, "/blobs", H5P_DEFAULT) > 0;
+    int used = is_model ? COLUMN_COUNT : BLOB_CENTER;
+    bool seen[COLUMN_COUNT] = {false};
+    for (int i = 0; i < used; i++)
+        seen[i] = inspect(reader, &found[i]);
+    double iso_level = read_attributes(reader, info);
+    hsize_t nodes = found[CENTER].size[0], points = found[POINT].size[0], blobs = is_model ? found[BLOB_CENTER].size[0] : 0;
+    for (int i = 0; i < used && seen[CENTER]; i++) {
+        if (seen[i] && (i <= KIND || i == ERROR_MM))
+            expect_rows(reader, &found[i], nodes, "the number of nodes");
+        else if (seen[i] && (i == POINT_OFFSET || i == BLOB_OFFSET))
+            expect_rows(reader, &found[i], nodes + 1, "the number of nodes and one");
+    }
+    if (is_model && seen[BLOB_CENTER] && seen[BLOB_WIDTH])
+        expect_rows(reader, &found[BLOB_WIDTH], blobs, "the number of blobs");
+    if (seen[CENTER] && (nodes < 1 || nodes > INT32_MAX - 1))
+        faults_add(reader->faults, reader->name, 0, 0, "/nodes/center has %llu rows; valid: 1 to %d", (unsigned long long)nodes, INT32_MAX - 1);
+    if (is_model && seen[BLOB_CENTER] && blobs < 1)
+        faults_add(reader->faults, reader->name, 0, 0, "/blobs/center is empty; a model has blobs, a tree no /blobs");
+    if (reader->faults->count > before)
+        return NULL;
+
+    VesselTree *tree = vessel_tree_create((int)nodes, (int64_t)points, (int64_t)blobs);
+    if (!tree) {
+        faults_add(reader->faults, reader->name, 0, 0, "needs more memory than there is (%llu nodes, %llu points)", (unsigned long long)nodes,
+                   (unsigned long long)points);
+        return NULL;
+    }
+    tree->iso_level = iso_level;
+    const struct {
+        int column;
+        hid_t type;
+        void *out;
+    } target[COLUMN_COUNT] = {
+        {CENTER, H5T_NATIVE_DOUBLE, tree->center},
+        {RADIUS, H5T_NATIVE_DOUBLE, tree->radius},
+        {DIRECTION, H5T_NATIVE_DOUBLE, tree->direction},
+        {HEIGHT, H5T_NATIVE_DOUBLE, tree->height},
+        {PARENT, H5T_NATIVE_INT32, tree->parent},
+        {KIND, H5T_NATIVE_UINT8, tree->kind},
+        {POINT, H5T_NATIVE_DOUBLE, tree->point},
+        {POINT_OFFSET, H5T_NATIVE_INT64, tree->point_offset},
+        {BLOB_CENTER, H5T_NATIVE_DOUBLE, tree->blob_center},
+        {BLOB_WIDTH, H5T_NATIVE_DOUBLE, tree->blob_width},
+        {BLOB_OFFSET, H5T_NATIVE_INT64, tree->blob_offset},
+        {ERROR_MM, H5T_NATIVE_DOUBLE, tree->error},
+    };
+    bool good = true;
+    for (int i = 0; i < used; i++)
+        good = read_column(reader, &found[target[i].column], target[i].type, target[i].out) && good;
+    if (good && vessel_tree_validate(tree, reader->name, reader->faults)) {
+        vessel_tree_link(tree);
+        return tree;
+    }
+    vessel_tree_free(tree);
+    return NULL;
+}
+
+VesselTree *tree_file_parse(const void *bytes, size_t length, const char *name, TreeFileInfo *info, Faults *faults)
+{
+    Silence kept = silence_begin();
+    VesselTree *tree = NULL;
+    TreeFileInfo held = {0};
+    hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+    Reader reader = {.file = -1, .name = name, .faults = faults};
+    // the library copies the image and never writes to it: the cast is its missing const
+    if (access >= 0 && length > 0 && H5Pset_fapl_core(access, 1 << 16, 0) >= 0 && H5Pset_file_image(access, (void *)(uintptr_t)bytes, length) >= 0)
+        reader.file = H5Fopen(name, H5F_ACC_RDONLY, access);
+    if (reader.file >= 0) {
+        tree = read_tree(&reader, &held);
+        H5Fclose(reader.file);
+    } else {
+        faults_add_at_byte(faults, name, 0, "is not a readable HDF5 file (cut off, damaged or of another kind); a tree or model of seldinger is needed");
+    }
+    if (access >= 0)
+        H5Pclose(access);
+    silence_end(kept);
+    if (tree && info)
+        *info = held;
+    else
+        tree_file_info_free(&held);
+    return tree;
+}
+
+VesselTree *tree_file_load(const char *path, TreeFileInfo *info, Faults *faults)
+{
+    size_t length;
+    char *bytes = whole_file_read(path, &length, faults);
+    VesselTree *tree = bytes ? tree_file_parse(bytes, length, path, info, faults) : NULL;
+    free(bytes);
+    return tree;
+}
+
+// --- writing ---
+
+static bool write_column(hid_t file, const char *path, hid_t type, int rank, int64_t rows, const void *data)
+{
+    hsize_t size[2] = {(hsize_t)rows, 3};
+    hid_t space = H5Screate_simple(rank, size, NULL), plist = H5Pcreate(H5P_DATASET_CREATE);
+    bool good = space >= 0 && plist >= 0 && H5Pset_obj_track_times(plist, false) >= 0;   // no clock in the file: same content, same bytes
+    hid_t dataset = good ? H5Dcreate2(file, path, type, space, H5P_DEFAULT, plist, H5P_DEFAULT) : -1;
+    good = dataset >= 0 && (rows == 0 || H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0);
+    if (dataset >= 0)
+        good = H5Dclose(dataset) >= 0 && good;
+    if (plist >= 0)
+        H5Pclose(plist);
+    if (space >= 0)
+        H5Sclose(space);
+    return good;
+}
+
+static bool write_text(hid_t file, const char *key, const char *text)
+{
+    hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
+    size_t length = text ? strlen(text) : 0;
+    bool good = H5Tset_size(type, length + 1) >= 0 && H5Tset_cset(type, H5T_CSET_UTF8) >= 0;
+    hid_t attribute = good ? H5Acreate2(file, key, type, space, H5P_DEFAULT, H5P_DEFAULT) : -1;
+    good = attribute >= 0 && H5Awrite(attribute, type, text ? text : "") >= 0;
+    if (attribute >= 0)
+        H5Aclose(attribute);
+    H5Sclose(space);
+    H5Tclose(type);
+    return good;
+}
+
+static bool write_scalar(hid_t file, const char *key, hid_t type, const void *value)
+{
+    hid_t space = H5Screate(H5S_SCALAR), attribute = H5Acreate2(file, key, type, space, H5P_DEFAULT, H5P_DEFAULT);
+    bool good = attribute >= 0 && H5Awrite(attribute, type, value) >= 0;
+    if (attribute >= 0)
+        H5Aclose(attribute);
+    H5Sclose(space);
+    return good;
+}
+
+static bool make_group(hid_t file, const char *path)
+{
+    hid_t plist = H5Pcreate(H5P_GROUP_CREATE);
+    H5Pset_obj_track_times(plist, false);
+    hid_t group = H5Gcreate2(file, path, H5P_DEFAULT, plist, H5P_DEFAULT);
+    H5Pclose(plist);
+    return group >= 0 && H5Gclose(group) >= 0;
+}
+
+static bool write_tree(hid_t file, const VesselTree *tree, const TreeFileInfo *info)
+{
+    const int32_t version = FORMAT_VERSION;
+    int64_t n = tree->node_count, p = tree->point_count, b = tree->blob_count;
+    bool good = make_group(file, "/nodes") && make_group(file, "/points") && write_text(file, "format", b > 0 ? "seldinger-model" : "seldinger-tree") &&
+                write_scalar(file, "version", H5T_NATIVE_INT32, &version) &&
+                write_scalar(file, "iso_level", H5T_NATIVE_DOUBLE, &tree->iso_level) && write_text(file, "kernel", "cauchy") &&
+                write_text(file, "source", info ? info->source : "") && write_text(file, "parameters", info ? info->parameters : "") &&
+                write_text(file, "created_by", info && info->created_by ? info->created_by : "seldinger " SELDINGER_VERSION);
+    good = good && write_column(file, "/nodes/center", H5T_NATIVE_DOUBLE, 2, n, tree->center) &&
+           write_column(file, "/nodes/radius", H5T_NATIVE_DOUBLE, 1, n, tree->radius) &&
+           write_column(file, "/nodes/direction", H5T_NATIVE_DOUBLE, 2, n, tree->direction) &&
+           write_column(file, "/nodes/height", H5T_NATIVE_DOUBLE, 1, n, tree->height) &&
+           write_column(file, "/nodes/parent", H5T_NATIVE_INT32, 1, n, tree->parent) &&
+           write_column(file, "/nodes/kind", H5T_NATIVE_UINT8, 1, n, tree->kind) &&
+           write_column(file, "/points/xyz", H5T_NATIVE_DOUBLE, 2, p, tree->point) &&
+           write_column(file, "/points/offset", H5T_NATIVE_INT64, 1, n + 1, tree->point_offset);
+    if (good && b > 0)
+        good = make_group(file, "/blobs") && write_column(file, "/blobs/center", H5T_NATIVE_DOUBLE, 2, b, tree->blob_center) &&
+               write_column(file, "/blobs/width", H5T_NATIVE_DOUBLE, 1, b, tree->blob_width) &&
+               write_column(file, "/blobs/offset", H5T_NATIVE_INT64, 1, n + 1, tree->blob_offset) &&
+               write_column(file, "/blobs/error_mm", H5T_NATIVE_DOUBLE, 1, n, tree->error);
+    return good;
+}
+
+bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char *path, Faults *faults)
+{
+    Silence kept = silence_begin();
+    hid_t access = H5Pcreate(H5P_FILE_ACCESS), create = H5Pcreate(H5P_FILE_CREATE);
+    H5Pset_fapl_core(access, 1 << 20, 0);
+    H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110);
+    H5Pset_obj_track_times(create, false);
+    // text of parameters may exceed the 64 kB of compact attribute storage: the 1.8+ dense form has no such limit
+    H5Pset_attr_phase_change(create, 8, 6);
+    hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, create, access);
+    bool built = file >= 0 && write_tree(file, tree, info) && H5Fflush(file, H5F_SCOPE_GLOBAL) >= 0;
+    ssize_t size = built ? H5Fget_file_image(file, NULL, 0) : -1;
+    void *image = size > 0 ? malloc((size_t)size) : NULL;
+    built = image && H5Fget_file_image(file, image, (size_t)size) == size;
+    if (file >= 0)
+        H5Fclose(file);
+    H5Pclose(create);
+    H5Pclose(access);
+    silence_end(kept);
+    if (!built)
+        faults_add(faults, path, 0, 0, "cannot be written: the HDF5 library failed (memory?)");
+    else
+        built = whole_file_write(path, image, (size_t)size, faults);
+    free(image);
+    return built;
+}
+
+void tree_file_info_free(TreeFileInfo *info)
+{
+    free(info->source);
+    free(info->parameters);
+    free(info->created_by);
+    *info = (TreeFileInfo){0};
+}
+
+double tree_file_number(const TreeFileInfo *info, const char *key, double otherwise)
+{
+    size_t length = strlen(key);
+    for (const char *line = info && info->parameters ? info->parameters : NULL; line; line = strchr(line, '\n')) {
+        line += strspn(line, "\n \t{,");
+        if (strncmp(line, key, length) == 0 && line[length] == ':') {
+            char *end;
+            double value = strtod(line + length + 1, &end);
+            if (end != line + length + 1 && isfinite(value))
+                return value;
+        }
+    }
+    return otherwise;
+}

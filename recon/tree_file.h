@@ -13,7 +13,11 @@ typedef struct TreeFileInfo {  // root attributes
 
 // NULL with faults. `info` may be NULL; free it with tree_file_info_free.
 VesselTree *tree_file_load(const char *path, TreeFileInfo *info, Faults *faults);
+// The same from memory; `name` stands in the messages.
+VesselTree *tree_file_parse(const void *bytes, size_t length, const char *name, TreeFileInfo *info, Faults *faults);
 bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char *path, Faults *faults);
 void tree_file_info_free(TreeFileInfo *info);
+// The number on the line `key: number` of the parameters (any indentation); `otherwise` where there is none.
+double tree_file_number(const TreeFileInfo *info, const char *key, double otherwise);
 
 #endif

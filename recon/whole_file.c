@@ -1,0 +1,85 @@
+// Writing goes to `path.part-PID`, is synced, then renamed over `path`; whatever fails removes the part.
+#include "recon/whole_file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+char *whole_file_read(const char *path, size_t *length, Faults *faults)
+{
+    int file = open(path, O_RDONLY | O_CLOEXEC);
+    struct stat status;
+    if (file < 0 || fstat(file, &status)) {
+        faults_add(faults, path, 0, 0, "cannot be opened: %s; an existing readable file is needed", strerror(errno));
+        if (file >= 0)
+            close(file);
+        return NULL;
+    }
+    if (!S_ISREG(status.st_mode)) {
+        faults_add(faults, path, 0, 0, "is not a regular file; an existing readable file is needed");
+        close(file);
+        return NULL;
+    }
+    size_t size = (size_t)status.st_size, got = 0;
+    char *bytes = malloc(size + 1);
+    while (bytes && got < size) {
+        ssize_t n = read(file, bytes + got, size - got);
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n <= 0)
+            break;
+        got += (size_t)n;
+    }
+    close(file);
+    if (!bytes || got < size) {
+        faults_add(faults, path, 0, 0, "cannot be read: %s", bytes ? "it ends early" : "not enough memory");
+        free(bytes);
+        return NULL;
+    }
+    bytes[size] = '\0';
+    *length = size;
+    return bytes;
+}
+
+static bool write_all(int file, const char *bytes, size_t length)
+{
+    while (length > 0) {
+        ssize_t n = write(file, bytes, length);
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n <= 0)
+            return false;
+        bytes += n;
+        length -= (size_t)n;
+    }
+    return true;
+}
+
+bool whole_file_write(const char *path, const void *bytes, size_t length, Faults *faults)
+{
+    size_t room = strlen(path) + 32;
+    char *part = malloc(room);
+    if (!part) {
+        faults_add(faults, path, 0, 0, "cannot be written: not enough memory");
+        return false;
+    }
+    snprintf(part, room, "%s.part-%ld", path, (long)getpid());
+    int file = open(part, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    bool written = file >= 0 && write_all(file, bytes, length) && (fsync(file) == 0 || errno == EINVAL);
+    int reason = errno;
+    if (file >= 0 && close(file) && written)
+        written = false, reason = errno;
+    if (written && rename(part, path))
+        written = false, reason = errno;
+    if (!written) {
+        if (file >= 0)
+            unlink(part);
+        faults_add(faults, path, 0, 0, "cannot be written: %s; a folder with write permission and free space is needed", strerror(reason));
+    }
+    free(part);
+    return written;
+}

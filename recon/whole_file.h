@@ -1,0 +1,12 @@
+// Whole files: read at once, and written so that no half file is ever left (beside, synced, then renamed).
+#ifndef SELDINGER_RECON_WHOLE_FILE_H
+#define SELDINGER_RECON_WHOLE_FILE_H
+
+#include "geom/faults.h"
+
+// The bytes of a regular file, NUL-terminated beyond `length`; NULL with a fault. The caller frees.
+char *whole_file_read(const char *path, size_t *length, Faults *faults);
+// False with a fault: `path` is then as it was before.
+bool whole_file_write(const char *path, const void *bytes, size_t length, Faults *faults);
+
+#endif
