@@ -15,7 +15,7 @@ double blobby_field(const Blobby *model, Vec3 x)
     double f = 0;
     for (int j = 0; j < model->count; j++) {
         double rho = model->width[j], u = 1 / (1 + vec3_norm2(vec3_sub(x, model->center[j])) / (5 * rho * rho));
-        f += rho * u * u;
+        f += rho * (u * u);
     }
     return f - model->iso_level;
 }
@@ -202,9 +202,12 @@ static bool surface_frame(const Blobby *model, Vec3 x, Vec3 foot, SurfaceFrame *
     return true;
 }
 
-// The tangential Newton step -(I + gap S)^-1 P (foot - x), each eigenvalue raised to at least `floor`. `least` gets the smallest
-// eigenvalue before that, `weak` its direction.
-static Vec3 tangential_step(const SurfaceFrame *frame, double floor, double *least, Vec3 *weak)
+// Beyond the focal point the distance is concave along the surface; its size still scales a step downhill (saddle-free Newton). Near the
+// centre of a sphere both are tiny: a fixed floor made the way round too slow.
+static double descent_divisor(double eigenvalue) { return fmax(fabs(eigenvalue), 1e-6); }
+
+// The tangential Newton step -(I + gap S)^-1 P (foot - x). `least` gets the smallest eigenvalue of I + gap S, `weak` its direction.
+static Vec3 tangential_step(const SurfaceFrame *frame, double *least, Vec3 *weak)
 {
     Vec3 t1 = vec3_normal_to(frame->normal), t2 = vec3_cross(frame->normal, t1), s1 = sym3_mul_vec(&frame->shape, t1);
     double a = 1 + frame->gap * vec3_dot(t1, s1), b = frame->gap * vec3_dot(t2, s1), c = 1 + frame->gap * sym3_quadratic(&frame->shape, t2);
@@ -213,8 +216,8 @@ static Vec3 tangential_step(const SurfaceFrame *frame, double floor, double *lea
     Vec3 e_high = vec3_add_scaled(vec3_scale(t1, cs), sn, t2), e_low = vec3_add_scaled(vec3_scale(t1, -sn), cs, t2);
     *least = low;
     *weak = e_low;
-    double y_high = -vec3_dot(e_high, frame->tangent) / (high > floor ? high : floor);
-    double y_low = -vec3_dot(e_low, frame->tangent) / (low > floor ? low : floor);
+    double y_high = -vec3_dot(e_high, frame->tangent) / descent_divisor(high);
+    double y_low = -vec3_dot(e_low, frame->tangent) / descent_divisor(low);
     return vec3_add_scaled(vec3_scale(e_high, y_high), y_low, e_low);
 }
 
@@ -228,7 +231,7 @@ static bool slide_to_closest(const Blobby *model, Vec3 x, Vec3 foot, double scal
         return false;
     for (int i = 0; i < STEPS; i++) {
         Vec3 weak;
-        Vec3 step = tangential_step(best, 0.1, least, &weak);
+        Vec3 step = tangential_step(best, least, &weak);
         double length = vec3_norm(step), size = vec3_distance(x, best->foot);
         if (vec3_norm(best->tangent) <= 1e-13 * (1 + size)) {
             // a point where the distance has a maximum along the surface (x beyond its focal point): leave it sideways, the same way always
