@@ -23,12 +23,16 @@ typedef struct Script {      // each row holds from its time until the next; the
     ScriptRow *row;
 } Script;
 
+enum { SCRIPT_FASTEST_MM_S = 1000, SCRIPT_FASTEST_DEG_S = 36000, SCRIPT_LONGEST_S = 86400 };
+
 // Parses the text of a script: CSV with the header t_s,push_mm_s,twist_deg_s, `#` comments. NULL with faults where it is wrong:
 // wrong header, not a number, times that go backwards, first time negative, |push| > 1000 mm/s, |twist| > 36,000 deg/s, no row.
 Script *script_parse(const char *text, size_t length, const char *file, Faults *faults);
 // Reads the file (at most 64 MiB) and parses it.
 Script *script_load(const char *path, Faults *faults);
 void script_free(Script *script);
+// One row's rules, for whoever reads rows from elsewhere (a scene's inline script); `before` is the row before it or NULL.
+bool script_check_row(const ScriptRow *row, const ScriptRow *before, const char *file, int line, int column, Faults *faults);
 double script_duration_s(const Script *script);
 // Command at simulated time t (zero before the first row and after the end). `cursor` remembers the row between calls, start with 0.
 Command script_at(const Script *script, double t_s, int *cursor);

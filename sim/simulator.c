@@ -1,1 +1,174 @@
-typedef int placeholder_simulator;
+// One step reads like the paper's loop: feed the sheath, detect, assemble, factor, free motion and contact, correct.
+#include "sim/simulator.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+const char *const stage_name[STAGE_COUNT] = {"feed", "detect", "assemble", "factor", "contact", "correct"};
+const char *const step_flag_name[STEP_FLAG_COUNT] = {"diverged",        "not_converged", "deep",            "fully_inserted",
+                                                     "fully_withdrawn", "out_of_vessel", "detection_unsure"};
+
+struct Simulator {
+    const Scene *scene;
+    Stepper *stepper;
+    StepProfile profile;
+    RunTotals totals;
+    TargetReach *target;
+    double dt;               // [ms]
+};
+
+Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *faults)
+{
+    char why[FAULT_LENGTH / 2] = "no memory";
+    Simulator *simulator = calloc(1, sizeof *simulator);
+    if (simulator)
+        simulator->target = calloc((size_t)scene->target_count + 1, sizeof *simulator->target);
+    if (simulator && simulator->target) {
+        StepperOptions options = {.wire = scene->wire, .vessel = vessel, .wall_friction = scene->friction, .contact = scene->contact_options,
+                                  .dt = scene->dt};
+        simulator->stepper = stepper_create(&options, why, (int)sizeof why);
+    }
+    if (!simulator || !simulator->stepper) {
+        faults_add(faults, scene->path, 0, 0, "cannot be simulated: %s", why);
+        simulator_destroy(simulator);
+        return NULL;
+    }
+    simulator->scene = scene;
+    simulator->dt = scene->dt;
+    for (int i = 0; i < scene->target_count; i++)
+        simulator->target[i].distance = HUGE_VAL;
+    return simulator;
+}
+
+void simulator_destroy(Simulator *simulator)
+{
+    if (!simulator)
+        return;
+    if (simulator->stepper)
+        stepper_destroy(simulator->stepper);
+    free(simulator->target);
+    free(simulator);
+}
+
+static int64_t thread_cpu_ns(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
+}
+
+// Ends a stage that began at *since.
+static void timed(StepProfile *profile, Stage stage, int64_t *since)
+{
+    int64_t now = thread_cpu_ns();
+    histogram_add(&profile->stage[stage], now - *since);
+    *since = now;
+}
+
+static void accumulate(Simulator *simulator)
+{
+    const StepReport *report = step_report(simulator->stepper);
+    RunTotals *totals = &simulator->totals;
+    totals->steps++;
+    totals->flags |= report->flags;
+    totals->not_converged_steps += (report->flags & STEP_NOT_CONVERGED) != 0;
+    totals->contacts_max = report->active > totals->contacts_max ? report->active : totals->contacts_max;
+    totals->penetration_max = fmax(totals->penetration_max, report->penetration);
+    totals->residual_max = fmax(totals->residual_max, report->residual);
+    histogram_add(&simulator->profile.iterations, report->iterations);
+
+    const WireState *state = stepper_state(simulator->stepper);
+    for (int i = 0; i < simulator->scene->target_count; i++) {
+        const SceneTarget *target = &simulator->scene->target[i];
+        TargetReach *reach = &simulator->target[i];
+        double distance = vec3_distance(state->position[state->node_count - 1], target->point);
+        bool inside = distance <= target->radius;
+        if ((inside && !reach->reached) || (!reach->reached && distance < reach->distance))
+            reach->time_s = simulator_time_s(simulator);
+        reach->reached |= inside;
+        reach->distance = fmin(reach->distance, distance);
+    }
+}
+
+void simulator_step(Simulator *simulator, Command command)
+{
+    Stepper *stepper = simulator->stepper;
+    StepProfile *profile = &simulator->profile;
+    double seconds = simulator->dt / 1000;
+    int64_t start = thread_cpu_ns(), since = start;
+
+    step_feed(stepper, (StepCommand){.advance = command.push_mm_s * seconds, .twist = command.twist_deg_s * seconds * PI / 180});
+    timed(profile, STAGE_FEED, &since);
+    step_detect(stepper);
+    timed(profile, STAGE_DETECT, &since);
+    step_assemble(stepper);
+    timed(profile, STAGE_ASSEMBLE, &since);
+    step_factor(stepper);
+    timed(profile, STAGE_FACTOR, &since);
+    step_contact(stepper);
+    timed(profile, STAGE_CONTACT, &since);
+    step_correct(stepper);
+    timed(profile, STAGE_CORRECT, &since);
+
+    histogram_add(&profile->step, since - start);
+    accumulate(simulator);
+}
+
+double simulator_time_s(const Simulator *simulator) { return (double)simulator->totals.steps * simulator->dt / 1000; }
+const WireState *simulator_state(const Simulator *simulator) { return stepper_state(simulator->stepper); }
+const StepReport *simulator_last(const Simulator *simulator) { return step_report(simulator->stepper); }
+const RunTotals *simulator_totals(const Simulator *simulator) { return &simulator->totals; }
+const StepProfile *simulator_profile(const Simulator *simulator) { return &simulator->profile; }
+const TargetReach *simulator_targets(const Simulator *simulator) { return simulator->target; }
+const Scene *simulator_scene(const Simulator *simulator) { return simulator->scene; }
+Stepper *simulator_stepper(Simulator *simulator) { return simulator->stepper; }
+
+typedef struct HashLanes {
+    uint64_t lane[4];
+} HashLanes;
+
+static void hash_doubles(HashLanes *hash, const void *data, size_t count)
+{
+    const unsigned char *byte = data;
+    for (size_t i = 0; i < count; i++) {
+        uint64_t word;
+        memcpy(&word, byte + i * sizeof word, sizeof word);
+        hash->lane[i % 4] = (hash->lane[i % 4] ^ word) * UINT64_C(0x100000001b3);
+        // FNV moves nothing downwards: without this a sign bit would reach one bit of the result only
+        hash->lane[i % 4] ^= hash->lane[i % 4] >> 29;
+    }
+}
+
+uint64_t simulator_hash(const Simulator *simulator)
+{
+    const WireState *state = stepper_state(simulator->stepper);
+    const uint64_t basis = UINT64_C(0xcbf29ce484222325);
+    HashLanes hash = {{basis, basis + 1, basis + 2, basis + 3}};
+    size_t nodes = (size_t)state->node_count;
+    double scalars[4] = {state->time, state->inserted, state->twist, (double)state->node_count};
+    hash_doubles(&hash, scalars, 4);
+    hash_doubles(&hash, state->position, nodes * 3);
+    hash_doubles(&hash, state->orientation, nodes * 4);
+    hash_doubles(&hash, state->velocity, nodes * 3);
+    hash_doubles(&hash, state->spin, nodes * 3);
+    uint64_t all = basis;
+    for (int i = 0; i < 4; i++) {
+        all = (all ^ hash.lane[i]) * UINT64_C(0x100000001b3);
+        all ^= all >> 32;
+    }
+    return all;
+}
+
+double simulator_fastest_mm_s(const Simulator *simulator)
+{
+    const WireState *state = stepper_state(simulator->stepper);
+    double fastest = 0, turning = 0, radius = 0;
+    for (int i = 0; i < state->node_count; i++) {
+        fastest = fmax(fastest, vec3_norm2(state->velocity[i]));
+        turning = fmax(turning, vec3_norm2(state->spin[i]));
+    }
+    for (int i = 0; i < simulator->scene->wire.section_count; i++)
+        radius = fmax(radius, simulator->scene->wire.section[i].diameter / 2);
+    return fmax(sqrt(fastest), sqrt(turning) * radius) * 1000;
+}

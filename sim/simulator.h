@@ -1,0 +1,63 @@
+// The simulator: a scene and its vessel, stepped by commands. One step is the solver's six stages, each timed with the thread's CPU clock.
+// Inside mm, g, ms, N, rad; commands and totals carry their unit in the name. A step allocates nothing. One thread owns a simulator;
+// it borrows scene and vessel, which must outlive it.
+#ifndef SELDINGER_SIM_SIMULATOR_H
+#define SELDINGER_SIM_SIMULATOR_H
+
+#include "input/input.h"
+#include "sim/scene.h"
+#include "sim/time_histogram.h"
+#include "solver/solver.h"
+
+typedef enum { STAGE_FEED, STAGE_DETECT, STAGE_ASSEMBLE, STAGE_FACTOR, STAGE_CONTACT, STAGE_CORRECT, STAGE_COUNT } Stage;
+extern const char *const stage_name[STAGE_COUNT];
+
+// Thread CPU time [ns] of all steps so far.
+typedef struct StepProfile {
+    TimeHistogram step;
+    TimeHistogram stage[STAGE_COUNT];
+    TimeHistogram iterations;        // of the contact solve, a count
+} StepProfile;
+
+// What happened over all steps so far.
+typedef struct RunTotals {
+    int64_t steps;
+    unsigned flags;                  // every STEP_ flag that was seen
+    int64_t not_converged_steps;
+    int contacts_max;                // contacts with force
+    double penetration_max;          // [mm]
+    double residual_max;
+} RunTotals;
+
+// How near the tip came to a target of the scene.
+typedef struct TargetReach {
+    double distance;                 // [mm] least distance of the tip so far
+    double time_s;                   // when that was, or when the target was first reached
+    bool reached;                    // within its radius at some step
+} TargetReach;
+
+typedef struct Simulator Simulator;
+
+// `vessel` may be NULL (no walls). NULL with a fault where the solver refuses an option.
+Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *faults);
+void simulator_destroy(Simulator *simulator);
+
+void simulator_step(Simulator *simulator, Command command);
+
+double simulator_time_s(const Simulator *simulator);
+const WireState *simulator_state(const Simulator *simulator);
+const StepReport *simulator_last(const Simulator *simulator);     // of the last step; zeros before the first
+const RunTotals *simulator_totals(const Simulator *simulator);
+const StepProfile *simulator_profile(const Simulator *simulator);
+const TargetReach *simulator_targets(const Simulator *simulator); // (scene->target_count)
+const Scene *simulator_scene(const Simulator *simulator);
+Stepper *simulator_stepper(Simulator *simulator);                 // for save, restore and node reports
+// FNV-1a over time, inserted length, twist and all nodes' position, orientation, velocity and spin, word by word in four lanes.
+uint64_t simulator_hash(const Simulator *simulator);
+double simulator_fastest_mm_s(const Simulator *simulator);        // the fastest node's speed, or the surface's where the tool turns
+
+// Names of STEP_ flags, for files: "diverged", "not_converged", … ; index 0 to STEP_FLAG_COUNT - 1 is the bit.
+enum { STEP_FLAG_COUNT = 7 };
+extern const char *const step_flag_name[STEP_FLAG_COUNT];
+
+#endif
