@@ -1,0 +1,55 @@
+// Golden tool paths: where some of the tool's nodes were every 50 ms of simulated time, as CSV beside the scene (X.yaml: X.golden.csv),
+// and the comparison of a run with it, point by point over time.
+//
+//   # seldinger golden tool path
+//   # nodes: 201
+//   # duration_s: 5
+//   t_s,node,x_mm,y_mm,z_mm
+//   0.05,0,-12.00000,0.00000,0.00000
+//
+// Positions have five decimals: the rounding, 5e-6 mm, is far below any tolerance.
+#ifndef SELDINGER_SIM_COMPARE_H
+#define SELDINGER_SIM_COMPARE_H
+
+#include "sim/simulator.h"
+
+typedef struct PathRow {
+    double t_s;
+    int node;
+    Vec3 position;
+} PathRow;
+
+typedef struct ToolPath {
+    int node_count;          // of the tool, not of the rows
+    double duration_s;       // how long the run was asked to last
+    int row_count, row_capacity;
+    PathRow *row;            // by time, then by node
+} ToolPath;
+
+// Default: a different machine's mathematics library changes results in the last bit, which contact can grow to about 1e-6 mm over a run;
+// one per cent of stiffness or friction moves a path by 0.01 mm and more.
+#define COMPARE_TOLERANCE_MM 0.001
+
+ToolPath *tool_path_parse(const char *text, size_t length, const char *file, Faults *faults);
+// Text for a file; the caller frees it. NULL where memory lacks.
+char *tool_path_print(const ToolPath *path, size_t *length);
+void tool_path_free(ToolPath *path);
+// `X.golden.csv` of `X.yaml` (or .yml); the caller frees it.
+char *golden_path_of(const char *scene_path);
+
+// Collects a path from a run: create, call after each step. False where memory lacks.
+ToolPath *tool_path_create(const Simulator *simulator, double duration_s);
+bool tool_path_sample(ToolPath *path, const Simulator *simulator);
+
+typedef struct PathDifference {
+    double worst_mm;         // the largest distance between golden and run
+    bool differs;            // beyond the tolerance, or another number of nodes, or missing rows
+    double first_t_s;        // the first time, node and distance beyond the tolerance
+    int first_node;
+    double first_mm;
+    char remark[160];        // what else differs; "" where nothing
+} PathDifference;
+
+PathDifference tool_path_compare(const ToolPath *golden, const ToolPath *run, double tolerance_mm);
+
+#endif

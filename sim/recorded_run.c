@@ -1,0 +1,153 @@
+// Reading a recording back. Every dataset's type, rank and extent is checked before memory is taken; rows that one dataset has
+// more than another (a run killed in the middle of a flush) are left out.
+#include "sim/recording.h"
+
+#include <hdf5.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+typedef struct Reader {
+    hid_t file;
+    const char *path;
+    Faults *faults;
+} Reader;
+
+static const hsize_t most_values = (hsize_t)1 << 29;
+
+// Reads a dataset of `rank` dimensions whose trailing ones are shape[1 …] (0: any, filled in); shape[0] is filled in. NULL with a fault.
+static void *read_dataset(const Reader *reader, const char *name, hid_t type, int rank, hsize_t *shape)
+{
+    hid_t set = H5Dopen2(reader->file, name, H5P_DEFAULT);
+    if (set < 0) {
+        faults_add(reader->faults, reader->path, 0, 0, "lacks the dataset '%s' of a recording", name);
+        return NULL;
+    }
+    hid_t space = H5Dget_space(set), stored = H5Dget_type(set);
+    hsize_t extent[3] = {0, 0, 0}, values = 1;
+    bool good = H5Sget_simple_extent_ndims(space) == rank && H5Sget_simple_extent_dims(space, extent, NULL) == rank;
+    for (int i = 0; good && i < rank; i++) {
+        good = i == 0 || shape[i] == 0 || shape[i] == extent[i];
+        good = good && (extent[i] == 0 || values <= most_values / extent[i]);
+        values *= extent[i];
+    }
+    H5T_class_t class = H5Tget_class(stored);
+    void *data = NULL;
+    if (!good || (class != H5T_FLOAT && class != H5T_INTEGER)) {
+        faults_add(reader->faults, reader->path, 0, 0, "dataset '%s' does not have the shape or type of a recording's", name);
+    } else if (!(data = calloc((size_t)values + 1, H5Tget_size(type)))) {
+        faults_add(reader->faults, reader->path, 0, 0, "no memory for dataset '%s'", name);
+    } else if (values > 0 && H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0) {
+        faults_add(reader->faults, reader->path, 0, 0, "dataset '%s' cannot be read; the file is damaged", name);
+        free(data);
+        data = NULL;
+    }
+    memcpy(shape, extent, (size_t)rank * sizeof *shape);
+    H5Tclose(stored);
+    H5Sclose(space);
+    H5Dclose(set);
+    return data;
+}
+
+static char *read_scene_text(hid_t file)
+{
+    hid_t set = H5Dopen2(file, "/scene", H5P_DEFAULT);
+    if (set < 0)
+        return NULL;
+    hid_t type = H5Dget_type(set);
+    char *text = NULL;
+    size_t size = H5Tget_size(type);
+    if (H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) <= 0 && size < ((size_t)1 << 27) && H5Dget_storage_size(set) == size) {
+        text = calloc(size + 1, 1);
+        if (text && H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text) < 0) {
+            free(text);
+            text = NULL;
+        }
+    }
+    H5Tclose(type);
+    H5Dclose(set);
+    return text;
+}
+
+static int64_t least(int64_t a, hsize_t b) { return (hsize_t)a < b ? a : (int64_t)b; }
+
+static void read_run(const Reader *reader, RecordedRun *run)
+{
+    hsize_t time[1] = {0}, command[2] = {0, 2}, proximal[2] = {0, 2}, hash[1] = {0}, step[1] = {0}, position[3] = {0, 0, 3}, quaternion[3] = {0, 0, 4},
+            radius[1] = {0};
+    run->time_s = read_dataset(reader, "/time_s", H5T_NATIVE_DOUBLE, 1, time);
+    run->command = read_dataset(reader, "/command", H5T_NATIVE_DOUBLE, 2, command);
+    run->proximal = read_dataset(reader, "/proximal", H5T_NATIVE_DOUBLE, 2, proximal);
+    run->state_hash = read_dataset(reader, "/state_hash", H5T_NATIVE_UINT64, 1, hash);
+    run->frame_step = read_dataset(reader, "/wire/step", H5T_NATIVE_INT64, 1, step);
+    run->position = read_dataset(reader, "/wire/position", H5T_NATIVE_DOUBLE, 3, position);
+    quaternion[1] = position[1];
+    run->quaternion = read_dataset(reader, "/wire/quaternion", H5T_NATIVE_DOUBLE, 3, quaternion);
+    run->radius = read_dataset(reader, "/wire/radius_mm", H5T_NATIVE_DOUBLE, 1, radius);
+    if (!run->time_s || !run->command || !run->proximal || !run->state_hash || !run->frame_step || !run->position || !run->quaternion || !run->radius)
+        return;
+    if (position[1] < 2 || position[1] > 100000 || radius[0] != position[1]) {
+        faults_add(reader->faults, reader->path, 0, 0, "holds %llu nodes and %llu radii; 2 to 100000 of each", (unsigned long long)position[1],
+                   (unsigned long long)radius[0]);
+        return;
+    }
+    run->node_count = (int)position[1];
+    run->step_count = least(least(least((int64_t)time[0], command[0]), proximal[0]), hash[0]);
+    run->frame_count = least(least((int64_t)step[0], position[0]), quaternion[0]);
+    while (run->frame_count > 0 && run->frame_step[run->frame_count - 1] >= run->step_count)
+        run->frame_count--;
+    for (int64_t i = 0; i < run->frame_count; i++)
+        if (run->frame_step[i] < (i ? run->frame_step[i - 1] + 1 : 0)) {
+            faults_add(reader->faults, reader->path, 0, 0, "frame %lld names step %lld; steps grow from 0", (long long)i, (long long)run->frame_step[i]);
+            return;
+        }
+}
+
+RecordedRun *recorded_run_load(const char *path, Faults *faults)
+{
+    int before = faults->count;
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+    struct stat status;
+    if (stat(path, &status) != 0 || !S_ISREG(status.st_mode)) {
+        faults_add(faults, path, 0, 0, "cannot be opened; a recording that `seldinger run --record` wrote is expected");
+        return NULL;
+    }
+    hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+    H5Pset_file_locking(access, false, true);
+    Reader reader = {.path = path, .faults = faults, .file = H5Fopen(path, H5F_ACC_RDONLY, access)};
+    H5Pclose(access);
+    if (reader.file < 0) {
+        faults_add_at_byte(faults, path, 0, "is no HDF5 file; a recording that `seldinger run --record` wrote is expected");
+        return NULL;
+    }
+    RecordedRun *run = calloc(1, sizeof *run);
+    if (run) {
+        read_run(&reader, run);
+        run->scene_text = read_scene_text(reader.file);
+    } else {
+        faults_add(faults, path, 0, 0, "no memory");
+    }
+    H5Fclose(reader.file);
+    if (faults->count > before) {
+        recorded_run_free(run);
+        return NULL;
+    }
+    return run;
+}
+
+void recorded_run_free(RecordedRun *run)
+{
+    if (!run)
+        return;
+    free(run->time_s);
+    free(run->command);
+    free(run->proximal);
+    free(run->state_hash);
+    free(run->frame_step);
+    free(run->position);
+    free(run->quaternion);
+    free(run->radius);
+    free(run->scene_text);
+    free(run);
+}

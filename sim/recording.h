@@ -1,0 +1,58 @@
+// A run as an HDF5 file (shared/CONTRACT.md "Recording"): scalars of every step, the wire every 10 ms of simulated time.
+//
+// The simulation thread copies into rings; a thread of the recording's own drains them and flushes about every 0.2 s, so no step sees a file.
+// The file opens in any HDF5 reader while it is written and after a kill, complete up to the last flush. How:
+//   - it is built beside and renamed once its first rows are flushed, so its structure is on the disk before it has its name;
+//   - superblock version 0 and version 1 headers: no checksums and no "open for writing" mark, so an interrupted update leaves old or new figures;
+//   - the metadata cache evicts nothing: between flushes only rows beyond the published extents reach the disk;
+//   - chunks are large and uncached: a flush moves extents in place and seldom anything else.
+// After a failed write (full disk) nothing more is written, the file stays as the last flush left it.
+//
+// Rows: /time_s (S) time at the end of each step, /command (S,2), /proximal (S,2), /state_hash (S), /inserted_mm (S), /report/* (S);
+// frames: /wire/step (K) the row of the frame, /wire/position (K,M,3), /wire/quaternion (K,M,4) as w x y z, /contact/force_n (K,M,3),
+// /contact/gap_mm (K,M), /contact/vessel_node (K,M); once: /wire/s_mm (M), /wire/radius_mm (M), /scene (text; attributes path, files, sha256).
+#ifndef SELDINGER_SIM_RECORDING_H
+#define SELDINGER_SIM_RECORDING_H
+
+#include "sim/simulator.h"
+
+typedef struct RecordingOptions {
+    double frame_ms;         // simulated time between frames, default 10
+    double flush_s;          // wall time between flushes, default 0.2
+    int64_t expected_steps;  // sizes the chunks; 0: unknown
+    int file_count;          // further files that the run depends on, besides what the scene names
+    const char *const *file;
+} RecordingOptions;
+RecordingOptions recording_default_options(void);
+
+typedef struct Recording Recording;
+
+// Call before the first use of HDF5 in a program that records: after a full disk the library must not write at exit.
+void recording_prepare_process(void);
+// NULL with a fault where the file cannot be made.
+Recording *recording_create(const char *path, Simulator *simulator, const RecordingOptions *options, Faults *faults);
+// After a step. Allocates nothing, calls no file; waits where the disk is slower than the simulation. False once writing failed.
+bool recording_step(Recording *recording, Simulator *simulator, Command command);
+// Adds the last state as a frame, writes what is left, ends. False with a fault where writing failed; always frees.
+bool recording_close(Recording *recording, Simulator *simulator, Faults *faults);
+
+// --- reading, for export, info and comparison ---
+typedef struct RecordedRun {
+    int64_t step_count;      // S
+    double *time_s;          // (S)
+    double *command;         // (S, 2)
+    double *proximal;        // (S, 2)
+    uint64_t *state_hash;    // (S)
+    int64_t frame_count;     // K
+    int node_count;          // M
+    int64_t *frame_step;     // (K)
+    Vec3 *position;          // (K, M)
+    Quat *quaternion;        // (K, M)
+    double *radius;          // (M)
+    char *scene_text;
+} RecordedRun;
+// NULL with faults where it is no recording or its sizes do not fit together.
+RecordedRun *recorded_run_load(const char *path, Faults *faults);
+void recorded_run_free(RecordedRun *run);
+
+#endif
