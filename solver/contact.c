@@ -1,1 +1,86 @@
+// The wall's curvature as stiffness (DESIGN section 4, item 1).
+//
+// Over a step the normal turns by H d (H the Hessian of the gap), so a contact force_n n does the work of a spring -force_n H. Its positive part
+// in the tangent plane goes into the matrix, or the tip oscillates; the negative part (a convex wall) would make the matrix indefinite and is left
+// to the next step's normal. The gap is a function of the axis' place alone: no lever arm here.
 #include "solver/contact.h"
+
+#include "solver/block_chain.h"
+
+#include <stddef.h>
+
+// The positive semi-definite part of [xx xy; xy yy].
+static void clamp_positive(double *xx, double *xy, double *yy)
+{
+    double mean = (*xx + *yy) / 2, half = (*xx - *yy) / 2, radius = sqrt(half * half + *xy * *xy);
+    if (mean >= radius)
+        return;
+    if (mean <= -radius) {
+        *xx = *xy = *yy = 0;
+        return;
+    }
+    // one eigenvalue of each sign: (mean + radius) times the projector on the upper eigenvector
+    double top = mean + radius, c = half / radius, s = *xy / radius;
+    *xx = top * (1 + c) / 2;
+    *yy = top * (1 - c) / 2;
+    *xy = top * s / 2;
+}
+
+unsigned contact_free_dofs(const BlockChain *chain, int node)
+{
+    const double *d = chain->diag + 36 * (size_t)node;
+    unsigned mask = 0;
+    for (int r = 0; r < 6; r++) {
+        int fixed = d[7 * r] == 1;
+        for (int c = 0; fixed && c < 6; c++)
+            fixed = c == r || d[6 * r + c] == 0;
+        if (fixed && node > 0) {
+            const double *l = chain->lower + 36 * (size_t)(node - 1);
+            for (int c = 0; fixed && c < 6; c++)
+                fixed = l[6 * r + c] == 0;
+        }
+        if (fixed && node + 1 < chain->count) {
+            const double *l = chain->lower + 36 * (size_t)node;
+            for (int c = 0; fixed && c < 6; c++)
+                fixed = l[6 * c + r] == 0;
+        }
+        mask |= fixed ? 0 : 1u << r;
+    }
+    return mask;
+}
+
+static void add_block(double *block, double k[3][3], double scale, unsigned rows, unsigned columns)
+{
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++)
+            if (rows >> r & columns >> c & 1)
+                block[6 * r + c] += scale * k[r][c];
+}
+
+void contact_add_curvature(const ContactSet *set, BlockChain *chain)
+{
+    for (int i = 0; i < set->count; i++) {
+        const ContactPoint *p = &set->point[i];
+        double force = vec3_dot(p->force, p->normal);
+        if (!(force > 0))
+            continue;
+        Vec3 e = vec3_normal_to(p->normal), f = vec3_cross(p->normal, e);
+        Vec3 he = sym3_mul_vec(&p->hessian, e);
+        double xx = -force * vec3_dot(e, he), xy = -force * vec3_dot(f, he), yy = -force * sym3_quadratic(&p->hessian, f);
+        if (!isfinite(xx) || !isfinite(xy) || !isfinite(yy))
+            continue;
+        clamp_positive(&xx, &xy, &yy);
+        double a[3] = {e.x, e.y, e.z}, b[3] = {f.x, f.y, f.z}, k[3][3];
+        for (int r = 0; r < 3; r++)
+            for (int c = 0; c < 3; c++)
+                k[r][c] = xx * a[r] * a[c] + xy * (a[r] * b[c] + b[r] * a[c]) + yy * b[r] * b[c];
+        unsigned here = contact_free_dofs(chain, p->node);
+        double near = 1 - p->xi;
+        add_block(chain->diag + 36 * (size_t)p->node, k, near * near, here, here);
+        if (p->xi > 0 && p->node + 1 < chain->count) {
+            unsigned next = contact_free_dofs(chain, p->node + 1);
+            add_block(chain->diag + 36 * (size_t)(p->node + 1), k, p->xi * p->xi, next, next);
+            add_block(chain->lower + 36 * (size_t)p->node, k, near * p->xi, next, here);
+        }
+    }
+}

@@ -30,5 +30,7 @@ typedef struct ContactSet {
 // DESIGN section 4, item 1.
 struct BlockChain;
 void contact_add_curvature(const ContactSet *set, struct BlockChain *chain);
+// Bit k: degree of freedom k of the node is free. A constrained one is recognised by its unit row; contacts neither push nor stiffen it.
+unsigned contact_free_dofs(const struct BlockChain *chain, int node);
 
 #endif
