@@ -16,7 +16,9 @@ typedef struct VesselMemory {
     int node;                // node of the tree, or segment of the tube; -1: not yet located
     bool has_foot;
     Vec3 foot;               // last projection, where Newton starts
-} VesselMemory;
+    double clearance;        // [mm] at `place` the wall of `node` was at least this far; 0: not known. Lets far points pass unevaluated
+    Vec3 place;
+} VesselMemory;              // a fresh one: {.node = -1}
 
 enum {
     VESSEL_FAR = 1,          // certainly further from the wall than `reach`: gap is a lower bound, normal and hessian are unset (0)
@@ -52,6 +54,18 @@ static inline void vessel_query(const Vessel *v, int count, const Vec3 *point, d
 
 // --- LIM: the fitted tree. Borrows the tree, which must outlive the vessel. NULL where the tree has no model. ---
 Vessel *lim_vessel_create(const VesselTree *tree);
+
+typedef enum {
+    LIM_SWITCH,              // the paper's: the local model of the point's node alone; the wall jumps where the node changes
+    LIM_BLEND,               // gap, normal and Hessian of the node's and its neighbours' models blended towards the borders of the power cells
+} LimField;
+typedef struct LimVesselOptions {
+    LimField field;
+    int hops;                // moves to a better neighbour a point may make in one query, >= 1 (the paper's: 1)
+    int isa;                 // 0: the widest the CPU has; 1 SSE2, 2 AVX2, 3 AVX-512 (falls back where absent). All give the same bits
+} LimVesselOptions;
+LimVesselOptions lim_vessel_default_options(void);
+Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *options);
 
 // --- Exact tube: the union of spheres of one radius along lines and arcs, or along a polyline. ---
 typedef struct TubePiece {   // a line (angle 0) or an arc

@@ -1,0 +1,38 @@
+// The hot form of a blobby model: groups of eight blobs, one blob a lane, evaluated by one kernel compiled for SSE2, AVX2 and AVX-512.
+//
+// Layout: a model is `count` groups, each seven vectors of eight doubles; unused lanes hold a blob of no weight. Every lane sums its blobs in
+// the order of the groups, and the lanes are added by one fixed tree, so that every instruction set gives the same bits (no fused
+// multiply-add: -ffp-contract=off). Lanes are blobs and not query points because each point has a model of its own.
+#ifndef SELDINGER_GEOM_BLOB_LANES_H
+#define SELDINGER_GEOM_BLOB_LANES_H
+
+#include "geom/blobby.h"
+
+#include <stdint.h>
+
+typedef double Lanes __attribute__((vector_size(64)));
+
+typedef struct BlobGroup {
+    Lanes cx, cy, cz;        // centres [mm]
+    Lanes inverse;           // 1 / (5 rho^2)
+    Lanes rho, a, b;         // rho, -4/(5 rho), 24/(25 rho^3); all 0 in unused lanes
+} BlobGroup;
+
+typedef struct FieldSample {
+    double f;                // field, iso-level taken off
+    Vec3 g;                  // gradient
+    Sym3 h;                  // Hessian
+} FieldSample;
+
+static inline int blob_groups_needed(int64_t blobs) { return (int)((blobs + 7) / 8); }
+void blob_groups_fill(BlobGroup *group, const Blobby *model);
+
+typedef struct BlobKernels {
+    const char *isa;
+    void (*gradient)(const BlobGroup *group, int count, double iso_level, Vec3 x, FieldSample *out);   // f and g; h is left alone
+    void (*hessian)(const BlobGroup *group, int count, double iso_level, Vec3 x, FieldSample *out);
+} BlobKernels;
+// isa: 0 the widest the CPU has, 1 SSE2, 2 AVX2, 3 AVX-512; the next narrower one where it is absent.
+const BlobKernels *blob_kernels(int isa);
+
+#endif
