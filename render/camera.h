@@ -1,0 +1,30 @@
+// A parallel projection: one millimetre is the same number of pixels anywhere, so a scale bar holds and a sphere's outline is its radius.
+#ifndef SELDINGER_RENDER_CAMERA_H
+#define SELDINGER_RENDER_CAMERA_H
+
+#include "geom/linear.h"
+
+typedef struct Camera {
+    Vec3 right, up, back;      // orthonormal, right-handed; back points towards the eye
+    Vec3 center;               // lands in the middle of the view
+    double mm_per_pixel;
+    double near_depth, far_depth;   // [mm] along back, relative to center: what lies between far < near is drawn
+    int width, height;         // [pixel] of the view
+} Camera;
+
+// Axes for a view direction and an up vector; zero vectors are chosen: `view` face on to the points (the principal axis of least extent, signed so
+// that one looks along +y, -z or -x, a patient's front, top or left in LPS), `up` the coordinate axis best seen from there (z before y before x).
+// Points thin in two directions, or in none, leave a choice: then as near to +y as they allow.
+void camera_orient(Camera *camera, Vec3 view, Vec3 up, int count, const Vec3 *point);
+// Frames the points (each with `margin` mm around it) in a view of width x height, leaving `border` pixels at each side. Axes must be set.
+void camera_frame(Camera *camera, int width, int height, double border, int count, const Vec3 *point, double margin);
+// Frames a sphere; with `slab` > 0 only what lies within slab mm before and behind its centre is drawn.
+void camera_frame_sphere(Camera *camera, int width, int height, double border, Vec3 center, double radius, double slab);
+// Pixel (x right, y down, from the view's upper left corner); z: depth towards the eye [mm] relative to center.
+Vec3 camera_project(const Camera *camera, Vec3 point);
+// Column-major matrix from space relative to `origin` to clip space.
+void camera_matrix(const Camera *camera, Vec3 origin, float matrix[16]);
+// Eigenvectors of a symmetric matrix by Jacobi's rotations, values ascending; the signs are arbitrary but repeatable.
+void camera_principal_axes(const Sym3 *matrix, double value[3], Vec3 axis[3]);
+
+#endif

@@ -1,0 +1,116 @@
+// EGL_PLATFORM_SURFACELESS_MESA needs no surface at all: everything is drawn into framebuffer objects.
+//
+// The display is one per process and eglTerminate ends all of its contexts, so contexts are counted and the last one ends it: without that
+// every picture would leave the driver's display behind.
+#include "render/gl_context.h"
+
+#include "render/message.h"
+
+#include <epoxy/egl.h>
+#include <epoxy/gl.h>
+#include <pthread.h>
+#include <stdlib.h>
+
+struct GlContext {
+    EGLDisplay display;
+    EGLContext context;
+    EGLDisplay previous_display;
+    EGLContext previous_context;
+    EGLSurface previous_draw, previous_read;
+};
+
+static pthread_mutex_t display_mutex = PTHREAD_MUTEX_INITIALIZER;
+static int display_users;
+
+static EGLDisplay open_display(char *message, size_t capacity)
+{
+    // epoxy ends the program on a function that does not exist, so ask for the extension before calling it
+    const char *extensions = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
+    if (!extensions || !epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_EXT_platform_base") ||
+        !epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_MESA_platform_surfaceless")) {
+        message_fail(message, capacity, "no surfaceless EGL here; install libegl-mesa0 and libgl1-mesa-dri");
+        return EGL_NO_DISPLAY;
+    }
+    EGLDisplay display = eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, NULL);
+    if (display == EGL_NO_DISPLAY || !eglInitialize(display, NULL, NULL)) {
+        message_fail(message, capacity, "EGL's surfaceless display does not start (error 0x%x); install libgl1-mesa-dri", (unsigned)eglGetError());
+        return EGL_NO_DISPLAY;
+    }
+    return display;
+}
+
+static void release_display(EGLDisplay display)
+{
+    if (--display_users == 0)
+        eglTerminate(display);
+}
+
+static bool make_context(GlContext *context, char *message, size_t capacity)
+{
+    if (!eglBindAPI(EGL_OPENGL_API))
+        return message_fail(message, capacity, "EGL has no desktop OpenGL here; install libgl1-mesa-dri");
+    // a GLES-only EGL has no config for desktop GL; surfaceless contexts need no surface type
+    const EGLint wanted[] = {EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_SURFACE_TYPE, EGL_DONT_CARE, EGL_NONE};
+    EGLConfig config = NULL;
+    EGLint count = 0;
+    if (!eglChooseConfig(context->display, wanted, &config, 1, &count) || count < 1)
+        return message_fail(message, capacity, "EGL has no configuration for desktop OpenGL");
+    const EGLint version[] = {EGL_CONTEXT_MAJOR_VERSION,       3, EGL_CONTEXT_MINOR_VERSION, 3, EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                              EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
+    context->context = eglCreateContext(context->display, config, EGL_NO_CONTEXT, version);
+    if (context->context == EGL_NO_CONTEXT)
+        return message_fail(message, capacity, "no OpenGL 3.3 core context (EGL error 0x%x)", (unsigned)eglGetError());
+    if (!eglMakeCurrent(context->display, EGL_NO_SURFACE, EGL_NO_SURFACE, context->context)) {
+        eglDestroyContext(context->display, context->context);
+        return message_fail(message, capacity, "the OpenGL context cannot be made current (EGL error 0x%x)", (unsigned)eglGetError());
+    }
+    return true;
+}
+
+GlContext *gl_context_create(char *message, size_t capacity)
+{
+    GlContext *context = calloc(1, sizeof *context);
+    if (!context) {
+        message_fail(message, capacity, "not enough memory for a picture");
+        return NULL;
+    }
+    context->previous_display = eglGetCurrentDisplay();
+    context->previous_context = eglGetCurrentContext();
+    context->previous_draw = eglGetCurrentSurface(EGL_DRAW);
+    context->previous_read = eglGetCurrentSurface(EGL_READ);
+    pthread_mutex_lock(&display_mutex);
+    context->display = open_display(message, capacity);
+    bool made = false;
+    if (context->display != EGL_NO_DISPLAY) {
+        display_users++;
+        made = make_context(context, message, capacity);
+        if (!made)
+            release_display(context->display);
+    }
+    pthread_mutex_unlock(&display_mutex);
+    if (!made) {
+        free(context);
+        return NULL;
+    }
+    return context;
+}
+
+void gl_context_destroy(GlContext *context)
+{
+    if (!context)
+        return;
+    eglMakeCurrent(context->display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+    eglDestroyContext(context->display, context->context);
+    pthread_mutex_lock(&display_mutex);
+    release_display(context->display);
+    pthread_mutex_unlock(&display_mutex);
+    if (context->previous_context != EGL_NO_CONTEXT)
+        eglMakeCurrent(context->previous_display, context->previous_draw, context->previous_read, context->previous_context);
+    free(context);
+}
+
+const char *gl_context_renderer(const GlContext *context)
+{
+    (void)context;
+    return (const char *)glGetString(GL_RENDERER);
+}

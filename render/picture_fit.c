@@ -1,0 +1,321 @@
+// A fitted tree: its surface, its points coloured by distance, a histogram, and slices through the worst local models.
+//
+// A slice through node i holds the node's centre, its axis (to the right) and its worst point. Contour: f_i = 0 by marching squares on bilinear
+// cells; its neighbours' contours, faint, show where the wall jumps from one local model to the next.
+#include "render/message.h"
+#include "render/sheet.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { SLICE_CELLS = 140, WORST_MOST = 12, BINS = 60 };
+
+typedef struct FitDrawing {
+    Sheet *sheet;
+    const PictureOptions *options;
+    const VesselTree *tree;
+    const TriangleMesh *mesh;
+    double *distance;          // (P) [mm] > 0 inside; NaN where a node has no model
+    double *sorted;            // |distance|, ascending, of the finite ones
+    int64_t finite_count;
+    double full_scale;         // [mm] ends of the colour map
+    float *field;              // (SLICE_CELLS + 1)^2 scratch
+} FitDrawing;
+
+static Color map_diverging(double x) { return color_diverging(x); }
+
+static Blobby model_of(const VesselTree *tree, int node)
+{
+    int64_t first = tree->blob_offset[node];
+    return (Blobby){.count = (int)(tree->blob_offset[node + 1] - first), .center = tree->blob_center + first, .width = tree->blob_width + first,
+                    .iso_level = tree->iso_level};
+}
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static bool find_distances(FitDrawing *drawing, const double *distance)
+{
+    const VesselTree *tree = drawing->tree;
+    size_t points = (size_t)tree->point_count;
+    drawing->distance = malloc((points + 1) * sizeof *drawing->distance);
+    drawing->sorted = malloc((points + 1) * sizeof *drawing->sorted);
+    drawing->field = malloc((SLICE_CELLS + 1) * (SLICE_CELLS + 1) * sizeof *drawing->field);
+    if (!drawing->distance || !drawing->sorted || !drawing->field)
+        return false;
+    for (int i = 0; i < tree->node_count; i++) {
+        Blobby model = model_of(tree, i);
+        for (int64_t k = tree->point_offset[i]; k < tree->point_offset[i + 1]; k++) {
+            Vec3 gradient;
+            double d = NAN;
+            if (distance)
+                d = distance[k];
+            else if (model.count > 0) {
+                double f = blobby_gradient(&model, tree->point[k], &gradient);
+                d = f / vec3_norm(gradient);
+            }
+            drawing->distance[k] = d;
+            if (isfinite(d))
+                drawing->sorted[drawing->finite_count++] = fabs(d);
+        }
+    }
+    qsort(drawing->sorted, (size_t)drawing->finite_count, sizeof *drawing->sorted, compare_doubles);
+    return true;
+}
+
+static double percentile(const FitDrawing *drawing, double part)
+{
+    return drawing->finite_count > 0 ? drawing->sorted[(int64_t)(part * (double)(drawing->finite_count - 1) + 0.5)] : 0;
+}
+
+static bool draw_surface(FitDrawing *drawing, double x, double y, int width, int height)
+{
+    Sheet *sheet = drawing->sheet;
+    const VesselTree *tree = drawing->tree;
+    double s = sheet->scale;
+    const Vec3 *shown = drawing->mesh && drawing->mesh->vertex_count > 0 ? drawing->mesh->vertex : tree->point_count > 0 ? tree->point : tree->center;
+    int shown_count = shown == tree->center ? tree->node_count : shown == tree->point ? (int)tree->point_count : drawing->mesh->vertex_count;
+    Camera camera = {0};
+    camera_orient(&camera, drawing->options->view, drawing->options->up, shown_count, shown);
+    camera_frame(&camera, width, height, 28 * s, shown_count, shown, 0);
+    if (drawing->options->focus_radius > 0)
+        camera_frame_sphere(&camera, width, height, 8 * s, drawing->options->focus, drawing->options->focus_radius, 0);
+    GlCanvas *panel = sheet_begin_panel(sheet, width, height);
+    ViewPoint *point = malloc(((size_t)tree->point_count + 1) * sizeof *point);
+    if (!panel || !point) {
+        free(point);
+        return panel ? message_fail(sheet->message, sheet->capacity, "not enough memory for a picture") : false;
+    }
+    // as large as half the spacing on a vessel of the mean size, so that single points are seen and none hides its neighbours
+    double size = fmin(fmax(0.22 / camera.mm_per_pixel, 1.6 * s), 9 * s);
+    int count = 0;
+    for (int64_t k = 0; k < tree->point_count; k++) {
+        if (!isfinite(drawing->distance[k]) || !vec3_is_finite(tree->point[k]))
+            continue;
+        Vec3 d = vec3_sub(tree->point[k], camera.center);
+        point[count++] = (ViewPoint){{(float)d.x, (float)d.y, (float)d.z}, color_diverging(drawing->distance[k] / drawing->full_scale), (float)size};
+    }
+    surface_view_draw_points(sheet->view, &camera, camera.center, count, point);
+    ShellStyle style = shell_style_glass();
+    const float grey[3] = {0.78f, 0.79f, 0.80f};
+    memcpy(style.front, grey, sizeof grey);
+    memcpy(style.back, grey, sizeof grey);
+    style.front_opacity = 0.38f;
+    style.back_opacity = 0.5f;
+    surface_view_draw_shell(sheet->view, &camera, &style);
+    sheet_end_panel(sheet, panel, x, y);
+    sheet_scale_bar(sheet, x + 16 * s, y + height - 14 * s, 0.22 * width, camera.mm_per_pixel, SHEET_INK);
+    free(point);
+    return true;
+}
+
+static void draw_histogram(FitDrawing *drawing, double x, double y, double width, double height)
+{
+    Sheet *sheet = drawing->sheet;
+    int64_t bin[BINS] = {0}, most = 1, beyond = 0;
+    for (int64_t k = 0; k < drawing->tree->point_count; k++) {
+        double place = (drawing->distance[k] / drawing->full_scale + 1) / 2 * BINS;
+        if (!isfinite(place))
+            continue;
+        beyond += place < 0 || place >= BINS;
+        bin[place < 0 ? 0 : place >= BINS ? BINS - 1 : (int)place]++;
+    }
+    for (int i = 0; i < BINS; i++)
+        most = bin[i] > most ? bin[i] : most;
+    overlay_fill(sheet->overlay, x, y, width, height, SHEET_PANEL);
+    for (int i = 0; i < BINS; i++) {
+        double tall = (height - 6 * sheet->scale) * (double)bin[i] / (double)most;
+        Color color = color_diverging((i + 0.5) / BINS * 2 - 1);
+        overlay_fill(sheet->overlay, x + width * i / BINS, y + height - tall, width / BINS - 1, tall, color);
+        overlay_rectangle(sheet->overlay, x + width * i / BINS, y + height - tall, width / BINS - 1, tall, color_with_alpha(SHEET_MUTED, 0.5), 1);
+    }
+    overlay_line(sheet->overlay, x + width / 2, y, x + width / 2, y + height, SHEET_MUTED, sheet->scale);
+    if (beyond > 0)
+        sheet_text(sheet, x + 6 * sheet->scale, y + 4 * sheet->scale, TEXT_SMALL, SHEET_MUTED, "%lld beyond the ends", (long long)beyond);
+}
+
+// Where the field crosses zero on the edge between two corners.
+static void crossing(const double a[2], double fa, const double b[2], double fb, double out[2])
+{
+    double t = fa / (fa - fb);
+    out[0] = a[0] + t * (b[0] - a[0]);
+    out[1] = a[1] + t * (b[1] - a[1]);
+}
+
+typedef struct Slice {
+    Vec3 center, along, across, normal;
+    double half;               // [mm] half of the side
+    double x, y, side;         // on the page
+} Slice;
+
+static void draw_contour(FitDrawing *drawing, const Slice *slice, int node, Color color, double thickness)
+{
+    Blobby model = model_of(drawing->tree, node);
+    if (model.count < 1)
+        return;
+    const int n = SLICE_CELLS + 1;
+    for (int j = 0; j < n; j++)
+        for (int i = 0; i < n; i++) {
+            double u = slice->half * (2.0 * i / SLICE_CELLS - 1), v = slice->half * (1 - 2.0 * j / SLICE_CELLS);
+            drawing->field[j * n + i] = (float)blobby_field(&model, vec3_add_scaled(vec3_add_scaled(slice->center, u, slice->along), v, slice->across));
+        }
+    double cell = slice->side / SLICE_CELLS;
+    for (int j = 0; j < SLICE_CELLS; j++)
+        for (int i = 0; i < SLICE_CELLS; i++) {
+            const double corner[4][2] = {{slice->x + i * cell, slice->y + j * cell},
+                                         {slice->x + (i + 1) * cell, slice->y + j * cell},
+                                         {slice->x + (i + 1) * cell, slice->y + (j + 1) * cell},
+                                         {slice->x + i * cell, slice->y + (j + 1) * cell}};
+            const double f[4] = {drawing->field[j * n + i], drawing->field[j * n + i + 1], drawing->field[(j + 1) * n + i + 1],
+                                 drawing->field[(j + 1) * n + i]};
+            double cut[4][2];
+            int cuts = 0;
+            for (int k = 0; k < 4; k++)
+                if ((f[k] > 0) != (f[(k + 1) % 4] > 0))
+                    crossing(corner[k], f[k], corner[(k + 1) % 4], f[(k + 1) % 4], cut[cuts++]);
+            for (int k = 0; k + 1 < cuts; k += 2)
+                overlay_line(drawing->sheet->overlay, cut[k][0], cut[k][1], cut[k + 1][0], cut[k + 1][1], color, thickness);
+        }
+}
+
+static void slice_place(const Slice *slice, Vec3 point, double *x, double *y, double *off)
+{
+    Vec3 d = vec3_sub(point, slice->center);
+    double scale = slice->side / (2 * slice->half);
+    *x = slice->x + slice->side / 2 + scale * vec3_dot(d, slice->along);
+    *y = slice->y + slice->side / 2 - scale * vec3_dot(d, slice->across);
+    *off = vec3_dot(d, slice->normal);
+}
+
+static void draw_slice(FitDrawing *drawing, int node, double x, double y, double side)
+{
+    Sheet *sheet = drawing->sheet;
+    const VesselTree *tree = drawing->tree;
+    double s = sheet->scale, r = tree->radius[node], worst = -1;
+    Slice slice = {.center = tree->center[node], .along = tree->direction[node], .half = 3 * r, .x = x, .y = y + 20 * s, .side = side - 20 * s};
+    Vec3 aside = vec3_normal_to(slice.along);
+    for (int64_t k = tree->point_offset[node]; k < tree->point_offset[node + 1]; k++) {
+        Vec3 d = vec3_sub(tree->point[k], slice.center), off = vec3_add_scaled(d, -vec3_dot(d, slice.along), slice.along);
+        if (fabs(drawing->distance[k]) > worst && vec3_norm(off) > 0.1 * r) {
+            worst = fabs(drawing->distance[k]);
+            aside = vec3_unit(off);
+        }
+    }
+    slice.across = aside;
+    slice.normal = vec3_cross(slice.along, aside);
+    sheet_text(sheet, x, y, TEXT_SMALL, SHEET_INK, "node %d: r %.2f, error %.3f mm, %d blobs", node, r, tree->error ? tree->error[node] : NAN,
+               model_of(tree, node).count);
+    overlay_fill(sheet->overlay, slice.x, slice.y, slice.side, slice.side, SHEET_PANEL);
+    overlay_push_clip(sheet->overlay, slice.x, slice.y, slice.side, slice.side);
+    double px, py, off, scale = slice.side / (2 * slice.half);
+    for (int64_t b = tree->blob_offset[node]; b < tree->blob_offset[node + 1]; b++) {
+        slice_place(&slice, tree->blob_center[b], &px, &py, &off);
+        double radius = blob_radius(tree->blob_width[b], tree->iso_level) * scale;
+        if (radius > 0)
+            overlay_circle(sheet->overlay, px, py, radius, (Color){0, 158, 115, 70}, 1.2 * s);
+        overlay_line(sheet->overlay, px - 3 * s, py, px + 3 * s, py, (Color){0, 120, 90, 200}, s);
+        overlay_line(sheet->overlay, px, py - 3 * s, px, py + 3 * s, (Color){0, 120, 90, 200}, s);
+    }
+    for (int i = 0; i < tree->node_count; i++)
+        if (tree->parent[i] == node || tree->parent[node] == i)
+            draw_contour(drawing, &slice, i, (Color){150, 154, 160, 150}, s);
+    draw_contour(drawing, &slice, node, SHEET_INK, 1.8 * s);
+    for (int64_t k = tree->point_offset[node]; k < tree->point_offset[node + 1]; k++) {
+        slice_place(&slice, tree->point[k], &px, &py, &off);
+        if (fabs(off) > 0.3 * r || !isfinite(drawing->distance[k]))
+            continue;
+        overlay_disc(sheet->overlay, px, py, 3.2 * s, color_with_alpha(SHEET_INK, 0.7));
+        overlay_disc(sheet->overlay, px, py, 2.5 * s, color_diverging(drawing->distance[k] / drawing->full_scale));
+    }
+    overlay_pop_clip(sheet->overlay);
+    overlay_rectangle(sheet->overlay, slice.x, slice.y, slice.side, slice.side, SHEET_FAINT, s);
+    sheet_scale_bar(sheet, slice.x + 8 * s, slice.y + slice.side - 6 * s, 0.3 * slice.side, 1 / scale, SHEET_INK);
+}
+
+// The largest errors first, none beside one already chosen.
+static int choose_worst(const VesselTree *tree, int most, int chosen[WORST_MOST])
+{
+    int count = 0;
+    while (tree->error && count < most && count < WORST_MOST) {
+        int best = -1;
+        for (int i = 0; i < tree->node_count; i++) {
+            bool near_other = model_of(tree, i).count < 1 || !isfinite(tree->error[i]);
+            for (int k = 0; k < count; k++)
+                near_other = near_other || vec3_distance(tree->center[i], tree->center[chosen[k]]) < 1.5 * tree->radius[chosen[k]];
+            if (!near_other && (best < 0 || tree->error[i] > tree->error[best]))
+                best = i;
+        }
+        if (best < 0)
+            break;
+        chosen[count++] = best;
+    }
+    return count;
+}
+
+static bool draw_fit(FitDrawing *drawing)
+{
+    Sheet *sheet = drawing->sheet;
+    const VesselTree *tree = drawing->tree;
+    int chosen[WORST_MOST], worst = choose_worst(tree, drawing->options->worst_count, chosen);
+    double s = sheet->scale, gap = 20 * s, top = 62 * s, column = (worst > 0 ? 0.42 : 0.28) * sheet->width, left = sheet->width - gap - column;
+    if (!draw_surface(drawing, gap, top, (int)(left - 2 * gap), (int)(sheet->height - top - gap)))
+        return false;
+    if (drawing->options->title)
+        sheet_text(sheet, gap, 18 * s, TEXT_LARGE, SHEET_INK, "%s", drawing->options->title);
+
+    double tall = 120 * s, y = top;
+    draw_histogram(drawing, left, y, column, tall);
+    y += tall + 8 * s;
+    char title[128];
+    snprintf(title, sizeof title, "signed distance [mm]: blue outside the model, red inside");
+    sheet_color_bar(sheet, left, y, column, 12 * s, map_diverging, -1, -drawing->full_scale, drawing->full_scale, title);
+    y += 66 * s;
+    sheet_text(sheet, left, y, TEXT_NORMAL, SHEET_INK, "%lld points, |distance| median %.3f, 90 %% %.3f, 99 %% %.3f, max %.2f mm",
+               (long long)drawing->finite_count, percentile(drawing, 0.5), percentile(drawing, 0.9), percentile(drawing, 0.99), percentile(drawing, 1));
+    sheet_text(sheet, left, y + 23 * s, TEXT_NORMAL, SHEET_INK, "%d nodes, %lld blobs, %.1f a node", tree->node_count, (long long)tree->blob_count,
+               (double)tree->blob_count / tree->node_count);
+    y += 56 * s;
+    if (worst < 1)
+        return true;
+    sheet_text(sheet, left, y, TEXT_NORMAL, SHEET_MUTED, "largest errors: slices through axis and worst point; neighbours' walls grey");
+    y += 28 * s;
+    int best_columns = 1;
+    double room = sheet->height - gap - y, best = 0;
+    for (int columns = 1; columns <= worst; columns++) {
+        int rows = (worst + columns - 1) / columns;
+        double side = fmin((column + 10 * s) / columns - 10 * s + 20 * s, room / rows - 6 * s);
+        if (side > best) {
+            best = side;
+            best_columns = columns;
+        }
+    }
+    double pitch = (column - (best - 20 * s)) / fmax(1, best_columns - 1);
+    for (int k = 0; k < worst; k++)
+        draw_slice(drawing, chosen[k], left + (k % best_columns) * pitch, y + (k / best_columns) * (best + 6 * s), best);
+    return true;
+}
+
+bool picture_of_fit(const char *path, const PictureOptions *options, const VesselTree *tree, const TriangleMesh *mesh, const double *distance,
+                    char *message, size_t capacity)
+{
+    if (!tree || tree->node_count < 1 || !vessel_tree_is_model(tree))
+        return message_fail(message, capacity, "the tree has no fitted model to draw");
+    Sheet sheet;
+    if (!sheet_open(&sheet, options, message, capacity))
+        return false;
+    FitDrawing drawing = {.sheet = &sheet, .options = options, .tree = tree, .mesh = mesh};
+    bool drawn = find_distances(&drawing, distance) || message_fail(message, capacity, "not enough memory for a picture");
+    if (drawn) {
+        double wide = percentile(&drawing, 0.98);
+        drawing.full_scale = options->distance_full_scale > 0 ? options->distance_full_scale : wide > 0 ? sheet_round_up(wide) : 0.1;
+    }
+    drawn = drawn && surface_view_set_mesh(sheet.view, mesh, message, capacity) && draw_fit(&drawing) && sheet_save(&sheet, path);
+    free(drawing.distance);
+    free(drawing.sorted);
+    free(drawing.field);
+    sheet_close(&sheet);
+    return drawn;
+}

@@ -1,0 +1,443 @@
+// Vessel and tool: the large view, the close-up of the tip, and several moments side by side.
+//
+// Depth: the tool's tube, arrows and target spheres are opaque and write depth; the vessel's wall, back and front faces, is blended over them from
+// far to near, so a tool inside is seen through exactly the walls that lie before it.
+#include "render/message.h"
+#include "render/sheet.h"
+
+#include <stdlib.h>
+
+typedef struct RunDrawing {
+    Sheet *sheet;
+    const PictureOptions *options;
+    const PictureScene *scene;
+    ShellStyle style;
+    double force_scale;        // [N] top of the map
+    Solids solids;
+    double *radius;            // (longest tool) scratch
+    Color *color;
+    int frame_count;
+    Vec3 *frame_point;         // what the camera must show
+} RunDrawing;
+
+static const Color TARGET_COLOR = {0, 114, 178, 255}, ARROW_COLOR = {0, 120, 105, 255}, SHEATH_COLOR = {120, 124, 130, 255};
+
+static bool check_input(const PictureScene *scene, int tool_count, const PictureTool *tool, char *message, size_t capacity)
+{
+    if (tool_count < 1 || tool_count > 6)
+        return message_fail(message, capacity, "a picture of %d moments; 1 to 6", tool_count);
+    for (int k = 0; k < tool_count; k++) {
+        if (tool[k].node_count < 2 || !tool[k].position || !tool[k].radius)
+            return message_fail(message, capacity, "a tool of %d nodes cannot be drawn; at least 2", tool[k].node_count);
+        for (int i = 0; i < tool[k].node_count; i++)
+            if (!vec3_is_finite(tool[k].position[i]) || !isfinite(tool[k].radius[i]) || (tool[k].force && !vec3_is_finite(tool[k].force[i])))
+                return message_fail(message, capacity, "node %d of the tool is not a finite number: nothing is drawn", i);
+    }
+    for (int i = 0; i < scene->target_count; i++)
+        if (!vec3_is_finite(scene->target[i].point) || !isfinite(scene->target[i].radius))
+            return message_fail(message, capacity, "target %d is not a finite number: nothing is drawn", i);
+    if (scene->vessel)
+        for (int i = 0; i < scene->vessel->vertex_count; i++)
+            if (!vec3_is_finite(scene->vessel->vertex[i]))
+                return message_fail(message, capacity, "vertex %d of the surface is not a finite number: nothing is drawn", i);
+    return true;
+}
+
+static int first_free(const PictureTool *tool)
+{
+    return tool->first_free_node < 0 ? 0 : tool->first_free_node > tool->node_count - 2 ? tool->node_count - 2 : tool->first_free_node;
+}
+
+// What the camera frames: the vessel where there is one, else the free part of the tools; targets; the sheath's mouth.
+static bool gather_frame(RunDrawing *drawing, int tool_count, const PictureTool *tool)
+{
+    const PictureScene *scene = drawing->scene;
+    bool has_vessel = scene->vessel && scene->vessel->vertex_count > 0;
+    size_t count = has_vessel ? (size_t)scene->vessel->vertex_count : 0;
+    for (int k = 0; k < tool_count && !has_vessel; k++)
+        count += (size_t)(tool[k].node_count - first_free(&tool[k]));
+    drawing->frame_point = malloc((count + 6 * (size_t)scene->target_count + 1) * sizeof *drawing->frame_point);
+    if (!drawing->frame_point)
+        return message_fail(drawing->sheet->message, drawing->sheet->capacity, "not enough memory for a picture");
+    int n = 0;
+    for (int i = 0; has_vessel && i < scene->vessel->vertex_count; i++)
+        drawing->frame_point[n++] = scene->vessel->vertex[i];
+    for (int k = 0; k < tool_count && !has_vessel; k++)
+        for (int i = first_free(&tool[k]); i < tool[k].node_count; i++)
+            drawing->frame_point[n++] = tool[k].position[i];
+    for (int i = 0; i < scene->target_count; i++) {
+        const SceneTarget *target = &scene->target[i];
+        const double r = target->radius;
+        const Vec3 corner[6] = {{r, 0, 0}, {-r, 0, 0}, {0, r, 0}, {0, -r, 0}, {0, 0, r}, {0, 0, -r}};
+        for (int k = 0; k < 6; k++)
+            drawing->frame_point[n++] = vec3_add(target->point, corner[k]);
+    }
+    if (scene->has_entry)
+        drawing->frame_point[n++] = scene->entry;
+    drawing->frame_count = n;
+    return true;
+}
+
+static double largest_force(int tool_count, const PictureTool *tool)
+{
+    double largest = 0;
+    for (int k = 0; k < tool_count; k++)
+        for (int i = 0; tool[k].force && i < tool[k].node_count; i++)
+            largest = fmax(largest, vec3_norm(tool[k].force[i]));
+    return largest;
+}
+
+// One arrow for each stretch of the tool of about 16 pixels: the sum of its nodes' forces, its head at the tool where the wall pushes.
+static void add_arrows(RunDrawing *drawing, const Camera *camera, const PictureTool *tool, double line)
+{
+    if (!tool->force || !drawing->options->arrows)
+        return;
+    double stretch = 16 * drawing->sheet->scale * camera->mm_per_pixel, longest = 64 * drawing->sheet->scale * camera->mm_per_pixel;
+    for (int i = first_free(tool); i < tool->node_count;) {
+        Vec3 sum = {0, 0, 0}, place = {0, 0, 0};
+        double weight = 0, radius = 0, length = 0;
+        int last = i;
+        while (last < tool->node_count && (last == i || length < stretch)) {
+            double size = vec3_norm(tool->force[last]);
+            sum = vec3_add(sum, tool->force[last]);
+            place = vec3_add_scaled(place, size, tool->position[last]);
+            weight += size;
+            radius = fmax(radius, drawing->radius[last]);
+            if (last + 1 < tool->node_count)
+                length += vec3_distance(tool->position[last], tool->position[last + 1]);
+            last++;
+        }
+        i = last;
+        double size = vec3_norm(sum);
+        if (!(size > 0.02 * drawing->force_scale))
+            continue;
+        place = vec3_scale(place, 1 / weight);
+        Vec3 direction = vec3_scale(sum, 1 / size);
+        // square root: a tenth of the force is still seen
+        double long_as = longest * sqrt(fmin(size / drawing->force_scale, 2));
+        Vec3 tip = vec3_add_scaled(place, -radius, direction);
+        solids_arrow(&drawing->solids, vec3_add_scaled(tip, -long_as, direction), tip, line, ARROW_COLOR);
+    }
+}
+
+static void add_tool(RunDrawing *drawing, const Camera *camera, const PictureTool *tool)
+{
+    double thin = 1.0 * drawing->sheet->scale * camera->mm_per_pixel;   // at least two pixels wide
+    int free_node = first_free(tool);
+    for (int i = 0; i < tool->node_count; i++) {
+        drawing->radius[i] = fmax(tool->radius[i], thin);
+        drawing->color[i] = i < free_node ? SHEATH_COLOR : color_sequential(tool->force ? vec3_norm(tool->force[i]) / drawing->force_scale : 0);
+    }
+    // behind the mouth only a short stub is shown
+    int first = free_node;
+    double stub = 0, most = 30 * drawing->sheet->scale * camera->mm_per_pixel;
+    while (first > 0 && stub < most) {
+        stub += vec3_distance(tool->position[first], tool->position[first - 1]);
+        first--;
+    }
+    solids_tube(&drawing->solids, tool->node_count - first, tool->position + first, drawing->radius + first, drawing->color + first);
+    add_arrows(drawing, camera, tool, thin);
+}
+
+static void add_targets(RunDrawing *drawing, const Camera *camera)
+{
+    double line = 0.75 * drawing->sheet->scale * camera->mm_per_pixel;
+    for (int i = 0; i < drawing->scene->target_count; i++) {
+        const SceneTarget *target = &drawing->scene->target[i];
+        solids_circle(&drawing->solids, target->point, camera->back, target->radius, line, TARGET_COLOR);
+        const Vec3 tilted[2] = {vec3_unit(vec3_add_scaled(camera->right, 0.35, camera->back)), vec3_unit(vec3_add_scaled(camera->up, 0.35, camera->back))};
+        for (int k = 0; k < 2; k++)
+            solids_circle(&drawing->solids, target->point, tilted[k], target->radius, 0.6 * line, TARGET_COLOR);
+    }
+}
+
+// One 3D panel with its upper left corner at (x, y) of the page.
+static bool draw_panel(RunDrawing *drawing, const Camera *camera, const PictureTool *tool, double x, double y)
+{
+    GlCanvas *panel = sheet_begin_panel(drawing->sheet, camera->width, camera->height);
+    if (!panel)
+        return false;
+    solids_clear(&drawing->solids);
+    drawing->solids.origin = camera->center;
+    add_tool(drawing, camera, tool);
+    add_targets(drawing, camera);
+    if (drawing->scene->has_entry)
+        solids_sphere(&drawing->solids, drawing->scene->entry, 4 * drawing->sheet->scale * camera->mm_per_pixel, SHEATH_COLOR);
+    if (drawing->solids.is_short_of_memory)
+        return message_fail(drawing->sheet->message, drawing->sheet->capacity, "not enough memory for a picture");
+    surface_view_draw_solids(drawing->sheet->view, camera, &drawing->solids, &drawing->style);
+    surface_view_draw_shell(drawing->sheet->view, camera, &drawing->style);
+    sheet_end_panel(drawing->sheet, panel, x, y);
+    return true;
+}
+
+// Names beside the target spheres and the entry, kept inside the panel.
+static void label_panel(RunDrawing *drawing, const Camera *camera, double x, double y)
+{
+    Sheet *sheet = drawing->sheet;
+    double s = sheet->scale;
+    for (int i = 0; i < drawing->scene->target_count + drawing->scene->has_entry; i++) {
+        bool is_target = i < drawing->scene->target_count;
+        const char *name = is_target ? drawing->scene->target[i].name : "sheath";
+        Vec3 place = is_target ? drawing->scene->target[i].point : drawing->scene->entry, p = camera_project(camera, place);
+        if (p.x < 0 || p.y < 0 || p.x > camera->width || p.y > camera->height)
+            continue;
+        double width, height, away = is_target ? drawing->scene->target[i].radius / camera->mm_per_pixel + 4 * s : 8 * s;
+        overlay_text_size(sheet->overlay, TEXT_NORMAL, name, &width, &height);
+        bool fits_right = p.x + away + width < camera->width - 4 * s;
+        double left = fits_right ? p.x + away : fmax(p.x - away - width, 2 * s), top = fmin(fmax(p.y - height / 2, 2 * s), camera->height - height - 2 * s);
+        sheet_label(sheet, x + left, y + top, 0, TEXT_NORMAL, is_target ? TARGET_COLOR : SHEET_MUTED, name);
+    }
+}
+
+// How far across the lumen at the tip: the nearest wall and the wall opposite to it. 0 where there is no vessel.
+static double lumen_width_at(const TriangleMesh *mesh, Vec3 tip)
+{
+    double near_wall = HUGE_VAL, far_wall = HUGE_VAL;
+    Vec3 outward = {1, 0, 0};
+    for (int i = 0; mesh && i < mesh->vertex_count; i++) {
+        double d = vec3_distance(mesh->vertex[i], tip);
+        if (d < near_wall) {
+            near_wall = d;
+            outward = mesh->normal[i];
+        }
+    }
+    for (int i = 0; mesh && i < mesh->vertex_count; i++) {
+        Vec3 d = vec3_sub(mesh->vertex[i], tip);
+        double along = -vec3_dot(d, outward), off = vec3_norm(vec3_add_scaled(d, along, outward));
+        if (along > 0 && off < 0.2 * along + 0.1 && vec3_dot(mesh->normal[i], outward) < -0.5)
+            far_wall = fmin(far_wall, along);
+    }
+    return isfinite(near_wall) && isfinite(far_wall) ? near_wall + far_wall : 0;
+}
+
+static double inset_radius_of(const RunDrawing *drawing, Vec3 tip)
+{
+    if (drawing->options->inset_radius > 0)
+        return drawing->options->inset_radius;
+    double width = lumen_width_at(drawing->scene->vessel, tip);
+    return width > 0 ? fmin(fmax(2.2 * width, 4), 12) : 6;
+}
+
+static Camera close_up_camera(const Camera *whole, Vec3 tip, double radius, int side)
+{
+    Camera camera = *whole;
+    camera_frame_sphere(&camera, side, side, 0, tip, radius, 1.3 * radius);
+    return camera;
+}
+
+// The square of the large view that the close-up shows.
+static void outline_close_up(RunDrawing *drawing, const Camera *whole, const Camera *close, double x, double y)
+{
+    Vec3 p = camera_project(whole, close->center);
+    double half = 0.5 * close->width * close->mm_per_pixel / whole->mm_per_pixel;
+    overlay_push_clip(drawing->sheet->overlay, x, y, whole->width, whole->height);
+    overlay_rectangle(drawing->sheet->overlay, x + p.x - half, y + p.y - half, 2 * half, 2 * half, SHEET_MUTED, 1.2 * drawing->sheet->scale);
+    overlay_pop_clip(drawing->sheet->overlay);
+}
+
+static void force_bar(RunDrawing *drawing, double x, double y, double width)
+{
+    bool milli = drawing->force_scale < 1;
+    sheet_color_bar(drawing->sheet, x, y, width, 14 * drawing->sheet->scale, color_sequential, 0, 0, drawing->force_scale * (milli ? 1000 : 1),
+                    milli ? "wall force on a node [mN]" : "wall force on a node [N]");
+}
+
+static void readings_text(char *text, size_t capacity, const PictureTool *tool)
+{
+    snprintf(text, capacity, "t %.2f s   inserted %.1f mm   push %.3g N   torque %.3g N mm", tool->time_s, tool->inserted_mm, tool->push_force_n,
+             tool->torque_n_mm);
+}
+
+static void write_facts(RunDrawing *drawing, const PictureTool *tool, double x, double y, double width)
+{
+    Sheet *sheet = drawing->sheet;
+    double line = 23 * sheet->scale;
+    int touching = 0;
+    double largest = largest_force(1, tool);
+    for (int i = 0; tool->force && i < tool->node_count; i++)
+        touching += vec3_norm2(tool->force[i]) > 0;
+    char text[128];
+    snprintf(text, sizeof text, largest < 1 ? "largest %.3g mN" : "largest %.3g N", largest < 1 ? 1000 * largest : largest);
+    sheet_text(sheet, x, y, TEXT_NORMAL, SHEET_INK, "%s, %d nodes touch the wall", text, touching);
+    Vec3 tip = tool->position[tool->node_count - 1];
+    sheet_text(sheet, x, y + line, TEXT_NORMAL, SHEET_INK, "tip (%.1f, %.1f, %.1f) mm", tip.x, tip.y, tip.z);
+    overlay_push_clip(sheet->overlay, x, y, width, sheet->height - y);
+    for (int i = 0; i < drawing->scene->target_count && i < 6; i++) {
+        double away = vec3_distance(tip, drawing->scene->target[i].point);
+        sheet_text(sheet, x, y + (2 + i) * line, TEXT_NORMAL, TARGET_COLOR, "%s: %.1f mm from the tip%s", drawing->scene->target[i].name, away,
+                   away <= drawing->scene->target[i].radius ? ", reached" : "");
+    }
+    overlay_pop_clip(sheet->overlay);
+}
+
+static bool draw_run(RunDrawing *drawing, const PictureTool *tool)
+{
+    Sheet *sheet = drawing->sheet;
+    const PictureOptions *options = drawing->options;
+    double s = sheet->scale, gap = 20 * s, top = 62 * s, column = fmin(0.32 * sheet->width, 0.56 * sheet->height);
+    int width = (int)(sheet->width - column - 3 * gap), height = (int)(sheet->height - top - gap);
+    Camera whole = {0};
+    camera_orient(&whole, options->view, options->up, drawing->frame_count, drawing->frame_point);
+    camera_frame(&whole, width, height, 34 * s, drawing->frame_count, drawing->frame_point, 0);
+    if (options->focus_radius > 0)
+        camera_frame_sphere(&whole, width, height, 8 * s, options->focus, options->focus_radius, 0);
+    if (!draw_panel(drawing, &whole, tool, gap, top))
+        return false;
+    label_panel(drawing, &whole, gap, top);
+    sheet_scale_bar(sheet, gap + 16 * s, top + height - 14 * s, 0.22 * width, whole.mm_per_pixel, SHEET_INK);
+
+    double left = sheet->width - gap - column, below = top;
+    if (options->inset) {
+        Vec3 tip = tool->position[tool->node_count - 1];
+        double radius = inset_radius_of(drawing, tip);
+        Camera close = close_up_camera(&whole, tip, radius, (int)column);
+        if (!draw_panel(drawing, &close, tool, left, top))
+            return false;
+        label_panel(drawing, &close, left, top);
+        overlay_rectangle(sheet->overlay, left, top, (int)column, (int)column, SHEET_MUTED, 1.2 * s);
+        outline_close_up(drawing, &whole, &close, gap, top);
+        sheet_scale_bar(sheet, left + 14 * s, top + column - 12 * s, 0.3 * column, close.mm_per_pixel, SHEET_INK);
+        below += column + 18 * s;
+    }
+    force_bar(drawing, left, below, column);
+    write_facts(drawing, tool, left, below + 62 * s, column);
+
+    char text[256];
+    readings_text(text, sizeof text, tool);
+    double title = options->title ? sheet_text_anchored(sheet, gap, 18 * s, 0, TEXT_LARGE, SHEET_INK, options->title) + 28 * s : 0;
+    double room = sheet->width - 2 * gap - title, wide;
+    overlay_text_size(sheet->overlay, TEXT_NORMAL, text, &wide, NULL);
+    overlay_text(sheet->overlay, wide < room ? gap + title : sheet->width - gap - wide, 23 * s, TEXT_NORMAL, SHEET_INK, text);
+    if (tool->label && wide < room)
+        sheet_text(sheet, gap + title + wide + 24 * s, 23 * s, TEXT_NORMAL, SHEET_MUTED, "%s", tool->label);
+    return true;
+}
+
+// The corner of a panel (0 to 3: upper left, upper right, lower left, lower right) whose square of `side` pixels hides least.
+static int emptiest_corner(const RunDrawing *drawing, const Camera *camera, const PictureTool *tool, double side)
+{
+    int hidden[4] = {0};
+    int tool_nodes = tool->node_count - first_free(tool);
+    for (int i = 0; i < drawing->frame_count + tool_nodes; i++) {
+        bool is_tool = i >= drawing->frame_count;
+        Vec3 p = camera_project(camera, is_tool ? tool->position[first_free(tool) + i - drawing->frame_count] : drawing->frame_point[i]);
+        bool left = p.x < side, right = p.x > camera->width - side, upper = p.y < side, lower = p.y > camera->height - side;
+        int weight = is_tool ? 50 : 1;
+        hidden[0] += weight * (left && upper);
+        hidden[1] += weight * (right && upper);
+        hidden[2] += weight * (left && lower) + (left && lower);   // the scale bar stands there
+        hidden[3] += weight * (right && lower);
+    }
+    int best = 3;
+    for (int k = 2; k >= 0; k--)
+        if (hidden[k] < hidden[best])
+            best = k;
+    return best;
+}
+
+static bool draw_moment(RunDrawing *drawing, const Camera *whole, const PictureTool *tool, double x, double y, double header)
+{
+    Sheet *sheet = drawing->sheet;
+    double s = sheet->scale;
+    char text[256];
+    snprintf(text, sizeof text, "t %.2f s   inserted %.1f mm   push %.3g N", tool->time_s, tool->inserted_mm, tool->push_force_n);
+    overlay_push_clip(sheet->overlay, x, y, whole->width, header);
+    if (tool->label)
+        sheet_text(sheet, x, y, TEXT_NORMAL, SHEET_INK, "%s", tool->label);
+    sheet_text(sheet, x, y + (tool->label ? 22 * s : 4 * s), tool->label ? TEXT_SMALL : TEXT_NORMAL, tool->label ? SHEET_MUTED : SHEET_INK, "%s", text);
+    overlay_pop_clip(sheet->overlay);
+    double top = y + header;
+    if (!draw_panel(drawing, whole, tool, x, top))
+        return false;
+    label_panel(drawing, whole, x, top);
+    sheet_scale_bar(sheet, x + 12 * s, top + whole->height - 12 * s, 0.22 * whole->width, whole->mm_per_pixel, SHEET_INK);
+    if (!drawing->options->inset)
+        return true;
+    Vec3 tip = tool->position[tool->node_count - 1];
+    int side = (int)(0.38 * fmin(whole->width, whole->height));
+    Camera close = close_up_camera(whole, tip, inset_radius_of(drawing, tip), side);
+    int corner = emptiest_corner(drawing, whole, tool, side);
+    double left = x + (corner & 1 ? whole->width - side : 0), above = top + (corner & 2 ? whole->height - side : 0);
+    outline_close_up(drawing, whole, &close, x, top);
+    if (!draw_panel(drawing, &close, tool, left, above))
+        return false;
+    overlay_rectangle(sheet->overlay, left, above, side, side, SHEET_MUTED, 1.2 * s);
+    sheet_scale_bar(sheet, left + 10 * s, above + side - 8 * s, 0.36 * side, close.mm_per_pixel, SHEET_INK);
+    return true;
+}
+
+static bool draw_moments(RunDrawing *drawing, int tool_count, const PictureTool *tool)
+{
+    Sheet *sheet = drawing->sheet;
+    const PictureOptions *options = drawing->options;
+    double s = sheet->scale, gap = 16 * s, header = 46 * s, foot = 64 * s, top = options->title ? 54 * s : 14 * s;
+    Camera best = {0};
+    camera_orient(&best, options->view, options->up, drawing->frame_count, drawing->frame_point);
+    int best_columns = tool_count;
+    double best_scale = HUGE_VAL;
+    for (int columns = tool_count; columns >= 1; columns--) {
+        int rows = (tool_count + columns - 1) / columns;
+        Camera camera = best;
+        int width = (int)((sheet->width - gap * (columns + 1)) / columns), height = (int)((sheet->height - top - foot) / rows - header);
+        if (width < 16 || height < 16)
+            continue;
+        camera_frame(&camera, width, height, 16 * s, drawing->frame_count, drawing->frame_point, 0);
+        if (options->focus_radius > 0)
+            camera_frame_sphere(&camera, width, height, 4 * s, options->focus, options->focus_radius, 0);
+        if (camera.mm_per_pixel < 0.97 * best_scale) {
+            best_scale = camera.mm_per_pixel;
+            best_columns = columns;
+            best = camera;
+        }
+    }
+    if (options->title)
+        sheet_text(sheet, gap, 14 * s, TEXT_LARGE, SHEET_INK, "%s", options->title);
+    for (int k = 0; k < tool_count; k++) {
+        double x = gap + (k % best_columns) * (best.width + gap), y = top + (k / best_columns) * (best.height + header);
+        if (!draw_moment(drawing, &best, &tool[k], x, y, header))
+            return false;
+    }
+    force_bar(drawing, gap, sheet->height - foot + 10 * s, fmin(420 * s, sheet->width - 2 * gap));
+    return true;
+}
+
+static bool draw(const char *path, const PictureOptions *options, const PictureScene *scene, int tool_count, const PictureTool *tool, bool is_single,
+                 char *message, size_t capacity)
+{
+    if (!check_input(scene, tool_count, tool, message, capacity))
+        return false;
+    Sheet sheet;
+    if (!sheet_open(&sheet, options, message, capacity))
+        return false;
+    RunDrawing drawing = {.sheet = &sheet, .options = options, .scene = scene, .style = shell_style_glass()};
+    double largest = largest_force(tool_count, tool);
+    drawing.force_scale = options->force_full_scale > 0 ? options->force_full_scale : largest > 0 ? sheet_round_up(largest) : 0.1;
+    int longest = 0;
+    for (int k = 0; k < tool_count; k++)
+        longest = tool[k].node_count > longest ? tool[k].node_count : longest;
+    drawing.radius = malloc((size_t)longest * sizeof *drawing.radius);
+    drawing.color = malloc((size_t)longest * sizeof *drawing.color);
+    bool drawn = drawing.radius && drawing.color ? true : message_fail(message, capacity, "not enough memory for a picture");
+    drawn = drawn && gather_frame(&drawing, tool_count, tool) && surface_view_set_mesh(sheet.view, scene->vessel, message, capacity);
+    drawn = drawn && (is_single ? draw_run(&drawing, tool) : draw_moments(&drawing, tool_count, tool));
+    drawn = drawn && sheet_save(&sheet, path);
+    free(drawing.radius);
+    free(drawing.color);
+    free(drawing.frame_point);
+    solids_free(&drawing.solids);
+    sheet_close(&sheet);
+    return drawn;
+}
+
+bool picture_of_run(const char *path, const PictureOptions *options, const PictureScene *scene, const PictureTool *tool, char *message,
+                    size_t capacity)
+{
+    return draw(path, options, scene, 1, tool, true, message, capacity);
+}
+
+bool picture_of_moments(const char *path, const PictureOptions *options, const PictureScene *scene, int tool_count, const PictureTool *tool,
+                        char *message, size_t capacity)
+{
+    return draw(path, options, scene, tool_count, tool, false, message, capacity);
+}

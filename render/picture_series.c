@@ -1,0 +1,176 @@
+// Time series, one panel above the other on one time axis. Where several samples fall on a pixel column, their least and greatest are drawn, so
+// that no spike is lost.
+#include "render/message.h"
+#include "render/sheet.h"
+
+#include <stdlib.h>
+
+static const int LINE_COLOR[6] = {6, 4, 2, 5, 0, 1};   // of the qualitative map: the ones that stand out on white
+
+typedef struct Chart {
+    double x, y, width, height;   // of the plotting area
+    double t0, t1, low, high;     // what it spans; log10 where logarithmic
+    bool logarithmic;
+} Chart;
+
+static double mapped(const Chart *chart, double v)
+{
+    if (chart->logarithmic)
+        v = v > 0 ? log10(v) : NAN;
+    return isfinite(v) ? v : NAN;
+}
+
+static void find_range(Chart *chart, int count, const PicturePanel *panel)
+{
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    for (int k = 0; k < panel->line_count; k++)
+        for (int i = 0; i < count; i++) {
+            double v = mapped(chart, panel->line[k].value[i]);
+            if (!isnan(v)) {
+                low = fmin(low, v);
+                high = fmax(high, v);
+            }
+        }
+    if (!(low <= high))
+        low = 0, high = 1;
+    if (!chart->logarithmic) {   // zero belongs to the picture where it is near
+        if (low > 0 && low < 0.5 * high)
+            low = 0;
+        if (high < 0 && high > 0.5 * low)
+            high = 0;
+    }
+    double room = high > low ? 0.06 * (high - low) : fmax(0.1 * fabs(high), 1e-3);
+    chart->low = low == 0 ? 0 : low - room;
+    chart->high = high == 0 ? 0 : high + room;
+}
+
+static void draw_line(Sheet *sheet, const Chart *chart, int count, const double *time, const double *value, Color color, float (*point)[2])
+{
+    double sx = chart->width / (chart->t1 - chart->t0), sy = chart->height / (chart->high - chart->low);
+    int n = 0;
+    for (int i = 0; i < count;) {
+        double v = mapped(chart, value[i]);
+        if (isnan(v)) {
+            overlay_polyline(sheet->overlay, n, (const float(*)[2])point, color, 1.6 * sheet->scale);
+            n = 0;
+            i++;
+            continue;
+        }
+        // all samples of this pixel column
+        int column = (int)(sx * (time[i] - chart->t0)), first = i;
+        double least = v, greatest = v, last = v;
+        bool least_first = true;
+        while (++i < count && (int)(sx * (time[i] - chart->t0)) == column) {
+            double w = mapped(chart, value[i]);
+            if (isnan(w))
+                break;
+            if (w < least)
+                least = w, least_first = false;
+            if (w > greatest)
+                greatest = w, least_first = true;
+            last = w;
+        }
+        double x = chart->x + sx * (time[first] - chart->t0);
+        const double way[4] = {v, least_first ? least : greatest, least_first ? greatest : least, last};
+        for (int k = 0; k < (i - first > 1 ? 4 : 1); k++) {
+            if (k > 0 && way[k] == way[k - 1])
+                continue;
+            point[n][0] = (float)x;
+            point[n++][1] = (float)(chart->y + chart->height - sy * (way[k] - chart->low));
+        }
+    }
+    overlay_polyline(sheet->overlay, n, (const float(*)[2])point, color, 1.6 * sheet->scale);
+}
+
+static void draw_grid(Sheet *sheet, const Chart *chart, bool is_last)
+{
+    double s = sheet->scale;
+    overlay_fill(sheet->overlay, chart->x, chart->y, chart->width, chart->height, SHEET_PANEL);
+    int most = chart->height > 150 * s ? 6 : 4;
+    double step = sheet_tick_step(chart->low, chart->high, most);
+    if (chart->logarithmic)
+        step = fmax(1, ceil(step));
+    char text[48];
+    for (double k = ceil(chart->low / step - 1e-9); k * step <= chart->high * (1 + 1e-12) + 1e-12 * step; k++) {
+        double y = chart->y + chart->height * (1 - (k * step - chart->low) / (chart->high - chart->low)), height;
+        if (chart->logarithmic)
+            snprintf(text, sizeof text, "%g", pow(10, k * step));
+        else
+            sheet_format_tick(text, sizeof text, k * step, step);
+        overlay_line(sheet->overlay, chart->x, y, chart->x + chart->width, y, k == 0 && !chart->logarithmic ? SHEET_MUTED : SHEET_FAINT, s);
+        overlay_text_size(sheet->overlay, TEXT_SMALL, text, NULL, &height);
+        sheet_text_anchored(sheet, chart->x - 7 * s, y - height / 2, 1, TEXT_SMALL, SHEET_INK, text);
+    }
+    step = sheet_tick_step(chart->t0, chart->t1, 10);
+    for (double k = ceil(chart->t0 / step - 1e-9); k * step <= chart->t1 + 1e-9 * step; k++) {
+        double x = chart->x + chart->width * (k * step - chart->t0) / (chart->t1 - chart->t0);
+        overlay_line(sheet->overlay, x, chart->y, x, chart->y + chart->height, SHEET_FAINT, s);
+        sheet_format_tick(text, sizeof text, k * step, step);
+        if (is_last)
+            sheet_text_anchored(sheet, x, chart->y + chart->height + 5 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
+    }
+    if (is_last)
+        sheet_text_anchored(sheet, chart->x + chart->width / 2, chart->y + chart->height + 23 * s, 0.5, TEXT_SMALL, SHEET_INK, "time [s]");
+}
+
+static void draw_panel(Sheet *sheet, Chart *chart, int count, const double *time, const PicturePanel *panel, bool is_last, float (*point)[2])
+{
+    double s = sheet->scale;
+    find_range(chart, count, panel);
+    draw_grid(sheet, chart, is_last);
+    double key = chart->x + chart->width;
+    sheet_text(sheet, chart->x, chart->y - 22 * s, TEXT_NORMAL, SHEET_INK, "%s", panel->title ? panel->title : "");
+    overlay_push_clip(sheet->overlay, chart->x, chart->y - 1, chart->width + 1, chart->height + 2);
+    for (int k = 0; k < panel->line_count; k++)
+        draw_line(sheet, chart, count, time, panel->line[k].value, color_qualitative(LINE_COLOR[k % 6]), point);
+    overlay_pop_clip(sheet->overlay);
+    for (int k = panel->line_count - 1; k >= 0; k--)
+        if (panel->line[k].label) {
+            Color color = color_qualitative(LINE_COLOR[k % 6]);
+            key -= sheet_text_anchored(sheet, key, chart->y - 20 * s, 1, TEXT_SMALL, SHEET_INK, panel->line[k].label) + 6 * s;
+            overlay_fill(sheet->overlay, key - 18 * s, chart->y - 13 * s, 18 * s, 3 * s, color);
+            key -= 36 * s;
+        }
+}
+
+bool picture_of_series(const char *path, const PictureOptions *options, int count, const double *time_s, int panel_count, const PicturePanel *panel,
+                       int event_count, const PictureEvent *event, char *message, size_t capacity)
+{
+    if (count < 2 || panel_count < 1 || panel_count > 12)
+        return message_fail(message, capacity, "a chart of %d samples in %d panels; at least 2 in 1 to 12", count, panel_count);
+    for (int i = 0; i < count; i++)
+        if (!isfinite(time_s[i]) || (i > 0 && time_s[i] < time_s[i - 1]))
+            return message_fail(message, capacity, "time %d of a chart is not a number or goes backwards: nothing is drawn", i);
+    Sheet sheet;
+    if (!sheet_open(&sheet, options, message, capacity))
+        return false;
+    double s = sheet.scale, top = options->title || event_count > 0 ? 54 * s : 10 * s, left = 84 * s, head = 32 * s, foot = 48 * s;
+    double each = (sheet.height - top - foot) / panel_count;
+    bool drawn = true;
+    // four points a sample at most
+    float(*point)[2] = malloc((4 * (size_t)count + 4) * sizeof *point);
+    if (!point)
+        drawn = message_fail(message, capacity, "not enough memory for a chart of %d samples", count);
+    Chart chart = {.x = left, .width = sheet.width - left - 24 * s, .height = each - head, .t0 = time_s[0], .t1 = time_s[count - 1]};
+    if (!(chart.t1 > chart.t0))
+        chart.t1 = chart.t0 + 1;
+    for (int k = 0; drawn && k < panel_count; k++) {
+        chart.y = top + k * each + head;
+        chart.logarithmic = panel[k].logarithmic;
+        draw_panel(&sheet, &chart, count, time_s, &panel[k], k + 1 == panel_count, point);
+    }
+    for (int i = 0; drawn && i < event_count; i++) {
+        double x = chart.x + chart.width * (event[i].time_s - chart.t0) / (chart.t1 - chart.t0);
+        if (!(x >= chart.x && x <= chart.x + chart.width))
+            continue;
+        overlay_line(sheet.overlay, x, top + head - 4 * s, x, sheet.height - foot, SHEET_MUTED, 1.2 * s);
+        if (event[i].label)
+            sheet_label(&sheet, x, top - 12 * s, 0.5, TEXT_SMALL, SHEET_MUTED, event[i].label);
+    }
+    if (drawn && options->title)
+        sheet_text(&sheet, 20 * s, 12 * s, TEXT_LARGE, SHEET_INK, "%s", options->title);
+    drawn = drawn && sheet_save(&sheet, path);
+    free(point);
+    sheet_close(&sheet);
+    return drawn;
+}

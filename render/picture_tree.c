@@ -1,0 +1,368 @@
+// An angiogram's maximum-intensity projections with the tracked tree drawn over them.
+//
+// A point X falls on pixel ((X - O) . a / |a|^2, (X - O) . b / |b|^2) with a, b the steps across and up: right for orthogonal voxel axes, oblique or
+// not. The images are kept darker than the lines over them.
+#include "render/message.h"
+#include "render/sheet.h"
+
+#include <float.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct Panel {
+    const PictureProjection *image;
+    double x, y, width, height;   // on the page
+    double pixels_per_mm;
+} Panel;
+
+static bool check_projections(int count, const PictureProjection *projection, int polyline_count, const PicturePolyline *polyline, char *message,
+                              size_t capacity)
+{
+    if (count < 1 || count > 6)
+        return message_fail(message, capacity, "a picture of %d projections; 1 to 6", count);
+    for (int k = 0; k < count; k++) {
+        const PictureProjection *p = &projection[k];
+        if (p->width < 1 || p->height < 1 || p->width > 16384 || p->height > 16384 || !p->value)
+            return message_fail(message, capacity, "projection %d has %d x %d pixels; 1 to 16384 each way", k, p->width, p->height);
+        if (!vec3_is_finite(p->origin) || !vec3_is_finite(p->across) || !vec3_is_finite(p->up) || !(vec3_norm(p->across) > 0) || !(vec3_norm(p->up) > 0))
+            return message_fail(message, capacity, "projection %d has no pixel size; steps across and up above 0 mm", k);
+    }
+    for (int k = 0; k < polyline_count; k++)
+        for (int i = 0; i < polyline[k].count; i++)
+            if (!vec3_is_finite(polyline[k].point[i]))
+                return message_fail(message, capacity, "point %d of line %d is not a finite number: nothing is drawn", i, k);
+    return true;
+}
+
+static int compare_floats(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+// Black at the median, white at the 99.7th percentile of a sample of all images.
+static bool find_window(int count, const PictureProjection *projection, float *low, float *high)
+{
+    enum { SAMPLE = 200000 };
+    float *sample = malloc(SAMPLE * sizeof *sample);
+    if (!sample)
+        return false;
+    size_t total = 0, n = 0;
+    for (int k = 0; k < count; k++)
+        total += (size_t)projection[k].width * (size_t)projection[k].height;
+    size_t stride = total / SAMPLE + 1;
+    for (int k = 0; k < count; k++)
+        for (size_t i = 0; i < (size_t)projection[k].width * (size_t)projection[k].height && n < SAMPLE; i += stride)
+            if (isfinite(projection[k].value[i]))
+                sample[n++] = projection[k].value[i];
+    *low = 0;
+    *high = 1;
+    if (n > 0) {
+        qsort(sample, n, sizeof *sample, compare_floats);
+        *low = sample[n / 2];
+        *high = sample[(size_t)(0.997 * (double)(n - 1))];
+        if (!(*high > *low))
+            *high = sample[n - 1];
+        if (!(*high > *low))
+            *high = *low + 1;
+    }
+    free(sample);
+    return true;
+}
+
+static unsigned upload(Sheet *sheet, const PictureProjection *p, float low, float high)
+{
+    size_t count = (size_t)p->width * (size_t)p->height;
+    uint8_t *grey = malloc(count);
+    if (!grey)
+        return 0;
+    for (size_t i = 0; i < count; i++) {
+        float x = (p->value[i] - low) / (high - low);
+        x = x > 0 ? x < 1 ? x : 1 : 0;   // NaN is black
+        grey[i] = (uint8_t)(8 + 165 * sqrtf(x) * (0.4f + 0.6f * x) + 0.5f);
+    }
+    unsigned texture = sheet_grey_texture(sheet, p->width, p->height, grey);
+    free(grey);
+    return texture;
+}
+
+static void place(const Panel *panel, Vec3 point, double *x, double *y)
+{
+    const PictureProjection *p = panel->image;
+    Vec3 d = vec3_sub(point, p->origin);
+    *x = panel->x + panel->width * (vec3_dot(d, p->across) / vec3_norm2(p->across) + 0.5) / p->width;
+    *y = panel->y + panel->height * (1 - (vec3_dot(d, p->up) / vec3_norm2(p->up) + 0.5) / p->height);
+}
+
+static void draw_outline(Sheet *sheet, const Panel *panel, const PicturePolyline *line, const float (*at)[2], float (*side)[2], Color color)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        for (int i = 0; i < line->count; i++) {
+            int a = i > 0 ? i - 1 : 0, b = i + 1 < line->count ? i + 1 : i;
+            double dx = at[b][0] - at[a][0], dy = at[b][1] - at[a][1], length = hypot(dx, dy), r = sign * line->radius[i] * panel->pixels_per_mm;
+            side[i][0] = at[i][0] - (float)(length > 0 ? r * dy / length : 0);
+            side[i][1] = at[i][1] + (float)(length > 0 ? r * dx / length : 0);
+        }
+        overlay_polyline(sheet->overlay, line->count, (const float(*)[2])side, color_with_alpha(color, 0.45), 0.8 * sheet->scale);
+    }
+}
+
+static void draw_axes(Sheet *sheet, const Panel *panel)
+{
+    const PictureProjection *p = panel->image;
+    double s = sheet->scale;
+    for (int way = 0; way < 2; way++) {
+        Vec3 step = way ? p->up : p->across;
+        int pixels = way ? p->height : p->width;
+        double size = vec3_norm(step), low = vec3_dot(p->origin, step) / size - size / 2, high = low + pixels * size, tick = sheet_tick_step(low, high, 6);
+        for (double k = ceil(low / tick); k * tick <= high; k++) {
+            char text[32];
+            sheet_format_tick(text, sizeof text, k * tick, tick);
+            double part = (k * tick - low) / (high - low);
+            if (way) {
+                double y = panel->y + panel->height * (1 - part), height;
+                overlay_text_size(sheet->overlay, TEXT_SMALL, text, NULL, &height);
+                overlay_line(sheet->overlay, panel->x - 4 * s, y, panel->x, y, SHEET_INK, s);
+                sheet_text_anchored(sheet, panel->x - 6 * s, y - height / 2, 1, TEXT_SMALL, SHEET_INK, text);
+            } else {
+                double x = panel->x + panel->width * part;
+                overlay_line(sheet->overlay, x, panel->y + panel->height, x, panel->y + panel->height + 4 * s, SHEET_INK, s);
+                sheet_text_anchored(sheet, x, panel->y + panel->height + 5 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
+            }
+        }
+    }
+    char text[128];
+    if (p->across_name) {
+        snprintf(text, sizeof text, "%s [mm]", p->across_name);
+        sheet_text_anchored(sheet, panel->x + panel->width / 2, panel->y + panel->height + 23 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
+    }
+    if (p->up_name) {
+        snprintf(text, sizeof text, "%s [mm]", p->up_name);
+        sheet_text_anchored(sheet, panel->x, panel->y - 20 * s, 0.5, TEXT_SMALL, SHEET_INK, text);
+    }
+}
+
+static bool draw_projection(Sheet *sheet, const Panel *panel, float low, float high, int polyline_count, const PicturePolyline *polyline, int mark_count,
+                            const PictureMark *mark)
+{
+    unsigned texture = upload(sheet, panel->image, low, high);
+    int longest = 1;
+    for (int k = 0; k < polyline_count; k++)
+        longest = polyline[k].count > longest ? polyline[k].count : longest;
+    float(*at)[2] = malloc(2 * (size_t)longest * sizeof *at);
+    if (!texture || !at) {
+        free(at);
+        return message_fail(sheet->message, sheet->capacity, "not enough memory for a picture");
+    }
+    double s = sheet->scale;
+    overlay_image(sheet->overlay, texture, panel->x, panel->y, panel->width, panel->height, true);
+    overlay_push_clip(sheet->overlay, panel->x, panel->y, panel->width, panel->height);
+    for (int k = 0; k < polyline_count; k++) {
+        const PicturePolyline *line = &polyline[k];
+        for (int i = 0; i < line->count; i++) {
+            double x, y;
+            place(panel, line->point[i], &x, &y);
+            at[i][0] = (float)x;
+            at[i][1] = (float)y;
+        }
+        Color color = color_qualitative(line->color);
+        if (line->radius)
+            draw_outline(sheet, panel, line, (const float(*)[2])at, at + longest, color);
+        overlay_polyline(sheet->overlay, line->count, (const float(*)[2])at, color, 1.7 * s);
+    }
+    for (int i = 0; i < mark_count; i++) {
+        double x, y, width, height;
+        place(panel, mark[i].point, &x, &y);
+        overlay_disc(sheet->overlay, x, y, 5.5 * s, color_rgb(20, 20, 20));
+        overlay_disc(sheet->overlay, x, y, 4 * s, color_rgb(255, 255, 255));
+        if (!mark[i].label)
+            continue;
+        overlay_text_size(sheet->overlay, TEXT_SMALL, mark[i].label, &width, &height);
+        bool fits = x + 9 * s + width < panel->x + panel->width;
+        double left = fits ? x + 9 * s : x - 9 * s - width;
+        overlay_fill(sheet->overlay, left - 2 * s, y - height / 2 - s, width + 4 * s, height + 2 * s, (Color){0, 0, 0, 150});
+        overlay_text(sheet->overlay, left, y - height / 2, TEXT_SMALL, color_rgb(255, 255, 255), mark[i].label);
+    }
+    overlay_pop_clip(sheet->overlay);
+    draw_axes(sheet, panel);
+    free(at);
+    return true;
+}
+
+static double length_of(int count, const PicturePolyline *polyline)
+{
+    double length = 0;
+    for (int k = 0; k < count; k++)
+        for (int i = 1; i < polyline[k].count; i++)
+            length += vec3_distance(polyline[k].point[i - 1], polyline[k].point[i]);
+    return length;
+}
+
+// All panels at one scale, in the arrangement of rows that makes them largest.
+static void lay_out(const Sheet *sheet, int count, const PictureProjection *projection, double top, Panel *panel)
+{
+    double s = sheet->scale, left = 52 * s, between = 14 * s, foot = 48 * s, head = 26 * s, best = 0;
+    int best_columns = count;
+    for (int columns = count; columns >= 1; columns--) {
+        int rows = (count + columns - 1) / columns;
+        double widest = 0, tallest = 0;   // mm of a full row, and of the rows together
+        for (int r = 0; r < rows; r++) {
+            double width = 0, height = 0;
+            for (int k = r * columns; k < count && k < (r + 1) * columns; k++) {
+                width += projection[k].width * vec3_norm(projection[k].across);
+                height = fmax(height, projection[k].height * vec3_norm(projection[k].up));
+            }
+            widest = fmax(widest, width);
+            tallest += height;
+        }
+        double scale = fmin((sheet->width - columns * left - between * columns) / widest, (sheet->height - top - rows * (head + foot)) / tallest);
+        if (scale > best) {
+            best = scale;
+            best_columns = columns;
+        }
+    }
+    double y = top;
+    for (int first = 0; first < count; first += best_columns) {
+        double x = left, tallest = 0;
+        for (int k = first; k < count && k < first + best_columns; k++) {
+            panel[k] = (Panel){.image = &projection[k], .x = x, .y = y + head, .pixels_per_mm = best,
+                               .width = best * projection[k].width * vec3_norm(projection[k].across),
+                               .height = best * projection[k].height * vec3_norm(projection[k].up)};
+            x += panel[k].width + left + between;
+            tallest = fmax(tallest, panel[k].height);
+        }
+        y += tallest + head + foot;
+    }
+}
+
+bool picture_of_projections(const char *path, const PictureOptions *options, int projection_count, const PictureProjection *projection, float low,
+                            float high, int polyline_count, const PicturePolyline *polyline, int mark_count, const PictureMark *mark, char *message,
+                            size_t capacity)
+{
+    if (!check_projections(projection_count, projection, polyline_count, polyline, message, capacity))
+        return false;
+    if (!(high > low) && !find_window(projection_count, projection, &low, &high))
+        return message_fail(message, capacity, "not enough memory for a picture");
+    Sheet sheet;
+    if (!sheet_open(&sheet, options, message, capacity))
+        return false;
+    double s = sheet.scale;
+    Panel panel[6];
+    lay_out(&sheet, projection_count, projection, 46 * s, panel);
+    if (options->title)
+        sheet_text(&sheet, 20 * s, 12 * s, TEXT_LARGE, SHEET_INK, "%s", options->title);
+    char text[160];
+    snprintf(text, sizeof text, "maximum intensity %.4g to %.4g; %d branch%s, %.0f mm", (double)low, (double)high, polyline_count,
+             polyline_count == 1 ? "" : "es", length_of(polyline_count, polyline));
+    sheet_text_anchored(&sheet, sheet.width - 20 * s, 17 * s, 1, TEXT_NORMAL, SHEET_MUTED, text);
+    bool drawn = true;
+    for (int k = 0; k < projection_count && drawn; k++)
+        drawn = draw_projection(&sheet, &panel[k], low, high, polyline_count, polyline, mark_count, mark);
+    drawn = drawn && sheet_save(&sheet, path);
+    sheet_close(&sheet);
+    return drawn;
+}
+
+// --- from a voxel grid and a tree ---
+
+typedef struct Branches {
+    int count;
+    PicturePolyline *line;
+    Vec3 *point;
+    double *radius;
+} Branches;
+
+static void free_branches(Branches *branches)
+{
+    free(branches->line);
+    free(branches->point);
+    free(branches->radius);
+}
+
+// A branch goes on through the first child of each node; every further child starts a new one, drawn from its parent on.
+static bool cut_into_branches(const VesselTree *tree, Branches *branches)
+{
+    int n = tree->node_count;
+    int *next = malloc((size_t)n * sizeof *next);
+    branches->line = calloc((size_t)n, sizeof *branches->line);
+    branches->point = malloc(2 * (size_t)n * sizeof *branches->point);
+    branches->radius = malloc(2 * (size_t)n * sizeof *branches->radius);
+    if (!next || !branches->line || !branches->point || !branches->radius) {
+        free(next);
+        return false;
+    }
+    for (int i = 0; i < n; i++)
+        next[i] = -1;
+    for (int i = n - 1; i > 0; i--)
+        if (tree->parent[i] >= 0)
+            next[tree->parent[i]] = i;
+    int used = 0;
+    for (int i = 0; i < n; i++) {
+        int parent = tree->parent[i];
+        if (parent >= 0 && next[parent] == i)
+            continue;
+        PicturePolyline *line = &branches->line[branches->count];
+        *line = (PicturePolyline){.point = branches->point + used, .radius = branches->radius + used, .color = branches->count};
+        for (int k = parent >= 0 ? parent : i, first = 1; k >= 0; k = first && parent >= 0 ? i : next[k], first = 0) {
+            branches->point[used] = tree->center[k];
+            branches->radius[used++] = first && parent >= 0 ? tree->radius[i] : tree->radius[k];
+            line->count++;
+        }
+        branches->count++;
+    }
+    free(next);
+    return true;
+}
+
+static const char *axis_name(Vec3 step)
+{
+    double n = vec3_norm(step);
+    const double part[3] = {step.x / n, step.y / n, step.z / n};
+    static const char *const name[3][2] = {{"x", "-x"}, {"y", "-y"}, {"z", "-z"}};
+    for (int k = 0; k < 3; k++)
+        if (fabs(part[k]) > 0.999)
+            return name[k][part[k] < 0];
+    return "oblique";
+}
+
+bool picture_of_tree(const char *path, const PictureOptions *options, const int size[3], Vec3 origin, const Vec3 axis[3], const float *value, float low,
+                     float high, const VesselTree *tree, int mark_count, const PictureMark *mark, char *message, size_t capacity)
+{
+    static const int plane[3][2] = {{0, 1}, {0, 2}, {1, 2}};
+    PictureProjection projection[3];
+    float *image[3] = {NULL, NULL, NULL};
+    Branches branches = {0};
+    bool drawn = true;
+    for (int k = 0; k < 3; k++)
+        if (size[k] < 1 || size[k] > 16384)
+            return message_fail(message, capacity, "a volume of %d x %d x %d voxels; 1 to 16384 each way", size[0], size[1], size[2]);
+    for (int k = 0; k < 3; k++) {
+        int a = plane[k][0], b = plane[k][1];
+        size_t pixels = (size_t)size[a] * (size_t)size[b];
+        image[k] = malloc(pixels * sizeof *image[k]);
+        for (size_t i = 0; image[k] && i < pixels; i++)
+            image[k][i] = -FLT_MAX;
+        drawn = drawn && image[k];
+        projection[k] = (PictureProjection){.width = size[a], .height = size[b], .value = image[k], .origin = origin, .across = axis[a], .up = axis[b],
+                                            .across_name = axis_name(axis[a]), .up_name = axis_name(axis[b])};
+    }
+    drawn = drawn && (!tree || tree->node_count < 1 || cut_into_branches(tree, &branches));
+    if (!drawn)
+        message_fail(message, capacity, "not enough memory for a picture");
+    for (int z = 0; drawn && z < size[2]; z++)
+        for (int y = 0; y < size[1]; y++) {
+            const float *row = value + ((size_t)z * (size_t)size[1] + (size_t)y) * (size_t)size[0];
+            float *across_z = image[0] + (size_t)y * (size_t)size[0], *across_y = image[1] + (size_t)z * (size_t)size[0], most = -FLT_MAX;
+            for (int x = 0; x < size[0]; x++) {
+                across_z[x] = row[x] > across_z[x] ? row[x] : across_z[x];
+                across_y[x] = row[x] > across_y[x] ? row[x] : across_y[x];
+                most = row[x] > most ? row[x] : most;
+            }
+            image[2][(size_t)z * (size_t)size[1] + (size_t)y] = most;
+        }
+    drawn = drawn && picture_of_projections(path, options, 3, projection, low, high, branches.count, branches.line, mark_count, mark, message, capacity);
+    for (int k = 0; k < 3; k++)
+        free(image[k]);
+    free_branches(&branches);
+    return drawn;
+}

@@ -1,0 +1,63 @@
+// No time stamp and a fixed compression level: the same pixels give the same bytes.
+#include "render/png_file.h"
+
+#include "render/message.h"
+
+#include <errno.h>
+#include <png.h>
+#include <setjmp.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static void keep_quiet(png_structp png, png_const_charp text)
+{
+    (void)png;
+    (void)text;
+}
+
+static bool write_pixels(FILE *file, int width, int height, const uint8_t *rgb)
+{
+    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, NULL, NULL, keep_quiet);
+    if (!png)
+        return false;
+    png_infop info = png_create_info_struct(png);
+    if (!info || setjmp(png_jmpbuf(png))) {   // libpng reports errors, a full disk among them, by longjmp
+        png_destroy_write_struct(&png, info ? &info : NULL);
+        return false;
+    }
+    png_init_io(png, file);
+    png_set_compression_level(png, 6);
+    png_set_IHDR(png, info, (png_uint_32)width, (png_uint_32)height, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+                 PNG_FILTER_TYPE_DEFAULT);
+    png_write_info(png, info);
+    for (int y = 0; y < height; y++)
+        png_write_row(png, rgb + (size_t)y * (size_t)width * 3);
+    png_write_end(png, NULL);
+    png_destroy_write_struct(&png, &info);
+    return true;
+}
+
+bool png_file_write(const char *path, int width, int height, const uint8_t *rgb, char *message, size_t capacity)
+{
+    size_t length = strlen(path) + 32;
+    char *beside = malloc(length);
+    if (!beside)
+        return message_fail(message, capacity, "%s: not enough memory", path);
+    snprintf(beside, length, "%s.part%ld", path, (long)getpid());
+    errno = 0;
+    FILE *file = fopen(beside, "wb");
+    bool written = file && write_pixels(file, width, height, rgb);
+    if (file && fclose(file) != 0)
+        written = false;
+    if (written && rename(beside, path) != 0)
+        written = false;
+    if (!written) {
+        int why = errno;
+        if (file)
+            remove(beside);
+        message_fail(message, capacity, "%s: cannot be written: %s", path, why ? strerror(why) : "write error");
+    }
+    free(beside);
+    return written;
+}

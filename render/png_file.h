@@ -1,0 +1,12 @@
+// RGB pixels to a PNG file, written beside its place and renamed, so that an older file stays whole until the new one is.
+#ifndef SELDINGER_RENDER_PNG_FILE_H
+#define SELDINGER_RENDER_PNG_FILE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+// `rgb` (height, width, 3), rows from the top. False with a reason in `message` (may be NULL).
+bool png_file_write(const char *path, int width, int height, const uint8_t *rgb, char *message, size_t capacity);
+
+#endif

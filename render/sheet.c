@@ -1,0 +1,202 @@
+#include "render/sheet.h"
+
+#include "render/message.h"
+#include "render/png_file.h"
+
+#include <epoxy/gl.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+const Color SHEET_INK = {34, 37, 42, 255}, SHEET_MUTED = {104, 108, 115, 255}, SHEET_FAINT = {206, 207, 205, 255};
+const Color SHEET_PAPER = {255, 255, 255, 255}, SHEET_PANEL = {248, 248, 246, 255};
+
+bool sheet_open(Sheet *sheet, const PictureOptions *options, char *message, size_t capacity)
+{
+    *sheet = (Sheet){.width = options->width, .height = options->height, .message = message, .capacity = capacity};
+    if (options->width < 64 || options->width > 8192 || options->height < 64 || options->height > 8192)
+        return message_fail(message, capacity, "a picture of %d x %d pixels; each side 64 to 8192", options->width, options->height);
+    double sides = fmin(options->width / 1.6, options->height);
+    sheet->scale = fmin(fmax(sides / 1000, 0.6), 4);
+    sheet->context = gl_context_create(message, capacity);
+    if (!sheet->context)
+        return false;
+    bool made = gl_canvas_create(&sheet->page, sheet->width, sheet->height, 1, message, capacity);
+    if (made) {
+        sheet->overlay = overlay_create(sheet->width, sheet->height, (float)sheet->scale);
+        if (!sheet->overlay)
+            made = message_fail(message, capacity, "the text renderer does not start; is libgl1 installed?");
+    }
+    if (made) {
+        sheet->view = surface_view_create(message, capacity);
+        made = sheet->view != NULL;
+    }
+    if (!made)
+        sheet_close(sheet);
+    return made;
+}
+
+bool sheet_save(Sheet *sheet, const char *path)
+{
+    uint8_t *rgb = malloc((size_t)sheet->width * (size_t)sheet->height * 3);
+    if (!rgb)
+        return message_fail(sheet->message, sheet->capacity, "not enough memory for a picture of %d x %d pixels", sheet->width, sheet->height);
+    const float paper[3] = {(float)SHEET_PAPER.r / 255, (float)SHEET_PAPER.g / 255, (float)SHEET_PAPER.b / 255};
+    gl_canvas_begin(&sheet->page, paper);
+    overlay_finish(sheet->overlay);
+    gl_canvas_read(&sheet->page, rgb);
+    GLenum trouble = glGetError();
+    bool written = trouble == GL_NO_ERROR ? png_file_write(path, sheet->width, sheet->height, rgb, sheet->message, sheet->capacity)
+                                          : message_fail(sheet->message, sheet->capacity, "OpenGL reports error 0x%x while drawing", trouble);
+    free(rgb);
+    return written;
+}
+
+void sheet_close(Sheet *sheet)
+{
+    if (!sheet->context)
+        return;
+    surface_view_destroy(sheet->view);
+    overlay_destroy(sheet->overlay);
+    for (int i = 0; i < sheet->panel_count; i++)
+        gl_canvas_destroy(&sheet->panel[i]);
+    if (sheet->texture_count > 0)
+        glDeleteTextures(sheet->texture_count, sheet->texture);
+    gl_canvas_destroy(&sheet->page);
+    gl_context_destroy(sheet->context);
+    sheet->context = NULL;
+}
+
+GlCanvas *sheet_begin_panel(Sheet *sheet, int width, int height)
+{
+    if (sheet->panel_count == SHEET_PANELS) {
+        message_fail(sheet->message, sheet->capacity, "more than %d panels in one picture", SHEET_PANELS);
+        return NULL;
+    }
+    GlCanvas *panel = &sheet->panel[sheet->panel_count];
+    if (!gl_canvas_create(panel, width < 1 ? 1 : width, height < 1 ? 1 : height, 4, sheet->message, sheet->capacity))
+        return NULL;
+    sheet->panel_count++;
+    const float ground[3] = {(float)SHEET_PANEL.r / 255, (float)SHEET_PANEL.g / 255, (float)SHEET_PANEL.b / 255};
+    gl_canvas_begin(panel, ground);
+    return panel;
+}
+
+void sheet_end_panel(Sheet *sheet, const GlCanvas *panel, double x, double y)
+{
+    gl_canvas_resolve(panel);
+    overlay_image(sheet->overlay, panel->texture, x, y, panel->width, panel->height, true);
+}
+
+unsigned sheet_grey_texture(Sheet *sheet, int width, int height, const uint8_t *grey)
+{
+    if (sheet->texture_count == SHEET_PANELS)
+        return 0;
+    unsigned texture;
+    glGenTextures(1, &texture);
+    sheet->texture[sheet->texture_count++] = texture;
+    glBindTexture(GL_TEXTURE_2D, texture);
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, width, height, 0, GL_RED, GL_UNSIGNED_BYTE, grey);
+    const GLint swizzle[4] = {GL_RED, GL_RED, GL_RED, GL_ONE};
+    glTexParameteriv(GL_TEXTURE_2D, GL_TEXTURE_SWIZZLE_RGBA, swizzle);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    return texture;
+}
+
+void sheet_text(Sheet *sheet, double x, double y, TextSize size, Color color, const char *format, ...)
+{
+    char text[512];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    overlay_text(sheet->overlay, x, y, size, color, text);
+}
+
+double sheet_text_anchored(Sheet *sheet, double x, double y, double anchor, TextSize size, Color color, const char *text)
+{
+    double width;
+    overlay_text_size(sheet->overlay, size, text, &width, NULL);
+    overlay_text(sheet->overlay, x - anchor * width, y, size, color, text);
+    return width;
+}
+
+void sheet_label(Sheet *sheet, double x, double y, double anchor, TextSize size, Color color, const char *text)
+{
+    const Color halo = color_with_alpha(SHEET_PANEL, 0.55);
+    for (int i = -1; i <= 1; i++)
+        for (int j = -1; j <= 1; j++)
+            if (i || j)
+                sheet_text_anchored(sheet, x + 1.2 * i * sheet->scale, y + 1.2 * j * sheet->scale, anchor, size, halo, text);
+    sheet_text_anchored(sheet, x, y, anchor, size, color, text);
+}
+
+void sheet_scale_bar(Sheet *sheet, double x, double y, double longest, double mm_per_pixel, Color color)
+{
+    double most = longest * mm_per_pixel, length = sheet_round_up(most);
+    for (int i = 0; i < 3 && length > most; i++)   // the round number at or below
+        length = sheet_round_up(length * 0.45);
+    double pixels = length / mm_per_pixel, s = sheet->scale;
+    overlay_fill(sheet->overlay, x, y - 4 * s, pixels, 4 * s, color);
+    char text[64];
+    snprintf(text, sizeof text, "%g mm", length);
+    double height;
+    overlay_text_size(sheet->overlay, TEXT_NORMAL, text, NULL, &height);
+    sheet_label(sheet, x, y - 7 * s - height, 0, TEXT_NORMAL, color, text);
+}
+
+void sheet_color_bar(Sheet *sheet, double x, double y, double width, double height, Color (*map)(double), double map_low, double low, double high,
+                     const char *title)
+{
+    double s = sheet->scale, text_height;
+    overlay_text_size(sheet->overlay, TEXT_SMALL, title, NULL, &text_height);
+    sheet_text(sheet, x, y, TEXT_SMALL, SHEET_INK, "%s", title);
+    double top = y + text_height + 4 * s;
+    int parts = (int)width;
+    for (int i = 0; i < parts; i++)
+        overlay_fill(sheet->overlay, x + width * i / parts, top, width / parts, height, map(map_low + (1 - map_low) * (i + 0.5) / parts));
+    double step = sheet_tick_step(low, high, 5);
+    for (double first = ceil(low / step - 1e-9), k = first; k * step <= high * (1 + 1e-9) + 1e-12; k++) {
+        char text[32];
+        sheet_format_tick(text, sizeof text, k * step, step);
+        double at = x + width * (k * step - low) / (high - low);
+        overlay_line(sheet->overlay, at, top + height, at, top + height + 4 * s, SHEET_INK, s);
+        double text_width;
+        overlay_text_size(sheet->overlay, TEXT_SMALL, text, &text_width, NULL);
+        double left = fmin(fmax(at - text_width / 2, x), x + width - text_width);
+        overlay_text(sheet->overlay, left, top + height + 5 * s, TEXT_SMALL, SHEET_INK, text);
+    }
+}
+
+double sheet_round_up(double x)
+{
+    if (!(x > 0) || !isfinite(x))
+        return x;
+    double power = pow(10, floor(log10(x)));
+    const double step[4] = {1, 2, 5, 10};
+    for (int i = 0; i < 4; i++)
+        if (x <= step[i] * power * (1 + 1e-9))
+            return step[i] * power;
+    return 10 * power;
+}
+
+double sheet_tick_step(double low, double high, int most)
+{
+    double span = high - low;
+    return span > 0 && isfinite(span) ? sheet_round_up(span / most) : 1;
+}
+
+void sheet_format_tick(char *text, size_t capacity, double value, double step)
+{
+    if (fabs(value) < 1e-9 * step)
+        value = 0;
+    int digits = step >= 1 ? 0 : (int)ceil(-log10(step) - 1e-9);
+    if (digits > 6 || fabs(value) >= 1e6)
+        snprintf(text, capacity, "%.3g", value);
+    else
+        snprintf(text, capacity, "%.*f", digits, value);
+}

@@ -1,0 +1,60 @@
+// The page of a picture: context, canvas, overlay, 3D panels placed on it, and what most pictures have (title, colour bar, scale bar).
+// Internal to render. One sheet at a time in a process.
+#ifndef SELDINGER_RENDER_SHEET_H
+#define SELDINGER_RENDER_SHEET_H
+
+#include "render/camera.h"
+#include "render/gl_canvas.h"
+#include "render/gl_context.h"
+#include "render/overlay.h"
+#include "render/picture.h"
+#include "render/surface_view.h"
+
+enum { SHEET_PANELS = 32 };
+
+typedef struct Sheet {
+    int width, height;         // [pixel]
+    double scale;              // of text, lines and gaps: 1 at 1000 pixels height
+    GlContext *context;
+    GlCanvas page;
+    Overlay *overlay;
+    SurfaceView *view;
+    int panel_count;
+    GlCanvas panel[SHEET_PANELS];
+    int texture_count;
+    unsigned texture[SHEET_PANELS];
+    char *message;             // the caller's
+    size_t capacity;
+} Sheet;
+
+extern const Color SHEET_INK, SHEET_MUTED, SHEET_FAINT, SHEET_PAPER, SHEET_PANEL;
+
+// False with a reason; then there is nothing to close.
+bool sheet_open(Sheet *sheet, const PictureOptions *options, char *message, size_t capacity);
+bool sheet_save(Sheet *sheet, const char *path);
+void sheet_close(Sheet *sheet);
+
+// A multisampled panel: draw between begin and end; end puts it on the page with its upper left corner at (x, y). NULL with the message set.
+GlCanvas *sheet_begin_panel(Sheet *sheet, int width, int height);
+void sheet_end_panel(Sheet *sheet, const GlCanvas *panel, double x, double y);
+// A grey image as a texture that lives as long as the sheet; rows from the bottom. 0 where there is no room.
+unsigned sheet_grey_texture(Sheet *sheet, int width, int height, const uint8_t *grey);
+
+void sheet_text(Sheet *sheet, double x, double y, TextSize size, Color color, const char *format, ...) __attribute__((format(printf, 6, 7)));
+// `anchor` 0: x is the text's left end, 0.5 its middle, 1 its right end. Returns the width.
+double sheet_text_anchored(Sheet *sheet, double x, double y, double anchor, TextSize size, Color color, const char *text);
+// Text on a light halo, for labels over a drawing.
+void sheet_label(Sheet *sheet, double x, double y, double anchor, TextSize size, Color color, const char *text);
+// A bar of round length at most `longest` pixels with its length in mm, its left end at x, its lower edge at y.
+void sheet_scale_bar(Sheet *sheet, double x, double y, double longest, double mm_per_pixel, Color color);
+// `map` over [low, high] with ticks at round values; `title` above it.
+void sheet_color_bar(Sheet *sheet, double x, double y, double width, double height, Color (*map)(double), double map_low, double low, double high,
+                     const char *title);
+
+// The round number (1, 2 or 5 times a power of ten) at or above x; x itself where it is not a positive number.
+double sheet_round_up(double x);
+// Where ticks go: a step so that at most `most` fall into [low, high].
+double sheet_tick_step(double low, double high, int most);
+void sheet_format_tick(char *text, size_t capacity, double value, double step);
+
+#endif

@@ -1,0 +1,179 @@
+// Tubes are swept along a spline with a frame carried along without twist (double reflection would be exact to fourth order; a projection of the
+// last normal is enough for a picture). Round ends are rings of falling radius on the sphere of the end point.
+#include "render/solids.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIDES = 14, SUBDIVISIONS = 5, CAP_RINGS = 4 };
+
+void solids_clear(Solids *solids) { solids->vertex_count = solids->index_count = 0; }
+
+void solids_free(Solids *solids)
+{
+    free(solids->vertex);
+    free(solids->index);
+    *solids = (Solids){0};
+}
+
+static bool reserve(Solids *solids, int vertices, int indices)
+{
+    if (solids->vertex_count > 50000000 - vertices || solids->index_count > 50000000 - indices) {
+        solids->is_short_of_memory = true;
+        return false;
+    }
+    while (solids->vertex_count + vertices > solids->vertex_capacity) {
+        int capacity = solids->vertex_capacity ? 2 * solids->vertex_capacity : 4096;
+        SolidVertex *grown = realloc(solids->vertex, (size_t)capacity * sizeof *grown);
+        if (!grown) {
+            solids->is_short_of_memory = true;
+            return false;
+        }
+        solids->vertex = grown;
+        solids->vertex_capacity = capacity;
+    }
+    while (solids->index_count + indices > solids->index_capacity) {
+        int capacity = solids->index_capacity ? 2 * solids->index_capacity : 16384;
+        uint32_t *grown = realloc(solids->index, (size_t)capacity * sizeof *grown);
+        if (!grown) {
+            solids->is_short_of_memory = true;
+            return false;
+        }
+        solids->index = grown;
+        solids->index_capacity = capacity;
+    }
+    return true;
+}
+
+static void add_vertex(Solids *solids, Vec3 p, Vec3 n, Color color)
+{
+    Vec3 d = vec3_sub(p, solids->origin);
+    solids->vertex[solids->vertex_count++] =
+        (SolidVertex){{(float)d.x, (float)d.y, (float)d.z}, {(float)n.x, (float)n.y, (float)n.z}, color};
+}
+
+// A ring of SIDES vertices; `lean` tilts the normals along the tangent (cos and sin of the angle from the radial direction). With `join` it is
+// sewn to the ring before it.
+static void add_ring(Solids *solids, Vec3 center, Vec3 tangent, Vec3 normal, double radius, double lean_cos, double lean_sin, Color color, bool join)
+{
+    if (!reserve(solids, SIDES, 6 * SIDES))
+        return;
+    Vec3 binormal = vec3_cross(tangent, normal);
+    uint32_t first = (uint32_t)solids->vertex_count;
+    for (int k = 0; k < SIDES; k++) {
+        double angle = 2 * PI * k / SIDES;
+        Vec3 radial = vec3_add_scaled(vec3_scale(normal, cos(angle)), sin(angle), binormal);
+        add_vertex(solids, vec3_add_scaled(center, radius, radial), vec3_add_scaled(vec3_scale(radial, lean_cos), lean_sin, tangent), color);
+    }
+    if (!join || first < SIDES)
+        return;
+    for (uint32_t k = 0; k < SIDES; k++) {
+        uint32_t a = first - SIDES + k, b = first - SIDES + (k + 1) % SIDES, c = first + k, d = first + (k + 1) % SIDES;
+        const uint32_t corner[6] = {a, b, c, c, b, d};
+        memcpy(solids->index + solids->index_count, corner, sizeof corner);
+        solids->index_count += 6;
+    }
+}
+
+static Vec3 spline(const Vec3 p[4], double t)
+{
+    Vec3 result = {0, 0, 0};
+    const double w[4] = {(-t + 2 * t * t - t * t * t) / 2, (2 - 5 * t * t + 3 * t * t * t) / 2, (t + 4 * t * t - 3 * t * t * t) / 2,
+                         (-t * t + t * t * t) / 2};
+    for (int k = 0; k < 4; k++)
+        result = vec3_add_scaled(result, w[k], p[k]);
+    return result;
+}
+
+static Vec3 spline_tangent(const Vec3 p[4], double t, Vec3 otherwise)
+{
+    Vec3 result = {0, 0, 0};
+    const double w[4] = {(-1 + 4 * t - 3 * t * t) / 2, (-10 * t + 9 * t * t) / 2, (1 + 8 * t - 9 * t * t) / 2, (-2 * t + 3 * t * t) / 2};
+    for (int k = 0; k < 4; k++)
+        result = vec3_add_scaled(result, w[k], p[k]);
+    return vec3_unit_or(result, otherwise);
+}
+
+static Color mix_color(Color a, Color b, double s)
+{
+    return color_rgb((int)(a.r + s * (b.r - a.r) + 0.5), (int)(a.g + s * (b.g - a.g) + 0.5), (int)(a.b + s * (b.b - a.b) + 0.5));
+}
+
+static Vec3 carry(Vec3 normal, Vec3 tangent)
+{
+    Vec3 n = vec3_add_scaled(normal, -vec3_dot(normal, tangent), tangent);
+    return vec3_norm(n) > 1e-9 ? vec3_unit(n) : vec3_normal_to(tangent);
+}
+
+// Rings of the hemisphere at an end: from the pole to the equator at the start (sign -1), from the equator to the pole at the end (+1).
+static void add_cap(Solids *solids, Vec3 center, Vec3 tangent, Vec3 normal, double radius, Color color, int sign)
+{
+    for (int k = 0; k < CAP_RINGS; k++) {
+        double angle = PI / 2 * (sign < 0 ? CAP_RINGS - k : k + 1) / CAP_RINGS, c = cos(angle), s = sin(angle);
+        add_ring(solids, vec3_add_scaled(center, sign * radius * s, tangent), tangent, normal, radius * c, c, sign * s, color, sign > 0 || k > 0);
+    }
+}
+
+void solids_tube(Solids *solids, int count, const Vec3 *point, const double *radius, const Color *color)
+{
+    if (count < 2)
+        return;
+    Vec3 tangent = {1, 0, 0}, normal = {0, 0, 0};
+    for (int i = 0; i + 1 < count; i++) {
+        // mirrored ghosts beyond the ends
+        Vec3 p[4] = {i > 0 ? point[i - 1] : vec3_sub(vec3_scale(point[0], 2), point[1]), point[i], point[i + 1],
+                     i + 2 < count ? point[i + 2] : vec3_sub(vec3_scale(point[i + 1], 2), point[i])};
+        for (int k = 0; k < SUBDIVISIONS + (i + 2 == count); k++) {
+            double t = (double)k / SUBDIVISIONS, r = radius[i] + t * (radius[i + 1] - radius[i]);
+            Vec3 x = spline(p, t);
+            tangent = spline_tangent(p, t, tangent);
+            normal = carry(normal, tangent);
+            Color c = mix_color(color[i], color[i + 1], t);
+            if (i == 0 && k == 0)
+                add_cap(solids, x, tangent, normal, r, c, -1);
+            add_ring(solids, x, tangent, normal, r, 1, 0, c, true);
+        }
+    }
+    add_cap(solids, point[count - 1], tangent, normal, radius[count - 1], color[count - 1], +1);
+}
+
+void solids_arrow(Solids *solids, Vec3 tail, Vec3 tip, double radius, Color color)
+{
+    Vec3 along = vec3_sub(tip, tail);
+    double length = vec3_norm(along);
+    if (!(length > 0))
+        return;
+    Vec3 t = vec3_scale(along, 1 / length), n = vec3_normal_to(t);
+    double head = fmin(5 * radius, 0.6 * length), wide = 2.4 * radius;
+    Vec3 neck = vec3_add_scaled(tip, -head, t);
+    add_ring(solids, tail, t, n, 0, 0, -1, color, false);
+    add_ring(solids, tail, t, n, radius, 0, -1, color, true);
+    add_ring(solids, tail, t, n, radius, 1, 0, color, true);
+    add_ring(solids, neck, t, n, radius, 1, 0, color, true);
+    add_ring(solids, neck, t, n, radius, 0, -1, color, true);
+    add_ring(solids, neck, t, n, wide, 0, -1, color, true);
+    double slope = hypot(head, wide), lean_cos = head / slope, lean_sin = wide / slope;
+    add_ring(solids, neck, t, n, wide, lean_cos, lean_sin, color, true);
+    add_ring(solids, tip, t, n, 0, lean_cos, lean_sin, color, true);
+}
+
+void solids_sphere(Solids *solids, Vec3 center, double radius, Color color)
+{
+    const Vec3 t = {0, 0, 1}, n = {1, 0, 0};
+    enum { RINGS = 16 };
+    for (int k = 0; k <= RINGS; k++) {
+        double angle = PI * ((double)k / RINGS - 0.5), c = cos(angle), s = sin(angle);
+        add_ring(solids, vec3_add_scaled(center, radius * s, t), t, n, radius * c, c, s, color, k > 0);
+    }
+}
+
+void solids_circle(Solids *solids, Vec3 center, Vec3 axis, double radius, double thickness, Color color)
+{
+    Vec3 u = vec3_normal_to(axis), v = vec3_cross(axis, u);
+    enum { PARTS = 72 };
+    for (int k = 0; k <= PARTS; k++) {
+        double angle = 2 * PI * k / PARTS;
+        Vec3 out = vec3_add_scaled(vec3_scale(u, cos(angle)), sin(angle), v);
+        add_ring(solids, vec3_add_scaled(center, radius, out), vec3_cross(axis, out), axis, thickness, 1, 0, color, k > 0);
+    }
+}

@@ -1,0 +1,40 @@
+// The 3D view: a translucent vessel, opaque solids inside and before it, points. Needs a current GL context; draws into the bound framebuffer.
+//
+// Order: solids and points first (they write depth), then the shell, its triangles sorted from far to near, blended, tested against that depth.
+#ifndef SELDINGER_RENDER_SURFACE_VIEW_H
+#define SELDINGER_RENDER_SURFACE_VIEW_H
+
+#include "geom/isosurface.h"
+#include "render/camera.h"
+#include "render/solids.h"
+
+#include <stddef.h>
+
+typedef struct SurfaceView SurfaceView;
+
+typedef struct ShellStyle {
+    float front[3], back[3];   // colour of the wall's outer and inner face
+    float front_opacity, back_opacity;   // where the wall is seen face on; 0 to 1
+    float rim;                 // opacity where it is seen edge on; 0 to 1
+    float rim_power;           // how narrow the rim is
+    float haze[3];             // far parts fade to this …
+    float haze_amount;         // … by this much at far_depth; 0 to 1
+} ShellStyle;
+ShellStyle shell_style_glass(void);   // a translucent vessel on a light ground
+ShellStyle shell_style_solid(void);   // an opaque surface
+
+typedef struct ViewPoint {
+    float position[3];         // [mm] relative to the origin given with the list
+    Color color;
+    float size;                // [pixel] diameter
+} ViewPoint;
+
+SurfaceView *surface_view_create(char *message, size_t capacity);
+void surface_view_destroy(SurfaceView *view);
+// Takes a copy. False where indices are out of range, numbers are not finite, or memory lacks.
+bool surface_view_set_mesh(SurfaceView *view, const TriangleMesh *mesh, char *message, size_t capacity);
+void surface_view_draw_solids(SurfaceView *view, const Camera *camera, const Solids *solids, const ShellStyle *style);
+void surface_view_draw_points(SurfaceView *view, const Camera *camera, Vec3 origin, int count, const ViewPoint *point);
+void surface_view_draw_shell(SurfaceView *view, const Camera *camera, const ShellStyle *style);
+
+#endif
