@@ -1,1 +1,432 @@
-typedef int placeholder_lim_fit;
+// The tree's side of LIM (Kerrien et al. 2017, 4.5): which points a node's model is fitted to, where it starts, and one job a node.
+//
+// Points are concatenated up to topological distance 2; where nodes stand closer than half a radius, as on imported centrelines, up to one
+// radius along the tree, so that overlap does not depend on spacing. The root's points are repeated upstream: without that a model
+// closes 1.4 to 1.7 r before the inlet.
+// Guards (ours): the centres of the nodes must be in the lumen, and a ring of points beyond the wall outside of it. They act only where violated;
+// they stop constrictions on the tool's way, and ghost lobes where points are missing, such as at the mouth of an untracked branch, which
+// one model would open and its neighbour cap.
+#include "recon/lim_fit.h"
+
+#include "geom/blobby.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { NEAR_CAPACITY = 256, GUARD_ANGLES = 12, GUARD_NODES = 6, SPHERE_DIRECTIONS = 48, LEAST_POINTS = 24 };
+
+LimFitOptions lim_fit_default_options(void)
+{
+    return (LimFitOptions){.alpha = 1e-5, .beta = 1e-4, .s = 2, .iso_level = 0.1, .max_blobs = 100, .target_mm = 0, .topological_distance = 2,
+                           .max_loops = 2, .line_searches = 4, .voxel_mm = 0.2, .weigh_distance = true, .project_points = true,
+                           .sweep_all_blobs = true, .give_up_splits = 3, .extend_inlet = true, .guard_shape = true, .max_points = 1500};
+}
+
+LimFitOptions lim_fit_paper_options(void)
+{
+    LimFitOptions options = lim_fit_default_options();
+    options.beta = 1e-3;
+    options.target_mm = 0.3;
+    options.max_loops = 5;
+    options.weigh_distance = options.project_points = options.sweep_all_blobs = options.extend_inlet = options.guard_shape = false;
+    options.give_up_splits = 0;
+    return options;
+}
+
+static bool check_options(const LimFitOptions *o, Faults *faults)
+{
+    int before = faults->count;
+    const struct {
+        const char *name;
+        double value, least, most;
+    } range[] = {{"alpha", o->alpha, 0, 1},          {"beta", o->beta, 0, 10},
+                 {"s", o->s, 0.1, 10},               {"iso-level", o->iso_level, 1e-4, 10},
+                 {"max-blobs", o->max_blobs, 2, 1000}, {"target-mm", o->target_mm, 0, 100},
+                 {"voxel-mm", o->voxel_mm, 1e-4, 100}, {"topological-distance", o->topological_distance, 0, 50},
+                 {"max-loops", o->max_loops, 1, 100}, {"line-searches", o->line_searches, 1, 100},
+                 {"give-up-splits", o->give_up_splits, 0, 1000}, {"max-points", o->max_points, 50, 100000}};
+    for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
+        if (!(range[i].value >= range[i].least && range[i].value <= range[i].most))
+            faults_add(faults, "fit", 0, 0, "%s is %g; valid: %g to %g", range[i].name, range[i].value, range[i].least, range[i].most);
+    return faults->count == before;
+}
+
+// --- The neighbourhood of a node ---
+
+typedef struct Near {
+    int node, hops;
+    double path;             // along the tree [mm]
+} Near;
+
+typedef struct Gather {      // the memory of one job
+    Near near[NEAR_CAPACITY];
+    int near_count;
+    int own_count;           // the first of `near` give points
+    Vec3 *point;
+    int point_count, point_capacity;
+    Vec3 guard[GUARD_NODES * GUARD_ANGLES + NEAR_CAPACITY * 2 + SPHERE_DIRECTIONS];
+    double clearance[GUARD_NODES * GUARD_ANGLES + NEAR_CAPACITY * 2 + SPHERE_DIRECTIONS];
+    int guard_count;
+    double reach;            // points further from the node are left to other models
+} Gather;
+
+// Breadth first, so `near` is sorted by hops; those that give points are moved to the front, order kept.
+static void find_near(const VesselTree *tree, int node, const LimFitOptions *options, int hops, Gather *gather)
+{
+    double radius = tree->radius[node], own_path = 0.5 * hops * radius, wide_path = 5 * radius;
+    gather->near[0] = (Near){node, 0, 0};
+    gather->near_count = 1;
+    for (int i = 0; i < gather->near_count; i++) {
+        Near at = gather->near[i];
+        for (int n = tree->neighbour_offset[at.node]; n < tree->neighbour_offset[at.node + 1]; n++) {
+            Near next = {tree->neighbour[n], at.hops + 1, at.path + vec3_distance(tree->center[at.node], tree->center[tree->neighbour[n]])};
+            bool seen = false;
+            for (int k = 0; k < gather->near_count && !seen; k++)
+                seen = gather->near[k].node == next.node;
+            if (!seen && gather->near_count < NEAR_CAPACITY && (next.hops <= hops + 2 || next.path <= wide_path))
+                gather->near[gather->near_count++] = next;
+        }
+    }
+    Near sorted[NEAR_CAPACITY];
+    int count = 0;
+    for (int pass = 0; pass < 2; pass++) {
+        for (int i = 0; i < gather->near_count; i++) {
+            bool own = gather->near[i].hops <= hops || (options->guard_shape && gather->near[i].path <= own_path);
+            if (own == (pass == 0))
+                sorted[count++] = gather->near[i];
+        }
+        if (pass == 0)
+            gather->own_count = count;
+    }
+    memcpy(gather->near, sorted, (size_t)count * sizeof sorted[0]);
+}
+
+static bool add_point(Gather *gather, Vec3 p)
+{
+    if (gather->point_count == gather->point_capacity) {
+        int capacity = gather->point_capacity ? 2 * gather->point_capacity : 1024;
+        Vec3 *more = realloc(gather->point, (size_t)capacity * sizeof *more);
+        if (!more)
+            return false;
+        gather->point = more;
+        gather->point_capacity = capacity;
+    }
+    gather->point[gather->point_count++] = p;
+    return true;
+}
+
+// The root's own points again, upstream, by their extent along the axis, so that the copies continue the tube to 2.2 r before the root.
+static bool extend_inlet(const VesselTree *tree, Gather *gather, Vec3 center)
+{
+    Vec3 root = tree->center[0], upstream = vec3_negate(tree->direction[0]);
+    double least = 0, most = 0, radius = tree->radius[0];
+    int64_t first = tree->point_offset[0], last = tree->point_offset[1];
+    for (int64_t i = first; i < last; i++) {
+        double t = vec3_dot(vec3_sub(tree->point[i], root), upstream);
+        least = i == first || t < least ? t : least;
+        most = i == first || t > most ? t : most;
+    }
+    double extent = most - least;
+    if (last - first < 12 || extent < 0.2 * radius)
+        return true;
+    for (int copy = 1; copy < 12 && most + (copy - 1) * extent < 2.2 * radius; copy++)
+        for (int64_t i = first; i < last; i++) {
+            Vec3 p = vec3_add_scaled(tree->point[i], copy * extent, upstream);
+            if (vec3_dot(vec3_sub(p, root), upstream) < 2.2 * radius && vec3_distance(p, center) < gather->reach && !add_point(gather, p))
+                return false;
+        }
+    return true;
+}
+
+// Keeps `most` of `count` points, evenly.
+static int thin_points(Vec3 *point, int count, int most)
+{
+    if (count <= most)
+        return count;
+    int kept = 0;
+    for (int i = 0; i < count; i++)
+        if ((int64_t)(i + 1) * most / count > (int64_t)i * most / count)
+            point[kept++] = point[i];
+    return kept;
+}
+
+static bool gather_points(const VesselTree *tree, int node, const LimFitOptions *options, Gather *gather)
+{
+    Vec3 center = tree->center[node];
+    bool has_root = false;
+    double widest = 0;
+    for (int k = 0; k < gather->own_count; k++)
+        widest = fmax(widest, tree->radius[gather->near[k].node]);
+    // what lies beyond is never asked of this model: its power cell ends before
+    gather->reach = options->guard_shape ? fmax(3.5 * tree->radius[node], 1.5 * widest) : HUGE_VAL;
+    gather->point_count = 0;
+    for (int k = 0; k < gather->own_count; k++) {
+        int from = gather->near[k].node;
+        has_root = has_root || from == 0;
+        for (int64_t i = tree->point_offset[from]; i < tree->point_offset[from + 1]; i++)
+            if (vec3_distance(tree->point[i], center) < gather->reach && !add_point(gather, tree->point[i]))
+                return false;
+    }
+    if (has_root && options->extend_inlet && tree->kind[0] == NODE_VESSEL && !extend_inlet(tree, gather, center))
+        return false;
+    gather->point_count = thin_points(gather->point, gather->point_count, options->max_points);
+    return true;
+}
+
+// --- Guards ---
+
+static void add_guard(Gather *gather, Vec3 p, double clearance)
+{
+    if (gather->guard_count < (int)(sizeof gather->guard / sizeof gather->guard[0])) {
+        gather->guard[gather->guard_count] = p;
+        gather->clearance[gather->guard_count++] = clearance;
+    }
+}
+
+static void guard_lumen(const VesselTree *tree, int node, Gather *gather)
+{
+    for (int k = 0; k < gather->own_count; k++) {
+        int at = gather->near[k].node, parent = tree->parent[at];
+        if (vec3_distance(tree->center[at], tree->center[node]) > 0.8 * gather->reach)
+            continue;
+        add_guard(gather, tree->center[at], 0.5 * tree->radius[at]);
+        // half way to the parent, where the two spheres overlap well (a link may run through background)
+        double length = parent >= 0 ? vec3_distance(tree->center[at], tree->center[parent]) : HUGE_VAL;
+        if (length < 0.8 * (tree->radius[at] + tree->radius[parent >= 0 ? parent : at]))
+            add_guard(gather, vec3_mix(tree->center[at], tree->center[parent], 0.5), 0.4 * fmin(tree->radius[at], tree->radius[parent]));
+    }
+    if (gather->near[0].node == 0 && tree->kind[0] == NODE_VESSEL)
+        for (int k = 1; k <= 3; k++)
+            add_guard(gather, vec3_add_scaled(tree->center[0], -0.5 * k * tree->radius[0], tree->direction[0]), 0.5 * tree->radius[0]);
+}
+
+// Whether x may be called outside: clear of all data and of all tubes that the tree has there.
+static bool is_outside(const VesselTree *tree, const Gather *gather, Vec3 x, double clearance)
+{
+    for (int k = 0; k < gather->near_count; k++) {
+        int at = gather->near[k].node;
+        if (vec3_distance(x, tree->center[at]) < 1.1 * tree->radius[at] + 0.5 * clearance)
+            return false;
+    }
+    for (int i = 0; i < gather->point_count; i++)
+        if (vec3_norm2(vec3_sub(x, gather->point[i])) < clearance * clearance)
+            return false;
+    return true;
+}
+
+// A ring about a vessel node, half a radius beyond the furthest point of each sector; 1.6 r in sectors without points.
+static void guard_ring(const VesselTree *tree, int at, Gather *gather)
+{
+    Vec3 c = tree->center[at], d = tree->direction[at], e1 = vec3_normal_to(d), e2 = vec3_cross(d, e1);
+    double radius = tree->radius[at], far[GUARD_ANGLES] = {0};
+    for (int i = 0; i < gather->point_count; i++) {
+        Vec3 p = vec3_sub(gather->point[i], c);
+        double along = vec3_dot(p, d), x = vec3_dot(p, e1), y = vec3_dot(p, e2), across = sqrt(x * x + y * y);
+        if (fabs(along) > 0.6 * radius || across > 2 * radius)
+            continue;
+        int sector = (int)floor(atan2(y, x) / (2 * PI) * GUARD_ANGLES + 0.5);
+        sector = (sector + GUARD_ANGLES) % GUARD_ANGLES;
+        far[sector] = fmax(far[sector], across);
+    }
+    for (int m = 0; m < GUARD_ANGLES; m++) {
+        double angle = 2 * PI * m / GUARD_ANGLES, out = far[m] > 0 ? far[m] + 0.5 * radius : 1.6 * radius;
+        Vec3 x = vec3_add_scaled(vec3_add_scaled(c, out * cos(angle), e1), out * sin(angle), e2);
+        if (is_outside(tree, gather, x, 0.4 * radius))
+            add_guard(gather, x, -0.4 * radius);
+    }
+}
+
+// The same about an aneurysm's centre, in all directions that have points.
+static void guard_sphere(const VesselTree *tree, int at, Gather *gather)
+{
+    Vec3 c = tree->center[at];
+    double radius = tree->radius[at];
+    for (int m = 0; m < SPHERE_DIRECTIONS; m++) {
+        double z = 1 - (2 * m + 1.0) / SPHERE_DIRECTIONS, ring = sqrt(1 - z * z), angle = m * PI * (3 - sqrt(5)), far = 0;
+        Vec3 d = {ring * cos(angle), ring * sin(angle), z};
+        for (int i = 0; i < gather->point_count; i++) {
+            Vec3 p = vec3_sub(gather->point[i], c);
+            double along = vec3_dot(p, d), length = vec3_norm(p);
+            if (along > 0.94 * length)
+                far = fmax(far, length);
+        }
+        Vec3 x = vec3_add_scaled(c, far + 0.4 * radius, d);
+        if (far > 0 && is_outside(tree, gather, x, 0.3 * radius))
+            add_guard(gather, x, -0.3 * radius);
+    }
+}
+
+static void gather_guards(const VesselTree *tree, int node, Gather *gather)
+{
+    gather->guard_count = 0;
+    guard_lumen(tree, node, gather);
+    if (tree->kind[node] == NODE_ANEURYSM)
+        guard_sphere(tree, node, gather);
+    int vessels = 0, taken = 0;
+    for (int k = 0; k < gather->own_count; k++)
+        vessels += tree->kind[gather->near[k].node] == NODE_VESSEL;
+    for (int k = 0, seen = 0; k < gather->own_count && taken < GUARD_NODES; k++) {
+        int at = gather->near[k].node;
+        if (tree->kind[at] != NODE_VESSEL)
+            continue;
+        // dense centrelines: every so many nodes are enough
+        if (vessels <= GUARD_NODES || seen * GUARD_NODES / vessels >= taken) {
+            guard_ring(tree, at, gather);
+            taken++;
+        }
+        seen++;
+    }
+}
+
+// --- Jobs ---
+
+typedef struct NodeModel {
+    int count;
+    Vec3 *center;
+    double *width;
+    double error;
+    bool failed;             // memory
+} NodeModel;
+
+typedef struct Job {
+    const VesselTree *tree;
+    const LimFitOptions *options;
+    NodeModel *model;
+} Job;
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+// d_a: the 90th percentile of Taubin's distance of the node's own points, or of `others` where it has none.
+static double node_error(const VesselTree *tree, int node, const Gather *gather, const NodeModel *model, double iso_level)
+{
+    int64_t first = tree->point_offset[node], own = tree->point_offset[node + 1] - first;
+    const Vec3 *point = own > 0 ? tree->point + first : gather->point;
+    int64_t count = own > 0 ? own : gather->point_count;
+    double *distance = malloc((size_t)(count + 1) * sizeof *distance);
+    if (!distance || count == 0) {
+        free(distance);
+        return 0;
+    }
+    Blobby blobby = {model->count, model->center, model->width, iso_level};
+    for (int64_t i = 0; i < count; i++) {
+        Vec3 g;
+        double f = blobby_gradient(&blobby, point[i], &g);
+        distance[i] = fabs(f) / fmax(vec3_norm(g), 1e-12);
+    }
+    qsort(distance, (size_t)count, sizeof *distance, compare_doubles);
+    double error = distance[(int64_t)(0.9 * (double)(count - 1) + 0.5)];
+    free(distance);
+    return error;
+}
+
+static void fit_node(void *context, long index)
+{
+    Job *job = context;
+    const VesselTree *tree = job->tree;
+    const LimFitOptions *options = job->options;
+    int node = (int)index;
+    NodeModel *model = &job->model[node];
+    Gather *gather = calloc(1, sizeof *gather);
+    Vec3 *center = calloc((size_t)options->max_blobs + 1, sizeof *center);
+    double *width = calloc((size_t)options->max_blobs + 1, sizeof *width);
+    bool good = gather && center && width;
+    // a node with hardly any points of its own or near it looks further along the tree
+    for (int more = 0; good && more <= 8; more++) {
+        find_near(tree, node, options, options->topological_distance + more, gather);
+        good = gather_points(tree, node, options, gather);
+        if (good && gather->point_count >= LEAST_POINTS)
+            break;
+    }
+    if (good && gather->point_count >= 4) {
+        if (options->guard_shape)
+            gather_guards(tree, node, gather);
+        LimFitTask task = {.point_count = gather->point_count, .point = gather->point, .center = tree->center[node],
+                           .direction = tree->direction[node], .radius = tree->radius[node], .guard_count = gather->guard_count,
+                           .guard = gather->guard, .clearance = gather->clearance};
+        if (tree->kind[node] == NODE_ANEURYSM) {   // the paper's figure 5: one blob
+            task.start_count = 1;
+            task.start = &tree->center[node];
+            task.start_radius = &tree->radius[node];
+        }
+        model->count = lim_fit_model(&task, options, center, width);
+        good = model->count > 0;
+    } else if (good) {   // nothing to fit: the node's sphere
+        model->count = 1;
+        center[0] = tree->center[node];
+        width[0] = blob_width_for_radius(tree->radius[node], options->iso_level);
+    }
+    model->failed = !good;
+    if (good) {
+        model->center = realloc(center, (size_t)model->count * sizeof *center);
+        model->width = realloc(width, (size_t)model->count * sizeof *width);
+        model->error = node_error(tree, node, gather, model, options->iso_level);
+    } else {
+        free(center);
+        free(width);
+    }
+    if (gather)
+        free(gather->point);
+    free(gather);
+}
+
+static VesselTree *assemble(const VesselTree *tree, const NodeModel *model, double iso_level)
+{
+    int64_t blobs = 0;
+    for (int i = 0; i < tree->node_count; i++)
+        blobs += model[i].count;
+    VesselTree *out = vessel_tree_create(tree->node_count, tree->point_count, blobs);
+    if (!out)
+        return NULL;
+    size_t n = (size_t)tree->node_count;
+    memcpy(out->center, tree->center, n * sizeof *out->center);
+    memcpy(out->radius, tree->radius, n * sizeof *out->radius);
+    memcpy(out->direction, tree->direction, n * sizeof *out->direction);
+    memcpy(out->height, tree->height, n * sizeof *out->height);
+    memcpy(out->parent, tree->parent, n * sizeof *out->parent);
+    memcpy(out->kind, tree->kind, n * sizeof *out->kind);
+    memcpy(out->point_offset, tree->point_offset, (n + 1) * sizeof *out->point_offset);
+    if (tree->point_count > 0)
+        memcpy(out->point, tree->point, (size_t)tree->point_count * sizeof *out->point);
+    out->iso_level = iso_level;
+    for (int i = 0; i < tree->node_count; i++) {
+        int64_t at = out->blob_offset[i];
+        memcpy(out->blob_center + at, model[i].center, (size_t)model[i].count * sizeof(Vec3));
+        memcpy(out->blob_width + at, model[i].width, (size_t)model[i].count * sizeof(double));
+        out->blob_offset[i + 1] = at + model[i].count;
+        out->error[i] = model[i].error;
+    }
+    vessel_tree_link(out);
+    return out;
+}
+
+VesselTree *lim_fit(const VesselTree *tree, const LimFitOptions *options, const Progress *progress, Faults *faults)
+{
+    if (!check_options(options, faults))
+        return NULL;
+    if (tree->node_count < 1 || tree->point_count < 4) {
+        faults_add(faults, "fit", 0, 0, "the tree has %d nodes and %lld points; valid: at least 1 node and 4 points", tree->node_count,
+                   (long long)tree->point_count);
+        return NULL;
+    }
+    Job job = {tree, options, calloc((size_t)tree->node_count, sizeof(NodeModel))};
+    VesselTree *out = NULL;
+    if (job.model) {
+        parallel_for(options->threads, tree->node_count, fit_node, &job, progress);
+        bool good = true;
+        for (int i = 0; i < tree->node_count; i++)
+            good = good && !job.model[i].failed;
+        out = good ? assemble(tree, job.model, options->iso_level) : NULL;
+        for (int i = 0; i < tree->node_count; i++) {
+            free(job.model[i].center);
+            free(job.model[i].width);
+        }
+    }
+    free(job.model);
+    if (!out)
+        faults_add(faults, "fit", 0, 0, "not enough memory for the models of %d nodes", tree->node_count);
+    return out;
+}

@@ -40,19 +40,22 @@ LimFitOptions lim_fit_paper_options(void);   // as published: Table 1, Taubin's 
 // too few points).
 VesselTree *lim_fit(const VesselTree *tree, const LimFitOptions *options, const Progress *progress, Faults *faults);
 
-// One local model: points (count), the node's tube, and what the guards need: interior points (f > 0 wanted there). Blobs are
-// written to center, width (capacity max_blobs + 1). Returns the number of blobs, 0 where memory lacks.
+// One local model: points, the node's tube, and what the guards need. Blobs are written to center, width (capacity max_blobs).
+// Returns the number of blobs, 0 where memory lacks. At least 4 points.
 typedef struct LimFitTask {
     int point_count;
     const Vec3 *point;       // (point_count)
-    const double *weight;    // (point_count) relative weight of each point, or NULL
     Vec3 center, direction;  // the node's; direction unit
     double radius;           // > 0
-    int inside_count;
-    const Vec3 *inside;      // (inside_count) points that must be in the lumen, with …
-    const double *clearance; // … the distance from the wall that they should have; may be NULL where inside_count is 0
-    bool sphere_start;       // start from one central blob and not from a pair (aneurysms)
+    int guard_count;         // used with guard_shape only
+    const Vec3 *guard;       // (guard_count) points known to be in the lumen (clearance > 0) or outside (< 0), with …
+    const double *clearance; // … the least distance from the wall that they should have [mm]
+    int start_count;         // 0: the paper's pair on either side of the centre; else start from these blobs
+    const Vec3 *start;       // (start_count) centres …
+    const double *start_radius;   // … and the radii of their spheres
 } LimFitTask;
 int lim_fit_model(const LimFitTask *task, const LimFitOptions *options, Vec3 *center, double *width);
+// Width of two co-centred blobs that together keep the level set of value `level` of one blob (half the width where level >= width).
+double lim_split_width(double width, double level);
 
 #endif
