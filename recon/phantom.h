@@ -21,6 +21,8 @@
 #include "geom/vessel_tree.h"
 #include "recon/volume.h"
 
+#include <stdint.h>
+
 typedef struct Shape Shape;
 
 // The names, separated by ", ", for messages and help.
