@@ -754,7 +754,7 @@ Volume *shape_volume(const Shape *shape, double voxel_mm, double psf_mm, double 
                     for (int j = j0; j < j0 + CELL && j < size[1]; j++)
                         for (int i = i0; i < i0 + CELL && i < size[0]; i++) {
                             double g = uniform ? f : shape_field(shape, volume_point_of(volume, vec3(i, j, k)), NULL);
-                            volume->value[i + (size_t)size[0] * ((size_t)j + (size_t)size[1] * (size_t)k)] =
+                            volume->value[(size_t)i + (size_t)size[0] * ((size_t)j + (size_t)size[1] * (size_t)k)] =
                                 (float)fmin(1, fmax(0, 0.5 + g / voxel_mm));
                         }
             }
