@@ -34,6 +34,8 @@ typedef struct OpenVessel {
 bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults);
 // The vessel's surface for pictures; NULL for planes.
 const TriangleMesh *open_vessel_mesh(const Scene *scene, OpenVessel *open);
+// Where the scene says `inlet: root`: start and direction of the tool from the vessel's inlet. False with a fault where it has none.
+bool open_vessel_inlet(Scene *scene, const OpenVessel *open, Faults *faults);
 void open_vessel_close(OpenVessel *open);
 
 #endif

@@ -1,7 +1,387 @@
+// seldinger run: a scene headless, with what it leaves: summary, final state, recording, picture.
 #include "cli/cli.h"
+
+#include "cli/output.h"
+#include "cli/run_files.h"
+#include "sim/recording.h"
+#ifdef SELDINGER_RENDER
+#include "render/picture.h"
+#endif
+
+#include <getopt.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_MOMENTS = 6 };
+
+typedef struct RunOptions {
+    const char *scene, *script, *record, *summary, *final, *picture, *contact;
+    double duration_s, settle_s;   // < 0: not given
+    double moment_s[MOST_MOMENTS];
+    int moment_count;
+    int threads;
+    bool paced, quiet;
+} RunOptions;
+
+static const char help[] =
+    "Usage: seldinger run SCENE [options]\n\n"
+    "Runs a scene (YAML) headless, as fast as it goes, and prints a short summary.\n\n"
+    "  --script F         script of the hand (CSV t_s,push_mm_s,twist_deg_s) instead of the scene's\n"
+    "  --duration-s S     simulated time [s]; default: the script's; needed where there is no script\n"
+    "  --settle-s S       afterwards goes on without input for at most S [s], until nothing moves faster than 0.01 mm/s; default 0\n"
+    "  --record F.h5      recording (HDF5): every step's figures, the wire every 10 ms; readable while it is written\n"
+    "  --summary F.json   figures of the run; - is standard output (also: --json)\n"
+    "  --final F.csv      the last state, one row a node\n"
+    "  --picture F.png    vessel and tool at the end\n"
+    "  --picture-at S     instead of the end, this moment [s]; up to 6 of them stand side by side\n"
+    "  --contact KIND     the surface that answers contact queries: lim, mesh or tube; default: the scene's\n"
+    "  --paced            one step each millisecond of real time; missed deadlines are counted, no step is skipped\n"
+    "  --threads N        threads of offline work such as fitting a shape; default 0: all cores\n"
+    "  --quiet            no summary, no progress\n\n"
+    "Scene defaults: 200 elements, poisson_ratio 0.3, density 6.45 g/cm3, no damping, no friction, no gravity, inserted 0 mm, step 1 ms,\n"
+    "contact tolerance 1e-6, `normal` (where a rest curvature with plane 0 bends) the coordinate axis after the direction's largest component, made\n"
+    "perpendicular. The README describes every key of a scene.\n"
+    "Exit codes: 0 done (also when stopped by SIGINT or SIGTERM); 2 wrong usage or bad input; 3 the run diverged, left the vessel, or a file\n"
+    "could not be written to its end.\n";
+
+static volatile sig_atomic_t stop_requested;
+
+static void request_stop(int signal_number)
+{
+    (void)signal_number;
+    stop_requested = 1;
+}
+
+static int usage_fault(const char *message, const char *what)
+{
+    fprintf(stderr, "seldinger run: %s%s; see `seldinger run --help`\n", message, what);
+    return EXIT_BAD_INPUT;
+}
+
+// -1: go on; otherwise the exit code.
+static int parse_options(int argc, char **argv, RunOptions *options)
+{
+    enum { SCRIPT = 256, DURATION, SETTLE, RECORD, SUMMARY, FINAL, PICTURE, PICTURE_AT, CONTACT, PACED, THREADS, QUIET, HELP };
+    static const struct option table[] = {
+        {"script", required_argument, NULL, SCRIPT},   {"duration-s", required_argument, NULL, DURATION}, {"settle-s", required_argument, NULL, SETTLE},
+        {"record", required_argument, NULL, RECORD},   {"summary", required_argument, NULL, SUMMARY},     {"json", required_argument, NULL, SUMMARY},
+        {"final", required_argument, NULL, FINAL},     {"picture", required_argument, NULL, PICTURE},     {"picture-at", required_argument, NULL, PICTURE_AT},
+        {"contact", required_argument, NULL, CONTACT}, {"paced", no_argument, NULL, PACED},               {"threads", required_argument, NULL, THREADS},
+        {"quiet", no_argument, NULL, QUIET},           {"help", no_argument, NULL, HELP},                 {0}};
+    *options = (RunOptions){.duration_s = -1, .settle_s = -1};
+    double number;
+    optind = 1;
+    for (int choice; (choice = getopt_long(argc, argv, "h", table, NULL)) != -1;) {
+        switch (choice) {
+        case SCRIPT: options->script = optarg; break;
+        case RECORD: options->record = optarg; break;
+        case SUMMARY: options->summary = optarg; break;
+        case FINAL: options->final = optarg; break;
+        case PICTURE: options->picture = optarg; break;
+        case CONTACT: options->contact = optarg; break;
+        case PACED: options->paced = true; break;
+        case QUIET: options->quiet = true; break;
+        case DURATION:
+            if (!cli_number("--duration-s", optarg, 0, SCRIPT_LONGEST_S, &options->duration_s))
+                return EXIT_BAD_INPUT;
+            break;
+        case SETTLE:
+            if (!cli_number("--settle-s", optarg, 0, SCRIPT_LONGEST_S, &options->settle_s))
+                return EXIT_BAD_INPUT;
+            break;
+        case PICTURE_AT:
+            if (options->moment_count == MOST_MOMENTS)
+                return usage_fault("at most 6 moments fit a picture", "");
+            if (!cli_number("--picture-at", optarg, 0, SCRIPT_LONGEST_S, &options->moment_s[options->moment_count++]))
+                return EXIT_BAD_INPUT;
+            break;
+        case THREADS:
+            if (!cli_number("--threads", optarg, 0, 256, &number))
+                return EXIT_BAD_INPUT;
+            options->threads = (int)number;
+            break;
+        case HELP:
+        case 'h': fputs(help, stdout); return EXIT_DONE;
+        default: return usage_fault("unknown option or lacking value", "");
+        }
+    }
+    if (optind != argc - 1)
+        return usage_fault(optind < argc ? "one scene at a time, not also " : "lacks the scene to run", optind < argc ? argv[optind + 1] : "");
+    options->scene = argv[optind];
+    if (options->moment_count && !options->picture)
+        return usage_fault("--picture-at goes with --picture F.png", "");
+    return -1;
+}
+
+// Scene, script and all output files: everything that can be wrong before the run, in one pass.
+static Scene *prepare_scene(const RunOptions *options, Faults *faults)
+{
+    static const char *const kinds[] = {"lim", "mesh", "tube"};
+    Scene *scene = scene_load(options->scene, faults);
+    Script *script = options->script ? script_load(options->script, faults) : NULL;
+    int kind = -1;
+    for (int i = 0; options->contact && i < 3; i++)
+        if (!strcmp(options->contact, kinds[i]))
+            kind = i;
+    if (options->contact && kind < 0)
+        faults_add(faults, "--contact", 0, 0, "'%.40s' is no kind; valid: lim, mesh, tube", options->contact);
+    output_check(options->summary, faults);
+    output_check(options->final, faults);
+    output_check_file(options->picture, faults);
+    output_check_file(options->record, faults);
+#ifndef SELDINGER_RENDER
+    if (options->picture)
+        faults_add(faults, "--picture", 0, 0, "this build has no pictures; build with -DSELDINGER_RENDER=ON");
+#endif
+    if (scene && script) {
+        script_free(scene->script);
+        free(scene->script_path);
+        scene->script = script;
+        scene->script_path = strdup(options->script);
+    } else {
+        script_free(script);
+    }
+    if (scene && kind >= 0)
+        scene->contact = (ContactKind)kind;
+    if (scene && !scene->script && options->duration_s < 0 && options->settle_s < 0)
+        faults_add(faults, options->scene, 0, 0, "has no script; give --script F, --duration-s S or --settle-s S");
+    if (faults->count > 0) {
+        scene_free(scene);
+        return NULL;
+    }
+    return scene;
+}
+
+// --- moments for the picture ---
+
+typedef struct Moment {
+    bool taken;
+    double time_s, inserted_mm, force_n, torque_n_mm;
+    Vec3 *position;
+    NodeReport *node;
+} Moment;
+
+typedef struct Watch {       // what after_step sees
+    const RunOptions *options;
+    Recording *recording;
+    Moment moment[MOST_MOMENTS];
+    int moment_count;
+    bool recording_failed;
+} Watch;
+
+static void take_moment(Moment *moment, Simulator *simulator)
+{
+    const WireState *state = simulator_state(simulator);
+    memcpy(moment->position, state->position, (size_t)state->node_count * sizeof *moment->position);
+    stepper_node_report(simulator_stepper(simulator), moment->node);
+    moment->time_s = simulator_time_s(simulator);
+    moment->inserted_mm = state->inserted;
+    moment->force_n = simulator_last(simulator)->proximal_force;
+    moment->torque_n_mm = simulator_last(simulator)->proximal_torque;
+    moment->taken = true;
+}
+
+static bool watch_step(void *context, Simulator *simulator, Command command)
+{
+    Watch *watch = context;
+    for (int i = 0; i < watch->options->moment_count; i++)
+        if (!watch->moment[i].taken && simulator_time_s(simulator) >= watch->options->moment_s[i] - 1e-9)
+            take_moment(&watch->moment[i], simulator);
+    if (watch->recording && !recording_step(watch->recording, simulator, command))
+        watch->recording_failed = true;
+    return !watch->recording_failed;
+}
+
+static bool make_moments(Watch *watch, int node_count)
+{
+    watch->moment_count = !watch->options->picture ? 0 : watch->options->moment_count ? watch->options->moment_count : 1;
+    for (int i = 0; i < watch->moment_count; i++) {
+        watch->moment[i].position = calloc((size_t)node_count, sizeof(Vec3));
+        watch->moment[i].node = calloc((size_t)node_count, sizeof(NodeReport));
+        if (!watch->moment[i].position || !watch->moment[i].node)
+            return false;
+    }
+    return true;
+}
+
+static void free_moments(Watch *watch)
+{
+    for (int i = 0; i < MOST_MOMENTS; i++) {
+        free(watch->moment[i].position);
+        free(watch->moment[i].node);
+    }
+}
+
+#ifdef SELDINGER_RENDER
+// A picture is never worth a failed run: what goes wrong is said, no more.
+static void draw_picture(const RunOptions *options, const Watch *watch, Simulator *simulator, OpenVessel *open)
+{
+    const Scene *scene = simulator_scene(simulator);
+    int nodes = simulator_state(simulator)->node_count, count = 0;
+    char message[512] = "";
+    PictureTool tool[MOST_MOMENTS] = {0};
+    double *radius = calloc((size_t)nodes, sizeof *radius);
+    Vec3 *force = calloc((size_t)nodes * MOST_MOMENTS, sizeof *force);
+    double total = 0;
+    for (int i = 0; i < scene->wire.section_count; i++)
+        total += scene->wire.section[i].length;
+    for (int m = 0; radius && force && m < watch->moment_count; m++) {
+        const Moment *moment = &watch->moment[m];
+        Vec3 *at = force + (size_t)m * (size_t)nodes;
+        int first = 0;
+        if (!moment->taken)
+            continue;
+        for (int i = 0; i < nodes; i++) {
+            radius[i] = moment->node[i].radius;
+            at[i] = moment->node[i].force;
+            if (scene->wire.has_sheath && moment->node[i].s < total - moment->inserted_mm)
+                first = i + 1;
+        }
+        tool[count++] = (PictureTool){.node_count = nodes, .position = moment->position, .radius = radius, .force = at,
+                                      .first_free_node = first < nodes ? first : nodes - 1, .time_s = moment->time_s, .inserted_mm = moment->inserted_mm,
+                                      .push_force_n = moment->force_n, .torque_n_mm = moment->torque_n_mm};
+    }
+    PictureOptions look = picture_default_options();
+    PictureScene shown = {.vessel = open_vessel_mesh(scene, open), .target_count = scene->target_count, .target = scene->target,
+                          .has_entry = scene->wire.has_sheath, .entry = scene->wire.start};
+    look.title = scene->path;
+    bool good = count == 1   ? picture_of_run(options->picture, &look, &shown, tool, message, sizeof message)
+                : count > 1 ? picture_of_moments(options->picture, &look, &shown, count, tool, message, sizeof message)
+                            : (snprintf(message, sizeof message, "the run ended before the first moment of --picture-at"), false);
+    if (!good)
+        fprintf(stderr, "%s: no picture: %s\n", options->picture, message);
+    free(radius);
+    free(force);
+}
+#endif
+
+// --- the run ---
+
+static int64_t expected_steps(const RunOptions *options, const Scene *scene)
+{
+    double seconds = options->duration_s >= 0 ? options->duration_s : scene->script ? script_duration_s(scene->script) : 0;
+    return (int64_t)ceil((seconds + fmax(options->settle_s, 0)) * 1000 / scene->dt) + 1;
+}
+
+// Files after the run; false with faults where one could not be written.
+static bool write_files(const RunOptions *options, Simulator *simulator, const DriveReport *drive, const NodeReport *node, Faults *faults)
+{
+    int before = faults->count;
+    size_t length;
+    if (options->summary) {
+        char *text = run_summary_json(simulator, drive, node), *line = text ? malloc(strlen(text) + 2) : NULL;
+        if (line) {
+            sprintf(line, "%s\n", text);
+            output_write(options->summary, line, strlen(line), faults);
+        } else {
+            faults_add(faults, options->summary, 0, 0, "cannot be written: no memory");
+        }
+        free(line);
+        free(text);
+    }
+    if (options->final) {
+        char *text = run_final_csv(simulator, node, &length);
+        if (text)
+            output_write(options->final, text, length, faults);
+        else
+            faults_add(faults, options->final, 0, 0, "cannot be written: no memory");
+        free(text);
+    }
+    return faults->count == before;
+}
+
+static void say_untrusted(const Simulator *simulator, const DriveReport *drive)
+{
+    const RunTotals *totals = simulator_totals(simulator);
+    const char *path = simulator_scene(simulator)->path;
+    if (drive->end == DRIVE_DIVERGED)
+        fprintf(stderr, "%s: diverged at %.3f s; the last good state is kept. Smaller step_ms, shorter elements or slower motion may help\n", path,
+                simulator_time_s(simulator));
+    if (run_left_vessel(totals))
+        fprintf(stderr, "%s: the tool left the vessel (deepest %.3f mm outside the wall%s); the run cannot be trusted\n", path, totals->penetration_max,
+                totals->flags & STEP_OUT_OF_VESSEL ? ", or beyond an open end" : "");
+    else if (totals->flags & STEP_DEEP)
+        fprintf(stderr, "%s: warning: a node was %.3f mm outside the wall\n", path, totals->penetration_max);
+    if (totals->not_converged_steps > 0)
+        fprintf(stderr, "%s: warning: the contact solve of %lld of %lld steps stopped at its cap (residual at most %.2g)\n", path,
+                (long long)totals->not_converged_steps, (long long)totals->steps, totals->residual_max);
+}
+
+static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *open, Faults *faults)
+{
+    Watch watch = {.options = options};
+    Simulator *simulator = simulator_create(scene, open->vessel, faults);
+    if (!simulator)
+        return EXIT_BAD_INPUT;
+    int nodes = simulator_state(simulator)->node_count, code = EXIT_BAD_INPUT;
+    NodeReport *node = calloc((size_t)nodes, sizeof *node);
+    RecordingOptions record = recording_default_options();
+    record.expected_steps = expected_steps(options, scene);
+    if (!node || !make_moments(&watch, nodes))
+        faults_add(faults, scene->path, 0, 0, "no memory");
+    else if (options->record)
+        watch.recording = recording_create(options->record, simulator, &record, faults);
+    if (faults->count == 0) {
+        DriveOptions drive = drive_default_options();
+        drive.script = scene->script;
+        drive.duration_s = options->duration_s;
+        drive.settle_s = fmax(options->settle_s, 0);
+        drive.paced = options->paced;
+        drive.stop = &stop_requested;
+        drive.after_step = watch_step;
+        drive.context = &watch;
+        DriveReport report = simulator_drive(simulator, &drive);
+        stepper_node_report(simulator_stepper(simulator), node);
+        if (options->picture && options->moment_count == 0)
+            take_moment(&watch.moment[0], simulator);
+        bool whole = !watch.recording || recording_close(watch.recording, simulator, faults);
+        whole &= write_files(options, simulator, &report, node, faults);
+        if (!options->quiet)
+            run_print(options->summary && !strcmp(options->summary, "-") ? stderr : stdout, simulator, &report, node);
+        say_untrusted(simulator, &report);
+#ifdef SELDINGER_RENDER
+        if (options->picture)
+            draw_picture(options, &watch, simulator, open);
+#endif
+        code = whole && report.end != DRIVE_DIVERGED && !run_left_vessel(simulator_totals(simulator)) ? EXIT_DONE : EXIT_UNTRUSTED;
+    }
+    free_moments(&watch);
+    free(node);
+    simulator_destroy(simulator);
+    return code;
+}
+
+static void install_signals(void)
+{
+    // a second signal ends the program at once
+    struct sigaction stop = {.sa_handler = request_stop, .sa_flags = (int)(SA_RESTART | SA_RESETHAND)}, ignore = {.sa_handler = SIG_IGN};
+    sigaction(SIGINT, &stop, NULL);
+    sigaction(SIGTERM, &stop, NULL);
+    // a file-size limit is then a failed write with a message
+    sigaction(SIGXFSZ, &ignore, NULL);
+}
 
 int verb_run(int argc, char **argv)
 {
-    (void)argc, (void)argv;
-    return EXIT_BAD_INPUT;
+    RunOptions options;
+    static Faults faults;
+    int code = parse_options(argc, argv, &options);
+    if (code >= 0)
+        return code;
+    recording_prepare_process();
+    install_signals();
+    faults_clear(&faults);
+    OpenVessel open = {0};
+    Scene *scene = prepare_scene(&options, &faults);
+    if (!scene)
+        return cli_bad_input(&faults);
+    code = EXIT_BAD_INPUT;
+    if (open_vessel(scene, options.threads, options.quiet, &open, &faults) && open_vessel_inlet(scene, &open, &faults))
+        code = simulate(&options, scene, &open, &faults);
+    if (faults.count > 0)
+        cli_bad_input(&faults);
+    open_vessel_close(&open);
+    scene_free(scene);
+    return code;
 }

@@ -1,1 +1,211 @@
+// What a scene's `vessel:` names, opened: a fitted model, a shape that is fitted on the fly and cached, an exact tube, a plane.
 #include "cli/cli.h"
+
+#include "recon/lim_fit.h"
+#include "recon/phantom.h"
+#include "recon/tree_file.h"
+#include "sim/sha256.h"
+#ifdef SELDINGER_RENDER
+#include "render/picture.h"
+#endif
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+// --- the cache of fitted shapes ---
+
+enum { CACHE_PATH = 4096 };
+
+// The folder of the cache, made where it is not there; false where there is none to be had.
+static bool cache_folder(char folder[CACHE_PATH])
+{
+    const char *own = getenv("SELDINGER_CACHE"), *xdg = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
+    int length = -1;
+    if (own && *own)
+        length = snprintf(folder, CACHE_PATH, "%s", own);
+    else if (xdg && *xdg)
+        length = snprintf(folder, CACHE_PATH, "%s/seldinger", xdg);
+    else if (home && *home)
+        length = snprintf(folder, CACHE_PATH, "%s/.cache/seldinger", home);
+    if (length <= 0 || length >= CACHE_PATH - 128)
+        return false;
+    for (char *at = folder + 1; *at; at++) {
+        if (*at != '/')
+            continue;
+        *at = 0;
+        bool made = mkdir(folder, 0777) == 0 || errno == EEXIST;
+        *at = '/';
+        if (!made)
+            return false;
+    }
+    return (mkdir(folder, 0777) == 0 || errno == EEXIST) && access(folder, R_OK | W_OK | X_OK) == 0;
+}
+
+// The key holds all that the fit depends on: the sampled tree, the fit's options, and the program itself, so that a newer program never takes
+// an older one's fit.
+static void cache_key(const VesselTree *tree, const LimFitOptions *options, char hex[65])
+{
+    Sha256 sha;
+    char program[65] = SELDINGER_VERSION;
+    sha256_of_file("/proc/self/exe", program);
+    double figures[] = {options->alpha,
+                        options->beta,
+                        options->s,
+                        options->iso_level,
+                        options->max_blobs,
+                        options->target_mm,
+                        options->topological_distance,
+                        options->max_loops,
+                        options->line_searches,
+                        options->voxel_mm,
+                        options->weigh_distance,
+                        options->project_points,
+                        options->sweep_all_blobs,
+                        options->give_up_splits,
+                        options->extend_inlet,
+                        options->guard_shape,
+                        options->max_points};
+    size_t nodes = (size_t)tree->node_count;
+    sha256_begin(&sha);
+    sha256_add(&sha, program, strlen(program));
+    sha256_add(&sha, figures, sizeof figures);
+    sha256_add(&sha, tree->center, nodes * sizeof *tree->center);
+    sha256_add(&sha, tree->radius, nodes * sizeof *tree->radius);
+    sha256_add(&sha, tree->direction, nodes * sizeof *tree->direction);
+    sha256_add(&sha, tree->parent, nodes * sizeof *tree->parent);
+    sha256_add(&sha, tree->kind, nodes * sizeof *tree->kind);
+    sha256_add(&sha, tree->point_offset, (nodes + 1) * sizeof *tree->point_offset);
+    sha256_add(&sha, tree->point, (size_t)tree->point_count * sizeof *tree->point);
+    sha256_end(&sha, hex);
+}
+
+// The fit of a sampled tree, from the cache where it is there and whole. What is wrong with the cache is never an error.
+static VesselTree *fit_cached(const VesselTree *sampled, const char *what, int threads, bool quiet, Faults *faults)
+{
+    LimFitOptions options = lim_fit_default_options();
+    options.threads = threads;
+    char folder[CACHE_PATH], path[CACHE_PATH] = "", hex[65];
+    Faults *ignored = calloc(1, sizeof *ignored);
+    VesselTree *model = NULL;
+    if (ignored && cache_folder(folder)) {
+        cache_key(sampled, &options, hex);
+        snprintf(path, sizeof path, "%.4000s/fit-%.32s.h5", folder, hex);
+        if (access(path, R_OK) == 0)
+            model = tree_file_load(path, NULL, ignored);
+        if (model && (!vessel_tree_is_model(model) || model->node_count != sampled->node_count)) {
+            vessel_tree_free(model);
+            model = NULL;
+        }
+    }
+    if (!model) {
+        ProgressBar bar;
+        Progress progress = progress_bar(&bar, "fit", quiet);
+        model = lim_fit(sampled, &options, &progress, faults);
+        if (model && ignored && *path) {
+            TreeFileInfo info = {.source = (char *)(size_t)what, .parameters = (char *)(size_t) "", .created_by = (char *)(size_t) "seldinger " SELDINGER_VERSION};
+            tree_file_save(model, &info, path, ignored);
+        }
+    }
+    free(ignored);
+    return model;
+}
+
+// --- sources ---
+
+static bool open_tree(VesselTree *tree, const char *path, OpenVessel *out, Faults *faults)
+{
+    if (!tree)
+        return false;
+    out->tree = tree;
+    out->vessel = vessel_tree_is_model(tree) ? lim_vessel_create(tree) : NULL;
+    if (!out->vessel)
+        faults_add(faults, path, 0, 0, "is a tree without a model; make one with `seldinger fit`");
+    return out->vessel != NULL;
+}
+
+static VesselTree *fit_shape(const Scene *scene, int threads, bool quiet, Faults *faults)
+{
+    VesselTree *sampled =
+        shape_tree(scene->shape_name, scene->shape_option_count, (const char(*)[2][64])scene->shape_option, scene->path, faults);
+    VesselTree *model = sampled ? fit_cached(sampled, scene->shape_name, threads, quiet, faults) : NULL;
+    vessel_tree_free(sampled);
+    return model;
+}
+
+bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults)
+{
+    int before = faults->count;
+    *out = (OpenVessel){0};
+    bool exact = scene->source == SOURCE_TUBE || scene->source == SOURCE_PLANE;
+    if (scene->contact == CONTACT_MESH && scene->source != SOURCE_NONE)
+        faults_add(faults, scene->path, 0, 0, "contact 'mesh' is not built yet; valid: %s", exact ? "tube" : "lim");
+    else if (scene->contact == CONTACT_TUBE && !exact && scene->source != SOURCE_NONE)
+        faults_add(faults, scene->path, 0, 0, "contact 'tube' needs the source 'tube'; a model or shape has 'lim'");
+    if (faults->count > before)
+        return false;
+    switch (scene->source) {
+    case SOURCE_NONE: return true;
+    case SOURCE_MODEL: return open_tree(tree_file_load(scene->model_path, NULL, faults), scene->model_path, out, faults);
+    case SOURCE_SHAPE: return open_tree(fit_shape(scene, threads, quiet, faults), scene->path, out, faults);
+    case SOURCE_TUBE:
+        if (scene->contact == CONTACT_LIM)
+            faults_add(faults, scene->path, 0, 0, "contact 'lim' of a tube is not built yet; valid: tube");
+        else
+            out->vessel = tube_vessel_create(&scene->tube, scene->path, faults);
+        return out->vessel != NULL;
+    case SOURCE_PLANE:
+        out->vessel = plane_vessel_create(scene->plane_point, scene->plane_normal);
+        if (!out->vessel)
+            faults_add(faults, scene->path, 0, 0, "no memory for the plane");
+        return out->vessel != NULL;
+    }
+    return false;
+}
+
+static double surface_cell(const VesselTree *tree)
+{
+    // about twenty cells round the thinnest branches
+    double least = HUGE_VAL;
+    for (int i = 0; i < tree->node_count; i++)
+        least = fmin(least, tree->radius[i]);
+    return fmax(0.3 * least, 0.02);
+}
+
+const TriangleMesh *open_vessel_mesh(const Scene *scene, OpenVessel *open)
+{
+    if (open->mesh)
+        return open->mesh;
+    if (open->tree)
+        open->mesh = isosurface_of_tree(open->tree, surface_cell(open->tree));
+#ifdef SELDINGER_RENDER
+    else if (scene->source == SOURCE_TUBE)
+        open->mesh = picture_mesh_of_tube(&scene->tube);
+    else if (scene->source == SOURCE_PLANE)
+        open->mesh = picture_mesh_of_plane(scene->plane_point, scene->plane_normal, 50);
+#else
+    (void)scene;
+#endif
+    return open->mesh;
+}
+
+bool open_vessel_inlet(Scene *scene, const OpenVessel *open, Faults *faults)
+{
+    if (!scene->inlet_is_root)
+        return true;
+    if (open->vessel && open->vessel->inlet && open->vessel->inlet(open->vessel, &scene->wire.start, &scene->wire.direction))
+        return true;
+    faults_add(faults, scene->path, 0, 0, "'inlet: root' finds no inlet in this vessel; give 'entry_mm' and 'direction'");
+    return false;
+}
+
+void open_vessel_close(OpenVessel *open)
+{
+    if (open->vessel)
+        open->vessel->destroy(open->vessel);
+    vessel_tree_free(open->tree);
+    triangle_mesh_free(open->mesh);
+    *open = (OpenVessel){0};
+}

@@ -1,0 +1,19 @@
+// Output files named on the command line: "-" is standard output, a device or pipe is written as it is, anything else is written beside
+// and renamed, so that no half file is left.
+#ifndef SELDINGER_CLI_OUTPUT_H
+#define SELDINGER_CLI_OUTPUT_H
+
+#include "geom/faults.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+// Before long work: a fault where `path` (NULL: nothing to check) will not be writable. Leaves nothing behind.
+bool output_check(const char *path, Faults *faults);
+// The same for what only whole files can hold (HDF5, PNG): a device, a pipe or "-" is a fault too.
+bool output_check_file(const char *path, Faults *faults);
+bool output_write(const char *path, const void *bytes, size_t length, Faults *faults);
+// The last extension in lower case, with its dot; "" where there is none or it is long.
+void output_extension(const char *path, char extension[16]);
+
+#endif

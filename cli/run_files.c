@@ -1,0 +1,157 @@
+#include "cli/run_files.h"
+
+#include <cJSON.h>
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+// A tool deeper in the wall than this is held by nothing: it has left the vessel.
+static const double lost_mm = 1;
+
+double run_final_penetration_mm(const NodeReport *node, int node_count)
+{
+    double deepest = 0;
+    for (int i = 0; i < node_count; i++)
+        deepest = fmax(deepest, -node[i].gap);
+    return deepest;
+}
+
+bool run_left_vessel(const RunTotals *totals) { return (totals->flags & STEP_OUT_OF_VESSEL) || totals->penetration_max > lost_mm; }
+
+static void add_numbers(cJSON *object, int count, const char *const *name, const double *value)
+{
+    for (int i = 0; i < count; i++)
+        cJSON_AddNumberToObject(object, name[i], value[i]);
+}
+
+static void add_vector(cJSON *object, const char *name, Vec3 v)
+{
+    double value[3] = {v.x, v.y, v.z};
+    cJSON_AddItemToObject(object, name, cJSON_CreateDoubleArray(value, 3));
+}
+
+static void add_times(cJSON *summary, const StepProfile *profile)
+{
+    static const char *const names[] = {"median", "p99", "p999", "max"};
+    cJSON *step = cJSON_AddObjectToObject(summary, "step_us"), *stages = cJSON_AddObjectToObject(summary, "stage_us");
+    double value[4] = {histogram_quantile(&profile->step, 0.5) / 1000, histogram_quantile(&profile->step, 0.99) / 1000,
+                       histogram_quantile(&profile->step, 0.999) / 1000, (double)profile->step.largest / 1000};
+    add_numbers(step, 4, names, value);
+    for (int i = 0; i < STAGE_COUNT; i++)
+        cJSON_AddNumberToObject(stages, stage_name[i], histogram_quantile(&profile->stage[i], 0.5) / 1000);
+}
+
+static void add_targets(cJSON *summary, const Simulator *simulator)
+{
+    const Scene *scene = simulator_scene(simulator);
+    const TargetReach *reach = simulator_targets(simulator);
+    cJSON *targets = cJSON_AddArrayToObject(summary, "targets");
+    for (int i = 0; i < scene->target_count; i++) {
+        cJSON *target = cJSON_CreateObject();
+        cJSON_AddStringToObject(target, "name", scene->target[i].name);
+        cJSON_AddBoolToObject(target, "reached", reach[i].reached);
+        cJSON_AddNumberToObject(target, "distance_mm", reach[i].distance);
+        cJSON_AddNumberToObject(target, "time_s", reach[i].time_s);
+        const WireState *state = simulator_state(simulator);
+        cJSON_AddNumberToObject(target, "final_distance_mm", vec3_distance(state->position[state->node_count - 1], scene->target[i].point));
+        cJSON_AddItemToArray(targets, target);
+    }
+}
+
+static void add_flags(cJSON *summary, unsigned flags, const DriveReport *drive)
+{
+    cJSON *list = cJSON_AddArrayToObject(summary, "flags");
+    for (int i = 0; i < STEP_FLAG_COUNT; i++)
+        if (flags & 1u << i)
+            cJSON_AddItemToArray(list, cJSON_CreateString(step_flag_name[i]));
+    if (drive->end == DRIVE_STOPPED)
+        cJSON_AddItemToArray(list, cJSON_CreateString("stopped"));
+}
+
+char *run_summary_json(Simulator *simulator, const DriveReport *drive, const NodeReport *node)
+{
+    const RunTotals *totals = simulator_totals(simulator);
+    const StepReport *last = simulator_last(simulator);
+    const StepProfile *profile = simulator_profile(simulator);
+    const WireState *state = simulator_state(simulator);
+    cJSON *summary = cJSON_CreateObject(), *part;
+    double simulated = simulator_time_s(simulator);
+    char hash[17];
+    cJSON_AddNumberToObject(summary, "steps", (double)totals->steps);
+    cJSON_AddNumberToObject(summary, "simulated_s", simulated);
+    cJSON_AddNumberToObject(summary, "wall_s", drive->wall_s);
+    cJSON_AddNumberToObject(summary, "real_time_factor", drive->wall_s > 0 ? simulated / drive->wall_s : 0);
+    add_times(summary, profile);
+    cJSON_AddNumberToObject(summary, "deadline_misses", (double)drive->deadline_misses);
+    part = cJSON_AddObjectToObject(summary, "contacts");
+    add_numbers(part, 2, (const char *const[]){"max", "final"}, (double[]){totals->contacts_max, last->active});
+    part = cJSON_AddObjectToObject(summary, "penetration_mm");
+    double final = run_final_penetration_mm(node, state->node_count);
+    add_numbers(part, 2, (const char *const[]){"max", "final"}, (double[]){fmax(totals->penetration_max, final), final});
+    part = cJSON_AddObjectToObject(summary, "solver");
+    add_numbers(part, 4, (const char *const[]){"iterations_median", "iterations_max", "not_converged_steps", "residual_max"},
+                (double[]){histogram_quantile(&profile->iterations, 0.5), (double)profile->iterations.largest, (double)totals->not_converged_steps,
+                           totals->residual_max});
+    part = cJSON_AddObjectToObject(summary, "proximal");
+    add_numbers(part, 2, (const char *const[]){"force_n", "torque_n_mm"}, (double[]){last->proximal_force, last->proximal_torque});
+    part = cJSON_AddObjectToObject(summary, "wall_force_n");
+    add_numbers(part, 2, (const char *const[]){"max", "sum_final"}, (double[]){last->wall_force_max, last->wall_force_sum});
+    add_vector(summary, "tip_mm", state->position[state->node_count - 1]);
+    cJSON_AddNumberToObject(summary, "inserted_mm", state->inserted);
+    cJSON_AddNumberToObject(summary, "elastic_energy_mj", stepper_elastic_energy(simulator_stepper(simulator)));
+    cJSON_AddBoolToObject(summary, "settled", drive->settled);
+    snprintf(hash, sizeof hash, "%016" PRIx64, simulator_hash(simulator));
+    cJSON_AddStringToObject(summary, "state_hash", hash);
+    add_flags(summary, totals->flags, drive);
+    add_targets(summary, simulator);
+    char *text = cJSON_Print(summary);
+    cJSON_Delete(summary);
+    return text;
+}
+
+char *run_final_csv(const Simulator *simulator, const NodeReport *node, size_t *length)
+{
+    const WireState *state = simulator_state(simulator);
+    char *text = NULL;
+    FILE *stream = open_memstream(&text, length);
+    if (!stream)
+        return NULL;
+    fprintf(stream, "node,s_mm,x_mm,y_mm,z_mm,qw,qx,qy,qz,force_x_n,force_y_n,force_z_n,gap_mm,vessel_node\n");
+    for (int i = 0; i < state->node_count; i++) {
+        Vec3 x = state->position[i], force = node[i].force;
+        Quat q = state->orientation[i];
+        fprintf(stream, "%d,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%d\n", i, node[i].s, x.x, x.y, x.z, q.w, q.x, q.y,
+                q.z, force.x, force.y, force.z, node[i].gap, node[i].vessel_node);
+    }
+    if (fclose(stream) != 0) {
+        free(text);
+        return NULL;
+    }
+    return text;
+}
+
+void run_print(FILE *out, Simulator *simulator, const DriveReport *drive, const NodeReport *node)
+{
+    const RunTotals *totals = simulator_totals(simulator);
+    const StepReport *last = simulator_last(simulator);
+    const StepProfile *profile = simulator_profile(simulator);
+    const WireState *state = simulator_state(simulator);
+    const Scene *scene = simulator_scene(simulator);
+    const TargetReach *reach = simulator_targets(simulator);
+    Vec3 tip = state->position[state->node_count - 1];
+    double simulated = simulator_time_s(simulator);
+    fprintf(out, "%s: %.3f s simulated in %.3f s (%.2f times real time), %" PRId64 " steps%s\n", scene->path, simulated, drive->wall_s,
+            drive->wall_s > 0 ? simulated / drive->wall_s : 0, totals->steps, drive->end == DRIVE_STOPPED ? ", stopped" : "");
+    fprintf(out, "step %.0f us median, %.0f us p99.9, %.0f us max; contact %.0f iterations median, %" PRId64 " max; %" PRId64 " steps not converged\n",
+            histogram_quantile(&profile->step, 0.5) / 1000, histogram_quantile(&profile->step, 0.999) / 1000, (double)profile->step.largest / 1000,
+            histogram_quantile(&profile->iterations, 0.5), profile->iterations.largest, totals->not_converged_steps);
+    fprintf(out, "tip at (%.3f, %.3f, %.3f) mm, %.2f mm inserted%s; push %.4f N, torque %.4f N mm\n", tip.x, tip.y, tip.z, state->inserted,
+            drive->settled ? ", at rest" : "", last->proximal_force, last->proximal_torque);
+    fprintf(out, "%d contacts (at most %d), wall force %.4f N in sum; deepest penetration %.4f mm, %.4f mm at the end\n", last->active,
+            totals->contacts_max, last->wall_force_sum, totals->penetration_max, run_final_penetration_mm(node, state->node_count));
+    if (drive->deadline_misses)
+        fprintf(out, "%" PRId64 " deadlines missed\n", drive->deadline_misses);
+    for (int i = 0; i < scene->target_count; i++)
+        fprintf(out, "target %s: %s, nearest %.2f mm (radius %.2f), at %.3f s\n", scene->target[i].name, reach[i].reached ? "reached" : "NOT reached",
+                reach[i].distance, scene->target[i].radius, reach[i].time_s);
+}
