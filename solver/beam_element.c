@@ -1,1 +1,284 @@
-typedef int placeholder_beam_element;
+// The corotational beam element. DESIGN section 3.
+//
+// Nodes 1 and 2 with positions x_i and frames R_i; chord e = (x2 - x1) / l. A circular section bends alike in all directions, so no
+// frame has to turn with the chord: all that is needed are the node's tangents.
+//   t_i     = R_i c_i            c_i: direction of the rest chord in the frame of node i (e1 where the element is straight at rest)
+//   theta_i = g(e . t_i) e x t_i bending angle from chord to tangent, g = angle / sine
+//   psi     = x component of the rotation vector of F1' F2, F_i = R_i C_i: twist, exact where curvature and twist are constant
+//   bow     = L/30 (2 |b1|^2 - b1 . b2 + 2 |b2|^2)   arc less chord of the cubic shape, b_i = g(e . a_i) e x a_i, a_i = R_i e1
+//   ext     = l + bow - extend
+//   E = EA/(2L) ext^2 + c/2 (|theta1|^2 + |theta2|^2) + d theta1 . theta2 + GJ/(2L) psi^2
+//   c - d = 2 EI / L,  c + d = 6 EI / ((1 + Phi) L),  Phi = 12 EI / (kappa G A L^2)
+// Forces are the exact derivative of E. E does not change when the nodes are swapped with e and the frames reversed, nor in a
+// rigid motion, nor when mirrored. The bow makes the chord shorten with the square of the bending angles: without it a chain rolls up
+// to a polygon whose chords (not arcs) have the rest length, (pi/N)^2/6 too large; its second derivative is the consistent
+// geometric stiffness. g is a polynomial in z = (1 - e . t)/2 = sin^2(angle/2), cut after z^7: 3e-9 off at 0.64 rad, and smooth
+// everywhere, which acos is not.
+//
+// Tangent: J' C J with the linearised J (main), which is positive semi-definite, and the geometric stiffness of a tension only:
+//   d theta_i = P d phi_i - e x (d x2 - d x1) / l,  P = I - e e'
+// A compression's part would make the matrix indefinite (DESIGN section 4, item 2).
+#include "solver/beam_element.h"
+
+#include <stddef.h>
+
+#if defined(__GNUC__) && !defined(__clang__)
+#define INLINE static inline __attribute__((always_inline))
+#define VECTOR_LOOP _Pragma("GCC ivdep")
+#else
+#define INLINE static inline
+#define VECTOR_LOOP
+#endif
+
+// angle / sine and its derivative with the cosine, from z = sin^2(angle/2): sum of 4^k (k!)^2 / (2k+1)! z^k.
+INLINE double angle_over_sine(double z, double *slope)
+{
+    const double a1 = 2.0 / 3, a2 = 8.0 / 15, a3 = 16.0 / 35, a4 = 128.0 / 315, a5 = 256.0 / 693, a6 = 1024.0 / 3003, a7 = 2048.0 / 6435;
+    *slope = -0.5 * (a1 + z * (2 * a2 + z * (3 * a3 + z * (4 * a4 + z * (5 * a5 + z * (6 * a6 + z * (7 * a7)))))));
+    return 1 + z * (a1 + z * (a2 + z * (a3 + z * (a4 + z * (a5 + z * (a6 + z * a7))))));
+}
+
+INLINE Vec3 first_axis(Quat q)
+{
+    return vec3(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y));
+}
+
+typedef struct Bend {        // an angle from the chord e to a tangent t
+    Vec3 t, n, angle;        // n = e x t
+    double s, g, h;          // e . t, angle / sine, its derivative with s
+} Bend;
+
+INLINE Bend bend_from(Vec3 e, Vec3 t)
+{
+    Bend b;
+    b.t = t;
+    b.n = vec3_cross(e, t);
+    b.s = vec3_dot(e, t);
+    b.g = angle_over_sine(0.5 * (1 - b.s), &b.h);
+    b.angle = vec3_scale(b.n, b.g);
+    return b;
+}
+
+// Given m = dE/d angle: returns dE for a rotation of t, adds dE/de to *along.
+INLINE Vec3 bend_back(const Bend *b, Vec3 e, Vec3 m, Vec3 *along)
+{
+    double mn = b->h * vec3_dot(m, b->n);
+    *along = vec3_add(*along, vec3_add_scaled(vec3_scale(vec3_cross(b->t, m), b->g), mn, b->t));
+    Vec3 turn = vec3_scale(vec3_add_scaled(vec3_scale(m, b->s), -vec3_dot(b->t, m), e), b->g);
+    return vec3_add_scaled(turn, -mn, b->n);
+}
+
+INLINE void element(const BeamInput *in, bool is_curved, BeamOutput *out)
+{
+    Vec3 d = vec3_sub(in->x2, in->x1);
+    double l = sqrt(vec3_norm2(d)), inverse = 1 / l;
+    Vec3 e = vec3_scale(d, inverse);
+    Quat f1 = in->q1, f2 = in->q2;
+    if (is_curved) {
+        f1 = quat_mul(in->q1, (Quat){in->half_w, 0, in->half_y, in->half_z});
+        f2 = quat_mul(in->q2, (Quat){in->half_w, 0, -in->half_y, -in->half_z});
+    }
+    Bend c1 = bend_from(e, first_axis(f1)), c2 = bend_from(e, first_axis(f2));
+    Bend b1 = c1, b2 = c2;
+    if (is_curved) {
+        b1 = bend_from(e, first_axis(in->q1));
+        b2 = bend_from(e, first_axis(in->q2));
+    }
+
+    // axial, with the bow
+    double share = in->length * (1.0 / 30);
+    Vec3 bow1 = vec3_scale(vec3_sub(vec3_scale(b1.angle, 4), b2.angle), share);
+    Vec3 bow2 = vec3_scale(vec3_sub(vec3_scale(b2.angle, 4), b1.angle), share);
+    double bow = 0.5 * (vec3_dot(bow1, b1.angle) + vec3_dot(bow2, b2.angle));
+    double extension = l + bow - in->extend, tension = in->axial * extension;
+
+    // bending
+    Vec3 m1 = vec3_add(vec3_scale(c1.angle, in->near), vec3_scale(c2.angle, in->far));
+    Vec3 m2 = vec3_add(vec3_scale(c2.angle, in->near), vec3_scale(c1.angle, in->far));
+    double energy = 0.5 * (tension * extension + vec3_dot(m1, c1.angle) + vec3_dot(m2, c2.angle));
+
+    // torsion: p = (w, v) the rotation from F1 to F2, seen in F1
+    Quat p = quat_mul(quat_conjugate(f1), f2);
+    double h, g = angle_over_sine(0.5 * (1 - p.w), &h);
+    double psi = 2 * g * p.x, torque = in->twist * psi;
+    Vec3 axis = vec3(g * p.w - h * p.x * p.x, g * p.z - h * p.x * p.y, -g * p.y - h * p.x * p.z);
+    Vec3 turn = vec3_scale(quat_rotate(f1, axis), torque);
+    energy += 0.5 * torque * psi;
+
+    Vec3 along = vec3(0, 0, 0), t1, t2;
+    if (is_curved) {
+        t1 = vec3_sub(bend_back(&c1, e, m1, &along), turn);
+        t2 = vec3_add(bend_back(&c2, e, m2, &along), turn);
+        out->chord1 = t1;
+        out->chord2 = t2;
+        t1 = vec3_add(t1, bend_back(&b1, e, vec3_scale(bow1, tension), &along));
+        t2 = vec3_add(t2, bend_back(&b2, e, vec3_scale(bow2, tension), &along));
+    } else {
+        t1 = vec3_sub(bend_back(&c1, e, vec3_add_scaled(m1, tension, bow1), &along), turn);
+        t2 = vec3_add(bend_back(&c2, e, vec3_add_scaled(m2, tension, bow2), &along), turn);
+        out->chord1 = out->chord2 = vec3(0, 0, 0);
+    }
+    along = vec3_scale(vec3_add_scaled(along, -vec3_dot(along, e), e), inverse);
+    out->force2 = vec3_add_scaled(along, tension, e);
+    out->moment1 = t1;
+    out->moment2 = t2;
+    out->chord = e;
+    out->inverse = inverse;
+    out->tension = tension;
+    out->bow = bow;
+    out->bow1 = bow1;
+    out->bow2 = bow2;
+    out->angle1 = c1.angle;
+    out->angle2 = c2.angle;
+    out->energy = energy;
+}
+
+void beam_element(const BeamInput *in, BeamOutput *out)
+{
+    element(in, in->half_w < 1, out);
+}
+
+INLINE void chain_strain(const BeamRest *rest, const BeamPose *pose, int first, int last, bool is_curved, const BeamStrain *strain)
+{
+    const double *restrict x = pose->x, *restrict y = pose->y, *restrict z = pose->z;
+    const double *restrict qw = pose->qw, *restrict qx = pose->qx, *restrict qy = pose->qy, *restrict qz = pose->qz;
+    const BeamRest r = *rest;
+    const BeamStrain s = *strain;
+    VECTOR_LOOP
+    for (int i = first; i < last; i++) {
+        BeamInput in = {
+            .x1 = {x[i], y[i], z[i]},
+            .x2 = {x[i + 1], y[i + 1], z[i + 1]},
+            .q1 = {qw[i], qx[i], qy[i], qz[i]},
+            .q2 = {qw[i + 1], qx[i + 1], qy[i + 1], qz[i + 1]},
+            .length = r.length[i],
+            .extend = r.extend[i],
+            .axial = r.axial[i],
+            .near = r.near[i],
+            .far = r.far[i],
+            .twist = r.twist[i],
+            .half_w = r.half_w[i],
+            .half_y = r.half_y[i],
+            .half_z = r.half_z[i],
+        };
+        BeamOutput o;
+        element(&in, is_curved, &o);
+        s.ex[i] = o.chord.x, s.ey[i] = o.chord.y, s.ez[i] = o.chord.z;
+        s.inverse[i] = o.inverse;
+        s.tension[i] = o.tension;
+        s.b1x[i] = o.bow1.x, s.b1y[i] = o.bow1.y, s.b1z[i] = o.bow1.z;
+        s.b2x[i] = o.bow2.x, s.b2y[i] = o.bow2.y, s.b2z[i] = o.bow2.z;
+        s.fx[i] = o.force2.x, s.fy[i] = o.force2.y, s.fz[i] = o.force2.z;
+        s.m1x[i] = o.moment1.x, s.m1y[i] = o.moment1.y, s.m1z[i] = o.moment1.z;
+        s.m2x[i] = o.moment2.x, s.m2y[i] = o.moment2.y, s.m2z[i] = o.moment2.z;
+        s.energy[i] = o.energy;
+    }
+}
+
+BEAM_KERNEL
+static void chain_strain_straight(const BeamRest *rest, const BeamPose *pose, int first, int last, const BeamStrain *strain)
+{
+    chain_strain(rest, pose, first, last, false, strain);
+}
+
+BEAM_KERNEL
+static void chain_strain_curved(const BeamRest *rest, const BeamPose *pose, int first, int last, const BeamStrain *strain)
+{
+    chain_strain(rest, pose, first, last, true, strain);
+}
+
+void beam_chain_strain(const BeamRest *rest, const BeamPose *pose, int first, int last, const BeamStrain *strain)
+{
+    // runs of elements that are straight or curved at rest: sections are long, so runs are few
+    for (int i = first; i < last;) {
+        bool is_curved = rest->half_w[i] < 1;
+        int end = i + 1;
+        while (end < last && (rest->half_w[end] < 1) == is_curved)
+            end++;
+        (is_curved ? chain_strain_curved : chain_strain_straight)(rest, pose, i, end, strain);
+        i = end;
+    }
+}
+
+// Rows r..r+2, columns c..c+2 of a 6x6 block.
+INLINE void put(double *block, int r, int c, int i, int j, double value, bool is_sum)
+{
+    double *at = &block[(r + i) * 6 + c + j];
+    *at = is_sum ? *at + value : value;
+}
+
+// The blocks of one element; `sum11` and `sum22` add into what is there.
+INLINE void tangent_blocks(Vec3 e, double inverse, double tension, Vec3 bow1, Vec3 bow2, double length, double axial, double near,
+                           double far, double twist, double scale, double *k11, double *k21, double *k22, bool is_sum)
+{
+    double pull = tension > 0 ? tension : 0;
+    double ka = axial * scale, kt = twist * scale;
+    double c = near * scale + pull * length * (4.0 / 30), d = far * scale - pull * length * (1.0 / 30);
+    double b = (c + d) * inverse, a = 2 * b * inverse + pull * inverse;
+    double v[3] = {e.x, e.y, e.z};
+    Vec3 tilt = vec3_scale(vec3_cross(e, vec3_add(bow1, bow2)), inverse);
+    double ext[3] = {e.x + tilt.x, e.y + tilt.y, e.z + tilt.z}, w1[3] = {bow1.x, bow1.y, bow1.z}, w2[3] = {bow2.x, bow2.y, bow2.z};
+    double skew[3][3] = {{0, -e.z * b, e.y * b}, {e.z * b, 0, -e.x * b}, {-e.y * b, e.x * b, 0}};
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            double vv = v[i] * v[j], id = i == j ? 1.0 : 0.0, p = id - vv;
+            double tt = a * p + ka * ext[i] * ext[j];
+            double e1 = ka * ext[i] * w1[j], e2 = ka * ext[i] * w2[j];
+            put(k11, 0, 0, i, j, tt, is_sum);
+            put(k11, 0, 3, i, j, -skew[i][j] - e1, is_sum);
+            put(k11, 3, 0, j, i, -skew[i][j] - e1, is_sum);
+            put(k11, 3, 3, i, j, c * p + kt * vv + ka * w1[i] * w1[j], is_sum);
+            put(k22, 0, 0, i, j, tt, is_sum);
+            put(k22, 0, 3, i, j, skew[i][j] + e2, is_sum);
+            put(k22, 3, 0, j, i, skew[i][j] + e2, is_sum);
+            put(k22, 3, 3, i, j, c * p + kt * vv + ka * w2[i] * w2[j], is_sum);
+            put(k21, 0, 0, i, j, -tt, false);
+            put(k21, 0, 3, i, j, skew[i][j] + e1, false);
+            put(k21, 3, 0, j, i, -skew[i][j] - e2, false);
+            put(k21, 3, 3, i, j, d * p - kt * vv + ka * w2[i] * w1[j], false);
+        }
+}
+
+void beam_tangent(Vec3 chord, double inverse, double tension, Vec3 bow1, Vec3 bow2, double length, double axial, double near, double far,
+                  double twist, double scale, BeamTangent *tangent)
+{
+    tangent_blocks(chord, inverse, tension, bow1, bow2, length, axial, near, far, twist, scale, tangent->k11, tangent->k21, tangent->k22,
+                   false);
+}
+
+BEAM_KERNEL
+void beam_chain_tangent(const BeamRest *rest, const BeamStrain *strain, int first, int last, double scale, BlockChain *chain)
+{
+    const BeamStrain s = *strain;
+    for (int i = first; i < last; i++)
+        tangent_blocks(vec3(s.ex[i], s.ey[i], s.ez[i]), s.inverse[i], s.tension[i], vec3(s.b1x[i], s.b1y[i], s.b1z[i]),
+                       vec3(s.b2x[i], s.b2y[i], s.b2z[i]), rest->length[i], rest->axial[i], rest->near[i], rest->far[i], rest->twist[i],
+                       scale, chain->diag + 36 * (size_t)i, chain->lower + 36 * (size_t)i, chain->diag + 36 * (size_t)(i + 1), true);
+}
+
+void beam_bending(double length, double bending, double shear, double *near, double *far)
+{
+    double sum = 6 * bending * shear * length / (shear * length * length + 12 * bending), difference = 2 * bending / length;
+    *near = 0.5 * (sum + difference);
+    *far = 0.5 * (sum - difference);
+}
+
+void beam_bending_slope(double length, double bending, double shear, double *near, double *far)
+{
+    double q = shear * length * length + 12 * bending;
+    double sum = 6 * bending * shear * (12 * bending - shear * length * length) / (q * q), difference = -2 * bending / (length * length);
+    *near = 0.5 * (sum + difference);
+    *far = 0.5 * (sum - difference);
+}
+
+double beam_arc_rest(double length, double curvature, double *slope)
+{
+    // chord = 2/k sin(kL/2); bow = k^2 L^3 / 24: what is left is k^4 L^5 / 1920 ...
+    double half = 0.5 * curvature * length, q = half * half;
+    if (half < 0.02) {
+        *slope = -q * q / 24 * (1 - q / 30);
+        return -length * q * q / 120 * (1 - q / 42);
+    }
+    *slope = 1 - cos(half) - 0.5 * q;
+    return length * (1 - sin(half) / half - q / 6);
+}

@@ -1,1 +1,81 @@
-typedef int placeholder_sheath;
+// The element across the mouth. Its inner node has the axial coordinate a < 0 and a twist; at the mouth m the wire is clamped in place and
+// direction d; the part outside has the rest length l = L + a and is one beam (beam_element.c) from m to the outer node x.
+//   E = EA/(2L) (-a + |x - m| + bow + w(l) - L)^2 + bending(l, x, R) + GJ/(2L) psi^2 + EI k0^2/2 (L - l)
+// Axial strain and twist are spread over the whole element; bending only over what is outside; the last term is what a wire
+// with rest curvature k0 stores while it is held straight inside. As l goes to 0 the beam becomes a clamp, at l = L it is the ordinary
+// element: nothing jumps when a node passes. Because l depends on a, dE/da has the configurational part dE/dl, in the
+// frictionless case -M^2/(2 EI) of a straight wire: the push that a bend downstream gives back through a sleeve (Bigoni 2015).
+#include "solver/sheath.h"
+
+double sheath_outside(const BeamRest *rest, int index, double coordinate)
+{
+    double length = rest->length[index];
+    return fmax(length + coordinate, 0.01 * length);
+}
+
+void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction, double coordinate, Quat q1, Vec3 x2, Quat q2,
+                    double outside, SheathElement *element)
+{
+    double length = rest->length[index], k0 = rest->curvature[index], bending = rest->bending[index], slope;
+    double quarter = 0.25 * k0 * outside, near_slope, far_slope;
+    // the bending plane in the node's frame: e3 turned about e1; half_y and half_z hold it times a sine
+    double axis = sqrt(rest->half_y[index] * rest->half_y[index] + rest->half_z[index] * rest->half_z[index]);
+    double by = axis > 0 ? rest->half_y[index] / axis : 0, bz = axis > 0 ? rest->half_z[index] / axis : 1;
+    BeamInput in = {.x1 = mouth, .x2 = x2, .q1 = q1, .q2 = q2, .length = outside, .axial = rest->axial[index], .twist = rest->twist[index],
+                    .half_w = cos(quarter), .half_y = sin(quarter) * by, .half_z = sin(quarter) * bz};
+    in.extend = length - beam_arc_rest(outside, k0, &slope) + coordinate;
+    beam_bending(outside, bending, rest->shear[index], &in.near, &in.far);
+    beam_bending_slope(outside, bending, rest->shear[index], &near_slope, &far_slope);
+    BeamOutput out;
+    beam_element(&in, &out);
+
+    double by_length = out.tension * (out.bow / outside + slope) - 0.5 * bending * k0 * k0;
+    by_length += 0.5 * near_slope * (vec3_norm2(out.angle1) + vec3_norm2(out.angle2)) + far_slope * vec3_dot(out.angle1, out.angle2);
+    // a longer arc turns the rest chord in both nodes' frames
+    Vec3 plane = vec3(0, by, bz);
+    by_length += 0.5 * k0 * (vec3_dot(quat_rotate(q1, plane), out.chord1) - vec3_dot(quat_rotate(q2, plane), out.chord2));
+
+    *element = (SheathElement){
+        .outside = outside,
+        .axial_gradient = by_length - out.tension,
+        .twist_gradient = vec3_dot(direction, out.moment1),
+        .force2 = out.force2,
+        .moment2 = out.moment2,
+        .energy = out.energy + 0.5 * bending * k0 * k0 * (length - outside),
+        .chord = out.chord,
+        .bow1 = out.bow1,
+        .bow2 = out.bow2,
+        .inverse = out.inverse,
+        .tension = out.tension,
+        .near = in.near,
+        .far = in.far,
+    };
+}
+
+void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const SheathElement *element, double scale, BeamTangent *tangent)
+{
+    BeamTangent full;
+    double ka = rest->axial[index] * scale, d[3] = {direction.x, direction.y, direction.z};
+    beam_tangent(element->chord, element->inverse, element->tension, element->bow1, element->bow2, element->outside, rest->axial[index],
+                 element->near, element->far, rest->twist[index], scale, &full);
+    *tangent = (BeamTangent){0};
+    for (int i = 0; i < 36; i++)
+        tangent->k22[i] = full.k22[i];
+    // rotation about the line: columns 3..5 times d
+    double twist[6] = {0};
+    for (int i = 0; i < 6; i++) {
+        for (int j = 0; j < 3; j++) {
+            tangent->k21[i * 6 + 3] += full.k21[i * 6 + 3 + j] * d[j];
+            twist[i] += full.k11[i * 6 + 3 + j] * d[j];
+        }
+    }
+    tangent->k11[21] = twist[3] * d[0] + twist[4] * d[1] + twist[5] * d[2];
+    // the axial unknown enters through the extension alone: -1 there
+    Vec3 tilt = vec3_scale(vec3_cross(element->chord, vec3_add(element->bow1, element->bow2)), element->inverse);
+    Vec3 along = vec3_add(element->chord, tilt);
+    tangent->k11[0] = ka;
+    tangent->k11[3] = tangent->k11[18] = -ka * vec3_dot(element->bow1, direction);
+    double column[6] = {along.x, along.y, along.z, element->bow2.x, element->bow2.y, element->bow2.z};
+    for (int i = 0; i < 6; i++)
+        tangent->k21[i * 6] = -ka * column[i];
+}

@@ -1,1 +1,492 @@
-#include "solver/step.h"
+// One implicit Euler step (step.h). Kerrien 2017 section 6.1 with what DESIGN sections 3 and 4 add.
+//
+// The system is linear about x_n. A step that turns an element by more than `newton_motion` is linearised again about what came out, with the
+// unknown still the whole displacement from x_n, so that inertia, damping, gaps and friction keep their meaning: Newton's method on the
+// implicit step. Inside an iteration no element may turn by more than TURN_MAX: a wire that springs back does so faster than
+// any step (10 mJ move 0.02 g at 30 m/s), and a linear displacement of that size would stretch it. What is still larger after the last
+// iteration is cut and flagged STEP_LIMITED: it takes the next steps to arrive.
+#include "solver/step_internal.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double TURN_MAX = 0.3;              // [rad]
+static const double NEWTON_MOTION = 0.02;        // [rad]: a chord turned by this stretches by 2e-4 in a linear step
+enum { NEWTON_MAX = 3 };
+
+// --- creation ---
+
+static double *take(double **from, size_t count)
+{
+    double *p = *from;
+    *from += count;
+    return p;
+}
+
+static bool allocate_scratch(Stepper *s)
+{
+    size_t m = (size_t)s->wire.node_count, e = (size_t)s->wire.element_count;
+    s->scratch = calloc(BEAM_REST_ARRAYS * e + BEAM_POSE_ARRAYS * m + BEAM_STRAIN_ARRAYS * e + 24 * m, sizeof *s->scratch);
+    if (!s->scratch)
+        return false;
+    double *at = s->scratch;
+    BeamRest *r = &s->rest;
+    double **rest[] = {&r->length, &r->extend, &r->axial, &r->near, &r->far, &r->twist, &r->half_w, &r->half_y, &r->half_z,
+                       &r->curvature, &r->bending, &r->shear};
+    for (int i = 0; i < BEAM_REST_ARRAYS; i++)
+        *rest[i] = take(&at, e);
+    BeamPose *p = &s->pose;
+    double **pose[] = {&p->x, &p->y, &p->z, &p->qw, &p->qx, &p->qy, &p->qz};
+    for (int i = 0; i < BEAM_POSE_ARRAYS; i++)
+        *pose[i] = take(&at, m);
+    BeamStrain *t = &s->strain;
+    double **strain[] = {&t->ex, &t->ey, &t->ez, &t->inverse, &t->tension, &t->b1x, &t->b1y, &t->b1z, &t->b2x, &t->b2y, &t->b2z,
+                         &t->fx, &t->fy, &t->fz, &t->m1x, &t->m1y, &t->m1z, &t->m2x, &t->m2y, &t->m2z, &t->energy};
+    for (int i = 0; i < BEAM_STRAIN_ARRAYS; i++)
+        *strain[i] = take(&at, e);
+    s->b = take(&at, 6 * m);
+    s->u = take(&at, 6 * m);
+    s->linearised = take(&at, 6 * m);
+    s->product = take(&at, 6 * m);
+    return true;
+}
+
+static bool allocate(Stepper *s)
+{
+    size_t m = (size_t)s->wire.node_count;
+    s->memory_count = 17 * m;
+    s->memory = calloc(s->memory_count, sizeof *s->memory);
+    s->place = calloc(m, sizeof *s->place);
+    s->fixed = calloc(m, sizeof *s->fixed);
+    s->start_position = calloc(m, sizeof *s->start_position);
+    s->start_orientation = calloc(m, sizeof *s->start_orientation);
+    s->query_point = calloc(m, sizeof *s->query_point);
+    s->query_place = calloc(m, sizeof *s->query_place);
+    s->query_hit = calloc(m, sizeof *s->query_hit);
+    s->query_node = calloc(m, sizeof *s->query_node);
+    s->set.point = calloc(m, sizeof *s->set.point);
+    s->set.capacity = s->wire.node_count;
+    s->factor = block_factor_create(s->wire.node_count);
+    s->solver = contact_solver_create(s->wire.node_count, s->set.capacity);
+    if (!s->memory || !s->place || !s->fixed || !s->start_position || !s->start_orientation || !s->query_point || !s->query_place ||
+        !s->query_hit || !s->query_node || !s->set.point || !s->factor || !s->solver || !block_chain_create(&s->chain, s->wire.node_count) ||
+        !allocate_scratch(s))
+        return false;
+    s->state.node_count = s->wire.node_count;
+    s->state.position = (Vec3 *)s->memory;
+    s->state.velocity = (Vec3 *)(s->memory + 3 * m);
+    s->state.spin = (Vec3 *)(s->memory + 6 * m);
+    s->force = (Vec3 *)(s->memory + 9 * m);
+    s->state.orientation = (Quat *)(s->memory + 12 * m);
+    s->clearance = s->memory + 16 * m;
+    return true;
+}
+
+static int nearest_node(const Wire *wire, double at)
+{
+    int best = 0;
+    for (int i = 1; i < wire->node_count; i++)
+        if (fabs(wire->s[i] - at) < fabs(wire->s[best] - at))
+            best = i;
+    return best;
+}
+
+static bool place_rig(Stepper *s, const WireOptions *o)
+{
+    for (int i = 0; i < o->fix_count; i++)
+        s->fixed[nearest_node(&s->wire, o->fix[i].s)] |= o->fix[i].dof;
+    s->load_count = o->load_count;
+    s->load = calloc((size_t)o->load_count + 1, sizeof *s->load);
+    if (!s->load)
+        return false;
+    for (int i = 0; i < o->load_count; i++) {
+        int node = 0;
+        while (node + 2 < s->wire.node_count && s->wire.s[node + 1] <= o->load[i].s)
+            node++;
+        double weight = fmin(1, fmax(0, (o->load[i].s - s->wire.s[node]) / s->wire.length[node]));
+        if (weight < 1e-9)
+            weight = 0;
+        if (weight > 1 - 1e-9)
+            weight = 1;
+        s->load[i] = (LoadPlace){.load = o->load[i], .node = node, .weight = weight};
+    }
+    return true;
+}
+
+static void place_wire(Stepper *s, const WireOptions *o)
+{
+    s->state.inserted = o->has_sheath ? fmin(o->inserted, s->wire.total_length) : s->wire.total_length;
+    double behind = s->wire.total_length - s->state.inserted;
+    for (int i = 0; i < s->wire.node_count; i++) {
+        s->state.position[i] = vec3_add_scaled(s->mouth, s->wire.s[i] - behind, s->axis[0]);
+        s->state.orientation[i] = s->line;
+        s->place[i].node = -1;
+    }
+}
+
+static bool check_options(const StepperOptions *o, char *why, int capacity)
+{
+    if (!(o->dt >= 1e-6 && o->dt <= 1e9)) {
+        snprintf(why, (size_t)capacity, "time step is %g ms; valid: 1e-6 to 1e9 ms", o->dt);
+        return false;
+    }
+    if (!(o->wall_friction >= 0 && o->wall_friction <= 10)) {
+        snprintf(why, (size_t)capacity, "friction of the wall is %g; valid: 0 to 10", o->wall_friction);
+        return false;
+    }
+    if (!(o->contact.tolerance >= 0 && o->contact.tolerance <= 1) || o->contact.max_iterations < 0) {
+        snprintf(why, (size_t)capacity, "contact tolerance %g or iterations %d; valid: 0 to 1, and not negative", o->contact.tolerance,
+                 o->contact.max_iterations);
+        return false;
+    }
+    return true;
+}
+
+Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
+{
+    StepperOptions o = *options;
+    if (o.dt == 0)
+        o.dt = 1;
+    if (!check_options(&o, why, capacity))
+        return NULL;
+    Stepper *s = calloc(1, sizeof *s);
+    if (!s) {
+        snprintf(why, (size_t)capacity, "no memory for a stepper");
+        return NULL;
+    }
+    if (!wire_create(&s->wire, &o.wire, why, capacity)) {
+        stepper_destroy(s);
+        return NULL;
+    }
+    if (!allocate(s) || !place_rig(s, &o.wire)) {
+        snprintf(why, (size_t)capacity, "no memory for a wire of %d elements", o.wire.elements);
+        stepper_destroy(s);
+        return NULL;
+    }
+    wire_rest(&s->wire, &o.wire, &s->rest);
+    s->gravity = o.wire.gravity;
+    s->damping_mass = o.wire.damping_mass;
+    s->damping_stiffness = o.wire.damping_stiffness;
+    s->dt = o.dt;
+    s->has_sheath = o.wire.has_sheath;
+    s->mouth = o.wire.start;
+    s->line = wire_start_frame(&o.wire);
+    Mat3 frame = quat_to_mat3(s->line);
+    for (int k = 0; k < 3; k++)
+        s->axis[k] = mat3_column(&frame, k);
+    s->vessel = o.vessel;
+    s->wall_friction = o.wall_friction;
+    ContactOptions usual = contact_default_options();
+    s->contact = o.contact;
+    if (s->contact.max_iterations == 0)
+        s->contact.max_iterations = usual.max_iterations;
+    if (s->contact.tolerance == 0)
+        s->contact.tolerance = usual.tolerance;
+    s->newton_max = o.newton_max > 0 ? o.newton_max : NEWTON_MAX;
+    s->newton_motion = NEWTON_MOTION;
+    place_wire(s, &o.wire);
+    return s;
+}
+
+void stepper_destroy(Stepper *s)
+{
+    if (!s)
+        return;
+    wire_destroy(&s->wire);
+    block_chain_destroy(&s->chain);
+    if (s->factor)
+        block_factor_destroy(s->factor);
+    if (s->solver)
+        contact_solver_destroy(s->solver);
+    free(s->memory);
+    free(s->place);
+    free(s->fixed);
+    free(s->load);
+    free(s->start_position);
+    free(s->start_orientation);
+    free(s->query_point);
+    free(s->query_place);
+    free(s->query_hit);
+    free(s->query_node);
+    free(s->set.point);
+    free(s->scratch);
+    free(s);
+}
+
+// --- stages ---
+
+// Nodes up to the mouth are held. One that has passed it is let go a fiftieth of an element later, so that the piece outside has a
+// direction; one that would come back in this step is held from now on.
+static int count_held(const Stepper *s, double advance)
+{
+    if (!s->has_sheath)
+        return 0;
+    int k = 1;
+    while (k < s->state.node_count && stepper_sheath_coordinate(s, k) + fmin(advance, 0) <= 0.02 * s->wire.length[k - 1])
+        k++;
+    return k;
+}
+
+void step_feed(Stepper *s, StepCommand command)
+{
+    s->report = (StepReport){0};
+    s->has_failed = false;
+    s->is_iterate = false;
+    if (!s->has_sheath || !isfinite(command.advance) || !isfinite(command.twist))
+        command = (StepCommand){0};
+    double inserted = s->state.inserted + command.advance, total = s->wire.total_length;
+    if (inserted > total) {
+        s->report.flags |= STEP_FULLY_INSERTED;
+        command.advance = total - s->state.inserted;
+    } else if (inserted < 0) {
+        s->report.flags |= STEP_FULLY_WITHDRAWN;
+        command.advance = -s->state.inserted;
+    }
+    s->command = command;
+    s->first_free = count_held(s, command.advance);
+    size_t nodes = (size_t)s->state.node_count;
+    memcpy(s->start_position, s->state.position, nodes * sizeof *s->start_position);
+    memcpy(s->start_orientation, s->state.orientation, nodes * sizeof *s->start_orientation);
+    memset(s->linearised, 0, 6 * nodes * sizeof *s->linearised);
+}
+
+void step_detect(Stepper *s) { stepper_detect(s); }
+
+void step_assemble(Stepper *s) { stepper_assemble(s); }
+
+void step_factor(Stepper *s)
+{
+    s->has_failed |= !block_chain_factor(&s->chain, s->factor);
+}
+
+static void solve(Stepper *s)
+{
+    if (s->has_failed)
+        return;
+    ContactReport report = {.converged = true};
+    if (s->set.count > 0)
+        report = contact_solve(s->solver, &s->chain, s->factor, s->b, &s->set, &s->contact, s->u);
+    else
+        block_factor_solve(s->factor, s->b, s->u);
+    s->report.iterations += report.iterations;
+    s->report.residual = report.residual;
+    s->report.cone_violation = report.cone_violation;
+    s->report.active = report.active;
+    s->report.flags &= ~(unsigned)STEP_NOT_CONVERGED;
+    if (!report.converged)
+        s->report.flags |= STEP_NOT_CONVERGED;
+    for (int k = 0; k < s->set.count; k++)
+        s->force[s->set.point[k].node] = s->set.point[k].force;
+    for (int i = 0; i < 6 * s->state.node_count; i++)
+        s->has_failed |= !isfinite(s->u[i]);
+}
+
+// The largest turn of an element's chord or of a node against the iterate [rad]; a node's turn about the axis does not count.
+static double largest_turn(const Stepper *s)
+{
+    double largest = 0;
+    for (int i = s->first_free; i < s->state.node_count; i++) {
+        const double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
+        Vec3 turn = vec3(u[3] - k[3], u[4] - k[4], u[5] - k[5]);
+        Vec3 axis = quat_rotate(s->state.orientation[i], vec3(1, 0, 0));
+        largest = fmax(largest, vec3_norm2(vec3_cross(turn, axis)));
+        if (i == s->first_free)
+            continue;
+        Vec3 e = vec3_scale(vec3_sub(s->state.position[i], s->state.position[i - 1]), 1 / s->wire.length[i - 1]);
+        Vec3 d = vec3(u[0] - u[-6] - k[0] + k[-6], u[1] - u[-5] - k[1] + k[-5], u[2] - u[-4] - k[2] + k[-4]);
+        largest = fmax(largest, vec3_norm2(vec3_cross(e, d)) / (s->wire.length[i - 1] * s->wire.length[i - 1]));
+    }
+    return sqrt(largest);
+}
+
+// exp of half the rotation vector; series where the angle is small, which is always in a good step.
+static Quat small_rotation(Vec3 w)
+{
+    double a = vec3_norm2(w);
+    if (a > 0.01)
+        return quat_from_rotation_vector(w);
+    double q = a / 4, sine = 0.5 * (1 - q / 6 * (1 - q / 20 * (1 - q / 42))), cosine = 1 - q / 2 * (1 - q / 12 * (1 - q / 30 * (1 - q / 56)));
+    return (Quat){cosine, sine * w.x, sine * w.y, sine * w.z};
+}
+
+// The iterate moves to `part` of the way from where it is to x_n + u. Nodes in the sheath go all the way: they are prescribed.
+static void move(Stepper *s, double part)
+{
+    WireState *w = &s->state;
+    for (int i = 0; i < w->node_count; i++) {
+        double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i, turn[3];
+        for (int c = 0; c < 6; c++) {
+            if (part < 1 && i >= s->first_free)
+                u[c] = k[c] + part * (u[c] - k[c]);
+            if (c >= 3)
+                turn[c - 3] = u[c] - k[c];
+            k[c] = u[c];
+        }
+        if (i >= s->first_free) {
+            w->position[i] = vec3_add(s->start_position[i], vec3(u[0], u[1], u[2]));
+            w->orientation[i] = quat_unit(quat_mul(small_rotation(vec3(turn[0], turn[1], turn[2])), w->orientation[i]));
+            continue;
+        }
+        // on the line exactly, whatever rounding does
+        double along = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]) + u[0];
+        w->position[i] = vec3_add_scaled(s->mouth, along, s->axis[0]);
+        Quat q = quat_mul(small_rotation(vec3_scale(s->axis[0], turn[0])), w->orientation[i]);
+        Vec3 e = quat_rotate(q, vec3(1, 0, 0)), axis = vec3_cross(e, s->axis[0]);
+        w->orientation[i] = quat_unit(quat_mul((Quat){1 + vec3_dot(e, s->axis[0]), axis.x, axis.y, axis.z}, q));
+    }
+}
+
+void step_contact(Stepper *s)
+{
+    solve(s);
+    for (int iteration = 1; iteration < s->newton_max && !s->has_failed; iteration++) {
+        double turn = largest_turn(s);
+        if (turn <= s->newton_motion)
+            break;
+        move(s, fmin(1, TURN_MAX / turn));
+        s->is_iterate = true;
+        stepper_detect(s);
+        stepper_assemble(s);
+        step_factor(s);
+        solve(s);
+        s->report.newton = iteration;
+    }
+}
+
+static void keep_last_state(Stepper *s)
+{
+    size_t nodes = (size_t)s->state.node_count;
+    memcpy(s->state.position, s->start_position, nodes * sizeof *s->start_position);
+    memcpy(s->state.orientation, s->start_orientation, nodes * sizeof *s->start_orientation);
+    memset(s->state.velocity, 0, nodes * sizeof *s->state.velocity);
+    memset(s->state.spin, 0, nodes * sizeof *s->state.spin);
+    memset(s->force, 0, nodes * sizeof *s->force);
+    memset(s->clearance, 0, nodes * sizeof *s->clearance);
+    s->report.flags |= STEP_DIVERGED;
+}
+
+static void set_velocities(Stepper *s)
+{
+    WireState *w = &s->state;
+    double rate = 1 / s->dt;
+    for (int i = 0; i < w->node_count; i++) {
+        const double *u = s->u + 6 * (size_t)i;
+        if (i < s->first_free) {
+            w->velocity[i] = vec3_scale(s->axis[0], u[0] * rate);
+            w->spin[i] = vec3_scale(s->axis[0], u[3] * rate);
+            continue;
+        }
+        w->velocity[i] = vec3(u[0] * rate, u[1] * rate, u[2] * rate);
+        w->spin[i] = vec3(u[3] * rate, u[4] * rate, u[5] * rate);
+        s->clearance[i] -= sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+    }
+}
+
+static void report_forces(Stepper *s)
+{
+    if (s->has_sheath) {
+        s->report.proximal_force = stepper_reaction(s, 0);
+        s->report.proximal_torque = stepper_reaction(s, 3);
+    } else {
+        Vec3 force = vec3(0, 0, 0), torque = vec3(0, 0, 0);
+        double *f[] = {&force.x, &force.y, &force.z, &torque.x, &torque.y, &torque.z};
+        for (int k = 0; k < 6; k++)
+            if (s->fixed[0] >> k & 1)
+                *f[k] = stepper_reaction(s, k);
+        s->report.proximal_force = vec3_dot(force, s->axis[0]);
+        s->report.proximal_torque = vec3_dot(torque, s->axis[0]);
+    }
+    for (int k = 0; k < s->set.count; k++) {
+        double force = vec3_norm(s->set.point[k].force);
+        s->report.wall_force_max = fmax(s->report.wall_force_max, force);
+        s->report.wall_force_sum += force;
+    }
+}
+
+void step_correct(Stepper *s)
+{
+    s->state.time += s->dt;
+    if (!s->has_failed) {
+        report_forces(s);
+        double turn = largest_turn(s);
+        if (turn > TURN_MAX)
+            s->report.flags |= STEP_LIMITED;
+        move(s, fmin(1, TURN_MAX / fmax(turn, TURN_MAX)));
+        set_velocities(s);
+        s->state.inserted += s->command.advance;
+        s->state.twist += s->command.twist;
+        for (int i = 0; i < s->state.node_count; i++)
+            s->has_failed |= !vec3_is_finite(s->state.position[i]);
+    }
+    if (s->has_failed)
+        keep_last_state(s);
+}
+
+const StepReport *step_report(const Stepper *s) { return &s->report; }
+const WireState *stepper_state(const Stepper *s) { return &s->state; }
+
+// --- questions ---
+
+void stepper_node_report(Stepper *s, NodeReport *node)
+{
+    int nodes = s->state.node_count, held = count_held(s, 0);
+    for (int i = 0; i < nodes; i++) {
+        node[i] = (NodeReport){.s = s->wire.s[i], .radius = s->wire.radius[i], .gap = HUGE_VAL, .vessel_node = -1};
+        if (i < held || !s->vessel)
+            continue;
+        // a copy of the memory: a question must not change the next step
+        VesselMemory place = s->place[i];
+        if (place.node < 0)
+            place = (VesselMemory){.node = s->vessel->locate(s->vessel, s->state.position[i], i > held ? node[i - 1].vessel_node : -1)};
+        VesselHit hit;
+        vessel_query(s->vessel, 1, &s->state.position[i], 1, &place, &hit);
+        node[i].force = s->force[i];
+        node[i].vessel_node = hit.node;
+        if (!(hit.flags & (VESSEL_FAR | VESSEL_OPEN_END)))
+            node[i].gap = hit.gap - s->wire.radius[i];
+    }
+}
+
+double stepper_elastic_energy(const Stepper *s)
+{
+    double energy = 0;
+    int held = count_held(s, 0);
+    for (int i = 0; i < s->wire.element_count; i++) {
+        const BeamRest *r = &s->rest;
+        const WireState *w = &s->state;
+        double k0 = r->curvature[i];
+        if (i + 1 < held) {
+            double strain = stepper_sheath_coordinate(s, i + 1) - stepper_sheath_coordinate(s, i) - r->length[i];
+            Quat p = quat_mul(quat_conjugate(w->orientation[i]), w->orientation[i + 1]);
+            double twist = 2 * atan2(p.x, p.w);
+            energy += 0.5 * (r->axial[i] * strain * strain + r->twist[i] * twist * twist + r->bending[i] * k0 * k0 * r->length[i]);
+        } else if (i + 1 == held) {
+            SheathElement e;
+            double coordinate = stepper_sheath_coordinate(s, i);
+            sheath_element(r, i, s->mouth, s->axis[0], coordinate, w->orientation[i], w->position[i + 1], w->orientation[i + 1],
+                           sheath_outside(r, i, coordinate), &e);
+            energy += e.energy;
+        } else {
+            BeamInput in = {.x1 = w->position[i], .x2 = w->position[i + 1], .q1 = w->orientation[i], .q2 = w->orientation[i + 1],
+                            .length = r->length[i], .extend = r->extend[i], .axial = r->axial[i], .near = r->near[i], .far = r->far[i],
+                            .twist = r->twist[i], .half_w = r->half_w[i], .half_y = r->half_y[i], .half_z = r->half_z[i]};
+            BeamOutput out;
+            beam_element(&in, &out);
+            energy += out.energy;
+        }
+    }
+    return energy;
+}
+
+double stepper_kinetic_energy(const Stepper *s)
+{
+    double twice = 0;
+    for (int i = 0; i < s->state.node_count; i++) {
+        Vec3 spin = s->state.spin[i], axis = quat_rotate(s->state.orientation[i], vec3(1, 0, 0));
+        double about = vec3_dot(spin, axis);
+        twice += s->wire.mass[i] * vec3_norm2(s->state.velocity[i]) + s->wire.inertia_lateral[i] * vec3_norm2(spin) +
+                 (s->wire.inertia_axial[i] - s->wire.inertia_lateral[i]) * about * about;
+    }
+    return 0.5 * twice;
+}

@@ -26,6 +26,7 @@ enum {
     STEP_FULLY_WITHDRAWN = 16,   // retraction was clamped
     STEP_OUT_OF_VESSEL = 32,     // a node beyond an open end that is not the sheath's
     STEP_DETECTION_UNSURE = 64,  // a projection did not converge
+    STEP_LIMITED = 128,          // an element would have turned by more than 0.3 rad: the motion was cut, later steps complete it
 };
 
 typedef struct StepReport {
@@ -38,6 +39,7 @@ typedef struct StepReport {
     double proximal_torque;      // [N mm]
     double wall_force_max;       // [N] largest contact force
     double wall_force_sum;       // [N] sum of magnitudes
+    int newton;                  // further linearisations of this step, 0 in a quiet one
 } StepReport;
 
 typedef struct Stepper Stepper;
@@ -48,6 +50,7 @@ typedef struct StepperOptions {
     double wall_friction;
     ContactOptions contact;
     double dt;                   // [ms], default 1
+    int newton_max;              // linearisations of a step at most; 0: the default, 3
 } StepperOptions;
 
 // NULL with a message in `why` (capacity >= 256) where an option is out of range.

@@ -67,4 +67,44 @@ typedef struct WireState {   // all that a step changes, M nodes; plain data, so
     Vec3 *spin;              // (M) [rad/ms], space axes
 } WireState;
 
+// --- What the chain is made of; does not change after its creation. ---
+typedef struct Wire {
+    int element_count, node_count;   // E, M = E + 1
+    double total_length;     // [mm]
+    double *s;               // (M) [mm] arc length from the proximal end
+    double *length;          // (E) [mm]
+    int *section;            // (E)
+    double *mass;            // (M) [g]
+    double *inertia_axial;   // (M) [g mm2] about e1
+    double *inertia_lateral; // (M) [g mm2] about e2 and e3
+    double *radius;          // (M) [mm] outer; at a border the larger one
+    double *friction;        // (M) < 0: the wall's; at a border the distal section's
+} Wire;
+
+WireOptions wire_default_options(void);          // 200 elements, Rayleigh damping 1e-4 per ms and 0.2 ms, no section, along +x from the origin
+// Every option in range? Else false with a message in `why` (capacity >= 256).
+bool wire_check(const WireOptions *options, char *why, int capacity);
+bool wire_create(Wire *wire, const WireOptions *options, char *why, int capacity);
+void wire_destroy(Wire *wire);
+// Elements per section, (section_count): in proportion to length by largest remainder, each at least one. False where elements < sections.
+bool wire_divide(const WireOptions *options, int *elements);
+
+// Properties of a section's cross-section.
+typedef struct WireStiffness {
+    double area;             // [mm2]
+    double axial;            // [N] EA
+    double bending;          // [N mm2] EI
+    double torsion;          // [N mm2] GJ
+    double shear;            // [N] kappa G A, Cowper's coefficient
+    double line_mass;        // [g/mm]
+    double line_inertia;     // [g mm] rho I, about a diameter; twice that about the axis
+} WireStiffness;
+WireStiffness wire_stiffness(const WireSection *section);
+
+struct BeamRest;
+// Fills the (E) arrays of `rest` (caller's).
+void wire_rest(const Wire *wire, const WireOptions *options, struct BeamRest *rest);
+// The frame at the start: e1 = direction, e2 = normal made perpendicular.
+Quat wire_start_frame(const WireOptions *options);
+
 #endif

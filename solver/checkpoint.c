@@ -1,0 +1,104 @@
+// Checkpoints: everything that the next step depends on. Restored, a run repeats bit for bit.
+// The hash is FNV-1a taken word by word (8 bytes) in four lanes, with a shift that carries high bits down; bytes would cost 100 us.
+#include "solver/step_internal.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+struct Checkpoint {
+    int node_count;
+    size_t memory_count;
+    double time, inserted, twist;
+    StepReport report;
+    VesselMemory *place;
+    double *memory;
+};
+
+void checkpoint_free(Checkpoint *c)
+{
+    if (!c)
+        return;
+    free(c->place);
+    free(c->memory);
+    free(c);
+}
+
+Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
+{
+    Checkpoint *c = reuse;
+    if (c && c->node_count != s->state.node_count) {
+        checkpoint_free(c);
+        c = NULL;
+    }
+    if (!c) {
+        c = calloc(1, sizeof *c);
+        if (!c)
+            return NULL;
+        c->node_count = s->state.node_count;
+        c->memory_count = s->memory_count;
+        c->place = calloc((size_t)c->node_count, sizeof *c->place);
+        c->memory = calloc(c->memory_count, sizeof *c->memory);
+        if (!c->place || !c->memory) {
+            checkpoint_free(c);
+            return NULL;
+        }
+    }
+    c->time = s->state.time;
+    c->inserted = s->state.inserted;
+    c->twist = s->state.twist;
+    c->report = s->report;
+    memcpy(c->place, s->place, (size_t)c->node_count * sizeof *c->place);
+    memcpy(c->memory, s->memory, c->memory_count * sizeof *c->memory);
+    return c;
+}
+
+void stepper_restore(Stepper *s, const Checkpoint *c)
+{
+    if (c->node_count != s->state.node_count)
+        return;
+    s->state.time = c->time;
+    s->state.inserted = c->inserted;
+    s->state.twist = c->twist;
+    s->report = c->report;
+    memcpy(s->place, c->place, (size_t)c->node_count * sizeof *c->place);
+    memcpy(s->memory, c->memory, c->memory_count * sizeof *c->memory);
+}
+
+typedef struct Hash {
+    uint64_t lane[4];
+    size_t next;
+} Hash;
+
+static void hash_double(Hash *hash, double value)
+{
+    uint64_t word, *lane = &hash->lane[hash->next++ % 4];
+    memcpy(&word, &value, sizeof word);
+    *lane = (*lane ^ word) * UINT64_C(0x100000001b3);
+    *lane ^= *lane >> 29;
+}
+
+uint64_t stepper_hash(const Stepper *s)
+{
+    const uint64_t basis = UINT64_C(0xcbf29ce484222325);
+    Hash hash = {.lane = {basis, basis + 1, basis + 2, basis + 3}};
+    hash_double(&hash, s->state.time);
+    hash_double(&hash, s->state.inserted);
+    hash_double(&hash, s->state.twist);
+    for (size_t i = 0; i < s->memory_count; i++)
+        hash_double(&hash, s->memory[i]);
+    // field by field: padding holds anything
+    for (int i = 0; i < s->state.node_count; i++) {
+        const VesselMemory *p = &s->place[i];
+        hash_double(&hash, p->node);
+        hash_double(&hash, p->has_foot);
+        hash_double(&hash, p->has_foot ? p->foot.x : 0);
+        hash_double(&hash, p->has_foot ? p->foot.y : 0);
+        hash_double(&hash, p->has_foot ? p->foot.z : 0);
+    }
+    uint64_t result = basis;
+    for (int k = 0; k < 4; k++) {
+        result = (result ^ hash.lane[k]) * UINT64_C(0x100000001b3);
+        result ^= result >> 29;
+    }
+    return result;
+}

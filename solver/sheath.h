@@ -1,0 +1,29 @@
+// The sheath: a frictionless straight guide that ends at the mouth. Behind the mouth the wire is a chain of axial and torsional
+// springs; the element that lies across the mouth bends with the part that is outside. DESIGN section 3; equations in sheath.c.
+#ifndef SELDINGER_SOLVER_SHEATH_H
+#define SELDINGER_SOLVER_SHEATH_H
+
+#include "solver/beam_element.h"
+
+typedef struct SheathElement {       // the element across the mouth
+    double outside;          // [mm] l, rest length of the part outside, 0 < l
+    double axial_gradient;   // [N] derivative of the energy with the axial coordinate of the node inside
+    double twist_gradient;   // [N mm] … with its rotation about the line
+    Vec3 force2, moment2;    // gradients for the node outside
+    double energy;           // [mJ]
+    Vec3 chord, bow1, bow2;  // for the tangent
+    double inverse, tension, near, far;
+} SheathElement;
+
+// `index`: the element. `coordinate` [mm] of its inner node along the line, 0 at the mouth, negative inside (a little past the mouth
+// is allowed); q1 of that node (aligned with the line); x2, q2 of the outer one. Outside length = outside (see sheath_outside).
+void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction, double coordinate, Quat q1, Vec3 x2, Quat q2,
+                    double outside, SheathElement *element);
+// Rest length outside for a coordinate of the inner node, kept above a hundredth of the element.
+double sheath_outside(const BeamRest *rest, int index, double coordinate);
+
+// Tangent with the inner node's unknowns (axial displacement, rotation about the line) in places 0 and 3 of its block, the rest
+// of it zero: k11 and k22 to be added, k21 to be written.
+void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const SheathElement *element, double scale, BeamTangent *tangent);
+
+#endif

@@ -1,0 +1,79 @@
+// What step.c, step_assemble.c, step_detect.c and checkpoint.c share: the stepper's inside. Not for users of the solver.
+#ifndef SELDINGER_SOLVER_STEP_INTERNAL_H
+#define SELDINGER_SOLVER_STEP_INTERNAL_H
+
+#include "solver/beam_element.h"
+#include "solver/sheath.h"
+#include "solver/step.h"
+
+#include <stddef.h>
+
+typedef struct LoadPlace {
+    WireLoad load;
+    int node;                // shared by node and node + 1 …
+    double weight;           // … with weights 1 - weight and weight
+} LoadPlace;
+
+struct Stepper {
+    // given once
+    Wire wire;
+    BeamRest rest;
+    int load_count;
+    LoadPlace *load;
+    uint8_t *fixed;          // (M) DOF_ mask of the rig
+    Vec3 gravity;
+    double damping_mass, damping_stiffness, dt;
+    bool has_sheath;
+    Vec3 mouth;              // sheath's mouth, or the rig's start
+    Quat line;               // the frame there
+    Vec3 axis[3];            // its columns: direction, e2, e3
+    const Vessel *vessel;
+    double wall_friction;
+    ContactOptions contact;
+    int newton_max;
+    double newton_motion;
+
+    // what the next step depends on: see checkpoint.c
+    WireState state;         // arrays in `memory`; within a step the iterate
+    size_t memory_count;
+    double *memory;          // position, orientation, velocity, spin, force, clearance
+    Vec3 *force;             // (M) [N] of the wall on the node: warm start
+    double *clearance;       // (M) [mm] how far the node may travel before it could touch: not queried until then
+    VesselMemory *place;     // (M)
+
+    // scratch of a step
+    BlockChain chain;
+    BlockFactor *factor;
+    ContactSolver *solver;
+    ContactSet set;
+    BeamPose pose;
+    BeamStrain strain;
+    SheathElement mouth_element;
+    double *b, *u;           // (M, 6)
+    double *linearised;      // (M, 6) displacement from x_n to the iterate about which the system is linear
+    double *product;         // (M, 6)
+    double grip_diag[36], grip_lower[36], grip_b[6];     // rows of node 0 before its constraints
+    Vec3 *start_position;    // (M) x_n
+    Quat *start_orientation;
+    Vec3 *query_point;       // (M)
+    VesselMemory *query_place;
+    VesselHit *query_hit;
+    int *query_node;
+    double *scratch;         // owns the arrays of doubles
+
+    // of this step
+    int first_free;          // nodes before it are held by the sheath
+    StepCommand command;
+    StepReport report;
+    double fastest;          // [mm/ms] of the free nodes at x_n
+    bool has_failed;
+    bool is_iterate;         // linearised about something else than x_n
+};
+
+void stepper_detect(Stepper *s);
+void stepper_assemble(Stepper *s);
+double stepper_sheath_coordinate(const Stepper *s, int node);
+// [N] reaction on node 0 along (index 0 to 2) and about (3 to 5) the axes of its unknowns.
+double stepper_reaction(const Stepper *s, int dof);
+
+#endif

@@ -1,0 +1,400 @@
+// Laws of the beam element: no force at rest, force = -dE/dx, invariance, symmetry, tangent against the force's derivative.
+#include "solver/beam_element.h"
+#include "solver/sheath.h"
+#include "solver/wire.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+static uint64_t seed = 7;
+
+static double random_unit(void)          // in [-1, 1]
+{
+    seed = seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+    return (double)(seed >> 11) * 0x1p-52 - 1;
+}
+static Vec3 random_vec(double scale)
+{
+    double x = random_unit(), y = random_unit(), z = random_unit();
+    return vec3(scale * x, scale * y, scale * z);
+}
+
+typedef struct OneBeam {
+    WireSection section;
+    WireOptions options;
+    Wire wire;
+    BeamRest rest;
+    double array[BEAM_REST_ARRAYS];
+} OneBeam;
+
+// One element of the standard wire.
+static void make(OneBeam *beam, double length, double curvature, double plane)
+{
+    beam->section = (WireSection){.length = length, .diameter = 0.36, .young_modulus = 80e3, .poisson_ratio = 0.3, .density = 6.45e-3,
+                                  .rest_curvature = curvature, .rest_plane = plane};
+    beam->options = wire_default_options();
+    beam->options.elements = beam->options.section_count = 1;
+    beam->options.section = &beam->section;
+    char why[256];
+    assert_true(wire_create(&beam->wire, &beam->options, why, sizeof why));
+    double *a = beam->array;
+    beam->rest = (BeamRest){.length = a, .extend = a + 1, .axial = a + 2, .near = a + 3, .far = a + 4, .twist = a + 5, .half_w = a + 6,
+                            .half_y = a + 7, .half_z = a + 8, .curvature = a + 9, .bending = a + 10, .shear = a + 11};
+    wire_rest(&beam->wire, &beam->options, &beam->rest);
+    wire_destroy(&beam->wire);
+}
+
+static BeamInput input_of(const BeamRest *r)
+{
+    return (BeamInput){.length = r->length[0], .extend = r->extend[0], .axial = r->axial[0], .near = r->near[0], .far = r->far[0],
+                       .twist = r->twist[0], .half_w = r->half_w[0], .half_y = r->half_y[0], .half_z = r->half_z[0]};
+}
+
+// The exact rest arc, from the origin along +x, bent towards e2 turned by `plane`.
+static void at_rest(BeamInput *in, double length, double curvature, double plane)
+{
+    double angle = curvature * length;
+    Vec3 normal = vec3(0, cos(plane), sin(plane)), axis = vec3(0, -sin(plane), cos(plane));
+    in->x1 = vec3(0, 0, 0);
+    in->q1 = quat_identity();
+    in->q2 = quat_from_rotation_vector(vec3_scale(axis, angle));
+    in->x2 = curvature == 0 ? vec3(length, 0, 0)
+                            : vec3_add_scaled(vec3(sin(angle) / curvature, 0, 0), (1 - cos(angle)) / curvature, normal);
+}
+
+static void deform(BeamInput *in, double scale)
+{
+    in->x2 = vec3_add(in->x2, random_vec(scale * in->length));
+    in->q1 = quat_mul(quat_from_rotation_vector(random_vec(scale)), in->q1);
+    in->q2 = quat_mul(quat_from_rotation_vector(random_vec(scale)), in->q2);
+}
+
+static const struct Shape {
+    double length, curvature, plane;
+} shape[] = {{1.5, 0, 0}, {0.4, 0, 0}, {1.5, 0.1, 0}, {1.5, 0.3, 1.1}, {3, -0.4, -2.3}};
+enum { SHAPES = sizeof shape / sizeof *shape };
+
+static void no_force_at_rest(void **state)
+{
+    (void)state;
+    for (int k = 0; k < SHAPES; k++) {
+        OneBeam beam;
+        make(&beam, shape[k].length, shape[k].curvature, shape[k].plane);
+        BeamInput in = input_of(&beam.rest);
+        at_rest(&in, shape[k].length, shape[k].curvature, shape[k].plane);
+        BeamOutput out;
+        beam_element(&in, &out);
+        // EA/L is 5e3 to 2e4 N/mm: rounding of a length of 1 mm is 1e-12 N
+        assert_true(vec3_norm(out.force2) < 1e-10);
+        assert_true(vec3_norm(out.moment1) < 1e-10 && vec3_norm(out.moment2) < 1e-10);
+        assert_true(fabs(out.energy) < 1e-20);
+    }
+}
+
+static void force_is_minus_energy_gradient(void **state)
+{
+    (void)state;
+    for (int k = 0; k < SHAPES; k++)
+        for (int trial = 0; trial < 20; trial++) {
+            OneBeam beam;
+            make(&beam, shape[k].length, shape[k].curvature, shape[k].plane);
+            BeamInput in = input_of(&beam.rest);
+            at_rest(&in, shape[k].length, shape[k].curvature, shape[k].plane);
+            deform(&in, trial < 10 ? 0.05 : 0.4);
+            BeamOutput out;
+            beam_element(&in, &out);
+            Vec3 axis = vec3_unit(random_vec(1));
+            double h = 1e-5, scale = 1e-8 * (in.axial * in.length + in.near);
+            double expected[4] = {-vec3_dot(out.force2, axis), vec3_dot(out.force2, axis), vec3_dot(out.moment1, axis),
+                                  vec3_dot(out.moment2, axis)};
+            for (int dof = 0; dof < 4; dof++) {
+                double energy[2];
+                for (int side = 0; side < 2; side++) {
+                    BeamInput moved = in;
+                    Vec3 d = vec3_scale(axis, side ? h : -h);
+                    if (dof == 0)
+                        moved.x1 = vec3_add(moved.x1, d);
+                    if (dof == 1)
+                        moved.x2 = vec3_add(moved.x2, d);
+                    if (dof == 2)
+                        moved.q1 = quat_mul(quat_from_rotation_vector(d), moved.q1);
+                    if (dof == 3)
+                        moved.q2 = quat_mul(quat_from_rotation_vector(d), moved.q2);
+                    BeamOutput o;
+                    beam_element(&moved, &o);
+                    energy[side] = o.energy;
+                }
+                assert_true(fabs((energy[1] - energy[0]) / (2 * h) - expected[dof]) < scale);
+            }
+        }
+}
+
+static void rigid_motion_changes_nothing(void **state)
+{
+    (void)state;
+    for (int k = 0; k < SHAPES; k++) {
+        OneBeam beam;
+        make(&beam, shape[k].length, shape[k].curvature, shape[k].plane);
+        BeamInput in = input_of(&beam.rest);
+        at_rest(&in, shape[k].length, shape[k].curvature, shape[k].plane);
+        deform(&in, 0.01);
+        BeamOutput here, there;
+        beam_element(&in, &here);
+        Quat turn = quat_from_rotation_vector(random_vec(2));
+        BeamInput moved = in;
+        moved.x1 = vec3_add(quat_rotate(turn, in.x1), vec3(3, -2, 5));
+        moved.x2 = vec3_add(quat_rotate(turn, in.x2), vec3(3, -2, 5));
+        moved.q1 = quat_mul(turn, in.q1);
+        moved.q2 = quat_mul(turn, in.q2);
+        beam_element(&moved, &there);
+        double size = in.axial * in.length;
+        assert_true(fabs(there.energy - here.energy) < 1e-10 * here.energy);
+        assert_true(vec3_distance(there.force2, quat_rotate(turn, here.force2)) < 1e-12 * size);
+        assert_true(vec3_distance(there.moment1, quat_rotate(turn, here.moment1)) < 1e-12 * size);
+        assert_true(vec3_distance(there.moment2, quat_rotate(turn, here.moment2)) < 1e-12 * size);
+        // no resultant moment either: m1 + m2 + (x2 - x1) x f2 = 0
+        Vec3 sum = vec3_add(vec3_add(here.moment1, here.moment2), vec3_cross(vec3_sub(in.x2, in.x1), here.force2));
+        assert_true(vec3_norm(sum) < 1e-12 * size);
+    }
+}
+
+// The same beam seen from its other end (e1 reversed, turned about e3 by pi), and in the mirror z -> -z.
+static void reversed_and_mirrored(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        OneBeam beam;
+        make(&beam, shape[k].length, 0, 0);
+        BeamInput in = input_of(&beam.rest);
+        at_rest(&in, shape[k].length, 0, 0);
+        deform(&in, 0.2);
+        BeamOutput here, there;
+        beam_element(&in, &here);
+        BeamInput other = in;
+        Quat half_turn = {0, 0, 0, 1};
+        other.x1 = in.x2, other.x2 = in.x1;
+        other.q1 = quat_mul(in.q2, half_turn), other.q2 = quat_mul(in.q1, half_turn);
+        beam_element(&other, &there);
+        double size = 1e-12 * in.axial * in.length;
+        assert_true(fabs(there.energy - here.energy) < 1e-12 * here.energy);
+        assert_true(vec3_norm(vec3_add(there.force2, here.force2)) < size);
+        assert_true(vec3_distance(there.moment1, here.moment2) < size && vec3_distance(there.moment2, here.moment1) < size);
+
+        BeamInput mirror = in;
+        mirror.x1.z *= -1, mirror.x2.z *= -1;
+        mirror.q1 = (Quat){in.q1.w, -in.q1.x, -in.q1.y, in.q1.z};
+        mirror.q2 = (Quat){in.q2.w, -in.q2.x, -in.q2.y, in.q2.z};
+        beam_element(&mirror, &there);
+        assert_true(vec3_distance(there.force2, vec3(here.force2.x, here.force2.y, -here.force2.z)) < size);
+        assert_true(vec3_distance(there.moment1, vec3(-here.moment1.x, -here.moment1.y, here.moment1.z)) < size);
+    }
+}
+
+// Twist and constant curvature together are exact: the relative rotation of a helix' ends.
+static void twist_is_exact(void **state)
+{
+    (void)state;
+    OneBeam beam;
+    make(&beam, 1.5, 0, 0);
+    BeamInput in = input_of(&beam.rest);
+    at_rest(&in, 1.5, 0, 0);
+    for (double angle = 0.001; angle < 1.6; angle *= 2) {
+        in.q2 = quat_from_rotation_vector(vec3(angle, 0, 0));
+        BeamOutput out;
+        beam_element(&in, &out);
+        assert_true(fabs(out.moment2.x / (in.twist * angle) - 1) < 2e-7);
+        in.q1 = quat_identity();
+    }
+}
+
+// Central differences of the gradient; the tangent leaves out moments' share, so compare at rest, and under pure tension.
+static void tangent_is_the_derivative(void **state)
+{
+    (void)state;
+    for (int k = 0; k < SHAPES; k++) {
+        OneBeam beam;
+        make(&beam, shape[k].length, k < 2 ? shape[k].curvature : 0, shape[k].plane);
+        BeamInput in = input_of(&beam.rest);
+        at_rest(&in, shape[k].length, 0, 0);
+        if (k >= 2)
+            in.x2.x *= 1.01;
+        BeamOutput out;
+        beam_element(&in, &out);
+        BeamTangent t;
+        beam_tangent(out.chord, out.inverse, out.tension, out.bow1, out.bow2, in.length, in.axial, in.near, in.far, in.twist, 1, &t);
+        double h = 1e-6, largest = in.axial + in.near;
+        for (int dof = 0; dof < 12; dof++) {
+            double gradient[2][12];
+            for (int side = 0; side < 2; side++) {
+                BeamInput moved = in;
+                double step = side ? h : -h;
+                Vec3 d = vec3(dof % 3 == 0 ? step : 0, dof % 3 == 1 ? step : 0, dof % 3 == 2 ? step : 0);
+                Vec3 *x = dof < 6 ? &moved.x1 : &moved.x2;
+                Quat *q = dof < 6 ? &moved.q1 : &moved.q2;
+                if (dof % 6 < 3)
+                    *x = vec3_add(*x, d);
+                else
+                    *q = quat_mul(quat_from_rotation_vector(d), *q);
+                BeamOutput o;
+                beam_element(&moved, &o);
+                Vec3 g[4] = {vec3_negate(o.force2), o.moment1, o.force2, o.moment2};
+                for (int i = 0; i < 4; i++)
+                    gradient[side][3 * i] = g[i].x, gradient[side][3 * i + 1] = g[i].y, gradient[side][3 * i + 2] = g[i].z;
+            }
+            for (int row = 0; row < 12; row++) {
+                double number = (gradient[1][row] - gradient[0][row]) / (2 * h), closed;
+                if (row < 6 && dof < 6)
+                    closed = t.k11[row * 6 + dof];
+                else if (row >= 6 && dof >= 6)
+                    closed = t.k22[(row - 6) * 6 + dof - 6];
+                else
+                    closed = row >= 6 ? t.k21[(row - 6) * 6 + dof] : t.k21[(dof - 6) * 6 + row];
+                // under tension the chord is 1 % longer than L: the bow's share follows L
+                assert_true(fabs(number - closed) < (k < 2 ? 1e-6 : 2e-3) * largest);
+            }
+        }
+    }
+}
+
+// With bending the tangent is J' C J with J linearised: positive semi-definite, and the axial part exact to first order in the angles.
+static void tangent_is_positive(void **state)
+{
+    (void)state;
+    for (int trial = 0; trial < 100; trial++) {
+        OneBeam beam;
+        make(&beam, 1.5, 0.1, 0.3);
+        BeamInput in = input_of(&beam.rest);
+        at_rest(&in, 1.5, 0.1, 0.3);
+        deform(&in, 0.3);
+        BeamOutput out;
+        beam_element(&in, &out);
+        BeamTangent t;
+        beam_tangent(out.chord, out.inverse, out.tension, out.bow1, out.bow2, in.length, in.axial, in.near, in.far, in.twist, 1, &t);
+        double u[12], q = 0;
+        for (int i = 0; i < 12; i++)
+            u[i] = random_unit();
+        for (int i = 0; i < 6; i++)
+            for (int j = 0; j < 6; j++) {
+                q += u[i] * t.k11[i * 6 + j] * u[j] + u[6 + i] * t.k22[i * 6 + j] * u[6 + j] + 2 * u[6 + i] * t.k21[i * 6 + j] * u[j];
+                assert_true(fabs(t.k11[i * 6 + j] - t.k11[j * 6 + i]) < 1e-9 && fabs(t.k22[i * 6 + j] - t.k22[j * 6 + i]) < 1e-9);
+            }
+        assert_true(q > 0);
+    }
+}
+
+// Kernel = single element, whatever instruction set was picked.
+static void chain_equals_elements(void **state)
+{
+    (void)state;
+    enum { E = 23 };
+    static double rest_array[BEAM_REST_ARRAYS][E], pose_array[BEAM_POSE_ARRAYS][E + 1], strain_array[BEAM_STRAIN_ARRAYS][E];
+    BeamRest rest = {.length = rest_array[0], .extend = rest_array[1], .axial = rest_array[2], .near = rest_array[3], .far = rest_array[4],
+                     .twist = rest_array[5], .half_w = rest_array[6], .half_y = rest_array[7], .half_z = rest_array[8],
+                     .curvature = rest_array[9], .bending = rest_array[10], .shear = rest_array[11]};
+    BeamPose pose = {pose_array[0], pose_array[1], pose_array[2], pose_array[3], pose_array[4], pose_array[5], pose_array[6]};
+    BeamStrain s = {strain_array[0], strain_array[1], strain_array[2], strain_array[3], strain_array[4], strain_array[5], strain_array[6],
+                    strain_array[7], strain_array[8], strain_array[9], strain_array[10], strain_array[11], strain_array[12],
+                    strain_array[13], strain_array[14], strain_array[15], strain_array[16], strain_array[17], strain_array[18],
+                    strain_array[19], strain_array[20]};
+    WireSection section[2] = {{.length = 10, .diameter = 0.36, .young_modulus = 80e3, .poisson_ratio = 0.3, .density = 6.45e-3},
+                              {.length = 10, .diameter = 0.3, .young_modulus = 5e3, .poisson_ratio = 0.3, .density = 6.45e-3,
+                               .rest_curvature = 0.2, .rest_plane = 0.4}};
+    WireOptions options = wire_default_options();
+    options.elements = E;
+    options.section_count = 2;
+    options.section = section;
+    Wire wire;
+    char why[256];
+    assert_true(wire_create(&wire, &options, why, sizeof why));
+    wire_rest(&wire, &options, &rest);
+    for (int i = 0; i <= E; i++) {
+        Vec3 x = vec3_add(vec3(wire.s[i], 0, 0), random_vec(0.05));
+        Quat q = quat_from_rotation_vector(random_vec(0.2));
+        pose.x[i] = x.x, pose.y[i] = x.y, pose.z[i] = x.z;
+        pose.qw[i] = q.w, pose.qx[i] = q.x, pose.qy[i] = q.y, pose.qz[i] = q.z;
+    }
+    beam_chain_strain(&rest, &pose, 0, E, &s);
+    for (int i = 0; i < E; i++) {
+        BeamInput in = {.x1 = {pose.x[i], pose.y[i], pose.z[i]}, .x2 = {pose.x[i + 1], pose.y[i + 1], pose.z[i + 1]},
+                        .q1 = {pose.qw[i], pose.qx[i], pose.qy[i], pose.qz[i]},
+                        .q2 = {pose.qw[i + 1], pose.qx[i + 1], pose.qy[i + 1], pose.qz[i + 1]},
+                        .length = rest.length[i], .extend = rest.extend[i], .axial = rest.axial[i], .near = rest.near[i],
+                        .far = rest.far[i], .twist = rest.twist[i], .half_w = rest.half_w[i], .half_y = rest.half_y[i],
+                        .half_z = rest.half_z[i]};
+        BeamOutput out;
+        beam_element(&in, &out);
+        assert_true(out.energy == s.energy[i] && out.tension == s.tension[i] && out.inverse == s.inverse[i]);
+        assert_true(out.force2.x == s.fx[i] && out.force2.y == s.fy[i] && out.force2.z == s.fz[i]);
+        assert_true(out.moment1.x == s.m1x[i] && out.moment1.y == s.m1y[i] && out.moment1.z == s.m1z[i]);
+        assert_true(out.moment2.x == s.m2x[i] && out.moment2.y == s.m2y[i] && out.moment2.z == s.m2z[i]);
+        assert_true(out.bow1.x == s.b1x[i] && out.bow2.z == s.b2z[i] && out.chord.y == s.ey[i]);
+    }
+    wire_destroy(&wire);
+}
+
+static SheathElement across(const BeamRest *rest, double coordinate, Quat q1, Vec3 x2, Quat q2)
+{
+    SheathElement e;
+    sheath_element(rest, 0, vec3(0, 0, 0), vec3(1, 0, 0), coordinate, q1, x2, q2, sheath_outside(rest, 0, coordinate), &e);
+    return e;
+}
+
+static void sheath_gradient(void **state)
+{
+    (void)state;
+    for (int k = 0; k < SHAPES; k++)
+        for (int trial = 0; trial < 10; trial++) {
+            OneBeam beam;
+            make(&beam, shape[k].length, shape[k].curvature, shape[k].plane);
+            double length = shape[k].length, a = -length * (0.05 + 0.09 * trial), outside = length + a;
+            Quat q1 = quat_from_rotation_vector(vec3(0.3, 0, 0)), q2 = quat_from_rotation_vector(vec3_add(vec3(0.3, 0, 0), random_vec(0.2)));
+            Vec3 x2 = vec3_add(vec3(outside, 0, 0), random_vec(0.1 * outside));
+            SheathElement e = across(&beam.rest, a, q1, x2, q2);
+            double h = 1e-6, scale = 1e-6 * (beam.rest.axial[0] * length + beam.rest.bending[0] / outside);
+            double number = (across(&beam.rest, a + h, q1, x2, q2).energy - across(&beam.rest, a - h, q1, x2, q2).energy) / (2 * h);
+            assert_true(fabs(number - e.axial_gradient) < scale);
+            Quat ahead = quat_from_rotation_vector(vec3(h, 0, 0)), back = quat_conjugate(ahead);
+            number = (across(&beam.rest, a, quat_mul(ahead, q1), x2, q2).energy - across(&beam.rest, a, quat_mul(back, q1), x2, q2).energy) / (2 * h);
+            assert_true(fabs(number - e.twist_gradient) < scale);
+            Vec3 d = random_vec(h);
+            number = across(&beam.rest, a, q1, vec3_add(x2, d), q2).energy - across(&beam.rest, a, q1, vec3_sub(x2, d), q2).energy;
+            assert_true(fabs(number / 2 - vec3_dot(e.force2, d)) < scale * h);
+        }
+}
+
+// At l = L the element across the mouth is the ordinary one. It takes the arc's length from sine and cosine, the other from its own
+// polynomial: 1e-9 of the bow apart at the last shape's 0.6 rad, that is 1e-10 mm of an extension of 0.1 mm.
+static void sheath_joins_the_chain(void **state)
+{
+    (void)state;
+    for (int k = 0; k < SHAPES; k++) {
+        OneBeam beam;
+        make(&beam, shape[k].length, shape[k].curvature, shape[k].plane);
+        BeamInput in = input_of(&beam.rest);
+        at_rest(&in, shape[k].length, shape[k].curvature, shape[k].plane);
+        in.q1 = quat_from_rotation_vector(vec3(0.2, 0, 0));
+        in.x2 = vec3_add(in.x2, random_vec(0.1));
+        BeamOutput out;
+        beam_element(&in, &out);
+        SheathElement e = across(&beam.rest, 0, in.q1, in.x2, in.q2);
+        assert_true(fabs(e.energy - out.energy) < 1e-7 * out.energy);
+        assert_true(vec3_distance(e.force2, out.force2) < 1e-7 * vec3_norm(out.force2));
+        assert_true(vec3_distance(e.moment2, out.moment2) < 1e-7 * vec3_norm(out.moment2));
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(no_force_at_rest),          cmocka_unit_test(force_is_minus_energy_gradient),
+        cmocka_unit_test(rigid_motion_changes_nothing), cmocka_unit_test(reversed_and_mirrored),
+        cmocka_unit_test(twist_is_exact),            cmocka_unit_test(tangent_is_the_derivative),
+        cmocka_unit_test(tangent_is_positive),       cmocka_unit_test(chain_equals_elements),
+        cmocka_unit_test(sheath_gradient),           cmocka_unit_test(sheath_joins_the_chain),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
