@@ -17,7 +17,7 @@ enum { NEAR_CAPACITY = 256, GUARD_ANGLES = 12, GUARD_NODES = 6, SPHERE_DIRECTION
 
 LimFitOptions lim_fit_default_options(void)
 {
-    return (LimFitOptions){.alpha = 1e-5, .beta = 1e-4, .s = 2, .iso_level = 0.1, .max_blobs = 100, .target_mm = 0, .topological_distance = 2,
+    return (LimFitOptions){.alpha = 0, .beta = 1e-4, .s = 2, .iso_level = 0.1, .max_blobs = 100, .target_mm = 0, .topological_distance = 2,
                            .max_loops = 2, .line_searches = 4, .voxel_mm = 0.2, .weigh_distance = true, .project_points = true,
                            .sweep_all_blobs = true, .give_up_splits = 3, .extend_inlet = true, .guard_shape = true, .max_points = 1500};
 }
@@ -25,6 +25,7 @@ LimFitOptions lim_fit_default_options(void)
 LimFitOptions lim_fit_paper_options(void)
 {
     LimFitOptions options = lim_fit_default_options();
+    options.alpha = 1e-5;
     options.beta = 1e-3;
     options.target_mm = 0.3;
     options.max_loops = 5;
@@ -165,6 +166,13 @@ static bool gather_points(const VesselTree *tree, int node, const LimFitOptions 
         has_root = has_root || from == 0;
         for (int64_t i = tree->point_offset[from]; i < tree->point_offset[from + 1]; i++)
             if (vec3_distance(tree->point[i], center) < gather->reach && !add_point(gather, tree->point[i]))
+                return false;
+    }
+    // a sac's or branch's mouth may reach into this node's cell from a node further along the tree
+    for (int k = gather->own_count; k < gather->near_count && options->guard_shape; k++) {
+        int from = gather->near[k].node;
+        for (int64_t i = tree->point_offset[from]; i < tree->point_offset[from + 1]; i++)
+            if (vec3_distance(tree->point[i], center) < 1.7 * tree->radius[node] && !add_point(gather, tree->point[i]))
                 return false;
     }
     if (has_root && options->extend_inlet && tree->kind[0] == NODE_VESSEL && !extend_inlet(tree, gather, center))

@@ -11,7 +11,7 @@
 
 typedef struct LimFitOptions {
     // Table 1 of the paper by name
-    double alpha;            // weight of the Lennard-Jones cohesion E_c, 1e-5
+    double alpha;            // weight of the Lennard-Jones cohesion E_c; paper 1e-5, default 0: its repulsion kills twins
     double beta;             // weight of the curvature E_a [mm^4]; paper 1e-3, default 1e-4
     double s;                // repulsive distance of E_c in widths, 2
     double iso_level;        // T, 0.1

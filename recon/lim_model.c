@@ -30,6 +30,7 @@ typedef struct Fit {
     int capacity;
     double beta, target;     // beta for this radius; t_g [mm]
     double mean_slope;       // mean |grad f| at the data
+    double alpha;            // weight of E_c at the moment
     float *distance;         // (padded) Taubin's
     float *column;           // (SWEEP_SIZE, padded) of the Gauss-Newton pass
     float *residual;         // (padded)
@@ -147,10 +148,10 @@ static Trial evaluate(Fit *fit, int j, LimBlob blob)
     double cohesion[4];
     fit->model.blob[j] = blob;
     Trial trial = {.energy = part.distance + fit->beta * part.bend +
-                             fit->options->alpha * lim_cohesion(fit->model.blob, fit->model.count, j, fit->options->s, cohesion)};
+                             fit->alpha * lim_cohesion(fit->model.blob, fit->model.count, j, fit->options->s, cohesion)};
     fit->model.blob[j] = kept;
     for (int k = 0; k < 4; k++)
-        trial.slope[k] = part.distance_slope[k] + fit->beta * part.bend_slope[k] + fit->options->alpha * cohesion[k];
+        trial.slope[k] = part.distance_slope[k] + fit->beta * part.bend_slope[k] + fit->alpha * cohesion[k];
     if (!isfinite(trial.energy))
         trial.energy = HUGE_VAL;
     return trial;
@@ -253,7 +254,11 @@ static void optimise_blob(Fit *fit, int j)
 {
     lim_points_add(&fit->points, &fit->model.blob[j], -1);
     for (int loop = 0; loop < fit->options->max_loops; loop++) {
+        fit->alpha = fit->options->alpha;
         descend(fit, j, 0, fit->options->line_searches);
+        // a width would shrink to nothing under the repulsion of its twin: there E_c moves centres only
+        if (fit->options->sweep_all_blobs)
+            fit->alpha = 0;
         descend(fit, j, 3, fit->options->line_searches);
     }
     lim_points_add(&fit->points, &fit->model.blob[j], 1);
@@ -265,7 +270,7 @@ static double total_energy(Fit *fit)
 {
     double distance, bend;
     lim_energy_total(&fit->points, &distance, &bend);
-    double energy = distance + fit->beta * bend + fit->options->alpha * lim_cohesion_total(fit->model.blob, fit->model.count, fit->options->s);
+    double energy = distance + fit->beta * bend + fit->alpha * lim_cohesion_total(fit->model.blob, fit->model.count, fit->options->s);
     return isfinite(energy) ? energy : HUGE_VAL;
 }
 
@@ -294,7 +299,7 @@ static void build_normal(Fit *fit, const int *which, int count, double *side)
             lim_points_add(&fit->points, blob, 1);
         }
         for (int k = 0; k < 4; k++) {
-            double slope = 0.5 * (fit->beta * part.bend_slope[k] + fit->options->alpha * cohesion[k]);
+            double slope = 0.5 * (fit->beta * part.bend_slope[k] + fit->alpha * cohesion[k]);
             side[4 * m + k] -= slope;
             fit->normal[(4 * m + k) * SWEEP_SIZE + 4 * m + k] += fabs(slope) / (0.33 * blob->width);
         }
@@ -501,6 +506,50 @@ static void split_blob(Fit *fit, int j, Vec3 p)
     new->center[2] += shift.z;
 }
 
+// Keeps blob j and adds a new one three quarters of the way to p, just wide enough to bring the surface there. For points far outside
+// (a branch that the model has not seen yet) the split alone stays: the field is flat there and does not pull.
+static void reach_out(Fit *fit, int j, Vec3 p, double lack)
+{
+    const LimBlob *old = &fit->model.blob[j];
+    LimBlob *new = &fit->model.blob[fit->model.count++];
+    Vec3 from = vec3(old->center[0], old->center[1], old->center[2]), c = vec3_mix(from, p, 0.75);
+    double d2 = vec3_norm2(vec3_sub(p, c)), low = lack, high = fmax(old->width, 2 * lack);
+    for (int i = 0; i < 40; i++) {   // rho phi(d / rho) = lack
+        double rho = 0.5 * (low + high), u = 1 / (1 + d2 / (5 * rho * rho));
+        if (rho * u * u < lack)
+            low = rho;
+        else
+            high = rho;
+    }
+    *new = (LimBlob){{c.x, c.y, c.z}, 0.5 * (low + high)};
+}
+
+// One more blob for the worst point: the paper's split, and where the point is far outside also a blob of its own; the better one stays.
+static void add_blob(Fit *fit, int worst, double worst_distance)
+{
+    Vec3 p = point_of(fit, worst);
+    double lack = -(double)fit->points.f[worst];
+    int j = select_blob(fit, p), count = fit->model.count;
+    LimBlob before = fit->model.blob[j], split_old, split_new;
+    split_blob(fit, j, p);
+    fit_refresh_sums(fit);
+    optimise_blob(fit, count);
+    if (!fit->options->sweep_all_blobs || lack <= 0 || worst_distance < 3 * fit->target)
+        return;
+    double energy = total_energy(fit);
+    split_old = fit->model.blob[j];
+    split_new = fit->model.blob[count];
+    fit->model.blob[j] = before;
+    fit->model.count = count;
+    reach_out(fit, j, p, lack);
+    fit_refresh_sums(fit);
+    optimise_blob(fit, count);
+    if (total_energy(fit) > energy) {
+        fit->model.blob[j] = split_old;
+        fit->model.blob[count] = split_new;
+    }
+}
+
 // --- The fit ---
 
 static void start_model(Fit *fit)
@@ -587,10 +636,7 @@ static void fit_run(Fit *fit)
         }
         if (reached || fit->model.count >= options->max_blobs || (options->give_up_splits > 0 && idle >= options->give_up_splits))
             break;
-        Vec3 p = point_of(fit, worst);
-        split_blob(fit, select_blob(fit, p), p);
-        fit_refresh_sums(fit);
-        optimise_blob(fit, fit->model.count - 1);
+        add_blob(fit, worst, worst_distance);
         optimise_all(fit, fit->model.count - 1, 3);
     }
     copy_model(&fit->model, &fit->best);
