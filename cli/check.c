@@ -292,8 +292,11 @@ int verb_check(int argc, char **argv)
         return code;
     faults_clear(&faults);
     gather(argc, argv, &options, &list, &faults);
-    if (list.count == 0 && faults.count == 0)
-        fprintf(stderr, "seldinger check: no scene with a golden tool path below what was given\n");
+    if (list.count == 0 && faults.count == 0) {
+        // a check that checks nothing has not passed
+        fprintf(stderr, "seldinger check: no scene with a golden tool path below what was given; `--update` with a scene makes one\n");
+        worst = EXIT_BAD_INPUT;
+    }
     if (list.count > 0 && !options.quiet && !options.update)
         printf("%-44s %-9s %12s  %9s %5s %12s\n", "scene", "", "worst mm", "first s", "node", "by mm");
     for (int i = 0; i < list.count; i++) {

@@ -38,7 +38,7 @@ Script *script_parse(const char *text, size_t length, const char *file, Faults *
     if (!script || !script->row)
         faults_add(faults, file, 0, 0, "no memory for its rows");
     else if (table->row_count == 0)
-        faults_add(faults, file, 0, 0, "has no row; at least one '%s', the last row's time ends the script", header);
+        faults_add(faults, file, 1, 1, "has no row; at least one '%s', the last row's time ends the script", header);
     else
         for (int i = 0; i < table->row_count; i++) {
             const double *value = table->value + (size_t)i * 3;

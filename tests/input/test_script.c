@@ -1,0 +1,130 @@
+// Scripts: parsing, sampling, and what is wrong with broken ones, each fault at its place.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "input/input.h"
+#include "input/number_table.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+// cmocka's own compares in single precision
+#define assert_near(a, b, tolerance) assert_true(fabs((a) - (b)) <= (tolerance))
+
+static Faults faults;
+
+static Script *parse(const char *text)
+{
+    faults_clear(&faults);
+    return script_parse(text, strlen(text), "s.csv", &faults);
+}
+
+static void rows_hold_until_the_next(void **state)
+{
+    (void)state;
+    Script *script = parse("# push, rest, turn\n\nt_s, push_mm_s ,twist_deg_s\n0.5,20,0\r\n1,0,0 \n1.5,-10,90\n2,7,7");
+    assert_non_null(script);
+    assert_int_equal(script->count, 4);
+    assert_near(script_duration_s(script), 2, 0);
+    int cursor = 0;
+    const double time[] = {0, 0.499, 0.5, 0.999, 1, 1.499, 1.5, 1.999, 2, 100, 0.7};
+    const double push[] = {0, 0, 20, 20, 0, 0, -10, -10, 0, 0, 20};
+    for (size_t i = 0; i < sizeof time / sizeof *time; i++)
+        assert_near(script_at(script, time[i], &cursor).push_mm_s, push[i], 0);
+    assert_near(script_at(script, 1.7, &cursor).twist_deg_s, 90, 0);
+    script_free(script);
+}
+
+static void every_millisecond_finds_its_row(void **state)
+{
+    (void)state;
+    // a row at each millisecond: sampling on step times n/1000 must meet each of them exactly
+    static char text[200000];
+    size_t used = (size_t)sprintf(text, "t_s,push_mm_s,twist_deg_s\n");
+    for (int i = 0; i <= 5000; i++)
+        used += (size_t)sprintf(text + used, "%d.%03d,%d,0\n", i / 1000, i % 1000, i % 900);
+    Script *script = parse(text);
+    assert_non_null(script);
+    int cursor = 0;
+    for (int i = 0; i < 5000; i++)
+        assert_near(script_at(script, (double)i * 1.0 / 1000, &cursor).push_mm_s, i % 900, 0);
+    script_free(script);
+}
+
+static void expect_fault(const char *text, const char *place, const char *words)
+{
+    Script *script = parse(text);
+    char start[64];
+    snprintf(start, sizeof start, "s.csv:%s: ", place);
+    if (script || faults.count != 1 || strncmp(faults.text[0], start, strlen(start)) || !strstr(faults.text[0], words))
+        fail_msg("<<%s>> gave %d faults, the first '%s'; expected %s … %s", text, faults.count, faults.count ? faults.text[0] : "", place, words);
+}
+
+#define HEADER "t_s,push_mm_s,twist_deg_s\n"
+static void each_fault_has_its_place(void **state)
+{
+    (void)state;
+    expect_fault("", "1:1", "empty");
+    expect_fault("# nothing\n\n", "2:1", "empty");
+    expect_fault(HEADER, "1:1", "no row");
+    expect_fault("t_ms,push_mm_s,twist_deg_s\n0,1,1\n", "1:1", "t_s,push_mm_s,twist_deg_s");
+    expect_fault("t_s,push_cm_s,twist_deg_s\n0,1,1\n", "1:5", "push_mm_s");
+    expect_fault("t_s,push_mm_s\n0,1\n", "1:14", "twist_deg_s");
+    expect_fault("t_s,push_mm_s,twist_deg_s,x\n0,1,1,1\n", "1:27", "twist_deg_s");
+    expect_fault(HEADER "0,1\n1,0,0\n", "2:1", "2 fields");
+    expect_fault(HEADER "0,1,0\n1,fast,0\n", "3:3", "'fast'");
+    expect_fault(HEADER "0,1,nan\n1,0,0\n", "2:5", "'nan'");
+    expect_fault(HEADER "0,1,0x10\n1,0,0\n", "2:5", "0x10");
+    expect_fault(HEADER "0,1,1e999\n1,0,0\n", "2:5", "1e999");
+    expect_fault(HEADER "0,1,0\n2,1,0\n1,0,0\n", "4:1", "does not follow 2");
+    expect_fault(HEADER "0,1,0\n0,1,0\n", "3:1", "grow");
+    expect_fault(HEADER "-1,1,0\n0,1,0\n", "2:1", "negative");
+    expect_fault(HEADER "0,1001,0\n1,0,0\n", "2:1", "push_mm_s");
+    expect_fault(HEADER "0,1,-36001\n1,0,0\n", "2:1", "twist_deg_s");
+    expect_fault(HEADER "0,1,0\n1e6,0,0\n", "3:1", "too late");
+}
+
+static void all_faults_come_in_one_pass(void **state)
+{
+    (void)state;
+    assert_null(parse(HEADER "0,x,y\n1\n2,3,z\n"));
+    assert_int_equal(faults.count, 4);
+    assert_null(parse(HEADER "5,2000,0\n4,0,40000\n3,0,0\n"));
+    assert_int_equal(faults.count, 4);
+}
+
+static void a_file_that_is_none_is_said(void **state)
+{
+    (void)state;
+    faults_clear(&faults);
+    assert_null(script_load("/nowhere/s.csv", &faults));
+    assert_null(script_load("/dev/zero", &faults));
+    assert_null(script_load("/", &faults));
+    assert_int_equal(faults.count, 3);
+    assert_non_null(strstr(faults.text[0], "/nowhere/s.csv"));
+}
+
+static void numbers_are_decimal_and_finite(void **state)
+{
+    (void)state;
+    double value;
+    const char *good[] = {"1", "-1.5", "+2", ".5", "5.", "1e3", "1E-3"}, *bad[] = {"", " 1", "1 ", "1.2.3", "e5", "-", "0x1", "inf", "1e400", "1,5", "--1"};
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++)
+        assert_true(number_of_text(good[i], strlen(good[i]), &value));
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        assert_false(number_of_text(bad[i], strlen(bad[i]), &value));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(rows_hold_until_the_next),    cmocka_unit_test(every_millisecond_finds_its_row), cmocka_unit_test(each_fault_has_its_place),
+        cmocka_unit_test(all_faults_come_in_one_pass), cmocka_unit_test(a_file_that_is_none_is_said),     cmocka_unit_test(numbers_are_decimal_and_finite),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,305 @@
+// Scenes: units, defaults, and what is wrong with broken ones, each fault at its line and column, all of a file in one pass.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "sim/scene.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+// cmocka's own compares in single precision
+#define assert_near(a, b, tolerance) assert_true(fabs((a) - (b)) <= (tolerance))
+
+#define VERSION "seldinger: 1\n"
+#define WIRE "wire: {sections: [{length_mm: 100, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
+#define SHEATH "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n"
+#define WHOLE VERSION WIRE SHEATH       // three lines; a case adds its own from line 4
+
+static Faults faults;
+
+static Scene *parse(const char *text)
+{
+    faults_clear(&faults);
+    return scene_parse(text, strlen(text), "x.yaml", &faults);
+}
+
+static Scene *good(const char *text)
+{
+    Scene *scene = parse(text);
+    if (!scene)
+        fail_msg("refused: %s", faults.text[0]);
+    return scene;
+}
+
+static void units_are_converted_once(void **state)
+{
+    (void)state;
+    char path[] = SOURCE_DIR "/tests/fuzz/corpus/scene/full.yaml";
+    faults_clear(&faults);
+    Scene *scene = scene_load(path, &faults);
+    assert_non_null(scene);
+    const WireSection *shaft = &scene->wire.section[0], *tip = &scene->wire.section[1];
+    assert_near(shaft->young_modulus, 80000, 1e-9);
+    assert_near(shaft->density, 6.45e-3, 1e-15);
+    assert_near(shaft->friction, -1, 0);
+    assert_near(tip->rest_curvature, 0.1, 0);
+    assert_near(tip->friction, 0.02, 0);
+    assert_near(scene->wire.damping_mass, 0.1e-3, 1e-18);
+    assert_near(scene->wire.damping_stiffness, 0.2, 1e-15);
+    assert_near(scene->wire.load[0].ramp, 500, 0);
+    assert_near(scene->wire.load[0].s, 300, 0);
+    assert_int_equal(scene->wire.fix[0].dof, DOF_ALL);
+    assert_int_equal(scene->wire.fix[1].dof, DOF_X | DOF_RY);
+    assert_near(scene->tube.piece[1].angle, PI / 2, 1e-15);
+    assert_near(scene->script->row[0].command.push_mm_s, 20, 0);
+    assert_int_equal(scene->source, SOURCE_TUBE);
+    assert_int_equal(scene->contact, CONTACT_TUBE);
+    assert_near(scene->friction, 0.04, 0);
+    assert_true(scene->wire.has_sheath);
+    assert_string_equal(scene->target[0].name, "aneurysm");
+    scene_free(scene);
+    // gravity: 9.81 m/s2 is 0.00981 mm/ms2; falling 0.1 s from rest by g t^2 / 2 is 49.05 mm
+    scene = good(VERSION WIRE "rig: {gravity_m_s2: [0, 0, -9.81]}\n");
+    assert_near(0.5 * scene->wire.gravity.z * 100 * 100, -49.05, 1e-9);
+    scene_free(scene);
+}
+
+static void what_is_not_said_has_its_default(void **state)
+{
+    (void)state;
+    Scene *scene = good(WHOLE);
+    assert_int_equal(scene->wire.elements, 200);
+    assert_int_equal(scene->source, SOURCE_NONE);
+    assert_near(scene->wire.section[0].poisson_ratio, 0.3, 0);
+    assert_near(scene->wire.section[0].density, 6.45e-3, 1e-18);
+    assert_near(scene->wire.damping_stiffness, 0, 0);
+    assert_near(scene->friction, 0, 0);
+    assert_near(scene->dt, 1, 0);
+    assert_int_equal(scene->contact_options.max_iterations, 200);
+    assert_near(scene->contact_options.tolerance, 1e-6, 0);
+    assert_null(scene->script);
+    scene_free(scene);
+    scene = good(VERSION WIRE "sheath: {inlet: root}\nvessel: {model: m/a.h5}\n");
+    assert_true(scene->inlet_is_root);
+    assert_string_equal(scene->model_path, "m/a.h5");
+    assert_int_equal(scene->contact, CONTACT_LIM);
+    scene_free(scene);
+    scene = good(VERSION WIRE "rig: {start_mm: [1, 2, 3], direction: [0, 0, 5], normal: [1, 0, 0]}\n");
+    assert_false(scene->wire.has_sheath);
+    assert_near(scene->wire.direction.z, 1, 0);
+    assert_near(scene->wire.normal.x, 1, 0);
+    scene_free(scene);
+    scene = good(WHOLE "vessel: {shape: {name: spiral, points: 300, seed: 2}}\n");
+    assert_string_equal(scene->shape_name, "spiral");
+    assert_int_equal(scene->shape_option_count, 2);
+    assert_string_equal(scene->shape_option[0][0], "points");
+    assert_string_equal(scene->shape_option[0][1], "300");
+    scene_free(scene);
+}
+
+static void the_contracts_example_with_sheath_and_rig_is_good(void **state)
+{
+    (void)state;
+    Scene *scene = good(VERSION WIRE SHEATH "rig:\n  start_mm: [9, 9, 9]\n  direction: [0, 1, 0]\n  fix: [{s_mm: 0, dof: all}]\n");
+    // the sheath says where the wire starts; the rig's fixes stay
+    assert_near(scene->wire.start.x, 0, 0);
+    assert_near(scene->wire.direction.x, 1, 0);
+    assert_int_equal(scene->wire.fix_count, 1);
+    scene_free(scene);
+}
+
+typedef struct Broken {
+    const char *text, *place, *words;
+} Broken;
+
+#define SECTION(extra) VERSION SHEATH "wire:\n  sections:\n    - {length_mm: 100, diameter_mm: 0.36, young_modulus_gpa: 80, " extra "}\n"
+#define TUBE(inner) WHOLE "vessel:\n  tube: {" inner "}\n"
+#define RIG(inner) VERSION WIRE "rig: {" inner "}\n"
+
+static const Broken broken[] = {
+    // YAML itself
+    {"", "1:1", "seldinger: 1"},
+    {"seldinger: [1\n", "2:1", "not YAML"},
+    {"seldinger: 1\n\tx: 1\n", "2:1", "not YAML"},
+    {"\xff\xfe\xfd", "1:1", "not YAML"},
+    {WHOLE "---\na: 1\n", "4:1", "second document"},
+    {"- 1\n- 2\n", "1:1", "no map"},
+    {"hello\n", "1:1", "no map"},
+    // keys
+    {WIRE SHEATH, "1:1", "lacks the key 'seldinger'"},
+    {"seldinger: 2\n" WIRE SHEATH, "1:12", "whole number from 1 to 1"},
+    {WHOLE "vesel: {}\n", "4:1", "did you mean 'vessel'"},
+    {WHOLE "banana: 3\n", "4:1", "valid: seldinger, vessel, wire"},
+    {WHOLE "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n", "4:1", "second time"},
+    {VERSION SHEATH, "1:1", "lacks the key 'wire'"},
+    {VERSION WIRE, "1:1", "neither 'sheath' nor 'rig'"},
+    {VERSION SHEATH "wire: {elements: 10}\n", "3:7", "lacks the key 'sections'"},
+    // wrong units
+    {VERSION SHEATH "wire:\n  sections:\n    - {length_m: 0.1, length_mm: 100, diameter_mm: 0.36, young_modulus_gpa: 80}\n", "5:8", "it is 'length_mm'"},
+    {SECTION("inner_diameter_cm: 0"), "5:66", "it is 'inner_diameter_mm'"},
+    {SECTION("density_kg_m3: 6450"), "5:66", "it is 'density_g_cm3'"},
+    {SECTION("density: 6.45"), "5:66", "lacks its unit; it is 'density_g_cm3'"},
+    {SECTION("rest_curvature_1_m: 100"), "5:66", "it is 'rest_curvature_1_mm'"},
+    {SECTION("poisson_ratio_percent: 30"), "5:66", "unit too many"},
+    {WHOLE "simulation: {step_s: 0.001}\n", "4:14", "it is 'step_ms'"},
+    {RIG("gravity_mm_s2: [0, 0, -9810]"), "3:7", "it is 'gravity_m_s2'"},
+    // wrong type
+    {SECTION("friction: high"), "5:76", "not a number"},
+    {SECTION("friction: 5 mm"), "5:76", "not a number"},
+    {SECTION("friction: [1]"), "5:76", "is a list"},
+    {SECTION("friction: .inf"), "5:76", "not a number"},
+    {VERSION SHEATH "wire: {elements: 12.5, sections: [{length_mm: 1, diameter_mm: 1, young_modulus_gpa: 1}]}\n", "3:18", "whole number"},
+    {VERSION SHEATH "wire: {sections: 5}\n", "3:18", "no list"},
+    {VERSION SHEATH "wire: {sections: []}\n", "3:18", "0 entries"},
+    {VERSION WIRE "sheath: {entry_mm: [0, 0], direction: [1, 0, 0]}\n", "3:20", "2 entries; 3 to 3"},
+    {VERSION WIRE "sheath: {entry_mm: 0, direction: [1, 0, 0]}\n", "3:20", "[x, y, z]"},
+    {WHOLE "vessel: 7\n", "4:9", "no map"},
+    {RIG("loads: [{s_mm: 0, force_n: [0, 0, 1], follower: maybe}]"), "3:55", "one of: false, true"},
+    // out of range
+    {VERSION SHEATH "wire: {elements: 0, sections: [{length_mm: 1, diameter_mm: 1, young_modulus_gpa: 1}]}\n", "3:18", "from 1 to 10000"},
+    {VERSION SHEATH "wire: {elements: 100000, sections: [{length_mm: 1, diameter_mm: 1, young_modulus_gpa: 1}]}\n", "3:18", "from 1 to 10000"},
+    {VERSION SHEATH "wire: {sections: [{length_mm: 0, diameter_mm: 1, young_modulus_gpa: 1}]}\n", "3:31", "above 0"},
+    {VERSION SHEATH "wire: {sections: [{length_mm: 1, diameter_mm: -1, young_modulus_gpa: 1}]}\n", "3:47", "above 0"},
+    {SECTION("poisson_ratio: 0.6"), "5:81", "out of range"},
+    {SECTION("inner_diameter_mm: 0.36"), "5:85", "not below 'diameter_mm'"},
+    {SECTION("friction: -0.1"), "5:76", "out of range"},
+    {VERSION WIRE "sheath: {entry_mm: [0, 0, 0], direction: [0, 0, 0]}\n", "3:42", "no length"},
+    {VERSION WIRE "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], normal: [2, 0, 0]}\n", "3:61", "lies along"},
+    {VERSION WIRE "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 101}\n", "3:66", "at most 100"},
+    {WHOLE "simulation: {step_ms: 0}\n", "4:23", "out of range"},
+    {WHOLE "simulation: {contact_iterations: 0}\n", "4:34", "whole number"},
+    {WHOLE "simulation: {contact_tolerance: -1}\n", "4:33", "out of range"},
+    {WHOLE "targets: [{name: a, point_mm: [0, 0, 0], radius_mm: 0}]\n", "4:53", "above 0"},
+    {RIG("fix: [{s_mm: 200, dof: all}]"), "3:20", "at most 100"},
+    {RIG("fix: [{s_mm: 0, dof: [x, w]}]"), "3:32", "one of: x, y, z"},
+    {RIG("loads: [{s_mm: end}]"), "3:15", "neither 'force_n'"},
+    // vessel
+    {WHOLE "vessel: {friction: 0.1}\n", "4:9", "exactly one of model, shape, tube, plane"},
+    {WHOLE "vessel: {model: a.h5, plane: {normal: [0, 0, 1]}}\n", "4:30", "second source"},
+    {WHOLE "vessel: {model: a.h5, friction: -1}\n", "4:33", "out of range"},
+    {WHOLE "vessel: {model: a.h5, contact: wall}\n", "4:32", "one of: lim, mesh, tube"},
+    {WHOLE "vessel: {model: a.h5, contact: tube}\n", "4:32", "needs the source 'tube'"},
+    {WHOLE "vessel: {shape: {points: 3}}\n", "4:17", "lacks the key 'name'"},
+    {WHOLE "vessel: {plane: {point_mm: [0, 0, 0]}}\n", "4:17", "lacks the key 'normal'"},
+    {TUBE("radius_mm: 0, path: [{line_mm: 10}]"), "5:21", "above 0"},
+    {TUBE("path: [{line_mm: 10}]"), "5:9", "lacks the key 'radius_mm'"},
+    {TUBE("radius_mm: 1"), "5:9", "one of 'path'"},
+    {TUBE("radius_mm: 1, path: [{line_mm: 10, arc: {radius_mm: 5, angle_deg: 90}}]"), "5:31", "either {line_mm"},
+    {TUBE("radius_mm: 1, path: [{arc: {radius_mm: 0.5, angle_deg: 90}}]"), "5:31", "tighter than the lumen"},
+    {TUBE("radius_mm: 1, path: [{line_mm: -10}]"), "5:41", "above 0"},
+    {TUBE("radius_mm: 1, path: [{line_mm: 10}], ends: ajar"), "5:52", "one of: open, closed"},
+    {VERSION WIRE "sheath: {inserted_mm: 0}\n", "3:9", "inlet: root"},
+    {VERSION WIRE "sheath: {inlet: root}\n", "3:17", "needs a vessel"},
+    {VERSION WIRE "sheath: {entry_mm: [0, 0, 0]}\n", "3:9", "lacks the key 'direction'"},
+    // script
+    {WHOLE "script: [{t_s: 0, push_mm_s: 5}, {t_s: 0}]\n", "4:34", "does not follow"},
+    {WHOLE "script: [{push_mm_s: 5}]\n", "4:10", "lacks the key 't_s'"},
+    {WHOLE "script: [{t_s: 0, push_cm_s: 5}]\n", "4:19", "it is 'push_mm_s'"},
+    {WHOLE "script: [[0, 5]]\n", "4:10", "2 entries"},
+    // aliases
+    {VERSION "wire: &w {sections: [*w]}\n" SHEATH, "2:7", ""},
+};
+
+static void each_fault_has_its_line_and_column(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof broken / sizeof *broken; i++) {
+        const Broken *one = &broken[i];
+        Scene *scene = parse(one->text);
+        char start[64];
+        bool found = false;
+        snprintf(start, sizeof start, "x.yaml:%s: ", one->place);
+        for (int j = 0; j < faults.count && j < FAULTS_CAPACITY; j++)
+            found |= !strncmp(faults.text[j], start, strlen(start)) && strstr(faults.text[j], one->words);
+        if (scene || !found)
+            fail_msg("case %zu:\n%s-- expected %s … %s\n-- %d faults, the first: %s", i, one->text, one->place, one->words, faults.count,
+                     faults.count ? faults.text[0] : "");
+    }
+    assert_true(sizeof broken / sizeof *broken >= 25);
+}
+
+static void all_faults_come_in_one_pass(void **state)
+{
+    (void)state;
+    assert_null(parse("seldinger: 3\n"
+                      "vessel: {tube: {radius_mm: -1, path: [{line_cm: 4}]}, friction: x, contac: lim}\n"
+                      "wire:\n"
+                      "  elements: 100000\n"
+                      "  sections: [{length_mm: 1, diameter_cm: 2, young_modulus_gpa: 0}]\n"
+                      "sheath: {entry_mm: [0, 0, 0], direction: [0, 0, 0]}\n"
+                      "sheath: 4\n"
+                      "simulation: {step_ms: -1}\n"
+                      "targets: [{name: a}]\n"));
+    // version; radius; line_cm and no piece in its place; friction; contac; elements; diameter_cm and its lack; modulus;
+    // direction; second sheath; step; target without point and radius
+    const char *words[] = {"seldinger",       "radius_mm",  "line_mm", "friction",  "'contact'", "elements",  "it is 'diameter_mm'", "lacks the key 'diameter_mm'",
+                           "young_modulus_gpa", "no length", "second time", "step_ms", "lacks the key 'point_mm'", "lacks the key 'radius_mm'"};
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
+        bool found = false;
+        for (int j = 0; j < faults.count && j < FAULTS_CAPACITY; j++)
+            found |= strstr(faults.text[j], words[i]) != NULL;
+        if (!found)
+            fail_msg("no fault says '%s'", words[i]);
+    }
+}
+
+static void a_missing_script_and_a_wrong_one_are_the_scenes_faults(void **state)
+{
+    (void)state;
+    assert_null(parse(WHOLE "script: nowhere.csv\nbanana: 1\n"));
+    assert_int_equal(faults.count, 2);
+    assert_null(parse(WHOLE "script: /dev/zero\n"));
+    assert_int_equal(faults.count, 1);
+}
+
+static void many_aliases_end(void **state)
+{
+    (void)state;
+    // ten levels of ten aliases each: 10^10 values if they were followed blindly
+    char text[4000];
+    size_t used = (size_t)sprintf(text, WHOLE "a0: &a0 {line_mm: 1}\n");
+    for (int i = 1; i <= 10; i++)
+        used += (size_t)sprintf(text + used, "a%d: &a%d [*a%d, *a%d, *a%d, *a%d, *a%d, *a%d, *a%d, *a%d, *a%d, *a%d]\n", i, i, i - 1, i - 1, i - 1, i - 1,
+                                i - 1, i - 1, i - 1, i - 1, i - 1, i - 1);
+    sprintf(text + used, "vessel: {tube: {radius_mm: 1, path: *a10}}\n");
+    assert_null(parse(text));
+    assert_true(faults.count >= 11);
+    // a list of a map that holds the list
+    assert_null(parse(VERSION "rig: &r {fix: [*r], loads: &l [*l, {s_mm: *l}]}\n" WIRE));
+    // an alias used well
+    Scene *scene = good(VERSION SHEATH "wire: {sections: [&s {length_mm: 10, diameter_mm: 0.36, young_modulus_gpa: 80}, *s]}\n");
+    assert_int_equal(scene->wire.section_count, 2);
+    scene_free(scene);
+}
+
+static void deep_nesting_is_a_fault(void **state)
+{
+    (void)state;
+    enum { DEPTH = 100000 };
+    char *text = malloc(2 * DEPTH + 100);
+    assert_non_null(text);
+    memset(text, '[', DEPTH);
+    text[DEPTH] = 0;
+    assert_null(parse(text));
+    free(text);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(units_are_converted_once),
+        cmocka_unit_test(what_is_not_said_has_its_default),
+        cmocka_unit_test(the_contracts_example_with_sheath_and_rig_is_good),
+        cmocka_unit_test(each_fault_has_its_line_and_column),
+        cmocka_unit_test(all_faults_come_in_one_pass),
+        cmocka_unit_test(a_missing_script_and_a_wrong_one_are_the_scenes_faults),
+        cmocka_unit_test(many_aliases_end),
+        cmocka_unit_test(deep_nesting_is_a_fault),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
