@@ -120,6 +120,17 @@ void camera_frame(Camera *camera, int width, int height, double border, int coun
     camera->height = height;
 }
 
+double camera_height_of(const Camera *camera, int count, const Vec3 *point)
+{
+    double low = DBL_MAX, high = -DBL_MAX;
+    for (int i = 0; i < count; i++) {
+        double e = vec3_dot(camera->up, point[i]);
+        low = fmin(low, e);
+        high = fmax(high, e);
+    }
+    return count > 0 ? (high - low) / camera->mm_per_pixel : 0;
+}
+
 void camera_frame_sphere(Camera *camera, int width, int height, double border, Vec3 center, double radius, double slab)
 {
     camera->center = center;

@@ -18,6 +18,8 @@ typedef struct Camera {
 void camera_orient(Camera *camera, Vec3 view, Vec3 up, int count, const Vec3 *point);
 // Frames the points (each with `margin` mm around it) in a view of width x height, leaving `border` pixels at each side. Axes must be set.
 void camera_frame(Camera *camera, int width, int height, double border, int count, const Vec3 *point, double margin);
+// How many pixels high the points are in the view.
+double camera_height_of(const Camera *camera, int count, const Vec3 *point);
 // Frames a sphere; with `slab` > 0 only what lies within slab mm before and behind its centre is drawn.
 void camera_frame_sphere(Camera *camera, int width, int height, double border, Vec3 center, double radius, double slab);
 // Pixel (x right, y down, from the view's upper left corner); z: depth towards the eye [mm] relative to center.

@@ -14,7 +14,7 @@
 #include "sim/scene.h"
 
 typedef struct PictureOptions {
-    int width, height;         // [pixel] 64 to 8192; default 1600 x 1000
+    int width, height;         // [pixel] 64 to 8192; default 1600 x 1000; projections and moments are cut to the height that they need
     const char *title;         // first words of the title line, default NULL: none
     Vec3 view;                 // direction from the eye into the scene; zero (default): face on, along the axis of least extent
     Vec3 up;                   // points up on paper; zero (default): the coordinate axis best seen from there, z before y before x

@@ -206,7 +206,7 @@ static void draw_slice(FitDrawing *drawing, int node, double x, double y, double
     }
     slice.across = aside;
     slice.normal = vec3_cross(slice.along, aside);
-    sheet_text(sheet, x, y, TEXT_SMALL, SHEET_INK, "node %d: r %.2f, error %.3f mm, %d blobs", node, r, tree->error ? tree->error[node] : NAN,
+    sheet_text(sheet, x, y, TEXT_SMALL, SHEET_INK, "%d: r %.2f, error %.2f mm, %d blobs", node, r, tree->error ? tree->error[node] : NAN,
                model_of(tree, node).count);
     overlay_fill(sheet->overlay, slice.x, slice.y, slice.side, slice.side, SHEET_PANEL);
     overlay_push_clip(sheet->overlay, slice.x, slice.y, slice.side, slice.side);
@@ -280,7 +280,7 @@ static bool draw_fit(FitDrawing *drawing)
     y += 56 * s;
     if (worst < 1)
         return true;
-    sheet_text(sheet, left, y, TEXT_NORMAL, SHEET_MUTED, "largest errors: slices through axis and worst point; neighbours' walls grey");
+    sheet_text(sheet, left, y, TEXT_NORMAL, SHEET_MUTED, "nodes of the largest errors, cut through axis and worst point; neighbours' walls grey");
     y += 28 * s;
     int best_columns = 1;
     double room = sheet->height - gap - y, best = 0;
@@ -304,7 +304,7 @@ bool picture_of_fit(const char *path, const PictureOptions *options, const Vesse
     if (!tree || tree->node_count < 1 || !vessel_tree_is_model(tree))
         return message_fail(message, capacity, "the tree has no fitted model to draw");
     Sheet sheet;
-    if (!sheet_open(&sheet, options, message, capacity))
+    if (!sheet_open(&sheet, options, options->height, message, capacity))
         return false;
     FitDrawing drawing = {.sheet = &sheet, .options = options, .tree = tree, .mesh = mesh};
     bool drawn = find_distances(&drawing, distance) || message_fail(message, capacity, "not enough memory for a picture");

@@ -58,7 +58,7 @@ static bool gather_frame(RunDrawing *drawing, int tool_count, const PictureTool 
         count += (size_t)(tool[k].node_count - first_free(&tool[k]));
     drawing->frame_point = malloc((count + 6 * (size_t)scene->target_count + 1) * sizeof *drawing->frame_point);
     if (!drawing->frame_point)
-        return message_fail(drawing->sheet->message, drawing->sheet->capacity, "not enough memory for a picture");
+        return false;
     int n = 0;
     for (int i = 0; has_vessel && i < scene->vessel->vertex_count; i++)
         drawing->frame_point[n++] = scene->vessel->vertex[i];
@@ -87,12 +87,18 @@ static double largest_force(int tool_count, const PictureTool *tool)
     return largest;
 }
 
+// [mm] of the arrow for a force at the top of the scale
+static double arrow_length(const RunDrawing *drawing, const Camera *camera)
+{
+    return fmin(64 * drawing->sheet->scale, 0.12 * (camera->width < camera->height ? camera->width : camera->height)) * camera->mm_per_pixel;
+}
+
 // One arrow for each stretch of the tool of about 16 pixels: the sum of its nodes' forces, its head at the tool where the wall pushes.
 static void add_arrows(RunDrawing *drawing, const Camera *camera, const PictureTool *tool, double line)
 {
     if (!tool->force || !drawing->options->arrows)
         return;
-    double stretch = 16 * drawing->sheet->scale * camera->mm_per_pixel, longest = 64 * drawing->sheet->scale * camera->mm_per_pixel;
+    double stretch = 16 * drawing->sheet->scale * camera->mm_per_pixel, longest = arrow_length(drawing, camera);
     for (int i = first_free(tool); i < tool->node_count;) {
         Vec3 sum = {0, 0, 0}, place = {0, 0, 0};
         double weight = 0, radius = 0, length = 0;
@@ -249,26 +255,42 @@ static void readings_text(char *text, size_t capacity, const PictureTool *tool)
              tool->torque_n_mm);
 }
 
-static void write_facts(RunDrawing *drawing, const PictureTool *tool, double x, double y, double width)
+// Returns the height of what it wrote.
+static double write_facts(RunDrawing *drawing, const PictureTool *tool, double x, double y, double width)
 {
     Sheet *sheet = drawing->sheet;
     double line = 23 * sheet->scale;
-    int touching = 0;
+    int touching = 0, targets = drawing->scene->target_count < 6 ? drawing->scene->target_count : 6;
     double largest = largest_force(1, tool);
     for (int i = 0; tool->force && i < tool->node_count; i++)
         touching += vec3_norm2(tool->force[i]) > 0;
-    char text[128];
-    snprintf(text, sizeof text, largest < 1 ? "largest %.3g mN" : "largest %.3g N", largest < 1 ? 1000 * largest : largest);
-    sheet_text(sheet, x, y, TEXT_NORMAL, SHEET_INK, "%s, %d nodes touch the wall", text, touching);
+    sheet_text(sheet, x, y, TEXT_NORMAL, SHEET_INK, "largest %.3g %s, %d nodes touch the wall", largest < 1 ? 1000 * largest : largest,
+               largest < 1 ? "mN" : "N", touching);
     Vec3 tip = tool->position[tool->node_count - 1];
     sheet_text(sheet, x, y + line, TEXT_NORMAL, SHEET_INK, "tip (%.1f, %.1f, %.1f) mm", tip.x, tip.y, tip.z);
     overlay_push_clip(sheet->overlay, x, y, width, sheet->height - y);
-    for (int i = 0; i < drawing->scene->target_count && i < 6; i++) {
-        double away = vec3_distance(tip, drawing->scene->target[i].point);
-        sheet_text(sheet, x, y + (2 + i) * line, TEXT_NORMAL, TARGET_COLOR, "%s: %.1f mm from the tip%s", drawing->scene->target[i].name, away,
-                   away <= drawing->scene->target[i].radius ? ", reached" : "");
+    for (int i = 0; i < targets; i++) {
+        const SceneTarget *target = &drawing->scene->target[i];
+        double away = vec3_distance(tip, target->point);
+        sheet_text(sheet, x, y + (2 + i) * line, TEXT_NORMAL, TARGET_COLOR, "%s: %.1f mm from the tip%s", target->name, away,
+                   away <= target->radius ? ", reached" : "");
     }
     overlay_pop_clip(sheet->overlay);
+    return (2 + targets) * line;
+}
+
+// The same from the right hand side.
+static bool draw_side_view(RunDrawing *drawing, const Camera *whole, const PictureTool *tool, double x, double y, double width, double height)
+{
+    Sheet *sheet = drawing->sheet;
+    double s = sheet->scale;
+    Camera side = {.right = vec3_negate(whole->back), .up = whole->up, .back = whole->right};
+    camera_frame(&side, (int)width, (int)height, 12 * s, drawing->frame_count, drawing->frame_point, 0);
+    if (!draw_panel(drawing, &side, tool, x, y))
+        return false;
+    sheet_label(sheet, x + 8 * s, y + 6 * s, 0, TEXT_SMALL, SHEET_MUTED, "from the right");
+    sheet_scale_bar(sheet, x + 14 * s, y + (int)height - 10 * s, 0.2 * width, side.mm_per_pixel, SHEET_INK);
+    return true;
 }
 
 static bool draw_run(RunDrawing *drawing, const PictureTool *tool)
@@ -301,7 +323,11 @@ static bool draw_run(RunDrawing *drawing, const PictureTool *tool)
         below += column + 18 * s;
     }
     force_bar(drawing, left, below, column);
-    write_facts(drawing, tool, left, below + 62 * s, column);
+    below += 62 * s;
+    below += write_facts(drawing, tool, left, below, column) + 14 * s;
+    double room_below = sheet->height - gap - below;
+    if (room_below > 140 * s && !draw_side_view(drawing, &whole, tool, left, below, column, room_below))
+        return false;
 
     char text[256];
     readings_text(text, sizeof text, tool);
@@ -367,39 +393,64 @@ static bool draw_moment(RunDrawing *drawing, const Camera *whole, const PictureT
     return true;
 }
 
-static bool draw_moments(RunDrawing *drawing, int tool_count, const PictureTool *tool)
+typedef struct MomentLayout {
+    Camera camera;
+    int columns;
+    double top, header, gap, height;   // [pixel]; height: of the page
+} MomentLayout;
+
+// The arrangement of rows in which the vessel is largest.
+static MomentLayout lay_out_moments(const RunDrawing *drawing, int tool_count)
 {
-    Sheet *sheet = drawing->sheet;
     const PictureOptions *options = drawing->options;
-    double s = sheet->scale, gap = 16 * s, header = 46 * s, foot = 64 * s, top = options->title ? 54 * s : 14 * s;
-    Camera best = {0};
-    camera_orient(&best, options->view, options->up, drawing->frame_count, drawing->frame_point);
-    int best_columns = tool_count;
-    double best_scale = HUGE_VAL;
+    double s = sheet_scale_of(options), foot = 66 * s, border = 26 * s;
+    MomentLayout layout = {.columns = tool_count, .header = 46 * s, .gap = 16 * s, .top = options->title ? 54 * s : 14 * s};
+    Camera camera = {0};
+    camera_orient(&camera, options->view, options->up, drawing->frame_count, drawing->frame_point);
+    double best = HUGE_VAL;
     for (int columns = tool_count; columns >= 1; columns--) {
         int rows = (tool_count + columns - 1) / columns;
-        Camera camera = best;
-        int width = (int)((sheet->width - gap * (columns + 1)) / columns), height = (int)((sheet->height - top - foot) / rows - header);
-        if (width < 16 || height < 16)
-            continue;
-        camera_frame(&camera, width, height, 16 * s, drawing->frame_count, drawing->frame_point, 0);
+        int width = (int)fmax((options->width - layout.gap * (columns + 1)) / columns, 16);
+        int height = (int)fmax((options->height - layout.top - foot) / rows - layout.header, 16);
+        camera_frame(&camera, width, height, border, drawing->frame_count, drawing->frame_point, 0);
         if (options->focus_radius > 0)
             camera_frame_sphere(&camera, width, height, 4 * s, options->focus, options->focus_radius, 0);
-        if (camera.mm_per_pixel < 0.97 * best_scale) {
-            best_scale = camera.mm_per_pixel;
-            best_columns = columns;
-            best = camera;
+        else {
+            // no higher than what there is to see, but never flatter than 3 to 1
+            double tall = camera_height_of(&camera, drawing->frame_count, drawing->frame_point) + 2 * border;
+            camera.height = (int)fmin(height, fmax(tall, width / 3.0));
+        }
+        if (camera.mm_per_pixel < 0.97 * best) {
+            best = camera.mm_per_pixel;
+            layout.columns = columns;
+            layout.camera = camera;
+            layout.height = layout.top + foot + rows * (layout.header + camera.height);
         }
     }
-    if (options->title)
-        sheet_text(sheet, gap, 14 * s, TEXT_LARGE, SHEET_INK, "%s", options->title);
+    return layout;
+}
+
+static bool draw_moments(RunDrawing *drawing, const MomentLayout *layout, int tool_count, const PictureTool *tool)
+{
+    Sheet *sheet = drawing->sheet;
+    double s = sheet->scale, gap = layout->gap;
+    if (drawing->options->title)
+        sheet_text(sheet, gap, 14 * s, TEXT_LARGE, SHEET_INK, "%s", drawing->options->title);
     for (int k = 0; k < tool_count; k++) {
-        double x = gap + (k % best_columns) * (best.width + gap), y = top + (k / best_columns) * (best.height + header);
-        if (!draw_moment(drawing, &best, &tool[k], x, y, header))
+        double x = gap + (k % layout->columns) * (layout->camera.width + gap);
+        double y = layout->top + (k / layout->columns) * (layout->camera.height + layout->header);
+        if (!draw_moment(drawing, &layout->camera, &tool[k], x, y, layout->header))
             return false;
     }
-    force_bar(drawing, gap, sheet->height - foot + 10 * s, fmin(420 * s, sheet->width - 2 * gap));
+    force_bar(drawing, gap, sheet->height - 56 * s, fmin(420 * s, sheet->width - 2 * gap));
     return true;
+}
+
+static bool draw_on(Sheet *sheet, RunDrawing *drawing, const char *path, int tool_count, const PictureTool *tool, const MomentLayout *layout)
+{
+    drawing->sheet = sheet;
+    return surface_view_set_mesh(sheet->view, drawing->scene->vessel, sheet->message, sheet->capacity) &&
+           (layout ? draw_moments(drawing, layout, tool_count, tool) : draw_run(drawing, tool)) && sheet_save(sheet, path);
 }
 
 static bool draw(const char *path, const PictureOptions *options, const PictureScene *scene, int tool_count, const PictureTool *tool, bool is_single,
@@ -407,10 +458,7 @@ static bool draw(const char *path, const PictureOptions *options, const PictureS
 {
     if (!check_input(scene, tool_count, tool, message, capacity))
         return false;
-    Sheet sheet;
-    if (!sheet_open(&sheet, options, message, capacity))
-        return false;
-    RunDrawing drawing = {.sheet = &sheet, .options = options, .scene = scene, .style = shell_style_glass()};
+    RunDrawing drawing = {.options = options, .scene = scene, .style = shell_style_glass()};
     double largest = largest_force(tool_count, tool);
     drawing.force_scale = options->force_full_scale > 0 ? options->force_full_scale : largest > 0 ? sheet_round_up(largest) : 0.1;
     int longest = 0;
@@ -418,15 +466,21 @@ static bool draw(const char *path, const PictureOptions *options, const PictureS
         longest = tool[k].node_count > longest ? tool[k].node_count : longest;
     drawing.radius = malloc((size_t)longest * sizeof *drawing.radius);
     drawing.color = malloc((size_t)longest * sizeof *drawing.color);
-    bool drawn = drawing.radius && drawing.color ? true : message_fail(message, capacity, "not enough memory for a picture");
-    drawn = drawn && gather_frame(&drawing, tool_count, tool) && surface_view_set_mesh(sheet.view, scene->vessel, message, capacity);
-    drawn = drawn && (is_single ? draw_run(&drawing, tool) : draw_moments(&drawing, tool_count, tool));
-    drawn = drawn && sheet_save(&sheet, path);
+    bool drawn = false;
+    if (!drawing.radius || !drawing.color || !gather_frame(&drawing, tool_count, tool))
+        message_fail(message, capacity, "not enough memory for a picture");
+    else {
+        Sheet sheet;
+        MomentLayout layout = lay_out_moments(&drawing, tool_count);
+        if (sheet_open(&sheet, options, is_single ? options->height : (int)ceil(layout.height), message, capacity)) {
+            drawn = draw_on(&sheet, &drawing, path, tool_count, tool, is_single ? NULL : &layout);
+            sheet_close(&sheet);
+        }
+    }
     free(drawing.radius);
     free(drawing.color);
     free(drawing.frame_point);
     solids_free(&drawing.solids);
-    sheet_close(&sheet);
     return drawn;
 }
 

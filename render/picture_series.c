@@ -44,6 +44,24 @@ static void find_range(Chart *chart, int count, const PicturePanel *panel)
     chart->high = high == 0 ? 0 : high + room;
 }
 
+// Cut at sharp turns: ImGui's mitred joints tear there, as noisy data shows.
+static void stroke(Sheet *sheet, int count, const float (*point)[2], Color color)
+{
+    int first = 0;
+    for (int i = 1; i < count; i++) {
+        bool is_sharp = i + 1 == count;
+        if (!is_sharp) {
+            double ax = point[i][0] - point[i - 1][0], ay = point[i][1] - point[i - 1][1];
+            double bx = point[i + 1][0] - point[i][0], by = point[i + 1][1] - point[i][1];
+            is_sharp = ax * bx + ay * by < 0.5 * hypot(ax, ay) * hypot(bx, by);
+        }
+        if (is_sharp) {
+            overlay_polyline(sheet->overlay, i + 1 - first, point + first, color, 1.6 * sheet->scale);
+            first = i;
+        }
+    }
+}
+
 static void draw_line(Sheet *sheet, const Chart *chart, int count, const double *time, const double *value, Color color, float (*point)[2])
 {
     double sx = chart->width / (chart->t1 - chart->t0), sy = chart->height / (chart->high - chart->low);
@@ -51,7 +69,7 @@ static void draw_line(Sheet *sheet, const Chart *chart, int count, const double 
     for (int i = 0; i < count;) {
         double v = mapped(chart, value[i]);
         if (isnan(v)) {
-            overlay_polyline(sheet->overlay, n, (const float(*)[2])point, color, 1.6 * sheet->scale);
+            stroke(sheet, n, (const float(*)[2])point, color);
             n = 0;
             i++;
             continue;
@@ -79,27 +97,41 @@ static void draw_line(Sheet *sheet, const Chart *chart, int count, const double 
             point[n++][1] = (float)(chart->y + chart->height - sy * (way[k] - chart->low));
         }
     }
-    overlay_polyline(sheet->overlay, n, (const float(*)[2])point, color, 1.6 * sheet->scale);
+    stroke(sheet, n, (const float(*)[2])point, color);
+}
+
+static void draw_level(Sheet *sheet, const Chart *chart, double level, const char *text, bool is_zero)
+{
+    double s = sheet->scale, y = chart->y + chart->height * (1 - (level - chart->low) / (chart->high - chart->low)), height;
+    if (y < chart->y - 1e-6 || y > chart->y + chart->height + 1e-6)
+        return;
+    overlay_line(sheet->overlay, chart->x, y, chart->x + chart->width, y, is_zero ? SHEET_MUTED : SHEET_FAINT, s);
+    overlay_text_size(sheet->overlay, TEXT_SMALL, text, NULL, &height);
+    sheet_text_anchored(sheet, chart->x - 7 * s, y - height / 2, 1, TEXT_SMALL, SHEET_INK, text);
 }
 
 static void draw_grid(Sheet *sheet, const Chart *chart, bool is_last)
 {
     double s = sheet->scale;
     overlay_fill(sheet->overlay, chart->x, chart->y, chart->width, chart->height, SHEET_PANEL);
-    int most = chart->height > 150 * s ? 6 : 4;
-    double step = sheet_tick_step(chart->low, chart->high, most);
-    if (chart->logarithmic)
-        step = fmax(1, ceil(step));
     char text[48];
-    for (double k = ceil(chart->low / step - 1e-9); k * step <= chart->high * (1 + 1e-12) + 1e-12 * step; k++) {
-        double y = chart->y + chart->height * (1 - (k * step - chart->low) / (chart->high - chart->low)), height;
-        if (chart->logarithmic)
-            snprintf(text, sizeof text, "%g", pow(10, k * step));
-        else
-            sheet_format_tick(text, sizeof text, k * step, step);
-        overlay_line(sheet->overlay, chart->x, y, chart->x + chart->width, y, k == 0 && !chart->logarithmic ? SHEET_MUTED : SHEET_FAINT, s);
-        overlay_text_size(sheet->overlay, TEXT_SMALL, text, NULL, &height);
-        sheet_text_anchored(sheet, chart->x - 7 * s, y - height / 2, 1, TEXT_SMALL, SHEET_INK, text);
+    double step = sheet_tick_step(chart->low, chart->high, chart->height > 150 * s ? 6 : 4);
+    if (chart->logarithmic) {
+        // whole decades, and 2 and 5 between them where there is room
+        static const double part[3] = {1, 2, 5};
+        double decades = chart->high - chart->low;
+        int parts = decades < 2.5 ? 3 : 1;
+        step = fmax(1, ceil(decades / 6));
+        for (double k = floor(chart->low / step); k * step <= chart->high; k++)
+            for (int j = 0; j < parts; j++) {
+                double value = part[j] * pow(10, k * step);
+                snprintf(text, sizeof text, "%g", value);
+                draw_level(sheet, chart, log10(value), text, false);
+            }
+    }
+    for (double k = ceil(chart->low / step - 1e-9); !chart->logarithmic && k * step <= chart->high + 1e-9 * step; k++) {
+        sheet_format_tick(text, sizeof text, k * step, step);
+        draw_level(sheet, chart, k * step, text, k == 0);
     }
     step = sheet_tick_step(chart->t0, chart->t1, 10);
     for (double k = ceil(chart->t0 / step - 1e-9); k * step <= chart->t1 + 1e-9 * step; k++) {
@@ -142,7 +174,7 @@ bool picture_of_series(const char *path, const PictureOptions *options, int coun
         if (!isfinite(time_s[i]) || (i > 0 && time_s[i] < time_s[i - 1]))
             return message_fail(message, capacity, "time %d of a chart is not a number or goes backwards: nothing is drawn", i);
     Sheet sheet;
-    if (!sheet_open(&sheet, options, message, capacity))
+    if (!sheet_open(&sheet, options, options->height, message, capacity))
         return false;
     double s = sheet.scale, top = options->title || event_count > 0 ? 54 * s : 10 * s, left = 84 * s, head = 32 * s, foot = 48 * s;
     double each = (sheet.height - top - foot) / panel_count;

@@ -103,7 +103,7 @@ static void draw_outline(Sheet *sheet, const Panel *panel, const PicturePolyline
             side[i][0] = at[i][0] - (float)(length > 0 ? r * dy / length : 0);
             side[i][1] = at[i][1] + (float)(length > 0 ? r * dx / length : 0);
         }
-        overlay_polyline(sheet->overlay, line->count, (const float(*)[2])side, color_with_alpha(color, 0.45), 0.8 * sheet->scale);
+        overlay_polyline(sheet->overlay, line->count, (const float(*)[2])side, color_with_alpha(color, 0.6), 0.8 * sheet->scale);
     }
 }
 
@@ -198,10 +198,10 @@ static double length_of(int count, const PicturePolyline *polyline)
     return length;
 }
 
-// All panels at one scale, in the arrangement of rows that makes them largest.
-static void lay_out(const Sheet *sheet, int count, const PictureProjection *projection, double top, Panel *panel)
+// All panels at one scale, in the arrangement of rows that makes them largest. Returns the height they need.
+static double lay_out(const PictureOptions *page, int count, const PictureProjection *projection, double top, Panel *panel)
 {
-    double s = sheet->scale, left = 52 * s, between = 14 * s, foot = 48 * s, head = 26 * s, best = 0;
+    double s = sheet_scale_of(page), left = 52 * s, between = 14 * s, foot = 48 * s, head = 26 * s, best = 0;
     int best_columns = count;
     for (int columns = count; columns >= 1; columns--) {
         int rows = (count + columns - 1) / columns;
@@ -215,7 +215,7 @@ static void lay_out(const Sheet *sheet, int count, const PictureProjection *proj
             widest = fmax(widest, width);
             tallest += height;
         }
-        double scale = fmin((sheet->width - columns * left - between * columns) / widest, (sheet->height - top - rows * (head + foot)) / tallest);
+        double scale = fmin((page->width - columns * left - between * columns) / widest, (page->height - top - rows * (head + foot)) / tallest);
         if (scale > best) {
             best = scale;
             best_columns = columns;
@@ -233,6 +233,7 @@ static void lay_out(const Sheet *sheet, int count, const PictureProjection *proj
         }
         y += tallest + head + foot;
     }
+    return y;
 }
 
 bool picture_of_projections(const char *path, const PictureOptions *options, int projection_count, const PictureProjection *projection, float low,
@@ -244,11 +245,10 @@ bool picture_of_projections(const char *path, const PictureOptions *options, int
     if (!(high > low) && !find_window(projection_count, projection, &low, &high))
         return message_fail(message, capacity, "not enough memory for a picture");
     Sheet sheet;
-    if (!sheet_open(&sheet, options, message, capacity))
-        return false;
-    double s = sheet.scale;
     Panel panel[6];
-    lay_out(&sheet, projection_count, projection, 46 * s, panel);
+    double s = sheet_scale_of(options), needed = lay_out(options, projection_count, projection, 46 * s, panel);
+    if (!sheet_open(&sheet, options, (int)ceil(needed), message, capacity))
+        return false;
     if (options->title)
         sheet_text(&sheet, 20 * s, 12 * s, TEXT_LARGE, SHEET_INK, "%s", options->title);
     char text[160];

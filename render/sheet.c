@@ -11,13 +11,17 @@
 const Color SHEET_INK = {34, 37, 42, 255}, SHEET_MUTED = {104, 108, 115, 255}, SHEET_FAINT = {206, 207, 205, 255};
 const Color SHEET_PAPER = {255, 255, 255, 255}, SHEET_PANEL = {248, 248, 246, 255};
 
-bool sheet_open(Sheet *sheet, const PictureOptions *options, char *message, size_t capacity)
+double sheet_scale_of(const PictureOptions *options)
 {
-    *sheet = (Sheet){.width = options->width, .height = options->height, .message = message, .capacity = capacity};
+    return fmin(fmax(fmin(options->width / 1.6, options->height) / 1000, 0.6), 4);
+}
+
+bool sheet_open(Sheet *sheet, const PictureOptions *options, int height, char *message, size_t capacity)
+{
+    *sheet = (Sheet){.width = options->width, .height = height < 64 ? 64 : height < options->height ? height : options->height, .message = message, .capacity = capacity};
     if (options->width < 64 || options->width > 8192 || options->height < 64 || options->height > 8192)
         return message_fail(message, capacity, "a picture of %d x %d pixels; each side 64 to 8192", options->width, options->height);
-    double sides = fmin(options->width / 1.6, options->height);
-    sheet->scale = fmin(fmax(sides / 1000, 0.6), 4);
+    sheet->scale = sheet_scale_of(options);
     sheet->context = gl_context_create(message, capacity);
     if (!sheet->context)
         return false;
@@ -137,9 +141,7 @@ void sheet_label(Sheet *sheet, double x, double y, double anchor, TextSize size,
 
 void sheet_scale_bar(Sheet *sheet, double x, double y, double longest, double mm_per_pixel, Color color)
 {
-    double most = longest * mm_per_pixel, length = sheet_round_up(most);
-    for (int i = 0; i < 3 && length > most; i++)   // the round number at or below
-        length = sheet_round_up(length * 0.45);
+    double length = sheet_round_down(longest * mm_per_pixel);
     double pixels = length / mm_per_pixel, s = sheet->scale;
     overlay_fill(sheet->overlay, x, y - 4 * s, pixels, 4 * s, color);
     char text[64];
@@ -182,6 +184,18 @@ double sheet_round_up(double x)
         if (x <= step[i] * power * (1 + 1e-9))
             return step[i] * power;
     return 10 * power;
+}
+
+double sheet_round_down(double x)
+{
+    if (!(x > 0) || !isfinite(x))
+        return x;
+    double power = pow(10, floor(log10(x)));
+    const double step[4] = {10, 5, 2, 1};
+    for (int i = 0; i < 3; i++)
+        if (x >= step[i] * power * (1 - 1e-9))
+            return step[i] * power;
+    return power;
 }
 
 double sheet_tick_step(double low, double high, int most)

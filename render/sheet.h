@@ -29,8 +29,11 @@ typedef struct Sheet {
 
 extern const Color SHEET_INK, SHEET_MUTED, SHEET_FAINT, SHEET_PAPER, SHEET_PANEL;
 
-// False with a reason; then there is nothing to close.
-bool sheet_open(Sheet *sheet, const PictureOptions *options, char *message, size_t capacity);
+// 1 for 1600 x 1000 pixels.
+double sheet_scale_of(const PictureOptions *options);
+// A page `height` pixels high (options->height, or less where less is needed; the scale stays that of the options). False with a reason; then there
+// is nothing to close.
+bool sheet_open(Sheet *sheet, const PictureOptions *options, int height, char *message, size_t capacity);
 bool sheet_save(Sheet *sheet, const char *path);
 void sheet_close(Sheet *sheet);
 
@@ -51,8 +54,9 @@ void sheet_scale_bar(Sheet *sheet, double x, double y, double longest, double mm
 void sheet_color_bar(Sheet *sheet, double x, double y, double width, double height, Color (*map)(double), double map_low, double low, double high,
                      const char *title);
 
-// The round number (1, 2 or 5 times a power of ten) at or above x; x itself where it is not a positive number.
+// The round number (1, 2 or 5 times a power of ten) at or above x, at or below x; x itself where it is not a positive number.
 double sheet_round_up(double x);
+double sheet_round_down(double x);
 // Where ticks go: a step so that at most `most` fall into [low, high].
 double sheet_tick_step(double low, double high, int most);
 void sheet_format_tick(char *text, size_t capacity, double value, double step);

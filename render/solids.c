@@ -144,7 +144,7 @@ void solids_arrow(Solids *solids, Vec3 tail, Vec3 tip, double radius, Color colo
     if (!(length > 0))
         return;
     Vec3 t = vec3_scale(along, 1 / length), n = vec3_normal_to(t);
-    double head = fmin(5 * radius, 0.6 * length), wide = 2.4 * radius;
+    double head = fmin(8 * radius, 0.6 * length), wide = 3.2 * radius;
     Vec3 neck = vec3_add_scaled(tip, -head, t);
     add_ring(solids, tail, t, n, 0, 0, -1, color, false);
     add_ring(solids, tail, t, n, radius, 0, -1, color, true);

@@ -57,7 +57,7 @@ static const char *const SHELL_FRAGMENT =
 static const char *const SOLID_FRAGMENT = "in vec3 n; in vec4 c; in float depth; out vec4 result;\n"
                                           "uniform vec3 haze; uniform float haze_amount;\n"
                                           "void main() { vec3 m = normalize(n); if (m.z < 0.0) m = -m;\n"
-                                          "  vec3 k = c.rgb * (0.30 + 0.92 * lit(m)) + vec3(0.30 * shine(m, 30.0));\n"
+                                          "  vec3 k = c.rgb * (0.55 + 0.55 * lit(m)) + vec3(0.22 * shine(m, 30.0));\n"
                                           "  result = vec4(mix(k, haze, haze_amount * depth), 1.0); }\n";
 
 static const char *const POINT_VERTEX = "#version 330 core\n"
