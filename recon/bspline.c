@@ -3,13 +3,18 @@
 // Floats: 64 products of values known to a few digits. The four lanes of a row are summed apart and joined at the end, always in the same order.
 #include "recon/bspline.h"
 
+#include <string.h>
+
+typedef float Lanes __attribute__((vector_size(16)));
+
 static inline void weights(float t, float w[4])
 {
-    float u = 1 - t;
-    w[0] = u * u * u / 6;
-    w[1] = (4 - 6 * t * t + 3 * t * t * t) / 6;
-    w[2] = (4 - 6 * u * u + 3 * u * u * u) / 6;
-    w[3] = t * t * t / 6;
+    const float sixth = 1.0f / 6;
+    float u = 1 - t, t2 = t * t, u2 = u * u;
+    w[0] = u2 * u * sixth;
+    w[1] = (4 - 6 * t2 + 3 * (t2 * t)) * sixth;
+    w[2] = (4 - 6 * u2 + 3 * (u2 * u)) * sixth;
+    w[3] = t2 * t * sixth;
 }
 
 // Taps that lie beyond the grid.
@@ -33,24 +38,26 @@ static inline float sample(const Volume *volume, double x, double y, double z)
     // far outside (or not a number) no tap is inside
     if (!(x > -3 && y > -3 && z > -3 && x < size[0] + 2 && y < size[1] + 2 && z < size[2] + 2))
         return volume->minimum;
-    double fx = floor(x), fy = floor(y), fz = floor(z);
-    int base[3] = {(int)fx - 1, (int)fy - 1, (int)fz - 1};
+    // all are > -3: truncation of the shifted number is floor(), which is a call without SSE4
+    int base[3] = {(int)(x + 4) - 5, (int)(y + 4) - 5, (int)(z + 4) - 5};
     float wx[4], wy[4], wz[4];
-    weights((float)(x - fx), wx);
-    weights((float)(y - fy), wy);
-    weights((float)(z - fz), wz);
+    weights((float)(x - (base[0] + 1)), wx);
+    weights((float)(y - (base[1] + 1)), wy);
+    weights((float)(z - (base[2] + 1)), wz);
     if (base[0] < 0 || base[1] < 0 || base[2] < 0 || base[0] + 3 >= size[0] || base[1] + 3 >= size[1] || base[2] + 3 >= size[2])
         return sample_at_border(volume, base, wx, wy, wz);
     size_t row = (size_t)size[0], slice = row * (size_t)size[1];
     const float *first = volume->value + (size_t)base[2] * slice + (size_t)base[1] * row + (size_t)base[0];
-    float lane[4] = {0, 0, 0, 0};
-    for (int k = 0; k < 4; k++)
+    Lanes lane = {0, 0, 0, 0};
+    for (int k = 0; k < 4; k++) {
+        Lanes layer = {0, 0, 0, 0};
         for (int j = 0; j < 4; j++) {
-            const float *tap = first + (size_t)k * slice + (size_t)j * row;
-            float w = wz[k] * wy[j];
-            for (int i = 0; i < 4; i++)
-                lane[i] += w * tap[i];
+            Lanes tap;
+            memcpy(&tap, first + (size_t)k * slice + (size_t)j * row, sizeof tap);
+            layer += wy[j] * tap;
         }
+        lane += wz[k] * layer;
+    }
     return (lane[0] * wx[0] + lane[1] * wx[1]) + (lane[2] * wx[2] + lane[3] * wx[3]);
 }
 

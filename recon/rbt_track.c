@@ -1,1 +1,908 @@
-typedef int placeholder_rbt_track;
+// Prediction, eq. (1), (2): C* = C + s h/2 d, and r, d, h stay. Estimation: rays from C* give candidate points; for axis directions in order of their
+// angle with d* a RANSAC circle across each gives a cylinder, the first valid one is kept; refinement by least squares; the centre goes to the median of
+// the consensus set along the axis; new rays from there give the node's points and its height. Kerrien et al. 2017, section 3.
+//
+// What was tried and lost: the paper as written stalls at bifurcations and beside a sac, where the consensus lies upstream and the median pulls the
+// centre back to where it came from. A failed step is repeated from the last good node with longer steps, which look past such a place; then the
+// radius and the contrast must agree with the vessel, or branches are invented off open ends. That does not suffice at a giant aneurysm: the natural
+// way is straight on into the sac, and the tracking ends at its bottom. Where a branch swells or ends, the lumen ahead is searched for tubes that
+// leave it (rbt_exits.h), and the branch goes on from the widest one that tracks.
+#include "recon/rbt_track.h"
+#include "recon/bspline.h"
+#include "recon/cast_rays.h"
+#include "recon/ransac_cylinder.h"
+#include "recon/rbt_exits.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_RAYS = 2562, MAX_AXES = 321, CONTRAST_MEMORY = 8, MAX_NODES = 200000 };
+
+// --- growing tree ---
+
+typedef struct TrackNode {
+    Cylinder cylinder;
+    double inlier_rate, contrast;
+    int parent, kind, branch;
+    bool retried, is_junction;
+    int64_t point_start;
+    int point_count;
+} TrackNode;
+
+typedef struct Estimate {    // a node before it is accepted
+    TrackNode node;
+    Vec3 point[MAX_RAYS];
+} Estimate;
+
+typedef struct Track {       // nodes with their points, growing
+    TrackNode *node;
+    int count, capacity;
+    Vec3 *point;
+    int64_t point_count, point_capacity;
+} Track;
+
+typedef struct Tracker {
+    const Volume *volume;
+    const RbtParameters *parameters;
+    double voxel;            // [mm]
+    int ray_count, axis_count;
+    Vec3 ray[MAX_RAYS];
+    Vec3 axis[MAX_AXES];     // half a sphere about +z in order of angle with it
+    Random random;
+    Vec3 candidate[MAX_RAYS];
+    int inlier[MAX_RAYS];
+    double along[MAX_RAYS];
+    Estimate estimate;
+    Track tree;
+    bool out_of_memory;
+    const char *why;         // the last estimate was refused
+} Tracker;
+
+static bool track_append(Track *track, const TrackNode *node, const Vec3 *point)
+{
+    if (track->count == track->capacity) {
+        int capacity = track->capacity ? 2 * track->capacity : 256;
+        TrackNode *grown = realloc(track->node, (size_t)capacity * sizeof *grown);
+        if (!grown)
+            return false;
+        track->node = grown;
+        track->capacity = capacity;
+    }
+    if (track->point_count + node->point_count > track->point_capacity) {
+        int64_t capacity = 2 * track->point_capacity + 65536;
+        Vec3 *grown = realloc(track->point, (size_t)capacity * sizeof *grown);
+        if (!grown)
+            return false;
+        track->point = grown;
+        track->point_capacity = capacity;
+    }
+    TrackNode *added = &track->node[track->count++];
+    *added = *node;
+    added->point_start = track->point_count;
+    if (node->point_count > 0)
+        memcpy(track->point + track->point_count, point, (size_t)node->point_count * sizeof *point);
+    track->point_count += node->point_count;
+    return true;
+}
+
+static void track_free(Track *track)
+{
+    free(track->node);
+    free(track->point);
+    *track = (Track){0};
+}
+
+// --- estimation, section 3.1 ---
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+// Half of the sphere's vertices, +z first, then by angle with it: the directions of a RANSAC are these, turned so that +z is the predicted axis.
+static void prepare_axes(Tracker *t)
+{
+    Vec3 all[2 * MAX_AXES];
+    int level = sphere_level_of(2 * t->axis_count), used = 0;
+    sphere_directions(level, all);
+    // turn vertex 0 onto z, then keep the upper half; on the equator one of two opposite vertices
+    Vec3 z = all[0], x = vec3_normal_to(z), y = vec3_cross(z, x);
+    for (int i = 0; i < 2 * t->axis_count; i++) {
+        Vec3 a = vec3(vec3_dot(all[i], x), vec3_dot(all[i], y), vec3_dot(all[i], z));
+        bool upper = a.z > 1e-9 || (a.z > -1e-9 && (a.y > 1e-9 || (a.y > -1e-9 && a.x > 0)));
+        if (!upper || used == t->axis_count)
+            continue;
+        int k = used++;
+        for (; k > 0 && t->axis[k - 1].z < a.z - 1e-9; k--)   // insertion keeps the order of equals
+            t->axis[k] = t->axis[k - 1];
+        t->axis[k] = a;
+    }
+    t->axis_count = used;
+}
+
+static double brightness(const Tracker *t, Vec3 point) { return (double)bspline_sample(t->volume, volume_voxel_of(t->volume, point)); }
+
+// Lumen on the axis less the darker half of a ring outside the wall: a neighbour in contact must not hide the vessel.
+static double contrast_of(const Tracker *t, const Cylinder *c)
+{
+    enum { RING = 16 };
+    double inside = 0, ring[RING], outside = 0, radius = 1.5 * c->radius + t->voxel;
+    Vec3 e1 = vec3_normal_to(c->axis), e2 = vec3_cross(c->axis, e1);
+    for (int i = -1; i <= 1; i++)
+        inside += brightness(t, vec3_add_scaled(c->center, 0.25 * i * c->radius, c->axis)) / 3;
+    for (int i = 0; i < RING; i++) {
+        double a = 2 * PI * i / RING;
+        ring[i] = brightness(t, vec3_add_scaled(vec3_add_scaled(c->center, radius * cos(a), e1), radius * sin(a), e2));
+    }
+    qsort(ring, RING, sizeof *ring, compare_doubles);
+    for (int i = 0; i < RING / 2; i++)
+        outside += ring[i] / (RING / 2);
+    return inside - outside;
+}
+
+// RANSAC over the axis directions in order of their angle with the predicted one: the first valid cylinder, or the best of all if that is above
+// the relaxed rate. Returns its inlier rate, 0 where there is none.
+static double search_axes(Tracker *t, const Cylinder *predicted, int candidates, double threshold, Cylinder *out)
+{
+    const RbtParameters *p = t->parameters;
+    RansacOptions options = {.threshold = threshold, .radius_min = predicted->radius / 2, .radius_max = 1.5 * predicted->radius,
+                             .offset_max = 1.5 * predicted->radius, .inlier_rate = p->p_inl, .trials_min = (int)p->n_min, .trials_max = (int)p->n_max};
+    Vec3 z = predicted->axis, x = vec3_normal_to(z), y = vec3_cross(z, x);
+    double best = 0;
+    for (int i = 0; i < t->axis_count && best <= p->p_inl; i++) {
+        Vec3 a = t->axis[i], axis = vec3_add(vec3_add(vec3_scale(x, a.x), vec3_scale(y, a.y)), vec3_scale(z, a.z));
+        Cylinder cylinder;
+        double rate = ransac_circle(t->candidate, candidates, predicted->center, vec3_unit(axis), &options, &t->random, &cylinder);
+        if (rate > best) {
+            best = rate;
+            *out = cylinder;
+        }
+    }
+    return best > p->relaxed * p->p_inl ? best : 0;
+}
+
+// The consensus set's median position along the axis becomes the centre; the height encloses the share of the inliers around it.
+static double median_along(Tracker *t, const Cylinder *c, int inliers)
+{
+    for (int i = 0; i < inliers; i++)
+        t->along[i] = vec3_dot(vec3_sub(t->candidate[t->inlier[i]], c->center), c->axis);
+    qsort(t->along, (size_t)inliers, sizeof *t->along, compare_doubles);
+    return inliers % 2 ? t->along[inliers / 2] : 0.5 * (t->along[inliers / 2 - 1] + t->along[inliers / 2]);
+}
+
+// The whole of the estimation step. False where no cylinder is valid (t->why says which part failed); else t->estimate holds the node.
+static bool estimate(Tracker *t, const Cylinder *predicted, double relative_threshold)
+{
+    const RbtParameters *p = t->parameters;
+    RayOptions rays = {p->ray_length * predicted->radius, (int)p->n_p, p->ray_smoothing_voxels * t->voxel, p->ray_edge};
+    double threshold = fmax(relative_threshold * predicted->radius, p->r_t_voxels * t->voxel);
+    int least = t->ray_count / 8;   // fewer edges than this are no tube
+    Cylinder c;
+    int n = cast_rays(t->volume, predicted->center, t->ray, t->ray_count, &rays, t->candidate);
+    t->why = "too few rays meet a wall";
+    if (n < least)
+        return false;
+    t->why = "no cylinder among the points";
+    if (search_axes(t, predicted, n, threshold, &c) <= 0)
+        return false;
+    if (vec3_dot(c.axis, predicted->axis) < 0)
+        c.axis = vec3_negate(c.axis);
+    // refine, and select the consensus anew: the axis of the discrete set lags otherwise
+    int inliers = cylinder_inliers(&c, t->candidate, n, threshold, t->inlier);
+    for (int i = 0; i <= (int)p->refits; i++) {
+        bool good;
+        cylinder_refine(&c, t->candidate, t->inlier, inliers, p->powell > 0, &good);
+        if (!good || c.radius < predicted->radius / 2 || c.radius > 1.5 * predicted->radius)
+            return false;
+        inliers = cylinder_inliers(&c, t->candidate, n, threshold, t->inlier);
+    }
+    if (inliers < least)
+        return false;
+    c.center = vec3_add_scaled(c.center, median_along(t, &c, inliers), c.axis);
+    // new candidates from the new centre give the node's points and height
+    rays.length = p->ray_length * c.radius;
+    n = cast_rays(t->volume, c.center, t->ray, t->ray_count, &rays, t->candidate);
+    inliers = n < least ? 0 : cylinder_inliers(&c, t->candidate, n, threshold, t->inlier);
+    double rate = n > 0 ? (double)inliers / n : 0;
+    if (inliers < least || rate <= p->relaxed * p->p_inl)
+        return false;
+    for (int i = 0; i < inliers; i++)
+        t->along[i] = fabs(vec3_dot(vec3_sub(t->candidate[t->inlier[i]], c.center), c.axis));
+    qsort(t->along, (size_t)inliers, sizeof *t->along, compare_doubles);
+    int inside = (int)ceil(p->height_share * inliers);
+    c.height = 2 * t->along[inside > 0 ? inside - 1 : 0];
+    t->estimate.node = (TrackNode){.cylinder = c, .inlier_rate = rate, .contrast = contrast_of(t, &c), .kind = NODE_VESSEL, .parent = -1};
+    int kept = 0;
+    for (int i = 0; i < inliers; i++) {
+        Vec3 x = t->candidate[t->inlier[i]];
+        if (2 * fabs(vec3_dot(vec3_sub(x, c.center), c.axis)) <= c.height)
+            t->estimate.point[kept++] = x;
+    }
+    t->estimate.node.point_count = kept;
+    t->why = NULL;
+    return c.height > 0 && vec3_is_finite(c.center);
+}
+
+// --- one branch ---
+
+static bool inside_volume(const Volume *volume, Vec3 x)
+{
+    Vec3 v = volume_voxel_of(volume, x);
+    return v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x <= volume->size[0] - 1 && v.y <= volume->size[1] - 1 && v.z <= volume->size[2] - 1;
+}
+
+static double segment_distance(Vec3 x, Vec3 a, Vec3 b)
+{
+    Vec3 ab = vec3_sub(b, a);
+    double l2 = vec3_norm2(ab), s = l2 > 0 ? vec3_dot(vec3_sub(x, a), ab) / l2 : 0;
+    return vec3_distance(x, vec3_add_scaled(a, fmax(0, fmin(1, s)), ab));
+}
+
+// A node of the finished tree whose tube holds x near its middle, or -1.
+static int tree_node_around(const Tracker *t, Vec3 x, double share)
+{
+    for (int i = 0; i < t->tree.count; i++)
+        if (vec3_distance(x, t->tree.node[i].cylinder.center) < share * t->tree.node[i].cylinder.radius)
+            return i;
+    return -1;
+}
+
+static double recent_contrast(const Track *track)
+{
+    int first = track->count > CONTRAST_MEMORY ? track->count - CONTRAST_MEMORY : 0;
+    double sum = 0;
+    for (int i = first; i < track->count; i++)
+        sum += track->node[i].contrast;
+    return sum / (track->count - first);
+}
+
+// Is the estimate the next node after the last one of the branch?
+static bool is_progress(Tracker *t, const Track *branch, double step, bool is_retry, bool may_overlap)
+{
+    const RbtParameters *p = t->parameters;
+    const TrackNode *last = &branch->node[branch->count - 1];
+    const TrackNode *next = &t->estimate.node;
+    Vec3 move = vec3_sub(next->cylinder.center, last->cylinder.center);
+    t->why = "leaves the volume";
+    if (!inside_volume(t->volume, next->cylinder.center))
+        return false;
+    t->why = "steps back";
+    if (vec3_dot(move, last->cylinder.axis) < 0.25 * step)
+        return false;
+    for (int i = 0; i + 1 < branch->count; i++)
+        if (segment_distance(next->cylinder.center, branch->node[i].cylinder.center, branch->node[i + 1].cylinder.center) < p->back_step * last->cylinder.radius)
+            return false;
+    t->why = "runs into itself";
+    double way = vec3_norm(move);
+    for (int i = branch->count - 2; i >= 0; i--) {
+        way += vec3_distance(branch->node[i].cylinder.center, branch->node[i + 1].cylinder.center);
+        if (way > 4 * last->cylinder.radius && vec3_distance(next->cylinder.center, branch->node[i].cylinder.center) < p->overlap * branch->node[i].cylinder.radius)
+            return false;
+    }
+    t->why = "the contrast is lost";
+    double contrast = recent_contrast(branch);
+    if (next->contrast < p->contrast * contrast || !(next->contrast > 0.02 * ((double)t->volume->maximum - (double)t->volume->minimum)))
+        return false;
+    t->why = "no vessel beyond";
+    if (is_retry && (fabs(next->cylinder.radius - last->cylinder.radius) > p->retry_radius * last->cylinder.radius || next->contrast < p->retry_contrast * contrast))
+        return false;
+    t->why = "runs into another branch";
+    return may_overlap || tree_node_around(t, next->cylinder.center, p->overlap) < 0;
+}
+
+// The next node of a branch: the step of eq. (1), then the longer ones, each with both thresholds. False at the end of the vessel.
+static bool next_node(Tracker *t, const Track *branch, bool may_overlap)
+{
+    const RbtParameters *p = t->parameters;
+    const TrackNode *last = &branch->node[branch->count - 1];
+    double step = p->s * last->cylinder.height / 2;
+    const char *first_reason = NULL;
+    for (int k = 0; k <= p->retry_count; k++) {
+        Cylinder predicted = last->cylinder;
+        double length = k ? p->retry_steps[k - 1] * step : step;
+        predicted.center = vec3_add_scaled(predicted.center, length, predicted.axis);
+        for (int second = 0; second <= (p->r_t_second > 0); second++) {
+            bool found = estimate(t, &predicted, second ? p->r_t_second : p->r_t) && is_progress(t, branch, length, k > 0, may_overlap);
+            if (found) {
+                t->estimate.node.retried = k > 0;
+                return true;
+            }
+            if (!first_reason)
+                first_reason = t->why;
+        }
+    }
+    t->why = first_reason;
+    return false;
+}
+
+// Darkest place on the way from a to b, as a share of the lumen's brightness at both ends.
+static double link_brightness(const Tracker *t, Vec3 a, Vec3 b)
+{
+    double base = (double)t->volume->minimum, ends = fmin(brightness(t, a), brightness(t, b)) - base, least = HUGE_VAL;
+    int steps = 2 + (int)(vec3_distance(a, b) / (0.5 * t->voxel));
+    if (steps > 4000)
+        steps = 4000;
+    for (int i = 0; i <= steps; i++)
+        least = fmin(least, brightness(t, vec3_mix(a, b, (double)i / steps)) - base);
+    return ends > 0 ? least / ends : 0;
+}
+
+// --- past what is no cylinder ---
+
+// The median radius of the last nodes: what the vessel is like.
+static double usual_radius(const Track *branch)
+{
+    double radius[12];
+    int n = branch->count < 12 ? branch->count : 12;
+    for (int i = 0; i < n; i++)
+        radius[i] = branch->node[branch->count - 1 - i].cylinder.radius;
+    qsort(radius, (size_t)n, sizeof *radius, compare_doubles);
+    return radius[n / 2];
+}
+
+// Nodes on the straight way between two cylinders, in an opening where no cylinder fits: their points are the first walls that rays meet nearby.
+static bool append_junction(Tracker *t, Track *branch, const Cylinder *from, const Cylinder *to)
+{
+    Vec3 way = vec3_sub(to->center, from->center);
+    double gap = vec3_norm(way);
+    int steps = (int)ceil(gap / (0.5 * fmin(from->radius, to->radius)));
+    for (int i = 1; i < steps; i++) {
+        double share = (double)i / steps, distance[MAX_RAYS];
+        Cylinder c = {vec3_mix(from->center, to->center, share), from->radius + share * (to->radius - from->radius), vec3_unit(way), 2 * gap / steps};
+        RayOptions rays = {2 * c.radius, (int)t->parameters->n_p, t->parameters->ray_smoothing_voxels * t->voxel, 0};
+        t->estimate.node = (TrackNode){.cylinder = c, .contrast = recent_contrast(branch), .kind = NODE_VESSEL, .parent = -1, .is_junction = true};
+        cast_rays_first_edge(t->volume, c.center, t->ray, t->ray_count, &rays, distance);
+        int kept = 0;
+        for (int k = 0; k < t->ray_count; k++)
+            if (distance[k] > 0 && distance[k] < 1.5 * c.radius)
+                t->estimate.point[kept++] = vec3_add_scaled(c.center, distance[k], t->ray[k]);
+        t->estimate.node.point_count = kept;
+        t->estimate.node.inlier_rate = (double)kept / t->ray_count;
+        if (!track_append(branch, &t->estimate.node, t->estimate.point))
+            return false;
+    }
+    return true;
+}
+
+static void track_cut(Track *track, int count)
+{
+    if (count < track->count)
+        track->point_count = track->node[count].point_start;
+    track->count = count;
+}
+
+static bool next_node(Tracker *t, const Track *branch, bool may_overlap);
+
+// From an exit back towards the branch, until that is met or the tube widens into what is to be passed. Then joins: the branch up to `keep` nodes, the
+// junction, the way back turned round. False where the exit is no vessel or cannot be seen from the branch.
+static bool join_exit(Tracker *t, Track *branch, int keep, const RbtExit *exit, int place)
+{
+    const RbtParameters *p = t->parameters;
+    const Cylinder last = branch->node[keep - 1].cylinder;
+    Cylinder predicted = {exit->center[place], exit->radius, exit->direction[place], 0};
+    Track back = {0};
+    if (tree_node_around(t, exit->center[place], 1) >= 0 || !(estimate(t, &predicted, p->r_t) || (p->r_t_second > 0 && estimate(t, &predicted, p->r_t_second))))
+        return false;
+    if (t->estimate.node.contrast < p->retry_contrast * recent_contrast(branch) || tree_node_around(t, t->estimate.node.cylinder.center, p->overlap) >= 0)
+        return false;
+    t->estimate.node.cylinder.axis = vec3_negate(t->estimate.node.cylinder.axis);
+    bool good = true;
+    int joined = -1;   // the node of the way back that is nearest to the branch and in plain sight of it
+    double nearest = HUGE_VAL, brightest = 0.5;
+    for (int i = 0; good && i < 40; i++) {
+        const Cylinder *c = &t->estimate.node.cylinder;
+        double link = link_brightness(t, last.center, c->center), distance = vec3_distance(c->center, last.center);
+        // it has met the branch, has come into the wide part, or has passed by
+        if (i > 0 && (distance < last.radius || c->radius > 1.35 * usual_radius(&back) || (brightest >= 0.9 && link < 0.5)))
+            break;
+        good = track_append(&back, &t->estimate.node, t->estimate.point);
+        if (link >= 0.9 ? brightest < 0.9 || distance < nearest : link > brightest) {
+            joined = i;
+            nearest = distance;
+            brightest = fmin(link, 0.9);
+        }
+        if (!good || !next_node(t, &back, false))
+            break;
+    }
+    t->out_of_memory = !good;
+    good = good && joined >= 0;
+    if (good) {
+        track_cut(branch, keep);
+        good = append_junction(t, branch, &last, &back.node[joined].cylinder);
+        for (int i = joined; good && i >= 0; i--) {
+            TrackNode node = back.node[i];
+            node.cylinder.axis = vec3_negate(node.cylinder.axis);
+            good = track_append(branch, &node, back.point + back.node[i].point_start);
+        }
+        t->out_of_memory = !good;
+    }
+    track_free(&back);
+    return good;
+}
+
+// The branch has swelled or ended: looks ahead for its continuation and joins the widest one that tracks.
+static bool look_ahead(Tracker *t, Track *branch)
+{
+    enum { MAX_EXITS = 16 };
+    RbtExit exit[MAX_EXITS];
+    double radius = usual_radius(branch), base = (double)t->volume->minimum;
+    int keep = branch->count, found = 0;
+    while (keep > 2 && branch->node[keep - 1].cylinder.radius > 1.15 * radius)
+        keep--;
+    const Cylinder *last = &branch->node[keep - 1].cylinder;
+    double level = base + 0.5 * (brightness(t, last->center) - base);
+    RbtBlock *block = malloc((size_t)keep * sizeof *block);
+    if (block) {
+        for (int i = 0; i < keep; i++)
+            block[i] = (RbtBlock){branch->node[i].cylinder.center, 1.4 * branch->node[i].cylinder.radius};
+        found = rbt_find_exits(t->volume, last->center, last->axis, radius, t->parameters->look_ahead * radius, level, block, keep, exit, MAX_EXITS);
+    }
+    free(block);
+    const char *why = t->why;
+    for (int i = 0; i < found && !t->out_of_memory; i++)
+        for (int place = 0; exit[i].radius < 2 * radius && place < exit[i].count && !t->out_of_memory; place++)
+            if (join_exit(t, branch, keep, &exit[i], place))
+                return true;
+    t->why = why;
+    return false;
+}
+
+static double branch_length(const Track *branch)
+{
+    double length = 0;
+    for (int i = 1; i < branch->count; i++)
+        length += vec3_distance(branch->node[i].cylinder.center, branch->node[i - 1].cylinder.center);
+    return length;
+}
+
+// Tracks from an estimate of the first node until the vessel ends. The branch's nodes are appended to `branch`, without parents.
+// `until_tree`: it is on its way back to its parent and ends inside another branch's tube.
+static void track_branch(Tracker *t, const Cylinder *start, Track *branch, bool until_tree)
+{
+    const RbtParameters *p = t->parameters;
+    double length = 0;
+    bool left = tree_node_around(t, start->center, 1) < 0;   // it may start within its parent's tube, and be there until it has left it
+    Cylinder predicted = *start;
+    if (!estimate(t, &predicted, p->r_t) && !(p->r_t_second > 0 && estimate(t, &predicted, p->r_t_second)))
+        return;
+    int rest = 0;   // nodes until it looks ahead again
+    for (bool found = true; found;) {
+        if (!track_append(branch, &t->estimate.node, t->estimate.point)) {
+            t->out_of_memory = true;
+            return;
+        }
+        Vec3 here = t->estimate.node.cylinder.center;
+        left = left || tree_node_around(t, here, 1) < 0;
+        length = branch_length(branch);
+        t->why = "is as long as max_length_mm";
+        if (length >= p->max_length_mm || branch->count >= MAX_NODES)
+            return;
+        t->why = "reached its parent";
+        if (until_tree && tree_node_around(t, here, 0.9) >= 0)
+            return;
+        t->why = "does not leave its parent";
+        if (!left && length > 6 * branch->node[0].cylinder.radius)
+            return;
+        found = next_node(t, branch, !left);
+        bool swells = found && branch->count >= 6 && t->estimate.node.cylinder.radius > 1.35 * usual_radius(branch);
+        rest -= rest > 0;
+        if (p->look_ahead > 0 && !until_tree && left && branch->count >= 6 && rest == 0 && (swells || !found)) {
+            rest = 12;
+            Estimate *kept = malloc(sizeof *kept);   // the search uses the tracker's own
+            if (!kept) {
+                t->out_of_memory = true;
+                return;
+            }
+            *kept = t->estimate;
+            bool joined = look_ahead(t, branch);
+            if (!joined)
+                t->estimate = *kept;
+            free(kept);
+            if (t->out_of_memory)
+                return;
+            if (joined)
+                found = next_node(t, branch, false);
+        }
+    }
+}
+
+// --- the tree, section 3.3 ---
+
+// Where a subtree that starts at x hangs on the tree: the node of least power distance whose straight link stays inside the lumen (at least half as
+// bright as its ends); if no link does, the brightest one among the near nodes.
+static int attachment(const Tracker *t, Vec3 x, int node_count)
+{
+    int best = -1, brightest = -1;
+    double least = HUGE_VAL, most = -HUGE_VAL, reach = HUGE_VAL;
+    for (int i = 0; i < node_count; i++)
+        reach = fmin(reach, vec3_distance(x, t->tree.node[i].cylinder.center));
+    for (int i = 0; i < node_count; i++) {
+        const TrackNode *n = &t->tree.node[i];
+        double distance = vec3_distance(x, n->cylinder.center), power = distance * distance - n->cylinder.radius * n->cylinder.radius;
+        if (distance > 2 * reach + 4 * n->cylinder.radius)
+            continue;
+        double link = link_brightness(t, x, n->cylinder.center);
+        if (link >= 0.5 && power < least) {
+            least = power;
+            best = i;
+        }
+        if (link > most) {
+            most = link;
+            brightest = i;
+        }
+    }
+    return best >= 0 ? best : brightest;
+}
+
+// Appends a branch's nodes: those of the way back reversed, then those of the way out.
+static bool adopt_branch(Tracker *t, const Track *out, const Track *back, int number)
+{
+    int before = t->tree.count;
+    for (int i = 0; i < back->count + out->count; i++) {
+        bool is_back = i < back->count;
+        const Track *from = is_back ? back : out;
+        TrackNode node = from->node[is_back ? back->count - 1 - i : i - back->count];
+        const Vec3 *point = from->point + node.point_start;
+        if (is_back)
+            node.cylinder.axis = vec3_negate(node.cylinder.axis);
+        node.branch = number;
+        node.parent = i > 0 ? t->tree.count - 1 : before > 0 ? attachment(t, node.cylinder.center, before) : -1;
+        if (!track_append(&t->tree, &node, point))
+            return false;
+    }
+    return true;
+}
+
+static void report_branch(const Tracker *t, int first, double p_inl, RbtBranchReport *report)
+{
+    *report = (RbtBranchReport){.first_node = first, .node_count = t->tree.count - first, .inlier_rate_min = t->tree.count > first ? 1 : 0};
+    for (int i = first; i < t->tree.count; i++) {
+        const TrackNode *n = &t->tree.node[i];
+        report->inlier_rate += n->inlier_rate / report->node_count;
+        report->inlier_rate_min = fmin(report->inlier_rate_min, n->inlier_rate);
+        report->relaxed_count += n->inlier_rate <= p_inl;
+        report->retried_count += n->retried;
+        report->junction_count += n->is_junction;
+        if (n->parent >= 0)
+            report->length += vec3_distance(n->cylinder.center, t->tree.node[n->parent].cylinder.center);
+    }
+}
+
+// The nearest point of the centreline and its node, for the projection of section 3.3.
+static int project_to_tree(const Tracker *t, Vec3 x, Vec3 *foot)
+{
+    int node = 0;
+    double least = HUGE_VAL;
+    for (int i = 0; i < t->tree.count; i++) {
+        const TrackNode *n = &t->tree.node[i];
+        Vec3 a = n->cylinder.center, b = n->parent >= 0 ? t->tree.node[n->parent].cylinder.center : a, ab = vec3_sub(b, a);
+        double l2 = vec3_norm2(ab), s = l2 > 0 ? fmax(0, fmin(1, vec3_dot(vec3_sub(x, a), ab) / l2)) : 0, d = vec3_distance(x, vec3_add_scaled(a, s, ab));
+        if (d < least) {
+            least = d;
+            node = i;
+            *foot = vec3_add_scaled(a, s, ab);
+        }
+    }
+    return node;
+}
+
+// Tracks seed `number`. With a `toward`: from its start, and for further branches also back to the parent. Without: as section 3.3 has it, from just
+// outside the parent's wall; where nothing is found there (the point was set far down the branch) from the point itself, and back.
+static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
+{
+    Track out = {0}, back = {0};
+    bool is_first = t->tree.count == 0, both_ways = !is_first;
+    Cylinder start = {.center = seed->start, .radius = seed->radius};
+    t->random = random_from_seed((uint64_t)t->parameters->seed, (uint64_t)number);
+    if (seed->has_toward)
+        start.axis = vec3_unit(vec3_sub(seed->toward, seed->start));
+    if (!is_first) {
+        Vec3 foot = seed->start;
+        int parent = project_to_tree(t, seed->start, &foot);
+        Vec3 away = vec3_unit_or(vec3_sub(seed->start, foot), t->tree.node[parent].cylinder.axis);
+        double parent_radius = t->tree.node[parent].cylinder.radius;
+        if (!(start.radius > 0))
+            start.radius = parent_radius;
+        if (!seed->has_toward) {
+            Cylinder beside = {.center = vec3_add_scaled(foot, 1.25 * parent_radius, away), .radius = start.radius, .axis = away};
+            start.axis = away;
+            track_branch(t, &beside, &out, false);
+            both_ways = out.count < 3;
+            if (both_ways)
+                track_free(&out);
+        }
+    }
+    if (out.count == 0)
+        track_branch(t, &start, &out, false);
+    const char *why = t->why;
+    if (both_ways && out.count > 0 && !t->out_of_memory) {
+        Cylinder behind = out.node[0].cylinder;
+        behind.axis = vec3_negate(behind.axis);
+        Track way = {0};
+        track_branch(t, &behind, &way, true);
+        // its first node is the branch's own first one, seen the other way
+        for (int i = 1; i < way.count && !t->out_of_memory; i++)
+            t->out_of_memory = !track_append(&back, &way.node[i], way.point + way.node[i].point_start);
+        track_free(&way);
+    }
+    t->why = why;
+    bool found = out.count > 0 && !t->out_of_memory;
+    if (found)
+        t->out_of_memory = !adopt_branch(t, &out, &back, number);
+    track_free(&out);
+    track_free(&back);
+    return found;
+}
+
+// --- aneurysms, section 3.4 ---
+
+typedef struct SacJob {
+    const Tracker *t;
+    const Vec3 *direction;
+    int direction_count;
+    const Vec3 *center;
+    double (*distance)[MAX_RAYS];   // per centre
+} SacJob;
+
+static void cast_sac_rays(void *context, long index)
+{
+    SacJob *job = context;
+    const RbtParameters *p = job->t->parameters;
+    int samples = (int)(p->aneurysm_reach_mm / (0.25 * job->t->voxel));
+    samples = samples < 32 ? 32 : samples > MAX_RAY_SAMPLES ? MAX_RAY_SAMPLES : samples;
+    RayOptions rays = {p->aneurysm_reach_mm, samples, 0, 0};
+    cast_rays_first_edge(job->t->volume, job->center[index], job->direction, job->direction_count, &rays, job->distance[index]);
+}
+
+// Is x on the wall of a tracked cylinder, as its consensus set is?
+static bool is_in_consensus(const Tracker *t, Vec3 x, int node_count)
+{
+    for (int i = 0; i < node_count; i++) {
+        const Cylinder *c = &t->tree.node[i].cylinder;
+        Vec3 q = vec3_sub(x, c->center);
+        double along = vec3_dot(q, c->axis);
+        if (fabs(along) > c->height / 2)
+            continue;
+        double rho = sqrt(fmax(vec3_norm2(q) - along * along, 0));
+        if (fabs(rho - c->radius) <= fmax(t->parameters->r_t * c->radius, t->parameters->r_t_voxels * t->voxel))
+            return true;
+    }
+    return false;
+}
+
+static double power_of(const Cylinder *c, Vec3 x) { return vec3_norm2(vec3_sub(x, c->center)) - c->radius * c->radius; }
+
+// Does a vessel's node own x rather than the sac? Such points were seen through the neck and lie on the vessel's wall.
+static bool is_vessels(const Tracker *t, Vec3 x, int node_count, const TrackNode *sac, int sac_count)
+{
+    double least = HUGE_VAL;
+    for (int i = 0; i < sac_count; i++)
+        least = fmin(least, power_of(&sac[i].cylinder, x));
+    for (int i = 0; i < node_count; i++)
+        if (power_of(&t->tree.node[i].cylinder, x) < least)
+            return true;
+    return false;
+}
+
+// One sac: points by rays from each centre, a sphere for each, then the centres are linked: the first to the tree, every next one to its nearest.
+static bool track_aneurysm(Tracker *t, const RbtAneurysm *aneurysm, const Vec3 *center, int number, int threads, Faults *faults, const char *path)
+{
+    int n = aneurysm->center_count, rays = (int)t->parameters->aneurysm_rays, vessel_count = t->tree.count;
+    Vec3 *direction = malloc(MAX_RAYS * sizeof *direction), *point = malloc((size_t)n * MAX_RAYS * sizeof *point);
+    double(*distance)[MAX_RAYS] = malloc((size_t)n * sizeof *distance);
+    TrackNode *sac = calloc((size_t)n, sizeof *sac);
+    bool good = direction && point && distance && sac;
+    t->out_of_memory = !good;
+    if (good) {
+        sphere_directions(sphere_level_of(rays), direction);
+        SacJob job = {t, direction, rays, center, distance};
+        parallel_for(threads, n, cast_sac_rays, &job, NULL);
+    }
+    for (int i = 0; good && i < n; i++) {
+        Vec3 *own = point + (size_t)i * MAX_RAYS, middle;
+        int count = 0;
+        for (int k = 0; k < rays; k++) {
+            Vec3 x = vec3_add_scaled(center[i], distance[i][k], direction[k]);
+            if (distance[i][k] > 0 && !is_in_consensus(t, x, vessel_count))
+                own[count++] = x;
+        }
+        double radius;
+        good = count >= rays / 8 && sphere_fit(own, count, &middle, &radius);
+        if (!good) {
+            faults_add(faults, path, aneurysm->line, aneurysm->column, "centre %d of the aneurysm sees no wall around it (%d of %d rays within %g mm); a point well "
+                       "inside the sac, or a longer aneurysm_reach_mm", i + 1, count, rays, t->parameters->aneurysm_reach_mm);
+            break;
+        }
+        sac[i] = (TrackNode){.cylinder = {center[i], radius, {1, 0, 0}, 2 * radius}, .inlier_rate = (double)count / rays, .kind = NODE_ANEURYSM, .branch = number,
+                             .point_count = count, .parent = -1};
+    }
+    for (int i = 0; good && i < n; i++) {
+        Vec3 *own = point + (size_t)i * MAX_RAYS;
+        int kept = 0;
+        for (int k = 0; k < sac[i].point_count; k++)
+            if (!is_vessels(t, own[k], vessel_count, sac, n))
+                own[kept++] = own[k];
+        sac[i].point_count = kept;
+        sac[i].inlier_rate = (double)kept / rays;
+    }
+    // Prim's tree over the centres, from the one that hangs on the vessel
+    for (int done = 0; good && done < n; done++) {
+        int next = -1, parent = -1;
+        double least = HUGE_VAL;
+        for (int i = 0; i < n; i++) {
+            if (sac[i].parent != -1)
+                continue;
+            int first = done == 0 ? attachment(t, center[i], vessel_count) : vessel_count, last = done == 0 ? first + 1 : t->tree.count;
+            for (int j = first; j < last; j++) {
+                double d = done == 0 ? power_of(&t->tree.node[j].cylinder, center[i]) : vec3_distance(center[i], t->tree.node[j].cylinder.center);
+                if (d < least) {
+                    least = d;
+                    next = i;
+                    parent = j;
+                }
+            }
+        }
+        sac[next].parent = parent;
+        sac[next].cylinder.axis = vec3_unit(vec3_sub(center[next], t->tree.node[parent].cylinder.center));
+        sac[next].point_start = 0;
+        good = track_append(&t->tree, &sac[next], point + (size_t)next * MAX_RAYS);
+        t->out_of_memory = !good;
+    }
+    free(direction);
+    free(point);
+    free(distance);
+    free(sac);
+    return good;
+}
+
+// --- the whole ---
+
+static Vec3 in_mm(const Volume *volume, Vec3 x, bool is_voxel) { return is_voxel ? volume_point_of(volume, x) : x; }
+
+static bool check_point(const Tracker *t, Vec3 x, const char *what, int line, int column, const char *path, Faults *faults)
+{
+    Vec3 v = volume_voxel_of(t->volume, x);
+    const int *size = t->volume->size;
+    if (!inside_volume(t->volume, x)) {
+        faults_add(faults, path, line, column, "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies outside the volume; voxels (0, 0, 0) to (%d, %d, %d)", what, x.x, x.y,
+                   x.z, v.x, v.y, v.z, size[0] - 1, size[1] - 1, size[2] - 1);
+        return false;
+    }
+    double value = brightness(t, x), low = (double)t->volume->minimum, high = (double)t->volume->maximum;
+    if (value < low + 0.1 * (high - low)) {
+        faults_add(faults, path, line, column, "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies on background (%g in a volume of %g to %g); a point inside a vessel",
+                   what, x.x, x.y, x.z, v.x, v.y, v.z, value, low, high);
+        return false;
+    }
+    return true;
+}
+
+static bool check_seed(const Tracker *t, RbtSeed *seed, int number, const char *path, Faults *faults)
+{
+    char what[64];
+    int before = faults->count;
+    seed->start = in_mm(t->volume, seed->start, seed->start_is_voxel);
+    seed->toward = in_mm(t->volume, seed->toward, seed->toward_is_voxel);
+    seed->start_is_voxel = seed->toward_is_voxel = false;
+    snprintf(what, sizeof what, "the start of branch %d", number + 1);
+    check_point(t, seed->start, what, seed->line, seed->column, path, faults);
+    if (number == 0 && !seed->has_toward)
+        faults_add(faults, path, seed->line, seed->column, "the first branch has no direction; toward_mm (or toward_voxel), a point further down the vessel");
+    if (seed->has_toward && !(vec3_distance(seed->start, seed->toward) > 1e-6 * t->voxel))
+        faults_add(faults, path, seed->line, seed->column, "the start of branch %d and its toward are the same point; toward is a point further down the vessel", number + 1);
+    if (number == 0 && !(seed->radius > 0))
+        faults_add(faults, path, seed->line, seed->column, "the first branch has no radius; radius_mm, about that of the vessel at its start");
+    double extent = 0;
+    for (int i = 0; i < 3; i++)
+        extent = fmax(extent, vec3_norm(t->volume->axis[i]) * t->volume->size[i]);
+    if (seed->radius > extent / 2)
+        faults_add(faults, path, seed->line, seed->column, "the radius %g mm of branch %d is larger than the volume; at most %g mm", seed->radius, number + 1, extent / 2);
+    return faults->count == before;
+}
+
+static VesselTree *finish_tree(const Track *track)
+{
+    VesselTree *tree = vessel_tree_create(track->count, track->point_count, 0);
+    if (!tree)
+        return NULL;
+    int64_t used = 0;
+    for (int i = 0; i < track->count; i++) {
+        const TrackNode *n = &track->node[i];
+        tree->center[i] = n->cylinder.center;
+        tree->radius[i] = n->cylinder.radius;
+        tree->direction[i] = n->cylinder.axis;
+        tree->height[i] = n->cylinder.height;
+        tree->parent[i] = n->parent;
+        tree->kind[i] = (uint8_t)n->kind;
+        tree->point_offset[i] = used;
+        if (n->point_count > 0)
+            memcpy(tree->point + used, track->point + n->point_start, (size_t)n->point_count * sizeof *tree->point);
+        used += n->point_count;
+    }
+    tree->point_offset[track->count] = used;
+    vessel_tree_link(tree);
+    return tree;
+}
+
+void rbt_report_free(RbtReport *report)
+{
+    free(report->branch);
+    *report = (RbtReport){0};
+}
+
+static bool track_all(Tracker *t, RbtSeed *seed, int seed_count, const RbtAneurysm *aneurysm, Vec3 **center, int aneurysm_count, int threads, const Progress *progress,
+                      RbtReport *report, const char *path, Faults *faults)
+{
+    for (int i = 0; i < seed_count + aneurysm_count; i++) {
+        int first = t->tree.count;
+        bool is_sac = i >= seed_count, found = is_sac ? track_aneurysm(t, &aneurysm[i - seed_count], center[i - seed_count], i, threads, faults, path)
+                                                      : track_seed(t, &seed[i], i);
+        if (t->out_of_memory) {
+            faults_add(faults, path, 0, 0, "out of memory at branch %d", i + 1);
+            return false;
+        }
+        if (!found) {
+            if (!is_sac)
+                faults_add(faults, path, seed[i].line, seed[i].column, "nothing could be tracked from the start of branch %d (%s); a point well inside the vessel, about its "
+                           "true radius and direction", i + 1, t->why);
+            return false;
+        }
+        report_branch(t, first, t->parameters->p_inl, &report->branch[i]);
+        report->branch[i].is_aneurysm = is_sac;
+        snprintf(report->branch[i].end, sizeof report->branch[i].end, "%s", is_sac ? "" : t->why ? t->why : "");
+        if (progress && progress->call)
+            progress->call(progress->context, i + 1, seed_count + aneurysm_count);
+    }
+    return true;
+}
+
+VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, const RbtSeed *given, int seed_count, const RbtAneurysm *aneurysm, int aneurysm_count,
+                      int threads, const Progress *progress, RbtReport *report, const char *path, Faults *faults)
+{
+    Tracker *t = calloc(1, sizeof *t);
+    RbtSeed *seed = malloc((size_t)(seed_count > 0 ? seed_count : 1) * sizeof *seed);
+    Vec3 **center = calloc((size_t)(aneurysm_count > 0 ? aneurysm_count : 1), sizeof *center);
+    RbtReport own = {.branch_count = seed_count + aneurysm_count, .branch = calloc((size_t)(seed_count + aneurysm_count + 1), sizeof *own.branch)};
+    VesselTree *tree = NULL;
+    bool good = t && seed && center && own.branch;
+    int before = faults->count;
+    for (int i = 0; good && i < aneurysm_count; i++)
+        good = (center[i] = malloc((size_t)aneurysm[i].center_count * sizeof **center)) != NULL;
+    if (!good)
+        faults_add(faults, path, 0, 0, "out of memory");
+    if (good && seed_count < 1)
+        faults_add(faults, path, 0, 0, "there is no branch to track; `branches` with at least one start");
+    if (good) {
+        *t = (Tracker){.volume = volume, .parameters = parameters, .voxel = volume_voxel_size(volume), .ray_count = (int)parameters->n_r,
+                       .axis_count = (int)parameters->n_d};
+        if (seed_count > 0)
+            memcpy(seed, given, (size_t)seed_count * sizeof *seed);
+        for (int i = 0; i < seed_count; i++)
+            check_seed(t, &seed[i], i, path, faults);
+        for (int i = 0; i < aneurysm_count; i++)
+            for (int k = 0; k < aneurysm[i].center_count; k++) {
+                center[i][k] = in_mm(volume, aneurysm[i].center[k], aneurysm[i].is_voxel);
+                check_point(t, center[i][k], "a centre of an aneurysm", aneurysm[i].line, aneurysm[i].column, path, faults);
+            }
+    }
+    if (good && faults->count == before) {
+        sphere_directions(sphere_level_of(t->ray_count), t->ray);
+        prepare_axes(t);
+        if (track_all(t, seed, seed_count, aneurysm, center, aneurysm_count, threads, progress, &own, path, faults) && !(tree = finish_tree(&t->tree)))
+            faults_add(faults, path, 0, 0, "out of memory for a tree of %d nodes", t->tree.count);
+    }
+    if (t)
+        track_free(&t->tree);
+    for (int i = 0; center && i < aneurysm_count; i++)
+        free(center[i]);
+    free(center);
+    free(seed);
+    free(t);
+    if (tree && report)
+        *report = own;
+    else
+        free(own.branch);
+    return tree;
+}

@@ -1,0 +1,103 @@
+// RANSAC-based tracking: from a volume and a few start points to a vessel tree of cylinders (C, r, d, h), each with its points on the wall.
+// Kerrien et al. 2017, section 3. Lengths mm, in the volume's frame. A run repeats bit for bit: random numbers come from `seed` and the branch's number
+// alone, and threads only share out the aneurysms' rays.
+//
+// The paper's values are rbt_paper_parameters(). The default ones differ where the paper's never get past a giant aneurysm or a symmetric
+// bifurcation: each field says so. The fields are listed by name, range and default in rbt_parameter_table, which the trace file and --help read.
+#ifndef SELDINGER_RECON_RBT_TRACK_H
+#define SELDINGER_RECON_RBT_TRACK_H
+
+#include "geom/vessel_tree.h"
+#include "recon/parallel.h"
+#include "recon/volume.h"
+
+#include <stdint.h>
+
+enum { RBT_MAX_RETRIES = 8 };
+
+typedef struct RbtParameters {
+    // the paper's, table 1 and section 3
+    double p_inl;            // inlier rate above which a cylinder is valid
+    double r_t;              // inlier threshold, as a share of the predicted radius
+    double n_r;              // rays: 42, 162, 642 or 2562
+    double n_d;              // axis directions: half as many as vertices: 21, 81 or 321
+    double n_p;              // samples along a ray
+    double n_min, n_max;     // RANSAC trials for a direction, least and most
+    double s;                // step in half heights, eq. (1)
+    double ray_length;       // in predicted radii
+    double height_share;     // of the inliers that the height encompasses
+    double back_step;        // a centre closer to the former centreline than this many radii is a step back
+    double relaxed;          // where no direction is valid, the best one is, above relaxed * p_inl
+    double powell;           // 1: refine by Powell's method (NLopt's PRAXIS), 0: by Gauss-Newton (same minimum)
+    // the mends
+    double r_t_voxels;       // inlier threshold is at least this many voxels
+    double r_t_second;       // threshold (share of the radius) of the second try; 0: none
+    double refits;           // times that the consensus is selected again with the refined axis, and refitted
+    double retry_steps[RBT_MAX_RETRIES];   // multiples of the step that are tried from the last good node when a step fails …
+    int retry_count;
+    double retry_radius;     // … and then the radius may change by this share only …
+    double retry_contrast;   // … and the contrast must be this share of the branch's
+    double ray_smoothing_voxels;   // moving average along the ray
+    double ray_edge;         // rays whose fall per voxel is below this share of the brightness range are discarded
+    double contrast;         // least contrast of a node as a share of the mean of its last eight predecessors
+    double look_ahead;       // where a branch swells or ends, the lumen is searched this many radii ahead for a vessel that goes on; 0: never
+    double overlap;          // a branch ends where its centre is closer than this many radii to the centre of another branch's node
+    double max_length_mm;    // of a branch
+    double aneurysm_rays;    // from each centre of an aneurysm: 162, 642 or 2562
+    double aneurysm_reach_mm;// their length
+    double seed;             // of the random numbers
+} RbtParameters;
+
+RbtParameters rbt_default_parameters(void);
+RbtParameters rbt_paper_parameters(void);
+
+typedef struct RbtParameterName {
+    const char *name;        // in the trace file
+    size_t offset;           // of the field, in RbtParameters
+    double least, most;
+    bool is_whole;
+    const char *meaning;
+} RbtParameterName;
+extern const RbtParameterName rbt_parameter_table[];
+extern const int rbt_parameter_count;
+// "name: value" a line, for the tree file; to be freed.
+char *rbt_parameters_text(const RbtParameters *parameters);
+
+typedef struct RbtSeed {     // where a branch starts
+    Vec3 start, toward;      // [mm] or voxels
+    bool start_is_voxel, toward_is_voxel, has_toward;
+    double radius;           // [mm]; 0: the parent's (not for the first branch)
+    int line, column;        // in the trace file, for faults
+} RbtSeed;
+
+typedef struct RbtAneurysm { // points inside a sac, the first one anywhere in it
+    int center_count;
+    Vec3 *center;            // [mm] or voxels
+    bool is_voxel;
+    int line, column;
+} RbtAneurysm;
+
+typedef struct RbtBranchReport {
+    int first_node, node_count;    // nodes of a branch follow each other
+    double length;           // [mm] of its centreline
+    double inlier_rate, inlier_rate_min;   // mean and least over the nodes
+    int relaxed_count;       // nodes below p_inl
+    int retried_count;       // nodes that took a longer step
+    int junction_count;      // nodes in openings where no cylinder fits (their inlier rate is the share of rays that meet a near wall)
+    bool is_aneurysm;
+    char end[96];            // why it ended
+} RbtBranchReport;
+
+typedef struct RbtReport {
+    int branch_count;
+    RbtBranchReport *branch; // one a seed, then one an aneurysm
+} RbtReport;
+void rbt_report_free(RbtReport *report);
+
+// Seeds first to last, then the aneurysms. The first seed gives the root and its direction (toward). A further one is projected to the tree tracked so far
+// (section 3.3) unless it has a `toward`: then it is tracked from its start in both directions, back to the parent. NULL with faults (`path` is the trace
+// file's) when a seed is unfit or nothing could be tracked from it; a branch that just ends early is no fault. `report` may be NULL.
+VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, const RbtSeed *seed, int seed_count, const RbtAneurysm *aneurysm,
+                      int aneurysm_count, int threads, const Progress *progress, RbtReport *report, const char *path, Faults *faults);
+
+#endif
