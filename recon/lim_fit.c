@@ -9,6 +9,7 @@
 #include "recon/lim_fit.h"
 
 #include "geom/blobby.h"
+#include "geom/power_walk.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -68,6 +69,9 @@ typedef struct Gather {      // the memory of one job
     Vec3 guard[GUARD_NODES * GUARD_ANGLES + NEAR_CAPACITY * 2 + SPHERE_DIRECTIONS];
     double clearance[GUARD_NODES * GUARD_ANGLES + NEAR_CAPACITY * 2 + SPHERE_DIRECTIONS];
     int guard_count;
+    Vec3 retry[NEAR_CAPACITY];
+    double retry_radius[NEAR_CAPACITY];
+    int retry_count;
     double reach;            // points further from the node are left to other models
 } Gather;
 
@@ -122,13 +126,17 @@ static bool extend_inlet(const VesselTree *tree, Gather *gather, Vec3 center)
     Vec3 root = tree->center[0], upstream = vec3_negate(tree->direction[0]);
     double least = 0, most = 0, radius = tree->radius[0];
     int64_t first = tree->point_offset[0], last = tree->point_offset[1];
+    int closing = 0;
     for (int64_t i = first; i < last; i++) {
-        double t = vec3_dot(vec3_sub(tree->point[i], root), upstream);
+        Vec3 p = vec3_sub(tree->point[i], root);
+        double t = vec3_dot(p, upstream);
+        closing += t > 0.5 * radius && vec3_norm2(p) - t * t < 0.36 * radius * radius;
         least = i == first || t < least ? t : least;
         most = i == first || t > most ? t : most;
     }
     double extent = most - least;
-    if (last - first < 12 || extent < 0.2 * radius)
+    // a root whose points close it over is a blind end, not an inlet
+    if (last - first < 12 || extent < 0.2 * radius || closing >= 3)
         return true;
     for (int copy = 1; copy < 12 && most + (copy - 1) * extent < 2.2 * radius; copy++)
         for (int64_t i = first; i < last; i++) {
@@ -171,9 +179,13 @@ static bool gather_points(const VesselTree *tree, int node, const LimFitOptions 
     // a sac's or branch's mouth may reach into this node's cell from a node further along the tree
     for (int k = gather->own_count; k < gather->near_count && options->guard_shape; k++) {
         int from = gather->near[k].node;
-        for (int64_t i = tree->point_offset[from]; i < tree->point_offset[from + 1]; i++)
-            if (vec3_distance(tree->point[i], center) < 1.7 * tree->radius[node] && !add_point(gather, tree->point[i]))
+        double apart = vec3_distance(tree->center[from], center), slack = 0.3 * tree->radius[node] * apart;
+        for (int64_t i = tree->point_offset[from]; i < tree->point_offset[from + 1]; i++) {
+            Vec3 p = tree->point[i];
+            bool reaches = power_distance(p, center, tree->radius[node]) < power_distance(p, tree->center[from], tree->radius[from]) + slack;
+            if (reaches && vec3_distance(p, center) < gather->reach && !add_point(gather, p))
                 return false;
+        }
     }
     if (has_root && options->extend_inlet && tree->kind[0] == NODE_VESSEL && !extend_inlet(tree, gather, center))
         return false;
@@ -286,6 +298,22 @@ static void gather_guards(const VesselTree *tree, int node, Gather *gather)
     }
 }
 
+// Blobs on the nodes around, where they do not crowd: for a second attempt.
+static void gather_retry(const VesselTree *tree, int node, Gather *gather)
+{
+    gather->retry_count = 0;
+    for (int k = 0; k < gather->own_count; k++) {
+        int at = gather->near[k].node;
+        bool free_place = vec3_distance(tree->center[at], tree->center[node]) < 0.8 * gather->reach;
+        for (int m = 0; m < gather->retry_count && free_place; m++)
+            free_place = vec3_distance(gather->retry[m], tree->center[at]) > 0.8 * fmin(tree->radius[at], gather->retry_radius[m]);
+        if (free_place) {
+            gather->retry[gather->retry_count] = tree->center[at];
+            gather->retry_radius[gather->retry_count++] = 0.8 * tree->radius[at];
+        }
+    }
+}
+
 // --- Jobs ---
 
 typedef struct NodeModel {
@@ -355,6 +383,12 @@ static void fit_node(void *context, long index)
         LimFitTask task = {.point_count = gather->point_count, .point = gather->point, .center = tree->center[node],
                            .direction = tree->direction[node], .radius = tree->radius[node], .guard_count = gather->guard_count,
                            .guard = gather->guard, .clearance = gather->clearance};
+        if (options->sweep_all_blobs) {
+            gather_retry(tree, node, gather);
+            task.retry_count = gather->retry_count;
+            task.retry = gather->retry;
+            task.retry_radius = gather->retry_radius;
+        }
         if (tree->kind[node] == NODE_ANEURYSM) {   // the paper's figure 5: one blob
             task.start_count = 1;
             task.start = &tree->center[node];

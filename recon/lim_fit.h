@@ -53,6 +53,9 @@ typedef struct LimFitTask {
     int start_count;         // 0: the paper's pair on either side of the centre; else start from these blobs
     const Vec3 *start;       // (start_count) centres …
     const double *start_radius;   // … and the radii of their spheres
+    int retry_count;         // where the first attempt gives up far from the target, another starts from these; the better one stays
+    const Vec3 *retry;       // (retry_count); 0: no second attempt
+    const double *retry_radius;
 } LimFitTask;
 int lim_fit_model(const LimFitTask *task, const LimFitOptions *options, Vec3 *center, double *width);
 // Width of two co-centred blobs that together keep the level set of value `level` of one blob (half the width where level >= width).

@@ -433,7 +433,7 @@ static int worst_point(Fit *fit, double *worst_distance, double *mean_square)
         double d = fabs((double)fit->distance[i]);
         d = isfinite(d) ? d : 1e30;
         fit->distance[i] = (float)d;
-        sum += fmin(d * d, 1e3);
+        sum += fmin(d, fit->task->radius) * fmin(d, fit->task->radius);
         beyond += d > fit->target;
         if (d > (double)fit->distance[worst])
             worst = i;
@@ -552,14 +552,18 @@ static void add_blob(Fit *fit, int worst, double worst_distance)
 
 // --- The fit ---
 
-static void start_model(Fit *fit)
+static void start_model(Fit *fit, bool retry)
 {
     const LimFitTask *task = fit->task;
     double iso_level = fit->options->iso_level;
-    if (task->start_count > 0) {
-        for (int k = 0; k < task->start_count && k < fit->options->max_blobs; k++) {
-            Vec3 c = vec3_sub(task->start[k], task->center);
-            fit->model.blob[fit->model.count++] = (LimBlob){{c.x, c.y, c.z}, blob_width_for_radius(task->start_radius[k], iso_level)};
+    int given = retry ? task->retry_count : task->start_count;
+    const Vec3 *start = retry ? task->retry : task->start;
+    const double *start_radius = retry ? task->retry_radius : task->start_radius;
+    fit->model.count = 0;
+    if (given > 0) {
+        for (int k = 0; k < given && k < fit->options->max_blobs; k++) {
+            Vec3 c = vec3_sub(start[k], task->center);
+            fit->model.blob[fit->model.count++] = (LimBlob){{c.x, c.y, c.z}, blob_width_for_radius(start_radius[k], iso_level)};
         }
         return;
     }
@@ -610,16 +614,17 @@ static void clean_up(Fit *fit)
     }
 }
 
-static void fit_run(Fit *fit)
+// One attempt; the model found is in fit->best. Returns its mean square distance, points counting no more than a radius.
+static double attempt_fit(Fit *fit, bool retry, double *worst_of_best)
 {
     const LimFitOptions *options = fit->options;
-    start_model(fit);
+    start_model(fit, retry);
     fit_refresh_sums(fit);
     fit_refresh_weights(fit);
     for (int j = 0; j < fit->model.count; j++)
         optimise_blob(fit, j);
     optimise_all(fit, 0, 8);
-    double best_square = HUGE_VAL, best_worst = HUGE_VAL;
+    double best_square = HUGE_VAL, best_worst = HUGE_VAL, square_of_best = HUGE_VAL;
     for (int idle = 0;;) {
         double worst_distance, mean_square;
         fit_refresh_sums(fit);
@@ -629,6 +634,8 @@ static void fit_run(Fit *fit)
         if (reached || mean_square < 0.96 * best_square || worst_distance < 0.93 * best_worst || options->give_up_splits == 0) {
             best_square = fmin(best_square, mean_square);
             best_worst = fmin(best_worst, worst_distance);
+            *worst_of_best = worst_distance;
+            square_of_best = mean_square;
             copy_model(&fit->best, &fit->model);
             idle = 0;
         } else {
@@ -638,6 +645,21 @@ static void fit_run(Fit *fit)
             break;
         add_blob(fit, worst, worst_distance);
         optimise_all(fit, fit->model.count - 1, 3);
+    }
+    return square_of_best;
+}
+
+static void fit_run(Fit *fit)
+{
+    double worst, square = attempt_fit(fit, false, &worst);
+    if (fit->task->retry_count > 0 && worst > 2.5 * fit->target) {
+        Model kept = {malloc((size_t)fit->capacity * sizeof(LimBlob)), 0};
+        if (kept.blob) {
+            copy_model(&kept, &fit->best);
+            if (attempt_fit(fit, true, &worst) > square)
+                copy_model(&fit->best, &kept);
+        }
+        free(kept.blob);
     }
     copy_model(&fit->model, &fit->best);
     fit_refresh_sums(fit);
