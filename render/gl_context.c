@@ -1,14 +1,13 @@
 // EGL_PLATFORM_SURFACELESS_MESA needs no surface at all: everything is drawn into framebuffer objects.
 //
-// The display is one per process and eglTerminate ends all of its contexts, so contexts are counted and the last one ends it: without that
-// every picture would leave the driver's display behind.
+// The display is one per process and stays open until the process ends: eglTerminate would end other contexts with it, and it unloads the
+// driver, which leaves a little of LLVM behind at every round and takes 50 ms to load again.
 #include "render/gl_context.h"
 
 #include "render/message.h"
 
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
-#include <pthread.h>
 #include <stdlib.h>
 
 struct GlContext {
@@ -18,9 +17,6 @@ struct GlContext {
     EGLContext previous_context;
     EGLSurface previous_draw, previous_read;
 };
-
-static pthread_mutex_t display_mutex = PTHREAD_MUTEX_INITIALIZER;
-static int display_users;
 
 static EGLDisplay open_display(char *message, size_t capacity)
 {
@@ -37,12 +33,6 @@ static EGLDisplay open_display(char *message, size_t capacity)
         return EGL_NO_DISPLAY;
     }
     return display;
-}
-
-static void release_display(EGLDisplay display)
-{
-    if (--display_users == 0)
-        eglTerminate(display);
 }
 
 static bool make_context(GlContext *context, char *message, size_t capacity)
@@ -78,17 +68,8 @@ GlContext *gl_context_create(char *message, size_t capacity)
     context->previous_context = eglGetCurrentContext();
     context->previous_draw = eglGetCurrentSurface(EGL_DRAW);
     context->previous_read = eglGetCurrentSurface(EGL_READ);
-    pthread_mutex_lock(&display_mutex);
     context->display = open_display(message, capacity);
-    bool made = false;
-    if (context->display != EGL_NO_DISPLAY) {
-        display_users++;
-        made = make_context(context, message, capacity);
-        if (!made)
-            release_display(context->display);
-    }
-    pthread_mutex_unlock(&display_mutex);
-    if (!made) {
+    if (context->display == EGL_NO_DISPLAY || !make_context(context, message, capacity)) {
         free(context);
         return NULL;
     }
@@ -101,9 +82,6 @@ void gl_context_destroy(GlContext *context)
         return;
     eglMakeCurrent(context->display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
     eglDestroyContext(context->display, context->context);
-    pthread_mutex_lock(&display_mutex);
-    release_display(context->display);
-    pthread_mutex_unlock(&display_mutex);
     if (context->previous_context != EGL_NO_CONTEXT)
         eglMakeCurrent(context->previous_display, context->previous_draw, context->previous_read, context->previous_context);
     free(context);

@@ -2,7 +2,7 @@
 //
 // Plain arrays in, a file out. Lengths mm, forces N, torques N mm, times s (these are borders: names carry the unit where it is not mm).
 // All arrays stay the caller's and are only read. Every function makes its own GL context (EGL, surfaceless, no X needed) and takes it down
-// again; one call at a time per thread, the same bytes for the same input on the same machine.
+// again; one call at a time in a process, the same bytes for the same input on the same machine.
 //
 // Return: true, or false with one line in `message` (which may be NULL): EGL or OpenGL 3.3 is not available (say so and go on: a picture is
 // never worth a failed run), the input has nothing to draw or numbers that are not finite, or the file cannot be written (it is written beside
