@@ -10,22 +10,12 @@
 // Pivots stay scalar: multiplying with explicit inverses of 6x6 blocks is faster by a third but loses the square root of the condition.
 #include "solver/block_chain.h"
 
+#include "solver/block_lanes.h"
+
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-#if defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && defined(__x86_64__)
-#define CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define CLONES
-#endif
-#define INLINE static inline __attribute__((always_inline))
-
-typedef double Lanes __attribute__((vector_size(64), may_alias));
-typedef double LooseLanes __attribute__((vector_size(64), may_alias, aligned(8)));
-
-enum { BLOCK = 36, COLUMN = 8, PANEL = 6 * COLUMN };
 
 // Per node: T and Z by columns (6 x 8; z lane 6: d^-1 y of the fused solve), and 1/d.
 struct BlockFactor {
@@ -96,18 +86,6 @@ typedef struct End {
     Lanes d[6], c[6], n[6];
     double *t, *z, *inverse;
 } End;
-
-INLINE void load_rows(Lanes *v, const double *a)
-{
-    for (int k = 0; k < 6; k++)
-        v[k] = *(const LooseLanes *)(a + 6 * k);
-}
-
-INLINE void load_columns(Lanes *v, const double *a)
-{
-    for (int k = 0; k < 6; k++)
-        v[k] = (Lanes){a[k], a[6 + k], a[12 + k], a[18 + k], a[24 + k], a[30 + k], 0, 0};
-}
 
 // Lane 6 of a node's columns: its right-hand side, where there is one.
 INLINE void set_side(Lanes *v, const double *b, int i)

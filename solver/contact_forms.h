@@ -1,0 +1,42 @@
+// Internal to solver: the work space of a contact solve and its two forms.
+#ifndef SELDINGER_SOLVER_CONTACT_FORMS_H
+#define SELDINGER_SOLVER_CONTACT_FORMS_H
+
+#include "solver/block_lu.h"
+#include "solver/contact_rows.h"
+#include "solver/gauss_seidel.h"
+
+enum { BLOCK_DOUBLES = 36 };
+
+// What a contact does in one Newton iteration: f = force - C (further motion), C acting in space.
+typedef struct ContactLaw {
+    int state;
+    bool touched;                // the matrix holds its C
+    Vec3 force;
+    Mat3 c;
+    Vec3 ratio;                  // friction over normal force, while that is frozen
+} ContactLaw;
+
+struct ContactSolver {
+    int node_count, capacity;
+    ContactRow *row;             // (capacity)
+    Vec3 *motion;                // (capacity) d = J u
+    ContactLaw *law;             // (capacity)
+    Vec3 *best;                  // (capacity) forces of the best iterate
+    bool *flag;                  // (capacity)
+    bool symmetric;              // which of the two factors holds the matrix
+    double *rhs, *delta, *upper; // (M, 6), (M, 6), (M, 6, 6)
+    BlockChain matrix;
+    BlockLu *lu;
+    BlockFactor *factor;
+};
+
+// Fills residual, cone_violation and active.
+double contact_residual(const ContactRow *row, int count, const Vec3 *motion, ContactReport *report);
+// Of the normal direction alone.
+double contact_normal_residual(const ContactRow *row, int count, const Vec3 *motion);
+
+ContactReport contact_newton(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
+                             const ContactOptions *options, double *u);
+
+#endif

@@ -1,0 +1,68 @@
+// Internal to solver: contacts as the solvers use them, in the order of the chain.
+//
+//   d = J u = sum over its one or two nodes of w (u_i + theta_i x a),  a = -radius * normal
+// J^T f gives a node w f and w a x f; constrained degrees of freedom (`mask`, unit rows) get nothing, but move the contact.
+#ifndef SELDINGER_SOLVER_CONTACT_ROWS_H
+#define SELDINGER_SOLVER_CONTACT_ROWS_H
+
+#include "solver/block_chain.h"
+
+#include <stddef.h>
+#include "solver/contact.h"
+
+typedef struct ContactRow {
+    int node, point;             // point: its place in the caller's set
+    int nodes;                   // 1, or 2 where xi > 0
+    double weight[2];
+    unsigned mask[2];            // free degrees of freedom
+    bool inert;                  // the node cannot yield along the normal: no force
+    Vec3 normal;
+    double gap, radius, friction;
+    double stiffness_n, stiffness_t; // [N/mm] of the node alone, neighbours held: the scale of the residual and of penalties
+    Vec3 force;                  // on the tool
+} ContactRow;
+
+// Sorted by node, then xi (insertion sort: the caller's set comes nearly in order). Returns their number.
+int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow *row);
+
+static inline Vec3 contact_row_motion(const ContactRow *c, const double *u)
+{
+    Vec3 d = {0, 0, 0};
+    for (int e = 0; e < c->nodes; e++) {
+        const double *v = u + 6 * (size_t)(c->node + e);
+        Vec3 lever = vec3_scale(vec3_cross(c->normal, vec3(v[3], v[4], v[5])), c->radius);
+        d = vec3_add_scaled(d, c->weight[e], vec3_add(vec3(v[0], v[1], v[2]), lever));
+    }
+    return d;
+}
+
+// y += J^T f
+static inline void contact_row_push(const ContactRow *c, Vec3 f, double *y)
+{
+    Vec3 moment = vec3_scale(vec3_cross(f, c->normal), c->radius);
+    const double g[6] = {f.x, f.y, f.z, moment.x, moment.y, moment.z};
+    for (int e = 0; e < c->nodes; e++) {
+        double *v = y + 6 * (size_t)(c->node + e);
+        if (c->mask[e] == 63)
+            for (int k = 0; k < 6; k++)
+                v[k] += c->weight[e] * g[k];
+        else
+            for (int k = 0; k < 6; k++)
+                v[k] += c->mask[e] >> k & 1 ? c->weight[e] * g[k] : 0;
+    }
+}
+
+static inline Vec3 contact_tangential(Vec3 v, Vec3 normal) { return vec3_add_scaled(v, -vec3_dot(v, normal), normal); }
+
+// The nearest force in Coulomb's cone of the normal force that it has: f_n+ n, and the tangent cut to mu f_n+.
+static inline Vec3 contact_project(Vec3 f, Vec3 normal, double friction)
+{
+    double fn = vec3_dot(f, normal);
+    if (!(fn > 0))
+        return (Vec3){0, 0, 0};
+    Vec3 t = contact_tangential(f, normal);
+    double size = vec3_norm(t), bound = friction * fn;
+    return vec3_add_scaled(vec3_scale(t, size > bound ? bound / size : 1), fn, normal);
+}
+
+#endif
