@@ -96,6 +96,9 @@ static bool place_rig(Stepper *s, const WireOptions *o)
 {
     for (int i = 0; i < o->fix_count; i++)
         s->fixed[nearest_node(&s->wire, o->fix[i].s)] |= o->fix[i].dof;
+    s->can_swing = true;
+    for (int i = 1; i < s->wire.node_count; i++)
+        s->can_swing &= (s->fixed[i] & DOF_POSITION) == 0;
     s->load_count = o->load_count;
     s->load = calloc((size_t)o->load_count + 1, sizeof *s->load);
     if (!s->load)
@@ -310,30 +313,65 @@ static Quat small_rotation(Vec3 w)
     return (Quat){cosine, sine * w.x, sine * w.y, sine * w.z};
 }
 
+// Moves the free nodes' positions by `part` of the change, each element turning and stretching instead of its end being displaced: to first
+// order the same, but a large turn does not stretch the wire. From the proximal end on, so not where the rig holds a node further along.
+static void swing(Stepper *s, double part)
+{
+    const double *base = s->u;
+    Vec3 from = s->mouth, moved = s->mouth, shift = vec3(0, 0, 0);
+    for (int i = s->first_free; i < s->state.node_count; i++) {
+        const double *u = base + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
+        Vec3 own = vec3_scale(vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]), part), here = s->state.position[i];
+        if (i == 0) {
+            moved = vec3_add(here, own);
+        } else {
+            Vec3 chord = vec3_sub(here, from), change = vec3_sub(own, shift);
+            double length2 = fmax(vec3_norm2(chord), 1e-12);
+            Vec3 turn = vec3_scale(vec3_cross(chord, change), 1 / length2);
+            chord = vec3_scale(quat_rotate(quat_from_rotation_vector(turn), chord), 1 + vec3_dot(chord, change) / length2);
+            moved = vec3_add(moved, chord);
+        }
+        from = here;
+        shift = own;
+        s->state.position[i] = moved;
+    }
+}
+
+static void displace(Stepper *s, double part)
+{
+    for (int i = s->first_free; i < s->state.node_count; i++) {
+        const double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
+        Vec3 d = part < 1 ? vec3(k[0] + part * (u[0] - k[0]), k[1] + part * (u[1] - k[1]), k[2] + part * (u[2] - k[2])) : vec3(u[0], u[1], u[2]);
+        s->state.position[i] = vec3_add(s->start_position[i], d);
+    }
+}
+
 // The iterate moves to `part` of the way from where it is to x_n + u. Nodes in the sheath go all the way: they are prescribed.
-static void move(Stepper *s, double part)
+static void move(Stepper *s, double turn)
 {
     WireState *w = &s->state;
+    double part = turn > TURN_MAX ? TURN_MAX / turn : 1;
+    if (turn > s->newton_motion && s->can_swing)
+        swing(s, part);
+    else
+        displace(s, part);
     for (int i = 0; i < w->node_count; i++) {
-        double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i, turn[3];
-        for (int c = 0; c < 6; c++) {
-            if (part < 1 && i >= s->first_free)
-                u[c] = k[c] + part * (u[c] - k[c]);
-            if (c >= 3)
-                turn[c - 3] = u[c] - k[c];
-            k[c] = u[c];
-        }
+        double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
         if (i >= s->first_free) {
-            w->position[i] = vec3_add(s->start_position[i], vec3(u[0], u[1], u[2]));
-            w->orientation[i] = quat_unit(quat_mul(small_rotation(vec3(turn[0], turn[1], turn[2])), w->orientation[i]));
+            Vec3 rotation = vec3_scale(vec3(u[3] - k[3], u[4] - k[4], u[5] - k[5]), part);
+            w->orientation[i] = quat_unit(quat_mul(small_rotation(rotation), w->orientation[i]));
+            Vec3 d = vec3_sub(w->position[i], s->start_position[i]);
+            k[0] = d.x, k[1] = d.y, k[2] = d.z;
+            k[3] += rotation.x, k[4] += rotation.y, k[5] += rotation.z;
             continue;
         }
         // on the line exactly, whatever rounding does
         double along = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]) + u[0];
         w->position[i] = vec3_add_scaled(s->mouth, along, s->axis[0]);
-        Quat q = quat_mul(small_rotation(vec3_scale(s->axis[0], turn[0])), w->orientation[i]);
+        Quat q = quat_mul(small_rotation(vec3_scale(s->axis[0], u[3] - k[3])), w->orientation[i]);
         Vec3 e = quat_rotate(q, vec3(1, 0, 0)), axis = vec3_cross(e, s->axis[0]);
         w->orientation[i] = quat_unit(quat_mul((Quat){1 + vec3_dot(e, s->axis[0]), axis.x, axis.y, axis.z}, q));
+        memcpy(k, u, 6 * sizeof *k);
     }
 }
 
@@ -344,7 +382,7 @@ void step_contact(Stepper *s)
         double turn = largest_turn(s);
         if (turn <= s->newton_motion)
             break;
-        move(s, fmin(1, TURN_MAX / turn));
+        move(s, turn);
         s->is_iterate = true;
         stepper_detect(s);
         stepper_assemble(s);
@@ -371,7 +409,7 @@ static void set_velocities(Stepper *s)
     WireState *w = &s->state;
     double rate = 1 / s->dt;
     for (int i = 0; i < w->node_count; i++) {
-        const double *u = s->u + 6 * (size_t)i;
+        const double *u = s->linearised + 6 * (size_t)i;      // what has been done, cut or not
         if (i < s->first_free) {
             w->velocity[i] = vec3_scale(s->axis[0], u[0] * rate);
             w->spin[i] = vec3_scale(s->axis[0], u[3] * rate);
@@ -412,7 +450,7 @@ void step_correct(Stepper *s)
         double turn = largest_turn(s);
         if (turn > TURN_MAX)
             s->report.flags |= STEP_LIMITED;
-        move(s, fmin(1, TURN_MAX / fmax(turn, TURN_MAX)));
+        move(s, turn);
         set_velocities(s);
         s->state.inserted += s->command.advance;
         s->state.twist += s->command.twist;

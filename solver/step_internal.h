@@ -21,6 +21,7 @@ struct Stepper {
     int load_count;
     LoadPlace *load;
     uint8_t *fixed;          // (M) DOF_ mask of the rig
+    bool can_swing;          // no node but the first is held in place by the rig
     Vec3 gravity;
     double damping_mass, damping_stiffness, dt;
     bool has_sheath;
