@@ -10,27 +10,33 @@
 
 #include <stdint.h>
 
-typedef double Lanes __attribute__((vector_size(64)));
+enum { BLOB_GROUP_ALIGNMENT = 64 };
 
 typedef struct BlobGroup {
-    Lanes cx, cy, cz;        // centres [mm]
-    Lanes inverse;           // 1 / (5 rho^2)
-    Lanes rho, a, b;         // rho, -4/(5 rho), 24/(25 rho^3); all 0 in unused lanes
+    double cx[8] __attribute__((aligned(64)));   // centres [mm] …
+    double cy[8], cz[8];
+    double inverse[8];       // 1 / (5 rho^2)
+    double rho[8], a[8], b[8];   // rho, -4/(5 rho), 24/(25 rho^3); all 0 in unused lanes
 } BlobGroup;
 
-typedef struct FieldSample {
+// One evaluation: a model, a place, and the answer.
+typedef struct FieldJob {
+    const BlobGroup *group;
+    int groups;
+    Vec3 x;
     double f;                // field, iso-level taken off
     Vec3 g;                  // gradient
     Sym3 h;                  // Hessian
-} FieldSample;
+} FieldJob;
 
 static inline int blob_groups_needed(int64_t blobs) { return (int)((blobs + 7) / 8); }
 void blob_groups_fill(BlobGroup *group, const Blobby *model);
 
 typedef struct BlobKernels {
     const char *isa;
-    void (*gradient)(const BlobGroup *group, int count, double iso_level, Vec3 x, FieldSample *out);   // f and g; h is left alone
-    void (*hessian)(const BlobGroup *group, int count, double iso_level, Vec3 x, FieldSample *out);
+    // Many jobs at a time: one alone waits 35 ns for its own division and sums, others fit into that gap.
+    void (*gradient)(FieldJob *const *job, int count, double iso_level);   // f and g; h is left alone
+    void (*hessian)(FieldJob *const *job, int count, double iso_level);
 } BlobKernels;
 // isa: 0 the widest the CPU has, 1 SSE2, 2 AVX2, 3 AVX-512; the next narrower one where it is absent.
 const BlobKernels *blob_kernels(int isa);

@@ -1,0 +1,512 @@
+// Contact with a fitted tree: the lanes against their plain twin on every instruction set, gaps against the slow projection, derivatives,
+// points that must not be called far, ways back from outside, the inlet, motion and mirroring of the scene, the wall's jump between nodes.
+#include "blob_tube.h"
+#include "geom/blob_lanes.h"
+#include "geom/power_walk.h"
+#include "geom/vessel.h"
+#include "random_numbers.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include <cmocka.h>
+
+#include "near.h"
+
+enum { NODES = 60, OVERLAP = 3, BLOBS = 10 };
+
+static VesselTree *helix_tree(void)
+{
+    Vec3 line[NODES + 2 * OVERLAP];
+    helix_line(line, NODES + 2 * OVERLAP, 6, 9, 0.7);
+    return blob_tube(line, NODES, OVERLAP, BLOBS, 1);
+}
+
+// Every node has its own random blobs about the helix: neighbours agree only roughly, as where a fit is poor.
+static VesselTree *rough_tree(double roughness)
+{
+    VesselTree *t = helix_tree();
+    uint64_t seed = 11;
+    for (int64_t j = 0; j < t->blob_count; j++) {
+        t->blob_center[j] = vec3_add(t->blob_center[j], random_in_box(&seed, roughness));
+        t->blob_width[j] *= random_in(&seed, 1 - roughness, 1 + roughness);
+    }
+    return t;
+}
+
+static Vessel *make(const VesselTree *tree, LimField field, int isa)
+{
+    LimVesselOptions o = lim_vessel_default_options();
+    o.field = field;
+    o.isa = isa;
+    Vessel *v = lim_vessel_create_with(tree, &o);
+    assert_non_null(v);
+    return v;
+}
+
+static VesselHit ask(const Vessel *v, Vec3 x, int from, double reach)
+{
+    VesselMemory memory = {.node = from};
+    VesselHit hit;
+    vessel_query(v, 1, &x, reach, &memory, &hit);
+    return hit;
+}
+
+static Blobby model_of(const VesselTree *t, int node)
+{
+    int64_t a = t->blob_offset[node], b = t->blob_offset[node + 1];
+    return (Blobby){(int)(b - a), t->blob_center + a, t->blob_width + a, t->iso_level};
+}
+
+static void lanes_against_twin(void **state)
+{
+    (void)state;
+    uint64_t seed = 12;
+    for (int count = 1; count <= 27; count++) {
+        Vec3 center[27];
+        double width[27] = {0};
+        for (int j = 0; j < count; j++) {
+            center[j] = random_in_box(&seed, 2);
+            width[j] = random_in(&seed, 0.1, 1);
+        }
+        Blobby m = {count, center, width, 0.1};
+        int groups = blob_groups_needed(count);
+        BlobGroup *group = aligned_alloc(64, (size_t)groups * sizeof *group);
+        blob_groups_fill(group, &m);
+        for (int trial = 0; trial < 20; trial++) {
+            Vec3 x = random_in_box(&seed, trial == 0 ? 1e20 : 3), g;
+            Sym3 h;
+            double f = blobby_hessian(&m, x, &g, &h), scale = 0;
+            for (int j = 0; j < count; j++)
+                scale += 1 / (width[j] * width[j]) + 1;
+            FieldJob first, a, b, *job_a = &a, *job_b = &b;
+            memset(&first, 0, sizeof first);
+            for (int isa = 1; isa <= 3; isa++) {
+                memset(&a, 0, sizeof a);
+                a.group = group, a.groups = groups, a.x = x;
+                b = a;
+                blob_kernels(isa)->hessian(&job_a, 1, 0.1);
+                blob_kernels(isa)->gradient(&job_b, 1, 0.1);
+                assert_true(a.f == b.f && vec3_distance(a.g, b.g) == 0);
+                // sums in another order: rounding of some tens of terms
+                assert_near(a.f, f, 1e-15 * scale);
+                assert_true(vec3_distance(a.g, g) <= 1e-14 * scale);
+                assert_near(a.h.xx, h.xx, 1e-14 * scale);
+                assert_near(a.h.xy, h.xy, 1e-14 * scale);
+                assert_near(a.h.xz, h.xz, 1e-14 * scale);
+                assert_near(a.h.yy, h.yy, 1e-14 * scale);
+                assert_near(a.h.yz, h.yz, 1e-14 * scale);
+                assert_near(a.h.zz, h.zz, 1e-14 * scale);
+                if (isa == 1)
+                    first = a;
+                assert_memory_equal(&first, &a, sizeof a);
+            }
+        }
+        free(group);
+    }
+}
+
+// A tool of points wandering in and out of the lumen along the tree.
+static Vec3 wander(const VesselTree *t, uint64_t *seed, int step, int steps, Vec3 x, double reach)
+{
+    double s = (double)step / steps * (t->node_count - 1.001);
+    int k = (int)s;
+    Vec3 axis = vec3_mix(t->center[k], t->center[k + 1], s - k), drift = vec3_scale(vec3_sub(x, axis), 0.98);
+    return vec3_add(vec3_add(axis, drift), random_in_box(seed, reach));
+}
+
+static void same_bits_on_every_isa(void **state)
+{
+    (void)state;
+    VesselTree *t = rough_tree(0.05);
+    for (int field = 0; field < 2; field++) {
+        Vessel *v[3];
+        VesselMemory memory[3] = {{.node = -1}, {.node = -1}, {.node = -1}};
+        for (int i = 0; i < 3; i++)
+            v[i] = make(t, (LimField)field, i + 1);
+        uint64_t seed = 13;
+        Vec3 x = t->center[2];
+        for (int step = 0; step < 2000; step++) {
+            VesselHit hit[3];
+            memset(hit, 0, sizeof hit);
+            x = wander(t, &seed, step, 2000, x, 0.1);
+            for (int i = 0; i < 3; i++)
+                vessel_query(v[i], 1, &x, 0.5, &memory[i], &hit[i]);
+            for (int i = 1; i < 3; i++) {
+                assert_true(hit[0].gap == hit[i].gap && hit[0].node == hit[i].node && hit[0].flags == hit[i].flags);
+                assert_memory_equal(&hit[0].normal, &hit[i].normal, sizeof(Vec3));
+                assert_memory_equal(&hit[0].hessian, &hit[i].hessian, sizeof(Sym3));
+            }
+        }
+        for (int i = 0; i < 3; i++)
+            v[i]->destroy(v[i]);
+    }
+    vessel_tree_free(t);
+}
+
+static void one_blob_is_a_sphere(void **state)
+{
+    (void)state;
+    VesselTree *t = vessel_tree_create(1, 0, 1);
+    t->center[0] = t->blob_center[0] = vec3(1, 2, 3);
+    t->radius[0] = 2;
+    t->direction[0] = vec3(-1, 0, 0);
+    t->parent[0] = -1;
+    t->blob_width[0] = blob_width_for_radius(2, 0.1);
+    t->blob_offset[1] = 1;
+    vessel_tree_link(t);
+    Vessel *v = lim_vessel_create(t);
+    uint64_t seed = 14;
+    for (int trial = 0; trial < 1000; trial++) {
+        Vec3 u = random_unit(&seed);
+        double d = random_in(&seed, 0.3, trial % 2 ? 2.5 : 30);
+        if (u.x > -0.1)
+            u.x = -0.1 - fabs(u.x);   // downstream of the inlet, which looks along -x
+        u = vec3_unit(u);
+        VesselHit hit = ask(v, vec3_add_scaled(t->center[0], d, u), 0, 100);
+        assert_int_equal(hit.flags, 0);
+        assert_near(hit.gap, 2 - d, 1e-9 * (1 + d));
+        assert_true(vec3_distance(hit.normal, vec3_negate(u)) < 1e-5);
+        // S (I + gap S)^-1 = -1/(r (1 - gap/r)) = -1/d
+        Vec3 across = vec3_normal_to(u);
+        if (d > 0.4)
+            assert_near(sym3_quadratic(&hit.hessian, across) * d, -1, 1e-4);
+    }
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
+// Warm queries of a wandering point: never worse than the slow projection from scratch, the foot on the surface, and no history to speak of.
+static void gaps_against_slow_projection(void **state)
+{
+    (void)state;
+    for (int rough = 0; rough < 2; rough++) {
+        VesselTree *t = rough_tree(rough ? 0.1 : 0);
+        Vessel *v = make(t, LIM_SWITCH, 0);
+        uint64_t seed = 15;
+        int farther = 0, compared = 0;
+        for (int run = 0; run < 3; run++) {
+            Vec3 x = t->center[2];
+            VesselMemory memory = {.node = -1};
+            for (int step = 0; step < 1500; step++) {
+                VesselHit hit;
+                x = wander(t, &seed, step, 1500, x, run == 0 ? 0.02 : run == 1 ? 0.1 : 0.4);
+                vessel_query(v, 1, &x, 0.7, &memory, &hit);
+                if (hit.flags & VESSEL_OPEN_END)
+                    continue;
+                Blobby m = model_of(t, hit.node);
+                SurfacePoint s = blobby_project(&m, x, x);
+                assert_true(s.converged);
+                if (hit.flags & VESSEL_FAR) {
+                    assert_true(s.distance > 0.7 && s.distance >= hit.gap);   // a bound, and beyond reach
+                    continue;
+                }
+                assert_int_equal(hit.flags, 0);
+                assert_true((hit.gap > 0) == (s.distance > 0) || fabs(hit.gap) < 1e-7);
+                Vec3 g;
+                double f = blobby_gradient(&m, memory.foot, &g);
+                assert_true(fabs(f) < 1e-7 * vec3_norm(g));
+                assert_near(vec3_norm(hit.normal), 1, 1e-12);
+                Vec3 rest = vec3_sub(vec3_sub(x, memory.foot), vec3_scale(hit.normal, hit.gap));
+                assert_true(vec3_norm(rest) < 1e-4 * fabs(hit.gap) + 1e-5);   // the last step leaves 1e-6 mm times the curvature's own change
+                // near the axis two sides are equally far and the remembered one may be kept a little longer
+                compared++;
+                farther += fabs(hit.gap) > fabs(s.distance) + 1e-6;
+                if (fabs(hit.gap) < 0.4)
+                    assert_near(hit.gap, s.distance, 1e-6);
+            }
+        }
+        print_message("roughness %g: %d of %d feet farther than the closest, none within 0.4 mm of the wall\n", rough ? 0.1 : 0, farther, compared);
+        assert_true(farther < compared / 50);
+        v->destroy(v);
+        vessel_tree_free(t);
+    }
+}
+
+static void derivatives_of_the_gap(void **state)
+{
+    (void)state;
+    VesselTree *t = rough_tree(0.1);
+    Vessel *v = make(t, LIM_SWITCH, 0);
+    uint64_t seed = 16;
+    int checked = 0;
+    for (int trial = 0; trial < 2000; trial++) {
+        Vec3 c = t->center[5 + trial % 50], x = vec3_add_scaled(c, random_in(&seed, 0.6, 1.2), random_unit(&seed));
+        VesselHit hit = ask(v, x, -1, 5);
+        // well inside its own focal distance, so that differences stay with one side
+        if (fabs(hit.gap) > 0.4 || fabs(sym3_trace(&hit.hessian)) > 6)
+            continue;
+        double h = 1e-4;
+        Vec3 slope = {0, 0, 0};
+        bool same = true;
+        for (int k = 0; k < 3 && same; k++) {
+            Vec3 e = vec3(k == 0, k == 1, k == 2);
+            VesselHit a = ask(v, vec3_add_scaled(x, h, e), hit.node, 5), b = ask(v, vec3_add_scaled(x, -h, e), hit.node, 5);
+            same = a.node == hit.node && b.node == hit.node;
+            if (!same)
+                break;
+            slope = vec3_add_scaled(slope, (a.gap - b.gap) / (2 * h), e);
+            Vec3 bends = vec3_scale(vec3_sub(a.normal, b.normal), 1 / (2 * h));
+            // the Hessian is that of the last evaluation: at most 1e-3 mm from the foot
+            assert_true(vec3_distance(bends, sym3_mul_vec(&hit.hessian, e)) < 2e-2);
+        }
+        if (!same)
+            continue;
+        checked++;
+        assert_true(vec3_distance(slope, hit.normal) < 1e-4);
+        assert_true(vec3_norm(sym3_mul_vec(&hit.hessian, hit.normal)) < 1e-9);
+    }
+    assert_true(checked > 500);
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
+// From several millimetres outside the answer still says which way is back, and following it leads home.
+static void back_from_outside(void **state)
+{
+    (void)state;
+    VesselTree *t = rough_tree(0.05);
+    for (int field = 0; field < 2; field++) {
+        Vessel *v = make(t, (LimField)field, 0);
+        uint64_t seed = 17;
+        for (int trial = 0; trial < 300; trial++) {
+            int node = 5 + trial % 50;
+            Vec3 x = vec3_add_scaled(t->center[node], random_in(&seed, 1.5, 6), random_unit(&seed));
+            VesselMemory memory = {.node = node};
+            VesselHit hit;
+            int steps = 0;
+            do {
+                vessel_query(v, 1, &x, 0.5, &memory, &hit);
+                if (hit.flags == VESSEL_FAR || hit.flags == VESSEL_OPEN_END)
+                    break;
+                assert_true(isfinite(hit.gap) && vec3_is_finite(hit.normal));
+                if (hit.gap < 0)
+                    x = vec3_add_scaled(x, fmin(-hit.gap, 0.5) + 1e-3, hit.normal);
+            } while (hit.gap < 0 && ++steps < 40);
+            assert_true(steps < 40);
+        }
+        static const double bad[] = {NAN, INFINITY, 1e70, 1e30};
+        for (int i = 0; i < 4; i++) {
+            VesselHit hit = ask(v, vec3(bad[i], 0, 0), i % 2 ? -1 : 5, 1);
+            assert_true(hit.gap == hit.gap);   // no NaN
+            assert_true(vec3_is_finite(hit.normal));
+            (void)v->locate(v, vec3(bad[i], 0, 0), -1);
+        }
+        v->destroy(v);
+    }
+    vessel_tree_free(t);
+}
+
+static void inlet_is_open(void **state)
+{
+    (void)state;
+    // a straight tube whose blobs end right at the root: the model closes inside the lumen, the vessel does not
+    for (int extrapolated = 0; extrapolated < 2; extrapolated++) {
+        enum { N = 20, O = 2 };
+        Vec3 line[N + 2 * O];
+        for (int i = 0; i < N + 2 * O; i++)
+            line[i] = vec3(0.8 * (i - O), 0, 0);
+        VesselTree *t = blob_tube(line, N, O, 11, 1);
+        for (int64_t j = 0; j < t->blob_count && !extrapolated; j++)
+            if (t->blob_center[j].x < 0)
+                t->blob_center[j].x = 0;   // what a fit without points upstream gives: everything piles up at the end
+        Vessel *v = make(t, LIM_SWITCH, 0);
+        Vec3 p, d;
+        assert_true(v->inlet(v, &p, &d));
+        assert_true(vec3_norm(p) == 0 && vec3_distance(d, vec3(1, 0, 0)) < 1e-12);
+        for (double x = -5; x < 0; x += 0.3) {
+            VesselHit hit = ask(v, vec3(x, 0.3, 0.2), x > -1 ? -1 : 0, 1);
+            assert_true(hit.flags == VESSEL_OPEN_END && hit.gap == HUGE_VAL && hit.node == 0);
+        }
+        // just inside, walking out along the wall: no cap shows, the normal stays across
+        VesselMemory memory = {.node = -1};
+        for (double x = 3; x >= 0; x -= 0.01) {
+            VesselHit hit;
+            Vec3 at = {x, 0.7, 0};
+            vessel_query(v, 1, &at, 0.5, &memory, &hit);
+            assert_int_equal(hit.flags, 0);
+            if (extrapolated)
+                assert_near(hit.gap, 0.3, 0.05);   // blobs in a row: the wall waves
+            assert_true(hit.gap > 0.1 && hit.normal.y < -0.9);
+        }
+        v->destroy(v);
+        vessel_tree_free(t);
+    }
+}
+
+static Vec3 mirrored(Vec3 v) { return vec3(v.x, -v.y, v.z); }
+
+static void moved_and_mirrored_scenes(void **state)
+{
+    (void)state;
+    Quat q = quat_from_rotation_vector(vec3(0.7, 0.2, -1.5));
+    Vec3 shift = {100, -50, 20};
+    VesselTree *t[3] = {rough_tree(0.05), rough_tree(0.05), rough_tree(0.05)};
+    for (int i = 0; i < t[0]->node_count; i++) {
+        t[1]->center[i] = vec3_add(quat_rotate(q, t[0]->center[i]), shift);
+        t[1]->direction[i] = quat_rotate(q, t[0]->direction[i]);
+        t[2]->center[i] = mirrored(t[0]->center[i]);
+        t[2]->direction[i] = mirrored(t[0]->direction[i]);
+    }
+    for (int64_t j = 0; j < t[0]->blob_count; j++) {
+        t[1]->blob_center[j] = vec3_add(quat_rotate(q, t[0]->blob_center[j]), shift);
+        t[2]->blob_center[j] = mirrored(t[0]->blob_center[j]);
+    }
+    for (int field = 0; field < 2; field++) {
+        Vessel *v[3];
+        VesselMemory memory[3] = {{.node = 3}, {.node = 3}, {.node = 3}};
+        for (int i = 0; i < 3; i++)
+            v[i] = make(t[i], (LimField)field, 0);
+        uint64_t seed = 18;
+        Vec3 x = t[0]->center[3];
+        for (int step = 0; step < 2000; step++) {
+            x = wander(t[0], &seed, step + 100, 2200, x, 0.1);
+            VesselHit hit[3];
+            vessel_query(v[0], 1, &x, 0.5, &memory[0], &hit[0]);
+            Vec3 moved = vec3_add(quat_rotate(q, x), shift), flipped = mirrored(x);
+            vessel_query(v[1], 1, &moved, 0.5, &memory[1], &hit[1]);
+            vessel_query(v[2], 1, &flipped, 0.5, &memory[2], &hit[2]);
+            assert_true(hit[0].flags == hit[1].flags && hit[0].flags == hit[2].flags && hit[0].node == hit[1].node && hit[0].node == hit[2].node);
+            if (hit[0].flags || hit[0].gap > 0.4)
+                continue;
+            assert_near(hit[0].gap, hit[1].gap, 1e-9);
+            assert_near(hit[0].gap, hit[2].gap, 1e-11);
+            assert_true(vec3_distance(quat_rotate(q, hit[0].normal), hit[1].normal) < 1e-7);
+            assert_true(vec3_distance(mirrored(hit[0].normal), hit[2].normal) < 1e-10);
+            Vec3 u = random_unit(&seed);
+            assert_near(sym3_quadratic(&hit[0].hessian, u), sym3_quadratic(&hit[1].hessian, quat_rotate(q, u)), 1e-6);
+            assert_near(sym3_quadratic(&hit[0].hessian, u), sym3_quadratic(&hit[2].hessian, mirrored(u)), 1e-8);
+        }
+        for (int i = 0; i < 3; i++)
+            v[i]->destroy(v[i]);
+    }
+    for (int i = 0; i < 3; i++)
+        vessel_tree_free(t[i]);
+}
+
+// Slides points along the wall by 1 um: what the gap changes beyond the motion is the wall's jump between neighbouring models.
+static double worst_jump(const VesselTree *t, LimField field)
+{
+    Vessel *v = make(t, field, 0);
+    double worst = 0, ds = 1e-3;
+    for (int turn = 0; turn < 8; turn++) {
+        VesselMemory memory = {.node = 5};
+        double before = 0;
+        for (int i = 5; i < 30; i++) {
+            int steps = (int)(vec3_distance(t->center[i], t->center[i + 1]) / ds);
+            for (int k = 0; k < steps; k++) {
+                Vec3 axis = vec3_mix(t->center[i], t->center[i + 1], (double)k / steps);
+                double a = turn * PI / 4;
+                Vec3 out = vec3_unit(vec3(cos(a) * axis.x, cos(a) * axis.y, 6 * sin(a)));
+                Vec3 x = vec3_add_scaled(axis, 0.9, out);
+                VesselHit hit;
+                vessel_query(v, 1, &x, 1, &memory, &hit);
+                assert_int_equal(hit.flags, 0);
+                if (i > 5 && k > 0)
+                    worst = fmax(worst, fabs(hit.gap - before));
+                before = hit.gap;
+            }
+        }
+    }
+    v->destroy(v);
+    return worst;
+}
+
+static void blend_has_no_jump(void **state)
+{
+    (void)state;
+    VesselTree *t = rough_tree(0.02);
+    double paper = worst_jump(t, LIM_SWITCH), blend = worst_jump(t, LIM_BLEND);
+    print_message("the wall's worst change over 1 um of travel: switch %.4f mm, blend %.5f mm\n", paper, blend);
+    assert_true(paper > 0.005);            // the test sees jumps
+    assert_true(blend < 0.1 * paper);
+    vessel_tree_free(t);
+}
+
+static void nodes_without_blobs(void **state)
+{
+    (void)state;
+    VesselTree *t = helix_tree(), *u = helix_tree();
+    // u: node 0 and 7 have lost theirs to nobody
+    int64_t kept = 0;
+    for (int i = 0; i < u->node_count; i++) {
+        u->blob_offset[i] = kept;
+        for (int64_t j = t->blob_offset[i]; j < t->blob_offset[i + 1] && i != 0 && i != 7; j++) {
+            u->blob_center[kept] = t->blob_center[j];
+            u->blob_width[kept++] = t->blob_width[j];
+        }
+    }
+    u->blob_offset[u->node_count] = u->blob_count = kept;
+    Vessel *v = lim_vessel_create(u);
+    assert_non_null(v);
+    VesselHit hit = ask(v, vec3_add(u->center[7], vec3(0, 0, 0.8)), -1, 1);
+    assert_true(hit.node == 7 && hit.flags == 0 && fabs(hit.gap - 0.2) < 0.1);
+    v->destroy(v);
+    u->blob_count = 0;
+    assert_null(lim_vessel_create(u));
+    assert_null(lim_vessel_create(NULL));
+    vessel_tree_free(t);
+    vessel_tree_free(u);
+}
+
+static double now_us(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return 1e6 * (double)t.tv_sec + 1e-3 * (double)t.tv_nsec;
+}
+
+// Not a check: prints the cost of 80 points near the wall (all projected) and of a tool lying in the lumen, 10 blobs a node.
+static void cost(void **state)
+{
+    (void)state;
+    enum { P = 80, ROUNDS = 400 };
+    VesselTree *t = rough_tree(0.01);
+    for (int field = 0; field < 2; field++)
+        for (int near_wall = 0; near_wall < 2; near_wall++) {
+            Vessel *v = make(t, (LimField)field, 0);
+            Vec3 x[P], out[P];
+            VesselMemory memory[P];
+            VesselHit hit[P];
+            uint64_t seed = 19;
+            for (int i = 0; i < P; i++) {
+                double s = 3 + 50.0 * i / P;
+                int k = (int)s;
+                Vec3 axis = vec3_mix(t->center[k], t->center[k + 1], s - k);
+                out[i] = vec3_unit(vec3(axis.x, axis.y, random_in(&seed, -9, 9)));
+                x[i] = vec3_add_scaled(axis, near_wall ? 0.82 : random_in(&seed, 0, 0.85), out[i]);
+                memory[i] = (VesselMemory){.node = -1};
+            }
+            double best = HUGE_VAL, sum = 0;
+            for (int r = 0; r < ROUNDS; r++) {
+                for (int i = 0; i < P; i++)   // 10 mm/s along, 1 mm/s across
+                    x[i] = vec3_add(x[i], vec3(r % 2 ? 0.01 : -0.01, 0.001 * (r % 3 - 1), 0));
+                double start = now_us();
+                vessel_query(v, P, x, 0.5, memory, hit);
+                double used = now_us() - start;
+                best = fmin(best, used);
+                for (int i = 0; i < P; i++)
+                    sum += hit[i].flags ? 0 : hit[i].gap;
+            }
+            print_message("%s, %s: %.2f us per query of %d points (sum of gaps %.6f)\n", field ? "blend" : "switch",
+                          near_wall ? "all near the wall" : "spread in the lumen", best, P, sum);
+            v->destroy(v);
+        }
+    vessel_tree_free(t);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(lanes_against_twin), cmocka_unit_test(same_bits_on_every_isa), cmocka_unit_test(one_blob_is_a_sphere),
+        cmocka_unit_test(gaps_against_slow_projection), cmocka_unit_test(derivatives_of_the_gap), cmocka_unit_test(back_from_outside),
+        cmocka_unit_test(inlet_is_open), cmocka_unit_test(moved_and_mirrored_scenes), cmocka_unit_test(blend_has_no_jump),
+        cmocka_unit_test(nodes_without_blobs), cmocka_unit_test(cost),
+    };
+    return cmocka_run_group_tests_name("lim_vessel", tests, NULL, NULL);
+}
