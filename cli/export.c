@@ -1,7 +1,561 @@
+// seldinger export: surfaces, centrelines and recordings for other programs.
 #include "cli/cli.h"
+
+#include "cli/file_kind.h"
+#include "cli/output.h"
+#include "recon/tree_file.h"
+#include "sim/recording.h"
+
+#include <cJSON.h>
+#include <getopt.h>
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char help[] =
+    "Usage: seldinger export FILE -o OUT [options]\n\n"
+    "Writes what FILE (a tree, model or recording) holds for other programs; the extension of OUT says how. Lengths mm.\n\n"
+    "  model, surface         .stl (binary)  .ply  .obj  .vtp\n"
+    "  tree or model, centreline  .vtp (lines with Radius)  .mrk.json (3D Slicer curves)  .swc\n"
+    "  recording              .csv (a row a node and frame)  .vtp or .pvd (one .vtp a frame and a .pvd that names them)\n\n"
+    "  --what surface|centreline  what a .vtp holds; default: the surface of a model, the centreline of a tree\n"
+    "  --cell-mm X                size of the surface's cells [mm]; default 0.3 of the least radius\n"
+    "  --frame RAS|LPS            coordinate system that a .mrk.json names; coordinates are never converted; default LPS\n"
+    "  -o OUT                     the file to write\n"
+    "  --threads N, --quiet       accepted as everywhere; nothing here takes long\n";
+
+typedef struct ExportOptions {
+    const char *in, *out, *what, *frame;
+    double cell_mm;          // 0: automatic
+} ExportOptions;
+
+// --- text that grows in memory, then one write ---
+
+typedef struct Text {
+    FILE *stream;
+    char *bytes;
+    size_t length;
+} Text;
+
+static bool text_open(Text *text)
+{
+    *text = (Text){0};
+    text->stream = open_memstream(&text->bytes, &text->length);
+    return text->stream != NULL;
+}
+
+static bool text_write(Text *text, const char *path, Faults *faults)
+{
+    bool whole = !ferror(text->stream) && fclose(text->stream) == 0;
+    if (!whole)
+        faults_add(faults, path, 0, 0, "cannot be written: no memory");
+    whole = whole && output_write(path, text->bytes, text->length, faults);
+    free(text->bytes);
+    return whole;
+}
+
+// --- surfaces ---
+
+static void put_float(FILE *out, double value)
+{
+    float single = (float)value;
+    uint32_t bits;
+    memcpy(&bits, &single, sizeof bits);
+    for (int i = 0; i < 4; i++)
+        fputc((int)(bits >> (8 * i) & 0xff), out);
+}
+
+static void put_vector(FILE *out, Vec3 v)
+{
+    put_float(out, v.x);
+    put_float(out, v.y);
+    put_float(out, v.z);
+}
+
+static void print_stl(FILE *out, const TriangleMesh *mesh)
+{
+    char head[81] = "seldinger " SELDINGER_VERSION ", mm";
+    fwrite(head, 1, 80, out);
+    for (int i = 0; i < 4; i++)
+        fputc((int)((unsigned)mesh->triangle_count >> (8 * i) & 0xff), out);
+    for (int i = 0; i < mesh->triangle_count; i++) {
+        Vec3 corner[3];
+        for (int j = 0; j < 3; j++)
+            corner[j] = mesh->vertex[mesh->triangle[i][j]];
+        put_vector(out, vec3_unit_or(vec3_cross(vec3_sub(corner[1], corner[0]), vec3_sub(corner[2], corner[0])), vec3(0, 0, 0)));
+        for (int j = 0; j < 3; j++)
+            put_vector(out, corner[j]);
+        fputc(0, out);
+        fputc(0, out);
+    }
+}
+
+static void print_ply(FILE *out, const TriangleMesh *mesh)
+{
+    fprintf(out,
+            "ply\nformat ascii 1.0\ncomment seldinger " SELDINGER_VERSION ", mm\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\n"
+            "property float nx\nproperty float ny\nproperty float nz\nelement face %d\nproperty list uchar int vertex_indices\nend_header\n",
+            mesh->vertex_count, mesh->triangle_count);
+    for (int i = 0; i < mesh->vertex_count; i++)
+        fprintf(out, "%.9g %.9g %.9g %.6g %.6g %.6g\n", mesh->vertex[i].x, mesh->vertex[i].y, mesh->vertex[i].z, mesh->normal[i].x, mesh->normal[i].y,
+                mesh->normal[i].z);
+    for (int i = 0; i < mesh->triangle_count; i++)
+        fprintf(out, "3 %d %d %d\n", mesh->triangle[i][0], mesh->triangle[i][1], mesh->triangle[i][2]);
+}
+
+static void print_obj(FILE *out, const TriangleMesh *mesh)
+{
+    fprintf(out, "# seldinger " SELDINGER_VERSION ", mm\n");
+    for (int i = 0; i < mesh->vertex_count; i++)
+        fprintf(out, "v %.9g %.9g %.9g\n", mesh->vertex[i].x, mesh->vertex[i].y, mesh->vertex[i].z);
+    for (int i = 0; i < mesh->vertex_count; i++)
+        fprintf(out, "vn %.6g %.6g %.6g\n", mesh->normal[i].x, mesh->normal[i].y, mesh->normal[i].z);
+    for (int i = 0; i < mesh->triangle_count; i++) {
+        const int *t = mesh->triangle[i];
+        fprintf(out, "f %d//%d %d//%d %d//%d\n", t[0] + 1, t[0] + 1, t[1] + 1, t[1] + 1, t[2] + 1, t[2] + 1);
+    }
+}
+
+// --- VTP: XML with the numbers as text, which every reader takes ---
+
+static void vtp_begin(FILE *out, int points, int lines, int polygons)
+{
+    fprintf(out,
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"LittleEndian\">\n<PolyData>\n"
+            "<Piece NumberOfPoints=\"%d\" NumberOfVerts=\"0\" NumberOfLines=\"%d\" NumberOfStrips=\"0\" NumberOfPolys=\"%d\">\n",
+            points, lines, polygons);
+}
+
+static void vtp_array(FILE *out, const char *type, const char *name, int components)
+{
+    fprintf(out, "<DataArray type=\"%s\" Name=\"%s\" NumberOfComponents=\"%d\" format=\"ascii\">\n", type, name, components);
+}
+
+static void vtp_array_end(FILE *out) { fprintf(out, "</DataArray>\n"); }
+
+static void vtp_vectors(FILE *out, const char *name, const Vec3 *value, int count)
+{
+    vtp_array(out, "Float64", name, 3);
+    for (int i = 0; i < count; i++)
+        fprintf(out, "%.9g %.9g %.9g\n", value[i].x, value[i].y, value[i].z);
+    vtp_array_end(out);
+}
+
+static void vtp_points(FILE *out, const Vec3 *value, int count)
+{
+    fprintf(out, "<Points>\n");
+    vtp_vectors(out, "Points", value, count);
+    fprintf(out, "</Points>\n");
+}
+
+static void vtp_end(FILE *out) { fprintf(out, "</Piece>\n</PolyData>\n</VTKFile>\n"); }
+
+static void print_surface_vtp(FILE *out, const TriangleMesh *mesh)
+{
+    vtp_begin(out, mesh->vertex_count, 0, mesh->triangle_count);
+    fprintf(out, "<PointData Normals=\"Normals\" Scalars=\"node\">\n");
+    vtp_vectors(out, "Normals", mesh->normal, mesh->vertex_count);
+    vtp_array(out, "Int32", "node", 1);
+    for (int i = 0; i < mesh->vertex_count; i++)
+        fprintf(out, "%d\n", mesh->node[i]);
+    vtp_array_end(out);
+    fprintf(out, "</PointData>\n");
+    vtp_points(out, mesh->vertex, mesh->vertex_count);
+    fprintf(out, "<Polys>\n");
+    vtp_array(out, "Int64", "connectivity", 1);
+    for (int i = 0; i < mesh->triangle_count; i++)
+        fprintf(out, "%d %d %d\n", mesh->triangle[i][0], mesh->triangle[i][1], mesh->triangle[i][2]);
+    vtp_array_end(out);
+    vtp_array(out, "Int64", "offsets", 1);
+    for (int i = 0; i < mesh->triangle_count; i++)
+        fprintf(out, "%d\n", 3 * (i + 1));
+    vtp_array_end(out);
+    fprintf(out, "</Polys>\n");
+    vtp_end(out);
+}
+
+static bool export_surface(const ExportOptions *options, const char *extension, const VesselTree *tree, Faults *faults)
+{
+    double least = HUGE_VAL;
+    for (int i = 0; i < tree->node_count; i++)
+        least = fmin(least, tree->radius[i]);
+    TriangleMesh *mesh = isosurface_of_tree(tree, options->cell_mm > 0 ? options->cell_mm : fmax(0.3 * least, 0.02));
+    Text text;
+    bool good = mesh && mesh->triangle_count > 0 && text_open(&text);
+    if (good) {
+        void (*print)(FILE *, const TriangleMesh *) = !strcmp(extension, ".stl")   ? print_stl
+                                                      : !strcmp(extension, ".ply") ? print_ply
+                                                      : !strcmp(extension, ".obj") ? print_obj
+                                                                                   : print_surface_vtp;
+        print(text.stream, mesh);
+        good = text_write(&text, options->out, faults);
+    } else {
+        faults_add(faults, options->in, 0, 0, "gives no surface: %s", mesh ? "the model is empty at this --cell-mm" : "no memory; a larger --cell-mm may do");
+    }
+    triangle_mesh_free(mesh);
+    return good;
+}
+
+// --- centrelines ---
+
+// The branches of a tree: a branch is a chain from a child of a fork (or the root) to the next fork or end; it begins with the fork's node, so
+// that lines join. Calls `branch(context, nodes, count)` for each.
+static bool each_branch(const VesselTree *tree, void (*branch)(void *context, const int *node, int count), void *context)
+{
+    int *children = calloc((size_t)tree->node_count, sizeof *children), *only = calloc((size_t)tree->node_count, sizeof *only),
+        *chain = calloc((size_t)tree->node_count + 1, sizeof *chain);
+    bool good = children && only && chain;
+    for (int i = 1; good && i < tree->node_count; i++) {
+        children[tree->parent[i]]++;
+        only[tree->parent[i]] = i;
+    }
+    for (int i = 0; good && i < tree->node_count; i++) {
+        int parent = tree->parent[i], count = 0;
+        if (parent >= 0 && children[parent] == 1)
+            continue;
+        if (parent >= 0)
+            chain[count++] = parent;
+        for (int at = i;; at = only[at]) {
+            chain[count++] = at;
+            if (children[at] != 1)
+                break;
+        }
+        branch(context, chain, count);
+    }
+    free(children);
+    free(only);
+    free(chain);
+    return good;
+}
+
+typedef struct Lines {
+    FILE *connectivity, *offsets;
+    int count;
+    int64_t points;
+} Lines;
+
+static void add_line(void *context, const int *node, int count)
+{
+    Lines *lines = context;
+    for (int i = 0; i < count; i++)
+        fprintf(lines->connectivity, "%d%c", node[i], i + 1 < count ? ' ' : '\n');
+    lines->points += count;
+    lines->count++;
+    fprintf(lines->offsets, "%" PRId64 "\n", lines->points);
+}
+
+static bool print_centreline_vtp(FILE *out, const VesselTree *tree)
+{
+    Text connectivity, offsets;
+    bool first = text_open(&connectivity), second = text_open(&offsets), good = first && second;
+    Lines lines = {.connectivity = connectivity.stream, .offsets = offsets.stream};
+    good = good && each_branch(tree, add_line, &lines);
+    good &= !first || fclose(connectivity.stream) == 0;
+    good &= !second || fclose(offsets.stream) == 0;
+    if (good) {
+        vtp_begin(out, tree->node_count, lines.count, 0);
+        fprintf(out, "<PointData Scalars=\"Radius\">\n");
+        vtp_array(out, "Float64", "Radius", 1);
+        for (int i = 0; i < tree->node_count; i++)
+            fprintf(out, "%.9g\n", tree->radius[i]);
+        vtp_array_end(out);
+        vtp_array(out, "Int32", "kind", 1);
+        for (int i = 0; i < tree->node_count; i++)
+            fprintf(out, "%d\n", tree->kind[i]);
+        vtp_array_end(out);
+        fprintf(out, "</PointData>\n");
+        vtp_points(out, tree->center, tree->node_count);
+        fprintf(out, "<Lines>\n");
+        vtp_array(out, "Int64", "connectivity", 1);
+        fputs(connectivity.bytes, out);
+        vtp_array_end(out);
+        vtp_array(out, "Int64", "offsets", 1);
+        fputs(offsets.bytes, out);
+        vtp_array_end(out);
+        fprintf(out, "</Lines>\n");
+        vtp_end(out);
+    }
+    free(connectivity.bytes);
+    free(offsets.bytes);
+    return good;
+}
+
+static bool print_swc(FILE *out, const VesselTree *tree)
+{
+    fprintf(out, "# seldinger " SELDINGER_VERSION ", mm: id type x y z radius parent; type 0: vessel, 5: aneurysm\n");
+    for (int i = 0; i < tree->node_count; i++)
+        fprintf(out, "%d %d %.9g %.9g %.9g %.9g %d\n", i + 1, tree->kind[i] == NODE_ANEURYSM ? 5 : 0, tree->center[i].x, tree->center[i].y,
+                tree->center[i].z, tree->radius[i], tree->parent[i] < 0 ? -1 : tree->parent[i] + 1);
+    return true;
+}
+
+typedef struct Curves {
+    const VesselTree *tree;
+    const char *frame;
+    cJSON *list;
+} Curves;
+
+static void add_curve(void *context, const int *node, int count)
+{
+    Curves *curves = context;
+    const VesselTree *tree = curves->tree;
+    cJSON *curve = cJSON_CreateObject(), *points, *measurements, *radius, *values;
+    char name[48];
+    snprintf(name, sizeof name, "branch at node %d", node[count > 1 ? 1 : 0]);
+    cJSON_AddStringToObject(curve, "type", "Curve");
+    cJSON_AddStringToObject(curve, "name", name);
+    cJSON_AddStringToObject(curve, "coordinateSystem", curves->frame);
+    cJSON_AddStringToObject(curve, "coordinateUnits", "mm");
+    cJSON_AddBoolToObject(curve, "locked", false);
+    cJSON_AddStringToObject(curve, "labelFormat", "%N-%d");
+    cJSON_AddNumberToObject(curve, "lastUsedControlPointNumber", count);
+    points = cJSON_AddArrayToObject(curve, "controlPoints");
+    values = cJSON_CreateArray();
+    for (int i = 0; i < count; i++) {
+        cJSON *point = cJSON_CreateObject();
+        Vec3 x = tree->center[node[i]];
+        char id[16];
+        snprintf(id, sizeof id, "%d", i + 1);
+        cJSON_AddStringToObject(point, "id", id);
+        cJSON_AddStringToObject(point, "label", id);
+        cJSON_AddItemToObject(point, "position", cJSON_CreateDoubleArray((double[]){x.x, x.y, x.z}, 3));
+        cJSON_AddStringToObject(point, "positionStatus", "defined");
+        cJSON_AddItemToArray(points, point);
+        cJSON_AddItemToArray(values, cJSON_CreateNumber(tree->radius[node[i]]));
+    }
+    measurements = cJSON_AddArrayToObject(curve, "measurements");
+    radius = cJSON_CreateObject();
+    cJSON_AddStringToObject(radius, "name", "Radius");
+    cJSON_AddBoolToObject(radius, "enabled", true);
+    cJSON_AddStringToObject(radius, "units", "mm");
+    cJSON_AddItemToObject(radius, "controlPointValues", values);
+    cJSON_AddItemToArray(measurements, radius);
+    cJSON_AddItemToArray(curves->list, curve);
+}
+
+static bool print_markups(FILE *out, const VesselTree *tree, const char *frame)
+{
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "@schema",
+                            "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/Resources/Schema/markups-schema-v1.0.3.json#");
+    Curves curves = {.tree = tree, .frame = frame, .list = cJSON_AddArrayToObject(root, "markups")};
+    bool good = curves.list && each_branch(tree, add_curve, &curves);
+    char *text = good ? cJSON_Print(root) : NULL;
+    if (text)
+        fprintf(out, "%s\n", text);
+    free(text);
+    cJSON_Delete(root);
+    return text != NULL;
+}
+
+static bool export_centreline(const ExportOptions *options, const char *extension, const VesselTree *tree, Faults *faults)
+{
+    Text text;
+    if (!text_open(&text)) {
+        faults_add(faults, options->out, 0, 0, "cannot be written: no memory");
+        return false;
+    }
+    bool good = !strcmp(extension, ".vtp")   ? print_centreline_vtp(text.stream, tree)
+                : !strcmp(extension, ".swc") ? print_swc(text.stream, tree)
+                                             : print_markups(text.stream, tree, options->frame);
+    if (!good)
+        faults_add(faults, options->out, 0, 0, "cannot be written: no memory");
+    return text_write(&text, options->out, faults) && good;
+}
+
+static bool export_tree(const ExportOptions *options, const char *extension, Faults *faults)
+{
+    VesselTree *tree = tree_file_load(options->in, NULL, faults);
+    if (!tree)
+        return false;
+    bool model = vessel_tree_is_model(tree), good = false;
+    bool line_only = !strcmp(extension, ".swc") || !strcmp(extension, ".json");
+    bool surface_only = !strcmp(extension, ".stl") || !strcmp(extension, ".ply") || !strcmp(extension, ".obj");
+    bool surface = options->what ? !strcmp(options->what, "surface") : surface_only || (model && !line_only);
+    if (!line_only && !surface_only && strcmp(extension, ".vtp"))
+        faults_add(faults, options->out, 0, 0, "extension '%s' is no format of a tree or model; valid: .stl .ply .obj .vtp .mrk.json .swc", extension);
+    else if (surface ? line_only : surface_only)
+        faults_add(faults, options->out, 0, 0, "'%s' cannot hold a %s; valid: %s", extension, surface ? "surface" : "centreline",
+                   surface ? ".stl .ply .obj .vtp" : ".vtp .mrk.json .swc");
+    else if (surface && !model)
+        faults_add(faults, options->in, 0, 0, "is a tree without a model, so it has no surface; `seldinger fit` makes one, or export the centreline");
+    else
+        good = surface ? export_surface(options, extension, tree, faults) : export_centreline(options, extension, tree, faults);
+    vessel_tree_free(tree);
+    return good;
+}
+
+// --- recordings ---
+
+static bool export_rows(const ExportOptions *options, const RecordedRun *run, Faults *faults)
+{
+    Text text;
+    if (!text_open(&text)) {
+        faults_add(faults, options->out, 0, 0, "cannot be written: no memory");
+        return false;
+    }
+    fprintf(text.stream, "t_s,step,node,x_mm,y_mm,z_mm,qw,qx,qy,qz\n");
+    for (int64_t k = 0; k < run->frame_count; k++)
+        for (int i = 0; i < run->node_count; i++) {
+            Vec3 x = run->position[k * run->node_count + i];
+            Quat q = run->quaternion[k * run->node_count + i];
+            fprintf(text.stream, "%.9g,%" PRId64 ",%d,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g\n", run->time_s[run->frame_step[k]], run->frame_step[k], i, x.x, x.y,
+                    x.z, q.w, q.x, q.y, q.z);
+        }
+    return text_write(&text, options->out, faults);
+}
+
+static bool export_frame(const char *path, const RecordedRun *run, int64_t frame, Faults *faults)
+{
+    Text text;
+    if (!text_open(&text)) {
+        faults_add(faults, path, 0, 0, "cannot be written: no memory");
+        return false;
+    }
+    FILE *out = text.stream;
+    vtp_begin(out, run->node_count, 1, 0);
+    fprintf(out, "<PointData Scalars=\"Radius\">\n");
+    vtp_array(out, "Float64", "Radius", 1);
+    for (int i = 0; i < run->node_count; i++)
+        fprintf(out, "%.9g\n", run->radius[i]);
+    vtp_array_end(out);
+    fprintf(out, "</PointData>\n");
+    vtp_points(out, run->position + frame * run->node_count, run->node_count);
+    fprintf(out, "<Lines>\n");
+    vtp_array(out, "Int64", "connectivity", 1);
+    for (int i = 0; i < run->node_count; i++)
+        fprintf(out, "%d\n", i);
+    vtp_array_end(out);
+    vtp_array(out, "Int64", "offsets", 1);
+    fprintf(out, "%d\n", run->node_count);
+    vtp_array_end(out);
+    fprintf(out, "</Lines>\n");
+    vtp_end(out);
+    return text_write(&text, path, faults);
+}
+
+// OUT.pvd names OUT_00000.vtp and on, each with its time; the .pvd comes last, so what it names is there.
+static bool export_series(const ExportOptions *options, const RecordedRun *run, Faults *faults)
+{
+    int stem = (int)(strlen(options->out) - 4);
+    size_t room = strlen(options->out) + 32;
+    char *path = malloc(room);
+    const char *slash = strrchr(options->out, '/'), *name = slash ? slash + 1 : options->out;
+    Text list;
+    bool good = path && text_open(&list);
+    if (!good) {
+        faults_add(faults, options->out, 0, 0, "cannot be written: no memory");
+        free(path);
+        return false;
+    }
+    fprintf(list.stream, "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n<Collection>\n");
+    for (int64_t k = 0; good && k < run->frame_count; k++) {
+        snprintf(path, room, "%.*s_%05" PRId64 ".vtp", stem, options->out, k);
+        good = export_frame(path, run, k, faults);
+        fprintf(list.stream, "<DataSet timestep=\"%.9g\" group=\"\" part=\"0\" file=\"%.*s_%05" PRId64 ".vtp\"/>\n", run->time_s[run->frame_step[k]],
+                stem - (int)(name - options->out), name, k);
+    }
+    fprintf(list.stream, "</Collection>\n</VTKFile>\n");
+    snprintf(path, room, "%.*s.pvd", stem, options->out);
+    if (good) {
+        good = text_write(&list, path, faults);
+    } else {
+        fclose(list.stream);
+        free(list.bytes);
+    }
+    free(path);
+    return good;
+}
+
+static bool export_recording(const ExportOptions *options, const char *extension, Faults *faults)
+{
+    bool rows = !strcmp(extension, ".csv"), series = !strcmp(extension, ".vtp") || !strcmp(extension, ".pvd");
+    if (!rows && !series) {
+        faults_add(faults, options->out, 0, 0, "extension '%s' is no format of a recording here%s; valid: .csv .vtp .pvd", extension,
+                   !strcmp(extension, ".vtkhdf") || !strcmp(extension, ".hdf") ? " (VTKHDF is not built yet)" : "");
+        return false;
+    }
+    RecordedRun *run = recorded_run_load(options->in, faults);
+    bool good = run && (rows ? export_rows(options, run, faults) : export_series(options, run, faults));
+    recorded_run_free(run);
+    return good;
+}
+
+// --- the verb ---
+
+static int parse_options(int argc, char **argv, ExportOptions *options)
+{
+    enum { WHAT = 256, CELL, FRAME, THREADS, QUIET, HELP };
+    static const struct option table[] = {{"what", required_argument, NULL, WHAT},       {"cell-mm", required_argument, NULL, CELL},
+                                          {"frame", required_argument, NULL, FRAME},     {"output", required_argument, NULL, 'o'},
+                                          {"threads", required_argument, NULL, THREADS}, {"quiet", no_argument, NULL, QUIET},
+                                          {"help", no_argument, NULL, HELP},             {0}};
+    *options = (ExportOptions){.frame = "LPS"};
+    double number;
+    optind = 1;
+    for (int choice; (choice = getopt_long(argc, argv, "ho:", table, NULL)) != -1;) {
+        switch (choice) {
+        case 'o': options->out = optarg; break;
+        case WHAT:
+            options->what = optarg;
+            if (!strcmp(optarg, "centerline"))
+                options->what = "centreline";
+            if (strcmp(options->what, "surface") && strcmp(options->what, "centreline")) {
+                fprintf(stderr, "--what: '%s' is not valid; surface or centreline\n", optarg);
+                return EXIT_BAD_INPUT;
+            }
+            break;
+        case FRAME:
+            options->frame = optarg;
+            if (strcmp(optarg, "RAS") && strcmp(optarg, "LPS")) {
+                fprintf(stderr, "--frame: '%s' is not valid; RAS or LPS\n", optarg);
+                return EXIT_BAD_INPUT;
+            }
+            break;
+        case CELL:
+            if (!cli_number("--cell-mm", optarg, 0.001, 1000, &options->cell_mm))
+                return EXIT_BAD_INPUT;
+            break;
+        case THREADS:
+            if (!cli_number("--threads", optarg, 0, 256, &number))
+                return EXIT_BAD_INPUT;
+            break;
+        case QUIET: break;
+        case HELP:
+        case 'h': fputs(help, stdout); return EXIT_DONE;
+        default: fprintf(stderr, "seldinger export: unknown option or lacking value; see `seldinger export --help`\n"); return EXIT_BAD_INPUT;
+        }
+    }
+    if (optind != argc - 1 || !options->out) {
+        fprintf(stderr, "seldinger export: one file and `-o OUT` are needed; see `seldinger export --help`\n");
+        return EXIT_BAD_INPUT;
+    }
+    options->in = argv[optind];
+    return -1;
+}
 
 int verb_export(int argc, char **argv)
 {
-    (void)argc, (void)argv;
-    return EXIT_BAD_INPUT;
+    static Faults faults;
+    ExportOptions options;
+    char extension[16];
+    int code = parse_options(argc, argv, &options);
+    if (code >= 0)
+        return code;
+    faults_clear(&faults);
+    output_extension(options.out, extension);
+    bool good = output_check(options.out, &faults);
+    switch (good ? file_kind(options.in) : FILE_UNKNOWN) {
+    case FILE_TREE: good = export_tree(&options, extension, &faults); break;
+    case FILE_RECORDING: good = export_recording(&options, extension, &faults); break;
+    case FILE_MISSING:
+        faults_add(&faults, options.in, 0, 0, "cannot be opened; give a tree, model or recording");
+        good = false;
+        break;
+    default:
+        if (good)
+            faults_add(&faults, options.in, 0, 0, "is no tree, model or recording; those can be exported");
+        good = false;
+    }
+    return good ? EXIT_DONE : cli_bad_input(&faults);
 }

@@ -1,7 +1,256 @@
+// seldinger info: what a file is and its figures, for people or as JSON. The figures are gathered once as JSON; the text is that, printed plainly.
 #include "cli/cli.h"
+
+#include "cli/file_kind.h"
+#include "recon/tree_file.h"
+#include "recon/volume.h"
+#include "sim/recording.h"
+
+#include <cJSON.h>
+#include <getopt.h>
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char help[] = "Usage: seldinger info FILE [--json]\n\n"
+                           "Says what FILE is (volume, tree, model, recording, scene or script) and its figures. Lengths mm.\n\n"
+                           "  --json   as JSON on standard output\n";
+
+static void add_vector(cJSON *object, const char *name, Vec3 v)
+{
+    cJSON_AddItemToObject(object, name, cJSON_CreateDoubleArray((double[]){v.x, v.y, v.z}, 3));
+}
+
+static int by_value(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+// {"least", "median", "largest"} of `count` values.
+static void add_spread(cJSON *object, const char *name, const double *value, int count)
+{
+    double *sorted = count > 0 ? malloc((size_t)count * sizeof *sorted) : NULL;
+    if (!sorted)
+        return;
+    memcpy(sorted, value, (size_t)count * sizeof *sorted);
+    qsort(sorted, (size_t)count, sizeof *sorted, by_value);
+    cJSON *spread = cJSON_AddObjectToObject(object, name);
+    cJSON_AddNumberToObject(spread, "least", sorted[0]);
+    cJSON_AddNumberToObject(spread, "median", sorted[(count - 1) / 2]);
+    cJSON_AddNumberToObject(spread, "largest", sorted[count - 1]);
+    free(sorted);
+}
+
+static void add_box(cJSON *object, const Vec3 *point, int count)
+{
+    Vec3 low = point[0], high = point[0];
+    for (int i = 1; i < count; i++) {
+        low = vec3(fmin(low.x, point[i].x), fmin(low.y, point[i].y), fmin(low.z, point[i].z));
+        high = vec3(fmax(high.x, point[i].x), fmax(high.y, point[i].y), fmax(high.z, point[i].z));
+    }
+    add_vector(object, "low_mm", low);
+    add_vector(object, "high_mm", high);
+}
+
+static bool describe_tree(cJSON *object, const char *path, Faults *faults)
+{
+    TreeFileInfo info = {0};
+    VesselTree *tree = tree_file_load(path, &info, faults);
+    if (!tree)
+        return false;
+    bool model = vessel_tree_is_model(tree);
+    int *children = calloc((size_t)tree->node_count, sizeof *children), branches = 1, ends = 0, aneurysm = 0;
+    double length = 0;
+    for (int i = 1; i < tree->node_count; i++) {
+        length += tree->kind[i] == NODE_VESSEL ? vec3_distance(tree->center[i], tree->center[tree->parent[i]]) : 0;
+        if (children && children[tree->parent[i]]++ > 0)
+            branches++;
+    }
+    for (int i = 0; i < tree->node_count; i++) {
+        ends += children && children[i] == 0;
+        aneurysm += tree->kind[i] == NODE_ANEURYSM;
+    }
+    free(children);
+    cJSON_AddStringToObject(object, "what", model ? "model" : "tree");
+    cJSON_AddNumberToObject(object, "nodes", tree->node_count);
+    cJSON_AddNumberToObject(object, "branches", branches);
+    cJSON_AddNumberToObject(object, "ends", ends);
+    cJSON_AddNumberToObject(object, "aneurysm_nodes", aneurysm);
+    cJSON_AddNumberToObject(object, "points", (double)tree->point_count);
+    cJSON_AddNumberToObject(object, "centreline_mm", length);
+    add_spread(object, "radius_mm", tree->radius, tree->node_count);
+    add_box(object, tree->center, tree->node_count);
+    add_vector(object, "root_mm", tree->center[0]);
+    if (model) {
+        cJSON_AddNumberToObject(object, "blobs", (double)tree->blob_count);
+        cJSON_AddNumberToObject(object, "blobs_per_node", (double)tree->blob_count / tree->node_count);
+        cJSON_AddNumberToObject(object, "iso_level", tree->iso_level);
+        add_spread(object, "error_mm", tree->error, tree->node_count);
+    }
+    if (info.source)
+        cJSON_AddStringToObject(object, "source", info.source);
+    if (info.created_by)
+        cJSON_AddStringToObject(object, "created_by", info.created_by);
+    tree_file_info_free(&info);
+    vessel_tree_free(tree);
+    return true;
+}
+
+static bool describe_recording(cJSON *object, const char *path, Faults *faults)
+{
+    RecordedRun *run = recorded_run_load(path, faults);
+    char hash[17] = "";
+    if (!run)
+        return false;
+    cJSON_AddStringToObject(object, "what", "recording");
+    cJSON_AddNumberToObject(object, "steps", (double)run->step_count);
+    cJSON_AddNumberToObject(object, "frames", (double)run->frame_count);
+    cJSON_AddNumberToObject(object, "nodes", run->node_count);
+    cJSON_AddNumberToObject(object, "simulated_s", run->step_count > 0 ? run->time_s[run->step_count - 1] : 0);
+    if (run->frame_count > 0)
+        add_vector(object, "tip_mm", run->position[run->frame_count * run->node_count - 1]);
+    if (run->step_count > 0) {
+        snprintf(hash, sizeof hash, "%016" PRIx64, run->state_hash[run->step_count - 1]);
+        cJSON_AddStringToObject(object, "state_hash", hash);
+    }
+    recorded_run_free(run);
+    return true;
+}
+
+static bool describe_volume(cJSON *object, const char *path, Faults *faults)
+{
+    Volume *volume = volume_load(path, faults);
+    if (!volume)
+        return false;
+    cJSON_AddStringToObject(object, "what", "volume");
+    cJSON_AddStringToObject(object, "format", volume->format);
+    cJSON_AddItemToObject(object, "size", cJSON_CreateIntArray(volume->size, 3));
+    double edge[3];
+    for (int i = 0; i < 3; i++)
+        edge[i] = vec3_norm(volume->axis[i]);
+    cJSON_AddItemToObject(object, "voxel_mm", cJSON_CreateDoubleArray(edge, 3));
+    add_vector(object, "origin_mm", volume->origin);
+    for (int i = 0; i < 3; i++)
+        add_vector(object, (const char *const[]){"axis_i_mm", "axis_j_mm", "axis_k_mm"}[i], volume->axis[i]);
+    cJSON_AddStringToObject(object, "frame", volume->frame);
+    cJSON_AddNumberToObject(object, "minimum", volume->minimum);
+    cJSON_AddNumberToObject(object, "maximum", volume->maximum);
+    volume_free(volume);
+    return true;
+}
+
+static bool describe_scene(cJSON *object, const char *path, Faults *faults)
+{
+    static const char *const sources[] = {"model", "shape", "tube", "plane", "none"};
+    Scene *scene = scene_load(path, faults);
+    double length = 0;
+    if (!scene)
+        return false;
+    for (int i = 0; i < scene->wire.section_count; i++)
+        length += scene->wire.section[i].length;
+    cJSON_AddStringToObject(object, "what", "scene");
+    cJSON_AddStringToObject(object, "vessel", sources[scene->source]);
+    if (scene->model_path)
+        cJSON_AddStringToObject(object, "model", scene->model_path);
+    if (scene->source == SOURCE_SHAPE)
+        cJSON_AddStringToObject(object, "shape", scene->shape_name);
+    cJSON_AddNumberToObject(object, "friction", scene->friction);
+    cJSON_AddNumberToObject(object, "elements", scene->wire.elements);
+    cJSON_AddNumberToObject(object, "sections", scene->wire.section_count);
+    cJSON_AddNumberToObject(object, "length_mm", length);
+    cJSON_AddNumberToObject(object, "step_ms", scene->dt);
+    cJSON_AddBoolToObject(object, "sheath", scene->wire.has_sheath);
+    cJSON_AddNumberToObject(object, "script_s", scene->script ? script_duration_s(scene->script) : 0);
+    cJSON_AddNumberToObject(object, "targets", scene->target_count);
+    scene_free(scene);
+    return true;
+}
+
+static bool describe_script(cJSON *object, const char *path, Faults *faults)
+{
+    Script *script = script_load(path, faults);
+    double push = 0, twist = 0;
+    if (!script)
+        return false;
+    for (int i = 0; i + 1 < script->count; i++) {
+        double seconds = script->row[i + 1].t_s - script->row[i].t_s;
+        push += script->row[i].command.push_mm_s * seconds;
+        twist += script->row[i].command.twist_deg_s * seconds;
+    }
+    cJSON_AddStringToObject(object, "what", "script");
+    cJSON_AddNumberToObject(object, "rows", script->count);
+    cJSON_AddNumberToObject(object, "duration_s", script_duration_s(script));
+    cJSON_AddNumberToObject(object, "push_mm", push);
+    cJSON_AddNumberToObject(object, "twist_deg", twist);
+    script_free(script);
+    return true;
+}
+
+static void print_value(const cJSON *value)
+{
+    if (cJSON_IsString(value)) {
+        printf("%s", value->valuestring);
+    } else if (cJSON_IsBool(value)) {
+        printf("%s", cJSON_IsTrue(value) ? "yes" : "no");
+    } else if (cJSON_IsNumber(value)) {
+        printf("%.6g", value->valuedouble);
+    } else {
+        for (const cJSON *item = value->child; item; item = item->next) {
+            if (item->string)
+                printf("%s ", item->string);
+            print_value(item);
+            if (item->next)
+                printf(", ");
+        }
+    }
+}
 
 int verb_info(int argc, char **argv)
 {
-    (void)argc, (void)argv;
-    return EXIT_BAD_INPUT;
+    enum { JSON = 256, QUIET, HELP };
+    static const struct option table[] = {{"json", no_argument, NULL, JSON}, {"quiet", no_argument, NULL, QUIET}, {"help", no_argument, NULL, HELP}, {0}};
+    static Faults faults;
+    bool json = false;
+    optind = 1;
+    for (int choice; (choice = getopt_long(argc, argv, "h", table, NULL)) != -1;) {
+        switch (choice) {
+        case JSON: json = true; break;
+        case QUIET: break;
+        case HELP:
+        case 'h': fputs(help, stdout); return EXIT_DONE;
+        default: fprintf(stderr, "seldinger info: unknown option; see `seldinger info --help`\n"); return EXIT_BAD_INPUT;
+        }
+    }
+    if (optind != argc - 1) {
+        fprintf(stderr, "seldinger info: one file is needed; see `seldinger info --help`\n");
+        return EXIT_BAD_INPUT;
+    }
+    const char *path = argv[optind];
+    cJSON *object = cJSON_CreateObject();
+    faults_clear(&faults);
+    cJSON_AddStringToObject(object, "file", path);
+    bool good = false;
+    switch (file_kind(path)) {
+    case FILE_TREE: good = describe_tree(object, path, &faults); break;
+    case FILE_RECORDING: good = describe_recording(object, path, &faults); break;
+    case FILE_SCENE: good = describe_scene(object, path, &faults); break;
+    case FILE_SCRIPT: good = describe_script(object, path, &faults); break;
+    case FILE_MISSING: faults_add(&faults, path, 0, 0, "cannot be opened; give a file that is there"); break;
+    case FILE_VOLUME:
+    case FILE_UNKNOWN: good = describe_volume(object, path, &faults); break;
+    }
+    if (good && json) {
+        char *text = cJSON_Print(object);
+        printf("%s\n", text ? text : "{}");
+        free(text);
+    } else if (good) {
+        for (const cJSON *item = object->child; item; item = item->next) {
+            printf("%-16s ", item->string);
+            print_value(item);
+            printf("\n");
+        }
+    }
+    cJSON_Delete(object);
+    return good ? EXIT_DONE : cli_bad_input(&faults);
 }

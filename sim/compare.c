@@ -129,11 +129,13 @@ ToolPath *tool_path_create(const Simulator *simulator, double duration_s)
     return path;
 }
 
-bool tool_path_sample(ToolPath *path, const Simulator *simulator)
+bool tool_path_sample(ToolPath *path, const Simulator *simulator, bool last)
 {
     double dt_s = simulator_scene(simulator)->dt / 1000;
     int64_t steps = simulator_totals(simulator)->steps, every = (int64_t)fmax(1, floor(sample_s / dt_s + 0.5));
-    if (steps % every != 0)
+    bool due = steps % every == 0;
+    // the end is sampled where it falls between two samples
+    if (last ? due || steps == 0 : !due)
         return true;
     if (path->row_count + SAMPLED_NODES > path->row_capacity) {
         int wanted = path->row_capacity * 2 + SAMPLED_NODES;
@@ -144,9 +146,9 @@ bool tool_path_sample(ToolPath *path, const Simulator *simulator)
         path->row_capacity = wanted;
     }
     const WireState *state = simulator_state(simulator);
-    int last = state->node_count - 1, count = last + 1 < SAMPLED_NODES ? last + 1 : SAMPLED_NODES;
+    int tip = state->node_count - 1, count = tip + 1 < SAMPLED_NODES ? tip + 1 : SAMPLED_NODES;
     for (int i = 0; i < count; i++) {
-        int node = (int)((int64_t)i * last / (count - 1));
+        int node = (int)((int64_t)i * tip / (count - 1));
         path->row[path->row_count++] = (PathRow){simulator_time_s(simulator), node, state->position[node]};
     }
     return true;

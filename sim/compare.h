@@ -37,9 +37,9 @@ void tool_path_free(ToolPath *path);
 // `X.golden.csv` of `X.yaml` (or .yml); the caller frees it.
 char *golden_path_of(const char *scene_path);
 
-// Collects a path from a run: create, call after each step. False where memory lacks.
+// Collects a path from a run: create, call after each step, and once more with `last` at the end. False where memory lacks.
 ToolPath *tool_path_create(const Simulator *simulator, double duration_s);
-bool tool_path_sample(ToolPath *path, const Simulator *simulator);
+bool tool_path_sample(ToolPath *path, const Simulator *simulator, bool last);
 
 typedef struct PathDifference {
     double worst_mm;         // the largest distance between golden and run

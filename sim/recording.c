@@ -230,7 +230,7 @@ static bool build_file(Recording *recording, const Scene *scene)
     if (!open_part(recording))
         return false;
     hid_t file = recording->file;
-    bool good = write_text(file, "format", NULL, "seldinger recording") && write_number(file, "version", 1) &&
+    bool good = write_text(file, "format", NULL, "seldinger-recording") && write_number(file, "version", 1) &&
                 write_text(file, "created_by", NULL, "seldinger " SELDINGER_VERSION) && write_number(file, "step_ms", scene->dt) &&
                 write_number(file, "frame_ms", recording->options.frame_ms);
     for (int i = 0; good && i < 3; i++) {

@@ -23,7 +23,7 @@ struct YamlReader {
 
 static const char *const units[] = {"mm",    "cm",     "m",       "um",    "in",    "s",     "ms",     "us",    "min",    "gpa",    "mpa",
                                     "kpa",   "pa",     "n_mm2",   "g_cm3", "kg_m3", "g_mm3", "n",      "mn",    "n_mm",   "n_m",    "deg",
-                                    "rad",   "1_mm",   "1_m",     "1_cm",  "1_s",   "1_ms",  "m_s2",   "mm_s2", "mm_ms2", "cm_s2",  "mm_s",
+                                    "rad",   "1_mm",   "1_m",     "1_cm",  "1_s",   "1_ms",  "m_s2",   "mm_s2", "mm_ms2", "cm_s2",  "mm_s", "cm_s", "m_s",
                                     "deg_s", "rad_s",  "hz",      "psi",   "percent", NULL};
 
 static bool same_letters(const char *a, const char *b)

@@ -192,7 +192,7 @@ static const Broken broken[] = {
     {TUBE("radius_mm: 1, path: [{line_mm: 10, arc: {radius_mm: 5, angle_deg: 90}}]"), "5:31", "either {line_mm"},
     {TUBE("radius_mm: 1, path: [{arc: {radius_mm: 0.5, angle_deg: 90}}]"), "5:31", "tighter than the lumen"},
     {TUBE("radius_mm: 1, path: [{line_mm: -10}]"), "5:41", "above 0"},
-    {TUBE("radius_mm: 1, path: [{line_mm: 10}], ends: ajar"), "5:52", "one of: open, closed"},
+    {TUBE("radius_mm: 1, path: [{line_mm: 10}], ends: ajar"), "5:53", "one of: open, closed"},
     {VERSION WIRE "sheath: {inserted_mm: 0}\n", "3:9", "inlet: root"},
     {VERSION WIRE "sheath: {inlet: root}\n", "3:17", "needs a vessel"},
     {VERSION WIRE "sheath: {entry_mm: [0, 0, 0]}\n", "3:9", "lacks the key 'direction'"},
@@ -208,6 +208,7 @@ static const Broken broken[] = {
 static void each_fault_has_its_line_and_column(void **state)
 {
     (void)state;
+    int wrong = 0;
     for (size_t i = 0; i < sizeof broken / sizeof *broken; i++) {
         const Broken *one = &broken[i];
         Scene *scene = parse(one->text);
@@ -217,10 +218,10 @@ static void each_fault_has_its_line_and_column(void **state)
         for (int j = 0; j < faults.count && j < FAULTS_CAPACITY; j++)
             found |= !strncmp(faults.text[j], start, strlen(start)) && strstr(faults.text[j], one->words);
         if (scene || !found)
-            fail_msg("case %zu:\n%s-- expected %s … %s\n-- %d faults, the first: %s", i, one->text, one->place, one->words, faults.count,
+            wrong++, print_error("case %zu:\n%s-- expected %s … %s\n-- %d faults, the first: %s\n", i, one->text, one->place, one->words, faults.count,
                      faults.count ? faults.text[0] : "");
     }
-    assert_true(sizeof broken / sizeof *broken >= 25);
+    assert_int_equal(wrong, 0);
 }
 
 static void all_faults_come_in_one_pass(void **state)

@@ -1,0 +1,46 @@
+#include "cli/file_kind.h"
+
+#include <hdf5.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+
+static FileKind kind_of_hdf5(const char *path)
+{
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+    hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+    H5Pset_file_locking(access, false, true);
+    hid_t file = H5Fopen(path, H5F_ACC_RDONLY, access);
+    H5Pclose(access);
+    if (file < 0)
+        return FILE_UNKNOWN;
+    FileKind kind = H5Lexists(file, "nodes", H5P_DEFAULT) > 0  ? FILE_TREE
+                    : H5Lexists(file, "wire", H5P_DEFAULT) > 0 ? FILE_RECORDING
+                                                               : FILE_UNKNOWN;
+    H5Fclose(file);
+    return kind;
+}
+
+FileKind file_kind(const char *path)
+{
+    unsigned char head[4096] = {0};
+    struct stat status;
+    FILE *file = stat(path, &status) == 0 && S_ISREG(status.st_mode) ? fopen(path, "rb") : NULL;
+    if (!file)
+        return FILE_MISSING;
+    size_t length = fread(head, 1, sizeof head - 1, file);
+    fclose(file);
+    const char *text = (const char *)head;
+    if (length >= 8 && !memcmp(head, "\x89HDF\r\n\x1a\n", 8))
+        return kind_of_hdf5(path);
+    if (!strncmp(text, "NRRD", 4) || strstr(text, "NDims") || (length >= 2 && head[0] == 0x1f && head[1] == 0x8b) ||
+        (length >= 348 && (!memcmp(head + 344, "n+1", 3) || !memcmp(head + 344, "ni1", 3))))
+        return FILE_VOLUME;
+    if (strstr(text, "t_s,push_mm_s,twist_deg_s"))
+        return FILE_SCRIPT;
+    const char *name = strrchr(path, '.');
+    if (strstr(text, "seldinger:") || (name && (!strcmp(name, ".yaml") || !strcmp(name, ".yml"))))
+        return FILE_SCENE;
+    return FILE_UNKNOWN;
+}

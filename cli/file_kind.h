@@ -1,0 +1,10 @@
+// What a file is, by its content and not by its name: for info and export.
+#ifndef SELDINGER_CLI_FILE_KIND_H
+#define SELDINGER_CLI_FILE_KIND_H
+
+typedef enum { FILE_MISSING, FILE_UNKNOWN, FILE_TREE, FILE_RECORDING, FILE_SCENE, FILE_SCRIPT, FILE_VOLUME } FileKind;
+
+// FILE_TREE stands for trees and models; FILE_UNKNOWN where nothing recognised it (a volume is recognised by its first bytes only).
+FileKind file_kind(const char *path);
+
+#endif
