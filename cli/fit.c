@@ -1,7 +1,295 @@
+// seldinger fit: a tree of point sets to a model (LIM), with the figures of the paper's tables 3 and 4.
 #include "cli/cli.h"
+
+#include "cli/output.h"
+#include "recon/lim_fit.h"
+#include "recon/tree_file.h"
+#ifdef SELDINGER_RENDER
+#include "render/picture.h"
+#endif
+
+#include <cjson/cJSON.h>
+#include <getopt.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+typedef struct FitCommand {
+    const char *tree, *output, *json, *picture, *preset;
+    LimFitOptions options;
+    bool has_voxel, quiet;
+} FitCommand;
+
+static const char help[] =
+    "Usage: seldinger fit TREE.h5 -o MODEL.h5 [options]\n\n"
+    "Fits a local blobby model to the points around every node (LIM, Kerrien et al. 2017).\n\n"
+    "  -o, --output F.h5      the model\n"
+    "  --preset NAME          default, or paper: the published values and method; give it before other options\n"
+    "  --target-mm X          stop when every point is this near [mm]; default: max(0.5 voxel, min(0.2 r, 1.5 voxels)) of the node's radius r;\n"
+    "                         paper 0.3\n"
+    "  --max-blobs N          blobs of a local model, at most; default 100\n"
+    "  --voxel-mm X           voxel size of the angiogram [mm]; default: what the tree's file says (`voxel_mm`), else 0.2\n"
+    "  --alpha X              weight of the cohesion of blobs; default 0, paper 1e-5\n"
+    "  --beta X               weight of curvature [mm^4]; default 1e-4, paper 1e-3\n"
+    "  --max-points N         points of a local model, at most (evenly thinned); default 1500\n"
+    "  --threads N            default 0: all cores; the result does not depend on it\n"
+    "  --json F               figures as JSON; - is standard output\n"
+    "  --picture F.png        fitted surface, points coloured by distance\n"
+    "  --quiet                no summary, no progress\n\n"
+    "Exit codes: 0 done; 2 wrong usage or bad input.\n";
+
+static int usage_fault(const char *message, const char *what)
+{
+    fprintf(stderr, "seldinger fit: %s%s; see `seldinger fit --help`\n", message, what);
+    return EXIT_BAD_INPUT;
+}
+
+// -1: go on; otherwise the exit code.
+static int parse_options(int argc, char **argv, FitCommand *command)
+{
+    enum { PRESET = 256, TARGET, BLOBS, VOXEL, ALPHA, BETA, POINTS, THREADS, JSON, PICTURE, QUIET };
+    static const struct option table[] = {
+        {"output", required_argument, NULL, 'o'},      {"preset", required_argument, NULL, PRESET}, {"target-mm", required_argument, NULL, TARGET},
+        {"max-blobs", required_argument, NULL, BLOBS}, {"voxel-mm", required_argument, NULL, VOXEL}, {"alpha", required_argument, NULL, ALPHA},
+        {"beta", required_argument, NULL, BETA},       {"max-points", required_argument, NULL, POINTS}, {"threads", required_argument, NULL, THREADS},
+        {"json", required_argument, NULL, JSON},       {"picture", required_argument, NULL, PICTURE}, {"quiet", no_argument, NULL, QUIET},
+        {"help", no_argument, NULL, 'h'},              {0}};
+    *command = (FitCommand){.options = lim_fit_default_options(), .preset = "default"};
+    double number;
+    optind = 1;
+    for (int choice; (choice = getopt_long(argc, argv, "o:h", table, NULL)) != -1;) {
+        LimFitOptions *o = &command->options;
+        switch (choice) {
+        case 'o': command->output = optarg; break;
+        case JSON: command->json = optarg; break;
+        case PICTURE: command->picture = optarg; break;
+        case QUIET: command->quiet = true; break;
+        case PRESET:
+            if (strcmp(optarg, "default") && strcmp(optarg, "paper"))
+                return usage_fault("--preset is default or paper, not ", optarg);
+            command->preset = optarg;
+            command->options = strcmp(optarg, "paper") ? lim_fit_default_options() : lim_fit_paper_options();
+            break;
+        case TARGET:
+            if (!cli_number("--target-mm", optarg, 1e-4, 100, &o->target_mm))
+                return EXIT_BAD_INPUT;
+            break;
+        case VOXEL:
+            if (!cli_number("--voxel-mm", optarg, 1e-4, 100, &o->voxel_mm))
+                return EXIT_BAD_INPUT;
+            command->has_voxel = true;
+            break;
+        case ALPHA:
+            if (!cli_number("--alpha", optarg, 0, 1, &o->alpha))
+                return EXIT_BAD_INPUT;
+            break;
+        case BETA:
+            if (!cli_number("--beta", optarg, 0, 10, &o->beta))
+                return EXIT_BAD_INPUT;
+            break;
+        case BLOBS:
+            if (!cli_number("--max-blobs", optarg, 2, 1000, &number))
+                return EXIT_BAD_INPUT;
+            o->max_blobs = (int)number;
+            break;
+        case POINTS:
+            if (!cli_number("--max-points", optarg, 50, 100000, &number))
+                return EXIT_BAD_INPUT;
+            o->max_points = (int)number;
+            break;
+        case THREADS:
+            if (!cli_number("--threads", optarg, 0, 256, &number))
+                return EXIT_BAD_INPUT;
+            o->threads = (int)number;
+            break;
+        case 'h': fputs(help, stdout); return EXIT_DONE;
+        default: return usage_fault("unknown option or lacking value", "");
+        }
+    }
+    if (optind != argc - 1)
+        return usage_fault(optind < argc ? "one tree at a time, not also " : "lacks the tree to fit", optind < argc ? argv[optind + 1] : "");
+    if (!command->output)
+        return usage_fault("lacks -o MODEL.h5", "");
+    command->tree = argv[optind];
+    return -1;
+}
+
+// What was done, as YAML; the tree's own parameters below.
+static char *describe(const FitCommand *command, const TreeFileInfo *tree)
+{
+    const LimFitOptions *o = &command->options;
+    size_t room = 1024 + 4 * (tree->parameters ? strlen(tree->parameters) : 0);
+    char *text = malloc(room);
+    if (!text)
+        return NULL;
+    int n = snprintf(text, room,
+                     "fit:\n  preset: %s\n  alpha: %g\n  beta: %g\n  s: %g\n  iso_level: %g\n  max_blobs: %d\n  target_mm: %g\n  voxel_mm: %g\n"
+                     "  topological_distance: %d\n  max_loops: %d\n  line_searches: %d\n  weigh_distance: %d\n  project_points: %d\n"
+                     "  sweep_all_blobs: %d\n  give_up_splits: %d\n  extend_inlet: %d\n  guard_shape: %d\n  max_points: %d\ntree:\n",
+                     command->preset, o->alpha, o->beta, o->s, o->iso_level, o->max_blobs, o->target_mm, o->voxel_mm, o->topological_distance,
+                     o->max_loops, o->line_searches, o->weigh_distance, o->project_points, o->sweep_all_blobs, o->give_up_splits, o->extend_inlet,
+                     o->guard_shape, o->max_points);
+    char *out = text + n;
+    bool line_start = true;
+    for (const char *in = tree->parameters; in && *in && out < text + room - 4; in++) {
+        if (line_start)
+            *out++ = ' ', *out++ = ' ';
+        *out++ = *in;
+        line_start = *in == '\n';
+    }
+    *out = '\0';
+    return text;
+}
+
+typedef struct FitFigures {
+    long blobs;
+    int blobs_median, blobs_most;
+    double error_median, error_worst, class_percent[4], seconds;
+    int worst_node;
+} FitFigures;
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static FitFigures figures_of(const VesselTree *model, double voxel, double seconds)
+{
+    int n = model->node_count;
+    FitFigures figures = {.blobs = (long)model->blob_count, .seconds = seconds};
+    double *sorted = calloc((size_t)n, sizeof *sorted);
+    for (int i = 0; i < n; i++) {
+        double error = model->error[i];
+        int kind = error < 0.5 * voxel ? 0 : error < voxel ? 1 : error < 2 * voxel ? 2 : 3;
+        figures.class_percent[kind] += 100.0 / n;
+        if (error > model->error[figures.worst_node])
+            figures.worst_node = i;
+    }
+    figures.error_worst = model->error[figures.worst_node];
+    if (sorted) {
+        memcpy(sorted, model->error, (size_t)n * sizeof *sorted);
+        qsort(sorted, (size_t)n, sizeof *sorted, compare_doubles);
+        figures.error_median = sorted[n / 2];
+        for (int i = 0; i < n; i++)
+            sorted[i] = (double)(model->blob_offset[i + 1] - model->blob_offset[i]);
+        qsort(sorted, (size_t)n, sizeof *sorted, compare_doubles);
+        figures.blobs_median = (int)sorted[n / 2];
+        figures.blobs_most = (int)sorted[n - 1];
+        free(sorted);
+    }
+    return figures;
+}
+
+static void print_figures(const VesselTree *model, const FitFigures *f, double voxel)
+{
+    printf("nodes          %d, %lld points\n", model->node_count, (long long)model->point_count);
+    printf("blobs          %ld: %.1f a node, median %d, most %d\n", f->blobs, (double)f->blobs / model->node_count, f->blobs_median, f->blobs_most);
+    printf("d_a            median %.4f mm, worst %.4f mm (node %d)\n", f->error_median, f->error_worst, f->worst_node);
+    printf("d_a classes    C1 < 0.5 voxel %.2f %%, C2 < 1 voxel %.2f %%, C3 < 2 voxels %.2f %%, C4 %.2f %% (voxel %g mm)\n", f->class_percent[0],
+           f->class_percent[1], f->class_percent[2], f->class_percent[3], voxel);
+    printf("seconds        %.2f\n", f->seconds);
+}
+
+static bool write_json(const char *path, const VesselTree *model, const FitFigures *f, double voxel, Faults *faults)
+{
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddNumberToObject(root, "nodes", model->node_count);
+    cJSON_AddNumberToObject(root, "points", (double)model->point_count);
+    cJSON_AddNumberToObject(root, "blobs", (double)f->blobs);
+    cJSON_AddNumberToObject(root, "blobs_per_node", (double)f->blobs / model->node_count);
+    cJSON_AddNumberToObject(root, "blobs_median", f->blobs_median);
+    cJSON_AddNumberToObject(root, "blobs_max", f->blobs_most);
+    cJSON_AddNumberToObject(root, "error_median_mm", f->error_median);
+    cJSON_AddNumberToObject(root, "error_max_mm", f->error_worst);
+    cJSON_AddNumberToObject(root, "worst_node", f->worst_node);
+    cJSON_AddNumberToObject(root, "voxel_mm", voxel);
+    cJSON *classes = cJSON_AddArrayToObject(root, "class_percent");
+    for (int i = 0; i < 4; i++)
+        cJSON_AddItemToArray(classes, cJSON_CreateNumber(f->class_percent[i]));
+    cJSON_AddNumberToObject(root, "seconds", f->seconds);
+    char *text = cJSON_Print(root);
+    bool good = text && output_write(path, text, strlen(text), faults);
+    if (!text)
+        faults_add(faults, path, 0, 0, "not enough memory");
+    free(text);
+    cJSON_Delete(root);
+    return good;
+}
+
+// A picture is never worth a failed fit: what stops it is said, and the command succeeds.
+static void make_picture(const char *path, const VesselTree *model)
+{
+#ifdef SELDINGER_RENDER
+    double least = HUGE_VAL;
+    for (int i = 0; i < model->node_count; i++)
+        least = fmin(least, model->radius[i]);
+    char message[256] = "";
+    TriangleMesh *mesh = isosurface_of_tree(model, fmax(0.3 * least, 0.02));
+    PictureOptions options = picture_default_options();
+    if (!picture_of_fit(path, &options, model, mesh, NULL, message, sizeof message))
+        fprintf(stderr, "%s: no picture: %s\n", path, message);
+    triangle_mesh_free(mesh);
+#else
+    (void)model;
+    fprintf(stderr, "%s: this build has no pictures; build with -DSELDINGER_RENDER=ON\n", path);
+#endif
+}
+
+static double seconds_now(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seconds, Faults *faults)
+{
+    output_check_file(command->output, faults);
+    output_check(command->json, faults);
+    if (command->picture)
+        output_check_file(command->picture, faults);
+    VesselTree *tree = tree_file_load(command->tree, info, faults), *model = NULL;
+    if (tree && faults->count == 0) {
+        if (!command->has_voxel) {
+            double said = tree_file_number(info, "voxel_mm", command->options.voxel_mm);
+            command->options.voxel_mm = said > 1e-4 && said < 100 ? said : command->options.voxel_mm;
+        }
+        ProgressBar bar;
+        Progress progress = progress_bar(&bar, "fit", command->quiet);
+        double begin = seconds_now();
+        model = lim_fit(tree, &command->options, &progress, faults);
+        *seconds = seconds_now() - begin;
+    }
+    vessel_tree_free(tree);
+    return model;
+}
 
 int verb_fit(int argc, char **argv)
 {
-    (void)argc, (void)argv;
-    return EXIT_BAD_INPUT;
+    static Faults faults;
+    FitCommand command;
+    int code = parse_options(argc, argv, &command);
+    if (code >= 0)
+        return code;
+    TreeFileInfo from = {0};
+    double seconds = 0;
+    VesselTree *model = run_fit(&command, &from, &seconds, &faults);
+    bool good = model != NULL;
+    if (good) {
+        FitFigures figures = figures_of(model, command.options.voxel_mm, seconds);
+        TreeFileInfo info = {.source = from.source, .parameters = describe(&command, &from),
+                             .created_by = (char *)(size_t) "seldinger " SELDINGER_VERSION " fit"};
+        good = tree_file_save(model, &info, command.output, &faults);
+        free(info.parameters);
+        if (good && command.json)
+            good = write_json(command.json, model, &figures, command.options.voxel_mm, &faults);
+        if (good && !command.quiet && !(command.json && !strcmp(command.json, "-")))
+            print_figures(model, &figures, command.options.voxel_mm);
+        if (good && command.picture)
+            make_picture(command.picture, model);
+    }
+    vessel_tree_free(model);
+    tree_file_info_free(&from);
+    return good ? EXIT_DONE : cli_bad_input(&faults);
 }

@@ -1,7 +1,223 @@
+// seldinger query: field, gradient and Taubin distance of a model at points (CSV in, CSV out).
 #include "cli/cli.h"
+
+#include "cli/output.h"
+#include "recon/tree_file.h"
+#include "recon/whole_file.h"
+
+#include <getopt.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char help[] =
+    "Usage: seldinger query MODEL.h5 --points F.csv -o F.csv\n\n"
+    "Evaluates a fitted model at points: the node by power distance over the whole tree, field f (> 0 inside), its gradient, and the signed\n"
+    "Taubin distance f / |grad f| (> 0 inside).\n\n"
+    "  --points F.csv   a header with x_mm,y_mm,z_mm (any order, other columns are ignored), a point a line; # begins a comment\n"
+    "  -o, --output F   x_mm,y_mm,z_mm,node,f,gx,gy,gz,distance_mm,inside; - is standard output\n"
+    "  --quiet          no summary\n\n"
+    "Exit codes: 0 done; 2 wrong usage or bad input.\n";
+
+static int usage_fault(const char *message, const char *what)
+{
+    fprintf(stderr, "seldinger query: %s%s; see `seldinger query --help`\n", message, what);
+    return EXIT_BAD_INPUT;
+}
+
+// --- points ---
+
+enum { COLUMNS_MOST = 64 };
+
+typedef struct PointTable {
+    int count, capacity;
+    Vec3 *point;
+} PointTable;
+
+static bool append(PointTable *table, Vec3 p)
+{
+    if (table->count == table->capacity) {
+        int capacity = table->capacity ? 2 * table->capacity : 1024;
+        Vec3 *more = realloc(table->point, (size_t)capacity * sizeof *more);
+        if (!more)
+            return false;
+        table->point = more;
+        table->capacity = capacity;
+    }
+    table->point[table->count++] = p;
+    return true;
+}
+
+// Cuts a line at its commas (in place), blanks around cells removed. Returns the number of cells, at most COLUMNS_MOST + 1.
+static int cut_cells(char *line, char *cell[COLUMNS_MOST + 1])
+{
+    int count = 0;
+    for (char *at = line; count <= COLUMNS_MOST;) {
+        char *end = strchr(at, ',');
+        if (end)
+            *end = '\0';
+        at += strspn(at, " \t\r");
+        size_t length = strlen(at);
+        while (length > 0 && strchr(" \t\r", at[length - 1]))
+            at[--length] = '\0';
+        cell[count++] = at;
+        if (!end)
+            break;
+        at = end + 1;
+    }
+    return count;
+}
+
+static bool read_header(char *const *cell, int count, int which[3], const char *path, int line, Faults *faults)
+{
+    static const char *const name[3] = {"x_mm", "y_mm", "z_mm"};
+    int before = faults->count;
+    for (int k = 0; k < 3; k++) {
+        which[k] = -1;
+        for (int i = 0; i < count; i++)
+            if (!strcmp(cell[i], name[k])) {
+                if (which[k] >= 0)
+                    faults_add(faults, path, line, 0, "column %s stands twice; once is valid", name[k]);
+                which[k] = i;
+            }
+        if (which[k] < 0)
+            faults_add(faults, path, line, 0, "the header has no column %s; valid: x_mm,y_mm,z_mm", name[k]);
+    }
+    return faults->count == before;
+}
+
+static bool read_points(const char *path, PointTable *table, Faults *faults)
+{
+    size_t length;
+    int before = faults->count, which[3], columns = 0, line = 0;
+    char *text = whole_file_read(path, &length, faults), *next = text;
+    if (text && memchr(text, '\0', length)) {
+        faults_add_at_byte(faults, path, strlen(text), "a zero byte; valid: text");
+        next = NULL;
+    }
+    if (next && !strncmp(next, "\xEF\xBB\xBF", 3))
+        next += 3;
+    while (next && *next && faults->count < FAULTS_CAPACITY) {
+        char *at = next, *cell[COLUMNS_MOST + 1];
+        char *end = strchr(at, '\n');
+        next = end ? end + 1 : at + strlen(at);
+        if (end)
+            *end = '\0';
+        line++;
+        at[strcspn(at, "#")] = '\0';
+        if (at[strspn(at, " \t\r")] == '\0')
+            continue;
+        char *line_begin = at;
+        int count = cut_cells(at, cell);
+        if (columns == 0) {
+            if (!read_header(cell, count, which, path, line, faults))
+                break;
+            columns = count;
+            continue;
+        }
+        double x[3];
+        bool good = count == columns;
+        if (!good)
+            faults_add(faults, path, line, 0, "%d cells; valid: %d, as in the header", count, columns);
+        for (int k = 0; k < 3 && good; k++) {
+            char *stop;
+            const char *from = cell[which[k]];
+            x[k] = strtod(from, &stop);
+            if (stop == from || *stop || !isfinite(x[k]) || fabs(x[k]) > 1e9) {
+                faults_add(faults, path, line, (int)(from - line_begin) + 1, "'%.40s' is no coordinate; valid: a finite number of mm", from);
+                good = false;
+            }
+        }
+        if (good && !append(table, vec3(x[0], x[1], x[2]))) {
+            faults_add(faults, path, line, 0, "not enough memory");
+            break;
+        }
+    }
+    if (text && columns == 0 && faults->count == before)
+        faults_add(faults, path, 1, 1, "is empty; a header x_mm,y_mm,z_mm is needed");
+    free(text);
+    return faults->count == before;
+}
+
+// --- answers ---
+
+typedef struct Text {
+    char *bytes;
+    size_t length, capacity;
+    bool failed;
+} Text;
+
+__attribute__((format(printf, 2, 3))) static void print_to(Text *text, const char *format, ...)
+{
+    if (text->capacity - text->length < 512) {
+        size_t capacity = 2 * text->capacity + 65536;
+        char *more = realloc(text->bytes, capacity);
+        if (!more) {
+            text->failed = true;
+            return;
+        }
+        text->bytes = more;
+        text->capacity = capacity;
+    }
+    va_list arguments;
+    va_start(arguments, format);
+    text->length += (size_t)vsnprintf(text->bytes + text->length, text->capacity - text->length, format, arguments);
+    va_end(arguments);
+}
+
+static bool answer(const VesselTree *tree, const PointTable *table, const char *output, Faults *faults)
+{
+    Text text = {0};
+    print_to(&text, "x_mm,y_mm,z_mm,node,f,gx,gy,gz,distance_mm,inside\n");
+    for (int i = 0; i < table->count && !text.failed; i++) {
+        Vec3 x = table->point[i], g;
+        int node = power_nearest(tree, x);
+        int64_t first = tree->blob_offset[node];
+        Blobby model = {(int)(tree->blob_offset[node + 1] - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level};
+        double f = blobby_gradient(&model, x, &g), slope = vec3_norm(g);
+        double distance = slope > 0 ? f / slope : f > 0 ? HUGE_VAL : -HUGE_VAL;   // on a top of the field, or beyond its reach
+        print_to(&text, "%.17g,%.17g,%.17g,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%d\n", x.x, x.y, x.z, node, f, g.x, g.y, g.z, distance, f > 0);
+    }
+    bool good = !text.failed && output_write(output, text.bytes, text.length, faults);
+    if (text.failed)
+        faults_add(faults, output, 0, 0, "not enough memory for %d points", table->count);
+    free(text.bytes);
+    return good;
+}
 
 int verb_query(int argc, char **argv)
 {
-    (void)argc, (void)argv;
-    return EXIT_BAD_INPUT;
+    enum { POINTS = 256, QUIET };
+    static const struct option options[] = {{"points", required_argument, NULL, POINTS}, {"output", required_argument, NULL, 'o'},
+                                            {"quiet", no_argument, NULL, QUIET},          {"help", no_argument, NULL, 'h'},
+                                            {0}};
+    static Faults faults;
+    const char *points = NULL, *output = NULL;
+    bool quiet = false;
+    optind = 1;
+    for (int choice; (choice = getopt_long(argc, argv, "o:h", options, NULL)) != -1;) {
+        switch (choice) {
+        case POINTS: points = optarg; break;
+        case 'o': output = optarg; break;
+        case QUIET: quiet = true; break;
+        case 'h': fputs(help, stdout); return EXIT_DONE;
+        default: return usage_fault("unknown option or lacking value", "");
+        }
+    }
+    if (optind != argc - 1)
+        return usage_fault(optind < argc ? "one model at a time, not also " : "lacks the model", optind < argc ? argv[optind + 1] : "");
+    if (!points || !output)
+        return usage_fault(points ? "lacks -o F.csv" : "lacks --points F.csv", "");
+    PointTable table = {0};
+    output_check(output, &faults);
+    VesselTree *tree = tree_file_load(argv[optind], NULL, &faults);
+    if (tree && !vessel_tree_is_model(tree))
+        faults_add(&faults, argv[optind], 0, 0, "is a tree without a model; make one with `seldinger fit`");
+    read_points(points, &table, &faults);
+    bool good = faults.count == 0 && answer(tree, &table, output, &faults);
+    if (good && !quiet && strcmp(output, "-"))
+        printf("%d points\n", table.count);
+    vessel_tree_free(tree);
+    free(table.point);
+    return good ? EXIT_DONE : cli_bad_input(&faults);
 }
