@@ -1,7 +1,234 @@
+// seldinger segment: RBT, a volume to a tree of centreline nodes with local point sets (recon/rbt_track.h).
 #include "cli/cli.h"
+#include "recon/rbt_track.h"
+#include "recon/trace.h"
+#include "recon/tree_file.h"
+#include "recon/volume.h"
+#include "recon/whole_file.h"
+#ifdef SELDINGER_RENDER
+#include "render/picture.h"
+#endif
+
+#include <argp.h>
+#include <cjson/cJSON.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+enum { KEY_TRACE = 't', KEY_OUT = 'o', KEY_QUIET = 'q', KEY_THREADS = 1000, KEY_SEED, KEY_JSON, KEY_PICTURE };
+
+static const struct argp_option options[] = {
+    {"trace", KEY_TRACE, "F.yaml", 0, "where branches start, aneurysms, parameters (needed)", 0},
+    {"output", KEY_OUT, "TREE.h5", 0, "the tree (needed)", 0},
+    {"threads", KEY_THREADS, "N", 0, "threads, default 0: all cores; the tree does not depend on it", 0},
+    {"seed", KEY_SEED, "N", 0, "seed of the random numbers, default 1 or the trace's", 0},
+    {"json", KEY_JSON, "F", 0, "the figures of the table, and more, as JSON", 0},
+    {"picture", KEY_PICTURE, "F.png", 0, "maximum intensity projections along the three axes with the tree drawn over", 0},
+    {"quiet", KEY_QUIET, 0, 0, "no table, no progress bar", 0},
+    {0},
+};
+
+typedef struct SegmentArguments {
+    const char *volume, *trace, *out, *json, *picture;
+    int threads;
+    double seed;             // -1: the trace's
+    bool quiet;
+} SegmentArguments;
+
+static error_t parse_option(int key, char *text, struct argp_state *state)
+{
+    SegmentArguments *a = state->input;
+    double number;
+    switch (key) {
+    case KEY_TRACE: a->trace = text; return 0;
+    case KEY_OUT: a->out = text; return 0;
+    case KEY_JSON: a->json = text; return 0;
+    case KEY_PICTURE: a->picture = text; return 0;
+    case KEY_QUIET: a->quiet = true; return 0;
+    case KEY_THREADS:
+        if (!cli_number("--threads", text, 0, 256, &number) || floor(number) != number)
+            argp_error(state, "--threads takes a whole number from 0 to 256");
+        a->threads = (int)number;
+        return 0;
+    case KEY_SEED:
+        if (!cli_number("--seed", text, 0, 9007199254740991.0, &a->seed) || floor(a->seed) != a->seed)
+            argp_error(state, "--seed takes a whole number from 0 to 2^53");
+        return 0;
+    case ARGP_KEY_ARG:
+        if (a->volume)
+            argp_error(state, "one volume, not also '%s'", text);
+        a->volume = text;
+        return 0;
+    case ARGP_KEY_END:
+        if (!a->volume || !a->trace || !a->out)
+            argp_error(state, "%s", !a->volume ? "no volume is named" : !a->trace ? "--trace F.yaml is needed" : "-o TREE.h5 is needed");
+        return 0;
+    default: return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const char intro[] =
+    "Tracks vessels through an angiogram (RBT, Kerrien et al. 2017, section 3): VOLUME to a tree of cylinders, each with its points on the wall.\v"
+    "VOLUME is NRRD (raw, gzip or text, attached or detached), MetaImage or NIfTI, recognised by its content.\n\n"
+    "The trace is YAML. The first branch needs a start, a point further down the vessel and about its radius; it becomes the root of the tree. Further branches "
+    "need a start alone: it is projected to the tree tracked so far and the tracking starts beside the parent; with a `toward` it starts at the point itself and "
+    "runs both ways. All of mm may be voxels (start_voxel, toward_voxel, centers_voxel):\n\n"
+    "  branches:\n"
+    "    - {name: carotid, start_mm: [74.8, 12.8, 60.8], toward_mm: [72.8, 16, 61.6], radius_mm: 2}\n"
+    "    - {start_voxel: [95, 118, 172]}\n"
+    "  aneurysms:\n"
+    "    - {centers_mm: [[44, 42.4, 64]]}\n"
+    "  parameters: default        # or paper: the values of the paper, without what was added\n"
+    "  p_inl: 0.7                 # and any of these by name\n\n"
+    "Branches that are not named in the trace are not looked for: this version tracks what it is told.\n\n"
+    "Parameters of the tracking (default; paper):\n";
+
+// The introduction and a line for each parameter.
+static char *help_text(void)
+{
+    enum { LINE = 200 };
+    RbtParameters ours = rbt_default_parameters(), paper = rbt_paper_parameters();
+    size_t capacity = sizeof intro + LINE * (size_t)(rbt_parameter_count + 2);
+    char *text = malloc(capacity);
+    if (!text)
+        return NULL;
+    size_t used = (size_t)snprintf(text, capacity, "%s", intro);
+    for (int i = 0; i < rbt_parameter_count; i++) {
+        const RbtParameterName *p = &rbt_parameter_table[i];
+        double a = *(const double *)(const void *)((const char *)&ours + p->offset), b = *(const double *)(const void *)((const char *)&paper + p->offset);
+        used += (size_t)snprintf(text + used, capacity - used, "  %-20s %s (%g; %g)\n", p->name, p->meaning, a, b);
+    }
+    snprintf(text + used, capacity - used, "  %-20s %s\n", "retry_steps", "multiples of the step after a failed one ([1.7, 2.4, 3.1]; [])");
+    return text;
+}
+
+static double seconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static void print_table(const VesselTree *tree, const RbtReport *report, double load_s, double track_s)
+{
+    printf("%-3s %-16s %6s %6s %10s %10s %9s %9s  %s\n", "#", "branch", "nodes", "points", "length_mm", "radius_mm", "inliers", "least", "ends because");
+    for (int i = 0; i < report->branch_count; i++) {
+        const RbtBranchReport *b = &report->branch[i];
+        double radius = 0;
+        for (int k = 0; k < b->node_count; k++)
+            radius += tree->radius[b->first_node + k] / b->node_count;
+        printf("%-3d %-16s %6d %6ld %10.1f %10.2f %8.0f%% %8.0f%%  %s%s\n", i + 1, b->name[0] ? b->name : b->is_aneurysm ? "(aneurysm)" : "(branch)", b->node_count,
+               (long)(tree->point_offset[b->first_node + b->node_count] - tree->point_offset[b->first_node]), b->length, radius, 100 * b->inlier_rate,
+               100 * b->inlier_rate_min, b->is_aneurysm ? "aneurysm" : "", b->end);
+    }
+    printf("%d nodes, %ld points; volume read in %.2f s, tracked in %.2f s\n", tree->node_count, (long)tree->point_count, load_s, track_s);
+}
+
+static bool write_json(const SegmentArguments *a, const VesselTree *tree, const RbtReport *report, double load_s, double track_s, Faults *faults)
+{
+    cJSON *root = cJSON_CreateObject(), *list = cJSON_AddArrayToObject(root, "branches");
+    cJSON_AddStringToObject(root, "volume", a->volume);
+    cJSON_AddStringToObject(root, "trace", a->trace);
+    cJSON_AddNumberToObject(root, "nodes", tree->node_count);
+    cJSON_AddNumberToObject(root, "points", (double)tree->point_count);
+    cJSON_AddNumberToObject(root, "load_s", load_s);
+    cJSON_AddNumberToObject(root, "track_s", track_s);
+    for (int i = 0; i < report->branch_count; i++) {
+        const RbtBranchReport *b = &report->branch[i];
+        cJSON *entry = cJSON_CreateObject();
+        cJSON_AddStringToObject(entry, "name", b->name);
+        cJSON_AddStringToObject(entry, "kind", b->is_aneurysm ? "aneurysm" : "vessel");
+        cJSON_AddNumberToObject(entry, "first_node", b->first_node);
+        cJSON_AddNumberToObject(entry, "nodes", b->node_count);
+        cJSON_AddNumberToObject(entry, "length_mm", b->length);
+        cJSON_AddNumberToObject(entry, "inlier_rate", b->inlier_rate);
+        cJSON_AddNumberToObject(entry, "inlier_rate_min", b->inlier_rate_min);
+        cJSON_AddNumberToObject(entry, "relaxed_nodes", b->relaxed_count);
+        cJSON_AddNumberToObject(entry, "retried_nodes", b->retried_count);
+        cJSON_AddNumberToObject(entry, "junction_nodes", b->junction_count);
+        cJSON_AddStringToObject(entry, "end", b->end);
+        cJSON_AddItemToArray(list, entry);
+    }
+    char *text = cJSON_Print(root);
+    bool good = text && whole_file_write(a->json, text, strlen(text), faults);
+    cJSON_free(text);
+    cJSON_Delete(root);
+    return good;
+}
+
+// A picture is never worth a failed run: says why there is none and goes on.
+static void draw_picture(const SegmentArguments *a, const Volume *volume, const VesselTree *tree)
+{
+    char message[512] = "built without pictures";
+    bool drawn = false;
+#ifdef SELDINGER_RENDER
+    PictureOptions picture = picture_default_options();
+    picture.title = a->volume;
+    drawn = picture_of_tree(a->picture, &picture, volume->size, volume->origin, volume->axis, volume->value, 0, 0, tree, 0, NULL, message, sizeof message);
+#else
+    (void)volume;
+    (void)tree;
+#endif
+    if (!drawn)
+        fprintf(stderr, "%s: no picture: %s\n", a->picture, message);
+}
+
+static int segment(const SegmentArguments *a, Faults *faults)
+{
+    double start = seconds();
+    Trace *trace = trace_load(a->trace, faults);
+    Volume *volume = volume_load(a->volume, faults);
+    RbtReport report = {0};
+    VesselTree *tree = NULL;
+    double load_s = seconds() - start;
+    if (trace && volume) {
+        ProgressBar bar;
+        Progress progress = progress_bar(&bar, "tracking", a->quiet);
+        if (a->seed >= 0)
+            trace->parameters.seed = a->seed;
+        tree = rbt_track(volume, &trace->parameters, trace->branch, trace->branch_count, trace->aneurysm, trace->aneurysm_count, a->threads, &progress, &report,
+                         a->trace, faults);
+    }
+    bool good = tree != NULL;
+    if (good) {
+        double track_s = seconds() - start - load_s;
+        char created_by[] = "seldinger " SELDINGER_VERSION " segment", *text = rbt_parameters_text(&trace->parameters);
+        size_t length = strlen(a->volume);
+        char *source = malloc(length + 1);
+        good = source && text;
+        if (good) {
+            memcpy(source, a->volume, length + 1);
+            TreeFileInfo info = {.source = source, .parameters = text, .created_by = created_by};
+            good = tree_file_save(tree, &info, a->out, faults);
+        }
+        free(source);
+        free(text);
+        good = good && (!a->json || write_json(a, tree, &report, load_s, track_s, faults));
+        if (good && !a->quiet)
+            print_table(tree, &report, load_s, track_s);
+        if (good && a->picture)
+            draw_picture(a, volume, tree);
+    }
+    rbt_report_free(&report);
+    vessel_tree_free(tree);
+    volume_free(volume);
+    trace_free(trace);
+    return good ? EXIT_DONE : cli_bad_input(faults);
+}
 
 int verb_segment(int argc, char **argv)
 {
-    (void)argc, (void)argv;
-    return EXIT_BAD_INPUT;
+    SegmentArguments a = {.seed = -1};
+    char *help = help_text();
+    struct argp argp = {options, parse_option, "VOLUME --trace F.yaml -o TREE.h5", help, NULL, NULL, NULL};
+    Faults *faults = calloc(1, sizeof *faults);
+    int code = EXIT_BAD_INPUT;
+    argp_err_exit_status = EXIT_BAD_INPUT;
+    if (!faults)
+        fprintf(stderr, "out of memory\n");
+    else if (argp_parse(&argp, argc, argv, 0, NULL, &a) == 0)
+        code = segment(&a, faults);
+    free(faults);
+    free(help);
+    return code;
 }

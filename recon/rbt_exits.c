@@ -182,8 +182,6 @@ static Piece *cut_into_pieces(Flood *f, double thickness, int shells, int *piece
     return piece;
 }
 
-static Vec3 middle_of(const Piece *p) { return vec3_scale(p->sum, 1.0 / p->count); }
-
 // How many pieces follow `top` on the longest way down whose sections are like that of `first`; *next is the first of them. There are some
 // hundred pieces: looking through the list for the children costs nothing.
 static int tube_below(const Piece *piece, int count, int first, int top, int limit, int *next)

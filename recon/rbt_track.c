@@ -851,6 +851,7 @@ static bool track_all(Tracker *t, RbtSeed *seed, int seed_count, const RbtAneury
         }
         report_branch(t, first, t->parameters->p_inl, &report->branch[i]);
         report->branch[i].is_aneurysm = is_sac;
+        memcpy(report->branch[i].name, is_sac ? aneurysm[i - seed_count].name : seed[i].name, sizeof report->branch[i].name);
         snprintf(report->branch[i].end, sizeof report->branch[i].end, "%s", is_sac ? "" : t->why ? t->why : "");
         if (progress && progress->call)
             progress->call(progress->context, i + 1, seed_count + aneurysm_count);

@@ -68,6 +68,7 @@ typedef struct RbtSeed {     // where a branch starts
     bool start_is_voxel, toward_is_voxel, has_toward;
     double radius;           // [mm]; 0: the parent's (not for the first branch)
     int line, column;        // in the trace file, for faults
+    char name[32];           // for reports; may be empty
 } RbtSeed;
 
 typedef struct RbtAneurysm { // points inside a sac, the first one anywhere in it
@@ -75,6 +76,7 @@ typedef struct RbtAneurysm { // points inside a sac, the first one anywhere in i
     Vec3 *center;            // [mm] or voxels
     bool is_voxel;
     int line, column;
+    char name[32];
 } RbtAneurysm;
 
 typedef struct RbtBranchReport {
@@ -85,6 +87,7 @@ typedef struct RbtBranchReport {
     int retried_count;       // nodes that took a longer step
     int junction_count;      // nodes in openings where no cylinder fits (their inlier rate is the share of rays that meet a near wall)
     bool is_aneurysm;
+    char name[32];           // the seed's or the aneurysm's
     char end[96];            // why it ended
 } RbtBranchReport;
 
