@@ -17,6 +17,10 @@ typedef struct ContactLaw {
     Vec3 ratio;                  // friction over normal force, while that is frozen
 } ContactLaw;
 
+typedef struct PointwiseWork PointwiseWork;
+PointwiseWork *pointwise_work_create(int node_count, int capacity);
+void pointwise_work_destroy(PointwiseWork *work);
+
 struct ContactSolver {
     int node_count, capacity;
     ContactRow *row;             // (capacity)
@@ -29,13 +33,19 @@ struct ContactSolver {
     BlockChain matrix;
     BlockLu *lu;
     BlockFactor *factor;
+    PointwiseWork *pointwise;
 };
+
+// A u = b + J^T f for the present forces (the right-hand side stays in rhs), and the motion of every contact.
+void contact_balance(ContactSolver *solver, const BlockFactor *factor, const double *b, int count, double *u);
 
 // Fills residual, cone_violation and active.
 double contact_residual(const ContactRow *row, int count, const Vec3 *motion, ContactReport *report);
 // Of the normal direction alone.
 double contact_normal_residual(const ContactRow *row, int count, const Vec3 *motion);
 
+ContactReport contact_pointwise(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
+                                const ContactOptions *options, double *u);
 ContactReport contact_newton(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
                              const ContactOptions *options, double *u);
 

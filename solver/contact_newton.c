@@ -192,17 +192,6 @@ static void assemble(ContactSolver *s, const BlockChain *chain, int count)
             add_law(&s->row[i], &s->law[i].c, &s->matrix, s->upper);
 }
 
-// A u = b + J^T f for the present forces, and the motion of every contact.
-static void balance(ContactSolver *s, const BlockFactor *factor, const double *b, int count, double *u)
-{
-    memcpy(s->rhs, b, (size_t)s->matrix.count * 6 * sizeof *b);
-    for (int i = 0; i < count; i++)
-        contact_row_push(&s->row[i], s->row[i].force, s->rhs);
-    block_factor_solve(factor, s->rhs, u);
-    for (int i = 0; i < count; i++)
-        s->motion[i] = contact_row_motion(&s->row[i], u);
-}
-
 // One Newton iteration in the present states. False where the matrix cannot be factored or the result is not finite.
 static bool newton_iteration(ContactSolver *s, const BlockChain *chain, int count, int mode, bool reuse, double *u)
 {
@@ -254,7 +243,7 @@ static void restart(ContactSolver *s, const BlockFactor *factor, const double *b
         c->force = contact_project(s->best[i], c->normal, c->friction);
         s->law[i].state = vec3_dot(c->force, c->normal) > 0 ? SLIP : OPEN;
     }
-    balance(s, factor, b, count, u);
+    contact_balance(s, factor, b, count, u);
 }
 
 // Newton iterations until the residual of forces cut to their cones is below the tolerance; at most `parallel` + `single`.
@@ -284,7 +273,7 @@ static bool iterate(ContactSolver *s, const BlockChain *chain, const BlockFactor
             continue;
         for (int i = 0; i < count; i++)
             s->row[i].force = contact_project(s->row[i].force, s->row[i].normal, s->row[i].friction);
-        balance(s, factor, b, count, u);
+        contact_balance(s, factor, b, count, u);
         residual = mode == COULOMB ? contact_residual(s->row, count, s->motion, report) : contact_normal_residual(s->row, count, s->motion);
         report->residual = residual;
         if (residual <= tolerance)
@@ -333,7 +322,7 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
             ContactRow *c = &s->row[i];
             c->force = contact_project(c->force, c->normal, c->friction);
         }
-        balance(s, factor, b, count, u);
+        contact_balance(s, factor, b, count, u);
         contact_residual(s->row, count, s->motion, &report);
         report.converged = report.residual <= options->tolerance;
         left = options->max_iterations - report.iterations;

@@ -10,6 +10,7 @@
 #include "solver/contact_forms.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 ContactOptions contact_default_options(void)
 {
@@ -83,6 +84,16 @@ double contact_normal_residual(const ContactRow *row, int count, const Vec3 *mot
     return worst / top;
 }
 
+void contact_balance(ContactSolver *s, const BlockFactor *factor, const double *b, int count, double *u)
+{
+    memcpy(s->rhs, b, (size_t)s->matrix.count * 6 * sizeof *b);
+    for (int i = 0; i < count; i++)
+        contact_row_push(&s->row[i], s->row[i].force, s->rhs);
+    block_factor_solve(factor, s->rhs, u);
+    for (int i = 0; i < count; i++)
+        s->motion[i] = contact_row_motion(&s->row[i], u);
+}
+
 ContactSolver *contact_solver_create(int node_count, int contact_capacity)
 {
     ContactSolver *s = calloc(1, sizeof *s);
@@ -103,7 +114,8 @@ ContactSolver *contact_solver_create(int node_count, int contact_capacity)
     s->upper = calloc(BLOCK_DOUBLES * m + 2, sizeof *s->upper);
     s->lu = block_lu_create(node_count);
     s->factor = block_factor_create(node_count);
-    bool ok = block_chain_create(&s->matrix, node_count);
+    s->pointwise = pointwise_work_create(node_count, contact_capacity);
+    bool ok = block_chain_create(&s->matrix, node_count) && s->pointwise;
     if (!s->row || !s->motion || !s->law || !s->best || !s->flag || !s->rhs || !s->delta || !s->upper || !s->lu || !s->factor || !ok) {
         contact_solver_destroy(s);
         return NULL;
@@ -124,6 +136,7 @@ void contact_solver_destroy(ContactSolver *s)
     free(s->delta);
     free(s->upper);
     block_lu_destroy(s->lu);
+    pointwise_work_destroy(s->pointwise);
     block_factor_destroy(s->factor);
     block_chain_destroy(&s->matrix);
     free(s);
@@ -133,7 +146,8 @@ ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, cons
                             const ContactOptions *options, double *u)
 {
     int count = contact_rows_fill(set, chain, solver->row);
-    ContactReport report = contact_newton(solver, chain, factor, b, count, options, u);
+    ContactReport report = options->form == CONTACT_POINTWISE ? contact_pointwise(solver, chain, factor, b, count, options, u)
+                                                              : contact_newton(solver, chain, factor, b, count, options, u);
     for (int i = 0; i < count; i++)
         set->point[solver->row[i].point].force = solver->row[i].force;
     return report;

@@ -1,0 +1,404 @@
+// The pointwise form: Gauss-Seidel over the contacts along the chain, forth and back (Kerrien 2017, 6.3; Duriez 2006).
+//
+// W = J A^-1 J^T is never formed. Seen from node i the chain to its left and to its right act through two 6-vectors:
+//   u_i = S_i (p_i + q_i + r_i),  r_i = b_i + (J^T f)_i,  S_i = (A^-1)_ii
+//   p_(i+1) = -E_i (p_i + r_i),     E_i = L_i D_i^-1,            D_i the pivots of an elimination from the left
+//   q_(i-1) = -F_i (q_i + r_i),     F_i = L_(i-1)^T B_i^-1,      B_i of one from the right,   S_i = (D_i + B_i - A_ii)^-1
+// A pass from left to right needs p only of forces that it has set already and q of forces that it has not reached; a pass back the other way
+// round. So a pass costs one 6x6 product a node and one local problem a contact. A contact between nodes i and i+1 sees both:
+//   u_j = S_j (p_j + q_j + r_j),  u_i = D_i^-1 (p_i + r_i) - E_i^T u_j,  j = i+1
+//
+// The local problem, three unknowns, is solved exactly: open, stick, or slip with f_t = -(W_tt' + g)^-1 c, the scalar g > 0 such that
+// |f_t| = mu f_n. At least one such g exists for any mu (the difference of both sides changes sign between 0 and infinity).
+#include "solver/contact_forms.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+// What a pass needs of a contact.
+typedef struct Local {
+    Vec3 axis[3];            // normal, two tangents
+    double w[3][3];          // own 3x3 of W on these axes
+    double response[3][12];  // motion of its one or two nodes under a unit force along an axis
+    double g;                // of its last slip: where the next search starts
+} Local;
+
+struct PointwiseWork {
+    double *left, *right;    // (M, 6, 6) E_i, F_i
+    double *inverse, *pivot; // (M, 6, 6) S_i, D_i^-1
+    double *p, *q, *r;       // (M, 6)
+    Local *local;            // (capacity)
+};
+
+PointwiseWork *pointwise_work_create(int node_count, int capacity)
+{
+    PointwiseWork *w = calloc(1, sizeof *w);
+    if (!w)
+        return NULL;
+    size_t m = (size_t)node_count;
+    double **block[] = {&w->left, &w->right, &w->inverse, &w->pivot}, **vector[] = {&w->p, &w->q, &w->r};
+    bool ok = true;
+    for (int i = 0; i < 4; i++)
+        ok &= (*block[i] = calloc(m * 36, sizeof(double))) != NULL;
+    for (int i = 0; i < 3; i++)
+        ok &= (*vector[i] = calloc(m * 6, sizeof(double))) != NULL;
+    w->local = calloc((size_t)capacity + 1, sizeof *w->local);
+    if (!ok || !w->local) {
+        pointwise_work_destroy(w);
+        return NULL;
+    }
+    return w;
+}
+
+void pointwise_work_destroy(PointwiseWork *w)
+{
+    if (!w)
+        return;
+    free(w->left);
+    free(w->right);
+    free(w->inverse);
+    free(w->pivot);
+    free(w->p);
+    free(w->q);
+    free(w->r);
+    free(w->local);
+    free(w);
+}
+
+// inverse = d^-1 of a symmetric positive definite 6x6; false where it is not.
+static bool invert(const double *d, double *inverse)
+{
+    double l[6][6], y[6][6];
+    for (int j = 0; j < 6; j++)
+        for (int i = j; i < 6; i++) {
+            double sum = d[6 * i + j];
+            for (int k = 0; k < j; k++)
+                sum -= l[i][k] * l[j][k];
+            if (i == j && !(sum > 0))
+                return false;
+            l[i][j] = i == j ? sqrt(sum) : sum / l[j][j];
+        }
+    for (int c = 0; c < 6; c++) // y = l^-1 by columns
+        for (int i = c; i < 6; i++) {
+            double sum = i == c;
+            for (int k = c; k < i; k++)
+                sum -= l[i][k] * y[k][c];
+            y[i][c] = sum / l[i][i];
+        }
+    for (int i = 0; i < 6; i++)
+        for (int j = 0; j <= i; j++) {
+            double sum = 0;
+            for (int k = i; k < 6; k++)
+                sum += y[k][i] * y[k][j];
+            inverse[6 * i + j] = inverse[6 * j + i] = sum;
+        }
+    return true;
+}
+
+// y += s a x, or y += s a^T x
+static void add_product(const double *a, double s, const double *x, double *y)
+{
+    for (int i = 0; i < 6; i++) {
+        const double *r = a + 6 * i;
+        y[i] += s * (((r[0] * x[0] + r[1] * x[1]) + (r[2] * x[2] + r[3] * x[3])) + (r[4] * x[4] + r[5] * x[5]));
+    }
+}
+
+static void add_product_transposed(const double *a, double s, const double *x, double *y)
+{
+    for (int j = 0; j < 6; j++)
+        for (int i = 0; i < 6; i++)
+            y[j] += s * a[6 * i + j] * x[i];
+}
+
+// Eliminations from both ends: E, F, S and D^-1.
+static bool prepare(PointwiseWork *w, const BlockChain *a)
+{
+    int m = a->count;
+    double d[36], inverse[36];
+    for (int i = 0; i < m; i++) { // d = A_ii - L_(i-1) D_(i-1)^-1 L_(i-1)^T
+        memcpy(d, a->diag + 36 * (size_t)i, sizeof d);
+        for (int r = 0; i > 0 && r < 6; r++)
+            for (int c = 0; c < 6; c++)
+                for (int k = 0; k < 6; k++)
+                    d[6 * r + c] -= w->left[36 * (i - 1) + 6 * r + k] * a->lower[36 * (i - 1) + 6 * c + k];
+        memcpy(w->inverse + 36 * (size_t)i, d, sizeof d);
+        if (!invert(d, w->pivot + 36 * (size_t)i))
+            return false;
+        for (int r = 0; i + 1 < m && r < 6; r++)
+            for (int c = 0; c < 6; c++) {
+                double sum = 0;
+                for (int k = 0; k < 6; k++)
+                    sum += a->lower[36 * i + 6 * r + k] * w->pivot[36 * i + 6 * k + c];
+                w->left[36 * i + 6 * r + c] = sum;
+            }
+    }
+    for (int i = m - 1; i >= 0; i--) { // d = A_ii - L_i^T B_(i+1)^-1 L_i
+        memcpy(d, a->diag + 36 * (size_t)i, sizeof d);
+        for (int r = 0; i + 1 < m && r < 6; r++)
+            for (int c = 0; c < 6; c++)
+                for (int k = 0; k < 6; k++)
+                    d[6 * r + c] -= w->right[36 * (i + 1) + 6 * r + k] * a->lower[36 * i + 6 * k + c];
+        if (!invert(d, inverse))
+            return false;
+        for (int r = 0; i > 0 && r < 6; r++)
+            for (int c = 0; c < 6; c++) {
+                double sum = 0;
+                for (int k = 0; k < 6; k++)
+                    sum += a->lower[36 * (i - 1) + 6 * k + r] * inverse[6 * k + c];
+                w->right[36 * i + 6 * r + c] = sum;
+            }
+        for (int k = 0; k < 36; k++)
+            d[k] += w->inverse[36 * i + k] - a->diag[36 * i + k];
+        if (!invert(d, w->inverse + 36 * (size_t)i))
+            return false;
+    }
+    return true;
+}
+
+// Motion of a contact's nodes (12, the second half unused at a node) under loads g on them.
+static void respond(const PointwiseWork *w, const ContactRow *c, const double *g, double *v)
+{
+    size_t i = (size_t)c->node;
+    memset(v, 0, 12 * sizeof *v);
+    if (c->nodes == 1) {
+        add_product(w->inverse + 36 * i, 1, g, v);
+        return;
+    }
+    double load[6];
+    memcpy(load, g + 6, sizeof load);
+    add_product(w->left + 36 * i, -1, g, load);
+    add_product(w->inverse + 36 * (i + 1), 1, load, v + 6);
+    add_product(w->pivot + 36 * i, 1, g, v);
+    add_product_transposed(w->left + 36 * i, -1, v + 6, v);
+}
+
+static void prepare_local(const PointwiseWork *w, const ContactRow *c, Local *l)
+{
+    l->g = 0;
+    l->axis[0] = c->normal;
+    l->axis[1] = vec3_normal_to(c->normal);
+    l->axis[2] = vec3_cross(c->normal, l->axis[1]);
+    ContactRow here = *c;
+    here.node = 0;
+    for (int a = 0; a < 3; a++) {
+        double g[12] = {0};
+        contact_row_push(&here, l->axis[a], g);
+        respond(w, c, g, l->response[a]);
+        Vec3 d = contact_row_motion(&here, l->response[a]);
+        for (int k = 0; k < 3; k++)
+            l->w[k][a] = vec3_dot(d, l->axis[k]);
+    }
+}
+
+// f_t = -(a + g)^-1 c of the condensed tangential problem, f_n from the normal row.
+static void slide_force(double w[3][3], const double *d, const double a[3], const double *c, double g, double *f)
+{
+    double xx = a[0] + g, yy = a[2] + g, det = xx * yy - a[1] * a[1];
+    f[1] = -(yy * c[0] - a[1] * c[1]) / det;
+    f[2] = -(xx * c[1] - a[1] * c[0]) / det;
+    f[0] = -(d[0] + w[0][1] * f[1] + w[0][2] * f[2]) / w[0][0];
+}
+
+static double slide_excess(const double *f, double mu) { return sqrt(f[1] * f[1] + f[2] * f[2]) - mu * f[0]; }
+
+// Signorini and Coulomb of one contact: d + w f, d[0] with the gap.
+static void solve_local(double w[3][3], const double *d, double mu, double *start, double *f)
+{
+    f[0] = f[1] = f[2] = 0;
+    if (d[0] >= 0)
+        return;
+    f[0] = -d[0] / w[0][0];
+    const double a[3] = {w[1][1] - w[1][0] * w[0][1] / w[0][0], w[1][2] - w[1][0] * w[0][2] / w[0][0], w[2][2] - w[2][0] * w[0][2] / w[0][0]};
+    const double c[2] = {d[1] - w[1][0] * d[0] / w[0][0], d[2] - w[2][0] * d[0] / w[0][0]};
+    double scale = a[0] + a[2];
+    if (!(mu > 0) || !(scale > 0))
+        return;
+    double low = 1e-13 * scale; // fixed tangential directions have no motion: keeps the 2x2 regular
+    slide_force(w, d, a, c, low, f);
+    double h_low = slide_excess(f, mu);
+    if (h_low <= 0)
+        return;
+    double high = *start > 0 ? *start : scale * 1e-3, h_high = 1, grow = 1e-4;
+    for (int k = 0; k < 80 && h_high > 0; k++) {
+        if (k > 0) {
+            low = high;
+            h_low = h_high;
+            high *= 1 + grow;
+            grow = fmin(3, 8 * grow);
+        }
+        slide_force(w, d, a, c, high, f);
+        h_high = slide_excess(f, mu);
+        if (k == 0 && h_high < 0) { // the last g lies beyond the root: look just below it first
+            double near = high * (1 - 1e-4);
+            slide_force(w, d, a, c, near, f);
+            double h = slide_excess(f, mu);
+            if (h > 0) {
+                low = near;
+                h_low = h;
+            }
+        }
+    }
+    for (int k = 0; k < 80 && high - low > 1e-14 * high; k++) { // false position, a stuck end halved (Illinois)
+        double mid = (low * h_high - high * h_low) / (h_high - h_low);
+        if (!(mid > low && mid < high))
+            mid = (low + high) / 2;
+        slide_force(w, d, a, c, mid, f);
+        double h = slide_excess(f, mu);
+        *start = mid;
+        if (fabs(h) <= 4e-16 * fabs(mu * f[0]))
+            break;
+        if (h > 0) {
+            low = mid;
+            h_low = h;
+            h_high /= 2;
+        } else {
+            high = mid;
+            h_high = h;
+            h_low /= 2;
+        }
+    }
+    f[0] = fmax(0, f[0]);
+    double size = sqrt(f[1] * f[1] + f[2] * f[2]);
+    if (size > 0) {
+        f[1] *= mu * f[0] / size;
+        f[2] *= mu * f[0] / size;
+    }
+}
+
+// The contacts [from, to) at one place, in turn; their nodes' motion is found once and kept up to date.
+static void visit(PointwiseWork *w, ContactRow *row, int from, int to, bool reverse)
+{
+    const ContactRow *first = &row[from];
+    size_t i = (size_t)first->node;
+    double v[12] = {0}, load[6];
+    if (first->nodes == 1) {
+        for (int k = 0; k < 6; k++)
+            load[k] = w->p[6 * i + (size_t)k] + w->q[6 * i + (size_t)k] + w->r[6 * i + (size_t)k];
+        add_product(w->inverse + 36 * i, 1, load, v);
+    } else {
+        double left[6];
+        for (size_t k = 0; k < 6; k++) {
+            left[k] = w->p[6 * i + k] + w->r[6 * i + k];
+            load[k] = w->q[6 * i + 6 + k] + w->r[6 * i + 6 + k];
+        }
+        add_product(w->left + 36 * i, -1, left, load);
+        add_product(w->inverse + 36 * (i + 1), 1, load, v + 6);
+        add_product(w->pivot + 36 * i, 1, left, v);
+        add_product_transposed(w->left + 36 * i, -1, v + 6, v);
+    }
+    for (int n = 0; n < to - from; n++) {
+        int k = reverse ? to - 1 - n : from + n;
+        ContactRow *c = &row[k];
+        Local *l = &w->local[k];
+        if (c->inert)
+            continue;
+        ContactRow here = *c;
+        here.node = 0;
+        Vec3 motion = contact_row_motion(&here, v);
+        double old[3], d[3], f[3];
+        for (int a = 0; a < 3; a++)
+            old[a] = vec3_dot(c->force, l->axis[a]);
+        for (int a = 0; a < 3; a++)
+            d[a] = vec3_dot(motion, l->axis[a]) - l->w[a][0] * old[0] - l->w[a][1] * old[1] - l->w[a][2] * old[2];
+        d[0] += c->gap;
+        solve_local(l->w, d, c->friction, &l->g, f);
+        Vec3 force = vec3_add_scaled(vec3_add_scaled(vec3_scale(l->axis[0], f[0]), f[1], l->axis[1]), f[2], l->axis[2]);
+        contact_row_push(c, vec3_sub(force, c->force), w->r);
+        for (int a = 0; a < 3; a++)
+            for (int e = 0; e < 6 * c->nodes; e++)
+                v[e] += l->response[a][e] * (f[a] - old[a]);
+        c->force = force;
+    }
+}
+
+// Contacts of one place: the same node, or all between it and the next.
+static int place_end(const ContactRow *row, int count, int from)
+{
+    int to = from + 1;
+    while (to < count && row[to].node == row[from].node && row[to].nodes == row[from].nodes)
+        to++;
+    return to;
+}
+
+static void pass_forth(PointwiseWork *w, ContactRow *row, int count, int m)
+{
+    int k = 0;
+    memset(w->p, 0, 6 * sizeof *w->p);
+    for (int i = 0; i < m; i++) {
+        while (k < count && row[k].node == i) {
+            int to = place_end(row, count, k);
+            visit(w, row, k, to, false);
+            k = to;
+        }
+        if (i + 1 == m)
+            break;
+        double sum[6], *next = w->p + 6 * (size_t)(i + 1);
+        for (int e = 0; e < 6; e++) {
+            sum[e] = w->p[6 * i + e] + w->r[6 * i + e];
+            next[e] = 0;
+        }
+        add_product(w->left + 36 * (size_t)i, -1, sum, next);
+    }
+}
+
+static void pass_back(PointwiseWork *w, ContactRow *row, int count, int m)
+{
+    int k = count;
+    memset(w->q + 6 * (size_t)(m - 1), 0, 6 * sizeof *w->q);
+    for (int i = m - 1; i >= 0; i--) {
+        bool moved = i + 1 == m;
+        for (;;) {
+            int from = k;
+            while (from > 0 && row[from - 1].node == i && row[from - 1].nodes == row[k - 1].nodes)
+                from--;
+            bool node = from < k && row[from].nodes == 1;
+            if ((from == k || node) && !moved) { // contacts between i and i+1 see q_(i+1); those at i need q_i
+                double sum[6], *next = w->q + 6 * (size_t)i;
+                for (int e = 0; e < 6; e++) {
+                    sum[e] = w->q[6 * (i + 1) + e] + w->r[6 * (i + 1) + e];
+                    next[e] = 0;
+                }
+                add_product(w->right + 36 * (size_t)(i + 1), -1, sum, next);
+                moved = true;
+            }
+            if (from == k)
+                break;
+            visit(w, row, from, k, true);
+            k = from;
+        }
+    }
+}
+
+ContactReport contact_pointwise(ContactSolver *s, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
+                                const ContactOptions *options, double *u)
+{
+    ContactReport report = {0};
+    PointwiseWork *w = s->pointwise;
+    int m = chain->count;
+    contact_balance(s, factor, b, count, u);
+    contact_residual(s->row, count, s->motion, &report);
+    report.converged = report.residual <= options->tolerance;
+    if (report.converged || count == 0 || !prepare(w, chain))
+        return report;
+    for (int k = 0; k < count; k++)
+        if (!s->row[k].inert)
+            prepare_local(w, &s->row[k], &w->local[k]);
+    memcpy(w->r, s->rhs, (size_t)m * 6 * sizeof *b);
+    pass_back(w, s->row, 0, m); // q of the warm start
+    while (report.iterations < options->max_iterations && !report.converged) {
+        if (report.iterations % 2 == 0)
+            pass_forth(w, s->row, count, m);
+        else
+            pass_back(w, s->row, count, m);
+        report.iterations++;
+        // the residual costs two passes: look rarely
+        if (report.iterations % 16 && report.iterations < options->max_iterations)
+            continue;
+        contact_balance(s, factor, b, count, u);
+        memcpy(w->r, s->rhs, (size_t)m * 6 * sizeof *b);
+        contact_residual(s->row, count, s->motion, &report);
+        report.converged = report.residual <= options->tolerance;
+    }
+    return report;
+}
