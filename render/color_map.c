@@ -27,7 +27,7 @@ Color color_sequential(double x)
 
 Color color_diverging(double x)
 {
-    static const uint8_t table[9][3] = {{5, 48, 97},     {33, 102, 172}, {67, 147, 195}, {146, 197, 222}, {244, 243, 240},
+    static const uint8_t table[9][3] = {{5, 48, 97},     {33, 102, 172}, {67, 147, 195}, {146, 197, 222}, {228, 227, 224},
                                         {244, 165, 130}, {214, 96, 77},  {178, 24, 43},  {103, 0, 31}};
     return from_table(table, 9, 0.5 + 0.5 * x);
 }

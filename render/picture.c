@@ -5,7 +5,7 @@
 
 PictureOptions picture_default_options(void)
 {
-    return (PictureOptions){.width = 1600, .height = 1000, .inset = true, .worst_count = 6, .arrows = true};
+    return (PictureOptions){.width = 1600, .height = 1000, .inset = true, .worst_count = 9, .arrows = true};
 }
 
 bool picture_available(char *message, size_t capacity)

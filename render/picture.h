@@ -24,7 +24,7 @@ typedef struct PictureOptions {
     double inset_radius;       // [mm] of the sphere the close-up shows; 0 (default): chosen from the lumen (4 to 12 mm)
     double force_full_scale;   // [N] top of the colour map of wall force; 0 (default): the largest force shown, rounded up to 1, 2 or 5
     double distance_full_scale;// [mm] ends of the diverging map of `picture_of_fit`; 0 (default): the 98th percentile of |distance|, rounded up
-    int worst_count;           // `picture_of_fit`: close-ups of the local models with the largest error; 0 to 12, default 6
+    int worst_count;           // `picture_of_fit`: close-ups of the local models with the largest error; 0 to 12, default 9
     bool arrows;               // wall forces as arrows; default true
 } PictureOptions;
 PictureOptions picture_default_options(void);

@@ -30,11 +30,11 @@ static void add_station(Path *path, Vec3 point, Vec3 tangent)
     path->tangent[path->count++] = tangent;
 }
 
-// Straight stretches in parts of a lumen's radius, so that the painter's sort has small triangles.
-static void add_line(Path *path, Vec3 from, Vec3 direction, double length, double part)
+// Straight stretches in parts of a lumen's radius, so that the painter's sort has small triangles. Stations `first` to (parts - `spared`).
+static void add_line(Path *path, Vec3 from, Vec3 direction, double length, double part, int first, int spared)
 {
     int parts = (int)fmin(fmax(ceil(length / part), 1), 2000);
-    for (int k = 0; k <= parts; k++)
+    for (int k = first; k <= parts - spared; k++)
         add_station(path, vec3_add_scaled(from, length * k / parts, direction), direction);
 }
 
@@ -46,7 +46,7 @@ static void lay_pieces(Path *path, const TubeOptions *tube)
     for (int i = 0; i < tube->piece_count; i++) {
         const TubePiece *piece = &tube->piece[i];
         if (!(piece->angle > 0)) {
-            add_line(path, p, t, piece->length, tube->radius);
+            add_line(path, p, t, piece->length, tube->radius, 0, 0);
             p = vec3_add_scaled(p, piece->length, t);
             continue;
         }
@@ -63,11 +63,30 @@ static void lay_pieces(Path *path, const TubeOptions *tube)
     }
 }
 
+// One ring at a gentle corner, along the mean of its tangents (two would cross each other on the inner side, and shine through as a dark line); a
+// sharp corner is turned about, which leaves the sphere on its outer side.
+static void add_corner(Path *path, Vec3 point, Vec3 before, Vec3 after)
+{
+    double angle = atan2(vec3_norm(vec3_cross(before, after)), vec3_dot(before, after));
+    if (angle < 0.45) {
+        add_station(path, point, vec3_unit(vec3_add(before, after)));
+        return;
+    }
+    Vec3 axis = vec3_unit_or(vec3_cross(before, after), vec3_normal_to(before));
+    int parts = (int)ceil(angle / 0.2);
+    for (int k = 0; k <= parts; k++)
+        add_station(path, point, quat_rotate(quat_from_rotation_vector(vec3_scale(axis, angle * k / parts)), before));
+}
+
 static void lay_polyline(Path *path, const TubeOptions *tube)
 {
+    Vec3 before = {0, 0, 0};
     for (int i = 0; i + 1 < tube->point_count; i++) {
-        Vec3 step = vec3_sub(tube->point[i + 1], tube->point[i]);
-        add_line(path, tube->point[i], vec3_unit(step), vec3_norm(step), tube->radius);
+        Vec3 step = vec3_sub(tube->point[i + 1], tube->point[i]), t = vec3_unit(step);
+        if (i > 0)
+            add_corner(path, tube->point[i], before, t);
+        add_line(path, tube->point[i], t, vec3_norm(step), tube->radius, i > 0, i + 2 < tube->point_count);
+        before = t;
     }
 }
 
