@@ -395,7 +395,7 @@ bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char
     Silence kept = silence_begin();
     hid_t access = H5Pcreate(H5P_FILE_ACCESS), create = H5Pcreate(H5P_FILE_CREATE);
     H5Pset_fapl_core(access, 1 << 20, 0);
-    H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110);
+    H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V110);
     H5Pset_obj_track_times(create, false);
     // text of parameters may exceed the 64 kB of compact attribute storage: the 1.8+ dense form has no such limit
     H5Pset_attr_phase_change(create, 8, 6);
