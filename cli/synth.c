@@ -1,7 +1,299 @@
+// seldinger synth: synthetic shapes with known truth, as point sets, surfaces or noisy volumes; and a fitted model measured against truth.
 #include "cli/cli.h"
+
+#include "cli/output.h"
+#include "recon/lim_fit.h"
+#include "recon/phantom_measure.h"
+#include "recon/tree_file.h"
+
+#include <cjson/cJSON.h>
+#include <getopt.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SHAPE_OPTIONS = 10, FIRST_SHAPE_OPTION = 400 };
+
+typedef struct SynthCommand {
+    const char *shape, *output, *measure, *json;
+    int option_count;
+    char option[SHAPE_OPTIONS][2][64];
+    double cell_mm, voxel_mm, psf_mm, noise, seed;
+    bool quiet;
+} SynthCommand;
+
+static const char help[] =
+    "Usage: seldinger synth SHAPE [options] -o F\n"
+    "       seldinger synth SHAPE [options] --measure MODEL.h5\n\n"
+    "Shapes: capsule, open-capsule, arc, bifurcation, spiral, phantom.\n"
+    "F.h5 is a tree of point sets, F.stl or F.ply the surface, F.nrrd a noisy volume; beside the last two stands the true centreline with exact\n"
+    "surface points, F-truth.h5.\n\n"
+    "  -o, --output F       what to write, by its extension\n"
+    "  --measure MODEL.h5   instead: how far a model fitted to this shape is from the truth\n"
+    "  --json F             figures of --measure as JSON; - is standard output\n"
+    "  --quiet              no summary\n"
+    "shape\n"
+    "  --points N           samples of a vessel node; default 108\n"
+    "  --sac-points N       samples of an aneurysm node; default 1500\n"
+    "  --noise-mm X         standard deviation of the samples' noise along the normal [mm]; default 0\n"
+    "  --seed N             of noise and of the samples' places; default 1\n"
+    "  --spacing X          distance of nodes in local radii; default 0.5\n"
+    "  --blend-mm X         width of the joints [mm]; default 0: 0.6 times the branch's radius\n"
+    "  --length-mm X        capsules: segment [mm]; default 4\n"
+    "  --radius-mm X        capsules, arc, bifurcation: tube [mm]; default 1\n"
+    "  --bend-radius-mm X   arc, bifurcation: centreline [mm]; default 4\n"
+    "  --scale X            of the whole shape; default 1\n"
+    "surface\n"
+    "  --cell-mm X          grid of the triangles [mm]; default 0.15\n"
+    "volume\n"
+    "  --voxel-mm X         [mm]; default 0.2\n"
+    "  --psf-mm X           standard deviation of the blur [mm]; default 0.2\n"
+    "  --noise X            standard deviation of the noise in contrasts (vessel 1, background 0); default 0.05\n\n"
+    "Exit codes: 0 done; 2 wrong usage or bad input.\n";
+
+static int usage_fault(const char *message, const char *what)
+{
+    fprintf(stderr, "seldinger synth: %s%s; see `seldinger synth --help`\n", message, what);
+    return EXIT_BAD_INPUT;
+}
+
+// -1: go on; otherwise the exit code.
+static int parse_options(int argc, char **argv, SynthCommand *command)
+{
+    enum { MEASURE = 256, JSON, QUIET, CELL, VOXEL, PSF, NOISE };
+    static const char *const keys[SHAPE_OPTIONS] = {"points",   "sac_points", "noise_mm",  "seed",           "spacing",
+                                                    "blend_mm", "length_mm",  "radius_mm", "bend_radius_mm", "scale"};
+    static const struct option table[] = {{"output", required_argument, NULL, 'o'},
+                                          {"measure", required_argument, NULL, MEASURE},
+                                          {"json", required_argument, NULL, JSON},
+                                          {"quiet", no_argument, NULL, QUIET},
+                                          {"cell-mm", required_argument, NULL, CELL},
+                                          {"voxel-mm", required_argument, NULL, VOXEL},
+                                          {"psf-mm", required_argument, NULL, PSF},
+                                          {"noise", required_argument, NULL, NOISE},
+                                          {"points", required_argument, NULL, FIRST_SHAPE_OPTION},
+                                          {"sac-points", required_argument, NULL, FIRST_SHAPE_OPTION + 1},
+                                          {"noise-mm", required_argument, NULL, FIRST_SHAPE_OPTION + 2},
+                                          {"seed", required_argument, NULL, FIRST_SHAPE_OPTION + 3},
+                                          {"spacing", required_argument, NULL, FIRST_SHAPE_OPTION + 4},
+                                          {"blend-mm", required_argument, NULL, FIRST_SHAPE_OPTION + 5},
+                                          {"length-mm", required_argument, NULL, FIRST_SHAPE_OPTION + 6},
+                                          {"radius-mm", required_argument, NULL, FIRST_SHAPE_OPTION + 7},
+                                          {"bend-radius-mm", required_argument, NULL, FIRST_SHAPE_OPTION + 8},
+                                          {"scale", required_argument, NULL, FIRST_SHAPE_OPTION + 9},
+                                          {"help", no_argument, NULL, 'h'},
+                                          {0}};
+    *command = (SynthCommand){.cell_mm = 0.15, .voxel_mm = 0.2, .psf_mm = 0.2, .noise = 0.05, .seed = 1};
+    optind = 1;
+    for (int choice; (choice = getopt_long(argc, argv, "o:h", table, NULL)) != -1;) {
+        if (choice >= FIRST_SHAPE_OPTION) {   // the shape itself says what is valid
+            int which = choice - FIRST_SHAPE_OPTION, at = 0;
+            while (at < command->option_count && strcmp(command->option[at][0], keys[which]))
+                at++;
+            command->option_count += at == command->option_count;
+            snprintf(command->option[at][0], 64, "%s", keys[which]);
+            snprintf(command->option[at][1], 64, "%s", optarg);
+            continue;
+        }
+        bool good = true;
+        switch (choice) {
+        case 'o': command->output = optarg; break;
+        case MEASURE: command->measure = optarg; break;
+        case JSON: command->json = optarg; break;
+        case QUIET: command->quiet = true; break;
+        case CELL: good = cli_number("--cell-mm", optarg, 0.005, 10, &command->cell_mm); break;
+        case VOXEL: good = cli_number("--voxel-mm", optarg, 0.01, 10, &command->voxel_mm); break;
+        case PSF: good = cli_number("--psf-mm", optarg, 0, 10, &command->psf_mm); break;
+        case NOISE: good = cli_number("--noise", optarg, 0, 10, &command->noise); break;
+        case 'h': fputs(help, stdout); return EXIT_DONE;
+        default: return usage_fault("unknown option or lacking value", "");
+        }
+        if (!good)
+            return EXIT_BAD_INPUT;
+    }
+    if (optind != argc - 1)
+        return usage_fault(optind < argc ? "one shape at a time, not also " : "lacks a shape: ", optind < argc ? argv[optind + 1] : shape_names());
+    if (!command->output == !command->measure)
+        return usage_fault("give either -o F or --measure MODEL.h5", "");
+    if (command->json && !command->measure)
+        return usage_fault("--json goes with --measure MODEL.h5", "");
+    command->shape = argv[optind];
+    for (int i = 0; i < command->option_count; i++)
+        if (!strcmp(command->option[i][0], "seed"))
+            command->seed = strtod(command->option[i][1], NULL);
+    return -1;
+}
+
+// --- what is written ---
+
+static bool save_tree(const SynthCommand *command, const Shape *shape, const VesselTree *tree, const char *path, Faults *faults)
+{
+    char parameters[2048];
+    int n = snprintf(parameters, sizeof parameters, "shape: %s\n", command->shape);
+    for (int i = 0; i < command->option_count; i++)
+        n += snprintf(parameters + n, sizeof parameters - (size_t)n, "%s: %s\n", command->option[i][0], command->option[i][1]);
+    snprintf(parameters + n, sizeof parameters - (size_t)n, "voxel_mm: %g\n", shape_voxel_mm(shape));
+    TreeFileInfo info = {.source = (char *)(size_t)command->shape, .parameters = parameters,
+                         .created_by = (char *)(size_t) "seldinger " SELDINGER_VERSION " synth"};
+    return tree_file_save(tree, &info, path, faults);
+}
+
+static bool write_stl(const TriangleMesh *mesh, const char *path, Faults *faults)
+{
+    size_t room = 84 + 50 * (size_t)mesh->triangle_count;
+    unsigned char *bytes = calloc(room, 1);
+    if (!bytes) {
+        faults_add(faults, path, 0, 0, "not enough memory");
+        return false;
+    }
+    snprintf((char *)bytes, 80, "seldinger " SELDINGER_VERSION " synth, mm");
+    uint32_t count = (uint32_t)mesh->triangle_count;
+    memcpy(bytes + 80, &count, 4);   // little-endian, as this machine is
+    for (int t = 0; t < mesh->triangle_count; t++) {
+        const int *v = mesh->triangle[t];
+        Vec3 a = mesh->vertex[v[0]], b = mesh->vertex[v[1]], c = mesh->vertex[v[2]];
+        Vec3 n = vec3_unit_or(vec3_cross(vec3_sub(b, a), vec3_sub(c, a)), vec3(0, 0, 0));
+        const float number[12] = {(float)n.x, (float)n.y, (float)n.z, (float)a.x, (float)a.y, (float)a.z,
+                                  (float)b.x, (float)b.y, (float)b.z, (float)c.x, (float)c.y, (float)c.z};
+        memcpy(bytes + 84 + 50 * (size_t)t, number, sizeof number);
+    }
+    bool good = output_write(path, bytes, room, faults);
+    free(bytes);
+    return good;
+}
+
+static bool write_ply(const TriangleMesh *mesh, const char *path, Faults *faults)
+{
+    char *text = NULL;
+    size_t length = 0;
+    FILE *out = open_memstream(&text, &length);
+    if (out) {
+        fprintf(out,
+                "ply\nformat ascii 1.0\ncomment seldinger " SELDINGER_VERSION
+                " synth, mm\nelement vertex %d\nproperty double x\nproperty double y\nproperty double z\nproperty float nx\nproperty float ny\n"
+                "property float nz\nelement face %d\nproperty list uchar int vertex_indices\nend_header\n",
+                mesh->vertex_count, mesh->triangle_count);
+        for (int i = 0; i < mesh->vertex_count; i++)
+            fprintf(out, "%.9g %.9g %.9g %.6g %.6g %.6g\n", mesh->vertex[i].x, mesh->vertex[i].y, mesh->vertex[i].z, mesh->normal[i].x,
+                    mesh->normal[i].y, mesh->normal[i].z);
+        for (int t = 0; t < mesh->triangle_count; t++)
+            fprintf(out, "3 %d %d %d\n", mesh->triangle[t][0], mesh->triangle[t][1], mesh->triangle[t][2]);
+    }
+    bool written = out && !ferror(out);
+    written = out && fclose(out) == 0 && written;
+    if (!written)
+        faults_add(faults, path, 0, 0, "not enough memory");
+    written = written && output_write(path, text, length, faults);
+    free(text);
+    return written;
+}
+
+// F.stl -> F-truth.h5
+static void truth_path(const char *output, const char *extension, char *path, size_t capacity)
+{
+    snprintf(path, capacity, "%.*s-truth.h5", (int)(strlen(output) - strlen(extension)), output);
+}
+
+static bool write_output(const SynthCommand *command, const Shape *shape, Faults *faults)
+{
+    char extension[16], truth[4096];
+    output_extension(command->output, extension);
+    bool is_tree = !strcmp(extension, ".h5") || !strcmp(extension, ".hdf5"), is_volume = !strcmp(extension, ".nrrd");
+    bool is_stl = !strcmp(extension, ".stl"), is_ply = !strcmp(extension, ".ply");
+    if (!is_tree && !is_volume && !is_stl && !is_ply) {
+        faults_add(faults, command->output, 0, 0, "has no known extension; valid: .h5, .stl, .ply, .nrrd");
+        return false;
+    }
+    VesselTree *tree = shape_sample(shape, faults);
+    bool good = tree != NULL;
+    if (good && is_tree) {
+        good = save_tree(command, shape, tree, command->output, faults);
+        if (good && !command->quiet)
+            printf("%d nodes, %lld points\n", tree->node_count, (long long)tree->point_count);
+    } else if (good && is_volume) {
+        Volume *volume = shape_volume(shape, command->voxel_mm, command->psf_mm, command->noise, (uint64_t)command->seed + 1, faults);
+        good = volume && volume_save_nrrd(volume, command->output, "float", faults);
+        if (good && !command->quiet)
+            printf("%d x %d x %d voxels of %g mm\n", volume->size[0], volume->size[1], volume->size[2], command->voxel_mm);
+        volume_free(volume);
+    } else if (good) {
+        TriangleMesh *mesh = shape_surface(shape, command->cell_mm, faults);
+        good = mesh && (is_stl ? write_stl(mesh, command->output, faults) : write_ply(mesh, command->output, faults));
+        if (good && !command->quiet)
+            printf("%d vertices, %d triangles\n", mesh->vertex_count, mesh->triangle_count);
+        triangle_mesh_free(mesh);
+    }
+    if (good && !is_tree) {
+        truth_path(command->output, extension, truth, sizeof truth);
+        good = save_tree(command, shape, tree, truth, faults);
+    }
+    vessel_tree_free(tree);
+    return good;
+}
+
+// --- measuring ---
+
+static void print_row(const char *name, const MeasureRow *row)
+{
+    printf("%-28s %8d %8.4f %8.4f %8.4f %8.4f %8.4f\n", name, row->count, row->mean, row->median, row->p90, row->p99, row->most);
+}
+
+static void json_row(cJSON *root, const char *name, const MeasureRow *row)
+{
+    cJSON *item = cJSON_AddObjectToObject(root, name);
+    cJSON_AddNumberToObject(item, "count", row->count);
+    cJSON_AddNumberToObject(item, "mean_mm", row->mean);
+    cJSON_AddNumberToObject(item, "p50_mm", row->median);
+    cJSON_AddNumberToObject(item, "p90_mm", row->p90);
+    cJSON_AddNumberToObject(item, "p99_mm", row->p99);
+    cJSON_AddNumberToObject(item, "max_mm", row->most);
+}
+
+static bool measure(const SynthCommand *command, const Shape *shape, Faults *faults)
+{
+    VesselTree *model = tree_file_load(command->measure, NULL, faults);
+    ShapeMeasure figures;
+    if (model && !vessel_tree_is_model(model))
+        faults_add(faults, command->measure, 0, 0, "is a tree without a model; make one with `seldinger fit`");
+    bool good = faults->count == 0 && shape_measure(shape, model, &figures);
+    if (!good && faults->count == 0)
+        faults_add(faults, command->measure, 0, 0, "not enough memory");
+    if (good && command->json) {
+        cJSON *root = cJSON_CreateObject();
+        json_row(root, "truth_to_model", &figures.to_model);
+        json_row(root, "model_to_truth", &figures.to_truth);
+        json_row(root, "jump", &figures.jump);
+        cJSON_AddNumberToObject(root, "bias_mm", figures.bias);
+        cJSON_AddNumberToObject(root, "least_clearance_ratio", figures.least_clearance);
+        cJSON_AddNumberToObject(root, "worst_node", figures.worst_node);
+        char *text = cJSON_Print(root);
+        good = text && output_write(command->json, text, strlen(text), faults);
+        free(text);
+        cJSON_Delete(root);
+    }
+    if (good && !command->quiet && !(command->json && !strcmp(command->json, "-"))) {
+        printf("%-28s %8s %8s %8s %8s %8s %8s\n", "distance [mm]", "count", "mean", "p50", "p90", "p99", "max");
+        print_row("true surface to model", &figures.to_model);
+        print_row("model in its cell to truth", &figures.to_truth);
+        print_row("jump between neighbours", &figures.jump);
+        printf("bias %+.4f mm, least clearance at node centres %.3f of the true, worst node %d\n", figures.bias, figures.least_clearance,
+               figures.worst_node);
+    }
+    vessel_tree_free(model);
+    return good;
+}
 
 int verb_synth(int argc, char **argv)
 {
-    (void)argc, (void)argv;
-    return EXIT_BAD_INPUT;
+    static Faults faults;
+    SynthCommand command;
+    int code = parse_options(argc, argv, &command);
+    if (code >= 0)
+        return code;
+    Shape *shape = shape_create(command.shape, command.option_count, (const char(*)[2][64])command.option, "synth", &faults);
+    if (command.output)
+        output_check_file(command.output, &faults);
+    output_check(command.json, &faults);
+    bool good = faults.count == 0 && (command.measure ? measure(&command, shape, &faults) : write_output(&command, shape, &faults));
+    shape_free(shape);
+    return good ? EXIT_DONE : cli_bad_input(&faults);
 }

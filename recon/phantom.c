@@ -161,9 +161,10 @@ static double climb(const Part *part, Vec3 x, double t, double *value, Vec3 *awa
 }
 
 // f_part, its gradient and the parameter of the sphere that makes it. `enough`: parts whose f is below it may answer any lower bound.
-static double part_field(const Part *part, Vec3 x, double enough, Vec3 *gradient, double *at)
+// `cut`: without the straight pieces beyond open ends.
+static double part_field(const Part *part, Vec3 x, double enough, bool cut, Vec3 *gradient, double *at)
 {
-    double best = -HUGE_VAL, step = part->sample_count > 1 ? part->sample_at[1] - part->sample_at[0] : 1;
+    double lowest = cut ? 0 : part->low, highest = cut ? part->at[part->knot_count - 1] : part->high, best = -HUGE_VAL, step = part->sample_count > 1 ? part->sample_at[1] - part->sample_at[0] : 1;
     int nearest = 0;
     for (int k = 0; k < part->block_count; k++) {
         double bound = part->block_reach[k] - vec3_distance(x, part->block_center[k]);
@@ -171,6 +172,8 @@ static double part_field(const Part *part, Vec3 x, double enough, Vec3 *gradient
             continue;
         int last = (k + 1) * BLOCK < part->sample_count ? (k + 1) * BLOCK : part->sample_count;
         for (int i = k * BLOCK; i < last; i++) {
+            if (part->sample_at[i] < lowest || part->sample_at[i] > highest)
+                continue;
             double f = part->sample_radius[i] - vec3_distance(x, part->sample[i]);
             if (f > best)
                 best = f, nearest = i;
@@ -185,6 +188,8 @@ static double part_field(const Part *part, Vec3 x, double enough, Vec3 *gradient
     double low = part->sample_at[nearest > 0 ? nearest - 1 : 0];
     double high = part->sample_at[nearest < part->sample_count - 1 ? nearest + 1 : nearest], value, t = part->sample_at[nearest];
     Vec3 away;
+    low = fmax(low, lowest);
+    high = fmin(high, highest);
     double s_low = climb(part, x, low, &value, &away), s_high = climb(part, x, high, &value, &away);
     if (s_low <= 0)
         t = low;
@@ -214,13 +219,13 @@ static double joint_width(const Shape *shape, int child)
     return shape->blend > 0 ? shape->blend : 0.6 * shape->part[child].coordinate[3].value[0];
 }
 
-double shape_field(const Shape *shape, Vec3 x, Vec3 *gradient)
+static double joined_field(const Shape *shape, Vec3 x, bool cut, Vec3 *gradient)
 {
     double f[PARTS], best = -HUGE_VAL, at;
     Vec3 g[PARTS], best_gradient = {0, 0, 0};
     for (int p = 0; p < shape->part_count; p++) {
         // a part further below than any joint is wide cannot matter
-        f[p] = part_field(&shape->part[p], x, best - 4, &g[p], &at);
+        f[p] = part_field(&shape->part[p], x, best - 4, cut, &g[p], &at);
         if (f[p] > best)
             best = f[p], best_gradient = g[p];
     }
@@ -240,6 +245,26 @@ double shape_field(const Shape *shape, Vec3 x, Vec3 *gradient)
     if (gradient)
         *gradient = best_gradient;
     return best;
+}
+
+double shape_field(const Shape *shape, Vec3 x, Vec3 *gradient) { return joined_field(shape, x, false, gradient); }
+
+double shape_field_cut(const Shape *shape, Vec3 x)
+{
+    double f = joined_field(shape, x, true, NULL);
+    for (int p = 0; p < shape->part_count; p++) {
+        const Part *part = &shape->part[p];
+        for (int end = 0; end < 2; end++) {
+            if (!(end ? part->open_end : part->open_start))
+                continue;
+            // the half sphere beyond the end, and nothing else, lies in this ball
+            Station s = part_at(part, end ? part->at[part->knot_count - 1] : 0);
+            Vec3 away = vec3_sub(x, s.center);
+            if (vec3_norm(away) < 3 * s.radius)
+                f = fmin(f, (end ? -1 : 1) * vec3_dot(away, vec3_unit(s.tangent)));
+        }
+    }
+    return f;
 }
 
 double shape_distance(const Shape *shape, Vec3 x, Vec3 *foot)
@@ -282,7 +307,7 @@ bool shape_beyond_open_end(const Shape *shape, Vec3 x)
     int which = 0;
     for (int p = 0; p < shape->part_count; p++) {
         Vec3 g;
-        double t, f = part_field(&shape->part[p], x, -HUGE_VAL, &g, &t);
+        double t, f = part_field(&shape->part[p], x, -HUGE_VAL, false, &g, &t);
         if (f > best)
             best = f, which = p, at = t;
     }
@@ -471,6 +496,17 @@ Shape *shape_create(const char *name, int option_count, const char (*option)[2][
     return NULL;
 }
 
+double shape_voxel_mm(const Shape *shape) { return fmax(0.05, 2 * shape->noise); }
+
+double shape_options_voxel_mm(int option_count, const char (*option)[2][64])
+{
+    double noise = 0;
+    for (int i = 0; i < option_count; i++)
+        if (!strcmp(option[i][0], "noise_mm"))
+            noise = strtod(option[i][1], NULL);
+    return fmax(0.05, noise > 0 && noise <= 10 ? 2 * noise : 0);
+}
+
 void shape_free(Shape *shape)
 {
     for (int p = 0; shape && p < PARTS; p++)
@@ -582,7 +618,7 @@ static void sample_sac(Sampler *s, const Part *part, double at)
         Vec3 hit, g;
         if (!march_out(s->shape, station.center, vec3(ring * cos(angle), ring * sin(angle), z), 4 * station.radius, &hit))
             continue;
-        double own = part_field(part, hit, -HUGE_VAL, &g, &t), parent = part_field(&s->shape->part[part->parent], hit, -HUGE_VAL, &g, &t);
+        double own = part_field(part, hit, -HUGE_VAL, false, &g, &t), parent = part_field(&s->shape->part[part->parent], hit, -HUGE_VAL, false, &g, &t);
         if (own >= parent)
             add_sample(s, hit);
     }
@@ -601,7 +637,7 @@ static int place_nodes(const Shape *shape, int p, double *at, int capacity)
         const Part *parent = &shape->part[part->parent];
         for (; t < last; t += 0.01 * part_at(part, t).radius) {
             Vec3 g;
-            double u, inside = part_field(parent, part_at(part, t).center, -HUGE_VAL, &g, &u);
+            double u, inside = part_field(parent, part_at(part, t).center, -HUGE_VAL, false, &g, &u);
             if (inside < 0.1 * part_at(parent, u).radius)
                 break;
         }

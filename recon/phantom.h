@@ -18,6 +18,7 @@
 #ifndef SELDINGER_RECON_PHANTOM_H
 #define SELDINGER_RECON_PHANTOM_H
 
+#include "geom/isosurface.h"
 #include "geom/vessel_tree.h"
 #include "recon/volume.h"
 
@@ -30,9 +31,15 @@ const char *shape_names(void);
 // NULL with a fault for each unknown key, value out of range or unknown name; `file` is what messages begin with.
 Shape *shape_create(const char *name, int option_count, const char (*option)[2][64], const char *file, Faults *faults);
 void shape_free(Shape *shape);
+// The voxel size that stands for the samples' accuracy when a shape is fitted (LimFitOptions.voxel_mm): 0.05 mm, or twice the noise.
+double shape_voxel_mm(const Shape *shape);
+// The same from a scene's text options, before or without a shape (unknown or bad values count as absent).
+double shape_options_voxel_mm(int option_count, const char (*option)[2][64]);
 
 // The field whose zero is the surface: > 0 inside, gradient of length <= 1, the distance itself away from joints.
 double shape_field(const Shape *shape, Vec3 x, Vec3 *gradient);
+// The same with open ends cut off flat: the field of the closed body that is meshed.
+double shape_field_cut(const Shape *shape, Vec3 x);
 // Signed distance to the true surface [mm], > 0 inside; `foot` (may be NULL) is the closest surface point. Near the medial axis the
 // local one that projection finds, never less than the field.
 double shape_distance(const Shape *shape, Vec3 x, Vec3 *foot);
@@ -46,6 +53,8 @@ void shape_bounds(const Shape *shape, Vec3 *low, Vec3 *high);
 VesselTree *shape_sample(const Shape *shape, Faults *faults);
 // shape_create and shape_sample in one: what a scene's `shape:` needs.
 VesselTree *shape_tree(const char *name, int option_count, const char (*option)[2][64], const char *file, Faults *faults);
+// The surface as a closed mesh (open ends flat), marching tetrahedra with vertices projected onto it; every node is 0.
+TriangleMesh *shape_surface(const Shape *shape, double cell_mm, Faults *faults);
 // A contrast volume: 1 inside, 0 outside, partial voxels by the field, then Gaussian blur `psf_mm` (standard deviation) and
 // white noise `noise` (fraction of contrast).
 Volume *shape_volume(const Shape *shape, double voxel_mm, double psf_mm, double noise, uint64_t seed, Faults *faults);
