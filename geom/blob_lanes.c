@@ -1,5 +1,6 @@
-// One kernel text, three compilations. See blob_lanes.h for the layout and why the bits agree, blobby.c for the equations.
-#include "geom/blob_lanes.h"
+// One kernel text, three compilations. See blob_lanes.h and foot_lanes.h for the layouts and why the bits agree, blobby.c for the equations.
+// Compiled with -fno-math-errno and -fno-trapping-math, which change no result, so that roots and selects vectorise.
+#include "geom/foot_lanes.h"
 
 #include <string.h>
 
@@ -28,7 +29,7 @@ void blob_groups_fill(BlobGroup *group, const Blobby *model)
 #undef WIDTH
 #undef TARGET
 #undef KERNEL
-static const BlobKernels baseline = {"baseline", gradient_baseline, hessian_baseline};
+static const LaneKernels baseline = {"baseline", gradient_baseline, hessian_baseline, newton_baseline, finish_baseline, estimate_baseline};
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #define WIDTH 4
@@ -38,7 +39,7 @@ static const BlobKernels baseline = {"baseline", gradient_baseline, hessian_base
 #undef WIDTH
 #undef TARGET
 #undef KERNEL
-static const BlobKernels avx2 = {"avx2", gradient_avx2, hessian_avx2};
+static const LaneKernels avx2 = {"avx2", gradient_avx2, hessian_avx2, newton_avx2, finish_avx2, estimate_avx2};
 
 #define WIDTH 8
 #define TARGET __attribute__((target("avx512f,avx512dq,avx512vl")))
@@ -47,9 +48,9 @@ static const BlobKernels avx2 = {"avx2", gradient_avx2, hessian_avx2};
 #undef WIDTH
 #undef TARGET
 #undef KERNEL
-static const BlobKernels avx512 = {"avx512", gradient_avx512, hessian_avx512};
+static const LaneKernels avx512 = {"avx512", gradient_avx512, hessian_avx512, newton_avx512, finish_avx512, estimate_avx512};
 
-const BlobKernels *blob_kernels(int isa)
+const LaneKernels *lane_kernels(int isa)
 {
     if ((isa == 0 || isa >= 3) && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
         return &avx512;
@@ -58,7 +59,7 @@ const BlobKernels *blob_kernels(int isa)
     return &baseline;
 }
 #else
-const BlobKernels *blob_kernels(int isa)
+const LaneKernels *lane_kernels(int isa)
 {
     (void)isa;
     return &baseline;

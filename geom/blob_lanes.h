@@ -1,4 +1,5 @@
-// The hot form of a blobby model: groups of eight blobs, one blob a lane, evaluated by one kernel compiled for SSE2, AVX2 and AVX-512.
+// The hot form of a blobby model: groups of eight blobs, one blob a lane, evaluated by one kernel compiled for SSE2, AVX2 and AVX-512
+// (foot_lanes.h has the table of kernels).
 //
 // Layout: a model is `count` groups, each seven vectors of eight doubles; unused lanes hold a blob of no weight. Every lane sums its blobs in
 // the order of the groups, and the lanes are added by one fixed tree, so that every instruction set gives the same bits (no fused
@@ -19,26 +20,7 @@ typedef struct BlobGroup {
     double rho[8], a[8], b[8];   // rho, -4/(5 rho), 24/(25 rho^3); all 0 in unused lanes
 } BlobGroup;
 
-// One evaluation: a model, a place, and the answer.
-typedef struct FieldJob {
-    const BlobGroup *group;
-    int groups;
-    Vec3 x;
-    double f;                // field, iso-level taken off
-    Vec3 g;                  // gradient
-    Sym3 h;                  // Hessian
-} FieldJob;
-
 static inline int blob_groups_needed(int64_t blobs) { return (int)((blobs + 7) / 8); }
 void blob_groups_fill(BlobGroup *group, const Blobby *model);
-
-typedef struct BlobKernels {
-    const char *isa;
-    // Many jobs at a time: one alone waits 35 ns for its own division and sums, others fit into that gap.
-    void (*gradient)(FieldJob *const *job, int count, double iso_level);   // f and g; h is left alone
-    void (*hessian)(FieldJob *const *job, int count, double iso_level);
-} BlobKernels;
-// isa: 0 the widest the CPU has, 1 SSE2, 2 AVX2, 3 AVX-512; the next narrower one where it is absent.
-const BlobKernels *blob_kernels(int isa);
 
 #endif

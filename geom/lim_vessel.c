@@ -6,12 +6,11 @@
 //   2. bounds that cost no field: the distance is 1-Lipschitz, so gap(X) >= gap(C) - |X - C| for the node's centre C, and
 //      gap(X) >= gap(X_then) - |X - X_then| for the place where it was last measured;
 //   3. one value of the field at X: its sign, and an estimate that shows when another wall has come closer than the remembered one;
-//   4. Newton on {f = 0, (X - p) parallel to grad f} from the remembered foot p. With n = g/|g|, S = P H P/|g|, gap = (X - p).n, one step is
-//      p += t + nu n,  t = -(I + gap S)^-1 P (p - X),  nu = -(f/|g| + t'S't / 2): the quadratic term makes one step nearly always enough;
+//   4. Newton (foot_lanes.h) from where the remembered foot should have moved to: p + (I + gap S)^-1 P (X - X_then);
 //   5. where that fails, a march from X along the gradient, then again 4; where that fails, blobby_project (slow, robust).
 // The march works on W = (f + T)^(-1/2) - T^(-1/2), which for one blob is a paraboloid |X - C|^2 - r^2 up to scale: Newton on it from outside never
 // overshoots and arrives from any distance, where f itself is flat.
-#include "geom/blob_lanes.h"
+#include "geom/foot_lanes.h"
 #include "geom/power_walk.h"
 #include "geom/vessel.h"
 
@@ -29,36 +28,25 @@ typedef struct LimVessel {
     Vessel vessel;           // first: a Vessel * to us is a LimVessel *
     const VesselTree *tree;
     LimVesselOptions options;
-    const BlobKernels *kernels;
+    const LaneKernels *kernels;
     BlobGroup *group;        // all nodes' groups
     NodeModel *model;        // (N)
     bool inlet_open;         // the root is an end of the tree
 } LimVessel;
 
-// A foot on one model. The shape operator is that of the last evaluation.
-typedef struct Foot {
-    Vec3 place, normal;
-    Sym3 shape;
-    double gap;
-    bool sure;
-} Foot;
-
-// Points of a query are taken in batches, and each batch in stages (all fields at X, all first Newton steps, …): an evaluation alone waits mostly for
-// its own division and sums, see BlobKernels. A point's answer does not depend on its batch.
-enum { BATCH = 32 };
-
-typedef enum { FOOT_PENDING, FOOT_DONE, FOOT_DEEP, FOOT_LOST } FootState;
-
-typedef struct Projection {
-    const NodeModel *model;
+// Points of a query are taken in batches, and each batch in stages (all fields at X, all first Newton steps, …), see foot_lanes.h. A point's answer
+// does not depend on its batch. What the lanes do not hold:
+typedef struct Lane {
+    int point;               // of the query
     int node;
-    Vec3 x;
-    FootState state;
-    double longest;          // [mm] step bound; without `careful` a longer one is FOOT_LOST
-    bool careful;            // go on near focal points and with bounded steps
-    FieldJob at_x, at_foot;  // at_foot.x is the running foot
-    Foot foot;
-} Projection;
+    bool sure, again;
+    double weight;           // in a blend
+} Lane;
+
+static Vec3 lane_point(const FootBatch *b, int i) { return vec3(b->xx[i], b->xy[i], b->xz[i]); }
+static Vec3 lane_foot(const FootBatch *b, int i) { return vec3(b->px[i], b->py[i], b->pz[i]); }
+static Vec3 lane_normal(const FootBatch *b, int i) { return vec3(b->nx[i], b->ny[i], b->nz[i]); }
+static Sym3 lane_hessian(const FootBatch *b, int i) { return (Sym3){b->axx[i], b->axy[i], b->axz[i], b->ayy[i], b->ayz[i], b->azz[i]}; }
 
 static Blobby blobs_of(const LimVessel *lim, int node)
 {
@@ -67,227 +55,171 @@ static Blobby blobs_of(const LimVessel *lim, int node)
     return (Blobby){(int)(end - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level};
 }
 
-static Projection new_projection(const LimVessel *lim, int node, Vec3 x)
+static void set_lane(const LimVessel *lim, FootBatch *b, int i, int node, Vec3 x, Vec3 start)
 {
     const NodeModel *m = &lim->model[node];
-    FieldJob job = {.group = m->group, .groups = m->groups, .x = x};
-    return (Projection){.model = m, .node = node, .x = x, .state = FOOT_LOST, .at_x = job, .at_foot = job};
+    b->group[i] = m->group;
+    b->groups[i] = m->groups;
+    b->xx[i] = x.x, b->xy[i] = x.y, b->xz[i] = x.z;
+    b->px[i] = start.x, b->py[i] = start.y, b->pz[i] = start.z;
+    b->radius[i] = lim->tree->radius[node];
+    b->longest[i] = 0.5 * b->radius[i];
+    b->careful[i] = 0;
+    b->state[i] = FOOT_PENDING;
 }
 
-static Sym3 shape_from(Vec3 n, double slope, const Sym3 *h)
+// Lanes in use are computed all, whether they are pending or not; those beyond must hold something harmless.
+static void clear_lanes(FootBatch *b, int count)
 {
-    Vec3 hn = sym3_mul_vec(h, n);
-    double nhn = vec3_dot(n, hn), s = 1 / slope;
-    return (Sym3){s * (h->xx - 2 * n.x * hn.x + nhn * n.x * n.x),
-                  s * (h->xy - n.x * hn.y - n.y * hn.x + nhn * n.x * n.y),
-                  s * (h->xz - n.x * hn.z - n.z * hn.x + nhn * n.x * n.z),
-                  s * (h->yy - 2 * n.y * hn.y + nhn * n.y * n.y),
-                  s * (h->yz - n.y * hn.z - n.z * hn.y + nhn * n.y * n.z),
-                  s * (h->zz - 2 * n.z * hn.z + nhn * n.z * n.z)};
+    for (int i = count; i < FOOT_BATCH; i++)
+        b->state[i] = FOOT_LOST;
 }
 
-// One Newton step from the sample at the running foot. FOOT_DEEP: X is near or beyond a focal point of this foot, another side may be closer.
-static void newton_step(const LimVessel *lim, Projection *t)
+// At most `rounds` Newton steps of the pending lanes; those that are not done then are lost.
+static void newton_rounds(const LimVessel *lim, FootBatch *b, int count, int rounds)
 {
-    const FieldJob *s = &t->at_foot;
-    double slope2 = vec3_norm2(s->g), curl = 1 / lim->tree->radius[t->node];
-    if (!(slope2 > 1e-200)) {
-        t->state = FOOT_LOST;
-        return;
-    }
-    double slope = sqrt(slope2), flat = 1 / slope;
-    Vec3 n = vec3_scale(s->g, flat), away = vec3_sub(s->x, t->x), t1 = vec3_normal_to(n), t2 = vec3_cross(n, t1);
-    double gap = -vec3_dot(away, n), rest1 = vec3_dot(away, t1), rest2 = vec3_dot(away, t2);
-    Vec3 h1 = sym3_mul_vec(&s->h, t1), h2 = sym3_mul_vec(&s->h, t2);
-    double s11 = vec3_dot(t1, h1) * flat, s12 = vec3_dot(t2, h1) * flat, s22 = vec3_dot(t2, h2) * flat;
-    double m11 = 1 + gap * s11, m12 = gap * s12, m22 = 1 + gap * s22;
-    if (m11 < 0.3 || m22 < 0.3 || (m11 - 0.3) * (m22 - 0.3) < m12 * m12) {
-        if (!t->careful) {
-            t->state = FOOT_DEEP;
+    int lane[FOOT_BATCH];
+    for (int round = 0; round < rounds; round++) {
+        int n = 0;
+        for (int i = 0; i < count; i++)
+            if (b->state[i] == FOOT_PENDING)
+                lane[n++] = i;
+        if (n == 0)
             return;
-        }
-        // without the coupling and with bounded divisors it still descends, if slowly
-        m11 = fmax(fabs(m11), 0.3), m22 = fmax(fabs(m22), 0.3), m12 = 0;
+        lim->kernels->hessian(b, lane, n, lim->tree->iso_level);
+        lim->kernels->newton(b);
     }
-    double over = 1 / (m11 * m22 - m12 * m12), y1 = -(m22 * rest1 - m12 * rest2) * over, y2 = -(m11 * rest2 - m12 * rest1) * over;
-    double taubin = s->f * flat, along = sqrt(y1 * y1 + y2 * y2);
-    if (fabs(taubin) > t->longest || along > t->longest) {
-        if (!t->careful) {
-            t->state = FOOT_LOST;
-            return;
-        }
-        double shrink = along > t->longest ? t->longest / along : 1;
-        y1 *= shrink, y2 *= shrink, along *= shrink;
-        taubin = fmax(-t->longest, fmin(t->longest, taubin));
-    }
-    double nu = -(taubin + 0.5 * (y1 * y1 * s11 + 2 * y1 * y2 * s12 + y2 * y2 * s22));
-    Vec3 p = t->at_foot.x = vec3_add_scaled(vec3_add_scaled(vec3_add_scaled(s->x, y1, t1), y2, t2), nu, n);
-    // what the step leaves: of the foot's place (hence the normal) second order, of f/|g| third order, in units of the curvature
-    curl += fabs(s11) + fabs(s22) + 2 * fabs(s12);
-    if (curl * along * along > 1e-6 || fabs(nu) > 1e-4 || curl * (along + fabs(nu)) * (curl * along * along + fabs(nu)) > 1e-9)
-        return;
-    n = vec3_unit(vec3_add_scaled(vec3_add_scaled(n, y1 * s11 + y2 * s12, t1), y1 * s12 + y2 * s22, t2));   // the normal turns by S t
-    t->foot = (Foot){p, n, shape_from(n, slope, &s->h), vec3_dot(vec3_sub(t->x, p), n), true};
-    t->state = FOOT_DONE;
+    for (int i = 0; i < count; i++)
+        if (b->state[i] == FOOT_PENDING)
+            b->state[i] = FOOT_LOST;
 }
 
-// Both rounds consume their list: those that are not done move to its front.
-static void newton_rounds(const LimVessel *lim, Projection **left, int count, int rounds)
-{
-    FieldJob *job[BATCH];
-    int n = count;
-    for (int round = 0; round < rounds && n > 0; round++) {
-        for (int i = 0; i < n; i++)
-            job[i] = &left[i]->at_foot;
-        lim->kernels->hessian(job, n, lim->tree->iso_level);
-        int kept = 0;
-        for (int i = 0; i < n; i++) {
-            newton_step(lim, left[i]);
-            if (left[i]->state == FOOT_PENDING)
-                left[kept++] = left[i];
-        }
-        n = kept;
-    }
-    for (int i = 0; i < n; i++)
-        left[i]->state = FOOT_LOST;
-}
-
-// From the sample at t->at_foot.x one step of the march towards the wall; true where it is within a twentieth of the radius of it.
-static bool march_step(const LimVessel *lim, Projection *t)
+// From the sample at the running foot one step of the march towards the wall; true where it is within a twentieth of the radius of it.
+static bool march_step(const LimVessel *lim, FootBatch *b, int i, int node)
 {
     const VesselTree *tree = lim->tree;
-    FieldJob *s = &t->at_foot;
-    double radius = tree->radius[t->node], level = 1 / sqrt(tree->iso_level), slope = vec3_norm(s->g), sum = s->f + tree->iso_level;
-    if (!(slope > 1e-12 * sum)) {
+    Vec3 g = {b->gx[i], b->gy[i], b->gz[i]}, p = lane_foot(b, i);
+    double radius = tree->radius[node], level = 1 / sqrt(tree->iso_level), slope = vec3_norm(g), sum = b->f[i] + tree->iso_level, step = radius;
+    if (slope > 1e-12 * sum) {
+        double w = 1 / sqrt(sum);
+        step = fmax(2 * (w - level) / (w * w * w * slope), -1.2 * radius);   // < 0 inside: outwards
+        p = vec3_add_scaled(p, step / slope, g);
+    } else {
         // on a symmetric axis or at a lone blob's centre any way out is as good, the same one always
-        s->x = vec3_add_scaled(s->x, radius, vec3_normal_to(tree->direction[t->node]));
-        return false;
+        p = vec3_add_scaled(p, radius, vec3_normal_to(tree->direction[node]));
     }
-    double w = 1 / sqrt(sum), step = fmax(2 * (w - level) / (w * w * w * slope), -1.2 * radius);   // < 0 inside: outwards
-    s->x = vec3_add_scaled(s->x, step / slope, s->g);
+    b->px[i] = p.x, b->py[i] = p.y, b->pz[i] = p.z;
     return fabs(step) < 0.05 * radius;
 }
 
-static void march_rounds(const LimVessel *lim, Projection **left, int count)
+static void march_rounds(const LimVessel *lim, FootBatch *b, const Lane *of, int *lane, int count)
 {
-    enum { STEPS = 12 };
-    FieldJob *job[BATCH];
-    int n = 0;
-    for (int i = 0; i < count; i++) {
-        FieldJob *s = &left[i]->at_foot;
-        s->x = left[i]->x, s->f = left[i]->at_x.f, s->g = left[i]->at_x.g;
-        if (!march_step(lim, left[i]))
-            left[n++] = left[i];
-    }
-    for (int round = 0; round < STEPS && n > 0; round++) {
-        for (int i = 0; i < n; i++)
-            job[i] = &left[i]->at_foot;
-        lim->kernels->gradient(job, n, lim->tree->iso_level);
+    enum { STEPS = 13 };
+    for (int k = 0; k < count; k++)
+        b->px[lane[k]] = b->xx[lane[k]], b->py[lane[k]] = b->xy[lane[k]], b->pz[lane[k]] = b->xz[lane[k]];
+    for (int round = 0; round < STEPS && count > 0; round++) {
+        lim->kernels->gradient(b, lane, count, lim->tree->iso_level);
         int kept = 0;
-        for (int i = 0; i < n; i++)
-            if (!march_step(lim, left[i]))
-                left[kept++] = left[i];
-        n = kept;
+        for (int k = 0; k < count; k++)
+            if (!march_step(lim, b, lane[k], of[lane[k]].node))
+                lane[kept++] = lane[k];
+        count = kept;
     }
 }
 
-static void project_slowly(const LimVessel *lim, Projection *t)
+static void project_slowly(const LimVessel *lim, FootBatch *b, int i, Lane *of)
 {
-    Blobby model = blobs_of(lim, t->node);
-    SurfacePoint s = blobby_project(&model, t->x, t->x);
-    t->foot = (Foot){s.foot, s.normal, s.shape, s.distance, s.converged};
-    t->state = FOOT_DONE;
+    Blobby model = blobs_of(lim, of->node);
+    Vec3 x = lane_point(b, i), g, normal;
+    SurfacePoint s = blobby_project(&model, x, x);
+    double f = blobby_gradient(&model, x, &g), slope = vec3_norm(g), mean = 0.5 * sym3_trace(&s.shape);
+    const Sym3 *h = &s.shape;
+    of->sure = s.converged;
+    normal = s.normal;
     if (!s.converged) {
-        double slope = vec3_norm(t->at_x.g);
-        t->foot.normal = vec3_unit_or(t->at_x.g, s.normal);
-        t->foot.gap = slope > 1e-100 && fabs(t->at_x.f / slope) < fabs(s.distance) ? t->at_x.f / slope : s.distance;
-        t->foot.shape = (Sym3){0, 0, 0, 0, 0, 0};
+        // Taubin's distance along the gradient, or what little is known: a flat wall there
+        double gap = slope > 1e-100 && fabs(f / slope) < fabs(s.distance) ? f / slope : s.distance;
+        normal = vec3_unit_or(g, s.normal);
+        s.foot = vec3_add_scaled(x, -gap, normal);
+        s.shape = (Sym3){0, 0, 0, 0, 0, 0};
+        mean = 0;
     }
+    double frobenius2 = h->xx * h->xx + h->yy * h->yy + h->zz * h->zz + 2 * (h->xy * h->xy + h->xz * h->xz + h->yz * h->yz);
+    double spread = sqrt(fmax(0.5 * frobenius2 - mean * mean, 0));
+    b->px[i] = s.foot.x, b->py[i] = s.foot.y, b->pz[i] = s.foot.z;
+    b->nx[i] = normal.x, b->ny[i] = normal.y, b->nz[i] = normal.z;
+    b->k1[i] = mean + spread, b->k2[i] = mean - spread;
+    b->sxx[i] = h->xx, b->sxy[i] = h->xy, b->sxz[i] = h->xz, b->syy[i] = h->yy, b->syz[i] = h->yz, b->szz[i] = h->zz;
+    b->state[i] = FOOT_DONE;
 }
 
-static bool is_on_wrong_side(const Projection *t) { return (t->foot.gap > 0) != (t->at_x.f > 0) && fabs(t->foot.gap) > 1e-6; }
+static bool is_on_wrong_side(const FootBatch *b, int i) { return (b->gap[i] > 0) != (b->inside[i] > 0) && fabs(b->gap[i]) > 1e-6; }
 
-// A foot on the wrong side of the wall, or on a wall that stands further off than another, is not the closest.
-static bool is_plausible(const LimVessel *lim, const Projection *t)
+// Feet of `count` lanes on the models of their nodes; `again` marks those without a start. A foot on the wrong side of the wall, or on a wall that
+// stands further off than another, is not the closest: those start once more from X.
+static void project_batch(const LimVessel *lim, FootBatch *b, Lane *of, int count)
 {
-    if (t->state != FOOT_DONE || is_on_wrong_side(t))
-        return false;
-    // Newton's step on W, inside one blob never below the distance
-    double sum = t->at_x.f + lim->tree->iso_level, w = 1 / sqrt(sum), slope = vec3_norm(t->at_x.g);
-    return 2 * fabs(w - 1 / sqrt(lim->tree->iso_level)) > 0.8 * fabs(t->foot.gap) * (w * w * w * slope);
-}
-
-// Feet of up to BATCH points on the models of their nodes. Those that start from a remembered foot are FOOT_PENDING with it in at_foot.x.
-static void project_batch(const LimVessel *lim, Projection *task, int count)
-{
-    Projection *some[BATCH], *rest[BATCH];
-    FieldJob *job[BATCH];
-    int n = 0, again = 0;
+    FootLane start[3];
+    int lane[FOOT_BATCH], n = 0;
     for (int i = 0; i < count; i++) {
-        job[i] = &task[i].at_x;
-        task[i].longest = 0.5 * lim->tree->radius[task[i].node];
-        if (task[i].state == FOOT_PENDING)
-            some[n++] = &task[i];
+        start[0][i] = b->px[i], start[1][i] = b->py[i], start[2][i] = b->pz[i];
+        b->px[i] = b->xx[i], b->py[i] = b->xy[i], b->pz[i] = b->xz[i];
+        lane[i] = i;
+        of[i].sure = true;
+        if (of[i].again)
+            b->state[i] = FOOT_LOST;
     }
-    lim->kernels->gradient(job, count, lim->tree->iso_level);
-    newton_rounds(lim, some, n, 4);
+    clear_lanes(b, count);
+    lim->kernels->gradient(b, lane, count, lim->tree->iso_level);
+    lim->kernels->estimate(b, lim->tree->iso_level);
     for (int i = 0; i < count; i++)
-        if (!is_plausible(lim, &task[i]))
-            rest[again++] = some[i] = &task[i];
-        else
-            some[i] = NULL;
-    march_rounds(lim, rest, again);
-    again = 0;
+        b->px[i] = start[0][i], b->py[i] = start[1][i], b->pz[i] = start[2][i];
+    newton_rounds(lim, b, count, 4);
+    lim->kernels->finish(b);
+    for (int i = 0; i < count; i++) {
+        of[i].again = b->state[i] != FOOT_DONE || is_on_wrong_side(b, i) || !(b->estimate[i] > 0.8 * fabs(b->gap[i]));
+        if (of[i].again)
+            lane[n++] = i;
+    }
+    if (n == 0)
+        return;
+    march_rounds(lim, b, of, lane, n);
     for (int i = 0; i < count; i++)
-        if (some[i]) {
-            some[i]->state = FOOT_PENDING;
-            some[i]->careful = true;
-            some[i]->longest = lim->tree->radius[some[i]->node];
-            rest[again++] = some[i];
+        if (of[i].again) {
+            b->state[i] = FOOT_PENDING;
+            b->careful[i] = 1;
+            b->longest[i] = b->radius[i];
         }
-    newton_rounds(lim, rest, again, 12);
+    newton_rounds(lim, b, count, 12);
+    lim->kernels->finish(b);
+    bool slow = false;
     for (int i = 0; i < count; i++)
-        if (some[i] && (some[i]->state != FOOT_DONE || is_on_wrong_side(some[i])))
-            project_slowly(lim, some[i]);
-}
-
-// S (I + gap S)^-1: curvatures k / (1 + gap k), the divisor held at 0.1 near focal points.
-static Sym3 hessian_at_point(const Foot *foot)
-{
-    Vec3 n = foot->normal, t1 = vec3_normal_to(n), t2 = vec3_cross(n, t1), s1 = sym3_mul_vec(&foot->shape, t1);
-    double a = vec3_dot(t1, s1), b = vec3_dot(t2, s1), c = sym3_quadratic(&foot->shape, t2), gap = foot->gap;
-    double m11 = 1 + gap * a, m12 = gap * b, m22 = 1 + gap * c, det = m11 * m22 - m12 * m12, h11, h12, h22;
-    if (m11 > 0.1 && m22 > 0.1 && (m11 - 0.1) * (m22 - 0.1) > m12 * m12) {
-        // S and (I + gap S)^-1 commute
-        h11 = (a * m22 - b * m12) / det, h12 = (b * m11 - a * m12) / det, h22 = (c * m11 - b * m12) / det;
-    } else {
-        double mean = 0.5 * (a + c), spread = sqrt(0.25 * (a - c) * (a - c) + b * b), angle = 0.5 * atan2(2 * b, a - c);
-        double k1 = (mean + spread) / fmax(1 + gap * (mean + spread), 0.1), k2 = (mean - spread) / fmax(1 + gap * (mean - spread), 0.1);
-        double cs = cos(angle), sn = sin(angle);
-        h11 = k1 * cs * cs + k2 * sn * sn, h12 = (k1 - k2) * cs * sn, h22 = k1 * sn * sn + k2 * cs * cs;
-    }
-    Vec3 u = vec3_add_scaled(vec3_scale(t1, h11), h12, t2), v = vec3_add_scaled(vec3_scale(t1, h12), h22, t2);   // H = u t1' + v t2'
-    return (Sym3){u.x * t1.x + v.x * t2.x, u.x * t1.y + v.x * t2.y, u.x * t1.z + v.x * t2.z,
-                  u.y * t1.y + v.y * t2.y, u.y * t1.z + v.y * t2.z, u.z * t1.z + v.z * t2.z};
+        if (of[i].again && (b->state[i] != FOOT_DONE || is_on_wrong_side(b, i))) {
+            project_slowly(lim, b, i, &of[i]);
+            slow = true;
+        }
+    if (slow)
+        lim->kernels->finish(b);
 }
 
 // --- The inlet ---
 
 // The wall in the plane through X across the inlet's direction d. Used where the foot lies upstream of the inlet: the blobs close there, the vessel
 // does not. False where that section holds no wall.
-static bool project_in_section(const LimVessel *lim, int node, Vec3 x, Vec3 d, Foot *foot)
+static bool project_in_section(const LimVessel *lim, int node, Vec3 x, Vec3 d, VesselHit *hit, Vec3 *foot)
 {
     enum { STEPS = 30 };
-    const NodeModel *m = &lim->model[node];
+    Blobby model = blobs_of(lim, node);
     double level = 1 / sqrt(lim->tree->iso_level), radius = lim->tree->radius[node];
-    Vec3 e1 = vec3_normal_to(d), p = x;
+    Vec3 p = x;
     for (int i = 0; i < STEPS; i++) {
-        FieldJob s = {.group = m->group, .groups = m->groups, .x = p}, *job = &s;
-        lim->kernels->hessian(&job, 1, lim->tree->iso_level);
-        Vec3 g = vec3_add_scaled(s.g, -vec3_dot(s.g, d), d);
-        double slope = vec3_norm(g), sum = s.f + lim->tree->iso_level, w = 1 / sqrt(sum);
+        Vec3 g;
+        Sym3 h;
+        double f = blobby_hessian(&model, p, &g, &h);
+        g = vec3_add_scaled(g, -vec3_dot(g, d), d);
+        double slope = vec3_norm(g), sum = f + lim->tree->iso_level, w = 1 / sqrt(sum);
         if (!(slope > 1e-9 * sum)) {
-            p = vec3_add_scaled(p, radius, e1);
+            p = vec3_add_scaled(p, radius, vec3_normal_to(d));
             continue;
         }
         double step = fmax(2 * (w - level) / (w * w * w * slope), -1.2 * radius);
@@ -299,14 +231,17 @@ static bool project_in_section(const LimVessel *lim, int node, Vec3 x, Vec3 d, F
         }
         // Newton in the section: one tangent
         Vec3 n = vec3_scale(g, 1 / slope), t = vec3_cross(d, n), away = vec3_sub(p, x);
-        double gap = -vec3_dot(away, n), k = sym3_quadratic(&s.h, t) / slope, y = -vec3_dot(away, t) / fmax(fabs(1 + gap * k), 0.2);
+        double gap = -vec3_dot(away, n), k = sym3_quadratic(&h, t) / slope, y = -vec3_dot(away, t) / fmax(fabs(1 + gap * k), 0.2);
         y = fmax(-0.5 * radius, fmin(0.5 * radius, y));
-        double nu = -(s.f / slope + 0.5 * k * y * y);
+        double nu = -(f / slope + 0.5 * k * y * y);
         p = vec3_add_scaled(vec3_add_scaled(p, y, t), nu, n);
         if (fabs(y) + fabs(nu) > 1e-7)
             continue;
-        *foot = (Foot){.place = p, .normal = n, .gap = vec3_dot(vec3_sub(x, p), n), .sure = true};
-        foot->shape = (Sym3){k * t.x * t.x, k * t.x * t.y, k * t.x * t.z, k * t.y * t.y, k * t.y * t.z, k * t.z * t.z};
+        k /= fmax(1 + gap * k, 0.1);
+        hit->gap = vec3_dot(vec3_sub(x, p), n);
+        hit->normal = n;
+        hit->hessian = (Sym3){k * t.x * t.x, k * t.x * t.y, k * t.x * t.z, k * t.y * t.y, k * t.y * t.z, k * t.z * t.z};
+        *foot = p;
         return true;
     }
     return false;
@@ -374,65 +309,62 @@ static void sym3_accumulate(Sym3 *sum, double s, const Sym3 *a)
     sum->yy += s * a->yy, sum->yz += s * a->yz, sum->zz += s * a->zz;
 }
 
-// A point of the batch whose own foot is known, to be mixed with its neighbours'.
+// A hit of the batch to be mixed with its neighbours' answers.
 typedef struct Mixture {
     VesselHit *hit;
-    const Foot *own;
-    double gap, total;
+    double gap, total;       // weighted sums
     Vec3 normal;
     Sym3 hessian;
 } Mixture;
 
-static void mix_in(const LimVessel *lim, Mixture *mix, const Projection *t, double weight)
+static void mix_in(const LimVessel *lim, Mixture *mix, const FootBatch *b, int i, const Lane *of)
 {
-    double q = (t->foot.gap - mix->own->gap) / (BLEND_AGREE * lim->tree->radius[mix->hit->node]);
-    if (t->state != FOOT_DONE || !(fabs(q) < 1) || vec3_dot(t->foot.normal, mix->own->normal) < 0.5 ||
-        (t->node == 0 && upstream_of_inlet(lim, t->foot.place)))
+    double q = (b->gap[i] - mix->hit->gap) / (BLEND_AGREE * lim->tree->radius[mix->hit->node]);
+    if (b->state[i] != FOOT_DONE || !(fabs(q) < 1) || vec3_dot(lane_normal(b, i), mix->hit->normal) < 0.5 ||
+        (of->node == 0 && upstream_of_inlet(lim, lane_foot(b, i))))
         return;
-    double w = weight * (1 - q * q) * (1 - q * q);
-    Sym3 h = hessian_at_point(&t->foot);
+    double w = of->weight * (1 - q * q) * (1 - q * q);
+    Sym3 h = lane_hessian(b, i);
     mix->total += w;
-    mix->gap += w * t->foot.gap;
-    mix->normal = vec3_add_scaled(mix->normal, w, t->foot.normal);
+    mix->gap += w * b->gap[i];
+    mix->normal = vec3_add_scaled(mix->normal, w, lane_normal(b, i));
     sym3_accumulate(&mix->hessian, w, &h);
 }
 
-// Projects the queued neighbours from the own feet of their points, and mixes them in, in order.
-static void mix_queue(const LimVessel *lim, Projection *task, Mixture *const *owner, const double *weight, int count)
+// Projects the queued neighbours from the own feet of their points, and mixes them in, in order. of[].point is the mixture.
+static void mix_queue(const LimVessel *lim, FootBatch *b, const Lane *of, int count, Mixture *mixture)
 {
-    Projection *all[BATCH];
+    clear_lanes(b, count);
+    newton_rounds(lim, b, count, 4);
+    lim->kernels->finish(b);
     for (int i = 0; i < count; i++)
-        all[i] = &task[i];
-    newton_rounds(lim, all, count, 4);
-    for (int i = 0; i < count; i++)
-        mix_in(lim, owner[i], &task[i], weight[i]);
+        mix_in(lim, &mixture[of[i].point], b, i, &of[i]);
 }
 
-static void blend_batch(const LimVessel *lim, const Projection *own, VesselHit *const *hit, int count)
+static void blend_batch(const LimVessel *lim, const FootBatch *own, const Lane *own_of, int count, VesselHit *hit)
 {
-    Mixture mixture[BATCH], *owner[BATCH];
-    Projection queue[BATCH];
-    double weight[BATCH];
+    Mixture mixture[FOOT_BATCH];
+    FootBatch queue = {0};
+    Lane of[FOOT_BATCH];
     int queued = 0;
     for (int i = 0; i < count; i++) {
         Blend blend;
-        Mixture *mix = &mixture[i];
-        *mix = (Mixture){hit[i], &own[i].foot, hit[i]->gap, 1, hit[i]->normal, hit[i]->hessian};
-        blend_collect(lim->tree, own[i].x, own[i].node, &blend);
+        VesselHit *h = &hit[own_of[i].point];
+        mixture[i] = (Mixture){h, h->gap, 1, h->normal, h->hessian};
+        if (!own_of[i].sure)
+            continue;
+        Vec3 x = lane_point(own, i);
+        blend_collect(lim->tree, x, own_of[i].node, &blend);
         for (int k = 1; k < blend.count; k++) {
-            if (queued == BATCH) {
-                mix_queue(lim, queue, owner, weight, queued);
+            if (queued == FOOT_BATCH) {
+                mix_queue(lim, &queue, of, queued, mixture);
                 queued = 0;
             }
-            owner[queued] = mix;
-            weight[queued] = blend.weight[k];
-            queue[queued] = new_projection(lim, blend.node[k], own[i].x);
-            queue[queued].state = FOOT_PENDING;
-            queue[queued].at_foot.x = own[i].foot.place;
-            queue[queued++].longest = 0.5 * lim->tree->radius[own[i].node];
+            of[queued] = (Lane){.point = i, .node = blend.node[k], .weight = blend.weight[k]};
+            set_lane(lim, &queue, queued++, blend.node[k], x, lane_foot(own, i));
         }
     }
-    mix_queue(lim, queue, owner, weight, queued);
+    mix_queue(lim, &queue, of, queued, mixture);
     for (int i = 0; i < count; i++) {
         const Mixture *mix = &mixture[i];
         if (mix->total == 1)
@@ -479,54 +411,62 @@ static bool answer_cheaply(const LimVessel *lim, Vec3 x, double reach, VesselMem
     return hit->gap > reach;
 }
 
-// The hit from a projection. True where it may be blended.
-static bool answer_from_foot(const LimVessel *lim, Projection *t, VesselMemory *memory, VesselHit *hit)
+// Where the foot should be now: (I + gap S)^-1 P = P - gap H of the motion, H the gap's Hessian then.
+static Vec3 predicted_foot(const VesselMemory *memory, Vec3 x, double radius)
 {
-    bool section = t->node == 0 && upstream_of_inlet(lim, t->foot.place);
-    if (section && !project_in_section(lim, t->node, t->x, lim->tree->direction[0], &t->foot)) {
-        *hit = open_end(memory, t->node);
+    Vec3 move = vec3_sub(x, memory->place), n = memory->normal, bend = sym3_mul_vec(&memory->hessian, move);
+    double gap = vec3_dot(vec3_sub(memory->place, memory->foot), n);
+    Vec3 shift = vec3_add_scaled(vec3_add_scaled(move, -vec3_dot(move, n), n), -gap, bend);
+    return vec3_norm2(shift) < 0.04 * radius * radius ? vec3_add(memory->foot, shift) : memory->foot;
+}
+
+// The hit of a lane. False where the inlet decided, and there is nothing to blend.
+static bool answer_from_foot(const LimVessel *lim, const FootBatch *b, int i, const Lane *of, VesselMemory *memory, VesselHit *hit)
+{
+    Vec3 x = lane_point(b, i), foot = lane_foot(b, i);
+    *hit = (VesselHit){b->gap[i], lane_normal(b, i), lane_hessian(b, i), of->node, of->sure ? 0 : VESSEL_UNSURE};
+    bool section = of->node == 0 && upstream_of_inlet(lim, foot);
+    if (section && !project_in_section(lim, of->node, x, lim->tree->direction[0], hit, &foot)) {
+        *hit = open_end(memory, of->node);
         return false;
     }
-    memory->has_foot = t->foot.sure;
-    memory->foot = t->foot.place;
-    memory->clearance = t->foot.sure && !section ? t->foot.gap : 0;
-    memory->place = t->x;
-    *hit = (VesselHit){t->foot.gap, t->foot.normal, hessian_at_point(&t->foot), t->node, t->foot.sure ? 0 : VESSEL_UNSURE};
-    return t->foot.sure && !section;
+    if (section)
+        hit->flags = 0;
+    memory->has_foot = of->sure || section;
+    memory->clearance = of->sure && !section ? hit->gap : 0;
+    memory->foot = foot;
+    memory->place = x;
+    memory->normal = hit->normal;
+    memory->hessian = hit->hessian;
+    return !section;
 }
 
 static void query_batch(const LimVessel *lim, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
-    Projection task[BATCH];
-    VesselHit *mixed[BATCH];
-    int index[BATCH], n = 0, blended = 0;
+    FootBatch batch = {0};
+    Lane of[FOOT_BATCH];
+    int n = 0;
     for (int i = 0; i < count; i++) {
         if (answer_cheaply(lim, point[i], reach, &memory[i], &hit[i]))
             continue;
-        index[n] = i;
-        task[n] = new_projection(lim, hit[i].node, point[i]);
-        if (memory[i].has_foot) {
-            task[n].state = FOOT_PENDING;
-            task[n].at_foot.x = memory[i].foot;
-        }
-        n++;
+        int node = hit[i].node;
+        of[n] = (Lane){.point = i, .node = node, .again = !memory[i].has_foot};
+        set_lane(lim, &batch, n++, node, point[i],
+                 memory[i].has_foot ? predicted_foot(&memory[i], point[i], lim->tree->radius[node]) : point[i]);
     }
-    project_batch(lim, task, n);
+    if (n == 0)
+        return;
+    project_batch(lim, &batch, of, n);
     for (int i = 0; i < n; i++)
-        if (answer_from_foot(lim, &task[i], &memory[index[i]], &hit[index[i]])) {
-            mixed[blended] = &hit[index[i]];
-            if (blended != i)
-                task[blended] = task[i];
-            blended++;
-        }
+        of[i].sure = answer_from_foot(lim, &batch, i, &of[i], &memory[of[i].point], &hit[of[i].point]) && of[i].sure;
     if (lim->options.field == LIM_BLEND)
-        blend_batch(lim, task, mixed, blended);
+        blend_batch(lim, &batch, of, n, hit);
 }
 
 static void lim_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
-    for (int i = 0; i < count; i += BATCH) {
-        int n = count - i < BATCH ? count - i : BATCH;
+    for (int i = 0; i < count; i += FOOT_BATCH) {
+        int n = count - i < FOOT_BATCH ? count - i : FOOT_BATCH;
         query_batch((const LimVessel *)vessel, n, point + i, reach, memory + i, hit + i);
     }
 }
@@ -619,7 +559,7 @@ Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *o
     lim->tree = tree;
     lim->options = *options;
     lim->options.hops = options->hops > 0 ? options->hops : 1;
-    lim->kernels = blob_kernels(options->isa);
+    lim->kernels = lane_kernels(options->isa);
     lim->group = aligned_alloc(BLOB_GROUP_ALIGNMENT, groups * sizeof *lim->group);
     lim->model = calloc((size_t)tree->node_count, sizeof *lim->model);
     if (!lim->group || !lim->model) {

@@ -17,7 +17,8 @@ typedef struct VesselMemory {
     bool has_foot;
     Vec3 foot;               // last projection, where Newton starts
     double clearance;        // [mm] at `place` the wall of `node` was at least this far; 0: not known. Lets far points pass unevaluated
-    Vec3 place;
+    Vec3 place, normal;      // where the foot was found from, the answer there …
+    Sym3 hessian;            // … and its curvature: they say where the foot has moved to
 } VesselMemory;              // a fresh one: {.node = -1}
 
 enum {
