@@ -313,6 +313,22 @@ static Quat small_rotation(Vec3 w)
     return (Quat){cosine, sine * w.x, sine * w.y, sine * w.z};
 }
 
+// A wire that nothing holds: its mass centre goes where the linear solution, which keeps momentum, takes it.
+static void keep_mass_centre(Stepper *s, double part)
+{
+    Vec3 away = vec3(0, 0, 0);
+    double mass = 0;
+    for (int i = 0; i < s->state.node_count; i++) {
+        const double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
+        Vec3 linear = vec3(k[0] + part * (u[0] - k[0]), k[1] + part * (u[1] - k[1]), k[2] + part * (u[2] - k[2]));
+        Vec3 real = vec3_sub(s->state.position[i], s->start_position[i]);
+        away = vec3_add_scaled(away, s->wire.mass[i], vec3_sub(linear, real));
+        mass += s->wire.mass[i];
+    }
+    for (int i = 0; i < s->state.node_count; i++)
+        s->state.position[i] = vec3_add_scaled(s->state.position[i], 1 / mass, away);
+}
+
 // Moves the free nodes' positions by `part` of the change, each element turning and stretching instead of its end being displaced: to first
 // order the same, but a large turn does not stretch the wire. From the proximal end on, so not where the rig holds a node further along.
 static void swing(Stepper *s, double part)
@@ -335,6 +351,8 @@ static void swing(Stepper *s, double part)
         shift = own;
         s->state.position[i] = moved;
     }
+    if (s->first_free == 0 && (s->fixed[0] & DOF_POSITION) == 0)
+        keep_mass_centre(s, part);
 }
 
 static void displace(Stepper *s, double part)
