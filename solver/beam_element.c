@@ -130,6 +130,8 @@ INLINE void element(const BeamInput *in, bool is_curved, BeamOutput *out)
     out->bow2 = bow2;
     out->angle1 = c1.angle;
     out->angle2 = c2.angle;
+    out->turn1 = b1.angle;
+    out->turn2 = b2.angle;
     out->energy = energy;
 }
 

@@ -60,6 +60,7 @@ typedef struct BeamOutput {
     double inverse, tension, bow;    // bow [mm]: arc length less chord, by the cubic shape
     Vec3 bow1, bow2;
     Vec3 angle1, angle2;             // [rad] bending angles against the rest chord
+    Vec3 turn1, turn2;               // [rad] from the chord to the nodes' tangents
     Vec3 force2, moment1, moment2;   // gradients
     Vec3 chord1, chord2;             // [N mm] the part of moment1 and moment2 that comes through the rest chord (bending, torsion)
     double energy;

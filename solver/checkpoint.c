@@ -6,7 +6,7 @@
 #include <string.h>
 
 struct Checkpoint {
-    int node_count;
+    int node_count, first_free;
     size_t memory_count;
     double time, inserted, twist;
     StepReport report;
@@ -43,6 +43,7 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
             return NULL;
         }
     }
+    c->first_free = s->first_free;
     c->time = s->state.time;
     c->inserted = s->state.inserted;
     c->twist = s->state.twist;
@@ -56,6 +57,7 @@ void stepper_restore(Stepper *s, const Checkpoint *c)
 {
     if (c->node_count != s->state.node_count)
         return;
+    s->first_free = c->first_free;
     s->state.time = c->time;
     s->state.inserted = c->inserted;
     s->state.twist = c->twist;
@@ -84,6 +86,7 @@ uint64_t stepper_hash(const Stepper *s)
     hash_double(&hash, s->state.time);
     hash_double(&hash, s->state.inserted);
     hash_double(&hash, s->state.twist);
+    hash_double(&hash, s->first_free);
     for (size_t i = 0; i < s->memory_count; i++)
         hash_double(&hash, s->memory[i]);
     // field by field: padding holds anything

@@ -5,18 +5,22 @@
 // with rest curvature k0 stores while it is held straight inside. As l goes to 0 the beam becomes a clamp, at l = L it is the ordinary
 // element: nothing jumps when a node passes. Because l depends on a, dE/da has the configurational part dE/dl, in the
 // frictionless case -M^2/(2 EI) of a straight wire: the push that a bend downstream gives back through a sleeve (Bigoni 2015).
+//
+// l changes by a step's advance, which near the mouth is more than l itself. The energy of constant curvature, EI/(2l) |phi - k0 l|^2 with
+// phi = turn2 - turn1, is convex in (phi, l) together; its second derivative EI/l |d phi - k dl|^2, k = phi/l, goes into the tangent
+// whole. It is taken at the length of the step's end and at the curvature of its start, because curvature is what stays.
 #include "solver/sheath.h"
 
-double sheath_outside(const BeamRest *rest, int index, double coordinate)
+// Rest length outside, kept above a hundredth of the element.
+static double outside_of(double length, double coordinate)
 {
-    double length = rest->length[index];
     return fmax(length + coordinate, 0.01 * length);
 }
 
 void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction, double coordinate, Quat q1, Vec3 x2, Quat q2,
-                    double outside, SheathElement *element)
+                    double ahead, SheathElement *element)
 {
-    double length = rest->length[index], k0 = rest->curvature[index], bending = rest->bending[index], slope;
+    double length = rest->length[index], outside = outside_of(length, coordinate + ahead), now = outside_of(length, coordinate), k0 = rest->curvature[index], bending = rest->bending[index], slope;
     double quarter = 0.25 * k0 * outside, near_slope, far_slope;
     // the bending plane in the node's frame: e3 turned about e1; half_y and half_z hold it times a sine
     double axis = sqrt(rest->half_y[index] * rest->half_y[index] + rest->half_z[index] * rest->half_z[index]);
@@ -34,6 +38,10 @@ void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction,
     // a longer arc turns the rest chord in both nodes' frames
     Vec3 plane = vec3(0, by, bz);
     by_length += 0.5 * k0 * (vec3_dot(quat_rotate(q1, plane), out.chord1) - vec3_dot(quat_rotate(q2, plane), out.chord2));
+    // what the linearisation in phi at the new length misses where the curvature stays
+    Vec3 phi = vec3_sub(out.turn1, out.turn2);
+    double change = 1 / outside - 1 / now;
+    by_length += 0.5 * bending * vec3_norm2(phi) * change * change;
 
     *element = (SheathElement){
         .outside = outside,
@@ -49,10 +57,14 @@ void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction,
         .tension = out.tension,
         .near = in.near,
         .far = in.far,
+        .curvature = vec3_scale(phi, 1 / now),
+        .turn1 = out.turn1,
+        .turn2 = out.turn2,
     };
 }
 
-void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const SheathElement *element, double scale, BeamTangent *tangent)
+void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const SheathElement *element, double scale, BeamTangent *tangent,
+                    double *length_column)
 {
     BeamTangent full;
     double ka = rest->axial[index] * scale, d[3] = {direction.x, direction.y, direction.z};
@@ -78,4 +90,18 @@ void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const Sheat
     double column[6] = {along.x, along.y, along.z, element->bow2.x, element->bow2.y, element->bow2.z};
     for (int i = 0; i < 6; i++)
         tangent->k21[i * 6] = -ka * column[i];
+
+    // through l: EI/l |d theta1 - d theta2 - k dl|^2, where the displacement of the outer node cancels
+    double k = rest->bending[index] / element->outside;
+    Vec3 w = vec3_scale(element->curvature, -k), across = vec3_add_scaled(w, -vec3_dot(w, element->chord), element->chord);
+    for (int i = 0; i < 12; i++)
+        length_column[i] = 0;
+    length_column[0] = k * vec3_norm2(element->curvature);
+    length_column[3] = vec3_dot(direction, across);
+    length_column[9] = -across.x, length_column[10] = -across.y, length_column[11] = -across.z;
+    tangent->k11[0] += scale * length_column[0];
+    tangent->k11[3] += scale * length_column[3];
+    tangent->k11[18] += scale * length_column[3];
+    for (int i = 3; i < 6; i++)
+        tangent->k21[i * 6] += scale * length_column[6 + i];
 }

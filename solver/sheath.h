@@ -6,24 +6,27 @@
 #include "solver/beam_element.h"
 
 typedef struct SheathElement {       // the element across the mouth
-    double outside;          // [mm] l, rest length of the part outside, 0 < l
+    double outside;          // [mm] l, rest length of the part outside, > 0
     double axial_gradient;   // [N] derivative of the energy with the axial coordinate of the node inside
     double twist_gradient;   // [N mm] … with its rotation about the line
     Vec3 force2, moment2;    // gradients for the node outside
     double energy;           // [mJ]
     Vec3 chord, bow1, bow2;  // for the tangent
     double inverse, tension, near, far;
+    Vec3 curvature;          // [1/mm] of the part outside, as a vector along its axis of turning, negative
+    Vec3 turn1, turn2;       // [rad] from the chord to the tangents at the mouth and at the outer node
 } SheathElement;
 
 // `index`: the element. `coordinate` [mm] of its inner node along the line, 0 at the mouth, negative inside (a little past the mouth
-// is allowed); q1 of that node (aligned with the line); x2, q2 of the outer one. Outside length = outside (see sheath_outside).
+// is allowed); q1 of that node (aligned with the line); x2, q2 of the outer one. `ahead` [mm]: by how much the inner node will have moved
+// at the step's end; lengths, hence stiffness, are taken there, because near the mouth they change fast.
 void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction, double coordinate, Quat q1, Vec3 x2, Quat q2,
-                    double outside, SheathElement *element);
-// Rest length outside for a coordinate of the inner node, kept above a hundredth of the element.
-double sheath_outside(const BeamRest *rest, int index, double coordinate);
+                    double ahead, SheathElement *element);
 
 // Tangent with the inner node's unknowns (axial displacement, rotation about the line) in places 0 and 3 of its block, the rest
-// of it zero: k11 and k22 to be added, k21 to be written.
-void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const SheathElement *element, double scale, BeamTangent *tangent);
+// of it zero: k11 and k22 to be added, k21 to be written. `length_column` (12: inner block, outer block): the part of the axial
+// unknown's column that comes through l (without scale); displacements of the inner node count from `ahead` there.
+void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const SheathElement *element, double scale, BeamTangent *tangent,
+                    double *length_column);
 
 #endif

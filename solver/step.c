@@ -146,6 +146,18 @@ static bool check_options(const StepperOptions *o, char *why, int capacity)
     return true;
 }
 
+// Nodes up to the mouth are held. One that has passed it is let go a fiftieth of an element later, so that the piece outside has a
+// direction; one that would come back in this step is held from now on.
+static int count_held(const Stepper *s, double advance)
+{
+    if (!s->has_sheath)
+        return 0;
+    int k = 1;
+    while (k < s->state.node_count && stepper_sheath_coordinate(s, k) + fmin(advance, 0) <= 0.02 * s->wire.length[k - 1])
+        k++;
+    return k;
+}
+
 Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
 {
     StepperOptions o = *options;
@@ -189,6 +201,7 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
     s->newton_max = o.newton_max > 0 ? o.newton_max : NEWTON_MAX;
     s->newton_motion = NEWTON_MOTION;
     place_wire(s, &o.wire);
+    s->first_free = count_held(s, 0);
     return s;
 }
 
@@ -219,16 +232,38 @@ void stepper_destroy(Stepper *s)
 
 // --- stages ---
 
-// Nodes up to the mouth are held. One that has passed it is let go a fiftieth of an element later, so that the piece outside has a
-// direction; one that would come back in this step is held from now on.
-static int count_held(const Stepper *s, double advance)
+// The frame turned the short way until e1 is the line's direction.
+static Quat on_line(const Stepper *s, Quat q)
 {
-    if (!s->has_sheath)
-        return 0;
-    int k = 1;
-    while (k < s->state.node_count && stepper_sheath_coordinate(s, k) + fmin(advance, 0) <= 0.02 * s->wire.length[k - 1])
-        k++;
-    return k;
+    Vec3 e = quat_rotate(q, vec3(1, 0, 0)), axis = vec3_cross(e, s->axis[0]);
+    return quat_unit(quat_mul((Quat){1 + vec3_dot(e, s->axis[0]), axis.x, axis.y, axis.z}, q));
+}
+
+// A node that comes back is put on the line, one that is let go on the curve of the element it was inside of: a fiftieth of an element
+// from the mouth both are within a micrometre of where they were, but their tangents carry the moment.
+static void hold(Stepper *s, int node)
+{
+    WireState *w = &s->state;
+    double along = stepper_sheath_coordinate(s, node);
+    w->position[node] = vec3_add_scaled(s->mouth, along, s->axis[0]);
+    w->orientation[node] = on_line(s, w->orientation[node]);
+    w->velocity[node] = vec3_scale(s->axis[0], vec3_dot(w->velocity[node], s->axis[0]));
+    w->spin[node] = vec3_scale(s->axis[0], vec3_dot(w->spin[node], s->axis[0]));
+}
+
+static void let_go(Stepper *s, int node)
+{
+    if (node + 1 >= s->state.node_count)
+        return;
+    WireState *w = &s->state;
+    SheathElement e;
+    double along = stepper_sheath_coordinate(s, node), length = s->wire.length[node] + along, x = along / length;
+    sheath_element(&s->rest, node, s->mouth, s->axis[0], along, w->orientation[node], w->position[node + 1], w->orientation[node + 1], 0, &e);
+    // the cubic's tangent against the one at the mouth, and its integral
+    Vec3 turn = vec3_add_scaled(vec3_scale(e.turn1, x * (3 * x - 4)), x * (3 * x - 2), e.turn2);
+    Vec3 sum = vec3_scale(vec3_add_scaled(vec3_scale(e.turn1, x * x * (x - 2)), x * x * (x - 1), e.turn2), length);
+    w->position[node] = vec3_add(w->position[node], vec3_cross(sum, s->axis[0]));
+    w->orientation[node] = quat_unit(quat_mul(quat_from_rotation_vector(turn), w->orientation[node]));
 }
 
 void step_feed(Stepper *s, StepCommand command)
@@ -247,7 +282,12 @@ void step_feed(Stepper *s, StepCommand command)
         command.advance = -s->state.inserted;
     }
     s->command = command;
-    s->first_free = count_held(s, command.advance);
+    int held = count_held(s, command.advance);
+    for (int i = s->first_free; i < held; i++)
+        hold(s, i);
+    for (int i = s->first_free - 1; i >= held; i--)
+        let_go(s, i);
+    s->first_free = held;
     size_t nodes = (size_t)s->state.node_count;
     memcpy(s->start_position, s->state.position, nodes * sizeof *s->start_position);
     memcpy(s->start_orientation, s->state.orientation, nodes * sizeof *s->start_orientation);
@@ -386,9 +426,7 @@ static void move(Stepper *s, double turn)
         // on the line exactly, whatever rounding does
         double along = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]) + u[0];
         w->position[i] = vec3_add_scaled(s->mouth, along, s->axis[0]);
-        Quat q = quat_mul(small_rotation(vec3_scale(s->axis[0], u[3] - k[3])), w->orientation[i]);
-        Vec3 e = quat_rotate(q, vec3(1, 0, 0)), axis = vec3_cross(e, s->axis[0]);
-        w->orientation[i] = quat_unit(quat_mul((Quat){1 + vec3_dot(e, s->axis[0]), axis.x, axis.y, axis.z}, q));
+        w->orientation[i] = on_line(s, quat_mul(small_rotation(vec3_scale(s->axis[0], u[3] - k[3])), w->orientation[i]));
         memcpy(k, u, 6 * sizeof *k);
     }
 }
@@ -521,7 +559,7 @@ double stepper_elastic_energy(const Stepper *s)
             SheathElement e;
             double coordinate = stepper_sheath_coordinate(s, i);
             sheath_element(r, i, s->mouth, s->axis[0], coordinate, w->orientation[i], w->position[i + 1], w->orientation[i + 1],
-                           sheath_outside(r, i, coordinate), &e);
+                           0, &e);
             energy += e.energy;
         } else {
             BeamInput in = {.x1 = w->position[i], .x2 = w->position[i + 1], .q1 = w->orientation[i], .q2 = w->orientation[i + 1],

@@ -57,7 +57,7 @@ static void free_nodes(Stepper *s)
     }
 }
 
-// Axial and torsional chain behind the mouth. Lateral rows carry what brings a node that has just come in onto the line.
+// Axial and torsional chain behind the mouth; lateral rows are unit rows.
 static void sheath_nodes(Stepper *s, double scale)
 {
     const Wire *w = &s->wire;
@@ -69,10 +69,6 @@ static void sheath_nodes(Stepper *s, double scale)
         d[7] = d[14] = d[28] = d[35] = 1;
         b[0] += w->mass[i] * (vec3_dot(s->state.velocity[i], s->axis[0]) / h + vec3_dot(s->gravity, s->axis[0]));
         b[3] += w->inertia_axial[i] * vec3_dot(s->state.spin[i], s->axis[0]) / h;
-        Vec3 off = vec3_sub(s->start_position[i], s->mouth);
-        Vec3 tilt = vec3_cross(quat_rotate(s->start_orientation[i], vec3(1, 0, 0)), s->axis[0]);
-        b[1] = -vec3_dot(off, s->axis[1]), b[2] = -vec3_dot(off, s->axis[2]);
-        b[4] = vec3_dot(tilt, s->axis[1]), b[5] = vec3_dot(tilt, s->axis[2]);
         if (i + 1 == s->first_free)
             break;
         double ka = s->rest.axial[i], kt = s->rest.twist[i];
@@ -91,20 +87,19 @@ static void sheath_nodes(Stepper *s, double scale)
 static void mouth_element(Stepper *s, double scale)
 {
     int i = s->first_free - 1;
-    double coordinate = stepper_sheath_coordinate(s, i);
-    // stiffness of the length that will be outside at the step's end: near the mouth it changes fast
-    double outside = sheath_outside(&s->rest, i, s->is_iterate ? coordinate : coordinate + s->command.advance);
+    double ahead = s->is_iterate ? 0 : s->command.advance, column[12];
     SheathElement *e = &s->mouth_element;
-    sheath_element(&s->rest, i, s->mouth, s->axis[0], coordinate, s->state.orientation[i], s->state.position[i + 1],
-                   s->state.orientation[i + 1], outside, e);
-    double *b = s->b + 6 * (size_t)i;
+    sheath_element(&s->rest, i, s->mouth, s->axis[0], stepper_sheath_coordinate(s, i), s->state.orientation[i], s->state.position[i + 1],
+                   s->state.orientation[i + 1], ahead, e);
+    BeamTangent t;
+    sheath_tangent(&s->rest, i, s->axis[0], e, scale, &t, column);
+    double *b = s->b + 6 * (size_t)i, *d = s->chain.diag + 36 * (size_t)i;
     b[0] -= e->axial_gradient;
     b[3] -= e->twist_gradient;
     add_vec(b + 6, vec3_negate(e->force2));
     add_vec(b + 9, vec3_negate(e->moment2));
-    BeamTangent t;
-    sheath_tangent(&s->rest, i, s->axis[0], e, scale, &t);
-    double *d = s->chain.diag + 36 * (size_t)i;
+    for (int k = 0; k < 12; k++)
+        b[k] += column[k] * ahead;
     for (int k = 0; k < 36; k++) {
         d[k] += t.k11[k];
         d[36 + k] += t.k22[k];

@@ -41,6 +41,7 @@ struct Stepper {
     Vec3 *force;             // (M) [N] of the wall on the node: warm start
     double *clearance;       // (M) [mm] how far the node may travel before it could touch: not queried until then
     VesselMemory *place;     // (M)
+    int first_free;          // nodes before it are held by the sheath
 
     // scratch of a step
     BlockChain chain;
@@ -63,7 +64,6 @@ struct Stepper {
     double *scratch;         // owns the arrays of doubles
 
     // of this step
-    int first_free;          // nodes before it are held by the sheath
     StepCommand command;
     StepReport report;
     double fastest;          // [mm/ms] of the free nodes at x_n

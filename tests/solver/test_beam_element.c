@@ -339,7 +339,7 @@ static void chain_equals_elements(void **state)
 static SheathElement across(const BeamRest *rest, double coordinate, Quat q1, Vec3 x2, Quat q2)
 {
     SheathElement e;
-    sheath_element(rest, 0, vec3(0, 0, 0), vec3(1, 0, 0), coordinate, q1, x2, q2, sheath_outside(rest, 0, coordinate), &e);
+    sheath_element(rest, 0, vec3(0, 0, 0), vec3(1, 0, 0), coordinate, q1, x2, q2, 0, &e);
     return e;
 }
 
