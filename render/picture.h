@@ -22,7 +22,7 @@ typedef struct PictureOptions {
     double focus_radius;       // … of this radius [mm]; 0 (default): vessel, targets and (where there is no vessel) tool, all of it
     bool inset;                // close-up of the tip in a corner; default true
     double inset_radius;       // [mm] of the sphere the close-up shows; 0 (default): chosen from the lumen (4 to 12 mm)
-    double force_full_scale;   // [N] top of the colour map of wall force; 0 (default): the largest force shown, rounded up to 1, 2 or 5
+    double force_full_scale;   // [N] top of the colour map of wall force; 0 (default): the largest force shown, rounded up
     double distance_full_scale;// [mm] ends of the diverging map of `picture_of_fit`; 0 (default): the 98th percentile of |distance|, rounded up
     int worst_count;           // `picture_of_fit`: close-ups of the local models with the largest error; 0 to 12, default 9
     bool arrows;               // wall forces as arrows; default true
@@ -91,7 +91,7 @@ bool picture_of_projections(const char *path, const PictureOptions *options, int
                             float high, int polyline_count, const PicturePolyline *polyline, int mark_count, const PictureMark *mark, char *message,
                             size_t capacity);
 // The same from a voxel grid (layout of recon's Volume: value (size[2], size[1], size[0]), voxel (i,j,k) at origin + i axis[0] + …) and a tree:
-// three maximum-intensity projections, each branch in its own colour. `tree` may be NULL.
+// three maximum-intensity projections, each branch in its own colour. `tree` may be NULL. Without marks the tree's root is marked.
 bool picture_of_tree(const char *path, const PictureOptions *options, const int size[3], Vec3 origin, const Vec3 axis[3], const float *value, float low,
                      float high, const VesselTree *tree, int mark_count, const PictureMark *mark, char *message, size_t capacity);
 

@@ -206,8 +206,7 @@ static void draw_slice(FitDrawing *drawing, int node, double x, double y, double
     }
     slice.across = aside;
     slice.normal = vec3_cross(slice.along, aside);
-    sheet_text(sheet, x, y, TEXT_SMALL, SHEET_INK, "%d: r %.2f, error %.2f mm, %d blobs", node, r, tree->error ? tree->error[node] : NAN,
-               model_of(tree, node).count);
+    sheet_text(sheet, x, y, TEXT_SMALL, SHEET_INK, "%d: r %.2f, error %.2f mm", node, r, tree->error ? tree->error[node] : NAN);
     overlay_fill(sheet->overlay, slice.x, slice.y, slice.side, slice.side, SHEET_PANEL);
     overlay_push_clip(sheet->overlay, slice.x, slice.y, slice.side, slice.side);
     double px, py, off, scale = slice.side / (2 * slice.half);
@@ -232,6 +231,9 @@ static void draw_slice(FitDrawing *drawing, int node, double x, double y, double
     }
     overlay_pop_clip(sheet->overlay);
     overlay_rectangle(sheet->overlay, slice.x, slice.y, slice.side, slice.side, SHEET_FAINT, s);
+    char blobs[32];
+    snprintf(blobs, sizeof blobs, "%d blobs", model_of(tree, node).count);
+    sheet_label(sheet, slice.x + slice.side - 6 * s, slice.y + slice.side - 22 * s, 1, TEXT_SMALL, SHEET_MUTED, blobs);
     sheet_scale_bar(sheet, slice.x + 8 * s, slice.y + slice.side - 6 * s, 0.3 * slice.side, 1 / scale, SHEET_INK);
 }
 
@@ -263,8 +265,7 @@ static bool draw_fit(FitDrawing *drawing)
     double s = sheet->scale, gap = 20 * s, top = 62 * s, column = (worst > 0 ? 0.42 : 0.28) * sheet->width, left = sheet->width - gap - column;
     if (!draw_surface(drawing, gap, top, (int)(left - 2 * gap), (int)(sheet->height - top - gap)))
         return false;
-    if (drawing->options->title)
-        sheet_text(sheet, gap, 18 * s, TEXT_LARGE, SHEET_INK, "%s", drawing->options->title);
+    sheet_title(sheet, gap, 18 * s, sheet->width - 2 * gap, drawing->options->title);
 
     double tall = 120 * s, y = top;
     draw_histogram(drawing, left, y, column, tall);
@@ -310,7 +311,7 @@ bool picture_of_fit(const char *path, const PictureOptions *options, const Vesse
     bool drawn = find_distances(&drawing, distance) || message_fail(message, capacity, "not enough memory for a picture");
     if (drawn) {
         double wide = percentile(&drawing, 0.98);
-        drawing.full_scale = options->distance_full_scale > 0 ? options->distance_full_scale : wide > 0 ? sheet_round_up(wide) : 0.1;
+        drawing.full_scale = options->distance_full_scale > 0 ? options->distance_full_scale : wide > 0 ? sheet_scale_end(wide) : 0.1;
     }
     drawn = drawn && surface_view_set_mesh(sheet.view, mesh, message, capacity) && draw_fit(&drawing) && sheet_save(&sheet, path);
     free(drawing.distance);

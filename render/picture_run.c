@@ -331,12 +331,15 @@ static bool draw_run(RunDrawing *drawing, const PictureTool *tool)
 
     char text[256];
     readings_text(text, sizeof text, tool);
-    double title = options->title ? sheet_text_anchored(sheet, gap, 18 * s, 0, TEXT_LARGE, SHEET_INK, options->title) + 28 * s : 0;
-    double room = sheet->width - 2 * gap - title, wide;
+    double wide;
     overlay_text_size(sheet->overlay, TEXT_NORMAL, text, &wide, NULL);
-    overlay_text(sheet->overlay, wide < room ? gap + title : sheet->width - gap - wide, 23 * s, TEXT_NORMAL, SHEET_INK, text);
-    if (tool->label && wide < room)
-        sheet_text(sheet, gap + title + wide + 24 * s, 23 * s, TEXT_NORMAL, SHEET_MUTED, "%s", tool->label);
+    double title = sheet_title(sheet, gap, 18 * s, sheet->width - 2 * gap - wide - 28 * s, options->title);
+    double start = gap + (title > 0 ? title + 28 * s : 0);
+    overlay_text(sheet->overlay, start, 23 * s, TEXT_NORMAL, SHEET_INK, text);
+    overlay_push_clip(sheet->overlay, start + wide, 0, sheet->width - gap - start - wide, top);
+    if (tool->label)
+        sheet_text(sheet, start + wide + 24 * s, 23 * s, TEXT_NORMAL, SHEET_MUTED, "%s", tool->label);
+    overlay_pop_clip(sheet->overlay);
     return true;
 }
 
@@ -382,7 +385,11 @@ static bool draw_moment(RunDrawing *drawing, const Camera *whole, const PictureT
         return true;
     Vec3 tip = tool->position[tool->node_count - 1];
     int side = (int)(0.38 * fmin(whole->width, whole->height));
-    Camera close = close_up_camera(whole, tip, inset_radius_of(drawing, tip), side);
+    // at least twice as large as beside it
+    double radius = inset_radius_of(drawing, tip), largest = side * whole->mm_per_pixel / 4.5;
+    if (!(drawing->options->inset_radius > 0))
+        radius = fmin(radius, largest);
+    Camera close = close_up_camera(whole, tip, radius, side);
     int corner = emptiest_corner(drawing, whole, tool, side);
     double left = x + (corner & 1 ? whole->width - side : 0), above = top + (corner & 2 ? whole->height - side : 0);
     outline_close_up(drawing, whole, &close, x, top);
@@ -434,8 +441,7 @@ static bool draw_moments(RunDrawing *drawing, const MomentLayout *layout, int to
 {
     Sheet *sheet = drawing->sheet;
     double s = sheet->scale, gap = layout->gap;
-    if (drawing->options->title)
-        sheet_text(sheet, gap, 14 * s, TEXT_LARGE, SHEET_INK, "%s", drawing->options->title);
+    sheet_title(sheet, gap, 14 * s, sheet->width - 2 * gap, drawing->options->title);
     for (int k = 0; k < tool_count; k++) {
         double x = gap + (k % layout->columns) * (layout->camera.width + gap);
         double y = layout->top + (k / layout->columns) * (layout->camera.height + layout->header);
@@ -460,7 +466,7 @@ static bool draw(const char *path, const PictureOptions *options, const PictureS
         return false;
     RunDrawing drawing = {.options = options, .scene = scene, .style = shell_style_glass()};
     double largest = largest_force(tool_count, tool);
-    drawing.force_scale = options->force_full_scale > 0 ? options->force_full_scale : largest > 0 ? sheet_round_up(largest) : 0.1;
+    drawing.force_scale = options->force_full_scale > 0 ? options->force_full_scale : largest > 0 ? sheet_scale_end(largest) : 0.1;
     int longest = 0;
     for (int k = 0; k < tool_count; k++)
         longest = tool[k].node_count > longest ? tool[k].node_count : longest;

@@ -199,8 +199,8 @@ bool picture_of_series(const char *path, const PictureOptions *options, int coun
         if (event[i].label)
             sheet_label(&sheet, x, top - 12 * s, 0.5, TEXT_SMALL, SHEET_MUTED, event[i].label);
     }
-    if (drawn && options->title)
-        sheet_text(&sheet, 20 * s, 12 * s, TEXT_LARGE, SHEET_INK, "%s", options->title);
+    if (drawn)
+        sheet_title(&sheet, 20 * s, 12 * s, sheet.width - 40 * s, options->title);
     drawn = drawn && sheet_save(&sheet, path);
     free(point);
     sheet_close(&sheet);

@@ -249,12 +249,11 @@ bool picture_of_projections(const char *path, const PictureOptions *options, int
     double s = sheet_scale_of(options), needed = lay_out(options, projection_count, projection, 46 * s, panel);
     if (!sheet_open(&sheet, options, (int)ceil(needed), message, capacity))
         return false;
-    if (options->title)
-        sheet_text(&sheet, 20 * s, 12 * s, TEXT_LARGE, SHEET_INK, "%s", options->title);
     char text[160];
     snprintf(text, sizeof text, "maximum intensity %.4g to %.4g; %d branch%s, %.0f mm", (double)low, (double)high, polyline_count,
              polyline_count == 1 ? "" : "es", length_of(polyline_count, polyline));
-    sheet_text_anchored(&sheet, sheet.width - 20 * s, 17 * s, 1, TEXT_NORMAL, SHEET_MUTED, text);
+    double wide = sheet_text_anchored(&sheet, sheet.width - 20 * s, 17 * s, 1, TEXT_NORMAL, SHEET_MUTED, text);
+    sheet_title(&sheet, 20 * s, 12 * s, sheet.width - wide - 60 * s, options->title);
     bool drawn = true;
     for (int k = 0; k < projection_count && drawn; k++)
         drawn = draw_projection(&sheet, &panel[k], low, high, polyline_count, polyline, mark_count, mark);
@@ -360,6 +359,12 @@ bool picture_of_tree(const char *path, const PictureOptions *options, const int 
             }
             image[2][(size_t)z * (size_t)size[1] + (size_t)y] = most;
         }
+    PictureMark root = {{0, 0, 0}, "start"};
+    if (drawn && mark_count == 0 && tree && tree->node_count > 0) {
+        root.point = tree->center[0];
+        mark = &root;
+        mark_count = 1;
+    }
     drawn = drawn && picture_of_projections(path, options, 3, projection, low, high, branches.count, branches.line, mark_count, mark, message, capacity);
     for (int k = 0; k < 3; k++)
         free(image[k]);

@@ -129,6 +129,24 @@ double sheet_text_anchored(Sheet *sheet, double x, double y, double anchor, Text
     return width;
 }
 
+double sheet_title(Sheet *sheet, double x, double y, double room, const char *text)
+{
+    if (!text)
+        return 0;
+    char shown[512];
+    double width;
+    snprintf(shown, sizeof shown, "%s", text);
+    overlay_text_size(sheet->overlay, TEXT_LARGE, shown, &width, NULL);
+    for (size_t cut = 1; width > room && cut < strlen(text); cut++) {
+        if (((unsigned char)text[cut] & 0xc0) == 0x80)   // inside a UTF-8 letter
+            continue;
+        snprintf(shown, sizeof shown, "...%s", text + cut);
+        overlay_text_size(sheet->overlay, TEXT_LARGE, shown, &width, NULL);
+    }
+    overlay_text(sheet->overlay, x, y, TEXT_LARGE, SHEET_INK, shown);
+    return width;
+}
+
 void sheet_label(Sheet *sheet, double x, double y, double anchor, TextSize size, Color color, const char *text)
 {
     const Color halo = color_with_alpha(SHEET_PANEL, 0.55);
@@ -181,6 +199,18 @@ double sheet_round_up(double x)
     double power = pow(10, floor(log10(x)));
     const double step[4] = {1, 2, 5, 10};
     for (int i = 0; i < 4; i++)
+        if (x <= step[i] * power * (1 + 1e-9))
+            return step[i] * power;
+    return 10 * power;
+}
+
+double sheet_scale_end(double x)
+{
+    if (!(x > 0) || !isfinite(x))
+        return x;
+    double power = pow(10, floor(log10(x)));
+    const double step[10] = {1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8};
+    for (int i = 0; i < 10; i++)
         if (x <= step[i] * power * (1 + 1e-9))
             return step[i] * power;
     return 10 * power;

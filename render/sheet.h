@@ -46,6 +46,8 @@ unsigned sheet_grey_texture(Sheet *sheet, int width, int height, const uint8_t *
 void sheet_text(Sheet *sheet, double x, double y, TextSize size, Color color, const char *format, ...) __attribute__((format(printf, 6, 7)));
 // `anchor` 0: x is the text's left end, 0.5 its middle, 1 its right end. Returns the width.
 double sheet_text_anchored(Sheet *sheet, double x, double y, double anchor, TextSize size, Color color, const char *text);
+// Large; where it is too long its beginning is left out (the end of a path says more). Returns the width; 0 for NULL.
+double sheet_title(Sheet *sheet, double x, double y, double room, const char *text);
 // Text on a light halo, for labels over a drawing.
 void sheet_label(Sheet *sheet, double x, double y, double anchor, TextSize size, Color color, const char *text);
 // A bar of round length at most `longest` pixels with its length in mm, its left end at x, its lower edge at y.
@@ -57,6 +59,8 @@ void sheet_color_bar(Sheet *sheet, double x, double y, double width, double heig
 // The round number (1, 2 or 5 times a power of ten) at or above x, at or below x; x itself where it is not a positive number.
 double sheet_round_up(double x);
 double sheet_round_down(double x);
+// A finer one at or above x for the end of a scale: 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8.
+double sheet_scale_end(double x);
 // Where ticks go: a step so that at most `most` fall into [low, high].
 double sheet_tick_step(double low, double high, int most);
 void sheet_format_tick(char *text, size_t capacity, double value, double step);
