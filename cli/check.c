@@ -17,7 +17,7 @@ static const char help[] =
     "Usage: seldinger check PATH... [options]\n\n"
     "Runs every scene (X.yaml) below PATH that has a golden tool path (X.golden.csv) and compares point by point over time. The table names\n"
     "each scene, its worst distance, and the first time, node and distance beyond the tolerance.\n\n"
-    "  --tolerance-mm X   largest distance [mm] between golden and run that passes; default 0.001: other machines pass, one per cent\n"
+    "  --tolerance-mm X   largest distance [mm] between golden and run that passes; default 0.0001: other machines pass, one per cent\n"
     "                     of a parameter does not\n"
     "  --update           rewrites the goldens; a scene named itself gets one that had none\n"
     "  --duration-s S     with --update: simulated time [s] of the golden; default: the script's, else the old golden's, else 1\n"

@@ -307,6 +307,7 @@ static void *write_rings(void *argument)
 {
     Recording *recording = argument;
     int64_t flushed = 0;
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);   // each thread has its own
     for (bool last = false; !last;) {
         last = atomic_load(&recording->finish);
         // frames first: the rows that they name were pushed before them

@@ -10,7 +10,7 @@
 #include <string.h>
 #include <yaml.h>
 
-enum { VISIT_BUDGET = 4000000, MOST_KEYS = 64 };
+enum { VISIT_BUDGET = 4000000, MOST_KEYS = 64, DEEPEST = 100 };
 
 struct YamlReader {
     yaml_document_t document;
@@ -144,9 +144,44 @@ static void fault_syntax(const yaml_parser_t *parser, const char *text, size_t l
                    parser->context ? " " : "", parser->context ? parser->context : "");
 }
 
+// libyaml's time grows with the square of the depth of nested [ and {: a first pass over the events stops where it is too deep. False with a
+// fault then, or where the text is no YAML.
+static bool check_depth(const char *text, size_t length, const char *file, Faults *faults)
+{
+    yaml_parser_t parser;
+    if (!yaml_parser_initialize(&parser)) {
+        faults_add(faults, file, 0, 0, "no memory to read it");
+        return false;
+    }
+    yaml_parser_set_input_string(&parser, (const unsigned char *)text, length);
+    int depth = 0;
+    bool good = true;
+    for (bool ended = false; good && !ended;) {
+        yaml_event_t event;
+        if (!yaml_parser_parse(&parser, &event)) {
+            fault_syntax(&parser, text, length, file, faults);
+            good = false;
+            break;
+        }
+        depth += event.type == YAML_SEQUENCE_START_EVENT || event.type == YAML_MAPPING_START_EVENT;
+        depth -= event.type == YAML_SEQUENCE_END_EVENT || event.type == YAML_MAPPING_END_EVENT;
+        if (depth > DEEPEST) {
+            faults_add(faults, file, (int)event.start_mark.line + 1, (int)event.start_mark.column + 1,
+                       "lists and maps are nested more than %d deep; a scene needs 6", DEEPEST);
+            good = false;
+        }
+        ended = event.type == YAML_STREAM_END_EVENT;
+        yaml_event_delete(&event);
+    }
+    yaml_parser_delete(&parser);
+    return good;
+}
+
 YamlReader *yaml_reader_open(const char *text, size_t length, const char *file, Faults *faults)
 {
     yaml_parser_t parser;
+    if (!check_depth(text, length, file, faults))
+        return NULL;
     YamlReader *reader = calloc(1, sizeof *reader);
     if (!reader || !(reader->file = strdup(file)) || !yaml_parser_initialize(&parser)) {
         faults_add(faults, file, 0, 0, "no memory to read it");

@@ -1,0 +1,386 @@
+// The program as a user runs it: exit codes and messages of bad input, files of a run, determinism, golden paths, signals, a full disk.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <cJSON.h>
+#include <math.h>
+#include <signal.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+static char folder[] = "/tmp/seldinger-run-XXXXXX";
+
+// A tube with a bend, a wire that is pushed through it: contact, friction, a script. 0.4 s.
+#define SCENE(modulus, radius, elements, vessel_more, script) SCENE_MU("0.1", modulus, radius, elements, vessel_more, script)
+#define SCENE_MU(friction, modulus, radius, elements, vessel_more, script)                                                                                      \
+    "seldinger: 1\n"                                                                                                                               \
+    "vessel:\n"                                                                                                                                    \
+    "  tube: {radius_mm: " radius ", normal: [0, 1, 0], path: [{line_mm: 5}, {arc: {radius_mm: 15, angle_deg: 90}}, {line_mm: 30}]}\n"             \
+    "  friction: " friction "\n" vessel_more "wire:\n"                                                                                             \
+    "  elements: " elements "\n"                                                                                                                   \
+    "  sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: " modulus "}]\n"                                                           \
+    "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n"                                                                       \
+    "script: " script "\n"                                                                                                                         \
+    "targets: [{name: start, point_mm: [2, 0, 0], radius_mm: 3}]\n"
+#define SCRIPT "[[0, 60, 30], [0.4, 0, 0]]"
+#define GOOD SCENE("80", "0.68", "40", "", SCRIPT)
+
+static void put(const char *name, const char *text)
+{
+    char path[300];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fputs(text, file);
+    assert_int_equal(fclose(file), 0);
+}
+
+static char output[1 << 16];
+
+// Runs `seldinger ARGUMENTS` in the folder; standard output and error go to `output`. Returns the exit code, -signal where it was ended by one.
+static int run(const char *arguments)
+{
+    char command[2000];
+    snprintf(command, sizeof command, "cd '%s' && %s %s 2>&1", folder, SELDINGER_PROGRAM, arguments);
+    FILE *pipe = popen(command, "r");
+    assert_non_null(pipe);
+    size_t length = fread(output, 1, sizeof output - 1, pipe);
+    output[length] = 0;
+    int status = pclose(pipe);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
+static bool exists(const char *name)
+{
+    char path[300];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    return access(path, F_OK) == 0;
+}
+
+static char *slurp(const char *name)
+{
+    char path[300];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *file = fopen(path, "r");
+    assert_non_null(file);
+    char *text = calloc(1, 1 << 20);
+    assert_non_null(text);
+    size_t length = fread(text, 1, (1 << 20) - 1, file);
+    text[length] = 0;
+    fclose(file);
+    return text;
+}
+
+static cJSON *summary(const char *name)
+{
+    char *text = slurp(name);
+    cJSON *json = cJSON_Parse(text);
+    assert_non_null(json);
+    free(text);
+    return json;
+}
+
+static double figure(const cJSON *json, const char *group, const char *name)
+{
+    const cJSON *value = cJSON_GetObjectItemCaseSensitive(group ? cJSON_GetObjectItemCaseSensitive(json, group) : json, name);
+    if (!cJSON_IsNumber(value))
+        fail_msg("the summary lacks the number %s %s", group ? group : "", name);
+    return value->valuedouble;
+}
+
+// --- bad input ---
+
+static void expect_bad(const char *scene, const char *arguments, const char *words)
+{
+    if (scene)
+        put("bad.yaml", scene);
+    char all[600];
+    snprintf(all, sizeof all, "%s --summary left.json --final left.csv --record left.h5", arguments);
+    int code = run(all);
+    if (code != 2 || !strstr(output, words))
+        fail_msg("`%s` ended with %d and said: %s(expected 2 and '%s')", arguments, code, output, words);
+    assert_false(exists("left.json") || exists("left.csv") || exists("left.h5"));
+}
+
+static void bad_input_ends_with_2_and_says_where(void **state)
+{
+    (void)state;
+    put("back.csv", "t_s,push_mm_s,twist_deg_s\n0,10,0\n2,10,0\n1,0,0\n");
+    put("short.csv", "t_s,push_mm_s\n0,10\n");
+    put("model.h5", "this is no model");
+    put("cut.h5", "\x89HDF\r\n\x1a\n");
+    expect_bad(SCENE("80", "0.68", "40", "  contakt: tube\n", SCRIPT), "run bad.yaml", "bad.yaml:5:3: unknown key 'contakt'; did you mean 'contact'?");
+    expect_bad("seldinger: 1\nwire: {sections: [{length_cm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\nrig: {}\n", "run bad.yaml --duration-s 1",
+               "bad.yaml:2:20: key 'length_cm' has the wrong unit; it is 'length_mm'");
+    expect_bad(SCENE("80", "0", "40", "", SCRIPT), "run bad.yaml", "radius_mm");
+    expect_bad(SCENE("80", "-1", "40", "", SCRIPT), "run bad.yaml", "radius_mm");
+    expect_bad(SCENE("80", "0.68", "0", "", SCRIPT), "run bad.yaml", "bad.yaml:6:13: 'wire.elements' is 0; a whole number from 1 to 10000");
+    expect_bad(SCENE("80", "0.68", "100000", "", SCRIPT), "run bad.yaml", "bad.yaml:6:13: 'wire.elements' is 100000");
+    expect_bad(SCENE("80", "0.68", "40", "", "back.csv"), "run bad.yaml", "back.csv:4:1: t_s 1 does not follow 2");
+    expect_bad(GOOD, "run bad.yaml --script back.csv", "back.csv:4:1: t_s 1 does not follow 2");
+    expect_bad(GOOD, "run bad.yaml --script short.csv", "short.csv:1:14");
+    expect_bad(GOOD, "run bad.yaml --script nowhere.csv", "nowhere.csv: cannot be opened");
+    expect_bad(GOOD, "run bad.yaml --contact mesh", "not built yet");
+    expect_bad(GOOD, "run bad.yaml --contact wall", "valid: lim, mesh, tube");
+    expect_bad(GOOD, "run bad.yaml --duration-s -1", "--duration-s: '-1' is not valid");
+    expect_bad(GOOD, "run bad.yaml --settle-s soon", "--settle-s: 'soon' is not valid");
+    expect_bad(GOOD, "run bad.yaml --banana", "see `seldinger run --help`");
+    expect_bad(GOOD, "run bad.yaml other.yaml", "one scene at a time");
+    expect_bad(NULL, "run", "lacks the scene");
+    expect_bad(NULL, "run nowhere.yaml", "nowhere.yaml: cannot be opened");
+    expect_bad(NULL, "run .", "is not a regular file");
+    expect_bad("", "run bad.yaml", "bad.yaml:1:1: is empty");
+    expect_bad("seldinger: 1\nwire: {sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\nrig: {}\n", "run bad.yaml", "has no script");
+    const char *models[] = {"model.h5", "cut.h5", "nowhere.h5"};
+    for (int i = 0; i < 3; i++) {
+        char scene[400];
+        snprintf(scene, sizeof scene,
+                 "seldinger: 1\nvessel: {model: %s}\nwire: {sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\nsheath: {inlet: root}\n",
+                 models[i]);
+        expect_bad(scene, "run bad.yaml --duration-s 1", models[i]);
+    }
+    expect_bad("seldinger: 1\nvessel: {shape: {name: banana}}\nwire: {sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\nsheath: {inlet: root}\n",
+               "run bad.yaml --duration-s 1", "banana");
+}
+
+static void outputs_that_cannot_be_written_are_found_before_the_run(void **state)
+{
+    (void)state;
+    put("good.yaml", GOOD);
+    const char *option[] = {"--summary", "--final", "--record"};
+    for (int i = 0; i < 3; i++) {
+        char arguments[200];
+        snprintf(arguments, sizeof arguments, "run good.yaml %s nowhere/x.h5", option[i]);
+        assert_int_equal(run(arguments), 2);
+        assert_non_null(strstr(output, "nowhere/x.h5: cannot be written"));
+        assert_null(strstr(output, "simulated"));
+        snprintf(arguments, sizeof arguments, "run good.yaml %s .", option[i]);
+        assert_int_equal(run(arguments), 2);
+    }
+    assert_int_equal(run("run good.yaml --record /dev/null"), 2);
+}
+
+// --- runs ---
+
+static void a_run_leaves_its_files_and_repeats_bit_for_bit(void **state)
+{
+    (void)state;
+    static const char *const numbers[][2] = {{NULL, "steps"}, {NULL, "simulated_s"}, {NULL, "wall_s"}, {NULL, "real_time_factor"},
+        {"step_us", "median"}, {"step_us", "p99"}, {"step_us", "p999"}, {"step_us", "max"}, {"stage_us", "assemble"}, {"stage_us", "factor"},
+        {"stage_us", "detect"}, {"stage_us", "contact"}, {"stage_us", "correct"}, {NULL, "deadline_misses"}, {"contacts", "max"}, {"contacts", "final"},
+        {"penetration_mm", "max"}, {"penetration_mm", "final"}, {"solver", "iterations_median"}, {"solver", "iterations_max"},
+        {"solver", "not_converged_steps"}, {"solver", "residual_max"}, {"proximal", "force_n"}, {"proximal", "torque_n_mm"}, {"wall_force_n", "max"},
+        {"wall_force_n", "sum_final"}, {NULL, "inserted_mm"}, {NULL, "elastic_energy_mj"}};
+    put("good.yaml", GOOD);
+    assert_int_equal(run("run good.yaml --summary a.json --final a.csv --record a.h5"), 0);
+    assert_int_equal(run("run good.yaml --json b.json --final b.csv --quiet --threads 2"), 0);
+    assert_string_equal(output, "");
+    cJSON *a = summary("a.json"), *b = summary("b.json");
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+        figure(a, numbers[i][0], numbers[i][1]);
+    assert_true(cJSON_IsBool(cJSON_GetObjectItem(a, "settled")) && cJSON_IsArray(cJSON_GetObjectItem(a, "flags")));
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(a, "tip_mm")), 3);
+    assert_true(figure(a, NULL, "steps") == 400 && figure(a, NULL, "simulated_s") == 0.4);
+    assert_true(fabs(figure(a, NULL, "inserted_mm") - 26) < 1e-9);
+    assert_true(figure(a, "contacts", "max") > 0);
+    const char *hash = cJSON_GetStringValue(cJSON_GetObjectItem(a, "state_hash"));
+    assert_int_equal(strlen(hash), 16);
+    assert_string_equal(hash, cJSON_GetStringValue(cJSON_GetObjectItem(b, "state_hash")));
+    const cJSON *target = cJSON_GetArrayItem(cJSON_GetObjectItem(a, "targets"), 0);
+    assert_true(cJSON_IsTrue(cJSON_GetObjectItem(target, "reached")));
+
+    char *first = slurp("a.csv"), *second = slurp("b.csv"), *line = first;
+    assert_string_equal(first, second);
+    assert_int_equal(strncmp(first, "node,s_mm,x_mm,y_mm,z_mm,qw,qx,qy,qz,force_x_n,force_y_n,force_z_n,gap_mm,vessel_node\n", 86), 0);
+    int rows = 0;
+    for (; (line = strchr(line, '\n')) && line[1]; line++)
+        rows++;
+    assert_int_equal(rows, 41);
+    free(first);
+    free(second);
+    cJSON_Delete(a);
+    cJSON_Delete(b);
+    assert_int_equal(run("info a.h5 --json"), 0);
+    assert_non_null(strstr(output, "\"steps\":\t400"));
+    assert_int_equal(run("export a.h5 -o a-path.csv"), 0);
+    assert_int_equal(run("export a.h5 -o series.pvd"), 0);
+    assert_true(exists("series.pvd") && exists("series_00000.vtp") && exists("series_00040.vtp"));
+}
+
+static void a_script_on_the_command_line_and_a_duration_win(void **state)
+{
+    (void)state;
+    put("good.yaml", GOOD);
+    put("pull.csv", "t_s,push_mm_s,twist_deg_s\n0,-5,0\n0.2,0,0\n");
+    assert_int_equal(run("run good.yaml --script pull.csv --summary s.json"), 0);
+    cJSON *json = summary("s.json");
+    assert_true(fabs(figure(json, NULL, "inserted_mm") - 1) < 1e-9 && figure(json, NULL, "steps") == 200);
+    cJSON_Delete(json);
+    assert_int_equal(run("run good.yaml --duration-s 0.1 --summary s.json"), 0);
+    json = summary("s.json");
+    assert_true(fabs(figure(json, NULL, "inserted_mm") - 8) < 1e-9 && figure(json, NULL, "steps") == 100);
+    cJSON_Delete(json);
+    assert_int_equal(run("run good.yaml --duration-s 0.1 --settle-s 5 --summary s.json"), 0);
+    json = summary("s.json");
+    assert_true(figure(json, NULL, "steps") < 5100 && cJSON_IsTrue(cJSON_GetObjectItem(json, "settled")));
+    cJSON_Delete(json);
+    assert_int_equal(run("run good.yaml --paced --duration-s 0.3 --summary s.json"), 0);
+    json = summary("s.json");
+    assert_true(figure(json, NULL, "wall_s") >= 0.299 && figure(json, NULL, "steps") == 300);
+    cJSON_Delete(json);
+}
+
+static void a_signal_stops_cleanly(void **state)
+{
+    (void)state;
+    put("good.yaml", GOOD);
+    for (int trial = 0; trial < 2; trial++) {
+        pid_t child = fork();
+        assert_true(child >= 0);
+        if (child == 0) {
+            if (chdir(folder) == 0)
+                execl(SELDINGER_PROGRAM, "seldinger", "run", "good.yaml", "--paced", "--duration-s", "60", "--summary", "stop.json", "--record", "stop.h5",
+                      "--final", "stop.csv", "--quiet", (char *)NULL);
+            _exit(127);
+        }
+        for (int i = 0; i < 500 && !exists("stop.h5"); i++)
+            nanosleep(&(struct timespec){.tv_nsec = 10000000}, NULL);
+        kill(child, trial ? SIGTERM : SIGINT);
+        int status;
+        waitpid(child, &status, 0);
+        assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+        cJSON *json = summary("stop.json");
+        double steps = figure(json, NULL, "steps");
+        assert_true(steps > 0 && steps < 60000);
+        assert_string_equal(cJSON_GetStringValue(cJSON_GetArrayItem(cJSON_GetObjectItem(json, "flags"), 0)), "stopped");
+        cJSON_Delete(json);
+        assert_int_equal(run("info stop.h5 --json"), 0);
+        char words[64];
+        snprintf(words, sizeof words, "\"steps\":\t%.0f,", steps);
+        assert_non_null(strstr(output, words));
+        char clean[400];
+        snprintf(clean, sizeof clean, "rm '%s'/stop.*", folder);
+        assert_int_equal(system(clean), 0);
+    }
+}
+
+static void a_full_disk_ends_with_3(void **state)
+{
+    (void)state;
+    put("good.yaml", GOOD);
+    char command[1000];
+    // 64 kB of file: not even the first rows fit, so no file is left
+    snprintf(command, sizeof command, "cd '%s' && ulimit -f 64 && %s run good.yaml --record full.h5 > full.txt 2>&1", folder, SELDINGER_PROGRAM);
+    int status = system(command);
+    assert_true(WIFEXITED(status));
+    assert_true(WEXITSTATUS(status) == 3 || WEXITSTATUS(status) == 2);
+    char *said = slurp("full.txt");
+    assert_non_null(strstr(said, "full.h5"));
+    free(said);
+    assert_false(exists("full.h5"));
+    assert_int_equal(run("run good.yaml --summary /dev/full"), 3);
+    assert_non_null(strstr(output, "/dev/full: cannot be written: No space left"));
+}
+
+// --- golden paths ---
+
+static void check_passes_on_identity_and_fails_on_one_per_cent(void **state)
+{
+    (void)state;
+    put("gold.yaml", GOOD);
+    assert_int_equal(run("check gold.yaml"), 2);
+    assert_non_null(strstr(output, "--update"));
+    assert_int_equal(run("check --update gold.yaml"), 0);
+    assert_true(exists("gold.golden.csv"));
+    assert_int_equal(run("check gold.yaml"), 0);
+    assert_int_equal(run("check ."), 0);
+    // one per cent of stiffness, of friction, of the lumen's radius: each parts from the path beyond the default tolerance
+    put("gold.yaml", SCENE("80.8", "0.68", "40", "", SCRIPT));
+    assert_int_equal(run("check gold.yaml"), 1);
+    assert_non_null(strstr(output, "DIFFERS"));
+    put("gold.yaml", SCENE_MU("0.101", "80", "0.68", "40", "", SCRIPT));
+    assert_int_equal(run("check gold.yaml"), 1);
+    put("gold.yaml", SCENE("80", "0.6868", "40", "", SCRIPT));
+    assert_int_equal(run("check gold.yaml"), 1);
+    double worst = 0, first_t = 0, first = 0;
+    int node = -1;
+    assert_int_equal(sscanf(strstr(output, "DIFFERS"), "DIFFERS %lf %lf %d %lf", &worst, &first_t, &node, &first), 4);
+    assert_true(worst > 0.0001 && first > 0.0001 && first <= worst && node > 0 && node <= 40 && first_t > 0 && first_t <= 0.4);
+    assert_int_equal(run("check gold.yaml --tolerance-mm 10"), 0);
+    // another number of nodes, a shorter run
+    put("gold.yaml", SCENE("80", "0.68", "44", "", SCRIPT));
+    assert_int_equal(run("check gold.yaml"), 1);
+    assert_non_null(strstr(output, "45 nodes, the golden has 41"));
+    put("gold.yaml", SCENE("80", "zero", "40", "", SCRIPT));
+    assert_int_equal(run("check gold.yaml"), 2);
+    // a scene whose model is not there is skipped by name
+    put("gold.yaml", GOOD);
+    put("away.yaml", "seldinger: 1\nvessel: {model: nowhere.h5}\nwire: {sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
+                     "sheath: {inlet: root}\nscript: [[0, 10, 0], [1, 0, 0]]\n");
+    put("away.golden.csv", "# nodes: 201\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n0.05,0,0,0,0\n");
+    assert_int_equal(run("check ."), 0);
+    assert_non_null(strstr(output, "skipped"));
+    assert_non_null(strstr(output, "nowhere.h5"));
+    put("away.yaml", "seldinger: 1\n");
+    assert_int_equal(run("check ."), 2);
+    char clean[400];
+    snprintf(clean, sizeof clean, "rm '%s'/away.*", folder);
+    assert_int_equal(system(clean), 0);
+    assert_int_equal(run("check nowhere"), 2);
+    assert_int_equal(run("check"), 2);
+}
+
+static void help_names_every_option(void **state)
+{
+    (void)state;
+    const char *verbs[] = {"run", "check", "export", "info"};
+    for (int i = 0; i < 4; i++) {
+        char arguments[40];
+        snprintf(arguments, sizeof arguments, "%s --help", verbs[i]);
+        assert_int_equal(run(arguments), 0);
+        assert_non_null(strstr(output, "Usage: seldinger"));
+        snprintf(arguments, sizeof arguments, "%s --banana x", verbs[i]);
+        assert_int_equal(run(arguments), 2);
+    }
+}
+
+static int make_folder(void **state)
+{
+    (void)state;
+    if (!mkdtemp(folder))
+        return -1;
+    setenv("SELDINGER_CACHE", folder, 1);
+    return 0;
+}
+
+static int remove_folder(void **state)
+{
+    (void)state;
+    char command[300];
+    snprintf(command, sizeof command, "rm -rf '%s'", folder);
+    return system(command);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(bad_input_ends_with_2_and_says_where),
+        cmocka_unit_test(outputs_that_cannot_be_written_are_found_before_the_run),
+        cmocka_unit_test(a_run_leaves_its_files_and_repeats_bit_for_bit),
+        cmocka_unit_test(a_script_on_the_command_line_and_a_duration_win),
+        cmocka_unit_test(a_signal_stops_cleanly),
+        cmocka_unit_test(a_full_disk_ends_with_3),
+        cmocka_unit_test(check_passes_on_identity_and_fails_on_one_per_cent),
+        cmocka_unit_test(help_names_every_option),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
