@@ -332,13 +332,14 @@ static bool write_column(hid_t file, const char *path, hid_t type, int rank, int
     return good;
 }
 
+// Variable length, which other programs (h5py) read as text and not as bytes.
 static bool write_text(hid_t file, const char *key, const char *text)
 {
     hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
-    size_t length = text ? strlen(text) : 0;
-    bool good = H5Tset_size(type, length + 1) >= 0 && H5Tset_cset(type, H5T_CSET_UTF8) >= 0;
+    const char *value = text ? text : "";
+    bool good = H5Tset_size(type, H5T_VARIABLE) >= 0 && H5Tset_cset(type, H5T_CSET_UTF8) >= 0;
     hid_t attribute = good ? H5Acreate2(file, key, type, space, H5P_DEFAULT, H5P_DEFAULT) : -1;
-    good = attribute >= 0 && H5Awrite(attribute, type, text ? text : "") >= 0;
+    good = attribute >= 0 && H5Awrite(attribute, type, &value) >= 0;
     if (attribute >= 0)
         H5Aclose(attribute);
     H5Sclose(space);
@@ -397,8 +398,6 @@ bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char
     H5Pset_fapl_core(access, 1 << 20, 0);
     H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V110);
     H5Pset_obj_track_times(create, false);
-    // text of parameters may exceed the 64 kB of compact attribute storage: the 1.8+ dense form has no such limit
-    H5Pset_attr_phase_change(create, 8, 6);
     hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, create, access);
     bool built = file >= 0 && write_tree(file, tree, info) && H5Fflush(file, H5F_SCOPE_GLOBAL) >= 0;
     ssize_t size = built ? H5Fget_file_image(file, NULL, 0) : -1;
