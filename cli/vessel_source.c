@@ -83,9 +83,10 @@ static void cache_key(const VesselTree *tree, const LimFitOptions *options, char
 }
 
 // The fit of a sampled tree, from the cache where it is there and whole. What is wrong with the cache is never an error.
-static VesselTree *fit_cached(const VesselTree *sampled, const char *what, int threads, bool quiet, Faults *faults)
+static VesselTree *fit_cached(const VesselTree *sampled, const char *what, double voxel_mm, int threads, bool quiet, Faults *faults)
 {
     LimFitOptions options = lim_fit_default_options();
+    options.voxel_mm = voxel_mm;
     options.threads = threads;
     char folder[CACHE_PATH], path[CACHE_PATH] = "", hex[65];
     Faults *ignored = calloc(1, sizeof *ignored);
@@ -130,7 +131,9 @@ static VesselTree *fit_shape(const Scene *scene, int threads, bool quiet, Faults
 {
     VesselTree *sampled =
         shape_tree(scene->shape_name, scene->shape_option_count, (const char(*)[2][64])scene->shape_option, scene->path, faults);
-    VesselTree *model = sampled ? fit_cached(sampled, scene->shape_name, threads, quiet, faults) : NULL;
+    // exact samples deserve a tighter fit than an angiogram's
+    double voxel_mm = shape_options_voxel_mm(scene->shape_option_count, (const char(*)[2][64])scene->shape_option);
+    VesselTree *model = sampled ? fit_cached(sampled, scene->shape_name, voxel_mm, threads, quiet, faults) : NULL;
     vessel_tree_free(sampled);
     return model;
 }
