@@ -1,0 +1,18 @@
+// Any bytes as a volume: NRRD, MetaImage, NIfTI headers and data. Detached files are looked for in a folder that is not there.
+#include "recon/volume.h"
+
+#include <stdint.h>
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static Faults faults;
+    faults_clear(&faults);
+    Volume *volume = volume_parse(data, size, "/nowhere/fuzz.hdr", &faults);
+    // a volume or a fault, never both, never neither
+    if ((volume != NULL) == (faults.count > 0))
+        __builtin_trap();
+    volume_free(volume);
+    return 0;
+}
