@@ -17,7 +17,7 @@ static const char help[] =
     "Usage: seldinger check PATH... [options]\n\n"
     "Runs every scene (X.yaml) below PATH that has a golden tool path (X.golden.csv) and compares point by point over time. The table names\n"
     "each scene, its worst distance, and the first time, node and distance beyond the tolerance.\n\n"
-    "  --tolerance-mm X   largest distance [mm] between golden and run that passes; default 0.0001: other machines pass, one per cent\n"
+    "  --tolerance-mm X   largest distance [mm] between golden and run that passes; default 0.00001: other machines pass, one per cent\n"
     "                     of a parameter does not\n"
     "  --update           rewrites the goldens; a scene named itself gets one that had none\n"
     "  --duration-s S     with --update: simulated time [s] of the golden; default: the script's, else the old golden's, else 1\n"
@@ -163,12 +163,12 @@ static void print_row(const char *scene, const PathDifference *difference, const
 {
     if (!difference->differs) {
         if (!options->quiet)
-            printf("%-44s same      %12.6f\n", scene, difference->worst_mm);
+            printf("%-44s same      %12.7f\n", scene, difference->worst_mm);
         return;
     }
-    printf("%-44s DIFFERS   %12.6f", scene, difference->worst_mm);
+    printf("%-44s DIFFERS   %12.7f", scene, difference->worst_mm);
     if (difference->first_node >= 0)
-        printf("  %9.3f %5d %12.6f", difference->first_t_s, difference->first_node, difference->first_mm);
+        printf("  %9.3f %5d %12.7f", difference->first_t_s, difference->first_node, difference->first_mm);
     else
         printf("  %9s %5s %12s", "-", "-", "-");
     printf("%s%s\n", difference->remark[0] ? "  " : "", difference->remark);

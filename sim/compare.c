@@ -85,8 +85,8 @@ char *tool_path_print(const ToolPath *path, size_t *length)
     for (int i = 0; i < path->row_count; i++) {
         const PathRow *row = &path->row[i];
         // + 0.0 turns a minus zero, which rounding can leave, into zero
-        fprintf(stream, "%.6g,%d,%.6f,%.6f,%.6f\n", row->t_s, row->node, round(row->position.x * 1e6) / 1e6 + 0.0,
-                round(row->position.y * 1e6) / 1e6 + 0.0, round(row->position.z * 1e6) / 1e6 + 0.0);
+        fprintf(stream, "%.6g,%d,%.7f,%.7f,%.7f\n", row->t_s, row->node, round(row->position.x * 1e7) / 1e7 + 0.0,
+                round(row->position.y * 1e7) / 1e7 + 0.0, round(row->position.z * 1e7) / 1e7 + 0.0);
     }
     if (fclose(stream) != 0) {
         free(text);
