@@ -65,12 +65,13 @@ static bool allocate(Stepper *s)
     s->query_place = calloc(m, sizeof *s->query_place);
     s->query_hit = calloc(m, sizeof *s->query_hit);
     s->query_node = calloc(m, sizeof *s->query_node);
+    s->room = calloc(m, sizeof *s->room);
     s->set.point = calloc(m, sizeof *s->set.point);
     s->set.capacity = s->wire.node_count;
     s->factor = block_factor_create(s->wire.node_count);
     s->solver = contact_solver_create(s->wire.node_count, s->set.capacity);
     if (!s->memory || !s->place || !s->fixed || !s->start_position || !s->start_orientation || !s->query_point || !s->query_place ||
-        !s->query_hit || !s->query_node || !s->set.point || !s->factor || !s->solver || !block_chain_create(&s->chain, s->wire.node_count) ||
+        !s->query_hit || !s->query_node || !s->room || !s->set.point || !s->factor || !s->solver || !block_chain_create(&s->chain, s->wire.node_count) ||
         !allocate_scratch(s))
         return false;
     s->state.node_count = s->wire.node_count;
@@ -225,6 +226,7 @@ void stepper_destroy(Stepper *s)
     free(s->query_place);
     free(s->query_hit);
     free(s->query_node);
+    free(s->room);
     free(s->set.point);
     free(s->scratch);
     free(s);
@@ -323,6 +325,18 @@ static void solve(Stepper *s)
         s->force[s->set.point[k].node] = s->set.point[k].force;
     for (int i = 0; i < 6 * s->state.node_count; i++)
         s->has_failed |= !isfinite(s->u[i]);
+}
+
+// A wire that springs goes further than anybody looked: look that far, and solve again.
+static void solve_contained(Stepper *s)
+{
+    solve(s);
+    for (int i = 0; i < 2 && !s->has_failed && stepper_escapes(s); i++) {
+        s->knows_motion = true;
+        stepper_detect(s);
+        s->knows_motion = false;
+        solve(s);
+    }
 }
 
 // The largest turn of an element's chord or of a node against the iterate [rad]; a node's turn about the axis does not count.
@@ -433,7 +447,7 @@ static void move(Stepper *s, double turn)
 
 void step_contact(Stepper *s)
 {
-    solve(s);
+    solve_contained(s);
     for (int iteration = 1; iteration < s->newton_max && !s->has_failed; iteration++) {
         double turn = largest_turn(s);
         if (turn <= s->newton_motion)
@@ -443,7 +457,7 @@ void step_contact(Stepper *s)
         stepper_detect(s);
         stepper_assemble(s);
         step_factor(s);
-        solve(s);
+        solve_contained(s);
         s->report.newton = iteration;
     }
 }

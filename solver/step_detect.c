@@ -7,9 +7,28 @@ static const double REACH_MAX = 5;       // [mm]
 static const double STEP_OUT_MAX = 0.2;  // [mm] a deep node is brought back by this much a step, not thrown
 static const double DEEP = 0.2;          // [mm] STEP_DEEP
 
+// [mm] by which the solution moves a node from the iterate.
+static double travel(const Stepper *s, int node)
+{
+    const double *u = s->u + 6 * (size_t)node, *k = s->linearised + 6 * (size_t)node;
+    return vec3_norm(vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]));
+}
+
+bool stepper_escapes(const Stepper *s)
+{
+    if (!s->vessel)
+        return false;
+    for (int i = s->first_free; i < s->state.node_count; i++)
+        if (travel(s, i) > s->room[i])
+            return true;
+    return false;
+}
+
 // How far beyond its present gap a node is looked after.
 static double reach_of(const Stepper *s, int node)
 {
+    if (s->knows_motion)
+        return fmin(REACH_MAX, REACH + 1.5 * travel(s, node));
     return fmin(REACH_MAX, REACH + fabs(s->command.advance) + 2 * s->dt * vec3_norm(s->state.velocity[node]));
 }
 
@@ -34,6 +53,11 @@ static int query(Stepper *s)
         s->clearance[i] = 0;
     }
     for (int i = s->first_free; i < nodes; i++) {
+        s->room[i] = HUGE_VAL;
+        if (s->clearance[i] > 0 && s->knows_motion && travel(s, i) > s->clearance[i])
+            s->clearance[i] = 0;
+        if (s->clearance[i] > 0)
+            s->room[i] = s->clearance[i];
         if (s->clearance[i] > 0 || (s->fixed[i] & DOF_POSITION) == DOF_POSITION)
             continue;
         if (s->place[i].node < 0)
@@ -94,6 +118,7 @@ void stepper_detect(Stepper *s)
             s->report.flags |= STEP_DEEP;
         if ((hit->flags & VESSEL_FAR) || !(gap < reach) || !vec3_is_finite(hit->normal)) {
             s->force[i] = vec3(0, 0, 0);
+            s->room[i] = gap;
             if (gap > reach)
                 s->clearance[i] = gap - reach;
             continue;

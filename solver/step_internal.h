@@ -61,17 +61,20 @@ struct Stepper {
     VesselMemory *query_place;
     VesselHit *query_hit;
     int *query_node;
+    double *room;            // (M) [mm] how far a node that is no candidate may go from the iterate; HUGE_VAL for candidates
     double *scratch;         // owns the arrays of doubles
 
     // of this step
     StepCommand command;
     StepReport report;
-    double fastest;          // [mm/ms] of the free nodes at x_n
+    bool knows_motion;       // u is an answer to this iterate: detection looks as far as it goes
     bool has_failed;
     bool is_iterate;         // linearised about something else than x_n
 };
 
 void stepper_detect(Stepper *s);
+// Has a node that was no candidate gone further than its room?
+bool stepper_escapes(const Stepper *s);
 void stepper_assemble(Stepper *s);
 double stepper_sheath_coordinate(const Stepper *s, int node);
 // [N] reaction on node 0 along (index 0 to 2) and about (3 to 5) the axes of its unknowns.
