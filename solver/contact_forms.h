@@ -14,7 +14,9 @@ typedef struct ContactLaw {
     bool touched;                // the matrix holds its C
     Vec3 force;
     Mat3 c;
-    Vec3 ratio;                  // friction over normal force, while that is frozen
+    Vec3 step;                   // motion under the whole Newton step
+    Vec3 multiplier;             // l of the augmented Lagrangian
+    double bound;                // s, of Tresca's friction
 } ContactLaw;
 
 typedef struct PointwiseWork PointwiseWork;
@@ -46,6 +48,15 @@ double contact_normal_residual(const ContactRow *row, int count, const Vec3 *mot
 
 ContactReport contact_pointwise(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
                                 const ContactOptions *options, double *u);
+// solver->matrix = the chain with the laws' J^T C J. Call contact_assemble_reset once before the first of a solve.
+void contact_assemble_reset(ContactSolver *solver, const BlockChain *chain, int count);
+void contact_assemble(ContactSolver *solver, const BlockChain *chain, int count);
+// From the rows' forces; at most `budget` factorisations. True where it converged.
+bool contact_convex(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count, double tolerance,
+                    int budget, ContactReport *report, double *u);
+// The last resort: nothing overlaps, no force leaves its cone, but friction may be less than Coulomb's.
+void contact_feasible(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count, double tolerance,
+                      int budget, ContactReport *report, double *u);
 ContactReport contact_newton(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
                              const ContactOptions *options, double *u);
 

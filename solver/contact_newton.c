@@ -15,21 +15,20 @@
 // every overlapping contact brings large tensile forces and cycles. So of each run of neighbouring overlapping contacts only the deepest is
 // taken in at a time: active sets are a few isolated points, found in 3 to 7 iterations. A sliding contact that moves against its own sense
 // sticks first. If states still cycle, they change one at a time from the tip (Murty's rule, which ends for the frictionless problem).
-// Where friction has no solution that can be found (jammed, mu near 1), ratio and direction of the friction forces are frozen and the normal
-// field alone is brought to its end: then nothing penetrates and no force leaves its cone; `converged` says false.
+// Where that finds no end, contact_convex.c takes over; where friction has no solution that it can find (jammed, mu near 1), it gives up friction
+// until nothing overlaps and no force leaves its cone, and `converged` says false.
 #include "solver/contact_forms.h"
 
 #include <float.h>
 #include <string.h>
 
 enum { OPEN, STICK, SLIP };
-enum { COULOMB, OBLIQUE, FRICTIONLESS };
 
 // Penalty P over k: the rest after an iteration is about 1/P; rounding of the matrix grows with it.
 static const double penalty = 1e4;
 // r over k: only the branch that is taken depends on it, not the solution.
 static const double slope = 0.1;
-enum { PARALLEL_ITERATIONS = 14, SINGLE_ITERATIONS = 16, FEASIBLE_ITERATIONS = 24 };
+enum { PARALLEL_ITERATIONS = 14, SINGLE_ITERATIONS = 10, CONVEX_ITERATIONS = 40, FEASIBLE_ITERATIONS = 200 };
 
 static double normal_violation(const ContactRow *c, Vec3 motion) { return c->gap + vec3_dot(motion, c->normal); }
 
@@ -76,7 +75,7 @@ static void choose_active(const ContactSolver *s, int count, bool all, bool *act
 }
 
 // States for the next iteration; returns how many changed. `one`: only the change nearest to the tip.
-static int choose_states(ContactSolver *s, int count, int mode, bool one, bool first)
+static int choose_states(ContactSolver *s, int count, bool one, bool first)
 {
     int changes = 0;
     choose_active(s, count, one, s->flag);
@@ -85,7 +84,7 @@ static int choose_states(ContactSolver *s, int count, int mode, bool one, bool f
         int was = s->law[i].state, state = OPEN;
         if (s->flag[i]) {
             state = SLIP;
-            if (mode == COULOMB && c->friction > 0) {
+            if (c->friction > 0) {
                 double size;
                 slide_direction(c, s->motion[i], &size);
                 Vec3 slide = contact_tangential(s->motion[i], c->normal);
@@ -113,7 +112,7 @@ static Mat3 law_matrix(Vec3 n, double kn, Vec3 oblique, double across, Vec3 p)
 }
 
 // Fills law->force (g) and, unless the old factor is used again, law->c.
-static void write_law(const ContactRow *c, Vec3 motion, int mode, bool keep_matrix, ContactLaw *law)
+static void write_law(const ContactRow *c, Vec3 motion, bool keep_matrix, ContactLaw *law)
 {
     Vec3 n = c->normal, none = {0, 0, 0}, slide = contact_tangential(motion, n), ft = contact_tangential(c->force, n);
     double kn = penalty * c->stiffness_n, kt = penalty * c->stiffness_t;
@@ -125,10 +124,7 @@ static void write_law(const ContactRow *c, Vec3 motion, int mode, bool keep_matr
         across = kt;
     } else if (law->state == SLIP) {
         force = vec3_scale(n, gn);
-        if (mode == OBLIQUE) {
-            oblique = vec3_scale(law->ratio, kn);
-            force = vec3_add_scaled(force, gn, law->ratio);
-        } else if (mode == COULOMB && c->friction > 0) {
+        if (c->friction > 0) {
             double size, bound = friction_bound(c, motion);
             p = slide_direction(c, motion, &size);
             across = size > bound ? fmin(kt, bound * slope * c->stiffness_t / (size - bound)) : size > 0 ? kt : 0;
@@ -174,7 +170,7 @@ static void add_law(const ContactRow *c, const Mat3 *k, BlockChain *a, double *u
 }
 
 // The matrix of the present laws: only blocks that held or hold a contact differ from the chain's.
-static void assemble(ContactSolver *s, const BlockChain *chain, int count)
+void contact_assemble(ContactSolver *s, const BlockChain *chain, int count)
 {
     const size_t block = 36 * sizeof(double);
     for (int i = 0; i < count; i++) {
@@ -185,22 +181,33 @@ static void assemble(ContactSolver *s, const BlockChain *chain, int count)
             memcpy(s->matrix.lower + 36 * (size_t)c->node, chain->lower + 36 * (size_t)c->node, block);
             memcpy(s->upper + 36 * (size_t)c->node, chain->lower + 36 * (size_t)c->node, block);
         }
-        s->law[i].touched = s->law[i].state != OPEN;
     }
-    for (int i = 0; i < count; i++)
-        if (s->law[i].state != OPEN)
+    for (int i = 0; i < count; i++) {
+        s->law[i].touched = s->law[i].state != OPEN;
+        if (s->law[i].touched)
             add_law(&s->row[i], &s->law[i].c, &s->matrix, s->upper);
+    }
+}
+
+void contact_assemble_reset(ContactSolver *s, const BlockChain *chain, int count)
+{
+    size_t blocks = (size_t)chain->count * 36 * sizeof(double);
+    memcpy(s->matrix.diag, chain->diag, blocks);
+    memcpy(s->matrix.lower, chain->lower, blocks);
+    memcpy(s->upper, chain->lower, blocks);
+    for (int i = 0; i < count; i++)
+        s->law[i].touched = false;
 }
 
 // One Newton iteration in the present states. False where the matrix cannot be factored or the result is not finite.
-static bool newton_iteration(ContactSolver *s, const BlockChain *chain, int count, int mode, bool reuse, double *u)
+static bool newton_iteration(ContactSolver *s, const BlockChain *chain, int count, bool reuse, double *u)
 {
     bool symmetric = true;
     memset(s->rhs, 0, (size_t)chain->count * 6 * sizeof *s->rhs);
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &s->row[i];
-        write_law(c, s->motion[i], mode, reuse, &s->law[i]);
-        symmetric &= s->law[i].state != SLIP || c->friction == 0 || mode == FRICTIONLESS;
+        write_law(c, s->motion[i], reuse, &s->law[i]);
+        symmetric &= s->law[i].state != SLIP || c->friction == 0;
         contact_row_push(c, vec3_sub(s->law[i].force, c->force), s->rhs);
     }
     if (reuse) {
@@ -209,7 +216,7 @@ static bool newton_iteration(ContactSolver *s, const BlockChain *chain, int coun
         else
             block_lu_solve(s->lu, s->rhs, s->delta);
     } else {
-        assemble(s, chain, count);
+        contact_assemble(s, chain, count);
         s->symmetric = symmetric;
         if (symmetric ? !block_chain_factor_solve(&s->matrix, s->factor, s->rhs, s->delta)
                       : !block_lu_factor_solve(&s->matrix, s->upper, s->lu, s->rhs, s->delta))
@@ -247,25 +254,21 @@ static void restart(ContactSolver *s, const BlockFactor *factor, const double *b
 }
 
 // Newton iterations until the residual of forces cut to their cones is below the tolerance; at most `parallel` + `single`.
-// In the modes without Coulomb's law the residual counts the normal direction alone.
-static bool iterate(ContactSolver *s, const BlockChain *chain, const BlockFactor *factor, const double *b, int count, int mode, int parallel,
-                    int single, double tolerance, ContactReport *report, double *u)
+static bool iterate(ContactSolver *s, const BlockChain *chain, const BlockFactor *factor, const double *b, int count, int parallel, int single,
+                    double tolerance, ContactReport *report, double *u)
 {
     double best = DBL_MAX;
     bool fresh = true; // no factor yet
     for (int it = 0; it < parallel + single; it++) {
-        int changes = choose_states(s, count, mode, it >= parallel, it == 0);
+        int changes = choose_states(s, count, it >= parallel, it == 0);
         bool reuse = !fresh && !changes && report->residual < 1e-3 && s->symmetric;
         double before = report->residual;
         report->iterations++;
-        if (!newton_iteration(s, chain, count, mode, reuse, u))
+        if (!newton_iteration(s, chain, count, reuse, u))
             return false;
-        fresh = false;
-        double residual = mode == COULOMB ? contact_residual(s->row, count, s->motion, report) : contact_normal_residual(s->row, count, s->motion);
-        report->residual = residual;
-        if (reuse && residual > 0.05 * before)
-            fresh = true; // the old factor does not serve any more
-        if (residual < best && mode == COULOMB) {
+        double residual = contact_residual(s->row, count, s->motion, report);
+        fresh = reuse && residual > 0.05 * before; // the old factor does not serve any more
+        if (residual < best) {
             best = residual;
             keep_forces(s, count);
         }
@@ -274,9 +277,7 @@ static bool iterate(ContactSolver *s, const BlockChain *chain, const BlockFactor
         for (int i = 0; i < count; i++)
             s->row[i].force = contact_project(s->row[i].force, s->row[i].normal, s->row[i].friction);
         contact_balance(s, factor, b, count, u);
-        residual = mode == COULOMB ? contact_residual(s->row, count, s->motion, report) : contact_normal_residual(s->row, count, s->motion);
-        report->residual = residual;
-        if (residual <= tolerance)
+        if (contact_residual(s->row, count, s->motion, report) <= tolerance)
             return true;
     }
     return false;
@@ -286,46 +287,29 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
                              const ContactOptions *options, double *u)
 {
     ContactReport report = {0};
-    size_t blocks = (size_t)chain->count * 36 * sizeof *b;
-    for (int i = 0; i < count; i++) {
-        s->best[i] = s->row[i].force;
-        s->law[i].touched = false;
-    }
+    keep_forces(s, count);
     restart(s, factor, b, count, u);
     contact_residual(s->row, count, s->motion, &report);
-    if (report.residual <= options->tolerance) {
-        report.converged = true;
+    report.converged = report.residual <= options->tolerance;
+    if (report.converged)
         return report;
-    }
-    memcpy(s->matrix.diag, chain->diag, blocks);
-    memcpy(s->matrix.lower, chain->lower, blocks);
-    memcpy(s->upper, chain->lower, blocks);
-    int left = options->max_iterations;
-    while (left > 0 && !report.converged) {
-        int parallel = left < PARALLEL_ITERATIONS ? left : PARALLEL_ITERATIONS;
+    contact_assemble_reset(s, chain, count);
+    while (report.iterations < options->max_iterations) {
+        int left = options->max_iterations - report.iterations, parallel = left < PARALLEL_ITERATIONS ? left : PARALLEL_ITERATIONS;
         int single = left - parallel < SINGLE_ITERATIONS ? left - parallel : SINGLE_ITERATIONS;
-        report.converged = iterate(s, chain, factor, b, count, COULOMB, parallel, single, options->tolerance, &report, u);
+        report.converged = iterate(s, chain, factor, b, count, parallel, single, options->tolerance, &report, u);
         if (report.converged)
-            break;
+            return report;
         restart(s, factor, b, count, u);
-        for (int i = 0; i < count; i++) {
-            const ContactRow *c = &s->row[i];
-            double fn = vec3_dot(c->force, c->normal);
-            s->law[i].ratio = fn > 0 ? vec3_scale(contact_tangential(c->force, c->normal), 1 / fn) : (Vec3){0, 0, 0};
-        }
-        bool feasible = iterate(s, chain, factor, b, count, OBLIQUE, PARALLEL_ITERATIONS, FEASIBLE_ITERATIONS, options->tolerance, &report, u);
-        if (!feasible) {
-            restart(s, factor, b, count, u);
-            iterate(s, chain, factor, b, count, FRICTIONLESS, PARALLEL_ITERATIONS, 4 * FEASIBLE_ITERATIONS, options->tolerance, &report, u);
-        }
-        for (int i = 0; i < count; i++) {
-            ContactRow *c = &s->row[i];
-            c->force = contact_project(c->force, c->normal, c->friction);
-        }
-        contact_balance(s, factor, b, count, u);
-        contact_residual(s->row, count, s->motion, &report);
-        report.converged = report.residual <= options->tolerance;
         left = options->max_iterations - report.iterations;
+        report.converged = contact_convex(s, chain, factor, b, count, options->tolerance, left < CONVEX_ITERATIONS ? left : CONVEX_ITERATIONS,
+                                          &report, u);
+        if (report.converged)
+            return report;
+        keep_forces(s, count);
+        restart(s, factor, b, count, u);
     }
+    contact_feasible(s, chain, factor, b, count, options->tolerance, FEASIBLE_ITERATIONS, &report, u);
+    report.converged = report.residual <= options->tolerance;
     return report;
 }

@@ -21,6 +21,7 @@ typedef struct Local {
     double w[3][3];          // own 3x3 of W on these axes
     double response[3][12];  // motion of its one or two nodes under a unit force along an axis
     double g;                // of its last slip: where the next search starts
+    Vec3 offset;             // what the recursion lacks against the factor's solution, by rounding
 } Local;
 
 struct PointwiseWork {
@@ -266,27 +267,31 @@ static void solve_local(double w[3][3], const double *d, double mu, double *star
     }
 }
 
+// Motion of a place's one or two nodes under all forces.
+static void place_motion(const PointwiseWork *w, const ContactRow *first, double *v)
+{
+    size_t i = (size_t)first->node;
+    double load[6], left[6];
+    memset(v, 0, 12 * sizeof *v);
+    for (size_t k = 0; k < 6; k++) {
+        left[k] = w->p[6 * i + k] + w->r[6 * i + k];
+        load[k] = first->nodes == 1 ? left[k] + w->q[6 * i + k] : w->q[6 * i + 6 + k] + w->r[6 * i + 6 + k];
+    }
+    if (first->nodes == 1) {
+        add_product(w->inverse + 36 * i, 1, load, v);
+        return;
+    }
+    add_product(w->left + 36 * i, -1, left, load);
+    add_product(w->inverse + 36 * (i + 1), 1, load, v + 6);
+    add_product(w->pivot + 36 * i, 1, left, v);
+    add_product_transposed(w->left + 36 * i, -1, v + 6, v);
+}
+
 // The contacts [from, to) at one place, in turn; their nodes' motion is found once and kept up to date.
 static void visit(PointwiseWork *w, ContactRow *row, int from, int to, bool reverse)
 {
-    const ContactRow *first = &row[from];
-    size_t i = (size_t)first->node;
-    double v[12] = {0}, load[6];
-    if (first->nodes == 1) {
-        for (int k = 0; k < 6; k++)
-            load[k] = w->p[6 * i + (size_t)k] + w->q[6 * i + (size_t)k] + w->r[6 * i + (size_t)k];
-        add_product(w->inverse + 36 * i, 1, load, v);
-    } else {
-        double left[6];
-        for (size_t k = 0; k < 6; k++) {
-            left[k] = w->p[6 * i + k] + w->r[6 * i + k];
-            load[k] = w->q[6 * i + 6 + k] + w->r[6 * i + 6 + k];
-        }
-        add_product(w->left + 36 * i, -1, left, load);
-        add_product(w->inverse + 36 * (i + 1), 1, load, v + 6);
-        add_product(w->pivot + 36 * i, 1, left, v);
-        add_product_transposed(w->left + 36 * i, -1, v + 6, v);
-    }
+    double v[12];
+    place_motion(w, &row[from], v);
     for (int n = 0; n < to - from; n++) {
         int k = reverse ? to - 1 - n : from + n;
         ContactRow *c = &row[k];
@@ -295,7 +300,7 @@ static void visit(PointwiseWork *w, ContactRow *row, int from, int to, bool reve
             continue;
         ContactRow here = *c;
         here.node = 0;
-        Vec3 motion = contact_row_motion(&here, v);
+        Vec3 motion = vec3_add(contact_row_motion(&here, v), l->offset);
         double old[3], d[3], f[3];
         for (int a = 0; a < 3; a++)
             old[a] = vec3_dot(c->force, l->axis[a]);
@@ -370,6 +375,22 @@ static void pass_back(PointwiseWork *w, ContactRow *row, int count, int m)
     }
 }
 
+// p and q of the present forces, and what is missing in the motion that they give.
+static void refresh(ContactSolver *s, int count, int m)
+{
+    PointwiseWork *w = s->pointwise;
+    double v[12];
+    memcpy(w->r, s->rhs, (size_t)m * 6 * sizeof *w->r);
+    pass_forth(w, s->row, 0, m);
+    pass_back(w, s->row, 0, m);
+    for (int k = 0; k < count; k++) {
+        ContactRow here = s->row[k];
+        place_motion(w, &here, v);
+        here.node = 0;
+        w->local[k].offset = vec3_sub(s->motion[k], contact_row_motion(&here, v));
+    }
+}
+
 ContactReport contact_pointwise(ContactSolver *s, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
                                 const ContactOptions *options, double *u)
 {
@@ -384,8 +405,7 @@ ContactReport contact_pointwise(ContactSolver *s, const BlockChain *chain, const
     for (int k = 0; k < count; k++)
         if (!s->row[k].inert)
             prepare_local(w, &s->row[k], &w->local[k]);
-    memcpy(w->r, s->rhs, (size_t)m * 6 * sizeof *b);
-    pass_back(w, s->row, 0, m); // q of the warm start
+    refresh(s, count, m);
     while (report.iterations < options->max_iterations && !report.converged) {
         if (report.iterations % 2 == 0)
             pass_forth(w, s->row, count, m);
@@ -396,7 +416,7 @@ ContactReport contact_pointwise(ContactSolver *s, const BlockChain *chain, const
         if (report.iterations % 16 && report.iterations < options->max_iterations)
             continue;
         contact_balance(s, factor, b, count, u);
-        memcpy(w->r, s->rhs, (size_t)m * 6 * sizeof *b);
+        refresh(s, count, m);
         contact_residual(s->row, count, s->motion, &report);
         report.converged = report.residual <= options->tolerance;
     }

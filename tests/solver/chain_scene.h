@@ -1,0 +1,52 @@
+// A small wire in an exact tube, written independently of solver/wire.c and step.c: it makes the contact problems on which
+// the two forms of contact_solve are compared. Linear strain elements about the present chords, matrices as B^T C B, no speed.
+#ifndef SELDINGER_TESTS_CHAIN_SCENE_H
+#define SELDINGER_TESTS_CHAIN_SCENE_H
+
+#include "geom/vessel.h"
+#include "solver/block_chain.h"
+#include "solver/contact.h"
+#include "solver/gauss_seidel.h"
+
+typedef struct ChainSceneOptions {
+    int elements;
+    double element_length;   // [mm]
+    double young_modulus;    // [MPa]
+    double poisson_ratio;
+    double diameter;         // [mm]
+    double density;          // [g/mm3]
+    double inserted;         // [mm] beyond x = 0, where the sheath ends
+    double friction;
+    double tip_curvature;    // [1/mm] rest curvature of the last 15 mm
+    double reach;            // [mm] candidates are nodes with a gap below this
+    const Vessel *vessel;    // entered along +x at the origin
+} ChainSceneOptions;
+
+typedef struct ChainScene {
+    ChainSceneOptions options;
+    int nodes;
+    Vec3 *position, *velocity, *spin, *force;
+    Quat *orientation;
+    VesselMemory *memory;
+    VesselHit *hit;
+    BlockChain chain;
+    BlockFactor *factor;
+    double *b, *u;
+    ContactSet set;
+    int *candidate_of;       // (set.count) node
+    ContactSolver *solver;
+    double penetration;      // [mm] at the start of the last step
+} ChainScene;
+
+ChainSceneOptions chain_scene_default_options(void);
+void chain_scene_create(ChainScene *scene, const ChainSceneOptions *options);
+void chain_scene_destroy(ChainScene *scene);
+// Detect, assemble, factor: leaves the problem in chain, factor, b, set.
+void chain_scene_prepare(ChainScene *scene, double advance, double twist);
+// Takes u and the set's forces as the step's result.
+void chain_scene_finish(ChainScene *scene);
+// The paper's spiral in space: a straight lead, then arcs whose radius falls and whose plane turns.
+Vessel *chain_scene_spiral(double radius, bool in_space);
+Vessel *chain_scene_straight(double radius);
+
+#endif
