@@ -15,6 +15,9 @@ typedef struct TriangleMesh {
 } TriangleMesh;
 
 // Surface of one local model within a box around its blobs, cell size `cell_mm`.
+// Both: NULL where the tree has no model, memory ends, or the cell is not above 0 or so small that 2e7 blocks of 8 x 8 x 8 cells would not do. The
+// surface is a closed manifold; blobs close the root's end too. Vertices lie on their node's model to 1e-12 mm, save where neighbouring models disagree
+// by more than three quarters of a cell: there the surface steps across, and the vertices stay on the lattice's edges.
 TriangleMesh *isosurface_of_model(const VesselTree *tree, int node, double cell_mm);
 // Surface of the tree: one sparse grid over the whole tree, the field at a grid point is that of its power-nearest node
 // (candidates limited to nodes whose tube reaches the point), so neighbouring models join without a gap. Vertices are projected
