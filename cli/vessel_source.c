@@ -44,9 +44,9 @@ static bool cache_folder(char folder[CACHE_PATH])
     return (mkdir(folder, 0777) == 0 || errno == EEXIST) && access(folder, R_OK | W_OK | X_OK) == 0;
 }
 
-// The key holds all that the fit depends on: the sampled tree, the fit's options, and the program itself, so that a newer program never takes
-// an older one's fit.
-static void cache_key(const VesselTree *tree, const LimFitOptions *options, char hex[65])
+// The key holds all that the fit depends on: the shape with its options, the fit's options, and the program itself, so that a newer program
+// never takes an older one's fit.
+static void cache_key(const Scene *scene, const LimFitOptions *options, char hex[65])
 {
     Sha256 sha;
     char program[65] = SELDINGER_VERSION;
@@ -68,47 +68,53 @@ static void cache_key(const VesselTree *tree, const LimFitOptions *options, char
                         options->extend_inlet,
                         options->guard_shape,
                         options->max_points};
-    size_t nodes = (size_t)tree->node_count;
     sha256_begin(&sha);
     sha256_add(&sha, program, strlen(program));
     sha256_add(&sha, figures, sizeof figures);
-    sha256_add(&sha, tree->center, nodes * sizeof *tree->center);
-    sha256_add(&sha, tree->radius, nodes * sizeof *tree->radius);
-    sha256_add(&sha, tree->direction, nodes * sizeof *tree->direction);
-    sha256_add(&sha, tree->parent, nodes * sizeof *tree->parent);
-    sha256_add(&sha, tree->kind, nodes * sizeof *tree->kind);
-    sha256_add(&sha, tree->point_offset, (nodes + 1) * sizeof *tree->point_offset);
-    sha256_add(&sha, tree->point, (size_t)tree->point_count * sizeof *tree->point);
+    sha256_add(&sha, scene->shape_name, strlen(scene->shape_name) + 1);
+    for (int i = 0; i < scene->shape_option_count; i++)
+        for (int j = 0; j < 2; j++)
+            sha256_add(&sha, scene->shape_option[i][j], strlen(scene->shape_option[i][j]) + 1);
     sha256_end(&sha, hex);
 }
 
-// The fit of a sampled tree, from the cache where it is there and whole. What is wrong with the cache is never an error.
-static VesselTree *fit_cached(const VesselTree *sampled, const char *what, double voxel_mm, int threads, bool quiet, Faults *faults)
+static VesselTree *fit_shape(const Scene *scene, const LimFitOptions *options, bool quiet, Faults *faults)
+{
+    ProgressBar bar;
+    Progress progress = progress_bar(&bar, "fit", quiet);
+    VesselTree *sampled =
+        shape_tree(scene->shape_name, scene->shape_option_count, (const char(*)[2][64])scene->shape_option, scene->path, faults);
+    VesselTree *model = sampled ? lim_fit(sampled, options, &progress, faults) : NULL;
+    vessel_tree_free(sampled);
+    return model;
+}
+
+// The fitted shape, from the cache where it is there and whole. What is wrong with the cache is never an error.
+static VesselTree *cached_shape(const Scene *scene, int threads, bool quiet, Faults *faults)
 {
     LimFitOptions options = lim_fit_default_options();
-    options.voxel_mm = voxel_mm;
     options.threads = threads;
     char folder[CACHE_PATH], path[CACHE_PATH] = "", hex[65];
     Faults *ignored = calloc(1, sizeof *ignored);
     VesselTree *model = NULL;
     if (ignored && cache_folder(folder)) {
-        cache_key(sampled, &options, hex);
+        cache_key(scene, &options, hex);
         snprintf(path, sizeof path, "%.4000s/fit-%.32s.h5", folder, hex);
         if (access(path, R_OK) == 0)
             model = tree_file_load(path, NULL, ignored);
-        if (model && (!vessel_tree_is_model(model) || model->node_count != sampled->node_count)) {
+        if (model && !vessel_tree_is_model(model)) {
             vessel_tree_free(model);
             model = NULL;
         }
     }
     if (!model) {
-        ProgressBar bar;
-        Progress progress = progress_bar(&bar, "fit", quiet);
-        model = lim_fit(sampled, &options, &progress, faults);
-        if (model && ignored && *path) {
-            TreeFileInfo info = {.source = (char *)(size_t)what, .parameters = (char *)(size_t) "", .created_by = (char *)(size_t) "seldinger " SELDINGER_VERSION};
+        model = fit_shape(scene, &options, quiet, faults);
+        char source[sizeof scene->shape_name];
+        strcpy(source, scene->shape_name);
+        char created_by[] = "seldinger " SELDINGER_VERSION, parameters[] = "";
+        TreeFileInfo info = {.source = source, .parameters = parameters, .created_by = created_by};
+        if (model && *path)
             tree_file_save(model, &info, path, ignored);
-        }
     }
     free(ignored);
     return model;
@@ -127,17 +133,6 @@ static bool open_tree(VesselTree *tree, const char *path, OpenVessel *out, Fault
     return out->vessel != NULL;
 }
 
-static VesselTree *fit_shape(const Scene *scene, int threads, bool quiet, Faults *faults)
-{
-    VesselTree *sampled =
-        shape_tree(scene->shape_name, scene->shape_option_count, (const char(*)[2][64])scene->shape_option, scene->path, faults);
-    // exact samples deserve a tighter fit than an angiogram's
-    double voxel_mm = shape_options_voxel_mm(scene->shape_option_count, (const char(*)[2][64])scene->shape_option);
-    VesselTree *model = sampled ? fit_cached(sampled, scene->shape_name, voxel_mm, threads, quiet, faults) : NULL;
-    vessel_tree_free(sampled);
-    return model;
-}
-
 bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults)
 {
     int before = faults->count;
@@ -152,7 +147,7 @@ bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, F
     switch (scene->source) {
     case SOURCE_NONE: return true;
     case SOURCE_MODEL: return open_tree(tree_file_load(scene->model_path, NULL, faults), scene->model_path, out, faults);
-    case SOURCE_SHAPE: return open_tree(fit_shape(scene, threads, quiet, faults), scene->path, out, faults);
+    case SOURCE_SHAPE: return open_tree(cached_shape(scene, threads, quiet, faults), scene->path, out, faults);
     case SOURCE_TUBE:
         if (scene->contact == CONTACT_LIM)
             faults_add(faults, scene->path, 0, 0, "contact 'lim' of a tube is not built yet; valid: tube");
