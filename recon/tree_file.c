@@ -1,6 +1,6 @@
 // Trees and models in HDF5. Both directions go through memory (the core driver with a file image): a full disk is then our own write's
 // error and not one in the middle of the library, the same code serves the fuzz target, and a file cannot change under us.
-// Metadata are written in the 1.10 format, whose checksums make the library refuse damaged headers.
+// Metadata are written in the 1.8 format, whose checksums make the library refuse damaged headers.
 #include "recon/tree_file.h"
 
 #include "recon/whole_file.h"
@@ -332,14 +332,14 @@ static bool write_column(hid_t file, const char *path, hid_t type, int rank, int
     return good;
 }
 
-// Variable length, which other programs (h5py) read as text and not as bytes.
+// Fixed length: the heap of variable-length texts has no checksum, and damaged bytes there crash the library.
 static bool write_text(hid_t file, const char *key, const char *text)
 {
     hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
     const char *value = text ? text : "";
-    bool good = H5Tset_size(type, H5T_VARIABLE) >= 0 && H5Tset_cset(type, H5T_CSET_UTF8) >= 0;
+    bool good = H5Tset_size(type, strlen(value) + 1) >= 0 && H5Tset_cset(type, H5T_CSET_UTF8) >= 0;
     hid_t attribute = good ? H5Acreate2(file, key, type, space, H5P_DEFAULT, H5P_DEFAULT) : -1;
-    good = attribute >= 0 && H5Awrite(attribute, type, &value) >= 0;
+    good = attribute >= 0 && H5Awrite(attribute, type, value) >= 0;
     if (attribute >= 0)
         H5Aclose(attribute);
     H5Sclose(space);
@@ -391,28 +391,79 @@ static bool write_tree(hid_t file, const VesselTree *tree, const TreeFileInfo *i
     return good;
 }
 
+// The core driver frees the file's memory when the file is closed: by then it is complete. We take it instead. (H5Fget_file_image of an
+// open file clears the superblock's flags without renewing its checksum; what it returns opens nowhere.)
+typedef struct Image {
+    unsigned char *bytes;
+    size_t capacity;
+} Image;
+
+static void *image_malloc(size_t size, H5FD_file_image_op_t operation, void *image)
+{
+    (void)operation;
+    ((Image *)image)->capacity = size;
+    return malloc(size);
+}
+static void *image_realloc(void *bytes, size_t size, H5FD_file_image_op_t operation, void *image)
+{
+    (void)operation;
+    ((Image *)image)->capacity = size;
+    return realloc(bytes, size);
+}
+static void *image_copy(void *to, const void *from, size_t size, H5FD_file_image_op_t operation, void *image)
+{
+    (void)operation, (void)image;
+    return memcpy(to, from, size);
+}
+static herr_t image_free(void *bytes, H5FD_file_image_op_t operation, void *image)
+{
+    if (operation == H5FD_FILE_IMAGE_OP_FILE_CLOSE)
+        ((Image *)image)->bytes = bytes;
+    else
+        free(bytes);
+    return 0;
+}
+static void *image_keep(void *image) { return image; }
+static herr_t image_forget(void *image)
+{
+    (void)image;
+    return 0;
+}
+
+// The end of the file as its superblock (version 2: after signature, four bytes, two addresses) says it, little-endian.
+static size_t image_length(const Image *image)
+{
+    enum { END_ADDRESS = 28, SUPERBLOCK = 48 };
+    uint64_t end = 0;
+    if (!image->bytes || image->capacity < SUPERBLOCK || (image->bytes[8] != 2 && image->bytes[8] != 3))
+        return 0;
+    for (int i = 7; i >= 0; i--)
+        end = end << 8 | image->bytes[END_ADDRESS + i];
+    return end <= image->capacity ? (size_t)end : 0;
+}
+
 bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char *path, Faults *faults)
 {
     Silence kept = silence_begin();
+    Image image = {0};
+    H5FD_file_image_callbacks_t callbacks = {image_malloc, image_copy, image_realloc, image_free, image_keep, image_forget, &image};
     hid_t access = H5Pcreate(H5P_FILE_ACCESS), create = H5Pcreate(H5P_FILE_CREATE);
-    H5Pset_fapl_core(access, 1 << 20, 0);
-    H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V110);
+    H5Pset_fapl_core(access, 1 << 18, 0);
+    H5Pset_file_image_callbacks(access, &callbacks);
+    H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V18);
     H5Pset_obj_track_times(create, false);
-    hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, create, access);
-    bool built = file >= 0 && write_tree(file, tree, info) && H5Fflush(file, H5F_SCOPE_GLOBAL) >= 0;
-    ssize_t size = built ? H5Fget_file_image(file, NULL, 0) : -1;
-    void *image = size > 0 ? malloc((size_t)size) : NULL;
-    built = image && H5Fget_file_image(file, image, (size_t)size) == size;
+    hid_t file = H5Fcreate("/dev/null/image", H5F_ACC_TRUNC, create, access);
+    bool built = file >= 0 && write_tree(file, tree, info);
     if (file >= 0)
-        H5Fclose(file);
+        built = H5Fclose(file) >= 0 && built;
     H5Pclose(create);
     H5Pclose(access);
     silence_end(kept);
-    if (!built)
+    size_t length = built ? image_length(&image) : 0;
+    if (length == 0)
         faults_add(faults, path, 0, 0, "cannot be written: the HDF5 library failed (memory?)");
-    else
-        built = whole_file_write(path, image, (size_t)size, faults);
-    free(image);
+    built = length > 0 && whole_file_write(path, image.bytes, length, faults);
+    free(image.bytes);
     return built;
 }
 
