@@ -255,8 +255,9 @@ static bool upstream_of_inlet(const LimVessel *lim, Vec3 x)
 // --- The blended field ---
 
 enum { BLEND_MAX = 8 };
-// Models closer than this fraction of the radius are mixed; one that says something else altogether is a ghost and left out.
-static const double BLEND_AGREE = 0.25;
+// Models that differ by less than this are mixed, ever less the more they differ: a quarter of the radius, and never so much that the mixed wall
+// leaves the own model's by more than 0.05 mm (0.18 of it, for one neighbour). One that says something else altogether is a ghost and left out.
+static double blend_agree(double radius) { return fmin(0.25 * radius, 0.25); }
 // Half width of the mixed zone: a neighbour counts where its power distance exceeds the best by less than this part of the node spacing squared,
 // 0 at the cell's border, 1 at its middle.
 static const double BLEND_BAND = 0.75;
@@ -319,7 +320,7 @@ typedef struct Mixture {
 
 static void mix_in(const LimVessel *lim, Mixture *mix, const FootBatch *b, int i, const Lane *of)
 {
-    double q = (b->gap[i] - mix->hit->gap) / (BLEND_AGREE * lim->tree->radius[mix->hit->node]);
+    double q = (b->gap[i] - mix->hit->gap) / blend_agree(lim->tree->radius[mix->hit->node]);
     if (b->state[i] != FOOT_DONE || !(fabs(q) < 1) || vec3_dot(lane_normal(b, i), mix->hit->normal) < 0.5 ||
         (of->node == 0 && upstream_of_inlet(lim, lane_foot(b, i))))
         return;
@@ -402,7 +403,7 @@ static bool answer_cheaply(const LimVessel *lim, Vec3 x, double reach, VesselMem
         *hit = open_end(memory, node);
         return true;
     }
-    double agree = lim->options.field == LIM_BLEND ? BLEND_AGREE * tree->radius[node] : 0;
+    double agree = lim->options.field == LIM_BLEND ? blend_agree(tree->radius[node]) : 0;
     double bound = lim->model[node].clear - vec3_distance(x, tree->center[node]);
     if (memory->clearance > 0)
         bound = fmax(bound, memory->clearance - vec3_distance(x, memory->place));
