@@ -343,7 +343,7 @@ static void survives_random_problems(void **state)
             if (t % 7 == 3 && i > 0 && i % 4 == 0)
                 p.set.point[i].node = p.set.point[i - 1].node, p.set.point[i].xi = p.set.point[i - 1].xi, p.set.point[i].normal = p.set.point[i - 1].normal;
         }
-        ContactReport r = problem_solve(&p, CONTACT_BLOCK, 200, 1e-6);
+        ContactReport r = problem_solve(&p, CONTACT_BLOCK, 1000, 1e-6);
         Laws l = check_laws(&p.chain, p.b, &p.set, p.u);
         assert_true(isfinite(r.residual) && isfinite(l.momentum) && isfinite(l.top) && isfinite(l.penetration));
         assert_true(l.pull == 0 && l.cone <= 1e-9 && r.cone_violation <= 1e-9);
@@ -352,7 +352,7 @@ static void survives_random_problems(void **state)
         bool easy = friction < 0.5;
         all += easy, hard += !easy;
         solved += easy && r.converged, solved_hard += !easy && r.converged;
-        if (easy && !r.converged)
+        if (!r.converged)
             print_message("  not converged: E %g friction %g length %g contacts %d nodes %d residual %.1e after %d\n", young, friction, length, contacts, nodes, r.residual, r.iterations);
         if (r.converged)
             assert_laws(&p, 1e-6, "random");
@@ -363,11 +363,252 @@ static void survives_random_problems(void **state)
     assert_true(solved_hard >= hard * 9 / 10);
 }
 
+// --- The wire in tubes ---
+
+typedef struct Scene {
+    const char *name;
+    double young, length, friction, twist, tube;
+    int elements, push, pull;
+    bool straight;
+    double tip_curvature, speed;
+} Scene;
+
+static void scene_create(const Scene *scene, ChainScene *wire, Vessel **vessel)
+{
+    ChainSceneOptions o = chain_scene_default_options();
+    o.elements = scene->elements;
+    o.element_length = scene->length;
+    o.young_modulus = scene->young;
+    o.friction = scene->friction;
+    o.tip_curvature = scene->tip_curvature;
+    o.vessel = *vessel = scene->straight ? chain_scene_straight(scene->tube) : chain_scene_spiral(scene->tube, true);
+    assert_non_null(*vessel);
+    chain_scene_create(wire, &o);
+}
+
+static void scene_destroy(ChainScene *wire, Vessel *vessel)
+{
+    chain_scene_destroy(wire);
+    vessel->destroy(vessel);
+}
+
+// Every 100th state of a push through the spiral is solved by both forms, to the end.
+static void both_forms_agree(void **state)
+{
+    (void)state;
+    const Scene scenes[] = {
+        {.name = "0.5 mm, 100 GPa, mu 0", .young = 1e5, .length = 0.5, .elements = 200, .push = 500, .tube = 0.5},
+        {.name = "0.5 mm, 100 GPa, mu 0.2", .young = 1e5, .length = 0.5, .friction = 0.2, .elements = 200, .push = 500, .tube = 0.5, .twist = 0.005},
+        {.name = "1.5 mm, 80 GPa, mu 0.2", .young = 8e4, .length = 1.5, .friction = 0.2, .elements = 200, .push = 500, .tube = 0.8, .twist = 0.005},
+    };
+    for (size_t n = 0; n < sizeof scenes / sizeof *scenes; n++) {
+        ChainScene w;
+        Vessel *vessel;
+        scene_create(&scenes[n], &w, &vessel);
+        ContactPoint *start = calloc((size_t)w.nodes, sizeof *start), *block = calloc((size_t)w.nodes, sizeof *block);
+        double *u = calloc((size_t)w.nodes * 6, sizeof *u);
+        ContactOptions tight = contact_default_options(), sweeps = tight;
+        tight.tolerance = 1e-9;
+        sweeps.form = CONTACT_POINTWISE;
+        sweeps.max_iterations = 100000;
+        sweeps.tolerance = 1e-8;
+        for (int i = 1; i <= scenes[n].push; i++) {
+            chain_scene_prepare(&w, 0.05, scenes[n].twist);
+            size_t bytes = (size_t)w.set.count * sizeof *start;
+            memcpy(start, w.set.point, bytes);
+            ContactReport a = contact_solve(w.solver, &w.chain, w.factor, w.b, &w.set, &tight, w.u);
+            assert_true(a.converged);
+            if (i % 100 == 0 && w.set.count > 0) {
+                memcpy(block, w.set.point, bytes);
+                memcpy(u, w.u, (size_t)w.nodes * 6 * sizeof *u);
+                memcpy(w.set.point, start, bytes);
+                ContactReport b = contact_solve(w.solver, &w.chain, w.factor, w.b, &w.set, &sweeps, w.u);
+                double top = 1e-3, apart = 0, moved = 0;
+                for (int k = 0; k < w.set.count; k++) {
+                    top = fmax(top, vec3_norm(block[k].force));
+                    apart = fmax(apart, vec3_distance(block[k].force, w.set.point[k].force));
+                }
+                for (int k = 0; k < 6 * w.nodes; k++)
+                    moved = fmax(moved, fabs(u[k] - w.u[k]));
+                print_message("%-24s step %3d: %2d of %3d active; block %2d factorisations, residual %.0e; pointwise %5d sweeps, residual %.0e; "
+                              "forces differ by %.0e, motion by %.0e mm\n",
+                              scenes[n].name, i, a.active, w.set.count, a.iterations, a.residual, b.iterations, b.residual, apart / top, moved);
+                assert_true(b.converged);
+                assert_true(apart <= 1e-5 * top);
+                assert_true(moved <= 1e-8);
+                assert_true(fmax(a.cone_violation, b.cone_violation) <= 1e-9);
+                memcpy(w.set.point, block, bytes);
+                memcpy(w.u, u, (size_t)w.nodes * 6 * sizeof *u);
+            }
+            chain_scene_finish(&w);
+        }
+        free(start);
+        free(block);
+        free(u);
+        scene_destroy(&w, vessel);
+    }
+}
+
+// Cost and convergence over whole runs, warm-started as the step does it.
+static void wire_in_tubes(void **state)
+{
+    (void)state;
+    const Scene scenes[] = {
+        {.name = "spiral 0.2 mm 80 GPa mu 0", .young = 8e4, .length = 0.2, .elements = 200, .push = 500, .pull = 300, .tube = 0.5, .twist = 0.005},
+        {.name = "spiral 0.2 mm 80 GPa mu 0.2", .young = 8e4, .length = 0.2, .friction = 0.2, .elements = 200, .push = 500, .pull = 300, .tube = 0.5, .twist = 0.005},
+        {.name = "spiral 0.5 mm 80 GPa mu 0.2", .young = 8e4, .length = 0.5, .friction = 0.2, .elements = 200, .push = 500, .pull = 300, .tube = 0.5, .twist = 0.005},
+        {.name = "spiral 0.5 mm 100 GPa mu 0.2", .young = 1e5, .length = 0.5, .friction = 0.2, .elements = 200, .push = 500, .pull = 300, .tube = 0.5, .twist = 0.005},
+        {.name = "spiral 0.5 mm 100 GPa mu 0.5", .young = 1e5, .length = 0.5, .friction = 0.5, .elements = 200, .push = 500, .pull = 300, .tube = 0.5, .twist = 0.005},
+        {.name = "spiral 1.5 mm 80 GPa mu 0.2", .young = 8e4, .length = 1.5, .friction = 0.2, .elements = 200, .push = 500, .pull = 300, .tube = 0.8, .twist = 0.005},
+        {.name = "spiral 0.2 mm 0.05 GPa mu 0.2", .young = 50, .length = 0.2, .friction = 0.2, .elements = 200, .push = 500, .pull = 300, .tube = 0.5, .twist = 0.005},
+        {.name = "straight, J tip, twisting", .young = 8e4, .length = 0.5, .friction = 0.2, .elements = 200, .push = 500, .tube = 0.6, .twist = 0.05, .straight = true, .tip_curvature = 0.1},
+    };
+    for (size_t n = 0; n < sizeof scenes / sizeof *scenes; n++) {
+        enum { STEPS = 800 };
+        static double us[STEPS], iterations[STEPS];
+        ChainScene w;
+        Vessel *vessel;
+        scene_create(&scenes[n], &w, &vessel);
+        ContactOptions o = contact_default_options();
+        int failed = 0, active = 0, candidates = 0, steps = scenes[n].push + scenes[n].pull;
+        double penetration = 0, residual = 0;
+        for (int i = 0; i < steps; i++) {
+            chain_scene_prepare(&w, i < scenes[n].push ? 0.05 : -0.05, scenes[n].twist);
+            double t = now_us();
+            ContactReport r = contact_solve(w.solver, &w.chain, w.factor, w.b, &w.set, &o, w.u);
+            us[i] = now_us() - t;
+            iterations[i] = r.iterations;
+            failed += !r.converged;
+            active = r.active > active ? r.active : active;
+            candidates = w.set.count > candidates ? w.set.count : candidates;
+            if (i >= 50) // a J tip that starts straight springs open across the tube at once
+                penetration = fmax(penetration, w.penetration);
+            residual = r.converged ? fmax(residual, r.residual) : residual;
+            assert_true(r.cone_violation <= 1e-9 && isfinite(r.residual));
+            chain_scene_finish(&w);
+        }
+        qsort(us, (size_t)steps, sizeof *us, by_value);
+        qsort(iterations, (size_t)steps, sizeof *iterations, by_value);
+        print_message("%-30s up to %3d of %3d active, factorisations median %2.0f p99 %2.0f max %3.0f, %5.1f us median %6.1f p99 %7.1f max, "
+                      "residual <= %.0e, %d not converged, penetration <= %.1f um\n",
+                      scenes[n].name, active, candidates, iterations[steps / 2], iterations[steps * 99 / 100], iterations[steps - 1], us[steps / 2],
+                      us[steps * 99 / 100], us[steps - 1], residual, failed, 1e3 * penetration);
+        assert_true(failed <= steps / 100);
+        assert_true(penetration < (scenes[n].straight ? 0.05 : 0.02)); // of the wall's curvature and the turning of the normal in a step, not of the solve
+        scene_destroy(&w, vessel);
+    }
+}
+
+// A mirrored problem has the mirrored solution, to rounding; the same problem the same bits, whatever the work space solved before.
+static void mirrored_and_repeated(void **state)
+{
+    (void)state;
+    for (int trial = 0; trial < 24; trial++) {
+        int nodes = 41, contacts = 20, axis = trial % 3;
+        Problem p, q;
+        problem_create(&p, nodes, contacts);
+        problem_create(&q, nodes, contacts);
+        problem_randomise(&p, 80000, 1.5, trial % 2 ? 0.2 : 0, -0.002);
+        double sign[6];
+        for (int k = 0; k < 3; k++) {
+            sign[k] = k == axis ? -1 : 1;
+            sign[k + 3] = -sign[k]; // rotations are axial vectors
+        }
+        for (int i = 0; i < 36 * nodes; i++) {
+            q.chain.diag[i] = sign[i / 6 % 6] * sign[i % 6] * p.chain.diag[i];
+            if (i < 36 * (nodes - 1))
+                q.chain.lower[i] = sign[i / 6 % 6] * sign[i % 6] * p.chain.lower[i];
+        }
+        for (int i = 0; i < 6 * nodes; i++)
+            q.b[i] = sign[i % 6] * p.b[i];
+        memcpy(q.set.point, p.set.point, (size_t)contacts * sizeof *p.set.point);
+        for (int k = 0; k < contacts; k++) {
+            Vec3 *n = &q.set.point[k].normal;
+            *n = vec3(sign[0] * n->x, sign[1] * n->y, sign[2] * n->z);
+        }
+        assert_true(block_chain_factor(&q.chain, q.factor));
+        ContactPoint *start = malloc((size_t)contacts * sizeof *start), *first = malloc((size_t)contacts * sizeof *start);
+        memcpy(start, p.set.point, (size_t)contacts * sizeof *start);
+        ContactReport a = problem_solve(&p, CONTACT_BLOCK, 200, 1e-9), b = problem_solve(&q, CONTACT_BLOCK, 200, 1e-9);
+        assert_true(a.converged && b.converged);
+        double top = 1e-3;
+        for (int k = 0; k < contacts; k++)
+            top = fmax(top, vec3_norm(p.set.point[k].force));
+        for (int k = 0; k < contacts; k++) {
+            Vec3 f = p.set.point[k].force;
+            assert_true(vec3_distance(vec3(sign[0] * f.x, sign[1] * f.y, sign[2] * f.z), q.set.point[k].force) <= 1e-7 * top);
+        }
+        memcpy(first, p.set.point, (size_t)contacts * sizeof *start);
+        memcpy(p.set.point, start, (size_t)contacts * sizeof *start);
+        problem_solve(&p, CONTACT_POINTWISE, 7, 1e-9); // leaves something else in the work space
+        memcpy(p.set.point, start, (size_t)contacts * sizeof *start);
+        double *u = malloc((size_t)nodes * 6 * sizeof *u);
+        problem_solve(&p, CONTACT_BLOCK, 200, 1e-9);
+        memcpy(u, p.u, (size_t)nodes * 6 * sizeof *u);
+        assert_memory_equal(first, p.set.point, (size_t)contacts * sizeof *start);
+        memcpy(q.set.point, start, (size_t)contacts * sizeof *start);
+        ContactOptions o = contact_default_options();
+        o.tolerance = 1e-9;
+        contact_solve(q.solver, &p.chain, p.factor, p.b, &q.set, &o, q.u);
+        assert_memory_equal(u, q.u, (size_t)nodes * 6 * sizeof *u);
+        free(u);
+        free(start);
+        free(first);
+        problem_destroy(&p);
+        problem_destroy(&q);
+    }
+}
+
+// A node that cannot move along the normal bears no force and does not disturb the others; one that is held across it still pushes.
+static void held_nodes(void **state)
+{
+    (void)state;
+    for (int form = 0; form < 2; form++) {
+        Problem p;
+        problem_create(&p, 21, 3);
+        problem_randomise(&p, 80000, 1.5, 0.2, -0.002);
+        for (int k = 0; k < 3; k++)
+            p.set.point[k].xi = 0, p.set.point[k].normal = vec3(0, 1, 0), p.set.point[k].gap = -0.001, p.set.point[k].node = 5 + 5 * k;
+        for (int hold = 0; hold < 2; hold++) { // node 5: y held at +0.01; node 10: x and z held
+            int node = hold ? 10 : 5;
+            for (int dof = 0; dof < 3; dof++) {
+                if ((dof == 1) == (hold == 1))
+                    continue;
+                double value = hold ? 0 : 0.01 * (dof == 1);
+                if (!hold && dof != 1)
+                    continue;
+                for (int k = 0; k < 6; k++) {
+                    double *d = p.chain.diag + 36 * node, *l0 = p.chain.lower + 36 * (node - 1), *l1 = l0 + 36;
+                    p.b[6 * node + k] -= d[6 * k + dof] * value;
+                    p.b[6 * node - 6 + k] -= l0[6 * dof + k] * value;
+                    p.b[6 * node + 6 + k] -= l1[6 * k + dof] * value;
+                    d[6 * dof + k] = d[6 * k + dof] = k == dof;
+                    l0[6 * dof + k] = l1[6 * k + dof] = 0;
+                }
+                p.b[6 * node + dof] = value;
+            }
+        }
+        assert_true(block_chain_factor(&p.chain, p.factor));
+        assert_int_equal(contact_free_dofs(&p.chain, 5), 63 & ~2);
+        assert_int_equal(contact_free_dofs(&p.chain, 10), 63 & ~5);
+        ContactReport r = problem_solve(&p, form ? CONTACT_POINTWISE : CONTACT_BLOCK, form ? 100000 : 200, 1e-8);
+        assert_true(r.converged);
+        assert_true(vec3_norm(p.set.point[0].force) == 0);
+        assert_true(fabs(p.u[6 * 5 + 1] - 0.01) < 1e-15);
+        assert_laws(&p, 1e-6, "held nodes");
+        problem_destroy(&p);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(agrees_with_enumeration),
         cmocka_unit_test(survives_random_problems),
+        cmocka_unit_test(both_forms_agree),
+        cmocka_unit_test(wire_in_tubes),
+        cmocka_unit_test(mirrored_and_repeated),
+        cmocka_unit_test(held_nodes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
