@@ -131,16 +131,15 @@ double camera_height_of(const Camera *camera, int count, const Vec3 *point)
     return count > 0 ? (high - low) / camera->mm_per_pixel : 0;
 }
 
-void camera_frame_sphere(Camera *camera, int width, int height, double border, Vec3 center, double radius, double slab)
+void camera_frame_sphere(Camera *camera, int width, int height, double border, Vec3 center, double radius)
 {
+    double shift = vec3_dot(camera->back, vec3_sub(camera->center, center));
+    camera->near_depth += shift;
+    camera->far_depth += shift;
     camera->center = center;
     camera->width = width;
     camera->height = height;
     camera->mm_per_pixel = fmax(2 * radius / fmax(1, fmin(width, height) - 2 * border), 1e-9);
-    if (slab > 0) {
-        camera->near_depth = slab;
-        camera->far_depth = -slab;
-    }
 }
 
 Vec3 camera_project(const Camera *camera, Vec3 point)

@@ -20,8 +20,8 @@ void camera_orient(Camera *camera, Vec3 view, Vec3 up, int count, const Vec3 *po
 void camera_frame(Camera *camera, int width, int height, double border, int count, const Vec3 *point, double margin);
 // How many pixels high the points are in the view.
 double camera_height_of(const Camera *camera, int count, const Vec3 *point);
-// Frames a sphere; with `slab` > 0 only what lies within slab mm before and behind its centre is drawn.
-void camera_frame_sphere(Camera *camera, int width, int height, double border, Vec3 center, double radius, double slab);
+// Frames a sphere; what is drawn in depth stays as it was.
+void camera_frame_sphere(Camera *camera, int width, int height, double border, Vec3 center, double radius);
 // Pixel (x right, y down, from the view's upper left corner); z: depth towards the eye [mm] relative to center.
 Vec3 camera_project(const Camera *camera, Vec3 point);
 // Column-major matrix from space relative to `origin` to clip space.

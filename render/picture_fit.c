@@ -82,7 +82,7 @@ static bool draw_surface(FitDrawing *drawing, double x, double y, int width, int
     camera_orient(&camera, drawing->options->view, drawing->options->up, shown_count, shown);
     camera_frame(&camera, width, height, 28 * s, shown_count, shown, 0);
     if (drawing->options->focus_radius > 0)
-        camera_frame_sphere(&camera, width, height, 8 * s, drawing->options->focus, drawing->options->focus_radius, 0);
+        camera_frame_sphere(&camera, width, height, 8 * s, drawing->options->focus, drawing->options->focus_radius);
     GlCanvas *panel = sheet_begin_panel(sheet, width, height);
     ViewPoint *point = malloc(((size_t)tree->point_count + 1) * sizeof *point);
     if (!panel || !point) {

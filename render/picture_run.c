@@ -158,7 +158,7 @@ static void add_targets(RunDrawing *drawing, const Camera *camera)
 }
 
 // One 3D panel with its upper left corner at (x, y) of the page.
-static bool draw_panel(RunDrawing *drawing, const Camera *camera, const PictureTool *tool, double x, double y)
+static bool draw_panel(RunDrawing *drawing, const Camera *camera, const ShellStyle *style, const PictureTool *tool, double x, double y)
 {
     GlCanvas *panel = sheet_begin_panel(drawing->sheet, camera->width, camera->height);
     if (!panel)
@@ -171,8 +171,8 @@ static bool draw_panel(RunDrawing *drawing, const Camera *camera, const PictureT
         solids_sphere(&drawing->solids, drawing->scene->entry, 4 * drawing->sheet->scale * camera->mm_per_pixel, SHEATH_COLOR);
     if (drawing->solids.is_short_of_memory)
         return message_fail(drawing->sheet->message, drawing->sheet->capacity, "not enough memory for a picture");
-    surface_view_draw_solids(drawing->sheet->view, camera, &drawing->solids, &drawing->style);
-    surface_view_draw_shell(drawing->sheet->view, camera, &drawing->style);
+    surface_view_draw_solids(drawing->sheet->view, camera, &drawing->solids, style);
+    surface_view_draw_shell(drawing->sheet->view, camera, style);
     sheet_end_panel(drawing->sheet, panel, x, y);
     return true;
 }
@@ -228,8 +228,17 @@ static double inset_radius_of(const RunDrawing *drawing, Vec3 tip)
 static Camera close_up_camera(const Camera *whole, Vec3 tip, double radius, int side)
 {
     Camera camera = *whole;
-    camera_frame_sphere(&camera, side, side, 0, tip, radius, 1.3 * radius);
+    camera_frame_sphere(&camera, side, side, 0, tip, radius);
     return camera;
+}
+
+// Branches that lie before the tip do not hide it.
+static ShellStyle close_up_style(const RunDrawing *drawing, double radius)
+{
+    ShellStyle style = drawing->style;
+    style.fade_from = (float)(0.8 * radius);
+    style.fade_to = (float)(1.4 * radius);
+    return style;
 }
 
 // The square of the large view that the close-up shows.
@@ -286,7 +295,7 @@ static bool draw_side_view(RunDrawing *drawing, const Camera *whole, const Pictu
     double s = sheet->scale;
     Camera side = {.right = vec3_negate(whole->back), .up = whole->up, .back = whole->right};
     camera_frame(&side, (int)width, (int)height, 12 * s, drawing->frame_count, drawing->frame_point, 0);
-    if (!draw_panel(drawing, &side, tool, x, y))
+    if (!draw_panel(drawing, &side, &drawing->style, tool, x, y))
         return false;
     sheet_label(sheet, x + 8 * s, y + 6 * s, 0, TEXT_SMALL, SHEET_MUTED, "from the right");
     sheet_scale_bar(sheet, x + 14 * s, y + (int)height - 10 * s, 0.2 * width, side.mm_per_pixel, SHEET_INK);
@@ -303,8 +312,8 @@ static bool draw_run(RunDrawing *drawing, const PictureTool *tool)
     camera_orient(&whole, options->view, options->up, drawing->frame_count, drawing->frame_point);
     camera_frame(&whole, width, height, 34 * s, drawing->frame_count, drawing->frame_point, 0);
     if (options->focus_radius > 0)
-        camera_frame_sphere(&whole, width, height, 8 * s, options->focus, options->focus_radius, 0);
-    if (!draw_panel(drawing, &whole, tool, gap, top))
+        camera_frame_sphere(&whole, width, height, 8 * s, options->focus, options->focus_radius);
+    if (!draw_panel(drawing, &whole, &drawing->style, tool, gap, top))
         return false;
     label_panel(drawing, &whole, gap, top);
     sheet_scale_bar(sheet, gap + 16 * s, top + height - 14 * s, 0.22 * width, whole.mm_per_pixel, SHEET_INK);
@@ -314,7 +323,8 @@ static bool draw_run(RunDrawing *drawing, const PictureTool *tool)
         Vec3 tip = tool->position[tool->node_count - 1];
         double radius = inset_radius_of(drawing, tip);
         Camera close = close_up_camera(&whole, tip, radius, (int)column);
-        if (!draw_panel(drawing, &close, tool, left, top))
+        ShellStyle style = close_up_style(drawing, radius);
+        if (!draw_panel(drawing, &close, &style, tool, left, top))
             return false;
         label_panel(drawing, &close, left, top);
         overlay_rectangle(sheet->overlay, left, top, (int)column, (int)column, SHEET_MUTED, 1.2 * s);
@@ -377,7 +387,7 @@ static bool draw_moment(RunDrawing *drawing, const Camera *whole, const PictureT
     sheet_text(sheet, x, y + (tool->label ? 22 * s : 4 * s), tool->label ? TEXT_SMALL : TEXT_NORMAL, tool->label ? SHEET_MUTED : SHEET_INK, "%s", text);
     overlay_pop_clip(sheet->overlay);
     double top = y + header;
-    if (!draw_panel(drawing, whole, tool, x, top))
+    if (!draw_panel(drawing, whole, &drawing->style, tool, x, top))
         return false;
     label_panel(drawing, whole, x, top);
     sheet_scale_bar(sheet, x + 12 * s, top + whole->height - 12 * s, 0.22 * whole->width, whole->mm_per_pixel, SHEET_INK);
@@ -393,7 +403,8 @@ static bool draw_moment(RunDrawing *drawing, const Camera *whole, const PictureT
     int corner = emptiest_corner(drawing, whole, tool, side);
     double left = x + (corner & 1 ? whole->width - side : 0), above = top + (corner & 2 ? whole->height - side : 0);
     outline_close_up(drawing, whole, &close, x, top);
-    if (!draw_panel(drawing, &close, tool, left, above))
+    ShellStyle style = close_up_style(drawing, radius);
+    if (!draw_panel(drawing, &close, &style, tool, left, above))
         return false;
     overlay_rectangle(sheet->overlay, left, above, side, side, SHEET_MUTED, 1.2 * s);
     sheet_scale_bar(sheet, left + 10 * s, above + side - 8 * s, 0.36 * side, close.mm_per_pixel, SHEET_INK);
@@ -421,7 +432,7 @@ static MomentLayout lay_out_moments(const RunDrawing *drawing, int tool_count)
         int height = (int)fmax((options->height - layout.top - foot) / rows - layout.header, 16);
         camera_frame(&camera, width, height, border, drawing->frame_count, drawing->frame_point, 0);
         if (options->focus_radius > 0)
-            camera_frame_sphere(&camera, width, height, 4 * s, options->focus, options->focus_radius, 0);
+            camera_frame_sphere(&camera, width, height, 4 * s, options->focus, options->focus_radius);
         else {
             // no higher than what there is to see, but never flatter than 3 to 1
             double tall = camera_height_of(&camera, drawing->frame_count, drawing->frame_point) + 2 * border;

@@ -39,7 +39,7 @@ static const char *const MESH_VERTEX = "#version 330 core\n"
 
 static const char *const SHELL_FRAGMENT =
     "in vec3 n; in vec4 c; in float depth; out vec4 result;\n"
-    "uniform vec3 front, back, haze; uniform vec4 opacity; uniform float haze_amount;\n"   // opacity: front, back, rim, power
+    "uniform vec3 front, back, haze; uniform vec4 opacity; uniform float haze_amount; uniform vec2 fade;\n"   // opacity: front, back, rim, power
     "void main() {\n"
     "  vec3 m = normalize(n); bool outer = gl_FrontFacing;\n"
     // at the outline the interpolated normal may point the wrong way: the face decides
@@ -51,7 +51,7 @@ static const char *const SHELL_FRAGMENT =
     "  k = mix(k, k * 0.62, edge);\n"
     "  k = mix(k, haze, haze_amount * depth);\n"
     "  a = a + (1.0 - a) * shiny; k = mix(k, vec3(1.0), shiny);\n"
-    "  result = vec4(k, a);\n"
+    "  result = vec4(k, a * smoothstep(fade.y, fade.x, depth));\n"
     "}\n";
 
 static const char *const SOLID_FRAGMENT = "in vec3 n; in vec4 c; in float depth; out vec4 result;\n"
@@ -259,6 +259,11 @@ void surface_view_draw_shell(SurfaceView *view, const Camera *camera, const Shel
     glUniform3fv(glGetUniformLocation(program, "haze"), 1, style->haze);
     glUniform1f(glGetUniformLocation(program, "haze_amount"), style->haze_amount);
     glUniform4f(glGetUniformLocation(program, "opacity"), style->front_opacity, style->back_opacity, style->rim, style->rim_power);
+    // in depths of the clip space, 0 near to 1 far
+    double range = camera->near_depth - camera->far_depth, from = (camera->near_depth - style->fade_from) / range;
+    double to = (camera->near_depth - style->fade_to) / range;
+    bool fades = style->fade_to > style->fade_from;
+    glUniform2f(glGetUniformLocation(program, "fade"), fades ? (float)from : -1, fades ? (float)to : -2);
     bool is_opaque = style->front_opacity >= 1 && style->back_opacity >= 1 && style->rim >= 1;
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_LEQUAL);

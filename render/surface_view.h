@@ -19,6 +19,7 @@ typedef struct ShellStyle {
     float rim_power;           // how narrow the rim is
     float haze[3];             // far parts fade to this …
     float haze_amount;         // … by this much at far_depth; 0 to 1
+    float fade_from, fade_to;  // [mm] towards the eye from the camera's centre: nearer walls fade out between them; equal: none does
 } ShellStyle;
 ShellStyle shell_style_glass(void);   // a translucent vessel on a light ground
 ShellStyle shell_style_solid(void);   // an opaque surface

@@ -181,6 +181,14 @@ static void a_tool_shows_through_exactly_the_walls_before_it(void **state)
         assert_true(before > 150);
         assert_true(fabs(redness(stage, &camera, &solid, 0)) < 10 && fabs(redness(stage, &camera, &solid, -15)) < 10);
     }
+    // a fading near wall: the tool inside is as red as without it, and the far wall still stands before one behind
+    Camera camera = camera_at(view[2], vec3(0, 0, 0), 0.1);
+    ShellStyle glass = shell_style_glass();
+    double before = redness(stage, &camera, &glass, 15);
+    glass.fade_from = 2;
+    glass.fade_to = 4;
+    assert_true(fabs(redness(stage, &camera, &glass, 0) / before - 1) < 0.12);
+    assert_true(redness(stage, &camera, &glass, -15) < 0.8 * before);
     ball_free(&mesh);
     stage_close(stage);
 }
