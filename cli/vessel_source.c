@@ -93,6 +93,8 @@ static VesselTree *fit_shape(const Scene *scene, const LimFitOptions *options, b
 static VesselTree *cached_shape(const Scene *scene, int threads, bool quiet, Faults *faults)
 {
     LimFitOptions options = lim_fit_default_options();
+    // exact samples deserve a tighter fit than an angiogram's
+    options.voxel_mm = shape_options_voxel_mm(scene->shape_option_count, (const char(*)[2][64])scene->shape_option);
     options.threads = threads;
     char folder[CACHE_PATH], path[CACHE_PATH] = "", hex[65];
     Faults *ignored = calloc(1, sizeof *ignored);
