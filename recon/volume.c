@@ -520,6 +520,11 @@ bool volume_save_nrrd(const Volume *volume, const char *path, const char *type_n
         faults_add(faults, path, 0, 0, type ? "the path is too long; at most 4000 bytes" : "'%s' is no sample type; float, uint8 or int16", type_name);
         return false;
     }
+    struct stat status;
+    if (!stat(path, &status) && !S_ISREG(status.st_mode)) {   // renaming over a device would replace it
+        faults_add(faults, path, 0, 0, "is there and no regular file; another name");
+        return false;
+    }
     size_t count = (size_t)volume->size[0] * (size_t)volume->size[1] * (size_t)volume->size[2];
     uint8_t *sample = encode_samples(volume, count, type, path, faults);
     if (!sample)

@@ -1,0 +1,122 @@
+// Trace files: what is read, and that every fault is told with its line and column in one pass.
+#include "recon/trace.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <stdio.h>
+#include <string.h>
+
+static Faults faults;
+
+static Trace *parse(const char *text)
+{
+    faults_clear(&faults);
+    return trace_parse(text, strlen(text), "t.yaml", &faults);
+}
+
+static void full_file(void **state)
+{
+    (void)state;
+    Trace *t = parse("branches:\n"
+                     "  - {name: a, start_mm: [1, 2, 3], toward_voxel: [2, 2, 3.5], radius_mm: 1.5}\n"
+                     "  - {start_voxel: [4, 5, 6]}\n"
+                     "aneurysms: [{name: sac, centers_mm: [[1, 2, 3], [3, 4, 5]]}, {centers_voxel: [[7, 8, 9]]}]\n"
+                     "p_inl: 0.6\nretry_steps: [1.5, 2]\nseed: 7\nN_r: 642\nparameters: paper\n");
+    assert_non_null(t);
+    assert_int_equal(t->branch_count, 2);
+    assert_true(t->branch[0].start.z == 3 && !t->branch[0].start_is_voxel && t->branch[0].toward_is_voxel && t->branch[0].toward.z == 3.5);
+    assert_true(t->branch[0].radius == 1.5 && t->branch[0].has_toward && !strcmp(t->branch[0].name, "a"));
+    assert_true(t->branch[1].start_is_voxel && !t->branch[1].has_toward && t->branch[1].line == 3 && t->branch[1].column == 5);
+    assert_int_equal(t->aneurysm_count, 2);
+    assert_true(t->aneurysm[0].center_count == 2 && t->aneurysm[0].center[1].x == 3 && !t->aneurysm[0].is_voxel && t->aneurysm[1].is_voxel);
+    // the set first, then single ones, wherever they stand
+    RbtParameters p = rbt_paper_parameters();
+    assert_true(t->parameters.p_inl == 0.6 && t->parameters.seed == 7 && t->parameters.n_r == 642 && t->parameters.n_p == p.n_p && t->parameters.look_ahead == 0);
+    assert_true(t->parameters.retry_count == 2 && t->parameters.retry_steps[1] == 2);
+    trace_free(t);
+}
+
+static void every_parameter_by_name(void **state)
+{
+    (void)state;
+    for (int i = 0; i < rbt_parameter_count; i++) {
+        const RbtParameterName *p = &rbt_parameter_table[i];
+        double value = !strcmp(p->name, "N_r") || !strcmp(p->name, "aneurysm_rays") ? 642 : !strcmp(p->name, "N_d") ? 21 : !strcmp(p->name, "N_min") ? 100 : p->most;
+        char text[400];
+        snprintf(text, sizeof text, "branches: [{start_mm: [1, 2, 3], toward_mm: [2, 2, 3], radius_mm: 1}]\n%s: %.17g\n", p->name, value);
+        Trace *t = parse(text);
+        assert_non_null(t);
+        assert_true(*(double *)(void *)((char *)&t->parameters + p->offset) == value);
+        trace_free(t);
+        snprintf(text, sizeof text, "branches: [{start_mm: [1, 2, 3], toward_mm: [2, 2, 3], radius_mm: 1}]\n%s: %.17g\n", p->name, p->most * 1.01 + 1);
+        assert_null(parse(text));
+        assert_non_null(strstr(faults.text[0], "t.yaml:2:"));
+    }
+    // the defaults pass their own ranges
+    RbtParameters d = rbt_default_parameters(), p = rbt_paper_parameters();
+    for (int i = 0; i < rbt_parameter_count; i++) {
+        double a = *(double *)(void *)((char *)&d + rbt_parameter_table[i].offset), b = *(double *)(void *)((char *)&p + rbt_parameter_table[i].offset);
+        assert_true(a >= rbt_parameter_table[i].least && a <= rbt_parameter_table[i].most && b >= rbt_parameter_table[i].least && b <= rbt_parameter_table[i].most);
+    }
+}
+
+#define GOOD "branches: [{start_mm: [1, 2, 3], toward_mm: [2, 2, 3], radius_mm: 1}]\n"
+
+static void faults_with_their_place(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text, *place, *words;
+    } cases[] = {
+        {"", "t.yaml:1:1", "empty"},
+        {"- a\n", "t.yaml:1:1", "a trace is a map"},
+        {"branches: [\n", "t.yaml:2", "is no YAML"},
+        {"p_inl: 0.5\n", "t.yaml:1:1", "there is no branch"},
+        {"branches: []\n", "t.yaml:1:1", "there is no branch"},
+        {"branches: [3]\n", "t.yaml:1:12", "a branch is not valid"},
+        {"branches: [{start_mm: [1, 2, 3]}]\n", "t.yaml:1:12", "no direction"},
+        {"branches: [{start_mm: [1, 2, 3], toward_mm: [2, 2, 3]}]\n", "t.yaml:1:12", "no radius"},
+        {"branches: [{toward_mm: [1, 2, 3], radius_mm: 1}]\n", "t.yaml:1:12", "no start"},
+        {"branches: [{start_mm: [1, 2], toward_mm: [2, 2, 3], radius_mm: 1}]\n", "t.yaml:1:23", "three numbers"},
+        {"branches: [{start_mm: [1, 2, x], toward_mm: [2, 2, 3], radius_mm: 1}]\n", "t.yaml:1:30", "'x' is not valid"},
+        {"branches: [{start_mm: [1, 2, .nan], toward_mm: [2, 2, 3], radius_mm: 1}]\n", "t.yaml:1:30", "is not valid"},
+        {"branches: [{start_mm: [1, 2, 3], toward_mm: [2, 2, 3], radius_mm: 0}]\n", "t.yaml:1:67", "radius_mm '0' is not valid"},
+        {"branches: [{start_mm: [1, 2, 3], start_voxel: [1, 2, 3], toward_mm: [2, 2, 3], radius_mm: 1}]\n", "t.yaml:1:47", "given twice"},
+        {"branches: [{start_mm: [1, 2, 3], toward_mm: [2, 2, 3], radius_mm: 1, radius_mm: 2}]\n", "t.yaml:1:70", "stands on line 1 already"},
+        {"branches: [{start_mm: [1, 2, 3], toward_mm: [2, 2, 3], radius: 1}]\n", "t.yaml:1:64", "'radius' is no key of a branch"},
+        {GOOD "colour: red\n", "t.yaml:2:9", "'colour' is no key of a trace"},
+        {GOOD "seed: 1\nseed: 2\n", "t.yaml:3:1", "stands on line 2 already"},
+        {GOOD "N_r: 100\n", "t.yaml:2:6", "42, 162, 642 or 2562"},
+        {GOOD "N_d: 100\n", "t.yaml:2:6", "21, 81 or 321"},
+        {GOOD "N_p: 64.5\n", "t.yaml:2:6", "whole number"},
+        {GOOD "N_max: 10\n", "t.yaml:1:1", "less than N_min"},
+        {GOOD "parameters: best\n", "t.yaml:2:13", "default or paper"},
+        {GOOD "aneurysms: [{}]\n", "t.yaml:2:13", "no centres"},
+        {GOOD "aneurysms: [{centers_mm: []}]\n", "t.yaml:2:26", "a list of points"},
+        {GOOD "retry_steps: [1, 2, 3, 4, 5, 6, 7, 8, 9]\n", "t.yaml:2:14", "at most 8"},
+        {GOOD "---\n" GOOD, "t.yaml:3:1", "a second document"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        Trace *t = parse(cases[i].text);
+        if (t || !strstr(faults.text[0], cases[i].words) || !strstr(faults.text[0], cases[i].place))
+            print_message("case %zu: got '%s'\n", i, t ? "a trace" : faults.text[0]);
+        assert_null(t);
+        assert_non_null(strstr(faults.text[0], cases[i].words));
+        assert_non_null(strstr(faults.text[0], cases[i].place));
+    }
+    // all in one pass
+    assert_null(parse("branches: [{start_mm: [1, 2], toward_mm: 3, radius_mm: -1}]\nseed: x\nwhat: 1\n"));
+    assert_int_equal(faults.count, 6);
+    // an anchor that holds itself
+    assert_null(parse("branches: &a [*a]\n"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(full_file), cmocka_unit_test(every_parameter_by_name), cmocka_unit_test(faults_with_their_place)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
