@@ -202,16 +202,17 @@ void beam_chain_strain(const BeamRest *rest, const BeamPose *pose, int first, in
     }
 }
 
-// Rows r..r+2, columns c..c+2 of a 6x6 block.
+// Entry (i, j) of the 3x3 part at row r, column c of a 6x6 block. Rows of six as vectors, with outer products, ran slower than this
+// (9.2 against 7.4 us for 200 elements): the work is stores.
 INLINE void put(double *block, int r, int c, int i, int j, double value, bool is_sum)
 {
     double *at = &block[(r + i) * 6 + c + j];
     *at = is_sum ? *at + value : value;
 }
 
-// The blocks of one element; `sum11` and `sum22` add into what is there.
+// The blocks of one element; with `is_sum` that of node 1 is added to what is there, the others are written.
 INLINE void tangent_blocks(Vec3 e, double inverse, double tension, Vec3 bow1, Vec3 bow2, double length, double axial, double near,
-                           double far, double twist, double scale, double *k11, double *k21, double *k22, bool is_sum)
+                           double far, double twist, double scale, double *restrict k11, double *restrict k21, double *restrict k22, bool is_sum)
 {
     double pull = tension > 0 ? tension : 0;
     double ka = axial * scale, kt = twist * scale;
@@ -230,10 +231,10 @@ INLINE void tangent_blocks(Vec3 e, double inverse, double tension, Vec3 bow1, Ve
             put(k11, 0, 3, i, j, -skew[i][j] - e1, is_sum);
             put(k11, 3, 0, j, i, -skew[i][j] - e1, is_sum);
             put(k11, 3, 3, i, j, c * p + kt * vv + ka * w1[i] * w1[j], is_sum);
-            put(k22, 0, 0, i, j, tt, is_sum);
-            put(k22, 0, 3, i, j, skew[i][j] + e2, is_sum);
-            put(k22, 3, 0, j, i, skew[i][j] + e2, is_sum);
-            put(k22, 3, 3, i, j, c * p + kt * vv + ka * w2[i] * w2[j], is_sum);
+            put(k22, 0, 0, i, j, tt, false);
+            put(k22, 0, 3, i, j, skew[i][j] + e2, false);
+            put(k22, 3, 0, j, i, skew[i][j] + e2, false);
+            put(k22, 3, 3, i, j, c * p + kt * vv + ka * w2[i] * w2[j], false);
             put(k21, 0, 0, i, j, -tt, false);
             put(k21, 0, 3, i, j, skew[i][j] + e1, false);
             put(k21, 3, 0, j, i, -skew[i][j] - e2, false);

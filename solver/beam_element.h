@@ -76,7 +76,8 @@ typedef struct BeamTangent {
 } BeamTangent;
 void beam_tangent(Vec3 chord, double inverse, double tension, Vec3 bow1, Vec3 bow2, double length, double axial, double near, double far,
                   double twist, double scale, BeamTangent *tangent);
-// Adds the tangents of elements first to last-1 into the chain's diagonal blocks and writes the lower ones.
+// Writes the blocks of elements first to last-1 into the chain: lower ones, and the diagonal ones of nodes first to last, of which the first
+// is added to.
 void beam_chain_tangent(const BeamRest *rest, const BeamStrain *strain, int first, int last, double scale, BlockChain *chain);
 
 // c and d of a beam of this length: moments per rotation of the near and of the far end.

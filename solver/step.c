@@ -323,8 +323,35 @@ static void solve(Stepper *s)
         s->report.flags |= STEP_NOT_CONVERGED;
     for (int k = 0; k < s->set.count; k++)
         s->force[s->set.point[k].node] = s->set.point[k].force;
+    double sum = 0;
     for (int i = 0; i < 6 * s->state.node_count; i++)
-        s->has_failed |= !isfinite(s->u[i]);
+        sum += s->u[i] * 0;          // 0, or not a number
+    s->has_failed |= sum != 0;
+}
+
+// The largest turn of an element's chord or of a node against the iterate [rad]; a node's turn about the axis does not count.
+static double largest_turn(const Stepper *s)
+{
+    const BeamStrain *e = &s->strain;
+    double largest = 0;
+    for (int i = s->first_free; i < s->state.node_count; i++) {
+        const double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
+        Vec3 turn = vec3(u[3] - k[3], u[4] - k[4], u[5] - k[5]);
+        Quat q = s->state.orientation[i];
+        Vec3 axis = vec3(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y));
+        double node = vec3_norm2(vec3_cross(turn, axis)), chord = 0;
+        if (i > s->first_free) {
+            Vec3 d = vec3(u[0] - u[-6] - k[0] + k[-6], u[1] - u[-5] - k[1] + k[-5], u[2] - u[-4] - k[2] + k[-4]);
+            chord = vec3_norm2(vec3_cross(vec3(e->ex[i - 1], e->ey[i - 1], e->ez[i - 1]), d)) * (e->inverse[i - 1] * e->inverse[i - 1]);
+        } else if (i > 0) {
+            // from the mouth
+            Vec3 d = vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]);
+            chord = vec3_norm2(vec3_cross(s->mouth_element.chord, d)) / (s->wire.length[i - 1] * s->wire.length[i - 1]);
+        }
+        largest = largest > node ? largest : node;
+        largest = largest > chord ? largest : chord;
+    }
+    return sqrt(largest);
 }
 
 // A wire that springs goes further than anybody looked: look that far, and solve again.
@@ -337,24 +364,16 @@ static void solve_contained(Stepper *s)
         s->knows_motion = false;
         solve(s);
     }
+    s->turn = s->has_failed ? 0 : largest_turn(s);
 }
 
-// The largest turn of an element's chord or of a node against the iterate [rad]; a node's turn about the axis does not count.
-static double largest_turn(const Stepper *s)
+// A product of unit quaternions, unit again: one Newton step instead of a root, where rounding is all that is wrong.
+static Quat unit_again(Quat q)
 {
-    double largest = 0;
-    for (int i = s->first_free; i < s->state.node_count; i++) {
-        const double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
-        Vec3 turn = vec3(u[3] - k[3], u[4] - k[4], u[5] - k[5]);
-        Vec3 axis = quat_rotate(s->state.orientation[i], vec3(1, 0, 0));
-        largest = fmax(largest, vec3_norm2(vec3_cross(turn, axis)));
-        if (i == s->first_free)
-            continue;
-        Vec3 e = vec3_scale(vec3_sub(s->state.position[i], s->state.position[i - 1]), 1 / s->wire.length[i - 1]);
-        Vec3 d = vec3(u[0] - u[-6] - k[0] + k[-6], u[1] - u[-5] - k[1] + k[-5], u[2] - u[-4] - k[2] + k[-4]);
-        largest = fmax(largest, vec3_norm2(vec3_cross(e, d)) / (s->wire.length[i - 1] * s->wire.length[i - 1]));
-    }
-    return sqrt(largest);
+    double n = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z, scale = 1.5 - 0.5 * n;
+    if (!(fabs(n - 1) < 1e-7))
+        return quat_unit(q);
+    return (Quat){q.w * scale, q.x * scale, q.y * scale, q.z * scale};
 }
 
 // exp of half the rotation vector; series where the angle is small, which is always in a good step.
@@ -431,7 +450,7 @@ static void move(Stepper *s, double turn)
         double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
         if (i >= s->first_free) {
             Vec3 rotation = vec3_scale(vec3(u[3] - k[3], u[4] - k[4], u[5] - k[5]), part);
-            w->orientation[i] = quat_unit(quat_mul(small_rotation(rotation), w->orientation[i]));
+            w->orientation[i] = unit_again(quat_mul(small_rotation(rotation), w->orientation[i]));
             Vec3 d = vec3_sub(w->position[i], s->start_position[i]);
             k[0] = d.x, k[1] = d.y, k[2] = d.z;
             k[3] += rotation.x, k[4] += rotation.y, k[5] += rotation.z;
@@ -449,10 +468,9 @@ void step_contact(Stepper *s)
 {
     solve_contained(s);
     for (int iteration = 1; iteration < s->newton_max && !s->has_failed; iteration++) {
-        double turn = largest_turn(s);
-        if (turn <= s->newton_motion)
+        if (s->turn <= s->newton_motion)
             break;
-        move(s, turn);
+        move(s, s->turn);
         s->is_iterate = true;
         stepper_detect(s);
         stepper_assemble(s);
@@ -487,7 +505,8 @@ static void set_velocities(Stepper *s)
         }
         w->velocity[i] = vec3(u[0] * rate, u[1] * rate, u[2] * rate);
         w->spin[i] = vec3(u[3] * rate, u[4] * rate, u[5] * rate);
-        s->clearance[i] -= sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+        if (s->clearance[i] > 0)
+            s->clearance[i] -= sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
     }
 }
 
@@ -517,15 +536,12 @@ void step_correct(Stepper *s)
     s->state.time += s->dt;
     if (!s->has_failed) {
         report_forces(s);
-        double turn = largest_turn(s);
-        if (turn > TURN_MAX)
+        if (s->turn > TURN_MAX)
             s->report.flags |= STEP_LIMITED;
-        move(s, turn);
+        move(s, s->turn);
         set_velocities(s);
         s->state.inserted += s->command.advance;
         s->state.twist += s->command.twist;
-        for (int i = 0; i < s->state.node_count; i++)
-            s->has_failed |= !vec3_is_finite(s->state.position[i]);
     }
     if (s->has_failed)
         keep_last_state(s);

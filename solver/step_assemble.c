@@ -39,10 +39,10 @@ static void free_nodes(Stepper *s)
         Quat q = s->state.orientation[i];
         double t[3] = {1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y)};
         double lateral = w->inertia_lateral[i], excess = w->inertia_axial[i] - lateral;
-        d[0] = d[7] = d[14] = m * inertia;
+        d[0] += m * inertia, d[7] += m * inertia, d[14] += m * inertia;
         for (int r = 0; r < 3; r++)
             for (int c = 0; c < 3; c++)
-                d[(3 + r) * 6 + 3 + c] = (excess * t[r] * t[c] + (r == c ? lateral : 0)) * inertia;
+                d[(3 + r) * 6 + 3 + c] += (excess * t[r] * t[c] + (r == c ? lateral : 0)) * inertia;
         Vec3 v = s->state.velocity[i], spin = s->state.spin[i], axis = vec3(t[0], t[1], t[2]);
         add_vec(b, vec3_scale(vec3_add_scaled(vec3_scale(s->gravity, h), 1, v), m / h));
         add_vec(b + 3, vec3_scale(vec3_add_scaled(vec3_scale(spin, lateral), excess * vec3_dot(axis, spin), axis), 1 / h));
@@ -171,12 +171,13 @@ static void constraints(Stepper *s)
                 prescribe(s, i, k, 0);
 }
 
+// Nodes in the sheath and the first free one; the elements write the blocks of the others.
 static void clear_system(Stepper *s)
 {
-    size_t nodes = (size_t)s->chain.count;
-    memset(s->chain.diag, 0, 36 * nodes * sizeof(double));
-    if (s->first_free > 1)
-        memset(s->chain.lower, 0, 36 * ((size_t)s->first_free - 1) * sizeof(double));
+    size_t nodes = (size_t)s->chain.count, held = (size_t)s->first_free;
+    memset(s->chain.diag, 0, 36 * (held < nodes ? held + 1 : nodes) * sizeof(double));
+    if (held > 1)
+        memset(s->chain.lower, 0, 36 * (held - 1) * sizeof(double));
     memset(s->b, 0, 6 * nodes * sizeof(double));
 }
 
@@ -184,9 +185,9 @@ static void clear_system(Stepper *s)
 static void iterate_product(Stepper *s)
 {
     clear_system(s);
+    beam_chain_tangent(&s->rest, &s->strain, s->first_free, s->wire.element_count, 1, &s->chain);
     if (s->first_free > 0 && s->first_free < s->chain.count)
         mouth_element(s, 1);
-    beam_chain_tangent(&s->rest, &s->strain, s->first_free, s->wire.element_count, 1, &s->chain);
     contact_add_curvature(&s->set, &s->chain);
     for (int i = 0; i + 1 < s->first_free; i++) {
         double *d = s->chain.diag + 36 * (size_t)i, *l = s->chain.lower + 36 * (size_t)i, ka = s->rest.axial[i], kt = s->rest.twist[i];
@@ -207,8 +208,8 @@ void stepper_assemble(Stepper *s)
     clear_system(s);
     if (s->is_iterate)
         memcpy(s->b, s->product, unknowns * sizeof(double));
-    free_nodes(s);
     beam_chain_tangent(&s->rest, &s->strain, s->first_free, s->wire.element_count, scale, &s->chain);
+    free_nodes(s);
     if (s->first_free > 0) {
         if (s->first_free < s->chain.count)
             mouth_element(s, scale);

@@ -67,6 +67,7 @@ struct Stepper {
     // of this step
     StepCommand command;
     StepReport report;
+    double turn;             // [rad] largest of the solution against the iterate
     bool knows_motion;       // u is an answer to this iterate: detection looks as far as it goes
     bool has_failed;
     bool is_iterate;         // linearised about something else than x_n
