@@ -1,0 +1,235 @@
+// The fused single-precision loops against a plain double twin written from eq. (3) to (7), and its slopes against central differences of the
+// twin. Single precision sums of some hundred terms: 1e-5 of the energy; slopes 1e-4 of the largest.
+#include "recon/lim_energy.h"
+
+#include "geom/blobby.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include <stdlib.h>
+
+enum { BLOBS = 5, POINTS = 137 };
+
+static const double ISO_LEVEL = 0.1;
+
+typedef struct Case {
+    LimPoints points;
+    LimBlob blob[BLOBS];
+} Case;
+
+static double next_uniform(uint64_t *state)
+{
+    *state = *state * 6364136223846793005u + 1442695040888963407u;
+    return (double)(*state >> 11) / 9007199254740992.0;
+}
+
+// Blobs along a bent line, points about 1 mm around it, guards in and out.
+static void make_case(Case *c, uint64_t seed)
+{
+    assert_true(lim_points_create(&c->points, POINTS));
+    for (int j = 0; j < BLOBS; j++)
+        c->blob[j] = (LimBlob){{-1.6 + 0.8 * j, 0.1 * j * j - 0.3, 0.2 * next_uniform(&seed)}, 0.35 + 0.1 * next_uniform(&seed)};
+    for (int i = 0; i < POINTS; i++) {
+        double angle = 2 * PI * next_uniform(&seed), radius = 0.8 + 0.5 * next_uniform(&seed);
+        c->points.x[i] = (float)(-2 + 4 * next_uniform(&seed));
+        c->points.y[i] = (float)(radius * cos(angle));
+        c->points.z[i] = (float)(radius * sin(angle));
+        c->points.weight[i] = (float)((0.5 + next_uniform(&seed)) / POINTS);
+        c->points.bend[i] = i % 10 < 8 ? 1.0f / POINTS : 0;
+        if (i % 10 == 8)
+            c->points.low[i] = 0.05f, c->points.high[i] = 1e30f;
+        if (i % 10 == 9)
+            c->points.low[i] = -1e30f, c->points.high[i] = -0.02f;
+    }
+}
+
+static void sums_without(Case *c, int moving)
+{
+    lim_points_reset(&c->points, ISO_LEVEL);
+    for (int j = 0; j < BLOBS; j++)
+        if (j != moving)
+            lim_points_add(&c->points, &c->blob[j], 1);
+}
+
+// The twin.
+static void plain_energy(const Case *c, double *distance, double *bend)
+{
+    Vec3 center[BLOBS];
+    double width[BLOBS];
+    for (int j = 0; j < BLOBS; j++) {
+        center[j] = vec3(c->blob[j].center[0], c->blob[j].center[1], c->blob[j].center[2]);
+        width[j] = c->blob[j].width;
+    }
+    Blobby model = {BLOBS, center, width, ISO_LEVEL};
+    *distance = *bend = 0;
+    for (int i = 0; i < POINTS; i++) {
+        Vec3 g;
+        Sym3 h;
+        double f = blobby_hessian(&model, vec3((double)c->points.x[i], (double)c->points.y[i], (double)c->points.z[i]), &g, &h);
+        double kappa = blobby_curvature(g, &h), e = f - fmin(fmax(f, (double)c->points.low[i]), (double)c->points.high[i]);
+        *distance += (double)c->points.weight[i] * e * e;
+        *bend += (double)c->points.bend[i] * kappa * kappa;
+    }
+}
+
+static double *parameter(LimBlob *blob, int k) { return k < 3 ? &blob->center[k] : &blob->width; }
+
+static void the_fused_loop_equals_the_plain_one(void **state)
+{
+    (void)state;
+    for (uint64_t seed = 1; seed <= 5; seed++) {
+        Case c;
+        make_case(&c, seed);
+        double distance, bend, whole_distance, whole_bend;
+        plain_energy(&c, &distance, &bend);
+        for (int j = 0; j < BLOBS; j++) {
+            sums_without(&c, j);
+            LimEnergy energy = lim_energy(&c.points, &c.blob[j]);
+            assert_true(fabs(energy.distance - distance) < 1e-5 * distance);
+            assert_true(fabs(energy.bend - bend) < 1e-4 * bend);
+        }
+        sums_without(&c, -1);
+        lim_energy_total(&c.points, &whole_distance, &whole_bend);
+        assert_true(fabs(whole_distance - distance) < 1e-5 * distance);
+        assert_true(fabs(whole_bend - bend) < 1e-4 * bend);
+        lim_points_free(&c.points);
+    }
+}
+
+// Against central differences of the twin.
+static void slopes_equal_differences(void **state)
+{
+    (void)state;
+    for (uint64_t seed = 1; seed <= 5; seed++) {
+        Case c;
+        make_case(&c, seed);
+        for (int j = 0; j < BLOBS; j++) {
+            sums_without(&c, j);
+            LimEnergy energy = lim_energy(&c.points, &c.blob[j]);
+            double numeric[2][4], scale[2] = {0};
+            for (int k = 0; k < 4; k++) {
+                double *p = parameter(&c.blob[j], k), kept = *p, step = 1e-5, up[2], down[2];
+                *p = kept + step;
+                plain_energy(&c, &up[0], &up[1]);
+                *p = kept - step;
+                plain_energy(&c, &down[0], &down[1]);
+                *p = kept;
+                for (int e = 0; e < 2; e++) {
+                    numeric[e][k] = (up[e] - down[e]) / (2 * step);
+                    scale[e] = fmax(scale[e], fabs(numeric[e][k]));
+                }
+            }
+            for (int k = 0; k < 4; k++) {
+                assert_true(fabs(energy.distance_slope[k] - numeric[0][k]) < 1e-4 * scale[0]);
+                assert_true(fabs(energy.bend_slope[k] - numeric[1][k]) < 1e-3 * scale[1]);
+            }
+        }
+        lim_points_free(&c.points);
+    }
+}
+
+// Columns are the derivatives of the residuals.
+static void columns_equal_differences(void **state)
+{
+    (void)state;
+    Case c;
+    make_case(&c, 9);
+    int n = c.points.padded;
+    float *column = calloc((size_t)(4 * n), sizeof *column), *up = calloc((size_t)n, sizeof *up), *down = calloc((size_t)n, sizeof *down);
+    sums_without(&c, -1);
+    lim_energy_columns(&c.points, &c.blob[2], column);
+    for (int k = 0; k < 4; k++) {
+        double *p = parameter(&c.blob[2], k), kept = *p, step = 2e-3;
+        *p = kept + step;
+        sums_without(&c, -1);
+        lim_energy_residuals(&c.points, up);
+        *p = kept - step;
+        sums_without(&c, -1);
+        lim_energy_residuals(&c.points, down);
+        *p = kept;
+        for (int i = 0; i < POINTS; i++) {
+            if ((up[i] == 0) != (down[i] == 0))   // a guard's bound lies between
+                continue;
+            double numeric = ((double)up[i] - (double)down[i]) / (2 * step);
+            assert_true(fabs(numeric - (double)column[k * n + i]) < 3e-4);
+        }
+    }
+    double dot = 0;
+    for (int i = 0; i < n; i++)
+        dot += (double)column[i] * (double)column[n + i];
+    assert_true(fabs(lim_energy_dot(column, column + n, n) - dot) < 1e-5 * (fabs(dot) + 1e-3));
+    free(column);
+    free(up);
+    free(down);
+    lim_points_free(&c.points);
+}
+
+static double plain_cohesion(const LimBlob *blob, int count, double s)
+{
+    double sum = 0;
+    for (int j = 0; j < count; j++)
+        for (int k = 0; k < count; k++) {
+            if (j == k)
+                continue;
+            double d = sqrt(pow(blob[j].center[0] - blob[k].center[0], 2) + pow(blob[j].center[1] - blob[k].center[1], 2) +
+                            pow(blob[j].center[2] - blob[k].center[2], 2));
+            double x = s * sqrt(blob[j].width * blob[k].width) / d;
+            sum += pow(x, 12) - 2 * pow(x, 6);
+        }
+    return sum / (count * (count - 1));
+}
+
+static void cohesion_equals_eq_7(void **state)
+{
+    (void)state;
+    Case c;
+    make_case(&c, 3);
+    double slope[4], all = plain_cohesion(c.blob, BLOBS, 2);
+    assert_true(fabs(lim_cohesion_total(c.blob, BLOBS, 2) - all) < 1e-9 * fabs(all));
+    for (int j = 0; j < BLOBS; j++) {
+        lim_cohesion(c.blob, BLOBS, j, 2, slope);
+        for (int k = 0; k < 4; k++) {
+            double *p = parameter(&c.blob[j], k), kept = *p, step = 1e-6;
+            *p = kept + step;
+            double up = plain_cohesion(c.blob, BLOBS, 2);
+            *p = kept - step;
+            double down = plain_cohesion(c.blob, BLOBS, 2);
+            *p = kept;
+            assert_true(fabs((up - down) / (2 * step) - slope[k]) < 1e-5 * (1 + fabs(slope[k])));
+        }
+    }
+    // the minimum: two equal blobs 2 rho apart, energy -1
+    LimBlob pair[2] = {{{0, 0, 0}, 0.5}, {{1, 0, 0}, 0.5}};
+    assert_true(fabs(lim_cohesion(pair, 2, 0, 2, slope) + 1) < 1e-9);
+    for (int k = 0; k < 4; k++)
+        assert_true(fabs(slope[k]) < 1e-9);
+    lim_points_free(&c.points);
+}
+
+// Taking a blob out leaves what was there before it came.
+static void adding_and_removing_cancels(void **state)
+{
+    (void)state;
+    Case c;
+    make_case(&c, 4);
+    sums_without(&c, 1);
+    float before = c.points.h[3][17];
+    lim_points_add(&c.points, &c.blob[1], 1);
+    assert_true(c.points.h[3][17] != before);
+    lim_points_add(&c.points, &c.blob[1], -1);
+    assert_true(fabs((double)(c.points.h[3][17] - before)) < 1e-6);
+    lim_points_free(&c.points);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_fused_loop_equals_the_plain_one), cmocka_unit_test(slopes_equal_differences), cmocka_unit_test(columns_equal_differences),
+        cmocka_unit_test(cohesion_equals_eq_7),                cmocka_unit_test(adding_and_removing_cancels),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
