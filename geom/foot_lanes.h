@@ -13,7 +13,7 @@
 
 #include "geom/blob_lanes.h"
 
-enum { FOOT_BATCH = 32 };
+enum { FOOT_BATCH = 32, FOOT_BLOCK = 8 };   // lanes a batch, and lanes that are computed together
 
 // State of a lane, as a double so that it lives in the same vectors.
 #define FOOT_PENDING 0.0
@@ -45,10 +45,10 @@ typedef struct FootBatch {
     FootLane axx, axy, axz, ayy, ayz, azz;   // … and the gap's Hessian at X, S (I + gap S)^-1
 } FootBatch;
 
-// One step of all pending lanes from their samples.
-static inline __attribute__((always_inline)) void foot_newton(FootBatch *restrict b)
+// One step of a block's pending lanes from their samples.
+static inline __attribute__((always_inline)) void foot_newton(FootBatch *restrict b, int block)
 {
-    for (int i = 0; i < FOOT_BATCH; i++) {
+    for (int i = block; i < block + FOOT_BLOCK; i++) {
         double gx = b->gx[i], gy = b->gy[i], gz = b->gz[i], slope2 = gx * gx + gy * gy + gz * gz;
         double flat = 1 / sqrt(slope2 > 1e-200 ? slope2 : 1.0);
         double nx = gx * flat, ny = gy * flat, nz = gz * flat;
@@ -81,14 +81,16 @@ static inline __attribute__((always_inline)) void foot_newton(FootBatch *restric
         double sx = xx * tx + xy * ty + xz * tz, sy = xy * tx + yy * ty + yz * tz, sz = xz * tx + yz * ty + zz * tz;   // S t
         double nu = -(taubin + 0.5 * (tx * sx + ty * sy + tz * sz)), size = fabs(nu);
         px += tx + nu * nx, py += ty + nu * ny, pz += tz + nu * nz;
-        // what the step leaves: of the foot's place (hence the normal) second order, of f/|g| third order, in units of the curvature
+        // what the step leaves: of the foot's place (hence the normal) second order, of f/|g| third order, in units of the curvature. A foot that was
+        // followed from close by may leave 1e-8 mm, one found afresh less.
+        double careful = b->careful[i], allowed = careful > 0 ? 1e-9 : 1e-8;
         double curl = fabs(mean) + spread + 1 / b->radius[i], left = curl * along * along;
-        double done = left < 1e-6 && size < 1e-4 && curl * (along + size) * (left + size) < 1e-9 ? 1.0 : 0.0;
+        double done = left < 1e-6 && size < 1e5 * allowed && curl * (along + size) * (left + size) < allowed ? 1.0 : 0.0;
         // the normal turns by S t along the step
         nx += sx, ny += sy, nz += sz;
         double unit = 1 / sqrt(nx * nx + ny * ny + nz * nz);
         nx *= unit, ny *= unit, nz *= unit;
-        double careful = b->careful[i], state = done > 0 ? FOOT_DONE : FOOT_PENDING;
+        double state = done > 0 ? FOOT_DONE : FOOT_PENDING;
         state = far > careful * 2 ? FOOT_LOST : state;
         state = deep > careful * 2 ? FOOT_DEEP : state;
         state = slope2 > 1e-200 ? state : FOOT_LOST;
@@ -102,10 +104,10 @@ static inline __attribute__((always_inline)) void foot_newton(FootBatch *restric
     }
 }
 
-// Gap and Hessian at X of all lanes from foot, normal and S: phi(k) = k / (1 + gap k), the divisor held at 0.1 near focal points.
-static inline __attribute__((always_inline)) void foot_finish(FootBatch *restrict b)
+// Gap and Hessian at X of a block from foot, normal and S: phi(k) = k / (1 + gap k), the divisor held at 0.1 near focal points.
+static inline __attribute__((always_inline)) void foot_finish(FootBatch *restrict b, int block)
 {
-    for (int i = 0; i < FOOT_BATCH; i++) {
+    for (int i = block; i < block + FOOT_BLOCK; i++) {
         double nx = b->nx[i], ny = b->ny[i], nz = b->nz[i];
         double gap = (b->xx[i] - b->px[i]) * nx + (b->xy[i] - b->py[i]) * ny + (b->xz[i] - b->pz[i]) * nz;
         double k1 = b->k1[i], k2 = b->k2[i], m1 = 1 + gap * k1, m2 = 1 + gap * k2, spread = k1 - k2;
@@ -125,11 +127,11 @@ static inline __attribute__((always_inline)) void foot_finish(FootBatch *restric
     }
 }
 
-// `inside` and `estimate` of all lanes from the samples at X.
-static inline __attribute__((always_inline)) void foot_estimate(FootBatch *restrict b, double iso_level)
+// `inside` and `estimate` of a block from the samples at X.
+static inline __attribute__((always_inline)) void foot_estimate(FootBatch *restrict b, int block, double iso_level)
 {
     double level = 1 / sqrt(iso_level);
-    for (int i = 0; i < FOOT_BATCH; i++) {
+    for (int i = block; i < block + FOOT_BLOCK; i++) {
         double gx = b->gx[i], gy = b->gy[i], gz = b->gz[i], slope2 = gx * gx + gy * gy + gz * gz, f = b->f[i];
         double sum = f + iso_level, w = 1 / sqrt(sum), part = sum * sqrt(sum) * fabs(w - level);   // |W| / w^3
         b->estimate[i] = slope2 > 1e-280 ? 2 * part / sqrt(slope2 > 1e-280 ? slope2 : 1.0) : 1e300;
@@ -144,9 +146,10 @@ typedef struct LaneKernels {
     // for its own division and sums, others fit into that gap.
     void (*gradient)(FootBatch *batch, const int *lane, int count, double iso_level);
     void (*hessian)(FootBatch *batch, const int *lane, int count, double iso_level);
-    void (*newton)(FootBatch *batch);
-    void (*finish)(FootBatch *batch);
-    void (*estimate)(FootBatch *batch, double iso_level);
+    // Of the first `count` lanes, in whole blocks: the rest of the last block must hold numbers. newton leaves blocks alone where nothing is pending.
+    void (*newton)(FootBatch *batch, int count);
+    void (*finish)(FootBatch *batch, int count);
+    void (*estimate)(FootBatch *batch, int count, double iso_level);
 } LaneKernels;
 // isa: 0 the widest the CPU has, 1 SSE2, 2 AVX2, 3 AVX-512; the next narrower one where it is absent.
 const LaneKernels *lane_kernels(int isa);

@@ -21,6 +21,7 @@ typedef struct NodeModel {
     const BlobGroup *group;
     int groups;
     int source;              // the node whose blobs these are: itself, or the nearest relative where it has none
+    double band;             // [mm^2] width of the zone in which it is mixed, in power distance
     double clear;            // [mm] true distance from the node's centre to the wall of this model, less a margin; < 0: no bound
 } NodeModel;
 
@@ -55,6 +56,13 @@ static Blobby blobs_of(const LimVessel *lim, int node)
     return (Blobby){(int)(end - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level};
 }
 
+// Where Newton gives up at once the answer must still be numbers for the stages that run over whole blocks.
+static void clear_answer(FootBatch *b, int i)
+{
+    b->nx[i] = b->ny[i] = b->nz[i] = b->gap[i] = b->k1[i] = b->k2[i] = 0;
+    b->sxx[i] = b->sxy[i] = b->sxz[i] = b->syy[i] = b->syz[i] = b->szz[i] = 0;
+}
+
 static void set_lane(const LimVessel *lim, FootBatch *b, int i, int node, Vec3 x, Vec3 start)
 {
     const NodeModel *m = &lim->model[node];
@@ -66,13 +74,20 @@ static void set_lane(const LimVessel *lim, FootBatch *b, int i, int node, Vec3 x
     b->longest[i] = 0.5 * b->radius[i];
     b->careful[i] = 0;
     b->state[i] = FOOT_PENDING;
+    clear_answer(b, i);
 }
 
-// Lanes in use are computed all, whether they are pending or not; those beyond must hold something harmless.
-static void clear_lanes(FootBatch *b, int count)
+// Lanes are computed in whole blocks: those beyond the last in use get numbers, and nothing waits for them.
+static void fill_block(FootBatch *b, int count)
 {
-    for (int i = count; i < FOOT_BATCH; i++)
+    for (int i = count; i % FOOT_BLOCK != 0; i++) {
+        b->xx[i] = b->xy[i] = b->xz[i] = b->px[i] = b->py[i] = b->pz[i] = b->careful[i] = 0;
+        b->radius[i] = b->longest[i] = 1;
+        b->f[i] = b->gx[i] = b->gy[i] = b->gz[i] = 0;
+        b->hxx[i] = b->hxy[i] = b->hxz[i] = b->hyy[i] = b->hyz[i] = b->hzz[i] = 0;
+        clear_answer(b, i);
         b->state[i] = FOOT_LOST;
+    }
 }
 
 // At most `rounds` Newton steps of the pending lanes; those that are not done then are lost.
@@ -87,7 +102,7 @@ static void newton_rounds(const LimVessel *lim, FootBatch *b, int count, int rou
         if (n == 0)
             return;
         lim->kernels->hessian(b, lane, n, lim->tree->iso_level);
-        lim->kernels->newton(b);
+        lim->kernels->newton(b, count);
     }
     for (int i = 0; i < count; i++)
         if (b->state[i] == FOOT_PENDING)
@@ -169,13 +184,13 @@ static void project_batch(const LimVessel *lim, FootBatch *b, Lane *of, int coun
         if (of[i].again)
             b->state[i] = FOOT_LOST;
     }
-    clear_lanes(b, count);
+    fill_block(b, count);
     lim->kernels->gradient(b, lane, count, lim->tree->iso_level);
-    lim->kernels->estimate(b, lim->tree->iso_level);
+    lim->kernels->estimate(b, count, lim->tree->iso_level);
     for (int i = 0; i < count; i++)
         b->px[i] = start[0][i], b->py[i] = start[1][i], b->pz[i] = start[2][i];
     newton_rounds(lim, b, count, 4);
-    lim->kernels->finish(b);
+    lim->kernels->finish(b, count);
     for (int i = 0; i < count; i++) {
         of[i].again = b->state[i] != FOOT_DONE || is_on_wrong_side(b, i) || !(b->estimate[i] > 0.8 * fabs(b->gap[i]));
         if (of[i].again)
@@ -191,7 +206,7 @@ static void project_batch(const LimVessel *lim, FootBatch *b, Lane *of, int coun
             b->longest[i] = b->radius[i];
         }
     newton_rounds(lim, b, count, 12);
-    lim->kernels->finish(b);
+    lim->kernels->finish(b, count);
     bool slow = false;
     for (int i = 0; i < count; i++)
         if (of[i].again && (b->state[i] != FOOT_DONE || is_on_wrong_side(b, i))) {
@@ -199,7 +214,7 @@ static void project_batch(const LimVessel *lim, FootBatch *b, Lane *of, int coun
             slow = true;
         }
     if (slow)
-        lim->kernels->finish(b);
+        lim->kernels->finish(b, count);
 }
 
 // --- The inlet ---
@@ -254,13 +269,15 @@ static bool upstream_of_inlet(const LimVessel *lim, Vec3 x)
 
 // --- The blended field ---
 
-enum { BLEND_MAX = 8 };
+enum { BLEND_MAX = 5 };   // the own node and the first four neighbours
 // Models that differ by less than this are mixed, ever less the more they differ: a quarter of the radius, and never so much that the mixed wall
 // leaves the own model's by more than 0.05 mm (0.18 of it, for one neighbour). One that says something else altogether is a ghost and left out.
 static double blend_agree(double radius) { return fmin(0.25 * radius, 0.25); }
+// The mixed gap is less than the own model's by no more than this: sum w q / (1 + sum w) < 1/2 of the above for up to four neighbours, w = (1 - q^2)^2.
+static double blend_least(double radius) { return 0.5 * blend_agree(radius); }
 // Half width of the mixed zone: a neighbour counts where its power distance exceeds the best by less than this part of the node spacing squared,
-// 0 at the cell's border, 1 at its middle.
-static const double BLEND_BAND = 0.75;
+// which is 0 at the cell's border and 1 at its middle.
+static const double BLEND_BAND = 0.5;
 
 typedef struct Blend {
     int count;
@@ -277,30 +294,31 @@ static double spacing2(const VesselTree *tree, int node)
     return end > first ? sum / (end - first) : 0;
 }
 
-static void blend_add(const VesselTree *tree, Vec3 x, double best, int node, Blend *blend)
+static void blend_add(const LimVessel *lim, Vec3 x, double best, int node, Blend *blend)
 {
+    double behind = power_distance(x, lim->tree->center[node], lim->tree->radius[node]) - best, band = lim->model[node].band;
+    if (blend->count == BLEND_MAX || !(behind < band))
+        return;
     for (int i = 0; i < blend->count; i++)
         if (blend->node[i] == node)
             return;
-    double behind = power_distance(x, tree->center[node], tree->radius[node]) - best, band = BLEND_BAND * spacing2(tree, node);
-    if (blend->count == BLEND_MAX || !(behind < band))
-        return;
     double q = behind / band, w = 1 - q * q;
     blend->node[blend->count] = node;
     blend->weight[blend->count++] = behind <= 0 ? 1 : w * w;
 }
 
 // The node and those up to two links away whose cells are close: two, so that the set stays the same when the node changes.
-static void blend_collect(const VesselTree *tree, Vec3 x, int node, Blend *blend)
+static void blend_collect(const LimVessel *lim, Vec3 x, int node, Blend *blend)
 {
+    const VesselTree *tree = lim->tree;
     double best = power_distance(x, tree->center[node], tree->radius[node]);
     *blend = (Blend){.count = 1, .node = {node}, .weight = {1}};
     for (int k = tree->neighbour_offset[node]; k < tree->neighbour_offset[node + 1]; k++) {
         int next = tree->neighbour[k];
-        blend_add(tree, x, best, next, blend);
+        blend_add(lim, x, best, next, blend);
         for (int l = tree->neighbour_offset[next]; l < tree->neighbour_offset[next + 1]; l++)
             if (tree->neighbour[l] != node)
-                blend_add(tree, x, best, tree->neighbour[l], blend);
+                blend_add(lim, x, best, tree->neighbour[l], blend);
     }
 }
 
@@ -335,27 +353,27 @@ static void mix_in(const LimVessel *lim, Mixture *mix, const FootBatch *b, int i
 // Projects the queued neighbours from the own feet of their points, and mixes them in, in order. of[].point is the mixture.
 static void mix_queue(const LimVessel *lim, FootBatch *b, const Lane *of, int count, Mixture *mixture)
 {
-    clear_lanes(b, count);
+    fill_block(b, count);
     newton_rounds(lim, b, count, 4);
-    lim->kernels->finish(b);
+    lim->kernels->finish(b, count);
     for (int i = 0; i < count; i++)
         mix_in(lim, &mixture[of[i].point], b, i, &of[i]);
 }
 
-static void blend_batch(const LimVessel *lim, const FootBatch *own, const Lane *own_of, int count, VesselHit *hit)
+static void blend_batch(const LimVessel *lim, const FootBatch *own, const Lane *own_of, int count, double reach, VesselHit *hit)
 {
     Mixture mixture[FOOT_BATCH];
-    FootBatch queue = {0};
+    FootBatch queue;
     Lane of[FOOT_BATCH];
     int queued = 0;
     for (int i = 0; i < count; i++) {
         Blend blend;
         VesselHit *h = &hit[own_of[i].point];
         mixture[i] = (Mixture){h, h->gap, 1, h->normal, h->hessian};
-        if (!own_of[i].sure)
+        if (!own_of[i].sure || h->gap - blend_least(own->radius[i]) > reach)
             continue;
         Vec3 x = lane_point(own, i);
-        blend_collect(lim->tree, x, own_of[i].node, &blend);
+        blend_collect(lim, x, own_of[i].node, &blend);
         for (int k = 1; k < blend.count; k++) {
             if (queued == FOOT_BATCH) {
                 mix_queue(lim, &queue, of, queued, mixture);
@@ -403,22 +421,24 @@ static bool answer_cheaply(const LimVessel *lim, Vec3 x, double reach, VesselMem
         *hit = open_end(memory, node);
         return true;
     }
-    double agree = lim->options.field == LIM_BLEND ? blend_agree(tree->radius[node]) : 0;
+    double mixed = lim->options.field == LIM_BLEND ? blend_least(tree->radius[node]) : 0;
     double bound = lim->model[node].clear - vec3_distance(x, tree->center[node]);
     if (memory->clearance > 0)
         bound = fmax(bound, memory->clearance - vec3_distance(x, memory->place));
-    hit->gap = bound - agree;
+    hit->gap = bound - mixed;
     hit->flags = VESSEL_FAR;
     return hit->gap > reach;
 }
 
-// Where the foot should be now: (I + gap S)^-1 P = P - gap H of the motion, H the gap's Hessian then.
+// Where the foot should be now: t = (I + gap S)^-1 P dx = P dx - gap H dx along the wall, H the gap's Hessian then; and t'S t / 2 = t'H dx / 2 down with it.
 static Vec3 predicted_foot(const VesselMemory *memory, Vec3 x, double radius)
 {
     Vec3 move = vec3_sub(x, memory->place), n = memory->normal, bend = sym3_mul_vec(&memory->hessian, move);
     double gap = vec3_dot(vec3_sub(memory->place, memory->foot), n);
     Vec3 shift = vec3_add_scaled(vec3_add_scaled(move, -vec3_dot(move, n), n), -gap, bend);
-    return vec3_norm2(shift) < 0.04 * radius * radius ? vec3_add(memory->foot, shift) : memory->foot;
+    if (!(vec3_norm2(shift) < 0.04 * radius * radius))
+        return memory->foot;
+    return vec3_add_scaled(vec3_add(memory->foot, shift), -0.5 * vec3_dot(shift, bend), n);
 }
 
 // The hit of a lane. False where the inlet decided, and there is nothing to blend.
@@ -444,7 +464,7 @@ static bool answer_from_foot(const LimVessel *lim, const FootBatch *b, int i, co
 
 static void query_batch(const LimVessel *lim, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
-    FootBatch batch = {0};
+    FootBatch batch;
     Lane of[FOOT_BATCH];
     int n = 0;
     for (int i = 0; i < count; i++) {
@@ -461,7 +481,7 @@ static void query_batch(const LimVessel *lim, int count, const Vec3 *point, doub
     for (int i = 0; i < n; i++)
         of[i].sure = answer_from_foot(lim, &batch, i, &of[i], &memory[of[i].point], &hit[of[i].point]) && of[i].sure;
     if (lim->options.field == LIM_BLEND)
-        blend_batch(lim, &batch, of, n, hit);
+        blend_batch(lim, &batch, of, n, reach, hit);
 }
 
 static void lim_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
@@ -536,6 +556,7 @@ static void fill_models(LimVessel *lim)
         } else {
             m->group = NULL;   // below, when all are filled
         }
+        m->band = BLEND_BAND * spacing2(tree, i);
         // a twentieth off, should the projection have found another side's foot
         SurfacePoint s = blobby_project(&blobs, tree->center[i], tree->center[i]);
         m->clear = s.converged && s.distance > 0 ? 0.95 * s.distance : -HUGE_VAL;
