@@ -1,4 +1,4 @@
-// Synthetic vessels. A part is the union of spheres of radius r(t) along a curve C(t), both natural cubic splines of arc length (chord length at the
+// Synthetic vessels. A part is the union of spheres of radius r(t) along a curve C(t), both cubic splines of arc length (chord length at the
 // knots), straight beyond open ends:
 //   f_part(X) = max_t r(t) - |X - C(t)|      exact signed distance of the swept surface (outside everywhere, inside up to the medial axis)
 // A part and the part it grows from are joined by the cubic smooth maximum of width k (C2):
@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { KNOTS = 24, PARTS = 8, BLOCK = 8 };
+enum { KNOTS = 64, PARTS = 8, BLOCK = 8 };
 
 typedef struct Spline {      // one coordinate: value and second derivative at each knot
     double value[KNOTS], bend[KNOTS];
@@ -45,25 +45,26 @@ struct Shape {
 
 // --- Splines ---
 
-// Natural cubic spline (tridiagonal system for the second derivatives).
-static void spline_solve(Spline *s, const double *at, int n)
+// Cubic spline: tridiagonal system for the second derivatives; natural where an end's slope is NAN, else clamped to it.
+static void spline_solve(Spline *s, const double *at, int n, double first_slope, double last_slope)
 {
-    double diagonal[KNOTS], right[KNOTS];
-    s->bend[0] = s->bend[n - 1] = 0;
-    for (int i = 1; i < n - 1; i++) {
-        double h0 = at[i] - at[i - 1], h1 = at[i + 1] - at[i];
+    double diagonal[KNOTS], upper[KNOTS], right[KNOTS];
+    for (int i = 0; i < n; i++) {
+        double h0 = i > 0 ? at[i] - at[i - 1] : 0, h1 = i < n - 1 ? at[i + 1] - at[i] : 0, lower = h0 / 6;
+        double before = i > 0 ? (s->value[i] - s->value[i - 1]) / h0 : first_slope, after = i < n - 1 ? (s->value[i + 1] - s->value[i]) / h1 : last_slope;
         diagonal[i] = (h0 + h1) / 3;
-        right[i] = (s->value[i + 1] - s->value[i]) / h1 - (s->value[i] - s->value[i - 1]) / h0;
-        if (i > 1) {
-            double factor = h0 / 6 / diagonal[i - 1];
-            diagonal[i] -= factor * h0 / 6;
+        upper[i] = h1 / 6;
+        right[i] = after - before;
+        if ((i == 0 && isnan(first_slope)) || (i == n - 1 && isnan(last_slope)))
+            diagonal[i] = 1, upper[i] = lower = right[i] = 0;
+        if (i > 0) {
+            double factor = lower / diagonal[i - 1];
+            diagonal[i] -= factor * upper[i - 1];
             right[i] -= factor * right[i - 1];
         }
     }
-    for (int i = n - 2; i > 0; i--) {
-        double h1 = at[i + 1] - at[i];
-        s->bend[i] = (right[i] - h1 / 6 * s->bend[i + 1]) / diagonal[i];
-    }
+    for (int i = n - 1; i >= 0; i--)
+        s->bend[i] = (right[i] - (i < n - 1 ? upper[i] * s->bend[i + 1] : 0)) / diagonal[i];
 }
 
 // Value and first derivative; linear beyond the ends.
@@ -98,7 +99,9 @@ static Station part_at(const Part *part, double t)
 
 // --- Parts ---
 
-static bool part_build(Part *part, const double (*knot)[4], int count, bool open_start, bool open_end, int parent, uint8_t kind)
+// `end_slope`: tangents (dx, dy, dz, dr per mm) at both ends, or NULL: natural.
+static bool part_build(Part *part, const double (*knot)[4], int count, bool open_start, bool open_end, int parent, uint8_t kind,
+                       const double (*end_slope)[4])
 {
     *part = (Part){.knot_count = count, .open_start = open_start, .open_end = open_end, .parent = parent, .kind = kind};
     double least = HUGE_VAL;
@@ -110,7 +113,7 @@ static bool part_build(Part *part, const double (*knot)[4], int count, bool open
         least = fmin(least, knot[i][3]);
     }
     for (int k = 0; k < 4; k++)
-        spline_solve(&part->coordinate[k], part->at, count);
+        spline_solve(&part->coordinate[k], part->at, count, end_slope ? end_slope[0][k] : NAN, end_slope ? end_slope[1][k] : NAN);
     part->low = open_start ? -6 * knot[0][3] : 0;
     part->high = part->at[count - 1] + (open_end ? 6 * knot[count - 1][3] : 0);
     double step = 0.2 * least;
@@ -344,7 +347,7 @@ static bool build_capsule(Shape *shape, const ShapeOptions *o, bool open)
     for (int i = 0; i < 5; i++)
         memcpy(knot[i], (double[4]){o->length_mm * i / 4, 0, 0, o->radius_mm}, sizeof knot[i]);
     shape->part_count = 1;
-    return part_build(&shape->part[0], (const double (*)[4])knot, 5, open, open, -1, NODE_VESSEL);
+    return part_build(&shape->part[0], (const double (*)[4])knot, 5, open, open, -1, NODE_VESSEL, NULL);
 }
 
 static bool build_arc(Shape *shape, const ShapeOptions *o)
@@ -355,20 +358,22 @@ static bool build_arc(Shape *shape, const ShapeOptions *o)
         memcpy(knot[i], (double[4]){o->bend_radius_mm * sin(angle), o->bend_radius_mm * (1 - cos(angle)), 0, o->radius_mm}, sizeof knot[i]);
     }
     shape->part_count = 1;
-    return part_build(&shape->part[0], (const double (*)[4])knot, KNOTS, true, true, -1, NODE_VESSEL);
+    const double tangent[2][4] = {{1, 0, 0, 0}, {-1, 0, 0, 0}};
+    return part_build(&shape->part[0], (const double (*)[4])knot, KNOTS, true, true, -1, NODE_VESSEL, tangent);
 }
 
 // Two quarter arcs that leave the same point the same way and part to either side.
 static bool build_bifurcation(Shape *shape, const ShapeOptions *o)
 {
-    enum { N = 13 };
+    enum { N = 33 };
     for (int side = 0; side < 2; side++) {
         double knot[N][4];
         for (int i = 0; i < N; i++) {
             double angle = PI / 2 * i / (N - 1), across = o->bend_radius_mm * (1 - cos(angle));
             memcpy(knot[i], (double[4]){o->bend_radius_mm * sin(angle), side ? -across : across, 0, o->radius_mm}, sizeof knot[i]);
         }
-        if (!part_build(&shape->part[side], (const double (*)[4])knot, N, true, true, side - 1, NODE_VESSEL))
+        const double tangent[2][4] = {{1, 0, 0, 0}, {0, side ? -1 : 1, 0, 0}};
+        if (!part_build(&shape->part[side], (const double (*)[4])knot, N, true, true, side - 1, NODE_VESSEL, tangent))
             return false;
     }
     shape->part_count = 2;
@@ -377,15 +382,20 @@ static bool build_bifurcation(Shape *shape, const ShapeOptions *o)
 
 static bool build_spiral(Shape *shape)
 {
-    double knot[KNOTS][4];
+    double knot[KNOTS][4], tangent[2][4];
     for (int i = 0; i < KNOTS; i++) {
         // knots crowd where the spiral winds tightly
         double u = (double)i / (KNOTS - 1), theta = PI * pow(4, u), polar = 15.75 / theta;
         double radius = 0.5 + (0.15 - 0.5) * (theta - PI) / (3 * PI);
         memcpy(knot[i], (double[4]){polar * cos(theta), polar * sin(theta), 0, radius}, sizeof knot[i]);
     }
+    for (int end = 0; end < 2; end++) {
+        double theta = end ? 4 * PI : PI, polar = 15.75 / theta, along = polar * sqrt(1 + 1 / (theta * theta));   // ds / dtheta
+        double x = -polar / theta * cos(theta) - polar * sin(theta), y = -polar / theta * sin(theta) + polar * cos(theta);
+        memcpy(tangent[end], (double[4]){x / along, y / along, 0, (0.15 - 0.5) / (3 * PI) / along}, sizeof tangent[end]);
+    }
     shape->part_count = 1;
-    return part_build(&shape->part[0], (const double (*)[4])knot, KNOTS, true, false, -1, NODE_VESSEL);
+    return part_build(&shape->part[0], (const double (*)[4])knot, KNOTS, true, false, -1, NODE_VESSEL, (const double (*)[4])tangent);
 }
 
 // An internal carotid with its siphon, going on as the middle cerebral artery; anterior cerebral artery; two branches each, of which the anterior
@@ -395,18 +405,17 @@ static bool build_phantom(Shape *shape)
     static const double carotid[][4] = {{0, 0, 0, 2.5},       {0, 0, 8, 2.45},      {0.4, 1.2, 15, 2.4},   {1.4, 6.2, 20.4, 2.3},
                                         {2.4, 12.6, 22.2, 2.3}, {3, 17.8, 25.4, 2.25}, {3.2, 18.6, 31, 2.2}, {3.8, 14.4, 35.2, 2.1},
                                         {5, 8.9, 36.6, 2.05}, {7, 5.9, 40.4, 1.9},  {10.4, 5.6, 44.6, 1.75}, {15.4, 6.6, 46.6, 1.5},
-                                        {21, 7.6, 46.4, 1.4}, {26.6, 7, 48.2, 1.3}, {31.4, 5, 52, 1.15},   {34.6, 3, 57, 1}};
+                                        {21, 7.6, 46.4, 1.4}, {26.6, 7, 48.2, 1.3}, {31.4, 5, 52, 1.15}};
     static const double anterior[][4] = {{9.3, 5.6, 43.4, 1.2}, {6.6, 6.4, 47.2, 1.2}, {3.2, 9.2, 50.4, 1.1}, {0.6, 12.2, 54, 1},
                                          {-0.8, 12.4, 59.4, 0.9}, {-0.6, 10, 64.4, 0.8}};
-    static const double middle_1[][4] = {{21, 7.6, 46.4, 0.9}, {21.8, 9.4, 49.6, 0.85}, {21.6, 10.2, 54, 0.8}, {20, 9.2, 58.6, 0.7}};
-    static const double middle_2[][4] = {{26.6, 7, 48.2, 0.85}, {29.4, 8.2, 45.8, 0.8}, {33, 9, 45, 0.75}, {37, 8.4, 46.6, 0.65}};
-    static const double anterior_1[][4] = {{3.2, 9.2, 50.4, 0.8}, {4.9, 12, 52.2, 0.75}, {4.2, 15.6, 54.8, 0.75}, {1.5, 17.4, 57.8, 0.7},
-                                           {-1.2, 18.6, 61.4, 0.65}};
-    static const double anterior_2[][4] = {{0.6, 12.2, 54, 0.7}, {-0.6, 14.6, 54.8, 0.7}, {-0.9, 16.4, 57.2, 0.65}, {0.6, 16.2, 60.6, 0.6},
+    static const double middle_1[][4] = {{21, 7.6, 46.4, 0.9}, {21.8, 9.4, 49.6, 0.85}, {21.6, 10.2, 54, 0.8}};
+    static const double middle_2[][4] = {{26.6, 7, 48.2, 0.85}, {29.4, 8.2, 45.8, 0.8}, {33, 9, 45, 0.75}};
+    static const double anterior_1[][4] = {{3.2, 9.2, 50.4, 0.8}, {4.9, 12, 52.2, 0.75}, {4.2, 15.6, 54.8, 0.75}, {1.5, 17.4, 57.8, 0.7}, {-0.4, 18.2, 60.2, 0.65}};
+    static const double anterior_2[][4] = {{0.6, 12.2, 54, 0.72}, {-0.6, 14.6, 54.8, 0.69}, {-0.9, 16.4, 57.2, 0.66}, {0.6, 16.2, 60.6, 0.63},
                                            {1.6, 14.2, 63.8, 0.6}};
     static const double sac[][4] = {{3.1, 18.6, 28.2, 1.85}, {3.2, 20.6, 27.9, 1.9}, {3.3, 22.4, 27.7, 2.6}, {3.4, 24.2, 27.5, 3.35},
                                     {3.45, 25.2, 27.4, 3.5}};
-#define PART(i, knots, open, parent, kind) part_build(&shape->part[i], knots, (int)(sizeof knots / sizeof knots[0]), open, false, parent, kind)
+#define PART(i, knots, open, parent, kind) part_build(&shape->part[i], knots, (int)(sizeof knots / sizeof knots[0]), open, false, parent, kind, NULL)
     shape->part_count = 7;
     return PART(0, carotid, true, -1, NODE_VESSEL) && PART(1, anterior, false, 0, NODE_VESSEL) && PART(2, middle_1, false, 0, NODE_VESSEL) &&
            PART(3, middle_2, false, 0, NODE_VESSEL) && PART(4, anterior_1, false, 1, NODE_VESSEL) &&
@@ -482,12 +491,17 @@ Shape *shape_create(const char *name, int option_count, const char (*option)[2][
                               : build_phantom(shape);
     for (int p = 0; built && o.scale != 1 && p < shape->part_count; p++) {
         Part old = shape->part[p];
-        double knot[KNOTS][4];
+        double knot[KNOTS][4], tangent[2][4];
         for (int i = 0; i < old.knot_count; i++)
             for (int k = 0; k < 4; k++)
                 knot[i][k] = o.scale * old.coordinate[k].value[i];
+        for (int k = 0; k < 4; k++) {   // slopes at the ends do not change
+            spline_at(&old.coordinate[k], old.at, old.knot_count, 0, old.at[0], &tangent[0][k]);
+            spline_at(&old.coordinate[k], old.at, old.knot_count, old.knot_count - 2, old.at[old.knot_count - 1], &tangent[1][k]);
+        }
         part_free(&old);
-        built = part_build(&shape->part[p], (const double (*)[4])knot, old.knot_count, old.open_start, old.open_end, old.parent, old.kind);
+        built = part_build(&shape->part[p], (const double (*)[4])knot, old.knot_count, old.open_start, old.open_end, old.parent, old.kind,
+                           (const double (*)[4])tangent);
     }
     if (built)
         return shape;

@@ -68,16 +68,18 @@ static Vec3 lattice_point(const Mesher *m, const int64_t at[3])
 // Zero of the cut field between a (f > 0) and b (f <= 0).
 static Vec3 crossing(const Mesher *m, Vec3 a, double fa, Vec3 b, double fb)
 {
-    double low = 0, high = 1;
-    for (int i = 0; i < 60 && high - low > 1e-10; i++) {
-        double t = i % 3 == 2 ? 0.5 * (low + high) : low + (high - low) * fa / (fa - fb);
+    double low = 0, high = 1, t = 0.5;
+    for (int i = 0; i < 60 && high - low > 1e-14; i++) {   // false position, the kept end halved
+        t = low + (high - low) * fa / (fa - fb);
         double f = shape_field_cut(m->shape, vec3_mix(a, b, t));
+        if (fabs(f) < 1e-11)
+            break;
         if (f > 0)
-            low = t, fa = f;
+            low = t, fa = f, fb *= 0.5;
         else
-            high = t, fb = f;
+            high = t, fb = f, fa *= 0.5;
     }
-    return vec3_mix(a, b, 0.5 * (low + high));
+    return vec3_mix(a, b, t);
 }
 
 static int edge_vertex(Mesher *m, const int in[3], const int out[3])
