@@ -4,7 +4,7 @@
 
 typedef enum { FILE_MISSING, FILE_UNKNOWN, FILE_TREE, FILE_RECORDING, FILE_SCENE, FILE_SCRIPT, FILE_VOLUME } FileKind;
 
-// FILE_TREE stands for trees and models; FILE_UNKNOWN where nothing recognised it (a volume is recognised by its first bytes only).
+// FILE_TREE stands for trees and models.
 FileKind file_kind(const char *path);
 
 #endif

@@ -237,8 +237,10 @@ int verb_info(int argc, char **argv)
     case FILE_SCENE: good = describe_scene(object, path, &faults); break;
     case FILE_SCRIPT: good = describe_script(object, path, &faults); break;
     case FILE_MISSING: faults_add(&faults, path, 0, 0, "cannot be opened; give a file that is there"); break;
-    case FILE_VOLUME:
-    case FILE_UNKNOWN: good = describe_volume(object, path, &faults); break;
+    case FILE_VOLUME: good = describe_volume(object, path, &faults); break;
+    case FILE_UNKNOWN:
+        faults_add(&faults, path, 0, 0, "is nothing known here; volumes (NRRD, MetaImage, NIfTI), trees, models, recordings, scenes and scripts are");
+        break;
     }
     if (good && json) {
         char *text = cJSON_Print(object);

@@ -1,6 +1,7 @@
 // What a scene's `vessel:` names, opened: a fitted model, a shape that is fitted on the fly and cached, an exact tube, a plane.
 #include "cli/cli.h"
 
+#include "cli/tube_tree.h"
 #include "recon/lim_fit.h"
 #include "recon/phantom.h"
 #include "recon/tree_file.h"
@@ -135,6 +136,22 @@ static bool open_tree(VesselTree *tree, const char *path, OpenVessel *out, Fault
     return out->vessel != NULL;
 }
 
+// Contact 'lim' of a tube: the exact tube gives the samples, its fit takes its place.
+static bool fit_tube(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults)
+{
+    ProgressBar bar;
+    Progress progress = progress_bar(&bar, "fit", quiet);
+    LimFitOptions options = lim_fit_default_options();
+    options.voxel_mm = shape_options_voxel_mm(0, NULL);
+    options.threads = threads;
+    VesselTree *sampled = tube_tree(out->vessel, &scene->tube, scene->path, faults);
+    VesselTree *model = sampled ? lim_fit(sampled, &options, &progress, faults) : NULL;
+    vessel_tree_free(sampled);
+    out->vessel->destroy(out->vessel);
+    out->vessel = NULL;
+    return open_tree(model, scene->path, out, faults);
+}
+
 bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults)
 {
     int before = faults->count;
@@ -151,11 +168,8 @@ bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, F
     case SOURCE_MODEL: return open_tree(tree_file_load(scene->model_path, NULL, faults), scene->model_path, out, faults);
     case SOURCE_SHAPE: return open_tree(cached_shape(scene, threads, quiet, faults), scene->path, out, faults);
     case SOURCE_TUBE:
-        if (scene->contact == CONTACT_LIM)
-            faults_add(faults, scene->path, 0, 0, "contact 'lim' of a tube is not built yet; valid: tube");
-        else
-            out->vessel = tube_vessel_create(&scene->tube, scene->path, faults);
-        return out->vessel != NULL;
+        out->vessel = tube_vessel_create(&scene->tube, scene->path, faults);
+        return out->vessel && (scene->contact != CONTACT_LIM || fit_tube(scene, threads, quiet, out, faults));
     case SOURCE_PLANE:
         out->vessel = plane_vessel_create(scene->plane_point, scene->plane_normal);
         if (!out->vessel)

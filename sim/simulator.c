@@ -18,6 +18,21 @@ struct Simulator {
     double dt;               // [ms]
 };
 
+static void measure_targets(Simulator *simulator)
+{
+    const WireState *state = stepper_state(simulator->stepper);
+    for (int i = 0; i < simulator->scene->target_count; i++) {
+        const SceneTarget *target = &simulator->scene->target[i];
+        TargetReach *reach = &simulator->target[i];
+        double distance = vec3_distance(state->position[state->node_count - 1], target->point);
+        bool inside = distance <= target->radius;
+        if ((inside && !reach->reached) || (!reach->reached && distance < reach->distance))
+            reach->time_s = simulator_time_s(simulator);
+        reach->reached |= inside;
+        reach->distance = fmin(reach->distance, distance);
+    }
+}
+
 Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *faults)
 {
     char why[FAULT_LENGTH / 2] = "no memory";
@@ -38,6 +53,7 @@ Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *fa
     simulator->dt = scene->dt;
     for (int i = 0; i < scene->target_count; i++)
         simulator->target[i].distance = HUGE_VAL;
+    measure_targets(simulator);
     return simulator;
 }
 
@@ -78,17 +94,7 @@ static void accumulate(Simulator *simulator)
     totals->residual_max = fmax(totals->residual_max, report->residual);
     histogram_add(&simulator->profile.iterations, report->iterations);
 
-    const WireState *state = stepper_state(simulator->stepper);
-    for (int i = 0; i < simulator->scene->target_count; i++) {
-        const SceneTarget *target = &simulator->scene->target[i];
-        TargetReach *reach = &simulator->target[i];
-        double distance = vec3_distance(state->position[state->node_count - 1], target->point);
-        bool inside = distance <= target->radius;
-        if ((inside && !reach->reached) || (!reach->reached && distance < reach->distance))
-            reach->time_s = simulator_time_s(simulator);
-        reach->reached |= inside;
-        reach->distance = fmin(reach->distance, distance);
-    }
+    measure_targets(simulator);
 }
 
 void simulator_step(Simulator *simulator, Command command)

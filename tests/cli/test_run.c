@@ -46,6 +46,10 @@ static void put(const char *name, const char *text)
     assert_int_equal(fclose(file), 0);
 }
 
+typedef struct Tip {
+    double x[3];
+} Tip;
+
 static char output[1 << 16];
 
 // Runs `seldinger ARGUMENTS` in the folder; standard output and error go to `output`. Returns the exit code, -signal where it was ended by one.
@@ -241,6 +245,38 @@ static void a_script_on_the_command_line_and_a_duration_win(void **state)
     cJSON_Delete(json);
 }
 
+static void a_fitted_tube_answers_like_the_exact_one(void **state)
+{
+    (void)state;
+    put("good.yaml", GOOD);
+    Tip tip[2];
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(run(i ? "run good.yaml --contact lim --summary s.json" : "run good.yaml --contact tube --summary s.json"), 0);
+        cJSON *json = summary("s.json");
+        const cJSON *mm = cJSON_GetObjectItem(json, "tip_mm");
+        for (int j = 0; j < 3; j++)
+            tip[i].x[j] = cJSON_GetArrayItem(mm, j)->valuedouble;
+        cJSON_Delete(json);
+    }
+    double distance = 0;
+    for (int j = 0; j < 3; j++)
+        distance += (tip[1].x[j] - tip[0].x[j]) * (tip[1].x[j] - tip[0].x[j]);
+    // the fit's walls are a few hundredths of a millimetre off; the same bits would mean that no fit was made
+    assert_true(distance > 0 && sqrt(distance) < 0.15);
+}
+
+static void no_step_is_a_run_too(void **state)
+{
+    (void)state;
+    put("good.yaml", GOOD);
+    assert_int_equal(run("run good.yaml --duration-s 0 --summary s.json --final f.csv --record r.h5"), 0);
+    cJSON *json = summary("s.json");
+    assert_true(figure(json, NULL, "steps") == 0 && figure(json, NULL, "inserted_mm") == 2);
+    assert_true(cJSON_IsNumber(cJSON_GetObjectItem(cJSON_GetArrayItem(cJSON_GetObjectItem(json, "targets"), 0), "distance_mm")));
+    cJSON_Delete(json);
+    assert_true(exists("f.csv") && exists("r.h5"));
+}
+
 static void a_signal_stops_cleanly(void **state)
 {
     (void)state;
@@ -379,6 +415,8 @@ int main(void)
         cmocka_unit_test(outputs_that_cannot_be_written_are_found_before_the_run),
         cmocka_unit_test(a_run_leaves_its_files_and_repeats_bit_for_bit),
         cmocka_unit_test(a_script_on_the_command_line_and_a_duration_win),
+        cmocka_unit_test(a_fitted_tube_answers_like_the_exact_one),
+        cmocka_unit_test(no_step_is_a_run_too),
         cmocka_unit_test(a_signal_stops_cleanly),
         cmocka_unit_test(a_full_disk_ends_with_3),
         cmocka_unit_test(check_passes_on_identity_and_fails_on_one_per_cent),
