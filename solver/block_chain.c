@@ -91,6 +91,7 @@ typedef struct End {
 INLINE void set_side(Lanes *v, const double *b, int i)
 {
     if (b)
+        UNROLL
         for (int k = 0; k < 6; k++)
             v[k][6] = b[6 * i + k];
 }
@@ -110,6 +111,7 @@ INLINE int pivot(End *e, int k)
     Lanes s = e->d[k] * inverse;
     *(Lanes *)(e->t + COLUMN * k) = s;
     *(Lanes *)(e->z + COLUMN * k) = e->c[k] * inverse;
+    UNROLL
     for (int j = k + 1; j < 6; j++) {
         e->d[j] -= e->d[k] * s[j];
         e->c[j] -= e->c[k] * s[j];
@@ -120,8 +122,10 @@ INLINE int pivot(End *e, int k)
 // The neighbour's columns lose Z d Z^T (lane 6: its right-hand side loses Z y), and become the end's node.
 INLINE void advance(End *e)
 {
+    UNROLL
     for (int j = 0; j < 6; j++) {
         Lanes sum = e->n[j];
+        UNROLL
         for (int k = 0; k < 6; k++)
             sum -= e->c[k] * e->z[COLUMN * k + j];
         e->d[j] = sum;
@@ -130,6 +134,7 @@ INLINE void advance(End *e)
 
 INLINE void carry_side(End *e)
 {
+    UNROLL
     for (int k = 0; k < 6; k++)
         e->c[k][6] = e->d[k][6];
 }
@@ -137,7 +142,7 @@ INLINE void carry_side(End *e)
 CLONES static bool eliminate(const BlockChain *a, BlockFactor *f, const double *b)
 {
     int count = a->count, m = count / 2, ok = 1;
-    End left, right;
+    End left = {0}, right = {0};
     load_rows(left.d, a->diag);
     load_rows(right.d, a->diag + (size_t)(count - 1) * BLOCK);
     set_side(left.d, b, 0);
@@ -150,6 +155,7 @@ CLONES static bool eliminate(const BlockChain *a, BlockFactor *f, const double *
         set_side(left.n, b, i + 1);
         carry_side(&left);
         if (j <= m) { // even count: the left end has one node more
+            UNROLL
             for (int k = 0; k < 6; k++)
                 ok &= pivot(&left, k);
             advance(&left);
@@ -162,21 +168,26 @@ CLONES static bool eliminate(const BlockChain *a, BlockFactor *f, const double *
             load_rows(right.n, a->diag + (size_t)(j - 1) * BLOCK);
             set_side(right.n, b, j - 1);
         } else { // the middle node's own block comes with the left end; this end brings its loss alone
+            UNROLL
             for (int k = 0; k < 6; k++)
                 right.n[k] = (Lanes){0};
         }
+        UNROLL
         for (int k = 0; k < 6; k++)
             ok &= pivot(&left, k) & pivot(&right, k);
         advance(&left);
         advance(&right);
     }
     if (count > 2)
+        UNROLL
         for (int k = 0; k < 6; k++)
             left.d[k] += right.d[k];
     aim(&left, f, m);
+    UNROLL
     for (int k = 0; k < 6; k++)
         left.c[k] = (Lanes){0};
     carry_side(&left);
+    UNROLL
     for (int k = 0; k < 6; k++)
         ok &= pivot(&left, k);
     return ok;
@@ -186,13 +197,17 @@ CLONES static bool eliminate(const BlockChain *a, BlockFactor *f, const double *
 INLINE void back_substitute(const double *t, const double *z, const double *y_scaled, int step, const double *next, double *x)
 {
     double r[6];
+    UNROLL
     for (int k = 0; k < 6; k++) {
         const double *q = z + COLUMN * k;
         r[k] = y_scaled[step * k] - ((q[0] * next[0] + q[1] * next[1]) + (q[2] * next[2] + q[3] * next[3]) + (q[4] * next[4] + q[5] * next[5]));
     }
+    UNROLL
     for (int k = 5; k >= 0; k--)
+        UNROLL
         for (int j = 0; j < k; j++)
             r[j] -= t[COLUMN * j + k] * r[k];
+    UNROLL
     for (int k = 0; k < 6; k++)
         x[k] = r[k];
 }
@@ -200,9 +215,12 @@ INLINE void back_substitute(const double *t, const double *z, const double *y_sc
 // y = T^-1 b in place, and b' -= Z y.
 INLINE void forward_substitute(const double *t, const double *z, double *y, double *next)
 {
+    UNROLL
     for (int k = 0; k < 6; k++)
+        UNROLL
         for (int j = k + 1; j < 6; j++)
             y[j] -= t[COLUMN * k + j] * y[k];
+    UNROLL
     for (int j = 0; j < 6; j++)
         next[j] -= (z[j] * y[0] + z[COLUMN + j] * y[1]) + (z[2 * COLUMN + j] * y[2] + z[3 * COLUMN + j] * y[3]) +
                    (z[4 * COLUMN + j] * y[4] + z[5 * COLUMN + j] * y[5]);
@@ -249,6 +267,7 @@ CLONES static void forward_substitute_all(const BlockFactor *f, double *x)
     }
     size_t mid = (size_t)m;
     double rest[6];
+    UNROLL
     for (int k = 0; k < 6; k++)
         x[6 * mid + (size_t)k] += tail[k];
     forward_substitute(t + mid * PANEL, z + mid * PANEL, x + 6 * mid, rest);

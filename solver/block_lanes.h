@@ -10,6 +10,12 @@
 #else
 #define CLONES
 #endif
+// Loops over the six columns must be unrolled, or the columns live in memory.
+#if defined(__GNUC__) && !defined(__clang__)
+#define UNROLL _Pragma("GCC unroll 8")
+#else
+#define UNROLL
+#endif
 #define INLINE static inline __attribute__((always_inline))
 
 typedef double Lanes __attribute__((vector_size(64), may_alias));
@@ -20,12 +26,14 @@ enum { BLOCK = 36, COLUMN = 8, PANEL = 6 * COLUMN };
 // The rows of a row-major block as vectors (which are the columns of its transpose). Reads two doubles past the block.
 INLINE void load_rows(Lanes *v, const double *a)
 {
+    UNROLL
     for (int k = 0; k < 6; k++)
         v[k] = *(const LooseLanes *)(a + 6 * k);
 }
 
 INLINE void load_columns(Lanes *v, const double *a)
 {
+    UNROLL
     for (int k = 0; k < 6; k++)
         v[k] = (Lanes){a[k], a[6 + k], a[12 + k], a[18 + k], a[24 + k], a[30 + k], 0, 0};
 }

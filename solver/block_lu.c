@@ -14,7 +14,7 @@
 
 // Per node, all by columns of eight.
 typedef struct Node {
-    double t[6][COLUMN], v[6][COLUMN], z[6][COLUMN], y[7][COLUMN];
+    double t[6][COLUMN], v[6][COLUMN], z[6][COLUMN], y[7][COLUMN]; // of t the lanes below the diagonal count
     double inverse[COLUMN];
 } Node;
 
@@ -57,64 +57,68 @@ INLINE void load_side(Lanes *v, const double *b, int i)
     *v = (Lanes){b[0], b[1], b[2], b[3], b[4], b[5], 0, 0};
 }
 
-static const double below[6][COLUMN] __attribute__((aligned(64))) = {
-    {0, 1, 1, 1, 1, 1, 0, 0}, {0, 0, 1, 1, 1, 1, 0, 0}, {0, 0, 0, 1, 1, 1, 0, 0},
-    {0, 0, 0, 0, 1, 1, 0, 0}, {0, 0, 0, 0, 0, 1, 0, 0}, {0},
-};
-
+// Pivot k: row k of V and of Y is finished and kept entry by entry, so that lanes up to k need not be masked.
 INLINE int pivot(End *e, int k)
 {
     Node *o = e->node;
     double p = e->d[k][k], inverse = 1 / p;
     o->inverse[k] = inverse;
-    Lanes t = e->d[k] * inverse * *(const Lanes *)below[k], z = e->c[k] * inverse;
+    Lanes t = e->d[k] * inverse, z = e->c[k] * inverse;
     *(Lanes *)o->t[k] = t;
-    *(Lanes *)o->v[k] = e->d[k];
     *(Lanes *)o->z[k] = z;
+    UNROLL
     for (int j = k + 1; j < 6; j++) {
         double s = e->d[j][k];
+        o->v[j][k] = s;
         e->d[j] -= t * s;
         e->c[j] -= z * s;
     }
-    for (int j = 0; k < 5 && j < 7; j++)
-        e->y[j] -= t * e->y[j][k];
+    UNROLL
+    for (int j = 0; j < 7; j++) {
+        double s = e->y[j][k];
+        o->y[j][k] = s;
+        if (k < 5)
+            e->y[j] -= t * s;
+    }
     return p != 0 && fabs(p) <= DBL_MAX;
 }
 
 INLINE void advance(End *e)
 {
     Node *o = e->node;
-    for (int j = 0; j < 7; j++)
-        *(Lanes *)o->y[j] = e->y[j];
+    UNROLL
     for (int j = 0; j < 7; j++) {
         Lanes sum = e->n[j];
+        UNROLL
         for (int k = 0; k < 6; k++)
             sum -= *(const Lanes *)o->z[k] * o->y[j][k];
         e->n[j] = sum;
     }
+    UNROLL
     for (int j = 0; j < 6; j++)
         e->d[j] = e->n[j];
 }
 
-CLONES static bool eliminate(const BlockChain *a, const double *upper, BlockLu *f, const double *b)
+CLONES static bool eliminate(BlockLu *f, const double *diag, const double *lower, const double *upper, const double *b)
 {
-    int count = a->count, m = count / 2, ok = 1;
-    End left, right;
-    load_columns(left.d, a->diag);
+    int count = f->count, m = count / 2, ok = 1;
+    End left = {0}, right = {0};
+    load_rows(left.d, diag);
     load_side(&left.n[6], b, 0);
     if (count > 2) {
-        load_columns(right.d, a->diag + (size_t)(count - 1) * BLOCK);
+        load_rows(right.d, diag + (size_t)(count - 1) * BLOCK);
         load_side(&right.n[6], b, count - 1);
     }
     for (int i = 0; i < m; i++) {
         int j = count - 1 - i;
         left.node = f->node + i;
-        load_columns(left.c, a->lower + (size_t)i * BLOCK);
+        load_rows(left.c, lower + (size_t)i * BLOCK);
         load_rows(left.y, upper + (size_t)i * BLOCK);
         left.y[6] = left.n[6];
-        load_columns(left.n, a->diag + (size_t)(i + 1) * BLOCK);
+        load_rows(left.n, diag + (size_t)(i + 1) * BLOCK);
         load_side(&left.n[6], b, i + 1);
         if (j <= m) { // even count: the left end has one node more
+            UNROLL
             for (int k = 0; k < 6; k++)
                 ok &= pivot(&left, k);
             advance(&left);
@@ -122,46 +126,52 @@ CLONES static bool eliminate(const BlockChain *a, const double *upper, BlockLu *
         }
         right.node = f->node + j;
         load_rows(right.c, upper + (size_t)(j - 1) * BLOCK);
-        load_columns(right.y, a->lower + (size_t)(j - 1) * BLOCK);
+        load_rows(right.y, lower + (size_t)(j - 1) * BLOCK);
         right.y[6] = right.n[6];
         if (j - 1 > m) {
-            load_columns(right.n, a->diag + (size_t)(j - 1) * BLOCK);
+            load_rows(right.n, diag + (size_t)(j - 1) * BLOCK);
             load_side(&right.n[6], b, j - 1);
         } else { // the middle node's own block comes with the left end; this end brings its loss alone
+            UNROLL
             for (int k = 0; k < 7; k++)
                 right.n[k] = (Lanes){0};
         }
+        UNROLL
         for (int k = 0; k < 6; k++)
             ok &= pivot(&left, k) & pivot(&right, k);
         advance(&left);
         advance(&right);
     }
     if (count > 2) {
+        UNROLL
         for (int k = 0; k < 6; k++)
             left.d[k] += right.d[k];
         left.n[6] += right.n[6];
     }
     left.node = f->node + m;
+    UNROLL
     for (int k = 0; k < 6; k++)
         left.c[k] = left.y[k] = (Lanes){0};
     left.y[6] = left.n[6];
+    UNROLL
     for (int k = 0; k < 6; k++)
         ok &= pivot(&left, k);
-    for (int j = 0; j < 7; j++)
-        *(Lanes *)left.node->y[j] = left.y[j];
     return ok;
 }
 
 INLINE void back(const Node *o, const double *next, double *x)
 {
     Lanes r = *(const Lanes *)o->y[6];
+    UNROLL
     for (int j = 0; j < 6; j++)
         r -= *(const Lanes *)o->y[j] * next[j];
     double q[COLUMN];
+    UNROLL
     for (int k = 5; k >= 0; k--) {
         q[k] = r[k] * o->inverse[k];
-        r -= *(const Lanes *)o->v[k] * q[k];
+        r -= *(const Lanes *)o->v[k] * q[k]; // lanes below k; the others are done
     }
+    UNROLL
     for (int k = 0; k < 6; k++)
         x[k] = q[k];
 }
@@ -183,13 +193,14 @@ CLONES static void back_all(const BlockLu *f, double *x)
 // y = T^-1 b, and what the neighbour loses: Z y.
 INLINE void forward(Node *o, const double *side, Lanes *loss)
 {
-    Lanes b = (Lanes){side[0], side[1], side[2], side[3], side[4], side[5], 0, 0} - *loss;
-    for (int k = 0; k < 5; k++)
-        b -= *(const Lanes *)o->t[k] * b[k];
-    *(Lanes *)o->y[6] = b;
-    Lanes sum = *(const Lanes *)o->z[0] * b[0];
-    for (int k = 1; k < 6; k++)
-        sum += *(const Lanes *)o->z[k] * b[k];
+    Lanes b = (Lanes){side[0], side[1], side[2], side[3], side[4], side[5], 0, 0} - *loss, sum = {0};
+    UNROLL
+    for (int k = 0; k < 6; k++) {
+        double s = b[k];
+        o->y[6][k] = s;
+        b -= *(const Lanes *)o->t[k] * s;
+        sum += *(const Lanes *)o->z[k] * s;
+    }
     *loss = sum;
 }
 
@@ -207,9 +218,9 @@ CLONES static void forward_all(const BlockLu *f, const double *b)
     forward(f->node + m, b + 6 * (size_t)m, &left);
 }
 
-bool block_lu_factor_solve(const BlockChain *chain, const double *upper, BlockLu *lu, const double *b, double *x)
+bool block_lu_factor_solve(BlockLu *lu, const double *diag, const double *lower, const double *upper, const double *b, double *x)
 {
-    if (!eliminate(chain, upper, lu, b))
+    if (!eliminate(lu, diag, lower, upper, b))
         return false;
     back_all(lu, x);
     return true;
@@ -219,4 +230,12 @@ void block_lu_solve(const BlockLu *lu, const double *b, double *x)
 {
     forward_all(lu, b);
     back_all(lu, x);
+}
+
+void block_lu_transpose(int count, const double *from, double *to)
+{
+    for (int i = 0; i < count; i++, from += BLOCK, to += BLOCK)
+        for (int r = 0; r < 6; r++)
+            for (int c = 0; c < 6; c++)
+                to[6 * c + r] = from[6 * r + c];
 }

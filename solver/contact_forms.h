@@ -31,8 +31,9 @@ struct ContactSolver {
     Vec3 *best;                  // (capacity) forces of the best iterate
     bool *flag;                  // (capacity)
     bool symmetric;              // which of the two factors holds the matrix
-    double *rhs, *delta, *upper; // (M, 6), (M, 6), (M, 6, 6)
-    BlockChain matrix;
+    double *rhs, *delta;         // (M, 6)
+    BlockChain matrix;           // with the contacts' laws: diag and A(i, i+1) by columns (which is the row-major lower of a symmetric chain)
+    double *turned;              // (M, 6, 6) A(i+1, i) by columns
     BlockLu *lu;
     BlockFactor *factor;
     PointwiseWork *pointwise;

@@ -138,35 +138,33 @@ static void write_law(const ContactRow *c, Vec3 motion, bool keep_matrix, Contac
         law->c = law_matrix(n, kn, oblique, across, p);
 }
 
-// diag, lower (and upper) += J^T C J with J = w [I, R], R = radius [n]x.
-static void add_law(const ContactRow *c, const Mat3 *k, BlockChain *a, double *upper)
+// The matrix += J^T C J with J = w [I, R], R = radius [n]x; blocks by columns.
+static void add_law(const ContactRow *c, const Mat3 *k, ContactSolver *s)
 {
     Mat3 r = mat3_skew(vec3_scale(c->normal, c->radius)), rt = mat3_transpose(&r);
     Mat3 kr = mat3_mul(k, &r), rk = mat3_mul(&rt, k), rkr = mat3_mul(&rt, &kr);
-    double j[6][6];
+    double j[6][6]; // transposed
     for (int p = 0; p < 3; p++)
         for (int q = 0; q < 3; q++) {
-            j[p][q] = k->m[p][q];
-            j[p][q + 3] = kr.m[p][q];
-            j[p + 3][q] = rk.m[p][q];
-            j[p + 3][q + 3] = rkr.m[p][q];
+            j[q][p] = k->m[p][q];
+            j[q + 3][p] = kr.m[p][q];
+            j[q][p + 3] = rk.m[p][q];
+            j[q + 3][p + 3] = rkr.m[p][q];
         }
     for (int e = 0; e < c->nodes; e++) {
-        double *d = a->diag + 36 * (size_t)(c->node + e), w = c->weight[e] * c->weight[e];
-        for (int p = 0; p < 6; p++)
-            for (int q = 0; q < 6; q++)
-                d[6 * p + q] += c->mask[e] == 63 || (c->mask[e] >> p & c->mask[e] >> q & 1) ? w * j[p][q] : 0;
+        double *d = s->matrix.diag + 36 * (size_t)(c->node + e), w = c->weight[e] * c->weight[e];
+        for (int q = 0; q < 6; q++)
+            for (int p = 0; p < 6; p++)
+                d[6 * q + p] += c->mask[e] == 63 || (c->mask[e] >> p & c->mask[e] >> q & 1) ? w * j[q][p] : 0;
     }
     if (c->nodes < 2)
         return;
-    double w = c->weight[0] * c->weight[1], *lower = a->lower + 36 * (size_t)c->node;
-    upper += 36 * (size_t)c->node;
-    for (int p = 0; p < 6; p++)
-        for (int q = 0; q < 6; q++)
-            if (c->mask[1] >> p & c->mask[0] >> q & 1) {
-                lower[6 * p + q] += w * j[p][q];
-                upper[6 * p + q] += w * j[q][p];
-            }
+    double w = c->weight[0] * c->weight[1], *lower = s->turned + 36 * (size_t)c->node, *upper = s->matrix.lower + 36 * (size_t)c->node;
+    for (int q = 0; q < 6; q++)
+        for (int p = 0; p < 6; p++) {
+            lower[6 * q + p] += c->mask[1] >> p & c->mask[0] >> q & 1 ? w * j[q][p] : 0; // row of node+1, column of node
+            upper[6 * q + p] += c->mask[0] >> p & c->mask[1] >> q & 1 ? w * j[q][p] : 0;
+        }
 }
 
 // The matrix of the present laws: only blocks that held or hold a contact differ from the chain's.
@@ -179,13 +177,13 @@ void contact_assemble(ContactSolver *s, const BlockChain *chain, int count)
             memcpy(s->matrix.diag + 36 * (size_t)(c->node + e), chain->diag + 36 * (size_t)(c->node + e), block);
         if (s->law[i].touched && c->nodes == 2) {
             memcpy(s->matrix.lower + 36 * (size_t)c->node, chain->lower + 36 * (size_t)c->node, block);
-            memcpy(s->upper + 36 * (size_t)c->node, chain->lower + 36 * (size_t)c->node, block);
+            block_lu_transpose(1, chain->lower + 36 * (size_t)c->node, s->turned + 36 * (size_t)c->node);
         }
     }
     for (int i = 0; i < count; i++) {
         s->law[i].touched = s->law[i].state != OPEN;
         if (s->law[i].touched)
-            add_law(&s->row[i], &s->law[i].c, &s->matrix, s->upper);
+            add_law(&s->row[i], &s->law[i].c, s);
     }
 }
 
@@ -194,7 +192,7 @@ void contact_assemble_reset(ContactSolver *s, const BlockChain *chain, int count
     size_t blocks = (size_t)chain->count * 36 * sizeof(double);
     memcpy(s->matrix.diag, chain->diag, blocks);
     memcpy(s->matrix.lower, chain->lower, blocks);
-    memcpy(s->upper, chain->lower, blocks);
+    block_lu_transpose(chain->count - 1, chain->lower, s->turned);
     for (int i = 0; i < count; i++)
         s->law[i].touched = false;
 }
@@ -219,7 +217,7 @@ static bool newton_iteration(ContactSolver *s, const BlockChain *chain, int coun
         contact_assemble(s, chain, count);
         s->symmetric = symmetric;
         if (symmetric ? !block_chain_factor_solve(&s->matrix, s->factor, s->rhs, s->delta)
-                      : !block_lu_factor_solve(&s->matrix, s->upper, s->lu, s->rhs, s->delta))
+                      : !block_lu_factor_solve(s->lu, s->matrix.diag, s->turned, s->matrix.lower, s->rhs, s->delta))
             return false;
     }
     double sum = 0;

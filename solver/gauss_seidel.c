@@ -111,12 +111,12 @@ ContactSolver *contact_solver_create(int node_count, int contact_capacity)
     s->flag = calloc(k, sizeof *s->flag);
     s->rhs = calloc(6 * m, sizeof *s->rhs);
     s->delta = calloc(6 * m, sizeof *s->delta);
-    s->upper = calloc(BLOCK_DOUBLES * m + 2, sizeof *s->upper);
+    s->turned = calloc(BLOCK_DOUBLES * m + 2, sizeof *s->turned);
     s->lu = block_lu_create(node_count);
     s->factor = block_factor_create(node_count);
     s->pointwise = pointwise_work_create(node_count, contact_capacity);
     bool ok = block_chain_create(&s->matrix, node_count) && s->pointwise;
-    if (!s->row || !s->motion || !s->law || !s->best || !s->flag || !s->rhs || !s->delta || !s->upper || !s->lu || !s->factor || !ok) {
+    if (!s->row || !s->motion || !s->law || !s->best || !s->flag || !s->rhs || !s->delta || !s->turned || !s->lu || !s->factor || !ok) {
         contact_solver_destroy(s);
         return NULL;
     }
@@ -134,7 +134,7 @@ void contact_solver_destroy(ContactSolver *s)
     free(s->flag);
     free(s->rhs);
     free(s->delta);
-    free(s->upper);
+    free(s->turned);
     block_lu_destroy(s->lu);
     pointwise_work_destroy(s->pointwise);
     block_factor_destroy(s->factor);

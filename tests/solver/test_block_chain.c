@@ -202,7 +202,8 @@ static void lu_solves_unsymmetric(void **state)
         assert_true(block_chain_create(&a, m));
         BlockLu *lu = block_lu_create(m);
         random_chain(&a, 2);
-        double *upper = calloc(n * 6 + 2, sizeof *upper), *b = malloc(n * sizeof *b), *x = malloc(n * sizeof *x), *y = malloc(n * sizeof *y);
+        double *upper = calloc(n * 6 + 2, sizeof *upper), *diag = calloc(n * 6 + 2, sizeof *upper), *lower = calloc(n * 6 + 2, sizeof *upper);
+        double *b = malloc(n * sizeof *b), *x = malloc(n * sizeof *x), *y = malloc(n * sizeof *y);
         memcpy(upper, a.lower, n * 6 * sizeof *upper);
         for (int i = 0; i < m; i++)
             for (int r = 0; r < 6; r++)
@@ -216,9 +217,12 @@ static void lu_solves_unsymmetric(void **state)
         for (int round = 0; round < 2; round++) {
             for (size_t i = 0; i < n; i++)
                 b[i] = uniform();
-            if (round == 0)
-                assert_true(block_lu_factor_solve(&a, upper, lu, b, x));
-            else
+            if (round == 0) {
+                block_lu_transpose(m, a.diag, diag);
+                block_lu_transpose(m, a.lower, lower);
+                assert_true(block_lu_factor_solve(lu, diag, lower, upper, b, x));
+            }
+            if (round == 1)
                 block_lu_solve(lu, b, x);
             double worst = 0;
             for (int i = 0; i < m; i++)
@@ -234,6 +238,8 @@ static void lu_solves_unsymmetric(void **state)
             assert_true(worst < 1e-13 * (1 + largest(a.diag, n * 6) * largest(x, n)));
         }
         free(upper);
+        free(diag);
+        free(lower);
         free(b);
         free(x);
         free(y);
@@ -360,6 +366,8 @@ static void prints_timings(void **state)
         for (int i = 0; i < 6 * m; i++)
             b[i] = uniform();
         BlockLu *lu = block_lu_create(m);
+        double *lower = calloc((size_t)m * 36 + 2, sizeof *lower);
+        block_lu_transpose(m, a.lower, lower);
         static double factor[RUNS], solve[RUNS], fused[RUNS], diagonal[RUNS], unsymmetric[RUNS];
         for (int i = 0; i < RUNS; i++) {
             double t0 = now();
@@ -371,7 +379,7 @@ static void prints_timings(void **state)
             double t3 = now();
             block_factor_inverse_diagonal(f, s);
             double t4 = now();
-            assert_true(block_lu_factor_solve(&a, a.lower, lu, b, x));
+            assert_true(block_lu_factor_solve(lu, a.diag, lower, a.lower, b, x));
             unsymmetric[i] = now() - t4;
             factor[i] = t1 - t0, solve[i] = t2 - t1, fused[i] = t3 - t2, diagonal[i] = t4 - t3;
         }
@@ -384,6 +392,7 @@ static void prints_timings(void **state)
                       "(medians)\n",
                       m, factor[RUNS / 2], solve[RUNS / 2], fused[RUNS / 2], unsymmetric[RUNS / 2], diagonal[RUNS / 2]);
         block_lu_destroy(lu);
+        free(lower);
         free(b);
         free(x);
         free(s);
