@@ -266,7 +266,7 @@ CLONES static void forward_substitute_all(const BlockFactor *f, double *x)
             forward_substitute(t + r * PANEL, z + r * PANEL, x + 6 * r, r - 1 > (size_t)m ? x + 6 * (r - 1) : tail);
     }
     size_t mid = (size_t)m;
-    double rest[6];
+    double rest[6] = {0};
     UNROLL
     for (int k = 0; k < 6; k++)
         x[6 * mid + (size_t)k] += tail[k];
