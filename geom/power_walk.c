@@ -1,5 +1,5 @@
 // d(X, C) = |X - C|^2 - r^2, Kerrien 2017, eq. (12). The paper's rule takes the best of the node and its neighbours once a step; we
-// repeat it a few times, because a tip that springs back may cross several short nodes in one step.
+// take the near nodes (vessel_tree_link) and repeat it a few times, because a tip that springs back may cross several short nodes in one step.
 #include "geom/power_walk.h"
 
 int power_walk(const VesselTree *tree, Vec3 x, int node, int hops)
@@ -9,8 +9,8 @@ int power_walk(const VesselTree *tree, Vec3 x, int node, int hops)
     double best = power_distance(x, tree->center[node], tree->radius[node]);
     for (int hop = 0; hop < hops; hop++) {
         int here = node;
-        for (int k = tree->neighbour_offset[here]; k < tree->neighbour_offset[here + 1]; k++) {
-            int next = tree->neighbour[k];
+        for (int k = tree->near_offset[here]; k < tree->near_offset[here + 1]; k++) {
+            int next = tree->near[k];
             double d = power_distance(x, tree->center[next], tree->radius[next]);
             if (d < best) {
                 best = d;

@@ -1,5 +1,5 @@
 // Topological tracking: each tool point follows its node through the tree by power distance d(X, C) = |X - C|^2 - r^2,
-// among the node and its topological neighbours only, so that kissing branches are never confused. Kerrien 2017, 6.2.1, eq. (12).
+// among the node and those near it in the tree only (vessel_tree_link), so that kissing branches are never confused. Kerrien 2017, 6.2.1, eq. (12).
 #ifndef SELDINGER_GEOM_POWER_WALK_H
 #define SELDINGER_GEOM_POWER_WALK_H
 

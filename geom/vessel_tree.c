@@ -69,6 +69,8 @@ void vessel_tree_free(VesselTree *tree)
     free(tree->error);
     free(tree->neighbour_offset);
     free(tree->neighbour);
+    free(tree->near_offset);
+    free(tree->near);
     free(tree);
 }
 
@@ -157,7 +159,7 @@ bool vessel_tree_validate(const VesselTree *tree, const char *file, Faults *faul
     return faults->count == before;
 }
 
-void vessel_tree_link(VesselTree *tree)
+static void link_neighbours(VesselTree *tree)
 {
     int n = tree->node_count, *offset = tree->neighbour_offset;
     for (int i = 0; i <= n; i++)
@@ -184,4 +186,53 @@ void vessel_tree_link(VesselTree *tree)
             tree->neighbour[offset[p + 1]++] = i;
         }
     }
+}
+
+// A way through the tree, as far as it has been followed.
+typedef struct Way {
+    int node, from;
+    double length;
+} Way;
+enum { NEAR_MAX = 96 };      // ways followed from a node: bounds the work on crowded trees
+
+// The nodes near `node`, its neighbours always among them. Breadth first, so that the order is that of links, then of indices.
+static int collect_near(const VesselTree *tree, int node, double largest, int *near)
+{
+    Way way[NEAR_MAX + 1] = {{node, -1, 0}};
+    int known = 1, count = 0;
+    for (int w = 0; w < known; w++) {
+        Way at = way[w];
+        double reach = tree->radius[node] + tree->radius[at.node];
+        bool is_neighbour = at.from == node;
+        if (w > 0 && (is_neighbour || (at.length < 1.5 * reach && vec3_distance(tree->center[node], tree->center[at.node]) < 1.2 * reach)))
+            near[count++] = at.node;
+        for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1] && known <= NEAR_MAX; k++) {
+            int next = tree->neighbour[k];
+            double length = at.length + vec3_distance(tree->center[at.node], tree->center[next]);
+            if (next != at.from && (w == 0 || length < 1.5 * (tree->radius[node] + largest)))
+                way[known++] = (Way){next, at.node, length};
+        }
+    }
+    return count;
+}
+
+bool vessel_tree_link(VesselTree *tree)
+{
+    link_neighbours(tree);
+    int n = tree->node_count, near[NEAR_MAX + 1];
+    double largest = 0;
+    for (int i = 0; i < n; i++)
+        largest = fmax(largest, tree->radius[i]);
+    size_t total = 0;
+    for (int i = 0; i < n; i++)
+        total += (size_t)collect_near(tree, i, largest, near);
+    free(tree->near_offset);
+    free(tree->near);
+    tree->near_offset = calloc((size_t)n + 1, sizeof *tree->near_offset);
+    tree->near = calloc(total + 1, sizeof *tree->near);
+    if (total > INT_MAX || !tree->near_offset || !tree->near)
+        return false;
+    for (int i = 0; i < n; i++)
+        tree->near_offset[i + 1] = tree->near_offset[i] + collect_near(tree, i, largest, tree->near + tree->near_offset[i]);
+    return true;
 }

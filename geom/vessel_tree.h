@@ -36,6 +36,8 @@ typedef struct VesselTree {
 
     int *neighbour_offset;   // (N+1) derived: parent and children of each node …
     int *neighbour;          // … in one list of 2 (N-1) entries, parent first, children by index
+    int *near_offset;        // (N+1) derived: the nodes to which a tool point of node i may move, …
+    int *near;               // … nearest by links first: see vessel_tree_link
 } VesselTree;
 
 // Allocates all arrays for the counts (all zeroed, offsets included, iso_level 0.1). NULL where memory or a count is unfit.
@@ -45,8 +47,11 @@ void vessel_tree_free(VesselTree *tree);
 // Checks everything the comments above promise (finite numbers, offsets monotone and closed, parents before children, one
 // root, unit directions to 1e-6, radii and widths positive). Adds one fault per broken rule with the first offending index.
 bool vessel_tree_validate(const VesselTree *tree, const char *file, Faults *faults);
-// Fills the neighbour lists; call once after parents are set.
-void vessel_tree_link(VesselTree *tree);
+// Fills the neighbour lists; call once after parents, centres and radii are set. False where memory lacks.
+// Near is wider than the paper's neighbours (6.2.1), which stall where a sac or a side branch opens over several nodes: a point at the far lip of
+// a mouth would have to pass nodes that are worse. Node j is near node i where their centres are closer than 1.2 (r_i + r_j) and the way
+// through the tree is shorter than 1.5 (r_i + r_j): a vessel that turns back on itself needs pi times its radius, so kissing walls stay apart.
+bool vessel_tree_link(VesselTree *tree);
 static inline bool vessel_tree_is_model(const VesselTree *tree) { return tree->blob_count > 0; }
 
 #endif
