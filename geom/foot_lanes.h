@@ -31,6 +31,7 @@ typedef struct FootBatch {
     FootLane radius;                 // of the node [mm], the scale of the problem
     FootLane longest;                // [mm] bound of a step; where not careful a longer one makes the lane FOOT_LOST
     FootLane careful;                // 1: go on near focal points, with bounded steps
+    FootLane allowed;                // [mm] rest of |f|/|g| with which a foot is good enough; its place may be off by a hundred times that
     // the running foot and the sample there
     FootLane px, py, pz;
     FootLane f, gx, gy, gz, hxx, hxy, hxz, hyy, hyz, hzz;
@@ -67,7 +68,7 @@ static inline __attribute__((always_inline)) void foot_newton(FootBatch *restric
         double spread = sqrt(spread2 > 0 ? spread2 : 0.0), k1 = mean + spread, k2 = mean - spread;
         // phi = 1 / (1 + gap k), beyond focal points by its size
         double m1 = 1 + gap * k1, m2 = 1 + gap * k2, a1 = fabs(m1), a2 = fabs(m2);
-        double deep = (m1 < 0.3 ? 1.0 : 0.0) + (m2 < 0.3 ? 1.0 : 0.0);
+        double deep = (m1 < 0.1 ? 1.0 : 0.0) + (m2 < 0.1 ? 1.0 : 0.0);
         double phi1 = 1 / (a1 > 0.05 ? a1 : 0.05), phi2 = 1 / (a2 > 0.05 ? a2 : 0.05);
         double c1 = spread > 1e-9 * fabs(mean) ? (phi1 - phi2) / (2 * (spread > 1e-300 ? spread : 1.0)) : 0.0, c0 = phi1 - c1 * k1;
         double tx = -(c0 * rx + c1 * (xx * rx + xy * ry + xz * rz)), ty = -(c0 * ry + c1 * (xy * rx + yy * ry + yz * rz)),
@@ -81,16 +82,14 @@ static inline __attribute__((always_inline)) void foot_newton(FootBatch *restric
         double sx = xx * tx + xy * ty + xz * tz, sy = xy * tx + yy * ty + yz * tz, sz = xz * tx + yz * ty + zz * tz;   // S t
         double nu = -(taubin + 0.5 * (tx * sx + ty * sy + tz * sz)), size = fabs(nu);
         px += tx + nu * nx, py += ty + nu * ny, pz += tz + nu * nz;
-        // what the step leaves: of the foot's place (hence the normal) second order, of f/|g| third order, in units of the curvature. A foot that was
-        // followed from close by may leave 1e-8 mm, one found afresh less.
-        double careful = b->careful[i], allowed = careful > 0 ? 1e-9 : 1e-8;
-        double curl = fabs(mean) + spread + 1 / b->radius[i], left = curl * along * along;
-        double done = left < 1e-6 && size < 1e5 * allowed && curl * (along + size) * (left + size) < allowed ? 1.0 : 0.0;
+        // what the step leaves: of the foot's place (hence the normal) second order, of f/|g| third order, in units of the curvature
+        double allowed = b->allowed[i], curl = fabs(mean) + spread + 1 / b->radius[i], left = curl * along * along;
+        double done = left < 100 * allowed && curl * (along + size) * (left + size) < allowed ? 1.0 : 0.0;
         // the normal turns by S t along the step
         nx += sx, ny += sy, nz += sz;
         double unit = 1 / sqrt(nx * nx + ny * ny + nz * nz);
         nx *= unit, ny *= unit, nz *= unit;
-        double state = done > 0 ? FOOT_DONE : FOOT_PENDING;
+        double careful = b->careful[i], state = done > 0 ? FOOT_DONE : FOOT_PENDING;
         state = far > careful * 2 ? FOOT_LOST : state;
         state = deep > careful * 2 ? FOOT_DEEP : state;
         state = slope2 > 1e-200 ? state : FOOT_LOST;

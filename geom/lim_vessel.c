@@ -63,7 +63,10 @@ static void clear_answer(FootBatch *b, int i)
     b->sxx[i] = b->sxy[i] = b->sxz[i] = b->syy[i] = b->syz[i] = b->szz[i] = 0;
 }
 
-static void set_lane(const LimVessel *lim, FootBatch *b, int i, int node, Vec3 x, Vec3 start)
+// [mm] what Newton may leave: of a foot that was followed, of one found afresh, of a neighbour's that is mixed in with its weight.
+static const double REST_FOLLOWED = 1e-8, REST_FRESH = 1e-9, REST_MIXED = 1e-5;
+
+static void set_lane(const LimVessel *lim, FootBatch *b, int i, int node, Vec3 x, Vec3 start, double allowed)
 {
     const NodeModel *m = &lim->model[node];
     b->group[i] = m->group;
@@ -73,6 +76,7 @@ static void set_lane(const LimVessel *lim, FootBatch *b, int i, int node, Vec3 x
     b->radius[i] = lim->tree->radius[node];
     b->longest[i] = 0.5 * b->radius[i];
     b->careful[i] = 0;
+    b->allowed[i] = allowed;
     b->state[i] = FOOT_PENDING;
     clear_answer(b, i);
 }
@@ -82,7 +86,7 @@ static void fill_block(FootBatch *b, int count)
 {
     for (int i = count; i % FOOT_BLOCK != 0; i++) {
         b->xx[i] = b->xy[i] = b->xz[i] = b->px[i] = b->py[i] = b->pz[i] = b->careful[i] = 0;
-        b->radius[i] = b->longest[i] = 1;
+        b->radius[i] = b->longest[i] = b->allowed[i] = 1;
         b->f[i] = b->gx[i] = b->gy[i] = b->gz[i] = 0;
         b->hxx[i] = b->hxy[i] = b->hxz[i] = b->hyy[i] = b->hyz[i] = b->hzz[i] = 0;
         clear_answer(b, i);
@@ -203,6 +207,7 @@ static void project_batch(const LimVessel *lim, FootBatch *b, Lane *of, int coun
         if (of[i].again) {
             b->state[i] = FOOT_PENDING;
             b->careful[i] = 1;
+            b->allowed[i] = REST_FRESH;
             b->longest[i] = b->radius[i];
         }
     newton_rounds(lim, b, count, 12);
@@ -270,9 +275,9 @@ static bool upstream_of_inlet(const LimVessel *lim, Vec3 x)
 // --- The blended field ---
 
 enum { BLEND_MAX = 5 };   // the own node and the first four neighbours
-// Models that differ by less than this are mixed, ever less the more they differ: a quarter of the radius, and never so much that the mixed wall
+// Models that differ by less than this are mixed, ever less the more they differ: half the radius, and never so much that the mixed wall
 // leaves the own model's by more than 0.05 mm (0.18 of it, for one neighbour). One that says something else altogether is a ghost and left out.
-static double blend_agree(double radius) { return fmin(0.25 * radius, 0.25); }
+static double blend_agree(double radius) { return fmin(0.5 * radius, 0.25); }
 // The mixed gap is less than the own model's by no more than this: sum w q / (1 + sum w) < 1/2 of the above for up to four neighbours, w = (1 - q^2)^2.
 static double blend_least(double radius) { return 0.5 * blend_agree(radius); }
 // Half width of the mixed zone: a neighbour counts where its power distance exceeds the best by less than this part of the node spacing squared,
@@ -380,7 +385,7 @@ static void blend_batch(const LimVessel *lim, const FootBatch *own, const Lane *
                 queued = 0;
             }
             of[queued] = (Lane){.point = i, .node = blend.node[k], .weight = blend.weight[k]};
-            set_lane(lim, &queue, queued++, blend.node[k], x, lane_foot(own, i));
+            set_lane(lim, &queue, queued++, blend.node[k], x, lane_foot(own, i), REST_MIXED);
         }
     }
     mix_queue(lim, &queue, of, queued, mixture);
@@ -473,7 +478,7 @@ static void query_batch(const LimVessel *lim, int count, const Vec3 *point, doub
         int node = hit[i].node;
         of[n] = (Lane){.point = i, .node = node, .again = !memory[i].has_foot};
         set_lane(lim, &batch, n++, node, point[i],
-                 memory[i].has_foot ? predicted_foot(&memory[i], point[i], lim->tree->radius[node]) : point[i]);
+                 memory[i].has_foot ? predicted_foot(&memory[i], point[i], lim->tree->radius[node]) : point[i], REST_FOLLOWED);
     }
     if (n == 0)
         return;
