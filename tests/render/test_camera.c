@@ -151,6 +151,16 @@ static void a_frame_holds_its_points(void **state)
         assert_true(low_x >= 20 - 1e-6 && high_x <= 380 + 1e-6 && low_y >= 20 - 1e-6 && high_y <= 280 + 1e-6);
         // and no smaller than it need be
         assert_near(fmin(low_x - 20, low_y - 20), 0, 1e-6);
+        // looking closer at any of them cuts none off in depth
+        Vec3 place = vec3_add_scaled(point[round % 40], 30, camera.back);
+        camera_frame_sphere(&camera, 400, 300, 10, place, 7);
+        for (int i = 0; i < 40; i++) {
+            Vec3 p = camera_project(&camera, point[i]);
+            assert_true(p.z < camera.near_depth && p.z > camera.far_depth);
+        }
+        Vec3 edge = camera_project(&camera, vec3_add_scaled(place, 7, camera.up));
+        assert_near(edge.x, 200, 1e-9);
+        assert_near(edge.y, 10, 1e-9);
     }
 }
 
