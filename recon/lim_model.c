@@ -31,6 +31,7 @@ typedef struct Fit {
     double beta, target;     // beta for this radius; t_g [mm]
     double mean_slope;       // mean |grad f| at the data
     double alpha;            // weight of E_c at the moment
+    double reach;            // no blob's centre goes further from the node [mm]
     float *distance;         // (padded) Taubin's
     float *column;           // (SWEEP_SIZE, padded) of the Gauss-Newton pass
     float *residual;         // (padded)
@@ -89,6 +90,9 @@ static void fit_set_points(Fit *fit)
     int data = task->point_count;
     for (int i = 0; i < points->count; i++) {
         Vec3 p = vec3_sub(i < data ? task->point[i] : task->guard[i - data], task->center);
+        // beyond the points a blob only bends the field from afar: seen, a chain of them 9 r out, and the model fell apart without them
+        if (i < data)
+            fit->reach = fmax(fit->reach, 1.2 * vec3_norm(p));
         points->x[i] = (float)p.x;
         points->y[i] = (float)p.y;
         points->z[i] = (float)p.z;
@@ -157,11 +161,17 @@ static Trial evaluate(Fit *fit, int j, LimBlob blob)
     return trial;
 }
 
-static LimBlob moved(const LimBlob *blob, const double *direction, double step)
+static LimBlob moved(const Fit *fit, const LimBlob *blob, const double *direction, double step)
 {
     LimBlob out = *blob;
-    for (int k = 0; k < 3; k++)
+    double far2 = 0;
+    for (int k = 0; k < 3; k++) {
         out.center[k] += step * direction[k];
+        far2 += out.center[k] * out.center[k];
+    }
+    if (far2 > fit->reach * fit->reach)
+        for (int k = 0; k < 3; k++)
+            out.center[k] *= fit->reach / sqrt(far2);
     out.width += step * direction[3];
     return out;
 }
@@ -189,7 +199,7 @@ static double line_search(Fit *fit, int j, LimBlob *blob, Trial *at, const doubl
             if (!(t > a + 0.1 * (b - a) && t < b - 0.1 * (b - a)))
                 t = 0.5 * (a + b);
         }
-        LimBlob next = moved(&start, direction, t);
+        LimBlob next = moved(fit, &start, direction, t);
         Trial trial = evaluate(fit, j, next);
         double s = slope_along(&trial, direction);
         bool lower = trial.energy < at->energy;
@@ -361,7 +371,7 @@ static void sweep(Fit *fit, const int *which, int count, int iterations)
             }
             for (int m = 0; m < count; m++) {
                 kept[m] = fit->model.blob[which[m]];
-                fit->model.blob[which[m]] = moved(&kept[m], &step[4 * m], shrink);
+                fit->model.blob[which[m]] = moved(fit, &kept[m], &step[4 * m], shrink);
             }
             fit_refresh_sums(fit);
             double next = total_energy(fit);
@@ -589,27 +599,26 @@ static void optimise_all(Fit *fit, int newest, int iterations)
     sweep(fit, which, near_blobs(fit, newest, which), iterations);
 }
 
-// Blobs that went astray or shrank to nothing: further from every point than they reach, or adding less than a thousandth of T anywhere.
+// Blobs that shrank to nothing: adding less than a thousandth of T at any point. (None goes astray: see `reach`.)
 static void clean_up(Fit *fit)
 {
     Model *model = &fit->model;
-    double reach = 0;
-    for (int i = 0; i < fit->task->point_count; i++)
-        reach = fmax(reach, vec3_norm(point_of(fit, i)));
     int kept = 0;
     for (int j = 0; j < model->count; j++) {
         const LimBlob *blob = &model->blob[j];
-        double most = 0, far = sqrt(pow(blob->center[0], 2) + pow(blob->center[1], 2) + pow(blob->center[2], 2));
+        double most = 0;
         for (int i = 0; i < fit->task->point_count; i++) {
             Vec3 d = vec3_sub(point_of(fit, i), vec3(blob->center[0], blob->center[1], blob->center[2]));
             double u = 1 / (1 + vec3_norm2(d) / (5 * blob->width * blob->width));
             most = fmax(most, blob->width * u * u);
         }
-        if ((far < 3 * reach && most > 1e-3 * fit->options->iso_level) || model->count == 1)
+        if (most > 1e-3 * fit->options->iso_level || model->count == 1)
             model->blob[kept++] = *blob;
     }
     if (kept > 0 && kept < model->count) {
         model->count = kept;
+        fit_refresh_sums(fit);
+        fit_refresh_weights(fit);
         optimise_all(fit, 0, 4);
     }
 }
@@ -652,7 +661,7 @@ static double attempt_fit(Fit *fit, bool retry, double *worst_of_best)
 static void fit_run(Fit *fit)
 {
     double worst, square = attempt_fit(fit, false, &worst);
-    if (fit->task->retry_count > 0 && worst > 2.5 * fit->target) {
+    if (fit->task->retry_count > 0 && worst > 1.4 * fit->target) {
         Model kept = {malloc((size_t)fit->capacity * sizeof(LimBlob)), 0};
         if (kept.blob) {
             copy_model(&kept, &fit->best);
