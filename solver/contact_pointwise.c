@@ -18,7 +18,7 @@
 // What a pass needs of a contact.
 typedef struct Local {
     Vec3 axis[3];            // normal, two tangents
-    double w[3][3];          // own 3x3 of W on these axes
+    Mat3 w;                  // own 3x3 of W on these axes
     double response[3][12];  // motion of its one or two nodes under a unit force along an axis
     double g;                // of its last slip: where the next search starts
     Vec3 offset;             // what the recursion lacks against the factor's solution, by rounding
@@ -188,30 +188,30 @@ static void prepare_local(const PointwiseWork *w, const ContactRow *c, Local *l)
         respond(w, c, g, l->response[a]);
         Vec3 d = contact_row_motion(&here, l->response[a]);
         for (int k = 0; k < 3; k++)
-            l->w[k][a] = vec3_dot(d, l->axis[k]);
+            l->w.m[k][a] = vec3_dot(d, l->axis[k]);
     }
 }
 
 // f_t = -(a + g)^-1 c of the condensed tangential problem, f_n from the normal row.
-static void slide_force(double w[3][3], const double *d, const double a[3], const double *c, double g, double *f)
+static void slide_force(const Mat3 *w, const double *d, const double a[3], const double *c, double g, double *f)
 {
     double xx = a[0] + g, yy = a[2] + g, det = xx * yy - a[1] * a[1];
     f[1] = -(yy * c[0] - a[1] * c[1]) / det;
     f[2] = -(xx * c[1] - a[1] * c[0]) / det;
-    f[0] = -(d[0] + w[0][1] * f[1] + w[0][2] * f[2]) / w[0][0];
+    f[0] = -(d[0] + w->m[0][1] * f[1] + w->m[0][2] * f[2]) / w->m[0][0];
 }
 
 static double slide_excess(const double *f, double mu) { return sqrt(f[1] * f[1] + f[2] * f[2]) - mu * f[0]; }
 
 // Signorini and Coulomb of one contact: d + w f, d[0] with the gap.
-static void solve_local(double w[3][3], const double *d, double mu, double *start, double *f)
+static void solve_local(const Mat3 *w, const double *d, double mu, double *start, double *f)
 {
     f[0] = f[1] = f[2] = 0;
     if (d[0] >= 0)
         return;
-    f[0] = -d[0] / w[0][0];
-    const double a[3] = {w[1][1] - w[1][0] * w[0][1] / w[0][0], w[1][2] - w[1][0] * w[0][2] / w[0][0], w[2][2] - w[2][0] * w[0][2] / w[0][0]};
-    const double c[2] = {d[1] - w[1][0] * d[0] / w[0][0], d[2] - w[2][0] * d[0] / w[0][0]};
+    f[0] = -d[0] / w->m[0][0];
+    const double a[3] = {w->m[1][1] - w->m[1][0] * w->m[0][1] / w->m[0][0], w->m[1][2] - w->m[1][0] * w->m[0][2] / w->m[0][0], w->m[2][2] - w->m[2][0] * w->m[0][2] / w->m[0][0]};
+    const double c[2] = {d[1] - w->m[1][0] * d[0] / w->m[0][0], d[2] - w->m[2][0] * d[0] / w->m[0][0]};
     double scale = a[0] + a[2];
     if (!(mu > 0) || !(scale > 0))
         return;
@@ -305,9 +305,9 @@ static void visit(PointwiseWork *w, ContactRow *row, int from, int to, bool reve
         for (int a = 0; a < 3; a++)
             old[a] = vec3_dot(c->force, l->axis[a]);
         for (int a = 0; a < 3; a++)
-            d[a] = vec3_dot(motion, l->axis[a]) - l->w[a][0] * old[0] - l->w[a][1] * old[1] - l->w[a][2] * old[2];
+            d[a] = vec3_dot(motion, l->axis[a]) - l->w.m[a][0] * old[0] - l->w.m[a][1] * old[1] - l->w.m[a][2] * old[2];
         d[0] += c->gap;
-        solve_local(l->w, d, c->friction, &l->g, f);
+        solve_local(&l->w, d, c->friction, &l->g, f);
         Vec3 force = vec3_add_scaled(vec3_add_scaled(vec3_scale(l->axis[0], f[0]), f[1], l->axis[1]), f[2], l->axis[2]);
         contact_row_push(c, vec3_sub(force, c->force), w->r);
         for (int a = 0; a < 3; a++)
