@@ -291,6 +291,9 @@ static bool write_files(const RunOptions *options, Simulator *simulator, const D
     return faults->count == before;
 }
 
+// No node of a run that can be shown is further outside the wall than this.
+static const double deep_mm = 0.2;
+
 static void say_untrusted(const Simulator *simulator, const DriveReport *drive)
 {
     const RunTotals *totals = simulator_totals(simulator);
@@ -301,7 +304,7 @@ static void say_untrusted(const Simulator *simulator, const DriveReport *drive)
     if (run_left_vessel(totals))
         fprintf(stderr, "%s: the tool left the vessel (deepest %.3f mm outside the wall%s); the run cannot be trusted\n", path, totals->penetration_max,
                 totals->flags & STEP_OUT_OF_VESSEL ? ", or beyond an open end" : "");
-    else if (totals->flags & STEP_DEEP)
+    else if (totals->penetration_max > deep_mm)
         fprintf(stderr, "%s: warning: a node was %.3f mm outside the wall\n", path, totals->penetration_max);
     if (totals->not_converged_steps > 0)
         fprintf(stderr, "%s: warning: the contact solve of %lld of %lld steps stopped at its cap (residual at most %.2g)\n", path,
