@@ -151,7 +151,8 @@ static void add_targets(RunDrawing *drawing, const Camera *camera)
     for (int i = 0; i < drawing->scene->target_count; i++) {
         const SceneTarget *target = &drawing->scene->target[i];
         solids_circle(&drawing->solids, target->point, camera->back, target->radius, line, TARGET_COLOR);
-        const Vec3 tilted[2] = {vec3_unit(vec3_add_scaled(camera->right, 0.35, camera->back)), vec3_unit(vec3_add_scaled(camera->up, 0.35, camera->back))};
+        const Vec3 tilted[2] = {vec3_unit(vec3_add_scaled(camera->right, 0.35, camera->back)),
+                                vec3_unit(vec3_add_scaled(camera->up, 0.35, camera->back))};
         for (int k = 0; k < 2; k++)
             solids_circle(&drawing->solids, target->point, tilted[k], target->radius, 0.6 * line, TARGET_COLOR);
     }
@@ -191,7 +192,8 @@ static void label_panel(RunDrawing *drawing, const Camera *camera, double x, dou
         double width, height, away = is_target ? drawing->scene->target[i].radius / camera->mm_per_pixel + 4 * s : 8 * s;
         overlay_text_size(sheet->overlay, TEXT_NORMAL, name, &width, &height);
         bool fits_right = p.x + away + width < camera->width - 4 * s;
-        double left = fits_right ? p.x + away : fmax(p.x - away - width, 2 * s), top = fmin(fmax(p.y - height / 2, 2 * s), camera->height - height - 2 * s);
+        double left = fits_right ? p.x + away : fmax(p.x - away - width, 2 * s),
+               top = fmin(fmax(p.y - height / 2, 2 * s), camera->height - height - 2 * s);
         sheet_label(sheet, x + left, y + top, 0, TEXT_NORMAL, is_target ? TARGET_COLOR : SHEET_MUTED, name);
     }
 }
@@ -384,7 +386,8 @@ static bool draw_moment(RunDrawing *drawing, const Camera *whole, const PictureT
     overlay_push_clip(sheet->overlay, x, y, whole->width, header);
     if (tool->label)
         sheet_text(sheet, x, y, TEXT_NORMAL, SHEET_INK, "%s", tool->label);
-    sheet_text(sheet, x, y + (tool->label ? 22 * s : 4 * s), tool->label ? TEXT_SMALL : TEXT_NORMAL, tool->label ? SHEET_MUTED : SHEET_INK, "%s", text);
+    sheet_text(sheet, x, y + (tool->label ? 22 * s : 4 * s), tool->label ? TEXT_SMALL : TEXT_NORMAL, tool->label ? SHEET_MUTED : SHEET_INK, "%s",
+               text);
     overlay_pop_clip(sheet->overlay);
     double top = y + header;
     if (!draw_panel(drawing, whole, &drawing->style, tool, x, top))

@@ -24,7 +24,8 @@ static bool check_projections(int count, const PictureProjection *projection, in
         const PictureProjection *p = &projection[k];
         if (p->width < 1 || p->height < 1 || p->width > 16384 || p->height > 16384 || !p->value)
             return message_fail(message, capacity, "projection %d has %d x %d pixels; 1 to 16384 each way", k, p->width, p->height);
-        if (!vec3_is_finite(p->origin) || !vec3_is_finite(p->across) || !vec3_is_finite(p->up) || !(vec3_norm(p->across) > 0) || !(vec3_norm(p->up) > 0))
+        if (!vec3_is_finite(p->origin) || !vec3_is_finite(p->across) || !vec3_is_finite(p->up) || !(vec3_norm(p->across) > 0) ||
+            !(vec3_norm(p->up) > 0))
             return message_fail(message, capacity, "projection %d has no pixel size; steps across and up above 0 mm", k);
     }
     for (int k = 0; k < polyline_count; k++)
@@ -114,7 +115,8 @@ static void draw_axes(Sheet *sheet, const Panel *panel)
     for (int way = 0; way < 2; way++) {
         Vec3 step = way ? p->up : p->across;
         int pixels = way ? p->height : p->width;
-        double size = vec3_norm(step), low = vec3_dot(p->origin, step) / size - size / 2, high = low + pixels * size, tick = sheet_tick_step(low, high, 6);
+        double size = vec3_norm(step), low = vec3_dot(p->origin, step) / size - size / 2, high = low + pixels * size,
+               tick = sheet_tick_step(low, high, 6);
         for (double k = ceil(low / tick); k * tick <= high; k++) {
             char text[32];
             sheet_format_tick(text, sizeof text, k * tick, tick);
@@ -142,8 +144,8 @@ static void draw_axes(Sheet *sheet, const Panel *panel)
     }
 }
 
-static bool draw_projection(Sheet *sheet, const Panel *panel, float low, float high, int polyline_count, const PicturePolyline *polyline, int mark_count,
-                            const PictureMark *mark)
+static bool draw_projection(Sheet *sheet, const Panel *panel, float low, float high, int polyline_count, const PicturePolyline *polyline,
+                            int mark_count, const PictureMark *mark)
 {
     unsigned texture = upload(sheet, panel->image, low, high);
     int longest = 1;
@@ -324,8 +326,8 @@ static const char *axis_name(Vec3 step)
     return "oblique";
 }
 
-bool picture_of_tree(const char *path, const PictureOptions *options, const int size[3], Vec3 origin, const Vec3 axis[3], const float *value, float low,
-                     float high, const VesselTree *tree, int mark_count, const PictureMark *mark, char *message, size_t capacity)
+bool picture_of_tree(const char *path, const PictureOptions *options, const int size[3], Vec3 origin, const Vec3 axis[3], const float *value,
+                     float low, float high, const VesselTree *tree, int mark_count, const PictureMark *mark, char *message, size_t capacity)
 {
     static const int plane[3][2] = {{0, 1}, {0, 2}, {1, 2}};
     PictureProjection projection[3];
@@ -342,8 +344,14 @@ bool picture_of_tree(const char *path, const PictureOptions *options, const int 
         for (size_t i = 0; image[k] && i < pixels; i++)
             image[k][i] = -FLT_MAX;
         drawn = drawn && image[k];
-        projection[k] = (PictureProjection){.width = size[a], .height = size[b], .value = image[k], .origin = origin, .across = axis[a], .up = axis[b],
-                                            .across_name = axis_name(axis[a]), .up_name = axis_name(axis[b])};
+        projection[k] = (PictureProjection){.width = size[a],
+                                            .height = size[b],
+                                            .value = image[k],
+                                            .origin = origin,
+                                            .across = axis[a],
+                                            .up = axis[b],
+                                            .across_name = axis_name(axis[a]),
+                                            .up_name = axis_name(axis[b])};
     }
     drawn = drawn && (!tree || tree->node_count < 1 || cut_into_branches(tree, &branches));
     if (!drawn)
@@ -365,7 +373,8 @@ bool picture_of_tree(const char *path, const PictureOptions *options, const int 
         mark = &root;
         mark_count = 1;
     }
-    drawn = drawn && picture_of_projections(path, options, 3, projection, low, high, branches.count, branches.line, mark_count, mark, message, capacity);
+    drawn =
+        drawn && picture_of_projections(path, options, 3, projection, low, high, branches.count, branches.line, mark_count, mark, message, capacity);
     for (int k = 0; k < 3; k++)
         free(image[k]);
     free_branches(&branches);

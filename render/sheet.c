@@ -18,7 +18,8 @@ double sheet_scale_of(const PictureOptions *options)
 
 bool sheet_open(Sheet *sheet, const PictureOptions *options, int height, char *message, size_t capacity)
 {
-    *sheet = (Sheet){.width = options->width, .height = height < 64 ? 64 : height < options->height ? height : options->height, .message = message, .capacity = capacity};
+    int used = height < 64 ? 64 : height < options->height ? height : options->height;
+    *sheet = (Sheet){.width = options->width, .height = used, .message = message, .capacity = capacity};
     if (options->width < 64 || options->width > 8192 || options->height < 64 || options->height > 8192)
         return message_fail(message, capacity, "a picture of %d x %d pixels; each side 64 to 8192", options->width, options->height);
     sheet->scale = sheet_scale_of(options);

@@ -31,11 +31,12 @@ static const char *const LIGHT = "const vec3 key = vec3(-0.36, 0.55, 0.754), fil
                                  "float lit(vec3 n) { return 0.38 + 0.5 * max(dot(n, key), 0.0) + 0.17 * max(dot(n, fill), 0.0); }\n"
                                  "float shine(vec3 n, float p) { return pow(max(dot(n, normalize(key + vec3(0, 0, 1))), 0.0), p); }\n";
 
-static const char *const MESH_VERTEX = "#version 330 core\n"
-                                       "layout(location = 0) in vec3 position; layout(location = 1) in vec3 normal; layout(location = 2) in vec4 color;\n"
-                                       "uniform mat4 clip; uniform mat3 eye; out vec3 n; out vec4 c; out float depth;\n"
-                                       "void main() { gl_Position = clip * vec4(position, 1.0); n = eye * normal; c = color;\n"
-                                       "  depth = 0.5 + 0.5 * gl_Position.z; }\n";
+static const char *const MESH_VERTEX =
+    "#version 330 core\n"
+    "layout(location = 0) in vec3 position; layout(location = 1) in vec3 normal; layout(location = 2) in vec4 color;\n"
+    "uniform mat4 clip; uniform mat3 eye; out vec3 n; out vec4 c; out float depth;\n"
+    "void main() { gl_Position = clip * vec4(position, 1.0); n = eye * normal; c = color;\n"
+    "  depth = 0.5 + 0.5 * gl_Position.z; }\n";
 
 static const char *const SHELL_FRAGMENT =
     "in vec3 n; in vec4 c; in float depth; out vec4 result;\n"
@@ -60,10 +61,11 @@ static const char *const SOLID_FRAGMENT = "in vec3 n; in vec4 c; in float depth;
                                           "  vec3 k = c.rgb * (0.55 + 0.55 * lit(m)) + vec3(0.22 * shine(m, 30.0));\n"
                                           "  result = vec4(mix(k, haze, haze_amount * depth), 1.0); }\n";
 
-static const char *const POINT_VERTEX = "#version 330 core\n"
-                                        "layout(location = 0) in vec3 position; layout(location = 2) in vec4 color; layout(location = 3) in float size;\n"
-                                        "uniform mat4 clip; out vec4 c;\n"
-                                        "void main() { gl_Position = clip * vec4(position, 1.0); gl_PointSize = size; c = color; }\n";
+static const char *const POINT_VERTEX =
+    "#version 330 core\n"
+    "layout(location = 0) in vec3 position; layout(location = 2) in vec4 color; layout(location = 3) in float size;\n"
+    "uniform mat4 clip; out vec4 c;\n"
+    "void main() { gl_Position = clip * vec4(position, 1.0); gl_PointSize = size; c = color; }\n";
 
 static const char *const POINT_FRAGMENT = "in vec4 c; out vec4 result;\n"
                                           "void main() { vec2 p = 2.0 * gl_PointCoord - 1.0; float r = dot(p, p); if (r > 1.0) discard;\n"
@@ -131,7 +133,7 @@ void surface_view_destroy(SurfaceView *view)
     free(view);
 }
 
-static const void *at_byte(size_t offset) { return (const char *)NULL + offset; }
+static const void *at_byte(size_t offset) { return (const void *)(uintptr_t)offset; }
 
 static bool mesh_is_sound(const TriangleMesh *mesh)
 {
