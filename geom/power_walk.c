@@ -1,6 +1,40 @@
 // d(X, C) = |X - C|^2 - r^2, Kerrien 2017, eq. (12). The paper's rule takes the best of the node and its neighbours once a step; we
 // take the near nodes (vessel_tree_link) and repeat it a few times, because a tip that springs back may cross several short nodes in one step.
+//
+// Strict descent has a trap: the cell of a node on a vessel reaches as far beside the vessel as the tree leaves it, also across a wide sac that hangs on
+// another node, with worse nodes between. (Seen on the phantom: a wire crossed the whole sac, 9 mm, on the ghost lobe of a node beside the neck.) A point
+// that stands clearly outside its node's ball therefore looks along all ways through the tree that are not much longer than its distance, for a
+// ball that it is inside of.
 #include "geom/power_walk.h"
+
+enum { WAYS_MAX = 64 };
+
+typedef struct Way {
+    int node, from;
+    double length;
+} Way;
+
+static int look_around(const VesselTree *tree, Vec3 x, int node)
+{
+    Way way[WAYS_MAX] = {{node, -1, 0}};
+    int known = 1, best_node = node;
+    double longest = 2.5 * vec3_distance(x, tree->center[node]), best = 0;   // only inside a ball
+    for (int w = 0; w < known; w++) {
+        Way at = way[w];
+        double d = power_distance(x, tree->center[at.node], tree->radius[at.node]);
+        if (d < best) {
+            best = d;
+            best_node = at.node;
+        }
+        for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1] && known < WAYS_MAX; k++) {
+            int next = tree->neighbour[k];
+            double length = at.length + vec3_distance(tree->center[at.node], tree->center[next]);
+            if (next != at.from && length < longest)
+                way[known++] = (Way){next, at.node, length};
+        }
+    }
+    return best_node;
+}
 
 int power_walk(const VesselTree *tree, Vec3 x, int node, int hops)
 {
@@ -20,7 +54,8 @@ int power_walk(const VesselTree *tree, Vec3 x, int node, int hops)
         if (node == here)
             break;
     }
-    return node;
+    double r = tree->radius[node];
+    return hops > 0 && best > 0.44 * r * r ? look_around(tree, x, node) : node;   // further than 1.2 r from the centre
 }
 
 int power_nearest(const VesselTree *tree, Vec3 x)

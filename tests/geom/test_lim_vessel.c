@@ -451,6 +451,51 @@ static void nodes_without_blobs(void **state)
     vessel_tree_free(u);
 }
 
+// One model of a fork: a point that follows the outer wall of one arm and then crosses to the carina finds that wall in time, though the remembered foot
+// stays the locally closest; the same on the way back.
+static void another_wall_comes_closer(void **state)
+{
+    (void)state;
+    enum { A = 12 };
+    VesselTree *t = vessel_tree_create(1, 0, 3 * A);
+    double rho = blob_row_width(2 * A, 0.5, 1);
+    for (int i = 0; i < A; i++) {
+        double s = 0.5 * (i + 1);
+        t->blob_center[i] = vec3(-s, 0, 0);
+        t->blob_center[A + i] = vec3(s * cos(0.6), s * sin(0.6), 0);
+        t->blob_center[2 * A + i] = vec3(s * cos(0.6), -s * sin(0.6), 0);
+    }
+    for (int j = 0; j < 3 * A; j++)
+        t->blob_width[j] = rho;
+    t->blob_offset[1] = 3 * A;
+    t->center[0] = vec3(-5, 0, 0);
+    t->radius[0] = 1;
+    t->direction[0] = vec3(1, 0, 0);
+    t->parent[0] = -1;
+    vessel_tree_link(t);
+    Vessel *v = lim_vessel_create(t);
+    Blobby m = model_of(t, 0);
+    VesselMemory memory = {.node = 0};
+    int sides = 0;
+    double last = 0;
+    for (int step = 0; step <= 2000; step++) {
+        double a = step <= 1000 ? step * 1e-3 : (2000 - step) * 1e-3;
+        Vec3 x = vec3_mix(vec3(3.23, 3.24, 0.05), vec3(4.33, 1.63, 0.05), a);   // from the upper arm's outer wall across it into the carina
+        VesselHit hit;
+        vessel_query(v, 1, &x, 2, &memory, &hit);
+        SurfacePoint s = blobby_project(&m, x, x);
+        assert_true(s.converged && hit.flags == 0);
+        if (fabs(s.distance) < 0.6)
+            assert_near(hit.gap, s.distance, 1e-6);
+        double side = vec3_dot(hit.normal, vec3(1.1, -1.61, 0));   // along the way across, or against it
+        sides += step > 0 && side * last < 0;
+        last = side;
+    }
+    assert_int_equal(sides, 2);   // it did change sides, there and back
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
 static double now_us(void)
 {
     struct timespec t;
@@ -503,7 +548,7 @@ int main(void)
         cmocka_unit_test(lanes_against_twin), cmocka_unit_test(same_bits_on_every_isa), cmocka_unit_test(one_blob_is_a_sphere),
         cmocka_unit_test(gaps_against_slow_projection), cmocka_unit_test(derivatives_of_the_gap), cmocka_unit_test(back_from_outside),
         cmocka_unit_test(inlet_is_open), cmocka_unit_test(moved_and_mirrored_scenes), cmocka_unit_test(blend_has_no_jump),
-        cmocka_unit_test(nodes_without_blobs), cmocka_unit_test(cost),
+        cmocka_unit_test(nodes_without_blobs), cmocka_unit_test(another_wall_comes_closer), cmocka_unit_test(cost),
     };
     return cmocka_run_group_tests_name("lim_vessel", tests, NULL, NULL);
 }

@@ -192,6 +192,37 @@ static void kissing_branches(void **state)
     vessel_tree_free(t);
 }
 
+// A sac before the convex side of a bend, hung on a node up the vessel: every way to it leads over worse nodes. A point inside the sac is found to be
+// there; one pushed out of the lower arm into the kissing arm's wall (above) is not taken across.
+static void wide_sac(void **state)
+{
+    (void)state;
+    enum { N = 9, SAC = N };
+    VesselTree *t = vessel_tree_create(N + 1, 0, 0);
+    for (int i = 0; i < N; i++) {
+        double a = (i - 4) * 1.1 / 6;
+        t->center[i] = vec3(-6 + 6 * cos(a), 6 * sin(a), 0);
+        t->radius[i] = 2.2;
+        t->parent[i] = i - 1;
+    }
+    t->center[SAC] = vec3(6.5, 0, 0);
+    t->radius[SAC] = 3.5;
+    t->parent[SAC] = 2;
+    vessel_tree_link(t);
+    Vec3 x = {5, 2, 0};
+    assert_true(power_distance(x, t->center[SAC], 3.5) < 0);
+    for (int i = 0; i < N; i++)   // node 5 is the best of the vessel: descent stops there
+        assert_true(power_distance(x, t->center[i], 2.2) >= power_distance(x, t->center[5], 2.2));
+    for (int k = t->near_offset[5]; k < t->near_offset[6]; k++)
+        assert_true(t->near[k] != SAC);
+    assert_int_equal(power_walk(t, x, 5, 4), SAC);
+    assert_int_equal(power_walk(t, vec3(1, 0.5, 0), SAC, 4), 4);   // and back into the vessel
+    vessel_tree_free(t);
+    t = forked_tree();
+    assert_int_equal(power_walk(t, vec3(19, 1.35, 0), 19, 4), 19);
+    vessel_tree_free(t);
+}
+
 static void half_space(void **state)
 {
     (void)state;
@@ -214,7 +245,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(create_guards),    cmocka_unit_test(neighbours),       cmocka_unit_test(rules),
-        cmocka_unit_test(nearest_by_power), cmocka_unit_test(kissing_branches), cmocka_unit_test(half_space),
+        cmocka_unit_test(nearest_by_power), cmocka_unit_test(kissing_branches), cmocka_unit_test(wide_sac),
+        cmocka_unit_test(half_space),
     };
     return cmocka_run_group_tests_name("vessel_tree", tests, NULL, NULL);
 }
