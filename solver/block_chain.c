@@ -81,120 +81,8 @@ void block_factor_destroy(BlockFactor *factor)
     free(factor);
 }
 
-// One end of the chain while it is eliminated: columns of the node's block, of its coupling, and of the next node's block.
-typedef struct End {
-    Lanes d[6], c[6], n[6];
-    double *t, *z, *inverse;
-} End;
-
-// Lane 6 of a node's columns: its right-hand side, where there is one.
-INLINE void set_side(Lanes *v, const double *b, int i)
-{
-    if (b)
-        UNROLL
-        for (int k = 0; k < 6; k++)
-            v[k][6] = b[6 * i + k];
-}
-
-INLINE void aim(End *e, const BlockFactor *f, int i)
-{
-    e->t = f->t + (size_t)i * PANEL;
-    e->z = f->z + (size_t)i * PANEL;
-    e->inverse = f->inverse + (size_t)i * COLUMN;
-}
-
-// Pivot k: column k is finished, the later ones lose their part.
-INLINE int pivot(End *e, int k)
-{
-    double p = e->d[k][k], inverse = 1 / p;
-    e->inverse[k] = inverse;
-    Lanes s = e->d[k] * inverse;
-    *(Lanes *)(e->t + COLUMN * k) = s;
-    *(Lanes *)(e->z + COLUMN * k) = e->c[k] * inverse;
-    UNROLL
-    for (int j = k + 1; j < 6; j++) {
-        e->d[j] -= e->d[k] * s[j];
-        e->c[j] -= e->c[k] * s[j];
-    }
-    return p > 0 && p <= DBL_MAX;
-}
-
-// The neighbour's columns lose Z d Z^T (lane 6: its right-hand side loses Z y), and become the end's node.
-INLINE void advance(End *e)
-{
-    UNROLL
-    for (int j = 0; j < 6; j++) {
-        Lanes sum = e->n[j];
-        UNROLL
-        for (int k = 0; k < 6; k++)
-            sum -= e->c[k] * e->z[COLUMN * k + j];
-        e->d[j] = sum;
-    }
-}
-
-INLINE void carry_side(End *e)
-{
-    UNROLL
-    for (int k = 0; k < 6; k++)
-        e->c[k][6] = e->d[k][6];
-}
-
-CLONES static bool eliminate(const BlockChain *a, BlockFactor *f, const double *b)
-{
-    int count = a->count, m = count / 2, ok = 1;
-    End left = {0}, right = {0};
-    load_rows(left.d, a->diag);
-    load_rows(right.d, a->diag + (size_t)(count - 1) * BLOCK);
-    set_side(left.d, b, 0);
-    set_side(right.d, b, count - 1);
-    for (int i = 0; i < m; i++) {
-        int j = count - 1 - i;
-        aim(&left, f, i);
-        load_columns(left.c, a->lower + (size_t)i * BLOCK);
-        load_rows(left.n, a->diag + (size_t)(i + 1) * BLOCK);
-        set_side(left.n, b, i + 1);
-        carry_side(&left);
-        if (j <= m) { // even count: the left end has one node more
-            UNROLL
-            for (int k = 0; k < 6; k++)
-                ok &= pivot(&left, k);
-            advance(&left);
-            break;
-        }
-        aim(&right, f, j);
-        load_rows(right.c, a->lower + (size_t)(j - 1) * BLOCK);
-        carry_side(&right);
-        if (j - 1 > m) {
-            load_rows(right.n, a->diag + (size_t)(j - 1) * BLOCK);
-            set_side(right.n, b, j - 1);
-        } else { // the middle node's own block comes with the left end; this end brings its loss alone
-            UNROLL
-            for (int k = 0; k < 6; k++)
-                right.n[k] = (Lanes){0};
-        }
-        UNROLL
-        for (int k = 0; k < 6; k++)
-            ok &= pivot(&left, k) & pivot(&right, k);
-        advance(&left);
-        advance(&right);
-    }
-    if (count > 2)
-        UNROLL
-        for (int k = 0; k < 6; k++)
-            left.d[k] += right.d[k];
-    aim(&left, f, m);
-    UNROLL
-    for (int k = 0; k < 6; k++)
-        left.c[k] = (Lanes){0};
-    carry_side(&left);
-    UNROLL
-    for (int k = 0; k < 6; k++)
-        ok &= pivot(&left, k);
-    return ok;
-}
-
 // r = d^-1 y - Z^T x', then T^T x = r; y_scaled has stride `step` between its six entries.
-INLINE void back_substitute(const double *t, const double *z, const double *y_scaled, int step, const double *next, double *x)
+INLINE void back_substitute_node(const double *t, const double *z, const double *y_scaled, int step, const double *next, double *x)
 {
     double r[6];
     UNROLL
@@ -213,7 +101,7 @@ INLINE void back_substitute(const double *t, const double *z, const double *y_sc
 }
 
 // y = T^-1 b in place, and b' -= Z y.
-INLINE void forward_substitute(const double *t, const double *z, double *y, double *next)
+INLINE void forward_substitute_node(const double *t, const double *z, double *y, double *next)
 {
     UNROLL
     for (int k = 0; k < 6; k++)
@@ -228,60 +116,69 @@ INLINE void forward_substitute(const double *t, const double *z, double *y, doub
 
 static const double zeros[6];
 
-CLONES static void back_substitute_all(const BlockFactor *f, double *x, const double *y, int stride, int step)
+#define WIDTH 2
+#define TARGET
+#define KERNEL(name) name##_baseline
+#include "solver/block_chain_kernel.inc"
+#undef WIDTH
+#undef TARGET
+#undef KERNEL
+#if BLOCK_HAS_AVX
+#define WIDTH 4
+#define TARGET __attribute__((target("avx2")))
+#define KERNEL(name) name##_avx2
+#include "solver/block_chain_kernel.inc"
+#undef WIDTH
+#undef TARGET
+#undef KERNEL
+#define WIDTH 8
+#define TARGET __attribute__((target("avx512f,avx512dq,avx512vl")))
+#define KERNEL(name) name##_avx512
+#include "solver/block_chain_kernel.inc"
+#undef WIDTH
+#undef TARGET
+#undef KERNEL
+#define ON(name) {name##_baseline, name##_avx2, name##_avx512}
+#else
+#define ON(name) {name##_baseline, name##_baseline, name##_baseline}
+#endif
+
+static bool (*const eliminate_on[3])(const BlockChain *, BlockFactor *, const double *) = ON(eliminate);
+static void (*const back_substitute_on[3])(const BlockFactor *, double *, const double *, int, int) = ON(back_substitute);
+static void (*const forward_substitute_on[3])(const BlockFactor *, double *) = ON(forward_substitute);
+
+static int forced_isa;
+
+void block_isa_force(int isa) { forced_isa = isa; }
+
+int block_isa(void)
 {
-    int count = f->count, m = count / 2;
-    const double *t = f->t, *z = f->z;
-    back_substitute(t + (size_t)m * PANEL, z + (size_t)m * PANEL, y + (size_t)m * (size_t)stride, step, zeros, x + 6 * (size_t)m);
-    for (int i = m - 1; i >= 0; i--) {
-        size_t l = (size_t)i, r = (size_t)(2 * m - i);
-        back_substitute(t + l * PANEL, z + l * PANEL, y + l * (size_t)stride, step, x + 6 * (l + 1), x + 6 * l);
-        if (r < (size_t)count)
-            back_substitute(t + r * PANEL, z + r * PANEL, y + r * (size_t)stride, step, x + 6 * (r - 1), x + 6 * r);
-    }
+#if BLOCK_HAS_AVX
+    bool any = forced_isa <= 0;
+    if ((any || forced_isa >= 3) && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
+        return 2;
+    if ((any || forced_isa >= 2) && __builtin_cpu_supports("avx2"))
+        return 1;
+#endif
+    return 0;
 }
 
-bool block_chain_factor(const BlockChain *chain, BlockFactor *factor)
-{
-    return eliminate(chain, factor, NULL);
-}
+bool block_chain_factor(const BlockChain *chain, BlockFactor *factor) { return eliminate_on[block_isa()](chain, factor, NULL); }
 
 bool block_chain_factor_solve(const BlockChain *chain, BlockFactor *factor, const double *b, double *x)
 {
-    if (!eliminate(chain, factor, b))
+    if (!eliminate_on[block_isa()](chain, factor, b))
         return false;
-    back_substitute_all(factor, x, factor->z + 6, PANEL, COLUMN);
+    back_substitute_on[block_isa()](factor, x, factor->z + 6, PANEL, COLUMN);
     return true;
-}
-
-CLONES static void forward_substitute_all(const BlockFactor *f, double *x)
-{
-    int count = f->count, m = count / 2;
-    const double *t = f->t, *z = f->z;
-    double tail[6] = {0}; // what the right end takes from the middle node, added once the left end is there
-    for (int i = 0; i < m; i++) {
-        size_t l = (size_t)i, r = (size_t)(count - 1 - i);
-        forward_substitute(t + l * PANEL, z + l * PANEL, x + 6 * l, x + 6 * (l + 1));
-        if (r > (size_t)m)
-            forward_substitute(t + r * PANEL, z + r * PANEL, x + 6 * r, r - 1 > (size_t)m ? x + 6 * (r - 1) : tail);
-    }
-    size_t mid = (size_t)m;
-    double rest[6] = {0};
-    UNROLL
-    for (int k = 0; k < 6; k++)
-        x[6 * mid + (size_t)k] += tail[k];
-    forward_substitute(t + mid * PANEL, z + mid * PANEL, x + 6 * mid, rest);
-    for (size_t i = 0; i < (size_t)count; i++)
-        for (size_t k = 0; k < 6; k++)
-            x[6 * i + k] *= f->inverse[COLUMN * i + k];
 }
 
 void block_factor_solve(const BlockFactor *factor, const double *b, double *x)
 {
     if (x != b)
         memcpy(x, b, (size_t)factor->count * 6 * sizeof *x);
-    forward_substitute_all(factor, x);
-    back_substitute_all(factor, x, x, 6, 1);
+    forward_substitute_on[block_isa()](factor, x);
+    back_substitute_on[block_isa()](factor, x, x, 6, 1);
 }
 
 // S_i = D_i^-1 + G^T S' G with G = Z T^-1 = C D_i^-1, S' the neighbour's towards the middle.

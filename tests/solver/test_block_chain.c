@@ -309,6 +309,40 @@ static void unit_rows_are_exact(void **state)
     }
 }
 
+// Every instruction set gives the same bits.
+static void same_bits_everywhere(void **state)
+{
+    (void)state;
+    for (int m = 1; m < 60; m += 7) {
+        size_t n = (size_t)m * 6;
+        BlockChain a;
+        assert_true(block_chain_create(&a, m));
+        BlockFactor *f = block_factor_create(m);
+        BlockLu *lu = block_lu_create(m);
+        random_chain(&a, 8);
+        double *x = calloc(9 * n, sizeof *x), *b = malloc(n * sizeof *b), *lower = calloc(n * 6 + 2, sizeof *b);
+        block_lu_transpose(m, a.lower, lower);
+        for (size_t i = 0; i < n; i++)
+            b[i] = uniform();
+        for (int isa = 1; isa <= 3; isa++) {
+            double *y = x + (size_t)(isa - 1) * 3 * n;
+            block_isa_force(isa);
+            assert_true(block_chain_factor_solve(&a, f, b, y));
+            block_factor_solve(f, b, y + n);
+            assert_true(block_lu_factor_solve(lu, a.diag, lower, a.lower, b, y + 2 * n));
+        }
+        block_isa_force(0);
+        assert_memory_equal(x, x + 3 * n, 3 * n * sizeof *x);
+        assert_memory_equal(x, x + 6 * n, 3 * n * sizeof *x);
+        free(x);
+        free(b);
+        free(lower);
+        block_lu_destroy(lu);
+        block_factor_destroy(f);
+        block_chain_destroy(&a);
+    }
+}
+
 static double now(void)
 {
     struct timespec t;
@@ -354,9 +388,11 @@ static void mirrored_signs_to_the_bit(void **state)
 static void prints_timings(void **state)
 {
     (void)state;
-    const int sizes[] = {51, 101, 201, 401, 801};
+    const int sizes[] = {51, 101, 201, 401, 801, 201, 201};
     for (size_t t = 0; t < sizeof sizes / sizeof *sizes; t++) {
         int m = sizes[t];
+        block_isa_force(t < 5 ? 0 : t == 5 ? 2 : 1);
+        print_message("%-8s ", t < 5 ? "" : t == 5 ? "AVX2" : "SSE2");
         enum { RUNS = 300 };
         BlockChain a;
         assert_true(block_chain_create(&a, m));
@@ -399,13 +435,14 @@ static void prints_timings(void **state)
         block_factor_destroy(f);
         block_chain_destroy(&a);
     }
+    block_isa_force(0);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(solves_as_dense),       cmocka_unit_test(inverse_diagonal_as_dense), cmocka_unit_test(refuses_indefinite),
-        cmocka_unit_test(lu_solves_unsymmetric), cmocka_unit_test(unit_rows_are_exact),   cmocka_unit_test(mirrored_signs_to_the_bit), cmocka_unit_test(prints_timings),
+        cmocka_unit_test(lu_solves_unsymmetric), cmocka_unit_test(unit_rows_are_exact),   cmocka_unit_test(mirrored_signs_to_the_bit), cmocka_unit_test(same_bits_everywhere), cmocka_unit_test(prints_timings),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
