@@ -176,10 +176,7 @@ static void print_surface_vtp(FILE *out, const TriangleMesh *mesh)
 
 static bool export_surface(const ExportOptions *options, const char *extension, const VesselTree *tree, Faults *faults)
 {
-    double least = HUGE_VAL;
-    for (int i = 0; i < tree->node_count; i++)
-        least = fmin(least, tree->radius[i]);
-    TriangleMesh *mesh = isosurface_of_tree(tree, options->cell_mm > 0 ? options->cell_mm : fmax(0.3 * least, 0.02));
+    TriangleMesh *mesh = isosurface_of_tree(tree, options->cell_mm > 0 ? options->cell_mm : isosurface_cell_for(tree));
     Text text;
     bool good = mesh && mesh->triangle_count > 0 && text_open(&text);
     if (good) {

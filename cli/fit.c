@@ -221,11 +221,8 @@ static bool write_json(const char *path, const VesselTree *model, const FitFigur
 static void make_picture(const char *path, const VesselTree *model)
 {
 #ifdef SELDINGER_RENDER
-    double least = HUGE_VAL;
-    for (int i = 0; i < model->node_count; i++)
-        least = fmin(least, model->radius[i]);
     char message[256] = "";
-    TriangleMesh *mesh = isosurface_of_tree(model, fmax(0.3 * least, 0.02));
+    TriangleMesh *mesh = isosurface_of_tree(model, isosurface_cell_for(model));
     PictureOptions options = picture_default_options();
     if (!picture_of_fit(path, &options, model, mesh, NULL, message, sizeof message))
         fprintf(stderr, "%s: no picture: %s\n", path, message);

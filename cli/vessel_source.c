@@ -179,21 +179,12 @@ bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, F
     return false;
 }
 
-static double surface_cell(const VesselTree *tree)
-{
-    // about twenty cells round the thinnest branches
-    double least = HUGE_VAL;
-    for (int i = 0; i < tree->node_count; i++)
-        least = fmin(least, tree->radius[i]);
-    return fmax(0.3 * least, 0.02);
-}
-
 const TriangleMesh *open_vessel_mesh(const Scene *scene, OpenVessel *open)
 {
     if (open->mesh)
         return open->mesh;
     if (open->tree)
-        open->mesh = isosurface_of_tree(open->tree, surface_cell(open->tree));
+        open->mesh = isosurface_of_tree(open->tree, isosurface_cell_for(open->tree));
 #ifdef SELDINGER_RENDER
     else if (scene->source == SOURCE_TUBE)
         open->mesh = picture_mesh_of_tube(&scene->tube);

@@ -418,3 +418,16 @@ void triangle_mesh_free(TriangleMesh *mesh)
     free(mesh->triangle);
     free(mesh);
 }
+
+double isosurface_cell_for(const VesselTree *tree)
+{
+    double least = HUGE_VAL, area = 0;
+    for (int i = 0; i < tree->node_count; i++) {
+        int parent = tree->parent[i];
+        least = fmin(least, tree->radius[i]);
+        area += parent < 0 ? 0 : 2 * PI * tree->radius[i] * vec3_distance(tree->center[i], tree->center[parent]);
+    }
+    // marching cubes cut a cell's face in 2.3 triangles on the average
+    double wanted = sqrt(2.3 * area / 300000);
+    return fmax(fmin(fmax(wanted, 0.3 * least), 0.6 * least), 0.02);
+}

@@ -23,6 +23,8 @@ TriangleMesh *isosurface_of_model(const VesselTree *tree, int node, double cell_
 // (candidates limited to nodes whose tube reaches the point), so neighbouring models join without a gap. Vertices are projected
 // on their node's model. Memory grows with the surface, not with the bounding box.
 TriangleMesh *isosurface_of_tree(const VesselTree *tree, double cell_mm);
+// A cell size for looking: about twenty cells round the thinnest branch, coarser (to ten) where that would take more than some 300,000 triangles.
+double isosurface_cell_for(const VesselTree *tree);
 void triangle_mesh_free(TriangleMesh *mesh);
 
 #endif
