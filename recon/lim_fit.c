@@ -72,6 +72,8 @@ typedef struct Gather {      // the memory of one job
     Vec3 retry[NEAR_CAPACITY];
     double retry_radius[NEAR_CAPACITY];
     int retry_count;
+    LimTube tube[NEAR_CAPACITY + 1];
+    int tube_count;
     double reach;            // points further from the node are left to other models
 } Gather;
 
@@ -298,6 +300,23 @@ static void gather_guards(const VesselTree *tree, int node, Gather *gather)
     }
 }
 
+// Where blobs may be: the tubes between the nodes around and their parents, a little thinner than the vessel; sacs are seldom round.
+static void gather_tubes(const VesselTree *tree, Gather *gather)
+{
+    const double inside = 0.9;
+    gather->tube_count = 0;
+    for (int k = 0; k < gather->near_count; k++) {
+        int at = gather->near[k].node, parent = tree->parent[at];
+        int from = parent >= 0 ? parent : at;
+        bool sac = tree->kind[at] == NODE_ANEURYSM;
+        double own = (sac ? 1.2 : inside) * tree->radius[at], before = inside * fmin(tree->radius[from], tree->radius[at]);
+        gather->tube[gather->tube_count++] = (LimTube){tree->center[from], tree->center[at], from == at ? own : before, own};
+        if (at == 0)   // upstream of the inlet
+            gather->tube[gather->tube_count++] =
+                (LimTube){tree->center[0], vec3_add_scaled(tree->center[0], -3 * tree->radius[0], tree->direction[0]), own, own};
+    }
+}
+
 // Blobs on the nodes around, where they do not crowd: for a second attempt.
 static void gather_retry(const VesselTree *tree, int node, Gather *gather)
 {
@@ -383,6 +402,11 @@ static void fit_node(void *context, long index)
         LimFitTask task = {.point_count = gather->point_count, .point = gather->point, .center = tree->center[node],
                            .direction = tree->direction[node], .radius = tree->radius[node], .guard_count = gather->guard_count,
                            .guard = gather->guard, .clearance = gather->clearance};
+        if (options->guard_shape) {
+            gather_tubes(tree, gather);
+            task.tube_count = gather->tube_count;
+            task.tube = gather->tube;
+        }
         if (options->sweep_all_blobs) {
             gather_retry(tree, node, gather);
             task.retry_count = gather->retry_count;

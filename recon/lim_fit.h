@@ -42,6 +42,10 @@ VesselTree *lim_fit(const VesselTree *tree, const LimFitOptions *options, const 
 
 // One local model: points, the node's tube, and what the guards need. Blobs are written to center, width (capacity max_blobs).
 // Returns the number of blobs, 0 where memory lacks. At least 4 points.
+typedef struct LimTube {     // a piece of lumen as the tree knows it: a cone between two spheres
+    Vec3 a, b;
+    double radius_a, radius_b;
+} LimTube;
 typedef struct LimFitTask {
     int point_count;
     const Vec3 *point;       // (point_count)
@@ -50,6 +54,8 @@ typedef struct LimFitTask {
     int guard_count;         // used with guard_shape only
     const Vec3 *guard;       // (guard_count) points known to be in the lumen (clearance > 0) or outside (< 0), with …
     const double *clearance; // … the least distance from the wall that they should have [mm]
+    int tube_count;          // used with guard_shape: blobs stay in these tubes (0: anywhere)
+    const LimTube *tube;     // (tube_count)
     int start_count;         // 0: the paper's pair on either side of the centre; else start from these blobs
     const Vec3 *start;       // (start_count) centres …
     const double *start_radius;   // … and the radii of their spheres
