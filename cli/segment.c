@@ -192,7 +192,7 @@ static int segment(const SegmentArguments *a, Faults *faults)
     bool good = tree != NULL;
     if (good) {
         double track_s = seconds() - start - load_s;
-        char created_by[] = "seldinger " SELDINGER_VERSION " segment", *text = rbt_parameters_text(&trace->parameters);
+        char created_by[] = "seldinger " SELDINGER_VERSION " segment", *text = rbt_parameters_text(&trace->parameters, volume_voxel_size(volume));
         size_t length = strlen(a->volume);
         char *source = malloc(length + 1);
         good = source && text;

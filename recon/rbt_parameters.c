@@ -10,7 +10,7 @@ RbtParameters rbt_paper_parameters(void)
 {
     return (RbtParameters){
         .p_inl = 0.7, .r_t = 0.1, .n_r = 162, .n_d = 81, .n_p = 128, .n_min = 220, .n_max = 500, .s = 0.5, .ray_length = 3, .height_share = 0.75,
-        .back_step = 0.1, .relaxed = 0.5, .powell = 1,
+        .back_step = 0.1, .relaxed = 0.5, .powell = 1, .turn_deg = 180,
         .overlap = 0.5, .max_length_mm = 1000, .aneurysm_rays = 162, .aneurysm_reach_mm = 15, .seed = 1,
     };
 }
@@ -32,6 +32,7 @@ RbtParameters rbt_default_parameters(void)
     p.ray_smoothing_voxels = 1;
     p.ray_edge = 0.1;
     p.contrast = 0.3;
+    p.turn_deg = 110;
     p.look_ahead = 12;
     p.aneurysm_rays = 642;
     return p;
@@ -60,6 +61,7 @@ const RbtParameterName rbt_parameter_table[] = {
     {"ray_smoothing_voxels", FIELD(ray_smoothing_voxels), 0, 10, false, "moving average along a ray"},
     {"ray_edge", FIELD(ray_edge), 0, 1, false, "rays that fall less per voxel than this share of the brightness range are discarded"},
     {"contrast", FIELD(contrast), 0, 1, false, "least contrast of a node, share of its predecessors'"},
+    {"turn_deg", FIELD(turn_deg), 10, 180, false, "largest turn of the axis within two radii of way"},
     {"look_ahead", FIELD(look_ahead), 0, 40, false, "radii ahead in which a swelling or ended branch is searched for its continuation; 0: none"},
     {"overlap", FIELD(overlap), 0, 1, false, "a branch ends this many radii from the centre of another's node"},
     {"max_length_mm", FIELD(max_length_mm), 1, 100000, false, "longest branch"},
@@ -69,12 +71,13 @@ const RbtParameterName rbt_parameter_table[] = {
 };
 const int rbt_parameter_count = sizeof rbt_parameter_table / sizeof rbt_parameter_table[0];
 
-char *rbt_parameters_text(const RbtParameters *parameters)
+char *rbt_parameters_text(const RbtParameters *parameters, double voxel_mm)
 {
-    size_t capacity = 64 * (size_t)(rbt_parameter_count + RBT_MAX_RETRIES), used = 0;
+    size_t capacity = 64 * (size_t)(rbt_parameter_count + RBT_MAX_RETRIES + 1), used = 0;
     char *text = malloc(capacity);
     if (!text)
         return NULL;
+    used += (size_t)snprintf(text, capacity, "voxel_mm: %.17g\n", voxel_mm);
     for (int i = 0; i < rbt_parameter_count; i++) {
         double value = *(const double *)(const void *)((const char *)parameters + rbt_parameter_table[i].offset);
         used += (size_t)snprintf(text + used, capacity - used, "%s: %.17g\n", rbt_parameter_table[i].name, value);

@@ -274,8 +274,15 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     for (int i = 0; i + 1 < branch->count; i++)
         if (segment_distance(next->cylinder.center, branch->node[i].cylinder.center, branch->node[i + 1].cylinder.center) < p->back_step * last->cylinder.radius)
             return false;
+    t->why = "turns back";
+    double way = vec3_norm(move), least = cos(p->turn_deg * PI / 180) - 1e-9;
+    for (int i = branch->count - 1; i >= 0 && way < 2 * last->cylinder.radius; i--) {
+        if (vec3_dot(next->cylinder.axis, branch->node[i].cylinder.axis) < least)
+            return false;
+        way += i > 0 ? vec3_distance(branch->node[i].cylinder.center, branch->node[i - 1].cylinder.center) : 0;
+    }
     t->why = "runs into itself";
-    double way = vec3_norm(move);
+    way = vec3_norm(move);
     for (int i = branch->count - 2; i >= 0; i--) {
         way += vec3_distance(branch->node[i].cylinder.center, branch->node[i + 1].cylinder.center);
         if (way > 4 * last->cylinder.radius && vec3_distance(next->cylinder.center, branch->node[i].cylinder.center) < p->overlap * branch->node[i].cylinder.radius)

@@ -40,6 +40,7 @@ typedef struct RbtParameters {
     double ray_smoothing_voxels;   // moving average along the ray
     double ray_edge;         // rays whose fall per voxel is below this share of the brightness range are discarded
     double contrast;         // least contrast of a node as a share of the mean of its last eight predecessors
+    double turn_deg;         // the axis may turn by this much within two radii of way; 180: any turn (a vessel does not, a lost tracking does)
     double look_ahead;       // where a branch swells or ends, the lumen is searched this many radii ahead for a vessel that goes on; 0: never
     double overlap;          // a branch ends where its centre is closer than this many radii to the centre of another branch's node
     double max_length_mm;    // of a branch
@@ -60,8 +61,8 @@ typedef struct RbtParameterName {
 } RbtParameterName;
 extern const RbtParameterName rbt_parameter_table[];
 extern const int rbt_parameter_count;
-// "name: value" a line, for the tree file; to be freed.
-char *rbt_parameters_text(const RbtParameters *parameters);
+// "name: value" a line, for the tree file, the volume's voxel size first (the fit's target depends on it); to be freed.
+char *rbt_parameters_text(const RbtParameters *parameters, double voxel_mm);
 
 typedef struct RbtSeed {     // where a branch starts
     Vec3 start, toward;      // [mm] or voxels
