@@ -19,7 +19,7 @@ static const char help[] =
     "  tree or model, centreline  .vtp (lines with Radius)  .mrk.json (3D Slicer curves)  .swc\n"
     "  recording              .csv (a row a node and frame)  .vtp or .pvd (one .vtp a frame and a .pvd that names them)\n\n"
     "  --what surface|centreline  what a .vtp holds; default: the surface of a model, the centreline of a tree\n"
-    "  --cell-mm X                size of the surface's cells [mm]; default 0.3 of the least radius\n"
+    "  --cell-mm X                size of the surface's cells [mm]; default: about ten to twenty cells round the thinnest branch\n"
     "  --frame RAS|LPS            coordinate system that a .mrk.json names; coordinates are never converted; default LPS\n"
     "  -o OUT                     the file to write\n"
     "  --threads N, --quiet       accepted as everywhere; nothing here takes long\n";
