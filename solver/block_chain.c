@@ -116,6 +116,16 @@ INLINE void forward_substitute_node(const double *t, const double *z, double *y,
 
 static const double zeros[6];
 
+// All pivots positive and finite; looked at once, afterwards.
+INLINE bool pivots_hold(const BlockFactor *f)
+{
+    bool ok = true;
+    for (size_t i = 0; i < (size_t)f->count; i++)
+        for (size_t k = 0; k < 6; k++)
+            ok &= f->inverse[COLUMN * i + k] > 0 && f->inverse[COLUMN * i + k] <= DBL_MAX;
+    return ok;
+}
+
 #define WIDTH 2
 #define TARGET
 #define KERNEL(name) name##_baseline

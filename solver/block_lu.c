@@ -48,6 +48,16 @@ void block_lu_destroy(BlockLu *lu)
 
 static const double zeros[6];
 
+// No pivot vanishes or overflows.
+INLINE bool pivots_hold(const BlockLu *f)
+{
+    bool ok = true;
+    for (int i = 0; i < f->count; i++)
+        for (int k = 0; k < 6; k++)
+            ok &= f->node[i].inverse[k] != 0 && fabs(f->node[i].inverse[k]) <= DBL_MAX;
+    return ok;
+}
+
 #define WIDTH 2
 #define TARGET
 #define KERNEL(name) name##_baseline

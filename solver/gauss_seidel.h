@@ -2,8 +2,10 @@
 //
 // Two forms behind one call (DESIGN section 4, items 5 and 6); both reach the same solution.
 //   pointwise: Gauss-Seidel over contacts (the paper's, and the reference), on the chain's semi-separable structure: W is never formed.
-//   block:     Gauss-Seidel between the normal and the friction field, each solved by a semismooth Newton method on the augmented
-//              Lagrangian with exact line search; an iteration is one chain factorisation.
+//   block:     both fields together by a semismooth Newton method, an iteration being one chain factorisation (contact_newton.c); where that
+//              finds no end, Gauss-Seidel between normal and friction field on a convex problem with exact line search (contact_convex.c).
+// Warm start: ContactPoint.force of the same material point from the step before, as it is; zero for a new point. What presses in it is taken
+// as active, so stale forces on points that have left the wall cost iterations: drop them with the candidate. Nothing else is remembered.
 #ifndef SELDINGER_SOLVER_GAUSS_SEIDEL_H
 #define SELDINGER_SOLVER_GAUSS_SEIDEL_H
 
@@ -16,7 +18,8 @@ typedef enum { CONTACT_BLOCK = 0, CONTACT_POINTWISE = 1 } ContactForm;
 
 typedef struct ContactOptions {
     ContactForm form;        // default CONTACT_BLOCK
-    int max_iterations;      // sweeps (pointwise) or factorisations (block); from the scene's contact_iterations
+    int max_iterations;      // sweeps (pointwise) or factorisations (block); default 200. Where block gets that far without converging it may add
+                             // up to 200 more to hand out forces in their cones under which nothing overlaps, with less friction than Coulomb's
     double tolerance;        // on the residual below, default 1e-6
 } ContactOptions;
 
