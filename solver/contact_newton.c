@@ -27,8 +27,8 @@ enum { OPEN, STICK, SLIP };
 // Penalty P over k: the rest after an iteration is about 1/P; rounding of the matrix grows with it.
 static const double penalty = 1e4;
 // r over k: only the branch that is taken depends on it, not the solution.
-static const double slope = 0.1;
-enum { PARALLEL_ITERATIONS = 14, SINGLE_ITERATIONS = 10, CONVEX_ITERATIONS = 40, FEASIBLE_ITERATIONS = 200 };
+static const double slope = 0.01;
+enum { PARALLEL_ITERATIONS = 14, SINGLE_ITERATIONS = 16, CONVEX_ITERATIONS = 40, FEASIBLE_ITERATIONS = 200 };
 
 static double normal_violation(const ContactRow *c, Vec3 motion) { return c->gap + vec3_dot(motion, c->normal); }
 
