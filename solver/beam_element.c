@@ -15,9 +15,12 @@
 // geometric stiffness. g is a polynomial in z = (1 - e . t)/2 = sin^2(angle/2), cut after z^7: 3e-9 off at 0.64 rad, and smooth
 // everywhere, which acos is not.
 //
-// Tangent: J' C J with the linearised J (main), which is positive semi-definite, and the geometric stiffness of a tension only:
-//   d theta_i = P d phi_i - e x (d x2 - d x1) / l,  P = I - e e'
-// A compression's part would make the matrix indefinite (DESIGN section 4, item 2).
+// Tangent: J' C J (main), positive semi-definite, and the geometric stiffness of a tension only: a compression's part would make the
+// matrix indefinite (DESIGN section 4, item 2). To first order in the angles
+//   d theta_i = B_i d phi_i + D_i (d x2 - d x1),   B_i = s_i I - t_i e',   D_i = -[t_i]x P / l,   s_i = e . t_i,   P = I - e e'
+// B_i, not P: B_i t_i = 0, so spinning a bent wire about its own tangent costs nothing, as it should. With P in its place the matrix held
+// EI k^2 of stiffness a length against spin and lacked as much elsewhere; eigenvalues of the true Hessian against it reached 9 in a wire coiled
+// in a capsule (above 2 a Newton step overshoots, and the coil shook until it left the vessel); with B they stay below 1.02 in equilibrium.
 #include "solver/beam_element.h"
 
 #include <stddef.h>
@@ -102,7 +105,8 @@ INLINE void element(const BeamInput *in, bool is_curved, BeamOutput *out)
     double h, g = angle_over_sine(0.5 * (1 - p.w), &h);
     double psi = 2 * g * p.x, torque = in->twist * psi;
     Vec3 axis = vec3(g * p.w - h * p.x * p.x, g * p.z - h * p.x * p.y, -g * p.y - h * p.x * p.z);
-    Vec3 turn = vec3_scale(quat_rotate(f1, axis), torque);
+    axis = quat_rotate(f1, axis);
+    Vec3 turn = vec3_scale(axis, torque);
     energy += 0.5 * torque * psi;
 
     Vec3 along = vec3(0, 0, 0), t1, t2;
@@ -119,26 +123,34 @@ INLINE void element(const BeamInput *in, bool is_curved, BeamOutput *out)
         out->chord1 = out->chord2 = vec3(0, 0, 0);
     }
     along = vec3_scale(vec3_add_scaled(along, -vec3_dot(along, e), e), inverse);
+    Vec3 tilt = vec3_cross(e, vec3_add(vec3_scale(bow1, b1.s), vec3_scale(bow2, b2.s)));
+    out->chord = e;
+    out->tangent1 = c1.t;
+    out->tangent2 = c2.t;
+    out->stretch = vec3_add_scaled(e, inverse, tilt);
+    out->bow1 = vec3_add_scaled(vec3_scale(bow1, b1.s), -vec3_dot(b1.t, bow1), e);
+    out->bow2 = vec3_add_scaled(vec3_scale(bow2, b2.s), -vec3_dot(b2.t, bow2), e);
+    out->axis = axis;
     out->force2 = vec3_add_scaled(along, tension, e);
     out->moment1 = t1;
     out->moment2 = t2;
-    out->chord = e;
     out->inverse = inverse;
     out->tension = tension;
+    out->energy = energy;
     out->bow = bow;
-    out->bow1 = bow1;
-    out->bow2 = bow2;
     out->angle1 = c1.angle;
     out->angle2 = c2.angle;
     out->turn1 = b1.angle;
     out->turn2 = b2.angle;
-    out->energy = energy;
 }
 
 void beam_element(const BeamInput *in, BeamOutput *out)
 {
     element(in, in->half_w < 1, out);
 }
+
+INLINE void set(BeamVectors v, int i, Vec3 value) { v.x[i] = value.x, v.y[i] = value.y, v.z[i] = value.z; }
+INLINE Vec3 get(BeamVectors v, int i) { return vec3(v.x[i], v.y[i], v.z[i]); }
 
 INLINE void chain_strain(const BeamRest *rest, const BeamPose *pose, int first, int last, bool is_curved, const BeamStrain *strain)
 {
@@ -165,14 +177,18 @@ INLINE void chain_strain(const BeamRest *rest, const BeamPose *pose, int first, 
         };
         BeamOutput o;
         element(&in, is_curved, &o);
-        s.ex[i] = o.chord.x, s.ey[i] = o.chord.y, s.ez[i] = o.chord.z;
+        set(s.chord, i, o.chord);
+        set(s.tangent1, i, o.tangent1);
+        set(s.tangent2, i, o.tangent2);
+        set(s.stretch, i, o.stretch);
+        set(s.bow1, i, o.bow1);
+        set(s.bow2, i, o.bow2);
+        set(s.axis, i, o.axis);
+        set(s.force2, i, o.force2);
+        set(s.moment1, i, o.moment1);
+        set(s.moment2, i, o.moment2);
         s.inverse[i] = o.inverse;
         s.tension[i] = o.tension;
-        s.b1x[i] = o.bow1.x, s.b1y[i] = o.bow1.y, s.b1z[i] = o.bow1.z;
-        s.b2x[i] = o.bow2.x, s.b2y[i] = o.bow2.y, s.b2z[i] = o.bow2.z;
-        s.fx[i] = o.force2.x, s.fy[i] = o.force2.y, s.fz[i] = o.force2.z;
-        s.m1x[i] = o.moment1.x, s.m1y[i] = o.moment1.y, s.m1z[i] = o.moment1.z;
-        s.m2x[i] = o.moment2.x, s.m2y[i] = o.moment2.y, s.m2z[i] = o.moment2.z;
         s.energy[i] = o.energy;
     }
 }
@@ -210,53 +226,84 @@ INLINE void put(double *block, int r, int c, int i, int j, double value, bool is
     *at = is_sum ? *at + value : value;
 }
 
-// The blocks of one element; with `is_sum` that of node 1 is added to what is there, the others are written.
-INLINE void tangent_blocks(Vec3 e, double inverse, double tension, Vec3 bow1, Vec3 bow2, double length, double axial, double near,
-                           double far, double twist, double scale, double *restrict k11, double *restrict k21, double *restrict k22, bool is_sum)
+typedef struct Columns {
+    double v[3];
+} Columns;
+INLINE Columns columns(Vec3 v) { return (Columns){{v.x, v.y, v.z}}; }
+
+// The part of the tangent between the displacement of node 2 and the rotation of node j, T = sum over i of C_ij t_i:
+//   sum over i of D_i' C_ij B_j = (s_j P [T]x - P (T x t_j) e') / l,   P [T]x = [T]x - e (e x T)'
+typedef struct Coupling {
+    double m[3][3];
+} Coupling;
+INLINE Coupling coupling(Vec3 e, Vec3 sum, Vec3 tangent, double s, double inverse)
 {
-    double pull = tension > 0 ? tension : 0;
-    double ka = axial * scale, kt = twist * scale;
-    double c = near * scale + pull * length * (4.0 / 30), d = far * scale - pull * length * (1.0 / 30);
-    double b = (c + d) * inverse, a = 2 * b * inverse + pull * inverse;
-    double v[3] = {e.x, e.y, e.z};
-    Vec3 tilt = vec3_scale(vec3_cross(e, vec3_add(bow1, bow2)), inverse);
-    double ext[3] = {e.x + tilt.x, e.y + tilt.y, e.z + tilt.z}, w1[3] = {bow1.x, bow1.y, bow1.z}, w2[3] = {bow2.x, bow2.y, bow2.z};
-    double skew[3][3] = {{0, -e.z * b, e.y * b}, {e.z * b, 0, -e.x * b}, {-e.y * b, e.x * b, 0}};
+    Vec3 around = vec3_cross(sum, tangent);
+    Columns v = columns(e), w = columns(vec3_add_scaled(around, -vec3_dot(around, e), e)), across = columns(vec3_cross(e, sum));
+    double skew[3][3] = {{0, -sum.z, sum.y}, {sum.z, 0, -sum.x}, {-sum.y, sum.x, 0}};
+    Coupling k;
     for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            double vv = v[i] * v[j], id = i == j ? 1.0 : 0.0, p = id - vv;
-            double tt = a * p + ka * ext[i] * ext[j];
-            double e1 = ka * ext[i] * w1[j], e2 = ka * ext[i] * w2[j];
-            put(k11, 0, 0, i, j, tt, is_sum);
-            put(k11, 0, 3, i, j, -skew[i][j] - e1, is_sum);
-            put(k11, 3, 0, j, i, -skew[i][j] - e1, is_sum);
-            put(k11, 3, 3, i, j, c * p + kt * vv + ka * w1[i] * w1[j], is_sum);
-            put(k22, 0, 0, i, j, tt, false);
-            put(k22, 0, 3, i, j, skew[i][j] + e2, false);
-            put(k22, 3, 0, j, i, skew[i][j] + e2, false);
-            put(k22, 3, 3, i, j, c * p + kt * vv + ka * w2[i] * w2[j], false);
-            put(k21, 0, 0, i, j, -tt, false);
-            put(k21, 0, 3, i, j, skew[i][j] + e1, false);
-            put(k21, 3, 0, j, i, -skew[i][j] - e2, false);
-            put(k21, 3, 3, i, j, d * p - kt * vv + ka * w2[i] * w1[j], false);
-        }
+        for (int j = 0; j < 3; j++)
+            k.m[i][j] = inverse * (s * (skew[i][j] - v.v[i] * across.v[j]) - w.v[i] * v.v[j]);
+    return k;
 }
 
-void beam_tangent(Vec3 chord, double inverse, double tension, Vec3 bow1, Vec3 bow2, double length, double axial, double near, double far,
-                  double twist, double scale, BeamTangent *tangent)
+// The blocks of one element; with `is_sum` that of node 1 is added to what is there, the others are written.
+INLINE void tangent_blocks(const BeamOutput *o, double length, double axial, double near, double far, double twist, double scale,
+                           double *restrict k11, double *restrict k21, double *restrict k22, bool is_sum)
 {
-    tangent_blocks(chord, inverse, tension, bow1, bow2, length, axial, near, far, twist, scale, tangent->k11, tangent->k21, tangent->k22,
-                   false);
+    double pull = o->tension > 0 ? o->tension : 0, inverse = o->inverse;
+    double ka = axial * scale, kt = twist * scale;
+    double c = near * scale + pull * length * (4.0 / 30), d = far * scale - pull * length * (1.0 / 30);
+    Vec3 e = o->chord, t1 = o->tangent1, t2 = o->tangent2;
+    double s1 = vec3_dot(e, t1), s2 = vec3_dot(e, t2), t12 = vec3_dot(t1, t2), i2 = inverse * inverse;
+    double a = 2 * (c + d * t12) * i2 + pull * inverse;
+    Coupling u1 = coupling(e, vec3_add(vec3_scale(t1, c), vec3_scale(t2, d)), t1, s1, inverse);
+    Coupling u2 = coupling(e, vec3_add(vec3_scale(t1, d), vec3_scale(t2, c)), t2, s2, inverse);
+    Columns v = columns(e), ext = columns(o->stretch), w1 = columns(o->bow1), w2 = columns(o->bow2), g = columns(o->axis);
+    Columns p1 = columns(t1), p2 = columns(t2), q1 = columns(vec3_add_scaled(t1, -s1, e)), q2 = columns(vec3_add_scaled(t2, -s2, e));
+    for (int i = 0; i < 3; i++) {
+        // rows of B_i' B_j and of the second-order rest of D_i' D_j
+        double x1 = i2 * (c * q1.v[i] + d * q2.v[i]), x2 = i2 * (c * q2.v[i] + d * q1.v[i]);
+        double y11 = c * (v.v[i] - s1 * p1.v[i]), z11 = -c * s1 * v.v[i], y22 = c * (v.v[i] - s2 * p2.v[i]), z22 = -c * s2 * v.v[i];
+        double y21 = d * (t12 * v.v[i] - s2 * p1.v[i]), z21 = -d * s1 * v.v[i];
+        double ke = ka * ext.v[i], k1 = ka * w1.v[i], k2 = ka * w2.v[i], kg = kt * g.v[i];
+        for (int j = 0; j < 3; j++) {
+            double id = i == j ? 1.0 : 0.0;
+            double tt = a * (id - v.v[i] * v.v[j]) - x1 * q1.v[j] - x2 * q2.v[j] + ke * ext.v[j];
+            double e1 = u1.m[i][j] + ke * w1.v[j], e2 = u2.m[i][j] + ke * w2.v[j], gg = kg * g.v[j];
+            put(k11, 0, 0, i, j, tt, is_sum);
+            put(k11, 0, 3, i, j, -e1, is_sum);
+            put(k11, 3, 0, j, i, -e1, is_sum);
+            put(k11, 3, 3, i, j, c * s1 * s1 * id + y11 * v.v[j] + z11 * p1.v[j] + k1 * w1.v[j] + gg, is_sum);
+            put(k22, 0, 0, i, j, tt, false);
+            put(k22, 0, 3, i, j, e2, false);
+            put(k22, 3, 0, j, i, e2, false);
+            put(k22, 3, 3, i, j, c * s2 * s2 * id + y22 * v.v[j] + z22 * p2.v[j] + k2 * w2.v[j] + gg, false);
+            put(k21, 0, 0, i, j, -tt, false);
+            put(k21, 0, 3, i, j, e1, false);
+            put(k21, 3, 0, j, i, -e2, false);
+            put(k21, 3, 3, i, j, d * s1 * s2 * id + y21 * v.v[j] + z21 * p2.v[j] + k2 * w1.v[j] - gg, false);
+        }
+    }
+}
+
+void beam_tangent(const BeamInput *in, const BeamOutput *out, double scale, BeamTangent *tangent)
+{
+    tangent_blocks(out, in->length, in->axial, in->near, in->far, in->twist, scale, tangent->k11, tangent->k21, tangent->k22, false);
 }
 
 BEAM_KERNEL
 void beam_chain_tangent(const BeamRest *rest, const BeamStrain *strain, int first, int last, double scale, BlockChain *chain)
 {
     const BeamStrain s = *strain;
-    for (int i = first; i < last; i++)
-        tangent_blocks(vec3(s.ex[i], s.ey[i], s.ez[i]), s.inverse[i], s.tension[i], vec3(s.b1x[i], s.b1y[i], s.b1z[i]),
-                       vec3(s.b2x[i], s.b2y[i], s.b2z[i]), rest->length[i], rest->axial[i], rest->near[i], rest->far[i], rest->twist[i],
-                       scale, chain->diag + 36 * (size_t)i, chain->lower + 36 * (size_t)i, chain->diag + 36 * (size_t)(i + 1), true);
+    for (int i = first; i < last; i++) {
+        BeamOutput o = {.chord = get(s.chord, i), .tangent1 = get(s.tangent1, i), .tangent2 = get(s.tangent2, i), .stretch = get(s.stretch, i),
+                        .bow1 = get(s.bow1, i), .bow2 = get(s.bow2, i), .axis = get(s.axis, i), .inverse = s.inverse[i], .tension = s.tension[i]};
+        double *diagonal = chain->diag + 36 * (size_t)i;
+        tangent_blocks(&o, rest->length[i], rest->axial[i], rest->near[i], rest->far[i], rest->twist[i], scale, diagonal,
+                       chain->lower + 36 * (size_t)i, diagonal + 36, true);
+    }
 }
 
 void beam_bending(double length, double bending, double shear, double *near, double *far)

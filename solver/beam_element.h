@@ -34,19 +34,23 @@ typedef struct BeamPose {    // nodes, (M) each
     double *x, *y, *z, *qw, *qx, *qy, *qz;
 } BeamPose;
 
-// What the energy's first derivative gives, (E) each. Gradients: the force on a node is minus these.
+// What the energy's first derivative gives, and what the tangent is made of, (E) each. Gradients: the force on a node is minus these.
+typedef struct BeamVectors {         // three arrays
+    double *x, *y, *z;
+} BeamVectors;
 typedef struct BeamStrain {
-    double *ex, *ey, *ez;            // chord, unit
+    BeamVectors chord;               // unit
+    BeamVectors tangent1, tangent2;  // unit: where the nodes' frames see the rest chord
+    BeamVectors stretch;             // derivative of the extension with the position of node 2 …
+    BeamVectors bow1, bow2;          // [mm] … and with the rotations of the nodes
+    BeamVectors axis;                // derivative of the twist with the rotation of node 2; with that of node 1 the opposite
+    BeamVectors force2;              // [N] gradient for the position of node 2; that of node 1 is the opposite
+    BeamVectors moment1, moment2;    // [N mm] gradient for rotations about the space axes
     double *inverse;                 // [1/mm] of the chord's length
     double *tension;                 // [N]
-    double *b1x, *b1y, *b1z;         // [mm] derivative of the bow with the rotation of node 1 …
-    double *b2x, *b2y, *b2z;         // … and of node 2
-    double *fx, *fy, *fz;            // [N] gradient for the position of node 2; that of node 1 is the opposite
-    double *m1x, *m1y, *m1z;         // [N mm] gradient for a rotation of node 1 about the space axes
-    double *m2x, *m2y, *m2z;
     double *energy;                  // [mJ]
 } BeamStrain;
-enum { BEAM_REST_ARRAYS = 12, BEAM_POSE_ARRAYS = 7, BEAM_STRAIN_ARRAYS = 21 };
+enum { BEAM_REST_ARRAYS = 12, BEAM_POSE_ARRAYS = 7, BEAM_STRAIN_VECTORS = 10, BEAM_STRAIN_ARRAYS = 33 };
 
 // One element, for the sheath and for tests.
 typedef struct BeamInput {
@@ -56,14 +60,13 @@ typedef struct BeamInput {
     double half_w, half_y, half_z;
 } BeamInput;
 typedef struct BeamOutput {
-    Vec3 chord;
-    double inverse, tension, bow;    // bow [mm]: arc length less chord, by the cubic shape
-    Vec3 bow1, bow2;
+    Vec3 chord, tangent1, tangent2, stretch, bow1, bow2, axis;     // as in BeamStrain
+    Vec3 force2, moment1, moment2;   // gradients
+    double inverse, tension, energy;
+    double bow;                      // [mm] arc length less chord, by the cubic shape
     Vec3 angle1, angle2;             // [rad] bending angles against the rest chord
     Vec3 turn1, turn2;               // [rad] from the chord to the nodes' tangents
-    Vec3 force2, moment1, moment2;   // gradients
     Vec3 chord1, chord2;             // [N mm] the part of moment1 and moment2 that comes through the rest chord (bending, torsion)
-    double energy;
 } BeamOutput;
 void beam_element(const BeamInput *in, BeamOutput *out);
 
@@ -74,8 +77,7 @@ void beam_chain_strain(const BeamRest *rest, const BeamPose *pose, int first, in
 typedef struct BeamTangent {
     double k11[36], k21[36], k22[36];
 } BeamTangent;
-void beam_tangent(Vec3 chord, double inverse, double tension, Vec3 bow1, Vec3 bow2, double length, double axial, double near, double far,
-                  double twist, double scale, BeamTangent *tangent);
+void beam_tangent(const BeamInput *in, const BeamOutput *out, double scale, BeamTangent *tangent);
 // Writes the blocks of elements first to last-1 into the chain: lower ones, and the diagonal ones of nodes first to last, of which the first
 // is added to.
 void beam_chain_tangent(const BeamRest *rest, const BeamStrain *strain, int first, int last, double scale, BlockChain *chain);

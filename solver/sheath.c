@@ -47,19 +47,10 @@ void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction,
         .outside = outside,
         .axial_gradient = by_length - out.tension,
         .twist_gradient = vec3_dot(direction, out.moment1),
-        .force2 = out.force2,
-        .moment2 = out.moment2,
         .energy = out.energy + 0.5 * bending * k0 * k0 * (length - outside),
-        .chord = out.chord,
-        .bow1 = out.bow1,
-        .bow2 = out.bow2,
-        .inverse = out.inverse,
-        .tension = out.tension,
-        .near = in.near,
-        .far = in.far,
+        .beam = in,
+        .out = out,
         .curvature = vec3_scale(phi, 1 / now),
-        .turn1 = out.turn1,
-        .turn2 = out.turn2,
     };
 }
 
@@ -67,9 +58,9 @@ void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const Sheat
                     double *length_column)
 {
     BeamTangent full;
+    const BeamOutput *out = &element->out;
     double ka = rest->axial[index] * scale, d[3] = {direction.x, direction.y, direction.z};
-    beam_tangent(element->chord, element->inverse, element->tension, element->bow1, element->bow2, element->outside, rest->axial[index],
-                 element->near, element->far, rest->twist[index], scale, &full);
+    beam_tangent(&element->beam, out, scale, &full);
     *tangent = (BeamTangent){0};
     for (int i = 0; i < 36; i++)
         tangent->k22[i] = full.k22[i];
@@ -82,26 +73,26 @@ void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const Sheat
         }
     }
     tangent->k11[21] = twist[3] * d[0] + twist[4] * d[1] + twist[5] * d[2];
-    // the axial unknown enters through the extension alone: -1 there
-    Vec3 tilt = vec3_scale(vec3_cross(element->chord, vec3_add(element->bow1, element->bow2)), element->inverse);
-    Vec3 along = vec3_add(element->chord, tilt);
+    // the axial unknown enters through the extension: -1 there
     tangent->k11[0] = ka;
-    tangent->k11[3] = tangent->k11[18] = -ka * vec3_dot(element->bow1, direction);
-    double column[6] = {along.x, along.y, along.z, element->bow2.x, element->bow2.y, element->bow2.z};
+    tangent->k11[3] = tangent->k11[18] = -ka * vec3_dot(out->bow1, direction);
+    double column[6] = {out->stretch.x, out->stretch.y, out->stretch.z, out->bow2.x, out->bow2.y, out->bow2.z};
     for (int i = 0; i < 6; i++)
         tangent->k21[i * 6] = -ka * column[i];
-
-    // through l: EI/l |d theta1 - d theta2 - k dl|^2, where the displacement of the outer node cancels
+    // and through l: EI/l |d theta1 - d theta2 - k dl|^2, with B and D of beam_element.c
+    Vec3 e = out->chord, t1 = out->tangent1, t2 = out->tangent2;
     double k = rest->bending[index] / element->outside;
-    Vec3 w = vec3_scale(element->curvature, -k), across = vec3_add_scaled(w, -vec3_dot(w, element->chord), element->chord);
+    Vec3 w = vec3_scale(element->curvature, -k), across = vec3_scale(vec3_cross(vec3_sub(t1, t2), w), out->inverse);
+    across = vec3_add_scaled(across, -vec3_dot(across, e), e);
+    Vec3 first = vec3_add_scaled(vec3_scale(w, vec3_dot(e, t1)), -vec3_dot(t1, w), e);
+    Vec3 second = vec3_add_scaled(vec3_scale(w, -vec3_dot(e, t2)), vec3_dot(t2, w), e);
+    double through[12] = {k * vec3_norm2(element->curvature), 0, 0, vec3_dot(direction, first), 0, 0,
+                          across.x, across.y, across.z, second.x, second.y, second.z};
     for (int i = 0; i < 12; i++)
-        length_column[i] = 0;
-    length_column[0] = k * vec3_norm2(element->curvature);
-    length_column[3] = vec3_dot(direction, across);
-    length_column[9] = -across.x, length_column[10] = -across.y, length_column[11] = -across.z;
-    tangent->k11[0] += scale * length_column[0];
-    tangent->k11[3] += scale * length_column[3];
-    tangent->k11[18] += scale * length_column[3];
-    for (int i = 3; i < 6; i++)
-        tangent->k21[i * 6] += scale * length_column[6 + i];
+        length_column[i] = through[i];
+    tangent->k11[0] += scale * through[0];
+    tangent->k11[3] += scale * through[3];
+    tangent->k11[18] += scale * through[3];
+    for (int i = 0; i < 6; i++)
+        tangent->k21[i * 6] += scale * through[6 + i];
 }

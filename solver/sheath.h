@@ -9,12 +9,10 @@ typedef struct SheathElement {       // the element across the mouth
     double outside;          // [mm] l, rest length of the part outside, > 0
     double axial_gradient;   // [N] derivative of the energy with the axial coordinate of the node inside
     double twist_gradient;   // [N mm] … with its rotation about the line
-    Vec3 force2, moment2;    // gradients for the node outside
     double energy;           // [mJ]
-    Vec3 chord, bow1, bow2;  // for the tangent
-    double inverse, tension, near, far;
+    BeamInput beam;          // the part outside …
+    BeamOutput out;          // … and what it gives: force2 and moment2 are the gradients for the node outside
     Vec3 curvature;          // [1/mm] of the part outside, as a vector along its axis of turning, negative
-    Vec3 turn1, turn2;       // [rad] from the chord to the tangents at the mouth and at the outer node
 } SheathElement;
 
 // `index`: the element. `coordinate` [mm] of its inner node along the line, 0 at the mouth, negative inside (a little past the mouth

@@ -41,10 +41,12 @@ static bool allocate_scratch(Stepper *s)
     for (int i = 0; i < BEAM_POSE_ARRAYS; i++)
         *pose[i] = take(&at, m);
     BeamStrain *t = &s->strain;
-    double **strain[] = {&t->ex, &t->ey, &t->ez, &t->inverse, &t->tension, &t->b1x, &t->b1y, &t->b1z, &t->b2x, &t->b2y, &t->b2z,
-                         &t->fx, &t->fy, &t->fz, &t->m1x, &t->m1y, &t->m1z, &t->m2x, &t->m2y, &t->m2z, &t->energy};
-    for (int i = 0; i < BEAM_STRAIN_ARRAYS; i++)
-        *strain[i] = take(&at, e);
+    BeamVectors *vectors[] = {&t->chord, &t->tangent1, &t->tangent2, &t->stretch, &t->bow1, &t->bow2, &t->axis, &t->force2, &t->moment1, &t->moment2};
+    for (int i = 0; i < BEAM_STRAIN_VECTORS; i++)
+        *vectors[i] = (BeamVectors){take(&at, e), take(&at, e), take(&at, e)};
+    t->inverse = take(&at, e);
+    t->tension = take(&at, e);
+    t->energy = take(&at, e);
     s->b = take(&at, 6 * m);
     s->u = take(&at, 6 * m);
     s->linearised = take(&at, 6 * m);
@@ -262,8 +264,8 @@ static void let_go(Stepper *s, int node)
     double along = stepper_sheath_coordinate(s, node), length = s->wire.length[node] + along, x = along / length;
     sheath_element(&s->rest, node, s->mouth, s->axis[0], along, w->orientation[node], w->position[node + 1], w->orientation[node + 1], 0, &e);
     // the cubic's tangent against the one at the mouth, and its integral
-    Vec3 turn = vec3_add_scaled(vec3_scale(e.turn1, x * (3 * x - 4)), x * (3 * x - 2), e.turn2);
-    Vec3 sum = vec3_scale(vec3_add_scaled(vec3_scale(e.turn1, x * x * (x - 2)), x * x * (x - 1), e.turn2), length);
+    Vec3 turn = vec3_add_scaled(vec3_scale(e.out.turn1, x * (3 * x - 4)), x * (3 * x - 2), e.out.turn2);
+    Vec3 sum = vec3_scale(vec3_add_scaled(vec3_scale(e.out.turn1, x * x * (x - 2)), x * x * (x - 1), e.out.turn2), length);
     w->position[node] = vec3_add(w->position[node], vec3_cross(sum, s->axis[0]));
     w->orientation[node] = quat_unit(quat_mul(quat_from_rotation_vector(turn), w->orientation[node]));
 }
@@ -342,11 +344,11 @@ static double largest_turn(const Stepper *s)
         double node = vec3_norm2(vec3_cross(turn, axis)), chord = 0;
         if (i > s->first_free) {
             Vec3 d = vec3(u[0] - u[-6] - k[0] + k[-6], u[1] - u[-5] - k[1] + k[-5], u[2] - u[-4] - k[2] + k[-4]);
-            chord = vec3_norm2(vec3_cross(vec3(e->ex[i - 1], e->ey[i - 1], e->ez[i - 1]), d)) * (e->inverse[i - 1] * e->inverse[i - 1]);
+            chord = vec3_norm2(vec3_cross(vec3(e->chord.x[i - 1], e->chord.y[i - 1], e->chord.z[i - 1]), d)) * (e->inverse[i - 1] * e->inverse[i - 1]);
         } else if (i > 0) {
             // from the mouth
             Vec3 d = vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]);
-            chord = vec3_norm2(vec3_cross(s->mouth_element.chord, d)) / (s->wire.length[i - 1] * s->wire.length[i - 1]);
+            chord = vec3_norm2(vec3_cross(s->mouth_element.out.chord, d)) / (s->wire.length[i - 1] * s->wire.length[i - 1]);
         }
         largest = largest > node ? largest : node;
         largest = largest > chord ? largest : chord;

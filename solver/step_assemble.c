@@ -50,10 +50,10 @@ static void free_nodes(Stepper *s)
     const BeamStrain *e = &s->strain;
     for (int i = s->first_free; i < w->element_count; i++) {
         double *b = s->b + 6 * (size_t)i;
-        b[0] += e->fx[i], b[1] += e->fy[i], b[2] += e->fz[i];
-        b[3] -= e->m1x[i], b[4] -= e->m1y[i], b[5] -= e->m1z[i];
-        b[6] -= e->fx[i], b[7] -= e->fy[i], b[8] -= e->fz[i];
-        b[9] -= e->m2x[i], b[10] -= e->m2y[i], b[11] -= e->m2z[i];
+        b[0] += e->force2.x[i], b[1] += e->force2.y[i], b[2] += e->force2.z[i];
+        b[3] -= e->moment1.x[i], b[4] -= e->moment1.y[i], b[5] -= e->moment1.z[i];
+        b[6] -= e->force2.x[i], b[7] -= e->force2.y[i], b[8] -= e->force2.z[i];
+        b[9] -= e->moment2.x[i], b[10] -= e->moment2.y[i], b[11] -= e->moment2.z[i];
     }
 }
 
@@ -96,8 +96,8 @@ static void mouth_element(Stepper *s, double scale)
     double *b = s->b + 6 * (size_t)i, *d = s->chain.diag + 36 * (size_t)i;
     b[0] -= e->axial_gradient;
     b[3] -= e->twist_gradient;
-    add_vec(b + 6, vec3_negate(e->force2));
-    add_vec(b + 9, vec3_negate(e->moment2));
+    add_vec(b + 6, vec3_negate(e->out.force2));
+    add_vec(b + 9, vec3_negate(e->out.moment2));
     for (int k = 0; k < 12; k++)
         b[k] += column[k] * ahead;
     for (int k = 0; k < 36; k++) {

@@ -112,10 +112,11 @@ void stepper_detect(Stepper *s)
         was_inside = true;
         if (hit->flags & VESSEL_UNSURE)
             s->report.flags |= STEP_DETECTION_UNSURE;
-        if (!s->is_iterate)
+        if (!s->is_iterate) {
             s->report.penetration = fmax(s->report.penetration, -gap);
-        if (gap < -DEEP)
-            s->report.flags |= STEP_DEEP;
+            if (gap < -DEEP)
+                s->report.flags |= STEP_DEEP;
+        }
         if ((hit->flags & VESSEL_FAR) || !(gap < reach) || !vec3_is_finite(hit->normal)) {
             s->force[i] = vec3(0, 0, 0);
             s->room[i] = gap;
