@@ -113,19 +113,23 @@ static Vec3 cross_between(const Blobby *model, Vec3 in, double f_in, Vec3 out, d
     return vec3_mix(in, out, 0.5 * (a + b));
 }
 
-// From x inside, out along unit d to the first crossing found with growing strides (the field falls to -T at infinity).
-static Vec3 march_out(const Blobby *model, Vec3 x, double f, Vec3 d, double scale)
+// From x inside, out along unit d to the first crossing found with growing strides (the field falls to -T at infinity). False where there is none
+// within `reach`.
+static bool march_out(const Blobby *model, Vec3 x, double f, Vec3 d, double scale, double reach, Vec3 *start)
 {
     double t = 0, stride = 0.5 * scale, ft = f;
-    for (int i = 0; i < 200; i++) {
-        Vec3 next = vec3_add_scaled(x, t + stride, d);
+    for (int i = 0; i < 200 && t < reach; i++) {
+        double to = fmin(t + stride, reach);
+        Vec3 next = vec3_add_scaled(x, to, d);
         double fn = blobby_field(model, next);
-        if (!(fn > 0))
-            return cross_between(model, vec3_add_scaled(x, t, d), ft, next, fn);
-        t += stride, ft = fn;
+        if (!(fn > 0)) {
+            *start = cross_between(model, vec3_add_scaled(x, t, d), ft, next, fn);
+            return true;
+        }
+        t = to, ft = fn;
         stride *= 1.25;
     }
-    return x;
+    return false;
 }
 
 // From x outside, the nearest crossing on the way to a blob whose centre is inside. False where no centre is.
@@ -264,8 +268,7 @@ static bool start_on_surface(const Blobby *model, Vec3 x, double f, Vec3 g, doub
 {
     if (f > 0) {
         // the closest wall lies more or less where the field falls fastest; where it is flat any direction is as good, the same one always
-        *start = march_out(model, x, f, vec3_unit_or(vec3_negate(g), vec3(1, 0, 0)), scale);
-        return true;
+        return march_out(model, x, f, vec3_unit_or(vec3_negate(g), vec3(1, 0, 0)), scale, HUGE_VAL, start);
     }
     // near the surface fall onto it; from afar the field is no distance and the crossings towards the blobs are better starts
     Vec3 near = x;
@@ -308,15 +311,17 @@ SurfacePoint blobby_project(const Blobby *model, Vec3 x, Vec3 start)
         lost.distance = -vec3_distance(x, c);
         return lost;
     }
-    // Without a last contact, and more than half way to a focal point, another side may be closer.
-    if (!warm && least < 0.5) {
-        static const Vec3 way[6] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
-        Vec3 other;
-        for (int k = 0; k < 6 && f > 0; k++)
-            keep_closer(model, x, march_out(model, x, f, way[k], scale), scale, &best, &least);
-        if (f <= 0 && cross_towards_blobs(model, x, f, &other))
+    // Without a last contact: from inside, whatever wall a few rays find nearer than the foot; from outside, near a focal point, the blobs' lobes.
+    // (On a vessel's axis the field may fall fastest along it, and the first foot was the far end's.)
+    Vec3 other;
+    for (int k = 0; k < 14 && !warm && f > 0; k++) {
+        static const Vec3 way[14] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}, {1, 1, 1},
+                                     {1, 1, -1}, {1, -1, 1}, {1, -1, -1}, {-1, 1, 1}, {-1, 1, -1}, {-1, -1, 1}, {-1, -1, -1}};
+        if (march_out(model, x, f, vec3_unit(way[k]), scale, 0.999 * fabs(best.gap), &other))
             keep_closer(model, x, other, scale, &best, &least);
     }
+    if (!warm && f <= 0 && least < 0.5 && cross_towards_blobs(model, x, f, &other))
+        keep_closer(model, x, other, scale, &best, &least);
     double away = vec3_distance(x, best.foot), rest = vec3_norm(best.tangent);
     return (SurfacePoint){.foot = best.foot, .normal = best.normal, .shape = best.shape, .distance = best.gap,
                           .converged = fabs(best.field) < 1e-9 * best.slope && (away < 1e-6 || rest <= 1e-4 * away)};

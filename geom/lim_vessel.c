@@ -4,7 +4,7 @@
 // A point goes through
 //   1. power_walk from its last node;
 //   2. bounds that cost no field: the distance is 1-Lipschitz, so gap(X) >= gap(C) - |X - C| for the node's centre C, and
-//      gap(X) >= gap(X_then) - |X - X_then| for the place where it was last measured;
+//      gap(X) >= clearance - |X - X_then| for the place where that was last made sure of;
 //   3. one value of the field at X: its sign, and an estimate that shows when another wall has come closer than the remembered one;
 //   4. Newton (foot_lanes.h) from where the remembered foot should have moved to: p + (I + gap S)^-1 P (X - X_then);
 //   5. where that fails, a march from X along the gradient, then again 4; where that fails, blobby_project (slow, robust).
@@ -41,6 +41,7 @@ typedef struct Lane {
     int point;               // of the query
     int node;
     bool sure, again;
+    bool checked;            // no other wall stands within 0.7 gap
     double weight;           // in a blend
 } Lane;
 
@@ -118,6 +119,9 @@ static bool march_step(const LimVessel *lim, FootBatch *b, int i, int node)
 {
     const VesselTree *tree = lim->tree;
     Vec3 g = {b->gx[i], b->gy[i], b->gz[i]}, p = lane_foot(b, i);
+    // inside a vessel the side wall is nearer than its ends, though near the axis the field may fall faster towards those
+    if (b->inside[i] > 0 && tree->kind[node] == NODE_VESSEL)
+        g = vec3_add_scaled(g, -vec3_dot(g, tree->direction[node]), tree->direction[node]);
     double radius = tree->radius[node], level = 1 / sqrt(tree->iso_level), slope = vec3_norm(g), sum = b->f[i] + tree->iso_level, step = radius;
     if (slope > 1e-12 * sum) {
         double w = 1 / sqrt(sum);
@@ -218,6 +222,49 @@ static void project_batch(const LimVessel *lim, FootBatch *b, Lane *of, int coun
             project_slowly(lim, b, i, &of[i]);
             slow = true;
         }
+    if (slow)
+        lim->kernels->finish(b, count);
+}
+
+// A foot far off is the locally closest, but is it the closest? Looks on a sphere of 0.9 times its distance about X in 14 directions, at most 36 degrees
+// apart from any other: all inside means that no (flat) wall is nearer than 0.7 gap. What fails is projected anew, slowly and thoroughly. Asked only
+// where the clearance of an earlier check has been used up; near the wall the estimate serves.
+static void check_batch(const LimVessel *lim, FootBatch *b, Lane *of, int count, const VesselMemory *memory)
+{
+    static const double c = 0.57735026918962573;   // 1 / sqrt 3
+    const double way[14][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}, {c, c, c},
+                               {c, c, -c}, {c, -c, c}, {c, -c, -c}, {-c, c, c}, {-c, c, -c}, {-c, -c, c}, {-c, -c, -c}};
+    int lane[FOOT_BATCH], n = 0;
+    FootLane foot[3];
+    for (int i = 0; i < count; i++) {
+        const VesselMemory *m = &memory[of[i].point];
+        double known = m->clearance > 0 ? m->clearance - vec3_distance(lane_point(b, i), m->clear_place) : 0;
+        of[i].checked = of[i].sure && b->gap[i] > 0.3 * b->radius[i] && known < 0.5 * b->gap[i];
+        if (!of[i].checked)
+            continue;
+        foot[0][i] = b->px[i], foot[1][i] = b->py[i], foot[2][i] = b->pz[i];
+        lane[n++] = i;
+    }
+    bool slow = false, bad[FOOT_BATCH] = {false};
+    for (int k = 0; k < 14 && n > 0; k++) {
+        for (int j = 0; j < n; j++) {
+            int i = lane[j];
+            double r = 0.9 * b->gap[i];
+            b->px[i] = b->xx[i] + r * way[k][0], b->py[i] = b->xy[i] + r * way[k][1], b->pz[i] = b->xz[i] + r * way[k][2];
+        }
+        lim->kernels->gradient(b, lane, n, lim->tree->iso_level);
+        for (int j = 0; j < n; j++)
+            bad[lane[j]] = bad[lane[j]] || !(b->f[lane[j]] > 0);
+    }
+    for (int j = 0; j < n; j++) {
+        int i = lane[j];
+        b->px[i] = foot[0][i], b->py[i] = foot[1][i], b->pz[i] = foot[2][i];
+        if (bad[i]) {
+            project_slowly(lim, b, i, &of[i]);
+            of[i].checked = of[i].sure;
+            slow = true;
+        }
+    }
     if (slow)
         lim->kernels->finish(b, count);
 }
@@ -429,7 +476,7 @@ static bool answer_cheaply(const LimVessel *lim, Vec3 x, double reach, VesselMem
     double mixed = lim->options.field == LIM_BLEND ? blend_least(tree->radius[node]) : 0;
     double bound = lim->model[node].clear - vec3_distance(x, tree->center[node]);
     if (memory->clearance > 0)
-        bound = fmax(bound, memory->clearance - vec3_distance(x, memory->place));
+        bound = fmax(bound, memory->clearance - vec3_distance(x, memory->clear_place));
     hit->gap = bound - mixed;
     hit->flags = VESSEL_FAR;
     return hit->gap > reach;
@@ -459,7 +506,10 @@ static bool answer_from_foot(const LimVessel *lim, const FootBatch *b, int i, co
     if (section)
         hit->flags = 0;
     memory->has_foot = of->sure || section;
-    memory->clearance = of->sure && !section ? hit->gap : 0;
+    if (of->checked && !section) {
+        memory->clearance = fmax(0.7 * hit->gap, 0);
+        memory->clear_place = x;
+    }
     memory->foot = foot;
     memory->place = x;
     memory->normal = hit->normal;
@@ -483,6 +533,7 @@ static void query_batch(const LimVessel *lim, int count, const Vec3 *point, doub
     if (n == 0)
         return;
     project_batch(lim, &batch, of, n);
+    check_batch(lim, &batch, of, n, memory);
     for (int i = 0; i < n; i++)
         of[i].sure = answer_from_foot(lim, &batch, i, &of[i], &memory[of[i].point], &hit[of[i].point]) && of[i].sure;
     if (lim->options.field == LIM_BLEND)
@@ -562,9 +613,9 @@ static void fill_models(LimVessel *lim)
             m->group = NULL;   // below, when all are filled
         }
         m->band = BLEND_BAND * spacing2(tree, i);
-        // a twentieth off, should the projection have found another side's foot
+        // less than what was found, should that be another side's foot
         SurfacePoint s = blobby_project(&blobs, tree->center[i], tree->center[i]);
-        m->clear = s.converged && s.distance > 0 ? 0.95 * s.distance : -HUGE_VAL;
+        m->clear = s.converged && s.distance > 0 ? fmin(0.95 * s.distance, tree->radius[i]) : -HUGE_VAL;
     }
     for (int i = 0; i < tree->node_count; i++)
         lim->model[i].group = lim->model[lim->model[i].source].group;

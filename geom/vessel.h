@@ -16,7 +16,8 @@ typedef struct VesselMemory {
     int node;                // node of the tree, or segment of the tube; -1: not yet located
     bool has_foot;
     Vec3 foot;               // last projection, where Newton starts
-    double clearance;        // [mm] at `place` the wall of `node` was at least this far; 0: not known. Lets far points pass unevaluated
+    double clearance;        // [mm] at `clear_place` the wall of `node` was at least this far; 0: not known. Lets far points pass unevaluated
+    Vec3 clear_place;
     Vec3 place, normal;      // where the foot was found from, the answer there …
     Sym3 hessian;            // … and its curvature: they say where the foot has moved to
 } VesselMemory;              // a fresh one: {.node = -1}

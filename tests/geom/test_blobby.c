@@ -235,6 +235,32 @@ static void closest_against_sampling(void **state)
     }
 }
 
+// A row of blobs that thins out: at its middle the field falls fastest along the row, but the wall is beside.
+static void tapered_row(void **state)
+{
+    (void)state;
+    enum { N = 13 };
+    for (int turn = 0; turn < 12; turn++) {
+        Vec3 center[N], axis = vec3_unit(vec3(cos(turn), sin(turn), 0.3 * turn - 1.5));
+        double width[N];
+        for (int j = 0; j < N; j++) {
+            center[j] = vec3_scale(axis, 0.5 * (j - N / 2));
+            width[j] = 0.25 + 0.008 * j;
+        }
+        Blobby m = {N, center, width, 0.1};
+        for (double s = -2; s <= 2; s += 0.25) {
+            Vec3 x = vec3_scale(axis, s);
+            SurfacePoint p = blobby_project(&m, x, x);
+            assert_true(p.converged);
+            double wide = 0;   // the section's radius here: no nearer wall may be further
+            for (double step = 1; step > 1e-10; step /= 2)
+                if (blobby_field(&m, vec3_add_scaled(x, wide + step, vec3_normal_to(axis))) > 0)
+                    wide += step;
+            assert_true(p.distance <= wide + 1e-9);
+        }
+    }
+}
+
 // Near the surface there is no choice of lobes: the foot is the closest point, whatever the model.
 static void closest_near_the_surface(void **state)
 {
@@ -263,7 +289,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(radius_table),          cmocka_unit_test(split_table),     cmocka_unit_test(derivatives_of_second_order),
         cmocka_unit_test(curvature_of_a_sphere), cmocka_unit_test(sphere_is_exact), cmocka_unit_test(centre_and_far_away),
-        cmocka_unit_test(tube_axis),             cmocka_unit_test(closest_against_sampling), cmocka_unit_test(closest_near_the_surface),
+        cmocka_unit_test(tube_axis),             cmocka_unit_test(tapered_row),       cmocka_unit_test(closest_against_sampling), cmocka_unit_test(closest_near_the_surface),
     };
     return cmocka_run_group_tests_name("blobby", tests, NULL, NULL);
 }
