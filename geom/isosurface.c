@@ -87,8 +87,7 @@ typedef struct NodeReach {
 
 typedef struct Block {
     int base[3];                     // lattice point of its lowest corner
-    int first, count;                // its candidates, in Job.candidate
-    int latest;                      // scratch: the last link of its candidate list
+    int first, latest;               // its candidates: first and last link
 } Block;
 
 typedef struct Link {                // candidates of a block while blocks are found
@@ -156,7 +155,7 @@ static bool add_block(Job *job, const int base[3], int node)
     if (is_new) {
         if (job->block_count >= BLOCKS_MAX || !grow((void **)&job->block, job->block_count, &job->block_capacity, sizeof *job->block))
             return false;
-        job->block[job->block_count++] = (Block){{base[0], base[1], base[2]}, -1, 0, -1};
+        job->block[job->block_count++] = (Block){{base[0], base[1], base[2]}, -1, -1};
     }
     if (!grow((void **)&job->link, job->link_count, &job->link_capacity, sizeof *job->link))
         return false;
@@ -167,7 +166,6 @@ static bool add_block(Job *job, const int base[3], int node)
     else
         b->first = job->link_count;
     b->latest = job->link_count++;
-    b->count++;
     return true;
 }
 
@@ -211,11 +209,39 @@ static void field_bounds(const Blobby *m, Vec3 x, double h, double *low, double 
     }
 }
 
+static Vec3 block_ball(const Job *job, const Block *b, double *radius)
+{
+    double half = 0.5 * BLOCK * job->cell;
+    *radius = half * sqrt(3) * (1 + 1e-9);
+    return vec3(b->base[0] * job->cell + half, b->base[1] * job->cell + half, b->base[2] * job->cell + half);
+}
+
+// Drops candidates that are nowhere in the block the power-nearest: behind one that reaches all of it.
+static void prune_candidates(Job *job, Block *b)
+{
+    double h, least = HUGE_VAL;
+    Vec3 middle = block_ball(job, b, &h);
+    for (int l = b->first; l >= 0; l = job->link[l].next) {
+        const NodeReach *n = &job->node[job->link[l].node];
+        double d = vec3_distance(middle, job->tree->center[n->node]), r = job->tree->radius[n->node];
+        if (d + h < n->reach)
+            least = fmin(least, (d + h) * (d + h) - r * r);
+    }
+    for (int *link = &b->first; *link >= 0;) {
+        const NodeReach *n = &job->node[job->link[*link].node];
+        double d = fmax(0, vec3_distance(middle, job->tree->center[n->node]) - h), r = job->tree->radius[n->node];
+        if (d * d - r * r > least + 1e-9)
+            *link = job->link[*link].next;
+        else
+            link = &job->link[*link].next;
+    }
+}
+
 // Whether the block is certainly without surface: every candidate says outside, or every one inside and one covers all of it.
 static bool block_is_plain(const Job *job, const Block *b)
 {
-    double half = 0.5 * BLOCK * job->cell, h = half * sqrt(3) * (1 + 1e-9);
-    Vec3 middle = vec3(b->base[0] * job->cell + half, b->base[1] * job->cell + half, b->base[2] * job->cell + half);
+    double h;
+    Vec3 middle = block_ball(job, b, &h);
     bool all_out = true, all_in = true, covered = false;
     for (int l = b->first; l >= 0 && (all_out || all_in); l = job->link[l].next) {
         const NodeReach *n = &job->node[job->link[l].node];
@@ -377,6 +403,7 @@ static TriangleMesh *surface_of_nodes(const VesselTree *tree, int first, int end
     cube_table_fill(&job->table);
     bool good = find_blocks(job, first, end);
     for (int i = 0; good && i < job->block_count; i++) {
+        prune_candidates(job, &job->block[i]);
         if (block_is_plain(job, &job->block[i]))
             continue;
         sample_block(job, &job->block[i]);
