@@ -32,7 +32,6 @@ struct Stepper {
     double wall_friction;
     ContactOptions contact;
     int newton_max;
-    double newton_motion;
 
     // what the next step depends on: see checkpoint.c
     WireState state;         // arrays in `memory`; within a step the iterate
