@@ -62,7 +62,7 @@ Vessel *lim_vessel_create(const VesselTree *tree);
 typedef enum {
     LIM_SWITCH,              // the paper's: the local model of the point's node alone; the wall jumps where the node changes
     LIM_BLEND,               // the default: gaps, normals and Hessians of the node's and its neighbours' models mixed towards the borders of the power
-                             // cells, where they differ by less than min(r / 2, 0.25 mm); stays within 0.05 mm of the own model. The normal is the mean of
+                             // cells, where they differ by less than min(r / 2, 0.8 mm); stays within 0.15 mm of the own model. The normal is the mean of
                              // normals: it leaves out the weights' slope, so that a wire sliding along does not catch on what the models differ by
 } LimField;
 typedef struct LimVesselOptions {
