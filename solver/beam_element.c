@@ -331,6 +331,8 @@ INLINE void scatter_blocks(const double *tile, double *block)
 BEAM_KERNEL
 void beam_chain_tangent(const BeamRest *rest, const BeamStrain *strain, int first, int last, double scale, BlockChain *chain)
 {
+    if (first >= last)
+        return;
     _Alignas(64) double k11[BLOCK_ENTRIES * LANES], k21[BLOCK_ENTRIES * LANES], k22[BLOCK_ENTRIES * LANES], carry[BLOCK_ENTRIES];
     const BeamRest r = *rest;
     const BeamStrain s = *strain;
