@@ -30,6 +30,7 @@ LimFitOptions lim_fit_paper_options(void)
     options.beta = 1e-3;
     options.target_mm = 0.3;
     options.max_loops = 5;
+    options.line_searches = 20;   // with 4 the repulsion's throw is never taken back and the new blob shrinks to nothing outside
     options.weigh_distance = options.project_points = options.sweep_all_blobs = options.extend_inlet = options.guard_shape = false;
     options.give_up_splits = 0;
     return options;
@@ -74,6 +75,7 @@ typedef struct Gather {      // the memory of one job
     int retry_count;
     LimTube tube[NEAR_CAPACITY + 1];
     int tube_count;
+    bool is_extended;        // the inlet's points were repeated upstream
     double reach;            // points further from the node are left to other models
 } Gather;
 
@@ -140,6 +142,7 @@ static bool extend_inlet(const VesselTree *tree, Gather *gather, Vec3 center)
     // a root whose points close it over is a blind end, not an inlet
     if (last - first < 12 || extent < 0.2 * radius || closing >= 3)
         return true;
+    gather->is_extended = true;
     for (int copy = 1; copy < 12 && most + (copy - 1) * extent < 2.2 * radius; copy++)
         for (int64_t i = first; i < last; i++) {
             Vec3 p = vec3_add_scaled(tree->point[i], copy * extent, upstream);
@@ -171,6 +174,7 @@ static bool gather_points(const VesselTree *tree, int node, const LimFitOptions 
     // what lies beyond is never asked of this model: its power cell ends before
     gather->reach = options->guard_shape ? fmax(3.5 * tree->radius[node], 1.5 * widest) : HUGE_VAL;
     gather->point_count = 0;
+    gather->is_extended = false;
     for (int k = 0; k < gather->own_count; k++) {
         int from = gather->near[k].node;
         has_root = has_root || from == 0;
@@ -205,7 +209,7 @@ static void add_guard(Gather *gather, Vec3 p, double clearance)
     }
 }
 
-static void guard_lumen(const VesselTree *tree, int node, Gather *gather)
+static void guard_lumen(const VesselTree *tree, int node, bool extended, Gather *gather)
 {
     for (int k = 0; k < gather->own_count; k++) {
         int at = gather->near[k].node, parent = tree->parent[at];
@@ -217,7 +221,7 @@ static void guard_lumen(const VesselTree *tree, int node, Gather *gather)
         if (length < 0.8 * (tree->radius[at] + tree->radius[parent >= 0 ? parent : at]))
             add_guard(gather, vec3_mix(tree->center[at], tree->center[parent], 0.5), 0.4 * fmin(tree->radius[at], tree->radius[parent]));
     }
-    if (gather->near[0].node == 0 && tree->kind[0] == NODE_VESSEL)
+    if (extended && gather->near[0].node == 0 && tree->kind[0] == NODE_VESSEL)
         for (int k = 1; k <= 3; k++)
             add_guard(gather, vec3_add_scaled(tree->center[0], -0.5 * k * tree->radius[0], tree->direction[0]), 0.5 * tree->radius[0]);
 }
@@ -278,10 +282,10 @@ static void guard_sphere(const VesselTree *tree, int at, Gather *gather)
     }
 }
 
-static void gather_guards(const VesselTree *tree, int node, Gather *gather)
+static void gather_guards(const VesselTree *tree, int node, bool extended, Gather *gather)
 {
     gather->guard_count = 0;
-    guard_lumen(tree, node, gather);
+    guard_lumen(tree, node, extended, gather);
     if (tree->kind[node] == NODE_ANEURYSM)
         guard_sphere(tree, node, gather);
     int vessels = 0, taken = 0;
@@ -398,7 +402,7 @@ static void fit_node(void *context, long index)
     }
     if (good && gather->point_count >= 4) {
         if (options->guard_shape)
-            gather_guards(tree, node, gather);
+            gather_guards(tree, node, gather->is_extended, gather);
         LimFitTask task = {.point_count = gather->point_count, .point = gather->point, .center = tree->center[node],
                            .direction = tree->direction[node], .radius = tree->radius[node], .guard_count = gather->guard_count,
                            .guard = gather->guard, .clearance = gather->clearance};

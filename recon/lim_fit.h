@@ -20,7 +20,7 @@ typedef struct LimFitOptions {
     // what the paper fixes in its text
     int topological_distance;   // points are concatenated up to this many steps along the tree, 2
     int max_loops;           // centre-width loops per optimisation; paper 5, default 2
-    int line_searches;       // Polak-Ribiere steps per loop, 4
+    int line_searches;       // Polak-Ribiere steps per loop; paper 20 (not said there), default 4
     // departures (DESIGN.md section 2); the paper preset turns them off
     double voxel_mm;         // for the automatic target, 0.2
     bool weigh_distance;     // weigh E_d by mean g^2 / g_i^2: distances instead of field values

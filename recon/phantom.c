@@ -275,8 +275,8 @@ double shape_distance(const Shape *shape, Vec3 x, Vec3 *foot)
     Vec3 p = x, g;
     double f = shape_field(shape, x, &g), sign = f < 0 ? -1 : 1, nearest = HUGE_VAL;
     Vec3 best = x;
-    // alternate: fall onto the surface along the gradient, then slide half way towards the point nearest to x
-    double slide = 0.7;
+    // alternate: fall onto the surface along the gradient, then slide towards the point nearest to x, by less once that overshoots
+    double slide = 1;
     for (int round = 0; round < 200; round++) {
         for (int i = 0; i < 60; i++) {
             f = shape_field(shape, p, &g);

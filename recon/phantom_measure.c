@@ -41,29 +41,40 @@ static Blobby model_of(const VesselTree *tree, int node)
     return (Blobby){(int)(tree->blob_offset[node + 1] - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level};
 }
 
-// From x (f > 0) along d to the first change of sign of either field while node's cell lasts; false where it leaves the cell first.
+// From the node's centre along d to the first change of sign of the model's field (NULL: the shape's). False where that is not in the node's
+// cell; cells are convex, so only the end of the ray need be looked at.
 static bool first_crossing(const Shape *shape, const Blobby *model, const VesselTree *tree, int node, Vec3 d, Vec3 *hit)
 {
     Vec3 c = tree->center[node];
-    double step = 0.04 * tree->radius[node], t = 0;
-    for (;; t += step) {
-        Vec3 x = vec3_add_scaled(c, t + step, d);
-        if (t > 8 * tree->radius[node] || power_nearest(tree, x) != node)
-            return false;
-        if ((model ? blobby_field(model, x) : shape_field(shape, x, NULL)) < 0)
-            break;
+    double step = 0.04 * tree->radius[node], low = 0, high = 0, longest = 8 * tree->radius[node];
+    for (int i = 1; !model && low < longest; i++) {   // |grad f| <= 1: the field is a safe stride
+        *hit = vec3_add_scaled(c, low, d);
+        double f = shape_field(shape, *hit, NULL);
+        if (f < 1e-9)
+            return power_nearest(tree, *hit) == node;
+        low += f;
     }
-    double low = t, high = t + step;
-    for (int i = 0; i < 45; i++) {
+    for (int i = 1; model && high == 0; i++) {
+        Vec3 x = vec3_add_scaled(c, i * step, d);
+        if (i * step > longest || (i % 8 == 0 && power_nearest(tree, x) != node))
+            return false;
+        if (blobby_field(model, x) < 0)
+            high = i * step;
+        else
+            low = i * step;
+    }
+    if (!model)
+        return false;
+    for (int i = 0; i < 40; i++) {
         double middle = 0.5 * (low + high);
         Vec3 x = vec3_add_scaled(c, middle, d);
-        if ((model ? blobby_field(model, x) : shape_field(shape, x, NULL)) < 0)
+        if (blobby_field(model, x) < 0)
             high = middle;
         else
             low = middle;
     }
     *hit = vec3_add_scaled(c, low, d);
-    return true;
+    return power_nearest(tree, *hit) == node;
 }
 
 static void add_jumps(const VesselTree *tree, int node, Vec3 p, double distance, List *jump)
@@ -92,7 +103,13 @@ bool shape_measure(const Shape *shape, const VesselTree *tree, ShapeMeasure *out
         Blobby model = model_of(tree, node);
         Vec3 c = tree->center[node], hit;
         double truth = shape_field(shape, c, NULL);
-        out->least_clearance = fmin(out->least_clearance, blobby_project(&model, c, c).distance / truth);
+        // on the axis there may be no closest point to find; the sign is then the field's
+        double clearance = blobby_project(&model, c, c).distance;
+        bool inside = blobby_field(&model, c) > 0;
+        if (inside == (clearance > 0))
+            out->least_clearance = fmin(out->least_clearance, clearance / truth);
+        else if (!inside)
+            out->least_clearance = fmin(out->least_clearance, 0);
         for (int k = 0; k < RAYS; k++) {
             double z = 1 - (2 * k + 1.0) / RAYS, ring = sqrt(1 - z * z), angle = k * PI * (3 - sqrt(5)), far = 0;
             Vec3 d = {ring * cos(angle), ring * sin(angle), z};
