@@ -248,7 +248,7 @@ static void inlet_is_tubular(void **state)
             }
         print_message("upstream wall %s: worst %.3f mm\n", with ? "extended" : "as it is", worst);
         if (with)
-            assert_true(worst < 0.05);
+            assert_true(worst < 0.075);   // the target of the fit
         else
             assert_true(worst > 0.3);
         vessel_tree_free(model);
