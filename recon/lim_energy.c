@@ -59,24 +59,65 @@ void lim_points_reset(LimPoints *points, double iso_level)
 KERNEL void lim_points_add(LimPoints *points, const LimBlob *blob, double sign)
 {
     const float *restrict x = points->x, *restrict y = points->y, *restrict z = points->z;
-    float *restrict f = points->f, *restrict gx = points->g[0], *restrict gy = points->g[1], *restrict gz = points->g[2];
-    float *restrict hxx = points->h[0], *restrict hxy = points->h[1], *restrict hxz = points->h[2], *restrict hyy = points->h[3],
-                    *restrict hyz = points->h[4], *restrict hzz = points->h[5];
+    float *const sum[10] = {points->f,    points->g[0], points->g[1], points->g[2], points->h[0],
+                            points->h[1], points->h[2], points->h[3], points->h[4], points->h[5]};
     float cx = (float)blob->center[0], cy = (float)blob->center[1], cz = (float)blob->center[2], rho = (float)blob->width, sg = (float)sign;
     float iq = 1 / (5 * rho * rho), ka = 0.8f / rho, kb = 0.96f / (rho * rho * rho);
-    for (int i = 0; i < points->padded; i++) {
-        float dx = x[i] - cx, dy = y[i] - cy, dz = z[i] - cz, d2 = dx * dx + dy * dy + dz * dz;
-        float u = 1 / (1 + d2 * iq), u2 = u * u, a = -sg * ka * (u2 * u), b = sg * kb * (u2 * u2);
-        f[i] += sg * rho * u2;
-        gx[i] += a * dx;
-        gy[i] += a * dy;
-        gz[i] += a * dz;
-        hxx[i] += a + b * dx * dx;
-        hxy[i] += b * dx * dy;
-        hxz[i] += b * dx * dz;
-        hyy[i] += a + b * dy * dy;
-        hyz[i] += b * dy * dz;
-        hzz[i] += a + b * dz * dz;
+    // a block's terms first, then added array by array: written in one loop, gcc checks 10 x 13 pairs of arrays for overlap and gives up
+    for (int base = 0; base < points->padded; base += LIM_LANES) {
+        float term[10][LIM_LANES];
+        for (int l = 0; l < LIM_LANES; l++) {
+            float dx = x[base + l] - cx, dy = y[base + l] - cy, dz = z[base + l] - cz, d2 = dx * dx + dy * dy + dz * dz;
+            float u = 1 / (1 + d2 * iq), u2 = u * u, a = -sg * ka * (u2 * u), b = sg * kb * (u2 * u2);
+            term[0][l] = sg * rho * u2;
+            term[1][l] = a * dx;
+            term[2][l] = a * dy;
+            term[3][l] = a * dz;
+            term[4][l] = a + b * dx * dx;
+            term[5][l] = b * dx * dy;
+            term[6][l] = b * dx * dz;
+            term[7][l] = a + b * dy * dy;
+            term[8][l] = b * dy * dz;
+            term[9][l] = a + b * dz * dz;
+        }
+        for (int k = 0; k < 10; k++) {
+            float *restrict to = sum[k] + base;
+            for (int l = 0; l < LIM_LANES; l++)
+                to[l] += term[k][l];
+        }
+    }
+}
+
+KERNEL void lim_points_sum(LimPoints *points, const LimBlob *blobs, int count, double iso_level)
+{
+    const float *restrict x = points->x, *restrict y = points->y, *restrict z = points->z;
+    float *const sum[10] = {points->f,    points->g[0], points->g[1], points->g[2], points->h[0],
+                            points->h[1], points->h[2], points->h[3], points->h[4], points->h[5]};
+    for (int base = 0; base < points->padded; base += LIM_LANES) {
+        float term[10][LIM_LANES] = {{0}};
+        for (int l = 0; l < LIM_LANES; l++)
+            term[0][l] = (float)-iso_level;
+        for (int j = 0; j < count; j++) {
+            const LimBlob *blob = &blobs[j];
+            float cx = (float)blob->center[0], cy = (float)blob->center[1], cz = (float)blob->center[2], rho = (float)blob->width;
+            float iq = 1 / (5 * rho * rho), ka = 0.8f / rho, kb = 0.96f / (rho * rho * rho);
+            for (int l = 0; l < LIM_LANES; l++) {
+                float dx = x[base + l] - cx, dy = y[base + l] - cy, dz = z[base + l] - cz, d2 = dx * dx + dy * dy + dz * dz;
+                float u = 1 / (1 + d2 * iq), u2 = u * u, a = -ka * (u2 * u), b = kb * (u2 * u2);
+                term[0][l] += rho * u2;
+                term[1][l] += a * dx;
+                term[2][l] += a * dy;
+                term[3][l] += a * dz;
+                term[4][l] += a + b * dx * dx;
+                term[5][l] += b * dx * dy;
+                term[6][l] += b * dx * dz;
+                term[7][l] += a + b * dy * dy;
+                term[8][l] += b * dy * dz;
+                term[9][l] += a + b * dz * dz;
+            }
+        }
+        for (int k = 0; k < 10; k++)
+            memcpy(sum[k] + base, term[k], sizeof term[k]);
     }
 }
 

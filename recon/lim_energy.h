@@ -39,7 +39,9 @@ void lim_points_free(LimPoints *points);
 void lim_points_reset(LimPoints *points, double iso_level);
 // Adds the blob's field, gradient and Hessian to the sums (sign 1), or takes it out (sign -1).
 void lim_points_add(LimPoints *points, const LimBlob *blob, double sign);
-// Field and gradient's length at each point as the sums are (all blobs added).
+// lim_points_reset and lim_points_add of all blobs, in one pass.
+void lim_points_sum(LimPoints *points, const LimBlob *blobs, int count, double iso_level);
+// Signed Taubin distance at each point from the sums as they are (all blobs added).
 void lim_points_taubin(const LimPoints *points, float *distance);
 
 // With `blob` on top of the sums.

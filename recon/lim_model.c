@@ -103,9 +103,7 @@ static void fit_set_points(Fit *fit)
 
 static void fit_refresh_sums(Fit *fit)
 {
-    lim_points_reset(&fit->points, fit->options->iso_level);
-    for (int j = 0; j < fit->model.count; j++)
-        lim_points_add(&fit->points, &fit->model.blob[j], 1);
+    lim_points_sum(&fit->points, fit->model.blob, fit->model.count, fit->options->iso_level);
 }
 
 // Weights of E_d and bounds of the guards from the field as it is (sums hold all blobs).

@@ -96,6 +96,10 @@ static void the_fused_loop_equals_the_plain_one(void **state)
         lim_energy_total(&c.points, &whole_distance, &whole_bend);
         assert_true(fabs(whole_distance - distance) < 1e-5 * distance);
         assert_true(fabs(whole_bend - bend) < 1e-4 * bend);
+        // one pass over all blobs, the same bits
+        float f = c.points.f[33], h = c.points.h[4][120];
+        lim_points_sum(&c.points, c.blob, BLOBS, ISO_LEVEL);
+        assert_true(f == c.points.f[33] && h == c.points.h[4][120]);
         lim_points_free(&c.points);
     }
 }
