@@ -302,10 +302,11 @@ static void say_untrusted(const Simulator *simulator, const DriveReport *drive)
         fprintf(stderr, "%s: diverged at %.3f s; the last good state is kept. Smaller step_ms, shorter elements or slower motion may help\n", path,
                 simulator_time_s(simulator));
     if (run_left_vessel(totals))
-        fprintf(stderr, "%s: the tool left the vessel (deepest %.3f mm outside the wall%s); the run cannot be trusted\n", path, totals->penetration_max,
-                totals->flags & STEP_OUT_OF_VESSEL ? ", or beyond an open end" : "");
+        fprintf(stderr, "%s: the tool left the vessel (deepest %.3f mm outside the wall); the run cannot be trusted\n", path, totals->penetration_max);
     else if (totals->penetration_max > deep_mm)
         fprintf(stderr, "%s: warning: a node was %.3f mm outside the wall\n", path, totals->penetration_max);
+    if (totals->flags & STEP_OUT_OF_VESSEL)
+        fprintf(stderr, "%s: warning: the tool passed an open end of the vessel\n", path);
     if (totals->not_converged_steps > 0)
         fprintf(stderr, "%s: warning: the contact solve of %lld of %lld steps stopped at its cap (residual at most %.2g)\n", path,
                 (long long)totals->not_converged_steps, (long long)totals->steps, totals->residual_max);

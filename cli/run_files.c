@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// A tool deeper in the wall than this is held by nothing: it has left the vessel.
+// A tool deeper in the wall than this is held by nothing: it has left the vessel. (Through an open end it may leave; that is said, no failure.)
 static const double lost_mm = 1;
 
 double run_final_penetration_mm(const NodeReport *node, int node_count)
@@ -16,7 +16,7 @@ double run_final_penetration_mm(const NodeReport *node, int node_count)
     return deepest;
 }
 
-bool run_left_vessel(const RunTotals *totals) { return (totals->flags & STEP_OUT_OF_VESSEL) || totals->penetration_max > lost_mm; }
+bool run_left_vessel(const RunTotals *totals) { return totals->penetration_max > lost_mm; }
 
 static void add_numbers(cJSON *object, int count, const char *const *name, const double *value)
 {

@@ -321,13 +321,13 @@ static bool upstream_of_inlet(const LimVessel *lim, Vec3 x)
 
 // --- The blended field ---
 
-enum { BLEND_MAX = 5 };   // the own node and the first four neighbours
+enum { BLEND_MAX = 8 };   // the own node and the first seven of those near it
 // Models that differ by less than this are mixed, ever less the more they differ: half the radius, and never so much that the mixed wall
 // leaves the own model's by more than 0.15 mm (0.18 of it, for one neighbour). One that says something else altogether is a ghost and left out.
 // On the angiogram's model neighbours differ by up to 0.3 mm in sharp bends; mixing up to 0.25 mm only left steps in the wall that threw the
 // wire 0.3 mm out, where this leaves 0.09 mm.
 static double blend_agree(double radius) { return fmin(0.5 * radius, 0.8); }
-// The mixed gap is less than the own model's by no more than this: sum w q / (1 + sum w) < 1/2 of the above for up to four neighbours, w = (1 - q^2)^2.
+// The mixed gap is less than the own model's by no more than this: sum w q / (1 + sum w) < 1/2 of the above for a few neighbours, w = (1 - q^2)^2.
 static double blend_least(double radius) { return 0.5 * blend_agree(radius); }
 // Half width of the mixed zone: a neighbour counts where its power distance exceeds the best by less than this part of the node spacing squared,
 // which is 0 at the cell's border and 1 at its middle.
@@ -353,27 +353,19 @@ static void blend_add(const LimVessel *lim, Vec3 x, double best, int node, Blend
     double behind = power_distance(x, lim->tree->center[node], lim->tree->radius[node]) - best, band = lim->model[node].band;
     if (blend->count == BLEND_MAX || !(behind < band))
         return;
-    for (int i = 0; i < blend->count; i++)
-        if (blend->node[i] == node)
-            return;
     double q = behind / band, w = 1 - q * q;
     blend->node[blend->count] = node;
     blend->weight[blend->count++] = behind <= 0 ? 1 : w * w;
 }
 
-// The node and those up to two links away whose cells are close: two, so that the set stays the same when the node changes.
+// The node and those near it in the tree whose cells are close: at a mouth or a carina the cell across the border may be several links away.
 static void blend_collect(const LimVessel *lim, Vec3 x, int node, Blend *blend)
 {
     const VesselTree *tree = lim->tree;
     double best = power_distance(x, tree->center[node], tree->radius[node]);
     *blend = (Blend){.count = 1, .node = {node}, .weight = {1}};
-    for (int k = tree->neighbour_offset[node]; k < tree->neighbour_offset[node + 1]; k++) {
-        int next = tree->neighbour[k];
-        blend_add(lim, x, best, next, blend);
-        for (int l = tree->neighbour_offset[next]; l < tree->neighbour_offset[next + 1]; l++)
-            if (tree->neighbour[l] != node)
-                blend_add(lim, x, best, tree->neighbour[l], blend);
-    }
+    for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++)
+        blend_add(lim, x, best, tree->near[k], blend);
 }
 
 static void sym3_accumulate(Sym3 *sum, double s, const Sym3 *a)

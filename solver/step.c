@@ -16,6 +16,9 @@ static const double TURN_MAX = 0.3;              // [rad]
 // Among contacts it costs a contact solve, and nothing is seen to gain below 0.04.
 static const double NEWTON_MOTION = 0.02, NEWTON_MOTION_IN_CONTACT = 0.04;       // [rad]
 enum { NEWTON_MAX = 4 };
+// A tip that snaps from one wall to another lands where nobody linearised: [mm] of true penetration that asks for another linearisation there, up to
+// twice NEWTON_MAX of them.
+static const double OVERSHOOT = 0.03;
 
 // --- creation ---
 
@@ -470,8 +473,9 @@ static void move(Stepper *s, double turn)
 void step_contact(Stepper *s)
 {
     solve_contained(s);
-    for (int iteration = 1; iteration < s->newton_max && !s->has_failed; iteration++) {
-        if (s->turn <= (s->report.active > 0 ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION))
+    for (int iteration = 1; iteration < 2 * s->newton_max && !s->has_failed; iteration++) {
+        bool turns = s->turn > (s->report.active > 0 ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION);
+        if (!(turns && iteration < s->newton_max) && stepper_overshoot(s) <= OVERSHOOT)
             break;
         move(s, s->turn);
         s->is_iterate = true;

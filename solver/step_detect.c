@@ -6,6 +6,7 @@ static const double REACH = 0.3;         // [mm] candidates beyond what the node
 static const double REACH_MAX = 5;       // [mm]
 static const double STEP_OUT_MAX = 0.2;  // [mm] a deep node is brought back by this much a step, not thrown
 static const double DEEP = 0.2;          // [mm] STEP_DEEP
+static const double OVERSHOOT_TRAVEL = 0.05;   // [mm] a node that the solution moves less is where its linearised wall is
 
 // [mm] by which the solution moves a node from the iterate.
 static double travel(const Stepper *s, int node)
@@ -41,6 +42,26 @@ static void locate(Stepper *s, int node)
     else if (node + 1 < s->state.node_count && place[node + 1].node >= 0)
         from = place[node + 1].node;
     place[node] = (VesselMemory){.node = s->vessel->locate(s->vessel, s->state.position[node], from)};
+}
+
+double stepper_overshoot(Stepper *s)
+{
+    int count = 0;
+    double deepest = 0;
+    for (int i = s->first_free; s->vessel && i < s->state.node_count; i++) {
+        if (s->place[i].node < 0 || s->clearance[i] > travel(s, i) || travel(s, i) < OVERSHOOT_TRAVEL)
+            continue;
+        const double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
+        s->query_node[count] = i;
+        s->query_point[count] = vec3_add(s->state.position[i], vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]));
+        s->query_place[count++] = s->place[i];
+    }
+    if (count > 0)
+        vessel_query(s->vessel, count, s->query_point, 0.5, s->query_place, s->query_hit);
+    for (int k = 0; k < count; k++)
+        if (!(s->query_hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)))
+            deepest = fmax(deepest, s->wire.radius[s->query_node[k]] - s->query_hit[k].gap);
+    return deepest;
 }
 
 static int query(Stepper *s)
@@ -95,6 +116,7 @@ void stepper_detect(Stepper *s)
         return;
     int count = query(s);
     bool was_inside = false;
+    unsigned flags = 0;
     int next = s->first_free;
     for (int k = 0; k < count; k++) {
         int i = s->query_node[k];
@@ -105,17 +127,16 @@ void stepper_detect(Stepper *s)
         double gap = hit->gap - s->wire.radius[i], reach = reach_of(s, i);
         if (hit->flags & VESSEL_OPEN_END) {
             if (was_inside)
-                s->report.flags |= STEP_OUT_OF_VESSEL;
+                flags |= STEP_OUT_OF_VESSEL;
             s->force[i] = vec3(0, 0, 0);
             continue;
         }
         was_inside = true;
         if (hit->flags & VESSEL_UNSURE)
-            s->report.flags |= STEP_DETECTION_UNSURE;
+            flags |= STEP_DETECTION_UNSURE;
         if (!s->is_iterate) {
             s->report.penetration = fmax(s->report.penetration, -gap);
-            if (gap < -DEEP)
-                s->report.flags |= STEP_DEEP;
+            flags |= gap < -DEEP ? STEP_DEEP : 0;
         }
         if ((hit->flags & VESSEL_FAR) || !(gap < reach) || !vec3_is_finite(hit->normal)) {
             s->force[i] = vec3(0, 0, 0);
@@ -127,4 +148,6 @@ void stepper_detect(Stepper *s)
         add_candidate(s, i, hit, gap);
     }
     s->report.candidates = s->set.count;
+    if (!s->is_iterate)      // an iterate may be anywhere
+        s->report.flags |= flags;
 }

@@ -74,6 +74,8 @@ struct Stepper {
 
 void stepper_detect(Stepper *s);
 // Has a node that was no candidate gone further than its room?
+// How deep outside the true wall the solution would leave the nodes that it moves far from the iterate [mm], >= 0.
+double stepper_overshoot(Stepper *s);
 bool stepper_escapes(const Stepper *s);
 void stepper_assemble(Stepper *s);
 double stepper_sheath_coordinate(const Stepper *s, int node);
