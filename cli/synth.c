@@ -43,7 +43,7 @@ static const char help[] =
     "  --bend-radius-mm X   arc, bifurcation: centreline [mm]; default 4\n"
     "  --scale X            of the whole shape; default 1\n"
     "surface\n"
-    "  --cell-mm X          grid of the triangles [mm]; default 0.15\n"
+    "  --cell-mm X          grid of the triangles [mm]; default 0.25\n"
     "volume\n"
     "  --voxel-mm X         [mm]; default 0.2\n"
     "  --psf-mm X           standard deviation of the blur [mm]; default 0.2\n"
@@ -82,7 +82,7 @@ static int parse_options(int argc, char **argv, SynthCommand *command)
                                           {"scale", required_argument, NULL, FIRST_SHAPE_OPTION + 9},
                                           {"help", no_argument, NULL, 'h'},
                                           {0}};
-    *command = (SynthCommand){.cell_mm = 0.15, .voxel_mm = 0.2, .psf_mm = 0.2, .noise = 0.05, .seed = 1};
+    *command = (SynthCommand){.cell_mm = 0.25, .voxel_mm = 0.2, .psf_mm = 0.2, .noise = 0.05, .seed = 1};
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "o:h", table, NULL)) != -1;) {
         if (choice >= FIRST_SHAPE_OPTION) {   // the shape itself says what is valid

@@ -30,6 +30,8 @@ typedef struct Part {
     double *sample_radius, *sample_at;
     int block_count;         // … and spheres around each BLOCK of them
     Vec3 *block_center;
+    int *block_sample;       // the middle one, its radius and parameter
+    double *block_radius, *block_at;
     double *block_reach;     // largest |C - center| + r in the block: f <= reach - |X - center|
 } Part;
 
@@ -37,6 +39,7 @@ struct Shape {
     char name[32];
     int part_count;
     Part part[PARTS];
+    double widest_joint;
     double blend;            // 0: 0.6 times the child's first radius
     int points, sac_points;
     double noise, spacing;
@@ -125,7 +128,10 @@ static bool part_build(Part *part, const double (*knot)[4], int count, bool open
     part->sample_at = calloc(n, sizeof(double));
     part->block_center = calloc(b, sizeof(Vec3));
     part->block_reach = calloc(b, sizeof(double));
-    if (!part->sample || !part->sample_radius || !part->sample_at || !part->block_center || !part->block_reach)
+    part->block_sample = calloc(b, sizeof(int));
+    part->block_radius = calloc(b, sizeof(double));
+    part->block_at = calloc(b, sizeof(double));
+    if (!part->block_sample || !part->block_radius || !part->block_at || !part->sample || !part->sample_radius || !part->sample_at || !part->block_center || !part->block_reach)
         return false;
     for (int i = 0; i < part->sample_count; i++) {
         double t = part->low + (part->high - part->low) * i / (part->sample_count - 1);
@@ -136,7 +142,10 @@ static bool part_build(Part *part, const double (*knot)[4], int count, bool open
     }
     for (int k = 0; k < part->block_count; k++) {
         int first = k * BLOCK, last = first + BLOCK < part->sample_count ? first + BLOCK : part->sample_count;
-        part->block_center[k] = part->sample[(first + last) / 2];
+        int middle = part->block_sample[k] = (first + last) / 2;
+        part->block_center[k] = part->sample[middle];
+        part->block_radius[k] = part->sample_radius[middle];
+        part->block_at[k] = part->sample_at[middle];
         for (int i = first; i < last; i++)
             part->block_reach[k] = fmax(part->block_reach[k], vec3_distance(part->sample[i], part->block_center[k]) + part->sample_radius[i]);
     }
@@ -150,6 +159,9 @@ static void part_free(Part *part)
     free(part->sample_at);
     free(part->block_center);
     free(part->block_reach);
+    free(part->block_sample);
+    free(part->block_radius);
+    free(part->block_at);
 }
 
 // d/dt of r(t) - |X - C(t)|
@@ -169,20 +181,26 @@ static double part_field(const Part *part, Vec3 x, double enough, bool cut, Vec3
 {
     double lowest = cut ? 0 : part->low, highest = cut ? part->at[part->knot_count - 1] : part->high, best = -HUGE_VAL, step = part->sample_count > 1 ? part->sample_at[1] - part->sample_at[0] : 1;
     int nearest = 0;
+    // the blocks' middle samples give a first best that rules out most blocks
     for (int k = 0; k < part->block_count; k++) {
-        double bound = part->block_reach[k] - vec3_distance(x, part->block_center[k]);
-        if (bound <= best || bound + step < enough)
+        double f = part->block_radius[k] - vec3_distance(x, part->block_center[k]);
+        if (f > best && part->block_at[k] >= lowest && part->block_at[k] <= highest)
+            best = f, nearest = part->block_sample[k];
+    }
+    for (int k = 0; k < part->block_count; k++) {
+        double ball = part->block_reach[k] - fmax(best, enough - step);
+        if (ball <= 0 || vec3_norm2(vec3_sub(x, part->block_center[k])) >= ball * ball)
             continue;
         int last = (k + 1) * BLOCK < part->sample_count ? (k + 1) * BLOCK : part->sample_count;
         for (int i = k * BLOCK; i < last; i++) {
             if (part->sample_at[i] < lowest || part->sample_at[i] > highest)
                 continue;
-            double f = part->sample_radius[i] - vec3_distance(x, part->sample[i]);
-            if (f > best)
-                best = f, nearest = i;
+            double closer = part->sample_radius[i] - best;
+            if (closer > 0 && vec3_norm2(vec3_sub(x, part->sample[i])) < closer * closer)
+                best = part->sample_radius[i] - vec3_distance(x, part->sample[i]), nearest = i;
         }
     }
-    if (best == -HUGE_VAL) {
+    if (best + step < enough) {
         *gradient = vec3(0, 0, 0);
         *at = 0;
         return enough - step;
@@ -202,7 +220,7 @@ static double part_field(const Part *part, Vec3 x, double enough, bool cut, Vec3
         for (int i = 0; i < 80 && high - low > 1e-13 * (1 + fabs(high)); i++) {
             t = i % 3 == 2 ? 0.5 * (low + high) : low + (high - low) * s_low / (s_low - s_high);
             double s = climb(part, x, t, &value, &away);
-            if (fabs(s) < 1e-14)
+            if (fabs(s) < 1e-9)   // the value's error is of second order
                 break;
             if (s > 0)
                 low = t, s_low = s;
@@ -227,8 +245,8 @@ static double joined_field(const Shape *shape, Vec3 x, bool cut, Vec3 *gradient)
     double f[PARTS], best = -HUGE_VAL, at;
     Vec3 g[PARTS], best_gradient = {0, 0, 0};
     for (int p = 0; p < shape->part_count; p++) {
-        // a part further below than any joint is wide cannot matter
-        f[p] = part_field(&shape->part[p], x, best - 4, cut, &g[p], &at);
+        // a part further below the best than the joints are wide cannot matter
+        f[p] = part_field(&shape->part[p], x, best - shape->widest_joint, cut, &g[p], &at);
         if (f[p] > best)
             best = f[p], best_gradient = g[p];
     }
@@ -503,6 +521,9 @@ Shape *shape_create(const char *name, int option_count, const char (*option)[2][
         built = part_build(&shape->part[p], (const double (*)[4])knot, old.knot_count, old.open_start, old.open_end, old.parent, old.kind,
                            (const double (*)[4])tangent);
     }
+    for (int p = 0; built && p < shape->part_count; p++)
+        if (shape->part[p].parent >= 0)
+            shape->widest_joint = fmax(shape->widest_joint, 1.01 * joint_width(shape, p));
     if (built)
         return shape;
     faults_add(faults, file, 0, 0, "not enough memory for shape %s", name);
