@@ -1,6 +1,7 @@
 // seldinger: the table of verbs and what the verbs share.
 #include "cli/cli.h"
 
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -33,6 +34,8 @@ static void print_help(FILE *out)
 
 int main(int argc, char **argv)
 {
+    // a file-size limit is then a failed write with a message, and no part of a file is left
+    sigaction(SIGXFSZ, &(struct sigaction){.sa_handler = SIG_IGN}, NULL);
     if (argc < 2) {
         print_help(stderr);
         return EXIT_BAD_INPUT;

@@ -359,11 +359,9 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
 static void install_signals(void)
 {
     // a second signal ends the program at once
-    struct sigaction stop = {.sa_handler = request_stop, .sa_flags = (int)(SA_RESTART | SA_RESETHAND)}, ignore = {.sa_handler = SIG_IGN};
+    struct sigaction stop = {.sa_handler = request_stop, .sa_flags = (int)(SA_RESTART | SA_RESETHAND)};
     sigaction(SIGINT, &stop, NULL);
     sigaction(SIGTERM, &stop, NULL);
-    // a file-size limit is then a failed write with a message
-    sigaction(SIGXFSZ, &ignore, NULL);
 }
 
 int verb_run(int argc, char **argv)

@@ -1,10 +1,11 @@
 // seldinger segment: RBT, a volume to a tree of centreline nodes with local point sets (recon/rbt_track.h).
 #include "cli/cli.h"
+
+#include "cli/output.h"
 #include "recon/rbt_track.h"
 #include "recon/trace.h"
 #include "recon/tree_file.h"
 #include "recon/volume.h"
-#include "recon/whole_file.h"
 #ifdef SELDINGER_RENDER
 #include "render/picture.h"
 #endif
@@ -150,7 +151,7 @@ static bool write_json(const SegmentArguments *a, const VesselTree *tree, const 
         cJSON_AddItemToArray(list, entry);
     }
     char *text = cJSON_Print(root);
-    bool good = text && whole_file_write(a->json, text, strlen(text), faults);
+    bool good = text && output_write(a->json, text, strlen(text), faults);
     cJSON_free(text);
     cJSON_Delete(root);
     return good;
@@ -175,13 +176,17 @@ static void draw_picture(const SegmentArguments *a, const Volume *volume, const 
 
 static int segment(const SegmentArguments *a, Faults *faults)
 {
+    output_check_file(a->out, faults);
+    output_check(a->json, faults);
+    if (a->picture)
+        output_check_file(a->picture, faults);
     double start = seconds();
     Trace *trace = trace_load(a->trace, faults);
     Volume *volume = volume_load(a->volume, faults);
     RbtReport report = {0};
     VesselTree *tree = NULL;
     double load_s = seconds() - start;
-    if (trace && volume) {
+    if (trace && volume && faults->count == 0) {
         ProgressBar bar;
         Progress progress = progress_bar(&bar, "tracking", a->quiet);
         if (a->seed >= 0)
@@ -204,7 +209,7 @@ static int segment(const SegmentArguments *a, Faults *faults)
         free(source);
         free(text);
         good = good && (!a->json || write_json(a, tree, &report, load_s, track_s, faults));
-        if (good && !a->quiet)
+        if (good && !a->quiet && !(a->json && !strcmp(a->json, "-")))
             print_table(tree, &report, load_s, track_s);
         if (good && a->picture)
             draw_picture(a, volume, tree);

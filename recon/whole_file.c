@@ -1,4 +1,5 @@
-// Writing goes to `path.part-PID`, is synced, then renamed over `path`; whatever fails removes the part.
+// Writing goes to `path.part-PID`, is synced, then renamed over `path`; whatever fails removes the part. A device or pipe is written straight
+// through: renaming over it would replace it.
 #include "recon/whole_file.h"
 
 #include <errno.h>
@@ -59,8 +60,23 @@ static bool write_all(int file, const char *bytes, size_t length)
     return true;
 }
 
+static bool write_through(const char *path, const void *bytes, size_t length, Faults *faults)
+{
+    int file = open(path, O_WRONLY | O_CLOEXEC | O_NOCTTY);
+    bool written = file >= 0 && write_all(file, bytes, length);
+    int reason = errno;
+    if (file >= 0 && close(file) && written)
+        written = false, reason = errno;
+    if (!written)
+        faults_add(faults, path, 0, 0, "cannot be written: %s; a regular file in a folder with free space is valid", strerror(reason));
+    return written;
+}
+
 bool whole_file_write(const char *path, const void *bytes, size_t length, Faults *faults)
 {
+    struct stat status;
+    if (stat(path, &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode))
+        return write_through(path, bytes, length, faults);
     size_t room = strlen(path) + 32;
     char *part = malloc(room);
     if (!part) {

@@ -8,6 +8,7 @@
 #include <setjmp.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 static void leave(png_structp png, png_const_charp text)
@@ -46,6 +47,9 @@ static bool write_pixels(FILE *file, int width, int height, const uint8_t *rgb)
 
 bool png_file_write(const char *path, int width, int height, const uint8_t *rgb, char *message, size_t capacity)
 {
+    struct stat status;
+    if (stat(path, &status) == 0 && !S_ISREG(status.st_mode))   // renaming over a device would replace it
+        return message_fail(message, capacity, "%s: is there and no regular file; give another name", path);
     size_t length = strlen(path) + 32;
     char *beside = malloc(length);
     if (!beside)
