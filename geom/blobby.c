@@ -290,6 +290,23 @@ static void keep_closer(const Blobby *model, Vec3 x, Vec3 start, double scale, S
     }
 }
 
+// A foot whose normal says that x is on the other side than f says lies behind a nearer wall (a start far off led there): down to that one.
+static void pull_to_own_side(const Blobby *model, Vec3 x, double f, double scale, SurfaceFrame *best, double *least)
+{
+    static const double way[] = {1e-3, 1e-2, 0.1, 0.3};
+    enum { WAYS = sizeof way / sizeof way[0], WALLS = 4 };
+    for (int wall = 0; wall < WALLS && (best->gap > 0) != (f > 0) && fabs(best->gap) > 1e-9; wall++) {
+        for (int k = 0; k < WAYS; k++) {
+            Vec3 beyond = vec3_mix(best->foot, x, way[k]);
+            double there = blobby_field(model, beyond);
+            if ((there > 0) == (f > 0))
+                continue;
+            keep_closer(model, x, f > 0 ? cross_between(model, x, f, beyond, there) : cross_between(model, beyond, there, x, f), scale, best, least);
+            break;
+        }
+    }
+}
+
 SurfacePoint blobby_project(const Blobby *model, Vec3 x, Vec3 start)
 {
     SurfacePoint lost = {.foot = vec3(0, 0, 0), .normal = vec3(1, 0, 0)};
@@ -314,14 +331,19 @@ SurfacePoint blobby_project(const Blobby *model, Vec3 x, Vec3 start)
     // Without a last contact: from inside, whatever wall a few rays find nearer than the foot; from outside, near a focal point, the blobs' lobes.
     // (On a vessel's axis the field may fall fastest along it, and the first foot was the far end's.)
     Vec3 other;
+    // Rays beyond the foot too, by as much as a flat wall between them seems further off; not those that would only find the same foot again.
+    Vec3 to_foot = vec3_unit_or(vec3_sub(best.foot, x), vec3(0, 0, 0));
+    double reach = 1.25 * fabs(best.gap);
     for (int k = 0; k < 14 && !warm && f > 0; k++) {
         static const Vec3 way[14] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}, {1, 1, 1},
                                      {1, 1, -1}, {1, -1, 1}, {1, -1, -1}, {-1, 1, 1}, {-1, 1, -1}, {-1, -1, 1}, {-1, -1, -1}};
-        if (march_out(model, x, f, vec3_unit(way[k]), scale, 0.999 * fabs(best.gap), &other))
+        Vec3 d = vec3_unit(way[k]);
+        if (vec3_dot(d, to_foot) < 0.8 && march_out(model, x, f, d, scale, reach, &other))
             keep_closer(model, x, other, scale, &best, &least);
     }
     if (!warm && f <= 0 && least < 0.5 && cross_towards_blobs(model, x, f, &other))
         keep_closer(model, x, other, scale, &best, &least);
+    pull_to_own_side(model, x, f, scale, &best, &least);
     double away = vec3_distance(x, best.foot), rest = vec3_norm(best.tangent);
     return (SurfacePoint){.foot = best.foot, .normal = best.normal, .shape = best.shape, .distance = best.gap,
                           .converged = fabs(best.field) < 1e-9 * best.slope && (away < 1e-6 || rest <= 1e-4 * away)};

@@ -235,6 +235,55 @@ static void closest_against_sampling(void **state)
     }
 }
 
+// Inside, at a top of the field (no gradient) or anywhere, whatever the start: the sign of the distance is that of f, and no wall crosses the way.
+static void own_side_from_any_start(void **state)
+{
+    (void)state;
+    uint64_t seed = 5;
+    int inside = 0;
+    for (int trial = 0; trial < 6000; trial++) {
+        Vec3 center[BLOBS], x, g;
+        double width[BLOBS];
+        Blobby m = random_model(&seed, center, width);
+        for (int j = 0; j < BLOBS; j++)
+            width[j] *= 0.6;   // lobes and bridges
+        x = center[trial % BLOBS];
+        for (int i = 0; i < 300 && trial % 2; i++) {
+            blobby_gradient(&m, x, &g);
+            x = vec3_add_scaled(x, 0.1, g);
+        }
+        double f = blobby_field(&m, x);
+        SurfacePoint s = blobby_project(&m, x, vec3_add(x, random_in_box(&seed, 2)));
+        if (!(f > 0))
+            continue;
+        inside++;
+        assert_true(s.converged);
+        check_on_surface(&m, x, &s);
+        assert_true(s.distance > 0);
+    }
+    assert_true(inside > 4000);
+}
+
+// Where the field is flat the first foot is any wall's: the nearest is found all the same.
+static void nearest_from_a_top_of_the_field(void **state)
+{
+    (void)state;
+    uint64_t seed = 6;
+    for (int trial = 0; trial < 60; trial++) {
+        Vec3 center[BLOBS], g;
+        double width[BLOBS];
+        Blobby m = random_model(&seed, center, width);
+        Vec3 x = center[trial % BLOBS];
+        for (int i = 0; i < 300; i++) {
+            blobby_gradient(&m, x, &g);
+            x = vec3_add_scaled(x, 0.1, g);
+        }
+        SurfacePoint s = blobby_project(&m, x, x);
+        assert_true(s.converged && s.distance > 0 && blobby_field(&m, x) > 0);
+        assert_true(sampled_distance(&m, x) > s.distance - 5e-3);
+    }
+}
+
 // A row of blobs that thins out: at its middle the field falls fastest along the row, but the wall is beside.
 static void tapered_row(void **state)
 {
@@ -290,6 +339,7 @@ int main(void)
         cmocka_unit_test(radius_table),          cmocka_unit_test(split_table),     cmocka_unit_test(derivatives_of_second_order),
         cmocka_unit_test(curvature_of_a_sphere), cmocka_unit_test(sphere_is_exact), cmocka_unit_test(centre_and_far_away),
         cmocka_unit_test(tube_axis),             cmocka_unit_test(tapered_row),       cmocka_unit_test(closest_against_sampling), cmocka_unit_test(closest_near_the_surface),
+        cmocka_unit_test(own_side_from_any_start), cmocka_unit_test(nearest_from_a_top_of_the_field),
     };
     return cmocka_run_group_tests_name("blobby", tests, NULL, NULL);
 }
