@@ -571,7 +571,7 @@ void stepper_node_report(Stepper *s, NodeReport *node)
         if (place.node < 0)
             place = (VesselMemory){.node = s->vessel->locate(s->vessel, s->state.position[i], i > held ? node[i - 1].vessel_node : -1)};
         VesselHit hit;
-        vessel_query(s->vessel, 1, &s->state.position[i], 1, &place, &hit);
+        vessel_query(s->vessel, 1, &s->state.position[i], HUGE_VAL, &place, &hit);   // no bound will do: the gap itself is asked for
         node[i].force = s->force[i];
         node[i].vessel_node = hit.node;
         if (!(hit.flags & (VESSEL_FAR | VESSEL_OPEN_END)))
