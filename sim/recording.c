@@ -1,5 +1,6 @@
 #include "sim/recording.h"
 
+#include "sim/ordered_file.h"
 #include "sim/sha256.h"
 
 #include <errno.h>
@@ -12,7 +13,10 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { STEP_RING = 4096, FRAME_RING = 128, MOST_STEP_ROWS = 32768, FRAME_CHUNK_BYTES = 8 << 20, TREE_HALF_RANK = 128 };
+enum { STEP_RING = 4096, FRAME_RING = 128, MOST_STEP_ROWS = 32768, FRAME_CHUNK_BYTES = 8 << 20 };
+
+// A dataset's chunk index is one node that never splits: twice as many chunks as this. Known: 256 times what is expected; unknown: hours.
+enum { HALF_RANK_KNOWN = 128, HALF_RANK_UNKNOWN = 2048 };
 
 // A dataset that grows by rows, with its ring.
 typedef struct Column {
@@ -44,7 +48,8 @@ struct Recording {
     Column step_column[STEP_COLUMNS], frame_column[FRAME_COLUMNS];
     Ring steps, frames;
     hid_t file;
-    int descriptor;
+    OrderedFile *ordered;
+    int half_rank;           // of the chunk indices
     bool named;              // renamed to its path
     pthread_t writer;
     bool started;
@@ -111,7 +116,8 @@ static bool create_dataset(hid_t file, Column *column, hsize_t chunk_rows)
     H5Pset_fill_time(creation, H5D_FILL_TIME_NEVER);
     H5Pset_obj_track_times(creation, false);
     H5Pset_chunk_cache(access, 0, 0, 0);
-    column->dataset = H5Dcreate2(file, column->name, column->type, space, H5P_DEFAULT, creation, access);
+    H5Pset_dset_no_attrs_hint(creation, true);   // small headers: all of them share a page
+    column->dataset = H5Dcreate_anon(file, column->type, space, creation, access);
     H5Pclose(access);
     H5Pclose(creation);
     H5Sclose(space);
@@ -202,25 +208,29 @@ static bool write_scene(Recording *recording, const Scene *scene)
 static bool open_part(Recording *recording)
 {
     hid_t creation = H5Pcreate(H5P_FILE_CREATE), access = H5Pcreate(H5P_FILE_ACCESS);
-    H5Pset_istore_k(creation, TREE_HALF_RANK);
+    H5Pset_istore_k(creation, (unsigned)recording->half_rank);
     H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
     H5Pset_file_locking(access, false, true);
-    H5AC_cache_config_t cache = {.version = H5AC__CURR_CACHE_CONFIG_VERSION};
-    H5Pget_mdc_config(access, &cache);
-    cache.evictions_enabled = false;
-    cache.incr_mode = H5C_incr__off;
-    cache.flash_incr_mode = H5C_flash_incr__off;
-    cache.decr_mode = H5C_decr__off;
-    cache.set_initial_size = true;
-    cache.initial_size = cache.max_size = 32 << 20;
-    cache.min_size = 1 << 20;
-    bool good = H5Pset_mdc_config(access, &cache) >= 0;
-    recording->file = good ? H5Fcreate(recording->part, H5F_ACC_TRUNC, creation, access) : -1;
-    int *descriptor = NULL;
-    good = recording->file >= 0 && H5Fget_vfd_handle(recording->file, access, (void **)&descriptor) >= 0 && descriptor;
-    recording->descriptor = good ? *descriptor : -1;
+    recording->file = ordered_file_create(recording->part, creation, access);
+    recording->ordered = recording->file >= 0 ? ordered_file_of(recording->file) : NULL;
     H5Pclose(access);
     H5Pclose(creation);
+    return recording->ordered != NULL;
+}
+
+// Made without names one after the other, so that their headers lie side by side; then named.
+static bool create_datasets(Recording *recording)
+{
+    bool good = true;
+    ordered_file_start_page(recording->ordered);
+    for (int i = 0; good && i < STEP_COLUMNS; i++)
+        good = create_dataset(recording->file, &recording->step_column[i], recording->steps.chunk_rows);
+    for (int i = 0; good && i < FRAME_COLUMNS; i++)
+        good = create_dataset(recording->file, &recording->frame_column[i], recording->frames.chunk_rows);
+    for (int i = 0; good && i < STEP_COLUMNS + FRAME_COLUMNS; i++) {
+        const Column *column = i < STEP_COLUMNS ? &recording->step_column[i] : &recording->frame_column[i - STEP_COLUMNS];
+        good = H5Olink(column->dataset, recording->file, column->name, H5P_DEFAULT, H5P_DEFAULT) >= 0;
+    }
     return good;
 }
 
@@ -239,11 +249,7 @@ static bool build_file(Recording *recording, const Scene *scene)
         if (good)
             H5Gclose(group);
     }
-    for (int i = 0; good && i < STEP_COLUMNS; i++)
-        good = create_dataset(file, &recording->step_column[i], recording->steps.chunk_rows);
-    for (int i = 0; good && i < FRAME_COLUMNS; i++)
-        good = create_dataset(file, &recording->frame_column[i], recording->frames.chunk_rows);
-    return good && write_node_figures(recording) && write_scene(recording, scene);
+    return good && create_datasets(recording) && write_node_figures(recording) && write_scene(recording, scene);
 }
 
 // --- the writer's thread ---
@@ -278,17 +284,23 @@ static bool drain(Ring *ring, long long head)
     return true;
 }
 
+// Of a chunk of each column.
+static hsize_t chunk_bytes(const Ring *ring)
+{
+    hsize_t bytes = 0;
+    for (int i = 0; i < ring->column_count; i++)
+        bytes += ring->chunk_rows * ring->column[i].row_bytes + 8;
+    return bytes;
+}
+
 static bool flush(Recording *recording)
 {
-    // The superblock names the file's end, and a file shorter than that is refused: grow it first.
-    hsize_t size;
-    if (H5Fget_filesize(recording->file, &size) < 0 || lseek(recording->descriptor, 0, SEEK_END) < 0)
-        return false;
-    if ((off_t)size > lseek(recording->descriptor, 0, SEEK_END) && ftruncate(recording->descriptor, (off_t)size) != 0)
-        return false;
     if (H5Fflush(recording->file, H5F_SCOPE_LOCAL) < 0)
         return false;
-    if (!recording->named && rename(recording->part, recording->path) != 0)
+    if (recording->named)
+        return ordered_file_commit(recording->ordered);
+    hsize_t ahead = chunk_bytes(&recording->steps) + chunk_bytes(&recording->frames);
+    if (!ordered_file_seal(recording->ordered, 2 * recording->half_rank, ahead) || rename(recording->part, recording->path) != 0)
         return false;
     recording->named = true;
     return true;
@@ -320,7 +332,8 @@ static void *write_rings(void *argument)
             flushed = now_ns();
         }
         if (!good) {
-            snprintf(recording->reason, sizeof recording->reason, "%s", errno ? strerror(errno) : "the HDF5 library could not write");
+            const char *fault = ordered_file_fault(recording->ordered);
+            snprintf(recording->reason, sizeof recording->reason, "%s", fault ? fault : errno ? strerror(errno) : "the HDF5 library could not write");
             atomic_store(&recording->failed, true);
             break;
         }
@@ -421,6 +434,22 @@ static bool close_file(Recording *recording)
     return (recording->file < 0 || H5Fclose(recording->file) >= 0) && good;
 }
 
+// One chunk for a run of known length, so that no unused tail is left; half the index holds what is expected, however long.
+static void size_chunks(Recording *recording, int64_t expected_steps, hsize_t *step_rows, hsize_t *frame_rows)
+{
+    *step_rows = MOST_STEP_ROWS;
+    *frame_rows = (hsize_t)(FRAME_CHUNK_BYTES / recording->frame_column[POSITION].row_bytes) + 1;
+    recording->half_rank = HALF_RANK_UNKNOWN;
+    if (expected_steps <= 1)
+        return;
+    hsize_t steps = (hsize_t)expected_steps, frames = steps / (hsize_t)recording->frame_every + 2;
+    if (steps <= *step_rows * HALF_RANK_KNOWN && frames <= *frame_rows * HALF_RANK_KNOWN)
+        recording->half_rank = HALF_RANK_KNOWN;
+    hsize_t half = (hsize_t)recording->half_rank, most_steps = *step_rows, most_frames = *frame_rows;
+    *step_rows = steps < most_steps ? steps : most_steps > steps / half + 1 ? most_steps : steps / half + 1;
+    *frame_rows = frames < most_frames ? frames : most_frames > frames / half + 1 ? most_frames : frames / half + 1;
+}
+
 Recording *recording_create(const char *path, Simulator *simulator, const RecordingOptions *options, Faults *faults)
 {
     const Scene *scene = simulator_scene(simulator);
@@ -435,18 +464,13 @@ Recording *recording_create(const char *path, Simulator *simulator, const Record
     snprintf(recording->part, room, "%s.part-%ld", path, (long)getpid());
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
     recording->options = *options;
-    recording->file = recording->descriptor = -1;
+    recording->file = -1;
     recording->last_frame_step = -1;
     recording->node_count = simulator_state(simulator)->node_count;
     recording->frame_every = (int64_t)fmax(1, floor(options->frame_ms / scene->dt + 0.5));
     describe_columns(recording);
-    // one chunk for a run of known length, so that no unused tail is left
-    hsize_t step_rows = MOST_STEP_ROWS, frame_rows = (hsize_t)(FRAME_CHUNK_BYTES / recording->frame_column[POSITION].row_bytes) + 1;
-    if (options->expected_steps > 0) {
-        hsize_t steps = (hsize_t)options->expected_steps, frames = steps / (hsize_t)recording->frame_every + 2;
-        step_rows = steps < step_rows ? steps : step_rows;
-        frame_rows = frames < frame_rows ? frames : frame_rows;
-    }
+    hsize_t step_rows, frame_rows;
+    size_chunks(recording, options->expected_steps, &step_rows, &frame_rows);
     bool good = (recording->node = calloc((size_t)recording->node_count, sizeof *recording->node)) != NULL;
     good = good && make_ring(&recording->steps, STEP_RING, STEP_COLUMNS, recording->step_column, step_rows) &&
            make_ring(&recording->frames, FRAME_RING, FRAME_COLUMNS, recording->frame_column, frame_rows);

@@ -3,10 +3,12 @@
 // The simulation thread copies into rings; a thread of the recording's own drains them and flushes about every 0.2 s, so no step sees a file.
 // The file opens in any HDF5 reader while it is written and after a kill, complete up to the last flush. How:
 //   - it is built beside and renamed once its first rows are flushed, so its structure is on the disk before it has its name;
-//   - superblock version 0 and version 1 headers: no checksums and no "open for writing" mark, so an interrupted update leaves old or new figures;
-//   - the metadata cache evicts nothing: between flushes only rows beyond the published extents reach the disk;
-//   - chunks are large and uncached: a flush moves extents in place and seldom anything else.
-// After a failed write (full disk) nothing more is written, the file stays as the last flush left it.
+//   - after that datasets grow only, and a flush writes metadata in an order of which every prefix is a whole file (sim/ordered_file.h);
+//   - superblock version 1 and object headers of version 1: no checksums and no "open for writing" mark, so no figure depends on another's bytes;
+//   - the extents of all datasets lie in one page and change in one write: after a kill all have the S, and all the K, of the same flush.
+// Only a reader that opens the file while it is written can meet datasets of two flushes, as it reads one after the other: it takes the
+// least S and K, and of the frames those whose step is below S.
+// After a failed write (full disk, full index) nothing more is written, the file stays as the last flush left it.
 //
 // Rows: /time_s (S) time at the end of each step, /command (S,2), /proximal (S,2), /state_hash (S), /inserted_mm (S), /report/* (S);
 // frames: /wire/step (K) the row of the frame, /wire/position (K,M,3), /wire/quaternion (K,M,4) as w x y z, /contact/force_n (K,M,3),
@@ -19,7 +21,7 @@
 typedef struct RecordingOptions {
     double frame_ms;         // simulated time between frames, default 10
     double flush_s;          // wall time between flushes, default 0.2
-    int64_t expected_steps;  // sizes the chunks; 0: unknown
+    int64_t expected_steps;  // sizes the chunks and their index; 0 or 1: unknown
     int file_count;          // further files that the run depends on, besides what the scene names
     const char *const *file;
 } RecordingOptions;

@@ -1,4 +1,5 @@
-// Recordings: what is read back is what was simulated; a kill at any time leaves a file that opens, whole up to its last flush; so does a full disk.
+// Recordings: what is read back is what was simulated; a kill at any time leaves a file that opens, whole up to its last flush;
+// so does a full disk and a full index. `test_recording N` kills N recordings at random times; of use under load.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -7,14 +8,17 @@
 #include <cmocka.h>
 
 #include "sim/drive.h"
+#include "sim/ordered_file.h"
 #include "sim/recording.h"
 
 #include <hdf5.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
@@ -121,8 +125,8 @@ static void record_for_ever(const char *path)
     Scene *scene;
     Simulator *simulator = make_simulator(&scene);
     RecordingOptions options = recording_default_options();
-    options.flush_s = 0.02;   // ten times as often as in earnest: ten times the chance to be caught in a flush
-    options.expected_steps = 2000;
+    options.flush_s = 0;   // as often as can be: the chance to be caught in a flush
+    options.expected_steps = 300;
     Recording *recording = recording_create(path, simulator, &options, &faults);
     int cursor = 0;
     for (int64_t i = 0; recording; i++) {
@@ -136,31 +140,200 @@ static void record_for_ever(const char *path)
 
 static void nap_ms(long ms) { nanosleep(&(struct timespec){.tv_sec = ms / 1000, .tv_nsec = ms % 1000 * 1000000}, NULL); }
 
-// All rows that the file claims must have been written: an unwritten row is zero.
-static int64_t check_rows(const char *path)
+static int64_t load_rows(const char *path)
 {
     faults_clear(&faults);
     RecordedRun *run = recorded_run_load(path, &faults);
     if (!run)
         fail_msg("%s", faults.text[0]);
-    for (int64_t i = 0; i < run->step_count; i++)
-        if (fabs(run->time_s[i] - 0.001 * (double)(i + 1)) > 1e-9 * (double)(i + 1))
-            fail_msg("row %lld of %lld holds the time %g", (long long)i, (long long)run->step_count, run->time_s[i]);
-    for (int64_t i = 0; i < run->frame_count * run->node_count; i++) {
-        Quat q = run->quaternion[i];
-        if (fabs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1) > 1e-9)
-            fail_msg("frame %lld of %lld was not written", (long long)(i / run->node_count), (long long)run->frame_count);
-    }
     int64_t steps = run->step_count;
     recorded_run_free(run);
     return steps;
 }
 
-static void a_kill_leaves_a_file_that_opens(void **state)
+// All rows of a dataset as a reader that knows nothing of us gets them; NULL where they cannot be read.
+static double *read_rows(hid_t file, const char *name, hsize_t *rows, hsize_t *values)
+{
+    hid_t set = H5Dopen2(file, name, H5P_DEFAULT), space = set >= 0 ? H5Dget_space(set) : -1;
+    hsize_t extent[3] = {0, 1, 1};
+    double *data = NULL;
+    if (space >= 0 && H5Sget_simple_extent_dims(space, extent, NULL) >= 1) {
+        *rows = extent[0];
+        *values = extent[0] * extent[1] * extent[2];
+        data = calloc(*values + 1, sizeof *data);
+        if (data && H5Dread(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0) {
+            free(data);
+            data = NULL;
+        }
+    }
+    H5Sclose(space);
+    H5Dclose(set);
+    return data;
+}
+
+static bool unwritten(const char *name, const double *value, hsize_t values)
+{
+    for (hsize_t i = 0; strcmp(name, "/time_s") == 0 && i < values; i++)
+        if (fabs(value[i] - 0.001 * (double)(i + 1)) > 1e-9 * (double)(i + 1))
+            return true;
+    for (hsize_t i = 0; strcmp(name, "/state_hash") == 0 && i < values; i++)
+        if (value[i] == 0)
+            return true;
+    for (hsize_t i = 0; strcmp(name, "/wire/quaternion") == 0 && i < values; i += 4)
+        if (fabs(value[i] * value[i] + value[i + 1] * value[i + 1] + value[i + 2] * value[i + 2] + value[i + 3] * value[i + 3] - 1) > 1e-9)
+            return true;
+    return false;
+}
+
+// Every dataset is read whole: all of one kind have the same rows, and every row was written. NULL or what is wrong.
+static const char *check_file(const char *path, hsize_t count[2])
+{
+    static const char *const names[2][10] = {{"/time_s", "/command", "/proximal", "/state_hash", "/inserted_mm", "/report/penetration_mm",
+                                              "/report/contacts", "/report/iterations", "/report/flags"},
+                                             {"/wire/step", "/wire/position", "/wire/quaternion", "/contact/force_n", "/contact/gap_mm",
+                                              "/contact/vessel_node"}};
+    hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);   // locking on
+    if (file < 0)
+        return "cannot be opened";
+    const char *fault = NULL;
+    for (int kind = 0; kind < 2; kind++)
+        for (int i = 0; !fault && names[kind][i]; i++) {
+            hsize_t rows = 0, values = 0;
+            double *data = read_rows(file, names[kind][i], &rows, &values);
+            if (i == 0)
+                count[kind] = rows;
+            fault = !data ? "cannot be read" : rows != count[kind] ? "rows differ" : unwritten(names[kind][i], data, values) ? "unwritten rows" : NULL;
+            if (data && !fault && kind == 1 && i == 0 && rows > 0 && data[rows - 1] >= (double)count[0])
+                fault = "a frame of a step that is not there";
+            free(data);
+        }
+    H5Fclose(file);
+    return fault;
+}
+
+// --- every state of the file in a flush ---
+
+typedef struct Watched {
+    char path[256], copy[256];
+    int states, failures, commits, most_writes, writes;
+    hsize_t before[2];          // rows of the last commit
+    off_t length;               // of the file after it
+    const char *fault;
+    atomic_llong committed;
+} Watched;
+
+static bool copy_file(const char *from, const char *to)
+{
+    static char buffer[1 << 20];
+    FILE *source = fopen(from, "rb"), *target = fopen(to, "wb");
+    bool good = source && target;
+    for (size_t size; good && (size = fread(buffer, 1, sizeof buffer, source)) > 0;)
+        good = fwrite(buffer, 1, size, target) == size;
+    if (source)
+        fclose(source);
+    return (!target || fclose(target) == 0) && good;
+}
+
+static off_t length_of(const char *path)
+{
+    struct stat status;
+    return stat(path, &status) == 0 ? status.st_size : -1;
+}
+
+// The end that the superblock (version 1) states.
+static off_t stated_end(const char *path)
+{
+    uint64_t end = UINT64_MAX;
+    FILE *file = fopen(path, "rb");
+    if (file && fseek(file, 44, SEEK_SET) == 0 && fread(&end, sizeof end, 1, file) != 1)
+        end = UINT64_MAX;
+    if (file)
+        fclose(file);
+    return (off_t)end;
+}
+
+// In the recording's thread: the file as a kill right here would leave it.
+static void look(void *context, bool done)
+{
+    Watched *watched = context;
+    hsize_t count[2] = {0, 0};
+    const char *fault = copy_file(watched->path, watched->copy) ? check_file(watched->copy, count) : "no copy";
+    if (watched->states == 0) {   // as it got its name
+        memcpy(watched->before, count, sizeof count);
+        watched->length = length_of(watched->copy);
+    }
+    // a reader may have asked for the length before this flush
+    off_t end = stated_end(watched->copy);
+    if (!fault && (end <= 0 || end > watched->length))
+        fault = "an end that was not true a flush ago";
+    if (!fault && !done && (count[0] != watched->before[0] || count[1] != watched->before[1]))
+        fault = "rows before the last write of the flush";
+    if (!fault && done && (count[0] < watched->before[0] || count[1] < watched->before[1]))
+        fault = "fewer rows after a flush";
+    watched->states++;
+    watched->writes++;
+    if (fault) {
+        watched->failures++;
+        watched->fault = watched->fault ? watched->fault : fault;
+    }
+    if (done) {
+        watched->most_writes = watched->writes > watched->most_writes ? watched->writes : watched->most_writes;
+        watched->writes = 0;
+        watched->commits++;
+        memcpy(watched->before, count, sizeof count);
+        watched->length = length_of(watched->copy);
+        atomic_store(&watched->committed, (long long)count[0]);
+    }
+}
+
+static void every_state_in_a_flush_is_a_whole_file(void **state)
 {
     (void)state;
-    unsigned seed = 7;
-    for (int trial = 0; trial < 20; trial++) {
+    static Watched watched;
+    snprintf(watched.path, sizeof watched.path, "%s/states.h5", folder);
+    snprintf(watched.copy, sizeof watched.copy, "%s/state.h5", folder);
+    Scene *scene;
+    Simulator *simulator = make_simulator(&scene);
+    RecordingOptions options = recording_default_options();
+    options.flush_s = 0;
+    options.expected_steps = 60;   // chunks of 60 steps and of 8 frames
+    ordered_file_watch(look, &watched);
+    Recording *recording = recording_create(watched.path, simulator, &options, &faults);
+    assert_non_null(recording);
+    for (int step = 1; step <= 260; step++) {
+        simulator_step(simulator, (Command){5, 90});
+        assert_true(recording_step(recording, simulator, (Command){5, 90}));
+        if (step == 1) {
+            // the file gets its name with the first rows
+            while (access(watched.path, F_OK) != 0)
+                nap_ms(1);
+        } else if (step % 20 == 1) {
+            while (atomic_load(&watched.committed) < step && watched.failures == 0)
+                nap_ms(1);
+        }
+    }
+    assert_true(recording_close(recording, simulator, &faults));
+    ordered_file_watch(NULL, NULL);
+    simulator_destroy(simulator);
+    scene_free(scene);
+    print_message("%d states of the file in %d flushes, %d of them no whole file\n", watched.states, watched.commits, watched.failures);
+    if (watched.failures > 0)
+        fail_msg("%s", watched.fault);
+    assert_true(watched.commits >= 13);
+    // a new chunk of each of nine datasets: end of file, at least key, child, key and count of each, extents
+    assert_true(watched.most_writes > 1 + 9 * 4 + 1);
+    assert_int_equal(watched.before[0], 260);
+    assert_int_equal(watched.before[1], 27);
+    assert_null(check_file(watched.path, watched.before));
+    assert_true(length_of(watched.path) == stated_end(watched.path));
+}
+
+// --- kills ---
+
+static void kill_recordings(int trials)
+{
+    unsigned seed = trials > 100 ? (unsigned)time(NULL) : 7;
+    for (int trial = 0; trial < trials; trial++) {
         char path[256];
         snprintf(path, sizeof path, "%s/kill-%d.h5", folder, trial);
         pid_t child = fork();
@@ -171,22 +344,62 @@ static void a_kill_leaves_a_file_that_opens(void **state)
         for (int waited = 0; access(path, F_OK) != 0 && waited < 10000; waited++)
             nap_ms(1);
         seed = seed * 1103515245 + 12345;
-        nap_ms(seed / 65536 % 150);
+        nanosleep(&(struct timespec){.tv_nsec = seed / 65536 % 30000 * 3000}, NULL);
         if (trial % 4 == 0)
-            assert_true(check_rows(path) > 0);   // readable while it is written
+            assert_true(load_rows(path) > 0);   // readable while it is written
         kill(child, SIGKILL);
         int status;
         waitpid(child, &status, 0);
         assert_true(WIFSIGNALED(status));
-        // a reader that knows nothing of us: default access, locking on
-        hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
-        assert_true(file >= 0);
-        H5Fclose(file);
-        assert_true(check_rows(path) > 0);
+        hsize_t count[2];
+        const char *fault = check_file(path, count);
+        if (fault)
+            fail_msg("trial %d: %s", trial, fault);
+        assert_true(load_rows(path) == (int64_t)count[0] && count[0] > 0);
         unlink(path);
         snprintf(path, sizeof path, "%s/kill-%d.h5.part-%ld", folder, trial, (long)child);
         assert_true(access(path, F_OK) != 0);
     }
+}
+
+static void a_kill_leaves_a_file_that_opens(void **state)
+{
+    (void)state;
+    kill_recordings(8);
+}
+
+static void a_full_index_leaves_what_was_flushed(void **state)
+{
+    (void)state;
+    char path[256];
+    snprintf(path, sizeof path, "%s/index.h5", folder);
+    Scene *scene;
+    Simulator *simulator = make_simulator(&scene);
+    RecordingOptions options = recording_default_options();
+    options.expected_steps = 2;   // 256 chunks of two
+    options.flush_s = 0;
+    pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        Recording *recording = recording_create(path, simulator, &options, &faults);
+        for (int step = 0; recording && step < 600; step++) {
+            simulator_step(simulator, (Command){0, 0});
+            recording_step(recording, simulator, (Command){0, 0});
+            if (step % 100 == 0)
+                nap_ms(30);
+        }
+        bool closed = recording && recording_close(recording, simulator, &faults);
+        _exit(recording && !closed && faults.count == 1 && strstr(faults.text[0], "index is full") ? 0 : 2);
+    }
+    int status;
+    waitpid(child, &status, 0);
+    assert_true(WIFEXITED(status));
+    assert_int_equal(WEXITSTATUS(status), 0);
+    hsize_t count[2];
+    assert_null(check_file(path, count));
+    assert_true(count[0] > 0 && count[0] <= 512);
+    simulator_destroy(simulator);
+    scene_free(scene);
 }
 
 static void a_full_disk_leaves_what_was_flushed(void **state)
@@ -221,7 +434,9 @@ static void a_full_disk_leaves_what_was_flushed(void **state)
     waitpid(child, &status, 0);
     assert_true(WIFEXITED(status));
     assert_int_equal(WEXITSTATUS(status), 0);
-    assert_true(check_rows(path) > 2000);
+    hsize_t count[2];
+    assert_null(check_file(path, count));
+    assert_true(count[0] > 2000 && load_rows(path) == (int64_t)count[0]);
 }
 
 static void what_is_no_recording_is_said(void **state)
@@ -265,11 +480,22 @@ static int remove_folder(void **state)
     return system(command);
 }
 
-int main(void)
+static int most_kills;
+static void kills_at_random(void **state)
 {
+    (void)state;
+    kill_recordings(most_kills);
+}
+
+int main(int count, char **argument)
+{
+    if (count == 2 && (most_kills = atoi(argument[1])) > 0)
+        return cmocka_run_group_tests(((const struct CMUnitTest[]){cmocka_unit_test(kills_at_random)}), make_folder, remove_folder);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_read_is_what_was_simulated),
+        cmocka_unit_test(every_state_in_a_flush_is_a_whole_file),
         cmocka_unit_test(a_kill_leaves_a_file_that_opens),
+        cmocka_unit_test(a_full_index_leaves_what_was_flushed),
         cmocka_unit_test(a_full_disk_leaves_what_was_flushed),
         cmocka_unit_test(what_is_no_recording_is_said),
     };

@@ -1,0 +1,456 @@
+#include "sim/ordered_file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { WORD = 8, MOST_BLOCKS = 512, NODE_HEAD = 24 };
+
+// A piece of metadata that the library writes as one.
+typedef struct Block {
+    haddr_t address;
+    size_t size;
+    H5FD_mem_t type;
+    unsigned char *wanted, *disk;   // after sealing
+    bool dirty;
+} Block;
+
+struct OrderedFile {
+    H5FD_t driver;   // the library's part, first
+    int descriptor;
+    haddr_t end;     // of what is allocated
+    haddr_t ahead;   // the file on the disk is longer by this
+    bool sealed;
+    int index_entries, block_count;
+    Block block[MOST_BLOCKS];
+    unsigned char *page;   // page aligned: no fault in the middle of the kernel's copy
+    const char *fault;
+};
+
+static void (*watch_write)(void *context, bool done);
+static void *watch_context;
+
+void ordered_file_watch(void (*watch)(void *context, bool done), void *context)
+{
+    watch_write = watch;
+    watch_context = context;
+}
+
+static void watch(bool done)
+{
+    if (watch_write)
+        watch_write(watch_context, done);
+}
+
+static bool refuse(OrderedFile *file, const char *why)
+{
+    file->fault = why;
+    return false;
+}
+
+// --- plain reading and writing ---
+
+static bool write_all(int descriptor, const unsigned char *data, size_t size, haddr_t address)
+{
+    while (size > 0) {
+        ssize_t part = pwrite(descriptor, data, size, (off_t)address);
+        if (part < 0 && errno == EINTR)
+            continue;
+        if (part <= 0)
+            return false;
+        data += part;
+        size -= (size_t)part;
+        address += (haddr_t)part;
+    }
+    return true;
+}
+
+// What lies beyond the file's end is zero.
+static bool read_all(int descriptor, unsigned char *data, size_t size, haddr_t address)
+{
+    while (size > 0) {
+        ssize_t part = pread(descriptor, data, size, (off_t)address);
+        if (part < 0 && errno == EINTR)
+            continue;
+        if (part < 0)
+            return false;
+        if (part == 0) {
+            memset(data, 0, size);
+            return true;
+        }
+        data += part;
+        size -= (size_t)part;
+        address += (haddr_t)part;
+    }
+    return true;
+}
+
+// To `size` and, where the disk has it, `ahead` beyond.
+static bool grow(int descriptor, haddr_t size, haddr_t ahead)
+{
+    struct stat status;
+    if (fstat(descriptor, &status) != 0)
+        return false;
+    haddr_t now = (haddr_t)status.st_size;
+    return now >= size + ahead || ftruncate(descriptor, (off_t)(size + ahead)) == 0 || now >= size || ftruncate(descriptor, (off_t)size) == 0;
+}
+
+// --- what the library calls ---
+
+static H5FD_t *driver_open(const char *name, unsigned flags, hid_t access, haddr_t most)
+{
+    (void)access;
+    (void)most;
+    if (!(flags & H5F_ACC_TRUNC))
+        return NULL;
+    OrderedFile *file = calloc(1, sizeof *file);
+    if (!file)
+        return NULL;
+    file->page = aligned_alloc(ORDERED_FILE_PAGE, ORDERED_FILE_PAGE);
+    file->descriptor = file->page ? open(name, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666) : -1;
+    if (file->descriptor < 0) {
+        free(file->page);
+        free(file);
+        return NULL;
+    }
+    return &file->driver;
+}
+
+static herr_t driver_close(H5FD_t *driver)
+{
+    OrderedFile *file = (OrderedFile *)driver;
+    bool good = true;
+    for (int i = 0; i < file->block_count; i++) {
+        Block *block = &file->block[i];
+        // whoever closes has committed: nothing may be lost here
+        good = good && (!block->dirty || memcmp(block->wanted, block->disk, block->size) == 0);
+        free(block->wanted);
+        free(block->disk);
+    }
+    if (good && file->sealed)
+        good = ftruncate(file->descriptor, (off_t)file->end) == 0;
+    good = close(file->descriptor) == 0 && good;
+    free(file->page);
+    free(file);
+    return good ? 0 : -1;
+}
+
+static herr_t driver_query(const H5FD_t *driver, unsigned long *flags)
+{
+    (void)driver;
+    // no accumulator and no aggregation: every structure comes as its own write with its own type
+    *flags = H5FD_FEAT_DEFAULT_VFD_COMPATIBLE;
+    return 0;
+}
+
+static haddr_t driver_alloc(H5FD_t *driver, H5FD_mem_t type, hid_t transfer, hsize_t size)
+{
+    (void)type;
+    (void)transfer;
+    OrderedFile *file = (OrderedFile *)driver;
+    haddr_t address = (file->end + WORD - 1) / WORD * WORD;
+    file->end = address + size;
+    return address;
+}
+
+static haddr_t driver_get_eoa(const H5FD_t *driver, H5FD_mem_t type)
+{
+    (void)type;
+    return ((const OrderedFile *)driver)->end;
+}
+
+static herr_t driver_set_eoa(H5FD_t *driver, H5FD_mem_t type, haddr_t end)
+{
+    (void)type;
+    ((OrderedFile *)driver)->end = end;
+    return 0;
+}
+
+static haddr_t driver_get_eof(const H5FD_t *driver, H5FD_mem_t type)
+{
+    (void)type;
+    struct stat status;
+    return fstat(((const OrderedFile *)driver)->descriptor, &status) == 0 ? (haddr_t)status.st_size : HADDR_UNDEF;
+}
+
+static herr_t driver_get_handle(H5FD_t *driver, hid_t access, void **handle)
+{
+    (void)access;
+    *handle = driver;
+    return 0;
+}
+
+static herr_t driver_read(H5FD_t *driver, H5FD_mem_t type, hid_t transfer, haddr_t address, size_t size, void *data)
+{
+    (void)transfer;
+    OrderedFile *file = (OrderedFile *)driver;
+    if (!read_all(file->descriptor, data, size, address))
+        return -1;
+    if (!file->sealed || type == H5FD_MEM_DRAW)
+        return 0;
+    for (int i = 0; i < file->block_count; i++) {
+        const Block *block = &file->block[i];
+        haddr_t from = block->address > address ? block->address : address, to = block->address + block->size;
+        to = to < address + size ? to : address + size;
+        if (from < to)
+            memcpy((unsigned char *)data + (from - address), block->wanted + (from - block->address), to - from);
+    }
+    return 0;
+}
+
+static bool remember(OrderedFile *file, H5FD_mem_t type, haddr_t address, size_t size)
+{
+    int kept = 0;
+    for (int i = 0; i < file->block_count; i++)   // what is written over is another structure now
+        if (file->block[i].address + file->block[i].size <= address || address + size <= file->block[i].address)
+            file->block[kept++] = file->block[i];
+    file->block_count = kept;
+    if (file->block_count == MOST_BLOCKS)
+        return refuse(file, "more structures than a recording has");
+    file->block[file->block_count++] = (Block){.address = address, .size = size, .type = type};
+    return true;
+}
+
+static bool hold(OrderedFile *file, H5FD_mem_t type, haddr_t address, size_t size, const void *data)
+{
+    for (int i = 0; i < file->block_count; i++) {
+        Block *block = &file->block[i];
+        if (block->address == address && block->size == size && block->type == type) {
+            memcpy(block->wanted, data, size);
+            block->dirty = true;
+            return true;
+        }
+    }
+    return refuse(file, "the file's index is full");
+}
+
+static herr_t driver_write(H5FD_t *driver, H5FD_mem_t type, hid_t transfer, haddr_t address, size_t size, const void *data)
+{
+    (void)transfer;
+    OrderedFile *file = (OrderedFile *)driver;
+    if (file->sealed && type != H5FD_MEM_DRAW)
+        return hold(file, type, address, size, data) ? 0 : -1;
+    if (type != H5FD_MEM_DRAW && !remember(file, type, address, size))
+        return -1;
+    return write_all(file->descriptor, data, size, address) ? 0 : -1;
+}
+
+static herr_t driver_truncate(H5FD_t *driver, hid_t transfer, hbool_t closing)
+{
+    (void)transfer;
+    (void)closing;
+    OrderedFile *file = (OrderedFile *)driver;
+    return file->sealed || grow(file->descriptor, file->end, 0) ? 0 : -1;
+}
+
+static const H5FD_class_t driver_class = {
+#ifdef H5FD_CLASS_VERSION
+    .version = H5FD_CLASS_VERSION,
+    .value = 600,
+#endif
+    .name = "seldinger-ordered",
+    .maxaddr = INT64_MAX,
+    .fc_degree = H5F_CLOSE_WEAK,
+    .open = driver_open,
+    .close = driver_close,
+    .query = driver_query,
+    .alloc = driver_alloc,
+    .get_eoa = driver_get_eoa,
+    .set_eoa = driver_set_eoa,
+    .get_eof = driver_get_eof,
+    .get_handle = driver_get_handle,
+    .read = driver_read,
+    .write = driver_write,
+    .truncate = driver_truncate,
+    .fl_map = H5FD_FLMAP_DICHOTOMY,
+};
+
+hid_t ordered_file_create(const char *path, hid_t creation, hid_t access)
+{
+    hid_t driver = H5FDregister(&driver_class);
+    hid_t file = driver >= 0 && H5Pset_driver(access, driver, NULL) >= 0 ? H5Fcreate(path, H5F_ACC_TRUNC, creation, access) : -1;
+    if (driver >= 0)
+        H5FDunregister(driver);   // the file and the list hold it
+    return file;
+}
+
+OrderedFile *ordered_file_of(hid_t file)
+{
+    void *handle = NULL;
+    return H5Fget_vfd_handle(file, H5P_DEFAULT, &handle) >= 0 ? handle : NULL;
+}
+
+const char *ordered_file_fault(const OrderedFile *file) { return file->fault; }
+
+void ordered_file_start_page(OrderedFile *file) { file->end = (file->end + ORDERED_FILE_PAGE - 1) / ORDERED_FILE_PAGE * ORDERED_FILE_PAGE; }
+
+bool ordered_file_seal(OrderedFile *file, int index_entries, hsize_t ahead)
+{
+    file->index_entries = index_entries;
+    file->ahead = ahead;
+    if (!grow(file->descriptor, file->end, ahead))
+        return false;
+    for (int i = 0; i < file->block_count; i++) {
+        Block *block = &file->block[i];
+        if (block->address % WORD != 0)
+            return refuse(file, "a structure does not start at a word");
+        block->wanted = calloc(block->size + WORD, 1);   // whole words
+        block->disk = calloc(block->size + WORD, 1);
+        if (!block->wanted || !block->disk || !read_all(file->descriptor, block->disk, block->size, block->address))
+            return false;
+        memcpy(block->wanted, block->disk, block->size);
+    }
+    file->sealed = true;
+    return true;
+}
+
+// --- committing ---
+
+// The first changed word at or after the byte `from`, or the block's size.
+static size_t next_change(const Block *block, size_t from)
+{
+    while (from < block->size && memcmp(block->wanted + from, block->disk + from, WORD) == 0)
+        from += WORD;
+    return from < block->size ? from : block->size;
+}
+
+static uint64_t little_endian(const unsigned char *data, int bytes)
+{
+    uint64_t value = 0;
+    for (int i = bytes - 1; i >= 0; i--)
+        value = value << 8 | data[i];
+    return value;
+}
+
+// Where the superblock states the file's end: behind version 0's 24 bytes of sizes, or version 1's 28, and two addresses.
+static size_t end_field(const Block *superblock) { return superblock->disk[8] == 0 ? 40 : 44; }
+
+// Rule 1: the end of file grows, nothing else changes.
+static bool superblock_fits(const Block *block)
+{
+    size_t field = end_field(block), rest = field + WORD;
+    return block->disk[8] <= 1 && block->size > rest && memcmp(block->wanted, block->disk, field) == 0 &&
+           memcmp(block->wanted + rest, block->disk + rest, block->size - rest) == 0 &&
+           little_endian(block->wanted + field, WORD) >= little_endian(block->disk + field, WORD);
+}
+
+// Rules 2 and 3: a node (signature 4, type 1, level 1, entries 2, siblings 16, then key, child, key, …, key) gets entries at its end.
+static bool node_fits(const OrderedFile *file, const Block *block)
+{
+    if (next_change(block, 0) == block->size)
+        return true;
+    size_t children = (size_t)file->index_entries * WORD, keys = (size_t)file->index_entries + 1;
+    if (block->size < NODE_HEAD + children + keys || (block->size - NODE_HEAD - children) % keys != 0)
+        return false;
+    size_t key = (block->size - NODE_HEAD - children) / keys;
+    uint64_t before = little_endian(block->disk + 6, 2), after = little_endian(block->wanted + 6, 2);
+    if (memcmp(block->disk, "TREE", 4) != 0 || memcmp(block->disk, block->wanted, 6) != 0 || before < 1 || after < before ||
+        after > (uint64_t)file->index_entries)
+        return false;
+    // the leading index (after a key's first word) of key n: above the last chunk's afterwards, and never falling
+    size_t bound = NODE_HEAD + (size_t)before * (key + WORD), leading = bound + WORD, last = leading - key - WORD;
+    uint64_t new = little_endian(block->wanted + leading, WORD);
+    return next_change(block, WORD) >= bound && new > little_endian(block->disk + last, WORD) && new >= little_endian(block->disk + leading, WORD);
+}
+
+// Rule 4: one word of each header, all within the page that the first of them lies in.
+static bool header_fits(const Block *block, haddr_t *page)
+{
+    size_t change = next_change(block, 0);
+    if (change == block->size)
+        return true;
+    haddr_t at = (block->address + change) / ORDERED_FILE_PAGE;
+    if (*page == HADDR_UNDEF)
+        *page = at;
+    return *page == at && next_change(block, change + WORD) == block->size;
+}
+
+static bool all_fits(OrderedFile *file, haddr_t *page)
+{
+    *page = HADDR_UNDEF;
+    for (int i = 0; i < file->block_count; i++) {
+        const Block *block = &file->block[i];
+        bool good = !block->dirty || (block->type == H5FD_MEM_SUPER   ? superblock_fits(block)
+                                      : block->type == H5FD_MEM_BTREE ? node_fits(file, block)
+                                      : block->type == H5FD_MEM_OHDR  ? header_fits(block, page)
+                                                                      : next_change(block, 0) == block->size);
+        if (!good)
+            return refuse(file, "the file's structure would change");
+    }
+    return true;
+}
+
+static bool write_end(OrderedFile *file)
+{
+    for (int i = 0; i < file->block_count; i++) {
+        Block *block = &file->block[i];
+        size_t field = end_field(block);
+        if (block->type != H5FD_MEM_SUPER || !block->dirty || memcmp(block->wanted + field, block->disk + field, WORD) == 0)
+            continue;
+        watch(false);
+        if (!write_all(file->descriptor, block->wanted + field, WORD, block->address + field))
+            return false;
+        memcpy(block->disk + field, block->wanted + field, WORD);
+    }
+    return true;
+}
+
+// The changed words of all blocks of a type, one write each, in the order of their addresses within a block.
+static bool write_words(OrderedFile *file, H5FD_mem_t type, size_t from, size_t to)
+{
+    for (int i = 0; i < file->block_count; i++) {
+        Block *block = &file->block[i];
+        if (!block->dirty || block->type != type)
+            continue;
+        size_t end = to < block->size ? to : block->size;
+        for (size_t at = next_change(block, from); at < end; at = next_change(block, at)) {
+            watch(false);
+            if (!write_all(file->descriptor, block->wanted + at, WORD, block->address + at))
+                return false;
+            memcpy(block->disk + at, block->wanted + at, WORD);
+        }
+    }
+    return true;
+}
+
+static bool write_extents(OrderedFile *file, haddr_t page)
+{
+    if (page == HADDR_UNDEF)
+        return true;
+    haddr_t start = page * ORDERED_FILE_PAGE;
+    size_t first = ORDERED_FILE_PAGE, last = 0;
+    if (!read_all(file->descriptor, file->page, ORDERED_FILE_PAGE, start))
+        return false;
+    for (int i = 0; i < file->block_count; i++) {
+        Block *block = &file->block[i];
+        size_t change = block->dirty && block->type == H5FD_MEM_OHDR ? next_change(block, 0) : block->size;
+        if (change == block->size)
+            continue;
+        size_t at = (size_t)(block->address + change - start);
+        memcpy(file->page + at, block->wanted + change, WORD);
+        memcpy(block->disk + change, block->wanted + change, WORD);
+        first = at < first ? at : first;
+        last = at + WORD > last ? at + WORD : last;
+    }
+    watch(false);
+    // one call; a short one (a full disk cannot be the reason: the page is there) must not be followed by a second
+    return pwrite(file->descriptor, file->page + first, last - first, (off_t)(start + first)) == (ssize_t)(last - first);
+}
+
+bool ordered_file_commit(OrderedFile *file)
+{
+    haddr_t page;
+    if (file->fault || !all_fits(file, &page))
+        return false;
+    watch(false);
+    bool good = grow(file->descriptor, file->end, file->ahead) && write_end(file) && write_words(file, H5FD_MEM_BTREE, WORD, SIZE_MAX) &&
+                write_words(file, H5FD_MEM_BTREE, 0, WORD) && write_extents(file, page);
+    for (int i = 0; good && i < file->block_count; i++)
+        file->block[i].dirty = false;
+    watch(true);
+    return good;
+}
