@@ -6,6 +6,7 @@
 #include "recon/volume_format.h"
 
 #include <ctype.h>
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -531,6 +532,7 @@ bool volume_save_nrrd(const Volume *volume, const char *path, const char *type_n
         return false;
     FILE *file = fopen(part, "wb");
     bool good = file != NULL;
+    int reason = errno;
     if (good) {
         const Vec3 *a = volume->axis, o = volume->origin;
         fprintf(file, "NRRD0004\ntype: %s\ndimension: 3\n", type->name);
@@ -545,11 +547,12 @@ bool volume_save_nrrd(const Volume *volume, const char *path, const char *type_n
         good = write_gzip(file, sample, count * type->size);
         good = fclose(file) == 0 && good;
         good = good && rename(part, path) == 0;
+        reason = errno;
         if (!good)
             remove(part);
     }
     free(sample);
     if (!good)
-        faults_add(faults, path, 0, 0, "cannot be written; a folder that exists, may be written to, and has room");
+        faults_add(faults, path, 0, 0, "cannot be written: %s; a folder that exists, may be written to, and has room", strerror(reason));
     return good;
 }

@@ -1,0 +1,238 @@
+// Bad input to the verbs beside `run` (test_run.c has those): exit code 2, one message with the file, the place and what would be valid, and no
+// file left, not even a part of one.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <glob.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+static char folder[] = "/tmp/seldinger-bad-XXXXXX", output[1 << 16];
+
+static int run_in(const char *before, const char *arguments)
+{
+    char command[2000];
+    snprintf(command, sizeof command, "cd '%s' && %s %s %s 2>&1", folder, before, SELDINGER_PROGRAM, arguments);
+    FILE *pipe = popen(command, "r");
+    assert_non_null(pipe);
+    size_t length = fread(output, 1, sizeof output - 1, pipe);
+    output[length] = 0;
+    int status = pclose(pipe);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
+static void put_bytes(const char *name, const void *bytes, size_t length)
+{
+    char path[300];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, length, file), length);
+    assert_int_equal(fclose(file), 0);
+}
+
+static void put(const char *name, const char *text) { put_bytes(name, text, strlen(text)); }
+
+// Outputs of these tests are called out*.
+static void nothing_is_left(const char *arguments)
+{
+    char pattern[300];
+    glob_t found;
+    snprintf(pattern, sizeof pattern, "%s/*out*", folder);
+    if (glob(pattern, 0, NULL, &found) == 0)
+        fail_msg("`%s` left %s", arguments, found.gl_pathv[0]);
+    globfree(&found);
+}
+
+static void refused(const char *arguments, const char *words)
+{
+    int code = run_in("", arguments);
+    if (code != 2 || !strstr(output, words))
+        fail_msg("`%s` ended with %d and said: %s(expected 2 and '%s')", arguments, code, output, words);
+    nothing_is_left(arguments);
+}
+
+static void volumes_cut_off_or_lying(void **state)
+{
+    (void)state;
+    unsigned char nifti[400] = {0};
+    int32_t size = 348;
+    int16_t dim[8] = {3, 10, 10, 10, 1, 1, 1, 1}, type[2] = {4, 16};
+    float pixdim[8] = {1, 1, 1, 1, 1, 1, 1, 1}, offset = 352;
+    memcpy(nifti, &size, 4);
+    memcpy(nifti + 40, dim, 16);
+    memcpy(nifti + 70, type, 4);
+    memcpy(nifti + 76, pixdim, 32);
+    memcpy(nifti + 108, &offset, 4);
+    memcpy(nifti + 344, "n+1", 4);
+    put_bytes("short.nii", nifti, sizeof nifti);
+    put_bytes("cut.nii", nifti, 200);
+    dim[1] = -5;
+    memcpy(nifti + 40, dim, 16);
+    put_bytes("lie.nii", nifti, sizeof nifti);
+    put("short.mha", "ObjectType = Image\nNDims = 3\nDimSize = 10 10 10\nElementSpacing = 1 1 1\nElementType = MET_SHORT\nElementDataFile = LOCAL\nabc");
+    put("lie.mha", "ObjectType = Image\nNDims = 3\nDimSize = 10 10 1000000000\nElementSpacing = 1 1 1\nElementType = MET_SHORT\nElementDataFile = LOCAL\nabc");
+    put("short.nrrd", "NRRD0004\ntype: short\ndimension: 3\nsizes: 10 10 10\nendian: little\nencoding: raw\n\nabc");
+    put("lie.nrrd", "NRRD0004\ntype: short\ndimension: 3\nsizes: 10 -10 10\nendian: little\nencoding: raw\n\nabc");
+    put("head.nrrd", "NRRD0004\ntype: short\ndimension: 3\n");
+    put("trace.yaml", "branches: [{start_mm: [1, 1, 1], toward_mm: [2, 2, 2], radius_mm: 1}]\n");
+    static const char *const files[][2] = {
+        {"short.nii", "short.nii:byte "}, {"cut.nii", "cut.nii:byte 200"}, {"lie.nii", "lie.nii:byte 42"}, {"short.mha", "short.mha:byte "},
+        {"lie.mha", "lie.mha:3"},         {"short.nrrd", "short.nrrd:byte "}, {"lie.nrrd", "lie.nrrd:4"}, {"head.nrrd", "head.nrrd:"},
+        {"nowhere.nrrd", "nowhere.nrrd: cannot be opened"}, {".", "not a regular file"}, {"tree.h5", "tree.h5:byte 0"}};
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+        char arguments[200];
+        snprintf(arguments, sizeof arguments, "segment %s --trace trace.yaml -o out.h5 --json out.json", files[i][0]);
+        refused(arguments, files[i][1]);
+    }
+}
+
+static void traces(void **state)
+{
+    (void)state;
+    static const char *const texts[][2] = {
+        {"branches: [{start_mm: [90, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\n", "t.yaml:1:12: the start of branch 1 (90, 0, 0) mm"},
+        {"branches: [{start_mm: [90, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\n", "lies outside the volume; voxels (0, 0, 0) to"},
+        {"branches: [{start_mm: [0, 3, 3], toward_mm: [2, 0, 0], radius_mm: 1}]\n", "lies on background"},
+        {"branches: [{start_cm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\n", "t.yaml:1:23: 'start_cm'"},
+        {"branches: [{start_mm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 0}]\n", "t.yaml:1:67: radius_mm '0'"},
+        {"branches: [{start_mm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\nbanana: 1\n", "t.yaml:2:9: 'banana'"},
+        {"branches: []\n", "t.yaml:1:1: there is no branch"},
+        {"", "t.yaml:1:1: the file is empty"}};
+    assert_int_equal(run_in("", "synth capsule -o capsule.nrrd --voxel-mm 0.3 --quiet"), 0);
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
+        put("t.yaml", texts[i][0]);
+        refused("segment capsule.nrrd --trace t.yaml -o out.h5", texts[i][1]);
+    }
+}
+
+static void the_wrong_kind_of_file(void **state)
+{
+    (void)state;
+    put("ok.csv", "x_mm,y_mm,z_mm\n0,0,2\n");
+    put("nan.csv", "x_mm,y_mm,z_mm\n0,0,2\n0,nan,2\n");
+    put("cell.csv", "x_mm,y_mm,z_mm\n0,2\n");
+    put("unit.csv", "x_cm,y_mm,z_mm\n0,0,2\n");
+    put("noise.bin", "no file of any kind");
+    refused("query tree.h5 --points ok.csv -o out.csv", "tree.h5: is a tree without a model; make one with `seldinger fit`");
+    refused("query noise.bin --points ok.csv -o out.csv", "noise.bin:byte 0: is not a readable HDF5 file");
+    refused("query model.h5 --points nan.csv -o out.csv", "nan.csv:3:3: 'nan' is no coordinate; valid: a finite number of mm");
+    refused("query model.h5 --points cell.csv -o out.csv", "cell.csv:2: 2 cells; valid: 3");
+    refused("query model.h5 --points unit.csv -o out.csv", "unit.csv:1: the header has no column x_mm");
+    refused("query model.h5 --points model.h5 -o out.csv", "model.h5:byte");
+    refused("fit noise.bin -o out.h5", "noise.bin:byte 0: is not a readable HDF5 file");
+    refused("fit cut.h5 -o out.h5", "cut.h5:byte 0: is not a readable HDF5 file");
+    refused("export tree.h5 -o out.stl", "tree.h5: is a tree without a model");
+    refused("export noise.bin -o out.stl", "noise.bin: is no tree, model or recording");
+    refused("export model.h5 -o out.xyz", "extension '.xyz' is no format");
+    refused("info noise.bin", "noise.bin");
+    put("s.yaml", "seldinger: 1\nvessel: {model: tree.h5}\nwire: {sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
+                  "sheath: {inlet: root}\nscript: [[0, 10, 0], [0.1, 0, 0]]\n");
+    refused("run s.yaml --summary out.json --final out.csv --record out.h5", "tree.h5: is a tree without a model; make one with `seldinger fit`");
+}
+
+static void words_of_the_command_line(void **state)
+{
+    (void)state;
+    static const char *const lines[][2] = {
+        {"", "Usage: seldinger"},
+        {"banana", "no verb 'banana'; valid: run"},
+        {"segment", "no volume is named"},
+        {"segment capsule.nrrd", "--trace F.yaml is needed"},
+        {"segment capsule.nrrd --banana", "--banana"},
+        {"fit", "lacks the tree"},
+        {"fit tree.h5", "lacks -o MODEL.h5"},
+        {"fit tree.h5 -o out.h5 --max-blobs 0", "--max-blobs: '0' is not valid; a number from 2"},
+        {"fit tree.h5 -o out.h5 --target-mm nan", "--target-mm: 'nan' is not valid"},
+        {"fit tree.h5 -o out.h5 --banana", "see `seldinger fit --help`"},
+        {"fit nowhere.h5 -o out.h5", "nowhere.h5: cannot be opened"},
+        {"query", "lacks the model"},
+        {"query model.h5", "lacks --points F.csv"},
+        {"query model.h5 --points nowhere.csv -o out.csv", "nowhere.csv: cannot be opened"},
+        {"synth", "lacks a shape"},
+        {"synth banana -o out.h5", "no shape 'banana'; valid: capsule"},
+        {"synth capsule --radius-mm 0 -o out.h5", "radius_mm is '0'; valid: a number from"},
+        {"synth capsule -o out.xyz", "valid: .h5, .stl, .ply, .nrrd"},
+        {"export", "are needed"},
+        {"info", "one file is needed"}};
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)
+        refused(lines[i][0], lines[i][1]);
+    static const char *const nowhere[] = {"fit tree.h5 -o nowhere/x", "synth capsule -o nowhere/x.h5", "synth capsule -o nowhere/x.nrrd",
+                                          "query model.h5 --points ok.csv -o nowhere/x.csv", "export model.h5 -o nowhere/x.stl",
+                                          "segment capsule.nrrd --trace trace.yaml -o nowhere/x.h5"};
+    for (size_t i = 0; i < sizeof nowhere / sizeof nowhere[0]; i++)
+        refused(nowhere[i], "cannot be written: No such file or directory");
+}
+
+// Every verb that writes, with no more than 4 kB to a file; what was there before stays as it was.
+static void a_full_disk(void **state)
+{
+    (void)state;
+    static const char *const lines[] = {"synth phantom -o out.h5 --quiet", "synth capsule -o out.nrrd --quiet", "synth capsule -o out.stl --quiet",
+                                        "fit tree.h5 -o out.h5 --quiet",   "export model.h5 -o out.stl",        "query model.h5 --points many.csv -o out.csv"};
+    char many[60000] = "x_mm,y_mm,z_mm\n";
+    size_t length = strlen(many);
+    for (int i = 0; i < 200; i++)
+        length += (size_t)snprintf(many + length, sizeof many - length, "0.1,0.2,%d\n", i);
+    put("many.csv", many);
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
+        int code = run_in("ulimit -f 8;", lines[i]);
+        if (code != 2 || !strstr(output, ": cannot be written: File too large"))
+            fail_msg("`%s` on a full disk ended with %d and said: %s", lines[i], code, output);
+        nothing_is_left(lines[i]);
+    }
+    put("kept.h5", "before");
+    assert_int_equal(run_in("ulimit -f 8;", "synth phantom -o kept.h5"), 2);
+    assert_int_equal(run_in("grep -q '^before$' kept.h5 &&", "--version"), 0);
+}
+
+// Renaming over a device or pipe would replace it: text is written through, HDF5 and volumes are refused.
+static void pipes_and_devices_stay_what_they_are(void **state)
+{
+    (void)state;
+    char path[300];
+    snprintf(path, sizeof path, "%s/pipe.nrrd", folder);
+    assert_int_equal(mkfifo(path, 0600), 0);
+    static const char *const lines[] = {"synth capsule -o pipe.nrrd", "fit tree.h5 -o pipe.nrrd", "segment capsule.nrrd --trace trace.yaml -o pipe.nrrd",
+                                        "fit tree.h5 -o out.h5 --picture pipe.nrrd"};
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)
+        refused(lines[i], "pipe.nrrd: is no regular file");
+    assert_int_equal(run_in("{ timeout 10 cat pipe.nrrd > heard.csv & } ;", "query model.h5 --points ok.csv -o pipe.nrrd --quiet; wait; grep -q '^0,0,2,' heard.csv"), 0);
+    struct stat status;
+    assert_true(stat(path, &status) == 0 && S_ISFIFO(status.st_mode));
+}
+
+static int make_folder(void **state)
+{
+    (void)state;
+    if (!mkdtemp(folder))
+        return -1;
+    setenv("SELDINGER_CACHE", folder, 1);
+    return run_in("", "synth capsule -o tree.h5") || run_in("", "fit tree.h5 -o model.h5 --quiet") || run_in("head -c 3000 tree.h5 > cut.h5 &&", "--version");
+}
+
+static int remove_folder(void **state)
+{
+    (void)state;
+    char command[300];
+    snprintf(command, sizeof command, "rm -rf '%s'", folder);
+    return system(command);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(volumes_cut_off_or_lying), cmocka_unit_test(traces),      cmocka_unit_test(the_wrong_kind_of_file),
+        cmocka_unit_test(words_of_the_command_line), cmocka_unit_test(a_full_disk), cmocka_unit_test(pipes_and_devices_stay_what_they_are),
+    };
+    return cmocka_run_group_tests_name("bad_input", tests, make_folder, remove_folder);
+}
