@@ -23,7 +23,7 @@ struct OrderedFile {
     H5FD_t driver;   // the library's part, first
     int descriptor;
     haddr_t end;     // of what is allocated
-    haddr_t ahead;   // the file on the disk is longer by this
+    haddr_t ahead;   // the stated end is later than that by this, the file's length by twice this
     bool sealed;
     int index_entries, block_count;
     Block block[MOST_BLOCKS];
@@ -89,14 +89,68 @@ static bool read_all(int descriptor, unsigned char *data, size_t size, haddr_t a
     return true;
 }
 
-// To `size` and, where the disk has it, `ahead` beyond.
-static bool grow(int descriptor, haddr_t size, haddr_t ahead)
+static haddr_t length_of(int descriptor)
 {
     struct stat status;
-    if (fstat(descriptor, &status) != 0)
+    return fstat(descriptor, &status) == 0 ? (haddr_t)status.st_size : HADDR_UNDEF;
+}
+
+// To `size` and, where the disk has it, `more` beyond.
+static bool grow(int descriptor, haddr_t size, haddr_t more)
+{
+    haddr_t now = length_of(descriptor);
+    return now != HADDR_UNDEF && (now >= size + more || ftruncate(descriptor, (off_t)(size + more)) == 0 || now >= size ||
+                                  ftruncate(descriptor, (off_t)size) == 0);
+}
+
+// --- the end that the superblock states ---
+
+static uint64_t little_endian(const unsigned char *data, int bytes)
+{
+    uint64_t value = 0;
+    for (int i = bytes - 1; i >= 0; i--)
+        value = value << 8 | data[i];
+    return value;
+}
+
+static void put_little_endian(unsigned char *data, uint64_t value)
+{
+    for (int i = 0; i < WORD; i++)
+        data[i] = (unsigned char)(value >> 8 * i);
+}
+
+// Behind version 0's 24 bytes of sizes, or version 1's 28, and two addresses.
+static size_t end_field(const Block *superblock) { return superblock->disk[8] == 0 ? 40 : 44; }
+
+static Block *superblock_of(OrderedFile *file)
+{
+    for (int i = 0; i < file->block_count; i++)
+        if (file->block[i].type == H5FD_MEM_SUPER && file->block[i].address == 0)
+            return &file->block[i];
+    return NULL;
+}
+
+// What is to be stated, after the file has grown: ahead as far as it is long, and never less than before.
+static void state_end_ahead(OrderedFile *file)
+{
+    Block *block = superblock_of(file);
+    size_t field = end_field(block);
+    haddr_t length = length_of(file->descriptor), end = file->end + file->ahead, before = little_endian(block->disk + field, WORD);
+    end = length < end ? length : end;
+    put_little_endian(block->wanted + field, end > before ? end : before);
+    block->dirty = true;
+}
+
+static bool write_end(OrderedFile *file)
+{
+    Block *block = superblock_of(file);
+    size_t field = end_field(block);
+    if (memcmp(block->wanted + field, block->disk + field, WORD) == 0)
+        return true;
+    if (!write_all(file->descriptor, block->wanted + field, WORD, block->address + field))
         return false;
-    haddr_t now = (haddr_t)status.st_size;
-    return now >= size + ahead || ftruncate(descriptor, (off_t)(size + ahead)) == 0 || now >= size || ftruncate(descriptor, (off_t)size) == 0;
+    memcpy(block->disk + field, block->wanted + field, WORD);
+    return true;
 }
 
 // --- what the library calls ---
@@ -124,15 +178,17 @@ static herr_t driver_close(H5FD_t *driver)
 {
     OrderedFile *file = (OrderedFile *)driver;
     bool good = true;
+    if (file->sealed) {
+        // whoever closes has committed: only the end is still ahead
+        put_little_endian(superblock_of(file)->wanted + end_field(superblock_of(file)), file->end);
+        good = write_end(file) && ftruncate(file->descriptor, (off_t)file->end) == 0;
+    }
     for (int i = 0; i < file->block_count; i++) {
         Block *block = &file->block[i];
-        // whoever closes has committed: nothing may be lost here
         good = good && (!block->dirty || memcmp(block->wanted, block->disk, block->size) == 0);
         free(block->wanted);
         free(block->disk);
     }
-    if (good && file->sealed)
-        good = ftruncate(file->descriptor, (off_t)file->end) == 0;
     good = close(file->descriptor) == 0 && good;
     free(file->page);
     free(file);
@@ -173,8 +229,7 @@ static herr_t driver_set_eoa(H5FD_t *driver, H5FD_mem_t type, haddr_t end)
 static haddr_t driver_get_eof(const H5FD_t *driver, H5FD_mem_t type)
 {
     (void)type;
-    struct stat status;
-    return fstat(((const OrderedFile *)driver)->descriptor, &status) == 0 ? (haddr_t)status.st_size : HADDR_UNDEF;
+    return length_of(((const OrderedFile *)driver)->descriptor);
 }
 
 static herr_t driver_get_handle(H5FD_t *driver, hid_t access, void **handle)
@@ -292,8 +347,6 @@ bool ordered_file_seal(OrderedFile *file, int index_entries, hsize_t ahead)
 {
     file->index_entries = index_entries;
     file->ahead = ahead;
-    if (!grow(file->descriptor, file->end, ahead))
-        return false;
     for (int i = 0; i < file->block_count; i++) {
         Block *block = &file->block[i];
         if (block->address % WORD != 0)
@@ -304,8 +357,13 @@ bool ordered_file_seal(OrderedFile *file, int index_entries, hsize_t ahead)
             return false;
         memcpy(block->wanted, block->disk, block->size);
     }
+    if (!superblock_of(file) || superblock_of(file)->disk[8] > 1)
+        return refuse(file, "an unknown superblock");
     file->sealed = true;
-    return true;
+    if (!grow(file->descriptor, file->end, 2 * ahead))
+        return false;
+    state_end_ahead(file);
+    return write_end(file);
 }
 
 // --- committing ---
@@ -317,17 +375,6 @@ static size_t next_change(const Block *block, size_t from)
         from += WORD;
     return from < block->size ? from : block->size;
 }
-
-static uint64_t little_endian(const unsigned char *data, int bytes)
-{
-    uint64_t value = 0;
-    for (int i = bytes - 1; i >= 0; i--)
-        value = value << 8 | data[i];
-    return value;
-}
-
-// Where the superblock states the file's end: behind version 0's 24 bytes of sizes, or version 1's 28, and two addresses.
-static size_t end_field(const Block *superblock) { return superblock->disk[8] == 0 ? 40 : 44; }
 
 // Rule 1: the end of file grows, nothing else changes.
 static bool superblock_fits(const Block *block)
@@ -384,21 +431,6 @@ static bool all_fits(OrderedFile *file, haddr_t *page)
     return true;
 }
 
-static bool write_end(OrderedFile *file)
-{
-    for (int i = 0; i < file->block_count; i++) {
-        Block *block = &file->block[i];
-        size_t field = end_field(block);
-        if (block->type != H5FD_MEM_SUPER || !block->dirty || memcmp(block->wanted + field, block->disk + field, WORD) == 0)
-            continue;
-        watch(false);
-        if (!write_all(file->descriptor, block->wanted + field, WORD, block->address + field))
-            return false;
-        memcpy(block->disk + field, block->wanted + field, WORD);
-    }
-    return true;
-}
-
 // The changed words of all blocks of a type, one write each, in the order of their addresses within a block.
 static bool write_words(OrderedFile *file, H5FD_mem_t type, size_t from, size_t to)
 {
@@ -444,11 +476,17 @@ static bool write_extents(OrderedFile *file, haddr_t page)
 bool ordered_file_commit(OrderedFile *file)
 {
     haddr_t page;
-    if (file->fault || !all_fits(file, &page))
+    if (file->fault)
         return false;
     watch(false);
-    bool good = grow(file->descriptor, file->end, file->ahead) && write_end(file) && write_words(file, H5FD_MEM_BTREE, WORD, SIZE_MAX) &&
-                write_words(file, H5FD_MEM_BTREE, 0, WORD) && write_extents(file, page);
+    if (!grow(file->descriptor, file->end, 2 * file->ahead))
+        return false;
+    state_end_ahead(file);
+    if (!all_fits(file, &page))
+        return false;
+    watch(false);
+    bool good = write_end(file) && write_words(file, H5FD_MEM_BTREE, WORD, SIZE_MAX) && write_words(file, H5FD_MEM_BTREE, 0, WORD) &&
+                write_extents(file, page);
     for (int i = 0; good && i < file->block_count; i++)
         file->block[i].dirty = false;
     watch(true);

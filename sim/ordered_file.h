@@ -13,8 +13,9 @@
 //            key, whose leading index is above c's; that index is written before the lesser ones, so key n is above chunk c throughout.
 //   3 counts the nodes' leading words, n becomes n+1 (…): the slots are there. The new chunks hold rows beyond the stated extents only.
 //   4 extents of all datasets at once: the object headers that change lie within one page, so that this is one write.
-// A reader that opens the file meanwhile first asks for its length, then for the superblock's end, and refuses an end beyond that length. So
-// the file is kept longer than the end by what is allocated next: an end is published a chunk's time after the length that covers it.
+// A reader that opens the file meanwhile asks for its length, then for the superblock's end (refused where it is beyond that length), then for
+// chunks (refused where they are beyond that end). So the end is stated, and the length is, a chunk of every dataset or more ahead: a reader
+// may be a chunk's time late from one to the next. A slower one opens the file again. Closing states the true end, then cuts the file there.
 // A word is 8 bytes at an address that is a multiple of 8, a page 4096 bytes. SIGKILL ends a write to a file between pages only (the kernel
 // copies what lies within a page in one piece), so each of these writes is done whole or not at all. A loss of power is not covered.
 // A commit first compares what it is to write with these rules and refuses whatever does not fit (a node that splits, any other structure):
@@ -34,7 +35,8 @@ hid_t ordered_file_create(const char *path, hid_t creation, hid_t access);
 OrderedFile *ordered_file_of(hid_t file);
 // What is allocated next starts a page: the object headers of all datasets that are to grow, made right after.
 void ordered_file_start_page(OrderedFile *file);
-// After an H5Fflush(). `index_entries`: of a chunk index' node, twice H5Pset_istore_k()'s value. `ahead`: one more chunk of every dataset.
+// After an H5Fflush(). `index_entries`: of a chunk index' node, twice H5Pset_istore_k()'s value. `ahead`: bytes that may be allocated
+// between a reader's first look and its last.
 bool ordered_file_seal(OrderedFile *file, int index_entries, hsize_t ahead);
 // After an H5Fflush().
 bool ordered_file_commit(OrderedFile *file);

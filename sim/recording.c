@@ -299,7 +299,7 @@ static bool flush(Recording *recording)
         return false;
     if (recording->named)
         return ordered_file_commit(recording->ordered);
-    hsize_t ahead = chunk_bytes(&recording->steps) + chunk_bytes(&recording->frames);
+    hsize_t ahead = 2 * (chunk_bytes(&recording->steps) + chunk_bytes(&recording->frames));
     if (!ordered_file_seal(recording->ordered, 2 * recording->half_rank, ahead) || rename(recording->part, recording->path) != 0)
         return false;
     recording->named = true;
