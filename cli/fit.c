@@ -247,6 +247,9 @@ static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seco
     if (command->picture)
         output_check_file(command->picture, faults);
     VesselTree *tree = tree_file_load(command->tree, info, faults), *model = NULL;
+    if (tree && tree->point_count < 4)
+        faults_add(faults, command->tree, 0, 0, "has %d nodes and %lld points; at least 4 points on the wall are needed", tree->node_count,
+                   (long long)tree->point_count);
     if (tree && faults->count == 0) {
         if (!command->has_voxel) {
             double said = tree_file_number(info, "voxel_mm", command->options.voxel_mm);
