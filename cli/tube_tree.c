@@ -109,9 +109,13 @@ VesselTree *tube_tree(const Vessel *tube, const TubeOptions *options, const char
     }
     for (int i = 0; i < axis.count; i++)
         sample_node(tree, tube, options, i);
-    vessel_tree_link(tree);
     free(axis.point);
-    if (!vessel_tree_validate(tree, file, faults)) {
+    bool good = vessel_tree_validate(tree, file, faults);
+    if (good && !vessel_tree_link(tree)) {
+        faults_add(faults, file, 0, 0, "no memory for the tube's tree");
+        good = false;
+    }
+    if (!good) {
         vessel_tree_free(tree);
         return NULL;
     }

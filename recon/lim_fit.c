@@ -469,7 +469,10 @@ static VesselTree *assemble(const VesselTree *tree, const NodeModel *model, doub
         out->blob_offset[i + 1] = at + model[i].count;
         out->error[i] = model[i].error;
     }
-    vessel_tree_link(out);
+    if (!vessel_tree_link(out)) {
+        vessel_tree_free(out);
+        return NULL;
+    }
     return out;
 }
 

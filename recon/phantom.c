@@ -737,12 +737,11 @@ VesselTree *shape_sample(const Shape *shape, Faults *faults)
         }
     }
     free(at);
-    if (!tree || s.failed) {
+    if (!tree || s.failed || !vessel_tree_link(tree)) {
         faults_add(faults, shape->name, 0, 0, "not enough memory for %d nodes", nodes);
         vessel_tree_free(tree);
         return NULL;
     }
-    vessel_tree_link(tree);
     return tree;
 }
 

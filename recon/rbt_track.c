@@ -1031,7 +1031,10 @@ static VesselTree *finish_tree(const Track *track)
         used += n->point_count;
     }
     tree->point_offset[track->count] = used;
-    vessel_tree_link(tree);
+    if (!vessel_tree_link(tree)) {
+        vessel_tree_free(tree);
+        return NULL;
+    }
     return tree;
 }
 

@@ -272,8 +272,9 @@ static VesselTree *read_tree(const Reader *reader, TreeFileInfo *info)
     for (int i = 0; i < used; i++)
         good = read_column(reader, &found[target[i].column], target[i].type, target[i].out) && good;
     if (good && vessel_tree_validate(tree, reader->name, reader->faults)) {
-        vessel_tree_link(tree);
-        return tree;
+        if (vessel_tree_link(tree))
+            return tree;
+        faults_add(reader->faults, reader->name, 0, 0, "no memory for %d linked nodes; free some", tree->node_count);
     }
     vessel_tree_free(tree);
     return NULL;

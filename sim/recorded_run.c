@@ -1,5 +1,5 @@
 // Reading a recording back. Every dataset's type, rank and extent is checked before memory is taken; rows that one dataset has
-// more than another (a run killed in the middle of a flush) are left out.
+// more than another (a file still being written) are left out.
 #include "sim/recording.h"
 
 #include <hdf5.h>

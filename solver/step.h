@@ -50,7 +50,7 @@ typedef struct StepperOptions {
     double wall_friction;
     ContactOptions contact;
     double dt;                   // [ms], default 1
-    int newton_max;              // linearisations of a step at most; 0: the default, 4
+    int newton_max;              // linearisations of a step at most, twice as many where a snap overshoots the wall; 0: the default, 4
 } StepperOptions;
 
 // NULL with a message in `why` (capacity >= 256) where an option is out of range.
