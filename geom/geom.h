@@ -8,6 +8,7 @@
 #include "geom/isosurface.h"
 #include "geom/linear.h"
 #include "geom/power_walk.h"
+#include "geom/simd.h"
 #include "geom/vessel.h"
 #include "geom/vessel_tree.h"
 

@@ -7,7 +7,7 @@
 
 const char *const stage_name[STAGE_COUNT] = {"feed", "detect", "assemble", "factor", "contact", "correct"};
 const char *const step_flag_name[STEP_FLAG_COUNT] = {"diverged",        "not_converged", "deep",            "fully_inserted",
-                                                     "fully_withdrawn", "out_of_vessel", "detection_unsure"};
+                                                     "fully_withdrawn", "out_of_vessel", "detection_unsure", "limited"};
 
 struct Simulator {
     const Scene *scene;

@@ -57,7 +57,7 @@ uint64_t simulator_hash(const Simulator *simulator);
 double simulator_fastest_mm_s(const Simulator *simulator);        // the fastest node's speed, or the surface's where the tool turns
 
 // Names of STEP_ flags, for files: "diverged", "not_converged", … ; index 0 to STEP_FLAG_COUNT - 1 is the bit.
-enum { STEP_FLAG_COUNT = 7 };
+enum { STEP_FLAG_COUNT = 8 };
 extern const char *const step_flag_name[STEP_FLAG_COUNT];
 
 #endif

@@ -1,7 +1,8 @@
 // Contact candidates of one step: Signorini and Coulomb on gaps linearised at the start of the step, x_n.
 //
-// A candidate sits on the tool's axis, at node `node` or between nodes `node` and `node`+1 (weights 1-xi, xi). Its displacement in the step is
-//   d = (1-xi) (u_i + theta_i x a) + xi (u_j + theta_j x a),  a = -tool_radius * normal (the touching point relative to the axis).
+// A candidate sits on the tool's axis, at node `node` or between nodes `node` and `node`+1 (weights w_i = 1-xi, w_j = xi of the caller's shape
+// functions, so xi need not be a fraction of the length). Its displacement in the step is
+//   d = sum over i, j of w u + theta x (lever + w a),  a = -tool_radius * normal (the touching point relative to the axis).
 // Signorini:  0 <= gap + normal . d   perpendicular to   force_n >= 0.
 // Coulomb:    |force_t| <= friction * force_n, opposite to the tangential part of d where there is slip.
 // Forces in N act on the tool; `force` is the whole vector in space and is kept per material point from step to step as warm start.
@@ -13,6 +14,7 @@
 typedef struct ContactPoint {
     int node;
     double xi;               // [0, 1); 0: at the node, the usual case
+    Vec3 lever[2];           // [mm] how the axis at a point between nodes follows the turns of its two nodes (a cubic's slopes); 0 at a node
     Vec3 normal;             // unit, into the lumen
     double gap;              // [mm] at x_n, tool radius already taken off
     Sym3 hessian;            // of the gap [1/mm]; -force_n times it, clamped to its positive semi-definite tangential part, is stiffness
