@@ -21,7 +21,7 @@ SimdLevel simd_widest(void)
 void simd_force(SimdLevel level)
 {
     SimdLevel widest = simd_widest();
-    forced = level < widest ? level : widest;
+    forced = (int)(level < widest ? level : widest);
 }
 
 SimdLevel simd_level(void)
