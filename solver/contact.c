@@ -2,7 +2,8 @@
 //
 // Over a step the normal turns by H d (H the Hessian of the gap), so a contact force_n n does the work of a spring -force_n H. Its positive part
 // in the tangent plane goes into the matrix, or the tip oscillates; the negative part (a convex wall) would make the matrix indefinite and is left
-// to the next step's normal. The gap is a function of the axis' place alone: no lever arm here.
+// to the next step's normal. The gap is a function of the axis' place alone: no arm to the touching point here, but between nodes the axis
+// follows their turns with its levers.
 #include "solver/contact.h"
 
 #include "solver/block_chain.h"
@@ -49,12 +50,31 @@ unsigned contact_free_dofs(const BlockChain *chain, int node)
     return mask;
 }
 
-static void add_block(double *block, double k[3][3], double scale, unsigned rows, unsigned columns)
+static void add_block(double *block, double k[3][3], unsigned mask)
 {
     for (int r = 0; r < 3; r++)
         for (int c = 0; c < 3; c++)
+            if (mask >> r & mask >> c & 1)
+                block[6 * r + c] += k[r][c];
+}
+
+// block += (w I, -[l]x)^T K (v I, -[m]x)
+static void add_levered(double *block, double k[3][3], double w, Vec3 l, unsigned rows, double v, Vec3 m, unsigned columns)
+{
+    Mat3 left = mat3_skew(vec3_negate(l)), right = mat3_skew(vec3_negate(m));
+    double a[3][6], b[3][6], kb[3][6];
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++) {
+            a[r][c] = r == c ? w : 0, a[r][c + 3] = left.m[r][c];
+            b[r][c] = r == c ? v : 0, b[r][c + 3] = right.m[r][c];
+        }
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 6; c++)
+            kb[r][c] = k[r][0] * b[0][c] + k[r][1] * b[1][c] + k[r][2] * b[2][c];
+    for (int r = 0; r < 6; r++)
+        for (int c = 0; c < 6; c++)
             if (rows >> r & columns >> c & 1)
-                block[6 * r + c] += scale * k[r][c];
+                block[6 * r + c] += a[0][r] * kb[0][c] + a[1][r] * kb[1][c] + a[2][r] * kb[2][c];
 }
 
 void contact_add_curvature(const ContactSet *set, BlockChain *chain)
@@ -75,12 +95,15 @@ void contact_add_curvature(const ContactSet *set, BlockChain *chain)
             for (int c = 0; c < 3; c++)
                 k[r][c] = xx * a[r] * a[c] + xy * (a[r] * b[c] + b[r] * a[c]) + yy * b[r] * b[c];
         unsigned here = contact_free_dofs(chain, p->node);
-        double near = 1 - p->xi;
-        add_block(chain->diag + 36 * (size_t)p->node, k, near * near, here, here);
-        if (p->xi > 0 && p->node + 1 < chain->count) {
-            unsigned next = contact_free_dofs(chain, p->node + 1);
-            add_block(chain->diag + 36 * (size_t)(p->node + 1), k, p->xi * p->xi, next, next);
-            add_block(chain->lower + 36 * (size_t)p->node, k, near * p->xi, next, here);
+        double *diag = chain->diag + 36 * (size_t)p->node;
+        if (p->xi <= 0 || p->node + 1 >= chain->count) {
+            add_block(diag, k, here);
+            continue;
         }
+        unsigned next = contact_free_dofs(chain, p->node + 1);
+        double near = 1 - p->xi, far = p->xi;
+        add_levered(diag, k, near, p->lever[0], here, near, p->lever[0], here);
+        add_levered(diag + 36, k, far, p->lever[1], next, far, p->lever[1], next);
+        add_levered(chain->lower + 36 * (size_t)p->node, k, far, p->lever[1], next, near, p->lever[0], here);
     }
 }

@@ -138,33 +138,36 @@ static void write_law(const ContactRow *c, Vec3 motion, bool keep_matrix, Contac
         law->c = law_matrix(n, kn, oblique, across, p);
 }
 
-// The matrix += J^T C J with J = w [I, R], R = radius [n]x; blocks by columns.
+// block += (w I, R)^T K (v I, Q), by columns, where rows and columns are free.
+static void add_coupling(const Mat3 *k, double w, const Mat3 *r, unsigned rows, double v, const Mat3 *q, unsigned columns, double *block)
+{
+    Mat3 rt = mat3_transpose(r), kq = mat3_mul(k, q), rk = mat3_mul(&rt, k), rkq = mat3_mul(&rt, &kq);
+    double j[6][6]; // [column][row]
+    for (int a = 0; a < 3; a++)
+        for (int b = 0; b < 3; b++) {
+            j[b][a] = w * v * k->m[a][b];
+            j[b + 3][a] = w * kq.m[a][b];
+            j[b][a + 3] = v * rk.m[a][b];
+            j[b + 3][a + 3] = rkq.m[a][b];
+        }
+    bool all = (rows & columns) == 63;
+    for (int b = 0; b < 6; b++)
+        for (int a = 0; a < 6; a++)
+            block[6 * b + a] += all || (rows >> a & columns >> b & 1) ? j[b][a] : 0;
+}
+
+// The matrix += J^T C J with J = (w I, R) for each node, R = -[arm]x.
 static void add_law(const ContactRow *c, const Mat3 *k, ContactSolver *s)
 {
-    Mat3 r = mat3_skew(vec3_scale(c->normal, c->radius)), rt = mat3_transpose(&r);
-    Mat3 kr = mat3_mul(k, &r), rk = mat3_mul(&rt, k), rkr = mat3_mul(&rt, &kr);
-    double j[6][6]; // transposed
-    for (int p = 0; p < 3; p++)
-        for (int q = 0; q < 3; q++) {
-            j[q][p] = k->m[p][q];
-            j[q + 3][p] = kr.m[p][q];
-            j[q][p + 3] = rk.m[p][q];
-            j[q + 3][p + 3] = rkr.m[p][q];
-        }
+    Mat3 r[2];
     for (int e = 0; e < c->nodes; e++) {
-        double *d = s->matrix.diag + 36 * (size_t)(c->node + e), w = c->weight[e] * c->weight[e];
-        for (int q = 0; q < 6; q++)
-            for (int p = 0; p < 6; p++)
-                d[6 * q + p] += c->mask[e] == 63 || (c->mask[e] >> p & c->mask[e] >> q & 1) ? w * j[q][p] : 0;
+        r[e] = mat3_skew(contact_row_negative_arm(c, e));
+        add_coupling(k, c->weight[e], &r[e], c->mask[e], c->weight[e], &r[e], c->mask[e], s->matrix.diag + 36 * (size_t)(c->node + e));
     }
     if (c->nodes < 2)
         return;
-    double w = c->weight[0] * c->weight[1], *lower = s->turned + 36 * (size_t)c->node, *upper = s->matrix.lower + 36 * (size_t)c->node;
-    for (int q = 0; q < 6; q++)
-        for (int p = 0; p < 6; p++) {
-            lower[6 * q + p] += c->mask[1] >> p & c->mask[0] >> q & 1 ? w * j[q][p] : 0; // row of node+1, column of node
-            upper[6 * q + p] += c->mask[0] >> p & c->mask[1] >> q & 1 ? w * j[q][p] : 0;
-        }
+    add_coupling(k, c->weight[1], &r[1], c->mask[1], c->weight[0], &r[0], c->mask[0], s->turned + 36 * (size_t)c->node);
+    add_coupling(k, c->weight[0], &r[0], c->mask[0], c->weight[1], &r[1], c->mask[1], s->matrix.lower + 36 * (size_t)c->node);
 }
 
 // The matrix of the present laws: only blocks that held or hold a contact differ from the chain's.

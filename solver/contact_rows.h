@@ -1,7 +1,8 @@
 // Internal to solver: contacts as the solvers use them, in the order of the chain.
 //
-//   d = J u = sum over its one or two nodes of w (u_i + theta_i x a),  a = -radius * normal
-// J^T f gives a node w f and w a x f; constrained degrees of freedom (`mask`, unit rows) get nothing, but move the contact.
+//   d = J u = sum over its one or two nodes of w u_i + theta_i x (lever_i + w a),  a = -radius * normal
+// J^T f gives a node w f and (lever + w a) x f; constrained degrees of freedom (`mask`, unit rows) get nothing, but move the contact.
+// At a node w = 1 and there is no lever.
 #ifndef SELDINGER_SOLVER_CONTACT_ROWS_H
 #define SELDINGER_SOLVER_CONTACT_ROWS_H
 
@@ -14,6 +15,7 @@ typedef struct ContactRow {
     int node, point;             // point: its place in the caller's set
     int nodes;                   // 1, or 2 where xi > 0
     double weight[2];
+    Vec3 lever[2];               // looked at only where there are two nodes
     unsigned mask[2];            // free degrees of freedom
     bool inert;                  // the node cannot yield along the normal: no force
     Vec3 normal;
@@ -25,13 +27,22 @@ typedef struct ContactRow {
 // Sorted by node, then xi (insertion sort: the caller's set comes nearly in order). Returns their number.
 int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow *row);
 
+// Minus the arm at which node e's turn moves the contact: its motion is w u + negative_arm x theta.
+static inline Vec3 contact_row_negative_arm(const ContactRow *c, int e)
+{
+    Vec3 arm = vec3_scale(c->normal, c->weight[e] * c->radius);
+    return c->nodes == 1 ? arm : vec3_sub(arm, c->lever[e]);
+}
+
 static inline Vec3 contact_row_motion(const ContactRow *c, const double *u)
 {
+    const double *v = u + 6 * (size_t)c->node;
+    if (c->nodes == 1)
+        return vec3_add_scaled(vec3(v[0], v[1], v[2]), c->radius, vec3_cross(c->normal, vec3(v[3], v[4], v[5])));
     Vec3 d = {0, 0, 0};
-    for (int e = 0; e < c->nodes; e++) {
-        const double *v = u + 6 * (size_t)(c->node + e);
-        Vec3 lever = vec3_scale(vec3_cross(c->normal, vec3(v[3], v[4], v[5])), c->radius);
-        d = vec3_add_scaled(d, c->weight[e], vec3_add(vec3(v[0], v[1], v[2]), lever));
+    for (int e = 0; e < 2; e++, v += 6) {
+        d = vec3_add_scaled(d, c->weight[e], vec3(v[0], v[1], v[2]));
+        d = vec3_add(d, vec3_cross(contact_row_negative_arm(c, e), vec3(v[3], v[4], v[5])));
     }
     return d;
 }
@@ -39,16 +50,16 @@ static inline Vec3 contact_row_motion(const ContactRow *c, const double *u)
 // y += J^T f
 static inline void contact_row_push(const ContactRow *c, Vec3 f, double *y)
 {
-    Vec3 moment = vec3_scale(vec3_cross(f, c->normal), c->radius);
-    const double g[6] = {f.x, f.y, f.z, moment.x, moment.y, moment.z};
     for (int e = 0; e < c->nodes; e++) {
+        Vec3 moment = c->nodes == 1 ? vec3_scale(vec3_cross(f, c->normal), c->radius) : vec3_cross(f, contact_row_negative_arm(c, e));
+        const double w = c->weight[e], g[6] = {w * f.x, w * f.y, w * f.z, moment.x, moment.y, moment.z};
         double *v = y + 6 * (size_t)(c->node + e);
         if (c->mask[e] == 63)
             for (int k = 0; k < 6; k++)
-                v[k] += c->weight[e] * g[k];
+                v[k] += g[k];
         else
             for (int k = 0; k < 6; k++)
-                v[k] += c->mask[e] >> k & 1 ? c->weight[e] * g[k] : 0;
+                v[k] += c->mask[e] >> k & 1 ? g[k] : 0;
     }
 }
 

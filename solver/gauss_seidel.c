@@ -17,29 +17,45 @@ ContactOptions contact_default_options(void)
     return (ContactOptions){.form = CONTACT_BLOCK, .max_iterations = 200, .tolerance = 1e-6};
 }
 
+static Sym3 block_at(const double *d) { return (Sym3){d[0], d[6], d[12], d[7], d[13], d[14]}; }
+
+// The stiffness that a contact sees: its node's own, or of two nodes and their turns in series, each with its share.
+static void own_stiffness(const BlockChain *chain, ContactRow *c)
+{
+    double kn = 0, kt = 0, yields = 0, give_n = 0, give_t = 0;
+    Vec3 n = c->normal;
+    for (int e = 0; e < c->nodes; e++) {
+        const double *d = chain->diag + 36 * (size_t)(c->node + e), w = c->weight[e];
+        unsigned mask = c->mask[e] = contact_free_dofs(chain, c->node + e);
+        Sym3 k = block_at(d), turn = block_at(d + 21);
+        double normal = sym3_quadratic(&k, n), free = (mask & 1 ? n.x * n.x : 0) + (mask & 2 ? n.y * n.y : 0) + (mask & 4 ? n.z * n.z : 0);
+        yields += w * w * free;
+        kn += normal;
+        kt += (sym3_trace(&k) - normal) / 2;
+        double levered = mask >> 3 == 7 ? 3 * vec3_norm2(c->lever[e]) / sym3_trace(&turn) : 0;
+        give_n += w * w * free / normal + levered;
+        give_t += w * w * 2 / (sym3_trace(&k) - normal) + levered;
+    }
+    c->stiffness_n = c->nodes == 1 ? kn : 1 / give_n;
+    c->stiffness_t = c->nodes == 1 ? kt : 1 / give_t;
+    c->inert = !(yields > 1e-8) || !isfinite(c->gap) || !vec3_is_finite(n);
+}
+
 int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow *row)
 {
     for (int i = 0; i < set->count; i++) {
         const ContactPoint *p = &set->point[i];
-        ContactRow c = {.node = p->node, .point = i, .nodes = p->xi > 0 ? 2 : 1, .weight = {1 - p->xi, p->xi},
+        ContactRow c = {.node = p->node, .point = i, .nodes = p->xi > 0 && p->node + 1 < chain->count ? 2 : 1, .weight = {1, 0},
                         .normal = p->normal, .gap = p->gap, .radius = p->tool_radius, .friction = fmax(0, p->friction)};
-        double kn = 0, kt = 0, yields = 0;
-        Vec3 n = p->normal;
-        for (int e = 0; e < c.nodes; e++) {
-            const double *d = chain->diag + 36 * (size_t)(c.node + e);
-            unsigned mask = c.mask[e] = contact_free_dofs(chain, c.node + e);
-            Sym3 k = {d[0], d[6], d[12], d[7], d[13], d[14]};
-            double normal = sym3_quadratic(&k, n), w = c.weight[e];
-            yields += w * w * ((mask & 1 ? n.x * n.x : 0) + (mask & 2 ? n.y * n.y : 0) + (mask & 4 ? n.z * n.z : 0));
-            kn += w * w * normal;
-            kt += w * w * (sym3_trace(&k) - normal) / 2;
-        }
-        c.stiffness_n = kn;
-        c.stiffness_t = kt;
-        c.inert = !(yields > 1e-8) || !isfinite(c.gap) || !vec3_is_finite(n);
+        if (c.nodes == 2)
+            for (int e = 0; e < 2; e++) {
+                c.weight[e] = e ? p->xi : 1 - p->xi;
+                c.lever[e] = p->lever[e];
+            }
+        own_stiffness(chain, &c);
         if (c.inert)
             c.gap = HUGE_VAL;
-        c.force = c.inert || !vec3_is_finite(p->force) ? (Vec3){0, 0, 0} : contact_project(p->force, n, c.friction);
+        c.force = c.inert || !vec3_is_finite(p->force) ? (Vec3){0, 0, 0} : contact_project(p->force, p->normal, c.friction);
         int k = i;
         for (; k > 0 && (row[k - 1].node > c.node || (row[k - 1].node == c.node && row[k - 1].weight[1] > c.weight[1])); k--)
             row[k] = row[k - 1];

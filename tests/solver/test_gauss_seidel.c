@@ -42,7 +42,9 @@ static Vec3 displacement(const ContactPoint *p, const double *u)
     Vec3 a = vec3_scale(p->normal, -p->tool_radius), d = {0, 0, 0};
     for (int e = 0; e < (p->xi > 0 ? 2 : 1); e++) {
         const double *v = u + 6 * (p->node + e);
-        d = vec3_add_scaled(d, e ? p->xi : 1 - p->xi, vec3_add(vec3(v[0], v[1], v[2]), vec3_cross(vec3(v[3], v[4], v[5]), a)));
+        double w = e ? p->xi : 1 - p->xi;
+        Vec3 arm = vec3_add_scaled(p->xi > 0 ? p->lever[e] : vec3(0, 0, 0), w, a);
+        d = vec3_add(vec3_add_scaled(d, w, vec3(v[0], v[1], v[2])), vec3_cross(vec3(v[3], v[4], v[5]), arm));
     }
     return d;
 }
@@ -70,12 +72,15 @@ static Laws check_laws(const BlockChain *a, const double *b, const ContactSet *s
         r[i] -= b[i];
     for (int k = 0; k < set->count; k++) {
         const ContactPoint *p = &set->point[k];
-        Vec3 f = p->force, m = vec3_cross(vec3_scale(p->normal, -p->tool_radius), f);
-        const double g[6] = {f.x, f.y, f.z, m.x, m.y, m.z};
-        for (int e = 0; e < (p->xi > 0 ? 2 : 1); e++)
+        Vec3 f = p->force;
+        for (int e = 0; e < (p->xi > 0 ? 2 : 1); e++) {
+            double w = e ? p->xi : 1 - p->xi;
+            Vec3 arm = vec3_add_scaled(p->xi > 0 ? p->lever[e] : vec3(0, 0, 0), -w * p->tool_radius, p->normal), m = vec3_cross(arm, f);
+            const double g[6] = {w * f.x, w * f.y, w * f.z, m.x, m.y, m.z};
             for (int q = 0; q < 6; q++)
                 if (contact_free_dofs(a, p->node + e) >> q & 1)
-                    r[6 * (p->node + e) + q] -= (e ? p->xi : 1 - p->xi) * g[q];
+                    r[6 * (p->node + e) + q] -= g[q];
+        }
         laws.top = fmax(laws.top, vec3_norm(f));
     }
     for (size_t i = 0; i < n; i++)
@@ -208,6 +213,10 @@ static void problem_randomise(Problem *p, double young, double length, double fr
                                          .gap = 0.005 * uniform() + offset,
                                          .friction = friction,
                                          .tool_radius = 0.18};
+        ContactPoint *at = &p->set.point[n];
+        double x = at->xi; // of a cubic through both nodes
+        at->lever[0] = vec3_scale(t, length * x * (1 - x) * (1 - x));
+        at->lever[1] = vec3_scale(t, -length * x * x * (1 - x));
     }
 }
 
@@ -499,6 +508,87 @@ static void wire_in_tubes(void **state)
     }
 }
 
+// Contacts between nodes with levers of any direction: both forms reach the same forces, under which the laws hold.
+static void levers(void **state)
+{
+    (void)state;
+    for (int trial = 0; trial < 40; trial++) {
+        enum { K = 12 };
+        Problem p;
+        problem_create(&p, 31, K);
+        double friction = trial % 3 ? 0.3 : 0;
+        problem_randomise(&p, trial % 2 ? 80000 : 500, 1.5, friction, -0.002);
+        for (int i = 0; i < K; i++) {
+            ContactPoint *c = &p.set.point[i];
+            c->xi = i % 4 ? 0.1 + 0.8 * fabs(uniform()) : 0;
+            for (int e = 0; e < 2; e++)
+                c->lever[e] = vec3_add_scaled(c->lever[e], 0.1, random_unit());
+        }
+        ContactPoint block[K];
+        ContactReport a = problem_solve(&p, CONTACT_BLOCK, 200, 1e-9);
+        memcpy(block, p.set.point, sizeof block);
+        assert_true(a.converged);
+        assert_laws(&p, 1e-6, "levers, block");
+        for (int i = 0; i < K; i++)
+            p.set.point[i].force = vec3(0, 0, 0);
+        ContactReport b = problem_solve(&p, CONTACT_POINTWISE, 400000, 1e-9);
+        assert_true(b.converged);
+        assert_laws(&p, 1e-6, "levers, pointwise");
+        double top = 1e-3, apart = 0;
+        for (int i = 0; i < K; i++) {
+            top = fmax(top, vec3_norm(block[i].force));
+            apart = fmax(apart, vec3_distance(block[i].force, p.set.point[i].force));
+        }
+        if (!(apart <= 1e-6 * top))
+            print_message("trial %d: %.1e apart of %.1e, %d active; %d and %d iterations\n", trial, apart, top, a.active, a.iterations, b.iterations);
+        assert_true(apart <= 1e-6 * top);
+        problem_destroy(&p);
+    }
+}
+
+// The wall's curvature as the second derivative of its energy -f H(d, d)/2 with d the axis' motion: entry by entry from finite differences of
+// the motion that contact.h states (exact, for the energy is quadratic).
+static void curvature_follows_levers(void **state)
+{
+    (void)state;
+    for (int trial = 0; trial < 20; trial++) {
+        BlockChain chain;
+        assert_true(block_chain_create(&chain, 3));
+        for (int i = 0; i < 3; i++)
+            for (int k = 0; k < 6; k++)
+                chain.diag[36 * i + 7 * k] = 2;
+        for (int k = 0; k < 36; k++)
+            chain.lower[k] = chain.lower[36 + k] = 0.1; // no unit rows
+        ContactPoint c = {.node = 1, .xi = trial % 4 ? 0.1 + 0.8 * fabs(uniform()) : 0, .tool_radius = 0.3, .normal = random_unit()};
+        for (int e = 0; e < 2; e++)
+            c.lever[e] = vec3_scale(random_unit(), 0.5);
+        Vec3 e = vec3_normal_to(c.normal), f = vec3_cross(c.normal, e);
+        double along = -0.5 - fabs(uniform()), across = -0.2; // hollow: both eigenvalues of -H positive
+        c.hessian = (Sym3){along * e.x * e.x + across * f.x * f.x, along * e.x * e.y + across * f.x * f.y, along * e.x * e.z + across * f.x * f.z,
+                           along * e.y * e.y + across * f.y * f.y, along * e.y * e.z + across * f.y * f.z, along * e.z * e.z + across * f.z * f.z};
+        c.force = vec3_scale(c.normal, 3);
+        double before[2][36], lower[36];
+        memcpy(before, chain.diag + 36, sizeof before);
+        memcpy(lower, chain.lower + 36, sizeof lower);
+        contact_add_curvature(&(ContactSet){.count = 1, .capacity = 1, .point = &c}, &chain);
+        ContactPoint axis = c;
+        axis.tool_radius = 0;
+        for (int i = 0; i < 12; i++)
+            for (int j = 0; j < 12; j++) {
+                double u[18] = {0}, v[18] = {0};
+                u[6 + i] = v[6 + j] = 1;
+                double want = -3 * vec3_dot(displacement(&axis, u), sym3_mul_vec(&c.hessian, displacement(&axis, v))), got;
+                int a = i % 6, b = j % 6;
+                if (i / 6 == j / 6)
+                    got = chain.diag[36 + 36 * (i / 6) + 6 * a + b] - before[i / 6][6 * a + b];
+                else
+                    got = i > j ? chain.lower[36 + 6 * a + b] - lower[6 * a + b] : chain.lower[36 + 6 * b + a] - lower[6 * b + a];
+                assert_true(fabs(got - want) < 1e-13);
+            }
+        block_chain_destroy(&chain);
+    }
+}
+
 // A mirrored problem has the mirrored solution, to rounding; the same problem the same bits, whatever the work space solved before.
 static void mirrored_and_repeated(void **state)
 {
@@ -525,6 +615,10 @@ static void mirrored_and_repeated(void **state)
         for (int k = 0; k < contacts; k++) {
             Vec3 *n = &q.set.point[k].normal;
             *n = vec3(sign[0] * n->x, sign[1] * n->y, sign[2] * n->z);
+            for (int e = 0; e < 2; e++) {
+                Vec3 *l = &q.set.point[k].lever[e];
+                *l = vec3(sign[0] * l->x, sign[1] * l->y, sign[2] * l->z);
+            }
         }
         assert_true(block_chain_factor(&q.chain, q.factor));
         ContactPoint *start = malloc((size_t)contacts * sizeof *start), *first = malloc((size_t)contacts * sizeof *start);
@@ -607,6 +701,8 @@ int main(void)
         cmocka_unit_test(survives_random_problems),
         cmocka_unit_test(both_forms_agree),
         cmocka_unit_test(wire_in_tubes),
+        cmocka_unit_test(levers),
+        cmocka_unit_test(curvature_follows_levers),
         cmocka_unit_test(mirrored_and_repeated),
         cmocka_unit_test(held_nodes),
     };
