@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SHAPE_OPTIONS = 10, FIRST_SHAPE_OPTION = 400 };
+enum { SHAPE_OPTIONS = 11, FIRST_SHAPE_OPTION = 400 };
 
 typedef struct SynthCommand {
     const char *shape, *output, *measure, *json;
@@ -41,6 +41,7 @@ static const char help[] =
     "  --length-mm X        capsules: segment [mm]; default 4\n"
     "  --radius-mm X        capsules, arc, bifurcation: tube [mm]; default 1\n"
     "  --bend-radius-mm X   arc, bifurcation: centreline [mm]; default 4\n"
+    "  --rise-mm X          spiral: how far it winds out of its plane [mm]; default 0\n"
     "  --scale X            of the whole shape; default 1\n"
     "surface\n"
     "  --cell-mm X          grid of the triangles [mm]; default 0.25\n"
@@ -61,7 +62,7 @@ static int parse_options(int argc, char **argv, SynthCommand *command)
 {
     enum { MEASURE = 256, JSON, QUIET, CELL, VOXEL, PSF, NOISE };
     static const char *const keys[SHAPE_OPTIONS] = {"points",   "sac_points", "noise_mm",  "seed",           "spacing",
-                                                    "blend_mm", "length_mm",  "radius_mm", "bend_radius_mm", "scale"};
+                                                    "blend_mm", "length_mm",  "radius_mm", "bend_radius_mm", "scale",  "rise_mm"};
     static const struct option table[] = {{"output", required_argument, NULL, 'o'},
                                           {"measure", required_argument, NULL, MEASURE},
                                           {"json", required_argument, NULL, JSON},
@@ -80,6 +81,7 @@ static int parse_options(int argc, char **argv, SynthCommand *command)
                                           {"radius-mm", required_argument, NULL, FIRST_SHAPE_OPTION + 7},
                                           {"bend-radius-mm", required_argument, NULL, FIRST_SHAPE_OPTION + 8},
                                           {"scale", required_argument, NULL, FIRST_SHAPE_OPTION + 9},
+                                          {"rise-mm", required_argument, NULL, FIRST_SHAPE_OPTION + 10},
                                           {"help", no_argument, NULL, 'h'},
                                           {0}};
     *command = (SynthCommand){.cell_mm = 0.25, .voxel_mm = 0.2, .psf_mm = 0.2, .noise = 0.05, .seed = 1};

@@ -356,7 +356,7 @@ void shape_bounds(const Shape *shape, Vec3 *low, Vec3 *high)
 // --- The shapes ---
 
 typedef struct ShapeOptions {
-    double points, sac_points, noise_mm, seed, spacing, blend_mm, length_mm, radius_mm, bend_radius_mm, scale;
+    double points, sac_points, noise_mm, seed, spacing, blend_mm, length_mm, radius_mm, bend_radius_mm, rise_mm, scale;
 } ShapeOptions;
 
 static bool build_capsule(Shape *shape, const ShapeOptions *o, bool open)
@@ -398,19 +398,21 @@ static bool build_bifurcation(Shape *shape, const ShapeOptions *o)
     return true;
 }
 
-static bool build_spiral(Shape *shape)
+// Flat, or rising out of its plane at a nearly even slope: u grows with the length of the way but for 1 to 5 %.
+static bool build_spiral(Shape *shape, const ShapeOptions *o)
 {
     double knot[KNOTS][4], tangent[2][4];
     for (int i = 0; i < KNOTS; i++) {
         // knots crowd where the spiral winds tightly
         double u = (double)i / (KNOTS - 1), theta = PI * pow(4, u), polar = 15.75 / theta;
         double radius = 0.5 + (0.15 - 0.5) * (theta - PI) / (3 * PI);
-        memcpy(knot[i], (double[4]){polar * cos(theta), polar * sin(theta), 0, radius}, sizeof knot[i]);
+        memcpy(knot[i], (double[4]){polar * cos(theta), polar * sin(theta), u * o->rise_mm, radius}, sizeof knot[i]);
     }
     for (int end = 0; end < 2; end++) {
-        double theta = end ? 4 * PI : PI, polar = 15.75 / theta, along = polar * sqrt(1 + 1 / (theta * theta));   // ds / dtheta
+        double theta = end ? 4 * PI : PI, polar = 15.75 / theta, z = o->rise_mm / (theta * log(4));
+        double along = sqrt(polar * polar * (1 + 1 / (theta * theta)) + z * z);   // ds / dtheta
         double x = -polar / theta * cos(theta) - polar * sin(theta), y = -polar / theta * sin(theta) + polar * cos(theta);
-        memcpy(tangent[end], (double[4]){x / along, y / along, 0, (0.15 - 0.5) / (3 * PI) / along}, sizeof tangent[end]);
+        memcpy(tangent[end], (double[4]){x / along, y / along, z / along, (0.15 - 0.5) / (3 * PI) / along}, sizeof tangent[end]);
     }
     shape->part_count = 1;
     return part_build(&shape->part[0], (const double (*)[4])knot, KNOTS, true, false, -1, NODE_VESSEL, (const double (*)[4])tangent);
@@ -453,7 +455,7 @@ static bool parse_options(int count, const char (*option)[2][64], const char *fi
     } known[] = {{"points", &out->points, 8, 100000},         {"sac_points", &out->sac_points, 8, 100000}, {"noise_mm", &out->noise_mm, 0, 10},
                  {"seed", &out->seed, 0, 9007199254740992.0}, {"spacing", &out->spacing, 0.05, 4},          {"blend_mm", &out->blend_mm, 0, 3},
                  {"length_mm", &out->length_mm, 0.1, 1000},   {"radius_mm", &out->radius_mm, 0.05, 50},
-                 {"bend_radius_mm", &out->bend_radius_mm, 0.1, 1000}, {"scale", &out->scale, 0.01, 100}};
+                 {"bend_radius_mm", &out->bend_radius_mm, 0.1, 1000}, {"rise_mm", &out->rise_mm, 0, 100}, {"scale", &out->scale, 0.01, 100}};
     int before = faults->count;
     for (int i = 0; i < count; i++) {
         size_t k = 0, n = sizeof known / sizeof known[0];
@@ -462,7 +464,7 @@ static bool parse_options(int count, const char (*option)[2][64], const char *fi
         if (k == n) {
             faults_add(faults, file, 0, 0,
                        "a shape has no option '%s'; valid: points, sac_points, noise_mm, seed, spacing, blend_mm, length_mm, radius_mm, "
-                       "bend_radius_mm, scale",
+                       "bend_radius_mm, rise_mm, scale",
                        option[i][0]);
             continue;
         }
@@ -505,7 +507,7 @@ Shape *shape_create(const char *name, int option_count, const char (*option)[2][
                  : which == 1 ? build_capsule(shape, &o, true)
                  : which == 2 ? build_arc(shape, &o)
                  : which == 3 ? build_bifurcation(shape, &o)
-                 : which == 4 ? build_spiral(shape)
+                 : which == 4 ? build_spiral(shape, &o)
                               : build_phantom(shape);
     for (int p = 0; built && o.scale != 1 && p < shape->part_count; p++) {
         Part old = shape->part[p];

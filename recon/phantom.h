@@ -14,6 +14,7 @@
 //   blend_mm     width of the joints (0.6 times the smaller radius where 0)
 //   length_mm    capsule: segment (4)
 //   radius_mm    capsule, arc, bifurcation: tube (1); bend_radius_mm: arc, bifurcation (4)
+//   rise_mm      spiral: how far it winds out of its plane (0, the paper's)
 //   scale        the whole shape is scaled by it (1)
 #ifndef SELDINGER_RECON_PHANTOM_H
 #define SELDINGER_RECON_PHANTOM_H
