@@ -19,6 +19,7 @@ static const struct Verb {
     {"query", verb_query, "MODEL.h5 --points F.csv -o F.csv", "field, gradient and distance of a model at points"},
     {"export", verb_export, "FILE -o OUT", "surface, centreline or recording for other programs"},
     {"info", verb_info, "FILE", "what a file is and its figures"},
+    {"bench", verb_bench, "step|peer", "timing tables, each row measured in the same run"},
 };
 enum { VERB_COUNT = sizeof verbs / sizeof verbs[0] };
 

@@ -89,11 +89,16 @@ static void accumulate(Simulator *simulator)
     totals->steps++;
     totals->flags |= report->flags;
     totals->not_converged_steps += (report->flags & STEP_NOT_CONVERGED) != 0;
+    totals->further_linearisations += report->newton > 0;
+    totals->limited_steps += (report->flags & STEP_LIMITED) != 0;
     totals->contacts_max = report->active > totals->contacts_max ? report->active : totals->contacts_max;
     totals->penetration_max = fmax(totals->penetration_max, report->penetration);
     totals->residual_max = fmax(totals->residual_max, report->residual);
-    histogram_add(&simulator->profile.iterations, report->iterations);
-
+    StepProfile *profile = &simulator->profile;
+    histogram_add(&profile->iterations, report->iterations);
+    histogram_add(&profile->candidates, report->candidates);
+    histogram_add(&profile->contacts, report->active);
+    histogram_add(&profile->penetration_nm, (int64_t)fmin(report->penetration * 1e6, 1e12));
     measure_targets(simulator);
 }
 

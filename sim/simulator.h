@@ -12,11 +12,14 @@
 typedef enum { STAGE_FEED, STAGE_DETECT, STAGE_ASSEMBLE, STAGE_FACTOR, STAGE_CONTACT, STAGE_CORRECT, STAGE_COUNT } Stage;
 extern const char *const stage_name[STAGE_COUNT];
 
-// Thread CPU time [ns] of all steps so far.
+// Of all steps so far: thread CPU time [ns], counts, depths.
 typedef struct StepProfile {
     TimeHistogram step;
     TimeHistogram stage[STAGE_COUNT];
     TimeHistogram iterations;        // of the contact solve, a count
+    TimeHistogram candidates;        // points near enough to the wall to touch it
+    TimeHistogram contacts;          // with force
+    TimeHistogram penetration_nm;    // deepest node of the state at the step's start
 } StepProfile;
 
 // What happened over all steps so far.
@@ -24,6 +27,8 @@ typedef struct RunTotals {
     int64_t steps;
     unsigned flags;                  // every STEP_ flag that was seen
     int64_t not_converged_steps;
+    int64_t further_linearisations;  // steps that took a second Newton iteration or more
+    int64_t limited_steps;           // steps whose motion was cut; the next ones completed it
     int contacts_max;                // contacts with force
     double penetration_max;          // [mm]
     double residual_max;
@@ -56,7 +61,7 @@ Stepper *simulator_stepper(Simulator *simulator);                 // for save, r
 uint64_t simulator_hash(const Simulator *simulator);
 double simulator_fastest_mm_s(const Simulator *simulator);        // the fastest node's speed, or the surface's where the tool turns
 
-// Names of STEP_ flags, for files: "diverged", "not_converged", … ; index 0 to STEP_FLAG_COUNT - 1 is the bit.
+// Names of STEP_ flags, for files: "diverged", "not_converged", …, "limited"; index 0 to STEP_FLAG_COUNT - 1 is the bit.
 enum { STEP_FLAG_COUNT = 8 };
 extern const char *const step_flag_name[STEP_FLAG_COUNT];
 

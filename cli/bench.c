@@ -1,0 +1,127 @@
+// seldinger bench: the table of benchmarks, and how a run is measured.
+#include "cli/bench.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+static const char help[] =
+    "Usage: seldinger bench step|peer [options]\n\n"
+    "Timing tables, each row measured in the same run.\n\n"
+    "  step   a simulation step: spiral at 100 GPa, phantom, aneurism; growth with the elements; SIMD levels; budgets\n"
+    "  peer   the scenes on which SOFA with BeamAdapter was measured, beside its figures\n\n"
+    "`collision`, `fit` and `track` are not there yet. `seldinger bench NAME --help` explains the options.\n"
+    "Exit codes: 0 done; 1 a comparison failed; 2 wrong usage or bad input.\n";
+
+int verb_bench(int argc, char **argv)
+{
+    static const struct {
+        const char *name;
+        VerbFunction *call;
+    } table[] = {{"step", bench_step}, {"peer", bench_peer}, {"collision", NULL}, {"fit", NULL}, {"track", NULL}};
+    const char *name = argc > 1 ? argv[1] : "";
+    if (!strcmp(name, "--help") || !strcmp(name, "-h")) {
+        fputs(help, stdout);
+        return EXIT_DONE;
+    }
+    for (size_t i = 0; i < sizeof table / sizeof table[0]; i++) {
+        if (strcmp(name, table[i].name))
+            continue;
+        if (table[i].call)
+            return table[i].call(argc - 1, argv + 1);
+        fprintf(stderr, "seldinger bench: '%s' is not there yet; valid: step, peer\n", name);
+        return EXIT_BAD_INPUT;
+    }
+    fprintf(stderr, "seldinger bench: %s%s%s; valid: step, peer\n", *name ? "no table '" : "lacks the name of a table", name, *name ? "'" : "");
+    return EXIT_BAD_INPUT;
+}
+
+int64_t bench_cpu_ns(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
+}
+
+const char *bench_processor(void)
+{
+    static char name[128] = "unknown processor";
+    FILE *file = fopen("/proc/cpuinfo", "r");
+    char line[256];
+    while (file && fgets(line, sizeof line, file))
+        if (sscanf(line, "model name : %127[^\n]", name) == 1)
+            break;
+    if (file)
+        fclose(file);
+    return name;
+}
+
+Spread bench_spread(const TimeHistogram *histogram, double unit)
+{
+    return (Spread){histogram_quantile(histogram, 0.5) / unit, histogram_quantile(histogram, 0.99) / unit, histogram_quantile(histogram, 0.999) / unit,
+                    (double)histogram->largest / unit};
+}
+
+Command bench_command(const Scene *scene, int64_t step, int *cursor)
+{
+    return scene->script ? script_at(scene->script, (double)step * scene->dt / 1000, cursor) : (Command){0, 0};
+}
+
+int64_t bench_steps(const Scene *scene, int64_t most)
+{
+    int64_t steps = scene->script ? (int64_t)ceil(script_duration_s(scene->script) * 1000 / scene->dt - 1e-6) : 0;
+    return steps < most ? steps : most;
+}
+
+bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, StepFigures *figures, Faults *faults)
+{
+    *figures = (StepFigures){0};
+    Simulator *simulator = simulator_create(scene, vessel, faults);
+    if (!simulator)
+        return false;
+    int64_t steps = bench_steps(scene, most), begin = bench_cpu_ns();
+    int cursor = 0, busiest = -1;
+    for (int64_t i = 0; i < steps && !(simulator_last(simulator)->flags & STEP_DIVERGED); i++) {
+        simulator_step(simulator, bench_command(scene, i, &cursor));
+        if (simulator_last(simulator)->candidates > busiest) {
+            busiest = simulator_last(simulator)->candidates;
+            figures->busiest_step = i;
+        }
+    }
+    figures->cpu_s = (double)(bench_cpu_ns() - begin) * 1e-9;
+    const StepProfile *profile = simulator_profile(simulator);
+    const RunTotals *totals = simulator_totals(simulator);
+    figures->steps = totals->steps;
+    figures->simulated_s = simulator_time_s(simulator);
+    figures->step_us = bench_spread(&profile->step, 1000);
+    for (int k = 0; k < STAGE_COUNT; k++)
+        figures->stage_us[k] = bench_spread(&profile->stage[k], 1000);
+    figures->candidates = bench_spread(&profile->candidates, 1);
+    figures->contacts = bench_spread(&profile->contacts, 1);
+    figures->iterations = bench_spread(&profile->iterations, 1);
+    figures->penetration_um = bench_spread(&profile->penetration_nm, 1000);
+    figures->not_converged = totals->not_converged_steps;
+    figures->linearised_again = totals->further_linearisations;
+    figures->limited = totals->limited_steps;
+    figures->residual_max = totals->residual_max;
+    figures->flags = totals->flags;
+    figures->last = *simulator_last(simulator);
+    figures->inserted_mm = simulator_state(simulator)->inserted;
+    figures->hash = simulator_hash(simulator);
+    simulator_destroy(simulator);
+    return true;
+}
+
+bool bench_open(const char *path, int threads, BenchScene *out, Faults *faults)
+{
+    *out = (BenchScene){0};
+    out->scene = scene_load(path, faults);
+    return out->scene && open_vessel(out->scene, threads, true, &out->open, faults) && open_vessel_inlet(out->scene, &out->open, faults);
+}
+
+void bench_close(BenchScene *scene)
+{
+    open_vessel_close(&scene->open);
+    scene_free(scene->scene);
+    *scene = (BenchScene){0};
+}

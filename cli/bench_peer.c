@@ -1,0 +1,2 @@
+#include "cli/bench.h"
+int bench_peer(int argc, char **argv) { (void)argc; (void)argv; return EXIT_BAD_INPUT; }

@@ -1,0 +1,590 @@
+// seldinger bench step: what a simulation step costs, where, and how right it is.
+//
+//   scenes       the whole script of spiral, phantom and aneurism on the widest SIMD level: CPU time of the step and its stages, contacts, depth
+//   force error  every so many steps the step is taken again from its checkpoint with tolerance 1e-10; the error is the largest difference of a
+//                node's wall force, over the largest wall force of the step. Some are taken a third time by the pointwise form, to 1e-8
+//   growth       the spiral's wire in 50 to 800 elements
+//   levels       the same runs with each SIMD level forced: the state hash must not change
+//   kernels      assembly, factor and solve, detection alone, against the budgets (DESIGN.md section 7)
+#include "cli/bench.h"
+
+#include "cli/output.h"
+#include "geom/simd.h"
+#include "solver/block_chain.h"
+
+#include <cJSON.h>
+#include <getopt.h>
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { CASES = 3, GROWTHS = 5 };
+
+typedef struct Case {
+    const char *name, *path, *needs;     // `needs`: a file without which the case is skipped
+} Case;
+static const Case cases[CASES] = {{"spiral", "scenes/spiral/scene.yaml", NULL},
+                                  {"phantom", "scenes/phantom/scene.yaml", NULL},
+                                  {"aneurism", "scenes/aneurism/sac.yaml", "scenes/aneurism/aneurism.h5"}};
+static const int growth_elements[GROWTHS] = {50, 100, 200, 400, 800};
+
+typedef struct ForceError {
+    int samples, unresolved;             // steps with contact; those whose reference did not converge
+    double median, max;
+    int pointwise_samples;
+    double pointwise_max;                // tight block form against pointwise form
+} ForceError;
+
+typedef struct Kernels {                 // [us]
+    double assembly, factor_solve, detection;
+    int points;                          // of the detection
+} Kernels;
+
+typedef struct StepBench {
+    bool quick;
+    int threads;
+    const char *json;
+    int64_t most_steps;
+    bool present[CASES];
+    StepFigures run[SIMD_COUNT][CASES];
+    ForceError error[CASES];
+    StepFigures growth[GROWTHS];
+    Kernels kernels[SIMD_COUNT];
+    bool same_hash;
+} StepBench;
+
+static const char help[] =
+    "Usage: seldinger bench step [--quick] [--threads N] [--json F]\n\n"
+    "What a simulation step costs, where, and how right it is: spiral at 100 GPa, phantom and aneurism; 50 to 800 elements; each SIMD level.\n"
+    "Run it from the project's folder. Times are CPU times of the simulation's thread.\n\n"
+    "  --quick      300 steps of each scene, fewer samples\n"
+    "  --threads N  threads of offline work such as fitting the shapes; default 0: all cores\n"
+    "  --json F     the same figures as JSON; - is standard output, the tables then go to standard error\n\n"
+    "Exit codes: 0 done; 1 state hashes differ between SIMD levels or repetitions; 2 wrong usage or bad input.\n";
+
+// --- force error ---
+
+static int ascending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+// Largest difference of a node's force over the largest force of `exact`; -1 where nothing touches.
+static double force_difference(const NodeReport *node, const NodeReport *exact, int count)
+{
+    double top = 0, worst = 0;
+    for (int i = 0; i < count; i++) {
+        top = fmax(top, vec3_norm(exact[i].force));
+        worst = fmax(worst, vec3_distance(node[i].force, exact[i].force));
+    }
+    return top > 1e-6 ? worst / top : -1;
+}
+
+static void solve_again(Simulator *solver, const Checkpoint *start, Command command, NodeReport *node)
+{
+    stepper_restore(simulator_stepper(solver), start);
+    simulator_step(solver, command);
+    stepper_node_report(simulator_stepper(solver), node);
+}
+
+enum { RUN, TIGHT, POINTWISE, SOLVERS };
+
+static void compare_forces(Simulator *const solver[SOLVERS], const Scene *scene, int64_t steps, int64_t every, int pointwise_every, NodeReport *node,
+                           double *error, ForceError *out)
+{
+    int count = simulator_state(solver[RUN])->node_count, cursor = 0;
+    Checkpoint *start = NULL;
+    for (int64_t i = 0; i < steps; i++) {
+        Command command = bench_command(scene, i, &cursor);
+        if (i % every == 0)
+            start = stepper_save(simulator_stepper(solver[RUN]), start);
+        simulator_step(solver[RUN], command);
+        if (i % every != 0 || !start || simulator_last(solver[RUN])->active == 0)
+            continue;
+        stepper_node_report(simulator_stepper(solver[RUN]), node);
+        solve_again(solver[TIGHT], start, command, node + count);
+        if (simulator_last(solver[TIGHT])->flags & STEP_NOT_CONVERGED) {
+            out->unresolved++;
+            continue;
+        }
+        double e = force_difference(node, node + count, count);
+        if (e < 0)
+            continue;
+        error[out->samples++] = e;
+        if (out->samples % pointwise_every != 1)
+            continue;
+        solve_again(solver[POINTWISE], start, command, node);
+        if (!(simulator_last(solver[POINTWISE])->flags & STEP_NOT_CONVERGED)) {
+            out->pointwise_samples++;
+            out->pointwise_max = fmax(out->pointwise_max, force_difference(node, node + count, count));
+        }
+    }
+    checkpoint_free(start);
+}
+
+// Runs the script a second time; its hash must be that of the first.
+static bool force_error(const Scene *scene, const Vessel *vessel, int64_t steps, int samples, ForceError *out, uint64_t *hash, Faults *faults)
+{
+    Scene exact[SOLVERS] = {*scene, *scene, *scene};
+    exact[TIGHT].contact_options = (ContactOptions){.form = CONTACT_BLOCK, .max_iterations = 5000, .tolerance = 1e-10};
+    exact[POINTWISE].contact_options = (ContactOptions){.form = CONTACT_POINTWISE, .max_iterations = 100000, .tolerance = 1e-8};
+    Simulator *solver[SOLVERS] = {0};
+    bool good = true;
+    *out = (ForceError){0};
+    for (int k = 0; k < SOLVERS; k++)
+        good &= (solver[k] = simulator_create(&exact[k], vessel, faults)) != NULL;
+    NodeReport *node = good ? calloc((size_t)simulator_state(solver[RUN])->node_count * 2, sizeof *node) : NULL;
+    double *error = calloc((size_t)samples + 2, sizeof *error);
+    if (good && node && error) {
+        int64_t every = steps / samples > 0 ? steps / samples + (steps % samples != 0) : 1;
+        compare_forces(solver, scene, steps, every, samples / 8 + 1, node, error, out);
+        qsort(error, (size_t)out->samples, sizeof *error, ascending);
+        out->median = out->samples ? error[out->samples / 2] : 0;
+        out->max = out->samples ? error[out->samples - 1] : 0;
+        *hash = simulator_hash(solver[RUN]);
+    } else {
+        good = false;
+    }
+    free(error);
+    free(node);
+    for (int k = 0; k < SOLVERS; k++)
+        simulator_destroy(solver[k]);
+    return good;
+}
+
+// --- kernels ---
+
+enum { BATCH = 8, BATCHES = 201 };
+
+// Median time of a call [us], over batches, after one to warm up.
+static double time_of(void (*call)(void *context), void *context)
+{
+    double time[BATCHES];
+    for (int i = -1; i < BATCHES; i++) {
+        int64_t begin = bench_cpu_ns();
+        for (int k = 0; k < BATCH; k++)
+            call(context);
+        if (i >= 0)
+            time[i] = (double)(bench_cpu_ns() - begin) / 1000 / BATCH;
+    }
+    qsort(time, BATCHES, sizeof *time, ascending);
+    return time[BATCHES / 2];
+}
+
+static void call_assemble(void *context) { step_assemble(context); }
+
+// 200 elements, all of them free: a wire without sheath and vessel.
+static double time_assembly(const Scene *spiral, Faults *faults)
+{
+    Scene loose = *spiral;
+    loose.wire.has_sheath = false;
+    loose.wire.elements = 200;
+    Simulator *simulator = simulator_create(&loose, NULL, faults);
+    if (!simulator)
+        return 0;
+    Stepper *stepper = simulator_stepper(simulator);
+    step_feed(stepper, (StepCommand){0});
+    step_detect(stepper);
+    double time = time_of(call_assemble, stepper);
+    simulator_destroy(simulator);
+    return time;
+}
+
+typedef struct ChainSystem {
+    BlockChain chain;
+    BlockFactor *factor;
+    double *b, *x;
+} ChainSystem;
+
+static void call_factor_solve(void *context)
+{
+    ChainSystem *s = context;
+    block_chain_factor(&s->chain, s->factor);
+    block_factor_solve(s->factor, s->b, s->x);
+}
+
+// 201 blocks: the time does not depend on what they hold.
+static double time_factor_solve(void)
+{
+    enum { NODES = 201 };
+    ChainSystem s = {.factor = block_factor_create(NODES), .b = calloc(12 * NODES, sizeof(double))};
+    double time = 0;
+    if (block_chain_create(&s.chain, NODES) && s.factor && s.b) {
+        s.x = s.b + 6 * NODES;
+        for (int i = 0; i < NODES; i++)
+            for (int k = 0; k < 36; k++) {
+                s.chain.diag[36 * i + k] = k % 7 == 0 ? 4 : 0.1;
+                if (i + 1 < NODES)
+                    s.chain.lower[36 * i + k] = 0.2 - 0.01 * k;
+            }
+        for (int i = 0; i < 6 * NODES; i++)
+            s.b[i] = i % 5;
+        time = time_of(call_factor_solve, &s);
+    }
+    block_chain_destroy(&s.chain);
+    if (s.factor)
+        block_factor_destroy(s.factor);
+    free(s.b);
+    return time;
+}
+
+enum { POINTS = 80 };
+
+typedef struct Detection {
+    const Vessel *vessel;
+    int count;
+    double reach;
+    Vec3 point[2][POINTS];               // at two successive steps, taken in turn
+    VesselMemory memory[POINTS];
+    VesselHit hit[POINTS];
+    int turn;
+} Detection;
+
+static void call_query(void *context)
+{
+    Detection *d = context;
+    d->turn ^= 1;
+    vessel_query(d->vessel, d->count, d->point[d->turn], d->reach, d->memory, d->hit);
+}
+
+// The free nodes nearest to the wall at the step with the most candidates, along the wire; moved to and fro by that step's motion.
+static void time_detection(const Scene *scene, const Vessel *vessel, int64_t busiest, Kernels *kernels, Faults *faults)
+{
+    Simulator *simulator = simulator_create(scene, vessel, faults);
+    if (!simulator)
+        return;
+    int nodes = simulator_state(simulator)->node_count, cursor = 0;
+    NodeReport *node = calloc((size_t)nodes, sizeof *node);
+    Vec3 *before = calloc((size_t)nodes, sizeof *before);
+    double *gap = calloc((size_t)nodes, sizeof *gap);
+    Detection d = {.vessel = vessel, .reach = 0.5};
+    if (node && before && gap) {
+        for (int64_t i = 0; i <= busiest; i++) {
+            memcpy(before, simulator_state(simulator)->position, (size_t)nodes * sizeof *before);
+            simulator_step(simulator, bench_command(scene, i, &cursor));
+        }
+        stepper_node_report(simulator_stepper(simulator), node);
+        for (int i = 0; i < nodes; i++)
+            gap[i] = node[i].gap;
+        qsort(gap, (size_t)nodes, sizeof *gap, ascending);
+        double limit = fmin(gap[nodes < POINTS ? nodes - 1 : POINTS - 1], d.reach);
+        for (int i = 0; i < nodes && d.count < POINTS; i++)
+            if (node[i].gap <= limit && node[i].vessel_node >= 0) {
+                d.memory[d.count] = (VesselMemory){.node = node[i].vessel_node};
+                d.point[0][d.count] = before[i];
+                d.point[1][d.count++] = simulator_state(simulator)->position[i];
+            }
+        kernels->points = d.count;
+        kernels->detection = time_of(call_query, &d);
+    }
+    free(gap);
+    free(before);
+    free(node);
+    simulator_destroy(simulator);
+}
+
+// --- the runs ---
+
+static bool run_cases(StepBench *bench, SimdLevel level, SimdLevel widest, Faults *faults)
+{
+    simd_force(level);
+    for (int c = 0; c < CASES; c++) {
+        if (!bench->present[c])
+            continue;
+        BenchScene s;
+        StepFigures *run = &bench->run[level][c];
+        bool good = bench_open(cases[c].path, bench->threads, &s, faults) && bench_run(s.scene, s.open.vessel, bench->most_steps, run, faults);
+        if (good && c == 0) {
+            bench->kernels[level].assembly = time_assembly(s.scene, faults);
+            bench->kernels[level].factor_solve = time_factor_solve();
+            time_detection(s.scene, s.open.vessel, run->busiest_step, &bench->kernels[level], faults);
+        }
+        if (good && level == widest) {
+            uint64_t hash = 0;
+            good = force_error(s.scene, s.open.vessel, run->steps, bench->quick ? 30 : 200, &bench->error[c], &hash, faults);
+            bench->same_hash &= hash == run->hash;
+        }
+        for (int e = 0; good && c == 0 && level == widest && e < GROWTHS; e++) {
+            s.scene->wire.elements = growth_elements[e];
+            good = bench_run(s.scene, s.open.vessel, bench->most_steps, &bench->growth[e], faults);
+        }
+        bench_close(&s);
+        if (!good)
+            return false;
+        bench->same_hash &= run->hash == bench->run[widest][c].hash;
+    }
+    return true;
+}
+
+// --- text ---
+
+static void print_spread(FILE *out, const char *name, Spread s)
+{
+    fprintf(out, "    %-10s %9.1f %9.1f %9.1f %9.1f\n", name, s.median, s.p99, s.p999, s.max);
+}
+
+static void print_scene(FILE *out, const char *name, const StepFigures *run, const ForceError *error)
+{
+    fprintf(out, "\n%s: %" PRId64 " steps, %.2f times real time\n    CPU [us]      median       p99     p99.9       max\n", name, run->steps,
+            run->simulated_s / run->cpu_s);
+    print_spread(out, "step", run->step_us);
+    for (int k = 0; k < STAGE_COUNT; k++)
+        print_spread(out, stage_name[k], run->stage_us[k]);
+    fprintf(out, "  candidates %.0f median, %.0f max; contacts with force %.0f median, %.0f max; %.0f iterations median, %.0f max\n",
+            run->candidates.median, run->candidates.max, run->contacts.median, run->contacts.max, run->iterations.median, run->iterations.max);
+    fprintf(out, "  penetration %.2f um median, %.2f p99, %.2f max; %" PRId64 " steps not converged (residual at most %.1e), %" PRId64
+                 " linearised again, %" PRId64 " limited\n",
+            run->penetration_um.median, run->penetration_um.p99, run->penetration_um.max, run->not_converged, run->residual_max, run->linearised_again,
+            run->limited);
+    fprintf(out, "  force error %.1e median, %.1e max of %d steps (%d without reference); block against pointwise %.1e at most, of %d; hash %016" PRIx64 "\n",
+            error->median, error->max, error->samples, error->unresolved, error->pointwise_max, error->pointwise_samples, run->hash);
+}
+
+static void print_growth(FILE *out, const StepBench *bench)
+{
+    fprintf(out, "\ngrowth, spiral\n    elements  candidates   step [us]  per doubling       p99     p99.9  deepest [um]\n");
+    for (int e = 0; e < GROWTHS; e++) {
+        const StepFigures *g = &bench->growth[e];
+        char ratio[32] = "-";
+        if (e > 0)
+            snprintf(ratio, sizeof ratio, "%.2f", g->step_us.median / bench->growth[e - 1].step_us.median);
+        fprintf(out, "    %8d  %10.0f  %10.1f  %12s  %8.1f  %8.1f  %12.2f%s\n", growth_elements[e], g->candidates.max, g->step_us.median, ratio,
+                g->step_us.p99, g->step_us.p999, g->penetration_um.max, g->flags & STEP_DIVERGED ? "  DIVERGED" : "");
+    }
+}
+
+static void print_levels(FILE *out, const StepBench *bench, SimdLevel widest)
+{
+    fprintf(out, "\nSIMD levels            step median [us]   assembly   factor+solve   detection of %d points   state hash\n", bench->kernels[widest].points);
+    for (int level = SIMD_SSE2; level <= (int)widest; level++)
+        for (int c = 0; c < CASES; c++) {
+            const StepFigures *run = &bench->run[level][c];
+            const Kernels *k = &bench->kernels[level];
+            if (!bench->present[c])
+                continue;
+            fprintf(out, "    %-6s %-12s %16.1f", simd_name[level], cases[c].name, run->step_us.median);
+            if (c == 0)
+                fprintf(out, " %10.2f %14.2f %24.2f", k->assembly, k->factor_solve, k->detection);
+            else
+                fprintf(out, " %50s", "");
+            fprintf(out, "   %016" PRIx64 "%s\n", run->hash, run->hash == bench->run[widest][c].hash ? "" : "  DIFFERS");
+        }
+}
+
+// --- budgets ---
+
+typedef struct Budget {
+    const char *item;
+    double must, aim, measured;
+} Budget;
+
+enum { MOST_BUDGETS = 48 };
+
+static int list_budgets(const StepBench *bench, SimdLevel widest, Budget *list)
+{
+    static const char *const factors[SIMD_COUNT] = {"factor and solve, SSE2 [us]", "factor and solve, AVX2 [us]", "factor and solve, AVX-512 [us]"};
+    static const double factor_must[SIMD_COUNT] = {35, 20, 12}, factor_aim[SIMD_COUNT] = {25, 12, 8};
+    static const char *const names[CASES][7] = {
+        {"spiral: step, median [us]", "spiral: step, p99.9 [us]", "spiral: penetration, p50 [um]", "spiral: penetration, p99 [um]",
+         "spiral: penetration, max [um]", "spiral: force error, median", "spiral: force error, max"},
+        {"phantom: step, median [us]", "phantom: step, p99.9 [us]", "phantom: penetration, p50 [um]", "phantom: penetration, p99 [um]",
+         "phantom: penetration, max [um]", "phantom: force error, median", "phantom: force error, max"},
+        {"aneurism: step, median [us]", "aneurism: step, p99.9 [us]", "aneurism: penetration, p50 [um]", "aneurism: penetration, p99 [um]",
+         "aneurism: penetration, max [um]", "aneurism: force error, median", "aneurism: force error, max"}};
+    static const double must[7] = {300, 700, 2, 20, 200, 1e-3, 1e-3}, aim[7] = {100, 400, 1, 10, 50, 1e-6, 1e-6};
+    int count = 0;
+    list[count++] = (Budget){"detection of 80 points [us]", 5, 2.5, bench->kernels[widest].detection};
+    list[count++] = (Budget){"assembly of 200 elements [us]", 12, 6, bench->kernels[widest].assembly};
+    for (int level = SIMD_SSE2; level <= (int)widest; level++)
+        list[count++] = (Budget){factors[level], factor_must[level], factor_aim[level], bench->kernels[level].factor_solve};
+    for (int c = 0; c < CASES; c++) {
+        const StepFigures *run = &bench->run[widest][c];
+        const ForceError *error = &bench->error[c];
+        const double measured[7] = {run->step_us.median,       run->step_us.p999, run->penetration_um.median, run->penetration_um.p99,
+                                    run->penetration_um.max, error->median,     error->max};
+        for (int k = 0; bench->present[c] && k < 7; k++)
+            list[count++] = (Budget){names[c][k], must[k], aim[k], measured[k]};
+    }
+    double worst = 0;
+    for (int e = 1; e < GROWTHS; e++)
+        worst = fmax(worst, bench->growth[e].step_us.median / bench->growth[e - 1].step_us.median);
+    list[count++] = (Budget){"cost when nodes double, worst", 2.6, 2.1, worst};
+    return count;
+}
+
+static const char *verdict(const Budget *b) { return b->measured <= b->aim ? "aim" : b->measured <= b->must ? "must" : "MISSED"; }
+
+static void print_budgets(FILE *out, const StepBench *bench, SimdLevel widest)
+{
+    Budget list[MOST_BUDGETS];
+    int count = list_budgets(bench, widest, list);
+    fprintf(out, "\nbudgets                                    must        aim   measured\n");
+    for (int i = 0; i < count; i++)
+        fprintf(out, "    %-32s %10.3g %10.3g %10.3g  %s\n", list[i].item, list[i].must, list[i].aim, list[i].measured, verdict(&list[i]));
+}
+
+// --- JSON ---
+
+static void add_spread(cJSON *object, const char *name, Spread s)
+{
+    cJSON *at = cJSON_AddObjectToObject(object, name);
+    cJSON_AddNumberToObject(at, "median", s.median);
+    cJSON_AddNumberToObject(at, "p99", s.p99);
+    cJSON_AddNumberToObject(at, "p999", s.p999);
+    cJSON_AddNumberToObject(at, "max", s.max);
+}
+
+static cJSON *run_json(const StepFigures *run)
+{
+    cJSON *at = cJSON_CreateObject();
+    char hash[17];
+    snprintf(hash, sizeof hash, "%016" PRIx64, run->hash);
+    cJSON_AddNumberToObject(at, "steps", (double)run->steps);
+    cJSON_AddNumberToObject(at, "real_time_factor", run->simulated_s / run->cpu_s);
+    add_spread(at, "step_us", run->step_us);
+    cJSON *stages = cJSON_AddObjectToObject(at, "stage_us");
+    for (int k = 0; k < STAGE_COUNT; k++)
+        add_spread(stages, stage_name[k], run->stage_us[k]);
+    add_spread(at, "candidates", run->candidates);
+    add_spread(at, "contacts", run->contacts);
+    add_spread(at, "iterations", run->iterations);
+    add_spread(at, "penetration_um", run->penetration_um);
+    cJSON_AddNumberToObject(at, "not_converged_steps", (double)run->not_converged);
+    cJSON_AddNumberToObject(at, "linearised_again_steps", (double)run->linearised_again);
+    cJSON_AddNumberToObject(at, "limited_steps", (double)run->limited);
+    cJSON_AddNumberToObject(at, "residual_max", run->residual_max);
+    cJSON_AddStringToObject(at, "state_hash", hash);
+    return at;
+}
+
+static void add_levels(cJSON *list, const StepBench *bench, SimdLevel widest)
+{
+    for (int level = SIMD_SSE2; level <= (int)widest; level++) {
+        cJSON *at = cJSON_CreateObject();
+        const Kernels *k = &bench->kernels[level];
+        cJSON_AddStringToObject(at, "level", simd_name[level]);
+        cJSON_AddNumberToObject(at, "assembly_us", k->assembly);
+        cJSON_AddNumberToObject(at, "factor_solve_us", k->factor_solve);
+        cJSON_AddNumberToObject(at, "detection_us", k->detection);
+        cJSON_AddNumberToObject(at, "detection_points", k->points);
+        for (int c = 0; c < CASES; c++)
+            if (bench->present[c])
+                cJSON_AddItemToObject(at, cases[c].name, run_json(&bench->run[level][c]));
+        cJSON_AddItemToArray(list, at);
+    }
+}
+
+static bool write_json(const StepBench *bench, SimdLevel widest, Faults *faults)
+{
+    cJSON *root = cJSON_CreateObject(), *scenes = cJSON_AddArrayToObject(root, "scenes"), *at;
+    cJSON_AddStringToObject(root, "processor", bench_processor());
+    for (int c = 0; c < CASES; c++) {
+        if (!bench->present[c])
+            continue;
+        const ForceError *error = &bench->error[c];
+        cJSON_AddItemToArray(scenes, at = run_json(&bench->run[widest][c]));
+        cJSON_AddStringToObject(at, "name", cases[c].name);
+        cJSON_AddStringToObject(at, "level", simd_name[widest]);
+        cJSON *e = cJSON_AddObjectToObject(at, "force_error");
+        cJSON_AddNumberToObject(e, "median", error->median);
+        cJSON_AddNumberToObject(e, "max", error->max);
+        cJSON_AddNumberToObject(e, "samples", error->samples);
+        cJSON_AddNumberToObject(e, "without_reference", error->unresolved);
+        cJSON_AddNumberToObject(e, "pointwise_max", error->pointwise_max);
+        cJSON_AddNumberToObject(e, "pointwise_samples", error->pointwise_samples);
+    }
+    cJSON *growth = cJSON_AddArrayToObject(root, "growth");
+    for (int e = 0; e < GROWTHS; e++) {
+        cJSON_AddItemToArray(growth, at = run_json(&bench->growth[e]));
+        cJSON_AddNumberToObject(at, "elements", growth_elements[e]);
+    }
+    add_levels(cJSON_AddArrayToObject(root, "levels"), bench, widest);
+    cJSON_AddBoolToObject(root, "same_hash", bench->same_hash);
+    Budget list[MOST_BUDGETS];
+    int count = list_budgets(bench, widest, list);
+    cJSON *budgets = cJSON_AddArrayToObject(root, "budgets");
+    for (int i = 0; i < count; i++) {
+        cJSON_AddItemToArray(budgets, at = cJSON_CreateObject());
+        cJSON_AddStringToObject(at, "item", list[i].item);
+        cJSON_AddNumberToObject(at, "must", list[i].must);
+        cJSON_AddNumberToObject(at, "aim", list[i].aim);
+        cJSON_AddNumberToObject(at, "measured", list[i].measured);
+        cJSON_AddStringToObject(at, "verdict", verdict(&list[i]));
+    }
+    char *text = cJSON_Print(root);
+    bool good = text && output_write(bench->json, text, strlen(text), faults);
+    free(text);
+    cJSON_Delete(root);
+    return good;
+}
+
+// --- the verb ---
+
+static int parse_options(int argc, char **argv, StepBench *bench)
+{
+    static const struct option table[] = {{"json", required_argument, NULL, 'j'}, {"quick", no_argument, NULL, 'q'},
+                                          {"threads", required_argument, NULL, 't'}, {"help", no_argument, NULL, 'h'}, {0}};
+    double number;
+    optind = 1;
+    for (int choice; (choice = getopt_long(argc, argv, "h", table, NULL)) != -1;) {
+        switch (choice) {
+        case 'j': bench->json = optarg; break;
+        case 'q': bench->quick = true; break;
+        case 't':
+            if (!cli_number("--threads", optarg, 0, 256, &number))
+                return EXIT_BAD_INPUT;
+            bench->threads = (int)number;
+            break;
+        case 'h': fputs(help, stdout); return EXIT_DONE;
+        default: fprintf(stderr, "seldinger bench step: unknown option or lacking value; see --help\n"); return EXIT_BAD_INPUT;
+        }
+    }
+    if (optind < argc) {
+        fprintf(stderr, "seldinger bench step: takes no '%s'; see --help\n", argv[optind]);
+        return EXIT_BAD_INPUT;
+    }
+    bench->most_steps = bench->quick ? 300 : INT64_MAX;
+    return -1;
+}
+
+int bench_step(int argc, char **argv)
+{
+    static StepBench bench;
+    static Faults faults;
+    int code = parse_options(argc, argv, &bench);
+    if (code >= 0)
+        return code;
+    if (!output_check(bench.json, &faults))
+        return cli_bad_input(&faults);
+    FILE *out = bench.json && !strcmp(bench.json, "-") ? stderr : stdout;
+    SimdLevel widest = simd_level();
+    bench.same_hash = true;
+    fprintf(out, "%s, %s\n", bench_processor(), simd_name[widest]);
+    for (int c = 0; c < CASES; c++) {
+        bench.present[c] = !cases[c].needs || access(cases[c].needs, R_OK) == 0;
+        if (!bench.present[c])
+            fprintf(out, "%s: skipped, %s is not here\n", cases[c].name, cases[c].needs);
+    }
+    bool good = run_cases(&bench, widest, widest, &faults);
+    for (int c = 0; good && c < CASES; c++)
+        if (bench.present[c])
+            print_scene(out, cases[c].name, &bench.run[widest][c], &bench.error[c]);
+    if (good)
+        print_growth(out, &bench);
+    fflush(out);
+    for (int level = (int)widest - 1; good && level >= SIMD_SSE2; level--)
+        good = run_cases(&bench, (SimdLevel)level, widest, &faults);
+    simd_force(widest);
+    if (good) {
+        print_levels(out, &bench, widest);
+        print_budgets(out, &bench, widest);
+        if (!bench.same_hash)
+            fprintf(out, "\nSTATE HASHES DIFFER\n");
+        good = !bench.json || write_json(&bench, widest, &faults);
+    }
+    if (!good)
+        return cli_bad_input(&faults);
+    return bench.same_hash ? EXIT_DONE : EXIT_DIFFERENT;
+}
