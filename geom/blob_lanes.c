@@ -1,6 +1,7 @@
 // One kernel text, three compilations. See blob_lanes.h and foot_lanes.h for the layouts and why the bits agree, blobby.c for the equations.
 // Compiled with -fno-math-errno and -fno-trapping-math, which change no result, so that roots and selects vectorise.
 #include "geom/foot_lanes.h"
+#include "geom/simd.h"
 
 #include <string.h>
 
@@ -52,11 +53,9 @@ static const LaneKernels avx512 = {"avx512", gradient_avx512, hessian_avx512, ne
 
 const LaneKernels *lane_kernels(int isa)
 {
-    if ((isa == 0 || isa >= 3) && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
-        return &avx512;
-    if ((isa == 0 || isa >= 2) && __builtin_cpu_supports("avx2"))
-        return &avx2;
-    return &baseline;
+    static const LaneKernels *const of[SIMD_COUNT] = {&baseline, &avx2, &avx512};
+    int wanted = isa > 0 ? isa - 1 : (int)simd_level(), widest = (int)simd_widest();
+    return of[wanted < widest ? wanted : widest];
 }
 #else
 const LaneKernels *lane_kernels(int isa)

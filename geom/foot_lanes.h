@@ -150,7 +150,7 @@ typedef struct LaneKernels {
     void (*finish)(FootBatch *batch, int count);
     void (*estimate)(FootBatch *batch, int count, double iso_level);
 } LaneKernels;
-// isa: 0 the widest the CPU has, 1 SSE2, 2 AVX2, 3 AVX-512; the next narrower one where it is absent.
+// isa: 0 what simd_level() says, 1 SSE2, 2 AVX2, 3 AVX-512; the next narrower one where it is absent.
 const LaneKernels *lane_kernels(int isa);
 
 #endif

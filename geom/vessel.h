@@ -68,7 +68,7 @@ typedef enum {
 typedef struct LimVesselOptions {
     LimField field;
     int hops;                // moves to a better neighbour a point may make in one query, >= 1 (the paper's: 1)
-    int isa;                 // 0: the widest the CPU has; 1 SSE2, 2 AVX2, 3 AVX-512 (falls back where absent). All give the same bits
+    int isa;                 // 0: what simd_level() says; 1 SSE2, 2 AVX2, 3 AVX-512 (the widest there is, where absent). All give the same bits
 } LimVesselOptions;
 LimVesselOptions lim_vessel_default_options(void);
 Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *options);
