@@ -1,5 +1,6 @@
-// seldinger check: every scene that has a golden tool path (X.yaml with X.golden.csv beside it) is run headless and compared with it.
-#include "cli/cli.h"
+// seldinger check: every scene that has a golden tool path (X.yaml with X.golden.csv beside it) is run headless and compared with it;
+// every scene with a `verify:` key is measured against its references (check_verify.c).
+#include "cli/check_verify.h"
 
 #include "cli/output.h"
 #include "input/text_file.h"
@@ -16,15 +17,17 @@
 static const char help[] =
     "Usage: seldinger check PATH... [options]\n\n"
     "Runs every scene (X.yaml) below PATH that has a golden tool path (X.golden.csv) and compares point by point over time. The table names\n"
-    "each scene, its worst distance, and the first time, node and distance beyond the tolerance.\n\n"
+    "each scene, its worst distance, and the first time, node and distance beyond the tolerance.\n"
+    "Then every scene below PATH with the key `verify:` is measured against exact solutions, at several numbers of elements: case, reference,\n"
+    "result, error, tolerance, and the order in which the error falls. The key is described in scenes/verify/README.md.\n\n"
     "  --tolerance-mm X   largest distance [mm] between golden and run that passes; default 0.00001: other machines pass, one per cent\n"
     "                     of a parameter does not\n"
     "  --update           rewrites the goldens; a scene named itself gets one that had none\n"
     "  --duration-s S     with --update: simulated time [s] of the golden; default: the script's, else the old golden's, else 1\n"
-    "  --threads N        threads of offline work such as fitting a shape; default 0: all cores\n"
-    "  --quiet            only what differs\n\n"
+    "  --threads N        threads of fitting a shape and of verifying; default 0: all cores\n"
+    "  --quiet            only what differs or misses its tolerance\n\n"
     "Scenes whose vessel file is not there are skipped by name.\n"
-    "Exit codes: 0 all pass; 1 a path differs; 2 wrong usage or a scene or golden that cannot be read; 3 a run diverged.\n";
+    "Exit codes: 0 all pass; 1 a path differs or a tolerance is missed; 2 wrong usage or a scene or golden that cannot be read; 3 a run diverged.\n";
 
 typedef struct SceneList {
     int count, capacity;
@@ -89,7 +92,7 @@ static void find_scenes(const char *folder, int depth, SceneList *list)
         snprintf(path, room, "%s%s%s", folder, slash ? "" : "/", entry->d_name);
         if (lstat(path, &status) == 0 && S_ISDIR(status.st_mode))
             find_scenes(path, depth + 1, list);
-        else if ((ends_with(path, ".yaml") || ends_with(path, ".yml")) && has_golden(path))
+        else if ((ends_with(path, ".yaml") || ends_with(path, ".yml")) && (has_golden(path) || check_has_verify(path)))
             list_add(list, path);
         free(path);
     }
@@ -274,10 +277,10 @@ static bool gather(int argc, char **argv, const CheckOptions *options, SceneList
         else if (S_ISDIR(status.st_mode)) {
             find_scenes(argv[i], 0, list);
             qsort(list->path + before, (size_t)(list->count - before), sizeof *list->path, by_name);
-        } else if (options->update || has_golden(argv[i]))
+        } else if (options->update || has_golden(argv[i]) || check_has_verify(argv[i]))
             list_add(list, argv[i]);
         else
-            faults_add(faults, argv[i], 0, 0, "has no golden tool path beside it; `seldinger check --update` makes one");
+            faults_add(faults, argv[i], 0, 0, "has no golden tool path beside it and no key `verify:`; `seldinger check --update` makes a golden path");
     }
     return faults->count == 0;
 }
@@ -294,15 +297,24 @@ int verb_check(int argc, char **argv)
     gather(argc, argv, &options, &list, &faults);
     if (list.count == 0 && faults.count == 0) {
         // a check that checks nothing has not passed
-        fprintf(stderr, "seldinger check: no scene with a golden tool path below what was given; `--update` with a scene makes one\n");
+        fprintf(stderr, "seldinger check: no scene with a golden tool path or the key `verify:` below what was given; `--update` with a scene makes a path\n");
         worst = EXIT_BAD_INPUT;
     }
-    if (list.count > 0 && !options.quiet && !options.update)
-        printf("%-44s %-9s %12s  %9s %5s %12s\n", "scene", "", "worst mm", "first s", "node", "by mm");
+    bool headed = options.quiet || options.update;
     for (int i = 0; i < list.count; i++) {
+        // --update given a folder renews what is there; given a scene it makes one
+        if (!has_golden(list.path[i]) && check_has_verify(list.path[i]))
+            continue;
+        if (!headed)
+            printf("%-44s %-9s %12s  %9s %5s %12s\n", "scene", "", "worst mm", "first s", "node", "by mm");
+        headed = true;
         code = check_scene(list.path[i], &options, &faults);
         worst = code > worst ? code : worst;
         fflush(stdout);
+    }
+    if (!options.update) {
+        code = check_verify(list.count, list.path, options.threads, options.quiet, &faults);
+        worst = code > worst ? code : worst;
     }
     if (faults.count > 0)
         worst = cli_bad_input(&faults) > worst ? EXIT_BAD_INPUT : worst;

@@ -457,7 +457,7 @@ static void read_targets(Reading *reading, YamlValue value)
 
 static void read_scene(Reading *reading)
 {
-    static const char *const keys[] = {"seldinger", "vessel", "wire", "sheath", "rig", "simulation", "script", "targets", NULL};
+    static const char *const keys[] = {"seldinger", "vessel", "wire", "sheath", "rig", "simulation", "script", "targets", "verify", NULL};
     YamlValue root = yaml_root(reading->reader);
     YamlMap map = yaml_map(root, keys);
     int version;
@@ -477,6 +477,8 @@ static void read_scene(Reading *reading)
     read_script(reading, yaml_get(&map, "script", false));
     if (yaml_has(&map, "targets"))
         read_targets(reading, yaml_get(&map, "targets", false));
+    if (yaml_has(&map, "verify"))
+        verify_read(yaml_get(&map, "verify", false), reading->total_length, yaml_has(&map, "script"), &reading->scene->verify);
 }
 
 Scene *scene_parse(const char *text, size_t length, const char *path, Faults *faults)
@@ -535,6 +537,7 @@ void scene_free(Scene *scene)
     script_free(scene->script);
     free(scene->shape_option);
     free(scene->target);
+    free(scene->verify.cases);
     free(scene->model_path);
     free(scene->script_path);
     free(scene->text);

@@ -6,6 +6,7 @@
 
 #include "geom/geom.h"
 #include "input/input.h"
+#include "sim/verify.h"
 #include "solver/solver.h"
 
 typedef enum { SOURCE_MODEL, SOURCE_SHAPE, SOURCE_TUBE, SOURCE_PLANE, SOURCE_NONE } VesselSourceKind;
@@ -37,6 +38,7 @@ typedef struct Scene {
     char *script_path;       // NULL where inline or none
     int target_count;
     SceneTarget *target;
+    VerifyPlan verify;       // what `seldinger check` measures; case_count 0: nothing
 } Scene;
 
 // `text` need not be NUL-terminated; `path` is for messages and to resolve relative files. NULL with faults.

@@ -1,0 +1,12 @@
+// The verification table of `seldinger check`: scenes with the key `verify:`, each run with each of its numbers of elements.
+#ifndef SELDINGER_CLI_CHECK_VERIFY_H
+#define SELDINGER_CLI_CHECK_VERIFY_H
+
+#include "cli/cli.h"
+
+// Does the file's text hold the key, at the start of a line?
+bool check_has_verify(const char *path);
+// Runs those of the scenes that have it, on `threads` threads (0: all cores), and prints the table; with `quiet` only rows that fail. An exit code.
+int check_verify(int count, char *const *path, int threads, bool quiet, Faults *faults);
+
+#endif
