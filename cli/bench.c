@@ -80,12 +80,12 @@ bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, StepFigur
     if (!simulator)
         return false;
     int64_t steps = bench_steps(scene, most), begin = bench_cpu_ns();
-    int cursor = 0, busiest = -1;
+    int cursor = 0, crowd = -1;
     for (int64_t i = 0; i < steps && !(simulator_last(simulator)->flags & STEP_DIVERGED); i++) {
         simulator_step(simulator, bench_command(scene, i, &cursor));
-        if (simulator_last(simulator)->candidates > busiest) {
-            busiest = simulator_last(simulator)->candidates;
-            figures->busiest_step = i;
+        if (crowd < 80 && simulator_last(simulator)->candidates > crowd) {
+            crowd = simulator_last(simulator)->candidates;
+            figures->crowded_step = i;
         }
     }
     figures->cpu_s = (double)(bench_cpu_ns() - begin) * 1e-9;

@@ -19,7 +19,7 @@ typedef struct StepFigures { // of all steps of a run; times are the thread's CP
     int64_t not_converged, linearised_again, limited;
     double residual_max;
     unsigned flags;
-    int64_t busiest_step;    // the first with the most candidates, from 0
+    int64_t crowded_step;    // the first with 80 candidates, or else the most
     StepReport last;
     double inserted_mm;
     uint64_t hash;

@@ -36,7 +36,8 @@ static const char help[] =
     "  --picture F.png    vessel and tool at the end\n"
     "  --picture-at S     instead of the end, this moment [s]; up to 6 of them stand side by side\n"
     "  --contact KIND     the surface that answers contact queries: lim, mesh or tube; default: the scene's\n"
-    "  --paced            one step each millisecond of real time; missed deadlines are counted, no step is skipped\n"
+    "  --paced            one step each millisecond of real time, on SCHED_FIFO where that is permitted. Over load simulated time slows\n"
+    "                     down and the summary says so (deadline_misses, slowed_s); no step is skipped, none is hurried afterwards\n"
     "  --threads N        threads of offline work such as fitting a shape; default 0: all cores\n"
     "  --quiet            no summary, no progress\n\n"
     "Scene defaults: 200 elements, poisson_ratio 0.3, density 6.45 g/cm3, no damping, no friction, no gravity, inserted 0 mm, step 1 ms,\n"
@@ -336,6 +337,9 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
         drive.after_step = watch_step;
         drive.context = &watch;
         DriveReport report = simulator_drive(simulator, &drive);
+        if (options->paced && !report.real_time_priority && !options->quiet)
+            fprintf(stderr, "seldinger run: without real-time priority (SCHED_FIFO is not permitted here; see `ulimit -r` and CAP_SYS_NICE) other programs "
+                            "delay steps\n");
         stepper_node_report(simulator_stepper(simulator), node);
         if (options->picture && options->moment_count == 0)
             take_moment(&watch.moment[0], simulator);

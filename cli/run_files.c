@@ -83,15 +83,17 @@ char *run_summary_json(Simulator *simulator, const DriveReport *drive, const Nod
     cJSON_AddNumberToObject(summary, "real_time_factor", drive->wall_s > 0 ? simulated / drive->wall_s : 0);
     add_times(summary, profile);
     cJSON_AddNumberToObject(summary, "deadline_misses", (double)drive->deadline_misses);
+    cJSON_AddNumberToObject(summary, "slowed_s", drive->slowed_s);
     part = cJSON_AddObjectToObject(summary, "contacts");
     add_numbers(part, 2, (const char *const[]){"max", "final"}, (double[]){totals->contacts_max, last->active});
     part = cJSON_AddObjectToObject(summary, "penetration_mm");
     double final = run_final_penetration_mm(node, state->node_count);
     add_numbers(part, 2, (const char *const[]){"max", "final"}, (double[]){fmax(totals->penetration_max, final), final});
     part = cJSON_AddObjectToObject(summary, "solver");
-    add_numbers(part, 4, (const char *const[]){"iterations_median", "iterations_max", "not_converged_steps", "residual_max"},
+    add_numbers(part, 6,
+                (const char *const[]){"iterations_median", "iterations_max", "not_converged_steps", "residual_max", "linearised_again_steps", "limited_steps"},
                 (double[]){histogram_quantile(&profile->iterations, 0.5), (double)profile->iterations.largest, (double)totals->not_converged_steps,
-                           totals->residual_max});
+                           totals->residual_max, (double)totals->further_linearisations, (double)totals->limited_steps});
     part = cJSON_AddObjectToObject(summary, "proximal");
     add_numbers(part, 2, (const char *const[]){"force_n", "torque_n_mm"}, (double[]){last->proximal_force, last->proximal_torque});
     part = cJSON_AddObjectToObject(summary, "wall_force_n");
@@ -142,15 +144,18 @@ void run_print(FILE *out, Simulator *simulator, const DriveReport *drive, const 
     double simulated = simulator_time_s(simulator);
     fprintf(out, "%s: %.3f s simulated in %.3f s (%.2f times real time), %" PRId64 " steps%s\n", scene->path, simulated, drive->wall_s,
             drive->wall_s > 0 ? simulated / drive->wall_s : 0, totals->steps, drive->end == DRIVE_STOPPED ? ", stopped" : "");
-    fprintf(out, "step %.0f us median, %.0f us p99.9, %.0f us max; contact %.0f iterations median, %" PRId64 " max; %" PRId64 " steps not converged\n",
+    fprintf(out, "step %.0f us median, %.0f us p99.9, %.0f us max; contact %.0f iterations median, %" PRId64 " max, residual at most %.1e\n",
             histogram_quantile(&profile->step, 0.5) / 1000, histogram_quantile(&profile->step, 0.999) / 1000, (double)profile->step.largest / 1000,
-            histogram_quantile(&profile->iterations, 0.5), profile->iterations.largest, totals->not_converged_steps);
+            histogram_quantile(&profile->iterations, 0.5), profile->iterations.largest, totals->residual_max);
     fprintf(out, "tip at (%.3f, %.3f, %.3f) mm, %.2f mm inserted%s; push %.4f N, torque %.4f N mm\n", tip.x, tip.y, tip.z, state->inserted,
             drive->settled ? ", at rest" : "", last->proximal_force, last->proximal_torque);
     fprintf(out, "%d contacts (at most %d), wall force %.4f N in sum; deepest penetration %.4f mm, %.4f mm at the end\n", last->active,
             totals->contacts_max, last->wall_force_sum, totals->penetration_max, run_final_penetration_mm(node, state->node_count));
+    fprintf(out, "of all steps %" PRId64 " took a further linearisation, %" PRId64 " were cut short for the next to complete, %" PRId64
+            " did not converge\n", totals->further_linearisations, totals->limited_steps, totals->not_converged_steps);
     if (drive->deadline_misses)
-        fprintf(out, "%" PRId64 " deadlines missed\n", drive->deadline_misses);
+        fprintf(out, "SLOWED: %" PRId64 " deadlines missed, the worst by %.2f ms; simulated time fell %.3f s behind real time\n", drive->deadline_misses,
+                drive->latest_s * 1000, drive->slowed_s);
     for (int i = 0; i < scene->target_count; i++)
         fprintf(out, "target %s: %s, nearest %.2f mm (radius %.2f), at %.3f s\n", scene->target[i].name, reach[i].reached ? "reached" : "NOT reached",
                 reach[i].distance, scene->target[i].radius, reach[i].time_s);

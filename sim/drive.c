@@ -1,6 +1,8 @@
 #include "sim/drive.h"
 
 #include <errno.h>
+#include <pthread.h>
+#include <sched.h>
 #include <time.h>
 
 static const double rest_speed_mm_s = 0.01;
@@ -21,6 +23,40 @@ static void sleep_until(int64_t deadline_ns)
         ;
 }
 
+// The calling thread's scheduling while it is paced. Threads that exist already keep theirs.
+typedef struct Priority {
+    int policy;
+    struct sched_param parameter;
+    bool raised;
+} Priority;
+
+static Priority priority_raise(void)
+{
+    Priority before = {0};
+    const struct sched_param low = {.sched_priority = sched_get_priority_min(SCHED_FIFO)};   // above every ordinary thread, below the system's own
+    if (pthread_getschedparam(pthread_self(), &before.policy, &before.parameter) == 0)
+        before.raised = pthread_setschedparam(pthread_self(), SCHED_FIFO, &low) == 0;
+    return before;
+}
+
+static void priority_restore(const Priority *before)
+{
+    if (before->raised)
+        pthread_setschedparam(pthread_self(), before->policy, &before->parameter);
+}
+
+// After a step of a paced run: late or not?
+static void keep_pace(DriveReport *report, int64_t *base, int64_t due)
+{
+    int64_t late = wall_ns() - due;
+    if (late <= 0)
+        return;
+    *base += late;
+    report->deadline_misses++;
+    report->slowed_s += (double)late * 1e-9;
+    report->latest_s = fmax(report->latest_s, (double)late * 1e-9);
+}
+
 static double last_ramp_s(const Scene *scene)
 {
     double end = 0;
@@ -38,7 +74,9 @@ DriveReport simulator_drive(Simulator *simulator, const DriveOptions *options)
     double step_s = scene->dt / 1000, ramp_s = last_ramp_s(scene), at_rest_s = 0;
     double duration = options->duration_s >= 0 ? options->duration_s : options->script ? script_duration_s(options->script) : 0;
     int64_t driven = (int64_t)ceil(duration / step_s - 1e-6), settling = (int64_t)ceil(options->settle_s / step_s - 1e-6);
-    int64_t begin = wall_ns(), step_ns = (int64_t)(scene->dt * 1e6 + 0.5);
+    Priority priority = options->paced ? priority_raise() : (Priority){0};
+    report.real_time_priority = priority.raised;
+    int64_t begin = wall_ns(), base = begin, step_ns = (int64_t)(scene->dt * 1e6 + 0.5);
     int cursor = 0;
 
     for (int64_t i = 0; i < driven + settling; i++) {
@@ -49,14 +87,15 @@ DriveReport simulator_drive(Simulator *simulator, const DriveOptions *options)
         if (i >= driven && at_rest_s >= rest_hold_s && simulator_time_s(simulator) >= ramp_s)
             break;
         if (options->paced)
-            sleep_until(begin + i * step_ns);
+            sleep_until(base + i * step_ns);
         bool scripted = options->script && i < driven;
         Command command = scripted ? script_at(options->script, (double)i * scene->dt / 1000, &cursor) : (Command){0, 0};
         simulator_step(simulator, command);
         at_rest_s = simulator_fastest_mm_s(simulator) <= rest_speed_mm_s ? at_rest_s + step_s : 0;
-        if (options->paced && wall_ns() > begin + (i + 1) * step_ns)
-            report.deadline_misses++;
-        if (options->after_step && !options->after_step(options->context, simulator, command)) {
+        bool goes_on = !options->after_step || options->after_step(options->context, simulator, command);
+        if (options->paced)
+            keep_pace(&report, &base, base + (i + 1) * step_ns);
+        if (!goes_on) {
             report.end = DRIVE_STOPPED;
             break;
         }
@@ -66,6 +105,7 @@ DriveReport simulator_drive(Simulator *simulator, const DriveOptions *options)
         }
     }
     report.wall_s = (double)(wall_ns() - begin) * 1e-9;
+    priority_restore(&priority);
     report.settled = report.end != DRIVE_DIVERGED && at_rest_s >= rest_hold_s - step_s / 2 && simulator_time_s(simulator) >= ramp_s;
     return report;
 }

@@ -11,7 +11,7 @@ typedef struct DriveOptions {
     const Script *script;            // NULL: no input
     double duration_s;               // < 0: the script's
     double settle_s;                 // afterwards, without input, at most this long, until nothing is faster than 0.01 mm/s for 0.1 s
-    bool paced;                      // a step begins at its absolute deadline; missed deadlines are counted, no step is skipped
+    bool paced;                      // a step begins when the last one's millisecond is over, see below
     const volatile sig_atomic_t *stop;   // NULL, or stops before the next step once it is not 0
     // After each step, on the simulation thread; false stops. May be NULL.
     bool (*after_step)(void *context, Simulator *simulator, Command command);
@@ -20,10 +20,16 @@ typedef struct DriveOptions {
 
 typedef enum { DRIVE_DONE, DRIVE_STOPPED, DRIVE_DIVERGED } DriveEnd;
 
+// Paced: step i begins at base + i dt of real time and is due at base + (i + 1) dt, both absolute. One that ends later is a missed deadline;
+// the base then moves by as much as it is late. So simulated time falls behind real time for good, by slowed_s in all: no step is
+// skipped, and none is hurried afterwards, which a hand would feel as a jump.
 typedef struct DriveReport {
     DriveEnd end;
     double wall_s;
     int64_t deadline_misses;
+    double slowed_s;                 // by which simulated time fell behind
+    double latest_s;                 // the worst single deadline was missed by this
+    bool real_time_priority;         // paced on SCHED_FIFO; false where that is not permitted: then other programs delay steps
     bool settled;                    // nothing was faster than 0.01 mm/s during the last 0.1 s
 } DriveReport;
 

@@ -1,0 +1,106 @@
+// Pacing: over load simulated time slows down by what was lost, and nothing is hurried afterwards.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "sim/drive.h"
+
+#include <string.h>
+#include <time.h>
+
+static const char text[] = "seldinger: 1\n"
+                           "wire: {elements: 10, sections: [{length_mm: 50, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
+                           "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 10}\n"
+                           "script: [{t_s: 0, push_mm_s: 10, twist_deg_s: 0}, {t_s: 0.3, push_mm_s: 0, twist_deg_s: 0}]\n";
+
+enum { STEPS = 300, STALL_AT = 100, STALL_MS = 50 };
+
+typedef struct Clock {
+    int steps;
+    bool stalls;
+    double end_s[STEPS];     // real time at the end of each step
+} Clock;
+
+static double now_s(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+}
+
+static bool note_time(void *context, Simulator *simulator, Command command)
+{
+    (void)simulator;
+    (void)command;
+    Clock *clock = context;
+    if (clock->stalls && clock->steps == STALL_AT)
+        nanosleep(&(struct timespec){.tv_nsec = STALL_MS * 1000000}, NULL);
+    clock->end_s[clock->steps++] = now_s();
+    return clock->steps < STEPS;
+}
+
+static DriveReport drive(Clock *clock, bool paced, uint64_t *hash)
+{
+    Faults faults = {0};
+    Scene *scene = scene_parse(text, strlen(text), "test", &faults);
+    assert_non_null(scene);
+    Simulator *simulator = simulator_create(scene, NULL, &faults);
+    assert_non_null(simulator);
+    DriveOptions options = drive_default_options();
+    options.script = scene->script;
+    options.paced = paced;
+    options.after_step = note_time;
+    options.context = clock;
+    DriveReport report = simulator_drive(simulator, &options);
+    assert_int_equal(clock->steps, STEPS);
+    *hash = simulator_hash(simulator);
+    simulator_destroy(simulator);
+    scene_free(scene);
+    return report;
+}
+
+// What is lost is exactly what real time is ahead, whatever else this machine does meanwhile.
+static void a_stall_slows_simulated_time(void **state)
+{
+    (void)state;
+    static Clock calm, stalled;
+    uint64_t free_hash, calm_hash, stalled_hash;
+    stalled.stalls = true;
+    Clock unpaced = {0};
+    drive(&unpaced, false, &free_hash);
+    DriveReport quiet = drive(&calm, true, &calm_hash), late = drive(&stalled, true, &stalled_hash);
+    print_message("calm: %lld misses, slowed %.4f s; stalled: %lld misses, slowed %.4f s, worst %.4f s; SCHED_FIFO %s\n",
+                  (long long)quiet.deadline_misses, quiet.slowed_s, (long long)late.deadline_misses, late.slowed_s, late.latest_s,
+                  late.real_time_priority ? "yes" : "not permitted");
+    assert_true(late.deadline_misses >= 1);
+    assert_true(late.slowed_s >= (STALL_MS - 1) * 1e-3);
+    assert_true(late.latest_s >= (STALL_MS - 1) * 1e-3 && late.latest_s <= late.slowed_s + 1e-12);
+    // the last step ends somewhere within its millisecond, or late and then counted
+    const DriveReport *both[] = {&quiet, &late};
+    for (int i = 0; i < 2; i++) {
+        assert_true(both[i]->wall_s - both[i]->slowed_s <= STEPS * 1e-3 + 1e-4);
+        assert_true(both[i]->wall_s - both[i]->slowed_s >= (STEPS - 1) * 1e-3);
+    }
+    assert_true(quiet.deadline_misses > 0 || quiet.slowed_s == 0);
+    assert_true(free_hash == calm_hash && calm_hash == stalled_hash);   // pacing is no input
+}
+
+// A run that caught up would do the 50 steps after the stall in a few milliseconds.
+static void nothing_is_hurried_after_a_stall(void **state)
+{
+    (void)state;
+    static Clock clock = {.stalls = true};
+    uint64_t hash;
+    drive(&clock, true, &hash);
+    for (int i = STALL_AT + 1; i + 20 < STEPS; i++)
+        assert_true(clock.end_s[i + 20] - clock.end_s[i] > 19e-3 - 1e-3);   // 20 deadlines lie between, the first step may have ended late in its own
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_stall_slows_simulated_time), cmocka_unit_test(nothing_is_hurried_after_a_stall)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
