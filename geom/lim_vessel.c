@@ -580,16 +580,6 @@ static void choose_sources(const VesselTree *tree, NodeModel *model)
     }
 }
 
-static bool is_open_end(const VesselTree *tree)
-{
-    for (int k = tree->neighbour_offset[0]; k < tree->neighbour_offset[1]; k++) {
-        Vec3 to = vec3_sub(tree->center[tree->neighbour[k]], tree->center[0]);
-        if (vec3_dot(to, tree->direction[0]) < -0.5 * vec3_norm(to))
-            return false;   // the tree goes on upstream of its root
-    }
-    return true;
-}
-
 static void fill_models(LimVessel *lim)
 {
     const VesselTree *tree = lim->tree;
@@ -639,7 +629,7 @@ Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *o
         return NULL;
     }
     fill_models(lim);
-    lim->inlet_open = is_open_end(tree);
+    lim->inlet_open = vessel_tree_root_is_open(tree);
     return &lim->vessel;
 }
 

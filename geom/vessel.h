@@ -56,7 +56,7 @@ static inline void vessel_query(const Vessel *v, int count, const Vec3 *point, d
 
 // --- LIM: the fitted tree. Borrows the tree, which must outlive the vessel. NULL where the tree has no model. ---
 // The root's end is open: upstream of its plane (center, direction) there is no wall, and where blobs close the model near it the wall is that of the
-// section through the point. A root from which the tree goes on upstream is no end. Leaves are closed by their blobs.
+// section through the point. A root from which the tree goes on upstream, or that its points close over, is no such end. Leaves are closed by their blobs.
 Vessel *lim_vessel_create(const VesselTree *tree);
 
 typedef enum {

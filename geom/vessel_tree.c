@@ -236,3 +236,21 @@ bool vessel_tree_link(VesselTree *tree)
         tree->near_offset[i + 1] = tree->near_offset[i] + collect_near(tree, i, largest, tree->near + tree->near_offset[i]);
     return true;
 }
+
+bool vessel_tree_root_is_open(const VesselTree *tree)
+{
+    Vec3 root = tree->center[0], upstream = vec3_negate(tree->direction[0]);
+    double radius = tree->radius[0];
+    for (int k = tree->neighbour_offset[0]; k < tree->neighbour_offset[1]; k++) {
+        Vec3 to = vec3_sub(tree->center[tree->neighbour[k]], root);
+        if (vec3_dot(to, upstream) > 0.5 * vec3_norm(to))
+            return false;
+    }
+    int closing = 0;
+    for (int64_t i = tree->point_offset[0]; i < tree->point_offset[1]; i++) {
+        Vec3 p = vec3_sub(tree->point[i], root);
+        double t = vec3_dot(p, upstream);
+        closing += t > 0.5 * radius && vec3_norm2(p) - t * t < 0.36 * radius * radius;
+    }
+    return closing < 3;
+}

@@ -52,6 +52,9 @@ bool vessel_tree_validate(const VesselTree *tree, const char *file, Faults *faul
 // a mouth would have to pass nodes that are worse. Node j is near node i where their centres are closer than 1.2 (r_i + r_j) and the way
 // through the tree is shorter than 1.5 (r_i + r_j): a vessel that turns back on itself needs pi times its radius, so kissing walls stay apart.
 bool vessel_tree_link(VesselTree *tree);
+// Whether the root is an end through which a tool comes in: neither does the tree go on upstream of it, nor do the root's own points close it
+// over, as those of a blind end do.
+bool vessel_tree_root_is_open(const VesselTree *tree);
 static inline bool vessel_tree_is_model(const VesselTree *tree) { return tree->blob_count > 0; }
 
 #endif

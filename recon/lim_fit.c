@@ -130,17 +130,14 @@ static bool extend_inlet(const VesselTree *tree, Gather *gather, Vec3 center)
     Vec3 root = tree->center[0], upstream = vec3_negate(tree->direction[0]);
     double least = 0, most = 0, radius = tree->radius[0];
     int64_t first = tree->point_offset[0], last = tree->point_offset[1];
-    int closing = 0;
     for (int64_t i = first; i < last; i++) {
         Vec3 p = vec3_sub(tree->point[i], root);
         double t = vec3_dot(p, upstream);
-        closing += t > 0.5 * radius && vec3_norm2(p) - t * t < 0.36 * radius * radius;
         least = i == first || t < least ? t : least;
         most = i == first || t > most ? t : most;
     }
     double extent = most - least;
-    // a root whose points close it over is a blind end, not an inlet
-    if (last - first < 12 || extent < 0.2 * radius || closing >= 3)
+    if (last - first < 12 || extent < 0.2 * radius || !vessel_tree_root_is_open(tree))
         return true;
     gather->is_extended = true;
     for (int copy = 1; copy < 12 && most + (copy - 1) * extent < 2.2 * radius; copy++)
