@@ -1,6 +1,9 @@
 // seldinger bench: the table of benchmarks, and how a run is measured.
 #include "cli/bench.h"
 
+#include "cli/output.h"
+
+#include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -73,7 +76,7 @@ int64_t bench_steps(const Scene *scene, int64_t most)
     return steps < most ? steps : most;
 }
 
-bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, StepFigures *figures, Faults *faults)
+bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, const StepTrace *trace, StepFigures *figures, Faults *faults)
 {
     *figures = (StepFigures){0};
     Simulator *simulator = simulator_create(scene, vessel, faults);
@@ -82,7 +85,12 @@ bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, StepFigur
     int64_t steps = bench_steps(scene, most), begin = bench_cpu_ns();
     int cursor = 0, crowd = -1;
     for (int64_t i = 0; i < steps && !(simulator_last(simulator)->flags & STEP_DIVERGED); i++) {
+        int64_t start = trace ? bench_cpu_ns() : 0;
         simulator_step(simulator, bench_command(scene, i, &cursor));
+        if (trace) {
+            trace->us[i] = (double)(bench_cpu_ns() - start) / 1000;
+            trace->contacts[i] = simulator_last(simulator)->active;
+        }
         if (crowd < 80 && simulator_last(simulator)->candidates > crowd) {
             crowd = simulator_last(simulator)->candidates;
             figures->crowded_step = i;
@@ -124,4 +132,45 @@ void bench_close(BenchScene *scene)
     open_vessel_close(&scene->open);
     scene_free(scene->scene);
     *scene = (BenchScene){0};
+}
+
+int bench_parse(int argc, char **argv, const char *table, const char *table_help, BenchOptions *options)
+{
+    static const struct option list[] = {{"json", required_argument, NULL, 'j'}, {"quick", no_argument, NULL, 'q'},
+                                         {"threads", required_argument, NULL, 't'}, {"help", no_argument, NULL, 'h'}, {0}};
+    double number;
+    *options = (BenchOptions){0};
+    optind = 1;
+    for (int choice; (choice = getopt_long(argc, argv, "h", list, NULL)) != -1;) {
+        switch (choice) {
+        case 'j': options->json = optarg; break;
+        case 'q': options->quick = true; break;
+        case 't':
+            if (!cli_number("--threads", optarg, 0, 256, &number))
+                return EXIT_BAD_INPUT;
+            options->threads = (int)number;
+            break;
+        case 'h': fputs(table_help, stdout); return EXIT_DONE;
+        default: fprintf(stderr, "seldinger bench %s: unknown option or lacking value; see --help\n", table); return EXIT_BAD_INPUT;
+        }
+    }
+    if (optind < argc) {
+        fprintf(stderr, "seldinger bench %s: takes no '%s'; see --help\n", table, argv[optind]);
+        return EXIT_BAD_INPUT;
+    }
+    return -1;
+}
+
+FILE *bench_text(const BenchOptions *options) { return options->json && !strcmp(options->json, "-") ? stderr : stdout; }
+
+bool bench_write_json(const BenchOptions *options, const cJSON *root, Faults *faults)
+{
+    if (!options->json)
+        return true;
+    char *text = cJSON_Print(root);
+    if (!text)
+        faults_add(faults, options->json, 0, 0, "cannot be written: no memory");
+    bool good = text && output_write(options->json, text, strlen(text), faults);
+    free(text);
+    return good;
 }

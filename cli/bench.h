@@ -5,6 +5,8 @@
 #include "cli/cli.h"
 #include "sim/simulator.h"
 
+#include <cJSON.h>
+
 VerbFunction bench_step, bench_peer;
 
 typedef struct Spread {
@@ -30,8 +32,12 @@ Spread bench_spread(const TimeHistogram *histogram, double unit);
 // The command of step i, from the scene's script.
 Command bench_command(const Scene *scene, int64_t step, int *cursor);
 int64_t bench_steps(const Scene *scene, int64_t most);   // of the script, but not more than `most`
-// Runs the script, at most `most` steps of it; stops where a step diverges. False with a fault.
-bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, StepFigures *figures, Faults *faults);
+typedef struct StepTrace {   // of each step; arrays of the caller with room for bench_steps()
+    double *us;
+    int *contacts;
+} StepTrace;
+// Runs the script, at most `most` steps of it; stops where a step diverges. `trace` may be NULL. False with a fault.
+bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, const StepTrace *trace, StepFigures *figures, Faults *faults);
 
 // A scene with its vessel, opened; false with faults.
 typedef struct BenchScene {
@@ -41,7 +47,20 @@ typedef struct BenchScene {
 bool bench_open(const char *path, int threads, BenchScene *out, Faults *faults);
 void bench_close(BenchScene *scene);
 
-// A process name of the machine for the head of a table.
+// The processor's name for the head of a table.
 const char *bench_processor(void);
+
+// What all tables take: --quick, --threads N, --json F, --help.
+typedef struct BenchOptions {
+    bool quick;
+    int threads;
+    const char *json;
+} BenchOptions;
+// -1: go on; otherwise the exit code.
+int bench_parse(int argc, char **argv, const char *table, const char *help, BenchOptions *options);
+// Where the text goes: not where the JSON goes.
+FILE *bench_text(const BenchOptions *options);
+// Nothing where no --json was given.
+bool bench_write_json(const BenchOptions *options, const cJSON *root, Faults *faults);
 
 #endif

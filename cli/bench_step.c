@@ -12,8 +12,6 @@
 #include "geom/simd.h"
 #include "solver/block_chain.h"
 
-#include <cJSON.h>
-#include <getopt.h>
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -45,9 +43,7 @@ typedef struct Kernels {                 // [us]
 } Kernels;
 
 typedef struct StepBench {
-    bool quick;
-    int threads;
-    const char *json;
+    BenchOptions options;
     int64_t most_steps;
     bool present[CASES];
     StepFigures run[SIMD_COUNT][CASES];
@@ -303,7 +299,7 @@ static bool run_cases(StepBench *bench, SimdLevel level, SimdLevel widest, Fault
             continue;
         BenchScene s;
         StepFigures *run = &bench->run[level][c];
-        bool good = bench_open(cases[c].path, bench->threads, &s, faults) && bench_run(s.scene, s.open.vessel, bench->most_steps, run, faults);
+        bool good = bench_open(cases[c].path, bench->options.threads, &s, faults) && bench_run(s.scene, s.open.vessel, bench->most_steps, NULL, run, faults);
         if (good && c == 0) {
             bench->kernels[level].assembly = time_assembly(s.scene, faults);
             bench->kernels[level].factor_solve = time_factor_solve();
@@ -312,12 +308,12 @@ static bool run_cases(StepBench *bench, SimdLevel level, SimdLevel widest, Fault
             time_detection(s.scene, s.open.vessel, run->crowded_step, &bench->kernels[level].detection[c], &bench->kernels[level].points[c], faults);
         if (good && level == widest) {
             uint64_t hash = 0;
-            good = force_error(s.scene, s.open.vessel, run->steps, bench->quick ? 30 : 200, &bench->error[c], &hash, faults);
+            good = force_error(s.scene, s.open.vessel, run->steps, bench->options.quick ? 30 : 200, &bench->error[c], &hash, faults);
             bench->same_hash &= hash == run->hash;
         }
         for (int e = 0; good && c == 0 && level == widest && e < GROWTHS; e++) {
             s.scene->wire.elements = growth_elements[e];
-            good = bench_run(s.scene, s.open.vessel, bench->most_steps, &bench->growth[e], faults);
+            good = bench_run(s.scene, s.open.vessel, bench->most_steps, NULL, &bench->growth[e], faults);
         }
         bench_close(&s);
         if (!good)
@@ -527,52 +523,24 @@ static bool write_json(const StepBench *bench, SimdLevel widest, Faults *faults)
         cJSON_AddNumberToObject(at, "measured", list[i].measured);
         cJSON_AddStringToObject(at, "verdict", verdict(&list[i]));
     }
-    char *text = cJSON_Print(root);
-    bool good = text && output_write(bench->json, text, strlen(text), faults);
-    free(text);
+    bool good = bench_write_json(&bench->options, root, faults);
     cJSON_Delete(root);
     return good;
 }
 
 // --- the verb ---
 
-static int parse_options(int argc, char **argv, StepBench *bench)
-{
-    static const struct option table[] = {{"json", required_argument, NULL, 'j'}, {"quick", no_argument, NULL, 'q'},
-                                          {"threads", required_argument, NULL, 't'}, {"help", no_argument, NULL, 'h'}, {0}};
-    double number;
-    optind = 1;
-    for (int choice; (choice = getopt_long(argc, argv, "h", table, NULL)) != -1;) {
-        switch (choice) {
-        case 'j': bench->json = optarg; break;
-        case 'q': bench->quick = true; break;
-        case 't':
-            if (!cli_number("--threads", optarg, 0, 256, &number))
-                return EXIT_BAD_INPUT;
-            bench->threads = (int)number;
-            break;
-        case 'h': fputs(help, stdout); return EXIT_DONE;
-        default: fprintf(stderr, "seldinger bench step: unknown option or lacking value; see --help\n"); return EXIT_BAD_INPUT;
-        }
-    }
-    if (optind < argc) {
-        fprintf(stderr, "seldinger bench step: takes no '%s'; see --help\n", argv[optind]);
-        return EXIT_BAD_INPUT;
-    }
-    bench->most_steps = bench->quick ? 300 : INT64_MAX;
-    return -1;
-}
-
 int bench_step(int argc, char **argv)
 {
     static StepBench bench;
     static Faults faults;
-    int code = parse_options(argc, argv, &bench);
+    int code = bench_parse(argc, argv, "step", help, &bench.options);
     if (code >= 0)
         return code;
-    if (!output_check(bench.json, &faults))
+    if (!output_check(bench.options.json, &faults))
         return cli_bad_input(&faults);
-    FILE *out = bench.json && !strcmp(bench.json, "-") ? stderr : stdout;
+    FILE *out = bench_text(&bench.options);
+    bench.most_steps = bench.options.quick ? 300 : INT64_MAX;
     SimdLevel widest = simd_level();
     bench.same_hash = true;
     fprintf(out, "%s, %s\n", bench_processor(), simd_name[widest]);
@@ -596,7 +564,7 @@ int bench_step(int argc, char **argv)
         print_budgets(out, &bench, widest);
         if (!bench.same_hash)
             fprintf(out, "\nSTATE HASHES DIFFER\n");
-        good = !bench.json || write_json(&bench, widest, &faults);
+        good = write_json(&bench, widest, &faults);
     }
     if (!good)
         return cli_bad_input(&faults);
