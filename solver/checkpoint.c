@@ -6,7 +6,7 @@
 #include <string.h>
 
 struct Checkpoint {
-    int node_count, first_free;
+    int node_count, point_count, first_free;
     size_t memory_count;
     double time, inserted, twist;
     StepReport report;
@@ -26,7 +26,7 @@ void checkpoint_free(Checkpoint *c)
 Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
 {
     Checkpoint *c = reuse;
-    if (c && c->node_count != s->state.node_count) {
+    if (c && (c->node_count != s->state.node_count || c->point_count != s->point_count)) {
         checkpoint_free(c);
         c = NULL;
     }
@@ -35,8 +35,9 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
         if (!c)
             return NULL;
         c->node_count = s->state.node_count;
+        c->point_count = s->point_count;
         c->memory_count = s->memory_count;
-        c->place = calloc((size_t)c->node_count, sizeof *c->place);
+        c->place = calloc((size_t)c->point_count, sizeof *c->place);
         c->memory = calloc(c->memory_count, sizeof *c->memory);
         if (!c->place || !c->memory) {
             checkpoint_free(c);
@@ -48,21 +49,21 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
     c->inserted = s->state.inserted;
     c->twist = s->state.twist;
     c->report = s->report;
-    memcpy(c->place, s->place, (size_t)c->node_count * sizeof *c->place);
+    memcpy(c->place, s->place, (size_t)c->point_count * sizeof *c->place);
     memcpy(c->memory, s->memory, c->memory_count * sizeof *c->memory);
     return c;
 }
 
 void stepper_restore(Stepper *s, const Checkpoint *c)
 {
-    if (c->node_count != s->state.node_count)
+    if (c->node_count != s->state.node_count || c->point_count != s->point_count)
         return;
     s->first_free = c->first_free;
     s->state.time = c->time;
     s->state.inserted = c->inserted;
     s->state.twist = c->twist;
     s->report = c->report;
-    memcpy(s->place, c->place, (size_t)c->node_count * sizeof *c->place);
+    memcpy(s->place, c->place, (size_t)c->point_count * sizeof *c->place);
     memcpy(s->memory, c->memory, c->memory_count * sizeof *c->memory);
 }
 
@@ -90,7 +91,7 @@ uint64_t stepper_hash(const Stepper *s)
     for (size_t i = 0; i < s->memory_count; i++)
         hash_double(&hash, s->memory[i]);
     // field by field: padding holds anything
-    for (int i = 0; i < s->state.node_count; i++) {
+    for (int i = 0; i < s->point_count; i++) {
         const VesselMemory *p = &s->place[i];
         hash_double(&hash, p->node);
         hash_double(&hash, p->has_foot);

@@ -59,35 +59,63 @@ static bool allocate_scratch(Stepper *s)
     return true;
 }
 
+static bool make_slots(Stepper *s, const WireOptions *o)
+{
+    const Wire *w = &s->wire;
+    s->slot_start = calloc((size_t)w->node_count, sizeof *s->slot_start);
+    if (!s->slot_start)
+        return false;
+    for (int i = 0; i < w->element_count; i++)
+        s->slot_start[i + 1] = s->slot_start[i] + slot_count_of(w->length[i]);
+    s->slot_count = s->slot_start[w->element_count];
+    s->point_count = w->node_count + s->slot_count;
+    s->slot = calloc((size_t)s->slot_count + 1, sizeof *s->slot);
+    if (!s->slot)
+        return false;
+    for (int i = 0; i < w->element_count; i++) {
+        const WireSection *section = &o->section[w->section[i]];
+        int first = s->slot_start[i], count = s->slot_start[i + 1] - first;
+        for (int k = 0; k < count; k++)
+            s->slot[first + k] = slot_make(i, w->length[i], k, count, section->diameter / 2, section->friction);
+    }
+    return true;
+}
+
 static bool allocate(Stepper *s)
 {
-    size_t m = (size_t)s->wire.node_count;
-    s->memory_count = 17 * m;
+    size_t m = (size_t)s->wire.node_count, points = (size_t)s->point_count;
+    s->memory_count = 13 * m + 4 * points;
     s->memory = calloc(s->memory_count, sizeof *s->memory);
-    s->place = calloc(m, sizeof *s->place);
+    s->place = calloc(points, sizeof *s->place);
     s->fixed = calloc(m, sizeof *s->fixed);
     s->start_position = calloc(m, sizeof *s->start_position);
     s->start_orientation = calloc(m, sizeof *s->start_orientation);
-    s->query_point = calloc(m, sizeof *s->query_point);
-    s->query_place = calloc(m, sizeof *s->query_place);
-    s->query_hit = calloc(m, sizeof *s->query_hit);
-    s->query_node = calloc(m, sizeof *s->query_node);
-    s->room = calloc(m, sizeof *s->room);
-    s->set.point = calloc(m, sizeof *s->set.point);
-    s->set.capacity = s->wire.node_count;
+    s->slot_place = calloc(points, sizeof *s->slot_place);
+    s->query_point = calloc(points, sizeof *s->query_point);
+    s->query_place = calloc(points, sizeof *s->query_place);
+    s->query_hit = calloc(points, sizeof *s->query_hit);
+    s->query_which = calloc(3 * points + m, sizeof *s->query_which);
+    s->room = calloc(points, sizeof *s->room);
+    s->set.point = calloc(points, sizeof *s->set.point);
+    s->set.capacity = s->point_count;
     s->factor = block_factor_create(s->wire.node_count);
     s->solver = contact_solver_create(s->wire.node_count, s->set.capacity);
-    if (!s->memory || !s->place || !s->fixed || !s->start_position || !s->start_orientation || !s->query_point || !s->query_place ||
-        !s->query_hit || !s->query_node || !s->room || !s->set.point || !s->factor || !s->solver || !block_chain_create(&s->chain, s->wire.node_count) ||
+    if (!s->memory || !s->place || !s->fixed || !s->start_position || !s->start_orientation || !s->slot_place || !s->query_point || !s->query_place ||
+        !s->query_hit || !s->query_which || !s->room || !s->set.point || !s->factor || !s->solver || !block_chain_create(&s->chain, s->wire.node_count) ||
         !allocate_scratch(s))
         return false;
     s->state.node_count = s->wire.node_count;
     s->state.position = (Vec3 *)s->memory;
     s->state.velocity = (Vec3 *)(s->memory + 3 * m);
     s->state.spin = (Vec3 *)(s->memory + 6 * m);
-    s->force = (Vec3 *)(s->memory + 9 * m);
-    s->state.orientation = (Quat *)(s->memory + 12 * m);
-    s->clearance = s->memory + 16 * m;
+    s->state.orientation = (Quat *)(s->memory + 9 * m);
+    s->force = (Vec3 *)(s->memory + 13 * m);
+    s->clearance = s->memory + 13 * m + 3 * points;
+    s->query_near = s->query_which + points;
+    s->candidate = s->query_near + points;
+    s->answer_of = s->candidate + points;
+    for (size_t k = 0; k < points; k++)
+        s->place[k].node = -1;
     return true;
 }
 
@@ -132,7 +160,6 @@ static void place_wire(Stepper *s, const WireOptions *o)
     for (int i = 0; i < s->wire.node_count; i++) {
         s->state.position[i] = vec3_add_scaled(s->mouth, s->wire.s[i] - behind, s->axis[0]);
         s->state.orientation[i] = s->line;
-        s->place[i].node = -1;
     }
 }
 
@@ -182,7 +209,7 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
         stepper_destroy(s);
         return NULL;
     }
-    if (!allocate(s) || !place_rig(s, &o.wire)) {
+    if (!make_slots(s, &o.wire) || !allocate(s) || !place_rig(s, &o.wire)) {
         snprintf(why, (size_t)capacity, "no memory for a wire of %d elements", o.wire.elements);
         stepper_destroy(s);
         return NULL;
@@ -231,7 +258,10 @@ void stepper_destroy(Stepper *s)
     free(s->query_point);
     free(s->query_place);
     free(s->query_hit);
-    free(s->query_node);
+    free(s->query_which);
+    free(s->slot_place);
+    free(s->slot);
+    free(s->slot_start);
     free(s->room);
     free(s->set.point);
     free(s->scratch);
@@ -291,8 +321,10 @@ void step_feed(Stepper *s, StepCommand command)
     }
     s->command = command;
     int held = count_held(s, command.advance);
-    for (int i = s->first_free; i < held; i++)
+    for (int i = s->first_free; i < held; i++) {
         hold(s, i);
+        stepper_forget(s, i);
+    }
     for (int i = s->first_free - 1; i >= held; i--)
         let_go(s, i);
     s->first_free = held;
@@ -327,8 +359,7 @@ static void solve(Stepper *s)
     s->report.flags &= ~(unsigned)STEP_NOT_CONVERGED;
     if (!report.converged)
         s->report.flags |= STEP_NOT_CONVERGED;
-    for (int k = 0; k < s->set.count; k++)
-        s->force[s->set.point[k].node] = s->set.point[k].force;
+    stepper_keep_forces(s);
     double sum = 0;
     for (int i = 0; i < 6 * s->state.node_count; i++)
         sum += s->u[i] * 0;          // 0, or not a number
@@ -494,8 +525,8 @@ static void keep_last_state(Stepper *s)
     memcpy(s->state.orientation, s->start_orientation, nodes * sizeof *s->start_orientation);
     memset(s->state.velocity, 0, nodes * sizeof *s->state.velocity);
     memset(s->state.spin, 0, nodes * sizeof *s->state.spin);
-    memset(s->force, 0, nodes * sizeof *s->force);
-    memset(s->clearance, 0, nodes * sizeof *s->clearance);
+    memset(s->force, 0, (size_t)s->point_count * sizeof *s->force);
+    memset(s->clearance, 0, (size_t)s->point_count * sizeof *s->clearance);
     s->report.flags |= STEP_DIVERGED;
 }
 
@@ -515,6 +546,7 @@ static void set_velocities(Stepper *s)
         if (s->clearance[i] > 0)
             s->clearance[i] -= sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
     }
+    stepper_use_clearance(s);
 }
 
 static void report_forces(Stepper *s)
@@ -532,7 +564,7 @@ static void report_forces(Stepper *s)
         s->report.proximal_torque = vec3_dot(torque, s->axis[0]);
     }
     for (int k = 0; k < s->set.count; k++) {
-        double force = vec3_norm(s->set.point[k].force);
+        double force = vec3_norm(s->force[s->candidate[k]]);
         s->report.wall_force_max = fmax(s->report.wall_force_max, force);
         s->report.wall_force_sum += force;
     }
@@ -577,6 +609,7 @@ void stepper_node_report(Stepper *s, NodeReport *node)
         if (!(hit.flags & (VESSEL_FAR | VESSEL_OPEN_END)))
             node[i].gap = hit.gap - s->wire.radius[i];
     }
+    stepper_share_forces(s, node);
 }
 
 double stepper_elastic_energy(const Stepper *s)

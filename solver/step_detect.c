@@ -1,18 +1,86 @@
-// Candidates at the iterate: free nodes whose gap could close in this step. A node that is certainly further away is not asked again
-// before it has travelled that far (DESIGN section 5).
+// Candidates at the iterate: contact points whose gap could close in this step. A contact point p is node p, or beyond the nodes slot p - M
+// (slot.h). A point that is certainly further away is not asked again before it has travelled that far (DESIGN section 5).
+//
+// Nodes first. A slot between two nodes is asked only where their answers leave it in doubt: not where a node is known to be further from the
+// wall than from the slot, and, in an element with a single slot, not where the wall as its nodes see it, gap + n.d + d'Hd/2, keeps DIP_MIN clear of
+// what the nodes alone guarantee. Elements of many slots are too long for such a guess.
 #include "solver/step_internal.h"
 
 static const double REACH = 0.3;         // [mm] candidates beyond what the nodes' speed asks for: contact forces can push neighbours about
 static const double REACH_MAX = 5;       // [mm]
-static const double STEP_OUT_MAX = 0.2;  // [mm] a deep node is brought back by this much a step, not thrown
+static const double STEP_OUT_MAX = 0.2;  // [mm] a deep point is brought back by this much a step, not thrown
 static const double DEEP = 0.2;          // [mm] STEP_DEEP
-static const double OVERSHOOT_TRAVEL = 0.05;   // [mm] a node that the solution moves less is where its linearised wall is
+static const double OVERSHOOT_TRAVEL = 0.05;   // [mm] a point that the solution moves less is where its linearised wall is
+static const double DIP_MIN = 0.002;     // [mm] by which the element may be nearer to the wall than its nodes before its slot counts
+// A contact between one free node and the sheath is one between nodes with no share for the second.
+static const double NO_SHARE = 1e-300;
 
-// [mm] by which the solution moves a node from the iterate.
-static double travel(const Stepper *s, int node)
+static Vec3 tangent_at(const Stepper *s, int node)
 {
-    const double *u = s->u + 6 * (size_t)node, *k = s->linearised + 6 * (size_t)node;
-    return vec3_norm(vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]));
+    Quat q = s->state.orientation[node];
+    return vec3(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y));
+}
+
+// Where slot k is; false where it is in the sheath.
+static bool place_slot(Stepper *s, int k)
+{
+    const Slot *slot = &s->slot[k];
+    int i = slot->element;
+    const Vec3 *x = s->state.position;
+    double length = s->wire.length[i];
+    if (i + 1 == s->first_free)
+        return i + 2 < s->state.node_count && slot_place_at_mouth(slot, length, stepper_sheath_coordinate(s, i), s->mouth, s->axis[0], x[i + 1],
+                                                                  tangent_at(s, i + 1), &s->slot_place[k]);
+    s->slot_place[k] = slot_place(slot, length, x[i], tangent_at(s, i), x[i + 1], tangent_at(s, i + 1));
+    return true;
+}
+
+// What the solution moves a node by from the iterate: 0 for translation, 3 for turn.
+static Vec3 change(const Stepper *s, int node, int from)
+{
+    const double *u = s->u + 6 * (size_t)node + from, *k = s->linearised + 6 * (size_t)node + from;
+    return vec3_sub(vec3(u[0], u[1], u[2]), vec3(k[0], k[1], k[2]));
+}
+
+static bool at_mouth(const Stepper *s, int element) { return element + 1 == s->first_free; }
+
+// The motion of slot k from its nodes' translations and turns.
+static Vec3 follow(const Stepper *s, int k, const Vec3 move[2], const Vec3 turn[2])
+{
+    const SlotPlace *p = &s->slot_place[k];
+    Vec3 d = vec3_add(vec3_scale(move[1], p->weight), vec3_cross(turn[1], p->lever[1]));
+    if (at_mouth(s, s->slot[k].element))
+        return d;
+    return vec3_add(d, vec3_add(vec3_scale(move[0], 1 - p->weight), vec3_cross(turn[0], p->lever[0])));
+}
+
+// By how much the solution moves a contact point from the iterate.
+static Vec3 motion(const Stepper *s, int point)
+{
+    int nodes = s->state.node_count;
+    if (point < nodes)
+        return change(s, point, 0);
+    int i = s->slot[point - nodes].element;
+    Vec3 move[2] = {change(s, i, 0), change(s, i + 1, 0)}, turn[2] = {change(s, i, 3), change(s, i + 1, 3)};
+    return follow(s, point - nodes, move, turn);
+}
+
+static Vec3 place_of(const Stepper *s, int point)
+{
+    int nodes = s->state.node_count;
+    return point < nodes ? s->state.position[point] : s->slot_place[point - nodes].position;
+}
+
+static double radius_of(const Stepper *s, int point)
+{
+    int nodes = s->state.node_count;
+    return point < nodes ? s->wire.radius[point] : s->slot[point - nodes].radius;
+}
+
+// The first contact point that may be free: nodes from first_free on, slots from the mouth's element on.
+static int first_slot(const Stepper *s)
+{
+    return s->state.node_count + s->slot_start[s->first_free > 0 ? s->first_free - 1 : 0];
 }
 
 bool stepper_escapes(const Stepper *s)
@@ -20,93 +88,313 @@ bool stepper_escapes(const Stepper *s)
     if (!s->vessel)
         return false;
     for (int i = s->first_free; i < s->state.node_count; i++)
-        if (travel(s, i) > s->room[i])
+        if (vec3_norm(change(s, i, 0)) > s->room[i])
+            return true;
+    for (int p = first_slot(s); p < s->point_count; p++)
+        if (s->room[p] < HUGE_VAL && vec3_norm(motion(s, p)) > s->room[p])
             return true;
     return false;
-}
-
-// How far beyond its present gap a node is looked after.
-static double reach_of(const Stepper *s, int node)
-{
-    if (s->knows_motion)
-        return fmin(REACH_MAX, REACH + 1.5 * travel(s, node));
-    return fmin(REACH_MAX, REACH + fabs(s->command.advance) + 2 * s->dt * vec3_norm(s->state.velocity[node]));
-}
-
-static void locate(Stepper *s, int node)
-{
-    VesselMemory *place = s->place;
-    int from = -1;
-    if (node > s->first_free && place[node - 1].node >= 0)
-        from = place[node - 1].node;
-    else if (node + 1 < s->state.node_count && place[node + 1].node >= 0)
-        from = place[node + 1].node;
-    place[node] = (VesselMemory){.node = s->vessel->locate(s->vessel, s->state.position[node], from)};
 }
 
 double stepper_overshoot(Stepper *s)
 {
     int count = 0;
     double deepest = 0;
-    for (int i = s->first_free; s->vessel && i < s->state.node_count; i++) {
-        if (s->place[i].node < 0 || s->clearance[i] > travel(s, i) || travel(s, i) < OVERSHOOT_TRAVEL)
+    if (!s->vessel)
+        return 0;
+    for (int p = s->first_free; p < s->point_count; p++) {
+        if (p == s->state.node_count)
+            p = first_slot(s);
+        if (p == s->point_count || s->place[p].node < 0)
             continue;
-        const double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
-        s->query_node[count] = i;
-        s->query_point[count] = vec3_add(s->state.position[i], vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]));
-        s->query_place[count++] = s->place[i];
+        Vec3 d = motion(s, p);
+        double travel = vec3_norm(d);
+        if (s->clearance[p] > travel || travel < OVERSHOOT_TRAVEL)
+            continue;
+        s->query_which[count] = p;
+        s->query_point[count] = vec3_add(place_of(s, p), d);
+        s->query_place[count++] = s->place[p];
     }
     if (count > 0)
         vessel_query(s->vessel, count, s->query_point, 0.5, s->query_place, s->query_hit);
     for (int k = 0; k < count; k++)
         if (!(s->query_hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)))
-            deepest = fmax(deepest, s->wire.radius[s->query_node[k]] - s->query_hit[k].gap);
+            deepest = fmax(deepest, radius_of(s, s->query_which[k]) - s->query_hit[k].gap);
     return deepest;
 }
 
-static int query(Stepper *s)
+// How far beyond its present gap a node is looked after.
+static double node_reach(const Stepper *s, int node)
 {
-    int count = 0, nodes = s->state.node_count;
+    if (s->knows_motion)
+        return fmin(REACH_MAX, REACH + 1.5 * vec3_norm(change(s, node, 0)));
+    return fmin(REACH_MAX, REACH + fabs(s->command.advance) + 2 * s->dt * vec3_norm(s->state.velocity[node]));
+}
+
+static double reach_of(const Stepper *s, int point)
+{
+    int nodes = s->state.node_count;
+    if (point < nodes)
+        return node_reach(s, point);
+    int i = s->slot[point - nodes].element;
+    return fmax(node_reach(s, i), node_reach(s, i + 1));
+}
+
+static void forget(Stepper *s, int point)
+{
+    s->place[point].node = -1;
+    s->place[point].has_foot = false;
+    s->clearance[point] = 0;
+    s->force[point] = vec3(0, 0, 0);
+}
+
+void stepper_forget(Stepper *s, int node)
+{
+    forget(s, node);
+    for (int k = node > 0 ? s->slot_start[node - 1] : 0; k < s->slot_start[node]; k++)
+        forget(s, s->state.node_count + k);
+}
+
+// A node that has not been located starts from a neighbour, a slot with what a neighbour knows of the wall.
+static void locate(Stepper *s, int point)
+{
+    VesselMemory *place = s->place;
+    int nodes = s->state.node_count, from = -1;
+    if (point >= nodes) {
+        int i = s->slot[point - nodes].element, known = s->answer_of[i + 1] >= 0 || place[i].node < 0 ? i + 1 : i;
+        if (place[known].node >= 0) {
+            place[point] = place[known];
+            return;
+        }
+    } else if (point > s->first_free && place[point - 1].node >= 0) {
+        from = place[point - 1].node;
+    } else if (point + 1 < nodes && place[point + 1].node >= 0) {
+        from = place[point + 1].node;
+    }
+    place[point] = (VesselMemory){.node = s->vessel->locate(s->vessel, place_of(s, point), from)};
+}
+
+// Is a point known to be too far off to touch?
+static bool sleeps(Stepper *s, int point)
+{
+    s->room[point] = HUGE_VAL;
+    if (s->clearance[point] > 0 && s->knows_motion && vec3_norm(motion(s, point)) > s->clearance[point])
+        s->clearance[point] = 0;
+    if (!(s->clearance[point] > 0))
+        return false;
+    s->room[point] = s->clearance[point];
+    return true;
+}
+
+static void ask(Stepper *s, int point, int *count)
+{
+    if (s->place[point].node < 0)
+        locate(s, point);
+    s->query_which[*count] = point;
+    s->query_point[*count] = place_of(s, point);
+    s->query_place[(*count)++] = s->place[point];
+}
+
+// Questions first to count-1, the answers judged: what is too far goes to sleep, candidates keep their question's number.
+static int answer(Stepper *s, int first, int count, int *candidate)
+{
     double reach = 0;
-    for (int i = 0; i < s->first_free; i++) {
-        s->place[i].node = -1;
-        s->place[i].has_foot = false;
-        s->clearance[i] = 0;
-    }
-    for (int i = s->first_free; i < nodes; i++) {
-        s->room[i] = HUGE_VAL;
-        if (s->clearance[i] > 0 && s->knows_motion && travel(s, i) > s->clearance[i])
-            s->clearance[i] = 0;
-        if (s->clearance[i] > 0)
-            s->room[i] = s->clearance[i];
-        if (s->clearance[i] > 0 || (s->fixed[i] & DOF_POSITION) == DOF_POSITION)
+    int candidates = 0;
+    for (int k = first; k < count; k++)
+        reach = fmax(reach, reach_of(s, s->query_which[k]) + radius_of(s, s->query_which[k]));
+    // distances grow with what is asked for: twice the reach lets most far points sleep for a while
+    if (count > first)
+        vessel_query(s->vessel, count - first, s->query_point + first, 2 * reach, s->query_place + first, s->query_hit + first);
+    for (int k = first; k < count; k++) {
+        int point = s->query_which[k];
+        const VesselHit *hit = &s->query_hit[k];
+        double gap = hit->gap - radius_of(s, point), own_reach = reach_of(s, point);
+        s->place[point] = s->query_place[k];
+        if (!(hit->flags & (VESSEL_FAR | VESSEL_OPEN_END)) && gap < own_reach && vec3_is_finite(hit->normal)) {
+            candidate[candidates++] = k;
             continue;
-        if (s->place[i].node < 0)
-            locate(s, i);
-        s->query_node[count] = i;
-        s->query_point[count] = s->state.position[i];
-        s->query_place[count++] = s->place[i];
-        reach = fmax(reach, reach_of(s, i) + s->wire.radius[i]);
+        }
+        s->force[point] = vec3(0, 0, 0);
+        if (hit->flags & VESSEL_OPEN_END)
+            continue;
+        s->room[point] = gap;
+        if (gap > own_reach)
+            s->clearance[point] = gap - own_reach;
     }
-    // distances grow with what is asked for: twice the reach lets most far nodes sleep for a while
-    if (count > 0)
-        vessel_query(s->vessel, count, s->query_point, 2 * reach, s->query_place, s->query_hit);
+    return candidates;
+}
+
+static int ask_nodes(Stepper *s)
+{
+    int count = 0;
+    for (int i = s->first_free; i < s->state.node_count; i++) {
+        s->answer_of[i] = -1;
+        if (sleeps(s, i) || (s->fixed[i] & DOF_POSITION) == DOF_POSITION)
+            continue;
+        s->answer_of[i] = count;
+        ask(s, i, &count);
+    }
     return count;
 }
 
-static void add_candidate(Stepper *s, int node, const VesselHit *hit, double gap)
+// The gap at a slot as the node sees it.
+static double gap_from(const Stepper *s, int node, Vec3 place)
 {
-    double friction = s->wire.friction[node] >= 0 ? s->wire.friction[node] : s->wall_friction, radius = s->wire.radius[node];
-    double target = fmax(gap, -STEP_OUT_MAX);
-    if (s->is_iterate) {
-        // unknowns are displacements from x_n: take off what has been done already
-        const double *u = s->linearised + 6 * (size_t)node;
-        Vec3 arm = vec3_scale(hit->normal, -radius);
-        Vec3 moved = vec3_add(vec3(u[0], u[1], u[2]), vec3_cross(vec3(u[3], u[4], u[5]), arm));
-        target -= vec3_dot(moved, hit->normal);
+    const VesselHit *hit = &s->query_hit[s->answer_of[node]];
+    Vec3 d = vec3_sub(place, s->state.position[node]);
+    return hit->gap + vec3_dot(hit->normal, d) + 0.5 * sym3_quadratic(&hit->hessian, d);
+}
+
+// Do the nodes of an element keep its only slot off the wall?
+static bool is_covered(const Stepper *s, int k)
+{
+    const Slot *slot = &s->slot[k];
+    int i = slot->element, a = s->answer_of[i], b = s->answer_of[i + 1];
+    if (s->slot_start[i + 1] - s->slot_start[i] > 1 || a < 0 || b < 0 || ((s->query_hit[a].flags | s->query_hit[b].flags) & ~0u) != 0)
+        return false;
+    Vec3 f = s->force[s->state.node_count + k], place = s->slot_place[k].position;
+    if (f.x != 0 || f.y != 0 || f.z != 0)
+        return false;
+    double alone = s->query_hit[a].gap + slot->weight * (s->query_hit[b].gap - s->query_hit[a].gap);
+    return fmin(gap_from(s, i, place), gap_from(s, i + 1, place)) > alone - DIP_MIN;
+}
+
+static int ask_slots(Stepper *s, int count)
+{
+    int nodes = s->state.node_count;
+    for (int p = first_slot(s); p < s->point_count; p++) {
+        int k = p - nodes, i = s->slot[k].element;
+        s->room[p] = HUGE_VAL;
+        if (!place_slot(s, k)) {
+            forget(s, p);
+            continue;
+        }
+        if (sleeps(s, p))
+            continue;
+        bool mouth = at_mouth(s, i);
+        Vec3 x = s->slot_place[k].position;
+        double near = mouth ? 0 : s->clearance[i] - vec3_distance(x, s->state.position[i]);
+        double bound = fmax(near, s->clearance[i + 1] - vec3_distance(x, s->state.position[i + 1]));
+        if (bound > 0)
+            s->room[p] = bound;
+        if (bound > 0 || (!mouth && is_covered(s, k)))
+            forget(s, p);    // what it knew grows old; its neighbours' knowledge does not
+        else
+            ask(s, p, &count);
     }
-    s->set.point[s->set.count++] = (ContactPoint){.node = node, .normal = hit->normal, .gap = target, .hessian = hit->hessian,
-                                                  .friction = friction, .tool_radius = radius, .force = s->force[node]};
+    return count;
+}
+
+// --- candidates ---
+
+static Vec3 done(const Stepper *s, int node, int from)
+{
+    const double *k = s->linearised + 6 * (size_t)node + from;
+    return vec3(k[0], k[1], k[2]);
+}
+
+// What of the motion from x_n the iterate has done already, at the touching point: unknowns are displacements from x_n.
+static Vec3 done_at(const Stepper *s, int point, Vec3 arm)
+{
+    int nodes = s->state.node_count;
+    if (point < nodes)
+        return vec3_add(done(s, point, 0), vec3_cross(done(s, point, 3), arm));
+    int k = point - nodes, i = s->slot[k].element;
+    Vec3 move[2] = {done(s, i, 0), done(s, i + 1, 0)}, turn[2] = {done(s, i, 3), done(s, i + 1, 3)};
+    double w = s->slot_place[k].weight;
+    Vec3 spin = vec3_scale(turn[1], w);
+    if (!at_mouth(s, i))
+        spin = vec3_add_scaled(spin, 1 - w, turn[0]);
+    return vec3_add(follow(s, k, move, turn), vec3_cross(spin, arm));
+}
+
+// A contact between the sheath and the first free node moves by w u + theta x (lever + w a) and the share of the advance. 1/w of that, of its
+// gap and of its curvature make it one of the node alone, whose force is w times the real one.
+static void lean_on_sheath(const Stepper *s, int k, ContactPoint *c)
+{
+    const SlotPlace *p = &s->slot_place[k];
+    double w = p->weight, ahead = s->command.advance - (s->is_iterate ? s->linearised[6 * (size_t)s->slot[k].element] : 0);
+    c->node = s->first_free;
+    c->xi = NO_SHARE;
+    c->gap = (c->gap + (1 - w) * ahead * vec3_dot(p->tangent, c->normal)) / w;
+    c->lever[0] = vec3_scale(p->lever[1], 1 / w);
+    c->lever[1] = vec3(0, 0, 0);
+    c->force = vec3_scale(c->force, w);
+    Sym3 *h = &c->hessian;
+    h->xx *= w, h->xy *= w, h->xz *= w, h->yy *= w, h->yz *= w, h->zz *= w;
+}
+
+static void add_candidate(Stepper *s, int point, const VesselHit *hit)
+{
+    int nodes = s->state.node_count;
+    double radius = radius_of(s, point), friction = point < nodes ? s->wire.friction[point] : s->slot[point - nodes].friction;
+    ContactPoint c = {.node = point, .normal = hit->normal, .gap = fmax(hit->gap - radius, -STEP_OUT_MAX), .hessian = hit->hessian,
+                      .friction = friction >= 0 ? friction : s->wall_friction, .tool_radius = radius, .force = s->force[point]};
+    if (s->is_iterate)
+        c.gap -= vec3_dot(done_at(s, point, vec3_scale(hit->normal, -radius)), hit->normal);
+    if (point >= nodes) {
+        const SlotPlace *p = &s->slot_place[point - nodes];
+        c.node = s->slot[point - nodes].element;
+        c.xi = p->weight;
+        c.lever[0] = p->lever[0], c.lever[1] = p->lever[1];
+        if (at_mouth(s, c.node))
+            lean_on_sheath(s, point - nodes, &c);
+    }
+    s->candidate[s->set.count] = point;
+    s->set.point[s->set.count++] = c;
+}
+
+void stepper_keep_forces(Stepper *s)
+{
+    int nodes = s->state.node_count;
+    for (int k = 0; k < s->set.count; k++) {
+        int point = s->candidate[k];
+        s->force[point] = s->set.point[k].force;
+        if (point >= nodes && at_mouth(s, s->slot[point - nodes].element))
+            s->force[point] = vec3_scale(s->force[point], 1 / s->slot_place[point - nodes].weight);
+    }
+}
+
+// In the order of the chain: a node, the slots behind it, the next node.
+static void collect(Stepper *s, const int *candidate, int node_count, int slot_count)
+{
+    const int *slot = candidate + node_count, *end = slot + slot_count;
+    for (const int *node = candidate; node < candidate + node_count || slot < end;) {
+        int next = node < candidate + node_count ? s->query_which[*node] : s->state.node_count;
+        while (slot < end && s->slot[s->query_which[*slot] - s->state.node_count].element < next) {
+            add_candidate(s, s->query_which[*slot], &s->query_hit[*slot]);
+            slot++;
+        }
+        if (node < candidate + node_count) {
+            add_candidate(s, next, &s->query_hit[*node]);
+            node++;
+        }
+    }
+}
+
+// What the answers say of the state at the step's start.
+static void report_wall(Stepper *s, int nodes, int count)
+{
+    int next = s->first_free;
+    bool was_inside = false;
+    unsigned flags = 0;
+    for (int k = 0; k < count; k++) {
+        const VesselHit *hit = &s->query_hit[k];
+        if (k < nodes) {
+            was_inside |= next < s->query_which[k];
+            next = s->query_which[k] + 1;
+        }
+        if (hit->flags & VESSEL_OPEN_END) {
+            flags |= k < nodes && was_inside ? STEP_OUT_OF_VESSEL : 0;
+            continue;
+        }
+        was_inside |= k < nodes;
+        flags |= hit->flags & VESSEL_UNSURE ? STEP_DETECTION_UNSURE : 0;
+        double outside = radius_of(s, s->query_which[k]) - hit->gap;
+        s->report.penetration = fmax(s->report.penetration, outside);
+        flags |= outside > DEEP ? STEP_DEEP : 0;
+    }
+    s->report.flags |= flags;
 }
 
 void stepper_detect(Stepper *s)
@@ -114,40 +402,41 @@ void stepper_detect(Stepper *s)
     s->set.count = 0;
     if (!s->vessel)
         return;
-    int count = query(s);
-    bool was_inside = false;
-    unsigned flags = 0;
-    int next = s->first_free;
-    for (int k = 0; k < count; k++) {
-        int i = s->query_node[k];
-        const VesselHit *hit = &s->query_hit[k];
-        s->place[i] = s->query_place[k];
-        was_inside |= next < i;
-        next = i + 1;
-        double gap = hit->gap - s->wire.radius[i], reach = reach_of(s, i);
-        if (hit->flags & VESSEL_OPEN_END) {
-            if (was_inside)
-                flags |= STEP_OUT_OF_VESSEL;
-            s->force[i] = vec3(0, 0, 0);
-            continue;
-        }
-        was_inside = true;
-        if (hit->flags & VESSEL_UNSURE)
-            flags |= STEP_DETECTION_UNSURE;
-        if (!s->is_iterate) {
-            s->report.penetration = fmax(s->report.penetration, -gap);
-            flags |= gap < -DEEP ? STEP_DEEP : 0;
-        }
-        if ((hit->flags & VESSEL_FAR) || !(gap < reach) || !vec3_is_finite(hit->normal)) {
-            s->force[i] = vec3(0, 0, 0);
-            s->room[i] = gap;
-            if (gap > reach)
-                s->clearance[i] = gap - reach;
-            continue;
-        }
-        add_candidate(s, i, hit, gap);
-    }
+    int *candidate = s->query_near, nodes = ask_nodes(s);
+    int node_candidates = answer(s, 0, nodes, candidate);
+    int count = ask_slots(s, nodes);
+    int slot_candidates = answer(s, nodes, count, candidate + node_candidates);
+    collect(s, candidate, node_candidates, slot_candidates);
     s->report.candidates = s->set.count;
     if (!s->is_iterate)      // an iterate may be anywhere
-        s->report.flags |= flags;
+        report_wall(s, nodes, count);
+}
+
+// --- between steps ---
+
+void stepper_use_clearance(Stepper *s)
+{
+    int nodes = s->state.node_count;
+    for (int p = first_slot(s); p < s->point_count; p++) {
+        if (!(s->clearance[p] > 0))
+            continue;
+        const Slot *slot = &s->slot[p - nodes];
+        int i = slot->element;
+        double shift = fmax(vec3_norm(done(s, i, 0)), vec3_norm(done(s, i + 1, 0)));
+        s->clearance[p] -= shift + slot->near * vec3_norm(done(s, i, 3)) - slot->far * vec3_norm(done(s, i + 1, 3));
+    }
+}
+
+void stepper_share_forces(const Stepper *s, NodeReport *node)
+{
+    for (int k = 0; k < s->slot_count; k++) {
+        Vec3 force = s->force[s->state.node_count + k], x2 = s->state.position[s->slot[k].element + 1];
+        int i = s->slot[k].element;
+        double w = s->slot[k].weight;
+        SlotPlace place;
+        if (at_mouth(s, i) && slot_place_at_mouth(&s->slot[k], s->wire.length[i], stepper_sheath_coordinate(s, i), s->mouth, s->axis[0], x2, s->axis[0], &place))
+            w = place.weight;
+        node[i].force = vec3_add_scaled(node[i].force, 1 - w, force);
+        node[i + 1].force = vec3_add_scaled(node[i + 1].force, w, force);
+    }
 }

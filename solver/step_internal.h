@@ -4,6 +4,7 @@
 
 #include "solver/beam_element.h"
 #include "solver/sheath.h"
+#include "solver/slot.h"
 #include "solver/step.h"
 
 #include <stddef.h>
@@ -32,14 +33,18 @@ struct Stepper {
     double wall_friction;
     ContactOptions contact;
     int newton_max;
+    // contact points: the nodes, then the slots
+    int slot_count, point_count;     // K, P = M + K
+    Slot *slot;              // (K) by element
+    int *slot_start;         // (M) first slot of element i; of the last node K
 
     // what the next step depends on: see checkpoint.c
     WireState state;         // arrays in `memory`; within a step the iterate
     size_t memory_count;
     double *memory;          // position, orientation, velocity, spin, force, clearance
-    Vec3 *force;             // (M) [N] of the wall on the node: warm start
-    double *clearance;       // (M) [mm] how far the node may travel before it could touch: not queried until then
-    VesselMemory *place;     // (M)
+    Vec3 *force;             // (P) [N] of the wall on the point: warm start
+    double *clearance;       // (P) [mm] how far the point may travel before it could touch: not queried until then
+    VesselMemory *place;     // (P)
     int first_free;          // nodes before it are held by the sheath
 
     // scratch of a step
@@ -56,11 +61,15 @@ struct Stepper {
     double grip_diag[36], grip_lower[36], grip_b[6];     // rows of node 0 before its constraints
     Vec3 *start_position;    // (M) x_n
     Quat *start_orientation;
-    Vec3 *query_point;       // (M)
+    SlotPlace *slot_place;   // (K) where the iterate has them
+    Vec3 *query_point;       // (P)
     VesselMemory *query_place;
     VesselHit *query_hit;
-    int *query_node;
-    double *room;            // (M) [mm] how far a node that is no candidate may go from the iterate; HUGE_VAL for candidates
+    int *query_which;        // (P) the point that is asked about
+    int *query_near;         // (P) questions whose points are candidates
+    int *answer_of;          // (M) the question about a node, -1: none
+    int *candidate;          // (P) the points of `set`
+    double *room;            // (P) [mm] how far a point that is no candidate may go from the iterate; HUGE_VAL for candidates
     double *scratch;         // owns the arrays of doubles
 
     // of this step
@@ -73,10 +82,18 @@ struct Stepper {
 };
 
 void stepper_detect(Stepper *s);
-// Has a node that was no candidate gone further than its room?
-// How deep outside the true wall the solution would leave the nodes that it moves far from the iterate [mm], >= 0.
-double stepper_overshoot(Stepper *s);
+// Forces of the solved set go to their points.
+void stepper_keep_forces(Stepper *s);
+// Has a point that was no candidate gone further than its room?
 bool stepper_escapes(const Stepper *s);
+// How deep outside the true wall the solution would leave the points that it moves far from the iterate [mm], >= 0.
+double stepper_overshoot(Stepper *s);
+// Takes this step's travel off the slots' clearances.
+void stepper_use_clearance(Stepper *s);
+// A node goes into the sheath, with the element before it: nothing of the wall is remembered.
+void stepper_forget(Stepper *s, int node);
+// Adds the slots' forces to the nodes between which they are.
+void stepper_share_forces(const Stepper *s, NodeReport *node);
 void stepper_assemble(Stepper *s);
 double stepper_sheath_coordinate(const Stepper *s, int node);
 // [N] reaction on node 0 along (index 0 to 2) and about (3 to 5) the axes of its unknowns.

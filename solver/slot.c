@@ -1,0 +1,53 @@
+// Slots: see slot.h.
+//
+// Between points at a distance h a wall of convex radius R cuts in by h^2 / (8 R): 0.6 mm keep that under 0.02 mm on the inner side of a bend of
+// 3 mm. Elements longer than 10 mm would want more than 15, but bend no tool round so narrow a corner anyway.
+#include "solver/slot.h"
+
+static const double SPACING = 0.6;       // [mm] between contact points, at most
+enum { SLOTS_MAX = 15 };                 // of an element
+// Of the part outside the sheath: nearer to its mouth than this the wire cannot leave the line by anything that matters.
+static const double MOUTH_PART = 0.1;
+
+int slot_count_of(double length)
+{
+    double count = ceil(length / SPACING - 1e-9) - 1;
+    return count < 0 ? 0 : count > SLOTS_MAX ? SLOTS_MAX : (int)count;
+}
+
+static void set_shape(Slot *s, double xi, double length)
+{
+    s->xi = xi;
+    s->weight = xi * xi * (3 - 2 * xi);
+    s->near = length * xi * (1 - xi) * (1 - xi);
+    s->far = length * xi * xi * (xi - 1);
+}
+
+Slot slot_make(int element, double length, int k, int count, double radius, double friction)
+{
+    Slot s = {.element = element, .radius = radius, .friction = friction};
+    set_shape(&s, (double)(k + 1) / (count + 1), length);
+    return s;
+}
+
+SlotPlace slot_place(const Slot *s, double length, Vec3 x1, Vec3 t1, Vec3 x2, Vec3 t2)
+{
+    SlotPlace p = {.weight = s->weight, .lever = {vec3_scale(t1, s->near), vec3_scale(t2, s->far)}};
+    Vec3 chord = vec3_sub(x2, x1);
+    p.position = vec3_add(vec3_add_scaled(x1, s->weight, chord), vec3_add(p.lever[0], p.lever[1]));
+    double xi = s->xi, slope = 6 * xi * (1 - xi) / length;
+    Vec3 tangent = vec3_add_scaled(vec3_scale(t1, (1 - xi) * (1 - 3 * xi)), xi * (3 * xi - 2), t2);
+    p.tangent = vec3_unit_or(vec3_add_scaled(tangent, slope, chord), t1);
+    return p;
+}
+
+bool slot_place_at_mouth(const Slot *slot, double length, double coordinate, Vec3 mouth, Vec3 direction, Vec3 x2, Vec3 t2, SlotPlace *place)
+{
+    double outside = length + coordinate, xi = outside > 0 ? (coordinate + slot->xi * length) / outside : 0;
+    if (!(xi > MOUTH_PART && xi < 1))
+        return false;
+    Slot s = *slot;
+    set_shape(&s, xi, outside);
+    *place = slot_place(&s, outside, mouth, direction, x2, t2);
+    return true;
+}

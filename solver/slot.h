@@ -1,0 +1,37 @@
+// Contact points between the nodes of long elements. A slot is a material point of the tool: it keeps its memory of the wall and its force from
+// step to step, like a node.
+//
+// It sits on the cubic through the nodes' places x and tangents t (the bent shape of beam_element.c): with xi = s / L of the rest length,
+//   P = (1 - w) x1 + w x2 + L (a t1 + b t2),   w = xi^2 (3 - 2 xi),  a = xi (1 - xi)^2,  b = xi^2 (xi - 1)
+//   dP = (1 - w) dx1 + w dx2 + theta1 x (L a t1) + theta2 x (L b t2)
+// which is exact, since a turned tangent changes by theta x t: w is the weight and L a t1, L b t2 are the levers of contact.h.
+#ifndef SELDINGER_SOLVER_SLOT_H
+#define SELDINGER_SOLVER_SLOT_H
+
+#include "geom/linear.h"
+
+typedef struct Slot {
+    int element;
+    double xi;               // (0, 1) of the element's rest length
+    double weight;           // w
+    double near, far;        // [mm] L a > 0, L b < 0
+    double radius;           // [mm] of the tool
+    double friction;         // < 0: the wall's
+} Slot;
+
+typedef struct SlotPlace {   // where it is and how it follows its nodes
+    Vec3 position, tangent;  // the tangent is unit
+    double weight;
+    Vec3 lever[2];
+} SlotPlace;
+
+// How many slots an element of this length has, none where its nodes are close enough.
+int slot_count_of(double length);
+// The k-th of `count` slots.
+Slot slot_make(int element, double length, int k, int count, double radius, double friction);
+SlotPlace slot_place(const Slot *slot, double length, Vec3 x1, Vec3 t1, Vec3 x2, Vec3 t2);
+// On the element across the sheath's mouth, whose inner node is at `coordinate` <= 0 behind it (sheath.c): the cubic of the part outside, from
+// the mouth, clamped along `direction`, to the outer node. False where the slot is inside. lever[0] belongs to the clamp.
+bool slot_place_at_mouth(const Slot *slot, double length, double coordinate, Vec3 mouth, Vec3 direction, Vec3 x2, Vec3 t2, SlotPlace *place);
+
+#endif
