@@ -4,6 +4,7 @@
 
 #include "input/number_table.h"
 #include "input/text_file.h"
+#include "sim/rest_shape.h"
 #include "sim/yaml_reader.h"
 
 #include <stdio.h>
@@ -239,9 +240,38 @@ static void read_section(YamlValue value, WireSection *section)
     section->rest_plane = plane * per_deg;
 }
 
+// `rest`: the tool's shape by lines and arcs, as a tube's path; its last piece ends at the tip.
+static void read_rest(Reading *reading, YamlValue list)
+{
+    WireOptions *wire = &reading->scene->wire;
+    int before = reading->faults->count, count = yaml_count(list, 1, MOST_PIECES);
+    TubePiece *piece = count > 0 ? zeroed(reading, count, sizeof *piece) : NULL;
+    double thickest = 0;
+    for (int i = 0; i < wire->section_count; i++) {
+        thickest = fmax(thickest, wire->section[i].diameter);
+        if (wire->section[i].rest_curvature != 0)
+            yaml_fault(list, "'rest' and 'rest_curvature_1_mm' of section %d both give a shape; one of them", i);
+    }
+    for (int i = 0; piece && i < count; i++)
+        if (read_piece(yaml_item(list, i), &piece[i]) && piece[i].angle > 0 && piece[i].arc_radius < thickest)
+            yaml_fault(yaml_item(list, i), "an arc of radius %g mm is tighter than the tool is thick, %g mm; make it larger", piece[i].arc_radius, thickest);
+    double length = piece ? rest_shape_length(piece, count) : 0;
+    if (reading->total_length > 0 && length > reading->total_length + 0.01)
+        yaml_fault(list, "'rest' is %g mm long, the wire %g mm; at most as long, what it leaves at the proximal end is straight", length,
+                   reading->total_length);
+    if (piece && wire->section_count > 0 && reading->faults->count == before) {
+        WireSection *cut = rest_shape_sections(wire->section, wire->section_count, piece, count, &wire->section_count);
+        free((void *)wire->section);
+        wire->section = cut;
+        if (!cut)
+            faults_add(reading->faults, reading->path, 0, 0, "no memory");
+    }
+    free(piece);
+}
+
 static void read_wire(Reading *reading, YamlValue value)
 {
-    static const char *const keys[] = {"elements", "sections", "damping", NULL};
+    static const char *const keys[] = {"elements", "sections", "rest", "damping", NULL};
     static const char *const damping_keys[] = {"mass_1_s", "stiffness_s", NULL};
     WireOptions *wire = &reading->scene->wire;
     YamlMap map = yaml_map(value, keys);
@@ -264,6 +294,8 @@ static void read_wire(Reading *reading, YamlValue value)
         read_section(yaml_item(list, i), &section[i]);
         reading->total_length += section[i].length;
     }
+    if (yaml_has(&map, "rest"))
+        read_rest(reading, yaml_get(&map, "rest", false));
 }
 
 // `normal` of a sheath or rig: the direction to which a rest curvature with plane 0 bends; default vec3_normal_to(direction).

@@ -19,7 +19,7 @@ typedef struct Needs {
 static const Needs needs[] = {
     [VERIFY_POSITION] = {.s = true, .axis_may = true, .origin = true},
     [VERIFY_TANGENT] = {.s = true, .axis_must = true},
-    [VERIFY_TWIST] = {.s = true, .range = true},
+    [VERIFY_TWIST] = {.range = true},
     [VERIFY_WALL_FORCE] = {.range = true, .axis_may = true},
     [VERIFY_WALL_MOMENT] = {.range = true, .axis_must = true, .origin = true},
     [VERIFY_WALL_CENTRE] = {.range = true},

@@ -12,6 +12,7 @@
 
 enum { ELEMENTS_MAX = 10000 };
 static const double REST_ANGLE_MAX = 2;          // [rad] of one element at rest
+static const double REST_ANGLE_AIM = 0.3;        // … where there are enough elements
 
 WireOptions wire_default_options(void)
 {
@@ -131,27 +132,36 @@ bool wire_check(const WireOptions *o, char *why, int capacity)
     return check_rig(o, total, why, capacity);
 }
 
+// How many elements a section asks for: its share of the wire's length, or enough that none turns by more than REST_ANGLE_AIM at rest.
+static double wanted(const WireSection *section, double per_mm)
+{
+    return fmax(section->length * per_mm, fabs(section->rest_curvature) * section->length / REST_ANGLE_AIM);
+}
+
 bool wire_divide(const WireOptions *options, int *elements)
 {
     int sections = options->section_count, left = options->elements - sections;
     if (left < 0)
         return false;
-    double total = 0;
+    double total = 0, all = 0;
     for (int i = 0; i < sections; i++)
         total += options->section[i].length;
-    // one for each, then again and again one to the section with the longest elements: the finest division, and no tie but by index
+    double per_mm = options->elements / total;
+    for (int i = 0; i < sections; i++)
+        all += wanted(&options->section[i], per_mm);
+    // one for each, then again and again one to the section that lacks most: the finest division, and no tie but by index
     for (int i = 0; i < sections; i++) {
-        double share = options->elements * options->section[i].length / total;
+        double share = options->elements * wanted(&options->section[i], per_mm) / all;
         int floor_count = share >= 2 ? (int)share - 1 : 0;       // safe start: never more than its share
         elements[i] = 1 + (floor_count < left ? floor_count : left);
         left -= elements[i] - 1;
     }
     while (left-- > 0) {
-        int longest = 0;
+        int most = 0;
         for (int i = 1; i < sections; i++)
-            if (options->section[i].length / elements[i] > options->section[longest].length / elements[longest] * (1 + 1e-12))
-                longest = i;
-        elements[longest]++;
+            if (wanted(&options->section[i], per_mm) / elements[i] > wanted(&options->section[most], per_mm) / elements[most] * (1 + 1e-12))
+                most = i;
+        elements[most]++;
     }
     return true;
 }

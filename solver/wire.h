@@ -86,7 +86,8 @@ WireOptions wire_default_options(void);          // 200 elements, Rayleigh dampi
 bool wire_check(const WireOptions *options, char *why, int capacity);
 bool wire_create(Wire *wire, const WireOptions *options, char *why, int capacity);
 void wire_destroy(Wire *wire);
-// Elements per section, (section_count): in proportion to length by largest remainder, each at least one. False where elements < sections.
+// Elements per section, (section_count): in proportion to length, more where an element would turn by over 0.3 rad at rest, each at least one.
+// False where elements < sections.
 bool wire_divide(const WireOptions *options, int *elements);
 
 // Properties of a section's cross-section.
