@@ -2,16 +2,17 @@
 // (slot.h). A point that is certainly further away is not asked again before it has travelled that far (DESIGN section 5).
 //
 // Nodes first. A slot between two nodes is asked only where their answers leave it in doubt: not where a node is known to be further from the
-// wall than from the slot, and, in an element with a single slot, not where the wall as its nodes see it, gap + n.d + d'Hd/2, keeps DIP_MIN clear of
-// what the nodes alone guarantee. Elements of many slots are too long for such a guess.
+// wall than from the slot, and in short elements not where the wall as both nodes see it, gap + n.d + d'Hd/2, comes no nearer than the nodes do.
 #include "solver/step_internal.h"
 
 static const double REACH = 0.3;         // [mm] candidates beyond what the nodes' speed asks for: contact forces can push neighbours about
+static const double SLOT_REACH = 0.1;    // [mm] the same for slots, whose nodes are candidates long before
 static const double REACH_MAX = 5;       // [mm]
 static const double STEP_OUT_MAX = 0.2;  // [mm] a deep point is brought back by this much a step, not thrown
 static const double DEEP = 0.2;          // [mm] STEP_DEEP
 static const double OVERSHOOT_TRAVEL = 0.05;   // [mm] a point that the solution moves less is where its linearised wall is
 static const double DIP_MIN = 0.002;     // [mm] by which the element may be nearer to the wall than its nodes before its slot counts
+static const double SIGHT = 2;           // [mm] longer elements' slots are asked at any rate
 // A contact between one free node and the sheath is one between nodes with no share for the second.
 static const double NO_SHARE = 1e-300;
 
@@ -123,21 +124,22 @@ double stepper_overshoot(Stepper *s)
     return deepest;
 }
 
-// How far beyond its present gap a node is looked after.
-static double node_reach(const Stepper *s, int node)
+// How far a node may go in this step, by what is known.
+static double range_of(const Stepper *s, int node)
 {
     if (s->knows_motion)
-        return fmin(REACH_MAX, REACH + 1.5 * vec3_norm(change(s, node, 0)));
-    return fmin(REACH_MAX, REACH + fabs(s->command.advance) + 2 * s->dt * vec3_norm(s->state.velocity[node]));
+        return 1.5 * vec3_norm(change(s, node, 0));
+    return fabs(s->command.advance) + 2 * s->dt * vec3_norm(s->state.velocity[node]);
 }
 
+// How far beyond its present gap a point is looked after.
 static double reach_of(const Stepper *s, int point)
 {
     int nodes = s->state.node_count;
     if (point < nodes)
-        return node_reach(s, point);
+        return fmin(REACH_MAX, REACH + range_of(s, point));
     int i = s->slot[point - nodes].element;
-    return fmax(node_reach(s, i), node_reach(s, i + 1));
+    return fmin(REACH_MAX, SLOT_REACH + fmax(range_of(s, i), range_of(s, i + 1)));
 }
 
 static void forget(Stepper *s, int point)
@@ -182,7 +184,8 @@ static bool sleeps(Stepper *s, int point)
         s->clearance[point] = 0;
     if (!(s->clearance[point] > 0))
         return false;
-    s->room[point] = s->clearance[point];
+    // when it went to sleep it had its reach besides
+    s->room[point] = s->clearance[point] + (point < s->state.node_count ? REACH : SLOT_REACH);
     return true;
 }
 
@@ -195,11 +198,26 @@ static void ask(Stepper *s, int point, int *count)
     s->query_place[(*count)++] = s->place[point];
 }
 
+// The gap that a slot would have where its element ran along the wall as its nodes do; HUGE_VAL where the nodes are not both near.
+static double gap_between(const Stepper *s, int k)
+{
+    int i = s->slot[k].element, a = s->answer_of[i], b = s->answer_of[i + 1];
+    if (i + 1 == s->first_free || a < 0 || b < 0 || (s->query_hit[a].flags | s->query_hit[b].flags) != 0)
+        return HUGE_VAL;
+    return s->query_hit[a].gap + s->slot[k].weight * (s->query_hit[b].gap - s->query_hit[a].gap);
+}
+
+static bool presses(const Stepper *s, int point)
+{
+    Vec3 f = s->force[point];
+    return f.x != 0 || f.y != 0 || f.z != 0;
+}
+
 // Questions first to count-1, the answers judged: what is too far goes to sleep, candidates keep their question's number.
 static int answer(Stepper *s, int first, int count, int *candidate)
 {
     double reach = 0;
-    int candidates = 0;
+    int candidates = 0, nodes = s->state.node_count;
     for (int k = first; k < count; k++)
         reach = fmax(reach, reach_of(s, s->query_which[k]) + radius_of(s, s->query_which[k]));
     // distances grow with what is asked for: twice the reach lets most far points sleep for a while
@@ -210,6 +228,8 @@ static int answer(Stepper *s, int first, int count, int *candidate)
         const VesselHit *hit = &s->query_hit[k];
         double gap = hit->gap - radius_of(s, point), own_reach = reach_of(s, point);
         s->place[point] = s->query_place[k];
+        if (point >= nodes && !presses(s, point) && hit->gap > gap_between(s, point - nodes) - DIP_MIN)
+            continue;        // its nodes keep it off the wall
         if (!(hit->flags & (VESSEL_FAR | VESSEL_OPEN_END)) && gap < own_reach && vec3_is_finite(hit->normal)) {
             candidate[candidates++] = k;
             continue;
@@ -245,18 +265,16 @@ static double gap_from(const Stepper *s, int node, Vec3 place)
     return hit->gap + vec3_dot(hit->normal, d) + 0.5 * sym3_quadratic(&hit->hessian, d);
 }
 
-// Do the nodes of an element keep its only slot off the wall?
+// Do the nodes of an element keep a slot off the wall, as far as they can see and agree?
 static bool is_covered(const Stepper *s, int k)
 {
-    const Slot *slot = &s->slot[k];
-    int i = slot->element, a = s->answer_of[i], b = s->answer_of[i + 1];
-    if (s->slot_start[i + 1] - s->slot_start[i] > 1 || a < 0 || b < 0 || ((s->query_hit[a].flags | s->query_hit[b].flags) & ~0u) != 0)
+    int i = s->slot[k].element;
+    double alone = gap_between(s, k);
+    if (s->wire.length[i] > SIGHT || alone == HUGE_VAL || presses(s, s->state.node_count + k))
         return false;
-    Vec3 f = s->force[s->state.node_count + k], place = s->slot_place[k].position;
-    if (f.x != 0 || f.y != 0 || f.z != 0)
-        return false;
-    double alone = s->query_hit[a].gap + slot->weight * (s->query_hit[b].gap - s->query_hit[a].gap);
-    return fmin(gap_from(s, i, place), gap_from(s, i + 1, place)) > alone - DIP_MIN;
+    Vec3 place = s->slot_place[k].position;
+    double one = gap_from(s, i, place), other = gap_from(s, i + 1, place);
+    return fabs(one - other) < 5 * DIP_MIN && fmin(one, other) > alone - DIP_MIN;
 }
 
 static int ask_slots(Stepper *s, int count)
@@ -276,8 +294,8 @@ static int ask_slots(Stepper *s, int count)
         double near = mouth ? 0 : s->clearance[i] - vec3_distance(x, s->state.position[i]);
         double bound = fmax(near, s->clearance[i + 1] - vec3_distance(x, s->state.position[i + 1]));
         if (bound > 0)
-            s->room[p] = bound;
-        if (bound > 0 || (!mouth && is_covered(s, k)))
+            s->room[p] = bound + REACH;
+        if (bound > 0 || is_covered(s, k))
             forget(s, p);    // what it knew grows old; its neighbours' knowledge does not
         else
             ask(s, p, &count);
