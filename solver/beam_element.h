@@ -1,20 +1,13 @@
 // The corotational beam element: large rotation, small strain, Timoshenko shear, circular section, rest curvature.
-// DESIGN section 3; equations at the head of beam_element.c. Lengths mm, forces N, moments N mm, energies mJ.
+// DESIGN section 3; equations in beam_equations.h. Lengths mm, forces N, moments N mm, energies mJ.
 //
-// Arrays are one per quantity (lanes are elements, so that the loop over elements vectorises); the caller owns all of them.
-// Nothing here allocates. A kernel gives the same bits on every instruction set (no contraction, one order per lane).
+// Arrays are one per quantity (lanes are elements, so that loops over elements vectorise); the caller owns all of them.
+// Nothing here allocates. Kernels give the same bits on every instruction set (no contraction, one order per lane).
 #ifndef SELDINGER_SOLVER_BEAM_ELEMENT_H
 #define SELDINGER_SOLVER_BEAM_ELEMENT_H
 
 #include "geom/linear.h"
 #include "solver/block_chain.h"
-
-// Kernels are compiled once per instruction set and picked at start-up; sanitizers cannot run before the resolver does.
-#if defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && defined(__x86_64__)
-#define BEAM_KERNEL __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define BEAM_KERNEL
-#endif
 
 typedef struct BeamRest {    // what an element is when nothing acts on it, (E) each
     int count;               // E
@@ -34,23 +27,11 @@ typedef struct BeamPose {    // nodes, (M) each
     double *x, *y, *z, *qw, *qx, *qy, *qz;
 } BeamPose;
 
-// What the energy's first derivative gives, and what the tangent is made of, (E) each. Gradients: the force on a node is minus these.
-typedef struct BeamVectors {         // three arrays
-    double *x, *y, *z;
-} BeamVectors;
-typedef struct BeamStrain {
-    BeamVectors chord;               // unit
-    BeamVectors tangent1, tangent2;  // unit: where the nodes' frames see the rest chord
-    BeamVectors stretch;             // derivative of the extension with the position of node 2 …
-    BeamVectors bow1, bow2;          // [mm] … and with the rotations of the nodes
-    BeamVectors axis;                // derivative of the twist with the rotation of node 2; with that of node 1 the opposite
-    BeamVectors force2;              // [N] gradient for the position of node 2; that of node 1 is the opposite
-    BeamVectors moment1, moment2;    // [N mm] gradient for rotations about the space axes
-    double *inverse;                 // [1/mm] of the chord's length
-    double *tension;                 // [N]
-    double *energy;                  // [mJ]
-} BeamStrain;
-enum { BEAM_REST_ARRAYS = 12, BEAM_POSE_ARRAYS = 7, BEAM_STRAIN_VECTORS = 10, BEAM_STRAIN_ARRAYS = 33 };
+typedef struct BeamInertia { // nodes, (M) each
+    double *mass, *lateral, *excess;     // [g], [g mm2] about a diameter, and what the inertia about the axis is more than that
+    double *ax, *ay, *az, *tx, *ty, *tz; // [mm/ms2], [rad/ms2] a: the right-hand side gets M a
+} BeamInertia;
+enum { BEAM_REST_ARRAYS = 12, BEAM_POSE_ARRAYS = 7, BEAM_INERTIA_ARRAYS = 9 };
 
 // One element, for the sheath and for tests.
 typedef struct BeamInput {
@@ -62,7 +43,7 @@ typedef struct BeamInput {
 typedef struct BeamOutput {
     Vec3 chord, tangent1, tangent2, stretch, bow1, bow2, axis;     // as in BeamStrain
     Vec3 force2, moment1, moment2;   // gradients
-    double inverse, tension, energy;
+    double inverse, tension, torque, energy;   // 1 / length of the chord; [N], [N mm], [mJ]
     double bow;                      // [mm] arc length less chord, by the cubic shape
     Vec3 angle1, angle2;             // [rad] bending angles against the rest chord
     Vec3 turn1, turn2;               // [rad] from the chord to the nodes' tangents
@@ -70,17 +51,29 @@ typedef struct BeamOutput {
 } BeamOutput;
 void beam_element(const BeamInput *in, BeamOutput *out);
 
-// Elements first to last-1 of a chain; element i joins nodes i and i+1.
-void beam_chain_strain(const BeamRest *rest, const BeamPose *pose, int first, int last, const BeamStrain *strain);
-
 // The tangent's 6x6 blocks of one element (row-major): main stiffness times `scale` plus the positive part of the geometric one.
 typedef struct BeamTangent {
     double k11[36], k21[36], k22[36];
 } BeamTangent;
 void beam_tangent(const BeamInput *in, const BeamOutput *out, double scale, BeamTangent *tangent);
-// Writes the blocks of elements first to last-1 into the chain: lower ones, and the diagonal ones of nodes first to last, of which the first
-// is added to.
-void beam_chain_tangent(const BeamRest *rest, const BeamStrain *strain, int first, int last, double scale, BlockChain *chain);
+
+// A chain: element i joins nodes i and i+1. Kernels read up to BEAM_PADDING entries past the last one of each array (any numbers will do).
+enum { BEAM_PADDING = 8 };
+typedef struct BeamChain {
+    BeamRest rest;
+    BeamPose pose;
+    BeamInertia inertia;
+    double *drag;            // (E) [N] viscous tension, which stiffens like the elastic one: 0, or what beam_chain_damp() left
+} BeamChain;
+
+// Elements first to last-1 with the nodes first to last, into `chain` and b (M, 6): the lower blocks of the elements, the diagonal blocks and the
+// right-hand side of the nodes, written, not added to (so what joins node `first` from before comes afterwards).
+//   block = scale K_main + positive part of the geometric stiffness + rate M,   b = M a - gradient of the energy
+void beam_chain_assemble(const BeamChain *beam, int first, int last, double scale, double rate, BlockChain *chain, double *b);
+
+// For an iterate, before its assembly: drag, and in b (M, 6), written for the nodes first to last, the forces of stiffness damping between the poses
+// `start` and the chain's: -rate J' C (strain - strain at the start). An element's rigid motion is taken off, so that a turn of any size is not damped.
+void beam_chain_damp(const BeamChain *beam, const BeamPose *start, int first, int last, double rate, double *b);
 
 // c and d of a beam of this length: moments per rotation of the near and of the far end.
 void beam_bending(double length, double bending, double shear, double *near, double *far);

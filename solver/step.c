@@ -14,7 +14,8 @@
 static const double TURN_MAX = 0.3;              // [rad]
 // A chord turned by 0.02 rad stretches by 2e-4 in a linear step, which a free wire would keep as energy: another linearisation costs it 30 us.
 // Among contacts it costs a contact solve, and nothing is seen to gain below 0.04.
-static const double NEWTON_MOTION = 0.02, NEWTON_MOTION_IN_CONTACT = 0.04;       // [rad]
+static const double NEWTON_MOTION = 0.005, NEWTON_MOTION_IN_CONTACT = 0.04;      // [rad]
+static const double SWING_MOTION = 1e-5;         // [rad] nothing turns: displaced and turned chords are the same
 enum { NEWTON_MAX = 4 };
 // A tip that snaps from one wall to another lands where nobody linearised: [mm] of true penetration that asks for another linearisation there, up to
 // twice NEWTON_MAX of them.
@@ -31,27 +32,24 @@ static double *take(double **from, size_t count)
 
 static bool allocate_scratch(Stepper *s)
 {
-    size_t m = (size_t)s->wire.node_count, e = (size_t)s->wire.element_count;
-    s->scratch = calloc(BEAM_REST_ARRAYS * e + BEAM_POSE_ARRAYS * m + BEAM_STRAIN_ARRAYS * e + 24 * m, sizeof *s->scratch);
+    size_t m = (size_t)s->wire.node_count, padded = m + BEAM_PADDING;
+    s->scratch = calloc((BEAM_REST_ARRAYS + 2 * BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1) * padded + 24 * m, sizeof *s->scratch);
     if (!s->scratch)
         return false;
     double *at = s->scratch;
-    BeamRest *r = &s->rest;
-    double **rest[] = {&r->length, &r->extend, &r->axial, &r->near, &r->far, &r->twist, &r->half_w, &r->half_y, &r->half_z,
-                       &r->curvature, &r->bending, &r->shear};
-    for (int i = 0; i < BEAM_REST_ARRAYS; i++)
-        *rest[i] = take(&at, e);
-    BeamPose *p = &s->pose;
-    double **pose[] = {&p->x, &p->y, &p->z, &p->qw, &p->qx, &p->qy, &p->qz};
-    for (int i = 0; i < BEAM_POSE_ARRAYS; i++)
-        *pose[i] = take(&at, m);
-    BeamStrain *t = &s->strain;
-    BeamVectors *vectors[] = {&t->chord, &t->tangent1, &t->tangent2, &t->stretch, &t->bow1, &t->bow2, &t->axis, &t->force2, &t->moment1, &t->moment2};
-    for (int i = 0; i < BEAM_STRAIN_VECTORS; i++)
-        *vectors[i] = (BeamVectors){take(&at, e), take(&at, e), take(&at, e)};
-    t->inverse = take(&at, e);
-    t->tension = take(&at, e);
-    t->energy = take(&at, e);
+    BeamRest *r = &s->beam.rest;
+    BeamPose *p = &s->beam.pose, *q = &s->start_pose;
+    BeamInertia *i = &s->beam.inertia;
+    double **array[] = {&r->length, &r->extend, &r->axial, &r->near, &r->far, &r->twist, &r->half_w, &r->half_y, &r->half_z, &r->curvature, &r->bending,
+                        &r->shear, &p->x, &p->y, &p->z, &p->qw, &p->qx, &p->qy, &p->qz, &q->x, &q->y, &q->z, &q->qw, &q->qx, &q->qy, &q->qz,
+                        &i->mass, &i->lateral, &i->excess, &i->ax, &i->ay, &i->az, &i->tx, &i->ty, &i->tz, &s->beam.drag};
+    for (size_t k = 0; k < sizeof array / sizeof *array; k++)
+        *array[k] = take(&at, padded);
+    for (size_t k = 0; k < m; k++) {
+        i->mass[k] = s->wire.mass[k];
+        i->lateral[k] = s->wire.inertia_lateral[k];
+        i->excess[k] = s->wire.inertia_axial[k] - s->wire.inertia_lateral[k];
+    }
     s->b = take(&at, 6 * m);
     s->u = take(&at, 6 * m);
     s->linearised = take(&at, 6 * m);
@@ -214,7 +212,7 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
         stepper_destroy(s);
         return NULL;
     }
-    wire_rest(&s->wire, &o.wire, &s->rest);
+    wire_rest(&s->wire, &o.wire, &s->beam.rest);
     s->gravity = o.wire.gravity;
     s->damping_mass = o.wire.damping_mass;
     s->damping_stiffness = o.wire.damping_stiffness;
@@ -296,7 +294,7 @@ static void let_go(Stepper *s, int node)
     WireState *w = &s->state;
     SheathElement e;
     double along = stepper_sheath_coordinate(s, node), length = s->wire.length[node] + along, x = along / length;
-    sheath_element(&s->rest, node, s->mouth, s->axis[0], along, w->orientation[node], w->position[node + 1], w->orientation[node + 1], 0, &e);
+    sheath_element(&s->beam.rest, node, s->mouth, s->axis[0], along, w->orientation[node], w->position[node + 1], w->orientation[node + 1], 0, &e);
     // the cubic's tangent against the one at the mouth, and its integral
     Vec3 turn = vec3_add_scaled(vec3_scale(e.out.turn1, x * (3 * x - 4)), x * (3 * x - 2), e.out.turn2);
     Vec3 sum = vec3_scale(vec3_add_scaled(vec3_scale(e.out.turn1, x * x * (x - 2)), x * x * (x - 1), e.out.turn2), length);
@@ -369,7 +367,6 @@ static void solve(Stepper *s)
 // The largest turn of an element's chord or of a node against the iterate [rad]; a node's turn about the axis does not count.
 static double largest_turn(const Stepper *s)
 {
-    const BeamStrain *e = &s->strain;
     double largest = 0;
     for (int i = s->first_free; i < s->state.node_count; i++) {
         const double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
@@ -379,7 +376,9 @@ static double largest_turn(const Stepper *s)
         double node = vec3_norm2(vec3_cross(turn, axis)), chord = 0;
         if (i > s->first_free) {
             Vec3 d = vec3(u[0] - u[-6] - k[0] + k[-6], u[1] - u[-5] - k[1] + k[-5], u[2] - u[-4] - k[2] + k[-4]);
-            chord = vec3_norm2(vec3_cross(vec3(e->chord.x[i - 1], e->chord.y[i - 1], e->chord.z[i - 1]), d)) * (e->inverse[i - 1] * e->inverse[i - 1]);
+            Vec3 c = vec3_sub(s->state.position[i], s->state.position[i - 1]);
+            double length2 = vec3_norm2(c);
+            chord = vec3_norm2(vec3_cross(c, d)) / (length2 * length2);
         } else if (i > 0) {
             // from the mouth
             Vec3 d = vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]);
@@ -439,23 +438,21 @@ static void keep_mass_centre(Stepper *s, double part)
         s->state.position[i] = vec3_add_scaled(s->state.position[i], 1 / mass, away);
 }
 
-// Moves the free nodes' positions by `part` of the change, each element turning and stretching instead of its end being displaced: to first
-// order the same, but a large turn does not stretch the wire. From the proximal end on, so not where the rig holds a node further along.
+// Moves the free nodes' positions by `part` of the change, chord by chord from the proximal end on: a chord c that the solution makes s = c + change
+// becomes s (c.s)/(|c||s|), as long as the linear solution thinks it is. With s itself a turn of 0.005 rad would stretch the wire by 1e-5, which in
+// steel is 0.1 N. Not where the rig holds a node further along.
 static void swing(Stepper *s, double part)
 {
-    const double *base = s->u;
     Vec3 from = s->mouth, moved = s->mouth, shift = vec3(0, 0, 0);
     for (int i = s->first_free; i < s->state.node_count; i++) {
-        const double *u = base + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
+        const double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
         Vec3 own = vec3_scale(vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]), part), here = s->state.position[i];
         if (i == 0) {
             moved = vec3_add(here, own);
         } else {
-            Vec3 chord = vec3_sub(here, from), change = vec3_sub(own, shift);
-            double length2 = fmax(vec3_norm2(chord), 1e-12);
-            Vec3 turn = vec3_scale(vec3_cross(chord, change), 1 / length2);
-            chord = vec3_scale(quat_rotate(quat_from_rotation_vector(turn), chord), 1 + vec3_dot(chord, change) / length2);
-            moved = vec3_add(moved, chord);
+            Vec3 chord = vec3_sub(here, from), sum = vec3_add(chord, vec3_sub(own, shift));
+            double product = vec3_dot(chord, sum);
+            moved = vec3_add_scaled(moved, product > 0 ? product / sqrt(vec3_norm2(chord) * vec3_norm2(sum)) : 1, sum);
         }
         from = here;
         shift = own;
@@ -479,7 +476,7 @@ static void move(Stepper *s, double turn)
 {
     WireState *w = &s->state;
     double part = turn > TURN_MAX ? TURN_MAX / turn : 1;
-    if (turn > NEWTON_MOTION && s->can_swing)
+    if (turn > SWING_MOTION && s->can_swing)
         swing(s, part);
     else
         displace(s, part);
@@ -617,7 +614,7 @@ double stepper_elastic_energy(const Stepper *s)
     double energy = 0;
     int held = count_held(s, 0);
     for (int i = 0; i < s->wire.element_count; i++) {
-        const BeamRest *r = &s->rest;
+        const BeamRest *r = &s->beam.rest;
         const WireState *w = &s->state;
         double k0 = r->curvature[i];
         if (i + 1 < held) {

@@ -1,10 +1,10 @@
 // The linear system of a step, linearised about an iterate x_k (x_n in the first iteration, then u_k = 0):
 //
-//   (M/h^2 + D/h + K) u = M v/h + f(x_k) + f_ext + K u_k,   u = x_{n+1} - x_n,   D = alpha M + beta K_main
+//   A = M/h^2 + D/h + K,   D = alpha M + beta K_main,   K = K_main + positive part of the geometric stiffness + the wall's curvature
+//   A u = A u_k + r(x_k),   r = M (v/h + g) - (M/h^2 + alpha M/h) u_k + f(x_k) + f_ext - beta/h J' C (strain(x_k) - strain(x_n)),   u = x_{n+1} - x_n
 //
-// K = K_main + positive part of the geometric stiffness + the wall's curvature. Unknowns are six a node in space axes; for nodes in the sheath
-// they are in the line's axes, so that "stays on the line" is unit rows. Reactions are read from node 0's rows as they were
-// before its constraints.
+// Unknowns are six a node in space axes; for nodes in the sheath they are in the line's axes, so that "stays on the line" is unit rows.
+// Reactions are read from node 0's rows as they were before its constraints.
 #include "solver/step_internal.h"
 
 #include <string.h>
@@ -14,13 +14,32 @@ double stepper_sheath_coordinate(const Stepper *s, int node)
     return vec3_dot(vec3_sub(s->state.position[node], s->mouth), s->axis[0]);
 }
 
-static void load_pose(Stepper *s)
+static void load_pose(const Vec3 *restrict position, const Quat *restrict orientation, int first, int count, const BeamPose *pose)
 {
-    const WireState *w = &s->state;
-    BeamPose p = s->pose;
-    for (int i = 0; i < w->node_count; i++) {
-        p.x[i] = w->position[i].x, p.y[i] = w->position[i].y, p.z[i] = w->position[i].z;
-        p.qw[i] = w->orientation[i].w, p.qx[i] = w->orientation[i].x, p.qy[i] = w->orientation[i].y, p.qz[i] = w->orientation[i].z;
+    double *restrict x = pose->x, *restrict y = pose->y, *restrict z = pose->z;
+    double *restrict qw = pose->qw, *restrict qx = pose->qx, *restrict qy = pose->qy, *restrict qz = pose->qz;
+    for (int i = first; i < count; i++)
+        x[i] = position[i].x, y[i] = position[i].y, z[i] = position[i].z;
+    for (int i = first; i < count; i++)
+        qw[i] = orientation[i].w, qx[i] = orientation[i].x, qy[i] = orientation[i].y, qz[i] = orientation[i].z;
+}
+
+// What acts on the nodes' mass: v/h + g, less what the iterate has used up of it.
+static void load_inertia(Stepper *s, double rate)
+{
+    const BeamInertia *m = &s->beam.inertia;
+    double *restrict ax = m->ax, *restrict ay = m->ay, *restrict az = m->az, *restrict tx = m->tx, *restrict ty = m->ty, *restrict tz = m->tz;
+    const Vec3 *restrict velocity = s->state.velocity, *restrict spin = s->state.spin, g = s->gravity;
+    double per = 1 / s->dt;
+    int count = s->state.node_count;
+    for (int i = s->first_free; i < count; i++)
+        ax[i] = velocity[i].x * per + g.x, ay[i] = velocity[i].y * per + g.y, az[i] = velocity[i].z * per + g.z;
+    for (int i = s->first_free; i < count; i++)
+        tx[i] = spin[i].x * per, ty[i] = spin[i].y * per, tz[i] = spin[i].z * per;
+    for (int i = s->first_free; i < count && s->is_iterate; i++) {
+        const double *u = s->linearised + 6 * (size_t)i;
+        ax[i] -= rate * u[0], ay[i] -= rate * u[1], az[i] -= rate * u[2];
+        tx[i] -= rate * u[3], ty[i] -= rate * u[4], tz[i] -= rate * u[5];
     }
 }
 
@@ -29,52 +48,43 @@ static void add_vec(double *at, Vec3 v)
     at[0] += v.x, at[1] += v.y, at[2] += v.z;
 }
 
-// Inertia, gravity and the elements' forces of the free nodes.
-static void free_nodes(Stepper *s)
+// The elements between free nodes, their inertia and gravity.
+static void free_nodes(Stepper *s, double scale, double inertia)
 {
-    const Wire *w = &s->wire;
-    double h = s->dt, inertia = 1 / (h * h) + s->damping_mass / h;
-    for (int i = s->first_free; i < w->node_count; i++) {
-        double *d = s->chain.diag + 36 * (size_t)i, *b = s->b + 6 * (size_t)i, m = w->mass[i];
-        Quat q = s->state.orientation[i];
-        double t[3] = {1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y)};
-        double lateral = w->inertia_lateral[i], excess = w->inertia_axial[i] - lateral;
-        d[0] += m * inertia, d[7] += m * inertia, d[14] += m * inertia;
-        for (int r = 0; r < 3; r++)
-            for (int c = 0; c < 3; c++)
-                d[(3 + r) * 6 + 3 + c] += (excess * t[r] * t[c] + (r == c ? lateral : 0)) * inertia;
-        Vec3 v = s->state.velocity[i], spin = s->state.spin[i], axis = vec3(t[0], t[1], t[2]);
-        add_vec(b, vec3_scale(vec3_add_scaled(vec3_scale(s->gravity, h), 1, v), m / h));
-        add_vec(b + 3, vec3_scale(vec3_add_scaled(vec3_scale(spin, lateral), excess * vec3_dot(axis, spin), axis), 1 / h));
+    int first = s->first_free, count = s->state.node_count;
+    size_t from = 6 * (size_t)first, to = 6 * (size_t)count;
+    load_pose(s->state.position, s->state.orientation, first, count, &s->beam.pose);
+    load_inertia(s, inertia);
+    memset(s->beam.drag, 0, (size_t)s->wire.element_count * sizeof(double));
+    if (s->is_iterate) {
+        load_pose(s->start_position, s->start_orientation, first, count, &s->start_pose);
+        beam_chain_damp(&s->beam, &s->start_pose, first, count - 1, scale - 1, s->product);
     }
-    const BeamStrain *e = &s->strain;
-    for (int i = s->first_free; i < w->element_count; i++) {
-        double *b = s->b + 6 * (size_t)i;
-        b[0] += e->force2.x[i], b[1] += e->force2.y[i], b[2] += e->force2.z[i];
-        b[3] -= e->moment1.x[i], b[4] -= e->moment1.y[i], b[5] -= e->moment1.z[i];
-        b[6] -= e->force2.x[i], b[7] -= e->force2.y[i], b[8] -= e->force2.z[i];
-        b[9] -= e->moment2.x[i], b[10] -= e->moment2.y[i], b[11] -= e->moment2.z[i];
-    }
+    beam_chain_assemble(&s->beam, first, count - 1, scale, inertia, &s->chain, s->b);
+    for (size_t k = from; k < to && s->is_iterate; k++)
+        s->b[k] += s->product[k];
 }
 
 // Axial and torsional chain behind the mouth; lateral rows are unit rows.
-static void sheath_nodes(Stepper *s, double scale)
+static void sheath_nodes(Stepper *s, double scale, double inertia)
 {
     const Wire *w = &s->wire;
-    double h = s->dt, inertia = 1 / (h * h) + s->damping_mass / h;
+    const double *done = s->linearised;
     for (int i = 0; i < s->first_free; i++) {
         double *d = s->chain.diag + 36 * (size_t)i, *b = s->b + 6 * (size_t)i;
+        const double *u = done + 6 * (size_t)i;
+        double push = vec3_dot(s->state.velocity[i], s->axis[0]) / s->dt + vec3_dot(s->gravity, s->axis[0]);
         d[0] += w->mass[i] * inertia;
         d[21] += w->inertia_axial[i] * inertia;
         d[7] = d[14] = d[28] = d[35] = 1;
-        b[0] += w->mass[i] * (vec3_dot(s->state.velocity[i], s->axis[0]) / h + vec3_dot(s->gravity, s->axis[0]));
-        b[3] += w->inertia_axial[i] * vec3_dot(s->state.spin[i], s->axis[0]) / h;
+        b[0] += w->mass[i] * (push - inertia * u[0]);
+        b[3] += w->inertia_axial[i] * (vec3_dot(s->state.spin[i], s->axis[0]) / s->dt - inertia * u[3]);
         if (i + 1 == s->first_free)
             break;
-        double ka = s->rest.axial[i], kt = s->rest.twist[i];
-        double strain = stepper_sheath_coordinate(s, i + 1) - stepper_sheath_coordinate(s, i) - s->rest.length[i];
+        double ka = s->beam.rest.axial[i], kt = s->beam.rest.twist[i];
+        double strain = stepper_sheath_coordinate(s, i + 1) - stepper_sheath_coordinate(s, i) - s->beam.rest.length[i];
         Quat p = quat_mul(quat_conjugate(s->state.orientation[i]), s->state.orientation[i + 1]);
-        double tension = ka * strain, torque = kt * 2 * atan2(p.x, p.w);
+        double tension = ka * (strain + (scale - 1) * (u[6] - u[0])), torque = kt * (2 * atan2(p.x, p.w) + (scale - 1) * (u[9] - u[3]));
         double *l = s->chain.lower + 36 * (size_t)i, *next = d + 36;
         b[0] += tension, b[3] += torque;
         b[6] -= tension, b[9] -= torque;
@@ -84,16 +94,17 @@ static void sheath_nodes(Stepper *s, double scale)
     }
 }
 
+// Between the last held node and the first free one. Clamped at the mouth it turns little in a step: its damping is that of the displacement.
 static void mouth_element(Stepper *s, double scale)
 {
     int i = s->first_free - 1;
     double ahead = s->is_iterate ? 0 : s->command.advance, column[12];
     SheathElement *e = &s->mouth_element;
-    sheath_element(&s->rest, i, s->mouth, s->axis[0], stepper_sheath_coordinate(s, i), s->state.orientation[i], s->state.position[i + 1],
+    sheath_element(&s->beam.rest, i, s->mouth, s->axis[0], stepper_sheath_coordinate(s, i), s->state.orientation[i], s->state.position[i + 1],
                    s->state.orientation[i + 1], ahead, e);
-    BeamTangent t;
-    sheath_tangent(&s->rest, i, s->axis[0], e, scale, &t, column);
-    double *b = s->b + 6 * (size_t)i, *d = s->chain.diag + 36 * (size_t)i;
+    BeamTangent t, damped;
+    sheath_tangent(&s->beam.rest, i, s->axis[0], e, scale, &t, column);
+    double *b = s->b + 6 * (size_t)i, *d = s->chain.diag + 36 * (size_t)i, *l = s->chain.lower + 36 * (size_t)i;
     b[0] -= e->axial_gradient;
     b[3] -= e->twist_gradient;
     add_vec(b + 6, vec3_negate(e->out.force2));
@@ -103,8 +114,19 @@ static void mouth_element(Stepper *s, double scale)
     for (int k = 0; k < 36; k++) {
         d[k] += t.k11[k];
         d[36 + k] += t.k22[k];
+        l[k] = t.k21[k];
     }
-    memcpy(s->chain.lower + 36 * (size_t)i, t.k21, sizeof t.k21);
+    if (!s->is_iterate)
+        return;
+    sheath_tangent(&s->beam.rest, i, s->axis[0], e, 1, &damped, column);
+    const double *u = s->linearised + 6 * (size_t)i;
+    for (int r = 0; r < 6; r++)
+        for (int c = 0; c < 6; c++) {
+            int k = 6 * r + c;
+            b[r] -= (t.k11[k] - damped.k11[k]) * u[c];
+            b[c] -= (t.k21[k] - damped.k21[k]) * u[6 + r];
+            b[6 + r] -= (t.k21[k] - damped.k21[k]) * u[c] + (t.k22[k] - damped.k22[k]) * u[6 + c];
+        }
 }
 
 static void add_load(Stepper *s, int node, double weight, const WireLoad *load)
@@ -171,49 +193,30 @@ static void constraints(Stepper *s)
                 prescribe(s, i, k, 0);
 }
 
-// Nodes in the sheath and the first free one; the elements write the blocks of the others.
-static void clear_system(Stepper *s)
+static void clear_held(Stepper *s)
 {
-    size_t nodes = (size_t)s->chain.count, held = (size_t)s->first_free;
-    memset(s->chain.diag, 0, 36 * (held < nodes ? held + 1 : nodes) * sizeof(double));
+    size_t held = (size_t)s->first_free;
+    memset(s->chain.diag, 0, 36 * held * sizeof(double));
+    memset(s->b, 0, 6 * held * sizeof(double));
     if (held > 1)
         memset(s->chain.lower, 0, 36 * (held - 1) * sizeof(double));
-    memset(s->b, 0, 6 * nodes * sizeof(double));
-}
-
-// K u_k of an iterate: the main stiffness without its share of damping, geometric and curvature parts included.
-static void iterate_product(Stepper *s)
-{
-    clear_system(s);
-    beam_chain_tangent(&s->rest, &s->strain, s->first_free, s->wire.element_count, 1, &s->chain);
-    if (s->first_free > 0 && s->first_free < s->chain.count)
-        mouth_element(s, 1);
-    contact_add_curvature(&s->set, &s->chain);
-    for (int i = 0; i + 1 < s->first_free; i++) {
-        double *d = s->chain.diag + 36 * (size_t)i, *l = s->chain.lower + 36 * (size_t)i, ka = s->rest.axial[i], kt = s->rest.twist[i];
-        d[0] += ka, d[36] += ka, l[0] = -ka;
-        d[21] += kt, d[57] += kt, l[21] = -kt;
-    }
-    block_chain_multiply(&s->chain, s->linearised, s->product);
 }
 
 void stepper_assemble(Stepper *s)
 {
-    size_t unknowns = 6 * (size_t)s->chain.count;
-    double scale = 1 + s->damping_stiffness / s->dt;
-    load_pose(s);
-    beam_chain_strain(&s->rest, &s->pose, s->first_free, s->wire.element_count, &s->strain);
-    if (s->is_iterate)
-        iterate_product(s);
-    clear_system(s);
-    if (s->is_iterate)
-        memcpy(s->b, s->product, unknowns * sizeof(double));
-    beam_chain_tangent(&s->rest, &s->strain, s->first_free, s->wire.element_count, scale, &s->chain);
-    free_nodes(s);
-    if (s->first_free > 0) {
-        if (s->first_free < s->chain.count)
+    double h = s->dt, scale = 1 + s->damping_stiffness / h, inertia = 1 / (h * h) + s->damping_mass / h;
+    clear_held(s);
+    if (s->first_free < s->chain.count) {
+        free_nodes(s, scale, inertia);
+        if (s->first_free > 0)
             mouth_element(s, scale);
-        sheath_nodes(s, scale);
+    }
+    sheath_nodes(s, scale, inertia);
+    contact_add_curvature(&s->set, &s->chain);
+    if (s->is_iterate) {
+        block_chain_multiply(&s->chain, s->linearised, s->product);
+        for (int k = 0; k < 6 * s->chain.count; k++)
+            s->b[k] += s->product[k];
     }
     for (int i = 0; i < s->load_count; i++) {
         const LoadPlace *p = &s->load[i];
@@ -221,7 +224,6 @@ void stepper_assemble(Stepper *s)
         if (p->weight > 0)
             add_load(s, p->node + 1, p->weight, &p->load);
     }
-    contact_add_curvature(&s->set, &s->chain);
     constraints(s);
 }
 

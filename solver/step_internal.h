@@ -18,7 +18,7 @@ typedef struct LoadPlace {
 struct Stepper {
     // given once
     Wire wire;
-    BeamRest rest;
+    BeamChain beam;          // its pose and right-hand side: scratch of an assembly
     int load_count;
     LoadPlace *load;
     uint8_t *fixed;          // (M) DOF_ mask of the rig
@@ -52,8 +52,7 @@ struct Stepper {
     BlockFactor *factor;
     ContactSolver *solver;
     ContactSet set;
-    BeamPose pose;
-    BeamStrain strain;
+    BeamPose start_pose;     // x_n, for the damping of an iterate
     SheathElement mouth_element;
     double *b, *u;           // (M, 6)
     double *linearised;      // (M, 6) displacement from x_n to the iterate about which the system is linear

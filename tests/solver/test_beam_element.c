@@ -1,4 +1,5 @@
 // Laws of the beam element: no force at rest, force = -dE/dx, invariance, symmetry, tangent against the force's derivative.
+#include "geom/simd.h"
 #include "solver/beam_element.h"
 #include "solver/sheath.h"
 #include "solver/wire.h"
@@ -7,6 +8,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -286,20 +288,28 @@ static void tangent_is_positive(void **state)
     }
 }
 
-// Kernel = single element, whatever instruction set was picked.
-static void chain_equals_elements(void **state)
+// --- the chain's kernels ---
+
+enum { E = 23, PADDED = E + 1 + BEAM_PADDING };
+typedef struct Chain {
+    double array[BEAM_REST_ARRAYS + BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1][PADDED];
+    BeamChain beam;
+    BlockChain blocks;
+    double b[(E + 1) * 6];
+} Chain;
+
+// A straight and a curved section whose border is in the middle of a group of lanes, bent at random, with random inertia.
+static void make_chain(Chain *c)
 {
-    (void)state;
-    enum { E = 23 };
-    static double rest_array[BEAM_REST_ARRAYS][E], pose_array[BEAM_POSE_ARRAYS][E + 1], strain_array[BEAM_STRAIN_ARRAYS][E];
-    BeamRest rest = {.length = rest_array[0], .extend = rest_array[1], .axial = rest_array[2], .near = rest_array[3], .far = rest_array[4],
-                     .twist = rest_array[5], .half_w = rest_array[6], .half_y = rest_array[7], .half_z = rest_array[8],
-                     .curvature = rest_array[9], .bending = rest_array[10], .shear = rest_array[11]};
-    BeamPose pose = {pose_array[0], pose_array[1], pose_array[2], pose_array[3], pose_array[4], pose_array[5], pose_array[6]};
-    BeamStrain s = {.inverse = strain_array[30], .tension = strain_array[31], .energy = strain_array[32]};
-    BeamVectors *vectors[] = {&s.chord, &s.tangent1, &s.tangent2, &s.stretch, &s.bow1, &s.bow2, &s.axis, &s.force2, &s.moment1, &s.moment2};
-    for (int i = 0; i < BEAM_STRAIN_VECTORS; i++)
-        *vectors[i] = (BeamVectors){strain_array[3 * i], strain_array[3 * i + 1], strain_array[3 * i + 2]};
+    *c = (Chain){0};
+    BeamRest *r = &c->beam.rest;
+    BeamPose *p = &c->beam.pose;
+    BeamInertia *m = &c->beam.inertia;
+    double **array[] = {&r->length, &r->extend, &r->axial, &r->near, &r->far, &r->twist, &r->half_w, &r->half_y, &r->half_z, &r->curvature, &r->bending,
+                        &r->shear, &p->x, &p->y, &p->z, &p->qw, &p->qx, &p->qy, &p->qz, &m->mass, &m->lateral, &m->excess, &m->ax, &m->ay, &m->az,
+                        &m->tx, &m->ty, &m->tz, &c->beam.drag};
+    for (size_t k = 0; k < sizeof array / sizeof *array; k++)
+        *array[k] = c->array[k];
     WireSection section[2] = {{.length = 10, .diameter = 0.36, .young_modulus = 80e3, .poisson_ratio = 0.3, .density = 6.45e-3},
                               {.length = 10, .diameter = 0.3, .young_modulus = 5e3, .poisson_ratio = 0.3, .density = 6.45e-3,
                                .rest_curvature = 0.2, .rest_plane = 0.4}};
@@ -310,29 +320,114 @@ static void chain_equals_elements(void **state)
     Wire wire;
     char why[256];
     assert_true(wire_create(&wire, &options, why, sizeof why));
-    wire_rest(&wire, &options, &rest);
+    wire_rest(&wire, &options, r);
     for (int i = 0; i <= E; i++) {
-        Vec3 x = vec3_add(vec3(wire.s[i], 0, 0), random_vec(0.05));
+        Vec3 x = vec3_add(vec3(wire.s[i], 0, 0), random_vec(0.05)), a = random_vec(1), t = random_vec(1);
         Quat q = quat_from_rotation_vector(random_vec(0.2));
-        pose.x[i] = x.x, pose.y[i] = x.y, pose.z[i] = x.z;
-        pose.qw[i] = q.w, pose.qx[i] = q.x, pose.qy[i] = q.y, pose.qz[i] = q.z;
-    }
-    beam_chain_strain(&rest, &pose, 0, E, &s);
-    for (int i = 0; i < E; i++) {
-        BeamInput in = {.x1 = {pose.x[i], pose.y[i], pose.z[i]}, .x2 = {pose.x[i + 1], pose.y[i + 1], pose.z[i + 1]},
-                        .q1 = {pose.qw[i], pose.qx[i], pose.qy[i], pose.qz[i]},
-                        .q2 = {pose.qw[i + 1], pose.qx[i + 1], pose.qy[i + 1], pose.qz[i + 1]},
-                        .length = rest.length[i], .extend = rest.extend[i], .axial = rest.axial[i], .near = rest.near[i],
-                        .far = rest.far[i], .twist = rest.twist[i], .half_w = rest.half_w[i], .half_y = rest.half_y[i],
-                        .half_z = rest.half_z[i]};
-        BeamOutput out;
-        beam_element(&in, &out);
-        assert_true(out.energy == s.energy[i] && out.tension == s.tension[i] && out.inverse == s.inverse[i]);
-        Vec3 one[] = {out.chord, out.tangent1, out.tangent2, out.stretch, out.bow1, out.bow2, out.axis, out.force2, out.moment1, out.moment2};
-        for (int k = 0; k < BEAM_STRAIN_VECTORS; k++)
-            assert_true(one[k].x == vectors[k]->x[i] && one[k].y == vectors[k]->y[i] && one[k].z == vectors[k]->z[i]);
+        p->x[i] = x.x, p->y[i] = x.y, p->z[i] = x.z;
+        p->qw[i] = q.w, p->qx[i] = q.x, p->qy[i] = q.y, p->qz[i] = q.z;
+        m->mass[i] = 1 + random_unit(), m->lateral[i] = 1 + random_unit(), m->excess[i] = random_unit();
+        m->ax[i] = a.x, m->ay[i] = a.y, m->az[i] = a.z, m->tx[i] = t.x, m->ty[i] = t.y, m->tz[i] = t.z;
     }
     wire_destroy(&wire);
+    assert_true(block_chain_create(&c->blocks, E + 1));
+}
+
+static BeamInput chain_input(const Chain *c, int i)
+{
+    BeamInput in = {0};
+    const BeamPose *p = &c->beam.pose;
+    const BeamRest *r = &c->beam.rest;
+    in.x1 = vec3(p->x[i], p->y[i], p->z[i]), in.x2 = vec3(p->x[i + 1], p->y[i + 1], p->z[i + 1]);
+    in.q1 = (Quat){p->qw[i], p->qx[i], p->qy[i], p->qz[i]}, in.q2 = (Quat){p->qw[i + 1], p->qx[i + 1], p->qy[i + 1], p->qz[i + 1]};
+    in.length = r->length[i], in.extend = r->extend[i], in.axial = r->axial[i], in.near = r->near[i], in.far = r->far[i], in.twist = r->twist[i];
+    in.half_w = r->half_w[i], in.half_y = r->half_y[i], in.half_z = r->half_z[i];
+    return in;
+}
+
+static void add3(double *at, double sign, Vec3 v) { at[0] += sign * v.x, at[1] += sign * v.y, at[2] += sign * v.z; }
+
+// The same system element by element, node by node.
+static void plain_assembly(const Chain *c, int first, double scale, double rate, double *diag, double *lower, double *b)
+{
+    for (int i = first; i <= E; i++) {
+        const BeamInertia *m = &c->beam.inertia;
+        const BeamPose *p = &c->beam.pose;
+        Vec3 axis = quat_rotate((Quat){p->qw[i], p->qx[i], p->qy[i], p->qz[i]}, vec3(1, 0, 0)), t = vec3(m->tx[i], m->ty[i], m->tz[i]);
+        double a[3] = {axis.x, axis.y, axis.z}, *d = diag + 36 * i;
+        for (int k = 0; k < 3; k++) {
+            d[7 * k] += m->mass[i] * rate;
+            for (int j = 0; j < 3; j++)
+                d[6 * (3 + k) + 3 + j] += rate * (m->excess[i] * a[k] * a[j] + (k == j ? m->lateral[i] : 0));
+        }
+        add3(b + 6 * i, m->mass[i], vec3(m->ax[i], m->ay[i], m->az[i]));
+        add3(b + 6 * i + 3, 1, vec3_add_scaled(vec3_scale(t, m->lateral[i]), m->excess[i] * vec3_dot(axis, t), axis));
+    }
+    for (int i = first; i < E; i++) {
+        BeamInput in = chain_input(c, i);
+        BeamOutput out;
+        BeamTangent t;
+        beam_element(&in, &out);
+        beam_tangent(&in, &out, scale, &t);
+        for (int k = 0; k < 36; k++) {
+            diag[36 * i + k] += t.k11[k];
+            diag[36 * (i + 1) + k] += t.k22[k];
+            lower[36 * i + k] = t.k21[k];
+        }
+        add3(b + 6 * i, 1, out.force2);
+        add3(b + 6 * i + 3, -1, out.moment1);
+        add3(b + 6 * i + 6, -1, out.force2);
+        add3(b + 6 * i + 9, -1, out.moment2);
+    }
+}
+
+static void assert_near(const double *a, const double *b, int count)
+{
+    double largest = 0;
+    for (int k = 0; k < count; k++)
+        largest = fmax(largest, fabs(b[k]));
+    for (int k = 0; k < count; k++)
+        assert_true(fabs(a[k] - b[k]) <= 1e-13 * largest);
+}
+
+// Kernel = element by element, from any first node on; nothing outside is written; the same bits at every SIMD level.
+static void chain_equals_elements(void **state)
+{
+    (void)state;
+    static Chain c, wide;
+    make_chain(&c);
+    for (int first = 0; first <= E; first++) {
+        double diag[36 * (E + 1)] = {0}, lower[36 * (E + 1)] = {0}, b[6 * (E + 1)] = {0};
+        plain_assembly(&c, first, 1.2, 0.7, diag, lower, b);
+        for (int level = (int)simd_widest(); level >= 0; level--) {
+            simd_force((SimdLevel)level);
+            for (int k = 0; k < 36 * (E + 1); k++)
+                c.blocks.diag[k] = k < 36 * E ? (c.blocks.lower[k] = -7) : -7;
+            for (int k = 0; k < 6 * (E + 1); k++)
+                c.b[k] = -7;
+            beam_chain_assemble(&c.beam, first, E, 1.2, 0.7, &c.blocks, c.b);
+            for (int k = 0; k < 36 * first; k++)
+                assert_true(c.blocks.diag[k] == -7 && (k >= 36 * E || c.blocks.lower[k] == -7) && (k >= 6 * first || c.b[k] == -7));
+            assert_near(c.blocks.diag + 36 * first, diag + 36 * first, 36 * (E + 1 - first));
+            assert_near(c.blocks.lower + 36 * first, lower + 36 * first, 36 * (E - first));
+            assert_near(c.b + 6 * first, b + 6 * first, 6 * (E + 1 - first));
+            if (level == (int)simd_widest()) {
+                BlockChain own = wide.blocks;
+                wide = c;
+                if (!own.diag)
+                    assert_true(block_chain_create(&own, E + 1));
+                wide.blocks = own;
+                memcpy(own.diag, c.blocks.diag, sizeof diag);
+                memcpy(own.lower, c.blocks.lower, 36 * E * sizeof(double));
+            }
+            assert_memory_equal(wide.blocks.diag, c.blocks.diag, sizeof diag);
+            assert_memory_equal(wide.blocks.lower, c.blocks.lower, 36 * E * sizeof(double));
+            assert_memory_equal(wide.b, c.b, sizeof b);
+        }
+        simd_force(simd_widest());
+    }
+    block_chain_destroy(&c.blocks);
+    block_chain_destroy(&wide.blocks);
 }
 
 static SheathElement across(const BeamRest *rest, double coordinate, Quat q1, Vec3 x2, Quat q2)

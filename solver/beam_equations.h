@@ -1,0 +1,219 @@
+// The corotational beam element: its equations, for one element and for the lanes of a chain. Internal to beam_element.c and beam_chain.c.
+//
+// Nodes 1 and 2 with positions x_i and frames R_i; chord e = (x2 - x1) / l. A circular section bends alike in all directions, so no
+// frame has to turn with the chord: all that is needed are the node's tangents.
+//   t_i     = R_i c_i            c_i: direction of the rest chord in the frame of node i (e1 where the element is straight at rest)
+//   theta_i = g(e . t_i) e x t_i bending angle from chord to tangent, g = angle / sine
+//   psi     = x component of the rotation vector of F1' F2, F_i = R_i C_i: twist, exact where curvature and twist are constant
+//   bow     = L/30 (2 |b1|^2 - b1 . b2 + 2 |b2|^2)   arc less chord of the cubic shape, b_i = g(e . a_i) e x a_i, a_i = R_i e1
+//   ext     = l + bow - extend
+//   E = EA/(2L) ext^2 + c/2 (|theta1|^2 + |theta2|^2) + d theta1 . theta2 + GJ/(2L) psi^2
+//   c - d = 2 EI / L,  c + d = 6 EI / ((1 + Phi) L),  Phi = 12 EI / (kappa G A L^2)
+// Forces are the exact derivative of E. E does not change when the nodes are swapped with e and the frames reversed, nor in a
+// rigid motion, nor when mirrored. The bow makes the chord shorten with the square of the bending angles: without it a chain rolls up
+// to a polygon whose chords (not arcs) have the rest length, (pi/N)^2/6 too large; its second derivative is the consistent
+// geometric stiffness. g is a polynomial in z = (1 - e . t)/2 = sin^2(angle/2), cut after z^7: 3e-9 off at 0.64 rad, and smooth
+// everywhere, which acos is not.
+//
+// Tangent: J' C J (main), positive semi-definite, and the geometric stiffness of a tension only: a compression's part would make the
+// matrix indefinite (DESIGN section 4, item 2). To first order in the angles
+//   d theta_i = B_i d phi_i + D_i (d x2 - d x1),   B_i = s_i I - t_i e',   D_i = -[t_i]x P / l,   s_i = e . t_i,   P = I - e e'
+// B_i, not P: B_i t_i = 0, so spinning a bent wire about its own tangent costs nothing, as it should. With P in its place the matrix held
+// EI k^2 of stiffness a length against spin and lacked as much elsewhere; eigenvalues of the true Hessian against it reached 9 in a wire coiled
+// in a capsule (above 2 a Newton step overshoots, and the coil shook until it left the vessel); with B they stay below 1.02 in equilibrium.
+#ifndef SELDINGER_SOLVER_BEAM_EQUATIONS_H
+#define SELDINGER_SOLVER_BEAM_EQUATIONS_H
+
+#include "solver/beam_element.h"
+
+#if defined(__GNUC__) && !defined(__clang__)
+#define INLINE static inline __attribute__((always_inline))
+#define UNROLL _Pragma("GCC unroll 3")
+#else
+#define INLINE static inline
+#define UNROLL
+#endif
+
+// angle / sine and its derivative with the cosine, from z = sin^2(angle/2): sum of 4^k (k!)^2 / (2k+1)! z^k.
+INLINE double angle_over_sine(double z, double *slope)
+{
+    const double a1 = 2.0 / 3, a2 = 8.0 / 15, a3 = 16.0 / 35, a4 = 128.0 / 315, a5 = 256.0 / 693, a6 = 1024.0 / 3003, a7 = 2048.0 / 6435;
+    *slope = -0.5 * (a1 + z * (2 * a2 + z * (3 * a3 + z * (4 * a4 + z * (5 * a5 + z * (6 * a6 + z * (7 * a7)))))));
+    return 1 + z * (a1 + z * (a2 + z * (a3 + z * (a4 + z * (a5 + z * (a6 + z * a7))))));
+}
+
+INLINE Vec3 first_axis(Quat q)
+{
+    return vec3(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y));
+}
+
+typedef struct Bend {        // an angle from the chord e to a tangent t
+    Vec3 t, n, angle;        // n = e x t
+    double s, g, h;          // e . t, angle / sine, its derivative with s
+} Bend;
+
+INLINE Bend bend_from(Vec3 e, Vec3 t)
+{
+    Bend b;
+    b.t = t;
+    b.n = vec3_cross(e, t);
+    b.s = vec3_dot(e, t);
+    b.g = angle_over_sine(0.5 * (1 - b.s), &b.h);
+    b.angle = vec3_scale(b.n, b.g);
+    return b;
+}
+
+// Given m = dE/d angle: returns dE for a rotation of t, adds dE/de to *along.
+INLINE Vec3 bend_back(const Bend *b, Vec3 e, Vec3 m, Vec3 *along)
+{
+    double mn = b->h * vec3_dot(m, b->n);
+    *along = vec3_add(*along, vec3_add_scaled(vec3_scale(vec3_cross(b->t, m), b->g), mn, b->t));
+    Vec3 turn = vec3_scale(vec3_add_scaled(vec3_scale(m, b->s), -vec3_dot(b->t, m), e), b->g);
+    return vec3_add_scaled(turn, -mn, b->n);
+}
+
+INLINE void element(const BeamInput *in, bool is_curved, BeamOutput *out)
+{
+    Vec3 d = vec3_sub(in->x2, in->x1);
+    double l = sqrt(vec3_norm2(d)), inverse = 1 / l;
+    Vec3 e = vec3_scale(d, inverse);
+    Quat f1 = in->q1, f2 = in->q2;
+    if (is_curved) {
+        f1 = quat_mul(in->q1, (Quat){in->half_w, 0, in->half_y, in->half_z});
+        f2 = quat_mul(in->q2, (Quat){in->half_w, 0, -in->half_y, -in->half_z});
+    }
+    Bend c1 = bend_from(e, first_axis(f1)), c2 = bend_from(e, first_axis(f2));
+    Bend b1 = c1, b2 = c2;
+    if (is_curved) {
+        b1 = bend_from(e, first_axis(in->q1));
+        b2 = bend_from(e, first_axis(in->q2));
+    }
+
+    // axial, with the bow
+    double share = in->length * (1.0 / 30);
+    Vec3 bow1 = vec3_scale(vec3_sub(vec3_scale(b1.angle, 4), b2.angle), share);
+    Vec3 bow2 = vec3_scale(vec3_sub(vec3_scale(b2.angle, 4), b1.angle), share);
+    double bow = 0.5 * (vec3_dot(bow1, b1.angle) + vec3_dot(bow2, b2.angle));
+    double extension = l + bow - in->extend, tension = in->axial * extension;
+
+    // bending
+    Vec3 m1 = vec3_add(vec3_scale(c1.angle, in->near), vec3_scale(c2.angle, in->far));
+    Vec3 m2 = vec3_add(vec3_scale(c2.angle, in->near), vec3_scale(c1.angle, in->far));
+    double energy = 0.5 * (tension * extension + vec3_dot(m1, c1.angle) + vec3_dot(m2, c2.angle));
+
+    // torsion: p = (w, v) the rotation from F1 to F2, seen in F1
+    Quat p = quat_mul(quat_conjugate(f1), f2);
+    double h, g = angle_over_sine(0.5 * (1 - p.w), &h);
+    double psi = 2 * g * p.x, torque = in->twist * psi;
+    Vec3 axis = vec3(g * p.w - h * p.x * p.x, g * p.z - h * p.x * p.y, -g * p.y - h * p.x * p.z);
+    axis = quat_rotate(f1, axis);
+    Vec3 turn = vec3_scale(axis, torque);
+    energy += 0.5 * torque * psi;
+
+    Vec3 along = vec3(0, 0, 0), t1, t2;
+    if (is_curved) {
+        t1 = vec3_sub(bend_back(&c1, e, m1, &along), turn);
+        t2 = vec3_add(bend_back(&c2, e, m2, &along), turn);
+        out->chord1 = t1;
+        out->chord2 = t2;
+        t1 = vec3_add(t1, bend_back(&b1, e, vec3_scale(bow1, tension), &along));
+        t2 = vec3_add(t2, bend_back(&b2, e, vec3_scale(bow2, tension), &along));
+    } else {
+        t1 = vec3_sub(bend_back(&c1, e, vec3_add_scaled(m1, tension, bow1), &along), turn);
+        t2 = vec3_add(bend_back(&c2, e, vec3_add_scaled(m2, tension, bow2), &along), turn);
+        out->chord1 = out->chord2 = vec3(0, 0, 0);
+    }
+    along = vec3_scale(vec3_add_scaled(along, -vec3_dot(along, e), e), inverse);
+    Vec3 tilt = vec3_cross(e, vec3_add(vec3_scale(bow1, b1.s), vec3_scale(bow2, b2.s)));
+    out->chord = e;
+    out->tangent1 = c1.t;
+    out->tangent2 = c2.t;
+    out->stretch = vec3_add_scaled(e, inverse, tilt);
+    out->bow1 = vec3_add_scaled(vec3_scale(bow1, b1.s), -vec3_dot(b1.t, bow1), e);
+    out->bow2 = vec3_add_scaled(vec3_scale(bow2, b2.s), -vec3_dot(b2.t, bow2), e);
+    out->axis = axis;
+    out->force2 = vec3_add_scaled(along, tension, e);
+    out->moment1 = t1;
+    out->moment2 = t2;
+    out->inverse = inverse;
+    out->tension = tension;
+    out->torque = torque;
+    out->energy = energy;
+    out->bow = bow;
+    out->angle1 = c1.angle;
+    out->angle2 = c2.angle;
+    out->turn1 = b1.angle;
+    out->turn2 = b2.angle;
+}
+
+// The tangent of an element, its distinct entries: with A = [tt, tr; tr', rr] for the unknowns (displacement, rotation) of each node,
+//   k11 = [-F_TT, -N_TR; ., N_RR]   k21 = [F_TT, N_TR; F_TR', N_FAR]   k22 = [-F_TT, -F_TR; ., F_RR]
+// N_ rows belong to the element's first node, F_ rows to its second: signs are those of k21. Symmetric blocks hold six entries (SYM).
+// After the tangent: the gradient of the energy.
+enum { N_TR = 0, N_RR = 9, N_FAR = 15, N_MOMENT = 24, N_ROWS = 27 };
+enum { F_TT = 0, F_TR = 6, F_RR = 15, F_FORCE = 21, F_MOMENT = 24, F_ROWS = 27 };
+static const int SYM[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+
+typedef struct Columns {
+    double v[3];
+} Columns;
+INLINE Columns columns(Vec3 v) { return (Columns){{v.x, v.y, v.z}}; }
+
+// The part of the tangent between the displacement of node 2 and the rotation of node j, T = sum over i of C_ij t_i:
+//   sum over i of D_i' C_ij B_j = (s_j P [T]x - P (T x t_j) e') / l,   P [T]x = [T]x - e (e x T)'
+typedef struct Coupling {
+    double m[3][3];
+} Coupling;
+INLINE Coupling coupling(Vec3 e, Vec3 sum, Vec3 tangent, double s, double inverse)
+{
+    Vec3 around = vec3_scale(vec3_cross(sum, tangent), inverse), turn = vec3_scale(sum, inverse * s);
+    Columns v = columns(e), w = columns(vec3_add_scaled(around, -vec3_dot(around, e), e)), across = columns(vec3_cross(e, turn));
+    double skew[3][3] = {{0, -turn.z, turn.y}, {turn.z, 0, -turn.x}, {-turn.y, turn.x, 0}};
+    Coupling k;
+    UNROLL
+    for (int i = 0; i < 3; i++)
+        UNROLL
+        for (int j = 0; j < 3; j++)
+            k.m[i][j] = i == j ? -v.v[i] * across.v[j] - w.v[i] * v.v[j] : skew[i][j] - v.v[i] * across.v[j] - w.v[i] * v.v[j];
+    return k;
+}
+
+// Rows of the tangent, main part times `scale`, geometric part of the tension `pull` >= 0, row k at [k * stride].
+INLINE void tangent_rows(const BeamOutput *o, double length, double axial, double near, double far, double twist, double scale,
+                         double pull, double *restrict n, int n_stride, double *restrict f, int f_stride)
+{
+    double inverse = o->inverse, ka = axial * scale, kt = twist * scale;
+    double c = near * scale + pull * length * (4.0 / 30), d = far * scale - pull * length * (1.0 / 30);
+    Vec3 e = o->chord, t1 = o->tangent1, t2 = o->tangent2;
+    double s1 = vec3_dot(e, t1), s2 = vec3_dot(e, t2), t12 = vec3_dot(t1, t2), i2 = inverse * inverse;
+    double a = 2 * (c + d * t12) * i2 + pull * inverse;
+    Coupling u1 = coupling(e, vec3_add(vec3_scale(t1, c), vec3_scale(t2, d)), t1, s1, inverse);
+    Coupling u2 = coupling(e, vec3_add(vec3_scale(t1, d), vec3_scale(t2, c)), t2, s2, inverse);
+    Columns v = columns(e), ext = columns(o->stretch), w1 = columns(o->bow1), w2 = columns(o->bow2), g = columns(o->axis);
+    Columns p1 = columns(t1), p2 = columns(t2), q1 = columns(vec3_add_scaled(t1, -s1, e)), q2 = columns(vec3_add_scaled(t2, -s2, e));
+    UNROLL
+    for (int i = 0; i < 3; i++) {
+        // rows of B_i' B_j and of the second-order rest of D_i' D_j
+        double av = a * v.v[i], x1 = i2 * (c * q1.v[i] + d * q2.v[i]), x2 = i2 * (c * q2.v[i] + d * q1.v[i]);
+        double y11 = c * (v.v[i] - s1 * p1.v[i]), z11 = c * s1 * v.v[i], y22 = c * (v.v[i] - s2 * p2.v[i]), z22 = c * s2 * v.v[i];
+        double y21 = d * (t12 * v.v[i] - s2 * p1.v[i]), z21 = d * s1 * v.v[i];
+        double ke = ka * ext.v[i], k1 = ka * w1.v[i], k2 = ka * w2.v[i], kg = kt * g.v[i];
+        UNROLL
+        for (int j = 0; j < 3; j++) {
+            double r21 = y21 * v.v[j] - z21 * p2.v[j] + k2 * w1.v[j] - kg * g.v[j];
+            n[(N_TR + 3 * i + j) * n_stride] = u1.m[i][j] + ke * w1.v[j];
+            f[(F_TR + 3 * i + j) * f_stride] = -u2.m[i][j] - ke * w2.v[j];
+            n[(N_FAR + 3 * i + j) * n_stride] = i == j ? d * s1 * s2 + r21 : r21;
+            if (j < i)
+                continue;
+            double tt = av * v.v[j] + x1 * q1.v[j] + x2 * q2.v[j] - ke * ext.v[j];
+            double r11 = y11 * v.v[j] - z11 * p1.v[j] + k1 * w1.v[j] + kg * g.v[j];
+            double r22 = y22 * v.v[j] - z22 * p2.v[j] + k2 * w2.v[j] + kg * g.v[j];
+            f[(F_TT + SYM[i][j]) * f_stride] = i == j ? tt - a : tt;
+            n[(N_RR + SYM[i][j]) * n_stride] = i == j ? c * s1 * s1 + r11 : r11;
+            f[(F_RR + SYM[i][j]) * f_stride] = i == j ? c * s2 * s2 + r22 : r22;
+        }
+    }
+}
+
+#endif
