@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "cli/output.h"
+#include "cli/run_chart.h"
 #include "cli/run_files.h"
 #include "sim/recording.h"
 #ifdef SELDINGER_RENDER
@@ -16,7 +17,7 @@
 enum { MOST_MOMENTS = 6 };
 
 typedef struct RunOptions {
-    const char *scene, *script, *record, *summary, *final, *picture, *contact;
+    const char *scene, *script, *record, *summary, *final, *picture, *chart, *contact;
     double duration_s, settle_s;   // < 0: not given
     double moment_s[MOST_MOMENTS];
     int moment_count;
@@ -35,6 +36,7 @@ static const char help[] =
     "  --final F.csv      the last state, one row a node\n"
     "  --picture F.png    vessel and tool at the end\n"
     "  --picture-at S     instead of the end, this moment [s]; up to 6 of them stand side by side\n"
+    "  --chart F.png      forces at the hand and the wall, contacts, depth, CPU time, iterations and residual over time\n"
     "  --contact KIND     the surface that answers contact queries: lim, mesh or tube; default: the scene's\n"
     "  --paced            one step each millisecond of real time, on SCHED_FIFO where that is permitted. Over load simulated time slows\n"
     "                     down and the summary says so (deadline_misses, slowed_s); no step is skipped, none is hurried afterwards\n"
@@ -63,13 +65,14 @@ static int usage_fault(const char *message, const char *what)
 // -1: go on; otherwise the exit code.
 static int parse_options(int argc, char **argv, RunOptions *options)
 {
-    enum { SCRIPT = 256, DURATION, SETTLE, RECORD, SUMMARY, FINAL, PICTURE, PICTURE_AT, CONTACT, PACED, THREADS, QUIET, HELP };
+    enum { SCRIPT = 256, DURATION, SETTLE, RECORD, SUMMARY, FINAL, PICTURE, PICTURE_AT, CHART, CONTACT, PACED, THREADS, QUIET, HELP };
     static const struct option table[] = {
         {"script", required_argument, NULL, SCRIPT},   {"duration-s", required_argument, NULL, DURATION}, {"settle-s", required_argument, NULL, SETTLE},
         {"record", required_argument, NULL, RECORD},   {"summary", required_argument, NULL, SUMMARY},     {"json", required_argument, NULL, SUMMARY},
         {"final", required_argument, NULL, FINAL},     {"picture", required_argument, NULL, PICTURE},     {"picture-at", required_argument, NULL, PICTURE_AT},
         {"contact", required_argument, NULL, CONTACT}, {"paced", no_argument, NULL, PACED},               {"threads", required_argument, NULL, THREADS},
-        {"quiet", no_argument, NULL, QUIET},           {"help", no_argument, NULL, HELP},                 {0}};
+        {"quiet", no_argument, NULL, QUIET},           {"help", no_argument, NULL, HELP},
+        {"chart", required_argument, NULL, CHART},     {0}};
     *options = (RunOptions){.duration_s = -1, .settle_s = -1};
     double number;
     optind = 1;
@@ -80,6 +83,7 @@ static int parse_options(int argc, char **argv, RunOptions *options)
         case SUMMARY: options->summary = optarg; break;
         case FINAL: options->final = optarg; break;
         case PICTURE: options->picture = optarg; break;
+        case CHART: options->chart = optarg; break;
         case CONTACT: options->contact = optarg; break;
         case PACED: options->paced = true; break;
         case QUIET: options->quiet = true; break;
@@ -130,10 +134,11 @@ static Scene *prepare_scene(const RunOptions *options, Faults *faults)
     output_check(options->summary, faults);
     output_check(options->final, faults);
     output_check_file(options->picture, faults);
+    output_check_file(options->chart, faults);
     output_check_file(options->record, faults);
 #ifndef SELDINGER_RENDER
-    if (options->picture)
-        faults_add(faults, "--picture", 0, 0, "this build has no pictures; build with -DSELDINGER_RENDER=ON");
+    if (options->picture || options->chart)
+        faults_add(faults, options->picture ? "--picture" : "--chart", 0, 0, "this build has no pictures; build with -DSELDINGER_RENDER=ON");
 #endif
     if (scene && script) {
         script_free(scene->script);
@@ -166,6 +171,7 @@ typedef struct Moment {
 typedef struct Watch {       // what after_step sees
     const RunOptions *options;
     Recording *recording;
+    RunChart *chart;
     Moment moment[MOST_MOMENTS];
     int moment_count;
     bool recording_failed;
@@ -189,6 +195,8 @@ static bool watch_step(void *context, Simulator *simulator, Command command)
     for (int i = 0; i < watch->options->moment_count; i++)
         if (!watch->moment[i].taken && simulator_time_s(simulator) >= watch->options->moment_s[i] - 1e-9)
             take_moment(&watch->moment[i], simulator);
+    if (watch->chart)
+        run_chart_step(watch->chart, simulator);
     if (watch->recording && !recording_step(watch->recording, simulator, command))
         watch->recording_failed = true;
     return !watch->recording_failed;
@@ -323,7 +331,9 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
     NodeReport *node = calloc((size_t)nodes, sizeof *node);
     RecordingOptions record = recording_default_options();
     record.expected_steps = expected_steps(options, scene);
-    if (!node || !make_moments(&watch, nodes))
+    if (options->chart)
+        watch.chart = run_chart_create(record.expected_steps);
+    if (!node || !make_moments(&watch, nodes) || (options->chart && !watch.chart))
         faults_add(faults, scene->path, 0, 0, "no memory");
     else if (options->record)
         watch.recording = recording_create(options->record, simulator, &record, faults);
@@ -352,9 +362,13 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
         if (options->picture)
             draw_picture(options, &watch, simulator, open);
 #endif
+        char message[512];
+        if (options->chart && !run_chart_draw(watch.chart, simulator, options->chart, message, sizeof message))
+            fprintf(stderr, "%s: no chart: %s\n", options->chart, message);
         code = whole && report.end != DRIVE_DIVERGED && !run_left_vessel(simulator_totals(simulator)) ? EXIT_DONE : EXIT_UNTRUSTED;
     }
     free_moments(&watch);
+    run_chart_free(watch.chart);
     free(node);
     simulator_destroy(simulator);
     return code;

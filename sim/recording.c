@@ -28,7 +28,7 @@ typedef struct Column {
     hid_t type, dataset;
 } Column;
 
-enum { TIME, COMMAND, PROXIMAL, HASH, INSERTED, PENETRATION, CONTACTS, ITERATIONS, FLAGS, STEP_COLUMNS };
+enum { TIME, COMMAND, PROXIMAL, HASH, INSERTED, PENETRATION, CONTACTS, ITERATIONS, RESIDUAL, LINEARISATIONS, WALL_FORCE, FLAGS, STEP_COLUMNS };
 enum { FRAME_STEP, POSITION, QUATERNION, FORCE, GAP, VESSEL_NODE, FRAME_COLUMNS };
 
 // Rows of all columns of one kind: written by the simulation thread at `head`, drained by the writer at `tail`; both only grow.
@@ -86,6 +86,9 @@ static void describe_columns(Recording *recording)
     step[PENETRATION] = column_of("/report/penetration_mm", H5T_NATIVE_DOUBLE, 0, 1, 1);
     step[CONTACTS] = column_of("/report/contacts", H5T_NATIVE_INT32, 0, 1, 1);
     step[ITERATIONS] = column_of("/report/iterations", H5T_NATIVE_INT32, 0, 1, 1);
+    step[RESIDUAL] = column_of("/report/residual", H5T_NATIVE_DOUBLE, 0, 1, 1);
+    step[LINEARISATIONS] = column_of("/report/linearisations", H5T_NATIVE_INT32, 0, 1, 1);
+    step[WALL_FORCE] = column_of("/report/wall_force_n", H5T_NATIVE_DOUBLE, 1, 2, 1);
     step[FLAGS] = column_of("/report/flags", H5T_NATIVE_UINT32, 0, 1, 1);
     frame[FRAME_STEP] = column_of("/wire/step", H5T_NATIVE_INT64, 0, 1, 1);
     frame[POSITION] = column_of("/wire/position", H5T_NATIVE_DOUBLE, 2, nodes, 3);
@@ -396,7 +399,8 @@ bool recording_step(Recording *recording, Simulator *simulator, Command command)
     double time = simulator_time_s(simulator), inserted = simulator_state(simulator)->inserted, penetration = report->penetration;
     double commanded[2] = {command.push_mm_s, command.twist_deg_s}, proximal[2] = {report->proximal_force, report->proximal_torque};
     uint64_t hash = simulator_hash(simulator);
-    int32_t contacts = report->active, iterations = report->iterations;
+    double residual = report->residual, wall_force[2] = {report->wall_force_max, report->wall_force_sum};
+    int32_t contacts = report->active, iterations = report->iterations, linearisations = 1 + report->newton;
     uint32_t flags = report->flags;
     memcpy(slot_of(ring, TIME), &time, sizeof time);
     memcpy(slot_of(ring, COMMAND), commanded, sizeof commanded);
@@ -406,6 +410,9 @@ bool recording_step(Recording *recording, Simulator *simulator, Command command)
     memcpy(slot_of(ring, PENETRATION), &penetration, sizeof penetration);
     memcpy(slot_of(ring, CONTACTS), &contacts, sizeof contacts);
     memcpy(slot_of(ring, ITERATIONS), &iterations, sizeof iterations);
+    memcpy(slot_of(ring, RESIDUAL), &residual, sizeof residual);
+    memcpy(slot_of(ring, LINEARISATIONS), &linearisations, sizeof linearisations);
+    memcpy(slot_of(ring, WALL_FORCE), wall_force, sizeof wall_force);
     memcpy(slot_of(ring, FLAGS), &flags, sizeof flags);
     publish(ring);
     int64_t step = simulator_totals(simulator)->steps;

@@ -13,6 +13,7 @@ struct Simulator {
     const Scene *scene;
     Stepper *stepper;
     StepProfile profile;
+    int64_t step_ns;
     RunTotals totals;
     TargetReach *target;
     double dt;               // [ms]
@@ -122,7 +123,8 @@ void simulator_step(Simulator *simulator, Command command)
     step_correct(stepper);
     timed(profile, STAGE_CORRECT, &since);
 
-    histogram_add(&profile->step, since - start);
+    simulator->step_ns = since - start;
+    histogram_add(&profile->step, simulator->step_ns);
     accumulate(simulator);
 }
 
@@ -130,6 +132,7 @@ double simulator_time_s(const Simulator *simulator) { return (double)simulator->
 const WireState *simulator_state(const Simulator *simulator) { return stepper_state(simulator->stepper); }
 const StepReport *simulator_last(const Simulator *simulator) { return step_report(simulator->stepper); }
 const RunTotals *simulator_totals(const Simulator *simulator) { return &simulator->totals; }
+int64_t simulator_step_ns(const Simulator *simulator) { return simulator->step_ns; }
 const StepProfile *simulator_profile(const Simulator *simulator) { return &simulator->profile; }
 const TargetReach *simulator_targets(const Simulator *simulator) { return simulator->target; }
 const Scene *simulator_scene(const Simulator *simulator) { return simulator->scene; }

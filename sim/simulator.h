@@ -53,6 +53,7 @@ double simulator_time_s(const Simulator *simulator);
 const WireState *simulator_state(const Simulator *simulator);
 const StepReport *simulator_last(const Simulator *simulator);     // of the last step; zeros before the first
 const RunTotals *simulator_totals(const Simulator *simulator);
+int64_t simulator_step_ns(const Simulator *simulator);             // thread CPU time of the last step
 const StepProfile *simulator_profile(const Simulator *simulator);
 const TargetReach *simulator_targets(const Simulator *simulator); // (scene->target_count)
 const Scene *simulator_scene(const Simulator *simulator);

@@ -188,8 +188,9 @@ static bool unwritten(const char *name, const double *value, hsize_t values)
 // Every dataset is read whole: all of one kind have the same rows, and every row was written. NULL or what is wrong.
 static const char *check_file(const char *path, hsize_t count[2])
 {
-    static const char *const names[2][10] = {{"/time_s", "/command", "/proximal", "/state_hash", "/inserted_mm", "/report/penetration_mm",
-                                              "/report/contacts", "/report/iterations", "/report/flags"},
+    static const char *const names[2][14] = {{"/time_s", "/command", "/proximal", "/state_hash", "/inserted_mm", "/report/penetration_mm",
+                                              "/report/contacts", "/report/iterations", "/report/residual", "/report/linearisations",
+                                              "/report/wall_force_n", "/report/flags"},
                                              {"/wire/step", "/wire/position", "/wire/quaternion", "/contact/force_n", "/contact/gap_mm",
                                               "/contact/vessel_node"}};
     hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);   // locking on
