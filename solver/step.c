@@ -3,8 +3,11 @@
 // The system is linear about x_n. A step that turns an element by more than NEWTON_MOTION is linearised again about what came out, with the
 // unknown still the whole displacement from x_n, so that inertia, damping, gaps and friction keep their meaning: Newton's method on the
 // implicit step. Inside an iteration no element may turn by more than TURN_MAX: a wire that springs back does so faster than
-// any step (10 mJ move 0.02 g at 30 m/s), and a linear displacement of that size would stretch it. What is still larger after the last
-// iteration is cut and flagged STEP_LIMITED: it takes the next steps to arrive.
+// any step (10 mJ move 0.02 g at 30 m/s), and a linear displacement of that size would stretch it.
+//
+// Never through the wall, and never energy from nowhere: every place that a step stops at is good, because the motion to it is halved until it is
+// (follow). The whole wire is held back together, what the hand feeds included. What is not done after the last iteration is flagged
+// STEP_LIMITED and left to the next steps; so is an advance into a tool that is squeezed by more than SQUEEZE_MAX: the hand stalls.
 #include "solver/step_internal.h"
 
 #include <stdio.h>
@@ -20,6 +23,11 @@ enum { NEWTON_MAX = 4 };
 // A tip that snaps from one wall to another lands where nobody linearised: [mm] of true penetration that asks for another linearisation there, up to
 // twice NEWTON_MAX of them.
 static const double OVERSHOOT = 0.03;
+// Where a motion is followed in halves: [mm] of depth that it may leave, halves at most, [mm] of the hand's advance that later steps make up.
+static const double DEPTH_MAX = 0.05, OWED_MAX = 0.5;
+enum { HALVES_MAX = 8 };
+// A tool that is squeezed by more than this share of its length is beyond what its elements describe (and would have yielded): the hand stalls.
+static const double SQUEEZE_MAX = 0.03;
 
 // --- creation ---
 
@@ -33,7 +41,7 @@ static double *take(double **from, size_t count)
 static bool allocate_scratch(Stepper *s)
 {
     size_t m = (size_t)s->wire.node_count, padded = m + BEAM_PADDING;
-    s->scratch = calloc((BEAM_REST_ARRAYS + 2 * BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1) * padded + 24 * m, sizeof *s->scratch);
+    s->scratch = calloc((BEAM_REST_ARRAYS + 2 * BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1) * padded + 37 * m, sizeof *s->scratch);
     if (!s->scratch)
         return false;
     double *at = s->scratch;
@@ -54,6 +62,7 @@ static bool allocate_scratch(Stepper *s)
     s->u = take(&at, 6 * m);
     s->linearised = take(&at, 6 * m);
     s->product = take(&at, 6 * m);
+    s->kept = take(&at, 13 * m);
     return true;
 }
 
@@ -302,11 +311,29 @@ static void let_go(Stepper *s, int node)
     w->orientation[node] = quat_unit(quat_mul(quat_from_rotation_vector(turn), w->orientation[node]));
 }
 
+// The command with what is owed from before; no advance into a tool that is squeezed too much.
+static StepCommand stalled(Stepper *s, StepCommand command)
+{
+    if (!s->has_sheath)
+        return command;
+    double actual = s->wire.total_length + stepper_sheath_coordinate(s, 0), owed = s->state.inserted - actual;
+    if (fabs(owed) > 1e-9) {
+        command.advance += owed;
+        s->state.inserted = actual;
+    }
+    if (command.advance > 0 && vec3_distance(s->state.position[1], s->state.position[0]) < (1 - SQUEEZE_MAX) * s->wire.length[0]) {
+        command.advance = 0;
+        s->report.flags |= STEP_LIMITED;
+    }
+    return command;
+}
+
 void step_feed(Stepper *s, StepCommand command)
 {
     s->report = (StepReport){0};
     s->has_failed = false;
-    s->is_iterate = false;
+    s->is_iterate = s->overshoots = s->blocked = false;
+    s->energy_before = -1;
     if (!s->has_sheath || !isfinite(command.advance) || !isfinite(command.twist))
         command = (StepCommand){0};
     double inserted = s->state.inserted + command.advance, total = s->wire.total_length;
@@ -317,7 +344,8 @@ void step_feed(Stepper *s, StepCommand command)
         s->report.flags |= STEP_FULLY_WITHDRAWN;
         command.advance = -s->state.inserted;
     }
-    s->command = command;
+    s->command = stalled(s, command);
+    command = s->command;
     int held = count_held(s, command.advance);
     for (int i = s->first_free; i < held; i++) {
         hold(s, i);
@@ -471,12 +499,11 @@ static void displace(Stepper *s, double part)
     }
 }
 
-// The iterate moves to `part` of the way from where it is to x_n + u. Nodes in the sheath go all the way: they are prescribed.
-static void move(Stepper *s, double turn)
+// The iterate moves to `part` of the way from where it is to x_n + u, nodes in the sheath too: a tool that is held back is not fed.
+static void move(Stepper *s, double part)
 {
     WireState *w = &s->state;
-    double part = turn > TURN_MAX ? TURN_MAX / turn : 1;
-    if (turn > SWING_MOTION && s->can_swing)
+    if (s->turn > SWING_MOTION && s->can_swing)
         swing(s, part);
     else
         displace(s, part);
@@ -491,11 +518,68 @@ static void move(Stepper *s, double turn)
             continue;
         }
         // on the line exactly, whatever rounding does
-        double along = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]) + u[0];
+        double turn = part * (u[3] - k[3]);
+        k[0] = part < 1 ? k[0] + part * (u[0] - k[0]) : u[0];
+        k[3] += turn;
+        double along = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]) + k[0];
         w->position[i] = vec3_add_scaled(s->mouth, along, s->axis[0]);
-        w->orientation[i] = on_line(s, quat_mul(small_rotation(vec3_scale(s->axis[0], u[3] - k[3])), w->orientation[i]));
-        memcpy(k, u, 6 * sizeof *k);
+        w->orientation[i] = on_line(s, quat_mul(small_rotation(vec3_scale(s->axis[0], turn)), w->orientation[i]));
     }
+}
+
+// --- how far a solution is followed ---
+
+// [mJ] of elastic energy that the step may leave at most: what there was, the motion's, and what hand, wall and loads have done.
+static double energy_bound(const Stepper *s)
+{
+    const Wire *w = &s->wire;
+    double work = 0, bound = s->energy_before;
+    for (int i = s->first_free; i < w->node_count; i++)
+        work += w->mass[i] * fabs(vec3_dot(s->gravity, vec3(s->u[6 * i], s->u[6 * i + 1], s->u[6 * i + 2])));
+    for (int k = 0; k < s->set.count; k++)
+        work += fmax(0, -s->set.point[k].gap) * vec3_norm(s->set.point[k].force);
+    if (s->has_sheath) {
+        // the hand's force is that of before: a solution that is not to be trusted says anything
+        double stiffness = s->beam.rest.axial[0], advance = fabs(s->u[0]);
+        double squeezed = fabs(vec3_distance(s->start_position[1], s->start_position[0]) - s->beam.rest.length[0]);
+        work += stiffness * advance * (squeezed + advance * s->beam.rest.length[0] / w->total_length) + fabs(s->u[3] * stepper_reaction(s, 3));
+    }
+    return bound + 2 * work + 1e-6;
+}
+
+static void copy_iterate(Stepper *s, bool back)
+{
+    size_t m = (size_t)s->state.node_count, size[3] = {m * sizeof(Vec3), m * sizeof(Quat), 6 * m * sizeof(double)};
+    void *live[3] = {s->state.position, s->state.orientation, s->linearised}, *kept[3] = {s->kept, s->kept + 3 * m, s->kept + 7 * m};
+    for (int i = 0; i < 3; i++)
+        memcpy(back ? live[i] : kept[i], back ? kept[i] : live[i], size[i]);
+}
+
+// The share of the solution that was followed. A quiet step goes all the way, and so does a wire without walls but for TURN_MAX. Else only as far as
+// no node is driven through the wall and the wire is not left with energy that nobody gave it: by halves, from places that are good.
+static double follow(Stepper *s)
+{
+    double part = s->turn > TURN_MAX ? TURN_MAX / s->turn : 1;
+    if (!s->vessel || (s->turn <= NEWTON_MOTION_IN_CONTACT && !s->overshoots)) {
+        move(s, part);
+        return part;
+    }
+    if (s->energy_before < 0) {       // of x_n, or of an iterate beside it
+        s->energy_before = stepper_elastic_energy(s) + stepper_kinetic_energy(s);
+        s->depth = s->report.penetration;
+    }
+    double bound = s->has_sheath && s->load_count == 0 ? energy_bound(s) : HUGE_VAL;
+    copy_iterate(s, false);
+    for (int k = 0; k < HALVES_MAX; k++, part /= 2) {
+        move(s, part);
+        double depth = stepper_depth(s);
+        if (depth <= fmax(DEPTH_MAX, s->depth) && stepper_elastic_energy(s) <= bound) {
+            s->depth = depth;
+            return part;
+        }
+        copy_iterate(s, true);
+    }
+    return 0;
 }
 
 void step_contact(Stepper *s)
@@ -503,15 +587,20 @@ void step_contact(Stepper *s)
     solve_contained(s);
     for (int iteration = 1; iteration < 2 * s->newton_max && !s->has_failed; iteration++) {
         bool turns = s->turn > (s->report.active > 0 ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION);
-        if (!(turns && iteration < s->newton_max) && stepper_overshoot(s) <= OVERSHOOT)
+        s->overshoots = stepper_overshoot(s) > OVERSHOOT;
+        if (!(turns && iteration < s->newton_max) && !s->overshoots)
             break;
-        move(s, s->turn);
+        if (follow(s) == 0) {
+            s->blocked = true;
+            break;
+        }
         s->is_iterate = true;
         stepper_detect(s);
         stepper_assemble(s);
         step_factor(s);
         solve_contained(s);
         s->report.newton = iteration;
+        s->overshoots = true;
     }
 }
 
@@ -567,17 +656,27 @@ static void report_forces(Stepper *s)
     }
 }
 
+// What the hand has moved in fact. What a cut motion has left of an advance is owed, up to OWED_MAX.
+static void count_command(Stepper *s)
+{
+    s->state.inserted += s->command.advance;
+    s->state.twist += s->command.twist;
+    if (!s->has_sheath || !(s->report.flags & STEP_LIMITED))
+        return;
+    double actual = s->wire.total_length + stepper_sheath_coordinate(s, 0);
+    s->state.inserted = actual + fmax(-OWED_MAX, fmin(OWED_MAX, s->state.inserted - actual));
+    s->state.twist += s->linearised[3] - s->command.twist;
+}
+
 void step_correct(Stepper *s)
 {
     s->state.time += s->dt;
     if (!s->has_failed) {
         report_forces(s);
-        if (s->turn > TURN_MAX)
+        if (s->blocked || follow(s) < 1)
             s->report.flags |= STEP_LIMITED;
-        move(s, s->turn);
         set_velocities(s);
-        s->state.inserted += s->command.advance;
-        s->state.twist += s->command.twist;
+        count_command(s);
     }
     if (s->has_failed)
         keep_last_state(s);

@@ -26,7 +26,8 @@ enum {
     STEP_FULLY_WITHDRAWN = 16,   // retraction was clamped
     STEP_OUT_OF_VESSEL = 32,     // a node beyond an open end that is not the sheath's
     STEP_DETECTION_UNSURE = 64,  // a projection did not converge
-    STEP_LIMITED = 128,          // an element would have turned by more than 0.3 rad: the motion was cut, later steps complete it
+    STEP_LIMITED = 128,          // the motion was cut, later steps complete it: an element would have turned by more than 0.3 rad, the tool would have
+                                 // gone through the wall, or the hand would have squeezed it by more than 3 % of its length
 };
 
 typedef struct StepReport {

@@ -132,6 +132,36 @@ static double range_of(const Stepper *s, int node)
     return fabs(s->command.advance) + 2 * s->dt * vec3_norm(s->state.velocity[node]);
 }
 
+double stepper_depth(Stepper *s)
+{
+    int count = 0;
+    double deepest = 0;
+    for (int p = s->first_free; p < s->point_count; p++) {
+        int nodes = s->state.node_count, node = p;
+        if (p == nodes)
+            p = first_slot(s);
+        if (p == s->point_count || s->place[p].node < 0)
+            continue;
+        if (p >= nodes) {
+            if (!place_slot(s, p - nodes))
+                continue;
+            node = s->slot[p - nodes].element + 1;
+        }
+        const double *k = s->linearised + 6 * (size_t)node;
+        if (s->clearance[p] > vec3_norm(vec3(k[0], k[1], k[2])))
+            continue;
+        s->query_which[count] = p;
+        s->query_point[count] = place_of(s, p);
+        s->query_place[count++] = s->place[p];
+    }
+    if (count > 0)
+        vessel_query(s->vessel, count, s->query_point, 0.5, s->query_place, s->query_hit);
+    for (int k = 0; k < count; k++)
+        if (!(s->query_hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)))
+            deepest = fmax(deepest, radius_of(s, s->query_which[k]) - s->query_hit[k].gap);
+    return deepest;
+}
+
 // How far beyond its present gap a point is looked after.
 static double reach_of(const Stepper *s, int point)
 {

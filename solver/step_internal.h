@@ -57,6 +57,7 @@ struct Stepper {
     double *b, *u;           // (M, 6)
     double *linearised;      // (M, 6) displacement from x_n to the iterate about which the system is linear
     double *product;         // (M, 6)
+    double *kept;            // (M, 13) an iterate to go back to: position, orientation, displacement
     double grip_diag[36], grip_lower[36], grip_b[6];     // rows of node 0 before its constraints
     Vec3 *start_position;    // (M) x_n
     Quat *start_orientation;
@@ -75,6 +76,10 @@ struct Stepper {
     StepCommand command;
     StepReport report;
     double turn;             // [rad] largest of the solution against the iterate
+    bool overshoots;         // the solution goes through the wall, or may
+    bool blocked;            // no part of it could be followed
+    double energy_before;    // [mJ] at x_n, elastic and kinetic; < 0: not asked for yet
+    double depth;            // [mm] outside the wall at the iterate
     bool knows_motion;       // u is an answer to this iterate: detection looks as far as it goes
     bool has_failed;
     bool is_iterate;         // linearised about something else than x_n
@@ -87,6 +92,8 @@ void stepper_keep_forces(Stepper *s);
 bool stepper_escapes(const Stepper *s);
 // How deep outside the true wall the solution would leave the points that it moves far from the iterate [mm], >= 0.
 double stepper_overshoot(Stepper *s);
+// How deep outside the true wall the nodes are that may have come near it in this step [mm], >= 0.
+double stepper_depth(Stepper *s);
 // Takes this step's travel off the slots' clearances.
 void stepper_use_clearance(Stepper *s);
 // A node goes into the sheath, with the element before it: nothing of the wall is remembered.
