@@ -10,18 +10,19 @@ void blob_groups_fill(BlobGroup *group, const Blobby *model)
     int groups = blob_groups_needed(model->count);
     memset(group, 0, (size_t)groups * sizeof *group);
     for (int j = 0; j < model->count; j++) {
-        BlobGroup *to = &group[j / 8];
-        int lane = j % 8;
+        BlobGroup *to = &group[j / BLOB_GROUP];
+        int lane = j % BLOB_GROUP;
         double rho = model->width[j];
         to->cx[lane] = model->center[j].x;
         to->cy[lane] = model->center[j].y;
         to->cz[lane] = model->center[j].z;
         to->inverse[lane] = 1 / (5 * rho * rho);
         to->rho[lane] = rho;
-        to->a[lane] = -0.8 / rho;
-        to->b[lane] = 0.96 / (rho * rho * rho);
     }
 }
+
+#define KERNEL_TABLE(isa) \
+    {#isa, gradient_##isa, hessian_##isa, newton_##isa, finish_##isa, estimate_##isa, partner_##isa, mix_##isa, near_##isa}
 
 #define WIDTH 2
 #define TARGET
@@ -30,7 +31,7 @@ void blob_groups_fill(BlobGroup *group, const Blobby *model)
 #undef WIDTH
 #undef TARGET
 #undef KERNEL
-static const LaneKernels baseline = {"baseline", gradient_baseline, hessian_baseline, newton_baseline, finish_baseline, estimate_baseline};
+static const LaneKernels baseline = KERNEL_TABLE(baseline);
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #define WIDTH 4
@@ -40,16 +41,16 @@ static const LaneKernels baseline = {"baseline", gradient_baseline, hessian_base
 #undef WIDTH
 #undef TARGET
 #undef KERNEL
-static const LaneKernels avx2 = {"avx2", gradient_avx2, hessian_avx2, newton_avx2, finish_avx2, estimate_avx2};
+static const LaneKernels avx2 = KERNEL_TABLE(avx2);
 
-#define WIDTH 8
+#define WIDTH 4
 #define TARGET __attribute__((target("avx512f,avx512dq,avx512vl")))
 #define KERNEL(name) name##_avx512
 #include "geom/blob_kernel.inc"
 #undef WIDTH
 #undef TARGET
 #undef KERNEL
-static const LaneKernels avx512 = {"avx512", gradient_avx512, hessian_avx512, newton_avx512, finish_avx512, estimate_avx512};
+static const LaneKernels avx512 = KERNEL_TABLE(avx512);
 
 const LaneKernels *lane_kernels(int isa)
 {

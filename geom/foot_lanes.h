@@ -2,9 +2,14 @@
 //
 // The foot p of X minimises |p - X| on f = 0. With n = g/|g|, P = I - n n', S = P H P/|g|, gap = (X - p).n, r = P (p - X), one step is
 //   p += t + nu n,  t = -(I + gap S)^-1 r,  nu = -(f/|g| + t'S t / 2);
-// the quadratic term makes one step from a predicted foot nearly always enough. S has two eigenvalues k across n; functions of S are linear in it,
-//   phi(S) = c0 P + c1 S,  c1 = (phi(k1) - phi(k2)) / (k1 - k2),  c0 = phi(k1) - c1 k1,
-// so that neither step nor answer needs a tangent frame (and a mirrored or turned scene gets the mirrored or turned answer).
+// the quadratic term makes one step from a predicted foot nearly always enough. S has two eigenvalues across n, so that with T = tr S, D = k1 k2
+//   (I + gap S)^-1 = ((1 + gap T) P - gap S) / (1 + gap T + gap^2 D),   S (I + gap S)^-1 = (S + gap D P) / (1 + gap T + gap^2 D)
+// and neither step nor answer needs a tangent frame or a root (and a mirrored or turned scene gets the mirrored or turned answer).
+//
+// Another model's wall, the partner's, is asked at the own foot p (or a better place q), not from a foot of its own. With u = g_k/|g_k| there,
+// d = X - q, e = d - (d.u) u and the own gap's Hessian A, the distance of X to it and that distance's gradient are, to second order in e,
+//   gap_k = s + d.u + e'A e / 2,   n_k = u + A e,   s = t / (1 - t n'H n / (2 |g|)),   t = f_k/|g_k|.
+// Where the walls differ much, f_k is asked once more, at q = X - gap_k n_k.
 //
 // Layout: one array of BATCH doubles for each quantity, a lane for each point. Lanes do not see each other. Compiled for each instruction set; only
 // IEEE operations, so that all give the same bits.
@@ -13,7 +18,14 @@
 
 #include "geom/blob_lanes.h"
 
+#include <stdbool.h>
+
 enum { FOOT_BATCH = 32, FOOT_BLOCK = 8 };   // lanes a batch, and lanes that are computed together
+// A partner is looked at twice where its wall is further from the own than this part of the radius, or its normal differs by more than this, squared.
+#ifndef FOOT_LOOK_WALL
+#define FOOT_LOOK_WALL 0.05
+#define FOOT_LOOK_TURN 0.02
+#endif
 
 // State of a lane, as a double so that it lives in the same vectors.
 #define FOOT_PENDING 0.0
@@ -23,132 +35,214 @@ enum { FOOT_BATCH = 32, FOOT_BLOCK = 8 };   // lanes a batch, and lanes that are
 
 typedef double FootLane[FOOT_BATCH];
 
+// A field's value and derivatives at places, each lane with its own model.
+typedef struct FootSample {
+    const BlobGroup *group[FOOT_BATCH];
+    int groups[FOOT_BATCH];
+    bool carried[FOOT_BATCH], any_carried;   // near the inlet, see lim_vessel.c
+    FootLane x, y, z;                // [mm]
+    FootLane f, gx, gy, gz, hxx, hxy, hxz, hyy, hyz, hzz;
+} FootSample;
+
 typedef struct FootBatch {
     // in
-    const BlobGroup *group[FOOT_BATCH];      // the lane's model
-    int groups[FOOT_BATCH];
     FootLane xx, xy, xz;             // X [mm]
-    FootLane radius;                 // of the node [mm], the scale of the problem
+    FootLane radius, bend;           // of the node [mm], the scale of the problem, and its inverse
     FootLane longest;                // [mm] bound of a step; where not careful a longer one makes the lane FOOT_LOST
-    FootLane careful;                // 1: go on near focal points, with bounded steps
     FootLane allowed;                // [mm] rest of |f|/|g| with which a foot is good enough; its place may be off by a hundred times that
-    // the running foot and the sample there
-    FootLane px, py, pz;
-    FootLane f, gx, gy, gz, hxx, hxy, hxz, hyy, hyz, hzz;
+    FootSample at;                   // the running foot
     // the field at X
     FootLane inside;                 // 1 or 0
     FootLane estimate;               // Newton's step on W, see lim_vessel.c: inside one blob never below the distance
     // out
     FootLane state;
     FootLane nx, ny, nz, gap;        // unit normal, signed distance
-    FootLane k1, k2;                 // principal curvatures of the distance, k1 >= k2 [1/mm]
+    FootLane half;                   // n'H n / (2 |g|) [1/mm]
     FootLane sxx, sxy, sxz, syy, syz, szz;   // S …
-    FootLane axx, axy, axz, ayy, ayz, azz;   // … and the gap's Hessian at X, S (I + gap S)^-1
+    FootLane axx, axy, axz, ayy, ayz, azz;   // … and the gap's Hessian at X
 } FootBatch;
 
-// One step of a block's pending lanes from their samples.
-static inline __attribute__((always_inline)) void foot_newton(FootBatch *restrict b, int block)
+// A partner's answers for the lanes of a batch.
+typedef struct FootPartner {
+    FootSample at;                   // at the own feet, or moved from there
+    FootLane weight;                 // 0: none
+    FootLane gap, nx, ny, nz;        // at X
+    FootLane move;                   // 1 where a second look from a better place is due …
+    FootLane tox, toy, toz;          // … from here
+} FootPartner;
+
+// Weighted sums of what partners' answers differ by from the own one.
+typedef struct FootMixture {
+    FootLane agree;                  // [mm] walls that differ by more are not mixed
+    FootLane total, gap, nx, ny, nz;
+} FootMixture;
+
+// One step of a block's pending lanes from their samples. `careful`: goes on near focal points, with bounded steps.
+static inline __attribute__((always_inline)) void foot_newton(FootBatch *restrict b, int block, const bool careful)
 {
     for (int i = block; i < block + FOOT_BLOCK; i++) {
-        double gx = b->gx[i], gy = b->gy[i], gz = b->gz[i], slope2 = gx * gx + gy * gy + gz * gz;
+        double gx = b->at.gx[i], gy = b->at.gy[i], gz = b->at.gz[i], slope2 = gx * gx + gy * gy + gz * gz;
         double flat = 1 / sqrt(slope2 > 1e-200 ? slope2 : 1.0);
         double nx = gx * flat, ny = gy * flat, nz = gz * flat;
-        double px = b->px[i], py = b->py[i], pz = b->pz[i], dx = px - b->xx[i], dy = py - b->xy[i], dz = pz - b->xz[i];
+        double px = b->at.x[i], py = b->at.y[i], pz = b->at.z[i], dx = px - b->xx[i], dy = py - b->xy[i], dz = pz - b->xz[i];
         double gap = -(dx * nx + dy * ny + dz * nz), rx = dx + gap * nx, ry = dy + gap * ny, rz = dz + gap * nz;
         // S = (H - n v' - v n' + (n.v) n n') / |g|, v = H n
-        double xx = b->hxx[i] * flat, xy = b->hxy[i] * flat, xz = b->hxz[i] * flat, yy = b->hyy[i] * flat, yz = b->hyz[i] * flat,
-               zz = b->hzz[i] * flat;
+        double xx = b->at.hxx[i] * flat, xy = b->at.hxy[i] * flat, xz = b->at.hxz[i] * flat, yy = b->at.hyy[i] * flat, yz = b->at.hyz[i] * flat,
+               zz = b->at.hzz[i] * flat;
         double vx = xx * nx + xy * ny + xz * nz, vy = xy * nx + yy * ny + yz * nz, vz = xz * nx + yz * ny + zz * nz;
         double half = 0.5 * (nx * vx + ny * vy + nz * vz);
         vx -= half * nx, vy -= half * ny, vz -= half * nz;
         xx -= 2 * nx * vx, xy -= nx * vy + ny * vx, xz -= nx * vz + nz * vx;
         yy -= 2 * ny * vy, yz -= ny * vz + nz * vy, zz -= 2 * nz * vz;
-        double mean = 0.5 * (xx + yy + zz);
-        double spread2 = 0.5 * (xx * xx + yy * yy + zz * zz + 2 * (xy * xy + xz * xz + yz * yz)) - mean * mean;
-        double spread = sqrt(spread2 > 0 ? spread2 : 0.0), k1 = mean + spread, k2 = mean - spread;
-        // phi = 1 / (1 + gap k), beyond focal points by its size
-        double m1 = 1 + gap * k1, m2 = 1 + gap * k2, a1 = fabs(m1), a2 = fabs(m2);
-        double deep = (m1 < 0.1 ? 1.0 : 0.0) + (m2 < 0.1 ? 1.0 : 0.0);
-        double phi1 = 1 / (a1 > 0.05 ? a1 : 0.05), phi2 = 1 / (a2 > 0.05 ? a2 : 0.05);
-        double c1 = spread > 1e-9 * fabs(mean) ? (phi1 - phi2) / (2 * (spread > 1e-300 ? spread : 1.0)) : 0.0, c0 = phi1 - c1 * k1;
+        double trace = xx + yy + zz, size2 = xx * xx + yy * yy + zz * zz + 2 * (xy * xy + xz * xz + yz * yz);   // k1^2 + k2^2
+        double product = 0.5 * (trace * trace - size2);
+        // both 1 + gap k > 0.1: the product and the sum of (0.9 + gap k) are positive
+        double deep = 0.81 + gap * (0.9 * trace + gap * product) > 0 && 1.8 + gap * trace > 0 ? 0.0 : 1.0;
+        double c0, c1;
+        if (careful) {
+            // phi = 1 / (1 + gap k), beyond focal points by its size
+            double spread = sqrt(0.5 * size2 - 0.25 * trace * trace > 0 ? 0.5 * size2 - 0.25 * trace * trace : 0.0);
+            double k1 = 0.5 * trace + spread, k2 = 0.5 * trace - spread, a1 = fabs(1 + gap * k1), a2 = fabs(1 + gap * k2);
+            double phi1 = 1 / (a1 > 0.05 ? a1 : 0.05), phi2 = 1 / (a2 > 0.05 ? a2 : 0.05);
+            c1 = spread > 1e-9 * fabs(trace) ? (phi1 - phi2) / (2 * (spread > 1e-300 ? spread : 1.0)) : 0.0, c0 = phi1 - c1 * k1;
+        } else {
+            double all = 1 / (deep > 0 ? 1.0 : 1 + gap * (trace + gap * product));
+            c0 = all * (1 + gap * trace), c1 = -all * gap;
+        }
         double tx = -(c0 * rx + c1 * (xx * rx + xy * ry + xz * rz)), ty = -(c0 * ry + c1 * (xy * rx + yy * ry + yz * rz)),
                tz = -(c0 * rz + c1 * (xz * rx + yz * ry + zz * rz));
-        double taubin = b->f[i] * flat, longest = b->longest[i], along = sqrt(tx * tx + ty * ty + tz * tz);
-        double far = (fabs(taubin) > longest ? 1.0 : 0.0) + (along > longest ? 1.0 : 0.0);
-        double shrink = along > longest ? longest / along : 1.0;
-        taubin = taubin > longest ? longest : taubin;
-        taubin = taubin < -longest ? -longest : taubin;
-        tx *= shrink, ty *= shrink, tz *= shrink, along *= shrink;
+        double taubin = b->at.f[i] * flat, longest = b->longest[i], along2 = tx * tx + ty * ty + tz * tz;
+        double far = fabs(taubin) > longest || along2 > longest * longest ? 1.0 : 0.0;
+        if (careful) {
+            double shrink = along2 > longest * longest ? longest / sqrt(along2) : 1.0;
+            taubin = taubin > longest ? longest : taubin;
+            taubin = taubin < -longest ? -longest : taubin;
+            tx *= shrink, ty *= shrink, tz *= shrink, along2 *= shrink * shrink;
+        }
         double sx = xx * tx + xy * ty + xz * tz, sy = xy * tx + yy * ty + yz * tz, sz = xz * tx + yz * ty + zz * tz;   // S t
-        double nu = -(taubin + 0.5 * (tx * sx + ty * sy + tz * sz)), size = fabs(nu);
+        double nu = -(taubin + 0.5 * (tx * sx + ty * sy + tz * sz)), step2 = nu * nu;
         px += tx + nu * nx, py += ty + nu * ny, pz += tz + nu * nz;
-        // what the step leaves: of the foot's place (hence the normal) second order, of f/|g| third order, in units of the curvature
-        double allowed = b->allowed[i], curl = fabs(mean) + spread + 1 / b->radius[i], left = curl * along * along;
-        double done = left < 100 * allowed && curl * (along + size) * (left + size) < allowed ? 1.0 : 0.0;
-        // the normal turns by S t along the step
-        nx += sx, ny += sy, nz += sz;
-        double unit = 1 / sqrt(nx * nx + ny * ny + nz * nz);
-        nx *= unit, ny *= unit, nz *= unit;
-        double careful = b->careful[i], state = done > 0 ? FOOT_DONE : FOOT_PENDING;
-        state = far > careful * 2 ? FOOT_LOST : state;
-        state = deep > careful * 2 ? FOOT_DEEP : state;
+        // what the step leaves: of the foot's place (hence the normal) second order, of f/|g| third order, in units of the curvature; all squared
+        double allowed = b->allowed[i] * b->allowed[i], curl = 2 * (size2 + b->bend[i] * b->bend[i]), left = curl * along2 * along2;
+        double done = left < 1e4 * allowed && 4 * curl * (along2 + step2) * (left + step2) < allowed ? 1.0 : 0.0;
+        // the normal turns by S t along the step; what that adds to its length is small where the step is the last
+        double turn2 = sx * sx + sy * sy + sz * sz, unit = 1 - turn2 * (0.5 - 0.375 * turn2);
+        nx = (nx + sx) * unit, ny = (ny + sy) * unit, nz = (nz + sz) * unit;
+        double state = done > 0 ? FOOT_DONE : FOOT_PENDING;
+        if (!careful) {
+            state = far > 0 ? FOOT_LOST : state;
+            state = deep > 0 ? FOOT_DEEP : state;
+        }
         state = slope2 > 1e-200 ? state : FOOT_LOST;
         double held = b->state[i];
         b->state[i] = held == FOOT_PENDING ? state : held;
-        b->px[i] = held == FOOT_PENDING ? px : b->px[i], b->py[i] = held == FOOT_PENDING ? py : b->py[i], b->pz[i] = held == FOOT_PENDING ? pz : b->pz[i];
+        b->at.x[i] = held == FOOT_PENDING ? px : b->at.x[i], b->at.y[i] = held == FOOT_PENDING ? py : b->at.y[i], b->at.z[i] = held == FOOT_PENDING ? pz : b->at.z[i];
         b->nx[i] = held == FOOT_PENDING ? nx : b->nx[i], b->ny[i] = held == FOOT_PENDING ? ny : b->ny[i], b->nz[i] = held == FOOT_PENDING ? nz : b->nz[i];
-        b->k1[i] = held == FOOT_PENDING ? k1 : b->k1[i], b->k2[i] = held == FOOT_PENDING ? k2 : b->k2[i];
+        b->half[i] = held == FOOT_PENDING ? half : b->half[i];
         b->sxx[i] = held == FOOT_PENDING ? xx : b->sxx[i], b->sxy[i] = held == FOOT_PENDING ? xy : b->sxy[i], b->sxz[i] = held == FOOT_PENDING ? xz : b->sxz[i];
         b->syy[i] = held == FOOT_PENDING ? yy : b->syy[i], b->syz[i] = held == FOOT_PENDING ? yz : b->syz[i], b->szz[i] = held == FOOT_PENDING ? zz : b->szz[i];
     }
 }
 
-// Gap and Hessian at X of a block from foot, normal and S: phi(k) = k / (1 + gap k), the divisor held at 0.1 near focal points.
+// Gap and Hessian at X of a block from foot, normal and S. Near focal points the gap in the Hessian is held so that both 1 + gap k are at least 0.1.
 static inline __attribute__((always_inline)) void foot_finish(FootBatch *restrict b, int block)
 {
     for (int i = block; i < block + FOOT_BLOCK; i++) {
         double nx = b->nx[i], ny = b->ny[i], nz = b->nz[i];
-        double gap = (b->xx[i] - b->px[i]) * nx + (b->xy[i] - b->py[i]) * ny + (b->xz[i] - b->pz[i]) * nz;
-        double k1 = b->k1[i], k2 = b->k2[i], m1 = 1 + gap * k1, m2 = 1 + gap * k2, spread = k1 - k2;
-        m1 = m1 > 0.1 ? m1 : 0.1, m2 = m2 > 0.1 ? m2 : 0.1;
-        double phi1 = k1 / m1, phi2 = k2 / m2;
-        double c1 = spread > 1e-6 * (fabs(k1) + fabs(k2)) ? (phi1 - phi2) / (spread > 1e-300 ? spread : 1.0) : 1 / (m1 * m2);
-        double c0 = phi1 - c1 * k1;
+        double gap = (b->xx[i] - b->at.x[i]) * nx + (b->xy[i] - b->at.y[i]) * ny + (b->xz[i] - b->at.z[i]) * nz;
         b->gap[i] = gap;
-        // S is that of the last evaluation, the normal has turned a little since: c0 P + c1 S across the new one
+        // S is that of the last evaluation, the normal has turned a little since: across the new one
         double xx = b->sxx[i], xy = b->sxy[i], xz = b->sxz[i], yy = b->syy[i], yz = b->syz[i], zz = b->szz[i];
         double vx = xx * nx + xy * ny + xz * nz, vy = xy * nx + yy * ny + yz * nz, vz = xz * nx + yz * ny + zz * nz;
         double half = 0.5 * (nx * vx + ny * vy + nz * vz);
         vx -= half * nx, vy -= half * ny, vz -= half * nz;
-        b->axx[i] = c0 * (1 - nx * nx) + c1 * (xx - 2 * nx * vx), b->axy[i] = -c0 * nx * ny + c1 * (xy - nx * vy - ny * vx);
-        b->axz[i] = -c0 * nx * nz + c1 * (xz - nx * vz - nz * vx), b->ayy[i] = c0 * (1 - ny * ny) + c1 * (yy - 2 * ny * vy);
-        b->ayz[i] = -c0 * ny * nz + c1 * (yz - ny * vz - nz * vy), b->azz[i] = c0 * (1 - nz * nz) + c1 * (zz - 2 * nz * vz);
+        xx -= 2 * nx * vx, xy -= nx * vy + ny * vx, xz -= nx * vz + nz * vx;
+        yy -= 2 * ny * vy, yz -= ny * vz + nz * vy, zz -= 2 * nz * vz;
+        double trace = xx + yy + zz, size2 = xx * xx + yy * yy + zz * zz + 2 * (xy * xy + xz * xz + yz * yz), product = 0.5 * (trace * trace - size2);
+        double spread2 = 0.5 * size2 - 0.25 * trace * trace, spread = sqrt(spread2 > 0 ? spread2 : 0.0);
+        double least = 0.5 * trace + (gap > 0 ? -spread : spread), held = 1 + gap * least < 0.1 ? -0.9 / (1 + gap * least < 0.1 ? least : 1.0) : gap;
+        double c1 = 1 / (1 + held * (trace + held * product)), c0 = c1 * held * product;
+        b->axx[i] = c0 * (1 - nx * nx) + c1 * xx, b->axy[i] = c1 * xy - c0 * nx * ny, b->axz[i] = c1 * xz - c0 * nx * nz;
+        b->ayy[i] = c0 * (1 - ny * ny) + c1 * yy, b->ayz[i] = c1 * yz - c0 * ny * nz, b->azz[i] = c0 * (1 - nz * nz) + c1 * zz;
     }
 }
 
 // `inside` and `estimate` of a block from the samples at X.
-static inline __attribute__((always_inline)) void foot_estimate(FootBatch *restrict b, int block, double iso_level)
+static inline __attribute__((always_inline)) void foot_estimate(FootBatch *restrict b, const FootSample *restrict s, int block, double iso_level)
 {
     double level = 1 / sqrt(iso_level);
     for (int i = block; i < block + FOOT_BLOCK; i++) {
-        double gx = b->gx[i], gy = b->gy[i], gz = b->gz[i], slope2 = gx * gx + gy * gy + gz * gz, f = b->f[i];
-        double sum = f + iso_level, w = 1 / sqrt(sum), part = sum * sqrt(sum) * fabs(w - level);   // |W| / w^3
+        double gx = s->gx[i], gy = s->gy[i], gz = s->gz[i], slope2 = gx * gx + gy * gy + gz * gz, f = s->f[i];
+        double sum = f + iso_level, root = sqrt(sum), part = sum * fabs(1 - level * root);   // |W| / w^3
         b->estimate[i] = slope2 > 1e-280 ? 2 * part / sqrt(slope2 > 1e-280 ? slope2 : 1.0) : 1e300;
         b->inside[i] = f > 0 ? 1.0 : 0.0;
     }
 }
 
+// A partner's answers in a block, from its samples at `s->at`.
+static inline __attribute__((always_inline)) void foot_partner(const FootBatch *restrict b, FootPartner *restrict s, int block)
+{
+    for (int i = block; i < block + FOOT_BLOCK; i++) {
+        double gx = s->at.gx[i], gy = s->at.gy[i], gz = s->at.gz[i], slope2 = gx * gx + gy * gy + gz * gz;
+        double flat = 1 / sqrt(slope2 > 1e-200 ? slope2 : 1.0), ux = gx * flat, uy = gy * flat, uz = gz * flat;
+        double taubin = s->at.f[i] * flat, bent = b->half[i] * taubin;
+        bent = bent > 0.4 ? 0.4 : bent;
+        bent = bent < -0.4 ? -0.4 : bent;
+        double away = taubin / (1 - bent);
+        double dx = b->xx[i] - s->at.x[i], dy = b->xy[i] - s->at.y[i], dz = b->xz[i] - s->at.z[i], along = dx * ux + dy * uy + dz * uz;
+        dx -= along * ux, dy -= along * uy, dz -= along * uz;
+        double cx = b->axx[i] * dx + b->axy[i] * dy + b->axz[i] * dz, cy = b->axy[i] * dx + b->ayy[i] * dy + b->ayz[i] * dz,
+               cz = b->axz[i] * dx + b->ayz[i] * dy + b->azz[i] * dz;
+        s->gap[i] = away + along + 0.5 * (dx * cx + dy * cy + dz * cz);
+        double nx = ux + cx, ny = uy + cy, nz = uz + cz, ax = nx - b->nx[i], ay = ny - b->ny[i], az = nz - b->nz[i];
+        s->nx[i] = nx, s->ny[i] = ny, s->nz[i] = nz;
+        // X's foot there, as well as can be said from here
+        s->tox[i] = b->xx[i] - s->gap[i] * nx, s->toy[i] = b->xy[i] - s->gap[i] * ny, s->toz[i] = b->xz[i] - s->gap[i] * nz;
+        double reach = FOOT_LOOK_WALL * b->radius[i];
+        s->move[i] = slope2 > 1e-200 && (fabs(away) > reach || ax * ax + ay * ay + az * az > FOOT_LOOK_TURN) ? 1.0 : 0.0;
+        s->weight[i] = slope2 > 1e-200 ? s->weight[i] : 0.0;
+    }
+}
+
+// Adds a partner's answers to the mixture: less the more they differ from the own, nothing where they say something else altogether.
+static inline __attribute__((always_inline)) void foot_mix(const FootBatch *restrict b, const FootPartner *restrict s, FootMixture *restrict m, int block)
+{
+    for (int i = block; i < block + FOOT_BLOCK; i++) {
+        double differs = s->gap[i] - b->gap[i], q = differs / m->agree[i], near = 1 - q * q;
+        double cosine = s->nx[i] * b->nx[i] + s->ny[i] * b->ny[i] + s->nz[i] * b->nz[i], turned = 4 * cosine - 2;   // 1 up to 41 degrees, 0 at 60
+        turned = turned < 1 ? turned : 1.0;
+        double w = near > 0 && turned > 0 ? s->weight[i] * near * near * turned * turned * (3 - 2 * turned) : 0.0;
+        m->total[i] += w;
+        m->gap[i] += w * differs;
+        m->nx[i] += w * (s->nx[i] - b->nx[i]), m->ny[i] += w * (s->ny[i] - b->ny[i]), m->nz[i] += w * (s->nz[i] - b->nz[i]);
+    }
+}
+
+// Nodes near a node, eight at a time, as planes: with y = X - C_i and e = C_j - C_i, node j's power distance exceeds i's by
+// |e|^2 + r_i^2 - r_j^2 - 2 e.y. In single precision, which moves a weight by 1e-6.
+enum { NEAR_GROUP = 8 };
+typedef struct NearGroup {
+    float base[NEAR_GROUP] __attribute__((aligned(32)));
+    float ex[NEAR_GROUP], ey[NEAR_GROUP], ez[NEAR_GROUP];    // 2 e
+    float band[NEAR_GROUP];          // 1 / width of the mixed zone [1/mm^2]
+    int node[NEAR_GROUP];            // -1: none
+} NearGroup;
+
 // The kernels of foot_lanes.h and blob_lanes.h for one instruction set.
 typedef struct LaneKernels {
     const char *isa;
-    // Field and gradient (and Hessian) at the running feet of `count` lanes, with the lanes' models. Many at a time: one evaluation alone waits 35 ns
-    // for its own division and sums, others fit into that gap.
-    void (*gradient)(FootBatch *batch, const int *lane, int count, double iso_level);
-    void (*hessian)(FootBatch *batch, const int *lane, int count, double iso_level);
+    // Field and gradient (and Hessian) of `count` lanes. Many at a time: one evaluation alone waits 35 ns for its own division and sums, others fit into
+    // that gap.
+    void (*gradient)(FootSample *sample, const int *lane, int count, double iso_level);
+    void (*hessian)(FootSample *sample, const int *lane, int count, double iso_level);
     // Of the first `count` lanes, in whole blocks: the rest of the last block must hold numbers. newton leaves blocks alone where nothing is pending.
-    void (*newton)(FootBatch *batch, int count);
+    void (*newton)(FootBatch *batch, int count, bool careful);
     void (*finish)(FootBatch *batch, int count);
-    void (*estimate)(FootBatch *batch, int count, double iso_level);
+    void (*estimate)(FootBatch *batch, const FootSample *at_x, int count, double iso_level);
+    void (*partner)(const FootBatch *batch, FootPartner *partner, int count);
+    void (*mix)(const FootBatch *batch, const FootPartner *partner, FootMixture *mixture, int count);
+    // Weights of the near nodes for y (see NearGroup): 1 at the border of the own cell, 0 a band behind it, 2 for one whose cell X is in.
+    void (*near)(const NearGroup *group, int groups, const float y[3], float *weight);
 } LaneKernels;
 // isa: 0 what simd_level() says, 1 SSE2, 2 AVX2, 3 AVX-512; the next narrower one where it is absent.
 const LaneKernels *lane_kernels(int isa);

@@ -2,14 +2,19 @@
 // point's node (6.2.2, iterated: a single step is Taubin's distance, up to 2.3 times too long).
 //
 // A point goes through
-//   1. power_walk from its last node;
+//   1. the planes between its node's cell and those near (NearGroup); where another is better, power_walk;
 //   2. bounds that cost no field: the distance is 1-Lipschitz, so gap(X) >= gap(C) - |X - C| for the node's centre C, and
 //      gap(X) >= clearance - |X - X_then| for the place where that was last made sure of;
 //   3. one value of the field at X: its sign, and an estimate that shows when another wall has come closer than the remembered one;
 //   4. Newton (foot_lanes.h) from where the remembered foot should have moved to: p + (I + gap S)^-1 P (X - X_then);
-//   5. where that fails, a march from X along the gradient, then again 4; where that fails, blobby_project (slow, robust).
+//   5. where that fails, a march from X along the gradient, then again 4; where that fails, blobby_project (slow, robust);
+//   6. near the wall, the partners: models of the cells that are close, asked at the own foot, and mixed in.
 // The march works on W = (f + T)^(-1/2) - T^(-1/2), which for one blob is a paraboloid |X - C|^2 - r^2 up to scale: Newton on it from outside never
 // overshoots and arrives from any distance, where f itself is flat.
+//
+// The inlet. Blobs close upstream of the root, the vessel does not. With z the height over the root's plane along its direction d, models near it are
+// asked at X + (zeta(z) - z) d instead of at X: zeta = z downstream of h = r / 2, 0 upstream of -h, with a continuous second derivative between. So the
+// section at the root goes on upstream as a cylinder for ever, and wall, normal and Hessian are smooth across the plane.
 #include "geom/foot_lanes.h"
 #include "geom/power_walk.h"
 #include "geom/vessel.h"
@@ -19,9 +24,12 @@
 
 typedef struct NodeModel {
     const BlobGroup *group;
-    int groups;
+    const NearGroup *near;
+    int groups, near_groups;
     int source;              // the node whose blobs these are: itself, or the nearest relative where it has none
-    double band;             // [mm^2] width of the zone in which it is mixed, in power distance
+    bool carried;            // near the inlet: goes on upstream
+    double radius;
+    Vec3 center;
     double clear;            // [mm] true distance from the node's centre to the wall of this model, less a margin; < 0: no bound
 } NodeModel;
 
@@ -31,22 +39,26 @@ typedef struct LimVessel {
     LimVesselOptions options;
     const LaneKernels *kernels;
     BlobGroup *group;        // all nodes' groups
+    NearGroup *near;
     NodeModel *model;        // (N)
     bool inlet_open;         // the root is an end of the tree
 } LimVessel;
 
 // Points of a query are taken in batches, and each batch in stages (all fields at X, all first Newton steps, …), see foot_lanes.h. A point's answer
 // does not depend on its batch. What the lanes do not hold:
+enum { PARTNERS_MAX = 7 };
 typedef struct Lane {
     int point;               // of the query
     int node;
     bool sure, again;
     bool checked;            // no other wall stands within 0.7 gap
-    double weight;           // in a blend
+    int partners;            // nodes whose models are mixed in
+    int partner[PARTNERS_MAX];
+    float weight[PARTNERS_MAX];
 } Lane;
 
 static Vec3 lane_point(const FootBatch *b, int i) { return vec3(b->xx[i], b->xy[i], b->xz[i]); }
-static Vec3 lane_foot(const FootBatch *b, int i) { return vec3(b->px[i], b->py[i], b->pz[i]); }
+static Vec3 lane_foot(const FootBatch *b, int i) { return vec3(b->at.x[i], b->at.y[i], b->at.z[i]); }
 static Vec3 lane_normal(const FootBatch *b, int i) { return vec3(b->nx[i], b->ny[i], b->nz[i]); }
 static Sym3 lane_hessian(const FootBatch *b, int i) { return (Sym3){b->axx[i], b->axy[i], b->axz[i], b->ayy[i], b->ayz[i], b->azz[i]}; }
 
@@ -57,46 +69,112 @@ static Blobby blobs_of(const LimVessel *lim, int node)
     return (Blobby){(int)(end - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level};
 }
 
+// --- The inlet ---
+
+static double inlet_height(const LimVessel *lim, Vec3 x) { return vec3_dot(vec3_sub(x, lim->tree->center[0]), lim->tree->direction[0]); }
+static double inlet_zone(const LimVessel *lim) { return 0.5 * lim->tree->radius[0]; }   // h
+
+// zeta(z) and its first two derivatives.
+static double carried_height(double z, double h, double *slope, double *bend)
+{
+    if (z >= h) {
+        *slope = 1, *bend = 0;
+        return z;
+    }
+    double u = fmax(0.5 * (z / h + 1), 0);
+    *slope = u * u * (3 - 2 * u);
+    *bend = 3 * u * (1 - u) / h;
+    return h * u * u * u * (2 - u);
+}
+
+// Sums of the fields, those near the inlet as they go on upstream.
+static void sample(const LimVessel *lim, FootSample *s, const int *lane, int count, bool hessian)
+{
+    void (*kernel)(FootSample *, const int *, int, double) = hessian ? lim->kernels->hessian : lim->kernels->gradient;
+    if (!s->any_carried) {
+        kernel(s, lane, count, lim->tree->iso_level);
+        return;
+    }
+    Vec3 at[FOOT_BATCH], d = lim->tree->direction[0];
+    double slope[FOOT_BATCH], bend[FOOT_BATCH];
+    for (int k = 0; k < count; k++) {
+        int i = lane[k];
+        at[k] = vec3(s->x[i], s->y[i], s->z[i]);
+        double z = inlet_height(lim, at[k]), to = s->carried[i] ? carried_height(z, inlet_zone(lim), &slope[k], &bend[k]) : z;
+        if (to == z)
+            slope[k] = 1, bend[k] = 0;
+        s->x[i] += (to - z) * d.x, s->y[i] += (to - z) * d.y, s->z[i] += (to - z) * d.z;
+    }
+    kernel(s, lane, count, lim->tree->iso_level);
+    for (int k = 0; k < count; k++) {
+        int i = lane[k];
+        s->x[i] = at[k].x, s->y[i] = at[k].y, s->z[i] = at[k].z;
+        if (slope[k] == 1)
+            continue;
+        // with J = I + c d d': J g, J H J + (g.d) zeta'' d d'
+        double c = slope[k] - 1, along = s->gx[i] * d.x + s->gy[i] * d.y + s->gz[i] * d.z;
+        s->gx[i] += c * along * d.x, s->gy[i] += c * along * d.y, s->gz[i] += c * along * d.z;
+        if (!hessian)
+            continue;
+        Vec3 v = {s->hxx[i] * d.x + s->hxy[i] * d.y + s->hxz[i] * d.z, s->hxy[i] * d.x + s->hyy[i] * d.y + s->hyz[i] * d.z,
+                  s->hxz[i] * d.x + s->hyz[i] * d.y + s->hzz[i] * d.z};
+        v = vec3_add_scaled(vec3_scale(v, c), 0.5 * (c * c * vec3_dot(v, d) + along * bend[k]), d);
+        s->hxx[i] += 2 * d.x * v.x, s->hxy[i] += d.x * v.y + v.x * d.y, s->hxz[i] += d.x * v.z + v.x * d.z;
+        s->hyy[i] += 2 * d.y * v.y, s->hyz[i] += d.y * v.z + v.y * d.z, s->hzz[i] += 2 * d.z * v.z;
+    }
+}
+
+static void set_sample(const LimVessel *lim, FootSample *s, int i, int node, Vec3 x)
+{
+    const NodeModel *m = &lim->model[node];
+    s->group[i] = m->group;
+    s->groups[i] = m->groups;
+    s->carried[i] = m->carried;
+    s->any_carried |= m->carried;
+    s->x[i] = x.x, s->y[i] = x.y, s->z[i] = x.z;
+}
+
+// --- Feet ---
+
 // Where Newton gives up at once the answer must still be numbers for the stages that run over whole blocks.
 static void clear_answer(FootBatch *b, int i)
 {
-    b->nx[i] = b->ny[i] = b->nz[i] = b->gap[i] = b->k1[i] = b->k2[i] = 0;
+    b->nx[i] = b->ny[i] = b->nz[i] = b->gap[i] = b->half[i] = 0;
     b->sxx[i] = b->sxy[i] = b->sxz[i] = b->syy[i] = b->syz[i] = b->szz[i] = 0;
 }
 
-// [mm] what Newton may leave: of a foot that was followed, of one found afresh, of a neighbour's that is mixed in with its weight.
-static const double REST_FOLLOWED = 1e-8, REST_FRESH = 1e-9, REST_MIXED = 1e-5;
+// [mm] what Newton may leave: of a foot that was followed, of one found afresh.
+static const double REST_FOLLOWED = 1e-8, REST_FRESH = 1e-9;
 
-static void set_lane(const LimVessel *lim, FootBatch *b, int i, int node, Vec3 x, Vec3 start, double allowed)
+static void set_lane(const LimVessel *lim, FootBatch *b, int i, int node, Vec3 x, Vec3 start)
 {
-    const NodeModel *m = &lim->model[node];
-    b->group[i] = m->group;
-    b->groups[i] = m->groups;
+    set_sample(lim, &b->at, i, node, start);
     b->xx[i] = x.x, b->xy[i] = x.y, b->xz[i] = x.z;
-    b->px[i] = start.x, b->py[i] = start.y, b->pz[i] = start.z;
-    b->radius[i] = lim->tree->radius[node];
+    b->radius[i] = lim->model[node].radius;
+    b->bend[i] = 1 / b->radius[i];
     b->longest[i] = 0.5 * b->radius[i];
-    b->careful[i] = 0;
-    b->allowed[i] = allowed;
+    b->allowed[i] = REST_FOLLOWED;
     b->state[i] = FOOT_PENDING;
     clear_answer(b, i);
 }
 
 // Lanes are computed in whole blocks: those beyond the last in use get numbers, and nothing waits for them.
-static void fill_block(FootBatch *b, int count)
+static void fill_block(FootBatch *b, FootSample *at_x, int count)
 {
     for (int i = count; i % FOOT_BLOCK != 0; i++) {
-        b->xx[i] = b->xy[i] = b->xz[i] = b->px[i] = b->py[i] = b->pz[i] = b->careful[i] = 0;
-        b->radius[i] = b->longest[i] = b->allowed[i] = 1;
-        b->f[i] = b->gx[i] = b->gy[i] = b->gz[i] = 0;
-        b->hxx[i] = b->hxy[i] = b->hxz[i] = b->hyy[i] = b->hyz[i] = b->hzz[i] = 0;
+        FootSample *s = &b->at;
+        b->xx[i] = b->xy[i] = b->xz[i] = s->x[i] = s->y[i] = s->z[i] = 0;
+        b->radius[i] = b->bend[i] = b->longest[i] = b->allowed[i] = 1;
+        s->f[i] = s->gx[i] = s->gy[i] = s->gz[i] = 0;
+        s->hxx[i] = s->hxy[i] = s->hxz[i] = s->hyy[i] = s->hyz[i] = s->hzz[i] = 0;
+        at_x->f[i] = at_x->gx[i] = at_x->gy[i] = at_x->gz[i] = 0;
         clear_answer(b, i);
         b->state[i] = FOOT_LOST;
     }
 }
 
 // At most `rounds` Newton steps of the pending lanes; those that are not done then are lost.
-static void newton_rounds(const LimVessel *lim, FootBatch *b, int count, int rounds)
+static void newton_rounds(const LimVessel *lim, FootBatch *b, int count, int rounds, bool careful)
 {
     int lane[FOOT_BATCH];
     for (int round = 0; round < rounds; round++) {
@@ -106,8 +184,8 @@ static void newton_rounds(const LimVessel *lim, FootBatch *b, int count, int rou
                 lane[n++] = i;
         if (n == 0)
             return;
-        lim->kernels->hessian(b, lane, n, lim->tree->iso_level);
-        lim->kernels->newton(b, count);
+        sample(lim, &b->at, lane, n, true);
+        lim->kernels->newton(b, count, careful);
     }
     for (int i = 0; i < count; i++)
         if (b->state[i] == FOOT_PENDING)
@@ -118,11 +196,11 @@ static void newton_rounds(const LimVessel *lim, FootBatch *b, int count, int rou
 static bool march_step(const LimVessel *lim, FootBatch *b, int i, int node)
 {
     const VesselTree *tree = lim->tree;
-    Vec3 g = {b->gx[i], b->gy[i], b->gz[i]}, p = lane_foot(b, i);
+    Vec3 g = {b->at.gx[i], b->at.gy[i], b->at.gz[i]}, p = lane_foot(b, i);
     // inside a vessel the side wall is nearer than its ends, though near the axis the field may fall faster towards those
     if (b->inside[i] > 0 && tree->kind[node] == NODE_VESSEL)
         g = vec3_add_scaled(g, -vec3_dot(g, tree->direction[node]), tree->direction[node]);
-    double radius = tree->radius[node], level = 1 / sqrt(tree->iso_level), slope = vec3_norm(g), sum = b->f[i] + tree->iso_level, step = radius;
+    double radius = tree->radius[node], level = 1 / sqrt(tree->iso_level), slope = vec3_norm(g), sum = b->at.f[i] + tree->iso_level, step = radius;
     if (slope > 1e-12 * sum) {
         double w = 1 / sqrt(sum);
         step = fmax(2 * (w - level) / (w * w * w * slope), -1.2 * radius);   // < 0 inside: outwards
@@ -131,7 +209,7 @@ static bool march_step(const LimVessel *lim, FootBatch *b, int i, int node)
         // on a symmetric axis or at a lone blob's centre any way out is as good, the same one always
         p = vec3_add_scaled(p, radius, vec3_normal_to(tree->direction[node]));
     }
-    b->px[i] = p.x, b->py[i] = p.y, b->pz[i] = p.z;
+    b->at.x[i] = p.x, b->at.y[i] = p.y, b->at.z[i] = p.z;
     return fabs(step) < 0.05 * radius;
 }
 
@@ -139,9 +217,9 @@ static void march_rounds(const LimVessel *lim, FootBatch *b, const Lane *of, int
 {
     enum { STEPS = 13 };
     for (int k = 0; k < count; k++)
-        b->px[lane[k]] = b->xx[lane[k]], b->py[lane[k]] = b->xy[lane[k]], b->pz[lane[k]] = b->xz[lane[k]];
+        b->at.x[lane[k]] = b->xx[lane[k]], b->at.y[lane[k]] = b->xy[lane[k]], b->at.z[lane[k]] = b->xz[lane[k]];
     for (int round = 0; round < STEPS && count > 0; round++) {
-        lim->kernels->gradient(b, lane, count, lim->tree->iso_level);
+        sample(lim, &b->at, lane, count, false);
         int kept = 0;
         for (int k = 0; k < count; k++)
             if (!march_step(lim, b, lane[k], of[lane[k]].node))
@@ -150,134 +228,15 @@ static void march_rounds(const LimVessel *lim, FootBatch *b, const Lane *of, int
     }
 }
 
-static void project_slowly(const LimVessel *lim, FootBatch *b, int i, Lane *of)
-{
-    Blobby model = blobs_of(lim, of->node);
-    Vec3 x = lane_point(b, i), g, normal;
-    SurfacePoint s = blobby_project(&model, x, x);
-    double f = blobby_gradient(&model, x, &g), slope = vec3_norm(g), mean = 0.5 * sym3_trace(&s.shape);
-    const Sym3 *h = &s.shape;
-    of->sure = s.converged;
-    normal = s.normal;
-    if (!s.converged) {
-        // Taubin's distance along the gradient, or what little is known: a flat wall there
-        double gap = slope > 1e-100 && fabs(f / slope) < fabs(s.distance) ? f / slope : s.distance;
-        normal = vec3_unit_or(g, s.normal);
-        s.foot = vec3_add_scaled(x, -gap, normal);
-        s.shape = (Sym3){0, 0, 0, 0, 0, 0};
-        mean = 0;
-    }
-    double frobenius2 = h->xx * h->xx + h->yy * h->yy + h->zz * h->zz + 2 * (h->xy * h->xy + h->xz * h->xz + h->yz * h->yz);
-    double spread = sqrt(fmax(0.5 * frobenius2 - mean * mean, 0));
-    b->px[i] = s.foot.x, b->py[i] = s.foot.y, b->pz[i] = s.foot.z;
-    b->nx[i] = normal.x, b->ny[i] = normal.y, b->nz[i] = normal.z;
-    b->k1[i] = mean + spread, b->k2[i] = mean - spread;
-    b->sxx[i] = h->xx, b->sxy[i] = h->xy, b->sxz[i] = h->xz, b->syy[i] = h->yy, b->syz[i] = h->yz, b->szz[i] = h->zz;
-    b->state[i] = FOOT_DONE;
-}
-
-static bool is_on_wrong_side(const FootBatch *b, int i) { return (b->gap[i] > 0) != (b->inside[i] > 0) && fabs(b->gap[i]) > 1e-6; }
-
-// Feet of `count` lanes on the models of their nodes; `again` marks those without a start. A foot on the wrong side of the wall, or on a wall that
-// stands further off than another, is not the closest: those start once more from X.
-static void project_batch(const LimVessel *lim, FootBatch *b, Lane *of, int count)
-{
-    FootLane start[3];
-    int lane[FOOT_BATCH], n = 0;
-    for (int i = 0; i < count; i++) {
-        start[0][i] = b->px[i], start[1][i] = b->py[i], start[2][i] = b->pz[i];
-        b->px[i] = b->xx[i], b->py[i] = b->xy[i], b->pz[i] = b->xz[i];
-        lane[i] = i;
-        of[i].sure = true;
-        if (of[i].again)
-            b->state[i] = FOOT_LOST;
-    }
-    fill_block(b, count);
-    lim->kernels->gradient(b, lane, count, lim->tree->iso_level);
-    lim->kernels->estimate(b, count, lim->tree->iso_level);
-    for (int i = 0; i < count; i++)
-        b->px[i] = start[0][i], b->py[i] = start[1][i], b->pz[i] = start[2][i];
-    newton_rounds(lim, b, count, 4);
-    lim->kernels->finish(b, count);
-    for (int i = 0; i < count; i++) {
-        of[i].again = b->state[i] != FOOT_DONE || is_on_wrong_side(b, i) || !(b->estimate[i] > 0.8 * fabs(b->gap[i]));
-        if (of[i].again)
-            lane[n++] = i;
-    }
-    if (n == 0)
-        return;
-    march_rounds(lim, b, of, lane, n);
-    for (int i = 0; i < count; i++)
-        if (of[i].again) {
-            b->state[i] = FOOT_PENDING;
-            b->careful[i] = 1;
-            b->allowed[i] = REST_FRESH;
-            b->longest[i] = b->radius[i];
-        }
-    newton_rounds(lim, b, count, 12);
-    lim->kernels->finish(b, count);
-    bool slow = false;
-    for (int i = 0; i < count; i++)
-        if (of[i].again && (b->state[i] != FOOT_DONE || is_on_wrong_side(b, i))) {
-            project_slowly(lim, b, i, &of[i]);
-            slow = true;
-        }
-    if (slow)
-        lim->kernels->finish(b, count);
-}
-
-// A foot far off is the locally closest, but is it the closest? Looks on a sphere of 0.9 times its distance about X in 14 directions, at most 36 degrees
-// apart from any other: all inside means that no (flat) wall is nearer than 0.7 gap. What fails is projected anew, slowly and thoroughly. Asked only
-// where the clearance of an earlier check has been used up; near the wall the estimate serves.
-static void check_batch(const LimVessel *lim, FootBatch *b, Lane *of, int count, const VesselMemory *memory)
-{
-    static const double c = 0.57735026918962573;   // 1 / sqrt 3
-    const double way[14][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}, {c, c, c},
-                               {c, c, -c}, {c, -c, c}, {c, -c, -c}, {-c, c, c}, {-c, c, -c}, {-c, -c, c}, {-c, -c, -c}};
-    int lane[FOOT_BATCH], n = 0;
-    FootLane foot[3];
-    for (int i = 0; i < count; i++) {
-        const VesselMemory *m = &memory[of[i].point];
-        double known = m->clearance > 0 ? m->clearance - vec3_distance(lane_point(b, i), m->clear_place) : 0;
-        of[i].checked = of[i].sure && b->gap[i] > 0.3 * b->radius[i] && known < 0.5 * b->gap[i];
-        if (!of[i].checked)
-            continue;
-        foot[0][i] = b->px[i], foot[1][i] = b->py[i], foot[2][i] = b->pz[i];
-        lane[n++] = i;
-    }
-    bool slow = false, bad[FOOT_BATCH] = {false};
-    for (int k = 0; k < 14 && n > 0; k++) {
-        for (int j = 0; j < n; j++) {
-            int i = lane[j];
-            double r = 0.9 * b->gap[i];
-            b->px[i] = b->xx[i] + r * way[k][0], b->py[i] = b->xy[i] + r * way[k][1], b->pz[i] = b->xz[i] + r * way[k][2];
-        }
-        lim->kernels->gradient(b, lane, n, lim->tree->iso_level);
-        for (int j = 0; j < n; j++)
-            bad[lane[j]] = bad[lane[j]] || !(b->f[lane[j]] > 0);
-    }
-    for (int j = 0; j < n; j++) {
-        int i = lane[j];
-        b->px[i] = foot[0][i], b->py[i] = foot[1][i], b->pz[i] = foot[2][i];
-        if (bad[i]) {
-            project_slowly(lim, b, i, &of[i]);
-            of[i].checked = of[i].sure;
-            slow = true;
-        }
-    }
-    if (slow)
-        lim->kernels->finish(b, count);
-}
-
-// --- The inlet ---
-
-// The wall in the plane through X across the inlet's direction d. Used where the foot lies upstream of the inlet: the blobs close there, the vessel
-// does not. False where that section holds no wall.
-static bool project_in_section(const LimVessel *lim, int node, Vec3 x, Vec3 d, VesselHit *hit, Vec3 *foot)
+// The wall in the plane through X across the inlet's direction d: for feet near the inlet that nothing else finds. False where that section holds no wall.
+static bool project_in_section(const LimVessel *lim, int node, Vec3 x, SurfacePoint *found)
 {
     enum { STEPS = 30 };
     Blobby model = blobs_of(lim, node);
-    double level = 1 / sqrt(lim->tree->iso_level), radius = lim->tree->radius[node];
+    Vec3 d = lim->tree->direction[0];
+    double level = 1 / sqrt(lim->tree->iso_level), radius = lim->tree->radius[node], slope_of, bend_of, z = inlet_height(lim, x);
+    double shift = carried_height(z, inlet_zone(lim), &slope_of, &bend_of) - z;
+    x = vec3_add_scaled(x, shift, d);
     Vec3 p = x;
     for (int i = 0; i < STEPS; i++) {
         Vec3 g;
@@ -304,40 +263,137 @@ static bool project_in_section(const LimVessel *lim, int node, Vec3 x, Vec3 d, V
         p = vec3_add_scaled(vec3_add_scaled(p, y, t), nu, n);
         if (fabs(y) + fabs(nu) > 1e-7)
             continue;
-        k /= fmax(1 + gap * k, 0.1);
-        hit->gap = vec3_dot(vec3_sub(x, p), n);
-        hit->normal = n;
-        hit->hessian = (Sym3){k * t.x * t.x, k * t.x * t.y, k * t.x * t.z, k * t.y * t.y, k * t.y * t.z, k * t.z * t.z};
-        *foot = p;
+        gap = vec3_dot(vec3_sub(x, p), n);
+        *found = (SurfacePoint){.foot = vec3_add_scaled(p, -shift, d), .normal = n, .distance = gap, .converged = true,
+                                .shape = {k * t.x * t.x, k * t.x * t.y, k * t.x * t.z, k * t.y * t.y, k * t.y * t.z, k * t.z * t.z}};
         return true;
     }
     return false;
 }
 
-static bool upstream_of_inlet(const LimVessel *lim, Vec3 x)
+static void project_slowly(const LimVessel *lim, FootBatch *b, int i, Lane *of)
 {
-    return lim->inlet_open && vec3_dot(vec3_sub(x, lim->tree->center[0]), lim->tree->direction[0]) < 0;
+    Blobby model = blobs_of(lim, of->node);
+    Vec3 x = lane_point(b, i), g, normal;
+    SurfacePoint s = blobby_project(&model, x, x);
+    if (lim->model[of->node].carried && (inlet_height(lim, x) < inlet_zone(lim) || inlet_height(lim, s.foot) < inlet_zone(lim)))
+        s.converged = project_in_section(lim, of->node, x, &s);
+    double f = blobby_gradient(&model, x, &g), slope = vec3_norm(g);
+    const Sym3 *h = &s.shape;
+    of->sure = s.converged;
+    normal = s.normal;
+    if (!s.converged) {
+        // Taubin's distance along the gradient, or what little is known: a flat wall there
+        double gap = slope > 1e-100 && fabs(f / slope) < fabs(s.distance) ? f / slope : s.distance;
+        normal = vec3_unit_or(g, s.normal);
+        s.foot = vec3_add_scaled(x, -gap, normal);
+        s.shape = (Sym3){0, 0, 0, 0, 0, 0};
+    }
+    b->at.x[i] = s.foot.x, b->at.y[i] = s.foot.y, b->at.z[i] = s.foot.z;
+    b->nx[i] = normal.x, b->ny[i] = normal.y, b->nz[i] = normal.z;
+    b->half[i] = 0;
+    b->sxx[i] = h->xx, b->sxy[i] = h->xy, b->sxz[i] = h->xz, b->syy[i] = h->yy, b->syz[i] = h->yz, b->szz[i] = h->zz;
+    b->state[i] = FOOT_DONE;
+}
+
+static bool is_on_wrong_side(const FootBatch *b, int i) { return (b->gap[i] > 0) != (b->inside[i] > 0) && fabs(b->gap[i]) > 1e-6; }
+
+// Feet of `count` lanes on the models of their nodes; `again` marks those without a start. A foot on the wrong side of the wall, or on a wall that
+// stands further off than another, is not the closest: those start once more from X.
+static void project_batch(const LimVessel *lim, FootBatch *b, FootSample *at_x, Lane *of, int count)
+{
+    int lane[FOOT_BATCH], n = 0;
+    at_x->any_carried = false;
+    for (int i = 0; i < count; i++) {
+        set_sample(lim, at_x, i, of[i].node, lane_point(b, i));
+        lane[i] = i;
+        of[i].sure = true;
+        if (of[i].again)
+            b->state[i] = FOOT_LOST;
+    }
+    fill_block(b, at_x, count);
+    sample(lim, at_x, lane, count, false);
+    lim->kernels->estimate(b, at_x, count, lim->tree->iso_level);
+    newton_rounds(lim, b, count, 4, false);
+    lim->kernels->finish(b, count);
+    for (int i = 0; i < count; i++) {
+        of[i].again = b->state[i] != FOOT_DONE || is_on_wrong_side(b, i) || !(b->estimate[i] > 0.8 * fabs(b->gap[i]));
+        if (of[i].again)
+            lane[n++] = i;
+    }
+    if (n == 0)
+        return;
+    march_rounds(lim, b, of, lane, n);
+    for (int i = 0; i < count; i++)
+        if (of[i].again) {
+            b->state[i] = FOOT_PENDING;
+            b->allowed[i] = REST_FRESH;
+            b->longest[i] = b->radius[i];
+        }
+    newton_rounds(lim, b, count, 12, true);
+    lim->kernels->finish(b, count);
+    bool slow = false;
+    for (int i = 0; i < count; i++)
+        if (of[i].again && (b->state[i] != FOOT_DONE || is_on_wrong_side(b, i))) {
+            project_slowly(lim, b, i, &of[i]);
+            slow = true;
+        }
+    if (slow)
+        lim->kernels->finish(b, count);
+}
+
+// A foot far off is the locally closest, but is it the closest? Looks on a sphere of 0.9 times its distance about X in 14 directions, at most 36 degrees
+// apart from any other: all inside means that no (flat) wall is nearer than 0.7 gap. What fails is projected anew, slowly and thoroughly. Asked only
+// where the clearance of an earlier check has been used up; near the wall the estimate serves.
+static void check_batch(const LimVessel *lim, FootBatch *b, FootSample *at, Lane *of, int count, const VesselMemory *memory)
+{
+    static const double c = 0.57735026918962573;   // 1 / sqrt 3
+    const double way[14][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}, {c, c, c},
+                               {c, c, -c}, {c, -c, c}, {c, -c, -c}, {-c, c, c}, {-c, c, -c}, {-c, -c, c}, {-c, -c, -c}};
+    int lane[FOOT_BATCH], n = 0;
+    for (int i = 0; i < count; i++) {
+        const VesselMemory *m = &memory[of[i].point];
+        double known = m->clearance > 0 ? m->clearance - vec3_distance(lane_point(b, i), m->clear_place) : 0;
+        of[i].checked = of[i].sure && b->gap[i] > 0.3 * b->radius[i] && known < 0.5 * b->gap[i];
+        if (!of[i].checked)
+            continue;
+        lane[n++] = i;
+    }
+    bool slow = false, bad[FOOT_BATCH] = {false};
+    for (int k = 0; k < 14 && n > 0; k++) {
+        for (int j = 0; j < n; j++) {
+            int i = lane[j];
+            double r = 0.9 * b->gap[i];
+            at->x[i] = b->xx[i] + r * way[k][0], at->y[i] = b->xy[i] + r * way[k][1], at->z[i] = b->xz[i] + r * way[k][2];
+        }
+        sample(lim, at, lane, n, false);
+        for (int j = 0; j < n; j++)
+            bad[lane[j]] = bad[lane[j]] || !(at->f[lane[j]] > 0);
+    }
+    for (int j = 0; j < n; j++) {
+        int i = lane[j];
+        if (bad[i]) {
+            project_slowly(lim, b, i, &of[i]);
+            of[i].checked = of[i].sure;
+            slow = true;
+        }
+    }
+    if (slow)
+        lim->kernels->finish(b, count);
 }
 
 // --- The blended field ---
 
-enum { BLEND_MAX = 8 };   // the own node and the first seven of those near it
 // Models that differ by less than this are mixed, ever less the more they differ: half the radius, and never so much that the mixed wall
-// leaves the own model's by more than 0.15 mm (0.18 of it, for one neighbour). One that says something else altogether is a ghost and left out.
+// leaves the own model's by more than 0.15 mm (0.18 of it, for one partner). One that says something else altogether is a ghost and left out.
 // On the angiogram's model neighbours differ by up to 0.3 mm in sharp bends; mixing up to 0.25 mm only left steps in the wall that threw the
 // wire 0.3 mm out, where this leaves 0.09 mm.
 static double blend_agree(double radius) { return fmin(0.5 * radius, 0.8); }
-// The mixed gap is less than the own model's by no more than this: sum w q / (1 + sum w) < 1/2 of the above for a few neighbours, w = (1 - q^2)^2.
+// The mixed gap is less than the own model's by no more than this: sum w q / (1 + sum w) < 1/2 of the above for a few partners, w = (1 - q^2)^2.
 static double blend_least(double radius) { return 0.5 * blend_agree(radius); }
-// Half width of the mixed zone: a neighbour counts where its power distance exceeds the best by less than this part of the node spacing squared,
+// Half width of the mixed zone: a node counts where its power distance exceeds the best by less than this part of the node spacing squared,
 // which is 0 at the cell's border and 1 at its middle.
 static const double BLEND_BAND = 2;
-
-typedef struct Blend {
-    int count;
-    int node[BLEND_MAX];
-    double weight[BLEND_MAX];
-} Blend;
 
 static double spacing2(const VesselTree *tree, int node)
 {
@@ -348,96 +404,58 @@ static double spacing2(const VesselTree *tree, int node)
     return end > first ? sum / (end - first) : 0;
 }
 
-static void blend_add(const LimVessel *lim, Vec3 x, double best, int node, Blend *blend)
+// A partner's answers for the lanes [lane, lane + n) of a batch of `count`; those whose walls differ much get a second look.
+static void ask_partners(const LimVessel *lim, const FootBatch *b, FootPartner *partner, int *lane, int n, int count)
 {
-    double behind = power_distance(x, lim->tree->center[node], lim->tree->radius[node]) - best, band = lim->model[node].band;
-    if (blend->count == BLEND_MAX || !(behind < band))
-        return;
-    double q = behind / band, w = 1 - q * q;
-    blend->node[blend->count] = node;
-    blend->weight[blend->count++] = behind <= 0 ? 1 : w * w;
-}
-
-// The node and those near it in the tree whose cells are close: at a mouth or a carina the cell across the border may be several links away.
-static void blend_collect(const LimVessel *lim, Vec3 x, int node, Blend *blend)
-{
-    const VesselTree *tree = lim->tree;
-    double best = power_distance(x, tree->center[node], tree->radius[node]);
-    *blend = (Blend){.count = 1, .node = {node}, .weight = {1}};
-    for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++)
-        blend_add(lim, x, best, tree->near[k], blend);
-}
-
-static void sym3_accumulate(Sym3 *sum, double s, const Sym3 *a)
-{
-    sum->xx += s * a->xx, sum->xy += s * a->xy, sum->xz += s * a->xz;
-    sum->yy += s * a->yy, sum->yz += s * a->yz, sum->zz += s * a->zz;
-}
-
-// A hit of the batch to be mixed with its neighbours' answers.
-typedef struct Mixture {
-    VesselHit *hit;
-    double gap, total;       // weighted sums
-    Vec3 normal;
-    Sym3 hessian;
-} Mixture;
-
-static void mix_in(const LimVessel *lim, Mixture *mix, const FootBatch *b, int i, const Lane *of)
-{
-    double q = (b->gap[i] - mix->hit->gap) / blend_agree(lim->tree->radius[mix->hit->node]);
-    if (b->state[i] != FOOT_DONE || !(fabs(q) < 1) || vec3_dot(lane_normal(b, i), mix->hit->normal) < 0.5 ||
-        (of->node == 0 && upstream_of_inlet(lim, lane_foot(b, i))))
-        return;
-    double w = of->weight * (1 - q * q) * (1 - q * q);
-    Sym3 h = lane_hessian(b, i);
-    mix->total += w;
-    mix->gap += w * b->gap[i];
-    mix->normal = vec3_add_scaled(mix->normal, w, lane_normal(b, i));
-    sym3_accumulate(&mix->hessian, w, &h);
-}
-
-// Projects the queued neighbours from the own feet of their points, and mixes them in, in order. of[].point is the mixture.
-static void mix_queue(const LimVessel *lim, FootBatch *b, const Lane *of, int count, Mixture *mixture)
-{
-    fill_block(b, count);
-    newton_rounds(lim, b, count, 4);
-    lim->kernels->finish(b, count);
-    for (int i = 0; i < count; i++)
-        mix_in(lim, &mixture[of[i].point], b, i, &of[i]);
-}
-
-static void blend_batch(const LimVessel *lim, const FootBatch *own, const Lane *own_of, int count, double reach, VesselHit *hit)
-{
-    Mixture mixture[FOOT_BATCH];
-    FootBatch queue;
-    Lane of[FOOT_BATCH];
-    int queued = 0;
-    for (int i = 0; i < count; i++) {
-        Blend blend;
-        VesselHit *h = &hit[own_of[i].point];
-        mixture[i] = (Mixture){h, h->gap, 1, h->normal, h->hessian};
-        if (!own_of[i].sure || h->gap - blend_least(own->radius[i]) > reach)
+    int again = 0;
+    sample(lim, &partner->at, lane, n, false);
+    lim->kernels->partner(b, partner, count);
+    for (int k = 0; k < n; k++) {
+        int i = lane[k];
+        if (partner->move[i] == 0)
             continue;
-        Vec3 x = lane_point(own, i);
-        blend_collect(lim, x, own_of[i].node, &blend);
-        for (int k = 1; k < blend.count; k++) {
-            if (queued == FOOT_BATCH) {
-                mix_queue(lim, &queue, of, queued, mixture);
-                queued = 0;
-            }
-            of[queued] = (Lane){.point = i, .node = blend.node[k], .weight = blend.weight[k]};
-            set_lane(lim, &queue, queued++, blend.node[k], x, lane_foot(own, i), REST_MIXED);
-        }
+        partner->at.x[i] = partner->tox[i], partner->at.y[i] = partner->toy[i], partner->at.z[i] = partner->toz[i];
+        lane[again++] = i;
     }
-    mix_queue(lim, &queue, of, queued, mixture);
+    if (again == 0)
+        return;
+    sample(lim, &partner->at, lane, again, false);
+    lim->kernels->partner(b, partner, count);
+}
+
+// Mixes the partners' walls into the hits of a batch, partner by partner.
+static void blend_batch(const LimVessel *lim, const FootBatch *b, const Lane *of, int count, double reach, VesselHit *hit)
+{
+    FootPartner partner = {.weight = {0}};
+    FootMixture mixture = {.total = {0}};
+    int most = 0, partners[FOOT_BATCH];
     for (int i = 0; i < count; i++) {
-        const Mixture *mix = &mixture[i];
-        if (mix->total == 1)
+        bool wanted = of[i].sure && hit[of[i].point].gap - blend_least(b->radius[i]) <= reach;
+        partners[i] = wanted ? of[i].partners : 0;
+        most = partners[i] > most ? partners[i] : most;
+    }
+    for (int i = 0; i < FOOT_BATCH; i++)
+        mixture.agree[i] = i < count ? blend_agree(b->radius[i]) : 1;
+    for (int k = 0; k < most; k++) {
+        int lane[FOOT_BATCH], n = 0;
+        for (int i = 0; i < count; i++) {
+            partner.weight[i] = 0;
+            if (partners[i] <= k)
+                continue;
+            partner.weight[i] = (double)of[i].weight[k];
+            set_sample(lim, &partner.at, i, of[i].partner[k], lane_foot(b, i));
+            lane[n++] = i;
+        }
+        ask_partners(lim, b, &partner, lane, n, count);
+        lim->kernels->mix(b, &partner, &mixture, count);
+    }
+    for (int i = 0; i < count; i++) {
+        if (mixture.total[i] == 0)
             continue;
-        mix->hit->gap = mix->gap / mix->total;
-        mix->hit->normal = vec3_unit(mix->normal);
-        mix->hit->hessian = (Sym3){0, 0, 0, 0, 0, 0};
-        sym3_accumulate(&mix->hit->hessian, 1 / mix->total, &mix->hessian);
+        double share = 1 / (1 + mixture.total[i]);
+        VesselHit *h = &hit[of[i].point];
+        h->gap += share * mixture.gap[i];
+        h->normal = vec3_unit(vec3_add_scaled(h->normal, share, vec3(mixture.nx[i], mixture.ny[i], mixture.nz[i])));
     }
 }
 
@@ -450,28 +468,69 @@ static VesselHit open_end(VesselMemory *memory, int node)
     return (VesselHit){.gap = HUGE_VAL, .node = node, .flags = VESSEL_OPEN_END};
 }
 
-// Answers where no field is needed; false where one is.
-static bool answer_cheaply(const LimVessel *lim, Vec3 x, double reach, VesselMemory *memory, VesselHit *hit)
+// Collects the partners of `node` at y from its centre. False where X is in another node's cell.
+static bool collect_partners(const LimVessel *lim, int node, Vec3 y, Lane *of)
+{
+    enum { AT_ONCE = 4 };
+    const NodeModel *m = &lim->model[node];
+    float weight[AT_ONCE * NEAR_GROUP], at[3] = {(float)y.x, (float)y.y, (float)y.z};
+    bool own = true, mixed = lim->options.field == LIM_BLEND;
+    of->partners = 0;
+    for (int first = 0; first < m->near_groups; first += AT_ONCE) {
+        int groups = m->near_groups - first < AT_ONCE ? m->near_groups - first : AT_ONCE;
+        lim->kernels->near(m->near + first, groups, at, weight);
+        for (int k = 0; k < NEAR_GROUP * groups; k++) {
+            if (!(weight[k] > 0))
+                continue;
+            own = own && !(weight[k] > 1);
+            if (!mixed || of->partners == PARTNERS_MAX)
+                continue;
+            of->partner[of->partners] = m->near[first + k / NEAR_GROUP].node[k % NEAR_GROUP];
+            of->weight[of->partners++] = weight[k] > 1 ? 1 : weight[k];
+        }
+    }
+    return own;
+}
+
+// The point's node and its partners.
+static int follow(const LimVessel *lim, Vec3 x, int node, Lane *of)
 {
     const VesselTree *tree = lim->tree;
+    if (node >= 0 && node < tree->node_count) {
+        Vec3 y = vec3_sub(x, lim->model[node].center);
+        double r = lim->model[node].radius;
+        if (collect_partners(lim, node, y, of) && !(vec3_norm2(y) > 1.44 * r * r))
+            return node;   // where power_walk looks around
+    }
+    int next = power_walk(tree, x, node, lim->options.hops);
+    if (next != node)
+        collect_partners(lim, next, vec3_sub(x, lim->model[next].center), of);
+    return next;
+}
+
+// Answers where no field is needed; false where one is.
+static bool answer_cheaply(const LimVessel *lim, Vec3 x, double reach, VesselMemory *memory, Lane *of, VesselHit *hit)
+{
     *hit = (VesselHit){.node = memory->node};
-    if (!vec3_is_finite(x) || !(vec3_norm2(x) < 1e100)) {
+    if (!(vec3_norm2(x) < 1e100)) {
         hit->flags = VESSEL_UNSURE;
         return true;
     }
-    int node = power_walk(tree, x, memory->node, lim->options.hops);
+    int node = follow(lim, x, memory->node, of);
+    const NodeModel *m = &lim->model[node];
     if (node != memory->node)
         memory->clearance = 0;
-    memory->node = hit->node = node;
-    if (node == 0 && upstream_of_inlet(lim, x)) {
+    memory->node = hit->node = of->node = node;
+    if (node == 0 && lim->inlet_open && !m->carried && inlet_height(lim, x) < 0) {
         *hit = open_end(memory, node);
         return true;
     }
-    double mixed = lim->options.field == LIM_BLEND ? blend_least(tree->radius[node]) : 0;
-    double bound = lim->model[node].clear - vec3_distance(x, tree->center[node]);
-    if (memory->clearance > 0)
+    double bound = -HUGE_VAL;
+    if (m->clear > reach)
+        bound = m->clear - vec3_distance(x, m->center);
+    if (memory->clearance > reach)
         bound = fmax(bound, memory->clearance - vec3_distance(x, memory->clear_place));
-    hit->gap = bound - mixed;
+    hit->gap = bound - (lim->options.field == LIM_BLEND ? blend_least(m->radius) : 0);
     hit->flags = VESSEL_FAR;
     return hit->gap > reach;
 }
@@ -487,49 +546,42 @@ static Vec3 predicted_foot(const VesselMemory *memory, Vec3 x, double radius)
     return vec3_add_scaled(vec3_add(memory->foot, shift), -0.5 * vec3_dot(shift, bend), n);
 }
 
-// The hit of a lane. False where the inlet decided, and there is nothing to blend.
-static bool answer_from_foot(const LimVessel *lim, const FootBatch *b, int i, const Lane *of, VesselMemory *memory, VesselHit *hit)
+static void answer_from_foot(const FootBatch *b, int i, const Lane *of, VesselMemory *memory, VesselHit *hit)
 {
-    Vec3 x = lane_point(b, i), foot = lane_foot(b, i);
     *hit = (VesselHit){b->gap[i], lane_normal(b, i), lane_hessian(b, i), of->node, of->sure ? 0 : VESSEL_UNSURE};
-    bool section = of->node == 0 && upstream_of_inlet(lim, foot);
-    if (section && !project_in_section(lim, of->node, x, lim->tree->direction[0], hit, &foot)) {
-        *hit = open_end(memory, of->node);
-        return false;
-    }
-    if (section)
-        hit->flags = 0;
-    memory->has_foot = of->sure || section;
-    if (of->checked && !section) {
+    memory->has_foot = of->sure;
+    memory->place = lane_point(b, i);
+    if (of->checked) {
         memory->clearance = fmax(0.7 * hit->gap, 0);
-        memory->clear_place = x;
+        memory->clear_place = memory->place;
     }
-    memory->foot = foot;
-    memory->place = x;
+    memory->foot = lane_foot(b, i);
     memory->normal = hit->normal;
     memory->hessian = hit->hessian;
-    return !section;
 }
 
 static void query_batch(const LimVessel *lim, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
     FootBatch batch;
+    FootSample at_x;
     Lane of[FOOT_BATCH];
     int n = 0;
+    batch.at.any_carried = false;
     for (int i = 0; i < count; i++) {
-        if (answer_cheaply(lim, point[i], reach, &memory[i], &hit[i]))
+        if (answer_cheaply(lim, point[i], reach, &memory[i], &of[n], &hit[i]))
             continue;
-        int node = hit[i].node;
-        of[n] = (Lane){.point = i, .node = node, .again = !memory[i].has_foot};
-        set_lane(lim, &batch, n++, node, point[i],
-                 memory[i].has_foot ? predicted_foot(&memory[i], point[i], lim->tree->radius[node]) : point[i], REST_FOLLOWED);
+        of[n].point = i;
+        of[n].again = !memory[i].has_foot;
+        set_lane(lim, &batch, n, of[n].node, point[i],
+                 memory[i].has_foot ? predicted_foot(&memory[i], point[i], lim->model[of[n].node].radius) : point[i]);
+        n++;
     }
     if (n == 0)
         return;
-    project_batch(lim, &batch, of, n);
-    check_batch(lim, &batch, of, n, memory);
+    project_batch(lim, &batch, &at_x, of, n);
+    check_batch(lim, &batch, &at_x, of, n, memory);
     for (int i = 0; i < n; i++)
-        of[i].sure = answer_from_foot(lim, &batch, i, &of[i], &memory[of[i].point], &hit[of[i].point]) && of[i].sure;
+        answer_from_foot(&batch, i, &of[i], &memory[of[i].point], &hit[of[i].point]);
     if (lim->options.field == LIM_BLEND)
         blend_batch(lim, &batch, of, n, reach, hit);
 }
@@ -562,6 +614,7 @@ static void lim_destroy(Vessel *vessel)
     if (!lim)
         return;
     free(lim->group);
+    free(lim->near);
     free(lim->model);
     free(lim);
 }
@@ -580,10 +633,47 @@ static void choose_sources(const VesselTree *tree, NodeModel *model)
     }
 }
 
+static int near_groups_of(const VesselTree *tree, int node)
+{
+    return (tree->near_offset[node + 1] - tree->near_offset[node] + NEAR_GROUP - 1) / NEAR_GROUP;
+}
+
+// Planes to the near nodes. The mixed zone is as wide as the narrower of the two nodes' own.
+static void fill_near(const VesselTree *tree, int i, NearGroup *group)
+{
+    int first = tree->near_offset[i], count = tree->near_offset[i + 1] - first;
+    for (int k = 0; k < NEAR_GROUP * near_groups_of(tree, i); k++) {
+        NearGroup *g = &group[k / NEAR_GROUP];
+        int lane = k % NEAR_GROUP, j = k < count ? tree->near[first + k] : -1;
+        g->node[lane] = j;
+        if (j < 0) {
+            g->base[lane] = 1, g->ex[lane] = g->ey[lane] = g->ez[lane] = 0, g->band[lane] = 2;   // nowhere in its band
+            continue;
+        }
+        Vec3 e = vec3_sub(tree->center[j], tree->center[i]);
+        double band = BLEND_BAND * fmin(spacing2(tree, i), spacing2(tree, j));
+        g->base[lane] = (float)(vec3_norm2(e) + tree->radius[i] * tree->radius[i] - tree->radius[j] * tree->radius[j]);
+        g->ex[lane] = (float)(2 * e.x), g->ey[lane] = (float)(2 * e.y), g->ez[lane] = (float)(2 * e.z);
+        g->band[lane] = (float)(1 / fmax(band, 1e-12));
+    }
+}
+
+// The root's section goes on upstream in the models near it that hold the root's centre.
+static void carry_inlet(LimVessel *lim)
+{
+    const VesselTree *tree = lim->tree;
+    for (int k = tree->near_offset[0] - 1; k < tree->near_offset[1] && lim->inlet_open; k++) {
+        int node = k < tree->near_offset[0] ? 0 : tree->near[k];
+        Blobby blobs = blobs_of(lim, node);
+        lim->model[node].carried = blobby_field(&blobs, tree->center[0]) > 0;
+    }
+}
+
 static void fill_models(LimVessel *lim)
 {
     const VesselTree *tree = lim->tree;
     BlobGroup *group = lim->group;
+    NearGroup *near = lim->near;
     choose_sources(tree, lim->model);
     for (int i = 0; i < tree->node_count; i++) {
         NodeModel *m = &lim->model[i];
@@ -596,10 +686,15 @@ static void fill_models(LimVessel *lim)
         } else {
             m->group = NULL;   // below, when all are filled
         }
-        m->band = BLEND_BAND * spacing2(tree, i);
+        m->center = tree->center[i];
+        m->radius = tree->radius[i];
         // less than what was found, should that be another side's foot
         SurfacePoint s = blobby_project(&blobs, tree->center[i], tree->center[i]);
         m->clear = s.converged && s.distance > 0 ? fmin(0.95 * s.distance, tree->radius[i]) : -HUGE_VAL;
+        m->near = near;
+        m->near_groups = near_groups_of(tree, i);
+        fill_near(tree, i, near);
+        near += m->near_groups;
     }
     for (int i = 0; i < tree->node_count; i++)
         lim->model[i].group = lim->model[lim->model[i].source].group;
@@ -611,9 +706,11 @@ Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *o
 {
     if (!tree || !vessel_tree_is_model(tree))
         return NULL;
-    size_t groups = 0;
-    for (int i = 0; i < tree->node_count; i++)
+    size_t groups = 0, near = 0;
+    for (int i = 0; i < tree->node_count; i++) {
         groups += (size_t)blob_groups_needed(tree->blob_offset[i + 1] - tree->blob_offset[i]);
+        near += (size_t)near_groups_of(tree, i);
+    }
     LimVessel *lim = calloc(1, sizeof *lim);
     if (!lim)
         return NULL;
@@ -623,13 +720,15 @@ Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *o
     lim->options.hops = options->hops > 0 ? options->hops : 1;
     lim->kernels = lane_kernels(options->isa);
     lim->group = aligned_alloc(BLOB_GROUP_ALIGNMENT, groups * sizeof *lim->group);
+    lim->near = aligned_alloc(BLOB_GROUP_ALIGNMENT, (near + 1) * sizeof *lim->near);
     lim->model = calloc((size_t)tree->node_count, sizeof *lim->model);
-    if (!lim->group || !lim->model) {
+    if (!lim->group || !lim->near || !lim->model) {
         lim_destroy(&lim->vessel);
         return NULL;
     }
     fill_models(lim);
     lim->inlet_open = vessel_tree_root_is_open(tree);
+    carry_inlet(lim);
     return &lim->vessel;
 }
 

@@ -76,7 +76,7 @@ static void lanes_against_twin(void **state)
         }
         Blobby m = {count, center, width, 0.1};
         int groups = blob_groups_needed(count);
-        BlobGroup *group = aligned_alloc(64, (size_t)groups * sizeof *group);
+        BlobGroup *group = aligned_alloc(BLOB_GROUP_ALIGNMENT, (size_t)groups * sizeof *group);
         blob_groups_fill(group, &m);
         for (int trial = 0; trial < 20; trial++) {
             Vec3 x = random_in_box(&seed, trial == 0 ? 1e20 : 3), g;
@@ -87,9 +87,9 @@ static void lanes_against_twin(void **state)
             double first[10] = {0};
             for (int isa = 1; isa <= 3; isa++) {
                 const LaneKernels *kernels = lane_kernels(isa);
-                FootBatch a = {0}, c = {0};
+                FootSample a = {0}, c = {0};
                 int lane = (trial * 7) % FOOT_BATCH;
-                a.group[lane] = group, a.groups[lane] = groups, a.px[lane] = x.x, a.py[lane] = x.y, a.pz[lane] = x.z;
+                a.group[lane] = group, a.groups[lane] = groups, a.x[lane] = x.x, a.y[lane] = x.y, a.z[lane] = x.z;
                 c = a;
                 kernels->hessian(&a, &lane, 1, 0.1);
                 kernels->gradient(&c, &lane, 1, 0.1);
@@ -162,8 +162,8 @@ static void one_blob_is_a_sphere(void **state)
     for (int trial = 0; trial < 1000; trial++) {
         Vec3 u = random_unit(&seed);
         double d = random_in(&seed, 0.3, trial % 2 ? 2.5 : 30);
-        if (u.x > -0.1)
-            u.x = -0.1 - fabs(u.x);   // downstream of the inlet, which looks along -x
+        if (u.x > -0.6)
+            u.x = -0.6 - fabs(u.x);   // downstream of the inlet, which looks along -x, and of the zone in which the section there is carried on
         u = vec3_unit(u);
         VesselHit hit = ask(v, vec3_add_scaled(t->center[0], d, u), 0, 100);
         assert_int_equal(hit.flags, 0);
@@ -194,8 +194,8 @@ static void gaps_against_slow_projection(void **state)
                 VesselHit hit;
                 x = wander(t, &seed, step, 1500, x, run == 0 ? 0.02 : run == 1 ? 0.1 : 0.4);
                 vessel_query(v, 1, &x, 0.7, &memory, &hit);
-                if (hit.flags & VESSEL_OPEN_END)
-                    continue;
+                if (vec3_distance(x, t->center[0]) < 3)
+                    continue;   // near the inlet the wall is not the blobs' own
                 Blobby m = model_of(t, hit.node);
                 SurfacePoint s = blobby_project(&m, x, x);
                 assert_true(s.converged);
@@ -316,17 +316,30 @@ static void inlet_is_open(void **state)
         Vec3 p, d;
         assert_true(v->inlet(v, &p, &d));
         assert_true(vec3_norm(p) == 0 && vec3_distance(d, vec3(1, 0, 0)) < 1e-12);
-        for (double x = -5; x < 0; x += 0.3) {
-            VesselHit hit = ask(v, vec3(x, 0.3, 0.2), x > -1 ? -1 : 0, 1);
-            assert_true(hit.flags == VESSEL_OPEN_END && hit.gap == HUGE_VAL && hit.node == 0);
+        // upstream the section at the root goes on as a cylinder
+        for (double x = -5; x < -0.5; x += 0.3) {
+            VesselHit hit = ask(v, vec3(x, 0.3, 0.2), 0, 1), root = ask(v, vec3(-20, 0.3, 0.2), 0, 1);
+            assert_true(hit.flags == 0 && hit.node == 0);
+            assert_near(hit.gap, root.gap, 1e-9);
+            assert_true(vec3_distance(hit.normal, root.normal) < 1e-7 && fabs(hit.normal.x) < 1e-9);
+            assert_near(hit.hessian.xx, 0, 1e-9);
+            assert_true(ask(v, vec3(x, 2, 0), 0, 1).gap < -0.5);
         }
         // just inside, walking out along the wall: no cap shows, the normal stays across
         VesselMemory memory = {.node = -1};
-        for (double x = 3; x >= 0; x -= 0.01) {
+        VesselHit last = {.gap = HUGE_VAL};
+        for (double x = 3; x >= -3; x -= 0.01) {
             VesselHit hit;
             Vec3 at = {x, 0.7, 0};
             vessel_query(v, 1, &at, 0.5, &memory, &hit);
             assert_int_equal(hit.flags, 0);
+            if (hit.node == 0 && last.node == 0 && last.gap < 1) {
+                // smooth across the plane: the gap changes as the normal says, the normal as the Hessian says
+                assert_near(last.gap - hit.gap, 0.01 * 0.5 * (hit.normal.x + last.normal.x), 2e-5);
+                Vec3 bends = vec3_scale(vec3_sub(last.normal, hit.normal), 100);
+                assert_true(vec3_distance(bends, sym3_mul_vec(&hit.hessian, vec3(1, 0, 0))) < 0.1);
+            }
+            last = hit;
             if (extrapolated)
                 assert_near(hit.gap, 0.3, 0.05);   // blobs in a row: the wall waves
             assert_true(hit.gap > 0.1 && hit.normal.y < -0.9);
@@ -371,7 +384,7 @@ static void moved_and_mirrored_scenes(void **state)
             assert_true(hit[0].flags == hit[1].flags && hit[0].flags == hit[2].flags && hit[0].node == hit[1].node && hit[0].node == hit[2].node);
             if (hit[0].flags || hit[0].gap > 0.4)
                 continue;
-            assert_near(hit[0].gap, hit[1].gap, 1e-9);
+            assert_near(hit[0].gap, hit[1].gap, field == LIM_BLEND ? 1e-8 : 1e-9);   // weights of single precision, 1e-7 of what the models differ by
             assert_near(hit[0].gap, hit[2].gap, 1e-11);
             assert_true(vec3_distance(quat_rotate(q, hit[0].normal), hit[1].normal) < 1e-7);
             assert_true(vec3_distance(mirrored(hit[0].normal), hit[2].normal) < 1e-10);
@@ -526,8 +539,8 @@ static void far_is_far_in_a_taper(void **state)
             for (int step = 0; step < 30; step++, x = vec3_add(x, way)) {
                 VesselHit hit;
                 vessel_query(v, 1, &x, reach, &memory, &hit);
-                if (hit.flags & VESSEL_OPEN_END)
-                    break;
+                if (x.x < 2)
+                    break;   // near the inlet the wall is not the blobs' own
                 Blobby m = model_of(t, hit.node);
                 SurfacePoint s = blobby_project(&m, x, x);
                 // blended neighbours differ from the own model by less than 0.05 mm here
