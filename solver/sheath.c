@@ -11,6 +11,18 @@
 // whole. It is taken at the length of the step's end and at the curvature of its start, because curvature is what stays.
 #include "solver/sheath.h"
 
+// Unit, in the node's frame: the axis about which rest curvature turns, e3 turned about e1; half_y and half_z hold it times a sine.
+static Vec3 bending_axis(const BeamRest *rest, int index)
+{
+    double y = rest->half_y[index], z = rest->half_z[index], size = sqrt(y * y + z * z);
+    return size > 0 ? vec3(0, y / size, z / size) : vec3(0, 0, 1);
+}
+
+Vec3 sheath_rest_curvature(const BeamRest *rest, int index, Quat q)
+{
+    return quat_rotate(q, vec3_scale(bending_axis(rest, index), rest->curvature[index]));
+}
+
 // Rest length outside, kept above a hundredth of the element.
 static double outside_of(double length, double coordinate)
 {
@@ -22,11 +34,9 @@ void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction,
 {
     double length = rest->length[index], outside = outside_of(length, coordinate + ahead), now = outside_of(length, coordinate), k0 = rest->curvature[index], bending = rest->bending[index], slope;
     double quarter = 0.25 * k0 * outside, near_slope, far_slope;
-    // the bending plane in the node's frame: e3 turned about e1; half_y and half_z hold it times a sine
-    double axis = sqrt(rest->half_y[index] * rest->half_y[index] + rest->half_z[index] * rest->half_z[index]);
-    double by = axis > 0 ? rest->half_y[index] / axis : 0, bz = axis > 0 ? rest->half_z[index] / axis : 1;
+    Vec3 plane = bending_axis(rest, index);
     BeamInput in = {.x1 = mouth, .x2 = x2, .q1 = q1, .q2 = q2, .length = outside, .axial = rest->axial[index], .twist = rest->twist[index],
-                    .half_w = cos(quarter), .half_y = sin(quarter) * by, .half_z = sin(quarter) * bz};
+                    .half_w = cos(quarter), .half_y = sin(quarter) * plane.y, .half_z = sin(quarter) * plane.z};
     in.extend = length - beam_arc_rest(outside, k0, &slope) + coordinate;
     beam_bending(outside, bending, rest->shear[index], &in.near, &in.far);
     beam_bending_slope(outside, bending, rest->shear[index], &near_slope, &far_slope);
@@ -36,7 +46,6 @@ void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction,
     double by_length = out.tension * (out.bow / outside + slope) - 0.5 * bending * k0 * k0;
     by_length += 0.5 * near_slope * (vec3_norm2(out.angle1) + vec3_norm2(out.angle2)) + far_slope * vec3_dot(out.angle1, out.angle2);
     // a longer arc turns the rest chord in both nodes' frames
-    Vec3 plane = vec3(0, by, bz);
     by_length += 0.5 * k0 * (vec3_dot(quat_rotate(q1, plane), out.chord1) - vec3_dot(quat_rotate(q2, plane), out.chord2));
     // what the linearisation in phi at the new length misses where the curvature stays
     Vec3 phi = vec3_sub(out.turn1, out.turn2);

@@ -21,6 +21,9 @@ typedef struct SheathElement {       // the element across the mouth
 void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction, double coordinate, Quat q1, Vec3 x2, Quat q2,
                     double ahead, SheathElement *element);
 
+// [1/mm] rest curvature of an element in space, along the axis about which it turns; q: frame of its node.
+Vec3 sheath_rest_curvature(const BeamRest *rest, int index, Quat q);
+
 // Tangent with the inner node's unknowns (axial displacement, rotation about the line) in places 0 and 3 of its block, the rest
 // of it zero: k11 and k22 to be added, k21 to be written. `length_column` (12: inner block, outer block): the part of the axial
 // unknown's column that comes through l (without scale); displacements of the inner node count from `ahead` there.

@@ -284,8 +284,9 @@ static Quat on_line(const Stepper *s, Quat q)
     return quat_unit(quat_mul((Quat){1 + vec3_dot(e, s->axis[0]), axis.x, axis.y, axis.z}, q));
 }
 
-// A node that comes back is put on the line, one that is let go on the curve of the element it was inside of: a fiftieth of an element
-// from the mouth both are within a micrometre of where they were, but their tangents carry the moment.
+// A node that comes back is put on the line. One that is let go, a fiftieth of an element from the mouth, takes the place that the short piece behind it,
+// from now on the one across the mouth, has under the moment there: with the curve of its own element, which at a section's border may be ten times as
+// soft, the piece would spring.
 static void hold(Stepper *s, int node)
 {
     WireState *w = &s->state;
@@ -301,14 +302,14 @@ static void let_go(Stepper *s, int node)
     if (node + 1 >= s->state.node_count)
         return;
     WireState *w = &s->state;
+    const BeamRest *r = &s->beam.rest;
     SheathElement e;
-    double along = stepper_sheath_coordinate(s, node), length = s->wire.length[node] + along, x = along / length;
-    sheath_element(&s->beam.rest, node, s->mouth, s->axis[0], along, w->orientation[node], w->position[node + 1], w->orientation[node + 1], 0, &e);
-    // the cubic's tangent against the one at the mouth, and its integral
-    Vec3 turn = vec3_add_scaled(vec3_scale(e.out.turn1, x * (3 * x - 4)), x * (3 * x - 2), e.out.turn2);
-    Vec3 sum = vec3_scale(vec3_add_scaled(vec3_scale(e.out.turn1, x * x * (x - 2)), x * x * (x - 1), e.out.turn2), length);
-    w->position[node] = vec3_add(w->position[node], vec3_cross(sum, s->axis[0]));
-    w->orientation[node] = quat_unit(quat_mul(quat_from_rotation_vector(turn), w->orientation[node]));
+    double along = stepper_sheath_coordinate(s, node);
+    sheath_element(r, node, s->mouth, s->axis[0], along, w->orientation[node], w->position[node + 1], w->orientation[node + 1], 0, &e);
+    Vec3 moment = vec3_add_scaled(e.out.moment1, -vec3_dot(e.out.moment1, s->axis[0]), s->axis[0]);
+    Vec3 curvature = vec3_add_scaled(sheath_rest_curvature(r, node - 1, w->orientation[node]), -1 / r->bending[node - 1], moment);
+    w->position[node] = vec3_add_scaled(w->position[node], 0.5 * along * along, vec3_cross(curvature, s->axis[0]));
+    w->orientation[node] = quat_unit(quat_mul(quat_from_rotation_vector(vec3_scale(curvature, along)), w->orientation[node]));
 }
 
 // The command with what is owed from before; no advance into a tool that is squeezed too much.
