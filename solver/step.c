@@ -126,6 +126,21 @@ static bool allocate(Stepper *s)
     return true;
 }
 
+// Nothing would tell a straight wire on the axis of a straight tube, pushed against its end, which way to buckle. So its last element is not quite
+// straight: it turns by this at rest, towards e2. Hardly more than rounding does to a wire that lies askew; 1e-7 would lift a stiff tip off a plane.
+// Without walls a wire is as straight as it says: rolled up by an end moment that keeps its direction it would leave the plane.
+static const double IMPERFECTION = 1e-12;    // [rad]
+
+static void make_imperfect(const Wire *wire, BeamRest *rest)
+{
+    int tip = wire->element_count - 1;
+    if (rest->curvature[tip] > 0)
+        return;
+    rest->curvature[tip] = IMPERFECTION / wire->length[tip];
+    rest->half_w[tip] = nextafter(1, 0);      // below 1 marks an element that is curved at rest
+    rest->half_z[tip] = 0.25 * IMPERFECTION;
+}
+
 static int nearest_node(const Wire *wire, double at)
 {
     int best = 0;
@@ -233,6 +248,8 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
     for (int k = 0; k < 3; k++)
         s->axis[k] = mat3_column(&frame, k);
     s->vessel = o.vessel;
+    if (s->vessel)
+        make_imperfect(&s->wire, &s->beam.rest);
     s->wall_friction = o.wall_friction;
     ContactOptions usual = contact_default_options();
     s->contact = o.contact;
