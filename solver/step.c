@@ -414,22 +414,21 @@ static void solve(Stepper *s)
 static double largest_turn(const Stepper *s)
 {
     double largest = 0;
+    Vec3 before = vec3(0, 0, 0);         // what the node before moves by
     for (int i = s->first_free; i < s->state.node_count; i++) {
         const double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
-        Vec3 turn = vec3(u[3] - k[3], u[4] - k[4], u[5] - k[5]);
+        Vec3 turn = vec3(u[3] - k[3], u[4] - k[4], u[5] - k[5]), moves = vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]);
         Quat q = s->state.orientation[i];
         Vec3 axis = vec3(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y));
         double node = vec3_norm2(vec3_cross(turn, axis)), chord = 0;
-        if (i > s->first_free) {
-            Vec3 d = vec3(u[0] - u[-6] - k[0] + k[-6], u[1] - u[-5] - k[1] + k[-5], u[2] - u[-4] - k[2] + k[-4]);
-            Vec3 c = vec3_sub(s->state.position[i], s->state.position[i - 1]);
-            double length2 = vec3_norm2(c);
-            chord = vec3_norm2(vec3_cross(c, d)) / (length2 * length2);
-        } else if (i > 0) {
-            // from the mouth
-            Vec3 d = vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]);
-            chord = vec3_norm2(vec3_cross(s->mouth_element.out.chord, d)) / (s->wire.length[i - 1] * s->wire.length[i - 1]);
+        if (i > 0) {
+            // from the mouth: over the whole element, however little of it is outside
+            bool from_mouth = i == s->first_free;
+            Vec3 c = vec3_sub(s->state.position[i], from_mouth ? s->mouth : s->state.position[i - 1]);
+            double length2 = vec3_norm2(c), over = from_mouth ? s->wire.length[i - 1] * s->wire.length[i - 1] : length2;
+            chord = vec3_norm2(vec3_cross(c, vec3_sub(moves, before))) / (length2 * over);
         }
+        before = moves;
         largest = largest > node ? largest : node;
         largest = largest > chord ? largest : chord;
     }
@@ -450,7 +449,7 @@ static void solve_contained(Stepper *s)
 }
 
 // A product of unit quaternions, unit again: one Newton step instead of a root, where rounding is all that is wrong.
-static Quat unit_again(Quat q)
+static inline Quat unit_again(Quat q)
 {
     double n = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z, scale = 1.5 - 0.5 * n;
     if (!(fabs(n - 1) < 1e-7))
@@ -459,12 +458,13 @@ static Quat unit_again(Quat q)
 }
 
 // exp of half the rotation vector; series where the angle is small, which is always in a good step.
-static Quat small_rotation(Vec3 w)
+static inline Quat small_rotation(Vec3 w)
 {
     double a = vec3_norm2(w);
     if (a > 0.01)
         return quat_from_rotation_vector(w);
-    double q = a / 4, sine = 0.5 * (1 - q / 6 * (1 - q / 20 * (1 - q / 42))), cosine = 1 - q / 2 * (1 - q / 12 * (1 - q / 30 * (1 - q / 56)));
+    double q = 0.25 * a, sine = 0.5 + q * (-1.0 / 12 + q * (1.0 / 240 + q * (-1.0 / 10080)));
+    double cosine = 1 + q * (-1.0 / 2 + q * (1.0 / 24 + q * (-1.0 / 720 + q * (1.0 / 40320))));
     return (Quat){cosine, sine * w.x, sine * w.y, sine * w.z};
 }
 
@@ -541,7 +541,7 @@ static void move(Stepper *s, double part)
         k[3] += turn;
         double along = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]) + k[0];
         w->position[i] = vec3_add_scaled(s->mouth, along, s->axis[0]);
-        w->orientation[i] = on_line(s, quat_mul(small_rotation(vec3_scale(s->axis[0], turn)), w->orientation[i]));
+        w->orientation[i] = unit_again(quat_mul(small_rotation(vec3_scale(s->axis[0], turn)), w->orientation[i]));
     }
 }
 

@@ -98,7 +98,7 @@ static void sheath_nodes(Stepper *s, double scale, double inertia)
 static void mouth_element(Stepper *s, double scale)
 {
     int i = s->first_free - 1;
-    double ahead = s->is_iterate ? 0 : s->command.advance, column[12];
+    double ahead = s->command.advance - s->linearised[6 * (size_t)i], column[12];
     SheathElement *e = &s->mouth_element;
     sheath_element(&s->beam.rest, i, s->mouth, s->axis[0], stepper_sheath_coordinate(s, i), s->state.orientation[i], s->state.position[i + 1],
                    s->state.orientation[i + 1], ahead, e);
