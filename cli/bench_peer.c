@@ -52,7 +52,7 @@ static const char help[] =
     "Usage: seldinger bench peer [--quick] [--threads N] [--json F]\n\n"
     "The scenes of scenes/peer, on which SOFA with BeamAdapter was measured: 100 mm pushed in at 50 mm/s, at 100 and 20 GPa, on the exact tube and\n"
     "on local models fitted to it, beside the peer's figures. Run it from the project's folder, after scenes/peer/prepare. CPU times.\n\n"
-    "  --quick      the first 500 of 2,000 steps\n"
+    "  --quick      the first 400 of 2,000 steps\n"
     "  --threads N  threads for fitting the tubes; default 0: all cores\n"
     "  --json F     the same figures as JSON; - is standard output, the table then goes to standard error\n\n"
     "Exit codes: 0 done; 1 a run ended early or a node was more than 0.05 mm outside the wall; 2 wrong usage or bad input.\n";
@@ -188,7 +188,7 @@ int bench_peer(int argc, char **argv)
     fprintf(out, "%s\n                CPU ms median (p99)   contacts with force, deepest um\n", bench_processor());
     cJSON *root = cJSON_CreateObject(), *rows = cJSON_AddArrayToObject(root, "rows");
     cJSON_AddStringToObject(root, "processor", bench_processor());
-    bool contained = true, good = run_all(out, options.quick ? 500 : INT64_MAX, options.threads, rows, &contained, &faults);
+    bool contained = true, good = run_all(out, options.quick ? 400 : INT64_MAX, options.threads, rows, &contained, &faults);
     good = good && bench_write_json(&options, root, &faults);
     cJSON_Delete(root);
     if (!good)

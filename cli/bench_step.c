@@ -57,7 +57,7 @@ static const char help[] =
     "Usage: seldinger bench step [--quick] [--threads N] [--json F]\n\n"
     "What a simulation step costs, where, and how right it is: spiral at 100 GPa, phantom and aneurism; 50 to 800 elements; each SIMD level.\n"
     "Run it from the project's folder. Times are CPU times of the simulation's thread.\n\n"
-    "  --quick      300 steps of each scene, fewer samples\n"
+    "  --quick      200 steps of each scene, fewer samples\n"
     "  --threads N  threads of offline work such as fitting the shapes; default 0: all cores\n"
     "  --json F     the same figures as JSON; - is standard output, the tables then go to standard error\n\n"
     "Exit codes: 0 done; 1 state hashes differ between SIMD levels or repetitions; 2 wrong usage or bad input.\n";
@@ -143,7 +143,7 @@ static bool force_error(const Scene *scene, const Vessel *vessel, int64_t steps,
     double *error = calloc((size_t)samples + 2, sizeof *error);
     if (good && node && error) {
         int64_t every = steps / samples > 0 ? steps / samples + (steps % samples != 0) : 1;
-        compare_forces(solver, scene, steps, every, samples / 8 + 1, node, error, out);
+        compare_forces(solver, scene, steps, every, samples / (samples > 100 ? 8 : 3) + 1, node, error, out);
         qsort(error, (size_t)out->samples, sizeof *error, ascending);
         out->median = out->samples ? error[out->samples / 2] : 0;
         out->max = out->samples ? error[out->samples - 1] : 0;
@@ -308,7 +308,7 @@ static bool run_cases(StepBench *bench, SimdLevel level, SimdLevel widest, Fault
             time_detection(s.scene, s.open.vessel, run->crowded_step, &bench->kernels[level].detection[c], &bench->kernels[level].points[c], faults);
         if (good && level == widest) {
             uint64_t hash = 0;
-            good = force_error(s.scene, s.open.vessel, run->steps, bench->options.quick ? 30 : 200, &bench->error[c], &hash, faults);
+            good = force_error(s.scene, s.open.vessel, run->steps, bench->options.quick ? 20 : 200, &bench->error[c], &hash, faults);
             bench->same_hash &= hash == run->hash;
         }
         for (int e = 0; good && c == 0 && level == widest && e < GROWTHS; e++) {
@@ -540,7 +540,7 @@ int bench_step(int argc, char **argv)
     if (!output_check(bench.options.json, &faults))
         return cli_bad_input(&faults);
     FILE *out = bench_text(&bench.options);
-    bench.most_steps = bench.options.quick ? 300 : INT64_MAX;
+    bench.most_steps = bench.options.quick ? 200 : INT64_MAX;
     SimdLevel widest = simd_level();
     bench.same_hash = true;
     fprintf(out, "%s, %s\n", bench_processor(), simd_name[widest]);
