@@ -520,6 +520,82 @@ static void reciprocity(void **state)
     assert_true(fabs(moved[0]) > 1e-9 && fabs(moved[0] / moved[1] - 1) < 1e-5);
 }
 
+// --- reactions while nodes pass the mouth ---
+
+typedef struct Trace {
+    double force_mean, torque_mean;      // of the absolute values
+    double force_jump, torque_jump;      // largest in a step
+    double beyond;                       // by how much a force is outside of its neighbours' range 20 steps before and after: a spike
+} Trace;
+
+// Fed at `speed` [mm/ms], after the loads have been taken up.
+static Trace feed(Stepper *s, double speed, double twist, int steps)
+{
+    enum { AWAY = 20 };
+    double *force = malloc((size_t)steps * sizeof *force), torque = 0;
+    assert_non_null(force);
+    for (int k = 0; k < 1500; k++)
+        step_once(s, 0, 0);
+    for (int k = 0; k < 200; k++)
+        step_once(s, speed, twist);
+    Trace t = {0};
+    for (int k = 0; k < steps; k++) {
+        const StepReport *r = step_once(s, speed, twist);
+        force[k] = r->proximal_force;
+        t.force_mean += fabs(force[k]) / steps;
+        t.torque_mean += fabs(r->proximal_torque) / steps;
+        if (k > 0) {
+            t.force_jump = fmax(t.force_jump, fabs(force[k] - force[k - 1]));
+            t.torque_jump = fmax(t.torque_jump, fabs(r->proximal_torque - torque));
+        }
+        torque = r->proximal_torque;
+    }
+    for (int k = AWAY; k + AWAY < steps; k++)
+        t.beyond = fmax(t.beyond, fmax(force[k] - fmax(force[k - AWAY], force[k + AWAY]), fmin(force[k - AWAY], force[k + AWAY]) - force[k]));
+    free(force);
+    return t;
+}
+
+static void no_spike_as_nodes_pass_the_mouth(void **state)
+{
+    (void)state;
+    static const char *const name[] = {"straight", "J", "J, turned", "soft tip", "soft J"};
+    for (int kind = 0; kind < 5; kind++)
+        for (int pull = 0; pull < 2; pull++) {
+            Bench b;
+            bench_start(&b, 60, 60, 1);
+            WireOptions *w = &b.options.wire;
+            w->fix_count = 0;
+            w->has_sheath = true;
+            w->inserted = 20;
+            w->damping_stiffness = 0.2;
+            w->damping_mass = 1e-4;
+            if (kind > 0) {
+                b.section[0].length = 45;
+                b.section[1] = standard_section(15);
+                b.section[1].rest_curvature = kind == 3 ? 0 : 0.1;
+                b.section[1].young_modulus = kind >= 3 ? 8e3 : 80e3;
+                w->section_count = 2;
+            }
+            bool border = kind >= 3;         // passes the mouth, at 15 mm
+            if (border)
+                w->inserted = pull ? 17 : 13;
+            bench_load(&b, 60, vec3(0, -0.002, 0.001), vec3(0, 0, 0.5), 200);
+            Stepper *s = bench_make(&b);
+            Trace t = feed(s, pull ? -0.001 : 0.001, kind == 2 ? 0.001 : 0, 4000);
+            print_message("%s at 1 mm/s, %-9s: force %.2e N, jumps %.3f %% in a step, spikes %.3f %%; torque %.2e N mm, jumps %.3f %%\n",
+                          pull ? "pull" : "push", name[kind], t.force_mean, 100 * t.force_jump / t.force_mean, 100 * t.beyond / t.force_mean,
+                          t.torque_mean, 100 * t.torque_jump / t.torque_mean);
+            assert_true(t.beyond < 0.02 * t.force_mean);
+            // where the stiffness at the mouth changes, the configurational push -M^2 / 2 EI truly steps
+            if (!border)
+                assert_true(t.force_jump < 0.01 * t.force_mean);
+            if (kind > 0)
+                assert_true(t.torque_jump < 0.01 * t.torque_mean);
+            stepper_destroy(s);
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -527,7 +603,7 @@ int main(void)
         cmocka_unit_test(force_is_the_derivative_of_energy), cmocka_unit_test(tangent_is_the_derivative_of_force),
         cmocka_unit_test(energy_never_grows), cmocka_unit_test(runs_move_rigidly_and_mirror),
         cmocka_unit_test(momentum_of_a_flying_wire), cmocka_unit_test(damping_leaves_rigid_rotation_alone),
-        cmocka_unit_test(reciprocity),
+        cmocka_unit_test(reciprocity), cmocka_unit_test(no_spike_as_nodes_pass_the_mouth),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
