@@ -84,6 +84,8 @@ char *run_summary_json(Simulator *simulator, const DriveReport *drive, const Nod
     add_times(summary, profile);
     cJSON_AddNumberToObject(summary, "deadline_misses", (double)drive->deadline_misses);
     cJSON_AddNumberToObject(summary, "slowed_s", drive->slowed_s);
+    cJSON_AddNumberToObject(summary, "worst_miss_ms", drive->latest_s * 1000);
+    cJSON_AddBoolToObject(summary, "real_time_priority", drive->real_time_priority);
     part = cJSON_AddObjectToObject(summary, "contacts");
     add_numbers(part, 2, (const char *const[]){"max", "final"}, (double[]){totals->contacts_max, last->active});
     part = cJSON_AddObjectToObject(summary, "penetration_mm");
