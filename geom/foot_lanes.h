@@ -241,8 +241,8 @@ typedef struct LaneKernels {
     void (*estimate)(FootBatch *batch, const FootSample *at_x, int count, double iso_level);
     void (*partner)(const FootBatch *batch, FootPartner *partner, int count);
     void (*mix)(const FootBatch *batch, const FootPartner *partner, FootMixture *mixture, int count);
-    // Weights of the near nodes for y (see NearGroup): 1 at the border of the own cell, 0 a band behind it, 2 for one whose cell X is in.
-    void (*near)(const NearGroup *group, int groups, const float y[3], float *weight);
+    // Bits of a group's nodes in whose mixed zone y lies (see NearGroup), their weights, and bits added to `better` where y lies in the node's own cell.
+    unsigned (*near)(const NearGroup *group, const float y[3], float weight[NEAR_GROUP], unsigned *better);
 } LaneKernels;
 // isa: 0 what simd_level() says, 1 SSE2, 2 AVX2, 3 AVX-512; the next narrower one where it is absent.
 const LaneKernels *lane_kernels(int isa);

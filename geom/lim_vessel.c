@@ -30,6 +30,7 @@ typedef struct NodeModel {
     bool carried;            // near the inlet: goes on upstream
     double radius;
     Vec3 center;
+    double room;             // [mm] a foot in this cell that is nearer is the closest: see measure_room
     double clear;            // [mm] true distance from the node's centre to the wall of this model, less a margin; < 0: no bound
 } NodeModel;
 
@@ -51,6 +52,8 @@ typedef struct Lane {
     int point;               // of the query
     int node;
     bool sure, again;
+    bool at_home;            // in the node's ball, as before
+    bool trusted;            // no other wall can be closer: not asked at X
     bool checked;            // no other wall stands within 0.7 gap
     int partners;            // nodes whose models are mixed in
     int partner[PARTNERS_MAX];
@@ -136,13 +139,6 @@ static void set_sample(const LimVessel *lim, FootSample *s, int i, int node, Vec
 
 // --- Feet ---
 
-// Where Newton gives up at once the answer must still be numbers for the stages that run over whole blocks.
-static void clear_answer(FootBatch *b, int i)
-{
-    b->nx[i] = b->ny[i] = b->nz[i] = b->gap[i] = b->half[i] = 0;
-    b->sxx[i] = b->sxy[i] = b->sxz[i] = b->syy[i] = b->syz[i] = b->szz[i] = 0;
-}
-
 // [mm] what Newton may leave: of a foot that was followed, of one found afresh.
 static const double REST_FOLLOWED = 1e-8, REST_FRESH = 1e-9;
 
@@ -155,22 +151,21 @@ static void set_lane(const LimVessel *lim, FootBatch *b, int i, int node, Vec3 x
     b->longest[i] = 0.5 * b->radius[i];
     b->allowed[i] = REST_FOLLOWED;
     b->state[i] = FOOT_PENDING;
-    clear_answer(b, i);
 }
 
-// Lanes are computed in whole blocks: those beyond the last in use get numbers, and nothing waits for them.
-static void fill_block(FootBatch *b, FootSample *at_x, int count)
+// Lanes are computed in whole blocks: those beyond the last in use repeat it. Returns their number.
+static int fill_block(FootBatch *b, int count)
 {
-    for (int i = count; i % FOOT_BLOCK != 0; i++) {
+    int to = (count + FOOT_BLOCK - 1) / FOOT_BLOCK * FOOT_BLOCK, last = count - 1;
+    for (int i = count; i < to; i++) {
         FootSample *s = &b->at;
-        b->xx[i] = b->xy[i] = b->xz[i] = s->x[i] = s->y[i] = s->z[i] = 0;
-        b->radius[i] = b->bend[i] = b->longest[i] = b->allowed[i] = 1;
-        s->f[i] = s->gx[i] = s->gy[i] = s->gz[i] = 0;
-        s->hxx[i] = s->hxy[i] = s->hxz[i] = s->hyy[i] = s->hyz[i] = s->hzz[i] = 0;
-        at_x->f[i] = at_x->gx[i] = at_x->gy[i] = at_x->gz[i] = 0;
-        clear_answer(b, i);
-        b->state[i] = FOOT_LOST;
+        s->group[i] = s->group[last], s->groups[i] = s->groups[last], s->carried[i] = s->carried[last];
+        s->x[i] = s->x[last], s->y[i] = s->y[last], s->z[i] = s->z[last];
+        b->xx[i] = b->xx[last], b->xy[i] = b->xy[last], b->xz[i] = b->xz[last];
+        b->radius[i] = b->radius[last], b->bend[i] = b->bend[last], b->longest[i] = b->longest[last], b->allowed[i] = b->allowed[last];
+        b->state[i] = FOOT_PENDING;
     }
+    return to;
 }
 
 // At most `rounds` Newton steps of the pending lanes; those that are not done then are lost.
@@ -213,11 +208,23 @@ static bool march_step(const LimVessel *lim, FootBatch *b, int i, int node)
     return fabs(step) < 0.05 * radius;
 }
 
-static void march_rounds(const LimVessel *lim, FootBatch *b, const Lane *of, int *lane, int count)
+static void march_rounds(const LimVessel *lim, FootBatch *b, FootSample *at_x, const Lane *of, int *lane, int count)
 {
     enum { STEPS = 13 };
-    for (int k = 0; k < count; k++)
-        b->at.x[lane[k]] = b->xx[lane[k]], b->at.y[lane[k]] = b->xy[lane[k]], b->at.z[lane[k]] = b->xz[lane[k]];
+    int trusted[FOOT_BATCH], n = 0;
+    for (int k = 0; k < count; k++) {
+        int i = lane[k];
+        b->at.x[i] = b->xx[i], b->at.y[i] = b->xy[i], b->at.z[i] = b->xz[i];
+        if (!of[i].trusted)
+            continue;
+        set_sample(lim, at_x, i, of[i].node, lane_point(b, i));
+        trusted[n++] = i;
+    }
+    if (n > 0) {   // the trust was misplaced
+        sample(lim, at_x, trusted, n, false);
+        for (int k = 0; k < n; k++)
+            b->inside[trusted[k]] = at_x->f[trusted[k]] > 0;
+    }
     for (int round = 0; round < STEPS && count > 0; round++) {
         sample(lim, &b->at, lane, count, false);
         int kept = 0;
@@ -302,28 +309,33 @@ static bool is_on_wrong_side(const FootBatch *b, int i) { return (b->gap[i] > 0)
 // stands further off than another, is not the closest: those start once more from X.
 static void project_batch(const LimVessel *lim, FootBatch *b, FootSample *at_x, Lane *of, int count)
 {
-    int lane[FOOT_BATCH], n = 0;
+    int lane[FOOT_BATCH], n = 0, filled = fill_block(b, count);
     at_x->any_carried = false;
-    for (int i = 0; i < count; i++) {
-        set_sample(lim, at_x, i, of[i].node, lane_point(b, i));
-        lane[i] = i;
-        of[i].sure = true;
-        if (of[i].again)
-            b->state[i] = FOOT_LOST;
+    for (int i = 0; i < filled; i++) {
+        if (i < count && !of[i].trusted) {
+            set_sample(lim, at_x, i, of[i].node, lane_point(b, i));
+            lane[n++] = i;
+        } else {
+            at_x->f[i] = at_x->gx[i] = at_x->gy[i] = at_x->gz[i] = 0;
+        }
     }
-    fill_block(b, at_x, count);
-    sample(lim, at_x, lane, count, false);
-    lim->kernels->estimate(b, at_x, count, lim->tree->iso_level);
-    newton_rounds(lim, b, count, 4, false);
+    if (n > 0) {
+        sample(lim, at_x, lane, n, false);
+        lim->kernels->estimate(b, at_x, count, lim->tree->iso_level);
+    }
+    n = 0;
+    newton_rounds(lim, b, filled, 4, false);
     lim->kernels->finish(b, count);
     for (int i = 0; i < count; i++) {
-        of[i].again = b->state[i] != FOOT_DONE || is_on_wrong_side(b, i) || !(b->estimate[i] > 0.8 * fabs(b->gap[i]));
+        of[i].sure = true;
+        bool stands = of[i].trusted || (!is_on_wrong_side(b, i) && b->estimate[i] > 0.8 * fabs(b->gap[i]));
+        of[i].again = of[i].again || b->state[i] != FOOT_DONE || !stands;
         if (of[i].again)
             lane[n++] = i;
     }
     if (n == 0)
         return;
-    march_rounds(lim, b, of, lane, n);
+    march_rounds(lim, b, at_x, of, lane, n);
     for (int i = 0; i < count; i++)
         if (of[i].again) {
             b->state[i] = FOOT_PENDING;
@@ -342,29 +354,33 @@ static void project_batch(const LimVessel *lim, FootBatch *b, FootSample *at_x, 
         lim->kernels->finish(b, count);
 }
 
+enum { LOOKS = 14 };
+#define C 0.57735026918962573   // 1 / sqrt 3
+static const Vec3 look[LOOKS] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}, {C, C, C},
+                                 {C, C, -C}, {C, -C, C}, {C, -C, -C}, {-C, C, C}, {-C, C, -C}, {-C, -C, C}, {-C, -C, -C}};
+#undef C
+
 // A foot far off is the locally closest, but is it the closest? Looks on a sphere of 0.9 times its distance about X in 14 directions, at most 36 degrees
 // apart from any other: all inside means that no (flat) wall is nearer than 0.7 gap. What fails is projected anew, slowly and thoroughly. Asked only
 // where the clearance of an earlier check has been used up; near the wall the estimate serves.
 static void check_batch(const LimVessel *lim, FootBatch *b, FootSample *at, Lane *of, int count, const VesselMemory *memory)
 {
-    static const double c = 0.57735026918962573;   // 1 / sqrt 3
-    const double way[14][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}, {c, c, c},
-                               {c, c, -c}, {c, -c, c}, {c, -c, -c}, {-c, c, c}, {-c, c, -c}, {-c, -c, c}, {-c, -c, -c}};
     int lane[FOOT_BATCH], n = 0;
     for (int i = 0; i < count; i++) {
         const VesselMemory *m = &memory[of[i].point];
         double known = m->clearance > 0 ? m->clearance - vec3_distance(lane_point(b, i), m->clear_place) : 0;
-        of[i].checked = of[i].sure && b->gap[i] > 0.3 * b->radius[i] && known < 0.5 * b->gap[i];
+        of[i].checked = of[i].sure && !of[i].trusted && b->gap[i] > 0.3 * b->radius[i] && known < 0.5 * b->gap[i];
         if (!of[i].checked)
             continue;
+        set_sample(lim, at, i, of[i].node, lane_point(b, i));
         lane[n++] = i;
     }
     bool slow = false, bad[FOOT_BATCH] = {false};
-    for (int k = 0; k < 14 && n > 0; k++) {
+    for (int k = 0; k < LOOKS && n > 0; k++) {
         for (int j = 0; j < n; j++) {
             int i = lane[j];
             double r = 0.9 * b->gap[i];
-            at->x[i] = b->xx[i] + r * way[k][0], at->y[i] = b->xy[i] + r * way[k][1], at->z[i] = b->xz[i] + r * way[k][2];
+            at->x[i] = b->xx[i] + r * look[k].x, at->y[i] = b->xy[i] + r * look[k].y, at->z[i] = b->xz[i] + r * look[k].z;
         }
         sample(lim, at, lane, n, false);
         for (int j = 0; j < n; j++)
@@ -426,20 +442,30 @@ static void ask_partners(const LimVessel *lim, const FootBatch *b, FootPartner *
 // Mixes the partners' walls into the hits of a batch, partner by partner.
 static void blend_batch(const LimVessel *lim, const FootBatch *b, const Lane *of, int count, double reach, VesselHit *hit)
 {
-    FootPartner partner = {.weight = {0}};
-    FootMixture mixture = {.total = {0}};
+    FootPartner partner;
+    FootMixture mixture;
     int most = 0, partners[FOOT_BATCH];
     for (int i = 0; i < count; i++) {
         bool wanted = of[i].sure && hit[of[i].point].gap - blend_least(b->radius[i]) <= reach;
         partners[i] = wanted ? of[i].partners : 0;
         most = partners[i] > most ? partners[i] : most;
     }
-    for (int i = 0; i < FOOT_BATCH; i++)
-        mixture.agree[i] = i < count ? blend_agree(b->radius[i]) : 1;
+    if (most == 0)
+        return;
+    int filled = (count + FOOT_BLOCK - 1) / FOOT_BLOCK * FOOT_BLOCK;
+    for (int i = 0; i < filled; i++) {
+        mixture.agree[i] = blend_agree(b->radius[i]);
+        mixture.total[i] = mixture.gap[i] = mixture.nx[i] = mixture.ny[i] = mixture.nz[i] = 0;
+        partner.at.f[i] = partner.at.gx[i] = partner.at.gy[i] = partner.at.gz[i] = 0;
+    }
     for (int k = 0; k < most; k++) {
         int lane[FOOT_BATCH], n = 0;
-        for (int i = 0; i < count; i++) {
+        partner.at.any_carried = false;
+        for (int i = 0; i < filled; i++) {
             partner.weight[i] = 0;
+            partner.at.x[i] = b->at.x[i], partner.at.y[i] = b->at.y[i], partner.at.z[i] = b->at.z[i];
+        }
+        for (int i = 0; i < count; i++) {
             if (partners[i] <= k)
                 continue;
             partner.weight[i] = (double)of[i].weight[k];
@@ -471,25 +497,21 @@ static VesselHit open_end(VesselMemory *memory, int node)
 // Collects the partners of `node` at y from its centre. False where X is in another node's cell.
 static bool collect_partners(const LimVessel *lim, int node, Vec3 y, Lane *of)
 {
-    enum { AT_ONCE = 4 };
     const NodeModel *m = &lim->model[node];
-    float weight[AT_ONCE * NEAR_GROUP], at[3] = {(float)y.x, (float)y.y, (float)y.z};
-    bool own = true, mixed = lim->options.field == LIM_BLEND;
+    float at[3] = {(float)y.x, (float)y.y, (float)y.z}, weight[NEAR_GROUP];
+    unsigned better = 0;
+    bool mixed = lim->options.field == LIM_BLEND;
     of->partners = 0;
-    for (int first = 0; first < m->near_groups; first += AT_ONCE) {
-        int groups = m->near_groups - first < AT_ONCE ? m->near_groups - first : AT_ONCE;
-        lim->kernels->near(m->near + first, groups, at, weight);
-        for (int k = 0; k < NEAR_GROUP * groups; k++) {
-            if (!(weight[k] > 0))
+    for (int g = 0; g < m->near_groups; g++) {
+        unsigned in = lim->kernels->near(m->near + g, at, weight, &better);
+        for (int k = 0; mixed && in >> k && of->partners < PARTNERS_MAX; k++) {
+            if (!(in >> k & 1))
                 continue;
-            own = own && !(weight[k] > 1);
-            if (!mixed || of->partners == PARTNERS_MAX)
-                continue;
-            of->partner[of->partners] = m->near[first + k / NEAR_GROUP].node[k % NEAR_GROUP];
-            of->weight[of->partners++] = weight[k] > 1 ? 1 : weight[k];
+            of->partner[of->partners] = m->near[g].node[k];
+            of->weight[of->partners++] = better >> k & 1 ? 1 : weight[k];
         }
     }
-    return own;
+    return better == 0;
 }
 
 // The point's node and its partners.
@@ -511,53 +533,72 @@ static int follow(const LimVessel *lim, Vec3 x, int node, Lane *of)
 // Answers where no field is needed; false where one is.
 static bool answer_cheaply(const LimVessel *lim, Vec3 x, double reach, VesselMemory *memory, Lane *of, VesselHit *hit)
 {
-    *hit = (VesselHit){.node = memory->node};
     if (!(vec3_norm2(x) < 1e100)) {
-        hit->flags = VESSEL_UNSURE;
+        *hit = (VesselHit){.node = memory->node, .flags = VESSEL_UNSURE};
         return true;
     }
     int node = follow(lim, x, memory->node, of);
     const NodeModel *m = &lim->model[node];
     if (node != memory->node)
         memory->clearance = 0;
-    memory->node = hit->node = of->node = node;
+    of->at_home = node == memory->node && vec3_norm2(vec3_sub(x, m->center)) < 1.44 * m->radius * m->radius;
+    memory->node = of->node = node;
     if (node == 0 && lim->inlet_open && !m->carried && inlet_height(lim, x) < 0) {
         *hit = open_end(memory, node);
         return true;
     }
-    double bound = -HUGE_VAL;
-    if (m->clear > reach)
-        bound = m->clear - vec3_distance(x, m->center);
-    if (memory->clearance > reach)
-        bound = fmax(bound, memory->clearance - vec3_distance(x, memory->clear_place));
-    hit->gap = bound - (lim->options.field == LIM_BLEND ? blend_least(m->radius) : 0);
-    hit->flags = VESSEL_FAR;
-    return hit->gap > reach;
+    double least = reach + (lim->options.field == LIM_BLEND ? blend_least(m->radius) : 0), clear = 0, away = m->clear - least;
+    if (away > 0 && vec3_norm2(vec3_sub(x, m->center)) < away * away)
+        clear = m->clear - vec3_distance(x, m->center);
+    away = memory->clearance - least;
+    if (away > 0 && vec3_norm2(vec3_sub(x, memory->clear_place)) < away * away)
+        clear = fmax(clear, memory->clearance - vec3_distance(x, memory->clear_place));
+    if (!(clear > least))
+        return false;
+    *hit = (VesselHit){.gap = clear - (least - reach), .node = node, .flags = VESSEL_FAR};
+    return true;
 }
 
-// Where the foot should be now: t = (I + gap S)^-1 P dx = P dx - gap H dx along the wall, H the gap's Hessian then; and t'S t / 2 = t'H dx / 2 down with it.
-static Vec3 predicted_foot(const VesselMemory *memory, Vec3 x, double radius)
+// Where Newton starts: where the foot should be now, t = (I + gap S)^-1 P dx = P dx - gap H dx along the wall, H the gap's Hessian then, and
+// t'S t / 2 = t'H dx / 2 down with it.
+static void set_start(const LimVessel *lim, FootBatch *b, int i, Vec3 x, const VesselMemory *memory, Lane *of)
 {
-    Vec3 move = vec3_sub(x, memory->place), n = memory->normal, bend = sym3_mul_vec(&memory->hessian, move);
-    double gap = vec3_dot(vec3_sub(memory->place, memory->foot), n);
-    Vec3 shift = vec3_add_scaled(vec3_add_scaled(move, -vec3_dot(move, n), n), -gap, bend);
-    if (!(vec3_norm2(shift) < 0.04 * radius * radius))
-        return memory->foot;
-    return vec3_add_scaled(vec3_add(memory->foot, shift), -0.5 * vec3_dot(shift, bend), n);
+    const NodeModel *m = &lim->model[of->node];
+    of->again = !memory->has_foot;
+    of->trusted = false;
+    if (!memory->has_foot) {
+        set_lane(lim, b, i, of->node, x, x);
+        return;
+    }
+    Vec3 foot = memory->foot, move = vec3_sub(x, memory->place), n = memory->normal, bend = sym3_mul_vec(&memory->hessian, move);
+    double gap = vec3_dot(vec3_sub(memory->place, foot), n), closer = vec3_dot(move, n);
+    Vec3 shift = vec3_add_scaled(vec3_add_scaled(move, -closer, n), -gap, bend);
+    if (vec3_norm2(shift) < 0.04 * m->radius * m->radius) {
+        foot = vec3_add_scaled(vec3_add(foot, shift), -0.5 * vec3_dot(shift, bend), n);
+        of->trusted = memory->trusted > 0 && of->at_home && gap + closer < m->room && gap + closer > -0.05 * m->radius;
+    }
+    set_lane(lim, b, i, of->node, x, foot);
 }
+
+enum { TRUST = 16 };         // queries in which a trusted foot goes without the look at X
 
 static void answer_from_foot(const FootBatch *b, int i, const Lane *of, VesselMemory *memory, VesselHit *hit)
 {
-    *hit = (VesselHit){b->gap[i], lane_normal(b, i), lane_hessian(b, i), of->node, of->sure ? 0 : VESSEL_UNSURE};
+    // by values: reading back what was just written in pieces stalls
+    Vec3 x = lane_point(b, i), foot = lane_foot(b, i), normal = lane_normal(b, i);
+    Sym3 hessian = lane_hessian(b, i);
+    double gap = b->gap[i];
+    *hit = (VesselHit){gap, normal, hessian, of->node, of->sure ? 0 : VESSEL_UNSURE};
     memory->has_foot = of->sure;
-    memory->place = lane_point(b, i);
+    memory->trusted = of->sure ? of->trusted ? memory->trusted - 1 : TRUST : 0;
     if (of->checked) {
-        memory->clearance = fmax(0.7 * hit->gap, 0);
-        memory->clear_place = memory->place;
+        memory->clearance = fmax(0.7 * gap, 0);
+        memory->clear_place = x;
     }
-    memory->foot = lane_foot(b, i);
-    memory->normal = hit->normal;
-    memory->hessian = hit->hessian;
+    memory->place = x;
+    memory->foot = foot;
+    memory->normal = normal;
+    memory->hessian = hessian;
 }
 
 static void query_batch(const LimVessel *lim, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
@@ -571,9 +612,7 @@ static void query_batch(const LimVessel *lim, int count, const Vec3 *point, doub
         if (answer_cheaply(lim, point[i], reach, &memory[i], &of[n], &hit[i]))
             continue;
         of[n].point = i;
-        of[n].again = !memory[i].has_foot;
-        set_lane(lim, &batch, n, of[n].node, point[i],
-                 memory[i].has_foot ? predicted_foot(&memory[i], point[i], lim->model[of[n].node].radius) : point[i]);
+        set_start(lim, &batch, n, point[i], &memory[i], &of[n]);
         n++;
     }
     if (n == 0)
@@ -669,6 +708,37 @@ static void carry_inlet(LimVessel *lim)
     }
 }
 
+// Is the model's wall about the node one sheet with room before it? Takes feet around the node, over the length of its cell, and looks 14 ways from
+// the middle of a ball of 0.8 r that touches each: where all is lumen, a foot closer than 0.48 r is the closest.
+static double measure_room(const LimVessel *lim, int node)
+{
+    enum { AROUND = 8 };
+    const VesselTree *tree = lim->tree;
+    Blobby blobs = blobs_of(lim, node);
+    double r = tree->radius[node], ball = 0.8 * r, reach = fmax(0.5 * sqrt(spacing2(tree, node)), 0.3 * r);
+    Vec3 d = tree->direction[node], e1 = vec3_normal_to(d), e2 = vec3_cross(d, e1);
+    if (tree->kind[node] != NODE_VESSEL)
+        return 0;
+    for (int k = 0; k < 3 * AROUND; k++) {
+        double angle = 2 * PI * k / AROUND, step = 0.5 * r;
+        Vec3 out = vec3_add(vec3_scale(e1, cos(angle)), vec3_scale(e2, sin(angle)));
+        Vec3 foot = vec3_add_scaled(tree->center[node], (k / AROUND - 1) * reach, d), g;
+        if (!(blobby_field(&blobs, foot) > 0))
+            return 0;
+        for (int i = 0; i < 12; i++, step *= i > 4 ? 0.5 : 1)   // out, then closer and closer to the wall
+            if (i < 5 ? blobby_field(&blobs, vec3_add_scaled(foot, step, out)) > 0 : true) {
+                Vec3 next = vec3_add_scaled(foot, step, out);
+                foot = blobby_field(&blobs, next) > 0 ? next : foot;
+            }
+        blobby_gradient(&blobs, foot, &g);
+        Vec3 middle = vec3_add_scaled(foot, ball, vec3_unit(g));
+        for (int w = 0; w < LOOKS; w++)
+            if (!(blobby_field(&blobs, vec3_add_scaled(middle, 0.9 * ball, look[w])) > 0))
+                return 0;
+    }
+    return 0.6 * ball;
+}
+
 static void fill_models(LimVessel *lim)
 {
     const VesselTree *tree = lim->tree;
@@ -691,6 +761,7 @@ static void fill_models(LimVessel *lim)
         // less than what was found, should that be another side's foot
         SurfacePoint s = blobby_project(&blobs, tree->center[i], tree->center[i]);
         m->clear = s.converged && s.distance > 0 ? fmin(0.95 * s.distance, tree->radius[i]) : -HUGE_VAL;
+        m->room = measure_room(lim, i);
         m->near = near;
         m->near_groups = near_groups_of(tree, i);
         fill_near(tree, i, near);

@@ -14,6 +14,7 @@
 // What a tool point remembers between steps.
 typedef struct VesselMemory {
     int node;                // node of the tree, or segment of the tube; -1: not yet located
+    int trusted;             // queries for which the foot need not be compared with other walls
     bool has_foot;
     Vec3 foot;               // last projection, where Newton starts
     double clearance;        // [mm] at `clear_place` the wall of `node` was at least this far; 0: not known. Lets far points pass unevaluated
