@@ -21,6 +21,7 @@ typedef struct Node {
 struct BlockLu {
     int count;
     Node *node;
+    double *rest, *change;       // (M, 6) of the refinement
 };
 
 BlockLu *block_lu_create(int count)
@@ -30,7 +31,9 @@ BlockLu *block_lu_create(int count)
         return NULL;
     lu->count = count;
     lu->node = aligned_alloc(64, (size_t)count * sizeof *lu->node);
-    if (!lu->node) {
+    lu->rest = calloc((size_t)count * 12, sizeof *lu->rest);
+    lu->change = lu->rest + (size_t)count * 6;
+    if (!lu->node || !lu->rest) {
         block_lu_destroy(lu);
         return NULL;
     }
@@ -43,6 +46,7 @@ void block_lu_destroy(BlockLu *lu)
     if (!lu)
         return;
     free(lu->node);
+    free(lu->rest);
     free(lu);
 }
 
@@ -89,11 +93,46 @@ static bool (*const eliminate_on[3])(BlockLu *, const double *, const double *, 
 static void (*const back_on[3])(const BlockLu *, double *) = ON(back);
 static void (*const forward_on[3])(const BlockLu *, const double *) = ON(forward);
 
+static bool all_positive(const BlockLu *lu)
+{
+    bool ok = true;
+    for (int i = 0; i < lu->count; i++)
+        for (int k = 0; k < 6; k++)
+            ok &= lu->node[i].inverse[k] > 0;
+    return ok;
+}
+
+// r -= B x of one block by columns
+static void take_off(const double *block, const double *x, double *r)
+{
+    for (int c = 0; c < 6; c++)
+        for (int k = 0; k < 6; k++)
+            r[k] -= block[6 * c + k] * x[c];
+}
+
+static void refine(BlockLu *lu, const double *diag, const double *lower, const double *upper, const double *b, double *x)
+{
+    memcpy(lu->rest, b, (size_t)lu->count * 6 * sizeof *b);
+    for (int i = 0; i < lu->count; i++) {
+        double *r = lu->rest + 6 * (size_t)i, *at = x + 6 * (size_t)i;
+        take_off(diag + (size_t)i * BLOCK, at, r);
+        if (i > 0)
+            take_off(lower + (size_t)(i - 1) * BLOCK, at - 6, r);
+        if (i + 1 < lu->count)
+            take_off(upper + (size_t)i * BLOCK, at + 6, r);
+    }
+    block_lu_solve(lu, lu->rest, lu->change);
+    for (size_t k = 0; k < 6 * (size_t)lu->count; k++)
+        x[k] += lu->change[k];
+}
+
 bool block_lu_factor_solve(BlockLu *lu, const double *diag, const double *lower, const double *upper, const double *b, double *x)
 {
     if (!eliminate_on[block_isa()](lu, diag, lower, upper, b))
         return false;
     back_on[block_isa()](lu, x);
+    if (!all_positive(lu))
+        refine(lu, diag, lower, upper, b, x);
     return true;
 }
 

@@ -6,17 +6,16 @@
 #include "solver/contact_rows.h"
 #include "solver/gauss_seidel.h"
 
-enum { BLOCK_DOUBLES = 36 };
+enum { BLOCK_DOUBLES = 36, CONTACT_SWEEPS_PER_FACTOR = 8 };
 
 // What a contact does in one Newton iteration: f = force - C (further motion), C acting in space.
 typedef struct ContactLaw {
     int state;
     bool touched;                // the matrix holds its C
-    Vec3 force;
+    Vec3 force;                  // g, then what the whole step makes of the force
     Mat3 c;
-    Vec3 step;                   // motion under the whole Newton step
-    Vec3 multiplier;             // l of the augmented Lagrangian
-    double bound;                // s, of Tresca's friction
+    Vec3 along;                  // mu p of a sliding contact
+    Vec3 step;                   // motion under the whole step
 } ContactLaw;
 
 typedef struct PointwiseWork PointwiseWork;
@@ -28,7 +27,8 @@ struct ContactSolver {
     ContactRow *row;             // (capacity)
     Vec3 *motion;                // (capacity) d = J u
     ContactLaw *law;             // (capacity)
-    Vec3 *best;                  // (capacity) forces of the best iterate
+    Vec3 *best;                  // (capacity) forces of the best iterate …
+    double *best_u;              // … and its motion (M, 6)
     bool *flag;                  // (capacity)
     bool symmetric;              // which of the two factors holds the matrix
     double *rhs, *delta;         // (M, 6)
@@ -44,20 +44,9 @@ void contact_balance(ContactSolver *solver, const BlockFactor *factor, const dou
 
 // Fills residual, cone_violation and active.
 double contact_residual(const ContactRow *row, int count, const Vec3 *motion, ContactReport *report);
-// Of the normal direction alone.
-double contact_normal_residual(const ContactRow *row, int count, const Vec3 *motion);
 
 ContactReport contact_pointwise(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
                                 const ContactOptions *options, double *u);
-// solver->matrix = the chain with the laws' J^T C J. Call contact_assemble_reset once before the first of a solve.
-void contact_assemble_reset(ContactSolver *solver, const BlockChain *chain, int count);
-void contact_assemble(ContactSolver *solver, const BlockChain *chain, int count);
-// From the rows' forces; at most `budget` factorisations. True where it converged.
-bool contact_convex(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count, double tolerance,
-                    int budget, ContactReport *report, double *u);
-// The last resort: nothing overlaps, no force leaves its cone, but friction may be less than Coulomb's.
-void contact_feasible(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count, double tolerance,
-                      int budget, ContactReport *report, double *u);
 ContactReport contact_newton(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
                              const ContactOptions *options, double *u);
 

@@ -11,12 +11,20 @@
 // with the bound frozen, a fixed point over the bound) every outer round costs several factorisations and a wire in a spiral needs 5 to 20
 // rounds, as friction builds up along it like a power series of exp(mu theta). With it: 3 to 5 iterations a step, quadratic at the end.
 //
-// What makes it robust is how states change. A stiff wire that overlaps the wall over a stretch does so nearly everywhere at once; taking in
-// every overlapping contact brings large tensile forces and cycles. So of each run of neighbouring overlapping contacts only the deepest is
-// taken in at a time: active sets are a few isolated points, found in 3 to 7 iterations. A sliding contact that moves against its own sense
-// sticks first. If states still cycle, they change one at a time from the tip (Murty's rule, which ends for the frictionless problem).
-// Where that finds no end, contact_convex.c takes over; where friction has no solution that it can find (jammed, mu near 1), it gives up friction
-// until nothing overlaps and no force leaves its cone, and `converged` says false.
+// What makes it robust: how states change, and a line search.
+// - A stiff wire that overlaps the wall over a stretch does so nearly everywhere at once; taking in every overlapping contact brings large
+//   tensile forces and cycles. So of each run of neighbouring overlapping contacts only the deepest is taken in at a time: active sets are a few
+//   isolated points, found in 3 to 7 iterations. The first iteration takes in none where some press already: old forces do not balance the new
+//   loads, and soft bending modes make of that an overlap of millimetres somewhere else.
+// - A sliding contact that moves against its own sense sticks first.
+// - Alart and Curnier's equations linearised at a contact that hardly slides point too far, and it flips between sticking and sliding for
+//   ever. Forces and motion are linear along a step, so their equations can be evaluated at any part of it without a solve: from the fourth
+//   iteration on the step is halved until they are better fulfilled than before. (Changing states one at a time, or minimising the convex problem
+//   of Tresca's friction in between, was tried before and cost ten times as much in the cases that need it.)
+//
+// Forces leave cut to their cones, which changes them by no more than the residual. The motion is not balanced again with them: the wire's bending
+// is so soft against its stretching that a force off by 1e-8 of the largest moves it by as much as a residual of 0.1, so that iterates that
+// fulfil all laws would be refused for the rounding of a cut. Where the iterations end first, the best iterate is handed out in the same way.
 #include "solver/contact_forms.h"
 
 #include <float.h>
@@ -26,9 +34,9 @@ enum { OPEN, STICK, SLIP };
 
 // Penalty P over k: the rest after an iteration is about 1/P; rounding of the matrix grows with it.
 static const double penalty = 1e4;
-// r over k: only the branch that is taken depends on it, not the solution.
-static const double slope = 0.01;
-enum { PARALLEL_ITERATIONS = 14, SINGLE_ITERATIONS = 16, CONVEX_ITERATIONS = 40, FEASIBLE_ITERATIONS = 200 };
+// r over k, in the choice of states and in the line search: neither changes the solution.
+static const double slope = 1e-3, merit_slope = 0.01;
+enum { FIRST_SEARCH = 3, HALVINGS = 6 };
 
 static double normal_violation(const ContactRow *c, Vec3 motion) { return c->gap + vec3_dot(motion, c->normal); }
 
@@ -46,8 +54,8 @@ static double friction_bound(const ContactRow *c, Vec3 motion)
     return c->friction * (fn > 0 ? fn : fmax(0, -0.01 * c->stiffness_n * normal_violation(c, motion)));
 }
 
-// Which contacts shall be active: those that press, and the deepest of each run of neighbours that overlap (`all`: every one).
-static void choose_active(const ContactSolver *s, int count, bool all, bool *active)
+// Which contacts shall be active: those that press, and the deepest of each run of neighbours that overlap.
+static void choose_active(const ContactSolver *s, int count, bool *active)
 {
     int i = 0;
     while (i < count) {
@@ -63,7 +71,7 @@ static void choose_active(const ContactSolver *s, int count, bool all, bool *act
             double vj = normal_violation(&s->row[j], s->motion[j]);
             if (!(vj < 0))
                 break;
-            active[j] = all;
+            active[j] = false;
             if (vj < v) {
                 v = vj;
                 deepest = j;
@@ -74,12 +82,18 @@ static void choose_active(const ContactSolver *s, int count, bool all, bool *act
     }
 }
 
-// States for the next iteration; returns how many changed. `one`: only the change nearest to the tip.
-static int choose_states(ContactSolver *s, int count, bool one, bool first)
+// States for the next iteration; returns how many changed.
+static int choose_states(ContactSolver *s, int count, bool first)
 {
-    int changes = 0;
-    choose_active(s, count, one, s->flag);
-    for (int i = count; i-- > 0;) {
+    int changes = 0, pressing = 0;
+    for (int i = 0; i < count; i++)
+        pressing += s->law[i].state != OPEN;
+    if (first && pressing > 0)
+        for (int i = 0; i < count; i++)
+            s->flag[i] = s->law[i].state != OPEN;
+    else
+        choose_active(s, count, s->flag);
+    for (int i = 0; i < count; i++) {
         const ContactRow *c = &s->row[i];
         int was = s->law[i].state, state = OPEN;
         if (s->flag[i]) {
@@ -92,10 +106,8 @@ static int choose_states(ContactSolver *s, int count, bool one, bool first)
                 state = reversed || size <= friction_bound(c, s->motion[i]) ? STICK : SLIP;
             }
         }
-        if (state != was && !(one && changes)) {
-            s->law[i].state = state;
-            changes++;
-        }
+        s->law[i].state = state;
+        changes += state != was;
     }
     return changes;
 }
@@ -111,12 +123,12 @@ static Mat3 law_matrix(Vec3 n, double kn, Vec3 oblique, double across, Vec3 p)
     return c;
 }
 
-// Fills law->force (g) and, unless the old factor is used again, law->c.
-static void write_law(const ContactRow *c, Vec3 motion, bool keep_matrix, ContactLaw *law)
+// Fills law->force (g, the force where the contact has moved by `from`) and, unless the old factor is used again, law->c.
+static void write_law(const ContactRow *c, Vec3 motion, Vec3 from, bool keep_matrix, ContactLaw *law)
 {
-    Vec3 n = c->normal, none = {0, 0, 0}, slide = contact_tangential(motion, n), ft = contact_tangential(c->force, n);
+    Vec3 n = c->normal, none = {0, 0, 0}, slide = contact_tangential(from, n), ft = contact_tangential(c->force, n);
     double kn = penalty * c->stiffness_n, kt = penalty * c->stiffness_t;
-    double fn = vec3_dot(c->force, n), gn = fn - kn * normal_violation(c, motion);
+    double fn = vec3_dot(c->force, n), gn = fn - kn * normal_violation(c, from);
     Vec3 force = none, oblique = none, p = none;
     double across = 0;
     if (law->state == STICK) {
@@ -128,7 +140,8 @@ static void write_law(const ContactRow *c, Vec3 motion, bool keep_matrix, Contac
             double size, bound = friction_bound(c, motion);
             p = slide_direction(c, motion, &size);
             across = size > bound ? fmin(kt, bound * slope * c->stiffness_t / (size - bound)) : size > 0 ? kt : 0;
-            oblique = vec3_scale(p, c->friction * kn);
+            law->along = vec3_scale(p, c->friction);
+            oblique = vec3_scale(law->along, kn);
             force = vec3_add_scaled(force, c->friction * gn, p);
             force = vec3_add_scaled(force, -across, vec3_add_scaled(slide, -vec3_dot(slide, p), p));
         }
@@ -170,27 +183,58 @@ static void add_law(const ContactRow *c, const Mat3 *k, ContactSolver *s)
     add_coupling(k, c->weight[0], &r[0], c->mask[0], c->weight[1], &r[1], c->mask[1], s->matrix.lower + 36 * (size_t)c->node);
 }
 
-// The matrix of the present laws: only blocks that held or hold a contact differ from the chain's.
-void contact_assemble(ContactSolver *s, const BlockChain *chain, int count)
+// Row e of a sliding contact, [A(i, i-1) A(i, i) A(i, i+1) | rhs], loses J^T mu p for every part of it along n: what is left of the law's
+// P (n + mu p) n^T is P n n^T, and the elimination, which does not look for pivots, finds large positive ones.
+static void straighten(const ContactRow *c, Vec3 along, int e, ContactSolver *s)
 {
-    const size_t block = 36 * sizeof(double);
-    for (int i = 0; i < count; i++) {
-        const ContactRow *c = &s->row[i];
-        for (int e = 0; s->law[i].touched && e < c->nodes; e++)
-            memcpy(s->matrix.diag + 36 * (size_t)(c->node + e), chain->diag + 36 * (size_t)(c->node + e), block);
-        if (s->law[i].touched && c->nodes == 2) {
-            memcpy(s->matrix.lower + 36 * (size_t)c->node, chain->lower + 36 * (size_t)c->node, block);
-            block_lu_transpose(1, chain->lower + 36 * (size_t)c->node, s->turned + 36 * (size_t)c->node);
+    double v[6], w = c->weight[e];
+    if (c->mask[e] != 63 || w < 0.05)
+        return;
+    ContactRow here = *c;
+    double push[12] = {0};
+    here.node = 0;
+    contact_row_push(&here, vec3_scale(along, 1 / w), push);
+    memcpy(v, push + 6 * e, sizeof v);
+    size_t i = (size_t)(c->node + e), block = BLOCK_DOUBLES;
+    double *columns[4] = {i > 0 ? s->turned + block * (i - 1) : NULL, s->matrix.diag + block * i,
+                          (int)i + 1 < s->matrix.count ? s->matrix.lower + block * i : NULL, s->rhs + 6 * i};
+    for (int k = 0; k < 4; k++)
+        for (double *x = columns[k]; x && x < columns[k] + (k < 3 ? 36 : 6); x += 6) {
+            double t = c->normal.x * x[0] + c->normal.y * x[1] + c->normal.z * x[2];
+            for (int r = 0; r < 6; r++)
+                x[r] -= v[r] * t;
         }
+}
+
+// The blocks of a contact's rows as the chain has them.
+static void restore(ContactSolver *s, const BlockChain *chain, const ContactRow *c)
+{
+    const size_t block = BLOCK_DOUBLES, bytes = block * sizeof(double), last = (size_t)(c->node + c->nodes - 1);
+    for (size_t i = (size_t)c->node; i <= last; i++)
+        memcpy(s->matrix.diag + block * i, chain->diag + block * i, bytes);
+    for (size_t i = (size_t)(c->node > 0 ? c->node - 1 : 0); i <= last && (int)i + 1 < chain->count; i++) {
+        memcpy(s->matrix.lower + block * i, chain->lower + block * i, bytes);
+        block_lu_transpose(1, chain->lower + block * i, s->turned + block * i);
     }
+}
+
+// The matrix of the present laws, and the right-hand side to it: only blocks that held or hold a contact differ from the chain's.
+static void assemble(ContactSolver *s, const BlockChain *chain, int count)
+{
+    for (int i = 0; i < count; i++)
+        if (s->law[i].touched)
+            restore(s, chain, &s->row[i]);
     for (int i = 0; i < count; i++) {
         s->law[i].touched = s->law[i].state != OPEN;
         if (s->law[i].touched)
             add_law(&s->row[i], &s->law[i].c, s);
     }
+    for (int i = 0; i < count; i++)
+        for (int e = 0; s->law[i].state == SLIP && s->row[i].friction > 0 && e < s->row[i].nodes; e++)
+            straighten(&s->row[i], s->law[i].along, e, s);
 }
 
-void contact_assemble_reset(ContactSolver *s, const BlockChain *chain, int count)
+static void assemble_reset(ContactSolver *s, const BlockChain *chain, int count)
 {
     size_t blocks = (size_t)chain->count * 36 * sizeof(double);
     memcpy(s->matrix.diag, chain->diag, blocks);
@@ -200,117 +244,152 @@ void contact_assemble_reset(ContactSolver *s, const BlockChain *chain, int count
         s->law[i].touched = false;
 }
 
-// One Newton iteration in the present states. False where the matrix cannot be factored or the result is not finite.
-static bool newton_iteration(ContactSolver *s, const BlockChain *chain, int count, bool reuse, double *u)
+// How far the laws are from being fulfilled after part t of the step.
+static double merit(const ContactSolver *s, int count, double t)
 {
-    bool symmetric = true;
-    memset(s->rhs, 0, (size_t)chain->count * 6 * sizeof *s->rhs);
+    double sum = 0;
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &s->row[i];
-        write_law(c, s->motion[i], reuse, &s->law[i]);
+        if (c->inert)
+            continue;
+        Vec3 f = vec3_mix(c->force, s->law[i].force, t), d = vec3_add_scaled(s->motion[i], t, s->law[i].step);
+        Vec3 error = contact_error(c, f, d, merit_slope);
+        sum += vec3_norm2(error);
+    }
+    return sum;
+}
+
+static double step_length(const ContactSolver *s, int count)
+{
+    double start = merit(s, count, 0), least = HUGE_VAL, best = 1, t = 1;
+    for (int k = 0; k < HALVINGS; k++, t /= 2) {
+        double m = merit(s, count, t);
+        if (m <= start)
+            return t;
+        if (m < least) {
+            least = m;
+            best = t;
+        }
+    }
+    return best;
+}
+
+// The step of the present states: s->delta, and of each contact its motion and its force afterwards. With `b`, of the first iterations, it is
+// the whole motion: forces that fit badly may have moved the wire anywhere, and the rounding of that shall not stay.
+// False where the matrix cannot be factored.
+static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bool reuse, const double *b)
+{
+    bool symmetric = true;
+    size_t bytes = (size_t)chain->count * 6 * sizeof *s->rhs;
+    const Vec3 none = {0, 0, 0};
+    if (b)
+        memcpy(s->rhs, b, bytes);
+    else
+        memset(s->rhs, 0, bytes);
+    for (int i = 0; i < count; i++) {
+        const ContactRow *c = &s->row[i];
+        write_law(c, s->motion[i], b ? none : s->motion[i], reuse, &s->law[i]);
         symmetric &= s->law[i].state != SLIP || c->friction == 0;
-        contact_row_push(c, vec3_sub(s->law[i].force, c->force), s->rhs);
+        contact_row_push(c, b ? s->law[i].force : vec3_sub(s->law[i].force, c->force), s->rhs);
     }
     if (reuse) {
-        if (s->symmetric)
-            block_factor_solve(s->factor, s->rhs, s->delta);
-        else
-            block_lu_solve(s->lu, s->rhs, s->delta);
+        block_factor_solve(s->factor, s->rhs, s->delta);
     } else {
-        contact_assemble(s, chain, count);
+        assemble(s, chain, count);
         s->symmetric = symmetric;
         if (symmetric ? !block_chain_factor_solve(&s->matrix, s->factor, s->rhs, s->delta)
                       : !block_lu_factor_solve(s->lu, s->matrix.diag, s->turned, s->matrix.lower, s->rhs, s->delta))
             return false;
     }
+    for (int i = 0; i < count; i++) {
+        ContactLaw *law = &s->law[i];
+        law->step = contact_row_motion(&s->row[i], s->delta);
+        law->force = law->state == OPEN ? (Vec3){0, 0, 0} : vec3_sub(law->force, mat3_mul_vec(&law->c, law->step));
+    }
+    return true;
+}
+
+// Part t of it. False where the result is not finite.
+static bool take_step(ContactSolver *s, int unknowns, int count, double t, double *u)
+{
     double sum = 0;
-    for (size_t k = 0; k < (size_t)chain->count * 6; k++) {
-        u[k] += s->delta[k];
+    for (int k = 0; k < unknowns; k++) {
+        u[k] += t * s->delta[k];
         sum += fabs(u[k]);
     }
     for (int i = 0; i < count; i++) {
-        Vec3 d = contact_row_motion(&s->row[i], s->delta);
-        s->motion[i] = vec3_add(s->motion[i], d);
-        s->row[i].force = s->law[i].state == OPEN ? (Vec3){0, 0, 0} : vec3_sub(s->law[i].force, mat3_mul_vec(&s->law[i].c, d));
-        sum += fabs(s->row[i].force.x) + fabs(s->row[i].force.y) + fabs(s->row[i].force.z);
+        Vec3 *f = &s->row[i].force;
+        s->motion[i] = vec3_add_scaled(s->motion[i], t, s->law[i].step);
+        *f = t == 1 ? s->law[i].force : vec3_mix(*f, s->law[i].force, t);
+        sum += fabs(f->x) + fabs(f->y) + fabs(f->z);
     }
     return sum <= DBL_MAX;
 }
 
-static void keep_forces(ContactSolver *s, int count)
+// Keeps an iterate, or goes back to the one that was kept.
+static void copy_iterate(ContactSolver *s, int unknowns, int count, bool keep, double *u)
 {
+    memcpy(keep ? s->best_u : u, keep ? u : s->best_u, (size_t)unknowns * sizeof *u);
     for (int i = 0; i < count; i++)
-        s->best[i] = s->row[i].force;
+        *(keep ? &s->best[i] : &s->row[i].force) = keep ? s->row[i].force : s->best[i];
 }
 
-// Back to kept forces, with the states that they show.
-static void restart(ContactSolver *s, const BlockFactor *factor, const double *b, int count, double *u)
+// Cuts the forces to their cones.
+static void cut(ContactSolver *s, int count, ContactReport *report)
 {
+    report->active = 0;
+    report->cone_violation = 0;
     for (int i = 0; i < count; i++) {
         ContactRow *c = &s->row[i];
-        c->force = contact_project(s->best[i], c->normal, c->friction);
-        s->law[i].state = vec3_dot(c->force, c->normal) > 0 ? SLIP : OPEN;
-    }
-    contact_balance(s, factor, b, count, u);
-}
-
-// Newton iterations until the residual of forces cut to their cones is below the tolerance; at most `parallel` + `single`.
-static bool iterate(ContactSolver *s, const BlockChain *chain, const BlockFactor *factor, const double *b, int count, int parallel, int single,
-                    double tolerance, ContactReport *report, double *u)
-{
-    double best = DBL_MAX;
-    bool fresh = true; // no factor yet
-    for (int it = 0; it < parallel + single; it++) {
-        int changes = choose_states(s, count, it >= parallel, it == 0);
-        bool reuse = !fresh && !changes && report->residual < 1e-3 && s->symmetric;
-        double before = report->residual;
-        report->iterations++;
-        if (!newton_iteration(s, chain, count, reuse, u))
-            return false;
-        double residual = contact_residual(s->row, count, s->motion, report);
-        fresh = reuse && residual > 0.05 * before; // the old factor does not serve any more
-        if (residual < best) {
-            best = residual;
-            keep_forces(s, count);
-        }
-        if (residual > tolerance)
+        c->force = contact_project(c->force, c->normal, c->friction);
+        double fn = vec3_dot(c->force, c->normal);
+        if (!(fn > 0))
             continue;
-        for (int i = 0; i < count; i++)
-            s->row[i].force = contact_project(s->row[i].force, s->row[i].normal, s->row[i].friction);
-        contact_balance(s, factor, b, count, u);
-        if (contact_residual(s->row, count, s->motion, report) <= tolerance)
-            return true;
+        report->active++;
+        report->cone_violation = fmax(report->cone_violation, vec3_norm(contact_tangential(c->force, c->normal)) / fn - c->friction);
     }
-    return false;
 }
 
 ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
                              const ContactOptions *options, double *u)
 {
     ContactReport report = {0};
-    keep_forces(s, count);
-    restart(s, factor, b, count, u);
+    int unknowns = 6 * chain->count, most = options->max_iterations / CONTACT_SWEEPS_PER_FACTOR;
+    for (int i = 0; i < count; i++)
+        s->law[i].state = vec3_dot(s->row[i].force, s->row[i].normal) > 0 ? SLIP : OPEN;
+    contact_balance(s, factor, b, count, u);
     contact_residual(s->row, count, s->motion, &report);
-    report.converged = report.residual <= options->tolerance;
-    if (report.converged)
-        return report;
-    contact_assemble_reset(s, chain, count);
-    while (report.iterations < options->max_iterations) {
-        int left = options->max_iterations - report.iterations, parallel = left < PARALLEL_ITERATIONS ? left : PARALLEL_ITERATIONS;
-        int single = left - parallel < SINGLE_ITERATIONS ? left - parallel : SINGLE_ITERATIONS;
-        report.converged = iterate(s, chain, factor, b, count, parallel, single, options->tolerance, &report, u);
-        if (report.converged)
-            return report;
-        restart(s, factor, b, count, u);
-        left = options->max_iterations - report.iterations;
-        report.converged = contact_convex(s, chain, factor, b, count, options->tolerance, left < CONVEX_ITERATIONS ? left : CONVEX_ITERATIONS,
-                                          &report, u);
-        if (report.converged)
-            return report;
-        keep_forces(s, count);
-        restart(s, factor, b, count, u);
+    double least = HUGE_VAL, residual = report.residual; // of the best iterate, its error in N and its residual
+    bool fresh = true, finite = true; // no factor yet
+    while (report.residual > options->tolerance && report.iterations < most) {
+        if (report.residual * report.largest < least) {
+            least = report.residual * report.largest;
+            residual = report.residual;
+            copy_iterate(s, unknowns, count, true, u);
+        }
+        bool first = report.iterations == 0, search = report.iterations >= FIRST_SEARCH;
+        if (first)
+            assemble_reset(s, chain, count);
+        bool reuse = choose_states(s, count, first) == 0 && !fresh && report.residual < 1e-3 && s->symmetric;
+        if (!newton_step(s, chain, count, reuse, search ? NULL : b))
+            break;
+        if (!search) {
+            memset(u, 0, (size_t)unknowns * sizeof *u);
+            memset(s->motion, 0, (size_t)count * sizeof *s->motion);
+        }
+        double t = search ? step_length(s, count) : 1, before = report.residual;
+        report.iterations++;
+        finite = take_step(s, unknowns, count, t, u);
+        if (!finite)
+            break;
+        contact_residual(s->row, count, s->motion, &report);
+        fresh = reuse && report.residual > 0.05 * before; // the old factor does not serve any more
     }
-    contact_feasible(s, chain, factor, b, count, options->tolerance, FEASIBLE_ITERATIONS, &report, u);
-    report.converged = report.residual <= options->tolerance;
+    report.converged = finite && report.residual <= options->tolerance;
+    if (!report.converged && report.iterations > 0 && !(finite && report.residual * report.largest < least)) {
+        copy_iterate(s, unknowns, count, false, u);
+        report.residual = residual;
+    }
+    cut(s, count, &report);
     return report;
 }

@@ -76,4 +76,14 @@ static inline Vec3 contact_project(Vec3 f, Vec3 normal, double friction)
     return vec3_add_scaled(vec3_scale(t, size > bound ? bound / size : 1), fn, normal);
 }
 
+// What is wrong with force f and motion d, in N: f less the nearest force in the cone to f - slope k violation, each direction by itself.
+static inline Vec3 contact_error(const ContactRow *c, Vec3 f, Vec3 d, double slope)
+{
+    Vec3 n = c->normal;
+    double fn = vec3_dot(f, n), normal = fn - fmax(0, fn - slope * c->stiffness_n * (c->gap + vec3_dot(d, n)));
+    Vec3 ft = contact_tangential(f, n), wish = vec3_add_scaled(ft, -slope * c->stiffness_t, contact_tangential(d, n));
+    double bound = c->friction * fmax(0, fn), size = vec3_norm(wish);
+    return vec3_add_scaled(vec3_sub(ft, vec3_scale(wish, size > bound ? bound / size : 1)), normal, n);
+}
+
 #endif

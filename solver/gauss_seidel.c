@@ -70,34 +70,21 @@ double contact_residual(const ContactRow *row, int count, const Vec3 *motion, Co
     int active = 0;
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &row[i];
-        double fn = vec3_dot(c->force, c->normal), want = fn - c->stiffness_n * (c->gap + vec3_dot(motion[i], c->normal));
-        double error = fn - fmax(0, want);
-        Vec3 ft = contact_tangential(c->force, c->normal), slide = contact_tangential(motion[i], c->normal);
-        Vec3 wish = vec3_add_scaled(ft, -c->stiffness_t, slide);
-        double bound = c->friction * fmax(0, fn), size = vec3_norm(wish);
-        Vec3 te = vec3_sub(ft, vec3_scale(wish, size > bound ? bound / size : 1));
-        worst = fmax(worst, fmax(fabs(error), vec3_norm(te)));
+        if (c->inert)
+            continue;
+        double fn = vec3_dot(c->force, c->normal);
+        Vec3 error = contact_error(c, c->force, motion[i], 1);
+        worst = fmax(worst, vec3_norm(error));
         top = fmax(top, vec3_norm(c->force));
         if (fn > 0) {
             active++;
-            cone = fmax(cone, (vec3_norm(ft) - bound) / fn);
+            cone = fmax(cone, vec3_norm(contact_tangential(c->force, c->normal)) / fn - c->friction);
         }
     }
     report->active = active;
+    report->largest = top;
     report->cone_violation = cone;
     return report->residual = worst / top;
-}
-
-double contact_normal_residual(const ContactRow *row, int count, const Vec3 *motion)
-{
-    double worst = 0, top = 1e-3;
-    for (int i = 0; i < count; i++) {
-        const ContactRow *c = &row[i];
-        double fn = vec3_dot(c->force, c->normal), want = fn - c->stiffness_n * (c->gap + vec3_dot(motion[i], c->normal));
-        worst = fmax(worst, fabs(fn - fmax(0, want)));
-        top = fmax(top, vec3_norm(c->force));
-    }
-    return worst / top;
 }
 
 void contact_balance(ContactSolver *s, const BlockFactor *factor, const double *b, int count, double *u)
@@ -124,6 +111,7 @@ ContactSolver *contact_solver_create(int node_count, int contact_capacity)
     s->motion = calloc(k, sizeof *s->motion);
     s->law = calloc(k, sizeof *s->law);
     s->best = calloc(k, sizeof *s->best);
+    s->best_u = calloc(6 * m, sizeof *s->best_u);
     s->flag = calloc(k, sizeof *s->flag);
     s->rhs = calloc(6 * m, sizeof *s->rhs);
     s->delta = calloc(6 * m, sizeof *s->delta);
@@ -132,7 +120,7 @@ ContactSolver *contact_solver_create(int node_count, int contact_capacity)
     s->factor = block_factor_create(node_count);
     s->pointwise = pointwise_work_create(node_count, contact_capacity);
     bool ok = block_chain_create(&s->matrix, node_count) && s->pointwise;
-    if (!s->row || !s->motion || !s->law || !s->best || !s->flag || !s->rhs || !s->delta || !s->turned || !s->lu || !s->factor || !ok) {
+    if (!s->row || !s->motion || !s->law || !s->best || !s->best_u || !s->flag || !s->rhs || !s->delta || !s->turned || !s->lu || !s->factor || !ok) {
         contact_solver_destroy(s);
         return NULL;
     }
@@ -147,6 +135,7 @@ void contact_solver_destroy(ContactSolver *s)
     free(s->motion);
     free(s->law);
     free(s->best);
+    free(s->best_u);
     free(s->flag);
     free(s->rhs);
     free(s->delta);

@@ -2,8 +2,8 @@
 //
 // Two forms behind one call (DESIGN section 4, items 5 and 6); both reach the same solution.
 //   pointwise: Gauss-Seidel over contacts (the paper's, and the reference), on the chain's semi-separable structure: W is never formed.
-//   block:     both fields together by a semismooth Newton method, an iteration being one chain factorisation (contact_newton.c); where that
-//              finds no end, Gauss-Seidel between normal and friction field on a convex problem with exact line search (contact_convex.c).
+//   block:     both fields together by a semismooth Newton method with a line search, an iteration being one chain factorisation
+//              (contact_newton.c).
 // Warm start: ContactPoint.force of the same material point from the step before, as it is; zero for a new point. What presses in it is taken
 // as active, so stale forces on points that have left the wall cost iterations: drop them with the candidate. Nothing else is remembered.
 #ifndef SELDINGER_SOLVER_GAUSS_SEIDEL_H
@@ -18,15 +18,17 @@ typedef enum { CONTACT_BLOCK = 0, CONTACT_POINTWISE = 1 } ContactForm;
 
 typedef struct ContactOptions {
     ContactForm form;        // default CONTACT_BLOCK
-    int max_iterations;      // sweeps (pointwise) or factorisations (block); default 200. Where block gets that far without converging it may add
-                             // up to 200 more to hand out forces in their cones under which nothing overlaps, with less friction than Coulomb's
+    int max_iterations;      // sweeps, default 200; a factorisation of the block form counts as eight of them, so that a step's cost is bounded
     double tolerance;        // on the residual below, default 1e-6
 } ContactOptions;
 
 typedef struct ContactReport {
     int iterations;          // sweeps or factorisations used
     bool converged;
-    double residual;         // natural residual: largest over contacts of |force - project_K(force - r * violation)| over the largest force (at least 1e-3 N)
+    double residual;         // natural residual: largest over contacts of |force - project_K(force - r * violation)| over the largest force (at
+                             // least 1e-3 N). Forces have been cut to their cones by no more than this; also in a solve that stopped
+                             // early no contact overlaps by more than residual * largest force / stiffness of its node
+    double largest;          // [N] that largest force
     double cone_violation;   // largest (|force_t| - mu force_n)+ over force_n
     int active;              // contacts with force
 } ContactReport;
