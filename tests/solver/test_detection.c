@@ -1,0 +1,236 @@
+// Which points of the wire ask the wall, and which need not: points between nodes, sleepers, far points, and how smoothly contacts take over.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "solver/step_internal.h"
+#include "tube_scene.h"
+
+static Vec3 some(double *seed)
+{
+    double v[3];
+    for (int k = 0; k < 3; k++)
+        v[k] = 2 * (*seed = fmod(*seed * 9301 + 0.49297, 1)) - 1;
+    return vec3(v[0], v[1], v[2]);
+}
+
+static Vec3 turned(Vec3 v, Vec3 by) { return quat_rotate(quat_from_rotation_vector(by), v); }
+
+// Weights and levers are the derivative of the cubic itself, by central differences; the cubic passes its nodes with their tangents.
+static void levers_follow_the_cubic(void **state)
+{
+    (void)state;
+    double seed = 0.37, worst = 0, h = 1e-6;
+    for (int trial = 0; trial < 200; trial++) {
+        double length = 0.7 + 9 * fabs(some(&seed).x), radius = 0.18;
+        int count = slot_count_of(length), k = (int)(0.999 * count * fabs(some(&seed).x));
+        Slot slot = slot_make(0, length, k, count, radius, -1);
+        Vec3 x1 = some(&seed), x2 = vec3_add(x1, vec3_scale(some(&seed), length)), t1 = vec3_unit(some(&seed)), t2 = vec3_unit(some(&seed));
+        Vec3 u1 = some(&seed), u2 = some(&seed), r1 = some(&seed), r2 = some(&seed);
+        bool mouth = trial % 2 == 1 && slot.xi > 0.2;
+        double behind = -0.3 * slot.xi * length;
+        SlotPlace at, sides[2];
+        for (int side = 0; side < 3; side++) {
+            double e = side == 2 ? 0 : side == 1 ? h : -h;
+            SlotPlace *p = side == 2 ? &at : &sides[side];
+            Vec3 y2 = vec3_add_scaled(x2, e, u2), s2 = turned(t2, vec3_scale(r2, e));
+            if (mouth)
+                assert_true(slot_place_at_mouth(&slot, length, behind, x1, t1, y2, s2, p));
+            else
+                *p = slot_place(&slot, length, vec3_add_scaled(x1, e, u1), turned(t1, vec3_scale(r1, e)), y2, s2);
+        }
+        Vec3 slope = vec3_scale(vec3_sub(sides[1].position, sides[0].position), 1 / (2 * h));
+        Vec3 mine = vec3_add(vec3_scale(u2, at.weight), vec3_cross(r2, at.lever[1]));
+        if (!mouth)
+            mine = vec3_add(mine, vec3_add(vec3_scale(u1, 1 - at.weight), vec3_cross(r1, at.lever[0])));
+        worst = fmax(worst, vec3_distance(slope, mine));
+    }
+    print_message("levers against differences of the cubic: %.1e\n", worst);
+    assert_true(worst < 1e-8);
+    Slot end = slot_make(0, 3, 0, 1, 0.18, -1);
+    end.xi = 1, end.weight = 1, end.near = end.far = 0;
+    SlotPlace p = slot_place(&end, 3, vec3(0, 0, 0), vec3(1, 0, 0), vec3(2, 1, 0), vec3(0, 1, 0));
+    assert_true(vec3_distance(p.position, vec3(2, 1, 0)) < 1e-15 && vec3_distance(p.tangent, vec3(0, 1, 0)) < 1e-15);
+    assert_int_equal(slot_count_of(0.5), 0);
+    assert_int_equal(slot_count_of(0.6), 0);
+    assert_int_equal(slot_count_of(1), 1);
+    assert_int_equal(slot_count_of(100), 15);
+}
+
+// [mm] by which the cubic through the nodes, sampled a hundred times an element, is outside the tube at worst; the wire's mouth element counts
+// from the mouth.
+static double deepest_of_curve(const Stepper *s, const Vessel *tube, double radius)
+{
+    const WireState *w = stepper_state(s);
+    double deepest = -HUGE_VAL;
+    VesselMemory memory = {.node = -1};
+    for (int i = s->first_free > 0 ? s->first_free - 1 : 0; i + 1 < w->node_count; i++) {
+        Vec3 x1 = w->position[i], x2 = w->position[i + 1], t1 = quat_rotate(w->orientation[i], vec3(1, 0, 0)),
+             t2 = quat_rotate(w->orientation[i + 1], vec3(1, 0, 0));
+        double length = s->wire.length[i];
+        if (i + 1 == s->first_free) {
+            length += stepper_sheath_coordinate(s, i);
+            x1 = s->mouth, t1 = s->axis[0];
+        }
+        for (int k = 1; k <= 100; k++) {
+            double x = k / 100.0, y = 1 - x;
+            Vec3 p = vec3_add(vec3_add_scaled(vec3_scale(x1, y * y * (1 + 2 * x)), x * x * (3 - 2 * x), x2),
+                              vec3_scale(vec3_add_scaled(vec3_scale(t1, x * y * y), -x * x * y, t2), length));
+            VesselHit hit;
+            vessel_query(tube, 1, &p, HUGE_VAL, &memory, &hit);
+            if (!(hit.flags & VESSEL_OPEN_END))
+                deepest = fmax(deepest, radius - hit.gap);
+        }
+    }
+    return deepest;
+}
+
+// Elements from short to far longer than the bend's room: at no time in a quasi-static push is any point of the wire outside by more than 0.05 mm,
+// and the push converges.
+static void coarse_elements_stay_inside(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        double bend, radius, lead;
+        int arcs;
+    } course[] = {{"bend 15", 15, 0.68, 12, 1}, {"S 15", 15, 0.68, 12, 2}, {"bend 8", 8, 0.9, 12, 1}, {"S 6", 6, 1.25, 12, 2}};
+    static const double size[] = {10, 5, 2, 1, 0.5};
+    for (int c = 0; c < 4; c++) {
+        TubePiece piece[4] = {line_piece(course[c].lead), arc_piece(course[c].bend, 90, 0), arc_piece(course[c].bend, 90, 180), line_piece(60)};
+        if (course[c].arcs == 1)
+            piece[2] = piece[3];
+        Vessel *tube = tube_of(piece, 2 + course[c].arcs, course[c].radius);
+        double push[5];
+        for (int k = 0; k < 5; k++) {
+            Bench b;
+            double length = 60, in = course[c].lead + 1.2 * course[c].arcs * course[c].bend * PI / 2, deepest = 0, sum = 0, reported = 0;
+            bench_in_tube(&b, tube, 0, length, (int)(length / size[k]), 2, QUASI_STATIC);
+            Stepper *s = bench_make(&b);
+            int steps = (int)((in - 2) / 0.05), count = 0;
+            for (int i = 0; i < steps; i++) {
+                const StepReport *r = step_once(s, 0.05, 0);
+                reported = fmax(reported, r->penetration);
+                if (i % 4 == 0)
+                    deepest = fmax(deepest, deepest_of_curve(s, tube, 0.18));
+                if (i >= steps * 3 / 4)
+                    sum += r->proximal_force, count++;
+            }
+            push[k] = sum / count;
+            print_message("%-8s elements of %4.1f mm: curve %+.4f mm outside at worst (points: %.4f), mean push %.5f N\n", course[c].name, size[k],
+                          deepest, reported, push[k]);
+            stepper_destroy(s);
+            assert_true(deepest < 0.02 && reported < 0.02);
+        }
+        static const double allowed[4] = {0.02, 5e-3, 3e-3, 3e-3};
+        for (int k = 0; k < 4; k++)
+            assert_true(fabs(push[k] / push[4] - 1) < allowed[k]);
+        tube->destroy(tube);
+    }
+}
+
+// --- sleepers ---
+
+typedef struct CountingVessel {
+    Vessel vessel;
+    const Vessel *real;
+    long *asked;
+} CountingVessel;
+
+static void count_query(const Vessel *v, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
+{
+    const CountingVessel *c = (const CountingVessel *)v;
+    *c->asked += count;
+    vessel_query(c->real, count, point, reach, memory, hit);
+}
+
+static int count_locate(const Vessel *v, Vec3 point, int from)
+{
+    const CountingVessel *c = (const CountingVessel *)v;
+    return c->real->locate(c->real, point, from);
+}
+
+typedef struct Run {
+    const char *name;
+    double radius, advance, twist;       // [mm], [mm] and [rad] a step
+    double size;                         // [mm] of an element
+    int in, out;                         // steps
+    double share;                        // of all questions that may be left: at 200 mm/s nobody sleeps for long, and who wakes in mid-step asks twice
+} Run;
+
+// A J tip in a wide tube with bends. The same twice: once with sleepers, once asking for every point in every step; now and then the first is
+// restored from a checkpoint into a stepper of its own.
+static void sleepers_miss_nothing(void **state)
+{
+    (void)state;
+    static const Run run[] = {
+        {"slow, turning", 4, 0.02, 0.006, 1, 1500, 200, 0.4}, {"200 mm/s in and out", 3, 0.2, 0, 1, 300, 280, 1.2}, {"two turns a second", 2.5, 0.05, 0.0126, 0.5, 700, 0, 0.6},
+        {"long elements", 3, 0.1, 0.01, 5, 600, 500, 0.9},
+    };
+    for (int k = 0; k < 4; k++) {
+        TubePiece piece[4] = {line_piece(10), arc_piece(12, 120, 0), arc_piece(10, 90, 130), line_piece(60)};
+        Vessel *tube = tube_of(piece, 4, run[k].radius);
+        long asked[2] = {0, 0};
+        CountingVessel count[2] = {{*tube, tube, &asked[0]}, {*tube, tube, &asked[1]}};
+        Stepper *s[2];
+        Bench b[2];
+        for (int j = 0; j < 2; j++) {
+            count[j].vessel.query = count_query, count[j].vessel.locate = count_locate;
+            bench_in_tube(&b[j], &count[j].vessel, 0.1, 80, (int)(80 / run[k].size), 5, 1);
+            b[j].section[0].length = 70;
+            b[j].section[1] = standard_section(10), b[j].section[1].rest_curvature = 0.2, b[j].section[1].young_modulus = 20e3;
+            b[j].options.wire.section_count = 2;
+            b[j].options.wire.damping_stiffness = 0.2, b[j].options.wire.damping_mass = 1e-4;
+            s[j] = bench_make(&b[j]);
+        }
+        double apart = 0, force_apart = 0, force_most = 0, deepest = 0;
+        Checkpoint *kept = NULL;
+        for (int i = 0; i < run[k].in + run[k].out; i++) {
+            double advance = i < run[k].in ? run[k].advance : -run[k].advance;
+            if (i % 97 == 50) {
+                kept = stepper_save(s[0], kept);
+                stepper_destroy(s[0]);
+                s[0] = bench_make(&b[0]);
+                stepper_restore(s[0], kept);
+            }
+            memset(s[1]->clearance, 0, (size_t)s[1]->point_count * sizeof *s[1]->clearance);
+            for (int j = 0; j < 2; j++)
+                step_once(s[j], advance, run[k].twist);
+            // from the same state, so that what a step does is compared and not how small differences grow
+            for (int n = 0; n < s[0]->state.node_count; n++)
+                apart = fmax(apart, vec3_distance(s[0]->state.position[n], s[1]->state.position[n]));
+            for (int p = 0; p < s[0]->point_count; p++) {
+                force_apart = fmax(force_apart, vec3_distance(s[0]->force[p], s[1]->force[p]));
+                force_most = fmax(force_most, vec3_norm(s[0]->force[p]));
+            }
+            deepest = fmax(deepest, step_report(s[1])->penetration);
+            memcpy(s[1]->memory, s[0]->memory, s[0]->memory_count * sizeof *s[0]->memory);
+            s[1]->state.inserted = s[0]->state.inserted;
+            s[1]->state.twist = s[0]->state.twist;
+        }
+        print_message("%-20s motion of a step differs by %.1e mm, forces by %.1e of %.2g N; deepest %.4f mm; %ld points asked, without sleep %ld\n",
+                      run[k].name, apart, force_apart, force_most, deepest, asked[0], asked[1]);
+        assert_true(apart < 1e-6 && force_apart < 1e-4 * force_most && deepest < 0.1);
+        assert_true((double)asked[0] < run[k].share * (double)asked[1]);
+        checkpoint_free(kept);
+        for (int j = 0; j < 2; j++)
+            stepper_destroy(s[j]);
+        tube->destroy(tube);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(levers_follow_the_cubic),
+        cmocka_unit_test(coarse_elements_stay_inside),
+        cmocka_unit_test(sleepers_miss_nothing),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
