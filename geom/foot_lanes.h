@@ -22,10 +22,8 @@
 
 enum { FOOT_BATCH = 32, FOOT_BLOCK = 8 };   // lanes a batch, and lanes that are computed together
 // A partner is looked at twice where its wall is further from the own than this part of the radius, or its normal differs by more than this, squared.
-#ifndef FOOT_LOOK_WALL
 #define FOOT_LOOK_WALL 0.05
 #define FOOT_LOOK_TURN 0.02
-#endif
 
 // State of a lane, as a double so that it lives in the same vectors.
 #define FOOT_PENDING 0.0
@@ -67,7 +65,7 @@ typedef struct FootPartner {
     FootSample at;                   // at the own feet, or moved from there
     FootLane weight;                 // 0: none
     FootLane gap, nx, ny, nz;        // at X
-    FootLane move;                   // 1 where a second look from a better place is due …
+    FootLane move;                   // > 0 where a second look from a better place is due, and how much that counts …
     FootLane tox, toy, toz;          // … from here
 } FootPartner;
 
@@ -179,8 +177,8 @@ static inline __attribute__((always_inline)) void foot_estimate(FootBatch *restr
     }
 }
 
-// A partner's answers in a block, from its samples at `s->at`.
-static inline __attribute__((always_inline)) void foot_partner(const FootBatch *restrict b, FootPartner *restrict s, int block)
+// A partner's answers in a block, from its samples at `s->at`; those of a `second` look replace the first ones as far as `move` says.
+static inline __attribute__((always_inline)) void foot_partner(const FootBatch *restrict b, FootPartner *restrict s, int block, const bool second)
 {
     for (int i = block; i < block + FOOT_BLOCK; i++) {
         double gx = s->at.gx[i], gy = s->at.gy[i], gz = s->at.gz[i], slope2 = gx * gx + gy * gy + gz * gz;
@@ -193,13 +191,20 @@ static inline __attribute__((always_inline)) void foot_partner(const FootBatch *
         dx -= along * ux, dy -= along * uy, dz -= along * uz;
         double cx = b->axx[i] * dx + b->axy[i] * dy + b->axz[i] * dz, cy = b->axy[i] * dx + b->ayy[i] * dy + b->ayz[i] * dz,
                cz = b->axz[i] * dx + b->ayz[i] * dy + b->azz[i] * dz;
-        s->gap[i] = away + along + 0.5 * (dx * cx + dy * cy + dz * cz);
-        double nx = ux + cx, ny = uy + cy, nz = uz + cz, ax = nx - b->nx[i], ay = ny - b->ny[i], az = nz - b->nz[i];
-        s->nx[i] = nx, s->ny[i] = ny, s->nz[i] = nz;
-        // X's foot there, as well as can be said from here
-        s->tox[i] = b->xx[i] - s->gap[i] * nx, s->toy[i] = b->xy[i] - s->gap[i] * ny, s->toz[i] = b->xz[i] - s->gap[i] * nz;
-        double reach = FOOT_LOOK_WALL * b->radius[i];
-        s->move[i] = slope2 > 1e-200 && (fabs(away) > reach || ax * ax + ay * ay + az * az > FOOT_LOOK_TURN) ? 1.0 : 0.0;
+        double gap = away + along + 0.5 * (dx * cx + dy * cy + dz * cz), nx = ux + cx, ny = uy + cy, nz = uz + cz;
+        if (second) {
+            double part = s->move[i];
+            s->gap[i] += part * (gap - s->gap[i]);
+            s->nx[i] += part * (nx - s->nx[i]), s->ny[i] += part * (ny - s->ny[i]), s->nz[i] += part * (nz - s->nz[i]);
+        } else {
+            double ax = nx - b->nx[i], ay = ny - b->ny[i], az = nz - b->nz[i], turn = (ax * ax + ay * ay + az * az) / FOOT_LOOK_TURN;
+            double far = away * b->bend[i] / FOOT_LOOK_WALL, most = far * far > turn ? far * far : turn, part = most - 1;
+            part = part > 0 ? part : 0.0, part = part < 1 ? part : 1.0;
+            s->gap[i] = gap, s->nx[i] = nx, s->ny[i] = ny, s->nz[i] = nz;
+            // X's foot there, as well as can be said from here
+            s->tox[i] = b->xx[i] - gap * nx, s->toy[i] = b->xy[i] - gap * ny, s->toz[i] = b->xz[i] - gap * nz;
+            s->move[i] = slope2 > 1e-200 ? part * part * (3 - 2 * part) : 0.0;
+        }
         s->weight[i] = slope2 > 1e-200 ? s->weight[i] : 0.0;
     }
 }
@@ -239,7 +244,7 @@ typedef struct LaneKernels {
     void (*newton)(FootBatch *batch, int count, bool careful);
     void (*finish)(FootBatch *batch, int count);
     void (*estimate)(FootBatch *batch, const FootSample *at_x, int count, double iso_level);
-    void (*partner)(const FootBatch *batch, FootPartner *partner, int count);
+    void (*partner)(const FootBatch *batch, FootPartner *partner, int count, bool second);
     void (*mix)(const FootBatch *batch, const FootPartner *partner, FootMixture *mixture, int count);
     // Bits of a group's nodes in whose mixed zone y lies (see NearGroup), their weights, and bits added to `better` where y lies in the node's own cell.
     unsigned (*near)(const NearGroup *group, const float y[3], float weight[NEAR_GROUP], unsigned *better);

@@ -425,7 +425,7 @@ static void ask_partners(const LimVessel *lim, const FootBatch *b, FootPartner *
 {
     int again = 0;
     sample(lim, &partner->at, lane, n, false);
-    lim->kernels->partner(b, partner, count);
+    lim->kernels->partner(b, partner, count, false);
     for (int k = 0; k < n; k++) {
         int i = lane[k];
         if (partner->move[i] == 0)
@@ -436,7 +436,7 @@ static void ask_partners(const LimVessel *lim, const FootBatch *b, FootPartner *
     if (again == 0)
         return;
     sample(lim, &partner->at, lane, again, false);
-    lim->kernels->partner(b, partner, count);
+    lim->kernels->partner(b, partner, count, true);
 }
 
 // Mixes the partners' walls into the hits of a batch, partner by partner.
