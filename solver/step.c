@@ -8,6 +8,7 @@
 // Never through the wall, and never energy from nowhere: every place that a step stops at is good, because the motion to it is halved until it is
 // (follow). The whole wire is held back together, what the hand feeds included. What is not done after the last iteration is flagged
 // STEP_LIMITED and left to the next steps; so is an advance into a tool that is squeezed by more than SQUEEZE_MAX: the hand stalls.
+#include "solver/node_turn.h"
 #include "solver/step_internal.h"
 
 #include <stdio.h>
@@ -448,26 +449,6 @@ static void solve_contained(Stepper *s)
     s->turn = s->has_failed ? 0 : largest_turn(s);
 }
 
-// A product of unit quaternions, unit again: one Newton step instead of a root, where rounding is all that is wrong.
-static inline Quat unit_again(Quat q)
-{
-    double n = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z, scale = 1.5 - 0.5 * n;
-    if (!(fabs(n - 1) < 1e-7))
-        return quat_unit(q);
-    return (Quat){q.w * scale, q.x * scale, q.y * scale, q.z * scale};
-}
-
-// exp of half the rotation vector; series where the angle is small, which is always in a good step.
-static inline Quat small_rotation(Vec3 w)
-{
-    double a = vec3_norm2(w);
-    if (a > 0.01)
-        return quat_from_rotation_vector(w);
-    double q = 0.25 * a, sine = 0.5 + q * (-1.0 / 12 + q * (1.0 / 240 + q * (-1.0 / 10080)));
-    double cosine = 1 + q * (-1.0 / 2 + q * (1.0 / 24 + q * (-1.0 / 720 + q * (1.0 / 40320))));
-    return (Quat){cosine, sine * w.x, sine * w.y, sine * w.z};
-}
-
 // A wire that nothing holds: its mass centre goes where the linear solution, which keeps momentum, takes it.
 static void keep_mass_centre(Stepper *s, double part)
 {
@@ -521,33 +502,38 @@ static void displace(Stepper *s, double part)
 static void move(Stepper *s, double part)
 {
     WireState *w = &s->state;
+    int nodes = w->node_count, held = s->first_free;
+    double *rx = s->product, *ry = rx + nodes, *rz = ry + nodes;     // how far a node turns, an assembly's scratch
     if (s->turn > SWING_MOTION && s->can_swing)
         swing(s, part);
     else
         displace(s, part);
-    for (int i = 0; i < w->node_count; i++) {
-        double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
-        if (i >= s->first_free) {
-            Vec3 rotation = vec3_scale(vec3(u[3] - k[3], u[4] - k[4], u[5] - k[5]), part);
-            w->orientation[i] = unit_again(quat_mul(small_rotation(rotation), w->orientation[i]));
-            Vec3 d = vec3_sub(w->position[i], s->start_position[i]);
-            k[0] = d.x, k[1] = d.y, k[2] = d.z;
-            k[3] += rotation.x, k[4] += rotation.y, k[5] += rotation.z;
-            continue;
-        }
+    for (int i = 0; i < held; i++) {
         // on the line exactly, whatever rounding does
-        double turn = part * (u[3] - k[3]);
+        const double *u = s->u + 6 * (size_t)i;
+        double *k = s->linearised + 6 * (size_t)i, turn = part * (u[3] - k[3]);
         k[0] = part < 1 ? k[0] + part * (u[0] - k[0]) : u[0];
         k[3] += turn;
         double along = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]) + k[0];
         w->position[i] = vec3_add_scaled(s->mouth, along, s->axis[0]);
-        w->orientation[i] = unit_again(quat_mul(small_rotation(vec3_scale(s->axis[0], turn)), w->orientation[i]));
+        rx[i] = turn * s->axis[0].x, ry[i] = turn * s->axis[0].y, rz[i] = turn * s->axis[0].z;
     }
+    for (int i = held; i < nodes; i++) {
+        const double *u = s->u + 6 * (size_t)i;
+        double *k = s->linearised + 6 * (size_t)i;
+        k[0] = w->position[i].x - s->start_position[i].x;
+        k[1] = w->position[i].y - s->start_position[i].y;
+        k[2] = w->position[i].z - s->start_position[i].z;
+        Vec3 turn = vec3_scale(vec3(u[3] - k[3], u[4] - k[4], u[5] - k[5]), part);
+        double angle2 = vec3_norm2(turn);
+        if (angle2 > NODE_TURN_MAX * NODE_TURN_MAX)
+            turn = vec3_scale(turn, NODE_TURN_MAX / sqrt(angle2));
+        k[3] += turn.x, k[4] += turn.y, k[5] += turn.z;
+        rx[i] = turn.x, ry[i] = turn.y, rz[i] = turn.z;
+    }
+    node_turn(nodes, rx, ry, rz, w->orientation);
 }
 
-// --- how far a solution is followed ---
-
-// [mJ] of elastic energy that the step may leave at most: what there was, the motion's, and what hand, wall and loads have done.
 static double energy_bound(const Stepper *s)
 {
     const Wire *w = &s->wire;
