@@ -10,6 +10,7 @@
 // Pivots stay scalar: multiplying with explicit inverses of 6x6 blocks is faster by a third but loses the square root of the condition.
 #include "solver/block_chain.h"
 
+#include "geom/simd.h"
 #include "solver/block_lanes.h"
 
 #include <float.h>
@@ -153,33 +154,17 @@ INLINE bool pivots_hold(const BlockFactor *f)
 #define ON(name) {name##_baseline, name##_baseline, name##_baseline}
 #endif
 
-static bool (*const eliminate_on[3])(const BlockChain *, BlockFactor *, const double *) = ON(eliminate);
-static void (*const back_substitute_on[3])(const BlockFactor *, double *, const double *, int, int) = ON(back_substitute);
-static void (*const forward_substitute_on[3])(const BlockFactor *, double *) = ON(forward_substitute);
+static bool (*const eliminate_on[SIMD_COUNT])(const BlockChain *, BlockFactor *, const double *) = ON(eliminate);
+static void (*const back_substitute_on[SIMD_COUNT])(const BlockFactor *, double *, const double *, int, int) = ON(back_substitute);
+static void (*const forward_substitute_on[SIMD_COUNT])(const BlockFactor *, double *) = ON(forward_substitute);
 
-static int forced_isa;
-
-void block_isa_force(int isa) { forced_isa = isa; }
-
-int block_isa(void)
-{
-#if BLOCK_HAS_AVX
-    bool any = forced_isa <= 0;
-    if ((any || forced_isa >= 3) && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
-        return 2;
-    if ((any || forced_isa >= 2) && __builtin_cpu_supports("avx2"))
-        return 1;
-#endif
-    return 0;
-}
-
-bool block_chain_factor(const BlockChain *chain, BlockFactor *factor) { return eliminate_on[block_isa()](chain, factor, NULL); }
+bool block_chain_factor(const BlockChain *chain, BlockFactor *factor) { return eliminate_on[simd_level()](chain, factor, NULL); }
 
 bool block_chain_factor_solve(const BlockChain *chain, BlockFactor *factor, const double *b, double *x)
 {
-    if (!eliminate_on[block_isa()](chain, factor, b))
+    if (!eliminate_on[simd_level()](chain, factor, b))
         return false;
-    back_substitute_on[block_isa()](factor, x, factor->z + 6, PANEL, COLUMN);
+    back_substitute_on[simd_level()](factor, x, factor->z + 6, PANEL, COLUMN);
     return true;
 }
 
@@ -187,8 +172,8 @@ void block_factor_solve(const BlockFactor *factor, const double *b, double *x)
 {
     if (x != b)
         memcpy(x, b, (size_t)factor->count * 6 * sizeof *x);
-    forward_substitute_on[block_isa()](factor, x);
-    back_substitute_on[block_isa()](factor, x, x, 6, 1);
+    forward_substitute_on[simd_level()](factor, x);
+    back_substitute_on[simd_level()](factor, x, x, 6, 1);
 }
 
 // S_i = D_i^-1 + G^T S' G with G = Z T^-1 = C D_i^-1, S' the neighbour's towards the middle.

@@ -33,8 +33,4 @@ void block_factor_inverse_diagonal(const BlockFactor *factor, double *inverse);
 // y = A x, for residuals and tests.
 void block_chain_multiply(const BlockChain *chain, const double *x, double *y);
 
-// For tests and benchmarks: 0 the widest instruction set that the CPU has, 1 baseline, 2 AVX2, 3 AVX-512 (the next narrower one where it is
-// absent). All give the same bits. Not while a step runs.
-void block_isa_force(int isa);
-
 #endif

@@ -19,7 +19,4 @@
 
 enum { BLOCK = 36, COLUMN = 8, PANEL = 6 * COLUMN };
 
-// Index of the kernels to call: 0 baseline, 1 AVX2, 2 AVX-512; the widest that the CPU has or that block_isa_force() leaves.
-int block_isa(void);
-
 #endif

@@ -5,6 +5,7 @@
 // The right-hand side travels as a seventh column of B. Backward: x = V^-1 (T^-1 b - Y x'), x' of the neighbour towards the middle.
 #include "solver/block_lu.h"
 
+#include "geom/simd.h"
 #include "solver/block_lanes.h"
 
 #include <float.h>
@@ -89,9 +90,9 @@ INLINE bool pivots_hold(const BlockLu *f)
 #define ON(name) {name##_baseline, name##_baseline, name##_baseline}
 #endif
 
-static bool (*const eliminate_on[3])(BlockLu *, const double *, const double *, const double *, const double *) = ON(eliminate);
-static void (*const back_on[3])(const BlockLu *, double *) = ON(back);
-static void (*const forward_on[3])(const BlockLu *, const double *) = ON(forward);
+static bool (*const eliminate_on[SIMD_COUNT])(BlockLu *, const double *, const double *, const double *, const double *) = ON(eliminate);
+static void (*const back_on[SIMD_COUNT])(const BlockLu *, double *) = ON(back);
+static void (*const forward_on[SIMD_COUNT])(const BlockLu *, const double *) = ON(forward);
 
 static bool all_positive(const BlockLu *lu)
 {
@@ -128,9 +129,9 @@ static void refine(BlockLu *lu, const double *diag, const double *lower, const d
 
 bool block_lu_factor_solve(BlockLu *lu, const double *diag, const double *lower, const double *upper, const double *b, double *x)
 {
-    if (!eliminate_on[block_isa()](lu, diag, lower, upper, b))
+    if (!eliminate_on[simd_level()](lu, diag, lower, upper, b))
         return false;
-    back_on[block_isa()](lu, x);
+    back_on[simd_level()](lu, x);
     if (!all_positive(lu))
         refine(lu, diag, lower, upper, b, x);
     return true;
@@ -138,8 +139,8 @@ bool block_lu_factor_solve(BlockLu *lu, const double *diag, const double *lower,
 
 void block_lu_solve(const BlockLu *lu, const double *b, double *x)
 {
-    forward_on[block_isa()](lu, b);
-    back_on[block_isa()](lu, x);
+    forward_on[simd_level()](lu, b);
+    back_on[simd_level()](lu, x);
 }
 
 void block_lu_transpose(int count, const double *from, double *to)

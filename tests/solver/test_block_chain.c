@@ -1,4 +1,5 @@
 // Block-tridiagonal systems against dense Cholesky: random chains of many sizes and conditions, and the chain's own laws.
+#include "geom/simd.h"
 #include "solver/block_chain.h"
 #include "solver/block_lu.h"
 
@@ -13,6 +14,8 @@
 #include <time.h>
 
 #include <cmocka.h>
+
+static SimdLevel level_given;
 
 static uint64_t seed_state = 12345;
 static double uniform(void) // [-1, 1)
@@ -324,14 +327,14 @@ static void same_bits_everywhere(void **state)
         block_lu_transpose(m, a.lower, lower);
         for (size_t i = 0; i < n; i++)
             b[i] = uniform();
-        for (int isa = 1; isa <= 3; isa++) {
-            double *y = x + (size_t)(isa - 1) * 3 * n;
-            block_isa_force(isa);
+        for (int level = 0; level < SIMD_COUNT; level++) {
+            double *y = x + (size_t)level * 3 * n;
+            simd_force((SimdLevel)level);
             assert_true(block_chain_factor_solve(&a, f, b, y));
             block_factor_solve(f, b, y + n);
             assert_true(block_lu_factor_solve(lu, a.diag, lower, a.lower, b, y + 2 * n));
         }
-        block_isa_force(0);
+        simd_force(level_given);
         assert_memory_equal(x, x + 3 * n, 3 * n * sizeof *x);
         assert_memory_equal(x, x + 6 * n, 3 * n * sizeof *x);
         free(x);
@@ -391,8 +394,8 @@ static void prints_timings(void **state)
     const int sizes[] = {51, 101, 201, 401, 801, 201, 201};
     for (size_t t = 0; t < sizeof sizes / sizeof *sizes; t++) {
         int m = sizes[t];
-        block_isa_force(t < 5 ? 0 : t == 5 ? 2 : 1);
-        print_message("%-8s ", t < 5 ? "" : t == 5 ? "AVX2" : "SSE2");
+        simd_force(t < 5 ? level_given : t == 5 ? SIMD_AVX2 : SIMD_SSE2);
+        print_message("%-8s ", simd_name[simd_level()]);
         enum { RUNS = 300 };
         BlockChain a;
         assert_true(block_chain_create(&a, m));
@@ -435,11 +438,12 @@ static void prints_timings(void **state)
         block_factor_destroy(f);
         block_chain_destroy(&a);
     }
-    block_isa_force(0);
+    simd_force(level_given);
 }
 
 int main(void)
 {
+    level_given = simd_level();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(solves_as_dense),       cmocka_unit_test(inverse_diagonal_as_dense), cmocka_unit_test(refuses_indefinite),
         cmocka_unit_test(lu_solves_unsymmetric), cmocka_unit_test(unit_rows_are_exact),   cmocka_unit_test(mirrored_signs_to_the_bit), cmocka_unit_test(same_bits_everywhere), cmocka_unit_test(prints_timings),
