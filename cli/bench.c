@@ -84,9 +84,14 @@ bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, const Ste
         return false;
     int64_t steps = bench_steps(scene, most), begin = bench_cpu_ns();
     int cursor = 0, crowd = -1;
+    double fed = simulator_state(simulator)->inserted, length = 0;
+    for (int i = 0; i < scene->wire.section_count; i++)
+        length += scene->wire.section[i].length;
     for (int64_t i = 0; i < steps && !(simulator_last(simulator)->flags & STEP_DIVERGED); i++) {
         int64_t start = trace ? bench_cpu_ns() : 0;
-        simulator_step(simulator, bench_command(scene, i, &cursor));
+        Command command = bench_command(scene, i, &cursor);
+        simulator_step(simulator, command);
+        fed = fmin(length, fmax(0, fed + command.push_mm_s * scene->dt / 1000));
         if (trace) {
             trace->us[i] = (double)(bench_cpu_ns() - start) / 1000;
             trace->contacts[i] = simulator_last(simulator)->active;
@@ -115,6 +120,7 @@ bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, const Ste
     figures->flags = totals->flags;
     figures->last = *simulator_last(simulator);
     figures->inserted_mm = simulator_state(simulator)->inserted;
+    figures->stalled_mm = scene->wire.has_sheath ? fed - figures->inserted_mm : 0;
     figures->hash = simulator_hash(simulator);
     simulator_destroy(simulator);
     return true;

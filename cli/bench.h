@@ -23,7 +23,7 @@ typedef struct StepFigures { // of all steps of a run; times are the thread's CP
     unsigned flags;
     int64_t crowded_step;    // the first with 80 candidates, or else the most
     StepReport last;
-    double inserted_mm;
+    double inserted_mm, stalled_mm;      // at the end; what the hand fed and the tool did not take
     uint64_t hash;
 } StepFigures;
 

@@ -33,7 +33,7 @@ static const Tube tubes[TUBES] = {
      {{"first 1000 steps", 1000, 0, 0, {"59 (113), 34", "58 (111), 34"}}, {"70-90 contacts", 2000, 70, 90, {"101 (132), 75", "97 (128), 75"}}}}};
 static const char *const surface_name[SURFACES] = {"tube", "lim"};
 static const int stiffness_gpa[STIFFNESSES] = {100, 20};
-static const double contained_um = 50;
+static const double contained_um = 50, stalled_mm = 0.1;
 
 typedef struct WindowFigures {
     int steps;
@@ -55,7 +55,7 @@ static const char help[] =
     "  --quick      the first 400 of 2,000 steps\n"
     "  --threads N  threads for fitting the tubes; default 0: all cores\n"
     "  --json F     the same figures as JSON; - is standard output, the table then goes to standard error\n\n"
-    "Exit codes: 0 done; 1 a run ended early or a node was more than 0.05 mm outside the wall; 2 wrong usage or bad input.\n";
+    "Exit codes: 0 done; 1 a run ended early, stalled, or had a node more than 0.05 mm outside the wall; 2 wrong usage or bad input.\n";
 
 static int ascending(const void *a, const void *b)
 {
@@ -99,16 +99,21 @@ static bool run_row(Row *row, int64_t most_steps, int threads, Faults *faults)
 
 static bool is_contained(const Row *row)
 {
-    return row->run.steps == row->wanted_steps && !(row->run.flags & (STEP_DIVERGED | STEP_OUT_OF_VESSEL)) && row->run.penetration_um.max <= contained_um;
+    return !(row->run.flags & (STEP_DIVERGED | STEP_OUT_OF_VESSEL)) && row->run.penetration_um.max <= contained_um;
 }
+
+// All steps, and all that the hand fed is in.
+static bool is_whole(const Row *row) { return row->run.steps == row->wanted_steps && fabs(row->run.stalled_mm) <= stalled_mm; }
 
 static void print_row(FILE *out, const Row *row)
 {
     const StepFigures *run = &row->run;
-    fprintf(out, "  %3d GPa, %-4s  %5.3f (%6.3f)   %3d, %3.0f at most  %6.1f  %s, %lld of %lld steps, %.1f mm in; not converged %lld, linearised again %lld\n",
+    fprintf(out, "  %3d GPa, %-4s  %5.3f (%6.3f)   %3d, %3.0f at most  %6.1f  %s%s, %lld of %lld steps, %.1f mm in; not converged %lld, linearised again %lld, "
+            "limited %lld\n",
             stiffness_gpa[row->stiffness], surface_name[row->surface], run->step_us.median / 1000, run->step_us.p99 / 1000, run->last.active,
-            run->contacts.max, run->penetration_um.max, is_contained(row) ? "contained" : "NOT CONTAINED", (long long)run->steps,
-            (long long)row->wanted_steps, run->inserted_mm, (long long)run->not_converged, (long long)run->linearised_again);
+            run->contacts.max, run->penetration_um.max, is_contained(row) ? "contained" : "NOT CONTAINED", is_whole(row) ? "" : ", NOT WHOLE",
+            (long long)run->steps, (long long)row->wanted_steps, run->inserted_mm, (long long)run->not_converged, (long long)run->linearised_again,
+            (long long)run->limited);
     for (int w = 0; w < WINDOWS && row->tube->window[w].name; w++) {
         const Window *window = &row->tube->window[w];
         const WindowFigures *figures = &row->window[w];
@@ -131,6 +136,8 @@ static cJSON *row_json(const Row *row)
     cJSON_AddNumberToObject(at, "steps", (double)run->steps);
     cJSON_AddNumberToObject(at, "inserted_mm", run->inserted_mm);
     cJSON_AddBoolToObject(at, "contained", is_contained(row));
+    cJSON_AddNumberToObject(at, "stalled_mm", run->stalled_mm);
+    cJSON_AddNumberToObject(at, "limited_steps", (double)run->limited);
     cJSON_AddNumberToObject(at, "cpu_ms_median", run->step_us.median / 1000);
     cJSON_AddNumberToObject(at, "cpu_ms_p99", run->step_us.p99 / 1000);
     cJSON_AddNumberToObject(at, "contacts_final", run->last.active);
@@ -168,7 +175,7 @@ static bool run_all(FILE *out, int64_t most_steps, int threads, cJSON *list, boo
                 return false;
             print_row(out, &row);
             fflush(out);
-            *contained &= is_contained(&row);
+            *contained &= is_contained(&row) && is_whole(&row);
             cJSON_AddItemToArray(list, row_json(&row));
         }
     }
@@ -194,6 +201,6 @@ int bench_peer(int argc, char **argv)
     if (!good)
         return cli_bad_input(&faults);
     if (!contained)
-        fprintf(stderr, "seldinger bench peer: a run was not contained to %.0f um\n", contained_um);
+        fprintf(stderr, "seldinger bench peer: a run was not contained to %.0f um, or not to its end\n", contained_um);
     return contained ? EXIT_DONE : EXIT_DIFFERENT;
 }

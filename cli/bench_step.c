@@ -349,6 +349,13 @@ static void print_scene(FILE *out, const char *name, const StepFigures *run, con
             run->hash);
 }
 
+// A tool that stands still is quick and tells nothing.
+static void print_stall(FILE *out, const StepFigures *run)
+{
+    if (fabs(run->stalled_mm) > 0.01)
+        fprintf(out, "  STALLED: %.2f mm of what the hand fed are not in the vessel at the end\n", run->stalled_mm);
+}
+
 static void print_growth(FILE *out, const StepBench *bench)
 {
     fprintf(out, "\ngrowth, spiral\n    elements  candidates   step [us]  per doubling       p99     p99.9  deepest [um]\n");
@@ -457,6 +464,7 @@ static cJSON *run_json(const StepFigures *run)
     cJSON_AddNumberToObject(at, "linearised_again_steps", (double)run->linearised_again);
     cJSON_AddNumberToObject(at, "limited_steps", (double)run->limited);
     cJSON_AddNumberToObject(at, "residual_max", run->residual_max);
+    cJSON_AddNumberToObject(at, "stalled_mm", run->stalled_mm);
     cJSON_AddStringToObject(at, "state_hash", hash);
     return at;
 }
@@ -551,8 +559,10 @@ int bench_step(int argc, char **argv)
     }
     bool good = run_cases(&bench, widest, widest, &faults);
     for (int c = 0; good && c < CASES; c++)
-        if (bench.present[c])
+        if (bench.present[c]) {
             print_scene(out, cases[c].name, &bench.run[widest][c], &bench.error[c]);
+            print_stall(out, &bench.run[widest][c]);
+        }
     if (good)
         print_growth(out, &bench);
     fflush(out);
