@@ -37,7 +37,7 @@ static bool follow(const Vessel *tube, double r, double step, Vec3 x, Vec3 d, Ve
 {
     Vec3 probe = vec3_add_scaled(vec3_add_scaled(x, step, d), 0.4 * r, vec3_normal_to(d));
     VesselHit hit = ask(tube, probe, 4 * r, memory);
-    if (hit.flags & (VESSEL_OPEN_END | VESSEL_FAR | VESSEL_UNSURE))
+    if (hit.flags & (VESSEL_OPEN_END | VESSEL_BEYOND | VESSEL_FAR | VESSEL_UNSURE))
         return false;
     *next = vec3_add_scaled(probe, r - hit.gap, hit.normal);
     return vec3_dot(vec3_sub(*next, x), d) > 0.5 * step;
@@ -64,7 +64,7 @@ static bool sample(const Vessel *tube, Vec3 x, Vec3 out, double r, VesselMemory 
 {
     Vec3 probe = vec3_add_scaled(x, 0.9 * r, out);
     VesselHit hit = ask(tube, probe, 4 * r, memory);
-    if (hit.flags & (VESSEL_OPEN_END | VESSEL_FAR | VESSEL_UNSURE))
+    if (hit.flags & (VESSEL_OPEN_END | VESSEL_BEYOND | VESSEL_FAR | VESSEL_UNSURE))
         return false;
     *surface = vec3_add_scaled(probe, -hit.gap, hit.normal);
     return true;

@@ -619,8 +619,11 @@ static void query_batch(const LimVessel *lim, int count, const Vec3 *point, doub
         return;
     project_batch(lim, &batch, &at_x, of, n);
     check_batch(lim, &batch, &at_x, of, n, memory);
-    for (int i = 0; i < n; i++)
+    for (int i = 0; i < n; i++) {
         answer_from_foot(&batch, i, &of[i], &memory[of[i].point], &hit[of[i].point]);
+        if (batch.at.carried[i] && inlet_height(lim, lane_point(&batch, i)) < 0)
+            hit[of[i].point].flags |= VESSEL_BEYOND;
+    }
     if (lim->options.field == LIM_BLEND)
         blend_batch(lim, &batch, of, n, reach, hit);
 }

@@ -5,8 +5,15 @@
 //   straight: 1/d about the axis, 0 along it;  arc of radius R, rho the distance to its axis of turning: also (rho - R) / (rho d) along the turn;
 //   end or corner (the nearest centreline point is a fixed point): 1/d in both directions.
 //
-// The centreline is cut into segments, arcs into parts of at most 90 degrees, so that a segment's closest point is unique near the tube. A point
-// walks from its last segment to a neighbour only where that is closer: it never jumps to another coil that crosses its own.
+// The centreline is cut into segments, arcs into parts of at most 90 degrees, so that a segment's closest point is unique near the tube. Between two
+// segments stands a plane through their joint, half way between their directions: near the tube a point is closer to the segment on its own side. A
+// point walks from its last segment across such planes, to a neighbour only and only where that is closer: it never jumps to another coil that crosses
+// or nearly touches its own, and its cost does not depend on the number of segments.
+//
+// Open ends. Upstream of the first plane the first cross-section goes on as a cylinder for ever: a coil that bulges back past the sheath is held. The
+// last end's wall flares like a trumpet's bell, a quarter of a circle of radius L = radius: the rim is rounded, as a sharp edge can hold a tool only
+// at points that happen to lie in its plane. So a wire that leaves at an angle leans on the bell, tangent at first. There gap = D - L with D the distance
+// to the circle of radius (radius + L) in the end plane. Two radii beyond the end, where the bell is further than any tool's radius, there is no wall.
 #include "geom/vessel.h"
 
 #include <stdlib.h>
@@ -20,9 +27,11 @@ typedef struct Segment {
     Vec3 normal;             // carried frame at the start; an arc turns towards it
     Vec3 binormal;           // tangent x normal, the arc's axis of turning
     Vec3 center;             // of the arc
+    Vec3 joint;              // normal of the plane at the end, onwards (no unit vector)
     double length;           // line
     double arc_radius;       // 0: line
-    double angle;            // arc, (0, pi/2]
+    double angle;            // arc, (0, pi/2] …
+    double cosine, sine, half_cosine, half_sine;     // … and of the half of it
 } Segment;
 
 typedef struct TubeVessel {
@@ -36,6 +45,7 @@ typedef struct TubeVessel {
 typedef struct CentrePoint {
     Vec3 foot, tangent, side;    // side: a unit vector across, for a point on the centreline itself
     double distance2;
+    double rho;                  // arc: distance of X to the axis of turning
     int end;                     // -1 before the segment's start, +1 beyond its end, 0 between
 } CentrePoint;
 
@@ -49,15 +59,17 @@ static CentrePoint closest_on_segment(const Segment *s, Vec3 x)
         c.side = s->normal;
         c.end = t < 0 ? -1 : t > s->length ? 1 : 0;
     } else {
-        // angle from the arc's middle, so that the wrap of atan2 lies opposite
+        // in the plane of the arc, from its centre: u towards the start, v along the tangent there
         Vec3 y = vec3_sub(x, s->center);
-        double half = 0.5 * s->angle, ch = cos(half), sh = sin(half), u = -vec3_dot(y, s->normal), v = vec3_dot(y, s->tangent);
-        double phi = atan2(v * ch - u * sh, u * ch + v * sh) + half, cp = cos(phi), sp = sin(phi);
+        double u = -vec3_dot(y, s->normal), v = vec3_dot(y, s->tangent), rho = sqrt(u * u + v * v);
+        double cp = rho > 0 ? u / rho : s->half_cosine, sp = rho > 0 ? v / rho : s->half_sine;
+        if (sp < 0 || cp * s->sine < sp * s->cosine)     // outside of the arc's wedge: the end on X's side of its middle
+            c.end = sp * s->half_cosine < cp * s->half_sine ? -1 : 1;
         Vec3 out = vec3_add_scaled(vec3_scale(s->normal, -cp), sp, s->tangent);
+        c.rho = rho;
         c.foot = vec3_add_scaled(s->center, s->arc_radius, out);
         c.tangent = vec3_add_scaled(vec3_scale(s->tangent, cp), sp, s->normal);
         c.side = vec3_negate(out);
-        c.end = phi < 0 ? -1 : phi > s->angle ? 1 : 0;
     }
     if (c.end != 0) {
         c.foot = c.end < 0 ? s->start : s->end;
@@ -67,24 +79,25 @@ static CentrePoint closest_on_segment(const Segment *s, Vec3 x)
     return c;
 }
 
+static bool is_past(const Segment *s, Vec3 x) { return vec3_dot(vec3_sub(x, s->end), s->joint) > 0; }
+
 // Walks to ever closer neighbours; ends, since the distance falls strictly.
 static int walk(const TubeVessel *tube, Vec3 x, int segment, CentrePoint *closest)
 {
-    *closest = closest_on_segment(&tube->segment[segment], x);
-    for (;;) {
-        int here = segment;
-        for (int k = here - 1; k <= here + 1; k += 2) {
-            if (k < 0 || k >= tube->count)
-                continue;
-            CentrePoint c = closest_on_segment(&tube->segment[k], x);
-            if (c.distance2 < closest->distance2) {
-                *closest = c;
-                segment = k;
-            }
+    const Segment *s = tube->segment;
+    *closest = closest_on_segment(&s[segment], x);
+    for (int way = -1; way <= 1; way += 2)
+        for (int next = segment + way; next >= 0 && next < tube->count; next += way) {
+            bool on = way > 0 ? closest->end > 0 || is_past(&s[segment], x) : closest->end < 0 || !is_past(&s[next], x);
+            if (!on)
+                break;
+            CentrePoint c = closest_on_segment(&s[next], x);
+            if (!(c.distance2 < closest->distance2))
+                break;
+            *closest = c;
+            segment = next;
         }
-        if (segment == here)
-            return segment;
-    }
+    return segment;
 }
 
 static int nearest_overall(const TubeVessel *tube, Vec3 x)
@@ -109,30 +122,58 @@ static void add_outer(Sym3 *h, double s, Vec3 v)
 
 // The gap's curvature grows without bound towards the centreline and, outside, towards the axis of an arc's turning; neither place is one
 // where a contact may sit, and both are held to what they are at a tenth of the radius.
-static Sym3 gap_hessian(const TubeVessel *tube, const Segment *s, const CentrePoint *c, Vec3 x, Vec3 normal, double distance)
+static Sym3 gap_hessian(const TubeVessel *tube, const Segment *s, const CentrePoint *c, Vec3 normal, double distance)
 {
     Sym3 h = {0, 0, 0, 0, 0, 0};
-    double d = fmax(distance, 0.1 * tube->radius);
-    Vec3 across = vec3_unit(vec3_cross(c->tangent, normal));
+    double least = 0.1 * tube->radius, d = distance > least ? distance : least;
     if (c->end != 0) {
         // a fixed nearest point: a sphere about it, -(I - n n') / d
         h.xx = h.yy = h.zz = -1 / d;
         add_outer(&h, 1 / d, normal);
         return h;
     }
-    add_outer(&h, -1 / d, across);
+    add_outer(&h, -1 / d, vec3_cross(c->tangent, normal));
     if (s->arc_radius > 0) {
-        Vec3 y = vec3_sub(x, s->center);
-        double rho = fmax(vec3_norm(vec3_add_scaled(y, -vec3_dot(y, s->binormal), s->binormal)), 0.1 * tube->radius);
+        double rho = c->rho > least ? c->rho : least;
         add_outer(&h, -(rho - s->arc_radius) / (rho * d), c->tangent);
     }
     return h;
 }
 
+static VesselHit open_end(VesselMemory *memory, int node)
+{
+    memory->has_foot = false;
+    return (VesselHit){.gap = HUGE_VAL, .node = node, .flags = VESSEL_OPEN_END};
+}
+
+// Beyond the last end's plane by z > 0: the bell.
+static VesselHit hit_bell(const TubeVessel *tube, Vec3 x, Vec3 end, Vec3 tangent, double z, VesselMemory *memory)
+{
+    double r = tube->radius, bell = r;
+    Vec3 radial = vec3_add_scaled(vec3_sub(x, end), -z, tangent);
+    double rho = vec3_norm(radial), aside = r + bell - rho, far = hypot(z, aside);
+    if (z > 2 * bell || rho > r + 2 * bell)
+        return open_end(memory, memory->node);
+    VesselHit hit = {.node = memory->node, .flags = VESSEL_BEYOND};
+    if (aside <= 0) {   // before the flange that the bell ends in
+        hit.gap = z - bell;
+        hit.normal = tangent;
+    } else {
+        Vec3 out = rho > 1e-9 * r ? vec3_scale(radial, 1 / rho) : vec3_negate(tube->segment[tube->count - 1].normal);
+        hit.gap = far - bell;
+        hit.normal = vec3_add_scaled(vec3_scale(tangent, z / far), -aside / far, out);
+        add_outer(&hit.hessian, 1 / far, vec3_add_scaled(vec3_scale(tangent, aside / far), z / far, out));
+        add_outer(&hit.hessian, -aside / (far * fmax(rho, 0.1 * r)), vec3_cross(tangent, out));
+    }
+    memory->has_foot = true;
+    memory->foot = vec3_add_scaled(x, -hit.gap, hit.normal);
+    return hit;
+}
+
 static VesselHit hit_at(const TubeVessel *tube, Vec3 x, VesselMemory *memory)
 {
     VesselHit hit = {.node = memory->node};
-    if (!vec3_is_finite(x) || !(vec3_norm2(x) < 1e200)) {
+    if (!(vec3_norm2(x) < 1e200)) {
         hit.flags = VESSEL_UNSURE;
         return hit;
     }
@@ -141,21 +182,22 @@ static VesselHit hit_at(const TubeVessel *tube, Vec3 x, VesselMemory *memory)
         memory->node = nearest_overall(tube, x);
     int k = hit.node = memory->node = walk(tube, x, memory->node, &c);
     const Segment *s = &tube->segment[k];
-    double forward = vec3_dot(vec3_sub(x, c.foot), c.tangent);
-    bool before = k == 0 && c.end < 0 && forward < 0, beyond = k == tube->count - 1 && c.end > 0 && forward > 0;
-    if (!tube->closed_ends && (before || beyond)) {
-        memory->has_foot = false;
-        hit.gap = HUGE_VAL;
-        hit.flags = VESSEL_OPEN_END;
-        return hit;
+    if (c.end != 0) {
+        double forward = vec3_dot(vec3_sub(x, c.foot), c.tangent);
+        // on the plane of a smooth joint rounding may put a point before one segment and beyond the other: that is no corner
+        if (fabs(forward) <= 1e-9 * tube->radius)
+            c.end = 0;
+        else if (!tube->closed_ends && k == 0 && c.end < 0 && forward < 0) {
+            c = (CentrePoint){.foot = vec3_add_scaled(c.foot, forward, c.tangent), .tangent = c.tangent, .side = s->normal, .rho = s->arc_radius};
+            c.distance2 = vec3_norm2(vec3_sub(x, c.foot));
+            hit.flags = VESSEL_BEYOND;
+        } else if (!tube->closed_ends && k == tube->count - 1 && c.end > 0 && forward > 0)
+            return hit_bell(tube, x, c.foot, c.tangent, forward, memory);
     }
-    // on the plane of a smooth joint rounding may put a point before one segment and beyond the other: that is no corner
-    if (fabs(forward) <= 1e-9 * tube->radius)
-        c.end = 0;
     double d = sqrt(c.distance2);
     hit.gap = tube->radius - d;
     hit.normal = d > 1e-9 * tube->radius ? vec3_scale(vec3_sub(c.foot, x), 1 / d) : c.side;
-    hit.hessian = gap_hessian(tube, s, &c, x, hit.normal, d);
+    hit.hessian = gap_hessian(tube, s, &c, hit.normal, d);
     memory->has_foot = true;
     memory->foot = vec3_add_scaled(c.foot, -tube->radius, hit.normal);
     return hit;
@@ -271,9 +313,10 @@ static int add_arc(Segment *out, Vec3 *p, Vec3 *t, Vec3 *n, double arc_radius, d
 {
     int parts = (int)ceil(angle / (PI / 2) - 1e-9);
     parts = parts < 1 ? 1 : parts;
-    double part = angle / parts, cs = cos(part), sn = sin(part);
+    double part = angle / parts, cs = cos(part), sn = sin(part), half_cs = cos(0.5 * part), half_sn = sin(0.5 * part);
     for (int k = 0; k < parts; k++) {
-        Segment s = {.start = *p, .tangent = *t, .normal = *n, .arc_radius = arc_radius, .angle = part};
+        Segment s = {.start = *p, .tangent = *t, .normal = *n, .arc_radius = arc_radius, .angle = part,
+                     .cosine = cs, .sine = sn, .half_cosine = half_cs, .half_sine = half_sn};
         s.binormal = vec3_cross(*t, *n);
         s.center = vec3_add_scaled(*p, arc_radius, *n);
         s.end_tangent = vec3_unit(vec3_add_scaled(vec3_scale(*t, cs), sn, *n));
@@ -343,5 +386,7 @@ Vessel *tube_vessel_create(const TubeOptions *options, const char *file, Faults 
     tube->closed_ends = options->closed_ends;
     tube->segment = segment;
     tube->count = pieces ? lay_pieces(options, segment) : lay_polyline(options, segment);
+    for (int i = 0; i + 1 < tube->count; i++)
+        segment[i].joint = vec3_add(segment[i].end_tangent, segment[i + 1].tangent);
     return &tube->vessel;
 }

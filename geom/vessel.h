@@ -25,7 +25,8 @@ typedef struct VesselMemory {
 
 enum {
     VESSEL_FAR = 1,          // certainly further from the wall than `reach`: gap is a lower bound, normal and hessian are unset (0)
-    VESSEL_OPEN_END = 2,     // beyond an open end (upstream of the inlet): there is no wall, gap = +HUGE_VAL, normal 0
+    VESSEL_OPEN_END = 2,     // beyond an open end and clear of it: there is no wall, gap = +HUGE_VAL, normal 0
+    VESSEL_BEYOND = 8,       // beyond an open end's plane, where the wall is what carries on from the end (a cylinder upstream, a bell downstream)
     VESSEL_UNSURE = 4,       // the projection did not converge: gap is Taubin's distance, normal the gradient's direction
 };
 
@@ -56,8 +57,9 @@ static inline void vessel_query(const Vessel *v, int count, const Vec3 *point, d
 }
 
 // --- LIM: the fitted tree. Borrows the tree, which must outlive the vessel. NULL where the tree has no model. ---
-// The root's end is open: upstream of its plane (center, direction) there is no wall, and where blobs close the model near it the wall is that of the
-// section through the point. A root from which the tree goes on upstream, or that its points close over, is no such end. Leaves are closed by their blobs.
+// The root's end is open: its section goes on upstream of its plane (center, direction) as a cylinder, smoothly, from half a radius downstream on. Where
+// the root's model does not hold the root's centre there is no wall upstream. A root from which the tree goes on upstream, or that its points close over,
+// is no such end. Leaves are closed by their blobs.
 Vessel *lim_vessel_create(const VesselTree *tree);
 
 typedef enum {
@@ -88,7 +90,8 @@ typedef struct TubeOptions {
     const TubePiece *piece;  // either pieces …
     int point_count;
     const Vec3 *point;       // … or a polyline of >= 2 points
-    bool closed_ends;        // hemispheres instead of open ends (open at BOTH ends when false)
+    bool closed_ends;        // hemispheres instead of open ends (open at BOTH ends when false: the first cross-section goes on upstream as a cylinder,
+                             // the last end flares like a bell of the lumen's radius, see tube_vessel.c)
 } TubeOptions;
 // NULL with a fault where a radius or a length is not positive, or an arc's radius is not larger than the lumen's.
 Vessel *tube_vessel_create(const TubeOptions *options, const char *file, Faults *faults);

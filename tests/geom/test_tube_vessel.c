@@ -182,9 +182,18 @@ static void ends(void **state)
     Vessel *open = make(&o);
     o.closed_ends = true;
     Vessel *closed = make(&o);
-    VesselHit before = ask(open, vec3(1.99, 0.2, 0), -1), after = ask(open, vec3(17, 5.01, 0), -1);
-    assert_true(before.flags == VESSEL_OPEN_END && before.gap == HUGE_VAL && vec3_norm(before.normal) == 0);
-    assert_true(after.flags == VESSEL_OPEN_END && after.gap == HUGE_VAL);
+    // upstream the first section goes on
+    VesselHit before = ask(open, vec3(-50, 0.2, 0.3), -1), after = ask(open, vec3(17, 6.01, 0), -1);
+    assert_true(before.flags == VESSEL_BEYOND);
+    assert_near(before.gap, 0.5 - hypot(0.2, 0.3), 1e-12);
+    assert_true(before.normal.x == 0 && before.hessian.xx == 0 && before.normal.y < 0);
+    assert_near(sym3_trace(&before.hessian), -1 / hypot(0.2, 0.3), 1e-9);
+    // downstream the bell, and nothing two radii on
+    assert_true(after.flags == VESSEL_OPEN_END && after.gap == HUGE_VAL && vec3_norm(after.normal) == 0);
+    assert_true(ask(open, vec3(17, 5.5, 0), -1).flags == VESSEL_BEYOND);
+    assert_near(ask(open, vec3(17, 5.5, 0), -1).gap, hypot(0.5, 1) - 0.5, 1e-12);
+    assert_near(ask(open, vec3(17.9, 5.5, 0), -1).gap, hypot(0.5, 0.1) - 0.5, 1e-12);
+    assert_true(ask(open, vec3(18.3, 5.2, 0), -1).flags == VESSEL_BEYOND);   // beside the flange
     assert_near(ask(open, vec3(2, 0.2, 0), -1).gap, 0.3, 1e-12);
     assert_true(ask(open, vec3(2.01, 0.2, 0), -1).flags == 0 && ask(open, vec3(17, 4.99, 0), -1).flags == 0);
     assert_near(ask(closed, vec3(1.7, 0.3, 0), -1).gap, 0.5 - hypot(0.3, 0.3), 1e-12);
@@ -205,6 +214,49 @@ static void ends(void **state)
     assert_true(far.flags == VESSEL_OPEN_END || far.gap < -9e5);
     open->destroy(open);
     closed->destroy(closed);
+}
+
+// Gap, normal and Hessian agree with each other all the way out of either end, and gap and normal have no step.
+static void ends_are_smooth(void **state)
+{
+    (void)state;
+    TubePiece piece[] = {{0, 5, PI / 2, 0}, {4, 0, 0, 0}, {0, 5, PI / 2, 0}};
+    TubeOptions o = {.start = {2, 0, 0}, .direction = {3, 0, 0}, .normal = {0, 1, 0}, .radius = 0.5, .piece_count = 3, .piece = piece};
+    Vessel *v = make(&o);
+    Vec3 p = {2, 0, 0}, d = {1, 0, 0}, end = {2, 14, 0}, along = {-1, 0, 0};
+    uint64_t seed = 31;
+    int checked = 0;
+    for (int trial = 0; trial < 400; trial++) {
+        bool inlet = trial % 2 == 0;
+        Vec3 t = inlet ? d : along, at = inlet ? p : end, out = random_unit(&seed);
+        out = vec3_unit(vec3_add_scaled(out, -vec3_dot(out, t), t));
+        double rho = random_in(&seed, 0.15, inlet ? 0.6 : 0.9), h = 1e-5;
+        VesselHit last = {.flags = VESSEL_OPEN_END};
+        for (double z = -0.3; z < 0.8; z += 0.0173) {
+            Vec3 here = vec3_add_scaled(vec3_add_scaled(at, rho, out), inlet ? -z : z, t), slope = {0, 0, 0};
+            int node = inlet ? 0 : v->locate(v, end, -1);
+            VesselHit hit = ask(v, here, node);
+            assert_true((hit.flags & ~(unsigned)VESSEL_BEYOND) == 0);
+            if (last.flags != VESSEL_OPEN_END) {
+                assert_true(fabs(hit.gap - last.gap) < 0.0174);
+                assert_true(rho < 0.3 || vec3_distance(hit.normal, last.normal) < 0.0174 * 10);   // curvature below 10 / mm
+            }
+            last = hit;
+            bool same = true;
+            for (int k = 0; k < 3; k++) {
+                Vec3 e = vec3(k == 0, k == 1, k == 2);
+                VesselHit a = ask(v, vec3_add_scaled(here, h, e), node), b = ask(v, vec3_add_scaled(here, -h, e), node);
+                same = same && same_kind(&a, &hit) && same_kind(&b, &hit);
+                slope = vec3_add_scaled(slope, (a.gap - b.gap) / (2 * h), e);
+                if (same)
+                    assert_true(vec3_distance(vec3_scale(vec3_sub(a.normal, b.normal), 1 / (2 * h)), sym3_mul_vec(&hit.hessian, e)) < 1e-5);
+            }
+            assert_true(vec3_distance(slope, hit.normal) < (same ? 1e-7 : 1e-3));
+            checked += same;
+        }
+    }
+    assert_true(checked > 20000);
+    v->destroy(v);
 }
 
 static Vec3 mirrored(Vec3 v) { return vec3(v.x, v.y, -v.z); }
@@ -307,7 +359,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(distance_to_the_centreline), cmocka_unit_test(derivatives), cmocka_unit_test(curvatures),
-        cmocka_unit_test(ends), cmocka_unit_test(rigid_motion_and_mirror), cmocka_unit_test(coils_that_coincide),
+        cmocka_unit_test(ends), cmocka_unit_test(ends_are_smooth), cmocka_unit_test(rigid_motion_and_mirror), cmocka_unit_test(coils_that_coincide),
         cmocka_unit_test(bad_tubes),
     };
     return cmocka_run_group_tests_name("tube_vessel", tests, NULL, NULL);
