@@ -93,7 +93,7 @@ INLINE void lane_damping(const BeamChain *c, const BeamPose *start, int base, in
     element(&in, true, &o);
     element(&from, true, &was);
     Vec3 e = o.chord, t1 = o.tangent1, t2 = o.tangent2, axis = vec3_cross(was.chord, e);
-    double cosine = 1 + vec3_dot(was.chord, e), unit = 1 / sqrt(2 * (cosine > 1e-6 ? cosine : 1e-6));
+    double cosine = 1 + vec3_dot(was.chord, e), unit = 1 / sqrt(2 * cosine + 1e-12);     // turned right round there is no short way
     Quat turn = {cosine * unit, axis.x * unit, axis.y * unit, axis.z * unit};
     Vec3 angle1 = vec3_sub(o.angle1, quat_rotate(turn, was.angle1)), angle2 = vec3_sub(o.angle2, quat_rotate(turn, was.angle2));
     Vec3 m1 = vec3_scale(vec3_add(vec3_scale(angle1, in.near), vec3_scale(angle2, in.far)), rate);
