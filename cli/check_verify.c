@@ -118,13 +118,13 @@ static const char *judge(const VerifyCase *c, double error, double tolerance, do
     order_text[0] = 0;
     if (isnan(error))
         return "  NOT MEASURED";
-    bool comparable = ratio > 0 && !isnan(error_before) && error_before > floor_error;
+    bool comparable = c->order > 0 && ratio > 0 && !isnan(error_before) && error_before > floor_error;
     double order = comparable ? log(error_before / fmax(error, floor_error)) / log(ratio) : 0;
     if (comparable)
         snprintf(order_text, 16, "%s%.2f", error > floor_error ? "" : ">", order);
     if (!(error <= tolerance))
         return "  MISSED";
-    if (comparable && c->order > 0 && error > floor_error && order < c->order)
+    if (comparable && error > floor_error && order < c->order)
         return "  ORDER";
     return "";
 }

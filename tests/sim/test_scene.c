@@ -20,6 +20,10 @@
 #define SHEATH "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n"
 #define WHOLE VERSION WIRE SHEATH       // three lines; a case adds its own from line 4
 
+#define REST(list) VERSION SHEATH "wire:\n  sections: [{length_mm: 100, diameter_mm: 0.36, young_modulus_gpa: 80}]\n  rest: " list "\n"
+#define CASE "{name: a, quantity: push_force_n, reference: 1, tolerance: 1"
+#define VERIFY(inner) WHOLE "verify: {cases: [{name: a, " inner "}]}\n"
+
 static Faults faults;
 
 static Scene *parse(const char *text)
@@ -102,6 +106,47 @@ static void what_is_not_said_has_its_default(void **state)
     scene_free(scene);
 }
 
+static void a_rest_shape_becomes_sections(void **state)
+{
+    (void)state;
+    // the pieces end at the tip; a section's border 0.004 mm beside a piece's moves there, another one cuts its piece
+    Scene *scene = good(VERSION SHEATH "wire:\n  sections:\n    - {length_mm: 60, diameter_mm: 0.5, young_modulus_gpa: 80}\n"
+                        "    - {length_mm: 30.004, diameter_mm: 0.4, young_modulus_gpa: 20}\n    - {length_mm: 9.996, diameter_mm: 0.3, young_modulus_gpa: 5}\n"
+                        "  rest: [{arc: {radius_mm: 50, angle_deg: 45.8366236105, plane_deg: 90}}, {arc: {radius_mm: 10, angle_deg: 57.2957795131, plane_deg: -30}}]\n");
+    static const double length[] = {50, 10, 30, 10}, curvature[] = {0, 0.02, 0.02, 0.1}, plane_deg[] = {0, 90, 90, 60}, diameter[] = {0.5, 0.5, 0.4, 0.3};
+    assert_int_equal(scene->wire.section_count, 4);
+    for (int i = 0; i < 4; i++) {
+        const WireSection *s = &scene->wire.section[i];
+        assert_near(s->length, length[i], 1e-8);
+        assert_near(s->rest_curvature, curvature[i], 1e-12);
+        assert_near(s->rest_plane * 180 / PI, plane_deg[i], 1e-9);
+        assert_near(s->diameter, diameter[i], 0);
+    }
+    scene_free(scene);
+}
+
+static void a_verify_plan_is_read(void **state)
+{
+    (void)state;
+    Scene *scene = good(WHOLE "script: [[0, 1, 0], [2, 0, 0]]\nverify:\n  elements: [10, 20]\n  cases:\n    - {name: a, quantity: wall_force_n, take: mean, s_mm: 50, from_s_mm: 20,"
+                        " axis: [0, 0, -2], from_t_s: 1, t_s: 2, scale: 10, reference: -4, tolerance_percent: [5, 1], order: 1.5, floor: 0.001}\n"
+                        "    - {name: b, quantity: penetration_mm, reference: 0, tolerance: 0.005}\n");
+    const VerifyPlan *plan = &scene->verify;
+    const VerifyCase *a = &plan->cases[0], *b = &plan->cases[1];
+    assert_int_equal(plan->case_count, 2);
+    assert_int_equal(plan->element[1], 20);
+    assert_near(plan->rest_s, 0, 0);                 // a script's end is the moment
+    assert_true(a->quantity == VERIFY_WALL_FORCE && a->take == TAKE_MEAN && a->has_axis && a->axis.z == -1);
+    assert_true(a->s_mm == 50 && a->from_s_mm == 20 && a->from_t_s == 1 && a->t_s == 2 && a->scale == 10 && a->order == 1.5);
+    assert_near(a->tolerance[0], 0.2, 1e-15);
+    assert_near(a->tolerance[1], 0.04, 1e-15);
+    assert_true(b->s_mm == 100 && b->from_s_mm == 0 && b->tolerance_count == 1 && b->tolerance[0] == 0.005 && b->t_s == HUGE_VAL);
+    scene_free(scene);
+    scene = good(WHOLE "verify: {cases: [" CASE "}]}\n");
+    assert_near(scene->verify.rest_s, 20, 0);
+    scene_free(scene);
+}
+
 static void the_contracts_example_with_sheath_and_rig_is_good(void **state)
 {
     (void)state;
@@ -178,6 +223,31 @@ static const Broken broken[] = {
     {RIG("fix: [{s_mm: 200, dof: all}]"), "3:20", "at most 100"},
     {RIG("fix: [{s_mm: 0, dof: [x, w]}]"), "3:32", "one of: x, y, z"},
     {RIG("loads: [{s_mm: end}]"), "3:15", "neither 'force_n'"},
+    // rest shape
+    {REST("[]"), "5:9", "0 entries"},
+    {REST("[{line_mm: 200}]"), "5:9", "200 mm long, the wire 100 mm"},
+    {REST("[{arc: {radius_mm: 0.3, angle_deg: 10}}]"), "5:10", "tighter than the tool is thick"},
+    {REST("[{arc: {radius_mm: 3}}]"), "5:16", "lacks the key 'angle_deg'"},
+    {REST("[{line_mm: 1, arc: {radius_mm: 3, angle_deg: 10}}]"), "5:10", "is one piece"},
+    {VERSION SHEATH "wire:\n  sections: [{length_mm: 100, diameter_mm: 0.36, young_modulus_gpa: 80, rest_curvature_1_mm: 0.1}]\n  rest: [{line_mm: 1}]\n",
+     "5:9", "one of them"},
+    // verify
+    {WHOLE "verify: 1\n", "4:9", "no map"},
+    {WHOLE "verify: {cases: []}\n", "4:17", "0 entries"},
+    {WHOLE "verify: {elements: [20, 10], cases: [" CASE "}]}\n", "4:25", "from coarse to fine"},
+    {VERIFY("quantity: speed, reference: 1, tolerance: 1"), "4:38", "one of: position_mm"},
+    {VERIFY("quantity: position_mm, reference: 1, tolerance: 1"), "4:18", "lacks the key 's_mm'"},
+    {VERIFY("quantity: position_mm, s_mm: 101, reference: 1, tolerance: 1"), "4:57", "at most 100"},
+    {VERIFY("quantity: tangent_deg, s_mm: end, reference: 1, tolerance: 1"), "4:18", "lacks the key 'axis'"},
+    {VERIFY("quantity: push_force_n, s_mm: 1, reference: 1, tolerance: 1"), "4:58", "says nothing here"},
+    {VERIFY("quantity: push_force_n, tolerance: 1"), "4:18", "lacks the key 'reference'"},
+    {VERIFY("quantity: push_force_n, reference: 1"), "4:18", "lacks the key 'tolerance'"},
+    {VERIFY("quantity: push_force_n, reference: 0, tolerance_percent: 1"), "4:85", "is absolute"},
+    {VERIFY("quantity: push_force_n, reference: 1, tolerance: [1, 2]"), "4:77", "1 to 1"},
+    {VERIFY("quantity: push_force_n, reference: 1, tolerance: 1, order: 2"), "4:87", "at least two numbers"},
+    {VERIFY("quantity: push_force_n, reference: 1, tolerance: 1, scale: 0"), "4:87", "divided by it"},
+    {VERIFY("quantity: push_force_n, reference: 1, tolerance: 1, from_t_s: 1"), "4:90", "says nothing here"},
+    {VERIFY("quantity: push_force_n, take: mean, t_s: 1, from_t_s: 2, reference: 1, tolerance: 1"), "4:18", "not before"},
     // vessel
     {WHOLE "vessel: {friction: 0.1}\n", "4:9", "exactly one of model, shape, tube, plane"},
     {WHOLE "vessel: {model: a.h5, plane: {normal: [0, 0, 1]}}\n", "4:30", "second source"},
@@ -295,6 +365,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(units_are_converted_once),
         cmocka_unit_test(what_is_not_said_has_its_default),
+        cmocka_unit_test(a_rest_shape_becomes_sections),
+        cmocka_unit_test(a_verify_plan_is_read),
         cmocka_unit_test(the_contracts_example_with_sheath_and_rig_is_good),
         cmocka_unit_test(each_fault_has_its_line_and_column),
         cmocka_unit_test(all_faults_come_in_one_pass),

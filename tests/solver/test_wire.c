@@ -40,6 +40,25 @@ static void borders_fall_on_nodes(void **state)
     assert_false(wire_create(&w, &b.options.wire, why, sizeof why));
 }
 
+// An element turns by 0.3 rad at rest at most where there are enough of them, in proportion where there are not.
+static void curved_sections_get_more_elements(void **state)
+{
+    (void)state;
+    Bench b;
+    bench_start(&b, 285, 200, 1);
+    b.section[1] = standard_section(15 * PI), b.section[1].rest_curvature = -0.2;          // three half turns of radius 5
+    b.section[2] = standard_section(PI / 4), b.section[2].rest_curvature = 1;              // 45 degrees of radius 1
+    b.options.wire.section_count = 3;
+    int count[3];
+    assert_true(wire_divide(&b.options.wire, count));
+    assert_int_equal(count[0] + count[1] + count[2], 200);
+    assert_true(3 * PI / count[1] < 0.31 && PI / 4 / count[2] < 0.31);
+    b.options.wire.elements = 24;
+    assert_true(wire_divide(&b.options.wire, count));
+    assert_int_equal(count[0] + count[1] + count[2], 24);
+    assert_true(count[0] >= 8 && count[1] >= 10 && count[2] >= 1 && fabs(3 * PI / count[1] - PI / 4 / count[2]) < 0.5);
+}
+
 static void stiffness_of_the_standard_wire(void **state)
 {
     (void)state;
@@ -96,6 +115,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(borders_fall_on_nodes),
+        cmocka_unit_test(curved_sections_get_more_elements),
         cmocka_unit_test(stiffness_of_the_standard_wire),
         cmocka_unit_test(wrong_options_are_refused),
     };
