@@ -13,6 +13,7 @@ static const double DEEP = 0.2;          // [mm] STEP_DEEP
 static const double OVERSHOOT_TRAVEL = 0.05;   // [mm] a point that the solution moves less is where its linearised wall is
 static const double DIP_MIN = 0.002;     // [mm] by which the element may be nearer to the wall than its nodes before its slot counts
 static const double SIGHT = 2;           // [mm] longer elements' slots are asked at any rate
+static const double NOTHING_KNOWN = -1;  // as a clearance: neither place nor force is held
 // A contact between one free node and the sheath is one between nodes with no share for the second.
 static const double NO_SHARE = 1e-300;
 
@@ -66,6 +67,28 @@ static Vec3 motion(const Stepper *s, int point)
     return follow(s, point - nodes, move, turn);
 }
 
+static Vec3 done(const Stepper *s, int node, int from)
+{
+    const double *k = s->linearised + 6 * (size_t)node + from;
+    return vec3(k[0], k[1], k[2]);
+}
+
+// [mm] no slot moves further where its nodes move and turn so.
+static double slot_travel(const Slot *slot, Vec3 move1, Vec3 turn1, Vec3 move2, Vec3 turn2)
+{
+    return sqrt(fmax(vec3_norm2(move1), vec3_norm2(move2))) + slot->near * vec3_norm(turn1) - slot->far * vec3_norm(turn2);
+}
+
+// [mm] that the solution moves a point by from the iterate; a bound where it is a slot.
+static double travel(const Stepper *s, int point)
+{
+    if (point < s->state.node_count)
+        return vec3_norm(change(s, point, 0));
+    const Slot *slot = &s->slot[point - s->state.node_count];
+    int i = slot->element;
+    return slot_travel(slot, change(s, i, 0), change(s, i, 3), change(s, i + 1, 0), change(s, i + 1, 3));
+}
+
 static Vec3 place_of(const Stepper *s, int point)
 {
     int nodes = s->state.node_count;
@@ -88,11 +111,11 @@ bool stepper_escapes(const Stepper *s)
 {
     if (!s->vessel)
         return false;
-    for (int i = s->first_free; i < s->state.node_count; i++)
-        if (vec3_norm(change(s, i, 0)) > s->room[i])
+    for (int p = s->first_free; p < s->state.node_count; p++)
+        if (s->room[p] < HUGE_VAL && travel(s, p) > s->room[p])
             return true;
     for (int p = first_slot(s); p < s->point_count; p++)
-        if (s->room[p] < HUGE_VAL && vec3_norm(motion(s, p)) > s->room[p])
+        if (s->room[p] < HUGE_VAL && travel(s, p) > s->room[p])
             return true;
     return false;
 }
@@ -106,12 +129,12 @@ double stepper_overshoot(Stepper *s)
     for (int p = s->first_free; p < s->point_count; p++) {
         if (p == s->state.node_count)
             p = first_slot(s);
-        if (p == s->point_count || s->place[p].node < 0)
+        if (p == s->point_count)
+            break;
+        double far = travel(s, p);
+        if (far < OVERSHOOT_TRAVEL || s->clearance[p] > far || s->place[p].node < 0 || (p >= s->state.node_count && !place_slot(s, p - s->state.node_count)))
             continue;
         Vec3 d = motion(s, p);
-        double travel = vec3_norm(d);
-        if (s->clearance[p] > travel || travel < OVERSHOOT_TRAVEL)
-            continue;
         s->query_which[count] = p;
         s->query_point[count] = vec3_add(place_of(s, p), d);
         s->query_place[count++] = s->place[p];
@@ -122,14 +145,6 @@ double stepper_overshoot(Stepper *s)
         if (!(s->query_hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)))
             deepest = fmax(deepest, radius_of(s, s->query_which[k]) - s->query_hit[k].gap);
     return deepest;
-}
-
-// How far a node may go in this step, by what is known.
-static double range_of(const Stepper *s, int node)
-{
-    if (s->knows_motion)
-        return 1.5 * vec3_norm(change(s, node, 0));
-    return fabs(s->command.advance) + 2 * s->dt * vec3_norm(s->state.velocity[node]);
 }
 
 double stepper_depth(Stepper *s)
@@ -162,21 +177,36 @@ double stepper_depth(Stepper *s)
     return deepest;
 }
 
+// How far a node may go in this step, by what is known.
+static void estimate_ranges(Stepper *s)
+{
+    for (int i = s->first_free > 0 ? s->first_free - 1 : 0; i < s->state.node_count; i++) {
+        Vec3 v = s->knows_motion ? change(s, i, 0) : s->state.velocity[i];
+        s->range[i] = sqrt(vec3_norm2(v));
+    }
+}
+
 // How far beyond its present gap a point is looked after.
 static double reach_of(const Stepper *s, int point)
 {
     int nodes = s->state.node_count;
-    if (point < nodes)
-        return fmin(REACH_MAX, REACH + range_of(s, point));
-    int i = s->slot[point - nodes].element;
-    return fmin(REACH_MAX, SLOT_REACH + fmax(range_of(s, i), range_of(s, i + 1)));
+    double reach = REACH, range;
+    if (point < nodes) {
+        range = s->range[point];
+    } else {
+        int i = s->slot[point - nodes].element;
+        range = fmax(s->range[i], s->range[i + 1]);
+        reach = SLOT_REACH;
+    }
+    reach += s->knows_motion ? 1.5 * range : fabs(s->command.advance) + 2 * s->dt * range;
+    return reach < REACH_MAX ? reach : REACH_MAX;
 }
 
 static void forget(Stepper *s, int point)
 {
     s->place[point].node = -1;
     s->place[point].has_foot = false;
-    s->clearance[point] = 0;
+    s->clearance[point] = NOTHING_KNOWN;
     s->force[point] = vec3(0, 0, 0);
 }
 
@@ -210,7 +240,7 @@ static void locate(Stepper *s, int point)
 static bool sleeps(Stepper *s, int point)
 {
     s->room[point] = HUGE_VAL;
-    if (s->clearance[point] > 0 && s->knows_motion && vec3_norm(motion(s, point)) > s->clearance[point])
+    if (s->clearance[point] > 0 && s->knows_motion && travel(s, point) > s->clearance[point])
         s->clearance[point] = 0;
     if (!(s->clearance[point] > 0))
         return false;
@@ -223,6 +253,7 @@ static void ask(Stepper *s, int point, int *count)
 {
     if (s->place[point].node < 0)
         locate(s, point);
+    s->clearance[point] = 0;
     s->query_which[*count] = point;
     s->query_point[*count] = place_of(s, point);
     s->query_place[(*count)++] = s->place[point];
@@ -248,8 +279,10 @@ static int answer(Stepper *s, int first, int count, int *candidate)
 {
     double reach = 0;
     int candidates = 0, nodes = s->state.node_count;
-    for (int k = first; k < count; k++)
-        reach = fmax(reach, reach_of(s, s->query_which[k]) + radius_of(s, s->query_which[k]));
+    for (int k = first; k < count; k++) {
+        double own = reach_of(s, s->query_which[k]) + radius_of(s, s->query_which[k]);
+        reach = own > reach ? own : reach;
+    }
     // distances grow with what is asked for: twice the reach lets most far points sleep for a while
     if (count > first)
         vessel_query(s->vessel, count - first, s->query_point + first, 2 * reach, s->query_place + first, s->query_hit + first);
@@ -307,39 +340,33 @@ static bool is_covered(const Stepper *s, int k)
     return fabs(one - other) < 5 * DIP_MIN && fmin(one, other) > alone - DIP_MIN;
 }
 
+// [mm] by which a slot is further from where it could touch than its nodes' clearances can tell; an arc is longer than its chord, 5 % are enough.
+static double clearance_by_nodes(const Stepper *s, const Slot *slot)
+{
+    int i = slot->element;
+    double length = 1.05 * s->wire.length[i], near = s->clearance[i] - slot->xi * length, far = s->clearance[i + 1] - (1 - slot->xi) * length;
+    return near > far ? near : far;
+}
+
 static int ask_slots(Stepper *s, int count)
 {
     int nodes = s->state.node_count;
     for (int p = first_slot(s); p < s->point_count; p++) {
-        int k = p - nodes, i = s->slot[k].element;
-        s->room[p] = HUGE_VAL;
-        if (!place_slot(s, k)) {
-            forget(s, p);
-            continue;
-        }
+        int k = p - nodes;
         if (sleeps(s, p))
             continue;
-        bool mouth = at_mouth(s, i);
-        Vec3 x = s->slot_place[k].position;
-        double near = mouth ? 0 : s->clearance[i] - vec3_distance(x, s->state.position[i]);
-        double bound = fmax(near, s->clearance[i + 1] - vec3_distance(x, s->state.position[i + 1]));
+        double bound = clearance_by_nodes(s, &s->slot[k]);
         if (bound > 0)
             s->room[p] = bound + REACH;
-        if (bound > 0 || is_covered(s, k))
-            forget(s, p);    // what it knew grows old; its neighbours' knowledge does not
-        else
+        if (bound <= 0 && place_slot(s, k) && !is_covered(s, k))
             ask(s, p, &count);
+        else if (s->clearance[p] != NOTHING_KNOWN)
+            forget(s, p);    // what it knew grows old; its neighbours' knowledge does not
     }
     return count;
 }
 
 // --- candidates ---
-
-static Vec3 done(const Stepper *s, int node, int from)
-{
-    const double *k = s->linearised + 6 * (size_t)node + from;
-    return vec3(k[0], k[1], k[2]);
-}
 
 // What of the motion from x_n the iterate has done already, at the touching point: unknowns are displacements from x_n.
 static Vec3 done_at(const Stepper *s, int point, Vec3 arm)
@@ -374,12 +401,12 @@ static void lean_on_sheath(const Stepper *s, int k, ContactPoint *c)
 
 // A wire that slides along a convex wall has gone round it by h v / R at the step's end. That curvature is not in the matrix (contact.c), and a force along the
 // normal of the step's start would drag like friction of h v / R: 50 mm/s in a bend of 15 mm took 0.5 % a quarter turn. So the wall is linearised
-// about where the sliding takes the node: normal n + H d, gap g - d'Hd / 2, d = h v along the tool alone, which is steady (ahead of what moves
+// about where the sliding takes the point: normal n + H d, gap g - d'Hd / 2, d = h v along the tool alone, which is steady (ahead of what moves
 // across it a wire that settles would swing).
-static void look_ahead(const Stepper *s, int node, ContactPoint *c)
+static void look_ahead(double dt, Vec3 axis, Vec3 velocity, ContactPoint *c)
 {
     static const double TURN_AHEAD = 0.1;        // [rad] further than this nobody slides along a smooth wall
-    Vec3 axis = quat_rotate(s->state.orientation[node], vec3(1, 0, 0)), d = vec3_scale(axis, s->dt * vec3_dot(axis, s->state.velocity[node]));
+    Vec3 d = vec3_scale(axis, dt * vec3_dot(axis, velocity));
     d = vec3_add_scaled(d, -vec3_dot(d, c->normal), c->normal);
     Vec3 turn = sym3_mul_vec(&c->hessian, d);
     double rise = vec3_dot(d, turn);
@@ -392,23 +419,28 @@ static void look_ahead(const Stepper *s, int node, ContactPoint *c)
 static void add_candidate(Stepper *s, int point, const VesselHit *hit)
 {
     int nodes = s->state.node_count;
-    double radius = radius_of(s, point), friction = point < nodes ? s->wire.friction[point] : s->slot[point - nodes].friction;
-    ContactPoint c = {.node = point, .normal = hit->normal, .gap = fmax(hit->gap - radius, -STEP_OUT_MAX), .hessian = hit->hessian,
-                      .friction = friction >= 0 ? friction : s->wall_friction, .tool_radius = radius, .force = s->force[point]};
+    const SlotPlace *p = point < nodes ? NULL : &s->slot_place[point - nodes];
+    double radius = radius_of(s, point), friction = p ? s->slot[point - nodes].friction : s->wire.friction[point], gap = hit->gap - radius;
+    ContactPoint *c = &s->set.point[s->set.count];
+    s->candidate[s->set.count++] = point;
+    c->node = p ? s->slot[point - nodes].element : point;
+    c->xi = p ? p->weight : 0;
+    c->lever[0] = p ? p->lever[0] : vec3(0, 0, 0);
+    c->lever[1] = p ? p->lever[1] : vec3(0, 0, 0);
+    c->normal = hit->normal;
+    c->gap = gap > -STEP_OUT_MAX ? gap : -STEP_OUT_MAX;
+    c->hessian = hit->hessian;
+    c->friction = friction >= 0 ? friction : s->wall_friction;
+    c->tool_radius = radius;
+    c->force = s->force[point];
     if (s->is_iterate)
-        c.gap -= vec3_dot(done_at(s, point, vec3_scale(hit->normal, -radius)), hit->normal);
-    else if (point < nodes)
-        look_ahead(s, point, &c);
-    if (point >= nodes) {
-        const SlotPlace *p = &s->slot_place[point - nodes];
-        c.node = s->slot[point - nodes].element;
-        c.xi = p->weight;
-        c.lever[0] = p->lever[0], c.lever[1] = p->lever[1];
-        if (at_mouth(s, c.node))
-            lean_on_sheath(s, point - nodes, &c);
-    }
-    s->candidate[s->set.count] = point;
-    s->set.point[s->set.count++] = c;
+        c->gap -= vec3_dot(done_at(s, point, vec3_scale(hit->normal, -radius)), hit->normal);
+    else if (p)
+        look_ahead(s->dt, p->tangent, vec3_mix(s->state.velocity[c->node], s->state.velocity[c->node + 1], p->weight), c);
+    else
+        look_ahead(s->dt, tangent_at(s, point), s->state.velocity[point], c);
+    if (p && at_mouth(s, c->node))
+        lean_on_sheath(s, point - nodes, c);
 }
 
 void stepper_keep_forces(Stepper *s)
@@ -445,6 +477,7 @@ static void report_wall(Stepper *s, int nodes, int count)
     int next = s->first_free;
     bool was_inside = false;
     unsigned flags = 0;
+    double deepest = s->report.penetration;
     for (int k = 0; k < count; k++) {
         const VesselHit *hit = &s->query_hit[k];
         if (k < nodes) {
@@ -458,10 +491,10 @@ static void report_wall(Stepper *s, int nodes, int count)
         was_inside |= k < nodes;
         flags |= hit->flags & VESSEL_UNSURE ? STEP_DETECTION_UNSURE : 0;
         double outside = radius_of(s, s->query_which[k]) - hit->gap;
-        s->report.penetration = fmax(s->report.penetration, outside);
-        flags |= outside > DEEP ? STEP_DEEP : 0;
+        deepest = outside > deepest ? outside : deepest;
     }
-    s->report.flags |= flags;
+    s->report.penetration = deepest;
+    s->report.flags |= flags | (deepest > DEEP ? STEP_DEEP : 0);
 }
 
 void stepper_detect(Stepper *s)
@@ -469,6 +502,7 @@ void stepper_detect(Stepper *s)
     s->set.count = 0;
     if (!s->vessel)
         return;
+    estimate_ranges(s);
     int *candidate = s->query_near, nodes = ask_nodes(s);
     int node_candidates = answer(s, 0, nodes, candidate);
     int count = ask_slots(s, nodes);
@@ -485,12 +519,10 @@ void stepper_use_clearance(Stepper *s)
 {
     int nodes = s->state.node_count;
     for (int p = first_slot(s); p < s->point_count; p++) {
-        if (!(s->clearance[p] > 0))
-            continue;
         const Slot *slot = &s->slot[p - nodes];
         int i = slot->element;
-        double shift = fmax(vec3_norm(done(s, i, 0)), vec3_norm(done(s, i + 1, 0)));
-        s->clearance[p] -= shift + slot->near * vec3_norm(done(s, i, 3)) - slot->far * vec3_norm(done(s, i + 1, 3));
+        if (s->clearance[p] > 0)
+            s->clearance[p] = fmax(0, s->clearance[p] - slot_travel(slot, done(s, i, 0), done(s, i, 3), done(s, i + 1, 0), done(s, i + 1, 3)));
     }
 }
 

@@ -69,6 +69,7 @@ struct Stepper {
     int *query_near;         // (P) questions whose points are candidates
     int *answer_of;          // (M) the question about a node, -1: none
     int *candidate;          // (P) the points of `set`
+    double *range;           // (M) [mm] or [mm/ms] that a node moves, or is likely to
     double *room;            // (P) [mm] how far a point that is no candidate may go from the iterate; HUGE_VAL for candidates
     double *scratch;         // owns the arrays of doubles
 

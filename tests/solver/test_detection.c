@@ -186,6 +186,7 @@ static void sleepers_miss_nothing(void **state)
             b[j].section[0].length = 70;
             b[j].section[1] = standard_section(10), b[j].section[1].rest_curvature = 0.2, b[j].section[1].young_modulus = 20e3;
             b[j].options.wire.section_count = 2;
+            b[j].options.contact.tolerance = 1e-9;
             b[j].options.wire.damping_stiffness = 0.2, b[j].options.wire.damping_mass = 1e-4;
             s[j] = bench_make(&b[j]);
         }
