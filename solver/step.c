@@ -25,10 +25,11 @@ enum { NEWTON_MAX = 4 };
 // twice NEWTON_MAX of them.
 static const double OVERSHOOT = 0.03;
 // Where a motion is followed in halves: [mm] of depth that it may leave, halves at most, [mm] of the hand's advance that later steps make up.
-static const double DEPTH_MAX = 0.05, OWED_MAX = 0.5;
-enum { HALVES_MAX = 8 };
+static const double DEPTH_MAX = 0.05, OWED_MAX = 0.2;
+enum { HALVES_MAX = 8, MEETINGS_MAX = 2 };
 // A tool that is squeezed by more than this share of its length is beyond what its elements describe (and would have yielded): the hand stalls.
 static const double SQUEEZE_MAX = 0.03;
+static const double LET_GO_TURN = 0.1;           // [rad] by which a node that is let go at the mouth is turned at most
 
 // --- creation ---
 
@@ -327,6 +328,9 @@ static void let_go(Stepper *s, int node)
     sheath_element(r, node, s->mouth, s->axis[0], along, w->orientation[node], w->position[node + 1], w->orientation[node + 1], 0, &e);
     Vec3 moment = vec3_add_scaled(e.out.moment1, -vec3_dot(e.out.moment1, s->axis[0]), s->axis[0]);
     Vec3 curvature = vec3_add_scaled(sheath_rest_curvature(r, node - 1, w->orientation[node]), -1 / r->bending[node - 1], moment);
+    double bend = vec3_norm(curvature) * along;
+    if (bend > LET_GO_TURN)          // sprang out of the sheath: no curve is known that far
+        curvature = vec3_scale(curvature, LET_GO_TURN / bend);
     w->position[node] = vec3_add_scaled(w->position[node], 0.5 * along * along, vec3_cross(curvature, s->axis[0]));
     w->orientation[node] = quat_unit(quat_mul(quat_from_rotation_vector(vec3_scale(curvature, along)), w->orientation[node]));
 }
@@ -560,11 +564,14 @@ static void copy_iterate(Stepper *s, bool back)
         memcpy(back ? live[i] : kept[i], back ? kept[i] : live[i], size[i]);
 }
 
+static double largest_part(const Stepper *s) { return s->turn > TURN_MAX ? TURN_MAX / s->turn : 1; }
+
 // The share of the solution that was followed. A quiet step goes all the way, and so does a wire without walls but for TURN_MAX. Else only as far as
-// no node is driven through the wall and the wire is not left with energy that nobody gave it: by halves, from places that are good.
+// no node is driven through the wall and the wire is not left with energy that nobody gave it. Where the wall is not where its linear form has it,
+// the form is first moved there and the contacts solved again (a second-order correction); then by halves, from places that are good.
 static double follow(Stepper *s)
 {
-    double part = s->turn > TURN_MAX ? TURN_MAX / s->turn : 1;
+    double part = largest_part(s);
     if (!s->vessel || (s->turn <= NEWTON_MOTION_IN_CONTACT && !s->overshoots)) {
         move(s, part);
         return part;
@@ -575,14 +582,24 @@ static double follow(Stepper *s)
     }
     double bound = s->has_sheath && s->load_count == 0 ? energy_bound(s) : HUGE_VAL;
     copy_iterate(s, false);
-    for (int k = 0; k < HALVES_MAX; k++, part /= 2) {
+    for (int k = 0; k < HALVES_MAX; k++) {
         move(s, part);
         double depth = stepper_depth(s);
-        if (depth <= fmax(DEPTH_MAX, s->depth) && stepper_elastic_energy(s) <= bound) {
+        bool contained = depth <= fmax(DEPTH_MAX, s->depth);
+        if (contained && stepper_elastic_energy(s) <= bound) {
             s->depth = depth;
             return part;
         }
+        bool meets = !contained && k < MEETINGS_MAX && stepper_meet_walls(s, part);
         copy_iterate(s, true);
+        part /= 2;
+        if (meets) {
+            solve(s);
+            if (s->has_failed)
+                return 0;
+            s->turn = largest_turn(s);
+            part = largest_part(s);
+        }
     }
     return 0;
 }
@@ -599,6 +616,7 @@ void step_contact(Stepper *s)
             s->blocked = true;
             break;
         }
+        stepper_use_clearance(s);
         s->is_iterate = true;
         stepper_detect(s);
         stepper_assemble(s);
@@ -634,8 +652,6 @@ static void set_velocities(Stepper *s)
         }
         w->velocity[i] = vec3(u[0] * rate, u[1] * rate, u[2] * rate);
         w->spin[i] = vec3(u[3] * rate, u[4] * rate, u[5] * rate);
-        if (s->clearance[i] > 0)
-            s->clearance[i] -= sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
     }
     stepper_use_clearance(s);
 }

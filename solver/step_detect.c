@@ -5,6 +5,8 @@
 // wall than from the slot, and in short elements not where the wall as both nodes see it, gap + n.d + d'Hd/2, comes no nearer than the nodes do.
 #include "solver/step_internal.h"
 
+#include <string.h>
+
 static const double REACH = 0.3;         // [mm] candidates beyond what the nodes' speed asks for: contact forces can push neighbours about
 static const double SLOT_REACH = 0.1;    // [mm] the same for slots, whose nodes are candidates long before
 static const double REACH_MAX = 5;       // [mm]
@@ -137,36 +139,6 @@ double stepper_overshoot(Stepper *s)
         Vec3 d = motion(s, p);
         s->query_which[count] = p;
         s->query_point[count] = vec3_add(place_of(s, p), d);
-        s->query_place[count++] = s->place[p];
-    }
-    if (count > 0)
-        vessel_query(s->vessel, count, s->query_point, 0.5, s->query_place, s->query_hit);
-    for (int k = 0; k < count; k++)
-        if (!(s->query_hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)))
-            deepest = fmax(deepest, radius_of(s, s->query_which[k]) - s->query_hit[k].gap);
-    return deepest;
-}
-
-double stepper_depth(Stepper *s)
-{
-    int count = 0;
-    double deepest = 0;
-    for (int p = s->first_free; p < s->point_count; p++) {
-        int nodes = s->state.node_count, node = p;
-        if (p == nodes)
-            p = first_slot(s);
-        if (p == s->point_count || s->place[p].node < 0)
-            continue;
-        if (p >= nodes) {
-            if (!place_slot(s, p - nodes))
-                continue;
-            node = s->slot[p - nodes].element + 1;
-        }
-        const double *k = s->linearised + 6 * (size_t)node;
-        if (s->clearance[p] > vec3_norm(vec3(k[0], k[1], k[2])))
-            continue;
-        s->query_which[count] = p;
-        s->query_point[count] = place_of(s, p);
         s->query_place[count++] = s->place[p];
     }
     if (count > 0)
@@ -443,6 +415,52 @@ static void add_candidate(Stepper *s, int point, const VesselHit *hit)
         lean_on_sheath(s, point - nodes, c);
 }
 
+double stepper_depth(Stepper *s)
+{
+    int count = 0;
+    double deepest = 0;
+    for (int p = s->first_free; p < s->point_count; p++) {
+        int nodes = s->state.node_count;
+        if (p == nodes)
+            p = first_slot(s);
+        if (p == s->point_count || s->place[p].node < 0 || (p >= nodes && !place_slot(s, p - nodes)))
+            continue;
+        if (!s->is_iterate && s->clearance[p] > vec3_norm(done_at(s, p, vec3(0, 0, 0))))
+            continue;
+        s->query_which[count] = p;
+        s->query_point[count] = place_of(s, p);
+        s->query_place[count++] = s->place[p];
+    }
+    if (count > 0)
+        vessel_query(s->vessel, count, s->query_point, 0.5, s->query_place, s->query_hit);
+    for (int k = 0; k < count; k++)
+        if (!(s->query_hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)))
+            deepest = fmax(deepest, radius_of(s, s->query_which[k]) - s->query_hit[k].gap);
+    return deepest;
+}
+
+bool stepper_meet_walls(Stepper *s, double part)
+{
+    int count = s->set.count;
+    bool any = false;
+    for (int k = 0; k < count; k++) {
+        s->query_point[k] = place_of(s, s->candidate[k]);
+        s->query_place[k] = s->place[s->candidate[k]];
+    }
+    if (count > 0)
+        vessel_query(s->vessel, count, s->query_point, 0.5, s->query_place, s->query_hit);
+    for (int k = 0; k < count; k++) {
+        ContactPoint *c = &s->set.point[k];
+        double radius = radius_of(s, s->candidate[k]), gap = s->query_hit[k].gap - radius;
+        double linear = c->gap + vec3_dot(done_at(s, s->candidate[k], vec3_scale(c->normal, -radius)), c->normal);
+        if ((s->query_hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)) || !(gap < 0 && gap < linear))
+            continue;
+        c->gap += fmax((gap - linear) / part, -STEP_OUT_MAX);
+        any = true;
+    }
+    return any;
+}
+
 void stepper_keep_forces(Stepper *s)
 {
     int nodes = s->state.node_count;
@@ -518,6 +536,13 @@ void stepper_detect(Stepper *s)
 void stepper_use_clearance(Stepper *s)
 {
     int nodes = s->state.node_count;
+    if (s->is_iterate) {       // known from other places than x_n
+        memset(s->clearance, 0, (size_t)s->point_count * sizeof *s->clearance);
+        return;
+    }
+    for (int i = s->first_free; i < nodes; i++)
+        if (s->clearance[i] > 0)
+            s->clearance[i] -= vec3_norm(done(s, i, 0));
     for (int p = first_slot(s); p < s->point_count; p++) {
         const Slot *slot = &s->slot[p - nodes];
         int i = slot->element;

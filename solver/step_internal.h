@@ -95,7 +95,9 @@ bool stepper_escapes(const Stepper *s);
 double stepper_overshoot(Stepper *s);
 // How deep outside the true wall the nodes are that may have come near it in this step [mm], >= 0.
 double stepper_depth(Stepper *s);
-// Takes this step's travel off the slots' clearances.
+// At a trial, `part` of the way: moves the candidates' linear walls in to where the trial finds the true ones. False where all stand right.
+bool stepper_meet_walls(Stepper *s, double part);
+// Takes the travel so far off the clearances.
 void stepper_use_clearance(Stepper *s);
 // A node goes into the sheath, with the element before it: nothing of the wall is remembered.
 void stepper_forget(Stepper *s, int node);
