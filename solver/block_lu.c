@@ -127,12 +127,13 @@ static void refine(BlockLu *lu, const double *diag, const double *lower, const d
         x[k] += lu->change[k];
 }
 
-bool block_lu_factor_solve(BlockLu *lu, const double *diag, const double *lower, const double *upper, const double *b, double *x)
+bool block_lu_factor_solve(BlockLu *lu, const double *diag, const double *lower, const double *upper, const double *b, double *x, bool *exact)
 {
     if (!eliminate_on[simd_level()](lu, diag, lower, upper, b))
         return false;
     back_on[simd_level()](lu, x);
-    if (!all_positive(lu))
+    *exact = all_positive(lu);
+    if (!*exact)
         refine(lu, diag, lower, upper, b, x);
     return true;
 }

@@ -30,6 +30,9 @@ struct ContactSolver {
     Vec3 *best;                  // (capacity) forces of the best iterate …
     double *best_u;              // … and its motion (M, 6)
     bool *flag;                  // (capacity)
+    int stalls;                  // of the line search in this solve …
+    double slope;                // … and what they make of r over k
+    bool inexact;                // a factor of this solve may have lost digits
     bool symmetric;              // which of the two factors holds the matrix
     double *rhs, *delta;         // (M, 6)
     BlockChain matrix;           // with the contacts' laws: diag and A(i, i+1) by columns (which is the row-major lower of a symmetric chain)

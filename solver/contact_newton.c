@@ -21,6 +21,8 @@
 //   ever. Forces and motion are linear along a step, so their equations can be evaluated at any part of it without a solve: from the fourth
 //   iteration on the step is halved until they are better fulfilled than before. (Changing states one at a time, or minimising the convex problem
 //   of Tresca's friction in between, was tried before and cost ten times as much in the cases that need it.)
+// - The search can stall at a kink, where the states say one direction and their own boundary another. Then the rule for reversed contacts is
+//   turned off or on again, every second time r is changed too, and after two stalls in a row the whole step is taken.
 //
 // Forces leave cut to their cones, which changes them by no more than the residual. The motion is not balanced again with them: the wire's bending
 // is so soft against its stretching that a force off by 1e-8 of the largest moves it by as much as a residual of 0.1, so that iterates that
@@ -34,13 +36,14 @@ enum { OPEN, STICK, SLIP };
 
 // Penalty P over k: the rest after an iteration is about 1/P; rounding of the matrix grows with it.
 static const double penalty = 1e4;
-// r over k, in the choice of states and in the line search: neither changes the solution.
-static const double slope = 1e-3, merit_slope = 0.01;
+// r over k, in the choice of states (usual and after stalls) and in the line search: none changes the solution.
+static const double usual_slope = 1e-3, other_slope = 1e-2, merit_slope = 1e-2;
 enum { FIRST_SEARCH = 3, HALVINGS = 6 };
+static const double stall = 0.05; // a step cut to less gets nowhere
 
 static double normal_violation(const ContactRow *c, Vec3 motion) { return c->gap + vec3_dot(motion, c->normal); }
 
-static Vec3 slide_direction(const ContactRow *c, Vec3 motion, double *size)
+static Vec3 slide_direction(const ContactRow *c, Vec3 motion, double slope, double *size)
 {
     Vec3 p = vec3_add_scaled(contact_tangential(c->force, c->normal), -slope * c->stiffness_t, contact_tangential(motion, c->normal));
     *size = vec3_norm(p);
@@ -86,6 +89,7 @@ static void choose_active(const ContactSolver *s, int count, bool *active)
 static int choose_states(ContactSolver *s, int count, bool first)
 {
     int changes = 0, pressing = 0;
+    s->slope = s->stalls / 2 % 2 ? other_slope : usual_slope;
     for (int i = 0; i < count; i++)
         pressing += s->law[i].state != OPEN;
     if (first && pressing > 0)
@@ -100,9 +104,9 @@ static int choose_states(ContactSolver *s, int count, bool first)
             state = SLIP;
             if (c->friction > 0) {
                 double size;
-                slide_direction(c, s->motion[i], &size);
+                slide_direction(c, s->motion[i], s->slope, &size);
                 Vec3 slide = contact_tangential(s->motion[i], c->normal);
-                bool reversed = was == SLIP && !first && vec3_dot(slide, c->force) > 0;
+                bool reversed = s->stalls % 2 == 0 && was == SLIP && !first && vec3_dot(slide, c->force) > 0;
                 state = reversed || size <= friction_bound(c, s->motion[i]) ? STICK : SLIP;
             }
         }
@@ -124,7 +128,7 @@ static Mat3 law_matrix(Vec3 n, double kn, Vec3 oblique, double across, Vec3 p)
 }
 
 // Fills law->force (g, the force where the contact has moved by `from`) and, unless the old factor is used again, law->c.
-static void write_law(const ContactRow *c, Vec3 motion, Vec3 from, bool keep_matrix, ContactLaw *law)
+static void write_law(const ContactRow *c, Vec3 motion, Vec3 from, double slope, bool keep_matrix, ContactLaw *law)
 {
     Vec3 n = c->normal, none = {0, 0, 0}, slide = contact_tangential(from, n), ft = contact_tangential(c->force, n);
     double kn = penalty * c->stiffness_n, kt = penalty * c->stiffness_t;
@@ -138,7 +142,7 @@ static void write_law(const ContactRow *c, Vec3 motion, Vec3 from, bool keep_mat
         force = vec3_scale(n, gn);
         if (c->friction > 0) {
             double size, bound = friction_bound(c, motion);
-            p = slide_direction(c, motion, &size);
+            p = slide_direction(c, motion, slope, &size);
             across = size > bound ? fmin(kt, bound * slope * c->stiffness_t / (size - bound)) : size > 0 ? kt : 0;
             law->along = vec3_scale(p, c->friction);
             oblique = vec3_scale(law->along, kn);
@@ -262,10 +266,8 @@ static double merit(const ContactSolver *s, int count, double t)
 static double step_length(const ContactSolver *s, int count)
 {
     double start = merit(s, count, 0), least = HUGE_VAL, best = 1, t = 1;
-    for (int k = 0; k < HALVINGS; k++, t /= 2) {
+    for (int k = 0; k < HALVINGS && least > start; k++, t /= 2) {
         double m = merit(s, count, t);
-        if (m <= start)
-            return t;
         if (m < least) {
             least = m;
             best = t;
@@ -288,19 +290,21 @@ static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bo
         memset(s->rhs, 0, bytes);
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &s->row[i];
-        write_law(c, s->motion[i], b ? none : s->motion[i], reuse, &s->law[i]);
+        write_law(c, s->motion[i], b ? none : s->motion[i], s->slope, reuse, &s->law[i]);
         symmetric &= s->law[i].state != SLIP || c->friction == 0;
         contact_row_push(c, b ? s->law[i].force : vec3_sub(s->law[i].force, c->force), s->rhs);
     }
+    bool exact = true;
     if (reuse) {
         block_factor_solve(s->factor, s->rhs, s->delta);
     } else {
         assemble(s, chain, count);
         s->symmetric = symmetric;
         if (symmetric ? !block_chain_factor_solve(&s->matrix, s->factor, s->rhs, s->delta)
-                      : !block_lu_factor_solve(s->lu, s->matrix.diag, s->turned, s->matrix.lower, s->rhs, s->delta))
+                      : !block_lu_factor_solve(s->lu, s->matrix.diag, s->turned, s->matrix.lower, s->rhs, s->delta, &exact))
             return false;
     }
+    s->inexact |= !exact;
     for (int i = 0; i < count; i++) {
         ContactLaw *law = &s->law[i];
         law->step = contact_row_motion(&s->row[i], s->delta);
@@ -324,6 +328,19 @@ static bool take_step(ContactSolver *s, int unknowns, int count, double t, doubl
         sum += fabs(f->x) + fabs(f->y) + fabs(f->z);
     }
     return sum <= DBL_MAX;
+}
+
+// How far u is from balance with the forces [N, N mm].
+static double imbalance(ContactSolver *s, const BlockChain *chain, const double *b, int count, const double *u)
+{
+    double worst = 0;
+    memcpy(s->rhs, b, (size_t)chain->count * 6 * sizeof *b);
+    for (int i = 0; i < count; i++)
+        contact_row_push(&s->row[i], s->row[i].force, s->rhs);
+    block_chain_multiply(chain, u, s->delta);
+    for (int k = 0; k < 6 * chain->count; k++)
+        worst = fmax(worst, fabs(s->delta[k] - s->rhs[k]));
+    return worst;
 }
 
 // Keeps an iterate, or goes back to the one that was kept.
@@ -360,14 +377,17 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
     contact_balance(s, factor, b, count, u);
     contact_residual(s->row, count, s->motion, &report);
     double least = HUGE_VAL, residual = report.residual; // of the best iterate, its error in N and its residual
-    bool fresh = true, finite = true; // no factor yet
+    bool fresh = true, finite = true, unbalanced = false; // no factor yet
+    int in_a_row = 0;
+    s->stalls = 0;
+    s->inexact = false;
     while (report.residual > options->tolerance && report.iterations < most) {
         if (report.residual * report.largest < least) {
             least = report.residual * report.largest;
             residual = report.residual;
             copy_iterate(s, unknowns, count, true, u);
         }
-        bool first = report.iterations == 0, search = report.iterations >= FIRST_SEARCH;
+        bool first = report.iterations == 0, search = report.iterations >= FIRST_SEARCH && !unbalanced;
         if (first)
             assemble_reset(s, chain, count);
         bool reuse = choose_states(s, count, first) == 0 && !fresh && report.residual < 1e-3 && s->symmetric;
@@ -378,12 +398,24 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
             memset(s->motion, 0, (size_t)count * sizeof *s->motion);
         }
         double t = search ? step_length(s, count) : 1, before = report.residual;
+        in_a_row = t < stall ? in_a_row + 1 : 0;
+        s->stalls += t < stall;
+        if (in_a_row == 2) {
+            t = 1;
+            in_a_row = 0;
+        }
         report.iterations++;
         finite = take_step(s, unknowns, count, t, u);
         if (!finite)
             break;
         contact_residual(s->row, count, s->motion, &report);
         fresh = reuse && report.residual > 0.05 * before; // the old factor does not serve any more
+        unbalanced = false;
+        if (s->inexact && report.residual <= options->tolerance) { // digits lost on the way: once more for the whole motion
+            report.residual = fmax(report.residual, imbalance(s, chain, b, count, u) / report.largest);
+            unbalanced = report.residual > options->tolerance;
+            s->inexact = false;
+        }
     }
     report.converged = finite && report.residual <= options->tolerance;
     if (!report.converged && report.iterations > 0 && !(finite && report.residual * report.largest < least)) {
