@@ -208,11 +208,81 @@ static void whip(void **state)
     }
 }
 
+// A long wire under the thrust F in a straight tube of radial clearance r coils: F = 2 EI sin^2 psi cos psi / r^2, pitch 2 pi r / tan psi, pressed on the wall by
+// EI sin^4 psi / r^3 a length. Pushed on with friction, 1/F_tip = 1/F_prox + mu r L / (4 EI) (small psi; the wire is off the wall near its ends). A weak
+// load across, removed before anything is measured, says which way round. Ends are free of the helix over a pitch or two: the middle 40 % is measured.
+typedef struct Coil {
+    double pitch, pressure;
+} Coil;
+
+static Coil coil_of(Stepper *s, double length, double r)
+{
+    const WireState *w = stepper_state(s);
+    NodeReport *node = calloc((size_t)w->node_count + 1, sizeof *node);
+    stepper_node_report(s, node);
+    double turn = 0, force = 0, from = 0, to = 0;
+    for (int i = 1, count = 0; i < w->node_count; i++) {
+        Vec3 p = w->position[i], q = w->position[i - 1];
+        if (p.x < 0.3 * length || p.x > 0.7 * length)
+            continue;
+        if (count++ == 0)
+            from = q.x;
+        to = p.x;
+        turn += atan2(q.y * p.z - q.z * p.y, q.y * p.y + q.z * p.z);
+        force -= (node[i].force.y * p.y + node[i].force.z * p.z) / r;
+    }
+    free(node);
+    return (Coil){2 * PI * (to - from) / fabs(turn), force / (to - from)};
+}
+
+static void helix_in_a_cylinder(void **state)
+{
+    (void)state;
+    enum { LENGTH = 200, BEHIND = 20, ELEMENTS = LENGTH + BEHIND };
+    const double r = 0.5, psi = 0.15, sine = sin(psi), force = 2 * EI_STANDARD * sine * sine * cos(psi) / (r * r), pitch = 2 * PI * r / tan(psi), mu = 0.1;
+    TubePiece piece = line_piece(2 * LENGTH);
+    Vessel *tube = tube_of(&piece, 1, r + 0.18);
+    WireLoad load[ELEMENTS + 1];
+    Bench b;
+    bench_in_tube(&b, tube, 0, ELEMENTS, ELEMENTS, LENGTH, 1);
+    b.options.wire.load = load;
+    b.options.wire.damping_mass = 0.02, b.options.wire.damping_stiffness = 0.2;
+    Stepper *s = NULL;
+    Checkpoint *c = NULL;
+    for (int k = 1; k <= 60; k++) {
+        load[0] = (WireLoad){.s = ELEMENTS, .force = vec3(-force * fmin(k / 40.0, 1), 0, 0)};
+        for (int i = 0; i < ELEMENTS; i++)
+            load[i + 1] = (WireLoad){.s = i, .force = vec3(0, 0.02 * cos(2 * PI * i / pitch), 0.02 * sin(2 * PI * i / pitch))};
+        b.options.wire.load_count = k < 45 ? ELEMENTS + 1 : 1;
+        stepper_destroy(s);
+        s = bench_make(&b);
+        if (c)
+            stepper_restore(s, c);
+        settle(s, 100, k < 58 ? 100 : 500, 0);
+        c = stepper_save(s, c);
+    }
+    Coil coil = coil_of(s, LENGTH, r);
+    double angle = atan(2 * PI * r / coil.pitch);
+    assert_true(fabs(row("helix", "pitch mm", pitch, coil.pitch)) < 0.01);
+    assert_true(fabs(row("helix", "thrust from its angle N", force, 2 * EI_STANDARD * sin(angle) * sin(angle) * cos(angle) / (r * r))) < 0.02);
+    assert_true(fabs(row("helix", "pressure N/mm", EI_STANDARD * sine * sine * sine * sine / (r * r * r * cos(psi)), coil.pressure)) < 0.03);
+    stepper_destroy(s);
+    b.options.wall_friction = mu;
+    s = bench_make(&b);
+    stepper_restore(s, c);
+    feed(s, 3, 600);
+    assert_true(fabs(row("helix, mu 0.1", "push N", 1 / (1 / force - mu * r * LENGTH / (4 * EI_STANDARD)), step_report(s)->proximal_force)) < 0.04);
+    checkpoint_free(c);
+    stepper_destroy(s);
+    tube->destroy(tube);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(strut_over_a_wall),
         cmocka_unit_test(sinusoidal_buckling_under_weight),
+        cmocka_unit_test(helix_in_a_cylinder),
         cmocka_unit_test(whip),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
