@@ -456,7 +456,7 @@ static void blend_batch(const LimVessel *lim, const FootBatch *b, const Lane *of
     for (int i = 0; i < filled; i++) {
         mixture.agree[i] = blend_agree(b->radius[i]);
         mixture.total[i] = mixture.gap[i] = mixture.nx[i] = mixture.ny[i] = mixture.nz[i] = 0;
-        partner.at.f[i] = partner.at.gx[i] = partner.at.gy[i] = partner.at.gz[i] = 0;
+        partner.at.f[i] = partner.at.gx[i] = partner.at.gy[i] = partner.at.gz[i] = partner.move[i] = 0;
     }
     for (int k = 0; k < most; k++) {
         int lane[FOOT_BATCH], n = 0;
