@@ -254,10 +254,10 @@ static double merit(const ContactSolver *s, int count, double t)
     double sum = 0;
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &s->row[i];
-        if (c->inert)
+        Vec3 d = vec3_add_scaled(s->motion[i], t, s->law[i].step);
+        if (c->inert || (contact_row_is_idle(c, d) && s->law[i].state == OPEN))
             continue;
-        Vec3 f = vec3_mix(c->force, s->law[i].force, t), d = vec3_add_scaled(s->motion[i], t, s->law[i].step);
-        Vec3 error = contact_error(c, f, d, merit_slope);
+        Vec3 error = contact_error(c, vec3_mix(c->force, s->law[i].force, t), d, merit_slope);
         sum += vec3_norm2(error);
     }
     return sum;
@@ -290,6 +290,10 @@ static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bo
         memset(s->rhs, 0, bytes);
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &s->row[i];
+        if (s->law[i].state == OPEN && contact_row_is_idle(c, s->motion[i])) {
+            s->law[i].force = none;
+            continue;
+        }
         write_law(c, s->motion[i], b ? none : s->motion[i], s->slope, reuse, &s->law[i]);
         symmetric &= s->law[i].state != SLIP || c->friction == 0;
         contact_row_push(c, b ? s->law[i].force : vec3_sub(s->law[i].force, c->force), s->rhs);

@@ -76,6 +76,12 @@ static inline Vec3 contact_project(Vec3 f, Vec3 normal, double friction)
     return vec3_add_scaled(vec3_scale(t, size > bound ? bound / size : 1), fn, normal);
 }
 
+// Most candidates: no force, and none due.
+static inline bool contact_row_is_idle(const ContactRow *c, Vec3 motion)
+{
+    return c->force.x == 0 && c->force.y == 0 && c->force.z == 0 && c->gap + vec3_dot(motion, c->normal) >= 0;
+}
+
 // What is wrong with force f and motion d, in N: f less the nearest force in the cone to f - slope k violation, each direction by itself.
 static inline Vec3 contact_error(const ContactRow *c, Vec3 f, Vec3 d, double slope)
 {

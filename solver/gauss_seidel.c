@@ -70,7 +70,7 @@ double contact_residual(const ContactRow *row, int count, const Vec3 *motion, Co
     int active = 0;
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &row[i];
-        if (c->inert)
+        if (c->inert || contact_row_is_idle(c, motion[i]))
             continue;
         double fn = vec3_dot(c->force, c->normal);
         Vec3 error = contact_error(c, c->force, motion[i], 1);

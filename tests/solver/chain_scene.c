@@ -250,3 +250,12 @@ Vessel *chain_scene_straight(double radius)
     Faults faults = {0};
     return tube_vessel_create(&options, "straight", &faults);
 }
+
+Vessel *chain_scene_capsule(double radius)
+{
+    TubePiece piece = {.length = 10};
+    TubeOptions options = {.start = vec3(0, 0.3, -0.1), .direction = vec3(0.98401, -0.17362, 0.03984), .normal = vec3(0, 1, 0), .radius = radius,
+                           .piece_count = 1, .piece = &piece, .closed_ends = true};
+    Faults faults = {0};
+    return tube_vessel_create(&options, "capsule", &faults);
+}

@@ -48,5 +48,7 @@ void chain_scene_finish(ChainScene *scene);
 // The paper's spiral in space: a straight lead, then arcs whose radius falls and whose plane turns.
 Vessel *chain_scene_spiral(double radius, bool in_space);
 Vessel *chain_scene_straight(double radius);
+// A closed capsule of 10 mm, entered beside its axis: the wire coils up in it.
+Vessel *chain_scene_capsule(double radius);
 
 #endif
