@@ -3,6 +3,7 @@
 #include "blob_tube.h"
 #include "geom/foot_lanes.h"
 #include "geom/power_walk.h"
+#include "geom/simd.h"
 #include "geom/vessel.h"
 #include "random_numbers.h"
 
@@ -144,6 +145,19 @@ static void same_bits_on_every_isa(void **state)
             v[i]->destroy(v[i]);
     }
     vessel_tree_free(t);
+}
+
+// What the program's level is decides where nothing else is asked for.
+static void kernels_follow_the_level(void **state)
+{
+    (void)state;
+    SimdLevel usual = simd_level();
+    for (int level = 0; level < SIMD_COUNT; level++) {
+        simd_force((SimdLevel)level);
+        assert_ptr_equal(lane_kernels(0), lane_kernels((int)simd_level() + 1));
+    }
+    simd_force(usual);
+    assert_ptr_equal(lane_kernels(3), lane_kernels((int)simd_widest() + 1));
 }
 
 static void one_blob_is_a_sphere(void **state)
@@ -605,7 +619,7 @@ static void cost(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lanes_against_twin), cmocka_unit_test(same_bits_on_every_isa), cmocka_unit_test(one_blob_is_a_sphere),
+        cmocka_unit_test(lanes_against_twin), cmocka_unit_test(same_bits_on_every_isa), cmocka_unit_test(kernels_follow_the_level), cmocka_unit_test(one_blob_is_a_sphere),
         cmocka_unit_test(gaps_against_slow_projection), cmocka_unit_test(derivatives_of_the_gap), cmocka_unit_test(back_from_outside),
         cmocka_unit_test(inlet_is_open), cmocka_unit_test(moved_and_mirrored_scenes), cmocka_unit_test(blend_has_no_jump),
         cmocka_unit_test(nodes_without_blobs), cmocka_unit_test(another_wall_comes_closer),

@@ -319,6 +319,59 @@ static void coils_that_coincide(void **state)
     v->destroy(v);
 }
 
+// A polyline helix of 540 points whose turns nearly touch, as dense as the peer tubes: a point led along the wall that faces the next turn stays in its
+// own, its gap is the exact tube's within the chords' sag, and nodes go on one by one.
+static void turns_that_nearly_touch(void **state)
+{
+    (void)state;
+    enum { N = 540 };
+    static Vec3 line[N];
+    double a = 5, pitch = 2.05, turns = 6, step = 2 * PI * turns / (N - 1);
+    for (int i = 0; i < N; i++)
+        line[i] = vec3(a * cos(step * i), a * sin(step * i), pitch * step * i / (2 * PI));
+    TubeOptions o = {.radius = 1, .point_count = N, .point = line};
+    Vessel *v = make(&o);
+    for (int side = -1; side <= 1; side += 2)
+        for (double out = 0.3; out < 1.2; out += 0.2) {
+            VesselMemory memory = {.node = 0};
+            int last = 0;
+            for (double t = 0.5; t < N - 1.5; t += 0.5) {
+                Vec3 tangent = vec3_unit(vec3(-a * sin(step * t), a * cos(step * t), pitch / (2 * PI))), up = vec3(0, 0, 1);
+                up = vec3_unit(vec3_add_scaled(up, -tangent.z, tangent));
+                Vec3 x = vec3_add_scaled(vec3(a * cos(step * t), a * sin(step * t), pitch * step * t / (2 * PI)), side * out, up);
+                VesselHit hit;
+                vessel_query(v, 1, &x, 1, &memory, &hit);
+                assert_true(hit.node == (int)t || hit.node == (int)(t + 0.01) || fabs(hit.node + 0.5 - t) <= 1);
+                assert_true(hit.node >= last);
+                assert_near(hit.gap, 1 - out, 3e-3);   // sag of a chord: step^2 a / 8
+                last = hit.node;
+            }
+            assert_true(last >= N - 4);
+        }
+    v->destroy(v);
+}
+
+// Where segments fold back, cross themselves or are tiny, and for points far away, answers stay finite and unit.
+static void strange_tubes(void **state)
+{
+    (void)state;
+    Vec3 fold[] = {{0, 0, 0}, {5, 0, 0}, {0, 0, 0}, {0, 5, 0}, {0, 5, 1e-8}, {-3, -4, 2}, {4, 0, 0}};
+    TubeOptions o = {.radius = 1, .point_count = 7, .point = fold};
+    for (int closed = 0; closed < 2; closed++) {
+        o.closed_ends = closed == 1;
+        Vessel *v = make(&o);
+        uint64_t seed = 51;
+        for (int trial = 0; trial < 3000; trial++) {
+            Vec3 x = trial % 3 ? random_in_box(&seed, trial % 3 == 1 ? 6 : 1e8) : vec3_mix(fold[trial % 6], fold[trial % 6 + 1], random_in(&seed, 0, 1));
+            VesselHit hit = ask(v, x, trial % 7 - 1);
+            if (hit.flags & VESSEL_OPEN_END)
+                continue;
+            assert_true(isfinite(hit.gap) && fabs(vec3_norm(hit.normal) - 1) < 1e-9 && isfinite(sym3_trace(&hit.hessian)));
+        }
+        v->destroy(v);
+    }
+}
+
 static void refuse(const TubeOptions *o, const char *words)
 {
     static Faults faults;
@@ -360,6 +413,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(distance_to_the_centreline), cmocka_unit_test(derivatives), cmocka_unit_test(curvatures),
         cmocka_unit_test(ends), cmocka_unit_test(ends_are_smooth), cmocka_unit_test(rigid_motion_and_mirror), cmocka_unit_test(coils_that_coincide),
+        cmocka_unit_test(turns_that_nearly_touch), cmocka_unit_test(strange_tubes),
         cmocka_unit_test(bad_tubes),
     };
     return cmocka_run_group_tests_name("tube_vessel", tests, NULL, NULL);
