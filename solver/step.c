@@ -23,9 +23,9 @@ static const double SWING_MOTION = 1e-5;         // [rad] nothing turns: displac
 enum { NEWTON_MAX = 4 };
 // A tip that snaps from one wall to another lands where nobody linearised: [mm] of true penetration that asks for another linearisation there, up to
 // twice NEWTON_MAX of them.
-static const double OVERSHOOT = 0.03;
+static const double OVERSHOOT = 0.015;
 // Where a motion is followed in halves: [mm] of depth that it may leave, halves at most, [mm] of the hand's advance that later steps make up.
-static const double DEPTH_MAX = 0.05, OWED_MAX = 0.2;
+static const double DEPTH_MAX = 0.02, OWED_MAX = 0.2;
 enum { HALVES_MAX = 8, MEETINGS_MAX = 2 };
 // A tool that is squeezed by more than this share of its length is beyond what its elements describe (and would have yielded): the hand stalls.
 static const double SQUEEZE_MAX = 0.03;
@@ -578,7 +578,7 @@ static double follow(Stepper *s)
     }
     if (s->energy_before < 0) {       // of x_n, or of an iterate beside it
         s->energy_before = stepper_elastic_energy(s) + stepper_kinetic_energy(s);
-        s->depth = s->report.penetration;
+        s->depth = stepper_depth(s);
     }
     double bound = s->has_sheath && s->load_count == 0 ? energy_bound(s) : HUGE_VAL;
     copy_iterate(s, false);

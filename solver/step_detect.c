@@ -122,6 +122,17 @@ bool stepper_escapes(const Stepper *s)
     return false;
 }
 
+// Is the depth of a point asked for where a solution leads? A short element's only slot is guarded by its nodes.
+static bool is_watched(const Stepper *s, int point)
+{
+    if (s->place[point].node < 0)
+        return false;
+    if (point < s->state.node_count)
+        return true;
+    int i = s->slot[point - s->state.node_count].element;
+    return s->slot_start[i + 1] - s->slot_start[i] > 1;
+}
+
 double stepper_overshoot(Stepper *s)
 {
     int count = 0;
@@ -134,7 +145,7 @@ double stepper_overshoot(Stepper *s)
         if (p == s->point_count)
             break;
         double far = travel(s, p);
-        if (far < OVERSHOOT_TRAVEL || s->clearance[p] > far || s->place[p].node < 0 || (p >= s->state.node_count && !place_slot(s, p - s->state.node_count)))
+        if (far < OVERSHOOT_TRAVEL || s->clearance[p] > far || !is_watched(s, p) || (p >= s->state.node_count && !place_slot(s, p - s->state.node_count)))
             continue;
         Vec3 d = motion(s, p);
         s->query_which[count] = p;
@@ -423,7 +434,7 @@ double stepper_depth(Stepper *s)
         int nodes = s->state.node_count;
         if (p == nodes)
             p = first_slot(s);
-        if (p == s->point_count || s->place[p].node < 0 || (p >= nodes && !place_slot(s, p - nodes)))
+        if (p == s->point_count || !is_watched(s, p) || (p >= nodes && !place_slot(s, p - nodes)))
             continue;
         if (!s->is_iterate && s->clearance[p] > vec3_norm(done_at(s, p, vec3(0, 0, 0))))
             continue;
