@@ -122,15 +122,24 @@ bool stepper_escapes(const Stepper *s)
     return false;
 }
 
-// Is the depth of a point asked for where a solution leads? A short element's only slot is guarded by its nodes.
-static bool is_watched(const Stepper *s, int point)
+// The node of the vessel from which a point's depth is asked where a solution leads; -1: not asked, as a short element's slots are guarded by its nodes.
+static int watched_from(const Stepper *s, int point)
 {
-    if (s->place[point].node < 0)
-        return false;
     if (point < s->state.node_count)
-        return true;
+        return s->place[point].node;
     int i = s->slot[point - s->state.node_count].element;
-    return s->slot_start[i + 1] - s->slot_start[i] > 1;
+    return s->wire.length[i] > SIGHT ? s->place[i + 1].node : -1;
+}
+
+// Asks for a point at x. One that slept may have left its part of the vessel long ago: it is looked for.
+static void ask_there(Stepper *s, int point, Vec3 x, int *count)
+{
+    s->query_which[*count] = point;
+    s->query_point[*count] = x;
+    s->query_place[*count] = s->place[point];
+    if (point >= s->state.node_count || s->clearance[point] > 0)
+        s->query_place[*count] = (VesselMemory){.node = s->vessel->locate(s->vessel, x, watched_from(s, point))};
+    ++*count;
 }
 
 double stepper_overshoot(Stepper *s)
@@ -145,12 +154,9 @@ double stepper_overshoot(Stepper *s)
         if (p == s->point_count)
             break;
         double far = travel(s, p);
-        if (far < OVERSHOOT_TRAVEL || s->clearance[p] > far || !is_watched(s, p) || (p >= s->state.node_count && !place_slot(s, p - s->state.node_count)))
+        if (far < OVERSHOOT_TRAVEL || s->clearance[p] > far || watched_from(s, p) < 0 || (p >= s->state.node_count && !place_slot(s, p - s->state.node_count)))
             continue;
-        Vec3 d = motion(s, p);
-        s->query_which[count] = p;
-        s->query_point[count] = vec3_add(place_of(s, p), d);
-        s->query_place[count++] = s->place[p];
+        ask_there(s, p, vec3_add(place_of(s, p), motion(s, p)), &count);
     }
     if (count > 0)
         vessel_query(s->vessel, count, s->query_point, 0.5, s->query_place, s->query_hit);
@@ -339,8 +345,10 @@ static int ask_slots(Stepper *s, int count)
         if (sleeps(s, p))
             continue;
         double bound = clearance_by_nodes(s, &s->slot[k]);
-        if (bound > 0)
+        if (bound > 0) {
             s->room[p] = bound + REACH;
+            s->place[p].node = -1;      // may come far before it is asked again
+        }
         if (bound <= 0 && place_slot(s, k) && !is_covered(s, k))
             ask(s, p, &count);
         else if (s->clearance[p] != NOTHING_KNOWN)
@@ -434,13 +442,11 @@ double stepper_depth(Stepper *s)
         int nodes = s->state.node_count;
         if (p == nodes)
             p = first_slot(s);
-        if (p == s->point_count || !is_watched(s, p) || (p >= nodes && !place_slot(s, p - nodes)))
+        if (p == s->point_count || watched_from(s, p) < 0 || (p >= nodes && !place_slot(s, p - nodes)))
             continue;
         if (!s->is_iterate && s->clearance[p] > vec3_norm(done_at(s, p, vec3(0, 0, 0))))
             continue;
-        s->query_which[count] = p;
-        s->query_point[count] = place_of(s, p);
-        s->query_place[count++] = s->place[p];
+        ask_there(s, p, place_of(s, p), &count);
     }
     if (count > 0)
         vessel_query(s->vessel, count, s->query_point, 0.5, s->query_place, s->query_hit);
