@@ -137,7 +137,7 @@ static void ask_there(Stepper *s, int point, Vec3 x, int *count)
     s->query_which[*count] = point;
     s->query_point[*count] = x;
     s->query_place[*count] = s->place[point];
-    if (point >= s->state.node_count || s->clearance[point] > 0)
+    if (s->place[point].node < 0 || s->clearance[point] > 0)
         s->query_place[*count] = (VesselMemory){.node = s->vessel->locate(s->vessel, x, watched_from(s, point))};
     ++*count;
 }
