@@ -24,11 +24,13 @@ enum { NEWTON_MAX = 4 };
 // A tip that snaps from one wall to another lands where nobody linearised: [mm] of true penetration that asks for another linearisation there, up to
 // twice NEWTON_MAX of them.
 static const double OVERSHOOT = 0.015;
-// Where a motion is followed in halves: [mm] of depth that it may leave, halves at most, [mm] of the hand's advance that later steps make up.
-static const double DEPTH_MAX = 0.02, OWED_MAX = 0.2;
-enum { HALVES_MAX = 8, MEETINGS_MAX = 2 };
+// Where a motion is followed in halves: [mm] of depth that it may leave, and where nothing else goes; [mm] of the hand's advance that later steps make
+// up; halves at most, and how often linear walls are moved before.
+static const double DEPTH_MAX = 0.02, DEPTH_LAST = 0.1, OWED_MAX = 0.2;
+enum { HALVES_MAX = 6, MEETINGS_MAX = 2 };
 // A tool that is squeezed by more than this share of its length is beyond what its elements describe (and would have yielded): the hand stalls.
-static const double SQUEEZE_MAX = 0.03;
+// One that is squeezed by JAMMED has a reason to be stuck.
+static const double SQUEEZE_MAX = 0.03, JAMMED = 0.002;
 static const double LET_GO_TURN = 0.1;           // [rad] by which a node that is let go at the mouth is turned at most
 
 // --- creation ---
@@ -335,6 +337,12 @@ static void let_go(Stepper *s, int node)
     w->orientation[node] = quat_unit(quat_mul(quat_from_rotation_vector(vec3_scale(curvature, along)), w->orientation[node]));
 }
 
+// The share of its length by which the tool is squeezed between hand and mouth, where it slides freely.
+static double squeeze(const Stepper *s, const Vec3 *position)
+{
+    return 1 - vec3_distance(position[1], position[0]) / s->wire.length[0];
+}
+
 // The command with what is owed from before; no advance into a tool that is squeezed too much.
 static StepCommand stalled(Stepper *s, StepCommand command)
 {
@@ -345,7 +353,7 @@ static StepCommand stalled(Stepper *s, StepCommand command)
         command.advance += owed;
         s->state.inserted = actual;
     }
-    if (command.advance > 0 && vec3_distance(s->state.position[1], s->state.position[0]) < (1 - SQUEEZE_MAX) * s->wire.length[0]) {
+    if (command.advance > 0 && squeeze(s, s->state.position) > SQUEEZE_MAX) {
         command.advance = 0;
         s->report.flags |= STEP_LIMITED;
     }
@@ -582,10 +590,16 @@ static double follow(Stepper *s)
     }
     double bound = s->has_sheath && s->load_count == 0 ? energy_bound(s) : HUGE_VAL;
     copy_iterate(s, false);
-    for (int k = 0; k < HALVES_MAX; k++) {
+    double most = fmax(DEPTH_MAX, s->depth);
+    int tries = squeeze(s, s->start_position) < JAMMED ? 2 * HALVES_MAX : HALVES_MAX;
+    for (int k = 0; k < tries; k++) {
+        if (k == HALVES_MAX) {        // no jam: rather a little deeper than stuck for ever where neighbouring models disagree about the wall
+            part = largest_part(s);
+            most = fmax(most, DEPTH_LAST);
+        }
         move(s, part);
         double depth = stepper_depth(s);
-        bool contained = depth <= fmax(DEPTH_MAX, s->depth);
+        bool contained = depth <= most;
         if (contained && stepper_elastic_energy(s) <= bound) {
             s->depth = depth;
             return part;
