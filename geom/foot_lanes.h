@@ -28,7 +28,7 @@ enum { FOOT_BATCH = 32, FOOT_BLOCK = 8 };   // lanes a batch, and lanes that are
 // State of a lane, as a double so that it lives in the same vectors.
 #define FOOT_PENDING 0.0
 #define FOOT_DONE 1.0
-#define FOOT_DEEP 2.0        // X is near or beyond a focal point of this foot: another side may be closer
+#define FOOT_DEEP 2.0        // X is near or beyond a focal point of this foot: careful steps lead to where the distance is least, or to another side
 #define FOOT_LOST 3.0
 
 typedef double FootLane[FOOT_BATCH];
@@ -101,10 +101,11 @@ static inline __attribute__((always_inline)) void foot_newton(FootBatch *restric
             // phi = 1 / (1 + gap k), beyond focal points by its size
             double spread = sqrt(0.5 * size2 - 0.25 * trace * trace > 0 ? 0.5 * size2 - 0.25 * trace * trace : 0.0);
             double k1 = 0.5 * trace + spread, k2 = 0.5 * trace - spread, a1 = fabs(1 + gap * k1), a2 = fabs(1 + gap * k2);
-            double phi1 = 1 / (a1 > 0.05 ? a1 : 0.05), phi2 = 1 / (a2 > 0.05 ? a2 : 0.05);
+            double phi1 = 1 / (a1 > 1e-3 ? a1 : 1e-3), phi2 = 1 / (a2 > 1e-3 ? a2 : 1e-3);
             c1 = spread > 1e-9 * fabs(trace) ? (phi1 - phi2) / (2 * (spread > 1e-300 ? spread : 1.0)) : 0.0, c0 = phi1 - c1 * k1;
         } else {
-            double all = 1 / (deep > 0 ? 1.0 : 1 + gap * (trace + gap * product));
+            // where that is no step to take the foot stays beside its place: careful steps go on from there
+            double all = deep > 0 ? 0.0 : 1 / (deep > 0 ? 1.0 : 1 + gap * (trace + gap * product));
             c0 = all * (1 + gap * trace), c1 = -all * gap;
         }
         double tx = -(c0 * rx + c1 * (xx * rx + xy * ry + xz * rz)), ty = -(c0 * ry + c1 * (xy * rx + yy * ry + yz * rz)),

@@ -305,6 +305,22 @@ static void project_slowly(const LimVessel *lim, FootBatch *b, int i, Lane *of)
 
 static bool is_on_wrong_side(const FootBatch *b, int i) { return (b->gap[i] > 0) != (b->inside[i] > 0) && fabs(b->gap[i]) > 1e-6; }
 
+// Newton's steps from the remembered feet. A point near the axis has many feet nearly as close as each other, and its foot runs round with it: careful
+// steps from the last one find it, where a march from X falls on any side and takes long.
+static void follow_feet(const LimVessel *lim, FootBatch *b, int filled)
+{
+    bool deep = false;
+    newton_rounds(lim, b, filled, 4, false);
+    for (int i = 0; i < filled; i++)
+        if (b->state[i] == FOOT_DEEP) {
+            b->state[i] = FOOT_PENDING;
+            b->allowed[i] = REST_FRESH;
+            deep = true;
+        }
+    if (deep)
+        newton_rounds(lim, b, filled, 12, true);
+}
+
 // Feet of `count` lanes on the models of their nodes; `again` marks those without a start. A foot on the wrong side of the wall, or on a wall that
 // stands further off than another, is not the closest: those start once more from X.
 static void project_batch(const LimVessel *lim, FootBatch *b, FootSample *at_x, Lane *of, int count)
@@ -324,7 +340,7 @@ static void project_batch(const LimVessel *lim, FootBatch *b, FootSample *at_x, 
         lim->kernels->estimate(b, at_x, count, lim->tree->iso_level);
     }
     n = 0;
-    newton_rounds(lim, b, filled, 4, false);
+    follow_feet(lim, b, filled);
     lim->kernels->finish(b, count);
     for (int i = 0; i < count; i++) {
         of[i].sure = true;
