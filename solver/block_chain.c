@@ -158,10 +158,15 @@ static bool (*const eliminate_on[SIMD_COUNT])(const BlockChain *, BlockFactor *,
 static void (*const back_substitute_on[SIMD_COUNT])(const BlockFactor *, double *, const double *, int, int) = ON(back_substitute);
 static void (*const forward_substitute_on[SIMD_COUNT])(const BlockFactor *, double *) = ON(forward_substitute);
 
-bool block_chain_factor(const BlockChain *chain, BlockFactor *factor) { return eliminate_on[simd_level()](chain, factor, NULL); }
+bool block_chain_factor(const BlockChain *chain, BlockFactor *factor)
+{
+    factor->count = chain->count;
+    return eliminate_on[simd_level()](chain, factor, NULL);
+}
 
 bool block_chain_factor_solve(const BlockChain *chain, BlockFactor *factor, const double *b, double *x)
 {
+    factor->count = chain->count;
     if (!eliminate_on[simd_level()](chain, factor, b))
         return false;
     back_substitute_on[simd_level()](factor, x, factor->z + 6, PANEL, COLUMN);

@@ -22,7 +22,7 @@ void block_chain_destroy(BlockChain *chain);
 BlockFactor *block_factor_create(int count);
 void block_factor_destroy(BlockFactor *factor);
 
-// False where A is not positive definite (the factor is then unusable).
+// Of a chain of any size up to the factor's. False where A is not positive definite (the factor is then unusable).
 bool block_chain_factor(const BlockChain *chain, BlockFactor *factor);
 // x = A^-1 b, both (M, 6); x may be b.
 void block_factor_solve(const BlockFactor *factor, const double *b, double *x);

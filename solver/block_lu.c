@@ -127,8 +127,10 @@ static void refine(BlockLu *lu, const double *diag, const double *lower, const d
         x[k] += lu->change[k];
 }
 
-bool block_lu_factor_solve(BlockLu *lu, const double *diag, const double *lower, const double *upper, const double *b, double *x, bool *exact)
+bool block_lu_factor_solve(BlockLu *lu, int count, const double *diag, const double *lower, const double *upper, const double *b, double *x,
+                           bool *exact)
 {
+    lu->count = count;
     if (!eliminate_on[simd_level()](lu, diag, lower, upper, b))
         return false;
     back_on[simd_level()](lu, x);

@@ -11,9 +11,11 @@ BlockLu *block_lu_create(int count);
 void block_lu_destroy(BlockLu *lu);
 // Blocks by columns: diag[i][c][r] of A(i, i), lower[i] of A(i+1, i), upper[i] of A(i, i+1), (M, 6, 6) each with two doubles of padding behind.
 // (A symmetric chain's diag and its row-major lower, taken as upper, are that already.) x = A^-1 b, both (M, 6), not the same.
+// M = `count` is at most what the factor was made for.
 // No pivoting: false where a pivot vanishes or is not finite. Where one is negative digits may be lost: such a solution is refined once,
 // and `exact` says false.
-bool block_lu_factor_solve(BlockLu *lu, const double *diag, const double *lower, const double *upper, const double *b, double *x, bool *exact);
+bool block_lu_factor_solve(BlockLu *lu, int count, const double *diag, const double *lower, const double *upper, const double *b, double *x,
+                           bool *exact);
 // Another right-hand side with the same factor.
 void block_lu_solve(const BlockLu *lu, const double *b, double *x);
 // to[i] = from[i]^T of `count` 6x6 blocks.

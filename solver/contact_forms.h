@@ -2,6 +2,7 @@
 #ifndef SELDINGER_SOLVER_CONTACT_FORMS_H
 #define SELDINGER_SOLVER_CONTACT_FORMS_H
 
+#include "solver/block_condense.h"
 #include "solver/block_lu.h"
 #include "solver/contact_rows.h"
 #include "solver/gauss_seidel.h"
@@ -39,6 +40,8 @@ struct ContactSolver {
     double *turned;              // (M, 6, 6) A(i+1, i) by columns
     BlockLu *lu;
     BlockFactor *factor;
+    BlockCondenser *condenser;
+    double *small_u;             // (M, 6)
     PointwiseWork *pointwise;
 };
 

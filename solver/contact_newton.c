@@ -70,7 +70,7 @@ static void choose_active(const ContactSolver *s, int count, bool *active)
             continue;
         }
         int deepest = i, j = i;
-        for (; j < count && s->law[j].state == OPEN && (j == i || s->row[j].node <= s->row[j - 1].node + 1); j++) {
+        for (; j < count && s->law[j].state == OPEN && (j == i || s->row[j].chain_node <= s->row[j - 1].chain_node + 1); j++) {
             double vj = normal_violation(&s->row[j], s->motion[j]);
             if (!(vj < 0))
                 break;
@@ -305,7 +305,7 @@ static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bo
         assemble(s, chain, count);
         s->symmetric = symmetric;
         if (symmetric ? !block_chain_factor_solve(&s->matrix, s->factor, s->rhs, s->delta)
-                      : !block_lu_factor_solve(s->lu, s->matrix.diag, s->turned, s->matrix.lower, s->rhs, s->delta, &exact))
+                      : !block_lu_factor_solve(s->lu, chain->count, s->matrix.diag, s->turned, s->matrix.lower, s->rhs, s->delta, &exact))
             return false;
     }
     s->inexact |= !exact;
@@ -375,6 +375,7 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
                              const ContactOptions *options, double *u)
 {
     ContactReport report = {0};
+    s->matrix.count = chain->count;
     int unknowns = 6 * chain->count, most = options->max_iterations / CONTACT_SWEEPS_PER_FACTOR;
     for (int i = 0; i < count; i++)
         s->law[i].state = vec3_dot(s->row[i].force, s->row[i].normal) > 0 ? SLIP : OPEN;

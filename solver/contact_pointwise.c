@@ -396,7 +396,7 @@ ContactReport contact_pointwise(ContactSolver *s, const BlockChain *chain, const
 {
     ContactReport report = {0};
     PointwiseWork *w = s->pointwise;
-    int m = chain->count;
+    int m = s->matrix.count = chain->count;
     contact_balance(s, factor, b, count, u);
     contact_residual(s->row, count, s->motion, &report);
     report.converged = report.residual <= options->tolerance;

@@ -12,7 +12,8 @@
 #include "solver/contact.h"
 
 typedef struct ContactRow {
-    int node, point;             // point: its place in the caller's set
+    int node, chain_node;        // in the chain that is solved, which may be condensed (block_condense.h), and in the caller's
+    int point;                   // its place in the caller's set
     int nodes;                   // 1, or 2 where xi > 0
     double weight[2];
     Vec3 lever[2];               // looked at only where there are two nodes

@@ -12,6 +12,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+// Condensing costs about as much as two factorisations of what goes: it pays unless nearly all nodes stay.
+static const double FULL_SHARE = 1.25;
+
 ContactOptions contact_default_options(void)
 {
     return (ContactOptions){.form = CONTACT_BLOCK, .max_iterations = 200, .tolerance = 1e-6};
@@ -45,7 +48,7 @@ int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow
 {
     for (int i = 0; i < set->count; i++) {
         const ContactPoint *p = &set->point[i];
-        ContactRow c = {.node = p->node, .point = i, .nodes = p->xi > 0 && p->node + 1 < chain->count ? 2 : 1, .weight = {1, 0},
+        ContactRow c = {.node = p->node, .chain_node = p->node, .point = i, .nodes = p->xi > 0 && p->node + 1 < chain->count ? 2 : 1, .weight = {1, 0},
                         .normal = p->normal, .gap = p->gap, .radius = p->tool_radius, .friction = fmax(0, p->friction)};
         if (c.nodes == 2)
             for (int e = 0; e < 2; e++) {
@@ -116,10 +119,12 @@ ContactSolver *contact_solver_create(int node_count, int contact_capacity)
     s->rhs = calloc(6 * m, sizeof *s->rhs);
     s->delta = calloc(6 * m, sizeof *s->delta);
     s->turned = calloc(BLOCK_DOUBLES * m + 2, sizeof *s->turned);
+    s->small_u = calloc(6 * m, sizeof *s->small_u);
     s->lu = block_lu_create(node_count);
+    s->condenser = block_condenser_create(node_count);
     s->factor = block_factor_create(node_count);
     s->pointwise = pointwise_work_create(node_count, contact_capacity);
-    bool ok = block_chain_create(&s->matrix, node_count) && s->pointwise;
+    bool ok = block_chain_create(&s->matrix, node_count) && s->pointwise && s->condenser && s->small_u;
     if (!s->row || !s->motion || !s->law || !s->best || !s->best_u || !s->flag || !s->rhs || !s->delta || !s->turned || !s->lu || !s->factor || !ok) {
         contact_solver_destroy(s);
         return NULL;
@@ -140,6 +145,8 @@ void contact_solver_destroy(ContactSolver *s)
     free(s->rhs);
     free(s->delta);
     free(s->turned);
+    free(s->small_u);
+    block_condenser_destroy(s->condenser);
     block_lu_destroy(s->lu);
     pointwise_work_destroy(s->pointwise);
     block_factor_destroy(s->factor);
@@ -147,12 +154,41 @@ void contact_solver_destroy(ContactSolver *s)
     free(s);
 }
 
+// Does the block form on the chain of the contacts' nodes, where these are few. False where it cannot.
+static bool solve_condensed(ContactSolver *s, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u,
+                            ContactReport *report)
+{
+    bool *keep = block_condenser_keep(s->condenser);
+    int kept = 0;
+    for (int i = 0; i < count; i++)
+        for (int e = 0; e < s->row[i].nodes; e++) {
+            bool *flag = &keep[s->row[i].chain_node + e];
+            kept += !*flag;
+            *flag = true;
+        }
+    if (FULL_SHARE * kept > chain->count) {
+        memset(keep, 0, (size_t)chain->count * sizeof *keep);
+        return false;
+    }
+    const BlockChain *small = block_condense(s->condenser, chain, b);
+    if (!small || !block_chain_factor(small, s->factor))
+        return false;
+    for (int i = 0; i < count; i++)
+        s->row[i].node = block_condenser_place(s->condenser, s->row[i].chain_node);
+    *report = contact_newton(s, small, s->factor, block_condenser_side(s->condenser), count, options, s->small_u);
+    block_condenser_expand(s->condenser, s->small_u, u);
+    return true;
+}
+
 ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, ContactSet *set,
                             const ContactOptions *options, double *u)
 {
     int count = contact_rows_fill(set, chain, solver->row);
-    ContactReport report = options->form == CONTACT_POINTWISE ? contact_pointwise(solver, chain, factor, b, count, options, u)
-                                                              : contact_newton(solver, chain, factor, b, count, options, u);
+    ContactReport report;
+    if (options->form == CONTACT_POINTWISE)
+        report = contact_pointwise(solver, chain, factor, b, count, options, u);
+    else if (!solve_condensed(solver, chain, b, count, options, u, &report))
+        report = contact_newton(solver, chain, factor, b, count, options, u);
     for (int i = 0; i < count; i++)
         set->point[solver->row[i].point].force = solver->row[i].force;
     return report;

@@ -1,6 +1,7 @@
 // Block-tridiagonal systems against dense Cholesky: random chains of many sizes and conditions, and the chain's own laws.
 #include "geom/simd.h"
 #include "solver/block_chain.h"
+#include "solver/block_condense.h"
 #include "solver/block_lu.h"
 
 #include <math.h>
@@ -224,7 +225,7 @@ static void lu_solves_unsymmetric(void **state)
             if (round == 0) {
                 block_lu_transpose(m, a.diag, diag);
                 block_lu_transpose(m, a.lower, lower);
-                assert_true(block_lu_factor_solve(lu, diag, lower, upper, b, x, &exact));
+                assert_true(block_lu_factor_solve(lu, m, diag, lower, upper, b, x, &exact));
             }
             if (round == 1)
                 block_lu_solve(lu, b, x);
@@ -333,7 +334,7 @@ static void same_bits_everywhere(void **state)
             simd_force((SimdLevel)level);
             assert_true(block_chain_factor_solve(&a, f, b, y));
             block_factor_solve(f, b, y + n);
-            assert_true(block_lu_factor_solve(lu, a.diag, lower, a.lower, b, y + 2 * n, &exact));
+            assert_true(block_lu_factor_solve(lu, a.count, a.diag, lower, a.lower, b, y + 2 * n, &exact));
         }
         simd_force(level_given);
         assert_memory_equal(x, x + 3 * n, 3 * n * sizeof *x);
@@ -345,6 +346,64 @@ static void same_bits_everywhere(void **state)
         block_factor_destroy(f);
         block_chain_destroy(&a);
     }
+}
+
+// Condensed to a few, many or all nodes, changed there (matrix and load) and expanded again: the changed chain's solution, at every level's same bits.
+static void condensed_solves_as_whole(void **state)
+{
+    (void)state;
+    const int sizes[] = {1, 2, 3, 7, 40, 121};
+    for (size_t t = 0; t < sizeof sizes / sizeof *sizes; t++)
+        for (int every = 1; every < 50; every += every < 4 ? 1 : 11)
+            for (int offset = 0; offset < 3; offset++) {
+                int m = sizes[t];
+                size_t n = (size_t)m * 6;
+                BlockChain a;
+                assert_true(block_chain_create(&a, m));
+                BlockFactor *f = block_factor_create(m);
+                BlockCondenser *k = block_condenser_create(m);
+                random_chain(&a, 2);
+                double *b = malloc(n * sizeof *b), *x = malloc(n * sizeof *x), *y = malloc(3 * n * sizeof *y), *small = malloc(n * sizeof *small);
+                for (size_t i = 0; i < n; i++)
+                    b[i] = uniform();
+                for (int level = 0; level < SIMD_COUNT; level++) {
+                    simd_force((SimdLevel)level);
+                    bool *keep = block_condenser_keep(k);
+                    for (int i = 0; i < m; i++)
+                        assert_false(keep[i]);
+                    for (int i = offset; i < m; i += every)
+                        keep[i] = true;
+                    const BlockChain *s = block_condense(k, &a, b);
+                    assert_non_null(s);
+                    for (int i = offset; i < m; i += every) {
+                        int p = block_condenser_place(k, i);
+                        assert_true(p >= 0);
+                        s->diag[36 * p] += 3;
+                        s->diag[36 * p + 21] += 100;
+                        block_condenser_side(k)[6 * p + 4] += 2;
+                    }
+                    assert_true(block_chain_factor_solve(s, f, block_condenser_side(k), small));
+                    block_condenser_expand(k, small, y + (size_t)level % 3 * n);
+                    if (level > 0)
+                        assert_memory_equal(y, y + (size_t)level % 3 * n, n * sizeof *y);
+                }
+                simd_force(level_given);
+                for (int i = offset; i < m; i += every) {
+                    a.diag[36 * i] += 3;
+                    a.diag[36 * i + 21] += 100;
+                    b[6 * i + 4] += 2;
+                }
+                assert_true(block_chain_factor_solve(&a, f, b, x));
+                for (size_t i = 0; i < n; i++)
+                    assert_true(fabs(x[i] - y[i]) < 1e-11 * largest(x, n));
+                free(b);
+                free(x);
+                free(y);
+                free(small);
+                block_condenser_destroy(k);
+                block_factor_destroy(f);
+                block_chain_destroy(&a);
+            }
 }
 
 static double now(void)
@@ -408,7 +467,8 @@ static void prints_timings(void **state)
         BlockLu *lu = block_lu_create(m);
         double *lower = calloc((size_t)m * 36 + 2, sizeof *lower);
         block_lu_transpose(m, a.lower, lower);
-        static double factor[RUNS], solve[RUNS], fused[RUNS], diagonal[RUNS], unsymmetric[RUNS];
+        BlockCondenser *condenser = block_condenser_create(m);
+        static double condense[RUNS], factor[RUNS], solve[RUNS], fused[RUNS], diagonal[RUNS], unsymmetric[RUNS];
         for (int i = 0; i < RUNS; i++) {
             double t0 = now();
             assert_true(block_chain_factor(&a, f));
@@ -419,18 +479,25 @@ static void prints_timings(void **state)
             double t3 = now();
             block_factor_inverse_diagonal(f, s);
             double t4 = now();
-            assert_true(block_lu_factor_solve(lu, a.diag, lower, a.lower, b, x, &exact));
+            assert_true(block_lu_factor_solve(lu, a.count, a.diag, lower, a.lower, b, x, &exact));
             unsymmetric[i] = now() - t4;
+            for (int j = 5; j < m; j += 10)
+                block_condenser_keep(condenser)[j] = true;
+            double t5 = now();
+            assert_non_null(block_condense(condenser, &a, b));
+            condense[i] = now() - t5;
             factor[i] = t1 - t0, solve[i] = t2 - t1, fused[i] = t3 - t2, diagonal[i] = t4 - t3;
         }
         qsort(factor, RUNS, sizeof *factor, by_value);
         qsort(solve, RUNS, sizeof *solve, by_value);
         qsort(fused, RUNS, sizeof *fused, by_value);
+        qsort(condense, RUNS, sizeof *condense, by_value);
         qsort(diagonal, RUNS, sizeof *diagonal, by_value);
         qsort(unsymmetric, RUNS, sizeof *unsymmetric, by_value);
-        print_message("%4d blocks: factor %6.2f us, solve %6.2f us, factor and solve fused %6.2f us, unsymmetric %6.2f us, diagonal of the inverse %6.2f us "
+        print_message("%4d blocks: factor %6.2f us, solve %6.2f us, factor and solve fused %6.2f us, unsymmetric %6.2f us, condense to a tenth %6.2f us, diagonal of the inverse %6.2f us "
                       "(medians)\n",
-                      m, factor[RUNS / 2], solve[RUNS / 2], fused[RUNS / 2], unsymmetric[RUNS / 2], diagonal[RUNS / 2]);
+                      m, factor[RUNS / 2], solve[RUNS / 2], fused[RUNS / 2], unsymmetric[RUNS / 2], condense[RUNS / 2], diagonal[RUNS / 2]);
+        block_condenser_destroy(condenser);
         block_lu_destroy(lu);
         free(lower);
         free(b);
@@ -447,7 +514,8 @@ int main(void)
     level_given = simd_level();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(solves_as_dense),       cmocka_unit_test(inverse_diagonal_as_dense), cmocka_unit_test(refuses_indefinite),
-        cmocka_unit_test(lu_solves_unsymmetric), cmocka_unit_test(unit_rows_are_exact),   cmocka_unit_test(mirrored_signs_to_the_bit), cmocka_unit_test(same_bits_everywhere), cmocka_unit_test(prints_timings),
+        cmocka_unit_test(lu_solves_unsymmetric), cmocka_unit_test(unit_rows_are_exact),   cmocka_unit_test(mirrored_signs_to_the_bit), cmocka_unit_test(same_bits_everywhere), 
+        cmocka_unit_test(condensed_solves_as_whole), cmocka_unit_test(prints_timings),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
