@@ -203,13 +203,14 @@ static int collect_near(const VesselTree *tree, int node, double largest, int *n
     for (int w = 0; w < known; w++) {
         Way at = way[w];
         double reach = tree->radius[node] + tree->radius[at.node];
-        bool is_neighbour = at.from == node;
-        if (w > 0 && (is_neighbour || (at.length < 1.5 * reach && vec3_distance(tree->center[node], tree->center[at.node]) < 1.2 * reach)))
+        bool is_neighbour = at.from == node, at_sac = tree->kind[node] != NODE_VESSEL || tree->kind[at.node] != NODE_VESSEL;
+        double way_max = at_sac ? 2 : 1.5, apart_max = at_sac ? 1.5 : 1.2;
+        if (w > 0 && (is_neighbour || (at.length < way_max * reach && vec3_distance(tree->center[node], tree->center[at.node]) < apart_max * reach)))
             near[count++] = at.node;
         for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1] && known <= NEAR_MAX; k++) {
             int next = tree->neighbour[k];
             double length = at.length + vec3_distance(tree->center[at.node], tree->center[next]);
-            if (next != at.from && (w == 0 || length < 1.5 * (tree->radius[node] + largest)))
+            if (next != at.from && (w == 0 || length < 2 * (tree->radius[node] + largest)))
                 way[known++] = (Way){next, at.node, length};
         }
     }
