@@ -7,7 +7,8 @@
 
 #include <string.h>
 
-static const double REACH = 0.3;         // [mm] candidates beyond what the nodes' speed asks for: contact forces can push neighbours about
+static const double REACH = 0.2;         // [mm] candidates beyond what the nodes' speed asks for: contact forces can push neighbours about
+static const double SHARED_TRAVEL = 0.3; // [mm] at most so much of what the fastest node may travel is expected of all others
 static const double SLOT_REACH = 0.1;    // [mm] the same for slots, whose nodes are candidates long before
 static const double REACH_MAX = 5;       // [mm]
 static const double STEP_OUT_MAX = 0.2;  // [mm] a deep point is brought back by this much a step, not thrown
@@ -166,13 +167,22 @@ double stepper_overshoot(Stepper *s)
     return deepest;
 }
 
-// How far a node may go in this step, by what is known.
+// How far a node may go in this step, by what is known. A spring runs along the wire: what one node does others may do next. (With that, a shorter
+// reach meets fewer points that went further than was looked.)
 static void estimate_ranges(Stepper *s)
 {
-    for (int i = s->first_free > 0 ? s->first_free - 1 : 0; i < s->state.node_count; i++) {
+    int first = s->first_free > 0 ? s->first_free - 1 : 0, nodes = s->state.node_count;
+    double fastest = 0;
+    for (int i = first; i < nodes; i++) {
         Vec3 v = s->knows_motion ? change(s, i, 0) : s->state.velocity[i];
         s->range[i] = sqrt(vec3_norm2(v));
+        fastest = s->range[i] > fastest ? s->range[i] : fastest;
     }
+    if (s->knows_motion)
+        return;
+    double shared = fmin(fastest, SHARED_TRAVEL / (2 * s->dt));
+    for (int i = first; i < nodes; i++)
+        s->range[i] = s->range[i] > shared ? s->range[i] : shared;
 }
 
 // How far beyond its present gap a point is looked after.
