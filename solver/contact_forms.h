@@ -37,7 +37,8 @@ struct ContactSolver {
     bool symmetric;              // which of the two factors holds the matrix
     double *rhs, *delta;         // (M, 6)
     BlockChain matrix;           // with the contacts' laws: diag and A(i, i+1) by columns (which is the row-major lower of a symmetric chain)
-    double *turned;              // (M, 6, 6) A(i+1, i) by columns
+    double *turned;              // (M, 6, 6) A(i+1, i) by columns …
+    double *turned_chain;        // … and that of the chain
     BlockLu *lu;
     BlockFactor *factor;
     BlockCondenser *condenser;

@@ -155,36 +155,50 @@ static void write_law(const ContactRow *c, Vec3 motion, Vec3 from, double slope,
         law->c = law_matrix(n, kn, oblique, across, p);
 }
 
-// block += (w I, R)^T K (v I, Q), by columns, where rows and columns are free.
-static void add_coupling(const Mat3 *k, double w, const Mat3 *r, unsigned rows, double v, const Mat3 *q, unsigned columns, double *block)
+static void cross_into(double x, double y, double z, Vec3 b, double out[3])
 {
-    Mat3 rt = mat3_transpose(r), kq = mat3_mul(k, q), rk = mat3_mul(&rt, k), rkq = mat3_mul(&rt, &kq);
-    double j[6][6]; // [column][row]
+    out[0] = y * b.z - z * b.y;
+    out[1] = z * b.x - x * b.z;
+    out[2] = x * b.y - y * b.x;
+}
+
+// block += (w I, [r]x)^T K (v I, [q]x), by columns, where rows and columns are free. Rows of K [q]x are those of K times q, columns of [r]x^T K
+// those of K times r.
+static void add_coupling(const Mat3 *k, double w, Vec3 r, unsigned rows, double v, Vec3 q, unsigned columns, double *block)
+{
+    double j[6][6], kq[3][3]; // j: [column][row]
     for (int a = 0; a < 3; a++)
-        for (int b = 0; b < 3; b++) {
+        cross_into(k->m[a][0], k->m[a][1], k->m[a][2], q, kq[a]);
+    for (int b = 0; b < 3; b++) {
+        cross_into(v * k->m[0][b], v * k->m[1][b], v * k->m[2][b], r, j[b] + 3);
+        cross_into(kq[0][b], kq[1][b], kq[2][b], r, j[b + 3] + 3);
+        for (int a = 0; a < 3; a++) {
             j[b][a] = w * v * k->m[a][b];
-            j[b + 3][a] = w * kq.m[a][b];
-            j[b][a + 3] = v * rk.m[a][b];
-            j[b + 3][a + 3] = rkq.m[a][b];
+            j[b + 3][a] = w * kq[a][b];
         }
-    bool all = (rows & columns) == 63;
+    }
+    if ((rows & columns) != 63)
+        for (int b = 0; b < 6; b++)
+            for (int a = 0; a < 6; a++)
+                j[b][a] = rows >> a & columns >> b & 1 ? j[b][a] : 0;
     for (int b = 0; b < 6; b++)
         for (int a = 0; a < 6; a++)
-            block[6 * b + a] += all || (rows >> a & columns >> b & 1) ? j[b][a] : 0;
+            block[6 * b + a] += j[b][a];
 }
 
 // The matrix += J^T C J with J = (w I, R) for each node, R = -[arm]x.
 static void add_law(const ContactRow *c, const Mat3 *k, ContactSolver *s)
 {
-    Mat3 r[2];
+    Vec3 r[2];
+    const double *w = c->weight;
     for (int e = 0; e < c->nodes; e++) {
-        r[e] = mat3_skew(contact_row_negative_arm(c, e));
-        add_coupling(k, c->weight[e], &r[e], c->mask[e], c->weight[e], &r[e], c->mask[e], s->matrix.diag + 36 * (size_t)(c->node + e));
+        r[e] = contact_row_negative_arm(c, e);
+        add_coupling(k, w[e], r[e], c->mask[e], w[e], r[e], c->mask[e], s->matrix.diag + 36 * (size_t)(c->node + e));
     }
     if (c->nodes < 2)
         return;
-    add_coupling(k, c->weight[1], &r[1], c->mask[1], c->weight[0], &r[0], c->mask[0], s->turned + 36 * (size_t)c->node);
-    add_coupling(k, c->weight[0], &r[0], c->mask[0], c->weight[1], &r[1], c->mask[1], s->matrix.lower + 36 * (size_t)c->node);
+    add_coupling(k, w[1], r[1], c->mask[1], w[0], r[0], c->mask[0], s->turned + 36 * (size_t)c->node);
+    add_coupling(k, w[0], r[0], c->mask[0], w[1], r[1], c->mask[1], s->matrix.lower + 36 * (size_t)c->node);
 }
 
 // Row e of a sliding contact, [A(i, i-1) A(i, i) A(i, i+1) | rhs], loses J^T mu p for every part of it along n: what is left of the law's
@@ -198,7 +212,8 @@ static void straighten(const ContactRow *c, Vec3 along, int e, ContactSolver *s)
     double push[12] = {0};
     here.node = 0;
     contact_row_push(&here, vec3_scale(along, 1 / w), push);
-    memcpy(v, push + 6 * e, sizeof v);
+    for (int k = 0; k < 6; k++)
+        v[k] = push[6 * e + k];
     size_t i = (size_t)(c->node + e), block = BLOCK_DOUBLES;
     double *columns[4] = {i > 0 ? s->turned + block * (i - 1) : NULL, s->matrix.diag + block * i,
                           (int)i + 1 < s->matrix.count ? s->matrix.lower + block * i : NULL, s->rhs + 6 * i};
@@ -218,7 +233,7 @@ static void restore(ContactSolver *s, const BlockChain *chain, const ContactRow 
         memcpy(s->matrix.diag + block * i, chain->diag + block * i, bytes);
     for (size_t i = (size_t)(c->node > 0 ? c->node - 1 : 0); i <= last && (int)i + 1 < chain->count; i++) {
         memcpy(s->matrix.lower + block * i, chain->lower + block * i, bytes);
-        block_lu_transpose(1, chain->lower + block * i, s->turned + block * i);
+        memcpy(s->turned + block * i, s->turned_chain + block * i, bytes);
     }
 }
 
@@ -243,7 +258,8 @@ static void assemble_reset(ContactSolver *s, const BlockChain *chain, int count)
     size_t blocks = (size_t)chain->count * 36 * sizeof(double);
     memcpy(s->matrix.diag, chain->diag, blocks);
     memcpy(s->matrix.lower, chain->lower, blocks);
-    block_lu_transpose(chain->count - 1, chain->lower, s->turned);
+    block_lu_transpose(chain->count - 1, chain->lower, s->turned_chain);
+    memcpy(s->turned, s->turned_chain, blocks);
     for (int i = 0; i < count; i++)
         s->law[i].touched = false;
 }

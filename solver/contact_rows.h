@@ -87,9 +87,9 @@ static inline bool contact_row_is_idle(const ContactRow *c, Vec3 motion)
 static inline Vec3 contact_error(const ContactRow *c, Vec3 f, Vec3 d, double slope)
 {
     Vec3 n = c->normal;
-    double fn = vec3_dot(f, n), normal = fn - fmax(0, fn - slope * c->stiffness_n * (c->gap + vec3_dot(d, n)));
+    double fn = vec3_dot(f, n), wish_n = fn - slope * c->stiffness_n * (c->gap + vec3_dot(d, n));
     Vec3 ft = contact_tangential(f, n), wish = vec3_add_scaled(ft, -slope * c->stiffness_t, contact_tangential(d, n));
-    double bound = c->friction * fmax(0, fn), size = vec3_norm(wish);
+    double normal = wish_n > 0 ? fn - wish_n : fn, bound = fn > 0 ? c->friction * fn : 0, size = vec3_norm(wish);
     return vec3_add_scaled(vec3_sub(ft, vec3_scale(wish, size > bound ? bound / size : 1)), normal, n);
 }
 

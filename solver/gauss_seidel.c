@@ -69,7 +69,7 @@ int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow
 
 double contact_residual(const ContactRow *row, int count, const Vec3 *motion, ContactReport *report)
 {
-    double worst = 0, top = 1e-3, cone = 0;
+    double worst = 0, top = 1e-6, cone = 0; // squares, the first two
     int active = 0;
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &row[i];
@@ -77,17 +77,18 @@ double contact_residual(const ContactRow *row, int count, const Vec3 *motion, Co
             continue;
         double fn = vec3_dot(c->force, c->normal);
         Vec3 error = contact_error(c, c->force, motion[i], 1);
-        worst = fmax(worst, vec3_norm(error));
-        top = fmax(top, vec3_norm(c->force));
+        double off = vec3_norm2(error), force = vec3_norm2(c->force);
+        worst = off > worst ? off : worst;
+        top = force > top ? force : top;
         if (fn > 0) {
             active++;
             cone = fmax(cone, vec3_norm(contact_tangential(c->force, c->normal)) / fn - c->friction);
         }
     }
     report->active = active;
-    report->largest = top;
+    report->largest = sqrt(top);
     report->cone_violation = cone;
-    return report->residual = worst / top;
+    return report->residual = sqrt(worst) / report->largest;
 }
 
 void contact_balance(ContactSolver *s, const BlockFactor *factor, const double *b, int count, double *u)
@@ -119,12 +120,13 @@ ContactSolver *contact_solver_create(int node_count, int contact_capacity)
     s->rhs = calloc(6 * m, sizeof *s->rhs);
     s->delta = calloc(6 * m, sizeof *s->delta);
     s->turned = calloc(BLOCK_DOUBLES * m + 2, sizeof *s->turned);
+    s->turned_chain = calloc(BLOCK_DOUBLES * m + 2, sizeof *s->turned_chain);
     s->small_u = calloc(6 * m, sizeof *s->small_u);
     s->lu = block_lu_create(node_count);
     s->condenser = block_condenser_create(node_count);
     s->factor = block_factor_create(node_count);
     s->pointwise = pointwise_work_create(node_count, contact_capacity);
-    bool ok = block_chain_create(&s->matrix, node_count) && s->pointwise && s->condenser && s->small_u;
+    bool ok = block_chain_create(&s->matrix, node_count) && s->pointwise && s->condenser && s->small_u && s->turned_chain;
     if (!s->row || !s->motion || !s->law || !s->best || !s->best_u || !s->flag || !s->rhs || !s->delta || !s->turned || !s->lu || !s->factor || !ok) {
         contact_solver_destroy(s);
         return NULL;
@@ -146,6 +148,7 @@ void contact_solver_destroy(ContactSolver *s)
     free(s->delta);
     free(s->turned);
     free(s->small_u);
+    free(s->turned_chain);
     block_condenser_destroy(s->condenser);
     block_lu_destroy(s->lu);
     pointwise_work_destroy(s->pointwise);
