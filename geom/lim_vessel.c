@@ -384,7 +384,10 @@ static void check_batch(const LimVessel *lim, FootBatch *b, FootSample *at, Lane
     int lane[FOOT_BATCH], n = 0;
     for (int i = 0; i < count; i++) {
         const VesselMemory *m = &memory[of[i].point];
-        double known = m->clearance > 0 ? m->clearance - vec3_distance(lane_point(b, i), m->clear_place) : 0;
+        const NodeModel *model = &lim->model[of[i].node];
+        double known = model->clear - vec3_distance(lane_point(b, i), model->center);
+        if (m->clearance > 0)
+            known = fmax(known, m->clearance - vec3_distance(lane_point(b, i), m->clear_place));
         of[i].checked = of[i].sure && !of[i].trusted && b->gap[i] > 0.3 * b->radius[i] && known < 0.5 * b->gap[i];
         if (!of[i].checked)
             continue;
