@@ -6,7 +6,8 @@
 //   2. bounds that cost no field: the distance is 1-Lipschitz, so gap(X) >= gap(C) - |X - C| for the node's centre C, and
 //      gap(X) >= clearance - |X - X_then| for the place where that was last made sure of;
 //   3. one value of the field at X: its sign, and an estimate that shows when another wall has come closer than the remembered one;
-//   4. Newton (foot_lanes.h) from where the remembered foot should have moved to: p + (I + gap S)^-1 P (X - X_then);
+//   4. Newton (foot_lanes.h) from where the remembered foot should have moved to: p + (I + gap S)^-1 P (X - X_then); near focal points with bounded
+//      steps of |I + gap S|^-1;
 //   5. where that fails, a march from X along the gradient, then again 4; where that fails, blobby_project (slow, robust);
 //   6. near the wall, the partners: models of the cells that are close, asked at the own foot, and mixed in.
 // The march works on W = (f + T)^(-1/2) - T^(-1/2), which for one blob is a paraboloid |X - C|^2 - r^2 up to scale: Newton on it from outside never
