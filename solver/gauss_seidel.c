@@ -178,7 +178,10 @@ static bool solve_condensed(ContactSolver *s, const BlockChain *chain, const dou
         return false;
     for (int i = 0; i < count; i++)
         s->row[i].node = block_condenser_place(s->condenser, s->row[i].chain_node);
-    *report = contact_newton(s, small, s->factor, block_condenser_side(s->condenser), count, options, s->small_u);
+    // an iteration costs what is left of the chain: up to twice as many are in the same bound
+    ContactOptions longer = *options;
+    longer.max_iterations = (int)(options->max_iterations * fmin(2, (double)chain->count / small->count));
+    *report = contact_newton(s, small, s->factor, block_condenser_side(s->condenser), count, &longer, s->small_u);
     block_condenser_expand(s->condenser, s->small_u, u);
     return true;
 }

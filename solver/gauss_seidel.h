@@ -18,7 +18,8 @@ typedef enum { CONTACT_BLOCK = 0, CONTACT_POINTWISE = 1 } ContactForm;
 
 typedef struct ContactOptions {
     ContactForm form;        // default CONTACT_BLOCK
-    int max_iterations;      // sweeps, default 200; a factorisation of the block form counts as eight of them, so that a step's cost is bounded
+    int max_iterations;      // sweeps, default 200; a factorisation of the block form counts as eight of them, or down to four on a
+                             // condensed chain (block_condense.h), so that a step's cost is bounded
     double tolerance;        // on the residual below, default 1e-6
 } ContactOptions;
 
