@@ -574,12 +574,27 @@ static void copy_iterate(Stepper *s, bool back)
 
 static double largest_part(const Stepper *s) { return s->turn > TURN_MAX ? TURN_MAX / s->turn : 1; }
 
+// Does the solution go back to where the iterate came from? Over an edge of the wall two linearisations each send a tip to the other's place for ever:
+// the answer lies between.
+static bool goes_back(const Stepper *s)
+{
+    const double *before = s->kept + 7 * (size_t)s->state.node_count;
+    double along = 0, came = 0;
+    for (int i = 6 * s->first_free; i < 6 * s->state.node_count; i += 6)
+        for (int k = i; k < i + 3; k++) {
+            double d = s->linearised[k] - before[k];
+            along += d * (s->u[k] - s->linearised[k]);
+            came += d * d;
+        }
+    return along < -0.5 * came;
+}
+
 // The share of the solution that was followed. A quiet step goes all the way, and so does a wire without walls but for TURN_MAX. Else only as far as
 // no node is driven through the wall and the wire is not left with energy that nobody gave it. Where the wall is not where its linear form has it,
 // the form is first moved there and the contacts solved again (a second-order correction); then by halves, from places that are good.
-static double follow(Stepper *s)
+static double follow(Stepper *s, bool halfway)
 {
-    double part = largest_part(s);
+    double part = halfway ? fmin(0.5, largest_part(s)) : largest_part(s);
     if (!s->vessel || (s->turn <= NEWTON_MOTION_IN_CONTACT && !s->overshoots)) {
         move(s, part);
         return part;
@@ -626,7 +641,7 @@ void step_contact(Stepper *s)
         s->overshoots = stepper_overshoot(s) > OVERSHOOT;
         if (!(turns && iteration < s->newton_max) && !s->overshoots)
             break;
-        if (follow(s) == 0) {
+        if (follow(s, iteration > 1 && s->vessel && goes_back(s)) == 0) {
             s->blocked = true;
             break;
         }
@@ -708,7 +723,7 @@ void step_correct(Stepper *s)
     s->state.time += s->dt;
     if (!s->has_failed) {
         report_forces(s);
-        if (s->blocked || follow(s) < 1)
+        if (s->blocked || follow(s, false) < 1)
             s->report.flags |= STEP_LIMITED;
         set_velocities(s);
         count_command(s);
