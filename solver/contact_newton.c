@@ -22,7 +22,8 @@
 //   iteration on the step is halved until they are better fulfilled than before. (Changing states one at a time, or minimising the convex problem
 //   of Tresca's friction in between, was tried before and cost ten times as much in the cases that need it.)
 // - The search can stall at a kink, where the states say one direction and their own boundary another. Then the rule for reversed contacts is
-//   turned off or on again, every second time r is changed too, and after two stalls in a row the whole step is taken.
+//   turned off or on again, every second time r is changed too, and after three stalls in a row the whole step is taken (after two, some solves
+//   go round for ever).
 //
 // Forces leave cut to their cones, which changes them by no more than the residual. The motion is not balanced again with them: the wire's bending
 // is so soft against its stretching that a force off by 1e-8 of the largest moves it by as much as a residual of 0.1, so that iterates that
@@ -38,7 +39,7 @@ enum { OPEN, STICK, SLIP };
 static const double penalty = 1e4;
 // r over k, in the choice of states (usual and after stalls) and in the line search: none changes the solution.
 static const double usual_slope = 1e-3, other_slope = 1e-2, merit_slope = 1e-2;
-enum { FIRST_SEARCH = 3, HALVINGS = 6 };
+enum { FIRST_SEARCH = 3, HALVINGS = 6, STALLS_IN_A_ROW = 3 };
 static const double stall = 0.05; // a step cut to less gets nowhere
 
 static double normal_violation(const ContactRow *c, Vec3 motion) { return c->gap + vec3_dot(motion, c->normal); }
@@ -421,7 +422,7 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
         double t = search ? step_length(s, count) : 1, before = report.residual;
         in_a_row = t < stall ? in_a_row + 1 : 0;
         s->stalls += t < stall;
-        if (in_a_row == 2) {
+        if (in_a_row == STALLS_IN_A_ROW) {
             t = 1;
             in_a_row = 0;
         }
