@@ -106,7 +106,7 @@ static bool allocate(Stepper *s)
     s->query_place = calloc(points, sizeof *s->query_place);
     s->query_hit = calloc(points, sizeof *s->query_hit);
     s->query_which = calloc(3 * points + m, sizeof *s->query_which);
-    s->room = calloc(points + m, sizeof *s->room);
+    s->room = calloc(2 * points + m, sizeof *s->room);
     s->set.point = calloc(points, sizeof *s->set.point);
     s->set.capacity = s->point_count;
     s->factor = block_factor_create(s->wire.node_count);
@@ -122,7 +122,8 @@ static bool allocate(Stepper *s)
     s->state.orientation = (Quat *)(s->memory + 9 * m);
     s->force = (Vec3 *)(s->memory + 13 * m);
     s->clearance = s->memory + 13 * m + 3 * points;
-    s->range = s->room + points;
+    s->linger = s->room + points;
+    s->range = s->linger + points;
     s->query_near = s->query_which + points;
     s->candidate = s->query_near + points;
     s->answer_of = s->candidate + points;

@@ -16,6 +16,7 @@ static const double DEEP = 0.2;          // [mm] STEP_DEEP
 static const double OVERSHOOT_TRAVEL = 0.05;   // [mm] a point that the solution moves less is where its linearised wall is
 static const double DIP_MIN = 0.002;     // [mm] by which the element may be nearer to the wall than its nodes before its slot counts
 static const double SIGHT = 2;           // [mm] longer elements' slots are asked at any rate
+static const double LINGER = 0.9, LINGER_MAX = 0.006;     // of a gap, [mm]
 static const double NOTHING_KNOWN = -1;  // as a clearance: neither place nor force is held
 // A contact between one free node and the sheath is one between nodes with no share for the second.
 static const double NO_SHARE = 1e-300;
@@ -417,6 +418,15 @@ static void look_ahead(double dt, Vec3 axis, Vec3 velocity, ContactPoint *c)
     c->gap -= 0.5 * rise;
 }
 
+// [mm] by which the wall of a point is taken to be nearer in this step. Where neighbouring local models hand a point over the wall steps back by some
+// um, and a wire that followed at once would kick the hand. A point that pressed in the last step goes after it by a part of the gap a step instead.
+static double linger(Stepper *s, int point, double gap)
+{
+    if (!s->is_iterate && !s->knows_motion && presses(s, point) && gap > 0)
+        s->linger[point] = LINGER * fmin(gap, LINGER_MAX);
+    return s->linger[point];
+}
+
 static void add_candidate(Stepper *s, int point, const VesselHit *hit)
 {
     int nodes = s->state.node_count;
@@ -430,6 +440,7 @@ static void add_candidate(Stepper *s, int point, const VesselHit *hit)
     c->lever[1] = p ? p->lever[1] : vec3(0, 0, 0);
     c->normal = hit->normal;
     c->gap = gap > -STEP_OUT_MAX ? gap : -STEP_OUT_MAX;
+    c->gap -= linger(s, point, gap);
     c->hessian = hit->hessian;
     c->friction = friction >= 0 ? friction : s->wall_friction;
     c->tool_radius = radius;
@@ -547,6 +558,8 @@ void stepper_detect(Stepper *s)
     s->set.count = 0;
     if (!s->vessel)
         return;
+    if (!s->is_iterate && !s->knows_motion)
+        memset(s->linger, 0, (size_t)s->point_count * sizeof *s->linger);
     estimate_ranges(s);
     int *candidate = s->query_near, nodes = ask_nodes(s);
     int node_candidates = answer(s, 0, nodes, candidate);

@@ -71,6 +71,7 @@ struct Stepper {
     int *candidate;          // (P) the points of `set`
     double *range;           // (M) [mm] or [mm/ms] that a node moves, or is likely to
     double *room;            // (P) [mm] how far a point that is no candidate may go from the iterate; HUGE_VAL for candidates
+    double *linger;          // (P) [mm] by which the wall is taken to be nearer in this step
     double *scratch;         // owns the arrays of doubles
 
     // of this step
