@@ -3,7 +3,7 @@
 // Two forms behind one call (DESIGN section 4, items 5 and 6); both reach the same solution.
 //   pointwise: Gauss-Seidel over contacts (the paper's, and the reference), on the chain's semi-separable structure: W is never formed.
 //   block:     both fields together by a semismooth Newton method with a line search, an iteration being one chain factorisation
-//              (contact_newton.c).
+//              (contact_newton.c), of the nodes that carry contacts where these are few: the others are eliminated once (block_condense.h).
 // Warm start: ContactPoint.force of the same material point from the step before, as it is; zero for a new point. What presses in it is taken
 // as active, so stale forces on points that have left the wall cost iterations: drop them with the candidate. Nothing else is remembered.
 #ifndef SELDINGER_SOLVER_GAUSS_SEIDEL_H
