@@ -3,6 +3,7 @@
 
 #include "cli/output.h"
 #include "recon/lim_fit.h"
+#include "recon/model_measure.h"
 #include "recon/tree_file.h"
 #ifdef SELDINGER_RENDER
 #include "render/picture.h"
@@ -17,11 +18,12 @@
 typedef struct FitCommand {
     const char *tree, *output, *json, *picture, *preset;
     LimFitOptions options;
-    bool has_voxel, quiet;
+    bool has_voxel, quiet, measure;
 } FitCommand;
 
 static const char help[] =
-    "Usage: seldinger fit TREE.h5 -o MODEL.h5 [options]\n\n"
+    "Usage: seldinger fit TREE.h5 -o MODEL.h5 [options]\n"
+    "       seldinger fit MODEL.h5 --measure [--json F]\n\n"
     "Fits a local blobby model to the points around every node (LIM, Kerrien et al. 2017).\n\n"
     "  -o, --output F.h5      the model\n"
     "  --preset NAME          default, or paper: the published values and method; give it before other options\n"
@@ -33,6 +35,8 @@ static const char help[] =
     "  --beta X               weight of curvature [mm^4]; default 1e-4, paper 1e-3\n"
     "  --max-points N         points of a local model, at most (evenly thinned); default 1500\n"
     "  --threads N            default 0: all cores; the result does not depend on it\n"
+    "  --measure              also: how far neighbouring local models differ where a tool passes from one to the next, walls that no\n"
+    "                         point supports, narrow links; without -o of the model given, which is then not fitted again\n"
     "  --json F               figures as JSON; - is standard output\n"
     "  --picture F.png        fitted surface, points coloured by distance\n"
     "  --quiet                no summary, no progress\n\n"
@@ -47,13 +51,13 @@ static int usage_fault(const char *message, const char *what)
 // -1: go on; otherwise the exit code.
 static int parse_options(int argc, char **argv, FitCommand *command)
 {
-    enum { PRESET = 256, TARGET, BLOBS, VOXEL, ALPHA, BETA, POINTS, THREADS, JSON, PICTURE, QUIET };
+    enum { PRESET = 256, TARGET, BLOBS, VOXEL, ALPHA, BETA, POINTS, THREADS, JSON, PICTURE, QUIET, MEASURE };
     static const struct option table[] = {
         {"output", required_argument, NULL, 'o'},      {"preset", required_argument, NULL, PRESET}, {"target-mm", required_argument, NULL, TARGET},
         {"max-blobs", required_argument, NULL, BLOBS}, {"voxel-mm", required_argument, NULL, VOXEL}, {"alpha", required_argument, NULL, ALPHA},
         {"beta", required_argument, NULL, BETA},       {"max-points", required_argument, NULL, POINTS}, {"threads", required_argument, NULL, THREADS},
         {"json", required_argument, NULL, JSON},       {"picture", required_argument, NULL, PICTURE}, {"quiet", no_argument, NULL, QUIET},
-        {"help", no_argument, NULL, 'h'},              {0}};
+        {"measure", no_argument, NULL, MEASURE},       {"help", no_argument, NULL, 'h'},              {0}};
     *command = (FitCommand){.options = lim_fit_default_options(), .preset = "default"};
     double number;
     optind = 1;
@@ -64,6 +68,7 @@ static int parse_options(int argc, char **argv, FitCommand *command)
         case JSON: command->json = optarg; break;
         case PICTURE: command->picture = optarg; break;
         case QUIET: command->quiet = true; break;
+        case MEASURE: command->measure = true; break;
         case PRESET:
             if (strcmp(optarg, "default") && strcmp(optarg, "paper"))
                 return usage_fault("--preset is default or paper, not ", optarg);
@@ -108,7 +113,7 @@ static int parse_options(int argc, char **argv, FitCommand *command)
     }
     if (optind != argc - 1)
         return usage_fault(optind < argc ? "one tree at a time, not also " : "lacks the tree to fit", optind < argc ? argv[optind + 1] : "");
-    if (!command->output)
+    if (!command->output && !command->measure)
         return usage_fault("lacks -o MODEL.h5", "");
     command->tree = argv[optind];
     return -1;
@@ -181,6 +186,64 @@ static FitFigures figures_of(const VesselTree *model, double voxel, double secon
     return figures;
 }
 
+static void print_jumps(const char *what, const JumpRow *row)
+{
+    for (int place = 0; place < PLACES; place++)
+        if (row[place].count > 0)
+            printf("%-8s %-12s %7d %9.4f %8.4f %8.4f %9.4f %8.4f %8.4f   %d, %d\n", what, model_place_name[place], row[place].count, row[place].gap_median,
+                   row[place].gap_p99, row[place].gap_most, row[place].normal_median, row[place].normal_p99, row[place].normal_most,
+                   row[place].worst_node, row[place].worst_other);
+}
+
+static void print_measure(const ModelMeasure *m)
+{
+    printf("jumps between  place          joins   gap p50      p99  max [mm] normal p50      p99 max [rad]   worst pair of nodes\n");
+    print_jumps("raw", m->raw);
+    print_jumps("as met", m->met);
+    printf("bare walls     %d nodes with wall further than 0.6 r from data", m->bare_nodes);
+    if (m->bare_nodes > 0)
+        printf(", at most %.3f mm (node %d)", m->bare_most_mm, m->bare_worst);
+    printf("\nghost sheets   %d nodes", m->ghost_nodes);
+    if (m->ghost_nodes > 0)
+        printf(", at most %.3f mm from data (node %d)", m->ghost_most_mm, m->ghost_worst);
+    printf("\nnarrow links   %d of %d have less than half the radius free", m->narrow_links, m->links);
+    if (m->links > 0)
+        printf("; least %.3f r (node %d)", m->least_clearance, m->narrowest_node);
+    printf("\n");
+}
+
+static void json_jumps(cJSON *root, const char *name, const JumpRow *row)
+{
+    cJSON *object = cJSON_AddObjectToObject(root, name);
+    for (int place = 0; place < PLACES; place++) {
+        cJSON *item = cJSON_AddObjectToObject(object, model_place_name[place]);
+        cJSON_AddNumberToObject(item, "joins", row[place].count);
+        cJSON_AddNumberToObject(item, "gap_p50_mm", row[place].gap_median);
+        cJSON_AddNumberToObject(item, "gap_p99_mm", row[place].gap_p99);
+        cJSON_AddNumberToObject(item, "gap_max_mm", row[place].gap_most);
+        cJSON_AddNumberToObject(item, "normal_p50_rad", row[place].normal_median);
+        cJSON_AddNumberToObject(item, "normal_p99_rad", row[place].normal_p99);
+        cJSON_AddNumberToObject(item, "normal_max_rad", row[place].normal_most);
+        cJSON_AddNumberToObject(item, "worst_node", row[place].worst_node);
+        cJSON_AddNumberToObject(item, "worst_other", row[place].worst_other);
+    }
+}
+
+static void json_measure(cJSON *root, const ModelMeasure *m)
+{
+    json_jumps(root, "jumps_raw", m->raw);
+    json_jumps(root, "jumps_as_met", m->met);
+    cJSON_AddNumberToObject(root, "bare_nodes", m->bare_nodes);
+    cJSON_AddNumberToObject(root, "bare_max_mm", m->bare_most_mm);
+    cJSON_AddNumberToObject(root, "bare_worst_node", m->bare_worst);
+    cJSON_AddNumberToObject(root, "ghost_nodes", m->ghost_nodes);
+    cJSON_AddNumberToObject(root, "ghost_max_mm", m->ghost_most_mm);
+    cJSON_AddNumberToObject(root, "ghost_worst_node", m->ghost_worst);
+    cJSON_AddNumberToObject(root, "narrow_links", m->narrow_links);
+    cJSON_AddNumberToObject(root, "least_clearance_ratio", m->links > 0 ? m->least_clearance : 1);
+    cJSON_AddNumberToObject(root, "narrowest_node", m->narrowest_node);
+}
+
 static void print_figures(const VesselTree *model, const FitFigures *f, double voxel)
 {
     printf("nodes          %d, %lld points\n", model->node_count, (long long)model->point_count);
@@ -191,7 +254,7 @@ static void print_figures(const VesselTree *model, const FitFigures *f, double v
     printf("seconds        %.2f\n", f->seconds);
 }
 
-static bool write_json(const char *path, const VesselTree *model, const FitFigures *f, double voxel, Faults *faults)
+static bool write_json(const char *path, const VesselTree *model, const FitFigures *f, const ModelMeasure *measure, double voxel, Faults *faults)
 {
     cJSON *root = cJSON_CreateObject();
     cJSON_AddNumberToObject(root, "nodes", model->node_count);
@@ -208,6 +271,8 @@ static bool write_json(const char *path, const VesselTree *model, const FitFigur
     for (int i = 0; i < 4; i++)
         cJSON_AddItemToArray(classes, cJSON_CreateNumber(f->class_percent[i]));
     cJSON_AddNumberToObject(root, "seconds", f->seconds);
+    if (measure)
+        json_measure(root, measure);
     char *text = cJSON_Print(root);
     bool good = text && output_write(path, text, strlen(text), faults);
     if (!text)
@@ -242,7 +307,8 @@ static double seconds_now(void)
 
 static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seconds, Faults *faults)
 {
-    output_check_file(command->output, faults);
+    if (command->output)
+        output_check_file(command->output, faults);
     output_check(command->json, faults);
     if (command->picture)
         output_check_file(command->picture, faults);
@@ -250,11 +316,15 @@ static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seco
     if (tree && tree->point_count < 4)
         faults_add(faults, command->tree, 0, 0, "has %d nodes and %lld points; at least 4 points on the wall are needed", tree->node_count,
                    (long long)tree->point_count);
+    if (tree && !command->output && !vessel_tree_is_model(tree))
+        faults_add(faults, command->tree, 0, 0, "is a tree without a model; fit it with -o MODEL.h5");
     if (tree && faults->count == 0) {
         if (!command->has_voxel) {
             double said = tree_file_number(info, "voxel_mm", command->options.voxel_mm);
             command->options.voxel_mm = said > 1e-4 && said < 100 ? said : command->options.voxel_mm;
         }
+        if (!command->output)
+            return tree;
         ProgressBar bar;
         Progress progress = progress_bar(&bar, "fit", command->quiet);
         double begin = seconds_now();
@@ -278,14 +348,23 @@ int verb_fit(int argc, char **argv)
     bool good = model != NULL;
     if (good) {
         FitFigures figures = figures_of(model, command.options.voxel_mm, seconds);
+        ModelMeasure measure;
+        if (command.measure && !model_measure(model, NULL, command.options.threads, &measure)) {
+            faults_add(&faults, command.tree, 0, 0, "not enough memory to measure the model");
+            good = false;
+        }
         TreeFileInfo info = {.source = from.source, .parameters = describe(&command, &from),
                              .created_by = (char *)(size_t) "seldinger " SELDINGER_VERSION " fit"};
-        good = tree_file_save(model, &info, command.output, &faults);
+        if (command.output)
+            good = good && tree_file_save(model, &info, command.output, &faults);
         free(info.parameters);
         if (good && command.json)
-            good = write_json(command.json, model, &figures, command.options.voxel_mm, &faults);
-        if (good && !command.quiet && !(command.json && !strcmp(command.json, "-")))
+            good = write_json(command.json, model, &figures, command.measure ? &measure : NULL, command.options.voxel_mm, &faults);
+        if (good && !command.quiet && !(command.json && !strcmp(command.json, "-"))) {
             print_figures(model, &figures, command.options.voxel_mm);
+            if (command.measure)
+                print_measure(&measure);
+        }
         if (good && command.picture)
             make_picture(command.picture, model);
     }
