@@ -9,6 +9,7 @@
 #include "geom/linear.h"
 #include "geom/power_walk.h"
 #include "geom/simd.h"
+#include "geom/tree_surface.h"
 #include "geom/vessel.h"
 #include "geom/vessel_tree.h"
 
