@@ -31,6 +31,16 @@ INLINE Row load_row(const float *from)
     return row;
 }
 
+// Of four samples: each one's lanes times its weights (one array of samples for each lane), added as (0 + 1) + (2 + 3).
+INLINE Row join_lanes(const Row *r, const float *w, size_t stride)
+{
+    Row a = __builtin_shufflevector(r[0], r[1], 0, 4, 1, 5), b = __builtin_shufflevector(r[2], r[3], 0, 4, 1, 5);
+    Row c = __builtin_shufflevector(r[0], r[1], 2, 6, 3, 7), d = __builtin_shufflevector(r[2], r[3], 2, 6, 3, 7);
+    Row l0 = __builtin_shufflevector(a, b, 0, 1, 4, 5), l1 = __builtin_shufflevector(a, b, 2, 3, 6, 7);
+    Row l2 = __builtin_shufflevector(c, d, 0, 1, 4, 5), l3 = __builtin_shufflevector(c, d, 2, 3, 6, 7);
+    return (l0 * load_row(w) + l1 * load_row(w + stride)) + (l2 * load_row(w + 2 * stride) + l3 * load_row(w + 3 * stride));
+}
+
 // Taps that lie beyond the grid.
 static float sample_at_border(const Volume *volume, const int base[3], const float wx[4], const float wy[4], const float wz[4])
 {

@@ -117,20 +117,21 @@ static double steepest(const RayProfile *ray, int first, int last, double *slope
 
 int cast_rays(const Volume *volume, Vec3 center, const Vec3 *direction, int count, const RayOptions *options, Vec3 *point)
 {
-    double distance[MAX_DIRECTIONS], slope[MAX_DIRECTIONS], least = HUGE_VAL, most = -HUGE_VAL;
+    double distance[MAX_DIRECTIONS], slope[MAX_DIRECTIONS];
+    float least = INFINITY, most = -INFINITY;
     Vec3 voxel = volume_voxel_of(volume, center);
     RayProfile ray;
     for (int i = 0; i < count; i++) {
         sample_ray(volume, voxel, direction[i], options, &ray);
         // brightness range: the lumen is bright in the first third of the rays, the background is the darkest of all
-        for (int k = 0; k < ray.samples; k++) {
-            least = fmin(least, (double)ray.value[k]);
-            most = k <= ray.samples / 3 ? fmax(most, (double)ray.value[k]) : most;
-        }
+        for (int k = 0; k < ray.samples; k++)
+            least = ray.value[k] < least ? ray.value[k] : least;
+        for (int k = 0; k <= ray.samples / 3; k++)
+            most = ray.value[k] > most ? ray.value[k] : most;
         smooth_ray(&ray, options->smoothing);
         distance[i] = steepest(&ray, 1, ray.samples - 2, &slope[i]);
     }
-    double needed = options->edge * (most - least) / volume_voxel_size(volume);
+    double needed = options->edge * ((double)most - (double)least) / volume_voxel_size(volume);
     int found = 0;
     for (int i = 0; i < count; i++)
         if (-slope[i] >= needed && slope[i] < 0)

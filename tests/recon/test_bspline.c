@@ -1,5 +1,6 @@
 // Cubic B-spline approximation: against a plain double reference, and the laws it must obey (reproduces straight lines, smooths by 1/sqrt(3) voxel).
 #include "recon/bspline.h"
+#include "geom/simd.h"
 #include "recon/ransac_cylinder.h"
 
 #include <setjmp.h>
@@ -90,15 +91,30 @@ static void smooths_by_a_known_width(void **state)
     volume_free(v);
 }
 
+// Any line, inside, across the border or outside, of any length, on any instruction set: the bits of its samples taken alone.
 static void lines_are_samples(void **state)
 {
     (void)state;
     Volume *v = volume_of(noise);
-    float line[40];
-    Vec3 start = {-2, 0.3, 0.1}, step = {0.31, 0.2, 0.15};
-    bspline_sample_line(v, start, step, 40, line);
-    for (int i = 0; i < 40; i++)
-        assert_true(line[i] == bspline_sample(v, vec3(start.x + i * step.x, start.y + i * step.y, start.z + i * step.z)));
+    Random random = random_from_seed(2, 0);
+    for (int level = 0; level < SIMD_COUNT; level++) {
+        simd_force((SimdLevel)level);
+        for (int n = 0; n < 600; n++) {
+            float line[70];
+            int count = n % 70 + 1;
+            double pace = n % 3 ? 0.1 : 0.7;
+            Vec3 start = {12 * random_unit(&random) - 2, 11 * random_unit(&random) - 2, 10 * random_unit(&random) - 2};
+            Vec3 step = {pace * (random_unit(&random) - 0.5), pace * (random_unit(&random) - 0.5), pace * (random_unit(&random) - 0.5)};
+            if (n % 50 == 0)
+                start.x = n % 100 ? -1e15 : NAN;
+            line[count % 70] = -7;
+            bspline_sample_line(v, start, step, count, line);
+            for (int i = 0; i < count; i++)
+                assert_true(line[i] == bspline_sample(v, vec3(start.x + i * step.x, start.y + i * step.y, start.z + i * step.z)));
+            assert_true(count == 70 || line[count] == -7);   // nothing written beyond
+        }
+    }
+    simd_force(simd_widest());
     volume_free(v);
 }
 
