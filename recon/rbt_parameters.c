@@ -12,6 +12,7 @@ RbtParameters rbt_paper_parameters(void)
         .p_inl = 0.7, .r_t = 0.1, .n_r = 162, .n_d = 81, .n_p = 128, .n_min = 220, .n_max = 500, .s = 0.5, .ray_length = 3, .height_share = 0.75,
         .back_step = 0.1, .relaxed = 0.5, .powell = 1, .turn_deg = 180,
         .overlap = 0.5, .max_length_mm = 1000, .aneurysm_rays = 162, .aneurysm_reach_mm = 15, .seed = 1,
+        .find_aneurysms = 1, .residue = 0.2,
     };
 }
 
@@ -67,6 +68,9 @@ const RbtParameterName rbt_parameter_table[] = {
     {"max_length_mm", FIELD(max_length_mm), 1, 100000, false, "longest branch"},
     {"aneurysm_rays", FIELD(aneurysm_rays), 42, 2562, true, "rays from each centre of an aneurysm: 42, 162, 642 or 2562"},
     {"aneurysm_reach_mm", FIELD(aneurysm_reach_mm), 0.1, 1000, false, "length of these rays"},
+    {"automatic", FIELD(automatic), 0, 1, true, "1: the whole tree from the first start; 0: what the trace names alone"},
+    {"find_aneurysms", FIELD(find_aneurysms), 0, 1, true, "1: aneurysms are looked for too (automatic: 1)"},
+    {"residue", FIELD(residue), 0.05, 0.5, false, "least contrast of a vessel that is looked for, share of its parent's"},
     {"seed", FIELD(seed), 0, 9007199254740991.0, true, "of the random numbers"},
 };
 const int rbt_parameter_count = sizeof rbt_parameter_table / sizeof rbt_parameter_table[0];

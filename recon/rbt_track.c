@@ -11,56 +11,20 @@
 #include "recon/bspline.h"
 #include "recon/cast_rays.h"
 #include "recon/ransac_cylinder.h"
+#include "recon/rbt_branches.h"
 #include "recon/rbt_exits.h"
+#include "recon/rbt_residue.h"
+#include "recon/rbt_tracker.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_RAYS = 2562, MAX_AXES = 321, CONTRAST_MEMORY = 8, MAX_NODES = 200000, MAX_HUB_ROUNDS = 2 };
+enum { CONTRAST_MEMORY = 8, MAX_NODES = 200000, MAX_HUB_ROUNDS = 2 };
 
 // --- growing tree ---
 
-typedef struct TrackNode {
-    Cylinder cylinder;
-    double inlier_rate, contrast;
-    int parent, kind, branch;
-    bool retried, is_junction;
-    int64_t point_start;
-    int point_count;
-} TrackNode;
-
-typedef struct Estimate {    // a node before it is accepted
-    TrackNode node;
-    Vec3 point[MAX_RAYS];
-} Estimate;
-
-typedef struct Track {       // nodes with their points, growing
-    TrackNode *node;
-    int count, capacity;
-    Vec3 *point;
-    int64_t point_count, point_capacity;
-} Track;
-
-typedef struct Tracker {
-    const Volume *volume;
-    const RbtParameters *parameters;
-    double voxel;            // [mm]
-    double dark;             // brightness below which a start lies on background
-    int ray_count, axis_count;
-    Vec3 ray[MAX_RAYS];
-    Vec3 axis[MAX_AXES];     // half a sphere about +z in order of angle with it
-    Random random;
-    Vec3 candidate[MAX_RAYS];
-    int inlier[MAX_RAYS];
-    double along[MAX_RAYS];
-    Estimate estimate;
-    Track tree;
-    bool out_of_memory;
-    const char *why;         // the last estimate was refused
-} Tracker;
-
-static bool track_append(Track *track, const TrackNode *node, const Vec3 *point)
+bool track_append(Track *track, const TrackNode *node, const Vec3 *point)
 {
     if (track->count == track->capacity) {
         int capacity = track->capacity ? 2 * track->capacity : 256;
@@ -87,7 +51,7 @@ static bool track_append(Track *track, const TrackNode *node, const Vec3 *point)
     return true;
 }
 
-static void track_free(Track *track)
+void track_free(Track *track)
 {
     free(track->node);
     free(track->point);
@@ -123,7 +87,7 @@ static void prepare_axes(Tracker *t)
     t->axis_count = used;
 }
 
-static double brightness(const Tracker *t, Vec3 point) { return (double)bspline_sample(t->volume, volume_voxel_of(t->volume, point)); }
+double tracker_brightness(const Tracker *t, Vec3 point) { return (double)bspline_sample(t->volume, volume_voxel_of(t->volume, point)); }
 
 // Lumen on the axis less the darker half of a ring outside the wall: a neighbour in contact must not hide the vessel.
 static double contrast_of(const Tracker *t, const Cylinder *c)
@@ -132,10 +96,10 @@ static double contrast_of(const Tracker *t, const Cylinder *c)
     double inside = 0, ring[RING], outside = 0, radius = 1.5 * c->radius + t->voxel;
     Vec3 e1 = vec3_normal_to(c->axis), e2 = vec3_cross(c->axis, e1);
     for (int i = -1; i <= 1; i++)
-        inside += brightness(t, vec3_add_scaled(c->center, 0.25 * i * c->radius, c->axis)) / 3;
+        inside += tracker_brightness(t, vec3_add_scaled(c->center, 0.25 * i * c->radius, c->axis)) / 3;
     for (int i = 0; i < RING; i++) {
         double a = 2 * PI * i / RING;
-        ring[i] = brightness(t, vec3_add_scaled(vec3_add_scaled(c->center, radius * cos(a), e1), radius * sin(a), e2));
+        ring[i] = tracker_brightness(t, vec3_add_scaled(vec3_add_scaled(c->center, radius * cos(a), e1), radius * sin(a), e2));
     }
     qsort(ring, RING, sizeof *ring, compare_doubles);
     for (int i = 0; i < RING / 2; i++)
@@ -174,7 +138,7 @@ static double median_along(Tracker *t, const Cylinder *c, int inliers)
 }
 
 // The whole of the estimation step. False where no cylinder is valid (t->why says which part failed); else t->estimate holds the node.
-static bool estimate(Tracker *t, const Cylinder *predicted, double relative_threshold)
+bool tracker_estimate(Tracker *t, const Cylinder *predicted, double relative_threshold)
 {
     const RbtParameters *p = t->parameters;
     RayOptions rays = {p->ray_length * predicted->radius, (int)p->n_p, p->ray_smoothing_voxels * t->voxel, p->ray_edge};
@@ -228,10 +192,18 @@ static bool estimate(Tracker *t, const Cylinder *predicted, double relative_thre
 
 // --- one branch ---
 
-static bool inside_volume(const Volume *volume, Vec3 x)
+bool tracker_is_inside(const Volume *volume, Vec3 x)
 {
     Vec3 v = volume_voxel_of(volume, x);
     return v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x <= volume->size[0] - 1 && v.y <= volume->size[1] - 1 && v.z <= volume->size[2] - 1;
+}
+
+bool tracker_is_forbidden(const Tracker *t, Vec3 x)
+{
+    for (int i = 0; i < t->parameters->forbid_count; i++)
+        if (vec3_distance(x, t->parameters->forbid[i].center) < t->parameters->forbid[i].radius)
+            return true;
+    return false;
 }
 
 static double segment_distance(Vec3 x, Vec3 a, Vec3 b)
@@ -242,8 +214,15 @@ static double segment_distance(Vec3 x, Vec3 a, Vec3 b)
 }
 
 // A node of the finished tree whose tube holds x near its middle, or -1.
-static int tree_node_around(const Tracker *t, Vec3 x, double share)
+int tracker_node_around(const Tracker *t, Vec3 x, double share)
 {
+    if (t->paint) {   // the owner of a voxel is the nearest in its own radii; at a voxel's border it may be the one beside it
+        int owner = rbt_paint_node(t->paint, x);
+        for (int i = owner > 0 ? owner - 1 : owner; i >= 0 && i <= owner + 1 && i < t->tree.count; i++)
+            if (vec3_distance(x, t->tree.node[i].cylinder.center) < share * t->tree.node[i].cylinder.radius)
+                return i;
+        return -1;
+    }
     for (int i = 0; i < t->tree.count; i++)
         if (vec3_distance(x, t->tree.node[i].cylinder.center) < share * t->tree.node[i].cylinder.radius)
             return i;
@@ -259,6 +238,17 @@ static double recent_contrast(const Track *track)
     return sum / (track->count - first);
 }
 
+// The median radius of the last nodes: what the vessel is like.
+static double usual_radius(const Track *branch)
+{
+    double radius[12];
+    int n = branch->count < 12 ? branch->count : 12;
+    for (int i = 0; i < n; i++)
+        radius[i] = branch->node[branch->count - 1 - i].cylinder.radius;
+    qsort(radius, (size_t)n, sizeof *radius, compare_doubles);
+    return radius[n / 2];
+}
+
 // Is the estimate the next node after the last one of the branch?
 static bool is_progress(Tracker *t, const Track *branch, double step, bool is_retry, bool may_overlap)
 {
@@ -267,7 +257,10 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     const TrackNode *next = &t->estimate.node;
     Vec3 move = vec3_sub(next->cylinder.center, last->cylinder.center);
     t->why = "leaves the volume";
-    if (!inside_volume(t->volume, next->cylinder.center))
+    if (!tracker_is_inside(t->volume, next->cylinder.center))
+        return false;
+    t->why = "enters a forbidden region";
+    if (tracker_is_forbidden(t, next->cylinder.center))
         return false;
     t->why = "steps back";
     if (vec3_dot(move, last->cylinder.axis) < 0.25 * step)
@@ -293,11 +286,14 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     double contrast = recent_contrast(branch);
     if (next->contrast < p->contrast * contrast || !(next->contrast > 0.02 * ((double)t->volume->maximum - (double)t->volume->minimum)))
         return false;
+    t->why = "leaks into a wider or brighter neighbour";
+    if (t->is_guarded && branch->count >= 3 && (next->cylinder.radius > 1.8 * usual_radius(branch) || next->contrast > 1.8 * contrast))
+        return false;
     t->why = "no vessel beyond";
     if (is_retry && (fabs(next->cylinder.radius - last->cylinder.radius) > p->retry_radius * last->cylinder.radius || next->contrast < p->retry_contrast * contrast))
         return false;
     t->why = "runs into another branch";
-    return may_overlap || tree_node_around(t, next->cylinder.center, p->overlap) < 0;
+    return may_overlap || tracker_node_around(t, next->cylinder.center, p->overlap) < 0;
 }
 
 // The next node of a branch: the step of eq. (1), then the longer ones, each with both thresholds. False at the end of the vessel.
@@ -312,7 +308,7 @@ static bool next_node(Tracker *t, const Track *branch, bool may_overlap)
         double length = k ? p->retry_steps[k - 1] * step : step;
         predicted.center = vec3_add_scaled(predicted.center, length, predicted.axis);
         for (int second = 0; second <= (p->r_t_second > 0); second++) {
-            bool found = estimate(t, &predicted, second ? p->r_t_second : p->r_t) && is_progress(t, branch, length, k > 0, may_overlap);
+            bool found = tracker_estimate(t, &predicted, second ? p->r_t_second : p->r_t) && is_progress(t, branch, length, k > 0, may_overlap);
             if (found) {
                 t->estimate.node.retried = k > 0;
                 return true;
@@ -326,28 +322,31 @@ static bool next_node(Tracker *t, const Track *branch, bool may_overlap)
 }
 
 // Darkest place on the way from a to b, as a share of the lumen's brightness at both ends.
-static double link_brightness(const Tracker *t, Vec3 a, Vec3 b)
+double tracker_link_brightness(const Tracker *t, Vec3 a, Vec3 b)
 {
-    double base = (double)t->volume->minimum, ends = fmin(brightness(t, a), brightness(t, b)) - base, least = HUGE_VAL;
+    double base = (double)t->volume->minimum, ends = fmin(tracker_brightness(t, a), tracker_brightness(t, b)) - base, least = HUGE_VAL;
     int steps = 2 + (int)(vec3_distance(a, b) / (0.5 * t->voxel));
     if (steps > 4000)
         steps = 4000;
     for (int i = 0; i <= steps; i++)
-        least = fmin(least, brightness(t, vec3_mix(a, b, (double)i / steps)) - base);
+        least = fmin(least, tracker_brightness(t, vec3_mix(a, b, (double)i / steps)) - base);
     return ends > 0 ? least / ends : 0;
 }
 
 // --- past what is no cylinder ---
 
-// The median radius of the last nodes: what the vessel is like.
-static double usual_radius(const Track *branch)
+void tracker_opening(Tracker *t, const Cylinder *c, double contrast)
 {
-    double radius[12];
-    int n = branch->count < 12 ? branch->count : 12;
-    for (int i = 0; i < n; i++)
-        radius[i] = branch->node[branch->count - 1 - i].cylinder.radius;
-    qsort(radius, (size_t)n, sizeof *radius, compare_doubles);
-    return radius[n / 2];
+    double distance[MAX_RAYS];
+    RayOptions rays = {2 * c->radius, (int)t->parameters->n_p, t->parameters->ray_smoothing_voxels * t->voxel, 0};
+    t->estimate.node = (TrackNode){.cylinder = *c, .contrast = contrast, .kind = NODE_VESSEL, .parent = -1, .is_junction = true};
+    cast_rays_first_edge(t->volume, c->center, t->ray, t->ray_count, &rays, distance);
+    int kept = 0;
+    for (int k = 0; k < t->ray_count; k++)
+        if (distance[k] > 0 && distance[k] < 1.5 * c->radius)
+            t->estimate.point[kept++] = vec3_add_scaled(c->center, distance[k], t->ray[k]);
+    t->estimate.node.point_count = kept;
+    t->estimate.node.inlier_rate = (double)kept / t->ray_count;
 }
 
 // Nodes on the straight way between two cylinders, in an opening where no cylinder fits: their points are the first walls that rays meet nearby.
@@ -357,24 +356,16 @@ static bool append_junction(Tracker *t, Track *branch, const Cylinder *from, con
     double gap = vec3_norm(way);
     int steps = (int)ceil(gap / (0.5 * fmin(from->radius, to->radius)));
     for (int i = 1; i < steps; i++) {
-        double share = (double)i / steps, distance[MAX_RAYS];
+        double share = (double)i / steps;
         Cylinder c = {vec3_mix(from->center, to->center, share), from->radius + share * (to->radius - from->radius), vec3_unit(way), 2 * gap / steps};
-        RayOptions rays = {2 * c.radius, (int)t->parameters->n_p, t->parameters->ray_smoothing_voxels * t->voxel, 0};
-        t->estimate.node = (TrackNode){.cylinder = c, .contrast = recent_contrast(branch), .kind = NODE_VESSEL, .parent = -1, .is_junction = true};
-        cast_rays_first_edge(t->volume, c.center, t->ray, t->ray_count, &rays, distance);
-        int kept = 0;
-        for (int k = 0; k < t->ray_count; k++)
-            if (distance[k] > 0 && distance[k] < 1.5 * c.radius)
-                t->estimate.point[kept++] = vec3_add_scaled(c.center, distance[k], t->ray[k]);
-        t->estimate.node.point_count = kept;
-        t->estimate.node.inlier_rate = (double)kept / t->ray_count;
+        tracker_opening(t, &c, recent_contrast(branch));
         if (!track_append(branch, &t->estimate.node, t->estimate.point))
             return false;
     }
     return true;
 }
 
-static void track_cut(Track *track, int count)
+void track_cut(Track *track, int count)
 {
     if (count < track->count)
         track->point_count = track->node[count].point_start;
@@ -391,9 +382,9 @@ static bool join_exit(Tracker *t, Track *branch, int keep, const RbtExit *exit, 
     const Cylinder last = branch->node[keep - 1].cylinder;
     Cylinder predicted = {exit->center[place], exit->radius, exit->direction[place], 0};
     Track back = {0};
-    if (tree_node_around(t, exit->center[place], 1) >= 0 || !(estimate(t, &predicted, p->r_t) || (p->r_t_second > 0 && estimate(t, &predicted, p->r_t_second))))
+    if (tracker_node_around(t, exit->center[place], 1) >= 0 || !(tracker_estimate(t, &predicted, p->r_t) || (p->r_t_second > 0 && tracker_estimate(t, &predicted, p->r_t_second))))
         return false;
-    if (t->estimate.node.contrast < p->retry_contrast * recent_contrast(branch) || tree_node_around(t, t->estimate.node.cylinder.center, p->overlap) >= 0)
+    if (t->estimate.node.contrast < p->retry_contrast * recent_contrast(branch) || tracker_node_around(t, t->estimate.node.cylinder.center, p->overlap) >= 0)
         return false;
     t->estimate.node.cylinder.axis = vec3_negate(t->estimate.node.cylinder.axis);
     bool good = true;
@@ -401,7 +392,7 @@ static bool join_exit(Tracker *t, Track *branch, int keep, const RbtExit *exit, 
     double nearest = HUGE_VAL, brightest = 0.5;
     for (int i = 0; good && i < 40; i++) {
         const Cylinder *c = &t->estimate.node.cylinder;
-        double link = link_brightness(t, last.center, c->center), distance = vec3_distance(c->center, last.center);
+        double link = tracker_link_brightness(t, last.center, c->center), distance = vec3_distance(c->center, last.center);
         // it has met the branch, has come into the wide part, or has passed by
         if (i > 0 && (distance < last.radius || c->radius > 1.35 * usual_radius(&back) || (brightest >= 0.9 && link < 0.5)))
             break;
@@ -440,7 +431,7 @@ static bool look_ahead(Tracker *t, Track *branch)
     while (keep > 2 && branch->node[keep - 1].cylinder.radius > 1.15 * radius)
         keep--;
     const Cylinder *last = &branch->node[keep - 1].cylinder;
-    double level = base + 0.5 * (brightness(t, last->center) - base);
+    double level = base + 0.5 * (tracker_brightness(t, last->center) - base);
     RbtBlock *block = malloc((size_t)keep * sizeof *block);
     if (block) {
         for (int i = 0; i < keep; i++)
@@ -467,13 +458,13 @@ static double branch_length(const Track *branch)
 
 // Tracks from an estimate of the first node until the vessel ends. The branch's nodes are appended to `branch`, without parents.
 // `until_tree`: it is on its way back to its parent and ends inside another branch's tube.
-static void track_branch(Tracker *t, const Cylinder *start, Track *branch, bool until_tree)
+void tracker_run(Tracker *t, const Cylinder *start, Track *branch, bool until_tree)
 {
     const RbtParameters *p = t->parameters;
     double length = 0;
-    bool left = tree_node_around(t, start->center, 1) < 0;   // it may start within its parent's tube, and be there until it has left it
+    bool left = tracker_node_around(t, start->center, 1) < 0;   // it may start within its parent's tube, and be there until it has left it
     Cylinder predicted = *start;
-    if (!estimate(t, &predicted, p->r_t) && !(p->r_t_second > 0 && estimate(t, &predicted, p->r_t_second)))
+    if (!tracker_estimate(t, &predicted, p->r_t) && !(p->r_t_second > 0 && tracker_estimate(t, &predicted, p->r_t_second)))
         return;
     int rest = 0;   // nodes until it looks ahead again
     for (bool found = true; found;) {
@@ -482,13 +473,13 @@ static void track_branch(Tracker *t, const Cylinder *start, Track *branch, bool 
             return;
         }
         Vec3 here = t->estimate.node.cylinder.center;
-        left = left || tree_node_around(t, here, 1) < 0;
+        left = left || tracker_node_around(t, here, 1) < 0;
         length = branch_length(branch);
         t->why = "is as long as max_length_mm";
-        if (length >= p->max_length_mm || branch->count >= MAX_NODES)
+        if (length >= fmin(p->max_length_mm, t->longest) || branch->count >= MAX_NODES)
             return;
         t->why = "reached its parent";
-        if (until_tree && tree_node_around(t, here, 0.9) >= 0)
+        if (until_tree && tracker_node_around(t, here, 0.9) >= 0)
             return;
         t->why = "does not leave its parent";
         if (!left && length > 6 * branch->node[0].cylinder.radius)
@@ -520,7 +511,7 @@ static void track_branch(Tracker *t, const Cylinder *start, Track *branch, bool 
 
 // Where a subtree that starts at x hangs on the tree: the node of least power distance whose straight link stays inside the lumen (at least half as
 // bright as its ends); if no link does, the brightest one among the near nodes.
-static int attachment(const Tracker *t, Vec3 x, int node_count)
+int tracker_attachment(const Tracker *t, Vec3 x, int node_count)
 {
     int best = -1, brightest = -1;
     double least = HUGE_VAL, most = -HUGE_VAL, reach = HUGE_VAL;
@@ -531,7 +522,7 @@ static int attachment(const Tracker *t, Vec3 x, int node_count)
         double distance = vec3_distance(x, n->cylinder.center), power = distance * distance - n->cylinder.radius * n->cylinder.radius;
         if (distance > 2 * reach + 4 * n->cylinder.radius)
             continue;
-        double link = link_brightness(t, x, n->cylinder.center);
+        double link = tracker_link_brightness(t, x, n->cylinder.center);
         if (link >= 0.5 && power < least) {
             least = power;
             best = i;
@@ -556,7 +547,7 @@ static bool adopt_branch(Tracker *t, const Track *out, const Track *back, int nu
         if (is_back)
             node.cylinder.axis = vec3_negate(node.cylinder.axis);
         node.branch = number;
-        node.parent = i > 0 ? t->tree.count - 1 : before > 0 ? attachment(t, node.cylinder.center, before) : -1;
+        node.parent = i > 0 ? t->tree.count - 1 : before > 0 ? tracker_attachment(t, node.cylinder.center, before) : -1;
         if (!track_append(&t->tree, &node, point))
             return false;
     }
@@ -625,20 +616,20 @@ static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
         if (!seed->has_toward) {
             Cylinder beside = {.center = vec3_add_scaled(foot, 1.25 * parent_radius, away), .radius = start.radius, .axis = away};
             start.axis = away;
-            track_branch(t, &beside, &out, false);
+            tracker_run(t, &beside, &out, false);
             both_ways = out.count < 3;
             if (both_ways)
                 track_free(&out);
         }
     }
     if (out.count == 0)
-        track_branch(t, &start, &out, false);
+        tracker_run(t, &start, &out, false);
     const char *why = t->why;
     if (both_ways && out.count > 0 && !t->out_of_memory) {
         Cylinder behind = out.node[0].cylinder;
         behind.axis = vec3_negate(behind.axis);
         Track way = {0};
-        track_branch(t, &behind, &way, true);
+        tracker_run(t, &behind, &way, true);
         // its first node is the branch's own first one, seen the other way
         for (int i = 1; i < way.count && !t->out_of_memory; i++)
             t->out_of_memory = !track_append(&back, &way.node[i], way.point + way.node[i].point_start);
@@ -871,7 +862,7 @@ static int make_hub(Tracker *t, const SacJob *job, const TrackNode *sac, int sac
 }
 
 // One sac: points by rays from each centre, a sphere for each, then the centres are linked: one to the tree, every next one to its nearest.
-static bool track_aneurysm(Tracker *t, const RbtAneurysm *aneurysm, const Vec3 *center, int number, int threads, Faults *faults, const char *path)
+bool track_aneurysm(Tracker *t, const RbtAneurysm *aneurysm, const Vec3 *center, int number, int threads, Faults *faults, const char *path)
 {
     int n = aneurysm->center_count, rays = (int)t->parameters->aneurysm_rays, vessel_count = t->tree.count;
     Vec3 *direction = malloc(MAX_RAYS * sizeof *direction), *point = malloc((size_t)n * MAX_RAYS * sizeof *point);
@@ -921,7 +912,7 @@ static bool track_aneurysm(Tracker *t, const RbtAneurysm *aneurysm, const Vec3 *
     good = good && !t->out_of_memory;
     vessel_count = t->tree.count;
     for (int done = 0; good && done < n; done++) {
-        int next = root_center, parent = root >= 0 ? root : attachment(t, center[root_center], vessel_count);
+        int next = root_center, parent = root >= 0 ? root : tracker_attachment(t, center[root_center], vessel_count);
         double least = HUGE_VAL;
         for (int i = 0; i < n && done > 0; i++)
             for (int j = vessel_count; sac[i].parent == -1 && j < t->tree.count; j++)
@@ -972,12 +963,12 @@ static bool check_point(const Tracker *t, Vec3 x, const char *what, int line, in
 {
     Vec3 v = volume_voxel_of(t->volume, x);
     const int *size = t->volume->size;
-    if (!inside_volume(t->volume, x)) {
+    if (!tracker_is_inside(t->volume, x)) {
         faults_add(faults, path, line, column, "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies outside the volume; voxels (0, 0, 0) to (%d, %d, %d)", what, x.x, x.y,
                    x.z, v.x, v.y, v.z, size[0] - 1, size[1] - 1, size[2] - 1);
         return false;
     }
-    double value = brightness(t, x), low = (double)t->volume->minimum, high = (double)t->volume->maximum;
+    double value = tracker_brightness(t, x), low = (double)t->volume->minimum, high = (double)t->volume->maximum;
     if (value < fmax(low + 0.1 * (high - low), t->dark)) {
         faults_add(faults, path, line, column, "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies on background (%g in a volume of %g to %g); a point inside a vessel, above %g",
                    what, x.x, x.y, x.z, v.x, v.y, v.z, value, low, high, fmax(low + 0.1 * (high - low), t->dark));
@@ -1044,31 +1035,82 @@ void rbt_report_free(RbtReport *report)
     *report = (RbtReport){0};
 }
 
-static bool track_all(Tracker *t, RbtSeed *seed, int seed_count, const RbtAneurysm *aneurysm, Vec3 **center, int aneurysm_count, int threads, const Progress *progress,
-                      RbtReport *report, const char *path, Faults *faults)
+typedef struct Job {         // what rbt_track was asked for
+    RbtSeed *seed;
+    int seed_count;
+    const RbtAneurysm *aneurysm;
+    Vec3 **center;           // (aneurysm_count) [mm]
+    int aneurysm_count, threads;
+    const Progress *progress;
+    const char *path;
+    Faults *faults;
+} Job;
+
+static bool out_of_memory_at(const Job *job, int number)
 {
-    for (int i = 0; i < seed_count + aneurysm_count; i++) {
-        bool is_sac = i >= seed_count, found = is_sac ? track_aneurysm(t, &aneurysm[i - seed_count], center[i - seed_count], i, threads, faults, path)
-                                                      : track_seed(t, &seed[i], i);
-        if (t->out_of_memory) {
-            faults_add(faults, path, 0, 0, "out of memory at branch %d", i + 1);
-            return false;
-        }
-        if (!found) {
-            if (!is_sac)
-                faults_add(faults, path, seed[i].line, seed[i].column, "nothing could be tracked from the start of branch %d (%s); a point well inside the vessel, about its "
-                           "true radius and direction", i + 1, t->why);
-            return false;
-        }
-        report->branch[i].is_aneurysm = is_sac;
-        memcpy(report->branch[i].name, is_sac ? aneurysm[i - seed_count].name : seed[i].name, sizeof report->branch[i].name);
-        snprintf(report->branch[i].end, sizeof report->branch[i].end, "%s", is_sac ? "" : t->why ? t->why : "");
-        if (progress && progress->call)
-            progress->call(progress->context, i + 1, seed_count + aneurysm_count);
+    faults_add(job->faults, job->path, 0, 0, "out of memory at branch %d", number + 1);
+    return false;
+}
+
+static bool run_seed(Tracker *t, const Job *job, int i)
+{
+    if (track_seed(t, &job->seed[i], i))
+        return true;
+    if (t->out_of_memory)
+        return out_of_memory_at(job, i);
+    faults_add(job->faults, job->path, job->seed[i].line, job->seed[i].column, "nothing could be tracked from the start of branch %d (%s); a point well inside the vessel, "
+               "about its true radius and direction", i + 1, t->why);
+    return false;
+}
+
+static bool make_report(const Tracker *t, const Job *job, const RbtEnds *ends, RbtReport *report)
+{
+    report->branch_count = ends->count + job->aneurysm_count;
+    report->branch = calloc((size_t)report->branch_count + 1, sizeof *report->branch);
+    for (int i = 0; report->branch && i < report->branch_count; i++) {
+        RbtBranchReport *b = &report->branch[i];
+        b->is_aneurysm = i >= ends->count;
+        if (b->is_aneurysm)
+            memcpy(b->name, job->aneurysm[i - ends->count].name, sizeof b->name);
+        else if (i < job->seed_count)
+            memcpy(b->name, job->seed[i].name, sizeof b->name);
+        snprintf(b->end, sizeof b->end, "%s", !b->is_aneurysm && ends->why[i] ? ends->why[i] : "");
+        report_branch(t, i, t->parameters->p_inl, b);
     }
-    for (int i = 0; i < seed_count + aneurysm_count; i++)
-        report_branch(t, i, t->parameters->p_inl, &report->branch[i]);
-    return true;
+    return report->branch != NULL;
+}
+
+static bool track_all(Tracker *t, const Job *job, RbtReport *report)
+{
+    RbtEnds ends = {0};
+    bool automatic = t->parameters->automatic > 0, good = true;
+    RbtPaint *paint = NULL;
+    for (int i = 0; good && i < job->seed_count; i++) {
+        good = run_seed(t, job, i);
+        if (good && !rbt_ends_add(&ends, t->why))
+            good = out_of_memory_at(job, i);
+        if (good && i == 0 && automatic) {
+            paint = rbt_paint_create(t->volume);
+            t->paint = paint;
+            if (!paint || !rbt_grow_branches(t, paint, 0, job->threads, job->progress, &ends))
+                good = out_of_memory_at(job, ends.count);
+        }
+        if (good && job->progress && job->progress->call && !automatic)
+            job->progress->call(job->progress->context, i + 1, job->seed_count + job->aneurysm_count);
+    }
+    t->paint = NULL;
+    rbt_paint_free(paint);
+    for (int i = 0; good && i < job->aneurysm_count; i++) {
+        good = track_aneurysm(t, &job->aneurysm[i], job->center[i], ends.count + i, job->threads, job->faults, job->path);
+        if (t->out_of_memory)
+            good = out_of_memory_at(job, ends.count + i);
+        if (good && job->progress && job->progress->call)
+            job->progress->call(job->progress->context, job->seed_count + i + 1, job->seed_count + job->aneurysm_count);
+    }
+    if (good && !make_report(t, job, &ends, report))
+        good = out_of_memory_at(job, ends.count);
+    free(ends.why);
+    return good;
 }
 
 VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, const RbtSeed *given, int seed_count, const RbtAneurysm *aneurysm, int aneurysm_count,
@@ -1077,9 +1119,9 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
     Tracker *t = calloc(1, sizeof *t);
     RbtSeed *seed = malloc((size_t)(seed_count > 0 ? seed_count : 1) * sizeof *seed);
     Vec3 **center = calloc((size_t)(aneurysm_count > 0 ? aneurysm_count : 1), sizeof *center);
-    RbtReport own = {.branch_count = seed_count + aneurysm_count, .branch = calloc((size_t)(seed_count + aneurysm_count + 1), sizeof *own.branch)};
+    RbtReport own = {0};
     VesselTree *tree = NULL;
-    bool good = t && seed && center && own.branch;
+    bool good = t && seed && center;
     int before = faults->count;
     for (int i = 0; good && i < aneurysm_count; i++)
         good = (center[i] = malloc((size_t)aneurysm[i].center_count * sizeof **center)) != NULL;
@@ -1089,7 +1131,7 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
         faults_add(faults, path, 0, 0, "there is no branch to track; `branches` with at least one start");
     if (good) {
         *t = (Tracker){.volume = volume, .parameters = parameters, .voxel = volume_voxel_size(volume), .ray_count = (int)parameters->n_r,
-                       .axis_count = (int)parameters->n_d};
+                       .axis_count = (int)parameters->n_d, .longest = HUGE_VAL};
         double low, high;
         brightness_range(volume, &low, &high);
         t->dark = low + 0.2 * (high - low);
@@ -1106,7 +1148,8 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
     if (good && faults->count == before) {
         sphere_directions(sphere_level_of(t->ray_count), t->ray);
         prepare_axes(t);
-        if (track_all(t, seed, seed_count, aneurysm, center, aneurysm_count, threads, progress, &own, path, faults) && !(tree = finish_tree(&t->tree)))
+        Job job = {seed, seed_count, aneurysm, center, aneurysm_count, threads, progress, path, faults};
+        if (track_all(t, &job, &own) && !(tree = finish_tree(&t->tree)))
             faults_add(faults, path, 0, 0, "out of memory for a tree of %d nodes", t->tree.count);
     }
     if (t)

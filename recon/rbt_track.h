@@ -15,6 +15,13 @@
 
 enum { RBT_MAX_RETRIES = 8 };
 
+typedef struct RbtRegion {   // a ball; for a cut only its centre counts
+    Vec3 center;             // [mm] or voxels
+    bool is_voxel;
+    double radius;           // [mm]
+    int line, column;        // in the trace file, for faults
+} RbtRegion;
+
 typedef struct RbtParameters {
     // the paper's, table 1 and section 3
     double p_inl;            // inlier rate above which a cylinder is valid
@@ -47,6 +54,15 @@ typedef struct RbtParameters {
     double aneurysm_rays;    // from each centre of an aneurysm: 162, 642 or 2562
     double aneurysm_reach_mm;// their length
     double seed;             // of the random numbers
+    // the whole tree from the first start
+    double automatic;        // 1: branches and aneurysms that no seed names are looked for
+    double find_aneurysms;   // 1: so are aneurysms
+    double residue;          // a vessel's border is looked for at this share of the contrast of the vessel it leaves, after a half of it
+    // corrections by the trace; the owner of the parameters owns them
+    const RbtRegion *forbid; // no centre of a node lies in these, nor does the search go through them
+    int forbid_count;
+    const RbtRegion *cut;    // the branch nearest to each is cut from there on, with what hangs on it
+    int cut_count;
 } RbtParameters;
 
 RbtParameters rbt_default_parameters(void);

@@ -193,6 +193,60 @@ static void read_list(const Walk *w, const yaml_node_t *list, bool is_branches, 
     }
 }
 
+// `forbid`: balls; `cut`: points.
+static void read_region(const Walk *w, const yaml_node_t *map, bool is_cut, RbtRegion *out)
+{
+    *out = (RbtRegion){.line = (int)map->start_mark.line + 1, .column = (int)map->start_mark.column + 1};
+    const char *mm = is_cut ? "point_mm" : "center_mm", *voxel = is_cut ? "point_voxel" : "center_voxel";
+    bool has_center = false;
+    if (map->type != YAML_MAPPING_NODE) {
+        FAULT(w, map, "%s", is_cut ? "a cut is not valid; {point_mm: [x, y, z]}" : "a forbidden region is not valid; {center_mm: [x, y, z], radius_mm: r}");
+        return;
+    }
+    for (int i = 0; i < pair_count(map); i++) {
+        yaml_node_t *value;
+        const char *key = key_of(w, map, i, &value);
+        if (!key)
+            continue;
+        if (!strcmp(key, mm) || !strcmp(key, voxel))
+            read_place(w, value, key, !strcmp(key, voxel), &has_center, &out->center, &out->is_voxel);
+        else if (!is_cut && !strcmp(key, "radius_mm"))
+            read_number(w, value, key, 1e-3, 1e3, false, &out->radius);
+        else
+            FAULT(w, value, "'%.40s' is no key of a %s; %s or %s%s", key, is_cut ? "cut" : "forbidden region", mm, voxel, is_cut ? "" : ", radius_mm");
+    }
+    if (!has_center)
+        FAULT(w, map, "the %s has no place; %s (or %s)", is_cut ? "cut" : "forbidden region", mm, voxel);
+    if (!is_cut && !(out->radius > 0))
+        FAULT(w, map, "the forbidden region has no radius; radius_mm");
+}
+
+static void read_regions(const Walk *w, const yaml_node_t *list, bool is_cut, Trace *trace)
+{
+    if (list->type != YAML_SEQUENCE_NODE || item_count(list) > MAX_ENTRIES) {
+        FAULT(w, list, "%s is not valid; a list of at most %d entries", is_cut ? "cut" : "forbid", MAX_ENTRIES);
+        return;
+    }
+    int n = item_count(list);
+    RbtRegion *region = calloc((size_t)n + 1, sizeof *region);
+    if (!region) {
+        FAULT(w, list, "out of memory");
+        return;
+    }
+    for (int i = 0; i < n; i++) {
+        yaml_node_t *item = node_at(w, list->data.sequence.items.start[i]);
+        if (item)
+            read_region(w, item, is_cut, &region[i]);
+    }
+    if (is_cut) {
+        trace->cut = region;
+        trace->cut_count = n;
+    } else {
+        trace->forbid = region;
+        trace->forbid_count = n;
+    }
+}
+
 static void read_retry_steps(const Walk *w, const yaml_node_t *list, RbtParameters *p)
 {
     if (list->type != YAML_SEQUENCE_NODE || item_count(list) > RBT_MAX_RETRIES) {
@@ -229,7 +283,7 @@ static void read_parameter(const Walk *w, const char *key, const yaml_node_t *va
         }
         return;
     }
-    FAULT(w, value, "'%.40s' is no key of a trace; branches, aneurysms, parameters (default or paper), or a parameter that `segment --help` lists", key);
+    FAULT(w, value, "'%.40s' is no key of a trace; branches, aneurysms, forbid, cut, parameters (default or paper), or a parameter that `segment --help` lists", key);
 }
 
 static void read_root(const Walk *w, const yaml_node_t *root, Trace *trace)
@@ -238,7 +292,7 @@ static void read_root(const Walk *w, const yaml_node_t *root, Trace *trace)
         FAULT(w, root, "a trace is a map; `branches: [...]`");
         return;
     }
-    bool has_branches = false;
+    bool has_branches = false, has_automatic = false;
     // the set first, wherever it stands: single parameters change it
     for (int i = 0; i < pair_count(root); i++) {
         yaml_node_t *key = node_at(w, root->data.mapping.pairs.start[i].key), *value = node_at(w, root->data.mapping.pairs.start[i].value);
@@ -260,12 +314,17 @@ static void read_root(const Walk *w, const yaml_node_t *root, Trace *trace)
             read_number(w, value, key, 1, 1, true, &version);
         else if (!strcmp(key, "branches") || !strcmp(key, "aneurysms"))
             read_list(w, value, key[0] == 'b', trace);
+        else if (!strcmp(key, "forbid") || !strcmp(key, "cut"))
+            read_regions(w, value, key[0] == 'c', trace);
         else if (!strcmp(key, "retry_steps"))
             read_retry_steps(w, value, &trace->parameters);
         else
             read_parameter(w, key, value, &trace->parameters);
         has_branches = has_branches || !strcmp(key, "branches");
+        has_automatic = has_automatic || !strcmp(key, "automatic");
     }
+    if (!has_automatic)
+        trace->parameters.automatic = trace->branch_count == 1;
     if (!has_branches || trace->branch_count < 1)
         FAULT(w, root, "there is no branch; `branches` with at least one start");
     if (trace->parameters.n_max < trace->parameters.n_min)
@@ -280,6 +339,8 @@ void trace_free(Trace *trace)
         free(trace->aneurysm[i].center);
     free(trace->aneurysm);
     free(trace->branch);
+    free(trace->forbid);
+    free(trace->cut);
     free(trace);
 }
 
@@ -323,6 +384,10 @@ Trace *trace_parse(const char *text, size_t length, const char *path, Faults *fa
         }
     }
     yaml_parser_delete(&parser);
+    trace->parameters.forbid = trace->forbid;
+    trace->parameters.forbid_count = trace->forbid_count;
+    trace->parameters.cut = trace->cut;
+    trace->parameters.cut_count = trace->cut_count;
     if (faults->count == before)
         return trace;
     trace_free(trace);

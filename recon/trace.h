@@ -1,4 +1,5 @@
-// The trace file of `segment` (YAML): where branches start, where aneurysms are, and parameters of the tracking by name.
+// The trace file of `segment` (YAML): where branches start, where aneurysms are, corrections, and parameters of the tracking by name. `automatic` is
+// 1 where no branch beyond the first is named and the file does not say.
 // shared/CONTRACT.md "Trace". Every fault of a file is reported in one pass, with line and column.
 #ifndef SELDINGER_RECON_TRACE_H
 #define SELDINGER_RECON_TRACE_H
@@ -11,6 +12,8 @@ typedef struct Trace {
     RbtSeed *branch;
     int aneurysm_count;
     RbtAneurysm *aneurysm;
+    int forbid_count, cut_count;     // corrections; the parameters point to them
+    RbtRegion *forbid, *cut;
 } Trace;
 
 // `text` need not end in NUL; `path` is for messages. NULL with faults.

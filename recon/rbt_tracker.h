@@ -1,0 +1,74 @@
+// Internal to recon: the state of one tracking and its steps, shared by rbt_track.c (branches, aneurysms), rbt_branches.c (the whole tree) and rbt_links.c.
+// A tracker belongs to one thread; several may read one tree (`tree` is then a shallow copy and nothing is appended to it).
+#ifndef SELDINGER_RECON_RBT_TRACKER_H
+#define SELDINGER_RECON_RBT_TRACKER_H
+
+#include "recon/ransac_cylinder.h"
+#include "recon/rbt_track.h"
+
+enum { MAX_RAYS = 2562, MAX_AXES = 321 };
+
+typedef struct TrackNode {
+    Cylinder cylinder;
+    double inlier_rate, contrast;
+    int parent, kind, branch;
+    bool retried, is_junction;
+    int64_t point_start;
+    int point_count;
+} TrackNode;
+
+typedef struct Estimate {    // a node before it is accepted
+    TrackNode node;
+    Vec3 point[MAX_RAYS];
+} Estimate;
+
+typedef struct Track {       // nodes with their points, growing
+    TrackNode *node;
+    int count, capacity;
+    Vec3 *point;
+    int64_t point_count, point_capacity;
+} Track;
+
+typedef struct Tracker {
+    const Volume *volume;
+    const RbtParameters *parameters;
+    double voxel;            // [mm]
+    double dark;             // brightness below which a start lies on background
+    int ray_count, axis_count;
+    Vec3 ray[MAX_RAYS];
+    Vec3 axis[MAX_AXES];     // half a sphere about +z in order of angle with it
+    Random random;
+    Vec3 candidate[MAX_RAYS];
+    int inlier[MAX_RAYS];
+    double along[MAX_RAYS];
+    Estimate estimate;
+    Track tree;
+    const struct RbtPaint *paint;  // of the tree, for fast looks around; NULL: all nodes are looked at
+    bool is_guarded;         // a branch that was found, not clicked: it must neither swell nor brighten past its vessel
+    double longest;          // [mm] a branch may become
+    bool out_of_memory;
+    const char *why;         // the last estimate was refused
+} Tracker;
+
+bool track_append(Track *track, const TrackNode *node, const Vec3 *point);   // false: out of memory
+void track_cut(Track *track, int count);
+void track_free(Track *track);
+
+double tracker_brightness(const Tracker *t, Vec3 point);   // the spline's value
+bool tracker_is_inside(const Volume *volume, Vec3 x);
+bool tracker_is_forbidden(const Tracker *t, Vec3 x);   // by the trace
+// A node of the finished tree whose centre is nearer to x than `share` of its radius, or -1.
+int tracker_node_around(const Tracker *t, Vec3 x, double share);
+// Darkest place on the straight way from a to b, as a share of the lumen's brightness at both ends.
+double tracker_link_brightness(const Tracker *t, Vec3 a, Vec3 b);
+// The estimation step from a predicted cylinder; the node goes to t->estimate, false with t->why.
+bool tracker_estimate(Tracker *t, const Cylinder *predicted, double relative_threshold);
+// Tracks from an estimate of the first node until the vessel ends; `until_tree`: on its way back to its parent, ends inside another branch's tube.
+void tracker_run(Tracker *t, const Cylinder *start, Track *branch, bool until_tree);
+// Turns the node at `c` into one whose points are the first walls that rays meet nearby, in t->estimate.
+void tracker_opening(Tracker *t, const Cylinder *c, double contrast);
+int tracker_attachment(const Tracker *t, Vec3 x, int node_count);
+// Captures a sac (section 3.4) as branch `number`; false where it is none (a fault) or memory lacks.
+bool track_aneurysm(Tracker *t, const RbtAneurysm *aneurysm, const Vec3 *center, int number, int threads, Faults *faults, const char *path);
+
+#endif
