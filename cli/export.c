@@ -15,18 +15,25 @@
 static const char help[] =
     "Usage: seldinger export FILE -o OUT [options]\n\n"
     "Writes what FILE (a tree, model or recording) holds for other programs; the extension of OUT says how. Lengths mm.\n\n"
-    "  model, surface         .stl (binary)  .ply  .obj  .vtp\n"
+    "  model, surface         .stl (binary)  .ply  .obj  .vtp; .ply and .vtp also hold for each vertex\n"
+    "                         node      whose local model it lies on\n"
+    "                         error_mm  signed distance of the nearest data point to that model, > 0 inside: the model is too wide there\n"
+    "                         data_mm   distance of the vertex to that data point: large where there are no data, as on caps\n"
+    "                         (.stl and .obj have no place for these)\n"
     "  tree or model, centreline  .vtp (lines with Radius)  .mrk.json (3D Slicer curves)  .swc\n"
     "  recording              .csv (a row a node and frame)  .vtp or .pvd (one .vtp a frame and a .pvd that names them)\n\n"
     "  --what surface|centreline  what a .vtp holds; default: the surface of a model, the centreline of a tree\n"
     "  --cell-mm X                size of the surface's cells [mm]; default: about ten to twenty cells round the thinnest branch\n"
+    "  --open-inlet               the surface is cut open at the root's plane; blobs close it otherwise\n"
     "  --frame RAS|LPS            coordinate system that a .mrk.json names; coordinates are never converted; default LPS\n"
     "  -o OUT                     the file to write\n"
-    "  --threads N, --quiet       accepted as everywhere; nothing here takes long\n";
+    "  --quiet                    does not print what a surface is: parts, open edges, Euler characteristic, area, volume\n"
+    "  --threads N                accepted as everywhere; nothing here takes long\n";
 
 typedef struct ExportOptions {
     const char *in, *out, *what, *frame;
     double cell_mm;          // 0: automatic
+    bool open_inlet, quiet;
 } ExportOptions;
 
 // --- text that grows in memory, then one write ---
@@ -56,6 +63,11 @@ static bool text_write(Text *text, const char *path, Faults *faults)
 
 // --- surfaces ---
 
+typedef struct Surface {
+    TriangleMesh *mesh;
+    double *error, *distance;   // (V) [mm], both NULL where the tree has no points
+} Surface;
+
 static void put_float(FILE *out, double value)
 {
     float single = (float)value;
@@ -72,8 +84,9 @@ static void put_vector(FILE *out, Vec3 v)
     put_float(out, v.z);
 }
 
-static void print_stl(FILE *out, const TriangleMesh *mesh)
+static void print_stl(FILE *out, const Surface *surface)
 {
+    const TriangleMesh *mesh = surface->mesh;
     char head[81] = "seldinger " SELDINGER_VERSION ", mm";
     fwrite(head, 1, 80, out);
     for (int i = 0; i < 4; i++)
@@ -90,21 +103,28 @@ static void print_stl(FILE *out, const TriangleMesh *mesh)
     }
 }
 
-static void print_ply(FILE *out, const TriangleMesh *mesh)
+static void print_ply(FILE *out, const Surface *surface)
 {
+    const TriangleMesh *mesh = surface->mesh;
     fprintf(out,
             "ply\nformat ascii 1.0\ncomment seldinger " SELDINGER_VERSION ", mm\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\n"
-            "property float nx\nproperty float ny\nproperty float nz\nelement face %d\nproperty list uchar int vertex_indices\nend_header\n",
-            mesh->vertex_count, mesh->triangle_count);
-    for (int i = 0; i < mesh->vertex_count; i++)
-        fprintf(out, "%.9g %.9g %.9g %.6g %.6g %.6g\n", mesh->vertex[i].x, mesh->vertex[i].y, mesh->vertex[i].z, mesh->normal[i].x, mesh->normal[i].y,
-                mesh->normal[i].z);
+            "property float nx\nproperty float ny\nproperty float nz\nproperty int node\n%selement face %d\nproperty list uchar int vertex_indices\n"
+            "end_header\n",
+            mesh->vertex_count, surface->error ? "property float error_mm\nproperty float data_mm\n" : "", mesh->triangle_count);
+    for (int i = 0; i < mesh->vertex_count; i++) {
+        fprintf(out, "%.9g %.9g %.9g %.6g %.6g %.6g %d", mesh->vertex[i].x, mesh->vertex[i].y, mesh->vertex[i].z, mesh->normal[i].x, mesh->normal[i].y,
+                mesh->normal[i].z, mesh->node[i]);
+        if (surface->error)
+            fprintf(out, " %.6g %.6g", surface->error[i], surface->distance[i]);
+        fputc('\n', out);
+    }
     for (int i = 0; i < mesh->triangle_count; i++)
         fprintf(out, "3 %d %d %d\n", mesh->triangle[i][0], mesh->triangle[i][1], mesh->triangle[i][2]);
 }
 
-static void print_obj(FILE *out, const TriangleMesh *mesh)
+static void print_obj(FILE *out, const Surface *surface)
 {
+    const TriangleMesh *mesh = surface->mesh;
     fprintf(out, "# seldinger " SELDINGER_VERSION ", mm\n");
     for (int i = 0; i < mesh->vertex_count; i++)
         fprintf(out, "v %.9g %.9g %.9g\n", mesh->vertex[i].x, mesh->vertex[i].y, mesh->vertex[i].z);
@@ -133,6 +153,14 @@ static void vtp_array(FILE *out, const char *type, const char *name, int compone
 
 static void vtp_array_end(FILE *out) { fprintf(out, "</DataArray>\n"); }
 
+static void vtp_numbers(FILE *out, const char *name, const double *value, int count)
+{
+    vtp_array(out, "Float64", name, 1);
+    for (int i = 0; i < count; i++)
+        fprintf(out, "%.9g\n", value[i]);
+    vtp_array_end(out);
+}
+
 static void vtp_vectors(FILE *out, const char *name, const Vec3 *value, int count)
 {
     vtp_array(out, "Float64", name, 3);
@@ -150,15 +178,20 @@ static void vtp_points(FILE *out, const Vec3 *value, int count)
 
 static void vtp_end(FILE *out) { fprintf(out, "</Piece>\n</PolyData>\n</VTKFile>\n"); }
 
-static void print_surface_vtp(FILE *out, const TriangleMesh *mesh)
+static void print_surface_vtp(FILE *out, const Surface *surface)
 {
+    const TriangleMesh *mesh = surface->mesh;
     vtp_begin(out, mesh->vertex_count, 0, mesh->triangle_count);
-    fprintf(out, "<PointData Normals=\"Normals\" Scalars=\"node\">\n");
+    fprintf(out, "<PointData Normals=\"Normals\" Scalars=\"%s\">\n", surface->error ? "error_mm" : "node");
     vtp_vectors(out, "Normals", mesh->normal, mesh->vertex_count);
     vtp_array(out, "Int32", "node", 1);
     for (int i = 0; i < mesh->vertex_count; i++)
         fprintf(out, "%d\n", mesh->node[i]);
     vtp_array_end(out);
+    if (surface->error) {
+        vtp_numbers(out, "error_mm", surface->error, mesh->vertex_count);
+        vtp_numbers(out, "data_mm", surface->distance, mesh->vertex_count);
+    }
     fprintf(out, "</PointData>\n");
     vtp_points(out, mesh->vertex, mesh->vertex_count);
     fprintf(out, "<Polys>\n");
@@ -174,22 +207,64 @@ static void print_surface_vtp(FILE *out, const TriangleMesh *mesh)
     vtp_end(out);
 }
 
+static void print_census(const SurfaceCensus *c, double cell_mm, int specks)
+{
+    printf("surface        %d vertices, %d triangles, cells of %.3g mm\n", c->vertices, c->triangles, cell_mm);
+    printf("parts          %d, Euler characteristic %" PRId64 "%s\n", c->parts, c->euler,
+           specks ? "; specks where local models disagree were dropped" : "");
+    printf("edges          %" PRId64 " open, %" PRId64 " non-manifold, %" PRId64 " between triangles turned against each other\n", c->open_edges,
+           c->non_manifold_edges, c->turned_edges);
+    printf("area, volume   %.6g mm2, %.6g mm3\n", c->area, c->volume);
+}
+
+// The surface as it will be written, what there is to say of it told. False with faults.
+static bool make_surface(const ExportOptions *options, const VesselTree *tree, Surface *surface, Faults *faults)
+{
+    double cell = options->cell_mm > 0 ? options->cell_mm : isosurface_cell_for(tree);
+    TriangleMesh *mesh = surface->mesh = isosurface_of_tree(tree, cell);
+    if (!mesh || mesh->triangle_count < 1) {
+        faults_add(faults, options->in, 0, 0, "gives no surface: %s", mesh ? "the model is empty at this --cell-mm" : "no memory; a larger --cell-mm may do");
+        return false;
+    }
+    SurfaceCensus census;
+    int specks = surface_drop_specks(mesh, 8 * cell * cell * cell);
+    if (options->open_inlet && !surface_open_inlet(mesh, tree)) {
+        faults_add(faults, options->in, 0, 0, "has no inlet to open: the tree goes on upstream of its root, or the root's points close it; leave --open-inlet away");
+        return false;
+    }
+    bool good = specks >= 0 && surface_census(mesh, &census);
+    if (good && tree->point_count > 0) {
+        surface->error = malloc(((size_t)mesh->vertex_count + 1) * sizeof *surface->error);
+        surface->distance = malloc(((size_t)mesh->vertex_count + 1) * sizeof *surface->distance);
+        good = surface->error && surface->distance && surface_point_error(mesh, tree, surface->error, surface->distance);
+    }
+    if (!good)
+        faults_add(faults, options->in, 0, 0, "gives no surface: no memory; a larger --cell-mm may do");
+    else if (!options->quiet && strcmp(options->out, "-"))
+        print_census(&census, cell, specks);
+    return good;
+}
+
 static bool export_surface(const ExportOptions *options, const char *extension, const VesselTree *tree, Faults *faults)
 {
-    TriangleMesh *mesh = isosurface_of_tree(tree, options->cell_mm > 0 ? options->cell_mm : isosurface_cell_for(tree));
+    Surface surface = {0};
     Text text;
-    bool good = mesh && mesh->triangle_count > 0 && text_open(&text);
-    if (good) {
-        void (*print)(FILE *, const TriangleMesh *) = !strcmp(extension, ".stl")   ? print_stl
-                                                      : !strcmp(extension, ".ply") ? print_ply
-                                                      : !strcmp(extension, ".obj") ? print_obj
-                                                                                   : print_surface_vtp;
-        print(text.stream, mesh);
-        good = text_write(&text, options->out, faults);
-    } else {
-        faults_add(faults, options->in, 0, 0, "gives no surface: %s", mesh ? "the model is empty at this --cell-mm" : "no memory; a larger --cell-mm may do");
+    bool good = make_surface(options, tree, &surface, faults);
+    if (good && !text_open(&text)) {
+        faults_add(faults, options->out, 0, 0, "cannot be written: no memory");
+        good = false;
     }
-    triangle_mesh_free(mesh);
+    if (good) {
+        void (*print)(FILE *, const Surface *) = !strcmp(extension, ".stl")   ? print_stl
+                                                 : !strcmp(extension, ".ply") ? print_ply
+                                                 : !strcmp(extension, ".obj") ? print_obj
+                                                                              : print_surface_vtp;
+        print(text.stream, &surface);
+        good = text_write(&text, options->out, faults);
+    }
+    triangle_mesh_free(surface.mesh);
+    free(surface.error);
+    free(surface.distance);
     return good;
 }
 
@@ -482,11 +557,12 @@ static bool export_recording(const ExportOptions *options, const char *extension
 
 static int parse_options(int argc, char **argv, ExportOptions *options)
 {
-    enum { WHAT = 256, CELL, FRAME, THREADS, QUIET, HELP };
+    enum { WHAT = 256, CELL, FRAME, OPEN, THREADS, QUIET, HELP };
     static const struct option table[] = {{"what", required_argument, NULL, WHAT},       {"cell-mm", required_argument, NULL, CELL},
                                           {"frame", required_argument, NULL, FRAME},     {"output", required_argument, NULL, 'o'},
                                           {"threads", required_argument, NULL, THREADS}, {"quiet", no_argument, NULL, QUIET},
-                                          {"help", no_argument, NULL, HELP},             {0}};
+                                          {"open-inlet", no_argument, NULL, OPEN},       {"help", no_argument, NULL, HELP},
+                                          {0}};
     *options = (ExportOptions){.frame = "LPS"};
     double number;
     optind = 1;
@@ -517,7 +593,8 @@ static int parse_options(int argc, char **argv, ExportOptions *options)
             if (!cli_number("--threads", optarg, 0, 256, &number))
                 return EXIT_BAD_INPUT;
             break;
-        case QUIET: break;
+        case OPEN: options->open_inlet = true; break;
+        case QUIET: options->quiet = true; break;
         case HELP:
         case 'h': fputs(help, stdout); return EXIT_DONE;
         default: fprintf(stderr, "seldinger export: unknown option or lacking value; see `seldinger export --help`\n"); return EXIT_BAD_INPUT;
