@@ -11,22 +11,23 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SHAPE_OPTIONS = 11, FIRST_SHAPE_OPTION = 400 };
+enum { SHAPE_OPTIONS = 19, FIRST_SHAPE_OPTION = 400 };
 
 typedef struct SynthCommand {
     const char *shape, *output, *measure, *json;
     int option_count;
     char option[SHAPE_OPTIONS][2][64];
-    double cell_mm, voxel_mm, psf_mm, noise, seed;
+    double cell_mm, seed, gap_voxels;
+    VolumeOptions volume;
     bool quiet;
 } SynthCommand;
 
 static const char help[] =
     "Usage: seldinger synth SHAPE [options] -o F\n"
     "       seldinger synth SHAPE [options] --measure MODEL.h5\n\n"
-    "Shapes: capsule, open-capsule, arc, bifurcation, spiral, phantom.\n"
+    "Shapes: capsule, open-capsule, arc, bifurcation, spiral, phantom, helix, y, kissing, bone, twig, tree.\n"
     "F.h5 is a tree of point sets, F.stl or F.ply the surface, F.nrrd a noisy volume; beside the last two stands the true centreline with exact\n"
-    "surface points, F-truth.h5.\n\n"
+    "surface points, F-truth.h5, and F-neighbour.h5 that of a kissing neighbour, which is no part of the truth.\n\n"
     "  -o, --output F       what to write, by its extension\n"
     "  --measure MODEL.h5   instead: how far a model fitted to this shape is from the truth\n"
     "  --json F             figures of --measure as JSON; - is standard output\n"
@@ -38,17 +39,32 @@ static const char help[] =
     "  --seed N             of noise and of the samples' places; default 1\n"
     "  --spacing X          distance of nodes in local radii; default 0.5\n"
     "  --blend-mm X         width of the joints [mm]; default 0: 0.6 times the branch's radius\n"
-    "  --length-mm X        capsules: segment [mm]; default 4\n"
-    "  --radius-mm X        capsules, arc, bifurcation: tube [mm]; default 1\n"
-    "  --bend-radius-mm X   arc, bifurcation: centreline [mm]; default 4\n"
-    "  --rise-mm X          spiral: how far it winds out of its plane [mm]; default 0\n"
+    "  --length-mm X        capsules: segment [mm]; default 4; y: trunk and daughters, twig: vessel\n"
+    "  --radius-mm X        of the tube [mm]; default 1; tree: of the trunk, default 1.6\n"
+    "  --bend-radius-mm X   arc, bifurcation, helix: centreline [mm]; default 4\n"
+    "  --rise-mm X          spiral: how far it winds out of its plane [mm], default 0; helix: its rise, default 12\n"
+    "  --turns X            helix; default 2\n"
+    "  --angle-deg X        y: of each daughter against the trunk; default 37.5\n"
+    "  --twig-radius-mm X   twig: the tiny vessel; default 0.2\n"
+    "  --branches N         tree: segments between bifurcations, up to 200; default 51\n"
+    "  --sacs N             tree: aneurysms on its branches; default 0\n"
+    "  --blocks N           bone, tree: dense blocks beside the vessels; default 6, 0\n"
+    "  --gap-mm X           kissing: from wall to wall [mm], default 0.2; bone, tree: from wall to block, default 0\n"
+    "  --gap-voxels X       the same in voxels (the least edge)\n"
+    "  --crossing-deg X     kissing: angle of the two vessels; default 0: side by side\n"
     "  --scale X            of the whole shape; default 1\n"
     "surface\n"
     "  --cell-mm X          grid of the triangles [mm]; default 0.25\n"
     "volume\n"
-    "  --voxel-mm X         [mm]; default 0.2\n"
+    "  --voxel-mm X|X,Y,Z   [mm], edges along the grid's axes; default 0.2\n"
     "  --psf-mm X           standard deviation of the blur [mm]; default 0.2\n"
-    "  --noise X            standard deviation of the noise in contrasts (vessel 1, background 0); default 0.05\n\n"
+    "  --noise X            standard deviation of the noise in contrasts (vessel 1, background 0); default 0.05\n"
+    "  --rotate-deg X       the grid is turned by this much about (1, 2, 3); default 0\n"
+    "  --clip X             values below are cut; default none\n"
+    "  --saturate X         values above are cut; default none\n"
+    "  --fade X             share of the brightness that is lost from the root to the furthest tip; default 0\n"
+    "  --bone X             brightness of the blocks in contrasts; default 1.2\n"
+    "  --threads N          default 0: all cores; the volume does not depend on them\n\n"
     "Exit codes: 0 done; 2 wrong usage or bad input.\n";
 
 static int usage_fault(const char *message, const char *what)
@@ -57,12 +73,35 @@ static int usage_fault(const char *message, const char *what)
     return EXIT_BAD_INPUT;
 }
 
+static void set_option(SynthCommand *command, const char *key, const char *value)
+{
+    int at = 0;
+    while (at < command->option_count && strcmp(command->option[at][0], key))
+        at++;
+    command->option_count += at == command->option_count;
+    snprintf(command->option[at][0], 64, "%s", key);
+    snprintf(command->option[at][1], 64, "%s", value);
+}
+
+// One number for all edges, or three.
+static bool voxel_edges(const char *text, double edge[3])
+{
+    char part[3][64];
+    int count = sscanf(text, "%63[^,],%63[^,],%63s", part[0], part[1], part[2]);
+    for (int k = 0; k < 3; k++)
+        if (!cli_number("--voxel-mm", count == 3 ? part[k] : text, 0.01, 10, &edge[k]))
+            return false;
+    return true;
+}
+
 // -1: go on; otherwise the exit code.
 static int parse_options(int argc, char **argv, SynthCommand *command)
 {
-    enum { MEASURE = 256, JSON, QUIET, CELL, VOXEL, PSF, NOISE };
+    enum { MEASURE = 256, JSON, QUIET, CELL, VOXEL, PSF, NOISE, ROTATE, CLIP, SATURATE, FADE, BONE, THREADS, GAP_VOXELS };
     static const char *const keys[SHAPE_OPTIONS] = {"points",   "sac_points", "noise_mm",  "seed",           "spacing",
-                                                    "blend_mm", "length_mm",  "radius_mm", "bend_radius_mm", "scale",  "rise_mm"};
+                                                    "blend_mm", "length_mm",  "radius_mm", "bend_radius_mm", "scale",  "rise_mm",
+                                                    "turns",    "angle_deg",  "twig_radius_mm", "branches",  "sacs",   "blocks",    "gap_mm",
+                                                    "crossing_deg"};
     static const struct option table[] = {{"output", required_argument, NULL, 'o'},
                                           {"measure", required_argument, NULL, MEASURE},
                                           {"json", required_argument, NULL, JSON},
@@ -82,18 +121,30 @@ static int parse_options(int argc, char **argv, SynthCommand *command)
                                           {"bend-radius-mm", required_argument, NULL, FIRST_SHAPE_OPTION + 8},
                                           {"scale", required_argument, NULL, FIRST_SHAPE_OPTION + 9},
                                           {"rise-mm", required_argument, NULL, FIRST_SHAPE_OPTION + 10},
+                                          {"turns", required_argument, NULL, FIRST_SHAPE_OPTION + 11},
+                                          {"angle-deg", required_argument, NULL, FIRST_SHAPE_OPTION + 12},
+                                          {"twig-radius-mm", required_argument, NULL, FIRST_SHAPE_OPTION + 13},
+                                          {"branches", required_argument, NULL, FIRST_SHAPE_OPTION + 14},
+                                          {"sacs", required_argument, NULL, FIRST_SHAPE_OPTION + 15},
+                                          {"blocks", required_argument, NULL, FIRST_SHAPE_OPTION + 16},
+                                          {"gap-mm", required_argument, NULL, FIRST_SHAPE_OPTION + 17},
+                                          {"crossing-deg", required_argument, NULL, FIRST_SHAPE_OPTION + 18},
+                                          {"gap-voxels", required_argument, NULL, GAP_VOXELS},
+                                          {"rotate-deg", required_argument, NULL, ROTATE},
+                                          {"clip", required_argument, NULL, CLIP},
+                                          {"saturate", required_argument, NULL, SATURATE},
+                                          {"fade", required_argument, NULL, FADE},
+                                          {"bone", required_argument, NULL, BONE},
+                                          {"threads", required_argument, NULL, THREADS},
                                           {"help", no_argument, NULL, 'h'},
                                           {0}};
-    *command = (SynthCommand){.cell_mm = 0.25, .voxel_mm = 0.2, .psf_mm = 0.2, .noise = 0.05, .seed = 1};
+    *command = (SynthCommand){.cell_mm = 0.25, .seed = 1, .gap_voxels = -1, .volume = volume_default_options()};
+    VolumeOptions *volume = &command->volume;
+    double threads = 0;
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "o:h", table, NULL)) != -1;) {
         if (choice >= FIRST_SHAPE_OPTION) {   // the shape itself says what is valid
-            int which = choice - FIRST_SHAPE_OPTION, at = 0;
-            while (at < command->option_count && strcmp(command->option[at][0], keys[which]))
-                at++;
-            command->option_count += at == command->option_count;
-            snprintf(command->option[at][0], 64, "%s", keys[which]);
-            snprintf(command->option[at][1], 64, "%s", optarg);
+            set_option(command, keys[choice - FIRST_SHAPE_OPTION], optarg);
             continue;
         }
         bool good = true;
@@ -103,9 +154,16 @@ static int parse_options(int argc, char **argv, SynthCommand *command)
         case JSON: command->json = optarg; break;
         case QUIET: command->quiet = true; break;
         case CELL: good = cli_number("--cell-mm", optarg, 0.005, 10, &command->cell_mm); break;
-        case VOXEL: good = cli_number("--voxel-mm", optarg, 0.01, 10, &command->voxel_mm); break;
-        case PSF: good = cli_number("--psf-mm", optarg, 0, 10, &command->psf_mm); break;
-        case NOISE: good = cli_number("--noise", optarg, 0, 10, &command->noise); break;
+        case VOXEL: good = voxel_edges(optarg, volume->voxel_mm); break;
+        case PSF: good = cli_number("--psf-mm", optarg, 0, 10, &volume->psf_mm); break;
+        case NOISE: good = cli_number("--noise", optarg, 0, 10, &volume->noise); break;
+        case ROTATE: good = cli_number("--rotate-deg", optarg, -180, 180, &volume->rotate_deg); break;
+        case CLIP: good = cli_number("--clip", optarg, -10, 10, &volume->clip); break;
+        case SATURATE: good = cli_number("--saturate", optarg, -10, 10, &volume->saturate); break;
+        case FADE: good = cli_number("--fade", optarg, 0, 1, &volume->fade); break;
+        case BONE: good = cli_number("--bone", optarg, 0, 10, &volume->bone); break;
+        case THREADS: good = cli_number("--threads", optarg, 0, 256, &threads); break;
+        case GAP_VOXELS: good = cli_number("--gap-voxels", optarg, 0, 100, &command->gap_voxels); break;
         case 'h': fputs(help, stdout); return EXIT_DONE;
         default: return usage_fault("unknown option or lacking value", "");
         }
@@ -119,9 +177,16 @@ static int parse_options(int argc, char **argv, SynthCommand *command)
     if (command->json && !command->measure)
         return usage_fault("--json goes with --measure MODEL.h5", "");
     command->shape = argv[optind];
+    volume->threads = (int)threads;
+    if (command->gap_voxels >= 0) {
+        char gap[64];
+        snprintf(gap, sizeof gap, "%.17g", command->gap_voxels * fmin(volume->voxel_mm[0], fmin(volume->voxel_mm[1], volume->voxel_mm[2])));
+        set_option(command, "gap_mm", gap);
+    }
     for (int i = 0; i < command->option_count; i++)
         if (!strcmp(command->option[i][0], "seed"))
             command->seed = strtod(command->option[i][1], NULL);
+    volume->seed = (uint64_t)command->seed + 1;
     return -1;
 }
 
@@ -129,14 +194,32 @@ static int parse_options(int argc, char **argv, SynthCommand *command)
 
 static bool save_tree(const SynthCommand *command, const Shape *shape, const VesselTree *tree, const char *path, Faults *faults)
 {
-    char parameters[2048];
-    int n = snprintf(parameters, sizeof parameters, "shape: %s\n", command->shape);
-    for (int i = 0; i < command->option_count; i++)
-        n += snprintf(parameters + n, sizeof parameters - (size_t)n, "%s: %s\n", command->option[i][0], command->option[i][1]);
-    snprintf(parameters + n, sizeof parameters - (size_t)n, "voxel_mm: %g\n", shape_voxel_mm(shape));
+    char *parameters = NULL;
+    size_t length = 0;
+    FILE *out = open_memstream(&parameters, &length);
+    int blocks;
+    const ShapeBlock *block = shape_blocks(shape, &blocks);
+    if (out) {
+        fprintf(out, "shape: %s\n", command->shape);
+        for (int i = 0; i < command->option_count; i++)
+            fprintf(out, "%s: %s\n", command->option[i][0], command->option[i][1]);
+        fprintf(out, "voxel_mm: %g\n", shape_voxel_mm(shape));
+        for (int i = 0; i < blocks; i++) {   // bone: no part of the truth
+            fprintf(out, "block_%d: {center_mm: [%.9g, %.9g, %.9g], half_mm: [%.9g, %.9g, %.9g], axes: [", i, block[i].center.x, block[i].center.y,
+                    block[i].center.z, block[i].half.x, block[i].half.y, block[i].half.z);
+            for (int k = 0; k < 3; k++)
+                fprintf(out, "%s[%.9g, %.9g, %.9g]", k ? ", " : "", block[i].axis[k].x, block[i].axis[k].y, block[i].axis[k].z);
+            fprintf(out, "]}\n");
+        }
+    }
+    bool good = out && fclose(out) == 0;
     TreeFileInfo info = {.source = (char *)(size_t)command->shape, .parameters = parameters,
                          .created_by = (char *)(size_t) "seldinger " SELDINGER_VERSION " synth"};
-    return tree_file_save(tree, &info, path, faults);
+    if (!good)
+        faults_add(faults, path, 0, 0, "not enough memory");
+    good = good && tree_file_save(tree, &info, path, faults);
+    free(parameters);
+    return good;
 }
 
 static bool write_stl(const TriangleMesh *mesh, const char *path, Faults *faults)
@@ -190,9 +273,9 @@ static bool write_ply(const TriangleMesh *mesh, const char *path, Faults *faults
 }
 
 // F.stl -> F-truth.h5
-static void truth_path(const char *output, const char *extension, char *path, size_t capacity)
+static void beside(const char *output, const char *extension, const char *what, char *path, size_t capacity)
 {
-    snprintf(path, capacity, "%.*s-truth.h5", (int)(strlen(output) - strlen(extension)), output);
+    snprintf(path, capacity, "%.*s-%s.h5", (int)(strlen(output) - strlen(extension)), output, what);
 }
 
 static bool write_output(const SynthCommand *command, const Shape *shape, Faults *faults)
@@ -212,10 +295,11 @@ static bool write_output(const SynthCommand *command, const Shape *shape, Faults
         if (good && !command->quiet)
             printf("%d nodes, %lld points\n", tree->node_count, (long long)tree->point_count);
     } else if (good && is_volume) {
-        Volume *volume = shape_volume(shape, command->voxel_mm, command->psf_mm, command->noise, (uint64_t)command->seed + 1, faults);
+        Volume *volume = shape_volume_with(shape, &command->volume, faults);
         good = volume && volume_save_nrrd(volume, command->output, "float", faults);
         if (good && !command->quiet)
-            printf("%d x %d x %d voxels of %g mm\n", volume->size[0], volume->size[1], volume->size[2], command->voxel_mm);
+            printf("%d x %d x %d voxels of %g x %g x %g mm\n", volume->size[0], volume->size[1], volume->size[2], command->volume.voxel_mm[0],
+                   command->volume.voxel_mm[1], command->volume.voxel_mm[2]);
         volume_free(volume);
     } else if (good) {
         TriangleMesh *mesh = shape_surface(shape, command->cell_mm, faults);
@@ -225,8 +309,15 @@ static bool write_output(const SynthCommand *command, const Shape *shape, Faults
         triangle_mesh_free(mesh);
     }
     if (good && !is_tree) {
-        truth_path(command->output, extension, truth, sizeof truth);
+        beside(command->output, extension, "truth", truth, sizeof truth);
         good = save_tree(command, shape, tree, truth, faults);
+    }
+    const Shape *neighbour = shape_neighbour(shape);
+    if (good && neighbour) {
+        VesselTree *other = shape_sample(neighbour, faults);
+        beside(command->output, extension, "neighbour", truth, sizeof truth);
+        good = other && save_tree(command, neighbour, other, truth, faults);
+        vessel_tree_free(other);
     }
     vessel_tree_free(tree);
     return good;

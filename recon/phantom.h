@@ -1,4 +1,4 @@
-// Synthetic vessels with known truth: capsule, open-capsule, arc, bifurcation, spiral, phantom.
+// Synthetic vessels with known truth: capsule, open-capsule, arc, bifurcation, spiral, phantom; helix, y, kissing, bone, twig, tree.
 //
 // A shape is a set of parts: tubes (the union of spheres of smoothly varying radius along a smooth curve) and ellipsoids (sacs). Each
 // part's field is its signed distance, > 0 inside; parts that belong together are joined by a smooth maximum of width `blend_mm`, parts
@@ -12,9 +12,18 @@
 //   seed         of noise and of the samples' phase (1)
 //   spacing      node spacing in local radii (0.5)
 //   blend_mm     width of the joints (0.6 times the smaller radius where 0)
-//   length_mm    capsule: segment (4)
-//   radius_mm    capsule, arc, bifurcation: tube (1); bend_radius_mm: arc, bifurcation (4)
-//   rise_mm      spiral: how far it winds out of its plane (0, the paper's)
+//   length_mm    capsule: segment (4); y: trunk and daughters, twig: the vessel, at least 4 and 12 radii
+//   radius_mm    capsule, arc, bifurcation, helix, y, kissing, bone, twig: tube (1); tree: trunk (1.6)
+//   bend_radius_mm  arc, bifurcation, helix: of the centreline (4)
+//   rise_mm      spiral: how far it winds out of its plane (0, the paper's); helix: whole rise (12)
+//   turns        helix (2)
+//   angle_deg    y: of each daughter against the trunk (37.5, Murray's)
+//   twig_radius_mm  twig: the tiny vessel, 0.6 lengths long (0.2)
+//   branches     tree: segments between bifurcations, or bifurcation and end, up to 200 (51; odd)
+//   sacs         tree: aneurysms on its branches (0)
+//   blocks       bone, tree: dense blocks beside the vessels (6, 0)
+//   gap_mm       kissing: from wall to wall (0.2); bone, tree: from wall to block (0: they touch)
+//   crossing_deg kissing: angle of the two vessels, 0: they run side by side for twelve radii (0)
 //   scale        the whole shape is scaled by it (1)
 #ifndef SELDINGER_RECON_PHANTOM_H
 #define SELDINGER_RECON_PHANTOM_H
@@ -37,6 +46,15 @@ double shape_voxel_mm(const Shape *shape);
 // The same from a scene's text options, before or without a shape (unknown or bad values count as absent).
 double shape_options_voxel_mm(int option_count, const char (*option)[2][64]);
 
+// What an angiogram shows and the truth does not contain: a kissing neighbour (NULL: none), and bone.
+const Shape *shape_neighbour(const Shape *shape);
+typedef struct ShapeBlock {  // a box
+    Vec3 center, axis[3];    // unit, at right angles
+    Vec3 half;               // edges along them [mm]
+} ShapeBlock;
+const ShapeBlock *shape_blocks(const Shape *shape, int *count);
+double shape_block_distance(const ShapeBlock *block, Vec3 x);   // signed, > 0 inside
+
 // The field whose zero is the surface: > 0 inside, gradient of length <= 1, the distance itself away from joints.
 double shape_field(const Shape *shape, Vec3 x, Vec3 *gradient);
 // The same with open ends cut off flat: the field of the closed body that is meshed.
@@ -56,8 +74,22 @@ VesselTree *shape_sample(const Shape *shape, Faults *faults);
 VesselTree *shape_tree(const char *name, int option_count, const char (*option)[2][64], const char *file, Faults *faults);
 // The surface as a closed mesh (open ends flat), marching tetrahedra with vertices projected onto it; every node is 0.
 TriangleMesh *shape_surface(const Shape *shape, double cell_mm, Faults *faults);
-// A contrast volume: 1 inside, 0 outside, partial voxels by the field, then Gaussian blur `psf_mm` (standard deviation) and
-// white noise `noise` (fraction of contrast).
+// How the angiogram is taken. Vessels are 1, background 0.
+typedef struct VolumeOptions {
+    double voxel_mm[3];      // edges along the grid's axes
+    double psf_mm;           // standard deviation of the Gaussian blur
+    double noise;            // standard deviation of the white noise, in contrasts
+    uint64_t seed;           // of the noise
+    double rotate_deg;       // the grid is turned by this much about (1, 2, 3); patient coordinates stay the shape's
+    double clip, saturate;   // values below and above are cut, after the noise; -HUGE_VAL, HUGE_VAL: none
+    double fade;             // share of the brightness that is lost on the way from the root to the furthest tip
+    double bone;             // brightness of blocks (1.2)
+    int threads;             // 0: all cores; results do not depend on them
+} VolumeOptions;
+VolumeOptions volume_default_options(void);
+// Share of each voxel inside (partial voxels by the field), then blur, noise and clipping. NULL with a fault.
+Volume *shape_volume_with(const Shape *shape, const VolumeOptions *options, Faults *faults);
+// The same with cubic voxels and nothing else.
 Volume *shape_volume(const Shape *shape, double voxel_mm, double psf_mm, double noise, uint64_t seed, Faults *faults);
 
 #endif
