@@ -1,5 +1,5 @@
-// Volumes: memory, samples to voxels, choice of the reader by content, NRRD output. The readers are volume_nrrd.c, volume_metaimage.c and
-// volume_nifti.c; what they share is volume_format.h.
+// Volumes: memory, samples to voxels, choice of the reader by content, NRRD output. The readers are volume_nrrd.c, volume_metaimage.c,
+// volume_nifti.c and volume_dicom.c; what they share is volume_format.h.
 //
 // A header can lie. Before memory is taken the promised samples are held against the bytes that are there: raw data must be there in full,
 // a deflate stream cannot grow by more than 1032 times, a number written as text takes two bytes.
@@ -266,8 +266,7 @@ static void convert(const VolumeHeader *header, const uint8_t *sample, size_t co
     }
 }
 
-// Sets minimum and maximum; a fault with the first voxel that is not finite. `sample_size` 0: no byte to tell.
-static bool finish_values(Volume *volume, const FileBytes *data, size_t start, size_t sample_size, Faults *faults)
+bool volume_finish_values(Volume *volume, const FileBytes *data, size_t start, size_t sample_size, Faults *faults)
 {
     size_t count = (size_t)volume->size[0] * (size_t)volume->size[1] * (size_t)volume->size[2], bad = 0, first = 0;
     float least = volume->value[0], most = least;
@@ -288,7 +287,7 @@ static bool finish_values(Volume *volume, const FileBytes *data, size_t start, s
     return false;
 }
 
-static Volume *volume_of_header(const VolumeHeader *header, const char *path, Faults *faults)
+Volume *volume_of_header(const VolumeHeader *header, const char *path, Faults *faults)
 {
     Volume *volume = volume_create(header->size, header->origin, header->axis);
     if (!volume) {
@@ -319,7 +318,7 @@ static Volume *decode_text(const VolumeHeader *header, const FileBytes *data, si
         }
         volume->value[i] = (float)(header->slope * x + header->intercept);
     }
-    if (volume && !finish_values(volume, data, data->offset, 0, faults)) {
+    if (volume && !volume_finish_values(volume, data, data->offset, 0, faults)) {
         volume_free(volume);
         return NULL;
     }
@@ -369,7 +368,7 @@ Volume *volume_decode(const VolumeHeader *header, const FileBytes *file, Faults 
     if (volume) {
         convert(header, inflated ? inflated + skip : data.byte, count, volume->value);
         // bytes inside a compressed stream have no place in the file: tell where it starts
-        if (!finish_values(volume, &data, data.offset, inflated ? 0 : sample, faults)) {
+        if (!volume_finish_values(volume, &data, data.offset, inflated ? 0 : sample, faults)) {
             volume_free(volume);
             volume = NULL;
         }
@@ -419,13 +418,18 @@ Volume *volume_parse(const void *bytes, size_t length, const char *path, Faults 
         return volume_parse_nifti(&file, faults);
     if (volume_is_metaimage(&file))
         return volume_parse_metaimage(&file, faults);
-    faults_add_at_byte(faults, path, 0, "is no volume that can be read; NRRD (.nrrd .nhdr), MetaImage (.mha .mhd) or NIfTI (.nii .nii.gz .hdr)");
+    if (volume_is_dicom(&file))
+        return volume_parse_dicom(&file, faults);
+    faults_add_at_byte(faults, path, 0, "is no volume that can be read; NRRD (.nrrd .nhdr), MetaImage (.mha .mhd), NIfTI (.nii .nii.gz .hdr) or DICOM");
     return NULL;
 }
 
 Volume *volume_load(const char *path, Faults *faults)
 {
     FileBytes file;
+    struct stat status;
+    if (!stat(path, &status) && S_ISDIR(status.st_mode))
+        return volume_load_dicom_folder(path, faults);
     if (!file_bytes_read(path, &file, faults))
         return NULL;
     size_t n = strlen(path);

@@ -1,4 +1,5 @@
-// Volumes: scalar voxel grids in patient coordinates. NRRD (raw, gzip; attached and detached), MetaImage, NIfTI.
+// Volumes: scalar voxel grids in patient coordinates. NRRD (raw, gzip; attached and detached), MetaImage, NIfTI,
+// uncompressed DICOM (a folder, one file of a series, or a multi-frame file).
 //
 // Voxel (i, j, k), i fastest, lies at origin + i axis[0] + j axis[1] + k axis[2] [mm]; axes may be oblique and anisotropic. The frame (RAS, LPS)
 // is kept as the header says, never converted. Values are held as float. Every header figure is checked before memory is taken: a lying
@@ -20,10 +21,10 @@ typedef struct Volume {
     float *value;            // (size[2], size[1], size[0])
     float minimum, maximum;
     char frame[32];          // "RAS", "LPS", … or "" where the header does not say
-    char format[16];         // "nrrd", "metaimage", "nifti"
+    char format[16];         // "nrrd", "metaimage", "nifti", "dicom"
 } Volume;
 
-// By content, not by extension. NULL with faults.
+// By content, not by extension. A folder is taken for that of a DICOM series; of a series' file the others are found beside it. NULL with faults.
 Volume *volume_load(const char *path, Faults *faults);
 // The same from memory; `path` stands in messages, and detached data files are looked for in its folder.
 Volume *volume_parse(const void *bytes, size_t length, const char *path, Faults *faults);

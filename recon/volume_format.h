@@ -51,6 +51,10 @@ size_t voxel_type_size(VoxelType type);
 bool volume_header_check(const VolumeHeader *header, const char *path, int line, Faults *faults);
 // Samples to voxels, after the skips. Takes no memory before it is sure that `data` can hold what the header promises.
 Volume *volume_decode(const VolumeHeader *header, const FileBytes *data, Faults *faults);
+// The header's grid with values zero; NULL with a fault where memory lacks.
+Volume *volume_of_header(const VolumeHeader *header, const char *path, Faults *faults);
+// Sets minimum and maximum; a fault at the first voxel that is not finite. Samples of `sample_size` bytes begin at `start` of the file; 0: no byte to tell.
+bool volume_finish_values(Volume *volume, const FileBytes *data, size_t start, size_t sample_size, Faults *faults);
 // Exactly `wanted` bytes inflated from a gzip or zlib stream, to be freed; NULL with a fault.
 uint8_t *volume_inflate(const FileBytes *data, size_t wanted, Faults *faults);
 // The whole of a regular file, to be freed (file_bytes_free).
@@ -62,8 +66,13 @@ bool file_bytes_read_beside(const char *header_path, int line, const char *name,
 bool volume_is_nrrd(const FileBytes *file);
 bool volume_is_metaimage(const FileBytes *file);
 bool volume_is_nifti(const FileBytes *file);
+bool volume_is_dicom(const FileBytes *file);
 Volume *volume_parse_nrrd(const FileBytes *file, Faults *faults);
 Volume *volume_parse_metaimage(const FileBytes *file, Faults *faults);
 Volume *volume_parse_nifti(const FileBytes *file, Faults *faults);
+// A multi-frame file alone; a slice with the other files of its series, which stand beside it.
+Volume *volume_parse_dicom(const FileBytes *file, Faults *faults);
+// The only series of a folder; several are a fault that lists them.
+Volume *volume_load_dicom_folder(const char *path, Faults *faults);
 
 #endif
