@@ -11,6 +11,8 @@
 #include "geom/simd.h"
 #include "geom/tree_surface.h"
 #include "geom/vessel.h"
+#include "geom/vessel_branches.h"
+#include "geom/vessel_findings.h"
 #include "geom/vessel_tree.h"
 
 #endif
