@@ -27,10 +27,11 @@ static const char help[] =
     "Fits a local blobby model to the points around every node (LIM, Kerrien et al. 2017).\n\n"
     "  -o, --output F.h5      the model\n"
     "  --preset NAME          default, or paper: the published values and method; give it before other options\n"
-    "  --target-mm X          stop when every point is this near [mm]; default: max(0.5 voxel, min(0.2 r, 1.5 voxels)) of the node's radius r;\n"
-    "                         paper 0.3\n"
+    "  --target-mm X          stop when every point is this near [mm]; default: max(0.5 voxel, min(0.2 r, 1.5 voxels)) of the node's radius r,\n"
+    "                         where no voxel is known 0.08 r; paper 0.3\n"
     "  --max-blobs N          blobs of a local model, at most; default 100\n"
-    "  --voxel-mm X           voxel size of the angiogram [mm]; default: what the tree's file says (`voxel_mm`), else 0.2\n"
+    "  --voxel-mm X           voxel size of the angiogram [mm]; default: what the tree's file says (`voxel_mm`), else not known: the classes of\n"
+    "                         d_a are then of 0.2 mm\n"
     "  --alpha X              weight of the cohesion of blobs; default 0, paper 1e-5\n"
     "  --beta X               weight of curvature [mm^4]; default 1e-4, paper 1e-3\n"
     "  --max-points N         points of a local model, at most (evenly thinned); default 1500\n"
@@ -130,10 +131,10 @@ static char *describe(const FitCommand *command, const TreeFileInfo *tree)
     int n = snprintf(text, room,
                      "fit:\n  preset: %s\n  alpha: %g\n  beta: %g\n  s: %g\n  iso_level: %g\n  max_blobs: %d\n  target_mm: %g\n  voxel_mm: %g\n"
                      "  topological_distance: %d\n  max_loops: %d\n  line_searches: %d\n  weigh_distance: %d\n  project_points: %d\n"
-                     "  sweep_all_blobs: %d\n  give_up_splits: %d\n  extend_inlet: %d\n  guard_shape: %d\n  max_points: %d\ntree:\n",
+                     "  sweep_all_blobs: %d\n  give_up_splits: %d\n  extend_inlet: %d\n  guard_shape: %d\n  agree: %d\n  max_points: %d\ntree:\n",
                      command->preset, o->alpha, o->beta, o->s, o->iso_level, o->max_blobs, o->target_mm, o->voxel_mm, o->topological_distance,
                      o->max_loops, o->line_searches, o->weigh_distance, o->project_points, o->sweep_all_blobs, o->give_up_splits, o->extend_inlet,
-                     o->guard_shape, o->max_points);
+                     o->guard_shape, o->agree, o->max_points);
     char *out = text + n;
     bool line_start = true;
     for (const char *in = tree->parameters; in && *in && out < text + room - 4; in++) {
@@ -320,8 +321,8 @@ static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seco
         faults_add(faults, command->tree, 0, 0, "is a tree without a model; fit it with -o MODEL.h5");
     if (tree && faults->count == 0) {
         if (!command->has_voxel) {
-            double said = tree_file_number(info, "voxel_mm", command->options.voxel_mm);
-            command->options.voxel_mm = said > 1e-4 && said < 100 ? said : command->options.voxel_mm;
+            double said = tree_file_number(info, "voxel_mm", 0);
+            command->options.voxel_mm = said > 1e-4 && said < 100 ? said : 0;
         }
         if (!command->output)
             return tree;
@@ -347,7 +348,8 @@ int verb_fit(int argc, char **argv)
     VesselTree *model = run_fit(&command, &from, &seconds, &faults);
     bool good = model != NULL;
     if (good) {
-        FitFigures figures = figures_of(model, command.options.voxel_mm, seconds);
+        double voxel = command.options.voxel_mm > 0 ? command.options.voxel_mm : lim_fit_default_options().voxel_mm;
+        FitFigures figures = figures_of(model, voxel, seconds);
         ModelMeasure measure;
         if (command.measure && !model_measure(model, NULL, command.options.threads, &measure)) {
             faults_add(&faults, command.tree, 0, 0, "not enough memory to measure the model");
@@ -359,9 +361,9 @@ int verb_fit(int argc, char **argv)
             good = good && tree_file_save(model, &info, command.output, &faults);
         free(info.parameters);
         if (good && command.json)
-            good = write_json(command.json, model, &figures, command.measure ? &measure : NULL, command.options.voxel_mm, &faults);
+            good = write_json(command.json, model, &figures, command.measure ? &measure : NULL, voxel, &faults);
         if (good && !command.quiet && !(command.json && !strcmp(command.json, "-"))) {
-            print_figures(model, &figures, command.options.voxel_mm);
+            print_figures(model, &figures, voxel);
             if (command.measure)
                 print_measure(&measure);
         }

@@ -6,21 +6,26 @@
 // Guards (ours): the centres of the nodes must be in the lumen, and a ring of points beyond the wall outside of it. They act only where violated;
 // they stop constrictions on the tool's way, and ghost lobes where points are missing, such as at the mouth of an untracked branch, which
 // one model would open and its neighbour cap.
+// Agreement (ours): on noisy points neighbouring models stop at different places, one a bulge richer than the next. The second pass starts from the
+// first's models and adds points of the mixed wall, which all models around see, to fewer points of the data. On the angiogram this took the jumps
+// of the wall as a tool meets it from 0.016 to 0.004 mm (p99, tubes) for 1.6 times the work. Tried and lost: agreed points alone (the wall drifts
+// from the data, 0.02 mm, and out of the sac); a tighter target (more blobs, the same jumps); starting afresh (1.3 times the jumps, more work).
 #include "recon/lim_fit.h"
 
 #include "geom/blobby.h"
 #include "geom/power_walk.h"
+#include "recon/lim_agree.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-enum { NEAR_CAPACITY = 256, GUARD_ANGLES = 12, GUARD_NODES = 6, SPHERE_DIRECTIONS = 48, LEAST_POINTS = 24 };
+enum { NEAR_CAPACITY = 256, GUARD_ANGLES = 12, GUARD_NODES = 6, SPHERE_DIRECTIONS = 48, LEAST_POINTS = 24, SECOND_POINTS = 250 };
 
 LimFitOptions lim_fit_default_options(void)
 {
     return (LimFitOptions){.alpha = 0, .beta = 1e-4, .s = 2, .iso_level = 0.1, .max_blobs = 100, .target_mm = 0, .topological_distance = 2,
                            .max_loops = 2, .line_searches = 4, .voxel_mm = 0.2, .weigh_distance = true, .project_points = true,
-                           .sweep_all_blobs = true, .give_up_splits = 3, .extend_inlet = true, .guard_shape = true, .max_points = 1500};
+                           .sweep_all_blobs = true, .give_up_splits = 3, .extend_inlet = true, .guard_shape = true, .agree = true, .max_points = 1500};
 }
 
 LimFitOptions lim_fit_paper_options(void)
@@ -31,7 +36,7 @@ LimFitOptions lim_fit_paper_options(void)
     options.target_mm = 0.3;
     options.max_loops = 5;
     options.line_searches = 20;   // with 4 the repulsion's throw is never taken back and the new blob shrinks to nothing outside
-    options.weigh_distance = options.project_points = options.sweep_all_blobs = options.extend_inlet = options.guard_shape = false;
+    options.weigh_distance = options.project_points = options.sweep_all_blobs = options.extend_inlet = options.guard_shape = options.agree = false;
     options.give_up_splits = 0;
     return options;
 }
@@ -45,7 +50,7 @@ static bool check_options(const LimFitOptions *o, Faults *faults)
     } range[] = {{"alpha", o->alpha, 0, 1},          {"beta", o->beta, 0, 10},
                  {"s", o->s, 0.1, 10},               {"iso-level", o->iso_level, 1e-4, 10},
                  {"max-blobs", o->max_blobs, 2, 1000}, {"target-mm", o->target_mm, 0, 100},
-                 {"voxel-mm", o->voxel_mm, 1e-4, 100}, {"topological-distance", o->topological_distance, 0, 50},
+                 {"voxel-mm", o->voxel_mm, 0, 100}, {"topological-distance", o->topological_distance, 0, 50},
                  {"max-loops", o->max_loops, 1, 100}, {"line-searches", o->line_searches, 1, 100},
                  {"give-up-splits", o->give_up_splits, 0, 1000}, {"max-points", o->max_points, 50, 100000}};
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
@@ -240,7 +245,8 @@ static bool is_outside(const VesselTree *tree, const Gather *gather, Vec3 x, dou
 // A ring about a vessel node, half a radius beyond the furthest point of each sector; 1.6 r in sectors without points.
 static void guard_ring(const VesselTree *tree, int at, Gather *gather)
 {
-    Vec3 c = tree->center[at], d = tree->direction[at], e1 = vec3_normal_to(d), e2 = vec3_cross(d, e1);
+    Vec3 c = tree->center[at], d = tree->direction[at], e1, e2;
+    lim_frame(tree, at, &e1, &e2);
     double radius = tree->radius[at], far[GUARD_ANGLES] = {0};
     for (int i = 0; i < gather->point_count; i++) {
         Vec3 p = vec3_sub(gather->point[i], c);
@@ -347,7 +353,12 @@ typedef struct NodeModel {
 typedef struct Job {
     const VesselTree *tree;
     const LimFitOptions *options;
-    NodeModel *model;
+    const int *order;        // (N) nodes, the largest job first
+    NodeModel *model;        // (N)
+    // the second pass
+    const VesselTree *first; // the first's models, NULL in the first
+    const Vec3 *agreed;      // (N, LIM_AGREED_MOST)
+    const int *agreed_count; // (N)
 } Job;
 
 static int compare_doubles(const void *a, const void *b)
@@ -379,62 +390,111 @@ static double node_error(const VesselTree *tree, int node, const Gather *gather,
     return error;
 }
 
+// The data give way to the wall agreed on, which has averaged them; a sac's do not, it is too large for the few points agreed on.
+static bool add_agreed(const Job *job, int node, Gather *gather)
+{
+    const VesselTree *tree = job->tree;
+    bool at_sac = false;
+    for (int k = 0; k < gather->own_count; k++)
+        at_sac = at_sac || tree->kind[gather->near[k].node] == NODE_ANEURYSM;
+    if (!at_sac)
+        gather->point_count = thin_points(gather->point, gather->point_count, SECOND_POINTS);
+    for (int k = 0; k < gather->own_count; k++) {
+        int from = gather->near[k].node;
+        for (int i = 0; i < job->agreed_count[from]; i++) {
+            Vec3 p = job->agreed[(size_t)from * LIM_AGREED_MOST + (size_t)i];
+            if (vec3_distance(p, tree->center[node]) < gather->reach && !add_point(gather, p))
+                return false;
+        }
+    }
+    return true;
+}
+
+static bool gather_node(const Job *job, int node, Gather *gather)
+{
+    const LimFitOptions *options = job->options;
+    // a node with hardly any points of its own or near it looks further along the tree
+    for (int more = 0; more <= 8; more++) {
+        find_near(job->tree, node, options, options->topological_distance + more, gather);
+        if (!gather_points(job->tree, node, options, gather))
+            return false;
+        if (gather->point_count >= LEAST_POINTS)
+            break;
+    }
+    if (options->guard_shape && gather->point_count >= 4) {   // both by the data, not by what was made of them
+        gather_guards(job->tree, node, gather->is_extended, gather);
+        gather_tubes(job->tree, gather);
+    }
+    return !job->first || add_agreed(job, node, gather);
+}
+
+static LimFitTask task_of(const Job *job, int node, Gather *gather, double *start_radius)
+{
+    const VesselTree *tree = job->tree, *first = job->first;
+    LimFitTask task = {.point_count = gather->point_count, .point = gather->point, .center = tree->center[node], .direction = tree->direction[node],
+                       .radius = tree->radius[node]};
+    if (job->options->guard_shape) {
+        task.guard_count = gather->guard_count;
+        task.guard = gather->guard;
+        task.clearance = gather->clearance;
+        task.tube_count = gather->tube_count;
+        task.tube = gather->tube;
+    }
+    if (first) {
+        int64_t at = first->blob_offset[node];
+        task.start_count = (int)(first->blob_offset[node + 1] - at);
+        task.start = first->blob_center + at;
+        task.start_radius = start_radius;
+        for (int k = 0; k < task.start_count; k++)
+            start_radius[k] = blob_radius(first->blob_width[at + k], first->iso_level);
+        return task;
+    }
+    if (job->options->sweep_all_blobs) {
+        gather_retry(tree, node, gather);
+        task.retry_count = gather->retry_count;
+        task.retry = gather->retry;
+        task.retry_radius = gather->retry_radius;
+    }
+    if (tree->kind[node] == NODE_ANEURYSM) {   // the paper's figure 5: one blob
+        task.start_count = 1;
+        task.start = &tree->center[node];
+        task.start_radius = &tree->radius[node];
+    }
+    return task;
+}
+
 static void fit_node(void *context, long index)
 {
     Job *job = context;
     const VesselTree *tree = job->tree;
-    const LimFitOptions *options = job->options;
-    int node = (int)index;
+    LimFitOptions options = *job->options;
+    int node = job->order[index];
     NodeModel *model = &job->model[node];
     Gather *gather = calloc(1, sizeof *gather);
-    Vec3 *center = calloc((size_t)options->max_blobs + 1, sizeof *center);
-    double *width = calloc((size_t)options->max_blobs + 1, sizeof *width);
-    bool good = gather && center && width;
-    // a node with hardly any points of its own or near it looks further along the tree
-    for (int more = 0; good && more <= 8; more++) {
-        find_near(tree, node, options, options->topological_distance + more, gather);
-        good = gather_points(tree, node, options, gather);
-        if (good && gather->point_count >= LEAST_POINTS)
-            break;
-    }
+    Vec3 *center = calloc((size_t)options.max_blobs + 1, sizeof *center);
+    double *width = calloc((size_t)options.max_blobs + 1, sizeof *width), *start_radius = calloc((size_t)options.max_blobs + 1, sizeof *start_radius);
+    bool good = gather && center && width && start_radius && gather_node(job, node, gather);
+    if (options.target_mm == 0 && options.voxel_mm == 0)
+        options.target_mm = 0.08 * tree->radius[node];
     if (good && gather->point_count >= 4) {
-        if (options->guard_shape)
-            gather_guards(tree, node, gather->is_extended, gather);
-        LimFitTask task = {.point_count = gather->point_count, .point = gather->point, .center = tree->center[node],
-                           .direction = tree->direction[node], .radius = tree->radius[node], .guard_count = gather->guard_count,
-                           .guard = gather->guard, .clearance = gather->clearance};
-        if (options->guard_shape) {
-            gather_tubes(tree, gather);
-            task.tube_count = gather->tube_count;
-            task.tube = gather->tube;
-        }
-        if (options->sweep_all_blobs) {
-            gather_retry(tree, node, gather);
-            task.retry_count = gather->retry_count;
-            task.retry = gather->retry;
-            task.retry_radius = gather->retry_radius;
-        }
-        if (tree->kind[node] == NODE_ANEURYSM) {   // the paper's figure 5: one blob
-            task.start_count = 1;
-            task.start = &tree->center[node];
-            task.start_radius = &tree->radius[node];
-        }
-        model->count = lim_fit_model(&task, options, center, width);
+        LimFitTask task = task_of(job, node, gather, start_radius);
+        model->count = lim_fit_model(&task, &options, center, width);
         good = model->count > 0;
     } else if (good) {   // nothing to fit: the node's sphere
         model->count = 1;
         center[0] = tree->center[node];
-        width[0] = blob_width_for_radius(tree->radius[node], options->iso_level);
+        width[0] = blob_width_for_radius(tree->radius[node], options.iso_level);
     }
     model->failed = !good;
     if (good) {
         model->center = realloc(center, (size_t)model->count * sizeof *center);
         model->width = realloc(width, (size_t)model->count * sizeof *width);
-        model->error = node_error(tree, node, gather, model, options->iso_level);
+        model->error = node_error(tree, node, gather, model, options.iso_level);
     } else {
         free(center);
         free(width);
     }
+    free(start_radius);
     if (gather)
         free(gather->point);
     free(gather);
@@ -473,6 +533,96 @@ static VesselTree *assemble(const VesselTree *tree, const NodeModel *model, doub
     return out;
 }
 
+// --- The tree ---
+
+typedef struct Size {
+    int64_t points;
+    int node;
+} Size;
+
+static int compare_sizes(const void *a, const void *b)
+{
+    const Size *x = a, *y = b;
+    return x->points != y->points ? (x->points < y->points) - (x->points > y->points) : (x->node > y->node) - (x->node < y->node);
+}
+
+// Nodes by the points around them, most first: a sac's model, the longest job and often the last node, must not keep one core waiting for it.
+static int *order_by_size(const VesselTree *tree)
+{
+    int n = tree->node_count, *order = calloc((size_t)n, sizeof *order);
+    Size *size = calloc((size_t)n, sizeof *size);
+    for (int i = 0; i < n && order && size; i++) {
+        size[i] = (Size){tree->point_offset[i + 1] - tree->point_offset[i], i};
+        for (int k = tree->neighbour_offset[i]; k < tree->neighbour_offset[i + 1]; k++)
+            size[i].points += tree->point_offset[tree->neighbour[k] + 1] - tree->point_offset[tree->neighbour[k]];
+    }
+    if (order && size) {
+        qsort(size, (size_t)n, sizeof *size, compare_sizes);
+        for (int i = 0; i < n; i++)
+            order[i] = size[i].node;
+    } else {
+        free(order);
+        order = NULL;
+    }
+    free(size);
+    return order;
+}
+
+typedef struct PassProgress {   // of one pass of several
+    const Progress *of_all;
+    long before, total;
+} PassProgress;
+
+static void pass_on(void *context, long done, long total)
+{
+    const PassProgress *pass = context;
+    (void)total;
+    pass->of_all->call(pass->of_all->context, pass->before + done, pass->total);
+}
+
+// All nodes once; NULL where memory lacks.
+static VesselTree *fit_pass(Job *job, const Progress *progress)
+{
+    const VesselTree *tree = job->tree;
+    long nodes = tree->node_count;
+    PassProgress pass = {progress, job->first ? nodes : 0, job->options->agree ? 2 * nodes : nodes};
+    Progress own = {pass_on, &pass};
+    job->model = calloc((size_t)nodes, sizeof *job->model);
+    if (!job->model)
+        return NULL;
+    parallel_for(job->options->threads, nodes, fit_node, job, progress && progress->call ? &own : NULL);
+    bool good = true;
+    for (int i = 0; i < nodes; i++)
+        good = good && !job->model[i].failed;
+    VesselTree *out = good ? assemble(tree, job->model, job->options->iso_level) : NULL;
+    for (int i = 0; i < nodes; i++) {
+        free(job->model[i].center);
+        free(job->model[i].width);
+    }
+    free(job->model);
+    job->model = NULL;
+    return out;
+}
+
+// The second pass; frees the first's models.
+static VesselTree *fit_to_agree(Job *job, VesselTree *first, const Progress *progress)
+{
+    size_t nodes = (size_t)first->node_count;
+    Vec3 *point = calloc(nodes * LIM_AGREED_MOST, sizeof *point);
+    int *count = calloc(nodes, sizeof *count);
+    VesselTree *out = NULL;
+    if (point && count && lim_agree(first, job->options->threads, point, count)) {
+        job->first = first;
+        job->agreed = point;
+        job->agreed_count = count;
+        out = fit_pass(job, progress);
+    }
+    free(point);
+    free(count);
+    vessel_tree_free(first);
+    return out;
+}
+
 VesselTree *lim_fit(const VesselTree *tree, const LimFitOptions *options, const Progress *progress, Faults *faults)
 {
     if (!check_options(options, faults))
@@ -482,20 +632,12 @@ VesselTree *lim_fit(const VesselTree *tree, const LimFitOptions *options, const 
                    (long long)tree->point_count);
         return NULL;
     }
-    Job job = {tree, options, calloc((size_t)tree->node_count, sizeof(NodeModel))};
-    VesselTree *out = NULL;
-    if (job.model) {
-        parallel_for(options->threads, tree->node_count, fit_node, &job, progress);
-        bool good = true;
-        for (int i = 0; i < tree->node_count; i++)
-            good = good && !job.model[i].failed;
-        out = good ? assemble(tree, job.model, options->iso_level) : NULL;
-        for (int i = 0; i < tree->node_count; i++) {
-            free(job.model[i].center);
-            free(job.model[i].width);
-        }
-    }
-    free(job.model);
+    int *order = order_by_size(tree);
+    Job job = {.tree = tree, .options = options, .order = order};
+    VesselTree *out = order ? fit_pass(&job, progress) : NULL;
+    if (out && options->agree)
+        out = fit_to_agree(&job, out, progress);
+    free(order);
     if (!out)
         faults_add(faults, "fit", 0, 0, "not enough memory for the models of %d nodes", tree->node_count);
     return out;

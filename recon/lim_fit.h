@@ -2,7 +2,8 @@
 //
 // For each node: concatenate the points up to topological distance 2, start from two blobs along the vessel, then
 // select (worst point, its nearest blob), split, optimise (Polak-Ribiere, centre then width) until every point lies within the
-// target distance or the number of blobs is reached; clean up. One job a node on all cores; results do not depend on `threads`.
+// target distance or the number of blobs is reached; clean up. Then once more, from there, also to the wall that neighbouring models agree on.
+// One job a node on all cores, the largest first; results do not depend on `threads`.
 #ifndef SELDINGER_RECON_LIM_FIT_H
 #define SELDINGER_RECON_LIM_FIT_H
 
@@ -16,19 +17,20 @@ typedef struct LimFitOptions {
     double s;                // repulsive distance of E_c in widths, 2
     double iso_level;        // T, 0.1
     int max_blobs;           // N_s, 100
-    double target_mm;        // t_g [mm]; 0: max(0.5 voxel, min(0.2 r, 1.5 voxels)); paper 0.3
+    double target_mm;        // t_g [mm]; 0: max(0.5 voxel, min(0.2 r, 1.5 voxels)), without a voxel 0.08 r; paper 0.3
     // what the paper fixes in its text
     int topological_distance;   // points are concatenated up to this many steps along the tree, 2
     int max_loops;           // centre-width loops per optimisation; paper 5, default 2
     int line_searches;       // Polak-Ribiere steps per loop; paper 20 (not said there), default 4
     // departures (DESIGN.md section 2); the paper preset turns them off
-    double voxel_mm;         // for the automatic target, 0.2
+    double voxel_mm;         // for the automatic target, 0.2; 0: not known, as where the tree comes from a mesh
     bool weigh_distance;     // weigh E_d by mean g^2 / g_i^2: distances instead of field values
     bool project_points;     // measure points beyond the target by projection, not by Taubin's one step
     bool sweep_all_blobs;    // a short pass over all blobs after each split
     int give_up_splits;      // stop when this many splits bring nothing; 0: never. 3
     bool extend_inlet;       // the root's points are repeated outwards so that the vessel is tubular through the inlet plane
     bool guard_shape;        // no constriction on the centreline, no ghost lobes away from the points
+    bool agree;              // a second fit of each model, from the first, to its points and to what the models around agree on (recon/lim_agree.h)
     int max_points;          // a node's points are thinned evenly to this many for speed, 1500
     int threads;             // 0: all cores
 } LimFitOptions;

@@ -5,10 +5,10 @@
 #include "geom/blobby.h"
 #include "geom/power_walk.h"
 #include "geom/vessel.h"
+#include "recon/lim_agree.h"
 #include "recon/parallel.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 enum { VESSEL_RAYS = 120, SAC_RAYS = 1500, LINK_SAMPLES = 5 };   // a sac's neck is a small part of its wall
 
@@ -104,18 +104,6 @@ static Blobby model_of(const VesselTree *tree, int node)
     return (Blobby){(int)(tree->blob_offset[node + 1] - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level};
 }
 
-// Whether no node near `node`, other than `spared`, is better for x.
-static bool is_in_cell(const VesselTree *tree, int node, int spared, Vec3 x)
-{
-    double own = power_distance(x, tree->center[node], tree->radius[node]);
-    for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++) {
-        int other = tree->near[k];
-        if (other != spared && power_distance(x, tree->center[other], tree->radius[other]) < own)
-            return false;
-    }
-    return true;
-}
-
 static Vec3 bisect(const Blobby *model, Vec3 c, Vec3 d, double low, double high)
 {
     bool in = blobby_field(model, vec3_add_scaled(c, low, d)) > 0;
@@ -190,7 +178,7 @@ static void look_at_wall(const Job *job, int node, Vec3 p, NodeFigures *f)
             continue;
         double beyond = (power_distance(p, tree->center[other], tree->radius[other]) - own) / (2 * apart);
         Vec3 across = vec3_scale(e, 1 / apart), x = vec3_add_scaled(p, beyond, across);
-        if (beyond < 0.1 * tree->radius[node] && is_in_cell(tree, node, other, x))
+        if (beyond < 0.1 * tree->radius[node] && lim_is_in_cell(tree, node, other, x))
             add_join(job, node, other, x, across, f);
     }
     if (job->truth) {
@@ -214,7 +202,7 @@ static void cast_rays_of(const Job *job, int node, NodeFigures *f)
         bool in = blobby_field(&model, c) > 0, first = true;
         for (int i = 1; i * step < 3 * radius; i++) {
             Vec3 x = vec3_add_scaled(c, i * step, d);
-            if (!is_in_cell(tree, node, -1, x))
+            if (!lim_is_in_cell(tree, node, -1, x))
                 break;   // cells are convex
             bool now = blobby_field(&model, x) > 0;
             if (now == in)
