@@ -1,0 +1,46 @@
+// From a surface and centrelines to the tree that `fit` takes: the part of RBT (Kerrien 2017, section 3) for vessels that somebody segmented.
+//
+// Curves are set in the mesh's frame, joined to one tree (curves may overlap, or begin on another; a loop is cut where it closes), and resampled to
+// nodes; flat lids over the ends of a closed surface are taken off, so that inlets and outlets are open; the surface is sampled evenly for each
+// local radius, and each point goes to the node that is nearest by power distance among those that see it. Lengths mm.
+#ifndef SELDINGER_RECON_IMPORT_SURFACE_H
+#define SELDINGER_RECON_IMPORT_SURFACE_H
+
+#include "geom/vessel_tree.h"
+#include "recon/centreline_file.h"
+#include "recon/mesh_check.h"
+
+typedef struct ImportOptions {
+    double spacing;          // of nodes, in local radii; 0.5
+    double points_per_node;  // 108, as the rays of RBT keep them
+    bool has_root;           // else the widest open end
+    Vec3 root;               // [mm] the end nearest to it is the root
+    int threads;             // 0: all cores; the tree does not depend on it
+} ImportOptions;
+ImportOptions import_default_options(void);
+
+typedef struct ImportReport {
+    bool curves_flipped;     // x and y of the curves were negated (LPS for RAS): only so they lie inside
+    double curves_scaled;    // by this, because only so they lie inside; 1
+    double inside_percent;   // of the curves' points inside the surface, in the frame that was taken
+    int branch_count, end_count, open_end_count, lid_count;
+    int loop_count;          // places where a loop was cut
+    Vec3 loop;               // the first of them
+    int lost_curves;         // that touch no other and were left out
+    Vec3 lost;
+    int unused_components;   // of the surface: no centreline runs in them
+    bool root_is_open;
+    double radius_min, radius_max, length;   // [mm]; length of all branches
+    long sampled_points, unseen_points;      // unseen: no node sees them; left out
+    int dropped_nodes;       // whose sphere lies within their parent's
+    Vec3 root;
+} ImportReport;
+
+// The frame in which the curves lie inside the mesh: as they stand, with x and y negated, or scaled by `scale`. False with a fault where fewer than
+// half of the points of any lie inside. `mesh` is mended (mesh_repair).
+bool import_place_curves(const SurfaceMesh *mesh, double scale, CurveSet *set, ImportReport *report, const char *name, Faults *faults);
+// NULL with faults. `name` stands in messages.
+VesselTree *import_surface(const SurfaceMesh *mesh, const CurveSet *set, const ImportOptions *options, ImportReport *report, const char *name,
+                           Faults *faults);
+
+#endif
