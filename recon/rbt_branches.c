@@ -4,6 +4,8 @@
 // Limbs of a round are tracked at the same time on the tree as it was, and adopted widest first; what lies in a tube that was adopted before is left out.
 #include "recon/rbt_branches.h"
 #include "recon/bspline.h"
+#include "recon/rbt_links.h"
+#include "recon/rbt_sacs.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -13,7 +15,7 @@ typedef struct Found {       // what became of a limb
     const char *why;
     double radius;           // of its first nodes
     int limb;
-    bool good;
+    bool good, is_sac;       // a sac is one node in `out`
 } Found;
 
 typedef struct Round {
@@ -45,7 +47,7 @@ static bool is_along(const Tracker *t, const RbtLimb *limb, Vec3 place, Vec3 dir
     const TrackNode *parent = &t->tree.node[limb->contact];
     return vec3_dot(n->cylinder.axis, direction) > 0.5 && vec3_distance(n->cylinder.center, place) < 1.5 * fmax(n->cylinder.radius, t->voxel) &&
            n->contrast > 0.7 * share * parent->contrast && tracker_is_inside(t->volume, n->cylinder.center) && !tracker_is_forbidden(t, n->cylinder.center) &&
-           tracker_brightness(t, n->cylinder.center) >= limb->level && tracker_node_around(t, n->cylinder.center, 0.8) < 0;
+           tracker_brightness(t, n->cylinder.center) >= fmax(limb->level, t->floor) && tracker_node_around(t, n->cylinder.center, 0.8) < 0;
 }
 
 // A cylinder somewhere on the limb: its middle first, then outwards, then inwards.
@@ -69,15 +71,67 @@ static bool seed_on_limb(Tracker *t, const RbtLimb *limb, double share, Cylinder
     return false;
 }
 
-// Does the way back end where the limb begins: in the tree, or near the contact and heading for it?
-static bool meets_parent(const Tracker *t, const RbtLimb *limb, const Cylinder *end)
+static double segment_distance(Vec3 x, Vec3 a, Vec3 b)
 {
+    Vec3 ab = vec3_sub(b, a);
+    double l2 = vec3_norm2(ab), s = l2 > 0 ? fmax(0, fmin(1, vec3_dot(vec3_sub(x, a), ab) / l2)) : 0;
+    return vec3_distance(x, vec3_add_scaled(a, s, ab));
+}
+
+// From the limb's way down to the contact's node.
+static double distance_from_limb(const Tracker *t, const RbtLimb *limb, Vec3 x)
+{
+    double least = segment_distance(x, t->tree.node[limb->contact].cylinder.center, limb->place[0]);
+    for (int i = 1; i < limb->count; i++)
+        least = fmin(least, segment_distance(x, limb->place[i - 1], limb->place[i]));
+    return least;
+}
+
+// The darkest place on the way from x to the contact's node, between background (0) and the dimmer of both lumens (1).
+static double neck_of(const Tracker *t, const RbtLimb *limb, const TrackNode *node)
+{
+    const TrackNode *parent = &t->tree.node[limb->contact];
+    Vec3 x = node->cylinder.center, c = parent->cylinder.center;
+    double own = tracker_brightness(t, x), other = tracker_brightness(t, c), inside = fmin(own, other), outside = fmin(own - node->contrast, other - parent->contrast), least = 1;
+    int steps = 2 + (int)(vec3_distance(x, c) / (0.25 * t->voxel));
+    for (int i = 0; i <= steps; i++)
+        least = fmin(least, (tracker_brightness(t, vec3_mix(x, c, (double)i / steps)) - outside) / fmax(inside - outside, 1e-12));
+    return least;
+}
+
+// Does the way back come out where the limb begins? Cuts off what goes past it.
+static bool meets_parent(const Tracker *t, const RbtLimb *limb, Track *back)
+{
+    const Cylinder *end = &back->node[back->count - 1].cylinder;
     if (tracker_node_around(t, end->center, 0.9) >= 0)
         return true;
-    const Cylinder *parent = &t->tree.node[limb->contact].cylinder;
-    Vec3 gap = vec3_sub(limb->place[0], end->center), to_parent = vec3_sub(parent->center, end->center);
-    double reach = 2 * parent->radius + 2 * end->radius + 3 * t->voxel;
-    return vec3_norm(to_parent) < reach && vec3_norm(gap) < reach && vec3_dot(vec3_unit_or(to_parent, end->axis), end->axis) > 0.3;
+    int nearest = 0;
+    Vec3 contact = t->tree.node[limb->contact].cylinder.center;
+    for (int i = 0; i < back->count; i++)
+        if (vec3_distance(back->node[i].cylinder.center, contact) < vec3_distance(back->node[nearest].cylinder.center, contact))
+            nearest = i;
+    // it left the limb's way, into a sibling that lies straighter on: so far it was right
+    if (distance_from_limb(t, limb, back->node[nearest].cylinder.center) > 2 * fmax(back->node[nearest].cylinder.radius, t->voxel))
+        for (nearest = 0; nearest + 1 < back->count; nearest++)
+            if (distance_from_limb(t, limb, back->node[nearest + 1].cylinder.center) > 2 * fmax(back->node[nearest + 1].cylinder.radius, t->voxel))
+                break;
+    double past = 0, radius = back->node[nearest].cylinder.radius;
+    for (int i = nearest + 1; i < back->count; i++)
+        past += vec3_distance(back->node[i].cylinder.center, back->node[i - 1].cylinder.center);
+    double gap = vec3_distance(back->node[nearest].cylinder.center, contact);
+    bool goes_past = past > 4 * radius && past > 4 * t->voxel && gap < radius + t->tree.node[limb->contact].cylinder.radius + 3 * t->voxel;
+    // a vessel that ends in the side of another one forks there, a vessel that passes by does not
+    int ahead = limb->contact;
+    double left = 0;
+    while (ahead + 1 < t->tree.count && t->tree.node[ahead + 1].branch == t->tree.node[limb->contact].branch && left < 3 * radius) {
+        ahead++;
+        left += vec3_distance(t->tree.node[ahead].cylinder.center, t->tree.node[ahead - 1].cylinder.center);
+    }
+    bool is_end = left < fmax(2 * t->tree.node[limb->contact].cylinder.radius, 2 * t->voxel);
+    if (goes_past && neck_of(t, limb, &back->node[nearest]) < (is_end ? 0.4 : 0.8))
+        return false;
+    track_cut(back, nearest + 1);
+    return true;
 }
 
 static void track_limb(void *context, long index)
@@ -95,12 +149,19 @@ static void track_limb(void *context, long index)
     t->random = random_from_seed((uint64_t)t->parameters->seed, limb->key);
     t->is_guarded = true;
     Cylinder seed;
-    if (seed_on_limb(t, limb, round->share, &seed)) {
+    found->why = "no cylinder along the limb";
+    if (rbt_is_sac(t, round->paint, limb)) {
+        found->is_sac = true;
+        found->radius = t->estimate.node.cylinder.radius;
+        found->why = "aneurysm";
+        found->good = track_append(&found->out, &t->estimate.node, t->estimate.point);
+    } else if (seed_on_limb(t, limb, round->share, &seed)) {
+        found->why = "does not lead back to its parent";
         Cylinder behind = seed;
         behind.axis = vec3_negate(behind.axis);
-        t->longest = 3 * limb->depth + 6 * seed.radius;
+        t->longest = limb->depth + 8 * fmax(seed.radius, t->voxel);
         tracker_run(t, &behind, &found->back, true);
-        if (found->back.count > 0 && meets_parent(t, limb, &found->back.node[found->back.count - 1].cylinder)) {
+        if (found->back.count > 0 && meets_parent(t, limb, &found->back)) {
             t->longest = HUGE_VAL;
             tracker_run(t, &seed, &found->out, false);
             found->why = t->why;
@@ -179,7 +240,9 @@ static bool adopt(Tracker *t, RbtPaint *paint, const RbtLimb *limb, const Found 
                 copy.parent = i > first ? t->tree.count - 1 : parent;
                 good = track_append(&t->tree, &copy, point[i]);
             }
-            good = good && rbt_ends_add(ends, last < total - 1 ? "runs into another branch" : found->why);
+            bool is_joined = false;
+            good = good && rbt_mend_links(t, paint, before, &is_joined);
+            good = good && (!is_joined || rbt_ends_add(ends, last < total - 1 ? "runs into another branch" : found->why));
             if (good)
                 rbt_paint_nodes(paint, &t->tree, before, t->tree.count);
         }
@@ -187,6 +250,22 @@ static bool adopt(Tracker *t, RbtPaint *paint, const RbtLimb *limb, const Found 
     free(node);
     free(point);
     return good || total == 0;
+}
+
+// A sac hangs on the node beside it; one sac may be met by several limbs. False: out of memory.
+static bool adopt_sac(Tracker *t, RbtPaint *paint, const RbtLimb *limb, const Found *found, RbtEnds *ends)
+{
+    TrackNode node = found->out.node[0];
+    int before = t->tree.count;
+    bool is_joined;
+    if (is_painted(paint, node.cylinder.center))
+        return true;
+    node.branch = ends->count;
+    node.parent = limb->contact;
+    if (!track_append(&t->tree, &node, found->out.point) || !rbt_mend_links(t, paint, before, &is_joined) || (is_joined && !rbt_ends_add(ends, found->why)))
+        return false;
+    rbt_paint_nodes(paint, &t->tree, before, t->tree.count);
+    return true;
 }
 
 // One round over branches whose nodes are first … end-1. False: out of memory.
@@ -206,7 +285,7 @@ static bool grow_round(Tracker *t, RbtPaint *paint, int first, int end, double s
         qsort(order, (size_t)count, sizeof(*order), compare_found);
         for (int i = 0; good && i < count; i++)
             if (order[i]->good)
-                good = adopt(t, paint, &limb[order[i]->limb], order[i], ends);
+                good = (order[i]->is_sac ? adopt_sac : adopt)(t, paint, &limb[order[i]->limb], order[i], ends);
     }
     for (int i = 0; found && i < count; i++) {
         track_free(&found[i].out);
@@ -243,10 +322,26 @@ static double noise_of(const Tracker *t)
     return 1.4826 * value[n / 2];
 }
 
+// Medians of brightness and contrast over the first branch say what is bright at all.
+static double floor_of(const Tracker *t)
+{
+    enum { MOST = 512 };
+    double inside[MOST], contrast[MOST];
+    int n = 0, stride = t->tree.count / MOST + 1;
+    for (int i = 0; i < t->tree.count && t->tree.node[i].branch == 0 && n < MOST; i += stride) {
+        inside[n] = tracker_brightness(t, t->tree.node[i].cylinder.center);
+        contrast[n++] = t->tree.node[i].contrast;
+    }
+    qsort(inside, (size_t)n, sizeof *inside, compare_doubles);
+    qsort(contrast, (size_t)n, sizeof *contrast, compare_doubles);
+    return inside[n / 2] - (1 - t->parameters->residue) * contrast[n / 2];
+}
+
 bool rbt_grow_branches(Tracker *t, RbtPaint *paint, int first, int threads, const Progress *progress, RbtEnds *ends)
 {
     const double share[] = {0.5, 0.5 * (0.5 + t->parameters->residue), t->parameters->residue};
     double noise = 4 * noise_of(t);
+    t->floor = floor_of(t);
     rbt_paint_nodes(paint, &t->tree, first, t->tree.count);
     bool good = true;
     for (int pass = 0; good && pass < 3; pass++)

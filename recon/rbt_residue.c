@@ -3,6 +3,7 @@
 // so on; short ones are ragged edges.
 #include "recon/rbt_residue.h"
 #include "recon/bspline.h"
+#include "recon/way_heap.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -111,19 +112,13 @@ typedef struct Wet {         // a voxel of the residue
     int node;                // that the way started from
 } Wet;
 
-typedef struct HeapEntry {
-    float way;
-    int wet;
-} HeapEntry;
-
 typedef struct Flood {
     const Volume *volume;
     Wet *wet;
     int count, capacity;
     int *slot;               // (slots, a power of two) index + 1 of a wet voxel by its place
     int slots;
-    HeapEntry *heap;
-    int heap_count, heap_capacity;
+    WayHeap heap;
     bool out_of_memory;
 } Flood;
 
@@ -178,40 +173,7 @@ static int add_wet(Flood *f, const int at[3], float way, int from, int node)
     return f->count++;
 }
 
-static bool heap_before(HeapEntry a, HeapEntry b) { return a.way < b.way || (a.way == b.way && a.wet < b.wet); }
-
-static void heap_push(Flood *f, HeapEntry entry)
-{
-    if (f->heap_count == f->heap_capacity) {
-        int capacity = f->heap_capacity ? 2 * f->heap_capacity : 1024;
-        HeapEntry *grown = realloc(f->heap, (size_t)capacity * sizeof *grown);
-        if (!grown) {
-            f->out_of_memory = true;
-            return;
-        }
-        f->heap = grown;
-        f->heap_capacity = capacity;
-    }
-    int i = f->heap_count++;
-    for (; i > 0 && heap_before(entry, f->heap[(i - 1) / 2]); i = (i - 1) / 2)
-        f->heap[i] = f->heap[(i - 1) / 2];
-    f->heap[i] = entry;
-}
-
-static HeapEntry heap_pop(Flood *f)
-{
-    HeapEntry top = f->heap[0], last = f->heap[--f->heap_count];
-    int i = 0;
-    for (int child; (child = 2 * i + 1) < f->heap_count; i = child) {
-        if (child + 1 < f->heap_count && heap_before(f->heap[child + 1], f->heap[child]))
-            child++;
-        if (!heap_before(f->heap[child], last))
-            break;
-        f->heap[i] = f->heap[child];
-    }
-    f->heap[i] = last;
-    return top;
-}
+static void put_in_heap(Flood *f, float way, int wet) { f->out_of_memory = !way_heap_push(&f->heap, (WayEntry){way, wet}) || f->out_of_memory; }
 
 static bool neighbour_of(const Volume *v, const int at[3], int n, int next[3])
 {
@@ -245,9 +207,9 @@ static void flood(Flood *f, const Tracker *t, const RbtPaint *paint, int first, 
         step = vec3_add_scaled(vec3_add_scaled(step, n / 3 % 3 - 1, t->volume->axis[1]), n / 9 - 1, t->volume->axis[2]);
         length[n] = (float)vec3_norm(step);
     }
-    while (f->heap_count > 0 && !f->out_of_memory) {
-        HeapEntry here = heap_pop(f);
-        Wet wet = f->wet[here.wet];
+    while (f->heap.count > 0 && !f->out_of_memory) {
+        WayEntry here = way_heap_pop(&f->heap);
+        Wet wet = f->wet[here.place];
         const Border *b = &border[wet.node - first];
         if (here.way > wet.way)
             continue;
@@ -260,13 +222,13 @@ static void flood(Flood *f, const Tracker *t, const RbtPaint *paint, int first, 
             if (known >= 0 ? way >= f->wet[known].way : !is_residue(t, paint, next, b))
                 continue;
             if (known < 0)
-                known = add_wet(f, next, way, here.wet, wet.node);
+                known = add_wet(f, next, way, here.place, wet.node);
             if (known < 0)
                 return;
             f->wet[known].way = way;
-            f->wet[known].from = here.wet;
+            f->wet[known].from = here.place;
             f->wet[known].node = wet.node;
-            heap_push(f, (HeapEntry){way, known});
+            put_in_heap(f, way, known);
         }
     }
 }
@@ -284,7 +246,7 @@ static Piece *cut_into_pieces(Flood *f, double thickness, int *piece_count)
 {
     int count = 0, capacity = 256;
     Piece *piece = malloc((size_t)capacity * sizeof *piece);
-    int *stack = malloc(((size_t)f->count + 1) * sizeof *stack), *head = NULL;
+    int *stack = malloc(((size_t)f->count + 1) * sizeof *stack);
     for (int i = 0; piece && stack && i < f->count; i++) {
         if (f->wet[i].piece >= 0)
             continue;
@@ -323,7 +285,6 @@ static Piece *cut_into_pieces(Flood *f, double thickness, int *piece_count)
         count++;
     }
     free(stack);
-    free(head);
     for (int i = 0; piece && i < count; i++) {
         int wet = piece[i].parent;   // so far one of its voxels
         while (wet >= 0 && f->wet[wet].piece == i)
@@ -472,7 +433,7 @@ RbtLimb *rbt_find_limbs(const Tracker *t, const RbtPaint *paint, int first, int 
                         continue;
                     int wet = add_wet(&f, at, 0, -1, i);
                     if (wet >= 0)
-                        heap_push(&f, (HeapEntry){0, wet});
+                        put_in_heap(&f, 0, wet);
                 }
     }
     flood(&f, t, paint, first, border);
@@ -484,6 +445,6 @@ RbtLimb *rbt_find_limbs(const Tracker *t, const RbtPaint *paint, int first, int 
     free(border);
     free(f.wet);
     free(f.slot);
-    free(f.heap);
+    free(f.heap.entry);
     return limb;
 }

@@ -13,6 +13,7 @@
 #include "recon/ransac_cylinder.h"
 #include "recon/rbt_branches.h"
 #include "recon/rbt_exits.h"
+#include "recon/rbt_links.h"
 #include "recon/rbt_residue.h"
 #include "recon/rbt_tracker.h"
 
@@ -285,6 +286,9 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     t->why = "the contrast is lost";
     double contrast = recent_contrast(branch);
     if (next->contrast < p->contrast * contrast || !(next->contrast > 0.02 * ((double)t->volume->maximum - (double)t->volume->minimum)))
+        return false;
+    t->why = "too faint";
+    if (t->is_guarded && tracker_brightness(t, next->cylinder.center) < t->floor)
         return false;
     t->why = "leaks into a wider or brighter neighbour";
     if (t->is_guarded && branch->count >= 3 && (next->cylinder.radius > 1.8 * usual_radius(branch) || next->contrast > 1.8 * contrast))
@@ -1092,7 +1096,8 @@ static bool track_all(Tracker *t, const Job *job, RbtReport *report)
         if (good && i == 0 && automatic) {
             paint = rbt_paint_create(t->volume);
             t->paint = paint;
-            if (!paint || !rbt_grow_branches(t, paint, 0, job->threads, job->progress, &ends))
+            bool is_joined;
+            if (!paint || !rbt_mend_links(t, NULL, 0, &is_joined) || !rbt_grow_branches(t, paint, 0, job->threads, job->progress, &ends))
                 good = out_of_memory_at(job, ends.count);
         }
         if (good && job->progress && job->progress->call && !automatic)
