@@ -7,7 +7,7 @@
 
 #include <cJSON.h>
 
-VerbFunction bench_step, bench_peer;
+VerbFunction bench_step, bench_peer, bench_track;
 
 typedef struct Spread {
     double median, p99, p999, max;
