@@ -8,6 +8,8 @@
 
 #include "geom/linear.h"
 
+#include <stddef.h>
+
 enum { LIM_LANES = 16 };
 
 typedef struct LimPoints {
@@ -18,6 +20,7 @@ typedef struct LimPoints {
     float *weight;           // (padded) of the residual's square in E_d
     float *bend;             // (padded) of kappa^2 in E_a
     float *low, *high;       // (padded) where the field is welcome
+    float *given[3];         // (padded) the data where they were measured, for lim_points_approach
     float *memory;           // all of the above
 } LimPoints;
 
@@ -44,14 +47,21 @@ void lim_points_sum(LimPoints *points, const LimBlob *blobs, int count, double i
 // Signed Taubin distance at each point from the sums as they are (all blobs added).
 void lim_points_taubin(const LimPoints *points, float *distance);
 
+// One step of every point (x, y, z) towards the foot of `given` on f = 0: down the gradient by f / |g|, no further than `longest`, then `slide`
+// times the way to `given` in the tangent plane. The sums are then to be made again.
+void lim_points_approach(LimPoints *points, double longest, double slide);
+
 // With `blob` on top of the sums.
 LimEnergy lim_energy(const LimPoints *points, const LimBlob *blob);
 // E_d and E_a of the sums as they are.
 void lim_energy_total(const LimPoints *points, double *distance, double *bend);
-// Jacobian of the weighted residuals by one blob's centre and width: four columns of `padded` entries each; the sums hold all blobs.
-void lim_energy_columns(const LimPoints *points, const LimBlob *blob, float *column);
-// The weighted residuals themselves.
-void lim_energy_residuals(const LimPoints *points, float *residual);
+// Jacobian by one blob's centre and width of the weighted residuals, then (beta > 0) of sqrt(beta b_i) kappa_i: four columns of `padded` entries
+// each, or of twice as many; the sums hold all blobs.
+void lim_energy_columns(const LimPoints *points, const LimBlob *blob, double beta, float *column);
+// The weighted residuals themselves, then (beta > 0) sqrt(beta b_i) kappa_i.
+void lim_energy_residuals(const LimPoints *points, double beta, float *residual);
+// Dot products of `one` with four columns that stand `stride` apart, all of `length` entries, a multiple of LIM_LANES.
+void lim_energy_four_dots(const float *one, const float *four, size_t stride, int length, double *dot);
 // Dot product of two columns of `padded` entries.
 double lim_energy_dot(const float *a, const float *b, int padded);
 

@@ -141,14 +141,20 @@ static bool extend_inlet(const VesselTree *tree, Gather *gather, Vec3 center)
         least = i == first || t < least ? t : least;
         most = i == first || t > most ? t : most;
     }
-    double extent = most - least;
+    double extent = most - least, slab = fmin(extent, 0.4 * radius);
+    int in_slab = 0;
+    for (int64_t i = first; i < last; i++)
+        in_slab += vec3_dot(vec3_sub(tree->point[i], root), upstream) >= most - slab;
+    if (in_slab < 12)
+        slab = extent;
     if (last - first < 12 || extent < 0.2 * radius || !vessel_tree_root_is_open(tree))
         return true;
     gather->is_extended = true;
-    for (int copy = 1; copy < 12 && most + (copy - 1) * extent < 2.2 * radius; copy++)
+    for (int copy = 1; copy < 12 && most + (copy - 1) * slab < 2.2 * radius; copy++)
         for (int64_t i = first; i < last; i++) {
-            Vec3 p = vec3_add_scaled(tree->point[i], copy * extent, upstream);
-            if (vec3_dot(vec3_sub(p, root), upstream) < 2.2 * radius && vec3_distance(p, center) < gather->reach && !add_point(gather, p))
+            Vec3 p = vec3_add_scaled(tree->point[i], copy * slab, upstream);
+            // a bent vessel's further points would bring its sag along, 0.1 mm on an arc of radius 4
+            if (vec3_dot(vec3_sub(tree->point[i], root), upstream) >= most - slab && vec3_dot(vec3_sub(p, root), upstream) < 2.2 * radius && vec3_distance(p, center) < gather->reach && !add_point(gather, p))
                 return false;
         }
     return true;

@@ -15,7 +15,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SWEEP_BLOBS = 16, SWEEP_SIZE = 4 * SWEEP_BLOBS, LINE_EVALUATIONS = 8 };
+enum { NOISE_PAIRS = 192, ROUNDS = 4, SWEEP_BLOBS = 16, SWEEP_SIZE = 4 * SWEEP_BLOBS, LINE_EVALUATIONS = 8 };
+
+// E_a's weight is this many times the variance of the noise times r^2 [mm^4]: exact points are not smoothed, noisy ones are. The noise
+// is what neighbours' distances differ by; the distances themselves hold the misfit too, which smoothing would keep alive.
+static const double BEND_OF_NOISE = 1;
+
+// A model within t_g is done when its mean square distance exceeds the noise's by no more than the square of this share of t_g.
+static const double MISFIT = 0.125;
 
 typedef struct Model {
     LimBlob *blob;           // (capacity)
@@ -28,17 +35,20 @@ typedef struct Fit {
     LimPoints points;        // data first, then guards
     Model model, best;
     int capacity;
-    double beta, target;     // beta for this radius; t_g [mm]
+    bool uses_feet;          // E_d and E_a at the feet of the data on the surface, not at the data
+    double beta, target;     // of E_a at the moment; t_g [mm]
+    int pair_count, pair[NOISE_PAIRS][2];   // of neighbouring data: what their distances differ by is noise, not misfit
+    double noise2;           // variance of the noise, from these pairs [mm^2]
     double mean_slope;       // mean |grad f| at the data
     double alpha;            // weight of E_c at the moment
     double reach;            // no blob's centre goes further from the node [mm]
-    float *distance;         // (padded) Taubin's
-    float *column;           // (SWEEP_SIZE, padded) of the Gauss-Newton pass
-    float *residual;         // (padded)
+    float *distance;         // (padded) of the data
+    float *boost;            // (padded) factor on the weight of a point that t_g asks for
+    float *offset;           // (padded) signed distance of a point from its foot, > 0 inside
+    float *column;           // (SWEEP_SIZE, 2 padded) of the Gauss-Newton pass
+    float *residual;         // (2 padded)
     double *normal;          // (SWEEP_SIZE, SWEEP_SIZE)
     double *factor;
-    Vec3 *center;            // (capacity) the model for the exact projection
-    double *width;
 } Fit;
 
 static double fit_target(const LimFitOptions *options, double radius)
@@ -55,19 +65,20 @@ static bool fit_create(Fit *fit, const LimFitTask *task, const LimFitOptions *op
     fit->capacity = options->max_blobs + 1;
     // E_a is about 1 / (4 r^2): below 1 mm its pull is kept in proportion to the vessel
     fit->beta = options->beta * (options->weigh_distance ? fmin(1, pow(task->radius, 4)) : 1);
+    fit->uses_feet = options->weigh_distance && options->project_points;
     if (!lim_points_create(&fit->points, task->point_count + guards))
         return false;
     size_t n = (size_t)fit->points.padded, c = (size_t)fit->capacity;
     fit->model.blob = calloc(c, sizeof(LimBlob));
     fit->best.blob = calloc(c, sizeof(LimBlob));
     fit->distance = calloc(n + 1, sizeof(float));
-    fit->column = calloc(n * SWEEP_SIZE, sizeof(float));
-    fit->residual = calloc(n + 1, sizeof(float));
+    fit->boost = calloc(n + 1, sizeof(float));
+    fit->offset = calloc(n + 1, sizeof(float));
+    fit->column = aligned_alloc(64, 2 * n * SWEEP_SIZE * sizeof(float));
+    fit->residual = aligned_alloc(64, 2 * n * sizeof(float));
     fit->normal = calloc(2 * (size_t)SWEEP_SIZE * SWEEP_SIZE, sizeof(double));
     fit->factor = fit->normal ? fit->normal + (size_t)SWEEP_SIZE * SWEEP_SIZE : NULL;
-    fit->center = calloc(c, sizeof(Vec3));
-    fit->width = calloc(c, sizeof(double));
-    return fit->model.blob && fit->best.blob && fit->distance && fit->column && fit->residual && fit->normal && fit->center && fit->width;
+    return fit->model.blob && fit->best.blob && fit->distance && fit->boost && fit->offset && fit->column && fit->residual && fit->normal;
 }
 
 static void fit_free(Fit *fit)
@@ -76,11 +87,33 @@ static void fit_free(Fit *fit)
     free(fit->model.blob);
     free(fit->best.blob);
     free(fit->distance);
+    free(fit->boost);
+    free(fit->offset);
     free(fit->column);
     free(fit->residual);
     free(fit->normal);
-    free(fit->center);
-    free(fit->width);
+}
+
+// Some data with their nearest neighbours.
+static void find_pairs(Fit *fit)
+{
+    const float *restrict x = fit->points.given[0], *restrict y = fit->points.given[1], *restrict z = fit->points.given[2];
+    int data = fit->task->point_count;
+    for (int k = 0; k < NOISE_PAIRS && k < data; k++) {
+        int i = (int)((int64_t)k * data / (data < NOISE_PAIRS ? data : NOISE_PAIRS)), nearest = -1;
+        float *restrict d2 = fit->residual, least = 1e30f;
+        for (int j = 0; j < data; j++) {
+            float dx = x[j] - x[i], dy = y[j] - y[i], dz = z[j] - z[i];
+            d2[j] = dx * dx + dy * dy + dz * dz;
+        }
+        for (int j = 0; j < data; j++)
+            if (d2[j] < least && j != i)
+                least = d2[j], nearest = j;
+        if (nearest >= 0) {
+            fit->pair[fit->pair_count][0] = i;
+            fit->pair[fit->pair_count++][1] = nearest;
+        }
+    }
 }
 
 static void fit_set_points(Fit *fit)
@@ -96,9 +129,15 @@ static void fit_set_points(Fit *fit)
         points->x[i] = (float)p.x;
         points->y[i] = (float)p.y;
         points->z[i] = (float)p.z;
+        points->given[0][i] = points->x[i];
+        points->given[1][i] = points->y[i];
+        points->given[2][i] = points->z[i];
+        fit->boost[i] = 1;
         points->weight[i] = i < data ? 1.0f / (float)data : 0;
         points->bend[i] = points->weight[i];
     }
+    if (fit->uses_feet)
+        find_pairs(fit);
 }
 
 static void fit_refresh_sums(Fit *fit)
@@ -106,30 +145,93 @@ static void fit_refresh_sums(Fit *fit)
     lim_points_sum(&fit->points, fit->model.blob, fit->model.count, fit->options->iso_level);
 }
 
-// Weights of E_d and bounds of the guards from the field as it is (sums hold all blobs).
+// The slope between the data and the surface, |g| - d/2 f_nn with d = f / |g|, squared: the slope at the point itself is smaller outside, where it
+// would weigh noise more than inside; that made vessels 0.03 mm too wide at 0.1 mm of noise.
+static double between_slope2(const LimPoints *points, int i)
+{
+    double gx = (double)points->g[0][i], gy = (double)points->g[1][i], gz = (double)points->g[2][i], g2 = gx * gx + gy * gy + gz * gz + 1e-12;
+    double bend = (double)points->h[0][i] * gx * gx + (double)points->h[3][i] * gy * gy + (double)points->h[5][i] * gz * gz +
+                  2 * ((double)points->h[1][i] * gx * gy + (double)points->h[2][i] * gx * gz + (double)points->h[4][i] * gy * gz);
+    double slope = sqrt(g2), between = slope - 0.5 * (double)points->f[i] / slope * bend / g2;
+    slope = fmin(fmax(between, 0.4 * slope), 2.5 * slope);
+    return slope * slope;
+}
+
+// Moves the data to their feet on the surface as it is, and bounds each so that its residual is its distance times the slope there: then least
+// squares are those of true distances, and noise along the normal leaves no bias. A point whose foot is not found stays where it was measured.
+static void find_feet(Fit *fit)
+{
+    enum { STEPS = 3 };
+    LimPoints *points = &fit->points;
+    int data = fit->task->point_count;
+    double radius = fit->task->radius;
+    bool any_lost = false;
+    float *const at[3] = {points->x, points->y, points->z};
+    for (int k = 0; k < 3; k++)
+        memcpy(at[k], points->given[k], (size_t)points->padded * sizeof(float));
+    for (int step = 0; step < STEPS; step++) {
+        fit_refresh_sums(fit);
+        lim_points_approach(points, 0.4 * radius, step < STEPS - 1 ? 0.7 : 0);
+        for (int k = 0; k < 3; k++)   // guards stay
+            memcpy(at[k] + data, points->given[k] + data, (size_t)(points->padded - data) * sizeof(float));
+    }
+    fit_refresh_sums(fit);
+    for (int i = 0; i < data; i++) {
+        double gx = (double)points->g[0][i], gy = (double)points->g[1][i], gz = (double)points->g[2][i];
+        double wx = (double)(points->given[0][i] - points->x[i]), wy = (double)(points->given[1][i] - points->y[i]),
+               wz = (double)(points->given[2][i] - points->z[i]), slope = sqrt(gx * gx + gy * gy + gz * gz + 1e-16);
+        double along = (wx * gx + wy * gy + wz * gz) / slope, side2 = wx * wx + wy * wy + wz * wz - along * along;
+        bool found = fabs(along) < 0.6 * radius && side2 < pow(0.02 * radius + 0.3 * fabs(along), 2) && fabs((double)points->f[i]) < 0.05 * radius * slope;
+        fit->offset[i] = found ? (float)along : 0;
+        points->low[i] = points->high[i] = found ? (float)(-along * slope) : 0;
+        fit->residual[i] = found ? (float)(slope * slope) : -1;
+        if (!found) {
+            points->x[i] = points->given[0][i];
+            points->y[i] = points->given[1][i];
+            points->z[i] = points->given[2][i];
+            any_lost = true;
+        }
+    }
+    if (any_lost)
+        fit_refresh_sums(fit);
+}
+
+// Distance of data point i: from its foot, which lies near the surface, or Taubin's. Signed, > 0 inside.
+static double data_distance(const Fit *fit, int i)
+{
+    const LimPoints *points = &fit->points;
+    double gx = (double)points->g[0][i], gy = (double)points->g[1][i], gz = (double)points->g[2][i];
+    return (double)fit->offset[i] + (double)points->f[i] / sqrt(gx * gx + gy * gy + gz * gz + 1e-8);
+}
+
+// Feet of the data, weights of E_d and E_a, bounds of the guards from the model as it is. The sums hold all blobs, before and after.
 static void fit_refresh_weights(Fit *fit)
 {
     LimPoints *points = &fit->points;
     int data = fit->task->point_count;
-    double mean2 = 0, mean = 0;
+    double mean2 = 0, mean = 0, square = 0;
+    if (fit->uses_feet)
+        find_feet(fit);
     for (int i = 0; i < data; i++) {
-        // The slope between the point and the surface, |g| - d/2 f_nn with d = f / |g|: the slope at the point itself is smaller outside, where
-        // it would weigh noise more than inside; that made vessels 0.03 mm too wide at 0.1 mm of noise.
-        double gx = (double)points->g[0][i], gy = (double)points->g[1][i], gz = (double)points->g[2][i], g2 = gx * gx + gy * gy + gz * gz + 1e-12;
-        double bend = (double)points->h[0][i] * gx * gx + (double)points->h[3][i] * gy * gy + (double)points->h[5][i] * gz * gz +
-                      2 * ((double)points->h[1][i] * gx * gy + (double)points->h[2][i] * gx * gz + (double)points->h[4][i] * gy * gz);
-        double slope = sqrt(g2), between = slope - 0.5 * (double)points->f[i] / slope * bend / g2;
-        slope = fmin(fmax(between, 0.4 * slope), 2.5 * slope);
-        fit->residual[i] = (float)(slope * slope);
-        mean2 += slope * slope / data;
-        mean += slope / data;
+        double slope2 = fit->uses_feet && fit->residual[i] >= 0 ? (double)fit->residual[i] : between_slope2(points, i);
+        fit->residual[i] = (float)slope2;
+        mean2 += slope2 / data;
+        mean += sqrt(slope2) / data;
     }
     fit->mean_slope = mean;
     if (fit->options->weigh_distance)
         for (int i = 0; i < data; i++) {
             double ratio = mean2 / fmax((double)fit->residual[i], 1e-3 * mean2 + 1e-30);
-            points->weight[i] = (float)(fmin(fmax(ratio, 0.2), 5) / data);
+            points->weight[i] = (float)(fmin(fmax(ratio, 0.2), 5) * (double)fit->boost[i] / data);
         }
+    if (fit->uses_feet) {
+        for (int k = 0; k < fit->pair_count; k++) {
+            double differ = data_distance(fit, fit->pair[k][0]) - data_distance(fit, fit->pair[k][1]);
+            square += fmin(0.5 * differ * differ, fit->target * fit->target / 4) / fit->pair_count;
+        }
+        fit->noise2 = square;
+        fit->beta = BEND_OF_NOISE * (fit->options->beta / 1e-4) * square * fit->task->radius * fit->task->radius * mean2;
+    }
     double iso_level = fit->options->iso_level;
     for (int i = data; i < points->count; i++) {
         double clearance = fit->task->clearance[i - data];
@@ -312,34 +414,27 @@ static double total_energy(Fit *fit)
     return isfinite(energy) ? energy : HUGE_VAL;
 }
 
-// (J'J + ...) and the downhill side of the blobs `which`. E_d by Gauss-Newton; E_c and E_a by their slopes and a stiffness that lets
-// them alone move a blob no further than a third of its width.
+// (J'J + ...) and the downhill side of the blobs `which`: E_d and E_a by Gauss-Newton; E_c by its slope and a stiffness that lets it alone move a
+// blob no further than a third of its width.
 static void build_normal(Fit *fit, const int *which, int count, double *side)
 {
-    int padded = fit->points.padded, size = 4 * count;
-    lim_energy_residuals(&fit->points, fit->residual);
+    int length = fit->points.padded * (fit->beta > 0 ? 2 : 1), size = 4 * count;
+    lim_energy_residuals(&fit->points, fit->beta, fit->residual);
     for (int m = 0; m < count; m++)
-        lim_energy_columns(&fit->points, &fit->model.blob[which[m]], fit->column + (size_t)(4 * m) * (size_t)padded);
+        lim_energy_columns(&fit->points, &fit->model.blob[which[m]], fit->beta, fit->column + (size_t)(4 * m) * (size_t)length);
     for (int a = 0; a < size; a++) {
-        const float *column = fit->column + (size_t)a * (size_t)padded;
-        for (int b = 0; b <= a; b++)
-            fit->normal[a * SWEEP_SIZE + b] = lim_energy_dot(column, fit->column + (size_t)b * (size_t)padded, padded);
-        side[a] = -lim_energy_dot(column, fit->residual, padded);
+        const float *column = fit->column + (size_t)a * (size_t)length;
+        for (int b = 0; b <= a; b += 4)
+            lim_energy_four_dots(column, fit->column + (size_t)b * (size_t)length, (size_t)length, length, &fit->normal[a * SWEEP_SIZE + b]);
+        side[a] = -lim_energy_dot(column, fit->residual, length);
     }
-    for (int m = 0; m < count; m++) {
-        LimBlob *blob = &fit->model.blob[which[m]];
+    for (int m = 0; m < count && fit->alpha > 0; m++) {
         double cohesion[4];
-        LimEnergy part = {0};
         lim_cohesion(fit->model.blob, fit->model.count, which[m], fit->options->s, cohesion);
-        if (fit->beta > 0) {
-            lim_points_add(&fit->points, blob, -1);
-            part = lim_energy(&fit->points, blob);
-            lim_points_add(&fit->points, blob, 1);
-        }
         for (int k = 0; k < 4; k++) {
-            double slope = 0.5 * (fit->beta * part.bend_slope[k] + fit->alpha * cohesion[k]);
+            double slope = 0.5 * fit->alpha * cohesion[k];
             side[4 * m + k] -= slope;
-            fit->normal[(4 * m + k) * SWEEP_SIZE + 4 * m + k] += fabs(slope) / (0.33 * blob->width);
+            fit->normal[(4 * m + k) * SWEEP_SIZE + 4 * m + k] += fabs(slope) / (0.33 * fit->model.blob[which[m]].width);
         }
     }
 }
@@ -416,7 +511,7 @@ static void sweep(Fit *fit, const int *which, int count, int iterations)
         }
         if (!improved)
             fit_refresh_sums(fit);
-        if (!improved || fabs(gain) < 2e-3)
+        if (!improved || fabs(gain) < 1e-3)
             break;
     }
 }
@@ -447,52 +542,30 @@ static int near_blobs(const Fit *fit, int j, int *which)
 
 // --- Selection and subdivision ---
 
-static double exact_distance(Fit *fit, int i)
-{
-    for (int j = 0; j < fit->model.count; j++) {
-        const LimBlob *blob = &fit->model.blob[j];
-        fit->center[j] = vec3(blob->center[0], blob->center[1], blob->center[2]);
-        fit->width[j] = blob->width;
-    }
-    Blobby model = {fit->model.count, fit->center, fit->width, fit->options->iso_level};
-    Vec3 x = vec3_sub(fit->task->point[i], fit->task->center);
-    SurfacePoint foot = blobby_project(&model, x, x);
-    return foot.converged ? fabs(foot.distance) : fabs((double)fit->distance[i]);
-}
-
-// The worst point (eq. 8) and its distance. Taubin's one step overestimates by up to 2.3 times outside, so a point beyond the target is
-// measured by projection, once they are few.
+// The worst point (eq. 8) and its distance. Taubin's one step overestimates by up to 2.3 times outside; measured from the foot it is exact.
 static int worst_point(Fit *fit, double *worst_distance, double *mean_square)
 {
-    int data = fit->task->point_count, worst = 0, beyond = 0;
+    int data = fit->task->point_count, worst = 0;
     double sum = 0;
-    lim_points_taubin(&fit->points, fit->distance);
+    if (!fit->uses_feet)
+        lim_points_taubin(&fit->points, fit->distance);
     for (int i = 0; i < data; i++) {
-        double d = fabs((double)fit->distance[i]);
+        double d = fabs(fit->uses_feet ? data_distance(fit, i) : (double)fit->distance[i]);
         d = isfinite(d) ? d : 1e30;
         fit->distance[i] = (float)d;
         sum += fmin(d, fit->task->radius) * fmin(d, fit->task->radius);
-        beyond += d > fit->target;
         if (d > (double)fit->distance[worst])
             worst = i;
     }
     *mean_square = sum / data;
     *worst_distance = (double)fit->distance[worst];
-    if (!fit->options->project_points || beyond == 0 || beyond > 8 + data / 20)
-        return worst;
-    double most = -1;
-    for (int i = 0; i < data; i++) {
-        double d = (double)fit->distance[i];
-        if (d > fit->target)
-            d = exact_distance(fit, i);
-        if (d > most)
-            most = d, worst = i;
-    }
-    *worst_distance = most;
     return worst;
 }
 
-static Vec3 point_of(const Fit *fit, int i) { return vec3((double)fit->points.x[i], (double)fit->points.y[i], (double)fit->points.z[i]); }
+static Vec3 point_of(const Fit *fit, int i)
+{
+    return vec3((double)fit->points.given[0][i], (double)fit->points.given[1][i], (double)fit->points.given[2][i]);
+}
 
 // Eq. (9): the blob whose own surface is nearest to the point by Taubin's distance.
 static int select_blob(const Fit *fit, Vec3 p)
@@ -568,7 +641,7 @@ static void reach_out(Fit *fit, int j, Vec3 p, double lack)
 static void add_blob(Fit *fit, int worst, double worst_distance)
 {
     Vec3 p = point_of(fit, worst);
-    double lack = -(double)fit->points.f[worst];
+    double lack = (double)(fit->points.low[worst] - fit->points.f[worst]);
     int j = select_blob(fit, p), count = fit->model.count;
     LimBlob before = fit->model.blob[j], split_old, split_new;
     split_blob(fit, j, p);
@@ -626,7 +699,18 @@ static void optimise_all(Fit *fit, int newest, int iterations)
     if (!fit->options->sweep_all_blobs)
         return;
     fit_refresh_sums(fit);
-    sweep(fit, which, near_blobs(fit, newest, which), iterations);
+    double before = HUGE_VAL;
+    for (int round = 0; round < ROUNDS; round++) {   // the feet move with the surface
+        sweep(fit, which, near_blobs(fit, newest, which), iterations);
+        if (!fit->uses_feet)
+            break;
+        fit_refresh_weights(fit);
+        double worst, square;
+        worst_point(fit, &worst, &square);
+        if (square > 0.99 * before)
+            break;
+        before = square;
+    }
 }
 
 // Blobs that shrank to nothing: adding less than a thousandth of T at any point. (None goes astray: see `reach`.)
@@ -669,8 +753,12 @@ static double attempt_fit(Fit *fit, bool retry, double *worst_of_best)
         fit_refresh_sums(fit);
         fit_refresh_weights(fit);
         int worst = worst_point(fit, &worst_distance, &mean_square);
-        bool reached = worst_distance <= fit->target;
-        if (reached || mean_square < 0.96 * best_square || (worst_distance < 0.93 * best_worst && worst_distance > 4.5 * sqrt(mean_square)) || options->give_up_splits == 0) {
+        // a loose target is met by models that still miss the wall by more than the noise
+        bool within = worst_distance <= fit->target, reached = within;
+        if (fit->uses_feet && options->give_up_splits > 0)
+            reached = within && mean_square <= fit->noise2 + pow(MISFIT * fit->target, 2);
+        bool better = mean_square < 0.96 * best_square || (worst_distance < 0.93 * best_worst && worst_distance > 4.5 * sqrt(mean_square));
+        if ((within && (better || best_worst > fit->target)) || (better && best_worst > fit->target) || options->give_up_splits == 0) {
             best_square = fmin(best_square, mean_square);
             best_worst = fmin(best_worst, worst_distance);
             *worst_of_best = worst_distance;
@@ -683,7 +771,7 @@ static double attempt_fit(Fit *fit, bool retry, double *worst_of_best)
         if (reached || fit->model.count >= options->max_blobs || (options->give_up_splits > 0 && idle >= options->give_up_splits))
             break;
         add_blob(fit, worst, worst_distance);
-        optimise_all(fit, fit->model.count - 1, 3);
+        optimise_all(fit, fit->model.count - 1, 4);
     }
     return square_of_best;
 }

@@ -3,6 +3,7 @@
 #include "recon/lim_energy.h"
 
 #include "geom/blobby.h"
+#include "geom/simd.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -11,6 +12,7 @@
 #include <cmocka.h>
 
 #include <stdlib.h>
+#include <string.h>
 
 enum { BLOBS = 5, POINTS = 137 };
 
@@ -136,40 +138,123 @@ static void slopes_equal_differences(void **state)
     }
 }
 
-// Columns are the derivatives of the residuals.
+// Columns are the derivatives of the residuals, those of E_a too.
 static void columns_equal_differences(void **state)
 {
     (void)state;
+    const double beta = 0.01;
     Case c;
     make_case(&c, 9);
-    int n = c.points.padded;
-    float *column = calloc((size_t)(4 * n), sizeof *column), *up = calloc((size_t)n, sizeof *up), *down = calloc((size_t)n, sizeof *down);
+    int n = c.points.padded, both = 2 * n;
+    float *column = calloc((size_t)(4 * both), sizeof *column), *up = calloc((size_t)both, sizeof *up), *down = calloc((size_t)both, sizeof *down);
     sums_without(&c, -1);
-    lim_energy_columns(&c.points, &c.blob[2], column);
+    lim_energy_columns(&c.points, &c.blob[2], beta, column);
     for (int k = 0; k < 4; k++) {
         double *p = parameter(&c.blob[2], k), kept = *p, step = 2e-3;
         *p = kept + step;
         sums_without(&c, -1);
-        lim_energy_residuals(&c.points, up);
+        lim_energy_residuals(&c.points, beta, up);
         *p = kept - step;
         sums_without(&c, -1);
-        lim_energy_residuals(&c.points, down);
+        lim_energy_residuals(&c.points, beta, down);
         *p = kept;
+        double bend_scale = 0, bend_error = 0;
         for (int i = 0; i < POINTS; i++) {
+            double bend = ((double)up[n + i] - (double)down[n + i]) / (2 * step);
+            bend_scale = fmax(bend_scale, fabs(bend));
+            bend_error = fmax(bend_error, fabs(bend - (double)column[k * both + n + i]));
             if ((up[i] == 0) != (down[i] == 0))   // a guard's bound lies between
                 continue;
             double numeric = ((double)up[i] - (double)down[i]) / (2 * step);
-            assert_true(fabs(numeric - (double)column[k * n + i]) < 3e-4);
+            assert_true(fabs(numeric - (double)column[k * both + i]) < 3e-4);
         }
+        assert_true(bend_scale > 0 && bend_error < 2e-3 * bend_scale);
     }
-    double dot = 0;
-    for (int i = 0; i < n; i++)
-        dot += (double)column[i] * (double)column[n + i];
-    assert_true(fabs(lim_energy_dot(column, column + n, n) - dot) < 1e-5 * (fabs(dot) + 1e-3));
+    double dot = 0, four[4];
+    for (int i = 0; i < both; i++)
+        dot += (double)column[i] * (double)column[both + i];
+    lim_energy_four_dots(column, column, (size_t)both, both, four);
+    assert_true(fabs(lim_energy_dot(column, column + both, both) - dot) < 1e-5 * (fabs(dot) + 1e-3));
+    assert_true(four[1] == lim_energy_dot(column, column + both, both) && four[3] == lim_energy_dot(column, column + 3 * both, both));
+    // without E_a the columns of E_d alone, the same bits
+    float *alone = calloc((size_t)(4 * n), sizeof *alone);
+    sums_without(&c, -1);
+    lim_energy_columns(&c.points, &c.blob[2], 0, alone);
+    for (int k = 0; k < 4; k++)
+        assert_memory_equal(alone + k * n, column + k * both, (size_t)n * sizeof *alone);
+    free(alone);
     free(column);
     free(up);
     free(down);
     lim_points_free(&c.points);
+}
+
+// Steps towards the foot end on the surface, with the way back to the point along the normal.
+static void feet_are_on_the_surface(void **state)
+{
+    (void)state;
+    Case c;
+    make_case(&c, 6);
+    double radius = 1, width = blob_width_for_radius(radius, ISO_LEVEL);
+    LimBlob ball = {{0.1, -0.2, 0.05}, width};
+    for (int i = 0; i < POINTS; i++)
+        c.points.given[0][i] = c.points.x[i], c.points.given[1][i] = c.points.y[i], c.points.given[2][i] = c.points.z[i];
+    for (int step = 0; step < 12; step++) {
+        lim_points_sum(&c.points, &ball, 1, ISO_LEVEL);
+        lim_points_approach(&c.points, 0.4, 0.7);
+    }
+    for (int i = 0; i < POINTS; i++) {
+        Vec3 center = vec3(0.1, -0.2, 0.05), p = vec3((double)c.points.given[0][i], (double)c.points.given[1][i], (double)c.points.given[2][i]);
+        Vec3 foot = vec3_add_scaled(center, radius, vec3_unit(vec3_sub(p, center)));
+        assert_true(vec3_distance(foot, vec3((double)c.points.x[i], (double)c.points.y[i], (double)c.points.z[i])) < 1e-4);
+    }
+    lim_points_free(&c.points);
+}
+
+// One kernel text, three compilations: the same bits from each that the machine has.
+static void every_instruction_set_gives_the_same_bits(void **state)
+{
+    (void)state;
+    SimdLevel before = simd_level();
+    LimEnergy energy[SIMD_COUNT];
+    double total[SIMD_COUNT][2], four[SIMD_COUNT][4];
+    float *column[SIMD_COUNT], *sums[SIMD_COUNT];
+    size_t columns_size = 0, sums_size = 0;
+    memset(energy, 0, sizeof energy);
+    for (int isa = 0; isa <= (int)simd_widest(); isa++) {
+        simd_force((SimdLevel)isa);
+        Case c;
+        make_case(&c, 11);
+        int both = 2 * c.points.padded;
+        columns_size = (size_t)(4 * both) * sizeof(float);
+        sums_size = (size_t)(3 * both) * sizeof(float);
+        column[isa] = calloc(1, columns_size);
+        sums[isa] = calloc(1, sums_size);
+        sums_without(&c, 2);
+        energy[isa] = lim_energy(&c.points, &c.blob[2]);
+        lim_points_sum(&c.points, c.blob, BLOBS, ISO_LEVEL);
+        lim_energy_total(&c.points, &total[isa][0], &total[isa][1]);
+        lim_energy_columns(&c.points, &c.blob[1], 0.01, column[isa]);
+        lim_energy_four_dots(column[isa], column[isa], (size_t)both, both, four[isa]);
+        lim_energy_residuals(&c.points, 0.01, sums[isa]);
+        memcpy(sums[isa] + both, c.points.h[2], (size_t)c.points.padded * sizeof(float));
+        lim_points_approach(&c.points, 0.4, 0.7);
+        memcpy(sums[isa] + both + c.points.padded, c.points.y, (size_t)c.points.padded * sizeof(float));
+        lim_points_taubin(&c.points, sums[isa] + 2 * both);
+        lim_points_free(&c.points);
+    }
+    simd_force(before);
+    for (int isa = 1; isa <= (int)simd_widest(); isa++) {
+        assert_memory_equal(&energy[isa], &energy[0], sizeof energy[0]);
+        assert_memory_equal(total[isa], total[0], sizeof total[0]);
+        assert_memory_equal(four[isa], four[0], sizeof four[0]);
+        assert_memory_equal(column[isa], column[0], columns_size);
+        assert_memory_equal(sums[isa], sums[0], sums_size);
+    }
+    for (int isa = 0; isa <= (int)simd_widest(); isa++) {
+        free(column[isa]);
+        free(sums[isa]);
+    }
 }
 
 static double plain_cohesion(const LimBlob *blob, int count, double s)
@@ -233,6 +318,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_fused_loop_equals_the_plain_one), cmocka_unit_test(slopes_equal_differences), cmocka_unit_test(columns_equal_differences),
+        cmocka_unit_test(feet_are_on_the_surface), cmocka_unit_test(every_instruction_set_gives_the_same_bits),
         cmocka_unit_test(cohesion_equals_eq_7),                cmocka_unit_test(adding_and_removing_cancels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
