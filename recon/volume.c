@@ -377,6 +377,136 @@ Volume *volume_decode(const VolumeHeader *header, const FileBytes *file, Faults 
     return volume;
 }
 
+// --- samples in several files ---
+
+static bool is_list(const char *text, size_t length)
+{
+    while (length > 0 && isspace((unsigned char)*text))
+        text++, length--;
+    return length >= 4 && !memcmp(text, "LIST", 4) && (length == 4 || isspace((unsigned char)text[4]));
+}
+
+bool data_names_several(const char *text, size_t length) { return is_list(text, length) || (length > 0 && memchr(text, '%', length)); }
+
+typedef struct NumberedName {   // before, number, after
+    const char *text;
+    int before, width, after_at, after;
+    bool zeros;
+    long first, last, step;
+} NumberedName;
+
+static bool read_numbered(const char *text, size_t length, NumberedName *out)
+{
+    double number[4];
+    while (length > 0 && isspace((unsigned char)*text))
+        text++, length--;
+    size_t named = 0, i;
+    while (named < length && !isspace((unsigned char)text[named]))
+        named++;
+    const char *percent = memchr(text, '%', named);
+    int given = 0;
+    for (int n = 4; n >= 2 && !given; n--)
+        given = header_numbers(text + named, length - named, n, number) ? n : 0;
+    if (!percent || !given || named > 1000)
+        return false;
+    *out = (NumberedName){.text = text, .before = (int)(percent - text)};
+    i = (size_t)out->before + 1;
+    out->zeros = i < named && text[i] == '0';
+    for (; i < named && isdigit((unsigned char)text[i]); i++)
+        out->width = out->width * 10 + (text[i] - '0') > 20 ? 21 : out->width * 10 + (text[i] - '0');
+    if (i >= named || text[i] != 'd' || out->width > 20 || memchr(text + i, '%', named - i))
+        return false;
+    out->after_at = (int)i + 1;
+    out->after = (int)(named - i) - 1;
+    for (int k = 0; k < 2 + (given > 2); k++)
+        if (!(fabs(number[k]) < 1e9) || floor(number[k]) != number[k])
+            return false;
+    out->first = (long)number[0];
+    out->last = (long)number[1];
+    out->step = given > 2 ? (long)number[2] : 1;
+    return out->step != 0 && (out->step > 0 ? out->first <= out->last : out->first >= out->last);
+}
+
+// The name of file `index`, 0 …; false after the last. Blank lines of a list are passed over.
+static bool next_name(const NumberedName *numbered, LineCursor *names, long index, char name[1200], int *line)
+{
+    if (!numbered) {
+        const char *text;
+        size_t length = 0;
+        while (line_cursor_next(names, &text, &length)) {
+            while (length > 0 && isspace((unsigned char)text[length - 1]))
+                length--;
+            if (length > 0 && length < 1100) {
+                memcpy(name, text, length);
+                name[length] = 0;
+                *line = names->line;
+                return true;
+            }
+        }
+        return false;
+    }
+    long number = numbered->first + index * numbered->step;
+    if (numbered->step > 0 ? number > numbered->last : number < numbered->last)
+        return false;
+    snprintf(name, 1200, numbered->zeros ? "%.*s%0*ld%.*s" : "%.*s%*ld%.*s", numbered->before, numbered->text, numbered->width, number, numbered->after,
+             numbered->text + numbered->after_at);
+    return true;
+}
+
+Volume *volume_decode_several(const VolumeHeader *header, const char *header_path, int line, const char *text, size_t length, LineCursor names, Faults *faults)
+{
+    NumberedName numbered;
+    bool by_list = is_list(text, length);
+    char name[1200], path[4096];
+    if (!by_list && !read_numbered(text, length, &numbered)) {
+        faults_add(faults, header_path, line, 0, "not a numbered name; `NAME%%03d.raw FIRST LAST STEP`, or LIST and a name a line");
+        return NULL;
+    }
+    const NumberedName *how = by_list ? NULL : &numbered;
+    if (header->encoding != ENCODING_RAW || header->line_skip > 0) {
+        faults_add(faults, header_path, line, 0, "several data files that are compressed, text or begin with lines are not read; raw data, or one data file");
+        return NULL;
+    }
+    size_t bytes = (size_t)header->size[0] * (size_t)header->size[1] * (size_t)header->size[2] * voxel_type_size(header->type), files = 0, done = 0;
+    LineCursor counting = names;
+    int at = line;
+    while (files <= (size_t)header->size[2] && next_name(how, &counting, (long)files, name, &at))
+        files++;
+    if (files == 0 || files > (size_t)header->size[2] || (size_t)header->size[2] % files != 0) {
+        faults_add(faults, header_path, line, 0, "%zu%s data files for %d slices; as many, or a divisor of that", files, files > (size_t)header->size[2] ? " or more" : "",
+                   header->size[2]);
+        return NULL;
+    }
+    size_t share = bytes / files;
+    uint8_t *joined = NULL;
+    bool good = true;
+    at = line;
+    for (size_t i = 0; good && i < files; i++) {
+        FileBytes data;
+        next_name(how, &names, (long)i, name, &at);
+        good = file_bytes_read_beside(header_path, at, name, strlen(name), &data, path, faults);
+        if (!good)
+            break;
+        size_t skip = header->byte_skip >= 0 ? (size_t)header->byte_skip : data.length > share ? data.length - share : 0;
+        good = skip <= data.length && data.length - skip >= share;
+        if (!good)
+            faults_add_at_byte(faults, path, data.length, "the data ends after %zu of %zu bytes", data.length, skip + share);
+        else if (!joined && !(joined = malloc(bytes)))   // one file has shown that the sizes are not mere words
+            faults_add(faults, header_path, line, 0, "needs %zu bytes of memory, more than is free", bytes);
+        good = good && joined;
+        if (good)
+            memcpy(joined + done, data.byte + skip, share);
+        done += share;
+        file_bytes_free(&data);
+    }
+    VolumeHeader plain = *header;
+    plain.byte_skip = 0;
+    FileBytes all = {joined, bytes, 0, header_path};
+    Volume *volume = good ? volume_decode(&plain, &all, faults) : NULL;
+    free(joined);
+    return volume;
+}
+
 // --- the public face ---
 
 Volume *volume_create(const int size[3], Vec3 origin, const Vec3 axis[3])

@@ -63,6 +63,11 @@ void file_bytes_free(FileBytes *file);
 // Opens the data file that a detached header names. It must lie in the header's folder or below: a header cannot point anywhere else unseen.
 bool file_bytes_read_beside(const char *header_path, int line, const char *name, size_t name_length, FileBytes *out, char path[4096], Faults *faults);
 
+// Raw samples in several files of equal share, one after the other: either numbered, where `text` is `NAME%03d.raw FIRST LAST [STEP [N]]`, or `LIST [N]`, where
+// `names` holds a name a line (of the file `header_path`). `line` is that of `text`.
+bool data_names_several(const char *text, size_t length);
+Volume *volume_decode_several(const VolumeHeader *header, const char *header_path, int line, const char *text, size_t length, LineCursor names, Faults *faults);
+
 bool volume_is_nrrd(const FileBytes *file);
 bool volume_is_metaimage(const FileBytes *file);
 bool volume_is_nifti(const FileBytes *file);

@@ -1,4 +1,5 @@
-// MetaImage (itk.org/Wiki/ITK/MetaIO): lines `Key = Value`, the last one ElementDataFile: LOCAL (the samples follow), or a file.
+// MetaImage (itk.org/Wiki/ITK/MetaIO): lines `Key = Value`, the last one ElementDataFile: LOCAL (the samples follow), a file,
+// LIST (names follow, one a line) or numbered names.
 //
 // Voxel (i, j, k) lies at Offset + sum_a index_a ElementSpacing_a D_a, where D_a is the a-th triple of TransformMatrix.
 #include "recon/volume_format.h"
@@ -178,10 +179,8 @@ Volume *volume_parse_metaimage(const FileBytes *file, Faults *faults)
         FileBytes data = {file->byte + end, file->length - end, end, file->path};
         return volume_decode(&header, &data, faults);
     }
-    if (memchr(name->text, '%', name->length) || header_text_is(name->text, name->length < 5 ? name->length : 5, "LIST")) {
-        faults_add(faults, file->path, name->line, 0, "several data files are not read; one data file, or LOCAL");
-        return NULL;
-    }
+    if (data_names_several(name->text, name->length))
+        return volume_decode_several(&header, file->path, name->line, name->text, name->length, (LineCursor){file->byte, file->length, end, name->line}, faults);
     char path[4096];
     FileBytes data;
     if (!file_bytes_read_beside(file->path, name->line, name->text, name->length, &data, path, faults))

@@ -1,5 +1,5 @@
 // NRRD, versions 1 to 5 (teem.sourceforge.net/nrrd/format.html): lines `field: value`, `key:=value` and `# comment` up to an empty line, then
-// the samples, or the samples in a detached file. Raw, gzip and text encodings.
+// the samples, or the samples in detached files. Raw, gzip and text encodings.
 //
 // Fields are gathered first and read afterwards, so that their order does not matter. An unknown or repeated field is a fault, as the format demands.
 #include "recon/volume_format.h"
@@ -101,6 +101,8 @@ static bool gather(const FileBytes *file, NrrdHeader *header, Faults *faults)
             faults_add(faults, file->path, cursor.line, 1, "'%s' stands on line %d already; each field once", name->name, value->line);
         else
             *value = (FieldValue){colon + 1, length - named - 1, cursor.line};
+        if (name && name->field == DATA_FILE && data_names_several(colon + 1, length - named - 1) && !memchr(colon, '%', length - named))
+            break;   // the names of a LIST stand in the header's place
     }
     header->has_end = cursor.position < file->length || length == 0;
     header->end = cursor.position;
@@ -343,10 +345,9 @@ Volume *volume_parse_nrrd(const FileBytes *file, Faults *faults)
         FileBytes data = {file->byte + h.end, file->length - h.end, h.end, file->path};
         return volume_decode(&header, &data, faults);
     }
-    if (memchr(detached->text, '%', detached->length) || header_text_is(detached->text, detached->length < 5 ? detached->length : 5, "LIST")) {
-        faults_add(faults, file->path, detached->line, 0, "several data files are not read; one data file: `unu save` joins them");
-        return NULL;
-    }
+    if (data_names_several(detached->text, detached->length))
+        return volume_decode_several(&header, file->path, detached->line, detached->text, detached->length,
+                                     (LineCursor){file->byte, file->length, h.end, detached->line}, faults);
     char path[4096];
     FileBytes data;
     if (!file_bytes_read_beside(file->path, detached->line, detached->text, detached->length, &data, path, faults))
