@@ -211,7 +211,8 @@ static void cast_rays_of(const Job *job, int node, NodeFigures *f)
             if (first && in)
                 look_at_wall(job, node, p, f);
             double far = job->place[node] == PLACE_END && first ? 0 : distance_to_data(tree, node, p);
-            if (far > 0.6 * radius && far < HUGE_VAL) {
+            // a further sheet may be another branch's wall, which other nodes' models say where the tool gets there
+            if (far > 0.6 * radius && far < HUGE_VAL && (first || power_nearest(tree, p) == node)) {
                 double *most = first ? &f->bare : &f->ghost;
                 *most = fmax(*most, far);
             }
