@@ -100,11 +100,13 @@ static double fall(const RayProfile *ray, int i) { return (double)ray->value[i +
 // The steepest place among samples [first, last], refined; its fall per mm goes to *slope (negative).
 static double steepest(const RayProfile *ray, int first, int last, double *slope)
 {
+    double shift = 0, b = fall(ray, first);
     int best = first;
-    for (int i = first; i <= last; i++)
-        if (fall(ray, i) < fall(ray, best))
-            best = i;
-    double shift = 0, b = fall(ray, best);
+    for (int i = first + 1; i <= last; i++) {
+        double f = fall(ray, i);
+        best = f < b ? i : best;
+        b = f < b ? f : b;
+    }
     if (best > 1 && best < ray->samples - 2) {
         double a = fall(ray, best - 1), c = fall(ray, best + 1), bend = a - 2 * b + c;
         if (bend > 0)

@@ -359,7 +359,8 @@ Volume *volume_decode(const VolumeHeader *header, const FileBytes *file, Faults 
         if (header->encoding == ENCODING_TEXT)
             return decode_text(header, &data, count, faults);
         if (data.length < bytes) {
-            faults_add_at_byte(faults, data.path, data.offset + data.length, "the data ends after %zu of %zu bytes (%d x %d x %d voxels of %zu); the whole file, "
+            faults_add_at_byte(faults, data.path, data.offset + data.length, "the data ends after %zu of %zu bytes (%d x %d x %d voxels of %zu); the "
+                               "whole file, "
                                "or a header with the true sizes", data.length, bytes, header->size[0], header->size[1], header->size[2], sample);
             return NULL;
         }
@@ -473,7 +474,8 @@ Volume *volume_decode_several(const VolumeHeader *header, const char *header_pat
     while (files <= (size_t)header->size[2] && next_name(how, &counting, (long)files, name, &at))
         files++;
     if (files == 0 || files > (size_t)header->size[2] || (size_t)header->size[2] % files != 0) {
-        faults_add(faults, header_path, line, 0, "%zu%s data files for %d slices; as many, or a divisor of that", files, files > (size_t)header->size[2] ? " or more" : "",
+        faults_add(faults, header_path, line, 0, "%zu%s data files for %d slices; as many, or a divisor of that", files,
+                   files > (size_t)header->size[2] ? " or more" : "",
                    header->size[2]);
         return NULL;
     }

@@ -159,7 +159,8 @@ static bool take_decimals(const Cursor *c, const Element *e, int count, double *
     for (int i = 0; good && i < count; i++)
         good = isfinite(value[i]);
     if (!good) {
-        faults_add_at_byte(c->faults, c->path, c->offset + c->at, "the element (%04x,%04x) is not valid; %d numbers, separated by \\", e->tag >> 16, e->tag & 0xffff, count);
+        faults_add_at_byte(c->faults, c->path, c->offset + c->at, "the element (%04x,%04x) is not valid; %d numbers, separated by \\", e->tag >> 16,
+                           e->tag & 0xffff, count);
         return false;
     }
     memcpy(out, value, (size_t)count * sizeof *out);
@@ -315,7 +316,8 @@ static bool begins_bare(const FileBytes *file, bool *explicit_vr, bool *big_endi
     if (file->length < 16)
         return false;
     *big_endian = b[0] == 0;
-    unsigned group = *big_endian ? b[1] : b[0], other = *big_endian ? b[0] : b[1], element = *big_endian ? (unsigned)b[2] << 8 | b[3] : (unsigned)b[3] << 8 | b[2];
+    unsigned high = *big_endian ? 0 : 1, low = 1 - high;   // bytes of a 16-bit word
+    unsigned group = b[low], other = b[high], element = (unsigned)b[2 + high] << 8 | b[2 + low];
     if (other != 0 || (group != 2 && group != 8) || element > 0x0070)
         return false;
     *explicit_vr = isupper(b[4]) && isupper(b[5]);
@@ -355,7 +357,8 @@ static bool check_image(const Cursor *c, const DicomImage *m)
         return false;
     }
     if (m->is_encapsulated) {
-        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "the pixels are compressed (transfer syntax %s); uncompressed: `gdcmconv --raw IN.dcm OUT.dcm`",
+        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "the pixels are compressed (transfer syntax %s); uncompressed: `gdcmconv --raw "
+                           "IN.dcm OUT.dcm`",
                            m->syntax[0] ? m->syntax : "not named");
         return false;
     }
@@ -363,10 +366,12 @@ static bool check_image(const Cursor *c, const DicomImage *m)
     if (m->samples != 1)
         faults_add_at_byte(faults, path, c->offset + m->pixel_place, "%ld samples a pixel (colour); one", m->samples);
     else if (strcmp(m->photometric, "MONOCHROME2") && strcmp(m->photometric, "MONOCHROME1"))
-        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "the photometric interpretation '%s' is not read; MONOCHROME1 or MONOCHROME2", m->photometric);
+        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "the photometric interpretation '%s' is not read; MONOCHROME1 or MONOCHROME2",
+                           m->photometric);
     if ((m->allocated != 8 && m->allocated != 16) || m->stored < 1 || m->stored > m->allocated || m->high_bit + 1 < m->stored || m->high_bit >= m->allocated ||
         m->is_signed > 1)
-        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "%ld bits allocated, %ld stored, high bit %ld, representation %ld are not read; 8 or 16 bits "
+        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "%ld bits allocated, %ld stored, high bit %ld, representation %ld are not read; "
+                           "8 or 16 bits "
                            "allocated, the stored ones within, representation 0 or 1", m->allocated, m->stored, m->high_bit, m->is_signed);
     if (faults->count > before)
         return false;
@@ -375,7 +380,8 @@ static bool check_image(const Cursor *c, const DicomImage *m)
     if (there > m->pixel_length)
         there = m->pixel_length;
     if (needed > there) {
-        faults_add_at_byte(faults, path, c->offset + m->pixel_place + there, "the pixels end after %zu of %zu bytes (%ld x %ld, %ld frames, %ld bits); the whole file",
+        faults_add_at_byte(faults, path, c->offset + m->pixel_place + there, "the pixels end after %zu of %zu bytes (%ld x %ld, %ld frames, %ld "
+                           "bits); the whole file",
                            there, needed, m->columns, m->rows, m->frames, m->allocated);
         return false;
     }
@@ -510,25 +516,29 @@ static bool check_slice(const Slice *s, const Slice *first, Faults *faults)
     const char *path = s->file->path;
     const DicomImage *m = &s->file->image, *n = &first->file->image;
     if (!p->has_position || !p->has_orientation || !p->has_spacing) {
-        faults_add_at_byte(faults, path, m->pixel_place, "frame %d has no %s: not a slice of a volume (a projection, a cine run, a secondary capture); images with "
+        faults_add_at_byte(faults, path, m->pixel_place, "frame %d has no %s: not a slice of a volume (a projection, a cine run, a secondary "
+                           "capture); images with "
                            "ImagePositionPatient, ImageOrientationPatient and PixelSpacing", s->frame + 1,
                            !p->has_position ? "position" : !p->has_orientation ? "orientation" : "pixel spacing");
         return false;
     }
     if (m->rows != n->rows || m->columns != n->columns) {
-        faults_add_at_byte(faults, path, m->pixel_place, "has %ld x %ld pixels, %s %ld x %ld; one size for the series: move the odd file away", m->columns, m->rows,
+        faults_add_at_byte(faults, path, m->pixel_place, "has %ld x %ld pixels, %s %ld x %ld; one size for the series: move the odd file away",
+                           m->columns, m->rows,
                            first->file->path, n->columns, n->rows);
         return false;
     }
     Vec3 u = vec3_of(p->orientation), v = vec3_of(p->orientation + 3);
     if (!(p->spacing[0] > 0 && p->spacing[1] > 0) || !(fabs(vec3_norm(u) - 1) < 0.01 && fabs(vec3_norm(v) - 1) < 0.01 && fabs(vec3_dot(u, v)) < 0.01)) {
-        faults_add_at_byte(faults, path, m->pixel_place, "frame %d: pixel spacing %g, %g or orientation (%g,%g,%g) (%g,%g,%g) is not valid; spacings above 0, two unit "
+        faults_add_at_byte(faults, path, m->pixel_place, "frame %d: pixel spacing %g, %g or orientation (%g,%g,%g) (%g,%g,%g) is not valid; spacings "
+                           "above 0, two unit "
                            "vectors at right angles", s->frame + 1, p->spacing[0], p->spacing[1], u.x, u.y, u.z, v.x, v.y, v.z);
         return false;
     }
     double turn = vec3_distance(u, vec3_of(q->orientation)) + vec3_distance(v, vec3_of(q->orientation + 3));
     if (turn > 2e-3 || fabs(p->spacing[0] / q->spacing[0] - 1) > 1e-3 || fabs(p->spacing[1] / q->spacing[1] - 1) > 1e-3) {
-        faults_add_at_byte(faults, path, m->pixel_place, "frame %d is turned or spaced otherwise than the first of %s; parallel slices of one spacing: move the odd file "
+        faults_add_at_byte(faults, path, m->pixel_place, "frame %d is turned or spaced otherwise than the first of %s; parallel slices of one "
+                           "spacing: move the odd file "
                            "(a localizer?) away", s->frame + 1, first->file->path);
         return false;
     }
@@ -556,7 +566,8 @@ static bool check_places(Slice *slice, int *count, Vec3 *step, Faults *faults)
     for (int i = 1; i < kept; i++) {
         double d = slice[i].along - slice[i - 1].along;
         if (!(d > 1e-4)) {
-            faults_add_at_byte(faults, slice[i].file->path, slice[i].file->image.pixel_place, "frame %d lies where frame %d of %s lies (several times or echoes in one "
+            faults_add_at_byte(faults, slice[i].file->path, slice[i].file->image.pixel_place, "frame %d lies where frame %d of %s lies (several times "
+                               "or echoes in one "
                                "series?); one slice at each place", slice[i].frame + 1, slice[i - 1].frame + 1, slice[i - 1].file->path);
             return false;
         }
@@ -568,7 +579,8 @@ static bool check_places(Slice *slice, int *count, Vec3 *step, Faults *faults)
     for (int i = 1; i < kept; i++) {
         Vec3 place = vec3_add_scaled(vec3_of(slice[0].plane.position), i, *step);
         if (vec3_distance(place, vec3_of(slice[i].plane.position)) > 0.05 * mean) {
-            faults_add_at_byte(faults, slice[widest].file->path, slice[widest].file->image.pixel_place, "frame %d lies %.4g mm behind frame %d of %s, others lie %.4g mm "
+            faults_add_at_byte(faults, slice[widest].file->path, slice[widest].file->image.pixel_place,
+                               "frame %d lies %.4g mm behind frame %d of %s, others lie %.4g mm "
                                "apart: slices are missing or unevenly placed; all slices, at even steps", slice[widest].frame + 1, steps[1],
                                slice[widest - 1].frame + 1, slice[widest - 1].file->path, steps[0]);
             return false;
@@ -771,7 +783,8 @@ Volume *volume_load_dicom_folder(const char *path, Faults *faults)
                 if (is_same_series(f, &series.file[k]))
                     files++, earlier += k < i;
             if (!earlier)
-                faults_add(faults, f->path, 0, 0, "a series of %d file%s, %ld x %ld pixels%s, %s '%s'", files, files > 1 ? "s" : "", f->image.columns, f->image.rows,
+                faults_add(faults, f->path, 0, 0, "a series of %d file%s, %ld x %ld pixels%s, %s '%s'", files, files > 1 ? "s" : "",
+                           f->image.columns, f->image.rows,
                            f->image.frames > 1 ? ", multi-frame" : "", f->image.modality, f->image.description);
         }
         good = false;

@@ -135,8 +135,10 @@ static void nrrd(void **state)
             Grid g = grid_of(left);
             const Vec3 *a = g.axis, o = g.origin;
             b.length = 0;
-            put_text(&b, "NRRD0004\ntype: float\ndimension: 3\nspace: %s\nsizes: %d %d %d\nspace directions: (%.9g,%.9g,%.9g) (%.9g,%.9g,%.9g) (%.9g,%.9g,%.9g)\n"
-                         "space origin: (%.9g,%.9g,%.9g)\nendian: %s\nencoding: raw\n\n", spaces[s][0], NX, NY, NZ, a[0].x, a[0].y, a[0].z, a[1].x, a[1].y, a[1].z,
+            put_text(&b, "NRRD0004\ntype: float\ndimension: 3\nspace: %s\nsizes: %d %d %d\nspace directions: (%.9g,%.9g,%.9g) (%.9g,%.9g,%.9g) "
+                     "(%.9g,%.9g,%.9g)\n"
+                         "space origin: (%.9g,%.9g,%.9g)\nendian: %s\nencoding: raw\n\n", spaces[s][0], NX, NY, NZ, a[0].x, a[0].y, a[0].z, a[1].x,
+                                         a[1].y, a[1].z,
                      a[2].x, a[2].y, a[2].z, o.x, o.y, o.z, left ? "big" : "little");
             put_samples(&b, &g, left, 1, 0);
             check_bytes(&b, &g, spaces[s][1]);
