@@ -126,7 +126,8 @@ static Frame frame_of(const MhtWindow *window, const MhtTemplate *t)
     Vec3 e1 = vec3_normal_to(t->axis), e2 = vec3_cross(t->axis, e1), c = vec3_scale(vec3_sub(t->center, window->middle), 1 / t->radius);
     double s = 1 / t->radius;
     return (Frame){{(float)(s * e1.x), (float)(s * e1.y), (float)(s * e1.z)}, {(float)(s * e2.x), (float)(s * e2.y), (float)(s * e2.z)},
-                   {(float)(s * t->axis.x), (float)(s * t->axis.y), (float)(s * t->axis.z)}, (float)vec3_dot(c, e1), (float)vec3_dot(c, e2), (float)vec3_dot(c, t->axis)};
+                   {(float)(s * t->axis.x), (float)(s * t->axis.y), (float)(s * t->axis.z)}, (float)vec3_dot(c, e1), (float)vec3_dot(c, e2),
+                       (float)vec3_dot(c, t->axis)};
 }
 
 static inline Lanes load(const float *from)
@@ -351,5 +352,6 @@ double mht_template_cost(const MhtWindow *window, const MhtTemplate *template, d
     for (int i = 0; i < 5; i++)
         gradient[i] = -2 * right[2 + i];
     double b = own.background;
-    return moment(m, 7, 7) - 2 * k * moment(m, 1, 7) - 2 * b * moment(m, 0, 7) + k * k * moment(m, 1, 1) + 2 * k * b * moment(m, 0, 1) + b * b * moment(m, 0, 0);
+    return moment(m, 7, 7) - 2 * k * moment(m, 1, 7) - 2 * b * moment(m, 0, 7) + k * k * moment(m, 1, 1) + 2 * k * b * moment(m, 0, 1) +
+           b * b * moment(m, 0, 0);
 }

@@ -13,7 +13,8 @@ enum { CIRCLE = 16, CONTRAST_MEMORY = 8, MAX_LEAVES = 24, MAX_ANGLES = 10, MAX_D
 
 MhtParameters mht_paper_parameters(void)
 {
-    return (MhtParameters){.step = 0.1, .window = 5, .radius_min = 0.25, .radius_max = 1.25, .radius_change = 0.1, .max_angle_deg = 85, .search_angles = 0, .search_depth = 1,
+    return (MhtParameters){.step = 0.1, .window = 5, .radius_min = 0.25, .radius_max = 1.25, .radius_change = 0.1, .max_angle_deg = 85, .search_angles = 0,
+                           .search_depth = 1,
                            .pruning = 1, .termination = 3, .max_steps = 2000, .max_length_mm = 1000, .contrast = 0, .overlap = 0.5, .own_overlap = 0};
 }
 
@@ -168,7 +169,8 @@ static int predict(Tracker *t, const MhtTemplate *from, MhtTemplate *out, int ca
             if (angle > widest * (1 + 1e-9))
                 continue;
             if (angle > 0)
-                guess->axis = vec3_unit(vec3_add_scaled(vec3_scale(from->axis, cos(angle)), sin(angle) / angle, vec3_add(vec3_scale(e1, a), vec3_scale(e2, b))));
+                guess->axis = vec3_unit(vec3_add_scaled(vec3_scale(from->axis, cos(angle)), sin(angle) / angle, vec3_add(vec3_scale(e1, a), vec3_scale(e2,
+                                                                                                                                                       b))));
             guess->center = vec3_add_scaled(from->center, p->step * from->radius, guess->axis);
             if (n > 0 && mht_window_open(t->window, t->volume, guess, p->window) > 0)
                 mht_template_score(t->window, guess);
@@ -389,20 +391,39 @@ static int nearest_node(const Tracker *t, Vec3 x)
     return nearest;
 }
 
-// Appends a branch's nodes: those of the way back reversed, then those of the way out.
+// Gap between a template's tube and the nearest one of the tree; < 0 where they overlap.
+static double gap_to_tree(const Tracker *t, const MhtTemplate *template)
+{
+    double least = HUGE_VAL;
+    for (int i = 0; i < t->tree.count; i++)
+        least = fmin(least, vec3_distance(template->center, t->tree.node[i].template.center) - t->tree.node[i].template.radius);
+    return least - template->radius;
+}
+
+// Appends a branch's nodes: those of the way back reversed, then those of the way out. A way back that missed its parent is joined where it came nearest, and
+// what lies beyond is a limb of its own there: by a link from its far end it would cross the background.
 static bool adopt(Tracker *t, const Chain *out, const Chain *back, int number)
 {
-    int before = t->tree.count;
-    for (int i = 0; i < back->count + out->count; i++) {
-        bool is_back = i < back->count;
-        MhtTemplate node = is_back ? back->node[back->count - 1 - i].template : out->node[i - back->count].template;
-        if (is_back)
-            node.axis = vec3_negate(node.axis);
-        int parent = i > 0 ? t->tree.count - 1 : before > 0 ? attachment(t, node.center) : -1;
-        if (!chain_append(&t->tree, &node, parent, number))
-            return false;
+    bool is_first = t->tree.count == 0, good = true;
+    int joint = back->count - 1, first = t->tree.count;
+    double least = HUGE_VAL;
+    for (int i = back->count - 1; i >= 0 && least > 0; i--) {
+        double gap = gap_to_tree(t, &back->node[i].template);
+        if (gap < least) {
+            least = gap;
+            joint = i;
+        }
     }
-    return true;
+    for (int i = 0; good && i < joint + 1 + out->count; i++) {
+        MhtTemplate node = i <= joint ? back->node[joint - i].template : out->node[i - joint - 1].template;
+        if (i <= joint)
+            node.axis = vec3_negate(node.axis);
+        int parent = i > 0 ? t->tree.count - 1 : is_first ? -1 : attachment(t, node.center);
+        good = chain_append(&t->tree, &node, parent, number);
+    }
+    for (int i = joint + 1; good && i < back->count; i++)
+        good = chain_append(&t->tree, &back->node[i].template, i == joint + 1 ? first : t->tree.count - 1, number);
+    return good;
 }
 
 static MhtLimits limits_of(const Tracker *t, double radius)
@@ -472,16 +493,19 @@ static bool check_seed(const Tracker *t, RbtSeed *seed, int number, const char *
     for (int i = 0; i < 3; i++)
         extent = fmax(extent, vec3_norm(t->volume->axis[i]) * size[i]);
     if (!inside_volume(t->volume, seed->start))
-        faults_add(faults, path, seed->line, seed->column, "the start of branch %d (%g, %g, %g) mm lies outside the volume; voxels (0, 0, 0) to (%d, %d, %d)", number + 1,
+        faults_add(faults, path, seed->line, seed->column,
+                   "the start of branch %d (%g, %g, %g) mm lies outside the volume; voxels (0, 0, 0) to (%d, %d, %d)", number + 1,
                    seed->start.x, seed->start.y, seed->start.z, size[0] - 1, size[1] - 1, size[2] - 1);
     if (number == 0 && !seed->has_toward)
         faults_add(faults, path, seed->line, seed->column, "the first branch has no direction; a point further down the vessel");
     if (seed->has_toward && !(vec3_distance(seed->start, seed->toward) > 1e-6 * t->voxel))
-        faults_add(faults, path, seed->line, seed->column, "the start of branch %d and its toward are the same point; toward is a point further down the vessel", number + 1);
+        faults_add(faults, path, seed->line, seed->column,
+                   "the start of branch %d and its toward are the same point; toward is a point further down the vessel", number + 1);
     if (number == 0 && !(seed->radius > 0))
         faults_add(faults, path, seed->line, seed->column, "the first branch has no radius; about that of the vessel at its start");
     if (seed->radius > extent / 2)
-        faults_add(faults, path, seed->line, seed->column, "the radius %g mm of branch %d is larger than the volume; at most %g mm", seed->radius, number + 1, extent / 2);
+        faults_add(faults, path, seed->line, seed->column, "the radius %g mm of branch %d is larger than the volume; at most %g mm", seed->radius,
+                   number + 1, extent / 2);
     return faults->count == before;
 }
 
@@ -551,7 +575,8 @@ static bool track_all(Tracker *t, const RbtSeed *seed, int seed_count, const Pro
             return false;
         }
         if (!found) {
-            faults_add(faults, path, seed[i].line, seed[i].column, "nothing could be tracked from the start of branch %d (%s); a point well inside the vessel, about its "
+            faults_add(faults, path, seed[i].line, seed[i].column,
+                       "nothing could be tracked from the start of branch %d (%s); a point well inside the vessel, about its "
                        "true radius and direction", i + 1, t->why);
             return false;
         }
@@ -562,7 +587,8 @@ static bool track_all(Tracker *t, const RbtSeed *seed, int seed_count, const Pro
     return true;
 }
 
-VesselTree *mht_track(const Volume *volume, const MhtParameters *parameters, const RbtSeed *given, int seed_count, int threads, const Progress *progress, RbtReport *report,
+VesselTree *mht_track(const Volume *volume, const MhtParameters *parameters, const RbtSeed *given, int seed_count, int threads, const Progress *progress,
+                      RbtReport *report,
                       const char *path, Faults *faults)
 {
     (void)threads;

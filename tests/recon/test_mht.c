@@ -137,7 +137,8 @@ static void fit_of_its_own_template(void **state)
     mht_template_fit(window, &t, &limits);
     Vec3 q = vec3_sub(t.center, line_from);
     double off = vec3_norm(vec3_add_scaled(q, -vec3_dot(q, axis), axis));
-    print_message("own template: centre %.5f, radius %.5f, axis %.5f, contrast %.3f, background %.3f\n", off, t.radius, vec3_dot(t.axis, axis), t.contrast, t.background);
+    print_message("own template: centre %.5f, radius %.5f, axis %.5f, contrast %.3f, background %.3f\n", off, t.radius, vec3_dot(t.axis, axis), t.contrast,
+                  t.background);
     assert_true(off < 2e-3 && fabs(t.radius - 1.3) < 2e-3 && vec3_dot(t.axis, axis) > 1 - 1e-5);
     assert_true(fabs(t.contrast - 300) < 1 && fabs(t.background - 700) < 1);
     mht_window_free(window);
@@ -163,7 +164,8 @@ static void score_is_a_t_statistic(void **state)
         double sum = 0, square = 0;
         for (int i = 0; i < TRIALS; i++) {
             Vec3 direction = {random_unit(&random) - 0.5, random_unit(&random) - 0.5, random_unit(&random) - 0.5};
-            MhtTemplate t = {.center = {5 + 10 * random_unit(&random), 5 + 10 * random_unit(&random), 5 + 10 * random_unit(&random)}, .axis = vec3_unit(direction), .radius = radius[k]};
+            MhtTemplate t = {.center = {5 + 10 * random_unit(&random), 5 + 10 * random_unit(&random), 5 + 10 * random_unit(&random)},
+                             .axis = vec3_unit(direction), .radius = radius[k]};
             assert_true(mht_window_open(window, v, &t, 4) > 100);
             mht_template_score(window, &t);
             sum += t.score;
@@ -199,7 +201,8 @@ static double best_radius(double blur, double size)
                 m[4] += w * t * f;
                 m[5] += w * f * f;
             }
-            double det = m[0] * m[2] - m[1] * m[1], k = (m[0] * m[4] - m[1] * m[3]) / det, b = (m[2] * m[3] - m[1] * m[4]) / det, cost = m[5] - k * m[4] - b * m[3];
+            double det = m[0] * m[2] - m[1] * m[1], k = (m[0] * m[4] - m[1] * m[3]) / det, b = (m[2] * m[3] - m[1] * m[4]) / det,
+                cost = m[5] - k * m[4] - b * m[3];
             if (cost < least) {
                 least = cost;
                 best = r;
@@ -230,7 +233,8 @@ static void straight_cylinder(void **state)
                 radius += tree->radius[i];
                 nodes++;
             }
-            print_message("cylinder, %s, noise %g: radius %.4f (best template %.4f), centre %.4f mm, to z = %.2f of 11.8, %d nodes\n", kind_name[kind], noisy ? 0.05 : 0.0,
+            print_message("cylinder, %s, noise %g: radius %.4f (best template %.4f), centre %.4f mm, to z = %.2f of 11.8, %d nodes\n", kind_name[kind],
+                          noisy ? 0.05 : 0.0,
                           radius / nodes, expected, center / nodes, reached, tree->node_count);
             assert_true(nodes >= 4);
             assert_true(fabs(radius / nodes - expected) < (noisy ? 0.01 : 0.005));
@@ -286,7 +290,8 @@ static void helix_to_its_end(void **state)
             worst = fmax(worst, d);
             nodes++;
         }
-        print_message("helix, %s: %.1f mm of %.1f, centre %.4f mm, worst %.3f, %d nodes, %s\n", kind_name[kind], report.branch[0].length, length, center / nodes, worst,
+        print_message("helix, %s: %.1f mm of %.1f, centre %.4f mm, worst %.3f, %d nodes, %s\n", kind_name[kind], report.branch[0].length, length,
+                      center / nodes, worst,
                       tree->node_count, report.branch[0].end);
         assert_true(furthest > 8.0);
         // not beyond the end either; Kerrien's values do go on into the background (their table 2 has 8.9 % of such), and lag in the curve
@@ -326,7 +331,8 @@ static void bifurcation_by_two_seeds(void **state)
             tree = track(v, &p, seed, 2, &report);
             const RbtBranchReport *second = &report.branch[1];
             Vec3 tip = tree->center[second->first_node + second->node_count - 1], foot = tree->center[tree->parent[second->first_node]];
-            print_message("fork, %s%s: tip (%.1f, %.1f, %.1f), %s; joined %.2f mm from the fork\n", kind_name[kind], has_toward ? ", toward" : "", tip.x, tip.y, tip.z, second->end,
+            print_message("fork, %s%s: tip (%.1f, %.1f, %.1f), %s; joined %.2f mm from the fork\n", kind_name[kind], has_toward ? ", toward" : "", tip.x,
+                          tip.y, tip.z, second->end,
                           vec3_distance(foot, fork));
             assert_true(tip.z > 18 && (tip.x < 11) != went_left);
             assert_true(vec3_distance(foot, fork) < 3.5);
@@ -381,6 +387,33 @@ static void parallel_neighbour(void **state)
         assert_true(tree->center[tree->node_count - 1].z > 18);
         vessel_tree_free(tree);
     }
+    volume_free(v);
+}
+
+static double passing_depth(Vec3 x)
+{
+    return fmax(segment_depth(x, vec3(10, 4, -2), vec3(10, 4, 14), 1), segment_depth(x, vec3(-2, 7.2, 8), vec3(22, 7.2, 8), 1));
+}
+
+// A way back that passes its parent without meeting it hangs there, not by a link from its far end through the background.
+static void joined_where_it_passes(void **state)
+{
+    (void)state;
+    Volume *v = develop((int[3]){101, 56, 66}, 0.2, passing_depth, 0.2, 0.05, 1);
+    MhtParameters p = parameters_of(0);
+    RbtSeed seed[2] = {{.start = {10, 4, 2}, .toward = {10, 4, 4}, .has_toward = true, .radius = 1},
+                       {.start = {15, 7.2, 8}, .toward = {17, 7.2, 8}, .has_toward = true, .radius = 1}};
+    VesselTree *tree = track(v, &p, seed, 2, NULL);
+    double least = HUGE_VAL, most = -HUGE_VAL, longest = 0;
+    for (int i = 0; i < tree->node_count; i++) {
+        if (tree->parent[i] >= 0)
+            longest = fmax(longest, vec3_distance(tree->center[i], tree->center[tree->parent[i]]));
+        least = fmin(least, tree->center[i].x);
+        most = fmax(most, tree->center[i].x);
+    }
+    print_message("passes its parent at 3.2 mm: from x = %.1f to %.1f, longest link %.2f mm\n", least, most, longest);
+    assert_true(least < 1.5 && most > 18.5 && longest < 4);
+    vessel_tree_free(tree);
     volume_free(v);
 }
 
@@ -449,7 +482,8 @@ static void unfit_seeds_and_parameters(void **state)
     struct {
         RbtSeed seed;
         const char *words;
-    } cases[] = {{good, "outside the volume"}, {good, "same point"}, {good, "no radius"}, {good, "no direction"}, {good, "larger than the volume"}, {good, "nothing could be tracked"}};
+    } cases[] = {{good, "outside the volume"}, {good, "same point"}, {good, "no radius"}, {good, "no direction"}, {good, "larger than the volume"},
+                 {good, "nothing could be tracked"}};
     cases[0].seed.start = vec3(6, 6, -1);
     cases[1].seed.toward = good.start;
     cases[2].seed.radius = 0;
@@ -487,7 +521,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(gradient_by_differences), cmocka_unit_test(fit_of_its_own_template), cmocka_unit_test(score_is_a_t_statistic),
         cmocka_unit_test(straight_cylinder), cmocka_unit_test(helix_to_its_end), cmocka_unit_test(bifurcation_by_two_seeds),
-        cmocka_unit_test(ends_where_the_vessel_ends), cmocka_unit_test(parallel_neighbour), cmocka_unit_test(turned_volume_gives_the_turned_tree),
+        cmocka_unit_test(ends_where_the_vessel_ends), cmocka_unit_test(parallel_neighbour), cmocka_unit_test(joined_where_it_passes),
+        cmocka_unit_test(turned_volume_gives_the_turned_tree),
         cmocka_unit_test(the_same_every_time), cmocka_unit_test(unfit_seeds_and_parameters),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
