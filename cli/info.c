@@ -2,6 +2,8 @@
 #include "cli/cli.h"
 
 #include "cli/file_kind.h"
+#include "cli/output.h"
+#include "cli/report.h"
 #include "recon/tree_file.h"
 #include "recon/volume.h"
 #include "sim/recording.h"
@@ -12,9 +14,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char help[] = "Usage: seldinger info FILE [--json]\n\n"
+static const char help[] = "Usage: seldinger info FILE [--json] [--report F.html]\n\n"
                            "Says what FILE is (volume, tree, model, recording, scene or script) and its figures. Lengths mm.\n\n"
-                           "  --json   as JSON on standard output\n";
+                           "  --json           as JSON on standard output\n"
+                           "  --report F.html  of a tree or model: a page for readers, all in one file: tree, candidates (narrow places, wide places, aneurysms),\n"
+                           "                   branches, radius along each, quality of the fit; for training and research, not a medical device\n";
 
 static void add_vector(cJSON *object, const char *name, Vec3 v)
 {
@@ -53,7 +57,7 @@ static void add_box(cJSON *object, const Vec3 *point, int count)
     add_vector(object, "high_mm", high);
 }
 
-static bool describe_tree(cJSON *object, const char *path, Faults *faults)
+static bool describe_tree(cJSON *object, const char *path, const char *report, Faults *faults)
 {
     TreeFileInfo info = {0};
     VesselTree *tree = tree_file_load(path, &info, faults);
@@ -92,9 +96,10 @@ static bool describe_tree(cJSON *object, const char *path, Faults *faults)
         cJSON_AddStringToObject(object, "source", info.source);
     if (info.created_by)
         cJSON_AddStringToObject(object, "created_by", info.created_by);
+    bool good = !report || report_write(report, path, tree, &info, faults);
     tree_file_info_free(&info);
     vessel_tree_free(tree);
-    return true;
+    return good;
 }
 
 static bool describe_recording(cJSON *object, const char *path, Faults *faults)
@@ -208,15 +213,18 @@ static void print_value(const cJSON *value)
 
 int verb_info(int argc, char **argv)
 {
-    enum { JSON = 256, QUIET, HELP };
-    static const struct option table[] = {{"json", no_argument, NULL, JSON}, {"quiet", no_argument, NULL, QUIET}, {"help", no_argument, NULL, HELP}, {0}};
+    enum { JSON = 256, REPORT, QUIET, HELP };
+    static const struct option table[] = {{"json", no_argument, NULL, JSON}, {"report", required_argument, NULL, REPORT}, {"quiet", no_argument, NULL, QUIET},
+                                          {"help", no_argument, NULL, HELP}, {0}};
     static Faults faults;
-    bool json = false;
+    const char *report = NULL;
+    bool json = false, quiet = false;
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "h", table, NULL)) != -1;) {
         switch (choice) {
         case JSON: json = true; break;
-        case QUIET: break;
+        case REPORT: report = optarg; break;
+        case QUIET: quiet = true; break;
         case HELP:
         case 'h': fputs(help, stdout); return EXIT_DONE;
         default: fprintf(stderr, "seldinger info: unknown option; see `seldinger info --help`\n"); return EXIT_BAD_INPUT;
@@ -231,8 +239,17 @@ int verb_info(int argc, char **argv)
     faults_clear(&faults);
     cJSON_AddStringToObject(object, "file", path);
     bool good = false;
-    switch (file_kind(path)) {
-    case FILE_TREE: good = describe_tree(object, path, &faults); break;
+    FileKind kind = file_kind(path);
+    if (report && kind != FILE_TREE && kind != FILE_MISSING)
+        faults_add(&faults, path, 0, 0, "is no tree or model; --report is made of those");
+    else if (report)
+        output_check(report, &faults);
+    if (faults.count > 0) {
+        cJSON_Delete(object);
+        return cli_bad_input(&faults);
+    }
+    switch (kind) {
+    case FILE_TREE: good = describe_tree(object, path, report, &faults); break;
     case FILE_RECORDING: good = describe_recording(object, path, &faults); break;
     case FILE_SCENE: good = describe_scene(object, path, &faults); break;
     case FILE_SCRIPT: good = describe_script(object, path, &faults); break;
@@ -242,11 +259,11 @@ int verb_info(int argc, char **argv)
         faults_add(&faults, path, 0, 0, "is nothing known here; volumes (NRRD, MetaImage, NIfTI), trees, models, recordings, scenes and scripts are");
         break;
     }
-    if (good && json) {
+    if (good && json && !(report && !strcmp(report, "-"))) {
         char *text = cJSON_Print(object);
         printf("%s\n", text ? text : "{}");
         free(text);
-    } else if (good) {
+    } else if (good && !quiet && !(report && !strcmp(report, "-"))) {
         for (const cJSON *item = object->child; item; item = item->next) {
             printf("%-16s ", item->string);
             print_value(item);
