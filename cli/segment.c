@@ -71,8 +71,8 @@ static error_t parse_option(int key, char *text, struct argp_state *state)
 static const char intro[] =
     "Tracks vessels through an angiogram (RBT, Kerrien et al. 2017, section 3): VOLUME to a tree of cylinders, each with its points on the wall.\v"
     "VOLUME is NRRD (raw, gzip or text, attached or detached), MetaImage or NIfTI, recognised by its content.\n\n"
-    "The trace is YAML. The first branch needs a start, a point further down the vessel and about its radius; it becomes the root of the tree. Further branches "
-    "need a start alone: it is projected to the tree tracked so far and the tracking starts beside the parent; with a `toward` it starts at the point itself and "
+    "The trace is YAML. The first branch needs a start, a point further down the vessel and about its radius; it becomes the root of the tree. Where it is the only "
+    "one (or with automatic: 1) the rest of the tree is found from it, downstream, aneurysms too. Further branches need a start alone: it is projected to the tree tracked so far and the tracking starts beside the parent; with a `toward` it starts at the point itself and "
     "runs both ways. All of mm may be voxels (start_voxel, toward_voxel, centers_voxel):\n\n"
     "  branches:\n"
     "    - {name: carotid, start_mm: [74.8, 12.8, 60.8], toward_mm: [72.8, 16, 61.6], radius_mm: 2}\n"
@@ -81,7 +81,10 @@ static const char intro[] =
     "    - {centers_mm: [[44, 42.4, 64]]}\n"
     "  parameters: default        # or paper: the values of the paper, without what was added\n"
     "  p_inl: 0.7                 # and any of these by name\n\n"
-    "Branches that are not named in the trace are not looked for: this version tracks what it is told.\n\n"
+    "Corrections leave the rest of the tree as it is, bit for bit; with automatic: 1 further branches are one, tracked after all that was found:\n\n"
+    "  automatic: 1\n"
+    "  forbid: [{center_voxel: [120, 90, 60], radius_mm: 3}]   # no node in this ball\n"
+    "  cut: [{point_mm: [40, 31, 22]}]                        # the nearest branch ends here, and what hangs on it goes\n\n"
     "Parameters of the tracking (default; paper):\n";
 
 // The introduction and a line for each parameter.
@@ -112,17 +115,47 @@ static double seconds(void)
 
 static void print_table(const VesselTree *tree, const RbtReport *report, double load_s, double track_s)
 {
-    printf("%-3s %-16s %6s %6s %10s %10s %9s %9s  %s\n", "#", "branch", "nodes", "points", "length_mm", "radius_mm", "inliers", "least", "ends because");
+    double length = 0;
+    printf("%-4s %-16s %6s %5s %6s %6s %10s %10s %8s %6s  %s\n", "#", "branch", "parent", "order", "nodes", "points", "length_mm", "radius_mm", "inliers", "least", "ends because");
     for (int i = 0; i < report->branch_count; i++) {
         const RbtBranchReport *b = &report->branch[i];
-        double radius = 0;
-        for (int k = 0; k < b->node_count; k++)
-            radius += tree->radius[b->first_node + k] / b->node_count;
-        printf("%-3d %-16s %6d %6ld %10.1f %10.2f %8.0f%% %8.0f%%  %s%s\n", i + 1, b->name[0] ? b->name : b->is_aneurysm ? "(aneurysm)" : "(branch)", b->node_count,
-               (long)(tree->point_offset[b->first_node + b->node_count] - tree->point_offset[b->first_node]), b->length, radius, 100 * b->inlier_rate,
-               100 * b->inlier_rate_min, b->is_aneurysm ? "aneurysm" : "", b->end);
+        char parent[16] = "-";
+        if (b->parent >= 0)
+            snprintf(parent, sizeof parent, "%d", b->parent + 1);
+        printf("%-4d %-16s %6s %5d %6d %6ld %10.1f %10.2f %7.0f%% %5.0f%%  ", i + 1,
+               b->name[0] ? b->name : b->is_aneurysm ? "(aneurysm)" : b->is_found ? "(found)" : "(branch)", parent, b->order, b->node_count,
+               (long)(tree->point_offset[b->first_node + b->node_count] - tree->point_offset[b->first_node]), b->length, b->radius, 100 * b->inlier_rate,
+               100 * b->inlier_rate_min);
+        if (b->is_aneurysm)
+            printf("aneurysm about (%.1f, %.1f, %.1f) mm\n", b->center.x, b->center.y, b->center.z);
+        else
+            printf("%s\n", b->end);
+        length += b->length;
     }
-    printf("%d nodes, %ld points; volume read in %.2f s, tracked in %.2f s\n", tree->node_count, (long)tree->point_count, load_s, track_s);
+    printf("%d branches, %.0f mm, %d nodes, %ld points; volume read in %.2f s, tracked in %.2f s\n", report->branch_count, length, tree->node_count, (long)tree->point_count,
+           load_s, track_s);
+}
+
+// What was found beside the parameters that found it, in the words of a trace; to be freed.
+static char *parameters_text(const RbtParameters *parameters, const RbtReport *report, double voxel_mm)
+{
+    enum { LINE = 120 };
+    char *text = rbt_parameters_text(parameters, voxel_mm);
+    size_t used = text ? strlen(text) : 0, capacity = used + LINE * ((size_t)report->branch_count + 2);
+    char *longer = text ? realloc(text, capacity) : NULL;
+    if (!longer) {
+        free(text);
+        return NULL;
+    }
+    const char *head = "aneurysms_found:\n";
+    for (int i = 0; i < report->branch_count; i++) {
+        const RbtBranchReport *b = &report->branch[i];
+        if (!b->is_aneurysm || !b->is_found)
+            continue;
+        used += (size_t)snprintf(longer + used, capacity - used, "%s  - {centers_mm: [[%.4f, %.4f, %.4f]]}\n", head, b->center.x, b->center.y, b->center.z);
+        head = "";
+    }
+    return longer;
 }
 
 static bool write_json(const SegmentArguments *a, const VesselTree *tree, const RbtReport *report, double load_s, double track_s, Faults *faults)
@@ -139,6 +172,12 @@ static bool write_json(const SegmentArguments *a, const VesselTree *tree, const 
         cJSON *entry = cJSON_CreateObject();
         cJSON_AddStringToObject(entry, "name", b->name);
         cJSON_AddStringToObject(entry, "kind", b->is_aneurysm ? "aneurysm" : "vessel");
+        cJSON_AddBoolToObject(entry, "found", b->is_found);
+        cJSON_AddNumberToObject(entry, "parent", b->parent);
+        cJSON_AddNumberToObject(entry, "order", b->order);
+        cJSON_AddNumberToObject(entry, "radius_mm", b->radius);
+        if (b->is_aneurysm)
+            cJSON_AddItemToObject(entry, "center_mm", cJSON_CreateDoubleArray((double[3]){b->center.x, b->center.y, b->center.z}, 3));
         cJSON_AddNumberToObject(entry, "first_node", b->first_node);
         cJSON_AddNumberToObject(entry, "nodes", b->node_count);
         cJSON_AddNumberToObject(entry, "length_mm", b->length);
@@ -197,7 +236,7 @@ static int segment(const SegmentArguments *a, Faults *faults)
     bool good = tree != NULL;
     if (good) {
         double track_s = seconds() - start - load_s;
-        char created_by[] = "seldinger " SELDINGER_VERSION " segment", *text = rbt_parameters_text(&trace->parameters, volume_voxel_size(volume));
+        char created_by[] = "seldinger " SELDINGER_VERSION " segment", *text = parameters_text(&trace->parameters, &report, volume_voxel_size(volume));
         size_t length = strlen(a->volume);
         char *source = malloc(length + 1);
         good = source && text;

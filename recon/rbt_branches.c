@@ -50,6 +50,15 @@ static bool is_along(const Tracker *t, const RbtLimb *limb, Vec3 place, Vec3 dir
            tracker_brightness(t, n->cylinder.center) >= fmax(limb->level, t->floor) && tracker_node_around(t, n->cylinder.center, 0.8) < 0;
 }
 
+// Where the vessel comes from, behind the first start.
+static bool is_upstream(const Tracker *t, const RbtLimb *limb)
+{
+    const Cylinder *root = &t->tree.node[0].cylinder;
+    Vec3 way = vec3_sub(limb->place[0], root->center);
+    double along = vec3_dot(way, root->axis);
+    return along < 0 && along > -4 * root->radius - 4 * t->voxel && vec3_norm(vec3_add_scaled(way, -along, root->axis)) < root->radius;
+}
+
 // A cylinder somewhere on the limb: its middle first, then outwards, then inwards.
 static bool seed_on_limb(Tracker *t, const RbtLimb *limb, double share, Cylinder *seed)
 {
@@ -119,7 +128,7 @@ static bool meets_parent(const Tracker *t, const RbtLimb *limb, Track *back)
     for (int i = nearest + 1; i < back->count; i++)
         past += vec3_distance(back->node[i].cylinder.center, back->node[i - 1].cylinder.center);
     double gap = vec3_distance(back->node[nearest].cylinder.center, contact);
-    bool goes_past = past > 4 * radius && past > 4 * t->voxel && gap < radius + t->tree.node[limb->contact].cylinder.radius + 3 * t->voxel;
+    bool goes_past = past > 4 * radius && past > 4 * t->voxel && gap < 1.25 * (radius + t->tree.node[limb->contact].cylinder.radius) + 3 * t->voxel;
     // a vessel that ends in the side of another one forks there, a vessel that passes by does not
     int ahead = limb->contact;
     double left = 0;
@@ -150,7 +159,9 @@ static void track_limb(void *context, long index)
     t->is_guarded = true;
     Cylinder seed;
     found->why = "no cylinder along the limb";
-    if (rbt_is_sac(t, round->paint, limb)) {
+    if (is_upstream(t, limb)) {
+        found->why = "is upstream of the first start";
+    } else if (rbt_is_sac(t, round->paint, limb)) {
         found->is_sac = true;
         found->radius = t->estimate.node.cylinder.radius;
         found->why = "aneurysm";
@@ -182,17 +193,22 @@ static int compare_found(const void *a, const void *b)
 
 static bool is_painted(const RbtPaint *paint, Vec3 x) { return rbt_paint_node(paint, x) >= 0; }
 
-bool rbt_ends_add(RbtEnds *ends, const char *why)
+bool rbt_ends_add(RbtEnds *ends, const char *why, int seed)
 {
     if (ends->count == ends->capacity) {
         int capacity = ends->capacity ? 2 * ends->capacity : 64;
-        const char **grown = realloc(ends->why, (size_t)capacity * sizeof *grown);
-        if (!grown)
+        const char **whys = realloc(ends->why, (size_t)capacity * sizeof *whys);
+        if (whys)
+            ends->why = whys;
+        int *seeds = realloc(ends->seed, (size_t)capacity * sizeof *seeds);
+        if (seeds)
+            ends->seed = seeds;
+        if (!whys || !seeds)
             return false;
-        ends->why = grown;
         ends->capacity = capacity;
     }
-    ends->why[ends->count++] = why;
+    ends->why[ends->count] = why;
+    ends->seed[ends->count++] = seed;
     return true;
 }
 
@@ -242,7 +258,7 @@ static bool adopt(Tracker *t, RbtPaint *paint, const RbtLimb *limb, const Found 
             }
             bool is_joined = false;
             good = good && rbt_mend_links(t, paint, before, &is_joined);
-            good = good && (!is_joined || rbt_ends_add(ends, last < total - 1 ? "runs into another branch" : found->why));
+            good = good && (!is_joined || rbt_ends_add(ends, last < total - 1 ? "runs into another branch" : found->why, -1));
             if (good)
                 rbt_paint_nodes(paint, &t->tree, before, t->tree.count);
         }
@@ -262,7 +278,7 @@ static bool adopt_sac(Tracker *t, RbtPaint *paint, const RbtLimb *limb, const Fo
         return true;
     node.branch = ends->count;
     node.parent = limb->contact;
-    if (!track_append(&t->tree, &node, found->out.point) || !rbt_mend_links(t, paint, before, &is_joined) || (is_joined && !rbt_ends_add(ends, found->why)))
+    if (!track_append(&t->tree, &node, found->out.point) || !rbt_mend_links(t, paint, before, &is_joined) || (is_joined && !rbt_ends_add(ends, found->why, -1)))
         return false;
     rbt_paint_nodes(paint, &t->tree, before, t->tree.count);
     return true;
@@ -322,8 +338,8 @@ static double noise_of(const Tracker *t)
     return 1.4826 * value[n / 2];
 }
 
-// Medians of brightness and contrast over the first branch say what is bright at all.
-static double floor_of(const Tracker *t)
+// Medians of brightness and contrast over the first branch say what is too faint and what is too bright.
+static void measure_root(Tracker *t, double noise)
 {
     enum { MOST = 512 };
     double inside[MOST], contrast[MOST];
@@ -334,14 +350,16 @@ static double floor_of(const Tracker *t)
     }
     qsort(inside, (size_t)n, sizeof *inside, compare_doubles);
     qsort(contrast, (size_t)n, sizeof *contrast, compare_doubles);
-    return inside[n / 2] - (1 - t->parameters->residue) * contrast[n / 2];
+    t->floor = inside[n / 2] - (1 - t->parameters->residue) * contrast[n / 2];
+    t->ceiling = inside[n - 1 - n / 10] + RBT_BRIGHTER * contrast[n / 2] + 0.6 * noise;
 }
 
 bool rbt_grow_branches(Tracker *t, RbtPaint *paint, int first, int threads, const Progress *progress, RbtEnds *ends)
 {
     const double share[] = {0.5, 0.5 * (0.5 + t->parameters->residue), t->parameters->residue};
     double noise = 4 * noise_of(t);
-    t->floor = floor_of(t);
+    if (first == 0)
+        measure_root(t, noise);
     rbt_paint_nodes(paint, &t->tree, first, t->tree.count);
     bool good = true;
     for (int pass = 0; good && pass < 3; pass++)

@@ -5,12 +5,13 @@
 
 #include "recon/rbt_residue.h"
 
-typedef struct RbtEnds {     // why each branch ended, by number
+typedef struct RbtEnds {     // why each branch ended, by number; free both arrays
     const char **why;
+    int *seed;               // that named it, -1: it was found
     int count, capacity;
 } RbtEnds;
 
-bool rbt_ends_add(RbtEnds *ends, const char *why);   // false: out of memory
+bool rbt_ends_add(RbtEnds *ends, const char *why, int seed);   // false: out of memory
 
 // Grows t->tree from its nodes `first` on; t->paint is `paint`, in which they need not stand yet. Random numbers of a branch come from its place, and what
 // is done at one place depends on what is near it alone: elsewhere the tree is the same bit for bit. False: out of memory.

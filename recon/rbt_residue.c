@@ -351,7 +351,7 @@ static RbtLimb *gather_limbs(const Flood *f, Piece *piece, int piece_count, cons
         }
         RbtLimb *l = &limb[used];
         const Border *b = &border[piece[leaf].node - first];
-        *l = (RbtLimb){.contact = piece[top].node, .level = b->level, .depth = (double)f->wet[piece[leaf].farthest].way, .key = voxel_index(v, f->wet[piece[leaf].farthest].at), .stem = -1};
+        *l = (RbtLimb){.contact = piece[top].node, .level = b->level, .ceiling = b->ceiling, .depth = (double)f->wet[piece[leaf].farthest].way, .key = voxel_index(v, f->wet[piece[leaf].farthest].at), .stem = -1};
         l->is_cut = l->depth > b->reach - 2 * thickness;
         int above = piece[top].parent;
         if (above >= 0 && piece[above].limb >= 0) {
@@ -399,11 +399,11 @@ static void set_borders(const Tracker *t, int first, int end, double share, doub
         qsort(outside, (size_t)n, sizeof *outside, compare_doubles);
         double in = inside[n / 2], out = fmin(outside[n / 2], in);
         border[i - first].level = out + fmax(share * (in - out), noise);
-        border[i - first].ceiling = in + 0.5 * (in - out) + noise;
+        // narrow vessels are dim: what leaves them need not be
+        border[i - first].ceiling = t->tree.node[i].cylinder.radius < 2 * t->voxel ? t->ceiling : in + RBT_BRIGHTER * (in - out) + 0.6 * noise;
         border[i - first].reach = fmax(14 * t->voxel, 3.5 * t->tree.node[i].cylinder.radius);
         brightest = fmax(brightest, border[i - first].ceiling);
     }
-    // narrow places are dim: what leaves them need not be
     for (int i = first; i < end; i++)
         border[i - first].ceiling = brightest;
 }

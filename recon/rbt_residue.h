@@ -19,13 +19,16 @@ void rbt_paint_nodes(RbtPaint *paint, const Track *tree, int first, int end);
 // The node whose tube x lies in, or -1.
 int rbt_paint_node(const RbtPaint *paint, Vec3 x);
 
+// What is brighter than the vessel beside it by more than this share of its contrast is bone, metal, not vessel.
+#define RBT_BRIGHTER 0.12
+
 enum { RBT_LIMB_PLACES = 24 };
 typedef struct RbtLimb {
     int count;               // places, from the contact outwards
     Vec3 place[RBT_LIMB_PLACES];
     double radius[RBT_LIMB_PLACES];   // [mm] from the area of its cross-section there
     int contact;             // node that it touches
-    double level;            // brightness of its border
+    double level, ceiling;   // brightness of its border; above which it is no vessel
     double depth;            // [mm] of its last place, by the way inside it
     uint64_t key;            // its last voxel: the place that its random numbers come from
     bool is_cut;             // it goes on beyond the reach of the search

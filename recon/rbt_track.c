@@ -199,10 +199,12 @@ bool tracker_is_inside(const Volume *volume, Vec3 x)
     return v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x <= volume->size[0] - 1 && v.y <= volume->size[1] - 1 && v.z <= volume->size[2] - 1;
 }
 
+static Vec3 in_mm(const Volume *volume, Vec3 x, bool is_voxel) { return is_voxel ? volume_point_of(volume, x) : x; }
+
 bool tracker_is_forbidden(const Tracker *t, Vec3 x)
 {
     for (int i = 0; i < t->parameters->forbid_count; i++)
-        if (vec3_distance(x, t->parameters->forbid[i].center) < t->parameters->forbid[i].radius)
+        if (vec3_distance(x, in_mm(t->volume, t->parameters->forbid[i].center, t->parameters->forbid[i].is_voxel)) < t->parameters->forbid[i].radius)
             return true;
     return false;
 }
@@ -577,6 +579,8 @@ static void report_branch(const Tracker *t, int number, double p_inl, RbtBranchR
         report->relaxed_count += n->inlier_rate <= p_inl;
         report->retried_count += n->retried;
         report->junction_count += n->is_junction;
+        report->radius += n->cylinder.radius / report->node_count;
+        report->center = n->cylinder.center;
         if (n->parent >= 0)
             report->length += vec3_distance(n->cylinder.center, t->tree.node[n->parent].cylinder.center);
     }
@@ -940,8 +944,6 @@ bool track_aneurysm(Tracker *t, const RbtAneurysm *aneurysm, const Vec3 *center,
 
 // --- the whole ---
 
-static Vec3 in_mm(const Volume *volume, Vec3 x, bool is_voxel) { return is_voxel ? volume_point_of(volume, x) : x; }
-
 // [low, high] of a million samples: the first quartile, which is background (vessels fill less than three quarters of any angiogram), and the 99.9th
 // percentile. The extremes would be noise, air or metal: with them half of a noisy background passed for vessel.
 static void brightness_range(const Volume *volume, double *low, double *high)
@@ -1067,44 +1069,143 @@ static bool run_seed(Tracker *t, const Job *job, int i)
     return false;
 }
 
-static bool make_report(const Tracker *t, const Job *job, const RbtEnds *ends, RbtReport *report)
+// Branches that lost all of their nodes to a cut are left out.
+static bool make_report(Tracker *t, const Job *job, const RbtEnds *ends, RbtReport *report)
 {
-    report->branch_count = ends->count + job->aneurysm_count;
-    report->branch = calloc((size_t)report->branch_count + 1, sizeof *report->branch);
-    for (int i = 0; report->branch && i < report->branch_count; i++) {
-        RbtBranchReport *b = &report->branch[i];
-        b->is_aneurysm = i >= ends->count;
+    int total = ends->count + job->aneurysm_count, used = 0;
+    int *renamed = malloc(((size_t)total + 1) * sizeof *renamed);
+    report->branch = calloc((size_t)total + 1, sizeof *report->branch);
+    bool good = renamed && report->branch;
+    for (int i = 0; good && i < total; i++) {
+        RbtBranchReport *b = &report->branch[used];
+        *b = (RbtBranchReport){.is_aneurysm = i >= ends->count, .is_found = i < ends->count && ends->seed[i] < 0, .parent = -1, .order = 1};
+        report_branch(t, i, t->parameters->p_inl, b);
+        renamed[i] = b->node_count > 0 ? used : -1;
+        if (b->node_count <= 0)
+            continue;
         if (b->is_aneurysm)
             memcpy(b->name, job->aneurysm[i - ends->count].name, sizeof b->name);
-        else if (i < job->seed_count)
-            memcpy(b->name, job->seed[i].name, sizeof b->name);
-        snprintf(b->end, sizeof b->end, "%s", !b->is_aneurysm && ends->why[i] ? ends->why[i] : "");
-        report_branch(t, i, t->parameters->p_inl, b);
+        else if (!b->is_found)
+            memcpy(b->name, job->seed[ends->seed[i]].name, sizeof b->name);
+        b->is_aneurysm = b->is_aneurysm || t->tree.node[b->first_node + b->node_count - 1].kind == NODE_ANEURYSM;
+        snprintf(b->end, sizeof b->end, "%s", i < ends->count && ends->why[i] && !b->is_aneurysm ? ends->why[i] : "");
+        int parent = t->tree.node[b->first_node].parent;
+        if (parent >= 0) {
+            b->parent = renamed[t->tree.node[parent].branch];
+            b->order = b->parent >= 0 ? report->branch[b->parent].order + 1 : 1;
+        }
+        used++;
     }
-    return report->branch != NULL;
+    report->branch_count = used;
+    free(renamed);
+    return good;
+}
+
+// Node by node: those for which keep[i] is false go; nothing may hang on them that stays.
+static void keep_nodes(Track *tree, const bool *keep, int *place)
+{
+    int used = 0;
+    for (int i = 0; i < tree->count; i++) {
+        if (!keep[i])
+            continue;
+        TrackNode node = tree->node[i];
+        node.parent = node.parent >= 0 ? place[node.parent] : -1;
+        place[i] = used;
+        tree->node[used++] = node;
+    }
+    tree->count = used;
+}
+
+// From the node nearest to each point on its branch goes, and all that hangs on what went. False with a fault where a point is on no branch.
+static bool make_cuts(Tracker *t, const Job *job)
+{
+    Track *tree = &t->tree;
+    bool *keep = malloc((size_t)tree->count * sizeof *keep), good = keep != NULL;
+    int *place = malloc((size_t)tree->count * sizeof *place);
+    good = good && place;
+    if (!good)
+        faults_add(job->faults, job->path, 0, 0, "out of memory");
+    for (int i = 0; good && i < tree->count; i++)
+        keep[i] = true;
+    for (int k = 0; good && k < t->parameters->cut_count; k++) {
+        const RbtRegion *cut = &t->parameters->cut[k];
+        Vec3 x = in_mm(t->volume, cut->center, cut->is_voxel);
+        int nearest = 0;
+        for (int i = 0; i < tree->count; i++)
+            if (vec3_distance(x, tree->node[i].cylinder.center) < vec3_distance(x, tree->node[nearest].cylinder.center))
+                nearest = i;
+        double distance = vec3_distance(x, tree->node[nearest].cylinder.center), radius = tree->node[nearest].cylinder.radius;
+        if (nearest == 0 || distance > 2 * radius + 3 * t->voxel) {
+            faults_add(job->faults, job->path, cut->line, cut->column, "the cut at (%g, %g, %g) mm %s; a point on the branch that is to be cut", x.x, x.y, x.z,
+                       nearest == 0 ? "leaves nothing of the tree" : "is on no branch");
+            good = false;
+        } else {
+            keep[nearest] = false;
+        }
+    }
+    for (int i = 0; good && i < tree->count; i++)
+        if (tree->node[i].parent >= 0 && !keep[tree->node[i].parent])
+            keep[i] = false;
+    if (good)
+        keep_nodes(tree, keep, place);
+    free(keep);
+    free(place);
+    return good;
+}
+
+// A node of the tree so far lies on this start: the branch was found already.
+static bool is_found_already(const Tracker *t, const RbtSeed *seed) { return tracker_node_around(t, seed->start, 1) >= 0; }
+
+// What grows out of the nodes from `first` on.
+static bool grow(Tracker *t, const Job *job, RbtPaint *paint, int first, RbtEnds *ends)
+{
+    return rbt_grow_branches(t, paint, first, job->threads, job->progress, ends) || out_of_memory_at(job, ends->count);
+}
+
+// The whole tree: all that is found from the first start, then the cuts, then what the other starts add to the rest.
+static bool track_automatic(Tracker *t, const Job *job, RbtEnds *ends)
+{
+    bool is_joined, good = run_seed(t, job, 0) && ((rbt_ends_add(ends, t->why, 0) && rbt_mend_links(t, NULL, 0, &is_joined)) || out_of_memory_at(job, 0));
+    RbtPaint *paint = good ? rbt_paint_create(t->volume) : NULL;
+    t->paint = paint;
+    good = good && (paint || out_of_memory_at(job, 0)) && grow(t, job, paint, 0, ends);
+    if (good && t->parameters->cut_count > 0) {
+        rbt_paint_free(paint);
+        t->paint = NULL;
+        good = make_cuts(t, job);
+        paint = good ? rbt_paint_create(t->volume) : NULL;
+        good = good && (paint || out_of_memory_at(job, 0));
+        t->paint = paint;
+        if (good)
+            rbt_paint_nodes(paint, &t->tree, 0, t->tree.count);
+    }
+    for (int i = 1; good && i < job->seed_count; i++) {
+        int first = t->tree.count;
+        if (is_found_already(t, &job->seed[i]))
+            continue;
+        good = run_seed(t, job, i);
+        for (int k = first; good && k < t->tree.count; k++)
+            t->tree.node[k].branch = ends->count;
+        good = good && ((rbt_ends_add(ends, t->why, i) && rbt_mend_links(t, paint, first, &is_joined)) || out_of_memory_at(job, i)) && grow(t, job, paint, first, ends);
+    }
+    t->paint = NULL;
+    rbt_paint_free(paint);
+    return good;
 }
 
 static bool track_all(Tracker *t, const Job *job, RbtReport *report)
 {
     RbtEnds ends = {0};
     bool automatic = t->parameters->automatic > 0, good = true;
-    RbtPaint *paint = NULL;
-    for (int i = 0; good && i < job->seed_count; i++) {
-        good = run_seed(t, job, i);
-        if (good && !rbt_ends_add(&ends, t->why))
-            good = out_of_memory_at(job, i);
-        if (good && i == 0 && automatic) {
-            paint = rbt_paint_create(t->volume);
-            t->paint = paint;
-            bool is_joined;
-            if (!paint || !rbt_mend_links(t, NULL, 0, &is_joined) || !rbt_grow_branches(t, paint, 0, job->threads, job->progress, &ends))
-                good = out_of_memory_at(job, ends.count);
-        }
-        if (good && job->progress && job->progress->call && !automatic)
+    if (automatic)
+        good = track_automatic(t, job, &ends);
+    for (int i = 0; good && !automatic && i < job->seed_count; i++) {
+        good = run_seed(t, job, i) && (rbt_ends_add(&ends, t->why, i) || out_of_memory_at(job, i));
+        if (good && job->progress && job->progress->call)
             job->progress->call(job->progress->context, i + 1, job->seed_count + job->aneurysm_count);
     }
-    t->paint = NULL;
-    rbt_paint_free(paint);
+    if (good && !automatic && t->parameters->cut_count > 0)
+        good = make_cuts(t, job);
     for (int i = 0; good && i < job->aneurysm_count; i++) {
         good = track_aneurysm(t, &job->aneurysm[i], job->center[i], ends.count + i, job->threads, job->faults, job->path);
         if (t->out_of_memory)
@@ -1115,6 +1216,7 @@ static bool track_all(Tracker *t, const Job *job, RbtReport *report)
     if (good && !make_report(t, job, &ends, report))
         good = out_of_memory_at(job, ends.count);
     free(ends.why);
+    free(ends.seed);
     return good;
 }
 

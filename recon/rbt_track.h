@@ -104,6 +104,10 @@ typedef struct RbtBranchReport {
     int retried_count;       // nodes that took a longer step
     int junction_count;      // nodes in openings where no cylinder fits (their inlier rate is the share of rays that meet a near wall)
     bool is_aneurysm;
+    bool is_found;           // by the program, no seed named it
+    int parent, order;       // number of the branch that it hangs on, -1: none; 1 for the first, one more than its parent's
+    double radius;           // [mm] mean over its nodes
+    Vec3 center;             // [mm] of its last node: of a sac, its middle
     char name[32];           // the seed's or the aneurysm's
     char end[96];            // why it ended
 } RbtBranchReport;

@@ -40,6 +40,32 @@ static void full_file(void **state)
     trace_free(t);
 }
 
+// One start alone asks for the whole tree; a second one, or a word, does not.
+static void automatic_and_corrections(void **state)
+{
+    (void)state;
+    static const char one[] = "branches: [{start_mm: [1, 2, 3], toward_mm: [2, 2, 3], radius_mm: 1}]\n";
+    static const char two[] = "branches: [{start_mm: [1, 2, 3], toward_mm: [2, 2, 3], radius_mm: 1}, {start_mm: [4, 2, 3]}]\n";
+    char text[400];
+    Trace *t = parse(one);
+    assert_true(t && t->parameters.automatic == 1);
+    trace_free(t);
+    t = parse(two);
+    assert_true(t && t->parameters.automatic == 0);
+    trace_free(t);
+    snprintf(text, sizeof text, "automatic: 0\n%s", one);
+    t = parse(text);
+    assert_true(t && t->parameters.automatic == 0);
+    trace_free(t);
+    snprintf(text, sizeof text, "%sautomatic: 1\nforbid: [{center_voxel: [1, 2, 3], radius_mm: 4}, {center_mm: [5, 6, 7], radius_mm: 8}]\ncut: [{point_mm: [9, 10, 11]}]\n", two);
+    t = parse(text);
+    assert_true(t && t->parameters.automatic == 1 && t->parameters.forbid_count == 2 && t->parameters.cut_count == 1);
+    const RbtRegion *forbid = t->parameters.forbid, *cut = t->parameters.cut;
+    assert_true(forbid[0].is_voxel && forbid[0].center.z == 3 && forbid[0].radius == 4 && !forbid[1].is_voxel && forbid[1].radius == 8);
+    assert_true(cut[0].center.x == 9 && !cut[0].is_voxel && cut[0].line == 4 && cut[0].column == 7);
+    trace_free(t);
+}
+
 static void every_parameter_by_name(void **state)
 {
     (void)state;
@@ -87,6 +113,17 @@ static void faults_with_their_place(void **state)
         {"branches: [{start_mm: [1, 2, 3], toward_mm: [2, 2, 3], radius_mm: 0}]\n", "t.yaml:1:67", "radius_mm '0' is not valid"},
         {"branches: [{start_mm: [1, 2, 3], start_voxel: [1, 2, 3], toward_mm: [2, 2, 3], radius_mm: 1}]\n", "t.yaml:1:47", "given twice"},
         {"branches: [{start_mm: [1, 2, 3], toward_mm: [2, 2, 3], radius_mm: 1, radius_mm: 2}]\n", "t.yaml:1:70", "stands on line 1 already"},
+        {GOOD "forbid: 3\n", "t.yaml:2:9", "forbid is not valid"},
+        {GOOD "forbid: [{center_mm: [1, 2, 3]}]\n", "t.yaml:2:10", "has no radius"},
+        {GOOD "forbid: [{radius_mm: 3}]\n", "t.yaml:2:10", "has no place"},
+        {GOOD "forbid: [{center_mm: [1, 2, 3], center_voxel: [1, 2, 3], radius_mm: 3}]\n", "t.yaml:2:47", "given twice"},
+        {GOOD "forbid: [{center_mm: [1, 2, 3], radius_mm: 0}]\n", "t.yaml:2:44", "radius_mm '0' is not valid"},
+        {GOOD "forbid: [7]\n", "t.yaml:2:10", "a forbidden region is not valid"},
+        {GOOD "cut: [{point_mm: [1, 2]}]\n", "t.yaml:2:18", "three numbers"},
+        {GOOD "cut: [{point_mm: [1, 2, 3], radius_mm: 1}]\n", "t.yaml:2:40", "no key of a cut"},
+        {GOOD "cut: [{}]\n", "t.yaml:2:7", "has no place"},
+        {GOOD "cut: [x]\n", "t.yaml:2:7", "a cut is not valid"},
+        {GOOD "automatic: 2\n", "t.yaml:2:12", "automatic '2' is not valid"},
         {"branches: [{start_mm: [1, 2, 3], toward_mm: [2, 2, 3], radius: 1}]\n", "t.yaml:1:64", "'radius' is no key of a branch"},
         {GOOD "colour: red\n", "t.yaml:2:9", "'colour' is no key of a trace"},
         {GOOD "seed: 1\nseed: 2\n", "t.yaml:3:1", "stands on line 2 already"},
@@ -117,6 +154,6 @@ static void faults_with_their_place(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(full_file), cmocka_unit_test(every_parameter_by_name), cmocka_unit_test(faults_with_their_place)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(full_file), cmocka_unit_test(automatic_and_corrections), cmocka_unit_test(every_parameter_by_name), cmocka_unit_test(faults_with_their_place)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
