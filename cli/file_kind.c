@@ -1,5 +1,7 @@
 #include "cli/file_kind.h"
 
+#include "recon/surface_file.h"
+
 #include <hdf5.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -26,6 +28,8 @@ FileKind file_kind(const char *path)
 {
     unsigned char head[4096] = {0};
     struct stat status;
+    if (stat(path, &status) == 0 && S_ISDIR(status.st_mode))
+        return FILE_VOLUME;
     FILE *file = stat(path, &status) == 0 && S_ISREG(status.st_mode) ? fopen(path, "rb") : NULL;
     if (!file)
         return FILE_MISSING;
@@ -35,12 +39,12 @@ FileKind file_kind(const char *path)
     if (length >= 8 && !memcmp(head, "\x89HDF\r\n\x1a\n", 8))
         return kind_of_hdf5(path);
     if (!strncmp(text, "NRRD", 4) || strstr(text, "NDims") || (length >= 2 && head[0] == 0x1f && head[1] == 0x8b) ||
-        (length >= 348 && (!memcmp(head + 344, "n+1", 3) || !memcmp(head + 344, "ni1", 3))))
+        (length >= 132 && !memcmp(head + 128, "DICM", 4)) || (length >= 348 && (!memcmp(head + 344, "n+1", 3) || !memcmp(head + 344, "ni1", 3))))
         return FILE_VOLUME;
     if (strstr(text, "t_s,push_mm_s,twist_deg_s"))
         return FILE_SCRIPT;
     const char *name = strrchr(path, '.');
     if (strstr(text, "seldinger:") || (name && (!strcmp(name, ".yaml") || !strcmp(name, ".yml"))))
         return FILE_SCENE;
-    return FILE_UNKNOWN;
+    return surface_is_known(head, length, path) ? FILE_SURFACE : FILE_UNKNOWN;
 }

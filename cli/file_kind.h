@@ -2,9 +2,9 @@
 #ifndef SELDINGER_CLI_FILE_KIND_H
 #define SELDINGER_CLI_FILE_KIND_H
 
-typedef enum { FILE_MISSING, FILE_UNKNOWN, FILE_TREE, FILE_RECORDING, FILE_SCENE, FILE_SCRIPT, FILE_VOLUME } FileKind;
+typedef enum { FILE_MISSING, FILE_UNKNOWN, FILE_TREE, FILE_RECORDING, FILE_SCENE, FILE_SCRIPT, FILE_VOLUME, FILE_SURFACE } FileKind;
 
-// FILE_TREE stands for trees and models.
+// FILE_TREE stands for trees and models. A folder is taken for a DICOM series.
 FileKind file_kind(const char *path);
 
 #endif

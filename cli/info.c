@@ -4,6 +4,7 @@
 #include "cli/file_kind.h"
 #include "cli/output.h"
 #include "cli/report.h"
+#include "recon/mesh_check.h"
 #include "recon/tree_file.h"
 #include "recon/volume.h"
 #include "sim/recording.h"
@@ -15,7 +16,7 @@
 #include <string.h>
 
 static const char help[] = "Usage: seldinger info FILE [--json] [--report F.html]\n\n"
-                           "Says what FILE is (volume, tree, model, recording, scene or script) and its figures. Lengths mm.\n\n"
+                           "Says what FILE is (volume or folder of a DICOM series, surface, tree, model, recording, scene or script) and its figures. Lengths mm.\n\n"
                            "  --json           as JSON on standard output\n"
                            "  --report F.html  of a tree or model: a page for readers, all in one file: tree, candidates (narrow places, wide places, aneurysms),\n"
                            "                   branches, radius along each, quality of the fit; for training and research, not a medical device\n";
@@ -145,6 +146,45 @@ static bool describe_volume(cJSON *object, const char *path, Faults *faults)
     return true;
 }
 
+static void add_count(cJSON *object, const char *name, const MeshFinding *finding)
+{
+    cJSON_AddNumberToObject(object, name, finding->count);
+}
+
+static bool describe_surface(cJSON *object, const char *path, Faults *faults)
+{
+    SurfaceMesh *mesh = surface_load(path, faults);
+    MeshCheck check;
+    if (!mesh)
+        return false;
+    bool good = mesh_check(mesh, &check);
+    if (good) {
+        cJSON_AddStringToObject(object, "what", "surface");
+        cJSON_AddNumberToObject(object, "vertices", check.vertex_count);
+        cJSON_AddNumberToObject(object, "triangles", check.triangle_count);
+        cJSON_AddNumberToObject(object, "parts", check.component_count);
+        cJSON_AddNumberToObject(object, "openings", check.opening_count);
+        add_vector(object, "low_mm", check.low);
+        add_vector(object, "high_mm", check.high);
+        cJSON_AddNumberToObject(object, "area_mm2", check.area);
+        cJSON_AddNumberToObject(object, "volume_mm3", check.volume);
+        add_count(object, "open_edges", &check.open_edges);
+        add_count(object, "nonmanifold_edges", &check.nonmanifold_edges);
+        add_count(object, "one_sided_edges", &check.one_sided_edges);
+        add_count(object, "flipped_triangles", &check.flipped_triangles);
+        add_count(object, "degenerate_triangles", &check.degenerate_triangles);
+        add_count(object, "duplicate_triangles", &check.duplicate_triangles);
+        add_count(object, "duplicate_vertices", &check.duplicate_vertices);
+        add_count(object, "unreferenced_vertices", &check.unreferenced_vertices);
+        cJSON_AddNumberToObject(object, "inside_out_parts", check.inside_out_count);
+        cJSON_AddBoolToObject(object, "unit_is_doubtful", check.unit_is_doubtful);
+    } else {
+        faults_add(faults, path, 0, 0, "cannot be checked: no memory");
+    }
+    surface_free(mesh);
+    return good;
+}
+
 static bool describe_scene(cJSON *object, const char *path, Faults *faults)
 {
     static const char *const sources[] = {"model", "shape", "tube", "plane", "none"};
@@ -255,8 +295,9 @@ int verb_info(int argc, char **argv)
     case FILE_SCRIPT: good = describe_script(object, path, &faults); break;
     case FILE_MISSING: faults_add(&faults, path, 0, 0, "cannot be opened; give a file that is there"); break;
     case FILE_VOLUME: good = describe_volume(object, path, &faults); break;
+    case FILE_SURFACE: good = describe_surface(object, path, &faults); break;
     case FILE_UNKNOWN:
-        faults_add(&faults, path, 0, 0, "is nothing known here; volumes (NRRD, MetaImage, NIfTI), trees, models, recordings, scenes and scripts are");
+        faults_add(&faults, path, 0, 0, "is nothing known here; volumes (NRRD, MetaImage, NIfTI, DICOM), surfaces (STL, PLY, OBJ, VTP), trees, models, recordings, scenes and scripts are");
         break;
     }
     if (good && json && !(report && !strcmp(report, "-"))) {

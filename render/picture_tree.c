@@ -266,6 +266,8 @@ bool picture_of_projections(const char *path, const PictureOptions *options, int
 
 // --- from a voxel grid and a tree ---
 
+enum { SAC_COLOR = 5 };      // a purple; orders above 5 take it too
+
 typedef struct Branches {
     int count;
     PicturePolyline *line;
@@ -280,39 +282,37 @@ static void free_branches(Branches *branches)
     free(branches->radius);
 }
 
-// A branch goes on through the first child of each node; every further child starts a new one, drawn from its parent on.
+// Each branch (vessel_branches.h) from the node it springs from on, and each aneurysm node as a line of its own; the colour is the branch's order.
 static bool cut_into_branches(const VesselTree *tree, Branches *branches)
 {
-    int n = tree->node_count;
-    int *next = malloc((size_t)n * sizeof *next);
-    branches->line = calloc((size_t)n, sizeof *branches->line);
-    branches->point = malloc(2 * (size_t)n * sizeof *branches->point);
-    branches->radius = malloc(2 * (size_t)n * sizeof *branches->radius);
-    if (!next || !branches->line || !branches->point || !branches->radius) {
-        free(next);
-        return false;
-    }
-    for (int i = 0; i < n; i++)
-        next[i] = -1;
-    for (int i = n - 1; i > 0; i--)
-        if (tree->parent[i] >= 0)
-            next[tree->parent[i]] = i;
+    size_t n = (size_t)tree->node_count;
+    VesselBranches *cut = vessel_branches_create(tree);
+    branches->line = calloc(n, sizeof *branches->line);
+    branches->point = malloc(2 * n * sizeof *branches->point);
+    branches->radius = malloc(2 * n * sizeof *branches->radius);
     int used = 0;
-    for (int i = 0; i < n; i++) {
-        int parent = tree->parent[i];
-        if (parent >= 0 && next[parent] == i)
-            continue;
-        PicturePolyline *line = &branches->line[branches->count];
-        *line = (PicturePolyline){.point = branches->point + used, .radius = branches->radius + used, .color = branches->count};
-        for (int k = parent >= 0 ? parent : i, first = 1; k >= 0; k = first && parent >= 0 ? i : next[k], first = 0) {
-            branches->point[used] = tree->center[k];
-            branches->radius[used++] = first && parent >= 0 ? tree->radius[i] : tree->radius[k];
-            line->count++;
+    bool good = cut && branches->line && branches->point && branches->radius;
+    for (int b = 0; good && b < cut->count; b++) {
+        const VesselBranch *branch = &cut->branch[b];
+        const int *node = cut->node + branch->first;
+        PicturePolyline *line = &branches->line[branches->count++];
+        *line = (PicturePolyline){.point = branches->point + used, .radius = branches->radius + used, .color = branch->order - 1};
+        for (int k = branch->from_node >= 0 ? -1 : 0; k < branch->count; k++, line->count++) {
+            branches->point[used] = tree->center[k < 0 ? branch->from_node : node[k]];
+            branches->radius[used++] = tree->radius[node[k < 0 ? 0 : k]];
         }
-        branches->count++;
     }
-    free(next);
-    return true;
+    for (int i = 1; good && i < tree->node_count; i++) {
+        if (cut->of_node[i] >= 0)
+            continue;
+        branches->line[branches->count++] = (PicturePolyline){.count = 2, .point = branches->point + used, .radius = branches->radius + used, .color = SAC_COLOR};
+        branches->point[used] = tree->center[tree->parent[i]];
+        branches->radius[used++] = tree->radius[i];
+        branches->point[used] = tree->center[i];
+        branches->radius[used++] = tree->radius[i];
+    }
+    vessel_branches_free(cut);
+    return good;
 }
 
 static const char *axis_name(Vec3 step)
