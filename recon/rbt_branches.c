@@ -47,7 +47,7 @@ static bool is_along(const Tracker *t, const RbtLimb *limb, Vec3 place, Vec3 dir
     const TrackNode *parent = &t->tree.node[limb->contact];
     return vec3_dot(n->cylinder.axis, direction) > 0.5 && vec3_distance(n->cylinder.center, place) < 1.5 * fmax(n->cylinder.radius, t->voxel) &&
            n->contrast > 0.7 * share * parent->contrast && tracker_is_inside(t->volume, n->cylinder.center) && !tracker_is_forbidden(t, n->cylinder.center) &&
-           tracker_brightness(t, n->cylinder.center) >= fmax(limb->level, t->floor) && tracker_node_around(t, n->cylinder.center, 0.8) < 0;
+           tracker_brightness(t, n->cylinder.center) >= fmax(limb->level, t->floor) && tracker_brightness(t, n->cylinder.center) <= limb->ceiling && tracker_node_around(t, n->cylinder.center, 0.8) < 0;
 }
 
 // Where the vessel comes from, behind the first start.
@@ -57,6 +57,22 @@ static bool is_upstream(const Tracker *t, const RbtLimb *limb)
     Vec3 way = vec3_sub(limb->place[0], root->center);
     double along = vec3_dot(way, root->axis);
     return along < 0 && along > -4 * root->radius - 4 * t->voxel && vec3_norm(vec3_add_scaled(way, -along, root->axis)) < root->radius;
+}
+
+// The blurred rim of a dense neighbour passes through every brightness: beside most of the limb lies what is too bright for a vessel.
+static bool is_rim(const Tracker *t, const RbtLimb *limb)
+{
+    int beside = 0;
+    for (int i = 0; i < limb->count; i++) {
+        bool is_bright = tracker_brightness(t, limb->place[i]) > limb->ceiling;
+        for (int k = 0; k < 18 && !is_bright; k++) {
+            double step[3] = {0, 0, 0};
+            step[k % 3] = (k / 3 % 2 ? 1 : -1) * (2 + 1.5 * (k / 6)) * t->voxel;
+            is_bright = tracker_brightness(t, vec3_add(limb->place[i], vec3(step[0], step[1], step[2]))) > limb->ceiling;
+        }
+        beside += is_bright;
+    }
+    return 2 * beside > limb->count;
 }
 
 // A cylinder somewhere on the limb: its middle first, then outwards, then inwards.
@@ -161,6 +177,8 @@ static void track_limb(void *context, long index)
     found->why = "no cylinder along the limb";
     if (is_upstream(t, limb)) {
         found->why = "is upstream of the first start";
+    } else if (is_rim(t, limb)) {
+        found->why = "is the rim of a dense neighbour";
     } else if (rbt_is_sac(t, round->paint, limb)) {
         found->is_sac = true;
         found->radius = t->estimate.node.cylinder.radius;

@@ -53,7 +53,7 @@ bool rbt_is_sac(Tracker *t, const RbtPaint *paint, const RbtLimb *limb)
         double reach = fmax(4 * widest, 2.5 * radius), *sorted = distance + MAX_RAYS;
         int samples = (int)(reach / (0.5 * t->voxel));
         RayOptions options = {reach, samples < 32 ? 32 : samples > MAX_RAY_SAMPLES ? MAX_RAY_SAMPLES : samples, t->parameters->ray_smoothing_voxels * t->voxel, 0};
-        good = tracker_is_inside(t->volume, center) && tracker_brightness(t, center) >= fmax(limb->level, t->floor);
+        good = tracker_is_inside(t->volume, center) && tracker_brightness(t, center) >= fmax(limb->level, t->floor) && tracker_brightness(t, center) <= limb->ceiling;
         if (!good)
             break;
         cast_rays_first_edge(t->volume, center, ray, rays, &options, distance);
