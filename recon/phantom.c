@@ -108,22 +108,21 @@ static bool build_helix(Shape *shape, const ShapeOptions *o)
     return shape_add(shape, (const double (*)[4])knot, N, true, true, -1, NODE_VESSEL, (const double (*)[4])tangent);
 }
 
-// Trunk and left daughter are one part, the right one another; each bends by the angle on an arc of three of its radii, then runs straight.
-// Murray's radii: r / 2^(1/3).
+// Symmetric: trunk and left daughter are one part, the right daughter is another that starts as wide as the trunk; each bends by the angle on an arc of
+// three of its radii, then runs straight. Murray's radii: r / 2^(1/3).
 static bool build_y(Shape *shape, const ShapeOptions *o)
 {
-    enum { TRUNK = 9, ARM = 17 };
-    double r = o->radius_mm, small = r / cbrt(2), angle = o->angle_deg * PI / 180, bend = 3 * small, arc = bend * angle;
-    double total = arc + fmax(o->length_mm, 4 * r);
+    enum { TRUNK = 17, ARM = 33 };
+    double r = o->radius_mm, small = r / cbrt(2), angle = o->angle_deg * PI / 180, bend = 3 * small, arc = bend * angle, length = fmax(o->length_mm, 4 * r);
     for (int side = 0; side < 2; side++) {
         double knot[TRUNK + ARM][4];
         int n = 0;
         for (int i = 0; side == 0 && i < TRUNK - 1; i++)
-            memcpy(knot[n++], (double[4]){fmax(o->length_mm, 4 * r) * ((double)i / (TRUNK - 1) - 1), 0, 0, r}, sizeof knot[0]);
+            memcpy(knot[n++], (double[4]){length * ((double)i / (TRUNK - 1) - 1), 0, 0, r}, sizeof knot[0]);
         for (int i = 0; i < ARM; i++) {
-            double s = total * i / (ARM - 1), turned = fmin(s, arc) / bend, on = fmax(0, s - arc), u = fmin(1, s / (3 * r));
+            double s = (arc + length) * i / (ARM - 1), turned = fmin(s, arc) / bend, on = fmax(0, s - arc), u = fmin(1, s / (3 * r));
             double x = bend * sin(turned) + on * cos(turned), y = bend * (1 - cos(turned)) + on * sin(turned);
-            memcpy(knot[n++], (double[4]){x, side ? -y : y, 0, side ? small : r + (small - r) * u * u * (3 - 2 * u)}, sizeof knot[0]);
+            memcpy(knot[n++], (double[4]){x, side ? -y : y, 0, r + (small - r) * u * u * (3 - 2 * u)}, sizeof knot[0]);
         }
         const double tangent[2][4] = {{1, 0, 0, 0}, {cos(angle), side ? -sin(angle) : sin(angle), 0, 0}};
         if (!shape_add(shape, (const double (*)[4])knot, n, side == 0, true, side - 1, NODE_VESSEL, tangent))

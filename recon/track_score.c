@@ -206,7 +206,7 @@ static void extend_run(Run *run, Zone zone, double length)
 
 static bool leads_to(const Judge *j, const Place *from, const Place *to, double straight)
 {
-    return way_between(&j->map, from, to) <= 2 * straight + 4 * fmax(from->radius, to->radius);
+    return way_between(&j->map, from, to) <= 1.2 * straight + 4 * fmax(from->radius, to->radius);
 }
 
 // Node i after its nearest ancestor that is a vessel.
