@@ -8,6 +8,9 @@
 #include "recon/tree_file.h"
 #include "recon/volume.h"
 #include "sim/recording.h"
+#ifdef SELDINGER_RENDER
+#include "render/picture.h"
+#endif
 
 #include <cJSON.h>
 #include <getopt.h>
@@ -15,11 +18,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char help[] = "Usage: seldinger info FILE [--json] [--report F.html]\n\n"
+static const char help[] = "Usage: seldinger info FILE [--json] [--report F.html] [--picture F.png]\n\n"
                            "Says what FILE is (volume or folder of a DICOM series, surface, tree, model, recording, scene or script) and its figures. Lengths mm.\n\n"
                            "  --json           as JSON on standard output\n"
                            "  --report F.html  of a tree or model: a page for readers, all in one file: tree, candidates (narrow places, wide places, aneurysms),\n"
-                           "                   branches, radius along each, quality of the fit; for training and research, not a medical device\n";
+                           "                   branches, radius along each, quality of the fit; for training and research, not a medical device\n"
+                           "  --picture F.png  of a model: its surface coloured by the distance to the data, and the paper's Table 4 as a histogram\n";
 
 static void add_vector(cJSON *object, const char *name, Vec3 v)
 {
@@ -58,7 +62,29 @@ static void add_box(cJSON *object, const Vec3 *point, int count)
     add_vector(object, "high_mm", high);
 }
 
-static bool describe_tree(cJSON *object, const char *path, const char *report, Faults *faults)
+// A picture is never worth a failed command: what stops it is said.
+static void draw_model(const char *picture, const char *path, const VesselTree *tree, const TreeFileInfo *info)
+{
+    char message[512] = "the tree has no fitted model to draw";
+#ifdef SELDINGER_RENDER
+    TriangleMesh *mesh = vessel_tree_is_model(tree) ? isosurface_of_tree(tree, isosurface_cell_for(tree)) : NULL;
+    double *error = mesh ? malloc(((size_t)mesh->vertex_count + 1) * sizeof *error) : NULL, voxel = tree_file_number(info, "voxel_mm", 0.2);
+    PictureOptions options = picture_default_options();
+    options.title = path;
+    bool drawn = error && surface_point_error(mesh, tree, error, NULL) &&
+                 picture_of_error(picture, &options, tree, mesh, error, voxel > 0 ? voxel : 0.2, message, sizeof message);
+    free(error);
+    triangle_mesh_free(mesh);
+#else
+    (void)path, (void)tree, (void)info;
+    bool drawn = false;
+    snprintf(message, sizeof message, "built without pictures");
+#endif
+    if (!drawn)
+        fprintf(stderr, "%s: no picture: %s\n", picture, message);
+}
+
+static bool describe_tree(cJSON *object, const char *path, const char *report, const char *picture, Faults *faults)
 {
     TreeFileInfo info = {0};
     VesselTree *tree = tree_file_load(path, &info, faults);
@@ -98,6 +124,8 @@ static bool describe_tree(cJSON *object, const char *path, const char *report, F
     if (info.created_by)
         cJSON_AddStringToObject(object, "created_by", info.created_by);
     bool good = !report || report_write(report, path, tree, &info, faults);
+    if (good && picture)
+        draw_model(picture, path, tree, &info);
     tree_file_info_free(&info);
     vessel_tree_free(tree);
     return good;
@@ -253,17 +281,18 @@ static void print_value(const cJSON *value)
 
 int verb_info(int argc, char **argv)
 {
-    enum { JSON = 256, REPORT, QUIET, HELP };
-    static const struct option table[] = {{"json", no_argument, NULL, JSON}, {"report", required_argument, NULL, REPORT}, {"quiet", no_argument, NULL, QUIET},
-                                          {"help", no_argument, NULL, HELP}, {0}};
+    enum { JSON = 256, REPORT, PICTURE, QUIET, HELP };
+    static const struct option table[] = {{"json", no_argument, NULL, JSON}, {"report", required_argument, NULL, REPORT},
+                                          {"picture", required_argument, NULL, PICTURE}, {"quiet", no_argument, NULL, QUIET}, {"help", no_argument, NULL, HELP}, {0}};
     static Faults faults;
-    const char *report = NULL;
+    const char *report = NULL, *picture = NULL;
     bool json = false, quiet = false;
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "h", table, NULL)) != -1;) {
         switch (choice) {
         case JSON: json = true; break;
         case REPORT: report = optarg; break;
+        case PICTURE: picture = optarg; break;
         case QUIET: quiet = true; break;
         case HELP:
         case 'h': fputs(help, stdout); return EXIT_DONE;
@@ -280,16 +309,18 @@ int verb_info(int argc, char **argv)
     cJSON_AddStringToObject(object, "file", path);
     bool good = false;
     FileKind kind = file_kind(path);
-    if (report && kind != FILE_TREE && kind != FILE_MISSING)
-        faults_add(&faults, path, 0, 0, "is no tree or model; --report is made of those");
-    else if (report)
+    if ((report || picture) && kind != FILE_TREE && kind != FILE_MISSING)
+        faults_add(&faults, path, 0, 0, "is no tree or model; %s is made of those", report ? "--report" : "--picture");
+    if (report)
         output_check(report, &faults);
+    if (picture)
+        output_check_file(picture, &faults);
     if (faults.count > 0) {
         cJSON_Delete(object);
         return cli_bad_input(&faults);
     }
     switch (kind) {
-    case FILE_TREE: good = describe_tree(object, path, report, &faults); break;
+    case FILE_TREE: good = describe_tree(object, path, report, picture, &faults); break;
     case FILE_RECORDING: good = describe_recording(object, path, &faults); break;
     case FILE_SCENE: good = describe_scene(object, path, &faults); break;
     case FILE_SCRIPT: good = describe_script(object, path, &faults); break;

@@ -102,6 +102,11 @@ bool picture_of_tree(const char *path, const PictureOptions *options, const int 
 bool picture_of_fit(const char *path, const PictureOptions *options, const VesselTree *tree, const TriangleMesh *mesh, const double *distance,
                     char *message, size_t capacity);
 
+// The model's surface with each vertex coloured by `error` (mesh->vertex_count) [mm] (geom/tree_surface.h: signed distance of the data point next to it,
+// > 0 inside; NaN grey), and the local models' d_a (tree->error) in voxels as a histogram with the borders of the paper's Table 4: half, one, two.
+bool picture_of_error(const char *path, const PictureOptions *options, const VesselTree *tree, const TriangleMesh *mesh, const double *error, double voxel_mm,
+                      char *message, size_t capacity);
+
 // --- time series ---
 typedef struct PictureLine {
     const char *label;

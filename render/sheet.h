@@ -56,6 +56,9 @@ void sheet_scale_bar(Sheet *sheet, double x, double y, double longest, double mm
 void sheet_color_bar(Sheet *sheet, double x, double y, double width, double height, Color (*map)(double), double map_low, double low, double high,
                      const char *title);
 
+// The paper's Table 4 as a histogram: `count` values `error` [mm] in voxels, classes C1 to C4 with their borders and shares; ticks below the box.
+void sheet_class_chart(Sheet *sheet, double x, double y, double width, double height, int count, const double *error, double voxel);
+
 // The round number (1, 2 or 5 times a power of ten) at or above x, at or below x; x itself where it is not a positive number.
 double sheet_round_up(double x);
 double sheet_round_down(double x);

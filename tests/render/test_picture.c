@@ -488,6 +488,53 @@ static void distances_choose_the_colour(void **state)
     vessel_tree_free(tree);
 }
 
+// Errors colour the surface where they are, and the classes' bars stand left of their borders.
+static void errors_colour_the_surface(void **state)
+{
+    (void)state;
+    if (!is_available)
+        skip();
+    VesselTree *tree = made_up_model();
+    TriangleMesh *mesh = isosurface_of_tree(tree, isosurface_cell_for(tree));
+    assert_non_null(mesh);
+    double *error = malloc((size_t)mesh->vertex_count * sizeof *error);
+    PictureOptions options = picture_default_options();
+    options.width = 640;
+    options.height = 400;
+    options.distance_full_scale = 0.12;
+    char message[256] = "";
+    int bars[2][2];
+    for (int k = 0; k < 2; k++) {
+        for (int v = 0; v < mesh->vertex_count; v++)
+            error[v] = k ? 0.1 : -0.1;
+        for (int i = 0; i < tree->node_count; i++)
+            tree->error[i] = k ? 0.3 : 0.1;   // C3 or C1 of voxels of 0.25 mm
+        if (!picture_of_error(in_folder("e.png"), &options, tree, mesh, error, 0.25, message, sizeof message))
+            fail_msg("%s", message);
+        Image image = load(in_folder("e.png"));
+        int red = 0, blue = 0;
+        bars[k][0] = bars[k][1] = 0;
+        for (int y = 40; y < 380; y++)
+            for (int x = 8; x < 632; x++) {
+                const uint8_t *p = pixel(&image, x, y);
+                red += x < 400 && p[0] > p[2] + 60;
+                blue += x < 400 && p[2] > p[0] + 60;
+                bars[k][0] += x > 430 && is_close(p, color_rgb(0, 114, 90), 8);
+                bars[k][1] += x > 430 && is_close(p, color_rgb(213, 94, 0), 8);
+            }
+        assert_true(k ? red > 500 && blue == 0 : blue > 500 && red == 0);
+        free(image.rgb);
+    }
+    assert_true(bars[0][0] > 100 && bars[0][0] > 2 * bars[1][0]);   // the class's name in its colour stands there always
+    assert_true(bars[1][1] > 100 && bars[1][1] > 2 * bars[0][1]);
+    remove(in_folder("e.png"));
+    assert_false(picture_of_error(in_folder("e.png"), &options, tree, mesh, error, 0, message, sizeof message));
+    assert_false(picture_of_error(in_folder("e.png"), &options, tree, NULL, error, 1, message, sizeof message));
+    free(error);
+    triangle_mesh_free(mesh);
+    vessel_tree_free(tree);
+}
+
 static int open_descriptors(void)
 {
     int count = 0;
@@ -540,6 +587,7 @@ int main(void)
         cmocka_unit_test(marks_lie_on_the_voxels_that_they_name),
         cmocka_unit_test(one_spike_among_many_samples_is_seen),
         cmocka_unit_test(distances_choose_the_colour),
+        cmocka_unit_test(errors_colour_the_surface),
         cmocka_unit_test(contexts_come_and_go),
         cmocka_unit_test(colours_tell_order),
     };
