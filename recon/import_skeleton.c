@@ -252,7 +252,7 @@ static void grow_all(Growing *g, Fine *fine, ImportReport *report)
                 best = i;
         if (best < 0)   // a curve that begins within a vessel but off its centreline
             for (int i = 0; i < fine->count; i++)
-                if (!fine->done[i] && fine->distance[i] < g->s->radius[fine->nearest[i]] && (best < 0 || fine->distance[i] < fine->distance[best]))
+                if (!fine->done[i] && fine->distance[i] < g->s->radius[fine->nearest[i]] + fine->radius[i] && (best < 0 || fine->distance[i] < fine->distance[best]))
                     best = i;
         if (best < 0)
             return;

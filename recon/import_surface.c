@@ -5,6 +5,7 @@
 #include "recon/import_surface.h"
 
 #include "recon/import_skeleton.h"
+#include "recon/mesh_tree.h"
 #include "recon/parallel.h"
 
 #include <stdlib.h>
@@ -57,6 +58,71 @@ bool import_place_curves(const SurfaceMesh *mesh, double scale, CurveSet *set, I
     return true;
 }
 
+// --- curves that graze the wall ---
+
+// Where a curve lies beside or beyond the wall (a coarse surface cuts its bends' corners) it goes to the middle of the chord that starts square to the
+// wall at the nearest point. `radius`: what the vessel has about there; chords that are longer cross another lumen.
+static Vec3 to_middle(const SurfaceMesh *mesh, const MeshTree *tree, Vec3 p, double radius, bool *moved)
+{
+    for (int pass = 0; pass < 3; pass++) {
+        Vec3 foot = p;
+        int t = 0;
+        double off = mesh_tree_nearest(tree, p, INFINITY, &foot, &t);
+        Vec3 a = mesh->vertex[mesh->triangle[t][0]], b = mesh->vertex[mesh->triangle[t][1]], c = mesh->vertex[mesh->triangle[t][2]];
+        Vec3 inward = vec3_negate(vec3_unit(vec3_cross(vec3_sub(b, a), vec3_sub(c, a))));
+        bool is_inside = vec3_dot(vec3_sub(p, foot), inward) > 0;
+        double chord = mesh_tree_ray(tree, vec3_add_scaled(foot, 1e-4 * radius, inward), inward, 4 * radius, NULL);
+        if (!isfinite(chord) || (is_inside && off > 0.3 * chord))
+            break;
+        p = vec3_add_scaled(foot, 0.5 * chord, inward);
+        *moved = true;
+    }
+    return p;
+}
+
+// The curves in steps of 0.3 radii, what grazes the wall moved to the middle; NULL where memory lacks.
+static CurveSet *clear_curves(const SurfaceMesh *mesh, const MeshTree *tree, const CurveSet *set, ImportReport *report)
+{
+    CurveSet *out = curve_set_create();
+    double total = 0;
+    for (int i = 0; i + 1 < set->point_count; i++)
+        total += vec3_distance(set->point[i], set->point[i + 1]);
+    size_t room = 300000 + 2 * (size_t)set->point_count;
+    Vec3 *point = malloc(room * sizeof *point);
+    double *radius = malloc(room * sizeof *radius);
+    bool *moved = calloc(room, sizeof *moved), good = out && point && radius && moved;
+    for (int c = 0; good && c < set->curve_count; c++) {
+        int n = 0;
+        for (int i = set->offset[c]; i < set->offset[c + 1]; i++) {
+            Vec3 from = set->point[i > set->offset[c] ? i - 1 : i], to = set->point[i], foot;
+            int t = 0;
+            double wide = fmax(set->radius[i], mesh_tree_nearest(tree, to, INFINITY, &foot, &t)), length = vec3_distance(from, to);
+            int steps = i > set->offset[c] ? (int)fmax(1, ceil(length / fmax(0.3 * wide, total / 100000))) : 1;
+            for (int k = 1; k <= steps && n + 1 < (int)room; k++) {
+                moved[n] = false;
+                radius[n] = wide;
+                point[n] = to_middle(mesh, tree, vec3_mix(from, to, (double)k / steps), wide, &moved[n]);
+                report->moved_samples += moved[n];
+                report->samples++;
+                n++;
+            }
+        }
+        // moved stretches are smoothed with their surroundings
+        for (int pass = 0; pass < 6; pass++)
+            for (int i = 1; i + 1 < n; i++)
+                if (moved[i - 1] || moved[i] || moved[i + 1])
+                    point[i] = vec3_mix(point[i], vec3_scale(vec3_add(point[i - 1], point[i + 1]), 0.5), 0.5);
+        good = curve_set_add(out, point, radius, n);
+    }
+    free(point);
+    free(radius);
+    free(moved);
+    if (good)
+        return out;
+    curve_set_free(out);
+    return NULL;
+}
+
 // --- nodes ---
 
 typedef struct Nodes {
@@ -67,7 +133,7 @@ typedef struct Nodes {
     bool *is_end;            // a leaf or the root: kept
 } Nodes;
 
-static bool choose_nodes(const Skeleton *s, double spacing, Nodes *nodes)
+static bool choose_nodes(Skeleton *s, double spacing, Nodes *nodes)
 {
     size_t room = (size_t)s->count + 1;
     int *node = malloc(room * sizeof *node);
@@ -78,6 +144,11 @@ static bool choose_nodes(const Skeleton *s, double spacing, Nodes *nodes)
     bool good = node && arc && has_child && nodes->center && nodes->direction && nodes->radius && nodes->parent && nodes->is_end;
     for (int i = 1; good && i < s->count; i++)
         has_child[s->parent[i]] = true;
+    // a graze that is left is no stenosis of a tenth: radii fall along the tree by no more than half a step's length
+    for (int i = 1; good && i < s->count; i++)
+        s->radius[i] = fmax(s->radius[i], s->radius[s->parent[i]] - 0.5 * vec3_distance(s->point[i], s->point[s->parent[i]]));
+    for (int i = s->count - 1; good && i > 0; i--)
+        s->radius[s->parent[i]] = fmax(s->radius[s->parent[i]], s->radius[i] - 0.5 * vec3_distance(s->point[i], s->point[s->parent[i]]));
     for (int i = 0; good && i < s->count; i++) {
         int up = s->parent[i];
         double since = up < 0 ? INFINITY : arc[up] + vec3_distance(s->point[i], s->point[up]);
@@ -187,7 +258,7 @@ static void find_owners(void *context, long chunk)
         for (int k = 0; k < count && s->owner[i] < 0; k++) {
             Vec3 from = s->nodes->center[node[k]], to = vec3_sub(s->point[i], from);
             double length = vec3_norm(to);
-            if (length > 4 * s->nodes->radius[node[k]])
+            if (length > 2.5 * s->nodes->radius[node[k]])
                 continue;
             // the wall is seen where nothing stands clearly before it
             double hit = length > 0 ? mesh_tree_ray(s->wall->tree, from, vec3_scale(to, 1 / length), length, NULL) : INFINITY;
@@ -352,11 +423,15 @@ static void describe_ends(const VesselTree *tree, const Skeleton *skeleton, Impo
     free(children);
 }
 
-VesselTree *import_surface(const SurfaceMesh *mesh, const CurveSet *set, const ImportOptions *options, ImportReport *report, const char *name, Faults *faults)
+VesselTree *import_surface(const SurfaceMesh *mesh, const CurveSet *given, const ImportOptions *options, ImportReport *report, const char *name, Faults *faults)
 {
     int before = faults->count;
     Wall wall;
-    if (!wall_open(mesh, set, &wall)) {
+    MeshTree *mesh_tree = mesh_tree_create(mesh);
+    CurveSet *set = mesh_tree ? clear_curves(mesh, mesh_tree, given, report) : NULL;
+    mesh_tree_free(mesh_tree);
+    if (!set || !wall_open(mesh, set, &wall)) {
+        curve_set_free(set);
         faults_add(faults, name, 0, 0, "not enough memory");
         return NULL;
     }
@@ -382,5 +457,6 @@ VesselTree *import_surface(const SurfaceMesh *mesh, const CurveSet *set, const I
     nodes_free(&nodes);
     skeleton_free(skeleton);
     wall_close(&wall);
+    curve_set_free(set);
     return tree;
 }

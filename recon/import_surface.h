@@ -23,6 +23,7 @@ typedef struct ImportReport {
     bool curves_flipped;     // x and y of the curves were negated (LPS for RAS): only so they lie inside
     double curves_scaled;    // by this, because only so they lie inside; 1
     double inside_percent;   // of the curves' points inside the surface, in the frame that was taken
+    int samples, moved_samples;          // of the curves; moved: they grazed the wall, or lay beyond it
     int branch_count, end_count, open_end_count, lid_count;
     int loop_count;          // places where a loop was cut
     Vec3 loop;               // the first of them
@@ -31,7 +32,7 @@ typedef struct ImportReport {
     int unused_components;   // of the surface: no centreline runs in them
     bool root_is_open;
     double radius_min, radius_max, length;   // [mm]; length of all branches
-    long sampled_points, unseen_points;      // unseen: no node sees them; left out
+    long sampled_points, unseen_points;      // unseen: no node sees them within 2.5 of its radii; left out
     int dropped_nodes;       // whose sphere lies within their parent's
     Vec3 root;
 } ImportReport;

@@ -8,14 +8,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { REFINE_PASSES = 8, TRIANGLES_MAX = 400000, BALL_STEPS = 24, CENTRING_PASSES = 12, RAYS = 16, CURVES_MAX = 4096 };
-static const double EDGE = 0.7, CONTACT_COSINE = 0.5, COVER = 1.5, PROTRUDES = 1.5;
+enum { REFINE_PASSES = 5, TRIANGLES_MAX = 60000, BALL_STEPS = 24, CENTRING_PASSES = 12, RAYS = 16, CURVES_MAX = 4096 };
+static const double EDGE = 0.7, CONTACT_COSINE = 0.5, COVER = 1.65, PROTRUDES = 1.5;
 
 typedef struct Pieces {      // the refined wall and its balls
     SurfaceMesh mesh;
     int (*across)[3];
     Vec3 *middle, *normal, *ball;        // (T) normal into the lumen
     double *radius;          // (T) inscribed at ball
+    bool *is_across;         // (T) the ball's two contacts lie more than 120 degrees apart: a tube's; at a lid's rim or tip they do not
     const MeshTree *tree;    // of the given mesh
 } Pieces;
 
@@ -85,19 +86,30 @@ static void find_ball(void *context, long t)
     Vec3 at = p->middle[t], n = p->normal[t], foot = at;
     int triangle = 0;
     // just inside, so that the piece itself is not hit
-    double reach = mesh_tree_ray(p->tree, vec3_add_scaled(at, 1e-6 * p->radius[t], n), n, INFINITY, NULL), r = isfinite(reach) ? 0.5 * reach : 0.5 * p->radius[t];
+    double reach = mesh_tree_ray(p->tree, vec3_add_scaled(at, 1e-6 * p->radius[t], n), n, INFINITY, NULL), r = 0.5 * reach;
+    if (!isfinite(reach)) {   // looks out of an opening
+        p->ball[t] = at;
+        p->radius[t] *= 1e-6;
+        p->is_across[t] = false;
+        return;
+    }
     Vec3 c = vec3_add_scaled(at, r, n);
     for (int step = 0; step < BALL_STEPS; step++) {
-        double d = mesh_tree_nearest(p->tree, c, INFINITY, &foot, &triangle);
+        // only what lies within the sphere is looked for: from a tube's axis all of its wall is equally near
+        double d = mesh_tree_nearest(p->tree, c, r * (1 - 1e-3), &foot, &triangle);
+        p->radius[t] = isfinite(d) ? d : r;
+        if (!isfinite(d))
+            break;
         Vec3 to_at = vec3_sub(at, c), to_foot = vec3_sub(foot, c), chord = vec3_sub(foot, at);
         double down = vec3_dot(chord, n);
-        if (d >= r * (1 - 1e-3) || down <= 0 || vec3_dot(to_at, to_foot) > CONTACT_COSINE * r * d)
+        if (down <= 0 || vec3_dot(to_at, to_foot) > CONTACT_COSINE * r * d)
             break;
         r = fmin(0.5 * vec3_norm2(chord) / down, 0.999 * r);
         c = vec3_add_scaled(at, r, n);
+        p->is_across[t] = vec3_dot(vec3_sub(at, c), vec3_sub(foot, c)) < -CONTACT_COSINE * r * r;
     }
     p->ball[t] = c;
-    p->radius[t] = fmax(mesh_tree_nearest(p->tree, c, INFINITY, &foot, &triangle), 1e-9);
+    p->radius[t] = fmax(p->radius[t], 1e-9);
 }
 
 static Vec3 area_of(const SurfaceMesh *mesh, int t)
@@ -113,11 +125,13 @@ static bool find_balls(Pieces *p, double size, int threads)
     free(p->normal);
     free(p->ball);
     free(p->radius);
+    free(p->is_across);
+    p->is_across = malloc(n * sizeof(bool));
     p->middle = malloc(n * sizeof(Vec3));
     p->normal = malloc(n * sizeof(Vec3));
     p->ball = malloc(n * sizeof(Vec3));
     p->radius = malloc(n * sizeof(double));
-    if (!p->middle || !p->normal || !p->ball || !p->radius || !link_sides(p))
+    if (!p->middle || !p->normal || !p->ball || !p->radius || !p->is_across || !link_sides(p))
         return false;
     for (int t = 0; t < p->mesh.triangle_count; t++) {
         const int *v = p->mesh.triangle[t];
@@ -132,6 +146,7 @@ static bool find_balls(Pieces *p, double size, int threads)
         p->middle[t] = vec3_scale(vec3_add(p->mesh.vertex[v[0]], vec3_add(p->mesh.vertex[v[1]], p->mesh.vertex[v[2]])), 1.0 / 3);
         p->normal[t] = vec3_negate(vec3_unit(sum));
         p->radius[t] = size;
+        p->is_across[t] = true;
     }
     parallel_for(threads, p->mesh.triangle_count, find_ball, p, NULL);
     return true;
@@ -149,9 +164,13 @@ static bool refine(Pieces *p, int *count)
     *count = 0;
     for (int i = 0, run; side && half && i < sides; i += run) {
         run = run_of(side, sides, i);
-        double length = vec3_distance(m->vertex[side[i].low], m->vertex[side[i].high]), limit = INFINITY;
+        double length = vec3_distance(m->vertex[side[i].low], m->vertex[side[i].high]), limit = 0;
+        // the largest about: balls in facets' corners are small
         for (int k = 0; k < run; k++)
-            limit = fmin(limit, EDGE * p->radius[side[i + k].triangle]);
+            for (int n = -1; n < 3; n++) {
+                int t = n < 0 ? side[i + k].triangle : p->across[side[i + k].triangle][n];
+                limit = fmax(limit, t >= 0 ? EDGE * p->radius[t] : 0);
+            }
         for (int k = 0; k < run; k++)
             half[side[i + k].triangle][side[i + k].side] = length > limit ? m->vertex_count + *count : -1;
         *count += length > limit;
@@ -366,17 +385,16 @@ static bool trace(const Pieces *p, const Ways *w, const bool *covered, const Cur
     return path->point && path->radius;
 }
 
-// Takes off the end's last samples, where the way turns into the corner of a lid or tip and its sphere shrinks.
+// Takes off the end that runs into the corner of a lid or tip: it lies within 1.5 radii of a larger sphere's centre (a lid's rim at 1.41). Once
+// only: a vessel that tapers would be eaten up.
 static void trim_end(Path *path)
 {
-    double most = 0, arc = 0;
-    int i = path->count - 1;
-    for (; i > 0 && arc < 2.5 * fmax(most, path->radius[path->count - 1]); i--) {
-        arc += vec3_distance(path->point[i], path->point[i - 1]);
-        most = fmax(most, path->radius[i]);
-    }
-    while (path->count > 2 && path->radius[path->count - 1] < 0.75 * most)
-        path->count--;
+    int tip = path->count - 1, keep = tip;
+    for (int i = tip - 1; i >= 0; i--)
+        if (path->radius[tip] < 0.9 * path->radius[i] && vec3_distance(path->point[tip], path->point[i]) < 1.5 * path->radius[i] &&
+            path->radius[i] > 0.97 * path->radius[keep])
+            keep = i;
+    path->count = keep + 1;
 }
 
 static bool protrudes(const Path *path, double parent_radius)
@@ -389,7 +407,7 @@ static bool protrudes(const Path *path, double parent_radius)
             n++;
         }
     Vec3 tip = path->point[path->count - 1];
-    return n > 2 && vec3_distance(tip, path->point[0]) + path->radius[path->count - 1] > parent_radius + PROTRUDES * radius / n + radius / n;
+    return n > 2 && vec3_distance(tip, path->point[0]) + path->radius[path->count - 1] > COVER * parent_radius + PROTRUDES * radius / n;
 }
 
 static void path_free(Path *path)
@@ -402,7 +420,7 @@ static int farthest(const Pieces *p, const Ways *w, const bool *covered)
 {
     int best = -1;
     for (int t = 0; t < p->mesh.triangle_count; t++)
-        if (!covered[t] && isfinite(w->cost[t]) && (best < 0 || w->length[t] > w->length[best]))
+        if (!covered[t] && p->is_across[t] && isfinite(w->cost[t]) && (best < 0 || w->length[t] > w->length[best]))
             best = t;
     return best;
 }
@@ -411,6 +429,8 @@ static bool find_curves(const Pieces *p, Ways *w, bool *covered, int start, Curv
 {
     find_ways(p, start, w);
     start = farthest(p, w, covered);
+    if (start < 0)
+        return true;
     find_ways(p, start, w);
     for (int tip; set->curve_count < CURVES_MAX && (tip = farthest(p, w, covered)) >= 0;) {
         Path path;
@@ -536,5 +556,6 @@ CurveSet *mesh_centreline(const SurfaceMesh *mesh, const ImportOptions *options,
     free(p.normal);
     free(p.ball);
     free(p.radius);
+    free(p.is_across);
     return set;
 }
