@@ -14,6 +14,7 @@ static const struct Verb {
     {"run", verb_run, "SCENE", "runs a scene headless: summary, final state, recording, picture"},
     {"check", verb_check, "PATH...", "runs every scene that has a golden tool path and compares"},
     {"segment", verb_segment, "VOLUME --trace F.yaml -o TREE.h5", "RBT: an angiogram to a tree of centreline nodes with local points"},
+    {"import", verb_import, "--surface F -o TREE.h5", "the same tree from a surface, with centrelines or alone"},
     {"fit", verb_fit, "TREE.h5 -o MODEL.h5", "LIM: a local blobby model for each node"},
     {"synth", verb_synth, "SHAPE -o F", "synthetic shapes with known truth"},
     {"query", verb_query, "MODEL.h5 --points F.csv -o F.csv", "field, gradient and distance of a model at points"},
