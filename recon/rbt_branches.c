@@ -63,14 +63,15 @@ static bool is_upstream(const Tracker *t, const RbtLimb *limb)
 static bool is_rim(const Tracker *t, const RbtLimb *limb)
 {
     int beside = 0;
+    double bright = limb->ceiling - RBT_NOISE_SHARE * t->noise;   // one sample may be noise, two are hardly
     for (int i = 0; i < limb->count; i++) {
-        bool is_bright = tracker_brightness(t, limb->place[i]) > limb->ceiling;
-        for (int k = 0; k < 18 && !is_bright; k++) {
+        int count = 0;
+        for (int k = 0; k < 18; k++) {
             double step[3] = {0, 0, 0};
             step[k % 3] = (k / 3 % 2 ? 1 : -1) * (2 + 1.5 * (k / 6)) * t->voxel;
-            is_bright = tracker_brightness(t, vec3_add(limb->place[i], vec3(step[0], step[1], step[2]))) > limb->ceiling;
+            count += tracker_brightness(t, vec3_add(limb->place[i], vec3(step[0], step[1], step[2]))) > bright;
         }
-        beside += is_bright;
+        beside += count >= 2;
     }
     return 2 * beside > limb->count;
 }
@@ -369,13 +370,14 @@ static void measure_root(Tracker *t, double noise)
     qsort(inside, (size_t)n, sizeof *inside, compare_doubles);
     qsort(contrast, (size_t)n, sizeof *contrast, compare_doubles);
     t->floor = inside[n / 2] - (1 - t->parameters->residue) * contrast[n / 2];
-    t->ceiling = inside[n - 1 - n / 10] + RBT_BRIGHTER * contrast[n / 2] + 0.6 * noise;
+    t->ceiling = inside[n - 1 - n / 10] + RBT_BRIGHTER * contrast[n / 2] + RBT_NOISE_SHARE * noise;
 }
 
 bool rbt_grow_branches(Tracker *t, RbtPaint *paint, int first, int threads, const Progress *progress, RbtEnds *ends)
 {
     const double share[] = {0.5, 0.5 * (0.5 + t->parameters->residue), t->parameters->residue};
     double noise = 4 * noise_of(t);
+    t->noise = noise;
     if (first == 0)
         measure_root(t, noise);
     rbt_paint_nodes(paint, &t->tree, first, t->tree.count);

@@ -81,7 +81,8 @@ void rbt_paint_nodes(RbtPaint *paint, const Track *tree, int first, int end)
 {
     for (int i = first; i < end; i++) {
         const TrackNode *n = &tree->node[i];
-        paint_ball(paint, tree, i, n->cylinder.center, n->cylinder.radius);
+    // a sac is no ball: what sticks out of it is looked at
+        paint_ball(paint, tree, i, n->cylinder.center, (n->kind == NODE_ANEURYSM ? 0.8 : 1) * n->cylinder.radius);
         if (n->parent < 0)
             continue;
         const Cylinder *p = &tree->node[n->parent].cylinder;
@@ -400,7 +401,7 @@ static void set_borders(const Tracker *t, int first, int end, double share, doub
         double in = inside[n / 2], out = fmin(outside[n / 2], in);
         border[i - first].level = out + fmax(share * (in - out), noise);
         // narrow vessels are dim: what leaves them need not be
-        border[i - first].ceiling = t->tree.node[i].cylinder.radius < 2 * t->voxel ? t->ceiling : in + RBT_BRIGHTER * (in - out) + 0.6 * noise;
+        border[i - first].ceiling = t->tree.node[i].cylinder.radius < 2 * t->voxel ? t->ceiling : in + RBT_BRIGHTER * (in - out) + RBT_NOISE_SHARE * noise;
         border[i - first].reach = fmax(14 * t->voxel, 3.5 * t->tree.node[i].cylinder.radius);
         brightest = fmax(brightest, border[i - first].ceiling);
     }

@@ -21,6 +21,7 @@ int rbt_paint_node(const RbtPaint *paint, Vec3 x);
 
 // What is brighter than the vessel beside it by more than this share of its contrast is bone, metal, not vessel.
 #define RBT_BRIGHTER 0.12
+#define RBT_NOISE_SHARE 0.6   // of the noise (four standard deviations) that is allowed on top
 
 enum { RBT_LIMB_PLACES = 24 };
 typedef struct RbtLimb {

@@ -46,6 +46,7 @@ typedef struct Tracker {
     const struct RbtPaint *paint;  // of the tree, for fast looks around; NULL: all nodes are looked at
     bool is_guarded;         // a branch that was found, not clicked: it must neither swell nor brighten past its vessel
     double longest;          // [mm] a branch may become
+    double noise;            // four standard deviations of the spline's values in the background
     double floor, ceiling;   // brightness below which a guarded branch has ended; above which nothing is vessel
     bool out_of_memory;
     const char *why;         // the last estimate was refused
