@@ -21,7 +21,7 @@ typedef struct TrackTruth {
     int block_count;             // bone
     const ShapeBlock *block;
     double voxel_mm;             // a centre may lie this share of a voxel outside and still count as inside: 0.5
-    double blur_mm;              // b: the steepest edge of a blurred disc lies at R - b^2 / (2 R) (references.md)
+    double blur_mm;              // b, standard deviation of all that blurs the image on its way to the edge
 } TrackTruth;
 
 typedef struct TrackBranch {
@@ -36,7 +36,8 @@ typedef struct TrackBranch {
 typedef struct TrackSample {     // of a tracked node inside a branch, two radii away from bifurcations and tips
     int branch;
     double center;               // [mm] distance of its centre to the true centreline
-    double radius;               // [mm] its radius less the one expected, R - b^2 / (2 R)
+    double radius;               // [mm] its radius less the one expected, R - b^2 / (2 R) (references.md) …
+    double radius_exact;         // … and less track_score_edge(R, b), which also holds where b is not small against R
     double true_radius;
 } TrackSample;
 
@@ -56,5 +57,8 @@ typedef struct TrackScore {
 // False where memory lacks. `tracked` may be NULL: nothing was tracked.
 bool track_score(const TrackTruth *truth, const VesselTree *tracked, TrackScore *out);
 void track_score_free(TrackScore *score);
+// Where a disc of radius R blurred by b is steepest: its slope is R/b^2 exp(-(R^2 + x^2) / (2 b^2)) I1(R x / b^2), steepest where
+// x = R I0(z) / I1(z) - b^2 / x, z = R x / b^2. Tends to R - b^2 / (2 R) for b << R and to b for R << b.
+double track_score_edge(double radius, double blur);
 
 #endif
