@@ -218,39 +218,55 @@ static int parts_near(const Shape *shape, Vec3 x, const int **list)
     return cell->count;
 }
 
-static double joined_field(const Shape *shape, Vec3 x, bool cut, Vec3 *gradient, int *which, double *at)
+// `f`, `g`: room for `count`, by place in the list.
+static double join(const Shape *shape, Vec3 x, bool cut, const int *list, int count, double *f, Vec3 *g, Vec3 *gradient, int *which, double *at)
 {
-    double f[MOST_PARTS], best = -HUGE_VAL, highest = -HUGE_VAL, t;
-    Vec3 g[MOST_PARTS], best_gradient = {0, 0, 0};
-    const int *list;
-    int count = parts_near(shape, x, &list);
-    for (int i = 0; list && i < count; i++)
-        if (shape->part[list[i]].parent >= 0)
-            f[shape->part[list[i]].parent] = -HUGE_VAL;   // too far below to join, where it is not in the list itself
+    double best = -HUGE_VAL, highest, t;
+    Vec3 best_gradient = {0, 0, 0};
     for (int i = 0; i < count; i++) {
         // a part further below the best than the joints are wide cannot matter
         int p = list ? list[i] : i;
-        f[p] = part_field(&shape->part[p], x, best - shape->widest_joint, cut, &g[p], &t);
-        if (f[p] > best)
-            best = f[p], best_gradient = g[p], *which = p, *at = t;
+        f[i] = part_field(&shape->part[p], x, best - shape->widest_joint, cut, &g[i], &t);
+        if (f[i] > best)
+            best = f[i], best_gradient = g[i], *which = p, *at = t;
     }
     highest = best;
     for (int i = 0; i < count; i++) {
-        int p = list ? list[i] : i, parent = shape->part[p].parent;
-        if (parent < 0)
+        int p = list ? list[i] : i, parent = shape->part[p].parent, k = list ? 0 : parent;
+        while (list && k < count && list[k] != parent)
+            k++;
+        if (parent < 0 || k == count)   // a parent that is not in the list is too far below to join
             continue;
-        double k = joint_width(shape, p), a = f[p], b = f[parent], h = 1 - fabs(a - b) / k;
+        double width = joint_width(shape, p), h = 1 - fabs(f[i] - f[k]) / width;
         if (!(h > 0))
             continue;
-        double joined = fmax(a, b) + k / 6 * h * h * h, share = 0.5 * h * h;
+        double joined = fmax(f[i], f[k]) + width / 6 * h * h * h, share = 0.5 * h * h;
         if (joined > highest) {
             highest = joined;
-            best_gradient = a > b ? vec3_mix(g[p], g[parent], share) : vec3_mix(g[parent], g[p], share);
+            best_gradient = f[i] > f[k] ? vec3_mix(g[i], g[k], share) : vec3_mix(g[k], g[i], share);
         }
     }
     if (gradient)
         *gradient = best_gradient;
     return highest;
+}
+
+// Apart, so that the usual few parts do not pay for a large frame.
+__attribute__((noinline)) static double join_many(const Shape *shape, Vec3 x, bool cut, const int *list, int count, Vec3 *gradient, int *which, double *at)
+{
+    double f[MOST_PARTS];
+    Vec3 g[MOST_PARTS];
+    return join(shape, x, cut, list, count, f, g, gradient, which, at);
+}
+
+static double joined_field(const Shape *shape, Vec3 x, bool cut, Vec3 *gradient, int *which, double *at)
+{
+    enum { USUAL = 12 };
+    double f[USUAL];
+    Vec3 g[USUAL];
+    const int *list;
+    int count = parts_near(shape, x, &list);
+    return count > USUAL ? join_many(shape, x, cut, list, count, gradient, which, at) : join(shape, x, cut, list, count, f, g, gradient, which, at);
 }
 
 double shape_field(const Shape *shape, Vec3 x, Vec3 *gradient)
@@ -395,11 +411,15 @@ static int parts_that_matter(const Shape *shape, const int *list, int count, Vec
 
 static bool keep_parts(Shape *shape, Cell *cell, const int *list, int count)
 {
-    int *more = realloc(shape->cell_part, (size_t)(shape->cell_part_count + count) * sizeof *more);
-    if (!more)
-        return false;
-    memcpy(more + shape->cell_part_count, list, (size_t)count * sizeof *list);
-    shape->cell_part = more;
+    if (shape->cell_part_count + count > shape->cell_part_capacity) {
+        int capacity = 2 * shape->cell_part_capacity + MOST_PARTS;
+        int *more = realloc(shape->cell_part, (size_t)capacity * sizeof *more);
+        if (!more)
+            return false;
+        shape->cell_part = more;
+        shape->cell_part_capacity = capacity;
+    }
+    memcpy(shape->cell_part + shape->cell_part_count, list, (size_t)count * sizeof *list);
     cell->first = shape->cell_part_count;
     cell->count = count;
     shape->cell_part_count += count;
@@ -415,10 +435,14 @@ static bool divide(Shape *shape, int index, const int *list, int count, Vec3 low
     shape->cell[index].child = -1;
     if (n <= ENOUGH || depth == DEEPEST || edge < 2 * shape->widest_joint)
         return keep_parts(shape, &shape->cell[index], kept, n);
-    Cell *more = realloc(shape->cell, (size_t)(shape->cell_count + 8) * sizeof *more);
-    if (!more)
-        return false;
-    shape->cell = more;
+    if (shape->cell_count + 8 > shape->cell_capacity) {
+        int capacity = 2 * shape->cell_capacity + 64;
+        Cell *more = realloc(shape->cell, (size_t)capacity * sizeof *more);
+        if (!more)
+            return false;
+        shape->cell = more;
+        shape->cell_capacity = capacity;
+    }
     int child = shape->cell[index].child = shape->cell_count;
     shape->cell_count += 8;
     for (int i = 0; i < 8; i++)
@@ -444,6 +468,6 @@ bool shape_finish(Shape *shape)
     for (int p = 0; p < shape->part_count; p++)
         all[p] = p;
     shape->cell = malloc(sizeof *shape->cell);
-    shape->cell_count = shape->cell != NULL;
+    shape->cell_count = shape->cell_capacity = shape->cell != NULL;
     return shape->cell && divide(shape, 0, all, shape->part_count, shape->cell_low, shape->cell_edge, 0);
 }

@@ -52,7 +52,7 @@ struct Shape {
 
     Vec3 cell_low;           // octree: a cube of edge `cell_edge` from there
     double cell_edge;
-    int cell_count, cell_part_count;
+    int cell_count, cell_capacity, cell_part_count, cell_part_capacity;
     Cell *cell;
     int *cell_part;
 };
