@@ -71,7 +71,7 @@ static error_t parse_option(int key, char *text, struct argp_state *state)
 static const char intro[] =
     "Tracks vessels through an angiogram (RBT, Kerrien et al. 2017, section 3): VOLUME to a tree of cylinders, each with its points on the wall.\v"
     "VOLUME is NRRD (raw, gzip or text, attached or detached), MetaImage or NIfTI, recognised by its content.\n\n"
-    "The trace is YAML. The first branch needs a start, a point further down the vessel and about its radius; it becomes the root of the tree. Where it is the only "
+    "The trace is YAML. The first branch needs a start; its direction (toward, a point further down the vessel) and radius_mm are estimated where they are not given. It becomes the root of the tree, and without a toward one of its two ends does, at the volume's border or wider than the other. Where it is the only "
     "one (or with automatic: 1) the rest of the tree is found from it, downstream, aneurysms too. Further branches need a start alone: it is projected to the tree tracked so far and the tracking starts beside the parent; with a `toward` it starts at the point itself and "
     "runs both ways. All of mm may be voxels (start_voxel, toward_voxel, centers_voxel):\n\n"
     "  branches:\n"
@@ -132,6 +132,8 @@ static void print_table(const VesselTree *tree, const RbtReport *report, double 
             printf("%s\n", b->end);
         length += b->length;
     }
+    if (report->start[0])
+        printf("%s\n", report->start);
     printf("%d branches, %.0f mm, %d nodes, %ld points; volume read in %.2f s, tracked in %.2f s\n", report->branch_count, length, tree->node_count, (long)tree->point_count,
            load_s, track_s);
 }
@@ -165,6 +167,8 @@ static bool write_json(const SegmentArguments *a, const VesselTree *tree, const 
     cJSON_AddStringToObject(root, "trace", a->trace);
     cJSON_AddNumberToObject(root, "nodes", tree->node_count);
     cJSON_AddNumberToObject(root, "points", (double)tree->point_count);
+    if (report->start[0])
+        cJSON_AddStringToObject(root, "start", report->start);
     cJSON_AddNumberToObject(root, "load_s", load_s);
     cJSON_AddNumberToObject(root, "track_s", track_s);
     for (int i = 0; i < report->branch_count; i++) {

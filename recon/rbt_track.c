@@ -15,6 +15,7 @@
 #include "recon/rbt_exits.h"
 #include "recon/rbt_links.h"
 #include "recon/rbt_residue.h"
+#include "recon/rbt_start.h"
 #include "recon/rbt_tracker.h"
 
 #include <stdio.h>
@@ -604,6 +605,63 @@ static int project_to_tree(const Tracker *t, Vec3 x, Vec3 *foot)
     return node;
 }
 
+// What was estimated at the first start, for the report.
+static void say_start(Tracker *t, const RbtSeed *seed, const Cylinder *start, const char *root)
+{
+    char radius[48] = "", direction[80] = "";
+    if (!(seed->radius > 0))
+        snprintf(radius, sizeof radius, ", radius %.2f mm", start->radius);
+    if (!seed->has_toward)
+        snprintf(direction, sizeof direction, ", direction (%.2f, %.2f, %.2f)", start->axis.x, start->axis.y, start->axis.z);
+    snprintf(t->start, sizeof t->start, "first start estimated: middle (%.2f, %.2f, %.2f) mm, %.2f mm from the click%s%s; %s", start->center.x, start->center.y, start->center.z,
+             vec3_distance(start->center, seed->start), radius, direction, root);
+}
+
+// Nodes of `way` up to where it meets `other`, which starts at the same place: a ring of vessels closes there.
+static int nodes_before_meeting(const Track *way, const Track *other, double share)
+{
+    double length = 0;
+    for (int i = 1; i < way->count; i++) {
+        length += vec3_distance(way->node[i].cylinder.center, way->node[i - 1].cylinder.center);
+        for (int k = 0; length > 4 * way->node[0].cylinder.radius && k < other->count; k++)
+            if (vec3_distance(way->node[i].cylinder.center, other->node[k].cylinder.center) < share * other->node[k].cylinder.radius)
+                return i;
+    }
+    return way->count;
+}
+
+// The first branch from a start without direction: it may lie anywhere along the vessel.
+static bool track_both_ways(Tracker *t, const RbtSeed *seed, const Cylinder *start, int number)
+{
+    Track way[2] = {{0}, {0}}, back = {0};
+    const char *end[2], *why = "the vessel was tracked one way only";
+    for (int i = 0; i < 2 && !t->out_of_memory; i++) {
+        Cylinder from = *start;
+        from.axis = i ? vec3_negate(from.axis) : from.axis;
+        tracker_run(t, &from, &way[i], false);
+        end[i] = t->why;
+    }
+    if (way[0].count > 0 && way[1].count > 0)
+        track_cut(&way[1], nodes_before_meeting(&way[1], &way[0], t->parameters->overlap));
+    int out = way[0].count == 0 || (way[1].count > 0 && rbt_root_is_at_end_of(t, &way[0], &way[1], &why));
+    bool found = way[out].count > 0 && !t->out_of_memory;
+    // the first node of both is the same one, seen from either side
+    for (int i = 1; found && i < way[1 - out].count && !t->out_of_memory; i++)
+        t->out_of_memory = !track_append(&back, &way[1 - out].node[i], way[1 - out].point + way[1 - out].node[i].point_start);
+    if (found && !t->out_of_memory)
+        t->out_of_memory = !adopt_branch(t, &way[out], &back, number);
+    if (found) {
+        char root[120];
+        snprintf(root, sizeof root, "tracked both ways, the root is %s", why);
+        say_start(t, seed, start, way[1 - out].count > 0 ? root : why);
+        t->why = end[out];
+    }
+    for (int i = 0; i < 2; i++)
+        track_free(&way[i]);
+    track_free(&back);
+    return found && !t->out_of_memory;
+}
+
 // Tracks seed `number`. With a `toward`: from its start, and for further branches also back to the parent. Without: as section 3.3 has it, from just
 // outside the parent's wall; where nothing is found there (the point was set far down the branch) from the point itself, and back.
 static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
@@ -614,6 +672,13 @@ static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
     t->random = random_from_seed((uint64_t)t->parameters->seed, (uint64_t)number);
     if (seed->has_toward)
         start.axis = vec3_unit(vec3_sub(seed->toward, seed->start));
+    if (is_first && (!seed->has_toward || !(seed->radius > 0))) {
+        if (!rbt_estimate_start(t, seed, &start))
+            return false;
+        if (!seed->has_toward)
+            return track_both_ways(t, seed, &start, number);
+        say_start(t, seed, &start, "the root is the start");
+    }
     if (!is_first) {
         Vec3 foot = seed->start;
         int parent = project_to_tree(t, seed->start, &foot);
@@ -992,12 +1057,8 @@ static bool check_seed(const Tracker *t, RbtSeed *seed, int number, const char *
     seed->start_is_voxel = seed->toward_is_voxel = false;
     snprintf(what, sizeof what, "the start of branch %d", number + 1);
     check_point(t, seed->start, what, seed->line, seed->column, path, faults);
-    if (number == 0 && !seed->has_toward)
-        faults_add(faults, path, seed->line, seed->column, "the first branch has no direction; toward_mm (or toward_voxel), a point further down the vessel");
     if (seed->has_toward && !(vec3_distance(seed->start, seed->toward) > 1e-6 * t->voxel))
         faults_add(faults, path, seed->line, seed->column, "the start of branch %d and its toward are the same point; toward is a point further down the vessel", number + 1);
-    if (number == 0 && !(seed->radius > 0))
-        faults_add(faults, path, seed->line, seed->column, "the first branch has no radius; radius_mm, about that of the vessel at its start");
     double extent = 0;
     for (int i = 0; i < 3; i++)
         extent = fmax(extent, vec3_norm(t->volume->axis[i]) * t->volume->size[i]);
@@ -1241,6 +1302,7 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
                        .axis_count = (int)parameters->n_d, .longest = HUGE_VAL};
         double low, high;
         brightness_range(volume, &low, &high);
+        t->background = low;
         t->dark = low + 0.2 * (high - low);
         if (seed_count > 0)
             memcpy(seed, given, (size_t)seed_count * sizeof *seed);
@@ -1258,6 +1320,7 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
         Job job = {seed, seed_count, aneurysm, center, aneurysm_count, threads, progress, path, faults};
         if (track_all(t, &job, &own) && !(tree = finish_tree(&t->tree)))
             faults_add(faults, path, 0, 0, "out of memory for a tree of %d nodes", t->tree.count);
+        memcpy(own.start, t->start, sizeof own.start);
     }
     if (t)
         track_free(&t->tree);

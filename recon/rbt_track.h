@@ -83,7 +83,7 @@ char *rbt_parameters_text(const RbtParameters *parameters, double voxel_mm);
 typedef struct RbtSeed {     // where a branch starts
     Vec3 start, toward;      // [mm] or voxels
     bool start_is_voxel, toward_is_voxel, has_toward;
-    double radius;           // [mm]; 0: the parent's (not for the first branch)
+    double radius;           // [mm]; 0: the parent's; the first branch's is estimated
     int line, column;        // in the trace file, for faults
     char name[32];           // for reports; may be empty
 } RbtSeed;
@@ -115,10 +115,12 @@ typedef struct RbtBranchReport {
 typedef struct RbtReport {
     int branch_count;
     RbtBranchReport *branch; // one a seed, then one an aneurysm
+    char start[256];         // what was estimated at the first start, and which end is the root; empty: it was given
 } RbtReport;
 void rbt_report_free(RbtReport *report);
 
-// Seeds first to last, then the aneurysms. The first seed gives the root and its direction (toward). A further one is projected to the tree tracked so far
+// Seeds first to last, then the aneurysms. The first seed gives the root and its direction (toward). Without a direction the
+// vessel is tracked both ways from it, and one of its ends becomes the root (rbt_start.h). A further one is projected to the tree tracked so far
 // (section 3.3) unless it has a `toward`: then it is tracked from its start in both directions, back to the parent. NULL with faults (`path` is the trace
 // file's) when a seed is unfit or nothing could be tracked from it; a branch that just ends early is no fault. `report` may be NULL.
 VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, const RbtSeed *seed, int seed_count, const RbtAneurysm *aneurysm,

@@ -33,6 +33,7 @@ typedef struct Tracker {
     const Volume *volume;
     const RbtParameters *parameters;
     double voxel;            // [mm]
+    double background;       // brightness of most of the volume
     double dark;             // brightness below which a start lies on background
     int ray_count, axis_count;
     Vec3 ray[MAX_RAYS];
@@ -50,6 +51,7 @@ typedef struct Tracker {
     double floor, ceiling;   // brightness below which a guarded branch has ended; above which nothing is vessel
     bool out_of_memory;
     const char *why;         // the last estimate was refused
+    char start[256];         // what was estimated at the first start; empty: nothing
 } Tracker;
 
 bool track_append(Track *track, const TrackNode *node, const Vec3 *point);   // false: out of memory

@@ -96,7 +96,7 @@ static void read_place(const Walk *w, const yaml_node_t *node, const char *key, 
     read_vector(w, node, key, out);
 }
 
-static void read_branch(const Walk *w, const yaml_node_t *map, bool is_first, RbtSeed *out)
+static void read_branch(const Walk *w, const yaml_node_t *map, RbtSeed *out)
 {
     *out = (RbtSeed){.line = (int)map->start_mark.line + 1, .column = (int)map->start_mark.column + 1};
     bool has_start = false;
@@ -122,10 +122,6 @@ static void read_branch(const Walk *w, const yaml_node_t *map, bool is_first, Rb
     }
     if (!has_start)
         FAULT(w, map, "the branch has no start; start_mm (or start_voxel)");
-    if (is_first && !out->has_toward)
-        FAULT(w, map, "the first branch has no direction; toward_mm (or toward_voxel), a point further down the vessel");
-    if (is_first && !(out->radius > 0))
-        FAULT(w, map, "the first branch has no radius; radius_mm, about that of the vessel at its start");
 }
 
 static void read_aneurysm(const Walk *w, const yaml_node_t *map, RbtAneurysm *out)
@@ -187,7 +183,7 @@ static void read_list(const Walk *w, const yaml_node_t *list, bool is_branches, 
     for (int i = 0; i < n; i++) {
         yaml_node_t *item = node_at(w, list->data.sequence.items.start[i]);
         if (item && is_branches)
-            read_branch(w, item, i == 0, &trace->branch[i]);
+            read_branch(w, item, &trace->branch[i]);
         else if (item)
             read_aneurysm(w, item, &trace->aneurysm[i]);
     }

@@ -415,15 +415,13 @@ static void unfit_seeds(void **state)
     struct {
         RbtSeed seed;
         const char *words;
-    } cases[] = {{good, "outside the volume"}, {good, "lies on background"}, {good, "same point"}, {good, "no radius"}, {good, "no direction"},
-                 {good, "larger than the volume"}, {good, "nothing could be tracked"}};
+    } cases[] = {{good, "outside the volume"}, {good, "lies on background"}, {good, "same point"}, {good, "larger than the volume"},
+                 {good, "nothing could be tracked"}};
     cases[0].seed.start = vec3(5, 5, -1);
     cases[1].seed.start = vec3(1, 1, 2);
     cases[2].seed.toward = good.start;
-    cases[3].seed.radius = 0;
-    cases[4].seed.has_toward = false;
-    cases[5].seed.radius = 50;
-    cases[6].seed.radius = 0.05;   // twenty times too thin: no wall within the rays
+    cases[3].seed.radius = 50;
+    cases[4].seed.radius = 0.05;   // twenty times too thin: no wall within the rays
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         faults_clear(&faults);
         VesselTree *tree = rbt_track(p.volume, &parameters, &cases[i].seed, 1, NULL, 0, 1, NULL, NULL, "t.yaml", &faults);
@@ -461,6 +459,55 @@ static void nothing_beyond_the_end(void **state)
         end = tree->center[tree->node_count - 1].z;
         assert_true(end < 2.5 && end >= 0);
         vessel_tree_free(tree);
+    }
+    phantom_free(&p);
+}
+
+// A start alone, half a radius off the axis, half-way along a curved vessel that fades into the volume's border at one end: all of the vessel, root first.
+static void a_click_is_enough(void **state)
+{
+    (void)state;
+    double blur = 0.2, middle = 4.2;
+    Disc disc = disc_of(1, blur);
+    Phantom p = phantom_box(80, 80, 95, 0.2, vec3(0, 0, 0));
+    for (int i = 0; i <= 1100; i++)
+        add_ball(&p, helix(8.5 * i / 1100), 1);
+    add_line(&p, helix(8.5), vec3_add_scaled(helix(8.5), 4, vec3_sub(helix(8.5), helix(8.4))), 1);
+    develop(&p, &disc, 0, 0.05, 1);
+    Vec3 tangent = vec3_unit(vec3_sub(helix(middle + 0.01), helix(middle))), e1 = vec3_normal_to(tangent), e2 = vec3_cross(tangent, e1);
+    for (int k = 0; k < 4; k++) {
+        RbtParameters parameters = rbt_default_parameters();
+        Vec3 off = k % 2 ? e2 : e1;
+        RbtSeed seed = {.start = vec3_add_scaled(helix(middle), k < 2 ? 0.5 : -0.5, off), .line = 1, .column = 1};
+        RbtReport report = {0};
+        VesselTree *tree = rbt_track(p.volume, &parameters, &seed, 1, NULL, 0, 1, NULL, &report, "t.yaml", &faults);
+        assert_non_null(tree);
+        assert_valid(tree);
+        assert_int_equal(tree->parent[0], -1);
+        double ends[2] = {1e9, 1e9};
+        for (int i = 0; i < tree->node_count; i++) {
+            ends[0] = fmin(ends[0], vec3_distance(tree->center[i], helix(0.2)));
+            ends[1] = fmin(ends[1], vec3_distance(tree->center[i], helix(8.3)));
+        }
+        assert_true(ends[0] < 0.6 && ends[1] < 0.6);
+        assert_int_equal(report.branch_count, 1);
+        assert_non_null(strstr(report.start, "both ways"));
+        rbt_report_free(&report);
+        vessel_tree_free(tree);
+        // one of the two alone: the other is kept, the root is the start
+        for (int given = 0; given < 2; given++) {
+            RbtSeed half = seed;
+            half.has_toward = given == 0;
+            half.toward = helix(middle - 0.4);
+            half.radius = given == 0 ? 0 : 1.1;
+            tree = rbt_track(p.volume, &parameters, &half, 1, NULL, 0, 1, NULL, &report, "t.yaml", &faults);
+            assert_non_null(tree);
+            assert_true(given ? strstr(report.start, "direction") && !strstr(report.start, "radius") : strstr(report.start, "radius") && !strstr(report.start, "direction"));
+            if (given == 0)   // the end that way is a hemisphere
+                assert_true(vec3_distance(tree->center[0], helix(middle)) < 0.5 && vec3_distance(tree->center[tree->node_count - 1], helix(0)) < 3);
+            rbt_report_free(&report);
+            vessel_tree_free(tree);
+        }
     }
     phantom_free(&p);
 }
@@ -526,7 +573,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(straight_cylinder), cmocka_unit_test(helix_to_its_end), cmocka_unit_test(oblique_grid), cmocka_unit_test(symmetric_bifurcation),
         cmocka_unit_test(past_a_sac), cmocka_unit_test(the_same_for_any_number_of_threads), cmocka_unit_test(unfit_seeds),
-        cmocka_unit_test(nothing_beyond_the_end), cmocka_unit_test(past_the_giant_aneurysm),
+        cmocka_unit_test(nothing_beyond_the_end), cmocka_unit_test(a_click_is_enough),
+        cmocka_unit_test(past_the_giant_aneurysm),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -40,6 +40,15 @@ static void full_file(void **state)
     trace_free(t);
 }
 
+static void a_start_is_enough(void **state)
+{
+    (void)state;
+    Trace *t = parse("branches: [{start_voxel: [1, 2, 3]}]\n");
+    assert_non_null(t);
+    assert_true(t->branch[0].start_is_voxel && !t->branch[0].has_toward && t->branch[0].radius == 0 && t->parameters.automatic == 1);
+    trace_free(t);
+}
+
 // One start alone asks for the whole tree; a second one, or a word, does not.
 static void automatic_and_corrections(void **state)
 {
@@ -104,8 +113,6 @@ static void faults_with_their_place(void **state)
         {"p_inl: 0.5\n", "t.yaml:1:1", "there is no branch"},
         {"branches: []\n", "t.yaml:1:1", "there is no branch"},
         {"branches: [3]\n", "t.yaml:1:12", "a branch is not valid"},
-        {"branches: [{start_mm: [1, 2, 3]}]\n", "t.yaml:1:12", "no direction"},
-        {"branches: [{start_mm: [1, 2, 3], toward_mm: [2, 2, 3]}]\n", "t.yaml:1:12", "no radius"},
         {"branches: [{toward_mm: [1, 2, 3], radius_mm: 1}]\n", "t.yaml:1:12", "no start"},
         {"branches: [{start_mm: [1, 2], toward_mm: [2, 2, 3], radius_mm: 1}]\n", "t.yaml:1:23", "three numbers"},
         {"branches: [{start_mm: [1, 2, x], toward_mm: [2, 2, 3], radius_mm: 1}]\n", "t.yaml:1:30", "'x' is not valid"},
@@ -147,13 +154,13 @@ static void faults_with_their_place(void **state)
     }
     // all in one pass
     assert_null(parse("branches: [{start_mm: [1, 2], toward_mm: 3, radius_mm: -1}]\nseed: x\nwhat: 1\n"));
-    assert_int_equal(faults.count, 6);
+    assert_int_equal(faults.count, 5);
     // an anchor that holds itself
     assert_null(parse("branches: &a [*a]\n"));
 }
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(full_file), cmocka_unit_test(automatic_and_corrections), cmocka_unit_test(every_parameter_by_name), cmocka_unit_test(faults_with_their_place)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(full_file), cmocka_unit_test(a_start_is_enough), cmocka_unit_test(automatic_and_corrections), cmocka_unit_test(every_parameter_by_name), cmocka_unit_test(faults_with_their_place)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

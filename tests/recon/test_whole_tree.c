@@ -1,4 +1,5 @@
 // The whole tree from one start: what is found, what is refused, and that corrections change nothing else.
+#include "recon/phantom.h"
 #include "recon/rbt_track.h"
 
 #include <setjmp.h>
@@ -205,6 +206,40 @@ static void a_sac_is_found(void **state)
     volume_free(v);
 }
 
+// One click anywhere in a random tree, half a radius off the axis, without direction or radius.
+static void a_click_anywhere(void **state)
+{
+    (void)state;
+    static const char option[][2][64] = {{"branches", "11"}, {"radius_mm", "1.4"}, {"seed", "5"}};
+    Shape *shape = shape_create("tree", 3, option, "test", &faults);
+    assert_non_null(shape);
+    VesselTree *truth = shape_sample(shape, &faults);
+    Volume *v = shape_volume(shape, 0.25, 0.2, 0.05, 3, &faults);
+    assert_true(truth && v);
+    for (int k = 0; k < 3; k++) {
+        int node = truth->node_count * (2 * k + 1) / 8;
+        Vec3 off = vec3_normal_to(truth->direction[node]);
+        RbtSeed seed = {.start = vec3_add_scaled(truth->center[node], (k % 2 ? 0.5 : -0.5) * truth->radius[node], off), .line = 1, .column = 1};
+        RbtParameters p = automatic();
+        RbtReport report = {0};
+        VesselTree *tree = track(v, &p, &seed, 1, 0, &report);
+        assert_non_null(tree);
+        int met = 0, beside = 0;
+        for (int i = 0; i < truth->node_count; i++)
+            met += nearest_to(tree, truth->center[i]) < fmax(truth->radius[i], 0.5);
+        for (int i = 0; i < tree->node_count; i++)
+            beside += shape_field(shape, tree->center[i], NULL) < -0.25;
+        print_message("%s: %d of %d nodes met\n", report.start, met, truth->node_count);
+        assert_true(met > 0.95 * truth->node_count);
+        assert_int_equal(beside, 0);
+        rbt_report_free(&report);
+        vessel_tree_free(tree);
+    }
+    volume_free(v);
+    vessel_tree_free(truth);
+    shape_free(shape);
+}
+
 // --- corrections ---
 
 // Every node of `part` further than `radius` from `around` stands in `whole` with the same bits, points and parent's place included; returns how
@@ -322,6 +357,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_branch_from_one_start), cmocka_unit_test(kissing_vessel_is_refused), cmocka_unit_test(a_sac_is_found),
+        cmocka_unit_test(a_click_anywhere),
         cmocka_unit_test(corrections_leave_the_rest), cmocka_unit_test(the_same_for_any_number_of_threads),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
