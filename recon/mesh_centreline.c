@@ -1,413 +1,172 @@
-// See mesh_centreline.h. Coarse meshes are refined first, by halving edges longer than 0.7 local radii, so that neighbouring centres are near each other.
-// A branch counts that leaves its parent's sphere by more than 1.5 of its own radii: bumps and facets' corners do not.
+// See mesh_centreline.h. Symbols: d distance to the wall, s along a way, r the largest d of a way beyond the curves' spheres. A way counts where
+//   integral (d / r)^2 ds > 1.0 r
+// which is length less about 0.7 r for a tube, 0.5 to 0.6 r in the corners of lids, 0.33 cot(angle) r in a wedge; a sac, where d rises again beyond its
+// neck, has 0.7 r or more and gives one curve. Tried and lost: centres of balls that touch the wall twice, joined as the wall's triangles are (facets
+// of coarse surfaces tear them apart: 279 curves of the aortic arch), and covering by spheres 1.5 d wide (they reach into kissing vessels).
 #include "recon/mesh_centreline.h"
 
-#include "recon/mesh_tree.h"
-#include "recon/parallel.h"
+#include "recon/mesh_lumen.h"
+#include "recon/way_heap.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-enum { REFINE_PASSES = 5, TRIANGLES_MAX = 60000, BALL_STEPS = 24, CENTRING_PASSES = 12, RAYS = 16, CURVES_MAX = 4096 };
-static const double EDGE = 0.7, CONTACT_COSINE = 0.5, COVER = 1.65, PROTRUDES = 1.5;
+enum { VOXELS_MAX = 2000000, CENTRING_PASSES = 12, RAY_PAIRS = 8, CURVES_MAX = 4096, BESIDE = 2 };
+static const double STEP = 0.3, BRANCH = 1.0, SAC = 0.5, SAC_WIDENS = 1.15, ATTACHED = 0.5, LEAST = 3, STUB = 0.6, STUB_WIDTH = 0.6;   // LEAST: voxels
 
-typedef struct Pieces {      // the refined wall and its balls
-    SurfaceMesh mesh;
-    int (*across)[3];
-    Vec3 *middle, *normal, *ball;        // (T) normal into the lumen
-    double *radius;          // (T) inscribed at ball
-    bool *is_across;         // (T) the ball's two contacts lie more than 120 degrees apart: a tube's; at a lid's rim or tip they do not
-    const MeshTree *tree;    // of the given mesh
-} Pieces;
-
-// --- refinement ---
-
-typedef struct Side {
-    int low, high, triangle, side;
-} Side;
-
-static int compare_sides(const void *a, const void *b)
-{
-    const Side *x = a, *y = b;
-    if (x->low != y->low)
-        return x->low < y->low ? -1 : 1;
-    if (x->high != y->high)
-        return x->high < y->high ? -1 : 1;
-    return (x->triangle > y->triangle) - (x->triangle < y->triangle);
-}
-
-static Side *sorted_sides(const SurfaceMesh *mesh)
-{
-    size_t count = 3 * (size_t)mesh->triangle_count;
-    Side *side = malloc((count + 1) * sizeof *side);
-    for (int t = 0; side && t < mesh->triangle_count; t++)
-        for (int k = 0; k < 3; k++) {
-            int a = mesh->triangle[t][k], b = mesh->triangle[t][(k + 1) % 3];
-            side[3 * t + k] = (Side){a < b ? a : b, a < b ? b : a, t, k};
-        }
-    if (side)
-        qsort(side, count, sizeof *side, compare_sides);
-    return side;
-}
-
-static int run_of(const Side *side, int count, int at)
-{
-    int run = 1;
-    while (at + run < count && side[at + run].low == side[at].low && side[at + run].high == side[at].high)
-        run++;
-    return run;
-}
-
-static bool link_sides(Pieces *p)
-{
-    int count = 3 * p->mesh.triangle_count;
-    Side *side = sorted_sides(&p->mesh);
-    free(p->across);
-    p->across = malloc(((size_t)p->mesh.triangle_count + 1) * sizeof *p->across);
-    if (side && p->across) {
-        for (int t = 0; t < p->mesh.triangle_count; t++)
-            p->across[t][0] = p->across[t][1] = p->across[t][2] = -1;
-        for (int i = 0, run; i < count; i += run) {
-            run = run_of(side, count, i);
-            if (run != 2)
-                continue;
-            p->across[side[i].triangle][side[i].side] = side[i + 1].triangle;
-            p->across[side[i + 1].triangle][side[i + 1].side] = side[i].triangle;
-        }
-    }
-    free(side);
-    return side && p->across;
-}
-
-// The sphere that touches the wall at piece t and across from it.
-static void find_ball(void *context, long t)
-{
-    Pieces *p = context;
-    Vec3 at = p->middle[t], n = p->normal[t], foot = at;
-    int triangle = 0;
-    // just inside, so that the piece itself is not hit
-    double reach = mesh_tree_ray(p->tree, vec3_add_scaled(at, 1e-6 * p->radius[t], n), n, INFINITY, NULL), r = 0.5 * reach;
-    if (!isfinite(reach)) {   // looks out of an opening
-        p->ball[t] = at;
-        p->radius[t] *= 1e-6;
-        p->is_across[t] = false;
-        return;
-    }
-    Vec3 c = vec3_add_scaled(at, r, n);
-    for (int step = 0; step < BALL_STEPS; step++) {
-        // only what lies within the sphere is looked for: from a tube's axis all of its wall is equally near
-        double d = mesh_tree_nearest(p->tree, c, r * (1 - 1e-3), &foot, &triangle);
-        p->radius[t] = isfinite(d) ? d : r;
-        if (!isfinite(d))
-            break;
-        Vec3 to_at = vec3_sub(at, c), to_foot = vec3_sub(foot, c), chord = vec3_sub(foot, at);
-        double down = vec3_dot(chord, n);
-        if (down <= 0 || vec3_dot(to_at, to_foot) > CONTACT_COSINE * r * d)
-            break;
-        r = fmin(0.5 * vec3_norm2(chord) / down, 0.999 * r);
-        c = vec3_add_scaled(at, r, n);
-        p->is_across[t] = vec3_dot(vec3_sub(at, c), vec3_sub(foot, c)) < -CONTACT_COSINE * r * r;
-    }
-    p->ball[t] = c;
-    p->radius[t] = fmax(p->radius[t], 1e-9);
-}
-
-static Vec3 area_of(const SurfaceMesh *mesh, int t)
-{
-    Vec3 a = mesh->vertex[mesh->triangle[t][0]], b = mesh->vertex[mesh->triangle[t][1]], c = mesh->vertex[mesh->triangle[t][2]];
-    return vec3_scale(vec3_cross(vec3_sub(b, a), vec3_sub(c, a)), 0.5);
-}
-
-static bool find_balls(Pieces *p, double size, int threads)
-{
-    size_t n = (size_t)p->mesh.triangle_count + 1;
-    free(p->middle);
-    free(p->normal);
-    free(p->ball);
-    free(p->radius);
-    free(p->is_across);
-    p->is_across = malloc(n * sizeof(bool));
-    p->middle = malloc(n * sizeof(Vec3));
-    p->normal = malloc(n * sizeof(Vec3));
-    p->ball = malloc(n * sizeof(Vec3));
-    p->radius = malloc(n * sizeof(double));
-    if (!p->middle || !p->normal || !p->ball || !p->radius || !p->is_across || !link_sides(p))
-        return false;
-    for (int t = 0; t < p->mesh.triangle_count; t++) {
-        const int *v = p->mesh.triangle[t];
-        Vec3 sum = area_of(&p->mesh, t);
-        // with its neighbours': half of what facets and stairs turn it away; not over sharp edges
-        Vec3 own = vec3_unit(sum);
-        for (int k = 0; k < 3; k++) {
-            Vec3 other = p->across[t][k] >= 0 ? area_of(&p->mesh, p->across[t][k]) : vec3(0, 0, 0);
-            if (vec3_dot(vec3_unit(other), own) > 0.5)
-                sum = vec3_add(sum, other);
-        }
-        p->middle[t] = vec3_scale(vec3_add(p->mesh.vertex[v[0]], vec3_add(p->mesh.vertex[v[1]], p->mesh.vertex[v[2]])), 1.0 / 3);
-        p->normal[t] = vec3_negate(vec3_unit(sum));
-        p->radius[t] = size;
-        p->is_across[t] = true;
-    }
-    parallel_for(threads, p->mesh.triangle_count, find_ball, p, NULL);
-    return true;
-}
-
-// Halves the edges that are long for the balls beside them; *count: how many. False where memory lacks.
-static bool refine(Pieces *p, int *count)
-{
-    SurfaceMesh *m = &p->mesh;
-    int sides = 3 * m->triangle_count, made = 0;
-    Side *side = sorted_sides(m);
-    int(*half)[3] = malloc(((size_t)m->triangle_count + 1) * sizeof *half);
-    Vec3 *vertex = NULL;
-    int(*triangle)[3] = NULL;
-    *count = 0;
-    for (int i = 0, run; side && half && i < sides; i += run) {
-        run = run_of(side, sides, i);
-        double length = vec3_distance(m->vertex[side[i].low], m->vertex[side[i].high]), limit = 0;
-        // the largest about: balls in facets' corners are small
-        for (int k = 0; k < run; k++)
-            for (int n = -1; n < 3; n++) {
-                int t = n < 0 ? side[i + k].triangle : p->across[side[i + k].triangle][n];
-                limit = fmax(limit, t >= 0 ? EDGE * p->radius[t] : 0);
-            }
-        for (int k = 0; k < run; k++)
-            half[side[i + k].triangle][side[i + k].side] = length > limit ? m->vertex_count + *count : -1;
-        *count += length > limit;
-    }
-    if (side && half && *count) {
-        vertex = realloc(m->vertex, ((size_t)m->vertex_count + (size_t)*count) * sizeof *vertex);
-        m->vertex = vertex ? vertex : m->vertex;
-        triangle = malloc(4 * (size_t)m->triangle_count * sizeof *triangle);
-    }
-    bool good = side && half && (!*count || (vertex && triangle));
-    if (good && *count) {
-        for (int t = 0; t < m->triangle_count; t++) {
-            const int *v = m->triangle[t], *h = half[t];
-            for (int k = 0; k < 3; k++)
-                if (h[k] >= 0)
-                    m->vertex[h[k]] = vec3_mix(m->vertex[v[k] < v[(k + 1) % 3] ? v[k] : v[(k + 1) % 3]], m->vertex[v[k] < v[(k + 1) % 3] ? v[(k + 1) % 3] : v[k]], 0.5);
-            int marked = (h[0] >= 0) + (h[1] >= 0) + (h[2] >= 0), s = 0;
-            // turned so that a single halved side is the first, or a single whole one the last
-            while (marked == 1 ? h[s] < 0 : marked == 2 && h[(s + 2) % 3] >= 0)
-                s++;
-            int a = v[s], b = v[(s + 1) % 3], c = v[(s + 2) % 3], ab = h[s], bc = h[(s + 1) % 3], ca = h[(s + 2) % 3];
-            const int none[4][3] = {{a, b, c}}, one[4][3] = {{a, ab, c}, {ab, b, c}}, two[4][3] = {{ab, b, bc}, {a, ab, bc}, {a, bc, c}},
-                      three[4][3] = {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}};
-            memcpy(triangle[made], marked == 0 ? none : marked == 1 ? one : marked == 2 ? two : three, (size_t)(marked + 1) * sizeof *triangle);
-            made += marked + 1;
-        }
-        m->vertex_count += *count;
-        m->triangle_count = made;
-        free(m->triangle);
-        m->triangle = triangle;
-    }
-    free(side);
-    free(half);
-    return good;
-}
+typedef struct Finding {
+    const Lumen *lumen;
+    const MeshTree *tree;
+    const int *component;    // (V) of each voxel …
+    int wanted;              // … and the one that is looked at
+    float *cost, *length;    // (V) from the start; length [mm]
+    int *from;               // (V) -1 at the start and where there is no way
+    int *owner;              // (V) the curve point in whose inscribed sphere the voxel lies, relatively deepest; -1
+    float *depth;            // (V) distance to that point in its radii
+    WayHeap heap;
+    int *tip, tip_count;     // voxels farther than their neighbours, farthest first
+    CurveSet *set;
+    int *end, end_count;     // the voxel at each free end; the start first …
+    int *end_point;          // … and the curve's point there
+} Finding;
 
 // --- ways ---
 
-typedef struct Ways {
-    double *cost, *length;   // (T) from the start; length [mm]
-    int *from;               // (T) -1 at the start and where there is no way
-    int *heap, *slot;        // binary heap by cost
-    int heap_count;
-} Ways;
-
-static bool comes_first(const Ways *w, int a, int b) { return w->cost[a] < w->cost[b] || (w->cost[a] == w->cost[b] && a < b); }
-
-static void heap_move(Ways *w, int at)
+static int compare_tips(const void *a, const void *b)
 {
-    int piece = w->heap[at];
-    for (int up; at > 0 && comes_first(w, piece, w->heap[up = (at - 1) / 2]); at = up) {
-        w->heap[at] = w->heap[up];
-        w->slot[w->heap[at]] = at;
-    }
-    for (int down; (down = 2 * at + 1) < w->heap_count; at = down) {
-        down += down + 1 < w->heap_count && comes_first(w, w->heap[down + 1], w->heap[down]);
-        if (!comes_first(w, w->heap[down], piece))
-            break;
-        w->heap[at] = w->heap[down];
-        w->slot[w->heap[at]] = at;
-    }
-    w->heap[at] = piece;
-    w->slot[piece] = at;
+    const WayEntry *x = a, *y = b;
+    return x->way != y->way ? (x->way < y->way) - (x->way > y->way) : (x->place > y->place) - (x->place < y->place);
 }
 
-// Dijkstra's ways from `start` to all pieces that hang together with it.
-static void find_ways(const Pieces *p, int start, Ways *w)
+static bool find_ways(Finding *f, int start)
 {
-    for (int t = 0; t < p->mesh.triangle_count; t++) {
-        w->cost[t] = INFINITY;
-        w->length[t] = 0;
-        w->from[t] = w->slot[t] = -1;
+    const Lumen *l = f->lumen;
+    for (int i = 0; i < l->count; i++) {
+        f->cost[i] = INFINITY;
+        f->length[i] = 0;
+        f->from[i] = f->owner[i] = -1;
+        f->depth[i] = INFINITY;
     }
-    w->cost[start] = 0;
-    w->heap[0] = start;
-    w->slot[start] = 0;
-    w->heap_count = 1;
-    while (w->heap_count) {
-        int t = w->heap[0], last = w->heap[--w->heap_count];
-        w->slot[t] = -2;
-        if (w->heap_count) {
-            w->heap[0] = last;
-            heap_move(w, 0);
-        }
-        for (int k = 0; k < 3; k++) {
-            int other = p->across[t][k];
-            if (other < 0 || w->slot[other] == -2)
-                continue;
-            // a little of the way on the wall, so that balls of one centre are not free
-            double length = vec3_distance(p->ball[t], p->ball[other]), r = fmin(p->radius[t], p->radius[other]);
-            double cost = w->cost[t] + (length + 0.02 * vec3_distance(p->middle[t], p->middle[other])) / (r * r);
-            if (cost < w->cost[other]) {
-                w->cost[other] = cost;
-                w->length[other] = w->length[t] + length;
-                w->from[other] = t;
-                if (w->slot[other] < 0) {
-                    w->slot[other] = w->heap_count;
-                    w->heap[w->heap_count++] = other;
-                }
-                heap_move(w, w->slot[other]);
+    f->cost[start] = 0;
+    f->heap.count = 0;
+    bool good = way_heap_push(&f->heap, (WayEntry){0, start});
+    const float least = (float)(0.2 * l->h), h = (float)l->h;
+    while (good && f->heap.count) {
+        WayEntry at = way_heap_pop(&f->heap);
+        if (at.way > f->cost[at.place])
+            continue;
+        int other[LUMEN_NEIGHBOURS];
+        float step[LUMEN_NEIGHBOURS];
+        int count = lumen_neighbours(l, at.place, other, step);
+        for (int k = 0; k < count && good; k++) {
+            float d = 0.5f * (fmaxf(l->distance[at.place], least) + fmaxf(l->distance[other[k]], least)), cost = at.way + step[k] * h / (d * d);
+            if (cost < f->cost[other[k]]) {
+                f->cost[other[k]] = cost;
+                f->length[other[k]] = f->length[at.place] + step[k] * h;
+                f->from[other[k]] = at.place;
+                good = way_heap_push(&f->heap, (WayEntry){cost, other[k]});
             }
         }
     }
+    return good;
+}
+
+// Voxels that no neighbour is farther than, farthest first.
+static bool find_tips(Finding *f)
+{
+    const Lumen *l = f->lumen;
+    int room = 1024;
+    WayEntry *entry = malloc((size_t)room * sizeof *entry);
+    f->tip_count = 0;
+    for (int i = 0; entry && i < l->count; i++) {
+        if (f->from[i] < 0)
+            continue;
+        int other[LUMEN_NEIGHBOURS];
+        float step[LUMEN_NEIGHBOURS];
+        bool is_farthest = true;
+        for (int k = 0, count = lumen_neighbours(l, i, other, step); k < count && is_farthest; k++)
+            is_farthest = f->length[other[k]] < f->length[i] || (f->length[other[k]] == f->length[i] && other[k] > i);
+        if (!is_farthest)
+            continue;
+        if (f->tip_count == room) {
+            room *= 2;
+            WayEntry *more = realloc(entry, (size_t)room * sizeof *more);
+            if (!more) {
+                free(entry);
+                return false;
+            }
+            entry = more;
+        }
+        entry[f->tip_count++] = (WayEntry){f->length[i], i};
+    }
+    free(f->tip);
+    f->tip = entry ? malloc(((size_t)f->tip_count + 1) * sizeof *f->tip) : NULL;
+    if (f->tip)
+        qsort(entry, (size_t)f->tip_count, sizeof *entry, compare_tips);
+    for (int i = 0; f->tip && i < f->tip_count; i++)
+        f->tip[i] = entry[i].place;
+    free(entry);
+    return f->tip != NULL;
 }
 
 // --- curves ---
 
 typedef struct Path {
-    int count;
-    Vec3 *point;             // from the attachment outwards
+    int count, room;
+    Vec3 *point;
     double *radius;
+    double first_radius, last_radius;    // of the spheres in which points are not centred: of those that the ends hang on; 0: free
 } Path;
 
-static void cover(const Pieces *p, const Path *path, bool *covered)
-{
-    for (int i = 0, before = -1; i < path->count; i++) {
-        if (before >= 0 && i + 1 < path->count && vec3_distance(path->point[i], path->point[before]) < 0.3 * path->radius[i])
-            continue;
-        before = i;
-        double wide = COVER * path->radius[i], same = 0.6 * path->radius[i];
-        for (int t = 0; t < p->mesh.triangle_count; t++)
-            covered[t] = covered[t] || vec3_distance(p->middle[t], path->point[i]) < wide || vec3_distance(p->ball[t], path->point[i]) < same;
-    }
-}
-
-static double inscribed(const Pieces *p, Vec3 c)
+static double inscribed(const Finding *f, Vec3 p, double reach)
 {
     Vec3 foot;
     int triangle = 0;
-    return fmax(mesh_tree_nearest(p->tree, c, INFINITY, &foot, &triangle), 1e-9);
+    double d = mesh_tree_nearest(f->tree, p, reach, &foot, &triangle);
+    return fmax(isfinite(d) ? d : reach, 1e-3 * f->lumen->h);
 }
 
-// Moves the points between the walls that rays square to the curve meet, and smooths; the first point stays, as do those within `parent_radius` of it.
-static void centre(const Pieces *p, Path *path, double parent_radius)
+// Appends in steps of STEP radii.
+static bool path_to(const Finding *f, Path *path, Vec3 to)
 {
-    for (int pass = 0; pass < CENTRING_PASSES; pass++) {
-        Vec3 before = path->point[0];
-        for (int i = 1; i < path->count; i++) {
-            Vec3 here = path->point[i], next = path->point[i + 1 < path->count ? i + 1 : i], axis = vec3_unit(vec3_sub(next, before));
-            Vec3 u = vec3_normal_to(axis), v = vec3_cross(axis, u), shift = {0, 0, 0};
-            double limit = 1.5 * path->radius[i];
-            if (vec3_distance(here, path->point[0]) > parent_radius)
-                for (int k = 0; k < RAYS; k++) {
-                    double angle = 2 * PI * k / RAYS;
-                    Vec3 d = vec3_add(vec3_scale(u, cos(angle)), vec3_scale(v, sin(angle)));
-                    shift = vec3_add_scaled(shift, fmin(mesh_tree_ray(p->tree, here, d, limit, NULL), limit) * 2 / RAYS, d);
-                }
-            Vec3 smooth = i + 1 < path->count ? vec3_scale(vec3_add(before, next), 0.5) : here;
-            Vec3 moved = vec3_add_scaled(vec3_mix(here, smooth, 0.4), 0.5, shift);
-            before = here;
-            // never towards the wall's other side
-            if (vec3_distance(moved, here) < 0.5 * path->radius[i])
-                path->point[i] = moved;
-            path->radius[i] = inscribed(p, path->point[i]);
+    Vec3 from = path->count ? path->point[path->count - 1] : to;
+    double length = vec3_distance(from, to), done = 0;
+    for (;;) {
+        double step = path->count ? STEP * fmax(path->radius[path->count - 1], f->lumen->h) : 0;
+        if (path->count && done + step > length)
+            return true;
+        done += step;
+        if (path->count == path->room) {
+            path->room = 2 * path->room + 64;
+            Vec3 *point = realloc(path->point, (size_t)path->room * sizeof *point);
+            path->point = point ? point : path->point;
+            double *radius = point ? realloc(path->radius, (size_t)path->room * sizeof *radius) : NULL;
+            path->radius = radius ? radius : path->radius;
+            if (!radius)
+                return false;
         }
+        Vec3 p = length > 0 ? vec3_mix(from, to, done / length) : to;
+        path->point[path->count] = p;
+        path->radius[path->count] = inscribed(f, p, INFINITY);
+        path->count++;
+        if (length == 0)
+            return true;
     }
 }
 
-// The way from the first covered piece to `tip`, in even steps; NULL point where memory lacks. `trunk`: curves so far.
-static bool trace(const Pieces *p, const Ways *w, const bool *covered, const CurveSet *trunk, int tip, Path *path, double *parent_radius)
+static void path_turn(Path *path)
 {
-    int count = 1, base = tip;
-    while (w->from[base] >= 0 && !covered[base]) {
-        base = w->from[base];
-        count++;
+    for (int i = 0, j = path->count - 1; i < j; i++, j--) {
+        Vec3 point = path->point[i];
+        double radius = path->radius[i];
+        path->point[i] = path->point[j];
+        path->radius[i] = path->radius[j];
+        path->point[j] = point;
+        path->radius[j] = radius;
     }
-    Vec3 *raw = malloc(((size_t)count + 1) * sizeof *raw);
-    *path = (Path){0};
-    if (!raw)
-        return false;
-    int n = count;
-    for (int t = tip, left = count; left > 0; t = w->from[t])
-        raw[--left] = p->ball[t];
-    *parent_radius = 0;
-    if (trunk->curve_count) {   // hangs on the nearest point of the curves so far
-        int nearest = 0;
-        for (int i = 1; i < trunk->point_count; i++)
-            if (vec3_distance(trunk->point[i], raw[0]) < vec3_distance(trunk->point[nearest], raw[0]))
-                nearest = i;
-        raw[0] = trunk->point[nearest];
-        *parent_radius = trunk->radius[nearest];
-    }
-    // even steps of 0.3 radii
-    size_t room = 16;
-    path->point = malloc(room * sizeof(Vec3));
-    path->radius = malloc(room * sizeof(double));
-    for (int i = 0; path->point && path->radius && i < n; i++) {
-        Vec3 from = i ? raw[i - 1] : raw[0];
-        double length = vec3_distance(from, raw[i]), done = 0;
-        do {
-            Vec3 at = length > 0 ? vec3_mix(from, raw[i], fmin(done / length, 1)) : raw[i];
-            double r = inscribed(p, at);
-            if (path->count == 0 || vec3_distance(at, path->point[path->count - 1]) >= 0.3 * r) {
-                if ((size_t)path->count == room) {
-                    room *= 2;
-                    Vec3 *point = realloc(path->point, room * sizeof *point);
-                    path->point = point ? point : path->point;
-                    double *radius = point ? realloc(path->radius, room * sizeof *radius) : NULL;
-                    path->radius = radius ? radius : path->radius;
-                    if (!radius) {
-                        free(raw);
-                        return false;
-                    }
-                }
-                path->point[path->count] = at;
-                path->radius[path->count++] = r;
-            }
-            done += 0.15 * r;
-        } while (done < length);
-    }
-    free(raw);
-    return path->point && path->radius;
-}
-
-// Takes off the end that runs into the corner of a lid or tip: it lies within 1.5 radii of a larger sphere's centre (a lid's rim at 1.41). Once
-// only: a vessel that tapers would be eaten up.
-static void trim_end(Path *path)
-{
-    int tip = path->count - 1, keep = tip;
-    for (int i = tip - 1; i >= 0; i--)
-        if (path->radius[tip] < 0.9 * path->radius[i] && vec3_distance(path->point[tip], path->point[i]) < 1.5 * path->radius[i] &&
-            path->radius[i] > 0.97 * path->radius[keep])
-            keep = i;
-    path->count = keep + 1;
-}
-
-static bool protrudes(const Path *path, double parent_radius)
-{
-    double radius = 0;
-    int n = 0;
-    for (int i = 0; i < path->count; i++)
-        if (vec3_distance(path->point[i], path->point[0]) > parent_radius) {
-            radius += path->radius[i];
-            n++;
-        }
-    Vec3 tip = path->point[path->count - 1];
-    return n > 2 && vec3_distance(tip, path->point[0]) + path->radius[path->count - 1] > COVER * parent_radius + PROTRUDES * radius / n;
+    double radius = path->first_radius;
+    path->first_radius = path->last_radius;
+    path->last_radius = radius;
 }
 
 static void path_free(Path *path)
@@ -416,146 +175,345 @@ static void path_free(Path *path)
     free(path->radius);
 }
 
-static int farthest(const Pieces *p, const Ways *w, const bool *covered)
+// Moves the points between the walls that pairs of opposite rays square to the curve meet, and smooths; ends that hang on other curves stay.
+static void path_centre(const Finding *f, Path *path)
 {
-    int best = -1;
-    for (int t = 0; t < p->mesh.triangle_count; t++)
-        if (!covered[t] && p->is_across[t] && isfinite(w->cost[t]) && (best < 0 || w->length[t] > w->length[best]))
-            best = t;
-    return best;
+    for (int pass = 0; pass < CENTRING_PASSES; pass++) {
+        // a free end goes where its neighbours go, before the last passes let it be
+        double smoothing = pass < CENTRING_PASSES - 3 ? 0.4 : 0.15;
+        Vec3 before = path->point[0], first = path->point[0], last = path->point[path->count - 1];
+        for (int i = 0; i < path->count; i++) {
+            bool is_end = i == 0 || i + 1 == path->count;
+            if ((i == 0 && path->first_radius > 0) || (i + 1 == path->count && path->last_radius > 0))
+                continue;
+            Vec3 here = path->point[i], next = path->point[i + 1 < path->count ? i + 1 : i], axis = vec3_unit_or(vec3_sub(next, before), vec3(1, 0, 0));
+            Vec3 u = vec3_normal_to(axis), v = vec3_cross(axis, u), shift = {0, 0, 0};
+            double limit = 2 * path->radius[i];
+            if (vec3_distance(here, first) >= path->first_radius && vec3_distance(here, last) >= path->last_radius)
+                for (int k = 0; k < RAY_PAIRS; k++) {
+                    double angle = PI * k / RAY_PAIRS;
+                    Vec3 d = vec3_add(vec3_scale(u, cos(angle)), vec3_scale(v, sin(angle)));
+                    double there = mesh_tree_ray(f->tree, here, d, limit, NULL), back = mesh_tree_ray(f->tree, here, vec3_negate(d), limit, NULL);
+                    // a ray that leaves into a branch says nothing
+                    if (isfinite(there) && isfinite(back))
+                        shift = vec3_add_scaled(shift, (there - back) / RAY_PAIRS, d);
+                }
+            Vec3 smooth = is_end ? here : vec3_scale(vec3_add(before, next), 0.5), moved = vec3_add_scaled(vec3_mix(here, smooth, smoothing), 0.5, shift);
+            before = here;
+            // never to a wall's other side
+            if (vec3_distance(moved, here) < 0.5 * path->radius[i])
+                path->point[i] = moved;
+            path->radius[i] = inscribed(f, path->point[i], INFINITY);
+        }
+    }
 }
 
-static bool find_curves(const Pieces *p, Ways *w, bool *covered, int start, CurveSet *set)
+// Takes off what runs into the corner of a lid or tip, beyond the outermost of the widest spheres that reach to it (a lid's rim is 1.41 radii off).
+static void path_trim(Path *path)
 {
-    find_ways(p, start, w);
-    start = farthest(p, w, covered);
-    if (start < 0)
-        return true;
-    find_ways(p, start, w);
-    for (int tip; set->curve_count < CURVES_MAX && (tip = farthest(p, w, covered)) >= 0;) {
-        Path path;
-        double parent_radius;
-        if (!trace(p, w, covered, set, tip, &path, &parent_radius)) {
-            path_free(&path);
-            return false;
-        }
-        covered[tip] = true;
-        trim_end(&path);
-        bool is_first = set->curve_count == 0, good = true;
-        if (is_first && path.count > 2) {   // the start is an end too
-            for (int i = 0; i < path.count / 2; i++) {
-                int j = path.count - 1 - i;
-                Vec3 point = path.point[i];
-                double radius = path.radius[i];
-                path.point[i] = path.point[j];
-                path.radius[i] = path.radius[j];
-                path.point[j] = point;
-                path.radius[j] = radius;
+    int tip = path->count - 1, keep = tip;
+    double widest = 0;
+    for (int i = tip; i >= 0; i--)
+        if (vec3_distance(path->point[tip], path->point[i]) < 1.5 * path->radius[i])
+            widest = fmax(widest, path->radius[i]);
+    // once only: a vessel that tapers would be eaten up
+    while (keep > 1 && path->radius[tip] < 0.9 * widest && path->radius[keep] < 0.95 * widest)
+        keep--;
+    path->count = keep + 1;
+}
+
+// The voxels within the curve points' inscribed spheres are theirs.
+static void own_spheres(Finding *f, int first_point)
+{
+    const Lumen *l = f->lumen;
+    for (int i = first_point; i < f->set->point_count; i++) {
+        Vec3 c = f->set->point[i], g = vec3_scale(vec3_sub(c, l->origin), 1 / l->h);
+        double r = fmax(f->set->radius[i], l->h) / l->h;
+        for (int z = (int)fmax(0, ceil(g.z - r)); z <= g.z + r && z < l->size[2]; z++)
+            for (int y = (int)fmax(0, ceil(g.y - r)); y <= g.y + r && y < l->size[1]; y++) {
+                int row = y + l->size[1] * z;
+                double wide2 = r * r - (y - g.y) * (y - g.y) - (z - g.z) * (z - g.z), wide = wide2 > 0 ? sqrt(wide2) : -1;
+                for (int k = l->row[row]; wide > 0 && k < l->row[row + 1]; k++)
+                    for (int x = (int)fmax(l->run[k].first, ceil(g.x - wide)); x <= g.x + wide && x < l->run[k].end; x++) {
+                        int voxel = l->run[k].base + x - l->run[k].first;
+                        float depth = (float)(sqrt(fmax(0, r * r - wide2 + (x - g.x) * (x - g.x))) / r);
+                        if (depth < f->depth[voxel]) {
+                            f->depth[voxel] = depth;
+                            f->owner[voxel] = i;
+                        }
+                    }
             }
-            trim_end(&path);
-        }
-        if (path.count > 2 && (is_first || protrudes(&path, parent_radius))) {
-            centre(p, &path, parent_radius);
-            good = curve_set_add(set, path.point, path.radius, path.count);
-        }
-        cover(p, &path, covered);
-        path_free(&path);
-        if (!good)
-            return false;
     }
+}
+
+static bool add_curve(Finding *f, Path *path)
+{
+    int first = f->set->point_count;
+    if (path->count < 2)
+        return true;
+    path_centre(f, path);
+    if (!curve_set_add(f->set, path->point, path->radius, path->count))
+        return false;
+    own_spheres(f, first);
     return true;
 }
 
-// A piece of the component that is wanted: of the most area, or nearest to the root.
-static int choose_start(const SurfaceMesh *mesh, const Pieces *p, const ImportOptions *options)
+// Where the way from a voxel first is well within a curve's sphere, or the start.
+static int way_joins(const Finding *f, int voxel)
 {
-    if (options->has_root) {
-        int best = 0;
-        for (int t = 1; t < mesh->triangle_count; t++)
-            if (vec3_distance(p->middle[t], options->root) < vec3_distance(p->middle[best], options->root))
-                best = t;
-        return best;
+    while (f->from[voxel] >= 0 && !(f->owner[voxel] >= 0 && f->depth[voxel] < ATTACHED))
+        voxel = f->from[voxel];
+    return voxel;
+}
+
+// Whether the way from a tip leaves the curves so far as a vessel or a sac does, by more than a few voxels.
+static bool is_branch(const Finding *f, int tip)
+{
+    const float *d = f->lumen->distance;
+    double widest = 0, sum = 0;
+    int entry = tip;
+    for (; f->from[entry] >= 0 && f->owner[entry] < 0; entry = f->from[entry])
+        widest = fmax(widest, 0.5 * (d[entry] + d[f->from[entry]]));
+    for (int i = tip; i != entry; i = f->from[i]) {
+        double mean = 0.5 * (d[i] + d[f->from[i]]);
+        sum += (f->length[i] - f->length[f->from[i]]) * mean * mean;
     }
-    double most = -1;
-    int best = 0, *queue = malloc(((size_t)mesh->triangle_count + 1) * sizeof *queue);
-    bool *seen = calloc((size_t)mesh->triangle_count + 1, sizeof *seen);
-    for (int t = 0; queue && seen && t < mesh->triangle_count; t++) {
-        if (seen[t])
+    sum /= fmax(widest * widest, 1e-300);
+    if (sum < LEAST * f->lumen->h)
+        return false;
+    if (sum > BRANCH * widest || (widest > SAC_WIDENS * d[entry] && sum > SAC * widest))
+        return true;
+    // a short wide stub, where it is no flattened vessel's end
+    int own = f->owner[entry];
+    bool is_stub = own >= 0 && widest > STUB_WIDTH * f->set->radius[own] && sum > STUB * widest;
+    for (int e = 0; is_stub && e < f->end_count; e++)
+        is_stub = vec3_distance(f->set->point[f->end_point[e]], f->set->point[own]) > 1.5 * f->set->radius[own];
+    return is_stub;
+}
+
+// A voxel beside the tip whose way comes from elsewhere: the tip is where a loop closes. -1 where there is none. `join`: where the tip's way joins.
+static int beyond_loop(const Finding *f, int tip, int join)
+{
+    int place[3], best = -1;
+    double farthest = 0;
+    Vec3 at = f->set->point[f->owner[join]];
+    lumen_place(f->lumen, tip, place);
+    for (int dz = -BESIDE; dz <= BESIDE; dz++)
+        for (int dy = -BESIDE; dy <= BESIDE; dy++)
+            for (int dx = -BESIDE; dx <= BESIDE; dx++) {
+                int other = lumen_voxel(f->lumen, place[0] + dx, place[1] + dy, place[2] + dz);
+                int there = other >= 0 && f->component[other] == f->wanted ? way_joins(f, other) : -1;
+                if (there < 0 || f->owner[there] < 0)
+                    continue;
+                int own = f->owner[there];
+                double apart = vec3_distance(f->set->point[own], at) / (f->set->radius[own] + f->set->radius[f->owner[join]]);
+                // from the other side, not from farther up in the same vessel
+                if (apart > 1 && apart > farthest) {
+                    farthest = apart;
+                    best = other;
+                }
+            }
+    return best;
+}
+
+static bool path_along(const Finding *f, Path *path, int tip, int join)
+{
+    bool good = true;
+    for (int i = tip; good && i != join; i = f->from[i])
+        good = path_to(f, path, lumen_middle(f->lumen, i));
+    return good;
+}
+
+static bool path_end_at(const Finding *f, Path *path, int point)
+{
+    Vec3 p = f->set->point[point];
+    double radius = f->set->radius[point];
+    if (!path_to(f, path, p))
+        return false;
+    int last = path->count - 1;
+    path->point[last] = p;
+    path->radius[last] = path->last_radius = radius;
+    return true;
+}
+
+static bool add_branch(Finding *f, int tip)
+{
+    Path path = {0};
+    int join = way_joins(f, tip);
+    if (f->owner[join] < 0)
+        return true;
+    int point = f->owner[join], other = beyond_loop(f, tip, join);
+    bool good = path_along(f, &path, tip, join) && path_end_at(f, &path, point);
+    if (good && other >= 0) {
+        int there = way_joins(f, other);
+        path_turn(&path);
+        Path back = {0};
+        good = path_along(f, &back, other, there);
+        for (int i = 0; good && i < back.count; i++)
+            good = path_to(f, &path, back.point[i]);
+        path_free(&back);
+        good = good && path_end_at(f, &path, f->owner[there]);
+    } else if (good) {
+        path_turn(&path);
+        path_trim(&path);
+    }
+    good = good && add_curve(f, &path);
+    if (good && other < 0) {
+        f->end[f->end_count] = tip;
+        f->end_point[f->end_count++] = f->set->point_count - 1;
+    }
+    path_free(&path);
+    return good;
+}
+
+// All curves of the lumen from a voxel at an end.
+static bool find_curves(Finding *f, int start)
+{
+    curve_set_free(f->set);
+    f->set = curve_set_create();
+    if (!f->set || !find_ways(f, start) || !find_tips(f))
+        return false;
+    free(f->end);
+    free(f->end_point);
+    f->end = malloc(((size_t)f->tip_count + 2) * sizeof *f->end);
+    f->end_point = malloc(((size_t)f->tip_count + 2) * sizeof *f->end_point);
+    f->end_count = 0;
+    if (!f->end || !f->end_point)
+        return false;
+    if (f->tip_count == 0)
+        return true;
+    Path trunk = {0};
+    bool good = path_along(f, &trunk, f->tip[0], -1);
+    path_trim(&trunk);
+    path_turn(&trunk);
+    path_trim(&trunk);
+    path_turn(&trunk);
+    good = good && add_curve(f, &trunk);
+    path_free(&trunk);
+    if (f->set->curve_count == 0)
+        return good;
+    f->end_count = 2;
+    f->end[0] = start;
+    f->end_point[0] = 0;
+    f->end[1] = f->tip[0];
+    f->end_point[1] = f->set->point_count - 1;
+    for (int i = 1; good && i < f->tip_count && f->set->curve_count < CURVES_MAX; i++)
+        if (is_branch(f, f->tip[i]))
+            good = add_branch(f, f->tip[i]);
+    return good;
+}
+
+// --- components ---
+
+// Numbers the lumens; the one that is wanted, -1 where memory lacks or there is none. `last`: a voxel of it at one of its ends.
+static int label(const Lumen *l, const ImportOptions *options, int *component, int *last)
+{
+    int *queue = malloc(((size_t)l->count + 1) * sizeof *queue), count = 0, most = 0, wanted = -1, widest = -1, nearest = -1;
+    double least = INFINITY;
+    for (int i = 0; i < l->count; i++) {
+        component[i] = -1;
+        double d = options->has_root ? vec3_distance(lumen_middle(l, i), options->root) : INFINITY;
+        if (d < least) {
+            least = d;
+            nearest = i;
+        }
+    }
+    // the last pass starts from the widest voxel of the one that is wanted: what it comes to last is an end
+    for (int seed = 0; queue && seed <= l->count; seed++) {
+        if (seed == l->count) {
+            wanted = nearest >= 0 ? component[nearest] : wanted;
+            for (int i = 0; i < l->count; i++)
+                if (component[i] == wanted && (widest < 0 || l->distance[i] > l->distance[widest]))
+                    widest = i;
+            for (int i = 0; i < l->count; i++)
+                component[i] = component[i] == wanted ? -1 : component[i];
+            if (widest < 0)
+                break;
+        }
+        int at = seed < l->count ? seed : widest, head = 0, tail = 0, number = seed < l->count ? count : wanted;
+        if (component[at] >= 0)
             continue;
-        double area = 0;
-        int head = 0, tail = 0;
-        queue[tail++] = t;
-        seen[t] = true;
+        queue[tail++] = at;
+        component[at] = number;
         while (head < tail) {
-            int at = queue[head++];
-            area += vec3_norm(area_of(mesh, at));
-            for (int k = 0; k < 3; k++)
-                if (p->across[at][k] >= 0 && !seen[p->across[at][k]]) {
-                    seen[p->across[at][k]] = true;
-                    queue[tail++] = p->across[at][k];
+            int other[LUMEN_NEIGHBOURS];
+            float step[LUMEN_NEIGHBOURS];
+            for (int k = 0, n = lumen_neighbours(l, queue[head++], other, step); k < n; k++)
+                if (component[other[k]] < 0) {
+                    component[other[k]] = number;
+                    queue[tail++] = other[k];
                 }
         }
-        if (area > most) {
-            most = area;
-            best = t;
+        if (tail > most) {
+            most = tail;
+            wanted = number;
         }
+        count++;
+        *last = queue[tail - 1];
     }
     free(queue);
-    free(seen);
+    return widest < 0 ? -1 : wanted;
+}
+
+// The voxel at the end that is nearest to the root that was asked for, else at the widest.
+static int choose_start(const Finding *f, const ImportOptions *options)
+{
+    int best = f->end[0];
+    double most = -INFINITY;
+    for (int e = 0; e < f->end_count; e++) {
+        double value = options->has_root ? -vec3_distance(lumen_middle(f->lumen, f->end[e]), options->root) : f->set->radius[f->end_point[e]];
+        if (value > most) {
+            most = value;
+            best = f->end[e];
+        }
+    }
     return best;
 }
 
 CurveSet *mesh_centreline(const SurfaceMesh *mesh, const ImportOptions *options, const char *name, Faults *faults)
 {
-    Vec3 low = mesh->vertex[0], high = low;
-    for (int i = 0; i < mesh->vertex_count; i++) {
-        Vec3 v = mesh->vertex[i];
-        low = vec3(fmin(low.x, v.x), fmin(low.y, v.y), fmin(low.z, v.z));
-        high = vec3(fmax(high.x, v.x), fmax(high.y, v.y), fmax(high.z, v.z));
+    SurfaceMesh closed;
+    bool good = mesh_close(mesh, &closed);
+    MeshTree *tree = good ? mesh_tree_create(&closed) : NULL;
+    Lumen *l = tree ? lumen_create(&closed, tree, VOXELS_MAX, options->threads) : NULL;
+    CurveSet *set = NULL;
+    if (l) {
+        size_t n = (size_t)l->count + 1;
+        int *component = malloc(n * sizeof *component), start = -1;
+        Finding f = {.lumen = l, .tree = tree, .component = component, .cost = malloc(n * sizeof(float)), .length = malloc(n * sizeof(float)),
+                     .from = malloc(n * sizeof(int)), .owner = malloc(n * sizeof(int)), .depth = malloc(n * sizeof(float))};
+        good = component && f.cost && f.length && f.from && f.owner && f.depth;
+        f.wanted = good ? label(l, options, component, &start) : -1;
+        // once from any end to learn of the ends, then from the one that is the root
+        if (good && f.wanted >= 0) {
+            good = find_curves(&f, start);
+            if (good && f.end_count)
+                good = find_curves(&f, choose_start(&f, options));
+            set = good ? f.set : NULL;
+        }
+        if (!set)
+            curve_set_free(f.set);
+        free(component);
+        free(f.cost);
+        free(f.length);
+        free(f.from);
+        free(f.owner);
+        free(f.depth);
+        free(f.heap.entry);
+        free(f.tip);
+        free(f.end);
+        free(f.end_point);
     }
-    double size = vec3_distance(low, high);
-    Pieces p = {.mesh = {mesh->vertex_count, mesh->triangle_count, malloc(((size_t)mesh->vertex_count + 1) * sizeof(Vec3)),
-                         malloc(((size_t)mesh->triangle_count + 1) * sizeof(int[3]))}};
-    MeshTree *tree = mesh_tree_create(mesh);
-    p.tree = tree;
-    bool good = tree && p.mesh.vertex && p.mesh.triangle;
-    if (good) {
-        memcpy(p.mesh.vertex, mesh->vertex, (size_t)mesh->vertex_count * sizeof(Vec3));
-        memcpy(p.mesh.triangle, mesh->triangle, (size_t)mesh->triangle_count * sizeof(int[3]));
-        good = find_balls(&p, size, options->threads);
-    }
-    for (int pass = 0, halved = 1; good && halved && pass < REFINE_PASSES && p.mesh.triangle_count < TRIANGLES_MAX; pass++)
-        good = refine(&p, &halved) && (!halved || find_balls(&p, size, options->threads));
-    size_t n = (size_t)p.mesh.triangle_count + 1;
-    Ways w = {malloc(n * sizeof(double)), malloc(n * sizeof(double)), malloc(n * sizeof(int)), malloc(n * sizeof(int)), malloc(n * sizeof(int)), 0};
-    bool *covered = calloc(n, sizeof *covered);
-    CurveSet *set = curve_set_create();
-    good = good && w.cost && w.length && w.from && w.heap && w.slot && covered && set;
-    good = good && find_curves(&p, &w, covered, choose_start(&p.mesh, &p, options), set);
-    if (!good)
+    if (!l || !good)
         faults_add(faults, name, 0, 0, "not enough memory");
-    else if (set->curve_count == 0) {
-        faults_add(faults, name, 0, 0, "no centreline was found: the surface is no tube");
-        good = false;
-    }
-    if (!good) {
+    else if (!set || set->curve_count == 0) {
+        faults_add(faults, name, 0, 0, "no centreline was found: the surface encloses no lumen; a closed tube, or one that is open at its ends, is valid");
         curve_set_free(set);
         set = NULL;
     }
-    free(w.cost);
-    free(w.length);
-    free(w.from);
-    free(w.heap);
-    free(w.slot);
-    free(covered);
+    lumen_free(l);
     mesh_tree_free(tree);
-    free(p.mesh.vertex);
-    free(p.mesh.triangle);
-    free(p.across);
-    free(p.middle);
-    free(p.normal);
-    free(p.ball);
-    free(p.radius);
-    free(p.is_across);
+    free(closed.vertex);
+    free(closed.triangle);
     return set;
 }

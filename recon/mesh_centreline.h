@@ -1,15 +1,16 @@
-// Centrelines of a surface alone. Every piece of the wall gets the centre of the sphere that touches it and the wall across from it (the shrinking
-// ball of Ma, Bae and Choi 2012, on the mesh itself, contacts within 60 degrees of the first ignored so that facets and noise grow no spurs); pieces
-// that share an edge have neighbouring centres. On that graph the cheapest way by length / radius^2 runs along the middle of vessels (Antiga, Ene-Iordache
-// and Remuzzi 2003, on the Voronoi diagram). From the root the way to the farthest piece is the first curve; what its tubes cover is done; the farthest
-// piece left over gives the next (Sato et al. 2000, TEASAR). Curves are then centred between the walls around them.
+// Centrelines of a surface alone (Sato et al. 2000, TEASAR, with local radii). The inside of the closed surface is cut into voxels (mesh_lumen.h). From
+// one end the cheapest ways by length / distance to the wall^2 run along the middle (Antiga, Ene-Iordache and Remuzzi 2003 use 1 / radius). The way to
+// the farthest voxel is the first curve; every other voxel that is farther than all around it may be the end of a branch, and is one where its way
+// leaves the inscribed spheres of the curves so far by more than a tube's, not by a bump's or a corner's length. A vessel that closes a loop is met from
+// both sides: its curve goes through. Curves are then smoothed and centred between the walls around them, on the surface itself.
 #ifndef SELDINGER_RECON_MESH_CENTRELINE_H
 #define SELDINGER_RECON_MESH_CENTRELINE_H
 
 #include "recon/import_surface.h"
 
-// Curves with inscribed radii, each but the first beginning at a point of an earlier one; `mesh` is mended. The component of most area is taken, or that
-// which is nearest to options->root. NULL with faults: no memory, no tube found.
+// Curves with inscribed radii, each but the first beginning at a point of an earlier one; the first begins at the widest end, or that nearest to
+// options->root. `mesh` is mended. Of several lumens the largest is taken, or that which is nearest to options->root. NULL with faults: no memory, no
+// lumen found.
 CurveSet *mesh_centreline(const SurfaceMesh *mesh, const ImportOptions *options, const char *name, Faults *faults);
 
 #endif
