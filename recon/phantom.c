@@ -155,8 +155,8 @@ static bool build_kissing(Shape *shape, const ShapeOptions *o)
         return false;
     for (int i = 0; i < N; i++) {
         double x = half * (2.0 * i / (N - 1) - 1), z = wave(o, x), far = fmax(0, fabs(x) - 6 * r) / r;
-        memcpy(knot[i], (double[4]){x * cos(turn) - z * sin(turn), 2 * r + o->gap_mm + r * 0.06 * pow(far, 2) * fmin(1, far / 3), x * sin(turn) + z * cos(turn), r},
-               sizeof knot[i]);
+        double y = 2 * r + o->gap_mm + r * 0.06 * pow(far, 2) * fmin(1, far / 3);
+        memcpy(knot[i], (double[4]){x * cos(turn) - z * sin(turn), y, x * sin(turn) + z * cos(turn), r}, sizeof knot[i]);
     }
     return shape_add(shape->neighbour, (const double (*)[4])knot, N, true, true, -1, NODE_VESSEL, NULL);
 }

@@ -300,7 +300,12 @@ static void take_sample(Judge *j, int i)
 
 static TrackLabel run_kind(const Run *run)
 {
-    return run->is_back ? TRACK_BT : run->kind_mm[TRACK_KV] > 0 ? TRACK_KV : run->kind_mm[TRACK_KB] > 0 ? TRACK_KB : run->kind_mm[TRACK_KA] > 0 ? TRACK_KA : TRACK_LB;
+    if (run->is_back)
+        return TRACK_BT;
+    for (TrackLabel kind = TRACK_KV; kind <= TRACK_KA; kind++)
+        if (run->kind_mm[kind] > 0)
+            return kind;
+    return TRACK_LB;
 }
 
 // Labels, once nodes and links are judged. `lost`: kind of the longest run that left each branch, or TRACK_ST; `hung`: reached by a jump.
@@ -310,7 +315,7 @@ static void label_branches(Judge *j, const TrackLabel *lost, const bool *hung)
     TrackScore *score = j->score;
     for (int b = 0; b < score->branch_count; b++) {
         TrackBranch *branch = &score->branch[b];
-        double skip = fmin(branch->first_node == 0 ? 0 : 2 * tree->radius[branch->first_node], 0.5 * branch->length), seen = 0, all = 0;
+        double skip = fmin(2 * tree->radius[branch->first_node], 0.5 * branch->length), seen = 0, all = 0;
         double r = tree->radius[branch->last_node];
         bool reached = false;
         for (int i = branch->last_node; i != branch->first_node; i = tree->parent[i]) {

@@ -28,7 +28,7 @@ typedef struct TrackBranch {
     int first_node, last_node;   // of the true tree: the bifurcation (or root) where it begins and the one (or tip) where it ends
     double radius;               // [mm] mean
     double length, covered;      // [mm] true length, and how much of it was tracked
-    double skip;                 // [mm] of its way that belongs to the bifurcation and is not asked for: two radii
+    double skip;                 // [mm] of its way that is not asked for, two radii: the bifurcation's, or before the start in the root's branch
     TrackLabel label;
     bool hangs_wrong;            // it was tracked, but attached to a vessel that it does not come from
 } TrackBranch;
