@@ -1,4 +1,4 @@
-// The way is the cheapest one over 26 neighbours, where a voxel costs its length over the cube of its brightness between background (0) and lumen (1):
+// The way is the cheapest one over 26 neighbours, where a voxel costs its length over the cube of its brightness between background (0) and lumen (1), mean of its own and the spline's:
 // it keeps to the middle and crosses what is dim only where it must.
 #include "recon/rbt_links.h"
 #include "recon/bspline.h"
@@ -60,6 +60,12 @@ static Vec3 voxel_in(const Search *s, int i)
     int at[3];
     place_in(s, i, at);
     return vec3(s->low[0] + at[0], s->low[1] + at[1], s->low[2] + at[2]);
+}
+
+// The spline blurs: half a voxel beside a thin vessel it is still bright.
+static double voxel_value(const Volume *v, Vec3 voxel)
+{
+    return (double)v->value[((size_t)voxel.z * (size_t)v->size[1] + (size_t)voxel.y) * (size_t)v->size[0] + (size_t)voxel.x];
 }
 
 // From `start` to `end`, or with `paint` to the nearest tube of a node before `before` whose centre is in sight; the places to way[0 … count-1], start first, and
@@ -128,6 +134,7 @@ static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 
             double bright = lit(light, (double)bspline_sample(v, voxel));
             if (tracker_is_forbidden(t, volume_point_of(v, voxel)) || bright < 0.5 * least_lit)
                 continue;
+            bright = 0.5 * (bright + lit(light, voxel_value(v, voxel)));
             float cost = here.way + length[n] / (float)pow(bright, 3);
             if (cost < s.cost[k]) {
                 s.cost[k] = cost;

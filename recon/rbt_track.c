@@ -328,16 +328,21 @@ static bool next_node(Tracker *t, const Track *branch, bool may_overlap)
     return false;
 }
 
-// Darkest place on the way from a to b, as a share of the lumen's brightness at both ends.
+// Darkest place on the way from a to b.
+static double darkest_between(const Tracker *t, Vec3 a, Vec3 b)
+{
+    double least = HUGE_VAL;
+    int steps = 2 + (int)fmin(vec3_distance(a, b) / (0.5 * t->voxel), 3998);
+    for (int i = 0; i <= steps; i++)
+        least = fmin(least, tracker_brightness(t, vec3_mix(a, b, (double)i / steps)));
+    return least;
+}
+
+// … as a share of the lumen's brightness at both ends.
 double tracker_link_brightness(const Tracker *t, Vec3 a, Vec3 b)
 {
-    double base = (double)t->volume->minimum, ends = fmin(tracker_brightness(t, a), tracker_brightness(t, b)) - base, least = HUGE_VAL;
-    int steps = 2 + (int)(vec3_distance(a, b) / (0.5 * t->voxel));
-    if (steps > 4000)
-        steps = 4000;
-    for (int i = 0; i <= steps; i++)
-        least = fmin(least, tracker_brightness(t, vec3_mix(a, b, (double)i / steps)) - base);
-    return ends > 0 ? least / ends : 0;
+    double base = (double)t->volume->minimum, ends = fmin(tracker_brightness(t, a), tracker_brightness(t, b)) - base;
+    return ends > 0 ? (darkest_between(t, a, b) - base) / ends : 0;
 }
 
 // --- past what is no cylinder ---
@@ -400,6 +405,8 @@ static bool join_exit(Tracker *t, Track *branch, int keep, const RbtExit *exit, 
     for (int i = 0; good && i < 40; i++) {
         const Cylinder *c = &t->estimate.node.cylinder;
         double link = tracker_link_brightness(t, last.center, c->center), distance = vec3_distance(c->center, last.center);
+        if (t->is_guarded && darkest_between(t, last.center, c->center) < t->floor)   // no leap over what is too faint for a vessel
+            link = 0;
         // it has met the branch, has come into the wide part, or has passed by
         if (i > 0 && (distance < last.radius || c->radius > 1.35 * usual_radius(&back) || (brightest >= 0.9 && link < 0.5)))
             break;
