@@ -8,7 +8,7 @@
 #include <string.h>
 
 enum { PROBES = 4000 };
-static const double VOXELS_PER_RADIUS = 8, SMALLEST = 0.02;   // SMALLEST: share of the vessels' length that may be thinner
+static const double VOXELS_PER_RADIUS = 6, SMALLEST = 0.02;   // SMALLEST: share of the vessels' length that may be thinner
 
 // --- lids ---
 

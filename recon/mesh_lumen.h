@@ -24,7 +24,7 @@ typedef struct Lumen {
 
 // The surface with a fan over every opening (loop of open edges); `mesh` is mended. False where memory lacks.
 bool mesh_close(const SurfaceMesh *mesh, SurfaceMesh *closed);
-// Voxels an eighth as wide as the smallest radii, or so wide that there are about `voxels_max`. `tree` is of `mesh`. NULL where memory lacks.
+// Voxels a sixth as wide as the smallest radii, or so wide that there are about `voxels_max`. `tree` is of `mesh`. NULL where memory lacks.
 Lumen *lumen_create(const SurfaceMesh *mesh, const MeshTree *tree, int voxels_max, int threads);
 void lumen_free(Lumen *lumen);
 void lumen_place(const Lumen *lumen, int voxel, int place[3]);

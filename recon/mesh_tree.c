@@ -144,10 +144,11 @@ static Vec3 nearest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c)
     return sum > 0 ? vec3_add(a, vec3_add(vec3_scale(ab, vb / sum), vec3_scale(ac, vc / sum))) : a;
 }
 
+static double beyond(double low, double high, double x) { return x < low ? low - x : x > high ? x - high : 0; }
+
 static double box_distance2(const Box *box, Vec3 p)
 {
-    double x = fmax(fmax(box->low.x - p.x, p.x - box->high.x), 0), y = fmax(fmax(box->low.y - p.y, p.y - box->high.y), 0),
-           z = fmax(fmax(box->low.z - p.z, p.z - box->high.z), 0);
+    double x = beyond(box->low.x, box->high.x, p.x), y = beyond(box->low.y, box->high.y, p.y), z = beyond(box->low.z, box->high.z, p.z);
     return x * x + y * y + z * z;
 }
 
@@ -155,14 +156,16 @@ double mesh_tree_nearest(const MeshTree *tree, Vec3 point, double reach, Vec3 *f
 {
     const SurfaceMesh *mesh = tree->mesh;
     int stack[DEPTH * 2], height = 0;
-    double best = reach * reach;
+    double away[DEPTH * 2], best = reach * reach;
     bool found = false;
-    if (mesh->triangle_count)
+    if (mesh->triangle_count) {
+        away[0] = box_distance2(tree->box, point);
         stack[height++] = 0;
+    }
     while (height) {
-        const Box *box = &tree->box[stack[--height]];
-        if (box_distance2(box, point) > best)
+        if (away[--height] > best)
             continue;
+        const Box *box = &tree->box[stack[height]];
         for (int i = 0; i < box->count; i++) {
             int t = tree->order[box->first + i];
             Vec3 q = nearest_on_triangle(point, mesh->vertex[mesh->triangle[t][0]], mesh->vertex[mesh->triangle[t][1]], mesh->vertex[mesh->triangle[t][2]]);
@@ -175,9 +178,15 @@ double mesh_tree_nearest(const MeshTree *tree, Vec3 point, double reach, Vec3 *f
             }
         }
         if (box->count == 0) {
-            bool left_first = box_distance2(&tree->box[box->first], point) < box_distance2(&tree->box[box->first + 1], point);
-            stack[height++] = box->first + left_first;
-            stack[height++] = box->first + !left_first;
+            double first = box_distance2(&tree->box[box->first], point), second = box_distance2(&tree->box[box->first + 1], point);
+            // the nearer one on top
+            int nearer = box->first + (first >= second), farther = box->first + (first < second);
+            if ((first < second ? second : first) <= best) {
+                away[height] = first < second ? second : first;
+                stack[height++] = farther;
+            }
+            away[height] = first < second ? first : second;
+            stack[height++] = nearer;
         }
     }
     return found ? sqrt(best) : INFINITY;

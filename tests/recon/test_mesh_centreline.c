@@ -1,0 +1,178 @@
+// Centrelines computed from surfaces alone, against the shapes' own: as many ends and branches, near them, with their radii; the same when turned and
+// mirrored, and with any number of threads; what encloses nothing is refused.
+#include "recon/import_surface.h"
+#include "recon/mesh_centreline.h"
+#include "recon/phantom.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+static Faults faults;
+
+static Vec3 turned(Vec3 p, bool turn)
+{
+    // a rotation about (1, 1, 1), a mirror and a shift
+    return turn ? vec3(17 - (0.8 * p.y - 0.6 * p.z), 5 + 0.6 * p.y + 0.8 * p.z, -3 + p.x) : p;
+}
+
+static SurfaceMesh *mesh_of(const Shape *shape, double cell, bool turn)
+{
+    TriangleMesh *made = shape_surface(shape, cell, &faults);
+    assert_non_null(made);
+    SurfaceMesh *mesh = calloc(1, sizeof *mesh);
+    mesh->vertex_count = made->vertex_count;
+    mesh->triangle_count = made->triangle_count;
+    mesh->vertex = malloc((size_t)made->vertex_count * sizeof(Vec3));
+    mesh->triangle = malloc((size_t)made->triangle_count * sizeof(int[3]));
+    for (int i = 0; i < made->vertex_count; i++)
+        mesh->vertex[i] = turned(made->vertex[i], turn);
+    memcpy(mesh->triangle, made->triangle, (size_t)made->triangle_count * sizeof(int[3]));
+    triangle_mesh_free(made);
+    MeshCheck check;
+    assert_true(mesh_repair(mesh, &check));
+    return mesh;
+}
+
+static double to_segment(Vec3 p, Vec3 a, Vec3 b)
+{
+    Vec3 ab = vec3_sub(b, a);
+    double t = vec3_dot(vec3_sub(p, a), ab) / fmax(vec3_norm2(ab), 1e-300);
+    return vec3_distance(p, vec3_add_scaled(a, fmin(fmax(t, 0), 1), ab));
+}
+
+// How much of the truth's nodes lie within half a radius of the curves, and how far the curves' points lie from the truth, in radii (mean).
+static void compare(const CurveSet *set, const VesselTree *truth, bool turn, double *found, double *off, double *radius_error)
+{
+    int hits = 0, n = 0;
+    double sum = 0, wrong = 0;
+    for (int i = 0; i < truth->node_count; i++) {
+        double least = INFINITY;
+        for (int c = 0; c < set->curve_count; c++)
+            for (int k = set->offset[c]; k + 1 < set->offset[c + 1]; k++)
+                least = fmin(least, to_segment(turned(truth->center[i], turn), set->point[k], set->point[k + 1]));
+        hits += least < 0.5 * truth->radius[i];
+    }
+    for (int k = 0; k < set->point_count; k++) {
+        double least = INFINITY, radius = 1;
+        for (int i = 1; i < truth->node_count; i++) {
+            double d = to_segment(set->point[k], turned(truth->center[i], turn), turned(truth->center[truth->parent[i]], turn));
+            if (d < least) {
+                least = d;
+                radius = truth->radius[i];
+            }
+        }
+        sum += least / radius;
+        wrong += fabs(set->radius[k] / radius - 1);
+        n++;
+    }
+    *found = (double)hits / truth->node_count;
+    *off = sum / n;
+    *radius_error = wrong / n;
+}
+
+static void count_tree(const VesselTree *tree, int *ends, int *branches)
+{
+    *ends = 1;
+    *branches = 1;
+    for (int i = 0; i < tree->node_count; i++) {
+        int children = 0;
+        for (int k = i + 1; k < tree->node_count; k++)
+            children += tree->parent[k] == i;
+        *ends += children == 0;
+        *branches += children > 1 ? children : 0;
+    }
+}
+
+static void check_shape(const char *name, const char *key, const char *value, double cell, double off_max)
+{
+    char option[1][2][64];
+    snprintf(option[0][0], 64, "%s", key);
+    snprintf(option[0][1], 64, "%s", value);
+    faults_clear(&faults);
+    Shape *shape = shape_create(name, key[0] ? 1 : 0, (const char (*)[2][64])option, "test", &faults);
+    VesselTree *truth = shape_sample(shape, &faults);
+    assert_non_null(truth);
+    for (int turn = 0; turn < 2; turn++) {
+        SurfaceMesh *mesh = mesh_of(shape, cell, turn);
+        ImportOptions options = import_default_options();
+        ImportReport report = {0};
+        CurveSet *set = mesh_centreline(mesh, &options, name, &faults);
+        assert_non_null(set);
+        double found, off, radius_error;
+        compare(set, truth, turn, &found, &off, &radius_error);
+        VesselTree *tree = import_surface(mesh, set, &options, &report, name, &faults);
+        assert_non_null(tree);
+        int ends, branches;
+        count_tree(truth, &ends, &branches);
+        print_message("%s%s: ends %d of %d, branches %d of %d, found %.3f, off %.4f radii, radius %.4f, %.2f %% unseen\n", name, turn ? " turned" : "",
+                      report.end_count, ends, report.branch_count, branches, found, off, radius_error, 100.0 * (double)report.unseen_points / (double)report.sampled_points);
+        assert_int_equal(report.end_count, ends);
+        assert_int_equal(report.branch_count, branches);
+        // curves stop up to a radius before flat ends, where their largest sphere is
+        assert_true(found > (truth->node_count > 40 ? 0.95 : 0.7));
+        assert_true(off < off_max);
+        assert_true(radius_error < 0.1);
+        assert_true(report.unseen_points <= report.sampled_points / 50);
+        if (turn == 0) {
+            options.threads = 3;
+            CurveSet *again = mesh_centreline(mesh, &options, name, &faults);
+            assert_non_null(again);
+            assert_int_equal(again->point_count, set->point_count);
+            assert_memory_equal(again->point, set->point, (size_t)set->point_count * sizeof(Vec3));
+            curve_set_free(again);
+        }
+        vessel_tree_free(tree);
+        curve_set_free(set);
+        surface_free(mesh);
+    }
+    vessel_tree_free(truth);
+    shape_free(shape);
+}
+
+static void test_tubes(void **state)
+{
+    (void)state;
+    check_shape("open-capsule", "", "", 0.3, 0.02);
+    check_shape("arc", "", "", 0.3, 0.02);
+    check_shape("helix", "", "", 0.3, 0.02);
+}
+
+static void test_branches(void **state)
+{
+    (void)state;
+    check_shape("bifurcation", "", "", 0.3, 0.1);
+    check_shape("y", "", "", 0.3, 0.06);
+    check_shape("tree", "branches", "15", 0.3, 0.05);
+}
+
+static void test_nothing(void **state)
+{
+    (void)state;
+    // one triangle encloses nothing
+    SurfaceMesh *mesh = calloc(1, sizeof *mesh);
+    mesh->vertex_count = 3;
+    mesh->triangle_count = 1;
+    mesh->vertex = malloc(3 * sizeof(Vec3));
+    mesh->triangle = malloc(sizeof(int[3]));
+    mesh->vertex[0] = vec3(0, 0, 0);
+    mesh->vertex[1] = vec3(5, 0, 0);
+    mesh->vertex[2] = vec3(0, 5, 0);
+    for (int k = 0; k < 3; k++)
+        mesh->triangle[0][k] = k;
+    ImportOptions options = import_default_options();
+    faults_clear(&faults);
+    assert_null(mesh_centreline(mesh, &options, "flat.stl", &faults));
+    assert_int_equal(faults.count, 1);
+    surface_free(mesh);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_tubes), cmocka_unit_test(test_branches), cmocka_unit_test(test_nothing)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
