@@ -154,7 +154,7 @@ int bench_parse(int argc, char **argv, const char *table, const char *table_help
         case 'j': options->json = optarg; break;
         case 'q': options->quick = true; break;
         case 't':
-            if (!cli_number("--threads", optarg, 0, 256, &number))
+            if (!cli_whole_number("--threads", optarg, 0, 256, &number))
                 return EXIT_BAD_INPUT;
             options->threads = (int)number;
             break;

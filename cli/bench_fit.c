@@ -66,7 +66,7 @@ static int parse(int argc, char **argv, FitBench *bench)
         case 'j': bench->common.json = optarg; break;
         case 'q': bench->common.quick = true; break;
         case 't':
-            if (!cli_number("--threads", optarg, 0, 256, &number))
+            if (!cli_whole_number("--threads", optarg, 0, 256, &number))
                 return EXIT_BAD_INPUT;
             bench->common.threads = (int)number;
             break;

@@ -590,7 +590,7 @@ static int parse_options(int argc, char **argv, ExportOptions *options)
                 return EXIT_BAD_INPUT;
             break;
         case THREADS:
-            if (!cli_number("--threads", optarg, 0, 256, &number))
+            if (!cli_whole_number("--threads", optarg, 0, 256, &number))
                 return EXIT_BAD_INPUT;
             break;
         case OPEN: options->open_inlet = true; break;

@@ -1,6 +1,7 @@
 #include "cli/file_kind.h"
 
 #include "recon/surface_file.h"
+#include "recon/volume.h"
 
 #include <hdf5.h>
 #include <stdbool.h>
@@ -16,7 +17,7 @@ static FileKind kind_of_hdf5(const char *path)
     hid_t file = H5Fopen(path, H5F_ACC_RDONLY, access);
     H5Pclose(access);
     if (file < 0)
-        return FILE_UNKNOWN;
+        return FILE_TREE;   // cut off or damaged: the reader of trees says so
     FileKind kind = H5Lexists(file, "nodes", H5P_DEFAULT) > 0  ? FILE_TREE
                     : H5Lexists(file, "wire", H5P_DEFAULT) > 0 ? FILE_RECORDING
                                                                : FILE_UNKNOWN;
@@ -38,8 +39,7 @@ FileKind file_kind(const char *path)
     const char *text = (const char *)head;
     if (length >= 8 && !memcmp(head, "\x89HDF\r\n\x1a\n", 8))
         return kind_of_hdf5(path);
-    if (!strncmp(text, "NRRD", 4) || strstr(text, "NDims") || (length >= 2 && head[0] == 0x1f && head[1] == 0x8b) ||
-        (length >= 132 && !memcmp(head + 128, "DICM", 4)) || (length >= 348 && (!memcmp(head + 344, "n+1", 3) || !memcmp(head + 344, "ni1", 3))))
+    if (volume_is_known(head, length, path))
         return FILE_VOLUME;
     if (strstr(text, "t_s,push_mm_s,twist_deg_s"))
         return FILE_SCRIPT;

@@ -94,17 +94,17 @@ static int parse_options(int argc, char **argv, FitCommand *command)
                 return EXIT_BAD_INPUT;
             break;
         case BLOBS:
-            if (!cli_number("--max-blobs", optarg, 2, 1000, &number))
+            if (!cli_whole_number("--max-blobs", optarg, 2, 1000, &number))
                 return EXIT_BAD_INPUT;
             o->max_blobs = (int)number;
             break;
         case POINTS:
-            if (!cli_number("--max-points", optarg, 50, 100000, &number))
+            if (!cli_whole_number("--max-points", optarg, 50, 100000, &number))
                 return EXIT_BAD_INPUT;
             o->max_points = (int)number;
             break;
         case THREADS:
-            if (!cli_number("--threads", optarg, 0, 256, &number))
+            if (!cli_whole_number("--threads", optarg, 0, 256, &number))
                 return EXIT_BAD_INPUT;
             o->threads = (int)number;
             break;

@@ -23,7 +23,9 @@ static const char help[] = "Usage: seldinger info FILE [--json] [--report F.html
                            "  --json           as JSON on standard output\n"
                            "  --report F.html  of a tree or model: a page for readers, all in one file: tree, candidates (narrow places, wide places, aneurysms),\n"
                            "                   branches, radius along each, quality of the fit; for training and research, not a medical device\n"
-                           "  --picture F.png  of a model: its surface coloured by the distance to the data, and the paper's Table 4 as a histogram\n";
+                           "  --picture F.png  of a model: its surface coloured by the distance to the data, and the paper's Table 4 as a histogram\n"
+                           "  --quiet          no figures as text: the report or picture alone\n\n"
+                           "Exit codes: 0 done; 2 wrong usage or bad input.\n";
 
 static void add_vector(cJSON *object, const char *name, Vec3 v)
 {
@@ -324,11 +326,12 @@ int verb_info(int argc, char **argv)
     case FILE_RECORDING: good = describe_recording(object, path, &faults); break;
     case FILE_SCENE: good = describe_scene(object, path, &faults); break;
     case FILE_SCRIPT: good = describe_script(object, path, &faults); break;
-    case FILE_MISSING: faults_add(&faults, path, 0, 0, "cannot be opened; give a file that is there"); break;
+    case FILE_MISSING: faults_add(&faults, path, 0, 0, "cannot be opened; a file that is there and may be read, or a folder with a DICOM series"); break;
     case FILE_VOLUME: good = describe_volume(object, path, &faults); break;
     case FILE_SURFACE: good = describe_surface(object, path, &faults); break;
     case FILE_UNKNOWN:
-        faults_add(&faults, path, 0, 0, "is nothing known here; volumes (NRRD, MetaImage, NIfTI, DICOM), surfaces (STL, PLY, OBJ, VTP), trees, models, recordings, scenes and scripts are");
+        faults_add(&faults, path, 0, 0, "is nothing known here; volumes (NRRD, MetaImage, NIfTI, DICOM), surfaces (STL, PLY, OBJ, VTP), trees, models, recordings, "
+                                       "scenes and scripts are");
         break;
     }
     if (good && json && !(report && !strcmp(report, "-"))) {

@@ -20,7 +20,7 @@ static const struct Verb {
     {"query", verb_query, "MODEL.h5 --points F.csv -o F.csv", "field, gradient and distance of a model at points"},
     {"export", verb_export, "FILE -o OUT", "surface, centreline or recording for other programs"},
     {"info", verb_info, "FILE", "what a file is and its figures"},
-    {"bench", verb_bench, "step|peer", "timing tables, each row measured in the same run"},
+    {"bench", verb_bench, "step|fit|track|peer", "timing tables, each row measured in the same run"},
 };
 enum { VERB_COUNT = sizeof verbs / sizeof verbs[0] };
 
@@ -56,7 +56,11 @@ int main(int argc, char **argv)
         char name[64];
         snprintf(name, sizeof name, "seldinger %s", verbs[i].name);
         argv[1] = name;
-        return verbs[i].call(argc - 1, argv + 1);
+        int code = verbs[i].call(argc - 1, argv + 1);
+        bool lost = fflush(stdout) != 0 || ferror(stdout);
+        if (lost)
+            fprintf(stderr, "-: standard output cannot be written to its end; a place with free space\n");
+        return lost && code == EXIT_DONE ? EXIT_BAD_INPUT : code;
     }
     fprintf(stderr, "seldinger: no verb '%s'; valid:", argv[1]);
     for (int i = 0; i < VERB_COUNT; i++)
@@ -97,6 +101,19 @@ bool cli_number(const char *option, const char *text, double least, double most,
     double number = strtod(text, &end);
     if (end == text || *end || !isfinite(number) || number < least || number > most) {
         fprintf(stderr, "%s: '%s' is not valid; a number from %g to %g\n", option, text, least, most);
+        return false;
+    }
+    *value = number;
+    return true;
+}
+
+bool cli_whole_number(const char *option, const char *text, double least, double most, double *value)
+{
+    double number;
+    if (!cli_number(option, text, least, most, &number))
+        return false;
+    if (floor(number) != number) {   // exact: whole numbers have no fraction
+        fprintf(stderr, "%s: '%s' is not valid; a whole number from %g to %g\n", option, text, least, most);
         return false;
     }
     *value = number;

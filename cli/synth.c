@@ -162,7 +162,7 @@ static int parse_options(int argc, char **argv, SynthCommand *command)
         case SATURATE: good = cli_number("--saturate", optarg, -10, 10, &volume->saturate); break;
         case FADE: good = cli_number("--fade", optarg, 0, 1, &volume->fade); break;
         case BONE: good = cli_number("--bone", optarg, 0, 10, &volume->bone); break;
-        case THREADS: good = cli_number("--threads", optarg, 0, 256, &threads); break;
+        case THREADS: good = cli_whole_number("--threads", optarg, 0, 256, &threads); break;
         case GAP_VOXELS: good = cli_number("--gap-voxels", optarg, 0, 100, &command->gap_voxels); break;
         case 'h': fputs(help, stdout); return EXIT_DONE;
         default: return usage_fault("unknown option or lacking value", "");

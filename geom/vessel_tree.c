@@ -91,11 +91,13 @@ static void check_offsets(const int64_t *offset, int node_count, int64_t total, 
                    (long long)offset[node_count], (long long)total);
 }
 
+#define MOST_MM 1e9   // squares and products of lengths stay far from overflow
+
 static void check_vectors(const Vec3 *v, int64_t count, const char *name, const char *file, Faults *faults)
 {
     for (int64_t i = 0; i < count; i++)
-        if (!vec3_is_finite(v[i])) {
-            faults_add(faults, file, 0, 0, "%s[%lld] is (%g, %g, %g); coordinates are finite numbers in mm", name, (long long)i, v[i].x,
+        if (!(fabs(v[i].x) < MOST_MM && fabs(v[i].y) < MOST_MM && fabs(v[i].z) < MOST_MM)) {
+            faults_add(faults, file, 0, 0, "%s[%lld] is (%g, %g, %g); coordinates are finite numbers below 1e9 mm", name, (long long)i, v[i].x,
                        v[i].y, v[i].z);
             return;
         }
@@ -105,8 +107,8 @@ static void check_vectors(const Vec3 *v, int64_t count, const char *name, const 
 static void check_lengths(const double *v, int64_t count, bool positive, const char *name, const char *file, Faults *faults)
 {
     for (int64_t i = 0; i < count; i++)
-        if (!isfinite(v[i]) || v[i] < 0 || (positive && !(v[i] > 0))) {
-            faults_add(faults, file, 0, 0, "%s[%lld] is %g; a finite number of mm %s 0 is valid", name, (long long)i, v[i],
+        if (!(v[i] < MOST_MM) || v[i] < 0 || (positive && !(v[i] > 0))) {
+            faults_add(faults, file, 0, 0, "%s[%lld] is %g; a number of mm %s 0 and below 1e9 is valid", name, (long long)i, v[i],
                        positive ? "above" : "of at least");
             return;
         }

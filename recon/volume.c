@@ -541,6 +541,18 @@ void volume_free(Volume *volume)
     free(volume);
 }
 
+static bool names_samples_of_pair(const char *path)
+{
+    size_t n = strlen(path);
+    return n > 4 && !strcmp(path + n - 4, ".img");
+}
+
+bool volume_is_known(const void *bytes, size_t length, const char *path)
+{
+    FileBytes file = {bytes, length, 0, path};
+    return volume_is_nrrd(&file) || volume_is_nifti(&file) || volume_is_metaimage(&file) || volume_is_dicom(&file) || names_samples_of_pair(path);
+}
+
 Volume *volume_parse(const void *bytes, size_t length, const char *path, Faults *faults)
 {
     FileBytes file = {bytes, length, 0, path};
@@ -567,7 +579,7 @@ Volume *volume_load(const char *path, Faults *faults)
     size_t n = strlen(path);
     char header[4096];
     // the samples of a NIfTI pair were named: their header tells
-    bool pair = n > 4 && n < sizeof header && !strcmp(path + n - 4, ".img") && !volume_is_nrrd(&file) && !volume_is_nifti(&file);
+    bool pair = names_samples_of_pair(path) && n < sizeof header && !volume_is_nrrd(&file) && !volume_is_nifti(&file);
     if (pair) {
         memcpy(header, path, n - 3);
         memcpy(header + n - 3, "hdr", 4);

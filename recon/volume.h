@@ -28,6 +28,8 @@ typedef struct Volume {
 Volume *volume_load(const char *path, Faults *faults);
 // The same from memory; `path` stands in messages, and detached data files are looked for in its folder.
 Volume *volume_parse(const void *bytes, size_t length, const char *path, Faults *faults);
+// Whether a file that begins with these bytes (4096 tell) is one for volume_load; by `path` the samples of a NIfTI pair.
+bool volume_is_known(const void *bytes, size_t length, const char *path);
 // A volume of the given grid, values zero. NULL where size is not positive or memory lacks.
 Volume *volume_create(const int size[3], Vec3 origin, const Vec3 axis[3]);
 void volume_free(Volume *volume);

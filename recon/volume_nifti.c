@@ -120,11 +120,11 @@ static bool read_header(const FileBytes *file, NiftiBytes *h, VolumeHeader *out,
     if (bits_at(h, 0, 4) != HEADER_BYTES)
         h->big_endian = true;
     if (bits_at(h, 0, 4) != HEADER_BYTES) {
-        h->big_endian = bits_at(h, 0, 4) != NIFTI2_BYTES;
+        h->big_endian = bits_at(h, 0, 4) == NIFTI2_BYTES;
         if (bits_at(h, 0, 4) == NIFTI2_BYTES)
-            faults_add_at_byte(faults, path, 0, "is NIfTI-2; NIfTI-1: `nifti_tool -convert2dtype`, or save as .nrrd");
+            faults_add_at_byte(faults, path, 0, "is NIfTI-2; NIfTI-1, NRRD or MetaImage");
         else
-            faults_add_at_byte(faults, path, 0, "a compressed file, but no NIfTI volume in it; .nii.gz, or NRRD with its own gzip encoding");
+            faults_add_at_byte(faults, path, 0, "no NIfTI volume is in this compressed file; .nii.gz, or NRRD with its own gzip encoding");
         return false;
     }
     if (file->length < HEADER_BYTES) {

@@ -100,7 +100,7 @@ static bool gather(const FileBytes *file, NrrdHeader *header, Faults *faults)
         else if (value->line && name->field != IGNORED)
             faults_add(faults, file->path, cursor.line, 1, "'%s' stands on line %d already; each field once", name->name, value->line);
         else
-            *value = (FieldValue){colon + 1, length - named - 1, cursor.line};
+            *value = (FieldValue){colon + 2, length - named - 2, cursor.line};
         if (name && name->field == DATA_FILE && data_names_several(colon + 1, length - named - 1) && !memchr(colon, '%', length - named))
             break;   // the names of a LIST stand in the header's place
     }

@@ -79,6 +79,14 @@ static void volumes_cut_off_or_lying(void **state)
     dim[1] = -5;
     memcpy(nifti + 40, dim, 16);
     put_bytes("lie.nii", nifti, sizeof nifti);
+    size = 540;
+    memcpy(nifti, &size, 4);
+    put_bytes("two.nii", nifti, sizeof nifti);
+    size = 348;
+    memcpy(nifti, &size, 4);
+    memset(nifti + 344, 0, 4);
+    put_bytes("analyze.hdr", nifti, sizeof nifti);
+    put("beside.mhd", "ObjectType = Image\nNDims = 3\nDimSize = 2 2 2\nElementType = MET_UCHAR\nElementDataFile = a\033[2Jb.raw\n");
     put("short.mha", "ObjectType = Image\nNDims = 3\nDimSize = 10 10 10\nElementSpacing = 1 1 1\nElementType = MET_SHORT\nElementDataFile = LOCAL\nabc");
     put("lie.mha", "ObjectType = Image\nNDims = 3\nDimSize = 10 10 1000000000\nElementSpacing = 1 1 1\nElementType = MET_SHORT\nElementDataFile = LOCAL\nabc");
     put("short.nrrd", "NRRD0004\ntype: short\ndimension: 3\nsizes: 10 10 10\nendian: little\nencoding: raw\n\nabc");
@@ -86,13 +94,19 @@ static void volumes_cut_off_or_lying(void **state)
     put("head.nrrd", "NRRD0004\ntype: short\ndimension: 3\n");
     put("trace.yaml", "branches: [{start_mm: [1, 1, 1], toward_mm: [2, 2, 2], radius_mm: 1}]\n");
     static const char *const files[][2] = {
-        {"short.nii", "short.nii:byte "}, {"cut.nii", "cut.nii:byte 200"}, {"lie.nii", "lie.nii:byte 42"}, {"short.mha", "short.mha:byte "},
+        {"short.nii", "short.nii:byte "}, {"cut.nii", "cut.nii:byte 200"}, {"lie.nii", "lie.nii:byte 42"}, {"two.nii", "two.nii:byte 0: is NIfTI-2"},
+        {"analyze.hdr", "analyze.hdr:byte 344: "}, {"beside.mhd", "beside.mhd:5: the data file 'a?[2Jb.raw' is not there"}, {"short.mha", "short.mha:byte "},
         {"lie.mha", "lie.mha:3"},         {"short.nrrd", "short.nrrd:byte "}, {"lie.nrrd", "lie.nrrd:4"}, {"head.nrrd", "head.nrrd:"},
-        {"nowhere.nrrd", "nowhere.nrrd: cannot be opened"}, {".", "not a regular file"}, {"tree.h5", "tree.h5:byte 0"}};
+        {"nowhere.nrrd", "nowhere.nrrd: cannot be opened"}, {".", "a folder without DICOM images"}, {"tree.h5", "tree.h5:byte 0"}};
     for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
         char arguments[200];
         snprintf(arguments, sizeof arguments, "segment %s --trace trace.yaml -o out.h5 --json out.json", files[i][0]);
         refused(arguments, files[i][1]);
+        if (strcmp(files[i][0], ".") && strcmp(files[i][0], "tree.h5")) {   // info knows a volume by the same signs
+            snprintf(arguments, sizeof arguments, "info %s", files[i][0]);
+            refused(arguments, files[i][0]);
+            assert_null(strstr(output, "is nothing known here"));
+        }
     }
 }
 
@@ -135,6 +149,8 @@ static void the_wrong_kind_of_file(void **state)
     refused("export noise.bin -o out.stl", "noise.bin: is no tree, model or recording");
     refused("export model.h5 -o out.xyz", "extension '.xyz' is no format");
     refused("info noise.bin", "noise.bin");
+    refused("info cut.h5", "cut.h5:byte 0: is not a readable HDF5 file");
+    refused("export cut.h5 -o out.swc", "cut.h5:byte 0: is not a readable HDF5 file");
     put("s.yaml", "seldinger: 1\nvessel: {model: tree.h5}\nwire: {sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
                   "sheath: {inlet: root}\nscript: [[0, 10, 0], [0.1, 0, 0]]\n");
     refused("run s.yaml --summary out.json --final out.csv --record out.h5", "tree.h5: is a tree without a model; make one with `seldinger fit`");
@@ -153,6 +169,9 @@ static void words_of_the_command_line(void **state)
         {"fit tree.h5", "lacks -o MODEL.h5"},
         {"fit tree.h5 -o out.h5 --max-blobs 0", "--max-blobs: '0' is not valid; a number from 2"},
         {"fit tree.h5 -o out.h5 --target-mm nan", "--target-mm: 'nan' is not valid"},
+        {"fit tree.h5 -o out.h5 --max-blobs 7.5", "--max-blobs: '7.5' is not valid; a whole number"},
+        {"fit tree.h5 -o out.h5 --threads 1.5", "--threads: '1.5' is not valid; a whole number from 0 to 256"},
+        {"fit tree.h5 -o out.h5 --threads -1", "--threads: '-1' is not valid"},
         {"fit tree.h5 -o out.h5 --banana", "see `seldinger fit --help`"},
         {"fit nowhere.h5 -o out.h5", "nowhere.h5: cannot be opened"},
         {"query", "lacks the model"},
@@ -190,6 +209,9 @@ static void a_full_disk(void **state)
             fail_msg("`%s` on a full disk ended with %d and said: %s", lines[i], code, output);
         nothing_is_left(lines[i]);
     }
+    // /dev/full refuses what is printed, too
+    assert_int_equal(run_in("", "info tree.h5 --json > /dev/full"), 2);
+    assert_int_equal(run_in("", "fit tree.h5 -o fitted.h5 > /dev/full"), 2);
     put("kept.h5", "before");
     assert_int_equal(run_in("ulimit -f 8;", "synth phantom -o kept.h5"), 2);
     assert_int_equal(run_in("grep -q '^before$' kept.h5 &&", "--version"), 0);

@@ -401,7 +401,7 @@ static void lies(void **state)
         {"endian: little\nencoding: raw\n\n", "ends after 0 of 48 bytes"},
         {"encoding: raw\n\n", "without their order"},
         {"endian: middle\nencoding: raw\n\n", "endian"},
-        {"endian: little\nencoding: hex\n\n", "the encoding ' hex' is not read"},
+        {"endian: little\nencoding: hex\n\n", "the encoding 'hex' is not read"},
         {"endian: little\nencoding: raw\nsizes: 2 2 2\n\n", "stands on line 4 already"},
         {"endian: little\nencoding: raw\nsise: 2\n\n", "is no field"},
         {"endian: little\nencoding: raw\nspace: mars\n\n", "the space"},
