@@ -34,7 +34,8 @@ static const char help[] =
     "  --surface F          the surface (needed)\n"
     "  --centerline F...    centrelines; may be given again\n"
     "  -o, --output F.h5    the tree (needed)\n"
-    "  --root X,Y,Z         the vessel's end nearest to this point [mm] is the root; default: the widest open end\n"
+    "  --root X,Y,Z         the vessel's end nearest to this point [mm] is the root, cut open where the surface is closed there; default: the\n"
+    "                       widest open end, else the widest, which then stays closed\n"
     "  --scale S            of the surface to mm, 1000 where it is in metres; default 1\n"
     "  --spacing X          distance of nodes in local radii; default 0.5\n"
     "  --points N           points of a node, about; default 108\n"
@@ -118,9 +119,9 @@ static int parse_options(int argc, char **argv, ImportCommand *command)
             command->has_scale = true;
             break;
         case SPACING: good = cli_number("--spacing", optarg, 0.05, 4, &command->options.spacing); break;
-        case POINTS: good = cli_number("--points", optarg, 20, 2000, &command->options.points_per_node); break;
+        case POINTS: good = cli_whole_number("--points", optarg, 20, 2000, &command->options.points_per_node); break;
         case THREADS:
-            good = cli_number("--threads", optarg, 0, 256, &number);
+            good = cli_whole_number("--threads", optarg, 0, 256, &number);
             command->options.threads = good ? (int)number : 0;
             break;
         case 'h': fputs(help, stdout); return EXIT_DONE;
@@ -171,7 +172,11 @@ static void print_found(const ImportCommand *command, const Found *f)
     if (!f->computed && r->inside_percent < 99.5)
         printf("centrelines: %.0f %% of their points lie inside the surface\n", r->inside_percent);
     if (!f->computed && r->moved_samples)
-        printf("centrelines: %.1f %% of their length grazes the wall or lies beyond it: moved to the middle\n", 100.0 * r->moved_samples / r->samples);
+        printf("centrelines: %.1f %% of their points graze the wall or lie beside the lumen: moved to its middle\n", 100.0 * r->moved_samples / r->samples);
+    if (!f->computed && r->cut_samples)
+        printf("centrelines: %.1f %% of their points lie over a vessel's end or in no vessel: cut off\n", 100.0 * r->cut_samples / r->samples);
+    if (r->root_is_cut)
+        printf("root: the surface is closed there: opened by a cut square to the vessel, %.2f mm before the end\n", r->root_cut);
     if (r->lost_curves)
         printf("centrelines: %d touch no other and were left out, first at (%.4g, %.4g, %.4g)\n", r->lost_curves, r->lost.x, r->lost.y, r->lost.z);
     if (r->loop_count)
@@ -180,8 +185,9 @@ static void print_found(const ImportCommand *command, const Found *f)
     printf("centrelines    %d curves %s, %d branches, %.1f mm, radius %.3g to %.3g mm\n", f->curve_count, f->computed ? "computed" : "read", r->branch_count,
            r->length, r->radius_min, r->radius_max);
     printf("ends           %d, %d of them open\n", r->end_count, r->open_end_count);
-    printf("root           (%.5g, %.5g, %.5g) mm, %s\n", r->root.x, r->root.y, r->root.z, r->root_is_open ? "open" : "closed: no tool can enter there");
-    printf("nodes          %d, %ld points; %ld points out of every node's sight\n", f->nodes, f->points, r->unseen_points);
+    printf("root           (%.5g, %.5g, %.5g) mm, %s\n", r->root.x, r->root.y, r->root.z, r->root_is_open ? "open" : "closed: no tool can enter there; --root X,Y,Z opens an end");
+    printf("nodes          %d, %ld points; %ld of them out of every node's sight; %ld more belong to no node\n", f->nodes, f->points, r->unseen_points,
+           r->left_points);
     printf("seconds        %.2f\n", f->seconds);
 }
 
@@ -205,10 +211,10 @@ static bool write_json(const ImportCommand *command, const Found *f, Faults *fau
     const struct { const char *name; double value; } tree[] = {
         {"curves", f->curve_count}, {"nodes", f->nodes}, {"points", (double)f->points}, {"branches", r->branch_count}, {"ends", r->end_count},
         {"open_ends", r->open_end_count}, {"lids", r->lid_count}, {"loops_cut", r->loop_count}, {"curves_lost", r->lost_curves},
-        {"components_unused", r->unused_components}, {"unseen_points", (double)r->unseen_points}, {"dropped_nodes", r->dropped_nodes},
+        {"components_unused", r->unused_components}, {"unseen_points", (double)r->unseen_points}, {"left_points", (double)r->left_points}, {"dropped_nodes", r->dropped_nodes},
         {"length_mm", r->length}, {"radius_min_mm", r->radius_min}, {"radius_max_mm", r->radius_max}, {"inside_percent", r->inside_percent},
         {"moved_percent", r->samples ? 100.0 * r->moved_samples / r->samples : 0},
-        {"curves_scaled", r->curves_scaled}, {"seconds", f->seconds}};
+        {"cut_percent", r->samples ? 100.0 * r->cut_samples / r->samples : 0}, {"root_cut_mm", r->root_cut}, {"curves_scaled", r->curves_scaled}, {"seconds", f->seconds}};
     for (size_t i = 0; i < sizeof surface / sizeof surface[0]; i++)
         cJSON_AddNumberToObject(mesh, surface[i].name, surface[i].value);
     for (size_t i = 0; i < sizeof tree / sizeof tree[0]; i++)
@@ -292,7 +298,7 @@ static bool import(const ImportCommand *command, Faults *faults)
     SurfaceMesh *mesh = load_surface(command, &found.check, faults);
     CurveSet *set = mesh ? get_curves(command, mesh, &found.report, faults) : NULL;
     VesselTree *tree = set ? import_surface(mesh, set, &command->options, &found.report, command->surface, faults) : NULL;
-    double unseen = 100.0 * (double)found.report.unseen_points / (double)(found.report.sampled_points + 1);
+    double unseen = 100.0 * (double)found.report.left_points / (double)(found.report.sampled_points + 1);
     if (tree && found.computed && unseen > UNSEEN_MAX_PERCENT)
         faults_add(faults, command->surface, 0, 0, "the computed centrelines leave %.0f %% of the surface out, more than %d %%: no tree is written; give --centerline F", unseen,
                    UNSEEN_MAX_PERCENT);

@@ -6,13 +6,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double STEP = 0.1, SAME = 0.35;
+static const double STEP = 0.1, SAME = 0.35, EDGE = 0.1;
 enum { SAMPLES_MAX = 4000000 };
 
 typedef struct Fine {        // the curves, sampled
     int count, curve_count;
     Vec3 *point;
-    double *radius;
+    double *radius, *given;
     int *offset;             // (C+1)
     double *distance;        // to the nearest sample of the tree …
     int *nearest;            // … and that
@@ -22,7 +22,7 @@ typedef struct Fine {        // the curves, sampled
 typedef struct Growing {
     Skeleton *s;
     double *way;             // from the root along the tree
-    bool *is_end;            // nothing hangs on it
+    int *children;           // how many hang on it
     int capacity;
 } Growing;
 
@@ -30,6 +30,7 @@ static void fine_free(Fine *fine)
 {
     free(fine->point);
     free(fine->radius);
+    free(fine->given);
     free(fine->offset);
     free(fine->distance);
     free(fine->nearest);
@@ -44,7 +45,7 @@ static double inscribed(const Wall *wall, Vec3 p)
 }
 
 // Samples curve c; with out == NULL only counts.
-static int sample_curve(const CurveSet *set, const Wall *wall, int c, double floor_step, Vec3 *out, double *radius)
+static int sample_curve(const CurveSet *set, const Wall *wall, int c, double floor_step, Vec3 *out, double *radius, double *given)
 {
     int count = 0;
     for (int i = set->offset[c]; i + 1 < set->offset[c + 1] && count < SAMPLES_MAX; i++) {
@@ -56,6 +57,7 @@ static int sample_curve(const CurveSet *set, const Wall *wall, int c, double flo
             if (out) {
                 out[count] = p;
                 radius[count] = r;
+                given[count] = set->radius[i] > 0 && set->radius[i + 1] > 0 ? set->radius[i] + at / length * (set->radius[i + 1] - set->radius[i]) : 0;
             }
             at += fmax(STEP * r, floor_step);
         }
@@ -63,6 +65,7 @@ static int sample_curve(const CurveSet *set, const Wall *wall, int c, double flo
     if (out) {
         out[count] = set->point[set->offset[c + 1] - 1];
         radius[count] = inscribed(wall, out[count]);
+        given[count] = set->radius[set->offset[c + 1] - 1];
     }
     return count + 1;
 }
@@ -78,18 +81,19 @@ static bool fine_create(const CurveSet *set, const Wall *wall, Fine *fine)
     if (!fine->offset)
         return false;
     for (int c = 0; c < set->curve_count; c++)
-        fine->offset[c + 1] = fine->offset[c] + sample_curve(set, wall, c, floor_step, NULL, NULL);
+        fine->offset[c + 1] = fine->offset[c] + sample_curve(set, wall, c, floor_step, NULL, NULL, NULL);
     size_t n = (size_t)fine->offset[set->curve_count] + 1;
     fine->count = (int)n - 1;
     fine->point = calloc(n, sizeof(Vec3));
     fine->radius = calloc(n, sizeof(double));
+    fine->given = calloc(n, sizeof(double));
     fine->distance = calloc(n, sizeof(double));
     fine->nearest = calloc(n, sizeof(int));
     fine->done = calloc(n, sizeof(bool));
-    if (!fine->point || !fine->radius || !fine->distance || !fine->nearest || !fine->done)
+    if (!fine->point || !fine->radius || !fine->given || !fine->distance || !fine->nearest || !fine->done)
         return false;
     for (int c = 0; c < set->curve_count; c++)
-        sample_curve(set, wall, c, floor_step, fine->point + fine->offset[c], fine->radius + fine->offset[c]);
+        sample_curve(set, wall, c, floor_step, fine->point + fine->offset[c], fine->radius + fine->offset[c], fine->given + fine->offset[c]);
     for (int i = 0; i < fine->count; i++)
         fine->distance[i] = INFINITY;
     return true;
@@ -168,17 +172,18 @@ static bool choose_root(const Fine *fine, const Wall *wall, const ImportOptions 
 
 // --- growing ---
 
-static int grow(Growing *g, Vec3 point, double radius, int parent)
+static int grow(Growing *g, Vec3 point, double radius, double given, int parent)
 {
     Skeleton *s = g->s;
     int i = s->count++;          // room for every sample and two openings' lines a curve was made before
     s->point[i] = point;
     s->radius[i] = radius;
+    s->given[i] = given;
     s->parent[i] = parent;
     g->way[i] = parent < 0 ? 0 : g->way[parent] + vec3_distance(point, s->point[parent]);
-    g->is_end[i] = true;
+    g->children[i] = 0;
     if (parent >= 0)
-        g->is_end[parent] = false;
+        g->children[parent]++;
     return i;
 }
 
@@ -225,7 +230,7 @@ static bool grow_run(Growing *g, Fine *fine, int at, int step, int end, ImportRe
     for (int i = from; i != last; i += step) {
         fine->done[i] = true;
         if (!stub)
-            parent = fine->nearest[i] = grow(g, fine->point[i], fine->radius[i], parent);
+            parent = fine->nearest[i] = grow(g, fine->point[i], fine->radius[i], fine->given[i], parent);
         fine->distance[i] = stub ? fine->distance[i] : 0;
     }
     if (closes && !stub && report->loop_count++ == 0)
@@ -265,8 +270,15 @@ static void grow_all(Growing *g, Fine *fine, ImportReport *report)
 
 // --- ends at openings ---
 
-// Takes the end's last samples back to before the opening's plane and leads it straight to the opening's middle.
-static void lead_to_opening(Growing *g, const Wall *wall, int end, bool *kept, double reach)
+// Where a curve from `from` meets the opening: on the curve's line, unless that is off the opening's middle.
+static Vec3 way_out(const Opening *opening, Vec3 from)
+{
+    Vec3 to = vec3_sub(from, opening->center), there = vec3_add_scaled(from, -vec3_dot(to, opening->normal), opening->normal);
+    return vec3_distance(there, opening->center) < 0.3 * opening->radius ? there : opening->center;
+}
+
+// Takes the end's last samples back to before the opening's plane and leads it straight out.
+static bool lead_to_opening(Growing *g, const Wall *wall, int end, bool *kept, double reach)
 {
     Skeleton *s = g->s;
     double arc = 0, radius = s->radius[end];
@@ -278,10 +290,10 @@ static void lead_to_opening(Growing *g, const Wall *wall, int end, bool *kept, d
     Vec3 outward = vec3_unit(vec3_sub(s->point[end], s->point[far]));
     int o = wall_opening_near(wall, s->point[end], outward, radius);
     if (o < 0)
-        return;
+        return false;
     const Opening *opening = &wall->opening[o];
     int at = end;
-    while (s->parent[at] >= 0 && g->is_end[end] && vec3_dot(vec3_sub(s->point[at], opening->center), opening->normal) > -0.3 * opening->radius) {
+    while (s->parent[at] >= 0 && g->children[end] == 0 && vec3_dot(vec3_sub(s->point[at], opening->center), opening->normal) > -EDGE * opening->radius) {
         int up = s->parent[at];
         bool branches = false;
         for (int k = up + 1; k < s->count && !branches; k++)
@@ -291,14 +303,32 @@ static void lead_to_opening(Growing *g, const Wall *wall, int end, bool *kept, d
         kept[at] = false;
         at = up;
     }
-    Vec3 from = s->point[at];
-    int steps = (int)fmin(ceil(vec3_distance(from, opening->center) / fmax(STEP * opening->radius, reach)), 200);
+    Vec3 from = s->point[at], out = way_out(opening, from);
+    int steps = (int)fmin(ceil(vec3_distance(from, out) / fmax(STEP * opening->radius, reach)), 200);
     for (int k = 1; k <= steps; k++) {
-        Vec3 p = vec3_mix(from, opening->center, (double)k / steps);
-        at = grow(g, p, inscribed(wall, p), at);
+        Vec3 p = vec3_mix(from, out, (double)k / steps);
+        at = grow(g, p, inscribed(wall, p), s->given[at], at);
         kept[at] = true;
     }
     s->is_open_end[at] = steps > 0;
+    return true;
+}
+
+// A closed end tapers, or its curve runs into the wall: the piece with less than half of the width before it is left to the nodes there.
+static void blunt_end(const Growing *g, int end, bool *kept)
+{
+    const Skeleton *s = g->s;
+    for (int from = end, to; ; from = to) {
+        double widest = s->radius[from], arc = 0;
+        for (int i = from; s->parent[i] > 0 && g->children[s->parent[i]] < 2 && arc < 15 * widest; i = s->parent[i]) {
+            arc += vec3_distance(s->point[i], s->point[s->parent[i]]);
+            widest = fmax(widest, s->radius[s->parent[i]]);
+        }
+        for (to = from; s->radius[to] < 0.5 * widest && s->parent[to] > 0 && g->children[s->parent[to]] < 2; to = s->parent[to])
+            kept[to] = false;
+        if (to == from)
+            return;
+    }
 }
 
 static void drop_samples(Skeleton *s, const bool *kept, int *place)
@@ -310,6 +340,7 @@ static void drop_samples(Skeleton *s, const bool *kept, int *place)
             continue;
         s->point[n] = s->point[i];
         s->radius[n] = s->radius[i];
+        s->given[n] = s->given[i];
         s->is_open_end[n] = s->is_open_end[i];
         s->parent[n] = s->parent[i] < 0 ? -1 : place[s->parent[i]];
         n++;
@@ -324,9 +355,10 @@ static Skeleton *skeleton_create(size_t room)
         return NULL;
     s->point = calloc(room, sizeof *s->point);
     s->radius = calloc(room, sizeof *s->radius);
+    s->given = calloc(room, sizeof *s->given);
     s->parent = calloc(room, sizeof *s->parent);
     s->is_open_end = calloc(room, sizeof *s->is_open_end);
-    if (s->point && s->radius && s->parent && s->is_open_end)
+    if (s->point && s->radius && s->given && s->parent && s->is_open_end)
         return s;
     skeleton_free(s);
     return NULL;
@@ -343,18 +375,32 @@ static bool build(Growing *g, Fine *fine, const Wall *wall, const ImportOptions 
     if (root.opening >= 0) {
         const Opening *opening = &wall->opening[root.opening];
         int last = root.step > 0 ? fine->offset[c + 1] - 1 : fine->offset[c];
-        for (; at != last && vec3_dot(vec3_sub(fine->point[at], opening->center), opening->normal) > -0.3 * opening->radius; at += root.step)
+        for (; at != last && vec3_dot(vec3_sub(fine->point[at], opening->center), opening->normal) > -EDGE * opening->radius; at += root.step)
             fine->done[at] = true;
-        double length = vec3_distance(fine->point[at], opening->center);
+        Vec3 out = way_out(opening, fine->point[at]);
+        double length = vec3_distance(fine->point[at], out);
         int steps = (int)fmin(fmax(ceil(length / (STEP * opening->radius)), 1), 200);
         for (int k = 0; k < steps; k++) {
-            Vec3 p = vec3_mix(opening->center, fine->point[at], (double)k / steps);
-            parent = grow(g, p, inscribed(wall, p), parent);
+            Vec3 p = vec3_mix(out, fine->point[at], (double)k / steps);
+            parent = grow(g, p, inscribed(wall, p), fine->given[at], parent);
         }
         s->is_open_end[0] = true;
+    } else if (options->has_root) {
+        // past the tip's taper, at the first place that is nearly as wide as the vessel
+        double widest = 0, arc = 0;
+        int last = root.step > 0 ? fine->offset[c + 1] - 1 : fine->offset[c], k = at;
+        for (; k != last && arc < 2 * root.radius; k += root.step) {
+            widest = fmax(widest, fine->radius[k]);
+            arc += vec3_distance(fine->point[k], fine->point[k + root.step]);
+        }
+        for (; at != k && fine->radius[at] < 0.9 * widest; at += root.step) {
+            report->root_cut += vec3_distance(fine->point[at], fine->point[at + root.step]);
+            fine->done[at] = true;
+        }
+        report->root_is_cut = s->is_open_end[0] = true;
     }
     for (int end = root.step > 0 ? fine->offset[c + 1] : fine->offset[c] - 1; at != end; at += root.step) {
-        parent = fine->nearest[at] = grow(g, fine->point[at], fine->radius[at], parent);
+        parent = fine->nearest[at] = grow(g, fine->point[at], fine->radius[at], fine->given[at], parent);
         fine->distance[at] = 0;
         fine->done[at] = true;
     }
@@ -370,8 +416,8 @@ static bool build(Growing *g, Fine *fine, const Wall *wall, const ImportOptions 
     for (int i = 0; i < s->count; i++)
         kept[i] = true;
     for (int i = 1, grown = s->count; i < grown; i++)
-        if (g->is_end[i])
-            lead_to_opening(g, wall, i, kept, 1e-6);
+        if (g->children[i] == 0 && !lead_to_opening(g, wall, i, kept, 1e-6))
+            blunt_end(g, i, kept);
     drop_samples(s, kept, place);
     return true;
 }
@@ -386,16 +432,16 @@ Skeleton *skeleton_join(const CurveSet *set, const Wall *wall, const ImportOptio
         size_t room = (size_t)fine.count + 201 * (2 * (size_t)set->curve_count + 2);
         g.s = skeleton_create(room);
         g.way = calloc(room, sizeof *g.way);
-        g.is_end = calloc(room, sizeof *g.is_end);
+        g.children = calloc(room, sizeof *g.children);
         kept = calloc(room, sizeof *kept);
         place = calloc(room, sizeof *place);
-        good = g.s && g.way && g.is_end && kept && place;
+        good = g.s && g.way && g.children && kept && place;
     }
     if (!good)
         faults_add(faults, name, 0, 0, "not enough memory");
     good = good && build(&g, &fine, wall, options, report, kept, place, name, faults);
     free(g.way);
-    free(g.is_end);
+    free(g.children);
     free(kept);
     free(place);
     fine_free(&fine);
@@ -411,6 +457,7 @@ void skeleton_free(Skeleton *s)
         return;
     free(s->point);
     free(s->radius);
+    free(s->given);
     free(s->parent);
     free(s->is_open_end);
     free(s);

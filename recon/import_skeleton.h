@@ -21,9 +21,16 @@ typedef struct Skeleton {
     int count;
     Vec3 *point;
     double *radius;          // inscribed [mm]
+    double *given;           // the curve's own [mm], 0 where it has none
     int *parent;             // -1 at 0, parents before children
     bool *is_open_end;       // at an opening
 } Skeleton;
+
+enum { SECTION_RAYS = 16 };
+// Median distance of the wall from p square to unit `tangent` [mm] within `reach`, the least, and the section's centroid; 0 where little wall is there.
+double section_radius(const MeshTree *tree, Vec3 p, Vec3 tangent, double reach, double *least, Vec3 *centroid);
+// The curves, sampled, what leaves the lumen or grazes its wall mended (import_curves.c). NULL where memory lacks.
+CurveSet *curves_in_lumen(const SurfaceMesh *mesh, const MeshTree *tree, const CurveSet *set, ImportReport *report);
 
 // Takes flat lids off where a curve's end points at one. False where memory lacks.
 bool wall_open(const SurfaceMesh *mesh, const CurveSet *set, Wall *wall);

@@ -1,7 +1,8 @@
 // See import_surface.h. Nodes stand every `spacing` inscribed radii along the skeleton. The wall's triangles are sampled with a density of
 // points_per_node / (2 pi r spacing r), r of the nearest node, by a low-discrepancy sequence (Roberts' R2, folded into the triangle). A node that gets
-// fewer than eight points lies within its parent's lumen and is left out: its children hang on the parent. The radius is then the median distance
-// of the node's points from its axis, between 1 and 1.6 times the inscribed one (ostia and kissing walls pull the median away).
+// fewer than eight points lies within its parent's lumen and is left out: its children hang on the parent. A node's radius is its curve's own where
+// that agrees with the mesh to 30 %, else the median distance of the wall square to the curve, between 1 and 1.6 times the inscribed radius (ostia and
+// kissing walls pull the median away). At a blind end, where inscribed spheres shrink, it is that of the last sphere that reaches the end.
 #include "recon/import_surface.h"
 
 #include "recon/import_skeleton.h"
@@ -11,117 +12,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { CANDIDATES = 6, LEAST_POINTS = 8, PASSES = 4, CHUNK = 256 };
-static const double POINTS_MAX = 4e6;
+enum { CANDIDATES = 12, LEAST_POINTS = 8, PASSES = 4, CHUNK = 256 };
+static const double POINTS_MAX = 4e6, SEEN_REACH = 4, REACH = 2.5, AGREES = 0.3, PULLED = 1.6;   // reaches in radii
 
 ImportOptions import_default_options(void) { return (ImportOptions){.spacing = 0.5, .points_per_node = 108}; }
-
-// --- the curves' frame ---
-
-static double inside_share(const SurfaceMesh *mesh, const CurveSet *set, double sx, double scale)
-{
-    // winding numbers cost all triangles each
-    int wanted = (int)fmin(fmax(2e7 / (mesh->triangle_count + 1), 20), 400), step = set->point_count / wanted + 1, inside = 0, count = 0;
-    for (int i = 0; i < set->point_count; i += step, count++) {
-        Vec3 p = set->point[i];
-        inside += mesh_winding(mesh, vec3(sx * scale * p.x, sx * scale * p.y, scale * p.z)) > 0.5;
-    }
-    return (double)inside / count;
-}
-
-bool import_place_curves(const SurfaceMesh *mesh, double scale, CurveSet *set, ImportReport *report, const char *name, Faults *faults)
-{
-    const double frame[4][2] = {{1, 1}, {-1, 1}, {1, scale}, {-1, scale}};
-    int best = 0;
-    double most = -1;
-    for (int f = 0; f < (scale != 1 ? 4 : 2); f++) {
-        double share = inside_share(mesh, set, frame[f][0], frame[f][1]);
-        // as they stand, unless that is clearly wrong
-        if (share > most + (f ? 0.25 : 0)) {
-            most = share;
-            best = f;
-        }
-    }
-    report->inside_percent = 100 * most;
-    report->curves_flipped = frame[best][0] < 0;
-    report->curves_scaled = frame[best][1];
-    if (most < 0.5) {
-        faults_add(faults, name, 0, 0, "only %.0f %% of the centrelines' points lie inside the surface, with x and y negated or not: they are of another frame or vessel",
-                   100 * most);
-        return false;
-    }
-    for (int i = 0; i < set->point_count; i++) {
-        double s = frame[best][0] * frame[best][1];
-        set->point[i] = vec3(s * set->point[i].x, s * set->point[i].y, frame[best][1] * set->point[i].z);
-        set->radius[i] *= frame[best][1];
-    }
-    return true;
-}
-
-// --- curves that graze the wall ---
-
-// Where a curve lies beside or beyond the wall (a coarse surface cuts its bends' corners) it goes to the middle of the chord that starts square to the
-// wall at the nearest point. `radius`: what the vessel has about there; chords that are longer cross another lumen.
-static Vec3 to_middle(const SurfaceMesh *mesh, const MeshTree *tree, Vec3 p, double radius, bool *moved)
-{
-    for (int pass = 0; pass < 3; pass++) {
-        Vec3 foot = p;
-        int t = 0;
-        double off = mesh_tree_nearest(tree, p, INFINITY, &foot, &t);
-        Vec3 a = mesh->vertex[mesh->triangle[t][0]], b = mesh->vertex[mesh->triangle[t][1]], c = mesh->vertex[mesh->triangle[t][2]];
-        Vec3 inward = vec3_negate(vec3_unit(vec3_cross(vec3_sub(b, a), vec3_sub(c, a))));
-        bool is_inside = vec3_dot(vec3_sub(p, foot), inward) > 0;
-        double chord = mesh_tree_ray(tree, vec3_add_scaled(foot, 1e-4 * radius, inward), inward, 4 * radius, NULL);
-        if (!isfinite(chord) || (is_inside && off > 0.3 * chord))
-            break;
-        p = vec3_add_scaled(foot, 0.5 * chord, inward);
-        *moved = true;
-    }
-    return p;
-}
-
-// The curves in steps of 0.3 radii, what grazes the wall moved to the middle; NULL where memory lacks.
-static CurveSet *clear_curves(const SurfaceMesh *mesh, const MeshTree *tree, const CurveSet *set, ImportReport *report)
-{
-    CurveSet *out = curve_set_create();
-    double total = 0;
-    for (int i = 0; i + 1 < set->point_count; i++)
-        total += vec3_distance(set->point[i], set->point[i + 1]);
-    size_t room = 300000 + 2 * (size_t)set->point_count;
-    Vec3 *point = malloc(room * sizeof *point);
-    double *radius = malloc(room * sizeof *radius);
-    bool *moved = calloc(room, sizeof *moved), good = out && point && radius && moved;
-    for (int c = 0; good && c < set->curve_count; c++) {
-        int n = 0;
-        for (int i = set->offset[c]; i < set->offset[c + 1]; i++) {
-            Vec3 from = set->point[i > set->offset[c] ? i - 1 : i], to = set->point[i], foot;
-            int t = 0;
-            double wide = fmax(set->radius[i], mesh_tree_nearest(tree, to, INFINITY, &foot, &t)), length = vec3_distance(from, to);
-            int steps = i > set->offset[c] ? (int)fmax(1, ceil(length / fmax(0.3 * wide, total / 100000))) : 1;
-            for (int k = 1; k <= steps && n + 1 < (int)room; k++) {
-                moved[n] = false;
-                radius[n] = wide;
-                point[n] = to_middle(mesh, tree, vec3_mix(from, to, (double)k / steps), wide, &moved[n]);
-                report->moved_samples += moved[n];
-                report->samples++;
-                n++;
-            }
-        }
-        // moved stretches are smoothed with their surroundings
-        for (int pass = 0; pass < 6; pass++)
-            for (int i = 1; i + 1 < n; i++)
-                if (moved[i - 1] || moved[i] || moved[i + 1])
-                    point[i] = vec3_mix(point[i], vec3_scale(vec3_add(point[i - 1], point[i + 1]), 0.5), 0.5);
-        good = curve_set_add(out, point, radius, n);
-    }
-    free(point);
-    free(radius);
-    free(moved);
-    if (good)
-        return out;
-    curve_set_free(out);
-    return NULL;
-}
 
 // --- nodes ---
 
@@ -133,7 +27,74 @@ typedef struct Nodes {
     bool *is_end;            // a leaf or the root: kept
 } Nodes;
 
-static bool choose_nodes(Skeleton *s, double spacing, Nodes *nodes)
+// Along the unbranched piece at `end`, `next` giving the sample after each: up to the last sphere that reaches the end, none is smaller than it.
+static void widen_end(Skeleton *s, int end, const int *next)
+{
+    double arc = 0, widest = 0;
+    int last = end;
+    for (int i = end; next[i] >= 0 && arc < 3 * fmax(widest, s->radius[i]); i = next[i]) {
+        arc += vec3_distance(s->point[i], s->point[next[i]]);
+        if (s->radius[next[i]] > widest && arc < 1.1 * s->radius[next[i]]) {
+            widest = s->radius[next[i]];
+            last = next[i];
+        }
+    }
+    for (int i = end; i != last; i = next[i])
+        s->radius[i] = fmax(s->radius[i], widest);
+}
+
+static double inscribed(const Wall *wall, Vec3 p)
+{
+    Vec3 foot;
+    int t = 0;
+    return mesh_tree_nearest(wall->tree, p, INFINITY, &foot, &t);
+}
+
+// The vessel's radius at sample i, r being the inscribed one.
+static double vessel_radius(const Skeleton *s, const Wall *wall, int i)
+{
+    int a = i > 0 ? s->parent[i] : i, b = i > 0 ? i : i + (s->count > 1);
+    double least, r = s->radius[i], given = s->given[i];
+    Vec3 centroid;
+    double section = section_radius(wall->tree, s->point[i], vec3_unit(vec3_sub(s->point[b], s->point[a])), 6 * fmax(r, given), &least, &centroid);
+    // a curve beside the middle has an inscribed sphere that is too small; the section's middle tells
+    section = fmin(fmax(section, r), PULLED * fmax(r, inscribed(wall, centroid)));
+    return given > 0 && (fabs(given - section) < AGREES * section || fabs(given - r) < AGREES * r) ? given : section;
+}
+
+// From inscribed radii to those of the vessel.
+static bool vessel_radii(Skeleton *s, const Wall *wall)
+{
+    size_t room = (size_t)s->count + 1;
+    int *up = malloc(room * sizeof *up), *down = malloc(room * sizeof *down), *children = calloc(room, sizeof *children);
+    double *radius = malloc(room * sizeof *radius);
+    bool good = up && down && children && radius;
+    for (int i = 0; good && i < s->count; i++) {
+        up[i] = s->parent[i];
+        down[i] = -1;
+        if (i > 0) {
+            down[s->parent[i]] = i;
+            children[s->parent[i]]++;
+        }
+    }
+    for (int i = 0; good && i < s->count; i++)
+        if (children[i] > 1)
+            up[i] = down[i] = -1;
+    for (int i = 0; good && i < s->count; i++)
+        if (i == 0 || children[i] == 0)
+            widen_end(s, i, i ? up : down);
+    for (int i = 0; good && i < s->count; i++)
+        radius[i] = vessel_radius(s, wall, i);
+    if (good)
+        memcpy(s->radius, radius, (size_t)s->count * sizeof *radius);
+    free(radius);
+    free(up);
+    free(down);
+    free(children);
+    return good;
+}
+
+static bool choose_nodes(Skeleton *s, const Wall *wall, double spacing, Nodes *nodes)
 {
     size_t room = (size_t)s->count + 1;
     int *node = malloc(room * sizeof *node);
@@ -144,11 +105,7 @@ static bool choose_nodes(Skeleton *s, double spacing, Nodes *nodes)
     bool good = node && arc && has_child && nodes->center && nodes->direction && nodes->radius && nodes->parent && nodes->is_end;
     for (int i = 1; good && i < s->count; i++)
         has_child[s->parent[i]] = true;
-    // a graze that is left is no stenosis of a tenth: radii fall along the tree by no more than half a step's length
-    for (int i = 1; good && i < s->count; i++)
-        s->radius[i] = fmax(s->radius[i], s->radius[s->parent[i]] - 0.5 * vec3_distance(s->point[i], s->point[s->parent[i]]));
-    for (int i = s->count - 1; good && i > 0; i--)
-        s->radius[s->parent[i]] = fmax(s->radius[s->parent[i]], s->radius[i] - 0.5 * vec3_distance(s->point[i], s->point[s->parent[i]]));
+    good = good && vessel_radii(s, wall);
     for (int i = 0; good && i < s->count; i++) {
         int up = s->parent[i];
         double since = up < 0 ? INFINITY : arc[up] + vec3_distance(s->point[i], s->point[up]);
@@ -211,10 +168,14 @@ typedef struct Sampling {
     const Nodes *nodes;
     const Wall *wall;
     double points_per_node, spacing;
+    bool root_is_cut;        // the wall beyond the root's plane is left out
     double *weight;          // (T) points wanted of each triangle
+    int *component;          // (V) of vertices: the first vertex of its component
+    bool *used;              // (V) components in which a node lies
     long count;
     Vec3 *point;             // (P)
-    int *owner;              // (P) -1: no node sees it
+    int *owner;              // (P) -1: left out
+    bool *unseen;            // (P) given to a node that does not see it
 } Sampling;
 
 // The nodes that are nearest to p by power distance |p - c|^2 - r^2, best first.
@@ -244,9 +205,18 @@ static void weigh_triangle(void *context, long t)
     Vec3 a = mesh->vertex[mesh->triangle[t][0]], b = mesh->vertex[mesh->triangle[t][1]], c = mesh->vertex[mesh->triangle[t][2]];
     double area = 0.5 * vec3_norm(vec3_cross(vec3_sub(b, a), vec3_sub(c, a)));
     int node;
-    nearest_nodes(s->nodes, vec3_scale(vec3_add(a, vec3_add(b, c)), 1.0 / 3), 1, &node);
-    double r = s->nodes->radius[node];
+    Vec3 middle = vec3_scale(vec3_add(a, vec3_add(b, c)), 1.0 / 3);
+    nearest_nodes(s->nodes, middle, 1, &node);
+    // far from every node the vessel is wider than that node's, or has none
+    double r = fmax(s->nodes->radius[node], vec3_distance(middle, s->nodes->center[node]) / PULLED);
     s->weight[t] = area * s->points_per_node / (2 * PI * r * r * s->spacing);
+}
+
+static bool is_beyond_cut(const Sampling *s, Vec3 p, int owner)
+{
+    const Nodes *n = s->nodes;
+    Vec3 upstream = vec3_unit(vec3_sub(n->center[0], n->center[n->count > 1]));
+    return s->root_is_cut && vec3_distance(n->center[owner], n->center[0]) < 3 * n->radius[0] && vec3_dot(vec3_sub(p, n->center[0]), upstream) > 0;
 }
 
 static void find_owners(void *context, long chunk)
@@ -255,17 +225,66 @@ static void find_owners(void *context, long chunk)
     for (long i = chunk * CHUNK; i < s->count && i < (chunk + 1) * CHUNK; i++) {
         int node[CANDIDATES], count = nearest_nodes(s->nodes, s->point[i], CANDIDATES, node);
         s->owner[i] = -1;
+        s->unseen[i] = false;
         for (int k = 0; k < count && s->owner[i] < 0; k++) {
             Vec3 from = s->nodes->center[node[k]], to = vec3_sub(s->point[i], from);
             double length = vec3_norm(to);
-            if (length > 2.5 * s->nodes->radius[node[k]])
+            if (length > SEEN_REACH * s->nodes->radius[node[k]])
                 continue;
             // the wall is seen where nothing stands clearly before it
             double hit = length > 0 ? mesh_tree_ray(s->wall->tree, from, vec3_scale(to, 1 / length), length, NULL) : INFINITY;
             if (!(hit < length - 0.1 * s->nodes->radius[node[k]]))
                 s->owner[i] = node[k];
         }
+        if (s->owner[i] < 0 && count > 0 && vec3_distance(s->point[i], s->nodes->center[node[0]]) < REACH * s->nodes->radius[node[0]]) {
+            s->owner[i] = node[0];
+            s->unseen[i] = true;
+        }
+        if (s->owner[i] >= 0 && is_beyond_cut(s, s->point[i], s->owner[i])) {
+            s->owner[i] = -1;
+            s->unseen[i] = false;
+        }
     }
+}
+
+static int first_of(int *component, int v)
+{
+    while (component[v] != v)
+        v = component[v] = component[component[v]];
+    return v;
+}
+
+// Components of the wall, and which of them have a node; counts the others.
+static bool find_components(Sampling *s, ImportReport *report)
+{
+    const SurfaceMesh *mesh = &s->wall->mesh;
+    size_t room = (size_t)mesh->vertex_count + 1;
+    bool *counted = calloc(room, sizeof *counted);
+    s->component = malloc(room * sizeof *s->component);
+    s->used = calloc(room, sizeof *s->used);
+    bool good = counted && s->component && s->used;
+    for (int v = 0; good && v < mesh->vertex_count; v++)
+        s->component[v] = v;
+    for (int t = 0; good && t < mesh->triangle_count; t++)
+        for (int k = 1; k < 3; k++) {
+            int a = first_of(s->component, mesh->triangle[t][0]), b = first_of(s->component, mesh->triangle[t][k]);
+            s->component[a > b ? a : b] = a > b ? b : a;
+        }
+    for (int v = 0; good && v < mesh->vertex_count; v++)
+        s->component[v] = first_of(s->component, v);
+    for (int i = 0; good && i < s->nodes->count; i++) {
+        Vec3 foot;
+        int t = 0;
+        if (isfinite(mesh_tree_nearest(s->wall->tree, s->nodes->center[i], INFINITY, &foot, &t)))
+            s->used[s->component[mesh->triangle[t][0]]] = true;
+    }
+    for (int t = 0; good && t < mesh->triangle_count; t++) {
+        int piece = s->component[mesh->triangle[t][0]];
+        report->unused_components += !s->used[piece] && !counted[piece];
+        counted[piece] = true;
+    }
+    free(counted);
+    return good;
 }
 
 static bool sample_wall(Sampling *s, int threads, ImportReport *report, const char *name, Faults *faults)
@@ -275,15 +294,20 @@ static bool sample_wall(Sampling *s, int threads, ImportReport *report, const ch
     if (s->weight)
         parallel_for(threads, mesh->triangle_count, weigh_triangle, s, NULL);
     double total = 0;
-    for (int t = 0; s->weight && t < mesh->triangle_count; t++)
+    bool good = s->weight && find_components(s, report);
+    for (int t = 0; good && t < mesh->triangle_count; t++) {
+        if (!s->used[s->component[mesh->triangle[t][0]]])
+            s->weight[t] = 0;
         total += s->weight[t];
+    }
     if (total > POINTS_MAX) {
         faults_add(faults, name, 0, 0, "would take %.0f points: the centrelines leave wide parts of the surface out; a centreline in every vessel is valid", total);
         return false;
     }
     s->point = calloc((size_t)total + 2, sizeof *s->point);
     s->owner = calloc((size_t)total + 2, sizeof *s->owner);
-    if (!s->weight || !s->point || !s->owner) {
+    s->unseen = calloc((size_t)total + 2, sizeof *s->unseen);
+    if (!good || !s->point || !s->owner || !s->unseen) {
         faults_add(faults, name, 0, 0, "not enough memory");
         return false;
     }
@@ -320,25 +344,17 @@ static int drop_nodes(Nodes *nodes, const long *points, int *place)
     return before - kept;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static VesselTree *make_tree(const Nodes *nodes, const Sampling *s, ImportReport *report)
 {
     long kept = 0;
-    for (long i = 0; i < s->count; i++)
+    for (long i = 0; i < s->count; i++) {
         kept += s->owner[i] >= 0;
-    report->unseen_points = s->count - kept;
-    VesselTree *tree = vessel_tree_create(nodes->count, kept, 0);
-    double *aside = calloc((size_t)kept + 1, sizeof *aside);
-    if (!tree || !aside) {
-        vessel_tree_free(tree);
-        free(aside);
-        return NULL;
+        report->unseen_points += s->unseen[i];
     }
+    report->left_points = s->count - kept;
+    VesselTree *tree = vessel_tree_create(nodes->count, kept, 0);
+    if (!tree)
+        return NULL;
     for (long i = 0; i < s->count; i++)
         if (s->owner[i] >= 0)
             tree->point_offset[s->owner[i] + 1]++;
@@ -353,7 +369,6 @@ static VesselTree *make_tree(const Nodes *nodes, const Sampling *s, ImportReport
     for (int n = 0; n < nodes->count; n++) {
         Vec3 c = nodes->center[n], d = nodes->direction[n];
         int parent = nodes->parent[n], children = 0;
-        int64_t first = tree->point_offset[n], last = tree->point_offset[n + 1];
         double height = parent >= 0 ? vec3_distance(c, nodes->center[parent]) : 0, down = 0;
         for (int k = n + 1; k < nodes->count; k++)
             if (nodes->parent[k] == n) {
@@ -364,22 +379,14 @@ static VesselTree *make_tree(const Nodes *nodes, const Sampling *s, ImportReport
         report->end_count += n == 0 || children == 0;
         down = children ? down / children : height;
         height = parent >= 0 ? 0.5 * (height + down) : down;
-        for (int64_t i = first; i < last; i++) {
-            Vec3 p = vec3_sub(tree->point[i], c);
-            double t = vec3_dot(p, d);
-            aside[i - first] = sqrt(fmax(0, vec3_norm2(p) - t * t));
-        }
-        qsort(aside, (size_t)(last - first), sizeof *aside, compare_doubles);
-        double median = last > first ? aside[(last - first) / 2] : nodes->radius[n];
         tree->center[n] = c;
         tree->direction[n] = d;
-        tree->radius[n] = fmin(fmax(median, nodes->radius[n]), 1.6 * nodes->radius[n]);
+        tree->radius[n] = nodes->radius[n];
         tree->height[n] = height;
         tree->parent[n] = parent;
         report->radius_min = fmin(report->radius_min, tree->radius[n]);
         report->radius_max = fmax(report->radius_max, tree->radius[n]);
     }
-    free(aside);
     return tree;
 }
 
@@ -428,7 +435,7 @@ VesselTree *import_surface(const SurfaceMesh *mesh, const CurveSet *given, const
     int before = faults->count;
     Wall wall;
     MeshTree *mesh_tree = mesh_tree_create(mesh);
-    CurveSet *set = mesh_tree ? clear_curves(mesh, mesh_tree, given, report) : NULL;
+    CurveSet *set = mesh_tree ? curves_in_lumen(mesh, mesh_tree, given, report) : NULL;
     mesh_tree_free(mesh_tree);
     if (!set || !wall_open(mesh, set, &wall)) {
         curve_set_free(set);
@@ -439,10 +446,14 @@ VesselTree *import_surface(const SurfaceMesh *mesh, const CurveSet *given, const
     Nodes nodes = {0};
     report->lid_count = wall.lid_count;
     Skeleton *skeleton = skeleton_join(set, &wall, options, report, name, faults);
-    if (skeleton && choose_nodes(skeleton, options->spacing, &nodes)) {
-        Sampling sampling = {.nodes = &nodes, .wall = &wall, .points_per_node = options->points_per_node, .spacing = options->spacing};
+    if (skeleton && choose_nodes(skeleton, &wall, options->spacing, &nodes)) {
+        Sampling sampling = {.nodes = &nodes, .wall = &wall, .points_per_node = options->points_per_node, .spacing = options->spacing,
+                             .root_is_cut = report->root_is_cut};
         tree = build(&nodes, &sampling, options, report, name, faults);
         free(sampling.weight);
+        free(sampling.component);
+        free(sampling.used);
+        free(sampling.unseen);
         free(sampling.point);
         free(sampling.owner);
     }

@@ -14,7 +14,7 @@ typedef struct ImportOptions {
     double spacing;          // of nodes, in local radii; 0.5
     double points_per_node;  // 108, as the rays of RBT keep them
     bool has_root;           // else the widest open end
-    Vec3 root;               // [mm] the end nearest to it is the root
+    Vec3 root;               // [mm] the end nearest to it is the root, and is cut open where the surface is closed there
     int threads;             // 0: all cores; the tree does not depend on it
 } ImportOptions;
 ImportOptions import_default_options(void);
@@ -23,16 +23,20 @@ typedef struct ImportReport {
     bool curves_flipped;     // x and y of the curves were negated (LPS for RAS): only so they lie inside
     double curves_scaled;    // by this, because only so they lie inside; 1
     double inside_percent;   // of the curves' points inside the surface, in the frame that was taken
-    int samples, moved_samples;          // of the curves; moved: they grazed the wall, or lay beyond it
+    int samples, moved_samples;          // of the curves; moved: they grazed the wall, or lay beside the lumen
+    int cut_samples;         // that lay beyond a vessel's end, or in no vessel
     int branch_count, end_count, open_end_count, lid_count;
     int loop_count;          // places where a loop was cut
     Vec3 loop;               // the first of them
     int lost_curves;         // that touch no other and were left out
     Vec3 lost;
-    int unused_components;   // of the surface: no centreline runs in them
-    bool root_is_open;
+    int unused_components;   // of the surface: no node sees them; they are left out
+    bool root_is_open, root_is_cut;      // cut: no opening was there
+    double root_cut;         // [mm] of the root's curve that was left out for it
     double radius_min, radius_max, length;   // [mm]; length of all branches
-    long sampled_points, unseen_points;      // unseen: no node sees them within 2.5 of its radii; left out
+    long sampled_points;     // of the surface
+    long unseen_points;      // no node sees them: given to the nearest by power distance within 2.5 of its radii
+    long left_points;        // and these to none: out of reach, or beyond the root's cut
     int dropped_nodes;       // whose sphere lies within their parent's
     Vec3 root;
 } ImportReport;

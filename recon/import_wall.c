@@ -6,7 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double LID_COSINE = 0.94, SQUARE_COSINE = 0.7, EDGE_COSINE = 0.82;   // 20 degrees, 45 degrees, 35 degrees
+static const double LID_COSINE = 0.94, SQUARE_COSINE = 0.7, EDGE_COSINE = 0.82,   // 20 degrees, 45 degrees, 35 degrees
+                    ROUND = 0.5;   // area against the disc around it: triangles have 0.41 at most, squares 0.64
 
 typedef struct Side {
     int low, high, triangle, side;
@@ -59,38 +60,62 @@ static void mark_lid(const SurfaceMesh *mesh, const MeshTree *tree, int (*across
                      bool *seen)
 {
     int seed = -1, head = 0, tail = 0;
-    // from a radius back, lest the end lies beyond its lid
-    if (!isfinite(mesh_tree_ray(tree, vec3_add_scaled(end, -radius, outward), outward, 4 * radius, &seed)) || lid[seed])
+    Vec3 u = vec3_normal_to(outward), v = vec3_cross(outward, u);
+    // from a radius back, lest the end lies beyond its lid; beside the axis too, for facets there may be slivers
+    for (int k = 0; k < 6 && seed < 0; k++) {
+        Vec3 aside = vec3_add(vec3_scale(u, cos(2.4 * k)), vec3_scale(v, sin(2.4 * k)));
+        Vec3 from = vec3_add_scaled(vec3_add_scaled(end, -radius, outward), 0.06 * k * radius, aside);
+        if (isfinite(mesh_tree_ray(tree, from, outward, 4 * radius, &seed)) && (lid[seed] || vec3_dot(vec3_unit(area_of(mesh, seed)), outward) < SQUARE_COSINE))
+            seed = -1;
+    }
+    if (seed < 0)
         return;
     Vec3 normal = vec3_unit(area_of(mesh, seed)), origin = mesh->vertex[mesh->triangle[seed][0]], sum = {0, 0, 0};
-    double sharp = 0, border = 0;
-    if (vec3_dot(normal, outward) < SQUARE_COSINE)
-        return;
-    queue[tail++] = seed;
-    seen[seed] = true;
-    while (head < tail) {
-        int t = queue[head++];
-        sum = vec3_add(sum, area_of(mesh, t));
-        for (int k = 0; k < 3; k++) {
-            int other = across[t][k];
-            if (other >= 0 && seen[other])
-                continue;
-            Vec3 n = other >= 0 ? vec3_unit(area_of(mesh, other)) : normal;
-            bool joins = other >= 0 && vec3_dot(n, normal) > LID_COSINE;
-            for (int c = 0; c < 3 && joins; c++)
-                joins = fabs(vec3_dot(vec3_sub(mesh->vertex[mesh->triangle[other][c]], origin), normal)) < 0.25 * radius;
-            if (joins) {
-                seen[other] = true;
-                queue[tail++] = other;
-            } else {
-                double length = vec3_distance(mesh->vertex[mesh->triangle[t][k]], mesh->vertex[mesh->triangle[t][(k + 1) % 3]]);
-                border += length;
-                sharp += other < 0 || vec3_dot(n, normal) < EDGE_COSINE ? length : 0;
+    double sharp = 0, border = 0, widest = 0;
+    // once about the first facet, then about the plane of what that found
+    for (int pass = 0; pass < 2; pass++) {
+        Vec3 moment = {0, 0, 0};
+        double weight = 0;
+        for (int i = 0; i < tail; i++)
+            seen[queue[i]] = false;
+        sum = vec3(0, 0, 0);
+        head = 0;
+        sharp = border = widest = 0;
+        queue[0] = seed;
+        tail = 1;
+        seen[seed] = true;
+        while (head < tail) {
+            int t = queue[head++];
+            Vec3 area = area_of(mesh, t);
+            sum = vec3_add(sum, area);
+            weight += vec3_norm(area);
+            for (int k = 0; k < 3; k++) {
+                moment = vec3_add_scaled(moment, vec3_norm(area) / 3, mesh->vertex[mesh->triangle[t][k]]);
+                int other = across[t][k];
+                if (other >= 0 && seen[other])
+                    continue;
+                Vec3 n = other >= 0 ? vec3_unit(area_of(mesh, other)) : normal;
+                bool joins = other >= 0 && vec3_dot(n, normal) > LID_COSINE;
+                for (int c = 0; c < 3 && joins; c++)
+                    joins = fabs(vec3_dot(vec3_sub(mesh->vertex[mesh->triangle[other][c]], origin), normal)) < 0.25 * radius;
+                if (joins) {
+                    seen[other] = true;
+                    queue[tail++] = other;
+                } else {
+                    Vec3 from = mesh->vertex[mesh->triangle[t][k]];
+                    double length = vec3_distance(from, mesh->vertex[mesh->triangle[t][(k + 1) % 3]]);
+                    border += length;
+                    sharp += other < 0 || vec3_dot(n, normal) < EDGE_COSINE ? length : 0;
+                    widest = fmax(widest, vec3_distance(from, origin));
+                }
             }
         }
+        origin = vec3_scale(moment, 1 / fmax(weight, 1e-300));
+        normal = vec3_unit_or(sum, normal);
     }
     double area = vec3_norm(sum);
-    bool is_lid = area > 0.5 * PI * radius * radius && area < 9 * PI * radius * radius && sharp > 0.7 * border;
+    // one facet of a coarse round end may be as large, but it is no disc
+    bool is_lid = area > 0.5 * PI * radius * radius && area < 4 * PI * radius * radius && sharp > 0.4 * border && area > ROUND * PI * widest * widest;
     for (int i = 0; i < tail; i++) {
         seen[queue[i]] = false;
         lid[queue[i]] = lid[queue[i]] || is_lid;
@@ -106,17 +131,34 @@ static void end_of_curve(const CurveSet *set, int curve, bool last, const MeshTr
     double arc = 0;
     *end = far = set->point[last ? first + n - 1 : first];
     *radius = mesh_tree_nearest(tree, *end, INFINITY, &foot, &triangle);
-    for (int i = 1; i < n && arc < 1.5 * *radius; i++) {
+    for (int i = 1; i < n && (i == 1 || arc < 1.5 * *radius); i++) {
         Vec3 next = set->point[last ? first + n - 1 - i : first + i];
         double length = vec3_distance(far, next);
         int steps = (int)fmin(ceil(length / fmax(0.25 * *radius, 1e-3 * length)), 1000);
         Vec3 from = far;
-        for (int s = 1; s <= steps && arc < 1.5 * *radius; s++, arc += length / steps) {
+        for (int s = 1; s <= steps && (arc == 0 || arc < 1.5 * *radius); s++, arc += length / steps) {
             far = vec3_mix(from, next, (double)s / steps);
             *radius = fmax(*radius, mesh_tree_nearest(tree, far, INFINITY, &foot, &triangle));
         }
     }
     *outward = vec3_unit(vec3_sub(*end, far));
+}
+
+// Whether another curve goes on, or aside, from this one's end: it is then no vessel's end.
+static bool is_junction(const CurveSet *set, int curve, Vec3 end, Vec3 outward, double radius)
+{
+    for (int c = 0; c < set->curve_count; c++) {
+        bool passes = false, goes_on = false;
+        for (int i = set->offset[c]; c != curve && i < set->offset[c + 1]; i++) {
+            Vec3 to = vec3_sub(set->point[i], end);
+            double d = vec3_norm(to);
+            passes = passes || d < 0.5 * radius;
+            goes_on = goes_on || (d > radius && d < 2 * radius && vec3_dot(to, outward) > -0.3 * d);
+        }
+        if (passes && goes_on)
+            return true;
+    }
+    return false;
 }
 
 // --- openings ---
@@ -218,7 +260,8 @@ bool wall_open(const SurfaceMesh *mesh, const CurveSet *set, Wall *wall)
             Vec3 end, outward;
             double radius;
             end_of_curve(set, c, last, tree, &end, &outward, &radius);
-            mark_lid(mesh, tree, across, end, outward, radius, lid, &wall->lid_count, queue, seen);
+            if (!is_junction(set, c, end, outward, radius))
+                mark_lid(mesh, tree, across, end, outward, radius, lid, &wall->lid_count, queue, seen);
         }
     if (good) {
         memcpy(wall->mesh.vertex, mesh->vertex, (size_t)mesh->vertex_count * sizeof(Vec3));
