@@ -387,15 +387,19 @@ static bool build(Growing *g, Fine *fine, const Wall *wall, const ImportOptions 
         s->is_open_end[0] = true;
     } else if (options->has_root) {
         // past the tip's taper, at the first place that is nearly as wide as the vessel
-        double widest = 0, arc = 0;
-        int last = root.step > 0 ? fine->offset[c + 1] - 1 : fine->offset[c], k = at;
-        for (; k != last && arc < 2 * root.radius; k += root.step) {
-            widest = fmax(widest, fine->radius[k]);
-            arc += vec3_distance(fine->point[k], fine->point[k + root.step]);
-        }
-        for (; at != k && fine->radius[at] < 0.9 * widest; at += root.step) {
-            report->root_cut += vec3_distance(fine->point[at], fine->point[at + root.step]);
-            fine->done[at] = true;
+        int last = root.step > 0 ? fine->offset[c + 1] - 1 : fine->offset[c];
+        for (bool narrow = true; narrow;) {
+            double widest = fine->radius[at], arc = 0;
+            for (int k = at; k != last && arc < 2 * fmax(widest, fine->given[at]); k += root.step) {
+                widest = fmax(widest, fine->radius[k]);
+                arc += vec3_distance(fine->point[k], fine->point[k + root.step]);
+            }
+            narrow = at != last && fine->radius[at] < 0.7 * widest;
+            if (narrow) {
+                report->root_cut += vec3_distance(fine->point[at], fine->point[at + root.step]);
+                fine->done[at] = true;
+                at += root.step;
+            }
         }
         report->root_is_cut = s->is_open_end[0] = true;
     }

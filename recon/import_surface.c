@@ -13,7 +13,7 @@
 #include <string.h>
 
 enum { CANDIDATES = 12, LEAST_POINTS = 8, PASSES = 4, CHUNK = 256 };
-static const double POINTS_MAX = 4e6, SEEN_REACH = 4, REACH = 2.5, AGREES = 0.3, PULLED = 1.6;   // reaches in radii
+static const double POINTS_MAX = 4e6, SEEN_REACH = 2, REACH = 2, AGREES = 0.3, PULLED = 1.6;   // reaches in radii
 
 ImportOptions import_default_options(void) { return (ImportOptions){.spacing = 0.5, .points_per_node = 108}; }
 
