@@ -10,6 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+static const double least_tube = 0.7;   // mean inlier rate of a branch, as a share of the first one's
+
 typedef struct Found {       // what became of a limb
     Track out, back;
     const char *why;
@@ -74,6 +76,33 @@ static bool is_rim(const Tracker *t, const RbtLimb *limb)
         beside += count >= 2;
     }
     return 2 * beside > limb->count;
+}
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+// Bone passes the ceiling of single samples where noise darkens them, not that of a median.
+static bool is_dense(const Tracker *t, const RbtLimb *limb, const Track *track)
+{
+    enum { MOST = 256 };
+    double value[MOST];
+    int n = 0, stride = track->count / MOST + 1;
+    for (int i = 0; i < track->count && n < MOST; i += stride)
+        value[n++] = tracker_brightness(t, track->node[i].cylinder.center);
+    qsort(value, (size_t)n, sizeof *value, compare_doubles);
+    return n > 0 && value[n / 2] > fmin(limb->ceiling, t->ceiling) - RBT_NOISE_SHARE * t->noise;
+}
+
+// Most nodes of a vessel are cylinders; what was tracked through a shapeless neighbour has few inliers all along.
+static bool is_tube(const Tracker *t, const TrackNode *node, int count)
+{
+    double sum = 0;
+    for (int i = 0; i < count; i++)
+        sum += node[i].inlier_rate;
+    return sum >= least_tube * t->usual_inliers * count;
 }
 
 // A cylinder somewhere on the limb: its middle first, then outwards, then inwards.
@@ -196,7 +225,7 @@ static void track_limb(void *context, long index)
             tracker_run(t, &seed, &found->out, false);
             found->why = t->why;
             found->radius = median_radius(&found->out, 7);
-            found->good = found->out.count > 0 && !t->out_of_memory;
+            found->good = found->out.count > 0 && !t->out_of_memory && is_tube(t, found->out.node, found->out.count) && !is_dense(t, limb, &found->out);
         }
     }
     if (t->out_of_memory)
@@ -277,6 +306,10 @@ static bool adopt(Tracker *t, RbtPaint *paint, const RbtLimb *limb, const Found 
             }
             bool is_joined = false;
             good = good && rbt_mend_links(t, paint, before, &is_joined);
+            if (good && is_joined && !is_tube(t, t->tree.node + before, t->tree.count - before)) {   // with the way that joins it
+                track_cut(&t->tree, before);
+                is_joined = false;
+            }
             good = good && (!is_joined || rbt_ends_add(ends, last < total - 1 ? "runs into another branch" : found->why, -1));
             if (good)
                 rbt_paint_nodes(paint, &t->tree, before, t->tree.count);
@@ -332,12 +365,6 @@ static bool grow_round(Tracker *t, RbtPaint *paint, int first, int end, double s
     return good;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 // Standard deviation of the spline's values in the background, from the median of their distances to its median: vessels are few.
 static double noise_of(const Tracker *t)
 {
@@ -357,18 +384,20 @@ static double noise_of(const Tracker *t)
     return 1.4826 * value[n / 2];
 }
 
-// Medians of brightness and contrast over the first branch say what is too faint and what is too bright.
+// Medians of brightness and contrast over the first branch say what is too faint and what is too bright; its inliers how well cylinders fit in this volume.
 static void measure_root(Tracker *t, double noise)
 {
     enum { MOST = 512 };
-    double inside[MOST], contrast[MOST];
+    double inside[MOST], contrast[MOST], inliers = 0;
     int n = 0, stride = t->tree.count / MOST + 1;
     for (int i = 0; i < t->tree.count && t->tree.node[i].branch == 0 && n < MOST; i += stride) {
         inside[n] = tracker_brightness(t, t->tree.node[i].cylinder.center);
+        inliers += t->tree.node[i].inlier_rate;
         contrast[n++] = t->tree.node[i].contrast;
     }
     qsort(inside, (size_t)n, sizeof *inside, compare_doubles);
     qsort(contrast, (size_t)n, sizeof *contrast, compare_doubles);
+    t->usual_inliers = inliers / n;
     t->floor = inside[n / 2] - (1 - t->parameters->residue) * contrast[n / 2];
     t->ceiling = inside[n - 1 - n / 10] + RBT_BRIGHTER * contrast[n / 2] + RBT_NOISE_SHARE * noise;
 }

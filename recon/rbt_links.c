@@ -132,7 +132,7 @@ static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 
             int k = index_in(&s, next);
             Vec3 voxel = voxel_in(&s, k);
             double bright = lit(light, (double)bspline_sample(v, voxel));
-            if (tracker_is_forbidden(t, volume_point_of(v, voxel)) || bright < 0.5 * least_lit)
+            if (tracker_is_forbidden(t, volume_point_of(v, voxel)) || bright < 0.7 * least_lit)
                 continue;
             bright = 0.5 * (bright + lit(light, voxel_value(v, voxel)));
             float cost = here.way + length[n] / (float)pow(bright, 3);

@@ -83,7 +83,7 @@ bool rbt_is_sac(Tracker *t, const RbtPaint *paint, const RbtLimb *limb)
     double middle = 0;
     for (int i = 0; good && i < rays; i += rays / 16)
         middle += tracker_brightness(t, vec3_add_scaled(center, 0.4 * radius, ray[i])) / ((rays + rays / 16 - 1) / (rays / 16));
-    good = good && rbt_paint_node(paint, center) < 0 && middle <= limb->ceiling - RBT_NOISE_SHARE * t->noise;
+    good = good && rbt_paint_node(paint, center) < 0 && middle <= fmin(limb->ceiling, t->ceiling) - RBT_NOISE_SHARE * t->noise;
     if (good) {
         // walls that the vessels see are theirs
         int kept = 0;

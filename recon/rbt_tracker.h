@@ -49,6 +49,7 @@ typedef struct Tracker {
     double longest;          // [mm] a branch may become
     double noise;            // four standard deviations of the spline's values in the background
     double floor, ceiling;   // brightness below which a guarded branch has ended; above which nothing is vessel
+    double usual_inliers;    // mean inlier rate of the first branch
     bool out_of_memory;
     const char *why;         // the last estimate was refused
     char start[256];         // what was estimated at the first start; empty: nothing
