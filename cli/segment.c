@@ -70,10 +70,13 @@ static error_t parse_option(int key, char *text, struct argp_state *state)
 
 static const char intro[] =
     "Tracks vessels through an angiogram (RBT, Kerrien et al. 2017, section 3): VOLUME to a tree of cylinders, each with its points on the wall.\v"
-    "VOLUME is NRRD (raw, gzip or text, attached or detached), MetaImage or NIfTI, recognised by its content.\n\n"
-    "The trace is YAML. The first branch needs a start; its direction (toward, a point further down the vessel) and radius_mm are estimated where they are not given. It becomes the root of the tree, and without a toward one of its two ends does, at the volume's border or wider than the other. Where it is the only "
-    "one (or with automatic: 1) the rest of the tree is found from it, downstream, aneurysms too. Further branches need a start alone: it is projected to the tree tracked so far and the tracking starts beside the parent; with a `toward` it starts at the point itself and "
-    "runs both ways. All of mm may be voxels (start_voxel, toward_voxel, centers_voxel):\n\n"
+    "VOLUME is NRRD (raw, gzip or text, attached or detached), MetaImage, NIfTI-1, or uncompressed DICOM (the folder of a series, one of its files, or a "
+    "multi-frame file), recognised by its content.\n\n"
+    "The trace is YAML. The first branch needs a start; its direction (toward, a point further down the vessel) and radius_mm are estimated where they are "
+    "not given. It becomes the root of the tree, and without a toward one of its two ends does, at the volume's border or wider than the other. Where it is "
+    "the only one (or with automatic: 1) the rest of the tree is found from it, downstream, aneurysms too. Further branches need a start alone: it is "
+    "projected to the tree tracked so far and the tracking starts beside the parent; with a `toward` it starts at the point itself and runs both ways. All "
+    "of mm may be voxels (start_voxel, toward_voxel, centers_voxel):\n\n"
     "  branches:\n"
     "    - {name: carotid, start_mm: [74.8, 12.8, 60.8], toward_mm: [72.8, 16, 61.6], radius_mm: 2}\n"
     "    - {start_voxel: [95, 118, 172]}\n"
