@@ -13,6 +13,7 @@ typedef struct Job {
     const Vessel *vessel;
     Vec3 *point;
     int *count;
+    double *differs;
 } Job;
 
 bool lim_is_in_cell(const VesselTree *tree, int node, int spared, Vec3 x)
@@ -69,6 +70,7 @@ static void agree_on_node(void *context, long index)
     const Job *job = context;
     const VesselTree *tree = job->tree;
     int node = (int)index, count = 0;
+    double most = 0;
     int64_t first = tree->blob_offset[node];
     Blobby model = {(int)(tree->blob_offset[node + 1] - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level};
     Vec3 along = tree->direction[node], e1, e2, wall;
@@ -83,16 +85,19 @@ static void agree_on_node(void *context, long index)
         VesselMemory memory = {.node = node};
         VesselHit hit;
         vessel_query(job->vessel, 1, &wall, tree->radius[node], &memory, &hit);
-        if (hit.flags == 0)
-            job->point[(size_t)node * LIM_AGREED_MOST + (size_t)count++] = vec3_add_scaled(wall, -hit.gap, hit.normal);
+        if (hit.flags != 0)
+            continue;
+        job->point[(size_t)node * LIM_AGREED_MOST + (size_t)count++] = vec3_add_scaled(wall, -hit.gap, hit.normal);
+        most = fmax(most, fabs(hit.gap));
     }
     job->count[node] = count;
+    job->differs[node] = most;
 }
 
-bool lim_agree(const VesselTree *model, int threads, Vec3 *point, int *count)
+bool lim_agree(const VesselTree *model, int threads, Vec3 *point, int *count, double *differs)
 {
     Vessel *vessel = lim_vessel_create(model);
-    Job job = {model, vessel, point, count};
+    Job job = {model, vessel, point, count, differs};
     if (!vessel)
         return false;
     parallel_for(threads, model->node_count, agree_on_node, &job, NULL);

@@ -2,7 +2,7 @@
 //
 // For each node: concatenate the points up to topological distance 2, start from two blobs along the vessel, then
 // select (worst point, its nearest blob), split, optimise (Polak-Ribiere, centre then width) until every point lies within the
-// target distance or the number of blobs is reached; clean up. Then once more, from there, also to the wall that neighbouring models agree on.
+// target distance or the number of blobs is reached; clean up. Then, where neighbours differ, once more from there, also to the wall that they agree on.
 // One job a node on all cores, the largest first; results do not depend on `threads`.
 #ifndef SELDINGER_RECON_LIM_FIT_H
 #define SELDINGER_RECON_LIM_FIT_H
@@ -13,9 +13,10 @@
 typedef struct LimFitOptions {
     // Table 1 of the paper by name
     double alpha;            // weight of the Lennard-Jones cohesion E_c; paper 1e-5, default 0: its repulsion kills twins
-    double beta;             // weight of the curvature E_a [mm^4]; paper 1e-3, default 1e-4
+    double beta;             // weight of the curvature E_a [mm^4]; paper 1e-3. By default a factor instead, with 1e-4 for 1: E_a then weighs the
+                             // noise's variance times r^2, both found from the points; 0: no smoothing
     double s;                // repulsive distance of E_c in widths, 2
-    double iso_level;        // T, 0.1
+    double iso_level;        // T [mm], 0.1; where neither voxel_mm nor target_mm is given, times the mean radius of the nodes
     int max_blobs;           // N_s, 100
     double target_mm;        // t_g [mm]; 0: max(0.5 voxel, min(0.2 r, 1.5 voxels)), without a voxel 0.08 r; paper 0.3
     // what the paper fixes in its text
@@ -27,11 +28,11 @@ typedef struct LimFitOptions {
     bool weigh_distance;     // weigh E_d by mean g^2 / g_i^2: distances instead of field values
     bool project_points;     // measure points beyond the target by projection, not by Taubin's one step
     bool sweep_all_blobs;    // a short pass over all blobs after each split
-    int give_up_splits;      // stop when this many splits bring nothing; 0: never. 3
+    int give_up_splits;      // stop when this many splits bring nothing, twice as many before t_g is met; 0: never. 3; 1 in the second pass
     bool extend_inlet;       // the root's points are repeated outwards so that the vessel is tubular through the inlet plane
     bool guard_shape;        // no constriction on the centreline, no ghost lobes away from the points
     bool agree;              // a second fit of each model, from the first, to its points and to what the models around agree on (recon/lim_agree.h)
-    int max_points;          // a node's points are thinned evenly to this many for speed, 1500
+    int max_points;          // a node's points are thinned evenly to this many for speed, 300, five times as many near an aneurysm; paper 1500
     int threads;             // 0: all cores
 } LimFitOptions;
 

@@ -15,14 +15,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NOISE_PAIRS = 192, ROUNDS = 4, SWEEP_BLOBS = 16, SWEEP_SIZE = 4 * SWEEP_BLOBS, LINE_EVALUATIONS = 8 };
+enum { NOISE_PAIRS = 128, ROUNDS = 4, SWEEP_BLOBS = 16, SWEEP_SIZE = 4 * SWEEP_BLOBS, LINE_EVALUATIONS = 8 };
 
 // E_a's weight is this many times the variance of the noise times r^2 [mm^4]: exact points are not smoothed, noisy ones are. The noise
 // is what neighbours' distances differ by; the distances themselves hold the misfit too, which smoothing would keep alive.
 static const double BEND_OF_NOISE = 1;
 
 // A model within t_g is done when its mean square distance exceeds the noise's by no more than the square of this share of t_g.
-static const double MISFIT = 0.125;
+static const double MISFIT = 0.17;
+
+// Gauss-Newton stops where an iteration gains less than this share of the energy; the second where the model is still far (2 t_g) from its data.
+static const double LEAST_GAIN = 1.5e-3, ROUGH_GAIN = 1e-2;
 
 typedef struct Model {
     LimBlob *blob;           // (capacity)
@@ -43,7 +46,6 @@ typedef struct Fit {
     double alpha;            // weight of E_c at the moment
     double reach;            // no blob's centre goes further from the node [mm]
     float *distance;         // (padded) of the data
-    float *boost;            // (padded) factor on the weight of a point that t_g asks for
     float *offset;           // (padded) signed distance of a point from its foot, > 0 inside
     float *column;           // (SWEEP_SIZE, 2 padded) of the Gauss-Newton pass
     float *residual;         // (2 padded)
@@ -72,13 +74,12 @@ static bool fit_create(Fit *fit, const LimFitTask *task, const LimFitOptions *op
     fit->model.blob = calloc(c, sizeof(LimBlob));
     fit->best.blob = calloc(c, sizeof(LimBlob));
     fit->distance = calloc(n + 1, sizeof(float));
-    fit->boost = calloc(n + 1, sizeof(float));
     fit->offset = calloc(n + 1, sizeof(float));
     fit->column = aligned_alloc(64, 2 * n * SWEEP_SIZE * sizeof(float));
     fit->residual = aligned_alloc(64, 2 * n * sizeof(float));
     fit->normal = calloc(2 * (size_t)SWEEP_SIZE * SWEEP_SIZE, sizeof(double));
     fit->factor = fit->normal ? fit->normal + (size_t)SWEEP_SIZE * SWEEP_SIZE : NULL;
-    return fit->model.blob && fit->best.blob && fit->distance && fit->boost && fit->offset && fit->column && fit->residual && fit->normal;
+    return fit->model.blob && fit->best.blob && fit->distance && fit->offset && fit->column && fit->residual && fit->normal;
 }
 
 static void fit_free(Fit *fit)
@@ -87,7 +88,6 @@ static void fit_free(Fit *fit)
     free(fit->model.blob);
     free(fit->best.blob);
     free(fit->distance);
-    free(fit->boost);
     free(fit->offset);
     free(fit->column);
     free(fit->residual);
@@ -101,14 +101,28 @@ static void find_pairs(Fit *fit)
     int data = fit->task->point_count;
     for (int k = 0; k < NOISE_PAIRS && k < data; k++) {
         int i = (int)((int64_t)k * data / (data < NOISE_PAIRS ? data : NOISE_PAIRS)), nearest = -1;
-        float *restrict d2 = fit->residual, least = 1e30f;
+        float *restrict d2 = fit->residual, least[LIM_LANES], shortest = 1e30f;
+        int where[LIM_LANES];
         for (int j = 0; j < data; j++) {
             float dx = x[j] - x[i], dy = y[j] - y[i], dz = z[j] - z[i];
             d2[j] = dx * dx + dy * dy + dz * dz;
         }
-        for (int j = 0; j < data; j++)
-            if (d2[j] < least && j != i)
-                least = d2[j], nearest = j;
+        d2[i] = 1e30f;
+        for (int l = 0; l < LIM_LANES; l++)
+            least[l] = 1e30f, where[l] = -1;
+        int whole = data / LIM_LANES * LIM_LANES;
+        for (int base = 0; base < whole; base += LIM_LANES)
+            for (int l = 0; l < LIM_LANES; l++) {
+                bool nearer = d2[base + l] < least[l];
+                least[l] = nearer ? d2[base + l] : least[l];
+                where[l] = nearer ? base + l : where[l];
+            }
+        for (int l = 0; l < LIM_LANES; l++)
+            if (least[l] < shortest)
+                shortest = least[l], nearest = where[l];
+        for (int j = whole; j < data; j++)
+            if (d2[j] < shortest)
+                shortest = d2[j], nearest = j;
         if (nearest >= 0) {
             fit->pair[fit->pair_count][0] = i;
             fit->pair[fit->pair_count++][1] = nearest;
@@ -132,7 +146,6 @@ static void fit_set_points(Fit *fit)
         points->given[0][i] = points->x[i];
         points->given[1][i] = points->y[i];
         points->given[2][i] = points->z[i];
-        fit->boost[i] = 1;
         points->weight[i] = i < data ? 1.0f / (float)data : 0;
         points->bend[i] = points->weight[i];
     }
@@ -159,19 +172,21 @@ static double between_slope2(const LimPoints *points, int i)
 
 // Moves the data to their feet on the surface as it is, and bounds each so that its residual is its distance times the slope there: then least
 // squares are those of true distances, and noise along the normal leaves no bias. A point whose foot is not found stays where it was measured.
-static void find_feet(Fit *fit)
+// Not afresh: from the feet of last time, with the sums as they are there; two steps then do.
+static void find_feet(Fit *fit, bool afresh)
 {
-    enum { STEPS = 3 };
+    const int steps = afresh ? 3 : 2;
     LimPoints *points = &fit->points;
     int data = fit->task->point_count;
     double radius = fit->task->radius;
     bool any_lost = false;
     float *const at[3] = {points->x, points->y, points->z};
-    for (int k = 0; k < 3; k++)
+    for (int k = 0; k < 3 && afresh; k++)
         memcpy(at[k], points->given[k], (size_t)points->padded * sizeof(float));
-    for (int step = 0; step < STEPS; step++) {
-        fit_refresh_sums(fit);
-        lim_points_approach(points, 0.4 * radius, step < STEPS - 1 ? 0.7 : 0);
+    for (int step = 0; step < steps; step++) {
+        if (afresh || step > 0)
+            fit_refresh_sums(fit);
+        lim_points_approach(points, 0.4 * radius, step < steps - 1 ? 0.7 : 0);
         for (int k = 0; k < 3; k++)   // guards stay
             memcpy(at[k] + data, points->given[k] + data, (size_t)(points->padded - data) * sizeof(float));
     }
@@ -205,13 +220,13 @@ static double data_distance(const Fit *fit, int i)
 }
 
 // Feet of the data, weights of E_d and E_a, bounds of the guards from the model as it is. The sums hold all blobs, before and after.
-static void fit_refresh_weights(Fit *fit)
+static void fit_refresh_weights(Fit *fit, bool afresh)
 {
     LimPoints *points = &fit->points;
     int data = fit->task->point_count;
     double mean2 = 0, mean = 0, square = 0;
     if (fit->uses_feet)
-        find_feet(fit);
+        find_feet(fit, afresh);
     for (int i = 0; i < data; i++) {
         double slope2 = fit->uses_feet && fit->residual[i] >= 0 ? (double)fit->residual[i] : between_slope2(points, i);
         fit->residual[i] = (float)slope2;
@@ -222,7 +237,7 @@ static void fit_refresh_weights(Fit *fit)
     if (fit->options->weigh_distance)
         for (int i = 0; i < data; i++) {
             double ratio = mean2 / fmax((double)fit->residual[i], 1e-3 * mean2 + 1e-30);
-            points->weight[i] = (float)(fmin(fmax(ratio, 0.2), 5) * (double)fit->boost[i] / data);
+            points->weight[i] = (float)(fmin(fmax(ratio, 0.2), 5) / data);
         }
     if (fit->uses_feet) {
         for (int k = 0; k < fit->pair_count; k++) {
@@ -253,10 +268,11 @@ static Trial evaluate(Fit *fit, int j, LimBlob blob)
 {
     LimBlob kept = fit->model.blob[j];
     LimEnergy part = lim_energy(&fit->points, &blob);
-    double cohesion[4];
+    double cohesion[4] = {0};
     fit->model.blob[j] = blob;
-    Trial trial = {.energy = part.distance + fit->beta * part.bend +
-                             fit->alpha * lim_cohesion(fit->model.blob, fit->model.count, j, fit->options->s, cohesion)};
+    Trial trial = {.energy = part.distance + fit->beta * part.bend};
+    if (fit->alpha > 0)
+        trial.energy += fit->alpha * lim_cohesion(fit->model.blob, fit->model.count, j, fit->options->s, cohesion);
     fit->model.blob[j] = kept;
     for (int k = 0; k < 4; k++)
         trial.slope[k] = part.distance_slope[k] + fit->beta * part.bend_slope[k] + fit->alpha * cohesion[k];
@@ -410,7 +426,9 @@ static double total_energy(Fit *fit)
 {
     double distance, bend;
     lim_energy_total(&fit->points, &distance, &bend);
-    double energy = distance + fit->beta * bend + fit->alpha * lim_cohesion_total(fit->model.blob, fit->model.count, fit->options->s);
+    double energy = distance + fit->beta * bend;
+    if (fit->alpha > 0)
+        energy += fit->alpha * lim_cohesion_total(fit->model.blob, fit->model.count, fit->options->s);
     return isfinite(energy) ? energy : HUGE_VAL;
 }
 
@@ -442,38 +460,41 @@ static void build_normal(Fit *fit, const int *which, int count, double *side)
 // Cholesky of (normal + lambda diag) and the solution; false where it is not positive.
 static bool solve_damped(Fit *fit, int size, double lambda, const double *side, double *step)
 {
-    double *l = fit->factor, floor = 0;
+    double *u = fit->factor, floor = 0;   // upper triangle, changed row by row: the innermost loop has no sum to wait for
     for (int a = 0; a < size; a++)
         floor = fmax(floor, fit->normal[a * SWEEP_SIZE + a]);
     for (int a = 0; a < size; a++) {
-        for (int b = 0; b <= a; b++) {
-            double sum = fit->normal[a * SWEEP_SIZE + b];
-            if (a == b)
-                sum += lambda * (sum + 1e-6 * floor);
-            for (int k = 0; k < b; k++)
-                sum -= l[a * SWEEP_SIZE + k] * l[b * SWEEP_SIZE + k];
-            if (a == b && !(sum > 0))
-                return false;
-            l[a * SWEEP_SIZE + b] = a == b ? sqrt(sum) : sum / l[b * SWEEP_SIZE + b];
-        }
+        for (int b = a; b < size; b++)
+            u[a * SWEEP_SIZE + b] = fit->normal[b * SWEEP_SIZE + a];
+        u[a * SWEEP_SIZE + a] += lambda * (u[a * SWEEP_SIZE + a] + 1e-6 * floor);
+        step[a] = side[a];
     }
-    for (int a = 0; a < size; a++) {
-        double sum = side[a];
-        for (int k = 0; k < a; k++)
-            sum -= l[a * SWEEP_SIZE + k] * step[k];
-        step[a] = sum / l[a * SWEEP_SIZE + a];
+    for (int k = 0; k < size; k++) {
+        double *restrict row = u + k * SWEEP_SIZE;
+        if (!(row[k] > 0))
+            return false;
+        double scale = 1 / sqrt(row[k]);
+        for (int b = k; b < size; b++)
+            row[b] *= scale;
+        step[k] *= scale;
+        for (int a = k + 1; a < size; a++) {
+            double *restrict to = u + a * SWEEP_SIZE, by = row[a];
+            for (int b = a; b < size; b++)
+                to[b] -= by * row[b];
+            step[a] -= by * step[k];
+        }
     }
     for (int a = size - 1; a >= 0; a--) {
         double sum = step[a];
         for (int k = a + 1; k < size; k++)
-            sum -= l[k * SWEEP_SIZE + a] * step[k];
-        step[a] = sum / l[a * SWEEP_SIZE + a];
+            sum -= u[a * SWEEP_SIZE + k] * step[k];
+        step[a] = sum / u[a * SWEEP_SIZE + a];
     }
     return true;
 }
 
 // Improves the blobs `which` together; the sums hold all blobs before and after.
-static void sweep(Fit *fit, const int *which, int count, int iterations)
+static void sweep(Fit *fit, const int *which, int count, int iterations, double least_gain)
 {
     LimBlob kept[SWEEP_BLOBS];
     double side[SWEEP_SIZE], step[SWEEP_SIZE], lambda = 1e-3, energy = total_energy(fit);
@@ -511,7 +532,7 @@ static void sweep(Fit *fit, const int *which, int count, int iterations)
         }
         if (!improved)
             fit_refresh_sums(fit);
-        if (!improved || fabs(gain) < 1e-3)
+        if (!improved || fabs(gain) < least_gain)
             break;
     }
 }
@@ -693,7 +714,7 @@ static void copy_model(Model *to, const Model *from)
     to->count = from->count;
 }
 
-static void optimise_all(Fit *fit, int newest, int iterations)
+static void optimise_all(Fit *fit, int newest, int iterations, double least_gain)
 {
     int which[SWEEP_BLOBS];
     if (!fit->options->sweep_all_blobs)
@@ -701,10 +722,10 @@ static void optimise_all(Fit *fit, int newest, int iterations)
     fit_refresh_sums(fit);
     double before = HUGE_VAL;
     for (int round = 0; round < ROUNDS; round++) {   // the feet move with the surface
-        sweep(fit, which, near_blobs(fit, newest, which), iterations);
+        sweep(fit, which, near_blobs(fit, newest, which), iterations, least_gain);
         if (!fit->uses_feet)
             break;
-        fit_refresh_weights(fit);
+        fit_refresh_weights(fit, false);
         double worst, square;
         worst_point(fit, &worst, &square);
         if (square > 0.99 * before)
@@ -732,8 +753,8 @@ static void clean_up(Fit *fit)
     if (kept > 0 && kept < model->count) {
         model->count = kept;
         fit_refresh_sums(fit);
-        fit_refresh_weights(fit);
-        optimise_all(fit, 0, 4);
+        fit_refresh_weights(fit, true);
+        optimise_all(fit, 0, 4, LEAST_GAIN);
     }
 }
 
@@ -743,15 +764,15 @@ static double attempt_fit(Fit *fit, bool retry, double *worst_of_best)
     const LimFitOptions *options = fit->options;
     start_model(fit, retry);
     fit_refresh_sums(fit);
-    fit_refresh_weights(fit);
+    fit_refresh_weights(fit, true);
     for (int j = 0; j < fit->model.count; j++)
         optimise_blob(fit, j);
-    optimise_all(fit, 0, 8);
+    optimise_all(fit, 0, 8, LEAST_GAIN);
     double best_square = HUGE_VAL, best_worst = HUGE_VAL, square_of_best = HUGE_VAL;
     for (int idle = 0;;) {
         double worst_distance, mean_square;
         fit_refresh_sums(fit);
-        fit_refresh_weights(fit);
+        fit_refresh_weights(fit, true);
         int worst = worst_point(fit, &worst_distance, &mean_square);
         // a loose target is met by models that still miss the wall by more than the noise
         bool within = worst_distance <= fit->target, reached = within;
@@ -768,10 +789,12 @@ static double attempt_fit(Fit *fit, bool retry, double *worst_of_best)
         } else {
             idle++;
         }
-        if (reached || fit->model.count >= options->max_blobs || (options->give_up_splits > 0 && idle >= options->give_up_splits))
+        // a worst point among some hundred noisy ones may need blobs of its own, which do not show in the mean
+        int patience = options->give_up_splits * (best_worst > fit->target ? 2 : 1);
+        if (reached || fit->model.count >= options->max_blobs || (options->give_up_splits > 0 && idle >= patience))
             break;
         add_blob(fit, worst, worst_distance);
-        optimise_all(fit, fit->model.count - 1, 4);
+        optimise_all(fit, fit->model.count - 1, 4, worst_distance > 2 * fit->target ? ROUGH_GAIN : LEAST_GAIN);
     }
     return square_of_best;
 }
