@@ -174,6 +174,42 @@ static void kissing_vessel_is_refused(void **state)
     }
 }
 
+// Bone in contact, and a thin neighbour that crosses two voxels away: nothing outside the vessel.
+static void dense_and_near_neighbours_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        uint64_t seed;
+        char option[3][2][64];
+    } shapes[] = {{"bone", 5, {{"seed", "5"}, {"radius_mm", "1"}, {"points", "8"}}}, {"bone", 7, {{"seed", "7"}, {"radius_mm", "1"}, {"points", "8"}}},
+                  {"kissing", 13, {{"gap_mm", "0.4"}, {"radius_mm", "0.6"}, {"crossing_deg", "90"}}}};
+    for (size_t k = 0; k < sizeof shapes / sizeof shapes[0]; k++) {
+        VolumeOptions options = volume_default_options();
+        options.seed = shapes[k].seed;   // as `synth` has it: of the places and of the noise
+        Shape *shape = shape_create(shapes[k].name, 3, shapes[k].option, "test", &faults);
+        assert_non_null(shape);
+        VesselTree *truth = shape_sample(shape, &faults);
+        Volume *v = shape_volume_with(shape, &options, &faults);
+        assert_true(truth && v);
+        RbtParameters p = automatic();
+        RbtSeed seed = {.start = truth->center[2], .toward = vec3_add(truth->center[2], truth->direction[2]), .has_toward = true, .radius = truth->radius[2]};
+        VesselTree *tree = track(v, &p, &seed, 1, 0, NULL);
+        assert_non_null(tree);
+        double deepest = 0;
+        for (int i = 0; i < tree->node_count; i++)
+            deepest = fmax(deepest, -shape_field(shape, tree->center[i], NULL));
+        if (deepest > 0.3)
+            print_message("%s %zu: %.2f mm outside\n", shapes[k].name, k, deepest);
+        assert_true(deepest < 0.3);
+        assert_true(nearest_to(tree, truth->center[truth->node_count - 2]) < 1);
+        vessel_tree_free(tree);
+        vessel_tree_free(truth);
+        volume_free(v);
+        shape_free(shape);
+    }
+}
+
 static void a_sac_is_found(void **state)
 {
     (void)state;
@@ -356,7 +392,8 @@ static void the_same_for_any_number_of_threads(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_branch_from_one_start), cmocka_unit_test(kissing_vessel_is_refused), cmocka_unit_test(a_sac_is_found),
+        cmocka_unit_test(every_branch_from_one_start), cmocka_unit_test(kissing_vessel_is_refused), cmocka_unit_test(dense_and_near_neighbours_are_refused),
+        cmocka_unit_test(a_sac_is_found),
         cmocka_unit_test(a_click_anywhere),
         cmocka_unit_test(corrections_leave_the_rest), cmocka_unit_test(the_same_for_any_number_of_threads),
     };
