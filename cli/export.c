@@ -28,7 +28,8 @@ static const char help[] =
     "  --frame RAS|LPS            coordinate system that a .mrk.json names; coordinates are never converted; default LPS\n"
     "  -o OUT                     the file to write\n"
     "  --quiet                    does not print what a surface is: parts, open edges, Euler characteristic, area, volume\n"
-    "  --threads N                accepted as everywhere; nothing here takes long\n";
+    "  --threads N                accepted as everywhere; nothing here takes long\n\n"
+    "Exit codes: 0 done; 2 wrong usage or bad input.\n";
 
 typedef struct ExportOptions {
     const char *in, *out, *what, *frame;

@@ -1,5 +1,6 @@
 #include "cli/output.h"
 
+#include "geom/stops.h"
 #include "recon/whole_file.h"
 
 #include <ctype.h>
@@ -24,12 +25,15 @@ static bool can_create_beside(const char *path)
     if (!part)
         return false;
     snprintf(part, room, "%s.part-%ld", path, (long)getpid());
+    sigset_t before;
+    stops_hold(&before);
     int file = open(part, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     int reason = errno;
     if (file >= 0) {
         close(file);
         unlink(part);
     }
+    stops_release(&before);
     free(part);
     errno = reason;
     return file >= 0;

@@ -3,6 +3,7 @@
 //
 // A header can lie. Before memory is taken the promised samples are held against the bytes that are there: raw data must be there in full,
 // a deflate stream cannot grow by more than 1032 times, a number written as text takes two bytes.
+#include "geom/stops.h"
 #include "recon/volume_format.h"
 
 #include <ctype.h>
@@ -664,7 +665,7 @@ bool volume_save_nrrd(const Volume *volume, const char *path, const char *type_n
         if (!strcmp(save_types[i].name, type_name))
             type = &save_types[i];
     char part[4096];
-    int named = snprintf(part, sizeof part, "%s.part", path);
+    int named = snprintf(part, sizeof part, "%s.part-%ld", path, (long)getpid());
     if (!type || named < 0 || named >= (int)sizeof part) {
         faults_add(faults, path, 0, 0, type ? "the path is too long; at most 4000 bytes" : "'%s' is no sample type; float, uint8 or int16", type_name);
         return false;
@@ -678,6 +679,8 @@ bool volume_save_nrrd(const Volume *volume, const char *path, const char *type_n
     uint8_t *sample = encode_samples(volume, count, type, path, faults);
     if (!sample)
         return false;
+    sigset_t before;
+    stops_hold(&before);
     FILE *file = fopen(part, "wb");
     bool good = file != NULL;
     int reason = errno;
@@ -699,6 +702,7 @@ bool volume_save_nrrd(const Volume *volume, const char *path, const char *type_n
         if (!good)
             remove(part);
     }
+    stops_release(&before);
     free(sample);
     if (!good)
         faults_add(faults, path, 0, 0, "cannot be written: %s; a folder that exists, may be written to, and has room", strerror(reason));

@@ -2,9 +2,10 @@
 // through: renaming over it would replace it.
 #include "recon/whole_file.h"
 
+#include "geom/stops.h"
+
 #include <errno.h>
 #include <fcntl.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -73,9 +74,6 @@ static bool write_through(const char *path, const void *bytes, size_t length, Fa
     return written;
 }
 
-// Held back while a part is on the disk: a user's stop would leave it there.
-static const int stop_signals[] = {SIGINT, SIGTERM, SIGHUP};
-
 bool whole_file_write(const char *path, const void *bytes, size_t length, Faults *faults)
 {
     struct stat status;
@@ -88,11 +86,8 @@ bool whole_file_write(const char *path, const void *bytes, size_t length, Faults
         return false;
     }
     snprintf(part, room, "%s.part-%ld", path, (long)getpid());
-    sigset_t stops, before;
-    sigemptyset(&stops);
-    for (size_t i = 0; i < sizeof stop_signals / sizeof stop_signals[0]; i++)
-        sigaddset(&stops, stop_signals[i]);
-    pthread_sigmask(SIG_BLOCK, &stops, &before);
+    sigset_t before;
+    stops_hold(&before);
     int file = open(part, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     bool written = file >= 0 && write_all(file, bytes, length) && (fsync(file) == 0 || errno == EINVAL);
     int reason = errno;
@@ -105,7 +100,7 @@ bool whole_file_write(const char *path, const void *bytes, size_t length, Faults
             unlink(part);
         faults_add(faults, path, 0, 0, "cannot be written: %s; a folder with write permission and free space is needed", strerror(reason));
     }
-    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    stops_release(&before);
     free(part);
     return written;
 }

@@ -1,6 +1,7 @@
 // No time stamp and a fixed compression level: the same pixels give the same bytes.
 #include "render/png_file.h"
 
+#include "geom/stops.h"
 #include "render/message.h"
 
 #include <errno.h>
@@ -55,6 +56,8 @@ bool png_file_write(const char *path, int width, int height, const uint8_t *rgb,
     if (!beside)
         return message_fail(message, capacity, "%s: not enough memory", path);
     snprintf(beside, length, "%s.part%ld", path, (long)getpid());
+    sigset_t before;
+    stops_hold(&before);
     errno = 0;
     FILE *file = fopen(beside, "wb");
     bool written = file && write_pixels(file, width, height, rgb);
@@ -68,6 +71,7 @@ bool png_file_write(const char *path, int width, int height, const uint8_t *rgb,
             remove(beside);
         message_fail(message, capacity, "%s: cannot be written: %s", path, why ? strerror(why) : "write error");
     }
+    stops_release(&before);
     free(beside);
     return written;
 }

@@ -8,12 +8,14 @@
 #include <cmocka.h>
 
 #include <glob.h>
+#include <signal.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-bad-XXXXXX", output[1 << 16];
@@ -197,12 +199,15 @@ static void a_full_disk(void **state)
 {
     (void)state;
     static const char *const lines[] = {"synth phantom -o out.h5 --quiet", "synth capsule -o out.nrrd --quiet", "synth capsule -o out.stl --quiet",
-                                        "fit tree.h5 -o out.h5 --quiet",   "export model.h5 -o out.stl",        "query model.h5 --points many.csv -o out.csv"};
+                                        "fit tree.h5 -o out.h5 --quiet",   "export model.h5 -o out.stl",        "query model.h5 --points many.csv -o out.csv",
+                                        "segment capsule.nrrd --trace one.yaml -o out.h5 --quiet", "import --surface capsule.stl -o out.h5 --quiet"};
     char many[60000] = "x_mm,y_mm,z_mm\n";
     size_t length = strlen(many);
     for (int i = 0; i < 200; i++)
         length += (size_t)snprintf(many + length, sizeof many - length, "0.1,0.2,%d\n", i);
     put("many.csv", many);
+    put("one.yaml", "branches: [{start_mm: [0, 0, 0]}]\n");
+    assert_int_equal(run_in("", "synth open-capsule -o capsule.stl --quiet"), 0);
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
         int code = run_in("ulimit -f 8;", lines[i]);
         if (code != 2 || !strstr(output, ": cannot be written: File too large"))
@@ -215,6 +220,66 @@ static void a_full_disk(void **state)
     put("kept.h5", "before");
     assert_int_equal(run_in("ulimit -f 8;", "synth phantom -o kept.h5"), 2);
     assert_int_equal(run_in("grep -q '^before$' kept.h5 &&", "--version"), 0);
+}
+
+// Runs `seldinger ARGUMENTS`, its words to stop.txt, until `is_time` or its end; then SIGINT. Returns the wait status.
+static int stopped(const char *arguments, bool (*is_time)(double seconds), double seconds)
+{
+    char command[600];
+    snprintf(command, sizeof command, "cd '%s' && exec %s %s > stop.txt 2>&1", folder, SELDINGER_PROGRAM, arguments);
+    pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        execl("/bin/sh", "sh", "-c", command, (char *)NULL);
+        _exit(127);
+    }
+    int status;
+    struct timespec start, now;
+    clock_gettime(CLOCK_MONOTONIC, &start);
+    for (;;) {
+        if (waitpid(child, &status, WNOHANG) == child)
+            return status;
+        clock_gettime(CLOCK_MONOTONIC, &now);
+        if (is_time((double)(now.tv_sec - start.tv_sec) + 1e-9 * (double)(now.tv_nsec - start.tv_nsec) - seconds))
+            break;
+    }
+    kill(child, SIGINT);
+    waitpid(child, &status, 0);
+    return status;
+}
+
+static bool is_past(double seconds) { return seconds >= 0; }
+
+// A part lies beside the output, or the time is up.
+static bool is_writing(double seconds)
+{
+    char pattern[300];
+    glob_t found;
+    snprintf(pattern, sizeof pattern, "%s/*.part-*", folder);
+    bool there = glob(pattern, 0, NULL, &found) == 0;
+    globfree(&found);
+    return there || seconds >= 0;
+}
+
+static void a_stop_by_the_user(void **state)
+{
+    (void)state;
+    // while a file is written: it is whole, and no part of it is left
+    for (int trial = 0; trial < 4; trial++) {
+        int status = stopped("export model.h5 -o out.stl --cell-mm 0.1 --quiet", is_writing, 20);
+        assert_true((WIFEXITED(status) && WEXITSTATUS(status) == 0) || (WIFSIGNALED(status) && WTERMSIG(status) == SIGINT));
+        assert_int_equal(run_in("test ! -e out.stl ||", "info out.stl"), 0);
+        assert_int_equal(run_in("rm -f out.stl;", "--version"), 0);
+        nothing_is_left("export, stopped");
+    }
+    // while it computes: ended by the signal and said so; the wait is doubled until the program is loaded on the busiest machine
+    bool said = false;
+    for (double wait = 0.2; !said && wait < 30; wait *= 2) {
+        int status = stopped("bench fit --table3 --threads 2", is_past, wait);
+        assert_true(WIFSIGNALED(status) && WTERMSIG(status) == SIGINT);
+        said = run_in("grep -q '^stopped; no unfinished file is left$' stop.txt &&", "--version") == 0;
+    }
+    assert_true(said);
 }
 
 // Renaming over a device or pipe would replace it: text is written through, HDF5 and volumes are refused.
@@ -254,7 +319,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(volumes_cut_off_or_lying), cmocka_unit_test(traces),      cmocka_unit_test(the_wrong_kind_of_file),
-        cmocka_unit_test(words_of_the_command_line), cmocka_unit_test(a_full_disk), cmocka_unit_test(pipes_and_devices_stay_what_they_are),
+        cmocka_unit_test(words_of_the_command_line), cmocka_unit_test(a_full_disk), cmocka_unit_test(a_stop_by_the_user), cmocka_unit_test(pipes_and_devices_stay_what_they_are),
     };
     return cmocka_run_group_tests_name("bad_input", tests, make_folder, remove_folder);
 }
