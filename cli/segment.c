@@ -93,7 +93,7 @@ static const char intro[] =
 // The introduction and a line for each parameter.
 static char *help_text(void)
 {
-    enum { LINE = 200 };
+    enum { LINE = 260 };
     RbtParameters ours = rbt_default_parameters(), paper = rbt_paper_parameters();
     size_t capacity = sizeof intro + LINE * (size_t)(rbt_parameter_count + 2);
     char *text = malloc(capacity);
@@ -105,7 +105,8 @@ static char *help_text(void)
         double a = *(const double *)(const void *)((const char *)&ours + p->offset), b = *(const double *)(const void *)((const char *)&paper + p->offset);
         used += (size_t)snprintf(text + used, capacity - used, "  %-20s %s (%g; %g)\n", p->name, p->meaning, a, b);
     }
-    snprintf(text + used, capacity - used, "  %-20s %s\n", "retry_steps", "multiples of the step after a failed one ([1.7, 2.4, 3.1]; [])");
+    snprintf(text + used, capacity - used, "  %-20s %s\n\nExit codes: 0 done; 2 wrong usage or bad input.", "retry_steps",
+             "multiples of the step after a failed one ([1.7, 2.4, 3.1]; [])");
     return text;
 }
 
@@ -275,6 +276,7 @@ int verb_segment(int argc, char **argv)
     Faults *faults = calloc(1, sizeof *faults);
     int code = EXIT_BAD_INPUT;
     argp_err_exit_status = EXIT_BAD_INPUT;
+    setenv("ARGP_HELP_FMT", "rmargin=160", 0);   // lines of YAML stay whole
     if (!faults)
         fprintf(stderr, "out of memory\n");
     else if (argp_parse(&argp, argc, argv, 0, NULL, &a) == 0)

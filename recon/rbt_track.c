@@ -1047,7 +1047,7 @@ static bool check_point(const Tracker *t, Vec3 x, const char *what, int line, in
         return false;
     }
     double value = tracker_brightness(t, x), low = (double)t->volume->minimum, high = (double)t->volume->maximum;
-    if (value < fmax(low + 0.1 * (high - low), t->dark)) {
+    if (!(high > low) || value < fmax(low + 0.1 * (high - low), t->dark)) {
         faults_add(faults, path, line, column, "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies on background (%g in a volume of %g to %g); a point inside a vessel, above %g",
                    what, x.x, x.y, x.z, v.x, v.y, v.z, value, low, high, fmax(low + 0.1 * (high - low), t->dark));
         return false;
@@ -1064,6 +1064,8 @@ static bool check_seed(const Tracker *t, RbtSeed *seed, int number, const char *
     seed->start_is_voxel = seed->toward_is_voxel = false;
     snprintf(what, sizeof what, "the start of branch %d", number + 1);
     check_point(t, seed->start, what, seed->line, seed->column, path, faults);
+    if (tracker_is_forbidden(t, seed->start))
+        faults_add(faults, path, seed->line, seed->column, "the start of branch %d lies in a region of `forbid`; a start outside of it", number + 1);
     if (seed->has_toward && !(vec3_distance(seed->start, seed->toward) > 1e-6 * t->voxel))
         faults_add(faults, path, seed->line, seed->column, "the start of branch %d and its toward are the same point; toward is a point further down the vessel", number + 1);
     double extent = 0;

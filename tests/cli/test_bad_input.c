@@ -122,6 +122,7 @@ static void traces(void **state)
         {"branches: [{start_cm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\n", "t.yaml:1:23: 'start_cm'"},
         {"branches: [{start_mm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 0}]\n", "t.yaml:1:67: radius_mm '0'"},
         {"branches: [{start_mm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\nbanana: 1\n", "t.yaml:2:9: 'banana'"},
+        {"branches: [{start_mm: [0, 0, 0]}]\nforbid: [{center_mm: [0, 0, 0], radius_mm: 2}]\n", "t.yaml:1:12: the start of branch 1 lies in a region of `forbid`"},
         {"branches: []\n", "t.yaml:1:1: there is no branch"},
         {"", "t.yaml:1:1: the file is empty"}};
     assert_int_equal(run_in("", "synth capsule -o capsule.nrrd --voxel-mm 0.3 --quiet"), 0);
@@ -129,6 +130,10 @@ static void traces(void **state)
         put("t.yaml", texts[i][0]);
         refused("segment capsule.nrrd --trace t.yaml -o out.h5", texts[i][1]);
     }
+    put("one.nrrd", "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 3 3 3\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nspace dimension: 3\nencoding: text\n\n"
+                    "5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5 5\n");
+    put("t.yaml", "branches: [{start_mm: [1, 1, 1]}]\n");
+    refused("segment one.nrrd --trace t.yaml -o out.h5", "lies on background (5 in a volume of 5 to 5)");
 }
 
 static void the_wrong_kind_of_file(void **state)
