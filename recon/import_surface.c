@@ -1,8 +1,10 @@
 // See import_surface.h. Nodes stand every `spacing` inscribed radii along the skeleton. The wall's triangles are sampled with a density of
-// points_per_node / (2 pi r spacing r), r of the nearest node, by a low-discrepancy sequence (Roberts' R2, folded into the triangle). A node that gets
-// fewer than eight points lies within its parent's lumen and is left out: its children hang on the parent. A node's radius is its curve's own where
-// that agrees with the mesh to 30 %, else the median distance of the wall square to the curve, between 1 and 1.6 times the inscribed radius (ostia and
-// kissing walls pull the median away). At a blind end, where inscribed spheres shrink, it is that of the last sphere that reaches the end.
+// points_per_node / (2 pi r spacing r), r of the nearest node, by a low-discrepancy sequence (Roberts' R2, folded into the triangle), and the samples
+// are set where the surface would be that coarse facets stand for. A node that gets fewer than eight points lies within its parent's lumen and is left
+// out: its children hang on the parent. A node's radius is its curve's own where that agrees to 30 % with the median distance of the wall square to
+// the curve, else that median, between 1 and 1.6 times the inscribed radius (ostia and kissing walls pull the median away): curves that come with
+// inscribed radii have far too small ones in flat vessels. At a blind end, where inscribed spheres shrink, it is that of the last sphere that
+// reaches the end.
 #include "recon/import_surface.h"
 
 #include "recon/import_skeleton.h"
@@ -13,7 +15,7 @@
 #include <string.h>
 
 enum { CANDIDATES = 12, LEAST_POINTS = 8, PASSES = 4, CHUNK = 256 };
-static const double POINTS_MAX = 4e6, SEEN_REACH = 2, REACH = 2, AGREES = 0.3, PULLED = 1.6;   // reaches in radii
+static const double POINTS_MAX = 4e6, SEEN_REACH = 2, REACH = 2, AGREES = 0.3, PULLED = 1.6, SHARP_COSINE = 0.5, ASIDE = 1.3;   // reaches in radii
 
 ImportOptions import_default_options(void) { return (ImportOptions){.spacing = 0.5, .points_per_node = 108}; }
 
@@ -59,7 +61,7 @@ static double vessel_radius(const Skeleton *s, const Wall *wall, int i)
     double section = section_radius(wall->tree, s->point[i], vec3_unit(vec3_sub(s->point[b], s->point[a])), 6 * fmax(r, given), &least, &centroid);
     // a curve beside the middle has an inscribed sphere that is too small; the section's middle tells
     section = fmin(fmax(section, r), PULLED * fmax(r, inscribed(wall, centroid)));
-    return given > 0 && (fabs(given - section) < AGREES * section || fabs(given - r) < AGREES * r) ? given : section;
+    return given > 0 && fabs(given - section) < AGREES * section ? given : section;
 }
 
 // From inscribed radii to those of the vessel.
@@ -172,8 +174,11 @@ typedef struct Sampling {
     double *weight;          // (T) points wanted of each triangle
     int *component;          // (V) of vertices: the first vertex of its component
     bool *used;              // (V) components in which a node lies
+    Vec3 *normal;            // (V) 0 at an edge of the surface
     long count;
-    Vec3 *point;             // (P)
+    Vec3 *point;             // (P) on facets
+    int *facet;              // (P)
+    Vec3 *curved;            // (P) where the surface would be that the facets stand for
     int *owner;              // (P) -1: left out
     bool *unseen;            // (P) given to a node that does not see it
 } Sampling;
@@ -219,6 +224,20 @@ static bool is_beyond_cut(const Sampling *s, Vec3 p, int owner)
     return s->root_is_cut && vec3_distance(n->center[owner], n->center[0]) < 3 * n->radius[0] && vec3_dot(vec3_sub(p, n->center[0]), upstream) > 0;
 }
 
+// In a branch that has no centreline: aside of the owner's vessel, and narrower by half. A model of the vessel cannot follow that; what is as wide,
+// a sac or a bulge, it can.
+static bool is_in_side_branch(const Sampling *s, long i, int owner)
+{
+    const SurfaceMesh *mesh = &s->wall->mesh;
+    double r = s->nodes->radius[owner];
+    if (vec3_distance(s->point[i], s->nodes->center[owner]) < ASIDE * r)
+        return false;
+    const int *corner = mesh->triangle[s->facet[i]];
+    Vec3 a = mesh->vertex[corner[0]];
+    Vec3 inward = vec3_unit(vec3_cross(vec3_sub(mesh->vertex[corner[2]], a), vec3_sub(mesh->vertex[corner[1]], a)));
+    return isfinite(mesh_tree_ray(s->wall->tree, vec3_add_scaled(s->point[i], 1e-3 * r, inward), inward, r, NULL));
+}
+
 static void find_owners(void *context, long chunk)
 {
     Sampling *s = context;
@@ -240,7 +259,7 @@ static void find_owners(void *context, long chunk)
             s->owner[i] = node[0];
             s->unseen[i] = true;
         }
-        if (s->owner[i] >= 0 && is_beyond_cut(s, s->point[i], s->owner[i])) {
+        if (s->owner[i] >= 0 && (is_beyond_cut(s, s->point[i], s->owner[i]) || is_in_side_branch(s, i, s->owner[i]))) {
             s->owner[i] = -1;
             s->unseen[i] = false;
         }
@@ -287,6 +306,46 @@ static bool find_components(Sampling *s, ImportReport *report)
     return good;
 }
 
+// Weighted by the facets' angles. An edge, where normals would round what is sharp, has none.
+static bool find_normals(Sampling *s)
+{
+    const SurfaceMesh *mesh = &s->wall->mesh;
+    s->normal = calloc((size_t)mesh->vertex_count + 1, sizeof *s->normal);
+    bool *sharp = calloc((size_t)mesh->vertex_count + 1, sizeof *sharp);
+    for (int pass = 0; pass < 2 && s->normal && sharp; pass++) {
+        for (int t = 0; t < mesh->triangle_count; t++) {
+            const int *corner = mesh->triangle[t];
+            Vec3 first = mesh->vertex[corner[0]];
+            Vec3 n = vec3_unit(vec3_cross(vec3_sub(mesh->vertex[corner[1]], first), vec3_sub(mesh->vertex[corner[2]], first)));
+            for (int k = 0; k < 3; k++) {
+                Vec3 a = mesh->vertex[corner[k]], b = vec3_unit(vec3_sub(mesh->vertex[corner[(k + 1) % 3]], a)),
+                     c = vec3_unit(vec3_sub(mesh->vertex[corner[(k + 2) % 3]], a));
+                if (pass == 0)
+                    s->normal[corner[k]] = vec3_add_scaled(s->normal[corner[k]], atan2(vec3_norm(vec3_cross(b, c)), vec3_dot(b, c)), n);
+                else
+                    sharp[corner[k]] = sharp[corner[k]] || vec3_dot(n, s->normal[corner[k]]) < SHARP_COSINE;
+            }
+        }
+        for (int v = 0; v < mesh->vertex_count; v++)
+            s->normal[v] = sharp[v] ? vec3(0, 0, 0) : vec3_unit_or(s->normal[v], vec3(0, 0, 0));
+    }
+    bool good = s->normal && sharp;
+    free(sharp);
+    return good;
+}
+
+// Half of the way to the mean of the projections on the corners' tangent planes (Boubekeur, Alexa 2008: Phong tessellation): exact to second order
+// on a sphere and square to a cylinder's axis.
+static Vec3 curve_facet(const Sampling *s, const int *corner, const double *share, Vec3 flat)
+{
+    Vec3 out = flat;
+    for (int k = 0; k < 3; k++) {
+        Vec3 n = s->normal[corner[k]];
+        out = vec3_add_scaled(out, 0.5 * share[k] * vec3_dot(vec3_sub(s->wall->mesh.vertex[corner[k]], flat), n), n);
+    }
+    return out;
+}
+
 static bool sample_wall(Sampling *s, int threads, ImportReport *report, const char *name, Faults *faults)
 {
     const SurfaceMesh *mesh = &s->wall->mesh;
@@ -305,9 +364,11 @@ static bool sample_wall(Sampling *s, int threads, ImportReport *report, const ch
         return false;
     }
     s->point = calloc((size_t)total + 2, sizeof *s->point);
+    s->curved = calloc((size_t)total + 2, sizeof *s->curved);
+    s->facet = calloc((size_t)total + 2, sizeof *s->facet);
     s->owner = calloc((size_t)total + 2, sizeof *s->owner);
     s->unseen = calloc((size_t)total + 2, sizeof *s->unseen);
-    if (!good || !s->point || !s->owner || !s->unseen) {
+    if (!good || !find_normals(s) || !s->point || !s->curved || !s->facet || !s->owner || !s->unseen) {
         faults_add(faults, name, 0, 0, "not enough memory");
         return false;
     }
@@ -318,7 +379,11 @@ static bool sample_wall(Sampling *s, int threads, ImportReport *report, const ch
             u = fmod(u + 0.7548776662466927, 1);
             v = fmod(v + 0.5698402909980532, 1);
             double x = u + v > 1 ? 1 - u : u, y = u + v > 1 ? 1 - v : v;
-            s->point[s->count++] = vec3_add(a, vec3_add(vec3_scale(vec3_sub(b, a), x), vec3_scale(vec3_sub(c, a), y)));
+            double share[3] = {1 - x - y, x, y};
+            Vec3 flat = vec3_add(a, vec3_add(vec3_scale(vec3_sub(b, a), x), vec3_scale(vec3_sub(c, a), y)));
+            s->curved[s->count] = curve_facet(s, mesh->triangle[t], share, flat);
+            s->facet[s->count] = t;
+            s->point[s->count++] = flat;
         }
     report->sampled_points = s->count;
     return true;
@@ -362,7 +427,7 @@ static VesselTree *make_tree(const Nodes *nodes, const Sampling *s, ImportReport
         tree->point_offset[n + 1] += tree->point_offset[n];
     for (long i = 0; i < s->count; i++)
         if (s->owner[i] >= 0)
-            tree->point[tree->point_offset[s->owner[i]]++] = s->point[i];
+            tree->point[tree->point_offset[s->owner[i]]++] = s->curved[i];
     memmove(tree->point_offset + 1, tree->point_offset, (size_t)nodes->count * sizeof *tree->point_offset);
     tree->point_offset[0] = 0;
     report->radius_min = INFINITY;
@@ -454,6 +519,9 @@ VesselTree *import_surface(const SurfaceMesh *mesh, const CurveSet *given, const
         free(sampling.component);
         free(sampling.used);
         free(sampling.unseen);
+        free(sampling.normal);
+        free(sampling.curved);
+        free(sampling.facet);
         free(sampling.point);
         free(sampling.owner);
     }

@@ -36,7 +36,7 @@ typedef struct ImportReport {
     double radius_min, radius_max, length;   // [mm]; length of all branches
     long sampled_points;     // of the surface
     long unseen_points;      // no node sees them: given to the nearest by power distance within 2.5 of its radii
-    long left_points;        // and these to none: out of reach, or beyond the root's cut
+    long left_points;        // and these to none: out of reach, beyond the root's cut, or of a narrow branch that has no centreline
     int dropped_nodes;       // whose sphere lies within their parent's
     Vec3 root;
 } ImportReport;
