@@ -2,8 +2,8 @@
 // points_per_node / (2 pi r spacing r), r of the nearest node, by a low-discrepancy sequence (Roberts' R2, folded into the triangle), and the samples
 // are set where the surface would be that coarse facets stand for. A node that gets fewer than eight points lies within its parent's lumen and is left
 // out: its children hang on the parent. A node's radius is its curve's own where that agrees to 30 % with the median distance of the wall square to
-// the curve, else that median, between 1 and 1.6 times the inscribed radius (ostia and kissing walls pull the median away): curves that come with
-// inscribed radii have far too small ones in flat vessels. At a blind end, where inscribed spheres shrink, it is that of the last sphere that
+// the curve, else that median, between 1 and 1.6 times the inscribed radius (ostia and kissing walls pull the median away): some curves come with
+// radii that are far too small in flat vessels. At a blind end, where inscribed spheres shrink, it is that of the last sphere that
 // reaches the end.
 #include "recon/import_surface.h"
 
@@ -15,7 +15,7 @@
 #include <string.h>
 
 enum { CANDIDATES = 12, LEAST_POINTS = 8, PASSES = 4, CHUNK = 256 };
-static const double POINTS_MAX = 4e6, SEEN_REACH = 2, REACH = 2, AGREES = 0.3, PULLED = 1.6, SHARP_COSINE = 0.5, ASIDE = 1.3;   // reaches in radii
+static const double POINTS_MAX = 4e6, SEEN_REACH = 2, REACH = 2, AGREES = 0.3, PULLED = 1.6, SHARP_COSINE = 0.5, ASIDE = 1.3, STEEP = 0.5;   // reaches in radii
 
 ImportOptions import_default_options(void) { return (ImportOptions){.spacing = 0.5, .points_per_node = 108}; }
 
@@ -52,16 +52,50 @@ static double inscribed(const Wall *wall, Vec3 p)
     return mesh_tree_nearest(wall->tree, p, INFINITY, &foot, &t);
 }
 
-// The vessel's radius at sample i, r being the inscribed one.
-static double vessel_radius(const Skeleton *s, const Wall *wall, int i)
+// Median distance of the wall square to the vessel at sample i, r being the inscribed radius.
+static double wall_radius(const Skeleton *s, const Wall *wall, int i)
 {
     int a = i > 0 ? s->parent[i] : i, b = i > 0 ? i : i + (s->count > 1);
-    double least, r = s->radius[i], given = s->given[i];
+    double least, r = s->radius[i];
     Vec3 centroid;
-    double section = section_radius(wall->tree, s->point[i], vec3_unit(vec3_sub(s->point[b], s->point[a])), 6 * fmax(r, given), &least, &centroid);
+    double section = section_radius(wall->tree, s->point[i], vec3_unit(vec3_sub(s->point[b], s->point[a])), 6 * fmax(r, s->given[i]), &least, &centroid);
     // a curve beside the middle has an inscribed sphere that is too small; the section's middle tells
-    section = fmin(fmax(section, r), PULLED * fmax(r, inscribed(wall, centroid)));
-    return given > 0 && fabs(given - section) < AGREES * section ? given : section;
+    return fmin(fmax(section, r), PULLED * fmax(r, inscribed(wall, centroid)));
+}
+
+// Sections in the mouth of a branch see the trunk's wall: `radius` (S) rises by STEEP at most along a piece, but never falls below the inscribed one.
+static void limit_slope(const Skeleton *s, const int *children, double *radius)
+{
+    for (int pass = 0; pass < 2; pass++)
+        for (int k = 1; k < s->count; k++) {
+            int i = pass ? s->count - k : k, up = s->parent[i];
+            double step = STEEP * vec3_distance(s->point[i], s->point[up]);
+            if (pass == 0)
+                radius[i] = fmax(fmin(radius[i], radius[up] + step), s->radius[i]);
+            else if (children[up] == 1)   // a branch says nothing of its trunk
+                radius[up] = fmax(fmin(radius[up], radius[i] + step), s->radius[up]);
+        }
+}
+
+// The curves' own radii on pieces between branchings where most agree with `radius` (S). False where memory lacks.
+static bool take_given(const Skeleton *s, const int *children, double *radius)
+{
+    size_t room = (size_t)s->count + 1;
+    int *piece = malloc(room * sizeof *piece), *agree = calloc(room, sizeof *agree);
+    bool good = piece && agree;
+    for (int pass = 0; pass < 2 && good; pass++)
+        for (int i = 0; i < s->count; i++) {
+            int up = s->parent[i];
+            piece[i] = up >= 0 && children[up] == 1 ? piece[up] : i;
+            bool agrees = s->given[i] > 0 && fabs(s->given[i] - radius[i]) < AGREES * radius[i];
+            if (pass == 0)
+                agree[piece[i]] += agrees ? 1 : -1;
+            else if (agrees && agree[piece[i]] > 0)
+                radius[i] = s->given[i];
+        }
+    free(piece);
+    free(agree);
+    return good;
 }
 
 // From inscribed radii to those of the vessel.
@@ -86,9 +120,12 @@ static bool vessel_radii(Skeleton *s, const Wall *wall)
         if (i == 0 || children[i] == 0)
             widen_end(s, i, i ? up : down);
     for (int i = 0; good && i < s->count; i++)
-        radius[i] = vessel_radius(s, wall, i);
-    if (good)
+        radius[i] = wall_radius(s, wall, i);
+    if (good) {
+        limit_slope(s, children, radius);
+        good = take_given(s, children, radius);
         memcpy(s->radius, radius, (size_t)s->count * sizeof *radius);
+    }
     free(radius);
     free(up);
     free(down);
