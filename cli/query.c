@@ -16,6 +16,7 @@ static const char help[] =
     "Taubin distance f / |grad f| (> 0 inside).\n\n"
     "  --points F.csv   a header with x_mm,y_mm,z_mm (any order, other columns are ignored), a point a line; # begins a comment\n"
     "  -o, --output F   x_mm,y_mm,z_mm,node,f,gx,gy,gz,distance_mm,inside; - is standard output\n"
+    "  --threads N      default 0: all cores; the answers do not depend on it\n"
     "  --quiet          no summary\n\n"
     "Exit codes: 0 done; 2 wrong usage or bad input.\n";
 
@@ -165,19 +166,46 @@ __attribute__((format(printf, 2, 3))) static void print_to(Text *text, const cha
     va_end(arguments);
 }
 
-static bool answer(const VesselTree *tree, const PointTable *table, const char *output, Faults *faults)
+typedef struct Answers {
+    const VesselTree *tree;
+    const PointTable *table;
+    int *node;               // (table->count)
+    double *f;
+    Vec3 *gradient;
+} Answers;
+
+enum { CHUNK = 256 };        // points of a job
+
+static void answer_chunk(void *context, long chunk)
 {
-    Text text = {0};
-    print_to(&text, "x_mm,y_mm,z_mm,node,f,gx,gy,gz,distance_mm,inside\n");
-    for (int i = 0; i < table->count && !text.failed; i++) {
-        Vec3 x = table->point[i], g;
-        int node = power_nearest(tree, x);
+    const Answers *a = context;
+    const VesselTree *tree = a->tree;
+    for (int i = (int)chunk * CHUNK; i < a->table->count && i < ((int)chunk + 1) * CHUNK; i++) {
+        int node = a->node[i] = power_nearest(tree, a->table->point[i]);
         int64_t first = tree->blob_offset[node];
         Blobby model = {(int)(tree->blob_offset[node + 1] - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level};
-        double f = blobby_gradient(&model, x, &g), slope = vec3_norm(g);
-        double distance = slope > 0 ? f / slope : f > 0 ? HUGE_VAL : -HUGE_VAL;   // on a top of the field, or beyond its reach
-        print_to(&text, "%.17g,%.17g,%.17g,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%d\n", x.x, x.y, x.z, node, f, g.x, g.y, g.z, distance, f > 0);
+        a->f[i] = blobby_gradient(&model, a->table->point[i], &a->gradient[i]);
     }
+}
+
+static bool answer(const VesselTree *tree, const PointTable *table, int threads, const char *output, Faults *faults)
+{
+    size_t count = (size_t)table->count + 1;
+    Answers a = {tree, table, malloc(count * sizeof *a.node), malloc(count * sizeof *a.f), malloc(count * sizeof *a.gradient)};
+    Text text = {.failed = !a.node || !a.f || !a.gradient};
+    if (!text.failed) {
+        parallel_for(threads, (table->count + CHUNK - 1) / CHUNK, answer_chunk, &a, NULL);
+        print_to(&text, "x_mm,y_mm,z_mm,node,f,gx,gy,gz,distance_mm,inside\n");
+    }
+    for (int i = 0; i < table->count && !text.failed; i++) {
+        Vec3 x = table->point[i], g = a.gradient[i];
+        double f = a.f[i], slope = vec3_norm(g);
+        double distance = slope > 0 ? f / slope : f > 0 ? HUGE_VAL : -HUGE_VAL;   // on a top of the field, or beyond its reach
+        print_to(&text, "%.17g,%.17g,%.17g,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%d\n", x.x, x.y, x.z, a.node[i], f, g.x, g.y, g.z, distance, f > 0);
+    }
+    free(a.node);
+    free(a.f);
+    free(a.gradient);
     bool good = !text.failed && output_write(output, text.bytes, text.length, faults);
     if (text.failed)
         faults_add(faults, output, 0, 0, "not enough memory for %d points", table->count);
@@ -187,19 +215,24 @@ static bool answer(const VesselTree *tree, const PointTable *table, const char *
 
 int verb_query(int argc, char **argv)
 {
-    enum { POINTS = 256, QUIET };
+    enum { POINTS = 256, QUIET, THREADS };
     static const struct option options[] = {{"points", required_argument, NULL, POINTS}, {"output", required_argument, NULL, 'o'},
-                                            {"quiet", no_argument, NULL, QUIET},          {"help", no_argument, NULL, 'h'},
-                                            {0}};
+                                            {"quiet", no_argument, NULL, QUIET},          {"threads", required_argument, NULL, THREADS},
+                                            {"help", no_argument, NULL, 'h'},             {0}};
     static Faults faults;
     const char *points = NULL, *output = NULL;
     bool quiet = false;
+    double threads = 0;
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "o:h", options, NULL)) != -1;) {
         switch (choice) {
         case POINTS: points = optarg; break;
         case 'o': output = optarg; break;
         case QUIET: quiet = true; break;
+        case THREADS:
+            if (!cli_whole_number("--threads", optarg, 0, 256, &threads))
+                return EXIT_BAD_INPUT;
+            break;
         case 'h': fputs(help, stdout); return EXIT_DONE;
         default: return usage_fault("unknown option or lacking value", "");
         }
@@ -214,7 +247,7 @@ int verb_query(int argc, char **argv)
     if (tree && !vessel_tree_is_model(tree))
         faults_add(&faults, argv[optind], 0, 0, "is a tree without a model; make one with `seldinger fit`");
     read_points(points, &table, &faults);
-    bool good = faults.count == 0 && answer(tree, &table, output, &faults);
+    bool good = faults.count == 0 && answer(tree, &table, (int)threads, output, &faults);
     if (good && !quiet && strcmp(output, "-"))
         printf("%d points\n", table.count);
     vessel_tree_free(tree);

@@ -183,6 +183,7 @@ static void words_of_the_command_line(void **state)
         {"fit nowhere.h5 -o out.h5", "nowhere.h5: cannot be opened"},
         {"query", "lacks the model"},
         {"query model.h5", "lacks --points F.csv"},
+        {"query model.h5 --points nowhere.csv -o out.csv --threads 1.5", "--threads: '1.5' is not valid; a whole number"},
         {"query model.h5 --points nowhere.csv -o out.csv", "nowhere.csv: cannot be opened"},
         {"synth", "lacks a shape"},
         {"synth banana -o out.h5", "no shape 'banana'; valid: capsule"},
