@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "cli/output.h"
+#include "recon/blurred_edge.h"
 #include "recon/lim_fit.h"
 #include "recon/model_measure.h"
 #include "recon/tree_file.h"
@@ -18,6 +19,7 @@
 typedef struct FitCommand {
     const char *tree, *output, *json, *picture, *preset;
     LimFitOptions options;
+    double edge_blur;        // [mm] < 0: what the tree's file says
     bool has_voxel, quiet, measure;
 } FitCommand;
 
@@ -32,6 +34,8 @@ static const char help[] =
     "  --max-blobs N          blobs of a local model, at most; default 100\n"
     "  --voxel-mm X           voxel size of the angiogram [mm]; default: what the tree's file says (`voxel_mm`), else not known: the classes of\n"
     "                         d_a are then of 0.2 mm\n"
+    "  --edge-blur-mm X       blur (standard deviation) that has moved the points inside the wall; they are first moved out by what it did to a\n"
+    "                         vessel of their radius, at most 0.2 X; default: what `segment` found (`edge_blur_mm`); with --preset paper 0\n"
     "  --alpha X              weight of the cohesion of blobs; default 0, paper 1e-5\n"
     "  --beta X               smoothing: by default 1e-4, which weighs curvature by the noise's variance times r^2 as found from the points (twice:\n"
     "                         twice that, 0: none); paper 1e-3, the weight of curvature itself [mm^4]\n"
@@ -54,14 +58,15 @@ static int usage_fault(const char *message, const char *what)
 // -1: go on; otherwise the exit code.
 static int parse_options(int argc, char **argv, FitCommand *command)
 {
-    enum { PRESET = 256, TARGET, BLOBS, VOXEL, ALPHA, BETA, POINTS, THREADS, JSON, PICTURE, QUIET, MEASURE };
+    enum { PRESET = 256, EDGE_BLUR, TARGET, BLOBS, VOXEL, ALPHA, BETA, POINTS, THREADS, JSON, PICTURE, QUIET, MEASURE };
     static const struct option table[] = {
         {"output", required_argument, NULL, 'o'},      {"preset", required_argument, NULL, PRESET}, {"target-mm", required_argument, NULL, TARGET},
         {"max-blobs", required_argument, NULL, BLOBS}, {"voxel-mm", required_argument, NULL, VOXEL}, {"alpha", required_argument, NULL, ALPHA},
         {"beta", required_argument, NULL, BETA},       {"max-points", required_argument, NULL, POINTS}, {"threads", required_argument, NULL, THREADS},
         {"json", required_argument, NULL, JSON},       {"picture", required_argument, NULL, PICTURE}, {"quiet", no_argument, NULL, QUIET},
-        {"measure", no_argument, NULL, MEASURE},       {"help", no_argument, NULL, 'h'},              {0}};
-    *command = (FitCommand){.options = lim_fit_default_options(), .preset = "default"};
+        {"measure", no_argument, NULL, MEASURE},       {"help", no_argument, NULL, 'h'},
+        {"edge-blur-mm", required_argument, NULL, EDGE_BLUR}, {0}};
+    *command = (FitCommand){.options = lim_fit_default_options(), .preset = "default", .edge_blur = -1};
     double number;
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "o:h", table, NULL)) != -1;) {
@@ -80,6 +85,10 @@ static int parse_options(int argc, char **argv, FitCommand *command)
             break;
         case TARGET:
             if (!cli_number("--target-mm", optarg, 1e-4, 100, &o->target_mm))
+                return EXIT_BAD_INPUT;
+            break;
+        case EDGE_BLUR:
+            if (!cli_number("--edge-blur-mm", optarg, 0, 100, &command->edge_blur))
                 return EXIT_BAD_INPUT;
             break;
         case VOXEL:
@@ -131,10 +140,10 @@ static char *describe(const FitCommand *command, const TreeFileInfo *tree)
     if (!text)
         return NULL;
     int n = snprintf(text, room,
-                     "fit:\n  preset: %s\n  alpha: %g\n  beta: %g\n  s: %g\n  iso_level: %g\n  max_blobs: %d\n  target_mm: %g\n  voxel_mm: %g\n"
+                     "fit:\n  preset: %s\n  edge_blur_mm: %g\n  alpha: %g\n  beta: %g\n  s: %g\n  iso_level: %g\n  max_blobs: %d\n  target_mm: %g\n  voxel_mm: %g\n"
                      "  topological_distance: %d\n  max_loops: %d\n  line_searches: %d\n  weigh_distance: %d\n  project_points: %d\n"
                      "  sweep_all_blobs: %d\n  give_up_splits: %d\n  extend_inlet: %d\n  guard_shape: %d\n  agree: %d\n  max_points: %d\ntree:\n",
-                     command->preset, o->alpha, o->beta, o->s, o->iso_level, o->max_blobs, o->target_mm, o->voxel_mm, o->topological_distance,
+                     command->preset, command->edge_blur, o->alpha, o->beta, o->s, o->iso_level, o->max_blobs, o->target_mm, o->voxel_mm, o->topological_distance,
                      o->max_loops, o->line_searches, o->weigh_distance, o->project_points, o->sweep_all_blobs, o->give_up_splits, o->extend_inlet,
                      o->guard_shape, o->agree, o->max_points);
     char *out = text + n;
@@ -328,6 +337,10 @@ static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seco
         }
         if (!command->output)
             return tree;
+        if (command->edge_blur < 0)      // a model's points are where its fit has put them
+            command->edge_blur = vessel_tree_is_model(tree) || !strcmp(command->preset, "paper") ? 0 : fmax(tree_file_number(info, "edge_blur_mm", 0), 0);
+        if (!blurred_edge_correct(tree, command->edge_blur))
+            faults_add(faults, command->tree, 0, 0, "not enough memory");
         ProgressBar bar;
         Progress progress = progress_bar(&bar, "fit", command->quiet);
         double begin = seconds_now();

@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "cli/output.h"
+#include "recon/blurred_edge.h"
 #include "recon/rbt_track.h"
 #include "recon/trace.h"
 #include "recon/tree_file.h"
@@ -142,17 +143,25 @@ static void print_table(const VesselTree *tree, const RbtReport *report, double 
            load_s, track_s);
 }
 
+// b [mm] of all that moved the edges that were tracked: the image's blur, or what its voxels and the spline make at least, and the average along the rays.
+static double edge_blur(const RbtParameters *parameters, const Volume *volume, const VesselTree *tree)
+{
+    double voxel = volume_voxel_size(volume), image = blurred_edge_measure(volume, tree), along = parameters->ray_smoothing_voxels * voxel;
+    return sqrt((image > 0 ? image * image : voxel * voxel * (1.0 / 12 + 1.0 / 3)) + along * along / 12);
+}
+
 // What was found beside the parameters that found it, in the words of a trace; to be freed.
-static char *parameters_text(const RbtParameters *parameters, const RbtReport *report, double voxel_mm)
+static char *parameters_text(const RbtParameters *parameters, const RbtReport *report, const Volume *volume, const VesselTree *tree)
 {
     enum { LINE = 120 };
-    char *text = rbt_parameters_text(parameters, voxel_mm);
-    size_t used = text ? strlen(text) : 0, capacity = used + LINE * ((size_t)report->branch_count + 2);
+    char *text = rbt_parameters_text(parameters, volume_voxel_size(volume));
+    size_t used = text ? strlen(text) : 0, capacity = used + LINE * ((size_t)report->branch_count + 3);
     char *longer = text ? realloc(text, capacity) : NULL;
     if (!longer) {
         free(text);
         return NULL;
     }
+    used += (size_t)snprintf(longer + used, capacity - used, "edge_blur_mm: %.4f\n", edge_blur(parameters, volume, tree));
     const char *head = "aneurysms_found:\n";
     for (int i = 0; i < report->branch_count; i++) {
         const RbtBranchReport *b = &report->branch[i];
@@ -244,7 +253,7 @@ static int segment(const SegmentArguments *a, Faults *faults)
     bool good = tree != NULL;
     if (good) {
         double track_s = seconds() - start - load_s;
-        char created_by[] = "seldinger " SELDINGER_VERSION " segment", *text = parameters_text(&trace->parameters, &report, volume_voxel_size(volume));
+        char created_by[] = "seldinger " SELDINGER_VERSION " segment", *text = parameters_text(&trace->parameters, &report, volume, tree);
         size_t length = strlen(a->volume);
         char *source = malloc(length + 1);
         good = source && text;

@@ -2,6 +2,8 @@
 // it leaves, a run begins that goes on to the run's last node. A short run that comes back to where it left is an excursion, no leak.
 #include "recon/track_score.h"
 
+#include "recon/blurred_edge.h"
+
 #include <stdlib.h>
 
 const char *const track_label_name[TRACK_LABELS] = {"ST", "PS", "WT", "KV", "KB", "KA", "LB", "BT"};
@@ -295,7 +297,7 @@ static void take_sample(Judge *j, int i)
     if ((!inlet && before < 2 * tree->radius[branch->first_node]) || (inlet && before < 0.5 * tree->radius[0]) || after < 2 * tree->radius[branch->last_node])
         return;
     double r = step->place.radius, expected = r - j->truth->blur_mm * j->truth->blur_mm / (2 * r), found = j->tracked->radius[i];
-    j->score->sample[j->score->sample_count++] = (TrackSample){b, step->place.away, found - expected, found - track_score_edge(r, j->truth->blur_mm), r};
+    j->score->sample[j->score->sample_count++] = (TrackSample){b, step->place.away, found - expected, found - blurred_edge_of(r, j->truth->blur_mm), r};
 }
 
 static TrackLabel run_kind(const Run *run)
@@ -419,33 +421,4 @@ void track_score_free(TrackScore *score)
     free(score->branch);
     free(score->sample);
     *score = (TrackScore){0};
-}
-
-// I0(z) / I1(z)
-static double bessel_ratio(double z)
-{
-    if (z > 30)              // asymptotic, right to 1e-7 there
-        return 1 + 1 / (2 * z) + 3 / (8 * z * z) + 3 / (8 * z * z * z);
-    double q = z * z / 4, term = 1, zeroth = 0, first = 0;
-    for (int k = 0; k < 200 && term > 1e-17 * zeroth; k++) {
-        zeroth += term;
-        first += term / (k + 1);
-        term *= q / ((k + 1.0) * (k + 1.0));
-    }
-    return zeroth / (first * z / 2);
-}
-
-double track_score_edge(double radius, double blur)
-{
-    if (!(blur > 1e-3 * radius))
-        return radius;
-    double low = 0, high = radius + 2 * blur, b2 = blur * blur;
-    for (int i = 0; i < 60; i++) {
-        double x = 0.5 * (low + high);
-        if (radius * bessel_ratio(radius * x / b2) - b2 / x > x)
-            low = x;
-        else
-            high = x;
-    }
-    return low;
 }

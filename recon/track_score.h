@@ -37,7 +37,7 @@ typedef struct TrackSample {     // of a tracked node inside a branch, two radii
     int branch;
     double center;               // [mm] distance of its centre to the true centreline
     double radius;               // [mm] its radius less the one expected, R - b^2 / (2 R) (references.md) …
-    double radius_exact;         // … and less track_score_edge(R, b), which also holds where b is not small against R
+    double radius_exact;         // … and less blurred_edge_of(R, b), which also holds where b is not small against R
     double true_radius;
 } TrackSample;
 
@@ -57,8 +57,5 @@ typedef struct TrackScore {
 // False where memory lacks. `tracked` may be NULL: nothing was tracked.
 bool track_score(const TrackTruth *truth, const VesselTree *tracked, TrackScore *out);
 void track_score_free(TrackScore *score);
-// Where a disc of radius R blurred by b is steepest: its slope is R/b^2 exp(-(R^2 + x^2) / (2 b^2)) I1(R x / b^2), steepest where
-// x = R I0(z) / I1(z) - b^2 / x, z = R x / b^2. Tends to R - b^2 / (2 R) for b << R and to b for R << b.
-double track_score_edge(double radius, double blur);
 
 #endif
