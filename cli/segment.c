@@ -17,10 +17,11 @@
 #include <string.h>
 #include <time.h>
 
-enum { KEY_TRACE = 't', KEY_OUT = 'o', KEY_QUIET = 'q', KEY_THREADS = 1000, KEY_SEED, KEY_JSON, KEY_PICTURE };
+enum { KEY_TRACE = 't', KEY_OUT = 'o', KEY_QUIET = 'q', KEY_THREADS = 1000, KEY_SEED, KEY_JSON, KEY_PICTURE, KEY_START };
 
 static const struct argp_option options[] = {
-    {"trace", KEY_TRACE, "F.yaml", 0, "where branches start, aneurysms, parameters (needed)", 0},
+    {"trace", KEY_TRACE, "F.yaml", 0, "where branches start, aneurysms, parameters", 0},
+    {"start", KEY_START, "X,Y,Z", 0, "instead of a trace: one point in a vessel [mm]; the whole tree is found from it", 0},
     {"output", KEY_OUT, "TREE.h5", 0, "the tree (needed)", 0},
     {"threads", KEY_THREADS, "N", 0, "threads, default 0: all cores; the tree does not depend on it", 0},
     {"seed", KEY_SEED, "N", 0, "seed of the random numbers, default 1 or the trace's", 0},
@@ -31,7 +32,7 @@ static const struct argp_option options[] = {
 };
 
 typedef struct SegmentArguments {
-    const char *volume, *trace, *out, *json, *picture;
+    const char *volume, *trace, *start, *out, *json, *picture;
     int threads;
     double seed;             // -1: the trace's
     bool quiet;
@@ -43,6 +44,7 @@ static error_t parse_option(int key, char *text, struct argp_state *state)
     double number;
     switch (key) {
     case KEY_TRACE: a->trace = text; return 0;
+    case KEY_START: a->start = text; return 0;
     case KEY_OUT: a->out = text; return 0;
     case KEY_JSON: a->json = text; return 0;
     case KEY_PICTURE: a->picture = text; return 0;
@@ -62,8 +64,8 @@ static error_t parse_option(int key, char *text, struct argp_state *state)
         a->volume = text;
         return 0;
     case ARGP_KEY_END:
-        if (!a->volume || !a->trace || !a->out)
-            argp_error(state, "%s", !a->volume ? "no volume is named" : !a->trace ? "--trace F.yaml is needed" : "-o TREE.h5 is needed");
+        if (!a->volume || !a->trace == !a->start || !a->out)
+            argp_error(state, "%s", !a->volume ? "no volume is named" : !a->out ? "-o TREE.h5 is needed" : "either --trace F.yaml or --start X,Y,Z is needed");
         return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
@@ -177,7 +179,7 @@ static bool write_json(const SegmentArguments *a, const VesselTree *tree, const 
 {
     cJSON *root = cJSON_CreateObject(), *list = cJSON_AddArrayToObject(root, "branches");
     cJSON_AddStringToObject(root, "volume", a->volume);
-    cJSON_AddStringToObject(root, "trace", a->trace);
+    cJSON_AddStringToObject(root, a->start ? "start_mm" : "trace", a->start ? a->start : a->trace);
     cJSON_AddNumberToObject(root, "nodes", tree->node_count);
     cJSON_AddNumberToObject(root, "points", (double)tree->point_count);
     if (report->start[0])
@@ -230,6 +232,21 @@ static void draw_picture(const SegmentArguments *a, const Volume *volume, const 
         fprintf(stderr, "%s: no picture: %s\n", a->picture, message);
 }
 
+static Trace *trace_of(const SegmentArguments *a, Faults *faults)
+{
+    char text[160];
+    double x, y, z;
+    int used = 0;
+    if (!a->start)
+        return trace_load(a->trace, faults);
+    if (sscanf(a->start, "%lf,%lf,%lf%n", &x, &y, &z, &used) != 3 || a->start[used] || !(fabs(x) < 1e9 && fabs(y) < 1e9 && fabs(z) < 1e9)) {
+        faults_add(faults, "--start", 0, 0, "'%.60s' is not valid; three numbers X,Y,Z in mm", a->start);
+        return NULL;
+    }
+    int length = snprintf(text, sizeof text, "branches: [{start_mm: [%.17g, %.17g, %.17g]}]", x, y, z);
+    return trace_parse(text, (size_t)length, "--start", faults);
+}
+
 static int segment(const SegmentArguments *a, Faults *faults)
 {
     output_check_file(a->out, faults);
@@ -237,7 +254,7 @@ static int segment(const SegmentArguments *a, Faults *faults)
     if (a->picture)
         output_check_file(a->picture, faults);
     double start = seconds();
-    Trace *trace = trace_load(a->trace, faults);
+    Trace *trace = trace_of(a, faults);
     Volume *volume = volume_load(a->volume, faults);
     RbtReport report = {0};
     VesselTree *tree = NULL;
@@ -248,7 +265,7 @@ static int segment(const SegmentArguments *a, Faults *faults)
         if (a->seed >= 0)
             trace->parameters.seed = a->seed;
         tree = rbt_track(volume, &trace->parameters, trace->branch, trace->branch_count, trace->aneurysm, trace->aneurysm_count, a->threads, &progress, &report,
-                         a->trace, faults);
+                         a->start ? "--start" : a->trace, faults);
     }
     bool good = tree != NULL;
     if (good) {
@@ -281,7 +298,7 @@ int verb_segment(int argc, char **argv)
 {
     SegmentArguments a = {.seed = -1};
     char *help = help_text();
-    struct argp argp = {options, parse_option, "VOLUME --trace F.yaml -o TREE.h5", help, NULL, NULL, NULL};
+    struct argp argp = {options, parse_option, "VOLUME --trace F.yaml -o TREE.h5\nVOLUME --start X,Y,Z -o TREE.h5", help, NULL, NULL, NULL};
     Faults *faults = calloc(1, sizeof *faults);
     int code = EXIT_BAD_INPUT;
     argp_err_exit_status = EXIT_BAD_INPUT;
