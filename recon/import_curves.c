@@ -1,12 +1,13 @@
 // Curves set in the mesh's frame and in its lumen. A given curve is kept as it is but where the surface contradicts it: a stretch that runs out of
-// the lumen sideways goes back to the middle, one that runs out over a vessel's end is cut there, and a sample whose section of the lumen (16 rays
-// square to the curve) has its wall at less than 0.15 of the section's median radius on one side goes to the section's centroid. Moving every
-// sample to the middle was tried and lost: it bends exact curves at ends and ostia by half a radius.
+// the lumen sideways goes back to the middle, one that runs out over a vessel's end is cut there, and a sample goes to the centroid of its section of
+// the lumen (16 rays square to the curve) where that has its wall at less than 0.15 of its median radius on one side, or at less than half of it
+// where the centroid has half as much room again; near a curve's ends only the former. Moving every sample to the middle was tried and lost: it bends
+// exact curves at ends and ostia by half a radius.
 #include "recon/import_skeleton.h"
 
 #include <stdlib.h>
 
-static const double STEP = 0.3, GRAZE = 0.15;
+static const double STEP = 0.3, GRAZE = 0.15, BESIDE = 0.5, GAIN = 1.5;
 
 // --- the curves' frame ---
 
@@ -127,7 +128,7 @@ static bool back_into_lumen(const SurfaceMesh *mesh, const MeshTree *tree, Vec3 
 
 enum { KEPT, MOVED, LOST };
 
-static int clear_sample(const SurfaceMesh *mesh, const MeshTree *tree, Vec3 tangent, double wide, Vec3 *p)
+static int clear_sample(const SurfaceMesh *mesh, const MeshTree *tree, Vec3 tangent, double wide, bool near_end, Vec3 *p)
 {
     bool moved = !is_in_lumen(mesh, tree, *p);
     if (moved && (!back_into_lumen(mesh, tree, tangent, wide, p) || !is_in_lumen(mesh, tree, *p)))
@@ -140,7 +141,10 @@ static int clear_sample(const SurfaceMesh *mesh, const MeshTree *tree, Vec3 tang
         if (isfinite(mesh_tree_nearest(tree, *p, wide, &foot, &t)) && fabs(vec3_dot(normal_of(mesh, t), tangent)) > 0.7)
             break;
         double median = section_radius(tree, *p, tangent, 4 * wide, &least, &centroid);
-        if (least > (moved ? 0.5 : GRAZE) * median || !is_in_lumen(mesh, tree, centroid))
+        if (least > BESIDE * median || !is_in_lumen(mesh, tree, centroid))
+            break;
+        bool grazes = moved || least < GRAZE * median;
+        if (!grazes && (near_end || mesh_tree_nearest(tree, centroid, INFINITY, &foot, &t) < GAIN * mesh_tree_nearest(tree, *p, INFINITY, &foot, &t)))
             break;
         *p = centroid;
         moved = true;
@@ -183,7 +187,8 @@ CurveSet *curves_in_lumen(const SurfaceMesh *mesh, const MeshTree *tree, const C
         for (int i = 0; i < n; i++) {
             Vec3 tangent = vec3_unit(vec3_sub(point[i + 2 < n ? i + 2 : n - 1], point[i > 2 ? i - 2 : 0]));
             place[i] = point[i];
-            state[i] = (unsigned char)clear_sample(mesh, tree, tangent, wide[i], &place[i]);
+            double from_end = fmin(vec3_distance(point[i], point[0]), vec3_distance(point[i], point[n - 1]));
+            state[i] = (unsigned char)clear_sample(mesh, tree, tangent, wide[i], from_end < 3 * wide[i], &place[i]);
             report->moved_samples += state[i] == MOVED;
             report->cut_samples += state[i] == LOST;
         }
