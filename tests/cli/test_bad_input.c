@@ -170,7 +170,11 @@ static void words_of_the_command_line(void **state)
         {"", "Usage: seldinger"},
         {"banana", "no verb 'banana'; valid: run"},
         {"segment", "no volume is named"},
-        {"segment capsule.nrrd", "--trace F.yaml is needed"},
+        {"segment capsule.nrrd", "-o TREE.h5 is needed"},
+        {"segment capsule.nrrd -o out.h5", "--trace F.yaml"},
+        {"segment capsule.nrrd --trace trace.yaml --start 0,0,0 -o out.h5", "--start"},
+        {"segment capsule.nrrd --start 0,0 -o out.h5", "--start"},
+        {"segment capsule.nrrd --start 90,0,0 -o out.h5", "lies outside the volume"},
         {"segment capsule.nrrd --banana", "--banana"},
         {"fit", "lacks the tree"},
         {"fit tree.h5", "lacks -o MODEL.h5"},
@@ -236,6 +240,7 @@ static int stopped(const char *arguments, bool (*is_time)(double seconds), doubl
     pid_t child = fork();
     assert_true(child >= 0);
     if (child == 0) {
+        signal(SIGINT, SIG_DFL);   // ignored where a shell runs the tests in the background
         execl("/bin/sh", "sh", "-c", command, (char *)NULL);
         _exit(127);
     }
