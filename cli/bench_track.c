@@ -9,6 +9,7 @@
 #include "recon/parallel.h"
 #include "recon/track_score.h"
 
+#include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,10 +18,13 @@ static const char *const method_name[METHODS] = {"RBT from one click", "RBT, a s
                                                  "MHT, the paper's values"};
 
 static const char help[] =
-    "Usage: seldinger bench track [--quick] [--threads N] [--json F]\n\n"
+    "Usage: seldinger bench track [--quick] [--trees N] [--click] [--threads N] [--json F]\n\n"
     "Trackers on synthetic angiograms with exact truth, branch by branch with the labels of Kerrien et al. 2017, Table 2: random trees of at least 200\n"
-    "branches at 0, 5, 10 and 20 % noise; kissing vessels 0.5 to 3 voxels apart; bone in contact; aneurysms; anisotropic, fading, clipped volumes.\n\n"
+    "branches of two voxels' radius or more at each of 0, 5, 10 and 20 % noise; kissing vessels 0.5 to 3 voxels apart; bone in contact; aneurysms;\n"
+    "anisotropic, fading, clipped volumes. At the end what a millimetre of vessel costs in trees of two sizes.\n\n"
     "  --quick      one small tree at 5 % noise and one of each trouble\n"
+    "  --trees N    random trees (51 branches each) at a level of noise, 1 to 24; default 5\n"
+    "  --click      whole trees from one click alone, without the other trackers\n"
     "  --threads N  default 0: all cores; figures but times do not depend on them\n"
     "  --json F     the same figures as JSON; - is standard output, the table then goes to standard error\n\n"
     "Exit codes: 0 done; 1 a figure that must be reached is not; 2 wrong usage or bad input.\n";
@@ -36,7 +40,7 @@ typedef struct Case {
     VolumeOptions volume;
 } Case;
 
-enum { MOST_CASES = 64, MOST_GROUPS = 24, BINS = 400 };
+enum { MOST_TREES = 24, MOST_CASES = 4 * MOST_TREES + 40, MOST_GROUPS = 24, BINS = 400 };
 static const double bin_voxels = 0.01;
 
 typedef struct Tally {           // of branches of one width
@@ -56,6 +60,7 @@ typedef struct Figures {         // of a group and a method
 typedef struct Group {
     char name[48];
     double noise;                // of the random trees whose figures must be reached; < 0: none
+    bool is_size;                // not of the table: what a tree of this size costs
     Figures figures[METHODS];
 } Group;
 
@@ -91,10 +96,10 @@ static Case *add_tree(Case *list, int *count, int group, double noise, int branc
     return c;
 }
 
-static int make_cases(bool quick, Case *cases, Group *groups, int *group_count)
+static int make_cases(bool quick, int trees, Case *cases, Group *groups, int *group_count)
 {
     static const double noises[] = {0.05, 0, 0.1, 0.2}, gaps[] = {0.5, 1, 1.5, 2, 3}, angles[] = {0, 30, 60, 90};
-    int count = 0, trees = quick ? 1 : 4, branches = quick ? 25 : 51;
+    int count = 0, branches = quick ? 25 : 51;
     *group_count = 0;
     for (int k = 0; k < (quick ? 1 : 4); k++) {
         char name[48];
@@ -137,6 +142,14 @@ static int make_cases(bool quick, Case *cases, Group *groups, int *group_count)
             c->volume.clip = 0.1, c->volume.saturate = 0.7;
         else
             c->volume.psf_mm = 0.35;
+    }
+    for (int k = 0; k < 2; k++) {
+        int size = quick ? (k ? 40 : 10) : (k ? 200 : 25);
+        char name[48];
+        snprintf(name, sizeof name, "%d branches", size);
+        group = add_group(groups, group_count, name, -1);
+        groups[group].is_size = true;
+        add_tree(cases, &count, group, 0.05, size, 12);
     }
     return count;
 }
@@ -275,7 +288,7 @@ static void angiogram_free(Angiogram *image)
     shape_free(image->shape);
 }
 
-static bool run_case(const Case *c, Group *groups, int threads, Faults *faults)
+static bool run_case(const Case *c, Group *groups, bool click_only, int threads, Faults *faults)
 {
     Angiogram image = {.about = c, .shape = shape_create(c->shape, c->option_count, c->option, "bench", faults)};
     VolumeOptions volume = c->volume;
@@ -289,7 +302,7 @@ static bool run_case(const Case *c, Group *groups, int threads, Faults *faults)
     bool good = image.volume && track_score(&image.known, NULL, &image.plan);
     if (good)
         image.known.block = shape_blocks(image.shape, &image.known.block_count);
-    long runs = good ? 1 + (METHODS - 1) * (long)image.plan.branch_count : 0;
+    long runs = good ? 1 + (click_only ? 0 : (METHODS - 1) * (long)image.plan.branch_count) : 0;
     Session session = {&image, calloc((size_t)runs + 1, sizeof(Trial))};
     good = good && session.trial;
     if (good)
@@ -372,6 +385,8 @@ static void print_groups(FILE *out, const Group *groups, int count)
         fprintf(out, "\n");
     }
     for (int g = 0; g < count; g++) {
+        if (groups[g].is_size)
+            continue;
         fprintf(out, "%s\n", groups[g].name);
         for (int m = 0; m < METHODS; m++) {
             const Figures *f = &groups[g].figures[m];
@@ -388,6 +403,18 @@ static void print_groups(FILE *out, const Group *groups, int count)
             "the first term only; exact: after the true steepest edge of a blurred disc; |.|: mean of its absolute value. MHT: without bias. inv., mm:\n"
             "runs of two radii or more that are no vessel of the tree, and their length; att.: links between places that are far apart in the true tree; bg: links\n"
             "that leave the lumen. Only for whole trees: a run a branch is judged on its branch alone. s/tree: CPU seconds.\n");
+}
+
+// Time against tracked length and nodes: narrow vessels have more nodes on a millimetre, and larger trees have more of them.
+static void print_sizes(FILE *out, const Group *groups, int count)
+{
+    fprintf(out, "\ncost of whole trees from one click, 5 %% noise\n");
+    for (int g = 0; g < count; g++) {
+        const Figures *f = &groups[g].figures[CLICK];
+        if (groups[g].is_size && f->tracked_mm > 0)
+            fprintf(out, "  %-26s %8.0f mm tracked %8.2f CPU s %8.2f ms a mm %6lld nodes %8.2f ms a node\n", groups[g].name, f->tracked_mm, f->cpu_s,
+                    1000 * f->cpu_s / f->tracked_mm, (long long)f->nodes, 1000 * f->cpu_s / (double)f->nodes);
+    }
 }
 
 typedef struct Verdict {
@@ -464,23 +491,67 @@ static cJSON *json_of(const Group *groups, int count)
     return root;
 }
 
+typedef struct TrackBench {
+    BenchOptions common;
+    bool click_only;
+    int trees;                   // random ones at a level of noise
+} TrackBench;
+
+static int parse(int argc, char **argv, TrackBench *bench)
+{
+    enum { TREES = 256, CLICK_ONLY };
+    static const struct option list[] = {{"trees", required_argument, NULL, TREES}, {"click", no_argument, NULL, CLICK_ONLY}, {"json", required_argument, NULL, 'j'},
+                                         {"quick", no_argument, NULL, 'q'}, {"threads", required_argument, NULL, 't'}, {"help", no_argument, NULL, 'h'}, {0}};
+    double number;
+    *bench = (TrackBench){0};
+    optind = 1;
+    for (int choice; (choice = getopt_long(argc, argv, "h", list, NULL)) != -1;) {
+        switch (choice) {
+        case TREES:
+            if (!cli_whole_number("--trees", optarg, 1, MOST_TREES, &number))
+                return EXIT_BAD_INPUT;
+            bench->trees = (int)number;
+            break;
+        case CLICK_ONLY: bench->click_only = true; break;
+        case 'j': bench->common.json = optarg; break;
+        case 'q': bench->common.quick = true; break;
+        case 't':
+            if (!cli_whole_number("--threads", optarg, 0, 256, &number))
+                return EXIT_BAD_INPUT;
+            bench->common.threads = (int)number;
+            break;
+        case 'h': fputs(help, stdout); return EXIT_DONE;
+        default: fputs("seldinger bench track: unknown option or lacking value; see --help\n", stderr); return EXIT_BAD_INPUT;
+        }
+    }
+    if (optind < argc) {
+        fprintf(stderr, "seldinger bench track: takes no '%s'; see --help\n", argv[optind]);
+        return EXIT_BAD_INPUT;
+    }
+    if (bench->trees == 0)
+        bench->trees = bench->common.quick ? 1 : 5;
+    return -1;
+}
+
 int bench_track(int argc, char **argv)
 {
     static Faults faults;
-    BenchOptions options;
-    int code = bench_parse(argc, argv, "track", help, &options), group_count = 0;
+    TrackBench bench;
+    int code = parse(argc, argv, &bench), group_count = 0;
     if (code >= 0)
         return code;
+    BenchOptions options = bench.common;
     Case *cases = calloc(MOST_CASES, sizeof *cases);
     Group *groups = calloc(MOST_GROUPS, sizeof *groups);
     bool good = cases && groups, kept = true;
-    int count = good ? make_cases(options.quick, cases, groups, &group_count) : 0;
+    int count = good ? make_cases(options.quick, bench.trees, cases, groups, &group_count) : 0;
     for (int i = 0; i < count && good; i++)
-        good = run_case(&cases[i], groups, options.threads, &faults);
+        good = run_case(&cases[i], groups, bench.click_only || groups[cases[i].group].is_size, options.threads, &faults);
     if (good) {
         FILE *out = bench_text(&options);
         fprintf(out, "bench track on %s\n", bench_processor());
         print_groups(out, groups, group_count);
+        print_sizes(out, groups, group_count);
         fprintf(out, "\n");
         for (int g = 0; g < group_count; g++) {
             Verdict list[8];

@@ -18,13 +18,18 @@
 
 // --- random numbers ---
 
+static const uint64_t random_step = 0x9e3779b97f4a7c15u;
+
 uint64_t random_next(Random *random)
 {
-    uint64_t z = random->state += 0x9e3779b97f4a7c15u;
+    uint64_t z = random->state += random_step;
     z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
     z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
     return z ^ (z >> 31);
 }
+
+// As after so many calls of random_next().
+static void random_skip(Random *random, int numbers) { random->state += (uint64_t)numbers * random_step; }
 
 Random random_from_seed(uint64_t seed, uint64_t stream)
 {
@@ -49,18 +54,40 @@ ISA_CLONES static int count_ring(const float *u, const float *v, int count, floa
     return inside;
 }
 
-static bool circle_of_three(const float *u, const float *v, const int index[3], double *cu, double *cv, double *radius)
+// Trials are drawn and their circles computed in batches: what a batch drew beyond the last trial is not used.
+enum { BATCH = 16 };
+typedef struct Circles {
+    double u0[BATCH], v0[BATCH], ax[BATCH], ay[BATCH], bx[BATCH], by[BATCH];   // first point; the others as seen from it
+    double cu[BATCH], cv[BATCH], r2[BATCH];
+    int fits[BATCH];         // not on a line, and about within the limits
+} Circles;
+
+// A trial takes three numbers, whatever comes of it.
+static void draw_triples(Circles *c, const float *u, const float *v, int count, Random *random)
 {
-    double ax = (double)u[index[1]] - (double)u[index[0]], ay = (double)v[index[1]] - (double)v[index[0]];
-    double bx = (double)u[index[2]] - (double)u[index[0]], by = (double)v[index[2]] - (double)v[index[0]];
-    double det = 2 * (ax * by - ay * bx), a2 = ax * ax + ay * ay, b2 = bx * bx + by * by;
-    if (det * det <= 1e-12 * a2 * b2)   // on a line
-        return false;
-    double x = (by * a2 - ay * b2) / det, y = (ax * b2 - bx * a2) / det;
-    *radius = sqrt(x * x + y * y);
-    *cu = (double)u[index[0]] + x;
-    *cv = (double)v[index[0]] + y;
-    return true;
+    for (int k = 0; k < BATCH; k++) {
+        int i = random_index(random, count), j = random_index(random, count), l = random_index(random, count);
+        c->u0[k] = (double)u[i];
+        c->v0[k] = (double)v[i];
+        c->ax[k] = (double)u[j] - (double)u[i];
+        c->ay[k] = (double)v[j] - (double)v[i];
+        c->bx[k] = (double)u[l] - (double)u[i];
+        c->by[k] = (double)v[l] - (double)v[i];
+        c->fits[k] = (i != j) & (i != l) & (j != l);
+    }
+}
+
+ISA_CLONES static void circles_of_three(Circles *c, double least2, double most2, double offset2)
+{
+    for (int k = 0; k < BATCH; k++) {
+        double ax = c->ax[k], ay = c->ay[k], bx = c->bx[k], by = c->by[k];
+        double det = 2 * (ax * by - ay * bx), a2 = ax * ax + ay * ay, b2 = bx * bx + by * by;
+        double x = (by * a2 - ay * b2) / det, y = (ax * b2 - bx * a2) / det, r2 = x * x + y * y, cu = c->u0[k] + x, cv = c->v0[k] + y;
+        c->cu[k] = cu;
+        c->cv[k] = cv;
+        c->r2[k] = r2;
+        c->fits[k] &= (det * det > 1e-12 * a2 * b2) & (r2 >= least2) & (r2 <= most2) & (cu * cu + cv * cv <= offset2);
+    }
 }
 
 double ransac_circle(const Vec3 *point, int count, Vec3 origin, Vec3 axis, const RansacOptions *options, Random *random, Cylinder *out)
@@ -74,23 +101,32 @@ double ransac_circle(const Vec3 *point, int count, Vec3 origin, Vec3 axis, const
         u[i] = (float)vec3_dot(q, e1);
         v[i] = (float)vec3_dot(q, e2);
     }
-    int best = 0;
-    for (int trial = 0; trial < options->trials_max && (trial < options->trials_min || best <= options->inlier_rate * count); trial++) {
-        int index[3];
-        index[0] = random_index(random, count);
-        index[1] = random_index(random, count);
-        index[2] = random_index(random, count);
-        double cu, cv, r;
-        if (index[0] == index[1] || index[0] == index[2] || index[1] == index[2] || !circle_of_three(u, v, index, &cu, &cv, &r))
-            continue;
-        if (!(r >= options->radius_min && r <= options->radius_max) || cu * cu + cv * cv > options->offset_max * options->offset_max)
-            continue;
-        double low = fmax(r - options->threshold, 0), high = r + options->threshold;
-        int inside = count_ring(u, v, count, (float)cu, (float)cv, (float)(low * low), (float)(high * high));
-        if (inside > best) {
-            best = inside;
-            *out = (Cylinder){vec3_add_scaled(vec3_add_scaled(origin, cu, e1), cv, e2), r, axis, 0};
+    int best = 0, trial = 0;
+    const double rounding = 1e-9;   // the exact test follows
+    double least2 = options->radius_min * options->radius_min * (1 - rounding), most2 = options->radius_max * options->radius_max * (1 + rounding);
+    for (bool more = true; more;) {
+        Circles c;
+        Random drawn = *random;
+        draw_triples(&c, u, v, count, &drawn);
+        circles_of_three(&c, least2, most2, options->offset_max * options->offset_max);
+        int k = 0;
+        for (; k < BATCH; k++, trial++) {
+            more = trial < options->trials_max && (trial < options->trials_min || best <= options->inlier_rate * count);
+            if (!more)
+                break;
+            if (!c.fits[k])
+                continue;
+            double r = sqrt(c.r2[k]);
+            if (!(r >= options->radius_min && r <= options->radius_max))
+                continue;
+            double low = fmax(r - options->threshold, 0), high = r + options->threshold;
+            int inside = count_ring(u, v, count, (float)c.cu[k], (float)c.cv[k], (float)(low * low), (float)(high * high));
+            if (inside > best) {
+                best = inside;
+                *out = (Cylinder){vec3_add_scaled(vec3_add_scaled(origin, c.cu[k], e1), c.cv[k], e2), r, axis, 0};
+            }
         }
+        random_skip(random, 3 * k);
     }
     return (double)best / count;
 }

@@ -142,10 +142,9 @@ static double distance_from_limb(const Tracker *t, const RbtLimb *limb, Vec3 x)
     return least;
 }
 
-// The darkest place on the way from x to the contact's node, between background (0) and the dimmer of both lumens (1).
-static double neck_of(const Tracker *t, const RbtLimb *limb, const TrackNode *node)
+// The darkest place on the way from a node to one of the tree, between background (0) and the dimmer of both lumens (1).
+static double neck_of(const Tracker *t, const TrackNode *parent, const TrackNode *node)
 {
-    const TrackNode *parent = &t->tree.node[limb->contact];
     Vec3 x = node->cylinder.center, c = parent->cylinder.center;
     double own = tracker_brightness(t, x), other = tracker_brightness(t, c), inside = fmin(own, other), outside = fmin(own - node->contrast, other - parent->contrast), least = 1;
     int steps = 2 + (int)(vec3_distance(x, c) / (0.25 * t->voxel));
@@ -154,8 +153,18 @@ static double neck_of(const Tracker *t, const RbtLimb *limb, const TrackNode *no
     return least;
 }
 
+// Does the way back end at the wall of a vessel, further on than where the limb touches the tree, and point into it? Vessels that kiss lie side by side.
+static bool meets_wall(const Tracker *t, const RbtPaint *paint, const TrackNode *end)
+{
+    int node = rbt_paint_node(paint, end->cylinder.center);
+    if (node < 0 || t->tree.node[node].kind != NODE_VESSEL)
+        return false;
+    Vec3 in = vec3_unit_or(vec3_sub(t->tree.node[node].cylinder.center, end->cylinder.center), end->cylinder.axis);
+    return vec3_dot(in, end->cylinder.axis) > 0.5 && neck_of(t, &t->tree.node[node], end) >= 0.8;
+}
+
 // Does the way back come out where the limb begins? Cuts off what goes past it.
-static bool meets_parent(const Tracker *t, const RbtLimb *limb, Track *back)
+static bool meets_parent(const Tracker *t, const RbtPaint *paint, const RbtLimb *limb, Track *back)
 {
     const Cylinder *end = &back->node[back->count - 1].cylinder;
     if (tracker_node_around(t, end->center, 0.9) >= 0)
@@ -183,8 +192,8 @@ static bool meets_parent(const Tracker *t, const RbtLimb *limb, Track *back)
         left += vec3_distance(t->tree.node[ahead].cylinder.center, t->tree.node[ahead - 1].cylinder.center);
     }
     bool is_end = left < fmax(2 * t->tree.node[limb->contact].cylinder.radius, 2 * t->voxel);
-    if (goes_past && neck_of(t, limb, &back->node[nearest]) < (is_end ? 0.4 : 0.8))
-        return false;
+    if (goes_past && neck_of(t, &t->tree.node[limb->contact], &back->node[nearest]) < (is_end ? 0.4 : 0.8))
+        return meets_wall(t, paint, &back->node[back->count - 1]);
     track_cut(back, nearest + 1);
     return true;
 }
@@ -213,14 +222,14 @@ static void track_limb(void *context, long index)
         found->is_sac = true;
         found->radius = t->estimate.node.cylinder.radius;
         found->why = "aneurysm";
-        found->good = track_append(&found->out, &t->estimate.node, t->estimate.point);
+        found->good = track_append(&found->out, &t->estimate.node, t->estimate.point) && rbt_fill_sac(t, round->paint, limb, &found->out);
     } else if (seed_on_limb(t, limb, round->share, &seed)) {
         found->why = "does not lead back to its parent";
         Cylinder behind = seed;
         behind.axis = vec3_negate(behind.axis);
         t->longest = limb->depth + 8 * fmax(seed.radius, t->voxel);
         tracker_run(t, &behind, &found->back, true);
-        if (found->back.count > 0 && meets_parent(t, limb, &found->back)) {
+        if (found->back.count > 0 && meets_parent(t, round->paint, limb, &found->back)) {
             t->longest = HUGE_VAL;
             tracker_run(t, &seed, &found->out, false);
             found->why = t->why;
@@ -323,14 +332,18 @@ static bool adopt(Tracker *t, RbtPaint *paint, const RbtLimb *limb, const Found 
 // A sac hangs on the node beside it; one sac may be met by several limbs. False: out of memory.
 static bool adopt_sac(Tracker *t, RbtPaint *paint, const RbtLimb *limb, const Found *found, RbtEnds *ends)
 {
-    TrackNode node = found->out.node[0];
     int before = t->tree.count;
     bool is_joined;
-    if (is_painted(paint, node.cylinder.center))
+    if (is_painted(paint, found->out.node[0].cylinder.center))
         return true;
-    node.branch = ends->count;
-    node.parent = limb->contact;
-    if (!track_append(&t->tree, &node, found->out.point) || !rbt_mend_links(t, paint, before, &is_joined) || (is_joined && !rbt_ends_add(ends, found->why, -1)))
+    for (int i = 0; i < found->out.count; i++) {
+        TrackNode node = found->out.node[i];
+        node.branch = ends->count;
+        node.parent = i > 0 ? before + node.parent : limb->contact;
+        if (!track_append(&t->tree, &node, found->out.point + node.point_start))
+            return false;
+    }
+    if (!rbt_mend_links(t, paint, before, &is_joined) || (is_joined && !rbt_ends_add(ends, found->why, -1)))
         return false;
     rbt_paint_nodes(paint, &t->tree, before, t->tree.count);
     return true;

@@ -164,7 +164,7 @@ static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 
 static bool insert_nodes(Tracker *t, Track *out, const TrackNode *parent, const TrackNode *child, const Vec3 *way, int count, int number, int parent_index, const Light *light)
 {
     Vec3 last = parent->cylinder.center;
-    double spacing = fmax(0.7 * child->cylinder.radius, t->voxel);
+    double radius = child->kind == NODE_ANEURYSM ? fmin(parent->cylinder.radius, child->cylinder.radius) : child->cylinder.radius, spacing = fmax(0.7 * radius, t->voxel);
     for (int i = count - 1; i >= 0;) {   // the way runs from child to parent
         int next = i;
         while (next > 0 && vec3_distance(way[next - 1], last) <= spacing && darkest(t, last, way[next - 1], light) >= least_lit)
@@ -172,7 +172,7 @@ static bool insert_nodes(Tracker *t, Track *out, const TrackNode *parent, const 
         if (next == 0 && darkest(t, last, child->cylinder.center, light) >= least_lit && vec3_distance(last, child->cylinder.center) < 2 * spacing)
             break;
         Vec3 ahead = next > 0 ? way[next - 1] : child->cylinder.center;
-        Cylinder c = {way[next], child->cylinder.radius, vec3_unit_or(vec3_sub(ahead, last), child->cylinder.axis), 2 * fmax(vec3_distance(last, way[next]), 0.5 * t->voxel)};
+        Cylinder c = {way[next], radius, vec3_unit_or(vec3_sub(ahead, last), child->cylinder.axis), 2 * fmax(vec3_distance(last, way[next]), 0.5 * t->voxel)};
         // in a wide mouth the walls are further away than the branch's radius
         for (int k = 0; k < 4; k++, c.radius = fmin(1.4 * c.radius, fmax(parent->cylinder.radius, child->cylinder.radius))) {
             tracker_opening(t, &c, fmax(0, child->contrast + tracker_brightness(t, c.center) - tracker_brightness(t, child->cylinder.center)));

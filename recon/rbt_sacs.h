@@ -8,4 +8,7 @@
 // Is the limb a sac? Then t->estimate is its node: the sphere through the first walls that rays meet from its middle, and those walls.
 bool rbt_is_sac(Tracker *t, const RbtPaint *paint, const RbtLimb *limb);
 
+// Appends to the sac's only node those of further centres where it is no ball; their parents are indices in `sac`. False: out of memory.
+bool rbt_fill_sac(Tracker *t, const RbtPaint *paint, const RbtLimb *limb, Track *sac);
+
 #endif

@@ -527,6 +527,7 @@ static void track_carotid(void *context, long index)
     RbtParameters parameters = rbt_default_parameters();
     RbtSeed seed = {.start = {187, 32, 152}, .toward = {182, 40, 154}, .start_is_voxel = true, .toward_is_voxel = true, .has_toward = true, .radius = 2};
     parameters.seed = (double)(index + 1);
+    parameters.max_length_mm = 120;   // M1 comes after 92 mm
     VesselTree *tree = rbt_track(volume, &parameters, &seed, 1, NULL, 0, 1, NULL, NULL, "test", &own);
     Vec3 neck = volume_point_of(volume, vec3(130, 118, 165)), m1 = volume_point_of(volume, vec3(150, 131, 185));
     int at = 0;
