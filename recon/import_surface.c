@@ -1,10 +1,9 @@
 // See import_surface.h. Nodes stand every `spacing` inscribed radii along the skeleton. The wall's triangles are sampled with a density of
 // points_per_node / (2 pi r spacing r), r of the nearest node, by a low-discrepancy sequence (Roberts' R2, folded into the triangle), and the samples
 // are set where the surface would be that coarse facets stand for. A node that gets fewer than eight points lies within its parent's lumen and is left
-// out: its children hang on the parent. A node's radius is its curve's own where that agrees to 30 % with the median distance of the wall square to
-// the curve, else that median, between 1 and 1.6 times the inscribed radius (ostia and kissing walls pull the median away): some curves come with
-// radii that are far too small in flat vessels. At a blind end, where inscribed spheres shrink, it is that of the last sphere that
-// reaches the end.
+// out: its children hang on the parent. A node's radius is the median distance of the wall square to the curve, between 1 and 1.6 times the inscribed
+// radius (ostia and kissing walls pull the median away), or the curve's own on pieces where most of those agree with it. At a blind end, where inscribed
+// spheres shrink, it is that of the last sphere that reaches the end.
 #include "recon/import_surface.h"
 
 #include "recon/import_skeleton.h"
@@ -15,7 +14,7 @@
 #include <string.h>
 
 enum { CANDIDATES = 12, LEAST_POINTS = 8, PASSES = 4, CHUNK = 256 };
-static const double POINTS_MAX = 4e6, SEEN_REACH = 2, REACH = 2, AGREES = 0.3, PULLED = 1.6, SHARP_COSINE = 0.5, ASIDE = 1.3, STEEP = 0.5;   // reaches in radii
+static const double POINTS_MAX = 4e6, SEEN_REACH = 2.5, REACH = 2, AGREES = 0.05, NEARLY = 0.3, PULLED = 1.6, SHARP_COSINE = 0.5, ASIDE = 1.3, STEEP = 0.5;   // reaches in radii
 
 ImportOptions import_default_options(void) { return (ImportOptions){.spacing = 0.5, .points_per_node = 108}; }
 
@@ -77,7 +76,8 @@ static void limit_slope(const Skeleton *s, const int *children, double *radius)
         }
 }
 
-// The curves' own radii on pieces between branchings where most agree with `radius` (S). False where memory lacks.
+// The curves' own radii on pieces between branchings where most agree with `radius` (S), but where they are far off. Agreement is narrow, for cells are
+// by power distance: trunks with radii a tenth too small lose their wall to branches. False where memory lacks.
 static bool take_given(const Skeleton *s, const int *children, double *radius)
 {
     size_t room = (size_t)s->count + 1;
@@ -87,10 +87,10 @@ static bool take_given(const Skeleton *s, const int *children, double *radius)
         for (int i = 0; i < s->count; i++) {
             int up = s->parent[i];
             piece[i] = up >= 0 && children[up] == 1 ? piece[up] : i;
-            bool agrees = s->given[i] > 0 && fabs(s->given[i] - radius[i]) < AGREES * radius[i];
+            double off = s->given[i] > 0 ? fabs(s->given[i] - radius[i]) / radius[i] : INFINITY;
             if (pass == 0)
-                agree[piece[i]] += agrees ? 1 : -1;
-            else if (agrees && agree[piece[i]] > 0)
+                agree[piece[i]] += off < AGREES ? 1 : -1;
+            else if (off < NEARLY && agree[piece[i]] > 0)
                 radius[i] = s->given[i];
         }
     free(piece);
