@@ -28,7 +28,7 @@ typedef struct LimKernels {
     void (*total_energy)(const LimPoints *, float (*)[LIM_LANES]);
     void (*residuals)(const LimPoints *, float, float *);
     void (*columns)(const LimPoints *, const LimBlob *, float, float *);
-    void (*gram)(const float *, const float *, size_t, int, float (*)[LIM_LANES]);
+    void (*gram)(const float *, const float *, size_t, int, float (*)[4][LIM_LANES]);
     void (*dot_lanes)(const float *, const float *, int, float *);
 } LimKernels;
 #define KERNEL_TABLE(isa) \
@@ -104,13 +104,15 @@ void lim_points_taubin(const LimPoints *points, float *distance) { kernels()->ta
 
 void lim_points_approach(LimPoints *points, double longest, double slide) { kernels()->approach(points, (float)longest, (float)slide); }
 
-// Adds the lanes of an accumulator in their order, in double.
+// Adds the lanes of an accumulator, in double, by halves: always in this order.
 static double add_lanes(const float *lane)
 {
-    double sum = 0;
-    for (int l = 0; l < LIM_LANES; l++)
-        sum += (double)lane[l];
-    return sum;
+    double half[LIM_LANES / 2];
+    for (int l = 0; l < LIM_LANES / 2; l++)
+        half[l] = (double)lane[l] + (double)lane[l + LIM_LANES / 2];
+    for (int l = 0; l < LIM_LANES / 4; l++)
+        half[l] += half[l + LIM_LANES / 4];
+    return (half[0] + half[2]) + (half[1] + half[3]);
 }
 
 LimEnergy lim_energy(const LimPoints *points, const LimBlob *blob)
@@ -147,12 +149,13 @@ double lim_energy_dot(const float *a, const float *b, int padded)
     return add_lanes(lane);
 }
 
-void lim_energy_four_dots(const float *one, const float *four, size_t stride, int length, double *dot)
+void lim_energy_gram(const float *rows, const float *columns, size_t stride, int length, double *dot, size_t dot_stride)
 {
-    float lane[4][LIM_LANES];
-    kernels()->gram(one, four, stride, length, lane);
-    for (int k = 0; k < 4; k++)
-        dot[k] = add_lanes(lane[k]);
+    float lane[4][4][LIM_LANES];
+    kernels()->gram(rows, columns, stride, length, lane);
+    for (int m = 0; m < 4; m++)
+        for (int k = 0; k < 4; k++)
+            dot[(size_t)m * dot_stride + (size_t)k] = add_lanes(lane[m][k]);
 }
 
 double lim_cohesion(const LimBlob *blobs, int count, int j, double s, double slope[4])

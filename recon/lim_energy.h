@@ -60,8 +60,9 @@ void lim_energy_total(const LimPoints *points, double *distance, double *bend);
 void lim_energy_columns(const LimPoints *points, const LimBlob *blob, double beta, float *column);
 // The weighted residuals themselves, then (beta > 0) sqrt(beta b_i) kappa_i.
 void lim_energy_residuals(const LimPoints *points, double beta, float *residual);
-// Dot products of `one` with four columns that stand `stride` apart, all of `length` entries, a multiple of LIM_LANES.
-void lim_energy_four_dots(const float *one, const float *four, size_t stride, int length, double *dot);
+// Dot products of four rows with four columns that stand `stride` apart, all of `length` entries, a multiple of LIM_LANES: dot (4, dot_stride), the
+// first four of each row are set.
+void lim_energy_gram(const float *rows, const float *columns, size_t stride, int length, double *dot, size_t dot_stride);
 // Dot product of two columns of `padded` entries.
 double lim_energy_dot(const float *a, const float *b, int padded);
 

@@ -440,12 +440,12 @@ static void build_normal(Fit *fit, const int *which, int count, double *side)
     lim_energy_residuals(&fit->points, fit->beta, fit->residual);
     for (int m = 0; m < count; m++)
         lim_energy_columns(&fit->points, &fit->model.blob[which[m]], fit->beta, fit->column + (size_t)(4 * m) * (size_t)length);
-    for (int a = 0; a < size; a++) {
-        const float *column = fit->column + (size_t)a * (size_t)length;
+    for (int a = 0; a < size; a += 4)
         for (int b = 0; b <= a; b += 4)
-            lim_energy_four_dots(column, fit->column + (size_t)b * (size_t)length, (size_t)length, length, &fit->normal[a * SWEEP_SIZE + b]);
-        side[a] = -lim_energy_dot(column, fit->residual, length);
-    }
+            lim_energy_gram(fit->column + (size_t)a * (size_t)length, fit->column + (size_t)b * (size_t)length, (size_t)length, length,
+                            &fit->normal[a * SWEEP_SIZE + b], SWEEP_SIZE);
+    for (int a = 0; a < size; a++)
+        side[a] = -lim_energy_dot(fit->column + (size_t)a * (size_t)length, fit->residual, length);
     for (int m = 0; m < count && fit->alpha > 0; m++) {
         double cohesion[4];
         lim_cohesion(fit->model.blob, fit->model.count, which[m], fit->options->s, cohesion);

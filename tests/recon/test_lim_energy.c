@@ -170,12 +170,13 @@ static void columns_equal_differences(void **state)
         }
         assert_true(bend_scale > 0 && bend_error < 2e-3 * bend_scale);
     }
-    double dot = 0, four[4];
+    double dot = 0, gram[4][8];
     for (int i = 0; i < both; i++)
         dot += (double)column[i] * (double)column[both + i];
-    lim_energy_four_dots(column, column, (size_t)both, both, four);
+    lim_energy_gram(column, column, (size_t)both, both, gram[0], 8);
     assert_true(fabs(lim_energy_dot(column, column + both, both) - dot) < 1e-5 * (fabs(dot) + 1e-3));
-    assert_true(four[1] == lim_energy_dot(column, column + both, both) && four[3] == lim_energy_dot(column, column + 3 * both, both));
+    for (int k = 0; k < 16; k++)
+        assert_true(gram[k / 4][k % 4] == lim_energy_dot(column + k / 4 * both, column + k % 4 * both, both));
     // without E_a the columns of E_d alone, the same bits
     float *alone = calloc((size_t)(4 * n), sizeof *alone);
     sums_without(&c, -1);
@@ -217,7 +218,7 @@ static void every_instruction_set_gives_the_same_bits(void **state)
     (void)state;
     SimdLevel before = simd_level();
     LimEnergy energy[SIMD_COUNT];
-    double total[SIMD_COUNT][2], four[SIMD_COUNT][4];
+    double total[SIMD_COUNT][2], gram[SIMD_COUNT][16];
     float *column[SIMD_COUNT], *sums[SIMD_COUNT];
     size_t columns_size = 0, sums_size = 0;
     memset(energy, 0, sizeof energy);
@@ -235,7 +236,7 @@ static void every_instruction_set_gives_the_same_bits(void **state)
         lim_points_sum(&c.points, c.blob, BLOBS, ISO_LEVEL);
         lim_energy_total(&c.points, &total[isa][0], &total[isa][1]);
         lim_energy_columns(&c.points, &c.blob[1], 0.01, column[isa]);
-        lim_energy_four_dots(column[isa], column[isa], (size_t)both, both, four[isa]);
+        lim_energy_gram(column[isa], column[isa], (size_t)both, both, gram[isa], 4);
         lim_energy_residuals(&c.points, 0.01, sums[isa]);
         memcpy(sums[isa] + both, c.points.h[2], (size_t)c.points.padded * sizeof(float));
         lim_points_approach(&c.points, 0.4, 0.7);
@@ -247,7 +248,7 @@ static void every_instruction_set_gives_the_same_bits(void **state)
     for (int isa = 1; isa <= (int)simd_widest(); isa++) {
         assert_memory_equal(&energy[isa], &energy[0], sizeof energy[0]);
         assert_memory_equal(total[isa], total[0], sizeof total[0]);
-        assert_memory_equal(four[isa], four[0], sizeof four[0]);
+        assert_memory_equal(gram[isa], gram[0], sizeof gram[0]);
         assert_memory_equal(column[isa], column[0], columns_size);
         assert_memory_equal(sums[isa], sums[0], sums_size);
     }
