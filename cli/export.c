@@ -619,7 +619,7 @@ int verb_export(int argc, char **argv)
         return code;
     faults_clear(&faults);
     output_extension(options.out, extension);
-    bool good = output_check(options.out, &faults);
+    bool good = output_check(options.out, &faults) && output_check_apart(options.out, options.in, &faults);
     switch (good ? file_kind(options.in) : FILE_UNKNOWN) {
     case FILE_TREE: good = export_tree(&options, extension, &faults); break;
     case FILE_RECORDING: good = export_recording(&options, extension, &faults); break;

@@ -328,6 +328,12 @@ int verb_import(int argc, char **argv)
         output_check_file(command->output, faults);
         output_check(command->json, faults);
         output_check(command->centreline_out, faults);
+        const char *outputs[] = {command->output, command->json, command->centreline_out};
+        for (size_t i = 0; i < sizeof outputs / sizeof outputs[0]; i++) {
+            output_check_apart(outputs[i], command->surface, faults);
+            for (int k = 0; k < command->centreline_count; k++)
+                output_check_apart(outputs[i], command->centreline[k], faults);
+        }
         code = faults->count == 0 && import(command, faults) ? EXIT_DONE : cli_bad_input(faults);
     }
     free(command);

@@ -317,6 +317,8 @@ int verb_info(int argc, char **argv)
         output_check(report, &faults);
     if (picture)
         output_check_file(picture, &faults);
+    output_check_apart(report, path, &faults);
+    output_check_apart(picture, path, &faults);
     if (faults.count > 0) {
         cJSON_Delete(object);
         return cli_bad_input(&faults);

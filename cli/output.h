@@ -12,6 +12,8 @@
 bool output_check(const char *path, Faults *faults);
 // The same for what only whole files can hold (HDF5, PNG): a device, a pipe or "-" is a fault too.
 bool output_check_file(const char *path, Faults *faults);
+// A fault where `path` is the file `input` (either NULL: nothing to check): what is read would be lost.
+bool output_check_apart(const char *path, const char *input, Faults *faults);
 bool output_write(const char *path, const void *bytes, size_t length, Faults *faults);
 // The last extension in lower case, with its dot; "" where there is none or it is long.
 void output_extension(const char *path, char extension[16]);

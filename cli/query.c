@@ -243,6 +243,8 @@ int verb_query(int argc, char **argv)
         return usage_fault(points ? "lacks -o F.csv" : "lacks --points F.csv", "");
     PointTable table = {0};
     output_check(output, &faults);
+    output_check_apart(output, argv[optind], &faults);
+    output_check_apart(output, points, &faults);
     VesselTree *tree = tree_file_load(argv[optind], NULL, &faults);
     if (tree && !vessel_tree_is_model(tree))
         faults_add(&faults, argv[optind], 0, 0, "is a tree without a model; make one with `seldinger fit`");

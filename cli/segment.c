@@ -253,6 +253,11 @@ static int segment(const SegmentArguments *a, Faults *faults)
     output_check(a->json, faults);
     if (a->picture)
         output_check_file(a->picture, faults);
+    const char *outputs[] = {a->out, a->json, a->picture};
+    for (size_t i = 0; i < sizeof outputs / sizeof outputs[0]; i++) {
+        output_check_apart(outputs[i], a->volume, faults);
+        output_check_apart(outputs[i], a->trace, faults);
+    }
     double start = seconds();
     Trace *trace = trace_of(a, faults);
     Volume *volume = volume_load(a->volume, faults);

@@ -122,7 +122,8 @@ static void traces(void **state)
         {"branches: [{start_cm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\n", "t.yaml:1:23: 'start_cm'"},
         {"branches: [{start_mm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 0}]\n", "t.yaml:1:67: radius_mm '0'"},
         {"branches: [{start_mm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\nbanana: 1\n", "t.yaml:2:9: 'banana'"},
-        {"branches: [{start_mm: [0, 0, 0]}]\nforbid: [{center_mm: [0, 0, 0], radius_mm: 2}]\n", "t.yaml:1:12: the start of branch 1 lies in a region of `forbid`"},
+        {"branches: [{start_mm: [0, 0, 0]}]\nforbid: [{center_mm: [0, 0, 0], radius_mm: 2}]\n",
+         "t.yaml:1:12: the start of branch 1 lies in a region of `forbid`"},
         {"branches: []\n", "t.yaml:1:1: there is no branch"},
         {"", "t.yaml:1:1: the file is empty"}};
     assert_int_equal(run_in("", "synth capsule -o capsule.nrrd --voxel-mm 0.3 --quiet"), 0);
@@ -197,6 +198,13 @@ static void words_of_the_command_line(void **state)
         {"info", "one file is needed"}};
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)
         refused(lines[i][0], lines[i][1]);
+    // what is read is never written over, under whatever name
+    static const char *const same[] = {"query model.h5 --points ok.csv -o ok.csv", "query model.h5 --points ok.csv -o ./model.h5", "export model.h5 -o alias.stl",
+                                       "info model.h5 --report model.h5", "segment capsule.nrrd --trace trace.yaml -o capsule.nrrd",
+                                       "segment capsule.nrrd --trace trace.yaml -o out.h5 --json trace.yaml", "import --surface tube.stl -o tube.stl"};
+    assert_int_equal(run_in("ln -s model.h5 alias.stl &&", "synth open-capsule -o tube.stl --quiet"), 0);
+    for (size_t i = 0; i < sizeof same / sizeof same[0]; i++)
+        refused(same[i], "is read here and would be lost");
     static const char *const nowhere[] = {"fit tree.h5 -o nowhere/x", "synth capsule -o nowhere/x.h5", "synth capsule -o nowhere/x.nrrd",
                                           "query model.h5 --points ok.csv -o nowhere/x.csv", "export model.h5 -o nowhere/x.stl",
                                           "segment capsule.nrrd --trace trace.yaml -o nowhere/x.h5"};
