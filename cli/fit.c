@@ -45,7 +45,7 @@ static const char help[] =
     "  --measure              also: how far neighbouring local models differ where a tool passes from one to the next, walls that no\n"
     "                         point supports, narrow links; without -o of the model given, which is then not fitted again\n"
     "  --json F               figures as JSON; - is standard output\n"
-    "  --picture F.png        fitted surface, points coloured by distance\n"
+    "  --picture F.png        fitted surface coloured by the distance to the points, the worst local models cut open\n"
     "  --quiet                no summary, no progress\n\n"
     "Exit codes: 0 done; 2 wrong usage or bad input.\n";
 

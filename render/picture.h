@@ -96,7 +96,7 @@ bool picture_of_tree(const char *path, const PictureOptions *options, const int 
                      float low, float high, const VesselTree *tree, int mark_count, const PictureMark *mark, char *message, size_t capacity);
 
 // --- a fit ---
-// The fitted surface with the data points coloured by signed distance (blue: outside the model, red: inside), a histogram, and slices through the
+// The fitted surface coloured by the signed distance of the data (blue: outside the model, red: inside), a histogram, and slices through the
 // worst local models with blobs, contour and points. `tree` must be a model; `distance` (tree->point_count) [mm] signed, > 0 inside, of each point to
 // its own node's model, NULL: Taubin's distance is computed here. `mesh` may be NULL (points alone).
 bool picture_of_fit(const char *path, const PictureOptions *options, const VesselTree *tree, const TriangleMesh *mesh, const double *distance,

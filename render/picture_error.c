@@ -30,9 +30,8 @@ static double find_scale(const PictureOptions *options, int count, const double 
     return options->distance_full_scale > 0 ? options->distance_full_scale : scale > 0 ? sheet_scale_end(scale) : 0.1;
 }
 
-// Vertices as discs that overlap: the surface, opaque, each place in its colour.
-static bool draw_surface(Sheet *sheet, const PictureOptions *options, const TriangleMesh *mesh, const double *error, double scale, double x, double y, int width,
-                         int height)
+bool sheet_error_surface(Sheet *sheet, const PictureOptions *options, const TriangleMesh *mesh, const double *error, double scale, double x, double y,
+                         int width, int height)
 {
     Camera camera = {0};
     camera_orient(&camera, options->view, options->up, mesh->vertex_count, mesh->vertex);
@@ -111,7 +110,7 @@ bool picture_of_error(const char *path, const PictureOptions *options, const Ves
         return false;
     double s = sheet.scale, gap = 20 * s, top = 62 * s, column = 0.3 * sheet.width, left = sheet.width - gap - column;
     double scale = find_scale(options, mesh->vertex_count, error);
-    bool drawn = draw_surface(&sheet, options, mesh, error, scale, gap, top, (int)(left - 2 * gap), (int)(sheet.height - top - gap));
+    bool drawn = sheet_error_surface(&sheet, options, mesh, error, scale, gap, top, (int)(left - 2 * gap), (int)(sheet.height - top - gap));
     if (drawn) {
         sheet_title(&sheet, gap, 18 * s, sheet.width - 2 * gap, options->title ? options->title : "distance of the surface to the data");
         sheet_color_bar(&sheet, left, top + 4 * s, column, 12 * s, map_diverging, -1, -scale, scale, "data to surface [mm]: blue outside the model, red inside");

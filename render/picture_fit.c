@@ -1,4 +1,5 @@
-// A fitted tree: its surface, its points coloured by distance, a histogram, and slices through the worst local models.
+// A fitted tree: its surface coloured by the distance to the points (without a mesh the points alone), a histogram, and slices through the worst
+// local models.
 //
 // A slice through node i holds the node's centre, its axis (to the right) and its worst point. Contour: f_i = 0 by marching squares on bilinear
 // cells; its neighbours' contours, faint, show where the wall jumps from one local model to the next.
@@ -76,8 +77,15 @@ static bool draw_surface(FitDrawing *drawing, double x, double y, int width, int
     Sheet *sheet = drawing->sheet;
     const VesselTree *tree = drawing->tree;
     double s = sheet->scale;
-    const Vec3 *shown = drawing->mesh && drawing->mesh->vertex_count > 0 ? drawing->mesh->vertex : tree->point_count > 0 ? tree->point : tree->center;
-    int shown_count = shown == tree->center ? tree->node_count : shown == tree->point ? (int)tree->point_count : drawing->mesh->vertex_count;
+    if (drawing->mesh && drawing->mesh->vertex_count > 0 && tree->point_count > 0) {
+        double *error = malloc((size_t)drawing->mesh->vertex_count * sizeof *error);
+        bool drawn = error && surface_point_error(drawing->mesh, tree, error, NULL) &&
+                     sheet_error_surface(sheet, drawing->options, drawing->mesh, error, drawing->full_scale, x, y, width, height);
+        free(error);
+        return drawn || message_fail(sheet->message, sheet->capacity, "not enough memory for a picture");
+    }
+    const Vec3 *shown = tree->point_count > 0 ? tree->point : tree->center;
+    int shown_count = shown == tree->center ? tree->node_count : (int)tree->point_count;
     Camera camera = {0};
     camera_orient(&camera, drawing->options->view, drawing->options->up, shown_count, shown);
     camera_frame(&camera, width, height, 28 * s, shown_count, shown, 0);
@@ -99,13 +107,6 @@ static bool draw_surface(FitDrawing *drawing, double x, double y, int width, int
         point[count++] = (ViewPoint){{(float)d.x, (float)d.y, (float)d.z}, color_diverging(drawing->distance[k] / drawing->full_scale), (float)size};
     }
     surface_view_draw_points(sheet->view, &camera, camera.center, count, point);
-    ShellStyle style = shell_style_glass();
-    const float grey[3] = {0.78f, 0.79f, 0.80f};
-    memcpy(style.front, grey, sizeof grey);
-    memcpy(style.back, grey, sizeof grey);
-    style.front_opacity = 0.38f;
-    style.back_opacity = 0.5f;
-    surface_view_draw_shell(sheet->view, &camera, &style);
     sheet_end_panel(sheet, panel, x, y);
     sheet_scale_bar(sheet, x + 16 * s, y + height - 14 * s, 0.22 * width, camera.mm_per_pixel, SHEET_INK);
     free(point);
@@ -315,7 +316,7 @@ bool picture_of_fit(const char *path, const PictureOptions *options, const Vesse
         double wide = percentile(&drawing, 0.98);
         drawing.full_scale = options->distance_full_scale > 0 ? options->distance_full_scale : wide > 0 ? sheet_scale_end(wide) : 0.1;
     }
-    drawn = drawn && surface_view_set_mesh(sheet.view, mesh, message, capacity) && draw_fit(&drawing) && sheet_save(&sheet, path);
+    drawn = drawn && draw_fit(&drawing) && sheet_save(&sheet, path);
     free(drawing.distance);
     free(drawing.sorted);
     free(drawing.field);

@@ -56,6 +56,9 @@ void sheet_scale_bar(Sheet *sheet, double x, double y, double longest, double mm
 void sheet_color_bar(Sheet *sheet, double x, double y, double width, double height, Color (*map)(double), double map_low, double low, double high,
                      const char *title);
 
+// A panel of the surface, each vertex in the colour of its `error` (mesh->vertex_count) [mm], +-scale at the ends, NaN grey: discs that overlap, opaque.
+bool sheet_error_surface(Sheet *sheet, const PictureOptions *options, const TriangleMesh *mesh, const double *error, double scale, double x, double y,
+                         int width, int height);
 // The paper's Table 4 as a histogram: `count` values `error` [mm] in voxels, classes C1 to C4 with their borders and shares; ticks below the box.
 void sheet_class_chart(Sheet *sheet, double x, double y, double width, double height, int count, const double *error, double voxel);
 
