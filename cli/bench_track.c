@@ -400,9 +400,9 @@ static void print_groups(FILE *out, const Group *groups, int count)
     }
     fprintf(out,
             "\nlength: share of the true length that was tracked. centre, radius: mean errors [voxel]. radius: after the known bias b^2 / (2 R), which is\n"
-            "the first term only; exact: after the true steepest edge of a blurred disc; |.|: mean of its absolute value. MHT: without bias. inv., mm:\n"
-            "runs of two radii or more that are no vessel of the tree, and their length; att.: links between places that are far apart in the true tree; bg: links\n"
-            "that leave the lumen. Only for whole trees: a run a branch is judged on its branch alone. s/tree: CPU seconds.\n");
+            "the first term only; exact: after the true steepest edge of a blurred disc; |.|: mean of its absolute value. MHT: without bias. inv., mm: runs\n"
+            "of two radii or more that are no vessel of the tree, and their length; att.: links between places that are far apart in the true tree; bg:\n"
+            "links that leave the lumen. Only for whole trees: a run a branch is judged on its branch alone. s/tree: CPU seconds.\n");
 }
 
 // Time against tracked length and nodes: narrow vessels have more nodes on a millimetre, and larger trees have more of them.
@@ -500,8 +500,13 @@ typedef struct TrackBench {
 static int parse(int argc, char **argv, TrackBench *bench)
 {
     enum { TREES = 256, CLICK_ONLY };
-    static const struct option list[] = {{"trees", required_argument, NULL, TREES}, {"click", no_argument, NULL, CLICK_ONLY}, {"json", required_argument, NULL, 'j'},
-                                         {"quick", no_argument, NULL, 'q'}, {"threads", required_argument, NULL, 't'}, {"help", no_argument, NULL, 'h'}, {0}};
+    static const struct option list[] = {{"trees", required_argument, NULL, TREES},
+                                         {"click", no_argument, NULL, CLICK_ONLY},
+                                         {"json", required_argument, NULL, 'j'},
+                                         {"quick", no_argument, NULL, 'q'},
+                                         {"threads", required_argument, NULL, 't'},
+                                         {"help", no_argument, NULL, 'h'},
+                                         {0}};
     double number;
     *bench = (TrackBench){0};
     optind = 1;
@@ -556,8 +561,8 @@ int bench_track(int argc, char **argv)
         for (int g = 0; g < group_count; g++) {
             Verdict list[8];
             for (int k = 0, n = verdicts(&groups[g], list); k < n; k++) {
-                fprintf(out, "%-4s %-4s %s, %s: %.4g, %s %g\n", list[k].must ? "must" : "aim", reached(&list[k]) ? "yes" : "NO", groups[g].name, list[k].what, list[k].found,
-                        list[k].at_least ? "at least" : "at most", list[k].limit);
+                fprintf(out, "%-4s %-4s %s, %s: %.4g, %s %g\n", list[k].must ? "must" : "aim", reached(&list[k]) ? "yes" : "NO", groups[g].name,
+                        list[k].what, list[k].found, list[k].at_least ? "at least" : "at most", list[k].limit);
                 kept = kept && (reached(&list[k]) || !list[k].must);
             }
         }

@@ -48,8 +48,9 @@ static bool is_along(const Tracker *t, const RbtLimb *limb, Vec3 place, Vec3 dir
     const TrackNode *n = &t->estimate.node;
     const TrackNode *parent = &t->tree.node[limb->contact];
     return vec3_dot(n->cylinder.axis, direction) > 0.5 && vec3_distance(n->cylinder.center, place) < 1.5 * fmax(n->cylinder.radius, t->voxel) &&
-           n->contrast > 0.7 * share * parent->contrast && tracker_is_inside(t->volume, n->cylinder.center) && !tracker_is_forbidden(t, n->cylinder.center) &&
-           tracker_brightness(t, n->cylinder.center) >= fmax(limb->level, t->floor) && tracker_brightness(t, n->cylinder.center) <= limb->ceiling && tracker_node_around(t, n->cylinder.center, 0.8) < 0;
+           n->contrast > 0.7 * share * parent->contrast && tracker_is_inside(t->volume, n->cylinder.center) &&
+           !tracker_is_forbidden(t, n->cylinder.center) && tracker_brightness(t, n->cylinder.center) >= fmax(limb->level, t->floor) &&
+           tracker_brightness(t, n->cylinder.center) <= limb->ceiling && tracker_node_around(t, n->cylinder.center, 0.8) < 0;
 }
 
 // Where the vessel comes from, behind the first start.
@@ -111,14 +112,18 @@ static bool seed_on_limb(Tracker *t, const RbtLimb *limb, double share, Cylinder
     const RbtParameters *p = t->parameters;
     double widest = 1.5 * fmax(t->tree.node[limb->contact].cylinder.radius, t->voxel);
     for (int n = 0; n < limb->count; n++) {
-        int middle = limb->count / 2, k = middle + n < limb->count ? middle + n : limb->count - 1 - n, before = k > 0 ? k - 1 : k, after = k + 1 < limb->count ? k + 1 : k;
+        int middle = limb->count / 2, k = middle + n < limb->count ? middle + n : limb->count - 1 - n, before = k > 0 ? k - 1 : k,
+            after = k + 1 < limb->count ? k + 1 : k;
         if (after == before)
             return false;
-        Cylinder predicted = {.center = limb->place[k], .radius = fmax(limb->radius[k], 0.8 * t->voxel), .axis = vec3_unit_or(vec3_sub(limb->place[after], limb->place[before]), vec3(0, 0, 1))};
+        Cylinder predicted = {.center = limb->place[k],
+                              .radius = fmax(limb->radius[k], 0.8 * t->voxel),
+                              .axis = vec3_unit_or(vec3_sub(limb->place[after], limb->place[before]), vec3(0, 0, 1))};
         if (predicted.radius > widest)
             continue;
         for (int second = 0; second <= (p->r_t_second > 0); second++)
-            if (tracker_estimate(t, &predicted, second ? p->r_t_second : p->r_t) && is_along(t, limb, predicted.center, predicted.axis, share) && t->estimate.node.cylinder.radius < widest) {
+            if (tracker_estimate(t, &predicted, second ? p->r_t_second : p->r_t) && is_along(t, limb, predicted.center, predicted.axis, share) &&
+                t->estimate.node.cylinder.radius < widest) {
                 *seed = t->estimate.node.cylinder;
                 return true;
             }
@@ -146,7 +151,8 @@ static double distance_from_limb(const Tracker *t, const RbtLimb *limb, Vec3 x)
 static double neck_of(const Tracker *t, const TrackNode *parent, const TrackNode *node)
 {
     Vec3 x = node->cylinder.center, c = parent->cylinder.center;
-    double own = tracker_brightness(t, x), other = tracker_brightness(t, c), inside = fmin(own, other), outside = fmin(own - node->contrast, other - parent->contrast), least = 1;
+    double own = tracker_brightness(t, x), other = tracker_brightness(t, c), inside = fmin(own, other),
+           outside = fmin(own - node->contrast, other - parent->contrast), least = 1;
     int steps = 2 + (int)(vec3_distance(x, c) / (0.25 * t->voxel));
     for (int i = 0; i <= steps; i++)
         least = fmin(least, (tracker_brightness(t, vec3_mix(x, c, (double)i / steps)) - outside) / fmax(inside - outside, 1e-12));
@@ -269,16 +275,15 @@ bool rbt_ends_add(RbtEnds *ends, const char *why, int seed)
     return true;
 }
 
-// Where a branch that comes from `axis` hangs: the node that its first one lies in or next to; of those near it the one whose link is brightest and straightest on.
-static int parent_of(const Tracker *t, const RbtPaint *paint, const RbtLimb *limb, const Cylinder *first)
+// Where a branch hangs: the node that its first one lies in, else the one that is attached to best.
+static int parent_of(const Tracker *t, const RbtPaint *paint, const Cylinder *first)
 {
     int inside = rbt_paint_node(paint, first->center);
-    (void)limb;
     return inside >= 0 && tracker_node_around(t, first->center, 1) >= 0 ? inside : tracker_attachment(t, first->center, t->tree.count);
 }
 
 // Appends back turned round, then out, without what lies inside other tubes. False: out of memory.
-static bool adopt(Tracker *t, RbtPaint *paint, const RbtLimb *limb, const Found *found, RbtEnds *ends)
+static bool adopt(Tracker *t, RbtPaint *paint, const Found *found, RbtEnds *ends)
 {
     int total = found->back.count - 1 + found->out.count, first = 0, last = total - 1, before = t->tree.count, number = ends->count;
     const TrackNode **node = malloc((size_t)total * sizeof *node);
@@ -304,7 +309,7 @@ static bool adopt(Tracker *t, RbtPaint *paint, const RbtLimb *limb, const Found 
         for (int i = first + 1; i <= last; i++)
             length += vec3_distance(node[i]->cylinder.center, node[i - 1]->cylinder.center);
         if (last >= seed && length >= fmax(3 * t->voxel, found->radius)) {
-            int parent = parent_of(t, paint, limb, &node[first]->cylinder);
+            int parent = parent_of(t, paint, &node[first]->cylinder);
             for (int i = first; good && i <= last; i++) {
                 TrackNode copy = *node[i];
                 if (i < found->back.count - 1)
@@ -366,7 +371,7 @@ static bool grow_round(Tracker *t, RbtPaint *paint, int first, int end, double s
         qsort(order, (size_t)count, sizeof(*order), compare_found);
         for (int i = 0; good && i < count; i++)
             if (order[i]->good)
-                good = (order[i]->is_sac ? adopt_sac : adopt)(t, paint, &limb[order[i]->limb], order[i], ends);
+                good = order[i]->is_sac ? adopt_sac(t, paint, &limb[order[i]->limb], order[i], ends) : adopt(t, paint, order[i], ends);
     }
     for (int i = 0; found && i < count; i++) {
         track_free(&found[i].out);

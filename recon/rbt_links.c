@@ -1,5 +1,5 @@
-// The way is the cheapest one over 26 neighbours, where a voxel costs its length over the cube of its brightness between background (0) and lumen (1), mean of its own and the spline's:
-// it keeps to the middle and crosses what is dim only where it must.
+// The way is the cheapest one over 26 neighbours, where a voxel costs its length over the cube of its brightness between background (0) and lumen
+// (1), mean of its own and the spline's: it keeps to the middle and crosses what is dim only where it must.
 #include "recon/rbt_links.h"
 #include "recon/bspline.h"
 #include "recon/way_heap.h"
@@ -68,8 +68,8 @@ static double voxel_value(const Volume *v, Vec3 voxel)
     return (double)v->value[((size_t)voxel.z * (size_t)v->size[1] + (size_t)voxel.y) * (size_t)v->size[0] + (size_t)voxel.x];
 }
 
-// From `start` to `end`, or with `paint` to the nearest tube of a node before `before` whose centre is in sight; the places to way[0 … count-1], start first, and
-// the node met. Returns the count, 0 where there is no way, -1 where memory lacks.
+// From `start` to `end`, or with `paint` to the nearest tube of a node before `before` whose centre is in sight; the places to way[0 … count-1],
+// start first, and the node met. Returns the count, 0 where there is no way, -1 where memory lacks.
 static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 start, Vec3 end, const Light *light, Vec3 *way, int *met)
 {
     const Volume *v = t->volume;
@@ -161,10 +161,12 @@ static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 
 }
 
 // Nodes along the way from the parent's centre to the child's: each as far on as it is seen from the one before, not further than half a radius.
-static bool insert_nodes(Tracker *t, Track *out, const TrackNode *parent, const TrackNode *child, const Vec3 *way, int count, int number, int parent_index, const Light *light)
+static bool insert_nodes(Tracker *t, Track *out, const TrackNode *parent, const TrackNode *child, const Vec3 *way, int count, int number,
+                         int parent_index, const Light *light)
 {
     Vec3 last = parent->cylinder.center;
-    double radius = child->kind == NODE_ANEURYSM ? fmin(parent->cylinder.radius, child->cylinder.radius) : child->cylinder.radius, spacing = fmax(0.7 * radius, t->voxel);
+    double radius = child->kind == NODE_ANEURYSM ? fmin(parent->cylinder.radius, child->cylinder.radius) : child->cylinder.radius,
+           spacing = fmax(0.7 * radius, t->voxel);
     for (int i = count - 1; i >= 0;) {   // the way runs from child to parent
         int next = i;
         while (next > 0 && vec3_distance(way[next - 1], last) <= spacing && darkest(t, last, way[next - 1], light) >= least_lit)
@@ -215,7 +217,8 @@ bool rbt_mend_links(Tracker *t, const RbtPaint *paint, int first, bool *is_joine
             }
             if (good && way_count > 0) {
                 int before = new.count;
-                good = insert_nodes(t, &new, &tree->node[parent], &node, way, way_count, node.branch, parent >= first ? first + place[parent - first] : parent, &light);
+                good = insert_nodes(t, &new, &tree->node[parent], &node, way, way_count, node.branch,
+                                    parent >= first ? first + place[parent - first] : parent, &light);
                 for (int k = before; k < new.count; k++)
                     if (new.node[k].parent == -2)
                         new.node[k].parent = first + k - 1;

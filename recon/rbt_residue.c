@@ -10,7 +10,10 @@
 
 // --- paint ---
 
-static size_t voxel_index(const Volume *v, const int at[3]) { return ((size_t)at[2] * (size_t)v->size[1] + (size_t)at[1]) * (size_t)v->size[0] + (size_t)at[0]; }
+static size_t voxel_index(const Volume *v, const int at[3])
+{
+    return ((size_t)at[2] * (size_t)v->size[1] + (size_t)at[1]) * (size_t)v->size[0] + (size_t)at[0];
+}
 
 RbtPaint *rbt_paint_create(const Volume *volume)
 {
@@ -70,7 +73,8 @@ static void paint_ball(RbtPaint *paint, const Track *tree, int node, Vec3 center
                 int32_t *owner = &paint->owner[voxel_index(v, at)];
                 if (*owner > 0) {
                     const Cylinder *other = &tree->node[*owner - 1].cylinder;
-                    if (vec3_norm2(vec3_sub(x, other->center)) / (other->radius * other->radius) <= vec3_norm2(vec3_sub(x, tree->node[node].cylinder.center)) / (radius * radius))
+                    if (vec3_norm2(vec3_sub(x, other->center)) / (other->radius * other->radius) <=
+                        vec3_norm2(vec3_sub(x, tree->node[node].cylinder.center)) / (radius * radius))
                         continue;
                 }
                 *owner = node + 1;
@@ -271,7 +275,8 @@ static Piece *cut_into_pieces(Flood *f, double thickness, int *piece_count)
             const Wet *w = &f->wet[here];
             p->count++;
             p->sum = vec3_add(p->sum, volume_point_of(f->volume, vec3(w->at[0], w->at[1], w->at[2])));
-            if (w->way > f->wet[p->farthest].way || (w->way == f->wet[p->farthest].way && voxel_index(f->volume, w->at) < voxel_index(f->volume, f->wet[p->farthest].at)))
+            if (w->way > f->wet[p->farthest].way ||
+                (w->way == f->wet[p->farthest].way && voxel_index(f->volume, w->at) < voxel_index(f->volume, f->wet[p->farthest].at)))
                 p->farthest = here;
             for (int n = 0; n < 27; n++) {
                 if (!neighbour_of(f->volume, w->at, n, next))
@@ -352,7 +357,12 @@ static RbtLimb *gather_limbs(const Flood *f, Piece *piece, int piece_count, cons
         }
         RbtLimb *l = &limb[used];
         const Border *b = &border[piece[leaf].node - first];
-        *l = (RbtLimb){.contact = piece[top].node, .level = b->level, .ceiling = b->ceiling, .depth = (double)f->wet[piece[leaf].farthest].way, .key = voxel_index(v, f->wet[piece[leaf].farthest].at), .stem = -1};
+        *l = (RbtLimb){.contact = piece[top].node,
+                       .level = b->level,
+                       .ceiling = b->ceiling,
+                       .depth = (double)f->wet[piece[leaf].farthest].way,
+                       .key = voxel_index(v, f->wet[piece[leaf].farthest].at),
+                       .stem = -1};
         l->is_cut = l->depth > b->reach - 2 * thickness;
         int above = piece[top].parent;
         if (above >= 0 && piece[above].limb >= 0) {

@@ -12,7 +12,8 @@
 
 static const double wider = 1.3;          // than the vessel beside it
 static const double least_closed = 0.7;   // share of the rays that meet a wall
-static const double least_lobe = 0.35;    // of a further centre's inscribed ball, radius and how far it sticks out of the others, share of the first one's radius
+// Of a further centre's inscribed ball, shares of the first one's radius: its radius, and how far it sticks out of the other balls.
+static const double least_lobe = 0.35;
 
 static int compare_doubles(const void *a, const void *b)
 {
@@ -118,8 +119,12 @@ bool rbt_is_sac(Tracker *t, const RbtPaint *paint, const RbtLimb *limb)
     if (good) {
         int kept = drop_painted(paint, e->point, met);
         const TrackNode *n = &t->tree.node[limb->contact];
-        e->node = (TrackNode){.cylinder = {center, radius, vec3_unit_or(vec3_sub(center, n->cylinder.center), n->cylinder.axis), 2 * radius}, .inlier_rate = (double)kept / rays,
-                              .contrast = n->contrast, .kind = NODE_ANEURYSM, .parent = -1, .point_count = kept};
+        e->node = (TrackNode){.cylinder = {center, radius, vec3_unit_or(vec3_sub(center, n->cylinder.center), n->cylinder.axis), 2 * radius},
+                              .inlier_rate = (double)kept / rays,
+                              .contrast = n->contrast,
+                              .kind = NODE_ANEURYSM,
+                              .parent = -1,
+                              .point_count = kept};
         good = kept >= rays / 4;
     }
     free(ray);
@@ -149,7 +154,8 @@ bool rbt_fill_sac(Tracker *t, const RbtPaint *paint, const RbtLimb *limb, Track 
         chosen[used++] = (Lobe){center, met > 0 ? sorted[met / 10] : 0};
         for (int i = 0; i < RAYS * STEPS; i++) {
             Lobe l = {.center = vec3_add_scaled(center, (0.8 - 0.2 * (i % STEPS)) * far[i / STEPS], coarse[i / STEPS])};
-            if (!(far[i / STEPS] > 0 && far[i / STEPS] < 1.5 * median) || tracker_node_around(t, l.center, 1) >= 0 || tracker_is_forbidden(t, l.center) || !is_lumen(t, limb, l.center))
+            if (!(far[i / STEPS] > 0 && far[i / STEPS] < 1.5 * median) || tracker_node_around(t, l.center, 1) >= 0 ||
+                tracker_is_forbidden(t, l.center) || !is_lumen(t, limb, l.center))
                 continue;
             met = see_walls(t, l.center, coarse, RAYS, reach, distance, sorted);
             if (met >= least_closed * RAYS && sorted[met / 10] >= fmax(least_lobe * chosen[0].inscribed, 2.5 * t->voxel)) {

@@ -270,7 +270,8 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     if (vec3_dot(move, last->cylinder.axis) < 0.25 * step)
         return false;
     for (int i = 0; i + 1 < branch->count; i++)
-        if (segment_distance(next->cylinder.center, branch->node[i].cylinder.center, branch->node[i + 1].cylinder.center) < p->back_step * last->cylinder.radius)
+        if (segment_distance(next->cylinder.center, branch->node[i].cylinder.center, branch->node[i + 1].cylinder.center) <
+            p->back_step * last->cylinder.radius)
             return false;
     t->why = "turns back";
     double way = vec3_norm(move), least = cos(p->turn_deg * PI / 180) - 1e-9;
@@ -283,7 +284,8 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     way = vec3_norm(move);
     for (int i = branch->count - 2; i >= 0; i--) {
         way += vec3_distance(branch->node[i].cylinder.center, branch->node[i + 1].cylinder.center);
-        if (way > 4 * last->cylinder.radius && vec3_distance(next->cylinder.center, branch->node[i].cylinder.center) < p->overlap * branch->node[i].cylinder.radius)
+        if (way > 4 * last->cylinder.radius &&
+            vec3_distance(next->cylinder.center, branch->node[i].cylinder.center) < p->overlap * branch->node[i].cylinder.radius)
             return false;
     }
     t->why = "the contrast is lost";
@@ -297,7 +299,8 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     if (t->is_guarded && branch->count >= 3 && (next->cylinder.radius > 1.8 * usual_radius(branch) || next->contrast > 1.8 * contrast))
         return false;
     t->why = "no vessel beyond";
-    if (is_retry && (fabs(next->cylinder.radius - last->cylinder.radius) > p->retry_radius * last->cylinder.radius || next->contrast < p->retry_contrast * contrast))
+    if (is_retry && (fabs(next->cylinder.radius - last->cylinder.radius) > p->retry_radius * last->cylinder.radius ||
+                     next->contrast < p->retry_contrast * contrast))
         return false;
     t->why = "runs into another branch";
     return may_overlap || tracker_node_around(t, next->cylinder.center, p->overlap) < 0;
@@ -394,7 +397,8 @@ static bool join_exit(Tracker *t, Track *branch, int keep, const RbtExit *exit, 
     const Cylinder last = branch->node[keep - 1].cylinder;
     Cylinder predicted = {exit->center[place], exit->radius, exit->direction[place], 0};
     Track back = {0};
-    if (tracker_node_around(t, exit->center[place], 1) >= 0 || !(tracker_estimate(t, &predicted, p->r_t) || (p->r_t_second > 0 && tracker_estimate(t, &predicted, p->r_t_second))))
+    if (tracker_node_around(t, exit->center[place], 1) >= 0 ||
+        !(tracker_estimate(t, &predicted, p->r_t) || (p->r_t_second > 0 && tracker_estimate(t, &predicted, p->r_t_second))))
         return false;
     if (t->estimate.node.contrast < p->retry_contrast * recent_contrast(branch) || tracker_node_around(t, t->estimate.node.cylinder.center, p->overlap) >= 0)
         return false;
@@ -620,8 +624,8 @@ static void say_start(Tracker *t, const RbtSeed *seed, const Cylinder *start, co
         snprintf(radius, sizeof radius, ", radius %.2f mm", start->radius);
     if (!seed->has_toward)
         snprintf(direction, sizeof direction, ", direction (%.2f, %.2f, %.2f)", start->axis.x, start->axis.y, start->axis.z);
-    snprintf(t->start, sizeof t->start, "first start estimated: middle (%.2f, %.2f, %.2f) mm, %.2f mm from the click%s%s; %s", start->center.x, start->center.y, start->center.z,
-             vec3_distance(start->center, seed->start), radius, direction, root);
+    snprintf(t->start, sizeof t->start, "first start estimated: middle (%.2f, %.2f, %.2f) mm, %.2f mm from the click%s%s; %s", start->center.x,
+             start->center.y, start->center.z, vec3_distance(start->center, seed->start), radius, direction, root);
 }
 
 // Nodes of `way` up to where it meets `other`, which starts at the same place: a ring of vessels closes there.
@@ -920,7 +924,8 @@ static int make_hub(Tracker *t, const SacJob *job, const TrackNode *sac, int sac
             grown = false;
             if (follows(tree, lo) && power_of(&hub, tree->node[lo - 1].cylinder.center) < -pow(tree->node[lo - 1].cylinder.radius, 2))
                 grown = true, lo--;
-            if (hi + 1 < tree->count && follows(tree, hi + 1) && power_of(&hub, tree->node[hi + 1].cylinder.center) < -pow(tree->node[hi + 1].cylinder.radius, 2))
+            if (hi + 1 < tree->count && follows(tree, hi + 1) &&
+                power_of(&hub, tree->node[hi + 1].cylinder.center) < -pow(tree->node[hi + 1].cylinder.radius, 2))
                 grown = true, hi++;
             if (!grown) {
                 Vec3 from = tree->node[lo].cylinder.center, to = tree->node[hi].cylinder.center;
@@ -966,12 +971,18 @@ bool track_aneurysm(Tracker *t, const RbtAneurysm *aneurysm, const Vec3 *center,
         double radius;
         good = count >= rays / 8 && sphere_fit(own, count, &middle, &radius);
         if (!good) {
-            faults_add(faults, path, aneurysm->line, aneurysm->column, "centre %d of the aneurysm sees no wall around it (%d of %d rays within %g mm); a point well "
-                       "inside the sac, or a longer aneurysm_reach_mm", i + 1, count, rays, t->parameters->aneurysm_reach_mm);
+            faults_add(faults, path, aneurysm->line, aneurysm->column,
+                       "centre %d of the aneurysm sees no wall around it (%d of %d rays within %g mm); a point well "
+                       "inside the sac, or a longer aneurysm_reach_mm",
+                       i + 1, count, rays, t->parameters->aneurysm_reach_mm);
             break;
         }
-        sac[i] = (TrackNode){.cylinder = {center[i], radius, {1, 0, 0}, 2 * radius}, .inlier_rate = (double)count / rays, .kind = NODE_ANEURYSM, .branch = number,
-                             .point_count = count, .parent = -1};
+        sac[i] = (TrackNode){.cylinder = {center[i], radius, {1, 0, 0}, 2 * radius},
+                             .inlier_rate = (double)count / rays,
+                             .kind = NODE_ANEURYSM,
+                             .branch = number,
+                             .point_count = count,
+                             .parent = -1};
     }
     for (int i = 0; good && i < n; i++) {
         Vec3 *own = point + (size_t)i * MAX_RAYS;
@@ -1042,13 +1053,15 @@ static bool check_point(const Tracker *t, Vec3 x, const char *what, int line, in
     Vec3 v = volume_voxel_of(t->volume, x);
     const int *size = t->volume->size;
     if (!tracker_is_inside(t->volume, x)) {
-        faults_add(faults, path, line, column, "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies outside the volume; voxels (0, 0, 0) to (%d, %d, %d)", what, x.x, x.y,
-                   x.z, v.x, v.y, v.z, size[0] - 1, size[1] - 1, size[2] - 1);
+        faults_add(faults, path, line, column,
+                   "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies outside the volume; voxels (0, 0, 0) to (%d, %d, %d)", what, x.x, x.y, x.z,
+                   v.x, v.y, v.z, size[0] - 1, size[1] - 1, size[2] - 1);
         return false;
     }
     double value = tracker_brightness(t, x), low = (double)t->volume->minimum, high = (double)t->volume->maximum;
     if (!(high > low) || value < fmax(low + 0.1 * (high - low), t->dark)) {
-        faults_add(faults, path, line, column, "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies on background (%g in a volume of %g to %g); a point inside a vessel, above %g",
+        faults_add(faults, path, line, column,
+                   "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies on background (%g in a volume of %g to %g); a point inside a vessel, above %g",
                    what, x.x, x.y, x.z, v.x, v.y, v.z, value, low, high, fmax(low + 0.1 * (high - low), t->dark));
         return false;
     }
@@ -1067,12 +1080,14 @@ static bool check_seed(const Tracker *t, RbtSeed *seed, int number, const char *
     if (tracker_is_forbidden(t, seed->start))
         faults_add(faults, path, seed->line, seed->column, "the start of branch %d lies in a region of `forbid`; a start outside of it", number + 1);
     if (seed->has_toward && !(vec3_distance(seed->start, seed->toward) > 1e-6 * t->voxel))
-        faults_add(faults, path, seed->line, seed->column, "the start of branch %d and its toward are the same point; toward is a point further down the vessel", number + 1);
+        faults_add(faults, path, seed->line, seed->column,
+                   "the start of branch %d and its toward are the same point; toward is a point further down the vessel", number + 1);
     double extent = 0;
     for (int i = 0; i < 3; i++)
         extent = fmax(extent, vec3_norm(t->volume->axis[i]) * t->volume->size[i]);
     if (seed->radius > extent / 2)
-        faults_add(faults, path, seed->line, seed->column, "the radius %g mm of branch %d is larger than the volume; at most %g mm", seed->radius, number + 1, extent / 2);
+        faults_add(faults, path, seed->line, seed->column, "the radius %g mm of branch %d is larger than the volume; at most %g mm", seed->radius,
+                   number + 1, extent / 2);
     return faults->count == before;
 }
 
@@ -1134,8 +1149,10 @@ static bool run_seed(Tracker *t, const Job *job, int i)
         return true;
     if (t->out_of_memory)
         return out_of_memory_at(job, i);
-    faults_add(job->faults, job->path, job->seed[i].line, job->seed[i].column, "nothing could be tracked from the start of branch %d (%s); a point well inside the vessel, "
-               "about its true radius and direction", i + 1, t->why);
+    faults_add(job->faults, job->path, job->seed[i].line, job->seed[i].column,
+               "nothing could be tracked from the start of branch %d (%s); a point well inside the vessel, "
+               "about its true radius and direction",
+               i + 1, t->why);
     return false;
 }
 
@@ -1256,7 +1273,8 @@ static bool track_automatic(Tracker *t, const Job *job, RbtEnds *ends)
         good = run_seed(t, job, i);
         for (int k = first; good && k < t->tree.count; k++)
             t->tree.node[k].branch = ends->count;
-        good = good && ((rbt_ends_add(ends, t->why, i) && rbt_mend_links(t, paint, first, &is_joined)) || out_of_memory_at(job, i)) && grow(t, job, paint, first, ends);
+        good = good && ((rbt_ends_add(ends, t->why, i) && rbt_mend_links(t, paint, first, &is_joined)) || out_of_memory_at(job, i)) &&
+               grow(t, job, paint, first, ends);
     }
     t->paint = NULL;
     rbt_paint_free(paint);
@@ -1290,8 +1308,8 @@ static bool track_all(Tracker *t, const Job *job, RbtReport *report)
     return good;
 }
 
-VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, const RbtSeed *given, int seed_count, const RbtAneurysm *aneurysm, int aneurysm_count,
-                      int threads, const Progress *progress, RbtReport *report, const char *path, Faults *faults)
+VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, const RbtSeed *given, int seed_count, const RbtAneurysm *aneurysm,
+                      int aneurysm_count, int threads, const Progress *progress, RbtReport *report, const char *path, Faults *faults)
 {
     Tracker *t = calloc(1, sizeof *t);
     RbtSeed *seed = malloc((size_t)(seed_count > 0 ? seed_count : 1) * sizeof *seed);

@@ -279,7 +279,9 @@ static void read_parameter(const Walk *w, const char *key, const yaml_node_t *va
         }
         return;
     }
-    FAULT(w, value, "'%.40s' is no key of a trace; branches, aneurysms, forbid, cut, parameters (default or paper), or a parameter that `segment --help` lists", key);
+    FAULT(w, value,
+          "'%.40s' is no key of a trace; branches, aneurysms, forbid, cut, parameters (default or paper), or a parameter that `segment --help` lists",
+          key);
 }
 
 static void read_root(const Walk *w, const yaml_node_t *root, Trace *trace)

@@ -502,7 +502,8 @@ static void a_click_is_enough(void **state)
             half.radius = given == 0 ? 0 : 1.1;
             tree = rbt_track(p.volume, &parameters, &half, 1, NULL, 0, 1, NULL, &report, "t.yaml", &faults);
             assert_non_null(tree);
-            assert_true(given ? strstr(report.start, "direction") && !strstr(report.start, "radius") : strstr(report.start, "radius") && !strstr(report.start, "direction"));
+            assert_true(given ? strstr(report.start, "direction") && !strstr(report.start, "radius")
+                              : strstr(report.start, "radius") && !strstr(report.start, "direction"));
             if (given == 0)   // the end that way is a hemisphere
                 assert_true(vec3_distance(tree->center[0], helix(middle)) < 0.5 && vec3_distance(tree->center[tree->node_count - 1], helix(0)) < 3);
             rbt_report_free(&report);
