@@ -14,7 +14,8 @@
 #include <string.h>
 
 enum { CANDIDATES = 12, LEAST_POINTS = 8, PASSES = 4, CHUNK = 256 };
-static const double POINTS_MAX = 4e6, SEEN_REACH = 2.5, REACH = 2, AGREES = 0.05, NEARLY = 0.3, PULLED = 1.6, SHARP_COSINE = 0.5, ASIDE = 1.3, STEEP = 0.5;   // reaches in radii
+static const double POINTS_MAX = 4e6, SEEN_REACH = 2.5, REACH = 2, ASIDE = 1.3,   // reaches in radii
+                    AGREES = 0.05, NEARLY = 0.1, PULLED = 1.6, STEEP = 0.5, SHARP_COSINE = 0.5;
 
 ImportOptions import_default_options(void) { return (ImportOptions){.spacing = 0.5, .points_per_node = 108}; }
 
