@@ -22,13 +22,25 @@ static double inside_share(const SurfaceMesh *mesh, const CurveSet *set, double 
     return (double)inside / count;
 }
 
+static double extent(const Vec3 *point, int count)
+{
+    Vec3 low = point[0], high = point[0];
+    for (int i = 1; i < count; i++) {
+        low = vec3(fmin(low.x, point[i].x), fmin(low.y, point[i].y), fmin(low.z, point[i].z));
+        high = vec3(fmax(high.x, point[i].x), fmax(high.y, point[i].y), fmax(high.z, point[i].z));
+    }
+    return vec3_distance(low, high);
+}
+
 bool import_place_curves(const SurfaceMesh *mesh, double scale, CurveSet *set, ImportReport *report, const char *name, Faults *faults)
 {
     const double frame[4][2] = {{1, 1}, {-1, 1}, {1, scale}, {-1, scale}};
     int best = 0;
     double most = -1;
+    // curves of another unit are a speck that may well lie inside
+    double least_extent = 0.01 * extent(mesh->vertex, mesh->vertex_count), curves = extent(set->point, set->point_count);
     for (int f = 0; f < (scale != 1 ? 4 : 2); f++) {
-        double share = inside_share(mesh, set, frame[f][0], frame[f][1]);
+        double share = curves * frame[f][1] < least_extent ? 0 : inside_share(mesh, set, frame[f][0], frame[f][1]);
         // as they stand, unless that is clearly wrong
         if (share > most + (f ? 0.25 : 0)) {
             most = share;
@@ -119,6 +131,8 @@ static bool back_into_lumen(const SurfaceMesh *mesh, const MeshTree *tree, Vec3 
     if (!isfinite(off) || fabs(vec3_dot(vec3_sub(foot, *p), tangent)) > 0.7 * off)
         return false;
     Vec3 inward = vec3_negate(normal_of(mesh, t));
+    if (fabs(vec3_dot(inward, tangent)) > 0.7)   // it stands on a lid
+        return false;
     double chord = mesh_tree_ray(tree, vec3_add_scaled(foot, 1e-4 * radius, inward), inward, 4 * radius, NULL);
     if (!isfinite(chord))
         return false;
