@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { WAVE = 8 };          // limbs that are tracked at the same time; the tree depends on it, not on the threads
 static const double least_tube = 0.7;   // mean inlier rate of a branch, as a share of the first one's
 
 typedef struct Found {       // what became of a limb
@@ -229,7 +230,7 @@ static void track_limb(void *context, long index)
         found->radius = t->estimate.node.cylinder.radius;
         found->why = "aneurysm";
         found->good = track_append(&found->out, &t->estimate.node, t->estimate.point) && rbt_fill_sac(t, round->paint, limb, &found->out);
-    } else if (seed_on_limb(t, limb, round->share, &seed)) {
+    } else if (seed_on_limb(t, limb, round->share, &seed) && rbt_paint_node(round->paint, seed.center) < 0) {
         found->why = "does not lead back to its parent";
         Cylinder behind = seed;
         behind.axis = vec3_negate(behind.axis);
@@ -354,31 +355,44 @@ static bool adopt_sac(Tracker *t, RbtPaint *paint, const RbtLimb *limb, const Fo
     return true;
 }
 
+// Wider ones first: what narrower ones find is then seen to be tracked.
+static int compare_limbs(const void *a, const void *b)
+{
+    const RbtLimb *x = a, *y = b;
+    double rx = x->radius[x->count / 2], ry = y->radius[y->count / 2];
+    return rx != ry ? (rx < ry) - (rx > ry) : (x->key > y->key) - (x->key < y->key);
+}
+
+// Limbs first … first+count-1 of a round at the same time. False: out of memory.
+static bool grow_wave(Tracker *t, RbtPaint *paint, const RbtLimb *limb, int count, double share, double noise, int threads, RbtEnds *ends)
+{
+    Found found[WAVE] = {0}, *order[WAVE];
+    bool good = true;
+    Round round = {t, paint, limb, found, share, noise};
+    parallel_for(threads, count, track_limb, &round, NULL);
+    for (int i = 0; i < count; i++)
+        order[i] = &found[i];
+    qsort(order, (size_t)count, sizeof(*order), compare_found);
+    for (int i = 0; good && i < count; i++)
+        if (order[i]->good)
+            good = order[i]->is_sac ? adopt_sac(t, paint, &limb[order[i]->limb], order[i], ends) : adopt(t, paint, order[i], ends);
+    for (int i = 0; i < count; i++) {
+        track_free(&found[i].out);
+        track_free(&found[i].back);
+    }
+    return good;
+}
+
 // One round over branches whose nodes are first … end-1. False: out of memory.
 static bool grow_round(Tracker *t, RbtPaint *paint, int first, int end, double share, double noise, int threads, RbtEnds *ends)
 {
     int count = 0;
     RbtLimb *limb = rbt_find_limbs(t, paint, first, end, share, noise, &count);
-    if (count < 0)
-        return false;
-    Found *found = calloc((size_t)count + 1, sizeof *found), **order = malloc(((size_t)count + 1) * sizeof *order);
-    bool good = found && order;
-    if (good) {
-        Round round = {t, paint, limb, found, share, noise};
-        parallel_for(threads, count, track_limb, &round, NULL);
-        for (int i = 0; i < count; i++)
-            order[i] = &found[i];
-        qsort(order, (size_t)count, sizeof(*order), compare_found);
-        for (int i = 0; good && i < count; i++)
-            if (order[i]->good)
-                good = order[i]->is_sac ? adopt_sac(t, paint, &limb[order[i]->limb], order[i], ends) : adopt(t, paint, order[i], ends);
-    }
-    for (int i = 0; found && i < count; i++) {
-        track_free(&found[i].out);
-        track_free(&found[i].back);
-    }
-    free(found);
-    free(order);
+    bool good = count >= 0;
+    if (count > 0)
+        qsort(limb, (size_t)count, sizeof *limb, compare_limbs);
+    for (int i = 0; good && i < count; i += WAVE)
+        good = grow_wave(t, paint, limb + i, count - i < WAVE ? count - i : WAVE, share, noise, threads, ends);
     free(limb);
     return good;
 }

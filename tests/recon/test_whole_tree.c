@@ -236,9 +236,52 @@ static void a_sac_is_found(void **state)
                 assert_true(tree->point_offset[node + 1] - tree->point_offset[node] > 300);
             }
         assert_int_equal(sacs, wanted);
+        int centers = 0;
+        for (int i = 0; i < tree->node_count; i++)
+            centers += tree->kind[i] == NODE_ANEURYSM;
+        assert_int_equal(centers, wanted);   // a ball has one centre
         rbt_report_free(&report);
         vessel_tree_free(tree);
     }
+    volume_free(v);
+}
+
+// A sac with a lobe is one sac of several centres, one of them in the lobe; each stands in the lumen and has the walls around it.
+static void a_lobed_sac_has_several_centers(void **state)
+{
+    (void)state;
+    Volume *v = dark_volume(110, 80, 130, 0.2);
+    Vec3 sac = {11.4, 7, 13}, lobe = {13.4, 10.6, 14.5};
+    add_tube(v, vec3(7, 7, -2), vec3(7, 7, 25), 1);
+    add_ball(v, sac, 3.6, 1);
+    add_ball(v, lobe, 2.4, 1);
+    add_noise(v, 0.05);
+    RbtSeed seed = {.start = {7, 7, 2}, .toward = {7, 7, 4}, .has_toward = true, .radius = 1};
+    RbtParameters p = automatic();
+    RbtReport report = {0};
+    VesselTree *tree = track(v, &p, &seed, 1, 0, &report);
+    assert_non_null(tree);
+    int sacs = 0, centers = 0;
+    double nearest = HUGE_VAL;
+    for (int i = 0; i < report.branch_count; i++)
+        sacs += report.branch[i].is_aneurysm;
+    for (int i = 0; i < tree->node_count; i++) {
+        Vec3 c = tree->center[i];
+        if (tree->kind[i] != NODE_ANEURYSM)
+            continue;
+        centers++;
+        nearest = fmin(nearest, vec3_distance(c, lobe));
+        assert_true(vec3_distance(c, sac) < 3.2 || vec3_distance(c, lobe) < 2);
+        int on_wall = 0, points = (int)(tree->point_offset[i + 1] - tree->point_offset[i]);
+        for (int64_t k = tree->point_offset[i]; k < tree->point_offset[i + 1]; k++)
+            on_wall += fabs(fmin(vec3_distance(tree->point[k], sac) - 3.6, vec3_distance(tree->point[k], lobe) - 2.4)) < 0.3;
+        assert_true(points > 160 && on_wall > 0.9 * points);
+    }
+    print_message("lobed sac: %d centres, the nearest %.2f mm from the lobe's middle\n", centers, nearest);
+    assert_int_equal(sacs, 1);
+    assert_true(centers >= 2 && nearest < 1.2);
+    rbt_report_free(&report);
+    vessel_tree_free(tree);
     volume_free(v);
 }
 
@@ -393,7 +436,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_branch_from_one_start), cmocka_unit_test(kissing_vessel_is_refused), cmocka_unit_test(dense_and_near_neighbours_are_refused),
-        cmocka_unit_test(a_sac_is_found),
+        cmocka_unit_test(a_sac_is_found), cmocka_unit_test(a_lobed_sac_has_several_centers),
         cmocka_unit_test(a_click_anywhere),
         cmocka_unit_test(corrections_leave_the_rest), cmocka_unit_test(the_same_for_any_number_of_threads),
     };
