@@ -24,15 +24,18 @@ typedef struct LimKernels {
     void (*sum)(LimPoints *, const LimBlob *, int, double);
     void (*taubin)(const LimPoints *, float *);
     void (*approach)(LimPoints *, float, float);
+    void (*feet)(LimPoints *, float, float *, float *);
     void (*moving_energy)(const LimPoints *, const LimBlob *, float (*)[LIM_LANES]);
     void (*total_energy)(const LimPoints *, float (*)[LIM_LANES]);
     void (*residuals)(const LimPoints *, float, float *);
     void (*columns)(const LimPoints *, const LimBlob *, float, float *);
-    void (*gram)(const float *, const float *, size_t, int, float (*)[4][LIM_LANES]);
+    void (*gram)(const float *, const float *, size_t, int, double *, size_t);
     void (*dot_lanes)(const float *, const float *, int, float *);
+    bool (*solve)(double *, int, int, double *);
 } LimKernels;
 #define KERNEL_TABLE(isa) \
-    {add_##isa, sum_##isa, taubin_##isa, approach_##isa, moving_energy_##isa, total_energy_##isa, residuals_##isa, columns_##isa, gram_##isa, dot_lanes_##isa}
+    {add_##isa, sum_##isa, taubin_##isa, approach_##isa, feet_##isa, moving_energy_##isa, total_energy_##isa, residuals_##isa, columns_##isa, gram_##isa, \
+     dot_lanes_##isa, solve_##isa}
 
 #define TARGET
 #define KERNEL(name) name##_baseline
@@ -104,6 +107,8 @@ void lim_points_taubin(const LimPoints *points, float *distance) { kernels()->ta
 
 void lim_points_approach(LimPoints *points, double longest, double slide) { kernels()->approach(points, (float)longest, (float)slide); }
 
+void lim_points_feet(LimPoints *points, double radius, float *offset, float *slope) { kernels()->feet(points, (float)radius, offset, slope); }
+
 // Adds the lanes of an accumulator, in double, by halves: always in this order.
 static double add_lanes(const float *lane)
 {
@@ -151,12 +156,10 @@ double lim_energy_dot(const float *a, const float *b, int padded)
 
 void lim_energy_gram(const float *rows, const float *columns, size_t stride, int length, double *dot, size_t dot_stride)
 {
-    float lane[4][4][LIM_LANES];
-    kernels()->gram(rows, columns, stride, length, lane);
-    for (int m = 0; m < 4; m++)
-        for (int k = 0; k < 4; k++)
-            dot[(size_t)m * dot_stride + (size_t)k] = add_lanes(lane[m][k]);
+    kernels()->gram(rows, columns, stride, length, dot, dot_stride);
 }
+
+bool lim_solve(double *factor, int size, int stride, double *step) { return kernels()->solve(factor, size, stride, step); }
 
 double lim_cohesion(const LimBlob *blobs, int count, int j, double s, double slope[4])
 {

@@ -51,6 +51,11 @@ void lim_points_taubin(const LimPoints *points, float *distance);
 // times the way to `given` in the tangent plane. The sums are then to be made again.
 void lim_points_approach(LimPoints *points, double longest, double slide);
 
+// After that, with the sums made: offset (padded), the signed distance of `given` from the foot, > 0 inside, 0 where no foot was found (further than 0.6
+// radii, aside of the normal, or off the surface by more than 0.05 radii); slope (padded), |grad f| at the foot, -1 where none was found; sets
+// low = high = -offset slope. The guards' bounds are to be set again.
+void lim_points_feet(LimPoints *points, double radius, float *offset, float *slope);
+
 // With `blob` on top of the sums.
 LimEnergy lim_energy(const LimPoints *points, const LimBlob *blob);
 // E_d and E_a of the sums as they are.
@@ -63,6 +68,9 @@ void lim_energy_residuals(const LimPoints *points, double beta, float *residual)
 // Dot products of four rows with four columns that stand `stride` apart, all of `length` entries, a multiple of LIM_LANES: dot (4, dot_stride), the
 // first four of each row are set.
 void lim_energy_gram(const float *rows, const float *columns, size_t stride, int length, double *dot, size_t dot_stride);
+// Solves by Cholesky: the matrix's upper triangle in factor (size, stride), lost; step (size): in the right-hand side, out the solution. False where it
+// is not positive definite.
+bool lim_solve(double *factor, int size, int stride, double *step);
 // Dot product of two columns of `padded` entries.
 double lim_energy_dot(const float *a, const float *b, int padded);
 

@@ -42,7 +42,6 @@ typedef struct Fit {
     double beta, target;     // of E_a at the moment; t_g [mm]
     int pair_count, pair[NOISE_PAIRS][2];   // of neighbouring data: what their distances differ by is noise, not misfit
     double noise2;           // variance of the noise, from these pairs [mm^2]
-    double mean_slope;       // mean |grad f| at the data
     double alpha;            // weight of E_c at the moment
     double reach;            // no blob's centre goes further from the node [mm]
     float *distance;         // (padded) of the data
@@ -158,16 +157,15 @@ static void fit_refresh_sums(Fit *fit)
     lim_points_sum(&fit->points, fit->model.blob, fit->model.count, fit->options->iso_level);
 }
 
-// The slope between the data and the surface, |g| - d/2 f_nn with d = f / |g|, squared: the slope at the point itself is smaller outside, where it
+// The slope between the data and the surface, |g| - d/2 f_nn with d = f / |g|: the slope at the point itself is smaller outside, where it
 // would weigh noise more than inside; that made vessels 0.03 mm too wide at 0.1 mm of noise.
-static double between_slope2(const LimPoints *points, int i)
+static double between_slope(const LimPoints *points, int i)
 {
     double gx = (double)points->g[0][i], gy = (double)points->g[1][i], gz = (double)points->g[2][i], g2 = gx * gx + gy * gy + gz * gz + 1e-12;
     double bend = (double)points->h[0][i] * gx * gx + (double)points->h[3][i] * gy * gy + (double)points->h[5][i] * gz * gz +
                   2 * ((double)points->h[1][i] * gx * gy + (double)points->h[2][i] * gx * gz + (double)points->h[4][i] * gy * gz);
     double slope = sqrt(g2), between = slope - 0.5 * (double)points->f[i] / slope * bend / g2;
-    slope = fmin(fmax(between, 0.4 * slope), 2.5 * slope);
-    return slope * slope;
+    return fmin(fmax(between, 0.4 * slope), 2.5 * slope);
 }
 
 // Moves the data to their feet on the surface as it is, and bounds each so that its residual is its distance times the slope there: then least
@@ -191,22 +189,14 @@ static void find_feet(Fit *fit, bool afresh)
             memcpy(at[k] + data, points->given[k] + data, (size_t)(points->padded - data) * sizeof(float));
     }
     fit_refresh_sums(fit);
-    for (int i = 0; i < data; i++) {
-        double gx = (double)points->g[0][i], gy = (double)points->g[1][i], gz = (double)points->g[2][i];
-        double wx = (double)(points->given[0][i] - points->x[i]), wy = (double)(points->given[1][i] - points->y[i]),
-               wz = (double)(points->given[2][i] - points->z[i]), slope = sqrt(gx * gx + gy * gy + gz * gz + 1e-16);
-        double along = (wx * gx + wy * gy + wz * gz) / slope, side2 = wx * wx + wy * wy + wz * wz - along * along;
-        bool found = fabs(along) < 0.6 * radius && side2 < pow(0.02 * radius + 0.3 * fabs(along), 2) && fabs((double)points->f[i]) < 0.05 * radius * slope;
-        fit->offset[i] = found ? (float)along : 0;
-        points->low[i] = points->high[i] = found ? (float)(-along * slope) : 0;
-        fit->residual[i] = found ? (float)(slope * slope) : -1;
-        if (!found) {
+    lim_points_feet(points, radius, fit->offset, fit->residual);
+    for (int i = 0; i < data; i++)
+        if (fit->residual[i] < 0) {
             points->x[i] = points->given[0][i];
             points->y[i] = points->given[1][i];
             points->z[i] = points->given[2][i];
             any_lost = true;
         }
-    }
     if (any_lost)
         fit_refresh_sums(fit);
 }
@@ -227,18 +217,22 @@ static void fit_refresh_weights(Fit *fit, bool afresh)
     double mean2 = 0, mean = 0, square = 0;
     if (fit->uses_feet)
         find_feet(fit, afresh);
-    for (int i = 0; i < data; i++) {
-        double slope2 = fit->uses_feet && fit->residual[i] >= 0 ? (double)fit->residual[i] : between_slope2(points, i);
-        fit->residual[i] = (float)slope2;
-        mean2 += slope2 / data;
-        mean += sqrt(slope2) / data;
+    for (int i = 0; i < data; i++) {   // residual: slopes
+        if (!fit->uses_feet || fit->residual[i] < 0)
+            fit->residual[i] = (float)between_slope(points, i);
+        mean2 += (double)fit->residual[i] * (double)fit->residual[i];
+        mean += (double)fit->residual[i];
     }
-    fit->mean_slope = mean;
-    if (fit->options->weigh_distance)
+    mean2 /= data;
+    mean /= data;
+    if (fit->options->weigh_distance) {
+        float usual = (float)mean2, least = 1e-3f * usual + 1e-30f, share = 1 / (float)data;
         for (int i = 0; i < data; i++) {
-            double ratio = mean2 / fmax((double)fit->residual[i], 1e-3 * mean2 + 1e-30);
-            points->weight[i] = (float)(fmin(fmax(ratio, 0.2), 5) / data);
+            float slope2 = fit->residual[i] * fit->residual[i], ratio = usual / (slope2 > least ? slope2 : least);
+            ratio = ratio > 0.2f ? ratio : 0.2f;
+            points->weight[i] = (ratio < 5 ? ratio : 5) * share;
         }
+    }
     if (fit->uses_feet) {
         for (int k = 0; k < fit->pair_count; k++) {
             double differ = data_distance(fit, fit->pair[k][0]) - data_distance(fit, fit->pair[k][1]);
@@ -469,28 +463,7 @@ static bool solve_damped(Fit *fit, int size, double lambda, const double *side, 
         u[a * SWEEP_SIZE + a] += lambda * (u[a * SWEEP_SIZE + a] + 1e-6 * floor);
         step[a] = side[a];
     }
-    for (int k = 0; k < size; k++) {
-        double *restrict row = u + k * SWEEP_SIZE;
-        if (!(row[k] > 0))
-            return false;
-        double scale = 1 / sqrt(row[k]);
-        for (int b = k; b < size; b++)
-            row[b] *= scale;
-        step[k] *= scale;
-        for (int a = k + 1; a < size; a++) {
-            double *restrict to = u + a * SWEEP_SIZE, by = row[a];
-            for (int b = a; b < size; b++)
-                to[b] -= by * row[b];
-            step[a] -= by * step[k];
-        }
-    }
-    for (int a = size - 1; a >= 0; a--) {
-        double sum = step[a];
-        for (int k = a + 1; k < size; k++)
-            sum -= u[a * SWEEP_SIZE + k] * step[k];
-        step[a] = sum / u[a * SWEEP_SIZE + a];
-    }
-    return true;
+    return lim_solve(u, size, SWEEP_SIZE, step);
 }
 
 // Improves the blobs `which` together; the sums hold all blobs before and after.

@@ -204,12 +204,53 @@ static void feet_are_on_the_surface(void **state)
         lim_points_sum(&c.points, &ball, 1, ISO_LEVEL);
         lim_points_approach(&c.points, 0.4, 0.7);
     }
+    float *offset = calloc(2 * (size_t)c.points.padded, sizeof *offset), *slope = offset + c.points.padded;
+    lim_points_sum(&c.points, &ball, 1, ISO_LEVEL);
+    lim_points_feet(&c.points, radius, offset, slope);
     for (int i = 0; i < POINTS; i++) {
         Vec3 center = vec3(0.1, -0.2, 0.05), p = vec3((double)c.points.given[0][i], (double)c.points.given[1][i], (double)c.points.given[2][i]);
         Vec3 foot = vec3_add_scaled(center, radius, vec3_unit(vec3_sub(p, center)));
         assert_true(vec3_distance(foot, vec3((double)c.points.x[i], (double)c.points.y[i], (double)c.points.z[i])) < 1e-4);
+        double inside = radius - vec3_distance(p, center);
+        if (fabs(inside) > 0.59)   // too far: no foot
+            continue;
+        assert_true(fabs((double)offset[i] - inside) < 1e-4 && slope[i] > 0);
+        assert_true(fabsf(c.points.low[i] + offset[i] * slope[i]) < 1e-6f && c.points.high[i] == c.points.low[i]);
     }
+    c.points.given[0][3] += 2;
+    lim_points_feet(&c.points, radius, offset, slope);
+    assert_true(slope[3] == -1 && offset[3] == 0 && c.points.low[3] == 0);
+    free(offset);
     lim_points_free(&c.points);
+}
+
+// A system of 20 unknowns, against the product of its matrix with the solution.
+static void solve_one(double solution[20])
+{
+    enum { SIZE = 20, STRIDE = 23 };
+    double matrix[SIZE][SIZE], factor[SIZE * STRIDE], side[SIZE], wide[SIZE][SIZE];
+    uint64_t state = 5;
+    for (int i = 0; i < SIZE; i++) {
+        side[i] = solution[i] = next_uniform(&state) - 0.5;
+        for (int k = 0; k < SIZE; k++)
+            wide[i][k] = next_uniform(&state) - 0.5;
+    }
+    for (int i = 0; i < SIZE; i++)
+        for (int k = 0; k < SIZE; k++) {
+            matrix[i][k] = i == k ? 0.1 : 0;
+            for (int m = 0; m < SIZE; m++)
+                matrix[i][k] += wide[i][m] * wide[k][m];
+            factor[i * STRIDE + k] = k < i ? NAN : matrix[i][k];   // the lower triangle is not read
+        }
+    assert_true(lim_solve(factor, SIZE, STRIDE, solution));
+    for (int i = 0; i < SIZE; i++) {
+        double sum = 0;
+        for (int k = 0; k < SIZE; k++)
+            sum += matrix[i][k] * solution[k];
+        assert_true(fabs(sum - side[i]) < 1e-12);
+    }
+    factor[0] = -1;
+    assert_false(lim_solve(factor, SIZE, STRIDE, side));
 }
 
 // One kernel text, three compilations: the same bits from each that the machine has.
@@ -218,7 +259,7 @@ static void every_instruction_set_gives_the_same_bits(void **state)
     (void)state;
     SimdLevel before = simd_level();
     LimEnergy energy[SIMD_COUNT];
-    double total[SIMD_COUNT][2], gram[SIMD_COUNT][16];
+    double total[SIMD_COUNT][2], gram[SIMD_COUNT][16], solved[SIMD_COUNT][20];
     float *column[SIMD_COUNT], *sums[SIMD_COUNT];
     size_t columns_size = 0, sums_size = 0;
     memset(energy, 0, sizeof energy);
@@ -228,7 +269,7 @@ static void every_instruction_set_gives_the_same_bits(void **state)
         make_case(&c, 11);
         int both = 2 * c.points.padded;
         columns_size = (size_t)(4 * both) * sizeof(float);
-        sums_size = (size_t)(3 * both) * sizeof(float);
+        sums_size = (size_t)(4 * both) * sizeof(float);
         column[isa] = calloc(1, columns_size);
         sums[isa] = calloc(1, sums_size);
         sums_without(&c, 2);
@@ -242,6 +283,8 @@ static void every_instruction_set_gives_the_same_bits(void **state)
         lim_points_approach(&c.points, 0.4, 0.7);
         memcpy(sums[isa] + both + c.points.padded, c.points.y, (size_t)c.points.padded * sizeof(float));
         lim_points_taubin(&c.points, sums[isa] + 2 * both);
+        lim_points_feet(&c.points, 1, sums[isa] + 3 * both, sums[isa] + 3 * both + c.points.padded);
+        solve_one(solved[isa]);
         lim_points_free(&c.points);
     }
     simd_force(before);
@@ -249,6 +292,7 @@ static void every_instruction_set_gives_the_same_bits(void **state)
         assert_memory_equal(&energy[isa], &energy[0], sizeof energy[0]);
         assert_memory_equal(total[isa], total[0], sizeof total[0]);
         assert_memory_equal(gram[isa], gram[0], sizeof gram[0]);
+        assert_memory_equal(solved[isa], solved[0], sizeof solved[0]);
         assert_memory_equal(column[isa], column[0], columns_size);
         assert_memory_equal(sums[isa], sums[0], sums_size);
     }
