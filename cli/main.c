@@ -13,7 +13,7 @@ static const struct Verb {
 } verbs[] = {
     {"run", verb_run, "SCENE", "runs a scene headless: summary, final state, recording, picture"},
     {"check", verb_check, "PATH...", "runs every scene that has a golden tool path and compares"},
-    {"segment", verb_segment, "VOLUME --trace F.yaml -o TREE.h5", "RBT: an angiogram to a tree of centreline nodes with local points"},
+    {"segment", verb_segment, "VOLUME --start X,Y,Z -o TREE.h5", "RBT: an angiogram, from one click or --trace F.yaml, to a tree of nodes with local points"},
     {"import", verb_import, "--surface F -o TREE.h5", "the same tree from a surface, with centrelines or alone"},
     {"fit", verb_fit, "TREE.h5 -o MODEL.h5", "LIM: a local blobby model for each node"},
     {"synth", verb_synth, "SHAPE -o F", "synthetic shapes with known truth"},
@@ -32,7 +32,7 @@ static void print_help(FILE *out)
         fprintf(out, "  %-8s %-34s %s\n", verbs[i].name, verbs[i].arguments, verbs[i].does);
     fprintf(out, "\n`seldinger VERB --help` explains every option with its unit and default.\n"
                  "Exit codes: 0 done; 1 a comparison failed; 2 wrong usage or bad input; 3 the simulation could not be trusted.\n"
-                 "Stopped by the user (SIGINT, SIGTERM) a verb leaves no unfinished file and ends by that signal (130, 143 in a shell); `run` ends in order.\n");
+                 "Stopped by the user (SIGINT, SIGTERM) a verb leaves no unfinished file and ends by that signal (130 or 143); `run` ends in order.\n");
 }
 
 // What is written is whole or not there (geom/stops.h); the exit status is the signal's, 130 in a shell for SIGINT.
