@@ -271,10 +271,11 @@ static const char *decode_compressed(const Reader *reader, Body body, unsigned c
         return cut_short;
     bool big = reader->is_big_endian;
     uint64_t blocks = word_at(head, (int)w, big), block = word_at(head + w, (int)w, big), last = word_at(head + 2 * w, (int)w, big);
-    // zlib packs at most 1032 to 1
-    if (blocks > body.length / w || block > (uint64_t)1 << 40 || last > block || (blocks && (blocks - 1) * block + last > 1032 * (uint64_t)body.length + 1024))
+    // zlib packs at most 1032 to 1; a last block of size 0 is a whole one
+    uint64_t most = 1032 * (uint64_t)body.length + 1024, whole = blocks - (blocks && last);
+    if (blocks > body.length / w || last > block || block > most || (block && whole > (most - last) / block))
         return cut_short;
-    size_t header = (3 + (size_t)blocks) * w, total = blocks ? (size_t)((blocks - (last != 0)) * block + last) : 0;
+    size_t header = (3 + (size_t)blocks) * w, total = blocks ? (size_t)(whole * block + last) : 0;
     unsigned char *sizes = malloc(header), *packed = malloc(body.length + 1), *out = malloc(total + 1);
     const char *fault = !sizes || !packed || !out ? "not enough memory" : !body_take(&body, header, sizes) ? cut_short : NULL;
     size_t done = 0, packed_total = 0;
