@@ -145,6 +145,7 @@ static void parse_stl_text(Growing *g, const char *text)
 {
     Cursor c = {text, 1};
     int corner = 0;
+    bool ended = false;
     for (skip_line(&c); *c.at && !g->bad;) {
         skip_space(&c);
         if (!*c.at)
@@ -161,13 +162,19 @@ static void parse_stl_text(Growing *g, const char *text)
             if (corner != 3)
                 fault_line(g, c.line, "a facet ends with fewer than 3 vertices");
             corner = 0;
-        } else if (!take_word(&c, "facet") && !take_word(&c, "outer") && !take_word(&c, "endloop") && !take_word(&c, "solid") && !take_word(&c, "endsolid"))
+        } else if (take_word(&c, "solid")) {
+            ended = false;
+        } else if (take_word(&c, "endsolid")) {
+            ended = true;
+        } else if (!take_word(&c, "facet") && !take_word(&c, "outer") && !take_word(&c, "endloop"))
             fault_line(g, c.line, "no word of STL; facet, outer loop, vertex, endloop, endfacet, endsolid are valid");
         if (!g->bad)
             skip_line(&c);
     }
     if (corner != 0)
         fault_line(g, c.line, "ends within a facet");
+    else if (!ended)
+        fault_line(g, c.line, "ends without endsolid: it was cut short");
 }
 
 static float float_at(const unsigned char *bytes, bool big)
