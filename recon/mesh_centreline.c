@@ -11,12 +11,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { VOXELS_MAX = 2000000, CENTRING_PASSES = 12, RAY_PAIRS = 8, CURVES_MAX = 4096, BESIDE = 2 };
+enum { VOXELS_MAX = 2000000, CENTRING_PASSES = 12, RAY_PAIRS = 8, CURVES_MAX = 4096, BESIDE = 2, LID_RAYS = 200 };
+static const double LID_REACH = 3, LID_COSINE = 0.94, LID_SHARE = 0.15;   // a round tip has 0.06 of the half sphere within 20 degrees
 static const double STEP = 0.3, BRANCH = 1.0, SAC = 0.5, SAC_WIDENS = 1.15, ATTACHED = 0.5, LEAST = 3, STUB = 0.6, STUB_WIDTH = 0.6;   // LEAST: voxels
 
 typedef struct Finding {
     const Lumen *lumen;
     const MeshTree *tree;
+    const SurfaceMesh *mesh; // closed
     const int *component;    // (V) of each voxel …
     int wanted;              // … and the one that is looked at
     float *cost, *length;    // (V) from the start; length [mm]
@@ -27,7 +29,7 @@ typedef struct Finding {
     int *tip, tip_count;     // voxels farther than their neighbours, farthest first
     CurveSet *set;
     int *end, end_count;     // the voxel at each free end; the start first …
-    int *end_point;          // … and the curve's point there
+    int *end_point;          // … and the curve's point a radius before it
 } Finding;
 
 // --- ways ---
@@ -208,6 +210,65 @@ static void path_centre(const Finding *f, Path *path)
     }
 }
 
+// The middle of the flat lid ahead of a curve's last point: of the wall that rays meet in one direction, each ray for the area it stands for. The wall
+// of a tube or of a round tip has no such direction. `outward`: the curve's own.
+static bool find_lid(const Finding *f, Vec3 from, Vec3 outward, double radius, Vec3 *middle)
+{
+    Vec3 u = vec3_normal_to(outward), v = vec3_cross(outward, u), hit[LID_RAYS], normal[LID_RAYS];
+    double area[LID_RAYS];
+    int most = 0, best = 0;
+    for (int k = 0; k < LID_RAYS; k++) {
+        // even over the half sphere: turns of the golden angle, each with its opposite
+        int pair = k / 2;
+        double z = 1 - (2 * pair + 1.0) / LID_RAYS, side = sqrt(1 - z * z), angle = 2.399963229728653 * pair + PI * (k % 2);
+        Vec3 d = vec3_add_scaled(vec3_scale(outward, z), side, vec3_add(vec3_scale(u, cos(angle)), vec3_scale(v, sin(angle))));
+        int triangle = 0;
+        double there = mesh_tree_ray(f->tree, from, d, LID_REACH * radius, &triangle);
+        const int *corner = f->mesh->triangle[triangle];
+        Vec3 p = f->mesh->vertex[corner[0]];
+        normal[k] = vec3_unit(vec3_cross(vec3_sub(f->mesh->vertex[corner[1]], p), vec3_sub(f->mesh->vertex[corner[2]], p)));
+        double facing = vec3_dot(normal[k], d);
+        hit[k] = vec3_add_scaled(from, isfinite(there) ? there : 0, d);
+        area[k] = isfinite(there) && facing > 0.1 && vec3_dot(normal[k], outward) > 0.5 ? there * there / facing : 0;
+    }
+    for (int k = 0; k < LID_RAYS; k++) {
+        int count = 0;
+        for (int m = 0; m < LID_RAYS; m++)
+            count += area[k] > 0 && area[m] > 0 && vec3_dot(normal[m], normal[k]) > LID_COSINE;
+        if (count > most) {
+            most = count;
+            best = k;
+        }
+    }
+    Vec3 sum = {0, 0, 0};
+    double all = 0;
+    for (int m = 0; m < LID_RAYS; m++)
+        if (area[m] > 0 && vec3_dot(normal[m], normal[best]) > LID_COSINE) {
+            sum = vec3_add_scaled(sum, area[m], hit[m]);
+            all += area[m];
+        }
+    *middle = vec3_scale(sum, 1 / fmax(all, 1e-300));
+    return most > LID_SHARE * LID_RAYS;
+}
+
+// Leads the last point on to the lid ahead, which is about a radius off; false where memory lacks.
+static bool path_lead_out(const Finding *f, Path *path)
+{
+    int tip = path->count - 1, back = tip;
+    double radius = path->radius[tip], arc = 0;
+    for (; back > 0 && arc < 1.5 * radius; back--)
+        arc += vec3_distance(path->point[back], path->point[back - 1]);
+    Vec3 from = path->point[tip], middle;
+    if (!find_lid(f, from, vec3_unit(vec3_sub(from, path->point[back])), radius, &middle))
+        return true;
+    double length = vec3_distance(from, middle);
+    if (!path_to(f, path, vec3_mix(from, middle, fmax(0, 1 - 0.2 * radius / fmax(length, 1e-300)))))
+        return false;
+    for (int i = tip + 1; i < path->count; i++)
+        path->radius[i] = radius;
+    return true;
+}
+
 // Takes off what runs into the corner of a lid or tip, beyond the outermost of the widest spheres that reach to it (a lid's rim is 1.41 radii off).
 static void path_trim(Path *path)
 {
@@ -246,12 +307,23 @@ static void own_spheres(Finding *f, int first_point)
     }
 }
 
-static bool add_curve(Finding *f, Path *path)
+// `tip`: the set's point a radius before the last one's lid, `front`: before the first one's.
+static bool add_curve(Finding *f, Path *path, int *tip, int *front)
 {
     int first = f->set->point_count;
     if (path->count < 2)
         return true;
     path_centre(f, path);
+    int count = path->count;
+    if (path->last_radius == 0 && !path_lead_out(f, path))
+        return false;
+    int led = path->count;
+    path_turn(path);
+    if (path->last_radius == 0 && !path_lead_out(f, path))
+        return false;
+    path_turn(path);
+    *front = first + path->count - led;
+    *tip = *front + count - 1;
     if (!curve_set_add(f->set, path->point, path->radius, path->count))
         return false;
     own_spheres(f, first);
@@ -357,10 +429,11 @@ static bool add_branch(Finding *f, int tip)
         path_turn(&path);
         path_trim(&path);
     }
-    good = good && add_curve(f, &path);
-    if (good && other < 0) {
+    int first = f->set->curve_count, last = 0, front = 0;
+    good = good && add_curve(f, &path, &last, &front);
+    if (good && other < 0 && f->set->curve_count > first) {
         f->end[f->end_count] = tip;
-        f->end_point[f->end_count++] = f->set->point_count - 1;
+        f->end_point[f->end_count++] = last;
     }
     path_free(&path);
     return good;
@@ -388,15 +461,16 @@ static bool find_curves(Finding *f, int start)
     path_turn(&trunk);
     path_trim(&trunk);
     path_turn(&trunk);
-    good = good && add_curve(f, &trunk);
+    int last = 0, front = 0;
+    good = good && add_curve(f, &trunk, &last, &front);
     path_free(&trunk);
     if (f->set->curve_count == 0)
         return good;
     f->end_count = 2;
     f->end[0] = start;
-    f->end_point[0] = 0;
+    f->end_point[0] = front;
     f->end[1] = f->tip[0];
-    f->end_point[1] = f->set->point_count - 1;
+    f->end_point[1] = last;
     for (int i = 1; good && i < f->tip_count && f->set->curve_count < CURVES_MAX; i++)
         if (is_branch(f, f->tip[i]))
             good = add_branch(f, f->tip[i]);
@@ -480,15 +554,16 @@ CurveSet *mesh_centreline(const SurfaceMesh *mesh, const ImportOptions *options,
     if (l) {
         size_t n = (size_t)l->count + 1;
         int *component = malloc(n * sizeof *component), start = -1;
-        Finding f = {.lumen = l, .tree = tree, .component = component, .cost = malloc(n * sizeof(float)), .length = malloc(n * sizeof(float)),
+        Finding f = {.lumen = l, .tree = tree, .mesh = &closed, .component = component, .cost = malloc(n * sizeof(float)), .length = malloc(n * sizeof(float)),
                      .from = malloc(n * sizeof(int)), .owner = malloc(n * sizeof(int)), .depth = malloc(n * sizeof(float))};
         good = component && f.cost && f.length && f.from && f.owner && f.depth;
         f.wanted = good ? label(l, options, component, &start) : -1;
         // once from any end to learn of the ends, then from the one that is the root
         if (good && f.wanted >= 0) {
             good = find_curves(&f, start);
-            if (good && f.end_count)
-                good = find_curves(&f, choose_start(&f, options));
+            int root = good && f.end_count ? choose_start(&f, options) : start;
+            if (good && root != start)
+                good = find_curves(&f, root);
             set = good ? f.set : NULL;
         }
         if (!set)

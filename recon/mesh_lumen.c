@@ -7,8 +7,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PROBES = 4000 };
-static const double VOXELS_PER_RADIUS = 6, SMALLEST = 0.02;   // SMALLEST: share of the vessels' length that may be thinner
+#define SQRT3 1.73205081f
+
+enum { PROBES = 4000, PASSES = 8 };
+static const double VOXELS_PER_RADIUS = 6, NEAR = 2, CHANGE = 0.05, SMALLEST = 0.02;   // SMALLEST: share of the vessels' length that may be thinner
 
 // --- lids ---
 
@@ -197,16 +199,12 @@ static Crossing *find_crossings(const SurfaceMesh *mesh, const Lumen *l, size_t 
     return crossing;
 }
 
-static void add_run(Lumen *l, int row, double from, double to)
+static void add_run(Lumen *l, int row, double from, double to, int winding)
 {
     int first = (int)fmax(0, ceil((from - l->origin.x) / l->h)), end = (int)fmin(l->size[0], ceil((to - l->origin.x) / l->h));
-    int last = l->run_count - 1;
     if (first >= end)
         return;
-    if (last >= l->row[row] && l->run[last].end == first) {
-        l->run[last].end = end;
-    } else
-        l->run[l->run_count++] = (LumenRun){first, end, l->count, row};
+    l->run[l->run_count++] = (LumenRun){first, end, l->count, row, winding};
     l->count += end - first;
 }
 
@@ -225,19 +223,16 @@ static bool fill_rows(Lumen *l, const SurfaceMesh *mesh)
         while (end < count && crossing[end].row == r)
             winding += crossing[end++].sign;
         if (winding == 0) {
-            double from = 0;
             for (; i < end; i++) {
                 winding += crossing[i].sign;
-                if (winding == 1 && crossing[i].sign > 0)
-                    from = crossing[i].x;
-                if (winding == 0 && crossing[i].sign < 0)
-                    add_run(l, r, from, crossing[i].x);
+                if (winding > 0)
+                    add_run(l, r, crossing[i].x, crossing[i + 1].x, winding);
             }
         } else {
             l->spoilt_rows++;
             for (int k = r ? l->row[r - 1] : 0; r && k < l->row[r] && (size_t)l->run_count < room - rows; k++) {
                 LumenRun run = l->run[k];
-                l->run[l->run_count++] = (LumenRun){run.first, run.end, l->count, r};
+                l->run[l->run_count++] = (LumenRun){run.first, run.end, l->count, r, run.winding};
                 l->count += run.end - run.first;
             }
         }
@@ -249,26 +244,177 @@ static bool fill_rows(Lumen *l, const SurfaceMesh *mesh)
     return l->run && l->row;
 }
 
+// --- places ---
+
+void lumen_place(const Lumen *l, int voxel, int place[3])
+{
+    const LumenRun *run = &l->run[l->run_of[voxel]];
+    place[0] = run->first + voxel - run->base;
+    place[1] = run->row % l->size[1];
+    place[2] = run->row / l->size[1];
+}
+
+Vec3 lumen_middle(const Lumen *l, int voxel)
+{
+    int p[3];
+    lumen_place(l, voxel, p);
+    return vec3_add_scaled(l->origin, l->h, vec3(p[0], p[1], p[2]));
+}
+
+int lumen_voxel(const Lumen *l, int x, int y, int z)
+{
+    if (y < 0 || z < 0 || y >= l->size[1] || z >= l->size[2])
+        return -1;
+    int row = y + l->size[1] * z;
+    for (int r = l->row[row]; r < l->row[row + 1]; r++)
+        if (x >= l->run[r].first && x < l->run[r].end)
+            return l->run[r].base + x - l->run[r].first;
+    return -1;
+}
+
+// `bit` of each in a mask, or NULL.
+static int neighbours(const Lumen *l, int voxel, int other[LUMEN_NEIGHBOURS], float step[LUMEN_NEIGHBOURS], int bit[LUMEN_NEIGHBOURS])
+{
+    static const float length[4] = {0, 1, 1.41421356f, SQRT3};
+    const uint32_t walled = bit ? 0 : l->walled[voxel];
+    int p[3], count = 0;
+    lumen_place(l, voxel, p);
+    for (int dz = -1; dz <= 1; dz++)
+        for (int dy = -1; dy <= 1; dy++) {
+            int y = p[1] + dy, z = p[2] + dz;
+            if (y < 0 || z < 0 || y >= l->size[1] || z >= l->size[2])
+                continue;
+            int row = y + l->size[1] * z;
+            for (int r = l->row[row]; r < l->row[row + 1] && l->run[r].first <= p[0] + 1; r++)
+                for (int x = p[0] - 1 > l->run[r].first ? p[0] - 1 : l->run[r].first; x <= p[0] + 1 && x < l->run[r].end; x++) {
+                    int index = l->run[r].base + x - l->run[r].first, place = 13 + x - p[0] + 3 * dy + 9 * dz;
+                    if (index == voxel || walled >> place & 1)
+                        continue;
+                    if (bit)
+                        bit[count] = place;
+                    other[count] = index;
+                    step[count++] = length[(x != p[0]) + (dy != 0) + (dz != 0)];
+                }
+        }
+    return count;
+}
+
+int lumen_neighbours(const Lumen *l, int voxel, int other[LUMEN_NEIGHBOURS], float step[LUMEN_NEIGHBOURS])
+{
+    return neighbours(l, voxel, other, step, NULL);
+}
+
 // --- distances ---
 
 typedef struct Measuring {
     Lumen *lumen;
+    const SurfaceMesh *mesh;
     const MeshTree *tree;
+    int *nearest;            // (count) triangle …
+    float (*foot)[3];        // … and its nearest point, from the origin
 } Measuring;
 
-static void measure_run(void *context, long r)
+static void set_foot(float foot[3], Vec3 p)
+{
+    foot[0] = (float)p.x;
+    foot[1] = (float)p.y;
+    foot[2] = (float)p.z;
+}
+
+static void measure_near(void *context, long r)
 {
     const Measuring *m = context;
     Lumen *l = m->lumen;
     const LumenRun *run = &l->run[r];
-    double reach = INFINITY;
-    for (int x = run->first; x < run->end; x++) {
-        Vec3 foot, p = lumen_middle(l, run->base + x - run->first);
-        int triangle;
-        double d = mesh_tree_nearest(m->tree, p, reach, &foot, &triangle);
-        l->distance[run->base + x - run->first] = (float)fmax(isfinite(d) ? d : reach, 1e-3 * l->h);
-        reach = 1.001 * (d + l->h);
+    for (int i = run->base; i < run->base + run->end - run->first; i++) {
+        Vec3 foot = {INFINITY, INFINITY, INFINITY};
+        l->run_of[i] = (int)r;
+        m->nearest[i] = -1;
+        double d = mesh_tree_nearest(m->tree, lumen_middle(l, i), NEAR * l->h, &foot, &m->nearest[i]);
+        l->distance[i] = (float)fmax(d, 1e-3 * l->h);
+        set_foot(m->foot[i], vec3_sub(foot, l->origin));
     }
+}
+
+// What is farther from the wall takes the nearest of its neighbours' triangles, to and fro until nothing changes (Danielsson 1980): a tree has to look at
+// all triangles around a vessel's middle.
+static void measure_far(const Measuring *m)
+{
+    Lumen *l = m->lumen;
+    bool changed = true;
+    for (int pass = 0; pass < PASSES && changed; pass++) {
+        changed = false;
+        for (int k = 0; k < l->count; k++) {
+            int i = pass % 2 ? l->count - 1 - k : k, other[LUMEN_NEIGHBOURS], best = -1;
+            float step[LUMEN_NEIGHBOURS];
+            if (l->distance[i] <= NEAR * l->h)
+                continue;
+            Vec3 p = lumen_middle(l, i), at = vec3_sub(p, l->origin), foot;
+            double least = (double)l->distance[i] * l->distance[i];
+            for (int n = lumen_neighbours(l, i, other, step) - 1; n >= 0; n--) {
+                const float *f = m->foot[other[n]];
+                double x = f[0] - at.x, y = f[1] - at.y, z = f[2] - at.z, d2 = x * x + y * y + z * z;
+                if (d2 < least) {
+                    least = d2;
+                    best = other[n];
+                }
+            }
+            if (best < 0)
+                continue;
+            m->nearest[i] = m->nearest[best];
+            float d = (float)mesh_triangle_nearest(m->mesh, m->nearest[i], p, &foot);
+            changed = changed || d < l->distance[i] - CHANGE * l->h;
+            l->distance[i] = d;
+            set_foot(m->foot[i], vec3_sub(foot, l->origin));
+        }
+    }
+}
+
+// Whether the way between two voxels' middles leaves the lumen. A way that meets no wall within both distances needs no ray.
+static bool is_walled(const Measuring *m, int a, int b, int winding, double steps)
+{
+    const Lumen *l = m->lumen;
+    int triangle = 0;
+    if ((double)l->distance[a] + l->distance[b] > 1.0001 * steps * l->h)
+        return false;
+    Vec3 from = lumen_middle(l, a), d = vec3_unit(vec3_sub(lumen_middle(l, b), from));
+    if (!isfinite(mesh_tree_ray(m->tree, from, d, steps * l->h, &triangle)))
+        return false;
+    const int *v = m->mesh->triangle[triangle];
+    Vec3 p = m->mesh->vertex[v[0]], n = vec3_cross(vec3_sub(m->mesh->vertex[v[1]], p), vec3_sub(m->mesh->vertex[v[2]], p));
+    // in overlapping parts the first wall leads from one into the other
+    return winding == 1 && vec3_dot(n, d) > 0;
+}
+
+static void find_walls(void *context, long r)
+{
+    const Measuring *m = context;
+    const LumenRun *run = &m->lumen->run[r];
+    int other[LUMEN_NEIGHBOURS], bit[LUMEN_NEIGHBOURS];
+    float step[LUMEN_NEIGHBOURS];
+    for (int x = run->first; x < run->end; x++) {
+        int voxel = run->base + x - run->first;
+        if (m->lumen->distance[voxel] > SQRT3 * m->lumen->h)
+            continue;
+        uint32_t walled = 0;
+        for (int k = 0, count = neighbours(m->lumen, voxel, other, step, bit); k < count; k++)
+            if (other[k] > voxel && is_walled(m, voxel, other[k], run->winding, step[k]))
+                walled |= UINT32_C(1) << bit[k];
+        m->lumen->walled[voxel] = walled;
+    }
+}
+
+// The other voxel's side of each wall. `walled` is not asked while it is made: each voxel changes only its own.
+static void mirror_walls(Lumen *l)
+{
+    for (int i = 0; i < l->count; i++)
+        for (int bit = 14; l->walled[i] && bit < 27; bit++)
+            if (l->walled[i] >> bit & 1) {
+                int p[3];
+                lumen_place(l, i, p);
+                int other = lumen_voxel(l, p[0] + bit % 3 - 1, p[1] + bit / 3 % 3 - 1, p[2] + bit / 9 - 1);
+                l->walled[other] |= UINT32_C(1) << (26 - bit);
+            }
 }
 
 Lumen *lumen_create(const SurfaceMesh *mesh, const MeshTree *tree, int voxels_max, int threads)
@@ -298,13 +444,23 @@ Lumen *lumen_create(const SurfaceMesh *mesh, const MeshTree *tree, int voxels_ma
     l->size[1] = (int)ceil(extent.y / l->h) + 1;
     l->size[2] = (int)ceil(extent.z / l->h) + 1;
     bool good = fill_rows(l, mesh);
-    l->distance = good ? malloc(((size_t)l->count + 1) * sizeof *l->distance) : NULL;
-    if (!l->distance) {
+    size_t n = (size_t)l->count + 1;
+    l->distance = good ? malloc(n * sizeof *l->distance) : NULL;
+    l->run_of = good ? malloc(n * sizeof *l->run_of) : NULL;
+    l->walled = good ? calloc(n, sizeof *l->walled) : NULL;
+    Measuring measuring = {l, mesh, tree, good ? malloc(n * sizeof(int)) : NULL, good ? malloc(n * sizeof(float[3])) : NULL};
+    if (!l->distance || !l->run_of || !l->walled || !measuring.nearest || !measuring.foot) {
+        free(measuring.nearest);
+        free(measuring.foot);
         lumen_free(l);
         return NULL;
     }
-    Measuring measuring = {l, tree};
-    parallel_for(threads, l->run_count, measure_run, &measuring, NULL);
+    parallel_for(threads, l->run_count, measure_near, &measuring, NULL);
+    measure_far(&measuring);
+    free(measuring.nearest);
+    free(measuring.foot);
+    parallel_for(threads, l->run_count, find_walls, &measuring, NULL);
+    mirror_walls(l);
     return l;
 }
 
@@ -314,64 +470,8 @@ void lumen_free(Lumen *l)
         return;
     free(l->row);
     free(l->run);
+    free(l->run_of);
     free(l->distance);
+    free(l->walled);
     free(l);
-}
-
-// --- places ---
-
-void lumen_place(const Lumen *l, int voxel, int place[3])
-{
-    int low = 0, high = l->run_count - 1;
-    while (low < high) {
-        int middle = (low + high + 1) / 2;
-        if (l->run[middle].base <= voxel)
-            low = middle;
-        else
-            high = middle - 1;
-    }
-    place[0] = l->run[low].first + voxel - l->run[low].base;
-    place[1] = l->run[low].row % l->size[1];
-    place[2] = l->run[low].row / l->size[1];
-}
-
-Vec3 lumen_middle(const Lumen *l, int voxel)
-{
-    int p[3];
-    lumen_place(l, voxel, p);
-    return vec3_add_scaled(l->origin, l->h, vec3(p[0], p[1], p[2]));
-}
-
-int lumen_voxel(const Lumen *l, int x, int y, int z)
-{
-    if (y < 0 || z < 0 || y >= l->size[1] || z >= l->size[2])
-        return -1;
-    int row = y + l->size[1] * z;
-    for (int r = l->row[row]; r < l->row[row + 1]; r++)
-        if (x >= l->run[r].first && x < l->run[r].end)
-            return l->run[r].base + x - l->run[r].first;
-    return -1;
-}
-
-int lumen_neighbours(const Lumen *l, int voxel, int other[LUMEN_NEIGHBOURS], float step[LUMEN_NEIGHBOURS])
-{
-    static const float length[4] = {0, 1, 1.41421356f, 1.73205081f};
-    int p[3], count = 0;
-    lumen_place(l, voxel, p);
-    for (int dz = -1; dz <= 1; dz++)
-        for (int dy = -1; dy <= 1; dy++) {
-            int y = p[1] + dy, z = p[2] + dz;
-            if (y < 0 || z < 0 || y >= l->size[1] || z >= l->size[2])
-                continue;
-            int row = y + l->size[1] * z;
-            for (int r = l->row[row]; r < l->row[row + 1] && l->run[r].first <= p[0] + 1; r++)
-                for (int x = p[0] - 1 > l->run[r].first ? p[0] - 1 : l->run[r].first; x <= p[0] + 1 && x < l->run[r].end; x++) {
-                    int index = l->run[r].base + x - l->run[r].first;
-                    if (index == voxel)
-                        continue;
-                    other[count] = index;
-                    step[count++] = length[(x != p[0]) + (dy != 0) + (dz != 0)];
-                }
-        }
-    return count;
 }

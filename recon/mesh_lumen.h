@@ -1,14 +1,18 @@
 // The inside of a closed surface as a sparse grid of cubic voxels, each with its exact distance to the wall. A row of voxels along x is inside where the
-// winding number is: entries less exits of the wall before it, so that parts of a surface that overlap are one lumen.
+// winding number is: entries less exits of the wall before it, so that parts of a surface that overlap are one lumen. Voxels are no neighbours where the
+// way between their middles leaves the lumen: vessels that touch stay apart, however thin the wall.
 #ifndef SELDINGER_RECON_MESH_LUMEN_H
 #define SELDINGER_RECON_MESH_LUMEN_H
 
 #include "recon/mesh_tree.h"
 
+#include <stdint.h>
+
 enum { LUMEN_NEIGHBOURS = 26 };
 
 typedef struct LumenRun {    // voxels x = first … end-1 of a row have indices base, base + 1, …
     int first, end, base, row;
+    int winding;             // > 0
 } LumenRun;
 
 typedef struct Lumen {
@@ -18,7 +22,9 @@ typedef struct Lumen {
     int *row;                // (size[1] * size[2] + 1) row y + size[1] * z owns runs row[…] … row[… + 1]
     LumenRun *run;
     int run_count, count;    // count: of voxels
+    int *run_of;             // (count)
     float *distance;         // (count) to the wall [mm], > 0
+    uint32_t *walled;        // (count) bit 13 + dx + 3 dy + 9 dz: there is a wall between this voxel and that
     int spoilt_rows;         // with as many entries as exits nowhere: taken from the row before
 } Lumen;
 
@@ -31,7 +37,7 @@ void lumen_place(const Lumen *lumen, int voxel, int place[3]);
 Vec3 lumen_middle(const Lumen *lumen, int voxel);
 // The voxel at a place, -1 outside.
 int lumen_voxel(const Lumen *lumen, int x, int y, int z);
-// The voxels that share a corner with this one, and how far their middles are [voxels]; returns how many.
+// The voxels that share a corner with this one and no wall between, and how far their middles are [voxels]; returns how many.
 int lumen_neighbours(const Lumen *lumen, int voxel, int other[LUMEN_NEIGHBOURS], float step[LUMEN_NEIGHBOURS]);
 
 #endif

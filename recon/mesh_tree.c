@@ -20,8 +20,11 @@ struct MeshTree {
 };
 
 static double part(Vec3 v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
-static Vec3 lower(Vec3 a, Vec3 b) { return vec3(fmin(a.x, b.x), fmin(a.y, b.y), fmin(a.z, b.z)); }
-static Vec3 upper(Vec3 a, Vec3 b) { return vec3(fmax(a.x, b.x), fmax(a.y, b.y), fmax(a.z, b.z)); }
+// libm's are calls, for the sake of NaN
+static double least(double a, double b) { return a < b ? a : b; }
+static double most(double a, double b) { return a > b ? a : b; }
+static Vec3 lower(Vec3 a, Vec3 b) { return vec3(least(a.x, b.x), least(a.y, b.y), least(a.z, b.z)); }
+static Vec3 upper(Vec3 a, Vec3 b) { return vec3(most(a.x, b.x), most(a.y, b.y), most(a.z, b.z)); }
 
 static bool before(const MeshTree *tree, int a, int b, int axis)
 {
@@ -144,6 +147,13 @@ static Vec3 nearest_on_triangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c)
     return sum > 0 ? vec3_add(a, vec3_add(vec3_scale(ab, vb / sum), vec3_scale(ac, vc / sum))) : a;
 }
 
+double mesh_triangle_nearest(const SurfaceMesh *mesh, int triangle, Vec3 point, Vec3 *foot)
+{
+    const int *v = mesh->triangle[triangle];
+    *foot = nearest_on_triangle(point, mesh->vertex[v[0]], mesh->vertex[v[1]], mesh->vertex[v[2]]);
+    return vec3_distance(*foot, point);
+}
+
 static double beyond(double low, double high, double x) { return x < low ? low - x : x > high ? x - high : 0; }
 
 static double box_distance2(const Box *box, Vec3 p)
@@ -205,48 +215,63 @@ static double ray_triangle(Vec3 from, Vec3 d, Vec3 a, Vec3 b, Vec3 c)
     return u >= -1e-9 && v >= -1e-9 && u + v <= 1 + 1e-9 && t > 0 ? t : INFINITY;
 }
 
-static bool ray_meets_box(const Box *box, Vec3 from, Vec3 d, double reach)
+// How far the ray goes before the box; INFINITY where it misses it.
+static double ray_enters(const Box *box, const double from[3], const double direction[3], const double inverse[3], double reach)
 {
+    const double low[3] = {box->low.x, box->low.y, box->low.z}, high[3] = {box->high.x, box->high.y, box->high.z};
     double enter = 0, leave = reach;
     for (int axis = 0; axis < 3; axis++) {
-        double o = part(from, axis), v = part(d, axis), low = part(box->low, axis), high = part(box->high, axis);
-        if (v == 0) {
-            if (o < low || o > high)
-                return false;
+        if (direction[axis] == 0) {
+            if (from[axis] < low[axis] || from[axis] > high[axis])
+                return INFINITY;
             continue;
         }
-        double a = (low - o) / v, b = (high - o) / v;
-        enter = fmax(enter, fmin(a, b));
-        leave = fmin(leave, fmax(a, b));
+        double a = (low[axis] - from[axis]) * inverse[axis], b = (high[axis] - from[axis]) * inverse[axis];
+        enter = most(enter, least(a, b));
+        leave = least(leave, most(a, b));
     }
-    return enter <= leave * (1 + 1e-12) + 1e-12;
+    // rounding must not lose a flat box
+    return enter <= leave * (1 + 1e-12) + 1e-12 ? enter : INFINITY;
 }
 
 double mesh_tree_ray(const MeshTree *tree, Vec3 from, Vec3 direction, double reach, int *triangle)
 {
     const SurfaceMesh *mesh = tree->mesh;
-    int stack[DEPTH * 2], height = 0;
-    double best = INFINITY;
-    if (mesh->triangle_count)
+    const double start[3] = {from.x, from.y, from.z}, d[3] = {direction.x, direction.y, direction.z}, inverse[3] = {1 / d[0], 1 / d[1], 1 / d[2]};
+    int stack[DEPTH * 2], height = 0, hit = -1;
+    double enters[DEPTH * 2], best = INFINITY;
+    if (mesh->triangle_count && isfinite(enters[0] = ray_enters(tree->box, start, d, inverse, reach)))
         stack[height++] = 0;
     while (height) {
-        const Box *box = &tree->box[stack[--height]];
-        if (!ray_meets_box(box, from, direction, fmin(best, reach)))
+        if (enters[--height] > best * (1 + 1e-12) + 1e-12)
             continue;
+        const Box *box = &tree->box[stack[height]];
         for (int i = 0; i < box->count; i++) {
             int t = tree->order[box->first + i];
-            double at = ray_triangle(from, direction, mesh->vertex[mesh->triangle[t][0]], mesh->vertex[mesh->triangle[t][1]], mesh->vertex[mesh->triangle[t][2]]);
-            if (at <= reach && at < best) {
+            const int *v = mesh->triangle[t];
+            double at = ray_triangle(from, direction, mesh->vertex[v[0]], mesh->vertex[v[1]], mesh->vertex[v[2]]);
+            if (at <= reach && (at < best || (at == best && t < hit))) {
                 best = at;
-                if (triangle)
-                    *triangle = t;
+                hit = t;
             }
         }
         if (box->count == 0) {
-            stack[height++] = box->first;
-            stack[height++] = box->first + 1;
+            double first = ray_enters(&tree->box[box->first], start, d, inverse, least(best, reach));
+            double second = ray_enters(&tree->box[box->first + 1], start, d, inverse, least(best, reach));
+            // the nearer one on top
+            int nearer = box->first + (first >= second), farther = box->first + (first < second);
+            if (isfinite(most(first, second))) {
+                enters[height] = most(first, second);
+                stack[height++] = farther;
+            }
+            if (isfinite(least(first, second))) {
+                enters[height] = least(first, second);
+                stack[height++] = nearer;
+            }
         }
     }
+    if (triangle && hit >= 0)
+        *triangle = hit;
     return best;
 }
 
