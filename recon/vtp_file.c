@@ -37,7 +37,7 @@ typedef struct Reader {
     Faults *faults;
     int section, depth, piece;
     Array *array;
-    int array_count, array_capacity, open_array;
+    int array_count, array_capacity, open_array, array_depth;
     bool is_big_endian, is_polydata, is_compressed, appended_base64, has_appended, stopped;
     int header_size;
 } Reader;
@@ -119,6 +119,7 @@ static void start_array(Reader *reader, const char **list)
         reader->array_capacity = capacity;
     }
     reader->open_array = reader->array_count;
+    reader->array_depth = reader->depth;
     reader->array[reader->array_count++] = array;
 }
 
@@ -161,7 +162,8 @@ static void end_element(void *context, const char *element)
 static void take_text(void *context, const char *text, int length)
 {
     Reader *reader = context;
-    if (reader->stopped || reader->open_array < 0)
+    // VTK puts an InformationKey with values of its own (ranges) behind the array's
+    if (reader->stopped || reader->open_array < 0 || reader->depth != reader->array_depth)
         return;
     Array *array = &reader->array[reader->open_array];
     if (array->length + (size_t)length + 1 > array->capacity) {
@@ -271,9 +273,9 @@ static const char *decode_compressed(const Reader *reader, Body body, unsigned c
         return cut_short;
     bool big = reader->is_big_endian;
     uint64_t blocks = word_at(head, (int)w, big), block = word_at(head + w, (int)w, big), last = word_at(head + 2 * w, (int)w, big);
-    // zlib packs at most 1032 to 1; a last block of size 0 is a whole one
+    // zlib packs at most 1032 to 1; a last block of size 0 is a whole one; an array of no block names the usual size of one
     uint64_t most = 1032 * (uint64_t)body.length + 1024, whole = blocks - (blocks && last);
-    if (blocks > body.length / w || last > block || block > most || (block && whole > (most - last) / block))
+    if (blocks > body.length / w || last > block || (blocks && (last > most || (whole && block > (most - last) / whole))))
         return cut_short;
     size_t header = (3 + (size_t)blocks) * w, total = blocks ? (size_t)(whole * block + last) : 0;
     unsigned char *sizes = malloc(header), *packed = malloc(body.length + 1), *out = malloc(total + 1);

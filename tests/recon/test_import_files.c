@@ -76,13 +76,17 @@ static void text_obj(Text *t)
         add(t, "f %d//1 %d//1 %d//1\n", face[i][0] + 1, face[i][1] + 1, face[i][2] + 1);
 }
 
+// As VTK 9 writes it: the points' range within their array, and empty arrays, packed, that name the usual size of a block.
 static void text_vtp(Text *t)
 {
-    add(t, "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"LittleEndian\"><PolyData>"
+    add(t, "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"LittleEndian\" header_type=\"UInt32\" "
+           "compressor=\"vtkZLibDataCompressor\"><PolyData>"
            "<Piece NumberOfPoints=\"8\" NumberOfPolys=\"12\"><Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">\n");
     for (int i = 0; i < 8; i++)
         add(t, "%g %g %g\n", corner[i][0], corner[i][1], corner[i][2]);
-    add(t, "</DataArray></Points><Polys><DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">\n");
+    add(t, "<InformationKey name=\"L2_NORM_RANGE\" location=\"vtkDataArray\" length=\"2\"><Value index=\"0\">\n0\n</Value><Value index=\"1\">\n1.7\n</Value>"
+           "</InformationKey></DataArray></Points><Lines><DataArray type=\"Int64\" Name=\"connectivity\" format=\"binary\">\nAAAAAACAAAAAAAAA\n</DataArray>"
+           "<DataArray type=\"Int64\" Name=\"offsets\" format=\"binary\">\nAAAAAACAAAAAAAAA\n</DataArray></Lines><Polys><DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">\n");
     for (int i = 0; i < 12; i++)
         add(t, "%d %d %d\n", face[i][0], face[i][1], face[i][2]);
     add(t, "</DataArray><DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">\n");
