@@ -26,8 +26,8 @@ typedef struct ImportCommand {
 
 static const char help[] =
     "Usage: seldinger import --surface F [--centerline F...] -o TREE.h5 [options]\n\n"
-    "A vessel's surface and its centrelines become the tree that `seldinger fit` takes. Without centrelines they are computed, which\n"
-    "works for plain tubes only as yet: a result that leaves out more than 10 % of the surface is refused.\n"
+    "A vessel's surface and its centrelines become the tree that `seldinger fit` takes. Without centrelines they are computed; a result\n"
+    "that leaves out more than 10 % of the surface is refused. Narrow branches that no centreline runs into are left out.\n"
     "Surface: STL, PLY, OBJ or VTK PolyData (.vtp), open or closed; flat lids over the ends of a closed one are taken off.\n"
     "Centrelines: VTK PolyData (.vtp), 3D Slicer Markups (.mrk.json), SWC; several files and overlapping curves make one tree.\n"
     "What is wrong with the surface is told and mended.\n\n"
