@@ -158,6 +158,8 @@ static char *parameters_text(const RbtParameters *parameters, const RbtReport *r
     enum { LINE = 120 };
     char *text = rbt_parameters_text(parameters, volume_voxel_size(volume));
     size_t used = text ? strlen(text) : 0, capacity = used + LINE * ((size_t)report->branch_count + 3);
+    for (int i = 0; i < tree->node_count; i++)
+        capacity += tree->kind[i] == NODE_ANEURYSM ? LINE : 0;
     char *longer = text ? realloc(text, capacity) : NULL;
     if (!longer) {
         free(text);
@@ -169,8 +171,16 @@ static char *parameters_text(const RbtParameters *parameters, const RbtReport *r
         const RbtBranchReport *b = &report->branch[i];
         if (!b->is_aneurysm || !b->is_found)
             continue;
-        used += (size_t)snprintf(longer + used, capacity - used, "%s  - {centers_mm: [[%.4f, %.4f, %.4f]]}\n", head, b->center.x, b->center.y, b->center.z);
+        used += (size_t)snprintf(longer + used, capacity - used, "%s  - {centers_mm: [", head);
         head = "";
+        const char *comma = "";
+        for (int k = b->first_node; k < b->first_node + b->node_count; k++)
+            if (tree->kind[k] == NODE_ANEURYSM) {
+                Vec3 c = tree->center[k];
+                used += (size_t)snprintf(longer + used, capacity - used, "%s[%.9g, %.9g, %.9g]", comma, c.x, c.y, c.z);
+                comma = ", ";
+            }
+        used += (size_t)snprintf(longer + used, capacity - used, "]}\n");
     }
     return longer;
 }

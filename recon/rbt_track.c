@@ -583,6 +583,8 @@ static void report_branch(const Tracker *t, int number, double p_inl, RbtBranchR
         }
     report->first_node = first;
     report->node_count = end - first;
+    int sacs = 0;
+    double sac_radius = 0, widest = 0;
     report->inlier_rate_min = 1;
     for (int i = first; i < end; i++) {
         const TrackNode *n = &t->tree.node[i];
@@ -591,11 +593,18 @@ static void report_branch(const Tracker *t, int number, double p_inl, RbtBranchR
         report->relaxed_count += n->inlier_rate <= p_inl;
         report->retried_count += n->retried;
         report->junction_count += n->is_junction;
+        bool is_sac = n->kind == NODE_ANEURYSM;
+        sacs += is_sac;
+        sac_radius += is_sac ? n->cylinder.radius : 0;
         report->radius += n->cylinder.radius / report->node_count;
-        report->center = n->cylinder.center;
+        if (!is_sac || n->cylinder.radius > widest)   // the widest of a sac's centres stands for it
+            report->center = n->cylinder.center;
+        widest = is_sac ? fmax(widest, n->cylinder.radius) : widest;
         if (n->parent >= 0)
             report->length += vec3_distance(n->cylinder.center, t->tree.node[n->parent].cylinder.center);
     }
+    if (sacs > 0)
+        report->radius = sac_radius / sacs;
 }
 
 // The nearest point of the centreline and its node, for the projection of section 3.3.

@@ -106,8 +106,8 @@ typedef struct RbtBranchReport {
     bool is_aneurysm;
     bool is_found;           // by the program, no seed named it
     int parent, order;       // number of the branch that it hangs on, -1: none; 1 for the first, one more than its parent's
-    double radius;           // [mm] mean over its nodes
-    Vec3 center;             // [mm] of its last node: of a sac, its middle
+    double radius;           // [mm] mean over its nodes, of a sac over its centres
+    Vec3 center;             // [mm] of its last node; of a sac, the middle of its widest ball
     char name[32];           // the seed's or the aneurysm's
     char end[96];            // why it ended
 } RbtBranchReport;
