@@ -13,7 +13,8 @@
 
 enum { VOXELS_MAX = 2000000, CENTRING_PASSES = 12, RAY_PAIRS = 8, CURVES_MAX = 4096, BESIDE = 2, LID_RAYS = 200 };
 static const double LID_REACH = 3, LID_COSINE = 0.94, LID_SHARE = 0.15;   // a round tip has 0.06 of the half sphere within 20 degrees
-static const double STEP = 0.3, BRANCH = 1.0, SAC = 0.5, SAC_WIDENS = 1.15, ATTACHED = 0.5, LEAST = 3, STUB = 0.6, STUB_WIDTH = 0.6;   // LEAST: voxels
+static const double STEP = 0.3, BRANCH = 1.0, SAC = 0.5, SAC_WIDENS = 1.15, ATTACHED = 0.5, LEAST = 3, STUB = 0.6, STUB_WIDTH = 0.6,   // LEAST: voxels
+                    PINCHED = 0.25;   // of the narrower side
 
 typedef struct Finding {
     const Lumen *lumen;
@@ -408,24 +409,57 @@ static bool path_end_at(const Finding *f, Path *path, int point)
     return true;
 }
 
+// From the joint of a tip's way through the loop that closes there to the joint on the other side.
+static bool path_through(const Finding *f, Path *path, int tip, int join, int other)
+{
+    Path back = {0};
+    int there = way_joins(f, other);
+    bool good = path_along(f, path, tip, join) && path_end_at(f, path, f->owner[join]) && path_along(f, &back, other, there);
+    path_turn(path);
+    for (int i = 0; good && i < back.count; i++)
+        good = path_to(f, path, back.point[i]);
+    path_free(&back);
+    return good && path_end_at(f, path, f->owner[there]);
+}
+
+// Whether two vessels only touch: beyond the spheres that it hangs on the curve is far narrower somewhere than on both sides of it.
+static bool is_pinched(const Path *path)
+{
+    Vec3 first = path->point[0], last = path->point[path->count - 1];
+    int least = -1;
+    for (int i = 0; i < path->count; i++)
+        if (vec3_distance(path->point[i], first) > path->first_radius && vec3_distance(path->point[i], last) > path->last_radius &&
+            (least < 0 || path->radius[i] < path->radius[least]))
+            least = i;
+    double before = path->first_radius, after = path->last_radius;
+    for (int i = 0; i < path->count; i++)
+        if (i < least)
+            before = fmax(before, path->radius[i]);
+        else
+            after = fmax(after, path->radius[i]);
+    return least >= 0 && path->radius[least] < PINCHED * fmin(before, after);
+}
+
 static bool add_branch(Finding *f, int tip)
 {
     Path path = {0};
     int join = way_joins(f, tip);
     if (f->owner[join] < 0)
         return true;
-    int point = f->owner[join], other = beyond_loop(f, tip, join);
-    bool good = path_along(f, &path, tip, join) && path_end_at(f, &path, point);
-    if (good && other >= 0) {
-        int there = way_joins(f, other);
-        path_turn(&path);
-        Path back = {0};
-        good = path_along(f, &back, other, there);
-        for (int i = 0; good && i < back.count; i++)
-            good = path_to(f, &path, back.point[i]);
-        path_free(&back);
-        good = good && path_end_at(f, &path, f->owner[there]);
-    } else if (good) {
+    int other = beyond_loop(f, tip, join);
+    bool good = true;
+    if (other >= 0) {
+        good = path_through(f, &path, tip, join, other);
+        if (good)
+            path_centre(f, &path);
+        if (good && is_pinched(&path)) {
+            path_free(&path);
+            path = (Path){0};
+            other = -1;
+        }
+    }
+    if (good && other < 0) {
+        good = path_along(f, &path, tip, join) && path_end_at(f, &path, f->owner[join]);
         path_turn(&path);
         path_trim(&path);
     }
