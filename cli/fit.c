@@ -30,7 +30,7 @@ static const char help[] =
     "  -o, --output F.h5      the model\n"
     "  --preset NAME          default, or paper: the published values and method; give it before other options\n"
     "  --target-mm X          stop when every point is this near [mm]; default: max(0.5 voxel, min(0.2 r, 1.5 voxels)) of the node's radius r,\n"
-    "                         where no voxel is known 0.08 r; paper 0.3\n"
+    "                         where no voxel is known 0.08 r; half of it near an aneurysm; paper 0.3\n"
     "  --max-blobs N          blobs of a local model, at most; default 100\n"
     "  --voxel-mm X           voxel size of the angiogram [mm]; default: what the tree's file says (`voxel_mm`), else not known: the classes of\n"
     "                         d_a are then of 0.2 mm\n"

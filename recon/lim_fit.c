@@ -76,6 +76,8 @@ typedef struct Gather {      // the memory of one job
     int own_count;           // the first of `near` give points
     Vec3 *point;
     int point_count, point_capacity;
+    float *weight;           // (point_count), or NULL
+    bool at_sac;
     Vec3 guard[GUARD_NODES * GUARD_ANGLES + NEAR_CAPACITY * 2 + SPHERE_DIRECTIONS];
     double clearance[GUARD_NODES * GUARD_ANGLES + NEAR_CAPACITY * 2 + SPHERE_DIRECTIONS];
     int guard_count;
@@ -217,7 +219,8 @@ static bool gather_points(const VesselTree *tree, int node, const LimFitOptions 
     }
     if (has_root && options->extend_inlet && tree->kind[0] == NODE_VESSEL && !extend_inlet(tree, gather, center))
         return false;
-    gather->point_count = thin_points(gather->point, gather->point_count, options->max_points * (options->guard_shape && is_at_sac(tree, gather) ? 5 : 1));
+    gather->at_sac = options->guard_shape && is_at_sac(tree, gather);
+    gather->point_count = thin_points(gather->point, gather->point_count, options->max_points * (gather->at_sac ? 5 : 1));
     return true;
 }
 
@@ -443,11 +446,28 @@ static bool gather_node(const Job *job, int node, Gather *gather)
     return !job->first || add_agreed(job, node, gather);
 }
 
+// The model is asked in the node's cell, where few blobs bulge: fitted evenly to five nodes' points they stood 0.01 mm too wide there. So points weigh
+// the less the further they are beyond the node's ball, as power distance has it. Not at a sac, whose cells reach far from their balls.
+static bool weigh_points(const VesselTree *tree, int node, Gather *gather)
+{
+    const double least = 0.3;
+    double r2 = tree->radius[node] * tree->radius[node], mean = 0;
+    gather->weight = malloc((size_t)gather->point_count * sizeof *gather->weight);
+    for (int i = 0; i < gather->point_count && gather->weight; i++) {
+        double beyond = fmax(power_distance(gather->point[i], tree->center[node], tree->radius[node]), 0);
+        gather->weight[i] = (float)fmax(least, r2 / (r2 + beyond));
+        mean += (double)gather->weight[i] / gather->point_count;
+    }
+    for (int i = 0; i < gather->point_count && gather->weight; i++)
+        gather->weight[i] /= (float)mean;
+    return gather->weight != NULL;
+}
+
 static LimFitTask task_of(const Job *job, int node, Gather *gather, double *start_radius)
 {
     const VesselTree *tree = job->tree, *first = job->first;
-    LimFitTask task = {.point_count = gather->point_count, .point = gather->point, .center = tree->center[node], .direction = tree->direction[node],
-                       .radius = tree->radius[node]};
+    LimFitTask task = {.point_count = gather->point_count, .point = gather->point, .weight = gather->weight, .center = tree->center[node],
+                       .direction = tree->direction[node], .radius = tree->radius[node]};
     if (job->options->guard_shape) {
         task.guard_count = gather->guard_count;
         task.guard = gather->guard;
@@ -511,8 +531,13 @@ static void fit_node(void *context, long index)
     bool good = gather && center && width && start_radius && gather_node(job, node, gather);
     if (job->first && options.give_up_splits > 1)
         options.give_up_splits = 1;
-    if (options.target_mm == 0 && options.voxel_mm == 0)
-        options.target_mm = 0.08 * tree->radius[node];
+    // neighbours at a sac agree no better than each meets the data: 0.19 mm with the usual t_g, 0.06 with half of it
+    if (good && gather->at_sac)
+        options.voxel_mm *= 0.5;
+    if (good && options.target_mm == 0 && options.voxel_mm == 0)
+        options.target_mm = (gather->at_sac ? 0.04 : 0.08) * tree->radius[node];
+    if (good && options.weigh_distance && !gather->at_sac && gather->point_count > 0)
+        good = weigh_points(tree, node, gather);
     if (good && gather->point_count >= 4) {
         LimFitTask task = task_of(job, node, gather, start_radius);
         model->count = lim_fit_model(&task, &options, center, width);
@@ -532,8 +557,10 @@ static void fit_node(void *context, long index)
         free(width);
     }
     free(start_radius);
-    if (gather)
+    if (gather) {
         free(gather->point);
+        free(gather->weight);
+    }
     free(gather);
 }
 

@@ -18,14 +18,14 @@ typedef struct LimFitOptions {
     double s;                // repulsive distance of E_c in widths, 2
     double iso_level;        // T [mm], 0.1; where neither voxel_mm nor target_mm is given, times the mean radius of the nodes
     int max_blobs;           // N_s, 100
-    double target_mm;        // t_g [mm]; 0: max(0.5 voxel, min(0.2 r, 1.5 voxels)), without a voxel 0.08 r; paper 0.3
+    double target_mm;        // t_g [mm]; 0: max(0.5 voxel, min(0.2 r, 1.5 voxels)), without a voxel 0.08 r, half of it near aneurysms; paper 0.3
     // what the paper fixes in its text
     int topological_distance;   // points are concatenated up to this many steps along the tree, 2
     int max_loops;           // centre-width loops per optimisation; paper 5, default 2
     int line_searches;       // Polak-Ribiere steps per loop; paper 20 (not said there), default 4
     // departures (DESIGN.md section 2); the paper preset turns them off
     double voxel_mm;         // for the automatic target, 0.2; 0: not known, as where the tree comes from a mesh
-    bool weigh_distance;     // weigh E_d by mean g^2 / g_i^2: distances instead of field values
+    bool weigh_distance;     // weigh E_d by mean g^2 / g_i^2: distances instead of field values; and points beyond the node's cell less
     bool project_points;     // measure points beyond the target by projection, not by Taubin's one step
     bool sweep_all_blobs;    // a short pass over all blobs after each split
     int give_up_splits;      // stop when this many splits bring nothing, twice as many before t_g is met; 0: never. 3; 1 in the second pass
@@ -52,6 +52,7 @@ typedef struct LimTube {     // a piece of lumen as the tree knows it: a cone be
 typedef struct LimFitTask {
     int point_count;
     const Vec3 *point;       // (point_count)
+    const float *weight;     // (point_count) of the points in E_d with weigh_distance, mean 1; NULL: all the same
     Vec3 center, direction;  // the node's; direction unit
     double radius;           // > 0
     int guard_count;         // used with guard_shape only

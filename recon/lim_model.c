@@ -230,7 +230,7 @@ static void fit_refresh_weights(Fit *fit, bool afresh)
         for (int i = 0; i < data; i++) {
             float slope2 = fit->residual[i] * fit->residual[i], ratio = usual / (slope2 > least ? slope2 : least);
             ratio = ratio > 0.2f ? ratio : 0.2f;
-            points->weight[i] = (ratio < 5 ? ratio : 5) * share;
+            points->weight[i] = (ratio < 5 ? ratio : 5) * share * (fit->task->weight ? fit->task->weight[i] : 1);
         }
     }
     if (fit->uses_feet) {
