@@ -2,7 +2,8 @@
 //   integral (d / r)^2 ds > 1.0 r
 // which is length less about 0.7 r for a tube, 0.5 to 0.6 r in the corners of lids, 0.33 cot(angle) r in a wedge; a sac, where d rises again beyond its
 // neck, has 0.7 r or more and gives one curve. Tried and lost: centres of balls that touch the wall twice, joined as the wall's triangles are (facets
-// of coarse surfaces tear them apart: 279 curves of the aortic arch), and covering by spheres 1.5 d wide (they reach into kissing vessels).
+// of coarse surfaces tear them apart: 279 curves of the aortic arch), covering by spheres 1.5 d wide (they reach into kissing vessels), cells of an
+// octree as small as each vessel asks for (as much of the arch, half as fast, short branches lost), and a start from any end (short trunks lost).
 #include "recon/mesh_centreline.h"
 
 #include "recon/mesh_lumen.h"

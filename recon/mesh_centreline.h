@@ -2,7 +2,8 @@
 // one end the cheapest ways by length / distance to the wall^2 run along the middle (Antiga, Ene-Iordache and Remuzzi 2003 use 1 / radius). The way to
 // the farthest voxel is the first curve; every other voxel that is farther than all around it may be the end of a branch, and is one where its way
 // leaves the inscribed spheres of the curves so far by more than a tube's, not by a bump's or a corner's length. A vessel that closes a loop is met from
-// both sides: its curve goes through. Curves are then smoothed and centred between the walls around them, on the surface itself, and led on to flat lids.
+// both sides: its curve goes through, unless it is pinched there (vessels that touch). Curves are then smoothed and
+// centred between the walls around them, on the surface itself, and led on to flat lids.
 #ifndef SELDINGER_RECON_MESH_CENTRELINE_H
 #define SELDINGER_RECON_MESH_CENTRELINE_H
 
