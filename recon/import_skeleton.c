@@ -125,18 +125,26 @@ static End end_at(const Fine *fine, const Wall *wall, int curve, bool last)
     return end;
 }
 
-// Whether another curve passes by or ends at this curve's end.
+static bool are_close(const Fine *fine, int i, int k)
+{
+    return vec3_distance(fine->point[i], fine->point[k]) < SAME * fmin(fine->radius[i], fine->radius[k]);
+}
+
+// Whether another curve passes by or ends at this curve's end. One that ends there too and comes the same way overlaps: it leaves the end free.
 static bool end_is_joined(const Fine *fine, int curve, int sample)
 {
-    for (int c = 0; c < fine->curve_count; c++)
-        for (int i = fine->offset[c]; c != curve && i < fine->offset[c + 1]; i++)
-            if (vec3_distance(fine->point[i], fine->point[sample]) < SAME * fmin(fine->radius[i], fine->radius[sample])) {
-                // overlapping curves that share this end leave it free
-                int near_end = i - fine->offset[c] < fine->offset[c + 1] - 1 - i ? fine->offset[c] : fine->offset[c + 1] - 1;
-                Vec3 own = fine->point[sample + (sample == fine->offset[curve] ? 1 : -1)], others = fine->point[i + (near_end == fine->offset[c] ? 1 : -1)];
-                if (near_end != i || vec3_dot(vec3_sub(own, fine->point[sample]), vec3_sub(others, fine->point[i])) < 0)
-                    return true;
-            }
+    Vec3 own = vec3_sub(fine->point[sample + (sample == fine->offset[curve] ? 1 : -1)], fine->point[sample]);
+    for (int c = 0; c < fine->curve_count; c++) {
+        int first = fine->offset[c], last = fine->offset[c + 1] - 1;
+        for (int i = first; c != curve && i <= last; i++) {
+            if (!are_close(fine, i, sample))
+                continue;
+            int end = i - first < last - i ? first : last;
+            Vec3 others = vec3_sub(fine->point[end + (end == first ? 1 : -1)], fine->point[end]);
+            if (!are_close(fine, end, sample) || vec3_dot(own, others) < 0)
+                return true;
+        }
+    }
     return false;
 }
 
