@@ -259,7 +259,7 @@ static SurfaceMesh *load_surface(const ImportCommand *command, MeshCheck *check,
 static CurveSet *get_curves(const ImportCommand *command, const SurfaceMesh *mesh, ImportReport *report, Faults *faults)
 {
     if (command->centreline_count == 0)
-        return mesh_centreline(mesh, &command->options, command->surface, faults);
+        return mesh_centreline(mesh, &command->options, report, command->surface, faults);
     CurveSet *set = curve_set_create();
     bool good = set != NULL;
     for (int i = 0; set && i < command->centreline_count; i++)

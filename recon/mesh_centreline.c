@@ -30,6 +30,8 @@ typedef struct Finding {
     WayHeap heap;
     int *tip, tip_count;     // voxels farther than their neighbours, farthest first
     CurveSet *set;
+    int cut_count;           // loops that are pinched …
+    Vec3 cut;                // … and the first of those places
     int *end, end_count;     // the voxel at each free end; the start first …
     int *end_point;          // … and the curve's point a radius before it
 } Finding;
@@ -424,7 +426,7 @@ static bool path_through(const Finding *f, Path *path, int tip, int join, int ot
 }
 
 // Whether two vessels only touch: beyond the spheres that it hangs on the curve is far narrower somewhere than on both sides of it.
-static bool is_pinched(const Path *path)
+static bool is_pinched(const Path *path, Vec3 *place)
 {
     Vec3 first = path->point[0], last = path->point[path->count - 1];
     int least = -1;
@@ -438,6 +440,7 @@ static bool is_pinched(const Path *path)
             before = fmax(before, path->radius[i]);
         else
             after = fmax(after, path->radius[i]);
+    *place = path->point[least >= 0 ? least : 0];
     return least >= 0 && path->radius[least] < PINCHED * fmin(before, after);
 }
 
@@ -453,7 +456,10 @@ static bool add_branch(Finding *f, int tip)
         good = path_through(f, &path, tip, join, other);
         if (good)
             path_centre(f, &path);
-        if (good && is_pinched(&path)) {
+        Vec3 place;
+        if (good && is_pinched(&path, &place)) {
+            if (f->cut_count++ == 0)
+                f->cut = place;
             path_free(&path);
             path = (Path){0};
             other = -1;
@@ -485,7 +491,7 @@ static bool find_curves(Finding *f, int start)
     free(f->end_point);
     f->end = malloc(((size_t)f->tip_count + 2) * sizeof *f->end);
     f->end_point = malloc(((size_t)f->tip_count + 2) * sizeof *f->end_point);
-    f->end_count = 0;
+    f->end_count = f->cut_count = 0;
     if (!f->end || !f->end_point)
         return false;
     if (f->tip_count == 0)
@@ -579,7 +585,7 @@ static int choose_start(const Finding *f, const ImportOptions *options)
     return best;
 }
 
-CurveSet *mesh_centreline(const SurfaceMesh *mesh, const ImportOptions *options, const char *name, Faults *faults)
+CurveSet *mesh_centreline(const SurfaceMesh *mesh, const ImportOptions *options, ImportReport *report, const char *name, Faults *faults)
 {
     SurfaceMesh closed;
     bool good = mesh_close(mesh, &closed);
@@ -600,6 +606,10 @@ CurveSet *mesh_centreline(const SurfaceMesh *mesh, const ImportOptions *options,
             if (good && root != start)
                 good = find_curves(&f, root);
             set = good ? f.set : NULL;
+            if (f.cut_count) {
+                report->loop = report->loop_count ? report->loop : f.cut;
+                report->loop_count += f.cut_count;
+            }
         }
         if (!set)
             curve_set_free(f.set);

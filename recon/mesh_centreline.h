@@ -10,8 +10,8 @@
 #include "recon/import_surface.h"
 
 // Curves with inscribed radii, each but the first beginning at a point of an earlier one; the first begins at the widest end, or that nearest to
-// options->root. `mesh` is mended. Of several lumens the largest is taken, or that which is nearest to options->root. NULL with faults: no memory, no
-// lumen found.
-CurveSet *mesh_centreline(const SurfaceMesh *mesh, const ImportOptions *options, const char *name, Faults *faults);
+// options->root. `mesh` is mended. Of several lumens the largest is taken, or that which is nearest to options->root. Pinched loops are
+// added to the report's. NULL with faults: no memory, no lumen found.
+CurveSet *mesh_centreline(const SurfaceMesh *mesh, const ImportOptions *options, ImportReport *report, const char *name, Faults *faults);
 
 #endif

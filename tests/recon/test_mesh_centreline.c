@@ -101,7 +101,7 @@ static void check_shape(const char *name, const char *key, const char *value, do
         SurfaceMesh *mesh = mesh_of(shape, cell, turn);
         ImportOptions options = import_default_options();
         ImportReport report = {0};
-        CurveSet *set = mesh_centreline(mesh, &options, name, &faults);
+        CurveSet *set = mesh_centreline(mesh, &options, &report, name, &faults);
         assert_non_null(set);
         double found, off, radius_error;
         compare(set, truth, turn, &found, &off, &radius_error);
@@ -120,7 +120,7 @@ static void check_shape(const char *name, const char *key, const char *value, do
         assert_true(report.unseen_points <= report.sampled_points / 50);
         if (turn == 0 && branches == 3) {
             options.threads = 3;
-            CurveSet *again = mesh_centreline(mesh, &options, name, &faults);
+            CurveSet *again = mesh_centreline(mesh, &options, &report, name, &faults);
             assert_non_null(again);
             assert_int_equal(again->point_count, set->point_count);
             assert_memory_equal(again->point, set->point, (size_t)set->point_count * sizeof(Vec3));
@@ -153,7 +153,7 @@ static void test_branches(void **state)
 static VesselTree *import_alone(SurfaceMesh *mesh, const char *name, ImportReport *report)
 {
     ImportOptions options = import_default_options();
-    CurveSet *set = mesh_centreline(mesh, &options, name, &faults);
+    CurveSet *set = mesh_centreline(mesh, &options, report, name, &faults);
     assert_non_null(set);
     VesselTree *tree = import_surface(mesh, set, &options, report, name, &faults);
     assert_non_null(tree);
@@ -243,8 +243,9 @@ static void test_nothing(void **state)
     for (int k = 0; k < 3; k++)
         mesh->triangle[0][k] = k;
     ImportOptions options = import_default_options();
+    ImportReport report = {0};
     faults_clear(&faults);
-    assert_null(mesh_centreline(mesh, &options, "flat.stl", &faults));
+    assert_null(mesh_centreline(mesh, &options, &report, "flat.stl", &faults));
     assert_int_equal(faults.count, 1);
     surface_free(mesh);
 }
