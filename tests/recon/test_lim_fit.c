@@ -20,6 +20,12 @@
 
 static Faults faults;
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+static const bool is_slow = true;    // the small shapes alone: the figures are the release build's business
+#else
+static const bool is_slow = false;
+#endif
+
 static Shape *make(const char *name, int count, const char (*option)[2][64])
 {
     faults_clear(&faults);
@@ -84,7 +90,7 @@ static void shapes_are_fitted_within_the_target(void **state)
 {
     (void)state;
     static const char *const names[] = {"capsule", "open-capsule", "arc", "bifurcation", "spiral", "phantom"};
-    for (int s = 0; s < 6; s++) {
+    for (int s = 0; s < (is_slow ? 4 : 6); s++) {
         Shape *shape = make(names[s], 0, NULL);
         LimFitOptions options = lim_fit_default_options();
         options.voxel_mm = shape_voxel_mm(shape);
@@ -125,7 +131,7 @@ static void distance_follows_the_target(void **state)
 static void noise_is_averaged(void **state)
 {
     (void)state;
-    for (int k = 1; k <= 2; k++) {
+    for (int k = 1; k <= (is_slow ? 1 : 2); k++) {
         char option[1][2][64] = {{"noise_mm", ""}};
         double sigma = 0.05 * k;
         snprintf(option[0][1], 64, "%g", sigma);
