@@ -36,6 +36,14 @@ static int look_around(const VesselTree *tree, Vec3 x, int node)
     return best_node;
 }
 
+// A vessel that runs beside a sac whose wall bulges out of its ball takes points of the sac that are many of its own radii away, and has no wall there.
+static bool is_nearer_in_radii(const VesselTree *tree, Vec3 x, int node, int next)
+{
+    double r2 = tree->radius[node] * tree->radius[node], next_r2 = tree->radius[next] * tree->radius[next];
+    double far2 = vec3_norm2(vec3_sub(x, tree->center[next]));
+    return far2 < 4 * next_r2 || far2 * r2 < vec3_norm2(vec3_sub(x, tree->center[node])) * next_r2;
+}
+
 int power_walk(const VesselTree *tree, Vec3 x, int node, int hops)
 {
     if (node < 0 || node >= tree->node_count)
@@ -46,7 +54,7 @@ int power_walk(const VesselTree *tree, Vec3 x, int node, int hops)
         for (int k = tree->near_offset[here]; k < tree->near_offset[here + 1]; k++) {
             int next = tree->near[k];
             double d = power_distance(x, tree->center[next], tree->radius[next]);
-            if (d < best) {
+            if (d < best && is_nearer_in_radii(tree, x, here, next)) {
                 best = d;
                 node = next;
             }

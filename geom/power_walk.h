@@ -6,7 +6,8 @@
 #include "geom/vessel_tree.h"
 
 static inline double power_distance(Vec3 x, Vec3 center, double radius) { return vec3_norm2(vec3_sub(x, center)) - radius * radius; }
-// The best node reached from `node` by repeated moves to a strictly better near node, at most `hops` of them. A point that then is further than 1.2 r
+// The best node reached from `node` by repeated moves to a strictly better near node, at most `hops` of them; to one whose ball X is outside of by its
+// radius or more only where that is also nearer in radii. A point that then is further than 1.2 r
 // from its node's centre, and inside the ball of a node to which a way through the tree of at most 2.5 times that distance leads, goes there.
 int power_walk(const VesselTree *tree, Vec3 x, int node, int hops);
 // The best node of the whole tree (lowest index on ties).
