@@ -327,7 +327,7 @@ static bool write_output(const SynthCommand *command, const Shape *shape, Faults
 
 static void print_row(const char *name, const MeasureRow *row)
 {
-    printf("%-28s %8d %8.4f %8.4f %8.4f %8.4f %8.4f\n", name, row->count, row->mean, row->median, row->p90, row->p99, row->most);
+    printf("%-28s %8d %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f\n", name, row->count, row->mean, row->rms, row->median, row->p90, row->p99, row->most);
 }
 
 static void json_row(cJSON *root, const char *name, const MeasureRow *row)
@@ -335,6 +335,7 @@ static void json_row(cJSON *root, const char *name, const MeasureRow *row)
     cJSON *item = cJSON_AddObjectToObject(root, name);
     cJSON_AddNumberToObject(item, "count", row->count);
     cJSON_AddNumberToObject(item, "mean_mm", row->mean);
+    cJSON_AddNumberToObject(item, "rms_mm", row->rms);
     cJSON_AddNumberToObject(item, "p50_mm", row->median);
     cJSON_AddNumberToObject(item, "p90_mm", row->p90);
     cJSON_AddNumberToObject(item, "p99_mm", row->p99);
@@ -364,7 +365,7 @@ static bool measure(const SynthCommand *command, const Shape *shape, Faults *fau
         cJSON_Delete(root);
     }
     if (good && !command->quiet && !(command->json && !strcmp(command->json, "-"))) {
-        printf("%-28s %8s %8s %8s %8s %8s %8s\n", "distance [mm]", "count", "mean", "p50", "p90", "p99", "max");
+        printf("%-28s %8s %8s %8s %8s %8s %8s %8s\n", "distance [mm]", "count", "mean", "rms", "p50", "p90", "p99", "max");
         print_row("true surface to model", &figures.to_model);
         print_row("model in its cell to truth", &figures.to_truth);
         print_row("jump between neighbours", &figures.jump);

@@ -27,7 +27,8 @@ static MeasureRow row_of(List *list)
         return row;
     qsort(list->value, (size_t)list->count, sizeof *list->value, compare_doubles);
     for (int i = 0; i < list->count; i++)
-        row.mean += list->value[i] / list->count;
+        row.mean += list->value[i] / list->count, row.rms += list->value[i] * list->value[i] / list->count;
+    row.rms = sqrt(row.rms);
     row.median = list->value[list->count / 2];
     row.p90 = list->value[(int)(0.9 * (list->count - 1))];
     row.p99 = list->value[(int)(0.99 * (list->count - 1))];

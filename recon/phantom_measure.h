@@ -6,7 +6,7 @@
 
 typedef struct MeasureRow {  // of absolute values [mm]
     int count;
-    double mean, median, p90, p99, most;
+    double mean, rms, median, p90, p99, most;
 } MeasureRow;
 
 typedef struct ShapeMeasure {
