@@ -4,6 +4,7 @@
 #include "cli/output.h"
 #include "geom/isosurface.h"
 #include "geom/simd.h"
+#include "geom/sort_doubles.h"
 #include "recon/lim_trial.h"
 #include "recon/phantom.h"
 #include "recon/rbt_track.h"
@@ -88,12 +89,6 @@ static int parse(int argc, char **argv, FitBench *bench)
     return -1;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 typedef struct Range {
     double least, median, most;
 } Range;
@@ -101,7 +96,7 @@ typedef struct Range {
 // Sorts `value`.
 static Range range_of(double *value, int count)
 {
-    qsort(value, (size_t)count, sizeof *value, compare_doubles);
+    sort_doubles(value, (size_t)count);
     double median = count % 2 ? value[count / 2] : 0.5 * (value[count / 2 - 1] + value[count / 2]);
     return (Range){value[0], median, value[count - 1]};
 }

@@ -5,6 +5,7 @@
 // them (5.2.1): one run a branch, started in it with the true point, direction and radius, and judged on that branch alone.
 #include "cli/bench.h"
 
+#include "recon/blurred_edge.h"
 #include "recon/mht_track.h"
 #include "recon/parallel.h"
 #include "recon/track_score.h"
@@ -195,13 +196,13 @@ static RbtSeed seed_at(const Angiogram *image, const TrackBranch *branch, double
     return (RbtSeed){.start = truth->center[at], .toward = truth->center[next], .has_toward = true, .radius = truth->radius[at], .name = "start"};
 }
 
-// b^2: the image's blur and partial voxels (v^2 / 12), the spline's (v^2 / 3), and the moving average along the rays.
+// b of all that blurs the image on its way to the edge.
 static double blur_of(const Angiogram *image, const RbtParameters *parameters)
 {
     double v2 = 0;
     for (int k = 0; k < 3; k++)
         v2 += pow(image->about->volume.voxel_mm[k], 2) / 3;
-    return sqrt(pow(image->about->volume.psf_mm, 2) + v2 / 12 + v2 / 3 + pow(parameters->ray_smoothing_voxels, 2) * v2 / 12);
+    return sqrt(pow(image->about->volume.psf_mm, 2) + blurred_edge_grid2(v2) + blurred_edge_average2(parameters->ray_smoothing_voxels, v2));
 }
 
 static void run_trial(void *context, long index)

@@ -24,6 +24,7 @@ typedef struct ProgressBar {
 Progress progress_bar(ProgressBar *bar, const char *label, bool quiet);
 // Number options: the whole text must be a finite number within [least, most]; else a message that names the option and the range, and false.
 bool cli_number(const char *option, const char *text, double least, double most, double *value);
+bool cli_point(const char *option, const char *text, Vec3 *point);   // X,Y,Z [mm], finite and below 1e9
 bool cli_whole_number(const char *option, const char *text, double least, double most, double *value);
 
 // Opens what a scene's `vessel:` names (recon is not below sim): loads a model, fits a shape (cached), builds a tube or plane.

@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "cli/output.h"
+#include "geom/sort_doubles.h"
 #include "recon/blurred_edge.h"
 #include "recon/lim_fit.h"
 #include "recon/model_measure.h"
@@ -165,12 +166,6 @@ typedef struct FitFigures {
     int worst_node;
 } FitFigures;
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static FitFigures figures_of(const VesselTree *model, double voxel, double seconds)
 {
     int n = model->node_count;
@@ -186,11 +181,11 @@ static FitFigures figures_of(const VesselTree *model, double voxel, double secon
     figures.error_worst = model->error[figures.worst_node];
     if (sorted) {
         memcpy(sorted, model->error, (size_t)n * sizeof *sorted);
-        qsort(sorted, (size_t)n, sizeof *sorted, compare_doubles);
+        sort_doubles(sorted, (size_t)n);
         figures.error_median = sorted[n / 2];
         for (int i = 0; i < n; i++)
             sorted[i] = (double)(model->blob_offset[i + 1] - model->blob_offset[i]);
-        qsort(sorted, (size_t)n, sizeof *sorted, compare_doubles);
+        sort_doubles(sorted, (size_t)n);
         figures.blobs_median = (int)sorted[n / 2];
         figures.blobs_most = (int)sorted[n - 1];
         free(sorted);

@@ -51,24 +51,6 @@ static int usage_fault(const char *message, const char *what)
     return EXIT_BAD_INPUT;
 }
 
-static bool read_root(const char *text, ImportOptions *options)
-{
-    double v[3];
-    char *end = (char *)(size_t)text;
-    for (int k = 0; k < 3; k++) {
-        const char *at = end;
-        v[k] = strtod(at, &end);
-        if (end == at || !isfinite(v[k]) || fabs(v[k]) > 1e9 || *end != (k < 2 ? ',' : '\0')) {
-            fprintf(stderr, "--root: '%s' is not valid; three numbers X,Y,Z in mm\n", text);
-            return false;
-        }
-        end += k < 2;
-    }
-    options->has_root = true;
-    options->root = vec3(v[0], v[1], v[2]);
-    return true;
-}
-
 static bool add_centreline(ImportCommand *command, const char *path)
 {
     if (command->centreline_count == FILES_MAX)
@@ -113,7 +95,7 @@ static int parse_options(int argc, char **argv, ImportCommand *command)
             if (!good)
                 return usage_fault("takes 1024 files of centrelines at most", "");
             break;
-        case ROOT: good = read_root(optarg, &command->options); break;
+        case ROOT: good = command->options.has_root = cli_point("--root", optarg, &command->options.root); break;
         case SCALE:
             good = cli_number("--scale", optarg, 1e-9, 1e9, &command->scale);
             command->has_scale = true;

@@ -4,6 +4,7 @@
 #include "cli/file_kind.h"
 #include "cli/output.h"
 #include "cli/report.h"
+#include "geom/sort_doubles.h"
 #include "recon/mesh_check.h"
 #include "recon/tree_file.h"
 #include "recon/volume.h"
@@ -32,12 +33,6 @@ static void add_vector(cJSON *object, const char *name, Vec3 v)
     cJSON_AddItemToObject(object, name, cJSON_CreateDoubleArray((double[]){v.x, v.y, v.z}, 3));
 }
 
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 // {"least", "median", "largest"} of `count` values.
 static void add_spread(cJSON *object, const char *name, const double *value, int count)
 {
@@ -45,7 +40,7 @@ static void add_spread(cJSON *object, const char *name, const double *value, int
     if (!sorted)
         return;
     memcpy(sorted, value, (size_t)count * sizeof *sorted);
-    qsort(sorted, (size_t)count, sizeof *sorted, by_value);
+    sort_doubles(sorted, (size_t)count);
     cJSON *spread = cJSON_AddObjectToObject(object, name);
     cJSON_AddNumberToObject(spread, "least", sorted[0]);
     cJSON_AddNumberToObject(spread, "median", sorted[(count - 1) / 2]);

@@ -127,6 +127,23 @@ bool cli_number(const char *option, const char *text, double least, double most,
     return true;
 }
 
+bool cli_point(const char *option, const char *text, Vec3 *point)
+{
+    double v[3];
+    char *end = (char *)(size_t)text;
+    for (int k = 0; k < 3; k++) {
+        const char *at = end;
+        v[k] = strtod(at, &end);
+        if (end == at || !isfinite(v[k]) || fabs(v[k]) > 1e9 || *end != (k < 2 ? ',' : '\0')) {
+            fprintf(stderr, "%s: '%s' is not valid; three numbers X,Y,Z in mm\n", option, text);
+            return false;
+        }
+        end += k < 2;
+    }
+    *point = vec3(v[0], v[1], v[2]);
+    return true;
+}
+
 bool cli_whole_number(const char *option, const char *text, double least, double most, double *value)
 {
     double number;

@@ -148,8 +148,8 @@ static void print_table(const VesselTree *tree, const RbtReport *report, double 
 // b [mm] of all that moved the edges that were tracked: the image's blur, or what its voxels and the spline make at least, and the average along the rays.
 static double edge_blur(const RbtParameters *parameters, const Volume *volume, const VesselTree *tree)
 {
-    double voxel = volume_voxel_size(volume), image = blurred_edge_measure(volume, tree), along = parameters->ray_smoothing_voxels * voxel;
-    return sqrt((image > 0 ? image * image : voxel * voxel * (1.0 / 12 + 1.0 / 3)) + along * along / 12);
+    double v2 = pow(volume_voxel_size(volume), 2), image = blurred_edge_measure(volume, tree);
+    return sqrt((image > 0 ? image * image : blurred_edge_grid2(v2)) + blurred_edge_average2(parameters->ray_smoothing_voxels, v2));
 }
 
 // What was found beside the parameters that found it, in the words of a trace; to be freed.
@@ -245,15 +245,12 @@ static void draw_picture(const SegmentArguments *a, const Volume *volume, const 
 static Trace *trace_of(const SegmentArguments *a, Faults *faults)
 {
     char text[160];
-    double x, y, z;
-    int used = 0;
+    Vec3 x;
     if (!a->start)
         return trace_load(a->trace, faults);
-    if (sscanf(a->start, "%lf,%lf,%lf%n", &x, &y, &z, &used) != 3 || a->start[used] || !(fabs(x) < 1e9 && fabs(y) < 1e9 && fabs(z) < 1e9)) {
-        faults_add(faults, "--start", 0, 0, "'%.60s' is not valid; three numbers X,Y,Z in mm", a->start);
+    if (!cli_point("--start", a->start, &x))
         return NULL;
-    }
-    int length = snprintf(text, sizeof text, "branches: [{start_mm: [%.17g, %.17g, %.17g]}]", x, y, z);
+    int length = snprintf(text, sizeof text, "branches: [{start_mm: [%.17g, %.17g, %.17g]}]", x.x, x.y, x.z);
     return trace_parse(text, (size_t)length, "--start", faults);
 }
 

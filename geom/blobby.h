@@ -6,6 +6,7 @@
 #define SELDINGER_GEOM_BLOBBY_H
 
 #include "geom/linear.h"
+#include "geom/vessel_tree.h"
 
 typedef struct Blobby {
     int count;               // number of blobs
@@ -13,6 +14,13 @@ typedef struct Blobby {
     const double *width;     // (count) rho > 0 [mm]
     double iso_level;        // T
 } Blobby;
+
+// The local model of a node of a fitted tree; borrows the tree's arrays.
+static inline Blobby blobby_of(const VesselTree *tree, int node)
+{
+    int64_t first = tree->blob_offset[node];
+    return (Blobby){(int)(tree->blob_offset[node + 1] - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level};
+}
 
 double blobby_field(const Blobby *model, Vec3 x);
 double blobby_gradient(const Blobby *model, Vec3 x, Vec3 *gradient);

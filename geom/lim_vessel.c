@@ -68,9 +68,7 @@ static Sym3 lane_hessian(const FootBatch *b, int i) { return (Sym3){b->axx[i], b
 
 static Blobby blobs_of(const LimVessel *lim, int node)
 {
-    const VesselTree *tree = lim->tree;
-    int64_t first = tree->blob_offset[lim->model[node].source], end = tree->blob_offset[lim->model[node].source + 1];
-    return (Blobby){(int)(end - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level};
+    return blobby_of(lim->tree, lim->model[node].source);
 }
 
 // --- The inlet ---

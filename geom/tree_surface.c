@@ -3,26 +3,12 @@
 #include "geom/tree_surface.h"
 
 #include "geom/blobby.h"
+#include "geom/disjoint_sets.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-static Blobby model_of(const VesselTree *tree, int node)
-{
-    int64_t first = tree->blob_offset[node];
-    return (Blobby){(int)(tree->blob_offset[node + 1] - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level};
-}
-
 // --- Parts ---
-
-static int root_of(int *link, int i)
-{
-    while (link[i] != i) {
-        link[i] = link[link[i]];
-        i = link[i];
-    }
-    return i;
-}
 
 // part[v]: the lowest vertex of v's connected part. NULL where memory lacks.
 static int *find_parts(const TriangleMesh *mesh)
@@ -33,12 +19,10 @@ static int *find_parts(const TriangleMesh *mesh)
     for (int v = 0; v < mesh->vertex_count; v++)
         part[v] = v;
     for (int t = 0; t < mesh->triangle_count; t++)
-        for (int k = 1; k < 3; k++) {
-            int a = root_of(part, mesh->triangle[t][0]), b = root_of(part, mesh->triangle[t][k]);
-            part[a > b ? a : b] = a < b ? a : b;
-        }
+        for (int k = 1; k < 3; k++)
+            disjoint_join(part, mesh->triangle[t][0], mesh->triangle[t][k]);
     for (int v = 0; v < mesh->vertex_count; v++)
-        part[v] = root_of(part, v);
+        part[v] = disjoint_root(part, v);
     return part;
 }
 
@@ -218,7 +202,7 @@ typedef struct Inlet {
 // Onto the node's model within the plane; p stays where that is further than `most`.
 static Vec3 settle_in_plane(const Inlet *inlet, int node, Vec3 p, double most)
 {
-    Blobby model = model_of(inlet->tree, node);
+    Blobby model = blobby_of(inlet->tree, node);
     Vec3 x = p, d = inlet->direction, g;
     for (int i = 0; i < 20; i++) {
         double f = blobby_gradient(&model, x, &g);
@@ -238,7 +222,7 @@ static Vec3 settle_in_plane(const Inlet *inlet, int node, Vec3 p, double most)
 
 static Vec3 normal_at(const Inlet *inlet, int node, Vec3 x)
 {
-    Blobby model = model_of(inlet->tree, node);
+    Blobby model = blobby_of(inlet->tree, node);
     Vec3 g;
     blobby_gradient(&model, x, &g);
     return vec3_unit(vec3_negate(g));
@@ -478,7 +462,7 @@ bool surface_point_error(const TriangleMesh *mesh, const VesselTree *tree, doubl
             distance[v] = nearest < 0 ? NAN : vec3_distance(x, tree->point[nearest]);
         if (!error)
             continue;
-        Blobby model = model_of(tree, of);
+        Blobby model = blobby_of(tree, of);
         error[v] = nearest < 0 ? NAN : blobby_project(&model, tree->point[nearest], x).distance;
     }
     return true;

@@ -1,21 +1,16 @@
 #include "geom/vessel_findings.h"
 
 #include "geom/blobby.h"
+#include "geom/sort_doubles.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 FindingOptions finding_default_options(void) { return (FindingOptions){.narrow = 0.7, .wide = 1.5}; }
 
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static double median(double *value, int count)
 {
-    qsort(value, (size_t)count, sizeof *value, by_value);
+    sort_doubles(value, (size_t)count);
     return 0.5 * (value[(count - 1) / 2] + value[count / 2]);
 }
 

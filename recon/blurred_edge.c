@@ -1,5 +1,6 @@
 #include "recon/blurred_edge.h"
 
+#include "geom/sort_doubles.h"
 #include "recon/bspline.h"
 
 #include <math.h>
@@ -109,12 +110,6 @@ static double profile_blur(const double profile[PROFILE])
     return height > 0 ? low : 0;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 double blurred_edge_measure(const Volume *volume, const VesselTree *tree)
 {
     double voxel = volume_voxel_size(volume), blur[NODES];
@@ -133,7 +128,7 @@ double blurred_edge_measure(const Volume *volume, const VesselTree *tree)
     }
     if (count < NODES_LEAST)
         return 0;
-    qsort(blur, (size_t)count, sizeof *blur, compare_doubles);
+    sort_doubles(blur, (size_t)count);
     return blur[count / 2] * SAMPLING * voxel;
 }
 

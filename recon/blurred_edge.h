@@ -17,6 +17,11 @@ double blurred_edge_undo(double edge, double blur);
 // node wider than three voxels, to which a step blurred by b is fitted; the median of up to 400 nodes. 0: fewer than ten such nodes.
 double blurred_edge_measure(const Volume *volume, const VesselTree *tree);
 
+// b^2 [mm^2] that an angiogram's grid adds: partial voxels (v^2 / 12) and the spline (v^2 / 3), for the mean square v2 of its voxels' edges.
+static inline double blurred_edge_grid2(double v2) { return v2 / 12 + v2 / 3; }
+// b^2 [mm^2] of a moving average along the rays over so many voxels.
+static inline double blurred_edge_average2(double voxels, double v2) { return voxels * voxels * v2 / 12; }
+
 // Moves the points of each node out from its axis, an aneurysm's from its centre, by what `blur` has moved them in, and the radii with them.
 // An aneurysm is curved both ways: twice the move of a vessel of its radius. False where memory lacks.
 bool blurred_edge_correct(VesselTree *tree, double blur);

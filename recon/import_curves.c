@@ -5,6 +5,8 @@
 // exact curves at ends and ostia by half a radius.
 #include "recon/import_skeleton.h"
 
+#include "geom/sort_doubles.h"
+
 #include <stdlib.h>
 
 static const double STEP = 0.3, GRAZE = 0.15, BESIDE = 0.5, GAIN = 1.5;
@@ -87,12 +89,6 @@ static bool is_in_lumen(const SurfaceMesh *mesh, const MeshTree *tree, Vec3 p)
     return from_within >= 2 && 2 * from_within > met;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 double section_radius(const MeshTree *tree, Vec3 p, Vec3 tangent, double reach, double *least, Vec3 *centroid)
 {
     Vec3 u = vec3_normal_to(tangent), v = vec3_cross(tangent, u), moment = {0, 0, 0};
@@ -109,7 +105,7 @@ double section_radius(const MeshTree *tree, Vec3 p, Vec3 tangent, double reach, 
     *centroid = p;
     if (met < SECTION_RAYS / 4)
         return 0;
-    qsort(sorted, (size_t)met, sizeof *sorted, compare_doubles);
+    sort_doubles(sorted, (size_t)met);
     double median = 0.5 * (sorted[(met - 1) / 2] + sorted[met / 2]);
     for (int k = 0; k < SECTION_RAYS; k++) {
         // a branch's mouth is no part of the section

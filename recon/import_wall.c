@@ -3,49 +3,23 @@
 // its pole lies an eighth of the lumen's area.
 #include "recon/import_skeleton.h"
 
+#include "geom/disjoint_sets.h"
+#include "recon/mesh_edges.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 static const double LID_COSINE = 0.94, SQUARE_COSINE = 0.7, EDGE_COSINE = 0.82,   // 20 degrees, 45 degrees, 35 degrees
                     ROUND = 0.5;   // area against the disc around it: triangles have 0.41 at most, squares 0.64
 
-typedef struct Side {
-    int low, high, triangle, side;
-} Side;
-
-static int compare_sides(const void *a, const void *b)
-{
-    const Side *x = a, *y = b;
-    if (x->low != y->low)
-        return x->low < y->low ? -1 : 1;
-    if (x->high != y->high)
-        return x->high < y->high ? -1 : 1;
-    return (x->triangle > y->triangle) - (x->triangle < y->triangle);
-}
-
-// across[t][k]: the triangle beyond side k, -1 where the side is open or crowded.
 static bool link_sides(const SurfaceMesh *mesh, int (*across)[3])
 {
-    int count = 3 * mesh->triangle_count, n = 0;
-    Side *side = malloc(((size_t)count + 1) * sizeof *side);
-    if (!side)
+    MeshEdge *edge = malloc((3 * (size_t)mesh->triangle_count + 1) * sizeof *edge);
+    if (!edge)
         return false;
-    for (int t = 0; t < mesh->triangle_count; t++)
-        for (int k = 0; k < 3; k++) {
-            int a = mesh->triangle[t][k], b = mesh->triangle[t][(k + 1) % 3];
-            side[n++] = (Side){a < b ? a : b, a < b ? b : a, t, k};
-            across[t][k] = -1;
-        }
-    qsort(side, (size_t)n, sizeof *side, compare_sides);
-    for (int i = 0, run; i < n; i += run) {
-        for (run = 1; i + run < n && side[i + run].low == side[i].low && side[i + run].high == side[i].high; run++)
-            ;
-        if (run == 2) {
-            across[side[i].triangle][side[i].side] = side[i + 1].triangle;
-            across[side[i + 1].triangle][side[i + 1].side] = side[i].triangle;
-        }
-    }
-    free(side);
+    mesh_edges_sort(mesh, edge);
+    mesh_edges_link(mesh, edge, across);
+    free(edge);
     return true;
 }
 
@@ -163,13 +137,6 @@ static bool is_junction(const CurveSet *set, int curve, Vec3 end, Vec3 outward, 
 
 // --- openings ---
 
-static int find_root(int *parent, int i)
-{
-    while (parent[i] != i)
-        i = parent[i] = parent[parent[i]];
-    return i;
-}
-
 static bool find_openings(Wall *wall)
 {
     const SurfaceMesh *mesh = &wall->mesh;
@@ -183,14 +150,12 @@ static bool find_openings(Wall *wall)
     }
     for (int t = 0; good && t < mesh->triangle_count; t++)
         for (int k = 0; k < 3; k++)
-            if (across[t][k] < 0) {
-                int a = find_root(parent, mesh->triangle[t][k]), b = find_root(parent, mesh->triangle[t][(k + 1) % 3]);
-                parent[a > b ? a : b] = a > b ? b : a;
-            }
+            if (across[t][k] < 0)
+                disjoint_join(parent, mesh->triangle[t][k], mesh->triangle[t][(k + 1) % 3]);
     for (int t = 0; good && t < mesh->triangle_count; t++)
         for (int k = 0; k < 3; k++)
             if (across[t][k] < 0) {
-                int root = find_root(parent, mesh->triangle[t][k]);
+                int root = disjoint_root(parent, mesh->triangle[t][k]);
                 number[root] = number[root] < 0 ? count++ : number[root];
             }
     wall->opening = calloc((size_t)count + 1, sizeof *wall->opening);
@@ -201,7 +166,7 @@ static bool find_openings(Wall *wall)
             for (int k = 0; k < 3; k++) {
                 if (across[t][k] >= 0)
                     continue;
-                int a = mesh->triangle[t][k], b = mesh->triangle[t][(k + 1) % 3], o = number[find_root(parent, a)];
+                int a = mesh->triangle[t][k], b = mesh->triangle[t][(k + 1) % 3], o = number[disjoint_root(parent, a)];
                 Vec3 p = mesh->vertex[a], q = mesh->vertex[b];
                 Opening *opening = &wall->opening[o];
                 double l = vec3_distance(p, q);

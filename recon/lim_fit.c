@@ -14,6 +14,7 @@
 
 #include "geom/blobby.h"
 #include "geom/power_walk.h"
+#include "geom/sort_doubles.h"
 #include "recon/lim_agree.h"
 
 #include <stdlib.h>
@@ -385,12 +386,6 @@ typedef struct Job {
     const double *differs;   // (N) how far the first's wall is from the one agreed on
 } Job;
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 // d_a: the 90th percentile of Taubin's distance of the node's own points, or of `others` where it has none.
 static double node_error(const VesselTree *tree, int node, const Gather *gather, const NodeModel *model, double iso_level)
 {
@@ -408,7 +403,7 @@ static double node_error(const VesselTree *tree, int node, const Gather *gather,
         double f = blobby_gradient(&blobby, point[i], &g);
         distance[i] = fabs(f) / fmax(vec3_norm(g), 1e-12);
     }
-    qsort(distance, (size_t)count, sizeof *distance, compare_doubles);
+    sort_doubles(distance, (size_t)count);
     double error = distance[(int64_t)(0.9 * (double)(count - 1) + 0.5)];
     free(distance);
     return error;

@@ -3,6 +3,7 @@
 #include "recon/lim_trial.h"
 
 #include "geom/blobby.h"
+#include "geom/sort_doubles.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -152,15 +153,9 @@ static bool spread_points(const LimTrialShape *shape, uint64_t *seed, Vec3 *poin
     return true;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static double p90(double *value, int count)
 {
-    qsort(value, (size_t)count, sizeof *value, compare_doubles);
+    sort_doubles(value, (size_t)count);
     return value[(int)(0.9 * (count - 1) + 0.5)];
 }
 

@@ -2,6 +2,9 @@
 // two triangles, then each component is turned outwards by the sign of its volume, openings closed by fans about their loops' middles.
 #include "recon/mesh_check.h"
 
+#include "geom/disjoint_sets.h"
+#include "recon/mesh_edges.h"
+
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -9,21 +12,6 @@
 #include <string.h>
 
 static const double WELD = 1e-6, SMALL = 1, LARGE = 5000;
-
-typedef struct Edge {
-    int low, high, triangle, side;
-    bool forward;            // the triangle runs low -> high
-} Edge;
-
-static int compare_edges(const void *a, const void *b)
-{
-    const Edge *x = a, *y = b;
-    if (x->low != y->low)
-        return x->low < y->low ? -1 : 1;
-    if (x->high != y->high)
-        return x->high < y->high ? -1 : 1;
-    return (x->triangle > y->triangle) - (x->triangle < y->triangle);
-}
 
 static void note(MeshFinding *finding, int index, Vec3 place)
 {
@@ -103,7 +91,7 @@ typedef struct Work {
     bool *turned;            // (T)
     bool *seen;              // (T)
     bool *used;              // (V) by the file's triangles
-    Edge *edge;              // (3 T) sorted
+    MeshEdge *edge;          // (3 T) sorted
     int (*across)[3];        // (T) the other triangle of an edge that has two, else -1
 } Work;
 
@@ -201,47 +189,18 @@ static bool drop_vertices(SurfaceMesh *mesh, MeshCheck *check, const int *same, 
 
 // --- edges, components, orientation ---
 
-static void sort_edges(const SurfaceMesh *mesh, Edge *edge)
-{
-    int count = 0;
-    for (int t = 0; t < mesh->triangle_count; t++)
-        for (int k = 0; k < 3; k++) {
-            int a = mesh->triangle[t][k], b = mesh->triangle[t][(k + 1) % 3];
-            edge[count++] = (Edge){a < b ? a : b, a < b ? b : a, t, k, a < b};
-        }
-    qsort(edge, (size_t)count, sizeof *edge, compare_edges);
-}
-
-// The edges from `at` on that are the same.
-static int run_of(const Edge *edge, int count, int at)
-{
-    int end = at + 1;
-    while (end < count && edge[end].low == edge[at].low && edge[end].high == edge[at].high)
-        end++;
-    return end - at;
-}
-
-static int find_root(int *parent, int i)
-{
-    while (parent[i] != i)
-        i = parent[i] = parent[parent[i]];
-    return i;
-}
-
 static void find_components(SurfaceMesh *mesh, MeshCheck *check, Work *work)
 {
     for (int i = 0; i < mesh->vertex_count; i++)
         work->parent[i] = i;
     for (int t = 0; t < mesh->triangle_count; t++)
-        for (int k = 1; k < 3; k++) {
-            int a = find_root(work->parent, mesh->triangle[t][0]), b = find_root(work->parent, mesh->triangle[t][k]);
-            work->parent[a > b ? a : b] = a > b ? b : a;
-        }
+        for (int k = 1; k < 3; k++)
+            disjoint_join(work->parent, mesh->triangle[t][0], mesh->triangle[t][k]);
     int *number = work->number;
     for (int i = 0; i < mesh->vertex_count; i++)
         number[i] = -1;
     for (int t = 0; t < mesh->triangle_count; t++) {
-        int root = find_root(work->parent, mesh->triangle[t][0]);
+        int root = disjoint_root(work->parent, mesh->triangle[t][0]);
         if (number[root] < 0)
             number[root] = check->component_count++;
         work->component[t] = number[root];
@@ -252,19 +211,14 @@ static void find_components(SurfaceMesh *mesh, MeshCheck *check, Work *work)
 static void link_triangles(const SurfaceMesh *mesh, MeshCheck *check, Work *work)
 {
     int count = 3 * mesh->triangle_count;
-    const Edge *edge = work->edge;
-    for (int t = 0; t < mesh->triangle_count; t++)
-        work->across[t][0] = work->across[t][1] = work->across[t][2] = -1;
+    const MeshEdge *edge = work->edge;
+    mesh_edges_link(mesh, edge, work->across);
     for (int e = 0, run; e < count; e += run) {
-        run = run_of(edge, count, e);
+        run = mesh_edges_run(edge, count, e);
         if (run == 1)
             note(&check->open_edges, work->source[edge[e].triangle], mesh->vertex[edge[e].low]);
         else if (run > 2)
             note(&check->nonmanifold_edges, work->source[edge[e].triangle], mesh->vertex[edge[e].low]);
-        else {
-            work->across[edge[e].triangle][edge[e].side] = edge[e + 1].triangle;
-            work->across[edge[e + 1].triangle][edge[e + 1].side] = edge[e].triangle;
-        }
     }
 }
 
@@ -319,18 +273,18 @@ static void add_lids(const SurfaceMesh *mesh, MeshCheck *check, Work *work, doub
         parent[i] = i;
     for (int pass = 0; pass < 2; pass++)
         for (int e = 0; e < count; e++) {
-            const Edge *edge = &work->edge[e];
-            if (work->across[edge->triangle][edge->side] >= 0 || run_of(work->edge, count, e) > 1 ||
+            const MeshEdge *edge = &work->edge[e];
+            if (work->across[edge->triangle][edge->side] >= 0 || mesh_edges_run(work->edge, count, e) > 1 ||
                 (e > 0 && edge[-1].low == edge->low && edge[-1].high == edge->high))
                 continue;
-            int a = find_root(parent, edge->low), b = find_root(parent, edge->high);
             if (pass == 0)
-                parent[a > b ? a : b] = a > b ? b : a;
+                disjoint_join(parent, edge->low, edge->high);
             else {
+                int a = disjoint_root(parent, edge->low);
                 // with the loop's first vertex as apex: any apex gives the same volume of a flat lid
                 Vec3 p = vec3_sub(mesh->vertex[edge->low], from), q = vec3_sub(mesh->vertex[edge->high], from), apex = vec3_sub(mesh->vertex[a], from);
                 double lid = vec3_dot(apex, vec3_cross(p, q)) / 6;
-                bool forward = edge->forward != work->turned[edge->triangle];
+                bool forward = (mesh->triangle[edge->triangle][edge->side] == edge->low) != work->turned[edge->triangle];
                 volume[work->component[edge->triangle]] += forward ? -lid : lid;
                 if (!work->number[a])
                     check->opening_count++;
@@ -392,7 +346,7 @@ static bool repair(SurfaceMesh *mesh, MeshCheck *check, Work *work)
     weld(mesh, check, work->same);
     if (!drop_triangles(mesh, check, work, size) || !drop_vertices(mesh, check, work->same, work->used))
         return false;
-    sort_edges(mesh, work->edge);
+    mesh_edges_sort(mesh, work->edge);
     find_components(mesh, check, work);
     link_triangles(mesh, check, work);
     return orient(mesh, check, work);
@@ -416,7 +370,7 @@ bool mesh_repair(SurfaceMesh *mesh, MeshCheck *check)
     check->unit_is_doubtful = most < SMALL || most > LARGE;
     Work work = {.same = calloc(v, sizeof(int)),      .parent = calloc(v, sizeof(int)),  .number = calloc(v, sizeof(int)),  .source = calloc(t, sizeof(int)),
                  .component = calloc(t, sizeof(int)), .queue = calloc(t, sizeof(int)),   .turned = calloc(t, sizeof(bool)), .seen = calloc(t, sizeof(bool)),
-                 .used = calloc(v, sizeof(bool)),     .edge = calloc(3 * t, sizeof(Edge)), .across = calloc(t, sizeof(int[3]))};
+                 .used = calloc(v, sizeof(bool)),     .edge = calloc(3 * t, sizeof(MeshEdge)), .across = calloc(t, sizeof(int[3]))};
     bool good = work.same && work.parent && work.number && work.source && work.component && work.queue && work.turned && work.seen && work.used &&
                 work.edge && work.across && repair(mesh, check, &work);
     free(work.same);

@@ -2,6 +2,8 @@
 // what passes through a common side and no row slips between them.
 #include "recon/mesh_lumen.h"
 
+#include "geom/disjoint_sets.h"
+#include "recon/mesh_edges.h"
 #include "recon/parallel.h"
 
 #include <stdlib.h>
@@ -14,43 +16,18 @@ static const double VOXELS_PER_RADIUS = 6, NEAR = 2, CHANGE = 0.05, SMALLEST = 0
 
 // --- lids ---
 
-typedef struct Side {
-    int low, high, from, to;
-} Side;
-
-static int compare_sides(const void *a, const void *b)
-{
-    const Side *x = a, *y = b;
-    if (x->low != y->low)
-        return x->low < y->low ? -1 : 1;
-    if (x->high != y->high)
-        return x->high < y->high ? -1 : 1;
-    return (x->from > y->from) - (x->from < y->from);
-}
-
-static int find_root(int *parent, int i)
-{
-    while (parent[i] != i)
-        i = parent[i] = parent[parent[i]];
-    return i;
-}
-
 bool mesh_close(const SurfaceMesh *mesh, SurfaceMesh *closed)
 {
-    size_t v = (size_t)mesh->vertex_count, t = (size_t)mesh->triangle_count, count = 3 * t, open = 0;
-    Side *side = malloc((count + 1) * sizeof *side);
+    size_t v = (size_t)mesh->vertex_count, t = (size_t)mesh->triangle_count, open = 0;
+    int count = 3 * mesh->triangle_count;
+    MeshEdge *side = malloc((3 * t + 1) * sizeof *side);
     int *parent = malloc((v + 1) * sizeof *parent), *lid = malloc((v + 1) * sizeof *lid);
     bool good = side && parent && lid;
     *closed = (SurfaceMesh){0};
-    for (size_t i = 0; good && i < count; i++) {
-        int a = mesh->triangle[i / 3][i % 3], b = mesh->triangle[i / 3][(i + 1) % 3];
-        side[i] = (Side){a < b ? a : b, a < b ? b : a, a, b};
-    }
     if (good)
-        qsort(side, count, sizeof *side, compare_sides);
-    for (size_t i = 0, run; good && i < count; i += run) {
-        for (run = 1; i + run < count && side[i + run].low == side[i].low && side[i + run].high == side[i].high; run++)
-            ;
+        mesh_edges_sort(mesh, side);
+    for (int i = 0, run; good && i < count; i += run) {
+        run = mesh_edges_run(side, count, i);
         if (run == 1)
             side[open++] = side[i];
     }
@@ -67,24 +44,23 @@ bool mesh_close(const SurfaceMesh *mesh, SurfaceMesh *closed)
             parent[i] = (int)i;
             lid[i] = -1;
         }
+        for (size_t i = 0; i < open; i++)
+            disjoint_join(parent, side[i].low, side[i].high);
         for (size_t i = 0; i < open; i++) {
-            int a = find_root(parent, side[i].low), b = find_root(parent, side[i].high);
-            parent[a > b ? a : b] = a > b ? b : a;
-        }
-        for (size_t i = 0; i < open; i++) {
-            int root = find_root(parent, side[i].low);
+            int root = disjoint_root(parent, side[i].low);
             if (lid[root] < 0) {
                 lid[root] = closed->vertex_count++;
                 closed->vertex[lid[root]] = vec3(0, 0, 0);
             }
             int middle = lid[root];
-            Vec3 p = mesh->vertex[side[i].from], q = mesh->vertex[side[i].to];
+            int from = mesh->triangle[side[i].triangle][side[i].side], to = mesh->triangle[side[i].triangle][(side[i].side + 1) % 3];
+            Vec3 p = mesh->vertex[from], q = mesh->vertex[to];
             double length = vec3_distance(p, q);
             closed->vertex[middle] = vec3_add_scaled(closed->vertex[middle], 0.5 * length, vec3_add(p, q));
             weight[middle] += length;
             int *corner = closed->triangle[closed->triangle_count++];
-            corner[0] = side[i].to;
-            corner[1] = side[i].from;
+            corner[0] = to;
+            corner[1] = from;
             corner[2] = middle;
         }
         for (int i = (int)v; i < closed->vertex_count; i++)

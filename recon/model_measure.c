@@ -5,6 +5,7 @@
 
 #include "geom/blobby.h"
 #include "geom/power_walk.h"
+#include "geom/sort_doubles.h"
 #include "geom/vessel.h"
 #include "recon/lim_agree.h"
 #include "recon/parallel.h"
@@ -99,12 +100,6 @@ static int place_of(const Job *job, int a, int b)
 
 // --- One node ---
 
-static Blobby model_of(const VesselTree *tree, int node)
-{
-    int64_t first = tree->blob_offset[node];
-    return (Blobby){(int)(tree->blob_offset[node + 1] - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level};
-}
-
 static Vec3 bisect(const Blobby *model, Vec3 c, Vec3 d, double low, double high)
 {
     bool in = blobby_field(model, vec3_add_scaled(c, low, d)) > 0;
@@ -146,7 +141,7 @@ static VesselHit ask(const Job *job, int node, Vec3 x)
 static void add_join(const Job *job, int node, int other, Vec3 x, Vec3 across, NodeFigures *f)
 {
     const double aside = 1e-4;   // [mm] beyond the rounding of the cells' planes
-    Blobby a = model_of(job->tree, node), b = model_of(job->tree, other);
+    Blobby a = blobby_of(job->tree, node), b = blobby_of(job->tree, other);
     SurfacePoint p = blobby_project(&a, x, x), q = blobby_project(&b, x, x);
     VesselHit before = ask(job, node, vec3_add_scaled(x, -aside, across)), behind = ask(job, other, vec3_add_scaled(x, aside, across));
     unsigned unfit = VESSEL_OPEN_END | VESSEL_BEYOND;
@@ -186,7 +181,7 @@ static bool slide_to_wall(const Blobby *model, Vec3 across, double far, Vec3 *x)
 static void look_at_wall(const Job *job, int node, Vec3 p, NodeFigures *f)
 {
     const VesselTree *tree = job->tree;
-    Blobby model = model_of(tree, node);
+    Blobby model = blobby_of(tree, node);
     double own = power_distance(p, tree->center[node], tree->radius[node]);
     for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++) {
         int other = tree->near[k];
@@ -210,7 +205,7 @@ static void look_at_wall(const Job *job, int node, Vec3 p, NodeFigures *f)
 static void cast_rays_of(const Job *job, int node, NodeFigures *f)
 {
     const VesselTree *tree = job->tree;
-    Blobby model = model_of(tree, node);
+    Blobby model = blobby_of(tree, node);
     Vec3 c = tree->center[node];
     double radius = tree->radius[node], step = 0.05 * radius;
     int rays = ray_count(tree, node);
@@ -262,12 +257,6 @@ static void measure_node(void *context, long index)
 
 // --- Sums ---
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static double part_of(const double *sorted, int count, double part) { return count > 0 ? sorted[(int)(part * (count - 1))] : 0; }
 
 static JumpRow jump_row(const Job *job, int place, bool met, double *value)
@@ -285,7 +274,7 @@ static JumpRow jump_row(const Job *job, int place, bool met, double *value)
                     row.gap_most = gap, row.worst_node = join->node, row.worst_other = join->other;
                 value[count++] = what == 0 ? gap : met ? join->met_normal : join->raw_normal;
             }
-        qsort(value, (size_t)count, sizeof *value, compare_doubles);
+        sort_doubles(value, (size_t)count);
         row.count = count;
         *(what ? &row.normal_median : &row.gap_median) = part_of(value, count, 0.5);
         *(what ? &row.normal_p99 : &row.gap_p99) = part_of(value, count, 0.99);
@@ -310,7 +299,7 @@ static WallRow wall_row(const Job *job, int place, double *value)
                 row.most = far, row.worst_node = i;
             value[row.count++] = far;
         }
-    qsort(value, (size_t)row.count, sizeof *value, compare_doubles);
+    sort_doubles(value, (size_t)row.count);
     row.p99 = part_of(value, row.count, 0.99);
     if (row.count > 0) {
         row.bias = sum / row.count;

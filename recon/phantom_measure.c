@@ -4,6 +4,7 @@
 
 #include "geom/blobby.h"
 #include "geom/power_walk.h"
+#include "geom/sort_doubles.h"
 
 #include <stdlib.h>
 
@@ -14,18 +15,12 @@ typedef struct List {
     int count;
 } List;
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static MeasureRow row_of(List *list)
 {
     MeasureRow row = {.count = list->count};
     if (list->count == 0)
         return row;
-    qsort(list->value, (size_t)list->count, sizeof *list->value, compare_doubles);
+    sort_doubles(list->value, (size_t)list->count);
     for (int i = 0; i < list->count; i++)
         row.mean += list->value[i] / list->count, row.rms += list->value[i] * list->value[i] / list->count;
     row.rms = sqrt(row.rms);
@@ -34,12 +29,6 @@ static MeasureRow row_of(List *list)
     row.p99 = list->value[(int)(0.99 * (list->count - 1))];
     row.most = list->value[list->count - 1];
     return row;
-}
-
-static Blobby model_of(const VesselTree *tree, int node)
-{
-    int64_t first = tree->blob_offset[node];
-    return (Blobby){(int)(tree->blob_offset[node + 1] - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level};
 }
 
 // From the node's centre along d to the first change of sign of the model's field (NULL: the shape's). False where that is not in the node's
@@ -87,7 +76,7 @@ static void add_jumps(const VesselTree *tree, int node, Vec3 p, double distance,
         double beyond = (power_distance(p, tree->center[other], tree->radius[other]) - own) / (2 * apart);
         if (beyond > 0.1 * tree->radius[node])
             continue;
-        Blobby model = model_of(tree, other);
+        Blobby model = blobby_of(tree, other);
         jump->value[jump->count++] = fabs(blobby_project(&model, p, p).distance - distance);
     }
 }
@@ -101,7 +90,7 @@ bool shape_measure(const Shape *shape, const VesselTree *tree, ShapeMeasure *out
     double worst = -1;
     bool good = to_model.value && to_truth.value && jump.value && vessel_tree_is_model(tree);
     for (int node = 0; good && node < tree->node_count; node++) {
-        Blobby model = model_of(tree, node);
+        Blobby model = blobby_of(tree, node);
         Vec3 c = tree->center[node], hit;
         double truth = shape_field(shape, c, NULL);
         // on the axis there may be no closest point to find; the sign is then the field's

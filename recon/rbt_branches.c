@@ -3,6 +3,7 @@
 //
 // Limbs of a round are tracked at the same time on the tree as it was, and adopted widest first; what lies in a tube that was adopted before is left out.
 #include "recon/rbt_branches.h"
+#include "geom/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/rbt_links.h"
 #include "recon/rbt_sacs.h"
@@ -80,12 +81,6 @@ static bool is_rim(const Tracker *t, const RbtLimb *limb)
     return 2 * beside > limb->count;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 // Bone passes the ceiling of single samples where noise darkens them, not that of a median.
 static bool is_dense(const Tracker *t, const RbtLimb *limb, const Track *track)
 {
@@ -94,7 +89,7 @@ static bool is_dense(const Tracker *t, const RbtLimb *limb, const Track *track)
     int n = 0, stride = track->count / MOST + 1;
     for (int i = 0; i < track->count && n < MOST; i += stride)
         value[n++] = tracker_brightness(t, track->node[i].cylinder.center);
-    qsort(value, (size_t)n, sizeof *value, compare_doubles);
+    sort_doubles(value, (size_t)n);
     return n > 0 && value[n / 2] > fmin(limb->ceiling, t->ceiling) - RBT_NOISE_SHARE * t->noise;
 }
 
@@ -408,11 +403,11 @@ static double noise_of(const Tracker *t)
     for (size_t i = 0; i < voxels && n < SAMPLES; i += stride)
         value[n++] = (double)bspline_sample(t->volume, vec3((double)(i % (size_t)size[0]), (double)(i / (size_t)size[0] % (size_t)size[1]),
                                                             (double)(i / ((size_t)size[0] * (size_t)size[1]))));
-    qsort(value, (size_t)n, sizeof *value, compare_doubles);
+    sort_doubles(value, (size_t)n);
     double middle = value[n / 2];
     for (int i = 0; i < n; i++)
         value[i] = fabs(value[i] - middle);
-    qsort(value, (size_t)n, sizeof *value, compare_doubles);
+    sort_doubles(value, (size_t)n);
     return 1.4826 * value[n / 2];
 }
 
@@ -427,8 +422,8 @@ static void measure_root(Tracker *t, double noise)
         inliers += t->tree.node[i].inlier_rate;
         contrast[n++] = t->tree.node[i].contrast;
     }
-    qsort(inside, (size_t)n, sizeof *inside, compare_doubles);
-    qsort(contrast, (size_t)n, sizeof *contrast, compare_doubles);
+    sort_doubles(inside, (size_t)n);
+    sort_doubles(contrast, (size_t)n);
     t->usual_inliers = inliers / n;
     t->floor = inside[n / 2] - (1 - t->parameters->residue) * contrast[n / 2];
     t->ceiling = inside[n - 1 - n / 10] + RBT_BRIGHTER * contrast[n / 2] + RBT_NOISE_SHARE * noise;

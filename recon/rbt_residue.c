@@ -2,6 +2,7 @@
 // a forest by the way they were reached (as in rbt_exits.c). Its deepest leaf with the way down to a root is a limb, then the deepest of what is left, and
 // so on; short ones are ragged edges.
 #include "recon/rbt_residue.h"
+#include "geom/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/way_heap.h"
 
@@ -386,12 +387,6 @@ static RbtLimb *gather_limbs(const Flood *f, Piece *piece, int piece_count, cons
     return limb;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 // Brightness inside and beside the vessel, medians over a few nodes.
 static void set_borders(const Tracker *t, int first, int end, double share, double noise, Border *border)
 {
@@ -406,8 +401,8 @@ static void set_borders(const Tracker *t, int first, int end, double share, doub
                 outside[n] = inside[n] - t->tree.node[k].contrast;
                 n++;
             }
-        qsort(inside, (size_t)n, sizeof *inside, compare_doubles);
-        qsort(outside, (size_t)n, sizeof *outside, compare_doubles);
+        sort_doubles(inside, (size_t)n);
+        sort_doubles(outside, (size_t)n);
         double in = inside[n / 2], out = fmin(outside[n / 2], in);
         border[i - first].level = out + fmax(share * (in - out), noise);
         // narrow vessels are dim: what leaves them need not be

@@ -5,6 +5,7 @@
 // A sac that is no ball gets further centres (section 3.4 has several in a giant one): of the places between the first centre and its walls the one
 // whose inscribed ball sticks out furthest of the other centres' balls, until none does by much. A ball stays alone.
 #include "recon/rbt_sacs.h"
+#include "geom/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/cast_rays.h"
 
@@ -15,12 +16,6 @@ static const double least_closed = 0.7;   // share of the rays that meet a wall
 // Of a further centre's inscribed ball, shares of the first one's radius: its radius, and how far it sticks out of the other balls.
 static const double least_lobe = 0.35;
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 // What the vessel is like around its node, not what it swells to in front of the neck.
 static double radius_beside(const Track *tree, int node)
 {
@@ -30,7 +25,7 @@ static double radius_beside(const Track *tree, int node)
     for (int i = node - HALF; i <= node + HALF; i++)
         if (i >= 0 && i < tree->count && tree->node[i].branch == tree->node[node].branch)
             radius[n++] = tree->node[i].cylinder.radius;
-    qsort(radius, (size_t)n, sizeof *radius, compare_doubles);
+    sort_doubles(radius, (size_t)n);
     return radius[n / 2];
 }
 
@@ -43,7 +38,7 @@ static int see_walls(const Tracker *t, Vec3 x, const Vec3 *ray, int rays, double
     for (int i = 0; i < rays; i++)
         if (distance[i] > 0)
             sorted[met++] = distance[i];
-    qsort(sorted, (size_t)met, sizeof *sorted, compare_doubles);
+    sort_doubles(sorted, (size_t)met);
     return met;
 }
 

@@ -2,6 +2,8 @@
 // nearest to their middles, weighed by length^-4, is nearer to the middle of the lumen, and the direction across which they lie is the axis.
 #include "recon/rbt_start.h"
 
+#include "geom/sort_doubles.h"
+
 #include <stdlib.h>
 
 enum { MAX_CENTRINGS = 12 };
@@ -56,12 +58,6 @@ static Vec3 step_to_middle(const Chords *c)
     return vec3_scale(vec3(vec3_dot(b, vec3_cross(v, w)), vec3_dot(u, vec3_cross(b, w)), vec3_dot(u, vec3_cross(v, b))), 1 / det);
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 // Half the median chord across the axis.
 static double radius_across(const Tracker *t, const Chords *c, Vec3 axis)
 {
@@ -70,7 +66,7 @@ static double radius_across(const Tracker *t, const Chords *c, Vec3 axis)
     for (int i = 0; i < t->ray_count; i++)
         if (fabs(vec3_dot(t->ray[i], axis)) < 0.3)
             half[n++] = 0.5 * (c->ahead[i] + c->behind[i]);
-    qsort(half, (size_t)n, sizeof *half, compare_doubles);
+    sort_doubles(half, (size_t)n);
     return n > 0 ? half[n / 2] : c->nearest;
 }
 
@@ -82,7 +78,7 @@ static double background_beside(const Tracker *t, Vec3 x, Vec3 axis, double radi
     for (int i = 0; i < t->ray_count; i++)
         if (fabs(vec3_dot(t->ray[i], axis)) < 0.3)
             value[n++] = tracker_brightness(t, vec3_add_scaled(x, 1.5 * radius + t->voxel, t->ray[i]));
-    qsort(value, (size_t)n, sizeof *value, compare_doubles);
+    sort_doubles(value, (size_t)n);
     for (int i = 0; i < n / 2; i++)
         sum += value[i] / (n / 2);
     return n > 1 ? sum : t->background;
@@ -186,20 +182,10 @@ static double distance_to_border(const Volume *v, Vec3 x)
     return least;
 }
 
-static double radius_at_end(const Track *track)
-{
-    double radius[12];
-    int n = track->count < 12 ? track->count : 12;
-    for (int i = 0; i < n; i++)
-        radius[i] = track->node[track->count - 1 - i].cylinder.radius;
-    qsort(radius, (size_t)n, sizeof *radius, compare_doubles);
-    return radius[n / 2];
-}
-
 bool rbt_root_is_at_end_of(const Tracker *t, const Track *a, const Track *b, const char **why)
 {
     const Cylinder *ends[2] = {&a->node[a->count - 1].cylinder, &b->node[b->count - 1].cylinder};
-    double distance[2], radius[2] = {radius_at_end(a), radius_at_end(b)};
+    double distance[2], radius[2] = {tracker_usual_radius(a), tracker_usual_radius(b)};
     bool at_border[2];
     for (int i = 0; i < 2; i++) {
         distance[i] = distance_to_border(t->volume, ends[i]->center);

@@ -8,6 +8,7 @@
 // way is straight on into the sac, and the tracking ends at its bottom. Where a branch swells or ends, the lumen ahead is searched for tubes that
 // leave it (rbt_exits.h), and the branch goes on from the widest one that tracks.
 #include "recon/rbt_track.h"
+#include "geom/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/cast_rays.h"
 #include "recon/ransac_cylinder.h"
@@ -62,12 +63,6 @@ void track_free(Track *track)
 
 // --- estimation, section 3.1 ---
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 // Half of the sphere's vertices, +z first, then by angle with it: the directions of a RANSAC are these, turned so that +z is the predicted axis.
 static void prepare_axes(Tracker *t)
 {
@@ -103,7 +98,7 @@ static double contrast_of(const Tracker *t, const Cylinder *c)
         double a = 2 * PI * i / RING;
         ring[i] = tracker_brightness(t, vec3_add_scaled(vec3_add_scaled(c->center, radius * cos(a), e1), radius * sin(a), e2));
     }
-    qsort(ring, RING, sizeof *ring, compare_doubles);
+    sort_doubles(ring, RING);
     for (int i = 0; i < RING / 2; i++)
         outside += ring[i] / (RING / 2);
     return inside - outside;
@@ -135,7 +130,7 @@ static double median_along(Tracker *t, const Cylinder *c, int inliers)
 {
     for (int i = 0; i < inliers; i++)
         t->along[i] = vec3_dot(vec3_sub(t->candidate[t->inlier[i]], c->center), c->axis);
-    qsort(t->along, (size_t)inliers, sizeof *t->along, compare_doubles);
+    sort_doubles(t->along, (size_t)inliers);
     return inliers % 2 ? t->along[inliers / 2] : 0.5 * (t->along[inliers / 2 - 1] + t->along[inliers / 2]);
 }
 
@@ -177,7 +172,7 @@ bool tracker_estimate(Tracker *t, const Cylinder *predicted, double relative_thr
         return false;
     for (int i = 0; i < inliers; i++)
         t->along[i] = fabs(vec3_dot(vec3_sub(t->candidate[t->inlier[i]], c.center), c.axis));
-    qsort(t->along, (size_t)inliers, sizeof *t->along, compare_doubles);
+    sort_doubles(t->along, (size_t)inliers);
     int inside = (int)ceil(p->height_share * inliers);
     c.height = 2 * t->along[inside > 0 ? inside - 1 : 0];
     t->estimate.node = (TrackNode){.cylinder = c, .inlier_rate = rate, .contrast = contrast_of(t, &c), .kind = NODE_VESSEL, .parent = -1};
@@ -242,14 +237,13 @@ static double recent_contrast(const Track *track)
     return sum / (track->count - first);
 }
 
-// The median radius of the last nodes: what the vessel is like.
-static double usual_radius(const Track *branch)
+double tracker_usual_radius(const Track *branch)
 {
     double radius[12];
     int n = branch->count < 12 ? branch->count : 12;
     for (int i = 0; i < n; i++)
         radius[i] = branch->node[branch->count - 1 - i].cylinder.radius;
-    qsort(radius, (size_t)n, sizeof *radius, compare_doubles);
+    sort_doubles(radius, (size_t)n);
     return radius[n / 2];
 }
 
@@ -296,7 +290,7 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     if (t->is_guarded && tracker_brightness(t, next->cylinder.center) < t->floor)
         return false;
     t->why = "leaks into a wider or brighter neighbour";
-    if (t->is_guarded && branch->count >= 3 && (next->cylinder.radius > 1.8 * usual_radius(branch) || next->contrast > 1.8 * contrast))
+    if (t->is_guarded && branch->count >= 3 && (next->cylinder.radius > 1.8 * tracker_usual_radius(branch) || next->contrast > 1.8 * contrast))
         return false;
     t->why = "no vessel beyond";
     if (is_retry && (fabs(next->cylinder.radius - last->cylinder.radius) > p->retry_radius * last->cylinder.radius ||
@@ -412,7 +406,7 @@ static bool join_exit(Tracker *t, Track *branch, int keep, const RbtExit *exit, 
         if (t->is_guarded && darkest_between(t, last.center, c->center) < t->floor)   // no leap over what is too faint for a vessel
             link = 0;
         // it has met the branch, has come into the wide part, or has passed by
-        if (i > 0 && (distance < last.radius || c->radius > 1.35 * usual_radius(&back) || (brightest >= 0.9 && link < 0.5)))
+        if (i > 0 && (distance < last.radius || c->radius > 1.35 * tracker_usual_radius(&back) || (brightest >= 0.9 && link < 0.5)))
             break;
         good = track_append(&back, &t->estimate.node, t->estimate.point);
         if (link >= 0.9 ? brightest < 0.9 || distance < nearest : link > brightest) {
@@ -444,7 +438,7 @@ static bool look_ahead(Tracker *t, Track *branch)
 {
     enum { MAX_EXITS = 16 };
     RbtExit exit[MAX_EXITS];
-    double radius = usual_radius(branch), base = (double)t->volume->minimum;
+    double radius = tracker_usual_radius(branch), base = (double)t->volume->minimum;
     int keep = branch->count, found = 0;
     while (keep > 2 && branch->node[keep - 1].cylinder.radius > 1.15 * radius)
         keep--;
@@ -503,7 +497,7 @@ void tracker_run(Tracker *t, const Cylinder *start, Track *branch, bool until_tr
         if (!left && length > 6 * branch->node[0].cylinder.radius)
             return;
         found = next_node(t, branch, !left);
-        bool swells = found && branch->count >= 6 && t->estimate.node.cylinder.radius > 1.35 * usual_radius(branch);
+        bool swells = found && branch->count >= 6 && t->estimate.node.cylinder.radius > 1.35 * tracker_usual_radius(branch);
         rest -= rest > 0;
         if (p->look_ahead > 0 && !until_tree && left && branch->count >= 6 && rest == 0 && (swells || !found)) {
             rest = 12;

@@ -59,6 +59,7 @@ bool track_append(Track *track, const TrackNode *node, const Vec3 *point);   // 
 void track_cut(Track *track, int count);
 void track_free(Track *track);
 
+double tracker_usual_radius(const Track *branch);   // the median of its last nodes: what the vessel is like
 double tracker_brightness(const Tracker *t, Vec3 point);   // the spline's value
 bool tracker_is_inside(const Volume *volume, Vec3 x);
 bool tracker_is_forbidden(const Tracker *t, Vec3 x);   // by the trace

@@ -1,5 +1,6 @@
 // A model's surface coloured by its distance to the data, and the paper's Table 4 as a histogram.
 #include "render/message.h"
+#include "geom/sort_doubles.h"
 #include "render/sheet.h"
 
 #include <stdlib.h>
@@ -7,12 +8,6 @@
 enum { BINS = 50 };
 
 static Color map_diverging(double x) { return color_diverging(x); }
-
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 // The end of the colour scale: the 98th percentile of |error|, rounded up.
 static double find_scale(const PictureOptions *options, int count, const double *error)
@@ -23,7 +18,7 @@ static double find_scale(const PictureOptions *options, int count, const double 
         if (isfinite(error[i]))
             sorted[finite++] = fabs(error[i]);
     if (finite > 0) {
-        qsort(sorted, (size_t)finite, sizeof *sorted, compare_doubles);
+        sort_doubles(sorted, (size_t)finite);
         scale = sorted[(int)(0.98 * (finite - 1))];
     }
     free(sorted);

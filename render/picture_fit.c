@@ -4,6 +4,7 @@
 // A slice through node i holds the node's centre, its axis (to the right) and its worst point. Contour: f_i = 0 by marching squares on bilinear
 // cells; its neighbours' contours, faint, show where the wall jumps from one local model to the next.
 #include "render/message.h"
+#include "geom/sort_doubles.h"
 #include "render/sheet.h"
 
 #include <stdlib.h>
@@ -25,19 +26,6 @@ typedef struct FitDrawing {
 
 static Color map_diverging(double x) { return color_diverging(x); }
 
-static Blobby model_of(const VesselTree *tree, int node)
-{
-    int64_t first = tree->blob_offset[node];
-    return (Blobby){.count = (int)(tree->blob_offset[node + 1] - first), .center = tree->blob_center + first, .width = tree->blob_width + first,
-                    .iso_level = tree->iso_level};
-}
-
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static bool find_distances(FitDrawing *drawing, const double *distance)
 {
     const VesselTree *tree = drawing->tree;
@@ -48,7 +36,7 @@ static bool find_distances(FitDrawing *drawing, const double *distance)
     if (!drawing->distance || !drawing->sorted || !drawing->field)
         return false;
     for (int i = 0; i < tree->node_count; i++) {
-        Blobby model = model_of(tree, i);
+        Blobby model = blobby_of(tree, i);
         for (int64_t k = tree->point_offset[i]; k < tree->point_offset[i + 1]; k++) {
             Vec3 gradient;
             double d = NAN;
@@ -63,7 +51,7 @@ static bool find_distances(FitDrawing *drawing, const double *distance)
                 drawing->sorted[drawing->finite_count++] = fabs(d);
         }
     }
-    qsort(drawing->sorted, (size_t)drawing->finite_count, sizeof *drawing->sorted, compare_doubles);
+    sort_doubles(drawing->sorted, (size_t)drawing->finite_count);
     return true;
 }
 
@@ -154,7 +142,7 @@ typedef struct Slice {
 
 static void draw_contour(FitDrawing *drawing, const Slice *slice, int node, Color color, double thickness)
 {
-    Blobby model = model_of(drawing->tree, node);
+    Blobby model = blobby_of(drawing->tree, node);
     if (model.count < 1)
         return;
     const int n = SLICE_CELLS + 1;
@@ -234,7 +222,7 @@ static void draw_slice(FitDrawing *drawing, int node, double x, double y, double
     overlay_pop_clip(sheet->overlay);
     overlay_rectangle(sheet->overlay, slice.x, slice.y, slice.side, slice.side, SHEET_FAINT, s);
     char blobs[32];
-    snprintf(blobs, sizeof blobs, "%d blobs", model_of(tree, node).count);
+    snprintf(blobs, sizeof blobs, "%d blobs", blobby_of(tree, node).count);
     sheet_label(sheet, slice.x + slice.side - 6 * s, slice.y + slice.side - 22 * s, 1, TEXT_SMALL, SHEET_MUTED, blobs);
     sheet_scale_bar(sheet, slice.x + 8 * s, slice.y + slice.side - 6 * s, 0.3 * slice.side, 1 / scale, SHEET_INK);
 }
@@ -246,7 +234,7 @@ static int choose_worst(const VesselTree *tree, int most, int chosen[WORST_MOST]
     while (tree->error && count < most && count < WORST_MOST) {
         int best = -1;
         for (int i = 0; i < tree->node_count; i++) {
-            bool near_other = model_of(tree, i).count < 1 || !isfinite(tree->error[i]);
+            bool near_other = blobby_of(tree, i).count < 1 || !isfinite(tree->error[i]);
             for (int k = 0; k < count; k++)
                 near_other = near_other || vec3_distance(tree->center[i], tree->center[chosen[k]]) < 1.5 * tree->radius[chosen[k]];
             if (!near_other && (best < 0 || tree->error[i] > tree->error[best]))

@@ -2,6 +2,8 @@
 // arcs. An arc of radius R whose plane is turned by the sum of all plane angles up to it is therefore a rest curvature 1 / R in that direction.
 #include "sim/rest_shape.h"
 
+#include "geom/sort_doubles.h"
+
 #include <stdlib.h>
 
 static const double sliver_mm = 0.01;
@@ -14,12 +16,6 @@ double rest_shape_length(const TubePiece *piece, int piece_count)
     for (int i = 0; i < piece_count; i++)
         sum += piece_length(&piece[i]);
     return sum;
-}
-
-static int by_size(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
 }
 
 // Where sections end, each moved to a piece's border that it nearly meets, and where pieces end, in rising order.
@@ -37,7 +33,7 @@ static int lay_borders(const double *section_end, int section_count, const doubl
     for (int k = 0; k <= piece_count; k++)
         if (piece_end[k] > 0 && piece_end[k] < total)
             border[count++] = piece_end[k];
-    qsort(border, (size_t)count, sizeof *border, by_size);
+    sort_doubles(border, (size_t)count);
     return count;
 }
 

@@ -18,15 +18,7 @@
 #include <sys/wait.h>
 
 static char folder[] = "/tmp/seldinger-export-XXXXXX";
-
-static const char *in_folder(const char *name)
-{
-    static char path[8][200];
-    static int turn;
-    turn = (turn + 1) % 8;
-    snprintf(path[turn], sizeof path[turn], "%s/%s", folder, name);
-    return path[turn];
-}
+#include "tests/cli/folder.h"
 
 static int seldinger(const char *verb, const char *in, const char *more, const char *out)
 {
@@ -44,28 +36,6 @@ static int make_model(void **state)
         return -1;
     snprintf(command, sizeof command, "%s synth bifurcation --points 40 --quiet -o '%s'", SELDINGER_PROGRAM, in_folder("tree.h5"));
     return system(command) == 0 ? seldinger("fit", in_folder("tree.h5"), "--target-mm 0.1 --quiet", in_folder("model.h5")) : -1;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    char command[100];
-    snprintf(command, sizeof command, "rm -r '%s'", folder);
-    return system(command);
-}
-
-static char *text_of(const char *path)
-{
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    fseek(file, 0, SEEK_END);
-    size_t size = (size_t)ftell(file);
-    rewind(file);
-    char *text = malloc(size + 1);
-    assert_int_equal(fread(text, 1, size, file), size);
-    text[size] = '\0';
-    fclose(file);
-    return text;
 }
 
 static void all_formats_hold_the_same_surface(void **state)

@@ -22,15 +22,7 @@
 
 static char folder[] = "/tmp/seldinger-must-XXXXXX", output[1 << 16];
 static Faults faults;
-
-static const char *in_folder(const char *name)
-{
-    static char path[4][300];
-    static int turn;
-    turn = (turn + 1) % 4;
-    snprintf(path[turn], sizeof path[turn], "%s/%s", folder, name);
-    return path[turn];
-}
+#include "tests/cli/folder.h"
 
 // Runs `seldinger ARGUMENTS` in the folder; its words go to `output`. Fails where it does not end with 0.
 static void run(const char *arguments)
@@ -301,14 +293,6 @@ static int make_folder(void **state)
     run("synth phantom -o tree.h5 --quiet");
     run("fit tree.h5 -o phantom.h5 --quiet");
     return 0;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    char command[300];
-    snprintf(command, sizeof command, "rm -rf '%s'", folder);
-    return system(command);
 }
 
 int main(void)

@@ -20,17 +20,9 @@
 #include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-report-XXXXXX";
+#include "tests/cli/folder.h"
 static const char *browser;  // NULL: none
 static int branch_count;      // of the model
-
-static const char *in_folder(const char *name)
-{
-    static char path[8][200];
-    static int turn;
-    turn = (turn + 1) % 8;
-    snprintf(path[turn], sizeof path[turn], "%s/%s", folder, name);
-    return path[turn];
-}
 
 // The phantom fitted, with a place made half as wide in the middle of its first branch.
 static int make_model(void)
@@ -65,28 +57,6 @@ static int make_folder(void **state)
         browser = system(command) == 0 ? names[i] : NULL;
     }
     return mkdtemp(folder) ? make_model() : -1;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    char command[100];
-    snprintf(command, sizeof command, "rm -r '%s'", folder);
-    return system(command);
-}
-
-static char *text_of(const char *path)
-{
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    fseek(file, 0, SEEK_END);
-    size_t size = (size_t)ftell(file);
-    rewind(file);
-    char *text = malloc(size + 1);
-    assert_int_equal(fread(text, 1, size, file), size);
-    text[size] = '\0';
-    fclose(file);
-    return text;
 }
 
 static void put(const char *path, const char *text)

@@ -58,12 +58,6 @@ static VesselHit ask(const Vessel *v, Vec3 x, int from, double reach)
     return hit;
 }
 
-static Blobby model_of(const VesselTree *t, int node)
-{
-    int64_t a = t->blob_offset[node], b = t->blob_offset[node + 1];
-    return (Blobby){(int)(b - a), t->blob_center + a, t->blob_width + a, t->iso_level};
-}
-
 static void lanes_against_twin(void **state)
 {
     (void)state;
@@ -210,7 +204,7 @@ static void gaps_against_slow_projection(void **state)
                 vessel_query(v, 1, &x, 0.7, &memory, &hit);
                 if (vec3_distance(x, t->center[0]) < 3)
                     continue;   // near the inlet the wall is not the blobs' own
-                Blobby m = model_of(t, hit.node);
+                Blobby m = blobby_of(t, hit.node);
                 SurfacePoint s = blobby_project(&m, x, x);
                 assert_true(s.converged);
                 if (hit.flags & VESSEL_FAR) {
@@ -501,7 +495,7 @@ static void another_wall_comes_closer(void **state)
     t->parent[0] = -1;
     vessel_tree_link(t);
     Vessel *v = lim_vessel_create(t);
-    Blobby m = model_of(t, 0);
+    Blobby m = blobby_of(t, 0);
     VesselMemory memory = {.node = 0};
     int sides = 0;
     double last = 0;
@@ -555,7 +549,7 @@ static void far_is_far_in_a_taper(void **state)
                 vessel_query(v, 1, &x, reach, &memory, &hit);
                 if (x.x < 2)
                     break;   // near the inlet the wall is not the blobs' own
-                Blobby m = model_of(t, hit.node);
+                Blobby m = blobby_of(t, hit.node);
                 SurfacePoint s = blobby_project(&m, x, x);
                 // blended neighbours differ from the own model by less than 0.05 mm here
                 if (hit.flags & VESSEL_FAR)
@@ -601,7 +595,7 @@ static double swing(const VesselTree *t, double aside, int *bad)
         vessel_query(v, P, x, 5, memory, hit);
         used[r] = now_us() - start;
         for (int i = 0; i < P && r % 10 == 9; i++) {
-            Blobby m = model_of(t, hit[i].node);
+            Blobby m = blobby_of(t, hit[i].node);
             *bad += hit[i].flags != 0 || hit[i].gap > 1.01 * blobby_project(&m, x[i], x[i]).distance;
         }
     }

@@ -110,11 +110,6 @@ static VesselTree *bent_tube(const Mat3 *turn, Vec3 move)
     return blob_tube(line, NODES, OVERLAP, BLOBS, 1);
 }
 
-static Blobby model_of(const VesselTree *t, int node)
-{
-    return (Blobby){BLOBS, t->blob_center + t->blob_offset[node], t->blob_width + t->blob_offset[node], t->iso_level};
-}
-
 // The volume with f > 0 and, where `half`, downstream of the root's plane near the root: cells of a fine lattice counted by their middles.
 static double counted_volume(const VesselTree *t, double cell, bool half)
 {
@@ -141,7 +136,7 @@ static double counted_volume(const VesselTree *t, double cell, bool half)
                 Vec3 away = vec3_sub(p, t->center[0]);
                 if (half && vec3_dot(away, t->direction[0]) < 0 && vec3_norm2(away) < 25)
                     continue;
-                Blobby b = model_of(t, best);
+                Blobby b = blobby_of(t, best);
                 inside += blobby_field(&b, p) > 0;
             }
     return (double)inside * cell * cell * cell;
@@ -168,7 +163,7 @@ static void check_open(const VesselTree *t, double cell, SurfaceCensus *c)
         if (vec3_distance(m->vertex[v], t->center[0]) < 3)
             assert_true(z > -1e-9);
         rim += fabs(z) < 1e-9 && vec3_distance(m->vertex[v], t->center[0]) < 3;
-        Blobby b = model_of(t, m->node[v]);
+        Blobby b = blobby_of(t, m->node[v]);
         Vec3 g;
         double f = blobby_gradient(&b, m->vertex[v], &g);
         assert_near(f / vec3_norm(g), 0, 1e-9);

@@ -3,6 +3,7 @@
 #include "recon/import_surface.h"
 
 #include "recon/phantom.h"
+#include "geom/sort_doubles.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -160,12 +161,6 @@ static void case_free(Case *c)
     shape_free(c->shape);
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void check_shape(const char *name)
 {
     ImportOptions options = import_default_options();
@@ -177,7 +172,7 @@ static void check_shape(const char *name)
             worst = fmax(worst, off_centre(c.truth, variant, c.tree->center[i], &radius));
             wrong[i] = fabs(c.tree->radius[i] / radius - 1);
         }
-        qsort(wrong, (size_t)c.tree->node_count, sizeof *wrong, compare_doubles);
+        sort_doubles(wrong, (size_t)c.tree->node_count);
         double most = wrong[c.tree->node_count * 9 / 10], from_wall = 0;
         for (int64_t i = 0; variant == PLAIN && i < c.tree->point_offset[c.tree->node_count]; i++)
             from_wall = fmax(from_wall, is_near_end(c.truth, c.tree->point[i]) ? 0 : fabs(shape_distance(c.shape, c.tree->point[i], NULL)));

@@ -14,30 +14,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static Faults faults;
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-static const bool is_slow = true;    // the small shapes alone: the figures are the release build's business
-#else
-static const bool is_slow = false;
-#endif
-
-static Shape *make(const char *name, int count, const char (*option)[2][64])
-{
-    faults_clear(&faults);
-    Shape *shape = shape_create(name, count, option, "test", &faults);
-    assert_non_null(shape);
-    return shape;
-}
-
-static VesselTree *fit_of(const Shape *shape, LimFitOptions options)
-{
-    VesselTree *tree = shape_sample(shape, &faults), *model = lim_fit(tree, &options, NULL, &faults);
-    assert_non_null(model);
-    assert_true(vessel_tree_validate(model, "model", &faults));
-    vessel_tree_free(tree);
-    return model;
-}
+#include "tests/recon/fitted_shape.h"
 
 // As a tool meets the wall, it does not jump where one local model gives way to the next, with noise of 0.05 mm as of an angiogram of 0.2 mm voxels; the
 // bounds are the issue's. No ghosts, nothing narrow, also where a vessel of 0.2 mm leaves one of 1 mm.

@@ -17,31 +17,7 @@
 
 #include "tests/geom/near.h"
 #include "tests/geom/random_numbers.h"
-
-static Faults faults;
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-static const bool is_slow = true;    // the small shapes alone: the figures are the release build's business
-#else
-static const bool is_slow = false;
-#endif
-
-static Shape *make(const char *name, int count, const char (*option)[2][64])
-{
-    faults_clear(&faults);
-    Shape *shape = shape_create(name, count, option, "test", &faults);
-    assert_non_null(shape);
-    return shape;
-}
-
-static VesselTree *fit_of(const Shape *shape, LimFitOptions options)
-{
-    VesselTree *tree = shape_sample(shape, &faults), *model = lim_fit(tree, &options, NULL, &faults);
-    assert_non_null(model);
-    assert_true(vessel_tree_validate(model, "model", &faults));
-    vessel_tree_free(tree);
-    return model;
-}
+#include "tests/recon/fitted_shape.h"
 
 // references.md: rho'^2 (sqrt(2 rho'/T) - 1) = rho^2 (sqrt(rho/T) - 1) at T = 0.1; and the level set of any value stays where it was.
 static void split_is_the_references(void **state)

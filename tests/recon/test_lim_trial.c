@@ -1,5 +1,6 @@
 // Section 5.3.2 in small: each shape at three levels of noise, five runs. Medians of 15 runs; the whole table is `seldinger bench fit --table3`.
 #include "recon/lim_trial.h"
+#include "geom/sort_doubles.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -12,15 +13,9 @@
 
 enum { RUNS = 5, LEVELS = 3, ALL = RUNS * LEVELS };
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static double median(double *value, int count)
 {
-    qsort(value, (size_t)count, sizeof *value, compare_doubles);
+    sort_doubles(value, (size_t)count);
     return value[count / 2];
 }
 
