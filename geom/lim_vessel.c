@@ -806,7 +806,7 @@ Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *o
     LimVessel *lim = calloc(1, sizeof *lim);
     if (!lim)
         return NULL;
-    lim->vessel = (Vessel){"lim", lim_query, lim_locate, lim_inlet, lim_destroy};
+    lim->vessel = (Vessel){.kind = "lim", .query = lim_query, .locate = lim_locate, .inlet = lim_inlet, .destroy = lim_destroy, .primitives = tree->blob_count};
     lim->tree = tree;
     lim->options = *options;
     lim->options.hops = options->hops > 0 ? options->hops : 1;
@@ -818,6 +818,8 @@ Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *o
         lim_destroy(&lim->vessel);
         return NULL;
     }
+    size_t of_node = sizeof *lim->model + 2 * sizeof(Vec3) + sizeof(double) + sizeof(uint8_t) + 2 * sizeof(int), links = (size_t)tree->near_offset[tree->node_count];
+    lim->vessel.bytes = sizeof *lim + groups * sizeof *lim->group + near * sizeof *lim->near + (size_t)tree->node_count * of_node + links * sizeof *tree->near;
     fill_models(lim);
     lim->inlet_open = vessel_tree_root_is_open(tree);
     carry_inlet(lim);

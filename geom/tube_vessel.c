@@ -381,11 +381,13 @@ Vessel *tube_vessel_create(const TubeOptions *options, const char *file, Faults 
         free(segment);
         return NULL;
     }
-    tube->vessel = (Vessel){"tube", tube_query, tube_locate, tube_inlet, tube_destroy};
+    tube->vessel = (Vessel){.kind = "tube", .query = tube_query, .locate = tube_locate, .inlet = tube_inlet, .destroy = tube_destroy};
     tube->radius = options->radius;
     tube->closed_ends = options->closed_ends;
     tube->segment = segment;
     tube->count = pieces ? lay_pieces(options, segment) : lay_polyline(options, segment);
+    tube->vessel.primitives = tube->count;
+    tube->vessel.bytes = sizeof *tube + (size_t)tube->count * sizeof *segment;
     for (int i = 0; i + 1 < tube->count; i++)
         segment[i].joint = vec3_add(segment[i].end_tangent, segment[i + 1].tangent);
     return &tube->vessel;

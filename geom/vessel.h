@@ -49,6 +49,8 @@ struct Vessel {
     // Inlet: a point on the root's open end and the unit direction into the vessel. False where it has none (plane).
     bool (*inlet)(const Vessel *vessel, Vec3 *point, Vec3 *direction);
     void (*destroy)(Vessel *vessel);
+    int64_t primitives;      // blobs, triangles, lattice points, segments
+    size_t bytes;            // that queries read, of whatever owner; both for tables
 };
 
 static inline void vessel_query(const Vessel *v, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
