@@ -185,8 +185,9 @@ static int check_scene(const char *path, const CheckOptions *options, Faults *fa
     Scene *scene = scene_load(path, faults);
     ToolPath *golden = NULL, *run = NULL;
     bool diverged = false, there = golden_path && access(golden_path, F_OK) == 0;
-    if (scene && scene->source == SOURCE_MODEL && access(scene->model_path, F_OK) != 0) {
-        printf("%-44s skipped   %s is not there\n", path, scene->model_path);
+    const char *needed = scene ? scene_needed_file(scene) : NULL;
+    if (needed && access(needed, F_OK) != 0) {
+        printf("%-44s skipped   %s is not there\n", path, needed);
         scene_free(scene);
         free(golden_path);
         return EXIT_DONE;

@@ -188,8 +188,9 @@ static bool open_scene(const char *path, int threads, bool quiet, VerifyScene *o
     Scene *scene = out->scene = scene_load(path, faults);
     if (!scene)
         return false;
-    if (scene->source == SOURCE_MODEL && access(scene->model_path, F_OK) != 0) {
-        printf("# %s: skipped, %s is not there\n", path, scene->model_path);
+    const char *needed = scene_needed_file(scene);
+    if (needed && access(needed, F_OK) != 0) {
+        printf("# %s: skipped, %s is not there\n", path, needed);
         return false;
     }
     return open_vessel(scene, threads, quiet, &out->open, faults) && open_vessel_inlet(scene, &out->open, faults) && faults->count == before;

@@ -16,6 +16,7 @@ VerbFunction verb_run, verb_check, verb_segment, verb_import, verb_fit, verb_syn
 
 // Prints all faults to standard error; returns EXIT_BAD_INPUT.
 int cli_bad_input(const Faults *faults);
+void cli_notes(FILE *out, const char *path, const char *text);   // each line of `text` after "PATH: "
 // A progress bar on standard error: drawn where that is a terminal and not --quiet, else nothing.
 typedef struct ProgressBar {
     const char *label;
@@ -31,7 +32,7 @@ bool cli_whole_number(const char *option, const char *text, double least, double
 typedef struct OpenVessel {
     Vessel *vessel;          // NULL for SOURCE_NONE
     VesselTree *tree;        // LIM only
-    TriangleMesh *mesh;      // filled on demand by open_vessel_mesh
+    TriangleMesh *mesh;      // the wall where that is triangles, else filled on demand by open_vessel_mesh
 } OpenVessel;
 bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults);
 // The vessel's surface for pictures; NULL for planes.

@@ -130,21 +130,12 @@ typedef struct Found {
     double seconds;
 } Found;
 
-static void print_lines(const char *path, const char *text)
-{
-    for (const char *at = text; *at;) {
-        size_t n = strcspn(at, "\n");
-        printf("%s: %.*s\n", path, (int)n, at);
-        at += n + (at[n] == '\n');
-    }
-}
-
 static void print_found(const ImportCommand *command, const Found *f)
 {
     char text[TEXT_MAX];
     const ImportReport *r = &f->report;
     mesh_check_text(&f->check, true, text, sizeof text);
-    print_lines(command->surface, text);
+    cli_notes(stdout, command->surface, text);
     if (r->unused_components)
         printf("%s: %d components have no centreline: left out\n", command->surface, r->unused_components);
     if (!f->computed && r->curves_flipped)
@@ -214,30 +205,6 @@ static bool write_json(const ImportCommand *command, const Found *f, Faults *fau
 
 // --- doing ---
 
-// The surface in mm, mended; NULL with faults.
-static SurfaceMesh *load_surface(const ImportCommand *command, MeshCheck *check, Faults *faults)
-{
-    SurfaceMesh *mesh = surface_load(command->surface, faults);
-    if (!mesh)
-        return NULL;
-    for (int i = 0; i < mesh->vertex_count; i++)
-        mesh->vertex[i] = vec3_scale(mesh->vertex[i], command->scale);
-    if (!mesh_repair(mesh, check))
-        faults_add(faults, command->surface, 0, 0, "not enough memory");
-    else if (check->unit_is_doubtful && !command->has_scale) {
-        Vec3 e = vec3_sub(check->high, check->low);
-        faults_add(faults, command->surface, 0, 0, "is %g x %g x %g across, which are no millimetres of a vessel; --scale 1000 takes metres, --scale 0.001 micrometres, "
-                   "--scale 1 takes it as it is", e.x, e.y, e.z);
-    } else if (check->one_sided_edges.count)
-        faults_add(faults, command->surface, 0, 0, "has one side only (first at triangle %d): inside and outside cannot be told", check->one_sided_edges.first);
-    else if (mesh->triangle_count == 0 || !(check->area > 0))
-        faults_add(faults, command->surface, 0, 0, "has no triangle with an area");
-    else
-        return mesh;
-    surface_free(mesh);
-    return NULL;
-}
-
 static CurveSet *get_curves(const ImportCommand *command, const SurfaceMesh *mesh, ImportReport *report, Faults *faults)
 {
     if (command->centreline_count == 0)
@@ -277,7 +244,7 @@ static bool import(const ImportCommand *command, Faults *faults)
     Found found = {.computed = command->centreline_count == 0, .report = {.curves_scaled = 1, .inside_percent = 100}};
     struct timespec start, end;
     clock_gettime(CLOCK_MONOTONIC, &start);
-    SurfaceMesh *mesh = load_surface(command, &found.check, faults);
+    SurfaceMesh *mesh = mesh_load_mended(command->surface, command->has_scale ? command->scale : 0, "--scale ", &found.check, faults);
     CurveSet *set = mesh ? get_curves(command, mesh, &found.report, faults) : NULL;
     VesselTree *tree = set ? import_surface(mesh, set, &command->options, &found.report, command->surface, faults) : NULL;
     double unseen = 100.0 * (double)found.report.left_points / (double)(found.report.sampled_points + 1);

@@ -212,7 +212,7 @@ static bool describe_surface(cJSON *object, const char *path, Faults *faults)
 
 static bool describe_scene(cJSON *object, const char *path, Faults *faults)
 {
-    static const char *const sources[] = {"model", "shape", "tube", "plane", "none"};
+    static const char *const sources[] = {"model", "shape", "tube", "plane", "mesh", "none"};
     Scene *scene = scene_load(path, faults);
     double length = 0;
     if (!scene)
@@ -223,6 +223,9 @@ static bool describe_scene(cJSON *object, const char *path, Faults *faults)
     cJSON_AddStringToObject(object, "vessel", sources[scene->source]);
     if (scene->model_path)
         cJSON_AddStringToObject(object, "model", scene->model_path);
+    if (scene->mesh_path)
+        cJSON_AddStringToObject(object, "mesh", scene->mesh_path);
+    cJSON_AddStringToObject(object, "contact", contact_name[scene->contact]);
     if (scene->source == SOURCE_SHAPE)
         cJSON_AddStringToObject(object, "shape", scene->shape_name);
     cJSON_AddNumberToObject(object, "friction", scene->friction);

@@ -89,6 +89,15 @@ int main(int argc, char **argv)
     return EXIT_BAD_INPUT;
 }
 
+void cli_notes(FILE *out, const char *path, const char *text)
+{
+    while (*text) {
+        size_t n = strcspn(text, "\n");
+        fprintf(out, "%s: %.*s\n", path, (int)n, text);
+        text += n + (text[n] == '\n');
+    }
+}
+
 int cli_bad_input(const Faults *faults)
 {
     static char text[(FAULTS_CAPACITY + 1) * FAULT_LENGTH];

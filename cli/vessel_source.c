@@ -1,7 +1,10 @@
-// What a scene's `vessel:` names, opened: a fitted model, a shape that is fitted on the fly and cached, an exact tube, a plane.
+// What a scene's `vessel:` names, opened: a fitted model, a shape that is fitted on the fly and cached, an exact tube, a plane, a mesh; and turned into
+// triangles or a grid where `contact:` asks for that.
 #include "cli/cli.h"
 
+#include "cli/contact_surface.h"
 #include "cli/tube_tree.h"
+#include "geom/mesh_vessel.h"
 #include "recon/lim_fit.h"
 #include "recon/phantom.h"
 #include "recon/tree_file.h"
@@ -125,6 +128,8 @@ static VesselTree *cached_shape(const Scene *scene, int threads, bool quiet, Fau
 
 // --- sources ---
 
+enum { CELLS_ROUND_TUBE = 40 };
+
 static bool open_tree(VesselTree *tree, const char *path, OpenVessel *out, Faults *faults)
 {
     if (!tree)
@@ -152,21 +157,70 @@ static bool fit_tube(const Scene *scene, int threads, bool quiet, OpenVessel *ou
     return open_tree(model, scene->path, out, faults);
 }
 
-bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults)
+// The wall of the open vessel as triangles or a grid, in its place. A tree stays: it says where the vessel runs.
+static bool turn_into_surface(const Scene *scene, OpenVessel *out, Faults *faults)
 {
-    int before = faults->count;
-    *out = (OpenVessel){0};
-    bool exact = scene->source == SOURCE_TUBE || scene->source == SOURCE_PLANE;
-    if (scene->contact == CONTACT_MESH && scene->source != SOURCE_NONE)
-        faults_add(faults, scene->path, 0, 0, "contact 'mesh' is not built yet; valid: %s", exact ? "tube" : "lim");
-    else if (scene->contact == CONTACT_TUBE && !exact && scene->source != SOURCE_NONE)
-        faults_add(faults, scene->path, 0, 0, "contact 'tube' needs the source 'tube'; a model or shape has 'lim'");
-    if (faults->count > before)
+    bool is_tube = scene->source == SOURCE_TUBE;
+    Vessel *exact = out->vessel;
+    VesselTree *nodes = is_tube ? tube_tree(exact, &scene->tube, scene->path, faults) : out->tree;
+    double cell = scene->mesh_cell;
+    if (nodes && !(cell > 0))
+        cell = is_tube ? 2 * PI * scene->tube.radius / CELLS_ROUND_TUBE : isosurface_cell_for(nodes);
+    out->mesh = nodes ? contact_surface_mesh(exact, nodes, is_tube && !scene->tube.closed_ends, cell, scene->path, faults) : NULL;
+    out->vessel = out->mesh ? contact_surface_vessel(scene->contact, exact, out->mesh, cell, scene->path, faults) : NULL;
+    exact->destroy(exact);
+    if (is_tube)
+        vessel_tree_free(nodes);
+    return out->vessel != NULL;
+}
+
+// The sheath's mouth must lie in the lumen: with a mesh of another frame or unit it does not.
+static bool entry_is_inside(const Scene *scene, const Vessel *vessel, Faults *faults)
+{
+    Vec3 x = vec3_add_scaled(scene->wire.start, fmax(scene->wire.inserted, 0.5), scene->wire.direction);
+    VesselMemory memory = {.node = vessel->locate(vessel, x, -1)};
+    VesselHit hit;
+    if (!scene->wire.has_sheath)
+        return true;
+    vessel_query(vessel, 1, &x, 1, &memory, &hit);
+    if (!(hit.flags & VESSEL_OPEN_END) && hit.gap > 0)
+        return true;
+    faults_add(faults, scene->path, 0, 0, "the tool's tip at the start, (%g, %g, %g) mm, is not inside of the mesh %s; put the sheath's entry into its lumen", x.x, x.y,
+               x.z, scene->mesh_path);
+    return false;
+}
+
+static double mean_side(const TriangleMesh *mesh)
+{
+    double sum = 0;
+    for (int t = 0; t < mesh->triangle_count; t++)
+        for (int k = 0; k < 3; k++)
+            sum += vec3_distance(mesh->vertex[mesh->triangle[t][k]], mesh->vertex[mesh->triangle[t][(k + 1) % 3]]);
+    return sum / (3 * mesh->triangle_count);
+}
+
+static bool open_mesh(const Scene *scene, OpenVessel *out, Faults *faults)
+{
+    out->mesh = contact_surface_load(scene->mesh_path, scene->mesh_scale, faults);
+    if (!out->mesh)
         return false;
+    ContactKind kind = scene->contact == CONTACT_GRID ? CONTACT_MESH : scene->contact;
+    Vessel *mesh = out->vessel = contact_surface_vessel(kind, NULL, out->mesh, 0, scene->mesh_path, faults);
+    if (mesh && scene->contact == CONTACT_GRID) {
+        double cell = scene->mesh_cell > 0 ? scene->mesh_cell : mean_side(out->mesh);
+        out->vessel = contact_surface_vessel(CONTACT_GRID, mesh, out->mesh, cell, scene->mesh_path, faults);
+        mesh->destroy(mesh);
+    }
+    return out->vessel && entry_is_inside(scene, out->vessel, faults);
+}
+
+static bool open_source(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults)
+{
     switch (scene->source) {
     case SOURCE_NONE: return true;
     case SOURCE_MODEL: return open_tree(tree_file_load(scene->model_path, NULL, faults), scene->model_path, out, faults);
     case SOURCE_SHAPE: return open_tree(cached_shape(scene, threads, quiet, faults), scene->path, out, faults);
+    case SOURCE_MESH: return open_mesh(scene, out, faults);
     case SOURCE_TUBE:
         out->vessel = tube_vessel_create(&scene->tube, scene->path, faults);
         return out->vessel && (scene->contact != CONTACT_LIM || fit_tube(scene, threads, quiet, out, faults));
@@ -177,6 +231,28 @@ bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, F
         return out->vessel != NULL;
     }
     return false;
+}
+
+bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults)
+{
+    int before = faults->count;
+    *out = (OpenVessel){0};
+    bool as_mesh = scene->contact == CONTACT_MESH || scene->contact == CONTACT_SMOOTH_MESH, as_surface = as_mesh || scene->contact == CONTACT_GRID;
+    bool exact = scene->source == SOURCE_TUBE || scene->source == SOURCE_PLANE;
+    const char *name = contact_name[scene->contact];
+    if (scene->source == SOURCE_NONE)
+        return true;
+    if (scene->contact == CONTACT_TUBE && !exact)
+        faults_add(faults, scene->path, 0, 0, "contact 'tube' needs the source 'tube'; a model or shape has lim, mesh, smooth_mesh and grid, a mesh the last three");
+    else if (scene->contact == CONTACT_LIM && scene->source == SOURCE_MESH)
+        faults_add(faults, scene->path, 0, 0, "contact 'lim' needs local models: make them with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh and grid");
+    else if (as_surface && scene->source == SOURCE_PLANE)
+        faults_add(faults, scene->path, 0, 0, "contact '%s' needs a wall that ends somewhere; a plane has 'tube', which is the plane itself", name);
+    else if ((as_mesh || scene->source == SOURCE_MESH) && !mesh_vessel_available())
+        faults_add(faults, scene->path, 0, 0, "contact '%s' of this vessel needs Embree, and this program was built without it; install libembree-dev and build again, or "
+                   "take another contact", name);
+    return faults->count == before && open_source(scene, threads, quiet, out, faults) &&
+           (!as_surface || scene->source == SOURCE_MESH || turn_into_surface(scene, out, faults));
 }
 
 const TriangleMesh *open_vessel_mesh(const Scene *scene, OpenVessel *open)

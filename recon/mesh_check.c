@@ -402,6 +402,29 @@ bool mesh_check(const SurfaceMesh *mesh, MeshCheck *check)
     return good;
 }
 
+SurfaceMesh *mesh_load_mended(const char *path, double scale, const char *option, MeshCheck *check, Faults *faults)
+{
+    SurfaceMesh *mesh = surface_load(path, faults);
+    if (!mesh)
+        return NULL;
+    for (int i = 0; i < mesh->vertex_count && scale > 0; i++)
+        mesh->vertex[i] = vec3_scale(mesh->vertex[i], scale);
+    if (!mesh_repair(mesh, check))
+        faults_add(faults, path, 0, 0, "not enough memory");
+    else if (check->unit_is_doubtful && !(scale > 0)) {
+        Vec3 e = vec3_sub(check->high, check->low);
+        faults_add(faults, path, 0, 0, "is %g x %g x %g across, which are no millimetres of a vessel; %s1000 takes metres, %s0.001 micrometres, %s1 takes it as it is",
+                   e.x, e.y, e.z, option, option, option);
+    } else if (check->one_sided_edges.count)
+        faults_add(faults, path, 0, 0, "has one side only (first at triangle %d): inside and outside cannot be told", check->one_sided_edges.first);
+    else if (mesh->triangle_count == 0 || !(check->area > 0))
+        faults_add(faults, path, 0, 0, "has no triangle with an area");
+    else
+        return mesh;
+    surface_free(mesh);
+    return NULL;
+}
+
 // --- in words ---
 
 typedef struct Text {

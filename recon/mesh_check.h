@@ -33,6 +33,9 @@ typedef struct MeshCheck {
 bool mesh_repair(SurfaceMesh *mesh, MeshCheck *check);
 // The same figures, the mesh untouched.
 bool mesh_check(const SurfaceMesh *mesh, MeshCheck *check);
+// Read (surface_file.h), scaled to mm and mended. `scale` 0: none is given, and the file must be in mm. `option` is what gives one, as the user writes
+// it: "--scale ", "mesh_scale: ". NULL with faults: unreadable, not millimetres, one side only, no triangle with an area.
+SurfaceMesh *mesh_load_mended(const char *path, double scale, const char *option, MeshCheck *check, Faults *faults);
 // What was found, a line each, ended by a newline; empty where nothing is wrong. An openings line stands there for open meshes.
 // `mended`: say what was done. NUL-ended, cut at `capacity`; returns the number of lines.
 int mesh_check_text(const MeshCheck *check, bool mended, char *text, size_t capacity);

@@ -180,6 +180,8 @@ static bool write_scene(Recording *recording, const Scene *scene)
     int count = 0;
     if (scene->model_path)
         file[count++] = scene->model_path;
+    if (scene->mesh_path)
+        file[count++] = scene->mesh_path;
     if (scene->script_path)
         file[count++] = scene->script_path;
     for (int i = 0; i < recording->options.file_count && count < MOST_FILES; i++)
@@ -200,7 +202,8 @@ static bool write_scene(Recording *recording, const Scene *scene)
         good &= fclose(sum_stream) == 0;
     good = good && write_text(recording->file, NULL, "/scene", scene->text);
     hid_t place = good ? H5Dopen2(recording->file, "/scene", H5P_DEFAULT) : -1;
-    good = good && write_text(place, "path", NULL, scene->path) && write_text(place, "files", NULL, paths) && write_text(place, "sha256", NULL, sums);
+    good = good && write_text(place, "path", NULL, scene->path) && write_text(place, "contact", NULL, contact_name[scene->contact]) &&
+           write_text(place, "files", NULL, paths) && write_text(place, "sha256", NULL, sums);
     if (place >= 0)
         H5Dclose(place);
     free(paths);

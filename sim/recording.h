@@ -14,7 +14,7 @@
 // contacts (with force), iterations and residual of the contact solve, linearisations (1 in a quiet step), flags (all S), wall_force_n (S,2):
 // largest and sum;
 // frames: /wire/step (K) the row of the frame, /wire/position (K,M,3), /wire/quaternion (K,M,4) as w x y z, /contact/force_n (K,M,3),
-// /contact/gap_mm (K,M), /contact/vessel_node (K,M); once: /wire/s_mm (M), /wire/radius_mm (M), /scene (text; attributes path, files, sha256).
+// /contact/gap_mm (K,M), /contact/vessel_node (K,M); once: /wire/s_mm (M), /wire/radius_mm (M), /scene (text; attributes path, contact, files, sha256).
 #ifndef SELDINGER_SIM_RECORDING_H
 #define SELDINGER_SIM_RECORDING_H
 

@@ -176,25 +176,41 @@ static void read_plane(Reading *reading, YamlValue value)
     yaml_map_unit_vector(&map, "normal", true, &reading->scene->plane_normal);
 }
 
+const char *const contact_name[CONTACT_COUNT + 1] = {"lim", "mesh", "tube", "smooth_mesh", "grid", NULL};
+
+static void read_contact(const YamlMap *map, Scene *scene)
+{
+    bool exact = scene->source == SOURCE_TUBE || scene->source == SOURCE_PLANE;
+    scene->contact = exact ? CONTACT_TUBE : scene->source == SOURCE_MESH ? CONTACT_MESH : CONTACT_LIM;
+    YamlValue contact = yaml_get(map, "contact", false);
+    int choice = contact.node ? yaml_choice(contact, contact_name) : -1;
+    if (choice >= 0)
+        scene->contact = (ContactKind)choice;
+    if (choice == CONTACT_TUBE && (scene->source == SOURCE_MODEL || scene->source == SOURCE_SHAPE || scene->source == SOURCE_MESH))
+        yaml_fault(contact, "contact 'tube' needs the source 'tube'; a model or shape has lim, mesh, smooth_mesh or grid");
+    else if (choice == CONTACT_LIM && scene->source == SOURCE_MESH)
+        yaml_fault(contact, "contact 'lim' needs local models: make them with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh or grid");
+}
+
 static void read_vessel(Reading *reading, YamlValue value)
 {
-    static const char *const keys[] = {"model", "shape", "tube", "plane", "contact", "friction", NULL};
-    static const char *const contacts[] = {"lim", "mesh", "tube", NULL};
+    static const char *const keys[] = {"model", "shape", "tube", "plane", "mesh", "mesh_scale", "mesh_cell_mm", "contact", "friction", NULL};
+    static const VesselSourceKind source[] = {SOURCE_MODEL, SOURCE_SHAPE, SOURCE_TUBE, SOURCE_PLANE, SOURCE_MESH};
     Scene *scene = reading->scene;
     YamlMap map = yaml_map(value, keys);
     scene->source = SOURCE_NONE;
     if (!map.value.node)
         return;
     int sources = 0;
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; i < 5; i++) {
         if (!yaml_has(&map, keys[i]))
             continue;
         if (++sources > 1)
-            yaml_fault(yaml_get(&map, keys[i], false), "a second source '%s'; a vessel has exactly one of model, shape, tube, plane", keys[i]);
-        scene->source = (VesselSourceKind[]){SOURCE_MODEL, SOURCE_SHAPE, SOURCE_TUBE, SOURCE_PLANE}[i];
+            yaml_fault(yaml_get(&map, keys[i], false), "a second source '%s'; a vessel has exactly one of model, shape, tube, plane, mesh", keys[i]);
+        scene->source = source[i];
     }
     if (sources == 0)
-        yaml_fault(value, "'vessel' has no source; exactly one of model, shape, tube, plane");
+        yaml_fault(value, "'vessel' has no source; exactly one of model, shape, tube, plane, mesh");
     const char *text;
     if (yaml_has(&map, "model") && yaml_text(yaml_get(&map, "model", false), &text))
         scene->model_path = resolved(reading, text);
@@ -204,13 +220,13 @@ static void read_vessel(Reading *reading, YamlValue value)
         read_tube(reading, yaml_get(&map, "tube", false));
     if (yaml_has(&map, "plane"))
         read_plane(reading, yaml_get(&map, "plane", false));
-    scene->contact = scene->source == SOURCE_TUBE || scene->source == SOURCE_PLANE ? CONTACT_TUBE : CONTACT_LIM;
-    YamlValue contact = yaml_get(&map, "contact", false);
-    int choice = contact.node ? yaml_choice(contact, contacts) : -1;
-    if (choice >= 0)
-        scene->contact = (ContactKind)choice;
-    if (choice == CONTACT_TUBE && (scene->source == SOURCE_MODEL || scene->source == SOURCE_SHAPE))
-        yaml_fault(contact, "contact 'tube' needs the source 'tube'; a model or shape has 'lim' or 'mesh'");
+    if (yaml_has(&map, "mesh") && yaml_text(yaml_get(&map, "mesh", false), &text))
+        scene->mesh_path = resolved(reading, text);
+    if (yaml_has(&map, "mesh_scale") && scene->source != SOURCE_MESH)
+        yaml_fault(yaml_get(&map, "mesh_scale", false), "'mesh_scale' goes with the source 'mesh'");
+    yaml_map_number(&map, "mesh_scale", false, (NumberRange){0, 1e9, true}, &scene->mesh_scale);
+    yaml_map_number(&map, "mesh_cell_mm", false, (NumberRange){0, 100, true}, &scene->mesh_cell);
+    read_contact(&map, scene);
     yaml_map_number(&map, "friction", false, friction_range, &scene->friction);
 }
 
@@ -571,6 +587,7 @@ void scene_free(Scene *scene)
     free(scene->target);
     free(scene->verify.cases);
     free(scene->model_path);
+    free(scene->mesh_path);
     free(scene->script_path);
     free(scene->text);
     free(scene->path);

@@ -9,8 +9,10 @@
 #include "sim/verify.h"
 #include "solver/solver.h"
 
-typedef enum { SOURCE_MODEL, SOURCE_SHAPE, SOURCE_TUBE, SOURCE_PLANE, SOURCE_NONE } VesselSourceKind;
-typedef enum { CONTACT_LIM, CONTACT_MESH, CONTACT_TUBE } ContactKind;   // `contact:` of the vessel, `--contact` on the command line
+typedef enum { SOURCE_MODEL, SOURCE_SHAPE, SOURCE_TUBE, SOURCE_PLANE, SOURCE_MESH, SOURCE_NONE } VesselSourceKind;
+// `contact:` of the vessel, `--contact` on the command line.
+typedef enum { CONTACT_LIM, CONTACT_MESH, CONTACT_TUBE, CONTACT_SMOOTH_MESH, CONTACT_GRID, CONTACT_COUNT } ContactKind;
+extern const char *const contact_name[CONTACT_COUNT + 1];  // "lim", "mesh", "tube", "smooth_mesh", "grid", NULL
 
 typedef struct SceneTarget {
     char name[64];
@@ -28,6 +30,9 @@ typedef struct Scene {
     char (*shape_option)[2][64];
     TubeOptions tube;        // SOURCE_TUBE (pieces and points owned by the scene)
     Vec3 plane_point, plane_normal;
+    char *mesh_path;         // SOURCE_MESH: resolved against the scene's folder
+    double mesh_scale;       // of its coordinates, to mm; 0: not given, they are in mm
+    double mesh_cell;        // [mm] of a mesh or grid that another source is turned into; 0: chosen from the vessel
     ContactKind contact;
     double friction;
     WireOptions wire;        // sections, fixes, loads owned by the scene
@@ -45,5 +50,7 @@ typedef struct Scene {
 Scene *scene_parse(const char *text, size_t length, const char *path, Faults *faults);
 Scene *scene_load(const char *path, Faults *faults);
 void scene_free(Scene *scene);
+// The file that the vessel comes from, a model or a mesh; NULL where it needs none.
+static inline const char *scene_needed_file(const Scene *scene) { return scene->source == SOURCE_MODEL ? scene->model_path : scene->mesh_path; }
 
 #endif
