@@ -1,0 +1,538 @@
+// Closest point of a triangle mesh (Embree 3's point query, Kerrien 2017 section 6.3 and Table 6).
+//
+// The closest point p of a triangle to X lies in its face where X is within the prism over it, else it is the nearest of the three edges' points: this
+// form has no determinant that thin triangles could spoil. All of it is computed in double from a copy of the vertices about the mesh's middle; the tree
+// of boxes is in float and only says where to look, with a radius that is wider than the rounding of box and point (see widened()).
+// Of triangles equally close the one with the lowest index is taken.
+//
+// Sign: (X - p) . N, N the pseudonormal of the feature that holds p: face; edge: sum of its two faces' normals; vertex: sum of its faces' normals, each
+// weighted by its angle there (Baerentzen and Aanaes 2005, who prove that this is right for every closed mesh).
+//
+// Hessian of the gap. Faces: 0. An edge with direction t is a cylinder and a vertex a sphere of radius |gap| about it: (I - n n' - t t') / gap and
+// (I - n n') / gap. Inside these are the convex edges that a wire bends round (of concave ones no point inside is the closest); they are positive, as at any
+// convex wall, and say how the normal turns when the wire slides on. MESH_SMOOTH: with vertex normals n_i and the barycentric coordinates b_i of p the
+// normal is N / |N|, N = sum b_i n_i, and S = sym(P sum n_i grad(b_i)' P), P = I - n n'; at X it is S (I + gap S)^-1.
+#include "geom/mesh_vessel.h"
+
+#ifndef SELDINGER_EMBREE
+
+MeshVesselOptions mesh_vessel_default_options(void) { return (MeshVesselOptions){.search = MESH_SEARCH_WARM}; }
+
+bool mesh_vessel_available(void) { return false; }
+
+Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *options, const char *name, Faults *faults)
+{
+    (void)mesh, (void)options;
+    faults_add(faults, name, 0, 0, "a mesh cannot be a vessel: this program was built without Embree; with libembree-dev installed and built again it can");
+    return NULL;
+}
+
+#else
+
+#include "geom/tree_surface.h"
+
+#include <embree3/rtcore.h>
+#include <float.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct MeshVessel {
+    Vessel vessel;           // first: a Vessel * to us is a MeshVessel *
+    MeshVesselOptions options;
+    RTCDevice device;
+    RTCScene scene;
+    ssize_t tree_bytes;
+    Vec3 middle;             // what follows is relative to it
+    double size;             // [mm] largest coordinate
+    int vertex_count, triangle_count;
+    Vec3 *vertex;            // (V)
+    Vec3 *vertex_normal;     // (V) pseudonormal, of no special length; all normals point into the lumen
+    Vec3 *smooth_normal;     // (V) unit; only with MESH_SMOOTH
+    bool *on_rim;            // (V)
+    int (*corner)[3];        // (T)
+    int (*across)[3];        // (T) the triangle beyond the side from corner k to the next; -1: rim
+    Vec3 *face;              // (T) unit normal
+} MeshVessel;
+
+// --- The closest point of one triangle ---
+
+enum { ON_EDGE = 0, ON_VERTEX = 3, ON_FACE = 6 };    // edge k: from corner k to the next
+
+typedef struct Foot {
+    Vec3 p;
+    double distance2;
+    int feature;             // ON_EDGE + k, ON_VERTEX + k or ON_FACE
+    double weight[3];        // barycentric coordinates
+} Foot;
+
+static Foot closest_of_triangle(const MeshVessel *m, int triangle, Vec3 x)
+{
+    const int *corner = m->corner[triangle];
+    Vec3 v[3] = {m->vertex[corner[0]], m->vertex[corner[1]], m->vertex[corner[2]]}, n = m->face[triangle];
+    Foot best = {.distance2 = HUGE_VAL};
+    double beyond[3];        // each side's area with X, < 0 within the prism (normals point inwards, corners run round the other way)
+    for (int k = 0; k < 3; k++) {
+        int next = (k + 1) % 3;
+        Vec3 q = vec3_sub(x, v[k]), e = vec3_sub(v[next], v[k]);
+        double t = vec3_dot(q, e) / vec3_norm2(e);
+        beyond[k] = vec3_dot(n, vec3_cross(e, q));
+        t = t > 0 ? t < 1 ? t : 1 : 0;
+        Vec3 p = t < 1 ? vec3_add_scaled(v[k], t, e) : v[next];
+        double d2 = vec3_norm2(vec3_sub(x, p));
+        if (d2 < best.distance2) {
+            best = (Foot){.p = p, .distance2 = d2, .feature = t <= 0 ? ON_VERTEX + k : t >= 1 ? ON_VERTEX + next : ON_EDGE + k};
+            best.weight[k] = 1 - t;
+            best.weight[next] = t;
+        }
+    }
+    if (beyond[0] <= 0 && beyond[1] <= 0 && beyond[2] <= 0) {
+        double height = vec3_dot(n, vec3_sub(x, v[0])), all = beyond[0] + beyond[1] + beyond[2];
+        if (height * height <= best.distance2 && all < 0)
+            best = (Foot){.p = vec3_add_scaled(x, -height, n), .distance2 = height * height, .feature = ON_FACE,
+                          .weight = {beyond[1] / all, beyond[2] / all, beyond[0] / all}};
+    }
+    return best;
+}
+
+// --- The search ---
+
+typedef struct Search {
+    const MeshVessel *mesh;
+    Vec3 x;
+    double distance2;
+    int triangle;            // -1: none yet
+} Search;
+
+// [mm] the radius within which boxes are visited, for a closest triangle at sqrt(distance2): wider by more than the rounding of boxes and point to float.
+static float widened(const Search *s)
+{
+    double room = 1e-6 * (s->mesh->size + vec3_norm(s->x));
+    return (float)(sqrt(s->distance2) * (1 + 1e-6) + room);
+}
+
+static bool try_triangle(Search *s, int triangle)
+{
+    double d2 = closest_of_triangle(s->mesh, triangle, s->x).distance2;
+    if (!(d2 < s->distance2 || (d2 == s->distance2 && triangle < s->triangle)))
+        return false;
+    s->distance2 = d2;
+    s->triangle = triangle;
+    return true;
+}
+
+static bool visit(struct RTCPointQueryFunctionArguments *a)
+{
+    Search *s = a->userPtr;
+    if (!try_triangle(s, (int)a->primID))
+        return false;
+    a->query->radius = widened(s);
+    return true;
+}
+
+// The closest triangle; `from`: a triangle to start from, -1: none is known.
+static int closest_triangle(const MeshVessel *m, Vec3 x, int from)
+{
+    Search s = {.mesh = m, .x = x, .distance2 = HUGE_VAL, .triangle = -1};
+    if (from >= 0)
+        try_triangle(&s, from);
+    struct RTCPointQuery query = {.x = (float)x.x, .y = (float)x.y, .z = (float)x.z, .radius = widened(&s)};
+    struct RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    rtcPointQuery(m->scene, &query, &context, visit, &s);
+    return s.triangle;
+}
+
+// --- The answer ---
+
+static Vec3 pseudonormal(const MeshVessel *m, int triangle, int feature)
+{
+    if (feature == ON_FACE)
+        return m->face[triangle];
+    if (feature >= ON_VERTEX)
+        return m->vertex_normal[m->corner[triangle][feature - ON_VERTEX]];
+    int other = m->across[triangle][feature - ON_EDGE];
+    return other < 0 ? m->face[triangle] : vec3_add(m->face[triangle], m->face[other]);
+}
+
+static bool is_on_rim(const MeshVessel *m, int triangle, int feature)
+{
+    if (feature == ON_FACE)
+        return false;
+    return feature >= ON_VERTEX ? m->on_rim[m->corner[triangle][feature - ON_VERTEX]] : m->across[triangle][feature - ON_EDGE] < 0;
+}
+
+static void add_outer(Sym3 *h, double s, Vec3 v)
+{
+    h->xx += s * v.x * v.x, h->xy += s * v.x * v.y, h->xz += s * v.x * v.z;
+    h->yy += s * v.y * v.y, h->yz += s * v.y * v.z, h->zz += s * v.z * v.z;
+}
+
+// [mm] closer to an edge or a vertex than this its curvature is taken as here; it grows without bound, and no tool's centre gets there.
+static const double LEAST_DISTANCE = 0.02;
+
+static Sym3 facet_hessian(const MeshVessel *m, int triangle, const Foot *foot, double gap, Vec3 normal)
+{
+    Sym3 h = {0, 0, 0, 0, 0, 0};
+    if (foot->feature == ON_FACE)
+        return h;
+    double bend = copysign(1 / fmax(fabs(gap), LEAST_DISTANCE), gap);
+    h.xx = h.yy = h.zz = bend;
+    add_outer(&h, -bend, normal);
+    if (foot->feature < ON_VERTEX) {
+        const int *corner = m->corner[triangle];
+        int k = foot->feature - ON_EDGE;
+        add_outer(&h, -bend, vec3_unit(vec3_sub(m->vertex[corner[(k + 1) % 3]], m->vertex[corner[k]])));
+    }
+    return h;
+}
+
+static Sym3 smooth_hessian(const MeshVessel *m, int triangle, double gap, Vec3 normal)
+{
+    static const double LEAST_STRETCH = 0.1;     // of I + gap S, which ends at the wall's focal points
+    const int *corner = m->corner[triangle];
+    Vec3 u = vec3_normal_to(normal), w = vec3_cross(normal, u);
+    double uu = 0, uw = 0, ww = 0;
+    for (int k = 0; k < 3; k++) {
+        Vec3 side = vec3_sub(m->vertex[corner[(k + 2) % 3]], m->vertex[corner[(k + 1) % 3]]), n = m->smooth_normal[corner[k]];
+        // the coordinate's gradient: across the opposite side, 1 over the height
+        Vec3 gradient = vec3_cross(side, m->face[triangle]);
+        gradient = vec3_scale(gradient, 1 / vec3_dot(gradient, vec3_sub(m->vertex[corner[k]], m->vertex[corner[(k + 1) % 3]])));
+        double nu = vec3_dot(n, u), nw = vec3_dot(n, w), gu = vec3_dot(gradient, u), gw = vec3_dot(gradient, w);
+        uu += nu * gu;
+        uw += 0.5 * (nu * gw + nw * gu);
+        ww += nw * gw;
+    }
+    // k -> k / (1 + gap k) for both principal curvatures
+    double mean = 0.5 * (uu + ww), half = hypot(0.5 * (uu - ww), uw), k1 = mean + half, k2 = mean - half;
+    k1 /= fmax(1 + gap * k1, LEAST_STRETCH);
+    k2 /= fmax(1 + gap * k2, LEAST_STRETCH);
+    double part = half > 0 ? 0.5 * (k1 - k2) / half : 0;
+    mean = 0.5 * (k1 + k2) - part * mean;
+    uu = mean + part * uu, ww = mean + part * ww, uw *= part;
+    Sym3 h = {0, 0, 0, 0, 0, 0};
+    Vec3 both = vec3_add(u, w);
+    add_outer(&h, uu - uw, u);
+    add_outer(&h, ww - uw, w);
+    add_outer(&h, uw, both);
+    return h;
+}
+
+static VesselHit hit_of(const MeshVessel *m, Vec3 x, int triangle)
+{
+    Foot foot = closest_of_triangle(m, triangle, x);
+    VesselHit hit = {.node = triangle};
+    Vec3 away = vec3_sub(x, foot.p), pseudo = pseudonormal(m, triangle, foot.feature);
+    double d = sqrt(foot.distance2), tiny = 1e-9 * m->size;
+    if (is_on_rim(m, triangle, foot.feature) && d > tiny)
+        return (VesselHit){.gap = HUGE_VAL, .node = triangle, .flags = VESSEL_OPEN_END};
+    hit.gap = vec3_dot(away, pseudo) < 0 ? -d : d;
+    hit.normal = foot.feature == ON_FACE ? pseudo : d > tiny ? vec3_scale(away, 1 / hit.gap) : vec3_unit(pseudo);
+    if (m->options.normals == MESH_FACES) {
+        hit.hessian = facet_hessian(m, triangle, &foot, hit.gap, hit.normal);
+        return hit;
+    }
+    const int *corner = m->corner[triangle];
+    Vec3 sum = {0, 0, 0};
+    for (int k = 0; k < 3; k++)
+        sum = vec3_add_scaled(sum, foot.weight[k], m->smooth_normal[corner[k]]);
+    hit.normal = vec3_unit_or(sum, hit.normal);
+    hit.hessian = smooth_hessian(m, triangle, hit.gap, hit.normal);
+    return hit;
+}
+
+static bool is_known(const MeshVessel *m, int triangle) { return triangle >= 0 && triangle < m->triangle_count; }
+
+static VesselHit query_one(const MeshVessel *m, Vec3 point, double reach, VesselMemory *memory)
+{
+    if (!(vec3_norm2(point) < 1e200))
+        return (VesselHit){.node = memory->node, .flags = VESSEL_UNSURE};
+    bool knows = is_known(m, memory->node) && m->options.search != MESH_SEARCH_FULL;
+    if (knows && memory->clearance > 0) {
+        double bound = memory->clearance - vec3_distance(point, memory->clear_place);
+        if (bound > reach)
+            return (VesselHit){.gap = bound, .node = memory->node, .flags = VESSEL_FAR};
+    }
+    Vec3 x = vec3_sub(point, m->middle);
+    VesselHit hit = hit_of(m, x, closest_triangle(m, x, knows ? memory->node : -1));
+    memory->node = hit.node;
+    // the distance changes by no more than the point moves
+    memory->clearance = hit.gap < HUGE_VAL ? fmax(0, hit.gap * (1 - 1e-12)) : 0;
+    memory->clear_place = point;
+    return hit;
+}
+
+static void mesh_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
+{
+    for (int i = 0; i < count; i++)
+        hit[i] = query_one((const MeshVessel *)vessel, point[i], reach, &memory[i]);
+}
+
+static int mesh_locate(const Vessel *vessel, Vec3 point, int from)
+{
+    const MeshVessel *m = (const MeshVessel *)vessel;
+    bool knows = is_known(m, from);
+    if (!(vec3_norm2(point) < 1e200))
+        return knows ? from : 0;
+    return closest_triangle(m, vec3_sub(point, m->middle), knows ? from : -1);
+}
+
+static bool mesh_inlet(const Vessel *vessel, Vec3 *point, Vec3 *direction)
+{
+    const MeshVessel *m = (const MeshVessel *)vessel;
+    if (!m->options.has_inlet)
+        return false;
+    *point = m->options.inlet;
+    *direction = m->options.direction;
+    return true;
+}
+
+static void mesh_destroy(Vessel *vessel)
+{
+    MeshVessel *m = (MeshVessel *)vessel;
+    if (!m)
+        return;
+    if (m->scene)
+        rtcReleaseScene(m->scene);
+    if (m->device)
+        rtcReleaseDevice(m->device);
+    free(m->vertex);
+    free(m->vertex_normal);
+    free(m->smooth_normal);
+    free(m->on_rim);
+    free(m->corner);
+    free(m->across);
+    free(m->face);
+    free(m);
+}
+
+// --- Making one ---
+
+static const double COORDINATE_MAX = 1e9;        // [mm]
+static const double THIN = 1e-12;                // height over length of a triangle that has an area
+
+MeshVesselOptions mesh_vessel_default_options(void) { return (MeshVesselOptions){.search = MESH_SEARCH_WARM}; }
+
+bool mesh_vessel_available(void) { return true; }
+
+static Vec3 outward_area(const TriangleMesh *mesh, int triangle, double *longest2)
+{
+    const int *corner = mesh->triangle[triangle];
+    Vec3 a = vec3_sub(mesh->vertex[corner[1]], mesh->vertex[corner[0]]), b = vec3_sub(mesh->vertex[corner[2]], mesh->vertex[corner[0]]);
+    *longest2 = fmax(vec3_norm2(vec3_sub(b, a)), fmax(vec3_norm2(a), vec3_norm2(b)));
+    return vec3_cross(a, b);
+}
+
+// What must hold before edges can be looked at.
+static bool check_triangles(const TriangleMesh *mesh, const char *name, Faults *faults)
+{
+    if (!mesh || mesh->triangle_count <= 0 || mesh->vertex_count <= 0) {
+        faults_add(faults, name, 0, 0, "the mesh has no triangle; a vessel's wall in triangles is valid");
+        return false;
+    }
+    int before = faults->count, flat = 0, first_flat = 0;
+    for (int v = 0; v < mesh->vertex_count && faults->count == before; v++) {
+        Vec3 p = mesh->vertex[v];
+        if (!(fabs(p.x) < COORDINATE_MAX && fabs(p.y) < COORDINATE_MAX && fabs(p.z) < COORDINATE_MAX))
+            faults_add(faults, name, 0, 0, "vertex %d of the mesh is (%g, %g, %g); numbers below %g mm are valid", v, p.x, p.y, p.z, COORDINATE_MAX);
+    }
+    for (int t = 0; t < mesh->triangle_count && faults->count == before; t++)
+        for (int k = 0; k < 3; k++)
+            if (mesh->triangle[t][k] < 0 || mesh->triangle[t][k] >= mesh->vertex_count) {
+                faults_add(faults, name, 0, 0, "triangle %d of the mesh has vertex %d; 0 to %d are valid", t, mesh->triangle[t][k], mesh->vertex_count - 1);
+                break;
+            }
+    for (int t = 0; t < mesh->triangle_count && faults->count == before; t++) {
+        double longest2;
+        if (!(vec3_norm(outward_area(mesh, t, &longest2)) > THIN * longest2) && flat++ == 0)
+            first_flat = t;
+    }
+    if (flat > 0)
+        faults_add(faults, name, 0, 0, "%d of the mesh's %d triangles have no area, triangle %d first; three corners apart and not in line are valid", flat,
+                   mesh->triangle_count, first_flat);
+    return faults->count == before;
+}
+
+static bool check_edges(const TriangleMesh *mesh, const char *name, Faults *faults)
+{
+    SurfaceCensus census;
+    int before = faults->count;
+    if (!surface_census(mesh, &census)) {
+        faults_add(faults, name, 0, 0, "no memory for a mesh of %d triangles", mesh->triangle_count);
+        return false;
+    }
+    if (census.non_manifold_edges > 0)
+        faults_add(faults, name, 0, 0, "%lld edges of the mesh are shared by three triangles or more; edges of two, or of one at an open end, are valid",
+                   (long long)census.non_manifold_edges);
+    if (census.turned_edges > 0)
+        faults_add(faults, name, 0, 0, "at %lld edges of the mesh two neighbours face opposite ways; triangles that all face out of the lumen are valid",
+                   (long long)census.turned_edges);
+    if (faults->count == before && census.volume < 0)
+        faults_add(faults, name, 0, 0, "the mesh faces into the lumen (it encloses %g mm3); triangles that face out of it are valid", census.volume);
+    return faults->count == before;
+}
+
+typedef struct Side {
+    int high, triangle, k;
+} Side;
+
+static int compare_sides(const void *a, const void *b)
+{
+    const Side *x = a, *y = b;
+    return (x->high > y->high) - (x->high < y->high);
+}
+
+// across: sides are gathered by their lower vertex and sorted by the other. No edge has more than two triangles.
+static bool link_triangles(MeshVessel *m)
+{
+    size_t sides = 3 * (size_t)m->triangle_count;
+    size_t *first = calloc((size_t)m->vertex_count + 2, sizeof *first);
+    Side *side = malloc(sides * sizeof *side);
+    bool good = first && side;
+    for (size_t i = 0; good && i < sides; i++) {
+        const int *c = m->corner[i / 3];
+        int a = c[i % 3], b = c[(i + 1) % 3];
+        first[(a < b ? a : b) + 2]++;
+    }
+    for (int v = 2; good && v < m->vertex_count + 2; v++)
+        first[v] += first[v - 1];
+    for (size_t i = 0; good && i < sides; i++) {
+        const int *c = m->corner[i / 3];
+        int a = c[i % 3], b = c[(i + 1) % 3], low = a < b ? a : b;
+        side[first[low + 1]++] = (Side){a < b ? b : a, (int)(i / 3), (int)(i % 3)};
+        m->across[i / 3][i % 3] = -1;
+    }
+    for (int v = 0; good && v < m->vertex_count; v++) {
+        Side *s = side + first[v];
+        size_t count = first[v + 1] - first[v];
+        qsort(s, count, sizeof *s, compare_sides);
+        for (size_t i = 0; i < count; i++) {
+            bool paired = i + 1 < count && s[i].high == s[i + 1].high;
+            if (!paired) {
+                m->on_rim[v] = m->on_rim[s[i].high] = true;
+                continue;
+            }
+            m->across[s[i].triangle][s[i].k] = s[i + 1].triangle;
+            m->across[s[i + 1].triangle][s[i + 1].k] = s[i].triangle;
+            i++;
+        }
+    }
+    free(first);
+    free(side);
+    return good;
+}
+
+static double angle_between(Vec3 a, Vec3 b) { return atan2(vec3_norm(vec3_cross(a, b)), vec3_dot(a, b)); }
+
+static void set_normals(MeshVessel *m, const TriangleMesh *mesh)
+{
+    for (int t = 0; t < m->triangle_count; t++) {
+        const int *corner = m->corner[t];
+        double longest2;
+        m->face[t] = vec3_negate(vec3_unit(outward_area(mesh, t, &longest2)));
+        for (int k = 0; k < 3; k++) {
+            Vec3 p = m->vertex[corner[k]], a = vec3_sub(m->vertex[corner[(k + 1) % 3]], p), b = vec3_sub(m->vertex[corner[(k + 2) % 3]], p);
+            Vec3 *sum = &m->vertex_normal[corner[k]];
+            *sum = vec3_add_scaled(*sum, angle_between(a, b), m->face[t]);
+        }
+    }
+    for (int v = 0; m->smooth_normal && v < m->vertex_count; v++)
+        m->smooth_normal[v] = vec3_unit(mesh->normal ? vec3_negate(mesh->normal[v]) : m->vertex_normal[v]);
+}
+
+static bool count_bytes(void *mesh, ssize_t bytes, bool post)
+{
+    (void)post;
+    ((MeshVessel *)mesh)->tree_bytes += bytes;
+    return true;
+}
+
+static bool build_tree(MeshVessel *m, const char *name, Faults *faults)
+{
+    m->device = rtcNewDevice("threads=1");
+    if (!m->device) {
+        faults_add(faults, name, 0, 0, "Embree does not start (error %d)", (int)rtcGetDeviceError(NULL));
+        return false;
+    }
+    rtcSetDeviceMemoryMonitorFunction(m->device, count_bytes, m);
+    RTCGeometry geometry = rtcNewGeometry(m->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    float *place = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof *place, (size_t)m->vertex_count);
+    unsigned *corner = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof *corner, (size_t)m->triangle_count);
+    m->scene = rtcNewScene(m->device);
+    if (place && corner && m->scene) {
+        for (int v = 0; v < m->vertex_count; v++) {
+            Vec3 p = m->vertex[v];
+            place[3 * (size_t)v] = (float)p.x, place[3 * (size_t)v + 1] = (float)p.y, place[3 * (size_t)v + 2] = (float)p.z;
+        }
+        for (int t = 0; t < m->triangle_count; t++)
+            for (int k = 0; k < 3; k++)
+                corner[3 * (size_t)t + (size_t)k] = (unsigned)m->corner[t][k];
+        rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
+        rtcSetSceneBuildQuality(m->scene, RTC_BUILD_QUALITY_HIGH);
+        rtcSetSceneFlags(m->scene, RTC_SCENE_FLAG_ROBUST);
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometry(m->scene, geometry);
+        rtcCommitScene(m->scene);
+    }
+    rtcReleaseGeometry(geometry);
+    enum RTCError error = rtcGetDeviceError(m->device);
+    if (error != RTC_ERROR_NONE)
+        faults_add(faults, name, 0, 0, "Embree cannot hold the mesh of %d triangles (%s)", m->triangle_count,
+                   error == RTC_ERROR_OUT_OF_MEMORY ? "no memory" : "error of its own");
+    return error == RTC_ERROR_NONE;
+}
+
+static bool copy_mesh(MeshVessel *m, const TriangleMesh *mesh)
+{
+    size_t vertices = (size_t)mesh->vertex_count, triangles = (size_t)mesh->triangle_count;
+    m->vertex_count = mesh->vertex_count;
+    m->triangle_count = mesh->triangle_count;
+    m->vertex = malloc(vertices * sizeof *m->vertex);
+    m->vertex_normal = calloc(vertices, sizeof *m->vertex_normal);
+    m->smooth_normal = m->options.normals == MESH_SMOOTH ? malloc(vertices * sizeof *m->smooth_normal) : NULL;
+    m->on_rim = calloc(vertices, sizeof *m->on_rim);
+    m->corner = malloc(triangles * sizeof *m->corner);
+    m->across = malloc(triangles * sizeof *m->across);
+    m->face = malloc(triangles * sizeof *m->face);
+    if (!m->vertex || !m->vertex_normal || (m->options.normals == MESH_SMOOTH && !m->smooth_normal) || !m->on_rim || !m->corner || !m->across || !m->face)
+        return false;
+    memcpy(m->corner, mesh->triangle, triangles * sizeof *m->corner);
+    Vec3 low = mesh->vertex[m->corner[0][0]], high = low;
+    for (size_t i = 0; i < 3 * triangles; i++) {
+        Vec3 p = mesh->vertex[m->corner[i / 3][i % 3]];
+        low = vec3(fmin(low.x, p.x), fmin(low.y, p.y), fmin(low.z, p.z));
+        high = vec3(fmax(high.x, p.x), fmax(high.y, p.y), fmax(high.z, p.z));
+    }
+    m->middle = vec3_mix(low, high, 0.5);
+    m->size = 0.5 * fmax(high.x - low.x, fmax(high.y - low.y, high.z - low.z));
+    for (size_t v = 0; v < vertices; v++)
+        m->vertex[v] = vec3_sub(mesh->vertex[v], m->middle);
+    return true;
+}
+
+Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *options, const char *name, Faults *faults)
+{
+    if (!check_triangles(mesh, name, faults) || !check_edges(mesh, name, faults))
+        return NULL;
+    MeshVessel *m = calloc(1, sizeof *m);
+    if (m)
+        m->options = *options;
+    if (!m || !copy_mesh(m, mesh) || !link_triangles(m)) {
+        faults_add(faults, name, 0, 0, "no memory for a mesh of %d triangles", mesh->triangle_count);
+        mesh_destroy(m ? &m->vessel : NULL);
+        return NULL;
+    }
+    set_normals(m, mesh);
+    if (!build_tree(m, name, faults)) {
+        mesh_destroy(&m->vessel);
+        return NULL;
+    }
+    size_t vertices = (size_t)m->vertex_count, triangles = (size_t)m->triangle_count;
+    m->vessel = (Vessel){.kind = options->normals == MESH_SMOOTH ? "smooth mesh" : "mesh", .query = mesh_query, .locate = mesh_locate, .inlet = mesh_inlet,
+                         .destroy = mesh_destroy, .primitives = m->triangle_count};
+    m->vessel.bytes = sizeof *m + (size_t)m->tree_bytes + vertices * (sizeof *m->vertex + sizeof *m->vertex_normal + sizeof *m->on_rim) +
+                      triangles * (sizeof *m->corner + sizeof *m->across + sizeof *m->face) +
+                      (m->smooth_normal ? vertices * sizeof *m->smooth_normal : 0);
+    return &m->vessel;
+}
+
+#endif
