@@ -134,8 +134,8 @@ TriangleMesh *contact_surface_load(const char *path, double scale, Faults *fault
     cli_notes(stderr, path, text);
     TriangleMesh *mesh = NULL;
     if (check.nonmanifold_edges.count)
-        faults_add(faults, path, 0, 0, "has %d edges of three triangles or more, first at triangle %d: inside and outside cannot be told; an edge has one or two",
-                   check.nonmanifold_edges.count, check.nonmanifold_edges.first);
+        faults_add(faults, path, 0, 0, "has %d edges of three triangles or more, first at triangle %d: inside and outside cannot be told; an edge has "
+                   "one or two", check.nonmanifold_edges.count, check.nonmanifold_edges.first);
     else if ((mesh = calloc(1, sizeof *mesh)) != NULL) {
         *mesh = (TriangleMesh){.vertex_count = surface->vertex_count, .triangle_count = surface->triangle_count, .vertex = surface->vertex,
                                .triangle = surface->triangle, .normal = calloc((size_t)surface->vertex_count, sizeof(Vec3)),

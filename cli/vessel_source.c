@@ -185,8 +185,8 @@ static bool entry_is_inside(const Scene *scene, const Vessel *vessel, Faults *fa
     vessel_query(vessel, 1, &x, 1, &memory, &hit);
     if (!(hit.flags & VESSEL_OPEN_END) && hit.gap > 0)
         return true;
-    faults_add(faults, scene->path, 0, 0, "the tool's tip at the start, (%g, %g, %g) mm, is not inside of the mesh %s; put the sheath's entry into its lumen", x.x, x.y,
-               x.z, scene->mesh_path);
+    faults_add(faults, scene->path, 0, 0, "the tool's tip at the start, (%g, %g, %g) mm, is not inside of the mesh %s; put the sheath's entry into its lumen",
+               x.x, x.y, x.z, scene->mesh_path);
     return false;
 }
 
@@ -243,14 +243,16 @@ bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, F
     if (scene->source == SOURCE_NONE)
         return true;
     if (scene->contact == CONTACT_TUBE && !exact)
-        faults_add(faults, scene->path, 0, 0, "contact 'tube' needs the source 'tube'; a model or shape has lim, mesh, smooth_mesh and grid, a mesh the last three");
+        faults_add(faults, scene->path, 0, 0, "contact 'tube' needs the source 'tube'; a model or shape has lim, mesh, smooth_mesh and grid, a mesh the last "
+                   "three");
     else if (scene->contact == CONTACT_LIM && scene->source == SOURCE_MESH)
-        faults_add(faults, scene->path, 0, 0, "contact 'lim' needs local models: make them with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh and grid");
+        faults_add(faults, scene->path, 0, 0, "contact 'lim' needs local models: make them with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh "
+                   "and grid");
     else if (as_surface && scene->source == SOURCE_PLANE)
         faults_add(faults, scene->path, 0, 0, "contact '%s' needs a wall that ends somewhere; a plane has 'tube', which is the plane itself", name);
     else if ((as_mesh || scene->source == SOURCE_MESH) && !mesh_vessel_available())
-        faults_add(faults, scene->path, 0, 0, "contact '%s' of this vessel needs Embree, and this program was built without it; install libembree-dev and build again, or "
-                   "take another contact", name);
+        faults_add(faults, scene->path, 0, 0, "contact '%s' of this vessel needs Embree, and this program was built without it; install libembree-dev and "
+                   "build again, or take another contact", name);
     return faults->count == before && open_source(scene, threads, quiet, out, faults) &&
            (!as_surface || scene->source == SOURCE_MESH || turn_into_surface(scene, out, faults));
 }
