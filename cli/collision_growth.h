@@ -1,0 +1,24 @@
+// What size costs: the part of `seldinger bench collision` on meshes of more and more triangles, trees of more and more nodes, blobs and triangles for the
+// same error, and memory per millimetre of vessel.
+#ifndef SELDINGER_CLI_COLLISION_GROWTH_H
+#define SELDINGER_CLI_COLLISION_GROWTH_H
+
+#include "geom/faults.h"
+
+#include <cJSON.h>
+#include <stdbool.h>
+#include <stdio.h>
+
+// Prints four tables and adds to `into`
+//   growth: [{surface, search: full|warm|cached|lim, triangles, ns_per_query: {wire, spread}, gap_error_um: {rms, max}, normal_error_deg: {rms, max}, bytes,
+//     surface_s, build_s}]: triangles is 0 for LIM; errors against the wall that was meshed
+//   sizes: [{field: blend|switch, nodes, blobs, ns_warm, ns_cold, first_us, next_us, bytes, build_s}]: one wire of 80 points; 250 of them all over the tree in
+//     turn; the first location of a point in the whole tree and that of its neighbour from there
+//   blobs_to_match: [{gap_error_um, target_mm, blobs, bytes, ns_per_query, fit_s, mesh: {gap_error_um, triangles, bytes, ns_per_query, normal_error_deg},
+//     normal_error_deg}]: rms against the true shape
+//   memory: [{tree, representation, length_mm, edge_mm, primitives, bytes, bytes_per_mm, ns_per_query: {wire, spread}, gap_error_um: {rms, max}, build_s}]
+// `quick`: meshes to 62,000 triangles, trees to 10,000 nodes. `threads` (0: all cores) are for the fits. Without Embree the meshes are left out, and the text
+// says so. False with a fault where memory lacks or a fit fails.
+bool collision_growth(FILE *out, cJSON *into, bool quick, int threads, Faults *faults);
+
+#endif
