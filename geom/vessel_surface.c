@@ -1,7 +1,13 @@
 // The wall of any vessel as triangles (isosurface.h): marching cubes over its gap, and refinement with new vertices on the wall.
 //
-// The gap is 1-Lipschitz, so that a block whose middle is further from the wall than its corners has none of it. Where a vessel answers from local models
-// the gap jumps a little; so a block that a marched one passes the wall on to is marched too, whatever its middle says.
+// A lattice point is asked from the ball in which it lies deepest for the ball's size; where that says outside, from the other balls around it too, and
+// any that says inside is believed: beside a wide vessel may run a thin one. The gap is 1-Lipschitz, so that a block whose middle is further from the wall
+// than its corners has none of it. Where a vessel answers from local models the gap jumps a little; so a block that a marched one passes the wall on to is
+// marched too, whatever its middle says.
+//
+// Vertices start near the middles of crossed edges, wherever the crossing is, and are then moved onto the wall along its normal: that keeps those
+// round one lattice point apart, and triangles have no angle below some 10 degrees. (Starting at the crossings: angles below 0.1.)
+#include "geom/disjoint_sets.h"
 #include "geom/sparse_march.h"
 
 #include <limits.h>
@@ -10,11 +16,23 @@
 
 enum { BATCH = 256, STEPS_MAX = 30 };
 
+static uint64_t edge_key(int a, int b) { return a < b ? (uint64_t)(uint32_t)a << 32 | (uint32_t)b : (uint64_t)(uint32_t)b << 32 | (uint32_t)a; }
+
 static const double CLOSE = 2e-10;           // [mm] to the wall: a step ends where the gap is that small
-// Vertices keep away from lattice points by a seventh of a cell, so that those round one lattice point are apart: settled, they make no slivers.
-static const double LEAST_SHARE = 0.15;
-// [cells] Lattice points that far beyond the balls are known too, so that cells through which the wall runs within the balls have all their corners.
-static const double MARGIN = 1.8;
+static const double LEAST_SHARE = 0.4;       // of an edge, from its ends
+// [cells] A vertex moves by at most that …
+static const double MOVE = 0.75;
+// … and lattice points that far beyond the balls are known too, so that all cells about a vertex within the balls have all their corners.
+static const double MARGIN = 2.4;
+
+// Points to ask, with what they are of: lattice points of a block, a block's middle.
+typedef struct Questions {
+    int count;
+    int of[MARCH_POINTS], ball[MARCH_POINTS];
+    Vec3 point[MARCH_POINTS];
+    VesselMemory memory[MARCH_POINTS];
+    VesselHit hit[MARCH_POINTS];
+} Questions;
 
 typedef struct VesselMarch {
     March march;             // first: a March * to us is a VesselMarch *
@@ -22,82 +40,167 @@ typedef struct VesselMarch {
     const Vec3 *center;
     const double *reach;
     const int *from;
-    int known_count;
-    int known[MARCH_POINTS];                 // lattice points of the block within balls
-    Vec3 point[MARCH_POINTS];                // in the order of `known`
-    VesselMemory memory[MARCH_POINTS];
-    VesselHit hit[MARCH_POINTS];
+    Questions ask;
+    int capacity;
+    int *made_in;            // block of each vertex
+    bool failed;
 } VesselMarch;
 
 // Signed gap: open ends are inside.
 static double gap_of(const VesselHit *hit) { return hit->flags & VESSEL_OPEN_END ? HUGE_VAL : hit->gap; }
 
-// The ball of the block in which x lies deepest, and how deep.
-static int deepest_ball(const VesselMarch *job, const MarchBlock *b, Vec3 x, double *depth)
+static bool is_covered(const VesselMarch *job, const MarchBlock *b, Vec3 x)
 {
-    int best = -1;
-    *depth = -HUGE_VAL;
     for (int l = b->first; l >= 0; l = job->march.link[l].next) {
         int n = job->march.link[l].ball;
-        double room = job->reach[n] - *depth;   // nearer than that is deeper
-        if (room > 0 && vec3_norm2(vec3_sub(x, job->center[n])) < room * room) {
-            *depth = job->reach[n] - vec3_distance(x, job->center[n]);
-            best = n;
-        }
+        if (vec3_norm2(vec3_sub(x, job->center[n])) < job->reach[n] * job->reach[n])
+            return true;
+    }
+    return false;
+}
+
+// The ball in which x lies deepest for its size; -1 where none reaches as far as `margin` beyond itself.
+static int deepest_ball(const VesselMarch *job, const MarchBlock *b, Vec3 x, double margin)
+{
+    int best = -1;
+    double least = HUGE_VAL;
+    for (int l = b->first; l >= 0; l = job->march.link[l].next) {
+        int n = job->march.link[l].ball;
+        double reach = job->reach[n], most = reach + margin, d2 = vec3_norm2(vec3_sub(x, job->center[n]));
+        if (d2 < most * most && d2 < least * reach * reach)
+            least = d2 / (reach * reach), best = n;
     }
     return best;
 }
 
-static VesselMemory located(const VesselMarch *job, int ball, Vec3 x)
+static int node_from(const VesselMarch *job, int ball, Vec3 x) { return job->vessel->locate(job->vessel, x, job->from ? job->from[ball] : -1); }
+
+static void add_question(VesselMarch *job, int of, int ball, Vec3 x, int node)
 {
-    return (VesselMemory){.node = job->vessel->locate(job->vessel, x, job->from ? job->from[ball] : -1)};
+    Questions *ask = &job->ask;
+    ask->of[ask->count] = of;
+    ask->ball[ask->count] = ball;
+    ask->point[ask->count] = x;
+    ask->memory[ask->count++] = (VesselMemory){.node = node};
 }
 
-static bool block_is_plain(const VesselMarch *job, const MarchBlock *b)
+static void put_questions(VesselMarch *job, double reach)
 {
-    double h, depth;
+    vessel_query(job->vessel, job->ask.count, job->ask.point, reach, job->ask.memory, job->ask.hit);
+}
+
+// Asks x, which is lattice point `of`, from all balls of the block within `margin` of it that lead to other nodes than those that were asked before.
+static void ask_others(VesselMarch *job, const MarchBlock *b, int of, Vec3 x, double margin, int first_node)
+{
+    enum { NODES_MAX = 16 };
+    int asked[NODES_MAX] = {first_node}, count = 1;
+    for (int l = b->first; l >= 0 && count < NODES_MAX && job->ask.count < MARCH_POINTS; l = job->march.link[l].next) {
+        int n = job->march.link[l].ball, k = 0;
+        double most = job->reach[n] + margin;
+        if (!(vec3_norm2(vec3_sub(x, job->center[n])) < most * most))
+            continue;
+        int node = node_from(job, n, x);
+        while (k < count && asked[k] != node)
+            k++;
+        if (k < count)
+            continue;
+        asked[count++] = node;
+        add_question(job, of, n, x, node);
+    }
+}
+
+static bool block_is_plain(VesselMarch *job, const MarchBlock *b)
+{
+    double h;
     Vec3 middle = march_block_ball(&job->march, b, &h);
-    VesselMemory memory = located(job, deepest_ball(job, b, middle, &depth), middle);
-    VesselHit hit;
-    vessel_query(job->vessel, 1, &middle, 1.01 * h, &memory, &hit);
-    return !(hit.flags & VESSEL_OPEN_END) && fabs(hit.gap) > h;
+    job->ask.count = 0;
+    ask_others(job, b, 0, middle, h + MARGIN * job->march.cell, -1);
+    put_questions(job, 1.01 * h);
+    bool all_out = true;
+    for (int n = 0; n < job->ask.count; n++) {
+        const VesselHit *hit = &job->ask.hit[n];
+        if (hit->flags & VESSEL_OPEN_END)
+            return false;
+        if (hit->gap > h)
+            return true;
+        all_out = all_out && hit->gap < -h;
+    }
+    return all_out;
+}
+
+// Takes what the second round's questions said: inside is believed.
+static void hear_others(VesselMarch *job)
+{
+    March *march = &job->march;
+    put_questions(job, 2 * march->cell);
+    for (int n = 0; n < job->ask.count; n++) {
+        const VesselHit *hit = &job->ask.hit[n];
+        int at = job->ask.of[n];
+        if (hit->flags & (VESSEL_OPEN_END | VESSEL_BEYOND) || !(hit->gap > march->value[at]))
+            continue;
+        march->value[at] = hit->gap;
+        march->owner[at] = job->ask.ball[n];
+    }
+    job->ask.count = 0;
 }
 
 static void sample_block(VesselMarch *job, const MarchBlock *b)
 {
     March *march = &job->march;
-    job->known_count = 0;
+    int node[MARCH_POINTS];
+    double margin = MARGIN * march->cell;
+    job->ask.count = 0;
     for (int i = 0; i < MARCH_SIDE; i++)
         for (int j = 0; j < MARCH_SIDE; j++)
             for (int k = 0; k < MARCH_SIDE; k++) {
                 Vec3 x = march_point(march, b, i, j, k);
-                double depth;
-                int at = march_index(i, j, k), ball = deepest_ball(job, b, x, &depth);
+                int at = march_index(i, j, k), ball = deepest_ball(job, b, x, margin);
                 march->value[at] = NAN;
                 march->owner[at] = ball;
-                if (!(depth > -MARGIN * march->cell))
-                    continue;
-                job->memory[job->known_count] = located(job, ball, x);
-                job->point[job->known_count] = x;
-                job->known[job->known_count++] = at;
+                if (ball >= 0)
+                    add_question(job, at, ball, x, node_from(job, ball, x));
             }
-    vessel_query(job->vessel, job->known_count, job->point, 2 * march->cell, job->memory, job->hit);
-    for (int n = 0; n < job->known_count; n++)
-        march->value[job->known[n]] = fmin(fmax(gap_of(&job->hit[n]), -march->cell), march->cell);
+    put_questions(job, 2 * march->cell);
+    for (int n = 0; n < job->ask.count; n++) {
+        march->value[job->ask.of[n]] = gap_of(&job->ask.hit[n]);
+        node[job->ask.of[n]] = job->ask.hit[n].node;
+    }
+    job->ask.count = 0;
+    for (int i = 0; i < MARCH_SIDE; i++)
+        for (int j = 0; j < MARCH_SIDE; j++)
+            for (int k = 0; k < MARCH_SIDE; k++) {
+                int at = march_index(i, j, k);
+                if (!(march->value[at] <= 0))
+                    continue;
+                if (job->ask.count > MARCH_POINTS / 2)
+                    hear_others(job);
+                ask_others(job, b, at, march_point(march, b, i, j, k), margin, node[at]);
+            }
+    hear_others(job);
+    for (int at = 0; at < MARCH_POINTS; at++)
+        if (!isnan(march->value[at]))        // finite, for shares of an edge
+            march->value[at] = fmin(fmax(march->value[at], -march->cell), march->cell);
 }
 
 static void place_vertex(March *march, const MarchBlock *b, Vec3 p, int inside, Vec3 *vertex, Vec3 *normal, int *node)
 {
-    const VesselMarch *job = (const VesselMarch *)march;
-    double depth;
-    int ball = deepest_ball(job, b, p, &depth);
+    VesselMarch *job = (VesselMarch *)march;
+    int v = (int)(vertex - march->mesh->vertex);
+    if (march->vertex_capacity > job->capacity) {
+        int *made_in = realloc(job->made_in, (size_t)march->vertex_capacity * sizeof *made_in);
+        job->failed = job->failed || !made_in;
+        job->made_in = made_in ? made_in : job->made_in;
+        job->capacity = made_in ? march->vertex_capacity : job->capacity;
+    }
+    if (!job->failed)
+        job->made_in[v] = (int)(b - march->block);
     *vertex = p;
     *normal = vec3(0, 0, 0);
-    *node = located(job, ball >= 0 ? ball : inside, p).node;
+    *node = job->from ? job->from[inside] : -1;
 }
 
 // Moves points onto the wall, none further than most[i]; where there is no wall that near the point comes as near as it can. `node` is where they are
-// asked from, and then the node that answers; `normal` looks out.
+// asked from, and then the node that answers; `normal` looks out. Every step asks afresh: what a point remembers could change its answer.
 static void settle(const Vessel *vessel, int count, Vec3 *point, const double *most, Vec3 *normal, int *node)
 {
     VesselMemory memory[BATCH];
@@ -107,13 +210,14 @@ static void settle(const Vessel *vessel, int count, Vec3 *point, const double *m
     int of[BATCH], going = count;
     double reach = 0;
     for (int i = 0; i < count; i++) {
-        memory[i] = (VesselMemory){.node = node[i]};
         x[i] = start[i] = point[i];
         least[i] = HUGE_VAL;
         of[i] = i;
         reach = fmax(reach, 4 * most[i]);
     }
     for (int step = 0; step < STEPS_MAX && going > 0; step++) {
+        for (int n = 0; n < going; n++)
+            memory[n] = (VesselMemory){.node = vessel->locate(vessel, x[n], node[of[n]])};
         vessel_query(vessel, going, x, reach, memory, hit);
         int left = 0;
         for (int n = 0; n < going; n++) {
@@ -130,8 +234,7 @@ static void settle(const Vessel *vessel, int count, Vec3 *point, const double *m
             if (!has_wall || fabs(gap) < CLOSE || last || !(vec3_norm2(vec3_sub(next, start[i])) <= most[i] * most[i]))
                 continue;
             of[left] = i;
-            x[left] = next;
-            memory[left++] = memory[n];
+            x[left++] = next;
         }
         going = left;
     }
@@ -187,12 +290,119 @@ static bool march_blocks(VesselMarch *job)
             queue[queued++] = i;
     for (int q = 0; good && q < queued; q++) {
         sample_block(job, &march->block[queue[q]]);
-        good = march_block(march, &march->block[queue[q]]);
+        good = march_block(march, &march->block[queue[q]]) && !job->failed;
         pass_on(job, queue[q], is_plain, is_queued, queue, &queued);
     }
     free(is_plain);
     free(is_queued);
     free(queue);
+    return good;
+}
+
+// --- The rim ---
+
+// ends[v]: rim edges at v, of the triangles kept. False where memory lacks.
+static bool count_rim(const TriangleMesh *mesh, const bool *keep, KeyMap *edge_of, int (*edge)[3], int *ends)
+{
+    int count = 0;
+    memset(ends, 0, (size_t)mesh->vertex_count * sizeof *ends);
+    for (int t = 0; t < mesh->triangle_count; t++)
+        for (int k = 0; keep[t] && k < 3; k++) {
+            bool is_new;
+            int a = mesh->triangle[t][k], b = mesh->triangle[t][(k + 1) % 3];
+            int *at = key_map_find_or_add(edge_of, edge_key(a, b), count, &is_new);
+            if (!at)
+                return false;
+            if (is_new)
+                memcpy(edge[count++], (int[3]){a, b, 0}, sizeof *edge);
+            edge[*at][2]++;
+        }
+    for (int e = 0; e < count; e++)
+        if (edge[e][2] == 1)
+            ends[edge[e][0]]++, ends[edge[e][1]]++;
+    return true;
+}
+
+// Parts all of whose triangles touch the rim are scraps.
+static void drop_scraps(const TriangleMesh *mesh, bool *keep, const int *ends, int *part, bool *is_whole)
+{
+    for (int v = 0; v < mesh->vertex_count; v++)
+        part[v] = v, is_whole[v] = false;
+    for (int t = 0; t < mesh->triangle_count; t++)
+        for (int k = 1; keep[t] && k < 3; k++)
+            disjoint_join(part, mesh->triangle[t][0], mesh->triangle[t][k]);
+    for (int t = 0; t < mesh->triangle_count; t++) {
+        const int *v = mesh->triangle[t];
+        if (keep[t] && ends[v[0]] + ends[v[1]] + ends[v[2]] == 0)
+            is_whole[disjoint_root(part, v[0])] = true;
+    }
+    for (int t = 0; t < mesh->triangle_count; t++)
+        keep[t] = keep[t] && is_whole[disjoint_root(part, mesh->triangle[t][0])];
+}
+
+// Keeps the triangles for which keep[t], and the vertices they use, in their order.
+static void keep_triangles(TriangleMesh *mesh, const bool *keep, int *renamed)
+{
+    int vertices = 0, triangles = 0;
+    memset(renamed, 0xff, (size_t)mesh->vertex_count * sizeof *renamed);
+    for (int t = 0; t < mesh->triangle_count; t++)
+        for (int k = 0; keep[t] && k < 3; k++)
+            renamed[mesh->triangle[t][k]] = 0;
+    for (int v = 0; v < mesh->vertex_count; v++) {
+        if (renamed[v] < 0)
+            continue;
+        renamed[v] = vertices;
+        mesh->vertex[vertices] = mesh->vertex[v];
+        mesh->normal[vertices] = mesh->normal[v];
+        mesh->node[vertices++] = mesh->node[v];
+    }
+    for (int t = 0; t < mesh->triangle_count; t++)
+        if (keep[t]) {
+            for (int k = 0; k < 3; k++)
+                mesh->triangle[triangles][k] = renamed[mesh->triangle[t][k]];
+            triangles++;
+        }
+    mesh->vertex_count = vertices;
+    mesh->triangle_count = triangles;
+}
+
+// What lies outside the balls goes, then what hangs on by a single vertex of the rim, then scraps. False where memory lacks.
+static bool trim(VesselMarch *job)
+{
+    TriangleMesh *mesh = job->march.mesh;
+    size_t vertices = (size_t)mesh->vertex_count + 1, triangles = (size_t)mesh->triangle_count + 1;
+    bool *is_bad = malloc(vertices), *keep = malloc(triangles), good = is_bad && keep, open = false, again = true;
+    for (int v = 0; good && v < mesh->vertex_count; v++) {
+        is_bad[v] = !is_covered(job, &job->march.block[job->made_in[v]], mesh->vertex[v]);
+        open = open || is_bad[v];
+    }
+    int(*edge)[3] = open ? malloc(3 * triangles * sizeof *edge) : NULL, *ends = open ? malloc(vertices * sizeof *ends) : NULL;
+    int *other = open ? malloc(vertices * sizeof *other) : NULL;
+    good = good && (!open || (edge && ends && other));
+    if (open && good)
+        memset(keep, true, triangles);
+    while (open && good && again) {
+        KeyMap edge_of = {0};
+        again = false;
+        for (int t = 0; t < mesh->triangle_count; t++)
+            for (int k = 0; k < 3; k++)
+                keep[t] = keep[t] && !is_bad[mesh->triangle[t][k]];
+        good = count_rim(mesh, keep, &edge_of, edge, ends);
+        key_map_free(&edge_of);
+        for (int v = 0; v < mesh->vertex_count; v++) {
+            is_bad[v] = ends[v] > 2;
+            again = again || is_bad[v];
+        }
+    }
+    if (open && good) {
+        drop_scraps(mesh, keep, ends, other, is_bad);
+        keep_triangles(mesh, keep, other);
+    }
+    free(is_bad);
+    free(keep);
+    free(edge);
+    free(ends);
+    free(other);
     return good;
 }
 
@@ -214,12 +424,13 @@ TriangleMesh *isosurface_of_vessel(const Vessel *vessel, int count, const Vec3 *
     good = good && march_blocks(job);
     TriangleMesh *mesh = job->march.mesh;
     if (good)
-        settle_all(vessel, mesh, 0, NULL, 0.75 * cell_mm);
-    else {
+        settle_all(vessel, mesh, 0, NULL, MOVE * cell_mm);
+    if (!good || !trim(job)) {
         triangle_mesh_free(mesh);
         mesh = NULL;
     }
     march_end(&job->march);
+    free(job->made_in);
     free(job);
     return mesh;
 }
@@ -240,14 +451,14 @@ TriangleMesh *triangle_mesh_refine(const TriangleMesh *mesh, const Vessel *vesse
     bool good = fine && middle && end && key_map_reserve(&edge_of, triangles + triangles / 2 + 1);
     for (size_t t = 0; good && t < triangles; t++)
         for (int k = 0; good && k < 3; k++) {
-            int a = mesh->triangle[t][k], b = mesh->triangle[t][(k + 1) % 3], low = a < b ? a : b, high = a < b ? b : a;
+            int a = mesh->triangle[t][k], b = mesh->triangle[t][(k + 1) % 3];
             bool is_new;
-            int *edge = key_map_find_or_add(&edge_of, (uint64_t)(uint32_t)low << 32 | (uint32_t)high, (int)edges, &is_new);
+            int *edge = key_map_find_or_add(&edge_of, edge_key(a, b), (int)edges, &is_new);
             good = edge != NULL && edges < (size_t)INT_MAX - old;
             if (!good)
                 break;
             if (is_new)
-                end[edges][0] = low, end[edges++][1] = high;
+                end[edges][0] = a, end[edges++][1] = b;
             middle[t][k] = (int)old + *edge;
         }
     key_map_free(&edge_of);
@@ -269,7 +480,7 @@ TriangleMesh *triangle_mesh_refine(const TriangleMesh *mesh, const Vessel *vesse
             Vec3 a = mesh->vertex[end[e][0]], b = mesh->vertex[end[e][1]], m = vec3_mix(a, b, 0.5);
             fine->vertex[old + e] = m;
             fine->normal[old + e] = vec3(0, 0, 0);
-            fine->node[old + e] = vessel->locate(vessel, m, mesh->node[end[e][0]]);
+            fine->node[old + e] = mesh->node[end[e][0]];
             most[e] = 0.5 * vec3_distance(a, b);
         }
         settle_all(vessel, fine, mesh->vertex_count, most, 0);
