@@ -14,9 +14,9 @@
 // normal is N / |N|, N = sum b_i n_i, and S = sym(P sum n_i grad(b_i)' P), P = I - n n'; at X it is S (I + gap S)^-1.
 #include "geom/mesh_vessel.h"
 
-#ifndef SELDINGER_EMBREE
+MeshVesselOptions mesh_vessel_default_options(void) { return (MeshVesselOptions){.search = MESH_SEARCH_CACHED}; }
 
-MeshVesselOptions mesh_vessel_default_options(void) { return (MeshVesselOptions){.search = MESH_SEARCH_WARM}; }
+#ifndef SELDINGER_EMBREE
 
 bool mesh_vessel_available(void) { return false; }
 
@@ -30,6 +30,7 @@ Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *op
 #else
 
 #include "geom/tree_surface.h"
+#include "geom/triangle_groups.h"
 
 #include <embree3/rtcore.h>
 #include <float.h>
@@ -49,9 +50,15 @@ typedef struct MeshVessel {
     Vec3 *vertex_normal;     // (V) pseudonormal, of no special length; all normals point into the lumen
     Vec3 *smooth_normal;     // (V) unit; only with MESH_SMOOTH
     bool *on_rim;            // (V)
+    int *keeper;             // (V) the lowest triangle at the vertex
     int (*corner)[3];        // (T)
     int (*across)[3];        // (T) the triangle beyond the side from corner k to the next; -1: rim
     Vec3 *face;              // (T) unit normal
+    const GroupKernels *kernels;
+    int group_count;
+    TriangleGroup *group;    // (G)
+    int *group_of;           // (T)
+    GroupSurroundings *around;   // (G); only with MESH_SEARCH_CACHED
 } MeshVessel;
 
 // --- The closest point of one triangle ---
@@ -101,6 +108,7 @@ typedef struct Search {
     Vec3 x;
     double distance2;
     int triangle;            // -1: none yet
+    const GroupSurroundings *without;    // groups that do not count; NULL: all do
 } Search;
 
 // [mm] the radius within which boxes are visited, for a closest triangle at sqrt(distance2): wider by more than the rounding of boxes and point to float.
@@ -110,36 +118,98 @@ static float widened(const Search *s)
     return (float)(sqrt(s->distance2) * (1 + 1e-6) + room);
 }
 
-static bool try_triangle(Search *s, int triangle)
+static bool look_at(Search *s, int group)
 {
-    double d2 = closest_of_triangle(s->mesh, triangle, s->x).distance2;
-    if (!(d2 < s->distance2 || (d2 == s->distance2 && triangle < s->triangle)))
-        return false;
-    s->distance2 = d2;
-    s->triangle = triangle;
-    return true;
+    const TriangleGroup *g = &s->mesh->group[group];
+    double d2[GROUP_TRIANGLES];
+    bool closer = false;
+    s->mesh->kernels->distances(g, s->x, d2);
+    for (int i = 0; i < GROUP_TRIANGLES; i++)
+        if (d2[i] < s->distance2 || (d2[i] == s->distance2 && g->triangle[i] < s->triangle)) {
+            s->distance2 = d2[i];
+            s->triangle = g->triangle[i];
+            closer = true;
+        }
+    return closer;
 }
 
 static bool visit(struct RTCPointQueryFunctionArguments *a)
 {
     Search *s = a->userPtr;
-    if (!try_triangle(s, (int)a->primID))
+    for (int i = 0; s->without && i < s->without->count; i++)
+        if (s->without->group[i] == (int)a->primID)
+            return false;
+    if (!look_at(s, (int)a->primID))
         return false;
     a->query->radius = widened(s);
     return true;
 }
 
+static void search_tree(Search *s)
+{
+    struct RTCPointQuery query = {.x = (float)s->x.x, .y = (float)s->x.y, .z = (float)s->x.z, .radius = widened(s)};
+    struct RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    rtcPointQuery(s->mesh->scene, &query, &context, visit, s);
+}
+
+// Does a ball prove that nothing outside the neighbourhood is closer?
+static bool is_proven(const GroupSurroundings *around, const Search *s)
+{
+    double d = sqrt(s->distance2);
+    for (int i = 0; i < around->balls; i++) {
+        double room = around->ball[i].radius - d;
+        if (room > 0 && vec3_norm2(vec3_sub(s->x, around->ball[i].center)) < room * room)
+            return true;
+    }
+    return false;
+}
+
+// The search in the neighbourhood of s->triangle, whose group has been looked at; true where that settles it.
+static bool search_around(Search *s)
+{
+    enum { ROUNDS = 3 };
+    const MeshVessel *m = s->mesh;
+    for (int round = 0; round < ROUNDS; round++) {
+        int own = m->group_of[s->triangle];
+        const GroupSurroundings *around = &m->around[own];
+        float d2[GROUP_NEAR];
+        m->kernels->boxes(around, s->x, d2);
+        for (int i = 1; i < around->count; i++)
+            if (d2[i] <= s->distance2)
+                look_at(s, around->group[i]);
+        if (is_proven(around, s))
+            return true;
+        if (m->group_of[s->triangle] == own)
+            return false;
+    }
+    return false;
+}
+
+// The triangle that stands for a feature: the lowest of those that share it. Which of them is the closest is a matter of rounding.
+static int keeper_of(const MeshVessel *m, int triangle, int feature)
+{
+    if (feature == ON_FACE)
+        return triangle;
+    if (feature >= ON_VERTEX)
+        return m->keeper[m->corner[triangle][feature - ON_VERTEX]];
+    int other = m->across[triangle][feature - ON_EDGE];
+    return other >= 0 && other < triangle ? other : triangle;
+}
+
 // The closest triangle; `from`: a triangle to start from, -1: none is known.
-static int closest_triangle(const MeshVessel *m, Vec3 x, int from)
+static int closest_triangle(const MeshVessel *m, Vec3 x, int from, Foot *foot)
 {
     Search s = {.mesh = m, .x = x, .distance2 = HUGE_VAL, .triangle = -1};
     if (from >= 0)
-        try_triangle(&s, from);
-    struct RTCPointQuery query = {.x = (float)x.x, .y = (float)x.y, .z = (float)x.z, .radius = widened(&s)};
-    struct RTCPointQueryContext context;
-    rtcInitPointQueryContext(&context);
-    rtcPointQuery(m->scene, &query, &context, visit, &s);
-    return s.triangle;
+        look_at(&s, m->group_of[from]);
+    if (from < 0 || !m->around || !search_around(&s))
+        search_tree(&s);
+    *foot = closest_of_triangle(m, s.triangle, x);
+    int keeper = keeper_of(m, s.triangle, foot->feature);
+    if (keeper != s.triangle)
+        *foot = closest_of_triangle(m, keeper, x);
+    return keeper;
 }
 
 // --- The answer ---
@@ -217,9 +287,13 @@ static Sym3 smooth_hessian(const MeshVessel *m, int triangle, double gap, Vec3 n
     return h;
 }
 
-static VesselHit hit_of(const MeshVessel *m, Vec3 x, int triangle)
+// [rad] beyond it no smooth wall is meant.
+static const double TURN_MAX = 0.5;
+
+static VesselHit hit_of(const MeshVessel *m, Vec3 x, int from)
 {
-    Foot foot = closest_of_triangle(m, triangle, x);
+    Foot foot;
+    int triangle = closest_triangle(m, x, from, &foot);
     VesselHit hit = {.node = triangle};
     Vec3 away = vec3_sub(x, foot.p), pseudo = pseudonormal(m, triangle, foot.feature);
     double d = sqrt(foot.distance2), tiny = 1e-9 * m->size;
@@ -237,6 +311,9 @@ static VesselHit hit_of(const MeshVessel *m, Vec3 x, int triangle)
         sum = vec3_add_scaled(sum, foot.weight[k], m->smooth_normal[corner[k]]);
     hit.normal = vec3_unit_or(sum, hit.normal);
     hit.hessian = smooth_hessian(m, triangle, hit.gap, hit.normal);
+    // X lies over p along the face's normal; where it would along the smooth one the wall has turned by H (X - p)
+    Vec3 turn = sym3_mul_vec(&hit.hessian, away);
+    hit.normal = vec3_unit(vec3_add_scaled(hit.normal, TURN_MAX / fmax(vec3_norm(turn), TURN_MAX), turn));
     return hit;
 }
 
@@ -253,7 +330,7 @@ static VesselHit query_one(const MeshVessel *m, Vec3 point, double reach, Vessel
             return (VesselHit){.gap = bound, .node = memory->node, .flags = VESSEL_FAR};
     }
     Vec3 x = vec3_sub(point, m->middle);
-    VesselHit hit = hit_of(m, x, closest_triangle(m, x, knows ? memory->node : -1));
+    VesselHit hit = hit_of(m, x, knows ? memory->node : -1);
     memory->node = hit.node;
     // the distance changes by no more than the point moves
     memory->clearance = hit.gap < HUGE_VAL ? fmax(0, hit.gap * (1 - 1e-12)) : 0;
@@ -273,7 +350,8 @@ static int mesh_locate(const Vessel *vessel, Vec3 point, int from)
     bool knows = is_known(m, from);
     if (!(vec3_norm2(point) < 1e200))
         return knows ? from : 0;
-    return closest_triangle(m, vec3_sub(point, m->middle), knows ? from : -1);
+    Foot foot;
+    return closest_triangle(m, vec3_sub(point, m->middle), knows ? from : -1, &foot);
 }
 
 static bool mesh_inlet(const Vessel *vessel, Vec3 *point, Vec3 *direction)
@@ -299,9 +377,13 @@ static void mesh_destroy(Vessel *vessel)
     free(m->vertex_normal);
     free(m->smooth_normal);
     free(m->on_rim);
+    free(m->keeper);
     free(m->corner);
     free(m->across);
     free(m->face);
+    free(m->group);
+    free(m->group_of);
+    free(m->around);
     free(m);
 }
 
@@ -309,8 +391,6 @@ static void mesh_destroy(Vessel *vessel)
 
 static const double COORDINATE_MAX = 1e9;        // [mm]
 static const double THIN = 1e-12;                // height over length of a triangle that has an area
-
-MeshVesselOptions mesh_vessel_default_options(void) { return (MeshVesselOptions){.search = MESH_SEARCH_WARM}; }
 
 bool mesh_vessel_available(void) { return true; }
 
@@ -446,6 +526,15 @@ static bool count_bytes(void *mesh, ssize_t bytes, bool post)
     return true;
 }
 
+static void set_bounds(const struct RTCBoundsFunctionArguments *a)
+{
+    const MeshVessel *m = a->geometryUserPtr;
+    GroupBox box = group_box(&m->group[a->primID], m->size);
+    struct RTCBounds *b = a->bounds_o;
+    b->lower_x = box.low[0], b->lower_y = box.low[1], b->lower_z = box.low[2];
+    b->upper_x = box.high[0], b->upper_y = box.high[1], b->upper_z = box.high[2];
+}
+
 static bool build_tree(MeshVessel *m, const char *name, Faults *faults)
 {
     m->device = rtcNewDevice("threads=1");
@@ -454,31 +543,148 @@ static bool build_tree(MeshVessel *m, const char *name, Faults *faults)
         return false;
     }
     rtcSetDeviceMemoryMonitorFunction(m->device, count_bytes, m);
-    RTCGeometry geometry = rtcNewGeometry(m->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    float *place = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof *place, (size_t)m->vertex_count);
-    unsigned *corner = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof *corner, (size_t)m->triangle_count);
     m->scene = rtcNewScene(m->device);
-    if (place && corner && m->scene) {
-        for (int v = 0; v < m->vertex_count; v++) {
-            Vec3 p = m->vertex[v];
-            place[3 * (size_t)v] = (float)p.x, place[3 * (size_t)v + 1] = (float)p.y, place[3 * (size_t)v + 2] = (float)p.z;
-        }
-        for (int t = 0; t < m->triangle_count; t++)
-            for (int k = 0; k < 3; k++)
-                corner[3 * (size_t)t + (size_t)k] = (unsigned)m->corner[t][k];
+    RTCGeometry geometry = rtcNewGeometry(m->device, RTC_GEOMETRY_TYPE_USER);
+    if (m->scene && geometry) {
+        rtcSetGeometryUserPrimitiveCount(geometry, (unsigned)m->group_count);
+        rtcSetGeometryUserData(geometry, m);
+        rtcSetGeometryBoundsFunction(geometry, set_bounds, NULL);
         rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
         rtcSetSceneBuildQuality(m->scene, RTC_BUILD_QUALITY_HIGH);
         rtcSetSceneFlags(m->scene, RTC_SCENE_FLAG_ROBUST);
         rtcCommitGeometry(geometry);
         rtcAttachGeometry(m->scene, geometry);
         rtcCommitScene(m->scene);
+        rtcReleaseGeometry(geometry);
     }
-    rtcReleaseGeometry(geometry);
     enum RTCError error = rtcGetDeviceError(m->device);
     if (error != RTC_ERROR_NONE)
         faults_add(faults, name, 0, 0, "Embree cannot hold the mesh of %d triangles (%s)", m->triangle_count,
                    error == RTC_ERROR_OUT_OF_MEMORY ? "no memory" : "error of its own");
     return error == RTC_ERROR_NONE;
+}
+
+static bool set_groups(MeshVessel *m)
+{
+    size_t triangles = (size_t)m->triangle_count;
+    m->kernels = group_kernels(0);
+    m->group_count = group_count(m->triangle_count);
+    m->group = aligned_alloc(_Alignof(TriangleGroup), (size_t)m->group_count * sizeof *m->group);
+    m->group_of = malloc(triangles * sizeof *m->group_of);
+    Vec3 *centroid = malloc(triangles * sizeof *centroid);
+    int *order = malloc(triangles * sizeof *order);
+    bool good = m->group && m->group_of && centroid && order;
+    for (int t = 0; good && t < m->triangle_count; t++) {
+        const int *c = m->corner[t];
+        centroid[t] = vec3_scale(vec3_add(vec3_add(m->vertex[c[0]], m->vertex[c[1]]), m->vertex[c[2]]), 1.0 / 3);
+    }
+    if (good)
+        group_order(m->triangle_count, centroid, order);
+    for (int g = 0; good && g < m->group_count; g++) {
+        int first = g * GROUP_TRIANGLES, count = m->triangle_count - first < GROUP_TRIANGLES ? m->triangle_count - first : GROUP_TRIANGLES;
+        group_fill(&m->group[g], count, order + first, (const int(*)[3])m->corner, m->vertex, m->face);
+        for (int i = 0; i < count; i++)
+            m->group_of[order[first + i]] = g;
+    }
+    free(centroid);
+    free(order);
+    return good;
+}
+
+// --- Neighbourhoods ---
+
+typedef struct GroupMiddle {
+    Vec3 place, normal;      // mean of the triangles' centroids; mean direction into the lumen
+    double radius;           // to the farthest corner
+} GroupMiddle;
+
+static GroupMiddle middle_of(const TriangleGroup *g)
+{
+    GroupMiddle middle = {{0, 0, 0}, {0, 0, 0}, 0};
+    for (int i = 0; i < GROUP_TRIANGLES; i++) {
+        middle.normal = vec3_add(middle.normal, vec3(g->normal[0][i], g->normal[1][i], g->normal[2][i]));
+        for (int k = 0; k < 3; k++)
+            middle.place = vec3_add_scaled(middle.place, 1.0 / (3 * GROUP_TRIANGLES), vec3(g->corner[k][0][i], g->corner[k][1][i], g->corner[k][2][i]));
+    }
+    middle.normal = vec3_unit(middle.normal);
+    for (int i = 0; i < GROUP_TRIANGLES; i++)
+        for (int k = 0; k < 3; k++)
+            middle.radius = fmax(middle.radius, vec3_distance(middle.place, vec3(g->corner[k][0][i], g->corner[k][1][i], g->corner[k][2][i])));
+    return middle;
+}
+
+// The groups that share a vertex with `group`, the nearest GROUP_NEAR of them by their middles, itself first. first, of: the groups at each vertex.
+static void gather_near(const MeshVessel *m, int group, const GroupMiddle *middle, const size_t *first, const int *of, GroupSurroundings *around)
+{
+    double far2[GROUP_NEAR] = {0};
+    around->group[0] = group;
+    around->count = 1;
+    for (int i = 0; i < 3 * GROUP_TRIANGLES; i++) {
+        int v = m->corner[m->group[group].triangle[i / 3]][i % 3];
+        for (size_t at = first[v]; at < first[v + 1]; at++) {
+            int other = of[at], k = 0;
+            while (k < around->count && around->group[k] != other)
+                k++;
+            double d2 = vec3_norm2(vec3_sub(middle[other].place, middle[group].place));
+            if (k < around->count || (around->count == GROUP_NEAR && !(d2 < far2[GROUP_NEAR - 1])))
+                continue;
+            around->count += around->count < GROUP_NEAR;
+            for (k = around->count - 1; k > 1 && far2[k - 1] > d2; k--) {
+                far2[k] = far2[k - 1];
+                around->group[k] = around->group[k - 1];
+            }
+            far2[k] = d2;
+            around->group[k] = other;
+        }
+    }
+    around->origin = middle[group].place;
+    around->axis[2] = middle[group].normal;
+    around->axis[0] = vec3_normal_to(around->axis[2]);
+    around->axis[1] = vec3_cross(around->axis[2], around->axis[0]);
+    group_set_boxes(around, m->group);
+}
+
+static void blow_balls(const MeshVessel *m, const GroupMiddle *middle, GroupSurroundings *around)
+{
+    double touching = 0.75 * middle->radius;
+    around->balls = 0;
+    for (int i = 0; i < GROUP_BALLS; i++, touching *= 2) {
+        double most = touching + 2 * middle->radius;         // room for points that have gone further is of no use
+        Search s = {.mesh = m, .x = vec3_add_scaled(middle->place, touching, middle->normal), .distance2 = most * most, .triangle = -1, .without = around};
+        search_tree(&s);
+        double radius = sqrt(s.distance2) * (1 - 1e-9) - 1e-9 * m->size;
+        if (!(radius > touching))
+            return;          // larger ones would have to hold this one
+        around->ball[around->balls].center = s.x;
+        around->ball[around->balls++].radius = radius;
+    }
+}
+
+static bool set_surroundings(MeshVessel *m)
+{
+    size_t groups = (size_t)m->group_count, sides = 3 * (size_t)m->triangle_count;
+    m->around = aligned_alloc(_Alignof(GroupSurroundings), groups * sizeof *m->around);
+    GroupMiddle *middle = malloc(groups * sizeof *middle);
+    size_t *first = calloc((size_t)m->vertex_count + 2, sizeof *first);
+    int *of = malloc(sides * sizeof *of);
+    bool good = m->around && middle && first && of;
+    for (size_t i = 0; good && i < sides; i++)
+        first[m->corner[i / 3][i % 3] + 2]++;
+    for (int v = 2; good && v < m->vertex_count + 2; v++)
+        first[v] += first[v - 1];
+    for (size_t i = 0; good && i < sides; i++)
+        of[first[m->corner[i / 3][i % 3] + 1]++] = m->group_of[i / 3];
+    for (int g = 0; good && g < m->group_count; g++)
+        middle[g] = middle_of(&m->group[g]);
+    for (int g = 0; good && g < m->group_count; g++) {
+        memset(&m->around[g], 0, sizeof m->around[g]);
+        gather_near(m, g, middle, first, of, &m->around[g]);
+        blow_balls(m, &middle[g], &m->around[g]);
+    }
+    free(middle);
+    free(first);
+    free(of);
+    return good;
 }
 
 static bool copy_mesh(MeshVessel *m, const TriangleMesh *mesh)
@@ -490,12 +696,17 @@ static bool copy_mesh(MeshVessel *m, const TriangleMesh *mesh)
     m->vertex_normal = calloc(vertices, sizeof *m->vertex_normal);
     m->smooth_normal = m->options.normals == MESH_SMOOTH ? malloc(vertices * sizeof *m->smooth_normal) : NULL;
     m->on_rim = calloc(vertices, sizeof *m->on_rim);
+    m->keeper = malloc(vertices * sizeof *m->keeper);
     m->corner = malloc(triangles * sizeof *m->corner);
     m->across = malloc(triangles * sizeof *m->across);
     m->face = malloc(triangles * sizeof *m->face);
-    if (!m->vertex || !m->vertex_normal || (m->options.normals == MESH_SMOOTH && !m->smooth_normal) || !m->on_rim || !m->corner || !m->across || !m->face)
+    if (!m->vertex || !m->vertex_normal || (m->options.normals == MESH_SMOOTH && !m->smooth_normal) || !m->on_rim || !m->keeper || !m->corner || !m->across ||
+        !m->face)
         return false;
     memcpy(m->corner, mesh->triangle, triangles * sizeof *m->corner);
+    for (int t = mesh->triangle_count - 1; t >= 0; t--)
+        for (int k = 0; k < 3; k++)
+            m->keeper[m->corner[t][k]] = t;
     Vec3 low = mesh->vertex[m->corner[0][0]], high = low;
     for (size_t i = 0; i < 3 * triangles; i++) {
         Vec3 p = mesh->vertex[m->corner[i / 3][i % 3]];
@@ -522,16 +733,27 @@ Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *op
         return NULL;
     }
     set_normals(m, mesh);
+    if (!set_groups(m)) {
+        faults_add(faults, name, 0, 0, "no memory for a mesh of %d triangles", mesh->triangle_count);
+        mesh_destroy(&m->vessel);
+        return NULL;
+    }
     if (!build_tree(m, name, faults)) {
+        mesh_destroy(&m->vessel);
+        return NULL;
+    }
+    if (options->search == MESH_SEARCH_CACHED && !set_surroundings(m)) {
+        faults_add(faults, name, 0, 0, "no memory for a mesh of %d triangles", mesh->triangle_count);
         mesh_destroy(&m->vessel);
         return NULL;
     }
     size_t vertices = (size_t)m->vertex_count, triangles = (size_t)m->triangle_count;
     m->vessel = (Vessel){.kind = options->normals == MESH_SMOOTH ? "smooth mesh" : "mesh", .query = mesh_query, .locate = mesh_locate, .inlet = mesh_inlet,
                          .destroy = mesh_destroy, .primitives = m->triangle_count};
-    m->vessel.bytes = sizeof *m + (size_t)m->tree_bytes + vertices * (sizeof *m->vertex + sizeof *m->vertex_normal + sizeof *m->on_rim) +
-                      triangles * (sizeof *m->corner + sizeof *m->across + sizeof *m->face) +
-                      (m->smooth_normal ? vertices * sizeof *m->smooth_normal : 0);
+    size_t each_group = sizeof *m->group + (m->around ? sizeof *m->around : 0);
+    size_t each_vertex = sizeof *m->vertex + sizeof *m->vertex_normal + sizeof *m->on_rim + sizeof *m->keeper + (m->smooth_normal ? sizeof(Vec3) : 0);
+    size_t each_triangle = sizeof *m->corner + sizeof *m->across + sizeof *m->face + sizeof *m->group_of;
+    m->vessel.bytes = sizeof *m + (size_t)m->tree_bytes + (size_t)m->group_count * each_group + vertices * each_vertex + triangles * each_triangle;
     return &m->vessel;
 }
 

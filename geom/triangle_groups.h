@@ -1,0 +1,62 @@
+// A mesh's triangles in groups of eight that lie together, for closest-point searches: a group is looked at in one go, and knows the groups around it.
+//
+// With each group o stand its neighbourhood N(o) (the groups that share a vertex with it, itself first) and balls on the lumen's side, each as large as
+// fits between the triangles that are not in N(o): no such triangle is nearer to the ball's centre c than its radius r. So if d is the distance from X
+// to the nearest triangle of N(o) and |X - c| + d < r, the ball of radius d about X lies within the other one, nothing outside N(o) reaches into it, and d
+// is the distance to the whole mesh. This holds wherever X is and wherever it came from; nothing has to be remembered but o.
+// The balls touch the wall at the group's middle, with radii from a part of the group's own size to many times it; which helps depends on d.
+//
+// Coordinates are relative to the mesh's middle. Immutable once filled. All instruction sets give the same bits.
+#ifndef SELDINGER_GEOM_TRIANGLE_GROUPS_H
+#define SELDINGER_GEOM_TRIANGLE_GROUPS_H
+
+#include "geom/linear.h"
+
+#include <stddef.h>
+
+enum { GROUP_TRIANGLES = 8, GROUP_NEAR = 16, GROUP_BALLS = 6 };
+
+typedef struct TriangleGroup {           // lanes beyond the last triangle repeat it
+    _Alignas(64) double corner[3][3][GROUP_TRIANGLES];   // [corner][axis]
+    double normal[3][GROUP_TRIANGLES];           // unit, into the lumen; corners run clockwise seen from there
+    double inverse[3][GROUP_TRIANGLES];          // 1 / squared length of the side from corner k to the next
+    int triangle[GROUP_TRIANGLES];
+} TriangleGroup;
+
+typedef struct GroupBox {                // in float, wider than the group by more than rounding of box and point can do
+    float low[3], high[3];
+} GroupBox;
+
+typedef struct GroupSurroundings {
+    // Boxes of N(o) in a frame of the group's own, (x - origin) . axis: neighbours lie much in one plane, and boxes along it are flat. In float, wider than
+    // the groups by more than rounding can do; those beyond `count` are nowhere.
+    _Alignas(64) float low[3][GROUP_NEAR], high[3][GROUP_NEAR];
+    Vec3 origin, axis[3];
+    int group[GROUP_NEAR];
+    int count, balls;
+    struct {
+        Vec3 center;
+        double radius;
+    } ball[GROUP_BALLS];
+} GroupSurroundings;
+
+typedef struct GroupKernels {
+    const char *name;
+    // distance2 (8) [mm2] from x to each triangle.
+    void (*distances)(const TriangleGroup *group, Vec3 x, double *distance2);
+    // distance2 (GROUP_NEAR): no more than the squared distance from x to each box.
+    void (*boxes)(const GroupSurroundings *around, Vec3 x, float *distance2);
+} GroupKernels;
+// isa: as LimVesselOptions.isa (geom/vessel.h).
+const GroupKernels *group_kernels(int isa);
+
+static inline int group_count(int triangle_count) { return (triangle_count + GROUP_TRIANGLES - 1) / GROUP_TRIANGLES; }
+// Orders the triangles (order (T), a permutation) so that each eight in a row are close together. centroid (T).
+void group_order(int triangle_count, const Vec3 *centroid, int *order);
+void group_fill(TriangleGroup *group, int count, const int *triangle, const int (*corner)[3], const Vec3 *vertex, const Vec3 *normal);
+// size: the largest coordinate of the mesh [mm].
+GroupBox group_box(const TriangleGroup *group, double size);
+// Sets `low` and `high` from `origin`, `axis`, `group` and `count`. group: all of the mesh's.
+void group_set_boxes(GroupSurroundings *around, const TriangleGroup *group);
+
+#endif
