@@ -1,5 +1,5 @@
-// A step allocates nothing: calls of the heap between the start of a step and its end are counted, by functions of this program that stand in
-// front of the C library's. Of the simulation thread alone: a recording's writer may do as it likes.
+// A step allocates nothing: calls of the heap between the start of a step and its end are counted. Of the simulation thread alone: a recording's
+// writer may do as it likes.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,82 +11,11 @@
 #include "recon/phantom.h"
 #include "sim/recording.h"
 
-#include <errno.h>
+#include "../heap_calls.h"
+
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <sys/syscall.h>
-#include <sys/types.h>
 #include <unistd.h>
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__GLIBC__)
-#define COUNTS_HEAP 0
-static long heap_calls(void) { return 0; }
-static void heap_watch(bool on) { (void)on; }
-#else
-#define COUNTS_HEAP 1
-static _Thread_local bool watched;
-static _Thread_local long calls;
-
-static long heap_calls(void) { return calls; }
-static void heap_watch(bool on) { watched = on; }
-
-void *__libc_malloc(size_t size);
-void *__libc_calloc(size_t count, size_t size);
-void *__libc_realloc(void *memory, size_t size);
-void *__libc_memalign(size_t alignment, size_t size);
-void __libc_free(void *memory);
-long syscall(long number, ...);   // hidden by _POSIX_C_SOURCE
-
-void *malloc(size_t size)
-{
-    calls += watched;
-    return __libc_malloc(size);
-}
-
-void *calloc(size_t count, size_t size)
-{
-    calls += watched;
-    return __libc_calloc(count, size);
-}
-
-void *realloc(void *memory, size_t size)
-{
-    calls += watched;
-    return __libc_realloc(memory, size);
-}
-
-void free(void *memory)
-{
-    calls += watched;
-    __libc_free(memory);
-}
-
-void *aligned_alloc(size_t alignment, size_t size)
-{
-    calls += watched;
-    return __libc_memalign(alignment, size);
-}
-
-int posix_memalign(void **memory, size_t alignment, size_t size)
-{
-    calls += watched;
-    *memory = __libc_memalign(alignment, size);
-    return *memory ? 0 : ENOMEM;
-}
-
-void *mmap(void *address, size_t length, int protection, int flags, int file, off_t offset)
-{
-    calls += watched;
-    return (void *)syscall(SYS_mmap, address, length, protection, flags, file, offset);
-}
-
-int munmap(void *address, size_t length)
-{
-    calls += watched;
-    return (int)syscall(SYS_munmap, address, length);
-}
-#endif
 
 static Faults faults;
 
@@ -134,32 +63,10 @@ static unsigned run_watched(const char *name, const char *text, const Vessel *ve
     return flags;
 }
 
-static void need_counting(void)
-{
-    if (COUNTS_HEAP)
-        return;
-    print_message("skipped: the heap is the sanitizer's\n");
-    skip();
-}
-
 #define STIFF "sections: [{length_mm: 40, diameter_mm: 0.2, young_modulus_gpa: 100, poisson_ratio: 0.48}]"
 #define IN_AND_OUT "script: [{t_s: 0, push_mm_s: 50, twist_deg_s: 180}, {t_s: 0.6, push_mm_s: -50, twist_deg_s: 180}, {t_s: 1.1, push_mm_s: 0, twist_deg_s: 0}]\n"
 #define BENT "vessel: {friction: 0.3, tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], radius_mm: 0.5, ends: closed, path: [{line_mm: 5}, "
 #define BENDS "{arc: {radius_mm: 6, angle_deg: 170}}, {arc: {radius_mm: 5, angle_deg: 170, plane_deg: 180}}]}}\n"
-
-// The counter counts: this test would see a call.
-static void the_counter_counts(void **state)
-{
-    (void)state;
-    need_counting();
-    long before = heap_calls();
-    heap_watch(true);
-    char *volatile memory = malloc(100);
-    memory = realloc(memory, 200);
-    free(memory);
-    heap_watch(false);
-    assert_int_equal(heap_calls() - before, 3);
-}
 
 static void steps_in_a_tube(void **state)
 {
