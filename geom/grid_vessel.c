@@ -2,7 +2,8 @@
 // neighbours, so that a query reads one block. A map finds the block; it also knows the blocks inside and beyond open ends, which hold nothing: they are
 // flooded from those that do, each asked once at its middle. What the map does not know is outside.
 //
-// A lattice point is asked from the node of the surface's vertex next to it (of one vertex a lattice cell).
+// A lattice point is asked from the node of the surface's vertex next to it (of one vertex a lattice cell). Vertices are found by halving, or rather by
+// thirds: those that may be next to a block, of those the ones that may be next to each 3 x 3 x 3 of its points, of those the next.
 #include "geom/grid_vessel.h"
 
 #include "geom/key_map.h"
@@ -149,12 +150,13 @@ typedef struct Making {
     GridVessel *grid;
     const Vessel *exact;
     const TriangleMesh *surface;
-    KeyMap vertex_in;        // lattice cell to one of its vertices
+    KeyMap list_of;          // block to the first vertex of its list
+    int *next;               // (V) the next one in the list, -1 at its end
     int capacity;
     int (*base)[3];          // of each held block …
     int *vertex;             // … and a vertex near it, of each known one
-    int near_capacity, near_count;
-    int *near;               // vertices near the block at hand
+    int near_capacity;
+    int *near;               // vertices that may be next to the block at hand, and behind them to a part of it
     int sought_count, sought_capacity;
     int (*sought)[3];        // known blocks that hold nothing, in the order found
     int *sought_vertex;
@@ -239,82 +241,123 @@ static bool hold_blocks(Making *m)
     return true;
 }
 
-static void cell_of(const Making *m, Vec3 x, int at[3])
-{
-    double scale = 1 / m->grid->options.cell_mm;
-    at[0] = (int)floor(x.x * scale), at[1] = (int)floor(x.y * scale), at[2] = (int)floor(x.z * scale);
-}
-
 // Lattice cells may lie eight times further out than blocks: a key of its own.
-static uint64_t cell_key(int i, int j, int k)
+static uint64_t cell_key(const int at[3])
 {
     uint64_t mask = (1u << 21) - 1;
-    return ((uint64_t)(int64_t)i & mask) << 42 | ((uint64_t)(int64_t)j & mask) << 21 | ((uint64_t)(int64_t)k & mask);
+    return ((uint64_t)(int64_t)at[0] & mask) << 42 | ((uint64_t)(int64_t)at[1] & mask) << 21 | ((uint64_t)(int64_t)at[2] & mask);
 }
 
-static bool sort_vertices(Making *m)
+// Lists of vertices by block, one a lattice cell.
+static bool list_vertices(Making *m)
 {
-    bool is_new;
-    for (int t = 0; t < m->surface->triangle_count; t++)
-        for (int k = 0; k < 3; k++) {
-            int v = m->surface->triangle[t][k], at[3];
-            cell_of(m, m->surface->vertex[v], at);
-            if (!key_map_find_or_add(&m->vertex_in, cell_key(at[0], at[1], at[2]), v, &is_new))
-                return false;
+    const TriangleMesh *mesh = m->surface;
+    double scale = 1 / m->grid->options.cell_mm;
+    KeyMap cells = {0};
+    m->next = malloc((size_t)mesh->vertex_count * sizeof *m->next);
+    bool good = m->next != NULL, is_new;
+    for (int i = 0; good && i < 3 * mesh->triangle_count; i++) {
+        int v = mesh->triangle[i / 3][i % 3];
+        const Vec3 x = vec3_scale(mesh->vertex[v], scale);
+        int cell[3] = {(int)floor(x.x), (int)floor(x.y), (int)floor(x.z)};
+        good = key_map_find_or_add(&cells, cell_key(cell), v, &is_new) != NULL;
+        if (!good || !is_new)
+            continue;
+        int *first = key_map_find_or_add(&m->list_of, key_of((int)floor(x.x / BLOCK), (int)floor(x.y / BLOCK), (int)floor(x.z / BLOCK)), v, &is_new);
+        good = first != NULL;
+        if (good) {
+            m->next[v] = is_new ? -1 : *first;
+            *first = v;
         }
+    }
+    key_map_free(&cells);
+    return good;
+}
+
+static bool push_near(Making *m, int count, int v)
+{
+    if (count == m->near_capacity) {
+        int capacity = 2 * m->near_capacity + 1024;
+        int *near = realloc(m->near, (size_t)capacity * sizeof *near);
+        if (!near)
+            return false;
+        m->near = near;
+        m->near_capacity = capacity;
+    }
+    m->near[count] = v;
     return true;
 }
 
-// Vertices in and around block b.
-static bool gather_vertices(Making *m, int b)
+// Of the vertices near[first … first + count) those that are next to some point of the ball, put behind them. Returns how many, -1 where memory lacks.
+static int narrow(Making *m, int first, int count, Vec3 middle, double radius)
 {
-    int band = (int)ceil(m->grid->options.band_mm / m->grid->options.cell_mm) + 1;
-    const int *base = m->base[b];
-    m->near_count = 0;
-    for (int i = base[0] * BLOCK - band; i < (base[0] + 1) * BLOCK + band; i++)
-        for (int j = base[1] * BLOCK - band; j < (base[1] + 1) * BLOCK + band; j++)
-            for (int k = base[2] * BLOCK - band; k < (base[2] + 1) * BLOCK + band; k++) {
-                int v = key_map_find(&m->vertex_in, cell_key(i, j, k));
-                if (v < 0)
-                    continue;
-                if (m->near_count == m->near_capacity) {
-                    int capacity = 2 * m->near_capacity + 1024;
-                    int *near = realloc(m->near, (size_t)capacity * sizeof *near);
-                    if (!near)
-                        return false;
-                    m->near = near;
-                    m->near_capacity = capacity;
-                }
-                m->near[m->near_count++] = v;
-            }
-    return true;
-}
-
-static int node_for(const Making *m, Vec3 x, int otherwise)
-{
-    int best = otherwise;
     double least = HUGE_VAL;
-    for (int n = 0; n < m->near_count; n++) {
+    int kept = 0;
+    for (int n = first; n < first + count; n++)
+        least = fmin(least, vec3_norm2(vec3_sub(middle, m->surface->vertex[m->near[n]])));
+    double most = sqrt(least) + 2 * radius;
+    for (int n = first; n < first + count; n++)
+        if (vec3_norm2(vec3_sub(middle, m->surface->vertex[m->near[n]])) <= most * most) {
+            if (!push_near(m, first + count + kept, m->near[n]))
+                return -1;
+            kept++;
+        }
+    return kept;
+}
+
+// Vertices in block b and the blocks around as far as the band and the vertices' triangles reach. Returns how many, -1 where memory lacks.
+static int gather_vertices(Making *m, int b)
+{
+    int around = (int)ceil(m->grid->options.band_mm / (BLOCK * m->grid->options.cell_mm)), count = 0;
+    const int *base = m->base[b];
+    for (int i = base[0] - around; i <= base[0] + around; i++)
+        for (int j = base[1] - around; j <= base[1] + around; j++)
+            for (int k = base[2] - around; k <= base[2] + around; k++)
+                for (int v = key_map_find(&m->list_of, key_of(i, j, k)); v >= 0; v = m->next[v])
+                    if (!push_near(m, count++, v))
+                        return -1;
+    return count == 0 && !push_near(m, count++, m->vertex[b]) ? -1 : count;
+}
+
+static int next_to(const Making *m, int first, int count, Vec3 x)
+{
+    int best = m->near[first];
+    double least = HUGE_VAL;
+    for (int n = first; n < first + count; n++) {
         double d2 = vec3_norm2(vec3_sub(x, m->surface->vertex[m->near[n]]));
         if (d2 < least)
             least = d2, best = m->near[n];
     }
-    return m->exact->locate(m->exact, x, m->surface->node[best]);
+    return best;
+}
+
+// Where each lattice point of block b is asked from.
+static bool ask_from(Making *m, int b)
+{
+    double cell = m->grid->options.cell_mm;
+    const int *base = m->base[b];
+    Vec3 low = vec3(base[0] * BLOCK * cell, base[1] * BLOCK * cell, base[2] * BLOCK * cell), half = vec3(4 * cell, 4 * cell, 4 * cell);
+    int all = gather_vertices(m, b), count = all < 0 ? -1 : narrow(m, 0, all, vec3_add(low, half), 1.001 * vec3_norm(half));
+    for (int third = 0; third < 27; third++) {
+        int i = 3 * (third / 9), j = 3 * (third / 3 % 3), k = 3 * (third % 3);
+        Vec3 middle = vec3_add(low, vec3((i + 1) * cell, (j + 1) * cell, (k + 1) * cell));
+        int few = count < 0 ? -1 : narrow(m, all, count, middle, 1.001 * sqrt(3) * cell);
+        if (few < 0)
+            return false;
+        for (int p = 0; p < 27; p++) {
+            int at = point_index(i + p / 9, j + p / 3 % 3, k + p % 3);
+            Vec3 x = m->point[at] = vec3_add(low, vec3((i + p / 9) * cell, (j + p / 3 % 3) * cell, (k + p % 3) * cell));
+            m->memory[at] = (VesselMemory){.node = m->exact->locate(m->exact, x, m->surface->node[next_to(m, all + count, few, x)])};
+        }
+    }
+    return true;
 }
 
 static bool sample_block(Making *m, int b)
 {
     double cell = m->grid->options.cell_mm, band = m->grid->options.band_mm;
-    const int *base = m->base[b];
-    if (!gather_vertices(m, b))
+    if (!ask_from(m, b))
         return false;
-    for (int i = 0; i < SIDE; i++)
-        for (int j = 0; j < SIDE; j++)
-            for (int k = 0; k < SIDE; k++) {
-                int at = point_index(i, j, k);
-                m->point[at] = vec3((base[0] * BLOCK + i) * cell, (base[1] * BLOCK + j) * cell, (base[2] * BLOCK + k) * cell);
-                m->memory[at] = (VesselMemory){.node = node_for(m, m->point[at], m->vertex[b])};
-            }
     vessel_query(m->exact, POINTS, m->point, band + 2 * BLOCK * cell, m->memory, m->hit);
     for (int i = 0; i < POINTS; i++)
         m->grid->value[b][i] = (float)(m->hit[i].flags & VESSEL_OPEN_END ? band : m->hit[i].gap);
@@ -390,7 +433,7 @@ static bool flood(Making *m)
 static bool fill_grid(Making *m)
 {
     GridVessel *grid = m->grid;
-    if (!hold_blocks(m) || !sort_vertices(m))
+    if (!hold_blocks(m) || !list_vertices(m))
         return false;
     grid->value = malloc((size_t)grid->block_count * sizeof *grid->value);
     bool good = grid->value != NULL;
@@ -415,7 +458,8 @@ Vessel *grid_vessel_create(const Vessel *exact, const TriangleMesh *surface, con
         good = fill_grid(m);
     }
     if (m) {
-        key_map_free(&m->vertex_in);
+        key_map_free(&m->list_of);
+        free(m->next);
         free(m->base);
         free(m->vertex);
         free(m->near);

@@ -23,13 +23,15 @@ TriangleMesh *isosurface_of_model(const VesselTree *tree, int node, double cell_
 // (candidates limited to nodes whose tube reaches the point), so neighbouring models join without a gap. Vertices are projected
 // on their node's model. Memory grows with the surface, not with the bounding box.
 TriangleMesh *isosurface_of_tree(const VesselTree *tree, double cell_mm);
-// The wall of any vessel: the zero of its gap within `count` balls (center, reach [mm]) that cover it; a lattice point is asked from the ball in which it
-// lies deepest (largest reach - distance), by its `from` (a node for vessel->locate; NULL: -1, which may search the whole vessel). A vertex's node is the one
-// that answers. Vertices are moved along the normal until they lie within 1e-9 mm of the wall, save where the vessel's local models disagree by more
-// than three quarters of a cell. Where the wall leaves the balls by two cells (open ends) the mesh has a rim. NULL where memory ends, a ball is not finite or
-// the cell is not above 0 or too small, as above.
+// The wall of any vessel: the zero of its gap within `count` balls (center, reach [mm]) that cover it. A lattice point is asked from the ball in which it
+// lies deepest for its size, and where that says outside from the other balls around it too, by their `from` (a node for vessel->locate; NULL: -1, which may
+// search the whole vessel): inside is believed. A vertex's node is the one that answers. Vertices lie within 1e-9 mm of the wall, as it answers from there
+// without memory, save where the vessel's local models disagree by more than three quarters of a cell. No angle is below some 10 degrees there. Where the wall
+// leaves the balls (open ends) the mesh has a rim; elsewhere it is closed. Walls of less than two cells between two lumens may be holed.
+// NULL where memory ends, a ball is not finite, or the cell is not above 0 or too small, as above.
 TriangleMesh *isosurface_of_vessel(const Vessel *vessel, int count, const Vec3 *center, const double *reach, const int *from, double cell_mm);
-// The same surface finer: each triangle in four, new vertices moved onto the wall. NULL where memory ends or there would be more than 5e8 triangles or 2^31 vertices.
+// The same surface finer: each triangle in four, new vertices moved onto the wall from the middles of edges. NULL where memory ends or there would be more
+// than 5e8 triangles.
 TriangleMesh *triangle_mesh_refine(const TriangleMesh *mesh, const Vessel *vessel);
 // A cell size for looking: about twenty cells round the thinnest branch, coarser (to ten) where that would take more than some 300,000 triangles.
 double isosurface_cell_for(const VesselTree *tree);
