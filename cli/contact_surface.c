@@ -101,7 +101,7 @@ Vessel *contact_surface_vessel(ContactKind kind, const Vessel *exact, const Tria
         return grid_vessel_create(exact, mesh, &options, name, faults);
     }
     MeshVesselOptions options = mesh_vessel_default_options();
-    options.normals = kind == CONTACT_SMOOTH_MESH ? MESH_SMOOTH : MESH_FACES;
+    options.normals = kind == CONTACT_SMOOTH_MESH ? MESH_SMOOTH : kind == CONTACT_FLAT_MESH ? MESH_FACES : MESH_CURVED;
     options.has_inlet = has_inlet;
     options.inlet = inlet;
     options.direction = direction;

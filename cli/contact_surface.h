@@ -1,4 +1,4 @@
-// Surfaces that answer contact queries instead of the vessel that they were made from: `contact: mesh`, `smooth_mesh` and `grid` of a scene, and the
+// Surfaces that answer contact queries instead of the vessel that they were made from: `contact: mesh`, `smooth_mesh`, `flat_mesh` and `grid` of a scene, and the
 // representations of `bench collision`.
 #ifndef SELDINGER_CLI_CONTACT_SURFACE_H
 #define SELDINGER_CLI_CONTACT_SURFACE_H
@@ -13,7 +13,7 @@ TriangleMesh *contact_surface_mesh(const Vessel *exact, const VesselTree *nodes,
 // The edge [mm] of cells for about so many triangles, by the area of the nodes' tubes.
 double contact_surface_cell(const VesselTree *nodes, double triangles);
 
-// A vessel of `kind` (mesh, smooth_mesh, grid) from the mesh; the grid samples `exact` on the mesh's cell. Inlet from `exact`. NULL with a fault.
+// A vessel of `kind` (mesh, smooth_mesh, flat_mesh, grid) from the mesh; the grid samples `exact` on the mesh's cell. Inlet from `exact`. NULL with a fault.
 Vessel *contact_surface_vessel(ContactKind kind, const Vessel *exact, const TriangleMesh *mesh, double cell_mm, const char *name, Faults *faults);
 
 // A surface from a file as a wall: read, mended (recon/mesh_check.h) and scaled. What was found wrong is printed to standard error, a line each. NULL with

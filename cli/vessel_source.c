@@ -237,17 +237,18 @@ bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, F
 {
     int before = faults->count;
     *out = (OpenVessel){0};
-    bool as_mesh = scene->contact == CONTACT_MESH || scene->contact == CONTACT_SMOOTH_MESH, as_surface = as_mesh || scene->contact == CONTACT_GRID;
+    bool as_mesh = scene->contact == CONTACT_MESH || scene->contact == CONTACT_SMOOTH_MESH || scene->contact == CONTACT_FLAT_MESH,
+          as_surface = as_mesh || scene->contact == CONTACT_GRID;
     bool exact = scene->source == SOURCE_TUBE || scene->source == SOURCE_PLANE;
     const char *name = contact_name[scene->contact];
     if (scene->source == SOURCE_NONE)
         return true;
     if (scene->contact == CONTACT_TUBE && !exact)
-        faults_add(faults, scene->path, 0, 0, "contact 'tube' needs the source 'tube'; a model or shape has lim, mesh, smooth_mesh and grid, a mesh the last "
-                   "three");
+        faults_add(faults, scene->path, 0, 0, "contact 'tube' needs the source 'tube'; a model or shape has lim, mesh, smooth_mesh, flat_mesh and "
+                   "grid, a mesh the last four");
     else if (scene->contact == CONTACT_LIM && scene->source == SOURCE_MESH)
-        faults_add(faults, scene->path, 0, 0, "contact 'lim' needs local models: make them with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh "
-                   "and grid");
+        faults_add(faults, scene->path, 0, 0, "contact 'lim' needs local models: make them with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh, "
+                   "flat_mesh and grid");
     else if (as_surface && scene->source == SOURCE_PLANE)
         faults_add(faults, scene->path, 0, 0, "contact '%s' needs a wall that ends somewhere; a plane has 'tube', which is the plane itself", name);
     else if ((as_mesh || scene->source == SOURCE_MESH) && !mesh_vessel_available())

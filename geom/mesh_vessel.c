@@ -48,7 +48,7 @@ typedef struct MeshVessel {
     int vertex_count, triangle_count;
     Vec3 *vertex;            // (V)
     Vec3 *vertex_normal;     // (V) pseudonormal, of no special length; all normals point into the lumen
-    Vec3 *smooth_normal;     // (V) unit; only with MESH_SMOOTH
+    Vec3 *smooth_normal;     // (V) unit; NULL with MESH_FACES
     bool *on_rim;            // (V)
     int *keeper;             // (V) the lowest triangle at the vertex
     int (*corner)[3];        // (T)
@@ -303,6 +303,10 @@ static VesselHit hit_of(const MeshVessel *m, Vec3 x, int from)
     hit.normal = foot.feature == ON_FACE ? pseudo : d > tiny ? vec3_scale(away, 1 / hit.gap) : vec3_unit(pseudo);
     if (m->options.normals == MESH_FACES) {
         hit.hessian = facet_hessian(m, triangle, &foot, hit.gap, hit.normal);
+        return hit;
+    }
+    if (m->options.normals == MESH_CURVED) {
+        hit.hessian = smooth_hessian(m, triangle, hit.gap, hit.normal);
         return hit;
     }
     const int *corner = m->corner[triangle];
@@ -694,13 +698,13 @@ static bool copy_mesh(MeshVessel *m, const TriangleMesh *mesh)
     m->triangle_count = mesh->triangle_count;
     m->vertex = malloc(vertices * sizeof *m->vertex);
     m->vertex_normal = calloc(vertices, sizeof *m->vertex_normal);
-    m->smooth_normal = m->options.normals == MESH_SMOOTH ? malloc(vertices * sizeof *m->smooth_normal) : NULL;
+    m->smooth_normal = m->options.normals != MESH_FACES ? malloc(vertices * sizeof *m->smooth_normal) : NULL;
     m->on_rim = calloc(vertices, sizeof *m->on_rim);
     m->keeper = malloc(vertices * sizeof *m->keeper);
     m->corner = malloc(triangles * sizeof *m->corner);
     m->across = malloc(triangles * sizeof *m->across);
     m->face = malloc(triangles * sizeof *m->face);
-    if (!m->vertex || !m->vertex_normal || (m->options.normals == MESH_SMOOTH && !m->smooth_normal) || !m->on_rim || !m->keeper || !m->corner || !m->across ||
+    if (!m->vertex || !m->vertex_normal || (m->options.normals != MESH_FACES && !m->smooth_normal) || !m->on_rim || !m->keeper || !m->corner || !m->across ||
         !m->face)
         return false;
     memcpy(m->corner, mesh->triangle, triangles * sizeof *m->corner);

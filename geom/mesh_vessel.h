@@ -16,6 +16,8 @@
 
 typedef enum {
     MESH_FACES,              // the mesh as it is: a wall of planes
+    MESH_CURVED,             // gap and normal are those, the Hessian is MESH_SMOOTH's: the solver knows that the next plane is turned. (Of planes alone it
+                             // does not: a stiff tip pushed into a hollow between them is sent from one to the other, and the step stalls)
     MESH_SMOOTH              // normal and Hessian of the surface whose normals at the vertices are the mesh's (where it has none, the angle-weighted mean of
                              // its faces'), interpolated between; the gap stays that of the triangle
 } MeshNormals;

@@ -176,7 +176,7 @@ static void read_plane(Reading *reading, YamlValue value)
     yaml_map_unit_vector(&map, "normal", true, &reading->scene->plane_normal);
 }
 
-const char *const contact_name[CONTACT_COUNT + 1] = {"lim", "mesh", "tube", "smooth_mesh", "grid", NULL};
+const char *const contact_name[CONTACT_COUNT + 1] = {"lim", "mesh", "tube", "smooth_mesh", "flat_mesh", "grid", NULL};
 
 static void read_contact(const YamlMap *map, Scene *scene)
 {
@@ -187,9 +187,9 @@ static void read_contact(const YamlMap *map, Scene *scene)
     if (choice >= 0)
         scene->contact = (ContactKind)choice;
     if (choice == CONTACT_TUBE && (scene->source == SOURCE_MODEL || scene->source == SOURCE_SHAPE || scene->source == SOURCE_MESH))
-        yaml_fault(contact, "contact 'tube' needs the source 'tube'; a model or shape has lim, mesh, smooth_mesh or grid");
+        yaml_fault(contact, "contact 'tube' needs the source 'tube'; a model or shape has lim, mesh, smooth_mesh, flat_mesh or grid");
     else if (choice == CONTACT_LIM && scene->source == SOURCE_MESH)
-        yaml_fault(contact, "contact 'lim' needs local models: make them with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh or grid");
+        yaml_fault(contact, "contact 'lim' needs local models: make them with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh, flat_mesh or grid");
 }
 
 static void read_vessel(Reading *reading, YamlValue value)

@@ -11,8 +11,8 @@
 
 typedef enum { SOURCE_MODEL, SOURCE_SHAPE, SOURCE_TUBE, SOURCE_PLANE, SOURCE_MESH, SOURCE_NONE } VesselSourceKind;
 // `contact:` of the vessel, `--contact` on the command line.
-typedef enum { CONTACT_LIM, CONTACT_MESH, CONTACT_TUBE, CONTACT_SMOOTH_MESH, CONTACT_GRID, CONTACT_COUNT } ContactKind;
-extern const char *const contact_name[CONTACT_COUNT + 1];  // "lim", "mesh", "tube", "smooth_mesh", "grid", NULL
+typedef enum { CONTACT_LIM, CONTACT_MESH, CONTACT_TUBE, CONTACT_SMOOTH_MESH, CONTACT_FLAT_MESH, CONTACT_GRID, CONTACT_COUNT } ContactKind;
+extern const char *const contact_name[CONTACT_COUNT + 1];  // as they are written; NULL at the end
 
 typedef struct SceneTarget {
     char name[64];
