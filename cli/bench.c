@@ -9,13 +9,14 @@
 #include <time.h>
 
 static const char help[] =
-    "Usage: seldinger bench step|fit|peer|track [options]\n\n"
+    "Usage: seldinger bench collision|step|fit|track|peer [options]\n\n"
     "Timing tables, each row measured in the same run.\n\n"
-    "  step   a simulation step: spiral at 100 GPa, phantom, aneurism; growth with the elements; SIMD levels; budgets\n"
-    "  fit    local models: the paper's tables 3, 4 and 5 beside its figures\n"
-    "  track  trackers on synthetic angiograms with truth: the labels of the paper's Table 2, errors, times\n"
-    "  peer   the scenes on which SOFA with BeamAdapter was measured, beside its figures\n\n"
-    "`collision` is not there yet. `seldinger bench NAME --help` explains the options.\n"
+    "  collision  local models against meshes searched by Embree, the exact wall and a sampled distance: cost, error, friction that is not there\n"
+    "  step       a simulation step: spiral at 100 GPa, phantom, aneurism; growth with the elements; SIMD levels; budgets\n"
+    "  fit        local models: the paper's tables 3, 4 and 5 beside its figures\n"
+    "  track      trackers on synthetic angiograms with truth: the labels of the paper's Table 2, errors, times\n"
+    "  peer       the scenes on which SOFA with BeamAdapter was measured, beside its figures\n\n"
+    "`seldinger bench NAME --help` explains the options.\n"
     "Exit codes: 0 done; 1 a comparison failed; 2 wrong usage or bad input.\n";
 
 int verb_bench(int argc, char **argv)
@@ -23,21 +24,17 @@ int verb_bench(int argc, char **argv)
     static const struct {
         const char *name;
         VerbFunction *call;
-    } table[] = {{"step", bench_step}, {"peer", bench_peer}, {"collision", NULL}, {"fit", bench_fit}, {"track", bench_track}};
+    } table[] = {{"step", bench_step}, {"peer", bench_peer}, {"collision", bench_collision}, {"fit", bench_fit}, {"track", bench_track}};
     const char *name = argc > 1 ? argv[1] : "";
     if (!strcmp(name, "--help") || !strcmp(name, "-h")) {
         fputs(help, stdout);
         return EXIT_DONE;
     }
     for (size_t i = 0; i < sizeof table / sizeof table[0]; i++) {
-        if (strcmp(name, table[i].name))
-            continue;
-        if (table[i].call)
+        if (!strcmp(name, table[i].name))
             return table[i].call(argc - 1, argv + 1);
-        fprintf(stderr, "seldinger bench: '%s' is not there yet; valid: step, fit, peer, track\n", name);
-        return EXIT_BAD_INPUT;
     }
-    fprintf(stderr, "seldinger bench: %s%s%s; valid: step, fit, peer, track\n", *name ? "no table '" : "lacks the name of a table", name, *name ? "'" : "");
+    fprintf(stderr, "seldinger bench: %s%s%s; valid: collision, step, fit, track, peer\n", *name ? "no table '" : "lacks the name of a table", name, *name ? "'" : "");
     return EXIT_BAD_INPUT;
 }
 

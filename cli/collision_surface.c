@@ -1,0 +1,318 @@
+// The paper's capsule (Kerrien 2017, section 6.3.1): the zero of sum_k rho phi(|X - C_k| / rho) - T for 10 equal blobs on a segment of 10 mm, as a local
+// model that all nodes share. Its samples are the vertices of its mesh, each given to its closest centre; a node's radius is the least distance.
+#include "cli/collision_surface.h"
+
+#include "cli/contact_surface.h"
+#include "cli/tube_tree.h"
+#include "geom/grid_vessel.h"
+#include "geom/mesh_vessel.h"
+#include "recon/lim_fit.h"
+#include "recon/shape_vessel.h"
+#include "recon/tree_file.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+static const double CAPSULE_LENGTH = 10, CAPSULE_RADIUS = 1.25, CAPSULE_WIDTH = 0.401485;  // [mm]; the width gives the radius half way (references.md)
+enum { CAPSULE_NODES = 10, TRIAL = 6 };   // a first mesh has so many times fewer triangles, and tells what cell the wanted one needs
+static const double PARTICLE_CELL = 0.2;     // [mm] about the paper's 3000 samples
+static const double BAND_CELLS = 3, BAND_BEYOND_TOOL = 0.2;  // half width of the grid's band: at least both, the second in mm; what the solver looks after
+
+double collision_build_clock_s(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+}
+
+// --- the paper's capsule ---
+
+static Vec3 capsule_center(int i) { return vec3(CAPSULE_LENGTH * i / (CAPSULE_NODES - 1), 0, 0); }
+
+static int capsule_nearest(Vec3 x)
+{
+    int best = 0;
+    for (int i = 1; i < CAPSULE_NODES; i++)
+        if (vec3_distance(x, capsule_center(i)) < vec3_distance(x, capsule_center(best)))
+            best = i;
+    return best;
+}
+
+static void capsule_points(VesselTree *tree, const TriangleMesh *samples)
+{
+    int64_t count = 0;
+    for (int i = 0; i < CAPSULE_NODES; i++) {
+        double least = HUGE_VAL;
+        for (int v = 0; v < samples->vertex_count; v++)
+            if (capsule_nearest(samples->vertex[v]) == i) {
+                tree->point[count++] = samples->vertex[v];
+                least = fmin(least, vec3_distance(samples->vertex[v], tree->center[i]));
+            }
+        tree->radius[i] = least;
+        tree->point_offset[i + 1] = count;
+    }
+}
+
+// With the samples and with or without the blobs; NULL where memory lacks.
+static VesselTree *capsule_tree(const TriangleMesh *samples, bool is_model)
+{
+    VesselTree *tree = vessel_tree_create(CAPSULE_NODES, samples ? samples->vertex_count : 0, is_model ? CAPSULE_NODES * CAPSULE_NODES : 0);
+    if (!tree)
+        return NULL;
+    for (int i = 0; i < CAPSULE_NODES; i++) {
+        tree->center[i] = capsule_center(i);
+        tree->radius[i] = CAPSULE_RADIUS;
+        tree->direction[i] = vec3(1, 0, 0);
+        tree->height[i] = CAPSULE_LENGTH / (CAPSULE_NODES - 1);
+        tree->parent[i] = i - 1;
+        for (int k = 0; is_model && k < CAPSULE_NODES; k++) {
+            tree->blob_center[i * CAPSULE_NODES + k] = capsule_center(k);
+            tree->blob_width[i * CAPSULE_NODES + k] = CAPSULE_WIDTH;
+        }
+        tree->blob_offset[i + 1] = is_model ? (i + 1) * CAPSULE_NODES : 0;
+    }
+    if (samples)
+        capsule_points(tree, samples);
+    if (vessel_tree_link(tree))
+        return tree;
+    vessel_tree_free(tree);
+    return NULL;
+}
+
+static Vessel *lim_of(const VesselTree *tree, LimField field)
+{
+    LimVesselOptions options = lim_vessel_default_options();
+    options.field = field;
+    return lim_vessel_create_with(tree, &options);
+}
+
+static bool open_capsule(CollisionSurface *s, Faults *faults)
+{
+    VesselTree *blobs = capsule_tree(NULL, true);
+    TriangleMesh *samples = blobs ? isosurface_of_model(blobs, 0, PARTICLE_CELL) : NULL;
+    if (samples) {
+        s->exact_tree = capsule_tree(samples, true);
+        s->nodes = capsule_tree(samples, false);
+    }
+    s->exact = s->exact_tree ? lim_of(s->exact_tree, LIM_SWITCH) : NULL;
+    s->truth = s->exact;
+    s->truth_is = "the convolution surface itself";
+    vessel_tree_free(blobs);
+    triangle_mesh_free(samples);
+    if (!s->exact || !s->nodes)
+        faults_add(faults, s->of->name, 0, 0, "no memory for the convolution surface");
+    return s->exact && s->nodes;
+}
+
+// --- what scenes name ---
+
+static bool fit(CollisionSurface *s, double voxel_mm, int threads, Faults *faults)
+{
+    LimFitOptions options = lim_fit_default_options();
+    options.voxel_mm = voxel_mm;
+    options.threads = threads;
+    double begin = collision_build_clock_s();
+    s->model = lim_fit(s->nodes, &options, NULL, faults);
+    s->fit_s = collision_build_clock_s() - begin;
+    return s->model != NULL;
+}
+
+static bool open_source(CollisionSurface *s, Faults *faults)
+{
+    Scene *scene = s->scene;
+    const char(*option)[2][64] = (const char(*)[2][64])scene->shape_option;
+    if (scene->source == SOURCE_TUBE) {
+        s->exact = tube_vessel_create(&scene->tube, scene->path, faults);
+        s->nodes = s->exact ? tube_tree(s->exact, &scene->tube, scene->path, faults) : NULL;
+        s->truth = s->exact;
+        s->truth_is = "the exact tube";
+        return s->nodes != NULL;
+    }
+    if (scene->source == SOURCE_SHAPE) {
+        s->shape = shape_create(scene->shape_name, scene->shape_option_count, option, scene->path, faults);
+        s->nodes = s->shape ? shape_sample(s->shape, faults) : NULL;
+        s->exact = s->nodes ? shape_vessel_create(s->shape) : NULL;
+        s->truth = s->exact;
+        s->truth_is = "the shape's own distance";
+        if (s->nodes && !s->exact)
+            faults_add(faults, scene->path, 0, 0, "no memory for the shape's wall");
+        return s->exact != NULL;
+    }
+    if (scene->source == SOURCE_MODEL) {
+        s->model = tree_file_load(scene->model_path, NULL, faults);
+        s->nodes = s->model;
+        s->fit_s = NAN;
+        s->truth_is = "the local models themselves";
+        s->truth_is_model = true;
+        if (s->model && !vessel_tree_is_model(s->model))
+            faults_add(faults, scene->model_path, 0, 0, "is a tree without a model; make one with `seldinger fit`");
+        return s->model && vessel_tree_is_model(s->model);
+    }
+    faults_add(faults, scene->path, 0, 0, "has no vessel that can be compared; valid: tube, shape, model");
+    return false;
+}
+
+static double centreline_length(const VesselTree *tree)
+{
+    double length = 0;
+    for (int i = 1; i < tree->node_count; i++)
+        length += vec3_distance(tree->center[i], tree->center[tree->parent[i]]);
+    return length;
+}
+
+bool collision_surface_open(const CollisionCase *of, int threads, CollisionSurface *out, Faults *faults)
+{
+    *out = (CollisionSurface){.of = of, .scene = scene_load(of->scene, faults)};
+    if (!out->scene || !(of->convolution_capsule ? open_capsule(out, faults) : open_source(out, faults)))
+        return false;
+    double voxel = shape_options_voxel_mm(out->scene->shape_option_count, (const char(*)[2][64])out->scene->shape_option);
+    if (!out->model && !fit(out, voxel, threads, faults))
+        return false;
+    out->length_mm = centreline_length(out->nodes);
+    out->lim = lim_of(out->model, LIM_BLEND);
+    if (!out->lim) {
+        faults_add(faults, of->scene, 0, 0, "no memory for the local models' vessel");
+        return false;
+    }
+    if (!out->truth)
+        out->truth = out->lim;
+    // where the tool comes in is the same for all
+    return open_vessel_inlet(out->scene, &(OpenVessel){.vessel = out->scene->source == SOURCE_TUBE ? out->exact : out->lim}, faults);
+}
+
+void collision_surface_close(CollisionSurface *s)
+{
+    Vessel *owned[] = {s->exact, s->lim};
+    for (size_t i = 0; i < sizeof owned / sizeof owned[0]; i++)
+        if (owned[i])
+            owned[i]->destroy(owned[i]);
+    if (s->nodes != s->model)
+        vessel_tree_free(s->nodes);
+    vessel_tree_free(s->model);
+    vessel_tree_free(s->exact_tree);
+    shape_free(s->shape);
+    if (s->scene)
+        scene_free(s->scene);
+    *s = (CollisionSurface){0};
+}
+
+// --- representations ---
+
+TriangleMesh *collision_mesh(const CollisionSurface *s, double triangles, CollisionMesh *out, Faults *faults)
+{
+    bool open_end = s->scene->source == SOURCE_TUBE && !s->of->convolution_capsule && !s->scene->tube.closed_ends;
+    double trial = triangles / TRIAL;
+    out->cell_mm = contact_surface_cell(s->nodes, trial);
+    TriangleMesh *mesh = contact_surface_mesh(s->truth, s->nodes, open_end, out->cell_mm, s->of->name, faults);
+    if (!mesh)
+        return NULL;
+    out->cell_mm *= sqrt(mesh->triangle_count / triangles);
+    triangle_mesh_free(mesh);
+    double begin = collision_build_clock_s();
+    mesh = contact_surface_mesh(s->truth, s->nodes, open_end, out->cell_mm, s->of->name, faults);
+    out->made_s = collision_build_clock_s() - begin;
+    return mesh;
+}
+
+static CollisionWall *add_wall(CollisionWalls *walls, const char *name, Vessel *vessel, bool owned)
+{
+    CollisionWall *wall = &walls->wall[walls->count++];
+    *wall = (CollisionWall){.name = name, .vessel = vessel, .mesh = -1, .surface_s = NAN, .build_s = NAN};
+    if (owned)
+        walls->owned[walls->owned_count++] = vessel;
+    return wall;
+}
+
+static bool add_mesh(const CollisionSurface *s, CollisionWalls *walls, const TriangleMesh *mesh, int index, CollisionMesh made, Faults *faults)
+{
+    static const struct {
+        const char *name;
+        MeshNormals normals;
+        MeshSearch search;
+    } kinds[] = {{"mesh full", MESH_FACES, MESH_SEARCH_FULL}, {"mesh warm", MESH_FACES, MESH_SEARCH_WARM}, {"mesh cached", MESH_FACES, MESH_SEARCH_CACHED},
+                 {"mesh smooth", MESH_SMOOTH, MESH_SEARCH_CACHED}};
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
+        MeshVesselOptions options = mesh_vessel_default_options();
+        options.normals = kinds[i].normals;
+        options.search = kinds[i].search;
+        double begin = collision_build_clock_s();
+        Vessel *vessel = mesh_vessel_create(mesh, &options, s->of->name, faults);
+        if (!vessel)
+            return false;
+        CollisionWall *wall = add_wall(walls, kinds[i].name, vessel, true);
+        wall->build_s = collision_build_clock_s() - begin;
+        wall->surface_s = made.made_s;
+        wall->triangles = mesh->triangle_count;
+        wall->mesh = index;
+        wall->cell_mm = made.cell_mm;
+    }
+    return true;
+}
+
+static bool add_grid(const CollisionSurface *s, CollisionWalls *walls, const TriangleMesh *mesh, double cell, Faults *faults)
+{
+    double tool = 0;
+    for (int i = 0; i < s->scene->wire.section_count; i++)
+        tool = fmax(tool, s->scene->wire.section[i].diameter / 2);
+    GridVesselOptions options = {.cell_mm = cell, .band_mm = fmax(BAND_CELLS * cell, tool + BAND_BEYOND_TOOL)};
+    double begin = collision_build_clock_s();
+    Vessel *grid = grid_vessel_create(s->truth, mesh, &options, s->of->name, faults);
+    if (!grid)
+        return false;
+    CollisionWall *wall = add_wall(walls, "grid", grid, true);
+    wall->build_s = collision_build_clock_s() - begin;
+    wall->cell_mm = cell;
+    return true;
+}
+
+static bool add_meshes(const CollisionSurface *s, CollisionWalls *walls, Faults *faults)
+{
+    for (int m = 0; m < s->of->mesh_count; m++) {
+        CollisionMesh made;
+        TriangleMesh *mesh = collision_mesh(s, s->of->triangles[m], &made, faults);
+        bool good = mesh && (walls->without_mesh || add_mesh(s, walls, mesh, m, made, faults));
+        if (good && m + 1 == s->of->mesh_count)
+            good = add_grid(s, walls, mesh, made.cell_mm, faults);
+        triangle_mesh_free(mesh);
+        if (!good)
+            return false;
+    }
+    return true;
+}
+
+bool collision_walls_open(const CollisionSurface *s, CollisionWalls *out, Faults *faults)
+{
+    *out = (CollisionWalls){.without_mesh = mesh_vessel_available() ? NULL : "built without Embree"};
+    if (s->exact)
+        add_wall(out, "exact", s->exact, false);
+    add_wall(out, "lim", s->lim, false)->surface_s = s->fit_s;
+    double begin = collision_build_clock_s();
+    Vessel *paper = lim_of(s->model, LIM_SWITCH);
+    double build_s = collision_build_clock_s() - begin;
+    if (!paper) {
+        faults_add(faults, s->of->name, 0, 0, "no memory for the local models' vessel");
+        return false;
+    }
+    add_wall(out, "lim-switch", paper, true);
+    for (int i = out->count - 2; i < out->count; i++) {
+        out->wall[i].surface_s = s->fit_s;
+        out->wall[i].build_s = build_s;
+    }
+    return add_meshes(s, out, faults);
+}
+
+void collision_walls_close(CollisionWalls *walls)
+{
+    for (int i = 0; i < walls->owned_count; i++)
+        walls->owned[i]->destroy(walls->owned[i]);
+    *walls = (CollisionWalls){0};
+}
+
+const CollisionWall *collision_wall_find(const CollisionWalls *walls, const char *name, int mesh)
+{
+    for (int i = 0; i < walls->count; i++)
+        if (!strcmp(walls->wall[i].name, name) && walls->wall[i].mesh == mesh)
+            return &walls->wall[i];
+    return NULL;
+}
