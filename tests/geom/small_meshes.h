@@ -68,6 +68,25 @@ static inline TriangleMesh sphere_mesh(int n)
     return m;
 }
 
+// `more` after it, moved by `by`; inside out where asked.
+static inline TriangleMesh mesh_and(TriangleMesh m, TriangleMesh more, Vec3 by, bool inside_out)
+{
+    TriangleMesh all = mesh_room(m.vertex_count + more.vertex_count, m.triangle_count + more.triangle_count);
+    for (int v = 0; v < m.vertex_count; v++)
+        mesh_vertex(&all, m.vertex[v], m.normal[v]);
+    for (int v = 0; v < more.vertex_count; v++)
+        mesh_vertex(&all, vec3_add(more.vertex[v], by), inside_out ? vec3_negate(more.normal[v]) : more.normal[v]);
+    for (int t = 0; t < m.triangle_count; t++)
+        mesh_triangle(&all, m.triangle[t][0], m.triangle[t][1], m.triangle[t][2]);
+    for (int t = 0; t < more.triangle_count; t++) {
+        const int *c = more.triangle[t];
+        mesh_triangle(&all, c[0] + m.vertex_count, c[inside_out ? 2 : 1] + m.vertex_count, c[inside_out ? 1 : 2] + m.vertex_count);
+    }
+    mesh_clear(&m);
+    mesh_clear(&more);
+    return all;
+}
+
 // A strip of rings: ring j holds `around` vertices from first + j * around, counter-clockwise seen against the way from ring to ring.
 static inline void mesh_join_rings(TriangleMesh *m, int first, int second, int around)
 {
@@ -136,6 +155,27 @@ static inline TriangleMesh prism_mesh(const Vec3 *corner, int count, double heig
             mesh_triangle(&m, 1, a + 1, b + 1);
         }
     }
+    return m;
+}
+
+// A pyramid over a square of 0.2 x 0.2, 1 high, one of whose sides is cut into `fan` triangles about the tip.
+static inline TriangleMesh spike_mesh(int fan)
+{
+    TriangleMesh m = mesh_room(fan + 5, fan + 3 + fan + 1);
+    Vec3 base[4] = {{-0.1, -0.1, 0}, {-0.1, 0.1, 0}, {0.1, 0.1, 0}, {0.1, -0.1, 0}};
+    int tip = mesh_vertex(&m, vec3(0, 0, 1), vec3(0, 0, 1)), corners[4], last;
+    for (int i = 0; i < 4; i++)
+        corners[i] = mesh_vertex(&m, base[i], vec3(0, 0, -1));
+    for (int i = 0; i < 3; i++)
+        mesh_triangle(&m, corners[i + 1], corners[i], tip);
+    last = corners[3];
+    for (int i = 1; i <= fan; i++) {
+        int next = i == fan ? corners[0] : mesh_vertex(&m, vec3_mix(base[3], base[0], (double)i / fan), vec3(0, 0, -1));
+        mesh_triangle(&m, next, last, tip);
+        mesh_triangle(&m, last, next, corners[1]);
+        last = next;
+    }
+    mesh_triangle(&m, corners[1], corners[2], corners[3]);
     return m;
 }
 

@@ -90,28 +90,26 @@ static double true_gap(const TriangleMesh *m, Vec3 x)
     return angle > 2 * PI ? sqrt(least) : -sqrt(least);
 }
 
-enum { SHAPES = 6 };
+enum { SHAPES = 7 };
 static const char *const shape_name[SHAPES] = {"sphere", "crumpled sphere", "torus", "thin triangles", "two spheres that nearly touch",
-                                               "crumpled, far from the origin"};
+                                               "crumpled, far from the origin", "two of 0.05 mm, 1000 mm apart"};
 
 static TriangleMesh shape_mesh(int shape)
 {
     TriangleMesh m = shape == 2 ? torus_mesh(2, 0.5, 40, 16) : shape == 3 ? torus_mesh(1.5, 0.6, 6, 300) : sphere_mesh(12);
     if (shape == 1 || shape == 5)
         mesh_crumple(&m, 0.12, 3);
-    if (shape == 4) {
-        TriangleMesh two = mesh_room(2 * m.vertex_count, 2 * m.triangle_count);
-        for (int k = 0; k < 2; k++) {
-            for (int t = 0; t < m.triangle_count; t++) {
-                const int *c = m.triangle[t];
-                int base = k * m.vertex_count;
-                mesh_triangle(&two, c[0] + base, c[1] + base, c[2] + base);
-            }
-            for (int v = 0; v < m.vertex_count; v++)
-                mesh_vertex(&two, vec3_add(m.vertex[v], vec3(2.01 * k, 0, 0)), m.normal[v]);
+    if (shape == 4)
+        m = mesh_and(m, sphere_mesh(12), vec3(2.01, 0, 0), false);
+    if (shape == 6) {    // about their middle coordinates are of 500 mm: floats there are 3e-5 mm apart
+        TriangleMesh other = sphere_mesh(12);
+        mesh_crumple(&m, 0.12, 3);
+        mesh_crumple(&other, 0.12, 4);
+        for (int v = 0; v < m.vertex_count; v++) {
+            m.vertex[v] = vec3_scale(m.vertex[v], 0.05);
+            other.vertex[v] = vec3_scale(other.vertex[v], 0.05);
         }
-        mesh_clear(&m);
-        m = two;
+        m = mesh_and(m, other, vec3(1000, 700, 300), false);
     }
     if (shape == 5)
         mesh_move(&m, quat_from_rotation_vector(vec3(0.3, 1.1, -0.4)), vec3(500, -310, 220), false);
@@ -165,8 +163,8 @@ static void agrees_with_brute_force(void **state)
             assert_near(vec3_norm(full.normal), 1, 1e-12);
         }
         print_message("%-32s %5d triangles: gap within %.1e mm of brute force\n", shape_name[shape], m.triangle_count, worst);
-        // coordinates of 500 mm are known to 6e-14 mm
-        assert_true(worst < (shape == 5 ? 1e-12 : 1e-13));
+        // coordinates of 500 and 1000 mm are known to 6e-14 and 1e-13 mm
+        assert_true(worst < (shape >= 5 ? 1e-12 : 1e-13));
         for (int k = 0; k < SEARCHES; k++)
             v[k]->destroy(v[k]);
         mesh_clear(&m);
@@ -252,31 +250,40 @@ static TriangleMesh room_mesh(void)
     return prism_mesh(room_corner, 6, 1);
 }
 
-static bool is_in_room(Vec3 x) { return x.x > 0 && x.y > 0 && x.x < 2 && x.y < 2 && x.z > 0 && x.z < 1 && !(x.x < 1 && x.y > 1); }
+// Blunt and sharp, standing out of the lumen and into it, and a tip at which one side has far more triangles than the others.
+static TriangleMesh edged_mesh(int kind)
+{
+    static const Vec3 blade[3] = {{0, 0, 0}, {1.5, -0.06, 0}, {1.5, 0.06, 0}};
+    static const Vec3 box[4] = {{-3, -3, 0}, {3, -3, 0}, {3, 3, 0}, {-3, 3, 0}};
+    TriangleMesh m = kind % 3 == 0 ? room_mesh() : kind % 3 == 1 ? prism_mesh(blade, 3, 1) : spike_mesh(40);
+    return kind < 3 ? m : mesh_and(prism_mesh(box, 4, 6), m, vec3(0, 0, 2), true);
+}
 
 static void sign_is_right_at_edges_and_corners(void **state)
 {
     (void)state;
     need_embree();
-    TriangleMesh m = room_mesh();
-    Vessel *v = vessel_of(&m, MESH_SEARCH_CACHED, MESH_FACES);
-    uint64_t seed = 4;
-    int inside = 0, asked = 0;
-    for (int corner = 0; corner < m.vertex_count; corner++)
-        for (int i = 0; i < 600; i++) {
-            // about the vertex, and about the middle of the edge to the next one
-            Vec3 at = m.vertex[corner], x;
-            if (i % 2)
-                at = vec3_mix(at, m.vertex[(corner + 2) % m.vertex_count], 0.5);
-            x = vec3_add(at, vec3_scale(random_unit(&seed), pow(10, random_in(&seed, -5, -0.7))));
-            VesselHit hit = ask_afresh(v, x);
-            assert_true((hit.gap > 0) == is_in_room(x));
-            inside += is_in_room(x);
-            asked++;
-        }
-    assert_true(inside > asked / 5 && inside < asked * 4 / 5);
-    v->destroy(v);
-    mesh_clear(&m);
+    for (int kind = 0; kind < 6; kind++) {
+        TriangleMesh m = edged_mesh(kind);
+        Vessel *v = vessel_of(&m, MESH_SEARCH_CACHED, MESH_FACES);
+        uint64_t seed = 4;
+        int inside = 0, asked = 0;
+        for (int t = 0; t < m.triangle_count; t++)
+            for (int i = 0; i < 60; i++) {
+                // about a corner, and about the middle of an edge
+                Vec3 at = m.vertex[m.triangle[t][i % 3]], x;
+                if (i % 2)
+                    at = vec3_mix(at, m.vertex[m.triangle[t][(i + 1) % 3]], 0.5);
+                x = vec3_add(at, vec3_scale(random_unit(&seed), pow(10, random_in(&seed, -5, -0.7))));
+                double gap = true_gap(&m, x);
+                assert_near(ask_afresh(v, x).gap, gap, 1e-14);
+                inside += gap > 0;
+                asked++;
+            }
+        assert_true(inside > asked / 50 && inside < asked * 49 / 50);
+        v->destroy(v);
+        mesh_clear(&m);
+    }
 }
 
 static Sym3 hessian_by_differences(const Vessel *v, Vec3 x, double h)
