@@ -181,7 +181,7 @@ static bool check_options(const GridVesselOptions *o, const TriangleMesh *surfac
     double most = cell ? (double)BLOCK_MAX * BLOCK * o->cell_mm - 2 * o->band_mm : 0;
     for (int v = 0; v < surface->vertex_count && faults->count == before; v++) {
         Vec3 p = surface->vertex[v];
-        if (!(fmax(fabs(p.x), fmax(fabs(p.y), fabs(p.z))) < most))
+        if (!(vec3_is_finite(p) && fmax(fabs(p.x), fmax(fabs(p.y), fabs(p.z))) < most))
             faults_add(faults, name, 0, 0, "grid: vertex %d is at (%g, %g, %g) mm; coordinates below %g mm are valid with cells of %g mm", v, p.x, p.y, p.z, most,
                        o->cell_mm);
     }
