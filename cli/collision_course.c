@@ -6,6 +6,7 @@
 #include <stdlib.h>
 
 static const double STEP = 0.05, GAP = 0.1, GAP_SWING = 0.05, SWING_LENGTH = 7;    // [mm]
+static const double NEAR_ENOUGH = 1e-3;   // [mm]
 static const double REACH = 0.5;         // [mm] all points are nearer to the wall
 enum { STEPS_APART = 10 };               // a wire's points, half a millimetre
 
@@ -23,15 +24,17 @@ static bool has_wall(const VesselHit *hit) { return hit->flags == 0 && isfinite(
 // Moved along the normal until it is as far inside as this stretch wants.
 static bool pull(const Vessel *exact, Walker *w)
 {
+    enum { ROUNDS = 8 };
     double wanted = GAP + GAP_SWING * sin(2 * PI * w->way / SWING_LENGTH);
-    for (int round = 0; round < 3; round++) {
+    for (int round = 0; round < ROUNDS; round++) {
         vessel_query(exact, 1, &w->x, REACH, &w->memory, &w->hit);
         if (!has_wall(&w->hit))
             return false;
+        if (fabs(w->hit.gap - wanted) < NEAR_ENOUGH)
+            return true;
         w->x = vec3_add_scaled(w->x, wanted - w->hit.gap, w->hit.normal);
     }
-    vessel_query(exact, 1, &w->x, REACH, &w->memory, &w->hit);
-    return has_wall(&w->hit) && fabs(w->hit.gap - wanted) < GAP_SWING;
+    return false;
 }
 
 static bool begin_walk(const Vessel *exact, const VesselTree *nodes, Vec3 x, int from, double way, Walker *w)

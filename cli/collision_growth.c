@@ -16,14 +16,14 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-enum { WIRE_POINTS = 80, WIRE_STEPS = 60, SPREAD_POINTS = 400, SPREAD_STEPS = 20, RUNS = 9, SEARCHES = 3 };
+enum { WIRE_POINTS = 80, WIRE_STEPS = 60, SPREAD_POINTS = 400, SPREAD_STEPS = 20, SEARCHES = 3 };
 static const char *const search_name[SEARCHES] = {"full", "warm", "cached"};
 static const MeshSearch search_kind[SEARCHES] = {MESH_SEARCH_FULL, MESH_SEARCH_WARM, MESH_SEARCH_CACHED};
 
 typedef struct Growth {
     FILE *out;
     bool quick;
-    int threads;
+    int threads, runs;       // runs: of which the least counts
     cJSON *growth, *sizes, *match, *memory;
     Faults *faults;
 } Growth;
@@ -95,18 +95,16 @@ static double mean_edge(const TriangleMesh *mesh)
     return sum / (3.0 * mesh->triangle_count);
 }
 
-// The wire starts beside the tree's axis, two radii from its root.
-static bool open_wall(Growth *g, Wall *wall)
+// The wire starts beside the tree's axis, two radii from its root; the other points at the mesh's vertices.
+static bool open_wall(Growth *g, Wall *wall, const TriangleMesh *mesh)
 {
     const VesselTree *tree = wall->nodes;
-    TriangleMesh *mesh = mesh_wall(wall, 16000, g->faults);
     int start = 0;
     while (start + 1 < tree->node_count && vec3_distance(tree->center[start], tree->center[0]) < 2 * tree->radius[0])
         start++;
     Vec3 x = vec3_add_scaled(tree->center[start], 0.8 * tree->radius[start], vec3_normal_to(tree->direction[start]));
     bool good = mesh && course_wire(wall->exact, tree, x, -1, WIRE_POINTS, WIRE_STEPS, &wall->wire) &&
-                course_all_over(wall->exact, tree, mesh, SPREAD_POINTS, SPREAD_STEPS, &wall->spread);
-    triangle_mesh_free(mesh);
+                course_all_over(wall->exact, tree, mesh, SPREAD_POINTS, g->quick ? SPREAD_STEPS / 4 : SPREAD_STEPS, &wall->spread);
     return good || fault(g, "no course along a wall: not enough memory");
 }
 
@@ -118,8 +116,8 @@ static void close_wall(Wall *wall)
 
 static bool measure(Growth *g, const Wall *wall, const Vessel *vessel, Figures *figures)
 {
-    figures->wire_ns = course_ns(vessel, 1, &wall->wire, RUNS);
-    figures->spread_ns = course_ns(vessel, 1, &wall->spread, RUNS);
+    figures->wire_ns = course_ns(vessel, 1, &wall->wire, g->runs);
+    figures->spread_ns = course_ns(vessel, 1, &wall->spread, g->runs);
     return (course_error(vessel, &wall->spread, &figures->error) && figures->wire_ns > 0 && figures->spread_ns > 0) ||
            fault(g, "a wall that gives no answers");
 }
@@ -221,15 +219,16 @@ static bool measure_grid(Growth *g, const Wall *wall, const TriangleMesh *mesh)
 
 static bool grow_mesh(Growth *g, Wall *wall, int largest, int largest_grid)
 {
+    enum { LARGEST_MARCHED = 16000 };    // from there on each triangle in four
     TriangleMesh *mesh = NULL;
     bool good = true;
-    for (int size = 1000; good && size <= largest; size = size == 1000 ? 4000 : size == 4000 ? 16000 : size == 16000 ? 62500 : 4 * size) {
+    for (int size = 1000; good && size <= largest; size *= 4) {
         double begin = collision_build_clock_s();
-        TriangleMesh *next = size <= 62500 ? mesh_wall(wall, size, g->faults) : triangle_mesh_refine(mesh, wall->exact);
+        TriangleMesh *next = size <= LARGEST_MARCHED ? mesh_wall(wall, size, g->faults) : triangle_mesh_refine(mesh, wall->exact);
         triangle_mesh_free(mesh);
         mesh = next;
         if (!mesh)
-            return size <= 62500 ? false : fault(g, "not enough memory for a mesh");
+            return size <= LARGEST_MARCHED ? false : fault(g, "not enough memory for a mesh");
         double surface_s = collision_build_clock_s() - begin;
         good = (!mesh_vessel_available() || measure_mesh(g, wall, mesh, surface_s)) && (size < 4000 || size > largest_grid || measure_grid(g, wall, mesh));
     }
@@ -239,10 +238,15 @@ static bool grow_mesh(Growth *g, Wall *wall, int largest, int largest_grid)
 
 static bool grow_wall(Growth *g, Wall *wall, const VesselTree *model, double fit_s, int largest)
 {
+    TriangleMesh *mesh = mesh_wall(wall, 4000, g->faults);
+    bool opened = mesh && open_wall(g, wall, mesh);
+    triangle_mesh_free(mesh);
+    if (!opened)
+        return false;
     fprintf(g->out, "\n%s: nanoseconds a query, for 80 points along one stretch (wire) and %d all over; errors against the wall that was meshed\n", wall->name,
             SPREAD_POINTS);
     fputs("   triangles |  wire: full   warm cached | all over: full  warm cached | gap rms, max um | normal rms, max deg | MB | s: surface, build\n", g->out);
-    int largest_grid = g->quick ? 16000 : 62500;
+    int largest_grid = g->quick ? 16000 : 64000;
     if (!mesh_vessel_available())
         fputs("  built without Embree: no meshes\n", g->out);
     if (!grow_mesh(g, wall, mesh_vessel_available() ? largest : largest_grid, largest_grid))
@@ -263,21 +267,38 @@ static bool grow_wall(Growth *g, Wall *wall, const VesselTree *model, double fit
     return good;
 }
 
-// The fitted phantom is its own truth here; the exact tube's local models have their error.
-static bool grow_phantom(Growth *g)
+typedef struct Phantom {
+    Shape *shape;
+    VesselTree *samples, *model;
+    Vessel *lim;
+    double fit_s;
+} Phantom;
+
+static bool open_phantom(Growth *g, Phantom *p)
 {
-    static const char name[] = "phantom, as fitted";
-    VesselTree *samples = shape_tree("phantom", 0, NULL, "bench collision", g->faults);
+    p->shape = shape_create("phantom", 0, NULL, "bench collision", g->faults);
+    p->samples = p->shape ? shape_sample(p->shape, g->faults) : NULL;
     double begin = collision_build_clock_s();
-    VesselTree *model = samples ? fit(g, samples, 0, shape_options_voxel_mm(0, NULL)) : NULL;
-    double fit_s = collision_build_clock_s() - begin;
-    Vessel *lim = model ? lim_of(model, LIM_BLEND) : NULL;
-    Wall wall = {.name = name, .exact = lim, .nodes = model};
-    bool good = lim ? open_wall(g, &wall) && grow_wall(g, &wall, model, fit_s, g->quick ? 62500 : 4000000) : false;
+    p->model = p->samples ? fit(g, p->samples, 0, shape_voxel_mm(p->shape)) : NULL;
+    p->fit_s = collision_build_clock_s() - begin;
+    p->lim = p->model ? lim_of(p->model, LIM_BLEND) : NULL;
+    return p->lim || fault(g, "the phantom has no local models");
+}
+
+static void close_phantom(Phantom *p)
+{
+    destroy(p->lim);
+    vessel_tree_free(p->model);
+    vessel_tree_free(p->samples);
+    shape_free(p->shape);
+}
+
+// The fitted phantom is its own truth here; the exact tube's local models have their error.
+static bool grow_phantom(Growth *g, const Phantom *p)
+{
+    Wall wall = {.name = "phantom, as fitted", .exact = p->lim, .nodes = p->model};
+    bool good = grow_wall(g, &wall, p->model, p->fit_s, g->quick ? 64000 : 4096000);
     close_wall(&wall);
-    destroy(lim);
-    vessel_tree_free(model);
-    vessel_tree_free(samples);
     return good;
 }
 
@@ -292,7 +313,7 @@ static bool grow_tube(Growth *g)
     VesselTree *model = samples ? fit(g, samples, 0, shape_options_voxel_mm(0, NULL)) : NULL;
     double fit_s = collision_build_clock_s() - begin;
     Wall wall = {.name = name, .exact = tube, .nodes = samples};
-    bool good = model ? open_wall(g, &wall) && grow_wall(g, &wall, model, fit_s, g->quick ? 62500 : 1000000) : false;
+    bool good = model && grow_wall(g, &wall, model, fit_s, g->quick ? 16000 : 256000);
     close_wall(&wall);
     vessel_tree_free(model);
     vessel_tree_free(samples);
@@ -382,11 +403,11 @@ typedef struct SizeFigures {
 } SizeFigures;
 
 // CPU time of locating a point in the whole tree, and its neighbour from there; the least of some all over.
-static void time_locations(const Vessel *vessel, const Course *tool, SizeFigures *f)
+static void time_locations(const Vessel *vessel, int tools, const Course *tool, SizeFigures *f)
 {
     f->first_us = f->next_us = HUGE_VAL;
     for (int k = 0; k < LOCATIONS; k++) {
-        const Course *c = &tool[k * (TOOLS / LOCATIONS)];
+        const Course *c = &tool[k * tools / LOCATIONS];
         int64_t begin = bench_cpu_ns();
         int node = vessel->locate(vessel, c->place[0], -1);
         int64_t then = bench_cpu_ns();
@@ -403,12 +424,12 @@ static bool place_tool(const Vessel *vessel, const VesselTree *tree, int node, i
     return course_wire(vessel, tree, x, node, WIRE_POINTS, steps, tool);
 }
 
-static bool place_tools(const Vessel *vessel, const VesselTree *tree, Course *wire, Course *tool)
+static bool place_tools(const Vessel *vessel, const VesselTree *tree, Course *wire, int tools, Course *tool)
 {
     enum { STRETCH = 92, INLET = 4 };    // nodes that the 42 mm of a tool may take, and that the wall beyond the root's end is near
     int last = tree->node_count - STRETCH, strand = tree->node_count < STRAND ? tree->node_count : STRAND;
     bool good = place_tool(vessel, tree, tree->node_count / STRAND / 2 * STRAND + (strand - STRETCH) / 2, WIRE_STEPS, wire);
-    for (int k = 0; good && k < TOOLS; k++) {
+    for (int k = 0; good && k < tools; k++) {
         // all over in no order: a golden ratio's steps round the tree
         int node = (int)(fmod(k * 0.6180339887498949, 1) * last), along = node % STRAND;
         node += along > strand - STRETCH ? strand - STRETCH - along : along < INLET ? INLET - along : 0;
@@ -419,21 +440,22 @@ static bool place_tools(const Vessel *vessel, const VesselTree *tree, Course *wi
 
 static bool measure_size(Growth *g, const VesselTree *tree, LimField field, SizeFigures *f)
 {
-    Course wire = {0}, *tool = calloc(TOOLS, sizeof *tool);
+    int tools = g->quick ? TOOLS / 5 : TOOLS;
+    Course wire = {0}, *tool = calloc((size_t)tools, sizeof *tool);
     double begin = collision_build_clock_s();
     Vessel *vessel = lim_of(tree, field);
     *f = (SizeFigures){.build_s = collision_build_clock_s() - begin};
-    bool good = vessel && tool && place_tools(vessel, tree, &wire, tool);
+    bool good = vessel && tool && place_tools(vessel, tree, &wire, tools, tool);
     if (good) {
         f->bytes = vessel->bytes;
-        f->warm_ns = course_ns(vessel, 1, &wire, 3 * RUNS);
-        f->cold_ns = course_ns(vessel, TOOLS, tool, RUNS);
-        time_locations(vessel, tool, f);
+        f->warm_ns = course_ns(vessel, 1, &wire, 3 * g->runs);
+        f->cold_ns = course_ns(vessel, tools, tool, g->runs);
+        time_locations(vessel, tools, tool, f);
         good = f->warm_ns > 0 && f->cold_ns > 0;
     }
     destroy(vessel);
     course_free(&wire);
-    for (int k = 0; tool && k < TOOLS; k++)
+    for (int k = 0; tool && k < tools; k++)
         course_free(&tool[k]);
     free(tool);
     return good || fault(g, "not enough memory for a large tree");
@@ -467,7 +489,7 @@ static bool grow_model(Growth *g)
         return helix ? fault(g, "the helix is too short to be wound on") : false;
     }
     fprintf(g->out, "\nLocal models of a helix that winds on: nanoseconds a query, for one wire of %d points, and for %d of them all over the tree in turn (far apart)\n",
-            WIRE_POINTS, TOOLS);
+            WIRE_POINTS, g->quick ? TOOLS / 5 : TOOLS);
     fputs("  field    nodes    blobs |  wire   far apart | us: first location, next from there | MB, s to build\n", g->out);
     bool good = true;
     for (LimField field = LIM_SWITCH; good && field <= LIM_BLEND; field++) {
@@ -498,32 +520,32 @@ typedef struct MeshPoint {   // a mesh of the true wall
     Figures figures;
 } MeshPoint;
 
-static bool measure_true_mesh(Growth *g, Wall *wall, double triangles, MeshPoint *out)
+static bool measure_true_mesh(Growth *g, const Wall *wall, const TriangleMesh *mesh, MeshPoint *out)
 {
-    TriangleMesh *mesh = mesh_wall(wall, triangles, g->faults);
-    Vessel *vessel = mesh ? mesh_vessel_of(wall, mesh, MESH_SEARCH_CACHED, g->faults) : NULL;
+    Vessel *vessel = mesh_vessel_of(wall, mesh, MESH_SEARCH_CACHED, g->faults);
     bool good = vessel && measure(g, wall, vessel, &out->figures);
     if (good) {
         out->triangles = mesh->triangle_count;
         out->bytes = (double)vessel->bytes;
     }
     destroy(vessel);
-    triangle_mesh_free(mesh);
     return good;
 }
 
 // The mesh whose gap is as wrong as `error_um`: the error goes with one over the triangles. One correction.
-static bool match_mesh(Growth *g, Wall *wall, double error_um, MeshPoint *mesh)
+static bool match_mesh(Growth *g, Wall *wall, double error_um, MeshPoint *point)
 {
     enum { MOST = 400000 };
-    for (int round = 0; round < 2; round++) {
-        double wanted = mesh->triangles * mesh->figures.error.gap_rms_um / error_um;
-        if (fabs(wanted / mesh->triangles - 1) < 0.05 || wanted > MOST)
+    bool good = true;
+    for (int round = 0; good && round < 2; round++) {
+        double wanted = point->triangles * point->figures.error.gap_rms_um / error_um;
+        if (fabs(wanted / point->triangles - 1) < 0.05 || wanted > MOST)
             return true;
-        if (!measure_true_mesh(g, wall, wanted, mesh))
-            return false;
+        TriangleMesh *mesh = mesh_wall(wall, wanted, g->faults);
+        good = mesh && measure_true_mesh(g, wall, mesh, point);
+        triangle_mesh_free(mesh);
     }
-    return true;
+    return good;
 }
 
 static void add_match(Growth *g, double target, const VesselTree *model, const Vessel *lim, double fit_s, const Figures *f, const MeshPoint *mesh)
@@ -565,30 +587,25 @@ static bool match_target(Growth *g, Wall *wall, double target, double voxel, Mes
     return good;
 }
 
-static bool match_blobs(Growth *g)
+static bool match_blobs(Growth *g, const Phantom *p)
 {
+    enum { FIRST_MESH = 16000 };
     static const double target[] = {0.4, 0.2, 0.1, 0.05, 0.025};
-    Shape *shape = shape_create("phantom", 0, NULL, "bench collision", g->faults);
-    VesselTree *samples = shape ? shape_sample(shape, g->faults) : NULL;
-    Vessel *exact = samples ? shape_vessel_create(shape) : NULL;
-    VesselTree *near = exact ? fit(g, samples, 0, shape_voxel_mm(shape)) : NULL;
-    Vessel *lim = near ? lim_of(near, LIM_BLEND) : NULL;
-    Wall wall = {.name = "phantom", .exact = exact, .nodes = samples, .near_exact = lim, .shape = shape};
+    Vessel *exact = shape_vessel_create(p->shape);
+    Wall wall = {.name = "phantom", .exact = exact, .nodes = p->samples, .near_exact = p->lim, .shape = p->shape};
+    TriangleMesh *first = exact ? mesh_wall(&wall, FIRST_MESH, g->faults) : NULL;
     MeshPoint mesh = {0};
-    bool good = lim && open_wall(g, &wall) && (!mesh_vessel_available() || measure_true_mesh(g, &wall, 16000, &mesh));
+    bool good = first && open_wall(g, &wall, first) && (!mesh_vessel_available() || measure_true_mesh(g, &wall, first, &mesh));
+    triangle_mesh_free(first);
     if (good) {
         fputs("\nThe phantom's true wall: blobs, and triangles of the mesh (cached) with the same rms error of the gap\n", g->out);
         fputs("  LIM: gap um, normal deg | target mm, blobs, MB, ns wire, all over, s to fit | mesh: gap um, normal deg, triangles, MB, ns wire, all over\n", g->out);
     }
     for (size_t k = 0; good && k < sizeof target / sizeof target[0]; k++)
-        if (!g->quick || k == 1 || k == 3)
-            good = match_target(g, &wall, target[k], shape_voxel_mm(shape), &mesh);
+        if (!g->quick || k == 1)
+            good = match_target(g, &wall, target[k], shape_voxel_mm(p->shape), &mesh);
     close_wall(&wall);
-    destroy(lim);
-    vessel_tree_free(near);
     destroy(exact);
-    vessel_tree_free(samples);
-    shape_free(shape);
     return good;
 }
 
@@ -655,7 +672,7 @@ static bool add_made(Growth *g, const Wall *wall, double length, const char *nam
 static bool compare_memory(Growth *g, const Wall *wall, const TriangleMesh *mesh)
 {
     double length = tree_length(wall->nodes), edge = mean_edge(mesh), dense = dense_grid_bytes(mesh, edge), begin = collision_build_clock_s();
-    GridVesselOptions options = {.cell_mm = edge, .band_mm = fmax(0.5, 3 * edge)};
+    GridVesselOptions options = {.cell_mm = edge, .band_mm = fmax(0.25, 2.5 * edge)};
     fprintf(g->out, "\n%s: %.0f mm of vessel, %d nodes; mesh and grid with edges of %.3f mm; errors against the local models\n", wall->name, length,
             wall->nodes->node_count, edge);
     fputs("                 | primitives      MB   bytes/mm | ns: wire, all over | gap rms, max um, normal deg | s to build\n", g->out);
@@ -687,8 +704,8 @@ static bool largest_tree(Growth *g)
     }
     Vessel *lim = model ? lim_of(model, LIM_BLEND) : NULL;
     Wall wall = {.name = path, .exact = lim, .nodes = model};
-    TriangleMesh *mesh = lim && open_wall(g, &wall) ? mesh_wall(&wall, g->quick ? 60000 : 300000, g->faults) : NULL;
-    bool good = mesh && compare_memory(g, &wall, mesh);
+    TriangleMesh *mesh = lim ? mesh_wall(&wall, g->quick ? 25000 : 100000, g->faults) : NULL;
+    bool good = mesh && open_wall(g, &wall, mesh) && compare_memory(g, &wall, mesh);
     triangle_mesh_free(mesh);
     close_wall(&wall);
     destroy(lim);
@@ -698,10 +715,13 @@ static bool largest_tree(Growth *g)
 
 bool collision_growth(FILE *out, cJSON *into, bool quick, int threads, Faults *faults)
 {
-    Growth g = {.out = out, .quick = quick, .threads = threads, .faults = faults};
+    Growth g = {.out = out, .quick = quick, .threads = threads, .runs = quick ? 3 : 9, .faults = faults};
     g.growth = cJSON_AddArrayToObject(into, "growth");
     g.sizes = cJSON_AddArrayToObject(into, "sizes");
     g.match = cJSON_AddArrayToObject(into, "blobs_to_match");
     g.memory = cJSON_AddArrayToObject(into, "memory");
-    return grow_phantom(&g) && grow_tube(&g) && grow_model(&g) && match_blobs(&g) && largest_tree(&g);
+    Phantom phantom = {0};
+    bool good = open_phantom(&g, &phantom) && grow_phantom(&g, &phantom) && grow_tube(&g) && grow_model(&g) && match_blobs(&g, &phantom) && largest_tree(&g);
+    close_phantom(&phantom);
+    return good;
 }
