@@ -54,6 +54,7 @@ typedef struct MeshVessel {
     int (*corner)[3];        // (T)
     int (*across)[3];        // (T) the triangle beyond the side from corner k to the next; -1: rim
     Vec3 *face;              // (T) unit normal
+    GroupMesh mesh;          // the same, as the groups take it
     const GroupKernels *kernels;
     int group_count;
     TriangleGroup *group;    // (G)
@@ -75,28 +76,31 @@ typedef struct Foot {
 static Foot closest_of_triangle(const MeshVessel *m, int triangle, Vec3 x)
 {
     const int *corner = m->corner[triangle];
-    Vec3 v[3] = {m->vertex[corner[0]], m->vertex[corner[1]], m->vertex[corner[2]]}, n = m->face[triangle];
+    Vec3 v[3] = {m->vertex[corner[0]], m->vertex[corner[1]], m->vertex[corner[2]]}, n = m->face[triangle], q[3], e[3];
+    double beyond[3], all = 0;       // each side's area with X, < 0 within the prism (normals point inwards, corners run round the other way)
+    for (int k = 0; k < 3; k++) {
+        q[k] = vec3_sub(x, v[k]);
+        e[k] = vec3_sub(v[(k + 1) % 3], v[k]);
+        beyond[k] = vec3_dot(n, vec3_cross(e[k], q[k]));
+        all += beyond[k];
+    }
+    if (beyond[0] <= 0 && beyond[1] <= 0 && beyond[2] <= 0 && all < 0) {
+        double height = vec3_dot(n, q[0]);
+        return (Foot){.p = vec3_add_scaled(x, -height, n), .distance2 = height * height, .feature = ON_FACE,
+                      .weight = {beyond[1] / all, beyond[2] / all, beyond[0] / all}};
+    }
     Foot best = {.distance2 = HUGE_VAL};
-    double beyond[3];        // each side's area with X, < 0 within the prism (normals point inwards, corners run round the other way)
     for (int k = 0; k < 3; k++) {
         int next = (k + 1) % 3;
-        Vec3 q = vec3_sub(x, v[k]), e = vec3_sub(v[next], v[k]);
-        double t = vec3_dot(q, e) / vec3_norm2(e);
-        beyond[k] = vec3_dot(n, vec3_cross(e, q));
+        double t = vec3_dot(q[k], e[k]) / vec3_norm2(e[k]);
         t = t > 0 ? t < 1 ? t : 1 : 0;
-        Vec3 p = t < 1 ? vec3_add_scaled(v[k], t, e) : v[next];
+        Vec3 p = t < 1 ? vec3_add_scaled(v[k], t, e[k]) : v[next];
         double d2 = vec3_norm2(vec3_sub(x, p));
         if (d2 < best.distance2) {
             best = (Foot){.p = p, .distance2 = d2, .feature = t <= 0 ? ON_VERTEX + k : t >= 1 ? ON_VERTEX + next : ON_EDGE + k};
             best.weight[k] = 1 - t;
             best.weight[next] = t;
         }
-    }
-    if (beyond[0] <= 0 && beyond[1] <= 0 && beyond[2] <= 0) {
-        double height = vec3_dot(n, vec3_sub(x, v[0])), all = beyond[0] + beyond[1] + beyond[2];
-        if (height * height <= best.distance2 && all < 0)
-            best = (Foot){.p = vec3_add_scaled(x, -height, n), .distance2 = height * height, .feature = ON_FACE,
-                          .weight = {beyond[1] / all, beyond[2] / all, beyond[0] / all}};
     }
     return best;
 }
@@ -123,7 +127,8 @@ static bool look_at(Search *s, int group)
     const TriangleGroup *g = &s->mesh->group[group];
     double d2[GROUP_TRIANGLES];
     bool closer = false;
-    s->mesh->kernels->distances(g, s->x, d2);
+    if (!s->mesh->kernels->distances(g, s->x, s->distance2, d2))
+        return false;
     for (int i = 0; i < GROUP_TRIANGLES; i++)
         if (d2[i] < s->distance2 || (d2[i] == s->distance2 && g->triangle[i] < s->triangle)) {
             s->distance2 = d2[i];
@@ -139,7 +144,7 @@ static bool visit(struct RTCPointQueryFunctionArguments *a)
     for (int i = 0; s->without && i < s->without->count; i++)
         if (s->without->group[i] == (int)a->primID)
             return false;
-    if (!look_at(s, (int)a->primID))
+    if (group_is_beyond(&s->mesh->group[a->primID], s->x, s->distance2, s->mesh->size) || !look_at(s, (int)a->primID))
         return false;
     a->query->radius = widened(s);
     return true;
@@ -174,7 +179,7 @@ static bool search_around(Search *s)
         int own = m->group_of[s->triangle];
         const GroupSurroundings *around = &m->around[own];
         float d2[GROUP_NEAR];
-        m->kernels->boxes(around, s->x, d2);
+        m->kernels->bounds(around, s->x, d2);
         for (int i = 1; i < around->count; i++)
             if (d2[i] <= s->distance2)
                 look_at(s, around->group[i]);
@@ -398,12 +403,10 @@ static const double THIN = 1e-12;                // height over length of a tria
 
 bool mesh_vessel_available(void) { return true; }
 
-static Vec3 outward_area(const TriangleMesh *mesh, int triangle, double *longest2)
+static bool has_area(const TriangleMesh *mesh, int triangle)
 {
-    const int *corner = mesh->triangle[triangle];
-    Vec3 a = vec3_sub(mesh->vertex[corner[1]], mesh->vertex[corner[0]]), b = vec3_sub(mesh->vertex[corner[2]], mesh->vertex[corner[0]]);
-    *longest2 = fmax(vec3_norm2(vec3_sub(b, a)), fmax(vec3_norm2(a), vec3_norm2(b)));
-    return vec3_cross(a, b);
+    TriangleFrame f = triangle_frame(mesh->vertex, mesh->triangle[triangle]);
+    return f.length > 0 && f.top[1] > THIN * f.length;
 }
 
 // What must hold before edges can be looked at.
@@ -425,11 +428,9 @@ static bool check_triangles(const TriangleMesh *mesh, const char *name, Faults *
                 faults_add(faults, name, 0, 0, "triangle %d of the mesh has vertex %d; 0 to %d are valid", t, mesh->triangle[t][k], mesh->vertex_count - 1);
                 break;
             }
-    for (int t = 0; t < mesh->triangle_count && faults->count == before; t++) {
-        double longest2;
-        if (!(vec3_norm(outward_area(mesh, t, &longest2)) > THIN * longest2) && flat++ == 0)
+    for (int t = 0; t < mesh->triangle_count && faults->count == before; t++)
+        if (!has_area(mesh, t) && flat++ == 0)
             first_flat = t;
-    }
     if (flat > 0)
         faults_add(faults, name, 0, 0, "%d of the mesh's %d triangles have no area, triangle %d first; three corners apart and not in line are valid", flat,
                    mesh->triangle_count, first_flat);
@@ -511,8 +512,7 @@ static void set_normals(MeshVessel *m, const TriangleMesh *mesh)
 {
     for (int t = 0; t < m->triangle_count; t++) {
         const int *corner = m->corner[t];
-        double longest2;
-        m->face[t] = vec3_negate(vec3_unit(outward_area(mesh, t, &longest2)));
+        m->face[t] = triangle_frame(m->vertex, corner).normal;
         for (int k = 0; k < 3; k++) {
             Vec3 p = m->vertex[corner[k]], a = vec3_sub(m->vertex[corner[(k + 1) % 3]], p), b = vec3_sub(m->vertex[corner[(k + 2) % 3]], p);
             Vec3 *sum = &m->vertex_normal[corner[k]];
@@ -533,7 +533,7 @@ static bool count_bytes(void *mesh, ssize_t bytes, bool post)
 static void set_bounds(const struct RTCBoundsFunctionArguments *a)
 {
     const MeshVessel *m = a->geometryUserPtr;
-    GroupBox box = group_box(&m->group[a->primID], m->size);
+    GroupBox box = group_box(&m->group[a->primID], &m->mesh);
     struct RTCBounds *b = a->bounds_o;
     b->lower_x = box.low[0], b->lower_y = box.low[1], b->lower_z = box.low[2];
     b->upper_x = box.high[0], b->upper_y = box.high[1], b->upper_z = box.high[2];
@@ -572,6 +572,7 @@ static bool set_groups(MeshVessel *m)
 {
     size_t triangles = (size_t)m->triangle_count;
     m->kernels = group_kernels(0);
+    m->mesh = (GroupMesh){m->vertex, (const int(*)[3])m->corner, m->size};
     m->group_count = group_count(m->triangle_count);
     m->group = aligned_alloc(_Alignof(TriangleGroup), (size_t)m->group_count * sizeof *m->group);
     m->group_of = malloc(triangles * sizeof *m->group_of);
@@ -586,7 +587,7 @@ static bool set_groups(MeshVessel *m)
         group_order(m->triangle_count, centroid, order);
     for (int g = 0; good && g < m->group_count; g++) {
         int first = g * GROUP_TRIANGLES, count = m->triangle_count - first < GROUP_TRIANGLES ? m->triangle_count - first : GROUP_TRIANGLES;
-        group_fill(&m->group[g], count, order + first, (const int(*)[3])m->corner, m->vertex, m->face);
+        group_fill(&m->group[g], count, order + first, &m->mesh);
         for (int i = 0; i < count; i++)
             m->group_of[order[first + i]] = g;
     }
@@ -598,22 +599,17 @@ static bool set_groups(MeshVessel *m)
 // --- Neighbourhoods ---
 
 typedef struct GroupMiddle {
-    Vec3 place, normal;      // mean of the triangles' centroids; mean direction into the lumen
+    Vec3 place;              // mean of the triangles' centroids
     double radius;           // to the farthest corner
 } GroupMiddle;
 
-static GroupMiddle middle_of(const TriangleGroup *g)
+static GroupMiddle middle_of(const MeshVessel *m, const TriangleGroup *g)
 {
-    GroupMiddle middle = {{0, 0, 0}, {0, 0, 0}, 0};
-    for (int i = 0; i < GROUP_TRIANGLES; i++) {
-        middle.normal = vec3_add(middle.normal, vec3(g->normal[0][i], g->normal[1][i], g->normal[2][i]));
-        for (int k = 0; k < 3; k++)
-            middle.place = vec3_add_scaled(middle.place, 1.0 / (3 * GROUP_TRIANGLES), vec3(g->corner[k][0][i], g->corner[k][1][i], g->corner[k][2][i]));
-    }
-    middle.normal = vec3_unit(middle.normal);
-    for (int i = 0; i < GROUP_TRIANGLES; i++)
-        for (int k = 0; k < 3; k++)
-            middle.radius = fmax(middle.radius, vec3_distance(middle.place, vec3(g->corner[k][0][i], g->corner[k][1][i], g->corner[k][2][i])));
+    GroupMiddle middle = {{0, 0, 0}, 0};
+    for (int i = 0; i < 3 * GROUP_TRIANGLES; i++)
+        middle.place = vec3_add_scaled(middle.place, 1.0 / (3 * GROUP_TRIANGLES), m->vertex[m->corner[g->triangle[i / 3]][i % 3]]);
+    for (int i = 0; i < 3 * GROUP_TRIANGLES; i++)
+        middle.radius = fmax(middle.radius, vec3_distance(middle.place, m->vertex[m->corner[g->triangle[i / 3]][i % 3]]));
     return middle;
 }
 
@@ -642,10 +638,10 @@ static void gather_near(const MeshVessel *m, int group, const GroupMiddle *middl
         }
     }
     around->origin = middle[group].place;
-    around->axis[2] = middle[group].normal;
+    around->axis[2] = m->group[group].facing;
     around->axis[0] = vec3_normal_to(around->axis[2]);
     around->axis[1] = vec3_cross(around->axis[2], around->axis[0]);
-    group_set_boxes(around, m->group);
+    group_set_bounds(around, m->group, &m->mesh);
 }
 
 static void blow_balls(const MeshVessel *m, const GroupMiddle *middle, GroupSurroundings *around)
@@ -654,7 +650,7 @@ static void blow_balls(const MeshVessel *m, const GroupMiddle *middle, GroupSurr
     around->balls = 0;
     for (int i = 0; i < GROUP_BALLS; i++, touching *= 2) {
         double most = touching + 2 * middle->radius;         // room for points that have gone further is of no use
-        Search s = {.mesh = m, .x = vec3_add_scaled(middle->place, touching, middle->normal), .distance2 = most * most, .triangle = -1, .without = around};
+        Search s = {.mesh = m, .x = vec3_add_scaled(middle->place, touching, around->axis[2]), .distance2 = most * most, .triangle = -1, .without = around};
         search_tree(&s);
         double radius = sqrt(s.distance2) * (1 - 1e-9) - 1e-9 * m->size;
         if (!(radius > touching))
@@ -679,7 +675,7 @@ static bool set_surroundings(MeshVessel *m)
     for (size_t i = 0; good && i < sides; i++)
         of[first[m->corner[i / 3][i % 3] + 1]++] = m->group_of[i / 3];
     for (int g = 0; good && g < m->group_count; g++)
-        middle[g] = middle_of(&m->group[g]);
+        middle[g] = middle_of(m, &m->group[g]);
     for (int g = 0; good && g < m->group_count; g++) {
         memset(&m->around[g], 0, sizeof m->around[g]);
         gather_near(m, g, middle, first, of, &m->around[g]);

@@ -1,4 +1,4 @@
-// The distance of a point to a triangle: to its plane within the prism over it, else to the nearest side. One text, compiled for each instruction set;
+// The squared distance of a point to a triangle: height over its plane, and in the plane, unless within, to the nearest side. One text, compiled for each instruction set;
 // with -fno-math-errno and -fno-trapping-math, which change no result, so that the selects vectorise.
 #include "geom/triangle_groups.h"
 
@@ -6,34 +6,44 @@
 
 #define ALWAYS static inline __attribute__((always_inline))
 
-ALWAYS void distances(const TriangleGroup *restrict g, Vec3 x, double *restrict distance2)
+ALWAYS bool distances(const TriangleGroup *restrict g, Vec3 x, double bound, double *restrict distance2)
 {
+    long long any = 0;
     for (int i = 0; i < GROUP_TRIANGLES; i++) {
-        double nx = g->normal[0][i], ny = g->normal[1][i], nz = g->normal[2][i], least = HUGE_VAL, most_beyond = -HUGE_VAL;
-        double height = nx * (x.x - g->corner[0][0][i]) + ny * (x.y - g->corner[0][1][i]) + nz * (x.z - g->corner[0][2][i]);
-        for (int k = 0; k < 3; k++) {
-            int next = k == 2 ? 0 : k + 1;
-            double ax = g->corner[k][0][i], ay = g->corner[k][1][i], az = g->corner[k][2][i];
-            double ex = g->corner[next][0][i] - ax, ey = g->corner[next][1][i] - ay, ez = g->corner[next][2][i] - az;
-            double qx = x.x - ax, qy = x.y - ay, qz = x.z - az;
-            double t = (qx * ex + qy * ey + qz * ez) * g->inverse[k][i];
-            double beyond = nx * (ey * qz - ez * qy) + ny * (ez * qx - ex * qz) + nz * (ex * qy - ey * qx);
-            t = t > 0 ? t : 0;
-            t = t < 1 ? t : 1;
-            double rx = qx - t * ex, ry = qy - t * ey, rz = qz - t * ez, d2 = rx * rx + ry * ry + rz * rz;
-            least = d2 < least ? d2 : least;
-            most_beyond = beyond > most_beyond ? beyond : most_beyond;
-        }
-        double over = height * height;
-        over = over < least ? over : least;
-        distance2[i] = most_beyond <= 0 ? over : least;
+        double x0 = x.x - g->origin[0][i], x1 = x.y - g->origin[1][i], x2 = x.z - g->origin[2][i];
+        double u = g->along[0][i] * x0 + g->along[1][i] * x1 + g->along[2][i] * x2;
+        double v = g->across[0][i] * x0 + g->across[1][i] * x1 + g->across[2][i] * x2;
+        double height = g->normal[0][i] * x0 + g->normal[1][i] * x1 + g->normal[2][i] * x2;
+        double length = g->length[i], p = g->top[0][i], q = g->top[1][i];
+        double low = u < 0 ? u : 0, high = u - length, beside = high > 0 ? high : low;
+        double least = beside * beside + v * v;
+        double b = p - length, w = u - length, t = (w * b + v * q) * g->inverse[0][i];
+        t = t > 0 ? t : 0;
+        t = t < 1 ? t : 1;
+        double r = w - t * b, s = v - t * q, d2 = r * r + s * s;
+        least = d2 < least ? d2 : least;
+        double within = b * v - q * w;   // > 0 on the inner side of the side from (length, 0) …
+        t = (u * p + v * q) * g->inverse[1][i];
+        t = t > 0 ? t : 0;
+        t = t < 1 ? t : 1;
+        r = u - t * p, s = v - t * q, d2 = r * r + s * s;
+        least = d2 < least ? d2 : least;
+        double other = q * u - p * v;    // … and of that from (0, 0)
+        within = other < within ? other : within;
+        within = v < within ? v : within;
+        least = within >= 0 ? 0 : least;
+        least += height * height;
+        distance2[i] = least;
+        any |= least <= bound ? 1 : 0;
     }
+    return any != 0;
 }
 
-ALWAYS void boxes(const GroupSurroundings *restrict s, Vec3 x, float *restrict distance2)
+ALWAYS void bounds(const GroupSurroundings *restrict s, Vec3 x, float *restrict distance2)
 {
     Vec3 q = vec3_sub(x, s->origin);
     float px = (float)vec3_dot(q, s->axis[0]), py = (float)vec3_dot(q, s->axis[1]), pz = (float)vec3_dot(q, s->axis[2]);
+    float rounding = 1e-6f * (fabsf(px) + fabsf(py) + fabsf(pz));
     for (int i = 0; i < GROUP_NEAR; i++) {
         float a = s->low[0][i] - px, b = px - s->high[0][i], dx = a > b ? a : b;
         float c = s->low[1][i] - py, d = py - s->high[1][i], dy = c > d ? c : d;
@@ -41,14 +51,18 @@ ALWAYS void boxes(const GroupSurroundings *restrict s, Vec3 x, float *restrict d
         dx = dx > 0 ? dx : 0;
         dy = dy > 0 ? dy : 0;
         dz = dz > 0 ? dz : 0;
-        distance2[i] = (dx * dx + dy * dy + dz * dz) * (1 - 1e-6f);
+        float height = s->facing[0][i] * px + s->facing[1][i] * py + s->facing[2][i] * pz, over = height - s->facing_high[i];
+        float under = s->facing_low[i] - height, slab = (over > under ? over : under) - rounding, box = (dx * dx + dy * dy + dz * dz) * (1 - 1e-6f);
+        slab = slab > 0 ? slab : 0;
+        slab *= slab;
+        distance2[i] = slab > box ? slab : box;
     }
 }
 
 #define KERNELS(isa, ...) \
-    __VA_ARGS__ static void distances_##isa(const TriangleGroup *g, Vec3 x, double *distance2) { distances(g, x, distance2); } \
-    __VA_ARGS__ static void boxes_##isa(const GroupSurroundings *s, Vec3 x, float *distance2) { boxes(s, x, distance2); } \
-    static const GroupKernels isa = {#isa, distances_##isa, boxes_##isa};
+    __VA_ARGS__ static bool distances_##isa(const TriangleGroup *g, Vec3 x, double least, double *distance2) { return distances(g, x, least, distance2); } \
+    __VA_ARGS__ static void bounds_##isa(const GroupSurroundings *s, Vec3 x, float *distance2) { bounds(s, x, distance2); } \
+    static const GroupKernels isa = {#isa, distances_##isa, bounds_##isa};
 
 KERNELS(baseline, )
 #if defined(__x86_64__) && defined(__GNUC__)
@@ -130,55 +144,88 @@ void group_order(int triangle_count, const Vec3 *centroid, int *order)
     order_part(order, triangle_count, centroid);
 }
 
-void group_fill(TriangleGroup *group, int count, const int *triangle, const int (*corner)[3], const Vec3 *vertex, const Vec3 *normal)
-{
-    for (int i = 0; i < GROUP_TRIANGLES; i++) {
-        int t = triangle[i < count ? i : count - 1];
-        group->triangle[i] = t;
-        for (int axis = 0; axis < 3; axis++) {
-            group->normal[axis][i] = along(normal[t], axis);
-            for (int k = 0; k < 3; k++)
-                group->corner[k][axis][i] = along(vertex[corner[t][k]], axis);
-        }
-        for (int k = 0; k < 3; k++)
-            group->inverse[k][i] = 1 / vec3_norm2(vec3_sub(vertex[corner[t][(k + 1) % 3]], vertex[corner[t][k]]));
-    }
-}
-
-static Vec3 corner_of(const TriangleGroup *g, int k, int i) { return vec3(g->corner[k][0][i], g->corner[k][1][i], g->corner[k][2][i]); }
-
 // The extent of the group along an axis.
-static void extent_of(const TriangleGroup *group, Vec3 origin, Vec3 axis, double *low, double *high)
+static void extent_of(const TriangleGroup *group, const GroupMesh *mesh, Vec3 origin, Vec3 axis, double *low, double *high)
 {
     *low = HUGE_VAL, *high = -HUGE_VAL;
-    for (int k = 0; k < 3; k++)
-        for (int i = 0; i < GROUP_TRIANGLES; i++) {
-            double place = vec3_dot(vec3_sub(corner_of(group, k, i), origin), axis);
-            *low = fmin(*low, place);
-            *high = fmax(*high, place);
+    for (int i = 0; i < GROUP_TRIANGLES; i++)
+        for (int k = 0; k < 3; k++) {
+            double place = vec3_dot(vec3_sub(mesh->vertex[mesh->corner[group->triangle[i]][k]], origin), axis);
+            *low = place < *low ? place : *low;
+            *high = place > *high ? place : *high;
         }
 }
 
 static Vec3 unit_axis(int axis) { return vec3(axis == 0, axis == 1, axis == 2); }
 
-GroupBox group_box(const TriangleGroup *group, double size)
+static void put(double (*to)[GROUP_TRIANGLES], int lane, Vec3 v)
+{
+    to[0][lane] = v.x, to[1][lane] = v.y, to[2][lane] = v.z;
+}
+
+TriangleFrame triangle_frame(const Vec3 *vertex, const int *corner)
+{
+    TriangleFrame f = {.first = 0};
+    double longest2 = -1;
+    for (int k = 0; k < 3; k++) {
+        double length2 = vec3_norm2(vec3_sub(vertex[corner[(k + 1) % 3]], vertex[corner[k]]));
+        if (length2 > longest2) {
+            longest2 = length2;
+            f.first = k;
+        }
+    }
+    Vec3 a = vertex[corner[f.first]], b = vec3_sub(vertex[corner[(f.first + 1) % 3]], a), c = vec3_sub(vertex[corner[(f.first + 2) % 3]], a);
+    f.length = vec3_norm(b);
+    f.along = vec3_scale(b, 1 / f.length);
+    f.top[0] = vec3_dot(c, f.along);
+    f.across = vec3_add_scaled(c, -f.top[0], f.along);
+    f.top[1] = vec3_norm(f.across);
+    f.across = vec3_unit(f.across);
+    f.across = vec3_unit(vec3_add_scaled(f.across, -vec3_dot(f.across, f.along), f.along));      // again, for what rounding left of a thin one
+    f.normal = vec3_cross(f.across, f.along);
+    return f;
+}
+
+void group_fill(TriangleGroup *group, int count, const int *triangle, const GroupMesh *mesh)
+{
+    Vec3 sum = {0, 0, 0};
+    for (int i = 0; i < GROUP_TRIANGLES; i++) {
+        int t = triangle[i < count ? i : count - 1];
+        TriangleFrame f = triangle_frame(mesh->vertex, mesh->corner[t]);
+        group->triangle[i] = t;
+        put(group->origin, i, mesh->vertex[mesh->corner[t][f.first]]);
+        put(group->along, i, f.along);
+        put(group->across, i, f.across);
+        put(group->normal, i, f.normal);
+        group->length[i] = f.length;
+        group->top[0][i] = f.top[0];
+        group->top[1][i] = f.top[1];
+        group->inverse[0][i] = 1 / ((f.top[0] - f.length) * (f.top[0] - f.length) + f.top[1] * f.top[1]);
+        group->inverse[1][i] = 1 / (f.top[0] * f.top[0] + f.top[1] * f.top[1]);
+        sum = vec3_add(sum, f.normal);
+    }
+    group->facing = vec3_unit(sum);
+    extent_of(group, mesh, vec3(0, 0, 0), group->facing, &group->low, &group->high);
+}
+
+GroupBox group_box(const TriangleGroup *group, const GroupMesh *mesh)
 {
     GroupBox box;
     for (int axis = 0; axis < 3; axis++) {
-        double low, high, wider = 5e-7 * size;
-        extent_of(group, vec3(0, 0, 0), unit_axis(axis), &low, &high);
+        double low, high, wider = 5e-7 * mesh->size;
+        extent_of(group, mesh, vec3(0, 0, 0), unit_axis(axis), &low, &high);
         box.low[axis] = (float)(low - wider);
         box.high[axis] = (float)(high + wider);
     }
     return box;
 }
 
-void group_set_boxes(GroupSurroundings *around, const TriangleGroup *group)
+void group_set_bounds(GroupSurroundings *around, const TriangleGroup *group, const GroupMesh *mesh)
 {
     double low[3][GROUP_NEAR], high[3][GROUP_NEAR], size = 0;
     for (int axis = 0; axis < 3; axis++)
         for (int i = 0; i < around->count; i++) {
-            extent_of(&group[around->group[i]], around->origin, around->axis[axis], &low[axis][i], &high[axis][i]);
+            extent_of(&group[around->group[i]], mesh, around->origin, around->axis[axis], &low[axis][i], &high[axis][i]);
             size = fmax(size, fmax(-low[axis][i], high[axis][i]));
         }
     for (int axis = 0; axis < 3; axis++)
@@ -186,4 +233,12 @@ void group_set_boxes(GroupSurroundings *around, const TriangleGroup *group)
             around->low[axis][i] = i < around->count ? (float)(low[axis][i] - 1e-6 * size) : HUGE_VALF;
             around->high[axis][i] = i < around->count ? (float)(high[axis][i] + 1e-6 * size) : HUGE_VALF;
         }
+    for (int i = 0; i < around->count; i++) {
+        const TriangleGroup *g = &group[around->group[i]];
+        double middle = vec3_dot(around->origin, g->facing);
+        for (int axis = 0; axis < 3; axis++)
+            around->facing[axis][i] = (float)vec3_dot(around->axis[axis], g->facing);
+        around->facing_low[i] = (float)(g->low - middle - 1e-6 * size);
+        around->facing_high[i] = (float)(g->high - middle + 1e-6 * size);
+    }
 }

@@ -16,11 +16,23 @@
 
 enum { GROUP_TRIANGLES = 8, GROUP_NEAR = 16, GROUP_BALLS = 6 };
 
+// A triangle's longest side runs from (0, 0) to (length, 0), its third corner is (top[0], top[1]), top[1] > 0. Orthonormal to rounding, however thin it is.
+typedef struct TriangleFrame {
+    int first;               // the corner where the longest side starts
+    Vec3 along, across, normal;      // normal: into the lumen, corners run clockwise seen from its tip
+    double length, top[2];
+} TriangleFrame;
+TriangleFrame triangle_frame(const Vec3 *vertex, const int *corner);
+
 typedef struct TriangleGroup {           // lanes beyond the last triangle repeat it
-    _Alignas(64) double corner[3][3][GROUP_TRIANGLES];   // [corner][axis]
-    double normal[3][GROUP_TRIANGLES];           // unit, into the lumen; corners run clockwise seen from there
-    double inverse[3][GROUP_TRIANGLES];          // 1 / squared length of the side from corner k to the next
+    // Each triangle in its frame (below), from `origin`.
+    _Alignas(64) double origin[3][GROUP_TRIANGLES];
+    double along[3][GROUP_TRIANGLES], across[3][GROUP_TRIANGLES], normal[3][GROUP_TRIANGLES];
+    double length[GROUP_TRIANGLES], top[2][GROUP_TRIANGLES];
+    double inverse[2][GROUP_TRIANGLES];          // 1 / squared length of the sides to the top, from (length, 0) and from (0, 0)
     int triangle[GROUP_TRIANGLES];
+    Vec3 facing;             // unit, mean of the normals (which point into the lumen): along it the group is thin, …
+    double low, high;        // … and x . facing of all its points is within these
 } TriangleGroup;
 
 typedef struct GroupBox {                // in float, wider than the group by more than rounding of box and point can do
@@ -31,6 +43,7 @@ typedef struct GroupSurroundings {
     // Boxes of N(o) in a frame of the group's own, (x - origin) . axis: neighbours lie much in one plane, and boxes along it are flat. In float, wider than
     // the groups by more than rounding can do; those beyond `count` are nowhere.
     _Alignas(64) float low[3][GROUP_NEAR], high[3][GROUP_NEAR];
+    float facing[3][GROUP_NEAR], facing_low[GROUP_NEAR], facing_high[GROUP_NEAR];    // the slabs that hold the groups, in that frame
     Vec3 origin, axis[3];
     int group[GROUP_NEAR];
     int count, balls;
@@ -42,10 +55,11 @@ typedef struct GroupSurroundings {
 
 typedef struct GroupKernels {
     const char *name;
-    // distance2 (8) [mm2] from x to each triangle.
-    void (*distances)(const TriangleGroup *group, Vec3 x, double *distance2);
-    // distance2 (GROUP_NEAR): no more than the squared distance from x to each box.
-    void (*boxes)(const GroupSurroundings *around, Vec3 x, float *distance2);
+    // distance2 (8) [mm2] from x to each triangle. True where one is at most `least`.
+    bool (*distances)(const TriangleGroup *group, Vec3 x, double least, double *distance2);
+    // distance2 (GROUP_NEAR): no more than the squared distance from x to each group, by its box and by its slab. In a concave wall the slabs tell more:
+    // the planes of all other groups are further off than the closest one's.
+    void (*bounds)(const GroupSurroundings *around, Vec3 x, float *distance2);
 } GroupKernels;
 // isa: as LimVesselOptions.isa (geom/vessel.h).
 const GroupKernels *group_kernels(int isa);
@@ -53,10 +67,22 @@ const GroupKernels *group_kernels(int isa);
 static inline int group_count(int triangle_count) { return (triangle_count + GROUP_TRIANGLES - 1) / GROUP_TRIANGLES; }
 // Orders the triangles (order (T), a permutation) so that each eight in a row are close together. centroid (T).
 void group_order(int triangle_count, const Vec3 *centroid, int *order);
-void group_fill(TriangleGroup *group, int count, const int *triangle, const int (*corner)[3], const Vec3 *vertex, const Vec3 *normal);
-// size: the largest coordinate of the mesh [mm].
-GroupBox group_box(const TriangleGroup *group, double size);
-// Sets `low` and `high` from `origin`, `axis`, `group` and `count`. group: all of the mesh's.
-void group_set_boxes(GroupSurroundings *around, const TriangleGroup *group);
+// Is the group certainly further from x than the root of distance2? size: the largest coordinate of the mesh [mm].
+static inline bool group_is_beyond(const TriangleGroup *group, Vec3 x, double distance2, double size)
+{
+    double height = vec3_dot(x, group->facing), out = fmax(group->low - height, height - group->high);
+    out -= 1e-12 * (fabs(x.x) + fabs(x.y) + fabs(x.z) + size);
+    return out > 0 && out * out > distance2;
+}
+
+typedef struct GroupMesh {               // what the groups are made of
+    const Vec3 *vertex;
+    const int (*corner)[3];
+    double size;             // [mm] largest coordinate
+} GroupMesh;
+void group_fill(TriangleGroup *group, int count, const int *triangle, const GroupMesh *mesh);
+GroupBox group_box(const TriangleGroup *group, const GroupMesh *mesh);
+// Sets boxes and slabs from `origin`, `axis`, `group` and `count`. group: all of the mesh's.
+void group_set_bounds(GroupSurroundings *around, const TriangleGroup *group, const GroupMesh *mesh);
 
 #endif
