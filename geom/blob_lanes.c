@@ -22,7 +22,7 @@ void blob_groups_fill(BlobGroup *group, const Blobby *model)
 }
 
 #define KERNEL_TABLE(isa) \
-    {#isa, gradient_##isa, hessian_##isa, newton_##isa, finish_##isa, estimate_##isa, partner_##isa, mix_##isa, near_##isa}
+    {#isa, gradient_##isa, hessian_##isa, predict_##isa, newton_##isa, finish_##isa, estimate_##isa, partner_##isa, mix_##isa, near_##isa}
 
 #define WIDTH 2
 #define TARGET
@@ -43,7 +43,7 @@ static const LaneKernels baseline = KERNEL_TABLE(baseline);
 #undef KERNEL
 static const LaneKernels avx2 = KERNEL_TABLE(avx2);
 
-#define WIDTH 4
+#define WIDTH 8
 #define TARGET __attribute__((target("avx512f,avx512dq,avx512vl")))
 #define KERNEL(name) name##_avx512
 #include "geom/blob_kernel.inc"

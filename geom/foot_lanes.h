@@ -46,12 +46,14 @@ typedef struct FootBatch {
     // in
     FootLane xx, xy, xz;             // X [mm]
     FootLane radius, bend;           // of the node [mm], the scale of the problem, and its inverse
+    FootLane room;                   // [mm] nearer feet in the node's cell are the closest
     FootLane longest;                // [mm] bound of a step; where not careful a longer one makes the lane FOOT_LOST
     FootLane allowed;                // [mm] rest of |f|/|g| with which a foot is good enough; its place may be off by a hundred times that
     FootSample at;                   // the running foot
+    // remembered, for foot_predict: in at.x.. the foot, in at.gx.. the X that it is of, in nx.. the normal, in axx.. the gap's Hessian
     // the field at X
-    FootLane inside;                 // 1 or 0
-    FootLane estimate;               // Newton's step on W, see lim_vessel.c: inside one blob never below the distance
+    FootLane inside;                 // 1 or 0; after foot_predict: the start is near, and has room
+    FootLane estimate;               // see foot_estimate
     // out
     FootLane state;
     FootLane nx, ny, nz, gap;        // unit normal, signed distance
@@ -74,6 +76,28 @@ typedef struct FootMixture {
     FootLane agree;                  // [mm] walls that differ by more are not mixed
     FootLane total, gap, nx, ny, nz;
 } FootMixture;
+
+// Where Newton starts: where a block's feet should be now, t = (I + gap S)^-1 P dx = P dx - gap A dx along the wall, A the gap's Hessian then, and
+// t'S t / 2 = t'A dx / 2 down with it.
+static inline __attribute__((always_inline)) void foot_predict(FootBatch *restrict b, int block, double allowed)
+{
+    for (int i = block; i < block + FOOT_BLOCK; i++) {
+        double nx = b->nx[i], ny = b->ny[i], nz = b->nz[i], px = b->at.x[i], py = b->at.y[i], pz = b->at.z[i], radius = b->radius[i];
+        double gap = (b->at.gx[i] - px) * nx + (b->at.gy[i] - py) * ny + (b->at.gz[i] - pz) * nz;
+        double dx = b->xx[i] - b->at.gx[i], dy = b->xy[i] - b->at.gy[i], dz = b->xz[i] - b->at.gz[i];
+        double bx = b->axx[i] * dx + b->axy[i] * dy + b->axz[i] * dz, by = b->axy[i] * dx + b->ayy[i] * dy + b->ayz[i] * dz,
+               bz = b->axz[i] * dx + b->ayz[i] * dy + b->azz[i] * dz;
+        double closer = dx * nx + dy * ny + dz * nz, tx = dx - closer * nx - gap * bx, ty = dy - closer * ny - gap * by, tz = dz - closer * nz - gap * bz;
+        double down = 0.5 * (tx * bx + ty * by + tz * bz), near = tx * tx + ty * ty + tz * tz < 0.04 * radius * radius ? 1.0 : 0.0;
+        px = near > 0 ? px + tx - down * nx : px, py = near > 0 ? py + ty - down * ny : py, pz = near > 0 ? pz + tz - down * nz : pz;
+        b->at.x[i] = px, b->at.y[i] = py, b->at.z[i] = pz;
+        near = gap + closer < b->room[i] ? near : 0.0;
+        b->inside[i] = gap + closer > -0.05 * radius ? near : 0.0;
+        b->longest[i] = 0.5 * radius;
+        b->allowed[i] = allowed;
+        b->state[i] = FOOT_PENDING;
+    }
+}
 
 // One step of a block's pending lanes from their samples. `careful`: goes on near focal points, with bounded steps.
 static inline __attribute__((always_inline)) void foot_newton(FootBatch *restrict b, int block, const bool careful)
@@ -166,15 +190,14 @@ static inline __attribute__((always_inline)) void foot_finish(FootBatch *restric
     }
 }
 
-// `inside` and `estimate` of a block from the samples at X.
-static inline __attribute__((always_inline)) void foot_estimate(FootBatch *restrict b, const FootSample *restrict s, int block, double iso_level)
+// A block's Newton steps on W, see lim_vessel.c: inside one blob never below the distance.
+static inline __attribute__((always_inline)) void foot_estimate(const FootSample *restrict s, double *restrict estimate, int block, double iso_level)
 {
     double level = 1 / sqrt(iso_level);
     for (int i = block; i < block + FOOT_BLOCK; i++) {
         double gx = s->gx[i], gy = s->gy[i], gz = s->gz[i], slope2 = gx * gx + gy * gy + gz * gz, f = s->f[i];
         double sum = f + iso_level, root = sqrt(sum), part = sum * fabs(1 - level * root);   // |W| / w^3
-        b->estimate[i] = slope2 > 1e-280 ? 2 * part / sqrt(slope2 > 1e-280 ? slope2 : 1.0) : 1e300;
-        b->inside[i] = f > 0 ? 1.0 : 0.0;
+        estimate[i] = slope2 > 1e-280 ? 2 * part / sqrt(slope2 > 1e-280 ? slope2 : 1.0) : 1e300;
     }
 }
 
@@ -217,7 +240,8 @@ static inline __attribute__((always_inline)) void foot_mix(const FootBatch *rest
         double differs = s->gap[i] - b->gap[i], q = differs / m->agree[i], near = 1 - q * q;
         double cosine = s->nx[i] * b->nx[i] + s->ny[i] * b->ny[i] + s->nz[i] * b->nz[i], turned = 4 * cosine - 2;   // 1 up to 41 degrees, 0 at 60
         turned = turned < 1 ? turned : 1.0;
-        double w = near > 0 && turned > 0 ? s->weight[i] * near * near * turned * turned * (3 - 2 * turned) : 0.0;
+        near = near > 0 ? near : 0.0, turned = turned > 0 ? turned : 0.0;
+        double w = s->weight[i] * near * near * turned * turned * (3 - 2 * turned);
         m->total[i] += w;
         m->gap[i] += w * differs;
         m->nx[i] += w * (s->nx[i] - b->nx[i]), m->ny[i] += w * (s->ny[i] - b->ny[i]), m->nz[i] += w * (s->nz[i] - b->nz[i]);
@@ -241,10 +265,12 @@ typedef struct LaneKernels {
     // that gap.
     void (*gradient)(FootSample *sample, const int *lane, int count, double iso_level);
     void (*hessian)(FootSample *sample, const int *lane, int count, double iso_level);
-    // Of the first `count` lanes, in whole blocks: the rest of the last block must hold numbers. newton leaves blocks alone where nothing is pending.
-    void (*newton)(FootBatch *batch, int count, bool careful);
+    // Of the first `count` lanes, in whole blocks: the rest of the last block must hold numbers. newton leaves blocks alone where all are
+    // done, and returns whether some lane is not.
+    void (*predict)(FootBatch *batch, int count, double allowed);   // leaves all pending, the rest of the last block done
+    bool (*newton)(FootBatch *batch, int count, bool careful);
     void (*finish)(FootBatch *batch, int count);
-    void (*estimate)(FootBatch *batch, const FootSample *at_x, int count, double iso_level);
+    void (*estimate)(const FootSample *at_x, double *estimate, int count, double iso_level);
     void (*partner)(const FootBatch *batch, FootPartner *partner, int count, bool second);
     void (*mix)(const FootBatch *batch, const FootPartner *partner, FootMixture *mixture, int count);
     // Bits of a group's nodes in whose mixed zone y lies (see NearGroup), their weights, and bits added to `better` where y lies in the node's own cell.

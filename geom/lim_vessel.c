@@ -26,12 +26,15 @@
 typedef struct NodeModel {
     const BlobGroup *group;
     const NearGroup *near;
-    int groups, near_groups;
+    int groups;
+    int near_groups, all_near;   // groups of planes that count within the node's ball, see fill_near, and all
     int source;              // the node whose blobs these are: itself, or the nearest relative where it has none
     bool carried;            // near the inlet: goes on upstream
-    double radius;
+    double radius, bend;     // [mm], and its inverse
     Vec3 center;
     double room;             // [mm] a foot in this cell that is nearer is the closest: see measure_room
+    double ball2;            // [mm^2] (1.2 r)^2: beyond, power_walk looks around
+    double agree, least;     // [mm] blend_agree, blend_least; 0 where nothing is mixed
     double clear;            // [mm] true distance from the node's centre to the wall of this model, less a margin; < 0: no bound
 } NodeModel;
 
@@ -60,6 +63,16 @@ typedef struct Lane {
     int partner[PARTNERS_MAX];
     float weight[PARTNERS_MAX];
 } Lane;
+
+// A batch's lanes, those with most partners first, so that the k-th partners are asked for neighbours.
+typedef struct LaneBatch {
+    int count;
+    Lane *of[FOOT_BATCH];
+    int asked_count, asked[FOOT_BATCH + 1];   // those that are not trusted
+    FootBatch foot;
+    FootSample at_x;         // of those, side by side
+    Lane lane[FOOT_BATCH];   // as they come
+} LaneBatch;
 
 static Vec3 lane_point(const FootBatch *b, int i) { return vec3(b->xx[i], b->xy[i], b->xz[i]); }
 static Vec3 lane_foot(const FootBatch *b, int i) { return vec3(b->at.x[i], b->at.y[i], b->at.z[i]); }
@@ -141,34 +154,23 @@ static void set_sample(const LimVessel *lim, FootSample *s, int i, int node, Vec
 // [mm] what Newton may leave: of a foot that was followed, of one found afresh.
 static const double REST_FOLLOWED = 1e-8, REST_FRESH = 1e-9;
 
-static void set_lane(const LimVessel *lim, FootBatch *b, int i, int node, Vec3 x, Vec3 start)
+// Lanes are computed in whole blocks: those beyond the last in use hold numbers.
+static void fill_block(FootBatch *b, int count)
 {
-    set_sample(lim, &b->at, i, node, start);
-    b->xx[i] = x.x, b->xy[i] = x.y, b->xz[i] = x.z;
-    b->radius[i] = lim->model[node].radius;
-    b->bend[i] = 1 / b->radius[i];
-    b->longest[i] = 0.5 * b->radius[i];
-    b->allowed[i] = REST_FOLLOWED;
-    b->state[i] = FOOT_PENDING;
-}
-
-// Lanes are computed in whole blocks: those beyond the last in use repeat it. Returns their number.
-static int fill_block(FootBatch *b, int count)
-{
-    int to = (count + FOOT_BLOCK - 1) / FOOT_BLOCK * FOOT_BLOCK, last = count - 1;
-    for (int i = count; i < to; i++) {
+    for (int i = count; i % FOOT_BLOCK != 0; i++) {
         FootSample *s = &b->at;
-        s->group[i] = s->group[last], s->groups[i] = s->groups[last], s->carried[i] = s->carried[last];
-        s->x[i] = s->x[last], s->y[i] = s->y[last], s->z[i] = s->z[last];
-        b->xx[i] = b->xx[last], b->xy[i] = b->xy[last], b->xz[i] = b->xz[last];
-        b->radius[i] = b->radius[last], b->bend[i] = b->bend[last], b->longest[i] = b->longest[last], b->allowed[i] = b->allowed[last];
-        b->state[i] = FOOT_PENDING;
+        s->x[i] = s->y[i] = s->z[i] = s->f[i] = s->gx[i] = s->gy[i] = s->gz[i] = 0;
+        s->hxx[i] = s->hxy[i] = s->hxz[i] = s->hyy[i] = s->hyz[i] = s->hzz[i] = 0;
+        b->xx[i] = b->xy[i] = b->xz[i] = b->room[i] = b->nx[i] = b->ny[i] = b->nz[i] = b->half[i] = 0;
+        b->sxx[i] = b->sxy[i] = b->sxz[i] = b->syy[i] = b->syz[i] = b->szz[i] = 0;
+        b->axx[i] = b->axy[i] = b->axz[i] = b->ayy[i] = b->ayz[i] = b->azz[i] = 0;
+        b->radius[i] = b->bend[i] = 1;
     }
-    return to;
 }
 
-// At most `rounds` Newton steps of the pending lanes; those that are not done then are lost.
-static void newton_rounds(const LimVessel *lim, FootBatch *b, int count, int rounds, bool careful)
+// At most `rounds` Newton steps of the pending lanes; those that are not done then are lost. False where all are done. (A second step with the first
+// one's Hessian costs half; but the Hessian is the answer's too, and partners go by it: tried and lost.)
+static bool newton_rounds(const LimVessel *lim, FootBatch *b, int count, int rounds, bool careful)
 {
     int lane[FOOT_BATCH];
     for (int round = 0; round < rounds; round++) {
@@ -177,13 +179,15 @@ static void newton_rounds(const LimVessel *lim, FootBatch *b, int count, int rou
             if (b->state[i] == FOOT_PENDING)
                 lane[n++] = i;
         if (n == 0)
-            return;
+            return true;
         sample(lim, &b->at, lane, n, true);
-        lim->kernels->newton(b, count, careful);
+        if (!lim->kernels->newton(b, count, careful))
+            return false;
     }
     for (int i = 0; i < count; i++)
         if (b->state[i] == FOOT_PENDING)
             b->state[i] = FOOT_LOST;
+    return true;
 }
 
 // From the sample at the running foot one step of the march towards the wall; true where it is within a twentieth of the radius of it.
@@ -207,28 +211,27 @@ static bool march_step(const LimVessel *lim, FootBatch *b, int i, int node)
     return fabs(step) < 0.05 * radius;
 }
 
-static void march_rounds(const LimVessel *lim, FootBatch *b, FootSample *at_x, const Lane *of, int *lane, int count)
+static void march_rounds(const LimVessel *lim, LaneBatch *batch, const int *lanes, int count)
 {
     enum { STEPS = 13 };
-    int trusted[FOOT_BATCH], n = 0;
+    FootBatch *b = &batch->foot;
+    int lane[FOOT_BATCH], trusted[FOOT_BATCH], n = 0;
     for (int k = 0; k < count; k++) {
-        int i = lane[k];
+        int i = lane[k] = lanes[k];
         b->at.x[i] = b->xx[i], b->at.y[i] = b->xy[i], b->at.z[i] = b->xz[i];
-        if (!of[i].trusted)
-            continue;
-        set_sample(lim, at_x, i, of[i].node, lane_point(b, i));
-        trusted[n++] = i;
+        if (batch->of[i]->trusted)
+            trusted[n++] = i;
     }
     if (n > 0) {   // the trust was misplaced
-        sample(lim, at_x, trusted, n, false);
+        sample(lim, &b->at, trusted, n, false);
         for (int k = 0; k < n; k++)
-            b->inside[trusted[k]] = at_x->f[trusted[k]] > 0;
+            b->inside[trusted[k]] = b->at.f[trusted[k]] > 0;
     }
     for (int round = 0; round < STEPS && count > 0; round++) {
         sample(lim, &b->at, lane, count, false);
         int kept = 0;
         for (int k = 0; k < count; k++)
-            if (!march_step(lim, b, lane[k], of[lane[k]].node))
+            if (!march_step(lim, b, lane[k], batch->of[lane[k]]->node))
                 lane[kept++] = lane[k];
         count = kept;
     }
@@ -306,63 +309,78 @@ static bool is_on_wrong_side(const FootBatch *b, int i) { return (b->gap[i] > 0)
 
 // Newton's steps from the remembered feet. A point near the axis has many feet nearly as close as each other, and its foot runs round with it: careful
 // steps from the last one find it, where a march from X falls on any side and takes long.
-static void follow_feet(const LimVessel *lim, FootBatch *b, int filled)
+static void follow_feet(const LimVessel *lim, FootBatch *b, int count)
 {
     bool deep = false;
-    newton_rounds(lim, b, filled, 4, false);
-    for (int i = 0; i < filled; i++)
+    if (!newton_rounds(lim, b, count, 4, false))
+        return;
+    for (int i = 0; i < count; i++)
         if (b->state[i] == FOOT_DEEP) {
             b->state[i] = FOOT_PENDING;
             b->allowed[i] = REST_FRESH;
             deep = true;
         }
     if (deep)
-        newton_rounds(lim, b, filled, 12, true);
+        newton_rounds(lim, b, count, 12, true);
 }
 
-// Feet of `count` lanes on the models of their nodes; `again` marks those without a start. A foot on the wrong side of the wall, or on a wall that
-// stands further off than another, is not the closest: those start once more from X.
-static void project_batch(const LimVessel *lim, FootBatch *b, FootSample *at_x, Lane *of, int count)
+// What the field at X says of the lanes that are not trusted.
+static void ask_at_points(const LimVessel *lim, LaneBatch *batch)
 {
-    int lane[FOOT_BATCH], n = 0, filled = fill_block(b, count);
-    at_x->any_carried = false;
-    for (int i = 0; i < filled; i++) {
-        if (i < count && !of[i].trusted) {
-            set_sample(lim, at_x, i, of[i].node, lane_point(b, i));
-            lane[n++] = i;
-        } else {
-            at_x->f[i] = at_x->gx[i] = at_x->gy[i] = at_x->gz[i] = 0;
-        }
+    FootBatch *b = &batch->foot;
+    FootSample *s = &batch->at_x;
+    FootLane estimate;
+    int n = batch->asked_count, lane[FOOT_BATCH];
+    s->any_carried = false;
+    for (int k = 0; k < n; k++) {
+        int i = batch->asked[k];
+        set_sample(lim, s, k, batch->of[i]->node, lane_point(b, i));
+        lane[k] = k;
     }
-    if (n > 0) {
-        sample(lim, at_x, lane, n, false);
-        lim->kernels->estimate(b, at_x, count, lim->tree->iso_level);
+    sample(lim, s, lane, n, false);
+    for (int k = n; k % FOOT_BLOCK != 0; k++)
+        s->f[k] = s->gx[k] = s->gy[k] = s->gz[k] = 0;
+    lim->kernels->estimate(s, estimate, n, lim->tree->iso_level);
+    for (int k = 0; k < n; k++) {
+        int i = batch->asked[k];
+        b->inside[i] = s->f[k] > 0;
+        b->estimate[i] = estimate[k];
     }
-    n = 0;
-    follow_feet(lim, b, filled);
+}
+
+// Feet of a batch's lanes on the models of their nodes; `again` marks those without a start. A foot on the wrong side of the wall, or on a wall that
+// stands further off than another, is not the closest: those start once more from X.
+static void project_batch(const LimVessel *lim, LaneBatch *batch)
+{
+    FootBatch *b = &batch->foot;
+    int lane[FOOT_BATCH], n = 0, count = batch->count;
+    if (batch->asked_count > 0)
+        ask_at_points(lim, batch);
+    follow_feet(lim, b, count);
     lim->kernels->finish(b, count);
+    for (int k = 0; k < batch->asked_count; k++) {
+        int i = batch->asked[k];
+        batch->of[i]->again |= is_on_wrong_side(b, i) || !(b->estimate[i] > 0.8 * fabs(b->gap[i]));
+    }
     for (int i = 0; i < count; i++) {
-        of[i].sure = true;
-        bool stands = of[i].trusted || (!is_on_wrong_side(b, i) && b->estimate[i] > 0.8 * fabs(b->gap[i]));
-        of[i].again = of[i].again || b->state[i] != FOOT_DONE || !stands;
-        if (of[i].again)
+        batch->of[i]->again |= b->state[i] != FOOT_DONE;
+        if (batch->of[i]->again)
             lane[n++] = i;
     }
     if (n == 0)
         return;
-    march_rounds(lim, b, at_x, of, lane, n);
-    for (int i = 0; i < count; i++)
-        if (of[i].again) {
-            b->state[i] = FOOT_PENDING;
-            b->allowed[i] = REST_FRESH;
-            b->longest[i] = b->radius[i];
-        }
+    march_rounds(lim, batch, lane, n);
+    for (int k = 0; k < n; k++) {
+        b->state[lane[k]] = FOOT_PENDING;
+        b->allowed[lane[k]] = REST_FRESH;
+        b->longest[lane[k]] = b->radius[lane[k]];
+    }
     newton_rounds(lim, b, count, 12, true);
     lim->kernels->finish(b, count);
     bool slow = false;
-    for (int i = 0; i < count; i++)
-        if (of[i].again && (b->state[i] != FOOT_DONE || is_on_wrong_side(b, i))) {
-            project_slowly(lim, b, i, &of[i]);
+    for (int k = 0; k < n; k++)
+        if (b->state[lane[k]] != FOOT_DONE || is_on_wrong_side(b, lane[k])) {
+            project_slowly(lim, b, lane[k], batch->of[lane[k]]);
             slow = true;
         }
     if (slow)
@@ -378,23 +396,31 @@ static const Vec3 look[LOOKS] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {
 // A foot far off is the locally closest, but is it the closest? Looks on a sphere of 0.9 times its distance about X in 14 directions, at most 36 degrees
 // apart from any other: all inside means that no (flat) wall is nearer than 0.7 gap. What fails is projected anew, slowly and thoroughly. Asked only
 // where the clearance of an earlier check has been used up; near the wall the estimate serves.
-static void check_batch(const LimVessel *lim, FootBatch *b, FootSample *at, Lane *of, int count, const VesselMemory *memory)
+static void check_batch(const LimVessel *lim, LaneBatch *batch, const VesselMemory *memory)
 {
+    FootBatch *b = &batch->foot;
+    FootSample *at = &batch->at_x;
     int lane[FOOT_BATCH], n = 0;
-    for (int i = 0; i < count; i++) {
-        const VesselMemory *m = &memory[of[i].point];
-        const NodeModel *model = &lim->model[of[i].node];
+    for (int k = 0; k < batch->asked_count; k++) {
+        int i = batch->asked[k];
+        Lane *of = batch->of[i];
+        if (!of->sure || !(b->gap[i] > 0.3 * b->radius[i]))
+            continue;
+        const VesselMemory *m = &memory[of->point];
+        const NodeModel *model = &lim->model[of->node];
         double known = model->clear - vec3_distance(lane_point(b, i), model->center);
         if (m->clearance > 0)
             known = fmax(known, m->clearance - vec3_distance(lane_point(b, i), m->clear_place));
-        of[i].checked = of[i].sure && !of[i].trusted && b->gap[i] > 0.3 * b->radius[i] && known < 0.5 * b->gap[i];
-        if (!of[i].checked)
+        of->checked = known < 0.5 * b->gap[i];
+        if (!of->checked)
             continue;
-        set_sample(lim, at, i, of[i].node, lane_point(b, i));
+        set_sample(lim, at, i, of->node, lane_point(b, i));
         lane[n++] = i;
     }
+    if (n == 0)
+        return;
     bool slow = false, bad[FOOT_BATCH] = {false};
-    for (int k = 0; k < LOOKS && n > 0; k++) {
+    for (int k = 0; k < LOOKS; k++) {
         for (int j = 0; j < n; j++) {
             int i = lane[j];
             double r = 0.9 * b->gap[i];
@@ -407,13 +433,13 @@ static void check_batch(const LimVessel *lim, FootBatch *b, FootSample *at, Lane
     for (int j = 0; j < n; j++) {
         int i = lane[j];
         if (bad[i]) {
-            project_slowly(lim, b, i, &of[i]);
-            of[i].checked = of[i].sure;
+            project_slowly(lim, b, i, batch->of[i]);
+            batch->of[i]->checked = batch->of[i]->sure;
             slow = true;
         }
     }
     if (slow)
-        lim->kernels->finish(b, count);
+        lim->kernels->finish(b, batch->count);
 }
 
 // --- The blended field ---
@@ -458,48 +484,54 @@ static void ask_partners(const LimVessel *lim, const FootBatch *b, FootPartner *
 }
 
 // Mixes the partners' walls into the hits of a batch, partner by partner.
-static void blend_batch(const LimVessel *lim, const FootBatch *b, const Lane *of, int count, double reach, VesselHit *hit)
+static void blend_batch(const LimVessel *lim, const LaneBatch *batch, double reach, VesselHit *hit)
 {
+    const FootBatch *b = &batch->foot;
     FootPartner partner;
     FootMixture mixture;
-    int most = 0, partners[FOOT_BATCH];
+    int count = batch->count, with = 0, partners[FOOT_BATCH];
     for (int i = 0; i < count; i++) {
-        bool wanted = of[i].sure && hit[of[i].point].gap - blend_least(b->radius[i]) <= reach;
-        partners[i] = wanted ? of[i].partners : 0;
-        most = partners[i] > most ? partners[i] : most;
+        const Lane *of = batch->of[i];
+        partners[i] = of->sure && b->gap[i] - lim->model[of->node].least <= reach ? of->partners : 0;
+        with = partners[i] > 0 ? i + 1 : with;
     }
-    if (most == 0)
+    if (with == 0)
         return;
-    int filled = (count + FOOT_BLOCK - 1) / FOOT_BLOCK * FOOT_BLOCK;
+    int filled = (with + FOOT_BLOCK - 1) / FOOT_BLOCK * FOOT_BLOCK;
     for (int i = 0; i < filled; i++) {
-        mixture.agree[i] = blend_agree(b->radius[i]);
+        mixture.agree[i] = i < count ? lim->model[batch->of[i]->node].agree : 1;
         mixture.total[i] = mixture.gap[i] = mixture.nx[i] = mixture.ny[i] = mixture.nz[i] = 0;
         partner.at.f[i] = partner.at.gx[i] = partner.at.gy[i] = partner.at.gz[i] = partner.move[i] = 0;
     }
-    for (int k = 0; k < most; k++) {
-        int lane[FOOT_BATCH], n = 0;
+    for (int k = 0; with > 0; k++) {
+        int lane[FOOT_BATCH], n = 0, last = 0;
+        filled = (with + FOOT_BLOCK - 1) / FOOT_BLOCK * FOOT_BLOCK;
         partner.at.any_carried = false;
         for (int i = 0; i < filled; i++) {
             partner.weight[i] = 0;
             partner.at.x[i] = b->at.x[i], partner.at.y[i] = b->at.y[i], partner.at.z[i] = b->at.z[i];
         }
-        for (int i = 0; i < count; i++) {
+        for (int i = 0; i < with; i++) {
             if (partners[i] <= k)
                 continue;
-            partner.weight[i] = (double)of[i].weight[k];
-            set_sample(lim, &partner.at, i, of[i].partner[k], lane_foot(b, i));
+            const NodeModel *m = &lim->model[batch->of[i]->partner[k]];
+            partner.weight[i] = (double)batch->of[i]->weight[k];
+            partner.at.group[i] = m->group, partner.at.groups[i] = m->groups;
+            partner.at.carried[i] = m->carried, partner.at.any_carried |= m->carried;
             lane[n++] = i;
+            last = partners[i] > k + 1 ? i + 1 : last;
         }
-        ask_partners(lim, b, &partner, lane, n, count);
-        lim->kernels->mix(b, &partner, &mixture, count);
+        ask_partners(lim, b, &partner, lane, n, with);
+        lim->kernels->mix(b, &partner, &mixture, with);
+        with = last;
     }
     for (int i = 0; i < count; i++) {
-        if (mixture.total[i] == 0)
+        if (partners[i] == 0 || mixture.total[i] == 0)
             continue;
         double share = 1 / (1 + mixture.total[i]);
-        VesselHit *h = &hit[of[i].point];
-        h->gap += share * mixture.gap[i];
-        h->normal = vec3_unit(vec3_add_scaled(h->normal, share, vec3(mixture.nx[i], mixture.ny[i], mixture.nz[i])));
+        VesselHit *h = &hit[batch->of[i]->point];
+        h->gap = b->gap[i] + share * mixture.gap[i];
+        h->normal = vec3_unit(vec3_add_scaled(lane_normal(b, i), share, vec3(mixture.nx[i], mixture.ny[i], mixture.nz[i])));
     }
 }
 
@@ -512,24 +544,23 @@ static VesselHit open_end(VesselMemory *memory, int node)
     return (VesselHit){.gap = HUGE_VAL, .node = node, .flags = VESSEL_OPEN_END};
 }
 
-// Collects the partners of `node` at y from its centre. False where X is in another node's cell.
-static bool collect_partners(const LimVessel *lim, int node, Vec3 y, Lane *of)
+// Collects the partners of `node` at y from its centre, among the first of its near groups. False where X is in another node's cell.
+static bool collect_partners(const LimVessel *lim, const NodeModel *m, int groups, Vec3 y, Lane *of)
 {
-    const NodeModel *m = &lim->model[node];
     float at[3] = {(float)y.x, (float)y.y, (float)y.z}, weight[NEAR_GROUP];
-    unsigned better = 0;
-    bool mixed = lim->options.field == LIM_BLEND;
-    of->partners = 0;
-    for (int g = 0; g < m->near_groups; g++) {
-        unsigned in = lim->kernels->near(m->near + g, at, weight, &better);
-        for (int k = 0; mixed && in >> k && of->partners < PARTNERS_MAX; k++) {
-            if (!(in >> k & 1))
-                continue;
-            of->partner[of->partners] = m->near[g].node[k];
-            of->weight[of->partners++] = better >> k & 1 ? 1 : weight[k];
+    bool own = true, mixed = lim->options.field == LIM_BLEND;
+    int found = 0;
+    for (int g = 0; g < groups; g++) {
+        unsigned better = 0, in = lim->kernels->near(m->near + g, at, weight, &better);
+        own &= better == 0;
+        for (in = mixed ? in : 0; in != 0 && found < PARTNERS_MAX; in &= in - 1) {
+            int k = __builtin_ctz(in);
+            of->partner[found] = m->near[g].node[k];
+            of->weight[found++] = better >> k & 1 ? 1 : weight[k];
         }
     }
-    return better == 0;
+    of->partners = found;
+    return own;
 }
 
 // The point's node and its partners.
@@ -537,14 +568,15 @@ static int follow(const LimVessel *lim, Vec3 x, int node, Lane *of)
 {
     const VesselTree *tree = lim->tree;
     if (node >= 0 && node < tree->node_count) {
-        Vec3 y = vec3_sub(x, lim->model[node].center);
-        double r = lim->model[node].radius;
-        if (collect_partners(lim, node, y, of) && !(vec3_norm2(y) > 1.44 * r * r))
-            return node;   // where power_walk looks around
+        const NodeModel *m = &lim->model[node];
+        Vec3 y = vec3_sub(x, m->center);
+        bool at_home = !(vec3_norm2(y) > m->ball2);
+        if (collect_partners(lim, m, at_home ? m->near_groups : m->all_near, y, of) && at_home)
+            return node;
     }
     int next = power_walk(tree, x, node, lim->options.hops);
     if (next != node)
-        collect_partners(lim, next, vec3_sub(x, lim->model[next].center), of);
+        collect_partners(lim, &lim->model[next], lim->model[next].all_near, vec3_sub(x, lim->model[next].center), of);
     return next;
 }
 
@@ -559,15 +591,16 @@ static bool answer_cheaply(const LimVessel *lim, Vec3 x, double reach, VesselMem
     const NodeModel *m = &lim->model[node];
     if (node != memory->node)
         memory->clearance = 0;
-    of->at_home = node == memory->node && vec3_norm2(vec3_sub(x, m->center)) < 1.44 * m->radius * m->radius;
+    double away2 = vec3_norm2(vec3_sub(x, m->center));
+    of->at_home = node == memory->node && away2 < m->ball2;
     memory->node = of->node = node;
     if (node == 0 && lim->inlet_open && !m->carried && inlet_height(lim, x) < 0) {
         *hit = open_end(memory, node);
         return true;
     }
-    double least = reach + (lim->options.field == LIM_BLEND ? blend_least(m->radius) : 0), clear = 0, away = m->clear - least;
-    if (away > 0 && vec3_norm2(vec3_sub(x, m->center)) < away * away)
-        clear = m->clear - vec3_distance(x, m->center);
+    double least = reach + m->least, clear = 0, away = m->clear - least;
+    if (away > 0 && away2 < away * away)
+        clear = m->clear - sqrt(away2);
     away = memory->clearance - least;
     if (away > 0 && vec3_norm2(vec3_sub(x, memory->clear_place)) < away * away)
         clear = fmax(clear, memory->clearance - vec3_distance(x, memory->clear_place));
@@ -577,25 +610,24 @@ static bool answer_cheaply(const LimVessel *lim, Vec3 x, double reach, VesselMem
     return true;
 }
 
-// Where Newton starts: where the foot should be now, t = (I + gap S)^-1 P dx = P dx - gap H dx along the wall, H the gap's Hessian then, and
-// t'S t / 2 = t'H dx / 2 down with it.
-static void set_start(const LimVessel *lim, FootBatch *b, int i, Vec3 x, const VesselMemory *memory, Lane *of)
+// What a lane is asked, and what is remembered: kernels->predict makes the start of it.
+static void set_lane(const LimVessel *lim, FootBatch *b, int i, int node, Vec3 x, const VesselMemory *memory)
 {
-    const NodeModel *m = &lim->model[of->node];
-    of->again = !memory->has_foot;
-    of->trusted = false;
-    if (!memory->has_foot) {
-        set_lane(lim, b, i, of->node, x, x);
-        return;
+    const NodeModel *m = &lim->model[node];
+    b->at.group[i] = m->group, b->at.groups[i] = m->groups;
+    b->at.carried[i] = m->carried, b->at.any_carried |= m->carried;
+    b->radius[i] = m->radius, b->bend[i] = m->bend, b->room[i] = m->room;
+    b->xx[i] = x.x, b->xy[i] = x.y, b->xz[i] = x.z;
+    if (memory->has_foot) {
+        b->at.x[i] = memory->foot.x, b->at.y[i] = memory->foot.y, b->at.z[i] = memory->foot.z;
+        b->at.gx[i] = memory->place.x, b->at.gy[i] = memory->place.y, b->at.gz[i] = memory->place.z;
+        b->nx[i] = memory->normal.x, b->ny[i] = memory->normal.y, b->nz[i] = memory->normal.z;
+        const Sym3 *h = &memory->hessian;
+        b->axx[i] = h->xx, b->axy[i] = h->xy, b->axz[i] = h->xz, b->ayy[i] = h->yy, b->ayz[i] = h->yz, b->azz[i] = h->zz;
+    } else {
+        b->at.x[i] = b->at.gx[i] = x.x, b->at.y[i] = b->at.gy[i] = x.y, b->at.z[i] = b->at.gz[i] = x.z;
+        b->nx[i] = b->ny[i] = b->nz[i] = b->axx[i] = b->axy[i] = b->axz[i] = b->ayy[i] = b->ayz[i] = b->azz[i] = 0;
     }
-    Vec3 foot = memory->foot, move = vec3_sub(x, memory->place), n = memory->normal, bend = sym3_mul_vec(&memory->hessian, move);
-    double gap = vec3_dot(vec3_sub(memory->place, foot), n), closer = vec3_dot(move, n);
-    Vec3 shift = vec3_add_scaled(vec3_add_scaled(move, -closer, n), -gap, bend);
-    if (vec3_norm2(shift) < 0.04 * m->radius * m->radius) {
-        foot = vec3_add_scaled(vec3_add(foot, shift), -0.5 * vec3_dot(shift, bend), n);
-        of->trusted = memory->trusted > 0 && of->at_home && gap + closer < m->room && gap + closer > -0.05 * m->radius;
-    }
-    set_lane(lim, b, i, of->node, x, foot);
 }
 
 enum { TRUST = 16 };         // queries in which a trusted foot goes without the look at X
@@ -619,31 +651,61 @@ static void answer_from_foot(const FootBatch *b, int i, const Lane *of, VesselMe
     memory->hessian = hessian;
 }
 
+// Takes the lanes in the order of their partners' number, most first.
+static void order_lanes(LaneBatch *batch, const int *with)
+{
+    int place[PARTNERS_MAX + 1], at = 0;
+    for (int k = PARTNERS_MAX; k >= 0; k--) {
+        place[k] = at;
+        at += with[k];
+    }
+    for (int i = 0; i < batch->count; i++)
+        batch->of[place[batch->lane[i].partners]++] = &batch->lane[i];
+}
+
 static void query_batch(const LimVessel *lim, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
-    FootBatch batch;
-    FootSample at_x;
-    Lane of[FOOT_BATCH];
-    int n = 0;
-    batch.at.any_carried = false;
+    LaneBatch batch;
+    FootBatch *b = &batch.foot;
+    int n = 0, with[PARTNERS_MAX + 1] = {0};
     for (int i = 0; i < count; i++) {
-        if (answer_cheaply(lim, point[i], reach, &memory[i], &of[n], &hit[i]))
+        Lane *of = &batch.lane[n];
+        if (answer_cheaply(lim, point[i], reach, &memory[i], of, &hit[i]))
             continue;
-        of[n].point = i;
-        set_start(lim, &batch, n, point[i], &memory[i], &of[n]);
+        of->point = i;
+        with[of->partners]++;
         n++;
     }
     if (n == 0)
         return;
-    project_batch(lim, &batch, &at_x, of, n);
-    check_batch(lim, &batch, &at_x, of, n, memory);
+    batch.count = n;
+    order_lanes(&batch, with);
+    batch.asked_count = 0;
+    b->at.any_carried = false;
+    for (int i = 0; i < n; i++)
+        set_lane(lim, b, i, batch.of[i]->node, point[batch.of[i]->point], &memory[batch.of[i]->point]);
+    fill_block(b, n);
+    lim->kernels->predict(b, n, REST_FOLLOWED);
     for (int i = 0; i < n; i++) {
-        answer_from_foot(&batch, i, &of[i], &memory[of[i].point], &hit[of[i].point]);
-        if (batch.at.carried[i] && inlet_height(lim, lane_point(&batch, i)) < 0)
-            hit[of[i].point].flags |= VESSEL_BEYOND;
+        Lane *of = batch.of[i];
+        const VesselMemory *m = &memory[of->point];
+        of->sure = true;
+        of->checked = false;
+        of->again = !m->has_foot;
+        of->trusted = m->has_foot & (m->trusted > 0) & of->at_home & (b->inside[i] > 0);
+        batch.asked[batch.asked_count] = i;
+        batch.asked_count += !of->trusted;
+    }
+    project_batch(lim, &batch);
+    check_batch(lim, &batch, memory);
+    for (int i = 0; i < n; i++) {
+        Lane *of = batch.of[i];
+        answer_from_foot(b, i, of, &memory[of->point], &hit[of->point]);
+        if (b->at.carried[i] && inlet_height(lim, lane_point(b, i)) < 0)
+            hit[of->point].flags |= VESSEL_BEYOND;
     }
     if (lim->options.field == LIM_BLEND)
-        blend_batch(lim, &batch, of, n, reach, hit);
+        blend_batch(lim, &batch, reach, hit);
 }
 
 static void lim_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
@@ -698,24 +760,67 @@ static int near_groups_of(const VesselTree *tree, int node)
     return (tree->near_offset[node + 1] - tree->near_offset[node] + NEAR_GROUP - 1) / NEAR_GROUP;
 }
 
-// Planes to the near nodes. The mixed zone is as wide as the narrower of the two nodes' own.
-static void fill_near(const VesselTree *tree, int i, NearGroup *group)
+// A near node's plane, see NearGroup: within the mixed zone, or beyond, where base - e.y <= width.
+typedef struct NearPlane {
+    int node;
+    double base, width;
+    Vec3 e;
+} NearPlane;
+
+// The mixed zone is as wide as the narrower of the two nodes' own.
+static NearPlane near_plane(const VesselTree *tree, int i, int j)
 {
-    int first = tree->near_offset[i], count = tree->near_offset[i + 1] - first;
-    for (int k = 0; k < NEAR_GROUP * near_groups_of(tree, i); k++) {
-        NearGroup *g = &group[k / NEAR_GROUP];
-        int lane = k % NEAR_GROUP, j = k < count ? tree->near[first + k] : -1;
-        g->node[lane] = j;
-        if (j < 0) {
-            g->base[lane] = 1, g->ex[lane] = g->ey[lane] = g->ez[lane] = 0, g->band[lane] = 2;   // nowhere in its band
-            continue;
+    Vec3 e = vec3_sub(tree->center[j], tree->center[i]);
+    double base = vec3_norm2(e) + tree->radius[i] * tree->radius[i] - tree->radius[j] * tree->radius[j];
+    return (NearPlane){j, base, fmax(BLEND_BAND * fmin(spacing2(tree, i), spacing2(tree, j)), 1e-12), vec3_scale(e, 2)};
+}
+
+// Within the ball |y| < ball, does a's cell cover all of the space in which b counts? With a's plane the ball is cut to y.e_a <= base_a: how far does that
+// reach along e_b?
+static bool covers(const NearPlane *a, const NearPlane *b, double ball)
+{
+    double size_a = vec3_norm(a->e), size_b = vec3_norm(b->e), most = ball * size_b;
+    if (!(size_a > 0))
+        return false;
+    double at = a->base / size_a, along = vec3_dot(b->e, a->e) / size_a, aside = sqrt(fmax(size_b * size_b - along * along, 0));
+    if (at <= -ball)
+        return true;
+    if (along * ball > at * size_b)   // the furthest point of the ball is cut off
+        most = along * at + aside * sqrt(fmax(ball * ball - at * at, 0));
+    return b->base - most > b->width + 1e-4 * (ball * size_b + fabs(b->base));   // single precision
+}
+
+// Planes to the near nodes: first those that count for points in the ball of 1.2 r, whose number of groups is returned. Along a vessel that leaves the two
+// next on either side of nine and more.
+static int fill_near(const VesselTree *tree, int i, double ball, NearGroup *group)
+{
+    int first = tree->near_offset[i], count = tree->near_offset[i + 1] - first, kept = 0;
+    for (int pass = 0, at = 0; pass < 2; pass++) {
+        for (int k = 0; k < count; k++) {
+            NearPlane p = near_plane(tree, i, tree->near[first + k]);
+            bool covered = false;
+            for (int l = 0; l < count && !covered; l++) {
+                NearPlane other = near_plane(tree, i, tree->near[first + l]);
+                covered = l != k && covers(&other, &p, ball);
+            }
+            if (covered != (pass == 1))
+                continue;
+            NearGroup *g = &group[at / NEAR_GROUP];
+            int lane = at++ % NEAR_GROUP;
+            g->node[lane] = p.node;
+            g->base[lane] = (float)p.base;
+            g->ex[lane] = (float)p.e.x, g->ey[lane] = (float)p.e.y, g->ez[lane] = (float)p.e.z;
+            g->band[lane] = (float)(1 / p.width);
         }
-        Vec3 e = vec3_sub(tree->center[j], tree->center[i]);
-        double band = BLEND_BAND * fmin(spacing2(tree, i), spacing2(tree, j));
-        g->base[lane] = (float)(vec3_norm2(e) + tree->radius[i] * tree->radius[i] - tree->radius[j] * tree->radius[j]);
-        g->ex[lane] = (float)(2 * e.x), g->ey[lane] = (float)(2 * e.y), g->ez[lane] = (float)(2 * e.z);
-        g->band[lane] = (float)(1 / fmax(band, 1e-12));
+        kept = pass == 0 ? at : kept;
     }
+    for (int k = count; k < NEAR_GROUP * near_groups_of(tree, i); k++) {
+        NearGroup *g = &group[k / NEAR_GROUP];
+        int lane = k % NEAR_GROUP;
+        g->node[lane] = -1;
+        g->base[lane] = 1, g->ex[lane] = g->ey[lane] = g->ez[lane] = 0, g->band[lane] = 2;   // nowhere in its band
+    }
+    return (kept + NEAR_GROUP - 1) / NEAR_GROUP;
 }
 
 // The root's section goes on upstream in the models near it that hold the root's centre.
@@ -779,14 +884,18 @@ static void fill_models(LimVessel *lim)
         }
         m->center = tree->center[i];
         m->radius = tree->radius[i];
+        m->bend = 1 / m->radius;
+        m->ball2 = 1.44 * m->radius * m->radius;
+        m->agree = blend_agree(m->radius);
+        m->least = lim->options.field == LIM_BLEND ? blend_least(m->radius) : 0;
         // less than what was found, should that be another side's foot
         SurfacePoint s = blobby_project(&blobs, tree->center[i], tree->center[i]);
         m->clear = s.converged && s.distance > 0 ? fmin(0.95 * s.distance, tree->radius[i]) : -HUGE_VAL;
         m->room = measure_room(lim, i);
         m->near = near;
-        m->near_groups = near_groups_of(tree, i);
-        fill_near(tree, i, near);
-        near += m->near_groups;
+        m->all_near = near_groups_of(tree, i);
+        m->near_groups = fill_near(tree, i, sqrt(m->ball2), near);
+        near += m->all_near;
     }
     for (int i = 0; i < tree->node_count; i++)
         lim->model[i].group = lim->model[lim->model[i].source].group;
