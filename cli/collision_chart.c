@@ -164,6 +164,8 @@ static void draw_mark(const Chart *chart, const char *class, const cJSON *row, d
     report_text(chart->out, text_at(row, "surface"));
     fprintf(chart->out, ", ");
     report_text(chart->out, text_at(row, "representation"));
+    if (number_at(row, "triangles") > 0)
+        fprintf(chart->out, " of %.0f triangles", number_at(row, "triangles"));
     fprintf(chart->out, ": %.6g %s</title></path>\n", value, unit);
 }
 
@@ -175,7 +177,7 @@ static double draw_legend(const Chart *chart, double top)
     for (int k = 0; k < chart->representations.count + 2; k++) {
         bool known = k < chart->representations.count;
         const char *name = known ? chart->representations.name[k] : k == chart->representations.count ? "hollow: the paper's Table 6 (its machine, 2017)"
-                                                                                                       : "crossed: the run in closed loop did not survive";
+                                                                                                       : "crossed: the run did not survive";
         double wide = 42 + 7.4 * (double)strlen(name);
         if (x + wide > WIDTH - MARGIN) {
             x = MARGIN + 8;
@@ -199,10 +201,27 @@ static double draw_legend(const Chart *chart, double top)
 
 // --- detection by surface ---
 
-static bool paper_us(const cJSON *row, double *us)
+// The paper's time of a row; false where it has none, or a row before has the same (its table knows one kind of mesh and of local models).
+static bool paper_us(const Chart *chart, const cJSON *row, double *us)
 {
+    const cJSON *before;
     *us = 1000 * number_at(row, "paper.ms");
-    return *us > 0;
+    if (!(*us > 0))
+        return false;
+    cJSON_ArrayForEach(before, chart->rows) {
+        if (before == row)
+            break;
+        if (1000 * number_at(before, "paper.ms") == *us && !strcmp(text_at(before, "surface"), text_at(row, "surface")))
+            return false;
+    }
+    return true;
+}
+
+// A cross over the mark of a run that ended badly.
+static void draw_lost(FILE *out, const cJSON *row, const char *run, double x, double y)
+{
+    if (cJSON_IsFalse(cJSON_GetObjectItemCaseSensitive(cJSON_GetObjectItemCaseSensitive(row, run), "survived")))
+        fprintf(out, "<path class=\"lost\" d=\"M%.1f %.1fl14 -14m0 14l-14 -14\"/>\n", x - 7, y + 7);
 }
 
 static double draw_detection(const Chart *chart, double top)
@@ -214,7 +233,7 @@ static double draw_detection(const Chart *chart, double top)
     open_panel(chart, "detect", MARGIN, top, "Detection: CPU time of 80 points on the same recorded motion");
     cJSON_ArrayForEach(row, chart->rows) {
         axis_hold(&x, number_at(row, "motion.us_per_80_points"));
-        axis_hold(&x, paper_us(row, &us) ? us : NAN);
+        axis_hold(&x, paper_us(chart, row, &us) ? us : NAN);
     }
     bool filled = axis_close(&x, MARGIN + LABELS, WIDTH - MARGIN - 10);
     if (filled) {
@@ -231,13 +250,12 @@ static double draw_detection(const Chart *chart, double top)
             double y = begin + surface * band + 5 + LANE * (kind + 0.5), own = number_at(row, "motion.us_per_80_points");
             if (surface < 0 || kind < 0)
                 continue;
-            if (paper_us(row, &us))
+            if (paper_us(chart, row, &us))
                 draw_mark(chart, "paper", row, place(&x, us), y, us, "us in the paper");
             if (!(own > 0))
                 continue;
             draw_mark(chart, "mark", row, place(&x, own), y, own, "us");
-            if (cJSON_IsFalse(cJSON_GetObjectItemCaseSensitive(cJSON_GetObjectItemCaseSensitive(row, "loop"), "survived")))
-                fprintf(out, "<path class=\"lost\" d=\"M%.1f %.1fl14 -14m0 14l-14 -14\"/>\n", place(&x, own) - 7, y + 7);
+            draw_lost(out, row, "loop", place(&x, own), y);
         }
     }
     close_panel(chart, filled, MARGIN, top);
@@ -318,20 +336,28 @@ static void draw_curve(FILE *out, const Curve *curve, const Axis *x, const Axis 
     }
 }
 
+// The colour and shape that the rows give it.
+static int kind_of(const Chart *chart, const char *representation, int otherwise)
+{
+    int kind = name_index(&chart->representations, representation);
+    return kind >= 0 ? kind : otherwise;
+}
+
 static void draw_growth(const Chart *chart, double left, double top, double width)
 {
     enum { CURVES = 8 };
     const char *surface = text_at(cJSON_GetArrayItem(chart->growth, 0), "surface");
     const cJSON *g = chart->growth, *s = chart->sizes, *item;
+    int lim = kind_of(chart, "lim", 0), full = kind_of(chart, "mesh full", 1), warm = kind_of(chart, "mesh warm", 2), cached = kind_of(chart, "mesh cached", 3);
     const Curve curve[CURVES] = {
-        {g, "surface", surface, "search", "full", "triangles", "ns_per_query.spread", "mesh, full, all over", 1, true},
-        {g, "surface", surface, "search", "full", "triangles", "ns_per_query.wire", "mesh, full, wire", 1, false},
-        {g, "surface", surface, "search", "warm", "triangles", "ns_per_query.spread", "mesh, warm, all over", 2, true},
-        {g, "surface", surface, "search", "warm", "triangles", "ns_per_query.wire", "mesh, warm, wire", 2, false},
-        {g, "surface", surface, "search", "cached", "triangles", "ns_per_query.spread", "mesh, cached, all over", 3, true},
-        {g, "surface", surface, "search", "cached", "triangles", "ns_per_query.wire", "mesh, cached, wire", 3, false},
-        {s, "field", "blend", NULL, NULL, "nodes", "ns_cold", "LIM, far apart", 0, true},
-        {s, "field", "blend", NULL, NULL, "nodes", "ns_warm", "LIM, wire", 0, false}};
+        {g, "surface", surface, "search", "full", "triangles", "ns_per_query.spread", "mesh, full, all over", full, true},
+        {g, "surface", surface, "search", "full", "triangles", "ns_per_query.wire", "mesh, full, wire", full, false},
+        {g, "surface", surface, "search", "warm", "triangles", "ns_per_query.spread", "mesh, warm, all over", warm, true},
+        {g, "surface", surface, "search", "warm", "triangles", "ns_per_query.wire", "mesh, warm, wire", warm, false},
+        {g, "surface", surface, "search", "cached", "triangles", "ns_per_query.spread", "mesh, cached, all over", cached, true},
+        {g, "surface", surface, "search", "cached", "triangles", "ns_per_query.wire", "mesh, cached, wire", cached, false},
+        {s, "field", "blend", NULL, NULL, "nodes", "ns_cold", "LIM, far apart", lim, true},
+        {s, "field", "blend", NULL, NULL, "nodes", "ns_warm", "LIM, wire", lim, false}};
     Axis x = {0}, y = {0};
     Tail tail[CURVES];
     int tails = 0;
@@ -365,7 +391,7 @@ static void draw_growth(const Chart *chart, double left, double top, double widt
         for (int k = 0; k < tails; k++) {
             at = fmax(at, fmin(tail[k].y, end - room * (tails - 1 - k)));
             fprintf(chart->out, "<path class=\"curve%s\" style=\"color:%s\" d=\"M%.1f %.1fh18\"/><text class=\"tail\" style=\"color:%s\" x=\"%.1f\" y=\"%.1f\">%s</text>\n",
-                    tail[k].curve->dashed ? " dashed" : "", colour[tail[k].curve->kind], x.to + 6, at, colour[tail[k].curve->kind], x.to + 28, at + 4,
+                    tail[k].curve->dashed ? " dashed" : "", colour[tail[k].curve->kind % COLOURS], x.to + 6, at, colour[tail[k].curve->kind % COLOURS], x.to + 28, at + 4,
                     tail[k].curve->name);
             at += room;
         }
@@ -400,8 +426,10 @@ static void draw_list(const Chart *chart, const char *id, const char *title, con
         cJSON_ArrayForEach(row, chart->rows) {
             double value = number_at(row, keys);
             int kind = name_index(&chart->representations, text_at(row, "representation"));
-            if (kind >= 0 && fabs(value) >= x.low)
-                draw_mark(chart, "mark", row, place(&x, fabs(value)), begin + 22 * (kind + 0.5), value, unit);
+            if (kind < 0 || !(fabs(value) >= x.low))
+                continue;
+            draw_mark(chart, "mark", row, place(&x, fabs(value)), begin + 22 * (kind + 0.5), value, unit);
+            draw_lost(chart->out, row, "frictionless", place(&x, fabs(value)), begin + 22 * (kind + 0.5));
         }
     }
     close_panel(chart, filled, left, top);
@@ -429,7 +457,7 @@ static bool draw(const Chart *chart)
     draw_error(&panels, MARGIN, top, half);
     draw_growth(&panels, right, top, half);
     top += HALF_HEIGHT + 12;
-    draw_list(&panels, "friction", "Artificial friction with mu = 0, against the exact wall", "frictionless.artificial_mu",
+    draw_list(&panels, "friction", "Artificial friction with mu = 0", "frictionless.artificial_mu",
               "equivalent coefficient of friction", "", MARGIN, top, half);
     draw_list(&panels, "work", "Work lost along the wall with mu = 0", "frictionless.work_lost_n", "mJ a millimetre of slide (N)", "N", right, top, half);
     top += list_height(chart) + 8;

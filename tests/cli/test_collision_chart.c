@@ -193,7 +193,7 @@ static const char whole[] =
     "{\"surface\":\"a & b <c>\",\"representation\":\"mesh\",\"motion\":{\"us_per_80_points\":2500}},"
     "{\"surface\":\"capsule\",\"representation\":\"tube\",\"motion\":{\"us_per_80_points\":1.5,\"gap_error_um\":{\"rms\":0}},\"frictionless\":{\"artificial_mu\":0,"
     "\"work_lost_n\":null}},"
-    "{\"surface\":\"capsule\",\"representation\":\"grid\"}],"
+    "{\"surface\":\"capsule\",\"representation\":\"grid\",\"frictionless\":{\"artificial_mu\":0.5,\"survived\":false},\"paper\":{\"ms\":4.89}}],"
     "\"growth\":[{\"surface\":\"phantom\",\"search\":\"full\",\"triangles\":1000,\"ns_per_query\":{\"wire\":400,\"spread\":500}},"
     "{\"surface\":\"phantom\",\"search\":\"full\",\"triangles\":4000000,\"ns_per_query\":{\"wire\":900,\"spread\":3000}},"
     "{\"surface\":\"phantom\",\"search\":\"warm\",\"triangles\":1000,\"ns_per_query\":{\"wire\":300}},"
@@ -209,12 +209,13 @@ static void every_figure_has_its_mark(void **state)
     const Panel *detect = &page.panel[0], *error = &page.panel[1], *growth = &page.panel[2], *friction = &page.panel[3], *work = &page.panel[4];
     assert_int_equal(page.keys, 4 + 1);            // and that of a run that did not survive
     assert_int_equal(detect->marks, 4);
-    assert_int_equal(detect->papers, 2);
+    assert_int_equal(detect->papers, 2);           // the same figure of the same surface once
     assert_int_equal(detect->lost, 1);
     assert_int_equal(error->marks, 2);             // the tube's is 0, which no logarithm shows
     assert_int_equal(growth->dots, 2 + 2 + 1 + 2 + 2);
     assert_int_equal(growth->curves, 5);
-    assert_int_equal(friction->marks, 2);
+    assert_int_equal(friction->marks, 3);
+    assert_int_equal(friction->lost, 1);
     assert_int_equal(work->marks, 2);
     assert_non_null(strstr(detect->mark[2].title, "a & b <c>, mesh"));
     for (int k = 0; k < PANELS; k++)
