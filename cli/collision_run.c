@@ -230,9 +230,10 @@ bool collision_replay(const Vessel *wall, const CollisionMotion *motion, int rep
 // --- closed loop ---
 
 typedef struct Judge {       // where the wall truly is, asked outside of what is timed
-    const Vessel *wall, *truth;
+    const Vessel *wall, *truth, *truth_gap;
     int node_count;
-    VesselMemory *memory;    // (M) of the truth
+    VesselMemory *memory;    // (M) of the truth, for depths …
+    VesselMemory *work_memory;       // (M) … and for normals
     VesselMemory *wall_memory;       // (M)
     VesselHit *hit;          // (M)
     NodeReport *node;        // (M)
@@ -256,8 +257,8 @@ static double judge_depth(Judge *judge, const WireState *state, int first)
     double deepest = 0;
     int count = judge->node_count - first;
     follow_forget(judge->memory, first);
-    follow_locate(judge->truth, first, judge->node_count, state->position + first, judge->memory);
-    vessel_query(judge->truth, count, state->position + first, HUGE_VAL, judge->memory + first, judge->hit);
+    follow_locate(judge->truth_gap, first, judge->node_count, state->position + first, judge->memory);
+    vessel_query(judge->truth_gap, count, state->position + first, HUGE_VAL, judge->memory + first, judge->hit);
     for (int k = 0; k < count; k++)
         if (has_answer(&judge->hit[k]))
             deepest = fmax(deepest, judge->node[first + k].radius - judge->hit[k].gap);
@@ -283,11 +284,14 @@ static Vec3 force_in_step(const Judge *judge, int i, Vec3 d, VesselMemory *memor
 static void judge_work(Judge *judge, const WireState *state, int first)
 {
     follow_forget(judge->wall_memory, first);
+    follow_forget(judge->work_memory, first);
     for (int i = first; i < judge->node_count; i++) {
         if (!(vec3_norm2(judge->node[i].force) > 0) || judge->memory[i].node < 0)
             continue;
         VesselHit hit;
-        vessel_query(judge->truth, 1, &state->position[i], HUGE_VAL, &judge->memory[i], &hit);
+        if (judge->work_memory[i].node < 0)
+            judge->work_memory[i].node = judge->memory[i].node;
+        vessel_query(judge->truth, 1, &state->position[i], HUGE_VAL, &judge->work_memory[i], &hit);
         if (!has_answer(&hit))
             continue;
         Vec3 d = vec3_sub(state->position[i], judge->before[i]), along = vec3_add_scaled(d, -vec3_dot(d, hit.normal), hit.normal);
@@ -305,14 +309,20 @@ static void fail(CollisionLoop *out, int64_t step, const char *format, double va
     snprintf(out->why, sizeof out->why, format, value);
 }
 
-static bool judge_create(Judge *judge, const Vessel *wall, const Vessel *truth, int node_count)
+static bool judge_create(Judge *judge, int node_count)
 {
     size_t room = (size_t)node_count + 1;
-    *judge = (Judge){wall, truth, node_count, calloc(room, sizeof(VesselMemory)), calloc(room, sizeof(VesselMemory)), calloc(room, sizeof(VesselHit)),
-                     calloc(room, sizeof(NodeReport)), calloc(room, sizeof(Vec3)), 0, 0};
-    if (!judge->memory || !judge->wall_memory || !judge->hit || !judge->node || !judge->before)
+    judge->node_count = node_count;
+    judge->memory = calloc(room, sizeof *judge->memory);
+    judge->work_memory = calloc(room, sizeof *judge->work_memory);
+    judge->wall_memory = calloc(room, sizeof *judge->wall_memory);
+    judge->hit = calloc(room, sizeof *judge->hit);
+    judge->node = calloc(room, sizeof *judge->node);
+    judge->before = calloc(room, sizeof *judge->before);
+    if (!judge->memory || !judge->work_memory || !judge->wall_memory || !judge->hit || !judge->node || !judge->before)
         return false;
     follow_start(judge->memory, node_count);
+    follow_start(judge->work_memory, node_count);
     follow_start(judge->wall_memory, node_count);
     return true;
 }
@@ -320,6 +330,7 @@ static bool judge_create(Judge *judge, const Vessel *wall, const Vessel *truth, 
 static void judge_free(Judge *judge)
 {
     free(judge->memory);
+    free(judge->work_memory);
     free(judge->wall_memory);
     free(judge->hit);
     free(judge->node);
@@ -419,7 +430,8 @@ static Scene scene_for(const Scene *scene, const LoopOptions *o, WireSection *se
     return own;
 }
 
-bool collision_loop(const Scene *scene, const Vessel *wall, const Vessel *truth, const LoopOptions *o, CollisionLoop *out, Faults *faults)
+bool collision_loop(const Scene *scene, const Vessel *wall, const Vessel *truth, const Vessel *truth_gap, const LoopOptions *o, CollisionLoop *out,
+                    Faults *faults)
 {
     *out = (CollisionLoop){.failed_step = -1, .wanted = bench_steps(scene, o->most_steps)};
     WireSection *section = calloc((size_t)scene->wire.section_count + 1, sizeof *section);
@@ -429,8 +441,8 @@ bool collision_loop(const Scene *scene, const Vessel *wall, const Vessel *truth,
     }
     Scene own = scene_for(scene, o, section);
     Simulator *simulator = simulator_create(&own, wall, faults);
-    Judge judge = {0};
-    bool lacks = simulator && !judge_create(&judge, wall, truth, simulator_state(simulator)->node_count);
+    Judge judge = {.wall = wall, .truth = truth, .truth_gap = truth_gap};
+    bool lacks = simulator && !judge_create(&judge, simulator_state(simulator)->node_count);
     if (simulator && !lacks) {
         stepper_node_report(simulator_stepper(simulator), judge.node);
         lacks = o->record && !start_record(o->record, &judge);

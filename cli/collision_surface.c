@@ -118,6 +118,50 @@ static bool fit(CollisionSurface *s, double voxel_mm, int threads, Faults *fault
     return s->model != NULL;
 }
 
+// A shape's wall without curvature: half the time.
+typedef struct GapVessel {
+    Vessel vessel;           // first: a Vessel * to us is a GapVessel *
+    const Shape *shape;
+    const Vessel *whole;     // answers beyond open ends
+} GapVessel;
+
+static void gap_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
+{
+    const GapVessel *v = (const GapVessel *)vessel;
+    for (int i = 0; i < count; i++) {
+        Vec3 foot;
+        if (!vec3_is_finite(point[i]) || shape_beyond_open_end(v->shape, point[i])) {
+            vessel_query(v->whole, 1, &point[i], reach, &memory[i], &hit[i]);
+            continue;
+        }
+        hit[i] = (VesselHit){.gap = shape_distance(v->shape, point[i], &foot), .node = 0};
+        hit[i].normal = vec3_unit_or(vec3_scale(vec3_sub(point[i], foot), hit[i].gap), vec3(0, 0, 0));
+    }
+}
+
+static int gap_locate(const Vessel *vessel, Vec3 point, int from)
+{
+    const Vessel *whole = ((const GapVessel *)vessel)->whole;
+    return whole->locate(whole, point, from);
+}
+
+static bool gap_inlet(const Vessel *vessel, Vec3 *point, Vec3 *direction)
+{
+    const Vessel *whole = ((const GapVessel *)vessel)->whole;
+    return whole->inlet(whole, point, direction);
+}
+
+static void gap_destroy(Vessel *vessel) { free(vessel); }
+
+static Vessel *gap_vessel_create(const Shape *shape, const Vessel *whole)
+{
+    GapVessel *v = calloc(1, sizeof *v);
+    if (!v)
+        return NULL;
+    *v = (GapVessel){{.kind = "shape", .query = gap_query, .locate = gap_locate, .inlet = gap_inlet, .destroy = gap_destroy}, shape, whole};
+    return &v->vessel;
+}
+
 static bool open_source(CollisionSurface *s, Faults *faults)
 {
     Scene *scene = s->scene;
@@ -133,11 +177,13 @@ static bool open_source(CollisionSurface *s, Faults *faults)
         s->shape = shape_create(scene->shape_name, scene->shape_option_count, option, scene->path, faults);
         s->nodes = s->shape ? shape_sample(s->shape, faults) : NULL;
         s->exact = s->nodes ? shape_vessel_create(s->shape) : NULL;
+        s->gap_only = s->exact ? gap_vessel_create(s->shape, s->exact) : NULL;
         s->truth = s->exact;
+        s->truth_gap = s->gap_only;
         s->truth_is = "the shape's own distance";
-        if (s->nodes && !s->exact)
+        if (s->nodes && !s->gap_only)
             faults_add(faults, scene->path, 0, 0, "no memory for the shape's wall");
-        return s->exact != NULL;
+        return s->gap_only != NULL;
     }
     if (scene->source == SOURCE_MODEL) {
         s->model = tree_file_load(scene->model_path, NULL, faults);
@@ -177,13 +223,15 @@ bool collision_surface_open(const CollisionCase *of, int threads, CollisionSurfa
     }
     if (!out->truth)
         out->truth = out->lim;
+    if (!out->truth_gap)
+        out->truth_gap = out->truth;
     // where the tool comes in is the same for all
     return open_vessel_inlet(out->scene, &(OpenVessel){.vessel = out->scene->source == SOURCE_TUBE ? out->exact : out->lim}, faults);
 }
 
 void collision_surface_close(CollisionSurface *s)
 {
-    Vessel *owned[] = {s->exact, s->lim};
+    Vessel *owned[] = {s->gap_only, s->exact, s->lim};
     for (size_t i = 0; i < sizeof owned / sizeof owned[0]; i++)
         if (owned[i])
             owned[i]->destroy(owned[i]);
@@ -199,18 +247,50 @@ void collision_surface_close(CollisionSurface *s)
 
 // --- representations ---
 
-TriangleMesh *collision_mesh(const CollisionSurface *s, double triangles, CollisionMesh *out, Faults *faults)
+static TriangleMesh *mesh_of(const CollisionSurface *s, const Vessel *wall, double cell_mm, Faults *faults)
 {
     bool open_end = s->scene->source == SOURCE_TUBE && !s->of->convolution_capsule && !s->scene->tube.closed_ends;
+    return contact_surface_mesh(wall, s->nodes, open_end, cell_mm, s->of->name, faults);
+}
+
+// Moves all vertices onto the wall, to 1e-9 mm. False where one would go further than half a cell, or does not get there.
+static bool project(TriangleMesh *mesh, const Vessel *wall, double cell_mm)
+{
+    enum { ROUNDS = 20 };
+    for (int v = 0; v < mesh->vertex_count; v++) {
+        Vec3 x = mesh->vertex[v];
+        VesselMemory memory = {.node = wall->locate(wall, x, -1)};
+        VesselHit hit = {.gap = HUGE_VAL};
+        for (int round = 0; round < ROUNDS && !(fabs(hit.gap) < 1e-9); round++) {
+            vessel_query(wall, 1, &x, HUGE_VAL, &memory, &hit);
+            if (!isfinite(hit.gap) || !(fabs(hit.gap) < cell_mm / 2))
+                return false;
+            x = vec3_add_scaled(x, -hit.gap, hit.normal);
+        }
+        if (!(fabs(hit.gap) < 1e-9) || vec3_distance(x, mesh->vertex[v]) > cell_mm / 2)
+            return false;
+        mesh->vertex[v] = x;
+        mesh->normal[v] = vec3_negate(hit.normal);
+    }
+    return true;
+}
+
+TriangleMesh *collision_mesh(const CollisionSurface *s, double triangles, CollisionMesh *out, Faults *faults)
+{
+    const Vessel *wall = s->shape ? s->lim : s->truth;
     double trial = triangles / TRIAL;
     out->cell_mm = contact_surface_cell(s->nodes, trial);
-    TriangleMesh *mesh = contact_surface_mesh(s->truth, s->nodes, open_end, out->cell_mm, s->of->name, faults);
+    TriangleMesh *mesh = mesh_of(s, wall, out->cell_mm, faults);
     if (!mesh)
         return NULL;
     out->cell_mm *= sqrt(mesh->triangle_count / triangles);
     triangle_mesh_free(mesh);
     double begin = collision_build_clock_s();
-    mesh = contact_surface_mesh(s->truth, s->nodes, open_end, out->cell_mm, s->of->name, faults);
+    mesh = mesh_of(s, wall, out->cell_mm, faults);
+    if (mesh && wall != s->truth && !project(mesh, s->truth, out->cell_mm)) {
+        triangle_mesh_free(mesh);
+        mesh = mesh_of(s, s->truth, out->cell_mm, faults);
+    }
     out->made_s = collision_build_clock_s() - begin;
     return mesh;
 }
@@ -231,6 +311,7 @@ static bool add_mesh(const CollisionSurface *s, CollisionWalls *walls, const Tri
         MeshNormals normals;
         MeshSearch search;
     } kinds[] = {{"mesh full", MESH_FACES, MESH_SEARCH_FULL}, {"mesh warm", MESH_FACES, MESH_SEARCH_WARM}, {"mesh cached", MESH_FACES, MESH_SEARCH_CACHED},
+                 {"mesh curved", MESH_CURVED, MESH_SEARCH_CACHED},
                  {"mesh smooth", MESH_SMOOTH, MESH_SEARCH_CACHED}};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
         MeshVesselOptions options = mesh_vessel_default_options();
@@ -257,7 +338,7 @@ static bool add_grid(const CollisionSurface *s, CollisionWalls *walls, const Tri
         tool = fmax(tool, s->scene->wire.section[i].diameter / 2);
     GridVesselOptions options = {.cell_mm = cell, .band_mm = fmax(BAND_CELLS * cell, tool + BAND_BEYOND_TOOL)};
     double begin = collision_build_clock_s();
-    Vessel *grid = grid_vessel_create(s->truth, mesh, &options, s->of->name, faults);
+    Vessel *grid = grid_vessel_create(s->truth_gap, mesh, &options, s->of->name, faults);
     if (!grid)
         return false;
     CollisionWall *wall = add_wall(walls, "grid", grid, true);

@@ -5,7 +5,7 @@
 #include "cli/cli.h"
 #include "recon/phantom.h"
 
-enum { SURFACE_MESHES = 3, WALLS_MOST = 5 + 4 * SURFACE_MESHES };
+enum { SURFACE_MESHES = 3, WALLS_MOST = 4 + 5 * SURFACE_MESHES };
 
 typedef struct PaperRow {    // Kerrien 2017, Table 6
     double ms;               // 0: the table has no such row
@@ -24,6 +24,7 @@ typedef struct CollisionSurface {
     const CollisionCase *of;
     Scene *scene;
     const Vessel *truth;             // where the wall is
+    const Vessel *truth_gap;         // the same without curvature, sooner answered
     const char *truth_is;            // in words
     bool truth_is_model;             // the local models themselves: there is no other truth
     VesselTree *nodes;               // centres, radii and samples: what was fitted, and where the wall is looked for
@@ -31,7 +32,7 @@ typedef struct CollisionSurface {
     double fit_s;                    // CPU time of the fit; NAN where the model came from a file
     double length_mm;                // of the centreline
     // owned
-    Vessel *exact, *lim;
+    Vessel *exact, *lim, *gap_only;
     VesselTree *exact_tree;
     Shape *shape;
 } CollisionSurface;
@@ -42,7 +43,7 @@ void collision_surface_close(CollisionSurface *surface);
 
 // One representation of the wall.
 typedef struct CollisionWall {
-    const char *name;        // "exact", "lim", "lim-switch", "mesh full", "mesh warm", "mesh cached", "mesh smooth", "grid"
+    const char *name;        // "exact", "lim", "lim-switch", "mesh full", "mesh warm", "mesh cached", "mesh curved", "mesh smooth", "grid"
     const Vessel *vessel;
     int triangles;           // of a mesh; 0
     int mesh;                // which of the case's meshes; -1
@@ -63,7 +64,8 @@ bool collision_walls_open(const CollisionSurface *surface, CollisionWalls *out, 
 void collision_walls_close(CollisionWalls *walls);
 const CollisionWall *collision_wall_find(const CollisionWalls *walls, const char *name, int mesh);   // NULL: not there
 
-// A mesh of the surface's wall with about `triangles` triangles: a coarse one tells the cell. NULL with a fault.
+// A mesh of the true wall with about `triangles` triangles: a coarse one tells the cell. A shape's is that of the local models, every vertex moved onto the
+// shape (asking the shape itself at each point of a lattice takes ten times as long). NULL with a fault.
 typedef struct CollisionMesh {
     double cell_mm, made_s;  // CPU time, of the mesh alone
 } CollisionMesh;
