@@ -10,7 +10,7 @@
 //
 // Hessian of the gap. Faces: 0. An edge with direction t is a cylinder and a vertex a sphere of radius |gap| about it: (I - n n' - t t') / gap and
 // (I - n n') / gap. Inside these are the convex edges that a wire bends round (of concave ones no point inside is the closest); they are positive, as at any
-// convex wall, and say how the normal turns when the wire slides on. MESH_SMOOTH: with vertex normals n_i and the barycentric coordinates b_i of p the
+// convex wall, and say how the normal turns when the wire slides on. MESH_SMOOTH and MESH_CURVED: with vertex normals n_i and the barycentric coordinates b_i of p the
 // normal is N / |N|, N = sum b_i n_i, and S = sym(P sum n_i grad(b_i)' P), P = I - n n'; at X it is S (I + gap S)^-1.
 #include "geom/mesh_vessel.h"
 
@@ -49,6 +49,7 @@ typedef struct MeshVessel {
     Vec3 *vertex;            // (V)
     Vec3 *vertex_normal;     // (V) pseudonormal, of no special length; all normals point into the lumen
     Vec3 *smooth_normal;     // (V) unit; NULL with MESH_FACES
+    Sym3 *bend;              // (T) [1/mm] derivative of the interpolated normal over the triangle, symmetrised; NULL with MESH_FACES
     bool *on_rim;            // (V)
     int *keeper;             // (V) the lowest triangle at the vertex
     int (*corner)[3];        // (T)
@@ -73,7 +74,7 @@ typedef struct Foot {
     double weight[3];        // barycentric coordinates
 } Foot;
 
-static Foot closest_of_triangle(const MeshVessel *m, int triangle, Vec3 x)
+static void closest_of_triangle(const MeshVessel *m, int triangle, Vec3 x, Foot *foot)
 {
     const int *corner = m->corner[triangle];
     Vec3 v[3] = {m->vertex[corner[0]], m->vertex[corner[1]], m->vertex[corner[2]]}, n = m->face[triangle], q[3], e[3];
@@ -86,23 +87,29 @@ static Foot closest_of_triangle(const MeshVessel *m, int triangle, Vec3 x)
     }
     if (beyond[0] <= 0 && beyond[1] <= 0 && beyond[2] <= 0 && all < 0) {
         double height = vec3_dot(n, q[0]);
-        return (Foot){.p = vec3_add_scaled(x, -height, n), .distance2 = height * height, .feature = ON_FACE,
-                      .weight = {beyond[1] / all, beyond[2] / all, beyond[0] / all}};
+        foot->p = vec3_add_scaled(x, -height, n);
+        foot->distance2 = height * height;
+        foot->feature = ON_FACE;
+        for (int k = 0; k < 3; k++)
+            foot->weight[k] = beyond[(k + 1) % 3] / all;
+        return;
     }
-    Foot best = {.distance2 = HUGE_VAL};
+    foot->distance2 = HUGE_VAL;
     for (int k = 0; k < 3; k++) {
         int next = (k + 1) % 3;
         double t = vec3_dot(q[k], e[k]) / vec3_norm2(e[k]);
         t = t > 0 ? t < 1 ? t : 1 : 0;
         Vec3 p = t < 1 ? vec3_add_scaled(v[k], t, e[k]) : v[next];
         double d2 = vec3_norm2(vec3_sub(x, p));
-        if (d2 < best.distance2) {
-            best = (Foot){.p = p, .distance2 = d2, .feature = t <= 0 ? ON_VERTEX + k : t >= 1 ? ON_VERTEX + next : ON_EDGE + k};
-            best.weight[k] = 1 - t;
-            best.weight[next] = t;
-        }
+        if (!(d2 < foot->distance2))
+            continue;
+        foot->p = p;
+        foot->distance2 = d2;
+        foot->feature = t <= 0 ? ON_VERTEX + k : t >= 1 ? ON_VERTEX + next : ON_EDGE + k;
+        foot->weight[k] = 1 - t;
+        foot->weight[next] = t;
+        foot->weight[3 - k - next] = 0;
     }
-    return best;
 }
 
 // --- The search ---
@@ -210,10 +217,10 @@ static int closest_triangle(const MeshVessel *m, Vec3 x, int from, Foot *foot)
         look_at(&s, m->group_of[from]);
     if (from < 0 || !m->around || !search_around(&s))
         search_tree(&s);
-    *foot = closest_of_triangle(m, s.triangle, x);
+    closest_of_triangle(m, s.triangle, x, foot);
     int keeper = keeper_of(m, s.triangle, foot->feature);
     if (keeper != s.triangle)
-        *foot = closest_of_triangle(m, keeper, x);
+        closest_of_triangle(m, keeper, x, foot);
     return keeper;
 }
 
@@ -264,93 +271,88 @@ static Sym3 facet_hessian(const MeshVessel *m, int triangle, const Foot *foot, d
 static Sym3 smooth_hessian(const MeshVessel *m, int triangle, double gap, Vec3 normal)
 {
     static const double LEAST_STRETCH = 0.1;     // of I + gap S, which ends at the wall's focal points
-    const int *corner = m->corner[triangle];
-    Vec3 u = vec3_normal_to(normal), w = vec3_cross(normal, u);
-    double uu = 0, uw = 0, ww = 0;
-    for (int k = 0; k < 3; k++) {
-        Vec3 side = vec3_sub(m->vertex[corner[(k + 2) % 3]], m->vertex[corner[(k + 1) % 3]]), n = m->smooth_normal[corner[k]];
-        // the coordinate's gradient: across the opposite side, 1 over the height
-        Vec3 gradient = vec3_cross(side, m->face[triangle]);
-        gradient = vec3_scale(gradient, 1 / vec3_dot(gradient, vec3_sub(m->vertex[corner[k]], m->vertex[corner[(k + 1) % 3]])));
-        double nu = vec3_dot(n, u), nw = vec3_dot(n, w), gu = vec3_dot(gradient, u), gw = vec3_dot(gradient, w);
-        uu += nu * gu;
-        uw += 0.5 * (nu * gw + nw * gu);
-        ww += nw * gw;
-    }
+    const Sym3 *bend = &m->bend[triangle];
+    Vec3 u = vec3_normal_to(normal), w = vec3_cross(normal, u), bend_u = sym3_mul_vec(bend, u);
+    double uu = vec3_dot(u, bend_u), uw = vec3_dot(w, bend_u), ww = sym3_quadratic(bend, w);
     // k -> k / (1 + gap k) for both principal curvatures
-    double mean = 0.5 * (uu + ww), half = hypot(0.5 * (uu - ww), uw), k1 = mean + half, k2 = mean - half;
+    double mean = 0.5 * (uu + ww), half = sqrt(0.25 * (uu - ww) * (uu - ww) + uw * uw), k1 = mean + half, k2 = mean - half;
     k1 /= fmax(1 + gap * k1, LEAST_STRETCH);
     k2 /= fmax(1 + gap * k2, LEAST_STRETCH);
     double part = half > 0 ? 0.5 * (k1 - k2) / half : 0;
     mean = 0.5 * (k1 + k2) - part * mean;
     uu = mean + part * uu, ww = mean + part * ww, uw *= part;
     Sym3 h = {0, 0, 0, 0, 0, 0};
-    Vec3 both = vec3_add(u, w);
     add_outer(&h, uu - uw, u);
     add_outer(&h, ww - uw, w);
-    add_outer(&h, uw, both);
+    add_outer(&h, uw, vec3_add(u, w));
     return h;
 }
 
 // [rad] beyond it no smooth wall is meant.
 static const double TURN_MAX = 0.5;
 
-static VesselHit hit_of(const MeshVessel *m, Vec3 x, int from)
+static void set_hit(const MeshVessel *m, Vec3 x, int from, VesselHit *hit)
 {
     Foot foot;
     int triangle = closest_triangle(m, x, from, &foot);
-    VesselHit hit = {.node = triangle};
+    hit->node = triangle;
     Vec3 away = vec3_sub(x, foot.p), pseudo = pseudonormal(m, triangle, foot.feature);
     double d = sqrt(foot.distance2), tiny = 1e-9 * m->size;
-    if (is_on_rim(m, triangle, foot.feature) && d > tiny)
-        return (VesselHit){.gap = HUGE_VAL, .node = triangle, .flags = VESSEL_OPEN_END};
-    hit.gap = vec3_dot(away, pseudo) < 0 ? -d : d;
-    hit.normal = foot.feature == ON_FACE ? pseudo : d > tiny ? vec3_scale(away, 1 / hit.gap) : vec3_unit(pseudo);
+    if (is_on_rim(m, triangle, foot.feature) && d > tiny) {
+        hit->gap = HUGE_VAL;
+        hit->flags = VESSEL_OPEN_END;
+        return;
+    }
+    hit->gap = vec3_dot(away, pseudo) < 0 ? -d : d;
+    hit->normal = foot.feature == ON_FACE ? pseudo : d > tiny ? vec3_scale(away, 1 / hit->gap) : vec3_unit(pseudo);
     if (m->options.normals == MESH_FACES) {
-        hit.hessian = facet_hessian(m, triangle, &foot, hit.gap, hit.normal);
-        return hit;
+        hit->hessian = facet_hessian(m, triangle, &foot, hit->gap, hit->normal);
+        return;
     }
-    if (m->options.normals == MESH_CURVED) {
-        hit.hessian = smooth_hessian(m, triangle, hit.gap, hit.normal);
-        return hit;
+    if (m->options.normals == MESH_SMOOTH) {
+        const int *corner = m->corner[triangle];
+        Vec3 sum = {0, 0, 0};
+        for (int k = 0; k < 3; k++)
+            sum = vec3_add_scaled(sum, foot.weight[k], m->smooth_normal[corner[k]]);
+        hit->normal = vec3_unit_or(sum, hit->normal);
     }
-    const int *corner = m->corner[triangle];
-    Vec3 sum = {0, 0, 0};
-    for (int k = 0; k < 3; k++)
-        sum = vec3_add_scaled(sum, foot.weight[k], m->smooth_normal[corner[k]]);
-    hit.normal = vec3_unit_or(sum, hit.normal);
-    hit.hessian = smooth_hessian(m, triangle, hit.gap, hit.normal);
+    hit->hessian = smooth_hessian(m, triangle, hit->gap, hit->normal);
+    if (m->options.normals == MESH_CURVED)
+        return;
     // X lies over p along the face's normal; where it would along the smooth one the wall has turned by H (X - p)
-    Vec3 turn = sym3_mul_vec(&hit.hessian, away);
-    hit.normal = vec3_unit(vec3_add_scaled(hit.normal, TURN_MAX / fmax(vec3_norm(turn), TURN_MAX), turn));
-    return hit;
+    Vec3 turn = sym3_mul_vec(&hit->hessian, away);
+    hit->normal = vec3_unit(vec3_add_scaled(hit->normal, TURN_MAX / fmax(vec3_norm(turn), TURN_MAX), turn));
 }
 
 static bool is_known(const MeshVessel *m, int triangle) { return triangle >= 0 && triangle < m->triangle_count; }
 
-static VesselHit query_one(const MeshVessel *m, Vec3 point, double reach, VesselMemory *memory)
+static void query_one(const MeshVessel *m, Vec3 point, double reach, VesselMemory *memory, VesselHit *hit)
 {
-    if (!(vec3_norm2(point) < 1e200))
-        return (VesselHit){.node = memory->node, .flags = VESSEL_UNSURE};
+    *hit = (VesselHit){.node = memory->node};
+    if (!(vec3_norm2(point) < 1e200)) {
+        hit->flags = VESSEL_UNSURE;
+        return;
+    }
     bool knows = is_known(m, memory->node) && m->options.search != MESH_SEARCH_FULL;
     if (knows && memory->clearance > 0) {
         double bound = memory->clearance - vec3_distance(point, memory->clear_place);
-        if (bound > reach)
-            return (VesselHit){.gap = bound, .node = memory->node, .flags = VESSEL_FAR};
+        if (bound > reach) {
+            hit->gap = bound;
+            hit->flags = VESSEL_FAR;
+            return;
+        }
     }
-    Vec3 x = vec3_sub(point, m->middle);
-    VesselHit hit = hit_of(m, x, knows ? memory->node : -1);
-    memory->node = hit.node;
+    set_hit(m, vec3_sub(point, m->middle), knows ? memory->node : -1, hit);
+    memory->node = hit->node;
     // the distance changes by no more than the point moves
-    memory->clearance = hit.gap < HUGE_VAL ? fmax(0, hit.gap * (1 - 1e-12)) : 0;
+    memory->clearance = hit->gap > 0 && hit->gap < HUGE_VAL ? hit->gap * (1 - 1e-12) : 0;
     memory->clear_place = point;
-    return hit;
 }
 
 static void mesh_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
     for (int i = 0; i < count; i++)
-        hit[i] = query_one((const MeshVessel *)vessel, point[i], reach, &memory[i]);
+        query_one((const MeshVessel *)vessel, point[i], reach, &memory[i], &hit[i]);
 }
 
 static int mesh_locate(const Vessel *vessel, Vec3 point, int from)
@@ -385,6 +387,7 @@ static void mesh_destroy(Vessel *vessel)
     free(m->vertex);
     free(m->vertex_normal);
     free(m->smooth_normal);
+    free(m->bend);
     free(m->on_rim);
     free(m->keeper);
     free(m->corner);
@@ -521,6 +524,25 @@ static void set_normals(MeshVessel *m, const TriangleMesh *mesh)
     }
     for (int v = 0; m->smooth_normal && v < m->vertex_count; v++)
         m->smooth_normal[v] = vec3_unit(mesh->normal ? vec3_negate(mesh->normal[v]) : m->vertex_normal[v]);
+}
+
+static void set_bends(MeshVessel *m)
+{
+    for (int t = 0; t < m->triangle_count; t++) {
+        const int *corner = m->corner[t];
+        Sym3 sum = {0, 0, 0, 0, 0, 0};
+        for (int k = 0; k < 3; k++) {
+            Vec3 a = m->vertex[corner[(k + 1) % 3]], side = vec3_sub(m->vertex[corner[(k + 2) % 3]], a), n = m->smooth_normal[corner[k]];
+            // the barycentric coordinate's gradient: across the opposite side, 1 over the height
+            Vec3 g = vec3_cross(side, m->face[t]);
+            g = vec3_scale(g, 1 / vec3_dot(g, vec3_sub(m->vertex[corner[k]], a)));
+            // sym(n g') = ((n + g)(n + g)' - n n' - g g') / 2
+            add_outer(&sum, 0.5, vec3_add(n, g));
+            add_outer(&sum, -0.5, n);
+            add_outer(&sum, -0.5, g);
+        }
+        m->bend[t] = sum;
+    }
 }
 
 static bool count_bytes(void *mesh, ssize_t bytes, bool post)
@@ -695,13 +717,14 @@ static bool copy_mesh(MeshVessel *m, const TriangleMesh *mesh)
     m->vertex = malloc(vertices * sizeof *m->vertex);
     m->vertex_normal = calloc(vertices, sizeof *m->vertex_normal);
     m->smooth_normal = m->options.normals != MESH_FACES ? malloc(vertices * sizeof *m->smooth_normal) : NULL;
+    m->bend = m->options.normals != MESH_FACES ? malloc(triangles * sizeof *m->bend) : NULL;
     m->on_rim = calloc(vertices, sizeof *m->on_rim);
     m->keeper = malloc(vertices * sizeof *m->keeper);
     m->corner = malloc(triangles * sizeof *m->corner);
     m->across = malloc(triangles * sizeof *m->across);
     m->face = malloc(triangles * sizeof *m->face);
-    if (!m->vertex || !m->vertex_normal || (m->options.normals != MESH_FACES && !m->smooth_normal) || !m->on_rim || !m->keeper || !m->corner || !m->across ||
-        !m->face)
+    if (!m->vertex || !m->vertex_normal || (m->options.normals != MESH_FACES && (!m->smooth_normal || !m->bend)) || !m->on_rim || !m->keeper || !m->corner ||
+        !m->across || !m->face)
         return false;
     memcpy(m->corner, mesh->triangle, triangles * sizeof *m->corner);
     for (int t = mesh->triangle_count - 1; t >= 0; t--)
@@ -733,6 +756,8 @@ Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *op
         return NULL;
     }
     set_normals(m, mesh);
+    if (m->bend)
+        set_bends(m);
     if (!set_groups(m)) {
         faults_add(faults, name, 0, 0, "no memory for a mesh of %d triangles", mesh->triangle_count);
         mesh_destroy(&m->vessel);
@@ -747,12 +772,13 @@ Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *op
         mesh_destroy(&m->vessel);
         return NULL;
     }
+    static const char *const kind[] = {[MESH_FACES] = "flat mesh", [MESH_CURVED] = "mesh", [MESH_SMOOTH] = "smooth mesh"};
     size_t vertices = (size_t)m->vertex_count, triangles = (size_t)m->triangle_count;
-    m->vessel = (Vessel){.kind = options->normals == MESH_SMOOTH ? "smooth mesh" : "mesh", .query = mesh_query, .locate = mesh_locate, .inlet = mesh_inlet,
+    m->vessel = (Vessel){.kind = kind[options->normals], .query = mesh_query, .locate = mesh_locate, .inlet = mesh_inlet,
                          .destroy = mesh_destroy, .primitives = m->triangle_count};
     size_t each_group = sizeof *m->group + (m->around ? sizeof *m->around : 0);
     size_t each_vertex = sizeof *m->vertex + sizeof *m->vertex_normal + sizeof *m->on_rim + sizeof *m->keeper + (m->smooth_normal ? sizeof(Vec3) : 0);
-    size_t each_triangle = sizeof *m->corner + sizeof *m->across + sizeof *m->face + sizeof *m->group_of;
+    size_t each_triangle = sizeof *m->corner + sizeof *m->across + sizeof *m->face + sizeof *m->group_of + (m->bend ? sizeof *m->bend : 0);
     m->vessel.bytes = sizeof *m + (size_t)m->tree_bytes + (size_t)m->group_count * each_group + vertices * each_vertex + triangles * each_triangle;
     return &m->vessel;
 }

@@ -435,7 +435,7 @@ static void moves_with_the_mesh(void **state)
     for (int way = 0; way < 3; way++) {
         Vec3 by = way == 1 ? vec3(480, -20, 115) : vec3(0, 0, 0);
         Quat turn = way == 2 ? quat_identity() : q;
-        for (int normals = 0; normals < 2; normals++) {
+        for (int normals = MESH_FACES; normals <= MESH_SMOOTH; normals++) {
             TriangleMesh m = shape_mesh(1), moved = shape_mesh(1);
             mesh_move(&moved, turn, by, way == 2);
             Vessel *v = vessel_of(&m, MESH_SEARCH_CACHED, (MeshNormals)normals), *w = vessel_of(&moved, MESH_SEARCH_CACHED, (MeshNormals)normals);
