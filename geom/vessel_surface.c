@@ -89,12 +89,13 @@ static void put_questions(VesselMarch *job, double reach)
     vessel_query(job->vessel, job->ask.count, job->ask.point, reach, job->ask.memory, job->ask.hit);
 }
 
-// Asks x, which is lattice point `of`, from all balls of the block within `margin` of it that lead to other nodes than those that were asked before.
-static void ask_others(VesselMarch *job, const MarchBlock *b, int of, Vec3 x, double margin, int first_node)
+// Asks x, which is lattice point `of`, from all balls of the block within `margin` of it that lead to other nodes than those that were asked before. False
+// where there is no room for all.
+static bool ask_others(VesselMarch *job, const MarchBlock *b, int of, Vec3 x, double margin, int first_node)
 {
     enum { NODES_MAX = 16 };
     int asked[NODES_MAX] = {first_node}, count = 1;
-    for (int l = b->first; l >= 0 && count < NODES_MAX && job->ask.count < MARCH_POINTS; l = job->march.link[l].next) {
+    for (int l = b->first; l >= 0; l = job->march.link[l].next) {
         int n = job->march.link[l].ball, k = 0;
         double most = job->reach[n] + margin;
         if (!(vec3_norm2(vec3_sub(x, job->center[n])) < most * most))
@@ -104,9 +105,12 @@ static void ask_others(VesselMarch *job, const MarchBlock *b, int of, Vec3 x, do
             k++;
         if (k < count)
             continue;
+        if (count == NODES_MAX || job->ask.count == MARCH_POINTS)
+            return false;
         asked[count++] = node;
         add_question(job, of, n, x, node);
     }
+    return true;
 }
 
 static bool block_is_plain(VesselMarch *job, const MarchBlock *b)
@@ -114,9 +118,8 @@ static bool block_is_plain(VesselMarch *job, const MarchBlock *b)
     double h;
     Vec3 middle = march_block_ball(&job->march, b, &h);
     job->ask.count = 0;
-    ask_others(job, b, 0, middle, h + MARGIN * job->march.cell, -1);
+    bool all_out = ask_others(job, b, 0, middle, h + MARGIN * job->march.cell, -1);
     put_questions(job, 1.01 * h);
-    bool all_out = true;
     for (int n = 0; n < job->ask.count; n++) {
         const VesselHit *hit = &job->ask.hit[n];
         if (hit->flags & VESSEL_OPEN_END)
