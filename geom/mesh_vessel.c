@@ -631,7 +631,8 @@ static GroupMiddle middle_of(const MeshVessel *m, const TriangleGroup *g)
     for (int i = 0; i < 3 * GROUP_TRIANGLES; i++)
         middle.place = vec3_add_scaled(middle.place, 1.0 / (3 * GROUP_TRIANGLES), m->vertex[m->corner[g->triangle[i / 3]][i % 3]]);
     for (int i = 0; i < 3 * GROUP_TRIANGLES; i++)
-        middle.radius = fmax(middle.radius, vec3_distance(middle.place, m->vertex[m->corner[g->triangle[i / 3]][i % 3]]));
+        middle.radius = fmax(middle.radius, vec3_norm2(vec3_sub(middle.place, m->vertex[m->corner[g->triangle[i / 3]][i % 3]])));
+    middle.radius = sqrt(middle.radius);
     return middle;
 }
 
@@ -669,11 +670,15 @@ static void gather_near(const MeshVessel *m, int group, const GroupMiddle *middl
 static void blow_balls(const MeshVessel *m, const GroupMiddle *middle, GroupSurroundings *around)
 {
     double touching = 0.75 * middle->radius;
+    int before = -1;
     around->balls = 0;
     for (int i = 0; i < GROUP_BALLS; i++, touching *= 2) {
         double most = touching + 2 * middle->radius;         // room for points that have gone further is of no use
         Search s = {.mesh = m, .x = vec3_add_scaled(middle->place, touching, around->axis[2]), .distance2 = most * most, .triangle = -1, .without = around};
+        if (before >= 0)
+            look_at(&s, m->group_of[before]);
         search_tree(&s);
+        before = s.triangle;
         double radius = sqrt(s.distance2) * (1 - 1e-9) - 1e-9 * m->size;
         if (!(radius > touching))
             return;          // larger ones would have to hold this one

@@ -70,7 +70,7 @@ void group_order(int triangle_count, const Vec3 *centroid, int *order);
 // Is the group certainly further from x than the root of distance2? size: the largest coordinate of the mesh [mm].
 static inline bool group_is_beyond(const TriangleGroup *group, Vec3 x, double distance2, double size)
 {
-    double height = vec3_dot(x, group->facing), out = fmax(group->low - height, height - group->high);
+    double height = vec3_dot(x, group->facing), under = group->low - height, over = height - group->high, out = under > over ? under : over;
     out -= 1e-12 * (fabs(x.x) + fabs(x.y) + fabs(x.z) + size);
     return out > 0 && out * out > distance2;
 }
