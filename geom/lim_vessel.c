@@ -17,6 +17,7 @@
 // asked at X + (zeta(z) - z) d instead of at X: zeta = z downstream of h = r / 2, 0 upstream of -h, with a continuous second derivative between. So the
 // section at the root goes on upstream as a cylinder for ever, and wall, normal and Hessian are smooth across the plane.
 #include "geom/foot_lanes.h"
+#include "geom/power_blocks.h"
 #include "geom/power_walk.h"
 #include "geom/vessel.h"
 
@@ -46,6 +47,7 @@ typedef struct LimVessel {
     BlobGroup *group;        // all nodes' groups
     NearGroup *near;
     NodeModel *model;        // (N)
+    PowerBlocks blocks;      // for points without a node
     bool inlet_open;         // the root is an end of the tree
 } LimVessel;
 
@@ -563,6 +565,12 @@ static bool collect_partners(const LimVessel *lim, const NodeModel *m, int group
     return own;
 }
 
+static int walk(const LimVessel *lim, Vec3 x, int from, int hops)
+{
+    bool known = from >= 0 && from < lim->tree->node_count;
+    return known ? power_walk(lim->tree, x, from, hops) : power_blocks_nearest(&lim->blocks, x);
+}
+
 // The point's node and its partners.
 static int follow(const LimVessel *lim, Vec3 x, int node, Lane *of)
 {
@@ -574,7 +582,7 @@ static int follow(const LimVessel *lim, Vec3 x, int node, Lane *of)
         if (collect_partners(lim, m, at_home ? m->near_groups : m->all_near, y, of) && at_home)
             return node;
     }
-    int next = power_walk(tree, x, node, lim->options.hops);
+    int next = walk(lim, x, node, lim->options.hops);
     if (next != node)
         collect_partners(lim, &lim->model[next], lim->model[next].all_near, vec3_sub(x, lim->model[next].center), of);
     return next;
@@ -719,7 +727,7 @@ static void lim_query(const Vessel *vessel, int count, const Vec3 *point, double
 static int lim_locate(const Vessel *vessel, Vec3 point, int from)
 {
     const LimVessel *lim = (const LimVessel *)vessel;
-    return power_walk(lim->tree, point, from, INT_MAX);
+    return walk(lim, point, from, INT_MAX);
 }
 
 static bool lim_inlet(const Vessel *vessel, Vec3 *point, Vec3 *direction)
@@ -738,6 +746,7 @@ static void lim_destroy(Vessel *vessel)
     free(lim->group);
     free(lim->near);
     free(lim->model);
+    power_blocks_free(&lim->blocks);
     free(lim);
 }
 
@@ -923,12 +932,14 @@ Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *o
     lim->group = aligned_alloc(BLOB_GROUP_ALIGNMENT, groups * sizeof *lim->group);
     lim->near = aligned_alloc(BLOB_GROUP_ALIGNMENT, (near + 1) * sizeof *lim->near);
     lim->model = calloc((size_t)tree->node_count, sizeof *lim->model);
-    if (!lim->group || !lim->near || !lim->model) {
+    if (!power_blocks_create(&lim->blocks, tree) || !lim->group || !lim->near || !lim->model) {
         lim_destroy(&lim->vessel);
         return NULL;
     }
     size_t of_node = sizeof *lim->model + 2 * sizeof(Vec3) + sizeof(double) + sizeof(uint8_t) + 2 * sizeof(int), links = (size_t)tree->near_offset[tree->node_count];
-    lim->vessel.bytes = sizeof *lim + groups * sizeof *lim->group + near * sizeof *lim->near + (size_t)tree->node_count * of_node + links * sizeof *tree->near;
+    for (int level = 0; level < lim->blocks.levels; level++)
+        lim->vessel.bytes += (size_t)lim->blocks.count[level] * sizeof(PowerBox);
+    lim->vessel.bytes += sizeof *lim + groups * sizeof *lim->group + near * sizeof *lim->near + (size_t)tree->node_count * of_node + links * sizeof *tree->near;
     fill_models(lim);
     lim->inlet_open = vessel_tree_root_is_open(tree);
     carry_inlet(lim);

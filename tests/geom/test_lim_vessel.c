@@ -2,6 +2,7 @@
 // points that must not be called far, ways back from outside, the inlet, motion and mirroring of the scene, the wall's jump between nodes.
 #include "blob_tube.h"
 #include "geom/foot_lanes.h"
+#include "geom/power_blocks.h"
 #include "geom/power_walk.h"
 #include "geom/simd.h"
 #include "geom/vessel.h"
@@ -564,6 +565,71 @@ static void far_is_far_in_a_taper(void **state)
     vessel_tree_free(t);
 }
 
+// The boxes find what a look at every node finds, of equals the first; whatever is asked.
+static void nearest_through_boxes(void **state)
+{
+    (void)state;
+    static const int sizes[] = {1, 2, 16, 17, 256, 257, 5000};
+    uint64_t seed = 31;
+    for (int s = 0; s < 7; s++) {
+        VesselTree *t = vessel_tree_create(sizes[s], 0, 0);
+        for (int i = 0; i < sizes[s]; i++) {
+            bool leap = i == 0 || random_in(&seed, 0, 1) < 0.05;   // branches
+            t->center[i] = leap ? random_in_box(&seed, 50) : vec3_add(t->center[i - 1], random_in_box(&seed, 1));
+            t->radius[i] = random_in(&seed, 0, 1) < 0.01 ? 12 : random_in(&seed, 0.1, 3);
+            if (i > 0 && random_in(&seed, 0, 1) < 0.1)
+                t->center[i] = t->center[i / 2], t->radius[i] = t->radius[i / 2];
+        }
+        PowerBlocks blocks;
+        assert_true(power_blocks_create(&blocks, t));
+        for (int trial = 0; trial < 2000; trial++) {
+            Vec3 x = trial % 3 == 0 ? t->center[trial % sizes[s]] : random_in_box(&seed, trial % 3 == 1 ? 60 : 1e4);
+            assert_int_equal(power_blocks_nearest(&blocks, x), power_nearest(t, x));
+        }
+        static const double bad[] = {NAN, INFINITY, -INFINITY, 1e200, 1e70};
+        for (int i = 0; i < 5; i++)
+            assert_int_equal(power_blocks_nearest(&blocks, vec3(0, bad[i], 1)), power_nearest(t, vec3(0, bad[i], 1)));
+        power_blocks_free(&blocks);
+        vessel_tree_free(t);
+    }
+}
+
+// Within a node's ball the few planes that are kept for it say what all near nodes say: points go where power_walk sends them. On a vessel that bends and
+// changes its width, with a branch.
+static void planes_against_walk(void **state)
+{
+    (void)state;
+    enum { TRUNK = 50, ALL = 70 };
+    VesselTree *t = vessel_tree_create(ALL, 0, ALL);
+    uint64_t seed = 37;
+    for (int i = 0; i < ALL; i++) {
+        bool trunk = i < TRUNK;
+        double s = 0.4 * (trunk ? i : i - TRUNK + 1);
+        t->parent[i] = i == TRUNK ? 25 : i - 1;
+        t->center[i] = trunk ? vec3(3 * cos(0.3 * s), 3 * sin(0.3 * s), 0.2 * s) : vec3_add(t->center[25], vec3(0.2 * s, 0.3 * s, s));
+        t->center[i] = vec3_add(t->center[i], random_in_box(&seed, 0.05));
+        t->radius[i] = (trunk ? 1 : 0.6) * random_in(&seed, 0.8, 1.2);
+        t->direction[i] = vec3(0, 0, 1);
+        t->blob_center[i] = t->center[i];
+        t->blob_width[i] = blob_width_for_radius(t->radius[i], 0.1);
+        t->blob_offset[i + 1] = i + 1;
+    }
+    vessel_tree_link(t);
+    Vessel *v = make(t, LIM_BLEND, 0);
+    int moved = 0;
+    for (int trial = 0; trial < 20000; trial++) {
+        int node = 1 + trial % (ALL - 1), hops = lim_vessel_default_options().hops;
+        Vec3 x = vec3_add_scaled(t->center[node], t->radius[node] * random_in(&seed, 0, 1.19), random_unit(&seed));
+        int walked = power_walk(t, x, node, hops), asked = ask(v, x, node, 0.5).node;
+        double d = power_distance(x, t->center[walked], t->radius[walked]) - power_distance(x, t->center[asked], t->radius[asked]);
+        assert_true(asked == walked || fabs(d) < 1e-5);   // planes are of single precision
+        moved += asked != node;
+    }
+    assert_true(moved > 5000);
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
 static double now_us(void)
 {
     struct timespec t;
@@ -671,7 +737,8 @@ int main(void)
         cmocka_unit_test(gaps_against_slow_projection), cmocka_unit_test(derivatives_of_the_gap), cmocka_unit_test(back_from_outside),
         cmocka_unit_test(inlet_is_open), cmocka_unit_test(moved_and_mirrored_scenes), cmocka_unit_test(blend_has_no_jump),
         cmocka_unit_test(nodes_without_blobs), cmocka_unit_test(another_wall_comes_closer),
-        cmocka_unit_test(far_is_far_in_a_taper), cmocka_unit_test(near_the_axis), cmocka_unit_test(cost),
+        cmocka_unit_test(far_is_far_in_a_taper), cmocka_unit_test(nearest_through_boxes), cmocka_unit_test(planes_against_walk),
+        cmocka_unit_test(near_the_axis), cmocka_unit_test(cost),
     };
     return cmocka_run_group_tests_name("lim_vessel", tests, NULL, NULL);
 }

@@ -1,0 +1,99 @@
+#include "geom/power_blocks.h"
+#include "geom/power_walk.h"
+
+#include <stdlib.h>
+
+static Vec3 least(Vec3 a, Vec3 b) { return vec3(fmin(a.x, b.x), fmin(a.y, b.y), fmin(a.z, b.z)); }
+static Vec3 most(Vec3 a, Vec3 b) { return vec3(fmax(a.x, b.x), fmax(a.y, b.y), fmax(a.z, b.z)); }
+
+static PowerBox box_of(const PowerBlocks *blocks, int level, int i)
+{
+    if (level >= 0)
+        return blocks->box[level][i];
+    const VesselTree *tree = blocks->tree;
+    return (PowerBox){tree->center[i], tree->center[i], tree->radius[i]};
+}
+
+bool power_blocks_create(PowerBlocks *blocks, const VesselTree *tree)
+{
+    *blocks = (PowerBlocks){.tree = tree};
+    size_t all = 0;
+    for (int n = tree->node_count; n > 1 && blocks->levels < POWER_LEVELS; blocks->levels++) {
+        n = (n - 1) / POWER_BLOCK + 1;
+        blocks->count[blocks->levels] = n;
+        all += (size_t)n;
+    }
+    PowerBox *box = calloc(all + 1, sizeof *box);
+    blocks->box[0] = box;
+    if (!box)
+        return false;
+    for (int level = 0, below = tree->node_count; level < blocks->levels; below = blocks->count[level++]) {
+        blocks->box[level] = box;
+        for (int i = 0; i < blocks->count[level]; i++) {
+            PowerBox b = box_of(blocks, level - 1, POWER_BLOCK * i);
+            for (int k = POWER_BLOCK * i + 1; k < POWER_BLOCK * (i + 1) && k < below; k++) {
+                PowerBox other = box_of(blocks, level - 1, k);
+                b = (PowerBox){least(b.low, other.low), most(b.high, other.high), fmax(b.radius, other.radius)};
+            }
+            *box++ = b;
+        }
+    }
+    return true;
+}
+
+void power_blocks_free(PowerBlocks *blocks)
+{
+    free(blocks->box[0]);
+    *blocks = (PowerBlocks){0};
+}
+
+// No node of the box has less, rounding included.
+static double bound(const PowerBox *b, Vec3 x)
+{
+    Vec3 out = most(most(vec3_sub(b->low, x), vec3_sub(x, b->high)), vec3(0, 0, 0));
+    double far2 = vec3_norm2(out), r2 = b->radius * b->radius;
+    return far2 - r2 - 1e-14 * (far2 + r2);
+}
+
+typedef struct Best {
+    double distance;
+    int node;
+} Best;
+
+// Looks through a box, its sub-boxes in the order of the tree; of equal nodes the first counts.
+static void look(const PowerBlocks *blocks, int level, int i, Vec3 x, Best *best)
+{
+    const VesselTree *tree = blocks->tree;
+    int below = level > 0 ? blocks->count[level - 1] : tree->node_count;
+    for (int k = POWER_BLOCK * i; k < POWER_BLOCK * (i + 1) && k < below; k++) {
+        if (level > 0) {
+            if (bound(&blocks->box[level - 1][k], x) <= best->distance)
+                look(blocks, level - 1, k, x, best);
+            continue;
+        }
+        double d = power_distance(x, tree->center[k], tree->radius[k]);
+        if (d < best->distance || (d == best->distance && k < best->node))
+            *best = (Best){d, k};
+    }
+}
+
+int power_blocks_nearest(const PowerBlocks *blocks, Vec3 x)
+{
+    const VesselTree *tree = blocks->tree;
+    Best best = {power_distance(x, tree->center[0], tree->radius[0]), 0};
+    int at = 0;
+    for (int level = blocks->levels - 2; level >= 0; level--) {   // a good one first: down the most promising boxes
+        double least_bound = HUGE_VAL;
+        int first = POWER_BLOCK * at;
+        for (int k = first; k < first + POWER_BLOCK && k < blocks->count[level]; k++) {
+            double b = bound(&blocks->box[level][k], x);
+            at = b < least_bound ? k : k == first ? first : at;
+            least_bound = fmin(b, least_bound);
+        }
+    }
+    if (blocks->levels > 0) {
+        look(blocks, 0, at, x, &best);
+        look(blocks, blocks->levels - 1, 0, x, &best);
+    }
+    return best.node;
+}
