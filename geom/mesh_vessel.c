@@ -5,13 +5,17 @@
 // of boxes is in float and only says where to look, with a radius that is wider than the rounding of box and point (see widened()).
 // Of triangles equally close the one with the lowest index is taken.
 //
+// A search looks at groups of eight triangles, which lie together and are computed together. From nothing, Embree's tree of the groups' boxes leads to them.
+// From the last triangle, its group gives a distance that bounds the tree's search; and with the group's surroundings (triangle_groups.h, where the proof
+// stands) no search is needed mostly: all that can be closer is in the neighbourhood, or in none.
+//
 // Sign: (X - p) . N, N the pseudonormal of the feature that holds p: face; edge: sum of its two faces' normals; vertex: sum of its faces' normals, each
 // weighted by its angle there (Baerentzen and Aanaes 2005, who prove that this is right for every closed mesh).
 //
 // Hessian of the gap. Faces: 0. An edge with direction t is a cylinder and a vertex a sphere of radius |gap| about it: (I - n n' - t t') / gap and
-// (I - n n') / gap. Inside these are the convex edges that a wire bends round (of concave ones no point inside is the closest); they are positive, as at any
-// convex wall, and say how the normal turns when the wire slides on. MESH_SMOOTH and MESH_CURVED: with vertex normals n_i and the barycentric coordinates b_i of p the
-// normal is N / |N|, N = sum b_i n_i, and S = sym(P sum n_i grad(b_i)' P), P = I - n n'; at X it is S (I + gap S)^-1.
+// (I - n n') / gap. Inside these are the convex edges that a wire bends round (of concave ones no point inside is the closest); they are positive, as at
+// any convex wall, and say how the normal turns when the wire slides on. MESH_SMOOTH and MESH_CURVED: with vertex normals n_i and the barycentric
+// coordinates b_i of p the normal is N / |N|, N = sum b_i n_i, and S = sym(P sum n_i grad(b_i)' P), P = I - n n'; at X it is S (I + gap S)^-1.
 #include "geom/mesh_vessel.h"
 
 MeshVesselOptions mesh_vessel_default_options(void) { return (MeshVesselOptions){.search = MESH_SEARCH_CACHED}; }
@@ -29,6 +33,7 @@ Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *op
 
 #else
 
+#include "geom/disjoint_sets.h"
 #include "geom/tree_surface.h"
 #include "geom/triangle_groups.h"
 
@@ -454,8 +459,6 @@ static bool check_edges(const TriangleMesh *mesh, const char *name, Faults *faul
     if (census.turned_edges > 0)
         faults_add(faults, name, 0, 0, "at %lld edges of the mesh two neighbours face opposite ways; triangles that all face out of the lumen are valid",
                    (long long)census.turned_edges);
-    if (faults->count == before && census.volume < 0)
-        faults_add(faults, name, 0, 0, "the mesh faces into the lumen (it encloses %g mm3); triangles that face out of it are valid", census.volume);
     return faults->count == before;
 }
 
@@ -506,6 +509,51 @@ static bool link_triangles(MeshVessel *m)
     }
     free(first);
     free(side);
+    return good;
+}
+
+typedef struct Hull {        // of the mesh with each rim closed by a fan about its middle
+    double volume, wall, caps;       // [mm3], [mm2]
+} Hull;
+
+static void add_to_hull(Hull *hull, double *area, Vec3 a, Vec3 b, Vec3 c)
+{
+    hull->volume += vec3_dot(a, vec3_cross(b, c)) / 6;
+    *area += 0.5 * vec3_norm(vec3_cross(vec3_sub(b, a), vec3_sub(c, a)));
+}
+
+// False where memory lacks.
+static bool measure_hull(const MeshVessel *m, Hull *hull)
+{
+    size_t room = (size_t)m->vertex_count + 1;
+    int *rim = malloc(room * sizeof *rim), *count = calloc(room, sizeof *count);
+    Vec3 *sum = calloc(room, sizeof *sum);
+    bool good = rim && count && sum;
+    *hull = (Hull){0, 0, 0};
+    for (int v = 0; good && v < m->vertex_count; v++)
+        rim[v] = v;
+    // first the rims are joined, then their middles found, then the fans added
+    for (int pass = 0; good && pass < 3; pass++)
+        for (int i = 0; i < 3 * m->triangle_count; i++) {
+            const int *c = m->corner[i / 3];
+            int from = c[i % 3], to = c[(i + 1) % 3];
+            if (pass == 2 && i % 3 == 0)
+                add_to_hull(hull, &hull->wall, m->vertex[c[0]], m->vertex[c[1]], m->vertex[c[2]]);
+            if (m->across[i / 3][i % 3] >= 0)
+                continue;
+            int root = disjoint_root(rim, from);
+            if (pass == 0) {
+                disjoint_join(rim, from, to);
+            } else if (pass == 1) {
+                sum[root] = vec3_add(sum[root], vec3_mix(m->vertex[from], m->vertex[to], 0.5));
+                count[root]++;
+            } else {
+                add_to_hull(hull, &hull->caps, m->vertex[to], m->vertex[from], vec3_scale(sum[root], 1.0 / count[root]));
+            }
+        }
+    free(rim);
+    free(count);
+    free(sum);
     return good;
 }
 
@@ -753,28 +801,28 @@ Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *op
     if (!check_triangles(mesh, name, faults) || !check_edges(mesh, name, faults))
         return NULL;
     MeshVessel *m = calloc(1, sizeof *m);
+    Hull hull;
     if (m)
         m->options = *options;
-    if (!m || !copy_mesh(m, mesh) || !link_triangles(m)) {
+    bool good = m && copy_mesh(m, mesh) && link_triangles(m) && measure_hull(m, &hull), faces_out = true;
+    if (good) {
+        faces_out = hull.volume >= 0 || hull.caps > 0.5 * hull.wall;     // of a mere patch nobody knows
+        set_normals(m, mesh);
+        if (m->bend)
+            set_bends(m);
+        good = set_groups(m);
+    }
+    if (!good)
         faults_add(faults, name, 0, 0, "no memory for a mesh of %d triangles", mesh->triangle_count);
+    else if (!faces_out)
+        faults_add(faults, name, 0, 0, "the mesh faces into the lumen (it encloses %g mm3); triangles that face out of it are valid", hull.volume);
+    good = good && faces_out && build_tree(m, name, faults);
+    if (good && options->search == MESH_SEARCH_CACHED && !set_surroundings(m)) {
+        faults_add(faults, name, 0, 0, "no memory for a mesh of %d triangles", mesh->triangle_count);
+        good = false;
+    }
+    if (!good) {
         mesh_destroy(m ? &m->vessel : NULL);
-        return NULL;
-    }
-    set_normals(m, mesh);
-    if (m->bend)
-        set_bends(m);
-    if (!set_groups(m)) {
-        faults_add(faults, name, 0, 0, "no memory for a mesh of %d triangles", mesh->triangle_count);
-        mesh_destroy(&m->vessel);
-        return NULL;
-    }
-    if (!build_tree(m, name, faults)) {
-        mesh_destroy(&m->vessel);
-        return NULL;
-    }
-    if (options->search == MESH_SEARCH_CACHED && !set_surroundings(m)) {
-        faults_add(faults, name, 0, 0, "no memory for a mesh of %d triangles", mesh->triangle_count);
-        mesh_destroy(&m->vessel);
         return NULL;
     }
     static const char *const kind[] = {[MESH_FACES] = "flat mesh", [MESH_CURVED] = "mesh", [MESH_SMOOTH] = "smooth mesh"};

@@ -42,7 +42,7 @@ MeshVesselOptions mesh_vessel_default_options(void);
 bool mesh_vessel_available(void);
 // Copies what it needs of the mesh. Triangles must face out of the lumen. NULL with a fault: no Embree; no triangle; an index out of range, a coordinate that
 // is not finite or 1e9 mm and more; a triangle without area (thinner than 1e-12 of its length); an edge of three triangles or more; two neighbours that face
-// opposite ways; a mesh that faces inwards as a whole (surface_census's volume < 0). `name` stands in messages.
+// opposite ways; a mesh that faces inwards as a whole (it and flat lids on its rims enclose a volume < 0). `name` stands in messages.
 Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *options, const char *name, Faults *faults);
 
 #endif

@@ -1,5 +1,5 @@
-// The squared distance of a point to a triangle: height over its plane, and in the plane, unless within, to the nearest side. One text, compiled for each instruction set;
-// with -fno-math-errno and -fno-trapping-math, which change no result, so that the selects vectorise.
+// The squared distance of a point to a triangle: height over its plane, and in the plane, unless within, to the nearest side. One text, compiled for each
+// instruction set, with -fno-math-errno and -fno-trapping-math, which change no result, so that the selects vectorise.
 #include "geom/triangle_groups.h"
 
 #include "geom/simd.h"

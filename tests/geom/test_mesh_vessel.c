@@ -488,6 +488,25 @@ static void beyond_a_rim_there_is_no_wall(void **state)
     mesh_clear(&m);
 }
 
+// A wide mouth that a long thin vessel leaves: the cone from its rim to the far one holds more than the vessel. It faces outwards all the same.
+static void a_funnel_is_no_inside_out(void **state)
+{
+    (void)state;
+    need_embree();
+    TriangleMesh m = mesh_room(4 * 16, 6 * 16);
+    const double x[4] = {0, 3, 6, 200}, radius[4] = {12, 12, 0.5, 0.5};
+    for (int j = 0; j < 4; j++) {
+        for (int i = 0; i < 16; i++)
+            mesh_vertex(&m, vec3(x[j], radius[j] * cos(PI * i / 8), radius[j] * sin(PI * i / 8)), vec3(0, cos(PI * i / 8), sin(PI * i / 8)));
+        if (j > 0)
+            mesh_join_rings(&m, 16 * (j - 1), 16 * j, 16);
+    }
+    Vessel *v = vessel_of(&m, MESH_SEARCH_CACHED, MESH_FACES);
+    assert_near(ask_afresh(v, vec3(100, 0, 0)).gap, 0.5 * cos(PI / 16), 1e-12);
+    v->destroy(v);
+    mesh_clear(&m);
+}
+
 static void points_that_are_none(void **state)
 {
     (void)state;
@@ -697,6 +716,14 @@ static void bad_meshes_are_refused(void **state)
         m.vertex[v].x = -m.vertex[v].x;
     refused(&m, "faces into the lumen");
     mesh_clear(&m);
+    // an open one, inside out
+    TriangleMesh tube = bent_tube_mesh(0.5, 0, 4, 1, 0, 0, 0.1, 24);
+    for (int i = 0; i < tube.triangle_count; i++) {
+        int b = tube.triangle[i][1];
+        tube.triangle[i][1] = tube.triangle[i][2], tube.triangle[i][2] = b;
+    }
+    refused(&tube, "faces into the lumen");
+    mesh_clear(&tube);
     // a fin on an edge; a triangle twice
     for (int twice = 0; twice < 2; twice++) {
         TriangleMesh full = sphere_mesh(3), more = mesh_room(full.vertex_count + 1, full.triangle_count + 1);
@@ -732,6 +759,7 @@ int main(void)
                                        cmocka_unit_test(far_points_are_bounded), cmocka_unit_test(sign_is_right_at_edges_and_corners),
                                        cmocka_unit_test(derivatives_are_the_gaps), cmocka_unit_test(converges_to_exact_shapes),
                                        cmocka_unit_test(moves_with_the_mesh), cmocka_unit_test(beyond_a_rim_there_is_no_wall),
+                                       cmocka_unit_test(a_funnel_is_no_inside_out),
                                        cmocka_unit_test(points_that_are_none), cmocka_unit_test(points_on_the_mesh),
                                        cmocka_unit_test(says_what_it_holds), cmocka_unit_test(every_instruction_set_gives_the_same_bits),
                                        cmocka_unit_test(threads_do_not_disturb_each_other), cmocka_unit_test(bad_meshes_are_refused),
