@@ -21,13 +21,18 @@ enum {
     IS_OUTSIDE = 0, IS_INSIDE, IS_OPEN, IS_HELD,     // values of the map; from IS_HELD on: 3 + the block
 };
 
+typedef struct GridBlock {
+    int base[3];
+    float value[POINTS];
+} GridBlock;
+
 typedef struct GridVessel {
     Vessel vessel;           // first: a Vessel * to us is a GridVessel *
     GridVesselOptions options;
     int low[3], high[3];     // blocks that are known lie between, high included
     KeyMap state_of;
     int block_count;
-    float (*value)[POINTS];
+    GridBlock *block;
 } GridVessel;
 
 static uint64_t key_of(int64_t i, int64_t j, int64_t k)
@@ -55,11 +60,11 @@ static double interpolate(const float *value, double u, double v, double w, Vec3
 }
 
 // Beyond all blocks: what is next to there goes on.
-static int state_beside(const GridVessel *grid, const double block[3])
+static int state_beside(const GridVessel *grid, const int block[3])
 {
-    int64_t at[3];
+    int at[3];
     for (int a = 0; a < 3; a++)
-        at[a] = (int64_t)fmin(fmax(block[a], grid->low[a]), grid->high[a]);
+        at[a] = block[a] < grid->low[a] ? grid->low[a] : block[a] > grid->high[a] ? grid->high[a] : block[a];
     int state = key_map_find(&grid->state_of, key_of(at[0], at[1], at[2]));
     return state == IS_INSIDE || state == IS_OPEN ? IS_OPEN : IS_OUTSIDE;
 }
@@ -75,18 +80,22 @@ static VesselHit hit_outside(const GridVessel *grid, VesselMemory *memory)
 static VesselHit hit_at(const GridVessel *grid, Vec3 x, double reach, VesselMemory *memory)
 {
     double away = memory->clearance - reach;
-    memory->node = 0;
     if (away > 0 && vec3_norm2(vec3_sub(x, memory->clear_place)) < away * away)
         return (VesselHit){.gap = memory->clearance - vec3_distance(x, memory->clear_place), .flags = VESSEL_FAR};
     if (!vec3_is_finite(x))
         return (VesselHit){.flags = VESSEL_UNSURE};
-    double scale = 1 / (BLOCK * grid->options.cell_mm), at[3] = {x.x * scale, x.y * scale, x.z * scale}, block[3];
+    double scale = 1 / (BLOCK * grid->options.cell_mm), at[3] = {x.x * scale, x.y * scale, x.z * scale};
+    int block[3];
     bool beyond = false;
     for (int a = 0; a < 3; a++) {
-        block[a] = floor(at[a]);
+        // rounds down, without a call
+        double in = at[a] > -BLOCK_MAX ? at[a] < BLOCK_MAX ? at[a] : BLOCK_MAX : -BLOCK_MAX;
+        block[a] = (int)in - (in < (int)in);
         beyond = beyond || block[a] < grid->low[a] || block[a] > grid->high[a];
     }
-    int state = beyond ? state_beside(grid, block) : key_map_find(&grid->state_of, key_of((int64_t)block[0], (int64_t)block[1], (int64_t)block[2]));
+    int state = IS_HELD + memory->node;      // mostly the block of before
+    if (memory->node < 0 || memory->node >= grid->block_count || memcmp(grid->block[memory->node].base, block, sizeof block) != 0)
+        state = beyond ? state_beside(grid, block) : key_map_find(&grid->state_of, key_of(block[0], block[1], block[2]));
     if (state == IS_OPEN) {
         memory->clearance = 0;
         return (VesselHit){.gap = HUGE_VAL, .flags = VESSEL_OPEN_END};
@@ -99,7 +108,8 @@ static VesselHit hit_at(const GridVessel *grid, Vec3 x, double reach, VesselMemo
     if (state < IS_HELD)
         return hit_outside(grid, memory);
     Vec3 gradient;
-    double gap = interpolate(grid->value[state - IS_HELD], BLOCK * (at[0] - block[0]), BLOCK * (at[1] - block[1]), BLOCK * (at[2] - block[2]), &gradient);
+    memory->node = state - IS_HELD;
+    double gap = interpolate(grid->block[memory->node].value, BLOCK * (at[0] - block[0]), BLOCK * (at[1] - block[1]), BLOCK * (at[2] - block[2]), &gradient);
     if (gap < -grid->options.band_mm)
         return hit_outside(grid, memory);
     memory->clearance = 0.7 * gap;           // interpolated distances may fall a little faster than the way
@@ -140,7 +150,7 @@ static void grid_destroy(Vessel *vessel)
     if (!grid)
         return;
     key_map_free(&grid->state_of);
-    free(grid->value);
+    free(grid->block);
     free(grid);
 }
 
@@ -182,8 +192,8 @@ static bool check_options(const GridVesselOptions *o, const TriangleMesh *surfac
     for (int v = 0; v < surface->vertex_count && faults->count == before; v++) {
         Vec3 p = surface->vertex[v];
         if (!(vec3_is_finite(p) && fmax(fabs(p.x), fmax(fabs(p.y), fabs(p.z))) < most))
-            faults_add(faults, name, 0, 0, "grid: vertex %d is at (%g, %g, %g) mm; coordinates below %g mm are valid with cells of %g mm", v, p.x, p.y, p.z, most,
-                       o->cell_mm);
+            faults_add(faults, name, 0, 0, "grid: vertex %d is at (%g, %g, %g) mm; coordinates below %g mm are valid with cells of %g mm", v, p.x, p.y,
+                       p.z, most, o->cell_mm);
     }
     for (int t = 0; t < surface->triangle_count && faults->count == before; t++)
         for (int k = 0; k < 3; k++)
@@ -358,9 +368,10 @@ static bool sample_block(Making *m, int b)
     double cell = m->grid->options.cell_mm, band = m->grid->options.band_mm;
     if (!ask_from(m, b))
         return false;
+    memcpy(m->grid->block[b].base, m->base[b], sizeof *m->base);
     vessel_query(m->exact, POINTS, m->point, band + 2 * BLOCK * cell, m->memory, m->hit);
     for (int i = 0; i < POINTS; i++)
-        m->grid->value[b][i] = (float)(m->hit[i].flags & VESSEL_OPEN_END ? band : m->hit[i].gap);
+        m->grid->block[b].value[i] = (float)(m->hit[i].flags & VESSEL_OPEN_END ? band : m->hit[i].gap);
     return true;
 }
 
@@ -435,8 +446,8 @@ static bool fill_grid(Making *m)
     GridVessel *grid = m->grid;
     if (!hold_blocks(m) || !list_vertices(m))
         return false;
-    grid->value = malloc((size_t)grid->block_count * sizeof *grid->value);
-    bool good = grid->value != NULL;
+    grid->block = malloc((size_t)grid->block_count * sizeof *grid->block);
+    bool good = grid->block != NULL;
     for (int b = 0; good && b < grid->block_count; b++)
         good = sample_block(m, b);
     return good && flood(m);
@@ -468,13 +479,13 @@ Vessel *grid_vessel_create(const Vessel *exact, const TriangleMesh *surface, con
         free(m);
     }
     if (!good) {
-        faults_add(faults, name, 0, 0, "grid: cells of %g mm with a band of %g mm need more memory than there is, or more than %d blocks; larger cells are valid",
+        faults_add(faults, name, 0, 0, "grid: cells of %g mm with a band of %g mm need more memory than there is, or over %d blocks; larger cells are valid",
                    options->cell_mm, options->band_mm, (int)BLOCKS_MAX);
         if (grid)
             grid_destroy(&grid->vessel);
         return NULL;
     }
     grid->vessel.primitives = (int64_t)grid->block_count * POINTS;
-    grid->vessel.bytes = sizeof *grid + (size_t)grid->block_count * sizeof *grid->value + grid->state_of.capacity * (sizeof(uint64_t) + sizeof(int));
+    grid->vessel.bytes = sizeof *grid + (size_t)grid->block_count * sizeof *grid->block + grid->state_of.capacity * (sizeof(uint64_t) + sizeof(int));
     return &grid->vessel;
 }

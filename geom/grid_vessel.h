@@ -2,7 +2,8 @@
 // Only blocks of the lattice near the wall hold values (a narrow band); those deeper inside say so, those outside too.
 //
 // gap: the interpolated distance, of second order in the cell. (Over the length of its gradient, as for other fields: of first order, eight times the error at
-// cells of r / 10.) normal: the gradient's direction, of first order, which steps at the faces of cells. hessian: 0. Queries need no node: locate answers 0.
+// cells of r / 10.) normal: the gradient's direction, of first order, which steps at the faces of cells. hessian: 0. node: 0, and so says locate; what a
+// point remembers as its node is its block.
 // Further inside than the blocks near the wall: VESSEL_FAR, with the band as a bound even where `reach` is more. Further outside than the band:
 // VESSEL_UNSURE, gap minus the band, the last normal the point had (0 where it had none).
 // Open ends: where `exact` says so at the middle of a block, VESSEL_OPEN_END; beyond the lattice a point is out of an open end where the block next to it is

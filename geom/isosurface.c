@@ -11,6 +11,7 @@
 #include "geom/sparse_march.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 typedef struct NodeReach {
     int node;
@@ -206,6 +207,36 @@ TriangleMesh *isosurface_of_model(const VesselTree *tree, int node, double cell_
 TriangleMesh *isosurface_of_tree(const VesselTree *tree, double cell_mm)
 {
     return tree ? surface_of_nodes(tree, 0, tree->node_count, cell_mm) : NULL;
+}
+
+bool triangle_mesh_keep(TriangleMesh *mesh, const bool *keep)
+{
+    int *renamed = malloc(((size_t)mesh->vertex_count + 1) * sizeof *renamed), vertices = 0, triangles = 0;
+    if (!renamed)
+        return false;
+    memset(renamed, 0xff, (size_t)mesh->vertex_count * sizeof *renamed);
+    for (int t = 0; t < mesh->triangle_count; t++)
+        for (int k = 0; keep[t] && k < 3; k++)
+            renamed[mesh->triangle[t][k]] = 0;
+    for (int v = 0; v < mesh->vertex_count; v++) {
+        if (renamed[v] < 0)
+            continue;
+        renamed[v] = vertices;
+        mesh->vertex[vertices] = mesh->vertex[v];
+        mesh->normal[vertices] = mesh->normal[v];
+        mesh->node[vertices++] = mesh->node[v];
+    }
+    for (int t = 0; t < mesh->triangle_count; t++) {
+        if (!keep[t])
+            continue;
+        for (int k = 0; k < 3; k++)
+            mesh->triangle[triangles][k] = renamed[mesh->triangle[t][k]];
+        triangles++;
+    }
+    mesh->vertex_count = vertices;
+    mesh->triangle_count = triangles;
+    free(renamed);
+    return true;
 }
 
 void triangle_mesh_free(TriangleMesh *mesh)

@@ -34,6 +34,8 @@ TriangleMesh *isosurface_of_vessel(const Vessel *vessel, int count, const Vec3 *
 // The same surface finer: each triangle in four, new vertices moved onto the wall from the middles of edges. NULL where memory ends or there would be more
 // than 5e8 triangles.
 TriangleMesh *triangle_mesh_refine(const TriangleMesh *mesh, const Vessel *vessel);
+// Keeps the triangles for which keep[t], and the vertices that they use, in their order. False, with the mesh as it was, where memory lacks.
+bool triangle_mesh_keep(TriangleMesh *mesh, const bool *keep);
 // A cell size for looking: about twenty cells round the thinnest branch, coarser (to ten) where that would take more than some 300,000 triangles.
 double isosurface_cell_for(const VesselTree *tree);
 void triangle_mesh_free(TriangleMesh *mesh);

@@ -367,32 +367,6 @@ static void drop_scraps(const TriangleMesh *mesh, bool *keep, const int *ends, i
         keep[t] = keep[t] && is_whole[disjoint_root(part, mesh->triangle[t][0])];
 }
 
-// Keeps the triangles for which keep[t], and the vertices they use, in their order.
-static void keep_triangles(TriangleMesh *mesh, const bool *keep, int *renamed)
-{
-    int vertices = 0, triangles = 0;
-    memset(renamed, 0xff, (size_t)mesh->vertex_count * sizeof *renamed);
-    for (int t = 0; t < mesh->triangle_count; t++)
-        for (int k = 0; keep[t] && k < 3; k++)
-            renamed[mesh->triangle[t][k]] = 0;
-    for (int v = 0; v < mesh->vertex_count; v++) {
-        if (renamed[v] < 0)
-            continue;
-        renamed[v] = vertices;
-        mesh->vertex[vertices] = mesh->vertex[v];
-        mesh->normal[vertices] = mesh->normal[v];
-        mesh->node[vertices++] = mesh->node[v];
-    }
-    for (int t = 0; t < mesh->triangle_count; t++)
-        if (keep[t]) {
-            for (int k = 0; k < 3; k++)
-                mesh->triangle[triangles][k] = renamed[mesh->triangle[t][k]];
-            triangles++;
-        }
-    mesh->vertex_count = vertices;
-    mesh->triangle_count = triangles;
-}
-
 // What lies outside the balls goes, then what hangs on by a single vertex of the rim, then scraps. False where memory lacks.
 static bool trim(VesselMarch *job)
 {
@@ -423,7 +397,7 @@ static bool trim(VesselMarch *job)
     }
     if (open && good) {
         drop_scraps(mesh, keep, ends, other, is_bad);
-        keep_triangles(mesh, keep, other);
+        good = triangle_mesh_keep(mesh, keep);
     }
     free(is_bad);
     free(keep);

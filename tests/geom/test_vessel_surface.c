@@ -43,7 +43,8 @@ static void cover_tube(Tube *tube, const TubeOptions *o, double spacing, double 
             double s = length * k / steps, angle = piece->angle > 0 ? s / R : 0;
             t = vec3_add_scaled(vec3_scale(along, cos(angle)), sin(angle), across);
             n = vec3_add_scaled(vec3_scale(across, cos(angle)), -sin(angle), along);
-            p = piece->angle > 0 ? vec3_add_scaled(vec3_add_scaled(from, R * sin(angle), along), R * (1 - cos(angle)), across) : vec3_add_scaled(from, s, along);
+            p = piece->angle > 0 ? vec3_add_scaled(vec3_add_scaled(from, R * sin(angle), along), R * (1 - cos(angle)), across)
+                                 : vec3_add_scaled(from, s, along);
             assert_true(tube->count < BALLS_MAX);
             tube->center[tube->count] = p;
             tube->reach[tube->count++] = cover * o->radius;
@@ -440,7 +441,8 @@ static void thin_beside_wide_is_whole(void **state)
     (void)state;
     const int from[3] = {0, 1, 2};
     for (int swapped = 0; swapped < 2; swapped++) {
-        Balls balls = {.vessel = {.query = balls_query, .locate = balls_locate}, .count = 3, .center = {{0, 0, 0}, {0, 3.2, 0}, {0, 0, 20}}, .radius = {2.5, 0.5, 1}};
+        Balls balls = {.vessel = {.query = balls_query, .locate = balls_locate}, .count = 3, .center = {{0, 0, 0}, {0, 3.2, 0}, {0, 0, 20}},
+                       .radius = {2.5, 0.5, 1}};
         if (swapped) {
             balls.center[0] = vec3(0, 3.2, 0), balls.radius[0] = 0.5;
             balls.center[1] = vec3(0, 0, 0), balls.radius[1] = 2.5;
@@ -470,7 +472,8 @@ static void kissing_legs_stay_apart(void **state)
 {
     (void)state;
     TubePiece piece[3] = {{4, 0, 0, 0}, {0, 1.1, PI, 0}, {4, 0, 0, 0}};
-    TubeOptions o = {.start = {0.1, 0.2, 0.3}, .direction = {0.3, 1, 0.2}, .normal = {1, 0, 0.4}, .radius = 1, .piece_count = 3, .piece = piece, .closed_ends = true};
+    TubeOptions o = {.start = {0.1, 0.2, 0.3}, .direction = {0.3, 1, 0.2}, .normal = {1, 0, 0.4}, .radius = 1, .piece_count = 3, .piece = piece,
+                     .closed_ends = true};
     Tube *tube = make_tube(&o);
     TriangleMesh *mesh = mesh_of(tube, 0.1);
     check_closed(mesh, 1);

@@ -203,7 +203,8 @@ static void shapes_as_triangles(void **state)
         const char *name;
         int rims;            // open ends
         double cell, radius; // the thinnest
-    } cases[] = {{"capsule", 0, 0.2, 1}, {"open-capsule", 2, 0.2, 1}, {"arc", 2, 0.25, 1}, {"y", 3, 0.25, 0.79}, {"twig", 2, 0.12, 0.2}, {"kissing", 1, 0.4, 1}};
+    } cases[] = {{"capsule", 0, 0.2, 1}, {"open-capsule", 2, 0.2, 1}, {"arc", 2, 0.25, 1},
+                 {"y", 3, 0.25, 0.79},   {"twig", 2, 0.12, 0.2},      {"kissing", 1, 0.4, 1}};
     for (int k = 0; k < (is_slow ? 3 : 6); k++) {
         Shape *shape = make(cases[k].name, 0, NULL);
         VesselTree *tree = shape_sample(shape, &faults);
