@@ -39,6 +39,26 @@ static Vessel *vessel_of(const TriangleMesh *mesh, MeshSearch search, MeshNormal
     return v;
 }
 
+typedef struct Vessels {     // the same mesh by every search
+    TriangleMesh mesh;
+    Vessel *by[SEARCHES];
+} Vessels;
+
+static Vessels vessels_of(TriangleMesh mesh, MeshNormals normals)
+{
+    Vessels v = {.mesh = mesh};
+    for (int k = 0; k < SEARCHES; k++)
+        v.by[k] = vessel_of(&mesh, (MeshSearch)k, normals);
+    return v;
+}
+
+static void vessels_free(Vessels *v)
+{
+    for (int k = 0; k < SEARCHES; k++)
+        v->by[k]->destroy(v->by[k]);
+    mesh_clear(&v->mesh);
+}
+
 static VesselHit ask(const Vessel *v, Vec3 x, VesselMemory *memory)
 {
     VesselHit hit;
@@ -143,36 +163,32 @@ static void agrees_with_brute_force(void **state)
     (void)state;
     need_embree();
     for (int shape = 0; shape < SHAPES; shape++) {
-        TriangleMesh m = shape_mesh(shape);
-        Vec3 middle = middle_of(&m);
-        Vessel *v[SEARCHES];
-        for (int k = 0; k < SEARCHES; k++)
-            v[k] = vessel_of(&m, (MeshSearch)k, MESH_FACES);
+        Vessels v = vessels_of(shape_mesh(shape), MESH_FACES);
+        const TriangleMesh *m = &v.mesh;
+        Vec3 middle = middle_of(m);
         uint64_t seed = 17;
         double worst = 0;
         for (int i = 0; i < 400; i++) {
             // half of them about the wall: moved off a random place of a random triangle
             Vec3 x = vec3_add(middle, random_in_box(&seed, 2.6));
             if (i % 2) {
-                const int *c = m.triangle[(int)random_in(&seed, 0, m.triangle_count)];
-                x = vec3_mix(vec3_mix(m.vertex[c[0]], m.vertex[c[1]], random_in(&seed, 0, 1)), m.vertex[c[2]], random_in(&seed, 0, 1));
+                const int *c = m->triangle[(int)random_in(&seed, 0, m->triangle_count)];
+                x = vec3_mix(vec3_mix(m->vertex[c[0]], m->vertex[c[1]], random_in(&seed, 0, 1)), m->vertex[c[2]], random_in(&seed, 0, 1));
                 x = vec3_add(x, vec3_scale(random_unit(&seed), pow(10, random_in(&seed, -6, -0.5))));
             }
-            double exact = true_gap(&m, x);
-            VesselHit full = ask_afresh(v[0], x);
+            double exact = true_gap(m, x);
+            VesselHit full = ask_afresh(v.by[0], x);
             worst = fmax(worst, fabs(full.gap - exact));
             for (int k = 1; k < SEARCHES; k++) {
-                VesselHit hit = ask_afresh(v[k], x);
+                VesselHit hit = ask_afresh(v.by[k], x);
                 assert_true(same_hit(&full, &hit));
             }
             assert_near(vec3_norm(full.normal), 1, 1e-12);
         }
-        print_message("%-32s %5d triangles: gap within %.1e mm of brute force\n", shape_name[shape], m.triangle_count, worst);
+        print_message("%-32s %5d triangles: gap within %.1e mm of brute force\n", shape_name[shape], m->triangle_count, worst);
         // coordinates of 500 and 1000 mm are known to 6e-14 and 1e-13 mm
         assert_true(worst < (shape == 5 || shape == 6 ? 1e-12 : 1e-13));
-        for (int k = 0; k < SEARCHES; k++)
-            v[k]->destroy(v[k]);
-        mesh_clear(&m);
+        vessels_free(&v);
     }
 }
 
@@ -182,11 +198,8 @@ static void memory_changes_nothing(void **state)
     (void)state;
     need_embree();
     for (int shape = 0; shape < SHAPES; shape++) {
-        TriangleMesh m = shape_mesh(shape);
-        Vec3 middle = middle_of(&m);
-        Vessel *v[SEARCHES];
-        for (int k = 0; k < SEARCHES; k++)
-            v[k] = vessel_of(&m, (MeshSearch)k, MESH_SMOOTH);
+        Vessels v = vessels_of(shape_mesh(shape), MESH_SMOOTH);
+        Vec3 middle = middle_of(&v.mesh);
         uint64_t seed = 5;
         for (int walk = 0; walk < 20; walk++) {
             VesselMemory memory[SEARCHES] = {{.node = -1}, {.node = -1}, {.node = -1}};
@@ -194,19 +207,17 @@ static void memory_changes_nothing(void **state)
             double step = pow(10, random_in(&seed, -3, -0.5));
             for (int i = 0; i < 200; i++) {
                 x = i % 50 == 49 ? vec3_add(middle, random_in_box(&seed, 3)) : vec3_add(x, vec3_scale(random_unit(&seed), step));
-                VesselHit full = ask(v[0], x, &memory[0]);
+                VesselHit full = ask(v.by[0], x, &memory[0]);
                 for (int k = 1; k < SEARCHES; k++) {
-                    VesselHit hit = ask(v[k], x, &memory[k]);
+                    VesselHit hit = ask(v.by[k], x, &memory[k]);
                     assert_true(same_hit(&full, &hit));
                     assert_int_equal(memory[k].node, full.node);
-                    assert_int_equal(v[k]->locate(v[k], x, memory[k].node), full.node);
+                    assert_int_equal(v.by[k]->locate(v.by[k], x, memory[k].node), full.node);
                 }
-                assert_int_equal(v[1]->locate(v[1], x, -1), full.node);
+                assert_int_equal(v.by[1]->locate(v.by[1], x, -1), full.node);
             }
         }
-        for (int k = 0; k < SEARCHES; k++)
-            v[k]->destroy(v[k]);
-        mesh_clear(&m);
+        vessels_free(&v);
     }
 }
 
