@@ -408,6 +408,8 @@ static void read_profile(const Simulator *simulator, CollisionLoop *out)
     out->step_us = bench_spread(&profile->step, 1000);
     out->detect_us = histogram_quantile(&profile->stage[STAGE_DETECT], 0.5) / 1000;
     out->contact_us = histogram_quantile(&profile->stage[STAGE_CONTACT], 0.5) / 1000;
+    out->candidates = histogram_quantile(&profile->candidates, 0.5);
+    out->candidates_max = (double)profile->candidates.largest;
     out->contacts = histogram_quantile(&profile->contacts, 0.5);
     out->contacts_max = (double)profile->contacts.largest;
     out->iterations = histogram_quantile(&profile->iterations, 0.5);

@@ -40,7 +40,8 @@ typedef struct CollisionLoop {
     int64_t steps, wanted;
     Spread step_us;
     double detect_us, contact_us;    // medians
-    double contacts, contacts_max, iterations;       // with force, median; factorisations or sweeps, median
+    double candidates, candidates_max, contacts, contacts_max;   // near enough to touch, and with force; medians and largest
+    double iterations;               // factorisations or sweeps, median
     int64_t not_converged;
     double penetration_um;           // deepest node outside the true wall
     double fed_mm, stalled_mm;

@@ -15,7 +15,8 @@
 #include <time.h>
 
 static const double CAPSULE_LENGTH = 10, CAPSULE_RADIUS = 1.25, CAPSULE_WIDTH = 0.401485;  // [mm]; the width gives the radius half way (references.md)
-enum { CAPSULE_NODES = 10, TRIAL = 6 };   // a first mesh has so many times fewer triangles, and tells what cell the wanted one needs
+enum { FINE = 10 };                          // by how much the fine fit is closer
+enum { CAPSULE_NODES = 10, TRIAL = 6 };      // a first mesh has so many times fewer triangles, and tells what cell the wanted one needs
 static const double PARTICLE_CELL = 0.2;     // [mm] about the paper's 3000 samples
 static const double BAND_CELLS = 3, BAND_BEYOND_TOOL = 0.2;  // half width of the grid's band: at least both, the second in mm; what the solver looks after
 
@@ -107,15 +108,15 @@ static bool open_capsule(CollisionSurface *s, Faults *faults)
 
 // --- what scenes name ---
 
-static bool fit(CollisionSurface *s, double voxel_mm, int threads, Faults *faults)
+static VesselTree *fit(const VesselTree *nodes, double voxel_mm, int threads, double *cpu_s, Faults *faults)
 {
     LimFitOptions options = lim_fit_default_options();
-    options.voxel_mm = voxel_mm;
+    options.voxel_mm = voxel_mm;     // of which the target is a multiple
     options.threads = threads;
     double begin = collision_build_clock_s();
-    s->model = lim_fit(s->nodes, &options, NULL, faults);
-    s->fit_s = collision_build_clock_s() - begin;
-    return s->model != NULL;
+    VesselTree *model = lim_fit(nodes, &options, NULL, faults);
+    *cpu_s = collision_build_clock_s() - begin;
+    return model;
 }
 
 // A shape's wall without curvature: half the time.
@@ -213,8 +214,12 @@ bool collision_surface_open(const CollisionCase *of, int threads, CollisionSurfa
     if (!out->scene || !(of->convolution_capsule ? open_capsule(out, faults) : open_source(out, faults)))
         return false;
     double voxel = shape_options_voxel_mm(out->scene->shape_option_count, (const char(*)[2][64])out->scene->shape_option);
-    if (!out->model && !fit(out, voxel, threads, faults))
-        return false;
+    if (!out->model) {
+        out->model = fit(out->nodes, voxel, threads, &out->fit_s, faults);
+        out->fine = out->model ? fit(out->nodes, voxel / FINE, threads, &out->fine_s, faults) : NULL;
+        if (!out->fine)
+            return false;
+    }
     out->length_mm = centreline_length(out->nodes);
     out->lim = lim_of(out->model, LIM_BLEND);
     if (!out->lim) {
@@ -238,6 +243,7 @@ void collision_surface_close(CollisionSurface *s)
     if (s->nodes != s->model)
         vessel_tree_free(s->nodes);
     vessel_tree_free(s->model);
+    vessel_tree_free(s->fine);
     vessel_tree_free(s->exact_tree);
     shape_free(s->shape);
     if (s->scene)
@@ -362,25 +368,28 @@ static bool add_meshes(const CollisionSurface *s, CollisionWalls *walls, Faults 
     return true;
 }
 
+// Builds it anew, to know how long that takes.
+static bool add_lim(const CollisionSurface *s, CollisionWalls *walls, const char *name, const VesselTree *model, LimField field, double fit_s, Faults *faults)
+{
+    double begin = collision_build_clock_s();
+    Vessel *vessel = lim_of(model, field);
+    if (!vessel) {
+        faults_add(faults, s->of->name, 0, 0, "no memory for the local models' vessel");
+        return false;
+    }
+    CollisionWall *wall = add_wall(walls, name, vessel, true);
+    wall->build_s = collision_build_clock_s() - begin;
+    wall->surface_s = fit_s;
+    return true;
+}
+
 bool collision_walls_open(const CollisionSurface *s, CollisionWalls *out, Faults *faults)
 {
     *out = (CollisionWalls){.without_mesh = mesh_vessel_available() ? NULL : "built without Embree"};
     if (s->exact)
         add_wall(out, "exact", s->exact, false);
-    add_wall(out, "lim", s->lim, false)->surface_s = s->fit_s;
-    double begin = collision_build_clock_s();
-    Vessel *paper = lim_of(s->model, LIM_SWITCH);
-    double build_s = collision_build_clock_s() - begin;
-    if (!paper) {
-        faults_add(faults, s->of->name, 0, 0, "no memory for the local models' vessel");
-        return false;
-    }
-    add_wall(out, "lim-switch", paper, true);
-    for (int i = out->count - 2; i < out->count; i++) {
-        out->wall[i].surface_s = s->fit_s;
-        out->wall[i].build_s = build_s;
-    }
-    return add_meshes(s, out, faults);
+    return add_lim(s, out, "lim", s->model, LIM_BLEND, s->fit_s, faults) && add_lim(s, out, "lim-switch", s->model, LIM_SWITCH, s->fit_s, faults) &&
+           (!s->fine || add_lim(s, out, "lim fine", s->fine, LIM_BLEND, s->fine_s, faults)) && add_meshes(s, out, faults);
 }
 
 void collision_walls_close(CollisionWalls *walls)

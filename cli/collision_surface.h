@@ -5,7 +5,7 @@
 #include "cli/cli.h"
 #include "recon/phantom.h"
 
-enum { SURFACE_MESHES = 3, WALLS_MOST = 4 + 5 * SURFACE_MESHES };
+enum { SURFACE_MESHES = 3, WALLS_MOST = 5 + 5 * SURFACE_MESHES };
 
 typedef struct PaperRow {    // Kerrien 2017, Table 6
     double ms;               // 0: the table has no such row
@@ -30,6 +30,8 @@ typedef struct CollisionSurface {
     VesselTree *nodes;               // centres, radii and samples: what was fitted, and where the wall is looked for
     VesselTree *model;
     double fit_s;                    // CPU time of the fit; NAN where the model came from a file
+    VesselTree *fine;                // the same points fitted to a tenth of the usual distance; NULL where the model came from a file
+    double fine_s;
     double length_mm;                // of the centreline
     // owned
     Vessel *exact, *lim, *gap_only;
@@ -43,7 +45,7 @@ void collision_surface_close(CollisionSurface *surface);
 
 // One representation of the wall.
 typedef struct CollisionWall {
-    const char *name;        // "exact", "lim", "lim-switch", "mesh full", "mesh warm", "mesh cached", "mesh curved", "mesh smooth", "grid"
+    const char *name;        // "exact", "lim", "lim-switch", "lim fine", "mesh full", "mesh warm", "mesh cached", "mesh curved", "mesh smooth", "grid"
     const Vessel *vessel;
     int triangles;           // of a mesh; 0
     int mesh;                // which of the case's meshes; -1
