@@ -27,8 +27,8 @@ TriangleMesh *isosurface_of_tree(const VesselTree *tree, double cell_mm);
 // lies deepest for its size, and where that says outside from the other balls around it too, by their `from` (a node for vessel->locate; NULL: -1, which may
 // search the whole vessel): inside is believed. A vertex's node is the one that answers. Vertices lie within 1e-9 mm of the wall, as it answers from there
 // without memory, save where its gap steps over zero: by some 1e-8 mm in LIM, whose weights are floats, by more where local models disagree. No angle is below
-// some 10 degrees away from such steps. Where the wall leaves the balls (open ends) the mesh has a rim; elsewhere it is closed. Walls thinner than two cells
-// between two lumens may be holed.
+// some 10 degrees away from such steps. Where the wall leaves the balls (open ends) the mesh has a rim; elsewhere it is closed. Two lumens that kiss stay
+// apart, however thin the wall between, where their balls' `from` lead to different nodes.
 // NULL where memory ends, a ball is not finite, or the cell is not above 0 or too small, as above.
 TriangleMesh *isosurface_of_vessel(const Vessel *vessel, int count, const Vec3 *center, const double *reach, const int *from, double cell_mm);
 // The same surface finer: each triangle in four, new vertices moved onto the wall from the middles of edges. NULL where memory ends or there would be more

@@ -1,7 +1,8 @@
 // The wall of any vessel as triangles (isosurface.h): marching cubes over its gap, and refinement with new vertices on the wall.
 //
 // A lattice point is asked from the ball in which it lies deepest for the ball's size; where that says outside, from the other balls around it too, and
-// any that says inside is believed: beside a wide vessel may run a thin one. The gap is 1-Lipschitz, so that a block whose middle is further from the wall
+// any that says inside is believed: beside a wide vessel may run a thin one. Where two lumens lie so near each other that no lattice point might
+// fall between, those nearest to the wall between are taken for outside, so that the lumens stay apart whatever the cell. The gap is 1-Lipschitz, so that a block whose middle is further from the wall
 // than its corners has none of it. Where a vessel answers from local models the gap jumps a little; so a block that a marched one passes the wall on to is
 // marched too, whatever its middle says.
 //
@@ -21,9 +22,11 @@ static uint64_t edge_key(int a, int b) { return a < b ? (uint64_t)(uint32_t)a <<
 static const double CLOSE = 2e-10;           // [mm] to the wall: a step ends where the gap is that small
 static const double LEAST_SHARE = 0.4;       // of an edge, from its ends
 // [cells] A vertex moves by at most that …
-static const double MOVE = 0.75;
+static const double MOVE = 1.2;
+// … two lumens are kept that far apart on the lattice: any line of it has a point between …
+static const double APART = 1.05;
 // … and lattice points that far beyond the balls are known too, so that all cells about a vertex within the balls have all their corners.
-static const double MARGIN = 2.4;
+static const double MARGIN = 2.8;
 
 // Points to ask, with what they are of: lattice points of a block, a block's middle.
 typedef struct Questions {
@@ -34,6 +37,8 @@ typedef struct Questions {
     VesselHit hit[MARCH_POINTS];
 } Questions;
 
+enum { NO_WALL = -1000 };    // [cells]
+
 typedef struct VesselMarch {
     March march;             // first: a March * to us is a VesselMarch *
     const Vessel *vessel;
@@ -41,6 +46,7 @@ typedef struct VesselMarch {
     const double *reach;
     const int *from;
     Questions ask;
+    double other[MARCH_POINTS];              // the nearest gap below 0 of those that do not answer for a lattice point
     int capacity;
     int *made_in;            // block of each vertex
     bool failed;
@@ -139,12 +145,28 @@ static void hear_others(VesselMarch *job)
     for (int n = 0; n < job->ask.count; n++) {
         const VesselHit *hit = &job->ask.hit[n];
         int at = job->ask.of[n];
-        if (hit->flags & (VESSEL_OPEN_END | VESSEL_BEYOND) || !(hit->gap > march->value[at]))
+        if (hit->flags & (VESSEL_OPEN_END | VESSEL_BEYOND))
             continue;
-        march->value[at] = hit->gap;
-        march->owner[at] = job->ask.ball[n];
+        double lesser = fmin(hit->gap, march->value[at]);
+        if (lesser < 0)
+            job->other[at] = fmax(job->other[at], lesser);
+        if (hit->gap > march->value[at]) {
+            march->value[at] = hit->gap;
+            march->owner[at] = job->ask.ball[n];
+        }
     }
     job->ask.count = 0;
+}
+
+// A point inside by g of one lumen and outside by s of another has a wall of s - g beside it.
+static void keep_apart(VesselMarch *job)
+{
+    double apart = APART * job->march.cell;
+    for (int at = 0; at < MARCH_POINTS; at++) {
+        double g = job->march.value[at], wall = -job->other[at] - g;
+        if (g > 0 && wall > 0 && wall < apart)
+            job->march.value[at] = g - 0.5 * (apart - wall);
+    }
 }
 
 static void sample_block(VesselMarch *job, const MarchBlock *b)
@@ -160,6 +182,7 @@ static void sample_block(VesselMarch *job, const MarchBlock *b)
                 int at = march_index(i, j, k), ball = deepest_ball(job, b, x, margin);
                 march->value[at] = NAN;
                 march->owner[at] = ball;
+                job->other[at] = NO_WALL * march->cell;
                 if (ball >= 0)
                     add_question(job, at, ball, x, node_from(job, ball, x));
             }
@@ -173,13 +196,14 @@ static void sample_block(VesselMarch *job, const MarchBlock *b)
         for (int j = 0; j < MARCH_SIDE; j++)
             for (int k = 0; k < MARCH_SIDE; k++) {
                 int at = march_index(i, j, k);
-                if (!(march->value[at] <= 0))
+                if (!(march->value[at] <= 0.5 * APART * march->cell))
                     continue;
                 if (job->ask.count > MARCH_POINTS / 2)
                     hear_others(job);
                 ask_others(job, b, at, march_point(march, b, i, j, k), margin, node[at]);
             }
     hear_others(job);
+    keep_apart(job);
     for (int at = 0; at < MARCH_POINTS; at++)
         if (!isnan(march->value[at]))        // finite, for shares of an edge
             march->value[at] = fmin(fmax(march->value[at], -march->cell), march->cell);

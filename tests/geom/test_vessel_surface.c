@@ -1,5 +1,5 @@
 // The wall of a vessel as triangles: closed and facing out, area and volume of exact tubes by Pappus, orders of convergence, rims at open ends, refinement,
-// no slivers, kissing vessels, thin beside wide, turned, mirrored and scaled shapes, fitted models, and what cannot be meshed.
+// no slivers, kissing vessels and thin walls, thin beside wide, turned, mirrored and scaled shapes, fitted models, and what cannot be meshed.
 #include "blob_tube.h"
 #include "geom/isosurface.h"
 #include "geom/tree_surface.h"
@@ -467,6 +467,32 @@ static void thin_beside_wide_is_whole(void **state)
     }
 }
 
+// A wall between two lumens that is much thinner than a cell stays a wall, whichever way it lies.
+static void thin_walls_stay_whole(void **state)
+{
+    (void)state;
+    uint64_t seed = 17;
+    const int from[3] = {0, 1, 2};
+    for (int trial = 0; trial < 30; trial++) {
+        double wall = random_in(&seed, 0.005, 0.1), cell = random_in(&seed, 0.1, 0.4);
+        Balls balls = {.vessel = {.query = balls_query, .locate = balls_locate}, .count = 3, .radius = {1.3, 0.8, 1}};
+        Vec3 towards = trial == 0 ? vec3(1, 0, 0) : random_unit(&seed), across = vec3_normal_to(towards);
+        balls.center[0] = random_in_box(&seed, 0.5);
+        balls.center[1] = vec3_add_scaled(balls.center[0], balls.radius[0] + balls.radius[1] + wall, towards);
+        balls.center[2] = vec3_add_scaled(balls.center[0], balls.radius[0] + balls.radius[2] + wall, across);
+        double reach[3];
+        for (int i = 0; i < 3; i++)
+            reach[i] = 1.6 * balls.radius[i];
+        TriangleMesh *mesh = isosurface_of_vessel(&balls.vessel, 3, balls.center, reach, from, cell);
+        check_closed(mesh, 3);
+        check_vertices(mesh, &balls.vessel);
+        Errors e = errors_of(mesh, &balls.vessel);
+        assert_true(e.distance < cell * cell);
+        assert_true(least_angle(mesh) > 5);
+        triangle_mesh_free(mesh);
+    }
+}
+
 // A hairpin whose legs kiss at 0.2 mm.
 static void kissing_legs_stay_apart(void **state)
 {
@@ -590,8 +616,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(tubes_converge), cmocka_unit_test(turned_tubes_are_the_same), cmocka_unit_test(scale_is_no_matter),
         cmocka_unit_test(open_ends_have_rims), cmocka_unit_test(refinement_converges), cmocka_unit_test(fine_meshes_survive_floats),
-        cmocka_unit_test(thin_beside_wide_is_whole), cmocka_unit_test(kissing_legs_stay_apart), cmocka_unit_test(model_has_one_rim),
-        cmocka_unit_test(bad_input), cmocka_unit_test(cost),
+        cmocka_unit_test(thin_beside_wide_is_whole), cmocka_unit_test(thin_walls_stay_whole), cmocka_unit_test(kissing_legs_stay_apart),
+        cmocka_unit_test(model_has_one_rim), cmocka_unit_test(bad_input), cmocka_unit_test(cost),
     };
     return cmocka_run_group_tests_name("vessel_surface", tests, NULL, NULL);
 }
