@@ -20,7 +20,8 @@
 #include <unistd.h>
 
 enum { CASES = 7, SCENES_MOST = 16, CAPS = 4, FORMS = 2, SCENE_TRIANGLES = 105000, QUICK_STEPS = 300, QUICK_TRIANGLES = 12000 };
-enum { LARGE = 100000, TIMES_FASTER = 10 };  // what issue 5 asks for
+enum { LARGE = 100000, TIMES_FASTER = 10 };  // what detection in local models is held to: so many times faster than on so many triangles …
+static const double FLAT = 1.2;              // … and within this ratio whatever the size of the tree
 enum { CLAMP_STEPS = 1000, POINTWISE_STEPS = 300, QUICK_POINTWISE_STEPS = 200 };
 
 static const CollisionCase cases[CASES] = {
@@ -71,7 +72,7 @@ typedef struct EqualError {              // a mesh as wrong as the local models
 typedef struct Verdict {
     char item[192];
     double must, measured;
-    bool good;
+    bool at_most, good;      // `must` is the most, not the least, that it may be
 } Verdict;
 
 typedef struct CollisionBench {
@@ -493,7 +494,7 @@ static void print_paper(FILE *out, const CollisionBench *bench)
 
 // --- verdicts ---
 
-static bool add_verdict(CollisionBench *bench, const char *item, double must, double measured, Faults *faults)
+static bool add_verdict(CollisionBench *bench, const char *item, bool at_most, double must, double measured, Faults *faults)
 {
     Verdict *v = further((void **)&bench->verdict, &bench->verdict_count, sizeof *v, faults);
     if (!v)
@@ -501,7 +502,8 @@ static bool add_verdict(CollisionBench *bench, const char *item, double must, do
     snprintf(v->item, sizeof v->item, "%s", item);
     v->must = must;
     v->measured = measured;
-    v->good = measured >= must;
+    v->at_most = at_most;
+    v->good = at_most ? measured <= must : measured >= must;
     return true;
 }
 
@@ -520,18 +522,41 @@ static bool judge_surface(CollisionBench *bench, const CollisionCase *of, Faults
                 us = fmin(us, full->motion.us_per_80_points);    // the faster of the searches that ask Embree in each step
             snprintf(item, sizeof item, "%.40s, %dk triangles: %s over lim, 80 near points of the same motion; errors %.3g and %.3g um rms", of->name,
                      mesh->wall.triangles / 1000, k ? "cached triangles" : "Embree in each step", mesh->motion.gap_um.rms, lim->motion.gap_um.rms);
-            if (!add_verdict(bench, item, TIMES_FASTER, us / lim->motion.us_per_80_points, faults))
+            if (!add_verdict(bench, item, false, TIMES_FASTER, us / lim->motion.us_per_80_points, faults))
                 return false;
         }
     return true;
 }
 
-static bool judge(CollisionBench *bench, Faults *faults)
+// Detection in local models against the size of the tree: the slowest of all sizes over the fastest, by collision_growth's figures.
+static bool judge_growth(CollisionBench *bench, const cJSON *sizes, Faults *faults)
+{
+    static const char *const times[] = {"ns_warm", "ns_cold"}, *const what[] = {"one wire", "wires all over the tree"};
+    for (size_t k = 0; k < 2; k++) {
+        double least = HUGE_VAL, most = 0, nodes = 0;
+        const cJSON *at;
+        cJSON_ArrayForEach(at, sizes) {
+            const cJSON *field = cJSON_GetObjectItem(at, "field"), *time = cJSON_GetObjectItem(at, times[k]), *size = cJSON_GetObjectItem(at, "nodes");
+            if (!cJSON_IsString(field) || strcmp(field->valuestring, "blend") != 0 || !cJSON_IsNumber(time) || !cJSON_IsNumber(size))
+                continue;
+            least = fmin(least, time->valuedouble);
+            most = fmax(most, time->valuedouble);
+            nodes = fmax(nodes, size->valuedouble);
+        }
+        char item[192];
+        snprintf(item, sizeof item, "a query in local models of 100 to %.0f nodes, %s: slowest over fastest", nodes, what[k]);
+        if (most > 0 && !add_verdict(bench, item, true, FLAT, most / least, faults))
+            return false;
+    }
+    return true;
+}
+
+static bool judge(CollisionBench *bench, const cJSON *root, Faults *faults)
 {
     for (int i = 0; i < bench->row_count; i++)
         if ((i == 0 || bench->row[i].of != bench->row[i - 1].of) && !judge_surface(bench, bench->row[i].of, faults))
             return false;
-    return true;
+    return judge_growth(bench, cJSON_GetObjectItem(root, "sizes"), faults);
 }
 
 static void print_verdicts(FILE *out, const CollisionBench *bench)
@@ -543,10 +568,10 @@ static void print_verdicts(FILE *out, const CollisionBench *bench)
                 e->warm_us / e->lim_us, e->cached_us, e->cached_us / e->lim_us);
     }
     if (bench->verdict_count > 0)
-        fprintf(out, "\nverdicts                                                                                                          must  measured\n");
+        fprintf(out, "\n%-124s must    measured\n", "verdicts");
     for (int i = 0; i < bench->verdict_count; i++) {
         const Verdict *v = &bench->verdict[i];
-        fprintf(out, "  %-110s %6.3g  %8.3g  %s\n", v->item, v->must, v->measured, v->good ? "good" : "MISSED");
+        fprintf(out, "  %-120s %s %-6.3g  %8.3g  %s\n", v->item, v->at_most ? "<=" : ">=", v->must, v->measured, v->good ? "good" : "MISSED");
     }
 }
 
@@ -672,6 +697,7 @@ static void add_lists(cJSON *root, const CollisionBench *bench)
         cJSON_AddItemToArray(verdicts, at = cJSON_CreateObject());
         cJSON_AddStringToObject(at, "item", v->item);
         put(at, "must", v->must);
+        cJSON_AddBoolToObject(at, "must_be_at_most", v->at_most);
         put(at, "measured", v->measured);
         cJSON_AddBoolToObject(at, "good", v->good);
     }
@@ -743,14 +769,19 @@ int bench_collision(int argc, char **argv)
     fprintf(bench.out, "%s\n", bench_processor());
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "processor", bench_processor());
-    bool good = run_all(&bench, &faults) && judge(&bench, &faults);
+    cJSON_AddBoolToObject(root, "embree", mesh_vessel_available());
+    bool good = run_all(&bench, &faults);
     if (good) {
         print_clamps(bench.out, &bench);
         print_paper(bench.out, &bench);
+        fflush(bench.out);
+        good = bench.given || collision_growth(bench.out, root, bench.common.quick, bench.common.threads, &faults);
+    }
+    good = good && judge(&bench, root, &faults);
+    if (good) {
         print_verdicts(bench.out, &bench);
         add_lists(root, &bench);
-        good = (bench.given || collision_growth(bench.out, root, bench.common.quick, bench.common.threads, &faults)) &&
-               (!bench.chart || collision_chart(root, bench.chart, &faults)) && bench_write_json(&bench.common, root, &faults);
+        good = (!bench.chart || collision_chart(root, bench.chart, &faults)) && bench_write_json(&bench.common, root, &faults);
     }
     cJSON_Delete(root);
     bool missed = false;

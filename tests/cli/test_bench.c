@@ -8,6 +8,7 @@
 #include <cmocka.h>
 
 #include <cJSON.h>
+#include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -83,7 +84,10 @@ static void peer_scenes_stay_inside(void **state)
     int code = run("bench peer --quick --json /tmp/seldinger-bench-peer.json > /tmp/seldinger-bench-peer.txt");
     cJSON *root = load("/tmp/seldinger-bench-peer.json"), *rows = cJSON_GetObjectItem(root, "rows"), *at;
     unlink("/tmp/seldinger-bench-peer.txt");
-    assert_int_equal(cJSON_GetArraySize(rows), tubes ? 12 : 4);
+    int surfaces = 2;    // the exact tube, local models, and with Embree a mesh
+    cJSON_ArrayForEach(at, rows)
+        surfaces = strcmp(cJSON_GetObjectItem(at, "contact")->valuestring, "mesh") == 0 ? 3 : surfaces;
+    assert_int_equal(cJSON_GetArraySize(rows), (tubes ? 6 : 2) * surfaces);
     cJSON_ArrayForEach(at, rows) {
         print_message("%s on %s: %g steps, deepest %.1f um, %g contacts at most\n", cJSON_GetObjectItem(at, "scene")->valuestring,
                       cJSON_GetObjectItem(at, "contact")->valuestring, number(at, "steps"), number(at, "deepest_um"), number(at, "contacts_max"));
@@ -96,6 +100,75 @@ static void peer_scenes_stay_inside(void **state)
         print_message("skipped: tube-b and tube-c, ../shared/data/peer-tubes is not here\n");
         skip();
     }
+}
+
+static bool is_called(const cJSON *row, const char *representation)
+{
+    return !strcmp(cJSON_GetObjectItem(row, "representation")->valuestring, representation);
+}
+
+static void a_row_is_whole(const cJSON *row, double steps)
+{
+    const cJSON *motion = cJSON_GetObjectItem(row, "motion"), *gap = cJSON_GetObjectItem(motion, "gap_error_um");
+    assert_true(number(row, "bytes") > 0 && number(row, "primitives") > 0 && number(row, "bytes_per_mm") > 0);
+    assert_true(number(motion, "steps") == steps && number(motion, "points_per_step") > 1);
+    assert_true(number(motion, "us_per_step") > 0 && number(motion, "us_per_80_points") > 0 && number(motion, "near_points") > 100);
+    assert_true(number(gap, "rms") <= number(gap, "max"));
+    assert_true(number(cJSON_GetObjectItem(motion, "normal_error_deg"), "rms") < 90);
+    const cJSON *loop = cJSON_GetObjectItem(row, "loop"), *smooth = cJSON_GetObjectItem(row, "frictionless");
+    if (!loop)
+        return;
+    assert_true(number(loop, "detect_us") > 0 && number(loop, "contact_us") > 0 && number(loop, "candidates_max") >= number(loop, "contacts_max"));
+    static const char *const all[] = {"push_force_n", "artificial_friction_n", "jitter_rms", "jitter_p99", "work_lost_n", "artificial_mu", "penetration_um"};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
+        number(smooth, all[i]);
+}
+
+// A bent tube, in which the wire presses on the wall: every representation has its row, and local models do what the exact tube does.
+static void collision_of_a_scene(void **state)
+{
+    (void)state;
+    const char *scene = "/tmp/seldinger-bench-bend.yaml";
+    FILE *file = fopen(scene, "w");
+    assert_non_null(file);
+    fprintf(file, "seldinger: 1\nvessel:\n  tube: {radius_mm: 1, path: [{line_mm: 4}, {arc: {radius_mm: 8, angle_deg: 70}}, {line_mm: 4}]}\n  friction: 0.1\n"
+                  "wire:\n  elements: 40\n  sections:\n    - {length_mm: 20, diameter_mm: 0.3, young_modulus_gpa: 50, poisson_ratio: 0.3, density_g_cm3: 6.45}\n"
+                  "sheath: {inlet: root, inserted_mm: 6}\nscript: [{t_s: 0, push_mm_s: 50, twist_deg_s: 0}, {t_s: 0.2, push_mm_s: 0, twist_deg_s: 0}]\n");
+    fclose(file);
+    int code = run("bench collision /tmp/seldinger-bench-bend.yaml --quick --json /tmp/seldinger-bench-bend.json --chart /tmp/seldinger-bench-bend.svg "
+                   "> /tmp/seldinger-bench-bend.txt");
+    unlink(scene);
+    unlink("/tmp/seldinger-bench-bend.txt");
+    assert_int_equal(code, 0);
+    assert_int_equal(access("/tmp/seldinger-bench-bend.svg", R_OK), 0);
+    unlink("/tmp/seldinger-bench-bend.svg");
+    cJSON *root = load("/tmp/seldinger-bench-bend.json"), *rows = cJSON_GetObjectItem(root, "rows"), *row;
+    bool embree = cJSON_IsTrue(cJSON_GetObjectItem(root, "embree"));
+    assert_int_equal(cJSON_GetArraySize(rows), embree ? 10 : 5);
+    double exact_push = 0;
+    cJSON_ArrayForEach(row, rows) {
+        a_row_is_whole(row, 200);
+        const cJSON *loop = cJSON_GetObjectItem(row, "loop"), *gap = cJSON_GetObjectItem(cJSON_GetObjectItem(row, "motion"), "gap_error_um");
+        const cJSON *smooth = cJSON_GetObjectItem(row, "frictionless");
+        if (is_called(row, "exact")) {
+            assert_true(number(gap, "max") == 0);
+            exact_push = number(smooth, "push_force_n");
+            assert_true(exact_push > 0 && fabs(number(smooth, "artificial_mu")) < 0.002);    // forces along the wall's own normals do no work along it
+        }
+        if (is_called(row, "exact") || !strncmp(cJSON_GetObjectItem(row, "representation")->valuestring, "lim", 3)) {
+            assert_true(cJSON_IsTrue(cJSON_GetObjectItem(loop, "survived")) && number(loop, "steps") == 200);
+            assert_true(number(loop, "contacts_max") > 0);
+            assert_true(number(gap, "max") < 50);        // samples of a tube stand for voxels of 0.05 mm
+        }
+        if (is_called(row, "lim fine"))
+            assert_true(fabs(number(smooth, "push_force_n") / exact_push - 1) < 0.1);
+        if (is_called(row, "mesh warm"))
+            assert_true(number(row, "triangles") > 8000 && number(row, "triangles") < 16000);
+        assert_true(number(gap, "rms") > 0 || is_called(row, "exact"));
+    }
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(root, "clamps")), embree ? 16 : 8);
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(root, "verdicts")), 0);      // there is no mesh of 100,000 triangles
+    cJSON_Delete(root);
 }
 
 static void tables_that_are_not_there(void **state)
@@ -134,7 +207,7 @@ static void a_chart_is_a_picture(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(step_tables), cmocka_unit_test(peer_scenes_stay_inside), cmocka_unit_test(tables_that_are_not_there),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(step_tables), cmocka_unit_test(peer_scenes_stay_inside), cmocka_unit_test(collision_of_a_scene), cmocka_unit_test(tables_that_are_not_there),
                                        cmocka_unit_test(a_chart_is_a_picture)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
