@@ -1,6 +1,7 @@
 // The wall of a vessel as triangles: closed and facing out, area and volume of exact tubes by Pappus, orders of convergence, rims at open ends, refinement,
 // no slivers, kissing vessels and thin walls, thin beside wide, turned, mirrored and scaled shapes, fitted models, and what cannot be meshed.
 #include "blob_tube.h"
+#include "geom/disjoint_sets.h"
 #include "geom/isosurface.h"
 #include "geom/tree_surface.h"
 #include "random_numbers.h"
@@ -181,13 +182,12 @@ static int compare_sides(const void *x, const void *y)
     return s->a != t->a ? (s->a < t->a ? -1 : 1) : (s->b > t->b) - (s->b < t->b);
 }
 
-// Follows the rims: each of their vertices lies on one loop, once.
-static Rim rim_of(const TriangleMesh *mesh)
+// next[v]: the vertex after v on the rim, -1 off it. Each vertex of a rim is on it once.
+static int find_rims(const TriangleMesh *mesh, int *next)
 {
     size_t n = 3 * (size_t)mesh->triangle_count;
     Side *side = malloc((n + 1) * sizeof *side);
-    int *next = malloc(((size_t)mesh->vertex_count + 1) * sizeof *next);
-    Rim rim = {0};
+    int edges = 0;
     for (size_t i = 0; i < n; i++)
         side[i] = (Side){mesh->triangle[i / 3][i % 3], mesh->triangle[i / 3][(i + 1) % 3]};
     qsort(side, n, sizeof *side, compare_sides);
@@ -198,8 +198,16 @@ static Rim rim_of(const TriangleMesh *mesh)
             continue;
         assert_int_equal(next[side[i].a], -1);
         next[side[i].a] = side[i].b;
-        rim.edges++;
+        edges++;
     }
+    free(side);
+    return edges;
+}
+
+static Rim rim_of(const TriangleMesh *mesh)
+{
+    int *next = malloc(((size_t)mesh->vertex_count + 1) * sizeof *next);
+    Rim rim = {.edges = find_rims(mesh, next)};
     for (int v = 0; v < mesh->vertex_count; v++) {
         int at = v, count = 0;
         while (next[at] >= 0) {
@@ -216,7 +224,6 @@ static Rim rim_of(const TriangleMesh *mesh)
         rim.middle[rim.loops] = vec3_scale(rim.middle[rim.loops], 1.0 / count);
         rim.loops++;
     }
-    free(side);
     free(next);
     return rim;
 }
@@ -447,10 +454,10 @@ static void thin_beside_wide_is_whole(void **state)
             balls.center[0] = vec3(0, 3.2, 0), balls.radius[0] = 0.5;
             balls.center[1] = vec3(0, 0, 0), balls.radius[1] = 2.5;
         }
-        for (double cover = 1.25; cover < 3; cover *= 1.5) {
+        for (int cover = 0; cover < 4; cover++) {
             double reach[3], area = 0, volume = 0;
             for (int i = 0; i < 3; i++) {
-                reach[i] = cover * balls.radius[i];
+                reach[i] = cover == 0 ? balls.radius[i] + 0.8 : (1 + 0.4 * cover) * balls.radius[i];
                 area += 4 * PI * pow(balls.radius[i], 2);
                 volume += 4 * PI / 3 * pow(balls.radius[i], 3);
             }
@@ -551,6 +558,84 @@ static void model_has_one_rim(void **state)
     vessel_tree_free(tree);
 }
 
+// A terrace: its wall steps up where x > 0, by more than a block of cells. The step is closed, though nothing in the blocks beside says that there is one.
+static void terrace_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
+{
+    (void)vessel, (void)memory;
+    for (int i = 0; i < count; i++) {
+        double gap = point[i].z - (point[i].x > 0.06 ? 1.1 : -1.05);
+        hit[i] = gap > reach ? (VesselHit){.gap = reach, .flags = VESSEL_FAR} : (VesselHit){.gap = gap, .normal = {0, 0, 1}};
+    }
+}
+
+static int terrace_locate(const Vessel *vessel, Vec3 point, int from)
+{
+    (void)vessel, (void)point, (void)from;
+    return 0;
+}
+
+static void steps_are_closed(void **state)
+{
+    (void)state;
+    const Vessel terrace = {.query = terrace_query, .locate = terrace_locate};
+    Vec3 center = {0, 0, 0};
+    double reach = 3;
+    TriangleMesh *mesh = isosurface_of_vessel(&terrace, 1, &center, &reach, NULL, 0.09);
+    assert_non_null(mesh);
+    SurfaceCensus c = census_of(mesh);
+    assert_int_equal(c.parts, 1);
+    assert_int_equal(c.euler, 1);
+    assert_int_equal(rim_of(mesh).loops, 1);
+    for (int v = 0; v < mesh->vertex_count; v++)
+        assert_near(vec3_norm(mesh->normal[v]), 1, 1e-12);
+    triangle_mesh_free(mesh);
+}
+
+// Balls that cover a plane in rags: rims still run round once, and no part is rim alone.
+static void ragged_cover_has_clean_rims(void **state)
+{
+    (void)state;
+    enum { COUNT = 60 };
+    uint64_t seed = 12;
+    Vessel *plane = plane_vessel_create(vec3(0, 0, 0.01), vec3(0.2, 0.1, 1));
+    int parts = 0;
+    for (int trial = 0; trial < 40; trial++) {
+        Vec3 center[COUNT];
+        double reach[COUNT];
+        for (int i = 0; i < COUNT; i++) {
+            center[i] = vec3(random_in(&seed, -2, 2), random_in(&seed, -2, 2), random_in(&seed, -0.3, 0.3));
+            reach[i] = random_in(&seed, 0.1, 0.5);
+        }
+        TriangleMesh *mesh = isosurface_of_vessel(plane, COUNT, center, reach, NULL, 0.1);
+        assert_non_null(mesh);
+        SurfaceCensus c = census_of(mesh);
+        parts += c.parts;
+        size_t vertices = (size_t)mesh->vertex_count + 1;
+        int whole = 0, *next = malloc(vertices * sizeof *next), *part = malloc(vertices * sizeof *part);
+        find_rims(mesh, next);
+        for (int v = 0; v < mesh->vertex_count; v++)
+            part[v] = v;
+        for (int t = 0; t < mesh->triangle_count; t++)
+            for (int k = 1; k < 3; k++)
+                disjoint_join(part, mesh->triangle[t][0], mesh->triangle[t][k]);
+        bool *is_whole = calloc(vertices, sizeof *is_whole);
+        for (int t = 0; t < mesh->triangle_count; t++) {
+            const int *v = mesh->triangle[t];
+            int root = disjoint_root(part, v[0]);
+            bool inner = next[v[0]] < 0 && next[v[1]] < 0 && next[v[2]] < 0;
+            whole += inner && !is_whole[root];
+            is_whole[root] = is_whole[root] || inner;
+        }
+        free(is_whole);
+        assert_int_equal(whole, c.parts);
+        free(part);
+        free(next);
+        triangle_mesh_free(mesh);
+    }
+    assert_true(parts > 100);
+    plane->destroy(plane);
+}
+
 // --- What cannot be meshed ---
 
 static void bad_input(void **state)
@@ -617,7 +702,8 @@ int main(void)
         cmocka_unit_test(tubes_converge), cmocka_unit_test(turned_tubes_are_the_same), cmocka_unit_test(scale_is_no_matter),
         cmocka_unit_test(open_ends_have_rims), cmocka_unit_test(refinement_converges), cmocka_unit_test(fine_meshes_survive_floats),
         cmocka_unit_test(thin_beside_wide_is_whole), cmocka_unit_test(thin_walls_stay_whole), cmocka_unit_test(kissing_legs_stay_apart),
-        cmocka_unit_test(model_has_one_rim), cmocka_unit_test(bad_input), cmocka_unit_test(cost),
+        cmocka_unit_test(model_has_one_rim), cmocka_unit_test(steps_are_closed), cmocka_unit_test(ragged_cover_has_clean_rims),
+        cmocka_unit_test(bad_input), cmocka_unit_test(cost),
     };
     return cmocka_run_group_tests_name("vessel_surface", tests, NULL, NULL);
 }
