@@ -150,7 +150,8 @@ static void close_panel(const Chart *chart, bool filled, double left, double top
 
 static void draw_shape(FILE *out, const char *class, int kind, double x, double y)
 {
-    fprintf(out, "<path class=\"%s\" transform=\"translate(%.2f %.2f)\" style=\"color:%s\" d=\"%s\"", class, x, y, colour[kind % COLOURS], shape[kind % SHAPES]);
+    fprintf(out, "<path class=\"%s\" transform=\"translate(%.2f %.2f)\" style=\"color:%s\" d=\"%s\"", class, x, y, colour[kind % COLOURS],
+            shape[kind % SHAPES]);
 }
 
 // What a browser shows under the pointer.
@@ -390,9 +391,9 @@ static void draw_growth(const Chart *chart, double left, double top, double widt
         double room = 16, at = begin;
         for (int k = 0; k < tails; k++) {
             at = fmax(at, fmin(tail[k].y, end - room * (tails - 1 - k)));
-            fprintf(chart->out, "<path class=\"curve%s\" style=\"color:%s\" d=\"M%.1f %.1fh18\"/><text class=\"tail\" style=\"color:%s\" x=\"%.1f\" y=\"%.1f\">%s</text>\n",
-                    tail[k].curve->dashed ? " dashed" : "", colour[tail[k].curve->kind % COLOURS], x.to + 6, at, colour[tail[k].curve->kind % COLOURS], x.to + 28, at + 4,
-                    tail[k].curve->name);
+            const Curve *c = tail[k].curve;
+            fprintf(chart->out, "<g style=\"color:%s\"><path class=\"curve%s\" d=\"M%.1f %.1fh18\"/><text class=\"tail\" x=\"%.1f\" y=\"%.1f\">%s</text></g>\n",
+                    colour[c->kind % COLOURS], c->dashed ? " dashed" : "", x.to + 6, at, x.to + 28, at + 4, c->name);
             at += room;
         }
     }
@@ -403,7 +404,8 @@ static void draw_growth(const Chart *chart, double left, double top, double widt
 
 static double list_height(const Chart *chart) { return HEAD + 22.0 * chart->representations.count + FOOT; }
 
-static void draw_list(const Chart *chart, const char *id, const char *title, const char *keys, const char *name, const char *unit, double left, double top, double width)
+static void draw_list(const Chart *chart, const char *id, const char *title, const char *keys, const char *name, const char *unit, double left, double top,
+                      double width)
 {
     const cJSON *row;
     Axis x = {0};
@@ -439,11 +441,12 @@ static void draw_list(const Chart *chart, const char *id, const char *title, con
 
 static bool draw(const Chart *chart)
 {
-    static const char style[] = "text{font:13px system-ui,sans-serif;fill:#1a1d21}.title{font-size:16px;font-weight:600}.tick,.axis{fill:#545b64;font-size:12px}.tick.up{text-anchor:end}"
-                                ".tick.along{text-anchor:middle}.grid{stroke:#eceff2;fill:none}.decade{stroke:#b9c0c9;fill:none}.band{fill:#f4f6f8}"
-                                ".mark,.key,.dot{fill:currentColor;stroke:#fff;stroke-width:.8}.paper{fill:none;stroke:currentColor;stroke-width:2}"
-                                ".lost{stroke:#1a1d21;stroke-width:1.4;fill:none}.curve{fill:none;stroke:currentColor;stroke-width:2}.dashed{stroke-dasharray:5 4}"
-                                ".tail{fill:currentColor;font-size:12px}";
+    static const char style[] =
+        "text{font:13px system-ui,sans-serif;fill:#1a1d21}.title{font-size:16px;font-weight:600}.tick,.axis{fill:#545b64;font-size:12px}"
+        ".tick.up{text-anchor:end}.tick.along{text-anchor:middle}.grid{stroke:#eceff2;fill:none}.decade{stroke:#b9c0c9;fill:none}.band{fill:#f4f6f8}"
+        ".mark,.key,.dot{fill:currentColor;stroke:#fff;stroke-width:.8}.paper{fill:none;stroke:currentColor;stroke-width:2}"
+        ".lost{stroke:#1a1d21;stroke-width:1.4;fill:none}.curve{fill:none;stroke:currentColor;stroke-width:2}.dashed{stroke-dasharray:5 4}"
+        ".tail{fill:currentColor;font-size:12px}";
     double top = 84, half = 0.5 * (WIDTH - 3 * MARGIN), right = 2 * MARGIN + half;
     // the picture's height is known once all is drawn: panels come first into a text of their own
     char *body = NULL;
@@ -466,10 +469,10 @@ static bool draw(const Chart *chart)
         return false;
     }
     fprintf(chart->out,
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-labelledby=\"chart-title chart-text\" viewBox=\"0 0 %d %.0f\" width=\"%d\" height=\"%.0f\">\n"
-            "<title id=\"chart-title\">Collision: local blobby models against meshes, grids and the exact wall</title>\n<desc id=\"chart-text\">Detection time by surface, "
-            "error against time, growth with the model, artificial friction and work lost; logarithmic axes.</desc>\n<style>%s</style>\n"
-            "<rect width=\"100%%\" height=\"100%%\" fill=\"#fff\"/>\n"
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-labelledby=\"chart-title chart-text\" viewBox=\"0 0 %d %.0f\" width=\"%d\" "
+            "height=\"%.0f\">\n<title id=\"chart-title\">Collision: local blobby models against meshes, grids and the exact wall</title>\n"
+            "<desc id=\"chart-text\">Detection time by surface, error against time, growth with the model, artificial friction and work lost; logarithmic "
+            "axes.</desc>\n<style>%s</style>\n<rect width=\"100%%\" height=\"100%%\" fill=\"#fff\"/>\n"
             "<text x=\"%d\" y=\"34\" style=\"font-size:20px;font-weight:600\">Collision with the wall of a vessel, by representation</text>\n"
             "<text class=\"axis\" x=\"%d\" y=\"56\">seldinger bench collision; one run, CPU time of one core</text>\n%s</svg>\n",
             WIDTH, top, WIDTH, top, style, MARGIN, MARGIN, body);

@@ -116,7 +116,7 @@ static void close_wall(Wall *wall)
 
 static bool measure(Growth *g, const Wall *wall, const Vessel *vessel, Figures *figures)
 {
-    figures->wire_ns = course_ns(vessel, 1, &wall->wire, g->runs);
+    figures->wire_ns = course_ns(vessel, 1, &wall->wire, 2 * g->runs);
     figures->spread_ns = course_ns(vessel, 1, &wall->spread, g->runs);
     return (course_error(vessel, &wall->spread, &figures->error) && figures->wire_ns > 0 && figures->spread_ns > 0) ||
            fault(g, "a wall that gives no answers");
@@ -158,11 +158,20 @@ static void add_growth(Growth *g, const Wall *wall, const char *search, int tria
     cJSON_AddNumberToObject(row, "build_s", build_s);
 }
 
+// Without the last search: "-".
+static void print_times(FILE *out, double full, double warm, double cached)
+{
+    fprintf(out, "|%7.0f %6.0f ", full, warm);
+    fprintf(out, cached > 0 ? "%6.0f " : "     - ", cached);
+}
+
 static void print_growth(FILE *out, const char *what, const Figures f[SEARCHES], double bytes, double surface_s, double build_s)
 {
-    fprintf(out, "  %10s |%6.0f %6.0f %6.0f |%7.0f %6.0f %6.0f | %8.3f %8.3f | %7.4f %7.3f | %8.2f |%6.2f %6.2f\n", what, f[0].wire_ns, f[1].wire_ns, f[2].wire_ns,
-            f[0].spread_ns, f[1].spread_ns, f[2].spread_ns, f[2].error.gap_rms_um, f[2].error.gap_max_um, f[2].error.normal_rms_deg, f[2].error.normal_max_deg,
-            bytes / 1e6, surface_s, build_s);
+    fprintf(out, "  %10s ", what);
+    print_times(out, f[0].wire_ns, f[1].wire_ns, f[2].wire_ns);
+    print_times(out, f[0].spread_ns, f[1].spread_ns, f[2].spread_ns);
+    fprintf(out, "| %8.3f %8.3f | %7.4f %7.3f | %8.2f |%6.2f %6.2f\n", f[0].error.gap_rms_um, f[0].error.gap_max_um, f[0].error.normal_rms_deg,
+            f[0].error.normal_max_deg, bytes / 1e6, surface_s, build_s);
     fflush(out);
 }
 
@@ -175,9 +184,10 @@ static Vessel *mesh_vessel_of(const Wall *wall, const TriangleMesh *mesh, MeshSe
 
 static bool measure_mesh(Growth *g, const Wall *wall, const TriangleMesh *mesh, double surface_s)
 {
+    enum { LARGEST_CACHED = 2000000 };   // beyond, what that search needs takes some half a minute to make
     Figures f[SEARCHES] = {0};
     double bytes = 0, build_s = 0;
-    for (int k = 0; k < SEARCHES; k++) {
+    for (int k = 0; k < SEARCHES && (search_kind[k] != MESH_SEARCH_CACHED || mesh->triangle_count <= LARGEST_CACHED); k++) {
         double begin = collision_build_clock_s();
         Vessel *vessel = mesh_vessel_of(wall, mesh, search_kind[k], g->faults);
         if (!vessel)
@@ -245,8 +255,8 @@ static bool grow_wall(Growth *g, Wall *wall, const VesselTree *model, double fit
         return false;
     fprintf(g->out, "\n%s: nanoseconds a query, for 80 points along one stretch (wire) and %d all over; errors against the wall that was meshed\n", wall->name,
             SPREAD_POINTS);
-    fputs("   triangles |  wire: full   warm cached | all over: full  warm cached | gap rms, max um | normal rms, max deg | MB | s: surface, build\n", g->out);
-    int largest_grid = g->quick ? 16000 : 64000;
+    fputs("   triangles |  wire: full warm cached | all over: full warm cached| gap rms, max um | normal rms, max deg | MB | s: surface, build\n", g->out);
+    int largest_grid = g->quick ? 4000 : 64000;
     if (!mesh_vessel_available())
         fputs("  built without Embree: no meshes\n", g->out);
     if (!grow_mesh(g, wall, mesh_vessel_available() ? largest : largest_grid, largest_grid))
@@ -305,7 +315,8 @@ static bool grow_phantom(Growth *g, const Phantom *p)
 static bool grow_tube(Growth *g)
 {
     static const char name[] = "exact tube";
-    static const TubePiece piece[] = {{.length = 10}, {.arc_radius = 6, .angle = 2 * PI / 3}, {.arc_radius = 8, .angle = 5 * PI / 6, .plane = PI / 2}, {.length = 10}};
+    static const TubePiece piece[] = {{.length = 10}, {.arc_radius = 6, .angle = 2 * PI / 3}, {.arc_radius = 8, .angle = 5 * PI / 6, .plane = PI / 2},
+                                      {.length = 10}};
     const TubeOptions options = {.direction = {1, 0, 0}, .normal = {0, 1, 0}, .radius = 1.5, .piece_count = 4, .piece = piece, .closed_ends = true};
     Vessel *tube = tube_vessel_create(&options, name, g->faults);
     VesselTree *samples = tube ? tube_tree(tube, &options, name, g->faults) : NULL;
@@ -313,7 +324,7 @@ static bool grow_tube(Growth *g)
     VesselTree *model = samples ? fit(g, samples, 0, shape_options_voxel_mm(0, NULL)) : NULL;
     double fit_s = collision_build_clock_s() - begin;
     Wall wall = {.name = name, .exact = tube, .nodes = samples};
-    bool good = model && grow_wall(g, &wall, model, fit_s, g->quick ? 16000 : 256000);
+    bool good = model && grow_wall(g, &wall, model, fit_s, g->quick ? 16000 : 64000);
     close_wall(&wall);
     vessel_tree_free(model);
     vessel_tree_free(samples);
@@ -396,7 +407,7 @@ static VesselTree *strands(const VesselTree *helix, int nodes)
     return NULL;
 }
 
-enum { TOOLS = 250, TOOL_STEPS = 4, LOCATIONS = 20 };
+enum { FIELDS = LIM_BLEND + 1, TOOLS = 250, TOOL_STEPS = 4, LOCATIONS = 20 };
 typedef struct SizeFigures {
     double warm_ns, cold_ns, first_us, next_us, build_s;
     size_t bytes;
@@ -438,26 +449,58 @@ static bool place_tools(const Vessel *vessel, const VesselTree *tree, Course *wi
     return good;
 }
 
-static bool measure_size(Growth *g, const VesselTree *tree, LimField field, SizeFigures *f)
+typedef struct Size {
+    VesselTree *tree;
+    Vessel *vessel[FIELDS];
+    Course wire, *tool;      // both fields are asked at the same places
+    int tools;
+    SizeFigures figures[FIELDS];
+} Size;
+
+static bool open_size(Growth *g, const VesselTree *helix, int nodes, Size *s)
 {
-    int tools = g->quick ? TOOLS / 5 : TOOLS;
-    Course wire = {0}, *tool = calloc((size_t)tools, sizeof *tool);
-    double begin = collision_build_clock_s();
-    Vessel *vessel = lim_of(tree, field);
-    *f = (SizeFigures){.build_s = collision_build_clock_s() - begin};
-    bool good = vessel && tool && place_tools(vessel, tree, &wire, tools, tool);
-    if (good) {
-        f->bytes = vessel->bytes;
-        f->warm_ns = course_ns(vessel, 1, &wire, 3 * g->runs);
-        f->cold_ns = course_ns(vessel, tools, tool, g->runs);
-        time_locations(vessel, tools, tool, f);
-        good = f->warm_ns > 0 && f->cold_ns > 0;
+    s->tools = g->quick ? TOOLS / 5 : TOOLS;
+    s->tool = calloc((size_t)s->tools, sizeof *s->tool);
+    s->tree = strands(helix, nodes);
+    for (int field = 0; s->tree && field < FIELDS; field++) {
+        double begin = collision_build_clock_s();
+        s->vessel[field] = lim_of(s->tree, (LimField)field);
+        s->figures[field] = (SizeFigures){.build_s = collision_build_clock_s() - begin, .warm_ns = HUGE_VAL};
     }
-    destroy(vessel);
-    course_free(&wire);
-    for (int k = 0; tool && k < tools; k++)
-        course_free(&tool[k]);
-    free(tool);
+    return (s->tool && s->vessel[LIM_SWITCH] && s->vessel[LIM_BLEND] && place_tools(s->vessel[LIM_BLEND], s->tree, &s->wire, s->tools, s->tool)) ||
+           fault(g, "not enough memory for a large tree");
+}
+
+static void close_size(Size *s)
+{
+    for (int field = 0; field < FIELDS; field++)
+        destroy(s->vessel[field]);
+    course_free(&s->wire);
+    for (int k = 0; s->tool && k < s->tools; k++)
+        course_free(&s->tool[k]);
+    free(s->tool);
+    vessel_tree_free(s->tree);
+}
+
+// The wire is measured on all sizes in turn, again and again, so that a busy moment of the machine falls on all of them.
+static bool measure_sizes(Growth *g, int count, Size *size)
+{
+    bool good = true;
+    for (int round = 0; good && round < 5 * g->runs; round++)
+        for (int k = 0; k < count * FIELDS; k++) {
+            Size *s = &size[k / FIELDS];
+            double ns = course_ns(s->vessel[k % FIELDS], 1, &s->wire, 2);
+            s->figures[k % FIELDS].warm_ns = fmin(s->figures[k % FIELDS].warm_ns, ns);
+            good = good && ns > 0;
+        }
+    for (int k = 0; k < count * FIELDS; k++) {
+        Size *s = &size[k / FIELDS];
+        SizeFigures *f = &s->figures[k % FIELDS];
+        f->bytes = s->vessel[k % FIELDS]->bytes;
+        f->cold_ns = course_ns(s->vessel[k % FIELDS], s->tools, s->tool, g->runs);
+        time_locations(s->vessel[k % FIELDS], s->tools, s->tool, f);
+        good = good && f->cold_ns > 0;
+    }
     return good || fault(g, "not enough memory for a large tree");
 }
 
@@ -473,41 +516,46 @@ static void add_size(Growth *g, const char *field, const VesselTree *tree, const
     cJSON_AddNumberToObject(row, "next_us", f->next_us);
     cJSON_AddNumberToObject(row, "bytes", (double)f->bytes);
     cJSON_AddNumberToObject(row, "build_s", f->build_s);
-    fprintf(g->out, "  %-6s %7d %8lld | %6.1f %6.1f | %8.1f %6.2f | %8.2f %6.2f\n", field, tree->node_count, (long long)tree->blob_count, f->warm_ns, f->cold_ns,
-            f->first_us, f->next_us, (double)f->bytes / 1e6, f->build_s);
+    fprintf(g->out, "  %-6s %7d %8lld | %6.1f %6.1f | %8.1f %6.2f | %8.2f %6.2f\n", field, tree->node_count, (long long)tree->blob_count, f->warm_ns,
+            f->cold_ns, f->first_us, f->next_us, (double)f->bytes / 1e6, f->build_s);
     fflush(g->out);
+}
+
+static void print_sizes(Growth *g, int count, const Size *size)
+{
+    static const char *const field_name[FIELDS] = {[LIM_SWITCH] = "switch", [LIM_BLEND] = "blend"};
+    fprintf(g->out, "\nLocal models of a helix that winds on: nanoseconds a query, for one wire of %d points, and for %d of them all over the tree in turn "
+            "(far apart)\n", WIRE_POINTS, size[0].tools);
+    fputs("  field    nodes    blobs |  wire   far apart | us: first location, next from there | MB, s to build\n", g->out);
+    for (int field = 0; field < FIELDS; field++) {
+        double least = HUGE_VAL, most = 0;
+        for (int k = 0; k < count; k++) {
+            add_size(g, field_name[field], size[k].tree, &size[k].figures[field]);
+            least = fmin(least, size[k].figures[field].warm_ns);
+            most = fmax(most, size[k].figures[field].warm_ns);
+        }
+        fprintf(g->out, "  %-6s the slowest of these sizes takes %.2f times as long for the wire as the fastest\n", field_name[field], most / least);
+    }
 }
 
 static bool grow_model(Growth *g)
 {
-    static const char *const field_name[] = {[LIM_SWITCH] = "switch", [LIM_BLEND] = "blend"};
+    enum { SIZES = 4 };
     static const char option[3][2][64] = {{"turns", "3.5"}, {"rise_mm", "21"}, {"points", "60"}};
-    VesselTree *samples = shape_tree("helix", 3, option, "bench collision", g->faults), *helix = samples ? fit(g, samples, 0, shape_options_voxel_mm(0, NULL)) : NULL;
+    static const int nodes[SIZES] = {100, 1000, 10000, 100000};
+    VesselTree *samples = shape_tree("helix", 3, option, "bench collision", g->faults);
+    VesselTree *helix = samples ? fit(g, samples, 0, shape_options_voxel_mm(0, NULL)) : NULL;
+    Size size[SIZES] = {0};
+    int count = g->quick ? SIZES - 1 : SIZES;
+    bool good = helix && (helix->node_count > FIRST + PERIOD + SPAN || fault(g, "the helix is too short to be wound on"));
+    for (int k = 0; good && k < count; k++)
+        good = open_size(g, helix, nodes[k], &size[k]);
+    good = good && measure_sizes(g, count, size);
+    if (good)
+        print_sizes(g, count, size);
+    for (int k = 0; k < count; k++)
+        close_size(&size[k]);
     vessel_tree_free(samples);
-    if (!helix || helix->node_count < FIRST + PERIOD + SPAN + 1) {
-        vessel_tree_free(helix);
-        return helix ? fault(g, "the helix is too short to be wound on") : false;
-    }
-    fprintf(g->out, "\nLocal models of a helix that winds on: nanoseconds a query, for one wire of %d points, and for %d of them all over the tree in turn (far apart)\n",
-            WIRE_POINTS, g->quick ? TOOLS / 5 : TOOLS);
-    fputs("  field    nodes    blobs |  wire   far apart | us: first location, next from there | MB, s to build\n", g->out);
-    bool good = true;
-    for (LimField field = LIM_SWITCH; good && field <= LIM_BLEND; field++) {
-        double least = HUGE_VAL, most = 0;
-        for (int nodes = 100; good && nodes <= (g->quick ? 10000 : 100000); nodes *= 10) {
-            VesselTree *tree = strands(helix, nodes);
-            SizeFigures f;
-            good = tree ? measure_size(g, tree, field, &f) : fault(g, "not enough memory for a large tree");
-            if (good) {
-                add_size(g, field_name[field], tree, &f);
-                least = fmin(least, f.warm_ns);
-                most = fmax(most, f.warm_ns);
-            }
-            vessel_tree_free(tree);
-        }
-        if (good)
-            fprintf(g->out, "  %-6s the slowest of these sizes takes %.2f times as long as the fastest\n", field_name[field], most / least);
-    }
     vessel_tree_free(helix);
     return good;
 }
@@ -532,14 +580,14 @@ static bool measure_true_mesh(Growth *g, const Wall *wall, const TriangleMesh *m
     return good;
 }
 
-// The mesh whose gap is as wrong as `error_um`: the error goes with one over the triangles. One correction.
+// The mesh whose gap is as wrong as `error_um` to a tenth, from one of other size: the error goes with one over the triangles, less so where they are few.
 static bool match_mesh(Growth *g, Wall *wall, double error_um, MeshPoint *point)
 {
-    enum { MOST = 400000 };
+    enum { ROUNDS = 3, MOST = 400000 };
     bool good = true;
-    for (int round = 0; good && round < 2; round++) {
-        double wanted = point->triangles * point->figures.error.gap_rms_um / error_um;
-        if (fabs(wanted / point->triangles - 1) < 0.05 || wanted > MOST)
+    for (int round = 0; good && round < ROUNDS; round++) {
+        double ratio = point->figures.error.gap_rms_um / error_um, wanted = point->triangles * ratio;
+        if (fabs(ratio - 1) < 0.1 || wanted > MOST)
             return true;
         TriangleMesh *mesh = mesh_wall(wall, wanted, g->faults);
         good = mesh && measure_true_mesh(g, wall, mesh, point);
@@ -599,11 +647,11 @@ static bool match_blobs(Growth *g, const Phantom *p)
     triangle_mesh_free(first);
     if (good) {
         fputs("\nThe phantom's true wall: blobs, and triangles of the mesh (cached) with the same rms error of the gap\n", g->out);
-        fputs("  LIM: gap um, normal deg | target mm, blobs, MB, ns wire, all over, s to fit | mesh: gap um, normal deg, triangles, MB, ns wire, all over\n", g->out);
+        fputs("  LIM: gap um, normal deg | target mm, blobs, MB, ns wire, all over, s to fit | mesh: gap um, normal deg, triangles, MB, ns wire, all over\n",
+              g->out);
     }
     for (size_t k = 0; good && k < sizeof target / sizeof target[0]; k++)
-        if (!g->quick || k == 1)
-            good = match_target(g, &wall, target[k], shape_voxel_mm(p->shape), &mesh);
+        good = match_target(g, &wall, target[k], shape_voxel_mm(p->shape), &mesh);
     close_wall(&wall);
     destroy(exact);
     return good;
@@ -654,7 +702,8 @@ static bool add_memory(Growth *g, const Wall *wall, double length, const MemoryR
     if (m->vessel) {
         cJSON_AddNumberToObject(row, "build_s", m->build_s);
         add_figures(row, &f);
-        fprintf(g->out, " %6.0f %6.0f | %8.3f %8.3f %7.3f | %6.2f", f.wire_ns, f.spread_ns, f.error.gap_rms_um, f.error.gap_max_um, f.error.normal_rms_deg, m->build_s);
+        fprintf(g->out, " %6.0f %6.0f | %8.3f %8.3f %7.3f | %6.2f", f.wire_ns, f.spread_ns, f.error.gap_rms_um, f.error.gap_max_um, f.error.normal_rms_deg,
+                m->build_s);
     }
     fputc('\n', g->out);
     fflush(g->out);
@@ -704,7 +753,7 @@ static bool largest_tree(Growth *g)
     }
     Vessel *lim = model ? lim_of(model, LIM_BLEND) : NULL;
     Wall wall = {.name = path, .exact = lim, .nodes = model};
-    TriangleMesh *mesh = lim ? mesh_wall(&wall, g->quick ? 25000 : 100000, g->faults) : NULL;
+    TriangleMesh *mesh = lim ? mesh_wall(&wall, 100000, g->faults) : NULL;
     bool good = mesh && open_wall(g, &wall, mesh) && compare_memory(g, &wall, mesh);
     triangle_mesh_free(mesh);
     close_wall(&wall);
@@ -715,13 +764,15 @@ static bool largest_tree(Growth *g)
 
 bool collision_growth(FILE *out, cJSON *into, bool quick, int threads, Faults *faults)
 {
-    Growth g = {.out = out, .quick = quick, .threads = threads, .runs = quick ? 3 : 9, .faults = faults};
+    Growth g = {.out = out, .quick = quick, .threads = threads, .runs = quick ? 3 : 7, .faults = faults};
     g.growth = cJSON_AddArrayToObject(into, "growth");
     g.sizes = cJSON_AddArrayToObject(into, "sizes");
     g.match = cJSON_AddArrayToObject(into, "blobs_to_match");
     g.memory = cJSON_AddArrayToObject(into, "memory");
     Phantom phantom = {0};
-    bool good = open_phantom(&g, &phantom) && grow_phantom(&g, &phantom) && grow_tube(&g) && grow_model(&g) && match_blobs(&g, &phantom) && largest_tree(&g);
+    bool good = open_phantom(&g, &phantom) && grow_phantom(&g, &phantom) && grow_tube(&g) && grow_model(&g) &&
+                (quick ? fputs("\nBlobs and triangles for the same error, and the memory of the largest tree: left out where quick\n", out) >= 0
+                       : match_blobs(&g, &phantom) && largest_tree(&g));
     close_phantom(&phantom);
     return good;
 }
