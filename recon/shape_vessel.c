@@ -8,6 +8,7 @@
 
 static const double LENGTH = 5;              // [radii]
 static const double NUDGE = 1e-6;            // [radii] off the centreline
+static const double ASIDE = 0.02;            // [radii] of starts beside x
 static const double STEP = 1e-4;             // [radii] of the differences
 
 typedef struct ShapeVessel {
@@ -56,6 +57,27 @@ static Sym3 hessian_at(const Shape *shape, Vec3 foot, Vec3 n, double gap, double
                   e[0].y * u.y + e[1].y * v.y, e[0].y * u.z + e[1].y * v.z, e[0].z * u.z + e[1].z * v.z};
 }
 
+// The foot of x, and the side of the wall that x is on. On a part's centreline, and between two, the field has no slope to fall along, or one to a foot that is
+// not the nearest: where the way to the foot is much more than the field (which is never more than the distance), starts beside x are tried too.
+static double closest_foot(const Shape *shape, Vec3 x, const Station *section, Vec3 *foot)
+{
+    Vec3 along = vec3_unit(section->tangent), u = vec3_normal_to(along), v = vec3_cross(along, u);
+    const Vec3 aside[5] = {{0, 0, 0}, u, v, vec3_negate(u), vec3_negate(v)};
+    double field = shape_field(shape, x, NULL), least = HUGE_VAL, r = section->radius;
+    bool on_axis = vec3_distance(x, section->center) < NUDGE * r;
+    for (int k = on_axis; k < 5 && !(least < fabs(field) + 0.05 * r); k++) {
+        Vec3 p;
+        shape_distance(shape, vec3_add_scaled(x, on_axis ? NUDGE * r : ASIDE * r, aside[k]), &p);
+        if (fabs(shape_field(shape, p, NULL)) < 1e-9 * fmax(1, r) && vec3_distance(x, p) < least) {
+            least = vec3_distance(x, p);
+            *foot = p;
+        }
+    }
+    if (least == HUGE_VAL)
+        shape_distance(shape, x, foot);
+    return field < 0 ? -1 : 1;
+}
+
 static VesselHit hit_at(const Shape *shape, Vec3 x, VesselMemory *memory)
 {
     VesselHit hit = {.node = 0};
@@ -81,11 +103,9 @@ static VesselHit hit_at(const Shape *shape, Vec3 x, VesselMemory *memory)
         hit.flags = VESSEL_OPEN_END;
         return hit;
     }
-    // on a part's centreline the field has no slope to fall along: all feet around are as near, one is taken
-    Vec3 foot, start = x;
-    if (vec3_distance(x, section.center) < NUDGE * section.radius)
-        start = vec3_add_scaled(x, NUDGE * section.radius, vec3_normal_to(vec3_unit(section.tangent)));
-    hit.gap = copysign(1, shape_distance(shape, start, &foot)) * vec3_distance(x, foot);
+    Vec3 foot;
+    double sign = closest_foot(shape, x, &section, &foot);
+    hit.gap = sign * vec3_distance(x, foot);
     hit.normal = normal_at(shape, foot);
     hit.hessian = hessian_at(shape, foot, hit.normal, hit.gap, STEP * section.radius);
     hit.flags = beyond > 0 ? VESSEL_BEYOND : 0;

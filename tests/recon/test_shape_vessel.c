@@ -136,6 +136,48 @@ static void feet_are_nearest(void **state)
     }
 }
 
+// Deep inside, where several walls are about as near, the foot is that of the nearest or of one hardly further.
+static void clearance_is_no_more_than_the_wall(void **state)
+{
+    (void)state;
+    const char *const name[] = {"y", "bifurcation", "twig"};
+    for (int k = 0; k < 3; k++) {
+        Shape *shape = make(name[k], 0, NULL);
+        VesselTree *tree = shape_sample(shape, &faults);
+        Vessel *truth = shape_vessel_create(shape);
+        uint64_t seed = 31;
+        for (int asked = 0; asked < (is_slow ? 100 : 600); asked++) {
+            int node = (int)random_in(&seed, 0, tree->node_count);
+            Vec3 x = vec3_add(tree->center[node], random_in_box(&seed, (asked % 3 ? 0.05 : 0.8) * tree->radius[node]));
+            VesselHit hit = ask(truth, x);
+            if (hit.flags)
+                continue;
+            assert_true(fabs(hit.gap) >= fabs(shape_field(shape, x, NULL)) - 1e-9);
+            for (int64_t i = 0; i < tree->point_count; i++)
+                assert_true(vec3_distance(x, tree->point[i]) > fabs(hit.gap) - 0.06 * tree->radius[node]);
+        }
+        truth->destroy(truth);
+        vessel_tree_free(tree);
+        shape_free(shape);
+    }
+}
+
+// Between two centrelines that part the field is flat: there, too, the wall is a radius away, and up to the joint's 0.1 mm more.
+static void flat_fields(void **state)
+{
+    (void)state;
+    Shape *shape = make("bifurcation", 0, NULL);   // both arcs leave (0, 0, 0) along x, radius 1, bending with radius 4
+    Vessel *truth = shape_vessel_create(shape);
+    for (int i = 0; i <= 200; i++) {
+        double x = 1e-4 * i;
+        VesselHit hit = ask(truth, vec3(x, 0, 0));
+        assert_true(hit.gap > 0.99 && hit.gap < 1.11);
+        assert_near(vec3_norm(hit.normal), 1, 1e-12);
+    }
+    truth->destroy(truth);
+    shape_free(shape);
+}
+
 // Upstream of the inlet a cylinder for ever; beyond the other open end for five radii, then no wall.
 static void open_ends(void **state)
 {
@@ -247,8 +289,9 @@ static void models_as_triangles(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(capsule_and_arc_are_exact), cmocka_unit_test(feet_are_nearest), cmocka_unit_test(open_ends),
-        cmocka_unit_test(shapes_as_triangles), cmocka_unit_test(models_as_triangles),
+        cmocka_unit_test(capsule_and_arc_are_exact), cmocka_unit_test(feet_are_nearest), cmocka_unit_test(clearance_is_no_more_than_the_wall),
+        cmocka_unit_test(flat_fields), cmocka_unit_test(open_ends), cmocka_unit_test(shapes_as_triangles),
+        cmocka_unit_test(models_as_triangles),
     };
     return cmocka_run_group_tests_name("shape_vessel", tests, NULL, NULL);
 }
