@@ -684,32 +684,51 @@ static GroupMiddle middle_of(const MeshVessel *m, const TriangleGroup *g)
     return middle;
 }
 
-// The groups that share a vertex with `group`, the nearest GROUP_NEAR of them by their middles, itself first. first, of: the groups at each vertex.
-static void gather_near(const MeshVessel *m, int group, const GroupMiddle *middle, const size_t *first, const int *of, GroupSurroundings *around)
+typedef struct Ring {        // groups about one, itself first, the nearest by their middles
+    int count;
+    int group[GROUP_NEAR];
+    double far2[GROUP_NEAR];
+} Ring;
+
+static void add_to_ring(Ring *ring, int group, const GroupMiddle *middle)
 {
-    double far2[GROUP_NEAR] = {0};
-    around->group[0] = group;
-    around->count = 1;
+    int k = 0;
+    while (k < ring->count && ring->group[k] != group)
+        k++;
+    double far2 = vec3_norm2(vec3_sub(middle[group].place, middle[ring->group[0]].place));
+    if (k < ring->count || (ring->count == GROUP_NEAR && !(far2 < ring->far2[GROUP_NEAR - 1])))
+        return;
+    ring->count += ring->count < GROUP_NEAR;
+    for (k = ring->count - 1; k > 1 && ring->far2[k - 1] > far2; k--) {
+        ring->far2[k] = ring->far2[k - 1];
+        ring->group[k] = ring->group[k - 1];
+    }
+    ring->far2[k] = far2;
+    ring->group[k] = group;
+}
+
+// Those that share a vertex with it. first, of: the groups at each vertex.
+static void gather_ring(const MeshVessel *m, int group, const GroupMiddle *middle, const size_t *first, const int *of, Ring *ring)
+{
+    *ring = (Ring){.count = 1, .group = {group}};
     for (int i = 0; i < 3 * GROUP_TRIANGLES; i++) {
         int v = m->corner[m->group[group].triangle[i / 3]][i % 3];
-        for (size_t at = first[v]; at < first[v + 1]; at++) {
-            int other = of[at], k = 0;
-            while (k < around->count && around->group[k] != other)
-                k++;
-            double d2 = vec3_norm2(vec3_sub(middle[other].place, middle[group].place));
-            if (k < around->count || (around->count == GROUP_NEAR && !(d2 < far2[GROUP_NEAR - 1])))
-                continue;
-            around->count += around->count < GROUP_NEAR;
-            for (k = around->count - 1; k > 1 && far2[k - 1] > d2; k--) {
-                far2[k] = far2[k - 1];
-                around->group[k] = around->group[k - 1];
-            }
-            far2[k] = d2;
-            around->group[k] = other;
-        }
+        for (size_t at = first[v]; at < first[v + 1]; at++)
+            add_to_ring(ring, of[at], middle);
     }
-    around->origin = middle[group].place;
-    around->axis[2] = m->group[group].facing;
+}
+
+// And of those around these as many as there is room for: the wider the neighbourhood, the more the balls may hold.
+static void set_neighbourhood(const MeshVessel *m, int group, const GroupMiddle *middle, const Ring *ring, GroupSurroundings *around)
+{
+    Ring wide = ring[group];
+    for (int i = 1; i < ring[group].count; i++) {
+        const Ring *next = &ring[ring[group].group[i]];
+        for (int k = 1; k < next->count; k++)
+            add_to_ring(&wide, next->group[k], middle);
+    }
+    *around = (GroupSurroundings){.count = wide.count, .origin = middle[group].place, .axis = {[2] = m->group[group].facing}};
+    memcpy(around->group, wide.group, sizeof around->group);
     around->axis[0] = vec3_normal_to(around->axis[2]);
     around->axis[1] = vec3_cross(around->axis[2], around->axis[0]);
     group_set_bounds(around, m->group, &m->mesh);
@@ -742,7 +761,8 @@ static bool set_surroundings(MeshVessel *m)
     GroupMiddle *middle = malloc(groups * sizeof *middle);
     size_t *first = calloc((size_t)m->vertex_count + 2, sizeof *first);
     int *of = malloc(sides * sizeof *of);
-    bool good = m->around && middle && first && of;
+    Ring *ring = malloc(groups * sizeof *ring);
+    bool good = ring && m->around && middle && first && of;
     for (size_t i = 0; good && i < sides; i++)
         first[m->corner[i / 3][i % 3] + 2]++;
     for (int v = 2; good && v < m->vertex_count + 2; v++)
@@ -751,11 +771,13 @@ static bool set_surroundings(MeshVessel *m)
         of[first[m->corner[i / 3][i % 3] + 1]++] = m->group_of[i / 3];
     for (int g = 0; good && g < m->group_count; g++)
         middle[g] = middle_of(m, &m->group[g]);
+    for (int g = 0; good && g < m->group_count; g++)
+        gather_ring(m, g, middle, first, of, &ring[g]);
     for (int g = 0; good && g < m->group_count; g++) {
-        memset(&m->around[g], 0, sizeof m->around[g]);
-        gather_near(m, g, middle, first, of, &m->around[g]);
+        set_neighbourhood(m, g, middle, ring, &m->around[g]);
         blow_balls(m, &middle[g], &m->around[g]);
     }
+    free(ring);
     free(middle);
     free(first);
     free(of);

@@ -1,9 +1,9 @@
 // A mesh's triangles in groups of eight that lie together, for closest-point searches: a group is looked at in one go, and knows the groups around it.
 //
-// With each group o stand its neighbourhood N(o) (the groups that share a vertex with it, itself first) and balls on the lumen's side, each as large as
-// fits between the triangles that are not in N(o): no such triangle is nearer to the ball's centre c than its radius r. So if d is the distance from X
-// to the nearest triangle of N(o) and |X - c| + d < r, the ball of radius d about X lies within the other one, nothing outside N(o) reaches into it, and d
-// is the distance to the whole mesh. This holds wherever X is and wherever it came from; nothing has to be remembered but o.
+// With each group o stand its neighbourhood N(o) (itself first, then the nearest about it, at most GROUP_NEAR in all) and balls on the lumen's side, each
+// as large as fits between the triangles that are not in N(o): no such triangle is nearer to the ball's centre c than its radius r. So if d is the
+// distance from X to the nearest triangle of N(o) and |X - c| + d < r, the ball of radius d about X lies within the other one, nothing outside N(o)
+// reaches into it, and d is the distance to the whole mesh. This holds wherever X is and wherever it came from; nothing has to be remembered but o.
 // The balls touch the wall at the group's middle, with radii from a part of the group's own size to many times it; which helps depends on d.
 //
 // Coordinates are relative to the mesh's middle. Immutable once filled. All instruction sets give the same bits.
