@@ -67,7 +67,7 @@ ALWAYS void bounds(const GroupSurroundings *restrict s, Vec3 x, float *restrict 
 KERNELS(baseline, )
 #if defined(__x86_64__) && defined(__GNUC__)
 KERNELS(avx2, __attribute__((target("avx2"))))
-KERNELS(avx512, __attribute__((target("avx512f,avx512dq,avx512vl,prefer-vector-width=512"))))
+KERNELS(avx512, __attribute__((target("avx512f,avx512dq,avx512vl"))))
 
 const GroupKernels *group_kernels(int isa)
 {
