@@ -182,13 +182,12 @@ static bool is_proven(const GroupSurroundings *around, const Search *s)
     return false;
 }
 
-// The search in the neighbourhood of s->triangle, whose group has been looked at; true where that settles it.
-static bool search_around(Search *s)
+// The search in the neighbourhood of a group that has been looked at, and of that of what is closer there; true where that settles it.
+static bool search_around(Search *s, int own)
 {
     enum { ROUNDS = 3 };
     const MeshVessel *m = s->mesh;
     for (int round = 0; round < ROUNDS; round++) {
-        int own = m->group_of[s->triangle];
         const GroupSurroundings *around = &m->around[own];
         float d2[GROUP_NEAR];
         m->kernels->bounds(around, s->x, d2);
@@ -197,8 +196,10 @@ static bool search_around(Search *s)
                 look_at(s, around->group[i]);
         if (is_proven(around, s))
             return true;
-        if (m->group_of[s->triangle] == own)
+        int next = s->triangle >= 0 ? m->group_of[s->triangle] : own;
+        if (next == own)
             return false;
+        own = next;
     }
     return false;
 }
@@ -214,14 +215,16 @@ static int keeper_of(const MeshVessel *m, int triangle, int feature)
     return other >= 0 && other < triangle ? other : triangle;
 }
 
-// The closest triangle; `from`: a triangle to start from, -1: none is known.
-static int closest_triangle(const MeshVessel *m, Vec3 x, int from, Foot *foot)
+// The closest triangle, -1 where none is nearer than `limit`; `from`: a triangle to start from, -1: none is known.
+static int closest_triangle(const MeshVessel *m, Vec3 x, int from, double limit, Foot *foot)
 {
-    Search s = {.mesh = m, .x = x, .distance2 = HUGE_VAL, .triangle = -1};
+    Search s = {.mesh = m, .x = x, .distance2 = limit * limit, .triangle = -1};
     if (from >= 0)
         look_at(&s, m->group_of[from]);
-    if (from < 0 || !m->around || !search_around(&s))
+    if (from < 0 || !m->around || !search_around(&s, m->group_of[from]))
         search_tree(&s);
+    if (s.triangle < 0)
+        return -1;
     closest_of_triangle(m, s.triangle, x, foot);
     int keeper = keeper_of(m, s.triangle, foot->feature);
     if (keeper != s.triangle)
@@ -296,10 +299,15 @@ static Sym3 smooth_hessian(const MeshVessel *m, int triangle, double gap, Vec3 n
 // [rad] beyond it no smooth wall is meant.
 static const double TURN_MAX = 0.5;
 
-static void set_hit(const MeshVessel *m, Vec3 x, int from, VesselHit *hit)
+static void set_hit(const MeshVessel *m, Vec3 x, int from, double limit, VesselHit *hit)
 {
     Foot foot;
-    int triangle = closest_triangle(m, x, from, &foot);
+    int triangle = closest_triangle(m, x, from, limit, &foot);
+    if (triangle < 0) {
+        hit->gap = limit * (1 - 1e-12);
+        hit->flags = VESSEL_FAR;
+        return;
+    }
     hit->node = triangle;
     Vec3 away = vec3_sub(x, foot.p), pseudo = pseudonormal(m, triangle, foot.feature);
     double d = sqrt(foot.distance2), tiny = 1e-9 * m->size;
@@ -339,6 +347,7 @@ static void query_one(const MeshVessel *m, Vec3 point, double reach, VesselMemor
         return;
     }
     bool knows = is_known(m, memory->node) && m->options.search != MESH_SEARCH_FULL;
+    double limit = HUGE_VAL;
     if (knows && memory->clearance > 0) {
         double bound = memory->clearance - vec3_distance(point, memory->clear_place);
         if (bound > reach) {
@@ -346,8 +355,10 @@ static void query_one(const MeshVessel *m, Vec3 point, double reach, VesselMemor
             hit->flags = VESSEL_FAR;
             return;
         }
+        if (bound > 0 && reach > 0)      // still inside: beyond reach there is nothing to be known but a bound that will do for a while
+            limit = 2 * reach;
     }
-    set_hit(m, vec3_sub(point, m->middle), knows ? memory->node : -1, hit);
+    set_hit(m, vec3_sub(point, m->middle), knows ? memory->node : -1, limit, hit);
     memory->node = hit->node;
     // the distance changes by no more than the point moves
     memory->clearance = hit->gap > 0 && hit->gap < HUGE_VAL ? hit->gap * (1 - 1e-12) : 0;
@@ -367,7 +378,7 @@ static int mesh_locate(const Vessel *vessel, Vec3 point, int from)
     if (!(vec3_norm2(point) < 1e200))
         return knows ? from : 0;
     Foot foot;
-    return closest_triangle(m, vec3_sub(point, m->middle), knows ? from : -1, &foot);
+    return closest_triangle(m, vec3_sub(point, m->middle), knows ? from : -1, HUGE_VAL, &foot);
 }
 
 static bool mesh_inlet(const Vessel *vessel, Vec3 *point, Vec3 *direction)

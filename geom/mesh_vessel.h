@@ -6,7 +6,7 @@
 // edges and vertices that of a cylinder or sphere about them, held to what it is 0.02 mm away. Where the closest point lies on a rim (an edge of one
 // triangle) the query point is beyond it, and the answer is VESSEL_OPEN_END. node: index of a triangle, the lowest of those that share the closest point.
 // The closest point is the best of the whole mesh, so a point may change over to another branch whose wall is closer.
-// Points that are not finite (or beyond 1e100 mm) are VESSEL_UNSURE. VESSEL_FAR: only for points inside, where the last answer allows it.
+// Points that are not finite (or beyond 1e100 mm) are VESSEL_UNSURE. VESSEL_FAR: only for points that were inside and cannot have left.
 // Answers do not depend on the search, on what a point remembers, on the instruction set or on threads: all of them find the same triangle.
 // Built without Embree, no mesh vessel can be made, and the fault says so.
 #ifndef SELDINGER_GEOM_MESH_VESSEL_H
