@@ -236,7 +236,7 @@ static void far_points_are_bounded(void **state)
         Vec3 x = {0, 0, 0};
         for (int i = 0; i < 3000; i++) {
             Vec3 next = vec3_add(x, vec3_scale(random_unit(&seed), 0.05));
-            x = vec3_norm(next) < 1.3 ? next : vec3(0, 0, 0);
+            x = i % 30 == 29 ? random_in_box(&seed, 1.5) : vec3_norm(next) < 1.3 ? next : vec3(0, 0, 0);     // jumps out of the mesh, too
             double reach = 0.2;
             VesselHit hit, exact = ask_afresh(full, x);
             vessel_query(v, 1, &x, reach, &memory, &hit);
