@@ -408,8 +408,9 @@ static VesselTree *strands(const VesselTree *helix, int nodes)
 }
 
 enum { FIELDS = LIM_BLEND + 1, TOOLS = 250, TOOL_STEPS = 4, LOCATIONS = 20 };
+enum { STRETCH = 92, INLET = 4 };        // nodes that the 42 mm of a tool may take, and that the wall beyond the root's end is near
 typedef struct SizeFigures {
-    double warm_ns, cold_ns, first_us, next_us, build_s;
+    double warm_ns, cold_ns, strand_ns, first_us, next_us, build_s;
     size_t bytes;
 } SizeFigures;
 
@@ -435,16 +436,22 @@ static bool place_tool(const Vessel *vessel, const VesselTree *tree, int node, i
     return course_wire(vessel, tree, x, node, WIRE_POINTS, steps, tool);
 }
 
-static bool place_tools(const Vessel *vessel, const VesselTree *tree, Course *wire, int tools, Course *tool)
+// In the middle of the tree's middle strand.
+static bool place_wire(const Vessel *vessel, const VesselTree *tree, Course *wire)
 {
-    enum { STRETCH = 92, INLET = 4 };    // nodes that the 42 mm of a tool may take, and that the wall beyond the root's end is near
-    int last = tree->node_count - STRETCH, strand = tree->node_count < STRAND ? tree->node_count : STRAND;
-    bool good = place_tool(vessel, tree, tree->node_count / STRAND / 2 * STRAND + (strand - STRETCH) / 2, WIRE_STEPS, wire);
+    int strand = tree->node_count < STRAND ? tree->node_count : STRAND;
+    return place_tool(vessel, tree, tree->node_count / STRAND / 2 * STRAND + (strand - STRETCH) / 2, WIRE_STEPS, wire);
+}
+
+// Among `nodes` nodes from `first` on, all over them in no order: a golden ratio's steps round.
+static bool place_tools(const Vessel *vessel, const VesselTree *tree, int first, int nodes, int tools, Course *tool)
+{
+    int strand = nodes < STRAND ? nodes : STRAND;
+    bool good = true;
     for (int k = 0; good && k < tools; k++) {
-        // all over in no order: a golden ratio's steps round the tree
-        int node = (int)(fmod(k * 0.6180339887498949, 1) * last), along = node % STRAND;
+        int node = (int)(fmod(k * 0.6180339887498949, 1) * (nodes - STRETCH)), along = node % STRAND;
         node += along > strand - STRETCH ? strand - STRETCH - along : along < INLET ? INLET - along : 0;
-        good = place_tool(vessel, tree, node, TOOL_STEPS, &tool[k]);
+        good = place_tool(vessel, tree, first + node, TOOL_STEPS, &tool[k]);
     }
     return good;
 }
@@ -452,8 +459,9 @@ static bool place_tools(const Vessel *vessel, const VesselTree *tree, Course *wi
 typedef struct Size {
     VesselTree *tree;
     Vessel *vessel[FIELDS];
-    Course wire, *tool;      // both fields are asked at the same places
+    Course wire;             // both fields are asked at the same places
     int tools;
+    Course *tool, *close;    // (tools) all over the tree, and within its middle strand
     SizeFigures figures[FIELDS];
 } Size;
 
@@ -461,13 +469,18 @@ static bool open_size(Growth *g, const VesselTree *helix, int nodes, Size *s)
 {
     s->tools = g->quick ? TOOLS / 5 : TOOLS;
     s->tool = calloc((size_t)s->tools, sizeof *s->tool);
+    s->close = calloc((size_t)s->tools, sizeof *s->close);
     s->tree = strands(helix, nodes);
     for (int field = 0; s->tree && field < FIELDS; field++) {
         double begin = collision_build_clock_s();
         s->vessel[field] = lim_of(s->tree, (LimField)field);
         s->figures[field] = (SizeFigures){.build_s = collision_build_clock_s() - begin, .warm_ns = HUGE_VAL};
     }
-    return (s->tool && s->vessel[LIM_SWITCH] && s->vessel[LIM_BLEND] && place_tools(s->vessel[LIM_BLEND], s->tree, &s->wire, s->tools, s->tool)) ||
+    const Vessel *blend = s->vessel[LIM_BLEND];
+    int strand = nodes < STRAND ? nodes : STRAND;
+    return (s->tool && s->close && s->vessel[LIM_SWITCH] && blend && place_wire(blend, s->tree, &s->wire) &&
+            place_tools(blend, s->tree, 0, nodes, s->tools, s->tool) &&
+            place_tools(blend, s->tree, nodes / STRAND / 2 * STRAND, strand, s->tools, s->close)) ||
            fault(g, "not enough memory for a large tree");
 }
 
@@ -476,9 +489,12 @@ static void close_size(Size *s)
     for (int field = 0; field < FIELDS; field++)
         destroy(s->vessel[field]);
     course_free(&s->wire);
-    for (int k = 0; s->tool && k < s->tools; k++)
+    for (int k = 0; s->tool && s->close && k < s->tools; k++) {
         course_free(&s->tool[k]);
+        course_free(&s->close[k]);
+    }
     free(s->tool);
+    free(s->close);
     vessel_tree_free(s->tree);
 }
 
@@ -498,8 +514,9 @@ static bool measure_sizes(Growth *g, int count, Size *size)
         SizeFigures *f = &s->figures[k % FIELDS];
         f->bytes = s->vessel[k % FIELDS]->bytes;
         f->cold_ns = course_ns(s->vessel[k % FIELDS], s->tools, s->tool, g->runs);
+        f->strand_ns = course_ns(s->vessel[k % FIELDS], s->tools, s->close, g->runs);
         time_locations(s->vessel[k % FIELDS], s->tools, s->tool, f);
-        good = good && f->cold_ns > 0;
+        good = good && f->cold_ns > 0 && f->strand_ns > 0;
     }
     return good || fault(g, "not enough memory for a large tree");
 }
@@ -512,21 +529,22 @@ static void add_size(Growth *g, const char *field, const VesselTree *tree, const
     cJSON_AddNumberToObject(row, "blobs", (double)tree->blob_count);
     cJSON_AddNumberToObject(row, "ns_warm", f->warm_ns);
     cJSON_AddNumberToObject(row, "ns_cold", f->cold_ns);
+    cJSON_AddNumberToObject(row, "ns_one_strand", f->strand_ns);
     cJSON_AddNumberToObject(row, "first_us", f->first_us);
     cJSON_AddNumberToObject(row, "next_us", f->next_us);
     cJSON_AddNumberToObject(row, "bytes", (double)f->bytes);
     cJSON_AddNumberToObject(row, "build_s", f->build_s);
-    fprintf(g->out, "  %-6s %7d %8lld | %6.1f %6.1f | %8.1f %6.2f | %8.2f %6.2f\n", field, tree->node_count, (long long)tree->blob_count, f->warm_ns,
-            f->cold_ns, f->first_us, f->next_us, (double)f->bytes / 1e6, f->build_s);
+    fprintf(g->out, "  %-6s %7d %8lld | %6.1f %9.1f %12.1f | %8.1f %6.2f | %8.2f %6.2f\n", field, tree->node_count, (long long)tree->blob_count, f->warm_ns,
+            f->cold_ns, f->strand_ns, f->first_us, f->next_us, (double)f->bytes / 1e6, f->build_s);
     fflush(g->out);
 }
 
 static void print_sizes(Growth *g, int count, const Size *size)
 {
     static const char *const field_name[FIELDS] = {[LIM_SWITCH] = "switch", [LIM_BLEND] = "blend"};
-    fprintf(g->out, "\nLocal models of a helix that winds on: nanoseconds a query, for one wire of %d points, and for %d of them all over the tree in turn "
-            "(far apart)\n", WIRE_POINTS, size[0].tools);
-    fputs("  field    nodes    blobs |  wire   far apart | us: first location, next from there | MB, s to build\n", g->out);
+    fprintf(g->out, "\nLocal models of a helix that winds on, 1000 nodes a strand: nanoseconds a query, for one wire of %d points, for %d wires all over the "
+            "tree in turn\n(far apart: what they touch outgrows the caches), and for as many in one strand\n", WIRE_POINTS, size[0].tools);
+    fputs("  field    nodes    blobs |   wire far apart   one strand | us: first location, next from there | MB, s to build\n", g->out);
     for (int field = 0; field < FIELDS; field++) {
         double least = HUGE_VAL, most = 0;
         for (int k = 0; k < count; k++) {
