@@ -22,7 +22,7 @@ void blob_groups_fill(BlobGroup *group, const Blobby *model)
 }
 
 #define KERNEL_TABLE(isa) \
-    {#isa, gradient_##isa, hessian_##isa, predict_##isa, newton_##isa, finish_##isa, estimate_##isa, partner_##isa, mix_##isa, near_##isa}
+    {#isa, gradient_##isa, hessian_##isa, predict_##isa, newton_##isa, finish_##isa, estimate_##isa, partner_##isa, mix_##isa, settle_##isa, near_##isa}
 
 #define WIDTH 2
 #define TARGET

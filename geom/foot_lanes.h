@@ -20,10 +20,13 @@
 
 #include <stdbool.h>
 
-enum { FOOT_BATCH = 32, FOOT_BLOCK = 8 };   // lanes a batch, and lanes that are computed together
+enum { FOOT_BATCH = 80, FOOT_BLOCK = 8 };   // lanes a batch, and lanes that are computed together
 // A partner is looked at twice where its wall is further from the own than this part of the radius, or its normal differs by more than this, squared.
 #define FOOT_LOOK_WALL 0.05
 #define FOOT_LOOK_TURN 0.02
+// Walls that differ by more than this part of the radius, or this [mm], are not mixed.
+#define FOOT_AGREE_RADII 0.5
+#define FOOT_AGREE 0.8
 
 // State of a lane, as a double so that it lives in the same vectors.
 #define FOOT_PENDING 0.0
@@ -71,9 +74,8 @@ typedef struct FootPartner {
     FootLane tox, toy, toz;          // … from here
 } FootPartner;
 
-// Weighted sums of what partners' answers differ by from the own one.
+// Weighted sums of what partners' answers differ by from the own one, and then the mixed wall.
 typedef struct FootMixture {
-    FootLane agree;                  // [mm] walls that differ by more are not mixed
     FootLane total, gap, nx, ny, nz;
 } FootMixture;
 
@@ -237,7 +239,8 @@ static inline __attribute__((always_inline)) void foot_partner(const FootBatch *
 static inline __attribute__((always_inline)) void foot_mix(const FootBatch *restrict b, const FootPartner *restrict s, FootMixture *restrict m, int block)
 {
     for (int i = block; i < block + FOOT_BLOCK; i++) {
-        double differs = s->gap[i] - b->gap[i], q = differs / m->agree[i], near = 1 - q * q;
+        double agree = FOOT_AGREE_RADII * b->radius[i], differs = s->gap[i] - b->gap[i];
+        double q = differs / (agree < FOOT_AGREE ? agree : FOOT_AGREE), near = 1 - q * q;
         double cosine = s->nx[i] * b->nx[i] + s->ny[i] * b->ny[i] + s->nz[i] * b->nz[i], turned = 4 * cosine - 2;   // 1 up to 41 degrees, 0 at 60
         turned = turned < 1 ? turned : 1.0;
         near = near > 0 ? near : 0.0, turned = turned > 0 ? turned : 0.0;
@@ -245,6 +248,17 @@ static inline __attribute__((always_inline)) void foot_mix(const FootBatch *rest
         m->total[i] += w;
         m->gap[i] += w * differs;
         m->nx[i] += w * (s->nx[i] - b->nx[i]), m->ny[i] += w * (s->ny[i] - b->ny[i]), m->nz[i] += w * (s->nz[i] - b->nz[i]);
+    }
+}
+
+// The mixed walls of a block from the sums.
+static inline __attribute__((always_inline)) void foot_settle(const FootBatch *restrict b, FootMixture *restrict m, int block)
+{
+    for (int i = block; i < block + FOOT_BLOCK; i++) {
+        double share = 1 / (1 + m->total[i]), nx = b->nx[i] + share * m->nx[i], ny = b->ny[i] + share * m->ny[i], nz = b->nz[i] + share * m->nz[i];
+        double length2 = nx * nx + ny * ny + nz * nz, unit = 1 / sqrt(length2 > 1e-200 ? length2 : 1.0);
+        m->gap[i] = b->gap[i] + share * m->gap[i];
+        m->nx[i] = nx * unit, m->ny[i] = ny * unit, m->nz[i] = nz * unit;
     }
 }
 
@@ -273,6 +287,7 @@ typedef struct LaneKernels {
     void (*estimate)(const FootSample *at_x, double *estimate, int count, double iso_level);
     void (*partner)(const FootBatch *batch, FootPartner *partner, int count, bool second);
     void (*mix)(const FootBatch *batch, const FootPartner *partner, FootMixture *mixture, int count);
+    void (*settle)(const FootBatch *batch, FootMixture *mixture, int count);
     // Bits of a group's nodes in whose mixed zone y lies (see NearGroup), their weights, and bits added to `better` where y lies in the node's own cell.
     unsigned (*near)(const NearGroup *group, const float y[3], float weight[NEAR_GROUP], unsigned *better);
 } LaneKernels;

@@ -35,7 +35,7 @@ typedef struct NodeModel {
     Vec3 center;
     double room;             // [mm] a foot in this cell that is nearer is the closest: see measure_room
     double ball2;            // [mm^2] (1.2 r)^2: beyond, power_walk looks around
-    double agree, least;     // [mm] blend_agree, blend_least; 0 where nothing is mixed
+    double least;            // [mm] blend_least; 0 where nothing is mixed
     double clear;            // [mm] true distance from the node's centre to the wall of this model, less a margin; < 0: no bound
 } NodeModel;
 
@@ -450,7 +450,7 @@ static void check_batch(const LimVessel *lim, LaneBatch *batch, const VesselMemo
 // leaves the own model's by more than 0.15 mm (0.18 of it, for one partner). One that says something else altogether is a ghost and left out.
 // On the angiogram's model neighbours differ by up to 0.3 mm in sharp bends; mixing up to 0.25 mm only left steps in the wall that threw the
 // wire 0.3 mm out, where this leaves 0.09 mm.
-static double blend_agree(double radius) { return fmin(0.5 * radius, 0.8); }
+static double blend_agree(double radius) { return fmin(FOOT_AGREE_RADII * radius, FOOT_AGREE); }
 // The mixed gap is less than the own model's by no more than this: sum w q / (1 + sum w) < 1/2 of the above for a few partners, w = (1 - q^2)^2.
 static double blend_least(double radius) { return 0.5 * blend_agree(radius); }
 // Half width of the mixed zone: a node counts where its power distance exceeds the best by less than this part of the node spacing squared,
@@ -499,15 +499,13 @@ static void blend_batch(const LimVessel *lim, const LaneBatch *batch, double rea
     }
     if (with == 0)
         return;
-    int filled = (with + FOOT_BLOCK - 1) / FOOT_BLOCK * FOOT_BLOCK;
-    for (int i = 0; i < filled; i++) {
-        mixture.agree[i] = i < count ? lim->model[batch->of[i]->node].agree : 1;
+    for (int i = 0; i < (count + FOOT_BLOCK - 1) / FOOT_BLOCK * FOOT_BLOCK; i++) {
         mixture.total[i] = mixture.gap[i] = mixture.nx[i] = mixture.ny[i] = mixture.nz[i] = 0;
         partner.at.f[i] = partner.at.gx[i] = partner.at.gy[i] = partner.at.gz[i] = partner.move[i] = 0;
     }
     for (int k = 0; with > 0; k++) {
         int lane[FOOT_BATCH], n = 0, last = 0;
-        filled = (with + FOOT_BLOCK - 1) / FOOT_BLOCK * FOOT_BLOCK;
+        int filled = (with + FOOT_BLOCK - 1) / FOOT_BLOCK * FOOT_BLOCK;
         partner.at.any_carried = false;
         for (int i = 0; i < filled; i++) {
             partner.weight[i] = 0;
@@ -527,13 +525,13 @@ static void blend_batch(const LimVessel *lim, const LaneBatch *batch, double rea
         lim->kernels->mix(b, &partner, &mixture, with);
         with = last;
     }
+    lim->kernels->settle(b, &mixture, count);
     for (int i = 0; i < count; i++) {
-        if (partners[i] == 0 || mixture.total[i] == 0)
-            continue;
-        double share = 1 / (1 + mixture.total[i]);
         VesselHit *h = &hit[batch->of[i]->point];
-        h->gap = b->gap[i] + share * mixture.gap[i];
-        h->normal = vec3_unit(vec3_add_scaled(lane_normal(b, i), share, vec3(mixture.nx[i], mixture.ny[i], mixture.nz[i])));
+        if (mixture.total[i] > 0) {
+            h->gap = mixture.gap[i];
+            h->normal = vec3(mixture.nx[i], mixture.ny[i], mixture.nz[i]);
+        }
     }
 }
 
@@ -895,7 +893,6 @@ static void fill_models(LimVessel *lim)
         m->radius = tree->radius[i];
         m->bend = 1 / m->radius;
         m->ball2 = 1.44 * m->radius * m->radius;
-        m->agree = blend_agree(m->radius);
         m->least = lim->options.field == LIM_BLEND ? blend_least(m->radius) : 0;
         // less than what was found, should that be another side's foot
         SurfacePoint s = blobby_project(&blobs, tree->center[i], tree->center[i]);
