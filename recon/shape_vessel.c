@@ -78,7 +78,7 @@ static double closest_foot(const Shape *shape, Vec3 x, const Station *section, V
     return field < 0 ? -1 : 1;
 }
 
-static VesselHit hit_at(const Shape *shape, Vec3 x, VesselMemory *memory)
+static VesselHit hit_at(const Shape *shape, Vec3 x, double reach, VesselMemory *memory)
 {
     VesselHit hit = {.node = 0};
     *memory = (VesselMemory){.node = 0};
@@ -88,6 +88,7 @@ static VesselHit hit_at(const Shape *shape, Vec3 x, VesselMemory *memory)
     }
     bool is_inlet;
     Station section;
+    const Vec3 place = x;
     const Part *root = &shape->part[0];
     if (root->open_start) {
         // far upstream, within reach of the inlet's cylinder
@@ -103,24 +104,29 @@ static VesselHit hit_at(const Shape *shape, Vec3 x, VesselMemory *memory)
         hit.flags = VESSEL_OPEN_END;
         return hit;
     }
+    double field = shape_field(shape, x, NULL);
+    hit.flags = beyond > 0 ? VESSEL_BEYOND : 0;
+    if (field > reach) {                     // never more than the distance
+        hit.gap = field;
+        hit.flags |= VESSEL_FAR;
+        return hit;
+    }
     Vec3 foot;
     double sign = closest_foot(shape, x, &section, &foot);
     hit.gap = sign * vec3_distance(x, foot);
     hit.normal = normal_at(shape, foot);
     hit.hessian = hessian_at(shape, foot, hit.normal, hit.gap, STEP * section.radius);
-    hit.flags = beyond > 0 ? VESSEL_BEYOND : 0;
     if (vec3_norm2(hit.normal) == 0)
         hit.flags |= VESSEL_UNSURE;
     memory->has_foot = true;
-    memory->foot = foot;
+    memory->foot = vec3_add(foot, vec3_sub(place, x));
     return hit;
 }
 
 static void shape_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
-    (void)reach;   // truth in full
     for (int i = 0; i < count; i++)
-        hit[i] = hit_at(((const ShapeVessel *)vessel)->shape, point[i], &memory[i]);
+        hit[i] = hit_at(((const ShapeVessel *)vessel)->shape, point[i], reach, &memory[i]);
 }
 
 static int shape_locate(const Vessel *vessel, Vec3 point, int from)
