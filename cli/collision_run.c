@@ -254,11 +254,13 @@ static int first_free(const Scene *scene, const WireState *state, const NodeRepo
 // The deepest node outside the true wall [mm].
 static double judge_depth(Judge *judge, const WireState *state, int first)
 {
-    double deepest = 0;
+    double deepest = 0, thickest = 0;
     int count = judge->node_count - first;
+    for (int k = first; k < judge->node_count; k++)
+        thickest = fmax(thickest, judge->node[k].radius);
     follow_forget(judge->memory, first);
     follow_locate(judge->truth_gap, first, judge->node_count, state->position + first, judge->memory);
-    vessel_query(judge->truth_gap, count, state->position + first, HUGE_VAL, judge->memory + first, judge->hit);
+    vessel_query(judge->truth_gap, count, state->position + first, thickest, judge->memory + first, judge->hit);   // further inside is not outside
     for (int k = 0; k < count; k++)
         if (has_answer(&judge->hit[k]))
             deepest = fmax(deepest, judge->node[first + k].radius - judge->hit[k].gap);

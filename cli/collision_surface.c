@@ -18,7 +18,6 @@ static const double CAPSULE_LENGTH = 10, CAPSULE_RADIUS = 1.25, CAPSULE_WIDTH = 
 enum { FINE = 10 };                          // by how much the fine fit is closer
 enum { CAPSULE_NODES = 10, TRIAL = 6 };      // a first mesh has so many times fewer triangles, and tells what cell the wanted one needs
 static const double PARTICLE_CELL = 0.2;     // [mm] about the paper's 3000 samples
-static const double SHAPE_GRID_CELLS = 1.5;  // of the mesh
 static const double BAND_CELLS = 3, BAND_BEYOND_TOOL = 0.2;  // half width of the grid's band: at least both, the second in mm; what the solver looks after
 
 double collision_build_clock_s(void)
@@ -136,7 +135,10 @@ static void gap_query(const Vessel *vessel, int count, const Vec3 *point, double
             vessel_query(v->whole, 1, &point[i], reach, &memory[i], &hit[i]);
             continue;
         }
-        hit[i] = (VesselHit){.gap = shape_distance(v->shape, point[i], &foot), .node = 0};
+        double field = shape_field(v->shape, point[i], NULL);    // never more than the distance
+        hit[i] = field > reach ? (VesselHit){.gap = field, .flags = VESSEL_FAR} : (VesselHit){.gap = shape_distance(v->shape, point[i], &foot)};
+        if (hit[i].flags)
+            continue;
         hit[i].normal = vec3_unit_or(vec3_scale(vec3_sub(point[i], foot), hit[i].gap), vec3(0, 0, 0));
     }
 }
@@ -338,10 +340,8 @@ static bool add_mesh(const CollisionSurface *s, CollisionWalls *walls, const Tri
     return true;
 }
 
-// On the mesh's cell; of a shape, which takes its time to answer, on a coarser one.
-static bool add_grid(const CollisionSurface *s, CollisionWalls *walls, const TriangleMesh *mesh, double mesh_cell, Faults *faults)
+static bool add_grid(const CollisionSurface *s, CollisionWalls *walls, const TriangleMesh *mesh, double cell, Faults *faults)
 {
-    double cell = s->shape ? SHAPE_GRID_CELLS * mesh_cell : mesh_cell;
     double tool = 0;
     for (int i = 0; i < s->scene->wire.section_count; i++)
         tool = fmax(tool, s->scene->wire.section[i].diameter / 2);
