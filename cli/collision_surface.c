@@ -18,7 +18,7 @@ static const double CAPSULE_LENGTH = 10, CAPSULE_RADIUS = 1.25, CAPSULE_WIDTH = 
 enum { FINE = 10 };                          // by how much the fine fit is closer
 enum { CAPSULE_NODES = 10, TRIAL = 6 };      // a first mesh has so many times fewer triangles, and tells what cell the wanted one needs
 static const double PARTICLE_CELL = 0.2;     // [mm] about the paper's 3000 samples
-static const double BAND_CELLS = 3, BAND_BEYOND_TOOL = 0.2;  // half width of the grid's band: at least both, the second in mm; what the solver looks after
+static const double BAND_CELLS = 2, BAND_BEYOND_TOOL = 0.2;  // half width of the grid's band: at least both, the second in mm; what the solver looks after
 
 double collision_build_clock_s(void)
 {
@@ -124,6 +124,7 @@ typedef struct GapVessel {
     Vessel vessel;           // first: a Vessel * to us is a GapVessel *
     const Shape *shape;
     const Vessel *whole;     // answers beyond open ends
+    double limit;            // [mm] further from the wall the shape's field will do, which is never more than the distance
 } GapVessel;
 
 static void gap_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
@@ -135,10 +136,13 @@ static void gap_query(const Vessel *vessel, int count, const Vec3 *point, double
             vessel_query(v->whole, 1, &point[i], reach, &memory[i], &hit[i]);
             continue;
         }
-        double field = shape_field(v->shape, point[i], NULL);    // never more than the distance
-        hit[i] = field > reach ? (VesselHit){.gap = field, .flags = VESSEL_FAR} : (VesselHit){.gap = shape_distance(v->shape, point[i], &foot)};
-        if (hit[i].flags)
+        Vec3 slope;
+        double field = shape_field(v->shape, point[i], &slope);
+        if (fabs(field) > v->limit || field > reach) {
+            hit[i] = (VesselHit){.gap = field, .normal = vec3_unit_or(slope, vec3(0, 0, 0)), .flags = field > reach ? VESSEL_FAR : 0};
             continue;
+        }
+        hit[i] = (VesselHit){.gap = shape_distance(v->shape, point[i], &foot)};
         hit[i].normal = vec3_unit_or(vec3_scale(vec3_sub(point[i], foot), hit[i].gap), vec3(0, 0, 0));
     }
 }
@@ -157,12 +161,12 @@ static bool gap_inlet(const Vessel *vessel, Vec3 *point, Vec3 *direction)
 
 static void gap_destroy(Vessel *vessel) { free(vessel); }
 
-static Vessel *gap_vessel_create(const Shape *shape, const Vessel *whole)
+static Vessel *gap_vessel_create(const Shape *shape, const Vessel *whole, double limit)
 {
     GapVessel *v = calloc(1, sizeof *v);
     if (!v)
         return NULL;
-    *v = (GapVessel){{.kind = "shape", .query = gap_query, .locate = gap_locate, .inlet = gap_inlet, .destroy = gap_destroy}, shape, whole};
+    *v = (GapVessel){{.kind = "shape", .query = gap_query, .locate = gap_locate, .inlet = gap_inlet, .destroy = gap_destroy}, shape, whole, limit};
     return &v->vessel;
 }
 
@@ -181,7 +185,7 @@ static bool open_source(CollisionSurface *s, Faults *faults)
         s->shape = shape_create(scene->shape_name, scene->shape_option_count, option, scene->path, faults);
         s->nodes = s->shape ? shape_sample(s->shape, faults) : NULL;
         s->exact = s->nodes ? shape_vessel_create(s->shape) : NULL;
-        s->gap_only = s->exact ? gap_vessel_create(s->shape, s->exact) : NULL;
+        s->gap_only = s->exact ? gap_vessel_create(s->shape, s->exact, HUGE_VAL) : NULL;
         s->truth = s->exact;
         s->truth_gap = s->gap_only;
         s->truth_is = "the shape's own distance";
@@ -347,7 +351,10 @@ static bool add_grid(const CollisionSurface *s, CollisionWalls *walls, const Tri
         tool = fmax(tool, s->scene->wire.section[i].diameter / 2);
     GridVesselOptions options = {.cell_mm = cell, .band_mm = fmax(BAND_CELLS * cell, tool + BAND_BEYOND_TOOL)};
     double begin = collision_build_clock_s();
-    Vessel *grid = grid_vessel_create(s->truth_gap, mesh, &options, s->of->name, faults);
+    Vessel *near_wall = s->shape ? gap_vessel_create(s->shape, s->exact, options.band_mm + cell) : NULL;
+    Vessel *grid = grid_vessel_create(near_wall ? near_wall : s->truth_gap, mesh, &options, s->of->name, faults);
+    if (near_wall)
+        near_wall->destroy(near_wall);
     if (!grid)
         return false;
     CollisionWall *wall = add_wall(walls, "grid", grid, true);
