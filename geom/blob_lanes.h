@@ -4,7 +4,7 @@
 // Layout: a model is `count` groups, each five vectors of four doubles; unused lanes hold a blob of no weight. Every lane sums its blobs in the order
 // of the groups, and the lanes are added by one fixed tree, so that every instruction set gives the same bits (no fused multiply-add:
 // -ffp-contract=off). Lanes are blobs and not query points because each point has a model of its own. Four, because a fitted tree has four blobs a
-// node at the median: groups of eight left half of the lanes idle.
+// node at the median: groups of eight left half of the lanes idle. With AVX-512 two points' groups stand abreast in a vector.
 #ifndef SELDINGER_GEOM_BLOB_LANES_H
 #define SELDINGER_GEOM_BLOB_LANES_H
 

@@ -161,7 +161,8 @@ static inline __attribute__((always_inline)) void foot_newton(FootBatch *restric
         state = slope2 > 1e-200 ? state : FOOT_LOST;
         double held = b->state[i];
         b->state[i] = held == FOOT_PENDING ? state : held;
-        b->at.x[i] = held == FOOT_PENDING ? px : b->at.x[i], b->at.y[i] = held == FOOT_PENDING ? py : b->at.y[i], b->at.z[i] = held == FOOT_PENDING ? pz : b->at.z[i];
+        b->at.x[i] = held == FOOT_PENDING ? px : b->at.x[i], b->at.y[i] = held == FOOT_PENDING ? py : b->at.y[i];
+        b->at.z[i] = held == FOOT_PENDING ? pz : b->at.z[i];
         b->nx[i] = held == FOOT_PENDING ? nx : b->nx[i], b->ny[i] = held == FOOT_PENDING ? ny : b->ny[i], b->nz[i] = held == FOOT_PENDING ? nz : b->nz[i];
         b->half[i] = held == FOOT_PENDING ? half : b->half[i];
         b->sxx[i] = held == FOOT_PENDING ? xx : b->sxx[i], b->sxy[i] = held == FOOT_PENDING ? xy : b->sxy[i], b->sxz[i] = held == FOOT_PENDING ? xz : b->sxz[i];
