@@ -353,7 +353,8 @@ static bool run_clamps(CollisionBench *bench, const Run *run, Faults *faults)
     const Row *mesh = mesh_in_loop(bench, s->of);
     int finest = s->of->mesh_count - 1;
     const CollisionWall *list[] = {collision_wall_find(walls, "lim", -1), mesh ? collision_wall_find(walls, mesh->wall.name, finest) : NULL,
-                                   collision_wall_find(walls, "mesh curved", finest), collision_wall_find(walls, "mesh smooth", finest), collision_wall_find(walls, "grid", -1)};
+                                   collision_wall_find(walls, "mesh curved", finest), collision_wall_find(walls, "mesh smooth", finest),
+                                   collision_wall_find(walls, "grid", -1)};
     for (int form = 0; form < FORMS; form++)
         for (size_t w = 0; w < (bench->common.quick ? 2 : sizeof list / sizeof list[0]); w++)
             for (int c = 0; list[w] && c < CAPS; c++) {
@@ -361,7 +362,8 @@ static bool run_clamps(CollisionBench *bench, const Run *run, Faults *faults)
                 if (!clamp)
                     return false;
                 *clamp = (Clamp){.surface = s->of->name, .wall = list[w]->name, .form = form, .cap = caps[c]};
-                LoopOptions options = {.most_steps = form == 0 ? CLAMP_STEPS : bench->common.quick ? QUICK_POINTWISE_STEPS : POINTWISE_STEPS, .stop_at_failure = true, .contact = s->scene->contact_options};
+                LoopOptions options = {.most_steps = form == 0 ? CLAMP_STEPS : bench->common.quick ? QUICK_POINTWISE_STEPS : POINTWISE_STEPS,
+                                       .stop_at_failure = true, .contact = s->scene->contact_options};
                 options.most_steps = options.most_steps < run->most_steps ? options.most_steps : run->most_steps;
                 options.contact.form = form ? CONTACT_POINTWISE : CONTACT_BLOCK;
                 options.contact.max_iterations = caps[c];
@@ -393,8 +395,8 @@ static void text_of_seconds(double seconds, char text[16])
 
 static void print_motion(FILE *out, const CollisionBench *bench, int first)
 {
-    fprintf(out, "  the same motion        primitives       MB  kB a mm   made of [s]  vessel [s]   us a step  us of 80 near  gap error [um] rms, max    normal [deg] "
-                 "rms, max   lost\n");
+    fprintf(out, "  the same motion        primitives       MB  kB a mm   made of [s]  vessel [s]   us a step  us of 80 near  "
+                 "gap error [um] rms, max    normal [deg] rms, max   lost\n");
     for (int i = first; i < bench->row_count; i++) {
         const Row *row = &bench->row[i];
         const CollisionReplay *m = &row->motion;
@@ -402,9 +404,9 @@ static void print_motion(FILE *out, const CollisionBench *bench, int first)
         text_of_mesh(row, name, sizeof name);
         text_of_seconds(row->wall.surface_s, made);
         text_of_seconds(row->wall.build_s, built);
-        fprintf(out, "    %-20s %10lld %8.2f %8.1f    %10s  %10s  %10.2f     %10.2f    %10.3f %10.2f       %8.3f %8.2f %6lld\n", name, (long long)row->primitives,
-                row->bytes / 1e6, row->bytes_per_mm / 1e3, made, built, m->us_per_step, m->us_per_80_points, m->gap_um.rms, m->gap_um.max, m->normal_deg.rms,
-                m->normal_deg.max, (long long)m->lost);
+        fprintf(out, "    %-20s %10lld %8.2f %8.1f    %10s  %10s  %10.2f     %10.2f    %10.3f %10.2f       %8.3f %8.2f %6lld\n", name,
+                (long long)row->primitives, row->bytes / 1e6, row->bytes_per_mm / 1e3, made, built, m->us_per_step, m->us_per_80_points,
+                m->gap_um.rms, m->gap_um.max, m->normal_deg.rms, m->normal_deg.max, (long long)m->lost);
     }
 }
 
@@ -420,8 +422,9 @@ static void print_loops(FILE *out, const CollisionBench *bench, int first)
         char name[48];
         text_of_mesh(row, name, sizeof name);
         if (row->has_loop)
-            fprintf(out, "    %-20s %6.1f %8.1f  %7.1f (%7.1f)         %3.0f (%3.0f)         %3.0f (%3.0f)  %10.0f     %10lld    %10.1f  %s%s\n", name, l->detect_us,
-                    l->contact_us, l->step_us.median, l->step_us.p99, l->candidates, l->candidates_max, l->contacts, l->contacts_max, l->iterations, (long long)l->not_converged, l->penetration_um,
+            fprintf(out, "    %-20s %6.1f %8.1f  %7.1f (%7.1f)         %3.0f (%3.0f)         %3.0f (%3.0f)  %10.0f     %10lld    %10.1f  %s%s\n", name,
+                    l->detect_us, l->contact_us, l->step_us.median, l->step_us.p99, l->candidates, l->candidates_max, l->contacts, l->contacts_max,
+                    l->iterations, (long long)l->not_converged, l->penetration_um,
                     l->survived ? "survived" : "FAILED: ", l->why);
     }
     fprintf(out, "  the same, mu = 0       push [N]  artificial [N]    (%%)   jitter rms     p99   work lost [N]  as a mu   deepest [um]; push against %s\n",
@@ -436,7 +439,8 @@ static void print_loops(FILE *out, const CollisionBench *bench, int first)
         else
             snprintf(artificial, sizeof artificial, "%10s %6s", "-", "-");
         if (row->has_loop)
-            fprintf(out, "    %-20s %9.4f      %s     %8.4f %7.4f      %10.5f %8.5f     %10.1f  %s%s\n", name, row->push.mean_n, artificial, row->push.jitter_rms, row->push.jitter_p99, l->work_n, l->work_mu, l->penetration_um,
+            fprintf(out, "    %-20s %9.4f      %s     %8.4f %7.4f      %10.5f %8.5f     %10.1f  %s%s\n", name, row->push.mean_n, artificial,
+                    row->push.jitter_rms, row->push.jitter_p99, l->work_n, l->work_mu, l->penetration_um,
                     l->survived ? "survived" : "FAILED: ", l->why);
     }
 }
@@ -445,8 +449,8 @@ static void print_surface(FILE *out, const CollisionBench *bench, const Run *run
 {
     const CollisionSurface *s = run->surface;
     const Row *first = &bench->row[run->first_row], *last = &bench->row[bench->row_count - 1];
-    fprintf(out, "\n%s: truth is %s; %.0f mm of centreline; motion recorded on %s: %lld steps, %.1f points a step, of which %.1f near\n", s->of->name, s->truth_is,
-            s->length_mm, first->reference, (long long)last->motion.steps, last->motion.points_per_step,
+    fprintf(out, "\n%s: truth is %s; %.0f mm of centreline; motion recorded on %s: %lld steps, %.1f points a step, of which %.1f near\n", s->of->name,
+            s->truth_is, s->length_mm, first->reference, (long long)last->motion.steps, last->motion.points_per_step,
             (double)last->motion.near_points / fmax(1, (double)last->motion.steps));
     if (run->walls->without_mesh)
         fprintf(out, "  mesh rows: %s\n", run->walls->without_mesh);
@@ -459,7 +463,8 @@ static void print_clamps(FILE *out, const CollisionBench *bench)
 {
     if (bench->clamp_count == 0)
         return;
-    fprintf(out, "\nclamped contact iterations (paper, section 6.5): survived, or the step at which it failed: how (um outside); deepest [um]; steps not converged\n"
+    fprintf(out, "\nclamped contact iterations (paper, section 6.5): survived, or the step at which it failed: how (um outside); deepest [um]; steps not "
+                 "converged\n"
                  "  surface                  form       wall          %27d %27d %27d %27d\n", caps[0], caps[1], caps[2], caps[3]);
     for (int i = 0; i < bench->clamp_count; i++) {
         const Clamp *c = &bench->clamp[i];
@@ -491,11 +496,12 @@ static void print_paper(FILE *out, const CollisionBench *bench)
         if (!(paper.ms > 0) || !row->has_loop)
             continue;
         if (!head)
-            fprintf(out, "\nbeside Table 6 of the paper (2017, its machine)          detect and contact [ms]  candidates, most       paper 2017 [ms]  contacts\n");
+            fprintf(out, "\nbeside Table 6 of the paper (2017, its machine)          detect and contact [ms]  candidates, most       paper 2017 [ms]  "
+                         "contacts\n");
         head = true;
         text_of_mesh(row, name, sizeof name);
-        fprintf(out, "  %-32s %-20s      %14.4f  %10.0f, %4.0f        %14.4f  %8d\n", row->of->paper_name, name, (row->loop.detect_us + row->loop.contact_us) / 1000,
-                row->loop.candidates, row->loop.candidates_max, paper.ms, paper.contacts);
+        fprintf(out, "  %-32s %-20s      %14.4f  %10.0f, %4.0f        %14.4f  %8d\n", row->of->paper_name, name,
+                (row->loop.detect_us + row->loop.contact_us) / 1000, row->loop.candidates, row->loop.candidates_max, paper.ms, paper.contacts);
     }
 }
 
@@ -531,8 +537,8 @@ static bool judge_surface(CollisionBench *bench, const CollisionCase *of, Faults
         for (int k = 0; k < 2 * TIMES; k++) {
             double us = k < TIMES ? fmin(time_of(full, k), time_of(warm, k)) : time_of(cached, k - TIMES);
             char item[192];
-            snprintf(item, sizeof item, "%.40s, %dk triangles, %s: %s over lim; errors %.3g and %.3g um rms", of->name, warm->wall.triangles / 1000, what[k % TIMES],
-                     k < TIMES ? "Embree in each step" : "cached triangles", warm->motion.gap_um.rms, lim->motion.gap_um.rms);
+            snprintf(item, sizeof item, "%.40s, %dk triangles, %s: %s over lim; errors %.3g and %.3g um rms", of->name, warm->wall.triangles / 1000,
+                     what[k % TIMES], k < TIMES ? "Embree in each step" : "cached triangles", warm->motion.gap_um.rms, lim->motion.gap_um.rms);
             if (!add_verdict(bench, item, false, k < TIMES ? TIMES_FASTER : 1, us / time_of(lim, k % TIMES), faults))
                 return false;
         }
@@ -575,9 +581,9 @@ static void print_verdicts(FILE *out, const CollisionBench *bench)
 {
     for (int i = 0; i < bench->equal_count; i++) {
         const EqualError *e = &bench->equal[i];
-        fprintf(out, "\nequal error, %s: local models are wrong by %.3g um rms; so is a mesh of %d triangles (%.3g um). 80 near points: lim %.2f us, Embree in each "
-                     "step %.2f us (%.1f times), cached triangles %.2f us (%.1f times)\n", e->surface, e->lim_um, e->triangles, e->mesh_um, e->lim_us, e->warm_us,
-                e->warm_us / e->lim_us, e->cached_us, e->cached_us / e->lim_us);
+        fprintf(out, "\nequal error, %s: local models are wrong by %.3g um rms; so is a mesh of %d triangles (%.3g um).\n  80 near points: lim %.2f us, "
+                     "Embree in each step %.2f us (%.1f times), cached triangles %.2f us (%.1f times)\n",
+                e->surface, e->lim_um, e->triangles, e->mesh_um, e->lim_us, e->warm_us, e->warm_us / e->lim_us, e->cached_us, e->cached_us / e->lim_us);
     }
     if (bench->verdict_count > 0)
         fprintf(out, "\n%-124s must    measured\n", "verdicts");

@@ -63,7 +63,8 @@ typedef struct LoopOptions {
 } LoopOptions;
 
 // `truth_gap` answers the same gaps as `truth` and perhaps nothing else; depths are asked of it.
-bool collision_loop(const Scene *scene, const Vessel *wall, const Vessel *truth, const Vessel *truth_gap, const LoopOptions *options, CollisionLoop *out, Faults *faults);
+bool collision_loop(const Scene *scene, const Vessel *wall, const Vessel *truth, const Vessel *truth_gap, const LoopOptions *options, CollisionLoop *out,
+                    Faults *faults);
 
 typedef struct PushFigures {
     double mean_n, reference_n;      // over the steps that both runs took

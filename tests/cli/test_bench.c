@@ -132,7 +132,8 @@ static void collision_of_a_scene(void **state)
     FILE *file = fopen(scene, "w");
     assert_non_null(file);
     fprintf(file, "seldinger: 1\nvessel:\n  tube: {radius_mm: 1, path: [{line_mm: 4}, {arc: {radius_mm: 8, angle_deg: 70}}, {line_mm: 4}]}\n  friction: 0.1\n"
-                  "wire:\n  elements: 40\n  sections:\n    - {length_mm: 20, diameter_mm: 0.3, young_modulus_gpa: 50, poisson_ratio: 0.3, density_g_cm3: 6.45}\n"
+                  "wire:\n  elements: 40\n  sections:\n"
+                  "    - {length_mm: 20, diameter_mm: 0.3, young_modulus_gpa: 50, poisson_ratio: 0.3, density_g_cm3: 6.45}\n"
                   "sheath: {inlet: root, inserted_mm: 6}\nscript: [{t_s: 0, push_mm_s: 50, twist_deg_s: 0}, {t_s: 0.2, push_mm_s: 0, twist_deg_s: 0}]\n");
     fclose(file);
     int code = run("bench collision /tmp/seldinger-bench-bend.yaml --quick --json /tmp/seldinger-bench-bend.json --chart /tmp/seldinger-bench-bend.svg "
@@ -175,7 +176,8 @@ static void collision_of_a_scene(void **state)
 static void tables_that_are_not_there(void **state)
 {
     (void)state;
-    static const char *const bad[] = {"bench", "bench collision --fast", "bench collision nowhere.yaml", "bench collision scenes/verify/cantilever.yaml", "bench fit", "bench track --fast", "bench nothing", "bench step --fast", "bench step extra",
+    static const char *const bad[] = {"bench", "bench collision --fast", "bench collision nowhere.yaml", "bench collision scenes/verify/cantilever.yaml",
+                                      "bench fit", "bench track --fast", "bench nothing", "bench step --fast", "bench step extra",
                                       "bench peer --threads many", "bench step --json /nowhere/f.json"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         char line[128];
@@ -208,7 +210,8 @@ static void a_chart_is_a_picture(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(step_tables), cmocka_unit_test(peer_scenes_stay_inside), cmocka_unit_test(collision_of_a_scene), cmocka_unit_test(tables_that_are_not_there),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(step_tables), cmocka_unit_test(peer_scenes_stay_inside), cmocka_unit_test(collision_of_a_scene),
+                                       cmocka_unit_test(tables_that_are_not_there),
                                        cmocka_unit_test(a_chart_is_a_picture)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
