@@ -3,6 +3,7 @@
 #include "cli/cli.h"
 #include "geom/grid_vessel.h"
 #include "geom/mesh_vessel.h"
+#include "geom/tree_surface.h"
 #include "recon/mesh_check.h"
 
 #include <stdlib.h>
@@ -62,6 +63,17 @@ static bool fill_balls(Balls *balls, const Vessel *exact, const VesselTree *node
     return true;
 }
 
+// Where neighbouring local models disagree little bubbles of wall hang in the lumen: smaller than a ball of the thinnest radius they are no vessel.
+static void drop_specks(TriangleMesh *mesh, const VesselTree *nodes, const char *name)
+{
+    double thinnest = nodes->radius[0];
+    for (int i = 1; i < nodes->node_count; i++)
+        thinnest = fmin(thinnest, nodes->radius[i]);
+    int dropped = surface_drop_specks(mesh, 4 * PI / 3 * thinnest * thinnest * thinnest);
+    if (dropped > 0)
+        fprintf(stderr, "%s: %d specks of its mesh were left out: neighbouring local models disagree there\n", name, dropped);
+}
+
 TriangleMesh *contact_surface_mesh(const Vessel *exact, const VesselTree *nodes, bool open_end, double cell_mm, const char *name, Faults *faults)
 {
     Balls balls;
@@ -75,6 +87,8 @@ TriangleMesh *contact_surface_mesh(const Vessel *exact, const VesselTree *nodes,
         triangle_mesh_free(mesh);
         mesh = NULL;
     }
+    if (mesh)
+        drop_specks(mesh, nodes, name);
     free(balls.center);
     free(balls.reach);
     free(balls.from);

@@ -126,37 +126,6 @@ bool surface_census(const TriangleMesh *mesh, SurfaceCensus *census)
 
 // --- Dropping ---
 
-// Keeps the triangles for which keep[t], and the vertices they use, in their order. False where memory lacks.
-static bool keep_triangles(TriangleMesh *mesh, const bool *keep)
-{
-    int *renamed = malloc(((size_t)mesh->vertex_count + 1) * sizeof *renamed), vertices = 0, triangles = 0;
-    if (!renamed)
-        return false;
-    memset(renamed, 0xff, (size_t)mesh->vertex_count * sizeof *renamed);
-    for (int t = 0; t < mesh->triangle_count; t++)
-        for (int k = 0; keep[t] && k < 3; k++)
-            renamed[mesh->triangle[t][k]] = 0;
-    for (int v = 0; v < mesh->vertex_count; v++) {
-        if (renamed[v] < 0)
-            continue;
-        renamed[v] = vertices;
-        mesh->vertex[vertices] = mesh->vertex[v];
-        mesh->normal[vertices] = mesh->normal[v];
-        mesh->node[vertices++] = mesh->node[v];
-    }
-    for (int t = 0; t < mesh->triangle_count; t++) {
-        if (!keep[t])
-            continue;
-        for (int k = 0; k < 3; k++)
-            mesh->triangle[triangles][k] = renamed[mesh->triangle[t][k]];
-        triangles++;
-    }
-    mesh->vertex_count = vertices;
-    mesh->triangle_count = triangles;
-    free(renamed);
-    return true;
-}
-
 int surface_drop_specks(TriangleMesh *mesh, double least_volume)
 {
     int *part = find_parts(mesh), dropped = 0, largest = 0;
@@ -177,7 +146,7 @@ int surface_drop_specks(TriangleMesh *mesh, double least_volume)
             volume[of] = NAN;   // counted
         }
     }
-    good = good && (dropped == 0 || keep_triangles(mesh, keep));
+    good = good && (dropped == 0 || triangle_mesh_keep(mesh, keep));
     free(part);
     free(volume);
     free(keep);
@@ -358,7 +327,7 @@ static bool cut_inlet(TriangleMesh *mesh, Inlet *inlet)
         mesh->triangle = inlet->triangle;
         mesh->triangle_count = inlet->triangle_count;
         inlet->triangle = NULL;
-        good = keep_triangles(mesh, keep);
+        good = triangle_mesh_keep(mesh, keep);
     }
     free(keep);
     return good;
