@@ -253,7 +253,9 @@ static void draw_picture(const RunOptions *options, const Watch *watch, Simulato
     PictureOptions look = picture_default_options();
     PictureScene shown = {.vessel = open_vessel_mesh(scene, open), .target_count = scene->target_count, .target = scene->target,
                           .has_entry = scene->wire.has_sheath, .entry = scene->wire.start};
-    look.title = scene->path;
+    char title[300];
+    snprintf(title, sizeof title, "%.200s%s%s", scene->path, options->contact ? ", contact: " : "", options->contact ? contact_name[scene->contact] : "");
+    look.title = title;
     bool good = count == 1   ? picture_of_run(options->picture, &look, &shown, tool, message, sizeof message)
                 : count > 1 ? picture_of_moments(options->picture, &look, &shown, count, tool, message, sizeof message)
                             : (snprintf(message, sizeof message, "the run ended before the first moment of --picture-at"), false);
