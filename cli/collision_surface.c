@@ -19,6 +19,7 @@ enum { FINE = 10 };                          // by how much the fine fit is clos
 enum { CAPSULE_NODES = 10, TRIAL = 6 };      // a first mesh has so many times fewer triangles, and tells what cell the wanted one needs
 static const double PARTICLE_CELL = 0.2;     // [mm] about the paper's 3000 samples
 static const double BAND_CELLS = 2, BAND_BEYOND_TOOL = 0.2;  // half width of the grid's band: at least both, the second in mm; what the solver looks after
+static const double ASKED_BEYOND_TOOL = 0.6; // [mm] of a shape's lattice: answers further from the wall are not judged
 
 double collision_build_clock_s(void)
 {
@@ -351,7 +352,7 @@ static bool add_grid(const CollisionSurface *s, CollisionWalls *walls, const Tri
         tool = fmax(tool, s->scene->wire.section[i].diameter / 2);
     GridVesselOptions options = {.cell_mm = cell, .band_mm = fmax(BAND_CELLS * cell, tool + BAND_BEYOND_TOOL)};
     double begin = collision_build_clock_s();
-    Vessel *near_wall = s->shape ? gap_vessel_create(s->shape, s->exact, options.band_mm + cell) : NULL;
+    Vessel *near_wall = s->shape ? gap_vessel_create(s->shape, s->exact, fmax(options.band_mm + cell, tool + ASKED_BEYOND_TOOL)) : NULL;
     Vessel *grid = grid_vessel_create(near_wall ? near_wall : s->truth_gap, mesh, &options, s->of->name, faults);
     if (near_wall)
         near_wall->destroy(near_wall);
