@@ -847,8 +847,17 @@ static void carry_inlet(LimVessel *lim)
     }
 }
 
+static bool is_lumen_within(const Blobby *blobs, Vec3 middle, double radius)
+{
+    bool lumen = true;
+    for (int w = 0; w < LOOKS && lumen; w++)
+        lumen = blobby_field(blobs, vec3_add_scaled(middle, radius, look[w])) > 0;
+    return lumen;
+}
+
 // Is the model's wall about the node one sheet with room before it? Takes feet around the node, over the length of its cell, and looks 14 ways from
-// the middle of a ball of 0.8 r that touches each: where all is lumen, a foot closer than 0.48 r is the closest.
+// the middle of a ball that touches each: where all is lumen, a foot closer than 0.6 times its radius is the closest. The ball is of 0.8 r, or of less, down
+// to 0.3 r, where that has no room, as beside a branch.
 static double measure_room(const LimVessel *lim, int node)
 {
     enum { AROUND = 8 };
@@ -870,10 +879,12 @@ static double measure_room(const LimVessel *lim, int node)
                 foot = blobby_field(&blobs, next) > 0 ? next : foot;
             }
         blobby_gradient(&blobs, foot, &g);
-        Vec3 middle = vec3_add_scaled(foot, ball, vec3_unit(g));
-        for (int w = 0; w < LOOKS; w++)
-            if (!(blobby_field(&blobs, vec3_add_scaled(middle, 0.9 * ball, look[w])) > 0))
+        g = vec3_unit(g);
+        while (!is_lumen_within(&blobs, vec3_add_scaled(foot, ball, g), 0.9 * ball)) {
+            ball *= 0.8;
+            if (ball < 0.3 * r)
                 return 0;
+        }
     }
     return 0.6 * ball;
 }
