@@ -20,20 +20,20 @@
 #include <unistd.h>
 
 enum { CASES = 7, SCENES_MOST = 16, CAPS = 4, FORMS = 2, SCENE_TRIANGLES = 105000, QUICK_STEPS = 300, QUICK_TRIANGLES = 12000 };
+enum { CLAMP_STEPS = 1000, POINTWISE_STEPS = 600, QUICK_POINTWISE_STEPS = 200 };
 enum { LARGE = 100000, TIMES_FASTER = 10 };  // what detection in local models is held to: so many times faster than on so many triangles …
 static const double FLAT = 1.2;              // … and within this ratio whatever the size of the tree
-enum { CLAMP_STEPS = 1000, POINTWISE_STEPS = 300, QUICK_POINTWISE_STEPS = 200 };
 
 static const CollisionCase cases[CASES] = {
-    {.name = "capsule", .scene = "scenes/peer/capsule-a-100.yaml", .convolution_capsule = true, .mesh_count = 1, .triangles = {12000},
+    {.name = "capsule", .scene = "scenes/peer/capsule-a-100.yaml", .convolution_capsule = true, .mesh_count = 1, .triangles = {12000}, .pointwise_steps = 300,
      .paper_name = "Capsule", .paper_mesh = {{4.89, 51}}, .paper_lim = {0.0232, 50}},
-    {.name = "spiral", .scene = "scenes/collision/spiral.yaml", .mesh_count = 3, .triangles = {2740, 11300, 45000},
+    {.name = "spiral", .scene = "scenes/collision/spiral.yaml", .mesh_count = 3, .triangles = {2740, 11300, 45000}, .pointwise_steps = 300,
      .paper_name = "Spiral", .paper_mesh = {{1.09, 79}, {1.84, 80}, {5.58, 80}}, .paper_lim = {0.0219, 80}},
-    {.name = "phantom", .scene = "scenes/collision/phantom.yaml", .mesh_count = 1, .triangles = {SCENE_TRIANGLES},
+    {.name = "phantom", .scene = "scenes/collision/phantom.yaml", .mesh_count = 1, .triangles = {SCENE_TRIANGLES}, .pointwise_steps = POINTWISE_STEPS,
      .paper_name = "Vascular Model (another vessel)", .paper_mesh = {{16.23, 80}}, .paper_lim = {0.133, 82}},
     {.name = "aneurism", .scene = "scenes/collision/aneurism.yaml", .mesh_count = 1, .triangles = {SCENE_TRIANGLES}},
     {.name = "peer a", .scene = "scenes/peer/capsule-a-100.yaml", .mesh_count = 1, .triangles = {12000}},
-    {.name = "peer b", .scene = "scenes/peer/tube-b-100.yaml", .mesh_count = 1, .triangles = {44640}},
+    {.name = "peer b", .scene = "scenes/peer/tube-b-100.yaml", .mesh_count = 1, .triangles = {44640}, .pointwise_steps = POINTWISE_STEPS},
     {.name = "peer c", .scene = "scenes/peer/tube-c-100.yaml", .mesh_count = 1, .triangles = {44640}}};
 static const struct {
     const char *name, *needs, *how;
@@ -134,7 +134,8 @@ static int parse(int argc, char **argv, CollisionBench *bench)
             fprintf(stderr, "seldinger bench collision: more than %d scenes\n", SCENES_MOST);
             return EXIT_BAD_INPUT;
         }
-        bench->list[bench->case_count++] = (CollisionCase){.name = argv[optind], .scene = argv[optind], .mesh_count = 1, .triangles = {SCENE_TRIANGLES}};
+        bench->list[bench->case_count++] = (CollisionCase){.name = argv[optind], .scene = argv[optind], .mesh_count = 1, .triangles = {SCENE_TRIANGLES},
+                                                             .pointwise_steps = POINTWISE_STEPS};
     }
     bench->given = bench->case_count > 0;
     for (int i = 0; !bench->given && i < CASES; i++)
@@ -362,7 +363,7 @@ static bool run_clamps(CollisionBench *bench, const Run *run, Faults *faults)
                 if (!clamp)
                     return false;
                 *clamp = (Clamp){.surface = s->of->name, .wall = list[w]->name, .form = form, .cap = caps[c]};
-                LoopOptions options = {.most_steps = form == 0 ? CLAMP_STEPS : bench->common.quick ? QUICK_POINTWISE_STEPS : POINTWISE_STEPS,
+                LoopOptions options = {.most_steps = form == 0 ? CLAMP_STEPS : bench->common.quick ? QUICK_POINTWISE_STEPS : s->of->pointwise_steps,
                                        .stop_at_failure = true, .contact = s->scene->contact_options};
                 options.most_steps = options.most_steps < run->most_steps ? options.most_steps : run->most_steps;
                 options.contact.form = form ? CONTACT_POINTWISE : CONTACT_BLOCK;

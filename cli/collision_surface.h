@@ -16,6 +16,7 @@ typedef struct CollisionCase {
     const char *name, *scene;        // the scene gives wire, hand, friction and, where `capsule` is not set, the vessel
     bool convolution_capsule;        // the vessel is the paper's capsule
     int mesh_count, triangles[SURFACE_MESHES];   // about so many
+    int pointwise_steps;     // of the runs with the slow pointwise contact solve
     const char *paper_name;          // of the rows that stand beside; NULL: none
     PaperRow paper_mesh[SURFACE_MESHES], paper_lim;
 } CollisionCase;
