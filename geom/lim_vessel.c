@@ -17,8 +17,8 @@
 // asked at X + (zeta(z) - z) d instead of at X: zeta = z downstream of h = r / 2, 0 upstream of -h, with a continuous second derivative between. So the
 // section at the root goes on upstream as a cylinder for ever, and wall, normal and Hessian are smooth across the plane.
 //
-// Where the time goes (80 points creeping 0.05 mm a step, AVX-512, phantom to aneurism, ns a point): fields and Newton 43 to 69, of which second steps
-// 14 to 35; the look at X where a foot is not trusted 6 to 24; cell test 19 to 27; lanes in and out 26; partners 45 to 75. Nothing of it grows with the tree.
+// Where the time goes (80 points creeping 0.05 mm a step, AVX-512, phantom to aneurism, ns a point): fields and Newton 44 to 65, of which second steps
+// 14 to 35; the look at X where a foot is not trusted 3 to 6; cell test 18 to 26; lanes in and out 25; partners 37 to 66. None grows with the tree.
 // Tried and lost: blob terms of fewer products (2 %), second steps from value and gradient alone (3 %, and a Hessian that is not that of the foot),
 // a prediction with the gap's change in it (nothing: what remains is the wall's own waviness), memories and hits turned over in registers (AVX2 slower),
 // lanes in the order of their models' size, blobs fetched ahead, cell tests of a whole batch in one call (nothing, 1 %), second steps side by side (1 %).
