@@ -63,12 +63,17 @@ static bool fill_balls(Balls *balls, const Vessel *exact, const VesselTree *node
     return true;
 }
 
-// Where neighbouring local models disagree little bubbles of wall hang in the lumen: smaller than a ball of the thinnest radius they are no vessel.
-static void drop_specks(TriangleMesh *mesh, const VesselTree *nodes, const char *name)
+static double thinnest_radius(const VesselTree *nodes)
 {
     double thinnest = nodes->radius[0];
     for (int i = 1; i < nodes->node_count; i++)
         thinnest = fmin(thinnest, nodes->radius[i]);
+    return thinnest;
+}
+
+// Where neighbouring local models disagree little bubbles of wall hang in the lumen: smaller than a ball of the thinnest radius they are no vessel.
+static void drop_specks(TriangleMesh *mesh, double thinnest, const char *name)
+{
     int dropped = surface_drop_specks(mesh, 4 * PI / 3 * thinnest * thinnest * thinnest);
     if (dropped > 0)
         fprintf(stderr, "%s: %d specks of its mesh were left out: neighbouring local models disagree there\n", name, dropped);
@@ -76,8 +81,12 @@ static void drop_specks(TriangleMesh *mesh, const VesselTree *nodes, const char 
 
 TriangleMesh *contact_surface_mesh(const Vessel *exact, const VesselTree *nodes, bool open_end, double cell_mm, const char *name, Faults *faults)
 {
+    static const double COARSE = 0.6;        // radii
     Balls balls;
     TriangleMesh *mesh = NULL;
+    double thinnest = thinnest_radius(nodes);
+    if (cell_mm > COARSE * thinnest)
+        fprintf(stderr, "%s: its mesh has cells of %g mm, which are coarse for a radius of %g mm: thin vessels lose their shape\n", name, cell_mm, thinnest);
     if (fill_balls(&balls, exact, nodes, open_end, cell_mm))
         mesh = isosurface_of_vessel(exact, balls.count, balls.center, balls.reach, balls.from, cell_mm);
     if (!mesh)
@@ -88,7 +97,7 @@ TriangleMesh *contact_surface_mesh(const Vessel *exact, const VesselTree *nodes,
         mesh = NULL;
     }
     if (mesh)
-        drop_specks(mesh, nodes, name);
+        drop_specks(mesh, thinnest, name);
     free(balls.center);
     free(balls.reach);
     free(balls.from);
