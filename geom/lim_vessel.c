@@ -356,6 +356,27 @@ static void ask_at_points(const LimVessel *lim, LaneBatch *batch)
     }
 }
 
+// On the axis of a round vessel all feet around are equally near: Newton's steps go round for ever, and any of them is right to second order in what is
+// left of the way along the wall. Keeps the lanes of which that is not true; returns their number.
+static int settle_on_axis(const LimVessel *lim, FootBatch *b, int *lane, int count)
+{
+    static const double LEFT = 1e-4, OFF = 1e-5;     // of the radius: along the wall, and from it
+    int kept = 0;
+    sample(lim, &b->at, lane, count, false);
+    for (int k = 0; k < count; k++) {
+        int i = lane[k];
+        Vec3 g = {b->at.gx[i], b->at.gy[i], b->at.gz[i]}, n = vec3_unit_or(g, vec3(0, 0, 0)), away = vec3_sub(lane_foot(b, i), lane_point(b, i));
+        double gap = -vec3_dot(away, n), left = vec3_norm(vec3_add_scaled(away, gap, n)), slope = vec3_norm(g), radius = b->radius[i];
+        if (!(slope > 1e-100 && gap > 0.5 * radius && left < LEFT * radius && fabs(b->at.f[i]) < OFF * radius * slope && b->inside[i] > 0)) {
+            lane[kept++] = i;
+            continue;
+        }
+        b->nx[i] = n.x, b->ny[i] = n.y, b->nz[i] = n.z;
+        b->state[i] = FOOT_DONE;
+    }
+    return kept;
+}
+
 // Feet of a batch's lanes on the models of their nodes; `again` marks those without a start. A foot on the wrong side of the wall, or on a wall that
 // stands further off than another, is not the closest: those start once more from X.
 static void project_batch(const LimVessel *lim, LaneBatch *batch)
@@ -385,14 +406,16 @@ static void project_batch(const LimVessel *lim, LaneBatch *batch)
     }
     newton_rounds(lim, b, count, 12, true);
     lim->kernels->finish(b, count);
-    bool slow = false;
+    int failed = 0;
     for (int k = 0; k < n; k++)
-        if (b->state[lane[k]] != FOOT_DONE || is_on_wrong_side(b, lane[k])) {
-            project_slowly(lim, b, lane[k], batch->of[lane[k]]);
-            slow = true;
-        }
-    if (slow)
-        lim->kernels->finish(b, count);
+        if (b->state[lane[k]] != FOOT_DONE || is_on_wrong_side(b, lane[k]))
+            lane[failed++] = lane[k];
+    if (failed == 0)
+        return;
+    n = settle_on_axis(lim, b, lane, failed);
+    for (int k = 0; k < n; k++)
+        project_slowly(lim, b, lane[k], batch->of[lane[k]]);
+    lim->kernels->finish(b, count);
 }
 
 enum { LOOKS = 14 };

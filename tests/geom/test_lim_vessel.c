@@ -691,6 +691,45 @@ static void near_the_axis(void **state)
     }
 }
 
+// A tool fed exactly along the axis of a straight vessel, where no side is the closest.
+static void on_the_axis(void **state)
+{
+    (void)state;
+    enum { N = 40, P = 20, ROUNDS = 40 };
+    Vec3 line[N + 8], along = vec3_unit(vec3(3, -1, 2)), across = vec3_normal_to(along);
+    for (int i = 0; i < N + 8; i++)
+        line[i] = vec3_scale(along, 0.5 * i);
+    VesselTree *t = blob_tube(line, N, 4, 9, 1);
+    uint64_t seed = 7;
+    for (int64_t j = 0; j < t->blob_count; j++)      // as round as a fit is
+        t->blob_center[j] = vec3_add(t->blob_center[j], random_in_box(&seed, 1e-4));
+    Vessel *v = make(t, LIM_SWITCH, 0);
+    double used[2] = {HUGE_VAL, HUGE_VAL};
+    for (int off = 0; off < 2; off++) {      // on it, and well beside it
+        VesselMemory memory[P];
+        VesselHit hit[P];
+        for (int i = 0; i < P; i++)
+            memory[i] = (VesselMemory){.node = -1};
+        for (int r = 0; r < ROUNDS; r++) {
+            Vec3 x[P];
+            for (int i = 0; i < P; i++)
+                x[i] = vec3_add_scaled(vec3_scale(along, 6 + 0.3 * i + 0.05 * r), 0.5 * off, across);
+            double start = now_us();
+            vessel_query(v, P, x, 2, memory, hit);
+            used[off] = r > 0 ? fmin(used[off], now_us() - start) : used[off];
+            for (int i = 0; i < P; i++) {
+                Blobby m = blobby_of(t, hit[i].node);
+                assert_int_equal(hit[i].flags, 0);
+                assert_true(fabs(hit[i].gap - blobby_project(&m, x[i], x[i]).distance) < 1e-4);
+            }
+        }
+    }
+    print_message("%d points on the axis %.1f us, beside it %.1f us\n", P, used[0], used[1]);
+    assert_true(used[0] < 40 * used[1]);
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
 // Not a check: prints the cost of 80 points near the wall (all projected) and of a tool lying in the lumen, 10 blobs a node.
 static void cost(void **state)
 {
@@ -738,7 +777,7 @@ int main(void)
         cmocka_unit_test(inlet_is_open), cmocka_unit_test(moved_and_mirrored_scenes), cmocka_unit_test(blend_has_no_jump),
         cmocka_unit_test(nodes_without_blobs), cmocka_unit_test(another_wall_comes_closer),
         cmocka_unit_test(far_is_far_in_a_taper), cmocka_unit_test(nearest_through_boxes), cmocka_unit_test(planes_against_walk),
-        cmocka_unit_test(near_the_axis), cmocka_unit_test(cost),
+        cmocka_unit_test(near_the_axis), cmocka_unit_test(on_the_axis), cmocka_unit_test(cost),
     };
     return cmocka_run_group_tests_name("lim_vessel", tests, NULL, NULL);
 }
