@@ -101,9 +101,10 @@ static bool without_embree(void)
 
 static void tip_of(double tip[3])
 {
-    const char *at = strstr(text_of(in_folder("s.json")), "\"tip_mm\"");
+    char *text = text_of(in_folder("s.json")), *at = strstr(text, "\"tip_mm\"");
     assert_non_null(at);
     assert_int_equal(sscanf(strchr(at, '['), "[ %lf , %lf , %lf", &tip[0], &tip[1], &tip[2]), 3);
+    free(text);
 }
 
 static double between(const double a[3], const double b[3])
