@@ -40,6 +40,11 @@ static const struct {
 } needed[] = {{"aneurism", "scenes/aneurism/aneurism.h5", "scenes/aneurism/prepare makes it"},
               {"peer b", "scenes/peer/tube-b-centreline.csv", "scenes/peer/prepare brings it"},
               {"peer c", "scenes/peer/tube-c-centreline.csv", "scenes/peer/prepare brings it"}};
+static const char legend[] =
+    "exact: the true wall, where it can be asked; lim: local models, neighbours blended; lim-switch: the paper's, a point's own model alone; lim fine:\n"
+    "fitted ten times closer; mesh full, warm, cached: a wall of planes, searched by Embree from nothing, within the last distance, and only where what is\n"
+    "remembered of each triangle's surroundings does not do; mesh curved: its planes with the bend of the wall as Hessian; mesh smooth: interpolated\n"
+    "normals; grid: a sampled distance, trilinear, with the mesh's edge as its cell\n";
 static const char *const in_quick[] = {"capsule", "spiral"}, *const clamped[] = {"capsule", "spiral", "phantom", "peer b"},
                   *const clamped_quick[] = {"capsule"};
 static const int caps[CAPS] = {50, 100, 200, 1000};
@@ -785,7 +790,7 @@ int bench_collision(int argc, char **argv)
     if (!output_check(bench.common.json, &faults) || !output_check(bench.chart, &faults))
         return cli_bad_input(&faults);
     bench.out = bench_text(&bench.common);
-    fprintf(bench.out, "%s\n", bench_processor());
+    fprintf(bench.out, "%s\n%s", bench_processor(), legend);
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "processor", bench_processor());
     cJSON_AddBoolToObject(root, "embree", mesh_vessel_available());

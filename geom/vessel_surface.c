@@ -2,9 +2,9 @@
 //
 // A lattice point is asked from the ball in which it lies deepest for the ball's size; where that says outside, from the other balls around it too, and
 // any that says inside is believed: beside a wide vessel may run a thin one. Where two lumens lie so near each other that no lattice point might
-// fall between, those nearest to the wall between are taken for outside, so that the lumens stay apart whatever the cell. The gap is 1-Lipschitz, so that a block whose middle is further from the wall
-// than its corners has none of it. Where a vessel answers from local models the gap jumps a little; so a block that a marched one passes the wall on to is
-// marched too, whatever its middle says.
+// fall between, those nearest to the wall between are taken for outside, so that the lumens stay apart whatever the cell. The gap is 1-Lipschitz, so that
+// a block whose middle is further from the wall than its corners has none of it. Where a vessel answers from local models the gap jumps a little; so a
+// block that a marched one passes the wall on to is marched too, whatever its middle says.
 //
 // Vertices start near the middles of crossed edges, wherever the crossing is, and are then moved onto the wall along its normal: that keeps those
 // round one lattice point apart, and triangles have no angle below some 10 degrees. (Starting at the crossings: angles below 0.1.)
