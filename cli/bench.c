@@ -139,26 +139,31 @@ void bench_close(BenchScene *scene)
     *scene = (BenchScene){0};
 }
 
+int bench_take(int choice, const char *table, const char *table_help, BenchOptions *options)
+{
+    double number;
+    switch (choice) {
+    case 'j': options->json = optarg; return -1;
+    case 'q': options->quick = true; return -1;
+    case 't':
+        if (!cli_whole_number("--threads", optarg, 0, 256, &number))
+            return EXIT_BAD_INPUT;
+        options->threads = (int)number;
+        return -1;
+    case 'h': fputs(table_help, stdout); return EXIT_DONE;
+    default: fprintf(stderr, "seldinger bench %s: unknown option or lacking value; see --help\n", table); return EXIT_BAD_INPUT;
+    }
+}
+
 int bench_parse(int argc, char **argv, const char *table, const char *table_help, BenchOptions *options)
 {
     static const struct option list[] = {{"json", required_argument, NULL, 'j'}, {"quick", no_argument, NULL, 'q'},
                                          {"threads", required_argument, NULL, 't'}, {"help", no_argument, NULL, 'h'}, {0}};
-    double number;
     *options = (BenchOptions){0};
     optind = 1;
-    for (int choice; (choice = getopt_long(argc, argv, "h", list, NULL)) != -1;) {
-        switch (choice) {
-        case 'j': options->json = optarg; break;
-        case 'q': options->quick = true; break;
-        case 't':
-            if (!cli_whole_number("--threads", optarg, 0, 256, &number))
-                return EXIT_BAD_INPUT;
-            options->threads = (int)number;
-            break;
-        case 'h': fputs(table_help, stdout); return EXIT_DONE;
-        default: fprintf(stderr, "seldinger bench %s: unknown option or lacking value; see --help\n", table); return EXIT_BAD_INPUT;
-        }
-    }
+    for (int choice, code; (choice = getopt_long(argc, argv, "h", list, NULL)) != -1;)
+        if ((code = bench_take(choice, table, table_help, options)) >= 0)
+            return code;
     if (optind < argc) {
         fprintf(stderr, "seldinger bench %s: takes no '%s'; see --help\n", table, argv[optind]);
         return EXIT_BAD_INPUT;

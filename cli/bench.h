@@ -56,7 +56,9 @@ typedef struct BenchOptions {
     int threads;
     const char *json;
 } BenchOptions;
-// -1: go on; otherwise the exit code.
+// One of these (or an unknown one) in a table's own getopt loop. -1: go on; otherwise the exit code.
+int bench_take(int choice, const char *table, const char *help, BenchOptions *options);
+// All of them where a table has no others. -1: go on; otherwise the exit code.
 int bench_parse(int argc, char **argv, const char *table, const char *help, BenchOptions *options);
 // Where the text goes: not where the JSON goes.
 FILE *bench_text(const BenchOptions *options);

@@ -118,20 +118,14 @@ static int parse(int argc, char **argv, CollisionBench *bench)
 {
     static const struct option list[] = {{"json", required_argument, NULL, 'j'}, {"quick", no_argument, NULL, 'q'}, {"threads", required_argument, NULL, 't'},
                                          {"chart", required_argument, NULL, 'c'}, {"help", no_argument, NULL, 'h'}, {0}};
-    double number;
+    int code;
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "h", list, NULL)) != -1;) {
         switch (choice) {
-        case 'j': bench->common.json = optarg; break;
-        case 'q': bench->common.quick = true; break;
-        case 't':
-            if (!cli_whole_number("--threads", optarg, 0, 256, &number))
-                return EXIT_BAD_INPUT;
-            bench->common.threads = (int)number;
-            break;
         case 'c': bench->chart = optarg; break;
-        case 'h': fputs(help, stdout); return EXIT_DONE;
-        default: fprintf(stderr, "seldinger bench collision: unknown option or lacking value; see --help\n"); return EXIT_BAD_INPUT;
+        default:
+            if ((code = bench_take(choice, "collision", help, &bench->common)) >= 0)
+                return code;
         }
     }
     for (; optind < argc; optind++) {

@@ -50,7 +50,7 @@ static int parse(int argc, char **argv, FitBench *bench)
                                          {"tree", required_argument, NULL, TREE}, {"preset", required_argument, NULL, PRESET},
                                          {"json", required_argument, NULL, 'j'}, {"quick", no_argument, NULL, 'q'},
                                          {"threads", required_argument, NULL, 't'}, {"help", no_argument, NULL, 'h'}, {0}};
-    double number;
+    int code;
     *bench = (FitBench){.options = lim_fit_default_options()};
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "h", list, NULL)) != -1;) {
@@ -71,15 +71,9 @@ static int parse(int argc, char **argv, FitBench *bench)
             }
             bench->options = strcmp(optarg, "paper") ? lim_fit_default_options() : lim_fit_paper_options();
             break;
-        case 'j': bench->common.json = optarg; break;
-        case 'q': bench->common.quick = true; break;
-        case 't':
-            if (!cli_whole_number("--threads", optarg, 0, 256, &number))
-                return EXIT_BAD_INPUT;
-            bench->common.threads = (int)number;
-            break;
-        case 'h': fputs(help, stdout); return EXIT_DONE;
-        default: fputs("seldinger bench fit: unknown option or lacking value; see --help\n", stderr); return EXIT_BAD_INPUT;
+        default:
+            if ((code = bench_take(choice, "fit", help, &bench->common)) >= 0)
+                return code;
         }
     }
     if (optind < argc || bench->table3 == bench->tables45) {

@@ -509,6 +509,7 @@ static int parse(int argc, char **argv, TrackBench *bench)
                                          {"help", no_argument, NULL, 'h'},
                                          {0}};
     double number;
+    int code;
     *bench = (TrackBench){0};
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "h", list, NULL)) != -1;) {
@@ -519,15 +520,9 @@ static int parse(int argc, char **argv, TrackBench *bench)
             bench->trees = (int)number;
             break;
         case CLICK_ONLY: bench->click_only = true; break;
-        case 'j': bench->common.json = optarg; break;
-        case 'q': bench->common.quick = true; break;
-        case 't':
-            if (!cli_whole_number("--threads", optarg, 0, 256, &number))
-                return EXIT_BAD_INPUT;
-            bench->common.threads = (int)number;
-            break;
-        case 'h': fputs(help, stdout); return EXIT_DONE;
-        default: fputs("seldinger bench track: unknown option or lacking value; see --help\n", stderr); return EXIT_BAD_INPUT;
+        default:
+            if ((code = bench_take(choice, "track", help, &bench->common)) >= 0)
+                return code;
         }
     }
     if (optind < argc) {

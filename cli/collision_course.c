@@ -199,7 +199,7 @@ bool course_error(const Vessel *vessel, const Course *course, CourseError *out)
                 continue;
             }
             double gap = 1000 * fabs(h->gap - t->gap);
-            double turn = 180 / PI * atan2(vec3_norm(vec3_cross(h->normal, t->normal)), vec3_dot(h->normal, t->normal));
+            double turn = vec3_angle(h->normal, t->normal) * 180 / PI;
             gap2 += gap * gap;
             turn2 += turn * turn;
             out->gap_max_um = fmax(out->gap_max_um, gap);

@@ -34,13 +34,6 @@ static bool fault(Growth *g, const char *what)
     return false;
 }
 
-static Vessel *lim_of(const VesselTree *tree, LimField field)
-{
-    LimVesselOptions options = lim_vessel_default_options();
-    options.field = field;
-    return lim_vessel_create_with(tree, &options);
-}
-
 static void destroy(Vessel *vessel)
 {
     if (vessel)
@@ -84,15 +77,6 @@ static TriangleMesh *mesh_wall(Wall *wall, double triangles, Faults *faults)
         if (!shape_beyond_open_end(wall->shape, mesh->vertex[i]))
             shape_distance(wall->shape, mesh->vertex[i], &mesh->vertex[i]);
     return mesh;
-}
-
-static double mean_edge(const TriangleMesh *mesh)
-{
-    double sum = 0;
-    for (int t = 0; t < mesh->triangle_count; t++)
-        for (int k = 0; k < 3; k++)
-            sum += vec3_distance(mesh->vertex[mesh->triangle[t][k]], mesh->vertex[mesh->triangle[t][(k + 1) % 3]]);
-    return sum / (3.0 * mesh->triangle_count);
 }
 
 // The wire starts beside the tree's axis, two radii from its root; the other points at the mesh's vertices.
@@ -210,7 +194,7 @@ static bool measure_mesh(Growth *g, const Wall *wall, const TriangleMesh *mesh, 
 // Sampled on the mesh's edge.
 static bool measure_grid(Growth *g, const Wall *wall, const TriangleMesh *mesh)
 {
-    double cell = mean_edge(mesh), begin = collision_build_clock_s();
+    double cell = contact_surface_edge(mesh), begin = collision_build_clock_s();
     GridVesselOptions options = {.cell_mm = cell, .band_mm = fmax(0.25, 2.5 * cell)};
     Vessel *grid = grid_vessel_create(wall->exact, mesh, &options, wall->name, g->faults);
     double build_s = collision_build_clock_s() - begin;
@@ -262,7 +246,7 @@ static bool grow_wall(Growth *g, Wall *wall, const VesselTree *model, double fit
     if (!grow_mesh(g, wall, mesh_vessel_available() ? largest : largest_grid, largest_grid))
         return false;
     double begin = collision_build_clock_s();
-    Vessel *lim = lim_of(model, LIM_BLEND);
+    Vessel *lim = collision_lim(model, LIM_BLEND);
     double build_s = collision_build_clock_s() - begin;
     Figures f[SEARCHES];
     bool good = lim ? measure(g, wall, lim, &f[0]) : fault(g, "not enough memory for local models");
@@ -291,7 +275,7 @@ static bool open_phantom(Growth *g, Phantom *p)
     double begin = collision_build_clock_s();
     p->model = p->samples ? fit(g, p->samples, 0, shape_voxel_mm(p->shape)) : NULL;
     p->fit_s = collision_build_clock_s() - begin;
-    p->lim = p->model ? lim_of(p->model, LIM_BLEND) : NULL;
+    p->lim = p->model ? collision_lim(p->model, LIM_BLEND) : NULL;
     return p->lim || fault(g, "the phantom has no local models");
 }
 
@@ -473,7 +457,7 @@ static bool open_size(Growth *g, const VesselTree *helix, int nodes, Size *s)
     s->tree = strands(helix, nodes);
     for (int field = 0; s->tree && field < FIELDS; field++) {
         double begin = collision_build_clock_s();
-        s->vessel[field] = lim_of(s->tree, (LimField)field);
+        s->vessel[field] = collision_lim(s->tree, (LimField)field);
         s->figures[field] = (SizeFigures){.build_s = collision_build_clock_s() - begin, .warm_ns = HUGE_VAL};
     }
     const Vessel *blend = s->vessel[LIM_BLEND];
@@ -643,7 +627,7 @@ static bool match_target(Growth *g, Wall *wall, double target, double voxel, Mes
     double begin = collision_build_clock_s();
     VesselTree *model = fit(g, wall->nodes, target, voxel);
     double fit_s = collision_build_clock_s() - begin;
-    Vessel *lim = model ? lim_of(model, LIM_BLEND) : NULL;
+    Vessel *lim = model ? collision_lim(model, LIM_BLEND) : NULL;
     Figures f;
     bool good = lim && measure(g, wall, lim, &f) && (mesh->triangles == 0 || match_mesh(g, wall, f.error.gap_rms_um, mesh));
     if (good)
@@ -676,14 +660,6 @@ static bool match_blobs(Growth *g, const Phantom *p)
 }
 
 // --- memory of the largest tree ---
-
-static double tree_length(const VesselTree *tree)
-{
-    double length = 0;
-    for (int i = 1; i < tree->node_count; i++)
-        length += tree->kind[i] == NODE_VESSEL ? vec3_distance(tree->center[i], tree->center[tree->parent[i]]) : 0;
-    return length;
-}
 
 // Single precision, over the box about the surface.
 static double dense_grid_bytes(const TriangleMesh *mesh, double cell)
@@ -738,12 +714,12 @@ static bool add_made(Growth *g, const Wall *wall, double length, const char *nam
 
 static bool compare_memory(Growth *g, const Wall *wall, const TriangleMesh *mesh)
 {
-    double length = tree_length(wall->nodes), edge = mean_edge(mesh), dense = dense_grid_bytes(mesh, edge), begin = collision_build_clock_s();
+    double length = vessel_tree_length(wall->nodes), edge = contact_surface_edge(mesh), dense = dense_grid_bytes(mesh, edge), begin = collision_build_clock_s();
     GridVesselOptions options = {.cell_mm = edge, .band_mm = fmax(0.25, 2.5 * edge)};
     fprintf(g->out, "\n%s: %.0f mm of vessel, %d nodes; mesh and grid with edges of %.3f mm; errors against the local models\n", wall->name, length,
             wall->nodes->node_count, edge);
     fputs("                 | primitives      MB   bytes/mm | ns: wire, all over | gap rms, max um, normal deg | s to build\n", g->out);
-    Vessel *lim = lim_of(wall->nodes, LIM_BLEND);
+    Vessel *lim = collision_lim(wall->nodes, LIM_BLEND);
     bool good = add_made(g, wall, length, "LIM", lim, 0, begin);
     for (int k = 0; good && k < SEARCHES && mesh_vessel_available(); k++) {
         char name[32];
@@ -769,7 +745,7 @@ static bool largest_tree(Growth *g)
         vessel_tree_free(model);
         return false;
     }
-    Vessel *lim = model ? lim_of(model, LIM_BLEND) : NULL;
+    Vessel *lim = model ? collision_lim(model, LIM_BLEND) : NULL;
     Wall wall = {.name = path, .exact = lim, .nodes = model};
     TriangleMesh *mesh = lim ? mesh_wall(&wall, 100000, g->faults) : NULL;
     bool good = mesh && open_wall(g, &wall, mesh) && compare_memory(g, &wall, mesh);

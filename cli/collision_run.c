@@ -171,8 +171,6 @@ static void add_error(ErrorFigures *figures, double error)
     figures->max = fmax(figures->max, error);
 }
 
-static double angle_deg(Vec3 a, Vec3 b) { return atan2(vec3_norm(vec3_cross(a, b)), vec3_dot(a, b)) * 180 / PI; }
-
 static void measure_errors(const Vessel *wall, const CollisionMotion *motion, VesselMemory *memory, VesselHit *hit, CollisionReplay *out)
 {
     int64_t normals = 0;
@@ -194,7 +192,7 @@ static void measure_errors(const Vessel *wall, const CollisionMotion *motion, Ve
             if (clear_of_tool(motion, step, p) > motion->radius[0] / 2)
                 continue;
             normals++;
-            add_error(&out->normal_deg, angle_deg(h->normal, motion->normal[p]));
+            add_error(&out->normal_deg, vec3_angle(h->normal, motion->normal[p]) * 180 / PI);
         }
     }
     out->gap_um.rms = sqrt(out->gap_um.rms / fmax(1, (double)out->judged));

@@ -82,7 +82,7 @@ static VesselTree *capsule_tree(const TriangleMesh *samples, bool is_model)
     return NULL;
 }
 
-static Vessel *lim_of(const VesselTree *tree, LimField field)
+Vessel *collision_lim(const VesselTree *tree, LimField field)
 {
     LimVesselOptions options = lim_vessel_default_options();
     options.field = field;
@@ -97,7 +97,7 @@ static bool open_capsule(CollisionSurface *s, Faults *faults)
         s->exact_tree = capsule_tree(samples, true);
         s->nodes = capsule_tree(samples, false);
     }
-    s->exact = s->exact_tree ? lim_of(s->exact_tree, LIM_SWITCH) : NULL;
+    s->exact = s->exact_tree ? collision_lim(s->exact_tree, LIM_SWITCH) : NULL;
     s->truth = s->exact;
     s->truth_is = "the convolution surface itself";
     vessel_tree_free(blobs);
@@ -208,14 +208,6 @@ static bool open_source(CollisionSurface *s, Faults *faults)
     return false;
 }
 
-static double centreline_length(const VesselTree *tree)
-{
-    double length = 0;
-    for (int i = 1; i < tree->node_count; i++)
-        length += vec3_distance(tree->center[i], tree->center[tree->parent[i]]);
-    return length;
-}
-
 bool collision_surface_open(const CollisionCase *of, int threads, CollisionSurface *out, Faults *faults)
 {
     *out = (CollisionSurface){.of = of, .scene = scene_load(of->scene, faults)};
@@ -228,8 +220,8 @@ bool collision_surface_open(const CollisionCase *of, int threads, CollisionSurfa
         if (!out->fine)
             return false;
     }
-    out->length_mm = centreline_length(out->nodes);
-    out->lim = lim_of(out->model, LIM_BLEND);
+    out->length_mm = vessel_tree_length(out->nodes);
+    out->lim = collision_lim(out->model, LIM_BLEND);
     if (!out->lim) {
         faults_add(faults, of->scene, 0, 0, "no memory for the local models' vessel");
         return false;
@@ -383,7 +375,7 @@ static bool add_meshes(const CollisionSurface *s, CollisionWalls *walls, Faults 
 static bool add_lim(const CollisionSurface *s, CollisionWalls *walls, const char *name, const VesselTree *model, LimField field, double fit_s, Faults *faults)
 {
     double begin = collision_build_clock_s();
-    Vessel *vessel = lim_of(model, field);
+    Vessel *vessel = collision_lim(model, field);
     if (!vessel) {
         faults_add(faults, s->of->name, 0, 0, "no memory for the local models' vessel");
         return false;

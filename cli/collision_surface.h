@@ -73,6 +73,7 @@ typedef struct CollisionMesh {
     double cell_mm, made_s;  // CPU time, of the mesh alone
 } CollisionMesh;
 TriangleMesh *collision_mesh(const CollisionSurface *surface, double triangles, CollisionMesh *out, Faults *faults);
+Vessel *collision_lim(const VesselTree *model, LimField field);   // NULL where memory lacks
 double collision_build_clock_s(void);    // CPU time of all threads
 
 #endif

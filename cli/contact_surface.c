@@ -115,6 +115,15 @@ double contact_surface_cell(const VesselTree *nodes, double triangles)
     return sqrt(2.3 * area / triangles);     // marching cubes cut a cell's face in 2.3 triangles on the average
 }
 
+double contact_surface_edge(const TriangleMesh *mesh)
+{
+    double sum = 0;
+    for (int t = 0; t < mesh->triangle_count; t++)
+        for (int k = 0; k < 3; k++)
+            sum += vec3_distance(mesh->vertex[mesh->triangle[t][k]], mesh->vertex[mesh->triangle[t][(k + 1) % 3]]);
+    return sum / (3.0 * mesh->triangle_count);
+}
+
 Vessel *contact_surface_vessel(ContactKind kind, const Vessel *exact, const TriangleMesh *mesh, double cell_mm, const char *name, Faults *faults)
 {
     Vec3 inlet = {0, 0, 0}, direction = {0, 0, 0};
@@ -138,9 +147,7 @@ static void add_normals(TriangleMesh *mesh)
         for (int k = 0; k < 3; k++) {
             const int *v = mesh->triangle[t];
             Vec3 a = vec3_sub(mesh->vertex[v[(k + 1) % 3]], mesh->vertex[v[k]]), b = vec3_sub(mesh->vertex[v[(k + 2) % 3]], mesh->vertex[v[k]]);
-            Vec3 across = vec3_cross(a, b);
-            double angle = atan2(vec3_norm(across), vec3_dot(a, b));
-            mesh->normal[v[k]] = vec3_add_scaled(mesh->normal[v[k]], angle, vec3_unit_or(across, vec3(0, 0, 0)));
+            mesh->normal[v[k]] = vec3_add_scaled(mesh->normal[v[k]], vec3_angle(a, b), vec3_unit_or(vec3_cross(a, b), vec3(0, 0, 0)));
         }
     for (int i = 0; i < mesh->vertex_count; i++)
         mesh->normal[i] = vec3_unit_or(mesh->normal[i], vec3(1, 0, 0));

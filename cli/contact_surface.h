@@ -13,6 +13,8 @@ TriangleMesh *contact_surface_mesh(const Vessel *exact, const VesselTree *nodes,
 // The edge [mm] of cells for about so many triangles, by the area of the nodes' tubes.
 double contact_surface_cell(const VesselTree *nodes, double triangles);
 
+double contact_surface_edge(const TriangleMesh *mesh);      // [mm] the triangles' sides, the mean
+
 // A vessel of `kind` (mesh, smooth_mesh, flat_mesh, grid) from the mesh; the grid samples `exact` on the mesh's cell. Inlet from `exact`. NULL with a fault.
 Vessel *contact_surface_vessel(ContactKind kind, const Vessel *exact, const TriangleMesh *mesh, double cell_mm, const char *name, Faults *faults);
 

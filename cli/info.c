@@ -89,12 +89,9 @@ static bool describe_tree(cJSON *object, const char *path, const char *report, c
         return false;
     bool model = vessel_tree_is_model(tree);
     int *children = calloc((size_t)tree->node_count, sizeof *children), branches = 1, ends = 0, aneurysm = 0;
-    double length = 0;
-    for (int i = 1; i < tree->node_count; i++) {
-        length += tree->kind[i] == NODE_VESSEL ? vec3_distance(tree->center[i], tree->center[tree->parent[i]]) : 0;
+    for (int i = 1; i < tree->node_count; i++)
         if (children && children[tree->parent[i]]++ > 0)
             branches++;
-    }
     for (int i = 0; i < tree->node_count; i++) {
         ends += children && children[i] == 0;
         aneurysm += tree->kind[i] == NODE_ANEURYSM;
@@ -106,7 +103,7 @@ static bool describe_tree(cJSON *object, const char *path, const char *report, c
     cJSON_AddNumberToObject(object, "ends", ends);
     cJSON_AddNumberToObject(object, "aneurysm_nodes", aneurysm);
     cJSON_AddNumberToObject(object, "points", (double)tree->point_count);
-    cJSON_AddNumberToObject(object, "centreline_mm", length);
+    cJSON_AddNumberToObject(object, "centreline_mm", vessel_tree_length(tree));
     add_spread(object, "radius_mm", tree->radius, tree->node_count);
     add_box(object, tree->center, tree->node_count);
     add_vector(object, "root_mm", tree->center[0]);

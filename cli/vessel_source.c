@@ -190,15 +190,6 @@ static bool entry_is_inside(const Scene *scene, const Vessel *vessel, Faults *fa
     return false;
 }
 
-static double mean_side(const TriangleMesh *mesh)
-{
-    double sum = 0;
-    for (int t = 0; t < mesh->triangle_count; t++)
-        for (int k = 0; k < 3; k++)
-            sum += vec3_distance(mesh->vertex[mesh->triangle[t][k]], mesh->vertex[mesh->triangle[t][(k + 1) % 3]]);
-    return sum / (3 * mesh->triangle_count);
-}
-
 static bool open_mesh(const Scene *scene, OpenVessel *out, Faults *faults)
 {
     out->mesh = contact_surface_load(scene->mesh_path, scene->mesh_scale, faults);
@@ -207,7 +198,7 @@ static bool open_mesh(const Scene *scene, OpenVessel *out, Faults *faults)
     ContactKind kind = scene->contact == CONTACT_GRID ? CONTACT_MESH : scene->contact;
     Vessel *mesh = out->vessel = contact_surface_vessel(kind, NULL, out->mesh, 0, scene->mesh_path, faults);
     if (mesh && scene->contact == CONTACT_GRID) {
-        double cell = scene->mesh_cell > 0 ? scene->mesh_cell : mean_side(out->mesh);
+        double cell = scene->mesh_cell > 0 ? scene->mesh_cell : contact_surface_edge(out->mesh);
         out->vessel = contact_surface_vessel(CONTACT_GRID, mesh, out->mesh, cell, scene->mesh_path, faults);
         mesh->destroy(mesh);
     }

@@ -44,6 +44,8 @@ static inline Vec3 vec3_cross(Vec3 a, Vec3 b)
 static inline double vec3_norm2(Vec3 a) { return vec3_dot(a, a); }
 static inline double vec3_norm(Vec3 a) { return sqrt(vec3_dot(a, a)); }
 static inline double vec3_distance(Vec3 a, Vec3 b) { return vec3_norm(vec3_sub(a, b)); }
+// [rad] between a and b, of any length, 0 to pi.
+static inline double vec3_angle(Vec3 a, Vec3 b) { return atan2(vec3_norm(vec3_cross(a, b)), vec3_dot(a, b)); }
 static inline bool vec3_is_finite(Vec3 a) { return isfinite(a.x) && isfinite(a.y) && isfinite(a.z); }
 // The unit vector along a; `otherwise` where a is too short to have a direction.
 static inline Vec3 vec3_unit_or(Vec3 a, Vec3 otherwise)
@@ -101,6 +103,12 @@ static inline Vec3 sym3_mul_vec(const Sym3 *s, Vec3 v)
     return (Vec3){s->xx * v.x + s->xy * v.y + s->xz * v.z, s->xy * v.x + s->yy * v.y + s->yz * v.z, s->xz * v.x + s->yz * v.y + s->zz * v.z};
 }
 static inline double sym3_quadratic(const Sym3 *s, Vec3 v) { return vec3_dot(v, sym3_mul_vec(s, v)); }
+// *s += factor v v'
+static inline void sym3_add_outer(Sym3 *s, double factor, Vec3 v)
+{
+    s->xx += factor * v.x * v.x, s->xy += factor * v.x * v.y, s->xz += factor * v.x * v.z;
+    s->yy += factor * v.y * v.y, s->yz += factor * v.y * v.z, s->zz += factor * v.z * v.z;
+}
 static inline double sym3_trace(const Sym3 *s) { return s->xx + s->yy + s->zz; }
 
 static inline Quat quat_identity(void) { return (Quat){1, 0, 0, 0}; }

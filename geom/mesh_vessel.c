@@ -251,12 +251,6 @@ static bool is_on_rim(const MeshVessel *m, int triangle, int feature)
     return feature >= ON_VERTEX ? m->on_rim[m->corner[triangle][feature - ON_VERTEX]] : m->across[triangle][feature - ON_EDGE] < 0;
 }
 
-static void add_outer(Sym3 *h, double s, Vec3 v)
-{
-    h->xx += s * v.x * v.x, h->xy += s * v.x * v.y, h->xz += s * v.x * v.z;
-    h->yy += s * v.y * v.y, h->yz += s * v.y * v.z, h->zz += s * v.z * v.z;
-}
-
 // [mm] closer to an edge or a vertex than this its curvature is taken as here; it grows without bound, and no tool's centre gets there.
 static const double LEAST_DISTANCE = 0.02;
 
@@ -267,11 +261,11 @@ static Sym3 facet_hessian(const MeshVessel *m, int triangle, const Foot *foot, d
         return h;
     double bend = copysign(1 / fmax(fabs(gap), LEAST_DISTANCE), gap);
     h.xx = h.yy = h.zz = bend;
-    add_outer(&h, -bend, normal);
+    sym3_add_outer(&h, -bend, normal);
     if (foot->feature < ON_VERTEX) {
         const int *corner = m->corner[triangle];
         int k = foot->feature - ON_EDGE;
-        add_outer(&h, -bend, vec3_unit(vec3_sub(m->vertex[corner[(k + 1) % 3]], m->vertex[corner[k]])));
+        sym3_add_outer(&h, -bend, vec3_unit(vec3_sub(m->vertex[corner[(k + 1) % 3]], m->vertex[corner[k]])));
     }
     return h;
 }
@@ -290,9 +284,9 @@ static Sym3 smooth_hessian(const MeshVessel *m, int triangle, double gap, Vec3 n
     mean = 0.5 * (k1 + k2) - part * mean;
     uu = mean + part * uu, ww = mean + part * ww, uw *= part;
     Sym3 h = {0, 0, 0, 0, 0, 0};
-    add_outer(&h, uu - uw, u);
-    add_outer(&h, ww - uw, w);
-    add_outer(&h, uw, vec3_add(u, w));
+    sym3_add_outer(&h, uu - uw, u);
+    sym3_add_outer(&h, ww - uw, w);
+    sym3_add_outer(&h, uw, vec3_add(u, w));
     return h;
 }
 
@@ -568,8 +562,6 @@ static bool measure_hull(const MeshVessel *m, Hull *hull)
     return good;
 }
 
-static double angle_between(Vec3 a, Vec3 b) { return atan2(vec3_norm(vec3_cross(a, b)), vec3_dot(a, b)); }
-
 static void set_normals(MeshVessel *m, const TriangleMesh *mesh)
 {
     for (int t = 0; t < m->triangle_count; t++) {
@@ -578,7 +570,7 @@ static void set_normals(MeshVessel *m, const TriangleMesh *mesh)
         for (int k = 0; k < 3; k++) {
             Vec3 p = m->vertex[corner[k]], a = vec3_sub(m->vertex[corner[(k + 1) % 3]], p), b = vec3_sub(m->vertex[corner[(k + 2) % 3]], p);
             Vec3 *sum = &m->vertex_normal[corner[k]];
-            *sum = vec3_add_scaled(*sum, angle_between(a, b), m->face[t]);
+            *sum = vec3_add_scaled(*sum, vec3_angle(a, b), m->face[t]);
         }
     }
     for (int v = 0; m->smooth_normal && v < m->vertex_count; v++)
@@ -596,9 +588,9 @@ static void set_bends(MeshVessel *m)
             Vec3 g = vec3_cross(side, m->face[t]);
             g = vec3_scale(g, 1 / vec3_dot(g, vec3_sub(m->vertex[corner[k]], a)));
             // sym(n g') = ((n + g)(n + g)' - n n' - g g') / 2
-            add_outer(&sum, 0.5, vec3_add(n, g));
-            add_outer(&sum, -0.5, n);
-            add_outer(&sum, -0.5, g);
+            sym3_add_outer(&sum, 0.5, vec3_add(n, g));
+            sym3_add_outer(&sum, -0.5, n);
+            sym3_add_outer(&sum, -0.5, g);
         }
         m->bend[t] = sum;
     }

@@ -114,12 +114,6 @@ static int nearest_overall(const TubeVessel *tube, Vec3 x)
     return best;
 }
 
-static void add_outer(Sym3 *h, double s, Vec3 v)
-{
-    h->xx += s * v.x * v.x, h->xy += s * v.x * v.y, h->xz += s * v.x * v.z;
-    h->yy += s * v.y * v.y, h->yz += s * v.y * v.z, h->zz += s * v.z * v.z;
-}
-
 // The gap's curvature grows without bound towards the centreline and, outside, towards the axis of an arc's turning; neither place is one
 // where a contact may sit, and both are held to what they are at a tenth of the radius.
 static Sym3 gap_hessian(const TubeVessel *tube, const Segment *s, const CentrePoint *c, Vec3 normal, double distance)
@@ -129,13 +123,13 @@ static Sym3 gap_hessian(const TubeVessel *tube, const Segment *s, const CentrePo
     if (c->end != 0) {
         // a fixed nearest point: a sphere about it, -(I - n n') / d
         h.xx = h.yy = h.zz = -1 / d;
-        add_outer(&h, 1 / d, normal);
+        sym3_add_outer(&h, 1 / d, normal);
         return h;
     }
-    add_outer(&h, -1 / d, vec3_cross(c->tangent, normal));
+    sym3_add_outer(&h, -1 / d, vec3_cross(c->tangent, normal));
     if (s->arc_radius > 0) {
         double rho = c->rho > least ? c->rho : least;
-        add_outer(&h, -(rho - s->arc_radius) / (rho * d), c->tangent);
+        sym3_add_outer(&h, -(rho - s->arc_radius) / (rho * d), c->tangent);
     }
     return h;
 }
@@ -162,8 +156,8 @@ static VesselHit hit_bell(const TubeVessel *tube, Vec3 x, Vec3 end, Vec3 tangent
         Vec3 out = rho > 1e-9 * r ? vec3_scale(radial, 1 / rho) : vec3_negate(tube->segment[tube->count - 1].normal);
         hit.gap = far - bell;
         hit.normal = vec3_add_scaled(vec3_scale(tangent, z / far), -aside / far, out);
-        add_outer(&hit.hessian, 1 / far, vec3_add_scaled(vec3_scale(tangent, aside / far), z / far, out));
-        add_outer(&hit.hessian, -aside / (far * fmax(rho, 0.1 * r)), vec3_cross(tangent, out));
+        sym3_add_outer(&hit.hessian, 1 / far, vec3_add_scaled(vec3_scale(tangent, aside / far), z / far, out));
+        sym3_add_outer(&hit.hessian, -aside / (far * fmax(rho, 0.1 * r)), vec3_cross(tangent, out));
     }
     memory->has_foot = true;
     memory->foot = vec3_add_scaled(x, -hit.gap, hit.normal);

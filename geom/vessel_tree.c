@@ -257,3 +257,11 @@ bool vessel_tree_root_is_open(const VesselTree *tree)
     }
     return closing < 3;
 }
+
+double vessel_tree_length(const VesselTree *tree)
+{
+    double length = 0;
+    for (int i = 1; i < tree->node_count; i++)
+        length += tree->kind[i] == NODE_VESSEL ? vec3_distance(tree->center[i], tree->center[tree->parent[i]]) : 0;
+    return length;
+}

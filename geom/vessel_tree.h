@@ -56,6 +56,8 @@ bool vessel_tree_link(VesselTree *tree);
 // Whether the root is an end through which a tool comes in: neither does the tree go on upstream of it, nor do the root's own points close it
 // over, as those of a blind end do.
 bool vessel_tree_root_is_open(const VesselTree *tree);
+// [mm] of its vessels' centrelines; the links within and into sacs are none.
+double vessel_tree_length(const VesselTree *tree);
 static inline bool vessel_tree_is_model(const VesselTree *tree) { return tree->blob_count > 0; }
 
 #endif

@@ -359,7 +359,7 @@ static bool find_normals(Sampling *s)
                 Vec3 a = mesh->vertex[corner[k]], b = vec3_unit(vec3_sub(mesh->vertex[corner[(k + 1) % 3]], a)),
                      c = vec3_unit(vec3_sub(mesh->vertex[corner[(k + 2) % 3]], a));
                 if (pass == 0)
-                    s->normal[corner[k]] = vec3_add_scaled(s->normal[corner[k]], atan2(vec3_norm(vec3_cross(b, c)), vec3_dot(b, c)), n);
+                    s->normal[corner[k]] = vec3_add_scaled(s->normal[corner[k]], vec3_angle(b, c), n);
                 else
                     sharp[corner[k]] = sharp[corner[k]] || vec3_dot(n, s->normal[corner[k]]) < SHARP_COSINE;
             }

@@ -127,8 +127,6 @@ static double distance_to_data(const VesselTree *tree, int node, Vec3 x)
 
 static int ray_count(const VesselTree *tree, int node) { return tree->kind[node] == NODE_ANEURYSM ? SAC_RAYS : VESSEL_RAYS; }
 
-static double angle_between(Vec3 a, Vec3 b) { return atan2(vec3_norm(vec3_cross(a, b)), vec3_dot(a, b)); }
-
 static VesselHit ask(const Job *job, int node, Vec3 x)
 {
     VesselMemory memory = {.node = node};
@@ -158,8 +156,8 @@ static void add_join(const Job *job, int node, int other, Vec3 x, Vec3 across, N
         f->join_capacity = capacity;
     }
     double moved = aside * vec3_dot(vec3_add(before.normal, behind.normal), across);
-    f->join[f->joins++] = (Join){place_of(job, node, other), node, other, fabs(p.distance - q.distance), angle_between(p.normal, q.normal),
-                                 fabs(behind.gap - before.gap - moved), angle_between(before.normal, behind.normal)};
+    f->join[f->joins++] = (Join){place_of(job, node, other), node, other, fabs(p.distance - q.distance), vec3_angle(p.normal, q.normal),
+                                 fabs(behind.gap - before.gap - moved), vec3_angle(before.normal, behind.normal)};
 }
 
 // Moves x in the plane across `across` to the model's wall; false where that is further than `far` off after some steps.

@@ -67,7 +67,7 @@ static void lay_pieces(Path *path, const TubeOptions *tube)
 // sharp corner is turned about, which leaves the sphere on its outer side.
 static void add_corner(Path *path, Vec3 point, Vec3 before, Vec3 after)
 {
-    double angle = atan2(vec3_norm(vec3_cross(before, after)), vec3_dot(before, after));
+    double angle = vec3_angle(before, after);
     if (angle < 0.45) {
         add_station(path, point, vec3_unit(vec3_add(before, after)));
         return;

@@ -139,7 +139,7 @@ static double value_now(VerifyMeasure *m, const VerifyCase *c, Vec3 *point)
     }
     case VERIFY_TANGENT:
         point_at(m, c->s_mm, point, &tangent);
-        return atan2(vec3_norm(vec3_cross(tangent, c->axis)), vec3_dot(tangent, c->axis)) * deg;
+        return vec3_angle(tangent, c->axis) * deg;
     case VERIFY_TWIST: return twist_between(m, c->from_s_mm, c->s_mm) * deg;
     case VERIFY_PUSH_FORCE: return simulator_last(m->simulator)->proximal_force;
     case VERIFY_PUSH_TORQUE: return simulator_last(m->simulator)->proximal_torque;

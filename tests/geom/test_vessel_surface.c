@@ -142,7 +142,7 @@ static double least_angle(const TriangleMesh *mesh)
         for (int k = 0; k < 3; k++) {
             const int *v = mesh->triangle[t];
             Vec3 p = mesh->vertex[v[k]], a = vec3_sub(mesh->vertex[v[(k + 1) % 3]], p), b = vec3_sub(mesh->vertex[v[(k + 2) % 3]], p);
-            least = fmin(least, atan2(vec3_norm(vec3_cross(a, b)), vec3_dot(a, b)));
+            least = fmin(least, vec3_angle(a, b));
         }
     return least * 180 / PI;
 }
