@@ -196,7 +196,7 @@ static bool watch_step(void *context, Simulator *simulator, Command command)
             take_moment(&watch->moment[i], simulator);
     if (watch->chart)
         run_chart_step(watch->chart, simulator);
-    if (watch->recording && !recording_step(watch->recording, simulator, command))
+    if (watch->recording && !recording_step(watch->recording, simulator, command, NULL))
         watch->recording_failed = true;
     return !watch->recording_failed;
 }

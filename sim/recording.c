@@ -28,7 +28,7 @@ typedef struct Column {
     hid_t type, dataset;
 } Column;
 
-enum { TIME, COMMAND, PROXIMAL, HASH, INSERTED, PENETRATION, CONTACTS, ITERATIONS, RESIDUAL, LINEARISATIONS, WALL_FORCE, FLAGS, STEP_COLUMNS };
+enum { TIME, COMMAND, PROXIMAL, HASH, INSERTED, PENETRATION, CONTACTS, ITERATIONS, RESIDUAL, LINEARISATIONS, WALL_FORCE, FLAGS, XRAY, STEP_COLUMNS };
 enum { FRAME_STEP, POSITION, QUATERNION, FORCE, GAP, VESSEL_NODE, FRAME_COLUMNS };
 
 // Rows of all columns of one kind: written by the simulation thread at `head`, drained by the writer at `tail`; both only grow.
@@ -90,6 +90,7 @@ static void describe_columns(Recording *recording)
     step[LINEARISATIONS] = column_of("/report/linearisations", H5T_NATIVE_INT32, 0, 1, 1);
     step[WALL_FORCE] = column_of("/report/wall_force_n", H5T_NATIVE_DOUBLE, 1, 2, 1);
     step[FLAGS] = column_of("/report/flags", H5T_NATIVE_UINT32, 0, 1, 1);
+    step[XRAY] = column_of("/xray", H5T_NATIVE_FLOAT, 1, XRAY_VALUES, 1);
     frame[FRAME_STEP] = column_of("/wire/step", H5T_NATIVE_INT64, 0, 1, 1);
     frame[POSITION] = column_of("/wire/position", H5T_NATIVE_DOUBLE, 2, nodes, 3);
     frame[QUATERNION] = column_of("/wire/quaternion", H5T_NATIVE_DOUBLE, 2, nodes, 4);
@@ -393,7 +394,7 @@ static bool push_frame(Recording *recording, Simulator *simulator)
     return true;
 }
 
-bool recording_step(Recording *recording, Simulator *simulator, Command command)
+bool recording_step(Recording *recording, Simulator *simulator, Command command, const XrayControl *xray)
 {
     if (!wait_for_room(recording, &recording->steps))
         return false;
@@ -417,6 +418,8 @@ bool recording_step(Recording *recording, Simulator *simulator, Command command)
     memcpy(slot_of(ring, LINEARISATIONS), &linearisations, sizeof linearisations);
     memcpy(slot_of(ring, WALL_FORCE), wall_force, sizeof wall_force);
     memcpy(slot_of(ring, FLAGS), &flags, sizeof flags);
+    XrayControl unseen = {0};
+    memcpy(slot_of(ring, XRAY), xray ? xray : &unseen, sizeof unseen);
     publish(ring);
     int64_t step = simulator_totals(simulator)->steps;
     return step % recording->frame_every != 0 && step != 1 ? true : push_frame(recording, simulator);

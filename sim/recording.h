@@ -10,7 +10,7 @@
 // least S and K, and of the frames those whose step is below S.
 // After a failed write (full disk, full index) nothing more is written, the file stays as the last flush left it.
 //
-// Rows: /time_s (S) time at the end of each step, /command (S,2), /proximal (S,2), /state_hash (S), /inserted_mm (S), /report/penetration_mm,
+// Rows: /time_s (S) time at the end of each step, /command (S,2), /proximal (S,2), /state_hash (S), /inserted_mm (S), /xray (S,16: sim/xray.h), /report/penetration_mm,
 // contacts (with force), iterations and residual of the contact solve, linearisations (1 in a quiet step), flags (all S), wall_force_n (S,2):
 // largest and sum;
 // frames: /wire/step (K) the row of the frame, /wire/position (K,M,3), /wire/quaternion (K,M,4) as w x y z, /contact/force_n (K,M,3),
@@ -19,6 +19,7 @@
 #define SELDINGER_SIM_RECORDING_H
 
 #include "sim/simulator.h"
+#include "sim/xray.h"
 
 typedef struct RecordingOptions {
     double frame_ms;         // simulated time between frames, default 10
@@ -36,7 +37,8 @@ void recording_prepare_process(void);
 // NULL with a fault where the file cannot be made.
 Recording *recording_create(const char *path, Simulator *simulator, const RecordingOptions *options, Faults *faults);
 // After a step. Allocates nothing, calls no file; waits where the disk is slower than the simulation. False once writing failed.
-bool recording_step(Recording *recording, Simulator *simulator, Command command);
+// `xray` may be NULL: nobody sees the run.
+bool recording_step(Recording *recording, Simulator *simulator, Command command, const XrayControl *xray);
 // Adds the last state as a frame, writes what is left, ends. False with a fault where writing failed; always frees.
 bool recording_close(Recording *recording, Simulator *simulator, Faults *faults);
 
@@ -52,8 +54,18 @@ typedef struct RecordedRun {
     int64_t *frame_step;     // (K)
     Vec3 *position;          // (K, M)
     Quat *quaternion;        // (K, M)
+    float *force;            // (K, M, 3) [N] from the wall
+    float *gap;              // (K, M) [mm]
+    int32_t *vessel_node;    // (K, M)
+    double *inserted;        // (S) [mm]
+    XrayControl *xray;       // (S); NULL in recordings from before there was one
+    uint32_t *flags;         // (S) STEP_ flags
+    double *wall_force;      // (S, 2) [N] largest and sum
+    double *s;               // (M) [mm]
     double *radius;          // (M)
-    char *scene_text;
+    char *scene_text, *scene_path;
+    ContactKind contact;
+    double step_ms;
 } RecordedRun;
 // NULL with faults where it is no recording or its sizes do not fit together.
 RecordedRun *recorded_run_load(const char *path, Faults *faults);

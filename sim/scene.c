@@ -4,8 +4,8 @@
 
 #include "input/number_table.h"
 #include "input/text_file.h"
+#include "input/yaml_reader.h"
 #include "sim/rest_shape.h"
-#include "sim/yaml_reader.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -232,13 +232,16 @@ static void read_vessel(Reading *reading, YamlValue value)
 
 // --- wire, sheath, rig ---
 
+static const double wire_attenuation = 0.55, marker_attenuation = 1.2, marker_length = 3;   // DESIGN section 8, what convinced
+
 static void read_section(YamlValue value, WireSection *section)
 {
     static const char *const keys[] = {"length_mm",     "diameter_mm",          "inner_diameter_mm",        "young_modulus_gpa", "poisson_ratio",
-                                       "density_g_cm3", "rest_curvature_1_mm", "rest_curvature_plane_deg", "friction",          NULL};
+                                       "density_g_cm3", "rest_curvature_1_mm", "rest_curvature_plane_deg", "friction",
+                                       "attenuation_1_mm", NULL};
     YamlMap map = yaml_map(value, keys);
     double young = 0, density = 6.45, plane = 0;
-    *section = (WireSection){.poisson_ratio = 0.3, .friction = -1};
+    *section = (WireSection){.poisson_ratio = 0.3, .friction = -1, .attenuation = wire_attenuation};
     yaml_map_number(&map, "length_mm", true, (NumberRange){0, 1e5, true}, &section->length);
     yaml_map_number(&map, "diameter_mm", true, (NumberRange){0, 1000, true}, &section->diameter);
     bool tubular = yaml_map_number(&map, "inner_diameter_mm", false, (NumberRange){0, 1000, false}, &section->inner_diameter);
@@ -251,6 +254,7 @@ static void read_section(YamlValue value, WireSection *section)
     yaml_map_number(&map, "rest_curvature_1_mm", false, (NumberRange){-10, 10, false}, &section->rest_curvature);
     yaml_map_number(&map, "rest_curvature_plane_deg", false, (NumberRange){-36000, 36000, false}, &plane);
     yaml_map_number(&map, "friction", false, friction_range, &section->friction);
+    yaml_map_number(&map, "attenuation_1_mm", false, (NumberRange){0, 100, false}, &section->attenuation);
     section->young_modulus = young * per_gpa;
     section->density = density * per_g_cm3;
     section->rest_plane = plane * per_deg;
@@ -287,7 +291,8 @@ static void read_rest(Reading *reading, YamlValue list)
 
 static void read_wire(Reading *reading, YamlValue value)
 {
-    static const char *const keys[] = {"elements", "sections", "rest", "damping", NULL};
+    static const char *const keys[] = {"elements", "sections", "rest", "damping", "tip_marker", NULL};
+    static const char *const marker_keys[] = {"length_mm", "attenuation_1_mm", NULL};
     static const char *const damping_keys[] = {"mass_1_s", "stiffness_s", NULL};
     WireOptions *wire = &reading->scene->wire;
     YamlMap map = yaml_map(value, keys);
@@ -300,6 +305,9 @@ static void read_wire(Reading *reading, YamlValue value)
     yaml_map_number(&damping, "stiffness_s", false, (NumberRange){0, 1000, false}, &stiffness);
     wire->damping_mass = mass / per_second;
     wire->damping_stiffness = stiffness * per_second;
+    YamlMap marker = yaml_map(yaml_get(&map, "tip_marker", false), marker_keys);
+    yaml_map_number(&marker, "length_mm", false, (NumberRange){0, 1000, false}, &reading->scene->marker_length);
+    yaml_map_number(&marker, "attenuation_1_mm", false, (NumberRange){0, 100, false}, &reading->scene->marker_attenuation);
 
     YamlValue list = yaml_get(&map, "sections", true);
     int count = yaml_count(list, 1, MOST_SECTIONS);
@@ -551,6 +559,8 @@ Scene *scene_parse(const char *text, size_t length, const char *path, Faults *fa
         scene->text[length] = 0;
         scene->source = SOURCE_NONE;
         scene->dt = 1;
+        scene->marker_length = marker_length;
+        scene->marker_attenuation = marker_attenuation;
         scene->contact_options = (ContactOptions){.form = CONTACT_BLOCK, .max_iterations = 200, .tolerance = 1e-6};
         scene->wire.direction = vec3(1, 0, 0);
         Reading reading = {.scene = scene, .reader = reader, .path = path, .faults = faults};
@@ -589,7 +599,21 @@ void scene_free(Scene *scene)
     free(scene->model_path);
     free(scene->mesh_path);
     free(scene->script_path);
+    free(scene->anatomy_path);
     free(scene->text);
     free(scene->path);
     free(scene);
+}
+
+double scene_attenuation(const Scene *scene, double s)
+{
+    const WireOptions *wire = &scene->wire;
+    double total = 0;
+    int at = -1;
+    for (int i = 0; i < wire->section_count; i++) {
+        total += wire->section[i].length;
+        if (at < 0 && (s < total || i == wire->section_count - 1))
+            at = i;
+    }
+    return at < 0 ? 0 : s > total - scene->marker_length ? scene->marker_attenuation : wire->section[at].attenuation;
 }

@@ -43,6 +43,8 @@ typedef struct Scene {
     char *script_path;       // NULL where inline or none
     int target_count;
     SceneTarget *target;
+    double marker_length, marker_attenuation;   // [mm], [1/mm] of the radio-opaque marker at the tip; length 0: none
+    char *anatomy_path;      // volume whose bone and soft tissue lie behind the vessel in fluoroscopy; NULL: a plain head
     VerifyPlan verify;       // what `seldinger check` measures; case_count 0: nothing
 } Scene;
 
@@ -50,6 +52,8 @@ typedef struct Scene {
 Scene *scene_parse(const char *text, size_t length, const char *path, Faults *faults);
 Scene *scene_load(const char *path, Faults *faults);
 void scene_free(Scene *scene);
+// [1/mm] by which the tool takes X-rays away at arc length s from its proximal end.
+double scene_attenuation(const Scene *scene, double s);
 // The file that the vessel comes from, a model or a mesh; NULL where it needs none.
 static inline const char *scene_needed_file(const Scene *scene) { return scene->source == SOURCE_MODEL ? scene->model_path : scene->mesh_path; }
 

@@ -5,6 +5,7 @@
 
 #include "sim/compare.h"
 #include "sim/drive.h"
+#include "sim/pose.h"
 #include "sim/recording.h"
 #include "sim/scene.h"
 #include "sim/simulator.h"

@@ -7,7 +7,7 @@
 #define SELDINGER_SIM_VERIFY_H
 
 #include "geom/linear.h"
-#include "sim/yaml_reader.h"
+#include "input/yaml_reader.h"
 
 enum { VERIFY_MOST_ELEMENTS = 8, VERIFY_MOST_CASES = 100, VERIFY_NAME = 64 };
 

@@ -21,6 +21,7 @@ typedef struct WireSection {
     double rest_curvature;   // [1/mm]
     double rest_plane;       // [rad] turns e2 about e1
     double friction;         // Coulomb coefficient; < 0: the wall's
+    double attenuation;      // [1/mm] of X-rays; mechanics never looks at it
 } WireSection;
 
 typedef struct WireLoad {    // dead or follower, at the node nearest s (exactly: shared linearly by the two nodes around s)

@@ -1,5 +1,5 @@
 // libyaml's document API keeps the line and column of every node but accepts duplicate keys; they are refused here.
-#include "sim/yaml_reader.h"
+#include "input/yaml_reader.h"
 
 #include "input/number_table.h"
 

@@ -1,8 +1,8 @@
 // Reads a YAML document by a schema that the caller walks: a map is opened with the list of its valid keys, then asked for each value by
 // type and range. Everything that is wrong becomes a fault with file:line:col; reading goes on, so one pass finds all.
 // Aliases are followed. A walk of bounded depth cannot run into a cycle; a budget of visited nodes bounds repeated aliases.
-#ifndef SELDINGER_SIM_YAML_READER_H
-#define SELDINGER_SIM_YAML_READER_H
+#ifndef SELDINGER_INPUT_YAML_READER_H
+#define SELDINGER_INPUT_YAML_READER_H
 
 #include "geom/faults.h"
 #include "geom/linear.h"

@@ -1,0 +1,29 @@
+// Between one hand (keyboard, gamepad, HID or USB device) and the 1 kHz thread, without locks: single values that one side writes and the other
+// reads. A hand gives rates (a stick, a key), ways (an encoder's counts), or both; ways are totals since the port was opened, so that none is
+// lost or taken twice however often either side looks. One writer for each direction; a port outlives both.
+#ifndef SELDINGER_INPUT_HAND_PORT_H
+#define SELDINGER_INPUT_HAND_PORT_H
+
+#include <stdatomic.h>
+#include <stdint.h>
+
+typedef enum { HAND_ABSENT, HAND_READY, HAND_LOST } HandState;   // LOST: was there, unplugged or silent; may come back
+
+enum { HAND_PEDAL = 1, HAND_CONTRAST = 2, HAND_STOP = 4, HAND_MARK = 8 };   // bits of `buttons`: X-ray pedal, injection, stop the tool, set a bookmark
+
+typedef struct HandPort {
+    // from the hand
+    _Atomic double push_mm_s;        // rate it asks for now, > 0 into the patient
+    _Atomic double twist_deg_s;
+    _Atomic double advanced_mm;      // way it has gone in all
+    _Atomic double turned_deg;
+    _Atomic unsigned buttons;        // HAND_ bits held now
+    _Atomic int state;               // HandState
+    _Atomic int64_t reports;         // read so far
+    // to the hand, after each step
+    _Atomic double force_n;          // the sheath's reaction at the driven node, > 0 where the tool pushes back against a push
+    _Atomic double torque_n_mm;
+    _Atomic int64_t step;            // grows while the simulation lives: a watchdog looks at it
+} HandPort;
+
+#endif

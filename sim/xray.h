@@ -1,0 +1,25 @@
+// What the operator sets at the X-ray system, sampled at each step and recorded beside the command: all floats, so that a row of the
+// recording's /xray (S, XRAY_VALUES) is this struct.
+#ifndef SELDINGER_SIM_XRAY_H
+#define SELDINGER_SIM_XRAY_H
+
+typedef struct XrayControl {
+    float pedal;             // 1 while fluoroscopy is on
+    float pulses_s;          // 7.5, 10, 15 or 30
+    float lao_deg;           // C-arm: LAO > 0, RAO < 0, within 90
+    float cra_deg;           // CRA > 0, CAU < 0, within 45
+    float field_mm;          // magnification: side of the square seen at the isocentre, 40 to 400
+    float table_mm[3];       // where the isocentre lies in the model's frame
+    float collimator[4];     // left, right, bottom, top blade: part of half the field that it covers, 0 to 0.95
+    float contrast_ml_s;     // contrast agent that flows now
+    float mode;              // XrayMode
+    float mask;              // counts the masks taken for DSA and roadmap: a change takes one
+    float reserved;          // 0
+} XrayControl;
+
+enum { XRAY_VALUES = sizeof(XrayControl) / sizeof(float) };
+typedef enum { XRAY_LIVE, XRAY_DSA, XRAY_ROADMAP } XrayMode;
+
+static inline XrayControl xray_default_control(void) { return (XrayControl){.pulses_s = 15, .field_mm = 160}; }
+
+#endif
