@@ -70,12 +70,49 @@ static char *read_scene_text(hid_t file)
     return text;
 }
 
+// A text attribute of /scene; NULL where there is none.
+static char *read_scene_attribute(hid_t file, const char *name)
+{
+    hid_t set = H5Dopen2(file, "/scene", H5P_DEFAULT), attribute = set >= 0 ? H5Aopen(set, name, H5P_DEFAULT) : -1;
+    char *text = NULL;
+    if (attribute >= 0) {
+        hid_t type = H5Aget_type(attribute);
+        size_t size = H5Tget_size(type);
+        if (H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) <= 0 && size < 1 << 20 && H5Aget_storage_size(attribute) == size &&
+            (text = calloc(size + 1, 1)) && H5Aread(attribute, type, text) < 0) {
+            free(text);
+            text = NULL;
+        }
+        H5Tclose(type);
+        H5Aclose(attribute);
+    }
+    if (set >= 0)
+        H5Dclose(set);
+    return text;
+}
+
+static double read_step_ms(hid_t file)
+{
+    double value = 1;
+    hid_t attribute = H5Aexists(file, "step_ms") > 0 ? H5Aopen(file, "step_ms", H5P_DEFAULT) : -1;
+    if (attribute >= 0) {
+        hid_t type = H5Aget_type(attribute);
+        if (H5Tget_class(type) == H5T_FLOAT && H5Aget_storage_size(attribute) == H5Tget_size(type))
+            H5Aread(attribute, H5T_NATIVE_DOUBLE, &value);
+        H5Tclose(type);
+        H5Aclose(attribute);
+    }
+    return value;
+}
+
 static int64_t least(int64_t a, hsize_t b) { return (hsize_t)a < b ? a : (int64_t)b; }
 
 static void read_run(const Reader *reader, RecordedRun *run)
 {
+    int before = reader->faults->count;
     hsize_t time[1] = {0}, command[2] = {0, 2}, proximal[2] = {0, 2}, hash[1] = {0}, step[1] = {0}, position[3] = {0, 0, 3}, quaternion[3] = {0, 0, 4},
-            radius[1] = {0};
+            radius[1] = {0}, force[3] = {0, 0, 3}, gap[2] = {0, 0}, node[2] = {0, 0}, inserted[1] = {0}, flags[1] = {0}, wall[2] = {0, 2}, s[1] = {0},
+            xray[2] = {0, XRAY_VALUES};
     run->time_s = read_dataset(reader, "/time_s", H5T_NATIVE_DOUBLE, 1, time);
     run->command = read_dataset(reader, "/command", H5T_NATIVE_DOUBLE, 2, command);
     run->proximal = read_dataset(reader, "/proximal", H5T_NATIVE_DOUBLE, 2, proximal);
@@ -85,16 +122,28 @@ static void read_run(const Reader *reader, RecordedRun *run)
     quaternion[1] = position[1];
     run->quaternion = read_dataset(reader, "/wire/quaternion", H5T_NATIVE_DOUBLE, 3, quaternion);
     run->radius = read_dataset(reader, "/wire/radius_mm", H5T_NATIVE_DOUBLE, 1, radius);
-    if (!run->time_s || !run->command || !run->proximal || !run->state_hash || !run->frame_step || !run->position || !run->quaternion || !run->radius)
+    force[1] = gap[1] = node[1] = position[1];
+    run->force = read_dataset(reader, "/contact/force_n", H5T_NATIVE_FLOAT, 3, force);
+    run->gap = read_dataset(reader, "/contact/gap_mm", H5T_NATIVE_FLOAT, 2, gap);
+    run->vessel_node = read_dataset(reader, "/contact/vessel_node", H5T_NATIVE_INT32, 2, node);
+    run->inserted = read_dataset(reader, "/inserted_mm", H5T_NATIVE_DOUBLE, 1, inserted);
+    run->flags = read_dataset(reader, "/report/flags", H5T_NATIVE_UINT32, 1, flags);
+    run->wall_force = read_dataset(reader, "/report/wall_force_n", H5T_NATIVE_DOUBLE, 2, wall);
+    run->s = read_dataset(reader, "/wire/s_mm", H5T_NATIVE_DOUBLE, 1, s);
+    bool was_seen = H5Lexists(reader->file, "/xray", H5P_DEFAULT) > 0;   // not in recordings of before the trainer
+    run->xray = was_seen ? read_dataset(reader, "/xray", H5T_NATIVE_FLOAT, 2, xray) : NULL;
+    if (reader->faults->count > before)
         return;
-    if (position[1] < 2 || position[1] > 100000 || radius[0] != position[1]) {
+    if (position[1] < 2 || position[1] > 100000 || radius[0] != position[1] || s[0] != position[1]) {
         faults_add(reader->faults, reader->path, 0, 0, "holds %llu nodes and %llu radii; 2 to 100000 of each", (unsigned long long)position[1],
                    (unsigned long long)radius[0]);
         return;
     }
     run->node_count = (int)position[1];
-    run->step_count = least(least(least((int64_t)time[0], command[0]), proximal[0]), hash[0]);
-    run->frame_count = least(least((int64_t)step[0], position[0]), quaternion[0]);
+    run->step_count = least(least(least(least(least(least((int64_t)time[0], command[0]), proximal[0]), hash[0]), inserted[0]), flags[0]), wall[0]);
+    if (run->xray)
+        run->step_count = least(run->step_count, xray[0]);
+    run->frame_count = least(least(least(least(least((int64_t)step[0], position[0]), quaternion[0]), force[0]), gap[0]), node[0]);
     while (run->frame_count > 0 && run->frame_step[run->frame_count - 1] >= run->step_count)
         run->frame_count--;
     for (int64_t i = 0; i < run->frame_count; i++)
@@ -102,6 +151,16 @@ static void read_run(const Reader *reader, RecordedRun *run)
             faults_add(reader->faults, reader->path, 0, 0, "frame %lld names step %lld; steps grow from 0", (long long)i, (long long)run->frame_step[i]);
             return;
         }
+}
+
+// Takes `name` over. CONTACT_COUNT where it is not known: then the scene's own.
+static ContactKind contact_of(char *name)
+{
+    int kind = 0;
+    while (kind < CONTACT_COUNT && (!name || strcmp(name, contact_name[kind])))
+        kind++;
+    free(name);
+    return (ContactKind)kind;
 }
 
 RecordedRun *recorded_run_load(const char *path, Faults *faults)
@@ -125,6 +184,9 @@ RecordedRun *recorded_run_load(const char *path, Faults *faults)
     if (run) {
         read_run(&reader, run);
         run->scene_text = read_scene_text(reader.file);
+        run->scene_path = read_scene_attribute(reader.file, "path");
+        run->contact = contact_of(read_scene_attribute(reader.file, "contact"));
+        run->step_ms = read_step_ms(reader.file);
     } else {
         faults_add(faults, path, 0, 0, "no memory");
     }
@@ -148,6 +210,15 @@ void recorded_run_free(RecordedRun *run)
     free(run->position);
     free(run->quaternion);
     free(run->radius);
+    free(run->force);
+    free(run->gap);
+    free(run->vessel_node);
+    free(run->inserted);
+    free(run->xray);
+    free(run->flags);
+    free(run->wall_force);
+    free(run->s);
+    free(run->scene_path);
     free(run->scene_text);
     free(run);
 }

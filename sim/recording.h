@@ -63,8 +63,8 @@ typedef struct RecordedRun {
     double *wall_force;      // (S, 2) [N] largest and sum
     double *s;               // (M) [mm]
     double *radius;          // (M)
-    char *scene_text, *scene_path;
-    ContactKind contact;
+    char *scene_text, *scene_path;   // NULL where the file lacks them
+    ContactKind contact;     // CONTACT_COUNT: not said, the scene's
     double step_ms;
 } RecordedRun;
 // NULL with faults where it is no recording or its sizes do not fit together.
