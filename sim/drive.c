@@ -46,15 +46,22 @@ static void priority_restore(const Priority *before)
 }
 
 // After a step of a paced run: late or not?
-static void keep_pace(DriveReport *report, int64_t *base, int64_t due)
+static void count_late(DriveReport *report, int64_t late)
+{
+    report->deadline_misses++;
+    report->slowed_s += (double)late * 1e-9;
+    report->latest_s = fmax(report->latest_s, (double)late * 1e-9);
+}
+
+static void keep_pace(DriveReport *report, DriveReport *live, int64_t *base, int64_t due)
 {
     int64_t late = wall_ns() - due;
     if (late <= 0)
         return;
     *base += late;
-    report->deadline_misses++;
-    report->slowed_s += (double)late * 1e-9;
-    report->latest_s = fmax(report->latest_s, (double)late * 1e-9);
+    count_late(report, late);
+    if (live)
+        count_late(live, late);
 }
 
 static double last_ramp_s(const Scene *scene)
@@ -76,6 +83,8 @@ DriveReport simulator_drive(Simulator *simulator, const DriveOptions *options)
     int64_t driven = (int64_t)ceil(duration / step_s - 1e-6), settling = (int64_t)ceil(options->settle_s / step_s - 1e-6);
     Priority priority = options->paced ? priority_raise() : (Priority){0};
     report.real_time_priority = priority.raised;
+    if (options->live)
+        options->live->real_time_priority = priority.raised;
     int64_t begin = wall_ns(), base = begin, step_ns = (int64_t)(scene->dt * 1e6 + 0.5);
     int cursor = 0;
 
@@ -88,13 +97,17 @@ DriveReport simulator_drive(Simulator *simulator, const DriveOptions *options)
             break;
         if (options->paced)
             sleep_until(base + i * step_ns);
+        if (options->paced && options->late_ns)
+            histogram_add(options->late_ns, wall_ns() - (base + i * step_ns));
         bool scripted = options->script && i < driven;
-        Command command = scripted ? script_at(options->script, (double)i * scene->dt / 1000, &cursor) : (Command){0, 0};
+        Command command = scripted                     ? script_at(options->script, (double)i * scene->dt / 1000, &cursor)
+                          : options->hand && i < driven ? options->hand(options->context)
+                                                        : (Command){0, 0};
         simulator_step(simulator, command);
         at_rest_s = simulator_fastest_mm_s(simulator) <= rest_speed_mm_s ? at_rest_s + step_s : 0;
         bool goes_on = !options->after_step || options->after_step(options->context, simulator, command);
         if (options->paced)
-            keep_pace(&report, &base, base + (i + 1) * step_ns);
+            keep_pace(&report, options->live, &base, base + (i + 1) * step_ns);
         if (!goes_on) {
             report.end = DRIVE_STOPPED;
             break;

@@ -7,17 +7,6 @@
 
 #include <signal.h>
 
-typedef struct DriveOptions {
-    const Script *script;            // NULL: no input
-    double duration_s;               // < 0: the script's
-    double settle_s;                 // afterwards, without input, at most this long, until nothing is faster than 0.01 mm/s for 0.1 s
-    bool paced;                      // a step begins when the last one's millisecond is over, see below
-    const volatile sig_atomic_t *stop;   // NULL, or stops before the next step once it is not 0
-    // After each step, on the simulation thread; false stops. May be NULL.
-    bool (*after_step)(void *context, Simulator *simulator, Command command);
-    void *context;
-} DriveOptions;
-
 typedef enum { DRIVE_DONE, DRIVE_STOPPED, DRIVE_DIVERGED } DriveEnd;
 
 // Paced: step i begins at base + i dt of real time and is due at base + (i + 1) dt, both absolute. One that ends later is a missed deadline;
@@ -32,6 +21,20 @@ typedef struct DriveReport {
     bool real_time_priority;         // paced on SCHED_FIFO; false where that is not permitted: then other programs delay steps
     bool settled;                    // nothing was faster than 0.01 mm/s during the last 0.1 s
 } DriveReport;
+
+typedef struct DriveOptions {
+    const Script *script;            // NULL: no input …
+    Command (*hand)(void *context);  // … or this instead, asked once before each step
+    double duration_s;               // < 0: the script's
+    double settle_s;                 // afterwards, without input, at most this long, until nothing is faster than 0.01 mm/s for 0.1 s
+    bool paced;                      // a step begins when the last one's millisecond is over, see below
+    const volatile sig_atomic_t *stop;   // NULL, or stops before the next step once it is not 0
+    // After each step, on the simulation thread; false stops. May be NULL.
+    bool (*after_step)(void *context, Simulator *simulator, Command command);
+    DriveReport *live;               // NULL, or where deadlines of a paced run are counted while it goes; added to what is there
+    TimeHistogram *late_ns;          // NULL, or by how much each paced step began late
+    void *context;
+} DriveOptions;
 
 DriveOptions drive_default_options(void);
 // Stops at the first diverged step: the state is the last good one.

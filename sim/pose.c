@@ -41,6 +41,15 @@ void pose_copy(Pose *to, const Pose *from)
     memcpy(to->node, from->node, count * sizeof *to->node);
 }
 
+// Behind the mouth lies what is not inserted. Without a sheath all of the tool is.
+static void find_first_free(Pose *pose, bool has_sheath)
+{
+    double hidden = has_sheath ? pose->node[pose->node_count - 1].s - pose->inserted_mm : 0;
+    pose->first_free_node = 0;
+    while (pose->first_free_node < pose->node_count - 1 && pose->node[pose->first_free_node].s < hidden)
+        pose->first_free_node++;
+}
+
 void pose_take(Pose *pose, Simulator *simulator, Command command, const XrayControl *xray)
 {
     const WireState *state = simulator_state(simulator);
@@ -50,13 +59,30 @@ void pose_take(Pose *pose, Simulator *simulator, Command command, const XrayCont
     pose->command = command;
     pose->xray = *xray;
     pose->inserted_mm = state->inserted;
-    pose->turned_deg = state->twist * 180 / PI;
     pose->report = *simulator_last(simulator);
     memcpy(pose->position, state->position, count * sizeof *pose->position);
     memcpy(pose->quaternion, state->orientation, count * sizeof *pose->quaternion);
     stepper_node_report(simulator_stepper(simulator), pose->node);
-    double hidden = simulator_scene(simulator)->wire.has_sheath ? pose->node[count - 1].s - pose->inserted_mm : 0;
-    pose->first_free_node = 0;
-    while (pose->first_free_node < state->node_count - 1 && pose->node[pose->first_free_node].s < hidden)
-        pose->first_free_node++;
+    find_first_free(pose, simulator_scene(simulator)->wire.has_sheath);
+}
+
+void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64_t frame)
+{
+    int64_t row = run->frame_step[frame];
+    size_t nodes = (size_t)run->node_count, first = (size_t)frame * nodes;
+    pose->step = row + 1;
+    pose->time_s = run->time_s[row];
+    pose->command = (Command){run->command[2 * row], run->command[2 * row + 1]};
+    pose->xray = run->xray ? run->xray[row] : xray_default_control();
+    pose->inserted_mm = run->inserted[row];
+    pose->report = (StepReport){.flags = run->flags[row], .proximal_force = run->proximal[2 * row], .proximal_torque = run->proximal[2 * row + 1],
+                                .wall_force_max = run->wall_force[2 * row], .wall_force_sum = run->wall_force[2 * row + 1]};
+    memcpy(pose->position, run->position + first, nodes * sizeof *pose->position);
+    memcpy(pose->quaternion, run->quaternion + first, nodes * sizeof *pose->quaternion);
+    for (size_t i = 0; i < nodes; i++) {
+        const float *force = run->force + 3 * (first + i);
+        pose->node[i] = (NodeReport){.s = run->s[i], .radius = run->radius[i], .force = vec3((double)force[0], (double)force[1], (double)force[2]),
+                                     .gap = (double)run->gap[first + i], .vessel_node = run->vessel_node[first + i]};
+    }
+    find_first_free(pose, scene->wire.has_sheath);
 }

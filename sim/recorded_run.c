@@ -185,6 +185,8 @@ RecordedRun *recorded_run_load(const char *path, Faults *faults)
         read_run(&reader, run);
         run->scene_text = read_scene_text(reader.file);
         run->scene_path = read_scene_attribute(reader.file, "path");
+        run->files = read_scene_attribute(reader.file, "files");
+        run->sha256 = read_scene_attribute(reader.file, "sha256");
         run->contact = contact_of(read_scene_attribute(reader.file, "contact"));
         run->step_ms = read_step_ms(reader.file);
     } else {
@@ -219,6 +221,8 @@ void recorded_run_free(RecordedRun *run)
     free(run->wall_force);
     free(run->s);
     free(run->scene_path);
+    free(run->files);
+    free(run->sha256);
     free(run->scene_text);
     free(run);
 }

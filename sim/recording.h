@@ -64,6 +64,7 @@ typedef struct RecordedRun {
     double *s;               // (M) [mm]
     double *radius;          // (M)
     char *scene_text, *scene_path;   // NULL where the file lacks them
+    char *files, *sha256;    // paths and sums of what the run was made from, one a line
     ContactKind contact;     // CONTACT_COUNT: not said, the scene's
     double step_ms;
 } RecordedRun;

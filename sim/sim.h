@@ -1,11 +1,12 @@
 // sim: a scene becomes a simulator, a hand drives it, what happens is recorded and compared. Uses geom, solver and input.
-// Reading order: scene.h (what is simulated), simulator.h (one step), drive.h (many steps), recording.h, compare.h.
+// Reading order: scene.h (what is simulated), simulator.h (one step), drive.h (many steps), recording.h, compare.h; for a hand: hand_set.h, realtime.h.
 #ifndef SELDINGER_SIM_SIM_H
 #define SELDINGER_SIM_SIM_H
 
 #include "sim/compare.h"
 #include "sim/drive.h"
 #include "sim/pose.h"
+#include "sim/realtime.h"
 #include "sim/recording.h"
 #include "sim/scene.h"
 #include "sim/simulator.h"

@@ -1,0 +1,200 @@
+#include "sim/realtime.h"
+
+#include "sim/triple_buffer.h"
+
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+// How often the figures are made anew [moments]: quantiles of a histogram take a few us each.
+enum { FIGURES_EVERY = 20 };
+
+struct Realtime {
+    RealtimeOptions options;
+    HandSet hands;
+    // operator to thread
+    TripleBuffer xray_buffer;
+    XrayControl xray[3];
+    _Atomic int paused, ending;
+    // thread to window
+    TripleBuffer moment_buffer;
+    Moment moment[3];
+    bool has_moment;         // the window's
+    // the thread's
+    pthread_t thread;
+    XrayControl now;         // of this step
+    int64_t pose_every, since_pose, moments;
+    DriveReport live;
+    TimeHistogram late_ns;
+    RealtimeFigures figures;
+    double factor_from_s;    // real and simulated time at the last figures
+    double factor_from_simulated_s;
+};
+
+RealtimeOptions realtime_default_options(void) { return (RealtimeOptions){.pose_ms = 10, .xray = xray_default_control()}; }
+
+static double wall_s(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+}
+
+static Command ask_hands(void *context)
+{
+    Realtime *realtime = context;
+    if (triple_buffer_fetch(&realtime->xray_buffer))
+        realtime->now = realtime->xray[realtime->xray_buffer.reading];
+    return hand_set_command(&realtime->hands, simulator_scene(realtime->options.simulator)->dt);
+}
+
+static void renew_figures(Realtime *realtime)
+{
+    RealtimeFigures *figures = &realtime->figures;
+    const TimeHistogram *step = &simulator_profile(realtime->options.simulator)->step, *late = &realtime->late_ns;
+    figures->deadline_misses = realtime->live.deadline_misses;
+    figures->slowed_s = realtime->live.slowed_s;
+    figures->latest_s = realtime->live.latest_s;
+    figures->real_time_priority = realtime->live.real_time_priority;
+    figures->step_us[0] = histogram_quantile(step, 0.5) / 1000;
+    figures->step_us[1] = histogram_quantile(step, 0.999) / 1000;
+    figures->step_us[2] = (double)step->largest / 1000;
+    figures->late_us[0] = histogram_quantile(late, 0.5) / 1000;
+    figures->late_us[1] = histogram_quantile(late, 0.99) / 1000;
+    figures->late_us[2] = (double)late->largest / 1000;
+    double real = wall_s(), simulated = simulator_time_s(realtime->options.simulator);
+    if (real - realtime->factor_from_s >= 1) {
+        figures->real_time_factor = (simulated - realtime->factor_from_simulated_s) / (real - realtime->factor_from_s);
+        realtime->factor_from_s = real;
+        realtime->factor_from_simulated_s = simulated;
+    }
+}
+
+static void publish(Realtime *realtime, Command command)
+{
+    const RealtimeOptions *options = &realtime->options;
+    Moment *moment = &realtime->moment[realtime->moment_buffer.writing];
+    if (realtime->moments++ % FIGURES_EVERY == 0)
+        renew_figures(realtime);
+    pose_take(moment->pose, options->simulator, command, &realtime->now);
+    moment->figures = realtime->figures;
+    if (options->publish)
+        options->publish(options->context, moment->extra);
+    triple_buffer_publish(&realtime->moment_buffer);
+    realtime->since_pose = 0;
+}
+
+static bool after_step(void *context, Simulator *simulator, Command command)
+{
+    Realtime *realtime = context;
+    const RealtimeOptions *options = &realtime->options;
+    const StepReport *report = simulator_last(simulator);
+    hand_set_answer(&realtime->hands, report, simulator_totals(simulator)->steps);
+    if (options->after_step)
+        options->after_step(options->context, simulator, command, &realtime->now);
+    if (options->recording && !recording_step(options->recording, simulator, command, &realtime->now))
+        realtime->figures.state = REALTIME_UNRECORDED;
+    if (report->flags & STEP_DIVERGED)
+        realtime->figures.state = REALTIME_DIVERGED;
+    if (++realtime->since_pose >= realtime->pose_every || realtime->figures.state != REALTIME_RUNNING)
+        publish(realtime, command);
+    return realtime->figures.state == REALTIME_RUNNING && !atomic_load_explicit(&realtime->paused, memory_order_relaxed) &&
+           !atomic_load_explicit(&realtime->ending, memory_order_relaxed);
+}
+
+static void nap(long milliseconds) { nanosleep(&(struct timespec){.tv_nsec = milliseconds * 1000000}, NULL); }
+
+static void *run_session(void *argument)
+{
+    Realtime *realtime = argument;
+    DriveOptions drive = drive_default_options();
+    drive.hand = ask_hands;
+    drive.duration_s = SCRIPT_LONGEST_S;
+    drive.paced = true;
+    drive.after_step = after_step;
+    drive.context = realtime;
+    drive.live = &realtime->live;
+    drive.late_ns = &realtime->late_ns;
+    publish(realtime, (Command){0, 0});
+    while (!atomic_load(&realtime->ending) && realtime->figures.state < REALTIME_DIVERGED) {
+        if (atomic_load(&realtime->paused)) {
+            if (realtime->figures.state == REALTIME_RUNNING) {
+                realtime->figures.state = REALTIME_PAUSED;
+                publish(realtime, (Command){0, 0});
+            }
+            nap(2);
+            continue;
+        }
+        realtime->figures.state = REALTIME_RUNNING;
+        realtime->factor_from_s = wall_s();
+        realtime->factor_from_simulated_s = simulator_time_s(realtime->options.simulator);
+        simulator_drive(realtime->options.simulator, &drive);
+    }
+    return NULL;
+}
+
+static void realtime_free(Realtime *realtime)
+{
+    for (int i = 0; i < 3; i++) {
+        pose_free(realtime->moment[i].pose);
+        free(realtime->moment[i].extra);
+    }
+    free(realtime);
+}
+
+Realtime *realtime_start(const RealtimeOptions *options, Faults *faults)
+{
+    Realtime *realtime = calloc(1, sizeof *realtime);
+    const Scene *scene = simulator_scene(options->simulator);
+    int nodes = simulator_state(options->simulator)->node_count;
+    bool good = realtime != NULL;
+    for (int i = 0; good && i < 3; i++) {
+        realtime->moment[i].pose = pose_create(nodes);
+        realtime->moment[i].extra = calloc(1, options->extra_bytes + 1);
+        good = realtime->moment[i].pose && realtime->moment[i].extra;
+    }
+    if (good) {
+        realtime->options = *options;
+        realtime->now = options->xray;
+        realtime->pose_every = (int64_t)fmax(1, floor(options->pose_ms / scene->dt + 0.5));
+        hand_set_init(&realtime->hands);
+        triple_buffer_init(&realtime->xray_buffer);
+        triple_buffer_init(&realtime->moment_buffer);
+        atomic_store(&realtime->paused, options->paused);
+        good = pthread_create(&realtime->thread, NULL, run_session, realtime) == 0;
+    }
+    if (good)
+        return realtime;
+    faults_add(faults, scene->path, 0, 0, "no memory or thread for a session");
+    if (realtime)
+        realtime_free(realtime);
+    return NULL;
+}
+
+HandPort *realtime_hand(Realtime *realtime, int index) { return &realtime->hands.port[index]; }
+
+void realtime_set_xray(Realtime *realtime, const XrayControl *xray)
+{
+    realtime->xray[realtime->xray_buffer.writing] = *xray;
+    triple_buffer_publish(&realtime->xray_buffer);
+}
+
+void realtime_pause(Realtime *realtime, bool paused) { atomic_store(&realtime->paused, paused); }
+
+const Moment *realtime_moment(Realtime *realtime)
+{
+    if (triple_buffer_fetch(&realtime->moment_buffer))
+        realtime->has_moment = true;
+    return realtime->has_moment ? &realtime->moment[realtime->moment_buffer.reading] : NULL;
+}
+
+RealtimeFigures realtime_stop(Realtime *realtime)
+{
+    atomic_store(&realtime->ending, true);
+    pthread_join(realtime->thread, NULL);
+    renew_figures(realtime);
+    RealtimeFigures figures = realtime->figures;
+    realtime_free(realtime);
+    return figures;
+}

@@ -1,0 +1,60 @@
+// The 1 kHz thread: owns a simulator, takes commands from hands and controls from the operator, steps at the simulated clock's speed, and lets
+// moments out for whoever draws. No locks: hands write ports (input/hand_port.h), the operator's controls and the moments go through triple
+// buffers. What it is given (simulator, recording) belongs to it from start to stop.
+//
+// A step that diverges ends the session: the state is the last good one, the moment says so. Nothing resets by itself.
+#ifndef SELDINGER_SIM_REALTIME_H
+#define SELDINGER_SIM_REALTIME_H
+
+#include "sim/drive.h"
+#include "sim/hand_set.h"
+#include "sim/pose.h"
+#include "sim/recording.h"
+
+typedef struct Realtime Realtime;
+
+typedef struct RealtimeOptions {
+    Simulator *simulator;
+    Recording *recording;            // NULL: none
+    XrayControl xray;                // before the operator sets any
+    double pose_ms;                  // simulated time between moments, default 10
+    bool paused;                     // at the start
+    // On the thread, after each step; must not wait. May be NULL.
+    void (*after_step)(void *context, Simulator *simulator, Command command, const XrayControl *xray);
+    // On the thread, with each moment: fills what else goes out with it (`extra_bytes`). May be NULL.
+    void (*publish)(void *context, void *extra);
+    void *context;
+    size_t extra_bytes;
+} RealtimeOptions;
+RealtimeOptions realtime_default_options(void);
+
+typedef enum { REALTIME_RUNNING, REALTIME_PAUSED, REALTIME_DIVERGED, REALTIME_UNRECORDED } RealtimeState;   // the last: the recording failed, and
+                                                                                                             // the session stopped with it
+typedef struct RealtimeFigures {
+    RealtimeState state;
+    int64_t deadline_misses;
+    double slowed_s, latest_s;       // see DriveReport
+    bool real_time_priority;
+    double step_us[3];               // CPU time of a step: median, p99.9, worst
+    double late_us[3];               // by which the thread woke late: median, p99, worst
+    double real_time_factor;         // simulated time over real time, of the last second that it ran
+} RealtimeFigures;
+
+typedef struct Moment {
+    Pose *pose;
+    RealtimeFigures figures;
+    void *extra;                     // (extra_bytes)
+} Moment;
+
+// Starts the thread. NULL with a fault.
+Realtime *realtime_start(const RealtimeOptions *options, Faults *faults);
+// One side each: `hand` of the port's writer (index below HAND_COUNT), the others of one thread, the window's.
+HandPort *realtime_hand(Realtime *realtime, int index);
+void realtime_set_xray(Realtime *realtime, const XrayControl *xray);
+void realtime_pause(Realtime *realtime, bool paused);
+// The newest moment; stays as it is until the next call. NULL before the first.
+const Moment *realtime_moment(Realtime *realtime);
+// Ends and joins the thread, gives the figures of the whole session; frees. The simulator and the recording are the caller's again.
+RealtimeFigures realtime_stop(Realtime *realtime);
+
+#endif
