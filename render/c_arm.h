@@ -1,0 +1,44 @@
+// The C-arm: where X-ray source and detector stand about the patient, and where a point lands in the picture.
+//
+// A point source at C_ARM_SOURCE_MM from the isocentre shines through it onto the detector: a cone, so that what lies nearer to the source is larger, as in
+// the angio suite (a parallel picture would show no magnification with depth). The picture is what the detector sees, displayed as usual: in the frontal view
+// the patient's right is on the left, the head is up; LAO turns the detector to the patient's left about the long axis, CRA towards the head.
+//
+// Models carry the frame of their volume, which no file of theirs says: the patient's axes are given by the caller, LPS unless they are.
+#ifndef SELDINGER_RENDER_C_ARM_H
+#define SELDINGER_RENDER_C_ARM_H
+
+#include "geom/linear.h"
+#include "sim/xray.h"
+
+#define C_ARM_SOURCE_MM 785.0          // source to isocentre, as in common angiography systems
+#define C_ARM_NEAREST_MM 20.0          // what is to be seen must be further than this from the source's plane
+
+typedef struct PatientAxes {           // unit vectors in the model's frame, perpendicular to each other; a mirrored patient is left-handed
+    Vec3 right, anterior, superior;
+} PatientAxes;
+PatientAxes patient_axes_lps(void);    // x to the left, y posterior, z superior (DICOM)
+PatientAxes patient_axes_ras(void);    // x to the right, y anterior, z superior
+bool patient_axes_are_sound(const PatientAxes *axes);
+
+typedef struct CArm {
+    Vec3 isocentre;                    // [mm] model frame
+    Vec3 right, up;                    // of the picture, unit
+    Vec3 towards;                      // unit, from the source through the isocentre to the detector
+    double handedness;                 // +1 where (right, up, towards) is right-handed, -1 for a mirrored patient
+    double field_mm;                   // side of the square seen at the isocentre
+} CArm;
+
+// Angles, table and field as set, cut to LAO/RAO 90, CRA/CAU 45 degrees, field 40 to 400 mm (not a number: as by default).
+CArm c_arm_place(const XrayControl *xray, const PatientAxes *axes);
+// Where a point lands: x, y in fields from the middle of the square (-0.5 to 0.5 inside, y up); z: depth [mm] from the isocentre's plane towards the detector.
+Vec3 c_arm_project(const CArm *c_arm, Vec3 point);
+Vec3 c_arm_source(const CArm *c_arm);
+// Unit direction of the ray from the source that lands at x, y [field].
+Vec3 c_arm_ray(const CArm *c_arm, double x, double y);
+// Column-major matrix from the model's frame relative to `origin` to clip space of the square; depths between near and far [mm] from the source's plane.
+void c_arm_matrix(const CArm *c_arm, Vec3 origin, double near_mm, double far_mm, float matrix[16]);
+// "LAO 20 CRA 10", "RAO 5 CAU 0" …: whole degrees, as shown on the screen.
+void c_arm_label(const XrayControl *xray, char text[32]);
+
+#endif

@@ -1,0 +1,69 @@
+// Fluoroscopy: the first view of the trainer, drawn from a Pose and what is set at the X-ray system.
+//
+// Along each ray I = exp(-(anatomy + contrast + tool)); brightness 1.75 I^0.72, as an automatic exposure shows it; quantum noise whose sigma follows from I,
+// softened by the detector; four blades with a rounded soft edge. The picture is the largest square in the middle of the ViewPort; the rest stays dark.
+// Drawn in layers, each only when its input changes (DESIGN section 8):
+//   anatomy and vessel thickness -> baked base (brightness, noise sigma) -> tool multiplied in -> noise by pulse.
+// While `xray.pedal` is 0, or `pulse` stays the same, the last picture stays, whatever else has changed (last image hold).
+//
+// Needs a current OpenGL 3.3 context, the same in every call; one thread.
+#ifndef SELDINGER_RENDER_FLUOROSCOPE_H
+#define SELDINGER_RENDER_FLUOROSCOPE_H
+
+#include "geom/isosurface.h"
+#include "render/c_arm.h"
+#include "render/view_port.h"
+#include "sim/pose.h"
+
+typedef struct Fluoroscope Fluoroscope;
+
+typedef struct FluoroscopeOptions {
+    // vessel; all borrowed during create only
+    const TriangleMesh *vessel;    // the wall. NULL: no contrast to be seen. Rims are closed by flat lids, which the message says; a surface whose triangles
+                                   // do not face one way is refused: the message says so and no contrast is drawn
+    const int *vertex_node;        // (V) tree node of each vertex; NULL: mesh->node where `tree` is given and that fits, else the nearest
+    const VesselTree *tree;        // NULL: the whole lumen is one node, 0
+    // tool
+    int node_count;                // M, as in the poses; 0: none
+    const double *radius;          // (M) [mm]
+    const double *attenuation;     // (M) [1/mm] >= 0 at each node: scene_attenuation() at its arc length
+    // anatomy: a volume (recon/volume.h), or none: value NULL. Then a plain head, or a trunk where the vessel is larger than a head
+    int anatomy_size[3];
+    Vec3 anatomy_origin;           // [mm] centre of voxel (0,0,0)
+    Vec3 anatomy_axis[3];          // [mm] step from voxel to voxel
+    const float *anatomy_value;    // (size[2], size[1], size[0]); CT numbers [HU] where the least is below -200, else an angiogram's brightness
+    bool has_no_anatomy;           // true: nothing but air around vessel and tool (tests)
+
+    PatientAxes patient;           // default: LPS
+    double contrast_attenuation;   // [1/mm] of undiluted contrast agent in blood, 0.105
+    double quanta;                 // detected per pixel where nothing stands in the beam, 550; 0: no noise
+    double dsa_gain;               // exponent of DSA's brightness, 2.2
+} FluoroscopeOptions;
+FluoroscopeOptions fluoroscope_default_options(void);
+
+// NULL with the reason in `message`. Otherwise `message` is empty or says what the picture lacks (a mesh that is not closed …).
+Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message, size_t capacity);
+void fluoroscope_destroy(Fluoroscope *fluoroscope);
+
+typedef struct FluoroscopeFrame {
+    const Pose *pose;              // positions are read; its node_count must be the options'. NULL: no tool
+    XrayControl xray;
+    const float *contrast;         // (N of the tree) concentration of contrast agent, 0 to 1; NULL: none
+    uint32_t pulse;                // number of the X-ray pulse: seeds the noise; the same pulse gives the same picture
+} FluoroscopeFrame;
+
+void fluoroscope_draw(Fluoroscope *fluoroscope, const FluoroscopeFrame *frame, ViewPort port);
+// Forgets held picture, mask and roadmap: after a jump in time. The next draw makes a picture even with the pedal off.
+void fluoroscope_forget(Fluoroscope *fluoroscope);
+
+typedef struct FluoroscopeState {
+    bool is_held;                  // the last draw showed an earlier pulse's picture with the pedal off
+    bool has_mask;                 // DSA: a mask is there …
+    bool mask_has_moved;           // … but C-arm, table or field were moved since, so that bones do not cancel
+    bool has_roadmap;              // an opacified lumen to overlay is there
+    XrayControl shown;             // what the picture on the screen was taken with
+    int square[3];                 // x, y (from the port's lower left corner), side [pixel]: where the picture lies in the port
+} FluoroscopeState;
+FluoroscopeState fluoroscope_state(const Fluoroscope *fluoroscope);
+
+#endif
