@@ -1,0 +1,12 @@
+// Changes one value in a YAML text and leaves the rest of it as it is, comments and layout too.
+#ifndef SELDINGER_INPUT_YAML_EDIT_H
+#define SELDINGER_INPUT_YAML_EDIT_H
+
+#include <stdbool.h>
+
+// The text with the value at `path` ("vessel.model": maps by key from the root) replaced by the scalar `value` (quoted here); a last key that is not there
+// is added to its map where `add`. The caller frees the result. NULL where a map on the way is not there, the last key neither there nor to be added, the
+// text is no YAML, or memory lacks.
+char *yaml_edit(const char *text, const char *path, const char *value, bool add);
+
+#endif
