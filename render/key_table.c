@@ -1,0 +1,180 @@
+// One row an action, in the order of ActionId. A trainee's left hand lies on A S D W, C, E and F (C-arm, contrast, X-ray), the right one on the
+// arrows (tool), as they lie on the table's controls and on the wire in the angio suite.
+#include "render/key_table.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define K(letter) letter, 0, 0
+#define KEY(name) WINDOW_KEY_##name, 0, 0
+#define ALT(name) WINDOW_KEY_##name, WINDOW_ALT, 0
+#define F(number) WINDOW_KEY_F1 + (number) - 1, 0, 0
+
+const KeyAction key_table[ACTION_COUNT] = {
+    {ACTION_PUSH, GROUP_TOOL, ACTION_HOLD, KEY(UP), "Push", "push the tool into the patient while held"},
+    {ACTION_PULL, GROUP_TOOL, ACTION_HOLD, KEY(DOWN), "Pull", "pull the tool back while held"},
+    {ACTION_TWIST_LEFT, GROUP_TOOL, ACTION_HOLD, KEY(LEFT), "Twist left", "turn the tool left (counter-clockwise, seen along the advance) while held"},
+    {ACTION_TWIST_RIGHT, GROUP_TOOL, ACTION_HOLD, KEY(RIGHT), "Twist right", "turn the tool right (clockwise, seen along the advance) while held"},
+    {ACTION_FAST, GROUP_TOOL, ACTION_HOLD, KEY(SHIFT), "Fast", "with push, pull or twist: faster"},
+    {ACTION_SLOW, GROUP_TOOL, ACTION_HOLD, KEY(CTRL), "Slow", "with push, pull or twist: slower, for the last millimetres"},
+    {ACTION_STOP, GROUP_TOOL, ACTION_HOLD, KEY(SPACE), "Hold tool", "the tool stands still while held, whatever any other hand or device asks for"},
+
+    {ACTION_PEDAL, GROUP_XRAY, ACTION_HOLD, K('F'), "X-ray pedal", "fluoroscopy while held; let go and the last image stays"},
+    {ACTION_PEDAL_LATCH, GROUP_XRAY, ACTION_PRESS, K('E'), "X-ray stays on", "fluoroscopy on until pressed again: a pedal for one hand"},
+    {ACTION_CONTRAST, GROUP_XRAY, ACTION_HOLD, K('C'), "Inject contrast", "inject contrast agent from the tip while held; X-ray must be on to see it"},
+    {ACTION_DSA, GROUP_XRAY, ACTION_PRESS, K('X'), "DSA", "subtract the mask: contrast and tool alone; again for the live image"},
+    {ACTION_ROADMAP, GROUP_XRAY, ACTION_PRESS, K('R'), "Roadmap", "lay the vessels of the last injection over the live image; again to leave it"},
+    {ACTION_MASK, GROUP_XRAY, ACTION_PRESS, K('M'), "Take mask", "take the mask for DSA and roadmap afresh, after the C-arm or table has moved"},
+    {ACTION_PULSES, GROUP_XRAY, ACTION_PRESS, K('U'), "Pulse rate", "next pulse rate: 7.5, 10, 15, 30 a second"},
+    {ACTION_MAGNIFY, GROUP_XRAY, ACTION_PRESS, WINDOW_KEY_KEYPAD_ADD, 0, '+', "Magnify", "smaller field, larger picture"},
+    {ACTION_DEMAGNIFY, GROUP_XRAY, ACTION_PRESS, WINDOW_KEY_KEYPAD_SUBTRACT, 0, '-', "Demagnify", "larger field, smaller picture"},
+    {ACTION_CINE_RECORD, GROUP_XRAY, ACTION_PRESS, F(6), "Record cine", "record the X-ray images as a cine loop; again to stop"},
+    {ACTION_CINE_REPLAY, GROUP_XRAY, ACTION_PRESS, F(7), "Replay cine", "show the recorded loop; again for the live image"},
+    {ACTION_CINE_SAVE, GROUP_XRAY, ACTION_PRESS, F(8), "Save cine", "save the recorded loop as a film"},
+
+    {ACTION_RAO, GROUP_C_ARM, ACTION_HOLD, K('A'), "RAO", "turn the C-arm to the patient's right (right anterior oblique) while held"},
+    {ACTION_LAO, GROUP_C_ARM, ACTION_HOLD, K('D'), "LAO", "turn the C-arm to the patient's left (left anterior oblique) while held"},
+    {ACTION_CRA, GROUP_C_ARM, ACTION_HOLD, K('W'), "CRA", "tilt the C-arm towards the head (cranial) while held"},
+    {ACTION_CAU, GROUP_C_ARM, ACTION_HOLD, K('S'), "CAU", "tilt the C-arm towards the feet (caudal) while held"},
+    {ACTION_AP, GROUP_C_ARM, ACTION_PRESS, K('0'), "AP 0/0", "C-arm straight from the front: both angles 0"},
+    {ACTION_TABLE_UP, GROUP_C_ARM, ACTION_HOLD, K('I'), "Table up", "move the table so that the picture goes up while held"},
+    {ACTION_TABLE_DOWN, GROUP_C_ARM, ACTION_HOLD, K('K'), "Table down", "move the table so that the picture goes down while held"},
+    {ACTION_TABLE_LEFT, GROUP_C_ARM, ACTION_HOLD, K('J'), "Table left", "move the table so that the picture goes left while held"},
+    {ACTION_TABLE_RIGHT, GROUP_C_ARM, ACTION_HOLD, K('L'), "Table right", "move the table so that the picture goes right while held"},
+    {ACTION_SIDES_CLOSE, GROUP_C_ARM, ACTION_HOLD, K('G'), "Sides in", "close the collimator's left and right blades while held"},
+    {ACTION_SIDES_OPEN, GROUP_C_ARM, ACTION_HOLD, K('H'), "Sides out", "open the collimator's left and right blades while held"},
+    {ACTION_ENDS_CLOSE, GROUP_C_ARM, ACTION_HOLD, K('T'), "Ends in", "close the collimator's upper and lower blades while held"},
+    {ACTION_ENDS_OPEN, GROUP_C_ARM, ACTION_HOLD, K('Y'), "Ends out", "open the collimator's upper and lower blades while held"},
+
+    {ACTION_VIEW_FLUOROSCOPY, GROUP_VIEW, ACTION_PRESS, K('1'), "X-ray view", "fluoroscopy as the main view"},
+    {ACTION_VIEW_3D, GROUP_VIEW, ACTION_PRESS, K('2'), "3D view", "the vessel in 3D as the main view"},
+    {ACTION_VIEW_ANGIOSCOPY, GROUP_VIEW, ACTION_PRESS, K('3'), "Angioscopy", "the view from the tool's tip as the main view"},
+    {ACTION_VIEW_ALL, GROUP_VIEW, ACTION_PRESS, K('4'), "All views", "all three views side by side"},
+    {ACTION_CAMERA_RESET, GROUP_VIEW, ACTION_PRESS, KEY(HOME), "Reset camera", "3D: the whole vessel from the front"},
+    {ACTION_CAMERA_FOLLOW, GROUP_VIEW, ACTION_PRESS, K('V'), "Follow tip", "3D: the camera keeps to the tool's tip"},
+    {ACTION_SECTION, GROUP_VIEW, ACTION_PRESS, K('N'), "Section", "3D: cut the vessel open by a plane"},
+    {ACTION_SECTION_NEARER, GROUP_VIEW, ACTION_HOLD, KEY(INSERT), "Plane nearer", "3D: move the section plane towards you while held"},
+    {ACTION_SECTION_FARTHER, GROUP_VIEW, ACTION_HOLD, KEY(DELETE), "Plane farther", "3D: move the section plane away while held"},
+    {ACTION_MODEL, GROUP_VIEW, ACTION_PRESS, K('Q'), "Local model", "3D: the wall's local model at the tip, as a wireframe"},
+    {ACTION_ARROWS, GROUP_VIEW, ACTION_PRESS, K('Z'), "Force arrows", "3D: wall forces as arrows"},
+    {ACTION_ORBIT_UP, GROUP_VIEW, ACTION_HOLD, ALT(UP), "Orbit up", "3D: turn the camera up while held; or drag in the view"},
+    {ACTION_ORBIT_DOWN, GROUP_VIEW, ACTION_HOLD, ALT(DOWN), "Orbit down", "3D: turn the camera down while held; or drag in the view"},
+    {ACTION_ORBIT_LEFT, GROUP_VIEW, ACTION_HOLD, ALT(LEFT), "Orbit left", "3D: turn the camera left while held; or drag in the view"},
+    {ACTION_ORBIT_RIGHT, GROUP_VIEW, ACTION_HOLD, ALT(RIGHT), "Orbit right", "3D: turn the camera right while held; or drag in the view"},
+    {ACTION_CAMERA_NEARER, GROUP_VIEW, ACTION_HOLD, KEY(PAGE_UP), "Nearer", "3D: camera nearer while held; or the mouse wheel in the view"},
+    {ACTION_CAMERA_FARTHER, GROUP_VIEW, ACTION_HOLD, KEY(PAGE_DOWN), "Farther", "3D: camera farther while held; or the mouse wheel in the view"},
+
+    {ACTION_PAUSE, GROUP_SESSION, ACTION_PRESS, K('P'), "Pause", "stop the simulation's time; again to go on"},
+    {ACTION_RESTART, GROUP_SESSION, ACTION_PRESS, F(4), "Restart", "begin the exercise anew (asks first)"},
+    {ACTION_BOOKMARK, GROUP_SESSION, ACTION_PRESS, K('B'), "Bookmark", "mark this moment in the recording, to come back to"},
+    {ACTION_SAVE, GROUP_SESSION, ACTION_PRESS, F(5), "Save session", "save recording and score so far"},
+    {ACTION_TRAINEE, GROUP_SESSION, ACTION_PRESS, F(3), "Trainee", "enter the trainee's name for the report"},
+    {ACTION_SCREENSHOT, GROUP_SESSION, ACTION_PRESS, F(12), "Screenshot", "save the window as a picture"},
+    {ACTION_FULL_SCREEN, GROUP_SESSION, ACTION_PRESS, F(11), "Full screen", "fill the screen; again for a window"},
+    {ACTION_PANELS, GROUP_SESSION, ACTION_PRESS, KEY(TAB), "Panels", "hide or show the panels around the views"},
+    {ACTION_HINTS, GROUP_SESSION, ACTION_PRESS, F(9), "Hints", "hide or show the hints at the bottom"},
+    {ACTION_HELP, GROUP_SESSION, ACTION_PRESS, WINDOW_KEY_F1, 0, '?', "Help", "this list of keys"},
+    {ACTION_QUIT, GROUP_SESSION, ACTION_PRESS, KEY(ESCAPE), "Quit", "end the session (asks first); closes this list or a dialogue if one is open"},
+};
+
+const char *const action_group_name[ACTION_GROUPS] = {"Tool", "X-ray", "C-arm and table", "Views", "Session"};
+
+static const char *key_name(int key, char *text, size_t capacity)
+{
+    static const struct { int key; const char *name; } named[] = {
+        {WINDOW_KEY_SPACE, "Space"}, {WINDOW_KEY_UP, "Up"}, {WINDOW_KEY_DOWN, "Down"}, {WINDOW_KEY_LEFT, "Left"}, {WINDOW_KEY_RIGHT, "Right"},
+        {WINDOW_KEY_PAGE_UP, "Page up"}, {WINDOW_KEY_PAGE_DOWN, "Page down"}, {WINDOW_KEY_HOME, "Home"}, {WINDOW_KEY_END, "End"},
+        {WINDOW_KEY_INSERT, "Insert"}, {WINDOW_KEY_DELETE, "Delete"}, {WINDOW_KEY_BACKSPACE, "Backspace"}, {WINDOW_KEY_ENTER, "Enter"},
+        {WINDOW_KEY_TAB, "Tab"}, {WINDOW_KEY_ESCAPE, "Esc"}, {WINDOW_KEY_SHIFT, "Shift"}, {WINDOW_KEY_CTRL, "Ctrl"}, {WINDOW_KEY_ALT, "Alt"},
+        {WINDOW_KEY_KEYPAD_ADD, "Keypad +"}, {WINDOW_KEY_KEYPAD_SUBTRACT, "Keypad -"}};
+    for (size_t i = 0; i < sizeof named / sizeof named[0]; i++)
+        if (named[i].key == key)
+            return named[i].name;
+    if (key >= WINDOW_KEY_F1 && key <= WINDOW_KEY_F12)
+        snprintf(text, capacity, "F%d", key - WINDOW_KEY_F1 + 1);
+    else
+        snprintf(text, capacity, "%c", key);
+    return text;
+}
+
+const char *key_table_text(ActionId id, char *text, size_t capacity)
+{
+    const KeyAction *action = &key_table[id];
+    char one[8];
+    const char *key = key_name(action->key, one, sizeof one), *alt = action->modifiers & WINDOW_ALT ? "Alt+" : "";
+    // of a sign and its key on the keypad the sign says both
+    if (action->character && (action->key == WINDOW_KEY_KEYPAD_ADD || action->key == WINDOW_KEY_KEYPAD_SUBTRACT))
+        snprintf(text, capacity, "%c", action->character);
+    else if (action->character)
+        snprintf(text, capacity, "%s%s or %c", alt, key, action->character);
+    else
+        snprintf(text, capacity, "%s%s", alt, key);
+    return text;
+}
+
+void key_state_begin(KeyState *state) { memset(state->pressed, 0, sizeof state->pressed); }
+
+void key_state_release(KeyState *state) { memset(state->held, 0, sizeof state->held); }
+
+static bool passes_capture(int key) { return key == WINDOW_KEY_ESCAPE || (key >= WINDOW_KEY_F1 && key <= WINDOW_KEY_F12); }
+
+static void key_down(KeyState *state, const WindowEvent *event)
+{
+    for (int i = 0; i < ACTION_COUNT; i++) {
+        const KeyAction *action = &key_table[i];
+        if (action->key != event->key || action->modifiers != (event->modifiers & WINDOW_ALT))
+            continue;
+        if (action->kind == ACTION_HOLD)
+            state->held[i] = true;
+        else
+            state->pressed[i]++;
+    }
+}
+
+static void key_up(KeyState *state, int key)
+{
+    for (int i = 0; i < ACTION_COUNT; i++)
+        if (key_table[i].key == key)
+            state->held[i] = false;
+}
+
+static void character_typed(KeyState *state, unsigned character)
+{
+    for (int i = 0; i < ACTION_COUNT; i++) {
+        const KeyAction *action = &key_table[i];
+        // the keypad's own sign came as a key already
+        if (action->character && (unsigned)action->character == character && action->kind == ACTION_PRESS)
+            state->pressed[i]++;
+    }
+}
+
+void key_state_feed(KeyState *state, const WindowInput *input, bool is_captured)
+{
+    bool is_keypad = false;
+    for (int i = 0; i < input->event_count; i++) {
+        const WindowEvent *event = &input->event[i];
+        switch (event->kind) {
+        case WINDOW_KEY_DOWN_EVENT:
+            is_keypad = event->key == WINDOW_KEY_KEYPAD_ADD || event->key == WINDOW_KEY_KEYPAD_SUBTRACT;
+            // a repeat begins nothing: what was released by loss of focus or a dialogue needs a new press
+            if (!event->is_repeat && ((!is_captured && !(event->modifiers & WINDOW_SUPER)) || passes_capture(event->key)))
+                key_down(state, event);
+            break;
+        case WINDOW_KEY_UP_EVENT:
+            key_up(state, event->key);
+            break;
+        case WINDOW_TEXT_EVENT:
+            if (!is_captured && !event->is_repeat && !is_keypad)
+                character_typed(state, event->character);
+            break;
+        case WINDOW_FOCUS_LOST_EVENT:
+            key_state_release(state);
+            break;
+        case WINDOW_SCROLL_EVENT:
+        case WINDOW_DEVICE_EVENT:
+            break;
+        }
+    }
+    if (!input->has_focus)
+        key_state_release(state);
+}

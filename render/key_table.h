@@ -1,0 +1,62 @@
+// What the user can do, in one table: the keys that are obeyed, the help overlay, the tooltips and the panel's buttons are all made from it, so
+// that nothing can be undocumented. And which actions are on now, from key events. Pure: no window, no GL, no clock.
+#ifndef SELDINGER_RENDER_KEY_TABLE_H
+#define SELDINGER_RENDER_KEY_TABLE_H
+
+#include "render/window.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+typedef enum ActionId {
+    // tool: held
+    ACTION_PUSH, ACTION_PULL, ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT, ACTION_FAST, ACTION_SLOW, ACTION_STOP,
+    // X-ray
+    ACTION_PEDAL, ACTION_PEDAL_LATCH, ACTION_CONTRAST, ACTION_DSA, ACTION_ROADMAP, ACTION_MASK, ACTION_PULSES, ACTION_MAGNIFY, ACTION_DEMAGNIFY,
+    ACTION_CINE_RECORD, ACTION_CINE_REPLAY, ACTION_CINE_SAVE,
+    // C-arm, table, collimator: held
+    ACTION_RAO, ACTION_LAO, ACTION_CRA, ACTION_CAU, ACTION_AP, ACTION_TABLE_UP, ACTION_TABLE_DOWN, ACTION_TABLE_LEFT, ACTION_TABLE_RIGHT,
+    ACTION_SIDES_CLOSE, ACTION_SIDES_OPEN, ACTION_ENDS_CLOSE, ACTION_ENDS_OPEN,
+    // views
+    ACTION_VIEW_FLUOROSCOPY, ACTION_VIEW_3D, ACTION_VIEW_ANGIOSCOPY, ACTION_VIEW_ALL, ACTION_CAMERA_RESET, ACTION_CAMERA_FOLLOW, ACTION_SECTION,
+    ACTION_SECTION_NEARER, ACTION_SECTION_FARTHER, ACTION_MODEL, ACTION_ARROWS, ACTION_ORBIT_UP, ACTION_ORBIT_DOWN, ACTION_ORBIT_LEFT,
+    ACTION_ORBIT_RIGHT, ACTION_CAMERA_NEARER, ACTION_CAMERA_FARTHER,
+    // session
+    ACTION_PAUSE, ACTION_RESTART, ACTION_BOOKMARK, ACTION_SAVE, ACTION_TRAINEE, ACTION_SCREENSHOT, ACTION_FULL_SCREEN, ACTION_PANELS, ACTION_HINTS,
+    ACTION_HELP, ACTION_QUIT,
+    ACTION_COUNT
+} ActionId;
+
+typedef enum { ACTION_HOLD, ACTION_PRESS } ActionKind;   // on while held; or done once at each press
+typedef enum { GROUP_TOOL, GROUP_XRAY, GROUP_C_ARM, GROUP_VIEW, GROUP_SESSION, ACTION_GROUPS } ActionGroup;
+
+typedef struct KeyAction {
+    ActionId id;             // its place in the table
+    ActionGroup group;
+    ActionKind kind;
+    int key;                 // WindowKey
+    unsigned modifiers;      // WINDOW_ALT or 0: Shift and Ctrl only change the speed of the tool and are no part of a key
+    char character;          // typed, does the same wherever it lies on the keyboard; 0 none
+    const char *name;        // on the button, at most 18 bytes
+    const char *help;        // one line
+} KeyAction;
+
+extern const KeyAction key_table[ACTION_COUNT];
+extern const char *const action_group_name[ACTION_GROUPS];
+
+// "Alt+Up", "F1 or ?", as shown to the user; returns text.
+const char *key_table_text(ActionId id, char *text, size_t capacity);
+
+// Which actions are on. Start from zeros.
+typedef struct KeyState {
+    bool held[ACTION_COUNT];       // ACTION_HOLD: its key is down
+    int pressed[ACTION_COUNT];     // ACTION_PRESS: how often since key_state_begin
+} KeyState;
+
+void key_state_begin(KeyState *state);   // of a frame: forgets presses, keeps what is held
+// Feeds a window's events: keys, typed characters, loss of focus (releases everything). A key that went down with Alt keeps its meaning until it
+// comes up. `is_captured`: a text field has the keyboard; releases still count, presses do not, but for Escape and the function keys.
+void key_state_feed(KeyState *state, const WindowInput *input, bool is_captured);
+void key_state_release(KeyState *state); // all keys up: the tool stops
+
+#endif

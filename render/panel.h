@@ -1,0 +1,130 @@
+// The trainer's panels around the views: figures, running plots, exercise, devices, controls, messages, help. Plain data in, actions out; draws
+// with Dear ImGui into a window or off screen (--picture, --movie), the same in both. A frame:
+//     input = window_next_frame            keys and mouse
+//     panel_take_input(panel, input, &a)   what the user wants; obey it before drawing
+//     layout = panel_layout(...)           draw the views into layout.view[]
+//     panel_draw(panel, input, &state, 0)  over and around the views
+//     window_swap
+#ifndef SELDINGER_RENDER_PANEL_H
+#define SELDINGER_RENDER_PANEL_H
+
+#include "input/hand_port.h"
+#include "render/key_table.h"
+#include "render/view_port.h"
+#include "render/window.h"
+#include "sim/xray.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef enum { VIEW_FLUOROSCOPY, VIEW_3D, VIEW_ANGIOSCOPY, VIEW_COUNT, VIEW_ALL = VIEW_COUNT } PanelView;
+typedef enum { PANEL_LIVE, PANEL_LIH, PANEL_DSA, PANEL_ROADMAP, PANEL_CINE } PanelMode;   // LIH: last image hold
+typedef enum { MARK_NONE, MARK_GOOD, MARK_WARNING, MARK_BAD } PanelMark;                  // shown by a sign and a colour
+
+enum { WARN_OUTSIDE = 1, WARN_NOT_CONVERGED = 2, WARN_SLOW = 4, WARN_NO_FIFO = 8, WARN_DEVICE_LOST = 16, WARN_STALLED = 32 }; // bits of `warnings`
+
+typedef struct PanelRect { float x, y, width, height; } PanelRect;   // [pixel], y down from the upper left corner
+
+// Where things are. A view's rectangle of zero width is not shown. Nothing overlaps from 1024x600 on (times 0.6 for smaller windows).
+typedef struct PanelLayout {
+    double scale;                  // of text and widgets, from the content scale and the window's height
+    ViewPort view[VIEW_COUNT];     // framebuffer 0, y from the lower left corner as OpenGL has it
+    PanelRect view_rect[VIEW_COUNT]; // the same, y down
+    PanelView main;                // the largest
+    PanelRect top, left, right, bottom;
+} PanelLayout;
+
+// `has_panels` false: the views alone fill the window.
+PanelLayout panel_layout(int width, int height, double scale, PanelView view, bool has_panels);
+
+typedef struct PanelFigure {       // one line of the score or of the exercise
+    const char *label;
+    double value;                  // NaN: not known yet, shown as a dash
+    const char *unit;              // "s", "ml", "" …
+    int decimals;
+    PanelMark mark;
+} PanelFigure;
+
+typedef struct PanelDevice {
+    const char *name;
+    HandState state;
+    const char *note;              // what it does or what is wrong; may be NULL
+} PanelDevice;
+
+// What is shown. Strings are borrowed for the call; NULL is an empty one. NaN in a figure shows as a dash.
+typedef struct PanelState {
+    double now_s;                  // wall clock of the session, for messages and hints
+    double time_s;                 // simulated
+    bool is_paused;
+    // exercise
+    const char *title, *instructions;
+    const char *trainee;
+    const char *target;            // name of the one to reach now
+    double hold_s, hold_needed_s;  // progress of holding the target; hold_needed_s 0: no target
+    bool is_finished;              // the exercise is over; `instructions` says how it ended
+    int figure_count, error_count;
+    const PanelFigure *figure;     // (figure_count) score so far
+    const char *const *error;      // (error_count) handling errors so far, newest last
+    // tool
+    const char *tool;
+    double inserted_mm, turned_deg, push_mm_s, twist_deg_s;
+    double force_n, torque_n_mm;   // of the sheath on the tool
+    double wall_max_n, wall_sum_n;
+    // X-ray
+    XrayControl xray;
+    PanelMode mode;
+    bool is_pedal_latched, is_roadmap_ready, is_recording_cine;
+    double fluoro_s, contrast_ml;
+    int cine_frame, cine_frames;
+    // views
+    PanelView view;
+    bool is_following, has_section, has_model, has_arrows;
+    // machine
+    double step_median_us, step_p999_us, real_time_factor, frame_ms;
+    int64_t missed_deadlines;
+    unsigned warnings;             // WARN_ bits
+    const char *warning;           // one more line of warning, or NULL
+    int device_count;
+    const PanelDevice *device;
+} PanelState;
+
+// What the mouse does in a view (dragging keeps to the view where it began).
+typedef struct PanelMouse {
+    int view;                      // PanelView, or -1 outside all
+    double x, y;                   // [0, 1] in the view, y up
+    double drag_x, drag_y;         // since the last frame, as parts of the view's height, y up
+    unsigned buttons;              // WINDOW_MOUSE_ bits of a press that began in the view
+    double scroll;
+} PanelMouse;
+
+typedef struct PanelActions {
+    bool held[ACTION_COUNT];       // by key or by the mouse on a button
+    int pressed[ACTION_COUNT];     // times since the last frame. RESTART and QUIT only when confirmed; SIGINT, SIGTERM: QUIT at once
+    bool xray_set;                 // a slider was moved: `xray` holds what the state showed with the new value in it
+    XrayControl xray;
+    bool trainee_set;
+    char trainee[64];              // UTF-8, printable, no control characters, trimmed
+    PanelMouse mouse;
+} PanelActions;
+
+typedef struct Panel Panel;
+
+// Needs a current GL context, window or off screen; NULL with a reason.
+Panel *panel_create(char *message, size_t capacity);
+void panel_destroy(Panel *panel);
+
+void panel_take_input(Panel *panel, const WindowInput *input, PanelActions *actions);
+void panel_draw(Panel *panel, const WindowInput *input, const PanelState *state, unsigned framebuffer);
+
+// A sample of the running plots; panel_draw takes one itself, more often than that is welcome (peaks are kept). Time simulated [s].
+void panel_sample(Panel *panel, double time_s, double force_n, double torque_n_mm, double wall_max_n);
+void panel_forget_samples(Panel *panel);         // after a restart or a jump in time
+
+void panel_message(Panel *panel, double now_s, PanelMark mark, const char *text);   // into the log; the last 100 are kept
+void panel_show_help(Panel *panel, bool is_shown);
+bool panel_has_panels(const Panel *panel);       // Tab hides them: pass to panel_layout
+void panel_show_hints(Panel *panel, bool is_shown);
+bool panel_is_asking(const Panel *panel);        // a dialogue has the keyboard
+
+#endif

@@ -1,0 +1,92 @@
+// The trainer's window: GLFW 3.3 with an OpenGL 3.3 core context, behind plain C. One thread (the one that created it) calls everything here.
+// Positions and sizes are framebuffer pixels, y down from the upper left corner, whatever the display's density.
+#ifndef SELDINGER_RENDER_WINDOW_H
+#define SELDINGER_RENDER_WINDOW_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+// Letters ('A' to 'Z') are those of the user's keyboard layout; digits and signs are named by their place on a US keyboard.
+typedef enum WindowKey {
+    WINDOW_KEY_NONE = 0, WINDOW_KEY_SPACE = ' ', // printable keys: their ASCII capital
+    WINDOW_KEY_UP = 256, WINDOW_KEY_DOWN, WINDOW_KEY_LEFT, WINDOW_KEY_RIGHT, WINDOW_KEY_PAGE_UP, WINDOW_KEY_PAGE_DOWN, WINDOW_KEY_HOME,
+    WINDOW_KEY_END, WINDOW_KEY_INSERT, WINDOW_KEY_DELETE, WINDOW_KEY_BACKSPACE, WINDOW_KEY_ENTER, WINDOW_KEY_TAB, WINDOW_KEY_ESCAPE,
+    WINDOW_KEY_SHIFT, WINDOW_KEY_CTRL, WINDOW_KEY_ALT, // left or right
+    WINDOW_KEY_KEYPAD_ADD, WINDOW_KEY_KEYPAD_SUBTRACT,
+    WINDOW_KEY_F1 = 290, WINDOW_KEY_F12 = WINDOW_KEY_F1 + 11,
+    WINDOW_KEYS = 320
+} WindowKey;
+
+enum { WINDOW_SHIFT = 1, WINDOW_CTRL = 2, WINDOW_ALT = 4, WINDOW_SUPER = 8 };      // bits of modifiers
+enum { WINDOW_MOUSE_LEFT = 1, WINDOW_MOUSE_RIGHT = 2, WINDOW_MOUSE_MIDDLE = 4 };   // bits of mouse buttons
+
+typedef enum WindowEventKind {
+    WINDOW_KEY_DOWN_EVENT,   // `key`, `modifiers`; `is_repeat` where the keyboard repeats it
+    WINDOW_KEY_UP_EVENT,
+    WINDOW_TEXT_EVENT,       // `character`, for text fields and for signs that lie elsewhere on other keyboards; `is_repeat`
+    WINDOW_SCROLL_EVENT,     // `scroll_x`, `scroll_y`: notches, y > 0 away from the user
+    WINDOW_FOCUS_LOST_EVENT, // keys and mouse buttons count as released
+    WINDOW_DEVICE_EVENT      // `device`, `is_present`: a joystick has come or gone; its name by window_gamepad or window_gamepad_name
+} WindowEventKind;
+
+typedef struct WindowEvent {
+    WindowEventKind kind;
+    int key;
+    unsigned modifiers;
+    unsigned character;      // Unicode
+    bool is_repeat, is_present;
+    int device;
+    float scroll_x, scroll_y;
+} WindowEvent;
+
+typedef enum { WINDOW_OPEN, WINDOW_CLOSE_ASKED, WINDOW_ENDED } WindowClose;   // by the title bar; by SIGINT, SIGTERM or SIGHUP
+
+enum { WINDOW_EVENTS = 256, WINDOW_GAMEPADS = 16, WINDOW_AXES = 16, WINDOW_BUTTONS = 64 };
+
+// What came in since the last poll. Filled by hand it drives the panel off screen as well: zeros with width, height and scale are a still frame.
+typedef struct WindowInput {
+    int width, height;       // of the framebuffer [pixel]
+    double scale;            // content scale: 1, 2 on a high-density display
+    double mouse_x, mouse_y; // [pixel], y down; negative where there is no mouse
+    unsigned mouse_buttons;  // held now; a click between two polls shows for one poll at least
+    bool has_focus, is_iconified;
+    WindowClose close;       // CLOSE_ASKED for one poll, ENDED for good
+    int event_count;
+    WindowEvent event[WINDOW_EVENTS];
+    int events_lost;         // beyond WINDOW_EVENTS in one poll; releases and loss of focus are never among them
+} WindowInput;
+
+typedef struct WindowGamepad {
+    char name[128], guid[40];
+    bool is_mapped;          // axes and buttons in the standard order: left x, left y, right x, right y, left and right trigger; A B X Y …
+    int axis_count, button_count;
+    float axis[WINDOW_AXES];          // [-1, 1]; y down
+    uint8_t button[WINDOW_BUTTONS];   // 0 or 1; of a joystick its hats follow its buttons: up, right, down, left
+} WindowGamepad;
+
+typedef struct Window Window;
+
+// A window with a current context and signal handlers, at most as large as the screen. NULL with a reason: "no display; seldinger run works without one, or start under Xvfb"
+// where there is none. One window a process. `hz` frames a second (0: 30).
+Window *window_create(const char *title, int width, int height, double hz, char *message, size_t capacity);
+void window_destroy(Window *window);   // signals and what was current are put back
+
+// Polls events and says what came. Valid until the next call.
+const WindowInput *window_poll(Window *window);
+// Sleeps to the next frame's deadline (absolute: a late frame does not shift the ones after it; whole periods are left out when it was later than
+// one), then polls. False where nothing should be drawn: iconified, or no pixel large.
+bool window_next_frame(Window *window, const WindowInput **input);
+void window_swap(Window *window);
+int64_t window_frames_skipped(const Window *window);   // periods left out because a frame took longer
+
+// A joystick as it is now, `index` 0 to 15. False where there is none.
+bool window_gamepad(Window *window, int index, WindowGamepad *out);
+const char *window_gamepad_name(const Window *window, int index);   // also of one that has just gone; "" where there never was one
+
+void window_set_full_screen(Window *window, bool is_full);
+bool window_is_full_screen(const Window *window);
+void window_set_title(Window *window, const char *title);
+const char *window_renderer(const Window *window);     // OpenGL's name of what draws
+
+#endif
