@@ -183,6 +183,8 @@ static bool write_scene(Recording *recording, const Scene *scene)
         file[count++] = scene->model_path;
     if (scene->mesh_path)
         file[count++] = scene->mesh_path;
+    if (scene->tube_points_path)
+        file[count++] = scene->tube_points_path;
     if (scene->script_path)
         file[count++] = scene->script_path;
     for (int i = 0; i < recording->options.file_count && count < MOST_FILES; i++)

@@ -130,7 +130,8 @@ static void read_polyline(Reading *reading, YamlValue value)
     }
     number_table_free(table);
     free(text);
-    free(path);
+    free(reading->scene->tube_points_path);
+    reading->scene->tube_points_path = path;
 }
 
 static void read_tube(Reading *reading, YamlValue value)
@@ -599,6 +600,7 @@ void scene_free(Scene *scene)
     free(scene->model_path);
     free(scene->mesh_path);
     free(scene->script_path);
+    free(scene->tube_points_path);
     free(scene->anatomy_path);
     free(scene->text);
     free(scene->path);

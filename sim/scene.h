@@ -29,6 +29,7 @@ typedef struct Scene {
     int shape_option_count;  // … and its other keys as text, checked by the synth code
     char (*shape_option)[2][64];
     TubeOptions tube;        // SOURCE_TUBE (pieces and points owned by the scene)
+    char *tube_points_path;  // its polyline's file; NULL where it has none
     Vec3 plane_point, plane_normal;
     char *mesh_path;         // SOURCE_MESH: resolved against the scene's folder
     double mesh_scale;       // of its coordinates, to mm; 0: not given, they are in mm
