@@ -20,6 +20,7 @@ static const struct Verb {
     {"query", verb_query, "MODEL.h5 --points F.csv -o F.csv", "field, gradient and distance of a model at points"},
     {"export", verb_export, "FILE -o OUT", "surface, centreline or recording for other programs"},
     {"info", verb_info, "FILE", "what a file is and its figures"},
+    {"replay", verb_replay, "REC.h5 [--verify]", "a recording shown, simulated again and compared, or made into a scene"},
     {"bench", verb_bench, "step|fit|track|peer", "timing tables, each row measured in the same run"},
 };
 enum { VERB_COUNT = sizeof verbs / sizeof verbs[0] };
