@@ -8,15 +8,17 @@
 #include "input/input.h"
 #include "solver/step.h"
 
-enum { HAND_COUNT = 8 };
+enum { HANDS_SAMPLED = 16 };
 
 typedef struct HandSet {
-    HandPort port[HAND_COUNT];       // index 0: keyboard; each written by one hand, see input/hand_port.h
-    double taken_mm[HAND_COUNT], taken_deg[HAND_COUNT];   // of each port's ways; the simulation thread's
+    int count;
+    HandPort *port[HANDS_SAMPLED];   // (count) borrowed; each written by one hand, see input/hand_port.h
+    double taken_mm[HANDS_SAMPLED], taken_deg[HANDS_SAMPLED];   // of each port's ways; the simulation thread's
     double fastest_mm_s, fastest_deg_s;                   // what the tool is moved by at most, default 200 and 1440
 } HandSet;
 
 void hand_set_init(HandSet *set);
+bool hand_set_add(HandSet *set, HandPort *port);   // false where there is no room. What it has gone so far does not count
 // The command of the next step of dt [ms]; a hand that holds HAND_STOP stops the tool, and what it would have moved meanwhile is forgotten.
 Command hand_set_command(HandSet *set, double dt);
 unsigned hand_set_buttons(const HandSet *set);

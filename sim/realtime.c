@@ -159,10 +159,12 @@ Realtime *realtime_start(const RealtimeOptions *options, Faults *faults)
         realtime->now = options->xray;
         realtime->pose_every = (int64_t)fmax(1, floor(options->pose_ms / scene->dt + 0.5));
         hand_set_init(&realtime->hands);
+        for (int i = 0; i < options->hand_count; i++)
+            good &= hand_set_add(&realtime->hands, options->hand[i]);
         triple_buffer_init(&realtime->xray_buffer);
         triple_buffer_init(&realtime->moment_buffer);
         atomic_store(&realtime->paused, options->paused);
-        good = pthread_create(&realtime->thread, NULL, run_session, realtime) == 0;
+        good = good && pthread_create(&realtime->thread, NULL, run_session, realtime) == 0;
     }
     if (good)
         return realtime;
@@ -171,8 +173,6 @@ Realtime *realtime_start(const RealtimeOptions *options, Faults *faults)
         realtime_free(realtime);
     return NULL;
 }
-
-HandPort *realtime_hand(Realtime *realtime, int index) { return &realtime->hands.port[index]; }
 
 void realtime_set_xray(Realtime *realtime, const XrayControl *xray)
 {

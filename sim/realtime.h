@@ -16,6 +16,8 @@ typedef struct Realtime Realtime;
 typedef struct RealtimeOptions {
     Simulator *simulator;
     Recording *recording;            // NULL: none
+    int hand_count;                  // at most HANDS_SAMPLED
+    HandPort *const *hand;           // (hand_count) borrowed, each with one writer
     XrayControl xray;                // before the operator sets any
     double pose_ms;                  // simulated time between moments, default 10
     bool paused;                     // at the start
@@ -48,8 +50,7 @@ typedef struct Moment {
 
 // Starts the thread. NULL with a fault.
 Realtime *realtime_start(const RealtimeOptions *options, Faults *faults);
-// One side each: `hand` of the port's writer (index below HAND_COUNT), the others of one thread, the window's.
-HandPort *realtime_hand(Realtime *realtime, int index);
+// The calls from here on are of one thread, the window's.
 void realtime_set_xray(Realtime *realtime, const XrayControl *xray);
 void realtime_pause(Realtime *realtime, bool paused);
 // The newest moment; stays as it is until the next call. NULL before the first.

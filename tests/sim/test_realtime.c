@@ -58,14 +58,17 @@ static void ways_are_fed_whole_and_no_faster_than_the_limit(void **state)
 {
     (void)state;
     static HandSet set;
+    static HandPort port[3];
     hand_set_init(&set);
+    for (int i = 0; i < 3; i++)
+        assert_true(hand_set_add(&set, &port[i]));
     double fed_mm = 0, fed_deg = 0;
-    set.port[1].advanced_mm = 7.3;     // one report of an encoder: 7.3 mm at once
-    set.port[2].advanced_mm = -0.05;   // and another hand that pulls
-    set.port[2].turned_deg = 33;
+    port[1].advanced_mm = 7.3;     // one report of an encoder: 7.3 mm at once
+    port[2].advanced_mm = -0.05;   // and another hand that pulls
+    port[2].turned_deg = 33;
     for (int i = 0; i < 100; i++) {
         if (i == 50)
-            set.port[1].advanced_mm = 7.3 + 1.25;
+            port[1].advanced_mm = 7.3 + 1.25;
         Command command = hand_set_command(&set, 1);
         assert_true(fabs(command.push_mm_s) <= set.fastest_mm_s * (1 + 1e-12));
         assert_true(fabs(command.twist_deg_s) <= set.fastest_deg_s * (1 + 1e-12));
@@ -80,22 +83,25 @@ static void rates_add_and_stop_holds_the_tool(void **state)
 {
     (void)state;
     static HandSet set;
+    static HandPort port[3];
     hand_set_init(&set);
-    set.port[0].push_mm_s = 10;
-    set.port[1].push_mm_s = -4;
-    set.port[1].twist_deg_s = 90;
+    for (int i = 0; i < 3; i++)
+        assert_true(hand_set_add(&set, &port[i]));
+    port[0].push_mm_s = 10;
+    port[1].push_mm_s = -4;
+    port[1].twist_deg_s = 90;
     Command command = hand_set_command(&set, 1);
     assert_true(fabs(command.push_mm_s - 6) < 1e-12 && fabs(command.twist_deg_s - 90) < 1e-12);
-    set.port[2].buttons = HAND_STOP;
-    set.port[2].advanced_mm = 3;
+    port[2].buttons = HAND_STOP;
+    port[2].advanced_mm = 3;
     command = hand_set_command(&set, 1);
     assert_true(command.push_mm_s == 0 && command.twist_deg_s == 0);
-    set.port[2].buttons = 0;
+    port[2].buttons = 0;
     command = hand_set_command(&set, 1);   // what came while it was stopped does not come afterwards
     assert_true(fabs(command.push_mm_s - 6) < 1e-12);
-    set.port[0].push_mm_s = NAN;           // a hand that fails does no harm
-    set.port[1].push_mm_s = HUGE_VAL;
-    set.port[2].advanced_mm = NAN;
+    port[0].push_mm_s = NAN;           // a hand that fails does no harm
+    port[1].push_mm_s = HUGE_VAL;
+    port[2].advanced_mm = NAN;
     command = hand_set_command(&set, 1);
     assert_true(fabs(command.push_mm_s) <= set.fastest_mm_s);
 }
@@ -182,6 +188,10 @@ static void a_session_replays_bit_for_bit(void **state)
     assert_non_null(recording);
     Extra counted = {0};
     RealtimeOptions options = realtime_default_options();
+    static HandPort hands[2];
+    HandPort *key = &hands[0], *encoder = &hands[1], *const both[] = {key, encoder};
+    options.hand_count = 2;
+    options.hand = both;
     options.simulator = rig.simulator;
     options.recording = recording;
     options.after_step = count_step;
@@ -190,7 +200,6 @@ static void a_session_replays_bit_for_bit(void **state)
     options.extra_bytes = sizeof counted;
     Realtime *session = realtime_start(&options, &faults);
     assert_non_null(session);
-    HandPort *key = realtime_hand(session, 0), *encoder = realtime_hand(session, 1);
     XrayControl xray = xray_default_control();
     key->push_mm_s = 30;
     wait_for_time(session, 0.15);
