@@ -512,9 +512,32 @@ static void read_targets(Reading *reading, YamlValue value)
     }
 }
 
+static void read_exercise(Reading *reading, YamlValue value)
+{
+    Scene *scene = reading->scene;
+    const char **name = zeroed(reading, scene->target_count, sizeof *name);
+    scene->exercise = zeroed(reading, 1, sizeof *scene->exercise);
+    for (int i = 0; name && i < scene->target_count; i++)
+        name[i] = scene->target[i].name;
+    if (name && scene->exercise)
+        exercise_read(value, scene->target_count, name, scene->exercise);
+    free(name);
+}
+
+// What lies behind the vessel in the X-ray picture.
+static void read_fluoroscopy(Reading *reading, YamlValue value)
+{
+    static const char *const keys[] = {"volume", NULL};
+    YamlMap map = yaml_map(value, keys);
+    const char *name;
+    if (yaml_has(&map, "volume") && yaml_text(yaml_get(&map, "volume", false), &name))
+        reading->scene->anatomy_path = resolved(reading, name);
+}
+
 static void read_scene(Reading *reading)
 {
-    static const char *const keys[] = {"seldinger", "vessel", "wire", "sheath", "rig", "simulation", "script", "targets", "verify", NULL};
+    static const char *const keys[] = {"seldinger", "vessel", "wire", "sheath", "rig", "simulation", "script", "targets", "exercise", "fluoroscopy",
+                                       "verify", NULL};
     YamlValue root = yaml_root(reading->reader);
     YamlMap map = yaml_map(root, keys);
     int version;
@@ -534,6 +557,10 @@ static void read_scene(Reading *reading)
     read_script(reading, yaml_get(&map, "script", false));
     if (yaml_has(&map, "targets"))
         read_targets(reading, yaml_get(&map, "targets", false));
+    if (yaml_has(&map, "exercise"))
+        read_exercise(reading, yaml_get(&map, "exercise", false));
+    if (yaml_has(&map, "fluoroscopy"))
+        read_fluoroscopy(reading, yaml_get(&map, "fluoroscopy", false));
     if (yaml_has(&map, "verify"))
         verify_read(yaml_get(&map, "verify", false), reading->total_length, yaml_has(&map, "script"), &reading->scene->verify);
 }
@@ -596,6 +623,8 @@ void scene_free(Scene *scene)
     script_free(scene->script);
     free(scene->shape_option);
     free(scene->target);
+    exercise_free(scene->exercise);
+    free(scene->exercise);
     free(scene->verify.cases);
     free(scene->model_path);
     free(scene->mesh_path);

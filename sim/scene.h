@@ -6,6 +6,7 @@
 
 #include "geom/geom.h"
 #include "input/input.h"
+#include "sim/exercise.h"
 #include "sim/verify.h"
 #include "solver/solver.h"
 
@@ -46,6 +47,7 @@ typedef struct Scene {
     SceneTarget *target;
     double marker_length, marker_attenuation;   // [mm], [1/mm] of the radio-opaque marker at the tip; length 0: none
     char *anatomy_path;      // volume whose bone and soft tissue lie behind the vessel in fluoroscopy; NULL: a plain head
+    Exercise *exercise;      // what a trainee has to do; NULL: nothing
     VerifyPlan verify;       // what `seldinger check` measures; case_count 0: nothing
 } Scene;
 

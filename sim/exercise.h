@@ -1,0 +1,66 @@
+// The `exercise:` key of a scene: what a trainee has to do there and how it is judged (sim/score.h). Numbers keep the file's units, which their
+// names carry: they are shown and compared as they were typed.
+//
+//   exercise:
+//     title: Reach the aneurysm             # required, at most 95 bytes
+//     instructions: |                       # text for the screen, at most 4000 bytes; default none
+//       Advance through the siphon …
+//     target: aneurysm                      # required: the name of one of the scene's targets
+//     hold_s: 2                             # 0 to 60: the tip stays within the target that long
+//     time_limit_s: 600                     # above 0, to 86,400: from the first movement or X-ray on
+//     rules:                                # what is counted as a handling error; 0: not judged
+//       tip_force_n: 0.5                    # on the last tip_length_mm of the tool, from the wall
+//       tip_length_mm: 5
+//       wall_force_n: 2                     # largest contact force anywhere
+//       wrong_branch_mm: 5                  # way into a branch that does not lead to the target, from its mouth
+//       blind_mm: 10                        # way that the tool is moved without X-rays
+//       contrast_ml: 30                     # contrast agent in all
+//       buckling: true                      # at the sheath, see score.h
+//     par:                                  # what is good enough for a part's full points; 0: the part is not judged
+//       time_s: 60
+//       fluoroscopy_s: 40
+//       contrast_ml: 5
+//       path_ratio: 1.5                     # way of the tip over the straight way to the target
+//       wall_force_n: 0.5
+//       wall_impulse_n_s: 10
+//     weights: {time: 1, fluoroscopy: 1, contrast: 1, path: 1, wall_force: 1, wall_impulse: 1}   # 0 to 1000, relative
+//     error_points: 5                       # 0 to 100, what each handling error costs
+#ifndef SELDINGER_SIM_EXERCISE_H
+#define SELDINGER_SIM_EXERCISE_H
+
+#include "input/yaml_reader.h"
+
+enum { EXERCISE_TITLE = 96, EXERCISE_TEXT_MOST = 4000 };
+
+// The parts of a score, each with a par and a weight; names in files: score_part_name.
+typedef enum { PART_TIME, PART_FLUOROSCOPY, PART_CONTRAST, PART_PATH, PART_WALL_FORCE, PART_WALL_IMPULSE, PART_COUNT } ScorePart;
+extern const char *const score_part_name[PART_COUNT + 1];      // "time", "fluoroscopy", …; NULL at the end
+
+typedef struct ExerciseRules {   // limits; 0: not judged
+    double tip_force_n;
+    double tip_length_mm;        // > 0
+    double wall_force_n;
+    double wrong_branch_mm;
+    double blind_mm;
+    double contrast_ml;
+    bool buckling;
+} ExerciseRules;
+
+typedef struct Exercise {
+    char title[EXERCISE_TITLE];
+    char *instructions;          // "" where there are none; owned
+    int target;                  // index of the scene's targets; -1 in exercise_default
+    double hold_s, time_limit_s;
+    ExerciseRules rules;
+    double par[PART_COUNT];      // s, s, ml, ratio, N, N s; 0: not judged
+    double weight[PART_COUNT];
+    double error_points;
+} Exercise;
+
+// What holds where the scene says nothing: 2 s, 600 s, buckling only, no par, all weights 1, 5 points an error.
+Exercise exercise_default(void);
+// Reads the value of `exercise:`; `target_name` are the names of the scene's targets. Faults go to the reader; the caller frees.
+void exercise_read(YamlValue value, int target_count, const char *const *target_name, Exercise *exercise);
+void exercise_free(Exercise *exercise);
+
+#endif

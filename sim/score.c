@@ -1,0 +1,319 @@
+#include "sim/score.h"
+
+#include "geom/power_walk.h"
+#include "sim/score_sheath.h"
+#include "sim/score_way.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+const char *const score_error_name[ERROR_COUNT + 1] = {"wrong_branch", "tip_force", "wall_force", "buckling", "blind", "contrast", NULL};
+const char *const score_error_words[ERROR_COUNT] = {"wrong branch",          "tip force above the limit", "wall force above the limit",
+                                                    "buckling at the sheath", "tool moved without X-rays", "too much contrast agent"};
+const char *const score_state_name[5] = {"waiting", "running", "reached", "time_out", NULL};
+
+static const double LOOK_MS = 10;            // between looks at forces and nodes
+static const double CHORD_MM = 0.2;          // of the tip's path
+static const double FORCE_MEAN_MS = 20;
+static const double QUIET_MS = 500;          // until an episode is over
+static const double FORCE_AGAIN = 0.8, AGAIN = 0.5;      // parts of a limit below which a measure is back
+enum { HOPS = 8 };
+
+struct Score {
+    const Scene *scene;
+    Exercise exercise;           // the scene's, or the default; its text is the scene's
+    ScoreFigures figures;
+    ScoreWay way;
+    ScoreSheath sheath;
+    double dt;                   // [ms]
+    int node_count;
+    NodeReport *node;            // (M) of the last look
+    double *s;                   // (M)
+    double since_look;           // [ms]
+    Vec3 path_from;              // where the last chord of the tip's path ended
+    double wall_force, tip_force;        // [N] means
+    double quiet[ERROR_COUNT];   // [ms] that an episode's measure has been back
+    double pulse_phase;          // of the next X-ray pulse, 1: now
+    bool had_pedal;
+    int64_t held_steps;
+    int event_count;
+    ScoreEvent event[SCORE_EVENTS_MOST];
+};
+
+static Vec3 tip_of(const Simulator *simulator)
+{
+    const WireState *state = simulator_state(simulator);
+    return state->position[state->node_count - 1];
+}
+
+// The lumen's radius at the mouth: the tree's, the tube's, or as much room as the first free node has.
+static double lumen_radius(const Score *score, const VesselTree *tree)
+{
+    if (score->scene->source == SOURCE_TUBE)
+        return score->scene->tube.radius;
+    if (tree)
+        return tree->radius[power_nearest(tree, score->scene->wire.start)];
+    for (int i = 0; i < score->node_count; i++)
+        if (score->node[i].vessel_node >= 0)
+            return score->node[i].gap + score->node[i].radius;
+    return HUGE_VAL;
+}
+
+Score *score_create(Simulator *simulator, const VesselTree *tree)
+{
+    const Scene *scene = simulator_scene(simulator);
+    const WireState *state = simulator_state(simulator);
+    Score *score = calloc(1, sizeof *score);
+    if (!score)
+        return NULL;
+    score->scene = scene;
+    score->exercise = scene->exercise ? *scene->exercise : exercise_default();
+    score->dt = scene->dt;
+    score->node_count = state->node_count;
+    score->node = calloc((size_t)state->node_count, sizeof *score->node);
+    score->s = calloc((size_t)state->node_count, sizeof *score->s);
+    int at = score->exercise.target;
+    Vec3 tip = tip_of(simulator), target = at >= 0 ? scene->target[at].point : tip;
+    if (!score->node || !score->s || !score_way_create(&score->way, tree, scene->wire.start, target, at >= 0 ? scene->target[at].radius : 0)) {
+        score_free(score);
+        return NULL;
+    }
+    stepper_node_report(simulator_stepper(simulator), score->node);
+    for (int i = 0; i < score->node_count; i++)
+        score->s[i] = score->node[i].s;
+    score_sheath_start(&score->sheath, &scene->wire, lumen_radius(score, tree), state->inserted);
+    ScoreFigures *f = &score->figures;
+    f->has_exercise = scene->exercise != NULL;
+    f->tip_node = tree ? power_nearest(tree, tip) : -1;
+    f->way_mm = f->remaining_mm = f->least_remaining_mm = score_way_left(&score->way, tip, f->tip_node);
+    f->target_distance_mm = vec3_distance(tip, target);
+    for (int i = 0; i < PART_COUNT; i++)
+        f->part[i] = 1;
+    score->path_from = tip;
+    return score;
+}
+
+void score_free(Score *score)
+{
+    if (!score)
+        return;
+    score_way_destroy(&score->way);
+    free(score->node);
+    free(score->s);
+    free(score);
+}
+
+// An episode of `kind` begins when it is `over` its limit and ends once it was `back` for `quiet_ms`.
+static void judge(Score *score, ScoreError kind, bool over, bool back, double quiet_ms, double elapsed_ms, double now_s)
+{
+    ScoreErrorFigures *error = &score->figures.error[kind];
+    if (error->is_on) {
+        score->quiet[kind] = back ? score->quiet[kind] + elapsed_ms : 0;
+        error->is_on = !back || score->quiet[kind] < quiet_ms;
+    } else if (over) {
+        *error = (ScoreErrorFigures){error->count + 1, true, now_s};
+        score->quiet[kind] = 0;
+        score->figures.error_total++;
+        if (score->event_count < SCORE_EVENTS_MOST)
+            score->event[score->event_count++] = (ScoreEvent){kind, now_s};
+    }
+}
+
+static void judge_limit(Score *score, ScoreError kind, double measure, double limit, double again, double elapsed_ms, double now_s)
+{
+    if (limit > 0)
+        judge(score, kind, measure > limit, measure < again * limit, QUIET_MS, elapsed_ms, now_s);
+}
+
+// --- X-rays and contrast ---
+
+static double open_area_cm2(const XrayControl *xray)
+{
+    const float *blade = xray->collimator;
+    double wide = fmax(1 - 0.5 * ((double)blade[0] + blade[1]), 0), high = fmax(1 - 0.5 * ((double)blade[2] + blade[3]), 0);
+    return (double)xray->field_mm * xray->field_mm * wide * high / 100;
+}
+
+static void count_pulses(Score *score, const XrayControl *xray, double seconds)
+{
+    ScoreFigures *f = &score->figures;
+    bool pedal = xray->pedal > 0.5F;
+    if (pedal) {
+        double rate = fmin(fmax((double)xray->pulses_s, 0), 1000);
+        f->fluoroscopy_s += seconds;
+        score->pulse_phase = score->had_pedal ? score->pulse_phase + rate * seconds : 1;
+        int64_t pulses = (int64_t)(score->pulse_phase + 1e-9);
+        score->pulse_phase -= (double)pulses;
+        f->pulses += pulses;
+        f->dose_area_cm2 += (double)pulses * open_area_cm2(xray);
+    }
+    score->had_pedal = pedal;
+}
+
+static void watch_xrays(Score *score, const XrayControl *xray, double fed, double now_s)
+{
+    ScoreFigures *f = &score->figures;
+    const ExerciseRules *rules = &score->exercise.rules;
+    double seconds = score->dt / 1000;
+    if (!xray)
+        return;
+    f->has_xray = true;
+    count_pulses(score, xray, seconds);
+    f->contrast_ml += fmax((double)xray->contrast_ml_s, 0) * seconds;
+    f->blind_mm = score->had_pedal ? 0 : f->blind_mm + fabs(fed);
+    if (rules->contrast_ml > 0)
+        judge(score, ERROR_CONTRAST, f->contrast_ml > rules->contrast_ml * (1 + 1e-9), false, QUIET_MS, score->dt, now_s);
+    if (rules->blind_mm > 0)
+        judge(score, ERROR_BLIND, f->blind_mm > rules->blind_mm, f->blind_mm <= 0, 0, score->dt, now_s);
+}
+
+// --- the tool ---
+
+static void watch_tip(Score *score, Vec3 tip)
+{
+    ScoreFigures *f = &score->figures;
+    double chord = vec3_distance(tip, score->path_from);
+    if (chord >= CHORD_MM) {
+        f->path_mm += chord;
+        score->path_from = tip;
+    }
+    if (score->exercise.target < 0)
+        return;
+    const SceneTarget *target = &score->scene->target[score->exercise.target];
+    f->target_distance_mm = vec3_distance(tip, target->point);
+    score->held_steps = f->target_distance_mm <= target->radius ? score->held_steps + 1 : 0;
+    f->held_s = (double)score->held_steps * score->dt / 1000;
+}
+
+static double low_pass(double mean, double value, double elapsed_ms) { return mean + (value - mean) * -expm1(-elapsed_ms / FORCE_MEAN_MS); }
+
+static void watch_wall_force(Score *score, const StepReport *report, double now_s)
+{
+    ScoreFigures *f = &score->figures;
+    f->wall_force_peak_n = fmax(f->wall_force_peak_n, report->wall_force_max);
+    f->wall_impulse_n_s += report->wall_force_sum * score->dt / 1000;
+    score->wall_force = low_pass(score->wall_force, report->wall_force_max, score->dt);
+    judge_limit(score, ERROR_WALL_FORCE, score->wall_force, score->exercise.rules.wall_force_n, FORCE_AGAIN, score->dt, now_s);
+}
+
+static double force_on_tip(const Score *score)
+{
+    double end = score->s[score->node_count - 1];
+    Vec3 sum = {0, 0, 0};
+    for (int i = score->node_count - 1; i >= 0 && end - score->s[i] <= score->exercise.rules.tip_length_mm; i--)
+        sum = vec3_add(sum, score->node[i].force);
+    return vec3_norm(sum);
+}
+
+// What is asked for every 10 ms only: forces along the tool, and where in the tree the tip is.
+static void look(Score *score, Simulator *simulator, Vec3 tip, double now_s)
+{
+    ScoreFigures *f = &score->figures;
+    const ExerciseRules *rules = &score->exercise.rules;
+    double elapsed = score->since_look;
+    score->since_look = 0;
+    stepper_node_report(simulator_stepper(simulator), score->node);
+    f->tip_force_n = force_on_tip(score);
+    f->tip_force_peak_n = fmax(f->tip_force_peak_n, f->tip_force_n);
+    score->tip_force = low_pass(score->tip_force, f->tip_force_n, elapsed);
+    judge_limit(score, ERROR_TIP_FORCE, score->tip_force, rules->tip_force_n, FORCE_AGAIN, elapsed, now_s);
+    score_sheath_look(&score->sheath, simulator_state(simulator), score->s);
+    if (score->way.tree)
+        f->tip_node = score->way.tree->near ? power_walk(score->way.tree, tip, f->tip_node, HOPS) : power_nearest(score->way.tree, tip);
+    if (score->exercise.target < 0)
+        return;
+    f->remaining_mm = score_way_left(&score->way, tip, f->tip_node);
+    f->least_remaining_mm = fmin(f->least_remaining_mm, f->remaining_mm);
+    f->off_way_mm = score->way.tree ? score->way.off[f->tip_node] : 0;
+    judge_limit(score, ERROR_WRONG_BRANCH, f->off_way_mm, rules->wrong_branch_mm, AGAIN, elapsed, now_s);
+}
+
+static double watch_sheath(Score *score, const WireState *state, Command command, double now_s)
+{
+    ScoreFigures *f = &score->figures;
+    double fed = score_sheath_step(&score->sheath, state, score->s, score->dt), limit = score_sheath_limit(&score->sheath);
+    f->inserted_mm += fmax(fed, 0);
+    f->withdrawn_mm += fmax(-fed, 0);
+    f->lost_mm = score->sheath.lost;
+    f->lost_limit_mm = limit;
+    if (score->exercise.rules.buckling && limit > 0)
+        judge(score, ERROR_BUCKLING, f->lost_mm > limit && command.push_mm_s > 0, f->lost_mm < AGAIN * limit, QUIET_MS, score->dt, now_s);
+    return fed;
+}
+
+// --- points ---
+
+static void give_points(Score *score)
+{
+    ScoreFigures *f = &score->figures;
+    const Exercise *exercise = &score->exercise;
+    double figure[PART_COUNT] = {[PART_TIME] = f->time_s,
+                                 [PART_FLUOROSCOPY] = f->fluoroscopy_s,
+                                 [PART_CONTRAST] = f->contrast_ml,
+                                 [PART_PATH] = f->way_mm > 0 ? f->path_mm / f->way_mm : 0,
+                                 [PART_WALL_FORCE] = f->wall_force_peak_n,
+                                 [PART_WALL_IMPULSE] = f->wall_impulse_n_s};
+    double sum = 0, weights = 0;
+    for (int i = 0; i < PART_COUNT; i++) {
+        if (!(exercise->par[i] > 0))
+            continue;
+        f->part[i] = exercise->par[i] / fmax(exercise->par[i], figure[i]);
+        sum += exercise->weight[i] * f->part[i];
+        weights += exercise->weight[i];
+    }
+    double covered = f->way_mm > 0 ? fmax(1 - f->least_remaining_mm / f->way_mm, 0) : 0;
+    f->efficiency = f->path_mm > 0 ? fmin(f->way_mm * covered / f->path_mm, 1) : 0;
+    double share = f->state == SCORE_REACHED ? 1 : 0.5 * covered;
+    if (f->has_exercise)
+        f->points = fmax(100 * share * (weights > 0 ? sum / weights : 1) - exercise->error_points * f->error_total, 0);
+}
+
+void score_step(Score *score, Simulator *simulator, Command command, const XrayControl *xray)
+{
+    ScoreFigures *f = &score->figures;
+    if (f->state == SCORE_REACHED || f->state == SCORE_TIME_OUT)
+        return;
+    const WireState *state = simulator_state(simulator);
+    double now_s = simulator_time_s(simulator);
+    bool acts = command.push_mm_s != 0 || command.twist_deg_s != 0 || (xray && (xray->pedal > 0.5F || xray->contrast_ml_s > 0));
+    if (f->state == SCORE_WAITING && acts) {
+        f->state = SCORE_RUNNING;
+        f->start_s = now_s - score->dt / 1000;
+    }
+    Vec3 tip = tip_of(simulator);
+    double fed = watch_sheath(score, state, command, now_s);
+    if (f->state == SCORE_WAITING)       // a tool that settles by itself is nobody's doing
+        return;
+    f->time_s = now_s - f->start_s;
+    watch_xrays(score, xray, fed, now_s);
+    watch_tip(score, tip);
+    watch_wall_force(score, simulator_last(simulator), now_s);
+    score->since_look += score->dt;
+    if (score->since_look >= LOOK_MS * (1 - 1e-9))
+        look(score, simulator, tip, now_s);
+    if (f->has_exercise && score->held_steps > 0 && f->held_s >= score->exercise.hold_s - 1e-9) {
+        f->state = SCORE_REACHED;
+        f->reached_s = now_s;
+    } else if (f->has_exercise && f->time_s >= score->exercise.time_limit_s - 1e-9) {
+        f->state = SCORE_TIME_OUT;
+    }
+    give_points(score);
+}
+
+ScoreFigures score_figures(const Score *score) { return score->figures; }
+
+const ScoreEvent *score_events(const Score *score, int *count)
+{
+    *count = score->event_count;
+    return score->event;
+}
+
+void score_copy(Score *to, const Score *from)
+{
+    Score own = *to;
+    *to = *from;
+    to->way = own.way;
+    to->node = own.node;
+    to->s = own.s;
+    memcpy(to->node, from->node, (size_t)from->node_count * sizeof *to->node);
+}

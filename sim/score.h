@@ -1,0 +1,99 @@
+// What a trainee's hand is worth: figures of a run, handling errors, points. One Score a simulator, stepped by the same thread right after each
+// simulator_step; the figures are plain data to be copied into a pose. The same steps give the same figures, so a replay has the session's score.
+// A step allocates nothing and takes well under 1 us at the median: forces and gaps along the tool are asked for every 10 ms only (some 20 us).
+//
+// The clock runs from the first step in which the hand moves the tool, the pedal is down or contrast flows. Once the target has been held, or the
+// time is over, all figures stand still. Without an exercise they are kept without an end.
+//
+// Points: 100 g (sum of w q / sum of w) - e n, at least 0, over the parts that are judged (par > 0, w > 0), with
+//   q = par / max(par, figure), 1 down to 0; the figures are time, fluoroscopy time, contrast, path over way, wall-force peak, wall-force impulse;
+//   g = 1 once the target was held, else half the share of the way to it that was ever covered;
+//   e n = error_points times the number of errors.
+// So no figure that grows worse ever gives more points, and no point is had for doing nothing.
+//
+// Errors are counted by episode: one begins when its limit is passed and ends once its measure has been back below the limit's half (forces: 0.8 of
+// it) for half a second. Forces are judged by their mean over 20 ms (a low-pass of first order): a knock of a single step is no handling error.
+//   wrong branch  the tip's node lies more than wrong_branch_mm beyond the mouth of a branch that does not lead from the sheath to the target:
+//                 way along the tree to the way there, less the radius of that vessel. A sac that holds the target is no wrong branch.
+//   tip force     resultant of the wall's forces on the last tip_length_mm
+//   wall force    largest contact force
+//   buckling      what goes in at the mouth does not go on: length lost next to the mouth, over the first 5 lumen diameters l beyond it (or up to the
+//                 tip), as the integral of feed less the tool's motion along itself at l, fading over 2 l of feed. A tool that slides keeps it at 0 in
+//                 any bend, because each point follows the one before it. It may lie down on the other side of the lumen without buckling, which
+//                 takes 2 c theta in a bend by theta and pi^2 c^2 / l for one bow from wall to wall (a half wave of amplitude a takes pi^2 a^2 / (4 l):
+//                 Timoshenko and Gere, Theory of Elastic Stability, 1961, 1.9), c being the lumen's radius less the tool's. More than that plus 1 mm,
+//                 while the hand pushes: the tool stands in folds between mouth and l.
+//   blind         the tool was moved by more than blind_mm since the pedal was last down
+//   contrast      more than contrast_ml in all; once
+#ifndef SELDINGER_SIM_SCORE_H
+#define SELDINGER_SIM_SCORE_H
+
+#include "sim/simulator.h"
+#include "sim/xray.h"
+
+typedef enum { ERROR_WRONG_BRANCH, ERROR_TIP_FORCE, ERROR_WALL_FORCE, ERROR_BUCKLING, ERROR_BLIND, ERROR_CONTRAST, ERROR_COUNT } ScoreError;
+extern const char *const score_error_name[ERROR_COUNT + 1];    // in files: "wrong_branch", "tip_force", …; NULL at the end
+extern const char *const score_error_words[ERROR_COUNT];       // on screens: "wrong branch", "tip force above the limit", …
+
+typedef enum { SCORE_WAITING, SCORE_RUNNING, SCORE_REACHED, SCORE_TIME_OUT } ScoreState;   // WAITING: nothing moved yet
+extern const char *const score_state_name[5];                  // "waiting", "running", "reached", "time_out", NULL
+
+typedef struct ScoreErrorFigures {
+    int count;
+    bool is_on;                  // an episode goes on now
+    double last_s;               // simulated time at which the last one began; 0 where there was none
+} ScoreErrorFigures;
+
+typedef struct ScoreFigures {
+    ScoreState state;
+    bool has_exercise, has_xray;     // has_xray: someone watches (xray not NULL)
+    double points;               // 0 to 100; 0 without exercise
+    double part[PART_COUNT];     // q of each part, 0 to 1; 1 where not judged
+    double start_s;              // simulated time at which the clock began
+    double time_s;               // since then
+    double fluoroscopy_s;        // pedal down
+    int64_t pulses;              // of X-rays
+    double dose_area_cm2;        // pulses times the field's open area at the isocentre: proportional to the dose-area product
+    double contrast_ml;
+    double path_mm;              // of the tip, in chords of 0.2 mm: what trembles counts for nothing
+    double way_mm;               // from where the tip was at the start to the target, along the tree's centrelines; straight where there is no tree
+    double remaining_mm;         // of it, now
+    double least_remaining_mm;
+    double efficiency;           // way gained over path, 0 to 1
+    double inserted_mm, withdrawn_mm;    // fed in and pulled out in all, both >= 0
+    double wall_force_peak_n;    // largest contact force of any step
+    double wall_impulse_n_s;     // sum of all contact forces over time
+    double tip_force_n, tip_force_peak_n;    // every 10 ms
+    double lost_mm, lost_limit_mm;       // length lost next to the mouth and what may be (buckling); limit 0: not known yet
+    int tip_node;                // node of the tree at which the tip is; -1 without tree
+    double off_way_mm;           // beyond the mouth of a branch that leads elsewhere; 0 on the way
+    double blind_mm;             // moved since the pedal was last down
+    double target_distance_mm;   // from the tip, straight
+    double held_s;               // within the target without a break
+    double reached_s;            // simulated time at which it had been held; 0 before
+    int error_total;
+    ScoreErrorFigures error[ERROR_COUNT];
+} ScoreFigures;
+
+typedef struct ScoreEvent {
+    ScoreError kind;
+    double time_s;               // simulated
+} ScoreEvent;
+enum { SCORE_EVENTS_MOST = 200 };    // later ones are counted, not listed
+
+typedef struct Score Score;
+
+// Call before the first step. `tree` may be NULL (the vessel is none) and must outlive the score. NULL where memory lacks.
+Score *score_create(Simulator *simulator, const VesselTree *tree);
+void score_free(Score *score);
+// After each simulator_step, with what it was given. `xray` NULL: nobody watches, so that nothing counts as blind.
+void score_step(Score *score, Simulator *simulator, Command command, const XrayControl *xray);
+ScoreFigures score_figures(const Score *score);
+const ScoreEvent *score_events(const Score *score, int *count);
+// To go on from an earlier moment: `to` belongs to the same scene.
+void score_copy(Score *to, const Score *from);
+
+// The figures as a JSON object {"state": …, "points": …, …}; the caller frees. NULL where memory lacks. `scene` names the exercise.
+char *score_json(const ScoreFigures *figures, const Scene *scene);
+
+#endif

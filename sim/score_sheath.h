@@ -1,0 +1,26 @@
+// Buckling at the sheath: the length that went in at the mouth and did not go on, over the first part of the tool beyond it. What is measured and why
+// says score.h.
+#ifndef SELDINGER_SIM_SCORE_SHEATH_H
+#define SELDINGER_SIM_SCORE_SHEATH_H
+
+#include "solver/solver.h"
+
+typedef struct ScoreSheath {
+    bool is_judged;              // a sheath, and a lumen whose radius is known
+    Vec3 mouth, direction;
+    double lumen_radius, clearance;      // [mm]
+    double reach;                // [mm] l, 5 lumen diameters
+    double lost;                 // [mm] >= 0
+    double turn;                 // [rad] by which the tool turns over l, seen while it slides
+    double last_inserted;        // [mm]
+} ScoreSheath;
+
+void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, double lumen_radius, double inserted);
+// `s` (M) [mm] arc length of the nodes. `dt` [ms]. Returns what was fed in [mm].
+double score_sheath_step(ScoreSheath *sheath, const WireState *state, const double *s, double dt);
+// Looks at the turn anew while little is lost.
+void score_sheath_look(ScoreSheath *sheath, const WireState *state, const double *s);
+// [mm] that may be lost without a fold.
+double score_sheath_limit(const ScoreSheath *sheath);
+
+#endif
