@@ -1,0 +1,30 @@
+// Angioscopy: from the tip looking forward inside the lumen. Perspective; the lamp is at the eye, so that light falls off with distance and the far
+// lumen is dark; the wall's normals are those of the vessel's own field. The eye rides on the tool, a little behind its tip and beside its axis, so that
+// the tool's end is seen at the picture's lower rim, and turns with the tool. Where it would come too near to a wall it is moved off it.
+// Needs a current GL context (3.3 core), always the same one. Lengths mm.
+#ifndef SELDINGER_RENDER_ANGIOSCOPE_H
+#define SELDINGER_RENDER_ANGIOSCOPE_H
+
+#include "geom/isosurface.h"
+#include "render/view_port.h"
+#include "sim/pose.h"
+
+typedef struct Angioscope Angioscope;
+
+typedef struct AngioscopeView {    // a perspective camera
+    Vec3 eye;
+    Vec3 right, up, forward;       // orthonormal; right = forward x up
+    double half_angle_tan;         // of the angle from the view's middle to the middle of its shorter side
+} AngioscopeView;
+
+// `mesh` NULL: no wall (a dark picture with the tool). It is copied; `vessel` (NULL: normals as in the mesh, eye not moved off the wall) and `tree`
+// (may be NULL) are borrowed. NULL with a reason.
+Angioscope *angioscope_create(const TriangleMesh *mesh, const Vessel *vessel, const VesselTree *tree, char *message, size_t capacity);
+void angioscope_destroy(Angioscope *scope);
+// Draws all of the port's rectangle. In the sheath, outside of the vessel, without pose or with one that is not finite it is what can be seen from there:
+// the sheath's dark, or nothing.
+void angioscope_draw(Angioscope *scope, const Pose *pose, ViewPort port);
+// The camera for a pose; false where the tip has no finite place.
+bool angioscope_view(const Angioscope *scope, const Pose *pose, AngioscopeView *view);
+
+#endif

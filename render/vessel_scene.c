@@ -1,0 +1,370 @@
+// A frame: the cached walls, then everything that moves as strokes over them.
+#include "render/vessel_scene.h"
+
+#include "render/message.h"
+#include "render/vessel_scene_layers.h"
+#include "render/vessel_scene_model.h"
+#include "render/vessel_scene_strokes.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+struct VesselScene {
+    VesselLayers *layers;
+    Strokes strokes;
+    ModelWires *models;
+    int target_count;
+    const SceneTarget *target;
+    bool has_entry;
+    Vec3 entry, entry_direction;
+    FreeCamera home;
+    Vec3 center;               // of the ball around everything …
+    double reach;              // … and its radius
+    // of the last draw
+    FreeCamera shown;
+    Camera projection;
+    LayersKey key;
+    bool has_drawn, was_moving;
+    bool is_following, is_gliding;
+    Vec3 anchor;               // where the followed focus is
+    bool has_tip;
+    Vec3 tip;
+    long layer_draws;
+    // scratch for the tool's smoothed line
+    int capacity;
+    Vec3 *point;
+    double *half;
+    Color *color;
+};
+
+static const Color TARGET_COLOR = {102, 190, 255, 255}, ARROW_COLOR = {120, 235, 200, 255}, SHEATH_COLOR = {150, 156, 166, 255},
+                   NO_CONTACT_COLOR = {196, 203, 214, 255};
+static const double sheath_shown_mm = 12;
+
+Color vessel_scene_force_color(double force_n, double full_scale_n)
+{
+    const double least = 0.34;   // of the map: what lies below is too dark on a dark ground
+    if (!(force_n > 0) || !(full_scale_n > 0))
+        return NO_CONTACT_COLOR;
+    return color_sequential(least + (1 - least) * fmin(force_n / full_scale_n, 1));
+}
+
+// --- create ---
+
+static int gather_points(const VesselSceneOptions *options, Vec3 *point)
+{
+    int count = 0;
+    for (int i = 0; options->vessel && i < options->vessel->vertex_count; i++)
+        point[count++] = options->vessel->vertex[i];
+    for (int i = 0; i < options->target_count; i++)
+        for (int k = 0; k < 6; k++) {
+            double r = (k & 1 ? -1 : 1) * options->target[i].radius;
+            Vec3 p = vec3_add(options->target[i].point, vec3(k / 2 == 0 ? r : 0, k / 2 == 1 ? r : 0, k / 2 == 2 ? r : 0));
+            if (vec3_is_finite(p))
+                point[count++] = p;
+        }
+    if (options->has_entry && vec3_is_finite(options->entry))
+        point[count++] = options->entry;
+    for (int i = 0; i < options->frame_count; i++)
+        if (vec3_is_finite(options->frame[i]))
+            point[count++] = options->frame[i];
+    return count;
+}
+
+static bool frame_everything(VesselScene *scene, const VesselSceneOptions *options)
+{
+    size_t most = (options->vessel ? (size_t)options->vessel->vertex_count : 0) + 6 * (size_t)options->target_count + (size_t)options->frame_count + 1;
+    Vec3 *point = malloc(most * sizeof *point);
+    if (!point)
+        return false;
+    int count = gather_points(options, point);
+    scene->home = free_camera_framing(count, point);
+    scene->center = scene->home.focus;
+    scene->reach = scene->home.extent_mm;
+    for (int i = 0; i < count; i++)
+        scene->reach = fmax(scene->reach, vec3_distance(point[i], scene->center));
+    free(point);
+    return true;
+}
+
+VesselScene *vessel_scene_create(const VesselSceneOptions *options, char *message, size_t capacity)
+{
+    VesselScene *scene = calloc(1, sizeof *scene);
+    if (!scene) {
+        message_fail(message, capacity, "not enough memory for the 3D view");
+        return NULL;
+    }
+    scene->target_count = options->target_count;
+    scene->target = options->target;
+    scene->has_entry = options->has_entry && vec3_is_finite(options->entry) && vec3_is_finite(options->entry_direction);
+    scene->entry = options->entry;
+    scene->entry_direction = vec3_unit(options->entry_direction);
+    scene->layers = vessel_layers_create(options->vessel, options->coarse, message, capacity);
+    bool good = scene->layers && strokes_create(&scene->strokes, message, capacity);
+    if (good && (!frame_everything(scene, options) || !(scene->models = model_wires_create(options->tree))))
+        good = message_fail(message, capacity, "not enough memory for the 3D view");
+    if (!good) {
+        vessel_scene_destroy(scene);
+        return NULL;
+    }
+    return scene;
+}
+
+void vessel_scene_destroy(VesselScene *scene)
+{
+    if (!scene)
+        return;
+    vessel_layers_destroy(scene->layers);
+    strokes_destroy(&scene->strokes);
+    model_wires_free(scene->models);
+    free(scene->point);
+    free(scene->half);
+    free(scene->color);
+    free(scene);
+}
+
+VesselSceneLook vessel_scene_default_look(const VesselScene *scene)
+{
+    return (VesselSceneLook){.camera = scene->home, .show_model = true, .show_arrows = true, .show_targets = true, .force_full_scale_n = 0.5,
+                             .font_scale = 1};
+}
+
+// --- camera ---
+
+// The focus stays while the tip is in the view's middle third and glides to it once it leaves: walls are redrawn only then.
+static void follow(VesselScene *scene, FreeCamera *camera)
+{
+    if (!scene->is_following)
+        scene->anchor = scene->tip;
+    scene->is_following = true;
+    Vec3 away = vec3_sub(scene->tip, scene->anchor), back = quat_rotate(camera->turn, vec3(0, 0, 1));
+    double off = vec3_norm(vec3_add_scaled(away, -vec3_dot(away, back), back)) / camera->extent_mm;
+    scene->is_gliding = off > (scene->is_gliding ? 0.02 : 1 / 6.0);
+    if (scene->is_gliding)
+        scene->anchor = off > 1 ? scene->tip : vec3_add_scaled(scene->anchor, 0.25, away);
+    camera->focus = scene->anchor;
+}
+
+static LayersKey key_for(VesselScene *scene, const VesselSceneLook *look, ViewPort port)
+{
+    FreeCamera camera = look->camera;
+    if (look->follow_tip && scene->has_tip)
+        follow(scene, &camera);
+    else
+        scene->is_following = scene->is_gliding = false;
+    scene->shown = camera;
+    double depth = 1.05 * scene->reach + vec3_distance(camera.focus, scene->center);
+    LayersKey key = {.camera = free_camera_projection(&camera, port.width, port.height, depth), .has_section = look->section};
+    key.section_normal = vec3_unit_or(look->section_normal, key.camera.back);
+    Vec3 through = look->section_at_tip && scene->has_tip ? scene->tip : scene->center;
+    key.section_offset = vec3_dot(key.section_normal, through) + look->section_offset_mm;
+    return key;
+}
+
+// Changing from frame to frame: the first changed frame is drawn in full, so that a single step of the camera never looks coarse.
+static bool is_moving(VesselScene *scene, const LayersKey *key)
+{
+    bool changed = !scene->has_drawn || !layers_key_same(&scene->key, key), moving = changed && scene->was_moving;
+    scene->key = *key;
+    scene->was_moving = changed && scene->has_drawn;
+    scene->has_drawn = true;
+    return moving;
+}
+
+// --- what moves ---
+
+static bool reserve(VesselScene *scene, int count)
+{
+    if (count <= scene->capacity)
+        return true;
+    Vec3 *point = realloc(scene->point, (size_t)count * sizeof *point);
+    scene->point = point ? point : scene->point;
+    double *half = realloc(scene->half, (size_t)count * sizeof *half);
+    scene->half = half ? half : scene->half;
+    Color *color = realloc(scene->color, (size_t)count * sizeof *color);
+    scene->color = color ? color : scene->color;
+    if (!point || !half || !color)
+        return false;
+    scene->capacity = count;
+    return true;
+}
+
+static Color mix_colors(Color a, Color b, double s)
+{
+    return color_rgb((int)(a.r + s * (b.r - a.r) + 0.5), (int)(a.g + s * (b.g - a.g) + 0.5), (int)(a.b + s * (b.b - a.b) + 0.5));
+}
+
+// Cubic through both nodes along their tangents.
+static Vec3 between(const Pose *pose, int i, double t)
+{
+    Vec3 a = pose->position[i], b = pose->position[i + 1], chord = vec3_sub(b, a);
+    double length = vec3_norm(chord);
+    Vec3 u = quat_rotate(pose->quaternion[i], vec3(length, 0, 0)), v = quat_rotate(pose->quaternion[i + 1], vec3(length, 0, 0));
+    // frames that do not follow the line are no help
+    double least = 0.5 * length * length;
+    if (!(vec3_dot(u, chord) > least && vec3_dot(v, chord) > least))
+        u = v = chord;
+    double s = 1 - t;
+    Vec3 x = vec3_add_scaled(vec3_scale(a, s * s * (1 + 2 * t)), t * t * (1 + 2 * s), b);
+    return vec3_add_scaled(vec3_add_scaled(x, t * s * s, u), -t * t * s, v);
+}
+
+static void add_tool(VesselScene *scene, const Pose *pose, const VesselSceneLook *look)
+{
+    enum { PIECES = 6 };
+    const Camera *camera = &scene->projection;
+    double thin = 1.25 * look->font_scale;
+    int first = pose->first_free_node;
+    double stub = 0;
+    while (first > 0 && stub < sheath_shown_mm) {
+        stub += vec3_distance(pose->position[first], pose->position[first - 1]);
+        first--;
+    }
+    if (!reserve(scene, (pose->node_count - first) * PIECES + 1))
+        return;
+    int count = 0;
+    for (int i = first; i < pose->node_count; i++) {
+        const NodeReport *node = &pose->node[i], *next = i + 1 < pose->node_count ? node + 1 : node;
+        Color here = i < pose->first_free_node ? SHEATH_COLOR : vessel_scene_force_color(vec3_norm(node->force), look->force_full_scale_n);
+        Color there = i + 1 < pose->first_free_node ? SHEATH_COLOR : vessel_scene_force_color(vec3_norm(next->force), look->force_full_scale_n);
+        int pieces = 1;
+        if (next != node) {
+            double pixels = vec3_distance(pose->position[i], pose->position[i + 1]) / camera->mm_per_pixel;
+            pieces = pixels < 3 ? 1 : pixels < 3 * PIECES ? (int)(pixels / 3) + 1 : PIECES;
+            pieces = pieces > PIECES ? PIECES : pieces;
+        }
+        for (int k = 0; k < pieces; k++, count++) {
+            double t = (double)k / pieces;
+            scene->point[count] = k == 0 ? pose->position[i] : between(pose, i, t);
+            scene->half[count] = fmax((node->radius + t * (next->radius - node->radius)) / camera->mm_per_pixel, thin);
+            scene->color[count] = mix_colors(here, there, t);
+        }
+    }
+    strokes_polyline(&scene->strokes, count, scene->point, scene->half, scene->color);
+}
+
+// One arrow for each stretch of the tool of about 14 pixels, counted from the tip so that stretches stay the same nodes: the sum of their forces, its
+// head at the tool where the wall pushes.
+static void add_arrows(VesselScene *scene, const Pose *pose, const VesselSceneLook *look)
+{
+    const double least = 0.01;   // of full scale: contacts that only rest there
+    double pixel = scene->projection.mm_per_pixel, stretch = 14 * look->font_scale * pixel, longest = 52 * look->font_scale * pixel;
+    int end = pose->node_count;
+    while (end > pose->first_free_node) {
+        Vec3 sum = {0, 0, 0}, place = {0, 0, 0};
+        double weight = 0, radius = 0, length = 0;
+        int i = end;
+        while (i > pose->first_free_node && (i == end || length < stretch)) {
+            i--;
+            double size = vec3_norm(pose->node[i].force);
+            if (size > 0 && isfinite(size) && vec3_is_finite(pose->position[i])) {
+                sum = vec3_add(sum, pose->node[i].force);
+                place = vec3_add_scaled(place, size, pose->position[i]);
+                weight += size;
+                radius = fmax(radius, pose->node[i].radius);
+            }
+            if (i > 0)
+                length += vec3_distance(pose->position[i], pose->position[i - 1]);
+        }
+        end = i;
+        double size = vec3_norm(sum);
+        if (!(weight > 0) || !(size > least * look->force_full_scale_n))
+            continue;
+        Vec3 direction = vec3_scale(sum, 1 / size), tip = vec3_add_scaled(vec3_scale(place, 1 / weight), -radius, direction);
+        // square root: a tenth of the force is still seen
+        double long_as = longest * sqrt(fmin(size / look->force_full_scale_n, 1.5));
+        strokes_arrow(&scene->strokes, vec3_add_scaled(tip, -long_as, direction), tip, 1.1 * look->font_scale, ARROW_COLOR);
+    }
+}
+
+static void add_targets(VesselScene *scene, double line)
+{
+    for (int i = 0; i < scene->target_count; i++) {
+        const SceneTarget *target = &scene->target[i];
+        if (!vec3_is_finite(target->point) || !isfinite(target->radius))
+            continue;
+        const Vec3 axis[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+        for (int k = 0; k < 3; k++)
+            strokes_circle(&scene->strokes, target->point, axis[k], target->radius, 0.55 * line, color_with_alpha(TARGET_COLOR, 0.75));
+        strokes_circle(&scene->strokes, target->point, scene->projection.back, target->radius, 0.8 * line, TARGET_COLOR);
+    }
+}
+
+static double tool_radius(const Pose *pose) { return pose ? pose->node[pose->node_count - 1].radius : 0.2; }
+
+static void add_sheath(VesselScene *scene, const Pose *pose, double line)
+{
+    double pixel = scene->projection.mm_per_pixel, half = fmax(2.2 * tool_radius(pose) / pixel, 3.2 * line);
+    const Vec3 point[2] = {vec3_add_scaled(scene->entry, -sheath_shown_mm, scene->entry_direction), scene->entry};
+    strokes_line(&scene->strokes, point[0], point[1], half, color_with_alpha(SHEATH_COLOR, 0.5));
+    strokes_circle(&scene->strokes, scene->entry, scene->entry_direction, half * pixel, 0.9 * line, color_rgb(226, 230, 236));
+}
+
+void vessel_scene_draw(VesselScene *scene, const Pose *pose, const VesselSceneLook *look, ViewPort port)
+{
+    if (port.width < 1 || port.height < 1)
+        return;
+    if (pose && pose->node_count < 2)
+        pose = NULL;
+    scene->has_tip = pose && vec3_is_finite(pose->position[pose->node_count - 1]);
+    if (scene->has_tip)
+        scene->tip = pose->position[pose->node_count - 1];
+    LayersKey key = key_for(scene, look, port);
+    key.is_quick = is_moving(scene, &key) && !look->full_detail;
+    scene->projection = key.camera;
+    scene->layer_draws += vessel_layers_update(scene->layers, &key);
+    vessel_layers_show(scene->layers, port);
+
+    double line = look->font_scale > 0 ? look->font_scale : 1;
+    strokes_begin(&scene->strokes, &scene->projection);
+    if (look->show_targets)
+        add_targets(scene, line);
+    if (scene->has_entry)
+        add_sheath(scene, pose, line);
+    if (look->show_model && pose)
+        model_wires_add(scene->models, pose->node[pose->node_count - 1].vessel_node, &scene->strokes, line);
+    if (pose)
+        add_tool(scene, pose, look);
+    if (pose && look->show_arrows)
+        add_arrows(scene, pose, look);
+    strokes_draw(&scene->strokes, scene->layers, port);
+}
+
+// --- what was shown ---
+
+static VesselSceneLabel label_at(const VesselScene *scene, VesselSceneLabelKind kind, const char *name, Vec3 place, double radius)
+{
+    Vec3 p = camera_project(&scene->projection, place);
+    return (VesselSceneLabel){.kind = kind, .name = name, .x = p.x, .y = p.y, .radius = radius,
+                              .is_in_view = p.x >= 0 && p.y >= 0 && p.x <= scene->projection.width && p.y <= scene->projection.height};
+}
+
+int vessel_scene_labels(const VesselScene *scene, VesselSceneLabel *label, int capacity)
+{
+    int count = 0;
+    double pixel = fmax(scene->projection.mm_per_pixel, 1e-300);
+    for (int i = 0; i < scene->target_count && count < capacity; i++) {
+        const SceneTarget *target = &scene->target[i];
+        label[count] = label_at(scene, LABEL_TARGET, target->name, target->point, target->radius / pixel);
+        label[count++].distance_mm = scene->has_tip ? vec3_distance(scene->tip, target->point) : NAN;
+    }
+    if (scene->has_entry && count < capacity)
+        label[count++] = label_at(scene, LABEL_SHEATH, "sheath", scene->entry, 6);
+    if (scene->has_tip && count < capacity)
+        label[count++] = label_at(scene, LABEL_TIP, "tip", scene->tip, 6);
+    return count;
+}
+
+ScaleBar vessel_scene_scale_bar(const VesselScene *scene, double most_pixels)
+{
+    double most = most_pixels * scene->projection.mm_per_pixel;
+    if (!(most > 0))
+        return (ScaleBar){0};
+    double power = pow(10, floor(log10(most))), part = most / power;
+    double length = (part >= 5 ? 5 : part >= 2 ? 2 : 1) * power;
+    return (ScaleBar){length, length / scene->projection.mm_per_pixel};
+}
+
+const Camera *vessel_scene_projection(const VesselScene *scene) { return &scene->projection; }
+FreeCamera vessel_scene_camera(const VesselScene *scene) { return scene->has_drawn ? scene->shown : scene->home; }
+long vessel_scene_layer_draws(const VesselScene *scene) { return scene->layer_draws; }

@@ -1,0 +1,81 @@
+// The live 3D view: a translucent vessel, the tool inside it coloured by wall force, the local model that answers at the tip as a wireframe
+// (Kerrien 2017, Fig. 10), wall forces as arrows, the sheath's mouth, targets as wire spheres. Lengths mm, forces N. Needs a current GL context (3.3
+// core), always the same one; all calls from that context's thread.
+//
+// Drawing: the walls nearest to the eye, outer and inner faces, are two layers kept as textures and redrawn only when camera, view size or section
+// plane change; a frame shows their composition, and whatever moves is drawn over it seen through the outer faces' layer, or, where it lies behind a
+// further vessel, through that too. While they change from frame to frame the layers come from a coarser mesh where one was given, without smooth edges; the
+// first frame that stands still has all of it.
+#ifndef SELDINGER_RENDER_VESSEL_SCENE_H
+#define SELDINGER_RENDER_VESSEL_SCENE_H
+
+#include "geom/isosurface.h"
+#include "render/color_map.h"
+#include "render/vessel_scene_camera.h"
+#include "render/view_port.h"
+#include "sim/pose.h"
+
+typedef struct VesselScene VesselScene;
+
+typedef struct VesselSceneOptions {    // all borrowed: must outlive the scene, save the meshes, which are copied
+    const TriangleMesh *vessel;        // NULL: none (rigs, free wires)
+    const TriangleMesh *coarse;        // of the same surface, for while the camera turns; NULL: `vessel`
+    const VesselTree *tree;            // NULL, or without model: no wireframe at the tip
+    int target_count;
+    const SceneTarget *target;         // (target_count)
+    bool has_entry;                    // a sheath …
+    Vec3 entry, entry_direction;       // … its mouth, and the unit direction into the vessel
+    int frame_count;                   // further points that the first view must hold, …
+    const Vec3 *frame;                 // (frame_count) a free wire's nodes where there is no vessel; read by create alone
+} VesselSceneOptions;
+
+typedef struct VesselSceneLook {
+    FreeCamera camera;
+    bool show_model;                   // the local model at the tip
+    bool show_arrows;                  // wall forces
+    bool show_targets;
+    bool section;                      // a plane takes away all of the vessel that lies on its normal's side
+    bool section_at_tip;               // the plane goes through the tip, else through the scene's middle …
+    double section_offset_mm;          // … moved this far along its normal
+    Vec3 section_normal;               // zero: towards the eye, whichever way the camera turns
+    bool follow_tip;                   // keeps the tip in the view's middle third, whatever camera.focus says
+    bool full_detail;                  // never the coarser mesh: for pictures and films off screen
+    double force_full_scale_n;         // top of the colour map, and the force of an arrow of full length
+    double font_scale;                 // of lines, 1 for 96 dpi
+} VesselSceneLook;
+// Camera: the scene as a whole, face on; model, arrows and targets shown; 0.5 N; no section.
+VesselSceneLook vessel_scene_default_look(const VesselScene *scene);
+
+// NULL with a reason: mesh with indices out of range or numbers that are not finite, memory, a driver that compiles no shader.
+VesselScene *vessel_scene_create(const VesselSceneOptions *options, char *message, size_t capacity);
+void vessel_scene_destroy(VesselScene *scene);
+// Draws all of the port's rectangle. `pose` NULL: no tool. Nodes that are not finite numbers are left out.
+void vessel_scene_draw(VesselScene *scene, const Pose *pose, const VesselSceneLook *look, ViewPort port);
+
+// --- what the last draw showed, for labels and legends; pixels from the view's upper left corner, x right, y down ---
+typedef enum { LABEL_TARGET, LABEL_SHEATH, LABEL_TIP } VesselSceneLabelKind;
+typedef struct VesselSceneLabel {
+    VesselSceneLabelKind kind;
+    const char *name;                  // target's name, "sheath", "tip"
+    double x, y;                       // of its centre
+    double radius;                     // [pixel] of what is drawn there: a label begins outside
+    bool is_in_view;
+    double distance_mm;                // LABEL_TARGET: from the tip; else 0. NaN where there is no tip
+} VesselSceneLabel;
+// Fills at most `capacity`, returns how many there are.
+int vessel_scene_labels(const VesselScene *scene, VesselSceneLabel *label, int capacity);
+// A bar of a round length (1, 2, 5 times a power of ten) not longer than `most_pixels`.
+typedef struct ScaleBar {
+    double length_mm, pixels;
+} ScaleBar;
+ScaleBar vessel_scene_scale_bar(const VesselScene *scene, double most_pixels);
+// Colour of a wall force: grey where there is none, then the sequential map from purple to yellow; full scale and above are yellow.
+Color vessel_scene_force_color(double force_n, double full_scale_n);
+// The projection and the camera that were used (with follow_tip the focus that was found): where a point is seen, and where to go on from when
+// following ends.
+const Camera *vessel_scene_projection(const VesselScene *scene);
+FreeCamera vessel_scene_camera(const VesselScene *scene);
+// Draws so far that had to redraw the layers.
+long vessel_scene_layer_draws(const VesselScene *scene);
+
+#endif

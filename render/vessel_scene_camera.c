@@ -1,0 +1,91 @@
+// The projection's axes are the rows of the turn's matrix: right = q x q*, up = q y q*, back = q z q*.
+#include "render/vessel_scene_camera.h"
+
+static const double turn_per_pixel = 0.4 * PI / 180, zoom_per_notch = 1.15, extent_least = 1 / 400.0, extent_most = 20;
+
+static Vec3 right_of(const FreeCamera *camera) { return quat_rotate(camera->turn, vec3(1, 0, 0)); }
+static Vec3 up_of(const FreeCamera *camera) { return quat_rotate(camera->turn, vec3(0, 1, 0)); }
+static Vec3 back_of(const FreeCamera *camera) { return quat_rotate(camera->turn, vec3(0, 0, 1)); }
+
+static Quat turn_of(Vec3 right, Vec3 up, Vec3 back)
+{
+    Mat3 axes = mat3_from_columns(right, up, back);
+    return quat_from_mat3(&axes);
+}
+
+static double mm_per_pixel(const FreeCamera *camera, int width, int height)
+{
+    int shorter = width < height ? width : height;
+    return camera->extent_mm / (shorter > 1 ? shorter : 1);
+}
+
+FreeCamera free_camera_framing(int count, const Vec3 *point)
+{
+    Camera camera = {0};
+    camera_orient(&camera, vec3(0, 0, 0), vec3(0, 0, 0), count, point);
+    const int side = 1000;
+    camera_frame(&camera, side, side, 0.06 * side, count, point, count > 0 ? 0 : 10);
+    FreeCamera home = {.home_focus = camera.center,
+                       .home_turn = turn_of(camera.right, camera.up, camera.back),
+                       .home_extent_mm = fmax(camera.mm_per_pixel * side, 1e-3)};
+    free_camera_reset(&home);
+    return home;
+}
+
+// By the left: about an axis of space.
+static void turn_about(FreeCamera *camera, Vec3 axis, double angle)
+{
+    camera->turn = quat_unit(quat_mul(quat_from_rotation_vector(vec3_scale(axis, angle)), camera->turn));
+}
+
+void free_camera_orbit(FreeCamera *camera, double dx, double dy)
+{
+    Vec3 right = right_of(camera), up = up_of(camera);
+    // the scene's turn would be about +up and +right: the camera's is the opposite
+    turn_about(camera, vec3_add(vec3_scale(up, dx), vec3_scale(right, dy)), -turn_per_pixel);
+}
+
+void free_camera_roll(FreeCamera *camera, double angle) { turn_about(camera, back_of(camera), -angle); }
+
+void free_camera_pan(FreeCamera *camera, double dx, double dy, int width, int height)
+{
+    double scale = mm_per_pixel(camera, width, height);
+    camera->focus = vec3_add_scaled(vec3_add_scaled(camera->focus, -dx * scale, right_of(camera)), dy * scale, up_of(camera));
+}
+
+void free_camera_zoom(FreeCamera *camera, double notch, double x, double y, int width, int height)
+{
+    double extent = camera->extent_mm * pow(zoom_per_notch, -notch), home = camera->home_extent_mm;
+    extent = fmin(fmax(extent, home * extent_least), home * extent_most);
+    double before = mm_per_pixel(camera, width, height), away = x - width / 2.0, below = y - height / 2.0;
+    camera->extent_mm = extent;
+    double moved = before - mm_per_pixel(camera, width, height);
+    camera->focus = vec3_add_scaled(vec3_add_scaled(camera->focus, away * moved, right_of(camera)), -below * moved, up_of(camera));
+}
+
+void free_camera_reset(FreeCamera *camera)
+{
+    camera->focus = camera->home_focus;
+    camera->turn = camera->home_turn;
+    camera->extent_mm = camera->home_extent_mm;
+}
+
+void free_camera_look_from(FreeCamera *camera, LookFrom from)
+{
+    static const struct {
+        Vec3 view, up;
+    } side[] = {[LOOK_FRONT] = {{0, 1, 0}, {0, 0, 1}}, [LOOK_BACK] = {{0, -1, 0}, {0, 0, 1}}, [LOOK_RIGHT] = {{1, 0, 0}, {0, 0, 1}},
+                [LOOK_LEFT] = {{-1, 0, 0}, {0, 0, 1}}, [LOOK_TOP] = {{0, 0, -1}, {0, -1, 0}}, [LOOK_BOTTOM] = {{0, 0, 1}, {0, -1, 0}}};
+    if (from == LOOK_FACE_ON) {
+        camera->turn = camera->home_turn;
+        return;
+    }
+    Vec3 back = vec3_negate(side[from].view), up = side[from].up;
+    camera->turn = turn_of(vec3_cross(up, back), up, back);
+}
+
+Camera free_camera_projection(const FreeCamera *camera, int width, int height, double depth)
+{
+    return (Camera){.right = right_of(camera), .up = up_of(camera), .back = back_of(camera), .center = camera->focus,
+                    .mm_per_pixel = mm_per_pixel(camera, width, height), .near_depth = depth, .far_depth = -depth, .width = width, .height = height};
+}

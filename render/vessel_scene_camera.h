@@ -1,0 +1,43 @@
+// The camera of the live 3D view: a parallel projection that orbits, pans and zooms by mouse movements. Plain data without OpenGL; lengths mm, the
+// frame is the model's (LPS: +x to the patient's left, +y to the back, +z to the head).
+#ifndef SELDINGER_RENDER_VESSEL_SCENE_CAMERA_H
+#define SELDINGER_RENDER_VESSEL_SCENE_CAMERA_H
+
+#include "render/camera.h"
+
+typedef struct FreeCamera {
+    Vec3 focus;                // lands in the middle of the view, and the view orbits around it
+    Quat turn;                 // takes x, y, z to the directions right, up and towards the eye
+    double extent_mm;          // seen across the shorter side of the view, > 0
+    Vec3 home_focus;           // what free_camera_reset goes back to
+    Quat home_turn;
+    double home_extent_mm;
+} FreeCamera;
+
+typedef enum {
+    LOOK_FACE_ON,              // as at the start: along the axis in which the scene is thinnest
+    LOOK_FRONT,                // from the patient's front (along +y), head up
+    LOOK_BACK,
+    LOOK_RIGHT,                // from the patient's right (along +x), head up
+    LOOK_LEFT,
+    LOOK_TOP,                  // from the head (along -z), front up
+    LOOK_BOTTOM,
+} LookFrom;
+
+// Frames a box of points, seen face on. Fewer than one point: a ball of 10 mm around the origin.
+FreeCamera free_camera_framing(int count, const Vec3 *point);
+// The view's near side follows the mouse by 0.4 degrees a pixel; dx right, dy down [pixel].
+void free_camera_orbit(FreeCamera *camera, double dx, double dy);
+// Turns the picture counter-clockwise [rad].
+void free_camera_roll(FreeCamera *camera, double angle);
+// What is under the mouse stays under it. width, height of the view [pixel].
+void free_camera_pan(FreeCamera *camera, double dx, double dy, int width, int height);
+// Nearer by a factor of 1.15 for each `notch` > 0 of the wheel; what lies at (x, y), from the view's upper left corner, stays where it is.
+// The extent stays within 1/400 and 20 of home's.
+void free_camera_zoom(FreeCamera *camera, double notch, double x, double y, int width, int height);
+void free_camera_reset(FreeCamera *camera);
+void free_camera_look_from(FreeCamera *camera, LookFrom from);   // focus and extent stay
+// The projection for a view of width x height; depths that are drawn reach `depth` mm before and behind the focus.
+Camera free_camera_projection(const FreeCamera *camera, int width, int height, double depth);
+
+#endif

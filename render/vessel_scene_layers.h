@@ -1,0 +1,39 @@
+// The vessel's walls as two cached pictures with depth: the outer faces and the inner faces nearest to the eye. Inside the live 3D view only.
+#ifndef SELDINGER_RENDER_VESSEL_SCENE_LAYERS_H
+#define SELDINGER_RENDER_VESSEL_SCENE_LAYERS_H
+
+#include "geom/isosurface.h"
+#include "render/camera.h"
+#include "render/view_port.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+typedef struct VesselLayers VesselLayers;
+
+typedef struct LayersKey {     // what the pictures depend on
+    Camera camera;
+    bool is_quick;             // the coarser mesh where there is one, no smooth edges
+    bool has_section;
+    Vec3 section_normal;       // unit; walls with normal . x > offset are left out
+    double section_offset;
+} LayersKey;
+
+// Apart from is_quick.
+bool layers_key_same(const LayersKey *a, const LayersKey *b);
+
+enum { LAYER_FRONT, LAYER_BACK, LAYER_COUNT };
+
+// Either mesh may be NULL. NULL with a reason.
+VesselLayers *vessel_layers_create(const TriangleMesh *fine, const TriangleMesh *coarse, char *message, size_t capacity);
+void vessel_layers_destroy(VesselLayers *layers);
+// Redraws where the key differs from the last one's; true if so.
+bool vessel_layers_update(VesselLayers *layers, const LayersKey *key);
+// Background and both layers into the port, whose size is the key's camera's.
+void vessel_layers_show(const VesselLayers *layers, ViewPort port);
+// Binds front colour, front depth, back colour and back depth to texture units 0 to 3. Colours are premultiplied.
+void vessel_layers_bind(const VesselLayers *layers);
+
+extern const float vessel_scene_background[3];
+
+#endif

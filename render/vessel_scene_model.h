@@ -1,0 +1,16 @@
+// Local models as wireframes, meshed when they are first asked for and kept for the last few nodes. Inside the live 3D view only.
+#ifndef SELDINGER_RENDER_VESSEL_SCENE_MODEL_H
+#define SELDINGER_RENDER_VESSEL_SCENE_MODEL_H
+
+#include "geom/vessel_tree.h"
+#include "render/vessel_scene_strokes.h"
+
+typedef struct ModelWires ModelWires;
+
+// Borrows the tree; NULL or one without model: there never is a wireframe. NULL where memory lacks.
+ModelWires *model_wires_create(const VesselTree *tree);
+void model_wires_free(ModelWires *models);
+// The surface of the node's own model; nothing where there is no such node. Lines on the far side are fainter.
+void model_wires_add(ModelWires *models, int node, Strokes *strokes, double line);
+
+#endif
