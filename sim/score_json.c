@@ -1,26 +1,57 @@
-#include "sim/score.h"
+#include "sim/score_json.h"
 
-#include <cjson/cJSON.h>
+#include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
+#include <string.h>
+
+// The plain numbers of ScoreFigures, with what they may be.
+static const struct Figure {
+    const char *name;
+    size_t offset;
+    double most;                 // from 0
+} figure_table[] = {
+#define FIGURE(name, most) {#name, offsetof(ScoreFigures, name), most}
+    FIGURE(points, 100),
+    FIGURE(start_s, 1e7),
+    FIGURE(time_s, 1e7),
+    FIGURE(fluoroscopy_s, 1e7),
+    FIGURE(dose_area_cm2, 1e15),
+    FIGURE(contrast_ml, 1e9),
+    FIGURE(path_mm, 1e12),
+    FIGURE(way_mm, 1e9),
+    FIGURE(remaining_mm, 1e9),
+    FIGURE(least_remaining_mm, 1e9),
+    FIGURE(efficiency, 1),
+    FIGURE(inserted_mm, 1e12),
+    FIGURE(withdrawn_mm, 1e12),
+    FIGURE(wall_force_peak_n, 1e12),
+    FIGURE(wall_impulse_n_s, 1e15),
+    FIGURE(tip_force_peak_n, 1e12),
+    FIGURE(target_distance_mm, 1e9),
+    FIGURE(held_s, 1e7),
+    FIGURE(reached_s, 1e7),
+#undef FIGURE
+};
+enum { FIGURES = sizeof figure_table / sizeof figure_table[0] };
+// after the numbers of the table
+static const char *const other_key[] = {"state", "has_exercise", "has_xray", "pulses", "error_total", "parts", "errors"};
+enum { OTHERS = sizeof other_key / sizeof other_key[0] };
 
 static bool add(cJSON *to, const char *name, double value) { return cJSON_AddNumberToObject(to, name, value) != NULL; }
 
-static bool add_figures(cJSON *json, const ScoreFigures *f)
+bool score_add_json(cJSON *object, const ScoreFigures *f)
 {
-    return cJSON_AddStringToObject(json, "state", score_state_name[f->state]) && add(json, "points", f->points) && add(json, "start_s", f->start_s) &&
-           add(json, "time_s", f->time_s) && add(json, "fluoroscopy_s", f->fluoroscopy_s) && add(json, "pulses", (double)f->pulses) &&
-           add(json, "dose_area_cm2", f->dose_area_cm2) && add(json, "contrast_ml", f->contrast_ml) && add(json, "path_mm", f->path_mm) &&
-           add(json, "way_mm", f->way_mm) && add(json, "least_remaining_mm", f->least_remaining_mm) && add(json, "efficiency", f->efficiency) &&
-           add(json, "inserted_mm", f->inserted_mm) && add(json, "withdrawn_mm", f->withdrawn_mm) && add(json, "wall_force_peak_n", f->wall_force_peak_n) &&
-           add(json, "wall_impulse_n_s", f->wall_impulse_n_s) && add(json, "tip_force_peak_n", f->tip_force_peak_n) &&
-           add(json, "target_distance_mm", f->target_distance_mm) && add(json, "held_s", f->held_s) && add(json, "reached_s", f->reached_s) &&
-           add(json, "error_total", f->error_total);
-}
-
-static bool add_parts(cJSON *json, const ScoreFigures *f)
-{
-    cJSON *parts = cJSON_AddObjectToObject(json, "parts"), *errors = cJSON_AddObjectToObject(json, "errors");
-    bool good = parts && errors;
+    bool good = cJSON_AddStringToObject(object, "state", score_state_name[f->state]) && cJSON_AddBoolToObject(object, "has_exercise", f->has_exercise) &&
+                cJSON_AddBoolToObject(object, "has_xray", f->has_xray);
+    for (int i = 0; good && i < FIGURES; i++) {
+        double value;
+        memcpy(&value, (const char *)f + figure_table[i].offset, sizeof value);
+        good = add(object, figure_table[i].name, value);
+    }
+    good = good && add(object, "pulses", (double)f->pulses) && add(object, "error_total", f->error_total);
+    cJSON *parts = good ? cJSON_AddObjectToObject(object, "parts") : NULL, *errors = parts ? cJSON_AddObjectToObject(object, "errors") : NULL;
+    good = good && parts && errors;
     for (int i = 0; good && i < PART_COUNT; i++)
         good = add(parts, score_part_name[i], f->part[i]);
     for (int i = 0; good && i < ERROR_COUNT; i++) {
@@ -34,10 +65,118 @@ char *score_json(const ScoreFigures *figures, const Scene *scene)
 {
     cJSON *json = cJSON_CreateObject();
     const Exercise *exercise = scene->exercise;
-    bool good = json && cJSON_AddBoolToObject(json, "has_exercise", figures->has_exercise) && cJSON_AddBoolToObject(json, "has_xray", figures->has_xray);
+    bool good = json != NULL;
     if (good && exercise)
         good = cJSON_AddStringToObject(json, "title", exercise->title) && cJSON_AddStringToObject(json, "target", scene->target[exercise->target].name);
-    char *text = good && add_figures(json, figures) && add_parts(json, figures) ? cJSON_Print(json) : NULL;
+    char *text = good && score_add_json(json, figures) ? cJSON_Print(json) : NULL;
     cJSON_Delete(json);
     return text;
+}
+
+// --- reading ---
+
+bool json_keys(const JsonReading *reading, const cJSON *object, const char *where, const char *const *keys)
+{
+    if (!cJSON_IsObject(object)) {
+        faults_add(reading->faults, reading->file, 0, 0, "'%s' is no object or is not there", where);
+        return false;
+    }
+    for (const cJSON *member = object->child; member; member = member->next) {
+        int known = 0;
+        for (int i = 0; keys[i]; i++)
+            known |= !strcmp(keys[i], member->string);
+        if (!known)
+            faults_add(reading->faults, reading->file, 0, 0, "unknown key '%.60s' in '%s'; its first is '%s'", member->string, where, keys[0]);
+        for (const cJSON *before = object->child; known && before != member; before = before->next)
+            if (!strcmp(before->string, member->string))
+                faults_add(reading->faults, reading->file, 0, 0, "'%s.%.60s' stands there twice", where, member->string);
+    }
+    return true;
+}
+
+double json_number(const JsonReading *reading, const cJSON *object, const char *where, const char *key, double least, double most)
+{
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+    if (cJSON_IsNumber(item) && item->valuedouble >= least && item->valuedouble <= most)
+        return item->valuedouble;
+    if (cJSON_IsNumber(item))
+        faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is %g; %g to %g", where, key, item->valuedouble, least, most);
+    else
+        faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is no number or is not there; %g to %g", where, key, least, most);
+    return least;
+}
+
+int64_t json_count(const JsonReading *reading, const cJSON *object, const char *where, const char *key, int64_t most)
+{
+    double number = json_number(reading, object, where, key, 0, (double)most);
+    if (number != floor(number))
+        faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is %g; a whole number", where, key, number);
+    return (int64_t)number;
+}
+
+int json_choice(const JsonReading *reading, const cJSON *object, const char *where, const char *key, const char *const *names)
+{
+    const char *text = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(object, key));
+    for (int i = 0; text && names[i]; i++)
+        if (!strcmp(text, names[i]))
+            return i;
+    faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is '%.60s'; '%s' or what goes with it", where, key, text ? text : "", names[0]);
+    return 0;
+}
+
+void json_text(const JsonReading *reading, const cJSON *object, const char *where, const char *key, size_t capacity, char *text)
+{
+    const char *value = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(object, key));
+    text[0] = 0;
+    if (value && strlen(value) < capacity)
+        strcpy(text, value);
+    else
+        faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is no text, is not there or has more than %zu bytes", where, key, capacity - 1);
+}
+
+static bool read_flag(const JsonReading *reading, const cJSON *object, const char *key)
+{
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+    if (!cJSON_IsBool(item))
+        faults_add(reading->faults, reading->file, 0, 0, "'score.%s' is neither true nor false", key);
+    return cJSON_IsTrue(item);
+}
+
+void score_read_json(const JsonReading *reading, const cJSON *object, ScoreFigures *f)
+{
+    static const char *const error_key[] = {"count", "last_s", NULL};
+    const char *keys[FIGURES + OTHERS + 1] = {0};
+    for (int i = 0; i < FIGURES; i++)
+        keys[i] = figure_table[i].name;
+    for (int i = 0; i < OTHERS; i++)
+        keys[FIGURES + i] = other_key[i];
+    *f = (ScoreFigures){.tip_node = -1};
+    if (!json_keys(reading, object, "score", keys))
+        return;
+    for (int i = 0; i < FIGURES; i++) {
+        double value = json_number(reading, object, "score", figure_table[i].name, 0, figure_table[i].most);
+        memcpy((char *)f + figure_table[i].offset, &value, sizeof value);
+    }
+    f->state = (ScoreState)json_choice(reading, object, "score", "state", score_state_name);
+    f->has_exercise = read_flag(reading, object, "has_exercise");
+    f->has_xray = read_flag(reading, object, "has_xray");
+    f->pulses = json_count(reading, object, "score", "pulses", INT64_C(1) << 50);
+    f->error_total = (int)json_count(reading, object, "score", "error_total", INT32_MAX);
+    const cJSON *parts = cJSON_GetObjectItemCaseSensitive(object, "parts"), *errors = cJSON_GetObjectItemCaseSensitive(object, "errors");
+    if (json_keys(reading, parts, "score.parts", score_part_name))
+        for (int i = 0; i < PART_COUNT; i++)
+            f->part[i] = json_number(reading, parts, "score.parts", score_part_name[i], 0, 1);
+    int64_t sum = 0;
+    if (!json_keys(reading, errors, "score.errors", score_error_name))
+        return;
+    for (int i = 0; i < ERROR_COUNT; i++) {
+        const cJSON *error = cJSON_GetObjectItemCaseSensitive(errors, score_error_name[i]);
+        if (!json_keys(reading, error, score_error_name[i], error_key))
+            continue;
+        f->error[i].count = (int)json_count(reading, error, score_error_name[i], "count", INT32_MAX);
+        f->error[i].last_s = json_number(reading, error, score_error_name[i], "last_s", 0, 1e7);
+        sum += f->error[i].count;
+    }
+    if (sum != f->error_total)
+        faults_add(reading->faults, reading->file, 0, 0, "'score.error_total' is %d; the errors' counts make %lld", f->error_total, (long long)sum);
 }

@@ -1,0 +1,28 @@
+// A score's figures to and from JSON: one table for both.
+#ifndef SELDINGER_SIM_SCORE_JSON_H
+#define SELDINGER_SIM_SCORE_JSON_H
+
+#include "sim/score.h"
+
+#include <cJSON.h>
+
+// Adds all figures to an object; false where memory lacks.
+bool score_add_json(cJSON *object, const ScoreFigures *figures);
+
+// Reads an object by its keys; everything wrong becomes a fault of `file`.
+typedef struct JsonReading {
+    const char *file;
+    Faults *faults;
+} JsonReading;
+void score_read_json(const JsonReading *reading, const cJSON *object, ScoreFigures *figures);
+
+// The members of `object`, called `where`, must be `keys` (NULL-terminated), each once. NULL or no object: a fault. False where it is none.
+bool json_keys(const JsonReading *reading, const cJSON *object, const char *where, const char *const *keys);
+double json_number(const JsonReading *reading, const cJSON *object, const char *where, const char *key, double least, double most);
+int64_t json_count(const JsonReading *reading, const cJSON *object, const char *where, const char *key, int64_t most);
+// Index in `names` (NULL-terminated); 0 with a fault.
+int json_choice(const JsonReading *reading, const cJSON *object, const char *where, const char *key, const char *const *names);
+// Copies at most `capacity` bytes with the NUL; a longer text is a fault.
+void json_text(const JsonReading *reading, const cJSON *object, const char *where, const char *key, size_t capacity, char *text);
+
+#endif

@@ -1,0 +1,53 @@
+// A trainee's session as a JSON file beside its recording: who, when, with what, the score, the errors with their times, and what proves that the
+// recording is the session's (digest of its time series, hash of its last state). Keys are those of the struct, times simulated seconds:
+//
+//   {"seldinger_session": 1, "trainee": "", "date": "2025-11-21T22:05:00Z", "device": "", "version": "",
+//    "scene": {"path": "", "sha256": "", "title": "", "target": ""},
+//    "recording": {"path": "", "steps": 0, "step_ms": 1, "series_sha256": "", "state_hash": ""},
+//    "score": {figures of score.h, "parts": {}, "errors": {"wrong_branch": {"count": 0, "last_s": 0}, …}},
+//    "events": [{"kind": "wrong_branch", "time_s": 0}]}
+#ifndef SELDINGER_SIM_SESSION_H
+#define SELDINGER_SIM_SESSION_H
+
+#include "sim/recording.h"
+#include "sim/score.h"
+
+#include <time.h>
+
+enum { SESSION_NAME = 96, SESSION_PATH = 1024, SESSION_BYTES_MOST = 1 << 20 };
+
+typedef struct Session {
+    char trainee[SESSION_NAME], device[SESSION_NAME];
+    char date[24];               // UTC, as above
+    char version[SESSION_NAME];  // of the program
+    char scene_path[SESSION_PATH], scene_sha256[65];     // of its text
+    char title[EXERCISE_TITLE], target[64];              // "" without exercise
+    char recording_path[SESSION_PATH];                   // as seen from the session's folder
+    int64_t steps;
+    double step_ms;
+    char series_sha256[65];      // of time, command, X-ray controls and state hash of all steps
+    uint64_t state_hash;         // of the last step
+    ScoreFigures figures;        // those that are written; what goes on at the moment is 0
+    int event_count;
+    ScoreEvent event[SCORE_EVENTS_MOST];
+} Session;
+
+// Who, when and where. Texts are cut to their room at a whole UTF-8 character.
+void session_begin(Session *session, const Scene *scene, const char *trainee, const char *device, time_t when);
+void session_set_score(Session *session, const Score *score);
+// What the recording holds, read back after it was closed; `path` as it shall stand in the file.
+void session_set_run(Session *session, const RecordedRun *run, const char *path);
+// Whether `run` is the session's: its digest.
+bool session_is_of(const Session *session, const RecordedRun *run);
+// The file's text, to be written beside and renamed (cli/output.h); the caller frees. NULL where memory lacks.
+char *session_json(const Session *session);
+
+// `text` need not be NUL-terminated. False with all faults at once: no JSON, bytes after it, unknown, repeated or lacking keys, wrong types and ranges;
+// the session is then untouched.
+bool session_parse(const char *text, size_t length, const char *path, Session *session, Faults *faults);
+bool session_load(const char *path, Session *session, Faults *faults);
+// The sessions in a folder, oldest first, that have this trainee and title (the same exercise). Other files are passed over; sessions that cannot be read are
+// counted in *broken. The caller frees. NULL with a fault where the folder cannot be read or memory lacks.
+Session *session_list(const char *folder, const char *trainee, const char *title, int *count, int *broken, Faults *faults);
+
+#endif
