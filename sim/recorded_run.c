@@ -107,16 +107,34 @@ static double read_step_ms(hid_t file)
 
 static int64_t least(int64_t a, hsize_t b) { return (hsize_t)a < b ? a : (int64_t)b; }
 
-static void read_run(const Reader *reader, RecordedRun *run)
+// What every step has.
+static int64_t read_series(const Reader *reader, RecordedRun *run)
 {
-    int before = reader->faults->count;
-    hsize_t time[1] = {0}, command[2] = {0, 2}, proximal[2] = {0, 2}, hash[1] = {0}, step[1] = {0}, position[3] = {0, 0, 3}, quaternion[3] = {0, 0, 4},
-            radius[1] = {0}, force[3] = {0, 0, 3}, gap[2] = {0, 0}, node[2] = {0, 0}, inserted[1] = {0}, flags[1] = {0}, wall[2] = {0, 2}, s[1] = {0},
+    hsize_t time[1] = {0}, command[2] = {0, 2}, proximal[2] = {0, 2}, hash[1] = {0}, inserted[1] = {0}, flags[1] = {0}, wall[2] = {0, 2},
             xray[2] = {0, XRAY_VALUES};
     run->time_s = read_dataset(reader, "/time_s", H5T_NATIVE_DOUBLE, 1, time);
     run->command = read_dataset(reader, "/command", H5T_NATIVE_DOUBLE, 2, command);
     run->proximal = read_dataset(reader, "/proximal", H5T_NATIVE_DOUBLE, 2, proximal);
     run->state_hash = read_dataset(reader, "/state_hash", H5T_NATIVE_UINT64, 1, hash);
+    run->inserted = read_dataset(reader, "/inserted_mm", H5T_NATIVE_DOUBLE, 1, inserted);
+    run->flags = read_dataset(reader, "/report/flags", H5T_NATIVE_UINT32, 1, flags);
+    run->wall_force = read_dataset(reader, "/report/wall_force_n", H5T_NATIVE_DOUBLE, 2, wall);
+    bool was_seen = H5Lexists(reader->file, "/xray", H5P_DEFAULT) > 0;   // not in recordings of before the trainer
+    run->xray = was_seen ? read_dataset(reader, "/xray", H5T_NATIVE_FLOAT, 2, xray) : NULL;
+    int64_t count = least(least(least(least(least(least((int64_t)time[0], command[0]), proximal[0]), hash[0]), inserted[0]), flags[0]), wall[0]);
+    return run->xray ? least(count, xray[0]) : count;
+}
+
+static void read_run(const Reader *reader, RecordedRun *run, bool with_frames)
+{
+    int before = reader->faults->count;
+    hsize_t step[1] = {0}, position[3] = {0, 0, 3}, quaternion[3] = {0, 0, 4}, radius[1] = {0}, force[3] = {0, 0, 3}, gap[2] = {0, 0},
+            node[2] = {0, 0}, s[1] = {0};
+    int64_t step_count = read_series(reader, run);
+    if (reader->faults->count == before)
+        run->step_count = step_count;
+    if (reader->faults->count > before || !with_frames)
+        return;
     run->frame_step = read_dataset(reader, "/wire/step", H5T_NATIVE_INT64, 1, step);
     run->position = read_dataset(reader, "/wire/position", H5T_NATIVE_DOUBLE, 3, position);
     quaternion[1] = position[1];
@@ -126,12 +144,7 @@ static void read_run(const Reader *reader, RecordedRun *run)
     run->force = read_dataset(reader, "/contact/force_n", H5T_NATIVE_FLOAT, 3, force);
     run->gap = read_dataset(reader, "/contact/gap_mm", H5T_NATIVE_FLOAT, 2, gap);
     run->vessel_node = read_dataset(reader, "/contact/vessel_node", H5T_NATIVE_INT32, 2, node);
-    run->inserted = read_dataset(reader, "/inserted_mm", H5T_NATIVE_DOUBLE, 1, inserted);
-    run->flags = read_dataset(reader, "/report/flags", H5T_NATIVE_UINT32, 1, flags);
-    run->wall_force = read_dataset(reader, "/report/wall_force_n", H5T_NATIVE_DOUBLE, 2, wall);
     run->s = read_dataset(reader, "/wire/s_mm", H5T_NATIVE_DOUBLE, 1, s);
-    bool was_seen = H5Lexists(reader->file, "/xray", H5P_DEFAULT) > 0;   // not in recordings of before the trainer
-    run->xray = was_seen ? read_dataset(reader, "/xray", H5T_NATIVE_FLOAT, 2, xray) : NULL;
     if (reader->faults->count > before)
         return;
     if (position[1] < 2 || position[1] > 100000 || radius[0] != position[1] || s[0] != position[1]) {
@@ -140,9 +153,6 @@ static void read_run(const Reader *reader, RecordedRun *run)
         return;
     }
     run->node_count = (int)position[1];
-    run->step_count = least(least(least(least(least(least((int64_t)time[0], command[0]), proximal[0]), hash[0]), inserted[0]), flags[0]), wall[0]);
-    if (run->xray)
-        run->step_count = least(run->step_count, xray[0]);
     run->frame_count = least(least(least(least(least((int64_t)step[0], position[0]), quaternion[0]), force[0]), gap[0]), node[0]);
     while (run->frame_count > 0 && run->frame_step[run->frame_count - 1] >= run->step_count)
         run->frame_count--;
@@ -163,7 +173,7 @@ static ContactKind contact_of(char *name)
     return (ContactKind)kind;
 }
 
-RecordedRun *recorded_run_load(const char *path, Faults *faults)
+static RecordedRun *load(const char *path, bool with_frames, Faults *faults)
 {
     int before = faults->count;
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
@@ -182,7 +192,7 @@ RecordedRun *recorded_run_load(const char *path, Faults *faults)
     }
     RecordedRun *run = calloc(1, sizeof *run);
     if (run) {
-        read_run(&reader, run);
+        read_run(&reader, run, with_frames);
         run->scene_text = read_scene_text(reader.file);
         run->scene_path = read_scene_attribute(reader.file, "path");
         run->files = read_scene_attribute(reader.file, "files");
@@ -199,6 +209,9 @@ RecordedRun *recorded_run_load(const char *path, Faults *faults)
     }
     return run;
 }
+
+RecordedRun *recorded_run_load(const char *path, Faults *faults) { return load(path, true, faults); }
+RecordedRun *recorded_run_load_series(const char *path, Faults *faults) { return load(path, false, faults); }
 
 void recorded_run_free(RecordedRun *run)
 {

@@ -5,15 +5,18 @@ static const double DIAMETERS = 5;           // of the lumen, in l
 
 void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, double lumen_radius, double inserted)
 {
-    double thickest = 0;
+    double thickest = 0, straight = 0;
     for (int i = 0; i < wire->section_count; i++)
         thickest = fmax(thickest, wire->section[i].diameter);
+    for (int i = 0; i < wire->section_count && wire->section[i].rest_curvature == 0; i++)
+        straight += wire->section[i].length;
     *sheath = (ScoreSheath){.is_judged = wire->has_sheath && lumen_radius > 0 && isfinite(lumen_radius),
                             .mouth = wire->start,
                             .direction = vec3_unit(wire->direction),
                             .lumen_radius = lumen_radius,
                             .clearance = fmax(lumen_radius - thickest / 2, 0),
                             .reach = DIAMETERS * 2 * lumen_radius,
+                            .straight = straight,
                             .last_inserted = inserted};
 }
 
@@ -38,8 +41,11 @@ double score_sheath_step(ScoreSheath *sheath, const WireState *state, const doub
     sheath->last_inserted = state->inserted;
     if (!sheath->is_judged || state->inserted <= 0)
         return fed;
-    double beyond = fmin(sheath->reach, state->inserted), end = s[state->node_count - 1];
-    int i = element_at(s, state->node_count, end - state->inserted + beyond, &part);
+    // a tip that is curved at rest moves across itself as it is dragged along a wall: it says nothing
+    double hidden = s[state->node_count - 1] - state->inserted, at = fmin(hidden + sheath->reach, sheath->straight);
+    if (at <= hidden)
+        return fed;
+    int i = element_at(s, state->node_count, at, &part);
     Vec3 along = vec3_unit(vec3_sub(state->position[i + 1], state->position[i])), speed = vec3_mix(state->velocity[i], state->velocity[i + 1], part);
     double moved = vec3_dot(speed, along) * dt, fades = fmin(fabs(fed) / (2 * sheath->reach), 1);
     sheath->lost = fmax(sheath->lost * (1 - fades) + fed - moved, 0);

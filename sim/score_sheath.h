@@ -10,6 +10,7 @@ typedef struct ScoreSheath {
     Vec3 mouth, direction;
     double lumen_radius, clearance;      // [mm]
     double reach;                // [mm] l, 5 lumen diameters
+    double straight;             // [mm] arc length up to which the tool is straight at rest
     double lost;                 // [mm] >= 0
     double turn;                 // [rad] by which the tool turns over l, seen while it slides
     double last_inserted;        // [mm]

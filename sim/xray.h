@@ -14,7 +14,7 @@ typedef struct XrayControl {
     float contrast_ml_s;     // contrast agent that flows now
     float mode;              // XrayMode
     float mask;              // counts the masks taken for DSA and roadmap: a change takes one
-    float reserved;          // 0
+    float bookmark;          // counts the bookmarks: a change marks the moment
 } XrayControl;
 
 enum { XRAY_VALUES = sizeof(XrayControl) / sizeof(float) };
