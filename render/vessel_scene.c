@@ -80,7 +80,7 @@ static bool frame_everything(VesselScene *scene, const VesselSceneOptions *optio
     int count = gather_points(options, point);
     scene->home = free_camera_framing(count, point);
     scene->center = scene->home.focus;
-    scene->reach = scene->home.extent_mm;
+    scene->reach = hypot(scene->home.width_mm, scene->home.height_mm) / 2;
     for (int i = 0; i < count; i++)
         scene->reach = fmax(scene->reach, vec3_distance(point[i], scene->center));
     free(point);
@@ -132,13 +132,15 @@ VesselSceneLook vessel_scene_default_look(const VesselScene *scene)
 // --- camera ---
 
 // The focus stays while the tip is in the view's middle third and glides to it once it leaves: walls are redrawn only then.
-static void follow(VesselScene *scene, FreeCamera *camera)
+static void follow(VesselScene *scene, FreeCamera *camera, ViewPort port)
 {
     if (!scene->is_following)
         scene->anchor = scene->tip;
     scene->is_following = true;
-    Vec3 away = vec3_sub(scene->tip, scene->anchor), back = quat_rotate(camera->turn, vec3(0, 0, 1));
-    double off = vec3_norm(vec3_add_scaled(away, -vec3_dot(away, back), back)) / camera->extent_mm;
+    Vec3 away = vec3_sub(scene->tip, scene->anchor);
+    Camera view = free_camera_projection(camera, port.width, port.height, 1);
+    double shorter = view.mm_per_pixel * (port.width < port.height ? port.width : port.height);
+    double off = vec3_norm(vec3_add_scaled(away, -vec3_dot(away, view.back), view.back)) / shorter;
     scene->is_gliding = off > (scene->is_gliding ? 0.02 : 1 / 6.0);
     if (scene->is_gliding)
         scene->anchor = off > 1 ? scene->tip : vec3_add_scaled(scene->anchor, 0.25, away);
@@ -149,7 +151,7 @@ static LayersKey key_for(VesselScene *scene, const VesselSceneLook *look, ViewPo
 {
     FreeCamera camera = look->camera;
     if (look->follow_tip && scene->has_tip)
-        follow(scene, &camera);
+        follow(scene, &camera, port);
     else
         scene->is_following = scene->is_gliding = false;
     scene->shown = camera;

@@ -15,21 +15,40 @@ static Quat turn_of(Vec3 right, Vec3 up, Vec3 back)
 
 static double mm_per_pixel(const FreeCamera *camera, int width, int height)
 {
-    int shorter = width < height ? width : height;
-    return camera->extent_mm / (shorter > 1 ? shorter : 1);
+    return fmax(camera->width_mm / (width > 1 ? width : 1), camera->height_mm / (height > 1 ? height : 1));
+}
+
+static const double margin = 1.10;   // of what is framed
+
+// The rectangle around the points as the camera is turned.
+static void frame_points(FreeCamera *camera, int count, const Vec3 *point)
+{
+    Camera view = {.right = right_of(camera), .up = up_of(camera), .back = back_of(camera)};
+    // a view of one by one pixel, far too wide or too high, gives the other extent: both are asked for
+    const int side = 1000000;
+    camera_frame(&view, 1, side, 0, count, point, count > 0 ? 0 : 10);
+    camera->width_mm = fmax(margin * view.mm_per_pixel, 1e-3);
+    camera_frame(&view, side, 1, 0, count, point, count > 0 ? 0 : 10);
+    camera->height_mm = fmax(margin * view.mm_per_pixel, 1e-3);
+    camera->focus = view.center;
 }
 
 FreeCamera free_camera_framing(int count, const Vec3 *point)
 {
-    Camera camera = {0};
-    camera_orient(&camera, vec3(0, 0, 0), vec3(0, 0, 0), count, point);
-    const int side = 1000;
-    camera_frame(&camera, side, side, 0.06 * side, count, point, count > 0 ? 0 : 10);
-    FreeCamera home = {.home_focus = camera.center,
-                       .home_turn = turn_of(camera.right, camera.up, camera.back),
-                       .home_extent_mm = fmax(camera.mm_per_pixel * side, 1e-3)};
-    free_camera_reset(&home);
-    return home;
+    Camera view = {0};
+    camera_orient(&view, vec3(0, 0, 0), vec3(0, 0, 0), count, point);
+    FreeCamera camera = {.turn = turn_of(view.right, view.up, view.back), .low = {-10, -10, -10}, .high = {10, 10, 10}};
+    for (int i = 0; i < count; i++) {
+        Vec3 p = point[i], low = i ? camera.low : p, high = i ? camera.high : p;
+        camera.low = vec3(fmin(low.x, p.x), fmin(low.y, p.y), fmin(low.z, p.z));
+        camera.high = vec3(fmax(high.x, p.x), fmax(high.y, p.y), fmax(high.z, p.z));
+    }
+    frame_points(&camera, count, point);
+    camera.home_focus = camera.focus;
+    camera.home_turn = camera.turn;
+    camera.home_width_mm = camera.width_mm;
+    camera.home_height_mm = camera.height_mm;
+    return camera;
 }
 
 // By the left: about an axis of space.
@@ -55,10 +74,11 @@ void free_camera_pan(FreeCamera *camera, double dx, double dy, int width, int he
 
 void free_camera_zoom(FreeCamera *camera, double notch, double x, double y, int width, int height)
 {
-    double extent = camera->extent_mm * pow(zoom_per_notch, -notch), home = camera->home_extent_mm;
-    extent = fmin(fmax(extent, home * extent_least), home * extent_most);
+    double size = camera->width_mm / camera->home_width_mm, scaled = size * pow(zoom_per_notch, -notch);
+    double factor = fmin(fmax(scaled, extent_least), extent_most) / size;
     double before = mm_per_pixel(camera, width, height), away = x - width / 2.0, below = y - height / 2.0;
-    camera->extent_mm = extent;
+    camera->width_mm *= factor;
+    camera->height_mm *= factor;
     double moved = before - mm_per_pixel(camera, width, height);
     camera->focus = vec3_add_scaled(vec3_add_scaled(camera->focus, away * moved, right_of(camera)), -below * moved, up_of(camera));
 }
@@ -67,7 +87,8 @@ void free_camera_reset(FreeCamera *camera)
 {
     camera->focus = camera->home_focus;
     camera->turn = camera->home_turn;
-    camera->extent_mm = camera->home_extent_mm;
+    camera->width_mm = camera->home_width_mm;
+    camera->height_mm = camera->home_height_mm;
 }
 
 void free_camera_look_from(FreeCamera *camera, LookFrom from)
@@ -77,11 +98,14 @@ void free_camera_look_from(FreeCamera *camera, LookFrom from)
     } side[] = {[LOOK_FRONT] = {{0, 1, 0}, {0, 0, 1}}, [LOOK_BACK] = {{0, -1, 0}, {0, 0, 1}}, [LOOK_RIGHT] = {{1, 0, 0}, {0, 0, 1}},
                 [LOOK_LEFT] = {{-1, 0, 0}, {0, 0, 1}}, [LOOK_TOP] = {{0, 0, -1}, {0, -1, 0}}, [LOOK_BOTTOM] = {{0, 0, 1}, {0, -1, 0}}};
     if (from == LOOK_FACE_ON) {
-        camera->turn = camera->home_turn;
+        free_camera_reset(camera);
         return;
     }
-    Vec3 back = vec3_negate(side[from].view), up = side[from].up;
+    Vec3 back = vec3_negate(side[from].view), up = side[from].up, corner[8];
     camera->turn = turn_of(vec3_cross(up, back), up, back);
+    for (int k = 0; k < 8; k++)
+        corner[k] = vec3(k & 1 ? camera->high.x : camera->low.x, k & 2 ? camera->high.y : camera->low.y, k & 4 ? camera->high.z : camera->low.z);
+    frame_points(camera, 8, corner);
 }
 
 Camera free_camera_projection(const FreeCamera *camera, int width, int height, double depth)

@@ -8,10 +8,11 @@
 typedef struct FreeCamera {
     Vec3 focus;                // lands in the middle of the view, and the view orbits around it
     Quat turn;                 // takes x, y, z to the directions right, up and towards the eye
-    double extent_mm;          // seen across the shorter side of the view, > 0
-    Vec3 home_focus;           // what free_camera_reset goes back to
+    double width_mm, height_mm;         // a rectangle around the focus that just fits into the view, > 0
+    Vec3 low, high;            // the box of what there is to see …
+    Vec3 home_focus;           // … and the view of it that free_camera_reset goes back to
     Quat home_turn;
-    double home_extent_mm;
+    double home_width_mm, home_height_mm;
 } FreeCamera;
 
 typedef enum {
@@ -24,7 +25,7 @@ typedef enum {
     LOOK_BOTTOM,
 } LookFrom;
 
-// Frames a box of points, seen face on. Fewer than one point: a ball of 10 mm around the origin.
+// Frames the points, seen face on. Fewer than one point: a ball of 10 mm around the origin.
 FreeCamera free_camera_framing(int count, const Vec3 *point);
 // The view's near side follows the mouse by 0.4 degrees a pixel; dx right, dy down [pixel].
 void free_camera_orbit(FreeCamera *camera, double dx, double dy);
@@ -33,10 +34,10 @@ void free_camera_roll(FreeCamera *camera, double angle);
 // What is under the mouse stays under it. width, height of the view [pixel].
 void free_camera_pan(FreeCamera *camera, double dx, double dy, int width, int height);
 // Nearer by a factor of 1.15 for each `notch` > 0 of the wheel; what lies at (x, y), from the view's upper left corner, stays where it is.
-// The extent stays within 1/400 and 20 of home's.
+// A view is at least 1/400 and at most 20 times as wide as home's.
 void free_camera_zoom(FreeCamera *camera, double notch, double x, double y, int width, int height);
 void free_camera_reset(FreeCamera *camera);
-void free_camera_look_from(FreeCamera *camera, LookFrom from);   // focus and extent stay
+void free_camera_look_from(FreeCamera *camera, LookFrom from);   // at all there is to see
 // The projection for a view of width x height; depths that are drawn reach `depth` mm before and behind the focus.
 Camera free_camera_projection(const FreeCamera *camera, int width, int height, double depth);
 

@@ -56,7 +56,7 @@ static const char *const WALL_FRAGMENT =
     "  float shiny = opacity.w * pow(max(dot(toward, halfway), 0.0), 40.0);\n"
     "  float a = mix(opacity.x, opacity.y, edge);\n"
     "  float far = clamp((depth - range.x) / (range.y - range.x), 0.0, 1.0);\n"
-    "  vec3 k = mix(color * light * (1.0 + 0.35 * edge), haze, range.z * far);\n"
+    "  vec3 k = mix(color * (light + 0.34 * edge), haze, range.z * far);\n"
     "  float rim = edge_width > 0.0 ? 1.0 - smoothstep(0.0, edge_width, cut / max(fwidth(cut), 1e-9)) : 0.0;\n"
     "  a = max(a, 0.85 * rim); k = mix(k, vec3(0.98, 0.86, 0.80), 0.75 * rim);\n"
     "  result = vec4(k * a, a) + vec4(vec3(shiny * (1.0 - 0.7 * far)), shiny);\n"
@@ -231,8 +231,8 @@ typedef struct WallStyle {
 } WallStyle;
 
 static const WallStyle wall_style[LAYER_COUNT] = {
-    [LAYER_FRONT] = {GL_BACK, {0.93f, 0.50f, 0.45f}, {0.13f, 0.80f, 2.0f, 0.16f}},
-    [LAYER_BACK] = {GL_FRONT, {0.66f, 0.27f, 0.26f}, {0.55f, 0.85f, 2.0f, 0.0f}},
+    [LAYER_FRONT] = {GL_BACK, {1.00f, 0.62f, 0.56f}, {0.16f, 0.82f, 1.8f, 0.22f}},
+    [LAYER_BACK] = {GL_FRONT, {0.88f, 0.36f, 0.36f}, {0.42f, 0.85f, 1.8f, 0.0f}},
 };
 
 static void set_wall_uniforms(const VesselLayers *layers, const LayersKey *key)

@@ -20,7 +20,7 @@ struct ModelWires {
 };
 
 static const Color WIRE_COLOR = {214, 236, 255, 255};
-static const double cells_a_radius = 3.2;
+static const double cells_a_radius = 2.5;
 
 ModelWires *model_wires_create(const VesselTree *tree)
 {
@@ -62,6 +62,9 @@ void model_wires_add(ModelWires *models, int node, Strokes *strokes, double line
     if (!models->tree || node < 0 || node >= models->tree->node_count)
         return;
     const TriangleMesh *mesh = mesh_of(models, node);
+    // lines nearer to each other than a few pixels would make a white patch
+    double spacing = models->tree->radius[node] / cells_a_radius / strokes->camera.mm_per_pixel;
+    double clear = fmin(fmax(spacing / (9 * line), 0.12), 1);
     for (int t = 0; mesh && t < mesh->triangle_count; t++)
         for (int k = 0; k < 3; k++) {
             // a closed surface has each edge twice, once each way
@@ -69,6 +72,6 @@ void model_wires_add(ModelWires *models, int node, Strokes *strokes, double line
             if (a > b)
                 continue;
             double toward = vec3_dot(vec3_add(mesh->normal[a], mesh->normal[b]), strokes->camera.back) / 2;
-            strokes_line(strokes, mesh->vertex[a], mesh->vertex[b], 0.5 * line, color_with_alpha(WIRE_COLOR, toward > 0 ? 0.50 : 0.16));
+            strokes_line(strokes, mesh->vertex[a], mesh->vertex[b], 0.5 * line, color_with_alpha(WIRE_COLOR, clear * (toward > 0 ? 0.60 : 0.20)));
         }
 }
