@@ -1,0 +1,120 @@
+// Device maps: which control of which device moves the tool, and how. YAML, or built in for gamepads, joysticks and haptic devices.
+//
+//   seldinger_device: 1
+//   name: roller
+//   device: {vendor_id: 0x1209, product_id: 0x0001, serial: A1}   # any of these; or {usage: joystick}, {usage_page: 1, usage: 4},
+//                                                                 # {gamepad: true}, {joystick: "part of its name, or *"} (GLFW), {usb: ftdi, serial: A1}
+//   push:                       # one, or a list that is summed: > 0 into the patient
+//     source: Y                 # usage by name or 0x0001:0x0031; GLFW: left_y, axis_1, button_2; hat_x, hat_y; ftdi: a count's name
+//     index: 0                  # the second control of the same usage is 1
+//     mm_s: 40                  # at full deflection; or mm_per_count: 0.05 (a relative field, or a counter that wraps round)
+//     kind: deflection          # deflection, relative or counter; by default what scale and descriptor say
+//     logical_min: 0            # calibration; by default the descriptor's range and its middle
+//     logical_centre: 128
+//     logical_max: 255
+//     counts_per_wrap: 65536    # of a counter; default the logical range; 0: it never wraps
+//     dead_zone: 0.1            # part of the deflection, 0 to 0.9; default 0.05
+//     exponent: 2               # 0.2 to 5; default 1
+//     invert: true
+//     optional: true            # a device without it is good too
+//   twist: {source: X, deg_s: 180}                                 # or deg_per_count; right-handed about the direction of advance
+//   pedal: {source: button_1}   # also contrast, stop, mark; an axis with `above: 0.5` (part of full deflection); one or a list
+//   force:                      # HID PID (input/force_feedback.h)
+//     full_scale_n: 8           # what the device gives at its largest magnitude
+//     max_n: 4
+//     slew_n_s: 200
+//     full_scale_n_mm: 100      # torque on the second axis; needed for it
+//     stall_ms: 50              # zero force where the simulation stands for this long
+//     quiet_ms: 200             # … or the device says nothing for this long; 0: it may be silent
+//     invert: true              # the other way round
+//   serial: {baud: 115200, counts: [A, R], bits: 32}               # usb: ftdi (input/usb_encoder.h); bits of its counters, 0: never wrap
+//
+// A rate is full scale x deflection, where deflection = sign(d) ((|d| - dead_zone) / (1 - dead_zone))^exponent, d = (raw - centre) / (max - centre) above
+// the centre and (raw - centre) / (centre - min) below, within +-1.
+#ifndef SELDINGER_INPUT_DEVICE_MAP_H
+#define SELDINGER_INPUT_DEVICE_MAP_H
+
+#include "geom/faults.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum { MAP_AXES = 12, MAP_BUTTONS = 16, MAP_NAME = 64 };
+
+typedef enum { MAP_HID, MAP_GAMEPAD, MAP_JOYSTICK, MAP_FTDI } MapDeviceKind;
+
+typedef struct MapDevice {
+    MapDeviceKind kind;
+    int vendor_id, product_id;       // -1: any
+    uint32_t usage;                  // page << 16 | usage of an application collection; 0: any
+    char serial[MAP_NAME];           // "": any
+    char joystick[MAP_NAME];         // part of the name GLFW gives; "": any
+} MapDevice;
+
+typedef enum { SOURCE_HID_USAGE, SOURCE_HID_HAT_X, SOURCE_HID_HAT_Y, SOURCE_AXIS, SOURCE_BUTTON, SOURCE_COUNT } MapSourceKind;
+
+typedef struct MapSource {
+    MapSourceKind kind;
+    uint32_t usage;                  // SOURCE_HID_USAGE
+    int index;                       // which of that usage; number of the axis, button or count
+    bool optional;
+    int line, column;                // where it stands, 0 in built-in maps
+} MapSource;
+
+typedef enum { AXIS_BY_DESCRIPTOR, AXIS_DEFLECTION, AXIS_RELATIVE, AXIS_COUNTER } AxisKind;
+
+typedef struct MapAxis {
+    bool is_twist;                   // else push
+    MapSource source;
+    AxisKind kind;
+    bool is_rate;                    // scale is mm_s or deg_s at full deflection; else mm or deg per count
+    double scale;
+    double logical_min, logical_centre, logical_max;     // NaN: not given
+    double counts_per_wrap;          // NaN: not given
+    double dead_zone, exponent;
+    bool invert;
+} MapAxis;
+
+typedef struct MapButton {
+    unsigned bit;                    // HAND_PEDAL …
+    MapSource source;
+    double above;                    // of an axis: on where its deflection is larger
+    bool invert;
+} MapButton;
+
+typedef struct MapForce {
+    bool is_wanted;
+    double full_scale_n, max_n, slew_n_s, full_scale_n_mm;
+    double direction_deg;            // NaN: from the source of push (input/force_feedback.h)
+    int stall_ms, quiet_ms;
+    bool invert;
+} MapForce;
+
+typedef struct MapSerial {
+    int baud;
+    char count[2][16];               // names that stand before the counts in a line; order: index 0, 1
+    int count_count;
+    int bits;                        // of its counters, 0: never wrap
+} MapSerial;
+
+typedef struct DeviceMap {
+    char name[MAP_NAME], file[256];
+    MapDevice device;
+    int axis_count, button_count;
+    MapAxis axis[MAP_AXES];
+    MapButton button[MAP_BUTTONS];
+    MapForce force;
+    MapSerial serial;
+} DeviceMap;
+
+// NULL with faults (all of them, FILE:LINE:COL) where it is wrong. Free with free().
+DeviceMap *device_map_parse(const char *text, size_t length, const char *file, Faults *faults);
+DeviceMap *device_map_load(const char *path, Faults *faults);
+
+// The built-in maps: any GLFW gamepad, any GLFW joystick, HID joystick, HID gamepad, HID multi-axis controller. A haptic joystick's has force.
+typedef enum { BUILT_IN_GAMEPAD, BUILT_IN_JOYSTICK, BUILT_IN_HID_JOYSTICK, BUILT_IN_HID_GAMEPAD, BUILT_IN_HID_MULTI_AXIS, BUILT_IN_HID_HAPTIC, BUILT_IN_COUNT } BuiltInMap;
+const char *device_map_built_in_text(BuiltInMap which);
+DeviceMap *device_map_built_in(BuiltInMap which);     // NULL: no memory
+
+#endif

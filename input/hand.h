@@ -1,0 +1,59 @@
+// All HID and USB hands of a session: finds the devices that a map (the user's, else a built-in one) fits, opens them, and drives one HandPort each.
+//
+// One thread looks for devices every half second; one thread a device reads its reports and writes its forces. Ports are there from the start to the end,
+// HAND_ABSENT until a device is found, so the 1 kHz thread samples all HANDS_MOST of them and never waits. An unplugged device's port turns
+// HAND_LOST, its rates and buttons zero, its ways stay; when it comes back (same vendor, product, serial, interface) it has the same port and goes on.
+// GLFW's gamepads and joysticks are not here (input/gamepad.h): GLFW wants the window's thread.
+#ifndef SELDINGER_INPUT_HAND_H
+#define SELDINGER_INPUT_HAND_H
+
+#include "geom/faults.h"
+#include "input/device_map.h"
+#include "input/hand_port.h"
+#include "input/hid_device.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+enum { HANDS_MOST = 8 };
+
+typedef struct Hands Hands;
+
+typedef struct HandsOptions {
+    const DeviceMap *const *map;     // the user's, copied; first that fits is taken, before the built-in ones
+    int map_count;
+    bool use_built_in;               // default true: joysticks, gamepads, multi-axis controllers and haptic devices without a map of the user's
+    bool use_usb;                    // default true: look for USB serial encoders where a map names one
+    int rescan_ms;                   // 500
+    const HidTransport *transport;   // NULL: hidapi; else the caller's, kept until hands_close
+} HandsOptions;
+HandsOptions hands_default_options(void);
+
+// Starts the threads; NULL with faults where that cannot be. No device at all is no fault.
+Hands *hands_open(const HandsOptions *options, Faults *faults);
+// Force to zero, devices given back, threads ended (within about 0.3 s).
+void hands_close(Hands *hands);
+
+HandPort *hands_port(Hands *hands, int index);           // 0 to HANDS_MOST - 1, the same address for the whole session
+// Force to zero while paused (rates and ways go on being read); any thread.
+void hands_pause(Hands *hands, bool paused);
+
+typedef struct HandInfo {
+    HandState state;
+    char name[96];                   // product, "" while absent
+    char map[MAP_NAME];
+    char force[160];                 // "constant force, 255 steps for 8 N" or why there is none
+    int64_t reports, bad_reports;    // read; short or of unknown id
+    double report_hz;                // over the last second or so
+    double force_n;                  // sent now
+} HandInfo;
+void hands_info(Hands *hands, int index, HandInfo *info);    // any thread but the 1 kHz one (takes a lock)
+
+// The first of `map` (NULL entries are passed over) that fits a HID device.
+const DeviceMap *hands_choose_map(const DeviceMap *const *map, int count, const HidDeviceInfo *device);
+
+// The next message for the user ("roller unplugged: the tool stops; plug it in again to go on"), oldest first; false where there is none. At most 32 are
+// kept. Any thread but the 1 kHz one.
+bool hands_message(Hands *hands, char *text, size_t capacity);
+
+#endif
