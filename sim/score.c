@@ -2,17 +2,17 @@
 
 #include "geom/power_walk.h"
 #include "sim/score_sheath.h"
+#include "sim/score_tip.h"
 #include "sim/score_way.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 const char *const score_error_name[ERROR_COUNT + 1] = {"wrong_branch", "tip_force", "wall_force", "buckling", "blind", "contrast", NULL};
 const char *const score_error_words[ERROR_COUNT] = {"wrong branch",          "tip force above the limit", "wall force above the limit",
                                                     "buckling at the sheath", "tool moved without X-rays", "too much contrast agent"};
 const char *const score_state_name[5] = {"waiting", "running", "reached", "time_out", NULL};
 
-static const double LOOK_MS = 10;            // between looks at forces and nodes
+static const double LOOK_MS = 10;            // between looks at where in the tree the tip is
 static const double CHORD_MM = 0.2;          // of the tip's path
 static const double FORCE_MEAN_MS = 20;
 static const double QUIET_MS = 500;          // until an episode is over
@@ -27,11 +27,11 @@ struct Score {
     ScoreSheath sheath;
     double dt;                   // [ms]
     int node_count;
-    NodeReport *node;            // (M) of the last look
-    double *s;                   // (M)
+    double *s;                   // (M) [mm] arc length of the nodes
+    ScoreTip tip;
     double since_look;           // [ms]
     Vec3 path_from;              // where the last chord of the tip's path ended
-    double wall_force, tip_force;        // [N] means
+    double wall_force;           // [N] mean
     double quiet[ERROR_COUNT];   // [ms] that an episode's measure has been back
     double pulse_phase;          // of the next X-ray pulse, 1: now
     bool had_pedal;
@@ -46,17 +46,23 @@ static Vec3 tip_of(const Simulator *simulator)
     return state->position[state->node_count - 1];
 }
 
-// The lumen's radius at the mouth: the tree's, the tube's, or as much room as the first free node has.
-static double lumen_radius(const Score *score, const VesselTree *tree)
+// The lumen's radius at the mouth: the tree's, the tube's, or as much room as the first free node has; HUGE_VAL where nothing says it.
+static double lumen_radius(const Scene *scene, Simulator *simulator, const VesselTree *tree)
 {
-    if (score->scene->source == SOURCE_TUBE)
-        return score->scene->tube.radius;
+    if (scene->source == SOURCE_TUBE)
+        return scene->tube.radius;
     if (tree)
-        return tree->radius[power_nearest(tree, score->scene->wire.start)];
-    for (int i = 0; i < score->node_count; i++)
-        if (score->node[i].vessel_node >= 0)
-            return score->node[i].gap + score->node[i].radius;
-    return HUGE_VAL;
+        return tree->radius[power_nearest(tree, scene->wire.start)];
+    int count = simulator_state(simulator)->node_count;
+    double radius = HUGE_VAL;
+    NodeReport *node = calloc((size_t)count, sizeof *node);
+    if (node)
+        stepper_node_report(simulator_stepper(simulator), node);
+    for (int i = 0; node && i < count && radius == HUGE_VAL; i++)
+        if (node[i].vessel_node >= 0)
+            radius = node[i].gap + node[i].radius;
+    free(node);
+    return radius;
 }
 
 Score *score_create(Simulator *simulator, const VesselTree *tree)
@@ -70,18 +76,15 @@ Score *score_create(Simulator *simulator, const VesselTree *tree)
     score->exercise = scene->exercise ? *scene->exercise : exercise_default();
     score->dt = scene->dt;
     score->node_count = state->node_count;
-    score->node = calloc((size_t)state->node_count, sizeof *score->node);
     score->s = calloc((size_t)state->node_count, sizeof *score->s);
     int at = score->exercise.target;
     Vec3 tip = tip_of(simulator), target = at >= 0 ? scene->target[at].point : tip;
-    if (!score->node || !score->s || !score_way_create(&score->way, tree, scene->wire.start, target, at >= 0 ? scene->target[at].radius : 0)) {
+    if (!score->s || !score_tip_create(&score->tip, &scene->wire, score->exercise.rules.tip_length_mm, score->s) ||
+        !score_way_create(&score->way, tree, scene->wire.start, target, at >= 0 ? scene->target[at].radius : 0)) {
         score_free(score);
         return NULL;
     }
-    stepper_node_report(simulator_stepper(simulator), score->node);
-    for (int i = 0; i < score->node_count; i++)
-        score->s[i] = score->node[i].s;
-    score_sheath_start(&score->sheath, &scene->wire, lumen_radius(score, tree), state->inserted);
+    score_sheath_start(&score->sheath, &scene->wire, lumen_radius(scene, simulator, tree), state->inserted);
     ScoreFigures *f = &score->figures;
     f->has_exercise = scene->exercise != NULL;
     f->tip_node = tree ? power_nearest(tree, tip) : -1;
@@ -98,7 +101,6 @@ void score_free(Score *score)
     if (!score)
         return;
     score_way_destroy(&score->way);
-    free(score->node);
     free(score->s);
     free(score);
 }
@@ -187,37 +189,27 @@ static void watch_tip(Score *score, Vec3 tip)
 
 static double low_pass(double mean, double value, double elapsed_ms) { return mean + (value - mean) * -expm1(-elapsed_ms / FORCE_MEAN_MS); }
 
-static void watch_wall_force(Score *score, const StepReport *report, double now_s)
-{
-    ScoreFigures *f = &score->figures;
-    f->wall_force_peak_n = fmax(f->wall_force_peak_n, report->wall_force_max);
-    f->wall_impulse_n_s += report->wall_force_sum * score->dt / 1000;
-    score->wall_force = low_pass(score->wall_force, report->wall_force_max, score->dt);
-    judge_limit(score, ERROR_WALL_FORCE, score->wall_force, score->exercise.rules.wall_force_n, FORCE_AGAIN, score->dt, now_s);
-}
-
-static double force_on_tip(const Score *score)
-{
-    double end = score->s[score->node_count - 1];
-    Vec3 sum = {0, 0, 0};
-    for (int i = score->node_count - 1; i >= 0 && end - score->s[i] <= score->exercise.rules.tip_length_mm; i--)
-        sum = vec3_add(sum, score->node[i].force);
-    return vec3_norm(sum);
-}
-
-// What is asked for every 10 ms only: forces along the tool, and where in the tree the tip is.
-static void look(Score *score, Simulator *simulator, Vec3 tip, double now_s)
+static void watch_forces(Score *score, const WireState *state, const StepReport *report, double now_s)
 {
     ScoreFigures *f = &score->figures;
     const ExerciseRules *rules = &score->exercise.rules;
+    double hidden = score->scene->wire.has_sheath ? score->s[score->node_count - 1] - state->inserted : 0;
+    f->wall_force_peak_n = fmax(f->wall_force_peak_n, report->wall_force_max);
+    f->wall_impulse_n_s += report->wall_force_sum * score->dt / 1000;
+    f->tip_force_n = low_pass(f->tip_force_n, score_tip_force(&score->tip, state, hidden), score->dt);
+    f->tip_force_peak_n = fmax(f->tip_force_peak_n, f->tip_force_n);
+    score->wall_force = low_pass(score->wall_force, report->wall_force_max, score->dt);
+    judge_limit(score, ERROR_TIP_FORCE, f->tip_force_n, rules->tip_force_n, FORCE_AGAIN, score->dt, now_s);
+    judge_limit(score, ERROR_WALL_FORCE, score->wall_force, rules->wall_force_n, FORCE_AGAIN, score->dt, now_s);
+}
+
+// Where in the tree the tip is, every 10 ms: a tool at 100 mm/s goes 1 mm in that time.
+static void look(Score *score, const WireState *state, Vec3 tip, double now_s)
+{
+    ScoreFigures *f = &score->figures;
     double elapsed = score->since_look;
     score->since_look = 0;
-    stepper_node_report(simulator_stepper(simulator), score->node);
-    f->tip_force_n = force_on_tip(score);
-    f->tip_force_peak_n = fmax(f->tip_force_peak_n, f->tip_force_n);
-    score->tip_force = low_pass(score->tip_force, f->tip_force_n, elapsed);
-    judge_limit(score, ERROR_TIP_FORCE, score->tip_force, rules->tip_force_n, FORCE_AGAIN, elapsed, now_s);
-    score_sheath_look(&score->sheath, simulator_state(simulator), score->s);
+    score_sheath_look(&score->sheath, state, score->s);
     if (score->way.tree)
         f->tip_node = score->way.tree->near ? power_walk(score->way.tree, tip, f->tip_node, HOPS) : power_nearest(score->way.tree, tip);
     if (score->exercise.target < 0)
@@ -225,7 +217,7 @@ static void look(Score *score, Simulator *simulator, Vec3 tip, double now_s)
     f->remaining_mm = score_way_left(&score->way, tip, f->tip_node);
     f->least_remaining_mm = fmin(f->least_remaining_mm, f->remaining_mm);
     f->off_way_mm = score->way.tree ? score->way.off[f->tip_node] : 0;
-    judge_limit(score, ERROR_WRONG_BRANCH, f->off_way_mm, rules->wrong_branch_mm, AGAIN, elapsed, now_s);
+    judge_limit(score, ERROR_WRONG_BRANCH, f->off_way_mm, score->exercise.rules.wrong_branch_mm, AGAIN, elapsed, now_s);
 }
 
 static double watch_sheath(Score *score, const WireState *state, Command command, double now_s)
@@ -287,10 +279,10 @@ void score_step(Score *score, Simulator *simulator, Command command, const XrayC
     f->time_s = now_s - f->start_s;
     watch_xrays(score, xray, fed, now_s);
     watch_tip(score, tip);
-    watch_wall_force(score, simulator_last(simulator), now_s);
+    watch_forces(score, state, simulator_last(simulator), now_s);
     score->since_look += score->dt;
     if (score->since_look >= LOOK_MS * (1 - 1e-9))
-        look(score, simulator, tip, now_s);
+        look(score, state, tip, now_s);
     if (f->has_exercise && score->held_steps > 0 && f->held_s >= score->exercise.hold_s - 1e-9) {
         f->state = SCORE_REACHED;
         f->reached_s = now_s;
@@ -313,7 +305,5 @@ void score_copy(Score *to, const Score *from)
     Score own = *to;
     *to = *from;
     to->way = own.way;
-    to->node = own.node;
     to->s = own.s;
-    memcpy(to->node, from->node, (size_t)from->node_count * sizeof *to->node);
 }

@@ -1,6 +1,6 @@
 // What a trainee's hand is worth: figures of a run, handling errors, points. One Score a simulator, stepped by the same thread right after each
 // simulator_step; the figures are plain data to be copied into a pose. The same steps give the same figures, so a replay has the session's score.
-// A step allocates nothing and takes well under 1 us at the median: forces and gaps along the tool are asked for every 10 ms only (some 20 us).
+// A step allocates nothing, asks the vessel nothing and takes well under 1 us; where in the tree the tip is is looked at every 10 ms.
 //
 // The clock runs from the first step in which the hand moves the tool, the pedal is down or contrast flows. Once the target has been held, or the
 // time is over, all figures stand still. Without an exercise they are kept without an end.
@@ -15,7 +15,7 @@
 // it) for half a second. Forces are judged by their mean over 20 ms (a low-pass of first order): a knock of a single step is no handling error.
 //   wrong branch  the tip's node lies more than wrong_branch_mm beyond the mouth of a branch that does not lead from the sheath to the target:
 //                 way along the tree to the way there, less the radius of that vessel. A sac that holds the target is no wrong branch.
-//   tip force     resultant of the wall's forces on the last tip_length_mm
+//   tip force     what the shaft carries into the last tip_length_mm (score_tip.h), at rest the resultant of the wall's forces on them
 //   wall force    largest contact force
 //   buckling      what goes in at the mouth does not go on: length lost next to the mouth, over the first 5 lumen diameters l beyond it (or up to where
 //                 its curved tip begins), as the integral of feed less the tool's motion along itself at l, fading over 2 l of feed. A tool that slides keeps it at 0 in
@@ -63,7 +63,7 @@ typedef struct ScoreFigures {
     double inserted_mm, withdrawn_mm;    // fed in and pulled out in all, both >= 0
     double wall_force_peak_n;    // largest contact force of any step
     double wall_impulse_n_s;     // sum of all contact forces over time
-    double tip_force_n, tip_force_peak_n;    // every 10 ms
+    double tip_force_n, tip_force_peak_n;    // means over 20 ms
     double lost_mm, lost_limit_mm;       // length lost next to the mouth and what may be (buckling); limit 0: not known yet
     int tip_node;                // node of the tree at which the tip is; -1 without tree
     double off_way_mm;           // beyond the mouth of a branch that leads elsewhere; 0 on the way
