@@ -85,15 +85,20 @@ void gl_canvas_resolve(const GlCanvas *canvas)
     glBindFramebuffer(GL_FRAMEBUFFER, canvas->framebuffer);
 }
 
+void gl_framebuffer_read(unsigned framebuffer, int width, int height, uint8_t *rgb)
+{
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
+    glPixelStorei(GL_PACK_ALIGNMENT, 1);
+    size_t row = (size_t)width * 3;
+    // GL's rows go up, a file's go down
+    for (int y = 0; y < height; y++)
+        glReadPixels(0, height - 1 - y, width, 1, GL_RGB, GL_UNSIGNED_BYTE, rgb + (size_t)y * row);
+}
+
 void gl_canvas_read(const GlCanvas *canvas, uint8_t *rgb)
 {
     gl_canvas_resolve(canvas);
-    glBindFramebuffer(GL_READ_FRAMEBUFFER, canvas->resolved);
-    glPixelStorei(GL_PACK_ALIGNMENT, 1);
-    size_t row = (size_t)canvas->width * 3;
-    // GL's rows go up, a file's go down
-    for (int y = 0; y < canvas->height; y++)
-        glReadPixels(0, canvas->height - 1 - y, canvas->width, 1, GL_RGB, GL_UNSIGNED_BYTE, rgb + (size_t)y * row);
+    gl_framebuffer_read(canvas->resolved, canvas->width, canvas->height, rgb);
 }
 
 static bool add_shader(unsigned program, GLenum kind, const char *text, char *message, size_t capacity)

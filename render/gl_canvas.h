@@ -22,6 +22,8 @@ void gl_canvas_begin(const GlCanvas *canvas, const float background[3]);
 void gl_canvas_resolve(const GlCanvas *canvas);
 // Rows from the top, 3 bytes a pixel, into `rgb` (height, width, 3); resolves first.
 void gl_canvas_read(const GlCanvas *canvas, uint8_t *rgb);
+// The same of any framebuffer that is not multisampled; 0 is the window's.
+void gl_framebuffer_read(unsigned framebuffer, int width, int height, uint8_t *rgb);
 
 // 0 with the compiler's first lines in `message`.
 unsigned gl_program_create(const char *vertex_shader, const char *fragment_shader, char *message, size_t capacity);

@@ -189,6 +189,15 @@ const Moment *realtime_moment(Realtime *realtime)
     return realtime->has_moment ? &realtime->moment[realtime->moment_buffer.reading] : NULL;
 }
 
+double realtime_cpu_s(const Realtime *realtime)
+{
+    clockid_t clock;
+    struct timespec used = {0};
+    if (pthread_getcpuclockid(realtime->thread, &clock) == 0)
+        clock_gettime(clock, &used);
+    return (double)used.tv_sec + (double)used.tv_nsec * 1e-9;
+}
+
 RealtimeFigures realtime_stop(Realtime *realtime)
 {
     atomic_store(&realtime->ending, true);

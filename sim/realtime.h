@@ -55,6 +55,7 @@ void realtime_set_xray(Realtime *realtime, const XrayControl *xray);
 void realtime_pause(Realtime *realtime, bool paused);
 // The newest moment; stays as it is until the next call. NULL before the first.
 const Moment *realtime_moment(Realtime *realtime);
+double realtime_cpu_s(const Realtime *realtime);   // CPU time of the thread so far [s]
 // Ends and joins the thread, gives the figures of the whole session; frees. The simulator and the recording are the caller's again.
 RealtimeFigures realtime_stop(Realtime *realtime);
 

@@ -1,0 +1,150 @@
+#include "render/desk.h"
+
+// How fast things go while a key is held.
+static const double arm_deg_s = 25, table_fields_s = 0.4, blade_s = 0.5, orbit_px_s = 220, section_mm_s = 15;
+static const double contrast_ml_s = 3;   // a hand injection through a diagnostic catheter
+static const float pulse_rates[] = {7.5F, 10, 15, 30};
+static const double field_step = 1.25;
+
+static float clamped(double value, double least, double most) { return (float)fmax(least, fmin(most, value)); }
+
+Desk desk_create(const VesselScene *scene, int count, const Vec3 *point)
+{
+    Desk desk = {.xray = xray_default_control(), .push_mm_s = 10, .twist_deg_s = 120, .view = VIEW_FLUOROSCOPY,
+                 .look = vessel_scene_default_look(scene), .patient = patient_axes_lps()};
+    Vec3 low = vec3(0, 0, 0), high = low;
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k < 3; k++) {
+            double x = (&point[i].x)[k];
+            (&low.x)[k] = i ? fmin((&low.x)[k], x) : x;
+            (&high.x)[k] = i ? fmax((&high.x)[k], x) : x;
+        }
+    for (int k = 0; k < 3; k++)
+        desk.xray.table_mm[k] = (float)(((&low.x)[k] + (&high.x)[k]) / 2);
+    // the largest extent with a margin: whichever way the C-arm turns it is in the field
+    desk.xray.field_mm = clamped(1.15 * vec3_distance(low, high), 40, 400);
+    return desk;
+}
+
+static double held(const PanelActions *actions, ActionId more, ActionId less) { return (double)actions->held[more] - (double)actions->held[less]; }
+
+static void obey_arm(XrayControl *xray, const PatientAxes *patient, const PanelActions *actions, double seconds)
+{
+    double turn = arm_deg_s * seconds * (actions->held[ACTION_SLOW] ? 0.2 : actions->held[ACTION_FAST] ? 3 : 1);
+    xray->lao_deg = clamped((double)xray->lao_deg + turn * held(actions, ACTION_LAO, ACTION_RAO), -90, 90);
+    xray->cra_deg = clamped((double)xray->cra_deg + turn * held(actions, ACTION_CRA, ACTION_CAU), -45, 45);
+    if (actions->pressed[ACTION_AP])
+        xray->lao_deg = xray->cra_deg = 0;
+    // the patient goes where the key says, so the isocentre goes the other way
+    CArm arm = c_arm_place(xray, patient);
+    double way = table_fields_s * (double)xray->field_mm * seconds;
+    Vec3 moved = vec3_add(vec3_scale(arm.right, way * held(actions, ACTION_TABLE_LEFT, ACTION_TABLE_RIGHT)),
+                          vec3_scale(arm.up, way * held(actions, ACTION_TABLE_DOWN, ACTION_TABLE_UP)));
+    for (int k = 0; k < 3; k++)
+        xray->table_mm[k] += (float)(&moved.x)[k];
+    double sides = blade_s * seconds * held(actions, ACTION_SIDES_CLOSE, ACTION_SIDES_OPEN);
+    double ends = blade_s * seconds * held(actions, ACTION_ENDS_CLOSE, ACTION_ENDS_OPEN);
+    for (int i = 0; i < 4; i++)
+        xray->collimator[i] = clamped((double)xray->collimator[i] + (i < 2 ? sides : ends), 0, 0.95);
+}
+
+static void obey_xray(Desk *desk, const PanelActions *actions)
+{
+    XrayControl *xray = &desk->xray;
+    for (int i = 0; i < actions->pressed[ACTION_MAGNIFY]; i++)
+        xray->field_mm = clamped((double)xray->field_mm / field_step, 40, 400);
+    for (int i = 0; i < actions->pressed[ACTION_DEMAGNIFY]; i++)
+        xray->field_mm = clamped((double)xray->field_mm * field_step, 40, 400);
+    if (actions->pressed[ACTION_PULSES] & 1) {
+        int next = 0;
+        while (next < 3 && pulse_rates[next] <= xray->pulses_s)
+            next++;
+        xray->pulses_s = xray->pulses_s >= pulse_rates[3] ? pulse_rates[0] : pulse_rates[next];
+    }
+    if (actions->pressed[ACTION_PEDAL_LATCH] & 1)
+        desk->pedal_latched = !desk->pedal_latched;
+    if (actions->pressed[ACTION_DSA] & 1) {
+        xray->mode = xray->mode == XRAY_DSA ? XRAY_LIVE : XRAY_DSA;
+        xray->mask += xray->mode == XRAY_DSA;   // subtraction begins with a mask of its own
+    }
+    if (actions->pressed[ACTION_ROADMAP] & 1)
+        xray->mode = xray->mode == XRAY_ROADMAP ? XRAY_LIVE : XRAY_ROADMAP;
+    xray->mask += (float)actions->pressed[ACTION_MASK];
+    if (actions->xray_set) {
+        float pedal = xray->pedal, contrast = xray->contrast_ml_s;   // these two are held, not set
+        *xray = actions->xray;
+        xray->pedal = pedal;
+        xray->contrast_ml_s = contrast;
+    }
+}
+
+static void obey_mouse(Desk *desk, const PanelActions *actions, const PanelLayout *layout)
+{
+    const PanelMouse *mouse = &actions->mouse;
+    if (mouse->view < 0 || mouse->view >= VIEW_COUNT)
+        return;
+    const ViewPort *port = &layout->view[mouse->view];
+    double dx = mouse->drag_x * port->height, dy = -mouse->drag_y * port->height;
+    if (mouse->view == VIEW_3D) {
+        FreeCamera *camera = &desk->look.camera;
+        if (mouse->buttons & WINDOW_MOUSE_LEFT)
+            free_camera_orbit(camera, dx, dy);
+        else if (mouse->buttons)
+            free_camera_pan(camera, dx, dy, port->width, port->height);
+        if (mouse->scroll != 0)
+            free_camera_zoom(camera, mouse->scroll, mouse->x * port->width, (1 - mouse->y) * port->height, port->width, port->height);
+    } else if (mouse->view == VIEW_FLUOROSCOPY) {
+        // dragging turns the C-arm as if one had hold of the detector
+        if (mouse->buttons & WINDOW_MOUSE_LEFT) {
+            desk->xray.lao_deg = clamped((double)desk->xray.lao_deg + 90 * mouse->drag_x, -90, 90);
+            desk->xray.cra_deg = clamped((double)desk->xray.cra_deg + 90 * mouse->drag_y, -45, 45);
+        }
+        if (mouse->scroll != 0)
+            desk->xray.field_mm = clamped((double)desk->xray.field_mm * pow(field_step, -mouse->scroll / 2), 40, 400);
+    }
+}
+
+static void obey_views(Desk *desk, const PanelActions *actions, double seconds)
+{
+    static const ActionId view[] = {ACTION_VIEW_FLUOROSCOPY, ACTION_VIEW_3D, ACTION_VIEW_ANGIOSCOPY, ACTION_VIEW_ALL};
+    VesselSceneLook *look = &desk->look;
+    for (int i = 0; i < 4; i++)
+        if (actions->pressed[view[i]])
+            desk->view = (PanelView)i;
+    if (actions->pressed[ACTION_CAMERA_RESET])
+        free_camera_reset(&look->camera);
+    look->follow_tip ^= actions->pressed[ACTION_CAMERA_FOLLOW] & 1;
+    look->section ^= actions->pressed[ACTION_SECTION] & 1;
+    look->section_at_tip = look->follow_tip;
+    look->show_model ^= actions->pressed[ACTION_MODEL] & 1;
+    look->show_arrows ^= actions->pressed[ACTION_ARROWS] & 1;
+    look->section_offset_mm += section_mm_s * seconds * held(actions, ACTION_SECTION_NEARER, ACTION_SECTION_FARTHER);
+    double orbit = orbit_px_s * seconds;
+    free_camera_orbit(&look->camera, orbit * held(actions, ACTION_ORBIT_RIGHT, ACTION_ORBIT_LEFT), orbit * held(actions, ACTION_ORBIT_DOWN, ACTION_ORBIT_UP));
+    free_camera_zoom(&look->camera, 8 * seconds * held(actions, ACTION_CAMERA_NEARER, ACTION_CAMERA_FARTHER), 50, 50, 100, 100);
+}
+
+void desk_obey(Desk *desk, const PanelActions *actions, const PanelLayout *layout, double seconds)
+{
+    obey_arm(&desk->xray, &desk->patient, actions, seconds);
+    obey_xray(desk, actions);
+    obey_views(desk, actions, seconds);
+    obey_mouse(desk, actions, layout);
+}
+
+Command desk_command(const Desk *desk, const PanelActions *actions)
+{
+    if (actions->held[ACTION_STOP])
+        return (Command){0, 0};
+    double speed = actions->held[ACTION_FAST] ? 3 : actions->held[ACTION_SLOW] ? 0.2 : 1;
+    return (Command){speed * desk->push_mm_s * held(actions, ACTION_PUSH, ACTION_PULL),
+                     speed * desk->twist_deg_s * held(actions, ACTION_TWIST_RIGHT, ACTION_TWIST_LEFT)};
+}
+
+XrayControl desk_xray(const Desk *desk, const PanelActions *actions, unsigned hand_buttons)
+{
+    XrayControl xray = desk->xray;
+    xray.pedal = desk->pedal_latched || actions->held[ACTION_PEDAL] || (hand_buttons & HAND_PEDAL);
+    xray.contrast_ml_s = actions->held[ACTION_CONTRAST] || (hand_buttons & HAND_CONTRAST) ? (float)contrast_ml_s : 0;
+    return xray;
+}

@@ -1,0 +1,42 @@
+// The three views of the trainer together: fluoroscopy, 3D, angioscopy, drawn where a layout says. For the window, and off screen for pictures and movies.
+// Needs a current OpenGL 3.3 context, the same in every call; one thread. Lengths mm.
+#ifndef SELDINGER_RENDER_VIEWS_H
+#define SELDINGER_RENDER_VIEWS_H
+
+#include "render/angioscope.h"
+#include "render/fluoroscope.h"
+#include "render/panel.h"
+#include "render/vessel_scene.h"
+
+typedef struct Views Views;
+
+typedef struct ViewsOptions {        // borrowed during create, but for scene, vessel and tree, which must outlive the views
+    const Scene *scene;
+    const Vessel *vessel;            // NULL: none
+    const VesselTree *tree;          // NULL: the vessel is no tree
+    const TriangleMesh *mesh;        // the wall, NULL: none
+    const Pose *pose;                // any of the tool: nodes, radii, arc lengths
+    int anatomy_size[3];             // a volume behind the vessel, see FluoroscopeOptions; value NULL: none
+    Vec3 anatomy_origin, anatomy_axis[3];
+    const float *anatomy_value;
+    PatientAxes patient;
+} ViewsOptions;
+
+// NULL with a reason. Otherwise `message` is empty or says what the pictures lack.
+Views *views_create(const ViewsOptions *options, char *message, size_t capacity);
+void views_destroy(Views *views);
+
+typedef struct ViewsFrame {
+    const Pose *pose;
+    const XrayControl *xray;
+    const float *contrast;           // (N of the tree), NULL: none
+    uint32_t pulse;                  // number of X-ray pulses so far
+    const VesselSceneLook *look;
+} ViewsFrame;
+
+// Draws each view that the layout shows into `framebuffer`, and dark ground into what lies between.
+void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout, int width, int height, unsigned framebuffer);
+const VesselScene *views_scene(const Views *views);
+Fluoroscope *views_fluoroscope(Views *views);
+
+#endif
