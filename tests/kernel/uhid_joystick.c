@@ -1,8 +1,9 @@
 // A force-feedback joystick that exists only in the kernel (uhid): to every program it is a HID device on a bus. Commands come by standard input,
 // one a line; each is answered by a line on standard output when it is done. Input reports go out each millisecond while the device is open.
-//   usage: uhid_joystick NAME VENDOR:PRODUCT LOG      (ids in hexadecimal)
+//   usage: uhid_joystick NAME VENDOR:PRODUCT LOG [SERIAL [LIE]]      (ids in hexadecimal)
+// LIE: wide, its X has 64 bits; mixed, its input report has no id though others have; full, it never has room for an effect. The kernel takes them all.
 //   axis X DIAL      from now on the stick is at X (-32767..32767) and the dial turns by DIAL counts a report
-//   yield K          the hand yields: X becomes X - K * force / 100, the force as the device plays it (-10000..10000)
+//   yield K          the hand yields: X becomes X + K * force / 100, the force as the device plays it (-10000..10000, > 0 to greater X)
 //   quiet | loud     no reports although open; reports again
 //   flood N          N reports as fast as the kernel takes them, the last with the dial at 0
 //   short            one report of 2 bytes, where the descriptor says 6
@@ -18,6 +19,7 @@
 #include <fcntl.h>
 #include <linux/input.h>
 #include <linux/uhid.h>
+#include <math.h>
 #include <poll.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -73,10 +75,15 @@ static const unsigned char descriptor[] = {
     0xc0,
 };
 
-typedef struct { bool made, configured, running; int gain, magnitude; long long ends_us; } Effect;   // ends_us 0: never
+typedef struct {
+    bool made, configured, running;
+    int gain, magnitude;
+    double along_x;          // which part of a magnitude > 0 pushes the stick to greater X
+    long long ends_us;       // 0: never
+} Effect;
 
 typedef struct {
-    const char *name;
+    const char *name, *serial, *lie;
     unsigned vendor, product;
     int fd;
     FILE *log;
@@ -113,12 +120,25 @@ static void send_event(const Device *device, const struct uhid_event *event)
     }
 }
 
+// The descriptor, or what a liar says in its place; its length in bytes.
+static size_t describe(unsigned char *out, const char *lie)
+{
+    static const unsigned char id[] = {0x85, INPUT}, sixteen_bits[] = {0x75, 0x10};
+    size_t length = sizeof descriptor, at = 0;
+    const unsigned char *wanted = !strcmp(lie, "mixed") ? id : sixteen_bits;
+    memcpy(out, descriptor, length);
+    while (out[at] != wanted[0] || out[at + 1] != wanted[1]) at++;
+    if (!strcmp(lie, "wide")) out[at + 1] = 64;
+    if (!strcmp(lie, "mixed")) memmove(out + at, out + at + 2, (length -= 2) - at);
+    return length;
+}
+
 static void plug(Device *device)
 {
     struct uhid_event event = {.type = UHID_CREATE2};
     snprintf((char *)event.u.create2.name, sizeof event.u.create2.name, "%s", device->name);
-    memcpy(event.u.create2.rd_data, descriptor, sizeof descriptor);
-    event.u.create2.rd_size = sizeof descriptor;
+    snprintf((char *)event.u.create2.uniq, sizeof event.u.create2.uniq, "%s", device->serial);
+    event.u.create2.rd_size = (unsigned short)describe(event.u.create2.rd_data, device->lie);
     event.u.create2.bus = BUS_USB;
     event.u.create2.vendor = device->vendor;
     event.u.create2.product = device->product;
@@ -138,16 +158,16 @@ static void unplug(Device *device)
     note(device, "unplugged");
 }
 
-// What the motor does now: the sum of the running effects, -10000..10000.
+// What the motor does now: the sum of the running effects, -10000..10000, > 0 to greater X.
 static void update_force(Device *device)
 {
-    long total = 0;
+    double total = 0;
     for (int i = 1; i <= EFFECTS; i++) {
         Effect *effect = &device->effects[i];
         if (effect->running && effect->ends_us && now_us() >= effect->ends_us) effect->running = false;
-        if (effect->running) total += (long)effect->magnitude * effect->gain / 255;
+        if (effect->running) total += effect->along_x * effect->magnitude * effect->gain / 255;
     }
-    int force = device->plugged && device->actuators && !device->paused ? (int)(total * device->device_gain / 255) : 0;
+    int force = device->plugged && device->actuators && !device->paused ? (int)lround(total * device->device_gain / 255) : 0;
     if (force != device->force) note(device, "force %d", force);
     device->force = force;
 }
@@ -155,7 +175,7 @@ static void update_force(Device *device)
 static void send_report(Device *device, int dial, int size)
 {
     update_force(device);
-    int axis = device->base - device->yield * device->force / 100;
+    int axis = device->base + device->yield * device->force / 100;
     axis = axis > 32767 ? 32767 : axis < -32767 ? -32767 : axis;
     if (axis != device->axis) note(device, "axis %d", axis);
     device->axis = axis;
@@ -218,6 +238,9 @@ static void take_output(Device *device, const unsigned char *bytes, int size)
         int duration = word(bytes + 3) & 0xffff;
         effect->configured = true;
         effect->gain = bytes[7];
+        // the direction is where a force comes from, clockwise from north (DirectInput; Linux's FF says the same the other way round): 90 degrees pushes
+        // to the left
+        effect->along_x = bytes[9] & 2 ? -sin((word(bytes + 10) & 0xffff) / 100.0 * 3.14159265358979 / 180) : -(bytes[9] & 1);
         effect->ends_us = duration == 0 || duration == 0xffff ? 0 : now_us() + duration * 1000LL;
         if (bytes[2] != CONSTANT_FORCE) note(device, "fault effect type %d", bytes[2]);
         note(device, "effect %d lasts %d ms gain %d axes %d direction %d", bytes[1], duration, effect->gain, bytes[9] & 3, word(bytes + 10) & 0xffff);
@@ -240,7 +263,7 @@ static void take_feature(Device *device, const struct uhid_set_report_req *reque
     } else if (request->rnum == CREATE_NEW && request->size == 4 && request->data[1] == CONSTANT_FORCE) {
         device->last_made = 0;
         for (int i = EFFECTS; i >= 1; i--)
-            if (!device->effects[i].made) device->last_made = i;
+            if (!device->effects[i].made && strcmp(device->lie, "full") != 0) device->last_made = i;
         if (device->last_made) device->effects[device->last_made] = (Effect){.made = true};
         note(device, "created %d", device->last_made);
     } else {
@@ -342,11 +365,13 @@ static bool obey(Device *device, char *line)
 int main(int argc, char **argv)
 {
     Device device = {.fd = open("/dev/uhid", O_RDWR | O_CLOEXEC), .axis = 1 << 20};
-    if (argc != 4 || sscanf(argv[2], "%x:%x", &device.vendor, &device.product) != 2) {
-        fprintf(stderr, "usage: uhid_joystick NAME VENDOR:PRODUCT LOG\n");
+    if (argc < 4 || argc > 6 || sscanf(argv[2], "%x:%x", &device.vendor, &device.product) != 2) {
+        fprintf(stderr, "usage: uhid_joystick NAME VENDOR:PRODUCT LOG [SERIAL [wide|mixed|full]]\n");
         return 2;
     }
     device.name = argv[1];
+    device.serial = argc > 4 ? argv[4] : "";
+    device.lie = argc > 5 ? argv[5] : "";
     device.log = fopen(argv[3], "w");
     if (device.fd < 0 || !device.log) {
         fprintf(stderr, "uhid_joystick: %s: %s\n", device.fd < 0 ? "/dev/uhid" : argv[3], strerror(errno));
