@@ -1,8 +1,9 @@
-// The one C++ file: Dear ImGui 1.86 with its OpenGL 3 back end, used for its draw list only. No window, no ini file, no clock.
+// Dear ImGui 1.86 with its OpenGL 3 back end, used for its draw list only. No window, no ini file, no clock.
 #include "render/overlay.h"
 
+#include "render/font.h"
+
 #include <cstdint>
-#include <cstdio>
 #include <imgui.h>
 #include <backends/imgui_impl_opengl3.h>
 #include <new>
@@ -19,8 +20,6 @@ static ImVec2 at(double x, double y) { return ImVec2((float)x, (float)y); }
 
 extern "C" Overlay *overlay_create(int width, int height, float scale)
 {
-    static const char *const file[] = {"/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf", "/usr/share/fonts/TTF/DejaVuSans.ttf",
-                                       "/usr/share/fonts/dejavu-sans-fonts/DejaVuSans.ttf"};
     static const float pixels[TEXT_SIZES] = {14, 17, 23};
     static const ImWchar letters[] = {0x20, 0x17f, 0x391, 0x3c9, 0x2010, 0x2027, 0x2190, 0x2193, 0x2212, 0x2212, 0};
 
@@ -35,18 +34,8 @@ extern "C" Overlay *overlay_create(int width, int height, float scale)
     io.LogFilename = nullptr;
     io.DisplaySize = at(width, height);
     io.DeltaTime = 1.0f / 30;
-    const char *found = nullptr;
-    for (const char *name : file)
-        if (FILE *probe = std::fopen(name, "rb")) {   // ImGui asserts on a file that is not there
-            std::fclose(probe);
-            found = name;
-            break;
-        }
-    for (int i = 0; i < TEXT_SIZES; i++) {
-        ImFontConfig config;
-        config.SizePixels = pixels[i] * scale;
-        overlay->font[i] = found ? io.Fonts->AddFontFromFileTTF(found, config.SizePixels, &config, letters) : io.Fonts->AddFontDefault(&config);
-    }
+    for (int i = 0; i < TEXT_SIZES; i++)
+        overlay->font[i] = font_add(pixels[i] * scale, letters);
     overlay->has_backend = ImGui_ImplOpenGL3_Init("#version 330 core");
     if (!overlay->has_backend) {
         overlay_destroy(overlay);

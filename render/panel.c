@@ -1,59 +1,321 @@
-#include "render/panel.h"
+#include "render/panel_internal.h"
 
 #include "render/message.h"
 
+#include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-struct Panel {
-    KeyState keys;
-    bool has_panels, has_hints;
-};
+#define FRAME_S (1.0 / 30)
+
+// ---- create and destroy
 
 Panel *panel_create(char *message, size_t capacity)
 {
     Panel *panel = calloc(1, sizeof *panel);
-    if (!panel)
-        message_fail(message, capacity, "out of memory");
-    else
-        panel->has_panels = panel->has_hints = true;
+    Gui *gui = panel ? gui_create(message, capacity) : NULL;
+    if (!gui) {
+        if (!panel)
+            message_fail(message, capacity, "out of memory");
+        free(panel);
+        return NULL;
+    }
+    panel->gui = gui;
+    panel->has_panels = panel->has_hints = true;
+    panel->drag_view = -1;
+    panel->plots = 2;
+    panel->plot_height = 60;
+    panel_forget_samples(panel);
     return panel;
 }
 
-void panel_destroy(Panel *panel) { free(panel); }
-
-PanelLayout panel_layout(int width, int height, double scale, PanelView view, bool has_panels)
+void panel_destroy(Panel *panel)
 {
-    (void)has_panels;
-    PanelLayout layout = {.scale = scale, .main = view == VIEW_ALL ? VIEW_FLUOROSCOPY : view};
-    layout.view[layout.main] = (ViewPort){0, 0, 0, width, height};
-    layout.view_rect[layout.main] = (PanelRect){0, 0, (float)width, (float)height};
-    return layout;
+    if (!panel)
+        return;
+    gui_destroy(panel->gui);
+    free(panel);
+}
+
+// ---- input
+
+static void open_dialogue(Panel *panel, Dialogue dialogue)
+{
+    panel->dialogue = dialogue;
+    panel->dialogue_is_new = true;
+    panel->answer = 0;
+    panel->has_help = false;
+    panel->drag_buttons = 0;
+    key_state_release(&panel->keys);
+    memset(panel->mouse_held, 0, sizeof panel->mouse_held);
+}
+
+// Printable text without blanks at its ends; control characters of a pasted or typed name are left out.
+static void trim_name(const char *from, char *to, size_t capacity)
+{
+    size_t length = 0;
+    for (; *from && length + 1 < capacity; from++)
+        if ((unsigned char)*from >= ' ' && *from != 127 && !(length == 0 && *from == ' '))
+            to[length++] = *from;
+    while (length > 0 && to[length - 1] == ' ')
+        length--;
+    to[length] = 0;
+}
+
+static void confirm(Panel *panel, PanelActions *actions)
+{
+    if (panel->dialogue == DIALOGUE_QUIT)
+        actions->pressed[ACTION_QUIT] = 1;
+    if (panel->dialogue == DIALOGUE_RESTART)
+        actions->pressed[ACTION_RESTART] = 1;
+    if (panel->dialogue == DIALOGUE_TRAINEE) {
+        trim_name(panel->name, actions->trainee, sizeof actions->trainee);
+        actions->trainee_set = actions->trainee[0] != 0;
+    }
+    panel->dialogue = DIALOGUE_NONE;
+}
+
+static bool has_key(const WindowInput *input, int key)
+{
+    for (int i = 0; i < input->event_count; i++)
+        if (input->event[i].kind == WINDOW_KEY_DOWN_EVENT && input->event[i].key == key && !input->event[i].is_repeat)
+            return true;
+    return false;
+}
+
+static void take_dialogue(Panel *panel, const WindowInput *input, PanelActions *actions)
+{
+    bool is_refused = actions->pressed[ACTION_QUIT] > 0 || panel->answer < 0;   // Escape, or the button
+    // a second click on the title bar's cross means it
+    bool is_confirmed = panel->answer > 0 || (panel->dialogue != DIALOGUE_TRAINEE && has_key(input, WINDOW_KEY_ENTER)) ||
+                        (panel->dialogue == DIALOGUE_QUIT && input->close == WINDOW_CLOSE_ASKED);
+    int full_screen = actions->pressed[ACTION_FULL_SCREEN], picture = actions->pressed[ACTION_SCREENSHOT];
+    memset(actions->pressed, 0, sizeof actions->pressed);
+    memset(actions->held, 0, sizeof actions->held);
+    actions->pressed[ACTION_FULL_SCREEN] = full_screen;
+    actions->pressed[ACTION_SCREENSHOT] = picture;
+    if (is_confirmed)
+        confirm(panel, actions);
+    else if (is_refused)
+        panel->dialogue = DIALOGUE_NONE;
+    panel->answer = 0;
+}
+
+// What the panel itself does of what was pressed. Restart and quit are asked back first.
+static void take_own_actions(Panel *panel, const WindowInput *input, PanelActions *actions)
+{
+    int *pressed = actions->pressed;
+    if (panel->has_help && pressed[ACTION_QUIT] > 0) {
+        panel->has_help = false;
+        pressed[ACTION_QUIT] = 0;
+    }
+    if (pressed[ACTION_HELP] % 2)
+        panel->has_help = !panel->has_help;
+    if (pressed[ACTION_PANELS] % 2)
+        panel->has_panels = !panel->has_panels;
+    if (pressed[ACTION_HINTS] % 2)
+        panel->has_hints = !panel->has_hints;
+    if (pressed[ACTION_QUIT] > 0 || input->close == WINDOW_CLOSE_ASKED)
+        open_dialogue(panel, DIALOGUE_QUIT);
+    else if (pressed[ACTION_RESTART] > 0)
+        open_dialogue(panel, DIALOGUE_RESTART);
+    else if (pressed[ACTION_TRAINEE] > 0)
+        open_dialogue(panel, DIALOGUE_TRAINEE);
+    pressed[ACTION_QUIT] = pressed[ACTION_RESTART] = 0;
+    if (panel->dialogue != DIALOGUE_NONE)
+        memset(actions->held, 0, sizeof actions->held);
+}
+
+static int view_at(const Panel *panel, double x, double y)
+{
+    for (int i = 0; i < VIEW_COUNT; i++) {
+        PanelRect r = panel->layout.view_rect[i];
+        if (x >= r.x && x < r.x + r.width && y >= r.y && y < r.y + r.height)
+            return i;
+    }
+    return -1;
+}
+
+static void take_mouse(Panel *panel, const WindowInput *input, PanelActions *actions)
+{
+    PanelMouse *mouse = &actions->mouse;
+    bool is_covered = !panel->is_drawn || panel->dialogue != DIALOGUE_NONE || panel->has_help;
+    int over = is_covered || input->mouse_x < 0 || input->mouse_y < 0 ? -1 : view_at(panel, input->mouse_x, input->mouse_y);
+    unsigned buttons = input->has_focus ? input->mouse_buttons : 0;
+    double dx = input->mouse_x - panel->mouse_x, dy = input->mouse_y - panel->mouse_y;
+    if (panel->drag_view >= 0) {
+        panel->dragged += fabs(dx) + fabs(dy);
+        // a click on a small view makes it the main one
+        if (!buttons && panel->drag_buttons && panel->dragged < 5 * panel->layout.scale && panel->drag_view != (int)panel->layout.main &&
+            over == panel->drag_view)
+            actions->pressed[ACTION_VIEW_FLUOROSCOPY + panel->drag_view]++;
+    }
+    if (!buttons || is_covered) {
+        panel->drag_view = -1;
+        panel->drag_buttons = 0;
+    } else if (panel->drag_view < 0 && !panel->drag_buttons) {
+        panel->drag_view = over;
+        panel->drag_buttons = buttons;
+        panel->dragged = 0;
+        dx = dy = 0;
+    }
+    mouse->view = panel->drag_view >= 0 ? panel->drag_view : over;
+    if (mouse->view >= 0) {
+        PanelRect r = panel->layout.view_rect[mouse->view];
+        mouse->x = (input->mouse_x - r.x) / r.width;
+        mouse->y = 1 - (input->mouse_y - r.y) / r.height;
+        if (panel->drag_view >= 0) {
+            mouse->buttons = buttons;
+            mouse->drag_x = dx / r.height;
+            mouse->drag_y = -dy / r.height;
+        }
+        for (int i = 0; i < input->event_count; i++)
+            if (input->event[i].kind == WINDOW_SCROLL_EVENT)
+                mouse->scroll += input->event[i].scroll_y;
+    }
+    panel->mouse_x = input->mouse_x;
+    panel->mouse_y = input->mouse_y;
 }
 
 void panel_take_input(Panel *panel, const WindowInput *input, PanelActions *actions)
 {
     *actions = (PanelActions){.mouse.view = -1};
     key_state_begin(&panel->keys);
-    key_state_feed(&panel->keys, input, false);
-    memcpy(actions->held, panel->keys.held, sizeof actions->held);
-    memcpy(actions->pressed, panel->keys.pressed, sizeof actions->pressed);
-    if (input->close != WINDOW_OPEN)
-        actions->pressed[ACTION_QUIT]++;
+    key_state_feed(&panel->keys, input, panel->dialogue != DIALOGUE_NONE);
+    bool is_mouse_down = (input->mouse_buttons & WINDOW_MOUSE_LEFT) && input->has_focus;
+    for (int i = 0; i < ACTION_COUNT; i++) {
+        actions->held[i] = panel->keys.held[i] || (panel->mouse_held[i] && is_mouse_down) || panel->latched[i];
+        actions->pressed[i] = panel->keys.pressed[i] + panel->mouse_pressed[i];
+        panel->mouse_pressed[i] = 0;
+    }
+    if (!is_mouse_down)
+        memset(panel->mouse_held, 0, sizeof panel->mouse_held);
+    take_mouse(panel, input, actions);
+    if (panel->dialogue != DIALOGUE_NONE)
+        take_dialogue(panel, input, actions);
+    else
+        take_own_actions(panel, input, actions);
+    if (input->close == WINDOW_ENDED)
+        actions->pressed[ACTION_QUIT] = 1;
+    if (panel->xray_set && panel->dialogue == DIALOGUE_NONE) {
+        actions->xray_set = true;
+        actions->xray = panel->xray;
+    }
+    panel->xray_set = false;
+    for (int i = 0; i < ACTION_COUNT; i++)
+        panel->used_s[i] += actions->held[i] ? FRAME_S : actions->pressed[i];
+    memcpy(panel->held, actions->held, sizeof panel->held);
 }
 
-void panel_draw(Panel *panel, const WindowInput *input, const PanelState *state, unsigned framebuffer)
-{
-    (void)panel, (void)input, (void)state, (void)framebuffer;
-}
+// ---- what it remembers
 
 void panel_sample(Panel *panel, double time_s, double force_n, double torque_n_mm, double wall_max_n)
 {
-    (void)panel, (void)time_s, (void)force_n, (void)torque_n_mm, (void)wall_max_n;
+    plot_add(&panel->force, time_s, 1000 * force_n);
+    plot_add(&panel->torque, time_s, torque_n_mm);
+    plot_add(&panel->wall, time_s, 1000 * wall_max_n);
 }
-void panel_forget_samples(Panel *panel) { (void)panel; }
-void panel_message(Panel *panel, double now_s, PanelMark mark, const char *text) { (void)panel, (void)now_s, (void)mark, (void)text; }
-void panel_show_help(Panel *panel, bool is_shown) { (void)panel, (void)is_shown; }
+
+void panel_forget_samples(Panel *panel)
+{
+    plot_clear(&panel->force);
+    plot_clear(&panel->torque);
+    plot_clear(&panel->wall);
+}
+
+void panel_message(Panel *panel, double now_s, PanelMark mark, const char *text)
+{
+    PanelMessage *message = &panel->message[panel->message_count++ % PANEL_MESSAGES];
+    message->now_s = now_s;
+    message->mark = mark;
+    snprintf(message->text, sizeof message->text, "%s", text);
+}
+
+void panel_show_help(Panel *panel, bool is_shown) { panel->has_help = is_shown; }
 bool panel_has_panels(const Panel *panel) { return panel->has_panels; }
 void panel_show_hints(Panel *panel, bool is_shown) { panel->has_hints = is_shown; }
-bool panel_is_asking(const Panel *panel) { return !panel; }
+bool panel_is_asking(const Panel *panel) { return panel->dialogue != DIALOGUE_NONE; }
+
+// ---- hints: what a new user needs next, until it was used
+
+typedef struct Hint {
+    ActionId done_by[4];           // any of them, ACTION_COUNT: none
+    double enough_s;
+    ActionId key[4];               // for the %s of the text, in this order
+    const char *text;
+} Hint;
+
+#define NO ACTION_COUNT
+static const Hint hint[] = {
+    {{ACTION_PEDAL, ACTION_PEDAL_LATCH, NO, NO}, 0.5, {ACTION_PEDAL, ACTION_PEDAL_LATCH, NO, NO},
+     "Hold %s for X-ray: the picture is live while you hold it. %s keeps it on."},
+    {{ACTION_PUSH, ACTION_PULL, NO, NO}, 1, {ACTION_PUSH, ACTION_PULL, ACTION_FAST, ACTION_SLOW},
+     "Arrow %s pushes the tool, %s pulls it back; with %s faster, with %s slower. Keep the X-ray on."},
+    {{ACTION_CONTRAST, NO, NO, NO}, 0.5, {ACTION_CONTRAST, ACTION_PEDAL, NO, NO},
+     "Hold %s with %s to inject contrast: the vessels downstream of the tip show for a moment."},
+    {{ACTION_ROADMAP, ACTION_DSA, NO, NO}, 1, {ACTION_ROADMAP, ACTION_DSA, NO, NO},
+     "%s keeps the vessels of the injection on the picture as a roadmap; %s shows contrast alone."},
+    {{ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT, NO, NO}, 0.5, {ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT, ACTION_PUSH, NO},
+     "Arrows %s and %s turn the tool: point the bent tip into the branch you want, then push with %s."},
+    {{ACTION_LAO, ACTION_RAO, ACTION_CRA, ACTION_CAU}, 0.3, {ACTION_RAO, ACTION_LAO, ACTION_CRA, ACTION_CAU},
+     "Branches hide each other? Turn the C-arm: %s and %s to the sides, %s and %s towards head and feet."},
+    {{ACTION_VIEW_3D, ACTION_VIEW_ANGIOSCOPY, ACTION_VIEW_ALL, NO}, 1, {ACTION_VIEW_3D, ACTION_VIEW_ANGIOSCOPY, ACTION_VIEW_ALL, ACTION_VIEW_FLUOROSCOPY},
+     "%s shows the vessel in 3D, %s looks out from the tip, %s shows all, %s returns to X-ray. Or click a small view."},
+    {{ACTION_HELP, NO, NO, NO}, 1, {ACTION_HELP, NO, NO, NO},
+     "Bring the tip to the target and keep it there until the bar at the left is full. All keys: %s"},
+};
+enum { HINTS = sizeof hint / sizeof hint[0] };
+
+int panel_current_hint(const Panel *panel)
+{
+    for (int i = 0; i < HINTS; i++) {
+        double used = 0;
+        for (int j = 0; j < 4; j++)
+            used += hint[i].done_by[j] != NO ? panel->used_s[hint[i].done_by[j]] : 0;
+        if (used < hint[i].enough_s - 1e-9)
+            return i;
+    }
+    return -1;
+}
+
+void panel_hint_text(int index, char *text, size_t capacity)
+{
+    const Hint *h = &hint[index];
+    size_t length = 0;
+    int key = 0;
+    for (const char *c = h->text; *c && length + 1 < capacity;) {
+        if (c[0] == '%' && c[1] == 's') {
+            char name[32];
+            int more = snprintf(text + length, capacity - length, "%s", key_table_text(h->key[key++], name, sizeof name));
+            length = length + (size_t)more < capacity ? length + (size_t)more : capacity - 1;
+            c += 2;
+        } else {
+            text[length++] = *c++;
+        }
+    }
+    text[length] = 0;
+}
+
+// ---- drawing
+
+void panel_draw(Panel *panel, const WindowInput *input, const PanelState *state, unsigned framebuffer)
+{
+    panel_sample(panel, state->time_s, state->force_n, state->torque_n_mm, state->wall_max_n);
+    PanelLayout layout = panel_layout(input->width, input->height, input->scale, state->view, panel->has_panels);
+    bool is_new = !panel->is_drawn || panel->width != input->width || panel->height != input->height || layout.scale != panel->layout.scale;
+    panel->layout = layout;
+    panel->width = input->width;
+    panel->height = input->height;
+    if (is_new)   // how much the contents need is known after they were laid out once
+        for (int i = 0; i < 2; i++) {
+            gui_begin(panel->gui, input, layout.scale, true);
+            panel_draw_all(panel, input, state);
+            gui_end(panel->gui, framebuffer);
+        }
+    panel->is_drawn = true;
+    gui_begin(panel->gui, input, layout.scale, false);
+    panel_draw_all(panel, input, state);
+    panel->dialogue_is_new = false;
+    gui_end(panel->gui, framebuffer);
+}

@@ -9,6 +9,7 @@
 #define SELDINGER_RENDER_PANEL_H
 
 #include "input/hand_port.h"
+#include "render/gui.h"
 #include "render/key_table.h"
 #include "render/view_port.h"
 #include "render/window.h"
@@ -24,7 +25,7 @@ typedef enum { MARK_NONE, MARK_GOOD, MARK_WARNING, MARK_BAD } PanelMark;        
 
 enum { WARN_OUTSIDE = 1, WARN_NOT_CONVERGED = 2, WARN_SLOW = 4, WARN_NO_FIFO = 8, WARN_DEVICE_LOST = 16, WARN_STALLED = 32 }; // bits of `warnings`
 
-typedef struct PanelRect { float x, y, width, height; } PanelRect;   // [pixel], y down from the upper left corner
+typedef GuiRect PanelRect;   // x, y, width, height [pixel], y down from the upper left corner
 
 // Where things are. A view's rectangle of zero width is not shown. Nothing overlaps from 1024x600 on (times 0.6 for smaller windows).
 typedef struct PanelLayout {

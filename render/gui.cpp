@@ -1,0 +1,386 @@
+// Buttons, rows and bars are drawn here rather than by ImGui's widgets: square and unsmoothed they cost a third of the triangles, which is what
+// counts on a software renderer.
+#include "render/gui.h"
+
+#include "render/font.h"
+
+#include <cmath>
+#include <cstring>
+#include <epoxy/gl.h>
+#include <imgui.h>
+#include <imgui_internal.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <new>
+
+struct Gui {
+    ImGuiContext *context, *previous;
+    ImFont *font[GUI_FONTS];
+    float scale;
+    bool has_backend, is_silent;
+    bool released[WINDOW_KEYS];
+};
+
+static constexpr Color rgb(int r, int g, int b) { return Color{(uint8_t)r, (uint8_t)g, (uint8_t)b, 255}; }
+// marks: sky blue, bluish green, orange and vermilion of Okabe and Ito, lightened for a dark ground
+extern "C" const GuiColors gui_colors = {rgb(12, 14, 18),    rgb(23, 26, 32),    rgb(40, 45, 55),   rgb(56, 63, 77),    rgb(32, 84, 128), rgb(52, 58, 70),
+                                         rgb(222, 226, 233), rgb(146, 154, 168), rgb(86, 180, 233), rgb(40, 190, 145), rgb(240, 172, 30), rgb(255, 112, 64)};
+
+static ImU32 packed(Color c) { return IM_COL32(c.r, c.g, c.b, c.a); }
+static ImVec4 as_vector(Color c) { return ImVec4(c.r / 255.0f, c.g / 255.0f, c.b / 255.0f, c.a / 255.0f); }
+static ImDrawList *list() { return ImGui::GetWindowDrawList(); }
+static float whole(float x) { return std::floor(x + 0.5f); }
+
+static void set_style(float scale)
+{
+    ImGuiStyle &style = ImGui::GetStyle();
+    style = ImGuiStyle();
+    style.WindowRounding = style.ChildRounding = style.FrameRounding = style.GrabRounding = style.TabRounding = style.PopupRounding = 0;
+    style.WindowBorderSize = style.ChildBorderSize = style.FrameBorderSize = style.TabBorderSize = 0;
+    style.PopupBorderSize = 1;
+    style.AntiAliasedFill = false;
+    style.WindowPadding = ImVec2(whole(10 * scale), whole(8 * scale));
+    style.FramePadding = ImVec2(whole(6 * scale), whole(3 * scale));
+    style.ItemSpacing = ImVec2(whole(6 * scale), whole(3 * scale));
+    style.ItemInnerSpacing = ImVec2(whole(4 * scale), whole(3 * scale));
+    style.ScrollbarSize = whole(11 * scale);
+    style.GrabMinSize = whole(10 * scale);
+    style.WindowMinSize = ImVec2(4, 4);
+    const struct { int which; Color color; } colors[] = {
+        {ImGuiCol_Text, gui_colors.text}, {ImGuiCol_TextDisabled, gui_colors.dim}, {ImGuiCol_WindowBg, gui_colors.panel}, {ImGuiCol_ChildBg, {0, 0, 0, 0}},
+        {ImGuiCol_PopupBg, gui_colors.window}, {ImGuiCol_Border, gui_colors.line}, {ImGuiCol_FrameBg, gui_colors.frame},
+        {ImGuiCol_FrameBgHovered, gui_colors.frame_hot}, {ImGuiCol_FrameBgActive, gui_colors.frame_hot}, {ImGuiCol_SliderGrab, gui_colors.accent},
+        {ImGuiCol_SliderGrabActive, gui_colors.text}, {ImGuiCol_ScrollbarBg, gui_colors.panel}, {ImGuiCol_ScrollbarGrab, gui_colors.frame_hot},
+        {ImGuiCol_ScrollbarGrabHovered, gui_colors.dim}, {ImGuiCol_ScrollbarGrabActive, gui_colors.dim}, {ImGuiCol_Tab, gui_colors.frame},
+        {ImGuiCol_TabHovered, gui_colors.frame_hot}, {ImGuiCol_TabActive, gui_colors.frame_on}, {ImGuiCol_TabUnfocused, gui_colors.frame},
+        {ImGuiCol_TabUnfocusedActive, gui_colors.frame_on}, {ImGuiCol_TextSelectedBg, gui_colors.frame_on}};
+    for (const auto &c : colors)
+        style.Colors[c.which] = as_vector(c.color);
+}
+
+static void make_fonts(Gui *gui, float scale)
+{
+    // Latin with its extensions, Greek, Cyrillic, dashes and quotes, arrows, minus, the signs that the panel uses
+    static const ImWchar letters[] = {0x20, 0x17f, 0x391, 0x3c9, 0x400, 0x45f, 0x2010, 0x2027, 0x2190, 0x2193, 0x2212, 0x2212, 0x25a0, 0x25a0,
+                                      0x25b2, 0x25b2, 0x25cb, 0x25cf, 0x2713, 0x2717, 0};
+    static const ImWchar large[] = {0x20, 0xff, 0x2010, 0x2027, 0x2212, 0x2212, 0};
+    static const float pixels[GUI_FONTS] = {13, 15, 19, 28};
+    ImGuiIO &io = ImGui::GetIO();
+    io.Fonts->Clear();
+    ImFontConfig config;
+    config.OversampleH = config.OversampleV = 1;   // glyphs lie on whole pixels
+    config.PixelSnapH = true;
+    for (int i = 0; i < GUI_FONTS; i++)
+        gui->font[i] = font_add(whole(pixels[i] * scale), i == GUI_HUGE ? large : letters, config);
+    io.FontDefault = gui->font[GUI_NORMAL];
+    gui->scale = scale;
+}
+
+extern "C" Gui *gui_create(char *message, size_t capacity)
+{
+    Gui *gui = new (std::nothrow) Gui();
+    if (!gui) {
+        std::snprintf(message, capacity, "out of memory");
+        return nullptr;
+    }
+    ImGuiContext *previous = ImGui::GetCurrentContext();
+    gui->context = ImGui::CreateContext();
+    ImGui::SetCurrentContext(gui->context);
+    ImGuiIO &io = ImGui::GetIO();
+    io.IniFilename = nullptr;
+    io.LogFilename = nullptr;
+    io.ConfigWindowsMoveFromTitleBarOnly = true;
+    const struct { int imgui, key; } keys[] = {
+        {ImGuiKey_LeftArrow, WINDOW_KEY_LEFT}, {ImGuiKey_RightArrow, WINDOW_KEY_RIGHT}, {ImGuiKey_Home, WINDOW_KEY_HOME}, {ImGuiKey_End, WINDOW_KEY_END},
+        {ImGuiKey_Delete, WINDOW_KEY_DELETE}, {ImGuiKey_Backspace, WINDOW_KEY_BACKSPACE}, {ImGuiKey_Enter, WINDOW_KEY_ENTER},
+        {ImGuiKey_Escape, WINDOW_KEY_ESCAPE}, {ImGuiKey_A, 'A'}};
+    for (const auto &k : keys)
+        io.KeyMap[k.imgui] = k.key;
+    static_assert(WINDOW_KEYS <= IM_ARRAYSIZE(ImGuiIO::KeysDown), "ImGui holds every key");
+    gui->has_backend = ImGui_ImplOpenGL3_Init("#version 330 core");
+    ImGui::SetCurrentContext(previous);
+    if (!gui->has_backend) {
+        std::snprintf(message, capacity, "Dear ImGui's OpenGL back end does not start");
+        gui_destroy(gui);
+        return nullptr;
+    }
+    return gui;
+}
+
+extern "C" void gui_destroy(Gui *gui)
+{
+    if (!gui)
+        return;
+    ImGuiContext *previous = ImGui::GetCurrentContext();
+    ImGui::SetCurrentContext(gui->context);
+    if (gui->has_backend)
+        ImGui_ImplOpenGL3_Shutdown();
+    ImGui::DestroyContext(gui->context);
+    ImGui::SetCurrentContext(previous == gui->context ? nullptr : previous);
+    delete gui;
+}
+
+// A key that came and went between two frames is down for one of them.
+static void feed_keys(Gui *gui, ImGuiIO &io, const WindowInput *input)
+{
+    for (int key = 0; key < WINDOW_KEYS; key++)
+        if (gui->released[key])
+            io.KeysDown[key] = gui->released[key] = false;
+    for (int i = 0; i < input->event_count; i++) {
+        const WindowEvent *event = &input->event[i];
+        if (event->kind == WINDOW_KEY_DOWN_EVENT) {
+            io.KeysDown[event->key] = true;
+            gui->released[event->key] = false;
+        } else if (event->kind == WINDOW_KEY_UP_EVENT) {
+            gui->released[event->key] = true;
+        } else if (event->kind == WINDOW_TEXT_EVENT) {
+            io.AddInputCharacter(event->character);
+        } else if (event->kind == WINDOW_SCROLL_EVENT) {
+            io.MouseWheel += event->scroll_y;
+        } else if (event->kind == WINDOW_FOCUS_LOST_EVENT) {
+            std::memset(io.KeysDown, 0, sizeof io.KeysDown);
+            io.ClearInputCharacters();
+        }
+    }
+    io.KeyCtrl = io.KeysDown[WINDOW_KEY_CTRL];
+    io.KeyShift = io.KeysDown[WINDOW_KEY_SHIFT];
+    io.KeyAlt = io.KeysDown[WINDOW_KEY_ALT];
+}
+
+extern "C" void gui_begin(Gui *gui, const WindowInput *input, double scale, bool is_silent)
+{
+    gui->previous = ImGui::GetCurrentContext();
+    ImGui::SetCurrentContext(gui->context);
+    gui->is_silent = is_silent;
+    ImGuiIO &io = ImGui::GetIO();
+    if (gui->scale <= 0 || std::fabs(scale / gui->scale - 1) > 0.05) {
+        ImGui_ImplOpenGL3_DestroyFontsTexture();
+        make_fonts(gui, (float)scale);
+        set_style((float)scale);
+        ImGui_ImplOpenGL3_CreateFontsTexture();
+    }
+    io.DisplaySize = ImVec2((float)input->width, (float)input->height);
+    io.DeltaTime = 1.0f / 30;
+    if (!is_silent) {
+        bool has_mouse = input->mouse_x >= 0 && input->mouse_y >= 0;
+        io.MousePos = has_mouse ? ImVec2((float)input->mouse_x, (float)input->mouse_y) : ImVec2(-FLT_MAX, -FLT_MAX);
+        for (int i = 0; i < 3; i++)
+            io.MouseDown[i] = input->mouse_buttons >> i & 1;
+        feed_keys(gui, io, input);
+    }
+    ImGui_ImplOpenGL3_NewFrame();
+    ImGui::NewFrame();
+}
+
+extern "C" void gui_end(Gui *gui, unsigned framebuffer)
+{
+    if (gui->is_silent) {
+        ImGui::EndFrame();
+    } else {
+        ImGui::Render();
+        const ImDrawData *data = ImGui::GetDrawData();
+        glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+        glViewport(0, 0, (int)data->DisplaySize.x, (int)data->DisplaySize.y);
+        ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+        glDisable(GL_BLEND);
+        glDisable(GL_SCISSOR_TEST);
+    }
+    ImGui::SetCurrentContext(gui->previous);
+}
+
+extern "C" float gui_scale(const Gui *gui) { return gui->scale; }
+
+// ---- windows and flow
+
+extern "C" void gui_window_begin(Gui *, const char *id, GuiRect at, unsigned flags)
+{
+    ImGuiWindowFlags f = ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse |
+                         ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoNav;
+    if (!(flags & GUI_ON_TOP))
+        f |= ImGuiWindowFlags_NoBringToFrontOnFocus;
+    if (flags & GUI_NO_BACKGROUND)
+        f |= ImGuiWindowFlags_NoBackground;
+    if (flags & GUI_NO_INPUT)
+        f |= ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_NoScrollbar;
+    ImGui::SetNextWindowPos(ImVec2(at.x, at.y));
+    ImGui::SetNextWindowSize(ImVec2(at.width, at.height));
+    ImGui::Begin(id, nullptr, f);
+    if (flags & GUI_ON_TOP)
+        ImGui::BringWindowToDisplayFront(ImGui::GetCurrentWindow());
+    if ((flags & GUI_SCROLL_TO_END) && ImGui::GetScrollY() >= ImGui::GetScrollMaxY())
+        ImGui::SetScrollHereY(1);
+}
+
+extern "C" float gui_window_end(Gui *)
+{
+    const ImGuiWindow *window = ImGui::GetCurrentWindow();
+    float bottom = window->DC.CursorMaxPos.y + window->Scroll.y + ImGui::GetStyle().WindowPadding.y;
+    float over = bottom - (window->Pos.y + window->Size.y);
+    ImGui::End();
+    return over;
+}
+
+extern "C" GuiRect gui_place(Gui *, float width, float height)
+{
+    ImVec2 at = ImGui::GetCursorScreenPos();
+    if (width <= 0)
+        width = std::fmax(1, ImGui::GetContentRegionAvail().x);
+    ImGui::Dummy(ImVec2(width, height));
+    return GuiRect{at.x, at.y, width, height};
+}
+
+extern "C" void gui_beside(Gui *, float gap) { ImGui::SameLine(0, gap); }
+extern "C" void gui_space(Gui *, float height) { ImGui::Dummy(ImVec2(0, height)); }
+extern "C" float gui_width(Gui *) { return ImGui::GetContentRegionAvail().x; }
+extern "C" float gui_line_height(const Gui *gui, GuiFont font) { return gui->font[font]->FontSize; }
+
+extern "C" void gui_text(Gui *gui, GuiFont font, Color color, const char *text)
+{
+    ImGui::PushFont(gui->font[font]);
+    ImGui::PushStyleColor(ImGuiCol_Text, packed(color));
+    ImGui::TextUnformatted(text);
+    ImGui::PopStyleColor();
+    ImGui::PopFont();
+}
+
+extern "C" void gui_text_wrapped(Gui *gui, GuiFont font, Color color, const char *text)
+{
+    ImGui::PushTextWrapPos(0);
+    gui_text(gui, font, color, text);
+    ImGui::PopTextWrapPos();
+}
+
+extern "C" void gui_row(Gui *gui, const char *label, Color color, const char *value)
+{
+    float width, height;
+    gui_text_extent(gui, GUI_NORMAL, value, &width, &height);
+    GuiRect at = gui_place(gui, 0, height);
+    float room = at.width - width - 4 * gui->scale;
+    ImVec4 clip(at.x, at.y, at.x + std::fmax(0, room), at.y + height);
+    ImFont *font = gui->font[GUI_NORMAL];
+    list()->AddText(font, font->FontSize, ImVec2(at.x, at.y), packed(gui_colors.dim), label, nullptr, 0, &clip);
+    gui_draw_text(gui, at.x + at.width - width, at.y, GUI_NORMAL, color, value);
+}
+
+// ---- widgets
+
+extern "C" GuiPress gui_button(Gui *gui, const char *id, const char *label, const char *key, float width, bool is_on)
+{
+    float height = whole(gui->font[GUI_NORMAL]->FontSize + 8 * gui->scale), pad = whole(6 * gui->scale);
+    ImVec2 at = ImGui::GetCursorScreenPos();
+    if (width <= 0)
+        width = std::fmax(1, ImGui::GetContentRegionAvail().x);
+    GuiPress press;
+    press.pressed = ImGui::InvisibleButton(id, ImVec2(width, height));
+    press.held = ImGui::IsItemActive() && ImGui::IsMouseDown(0);
+    bool is_hot = ImGui::IsItemHovered();
+    GuiRect rect = {at.x, at.y, width, height};
+    gui_draw_fill(gui, rect, is_on || press.held ? gui_colors.frame_on : is_hot ? gui_colors.frame_hot : gui_colors.frame);
+    if (is_on || press.held)
+        gui_draw_fill(gui, {at.x, at.y, whole(3 * gui->scale), height}, gui_colors.accent);
+
+    char text[64];
+    std::snprintf(text, sizeof text, is_on ? "\u2713 %s" : "%s", label);
+    // long labels on narrow buttons: small letters, then cut at the edge
+    GuiFont font = GUI_NORMAL;
+    float text_width, text_height, key_width = 0, key_height = 0;
+    gui_text_extent(gui, font, text, &text_width, &text_height);
+    if (text_width > width - 2 * pad) {
+        font = GUI_SMALL;
+        gui_text_extent(gui, font, text, &text_width, &text_height);
+    }
+    if (key)
+        gui_text_extent(gui, GUI_SMALL, key, &key_width, &key_height);
+    bool has_key = key && text_width + key_width + 3 * pad <= width;
+    float x = has_key ? at.x + pad : at.x + std::fmax(2, (width - text_width) / 2);
+    list()->PushClipRect(at, ImVec2(at.x + width, at.y + height), true);
+    gui_draw_text(gui, x, at.y + (height - text_height) / 2, font, gui_colors.text, text);
+    if (has_key)
+        gui_draw_text(gui, at.x + width - pad - key_width, at.y + (height - key_height) / 2, GUI_SMALL, gui_colors.dim, key);
+    list()->PopClipRect();
+    return press;
+}
+
+extern "C" bool gui_slider(Gui *gui, const char *id, float *value, float least, float most, const char *format, float width)
+{
+    ImGui::PushID(id);
+    ImGui::SetNextItemWidth(width > 0 ? width : ImGui::GetContentRegionAvail().x);
+    // no typing into it (Ctrl and click): the keys are the trainer's
+    bool is_moved = ImGui::SliderFloat("##value", value, least, most, format, ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoInput);
+    ImGui::PopID();
+    (void)gui;
+    return is_moved;
+}
+
+extern "C" void gui_progress(Gui *gui, double part, const char *text)
+{
+    float height = whole(gui->font[GUI_NORMAL]->FontSize + 6 * gui->scale), text_width, text_height;
+    GuiRect at = gui_place(gui, 0, height), full = at;
+    part = part > 0 ? std::fmin(part, 1) : 0;   // NaN counts as none
+    gui_draw_fill(gui, at, gui_colors.frame);
+    full.width = whole((float)(at.width * part));
+    gui_draw_fill(gui, full, gui_colors.frame_on);
+    gui_draw_fill(gui, {full.x + full.width, full.y, whole(2 * gui->scale), height}, gui_colors.accent);
+    gui_text_extent(gui, GUI_NORMAL, text, &text_width, &text_height);
+    gui_draw_text(gui, at.x + (at.width - text_width) / 2, at.y + (height - text_height) / 2, GUI_NORMAL, gui_colors.text, text);
+}
+
+extern "C" void gui_tooltip(Gui *gui, const char *title, const char *text, const char *last)
+{
+    if (!ImGui::IsItemHovered() || ImGui::GetCurrentContext()->HoveredIdTimer < 0.5f)
+        return;
+    ImGui::BeginTooltip();
+    ImGui::PushTextWrapPos(whole(320 * gui->scale));
+    if (title)
+        gui_text(gui, GUI_NORMAL, gui_colors.text, title);
+    if (text)
+        gui_text(gui, GUI_SMALL, gui_colors.dim, text);
+    if (last)
+        gui_text(gui, GUI_SMALL, gui_colors.accent, last);
+    ImGui::PopTextWrapPos();
+    ImGui::EndTooltip();
+}
+
+extern "C" bool gui_tabs_begin(Gui *, const char *id) { return ImGui::BeginTabBar(id, ImGuiTabBarFlags_NoTooltip | ImGuiTabBarFlags_FittingPolicyResizeDown); }
+extern "C" bool gui_tab_begin(Gui *, const char *name) { return ImGui::BeginTabItem(name); }
+extern "C" void gui_tab_end(Gui *) { ImGui::EndTabItem(); }
+extern "C" void gui_tabs_end(Gui *) { ImGui::EndTabBar(); }
+
+extern "C" bool gui_text_field(Gui *, const char *id, char *text, size_t capacity, bool take_focus)
+{
+    if (take_focus)
+        ImGui::SetKeyboardFocusHere();
+    ImGui::PushID(id);
+    ImGui::SetNextItemWidth(-1);
+    bool is_entered = ImGui::InputText("##text", text, capacity, ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_AutoSelectAll);
+    ImGui::PopID();
+    return is_entered;
+}
+
+// ---- drawing
+
+extern "C" void gui_draw_fill(Gui *, GuiRect at, Color color)
+{
+    list()->AddRectFilled(ImVec2(at.x, at.y), ImVec2(at.x + at.width, at.y + at.height), packed(color));
+}
+
+extern "C" void gui_draw_frame(Gui *, GuiRect at, Color color)
+{
+    list()->AddRect(ImVec2(at.x, at.y), ImVec2(at.x + at.width, at.y + at.height), packed(color));
+}
+
+extern "C" void gui_draw_line(Gui *, float x0, float y0, float x1, float y1, Color color, float thickness)
+{
+    list()->AddLine(ImVec2(x0, y0), ImVec2(x1, y1), packed(color), thickness);
+}
+
+extern "C" void gui_draw_text(Gui *gui, float x, float y, GuiFont font, Color color, const char *text)
+{
+    list()->AddText(gui->font[font], gui->font[font]->FontSize, ImVec2(whole(x), whole(y)), packed(color), text);   // whole pixels keep letters sharp
+}
+
+extern "C" void gui_text_extent(Gui *gui, GuiFont font, const char *text, float *width, float *height)
+{
+    ImVec2 extent = gui->font[font]->CalcTextSizeA(gui->font[font]->FontSize, 1e9f, 0, text);
+    *width = extent.x;
+    *height = extent.y;
+}

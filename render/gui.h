@@ -1,0 +1,80 @@
+// A thin C border around Dear ImGui and its OpenGL 3 back end: windows at fixed places, text, buttons, sliders, tabs, a text field, and drawing.
+// Fed with WindowInput, so that it works the same in a window and off screen (and in tests); GLFW is not seen here. Pixels, y down.
+// Needs a current GL context. Other ImGui contexts (render/overlay.h) are left as they are: a Gui's own is current from gui_begin to gui_end only.
+#ifndef SELDINGER_RENDER_GUI_H
+#define SELDINGER_RENDER_GUI_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#include "render/color_map.h"
+#include "render/window.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+typedef struct Gui Gui;
+typedef struct GuiRect { float x, y, width, height; } GuiRect;
+typedef enum { GUI_SMALL, GUI_NORMAL, GUI_LARGE, GUI_HUGE, GUI_FONTS } GuiFont;   // 13, 15, 19 and 28 pixels times the scale
+
+typedef struct GuiColors {     // of everything; the marks are told apart by the colour-blind, and no mark is told by colour alone
+    Color window, panel, frame, frame_hot, frame_on, line, text, dim, accent, good, warning, bad;
+} GuiColors;
+extern const GuiColors gui_colors;
+
+Gui *gui_create(char *message, size_t capacity);
+void gui_destroy(Gui *gui);
+
+// A frame. `scale` of text and widgets; letters are made anew where it changes by more than a twentieth. `is_silent`: lays out, takes no input and
+// draws nothing (a window's contents are known from its frame before).
+void gui_begin(Gui *gui, const WindowInput *input, double scale, bool is_silent);
+// The last of them draws into `framebuffer`, which is `input->width` x `height` large. Leaves blending and scissor test off.
+void gui_end(Gui *gui, unsigned framebuffer);
+float gui_scale(const Gui *gui);        // of the current letters
+
+// Windows at a fixed place. Contents that do not fit scroll. NO_INPUT lets the mouse through; ON_TOP lies over the ones before and takes their clicks.
+enum { GUI_NO_BACKGROUND = 1, GUI_NO_INPUT = 2, GUI_ON_TOP = 4, GUI_SCROLL_TO_END = 8 };
+void gui_window_begin(Gui *gui, const char *id, GuiRect at, unsigned flags);
+// The height [pixel] that the contents would need more than there is; negative: still free.
+float gui_window_end(Gui *gui);
+
+// Flow: each thing goes below the last one, or beside it.
+GuiRect gui_place(Gui *gui, float width, float height);   // takes room (width 0: all there is) and says where it is, for drawing
+void gui_beside(Gui *gui, float gap);
+void gui_space(Gui *gui, float height);
+float gui_width(Gui *gui);                                // left in this line
+float gui_line_height(const Gui *gui, GuiFont font);
+
+void gui_text(Gui *gui, GuiFont font, Color color, const char *text);
+void gui_text_wrapped(Gui *gui, GuiFont font, Color color, const char *text);
+void gui_row(Gui *gui, const char *label, Color color, const char *value);        // label left, value right, in one line
+
+typedef struct GuiPress { bool pressed, held; } GuiPress; // clicked in this frame; the mouse is down on it
+// `width` 0: all there is. `key` at its right end in small letters, where both fit. `is_on`: filled, with a tick.
+GuiPress gui_button(Gui *gui, const char *id, const char *label, const char *key, float width, bool is_on);
+// True while it is being moved. `format` as for printf of one double.
+bool gui_slider(Gui *gui, const char *id, float *value, float least, float most, const char *format, float width);
+void gui_progress(Gui *gui, double part, const char *text);
+// Over the last thing, once the mouse has rested on it. NULL texts are left out.
+void gui_tooltip(Gui *gui, const char *title, const char *text, const char *last);
+
+bool gui_tabs_begin(Gui *gui, const char *id);
+bool gui_tab_begin(Gui *gui, const char *name);           // true: fill it, then gui_tab_end
+void gui_tab_end(Gui *gui);
+void gui_tabs_end(Gui *gui);
+
+// One line of UTF-8. True when Enter was pressed. Takes the keyboard when `take_focus`.
+bool gui_text_field(Gui *gui, const char *id, char *text, size_t capacity, bool take_focus);
+
+// Drawing, in the window that is open.
+void gui_draw_fill(Gui *gui, GuiRect at, Color color);
+void gui_draw_frame(Gui *gui, GuiRect at, Color color);
+void gui_draw_line(Gui *gui, float x0, float y0, float x1, float y1, Color color, float thickness);
+void gui_draw_text(Gui *gui, float x, float y, GuiFont font, Color color, const char *text);
+void gui_text_extent(Gui *gui, GuiFont font, const char *text, float *width, float *height);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

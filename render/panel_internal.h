@@ -1,0 +1,61 @@
+// What panel.c (input, dialogues, what the panel remembers) and panel_draw.c (what it looks like) share.
+#ifndef SELDINGER_RENDER_PANEL_INTERNAL_H
+#define SELDINGER_RENDER_PANEL_INTERNAL_H
+
+#include "render/panel.h"
+#include "render/plot.h"
+
+typedef enum { DIALOGUE_NONE, DIALOGUE_QUIT, DIALOGUE_RESTART, DIALOGUE_TRAINEE } Dialogue;
+enum { PANEL_MESSAGES = 100, PANEL_TABS = 5, BUTTONS_IN_ROW = 5 };
+
+typedef struct PanelMessage {
+    double now_s;
+    PanelMark mark;
+    char text[200];
+} PanelMessage;
+
+struct Panel {
+    Gui *gui;
+    KeyState keys;
+    PanelLayout layout;            // as last drawn
+    bool is_drawn;                 // layout and contents' sizes are known
+    int width, height;
+    // mouse on buttons and sliders, until the next panel_take_input
+    bool mouse_held[ACTION_COUNT];
+    bool latched[ACTION_COUNT];    // Fast and Slow stay on by mouse: it has one button for two things
+    int mouse_pressed[ACTION_COUNT];
+    bool xray_set;
+    XrayControl xray;
+    bool held[ACTION_COUNT];       // as last given out: buttons light up with their keys
+    // mouse in a view
+    int drag_view;
+    unsigned drag_buttons;
+    double mouse_x, mouse_y, dragged;   // dragged: way since the press [pixel]
+    // what is open
+    Dialogue dialogue;
+    bool dialogue_is_new;
+    int answer;                    // a click on its yes (1) or no (-1)
+    char name[64];                 // the text field
+    bool has_help, has_panels, has_hints;
+    double used_s[ACTION_COUNT];   // how long an action was held, or 1 s for each press: hints disappear with use
+    // plots and log
+    RunningPlot force, torque, wall;
+    int plots;
+    float plot_height;
+    int message_count;             // of all; the last PANEL_MESSAGES are kept
+    PanelMessage message[PANEL_MESSAGES];
+};
+
+// The buttons of each tab, row by row: every action is in one (a test says so).
+typedef struct ButtonRow {
+    int tab, count;
+    ActionId action[BUTTONS_IN_ROW];
+} ButtonRow;
+extern const ButtonRow panel_button_row[];
+extern const int panel_button_row_count;
+
+void panel_draw_all(Panel *panel, const WindowInput *input, const PanelState *state);
+int panel_current_hint(const Panel *panel);                // -1: none left
+void panel_hint_text(int hint, char *text, size_t capacity);
+
+#endif

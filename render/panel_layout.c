@@ -1,0 +1,68 @@
+#include "render/panel.h"
+
+#include <math.h>
+
+// 1 at 1280x720, growing slower than the window so that views gain more than letters do; a display's density on top, as far as 1024x600 of its
+// points fit into the window.
+static double text_scale(double width, double height, double density)
+{
+    double fits = fmin(width / 1024, height / 600);
+    density = fmax(0.6, fmin(density, fmax(fits, 0.6)));
+    double wide = 1 + 0.00042 * (width / density - 1280), high = 1 + 0.00075 * (height / density - 720);
+    return density * fmax(0.85, fmin(wide, high));
+}
+
+static PanelRect place_view(PanelLayout *layout, PanelView view, PanelRect rect, int window_height)
+{
+    int left = (int)floor(rect.x), top = (int)floor(rect.y), right = (int)floor(rect.x + rect.width), bottom = (int)floor(rect.y + rect.height);
+    if (right <= left || bottom <= top)
+        right = left, bottom = top;
+    layout->view[view] = (ViewPort){0, left, window_height - bottom, right - left, bottom - top};
+    return layout->view_rect[view] = (PanelRect){(float)left, (float)top, (float)(right - left), (float)(bottom - top)};
+}
+
+// The main one at the left, the two others one above the other.
+static void place_all_views(PanelLayout *layout, PanelRect centre, float gap, int window_height)
+{
+    float main_width = floorf(centre.width * 0.6f), side = centre.width - main_width - gap, half = floorf((centre.height - gap) / 2);
+    place_view(layout, VIEW_FLUOROSCOPY, (PanelRect){centre.x, centre.y, main_width, centre.height}, window_height);
+    place_view(layout, VIEW_3D, (PanelRect){centre.x + main_width + gap, centre.y, side, half}, window_height);
+    place_view(layout, VIEW_ANGIOSCOPY, (PanelRect){centre.x + main_width + gap, centre.y + half + gap, side, centre.height - half - gap}, window_height);
+}
+
+PanelLayout panel_layout(int width, int height, double scale, PanelView view, bool has_panels)
+{
+    PanelLayout layout = {.scale = text_scale(width, height, scale), .main = view == VIEW_ALL ? VIEW_FLUOROSCOPY : view};
+    float s = (float)layout.scale, w = (float)width, h = (float)height, gap = ceilf(2 * s);
+    if (!has_panels) {
+        PanelRect whole = {0, 0, w, h};
+        if (view == VIEW_ALL)
+            place_all_views(&layout, whole, gap, height);
+        else
+            place_view(&layout, view, whole, height);
+        return layout;
+    }
+    layout.top = (PanelRect){0, 0, w, floorf(40 * s)};
+    float bottom = floorf(66 * s), y = layout.top.height + gap, middle = h - y - bottom - gap;
+    layout.bottom = (PanelRect){0, h - bottom, w, bottom};
+    float left = floorf(268 * s);
+    // the main view keeps a little more than a square, the insets take what is over
+    float right = floorf(fminf(fmaxf(w - left - 1.15f * middle, 268 * s), 380 * s)), right_x = w - right;
+    layout.left = (PanelRect){0, y, left, middle};
+    layout.right = (PanelRect){right_x, y, right, middle};
+    PanelRect centre = {left + gap, y, right_x - left - 2 * gap, middle};
+    if (view == VIEW_ALL) {
+        place_all_views(&layout, centre, gap, height);
+        return layout;
+    }
+    place_view(&layout, view, centre, height);
+    float inset = floorf(fminf(0.75f * right, (middle - 286 * s) / 2 - gap)), inset_y = y;
+    for (int i = 0; i < VIEW_COUNT; i++)
+        if (i != (int)view) {
+            place_view(&layout, (PanelView)i, (PanelRect){right_x, inset_y, right, inset}, height);
+            inset_y += inset + gap;
+        }
+    layout.right.y = inset_y;
+    layout.right.height = y + middle - inset_y;
+    return layout;
+}

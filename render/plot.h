@@ -1,0 +1,30 @@
+// A running plot: the last seconds of one quantity, least and most of each bin kept so that no peak is lost. Plain numbers, then a drawing.
+#ifndef SELDINGER_RENDER_PLOT_H
+#define SELDINGER_RENDER_PLOT_H
+
+#include "render/gui.h"
+
+#include <stdint.h>
+
+enum { PLOT_BINS = 200 };
+#define PLOT_SPAN_S 20.0
+
+typedef struct RunningPlot {
+    int64_t last;                  // number of the newest bin, PLOT_SPAN_S / PLOT_BINS seconds each, counted from time 0
+    int count;                     // bins with a place, newest last; 0 before the first sample
+    float least[PLOT_BINS], most[PLOT_BINS];   // by bin number modulo PLOT_BINS; NaN: no sample in it
+    double value, time_s;          // newest sample
+} RunningPlot;
+
+void plot_clear(RunningPlot *plot);
+// Time may stand still (a pause); where it goes backwards, or on by more than the span, the plot begins anew. NaN is left out.
+void plot_add(RunningPlot *plot, double time_s, double value);
+// Least and most of what is shown; false without a sample.
+bool plot_range(const RunningPlot *plot, double *least, double *most);
+// A round number of ticks: the step (1, 2 or 5 times a power of ten) that puts at most `most_ticks` steps into `span` > 0.
+double plot_tick_step(double span, int most_ticks);
+// Title and newest value with unit above, ticks with numbers at the left, a line each 5 s. `least_span`: the axis shows at least 0 to this, so that
+// noise is not blown up. `height` of all.
+void plot_draw(const RunningPlot *plot, Gui *gui, const char *title, const char *unit, int decimals, double least_span, float height);
+
+#endif

@@ -1,0 +1,199 @@
+// The panel off screen: layout at every size, what the mouse does on buttons and views, dialogues, names typed; what a frame costs.
+// SELDINGER_PICTURES=FOLDER keeps a picture of each size and state, to be looked at.
+#include "render/gl_canvas.h"
+#include "render/gl_context.h"
+#include "render/panel_internal.h"
+#include "render/png_file.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+#include <epoxy/gl.h>
+#include <math.h>
+#include <time.h>
+
+static GlContext *context;
+
+static int open_gl(void **state)
+{
+    (void)state;
+    char message[256] = "";
+    context = gl_context_create(message, sizeof message);
+    if (!context)
+        print_message("no EGL: %s\n", message);
+    return 0;
+}
+
+static int close_gl(void **state)
+{
+    (void)state;
+    gl_context_destroy(context);
+    return 0;
+}
+
+// ---- a made-up state
+
+static const PanelFigure figures[] = {{"Time", 83.4, "s", 1, MARK_NONE},           {"Fluoroscopy", 41.2, "s", 1, MARK_GOOD},
+                                      {"Contrast", 12.5, "ml", 1, MARK_WARNING},    {"Path efficiency", 0.83, "", 2, MARK_GOOD},
+                                      {"Wall force, peak", 412, "mN", 0, MARK_BAD}, {"Distance to target", NAN, "mm", 1, MARK_NONE}};
+static const char *const errors[] = {"1:02 wrong branch: left vertebral", "1:17 tip force above 300 mN"};
+static const PanelDevice devices[] = {{"Keyboard", HAND_READY, NULL},
+                                      {"Logitech Extreme 3D", HAND_READY, "y push, z twist, trigger pedal"},
+                                      {"Roller encoder", HAND_LOST, "unplugged at 1:20; the tool stands still"}};
+
+static PanelState some_state(void)
+{
+    return (PanelState){.now_s = 90, .time_s = 83.4, .title = "Reach the aneurysm", .trainee = "A. Müller",
+                        .instructions = "Bring the tip from the internal carotid into the aneurysm and hold it there for two seconds. Do not enter the "
+                                        "posterior communicating artery.",
+                        .target = "aneurysm", .hold_s = 1.2, .hold_needed_s = 2, .figure_count = 6, .figure = figures, .error_count = 2,
+                        .error = errors, .tool = "0.014\" guidewire, J tip, 200 elements", .inserted_mm = 120.4, .turned_deg = -35, .push_mm_s = 12,
+                        .twist_deg_s = -40, .force_n = 0.061, .torque_n_mm = 0.0123, .wall_max_n = 0.18, .wall_sum_n = 0.93,
+                        .xray = {.pedal = 1, .pulses_s = 15, .lao_deg = 30, .cra_deg = -10, .field_mm = 160, .collimator = {0.1f, 0.2f, 0, 0.3f}},
+                        .mode = PANEL_LIVE, .fluoro_s = 41.2, .contrast_ml = 12.5, .cine_frame = 11, .cine_frames = 120, .view = VIEW_FLUOROSCOPY,
+                        .is_following = true, .step_median_us = 182, .step_p999_us = 403, .real_time_factor = 1, .frame_ms = 9.1,
+                        .missed_deadlines = 3, .device_count = 3, .device = devices};
+}
+
+static WindowInput still_input(int width, int height, double scale)
+{
+    return (WindowInput){.width = width, .height = height, .scale = scale, .mouse_x = -1, .mouse_y = -1, .has_focus = true};
+}
+
+static Panel *new_panel(void)
+{
+    char message[256] = "";
+    Panel *panel = panel_create(message, sizeof message);
+    assert_non_null(panel);
+    for (int i = 0; i < 2000; i++)   // 20 s of samples
+        panel_sample(panel, 63.4 + 0.01 * i, 0.06 + 0.05 * sin(0.02 * i) + (i == 700 ? 0.2 : 0), 0.02 * sin(0.013 * i), 0.1 + 0.08 * cos(0.01 * i));
+    panel_message(panel, 12, MARK_NONE, "Session starts: phantom, 0.014\" guidewire");
+    panel_message(panel, 62, MARK_BAD, "Wrong branch: left vertebral");
+    panel_message(panel, 80, MARK_WARNING, "Roller encoder lost: unplugged");
+    return panel;
+}
+
+// Views filled with greys as pictures would, then the panel.
+static void draw(Panel *panel, const GlCanvas *canvas, const WindowInput *input, const PanelState *state)
+{
+    const float black[3] = {0, 0, 0};
+    gl_canvas_begin(canvas, black);
+    PanelLayout layout = panel_layout(input->width, input->height, input->scale, state->view, panel_has_panels(panel));
+    glEnable(GL_SCISSOR_TEST);
+    for (int i = 0; i < VIEW_COUNT; i++) {
+        ViewPort v = layout.view[i];
+        glScissor(v.x, v.y, v.width, v.height);
+        glClearColor(i == 0 ? 0.7f : 0.1f, i == 0 ? 0.7f : 0.11f, i == 0 ? 0.7f : 0.14f, 1);
+        glClear(GL_COLOR_BUFFER_BIT);
+    }
+    glDisable(GL_SCISSOR_TEST);
+    panel_draw(panel, input, state, canvas->framebuffer);
+}
+
+static void keep_picture(const GlCanvas *canvas, const char *name)
+{
+    const char *folder = getenv("SELDINGER_PICTURES");
+    if (!folder)
+        return;
+    char path[512];
+    snprintf(path, sizeof path, "%s/panel-%s.png", folder, name);
+    uint8_t *rgb = malloc((size_t)canvas->width * (size_t)canvas->height * 3);
+    assert_non_null(rgb);
+    gl_canvas_read(canvas, rgb);
+    assert_true(png_file_write(path, canvas->width, canvas->height, rgb, NULL, 0));
+    free(rgb);
+}
+
+static GlCanvas new_canvas(int width, int height)
+{
+    GlCanvas canvas;
+    char message[256] = "";
+    assert_true(gl_canvas_create(&canvas, width, height, 1, message, sizeof message));
+    return canvas;
+}
+
+static void pictures_at_all_sizes(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    static const struct { int width, height; double scale; PanelView view; const char *name; } size[] = {
+        {1280, 720, 1, VIEW_FLUOROSCOPY, "1280x720"}, {1024, 600, 1, VIEW_FLUOROSCOPY, "1024x600"}, {1920, 1080, 1, VIEW_3D, "1920x1080"},
+        {2560, 1440, 2, VIEW_FLUOROSCOPY, "2560x1440@2"}, {1280, 720, 1, VIEW_ALL, "all-views"}, {2560, 1440, 1, VIEW_ALL, "2560x1440"}};
+    for (size_t i = 0; i < sizeof size / sizeof size[0]; i++) {
+        GlCanvas canvas = new_canvas(size[i].width, size[i].height);
+        WindowInput input = still_input(size[i].width, size[i].height, size[i].scale);
+        PanelState state = some_state();
+        state.view = size[i].view;
+        if (i == 1)
+            state.warnings = WARN_SLOW | WARN_NO_FIFO | WARN_DEVICE_LOST;
+        Panel *panel = new_panel();
+        draw(panel, &canvas, &input, &state);
+        keep_picture(&canvas, size[i].name);
+        assert_int_equal(glGetError(), GL_NO_ERROR);
+        panel_show_help(panel, true);
+        draw(panel, &canvas, &input, &state);
+        char name[64];
+        snprintf(name, sizeof name, "%s-help", size[i].name);
+        keep_picture(&canvas, name);
+        panel_destroy(panel);
+        gl_canvas_destroy(&canvas);
+    }
+}
+
+// Process CPU, the driver's threads with it.
+static double cpu_ms(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
+}
+
+static int by_size(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static void what_a_frame_costs(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    for (int i = 0; i < 2; i++) {
+        enum { FRAMES = 60 };
+        GlCanvas canvas = i ? new_canvas(1920, 1080) : new_canvas(1280, 720);
+        WindowInput input = still_input(canvas.width, canvas.height, 1);
+        PanelState state = some_state();
+        Panel *panel = new_panel();
+        double ms[FRAMES];
+        for (int frame = 0; frame < FRAMES; frame++) {
+            state.time_s += 1.0 / 30;
+            state.force_n = 0.06 + 0.02 * sin(0.3 * frame);
+            state.inserted_mm += 0.4;
+            double start = cpu_ms();
+            panel_draw(panel, &input, &state, canvas.framebuffer);
+            glFinish();
+            ms[frame] = cpu_ms() - start;
+        }
+        double mean = 0;
+        for (int frame = 10; frame < FRAMES; frame++)
+            mean += ms[frame] / (FRAMES - 10);
+        qsort(ms + 10, FRAMES - 10, sizeof *ms, by_size);
+        print_message("panel alone, %dx%d: first frame %.1f ms CPU, then mean %.2f, median %.2f, most %.2f\n", canvas.width, canvas.height, ms[0], mean,
+                      ms[10 + (FRAMES - 10) / 2], ms[FRAMES - 1]);
+        panel_destroy(panel);
+        gl_canvas_destroy(&canvas);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_at_all_sizes), cmocka_unit_test(what_a_frame_costs)};
+    return cmocka_run_group_tests(tests, open_gl, close_gl);
+}
