@@ -1,0 +1,84 @@
+#include "cli/live_session.h"
+
+#include "sim/replay.h"
+
+#include <string.h>
+
+// An hour of frames at this spacing takes 1.4 GB for 200 elements; `replay` simulates what lies between.
+static const double frame_ms = 40;
+
+static bool take_over_step(void *context, Simulator *simulator, Command command, const XrayControl *xray)
+{
+    LiveSession *session = context;
+    lesson_step(session->lesson, simulator, command, xray);
+    return !session->recording || recording_step(session->recording, simulator, command, xray);
+}
+
+static bool take_over(LiveSession *session, const LiveSessionOptions *options, Faults *faults)
+{
+    const RecordedRun *run = options->resume;
+    int64_t steps = 0;
+    while (steps < run->step_count && run->time_s[steps] <= options->resume_s + 1e-9)
+        steps++;
+    ReplayVerdict verdict = replay_verify(session->simulator, run, steps, false, take_over_step, session);
+    session->resumed_s = simulator_time_s(session->simulator);
+    if (verdict.first_different < 0)
+        return true;
+    faults_add(faults, session->scene->path, 0, 0, "the recording cannot be resumed: step %lld gives another state than it holds; `seldinger replay --verify` says more",
+               (long long)verdict.first_different);
+    return false;
+}
+
+bool live_session_open(LiveSession *session, const Scene *scene, const OpenVessel *open, const LiveSessionOptions *options, Faults *faults)
+{
+    *session = (LiveSession){.scene = scene};
+    session->simulator = simulator_create(scene, open->vessel, faults);
+    session->lesson = session->simulator ? lesson_create(session->simulator, open->tree) : NULL;
+    if (session->simulator && !session->lesson)
+        faults_add(faults, scene->path, 0, 0, "no memory for a session");
+    if (session->lesson && options->record_path) {
+        RecordingOptions record = recording_default_options();
+        record.frame_ms = frame_ms;
+        snprintf(session->record_path, sizeof session->record_path, "%s", options->record_path);
+        session->recording = recording_create(options->record_path, session->simulator, &record, faults);
+    }
+    bool good = session->lesson && (session->recording || !options->record_path) && (!options->resume || take_over(session, options, faults));
+    if (good) {
+        RealtimeOptions realtime = realtime_default_options();
+        realtime.simulator = session->simulator;
+        realtime.recording = session->recording;
+        realtime.hand_count = options->hand_count;
+        realtime.hand = options->hand;
+        realtime.xray = options->xray;
+        realtime.paused = options->paused;
+        realtime.after_step = lesson_step;
+        realtime.publish = lesson_publish;
+        realtime.context = session->lesson;
+        realtime.extra_bytes = lesson_view_bytes(session->lesson);
+        session->realtime = realtime_start(&realtime, faults);
+        good = session->realtime != NULL;
+    }
+    if (good)
+        return true;
+    if (session->recording)
+        recording_close(session->recording, session->simulator, faults);
+    session->recording = NULL;
+    live_session_free(session);
+    return false;
+}
+
+bool live_session_stop(LiveSession *session, RealtimeFigures *figures, Faults *faults)
+{
+    *figures = realtime_stop(session->realtime);
+    session->realtime = NULL;
+    bool whole = !session->recording || recording_close(session->recording, session->simulator, faults);
+    session->recording = NULL;
+    return whole;
+}
+
+void live_session_free(LiveSession *session)
+{
+    lesson_free(session->lesson);
+    simulator_destroy(session->simulator);
+    *session = (LiveSession){0};
+}

@@ -1,0 +1,463 @@
+#include "cli/trainer.h"
+
+#include "cli/live_session.h"
+#include "cli/trainer_files.h"
+#include "cli/trainer_panel.h"
+#include "input/gamepad.h"
+#include "input/hand.h"
+#include "recon/volume.h"
+#include "render/gl_canvas.h"
+#include "render/png_file.h"
+#include "render/pulse_clock.h"
+#include "render/views.h"
+
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { PADS = 4 };
+
+typedef struct Trainer {
+    const TrainerOptions *options;
+    Scene *scene;
+    OpenVessel *open;
+    Window *window;
+    Panel *panel;
+    Views *views;
+    Desk desk;
+    HandPort keyboard, pad[PADS];
+    bool pad_refused[PADS];
+    Gamepad gamepad[PADS];
+    DeviceMap *built_in[2];          // for gamepads, for joysticks
+    Hands *hands;
+    LiveSession session;
+    TrainerPanel shown;
+    PulseClock pulses;
+    double begun_s;                  // wall clock
+    double frame_s, frame_cpu_s;     // … and process CPU time at the last frame
+    bool is_paused, has_told_end;
+    char trainee[64];
+    time_t began_at;
+    TimeHistogram frame_cpu_ns;
+    TrainerFigures *figures;
+} Trainer;
+
+static double clock_s(clockid_t which)
+{
+    struct timespec now;
+    clock_gettime(which, &now);
+    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+}
+
+static double since_begin(const Trainer *trainer) { return clock_s(CLOCK_MONOTONIC) - trainer->begun_s; }
+
+__attribute__((format(printf, 3, 4))) static void say(Trainer *trainer, PanelMark mark, const char *format, ...)
+{
+    char text[4600];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    panel_message(trainer->panel, since_begin(trainer), mark, text);
+}
+
+// --- a session's start and end ---
+
+static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *faults)
+{
+    const TrainerOptions *options = trainer->options;
+    char path[4096];
+    HandPort *hand[1 + PADS + HANDS_MOST] = {&trainer->keyboard};
+    int count = 1;
+    for (int i = 0; i < PADS; i++)
+        hand[count++] = &trainer->pad[i];
+    for (int i = 0; trainer->hands && i < HANDS_MOST; i++)
+        hand[count++] = hands_port(trainer->hands, i);
+    trainer_file_name(options->folder, trainer->scene->path, ".h5", path, sizeof path);
+    LiveSessionOptions session = {.record_path = options->is_recorded ? path : NULL, .hand_count = count, .hand = hand, .xray = trainer->desk.xray,
+                                  .resume = resume, .resume_s = options->resume_s, .paused = trainer->is_paused};
+    if (!live_session_open(&trainer->session, trainer->scene, trainer->open, &session, faults))
+        return false;
+    trainer->pulses = pulse_clock_start(trainer->session.resumed_s);
+    trainer->began_at = time(NULL);
+    trainer->has_told_end = false;
+    trainer_panel_begin(&trainer->shown, trainer->scene, trainer->trainee);
+    return true;
+}
+
+// Names of the hands that have given reports, for the session file.
+static void name_devices(Trainer *trainer, char out[SESSION_NAME])
+{
+    char all[2048] = "keyboard";
+    size_t used = strlen(all);
+    for (int i = 0; i < PADS; i++)
+        if (atomic_load(&trainer->pad[i].reports) > 0)
+            used += (size_t)snprintf(all + used, sizeof all - used, ", gamepad");
+    for (int i = 0; trainer->hands && i < HANDS_MOST; i++) {
+        HandInfo info;
+        hands_info(trainer->hands, i, &info);
+        if (info.reports > 0)
+            used += (size_t)snprintf(all + used, sizeof all - used, ", %.95s", info.name);
+        trainer->figures->reports += info.reports;
+    }
+    snprintf(out, SESSION_NAME, "%.*s", SESSION_NAME - 1, all);
+}
+
+// The thread ends, the recording is closed, the session file is written beside it.
+static bool end_session(Trainer *trainer, Faults *faults)
+{
+    RealtimeFigures real;
+    TrainerFigures *figures = trainer->figures;
+    LiveSession *session = &trainer->session;
+    char device[SESSION_NAME];
+    bool whole = live_session_stop(session, &real, faults);
+    memcpy(figures->step_us, real.step_us, sizeof figures->step_us);
+    memcpy(figures->late_us, real.late_us, sizeof figures->late_us);
+    figures->deadline_misses = real.deadline_misses;
+    figures->slowed_s = real.slowed_s;
+    figures->real_time_priority = real.real_time_priority;
+    snprintf(figures->hash, sizeof figures->hash, "%016llx", (unsigned long long)simulator_hash(session->simulator));
+    snprintf(figures->recording, sizeof figures->recording, "%s", session->record_path);
+    name_devices(trainer, device);
+    if (whole && session->record_path[0])
+        whole = trainer_save_session(trainer->scene, trainer->trainee, device, trainer->began_at, lesson_score(session->lesson), session->record_path, faults);
+    live_session_free(session);
+    return whole;
+}
+
+// --- hands ---
+
+static void drive_by_keys(Trainer *trainer, const PanelActions *actions)
+{
+    Command command = desk_command(&trainer->desk, actions);
+    HandPort *port = &trainer->keyboard;
+    atomic_store_explicit(&port->push_mm_s, command.push_mm_s, memory_order_relaxed);
+    atomic_store_explicit(&port->twist_deg_s, command.twist_deg_s, memory_order_relaxed);
+    atomic_store_explicit(&port->buttons, actions->held[ACTION_STOP] ? HAND_STOP : 0, memory_order_relaxed);
+}
+
+static const DeviceMap *map_for_pad(const Trainer *trainer, const WindowGamepad *pad)
+{
+    const DeviceMap *map[TRAINER_MAPS + 2];
+    int count = 0;
+    for (int i = 0; i < trainer->options->map_count; i++)
+        map[count++] = trainer->options->map[i];
+    for (int i = 0; i < 2; i++)
+        if (trainer->built_in[i])
+            map[count++] = trainer->built_in[i];
+    return gamepad_choose_map(map, count, pad->is_mapped, pad->name);
+}
+
+static void drive_by_pads(Trainer *trainer)
+{
+    for (int i = 0; i < PADS; i++) {
+        WindowGamepad pad;
+        Gamepad *gamepad = &trainer->gamepad[i];
+        bool is_there = window_gamepad(trainer->window, i, &pad), was_there = atomic_load(&trainer->pad[i].state) == HAND_READY;
+        if (!is_there) {
+            if (was_there) {
+                gamepad_lost(gamepad, &trainer->pad[i]);
+                say(trainer, MARK_WARNING, "%s unplugged: plug it in again to go on", window_gamepad_name(trainer->window, i));
+            }
+            gamepad->map = NULL;
+            continue;
+        }
+        const DeviceMap *map = gamepad->map || trainer->pad_refused[i] ? NULL : map_for_pad(trainer, &pad);
+        if (map) {
+            static Faults faults;
+            faults_clear(&faults);
+            bool is_bound = gamepad_bind(gamepad, map, pad.axis_count, pad.button_count, pad.name, &faults);
+            trainer->pad_refused[i] = !is_bound;
+            say(trainer, is_bound ? MARK_GOOD : MARK_BAD, "%s: %s", pad.name, is_bound ? map->name : faults.text[0]);
+        }
+        if (gamepad->map)
+            gamepad_update(gamepad, pad.axis, pad.axis_count, pad.button, pad.button_count, &trainer->pad[i]);
+    }
+}
+
+static unsigned buttons_of_hands(const Trainer *trainer)
+{
+    unsigned buttons = 0;
+    for (int i = 0; i < PADS; i++)
+        buttons |= atomic_load_explicit(&trainer->pad[i].buttons, memory_order_relaxed);
+    for (int i = 0; trainer->hands && i < HANDS_MOST; i++)
+        buttons |= atomic_load_explicit(&hands_port(trainer->hands, i)->buttons, memory_order_relaxed);
+    return buttons;
+}
+
+// --- what is pressed ---
+
+static void take_screenshot(Trainer *trainer, const WindowInput *input)
+{
+    char path[4096], message[256];
+    uint8_t *rgb = malloc((size_t)input->width * (size_t)input->height * 3);
+    trainer_file_name(trainer->options->folder, trainer->scene->path, ".png", path, sizeof path);
+    if (rgb)
+        gl_framebuffer_read(0, input->width, input->height, rgb);
+    if (rgb && png_file_write(path, input->width, input->height, rgb, message, sizeof message))
+        say(trainer, MARK_GOOD, "picture %s", path);
+    else
+        say(trainer, MARK_BAD, "no picture: %s", rgb ? message : "no memory");
+    free(rgb);
+}
+
+static bool restart(Trainer *trainer, Faults *faults)
+{
+    bool whole = end_session(trainer, faults);
+    panel_forget_samples(trainer->panel);
+    fluoroscope_forget(views_fluoroscope(trainer->views));
+    say(trainer, whole ? MARK_GOOD : MARK_BAD, whole ? "a new session; the last one is saved" : "a new session; the last one could not be saved: %s", faults->text[0]);
+    faults_clear(faults);
+    trainer->is_paused = false;
+    return begin_session(trainer, NULL, faults);
+}
+
+// False ends the program.
+static bool obey(Trainer *trainer, const PanelActions *actions, const WindowInput *input, Faults *faults)
+{
+    if (actions->trainee_set) {
+        snprintf(trainer->trainee, sizeof trainer->trainee, "%s", actions->trainee);
+        say(trainer, MARK_NONE, "trainee: %s", trainer->trainee);
+    }
+    if (actions->pressed[ACTION_PAUSE] & 1) {
+        trainer->is_paused = !trainer->is_paused;
+        realtime_pause(trainer->session.realtime, trainer->is_paused);
+        if (trainer->hands)
+            hands_pause(trainer->hands, trainer->is_paused);
+    }
+    if (actions->pressed[ACTION_BOOKMARK]) {
+        trainer->desk.xray.bookmark++;
+        say(trainer, MARK_GOOD, "bookmark %.0f", (double)trainer->desk.xray.bookmark);
+    }
+    if (actions->pressed[ACTION_SAVE])
+        say(trainer, trainer->session.record_path[0] ? MARK_GOOD : MARK_WARNING, trainer->session.record_path[0] ? "recorded up to now in %s" : "this session is not recorded%s",
+            trainer->session.record_path);
+    if (actions->pressed[ACTION_FULL_SCREEN] & 1)
+        window_set_full_screen(trainer->window, !window_is_full_screen(trainer->window));
+    if (actions->pressed[ACTION_SCREENSHOT])
+        take_screenshot(trainer, input);
+    if (actions->pressed[ACTION_RESTART] && !restart(trainer, faults))
+        return false;
+    return !actions->pressed[ACTION_QUIT] && input->close != WINDOW_ENDED;
+}
+
+// --- what is shown ---
+
+static void tell_news(Trainer *trainer, const Moment *moment)
+{
+    char text[256];
+    const LessonView *lesson = moment->extra;
+    while (trainer->hands && hands_message(trainer->hands, text, sizeof text))
+        say(trainer, MARK_WARNING, "%s", text);
+    if (!trainer->has_told_end && (lesson->score.state == SCORE_REACHED || lesson->score.state == SCORE_TIME_OUT)) {
+        trainer->has_told_end = true;
+        say(trainer, lesson->score.state == SCORE_REACHED ? MARK_GOOD : MARK_BAD, "%s: %.0f points",
+            lesson->score.state == SCORE_REACHED ? "target reached and held" : "the time is over", lesson->score.points);
+    }
+}
+
+static void show_devices(Trainer *trainer)
+{
+    TrainerPanel *shown = &trainer->shown;
+    PanelState *state = &shown->state;
+    state->device_count = 0;
+    state->device = shown->device;
+    for (int i = 0; trainer->hands && i < HANDS_MOST; i++) {
+        HandInfo info;
+        hands_info(trainer->hands, i, &info);
+        if (info.state == HAND_ABSENT)
+            continue;
+        int at = state->device_count++;
+        snprintf(shown->device_name[at], sizeof shown->device_name[at], "%s", info.name);
+        snprintf(shown->device_note[at], sizeof shown->device_note[at], "%s, %.0f reports/s; %s", info.map, info.report_hz, info.force);
+        shown->device[at] = (PanelDevice){shown->device_name[at], info.state, shown->device_note[at]};
+        if (info.state == HAND_LOST)
+            state->warnings |= WARN_DEVICE_LOST;
+    }
+}
+
+static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *layout, const XrayControl *xray)
+{
+    const Moment *moment = realtime_moment(trainer->session.realtime);
+    if (!moment)
+        return;
+    const LessonView *lesson = moment->extra;
+    const Pose *pose = moment->pose;
+    pulse_clock_advance(&trainer->pulses, pose->time_s, &pose->xray);
+    ViewsFrame frame = {.pose = pose, .xray = xray, .contrast = lesson->node_count > 0 ? lesson->concentration : NULL,
+                        .pulse = (uint32_t)trainer->pulses.count, .look = &trainer->desk.look};
+    views_draw(trainer->views, &frame, layout, input->width, input->height, 0);
+    trainer_panel_show(&trainer->shown, trainer->scene, pose, lesson, &moment->figures, xray);
+    PanelState *state = &trainer->shown.state;
+    FluoroscopeState fluoroscope = fluoroscope_state(views_fluoroscope(trainer->views));
+    state->now_s = since_begin(trainer);
+    state->view = trainer->desk.view;
+    state->is_following = trainer->desk.look.follow_tip;
+    state->has_section = trainer->desk.look.section;
+    state->has_model = trainer->desk.look.show_model;
+    state->has_arrows = trainer->desk.look.show_arrows;
+    state->is_pedal_latched = trainer->desk.pedal_latched;
+    state->is_roadmap_ready = fluoroscope.has_roadmap;
+    state->frame_ms = 1000 * histogram_quantile(&trainer->frame_cpu_ns, 0.5) * 1e-9;
+    tell_news(trainer, moment);
+    show_devices(trainer);
+    panel_draw(trainer->panel, input, state, 0);
+}
+
+static double resident_mb(void)
+{
+    long pages = 0, ignored = 0;
+    FILE *file = fopen("/proc/self/statm", "r");
+    int read = file ? fscanf(file, "%ld %ld", &ignored, &pages) : 0;
+    if (file)
+        fclose(file);
+    return read == 2 ? (double)pages * (double)sysconf(_SC_PAGESIZE) / 1e6 : 0;
+}
+
+static void measure_frame(Trainer *trainer)
+{
+    double cpu = clock_s(CLOCK_PROCESS_CPUTIME_ID) - realtime_cpu_s(trainer->session.realtime);
+    if (trainer->figures->frames++ > 0)
+        histogram_add(&trainer->frame_cpu_ns, (int64_t)((cpu - trainer->frame_cpu_s) * 1e9));
+    else
+        trainer->figures->first_picture_s = since_begin(trainer);
+    trainer->frame_cpu_s = cpu;
+    double resident = resident_mb();
+    if (trainer->figures->frames == 1 || since_begin(trainer) < 60)
+        trainer->figures->resident_mb[0] = resident;
+    trainer->figures->resident_mb[1] = resident;
+}
+
+static void run_window(Trainer *trainer, Faults *faults)
+{
+    const WindowInput *input;
+    PanelActions actions = {0};
+    double last = since_begin(trainer);
+    for (bool goes_on = true; goes_on;) {
+        bool visible = window_next_frame(trainer->window, &input);
+        double now = since_begin(trainer);
+        panel_take_input(trainer->panel, input, &actions);
+        PanelLayout layout = panel_layout(input->width, input->height, input->scale, trainer->desk.view, panel_has_panels(trainer->panel));
+        desk_obey(&trainer->desk, &actions, &layout, fmin(now - last, 0.1));
+        last = now;
+        drive_by_keys(trainer, &actions);
+        drive_by_pads(trainer);
+        XrayControl xray = desk_xray(&trainer->desk, &actions, buttons_of_hands(trainer));
+        realtime_set_xray(trainer->session.realtime, &xray);
+        goes_on = obey(trainer, &actions, input, faults) && !(trainer->options->duration_s > 0 && now > trainer->options->duration_s);
+        if (!goes_on || !visible)
+            continue;
+        layout = panel_layout(input->width, input->height, input->scale, trainer->desk.view, panel_has_panels(trainer->panel));
+        draw(trainer, input, &layout, &xray);
+        window_swap(trainer->window);
+        measure_frame(trainer);
+    }
+}
+
+// --- start and end ---
+
+// Everything that is seen: the wall, its volume where the scene names one, the tool as it stands at the start.
+static bool make_views(Trainer *trainer, Faults *faults)
+{
+    char message[512] = "";
+    Scene *scene = trainer->scene;
+    Volume *volume = scene->anatomy_path ? volume_load(scene->anatomy_path, faults) : NULL;
+    Simulator *simulator = simulator_create(scene, trainer->open->vessel, faults);
+    Pose *pose = simulator ? pose_create(simulator_state(simulator)->node_count) : NULL;
+    const TriangleMesh *mesh = open_vessel_mesh(scene, trainer->open);
+    XrayControl xray = xray_default_control();
+    if (pose && (volume || !scene->anatomy_path)) {
+        pose_take(pose, simulator, (Command){0, 0}, &xray);
+        ViewsOptions options = {.scene = scene, .vessel = trainer->open->vessel, .tree = trainer->open->tree, .mesh = mesh, .pose = pose,
+                                .patient = patient_axes_lps()};
+        if (volume) {
+            memcpy(options.anatomy_size, volume->size, sizeof options.anatomy_size);
+            memcpy(options.anatomy_axis, volume->axis, sizeof options.anatomy_axis);
+            options.anatomy_origin = volume->origin;
+            options.anatomy_value = volume->value;
+            if (!strcmp(volume->frame, "RAS"))
+                options.patient = patient_axes_ras();
+        }
+        trainer->views = views_create(&options, message, sizeof message);
+        if (!trainer->views)
+            faults_add(faults, scene->path, 0, 0, "cannot be shown: %s", message);
+        else
+            trainer->desk = mesh ? desk_create(views_scene(trainer->views), mesh->vertex_count, mesh->vertex)
+                                 : desk_create(views_scene(trainer->views), pose->node_count, pose->position);
+        trainer->desk.patient = options.patient;
+        trainer->desk.view = trainer->options->view;
+        if (trainer->views && *message)
+            say(trainer, MARK_WARNING, "%s", message);
+    }
+    pose_free(pose);
+    simulator_destroy(simulator);
+    volume_free(volume);
+    return trainer->views != NULL;
+}
+
+static bool open_hands(Trainer *trainer, Faults *faults)
+{
+    const TrainerOptions *options = trainer->options;
+    HandsOptions hands = hands_default_options();
+    hands.map = (const DeviceMap *const *)options->map;
+    hands.map_count = options->map_count;
+    hands.use_built_in = options->has_built_in_maps;
+    trainer->hands = hands_open(&hands, faults);
+    if (options->has_built_in_maps) {
+        trainer->built_in[0] = device_map_built_in(BUILT_IN_GAMEPAD);
+        trainer->built_in[1] = device_map_built_in(BUILT_IN_JOYSTICK);
+    }
+    return trainer->hands != NULL;
+}
+
+static bool open_window(Trainer *trainer, Faults *faults)
+{
+    char message[512] = "", title[300];
+    const TrainerOptions *options = trainer->options;
+    snprintf(title, sizeof title, "Seldinger: %.200s", trainer->scene->exercise ? trainer->scene->exercise->title : trainer->scene->path);
+    trainer->window = window_create(title, options->width, options->height, 0, message, sizeof message);
+    trainer->panel = trainer->window ? panel_create(message, sizeof message) : NULL;
+    if (!trainer->panel) {
+        faults_add(faults, trainer->scene->path, 0, 0, "no window: %s", message);
+        return false;
+    }
+    if (options->is_full_screen)
+        window_set_full_screen(trainer->window, true);
+    return true;
+}
+
+int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, TrainerFigures *figures, Faults *faults)
+{
+    Trainer *trainer = calloc(1, sizeof *trainer);
+    int code = EXIT_BAD_INPUT;
+    if (!trainer) {
+        faults_add(faults, scene->path, 0, 0, "no memory for a session");
+        return code;
+    }
+    *trainer = (Trainer){.options = options, .scene = scene, .open = open, .figures = figures, .begun_s = clock_s(CLOCK_MONOTONIC)};
+    snprintf(trainer->trainee, sizeof trainer->trainee, "%s", options->trainee);
+    if (open_window(trainer, faults) && make_views(trainer, faults) && open_hands(trainer, faults) && begin_session(trainer, options->resume, faults)) {
+        run_window(trainer, faults);
+        bool is_open = trainer->session.realtime != NULL;
+        const Moment *moment = is_open ? realtime_moment(trainer->session.realtime) : NULL;
+        bool diverged = moment && moment->figures.state == REALTIME_DIVERGED;
+        code = is_open && end_session(trainer, faults) ? diverged ? EXIT_UNTRUSTED : EXIT_DONE : EXIT_UNTRUSTED;
+        figures->frames_skipped = window_frames_skipped(trainer->window);
+        figures->frame_cpu_ms[0] = histogram_quantile(&trainer->frame_cpu_ns, 0.5) * 1e-6;
+        figures->frame_cpu_ms[1] = histogram_quantile(&trainer->frame_cpu_ns, 0.99) * 1e-6;
+        figures->frame_cpu_ms[2] = (double)trainer->frame_cpu_ns.largest * 1e-6;
+    }
+    if (trainer->hands)
+        hands_close(trainer->hands);
+    for (int i = 0; i < 2; i++)
+        free(trainer->built_in[i]);
+    if (trainer->window)
+        views_destroy(trainer->views);
+    panel_destroy(trainer->panel);
+    if (trainer->window)
+        window_destroy(trainer->window);
+    free(trainer);
+    return code;
+}

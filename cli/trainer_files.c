@@ -1,0 +1,85 @@
+#include "cli/trainer_files.h"
+
+#include "cli/output.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+// Each folder of the path in turn.
+static bool make_folders(char *path)
+{
+    for (char *at = path + 1; *at; at++) {
+        if (*at != '/')
+            continue;
+        *at = 0;
+        bool made = mkdir(path, 0777) == 0 || errno == EEXIST;
+        *at = '/';
+        if (!made)
+            return false;
+    }
+    return mkdir(path, 0777) == 0 || errno == EEXIST;
+}
+
+bool trainer_folder(const char *wanted, char *out, size_t capacity, Faults *faults)
+{
+    const char *data = getenv("XDG_DATA_HOME"), *home = getenv("HOME");
+    int length = wanted         ? snprintf(out, capacity, "%s", wanted)
+                 : data && *data ? snprintf(out, capacity, "%s/seldinger/sessions", data)
+                 : home && *home ? snprintf(out, capacity, "%s/.local/share/seldinger/sessions", home)
+                                 : snprintf(out, capacity, "sessions");
+    if (length > 0 && (size_t)length < capacity - 512 && make_folders(out) && access(out, W_OK | X_OK) == 0)
+        return true;
+    faults_add(faults, wanted ? wanted : out, 0, 0, "cannot take sessions: %s; a folder with write permission, by --sessions FOLDER", strerror(errno));
+    return false;
+}
+
+void trainer_file_name(const char *folder, const char *scene_path, const char *extension, char *out, size_t capacity)
+{
+    const char *name = strrchr(scene_path, '/');
+    name = name ? name + 1 : scene_path;
+    int stem = (int)strcspn(name, ".");
+    char when[32];
+    time_t now = time(NULL);
+    struct tm local;
+    strftime(when, sizeof when, "%Y%m%d-%H%M%S", localtime_r(&now, &local));
+    snprintf(out, capacity, "%s/%.*s-%s%s", folder, stem < 100 ? stem : 100, name, when, extension);
+    for (int i = 2; access(out, F_OK) == 0 && i < 1000; i++)
+        snprintf(out, capacity, "%s/%.*s-%s-%d%s", folder, stem < 100 ? stem : 100, name, when, i, extension);
+}
+
+void trainer_file_beside(const char *recording, const char *extension, char *out, size_t capacity)
+{
+    const char *dot = strrchr(recording, '.'), *slash = strrchr(recording, '/');
+    int stem = dot && (!slash || dot > slash) ? (int)(dot - recording) : (int)strlen(recording);
+    snprintf(out, capacity, "%.*s%s", stem, recording, extension);
+}
+
+bool trainer_save_session(const Scene *scene, const char *trainee, const char *device, time_t when, const Score *score, const char *recording,
+                          Faults *faults)
+{
+    char path[4096];
+    const char *name = strrchr(recording, '/');
+    RecordedRun *run = recorded_run_load_series(recording, faults);
+    Session *session = run ? calloc(1, sizeof *session) : NULL;
+    char *text = NULL;
+    if (session) {
+        session_begin(session, scene, trainee, device, when);
+        session_set_score(session, score);
+        session_set_run(session, run, name ? name + 1 : recording);
+        text = session_json(session);
+    }
+    recorded_run_free(run);
+    free(session);
+    trainer_file_beside(recording, ".json", path, sizeof path);
+    if (!text) {
+        faults_add(faults, path, 0, 0, "no session file could be made");
+        return false;
+    }
+    bool good = output_write(path, text, strlen(text), faults);
+    free(text);
+    return good;
+}

@@ -1,0 +1,136 @@
+#include "cli/trainer_panel.h"
+
+#include <stdio.h>
+#include <string.h>
+
+// Further outside the wall than any run that can be trusted (cli/run.c).
+static const double outside_mm = 0.2;
+// Below this part of real time the hand feels that the tool is slow.
+static const double slow_factor = 0.97;
+
+void trainer_panel_begin(TrainerPanel *panel, const Scene *scene, const char *trainee)
+{
+    memset(panel, 0, sizeof *panel);
+    double length = 0;
+    for (int i = 0; i < scene->wire.section_count; i++)
+        length += scene->wire.section[i].length;
+    const WireSection *tip = scene->wire.section_count ? &scene->wire.section[scene->wire.section_count - 1] : NULL;
+    snprintf(panel->tool, sizeof panel->tool, "%s %.2f mm x %.0f mm%s", tip && tip->inner_diameter > 0 ? "catheter" : "wire", tip ? tip->diameter : 0, length,
+             tip && tip->rest_curvature != 0 ? ", curved tip" : "");
+    PanelState *state = &panel->state;
+    state->tool = panel->tool;
+    state->trainee = trainee;
+    state->title = scene->exercise ? scene->exercise->title : "Free practice";
+    state->instructions = scene->exercise ? scene->exercise->instructions : "No exercise is set in this scene: go where you like.";
+    if (scene->exercise) {
+        snprintf(panel->target, sizeof panel->target, "%s", scene->target[scene->exercise->target].name);
+        state->target = panel->target;
+        state->hold_needed_s = scene->exercise->hold_s;
+    }
+}
+
+static void add_figure(TrainerPanel *panel, const char *label, double value, const char *unit, int decimals, PanelMark mark)
+{
+    if (panel->state.figure_count < PANEL_FIGURES)
+        panel->figure[panel->state.figure_count++] = (PanelFigure){label, value, unit, decimals, mark};
+}
+
+static PanelMark mark_of_part(const Scene *scene, const ScoreFigures *score, ScorePart part)
+{
+    if (!scene->exercise || scene->exercise->par[part] <= 0)
+        return MARK_NONE;
+    return score->part[part] >= 1 ? MARK_GOOD : score->part[part] > 0.6 ? MARK_WARNING : MARK_BAD;
+}
+
+static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigures *score)
+{
+    PanelState *state = &panel->state;
+    state->figure_count = state->error_count = 0;
+    state->figure = panel->figure;
+    if (scene->exercise)
+        add_figure(panel, "Points", score->points, "", 0, MARK_NONE);
+    add_figure(panel, "Time", score->time_s, "s", 0, mark_of_part(scene, score, PART_TIME));
+    add_figure(panel, "X-ray time", score->fluoroscopy_s, "s", 0, mark_of_part(scene, score, PART_FLUOROSCOPY));
+    add_figure(panel, "Contrast", score->contrast_ml, "ml", 1, mark_of_part(scene, score, PART_CONTRAST));
+    add_figure(panel, "Tip path", score->path_mm, "mm", 0, mark_of_part(scene, score, PART_PATH));
+    if (scene->exercise) {
+        add_figure(panel, "Way left", score->remaining_mm, "mm", 0, MARK_NONE);
+        add_figure(panel, "Efficiency", 100 * score->efficiency, "%", 0, MARK_NONE);
+    }
+    add_figure(panel, "Wall force, peak", score->wall_force_peak_n, "N", 2, mark_of_part(scene, score, PART_WALL_FORCE));
+    add_figure(panel, "Wall impulse", score->wall_impulse_n_s, "N s", 1, mark_of_part(scene, score, PART_WALL_IMPULSE));
+    add_figure(panel, "Tip force", score->tip_force_n, "N", 2, score->error[ERROR_TIP_FORCE].is_on ? MARK_BAD : MARK_NONE);
+    state->error = panel->error;
+    for (int i = 0; i < ERROR_COUNT && state->error_count < PANEL_ERRORS; i++) {
+        const ScoreErrorFigures *error = &score->error[i];
+        if (error->count == 0)
+            continue;
+        char *text = panel->error_text[state->error_count];
+        snprintf(text, sizeof panel->error_text[0], "%s%s: %d, last at %.1f s", error->is_on ? "NOW " : "", score_error_words[i], error->count, error->last_s);
+        panel->error[state->error_count++] = text;
+    }
+    state->hold_s = score->held_s;
+    state->is_finished = score->state == SCORE_REACHED || score->state == SCORE_TIME_OUT;
+    if (state->is_finished) {
+        snprintf(panel->instructions, sizeof panel->instructions, "%s: %.0f points in %.0f s with %d handling error%s. F4 begins anew; Esc ends.",
+                 score->state == SCORE_REACHED ? "Target reached and held" : "The time is over", score->points, score->time_s, score->error_total,
+                 score->error_total == 1 ? "" : "s");
+        state->instructions = panel->instructions;
+    }
+    state->fluoro_s = score->fluoroscopy_s;
+    state->contrast_ml = score->contrast_ml;
+}
+
+static void warn(TrainerPanel *panel, const Pose *pose, const RealtimeFigures *figures)
+{
+    PanelState *state = &panel->state;
+    const StepReport *report = &pose->report;
+    state->warnings = 0;
+    state->warning = NULL;
+    if (report->penetration > outside_mm || (report->flags & (STEP_DEEP | STEP_OUT_OF_VESSEL)))
+        state->warnings |= WARN_OUTSIDE;
+    if (report->flags & STEP_NOT_CONVERGED)
+        state->warnings |= WARN_NOT_CONVERGED;
+    if (report->flags & STEP_LIMITED)
+        state->warnings |= WARN_STALLED;
+    const char *line = report->flags & STEP_FULLY_INSERTED ? "The whole tool is in: there is no more to push" : NULL;
+    if (figures) {
+        if (figures->state == REALTIME_RUNNING && figures->real_time_factor > 0 && figures->real_time_factor < slow_factor)
+            state->warnings |= WARN_SLOW;
+        if (!figures->real_time_priority && pose->step > 0)
+            state->warnings |= WARN_NO_FIFO;
+        if (figures->state == REALTIME_DIVERGED)
+            line = "The simulation diverged: the session has ended with the last good state. F4 begins anew";
+        else if (figures->state == REALTIME_UNRECORDED)
+            line = "The recording could not be written (disk full?): the session has ended. F4 begins anew";
+    }
+    if (line) {
+        snprintf(panel->warning, sizeof panel->warning, "%s", line);
+        state->warning = panel->warning;
+    }
+}
+
+void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pose, const LessonView *lesson, const RealtimeFigures *figures,
+                        const XrayControl *xray)
+{
+    PanelState *state = &panel->state;
+    state->time_s = pose->time_s;
+    state->inserted_mm = pose->inserted_mm;
+    state->push_mm_s = pose->command.push_mm_s;
+    state->twist_deg_s = pose->command.twist_deg_s;
+    state->force_n = pose->report.proximal_force;
+    state->torque_n_mm = pose->report.proximal_torque;
+    state->wall_max_n = pose->report.wall_force_max;
+    state->wall_sum_n = pose->report.wall_force_sum;
+    state->xray = *xray;
+    state->mode = xray->mode == XRAY_DSA ? PANEL_DSA : xray->mode == XRAY_ROADMAP ? PANEL_ROADMAP : xray->pedal > 0 ? PANEL_LIVE : PANEL_LIH;
+    if (figures) {
+        state->is_paused = figures->state == REALTIME_PAUSED;
+        state->step_median_us = figures->step_us[0];
+        state->step_p999_us = figures->step_us[1];
+        state->real_time_factor = figures->real_time_factor;
+        state->missed_deadlines = figures->deadline_misses;
+    }
+    show_score(panel, scene, &lesson->score);
+    warn(panel, pose, figures);
+}

@@ -1,0 +1,28 @@
+// What the panel shows, made from a moment of a session (or of a recording): figures of the score, errors, devices, warnings, the image's mode.
+#ifndef SELDINGER_CLI_TRAINER_PANEL_H
+#define SELDINGER_CLI_TRAINER_PANEL_H
+
+#include "render/desk.h"
+#include "sim/lesson.h"
+#include "sim/realtime.h"
+
+enum { PANEL_FIGURES = 12, PANEL_ERRORS = 12, PANEL_DEVICES = 14 };
+
+typedef struct TrainerPanel {
+    PanelState state;                // what panel_draw takes; its strings lie below
+    PanelFigure figure[PANEL_FIGURES];
+    char error_text[PANEL_ERRORS][96];
+    const char *error[PANEL_ERRORS];
+    char device_name[PANEL_DEVICES][96], device_note[PANEL_DEVICES][600];
+    PanelDevice device[PANEL_DEVICES];
+    char tool[128], target[96], warning[200];
+    char instructions[4200];
+} TrainerPanel;
+
+// Scene, exercise, tool: what does not change in a session.
+void trainer_panel_begin(TrainerPanel *panel, const Scene *scene, const char *trainee);
+// Pose, score and controls of now. `figures` NULL: no real time (a recording).
+void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pose, const LessonView *lesson,
+                        const RealtimeFigures *figures, const XrayControl *xray);
+
+#endif
