@@ -1,5 +1,6 @@
 #include "input/hand.h"
 
+#include "input/force_feedback.h"
 #include "input/hid_report.h"
 #include "input/map_state.h"
 
@@ -11,7 +12,7 @@
 #include <time.h>
 
 enum { MESSAGES_KEPT = 32, MESSAGE_LENGTH = 400, DEVICES_LISTED = 64, MOST_MAPS = 16 };
-enum { READ_WAIT_MS = 50, DRAIN_MOST = 512, COUNT_RATE_US = 1000000 };
+enum { READ_WAIT_MS = 50, FORCE_WAIT_MS = 1, DRAIN_MOST = 512, INFO_US = 50000, COUNT_RATE_US = 1000000 };
 
 // One port and the device that drives it now or did before.
 typedef struct Slot {
@@ -22,6 +23,7 @@ typedef struct Slot {
     const DeviceMap *map;
     HidDescriptor *descriptor;
     MapState state;
+    ForceFeedback force;
     void *device;                    // while the thread runs
     pthread_t thread;
     bool has_thread;
@@ -79,7 +81,7 @@ static void say(Hands *hands, const char *format, ...)
 
 // --- one device's thread ---
 
-static void update_info(Slot *slot, HandState state, double report_hz, double force_n)
+static void update_info(Slot *slot, HandState state, double report_hz)
 {
     atomic_store(&slot->port.state, state);
     pthread_mutex_lock(&slot->hands->lock);
@@ -87,53 +89,84 @@ static void update_info(Slot *slot, HandState state, double report_hz, double fo
     slot->info.reports = slot->state.reports;
     slot->info.bad_reports = slot->state.bad_reports;
     slot->info.report_hz = report_hz;
-    slot->info.force_n = force_n;
+    slot->info.force_n = state == HAND_READY ? slot->force.guard.sent[0] : 0;
     pthread_mutex_unlock(&slot->hands->lock);
 }
 
-// All that has come, at most DRAIN_MOST reports, so that a flood cannot keep the thread from its other work. False: the device is gone.
-static bool drain(Slot *slot, int wait_ms)
+// All that has come, at most DRAIN_MOST reports, so that a flood cannot keep the thread from its other work. How many; -1: the device is gone.
+static int drain(Slot *slot, int wait_ms)
 {
     const HidTransport *transport = &slot->hands->transport;
     uint8_t bytes[HID_REPORT_BYTES];
-    int length = transport->read(transport->context, slot->device, bytes, (int)sizeof bytes, wait_ms);
-    bool any = length > 0;
-    for (int count = 0; length > 0; count++) {
+    int count = 0, length = transport->read(transport->context, slot->device, bytes, (int)sizeof bytes, wait_ms);
+    while (length > 0) {
         map_take_report(slot->map, slot->descriptor, bytes, (size_t)length, &slot->state);
-        if (count == DRAIN_MOST)
+        if (++count == DRAIN_MOST)
             break;
         length = transport->read(transport->context, slot->device, bytes, (int)sizeof bytes, 0);
     }
-    if (any)
+    if (count > 0)
         map_publish(slot->map, &slot->state, &slot->port);
-    return length >= 0;
+    return length < 0 ? -1 : count;
+}
+
+static void start_force(Slot *slot)
+{
+    Hands *hands = slot->hands;
+    bool plays = force_start(&slot->force, slot->map, slot->descriptor, &hands->transport, slot->device, now_us());
+    pthread_mutex_lock(&hands->lock);
+    snprintf(slot->info.force, sizeof slot->info.force, "%s", slot->force.text);
+    pthread_mutex_unlock(&hands->lock);
+    if (slot->map->force.is_wanted && !plays)
+        say(hands, "%s: force: %s", slot->info.name, slot->force.text);
+}
+
+// A force that the watchdog took away is told, once each time.
+static void tell_watchdog(Slot *slot, double sent_before)
+{
+    const char *why = slot->force.guard.why_zero;
+    if (sent_before != 0 && slot->force.guard.sent[0] == 0 && why && why[0] && strcmp(why, "paused") != 0)
+        say(slot->hands, "%s: force to zero, %s%s", slot->info.name, why,
+            strstr(why, "silent") ? " (force: {quiet_ms: 0} in its map where it reports only changes)" : "");
 }
 
 static void *run_device(void *argument)
 {
     Slot *slot = argument;
     Hands *hands = slot->hands;
-    int64_t counted_from = now_us(), reports_then = slot->state.reports, bad_told = slot->state.bad_reports;
-    bool is_there = true;
+    int64_t report_us = now_us(), counted_from = report_us, informed = 0, reports_then = slot->state.reports;
+    bool is_there = true, has_told_bad = slot->state.bad_reports > 0;
     double hz = 0;
-    update_info(slot, HAND_READY, 0, 0);
+    start_force(slot);
+    int wait_ms = slot->force.block[0] ? FORCE_WAIT_MS : READ_WAIT_MS;
     while (is_there && !atomic_load(&hands->quit)) {
-        is_there = drain(slot, READ_WAIT_MS);
+        int count = drain(slot, wait_ms);
         int64_t now = now_us();
+        double sent_before = slot->force.guard.sent[0];
+        is_there = count >= 0;
+        report_us = count > 0 ? now : report_us;
+        if (is_there)
+            force_tick(&slot->force, &slot->port, now, report_us, atomic_load(&hands->paused), &hands->transport, slot->device);
+        tell_watchdog(slot, sent_before);
         if (now - counted_from >= COUNT_RATE_US) {
             hz = 1e6 * (double)(slot->state.reports - reports_then) / (double)(now - counted_from);
             counted_from = now;
             reports_then = slot->state.reports;
-            if (bad_told == 0 && slot->state.bad_reports > 0)
-                say(hands, "%s sends reports that its descriptor does not describe (too short or of unknown id); they are left out", slot->info.name);
-            bad_told = slot->state.bad_reports;
         }
-        if (is_there)
-            update_info(slot, HAND_READY, hz, 0);
+        if (!has_told_bad && slot->state.bad_reports > 0) {
+            say(hands, "%s sends reports that its descriptor does not describe (too short or of unknown id); they are left out", slot->info.name);
+            has_told_bad = true;
+        }
+        if (now - informed >= INFO_US) {
+            update_info(slot, HAND_READY, hz);
+            informed = now;
+        }
     }
     map_release(slot->map, &slot->state);
     map_publish(slot->map, &slot->state, &slot->port);
-    update_info(slot, HAND_LOST, 0, 0);
+    if (is_there)
+        force_stop(&slot->force, &hands->transport, slot->device);
+    update_info(slot, HAND_LOST, 0);
     hands->transport.close(hands->transport.context, slot->device);
     slot->device = NULL;
     if (!is_there)
@@ -240,6 +273,8 @@ static bool connect_device(Hands *hands, const HidDeviceInfo *device, const Devi
         return false;
     }
     HidDescriptor *descriptor = read_descriptor(hands, device, name, faults);
+    if (descriptor && map == hands->built_in[BUILT_IN_HID_JOYSTICK] && pid_is_haptic(descriptor))
+        map = hands->built_in[BUILT_IN_HID_HAPTIC];
     if (!descriptor || !map_bind_hid(map, descriptor, name, &state, faults)) {
         free(descriptor);
         return false;

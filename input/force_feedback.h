@@ -1,0 +1,102 @@
+// Force back to the hand by HID PID (USB Device Class Definition for Physical Interface Devices 1.0, usage page 0x0F): two constant-force effects, one
+// along push, one along twist where the device has a second axis, played for ever; only their magnitudes change, up to once a millisecond.
+//
+// What may be sent is decided by force_guard, a pure function: scale, clamp, slew limit, and zero at once when the simulation stands, the device is
+// silent, the session is paused or a number is not finite. What is sent is encoded by pid_ functions, pure too. force_ functions talk to a device.
+#ifndef SELDINGER_INPUT_FORCE_FEEDBACK_H
+#define SELDINGER_INPUT_FORCE_FEEDBACK_H
+
+#include "input/device_map.h"
+#include "input/hand_port.h"
+#include "input/hid_device.h"
+#include "input/hid_report.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum { PID_MESSAGE_BYTES = 64 };
+
+// A report to be sent: byte 0 is its id (0: none).
+typedef struct PidMessage {
+    HidReportKind kind;              // HID_OUTPUT or HID_FEATURE
+    int length;
+    uint8_t bytes[PID_MESSAGE_BYTES];
+} PidMessage;
+
+// A field that takes a number, or (selector) the value that names one choice of it.
+typedef struct PidControl {
+    bool is_there;
+    HidField field;
+    int slot;
+    int64_t value;
+} PidControl;
+
+typedef struct PidLayout {
+    PidControl create_type;                                          // Create New Effect: constant force
+    PidControl load_index, load_success;                             // Block Load, a feature that is read; its fields
+    PidControl effect_index, effect_type, duration, trigger_button, gain, direction_enable, axis_x, axis_y, direction;   // Set Effect
+    PidControl force_index, magnitude;                               // Set Constant Force
+    PidControl operation_index, start, stop, loop_count;             // Effect Operation
+    PidControl reset, enable, stop_all;                              // Device Control
+    PidControl device_gain;
+    int report_bytes[3][256];        // of each kind and id, with the id byte, as the device's buffers want them
+} PidLayout;
+
+// False with the reason in `why` where constant forces cannot be played: "no constant force effect in the descriptor".
+bool pid_find(const HidDescriptor *descriptor, PidLayout *layout, char *why, size_t capacity);
+bool pid_is_haptic(const HidDescriptor *descriptor);     // has anything of the PID page
+
+// The messages of an upload in this order. All but the last write whole reports, other fields zero. False: the layout has no such report (then it is left out).
+bool pid_encode_reset(const PidLayout *layout, PidMessage *out);
+bool pid_encode_enable(const PidLayout *layout, PidMessage *out);
+bool pid_encode_gain(const PidLayout *layout, PidMessage *out);              // device gain to its largest
+bool pid_encode_create(const PidLayout *layout, PidMessage *out);
+// The effect's block from an answered Block Load report (`bytes` with id); 0: refused or full.
+int pid_decode_block_load(const PidLayout *layout, const uint8_t *bytes, size_t length);
+// `direction_deg`: where the force comes from, clockwise from north (away from the user). Duration for ever, largest gain, no trigger button.
+bool pid_encode_effect(const PidLayout *layout, int block, double direction_deg, PidMessage *out);
+// Without a direction field a force > 0 comes from the positive end of its axis (east, south); -1 for those that come from north or west.
+double pid_axis_sign(const PidLayout *layout, double direction_deg);
+// magnitude -1 to 1 of the device's largest; `value`: what was written.
+bool pid_encode_force(const PidLayout *layout, int block, double magnitude, PidMessage *out, int64_t *value);
+bool pid_encode_start(const PidLayout *layout, int block, PidMessage *out);
+bool pid_encode_stop(const PidLayout *layout, int block, PidMessage *out);
+// [ms] after which a started effect ends by itself; 0: never.
+int pid_duration_ms(const PidLayout *layout);
+
+// Direction of the reaction to a push along a stick's axis: it comes from where the stick goes when the tool is pushed.
+// X: 90 (270 inverted), Y: 180 (0 inverted: stick away from the user pushes, the force comes from north); NaN for other axes.
+double force_direction_deg(const DeviceMap *map, bool is_twist);
+
+typedef struct ForceGuard {
+    double sent[2];                  // force [N], torque [N mm]
+    int64_t last_us, step, step_grew_us;
+    bool has_started;
+    const char *why_zero;            // "" while forces may be sent
+} ForceGuard;
+
+// What may be sent now: `wanted` force [N] and torque [N mm] -> guard->sent. `step`: HandPort.step. `report_us`: when the device last said something.
+void force_guard(ForceGuard *guard, const MapForce *map, const double wanted[2], int64_t step, int64_t now_us, int64_t report_us, bool paused);
+
+typedef struct ForceFeedback {
+    PidLayout layout;
+    MapForce map;
+    double direction_deg[2];
+    int block[2];                    // of force and torque; 0: none
+    int64_t value[2];                // magnitudes written last
+    int64_t started_us, written_us;
+    int restart_ms;
+    int64_t writes, failed_writes;
+    ForceGuard guard;
+    char text[160];                  // what it does, or why it does nothing
+} ForceFeedback;
+
+// Finds the effects and uploads them at zero force. False: `text` says why; the device's inputs are good all the same.
+bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor *descriptor, const HidTransport *transport, void *device, int64_t now_us);
+// Sends what the port and the guard say where it changed; at most once a millisecond. Nothing before force_start was true.
+void force_tick(ForceFeedback *force, const HandPort *port, int64_t now_us, int64_t report_us, bool paused, const HidTransport *transport, void *device);
+// Zero and stop, for the end of a session.
+void force_stop(ForceFeedback *force, const HidTransport *transport, void *device);
+
+#endif
