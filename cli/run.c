@@ -4,6 +4,8 @@
 #include "cli/output.h"
 #include "cli/run_chart.h"
 #include "cli/run_files.h"
+#include "cli/run_hands.h"
+#include "sim/lesson.h"
 #include "sim/recording.h"
 #ifdef SELDINGER_RENDER
 #include "render/picture.h"
@@ -17,7 +19,9 @@
 enum { MOST_MOMENTS = 6 };
 
 typedef struct RunOptions {
-    const char *scene, *script, *record, *summary, *final, *picture, *chart, *contact;
+    const char *scene, *script, *record, *summary, *final, *picture, *chart, *contact, *score;
+    const char *device[RUN_MAPS];
+    int device_count;
     double duration_s, settle_s;   // < 0: not given
     double moment_s[MOST_MOMENTS];
     int moment_count;
@@ -29,10 +33,12 @@ static const char help[] =
     "Usage: seldinger run SCENE [options]\n\n"
     "Runs a scene (YAML) headless, as fast as it goes, and prints a short summary.\n\n"
     "  --script F         script of the hand (CSV t_s,push_mm_s,twist_deg_s) instead of the scene's\n"
+    "  --device F.yaml    instead of a script a device drives, by this map or (auto) a built-in one; paced; repeated for up to 8 maps. Needs --duration-s\n"
     "  --duration-s S     simulated time [s]; default: the script's; needed where there is no script\n"
     "  --settle-s S       afterwards goes on without input for at most S [s], until nothing moves faster than 0.01 mm/s; default 0\n"
     "  --record F.h5      recording (HDF5): every step's figures, the wire every 10 ms; readable while it is written\n"
     "  --summary F.json   figures of the run; - is standard output (also: --json)\n"
+    "  --score F.json     what the hand was worth: times, ways, forces, handling errors, points (`exercise:` of the scene)\n"
     "  --final F.csv      the last state, one row a node\n"
     "  --picture F.png    vessel and tool at the end\n"
     "  --picture-at S     instead of the end, this moment [s]; up to 6 of them stand side by side\n"
@@ -65,14 +71,15 @@ static int usage_fault(const char *message, const char *what)
 // -1: go on; otherwise the exit code.
 static int parse_options(int argc, char **argv, RunOptions *options)
 {
-    enum { SCRIPT = 256, DURATION, SETTLE, RECORD, SUMMARY, FINAL, PICTURE, PICTURE_AT, CHART, CONTACT, PACED, THREADS, QUIET, HELP };
+    enum { SCRIPT = 256, DURATION, SETTLE, RECORD, SUMMARY, FINAL, PICTURE, PICTURE_AT, CHART, CONTACT, SCORE, DEVICE, PACED, THREADS, QUIET, HELP };
     static const struct option table[] = {
         {"script", required_argument, NULL, SCRIPT},   {"duration-s", required_argument, NULL, DURATION}, {"settle-s", required_argument, NULL, SETTLE},
         {"record", required_argument, NULL, RECORD},   {"summary", required_argument, NULL, SUMMARY},     {"json", required_argument, NULL, SUMMARY},
         {"final", required_argument, NULL, FINAL},     {"picture", required_argument, NULL, PICTURE},     {"picture-at", required_argument, NULL, PICTURE_AT},
         {"contact", required_argument, NULL, CONTACT}, {"paced", no_argument, NULL, PACED},               {"threads", required_argument, NULL, THREADS},
         {"quiet", no_argument, NULL, QUIET},           {"help", no_argument, NULL, HELP},
-        {"chart", required_argument, NULL, CHART},     {0}};
+        {"chart", required_argument, NULL, CHART},     {"score", required_argument, NULL, SCORE},         {"device", required_argument, NULL, DEVICE},
+        {0}};
     *options = (RunOptions){.duration_s = -1, .settle_s = -1};
     double number;
     optind = 1;
@@ -85,6 +92,13 @@ static int parse_options(int argc, char **argv, RunOptions *options)
         case PICTURE: options->picture = optarg; break;
         case CHART: options->chart = optarg; break;
         case CONTACT: options->contact = optarg; break;
+        case SCORE: options->score = optarg; break;
+        case DEVICE:
+            if (options->device_count == RUN_MAPS)
+                return usage_fault("at most 8 device maps", "");
+            options->device[options->device_count++] = optarg;
+            options->paced = true;
+            break;
         case PACED: options->paced = true; break;
         case QUIET: options->quiet = true; break;
         case DURATION:
@@ -116,6 +130,8 @@ static int parse_options(int argc, char **argv, RunOptions *options)
     options->scene = argv[optind];
     if (options->moment_count && !options->picture)
         return usage_fault("--picture-at goes with --picture F.png", "");
+    if (options->device_count && (options->script || options->duration_s < 0))
+        return usage_fault(options->script ? "--device and --script are two hands; one of them" : "--device needs --duration-s S", "");
     return -1;
 }
 
@@ -132,6 +148,7 @@ static Scene *prepare_scene(const RunOptions *options, Faults *faults)
         faults_add(faults, "--contact", 0, 0, "'%.40s' is no kind; valid: lim, mesh, smooth_mesh, flat_mesh, grid, tube", options->contact);
     output_check(options->summary, faults);
     output_check(options->final, faults);
+    output_check(options->score, faults);
     output_check_file(options->picture, faults);
     output_check_file(options->chart, faults);
     output_check_file(options->record, faults);
@@ -171,6 +188,8 @@ typedef struct Watch {       // what after_step sees
     const RunOptions *options;
     Recording *recording;
     RunChart *chart;
+    RunHands *hands;
+    Lesson *lesson;
     Moment moment[MOST_MOMENTS];
     int moment_count;
     bool recording_failed;
@@ -194,6 +213,10 @@ static bool watch_step(void *context, Simulator *simulator, Command command)
     for (int i = 0; i < watch->options->moment_count; i++)
         if (!watch->moment[i].taken && simulator_time_s(simulator) >= watch->options->moment_s[i] - 1e-9)
             take_moment(&watch->moment[i], simulator);
+    if (watch->hands)
+        run_hands_answer(watch->hands, simulator_last(simulator), simulator_totals(simulator)->steps);
+    if (watch->lesson)
+        lesson_step(watch->lesson, simulator, command, NULL);
     if (watch->chart)
         run_chart_step(watch->chart, simulator);
     if (watch->recording && !recording_step(watch->recording, simulator, command, NULL))
@@ -301,6 +324,20 @@ static bool write_files(const RunOptions *options, Simulator *simulator, const D
     return faults->count == before;
 }
 
+static bool write_score(const RunOptions *options, const Watch *watch, const Scene *scene, Faults *faults)
+{
+    if (!options->score)
+        return true;
+    ScoreFigures figures = score_figures(lesson_score(watch->lesson));
+    char *text = score_json(&figures, scene);
+    bool good = text && output_write(options->score, text, strlen(text), faults);
+    free(text);
+    return good;
+}
+
+// How long a run waits for its device.
+static const double device_patience_s = 5;
+
 // No node of a run that can be shown is further outside the wall than this.
 static const double deep_mm = 0.2;
 
@@ -338,9 +375,15 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
         faults_add(faults, scene->path, 0, 0, "no memory");
     else if (options->record)
         watch.recording = recording_create(options->record, simulator, &record, faults);
+    if (options->score && !(watch.lesson = lesson_create(simulator, open->tree)))
+        faults_add(faults, scene->path, 0, 0, "no memory");
+    if (options->device_count && faults->count == 0)
+        watch.hands = run_hands_open(options->device_count, options->device, scene->dt, device_patience_s, faults);
     if (faults->count == 0) {
         DriveOptions drive = drive_default_options();
-        drive.script = scene->script;
+        drive.script = watch.hands ? NULL : scene->script;
+        drive.hand = watch.hands ? run_hands_command : NULL;
+        drive.hand_context = watch.hands;
         drive.duration_s = options->duration_s;
         drive.settle_s = fmax(options->settle_s, 0);
         drive.paced = options->paced;
@@ -348,6 +391,7 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
         drive.after_step = watch_step;
         drive.context = &watch;
         DriveReport report = simulator_drive(simulator, &drive);
+        run_hands_close(watch.hands);
         if (options->paced && !report.real_time_priority && !options->quiet)
             fprintf(stderr, "seldinger run: without real-time priority (SCHED_FIFO is not permitted here; see `ulimit -r` and CAP_SYS_NICE) other programs "
                             "delay steps\n");
@@ -356,6 +400,7 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
             take_moment(&watch.moment[0], simulator);
         bool whole = !watch.recording || recording_close(watch.recording, simulator, faults);
         whole &= write_files(options, simulator, &report, node, faults);
+        whole &= write_score(options, &watch, scene, faults);
         if (!options->quiet)
             run_print(options->summary && !strcmp(options->summary, "-") ? stderr : stdout, simulator, &report, node);
         say_untrusted(simulator, &report);
@@ -368,6 +413,7 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
             fprintf(stderr, "%s: no chart: %s\n", options->chart, message);
         code = whole && report.end != DRIVE_DIVERGED && !run_left_vessel(simulator_totals(simulator)) ? EXIT_DONE : EXIT_UNTRUSTED;
     }
+    lesson_free(watch.lesson);
     free_moments(&watch);
     run_chart_free(watch.chart);
     free(node);

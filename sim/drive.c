@@ -101,7 +101,7 @@ DriveReport simulator_drive(Simulator *simulator, const DriveOptions *options)
             histogram_add(options->late_ns, wall_ns() - (base + i * step_ns));
         bool scripted = options->script && i < driven;
         Command command = scripted                     ? script_at(options->script, (double)i * scene->dt / 1000, &cursor)
-                          : options->hand && i < driven ? options->hand(options->context)
+                          : options->hand && i < driven ? options->hand(options->hand_context)
                                                         : (Command){0, 0};
         simulator_step(simulator, command);
         at_rest_s = simulator_fastest_mm_s(simulator) <= rest_speed_mm_s ? at_rest_s + step_s : 0;

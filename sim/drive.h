@@ -24,7 +24,8 @@ typedef struct DriveReport {
 
 typedef struct DriveOptions {
     const Script *script;            // NULL: no input …
-    Command (*hand)(void *context);  // … or this instead, asked once before each step
+    Command (*hand)(void *hand_context);   // … or this instead, asked once before each step
+    void *hand_context;
     double duration_s;               // < 0: the script's
     double settle_s;                 // afterwards, without input, at most this long, until nothing is faster than 0.01 mm/s for 0.1 s
     bool paced;                      // a step begins when the last one's millisecond is over, see below

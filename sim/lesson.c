@@ -40,7 +40,7 @@ void lesson_step(void *context, Simulator *simulator, Command command, const Xra
 {
     Lesson *lesson = context;
     score_step(lesson->score, simulator, command, xray);
-    lesson->injected += (double)xray->contrast_ml_s * lesson->dt_s;
+    lesson->injected += xray ? (double)xray->contrast_ml_s * lesson->dt_s : 0;
     if (++lesson->steps % CONTRAST_EVERY != 0)
         return;
     double passed = CONTRAST_EVERY * lesson->dt_s;

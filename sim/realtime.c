@@ -110,6 +110,7 @@ static void *run_session(void *argument)
     Realtime *realtime = argument;
     DriveOptions drive = drive_default_options();
     drive.hand = ask_hands;
+    drive.hand_context = realtime;
     drive.duration_s = SCRIPT_LONGEST_S;
     drive.paced = true;
     drive.after_step = after_step;

@@ -1,0 +1,116 @@
+#include "cli/run_hands.h"
+
+#include "input/hand.h"
+
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+struct RunHands {
+    Hands *hands;
+    HandSet set;
+    double dt;
+    pthread_t speaker;
+    _Atomic int ending;
+};
+
+static void nap(long milliseconds) { nanosleep(&(struct timespec){.tv_nsec = milliseconds * 1000000}, NULL); }
+
+static void say_all(Hands *hands)
+{
+    char text[256];
+    while (hands_message(hands, text, sizeof text))
+        fprintf(stderr, "device: %s\n", text);
+}
+
+static void *speak(void *argument)
+{
+    RunHands *hands = argument;
+    while (!atomic_load(&hands->ending)) {
+        say_all(hands->hands);
+        nap(50);
+    }
+    say_all(hands->hands);
+    return NULL;
+}
+
+static bool is_any_ready(Hands *hands)
+{
+    for (int i = 0; i < HANDS_MOST; i++)
+        if (atomic_load(&hands_port(hands, i)->state) == HAND_READY)
+            return true;
+    return false;
+}
+
+static Hands *open_devices(int map_count, const char *const *path, Faults *faults)
+{
+    DeviceMap *map[RUN_MAPS] = {0};
+    HandsOptions options = hands_default_options();
+    int before = faults->count;
+    options.use_built_in = false;
+    options.map_count = 0;
+    for (int i = 0; i < map_count; i++) {
+        if (!strcmp(path[i], "auto"))
+            options.use_built_in = true;
+        else if ((map[options.map_count] = device_map_load(path[i], faults)))
+            options.map_count++;
+    }
+    options.map = (const DeviceMap *const *)map;
+    Hands *hands = faults->count == before ? hands_open(&options, faults) : NULL;
+    for (int i = 0; i < RUN_MAPS; i++)
+        free(map[i]);
+    return hands;
+}
+
+RunHands *run_hands_open(int map_count, const char *const *map, double dt, double patience_s, Faults *faults)
+{
+    RunHands *hands = calloc(1, sizeof *hands);
+    if (!hands) {
+        faults_add(faults, "--device", 0, 0, "no memory");
+        return NULL;
+    }
+    hands->dt = dt;
+    hands->hands = open_devices(map_count, map, faults);
+    if (!hands->hands) {
+        free(hands);
+        return NULL;
+    }
+    for (int waited_ms = 0; waited_ms < patience_s * 1000 && !is_any_ready(hands->hands); waited_ms += 10)
+        nap(10);
+    if (!is_any_ready(hands->hands)) {
+        say_all(hands->hands);
+        faults_add(faults, "--device", 0, 0, "no device that fits came within %g s; `seldinger devices` lists what is there", patience_s);
+        hands_close(hands->hands);
+        free(hands);
+        return NULL;
+    }
+    hand_set_init(&hands->set);
+    for (int i = 0; i < HANDS_MOST; i++)
+        hand_set_add(&hands->set, hands_port(hands->hands, i));
+    if (pthread_create(&hands->speaker, NULL, speak, hands) == 0)
+        return hands;
+    faults_add(faults, "--device", 0, 0, "no thread for the devices' messages");
+    hands_close(hands->hands);
+    free(hands);
+    return NULL;
+}
+
+Command run_hands_command(void *context)
+{
+    RunHands *hands = context;
+    return hand_set_command(&hands->set, hands->dt);
+}
+
+void run_hands_answer(RunHands *hands, const StepReport *report, int64_t step) { hand_set_answer(&hands->set, report, step); }
+
+void run_hands_close(RunHands *hands)
+{
+    if (!hands)
+        return;
+    atomic_store(&hands->ending, 1);
+    pthread_join(hands->speaker, NULL);
+    hands_close(hands->hands);
+    free(hands);
+}
