@@ -203,6 +203,19 @@ static void watch_forces(Score *score, const WireState *state, const StepReport 
     judge_limit(score, ERROR_WALL_FORCE, score->wall_force, rules->wall_force_n, FORCE_AGAIN, score->dt, now_s);
 }
 
+// The tip's node, from its last one. A tip that snaps from one branch's mouth into another may leave its node's reach between two looks: it is outside
+// of that node's ball then by half the radius, and inside another's.
+static int find_node(const VesselTree *tree, Vec3 tip, int node)
+{
+    if (!tree->near)
+        return power_nearest(tree, tip);
+    node = power_walk(tree, tip, node, HOPS);
+    if (vec3_distance(tip, tree->center[node]) < 1.5 * tree->radius[node])
+        return node;
+    int nearest = power_nearest(tree, tip);
+    return vec3_distance(tip, tree->center[nearest]) < tree->radius[nearest] ? nearest : node;
+}
+
 // Where in the tree the tip is, every 10 ms: a tool at 100 mm/s goes 1 mm in that time.
 static void look(Score *score, const WireState *state, Vec3 tip, double now_s)
 {
@@ -211,7 +224,7 @@ static void look(Score *score, const WireState *state, Vec3 tip, double now_s)
     score->since_look = 0;
     score_sheath_look(&score->sheath, state, score->s);
     if (score->way.tree)
-        f->tip_node = score->way.tree->near ? power_walk(score->way.tree, tip, f->tip_node, HOPS) : power_nearest(score->way.tree, tip);
+        f->tip_node = find_node(score->way.tree, tip, f->tip_node);
     if (score->exercise.target < 0)
         return;
     f->remaining_mm = score_way_left(&score->way, tip, f->tip_node);
