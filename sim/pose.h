@@ -10,7 +10,7 @@ typedef struct Pose {
     double time_s;
     Command command;         // of the last step
     XrayControl xray;
-    double inserted_mm;
+    double inserted_mm, turned_deg;  // fed in beyond the mouth; turned since the start
     StepReport report;       // of the last step
     int node_count;          // M, proximal to distal
     int first_free_node;     // nodes below it lie in the sheath
