@@ -1,25 +1,413 @@
-// Options; the drawing follows.
-#include "render/fluoroscope.h"
+// When which layer is drawn. Each new pulse is compared with what the layers hold:
+//   C-arm, table or field moved: anatomy and lumen afresh, coarse (half the resolution, the decimated lumen); the first pulse after that at rest: fine.
+//   contrast agent moved on: the lumen afresh, decimated; fine once it stays.
+//   anything of these, blades, mode, mask: the base is baked from the layers.
+//   always: the base is copied back where the tool was, and the tool multiplied in.
+// Showing adds the noise of the pulse; that alone is done where the picture is held.
+#include "render/fluoroscope_parts.h"
 
 #include "render/message.h"
+
+#include <epoxy/gl.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const float least_contrast = 0.002f;      // concentration that can be seen
+static const double median_transmission = 0.27;  // that automatic exposure sees to: brightness 0.68
 
 FluoroscopeOptions fluoroscope_default_options(void)
 {
     return (FluoroscopeOptions){.patient = patient_axes_lps(), .contrast_attenuation = 0.105, .quanta = 550, .dsa_gain = 2.2};
 }
 
-Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message, size_t capacity)
+// --- create ---
+
+static bool options_are_sound(const FluoroscopeOptions *options, char *message, size_t capacity)
 {
-    (void)options;
-    message_fail(message, capacity, "fluoroscopy is not drawn yet");
-    return NULL;
+    if (!patient_axes_are_sound(&options->patient))
+        return message_fail(message, capacity, "the patient's axes are not unit vectors perpendicular to each other");
+    if (options->node_count < 0 || (options->node_count > 0 && (!options->radius || !options->attenuation)))
+        return message_fail(message, capacity, "a tool of %d nodes has no radii or attenuations", options->node_count);
+    for (int i = 0; i < options->node_count; i++)
+        if (!(options->radius[i] > 0) || !isfinite(options->radius[i]) || !(options->attenuation[i] >= 0) || !isfinite(options->attenuation[i]))
+            return message_fail(message, capacity, "the tool's node %d has radius %g mm and attenuation %g / mm; both must be finite, and not negative", i,
+                                options->radius[i], options->attenuation[i]);
+    if (!(options->contrast_attenuation >= 0) || !(options->quanta >= 0) || !(options->dsa_gain > 0) || !isfinite(options->quanta))
+        return message_fail(message, capacity, "contrast, quanta or gain of fluoroscopy is negative");
+    return true;
 }
 
-void fluoroscope_destroy(Fluoroscope *fluoroscope) { (void)fluoroscope; }
-void fluoroscope_draw(Fluoroscope *fluoroscope, const FluoroscopeFrame *frame, ViewPort port) { (void)fluoroscope, (void)frame, (void)port; }
-void fluoroscope_forget(Fluoroscope *fluoroscope) { (void)fluoroscope; }
-FluoroscopeState fluoroscope_state(const Fluoroscope *fluoroscope)
+static bool mesh_is_sound(const TriangleMesh *mesh, char *message, size_t capacity)
 {
-    (void)fluoroscope;
-    return (FluoroscopeState){.square = {0, 0, 0}};
+    for (int v = 0; v < mesh->vertex_count; v++)
+        if (!vec3_is_finite(mesh->vertex[v]))
+            return message_fail(message, capacity, "no contrast is drawn: the vessel's wall has a vertex that is not finite");
+    for (int t = 0; t < mesh->triangle_count; t++)
+        for (int k = 0; k < 3; k++)
+            if (mesh->triangle[t][k] < 0 || mesh->triangle[t][k] >= mesh->vertex_count)
+                return message_fail(message, capacity, "no contrast is drawn: the vessel's wall has an index out of range");
+    return mesh->triangle_count > 0;
+}
+
+// Whether rays through the wall can be right; a remark where lids were needed.
+static bool wall_is_fit(const FluoroscopeOptions *options, MeshClosure *closure, MeshLids *lids, char *message, size_t capacity)
+{
+    if (!options->vessel || !mesh_is_sound(options->vessel, message, capacity))
+        return false;
+    if (!mesh_closure(options->vessel, closure, lids))
+        return message_fail(message, capacity, "no contrast is drawn: not enough memory to look at the vessel's wall");
+    if (closure->turned_edges > 0)
+        return message_fail(message, capacity, "no contrast is drawn: %lld edges of the vessel's wall lie between triangles that face opposite ways",
+                            (long long)closure->turned_edges);
+    double span = 0;
+    for (int v = 0; v < options->vessel->vertex_count; v++)
+        span = fmax(span, vec3_distance(options->vessel->vertex[v], options->vessel->vertex[0]));
+    if (!(fabs(closure->volume) > 1e-9 * span * span * span))
+        return message_fail(message, capacity, "no contrast is drawn: the vessel's wall encloses nothing");
+    const char *facing = closure->volume < 0 ? "; its triangles face inwards, which is allowed for" : "";
+    if (closure->rims > 0 && closure->unevenness > 0.25)
+        message_fail(message, capacity, "the vessel's wall is open at %d places, not all of them flat (up to %.0f %% of their radius): contrast is wrong there%s",
+                     closure->rims, 100 * closure->unevenness, facing);
+    else if (closure->rims > 0)
+        message_fail(message, capacity, "the vessel's wall is open at %d places; flat lids close it for contrast%s", closure->rims, facing);
+    else if (closure->volume < 0)
+        message_fail(message, capacity, "the triangles of the vessel's wall face inwards, which is allowed for");
+    return true;
+}
+
+static bool take_memory(Fluoroscope *f, const FluoroscopeOptions *options)
+{
+    size_t tool = (size_t)options->node_count, nodes = f->lumen.is_there ? (size_t)f->lumen.node_count : 1;
+    f->radius = malloc((tool + 1) * sizeof *f->radius);
+    f->attenuation = malloc((tool + 1) * sizeof *f->attenuation);
+    f->shown.position = calloc(tool + 1, sizeof *f->shown.position);
+    f->shown.contrast = calloc(nodes, sizeof *f->shown.contrast);
+    f->lumen_contrast = calloc(nodes, sizeof *f->lumen_contrast);
+    f->bolus = calloc(nodes, sizeof *f->bolus);
+    f->roadmap = calloc(nodes, sizeof *f->roadmap);
+    if (!f->radius || !f->attenuation || !f->shown.position || !f->shown.contrast || !f->lumen_contrast || !f->bolus || !f->roadmap)
+        return false;
+    for (size_t i = 0; i < tool; i++) {
+        f->radius[i] = options->radius[i];
+        f->attenuation[i] = options->attenuation[i];
+    }
+    return true;
+}
+
+Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message, size_t capacity)
+{
+    if (message && capacity > 0)
+        message[0] = 0;
+    if (!options_are_sound(options, message, capacity))
+        return NULL;
+    Fluoroscope *f = calloc(1, sizeof *f);
+    MeshClosure closure = {0};
+    MeshLids lids = {0};
+    bool good = f != NULL;
+    if (!good)
+        message_fail(message, capacity, "not enough memory for fluoroscopy");
+    bool has_wall = good && wall_is_fit(options, &closure, &lids, message, capacity);
+    FluoroscopeOptions own = *options;
+    if (!has_wall) {
+        own.vessel = NULL;
+        own.tree = NULL;
+    }
+    good = good && anatomy_create(&f->anatomy, &own, &lids, message, capacity);
+    good = good && layers_create(&f->programs, &f->anatomy, message, capacity);
+    good = good && (!has_wall || lumen_create(&f->lumen, &own, &closure, &lids, message, capacity));
+    mesh_lids_free(&lids);
+    if (good && !take_memory(f, options)) {
+        message_fail(message, capacity, "not enough memory for fluoroscopy");
+        good = false;
+    }
+    if (!good) {
+        fluoroscope_destroy(f);
+        return NULL;
+    }
+    f->options = *options;
+    f->options.vessel = NULL;
+    f->options.vertex_node = NULL;
+    f->options.tree = NULL;
+    f->options.radius = f->options.attenuation = NULL;
+    f->options.anatomy_value = NULL;
+    fluoroscope_forget(f);
+    return f;
+}
+
+void fluoroscope_destroy(Fluoroscope *f)
+{
+    if (!f)
+        return;
+    anatomy_free(&f->anatomy);
+    lumen_destroy(&f->lumen);
+    layers_destroy(&f->programs);
+    Layer *layer[6] = {&f->anatomy_layer, &f->lumen_layer, &f->roadmap_layer, &f->base, &f->picture, &f->mask};
+    for (int i = 0; i < 6; i++)
+        layer_destroy(layer[i]);
+    ribbon_free(&f->ribbon);
+    free(f->radius), free(f->attenuation), free(f->shown.position), free(f->shown.contrast);
+    free(f->lumen_contrast), free(f->bolus), free(f->roadmap);
+    free(f);
+}
+
+void fluoroscope_forget(Fluoroscope *f)
+{
+    size_t nodes = f->lumen.is_there ? (size_t)f->lumen.node_count : 1;
+    f->has_picture = f->has_mask = f->mask_is_due = f->was_opacified = false;
+    f->layers_are_stale = true;
+    f->mask_count = -1;
+    memset(f->bolus, 0, nodes * sizeof *f->bolus);
+    memset(f->roadmap, 0, nodes * sizeof *f->roadmap);
+    f->roadmap_has_changed = true;
+}
+
+// --- a pulse ---
+
+static bool is_seen(const float *contrast, int count)
+{
+    for (int n = 0; n < count; n++)
+        if (contrast[n] > least_contrast)
+            return true;
+    return false;
+}
+
+// What the pulse shows; mask and roadmap follow.
+static void take_exposure(Fluoroscope *f, const FluoroscopeFrame *frame)
+{
+    int nodes = f->lumen.is_there ? f->lumen.node_count : 0;
+    const Pose *pose = frame->pose;
+    f->shown.xray = frame->xray;
+    f->shown.pulse = frame->pulse;
+    f->shown.has_tool = pose && f->options.node_count > 0 && pose->node_count == f->options.node_count;
+    if (f->shown.has_tool)
+        memcpy(f->shown.position, pose->position, (size_t)pose->node_count * sizeof *pose->position);
+    for (int n = 0; n < nodes; n++) {
+        float c = frame->contrast ? frame->contrast[n] : 0;
+        f->shown.contrast[n] = c > 0 ? fminf(c, 1) : 0;   // not a number: none
+    }
+    bool is_opacified = is_seen(f->shown.contrast, nodes);
+    if (is_opacified && !f->was_opacified)
+        memset(f->bolus, 0, (size_t)nodes * sizeof *f->bolus);
+    f->was_opacified = is_opacified;
+    bool is_new = isfinite(frame->xray.mask) && (frame->xray.mask < f->mask_count || frame->xray.mask > f->mask_count);
+    for (int n = 0; n < nodes; n++) {
+        f->bolus[n] = fmaxf(f->bolus[n], f->shown.contrast[n]);
+        float before = f->roadmap[n];
+        // a new mask begins with the bolus that was last seen, and takes on what comes
+        f->roadmap[n] = is_new && f->mask_count >= 0 ? f->bolus[n] : lroundf(frame->xray.mode) == XRAY_ROADMAP ? fmaxf(before, f->shown.contrast[n]) : before;
+        f->roadmap_has_changed |= fabsf(f->roadmap[n] - before) > least_contrast;
+    }
+    if (is_new) {
+        f->mask_is_due = f->mask_count >= 0;
+        f->mask_count = frame->xray.mask;
+    }
+}
+
+static bool c_arms_differ(const CArm *a, const CArm *b)
+{
+    double way = vec3_distance(a->isocentre, b->isocentre) + fabs(a->field_mm - b->field_mm);
+    return way > 1e-3 || vec3_distance(a->towards, b->towards) > 1e-5 || vec3_distance(a->up, b->up) > 1e-5;
+}
+
+// The mean attenuation of what stands in the beam, from rays between the blades: what automatic exposure makes up for.
+static double find_exposure(const Fluoroscope *f, const CArm *c_arm)
+{
+    double sum = 0;
+    int count = 0;
+    for (int j = -4; j <= 4; j++)
+        for (int i = -4; i <= 4; i++) {
+            double a = anatomy_along(&f->anatomy, c_arm_source(c_arm), c_arm_ray(c_arm, i * 0.11, j * 0.11));
+            if (a > 0.02) {
+                sum += a;
+                count++;
+            }
+        }
+    return (count > 0 ? fmin(sum / count, 6) : 0) + log(median_transmission);
+}
+
+static bool has_anatomy(const Fluoroscope *f) { return f->anatomy.level || f->anatomy.ellipsoid_count > 0; }
+
+static void draw_anatomy(Fluoroscope *f, const CArm *c_arm, bool coarse)
+{
+    bool is_volume = f->anatomy.level != NULL;
+    int side = coarse ? (is_volume ? 96 : 160) : is_volume ? 256 : 384;
+    if (!has_anatomy(f) || !layer_fit(&f->anatomy_layer, side, LAYER_R32F))
+        return;
+    layers_draw_anatomy(&f->programs, &f->anatomy, c_arm, &f->anatomy_layer, coarse ? 64 : ANATOMY_GRID);
+}
+
+static void draw_lumen(Fluoroscope *f, Layer *layer, const CArm *c_arm, const float *contrast, bool half, bool coarse, bool *is_empty)
+{
+    *is_empty = !f->lumen.is_there || f->lumen_out_of_beam || !is_seen(contrast, f->lumen.node_count) ||
+                !layer_fit(layer, half ? (f->side + 1) / 2 : f->side, LAYER_R32F);
+    if (*is_empty)
+        return;
+    layer_begin(layer);
+    lumen_draw(&f->lumen, c_arm, contrast, coarse);
+}
+
+static bool contrast_differs(const Fluoroscope *f)
+{
+    for (int n = 0; f->lumen.is_there && n < f->lumen.node_count; n++)
+        if (fabsf(f->shown.contrast[n] - f->lumen_contrast[n]) > least_contrast)
+            return true;
+    return false;
+}
+
+// Anatomy, lumen and roadmap brought up to the exposure. True where any has changed.
+static bool update_layers(Fluoroscope *f, bool is_fresh)
+{
+    CArm c_arm = c_arm_place(&f->shown.xray, &f->options.patient);
+    bool moved = is_fresh || c_arms_differ(&c_arm, &f->c_arm), flowed = contrast_differs(f), is_roadmap = lroundf(f->shown.xray.mode) == XRAY_ROADMAP;
+    bool coarse = (moved || flowed) && !is_fresh, refine = !moved && !flowed && f->layers_are_coarse;
+    f->roadmap_has_changed |= moved || refine;
+    bool roadmap = is_roadmap && f->roadmap_has_changed;
+    if (!moved && !flowed && !refine && !roadmap)
+        return false;
+    f->lumen_out_of_beam = f->lumen.is_there && !lumen_is_in_beam(&f->lumen, &c_arm);
+    if (moved || refine) {
+        draw_anatomy(f, &c_arm, moved && coarse);
+        f->tone.exposure = find_exposure(f, &c_arm);
+    }
+    draw_lumen(f, &f->lumen_layer, &c_arm, f->shown.contrast, moved && coarse, coarse, &f->lumen_is_empty);
+    if (f->lumen.is_there)
+        memcpy(f->lumen_contrast, f->shown.contrast, (size_t)f->lumen.node_count * sizeof *f->lumen_contrast);
+    if (roadmap) {
+        draw_lumen(f, &f->roadmap_layer, &c_arm, f->roadmap, moved && coarse, coarse, &f->roadmap_is_empty);
+        f->roadmap_has_changed = false;
+    }
+    f->layers_are_coarse = coarse;
+    f->c_arm = c_arm;
+    return true;
+}
+
+static LayerStack layer_stack(const Fluoroscope *f)
+{
+    bool is_dsa = f->tone.mode == XRAY_DSA;
+    return (LayerStack){.anatomy = has_anatomy(f) ? &f->anatomy_layer : NULL,
+                        .lumen = f->lumen_is_empty ? NULL : &f->lumen_layer,
+                        .roadmap = f->tone.has_roadmap ? &f->roadmap_layer : NULL,
+                        .mask = is_dsa && f->has_mask ? &f->mask : NULL};
+}
+
+static void take_mask(Fluoroscope *f)
+{
+    if (!layer_fit(&f->mask, f->side, LAYER_R32F))
+        return;
+    LayerStack stack = layer_stack(f);
+    layers_draw_total(&f->programs, &stack, &f->c_arm, &f->tone, &f->mask);
+    layers_draw_tool(&f->programs, &f->ribbon, &f->tone, true, &f->mask);
+    f->has_mask = true;
+    f->mask_is_due = false;
+    f->mask_pulse = f->shown.pulse;
+    f->mask_c_arm = f->c_arm;
+}
+
+static bool blades_or_mode_differ(const XrayControl *a, const XrayControl *b)
+{
+    return memcmp(a->collimator, b->collimator, sizeof a->collimator) != 0 || lroundf(a->mode) != lroundf(b->mode);
+}
+
+static void copy_box(const Layer *from, const Layer *to, const int low[2], const int high[2])
+{
+    if (high[0] <= low[0] || high[1] <= low[1])
+        return;
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, from->framebuffer);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, to->framebuffer);
+    glBlitFramebuffer(low[0], low[1], high[0], high[1], low[0], low[1], high[0], high[1], GL_COLOR_BUFFER_BIT, GL_NEAREST);
+}
+
+// The picture without its noise, for the exposure that was taken.
+static void make_picture(Fluoroscope *f, bool is_fresh)
+{
+    const int all[2] = {f->side, f->side}, none[2] = {0, 0};
+    bool changed = update_layers(f, is_fresh);
+    int mode = (int)lroundf(f->shown.xray.mode);
+    bool has_roadmap = mode == XRAY_ROADMAP && f->lumen.is_there && !f->roadmap_is_empty;
+    changed |= has_roadmap != f->tone.has_roadmap;
+    f->tone.mode = mode == XRAY_DSA || mode == XRAY_ROADMAP ? mode : XRAY_LIVE;
+    f->tone.has_roadmap = has_roadmap;
+    f->tone.contrast = f->options.contrast_attenuation;
+    f->tone.gain = f->options.dsa_gain;
+    f->tone.quanta = f->options.quanta;
+    f->ribbon.count = 0;
+    if (f->shown.has_tool)
+        ribbon_lay(&f->ribbon, &f->c_arm, f->side, f->options.node_count, f->shown.position, f->radius, f->attenuation);
+    if (f->mask_is_due || (f->tone.mode == XRAY_DSA && !f->has_mask)) {
+        take_mask(f);
+        changed = true;
+    }
+    if (changed || is_fresh || blades_or_mode_differ(&f->baked, &f->shown.xray)) {
+        LayerStack stack = layer_stack(f);
+        layers_bake(&f->programs, &stack, &f->c_arm, &f->tone, f->shown.xray.collimator, f->mask_pulse, &f->base);
+        f->baked = f->shown.xray;
+        copy_box(&f->base, &f->picture, none, all);
+    } else
+        copy_box(&f->base, &f->picture, f->drawn_low, f->drawn_high);
+    layers_draw_tool(&f->programs, &f->ribbon, &f->tone, false, &f->picture);
+    memcpy(f->drawn_low, f->ribbon.low, sizeof f->drawn_low);
+    memcpy(f->drawn_high, f->ribbon.count > 0 ? f->ribbon.high : none, sizeof f->drawn_high);
+}
+
+// --- showing ---
+
+static void fill(int x, int y, int width, int height, float red, float green, float blue)
+{
+    if (width < 1 || height < 1)
+        return;
+    glScissor(x, y, width, height);
+    glClearColor(red, green, blue, 1);
+    glClear(GL_COLOR_BUFFER_BIT);
+}
+
+// What lies beside the square, and the sign of a held picture: two bars, as of a player that pauses.
+static void draw_surroundings(const Fluoroscope *f, ViewPort port)
+{
+    int x = f->corner[0], y = f->corner[1], side = f->side;
+    const float dark = 0.016f;
+    glEnable(GL_SCISSOR_TEST);
+    fill(port.x, port.y, x - port.x, port.height, dark, dark, dark);
+    fill(x + side, port.y, port.x + port.width - x - side, port.height, dark, dark, dark);
+    fill(x, port.y, side, y - port.y, dark, dark, dark);
+    fill(x, y + side, side, port.y + port.height - y - side, dark, dark, dark);
+    if (f->is_held) {
+        int unit = side / 90 > 2 ? side / 90 : 2, left = x + 5 * unit, bottom = y + side - 8 * unit;
+        fill(left - unit, bottom - unit, 5 * unit, 5 * unit, 0.05f, 0.05f, 0.05f);
+        fill(left, bottom, unit, 3 * unit, 1.0f, 0.78f, 0.2f);
+        fill(left + 2 * unit, bottom, unit, 3 * unit, 1.0f, 0.78f, 0.2f);
+    }
+    glDisable(GL_SCISSOR_TEST);
+}
+
+void fluoroscope_draw(Fluoroscope *f, const FluoroscopeFrame *frame, ViewPort port)
+{
+    int side = port.width < port.height ? port.width : port.height;
+    if (side < 8)
+        return;
+    bool has_pedal = frame->xray.pedal > 0.5f, is_resized = side != f->side;
+    bool is_pulse = !f->has_picture || (has_pedal && frame->pulse != f->shown.pulse);
+    if (is_resized && (!layer_fit(&f->base, side, LAYER_RGBA16) || !layer_fit(&f->picture, side, LAYER_RGBA16)))
+        return;
+    f->side = side;
+    f->corner[0] = port.x + (port.width - side) / 2;
+    f->corner[1] = port.y + (port.height - side) / 2;
+    f->is_held = !has_pedal;
+    if (is_pulse)
+        take_exposure(f, frame);
+    if (is_pulse || is_resized)
+        make_picture(f, f->layers_are_stale || is_resized);
+    f->has_picture = true;
+    f->layers_are_stale = false;
+    layers_show(&f->programs, &f->picture, &f->tone, f->shown.pulse, port.framebuffer, f->corner[0], f->corner[1]);
+    draw_surroundings(f, port);
+}
+
+FluoroscopeState fluoroscope_state(const Fluoroscope *f)
+{
+    return (FluoroscopeState){.is_held = f->is_held,
+                              .has_mask = f->has_mask,
+                              .mask_has_moved = f->has_mask && c_arms_differ(&f->mask_c_arm, &f->c_arm),
+                              .has_roadmap = f->tone.has_roadmap,
+                              .shown = f->shown.xray,
+                              .square = {f->corner[0], f->corner[1], f->side}};
 }

@@ -1,0 +1,37 @@
+// What lies around the vessel in fluoroscopy: bone and soft tissue from a volume, or a plain head or trunk made of ellipsoids.
+#ifndef SELDINGER_RENDER_FLUOROSCOPE_ANATOMY_H
+#define SELDINGER_RENDER_FLUOROSCOPE_ANATOMY_H
+
+#include "geom/mesh_closure.h"
+#include "render/fluoroscope.h"
+
+enum { ELLIPSOIDS_MOST = 40 };
+
+typedef struct Ellipsoid {
+    Vec3 center;             // [mm] from Anatomy.middle, along right, anterior, superior
+    Vec3 semi;               // [mm] semi-axes along the same
+    double attenuation;      // [1/mm], added to what others have there: a hollow is a second one with the sign turned
+} Ellipsoid;
+
+typedef struct Anatomy {
+    PatientAxes axes;
+    Vec3 middle;
+    int ellipsoid_count;
+    Ellipsoid ellipsoid[ELLIPSOIDS_MOST];
+    // attenuation of the volume on a grid of at most ANATOMY_GRID cells a side; level NULL: none
+    int size[3];
+    Vec3 origin;             // [mm] corner of the grid
+    Mat3 to_grid;            // (x - origin) to 0..1 along each side of the grid
+    uint8_t *level;          // (size[2], size[1], size[0]): attenuation in 255ths of `most`
+    double most;             // [1/mm]
+} Anatomy;
+
+enum { ANATOMY_GRID = 128 };
+
+// `vessel`'s lumen (closed: `lids`) is taken out of the volume, which may hold it full of contrast agent. False with a message.
+bool anatomy_create(Anatomy *anatomy, const FluoroscopeOptions *options, const MeshLids *lids, char *message, size_t capacity);
+void anatomy_free(Anatomy *anatomy);
+// Integral of the attenuation along a ray, in double precision (slow: for exposure and tests).
+double anatomy_along(const Anatomy *anatomy, Vec3 source, Vec3 direction);
+
+#endif

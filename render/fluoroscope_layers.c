@@ -1,0 +1,410 @@
+// With I = exp(-attenuation), 1 where exposure puts white:
+//   live: brightness 1.75 I^0.72; N = quanta I are detected, sigma_I = sqrt(I / quanta), so sigma of the brightness is 1.75 0.72 I^0.22 / sqrt(quanta)
+//   DSA: brightness 0.62 exp(-g D), D = attenuation now minus attenuation in the mask; sigma = brightness g sqrt(1 / N_now + 1 / N_mask): the part of the mask
+//   stays the same as long as the mask
+// The detector's blur is the 3 x 3 binomial kernel, on layers and on the noise; the noise has unit variance after it. It is taken of attenuation, not of
+// intensity: for what differs by 0.3 between neighbours that is 1 % of the difference.
+#include "render/fluoroscope_layers.h"
+
+#include "render/gl_canvas.h"
+#include "render/message.h"
+
+#include <epoxy/gl.h>
+#include <stdlib.h>
+
+static const double white = 1.75, live_power = 0.72, subtracted = 0.62, weakest = 1.0 / 64;   // DSA: less than `weakest` of the exposure makes no more noise
+
+static const char *const SQUARE_VERTEX = "#version 330 core\n"
+                                         "out vec2 at;\n"   // 0..1 over the square
+                                         "void main() { at = vec2(gl_VertexID == 1 ? 2.0 : 0.0, gl_VertexID == 2 ? 2.0 : 0.0);\n"
+                                         "  gl_Position = vec4(2.0 * at - 1.0, 0.0, 1.0); }\n";
+
+static const char *const ANATOMY_FRAGMENT =
+    "#version 330 core\n"
+    "in vec2 at; out float result;\n"
+    "uniform vec3 ray[3], source; uniform int count; uniform vec4 ellipsoid[40]; uniform vec3 inverse_semi[40];\n"   // ray: towards, right, up
+    "uniform vec3 grid_ray[3], grid_source; uniform int steps; uniform float most; uniform sampler3D volume;\n"
+    "void main() { vec2 f = at - 0.5;\n"
+    "  vec3 d = ray[0] + f.x * ray[1] + f.y * ray[2]; float size = length(d), sum = 0.0;\n"
+    "  for (int i = 0; i < count; i++) { vec3 p = (source - ellipsoid[i].xyz) * inverse_semi[i], v = d * inverse_semi[i];\n"
+    // from the point of the line closest to the centre: b^2 - a c of large numbers would lose the chord
+    "    float a = dot(v, v); p -= dot(p, v) / a * v; float q = 1.0 - dot(p, p);\n"
+    "    sum += q > 0.0 ? ellipsoid[i].w * 2.0 * sqrt(q / a) * size : 0.0; }\n"
+    "  if (steps > 0) { vec3 g = grid_ray[0] + f.x * grid_ray[1] + f.y * grid_ray[2];\n"
+    "    vec3 s = 1.0 / (abs(g) + 1e-12) * mix(vec3(-1.0), vec3(1.0), greaterThanEqual(g, vec3(0.0)));\n"
+    "    vec3 u = -grid_source * s, w = (1.0 - grid_source) * s, a = min(u, w), b = max(u, w);\n"
+    "    float t0 = max(max(a.x, a.y), max(a.z, 0.0)), t1 = min(min(b.x, b.y), b.z);\n"
+    "    if (t1 > t0) { float step = (t1 - t0) / float(steps), grid = 0.0; vec3 p = grid_source + (t0 + 0.5 * step) * g, by = step * g;\n"
+    "      for (int i = 0; i < steps; i++, p += by) grid += texture(volume, p).r;\n"
+    "      sum += grid * most * step * size; } }\n"
+    "  result = max(sum, 0.0); }\n";
+
+// what the baking shaders share: attenuation of anatomy and lumen at `at`
+static const char *const ATTENUATION =
+    "#version 330 core\n"
+    "in vec2 at; uniform sampler2D anatomy, lumen, roadmap, mask; uniform float slant, contrast; uniform bvec4 has;\n"
+    "float blurred(sampler2D layer, vec2 p) { vec2 h = 0.5 / vec2(textureSize(layer, 0));\n"
+    "  return 0.25 * (texture(layer, p + h).r + texture(layer, p - h).r + texture(layer, p + vec2(h.x, -h.y)).r + texture(layer, p + vec2(-h.x, h.y)).r); }\n"
+    "float along(vec2 p) { vec2 f = slant * (p - 0.5); return sqrt(1.0 + dot(f, f)); }\n"
+    "float thickness(sampler2D layer, vec2 p) { return max(blurred(layer, p), 0.0) * along(p); }\n"
+    "float attenuation(vec2 p) { float a = has.x ? texture(anatomy, p).r : 0.0; return has.y ? a + contrast * thickness(lumen, p) : a; }\n";
+
+static const char *const TOTAL_FRAGMENT = "out float result; void main() { result = attenuation(at); }\n";
+
+static const char *const BAKE_FRAGMENT =
+    "out vec4 result; uniform int mode; uniform float exposure, gain, weakest, mask_noise, dark; uniform vec4 blades; uniform float corner, soft;\n"
+    "uniform sampler2D noise; uniform ivec3 offset;\n"
+    "float normal(ivec2 p) { p = offset.z != 0 ? p.yx : p; return texelFetch(noise, (p + offset.xy) & 511, 0).r * 8.0 - 4.0; }\n"
+    "void main() { float a = attenuation(at), i = min(exp(exposure - a), 1.0); vec4 r;\n"
+    "  if (mode == 1) { float m = texture(mask, at).r, d = a - m;\n"
+    "    float im = max(min(exp(exposure - m), 1.0), weakest); d += mask_noise * inversesqrt(im) * normal(ivec2(gl_FragCoord.xy));\n"
+    "    r.x = min(dark * exp(-gain * d), 1.0); r.y = r.x * inversesqrt(max(i, weakest)) * sqrt(weakest); }\n"
+    "  else { r.x = pow(i, 0.72); r.y = pow(i, 0.22); }\n"
+    "  r.z = has.z ? 1.0 - exp(-0.9 * thickness(roadmap, at)) : 0.0; r.w = 1.0;\n"
+    "  vec2 p = at - 0.5, middle = 0.5 * (blades.yw + blades.xz), half_side = 0.5 * (blades.yw - blades.xz);\n"
+    "  float c = min(corner, min(half_side.x, half_side.y)); vec2 q = abs(p - middle) - half_side + c;\n"
+    "  float outside = length(max(q, 0.0)) + min(max(q.x, q.y), 0.0) - c;\n"
+    "  float open = smoothstep(soft, -soft, outside);\n"
+    "  result = vec4(r.x * open, r.y * sqrt(open), r.z * open, 1.0); }\n";
+
+static const char *const TOOL_VERTEX =
+    "#version 330 core\n"
+    "layout(location = 0) in vec2 place; layout(location = 1) in vec3 profile; uniform float side; out vec3 chord;\n"
+    "void main() { gl_Position = vec4(2.0 * place / side - 1.0, 0.0, 1.0); chord = profile; }\n";
+// the integral of sqrt(r^2 - x^2) between pixel borders, of three pixels for the detector's blur
+static const char *const TOOL_FRAGMENT =
+    "#version 330 core\n"
+    "in vec3 chord; out vec4 result; uniform vec2 power; uniform bool as_attenuation;\n"
+    "void main() { float r = max(chord.y, 1e-6); vec4 u = clamp((chord.x + vec4(-1.5, -0.5, 0.5, 1.5)) / r, -1.0, 1.0);\n"
+    "  vec4 area = r * r * (u * sqrt(max(1.0 - u * u, 0.0)) + asin(u));\n"
+    "  float mean = 0.25 * (area.y - area.x) + 0.5 * (area.z - area.y) + 0.25 * (area.w - area.z), a = chord.z * mean;\n"
+    "  result = as_attenuation ? vec4(a) : vec4(exp(-power * a), 1.0, 1.0); }\n";
+
+static const char *const SHOW_FRAGMENT =
+    "#version 330 core\n"
+    "out vec4 result; uniform sampler2D baked, noise; uniform ivec2 corner; uniform ivec3 offset; uniform float sigma; uniform bool tint;\n"
+    "void main() { ivec2 p = ivec2(gl_FragCoord.xy) - corner; vec4 b = texelFetch(baked, p, 0); p = offset.z != 0 ? p.yx : p;\n"
+    "  float n = texelFetch(noise, (p + offset.xy) & 511, 0).r * 8.0 - 4.0;\n"
+    "  float grey = clamp(1.75 * b.x + sigma * b.y * n, 0.016, 1.0);\n"
+    "  result = vec4(grey, grey, grey, 1.0);\n"
+    "  if (tint) result.rgb *= mix(vec3(1.0), vec3(0.60, 1.12, 1.20), 0.8 * b.z); }\n";
+
+// --- random numbers ---
+
+static uint64_t mix_bits(uint64_t x)
+{
+    x += 0x9e3779b97f4a7c15u;
+    x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ x >> 27) * 0x94d049bb133111ebu;
+    return x ^ x >> 31;
+}
+
+// Where in the tile a pulse's noise begins, and whether it is turned.
+static void noise_offset(uint32_t pulse, int offset[3])
+{
+    uint64_t bits = mix_bits(pulse);
+    offset[0] = (int)(bits & (NOISE_TILE - 1));
+    offset[1] = (int)(bits >> 16 & (NOISE_TILE - 1));
+    offset[2] = (int)(bits >> 32 & 1);
+}
+
+static bool make_noise(LayerPrograms *programs)
+{
+    const size_t n = NOISE_TILE, cells = n * n;
+    double *raw = malloc(cells * sizeof *raw), *soft = malloc(cells * sizeof *soft), square = 0;
+    uint8_t *tile = malloc(cells);
+    bool good = raw && soft && tile;
+    for (size_t i = 0; good && i < cells; i++) {
+        // Box and Muller
+        double u = (double)((mix_bits(2 * i) >> 11) + 1) / 9007199254740993.0, v = (double)(mix_bits(2 * i + 1) >> 11) / 9007199254740992.0;
+        raw[i] = sqrt(-2 * log(u)) * cos(2 * PI * v);
+    }
+    static const double kernel[3] = {0.25, 0.5, 0.25};
+    for (size_t i = 0; good && i < cells; i++) {
+        soft[i] = 0;
+        for (size_t k = 0; k < 9; k++)
+            soft[i] += kernel[k % 3] * kernel[k / 3] * raw[(i / n + k / 3 + n - 1) % n * n + (i % n + k % 3 + n - 1) % n];
+        square += soft[i] * soft[i];
+    }
+    for (size_t i = 0; good && i < cells; i++)
+        tile[i] = (uint8_t)lround(fmin(fmax((soft[i] / sqrt(square / (double)cells) + 4) / 8, 0), 1) * 255);
+    if (good) {
+        glGenTextures(1, &programs->noise);
+        glBindTexture(GL_TEXTURE_2D, programs->noise);
+        glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+        glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, NOISE_TILE, NOISE_TILE, 0, GL_RED, GL_UNSIGNED_BYTE, tile);
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    }
+    free(raw);
+    free(soft);
+    free(tile);
+    return good;
+}
+
+// --- create ---
+
+static unsigned square_program(const char *head, const char *fragment, char *message, size_t capacity)
+{
+    char text[8192];
+    snprintf(text, sizeof text, "%s%s", head, fragment);
+    return gl_program_create(SQUARE_VERTEX, text, message, capacity);
+}
+
+static void send_volume(LayerPrograms *programs, const Anatomy *anatomy)
+{
+    glGenTextures(1, &programs->volume);
+    glBindTexture(GL_TEXTURE_3D, programs->volume);
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    glTexImage3D(GL_TEXTURE_3D, 0, GL_R8, anatomy->size[0], anatomy->size[1], anatomy->size[2], 0, GL_RED, GL_UNSIGNED_BYTE, anatomy->level);
+    glTexParameteri(GL_TEXTURE_3D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_3D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    for (int k = 0; k < 3; k++)
+        glTexParameteri(GL_TEXTURE_3D, (const GLenum[]){GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, GL_TEXTURE_WRAP_R}[k], GL_CLAMP_TO_EDGE);
+}
+
+static void make_tool_array(LayerPrograms *programs)
+{
+    glGenVertexArrays(1, &programs->tool_array);
+    glGenBuffers(1, &programs->tool_vertices);
+    glBindVertexArray(programs->tool_array);
+    glBindBuffer(GL_ARRAY_BUFFER, programs->tool_vertices);
+    glEnableVertexAttribArray(0);
+    glVertexAttribPointer(0, 2, GL_FLOAT, GL_FALSE, sizeof(RibbonVertex), NULL);
+    glEnableVertexAttribArray(1);
+    glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, sizeof(RibbonVertex), (const void *)(2 * sizeof(float)));
+    glBindVertexArray(0);
+}
+
+bool layers_create(LayerPrograms *programs, const Anatomy *anatomy, char *message, size_t capacity)
+{
+    *programs = (LayerPrograms){0};
+    programs->anatomy = square_program("", ANATOMY_FRAGMENT, message, capacity);
+    programs->total = programs->anatomy ? square_program(ATTENUATION, TOTAL_FRAGMENT, message, capacity) : 0;
+    programs->bake = programs->total ? square_program(ATTENUATION, BAKE_FRAGMENT, message, capacity) : 0;
+    programs->tool = programs->bake ? gl_program_create(TOOL_VERTEX, TOOL_FRAGMENT, message, capacity) : 0;
+    programs->show = programs->tool ? square_program("", SHOW_FRAGMENT, message, capacity) : 0;
+    if (!programs->show)
+        return false;
+    if (!make_noise(programs))
+        return message_fail(message, capacity, "not enough memory for the noise of fluoroscopy");
+    glGenVertexArrays(1, &programs->empty_array);
+    make_tool_array(programs);
+    if (anatomy->level)
+        send_volume(programs, anatomy);
+    return true;
+}
+
+void layers_destroy(LayerPrograms *programs)
+{
+    const unsigned program[5] = {programs->anatomy, programs->total, programs->bake, programs->tool, programs->show};
+    for (int i = 0; i < 5; i++)
+        if (program[i])
+            glDeleteProgram(program[i]);
+    glDeleteVertexArrays(1, &programs->empty_array);
+    glDeleteVertexArrays(1, &programs->tool_array);
+    glDeleteBuffers(1, &programs->tool_vertices);
+    glDeleteTextures(1, &programs->noise);
+    glDeleteTextures(1, &programs->volume);
+    *programs = (LayerPrograms){0};
+}
+
+bool layer_fit(Layer *layer, int side, LayerFormat format)
+{
+    if (layer->side == side)
+        return true;
+    layer_destroy(layer);
+    glGenTextures(1, &layer->texture);
+    glBindTexture(GL_TEXTURE_2D, layer->texture);
+    if (format == LAYER_R32F)
+        glTexImage2D(GL_TEXTURE_2D, 0, GL_R32F, side, side, 0, GL_RED, GL_FLOAT, NULL);
+    else
+        glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA16, side, side, 0, GL_RGBA, GL_UNSIGNED_SHORT, NULL);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    glGenFramebuffers(1, &layer->framebuffer);
+    glBindFramebuffer(GL_FRAMEBUFFER, layer->framebuffer);
+    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, layer->texture, 0);
+    if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
+        layer_destroy(layer);
+        return false;
+    }
+    layer->side = side;
+    return true;
+}
+
+void layer_destroy(Layer *layer)
+{
+    if (layer->framebuffer)
+        glDeleteFramebuffers(1, &layer->framebuffer);
+    if (layer->texture)
+        glDeleteTextures(1, &layer->texture);
+    *layer = (Layer){0};
+}
+
+// --- passes ---
+
+static void bind_layer(const Layer *layer)
+{
+    glBindFramebuffer(GL_FRAMEBUFFER, layer->framebuffer);
+    glViewport(0, 0, layer->side, layer->side);
+    glDisable(GL_SCISSOR_TEST);
+    glDisable(GL_DEPTH_TEST);
+    glDisable(GL_CULL_FACE);
+    glDisable(GL_BLEND);
+    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+}
+
+void layer_begin(const Layer *layer)
+{
+    bind_layer(layer);
+    glClearColor(0, 0, 0, 0);
+    glClear(GL_COLOR_BUFFER_BIT);
+}
+
+static void draw_square(const LayerPrograms *programs)
+{
+    glBindVertexArray(programs->empty_array);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    glBindVertexArray(0);
+}
+
+static void set_vec3(unsigned program, const char *name, Vec3 v) { glUniform3f(glGetUniformLocation(program, name), (float)v.x, (float)v.y, (float)v.z); }
+static void set_float(unsigned program, const char *name, double v) { glUniform1f(glGetUniformLocation(program, name), (float)v); }
+static void set_int(unsigned program, const char *name, int v) { glUniform1i(glGetUniformLocation(program, name), v); }
+
+static void set_texture(unsigned program, const char *name, int unit, GLenum target, unsigned texture)
+{
+    set_int(program, name, unit);
+    glActiveTexture(GL_TEXTURE0 + (GLenum)unit);
+    glBindTexture(target, texture);
+    glActiveTexture(GL_TEXTURE0);
+}
+
+void layers_draw_anatomy(const LayerPrograms *programs, const Anatomy *anatomy, const CArm *c_arm, const Layer *to, int steps)
+{
+    unsigned program = programs->anatomy;
+    const PatientAxes *axes = &anatomy->axes;
+    const Vec3 along[3] = {vec3_scale(c_arm->towards, C_ARM_SOURCE_MM), vec3_scale(c_arm->right, c_arm->field_mm), vec3_scale(c_arm->up, c_arm->field_mm)};
+    static const char *const ray[2][3] = {{"ray[0]", "ray[1]", "ray[2]"}, {"grid_ray[0]", "grid_ray[1]", "grid_ray[2]"}};
+    const Mat3 to_patient = {{{axes->right.x, axes->right.y, axes->right.z},
+                              {axes->anterior.x, axes->anterior.y, axes->anterior.z},
+                              {axes->superior.x, axes->superior.y, axes->superior.z}}};
+    bind_layer(to);
+    glUseProgram(program);
+    for (int k = 0; k < 3; k++) {
+        set_vec3(program, ray[0][k], mat3_mul_vec(&to_patient, along[k]));
+        set_vec3(program, ray[1][k], mat3_mul_vec(&anatomy->to_grid, along[k]));
+    }
+    Vec3 source = c_arm_source(c_arm);
+    set_vec3(program, "source", mat3_mul_vec(&to_patient, vec3_sub(source, anatomy->middle)));
+    set_vec3(program, "grid_source", mat3_mul_vec(&anatomy->to_grid, vec3_sub(source, anatomy->origin)));
+    float ellipsoid[ELLIPSOIDS_MOST][4], inverse[ELLIPSOIDS_MOST][3];
+    for (int i = 0; i < anatomy->ellipsoid_count; i++) {
+        const Ellipsoid *e = &anatomy->ellipsoid[i];
+        ellipsoid[i][0] = (float)e->center.x, ellipsoid[i][1] = (float)e->center.y, ellipsoid[i][2] = (float)e->center.z;
+        ellipsoid[i][3] = (float)e->attenuation;
+        inverse[i][0] = (float)(1 / e->semi.x), inverse[i][1] = (float)(1 / e->semi.y), inverse[i][2] = (float)(1 / e->semi.z);
+    }
+    set_int(program, "count", anatomy->ellipsoid_count);
+    if (anatomy->ellipsoid_count > 0) {
+        glUniform4fv(glGetUniformLocation(program, "ellipsoid"), anatomy->ellipsoid_count, &ellipsoid[0][0]);
+        glUniform3fv(glGetUniformLocation(program, "inverse_semi"), anatomy->ellipsoid_count, &inverse[0][0]);
+    }
+    set_int(program, "steps", programs->volume ? steps : 0);
+    set_float(program, "most", anatomy->most);
+    set_texture(program, "volume", 0, GL_TEXTURE_3D, programs->volume);
+    draw_square(programs);
+}
+
+static void set_stack(unsigned program, const LayerStack *stack, const CArm *c_arm, const LayerTone *tone)
+{
+    static const char *const name[4] = {"anatomy", "lumen", "roadmap", "mask"};
+    const Layer *layer[4] = {stack->anatomy, stack->lumen, stack->roadmap, stack->mask};
+    glUseProgram(program);
+    for (int k = 0; k < 4; k++)
+        set_texture(program, name[k], k, GL_TEXTURE_2D, layer[k] ? layer[k]->texture : 0);
+    glUniform4i(glGetUniformLocation(program, "has"), stack->anatomy != NULL, stack->lumen != NULL, stack->roadmap != NULL, stack->mask != NULL);
+    set_float(program, "slant", c_arm->field_mm / C_ARM_SOURCE_MM);
+    set_float(program, "contrast", tone->contrast);
+}
+
+void layers_draw_total(const LayerPrograms *programs, const LayerStack *stack, const CArm *c_arm, const LayerTone *tone, const Layer *to)
+{
+    bind_layer(to);
+    set_stack(programs->total, stack, c_arm, tone);
+    draw_square(programs);
+}
+
+void layers_bake(const LayerPrograms *programs, const LayerStack *stack, const CArm *c_arm, const LayerTone *tone, const float blades[4], uint32_t mask_pulse,
+                 const Layer *to)
+{
+    unsigned program = programs->bake;
+    double edge[4];
+    int offset[3];
+    for (int k = 0; k < 4; k++) {
+        // open blades still frame the picture
+        double covered = isfinite(blades[k]) ? fmin(fmax(blades[k], 0), 0.95) : 0;
+        edge[k] = (k % 2 ? 0.5 : -0.5) * fmin(1 - covered, 0.965);
+    }
+    noise_offset(mask_pulse, offset);
+    bind_layer(to);
+    set_stack(program, stack, c_arm, tone);
+    set_int(program, "mode", stack->mask && tone->mode == XRAY_DSA ? 1 : 0);
+    set_float(program, "exposure", tone->exposure);
+    set_float(program, "gain", tone->gain);
+    set_float(program, "weakest", weakest);
+    set_float(program, "mask_noise", tone->quanta > 0 ? 1 / sqrt(tone->quanta) : 0);
+    set_float(program, "dark", subtracted / white);
+    glUniform4f(glGetUniformLocation(program, "blades"), (float)edge[0], (float)edge[1], (float)edge[2], (float)edge[3]);
+    set_float(program, "corner", 0.05);
+    set_float(program, "soft", 10.0 / 720);
+    set_texture(program, "noise", 4, GL_TEXTURE_2D, programs->noise);
+    glUniform3iv(glGetUniformLocation(program, "offset"), 1, offset);
+    draw_square(programs);
+}
+
+void layers_draw_tool(const LayerPrograms *programs, const Ribbon *ribbon, const LayerTone *tone, bool as_attenuation, const Layer *to)
+{
+    if (ribbon->count < 1)
+        return;
+    unsigned program = programs->tool;
+    bool is_subtracted = tone->mode == XRAY_DSA;
+    bind_layer(to);
+    glUseProgram(program);
+    set_float(program, "side", to->side);
+    glUniform2f(glGetUniformLocation(program, "power"), (float)(is_subtracted ? tone->gain : live_power),
+                (float)(is_subtracted ? tone->gain - 0.5 : live_power - 0.5));
+    set_int(program, "as_attenuation", as_attenuation);
+    glEnable(GL_BLEND);
+    glBlendEquation(GL_FUNC_ADD);
+    glBlendFunc(as_attenuation ? GL_ONE : GL_ZERO, as_attenuation ? GL_ONE : GL_SRC_COLOR);
+    glBindVertexArray(programs->tool_array);
+    glBindBuffer(GL_ARRAY_BUFFER, programs->tool_vertices);
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)((size_t)ribbon->count * sizeof *ribbon->vertex), ribbon->vertex, GL_STREAM_DRAW);
+    glDrawArrays(GL_TRIANGLES, 0, ribbon->count);
+    glBindVertexArray(0);
+    glDisable(GL_BLEND);
+}
+
+void layers_show(const LayerPrograms *programs, const Layer *baked, const LayerTone *tone, uint32_t pulse, unsigned framebuffer, int x, int y)
+{
+    unsigned program = programs->show;
+    int offset[3];
+    noise_offset(pulse, offset);
+    // of a unit of the baked noise channel
+    double unit = tone->mode == XRAY_DSA ? white * tone->gain / sqrt(weakest) : white * live_power;
+    bind_layer(baked);
+    glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+    glViewport(x, y, baked->side, baked->side);
+    glUseProgram(program);
+    set_texture(program, "baked", 0, GL_TEXTURE_2D, baked->texture);
+    set_texture(program, "noise", 1, GL_TEXTURE_2D, programs->noise);
+    glUniform2i(glGetUniformLocation(program, "corner"), x, y);
+    glUniform3iv(glGetUniformLocation(program, "offset"), 1, offset);
+    set_float(program, "sigma", tone->quanta > 0 ? unit / sqrt(tone->quanta) : 0);
+    set_int(program, "tint", tone->has_roadmap);
+    draw_square(programs);
+}

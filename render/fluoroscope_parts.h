@@ -1,0 +1,46 @@
+// Inside of a Fluoroscope, for its own files and tests.
+#ifndef SELDINGER_RENDER_FLUOROSCOPE_PARTS_H
+#define SELDINGER_RENDER_FLUOROSCOPE_PARTS_H
+
+#include "render/fluoroscope_layers.h"
+#include "render/fluoroscope_vessel.h"
+
+// What a picture was taken of.
+typedef struct Exposure {
+    XrayControl xray;
+    uint32_t pulse;
+    bool has_tool;
+    Vec3 *position;              // (M)
+    float *contrast;             // (N)
+} Exposure;
+
+struct Fluoroscope {
+    FluoroscopeOptions options;  // what it points to is gone
+    double *radius, *attenuation;   // (M)
+    Anatomy anatomy;
+    Lumen lumen;
+    LayerPrograms programs;
+    Layer anatomy_layer, lumen_layer, roadmap_layer, base, picture, mask;
+    Ribbon ribbon;
+    int drawn_low[2], drawn_high[2];   // box of the tool in `picture`
+    Exposure shown;
+    bool has_picture;
+    // what the layers hold
+    bool layers_are_stale, layers_are_coarse, lumen_is_empty, roadmap_is_empty, lumen_out_of_beam;
+    CArm c_arm;                  // of the layers
+    float *lumen_contrast;       // (N) of the lumen layer
+    XrayControl baked;           // of the base
+    LayerTone tone;
+    int side;
+    // mask and roadmap
+    bool has_mask, mask_is_due;
+    float mask_count;
+    uint32_t mask_pulse;
+    CArm mask_c_arm;
+    float *bolus, *roadmap;      // (N) most there was in the last bolus; most in the roadmap
+    bool was_opacified, roadmap_has_changed;
+    bool is_held;
+    int corner[2];
+};
+
+#endif
