@@ -314,8 +314,11 @@ static void open_collection(Reading *reading, uint32_t type)
     reading->open[reading->open_count++] = out->collection_count++;
 }
 
-static void read_main(Reading *reading, int tag, uint32_t value)
+static void read_main(Reading *reading, int tag, uint32_t value, size_t size)
 {
+    // zero bytes after the end, as some devices pad their descriptor
+    if (tag == 0 && size == 0 && reading->open_count == 0)
+        return;
     switch (tag) {
     case MAIN_INPUT: read_fields(reading, HID_INPUT, value); break;
     case MAIN_OUTPUT: read_fields(reading, HID_OUTPUT, value); break;
@@ -360,7 +363,7 @@ static size_t read_item(Reading *reading, const uint8_t *bytes, size_t length)
         as_signed -= (int64_t)1 << 8 * size;
     int type = item[0] >> 2 & 3, tag = item[0] >> 4;
     if (type == TYPE_MAIN)
-        read_main(reading, tag, value);
+        read_main(reading, tag, value, size);
     else if (type == TYPE_GLOBAL)
         read_global(reading, tag, value, as_signed);
     else if (type == TYPE_LOCAL)
