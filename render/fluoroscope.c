@@ -114,7 +114,7 @@ Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message
     }
     good = good && anatomy_create(&f->anatomy, &own, &lids, message, capacity);
     good = good && layers_create(&f->programs, &f->anatomy, message, capacity);
-    good = good && (!has_wall || lumen_create(&f->lumen, &own, &closure, &lids, message, capacity));
+    good = good && (!has_wall || lumen_layer_create(&f->lumen, &own, &closure, &lids, message, capacity));
     mesh_lids_free(&lids);
     if (good && !take_memory(f, options)) {
         message_fail(message, capacity, "not enough memory for fluoroscopy");
@@ -139,7 +139,7 @@ void fluoroscope_destroy(Fluoroscope *f)
     if (!f)
         return;
     anatomy_free(&f->anatomy);
-    lumen_destroy(&f->lumen);
+    lumen_layer_destroy(&f->lumen);
     layers_destroy(&f->programs);
     Layer *layer[6] = {&f->anatomy_layer, &f->lumen_layer, &f->roadmap_layer, &f->base, &f->picture, &f->mask};
     for (int i = 0; i < 6; i++)
@@ -243,7 +243,7 @@ static void draw_lumen(Fluoroscope *f, Layer *layer, const CArm *c_arm, const fl
     if (*is_empty)
         return;
     layer_begin(layer);
-    lumen_draw(&f->lumen, c_arm, contrast, coarse);
+    lumen_layer_draw(&f->lumen, c_arm, contrast, coarse);
 }
 
 static bool contrast_differs(const Fluoroscope *f)

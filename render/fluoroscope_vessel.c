@@ -165,7 +165,7 @@ static bool take_nodes(Lumen *lumen, const VesselTree *tree)
     return true;
 }
 
-bool lumen_create(Lumen *lumen, const FluoroscopeOptions *options, const MeshClosure *closure, const MeshLids *lids, char *message, size_t capacity)
+bool lumen_layer_create(Lumen *lumen, const FluoroscopeOptions *options, const MeshClosure *closure, const MeshLids *lids, char *message, size_t capacity)
 {
     *lumen = (Lumen){.sign = closure->volume < 0 ? -1 : 1};
     lumen->program = gl_program_create(LUMEN_VERTEX, LUMEN_FRAGMENT, message, capacity);
@@ -177,7 +177,7 @@ bool lumen_create(Lumen *lumen, const FluoroscopeOptions *options, const MeshClo
     return true;
 }
 
-void lumen_destroy(Lumen *lumen)
+void lumen_layer_destroy(Lumen *lumen)
 {
     if (lumen->program)
         glDeleteProgram(lumen->program);
@@ -226,7 +226,7 @@ static void send_nodes(Lumen *lumen, const CArm *c_arm, const float *concentrati
     glBufferData(GL_TEXTURE_BUFFER, (GLsizeiptr)((size_t)lumen->node_count * sizeof *lumen->shift_slope), lumen->shift_slope, GL_STREAM_DRAW);
 }
 
-void lumen_draw(Lumen *lumen, const CArm *c_arm, const float *concentration, bool coarse)
+void lumen_layer_draw(Lumen *lumen, const CArm *c_arm, const float *concentration, bool coarse)
 {
     const LumenMesh *mesh = coarse && lumen->coarse.index_count > 0 ? &lumen->coarse : &lumen->fine;
     float clip[16];

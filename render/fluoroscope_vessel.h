@@ -29,11 +29,11 @@ typedef struct Lumen {
 } Lumen;
 
 // `lids` and `closure` of options->vessel. False where the driver or memory fails; `message` may get a remark besides.
-bool lumen_create(Lumen *lumen, const FluoroscopeOptions *options, const MeshClosure *closure, const MeshLids *lids, char *message, size_t capacity);
-void lumen_destroy(Lumen *lumen);
+bool lumen_layer_create(Lumen *lumen, const FluoroscopeOptions *options, const MeshClosure *closure, const MeshLids *lids, char *message, size_t capacity);
+void lumen_layer_destroy(Lumen *lumen);
 // Whether the whole lumen lies between source and detector as the C-arm stands: otherwise rays are wrong and nothing may be drawn.
 bool lumen_is_in_beam(const Lumen *lumen, const CArm *c_arm);
 // Adds F into the bound framebuffer of one float channel (depth along the C-arm's axis, without the rays' slant).
-void lumen_draw(Lumen *lumen, const CArm *c_arm, const float *concentration, bool coarse);
+void lumen_layer_draw(Lumen *lumen, const CArm *c_arm, const float *concentration, bool coarse);
 
 #endif
