@@ -56,7 +56,7 @@ Views *views_create(const ViewsOptions *options, char *message, size_t capacity)
                                 .entry_direction = scene->wire.direction};
     bool good = views && (views->scene = vessel_scene_create(&shown, message, capacity)) &&
                 (views->angioscope = angioscope_create(options->mesh, options->vessel, options->tree, message, capacity)) &&
-                ((views->fluoroscope = create_fluoroscope(options, message, capacity)) || true);
+                (views->fluoroscope = create_fluoroscope(options, message, capacity));
     triangle_mesh_free(coarse);
     if (good)
         return views;
