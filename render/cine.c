@@ -1,0 +1,416 @@
+// A ring of images in arrays taken at once. File, all little-endian: "SELDCINE", version, tool nodes, vessel nodes, images (4 bytes each); the images,
+// field by field in the order of walk_frame(); FNV-1a of all before (8 bytes).
+#include "render/cine.h"
+
+#include "render/message.h"
+#include "render/movie_file.h"
+#include "render/pulse_clock.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+_Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "files are little-endian");
+
+enum { MOST_NODES = 100000, MOST_CONTRAST = 10000000, MOST_FRAMES = 1000000, VERSION = 1 };
+static const uint64_t MOST_BYTES = (uint64_t)8 << 30;
+static const char magic[] = "SELDCINE";
+
+struct Cine {
+    int node_count, contrast_count, capacity;
+    int first, count;        // ring
+    int64_t dropped;
+    bool is_recording, is_locked;
+    Pose *pose;              // (capacity) into the arrays below
+    uint32_t *pulse;         // (capacity)
+    Vec3 *position;          // (capacity, node_count)
+    Quat *quaternion;
+    NodeReport *node;
+    float *contrast;         // (capacity, contrast_count)
+};
+
+static uint64_t bytes_of_frame(int node_count, int contrast_count)
+{
+    return sizeof(Pose) + sizeof(uint32_t) + (uint64_t)node_count * (sizeof(Vec3) + sizeof(Quat) + sizeof(NodeReport)) +
+           (uint64_t)contrast_count * sizeof(float);
+}
+
+size_t cine_bytes(int node_count, int contrast_count, int capacity)
+{
+    if (node_count < 1 || node_count > MOST_NODES || contrast_count < 0 || contrast_count > MOST_CONTRAST || capacity < 1 || capacity > MOST_FRAMES)
+        return 0;
+    uint64_t bytes = bytes_of_frame(node_count, contrast_count) * (uint64_t)capacity;
+    return bytes <= MOST_BYTES ? (size_t)bytes : 0;
+}
+
+Cine *cine_create(int node_count, int contrast_count, int capacity)
+{
+    Cine *cine = cine_bytes(node_count, contrast_count, capacity) > 0 ? calloc(1, sizeof *cine) : NULL;
+    if (!cine)
+        return NULL;
+    size_t frames = (size_t)capacity, nodes = frames * (size_t)node_count;
+    *cine = (Cine){.node_count = node_count,
+                   .contrast_count = contrast_count,
+                   .capacity = capacity,
+                   .pose = calloc(frames, sizeof *cine->pose),
+                   .pulse = calloc(frames, sizeof *cine->pulse),
+                   .position = calloc(nodes, sizeof *cine->position),
+                   .quaternion = calloc(nodes, sizeof *cine->quaternion),
+                   .node = calloc(nodes, sizeof *cine->node),
+                   .contrast = calloc(frames * (size_t)contrast_count + 1, sizeof *cine->contrast)};
+    if (!cine->pose || !cine->pulse || !cine->position || !cine->quaternion || !cine->node || !cine->contrast) {
+        cine_free(cine);
+        return NULL;
+    }
+    for (int i = 0; i < capacity; i++) {
+        size_t at = (size_t)i * (size_t)node_count;
+        cine->pose[i] = (Pose){.node_count = node_count, .position = cine->position + at, .quaternion = cine->quaternion + at, .node = cine->node + at};
+    }
+    return cine;
+}
+
+void cine_free(Cine *cine)
+{
+    if (!cine)
+        return;
+    free(cine->pose);
+    free(cine->pulse);
+    free(cine->position);
+    free(cine->quaternion);
+    free(cine->node);
+    free(cine->contrast);
+    free(cine);
+}
+
+static int slot(const Cine *cine, int index) { return (cine->first + index) % cine->capacity; }
+static float *contrast_of(const Cine *cine, int place) { return cine->contrast + (size_t)place * (size_t)cine->contrast_count; }
+
+// --- recording ---
+
+bool cine_record(Cine *cine)
+{
+    if (cine->is_locked)
+        return false;
+    cine->first = cine->count = 0;
+    cine->dropped = 0;
+    return cine->is_recording = true;
+}
+
+void cine_stop(Cine *cine) { cine->is_recording = false; }
+bool cine_is_recording(const Cine *cine) { return cine->is_recording; }
+void cine_lock(Cine *cine, bool locked) { cine->is_locked = locked; }
+
+bool cine_add(Cine *cine, const CineFrame *frame)
+{
+    bool is_known = cine->count > 0 && cine->pulse[slot(cine, cine->count - 1)] == frame->pulse, is_full = cine->count == cine->capacity;
+    if (!cine->is_recording || is_known || frame->pose->node_count != cine->node_count || (is_full && cine->is_locked))
+        return false;
+    if (is_full) {
+        cine->first = slot(cine, 1);
+        cine->count--;
+        cine->dropped++;
+    }
+    int place = slot(cine, cine->count++);
+    pose_copy(&cine->pose[place], frame->pose);
+    cine->pulse[place] = frame->pulse;
+    float *contrast = contrast_of(cine, place);
+    for (int i = 0; i < cine->contrast_count; i++)
+        contrast[i] = frame->contrast ? frame->contrast[i] : 0;
+    return true;
+}
+
+int cine_node_count(const Cine *cine) { return cine->node_count; }
+int cine_contrast_count(const Cine *cine) { return cine->contrast_count; }
+int cine_capacity(const Cine *cine) { return cine->capacity; }
+int cine_count(const Cine *cine) { return cine->count; }
+int64_t cine_dropped(const Cine *cine) { return cine->dropped; }
+
+CineFrame cine_frame(const Cine *cine, int index)
+{
+    int place = slot(cine, index);
+    return (CineFrame){&cine->pose[place], cine->contrast_count > 0 ? contrast_of(cine, place) : NULL, cine->pulse[place]};
+}
+
+double cine_frame_s(const Cine *cine, int index)
+{
+    const Pose *pose = cine_frame(cine, index).pose;
+    double between = 1 / pulse_clock_rate(&pose->xray);
+    if (index + 1 >= cine->count)
+        return between;
+    double gap = cine_frame(cine, index + 1).pose->time_s - pose->time_s;
+    return gap > 0 && gap < 1.5 * between ? gap : between;
+}
+
+double cine_duration_s(const Cine *cine)
+{
+    double sum = 0;
+    for (int i = 0; i < cine->count; i++)
+        sum += cine_frame_s(cine, i);
+    return sum;
+}
+
+// --- replay ---
+
+CinePlayer cine_player_start(const Cine *cine)
+{
+    return (CinePlayer){.is_playing = true, .loops = true, .speed = 1, .frame = cine->count > 0 ? 0 : -1};
+}
+
+int cine_player_advance(CinePlayer *player, const Cine *cine, double dt_s)
+{
+    if (cine->count == 0)
+        return player->frame = -1;
+    player->frame = player->frame < 0 ? 0 : player->frame < cine->count ? player->frame : cine->count - 1;
+    if (!player->is_playing || !(dt_s > 0))
+        return player->frame;
+    double speed = player->speed >= 0.1 ? fmin(player->speed, 4) : 0.1;
+    player->shown_s += player->loops ? fmod(dt_s * speed, cine_duration_s(cine)) : dt_s * speed;
+    for (double length; player->shown_s >= (length = cine_frame_s(cine, player->frame));) {
+        if (player->frame + 1 == cine->count && !player->loops) {
+            player->is_playing = false;
+            player->shown_s = 0;
+            break;
+        }
+        player->shown_s -= length;
+        player->frame = (player->frame + 1) % cine->count;
+    }
+    return player->frame;
+}
+
+int cine_player_step(CinePlayer *player, const Cine *cine, int images)
+{
+    player->is_playing = false;
+    player->shown_s = 0;
+    if (cine->count == 0)
+        return player->frame = -1;
+    int64_t frame = (int64_t)(player->frame < 0 ? 0 : player->frame) + images, last = cine->count - 1;
+    if (player->loops)
+        frame = (frame % cine->count + cine->count) % cine->count;
+    return player->frame = (int)(frame < 0 ? 0 : frame < last ? frame : last);
+}
+
+// --- files ---
+
+// Reads or writes; turns bad once, where bytes lack.
+typedef struct Cursor {
+    uint8_t *out;            // NULL: reads
+    const uint8_t *in;
+    size_t at, length;
+    bool good;
+} Cursor;
+
+static void walk(Cursor *cursor, void *value, size_t size)
+{
+    if (!cursor->good || size > cursor->length - cursor->at) {
+        cursor->good = false;
+        return;
+    }
+    if (cursor->out)
+        memcpy(cursor->out + cursor->at, value, size);
+    else
+        memcpy(value, cursor->in + cursor->at, size);
+    cursor->at += size;
+}
+
+// WALK(cursor, variable): one field.
+#define WALK(cursor, value) walk(cursor, &(value), sizeof(value))
+
+static void walk_report(Cursor *cursor, StepReport *report)
+{
+    WALK(cursor, report->flags);
+    WALK(cursor, report->candidates);
+    WALK(cursor, report->active);
+    WALK(cursor, report->iterations);
+    WALK(cursor, report->residual);
+    WALK(cursor, report->cone_violation);
+    WALK(cursor, report->penetration);
+    WALK(cursor, report->proximal_force);
+    WALK(cursor, report->proximal_torque);
+    WALK(cursor, report->wall_force_max);
+    WALK(cursor, report->wall_force_sum);
+    WALK(cursor, report->newton);
+}
+
+static void walk_frame(Cursor *cursor, Cine *cine, int place)
+{
+    Pose *pose = &cine->pose[place];
+    WALK(cursor, cine->pulse[place]);
+    WALK(cursor, pose->step);
+    WALK(cursor, pose->time_s);
+    WALK(cursor, pose->command.push_mm_s);
+    WALK(cursor, pose->command.twist_deg_s);
+    WALK(cursor, pose->xray);
+    WALK(cursor, pose->inserted_mm);
+    WALK(cursor, pose->first_free_node);
+    walk_report(cursor, &pose->report);
+    walk(cursor, pose->position, (size_t)cine->node_count * sizeof *pose->position);
+    walk(cursor, pose->quaternion, (size_t)cine->node_count * sizeof *pose->quaternion);
+    for (int i = 0; i < cine->node_count; i++) {
+        NodeReport *node = &pose->node[i];
+        WALK(cursor, node->s);
+        WALK(cursor, node->radius);
+        WALK(cursor, node->force);
+        WALK(cursor, node->gap);
+        WALK(cursor, node->vessel_node);
+    }
+    walk(cursor, contrast_of(cine, place), (size_t)cine->contrast_count * sizeof *cine->contrast);
+}
+
+enum {
+    HEAD_BYTES = 8 + 4 * 4,
+    FRAME_BYTES = 4 + 8 + 8 + 2 * 8 + (int)sizeof(XrayControl) + 8 + 4 + 4 * 4 + 7 * 8 + 4,
+    NODE_BYTES = 3 * 8 + 4 * 8 + 6 * 8 + 4
+};
+
+static uint64_t file_bytes(int node_count, int contrast_count, int count)
+{
+    return HEAD_BYTES + 8 + (uint64_t)count * (FRAME_BYTES + (uint64_t)node_count * NODE_BYTES + (uint64_t)contrast_count * 4);
+}
+
+static uint64_t checksum(const uint8_t *bytes, size_t length)
+{
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (size_t i = 0; i < length; i++)
+        hash = (hash ^ bytes[i]) * 0x100000001b3u;
+    return hash;
+}
+
+uint8_t *cine_pack(const Cine *cine, size_t *length)
+{
+    *length = (size_t)file_bytes(cine->node_count, cine->contrast_count, cine->count);
+    Cursor cursor = {.out = malloc(*length), .length = *length, .good = true};
+    if (!cursor.out)
+        return NULL;
+    uint32_t version = VERSION;
+    int32_t count[] = {cine->node_count, cine->contrast_count, cine->count};
+    char mark[8];
+    memcpy(mark, magic, 8);
+    WALK(&cursor, mark);
+    WALK(&cursor, version);
+    WALK(&cursor, count);
+    Cine ring = *cine;   // walk_frame() writes where it reads a file, not here
+    for (int i = 0; i < cine->count; i++)
+        walk_frame(&cursor, &ring, slot(cine, i));
+    uint64_t sum = checksum(cursor.out, cursor.at);
+    WALK(&cursor, sum);
+    return cursor.out;
+}
+
+static bool all_finite(const double *value, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        if (!isfinite(value[i]))
+            return false;
+    return true;
+}
+
+// What drawing relies on. NULL or what is wrong.
+static const char *frame_fault(const Cine *cine, int index)
+{
+    const Pose *pose = &cine->pose[index];
+    const float *xray = (const float *)&pose->xray, *contrast = contrast_of(cine, index);
+    const double figures[] = {pose->time_s, pose->command.push_mm_s, pose->command.twist_deg_s, pose->inserted_mm, pose->report.residual,
+                              pose->report.cone_violation, pose->report.penetration, pose->report.proximal_force, pose->report.proximal_torque,
+                              pose->report.wall_force_max, pose->report.wall_force_sum};
+    for (int i = 0; i < XRAY_VALUES; i++)
+        if (!isfinite(xray[i]))
+            return "X-ray settings are finite numbers";
+    if (!(pose->xray.field_mm > 0) || !all_finite(figures, sizeof figures / sizeof *figures))
+        return "times, forces and lengths are finite numbers, a field is above 0";
+    if (pose->first_free_node < 0 || pose->first_free_node >= cine->node_count)
+        return "the first node outside of the sheath is one of the tool's";
+    for (int i = 0; i < cine->node_count; i++) {
+        const NodeReport *node = &pose->node[i];
+        Quat q = pose->quaternion[i];
+        double norm = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
+        if (!vec3_is_finite(pose->position[i]) || !vec3_is_finite(node->force) || !isfinite(node->s) || !(node->radius > 0) || !isfinite(node->radius) ||
+            isnan(node->gap) || !(fabs(norm - 1) < 1e-6))
+            return "the tool's nodes have finite places and forces, radii above 0, unit quaternions";
+        if (node->vessel_node < -1 || (cine->contrast_count > 0 && node->vessel_node >= cine->contrast_count))
+            return "the tool's nodes lie at nodes of the vessel, or at none (-1)";
+    }
+    for (int i = 0; i < cine->contrast_count; i++)
+        if (!(contrast[i] >= 0 && contrast[i] <= 1))
+            return "concentrations are 0 to 1";
+    return NULL;
+}
+
+Cine *cine_unpack(const uint8_t *bytes, size_t length, const char *name, Faults *faults)
+{
+    Cursor cursor = {.in = bytes, .length = length, .good = true};
+    char mark[8] = "";
+    uint32_t version = 0;
+    int32_t count[3] = {0};
+    WALK(&cursor, mark);
+    WALK(&cursor, version);
+    WALK(&cursor, count);
+    if (!cursor.good || memcmp(mark, magic, sizeof mark) != 0 || version != VERSION) {
+        faults_add_at_byte(faults, name, 0, "is no cine loop of version %d; a file that the trainer saved is expected", VERSION);
+        return NULL;
+    }
+    if (count[2] < 0 || cine_bytes(count[0], count[1], count[2] > 0 ? count[2] : 1) == 0) {
+        faults_add_at_byte(faults, name, 12, "says %d tool nodes, %d vessel nodes and %d images; 1 to %d, 0 to %d, 0 to %d, and 8 GB in all", (int)count[0],
+                           (int)count[1], (int)count[2], MOST_NODES, MOST_CONTRAST, MOST_FRAMES);
+        return NULL;
+    }
+    uint64_t expected = file_bytes(count[0], count[1], count[2]);
+    if (expected != length) {
+        faults_add_at_byte(faults, name, length, "has %zu bytes, its counts make %llu: it was cut or has grown", length, (unsigned long long)expected);
+        return NULL;
+    }
+    Cine *cine = cine_create(count[0], count[1], count[2] > 0 ? count[2] : 1);
+    if (!cine) {
+        faults_add(faults, name, 0, 0, "not enough memory for its %d images", (int)count[2]);
+        return NULL;
+    }
+    const char *fault = NULL;
+    size_t at = 0;
+    for (int i = 0; i < count[2] && !fault; i++) {
+        at = cursor.at;
+        walk_frame(&cursor, cine, i);
+        fault = frame_fault(cine, i);
+    }
+    uint64_t sum = 0;
+    WALK(&cursor, sum);
+    if (fault)
+        faults_add_at_byte(faults, name, at, "an image that cannot be drawn: %s; the file is damaged", fault);
+    else if (sum != checksum(bytes, length - sizeof sum))
+        faults_add_at_byte(faults, name, length - sizeof sum, "has another checksum than it says; the file is damaged");
+    else {
+        cine->count = count[2];
+        return cine;
+    }
+    cine_free(cine);
+    return NULL;
+}
+
+bool cine_movie(const Cine *cine, const char *path, int width, int height, CineDraw draw, void *context, char *message, size_t capacity)
+{
+    if (cine->count == 0)
+        return message_fail(message, capacity, "%s: the cine loop is empty: record some images first", path);
+    double rate = 0;
+    for (int i = 0; i < cine->count; i++)
+        rate = fmax(rate, pulse_clock_rate(&cine_frame(cine, i).pose->xray));
+    MovieFile *movie = movie_file_create(path, width, height, rate, message, capacity);
+    if (!movie)
+        return false;
+    uint8_t *rgb = malloc((size_t)width * (size_t)height * 3);
+    if (!rgb) {
+        movie_file_abandon(movie);
+        return message_fail(message, capacity, "%s: not enough memory", path);
+    }
+    bool drawn = true, going = true;
+    double shown = 0;   // what is due by the end of each image decides how often it is written: no drift
+    for (int i = 0; i < cine->count && drawn && going; i++) {
+        CineFrame frame = cine_frame(cine, i);
+        drawn = draw(context, &frame, rgb, message, capacity);
+        shown += cine_frame_s(cine, i);
+        while (drawn && going && movie_file_count(movie) < (int)lround(shown * rate))
+            going = movie_file_add(movie, rgb);
+    }
+    free(rgb);
+    if (drawn)
+        return movie_file_close(movie, message, capacity);
+    movie_file_abandon(movie);
+    return false;
+}

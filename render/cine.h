@@ -1,0 +1,71 @@
+// A cine loop: the last X-ray images, kept as what they were drawn from (tool, X-ray settings, pulse number, contrast agent), so that they are drawn
+// again exactly, at any size, and may be looked at from the 3D view as well. An image is 120 bytes a tool node and 4 a vessel node: 30 s at 30/s with
+// 300 and 1,400 of them are 39 MB, taken once; the images themselves at 1024 x 1024 would be 900.
+// A view that subtracts (DSA) takes the loop's first image as its mask: forget the held picture (fluoroscope_forget) where a loop begins.
+// Knows no OpenGL and no file: bytes in, bytes out. One thread.
+#ifndef SELDINGER_RENDER_CINE_H
+#define SELDINGER_RENDER_CINE_H
+
+#include "geom/faults.h"
+#include "sim/pose.h"
+
+typedef struct CineFrame {
+    const Pose *pose;            // at the pulse; X-ray settings and time are its own
+    const float *contrast;       // (contrast_count), NULL where that is 0
+    uint32_t pulse;              // number of the X-ray pulse
+} CineFrame;
+
+typedef struct Cine Cine;
+
+// [bytes] that a loop takes; 0 where it would be more than 8 GB or a count is unfit: 1 to 100,000 tool nodes, 0 to 10,000,000 vessel nodes, 1 to
+// 1,000,000 images.
+size_t cine_bytes(int node_count, int contrast_count, int capacity);
+// `contrast_count`: nodes of the vessel tree, 0 without. NULL where cine_bytes() is 0 or memory lacks.
+Cine *cine_create(int node_count, int contrast_count, int capacity);
+void cine_free(Cine *cine);
+
+// --- recording ---
+// Empties the loop and begins. False while it is locked.
+bool cine_record(Cine *cine);
+void cine_stop(Cine *cine);
+bool cine_is_recording(const Cine *cine);
+// Call it with every picture: a pulse that is there already is left out, and so is everything while nothing is recorded. Where the loop is full the
+// oldest image goes; while it is locked none does, and nothing more comes in. True where the image was kept. Allocates nothing.
+bool cine_add(Cine *cine, const CineFrame *frame);
+// While it is replayed or saved: images stay, and stay where they are.
+void cine_lock(Cine *cine, bool locked);
+
+int cine_node_count(const Cine *cine);
+int cine_contrast_count(const Cine *cine);
+int cine_capacity(const Cine *cine);
+int cine_count(const Cine *cine);
+int64_t cine_dropped(const Cine *cine);                  // images that went since cine_record
+CineFrame cine_frame(const Cine *cine, int index);       // 0 (oldest) to cine_count - 1; valid until the next cine_add
+// [s] that an image is shown: to the next pulse, but where the pedal was up between only as long as the pulses' rate says.
+double cine_frame_s(const Cine *cine, int index);
+double cine_duration_s(const Cine *cine);
+
+// --- replay, at the pulses' own times ---
+typedef struct CinePlayer {
+    bool is_playing, loops;
+    double speed;                // 1: as it was; 0.1 to 4
+    int frame;                   // shown now, -1: the loop is empty
+    double shown_s;              // how long it has been, in the loop's time
+} CinePlayer;
+CinePlayer cine_player_start(const Cine *cine);          // plays and loops, at its speed, from the first image
+// `dt_s` of real time on. Returns the image to show. Without `loops` it stops at the last one.
+int cine_player_advance(CinePlayer *player, const Cine *cine, double dt_s);
+// Stops and goes `images` on or back, round the ends where it loops.
+int cine_player_step(CinePlayer *player, const Cine *cine, int images);
+
+// --- files ---
+// The loop as bytes, `*length` of them; free() them. NULL where memory lacks.
+uint8_t *cine_pack(const Cine *cine, size_t *length);
+// NULL with a fault. The bytes are checked whole: sizes, ranges, checksum.
+Cine *cine_unpack(const uint8_t *bytes, size_t length, const char *name, Faults *faults);
+// As a movie at the fastest of its pulse rates; slower images are repeated. `draw` makes the picture of an image, (height, width, 3), rows from the top,
+// or returns false with its reason in the message. False with a reason in `message`; then there is no movie.
+typedef bool (*CineDraw)(void *context, const CineFrame *frame, uint8_t *rgb, char *message, size_t capacity);
+bool cine_movie(const Cine *cine, const char *path, int width, int height, CineDraw draw, void *context, char *message, size_t capacity);
+
+#endif
