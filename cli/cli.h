@@ -27,6 +27,10 @@ Progress progress_bar(ProgressBar *bar, const char *label, bool quiet);
 bool cli_number(const char *option, const char *text, double least, double most, double *value);
 bool cli_point(const char *option, const char *text, Vec3 *point);   // X,Y,Z [mm], finite and below 1e9
 bool cli_whole_number(const char *option, const char *text, double least, double most, double *value);
+// WIDTHxHEIGHT, 320x240 to 8192x8192; else a message and false.
+bool cli_size(const char *text, int *width, int *height);
+// A view by name, its index: fluoroscopy, 3d, angioscopy, all; else a message and false.
+bool cli_view(const char *text, int *view);
 
 // Opens what a scene's `vessel:` names (recon is not below sim): loads a model, fits a shape (cached), builds a tube or plane.
 typedef struct OpenVessel {

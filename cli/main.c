@@ -169,3 +169,22 @@ bool cli_whole_number(const char *option, const char *text, double least, double
     *value = number;
     return true;
 }
+
+bool cli_size(const char *text, int *width, int *height)
+{
+    char rest;
+    if (sscanf(text, "%dx%d%c", width, height, &rest) == 2 && *width >= 320 && *height >= 240 && *width <= 8192 && *height <= 8192)
+        return true;
+    fprintf(stderr, "--size: '%s' is not valid; WIDTHxHEIGHT from 320x240 to 8192x8192\n", text);
+    return false;
+}
+
+bool cli_view(const char *text, int *view)
+{
+    static const char *const name[] = {"fluoroscopy", "3d", "angioscopy", "all"};
+    for (*view = 0; *view < 4; ++*view)
+        if (!strcmp(text, name[*view]))
+            return true;
+    fprintf(stderr, "--view: '%s' is not valid; fluoroscopy, 3d, angioscopy or all\n", text);
+    return false;
+}

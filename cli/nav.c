@@ -44,23 +44,6 @@ static int usage_fault(const char *message, const char *what)
     return EXIT_BAD_INPUT;
 }
 
-static bool parse_size(const char *text, int *width, int *height)
-{
-    char end;
-    return sscanf(text, "%dx%d%c", width, height, &end) == 2 && *width >= 320 && *height >= 240 && *width <= 8192 && *height <= 8192;
-}
-
-static bool parse_view(const char *text, PanelView *view)
-{
-    static const char *const name[] = {"fluoroscopy", "3d", "angioscopy", "all"};
-    for (int i = 0; i < 4; i++)
-        if (!strcmp(text, name[i])) {
-            *view = (PanelView)i;
-            return true;
-        }
-    return false;
-}
-
 static int parse_options(int argc, char **argv, NavOptions *options)
 {
     enum { DEVICE = 256, ONLY_MAPPED, TRAINEE, SESSIONS, NO_RECORD, RESUME, AT, VIEW, SIZE, FULL_SCREEN, DURATION, FIGURES, THREADS, QUIET, HELP };
@@ -73,6 +56,7 @@ static int parse_options(int argc, char **argv, NavOptions *options)
     *options = (NavOptions){.trainer = {.is_recorded = true, .has_built_in_maps = true, .trainee = "", .resume_s = SCRIPT_LONGEST_S, .width = 1280, .height = 720}};
     TrainerOptions *trainer = &options->trainer;
     double number;
+    int view;
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "h", table, NULL)) != -1;) {
         switch (choice) {
@@ -94,12 +78,13 @@ static int parse_options(int argc, char **argv, NavOptions *options)
                 return EXIT_BAD_INPUT;
             break;
         case VIEW:
-            if (!parse_view(optarg, &trainer->view))
-                return usage_fault("--view is fluoroscopy, 3d, angioscopy or all, not ", optarg);
+            if (!cli_view(optarg, &view))
+                return EXIT_BAD_INPUT;
+            trainer->view = (PanelView)view;
             break;
         case SIZE:
-            if (!parse_size(optarg, &trainer->width, &trainer->height))
-                return usage_fault("--size is WIDTHxHEIGHT from 320x240 to 8192x8192, not ", optarg);
+            if (!cli_size(optarg, &trainer->width, &trainer->height))
+                return EXIT_BAD_INPUT;
             break;
         case DURATION:
             if (!cli_number("--duration-s", optarg, 0, SCRIPT_LONGEST_S, &trainer->duration_s))

@@ -1,11 +1,17 @@
 // seldinger replay: a recording shown, simulated again, made into a scene.
 #include "cli/cli.h"
 
+#include "cli/output.h"
 #include "cli/replay_scene.h"
 #include "sim/sha256.h"
+#ifdef SELDINGER_RENDER
+#include "cli/film.h"
+#endif
 
 #include <getopt.h>
 #include <inttypes.h>
+#include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -14,13 +20,25 @@ static const char help[] =
     "Shows a recording that `nav` or `run --record` wrote.\n\n"
     "  --verify           simulates it again headless, with the recorded hand, and compares the state's hash at each step\n"
     "  --scene FOLDER     makes a regression scene of it: scene.yaml, hand.csv and the golden tool path, for `seldinger check FOLDER`\n"
+    "  --picture F.png    what the trainee saw at the end, off screen …\n"
+    "  --at S             … or at this moment [s of simulated time]\n"
+    "  --movie F.mp4      all of it as a film (H.264 by ffmpeg), off screen\n"
+    "  --from S, --to S   of a film [s of simulated time]\n"
+    "  --fps N            frames a second of a film; default 30\n"
+    "  --speed X          simulated seconds a second of film; default 1\n"
+    "  --view V           fluoroscopy (default), 3d, angioscopy or all\n"
+    "  --size WxH         [pixel]; default 1280x720\n"
+    "  --no-panels        the views alone\n"
+    "  --lao DEG, --cra DEG   C-arm for a recording that nobody looked at (`run --record`); negative: RAO, CAU\n"
     "  --threads N        threads of fitting a shape; default 0: all cores\n"
     "  --quiet            no progress; --verify says only what differs\n\n"
     "Exit codes: 0 done, the same; 1 a step differs; 2 wrong usage or bad input; 3 the run diverged.\n";
 
 typedef struct ReplayOptions {
-    const char *recording, *scene_folder;
-    bool verify, quiet;
+    const char *recording, *scene_folder, *picture, *movie;
+    double at_s, from_s, to_s, fps, speed, lao_deg, cra_deg;
+    int width, height, view;
+    bool verify, quiet, no_panels;
     int threads;
 } ReplayOptions;
 
@@ -30,20 +48,55 @@ static int usage_fault(const char *message, const char *what)
     return EXIT_BAD_INPUT;
 }
 
+typedef struct NumberOption {
+    const char *name;
+    double least, most;
+    size_t offset;           // in ReplayOptions
+} NumberOption;
+
+static const NumberOption number_option[] = {
+    {"--at", 0, SCRIPT_LONGEST_S, offsetof(ReplayOptions, at_s)},     {"--from", 0, SCRIPT_LONGEST_S, offsetof(ReplayOptions, from_s)},
+    {"--to", 0, SCRIPT_LONGEST_S, offsetof(ReplayOptions, to_s)},     {"--fps", 1, 240, offsetof(ReplayOptions, fps)},
+    {"--speed", 0.01, 1000, offsetof(ReplayOptions, speed)},          {"--lao", -90, 90, offsetof(ReplayOptions, lao_deg)},
+    {"--cra", -45, 45, offsetof(ReplayOptions, cra_deg)},
+};
+
 static int parse_options(int argc, char **argv, ReplayOptions *options)
 {
-    enum { VERIFY = 256, SCENE, THREADS, QUIET, HELP };
-    static const struct option table[] = {{"verify", no_argument, NULL, VERIFY},    {"scene", required_argument, NULL, SCENE},
-                                          {"threads", required_argument, NULL, THREADS}, {"quiet", no_argument, NULL, QUIET},
-                                          {"help", no_argument, NULL, HELP},        {0}};
-    *options = (ReplayOptions){0};
+    // the first ones in the order of number_option
+    enum { NUMBERS = 256, VERIFY = 300, SCENE, PICTURE, MOVIE, VIEW, SIZE, NO_PANELS, THREADS, QUIET, HELP };
+    static const struct option table[] = {
+        {"at", required_argument, NULL, NUMBERS},          {"from", required_argument, NULL, NUMBERS + 1}, {"to", required_argument, NULL, NUMBERS + 2},
+        {"fps", required_argument, NULL, NUMBERS + 3},     {"speed", required_argument, NULL, NUMBERS + 4}, {"lao", required_argument, NULL, NUMBERS + 5},
+        {"cra", required_argument, NULL, NUMBERS + 6},     {"verify", no_argument, NULL, VERIFY},          {"scene", required_argument, NULL, SCENE},
+        {"picture", required_argument, NULL, PICTURE},     {"movie", required_argument, NULL, MOVIE},      {"view", required_argument, NULL, VIEW},
+        {"size", required_argument, NULL, SIZE},           {"no-panels", no_argument, NULL, NO_PANELS},    {"threads", required_argument, NULL, THREADS},
+        {"quiet", no_argument, NULL, QUIET},               {"help", no_argument, NULL, HELP},              {0}};
+    *options = (ReplayOptions){.at_s = HUGE_VAL, .to_s = HUGE_VAL, .fps = 30, .speed = 1, .width = 1280, .height = 720};
     double number;
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "h", table, NULL)) != -1;) {
+        if (choice >= NUMBERS && choice < VERIFY) {
+            const NumberOption *option = &number_option[choice - NUMBERS];
+            if (!cli_number(option->name, optarg, option->least, option->most, (double *)(void *)((char *)options + option->offset)))
+                return EXIT_BAD_INPUT;
+            continue;
+        }
         switch (choice) {
         case VERIFY: options->verify = true; break;
         case SCENE: options->scene_folder = optarg; break;
+        case PICTURE: options->picture = optarg; break;
+        case MOVIE: options->movie = optarg; break;
+        case NO_PANELS: options->no_panels = true; break;
         case QUIET: options->quiet = true; break;
+        case VIEW:
+            if (!cli_view(optarg, &options->view))
+                return EXIT_BAD_INPUT;
+            break;
+        case SIZE:
+            if (!cli_size(optarg, &options->width, &options->height))
+                return EXIT_BAD_INPUT;
+            break;
         case THREADS:
             if (!cli_whole_number("--threads", optarg, 0, 256, &number))
                 return EXIT_BAD_INPUT;
@@ -132,6 +185,33 @@ static int simulate_again(const ReplayOptions *options, const RecordedRun *run, 
     return code;
 }
 
+// Pictures and films.
+static bool draw(const ReplayOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults)
+{
+#ifdef SELDINGER_RENDER
+    FilmOptions film = film_default_options();
+    film.width = options->width;
+    film.height = options->height;
+    film.view = (PanelView)options->view;
+    film.has_panels = !options->no_panels;
+    film.to_s = options->to_s;
+    film.fps = options->fps;
+    film.speed = options->speed;
+    film.is_quiet = options->quiet;
+    film.lao_deg = options->lao_deg;
+    film.cra_deg = options->cra_deg;
+    film.from_s = options->at_s;
+    bool good = !options->picture || film_picture(options->picture, &film, run, scene, open, faults);
+    film.from_s = options->from_s;
+    return (!options->movie || film_movie(options->movie, &film, run, scene, open, faults)) && good;
+#else
+    (void)run, (void)scene, (void)open;
+    if (options->picture || options->movie)
+        faults_add(faults, options->picture ? "--picture" : "--movie", 0, 0, "this build has no pictures; build with -DSELDINGER_RENDER=ON");
+    return faults->count == 0;
+#endif
+}
+
 int verb_replay(int argc, char **argv)
 {
     ReplayOptions options;
@@ -144,8 +224,15 @@ int verb_replay(int argc, char **argv)
     RecordedRun *run = recorded_run_load(options.recording, &faults);
     Scene *scene = run ? replay_scene(run, options.recording, &faults) : NULL;
     code = EXIT_BAD_INPUT;
-    if (scene && open_vessel(scene, options.threads, options.quiet, &open, &faults) && open_vessel_inlet(scene, &open, &faults))
-        code = simulate_again(&options, run, scene, &open, &faults);
+    output_check_file(options.picture, &faults);
+    output_check_file(options.movie, &faults);
+    if (scene && faults.count == 0 && open_vessel(scene, options.threads, options.quiet, &open, &faults) && open_vessel_inlet(scene, &open, &faults)) {
+        code = EXIT_DONE;
+        if (options.verify || options.scene_folder)
+            code = simulate_again(&options, run, scene, &open, &faults);
+        if (!draw(&options, run, scene, &open, &faults))
+            code = EXIT_BAD_INPUT;
+    }
     if (faults.count > 0)
         code = cli_bad_input(&faults);
     open_vessel_close(&open);

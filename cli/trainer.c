@@ -1,15 +1,14 @@
 #include "cli/trainer.h"
 
 #include "cli/live_session.h"
+#include "cli/scene_views.h"
 #include "cli/trainer_files.h"
 #include "cli/trainer_panel.h"
 #include "input/gamepad.h"
 #include "input/hand.h"
-#include "recon/volume.h"
 #include "render/gl_canvas.h"
 #include "render/png_file.h"
 #include "render/pulse_clock.h"
-#include "render/views.h"
 
 #include <stdarg.h>
 #include <stdlib.h>
@@ -358,42 +357,13 @@ static void run_window(Trainer *trainer, Faults *faults)
 
 // --- start and end ---
 
-// Everything that is seen: the wall, its volume where the scene names one, the tool as it stands at the start.
-static bool make_views(Trainer *trainer, Faults *faults)
+static bool open_views(Trainer *trainer, Faults *faults)
 {
-    char message[512] = "";
-    Scene *scene = trainer->scene;
-    Volume *volume = scene->anatomy_path ? volume_load(scene->anatomy_path, faults) : NULL;
-    Simulator *simulator = simulator_create(scene, trainer->open->vessel, faults);
-    Pose *pose = simulator ? pose_create(simulator_state(simulator)->node_count) : NULL;
-    const TriangleMesh *mesh = open_vessel_mesh(scene, trainer->open);
-    XrayControl xray = xray_default_control();
-    if (pose && (volume || !scene->anatomy_path)) {
-        pose_take(pose, simulator, (Command){0, 0}, &xray);
-        ViewsOptions options = {.scene = scene, .vessel = trainer->open->vessel, .tree = trainer->open->tree, .mesh = mesh, .pose = pose,
-                                .patient = patient_axes_lps()};
-        if (volume) {
-            memcpy(options.anatomy_size, volume->size, sizeof options.anatomy_size);
-            memcpy(options.anatomy_axis, volume->axis, sizeof options.anatomy_axis);
-            options.anatomy_origin = volume->origin;
-            options.anatomy_value = volume->value;
-            if (!strcmp(volume->frame, "RAS"))
-                options.patient = patient_axes_ras();
-        }
-        trainer->views = views_create(&options, message, sizeof message);
-        if (!trainer->views)
-            faults_add(faults, scene->path, 0, 0, "cannot be shown: %s", message);
-        else
-            trainer->desk = mesh ? desk_create(views_scene(trainer->views), mesh->vertex_count, mesh->vertex)
-                                 : desk_create(views_scene(trainer->views), pose->node_count, pose->position);
-        trainer->desk.patient = options.patient;
-        trainer->desk.view = trainer->options->view;
-        if (trainer->views && *message)
-            say(trainer, MARK_WARNING, "%s", message);
-    }
-    pose_free(pose);
-    simulator_destroy(simulator);
-    volume_free(volume);
+    char note[512];
+    trainer->views = scene_views_create(trainer->scene, trainer->open, &trainer->desk, note, sizeof note, faults);
+    trainer->desk.view = trainer->options->view;
+    if (*note)
+        say(trainer, MARK_WARNING, "%s", note);
     return trainer->views != NULL;
 }
 
@@ -438,7 +408,7 @@ int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, T
     }
     *trainer = (Trainer){.options = options, .scene = scene, .open = open, .figures = figures, .begun_s = clock_s(CLOCK_MONOTONIC)};
     snprintf(trainer->trainee, sizeof trainer->trainee, "%s", options->trainee);
-    if (open_window(trainer, faults) && make_views(trainer, faults) && open_hands(trainer, faults) && begin_session(trainer, options->resume, faults)) {
+    if (open_window(trainer, faults) && open_views(trainer, faults) && open_hands(trainer, faults) && begin_session(trainer, options->resume, faults)) {
         run_window(trainer, faults);
         bool is_open = trainer->session.realtime != NULL;
         const Moment *moment = is_open ? realtime_moment(trainer->session.realtime) : NULL;

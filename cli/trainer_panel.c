@@ -116,6 +116,7 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
     PanelState *state = &panel->state;
     state->time_s = pose->time_s;
     state->inserted_mm = pose->inserted_mm;
+    state->turned_deg = pose->turned_deg;
     state->push_mm_s = pose->command.push_mm_s;
     state->twist_deg_s = pose->command.twist_deg_s;
     state->force_n = pose->report.proximal_force;

@@ -1,0 +1,186 @@
+#include "cli/film.h"
+
+#include "cli/playback.h"
+#include "cli/scene_views.h"
+#include "cli/trainer_panel.h"
+#include "render/gl_canvas.h"
+#include "render/gl_context.h"
+#include "render/movie_file.h"
+#include "render/png_file.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+typedef struct Film {
+    const FilmOptions *options;
+    Scene *scene;
+    const RecordedRun *run;
+    GlContext *context;
+    GlCanvas canvas;
+    Views *views;
+    Panel *panel;
+    Desk desk;
+    Playback *playback;
+    TrainerPanel shown;
+    Simulator *simulator;            // goes through the recording again, for the score
+    Lesson *lesson;
+    LessonView *score;
+    int64_t simulated;               // steps; -1 once it gave another state than the recording holds
+    double sampled_s;                // up to where the plots have samples
+    uint8_t *rgb;                    // (height, width, 3)
+} Film;
+
+FilmOptions film_default_options(void)
+{
+    return (FilmOptions){.width = 1280, .height = 720, .view = VIEW_FLUOROSCOPY, .has_panels = true, .to_s = HUGE_VAL, .fps = 30, .speed = 1};
+}
+
+static void film_close(Film *film)
+{
+    playback_close(film->playback);
+    views_destroy(film->views);
+    if (film->panel)
+        panel_destroy(film->panel);
+    if (film->context)
+        gl_canvas_destroy(&film->canvas);
+    gl_context_destroy(film->context);
+    lesson_free(film->lesson);
+    simulator_destroy(film->simulator);
+    free(film->score);
+    free(film->rgb);
+}
+
+static bool film_open(Film *film, const char *path, const FilmOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults)
+{
+    char message[512] = "";
+    int before = faults->count;
+    *film = (Film){.options = options, .scene = scene, .run = run};
+    film->rgb = malloc((size_t)options->width * (size_t)options->height * 3);
+    film->context = gl_context_create(message, sizeof message);
+    film->simulator = simulator_create(scene, open->vessel, faults);
+    film->lesson = film->simulator ? lesson_create(film->simulator, open->tree) : NULL;
+    film->score = film->lesson ? calloc(1, lesson_view_bytes(film->lesson)) : NULL;
+    bool good = film->rgb && film->score && film->context && gl_canvas_create(&film->canvas, options->width, options->height, 1, message, sizeof message) &&
+                (film->panel = panel_create(message, sizeof message)) &&
+                (film->views = scene_views_create(scene, open, &film->desk, message, sizeof message, faults));
+    if (good) {
+        XrayControl watched = film->desk.xray;
+        watched.pedal = 1;
+        watched.lao_deg = (float)options->lao_deg;
+        watched.cra_deg = (float)options->cra_deg;
+        film->playback = playback_open(run, scene, open->tree, &watched);
+        good = film->playback != NULL;
+        snprintf(message, sizeof message, "the recording holds no frame");
+    }
+    if (good) {
+        film->desk.look.full_detail = true;
+        film->desk.view = options->view;
+        panel_show_hints(film->panel, false);
+        trainer_panel_begin(&film->shown, scene, "");
+        return true;
+    }
+    if (faults->count == before)
+        faults_add(faults, path, 0, 0, "nothing can be drawn: %s", *message ? message : "no memory");
+    film_close(film);
+    return false;
+}
+
+static void show_score(Film *film)
+{
+    const RecordedRun *run = film->run;
+    int64_t to = playback_pose(film->playback)->step;
+    XrayControl unseen = {0};
+    for (; film->simulated >= 0 && film->simulated < to; film->simulated++) {
+        int64_t i = film->simulated;
+        Command command = {run->command[2 * i], run->command[2 * i + 1]};
+        simulator_step(film->simulator, command);
+        lesson_step(film->lesson, film->simulator, command, run->xray ? &run->xray[i] : &unseen);
+        if (simulator_hash(film->simulator) != run->state_hash[i]) {
+            fprintf(stderr, "the simulation differs from the recording from step %lld on: the score stands still from there\n", (long long)i);
+            film->simulated = -2;   // the loop adds one
+        }
+    }
+    lesson_publish(film->lesson, film->score);
+}
+
+// Running plots as they stood at `time_s`: 20 samples a second from the recorded steps.
+static void sample_plots(Film *film, double time_s)
+{
+    const RecordedRun *run = film->run;
+    int64_t every = (int64_t)fmax(1, floor(50 / run->step_ms));
+    for (int64_t i = 0; i < run->step_count; i += every)
+        if (run->time_s[i] > film->sampled_s && run->time_s[i] <= time_s && run->time_s[i] > time_s - 60)
+            panel_sample(film->panel, run->time_s[i], run->proximal[2 * i], run->proximal[2 * i + 1], run->wall_force[2 * i]);
+    film->sampled_s = time_s;
+}
+
+static void film_draw(Film *film, double time_s)
+{
+    const FilmOptions *options = film->options;
+    bool jumped = playback_seek(film->playback, time_s);
+    const Pose *pose = playback_pose(film->playback);
+    PanelLayout layout = panel_layout(options->width, options->height, 1, options->view, options->has_panels);
+    if (jumped)
+        fluoroscope_forget(views_fluoroscope(film->views));
+    ViewsFrame frame = {.pose = pose, .xray = &pose->xray, .contrast = playback_contrast(film->playback),
+                        .pulse = (uint32_t)playback_pulses(film->playback)->count, .look = &film->desk.look};
+    views_draw(film->views, &frame, &layout, options->width, options->height, film->canvas.framebuffer);
+    if (options->has_panels) {
+        WindowInput input = {.width = options->width, .height = options->height, .scale = 1, .mouse_x = -1, .mouse_y = -1, .has_focus = true};
+        show_score(film);
+        sample_plots(film, time_s);
+        trainer_panel_show(&film->shown, film->scene, pose, film->score, NULL, &pose->xray);
+        film->shown.state.now_s = pose->time_s;
+        film->shown.state.view = options->view;
+        film->shown.state.step_median_us = film->shown.state.step_p999_us = film->shown.state.real_time_factor = NAN;
+        panel_draw(film->panel, &input, &film->shown.state, film->canvas.framebuffer);
+    }
+    gl_canvas_read(&film->canvas, film->rgb);
+}
+
+bool film_picture(const char *path, const FilmOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults)
+{
+    Film film;
+    char message[256];
+    if (!film_open(&film, path, options, run, scene, open, faults))
+        return false;
+    film_draw(&film, options->from_s);
+    film_draw(&film, options->from_s);   // a panel's widths are known from its frame before
+    bool good = png_file_write(path, options->width, options->height, film.rgb, message, sizeof message);
+    if (!good)
+        faults_add(faults, path, 0, 0, "%s", message);
+    film_close(&film);
+    return good;
+}
+
+bool film_movie(const char *path, const FilmOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults)
+{
+    Film film;
+    char message[512] = "";
+    MovieFile *movie = movie_file_create(path, options->width, options->height, options->fps, message, sizeof message);
+    if (!movie) {
+        faults_add(faults, path, 0, 0, "%s", message);
+        return false;
+    }
+    if (!film_open(&film, path, options, run, scene, open, faults)) {
+        movie_file_abandon(movie);
+        return false;
+    }
+    double end = fmin(options->to_s, playback_end_s(film.playback));
+    long count = (long)fmax(1, floor((end - options->from_s) / options->speed * options->fps + 1e-6) + 1);
+    ProgressBar bar;
+    Progress progress = progress_bar(&bar, "film", options->is_quiet);
+    bool good = true;
+    film_draw(&film, options->from_s);
+    for (long i = 0; good && i < count; i++) {
+        film_draw(&film, options->from_s + (double)i * options->speed / options->fps);
+        good = movie_file_add(movie, film.rgb);
+        if (progress.call)
+            progress.call(progress.context, i + 1, count);
+    }
+    good = movie_file_close(movie, message, sizeof message) && good;
+    if (!good)
+        faults_add(faults, path, 0, 0, "%s", *message ? message : "the film could not be written to its end");
+    film_close(&film);
+    return good;
+}

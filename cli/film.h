@@ -1,0 +1,25 @@
+// What a trainee saw, off screen: a moment of a recording as the trainer's window shows it, to a picture or to the frames of a film.
+#ifndef SELDINGER_CLI_FILM_H
+#define SELDINGER_CLI_FILM_H
+
+#include "cli/cli.h"
+#include "render/panel.h"
+#include "sim/recording.h"
+
+typedef struct FilmOptions {
+    int width, height;               // [pixel]
+    PanelView view;
+    bool has_panels;                 // figures and controls around the views
+    double from_s, to_s;             // of a film; simulated time
+    double fps, speed;               // frames a second; simulated seconds a second of film
+    bool is_quiet;
+    double lao_deg, cra_deg;         // of a recording that nobody looked at
+} FilmOptions;
+FilmOptions film_default_options(void);  // 1280x720, fluoroscopy with panels, all of it, 30 a second
+
+// The moment `from_s`. False with faults, also where EGL is missing.
+bool film_picture(const char *path, const FilmOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults);
+// H.264 through ffmpeg.
+bool film_movie(const char *path, const FilmOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults);
+
+#endif

@@ -1,0 +1,169 @@
+#include "cli/playback.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+// Contrast goes on in steps of this many recorded steps; places to go on from are kept every so many of those.
+enum { STRIDE = 10, KEEP_EVERY = 500, MOST_KEPT = 1024 };
+
+typedef struct Place {
+    int64_t step;
+    PulseClock pulses;
+    Contrast *contrast;
+} Place;
+
+struct Playback {
+    const RecordedRun *run;
+    const Scene *scene;
+    const VesselTree *tree;
+    XrayControl unseen;
+    bool is_seen;
+    Pose *pose;
+    Place now;
+    int kept_count;
+    int64_t keep_steps;          // between places
+    Place kept[MOST_KEPT];
+};
+
+static const XrayControl *control(const Playback *playback, int64_t step)
+{
+    return playback->is_seen ? &playback->run->xray[step] : &playback->unseen;
+}
+
+static int64_t frame_at(const RecordedRun *run, int64_t step)
+{
+    int64_t low = 0, high = run->frame_count - 1;
+    while (low < high) {
+        int64_t middle = (low + high + 1) / 2;
+        if (run->frame_step[middle] <= step)
+            low = middle;
+        else
+            high = middle - 1;
+    }
+    return low;
+}
+
+static int tip_node(const Playback *playback, int64_t step)
+{
+    const RecordedRun *run = playback->run;
+    return run->vessel_node[(frame_at(run, step) + 1) * run->node_count - 1];
+}
+
+// Keeps the place reached where it is the next one to keep.
+static void keep(Playback *playback)
+{
+    if (playback->kept_count == MOST_KEPT || playback->now.step != playback->kept_count * playback->keep_steps)
+        return;
+    Place *place = &playback->kept[playback->kept_count];
+    Contrast *contrast = playback->tree ? contrast_create(playback->tree, NULL) : NULL;
+    if (playback->tree && !contrast)
+        return;
+    if (contrast)
+        contrast_copy(contrast, playback->now.contrast);
+    *place = (Place){playback->now.step, playback->now.pulses, contrast};
+    playback->kept_count++;
+}
+
+static void go_on(Playback *playback, int64_t step)
+{
+    const RecordedRun *run = playback->run;
+    Place *now = &playback->now;
+    while (now->step < step) {
+        double injected = 0, dt = run->step_ms / 1000;
+        int64_t end = now->step + STRIDE < step ? now->step + STRIDE : step;
+        end -= end % STRIDE && end - now->step > end % STRIDE ? end % STRIDE : 0;   // whole strides but for the last
+        double passed = (double)(end - now->step) * dt;
+        for (; now->step < end; now->step++) {
+            const XrayControl *xray = control(playback, now->step);
+            pulse_clock_advance(&now->pulses, run->time_s[now->step], xray);
+            injected += (double)xray->contrast_ml_s * dt;
+        }
+        if (now->contrast)
+            contrast_advance(now->contrast, passed, tip_node(playback, now->step - 1), injected / passed);
+        keep(playback);
+    }
+}
+
+Playback *playback_open(const RecordedRun *run, const Scene *scene, const VesselTree *tree, const XrayControl *unseen)
+{
+    Playback *playback = run->frame_count > 0 ? calloc(1, sizeof *playback) : NULL;
+    if (!playback)
+        return NULL;
+    playback->run = run;
+    playback->scene = scene;
+    playback->tree = tree;
+    playback->unseen = *unseen;
+    // nobody looked where no step has a field
+    for (int64_t i = 0; run->xray && i < run->step_count && !playback->is_seen; i++)
+        playback->is_seen = run->xray[i].field_mm > 0;
+    int64_t strides = (run->step_count / MOST_KEPT + 1) / STRIDE + 1;
+    playback->keep_steps = STRIDE * (strides > KEEP_EVERY ? strides : KEEP_EVERY);
+    playback->pose = pose_create(run->node_count);
+    playback->now = (Place){.pulses = pulse_clock_start(0), .contrast = tree ? contrast_create(tree, NULL) : NULL};
+    if (!playback->pose || (tree && !playback->now.contrast)) {
+        playback_close(playback);
+        return NULL;
+    }
+    keep(playback);
+    playback_seek(playback, 0);
+    return playback;
+}
+
+void playback_close(Playback *playback)
+{
+    if (!playback)
+        return;
+    for (int i = 0; i < playback->kept_count; i++)
+        contrast_free(playback->kept[i].contrast);
+    contrast_free(playback->now.contrast);
+    pose_free(playback->pose);
+    free(playback);
+}
+
+bool playback_seek(Playback *playback, double time_s)
+{
+    const RecordedRun *run = playback->run;
+    Place *now = &playback->now;
+    double dt = run->step_ms / 1000, first = run->time_s[0] - dt;
+    int64_t step = (int64_t)floor((time_s - first) / dt + 1e-6), before = now->step;
+    step = step < 1 ? 1 : step > run->step_count ? run->step_count : step;
+    int nearest = 0;
+    while (nearest + 1 < playback->kept_count && playback->kept[nearest + 1].step <= step)
+        nearest++;
+    if (playback->kept_count > 0 && (step < now->step || playback->kept[nearest].step > now->step)) {
+        now->step = playback->kept[nearest].step;
+        now->pulses = playback->kept[nearest].pulses;
+        if (now->contrast)
+            contrast_copy(now->contrast, playback->kept[nearest].contrast);
+    }
+    go_on(playback, step);
+    int64_t row = step - 1;
+    pose_from_run(playback->pose, playback->scene, run, frame_at(run, row));
+    playback->pose->step = step;
+    playback->pose->time_s = run->time_s[row];
+    playback->pose->xray = *control(playback, row);
+    playback->pose->command = (Command){run->command[2 * row], run->command[2 * row + 1]};
+    playback->pose->report.proximal_force = run->proximal[2 * row];
+    playback->pose->report.proximal_torque = run->proximal[2 * row + 1];
+    playback->pose->report.wall_force_max = run->wall_force[2 * row];
+    playback->pose->report.wall_force_sum = run->wall_force[2 * row + 1];
+    playback->pose->report.flags = run->flags[row];
+    return step < before || (double)(step - before) * dt > 1;
+}
+
+double playback_time_s(const Playback *playback) { return playback->pose->time_s; }
+double playback_end_s(const Playback *playback) { return playback->run->time_s[playback->run->step_count - 1]; }
+const Pose *playback_pose(const Playback *playback) { return playback->pose; }
+const float *playback_contrast(const Playback *playback) { return playback->now.contrast ? contrast_concentration(playback->now.contrast) : NULL; }
+double playback_injected_ml(const Playback *playback) { return playback->now.contrast ? contrast_injected_ml(playback->now.contrast) : 0; }
+const PulseClock *playback_pulses(const Playback *playback) { return &playback->now.pulses; }
+
+int playback_bookmarks(const Playback *playback, double *time_s, int capacity)
+{
+    const RecordedRun *run = playback->run;
+    int count = 0;
+    for (int64_t i = 1; run->xray && i < run->step_count && count < capacity; i++)
+        if (run->xray[i].bookmark != run->xray[i - 1].bookmark)
+            time_s[count++] = run->time_s[i];
+    return count;
+}

@@ -1,0 +1,57 @@
+#include "cli/scene_views.h"
+
+#include "recon/volume.h"
+
+#include <string.h>
+
+// Shapes and tubes lie in no patient: they are taken to lie so that they are seen face on from the front.
+static PatientAxes patient_of(const Scene *scene, const TriangleMesh *mesh)
+{
+    if (!mesh || (scene->source != SOURCE_SHAPE && scene->source != SOURCE_TUBE))
+        return patient_axes_lps();
+    Camera camera = {0};
+    camera_orient(&camera, vec3(0, 0, 0), vec3(0, 0, 0), mesh->vertex_count, mesh->vertex);
+    return (PatientAxes){.right = vec3_negate(camera.right), .anterior = camera.back, .superior = camera.up};
+}
+
+static Views *create(Scene *scene, OpenVessel *open, const Volume *volume, const Pose *pose, Desk *desk, char *note, size_t capacity, Faults *faults)
+{
+    const TriangleMesh *mesh = open_vessel_mesh(scene, open);
+    ViewsOptions options = {.scene = scene, .vessel = open->vessel, .tree = open->tree, .mesh = mesh, .pose = pose, .patient = patient_of(scene, mesh)};
+    if (volume) {
+        memcpy(options.anatomy_size, volume->size, sizeof options.anatomy_size);
+        memcpy(options.anatomy_axis, volume->axis, sizeof options.anatomy_axis);
+        options.anatomy_origin = volume->origin;
+        options.anatomy_value = volume->value;
+        options.patient = strcmp(volume->frame, "RAS") ? patient_axes_lps() : patient_axes_ras();
+    }
+    Views *views = views_create(&options, note, capacity);
+    if (!views) {
+        faults_add(faults, scene->path, 0, 0, "cannot be shown: %s", note);
+        return NULL;
+    }
+    *desk = mesh ? desk_create(views_scene(views), mesh->vertex_count, mesh->vertex) : desk_create(views_scene(views), pose->node_count, pose->position);
+    desk->patient = options.patient;
+    return views;
+}
+
+Views *scene_views_create(Scene *scene, OpenVessel *open, Desk *desk, char *note, size_t capacity, Faults *faults)
+{
+    int before = faults->count;
+    Volume *volume = scene->anatomy_path ? volume_load(scene->anatomy_path, faults) : NULL;
+    Simulator *simulator = simulator_create(scene, open->vessel, faults);
+    Pose *pose = simulator ? pose_create(simulator_state(simulator)->node_count) : NULL;
+    XrayControl xray = xray_default_control();
+    Views *views = NULL;
+    *note = 0;
+    if (pose && faults->count == before) {
+        pose_take(pose, simulator, (Command){0, 0}, &xray);
+        views = create(scene, open, volume, pose, desk, note, capacity, faults);
+    } else if (faults->count == before) {
+        faults_add(faults, scene->path, 0, 0, "cannot be shown: no memory");
+    }
+    pose_free(pose);
+    simulator_destroy(simulator);
+    volume_free(volume);
+    return views;
+}
