@@ -1,18 +1,247 @@
+// The wall is drawn in patches of neighbouring triangles (Morton order of their centroids), each with a ball around it: those outside of the view
+// or lost in the dark are left out, the others come near ones first, so that the depth test hides what lies behind a wall before it is shaded. Outer faces
+// are culled: the eye is inside. A patch asks the vessel for its normals when it is first seen.
+//
+// Light: with d the distance from lamp and eye and c the cosine between wall normal and ray, (ambient + c) / (1 + (d / 3 R)^2), R the lumen's radius at the tip,
+// and a fog exp(-(d / 8 R)^1.5) towards the dark.
 #include "render/angioscope.h"
 
+#include "render/gl_canvas.h"
 #include "render/message.h"
+#include "render/solids.h"
 
 #include <epoxy/gl.h>
+#include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
+
+enum { PATCH_TRIANGLES = 256, FINE_SAMPLES = 4 };
+
+typedef struct WallVertex {
+    float position[3];         // [mm] relative to origin
+    float normal[3];           // into the lumen
+} WallVertex;
+
+typedef struct Patch {
+    int first_index, index_count;
+    int first_vertex, vertex_count;
+    Vec3 center;
+    double radius;
+    bool has_field_normals;
+} Patch;
+
+typedef struct SeenPatch {
+    double distance;           // [mm] of its ball's near side from the eye
+    int patch;
+} SeenPatch;
 
 struct Angioscope {
     const Vessel *vessel;
     const VesselTree *tree;
+    Vec3 origin;
+    double mean_radius;        // [mm] of the whole lumen: 2 volume / area
+    int patch_count;
+    Patch *patch;
+    int vertex_count;
+    WallVertex *vertex;        // as uploaded
+    int *node;                 // (vertex_count) of the vessel, -1 where not known
+    SeenPatch *seen;           // (patch_count) scratch of a frame: patches to draw, near ones first
+    GLsizei *draw_count;
+    const void **draw_offset;
+    Solids tool;
+    unsigned program;
+    unsigned wall_array, wall_vertices, wall_indices;
+    unsigned tool_array, tool_vertices, tool_indices;
+    GlCanvas canvas;
+    int samples;               // of the canvas
+    bool full_detail;
 };
+
+static const float dark[3] = {0.030f, 0.012f, 0.012f};
+static const double half_angle = 50 * PI / 180;   // of the shorter side
+static const double lamp_reach = 3, fog_reach = 8, fog_end = 2.3;   // of the lumen's radius; of the fog's reach, where it is black
+
+static const char *const VERTEX =
+    "#version 330 core\n"
+    "layout(location = 0) in vec3 position; layout(location = 1) in vec3 normal; layout(location = 2) in vec4 color;\n"
+    "uniform mat4 clip; uniform vec3 eye; uniform vec4 tint; out vec3 ray; out vec3 n; out vec3 k;\n"
+    "void main() { gl_Position = clip * vec4(position, 1.0); ray = eye - position; n = normal; k = mix(tint.rgb, color.rgb, tint.a); }\n";
+
+static const char *const FRAGMENT =
+    "#version 330 core\n"
+    "in vec3 ray; in vec3 n; in vec3 k; out vec4 result;\n"
+    "uniform vec4 lamp; uniform vec3 dark, shine; uniform float edge;\n"   // lamp: 1 / reach^2, 1 / fog reach, brightness, ambient; shine: amount, power, glow
+    "void main() {\n"
+    "  float d2 = dot(ray, ray), d = sqrt(d2); vec3 m = normalize(n); float c = max(dot(m, ray) / max(d, 1e-6), 0.0);\n"
+    "  float light = lamp.z / (1.0 + d2 * lamp.x);\n"
+    "  float s = c * c; s *= s; s *= s; s *= s; s *= s;\n"
+    "  vec3 lit = k * (lamp.w + (1.0 - lamp.w) * c) * light;\n"
+    // thin tissue glows where the lamp grazes it
+    "  lit += shine.z * k * k * (1.0 - c) * (1.0 - c) * light + vec3(1.0, 0.93, 0.88) * (shine.x * s * light);\n"
+    "  float f = d * lamp.y; lit = mix(dark * lamp.z, lit, exp(-f * sqrt(f)));\n"
+    // the tool's edge: c^2 falls linearly towards the outline, so this is the distance from it in pixels
+    "  float e = c * c; result = vec4(1.0 - exp(-1.25 * lit), edge > 0.0 ? clamp(e / max(fwidth(e), 1e-9), 0.0, 1.0) : 1.0);\n"
+    "}\n";
+
+// --- the wall in patches ---
+
+typedef struct TriangleKey {
+    uint64_t key;
+    int triangle;
+} TriangleKey;
+
+static int by_key(const void *a, const void *b)
+{
+    const TriangleKey *x = a, *y = b;
+    if (x->key != y->key)
+        return x->key < y->key ? -1 : 1;
+    return (x->triangle > y->triangle) - (x->triangle < y->triangle);
+}
+
+// The bits of a 20-bit number, two zeros between each.
+static uint64_t spread_bits(uint64_t x)
+{
+    uint64_t result = 0;
+    for (int b = 0; b < 20; b++)
+        result |= (x >> b & 1) << 3 * b;
+    return result;
+}
+
+static Vec3 triangle_middle(const TriangleMesh *mesh, int t)
+{
+    const int *c = mesh->triangle[t];
+    return vec3_scale(vec3_add(vec3_add(mesh->vertex[c[0]], mesh->vertex[c[1]]), mesh->vertex[c[2]]), 1 / 3.0);
+}
+
+static TriangleKey *order_triangles(const TriangleMesh *mesh)
+{
+    TriangleKey *key = malloc((size_t)mesh->triangle_count * sizeof *key);
+    if (!key)
+        return NULL;
+    Vec3 low = mesh->vertex[mesh->triangle[0][0]], high = low;
+    for (int i = 0; i < mesh->vertex_count; i++) {
+        Vec3 p = mesh->vertex[i];
+        low = vec3(fmin(low.x, p.x), fmin(low.y, p.y), fmin(low.z, p.z));
+        high = vec3(fmax(high.x, p.x), fmax(high.y, p.y), fmax(high.z, p.z));
+    }
+    Vec3 size = vec3_sub(high, low);
+    double scale = ((1 << 20) - 1) / fmax(fmax(fmax(size.x, size.y), size.z), 1e-300);
+    for (int t = 0; t < mesh->triangle_count; t++) {
+        Vec3 p = vec3_scale(vec3_sub(triangle_middle(mesh, t), low), scale);
+        key[t] = (TriangleKey){spread_bits((uint64_t)p.x) | spread_bits((uint64_t)p.y) << 1 | spread_bits((uint64_t)p.z) << 2, t};
+    }
+    qsort(key, (size_t)mesh->triangle_count, sizeof *key, by_key);
+    return key;
+}
+
+static void enclose(Angioscope *scope, Patch *patch)
+{
+    Vec3 sum = {0, 0, 0};
+    for (int i = 0; i < patch->vertex_count; i++) {
+        const float *p = scope->vertex[patch->first_vertex + i].position;
+        sum = vec3_add(sum, vec3(p[0], p[1], p[2]));
+    }
+    patch->center = vec3_scale(sum, 1.0 / patch->vertex_count);
+    for (int i = 0; i < patch->vertex_count; i++) {
+        const float *p = scope->vertex[patch->first_vertex + i].position;
+        patch->radius = fmax(patch->radius, vec3_distance(vec3(p[0], p[1], p[2]), patch->center));
+    }
+}
+
+// Each patch has its own copy of the vertices that it uses.
+static void fill_patches(Angioscope *scope, const TriangleMesh *mesh, const TriangleKey *key, int *copy_of, uint32_t *index)
+{
+    for (int i = 0; i < mesh->vertex_count; i++)
+        copy_of[i] = -1;
+    for (int t = 0; t < mesh->triangle_count; t++) {
+        if (t % PATCH_TRIANGLES == 0)
+            scope->patch[scope->patch_count++] = (Patch){.first_index = 3 * t, .first_vertex = scope->vertex_count};
+        Patch *patch = &scope->patch[scope->patch_count - 1];
+        for (int k = 0; k < 3; k++) {
+            int v = mesh->triangle[key[t].triangle][k];
+            if (copy_of[v] < patch->first_vertex) {
+                Vec3 p = vec3_sub(mesh->vertex[v], scope->origin), n = vec3_negate(mesh->normal[v]);
+                copy_of[v] = scope->vertex_count;
+                scope->node[scope->vertex_count] = mesh->node ? mesh->node[v] : -1;
+                scope->vertex[scope->vertex_count++] = (WallVertex){{(float)p.x, (float)p.y, (float)p.z}, {(float)n.x, (float)n.y, (float)n.z}};
+                patch->vertex_count++;
+            }
+            index[patch->first_index + patch->index_count++] = (uint32_t)copy_of[v];
+        }
+    }
+    for (int i = 0; i < scope->patch_count; i++)
+        enclose(scope, &scope->patch[i]);
+}
+
+static void measure(Angioscope *scope, const TriangleMesh *mesh)
+{
+    double volume = 0, area = 0;
+    for (int t = 0; t < mesh->triangle_count; t++) {
+        const int *c = mesh->triangle[t];
+        Vec3 a = vec3_sub(mesh->vertex[c[0]], scope->origin), b = vec3_sub(mesh->vertex[c[1]], scope->origin),
+             d = vec3_sub(mesh->vertex[c[2]], scope->origin), across = vec3_cross(vec3_sub(b, a), vec3_sub(d, a));
+        volume += vec3_dot(a, across) / 6;
+        area += vec3_norm(across) / 2;
+    }
+    // of a sheet that encloses nothing: some part of its width
+    scope->mean_radius = area > 0 ? fmax(2 * volume / area, 0.02 * sqrt(area)) : 1;
+}
+
+static bool mesh_is_sound(const TriangleMesh *mesh)
+{
+    for (int i = 0; i < mesh->vertex_count; i++)
+        if (!vec3_is_finite(mesh->vertex[i]) || !vec3_is_finite(mesh->normal[i]))
+            return false;
+    for (int i = 0; i < mesh->triangle_count; i++)
+        for (int k = 0; k < 3; k++)
+            if (mesh->triangle[i][k] < 0 || mesh->triangle[i][k] >= mesh->vertex_count)
+                return false;
+    return true;
+}
+
+static const void *at_byte(size_t offset) { return (const void *)(uintptr_t)offset; }
+
+static bool set_wall(Angioscope *scope, const TriangleMesh *mesh, char *message, size_t capacity)
+{
+    scope->mean_radius = 1;
+    if (!mesh || mesh->triangle_count < 1)
+        return true;
+    if (!mesh_is_sound(mesh))
+        return message_fail(message, capacity, "the surface to draw has indices out of range or numbers that are not finite");
+    scope->origin = mesh->vertex[mesh->triangle[0][0]];
+    measure(scope, mesh);
+    size_t triangles = (size_t)mesh->triangle_count, patches = triangles / PATCH_TRIANGLES + 1;
+    TriangleKey *key = order_triangles(mesh);
+    int *copy_of = malloc((size_t)mesh->vertex_count * sizeof *copy_of);
+    uint32_t *index = malloc(3 * triangles * sizeof *index);
+    scope->patch = calloc(patches, sizeof *scope->patch);
+    scope->seen = calloc(patches, sizeof *scope->seen);
+    scope->draw_count = calloc(patches, sizeof *scope->draw_count);
+    scope->draw_offset = calloc(patches, sizeof *scope->draw_offset);
+    scope->vertex = malloc(3 * triangles * sizeof *scope->vertex);
+    scope->node = malloc(3 * triangles * sizeof *scope->node);
+    bool good = key && copy_of && index && scope->patch && scope->seen && scope->draw_count && scope->draw_offset && scope->vertex && scope->node;
+    if (good) {
+        fill_patches(scope, mesh, key, copy_of, index);
+        glBindVertexArray(scope->wall_array);
+        glBindBuffer(GL_ARRAY_BUFFER, scope->wall_vertices);
+        glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)((size_t)scope->vertex_count * sizeof *scope->vertex), scope->vertex, GL_STATIC_DRAW);
+        glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, scope->wall_indices);
+        glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)(3 * triangles * sizeof *index), index, GL_STATIC_DRAW);
+        for (unsigned k = 0; k < 2; k++) {
+            glEnableVertexAttribArray(k);
+            glVertexAttribPointer(k, 3, GL_FLOAT, GL_FALSE, sizeof(WallVertex), at_byte(3 * k * sizeof(float)));
+        }
+        glBindVertexArray(0);
+    }
+    free(key);
+    free(copy_of);
+    free(index);
+    return good || message_fail(message, capacity, "not enough memory for a surface of %d triangles", mesh->triangle_count);
+}
 
 Angioscope *angioscope_create(const TriangleMesh *mesh, const Vessel *vessel, const VesselTree *tree, char *message, size_t capacity)
 {
-    (void)mesh;
     Angioscope *scope = calloc(1, sizeof *scope);
     if (!scope) {
         message_fail(message, capacity, "not enough memory for angioscopy");
@@ -20,32 +249,284 @@ Angioscope *angioscope_create(const TriangleMesh *mesh, const Vessel *vessel, co
     }
     scope->vessel = vessel;
     scope->tree = tree;
+    scope->program = gl_program_create(VERTEX, FRAGMENT, message, capacity);
+    glGenVertexArrays(1, &scope->wall_array);
+    glGenVertexArrays(1, &scope->tool_array);
+    unsigned *const buffer[4] = {&scope->wall_vertices, &scope->wall_indices, &scope->tool_vertices, &scope->tool_indices};
+    for (int k = 0; k < 4; k++)
+        glGenBuffers(1, buffer[k]);
+    if (!scope->program || !set_wall(scope, mesh, message, capacity)) {
+        angioscope_destroy(scope);
+        return NULL;
+    }
     return scope;
 }
 
-void angioscope_destroy(Angioscope *scope) { free(scope); }
+void angioscope_destroy(Angioscope *scope)
+{
+    if (!scope)
+        return;
+    if (scope->program)
+        glDeleteProgram(scope->program);
+    const unsigned array[2] = {scope->wall_array, scope->tool_array};
+    glDeleteVertexArrays(2, array);
+    const unsigned buffer[4] = {scope->wall_vertices, scope->wall_indices, scope->tool_vertices, scope->tool_indices};
+    glDeleteBuffers(4, buffer);
+    gl_canvas_destroy(&scope->canvas);
+    solids_free(&scope->tool);
+    free(scope->patch);
+    free(scope->vertex);
+    free(scope->node);
+    free(scope->seen);
+    free(scope->draw_count);
+    free(scope->draw_offset);
+    free(scope);
+}
+
+// --- the eye ---
+
+// The tool's axis `back` mm behind its tip.
+static Vec3 axis_behind_tip(const Pose *pose, double back)
+{
+    int i = pose->node_count - 1;
+    while (i > 0) {
+        double length = vec3_distance(pose->position[i], pose->position[i - 1]);
+        if (!(length < back))
+            return length > 0 ? vec3_mix(pose->position[i], pose->position[i - 1], back / length) : pose->position[i];
+        back -= length;
+        i--;
+    }
+    return pose->position[0];
+}
+
+// Gap and inward normal at a point; false where there is no wall near, or none that is known.
+static bool wall_at(const Angioscope *scope, Vec3 x, int node, double reach, double *gap, Vec3 *normal)
+{
+    if (!scope->vessel)
+        return false;
+    VesselMemory memory = {.node = scope->vessel->locate(scope->vessel, x, node)};
+    VesselHit hit;
+    vessel_query(scope->vessel, 1, &x, reach, &memory, &hit);
+    *gap = hit.gap;
+    *normal = hit.normal;
+    return !(hit.flags & (VESSEL_FAR | VESSEL_OPEN_END)) && isfinite(hit.gap) && vec3_is_finite(hit.normal) && vec3_norm2(hit.normal) > 0.25;
+}
+
+static Vec3 across(Vec3 v, Vec3 axis, Vec3 otherwise)
+{
+    Vec3 flat = vec3_add_scaled(v, -vec3_dot(v, axis), axis);
+    return vec3_norm(flat) > 1e-6 ? vec3_unit(flat) : otherwise;
+}
 
 bool angioscope_view(const Angioscope *scope, const Pose *pose, AngioscopeView *view)
 {
-    (void)scope;
-    if (!pose || pose->node_count < 2 || !vec3_is_finite(pose->position[pose->node_count - 1]))
+    if (!pose || pose->node_count < 2)
         return false;
-    Quat q = pose->quaternion[pose->node_count - 1];
-    *view = (AngioscopeView){.eye = pose->position[pose->node_count - 1], .up = quat_rotate(q, vec3(0, 1, 0)), .forward = quat_rotate(q, vec3(1, 0, 0)),
-                             .half_angle_tan = 1};
-    view->right = vec3_cross(view->forward, view->up);
-    return true;
+    int last = pose->node_count - 1, node = pose->node[last].vessel_node;
+    double radius = fmax(pose->node[last].radius, 1e-3), back = 7.5 * radius, beside = 2.8 * radius, margin = 0.8 * radius;
+    Vec3 tip = pose->position[last], behind = axis_behind_tip(pose, back), forward = quat_rotate(pose->quaternion[last], vec3(1, 0, 0));
+    Vec3 upright = quat_rotate(pose->quaternion[last], vec3(0, 1, 0));
+    if (!isfinite(radius) || !vec3_is_finite(tip) || !vec3_is_finite(behind) || !vec3_is_finite(forward) || !vec3_is_finite(upright))
+        return false;
+    forward = vec3_unit(forward);
+    Vec3 up = across(upright, forward, vec3_normal_to(forward)), normal;
+    double gap, room = beside + margin;
+    // near a wall the eye rises off it, in the open it stays above the tool's own frame; in between both have a say
+    if (wall_at(scope, behind, node, 2 * room, &gap, &normal)) {
+        double t = fmin(fmax(2 - gap / room, 0), 1), weight = 2 * t * t * (3 - 2 * t);
+        up = across(vec3_add_scaled(up, weight, normal), forward, up);
+    }
+    Vec3 eye = vec3_add_scaled(behind, beside, up);
+    for (int k = 0; k < 4 && wall_at(scope, eye, node, 2 * room, &gap, &normal) && gap < margin; k++)
+        eye = vec3_add_scaled(eye, margin - gap, normal);
+    *view = (AngioscopeView){.eye = eye, .right = vec3_cross(forward, up), .up = up, .forward = forward, .half_angle_tan = tan(half_angle)};
+    return vec3_is_finite(eye);
+}
+
+void angioscope_set_full_detail(Angioscope *scope, bool on) { scope->full_detail = on; }
+
+// --- drawing ---
+
+static double lumen_radius(const Angioscope *scope, const Pose *pose)
+{
+    int node = pose->node[pose->node_count - 1].vessel_node;
+    return scope->tree && node >= 0 && node < scope->tree->node_count ? scope->tree->radius[node] : scope->mean_radius;
+}
+
+// Perspective from space relative to `origin` to clip space, column-major.
+static void view_matrix(const AngioscopeView *view, Vec3 origin, double aspect, double near, double far, float matrix[16])
+{
+    double tx = view->half_angle_tan * (aspect > 1 ? aspect : 1), ty = view->half_angle_tan / (aspect < 1 ? aspect : 1);
+    Vec3 offset = vec3_sub(origin, view->eye);
+    double a = (far + near) / (far - near), b = -2 * far * near / (far - near);
+    const Vec3 row[4] = {vec3_scale(view->right, 1 / tx), vec3_scale(view->up, 1 / ty), vec3_scale(view->forward, a), view->forward};
+    for (int i = 0; i < 4; i++) {
+        matrix[i] = (float)row[i].x;
+        matrix[4 + i] = (float)row[i].y;
+        matrix[8 + i] = (float)row[i].z;
+        matrix[12 + i] = (float)(vec3_dot(row[i], offset) + (i == 2 ? b : 0));
+    }
+}
+
+static void ask_normals(Angioscope *scope, Patch *patch)
+{
+    patch->has_field_normals = true;
+    if (!scope->vessel)
+        return;
+    for (int i = patch->first_vertex; i < patch->first_vertex + patch->vertex_count; i++) {
+        WallVertex *v = &scope->vertex[i];
+        Vec3 p = vec3_add(scope->origin, vec3(v->position[0], v->position[1], v->position[2])), n = vec3(v->normal[0], v->normal[1], v->normal[2]);
+        VesselMemory memory = {.node = scope->node[i]};
+        VesselHit hit;
+        vessel_query(scope->vessel, 1, &p, 0.1 * scope->mean_radius, &memory, &hit);
+        // another wall that answers here, or none, leaves the mesh's
+        if (!hit.flags && vec3_is_finite(hit.normal) && vec3_dot(hit.normal, n) > 0.5)
+            v->normal[0] = (float)hit.normal.x, v->normal[1] = (float)hit.normal.y, v->normal[2] = (float)hit.normal.z;
+    }
+    glBindBuffer(GL_ARRAY_BUFFER, scope->wall_vertices);
+    glBufferSubData(GL_ARRAY_BUFFER, (GLintptr)((size_t)patch->first_vertex * sizeof(WallVertex)),
+                    (GLsizeiptr)((size_t)patch->vertex_count * sizeof(WallVertex)), scope->vertex + patch->first_vertex);
+}
+
+static int nearer_first(const void *a, const void *b)
+{
+    const SeenPatch *x = a, *y = b;
+    if (x->distance != y->distance)
+        return x->distance < y->distance ? -1 : 1;
+    return (x->patch > y->patch) - (x->patch < y->patch);
+}
+
+// Patches in the view and before the dark, near ones first. Returns how many.
+static int choose_patches(Angioscope *scope, const AngioscopeView *view, double aspect, double reach)
+{
+    double tx = view->half_angle_tan * (aspect > 1 ? aspect : 1), ty = view->half_angle_tan / (aspect < 1 ? aspect : 1);
+    const Vec3 side[4] = {vec3_unit(vec3_add_scaled(view->right, tx, view->forward)), vec3_unit(vec3_add_scaled(vec3_negate(view->right), tx, view->forward)),
+                          vec3_unit(vec3_add_scaled(view->up, ty, view->forward)), vec3_unit(vec3_add_scaled(vec3_negate(view->up), ty, view->forward))};
+    Vec3 eye = vec3_sub(view->eye, scope->origin);
+    int count = 0;
+    for (int i = 0; i < scope->patch_count; i++) {
+        const Patch *patch = &scope->patch[i];
+        Vec3 d = vec3_sub(patch->center, eye);
+        double distance = vec3_norm(d) - patch->radius;
+        bool seen = distance < reach && vec3_dot(d, view->forward) > -patch->radius;
+        for (int k = 0; k < 4 && seen; k++)
+            seen = vec3_dot(d, side[k]) > -patch->radius;
+        if (!seen)
+            continue;
+        scope->seen[count++] = (SeenPatch){distance, i};
+    }
+    qsort(scope->seen, (size_t)count, sizeof *scope->seen, nearer_first);
+    return count;
+}
+
+static void draw_wall(Angioscope *scope, const AngioscopeView *view, double aspect, double reach)
+{
+    int count = choose_patches(scope, view, aspect, reach);
+    if (count == 0)
+        return;
+    for (int i = 0; i < count; i++) {
+        Patch *patch = &scope->patch[scope->seen[i].patch];
+        if (!patch->has_field_normals)
+            ask_normals(scope, patch);
+        scope->draw_count[i] = patch->index_count;
+        scope->draw_offset[i] = at_byte((size_t)patch->first_index * sizeof(uint32_t));
+    }
+    glUniform4f(glGetUniformLocation(scope->program, "tint"), 0.84f, 0.33f, 0.26f, 0);
+    glUniform3f(glGetUniformLocation(scope->program, "shine"), 0.30f, 1, 0.5f);
+    glUniform1f(glGetUniformLocation(scope->program, "edge"), 0);
+    glCullFace(GL_FRONT);
+    glBindVertexArray(scope->wall_array);
+    glVertexAttrib4f(2, 1, 1, 1, 1);
+    glMultiDrawElements(GL_TRIANGLES, scope->draw_count, GL_UNSIGNED_INT, scope->draw_offset, count);
+}
+
+static void draw_tool(Angioscope *scope, const Pose *pose, double reach)
+{
+    enum { NODES = 160 };
+    double radius[NODES];
+    Color color[NODES];
+    int last = pose->node_count - 1, first = last;
+    for (double length = 0; first > 0 && last - first < NODES - 1 && length < reach && vec3_is_finite(pose->position[first - 1]); first--)
+        length += vec3_distance(pose->position[first], pose->position[first - 1]);
+    for (int i = first; i <= last; i++) {
+        radius[i - first] = pose->node[i].radius;
+        color[i - first] = color_rgb(206, 212, 220);
+    }
+    solids_clear(&scope->tool);
+    scope->tool.origin = scope->origin;
+    scope->tool.sides = 48;
+    solids_tube(&scope->tool, last - first + 1, pose->position + first, radius, color);
+    const Solids *tool = &scope->tool;
+    if (tool->index_count == 0)
+        return;
+    glBindVertexArray(scope->tool_array);
+    glBindBuffer(GL_ARRAY_BUFFER, scope->tool_vertices);
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)((size_t)tool->vertex_count * sizeof *tool->vertex), tool->vertex, GL_STREAM_DRAW);
+    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, scope->tool_indices);
+    glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)((size_t)tool->index_count * sizeof *tool->index), tool->index, GL_STREAM_DRAW);
+    glEnableVertexAttribArray(0);
+    glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, sizeof(SolidVertex), at_byte(offsetof(SolidVertex, position)));
+    glEnableVertexAttribArray(1);
+    glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, sizeof(SolidVertex), at_byte(offsetof(SolidVertex, normal)));
+    glEnableVertexAttribArray(2);
+    glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, sizeof(SolidVertex), at_byte(offsetof(SolidVertex, color)));
+    glUniform4f(glGetUniformLocation(scope->program, "tint"), 0, 0, 0, 1);
+    glUniform3f(glGetUniformLocation(scope->program, "shine"), 0.5f, 1, 0);
+    glUniform1f(glGetUniformLocation(scope->program, "edge"), 1);
+    glEnable(GL_BLEND);
+    glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+    glCullFace(GL_BACK);
+    glDrawElements(GL_TRIANGLES, tool->index_count, GL_UNSIGNED_INT, at_byte(0));
+}
+
+static void draw_inside(Angioscope *scope, const Pose *pose, ViewPort port)
+{
+    AngioscopeView view;
+    if (!angioscope_view(scope, pose, &view))
+        return;
+    double radius = lumen_radius(scope, pose), fog = fog_reach * radius, reach = fog_end * fog;
+    double aspect = (double)port.width / port.height, near = 0.1 * fmax(pose->node[pose->node_count - 1].radius, 1e-3);
+    // light comes on while the tip leaves the sheath
+    double hidden = pose->first_free_node >= pose->node_count - 1 ? pose->inserted_mm : HUGE_VAL, t = fmin(fmax(hidden, 0), 1);
+    float clip[16];
+    view_matrix(&view, scope->origin, aspect, near, reach + near, clip);
+    Vec3 eye = vec3_sub(view.eye, scope->origin);
+    glUseProgram(scope->program);
+    glUniformMatrix4fv(glGetUniformLocation(scope->program, "clip"), 1, GL_FALSE, clip);
+    glUniform3f(glGetUniformLocation(scope->program, "eye"), (float)eye.x, (float)eye.y, (float)eye.z);
+    glUniform4f(glGetUniformLocation(scope->program, "lamp"), (float)(1 / (lamp_reach * lamp_reach * radius * radius)), (float)(1 / fog),
+                (float)(1.35 * t), 0.12f);
+    glUniform3fv(glGetUniformLocation(scope->program, "dark"), 1, dark);
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_LESS);
+    glDisable(GL_BLEND);
+    glEnable(GL_CULL_FACE);
+    glFrontFace(GL_CCW);
+    draw_wall(scope, &view, aspect, reach);
+    draw_tool(scope, pose, reach);
+    glBindVertexArray(0);
+    glDisable(GL_BLEND);
+    glDisable(GL_CULL_FACE);
+    glDisable(GL_DEPTH_TEST);
 }
 
 void angioscope_draw(Angioscope *scope, const Pose *pose, ViewPort port)
 {
-    (void)scope;
-    (void)pose;
+    if (port.width < 1 || port.height < 1)
+        return;
+    GlCanvas *canvas = &scope->canvas;
+    int samples = scope->full_detail ? FINE_SAMPLES : 1;
+    if (canvas->width != port.width || canvas->height != port.height || scope->samples != samples) {
+        gl_canvas_destroy(canvas);
+        if (!gl_canvas_create(canvas, port.width, port.height, samples, NULL, 0))
+            return;
+        scope->samples = samples;
+    }
+    gl_canvas_begin(canvas, dark);
+    draw_inside(scope, pose, port);
+    gl_canvas_resolve(canvas);
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, canvas->resolved);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, port.framebuffer);
+    glBlitFramebuffer(0, 0, port.width, port.height, port.x, port.y, port.x + port.width, port.y + port.height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
     glBindFramebuffer(GL_FRAMEBUFFER, port.framebuffer);
-    glEnable(GL_SCISSOR_TEST);
-    glScissor(port.x, port.y, port.width, port.height);
-    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-    glClearColor(0.02f, 0.01f, 0.01f, 1);
-    glClear(GL_COLOR_BUFFER_BIT);
-    glDisable(GL_SCISSOR_TEST);
 }

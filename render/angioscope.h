@@ -21,6 +21,8 @@ typedef struct AngioscopeView {    // a perspective camera
 // (may be NULL) are borrowed. NULL with a reason.
 Angioscope *angioscope_create(const TriangleMesh *mesh, const Vessel *vessel, const VesselTree *tree, char *message, size_t capacity);
 void angioscope_destroy(Angioscope *scope);
+// Smooth edges of the wall too, at two to three times the cost: for pictures and films off screen. Default: off.
+void angioscope_set_full_detail(Angioscope *scope, bool on);
 // Draws all of the port's rectangle. In the sheath, outside of the vessel, without pose or with one that is not finite it is what can be seen from there:
 // the sheath's dark, or nothing.
 void angioscope_draw(Angioscope *scope, const Pose *pose, ViewPort port);

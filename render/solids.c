@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SIDES = 14, SUBDIVISIONS = 5, CAP_RINGS = 4 };
+enum { USUAL_SIDES = 14, SUBDIVISIONS = 5, CAP_RINGS = 4 };
 
 void solids_clear(Solids *solids) { solids->vertex_count = solids->index_count = 0; }
 
@@ -52,23 +52,25 @@ static void add_vertex(Solids *solids, Vec3 p, Vec3 n, Color color)
         (SolidVertex){{(float)d.x, (float)d.y, (float)d.z}, {(float)n.x, (float)n.y, (float)n.z}, color};
 }
 
-// A ring of SIDES vertices; `lean` tilts the normals along the tangent (cos and sin of the angle from the radial direction). With `join` it is
+// A ring of vertices; `lean` tilts the normals along the tangent (cos and sin of the angle from the radial direction). With `join` it is
 // sewn to the ring before it.
 static void add_ring(Solids *solids, Vec3 center, Vec3 tangent, Vec3 normal, double radius, double lean_cos, double lean_sin, Color color, bool join)
 {
-    if (!reserve(solids, SIDES, 6 * SIDES))
+    int sides = solids->sides > 2 ? solids->sides : USUAL_SIDES;
+    if (!reserve(solids, sides, 6 * sides))
         return;
     Vec3 binormal = vec3_cross(tangent, normal);
     uint32_t first = (uint32_t)solids->vertex_count;
-    for (int k = 0; k < SIDES; k++) {
-        double angle = 2 * PI * k / SIDES;
+    for (int k = 0; k < sides; k++) {
+        double angle = 2 * PI * k / sides;
         Vec3 radial = vec3_add_scaled(vec3_scale(normal, cos(angle)), sin(angle), binormal);
         add_vertex(solids, vec3_add_scaled(center, radius, radial), vec3_add_scaled(vec3_scale(radial, lean_cos), lean_sin, tangent), color);
     }
-    if (!join || first < SIDES)
+    uint32_t count = (uint32_t)sides;
+    if (!join || first < count)
         return;
-    for (uint32_t k = 0; k < SIDES; k++) {
-        uint32_t a = first - SIDES + k, b = first - SIDES + (k + 1) % SIDES, c = first + k, d = first + (k + 1) % SIDES;
+    for (uint32_t k = 0; k < count; k++) {
+        uint32_t a = first - count + k, b = first - count + (k + 1) % count, c = first + k, d = first + (k + 1) % count;
         const uint32_t corner[6] = {a, b, c, c, b, d};
         memcpy(solids->index + solids->index_count, corner, sizeof corner);
         solids->index_count += 6;

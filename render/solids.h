@@ -16,6 +16,7 @@ typedef struct SolidVertex {
 
 typedef struct Solids {
     Vec3 origin;               // near the shapes, so that float coordinates keep their digits
+    int sides;                 // of round things, >= 3; 0: 14
     int vertex_count, vertex_capacity;
     SolidVertex *vertex;
     int index_count, index_capacity;

@@ -24,7 +24,8 @@ struct VesselScene {
     FreeCamera shown;
     Camera projection;
     LayersKey key;
-    bool has_drawn, was_moving;
+    bool has_drawn;
+    int still_frames;
     bool is_following, is_gliding;
     Vec3 anchor;               // where the followed focus is
     bool has_tip;
@@ -141,7 +142,7 @@ static void follow(VesselScene *scene, FreeCamera *camera, ViewPort port)
     Camera view = free_camera_projection(camera, port.width, port.height, 1);
     double shorter = view.mm_per_pixel * (port.width < port.height ? port.width : port.height);
     double off = vec3_norm(vec3_add_scaled(away, -vec3_dot(away, view.back), view.back)) / shorter;
-    scene->is_gliding = off > (scene->is_gliding ? 0.02 : 1 / 6.0);
+    scene->is_gliding = off > (scene->is_gliding ? 1 / 16.0 : 1 / 6.0);
     if (scene->is_gliding)
         scene->anchor = off > 1 ? scene->tip : vec3_add_scaled(scene->anchor, 0.25, away);
     camera->focus = scene->anchor;
@@ -163,14 +164,17 @@ static LayersKey key_for(VesselScene *scene, const VesselSceneLook *look, ViewPo
     return key;
 }
 
-// Changing from frame to frame: the first changed frame is drawn in full, so that a single step of the camera never looks coarse.
+// Changing, or not yet still for long enough that a costly frame does not show as a stutter.
 static bool is_moving(VesselScene *scene, const LayersKey *key)
 {
-    bool changed = !scene->has_drawn || !layers_key_same(&scene->key, key), moving = changed && scene->was_moving;
+    const int enough = 4;
+    if (!scene->has_drawn)
+        scene->still_frames = enough;
+    else
+        scene->still_frames = layers_key_same(&scene->key, key) ? scene->still_frames + (scene->still_frames < enough) : 0;
     scene->key = *key;
-    scene->was_moving = changed && scene->has_drawn;
     scene->has_drawn = true;
-    return moving;
+    return scene->still_frames < enough;
 }
 
 // --- what moves ---

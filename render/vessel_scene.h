@@ -4,8 +4,8 @@
 //
 // Drawing: the walls nearest to the eye, outer and inner faces, are two layers kept as textures and redrawn only when camera, view size or section
 // plane change; a frame shows their composition, and whatever moves is drawn over it seen through the outer faces' layer, or, where it lies behind a
-// further vessel, through that too. While they change from frame to frame the layers come from a coarser mesh where one was given, without smooth edges; the
-// first frame that stands still has all of it.
+// further vessel, through that too. While they change from frame to frame the layers come from a coarser mesh where one was given, without smooth edges;
+// all of it is drawn at the first frame and once four frames in a row stood still.
 #ifndef SELDINGER_RENDER_VESSEL_SCENE_H
 #define SELDINGER_RENDER_VESSEL_SCENE_H
 
@@ -19,7 +19,7 @@ typedef struct VesselScene VesselScene;
 
 typedef struct VesselSceneOptions {    // all borrowed: must outlive the scene, save the meshes, which are copied
     const TriangleMesh *vessel;        // NULL: none (rigs, free wires)
-    const TriangleMesh *coarse;        // of the same surface, for while the camera turns; NULL: `vessel`
+    const TriangleMesh *coarse;        // of the same surface, for while the camera turns (mesh_decimate to 25,000); NULL: `vessel`
     const VesselTree *tree;            // NULL, or without model: no wireframe at the tip
     int target_count;
     const SceneTarget *target;         // (target_count)
