@@ -1,5 +1,6 @@
 #include "input/gamepad.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 const DeviceMap *gamepad_choose_map(const DeviceMap *const *map, int count, bool is_gamepad, const char *name)
@@ -39,4 +40,25 @@ void gamepad_lost(Gamepad *gamepad, HandPort *port)
     map_release(gamepad->map, &gamepad->state);
     map_publish(gamepad->map, &gamepad->state, port);
     atomic_store(&port->state, HAND_LOST);
+}
+
+// SDL's form: 16 bytes in hexadecimal, each pair little-endian: bus, 0, vendor, 0, product, 0, version, 0
+static int word_of_guid(const char *guid, int byte)
+{
+    char text[5] = {guid[2 * byte + 2], guid[2 * byte + 3], guid[2 * byte], guid[2 * byte + 1], 0}, *end;
+    long value = strtol(text, &end, 16);
+    return *end || text[0] == '-' || text[0] == '+' || text[0] == ' ' ? -1 : (int)value;
+}
+
+bool gamepad_ids_of_guid(const char *guid, int *vendor_id, int *product_id)
+{
+    if (strlen(guid) != 32)
+        return false;
+    int vendor = word_of_guid(guid, 4), product = word_of_guid(guid, 8);
+    // names instead of ids fill the bytes that are 0 here
+    if (word_of_guid(guid, 2) != 0 || word_of_guid(guid, 6) != 0 || word_of_guid(guid, 10) != 0 || vendor <= 0 || product < 0)
+        return false;
+    *vendor_id = vendor;
+    *product_id = product;
+    return true;
 }

@@ -17,5 +17,7 @@ bool gamepad_bind(Gamepad *gamepad, const DeviceMap *map, int axis_count, int bu
 void gamepad_update(Gamepad *gamepad, const float *axes, int axis_count, const unsigned char *buttons, int button_count, HandPort *port);
 // Unplugged: rates and buttons zero, HAND_LOST.
 void gamepad_lost(Gamepad *gamepad, HandPort *port);
+// Vendor and product id from glfwGetJoystickGUID; false where it names none (devices that are on no bus).
+bool gamepad_ids_of_guid(const char *guid, int *vendor_id, int *product_id);
 
 #endif

@@ -1,35 +1,13 @@
 #include "input/hand.h"
 
-#include "input/force_feedback.h"
-#include "input/hid_report.h"
-#include "input/map_state.h"
+#include "input/hand_slot.h"
 
-#include <pthread.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
-enum { MESSAGES_KEPT = 32, MESSAGE_LENGTH = 400, DEVICES_LISTED = 64, MOST_MAPS = 16 };
-enum { READ_WAIT_MS = 50, FORCE_WAIT_MS = 1, DRAIN_MOST = 512, INFO_US = 50000, COUNT_RATE_US = 1000000 };
-
-// One port and the device that drives it now or did before.
-typedef struct Slot {
-    Hands *hands;
-    HandPort port;
-    bool is_used;                    // has had a device
-    HidDeviceInfo identity;
-    const DeviceMap *map;
-    HidDescriptor *descriptor;
-    MapState state;
-    ForceFeedback force;
-    void *device;                    // while the thread runs
-    pthread_t thread;
-    bool has_thread;
-    _Atomic bool has_ended;          // the device went; the scanner joins the thread
-    HandInfo info;                   // under the lock
-} Slot;
+enum { DEVICES_LISTED = 64, MOST_MAPS = 16 };
 
 // A device that cannot be used: told once, forgotten when it is unplugged.
 typedef struct Refusal {
@@ -39,141 +17,19 @@ typedef struct Refusal {
 } Refusal;
 
 struct Hands {
-    HidTransport transport;
+    HandShared shared;
     HidTransport *own_transport;
+    UsbContext *usb;
+    bool has_tried_usb;
     DeviceMap *map[MOST_MAPS], *built_in[BUILT_IN_COUNT];
     int map_count, rescan_ms;
-    bool use_built_in;
-    Slot slot[HANDS_MOST];
+    bool use_built_in, use_usb;
+    HandSlot slot[HANDS_MOST];
     Refusal refusal[DEVICES_LISTED];
     HidDeviceInfo listed[DEVICES_LISTED];
-    pthread_mutex_t lock;            // info and messages
-    pthread_cond_t wake;
     pthread_t scanner;
     bool has_scanner;
-    _Atomic bool quit, paused;
-    char message[MESSAGES_KEPT][MESSAGE_LENGTH];
-    int message_first, message_count;
 };
-
-static int64_t now_us(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
-}
-
-static void say(Hands *hands, const char *format, ...) __attribute__((format(printf, 2, 3)));
-static void say(Hands *hands, const char *format, ...)
-{
-    va_list arguments;
-    pthread_mutex_lock(&hands->lock);
-    if (hands->message_count == MESSAGES_KEPT) {    // the oldest gives way
-        hands->message_first = (hands->message_first + 1) % MESSAGES_KEPT;
-        hands->message_count--;
-    }
-    char *text = hands->message[(hands->message_first + hands->message_count++) % MESSAGES_KEPT];
-    va_start(arguments, format);
-    vsnprintf(text, MESSAGE_LENGTH, format, arguments);
-    va_end(arguments);
-    pthread_mutex_unlock(&hands->lock);
-}
-
-// --- one device's thread ---
-
-static void update_info(Slot *slot, HandState state, double report_hz)
-{
-    atomic_store(&slot->port.state, state);
-    pthread_mutex_lock(&slot->hands->lock);
-    slot->info.state = state;
-    slot->info.reports = slot->state.reports;
-    slot->info.bad_reports = slot->state.bad_reports;
-    slot->info.report_hz = report_hz;
-    slot->info.force_n = state == HAND_READY ? slot->force.guard.sent[0] : 0;
-    pthread_mutex_unlock(&slot->hands->lock);
-}
-
-// All that has come, at most DRAIN_MOST reports, so that a flood cannot keep the thread from its other work. How many; -1: the device is gone.
-static int drain(Slot *slot, int wait_ms)
-{
-    const HidTransport *transport = &slot->hands->transport;
-    uint8_t bytes[HID_REPORT_BYTES];
-    int count = 0, length = transport->read(transport->context, slot->device, bytes, (int)sizeof bytes, wait_ms);
-    while (length > 0) {
-        map_take_report(slot->map, slot->descriptor, bytes, (size_t)length, &slot->state);
-        if (++count == DRAIN_MOST)
-            break;
-        length = transport->read(transport->context, slot->device, bytes, (int)sizeof bytes, 0);
-    }
-    if (count > 0)
-        map_publish(slot->map, &slot->state, &slot->port);
-    return length < 0 ? -1 : count;
-}
-
-static void start_force(Slot *slot)
-{
-    Hands *hands = slot->hands;
-    bool plays = force_start(&slot->force, slot->map, slot->descriptor, &hands->transport, slot->device, now_us());
-    pthread_mutex_lock(&hands->lock);
-    snprintf(slot->info.force, sizeof slot->info.force, "%s", slot->force.text);
-    pthread_mutex_unlock(&hands->lock);
-    if (slot->map->force.is_wanted && !plays)
-        say(hands, "%s: force: %s", slot->info.name, slot->force.text);
-}
-
-// A force that the watchdog took away is told, once each time.
-static void tell_watchdog(Slot *slot, double sent_before)
-{
-    const char *why = slot->force.guard.why_zero;
-    if (sent_before != 0 && slot->force.guard.sent[0] == 0 && why && why[0] && strcmp(why, "paused") != 0)
-        say(slot->hands, "%s: force to zero, %s%s", slot->info.name, why,
-            strstr(why, "silent") ? " (force: {quiet_ms: 0} in its map where it reports only changes)" : "");
-}
-
-static void *run_device(void *argument)
-{
-    Slot *slot = argument;
-    Hands *hands = slot->hands;
-    int64_t report_us = now_us(), counted_from = report_us, informed = 0, reports_then = slot->state.reports;
-    bool is_there = true, has_told_bad = slot->state.bad_reports > 0;
-    double hz = 0;
-    start_force(slot);
-    int wait_ms = slot->force.block[0] ? FORCE_WAIT_MS : READ_WAIT_MS;
-    while (is_there && !atomic_load(&hands->quit)) {
-        int count = drain(slot, wait_ms);
-        int64_t now = now_us();
-        double sent_before = slot->force.guard.sent[0];
-        is_there = count >= 0;
-        report_us = count > 0 ? now : report_us;
-        if (is_there)
-            force_tick(&slot->force, &slot->port, now, report_us, atomic_load(&hands->paused), &hands->transport, slot->device);
-        tell_watchdog(slot, sent_before);
-        if (now - counted_from >= COUNT_RATE_US) {
-            hz = 1e6 * (double)(slot->state.reports - reports_then) / (double)(now - counted_from);
-            counted_from = now;
-            reports_then = slot->state.reports;
-        }
-        if (!has_told_bad && slot->state.bad_reports > 0) {
-            say(hands, "%s sends reports that its descriptor does not describe (too short or of unknown id); they are left out", slot->info.name);
-            has_told_bad = true;
-        }
-        if (now - informed >= INFO_US) {
-            update_info(slot, HAND_READY, hz);
-            informed = now;
-        }
-    }
-    map_release(slot->map, &slot->state);
-    map_publish(slot->map, &slot->state, &slot->port);
-    if (is_there)
-        force_stop(&slot->force, &hands->transport, slot->device);
-    update_info(slot, HAND_LOST, 0);
-    hands->transport.close(hands->transport.context, slot->device);
-    slot->device = NULL;
-    if (!is_there)
-        say(hands, "%s was unplugged: the tool stops; plug it in again to go on", slot->info.name);
-    atomic_store(&slot->has_ended, true);
-    return NULL;
-}
 
 // --- looking for devices ---
 
@@ -239,7 +95,7 @@ static Refusal *refusal_of(Hands *hands, const HidDeviceInfo *device)
 static HidDescriptor *read_descriptor(const Hands *hands, const HidDeviceInfo *device, const char *name, Faults *faults)
 {
     uint8_t bytes[HID_DESCRIPTOR_LIMIT];
-    int length = hands->transport.descriptor(hands->transport.context, device->path, bytes, (int)sizeof bytes);
+    int length = hands->shared.transport.descriptor(hands->shared.transport.context, device->path, bytes, (int)sizeof bytes);
     if (length <= 0) {
         faults_add(faults, name, 0, 0, "its report descriptor cannot be read");
         return NULL;
@@ -248,10 +104,10 @@ static HidDescriptor *read_descriptor(const Hands *hands, const HidDeviceInfo *d
 }
 
 // A slot for the device: the one it had, else a fresh one; NULL where all are taken.
-static Slot *slot_for(Hands *hands, const HidDeviceInfo *device)
+static HandSlot *slot_for(Hands *hands, const HidDeviceInfo *device)
 {
     for (int i = 0; i < HANDS_MOST; i++) {
-        Slot *slot = &hands->slot[i];
+        HandSlot *slot = &hands->slot[i];
         if (slot->is_used && !slot->has_thread && same_device(&slot->identity, device))
             return slot;
     }
@@ -261,17 +117,41 @@ static Slot *slot_for(Hands *hands, const HidDeviceInfo *device)
     return NULL;
 }
 
-// Opens a device and starts its thread. False with a fault where that cannot be.
-static bool connect_device(Hands *hands, const HidDeviceInfo *device, const DeviceMap *map, Faults *faults)
+// An opened device goes on where the slot's last one stopped; starts its thread. False with a fault where there is none to start.
+static bool start_slot(HandSlot *slot, const HidDeviceInfo *device, const DeviceMap *map, const MapState *fresh, const char *name, Faults *faults)
 {
-    char name[96], why[320] = "";
-    MapState state;
-    device_name(device, name, sizeof name);
-    Slot *slot = slot_for(hands, device);
-    if (!slot) {
-        faults_add(faults, name, 0, 0, "at most %d devices drive the tool", HANDS_MOST);
-        return false;
+    HandShared *shared = slot->shared;
+    bool is_back = slot->is_used;
+    MapState state = *fresh;
+    if (is_back && slot->map == map) {
+        memcpy(state.axis_state, slot->state.axis_state, sizeof state.axis_state);
+        state.reports = slot->state.reports;
+        state.bad_reports = slot->state.bad_reports;
     }
+    slot->state = state;
+    slot->identity = *device;
+    slot->map = map;
+    slot->is_used = true;
+    atomic_store(&slot->has_ended, false);
+    pthread_mutex_lock(&shared->lock);
+    snprintf(slot->info.name, sizeof slot->info.name, "%s", name);
+    snprintf(slot->info.map, sizeof slot->info.map, "%s", map->name);
+    slot->info.vendor_id = device->vendor_id;
+    slot->info.product_id = device->product_id;
+    pthread_mutex_unlock(&shared->lock);
+    slot->has_thread = pthread_create(&slot->thread, NULL, slot->encoder ? hand_run_encoder : hand_run_hid, slot) == 0;
+    if (slot->has_thread)
+        hand_say(shared, is_back ? "%s is back (map '%s')" : "%s drives the tool (map '%s')", name, map->name);
+    else
+        faults_add(faults, name, 0, 0, "no thread for it");
+    return slot->has_thread;
+}
+
+static bool connect_hid(Hands *hands, HandSlot *slot, const HidDeviceInfo *device, const DeviceMap *map, const char *name, Faults *faults)
+{
+    const HidTransport *transport = &hands->shared.transport;
+    char why[320] = "";
+    MapState state;
     HidDescriptor *descriptor = read_descriptor(hands, device, name, faults);
     if (descriptor && map == hands->built_in[BUILT_IN_HID_JOYSTICK] && pid_is_haptic(descriptor))
         map = hands->built_in[BUILT_IN_HID_HAPTIC];
@@ -279,38 +159,38 @@ static bool connect_device(Hands *hands, const HidDeviceInfo *device, const Devi
         free(descriptor);
         return false;
     }
-    void *opened = hands->transport.open(hands->transport.context, device->path, why, sizeof why);
+    void *opened = transport->open(transport->context, device->path, why, sizeof why);
     if (!opened) {
         faults_add(faults, name, 0, 0, "%s", why);
         free(descriptor);
         return false;
     }
-    bool is_back = slot->is_used;
-    if (is_back) {    // ways and numbers go on
-        memcpy(state.axis_state, slot->state.axis_state, sizeof state.axis_state);
-        state.reports = slot->state.reports;
-        state.bad_reports = slot->state.bad_reports;
-    }
     free(slot->descriptor);
     slot->descriptor = descriptor;
-    slot->state = state;
-    slot->identity = *device;
-    slot->map = map;
     slot->device = opened;
-    slot->is_used = true;
-    atomic_store(&slot->has_ended, false);
-    pthread_mutex_lock(&hands->lock);
-    snprintf(slot->info.name, sizeof slot->info.name, "%s", name);
-    snprintf(slot->info.map, sizeof slot->info.map, "%s", map->name);
-    pthread_mutex_unlock(&hands->lock);
-    slot->has_thread = pthread_create(&slot->thread, NULL, run_device, slot) == 0;
-    if (!slot->has_thread) {
-        hands->transport.close(hands->transport.context, opened);
-        faults_add(faults, name, 0, 0, "no thread for it");
+    if (start_slot(slot, device, map, &state, name, faults))
+        return true;
+    transport->close(transport->context, opened);
+    slot->device = NULL;
+    return false;
+}
+
+static bool connect_encoder(Hands *hands, HandSlot *slot, const HidDeviceInfo *device, const DeviceMap *map, const char *name, Faults *faults)
+{
+    char why[320] = "";
+    MapState state;
+    if (!map_bind_plain(map, map->serial.count_count, 0, name, &state, faults))
+        return false;
+    slot->encoder = usb_encoder_open(hands->usb, device->path, &map->serial, why, sizeof why);
+    if (!slot->encoder) {
+        faults_add(faults, name, 0, 0, "%s", why);
         return false;
     }
-    say(hands, is_back ? "%s is back (map '%s')" : "%s drives the tool (map '%s')", name, map->name);
-    return true;
+    if (start_slot(slot, device, map, &state, name, faults))
+        return true;
+    usb_encoder_close(slot->encoder);
+    slot->encoder = NULL;
+    return false;
 }
 
 static bool is_connected(const Hands *hands, const HidDeviceInfo *device)
@@ -321,41 +201,78 @@ static bool is_connected(const Hands *hands, const HidDeviceInfo *device)
     return false;
 }
 
-static void try_device(Hands *hands, const HidDeviceInfo *device)
+static void tell_refusal(Hands *hands, const HidDeviceInfo *device, const Faults *faults)
 {
-    const DeviceMap *map = is_connected(hands, device) ? NULL : choose_map(hands, device);
-    if (!map)
-        return;
-    Faults faults;
-    faults_clear(&faults);
-    if (connect_device(hands, device, map, &faults))
-        return;
-    // permissions come a moment after the device: it is tried at each look and told at the second
     Refusal *refusal = refusal_of(hands, device);
     if (!refusal)
         return;
     refusal->is_listed = true;
-    if (++refusal->attempts == 2)
-        for (int i = 0; i < faults.count && i < 4; i++)
-            say(hands, "not used: %s", faults.text[i]);
-    else if (refusal->attempts > 1000)
-        refusal->attempts = 3;
+    refusal->attempts += refusal->attempts < 3;
+    // permissions come a moment after the device: it is tried at each look and told at the second
+    for (int i = 0; refusal->attempts == 2 && i < faults->count && i < 4; i++)
+        hand_say(&hands->shared, "not used: %s", faults->text[i]);
+}
+
+static void try_device(Hands *hands, const HidDeviceInfo *device, const DeviceMap *map, bool is_encoder)
+{
+    if (!map || is_connected(hands, device))
+        return;
+    Faults faults;
+    char name[96];
+    faults_clear(&faults);
+    device_name(device, name, sizeof name);
+    HandSlot *slot = slot_for(hands, device);
+    if (!slot)
+        faults_add(&faults, name, 0, 0, "at most %d devices drive the tool", HANDS_MOST);
+    else if (is_encoder ? connect_encoder(hands, slot, device, map, name, &faults) : connect_hid(hands, slot, device, map, name, &faults))
+        return;
+    tell_refusal(hands, device, &faults);
+}
+
+static const DeviceMap *encoder_map(const Hands *hands, const UsbDeviceInfo *device)
+{
+    for (int i = 0; i < hands->map_count; i++)
+        if (usb_encoder_fits(hands->map[i], device))
+            return hands->map[i];
+    return NULL;
+}
+
+static void look_for_encoders(Hands *hands)
+{
+    UsbDeviceInfo found[HANDS_MOST * 2];
+    bool is_wanted = false;
+    for (int i = 0; i < hands->map_count; i++)
+        is_wanted |= hands->map[i]->device.kind == MAP_FTDI;
+    if (!hands->use_usb || !is_wanted)
+        return;
+    if (!hands->usb && !hands->has_tried_usb && !(hands->usb = usb_context_open()))
+        hand_say(&hands->shared, "USB encoders cannot be used: libusb does not start");
+    hands->has_tried_usb = true;
+    int count = hands->usb ? usb_encoder_list(hands->usb, found, HANDS_MOST * 2) : 0;
+    for (int i = 0; i < count; i++) {
+        HidDeviceInfo device = {.vendor_id = found[i].vendor_id, .product_id = found[i].product_id, .interface_number = -1};
+        snprintf(device.path, sizeof device.path, "%.31s", found[i].path);
+        snprintf(device.serial, sizeof device.serial, "%.63s", found[i].serial);
+        snprintf(device.product, sizeof device.product, "%.95s", found[i].product);
+        try_device(hands, &device, encoder_map(hands, &found[i]), true);
+    }
 }
 
 static void look_for_devices(Hands *hands)
 {
     for (int i = 0; i < HANDS_MOST; i++) {
-        Slot *slot = &hands->slot[i];
+        HandSlot *slot = &hands->slot[i];
         if (slot->has_thread && atomic_load(&slot->has_ended)) {
             pthread_join(slot->thread, NULL);
             slot->has_thread = false;
         }
     }
-    int count = hands->transport.list(hands->transport.context, hands->listed, DEVICES_LISTED);
     for (int i = 0; i < DEVICES_LISTED; i++)
         hands->refusal[i].is_listed = false;
+    int count = hands->shared.transport.list(hands->shared.transport.context, hands->listed, DEVICES_LISTED);
     for (int i = 0; i < count; i++)
-        try_device(hands, &hands->listed[i]);
+        try_device(hands, &hands->listed[i], choose_map(hands, &hands->listed[i]), false);
+    look_for_encoders(hands);
     for (int i = 0; i < DEVICES_LISTED; i++)
         if (!hands->refusal[i].is_listed)
             hands->refusal[i].attempts = 0;
@@ -364,14 +281,14 @@ static void look_for_devices(Hands *hands)
 static void *run_scanner(void *argument)
 {
     Hands *hands = argument;
-    while (!atomic_load(&hands->quit)) {
+    while (!atomic_load(&hands->shared.quit)) {
         look_for_devices(hands);
-        int64_t wake = now_us() + 1000 * (int64_t)hands->rescan_ms;
+        int64_t wake = hand_now_us() + 1000 * (int64_t)hands->rescan_ms;
         struct timespec until = {.tv_sec = wake / 1000000, .tv_nsec = wake % 1000000 * 1000};
-        pthread_mutex_lock(&hands->lock);
-        while (!atomic_load(&hands->quit) && pthread_cond_timedwait(&hands->wake, &hands->lock, &until) == 0)
+        pthread_mutex_lock(&hands->shared.lock);
+        while (!atomic_load(&hands->shared.quit) && pthread_cond_timedwait(&hands->shared.wake, &hands->shared.lock, &until) == 0)
             continue;
-        pthread_mutex_unlock(&hands->lock);
+        pthread_mutex_unlock(&hands->shared.lock);
     }
     return NULL;
 }
@@ -406,18 +323,19 @@ Hands *hands_open(const HandsOptions *options, Faults *faults)
     // waits must not depend on the wall clock being set
     pthread_condattr_init(&attributes);
     pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
-    pthread_mutex_init(&hands->lock, NULL);
-    pthread_cond_init(&hands->wake, &attributes);
+    pthread_mutex_init(&hands->shared.lock, NULL);
+    pthread_cond_init(&hands->shared.wake, &attributes);
     pthread_condattr_destroy(&attributes);
     hands->rescan_ms = options->rescan_ms > 0 ? options->rescan_ms : 500;
     hands->use_built_in = options->use_built_in;
+    hands->use_usb = options->use_usb;
     for (int i = 0; i < HANDS_MOST; i++)
-        hands->slot[i].hands = hands;
+        hands->slot[i].shared = &hands->shared;
     if (!options->transport)
         hands->own_transport = hid_transport_hidapi();
     const HidTransport *transport = options->transport ? options->transport : hands->own_transport;
     if (transport)
-        hands->transport = *transport;
+        hands->shared.transport = *transport;
     hands->has_scanner = transport && copy_maps(hands, options) && pthread_create(&hands->scanner, NULL, run_scanner, hands) == 0;
     if (!hands->has_scanner) {
         faults_add(faults, "devices", 0, 0, "%s", transport ? "no memory or no thread to look for them" : "hidapi cannot be started");
@@ -431,10 +349,10 @@ void hands_close(Hands *hands)
 {
     if (!hands)
         return;
-    pthread_mutex_lock(&hands->lock);
-    atomic_store(&hands->quit, true);
-    pthread_cond_broadcast(&hands->wake);
-    pthread_mutex_unlock(&hands->lock);
+    pthread_mutex_lock(&hands->shared.lock);
+    atomic_store(&hands->shared.quit, true);
+    pthread_cond_broadcast(&hands->shared.wake);
+    pthread_mutex_unlock(&hands->shared.lock);
     if (hands->has_scanner)
         pthread_join(hands->scanner, NULL);
     for (int i = 0; i < HANDS_MOST; i++) {
@@ -447,34 +365,47 @@ void hands_close(Hands *hands)
     for (int i = 0; i < BUILT_IN_COUNT; i++)
         free(hands->built_in[i]);
     hid_transport_hidapi_free(hands->own_transport);
-    pthread_cond_destroy(&hands->wake);
-    pthread_mutex_destroy(&hands->lock);
+    usb_context_close(hands->usb);
+    pthread_cond_destroy(&hands->shared.wake);
+    pthread_mutex_destroy(&hands->shared.lock);
     free(hands);
 }
 
 HandPort *hands_port(Hands *hands, int index) { return index >= 0 && index < HANDS_MOST ? &hands->slot[index].port : NULL; }
 
-void hands_pause(Hands *hands, bool paused) { atomic_store(&hands->paused, paused); }
+void hands_pause(Hands *hands, bool paused) { atomic_store(&hands->shared.paused, paused); }
 
 void hands_info(Hands *hands, int index, HandInfo *info)
 {
     *info = (HandInfo){.state = HAND_ABSENT};
     if (index < 0 || index >= HANDS_MOST)
         return;
-    pthread_mutex_lock(&hands->lock);
+    pthread_mutex_lock(&hands->shared.lock);
     *info = hands->slot[index].info;
-    pthread_mutex_unlock(&hands->lock);
+    pthread_mutex_unlock(&hands->shared.lock);
+}
+
+bool hands_drives(Hands *hands, int vendor_id, int product_id)
+{
+    bool drives = false;
+    pthread_mutex_lock(&hands->shared.lock);
+    for (int i = 0; i < HANDS_MOST; i++) {
+        const HandInfo *info = &hands->slot[i].info;
+        drives |= info->state != HAND_ABSENT && info->vendor_id == vendor_id && info->product_id == product_id;
+    }
+    pthread_mutex_unlock(&hands->shared.lock);
+    return drives;
 }
 
 bool hands_message(Hands *hands, char *text, size_t capacity)
 {
-    pthread_mutex_lock(&hands->lock);
-    bool any = hands->message_count > 0;
+    pthread_mutex_lock(&hands->shared.lock);
+    bool any = hands->shared.message_count > 0;
     if (any) {
-        snprintf(text, capacity, "%s", hands->message[hands->message_first]);
-        hands->message_first = (hands->message_first + 1) % MESSAGES_KEPT;
-        hands->message_count--;
+        snprintf(text, capacity, "%s", hands->shared.message[hands->shared.message_first]);
+        hands->shared.message_first = (hands->shared.message_first + 1) % MESSAGES_KEPT;
+        hands->shared.message_count--;
     }
-    pthread_mutex_unlock(&hands->lock);
+    pthread_mutex_unlock(&hands->shared.lock);
     return any;
 }

@@ -41,6 +41,7 @@ void hands_pause(Hands *hands, bool paused);
 typedef struct HandInfo {
     HandState state;
     char name[96];                   // product, "" while absent
+    int vendor_id, product_id;
     char map[MAP_NAME];
     char force[160];                 // "constant force, 255 steps for 8 N" or why there is none
     int64_t reports, bad_reports;    // read; short or of unknown id
@@ -48,6 +49,9 @@ typedef struct HandInfo {
     double force_n;                  // sent now
 } HandInfo;
 void hands_info(Hands *hands, int index, HandInfo *info);    // any thread but the 1 kHz one (takes a lock)
+
+// Whether a port here belongs to this device: then GLFW's joystick of the same ids is left alone, or it would count twice (gamepad_ids_of_guid).
+bool hands_drives(Hands *hands, int vendor_id, int product_id);
 
 // The first of `map` (NULL entries are passed over) that fits a HID device.
 const DeviceMap *hands_choose_map(const DeviceMap *const *map, int count, const HidDeviceInfo *device);

@@ -1,0 +1,171 @@
+#include "input/hand_slot.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+enum { READ_WAIT_MS = 50, FORCE_WAIT_MS = 1, DRAIN_MOST = 512, INFO_US = 50000, COUNT_RATE_US = 1000000 };
+
+int64_t hand_now_us(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+void hand_say(HandShared *shared, const char *format, ...)
+{
+    va_list arguments;
+    pthread_mutex_lock(&shared->lock);
+    if (shared->message_count == MESSAGES_KEPT) {    // the oldest gives way
+        shared->message_first = (shared->message_first + 1) % MESSAGES_KEPT;
+        shared->message_count--;
+    }
+    char *text = shared->message[(shared->message_first + shared->message_count++) % MESSAGES_KEPT];
+    va_start(arguments, format);
+    vsnprintf(text, MESSAGE_LENGTH, format, arguments);
+    va_end(arguments);
+    pthread_mutex_unlock(&shared->lock);
+}
+
+static void update_info(HandSlot *slot, HandState state, double report_hz)
+{
+    atomic_store(&slot->port.state, state);
+    pthread_mutex_lock(&slot->shared->lock);
+    slot->info.state = state;
+    slot->info.reports = slot->state.reports;
+    slot->info.bad_reports = slot->state.bad_reports;
+    slot->info.report_hz = report_hz;
+    slot->info.force_n = state == HAND_READY ? slot->force.guard.sent[0] : 0;
+    pthread_mutex_unlock(&slot->shared->lock);
+}
+
+// All that has come, at most DRAIN_MOST reports, so that a flood cannot keep the thread from its other work. How many; -1: the device is gone.
+static int drain(HandSlot *slot, int wait_ms)
+{
+    const HidTransport *transport = &slot->shared->transport;
+    uint8_t bytes[HID_REPORT_BYTES];
+    int count = 0, length = transport->read(transport->context, slot->device, bytes, (int)sizeof bytes, wait_ms);
+    while (length > 0) {
+        map_take_report(slot->map, slot->descriptor, bytes, (size_t)length, &slot->state);
+        if (++count == DRAIN_MOST)
+            break;
+        length = transport->read(transport->context, slot->device, bytes, (int)sizeof bytes, 0);
+    }
+    if (count > 0)
+        map_publish(slot->map, &slot->state, &slot->port);
+    return length < 0 ? -1 : count;
+}
+
+static void start_force(HandSlot *slot)
+{
+    HandShared *shared = slot->shared;
+    bool plays = force_start(&slot->force, slot->map, slot->descriptor, &shared->transport, slot->device, hand_now_us());
+    pthread_mutex_lock(&shared->lock);
+    snprintf(slot->info.force, sizeof slot->info.force, "%s", slot->force.text);
+    pthread_mutex_unlock(&shared->lock);
+    if (slot->map->force.is_wanted && !plays)
+        hand_say(shared, "%s: force: %s", slot->info.name, slot->force.text);
+}
+
+// A force that the watchdog took away is told, once each time.
+static void tell_watchdog(HandSlot *slot, double sent_before)
+{
+    const char *why = slot->force.guard.why_zero;
+    if (sent_before != 0 && slot->force.guard.sent[0] == 0 && why && why[0] && strcmp(why, "paused") != 0)
+        hand_say(slot->shared, "%s: force to zero, %s%s", slot->info.name, why,
+            strstr(why, "silent") ? " (force: {quiet_ms: 0} in its map where it reports only changes)" : "");
+}
+
+void *hand_run_hid(void *argument)
+{
+    HandSlot *slot = argument;
+    HandShared *shared = slot->shared;
+    int64_t report_us = hand_now_us(), counted_from = report_us, informed = 0, reports_then = slot->state.reports;
+    bool is_there = true, has_told_bad = slot->state.bad_reports > 0;
+    double hz = 0;
+    start_force(slot);
+    int wait_ms = slot->force.block[0] ? FORCE_WAIT_MS : READ_WAIT_MS;
+    while (is_there && !atomic_load(&shared->quit)) {
+        int count = drain(slot, wait_ms);
+        int64_t now = hand_now_us();
+        double sent_before = slot->force.guard.sent[0];
+        is_there = count >= 0;
+        report_us = count > 0 ? now : report_us;
+        if (is_there)
+            force_tick(&slot->force, &slot->port, now, report_us, atomic_load(&shared->paused), &shared->transport, slot->device);
+        tell_watchdog(slot, sent_before);
+        if (now - counted_from >= COUNT_RATE_US) {
+            hz = 1e6 * (double)(slot->state.reports - reports_then) / (double)(now - counted_from);
+            counted_from = now;
+            reports_then = slot->state.reports;
+        }
+        if (!has_told_bad && slot->state.bad_reports > 0) {
+            hand_say(shared, "%s sends reports that its descriptor does not describe (too short or of unknown id); they are left out", slot->info.name);
+            has_told_bad = true;
+        }
+        if (now - informed >= INFO_US) {
+            update_info(slot, HAND_READY, hz);
+            informed = now;
+        }
+    }
+    map_release(slot->map, &slot->state);
+    map_publish(slot->map, &slot->state, &slot->port);
+    if (is_there)
+        force_stop(&slot->force, &shared->transport, slot->device);
+    update_info(slot, HAND_LOST, 0);
+    shared->transport.close(shared->transport.context, slot->device);
+    slot->device = NULL;
+    if (!is_there)
+        hand_say(shared, "%s was unplugged: the tool stops; plug it in again to go on", slot->info.name);
+    atomic_store(&slot->has_ended, true);
+    return NULL;
+}
+
+
+static void take_line(void *context, const EncoderLine *line)
+{
+    HandSlot *slot = context;
+    map_take_counts(slot->map, line->count, line->fresh, ENCODER_COUNTS, &slot->state);
+}
+
+void *hand_run_encoder(void *argument)
+{
+    HandSlot *slot = argument;
+    HandShared *shared = slot->shared;
+    int64_t counted_from = hand_now_us(), informed = 0, reports_then = slot->state.reports, bad_before = slot->state.bad_reports;
+    bool is_there = true, has_told_bad = false;
+    double hz = 0;
+    while (is_there && !atomic_load(&shared->quit)) {
+        int64_t lines = slot->state.reports;
+        is_there = usb_encoder_read(slot->encoder, &slot->map->serial, READ_WAIT_MS, take_line, slot) >= 0;
+        const FtdiStream *stream = usb_encoder_stream(slot->encoder);
+        int64_t now = hand_now_us();
+        slot->state.bad_reports = bad_before + stream->bad_lines + stream->errors;
+        if (slot->state.reports > lines)
+            map_publish(slot->map, &slot->state, &slot->port);
+        if (!has_told_bad && stream->bad_lines > 3 && stream->lines == 0) {
+            hand_say(shared, "%s sends no line of counts as its map says; look at serial: {baud, counts}", slot->info.name);
+            has_told_bad = true;
+        }
+        if (now - counted_from >= COUNT_RATE_US) {
+            hz = 1e6 * (double)(slot->state.reports - reports_then) / (double)(now - counted_from);
+            counted_from = now;
+            reports_then = slot->state.reports;
+        }
+        if (now - informed >= INFO_US) {
+            update_info(slot, HAND_READY, hz);
+            informed = now;
+        }
+    }
+    map_release(slot->map, &slot->state);
+    map_publish(slot->map, &slot->state, &slot->port);
+    update_info(slot, HAND_LOST, 0);
+    usb_encoder_close(slot->encoder);
+    slot->encoder = NULL;
+    if (!is_there)
+        hand_say(shared, "%s was unplugged: the tool stops; plug it in again to go on", slot->info.name);
+    atomic_store(&slot->has_ended, true);
+    return NULL;
+}

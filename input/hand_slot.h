@@ -1,0 +1,47 @@
+// One hand's port and the thread that serves its device: what input/hand.c starts for each device it finds. Internal to input.
+#ifndef SELDINGER_INPUT_HAND_SLOT_H
+#define SELDINGER_INPUT_HAND_SLOT_H
+
+#include "input/force_feedback.h"
+#include "input/hand.h"
+#include "input/map_state.h"
+#include "input/usb_encoder.h"
+
+#include <pthread.h>
+
+enum { MESSAGES_KEPT = 32, MESSAGE_LENGTH = 400 };
+
+// What all threads of a session share.
+typedef struct HandShared {
+    HidTransport transport;
+    pthread_mutex_t lock;            // HandInfo of each slot, and messages
+    pthread_cond_t wake;
+    _Atomic bool quit, paused;
+    char message[MESSAGES_KEPT][MESSAGE_LENGTH];
+    int message_first, message_count;
+} HandShared;
+
+typedef struct HandSlot {
+    HandShared *shared;
+    HandPort port;
+    bool is_used;                    // has had a device
+    HidDeviceInfo identity;          // of a USB encoder: path, ids and serial
+    const DeviceMap *map;
+    MapState state;
+    HidDescriptor *descriptor;       // of a HID device
+    void *device;                    // while its thread runs; NULL for an encoder
+    UsbEncoder *encoder;             // the same of an encoder
+    ForceFeedback force;
+    pthread_t thread;
+    bool has_thread;
+    _Atomic bool has_ended;          // the device went; the scanner joins the thread
+    HandInfo info;                   // under the lock
+} HandSlot;
+
+int64_t hand_now_us(void);
+void hand_say(HandShared *shared, const char *format, ...) __attribute__((format(printf, 2, 3)));
+// Thread functions; the argument is a HandSlot with its device opened. They close it.
+void *hand_run_hid(void *slot);
+void *hand_run_encoder(void *slot);
+
+#endif
