@@ -2,6 +2,7 @@
 
 #include "cli/live_session.h"
 #include "cli/scene_views.h"
+#include "cli/trainer_cine.h"
 #include "cli/trainer_files.h"
 #include "cli/trainer_panel.h"
 #include "input/gamepad.h"
@@ -34,6 +35,7 @@ typedef struct Trainer {
     LiveSession session;
     TrainerPanel shown;
     PulseClock pulses;
+    TrainerCine cine;
     double begun_s;                  // wall clock
     double frame_s, frame_cpu_s;     // … and process CPU time at the last frame
     bool is_paused, has_told_end;
@@ -202,6 +204,21 @@ static void take_screenshot(Trainer *trainer, const WindowInput *input)
     free(rgb);
 }
 
+static void obey_cine(Trainer *trainer, const PanelActions *actions, Faults *faults)
+{
+    char told[600], stem[4096];
+    if (trainer_cine_obey(&trainer->cine, actions, told, sizeof told))
+        fluoroscope_forget(views_fluoroscope(trainer->views));
+    if (*told)
+        say(trainer, MARK_NONE, "%s", told);
+    if (!actions->pressed[ACTION_CINE_SAVE])
+        return;
+    trainer_file_name(trainer->options->folder, trainer->scene->path, "", stem, sizeof stem);
+    bool good = trainer_cine_save(&trainer->cine, trainer->views, stem, told, sizeof told, faults);
+    say(trainer, good ? MARK_GOOD : MARK_WARNING, "%s", told);
+    faults_clear(faults);
+}
+
 static bool restart(Trainer *trainer, Faults *faults)
 {
     bool whole = end_session(trainer, faults);
@@ -237,6 +254,7 @@ static bool obey(Trainer *trainer, const PanelActions *actions, const WindowInpu
         window_set_full_screen(trainer->window, !window_is_full_screen(trainer->window));
     if (actions->pressed[ACTION_SCREENSHOT])
         take_screenshot(trainer, input);
+    obey_cine(trainer, actions, faults);
     if (actions->pressed[ACTION_RESTART] && !restart(trainer, faults))
         return false;
     return !actions->pressed[ACTION_QUIT] && input->close != WINDOW_ENDED;
@@ -277,7 +295,7 @@ static void show_devices(Trainer *trainer)
     }
 }
 
-static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *layout, const XrayControl *xray)
+static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *layout, const XrayControl *xray, double passed_s)
 {
     const Moment *moment = realtime_moment(trainer->session.realtime);
     if (!moment)
@@ -287,6 +305,7 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
     pulse_clock_advance(&trainer->pulses, pose->time_s, &pose->xray);
     ViewsFrame frame = {.pose = pose, .xray = xray, .contrast = lesson->node_count > 0 ? lesson->concentration : NULL,
                         .pulse = (uint32_t)trainer->pulses.count, .look = &trainer->desk.look};
+    trainer_cine_frame(&trainer->cine, passed_s, &frame);
     views_draw(trainer->views, &frame, layout, input->width, input->height, 0);
     trainer_panel_show(&trainer->shown, trainer->scene, pose, lesson, &moment->figures, xray);
     PanelState *state = &trainer->shown.state;
@@ -299,6 +318,13 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
     state->has_arrows = trainer->desk.look.show_arrows;
     state->is_pedal_latched = trainer->desk.pedal_latched;
     state->is_roadmap_ready = fluoroscope.has_roadmap;
+    state->is_recording_cine = cine_is_recording(trainer->cine.cine);
+    state->cine_frames = cine_count(trainer->cine.cine);
+    if (trainer->cine.is_shown) {
+        state->mode = PANEL_CINE;
+        state->cine_frame = trainer->cine.player.frame;
+        state->xray = *frame.xray;
+    }
     state->frame_ms = 1000 * histogram_quantile(&trainer->frame_cpu_ns, 0.5) * 1e-9;
     tell_news(trainer, moment);
     show_devices(trainer);
@@ -333,7 +359,7 @@ static void run_window(Trainer *trainer, Faults *faults)
 {
     const WindowInput *input;
     PanelActions actions = {0};
-    double last = since_begin(trainer);
+    double last = since_begin(trainer), drawn = last;
     for (bool goes_on = true; goes_on;) {
         bool visible = window_next_frame(trainer->window, &input);
         double now = since_begin(trainer);
@@ -349,7 +375,8 @@ static void run_window(Trainer *trainer, Faults *faults)
         if (!goes_on || !visible)
             continue;
         layout = panel_layout(input->width, input->height, input->scale, trainer->desk.view, panel_has_panels(trainer->panel));
-        draw(trainer, input, &layout, &xray);
+        draw(trainer, input, &layout, &xray, now - drawn);
+        drawn = now;
         window_swap(trainer->window);
         measure_frame(trainer);
     }
@@ -398,6 +425,15 @@ static bool open_window(Trainer *trainer, Faults *faults)
     return true;
 }
 
+static bool open_cine(Trainer *trainer, Faults *faults)
+{
+    int nodes = simulator_state(trainer->session.simulator)->node_count, vessel_nodes = trainer->open->tree ? trainer->open->tree->node_count : 0;
+    if (trainer_cine_open(&trainer->cine, nodes, vessel_nodes, trainer->options->cine, faults))
+        return true;
+    end_session(trainer, faults);
+    return false;
+}
+
 int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, TrainerFigures *figures, Faults *faults)
 {
     Trainer *trainer = calloc(1, sizeof *trainer);
@@ -408,7 +444,8 @@ int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, T
     }
     *trainer = (Trainer){.options = options, .scene = scene, .open = open, .figures = figures, .begun_s = clock_s(CLOCK_MONOTONIC)};
     snprintf(trainer->trainee, sizeof trainer->trainee, "%s", options->trainee);
-    if (open_window(trainer, faults) && open_views(trainer, faults) && open_hands(trainer, faults) && begin_session(trainer, options->resume, faults)) {
+    if (open_window(trainer, faults) && open_views(trainer, faults) && open_hands(trainer, faults) &&
+        begin_session(trainer, options->resume, faults) && open_cine(trainer, faults)) {
         run_window(trainer, faults);
         bool is_open = trainer->session.realtime != NULL;
         const Moment *moment = is_open ? realtime_moment(trainer->session.realtime) : NULL;
@@ -425,6 +462,7 @@ int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, T
         free(trainer->built_in[i]);
     if (trainer->window)
         views_destroy(trainer->views);
+    trainer_cine_close(&trainer->cine);
     panel_destroy(trainer->panel);
     if (trainer->window)
         window_destroy(trainer->window);

@@ -18,6 +18,7 @@ typedef struct TrainerOptions {
     bool has_built_in_maps;
     const RecordedRun *resume;       // NULL, or go on from there …
     double resume_s;
+    const char *cine;                // NULL, or a cine loop to begin with
     int width, height;
     PanelView view;
     bool is_full_screen;
