@@ -9,7 +9,7 @@
 //   short            one report of 2 bytes, where the descriptor says 6
 //   unplug | plug    destroys the device, creates it again
 //   wait WHAT [N]    answers when WHAT has happened: opened, closed, force (the device plays one), rest (none any more), reports (N more have
-//                    gone out), written (N output and feature reports have come in all); gives up after 60 s
+//                    gone out), written (N output and feature reports have come in all); gives up after 25 s
 //   quit
 // LOG: one event a line, `TIME_US KIND ...`: axis X (when it changes), force F (what the motor does, when it changes), effect ... and fault TEXT
 // (a report that the device class definition does not allow, USB HID PID 1.0: an effect that was never created, a wrong length ...).
@@ -31,7 +31,7 @@
 
 enum { INPUT = 1, SET_EFFECT = 2, SET_CONSTANT = 5, OPERATION = 10, BLOCK_FREE = 11, CONTROL = 12, DEVICE_GAIN = 13 };   // ids of input and output reports
 enum { CREATE_NEW = 16, BLOCK_LOAD = 17, POOL = 18 };                                                                   // of feature reports
-enum { EFFECTS = 4, CONSTANT_FORCE = 1, INPUT_SIZE = 6, GIVE_UP_MS = 60000 };
+enum { EFFECTS = 4, CONSTANT_FORCE = 1, INPUT_SIZE = 6, GIVE_UP_MS = 25000 };
 
 static const unsigned char descriptor[] = {
     0x05, 0x01, 0x09, 0x04, 0xa1, 0x01,                                     // Generic Desktop, Joystick, application
@@ -78,8 +78,9 @@ static const unsigned char descriptor[] = {
 typedef struct {
     bool made, configured, running;
     int gain, magnitude;
+    int duration_ms;         // 0: for ever
     double along_x;          // which part of a magnitude > 0 pushes the stick to greater X
-    long long ends_us;       // 0: never
+    long long ends_us;       // while it runs; 0: never
 } Effect;
 
 typedef struct {
@@ -203,6 +204,7 @@ static void operate(Device *device, Effect *effect, int operation)
     if (operation == 2)
         for (int i = 1; i <= EFFECTS; i++) device->effects[i].running = false;
     effect->running = operation == 1 || operation == 2;
+    effect->ends_us = effect->duration_ms ? now_us() + effect->duration_ms * 1000LL : 0;
 }
 
 static void control(Device *device, int what)
@@ -241,7 +243,7 @@ static void take_output(Device *device, const unsigned char *bytes, int size)
         // the direction is where a force comes from, clockwise from north (DirectInput; Linux's FF says the same the other way round): 90 degrees pushes
         // to the left
         effect->along_x = bytes[9] & 2 ? -sin((word(bytes + 10) & 0xffff) / 100.0 * 3.14159265358979 / 180) : -(bytes[9] & 1);
-        effect->ends_us = duration == 0 || duration == 0xffff ? 0 : now_us() + duration * 1000LL;
+        effect->duration_ms = duration == 0xffff ? 0 : duration;
         if (bytes[2] != CONSTANT_FORCE) note(device, "fault effect type %d", bytes[2]);
         note(device, "effect %d lasts %d ms gain %d axes %d direction %d", bytes[1], duration, effect->gain, bytes[9] & 3, word(bytes + 10) & 0xffff);
     } else if (bytes[0] == SET_CONSTANT) {
@@ -341,6 +343,7 @@ static bool obey(Device *device, char *line)
     if (sscanf(line, "%15s", verb) != 1) return true;
     const char *rest = line + strspn(line, " ") + strlen(verb);
     bool good = true;
+    double took = 0;
     if (!strcmp(verb, "quit")) return false;
     if (!strcmp(verb, "axis") && sscanf(rest, "%ld %ld", &a, &b) == 2) {
         device->base = (int)a;
@@ -350,14 +353,16 @@ static bool obey(Device *device, char *line)
     else if (!strcmp(verb, "flood") && sscanf(rest, "%ld", &a) == 1) {
         long long begin = now_us();
         for (long i = 0; i < a; i++) send_report(device, i + 1 < a ? device->dial : 0, INPUT_SIZE);
-        printf("flood of %ld reports in %.3f s\n", a, (double)(now_us() - begin) / 1e6);
+        took = (double)(now_us() - begin) / 1e6;
     } else if (!strcmp(verb, "short")) send_report(device, 0, 2);
     else if (!strcmp(verb, "unplug") && device->plugged) unplug(device);
     else if (!strcmp(verb, "plug") && !device->plugged) plug(device);
     else if (!strcmp(verb, "wait") && sscanf(rest, "%15s %ld", what, &a) >= 1) good = wait_for(device, what, a);
     else good = false;
     fflush(device->log);
-    printf("%s: %s, %ld reports sent, %ld received, force %d\n", verb, good ? "done" : "FAILED", device->reports, device->written, device->force);
+    printf("%s: %s, %ld reports sent, %ld received, force %d", verb, good ? "done" : "FAILED", device->reports, device->written, device->force);
+    if (took > 0) printf(", took %.2f s", took);
+    printf("\n");
     fflush(stdout);
     return true;
 }
