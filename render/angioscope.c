@@ -337,7 +337,8 @@ bool angioscope_view(const Angioscope *scope, const Pose *pose, AngioscopeView *
         up = across(vec3_add_scaled(up, weight, normal), forward, up);
     }
     Vec3 eye = vec3_add_scaled(behind, beside, up);
-    for (int k = 0; k < 4 && wall_at(scope, eye, node, 2 * room, &gap, &normal) && gap < margin; k++)
+    // a tool inside the vessel puts it outside by less than `room`; one that has left it is not brought back
+    for (int k = 0; k < 4 && wall_at(scope, eye, node, 2 * room, &gap, &normal) && gap < margin && gap > -room; k++)
         eye = vec3_add_scaled(eye, margin - gap, normal);
     *view = (AngioscopeView){.eye = eye, .right = vec3_cross(forward, up), .up = up, .forward = forward, .half_angle_tan = tan(half_angle)};
     return vec3_is_finite(eye);

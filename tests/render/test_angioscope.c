@@ -1,0 +1,369 @@
+// Angioscopy, pixel by pixel: an exact tube is evenly round, its far end lies where its axis is seen, mirrored scenes give mirrored pictures, normals are the
+// vessel's, the eye stays inside; broken input.
+#include "render/angioscope.h"
+#include "view_stage.h"
+
+enum { SIDE = 300 };           // of a square port in the canvas' lower left corner
+
+static const double tool_radius = 0.18;
+
+typedef struct TubeScene {
+    TriangleMesh *mesh;
+    Vessel *vessel;
+    Angioscope *scope;
+} TubeScene;
+
+static TubeScene open_tube(Vec3 start, Vec3 direction, double length, double radius)
+{
+    const TubePiece piece = {.length = length};
+    const TubeOptions tube = {.start = start, .direction = direction, .normal = vec3_normal_to(direction), .radius = radius, .piece_count = 1, .piece = &piece};
+    Faults faults;
+    faults_clear(&faults);
+    char message[256] = "";
+    TubeScene scene = {.mesh = picture_mesh_of_tube(&tube), .vessel = tube_vessel_create(&tube, "tube", &faults)};
+    assert_non_null(scene.mesh);
+    assert_non_null(scene.vessel);
+    scene.scope = angioscope_create(scene.mesh, scene.vessel, NULL, message, sizeof message);
+    if (!scene.scope)
+        fail_msg("%s", message);
+    return scene;
+}
+
+static void close_tube(TubeScene *scene)
+{
+    angioscope_destroy(scene->scope);
+    scene->vessel->destroy(scene->vessel);
+    triangle_mesh_free(scene->mesh);
+}
+
+static ViewPort square(const ViewStage *stage) { return (ViewPort){stage->canvas.framebuffer, 0, 0, SIDE, SIDE}; }
+
+// Of the square port, from its upper left corner.
+static double brightness(StagePixels pixels, double x, double y)
+{
+    const uint8_t *p = pixels[(int)y + STAGE_HEIGHT - SIDE][(int)x];
+    return p[0] + p[1] + p[2];
+}
+
+// Where a direction is seen in the square port.
+static Vec3 seen_at(const AngioscopeView *view, Vec3 direction)
+{
+    double z = vec3_dot(direction, view->forward) * view->half_angle_tan;
+    return vec3(SIDE / 2.0 * (1 + vec3_dot(direction, view->right) / z), SIDE / 2.0 * (1 - vec3_dot(direction, view->up) / z), 0);
+}
+
+// A tool in the tube so that the eye lies on the tube's axis, looking along `look`.
+static Pose *pose_with_eye_at(const TubeScene *scene, Vec3 eye, Vec3 look, AngioscopeView *view)
+{
+    Pose *pose = straight_pose(12, vec3_add_scaled(eye, -11, look), look, vec3_normal_to(look), 1, tool_radius);
+    for (int k = 0; k < 3; k++) {
+        assert_true(angioscope_view(scene->scope, pose, view));
+        Vec3 off = vec3_sub(eye, view->eye);
+        for (int i = 0; i < 12; i++)
+            pose->position[i] = vec3_add(pose->position[i], off);
+    }
+    assert_true(angioscope_view(scene->scope, pose, view));
+    assert_true(vec3_distance(view->eye, eye) < 1e-9);
+    return pose;
+}
+
+static void a_straight_tube_is_evenly_round(void **state)
+{
+    (void)state;
+    ViewStage stage;
+    if (!stage_open(&stage))
+        skip();
+    static StagePixels pixels;
+    const Vec3 direction[3] = {{1, 0, 0}, {0, 0, -1}, {0.48, -0.6, 0.64}};
+    for (int d = 0; d < 3; d++) {
+        Vec3 start = {40, -20, 7};
+        TubeScene scene = open_tube(start, direction[d], 200, 3);
+        AngioscopeView view;
+        Pose *pose = pose_with_eye_at(&scene, vec3_add_scaled(start, 50, direction[d]), direction[d], &view);
+        angioscope_draw(scene.scope, pose, square(&stage));
+        stage_read(&stage, pixels);
+        double last = 1e9;
+        for (double radius = 130; radius >= 10; radius -= 20) {
+            double low = 1e9, high = 0, sum = 0;
+            int count = 0;
+            // the tool comes in from below
+            for (double angle = -20; angle <= 200; angle += 5, count++) {
+                double value = brightness(pixels, SIDE / 2.0 + radius * cos(angle * PI / 180), SIDE / 2.0 - radius * sin(angle * PI / 180));
+                low = fmin(low, value);
+                high = fmax(high, value);
+                sum += value;
+            }
+            // a pixel's width of the falling light, and the mesh's sides: 3 percent and 4 grey levels
+            assert_true(high - low < 0.03 * high + 12);
+            assert_true(sum / count < last);   // the further, the darker
+            last = sum / count;
+        }
+        assert_true(last < 60);
+        // the tool's end is in the picture, below the middle
+        Vec3 tip = seen_at(&view, vec3_sub(pose->position[11], view.eye));
+        assert_true(fabs(tip.x - SIDE / 2.0) < 1 && tip.y > 0.55 * SIDE && tip.y < 0.9 * SIDE);
+        const uint8_t *steel = pixels[STAGE_HEIGHT - 8][SIDE / 2], *wall = pixels[STAGE_HEIGHT - SIDE + 8][SIDE / 2];
+        assert_true(abs(steel[0] - steel[2]) < 30 && wall[0] > wall[2] + 40);
+        pose_free(pose);
+        close_tube(&scene);
+    }
+    stage_close(&stage);
+}
+
+static void the_far_end_lies_where_the_axis_is_seen(void **state)
+{
+    (void)state;
+    ViewStage stage;
+    if (!stage_open(&stage))
+        skip();
+    static StagePixels pixels;
+    const Vec3 axis = {0.48, 0.36, 0.8};
+    TubeScene scene = open_tube(vec3(0, 0, 0), axis, 300, 2.5);
+    const double side[3] = {0, 0.2, -0.3}, below[3] = {0.2, 0.3, 0.1};   // so that the tool, at the lower rim, does not hide it
+    for (int k = 0; k < 3; k++) {
+        AngioscopeView view;
+        Vec3 up = vec3_normal_to(axis), look = vec3_add_scaled(vec3_add_scaled(axis, -below[k], up), side[k], vec3_cross(axis, up));
+        Pose *pose = pose_with_eye_at(&scene, vec3_scale(axis, 60), vec3_unit(look), &view);
+        angioscope_draw(scene.scope, pose, square(&stage));
+        stage_read(&stage, pixels);
+        Vec3 expected = seen_at(&view, axis);
+        double x = 0, y = 0, count = 0;
+        for (int j = 0; j < SIDE; j++)
+            for (int i = 0; i < SIDE; i++)
+                if (brightness(pixels, i, j) < 30) {
+                    x += i + 0.5;
+                    y += j + 0.5;
+                    count++;
+                }
+        assert_true(expected.y < 0.47 * SIDE && count > 40);
+        assert_true(hypot(x / count - expected.x, y / count - expected.y) < 3);
+        pose_free(pose);
+    }
+    close_tube(&scene);
+    stage_close(&stage);
+}
+
+static Vec3 mirror(Vec3 v) { return vec3(-v.x, v.y, v.z); }
+
+static void a_mirrored_scene_gives_a_mirrored_picture(void **state)
+{
+    (void)state;
+    ViewStage stage;
+    if (!stage_open(&stage))
+        skip();
+    static StagePixels one, other;
+    const TubePiece piece[2] = {{.length = 20}, {.arc_radius = 12, .angle = 1.6}};
+    TubeOptions tube = {.start = {3, 0, 0}, .direction = vec3_unit(vec3(0.5, 0.7, 0.2)), .radius = 2, .piece_count = 2, .piece = piece};
+    tube.normal = vec3_unit(vec3_cross(tube.direction, vec3(0.1, 0.2, 0.9)));
+    TubeOptions reflected = tube;
+    reflected.start = mirror(tube.start), reflected.direction = mirror(tube.direction), reflected.normal = mirror(tube.normal);
+    Faults faults;
+    faults_clear(&faults);
+    Vessel *vessel[2] = {tube_vessel_create(&tube, "a", &faults), tube_vessel_create(&reflected, "b", &faults)};
+    TriangleMesh *mesh = picture_mesh_of_tube(&tube);
+    Vec3 up = vec3_unit(vec3_add_scaled(tube.normal, 0.4, vec3_cross(tube.direction, tube.normal)));
+    Vec3 from = vec3_add_scaled(vec3_add_scaled(tube.start, 6, tube.direction), 0.9, tube.normal);
+    Pose *pose = straight_pose(12, from, tube.direction, up, 0.8, tool_radius);
+    for (int side = 0; side < 2; side++) {
+        if (side == 1) {
+            for (int i = 0; i < mesh->vertex_count; i++) {
+                mesh->vertex[i] = mirror(mesh->vertex[i]);
+                mesh->normal[i] = mirror(mesh->normal[i]);
+            }
+            for (int t = 0; t < mesh->triangle_count; t++) {
+                int swap = mesh->triangle[t][1];
+                mesh->triangle[t][1] = mesh->triangle[t][2];
+                mesh->triangle[t][2] = swap;
+            }
+            pose_free(pose);
+            pose = straight_pose(12, mirror(from), mirror(tube.direction), mirror(up), 0.8, tool_radius);
+        }
+        char message[256];
+        Angioscope *scope = angioscope_create(mesh, vessel[side], NULL, message, sizeof message);
+        assert_non_null(scope);
+        angioscope_draw(scope, pose, stage.port);
+        if (side == 0)
+            stage_read(&stage, one);
+        else
+            stage_read(&stage, other);
+        angioscope_destroy(scope);
+    }
+    int differ = 0, lopsided = 0;
+    for (int y = 0; y < STAGE_HEIGHT; y++)
+        for (int x = 0; x < STAGE_WIDTH; x++) {
+            differ += pixel_difference(one[y][x], other[y][STAGE_WIDTH - 1 - x]) > 4;
+            lopsided += pixel_difference(one[y][x], one[y][STAGE_WIDTH - 1 - x]) > 4;
+        }
+    assert_true(lopsided > 20000);                               // it would show if it were not mirrored
+    assert_true(differ < STAGE_WIDTH * STAGE_HEIGHT / 200);      // pixels on edges of triangles
+    pose_free(pose);
+    triangle_mesh_free(mesh);
+    vessel[0]->destroy(vessel[0]);
+    vessel[1]->destroy(vessel[1]);
+    stage_close(&stage);
+}
+
+static void normals_are_the_vessel_s_own(void **state)
+{
+    (void)state;
+    ViewStage stage;
+    if (!stage_open(&stage))
+        skip();
+    static StagePixels exact, bent, lost;
+    TubeScene scene = open_tube(vec3(0, 0, 0), vec3(0, 0, 1), 100, 2);
+    Pose *pose = straight_pose(12, vec3(0.3, 0.2, 30), vec3_unit(vec3(0.1, 0, 1)), vec3(0, 1, 0), 1, tool_radius);
+    angioscope_draw(scene.scope, pose, stage.port);
+    stage_read(&stage, exact);
+    // a mesh whose normals are off by 40 degrees
+    for (int i = 0; i < scene.mesh->vertex_count; i++)
+        scene.mesh->normal[i] = vec3_unit(vec3_add_scaled(scene.mesh->normal[i], i % 2 ? 0.8 : -0.8, vec3(0, 0, 1)));
+    char message[256];
+    const Vessel *vessel[2] = {scene.vessel, NULL};
+    for (int k = 0; k < 2; k++) {
+        Angioscope *scope = angioscope_create(scene.mesh, vessel[k], NULL, message, sizeof message);
+        assert_non_null(scope);
+        angioscope_draw(scope, pose, stage.port);
+        if (k == 0)
+            stage_read(&stage, bent);
+        else
+            stage_read(&stage, lost);
+        angioscope_destroy(scope);
+    }
+    assert_int_equal(count_different(exact, bent, 2), 0);
+    assert_true(count_different(exact, lost, 8) > 20000);
+    pose_free(pose);
+    close_tube(&scene);
+    stage_close(&stage);
+}
+
+static void the_eye_stays_inside_and_sees_the_tip(void **state)
+{
+    (void)state;
+    ViewStage stage;
+    if (!stage_open(&stage))
+        skip();
+    const double lumen[4] = {0.3, 0.6, 1, 4};
+    for (int k = 0; k < 4; k++) {
+        TubeScene scene = open_tube(vec3(0, 0, 0), vec3(0, 1, 0), 60, lumen[k]);
+        AngioscopeView before = {0};
+        double furthest = 0;
+        for (int turn = 0; turn <= 720; turn++) {
+            // the tool lies on the wall and turns: the eye must not sink into the wall
+            double a = turn * PI / 360, off = lumen[k] - tool_radius - 0.01;
+            Pose *pose = straight_pose(20, vec3(off, 10, 0), vec3(0, 1, 0), vec3(cos(a), 0, sin(a)), 1, tool_radius);
+            AngioscopeView view;
+            assert_true(angioscope_view(scene.scope, pose, &view));
+            VesselMemory memory = {.node = -1};
+            VesselHit hit;
+            vessel_query(scene.vessel, 1, &view.eye, 10, &memory, &hit);
+            assert_true(hit.gap > 0.5 * tool_radius);
+            Vec3 tip = seen_at(&view, vec3_sub(pose->position[19], view.eye));
+            assert_true(fabs(tip.x - SIDE / 2.0) < 0.5 * SIDE && tip.y > SIDE / 2.0 - 1 && tip.y < SIDE);
+            assert_true(fabs(vec3_norm(view.up) - 1) < 1e-9 && fabs(vec3_dot(view.up, view.forward)) < 1e-9);
+            if (turn > 0)
+                furthest = fmax(furthest, vec3_distance(view.eye, before.eye));
+            before = view;
+            pose_free(pose);
+        }
+        assert_true(furthest < 0.1);   // half a degree of turn never makes it leap
+        close_tube(&scene);
+    }
+    stage_close(&stage);
+}
+
+static void nothing_breaks_it(void **state)
+{
+    (void)state;
+    ViewStage stage;
+    if (!stage_open(&stage))
+        skip();
+    static StagePixels pixels;
+    TubeScene scene = open_tube(vec3(0, 0, 0), vec3(0, 0, 1), 50, 2);
+    char message[256] = "";
+    Angioscope *empty = angioscope_create(NULL, NULL, NULL, message, sizeof message);
+    assert_non_null(empty);
+    Pose *pose = straight_pose(12, vec3(0, 0, 20), vec3(0, 0, 1), vec3(0, 1, 0), 1, tool_radius);
+    for (int k = 0; k < 8; k++) {
+        bool is_dark = false;
+        switch (k) {
+        case 1:   // far outside of the vessel
+            for (int i = 0; i < 12; i++)
+                pose->position[i].x += 500;
+            is_dark = true;
+            break;
+        case 2:   // just outside
+            for (int i = 0; i < 12; i++)
+                pose->position[i].x -= 497;
+            break;
+        case 3:   // beyond the open end
+            for (int i = 0; i < 12; i++)
+                pose->position[i] = vec3(0, 0, 60 + i);
+            break;
+        case 4:   // in the sheath
+            for (int i = 0; i < 12; i++)
+                pose->position[i] = vec3(0, 0, 10 + i);
+            pose->first_free_node = 11;
+            pose->inserted_mm = 0;
+            is_dark = true;
+            break;
+        case 5:   // all nodes in one place
+            for (int i = 0; i < 12; i++)
+                pose->position[i] = vec3(0, 0, 10);
+            pose->first_free_node = 0;
+            break;
+        case 6:
+            pose->position[11].y = NAN;
+            is_dark = true;
+            break;
+        case 7:
+            pose->position[11].y = 0;
+            pose->quaternion[11].w = NAN;
+            is_dark = true;
+            break;
+        default:
+            break;
+        }
+        const ViewPort port = {stage.canvas.framebuffer, 30, 20, 200, 150}, tiny = {stage.canvas.framebuffer, 0, 0, 1, 1}, none = {0};
+        stage_clear(&stage, 1, 0, 1);
+        angioscope_draw(scene.scope, pose, port);
+        stage_read(&stage, pixels);
+        bool is_lit = false;
+        for (int y = 0; y < STAGE_HEIGHT; y++)
+            for (int x = 0; x < STAGE_WIDTH; x++) {
+                bool is_in_port = x >= 30 && x < 230 && y >= STAGE_HEIGHT - 170 && y < STAGE_HEIGHT - 20;
+                const uint8_t *p = pixels[y][x];
+                assert_true(is_in_port != (p[0] == 255 && p[1] == 0 && p[2] == 255));
+                is_lit |= is_in_port && p[0] > 40 && p[0] > p[2] + 20;
+            }
+        if (is_dark)
+            assert_false(is_lit);
+        if (k == 0 || k == 5)
+            assert_true(is_lit);
+        angioscope_draw(empty, pose, port);
+        angioscope_draw(scene.scope, NULL, port);
+        angioscope_draw(scene.scope, pose, tiny);
+        angioscope_draw(scene.scope, pose, none);
+        assert_int_equal(glGetError(), GL_NO_ERROR);
+    }
+    // a surface that cannot be drawn
+    scene.mesh->triangle[5][2] = -1;
+    assert_null(angioscope_create(scene.mesh, NULL, NULL, message, sizeof message));
+    assert_true(strlen(message) > 0);
+    pose_free(pose);
+    angioscope_destroy(empty);
+    close_tube(&scene);
+    stage_close(&stage);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_straight_tube_is_evenly_round),
+        cmocka_unit_test(the_far_end_lies_where_the_axis_is_seen),
+        cmocka_unit_test(a_mirrored_scene_gives_a_mirrored_picture),
+        cmocka_unit_test(normals_are_the_vessel_s_own),
+        cmocka_unit_test(the_eye_stays_inside_and_sees_the_tip),
+        cmocka_unit_test(nothing_breaks_it),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
