@@ -29,12 +29,14 @@ void gui_destroy(Gui *gui);
 // A frame. `scale` of text and widgets; letters are made anew where it changes by more than a twentieth. `is_silent`: lays out, takes no input and
 // draws nothing (a window's contents are known from its frame before).
 void gui_begin(Gui *gui, const WindowInput *input, double scale, bool is_silent);
-// The last of them draws into `framebuffer`, which is `input->width` x `height` large. Leaves blending and scissor test off.
+// The last of them draws into `framebuffer`, which is `input->width` x `height` large and not multisampled. Leaves blending and scissor test off.
 void gui_end(Gui *gui, unsigned framebuffer);
 float gui_scale(const Gui *gui);        // of the current letters
 
 // Windows at a fixed place. Contents that do not fit scroll. NO_INPUT lets the mouse through; ON_TOP lies over the ones before and takes their clicks.
-enum { GUI_NO_BACKGROUND = 1, GUI_NO_INPUT = 2, GUI_ON_TOP = 4, GUI_SCROLL_TO_END = 8 };
+// KEPT: opaque, overlapping no other but those on top; its pixels are kept and drawn anew only where its contents changed. SELDOM: a kept one whose
+// changes show in every third frame, for figures that nobody reads faster.
+enum { GUI_NO_BACKGROUND = 1, GUI_NO_INPUT = 2, GUI_ON_TOP = 4, GUI_SCROLL_TO_END = 8, GUI_KEPT = 16, GUI_SELDOM = 32 };
 void gui_window_begin(Gui *gui, const char *id, GuiRect at, unsigned flags);
 // The height [pixel] that the contents would need more than there is; negative: still free.
 float gui_window_end(Gui *gui);

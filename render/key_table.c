@@ -13,18 +13,18 @@
 const KeyAction key_table[ACTION_COUNT] = {
     {ACTION_PUSH, GROUP_TOOL, ACTION_HOLD, KEY(UP), "Push", "push the tool into the patient while held"},
     {ACTION_PULL, GROUP_TOOL, ACTION_HOLD, KEY(DOWN), "Pull", "pull the tool back while held"},
-    {ACTION_TWIST_LEFT, GROUP_TOOL, ACTION_HOLD, KEY(LEFT), "Twist left", "turn the tool left (counter-clockwise, seen along the advance) while held"},
-    {ACTION_TWIST_RIGHT, GROUP_TOOL, ACTION_HOLD, KEY(RIGHT), "Twist right", "turn the tool right (clockwise, seen along the advance) while held"},
+    {ACTION_TWIST_LEFT, GROUP_TOOL, ACTION_HOLD, KEY(LEFT), "Twist left", "turn the tool left (counter-clockwise, seen from behind) while held"},
+    {ACTION_TWIST_RIGHT, GROUP_TOOL, ACTION_HOLD, KEY(RIGHT), "Twist right", "turn the tool right (clockwise, seen from behind) while held"},
     {ACTION_FAST, GROUP_TOOL, ACTION_HOLD, KEY(SHIFT), "Fast", "with push, pull or twist: faster"},
     {ACTION_SLOW, GROUP_TOOL, ACTION_HOLD, KEY(CTRL), "Slow", "with push, pull or twist: slower, for the last millimetres"},
-    {ACTION_STOP, GROUP_TOOL, ACTION_HOLD, KEY(SPACE), "Hold tool", "the tool stands still while held, whatever any other hand or device asks for"},
+    {ACTION_STOP, GROUP_TOOL, ACTION_HOLD, KEY(SPACE), "Hold tool", "the tool stands still while held, whatever other hands ask for"},
 
     {ACTION_PEDAL, GROUP_XRAY, ACTION_HOLD, K('F'), "X-ray pedal", "fluoroscopy while held; let go and the last image stays"},
     {ACTION_PEDAL_LATCH, GROUP_XRAY, ACTION_PRESS, K('E'), "X-ray stays on", "fluoroscopy on until pressed again: a pedal for one hand"},
     {ACTION_CONTRAST, GROUP_XRAY, ACTION_HOLD, K('C'), "Inject contrast", "inject contrast agent from the tip while held; X-ray must be on to see it"},
     {ACTION_DSA, GROUP_XRAY, ACTION_PRESS, K('X'), "DSA", "subtract the mask: contrast and tool alone; again for the live image"},
-    {ACTION_ROADMAP, GROUP_XRAY, ACTION_PRESS, K('R'), "Roadmap", "lay the vessels of the last injection over the live image; again to leave it"},
-    {ACTION_MASK, GROUP_XRAY, ACTION_PRESS, K('M'), "Take mask", "take the mask for DSA and roadmap afresh, after the C-arm or table has moved"},
+    {ACTION_ROADMAP, GROUP_XRAY, ACTION_PRESS, K('R'), "Roadmap", "vessels of the last injection over the live image; again: off"},
+    {ACTION_MASK, GROUP_XRAY, ACTION_PRESS, K('M'), "Take mask", "new mask for DSA and roadmap, after C-arm or table have moved"},
     {ACTION_PULSES, GROUP_XRAY, ACTION_PRESS, K('U'), "Pulse rate", "next pulse rate: 7.5, 10, 15, 30 a second"},
     {ACTION_MAGNIFY, GROUP_XRAY, ACTION_PRESS, WINDOW_KEY_KEYPAD_ADD, 0, '+', "Magnify", "smaller field, larger picture"},
     {ACTION_DEMAGNIFY, GROUP_XRAY, ACTION_PRESS, WINDOW_KEY_KEYPAD_SUBTRACT, 0, '-', "Demagnify", "larger field, smaller picture"},
@@ -32,8 +32,8 @@ const KeyAction key_table[ACTION_COUNT] = {
     {ACTION_CINE_REPLAY, GROUP_XRAY, ACTION_PRESS, F(7), "Replay cine", "show the recorded loop; again for the live image"},
     {ACTION_CINE_SAVE, GROUP_XRAY, ACTION_PRESS, F(8), "Save cine", "save the recorded loop as a film"},
 
-    {ACTION_RAO, GROUP_C_ARM, ACTION_HOLD, K('A'), "RAO", "turn the C-arm to the patient's right (right anterior oblique) while held"},
-    {ACTION_LAO, GROUP_C_ARM, ACTION_HOLD, K('D'), "LAO", "turn the C-arm to the patient's left (left anterior oblique) while held"},
+    {ACTION_RAO, GROUP_C_ARM, ACTION_HOLD, K('A'), "RAO", "C-arm to the patient's right (right anterior oblique) while held"},
+    {ACTION_LAO, GROUP_C_ARM, ACTION_HOLD, K('D'), "LAO", "C-arm to the patient's left (left anterior oblique) while held"},
     {ACTION_CRA, GROUP_C_ARM, ACTION_HOLD, K('W'), "CRA", "tilt the C-arm towards the head (cranial) while held"},
     {ACTION_CAU, GROUP_C_ARM, ACTION_HOLD, K('S'), "CAU", "tilt the C-arm towards the feet (caudal) while held"},
     {ACTION_AP, GROUP_C_ARM, ACTION_PRESS, K('0'), "AP 0/0", "C-arm straight from the front: both angles 0"},
@@ -74,7 +74,7 @@ const KeyAction key_table[ACTION_COUNT] = {
     {ACTION_PANELS, GROUP_SESSION, ACTION_PRESS, KEY(TAB), "Panels", "hide or show the panels around the views"},
     {ACTION_HINTS, GROUP_SESSION, ACTION_PRESS, F(9), "Hints", "hide or show the hints at the bottom"},
     {ACTION_HELP, GROUP_SESSION, ACTION_PRESS, WINDOW_KEY_F1, 0, '?', "Help", "this list of keys"},
-    {ACTION_QUIT, GROUP_SESSION, ACTION_PRESS, KEY(ESCAPE), "Quit", "end the session (asks first); closes this list or a dialogue if one is open"},
+    {ACTION_QUIT, GROUP_SESSION, ACTION_PRESS, KEY(ESCAPE), "Quit", "end the session (asks first); closes this list or a dialogue"},
 };
 
 const char *const action_group_name[ACTION_GROUPS] = {"Tool", "X-ray", "C-arm and table", "Views", "Session"};

@@ -307,8 +307,8 @@ void panel_draw(Panel *panel, const WindowInput *input, const PanelState *state,
     panel->layout = layout;
     panel->width = input->width;
     panel->height = input->height;
-    if (is_new)   // how much the contents need is known after they were laid out once
-        for (int i = 0; i < 2; i++) {
+    if (is_new)   // how much the contents need is known after they were laid out, and a scroll bar changes it
+        for (int i = 0; i < 4; i++) {
             gui_begin(panel->gui, input, layout.scale, true);
             panel_draw_all(panel, input, state);
             gui_end(panel->gui, framebuffer);

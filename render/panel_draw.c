@@ -21,10 +21,11 @@ static const char *text_or_empty(const char *text) { return text ? text : ""; }
 // "12.3 mm", a dash for what is not known; never "-0.0".
 static const char *figure(char *text, size_t capacity, double value, int decimals, const char *unit)
 {
+    const char *blank = unit[0] && strncmp(unit, "\u00b0", 2) != 0 ? " " : "";   // 35 mm, but 35\u00b0
     if (isfinite(value))
-        snprintf(text, capacity, "%.*f%s%s", decimals, fabs(value) < 0.5 * pow(10, -decimals) ? 0.0 : value, unit[0] ? " " : "", unit);
+        snprintf(text, capacity, "%.*f%s%s", decimals, fabs(value) < 0.5 * pow(10, -decimals) ? 0.0 : value, blank, unit);
     else
-        snprintf(text, capacity, "\u2013%s%s", unit[0] ? " " : "", unit);
+        snprintf(text, capacity, "\u2013%s%s", blank, unit);
     return text;
 }
 
@@ -87,14 +88,16 @@ const ButtonRow panel_button_row[] = {
     {TAB_XRAY, 3, {ACTION_CINE_RECORD, ACTION_CINE_REPLAY, ACTION_CINE_SAVE}},
     {TAB_XRAY, 3, {ACTION_MAGNIFY, ACTION_DEMAGNIFY, ACTION_PULSES}},
     {TAB_C_ARM, 5, {ACTION_RAO, ACTION_LAO, ACTION_CRA, ACTION_CAU, ACTION_AP}},
-    {TAB_C_ARM, 4, {ACTION_TABLE_LEFT, ACTION_TABLE_RIGHT, ACTION_TABLE_UP, ACTION_TABLE_DOWN}},
+    {TAB_C_ARM, 2, {ACTION_TABLE_LEFT, ACTION_TABLE_RIGHT}},
+    {TAB_C_ARM, 2, {ACTION_TABLE_UP, ACTION_TABLE_DOWN}},
     {TAB_C_ARM, 4, {ACTION_SIDES_CLOSE, ACTION_SIDES_OPEN, ACTION_ENDS_CLOSE, ACTION_ENDS_OPEN}},
     {TAB_VIEWS, 2, {ACTION_VIEW_FLUOROSCOPY, ACTION_VIEW_3D}},
     {TAB_VIEWS, 2, {ACTION_VIEW_ANGIOSCOPY, ACTION_VIEW_ALL}},
     {TAB_VIEWS, 2, {ACTION_CAMERA_RESET, ACTION_CAMERA_FOLLOW}},
     {TAB_VIEWS, 2, {ACTION_MODEL, ACTION_ARROWS}},
     {TAB_VIEWS, 3, {ACTION_SECTION, ACTION_SECTION_NEARER, ACTION_SECTION_FARTHER}},
-    {TAB_VIEWS, 4, {ACTION_ORBIT_LEFT, ACTION_ORBIT_RIGHT, ACTION_ORBIT_UP, ACTION_ORBIT_DOWN}},
+    {TAB_VIEWS, 2, {ACTION_ORBIT_LEFT, ACTION_ORBIT_RIGHT}},
+    {TAB_VIEWS, 2, {ACTION_ORBIT_UP, ACTION_ORBIT_DOWN}},
     {TAB_VIEWS, 2, {ACTION_CAMERA_NEARER, ACTION_CAMERA_FARTHER}},
     {TAB_SESSION, 2, {ACTION_PAUSE, ACTION_RESTART}},
     {TAB_SESSION, 2, {ACTION_BOOKMARK, ACTION_SAVE}},
@@ -232,7 +235,7 @@ static void draw_tab(Panel *panel, const PanelState *state, int tab)
 
 static void draw_right(Panel *panel, const PanelState *state)
 {
-    gui_window_begin(panel->gui, "right", panel->layout.right, 0);
+    gui_window_begin(panel->gui, "right", panel->layout.right, GUI_KEPT);
     if (gui_tabs_begin(panel->gui, "controls")) {
         for (int i = 0; i < PANEL_TABS; i++)
             if (gui_tab_begin(panel->gui, tab_name[i])) {
@@ -277,33 +280,23 @@ static void draw_tool(Panel *panel, const PanelState *state)
     char value[48], other[48];
     heading(panel, "TOOL");
     gui_text_wrapped(panel->gui, GUI_NORMAL, gui_colors.text, text_or_empty(state->tool));
-    row(panel, "Inserted", MARK_NONE, "%s", figure(value, sizeof value, state->inserted_mm, 1, "mm"));
-    row(panel, "Turned", MARK_NONE, "%s", figure(value, sizeof value, state->turned_deg, 0, "\u00b0"));
-    row(panel, "Moves", MARK_NONE, "%s  %s", figure(value, sizeof value, state->push_mm_s, 1, "mm/s"),
+    row(panel, "Inserted", MARK_NONE, "%s at %s", figure(value, sizeof value, state->inserted_mm, 1, "mm"),
+        figure(other, sizeof other, state->push_mm_s, 1, "mm/s"));
+    row(panel, "Turned", MARK_NONE, "%s at %s", figure(value, sizeof value, state->turned_deg, 0, "\u00b0"),
         figure(other, sizeof other, state->twist_deg_s, 0, "\u00b0/s"));
-    if (panel->plots < 3)
-        row(panel, "Wall force, largest", MARK_NONE, "%s", figure(value, sizeof value, 1000 * state->wall_max_n, 0, "mN"));
-    row(panel, "Wall force, sum", MARK_NONE, "%s", figure(value, sizeof value, 1000 * state->wall_sum_n, 0, "mN"));
-    gui_space(panel->gui, 0);
+    row(panel, "Wall, most / sum", MARK_NONE, "%s / %s", figure(value, sizeof value, 1000 * state->wall_max_n, 0, ""),
+        figure(other, sizeof other, 1000 * state->wall_sum_n, 0, "mN"));
     plot_draw(&panel->force, panel->gui, "Push force", "mN", 0, 100, panel->plot_height);
     plot_draw(&panel->torque, panel->gui, "Torque", "N mm", 3, 0.02, panel->plot_height);
     if (panel->plots == 3)
         plot_draw(&panel->wall, panel->gui, "Wall force, largest", "mN", 0, 100, panel->plot_height);
 }
 
-static void draw_machine(Panel *panel, const PanelState *state)
+static void draw_hands(Panel *panel, const PanelState *state)
 {
-    char median[32], high[32], factor[32], frame[32];
-    heading(panel, "SIMULATION");
-    row(panel, "Step, median / p99.9", MARK_NONE, "%s / %s", figure(median, sizeof median, state->step_median_us, 0, ""),
-        figure(high, sizeof high, state->step_p999_us, 0, "\u00b5s"));
-    row(panel, "Real time", state->warnings & (WARN_SLOW | WARN_STALLED) ? MARK_WARNING : MARK_NONE, "\u00d7%s",
-        figure(factor, sizeof factor, state->real_time_factor, 2, ""));
-    row(panel, "Missed deadlines", MARK_NONE, "%lld", (long long)state->missed_deadlines);
-    row(panel, "Drawing", MARK_NONE, "%s", figure(frame, sizeof frame, state->frame_ms, 1, "ms a frame"));
-    heading(panel, "HANDS");
     static const char *const device_state[] = {"not there", "ready", "lost"};
     static const PanelMark device_mark[] = {MARK_NONE, MARK_GOOD, MARK_BAD};
+    heading(panel, "HANDS");
     for (int i = 0; i < state->device_count; i++) {
         const PanelDevice *device = &state->device[i];
         row(panel, text_or_empty(device->name), device_mark[device->state], "%s", device_state[device->state]);
@@ -317,12 +310,12 @@ static void draw_machine(Panel *panel, const PanelState *state)
 static void draw_left(Panel *panel, const PanelState *state)
 {
     float s = gui_scale(panel->gui);
-    gui_window_begin(panel->gui, "left", panel->layout.left, 0);
+    gui_window_begin(panel->gui, "left", panel->layout.left, GUI_KEPT | GUI_SELDOM);
     draw_exercise(panel, state);
     draw_tool(panel, state);
-    draw_machine(panel, state);
+    draw_hands(panel, state);
     // the plots take what the rest leaves
-    float room = panel->plot_height * (float)panel->plots - gui_window_end(panel->gui);
+    float room = panel->plot_height * (float)panel->plots - gui_window_end(panel->gui) - 2;
     panel->plots = room >= 3 * 70 * s ? 3 : 2;
     panel->plot_height = floorf(fminf(fmaxf(room / (float)panel->plots, 44 * s), 120 * s));
 }
@@ -342,18 +335,22 @@ static void badge(Panel *panel, const char *text, Color ground, Color letters)
 static void draw_top(Panel *panel, const PanelState *state)
 {
     Gui *gui = panel->gui;
-    float s = gui_scale(gui), gap = floorf(8 * s), buttons = floorf(3 * 84 * s + 2 * gap), badges = floorf(300 * s);
-    GuiRect top = panel->layout.top;
+    float s = gui_scale(gui), gap = floorf(8 * s), button = floorf(88 * s);
+    GuiRect title = panel->layout.top, badges = title, session = title;
+    session.width = floorf(3 * button + 2 * gap + 20 * s);
+    session.x = title.width - session.width;
+    badges.width = floorf(330 * s);
+    badges.x = session.x - badges.width;
+    title.width = badges.x;
     char text[200], time[32];
-    gui_window_begin(gui, "title", (GuiRect){top.x, top.y, top.width - buttons - badges - 3 * gap, top.height}, GUI_NO_INPUT);
-    snprintf(text, sizeof text, "%s", text_or_empty(state->title)[0] ? state->title : "Seldinger");
-    gui_text(gui, GUI_LARGE, gui_colors.text, text);
+    gui_window_begin(gui, "title", title, GUI_NO_INPUT | GUI_KEPT);
+    gui_text(gui, GUI_LARGE, gui_colors.text, text_or_empty(state->title)[0] ? state->title : "Seldinger");
     if (text_or_empty(state->trainee)[0]) {
         gui_beside(gui, 2 * gap);
         gui_text(gui, GUI_LARGE, gui_colors.dim, state->trainee);
     }
     gui_window_end(gui);
-    gui_window_begin(gui, "badges", (GuiRect){top.width - buttons - badges - 3 * gap, top.y, badges + 3 * gap, top.height}, GUI_NO_INPUT);
+    gui_window_begin(gui, "badges", badges, GUI_NO_INPUT | GUI_KEPT);
     if (state->xray.pedal > 0)
         badge(panel, "\u25cf X-RAY ON", gui_colors.warning, gui_colors.window);
     else
@@ -364,34 +361,21 @@ static void draw_top(Panel *panel, const PanelState *state)
     snprintf(text, sizeof text, "%s%s", state->is_paused ? "PAUSED " : "", minutes(time, sizeof time, state->time_s));
     badge(panel, text, state->is_paused ? gui_colors.warning : gui_colors.frame, state->is_paused ? gui_colors.window : gui_colors.text);
     gui_window_end(gui);
-    gui_window_begin(gui, "session", (GuiRect){top.width - buttons - 2 * gap, top.y, buttons + 2 * gap, top.height}, 0);
+    gui_window_begin(gui, "session", session, GUI_KEPT);
     static const ActionId action[] = {ACTION_PAUSE, ACTION_HELP, ACTION_QUIT};
     for (int i = 0; i < 3; i++) {
         if (i > 0)
             gui_beside(gui, gap);
-        action_button(panel, state, action[i], "top", floorf(84 * s));
+        action_button(panel, state, action[i], "top", button);
     }
     gui_window_end(gui);
 }
 
-static void draw_bottom(Panel *panel)
+static void draw_log(Panel *panel, GuiRect at)
 {
     Gui *gui = panel->gui;
-    GuiRect at = panel->layout.bottom, hints = at, log = at;
-    float s = gui_scale(gui);
     char text[256], time[32];
-    int hint = panel->has_hints ? panel_current_hint(panel) : -1;
-    hints.width = hint >= 0 ? floorf(at.width * 0.58f) : 0;
-    log.x += hints.width;
-    log.width -= hints.width;
-    if (hint >= 0) {
-        gui_window_begin(gui, "hint", hints, GUI_NO_INPUT);
-        gui_draw_fill(gui, (GuiRect){hints.x, hints.y, floorf(4 * s), hints.height}, gui_colors.accent);
-        panel_hint_text(hint, text, sizeof text);
-        gui_text_wrapped(gui, GUI_LARGE, gui_colors.text, text);
-        gui_window_end(gui);
-    }
-    gui_window_begin(gui, "log", log, GUI_SCROLL_TO_END);
+    gui_window_begin(gui, "log", at, GUI_SCROLL_TO_END | GUI_KEPT);
     int first = panel->message_count > PANEL_MESSAGES ? panel->message_count - PANEL_MESSAGES : 0;
     if (panel->message_count == 0)
         gui_text(gui, GUI_SMALL, gui_colors.dim, "Messages appear here.");
@@ -401,6 +385,54 @@ static void draw_bottom(Panel *panel)
         gui_text_wrapped(gui, GUI_SMALL, mark_color(message->mark), text);
     }
     gui_window_end(gui);
+}
+
+static void small_row(Panel *panel, const char *label, PanelMark mark, const char *text)
+{
+    Gui *gui = panel->gui;
+    char marked[96];
+    float width, height;
+    snprintf(marked, sizeof marked, "%s%s", sign[mark], text);
+    GuiRect at = gui_place(gui, 0, gui_line_height(gui, GUI_SMALL));
+    gui_text_extent(gui, GUI_SMALL, marked, &width, &height);
+    gui_draw_text(gui, at.x, at.y, GUI_SMALL, gui_colors.dim, label);
+    gui_draw_text(gui, at.x + at.width - width, at.y, GUI_SMALL, mark_color(mark), marked);
+}
+
+static void draw_machine(Panel *panel, const PanelState *state, GuiRect at)
+{
+    char text[96], one[32], other[32];
+    gui_window_begin(panel->gui, "machine", at, GUI_KEPT | GUI_SELDOM | GUI_NO_INPUT);
+    snprintf(text, sizeof text, "%s / %s", figure(one, sizeof one, state->step_median_us, 0, ""),
+             figure(other, sizeof other, state->step_p999_us, 0, "\u00b5s"));
+    small_row(panel, "Step, median / p99.9", MARK_NONE, text);
+    snprintf(text, sizeof text, "\u00d7%s, %lld missed", figure(one, sizeof one, state->real_time_factor, 2, ""), (long long)state->missed_deadlines);
+    small_row(panel, "Real time, deadlines", state->warnings & (WARN_SLOW | WARN_STALLED) ? MARK_WARNING : MARK_NONE, text);
+    small_row(panel, "Drawing", MARK_NONE, figure(one, sizeof one, state->frame_ms, 1, "ms a frame"));
+    gui_window_end(panel->gui);
+}
+
+// Hint, messages, machine.
+static void draw_bottom(Panel *panel, const PanelState *state)
+{
+    Gui *gui = panel->gui;
+    GuiRect at = panel->layout.bottom, hints = at, log = at, machine = at;
+    float s = gui_scale(gui);
+    char text[256];
+    int hint = panel->has_hints ? panel_current_hint(panel) : -1;
+    machine.width = floorf(268 * s);
+    machine.x = at.width - machine.width;
+    hints.width = hint >= 0 ? floorf(machine.x * 0.58f) : 0;
+    log.x = hints.width;
+    log.width = machine.x - hints.width;
+    if (hint >= 0) {
+        gui_window_begin(gui, "hint", hints, GUI_NO_INPUT | GUI_KEPT);
+        panel_hint_text(hint, text, sizeof text);
+        gui_text_wrapped(gui, GUI_LARGE, gui_colors.text, text);
+        gui_window_end(gui);
+    }
+    draw_log(panel, log);
+    draw_machine(panel, state, machine);
 }
 
 // ---- over the views
@@ -523,26 +555,24 @@ static void veil(Panel *panel, const WindowInput *input)
     gui_window_end(panel->gui);
 }
 
-static void help_group(Panel *panel, ActionGroup group, float key_width)
+static void help_group(Panel *panel, ActionGroup group, GuiFont font, float key_width)
 {
     Gui *gui = panel->gui;
     heading(panel, action_group_name[group]);
     for (int i = 0; i < ACTION_COUNT; i++) {
         if (key_table[i].group != group)
             continue;
-        char key[32], text[160];
-        float line = gui_line_height(gui, GUI_SMALL);
-        GuiRect at = gui_place(gui, 0, line);
-        gui_draw_text(gui, at.x, at.y, GUI_SMALL, gui_colors.text, key_table_text((ActionId)i, key, sizeof key));
-        snprintf(text, sizeof text, "%s", key_table[i].help);
-        gui_draw_text(gui, at.x + key_width, at.y, GUI_SMALL, gui_colors.dim, text);
+        char key[32];
+        GuiRect at = gui_place(gui, 0, gui_line_height(gui, font));
+        gui_draw_text(gui, at.x, at.y, font, gui_colors.accent, key_table_text((ActionId)i, key, sizeof key));
+        gui_draw_text(gui, at.x + key_width, at.y, font, gui_colors.text, key_table[i].help);
     }
 }
 
 static void draw_help(Panel *panel, const WindowInput *input, const PanelState *state)
 {
     Gui *gui = panel->gui;
-    float s = gui_scale(gui), margin = floorf(12 * s), key_width = floorf(82 * s), head = floorf(38 * s);
+    float s = gui_scale(gui), margin = floorf(12 * s), key_width = floorf(90 * s), head = floorf(38 * s);
     GuiRect at = {margin, margin, (float)input->width - 2 * margin, (float)input->height - 2 * margin};
     veil(panel, input);
     gui_window_begin(gui, "help", (GuiRect){at.x, at.y, at.width, head}, GUI_ON_TOP);
@@ -552,13 +582,19 @@ static void draw_help(Panel *panel, const WindowInput *input, const PanelState *
     gui_beside(gui, margin);
     action_button(panel, state, ACTION_HELP, "help", floorf(120 * s));
     gui_window_end(gui);
+    // larger letters where the longer column has room for them
     float half = floorf(at.width / 2);
+    int lines = 0;
+    for (int i = 0; i < ACTION_COUNT; i++)
+        lines += key_table[i].group < GROUP_VIEW;
+    bool has_room = (float)(lines + GROUP_VIEW + 1) * (gui_line_height(gui, GUI_NORMAL) + 4 * s) < at.height - head;
+    GuiFont font = has_room ? GUI_NORMAL : GUI_SMALL;
     for (int i = 0; i < 2; i++) {
         GuiRect part = {at.x + (i ? half : 0), at.y + head, i ? at.width - half : half, at.height - head};
         gui_window_begin(gui, i ? "help right" : "help left", part, GUI_ON_TOP);
         for (int group = 0; group < ACTION_GROUPS; group++)
             if ((group >= GROUP_VIEW) == (i == 1))
-                help_group(panel, (ActionGroup)group, key_width);
+                help_group(panel, (ActionGroup)group, font, key_width);
         gui_window_end(gui);
     }
 }
@@ -597,7 +633,7 @@ void panel_draw_all(Panel *panel, const WindowInput *input, const PanelState *st
         draw_top(panel, state);
         draw_left(panel, state);
         draw_right(panel, state);
-        draw_bottom(panel);
+        draw_bottom(panel, state);
     }
     if (panel->has_help)
         draw_help(panel, input, state);

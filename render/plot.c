@@ -53,6 +53,7 @@ double plot_tick_step(double span, int most_ticks)
 
 static void draw_ticks(Gui *gui, GuiRect at, double low, double high, double step, float label_right)
 {
+    float zero = at.y + at.height * (float)(high / (high - low)), last = INFINITY;
     for (double value = ceil(low / step - 1e-9) * step; value <= high + 1e-9 * step; value += step) {
         float y = floorf(at.y + at.height * (float)((high - value) / (high - low)));
         bool is_zero = fabs(value) < 1e-9 * step;
@@ -61,7 +62,11 @@ static void draw_ticks(Gui *gui, GuiRect at, double low, double high, double ste
         float width, height;
         snprintf(text, sizeof text, "%.*f", step < 1 ? (int)ceil(-log10(step) - 1e-9) : 0, is_zero ? 0 : value);
         gui_text_extent(gui, GUI_SMALL, text, &width, &height);
-        float top = fminf(fmaxf(y - height / 2, at.y), at.y + at.height - height);
+        float top = fminf(fmaxf(y - height / 2, at.y - height / 3), at.y + at.height - 2 * height / 3);
+        // numbers that would touch the one below, or the zero's, are left out
+        if (!is_zero && (last - top < 0.9f * height || (top < zero && zero - top < 1.2f * height)))
+            continue;
+        last = top;
         gui_draw_text(gui, label_right - width, top, GUI_SMALL, gui_colors.dim, text);
     }
 }
@@ -115,7 +120,7 @@ void plot_draw(const RunningPlot *plot, Gui *gui, const char *title, const char 
     low -= low < 0 ? margin : 0;
     high += high > 0 ? margin : 0;
     GuiRect at = {all.x, all.y + line + gap, all.width, all.height - line - gap};
-    double step = plot_tick_step(high - low, at.height > 4.5f * line ? 4 : 2);
+    double step = plot_tick_step(high - low, at.height > 4.5f * line ? 4 : 3);
     // room for the numbers: the widest of the two ends
     float label = 0;
     for (int i = 0; i < 2; i++) {

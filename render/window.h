@@ -67,8 +67,8 @@ typedef struct WindowGamepad {
 
 typedef struct Window Window;
 
-// A window with a current context and signal handlers, at most as large as the screen. NULL with a reason: "no display; seldinger run works without one, or start under Xvfb"
-// where there is none. One window a process. `hz` frames a second (0: 30).
+// A window with a current context and signal handlers, at most as large as the screen. `hz` frames a second (0: 30). One window a process.
+// NULL with a reason: "no display; seldinger run works without one, or start under Xvfb" where there is none.
 Window *window_create(const char *title, int width, int height, double hz, char *message, size_t capacity);
 void window_destroy(Window *window);   // signals and what was current are put back
 

@@ -146,6 +146,106 @@ static void pictures_at_all_sizes(void **unused)
     }
 }
 
+// ---- the mouse
+
+typedef struct Desk {            // a panel, what it is drawn into and what came out
+    Panel *panel;
+    GlCanvas canvas;
+    WindowInput input;
+    PanelState state;
+    PanelActions actions;
+} Desk;
+
+static Desk new_desk(int width, int height)
+{
+    Desk desk = {.panel = new_panel(), .canvas = new_canvas(width, height), .input = still_input(width, height, 1), .state = some_state()};
+    draw(desk.panel, &desk.canvas, &desk.input, &desk.state);
+    return desk;
+}
+
+static void end_desk(Desk *desk)
+{
+    panel_destroy(desk->panel);
+    gl_canvas_destroy(&desk->canvas);
+}
+
+static void frame(Desk *desk)
+{
+    panel_take_input(desk->panel, &desk->input, &desk->actions);
+    draw(desk->panel, &desk->canvas, &desk->input, &desk->state);
+    desk->input.event_count = 0;
+    desk->input.close = WINDOW_OPEN;
+}
+
+static void add_event(Desk *desk, WindowEvent event) { desk->input.event[desk->input.event_count++] = event; }
+
+static void tap(Desk *desk, int key)
+{
+    add_event(desk, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = key});
+    add_event(desk, (WindowEvent){.kind = WINDOW_KEY_UP_EVENT, .key = key});
+    frame(desk);
+}
+
+// Moves there, presses, lets go; adds what was asked for to `seen`, which has room for all actions.
+static void click(Desk *desk, double x, double y, bool *seen)
+{
+    desk->input.mouse_x = x;
+    desk->input.mouse_y = y;
+    for (int i = 0; i < 3; i++) {
+        desk->input.mouse_buttons = i < 2 ? WINDOW_MOUSE_LEFT : 0;
+        frame(desk);
+        for (int action = 0; action < ACTION_COUNT; action++)
+            seen[action] = seen[action] || desk->actions.held[action] || desk->actions.pressed[action] > 0;
+        if (i == 2)   // let go: nothing is held, but for the speed that a click latches
+            for (int action = 0; action < ACTION_COUNT; action++)
+                assert_true(!desk->actions.held[action] || action == ACTION_FAST || action == ACTION_SLOW);
+    }
+}
+
+// Clicks on every tab and then all over it: each action must come out by mouse alone.
+static void every_action_has_a_button_that_works(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    Desk desk = new_desk(1024, 600);
+    PanelRect right = desk.panel->layout.right;
+    float s = (float)desk.panel->layout.scale;
+    bool seen[ACTION_COUNT] = {false};
+    int dialogues = 0, helps = 0, hidden = 0, xray_sets = 0;
+    for (int tab = 0; tab < 5; tab++) {
+        bool ignored[ACTION_COUNT];
+        click(&desk, right.x + 10 * s + (float)(tab + 0.35) * 45 * s, right.y + 16 * s, ignored);
+        char name[32];
+        snprintf(name, sizeof name, "tab%d", tab);
+        keep_picture(&desk.canvas, name);
+        for (float y = right.y + 40 * s; y < right.y + right.height; y += 20 * s)
+            for (float x = right.x + 14 * s; x < right.x + right.width - 8 * s; x += 40 * s) {
+                click(&desk, x, y, seen);
+                xray_sets += desk.actions.xray_set;
+                // what opened is closed again
+                if (panel_is_asking(desk.panel)) {
+                    dialogues |= 1 << desk.panel->dialogue;
+                    tap(&desk, WINDOW_KEY_ESCAPE);
+                    assert_false(panel_is_asking(desk.panel));
+                    assert_int_equal(desk.actions.pressed[ACTION_QUIT], 0);
+                }
+                helps += desk.panel->has_help;
+                panel_show_help(desk.panel, false);
+                hidden += !desk.panel->has_panels;
+                desk.panel->has_panels = true;
+            }
+    }
+    seen[ACTION_QUIT] = seen[ACTION_QUIT] || (dialogues >> DIALOGUE_QUIT & 1);
+    seen[ACTION_RESTART] = seen[ACTION_RESTART] || (dialogues >> DIALOGUE_RESTART & 1);
+    for (int action = 0; action < ACTION_COUNT; action++)
+        if (!seen[action])
+            fail_msg("no button does \"%s\"", key_table[action].name);
+    assert_true(dialogues >> DIALOGUE_TRAINEE & 1);
+    assert_true(helps > 0 && hidden > 0);
+    end_desk(&desk);
+}
+
 // Process CPU, the driver's threads with it.
 static double cpu_ms(void)
 {
@@ -172,21 +272,21 @@ static void what_a_frame_costs(void **unused)
         PanelState state = some_state();
         Panel *panel = new_panel();
         double ms[FRAMES];
-        for (int frame = 0; frame < FRAMES; frame++) {
+        for (int k = 0; k < FRAMES; k++) {
             state.time_s += 1.0 / 30;
-            state.force_n = 0.06 + 0.02 * sin(0.3 * frame);
+            state.force_n = 0.06 + 0.02 * sin(0.3 * k);
             state.inserted_mm += 0.4;
             double start = cpu_ms();
             panel_draw(panel, &input, &state, canvas.framebuffer);
             glFinish();
-            ms[frame] = cpu_ms() - start;
+            ms[k] = cpu_ms() - start;
         }
         double mean = 0;
-        for (int frame = 10; frame < FRAMES; frame++)
-            mean += ms[frame] / (FRAMES - 10);
+        for (int k = 10; k < FRAMES; k++)
+            mean += ms[k] / (FRAMES - 10);
         qsort(ms + 10, FRAMES - 10, sizeof *ms, by_size);
-        print_message("panel alone, %dx%d: first frame %.1f ms CPU, then mean %.2f, median %.2f, most %.2f\n", canvas.width, canvas.height, ms[0], mean,
-                      ms[10 + (FRAMES - 10) / 2], ms[FRAMES - 1]);
+        print_message("panel alone, %dx%d: first frame %.1f ms CPU, then mean %.2f, median %.2f, most %.2f\n", canvas.width, canvas.height, ms[0],
+                      mean, ms[10 + (FRAMES - 10) / 2], ms[FRAMES - 1]);
         panel_destroy(panel);
         gl_canvas_destroy(&canvas);
     }
@@ -194,6 +294,6 @@ static void what_a_frame_costs(void **unused)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_at_all_sizes), cmocka_unit_test(what_a_frame_costs)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_at_all_sizes), cmocka_unit_test(every_action_has_a_button_that_works), cmocka_unit_test(what_a_frame_costs)};
     return cmocka_run_group_tests(tests, open_gl, close_gl);
 }
