@@ -2,6 +2,7 @@
 
 #include "input/hand_slot.h"
 
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -312,6 +313,17 @@ static bool copy_maps(Hands *hands, const HandsOptions *options)
     return true;
 }
 
+// A signal that a hand's thread took would look like an unplugged device: its threads inherit a mask of all.
+static bool start_scanner(Hands *hands)
+{
+    sigset_t all, before;
+    sigfillset(&all);
+    pthread_sigmask(SIG_BLOCK, &all, &before);
+    bool good = pthread_create(&hands->scanner, NULL, run_scanner, hands) == 0;
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    return good;
+}
+
 Hands *hands_open(const HandsOptions *options, Faults *faults)
 {
     Hands *hands = calloc(1, sizeof *hands);
@@ -336,7 +348,7 @@ Hands *hands_open(const HandsOptions *options, Faults *faults)
     const HidTransport *transport = options->transport ? options->transport : hands->own_transport;
     if (transport)
         hands->shared.transport = *transport;
-    hands->has_scanner = transport && copy_maps(hands, options) && pthread_create(&hands->scanner, NULL, run_scanner, hands) == 0;
+    hands->has_scanner = transport && copy_maps(hands, options) && start_scanner(hands);
     if (!hands->has_scanner) {
         faults_add(faults, "devices", 0, 0, "%s", transport ? "no memory or no thread to look for them" : "hidapi cannot be started");
         hands_close(hands);
