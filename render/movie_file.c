@@ -73,7 +73,7 @@ static int spawn_encoder(MovieFile *movie, double fps, int frames, int words)
     char *const argument[] = {
         "ffmpeg", "-nostdin", "-hide_banner", "-loglevel", "error", "-f", "rawvideo", "-pixel_format", "rgb24", "-video_size", size, "-framerate", rate,
         "-i", "pipe:0", "-an", "-vf", "scale=out_color_matrix=bt709:out_range=tv:flags=bilinear+accurate_rnd+bitexact,format=yuv420p", "-colorspace",
-        "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv", "-c:v", "libx264", "-preset", "veryfast", "-crf", "18",
+        "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv", "-c:v", "libx264", "-preset", "veryfast", "-crf", "21",
         "-threads", "1", "-map_metadata", "-1", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-movflags", "+faststart", "-f", "mp4", "-y",
         "/proc/self/fd/3", NULL};
     posix_spawn_file_actions_t actions;

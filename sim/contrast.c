@@ -173,7 +173,8 @@ static double pass_part(Contrast *contrast, const FlowBranch *branch, int from, 
         int s = step > 0 ? first : end - 1;
         bool any = first < end;
         if (any && (step > 0 ? sac[s].cell < from : sac[s].cell > from)) {   // behind
-            step > 0 ? first++ : end--;
+            first += step > 0;
+            end -= step < 0;
             continue;
         }
         int stop = any && (step > 0 ? sac[s].cell < to : sac[s].cell > to) ? sac[s].cell : to;

@@ -299,6 +299,47 @@ static void a_sac_washes_out_exponentially(void **state)
     vessel_tree_free(tree);
 }
 
+// Below the tip each node sees what was injected, diluted by the flow at the tip and later by the blood's transit: the same area under its curve, and a
+// mean time that differs by the transit. The others see nothing.
+static void every_node_sees_the_bolus_in_its_time(void **state)
+{
+    (void)state;
+    int seen = 0;
+    for (unsigned seed = 20; seed < 24; seed++) {
+        VesselTree *tree = random_tree(120, seed);
+        for (int i = 0; i < 120; i++)
+            tree->kind[i] = NODE_VESSEL;
+        ContrastOptions options = steady(2);
+        Contrast *contrast = make(tree, &options);
+        int tip = 25;
+        bool below[120];
+        double area[120] = {0}, moment[120] = {0}, flow = contrast_flow_ml_s(contrast, tip);
+        for (int i = 0; i < 120; i++)
+            below[i] = i == tip || (i > tip && below[tree->parent[i]]);
+        for (int k = 0; k < 8000; k++) {
+            contrast_advance(contrast, 0.005, tip, k < 40 ? 0.7 * flow : 0);
+            for (int i = 0; i < 120; i++) {
+                area[i] += 0.005 * (double)contrast_concentration(contrast)[i];
+                moment[i] += 0.005 * (k + 0.5) * 0.005 * (double)contrast_concentration(contrast)[i];
+            }
+        }
+        for (int i = 0; i < 120; i++) {
+            double later = contrast_transit_s(contrast, i) - contrast_transit_s(contrast, tip);
+            if (!below[i] && later < 0 && contrast_transit_s(contrast, tip) - contrast_transit_s(contrast, i) > 0.011) {
+                assert_true(area[i] == 0);
+            } else if (below[i] && later > 0.01 && later < 20) {
+                assert_true(fabs(area[i] - 0.7 * 0.2) < 1e-3 * area[i]);
+                assert_true(fabs(moment[i] / area[i] - 0.1 - later) < 0.011 + 0.02 * later);
+                seen++;
+            }
+        }
+        contrast_free(contrast);
+        vessel_tree_free(tree);
+    }
+    print_message("%d nodes below the tip\n", seen);
+    assert_true(seen > 50);
+}
+
 // --- invariances ---
 
 static void run_bolus(Contrast *contrast, int tip, double until_s)
@@ -553,6 +594,7 @@ int main(void)
         cmocka_unit_test(below_the_tip_only),
         cmocka_unit_test(what_does_not_go_on_goes_back),
         cmocka_unit_test(a_sac_washes_out_exponentially),
+        cmocka_unit_test(every_node_sees_the_bolus_in_its_time),
         cmocka_unit_test(a_mirrored_tree_fills_alike),
         cmocka_unit_test(a_finer_tree_fills_alike),
         cmocka_unit_test(the_same_calls_give_the_same_bits),
