@@ -65,6 +65,42 @@ static double lumen_radius(const Scene *scene, Simulator *simulator, const Vesse
     return radius;
 }
 
+// The next node towards the target, past it or without one into the widest branch; -1 at an end.
+static int follow(const Score *score, const VesselTree *tree, int node)
+{
+    if (score->exercise.target >= 0 && node != score->way.goal)
+        return score->way.toward[node];
+    int next = -1;
+    for (int i = node + 1; i < tree->node_count; i++)
+        if (tree->parent[i] == node && (next < 0 || tree->radius[i] > tree->radius[next]))
+            next = i;
+    return next;
+}
+
+// By how much the vessel turns behind the mouth, which is where a tube begins. False where memory lacks.
+static bool find_turn(Score *score, const VesselTree *tree)
+{
+    ScoreSheath *sheath = &score->sheath;
+    const TubeOptions *tube = &score->scene->tube;
+    if (score->scene->source == SOURCE_TUBE && tube->point_count > 0)
+        score_sheath_set_line(sheath, tube->point, tube->point_count);
+    else if (score->scene->source == SOURCE_TUBE)
+        score_sheath_set_pieces(sheath, tube->piece, tube->piece_count);
+    if (score->scene->source == SOURCE_TUBE || !tree || !sheath->is_judged)
+        return true;
+    Vec3 *line = calloc((size_t)tree->node_count, sizeof *line);
+    int count = 0, node = power_nearest(tree, score->scene->wire.start);
+    for (double length = 0; line && node >= 0 && count < tree->node_count && length < 1.5 * sheath->reach;) {
+        line[count++] = tree->center[node];
+        node = follow(score, tree, node);
+        length += node >= 0 ? vec3_distance(line[count - 1], tree->center[node]) : 0;
+    }
+    if (line)
+        score_sheath_set_line(sheath, line, count);
+    free(line);
+    return line != NULL;
+}
+
 Score *score_create(Simulator *simulator, const VesselTree *tree)
 {
     const Scene *scene = simulator_scene(simulator);
@@ -85,6 +121,10 @@ Score *score_create(Simulator *simulator, const VesselTree *tree)
         return NULL;
     }
     score_sheath_start(&score->sheath, &scene->wire, lumen_radius(scene, simulator, tree), state->inserted);
+    if (!find_turn(score, tree)) {
+        score_free(score);
+        return NULL;
+    }
     ScoreFigures *f = &score->figures;
     f->has_exercise = scene->exercise != NULL;
     f->tip_node = tree ? power_nearest(tree, tip) : -1;

@@ -1,7 +1,8 @@
 #include "sim/score_sheath.h"
 
 static const double MARGIN = 1;              // [mm] over what the clearance takes
-static const double DIAMETERS = 5;           // of the lumen, in l
+enum { DIAMETERS = 5 };                      // of the lumen, in l
+static const double UNBENT = 0.1;            // [mm] lost by a tool that slides
 
 void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, double lumen_radius, double inserted)
 {
@@ -52,21 +53,57 @@ double score_sheath_step(ScoreSheath *sheath, const WireState *state, const doub
     return fed;
 }
 
-void score_sheath_look(ScoreSheath *sheath, const WireState *state, const double *s)
+// By how much the line through `point` turns, beginning in the sheath's direction.
+static double turn_of(const ScoreSheath *sheath, const Vec3 *point, int count)
 {
-    if (!sheath->is_judged || sheath->lost > 0.25 * score_sheath_limit(sheath))
-        return;
-    double end = s[state->node_count - 1], turn = 0, stride = 2 * sheath->lumen_radius;
-    Vec3 from = sheath->mouth, before = sheath->direction;
-    for (int k = 1; k <= (int)DIAMETERS && k * stride <= state->inserted; k++) {
-        double part;
-        int i = element_at(s, state->node_count, end - state->inserted + k * stride, &part);
-        Vec3 to = vec3_mix(state->position[i], state->position[i + 1], part), along = vec3_sub(to, from);
+    double turn = 0;
+    Vec3 before = sheath->direction;
+    for (int i = 1; i < count; i++) {
+        Vec3 along = vec3_sub(point[i], point[i - 1]);
         turn += vec3_angle(before, along);
         before = along;
-        from = to;
     }
-    sheath->turn = turn;
+    return turn;
+}
+
+void score_sheath_look(ScoreSheath *sheath, const WireState *state, const double *s)
+{
+    if (!sheath->is_judged || sheath->turn_is_known || sheath->lost > UNBENT)
+        return;
+    double hidden = s[state->node_count - 1] - state->inserted, stride = 2 * sheath->lumen_radius;
+    Vec3 point[DIAMETERS + 1] = {sheath->mouth};
+    int count = 1;
+    for (; count <= DIAMETERS && count * stride <= state->inserted; count++) {
+        double part;
+        int i = element_at(s, state->node_count, hidden + count * stride, &part);
+        point[count] = vec3_mix(state->position[i], state->position[i + 1], part);
+    }
+    sheath->turn = turn_of(sheath, point, count);
+}
+
+void score_sheath_set_line(ScoreSheath *sheath, const Vec3 *line, int line_count)
+{
+    double stride = 2 * sheath->lumen_radius;
+    Vec3 point[DIAMETERS + 1] = {sheath->mouth};
+    int count = 1;
+    sheath->turn_is_known = true;
+    for (int i = 0; i < line_count && count <= DIAMETERS; i++)
+        if (vec3_distance(line[i], point[count - 1]) >= stride)
+            point[count++] = line[i];
+    sheath->turn = turn_of(sheath, point, count);
+}
+
+void score_sheath_set_pieces(ScoreSheath *sheath, const TubePiece *piece, int count)
+{
+    double left = sheath->reach;
+    sheath->turn_is_known = true;
+    sheath->turn = 0;
+    for (int i = 0; i < count && left > 0; i++) {
+        double length = piece[i].angle > 0 ? piece[i].arc_radius * piece[i].angle : piece[i].length;
+        if (piece[i].angle > 0)
+            sheath->turn += fmin(length, left) / piece[i].arc_radius;
+        left -= length;
+    }
 }
 
 double score_sheath_limit(const ScoreSheath *sheath)

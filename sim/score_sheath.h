@@ -3,6 +3,7 @@
 #ifndef SELDINGER_SIM_SCORE_SHEATH_H
 #define SELDINGER_SIM_SCORE_SHEATH_H
 
+#include "geom/vessel.h"
 #include "solver/solver.h"
 
 typedef struct ScoreSheath {
@@ -12,14 +13,18 @@ typedef struct ScoreSheath {
     double reach;                // [mm] l, 5 lumen diameters
     double straight;             // [mm] arc length up to which the tool is straight at rest
     double lost;                 // [mm] >= 0
-    double turn;                 // [rad] by which the tool turns over l, seen while it slides
+    double turn;                 // [rad] by which the vessel turns over l
+    bool turn_is_known;          // else it is taken from the tool as long as that slides
     double last_inserted;        // [mm]
 } ScoreSheath;
 
 void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, double lumen_radius, double inserted);
+// The vessel's centreline from the mouth on, `count` points: sets the turn, by chords of one lumen diameter.
+void score_sheath_set_line(ScoreSheath *sheath, const Vec3 *point, int count);
 // `s` (M) [mm] arc length of the nodes. `dt` [ms]. Returns what was fed in [mm].
 double score_sheath_step(ScoreSheath *sheath, const WireState *state, const double *s, double dt);
-// Looks at the turn anew while little is lost.
+void score_sheath_set_pieces(ScoreSheath *sheath, const TubePiece *piece, int count);   // the same of lines and arcs
+// Where the turn is not known: looks at the tool while next to nothing is lost.
 void score_sheath_look(ScoreSheath *sheath, const WireState *state, const double *s);
 // [mm] that may be lost without a fold.
 double score_sheath_limit(const ScoreSheath *sheath);

@@ -1,0 +1,578 @@
+// The score: its clock and units, the hold, errors by episode, the way through a tree, buckling, forces, points that never grow with a worse figure.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "../heap_calls.h"
+#include "score_scene.h"
+#include "sim/score_way.h"
+
+#include <stdio.h>
+
+#define assert_near(a, b, tolerance) assert_true(fabs((a) - (b)) <= (tolerance))
+
+// --- the exercise in the scene ---
+
+static void an_exercise_is_read(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(IN_THE_OPEN EXERCISE(", instructions: Push., hold_s: 1.5, time_limit_s: 90, rules: {tip_force_n: 0.1, wrong_branch_mm: 4, buckling: "
+                                                      "false}, par: {path_ratio: 1.5}, weights: {path: 3}, error_points: 7"), NULL);
+    const Exercise *e = p->scene->exercise;
+    assert_string_equal(e->title, "Go there");
+    assert_string_equal(e->instructions, "Push.");
+    assert_int_equal(e->target, 0);
+    assert_near(e->hold_s, 1.5, 0);
+    assert_near(e->time_limit_s, 90, 0);
+    assert_near(e->rules.tip_force_n, 0.1, 0);
+    assert_near(e->rules.tip_length_mm, 5, 0);
+    assert_near(e->rules.wrong_branch_mm, 4, 0);
+    assert_false(e->rules.buckling);
+    assert_near(e->par[PART_PATH], 1.5, 0);
+    assert_near(e->par[PART_TIME], 0, 0);
+    assert_near(e->weight[PART_PATH], 3, 0);
+    assert_near(e->weight[PART_TIME], 1, 0);
+    assert_near(e->error_points, 7, 0);
+    practice_end(p);
+}
+
+static void a_wrong_exercise_is_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text, *words;
+    } cases[] = {
+        {IN_THE_OPEN "exercise: 3\n", "no map"},
+        {IN_THE_OPEN "exercise: {target: there}\n", "lacks the key 'title'"},
+        {IN_THE_OPEN "exercise: {title: a}\n", "lacks the key 'target'"},
+        {IN_THE_OPEN "exercise: {title: a, target: their}\n", "no target of this scene"},
+        {"seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\nexercise: {title: a, target: a}\n", "has no 'targets'"},
+        {IN_THE_OPEN EXERCISE(", hold: 2"), "'hold_s'"},
+        {IN_THE_OPEN EXERCISE(", hold_s: -1"), "out of range"},
+        {IN_THE_OPEN EXERCISE(", hold_s: 61"), "out of range"},
+        {IN_THE_OPEN EXERCISE(", time_limit_s: 0"), "above 0"},
+        {IN_THE_OPEN EXERCISE(", rules: {tip_force_n: -0.1}"), "out of range"},
+        {IN_THE_OPEN EXERCISE(", rules: {tip_force_mn: 1}"), "tip_force_n"},
+        {IN_THE_OPEN EXERCISE(", rules: {tip_length_mm: 0}"), "above 0"},
+        {IN_THE_OPEN EXERCISE(", rules: {buckling: perhaps}"), "one of: false, true"},
+        {IN_THE_OPEN EXERCISE(", par: {time: 3}"), "time_s"},
+        {IN_THE_OPEN EXERCISE(", weights: {path: -1}"), "out of range"},
+        {IN_THE_OPEN EXERCISE(", error_points: 101"), "out of range"},
+        {IN_THE_OPEN EXERCISE(", colour: red"), "valid: title"},
+        {IN_THE_OPEN "fluoroscopy: {volumes: a}\n", "'volume'"},
+    };
+    static Faults faults;
+    int wrong = 0;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        faults_clear(&faults);
+        Scene *scene = scene_parse(cases[i].text, strlen(cases[i].text), "x.yaml", &faults);
+        if (scene || faults.count != 1 || !strstr(faults.text[0], cases[i].words))
+            wrong++, print_error("%s-- expected %s; %d faults, the first: %s\n", cases[i].text, cases[i].words, faults.count, faults.text[0]);
+        scene_free(scene);
+    }
+    assert_int_equal(wrong, 0);
+}
+
+static void a_volume_is_found_beside_the_scene(void **state)
+{
+    (void)state;
+    static const char text[] = IN_THE_OPEN "fluoroscopy: {volume: head.nrrd}\n";
+    static Faults faults;
+    Scene *scene = scene_parse(text, strlen(text), "/some/folder/x.yaml", &faults);
+    assert_non_null(scene);
+    assert_string_equal(scene->anatomy_path, "/some/folder/head.nrrd");
+    assert_null(scene->exercise);
+    scene_free(scene);
+}
+
+// --- clock, ways, X-rays ---
+
+static void the_clock_runs_from_the_first_movement(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(IN_THE_OPEN EXERCISE(", time_limit_s: 3"), NULL);
+    ScoreFigures f = practice_go(p, 0, 2);
+    assert_int_equal(f.state, SCORE_WAITING);
+    assert_near(f.time_s, 0, 0);
+    f = practice_go(p, 5, 1);
+    assert_int_equal(f.state, SCORE_RUNNING);
+    assert_near(f.start_s, 2, 1e-9);
+    assert_near(f.time_s, 1, 1e-9);
+    f = practice_go(p, 0, 1.999);
+    assert_int_equal(f.state, SCORE_RUNNING);
+    f = practice_go(p, 0, 0.001);
+    assert_int_equal(f.state, SCORE_TIME_OUT);
+    ScoreFigures later = practice_go(p, 5, 1);   // nothing counts any more
+    assert_memory_equal(&f, &later, sizeof f);
+    practice_end(p);
+}
+
+static void ways_are_counted_both_ways(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(IN_THE_OPEN, NULL);
+    practice_go(p, 10, 1.5);
+    practice_go(p, -10, 0.5);
+    ScoreFigures f = practice_go(p, 10, 0.2);
+    assert_near(f.inserted_mm, 17, 1e-6);
+    assert_near(f.withdrawn_mm, 5, 1e-6);
+    assert_near(f.path_mm, 22, 0.8);     // in chords of 0.2 mm: up to 0.4 is lost at each of the two turns
+    assert_false(f.has_exercise);
+    assert_near(f.points, 0, 0);
+    practice_end(p);
+}
+
+static void x_rays_are_counted_while_the_pedal_is_down(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(IN_THE_OPEN EXERCISE(", rules: {contrast_ml: 5}"), NULL);
+    p->watched = true;
+    p->xray.field_mm = 100;
+    p->xray.pedal = 1;
+    ScoreFigures f = practice_go(p, 0, 1);
+    assert_int_equal(f.pulses, 15);      // the first at once
+    assert_near(f.fluoroscopy_s, 1, 1e-9);
+    assert_near(f.dose_area_cm2, 1500, 1e-6);
+    p->xray.pedal = 0;
+    f = practice_go(p, 0, 1);
+    assert_int_equal(f.pulses, 15);
+    p->xray.pedal = 1;
+    p->xray.pulses_s = 30;
+    p->xray.collimator[0] = p->xray.collimator[1] = 0.5F;   // half the width
+    f = practice_go(p, 0, 1);
+    assert_int_equal(f.pulses, 45);
+    assert_near(f.dose_area_cm2, 1500 + 1500, 1e-6);
+    assert_near(f.fluoroscopy_s, 2, 1e-9);
+    p->xray.contrast_ml_s = 2;
+    f = practice_go(p, 0, 2.499);
+    assert_int_equal(f.error[ERROR_CONTRAST].count, 0);
+    f = practice_go(p, 0, 0.501);
+    assert_near(f.contrast_ml, 6, 1e-6);
+    assert_int_equal(f.error[ERROR_CONTRAST].count, 1);
+    assert_near(f.error[ERROR_CONTRAST].last_s, 3 + 2.5, 0.0015);
+    practice_end(p);
+}
+
+static void moving_blind_is_an_error_once_until_the_pedal(void **state)
+{
+    (void)state;
+    for (int seen = 0; seen < 2; seen++) {
+        Practice *p = practice_begin(IN_THE_OPEN EXERCISE(", rules: {blind_mm: 4}"), NULL);
+        p->watched = seen;
+        practice_go(p, 10, 0.39);
+        assert_int_equal(score_figures(p->score).error[ERROR_BLIND].count, 0);
+        ScoreFigures f = practice_go(p, 10, 0.4);
+        assert_int_equal(f.error[ERROR_BLIND].count, seen);
+        p->xray.pedal = 1;
+        practice_go(p, 10, 0.5);
+        p->xray.pedal = 0;
+        f = practice_go(p, -10, 0.5);    // either way
+        assert_int_equal(f.error[ERROR_BLIND].count, 2 * seen);
+        practice_end(p);
+    }
+}
+
+// --- the hold ---
+
+static void a_target_must_be_held(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(IN_THE_OPEN EXERCISE(""), NULL);     // target from 19 to 21 mm, 2 s
+    ScoreFigures f = practice_go(p, 10, 2.5);      // through it
+    assert_int_equal(f.state, SCORE_RUNNING);
+    assert_near(f.held_s, 0, 0);
+    assert_near(f.least_remaining_mm, 0, 0.2);
+    practice_go(p, -10, 0.6);                      // back into it, to 20
+    f = practice_go(p, 0, 1.7);
+    assert_near(f.held_s, 1.8, 0.01);
+    practice_go(p, 10, 0.2);                       // out: all lost
+    practice_go(p, -10, 0.2);
+    f = practice_go(p, 0, 1.8);
+    assert_int_equal(f.state, SCORE_RUNNING);
+    assert_near(f.held_s, 1.9, 0.01);
+    f = practice_go(p, 0, 0.2);
+    assert_int_equal(f.state, SCORE_REACHED);
+    assert_near(f.held_s, 2, 1e-9);
+    assert_near(f.reached_s, 2.5 + 0.6 + 1.7 + 0.4 + 1.9, 0.01);
+    practice_end(p);
+}
+
+static void the_border_decides(void **state)
+{
+    (void)state;
+    for (int inside = 0; inside < 2; inside++) {
+        Practice *p = practice_begin(IN_THE_OPEN EXERCISE(", hold_s: 0.5"), NULL);
+        ScoreFigures f = practice_go(p, 1, inside ? 18.002 : 17.998);
+        f = practice_go(p, 0, 0.49);
+        assert_int_equal(f.state, SCORE_RUNNING);
+        f = practice_go(p, 0, 0.02);
+        assert_int_equal(f.state, inside ? SCORE_REACHED : SCORE_RUNNING);
+        practice_end(p);
+    }
+}
+
+// --- the way through a tree ---
+
+// A trunk along x, 0 to 40 mm, radius 2; at 20 mm a branch to +y, 20 mm, radius 1; at its end a sac of two nodes. Every 2 mm a node.
+enum { TRUNK = 21, BRANCH = 10, SAC = 2 };
+static VesselTree *forked(double mirror)
+{
+    VesselTree *t = vessel_tree_create(TRUNK + BRANCH + SAC, 0, 0);
+    assert_non_null(t);
+    for (int i = 0; i < t->node_count; i++) {
+        int k = i - TRUNK + 1;
+        t->center[i] = k <= 0 ? vec3(2 * i, 0, 0) : vec3(20, mirror * 2 * k, 0);
+        t->radius[i] = k <= 0 ? 2 : k <= BRANCH ? 1 : 3;
+        t->direction[i] = k <= 0 ? vec3(1, 0, 0) : vec3(0, mirror, 0);
+        t->height[i] = 2;
+        t->parent[i] = i == 0 ? -1 : i == TRUNK ? 10 : i - 1;
+        t->kind[i] = k > BRANCH ? NODE_ANEURYSM : NODE_VESSEL;
+    }
+    assert_true(vessel_tree_link(t));
+    return t;
+}
+
+static void the_way_is_measured_along_the_tree(void **state)
+{
+    (void)state;
+    VesselTree *t = forked(1);
+    ScoreWay way;
+    assert_true(score_way_create(&way, t, vec3(0, 0, 0), vec3(20, 15, 0), 1));       // between two nodes of the branch
+    assert_near(score_way_left(&way, vec3(0, 0, 0), 0), 35, 1e-9);
+    assert_near(score_way_left(&way, vec3(1, 0.5, 0), 0), 34, 1e-9);                 // between nodes, beside the line
+    assert_near(score_way_left(&way, vec3(40, 0, 0), 20), 35, 1e-9);                 // back to the fork, then on
+    assert_near(way.off[5], 0, 0);
+    assert_near(way.off[20], 20 - 2, 1e-9);                                          // beyond the fork, less the trunk's radius
+    assert_near(way.off[TRUNK], 0, 0);
+    score_way_destroy(&way);
+    // the target in the trunk: the branch begins at the trunk's wall; what lies past the target begins behind it
+    assert_true(score_way_create(&way, t, vec3(0, 0, 0), vec3(30, 0, 0), 3));
+    assert_near(way.off[TRUNK], 0, 1e-12);
+    assert_near(way.off[TRUNK + 4], 10 - 2, 1e-9);
+    assert_near(way.off[20], 10 - 3, 1e-9);
+    score_way_destroy(&way);
+    // a sac is one place; the mouth may lie inside the tree, and all upstream of it is off the way
+    assert_true(score_way_create(&way, t, vec3(10, 0, 0), vec3(20, 24, 0), 1));
+    assert_near(way.off[TRUNK + BRANCH], 0, 0);
+    assert_near(way.off[TRUNK + BRANCH + 1], 0, 0);
+    assert_near(way.off[0], 10 - 2, 1e-9);
+    score_way_destroy(&way);
+    // downstream of the target to upstream: target in the trunk, mouth at its end
+    assert_true(score_way_create(&way, t, vec3(40, 0, 0), vec3(10, 0, 0), 1));
+    assert_near(score_way_left(&way, vec3(40, 0, 0), 20), 30, 1e-9);
+    assert_near(way.off[15], 0, 0);
+    assert_near(way.off[0], 10 - 2, 1e-9);
+    assert_near(way.off[TRUNK + 9], 20 - 2, 1e-9);
+    score_way_destroy(&way);
+    assert_true(score_way_create(&way, NULL, vec3(0, 0, 0), vec3(3, 4, 0), 1));
+    assert_near(score_way_left(&way, vec3(0, 0, 0), -1), 5, 1e-12);
+    score_way_destroy(&way);
+    vessel_tree_free(t);
+}
+
+// The tool goes straight on in the trunk.
+static void a_wrong_branch_counts_once_each_time(void **state)
+{
+    (void)state;
+    VesselTree *t = forked(1);
+    static const char side[] = "seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 1}\n"
+                               "targets: [{name: there, point_mm: [20, 16, 0], radius_mm: 1}]\n" EXERCISE(", rules: {wrong_branch_mm: 5}");
+    Practice *p = practice_begin(side, t);
+    assert_near(score_figures(p->score).way_mm, 35, 1e-9);
+    ScoreFigures f = practice_go(p, 10, 2.5);      // at 26 mm: 4 mm beyond the trunk's wall
+    assert_int_equal(f.error_total, 0);
+    assert_near(f.off_way_mm, 4, 1e-9);
+    f = practice_go(p, 10, 0.5);                   // at 31 mm
+    assert_int_equal(f.error[ERROR_WRONG_BRANCH].count, 1);
+    assert_near(f.error[ERROR_WRONG_BRANCH].last_s, 2.6, 0.03);       // node 14 (28 mm) is the tip's from 27 mm on
+    f = practice_go(p, 10, 0.5);
+    assert_int_equal(f.error[ERROR_WRONG_BRANCH].count, 1);
+    practice_go(p, -10, 1.6);                      // to 20 mm
+    practice_go(p, 0, 0.6);
+    f = practice_go(p, 10, 1);
+    assert_int_equal(f.error[ERROR_WRONG_BRANCH].count, 2);
+    practice_end(p);
+    // on the way nothing is counted
+    p = practice_begin("seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 1}\n"
+                       "targets: [{name: there, point_mm: [38, 0, 0], radius_mm: 1}]\n" EXERCISE(", rules: {wrong_branch_mm: 5}"), t);
+    f = practice_go(p, 10, 3.7);
+    assert_int_equal(f.error_total, 0);
+    f = practice_go(p, 0, 2);
+    assert_int_equal(f.state, SCORE_REACHED);
+    assert_near(f.efficiency, 1, 0.03);
+    practice_end(p);
+    vessel_tree_free(t);
+}
+
+// --- buckling ---
+
+#define TUBE(path, ends) \
+    "seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n" AT(90) "vessel: {friction: 0.1, tube: {start_mm: [0, 0, 0], " \
+    "direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, ends: " ends ", path: [" path "]}}\n"
+
+// The tip is held 18 mm beyond the mouth: what goes in stands in folds.
+static void a_tool_whose_tip_is_held_buckles_at_the_sheath(void **state)
+{
+    (void)state;
+    for (int judged = 0; judged < 2; judged++) {
+        static const char *const exercise[] = {EXERCISE(", rules: {buckling: false}"), EXERCISE("")};
+        char text[2048];
+        snprintf(text, sizeof text, "seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 18}\nrig: {fix: [{s_mm: end, dof: position}]}\n"
+                 AT(90) "vessel: {friction: 0.1, tube: {radius_mm: 2, path: [{line_mm: 60}]}}\n%s", exercise[judged]);
+        Practice *p = practice_begin(text, NULL);
+        // one bow from wall to wall takes pi^2 1.8^2 / 20 = 1.6 mm
+        ScoreFigures f = practice_go(p, 10, 0.16);
+        assert_near(f.lost_limit_mm, 1 + PI * PI * 1.8 * 1.8 / 20, 1e-9);
+        assert_near(f.lost_mm, 1.6, 0.15);
+        assert_int_equal(f.error_total, 0);
+        f = practice_go(p, 10, 0.14);
+        assert_near(f.lost_mm, 3, 0.3);
+        assert_int_equal(f.error[ERROR_BUCKLING].count, judged);
+        assert_int_equal(f.error_total, judged);
+        f = practice_go(p, -10, 0.3);              // pulled straight again
+        assert_near(f.lost_mm, 0, 0.3);
+        f = practice_go(p, 0, 0.6);
+        assert_false(f.error[ERROR_BUCKLING].is_on);
+        practice_end(p);
+    }
+}
+
+static void normal_bends_are_no_buckling(void **state)
+{
+    (void)state;
+    static const char *const scene[] = {
+        TUBE("{line_mm: 5}, {arc: {radius_mm: 12, angle_deg: 90}}, {arc: {radius_mm: 12, angle_deg: 120, plane_deg: 180}}, {line_mm: 60}", "open") EXERCISE(""),
+        TUBE("{arc: {radius_mm: 15, angle_deg: 300}}, {line_mm: 30}", "open") EXERCISE(""),
+        TUBE("{arc: {radius_mm: 10, angle_deg: 60}}, {arc: {radius_mm: 10, angle_deg: 60, plane_deg: 90}}, {arc: {radius_mm: 10, angle_deg: 90, plane_deg: 200}}, "
+             "{line_mm: 60}", "open") EXERCISE(""),
+    };
+    for (size_t i = 0; i < sizeof scene / sizeof scene[0]; i++) {
+        Practice *p = practice_begin(scene[i], NULL);
+        double most = 0;
+        for (int k = 0; k < 3; k++) {                        // in, half out, in again
+            for (int n = 0; n < 30; n++)
+                most = fmax(most, practice_go(p, k == 1 ? -25 : 25, 0.1).lost_mm / score_figures(p->score).lost_limit_mm);
+        }
+        ScoreFigures f = score_figures(p->score);
+        print_message("bend %zu: at most %.2f of the limit %.2f mm; pushed %.2f N\n", i, most, f.lost_limit_mm, simulator_last(p->simulator)->proximal_force);
+        assert_int_equal(f.error[ERROR_BUCKLING].count, 0);
+        assert_true(most < 0.8);
+        practice_end(p);
+    }
+}
+
+// --- forces ---
+
+// At rest against the end, what the shaft carries into the tip is the wall's resultant on it.
+static void the_tips_force_is_the_walls(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(TUBE("{arc: {radius_mm: 15, angle_deg: 90}}, {line_mm: 10}", "closed") EXERCISE(", rules: {tip_length_mm: 6, tip_force_n: 0.02}"), NULL);
+    practice_go(p, 20, 1.8);
+    ScoreFigures f = practice_go(p, 0, 3);
+    int nodes = simulator_state(p->simulator)->node_count;
+    NodeReport *node = calloc((size_t)nodes, sizeof *node);
+    assert_non_null(node);
+    stepper_node_report(simulator_stepper(p->simulator), node);
+    Vec3 sum = {0, 0, 0};
+    for (int i = 0; i < nodes; i++)
+        if (node[nodes - 1].s - node[i].s <= 6)
+            sum = vec3_add(sum, node[i].force);
+    print_message("tip %.6f N, wall on it %.6f N\n", f.tip_force_n, vec3_norm(sum));
+    assert_true(vec3_norm(sum) > 0.02);
+    assert_near(f.tip_force_n, vec3_norm(sum), 0.01 * vec3_norm(sum));
+    assert_int_equal(f.error[ERROR_TIP_FORCE].count, 1);
+    free(node);
+    practice_end(p);
+}
+
+static void wall_force_is_summed_over_time(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(TUBE("{arc: {radius_mm: 15, angle_deg: 90}}, {line_mm: 30}", "open") EXERCISE(", rules: {wall_force_n: 0.001}"), NULL);
+    double peak = 0, impulse = 0;
+    for (int i = 0; i < 1500; i++) {
+        practice_step(p, 20);
+        peak = fmax(peak, simulator_last(p->simulator)->wall_force_max);
+        impulse += simulator_last(p->simulator)->wall_force_sum * 1e-3;
+    }
+    ScoreFigures f = score_figures(p->score);
+    assert_true(peak > 0.001);
+    assert_near(f.wall_force_peak_n, peak, 0);
+    assert_near(f.wall_impulse_n_s, impulse, 1e-12);
+    assert_int_equal(f.error[ERROR_WALL_FORCE].count, 1);    // one long episode
+    int count;
+    const ScoreEvent *event = score_events(p->score, &count);
+    assert_int_equal(count, f.error_total);
+    assert_int_equal(event[0].kind, ERROR_WALL_FORCE);
+    assert_near(event[0].time_s, f.error[ERROR_WALL_FORCE].last_s, 0);
+    practice_end(p);
+}
+
+// --- points ---
+
+#define JUDGED EXERCISE(", rules: {blind_mm: 5, contrast_ml: 3}, par: {time_s: 3, fluoroscopy_s: 2, contrast_ml: 1, path_ratio: 1.01, wall_force_n: 1, wall_impulse_n_s: 1}")
+
+typedef struct Hand {
+    double wait_s, contrast_ml_s, detour_mm, pedal_off_s;    // what makes it worse
+} Hand;
+
+static ScoreFigures reach(Hand hand)
+{
+    Practice *p = practice_begin(IN_THE_OPEN JUDGED, NULL);
+    p->watched = true;
+    p->xray.pedal = 1;
+    practice_go(p, 10, 0.5);
+    practice_go(p, 10, hand.detour_mm / 10);
+    practice_go(p, -10, hand.detour_mm / 10);
+    practice_go(p, 0, hand.wait_s);
+    p->xray.contrast_ml_s = (float)hand.contrast_ml_s;
+    practice_go(p, 0, 1);
+    p->xray.contrast_ml_s = 0;
+    p->xray.pedal = hand.pedal_off_s > 0 ? 0 : 1;
+    practice_go(p, 10, hand.pedal_off_s);
+    p->xray.pedal = 1;
+    practice_go(p, 10, 1.4 - hand.pedal_off_s);
+    ScoreFigures f = practice_go(p, 0, 3);
+    assert_int_equal(f.state, SCORE_REACHED);
+    practice_end(p);
+    return f;
+}
+
+static void a_worse_figure_never_gives_more_points(void **state)
+{
+    (void)state;
+    ScoreFigures best = reach((Hand){0});
+    assert_true(best.points > 50 && best.points <= 100);
+    for (int k = 0; k < 4; k++) {
+        double before = best.points;
+        for (int level = 1; level <= 3; level++) {
+            double x = level;
+            Hand hand = {.wait_s = k == 0 ? x : 0, .contrast_ml_s = k == 1 ? 1.2 * x : 0, .detour_mm = k == 2 ? x : 0, .pedal_off_s = k == 3 ? 0.3 * x : 0};
+            ScoreFigures f = reach(hand);
+            if (k < 3 || level == 2)                         // pedal off: less X-rays, but blind from 5 mm on
+                assert_true(f.points < before);
+            before = f.points;
+        }
+    }
+    assert_int_equal(reach((Hand){.contrast_ml_s = 4}).error_total, 1);
+}
+
+static void nothing_done_is_worth_nothing(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(IN_THE_OPEN JUDGED, NULL);
+    assert_near(practice_go(p, 0, 1).points, 0, 0);
+    p->watched = true;
+    p->xray.pedal = 1;
+    assert_near(practice_go(p, 0, 1).points, 0, 1e-9);
+    ScoreFigures half = practice_go(p, 10, 1);
+    assert_true(half.points > 20 && half.points < 50);       // half the way: at most a quarter; half of all at the very end
+    practice_end(p);
+}
+
+static ScoreFigures through_a_bend(bool mirrored)
+{
+    VesselTree *tree = forked(mirrored ? -1 : 1);
+    char text[2048];
+    snprintf(text, sizeof text, "seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, %d, 0], inserted_mm: 2}\n"
+             "targets: [{name: there, point_mm: [20, %d, 0], radius_mm: 2}]\nvessel: {friction: 0.1, tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: "
+             "[0, %d, 0], radius_mm: 2, path: [{line_mm: 8}, {arc: {radius_mm: 12, angle_deg: 90}}, {line_mm: 20}]}}\n"
+             EXERCISE(", hold_s: 0.2, rules: {tip_force_n: 0.01, wall_force_n: 0.01, wrong_branch_mm: 3}, par: {time_s: 1, path_ratio: 1, wall_impulse_n_s: 0.01}"),
+             mirrored ? -1 : 1, mirrored ? -20 : 20, mirrored ? -1 : 1);
+    Practice *p = practice_begin(text, tree);
+    practice_go(p, 20, 1.55);
+    ScoreFigures f = practice_go(p, 0, 1);
+    practice_end(p);
+    vessel_tree_free(tree);
+    return f;
+}
+
+static void a_mirrored_scene_gives_the_same_score(void **state)
+{
+    (void)state;
+    ScoreFigures one = through_a_bend(false), two = through_a_bend(true), again = through_a_bend(false);
+    assert_memory_equal(&one, &again, sizeof one);           // and the same run the same bits
+    assert_int_equal(one.state, SCORE_REACHED);
+    assert_int_equal(one.state, two.state);
+    assert_true(one.points > 0 && one.points < 100 && one.error_total > 0);
+    assert_near(one.points, two.points, 1e-3 * one.points);
+    assert_near(one.path_mm, two.path_mm, 1e-3 * one.path_mm);
+    assert_near(one.way_mm, two.way_mm, 1e-9);
+    assert_near(one.wall_impulse_n_s, two.wall_impulse_n_s, 1e-3 * one.wall_impulse_n_s);
+    for (int i = 0; i < ERROR_COUNT; i++)
+        assert_int_equal(one.error[i].count, two.error[i].count);
+}
+
+static void a_copy_goes_on_alike(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(TUBE("{line_mm: 30}", "closed") EXERCISE(", rules: {wall_force_n: 0.1}"), NULL);
+    practice_go(p, 20, 1.3);
+    Checkpoint *moment = stepper_save(simulator_stepper(p->simulator), NULL);
+    Score *kept = score_create(p->simulator, NULL);
+    score_copy(kept, p->score);
+    ScoreFigures first = practice_go(p, 20, 0.4);
+    stepper_restore(simulator_stepper(p->simulator), moment);
+    score_copy(p->score, kept);
+    ScoreFigures second = practice_go(p, 20, 0.4);
+    assert_true(first.error_total > 0);
+    assert_int_equal(first.error_total, second.error_total);
+    assert_near(first.wall_impulse_n_s, second.wall_impulse_n_s, 0);
+    assert_near(first.path_mm, second.path_mm, 0);
+    score_free(kept);
+    checkpoint_free(moment);
+    practice_end(p);
+}
+
+static void a_step_allocates_nothing(void **state)
+{
+    (void)state;
+    need_counting();
+    VesselTree *t = forked(1);
+    Practice *p = practice_begin(TUBE("{line_mm: 30}", "closed") EXERCISE(", rules: {tip_force_n: 0.1, wrong_branch_mm: 1}"), t);
+    p->watched = true;
+    p->xray.pedal = 1;
+    long before = heap_calls();
+    for (int i = 0; i < 2000; i++) {
+        simulator_step(p->simulator, (Command){20, 0});
+        heap_watch(true);
+        score_step(p->score, p->simulator, (Command){20, 0}, &p->xray);
+        heap_watch(false);
+    }
+    assert_int_equal(heap_calls() - before, 0);
+    assert_true(score_figures(p->score).error_total > 0);
+    practice_end(p);
+    vessel_tree_free(t);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(an_exercise_is_read),
+        cmocka_unit_test(a_wrong_exercise_is_refused),
+        cmocka_unit_test(a_volume_is_found_beside_the_scene),
+        cmocka_unit_test(the_clock_runs_from_the_first_movement),
+        cmocka_unit_test(ways_are_counted_both_ways),
+        cmocka_unit_test(x_rays_are_counted_while_the_pedal_is_down),
+        cmocka_unit_test(moving_blind_is_an_error_once_until_the_pedal),
+        cmocka_unit_test(a_target_must_be_held),
+        cmocka_unit_test(the_border_decides),
+        cmocka_unit_test(the_way_is_measured_along_the_tree),
+        cmocka_unit_test(a_wrong_branch_counts_once_each_time),
+        cmocka_unit_test(a_tool_whose_tip_is_held_buckles_at_the_sheath),
+        cmocka_unit_test(normal_bends_are_no_buckling),
+        cmocka_unit_test(the_tips_force_is_the_walls),
+        cmocka_unit_test(wall_force_is_summed_over_time),
+        cmocka_unit_test(a_worse_figure_never_gives_more_points),
+        cmocka_unit_test(nothing_done_is_worth_nothing),
+        cmocka_unit_test(a_mirrored_scene_gives_the_same_score),
+        cmocka_unit_test(a_copy_goes_on_alike),
+        cmocka_unit_test(the_counter_counts),
+        cmocka_unit_test(a_step_allocates_nothing),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
