@@ -17,7 +17,7 @@ static const double median_transmission = 0.27;  // that automatic exposure sees
 
 FluoroscopeOptions fluoroscope_default_options(void)
 {
-    return (FluoroscopeOptions){.patient = patient_axes_lps(), .contrast_attenuation = 0.105, .quanta = 550, .dsa_gain = 2.2};
+    return (FluoroscopeOptions){.patient = patient_axes_lps(), .contrast_attenuation = 0.105, .quanta = 550, .dsa_gain = 2.2, .dsa_dose = 16};
 }
 
 // --- create ---
@@ -32,7 +32,7 @@ static bool options_are_sound(const FluoroscopeOptions *options, char *message, 
         if (!(options->radius[i] > 0) || !isfinite(options->radius[i]) || !(options->attenuation[i] >= 0) || !isfinite(options->attenuation[i]))
             return message_fail(message, capacity, "the tool's node %d has radius %g mm and attenuation %g / mm; both must be finite, and not negative", i,
                                 options->radius[i], options->attenuation[i]);
-    if (!(options->contrast_attenuation >= 0) || !(options->quanta >= 0) || !(options->dsa_gain > 0) || !isfinite(options->quanta))
+    if (!(options->contrast_attenuation >= 0) || !(options->quanta >= 0) || !(options->dsa_gain > 0.5) || !(options->dsa_dose > 0) || !isfinite(options->quanta))
         return message_fail(message, capacity, "contrast, quanta or gain of fluoroscopy is negative");
     return true;
 }
@@ -130,6 +130,8 @@ Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message
     f->options.tree = NULL;
     f->options.radius = f->options.attenuation = NULL;
     f->options.anatomy_value = NULL;
+    f->tone.contrast = options->contrast_attenuation;
+    f->tone.gain = options->dsa_gain;
     fluoroscope_forget(f);
     return f;
 }
@@ -141,8 +143,8 @@ void fluoroscope_destroy(Fluoroscope *f)
     anatomy_free(&f->anatomy);
     lumen_layer_destroy(&f->lumen);
     layers_destroy(&f->programs);
-    Layer *layer[6] = {&f->anatomy_layer, &f->lumen_layer, &f->roadmap_layer, &f->base, &f->picture, &f->mask};
-    for (int i = 0; i < 6; i++)
+    Layer *layer[7] = {&f->anatomy_layer, &f->lumen_layer, &f->roadmap_layer, &f->bare, &f->base, &f->picture, &f->mask};
+    for (int i = 0; i < 7; i++)
         layer_destroy(layer[i]);
     ribbon_free(&f->ribbon);
     free(f->radius), free(f->attenuation), free(f->shown.position), free(f->shown.contrast);
@@ -236,10 +238,10 @@ static void draw_anatomy(Fluoroscope *f, const CArm *c_arm, bool coarse)
     layers_draw_anatomy(&f->programs, &f->anatomy, c_arm, &f->anatomy_layer, coarse ? 64 : ANATOMY_GRID);
 }
 
-static void draw_lumen(Fluoroscope *f, Layer *layer, const CArm *c_arm, const float *contrast, bool half, bool coarse, bool *is_empty)
+static void draw_lumen(Fluoroscope *f, Layer *layer, const CArm *c_arm, const float *contrast, bool coarse, bool *is_empty)
 {
     *is_empty = !f->lumen.is_there || f->lumen_out_of_beam || !is_seen(contrast, f->lumen.node_count) ||
-                !layer_fit(layer, half ? (f->side + 1) / 2 : f->side, LAYER_R32F);
+                !layer_fit(layer, coarse ? (f->side + 1) / 2 : f->side, LAYER_R32F);
     if (*is_empty)
         return;
     layer_begin(layer);
@@ -254,8 +256,12 @@ static bool contrast_differs(const Fluoroscope *f)
     return false;
 }
 
-// Anatomy, lumen and roadmap brought up to the exposure. True where any has changed.
-static bool update_layers(Fluoroscope *f, bool is_fresh)
+typedef struct LayerChanges {
+    bool anatomy, lumen;
+} LayerChanges;
+
+// Anatomy, lumen and roadmap brought up to the exposure.
+static LayerChanges update_layers(Fluoroscope *f, bool is_fresh)
 {
     CArm c_arm = c_arm_place(&f->shown.xray, &f->options.patient);
     bool moved = is_fresh || c_arms_differ(&c_arm, &f->c_arm), flowed = contrast_differs(f), is_roadmap = lroundf(f->shown.xray.mode) == XRAY_ROADMAP;
@@ -263,39 +269,34 @@ static bool update_layers(Fluoroscope *f, bool is_fresh)
     f->roadmap_has_changed |= moved || refine;
     bool roadmap = is_roadmap && f->roadmap_has_changed;
     if (!moved && !flowed && !refine && !roadmap)
-        return false;
+        return (LayerChanges){false, false};
     f->lumen_out_of_beam = f->lumen.is_there && !lumen_is_in_beam(&f->lumen, &c_arm);
-    if (moved || refine) {
-        draw_anatomy(f, &c_arm, moved && coarse);
+    bool anatomy = moved || (refine && f->anatomy_is_coarse);
+    if (anatomy) {
+        f->anatomy_is_coarse = moved && coarse;
+        draw_anatomy(f, &c_arm, f->anatomy_is_coarse);
         f->tone.exposure = find_exposure(f, &c_arm);
     }
-    draw_lumen(f, &f->lumen_layer, &c_arm, f->shown.contrast, moved && coarse, coarse, &f->lumen_is_empty);
+    draw_lumen(f, &f->lumen_layer, &c_arm, f->shown.contrast, coarse, &f->lumen_is_empty);
     if (f->lumen.is_there)
         memcpy(f->lumen_contrast, f->shown.contrast, (size_t)f->lumen.node_count * sizeof *f->lumen_contrast);
     if (roadmap) {
-        draw_lumen(f, &f->roadmap_layer, &c_arm, f->roadmap, moved && coarse, coarse, &f->roadmap_is_empty);
+        draw_lumen(f, &f->roadmap_layer, &c_arm, f->roadmap, coarse, &f->roadmap_is_empty);
         f->roadmap_has_changed = false;
     }
     f->layers_are_coarse = coarse;
     f->c_arm = c_arm;
-    return true;
+    return (LayerChanges){anatomy, true};
 }
 
-static LayerStack layer_stack(const Fluoroscope *f)
-{
-    bool is_dsa = f->tone.mode == XRAY_DSA;
-    return (LayerStack){.anatomy = has_anatomy(f) ? &f->anatomy_layer : NULL,
-                        .lumen = f->lumen_is_empty ? NULL : &f->lumen_layer,
-                        .roadmap = f->tone.has_roadmap ? &f->roadmap_layer : NULL,
-                        .mask = is_dsa && f->has_mask ? &f->mask : NULL};
-}
+static const Layer *anatomy_of(const Fluoroscope *f) { return has_anatomy(f) ? &f->anatomy_layer : NULL; }
+static const Layer *lumen_of(const Fluoroscope *f) { return f->lumen_is_empty ? NULL : &f->lumen_layer; }
 
 static void take_mask(Fluoroscope *f)
 {
     if (!layer_fit(&f->mask, f->side, LAYER_R32F))
         return;
-    LayerStack stack = layer_stack(f);
-    layers_draw_total(&f->programs, &stack, &f->c_arm, &f->tone, &f->mask);
+    layers_draw_total(&f->programs, anatomy_of(f), lumen_of(f), &f->c_arm, &f->tone, &f->mask);
     layers_draw_tool(&f->programs, &f->ribbon, &f->tone, true, &f->mask);
     f->has_mask = true;
     f->mask_is_due = false;
@@ -317,33 +318,53 @@ static void copy_box(const Layer *from, const Layer *to, const int low[2], const
     glBlitFramebuffer(low[0], low[1], high[0], high[1], low[0], low[1], high[0], high[1], GL_COLOR_BUFFER_BIT, GL_NEAREST);
 }
 
+static void bake(Fluoroscope *f)
+{
+    // subtraction has its own dose
+    f->tone.quanta = f->options.quanta * (f->tone.is_subtracted ? f->options.dsa_dose : 1);
+    layers_bake(&f->programs, anatomy_of(f), f->tone.is_subtracted ? &f->mask : NULL, &f->tone, f->shown.xray.collimator, f->mask_pulse, &f->bare);
+    f->baked = f->shown.xray;
+}
+
+static void opacify(Fluoroscope *f)
+{
+    const int none[2] = {0, 0}, all[2] = {f->side, f->side};
+    int low[2], high[2];
+    lumen_box(&f->lumen, &f->c_arm, f->side, low, high);
+    copy_box(&f->bare, &f->base, none, all);
+    const Layer *lumen = &f->lumen_layer, *roadmap = f->tone.has_roadmap ? &f->roadmap_layer : NULL;
+    if (f->lumen_is_empty && layer_fit(&f->lumen_layer, f->roadmap_layer.side, LAYER_R32F))
+        layer_begin(lumen);
+    layers_opacify(&f->programs, &f->bare, lumen, roadmap, &f->c_arm, &f->tone, low, high, &f->base);
+}
+
 // The picture without its noise, for the exposure that was taken.
 static void make_picture(Fluoroscope *f, bool is_fresh)
 {
     const int all[2] = {f->side, f->side}, none[2] = {0, 0};
-    bool changed = update_layers(f, is_fresh);
-    int mode = (int)lroundf(f->shown.xray.mode);
-    bool has_roadmap = mode == XRAY_ROADMAP && f->lumen.is_there && !f->roadmap_is_empty;
-    changed |= has_roadmap != f->tone.has_roadmap;
-    f->tone.mode = mode == XRAY_DSA || mode == XRAY_ROADMAP ? mode : XRAY_LIVE;
+    LayerChanges changes = update_layers(f, is_fresh);
+    long mode = lroundf(f->shown.xray.mode);
+    bool has_roadmap = mode == XRAY_ROADMAP && f->lumen.is_there && !f->roadmap_is_empty, has_new_mask = false;
+    changes.lumen |= has_roadmap != f->tone.has_roadmap;
     f->tone.has_roadmap = has_roadmap;
-    f->tone.contrast = f->options.contrast_attenuation;
-    f->tone.gain = f->options.dsa_gain;
-    f->tone.quanta = f->options.quanta;
     f->ribbon.count = 0;
     if (f->shown.has_tool)
         ribbon_lay(&f->ribbon, &f->c_arm, f->side, f->options.node_count, f->shown.position, f->radius, f->attenuation);
-    if (f->mask_is_due || (f->tone.mode == XRAY_DSA && !f->has_mask)) {
+    if (f->mask_is_due || (mode == XRAY_DSA && !f->has_mask)) {
         take_mask(f);
-        changed = true;
+        has_new_mask = true;
     }
-    if (changed || is_fresh || blades_or_mode_differ(&f->baked, &f->shown.xray)) {
-        LayerStack stack = layer_stack(f);
-        layers_bake(&f->programs, &stack, &f->c_arm, &f->tone, f->shown.xray.collimator, f->mask_pulse, &f->base);
-        f->baked = f->shown.xray;
-        copy_box(&f->base, &f->picture, none, all);
-    } else
-        copy_box(&f->base, &f->picture, f->drawn_low, f->drawn_high);
+    f->tone.is_subtracted = mode == XRAY_DSA && f->has_mask;
+    bool is_baked = changes.anatomy || has_new_mask || is_fresh || blades_or_mode_differ(&f->baked, &f->shown.xray);
+    if (is_baked)
+        bake(f);
+    const Layer *base = f->lumen_is_empty && !has_roadmap ? &f->bare : &f->base;
+    if (base == &f->base && (is_baked || changes.lumen))
+        opacify(f);
+    if (is_baked || changes.lumen)
+        copy_box(base, &f->picture, none, all);
+    else
+        copy_box(base, &f->picture, f->drawn_low, f->drawn_high);
     layers_draw_tool(&f->programs, &f->ribbon, &f->tone, false, &f->picture);
     memcpy(f->drawn_low, f->ribbon.low, sizeof f->drawn_low);
     memcpy(f->drawn_high, f->ribbon.count > 0 ? f->ribbon.high : none, sizeof f->drawn_high);
@@ -386,7 +407,7 @@ void fluoroscope_draw(Fluoroscope *f, const FluoroscopeFrame *frame, ViewPort po
         return;
     bool has_pedal = frame->xray.pedal > 0.5f, is_resized = side != f->side;
     bool is_pulse = !f->has_picture || (has_pedal && frame->pulse != f->shown.pulse);
-    if (is_resized && (!layer_fit(&f->base, side, LAYER_RGBA16) || !layer_fit(&f->picture, side, LAYER_RGBA16)))
+    if (is_resized && !(layer_fit(&f->bare, side, LAYER_RGBA16) && layer_fit(&f->base, side, LAYER_RGBA16) && layer_fit(&f->picture, side, LAYER_RGBA16)))
         return;
     f->side = side;
     f->corner[0] = port.x + (port.width - side) / 2;

@@ -37,7 +37,8 @@ typedef struct FluoroscopeOptions {
     PatientAxes patient;           // default: LPS
     double contrast_attenuation;   // [1/mm] of undiluted contrast agent in blood, 0.105
     double quanta;                 // detected per pixel where nothing stands in the beam, 550; 0: no noise
-    double dsa_gain;               // exponent of DSA's brightness, 2.2
+    double dsa_gain;               // exponent of DSA's brightness, 2.2; above 0.5
+    double dsa_dose;               // quanta of a DSA pulse in those of a fluoroscopy pulse, 16
 } FluoroscopeOptions;
 FluoroscopeOptions fluoroscope_default_options(void);
 

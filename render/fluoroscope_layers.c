@@ -12,7 +12,9 @@
 #include <epoxy/gl.h>
 #include <stdlib.h>
 
-static const double white = 1.75, live_power = 0.72, subtracted = 0.62, weakest = 1.0 / 64;   // DSA: less than `weakest` of the exposure makes no more noise
+static const double white = 1.75, live_power = 0.72, subtracted = 0.62;
+static const double weakest = 1.0 / 64;              // DSA: less than this part of white makes no more noise
+static const double room[2] = {8, 4};                // above white in the baked channels: what is brighter than white may yet be darkened
 
 static const char *const SQUARE_VERTEX = "#version 330 core\n"
                                          "out vec2 at;\n"   // 0..1 over the square
@@ -39,33 +41,47 @@ static const char *const ANATOMY_FRAGMENT =
     "      sum += grid * most * step * size; } }\n"
     "  result = max(sum, 0.0); }\n";
 
-// what the baking shaders share: attenuation of anatomy and lumen at `at`
-static const char *const ATTENUATION =
-    "#version 330 core\n"
-    "in vec2 at; uniform sampler2D anatomy, lumen, roadmap, mask; uniform float slant, contrast; uniform bvec4 has;\n"
-    "float blurred(sampler2D layer, vec2 p) { vec2 h = 0.5 / vec2(textureSize(layer, 0));\n"
-    "  return 0.25 * (texture(layer, p + h).r + texture(layer, p - h).r + texture(layer, p + vec2(h.x, -h.y)).r + texture(layer, p + vec2(-h.x, h.y)).r); }\n"
-    "float along(vec2 p) { vec2 f = slant * (p - 0.5); return sqrt(1.0 + dot(f, f)); }\n"
-    "float thickness(sampler2D layer, vec2 p) { return max(blurred(layer, p), 0.0) * along(p); }\n"
-    "float attenuation(vec2 p) { float a = has.x ? texture(anatomy, p).r : 0.0; return has.y ? a + contrast * thickness(lumen, p) : a; }\n";
+// What the shaders that look at the lumen share. TAPS 4 is the detector's blur; a layer of half the resolution is blurred by its one tap. llvmpipe runs both
+// sides of a branch, so what differs is compiled apart.
+#define TAPS_4                                                                                                                                             \
+    "#version 330 core\n"                                                                                                                                  \
+    "float tap(sampler2D layer, vec2 at) { vec2 h = 0.5 / vec2(textureSize(layer, 0));\n"                                                                  \
+    "  return 0.25 * (texture(layer, at + h).r + texture(layer, at - h).r + texture(layer, at + vec2(h.x, -h.y)).r + texture(layer, at + vec2(-h.x, h.y)).r); }\n"
+#define TAPS_1 "#version 330 core\nfloat tap(sampler2D layer, vec2 at) { return texture(layer, at).r; }\n"
+#define WITH_ROADMAP "#define ROADMAP\n"
+static const char *const LUMEN_HEAD[2][2] = {{TAPS_4, TAPS_4 WITH_ROADMAP}, {TAPS_1, TAPS_1 WITH_ROADMAP}};   // full or less than full resolution, roadmap
 
-static const char *const TOTAL_FRAGMENT = "out float result; void main() { result = attenuation(at); }\n";
+static const char *const TOTAL_FRAGMENT =
+    "in vec2 at; out float result; uniform sampler2D anatomy, lumen; uniform float slant, contrast; uniform bvec2 has;\n"
+    "void main() { vec2 f = slant * (at - 0.5); result = has.x ? texture(anatomy, at).r : 0.0;\n"
+    "  if (has.y) result += contrast * max(tap(lumen, at), 0.0) * sqrt(1.0 + dot(f, f)); }\n";
 
+static const char *const OPACIFY_FRAGMENT =
+    "in vec2 at; out vec4 result; uniform sampler2D bare, lumen, roadmap; uniform float slant; uniform vec2 power;\n"
+    "void main() { vec2 f = slant * (at - 0.5); float along = sqrt(1.0 + dot(f, f)); vec4 b = texture(bare, at);\n"
+    "  b.xy *= exp2(-power * (max(tap(lumen, at), 0.0) * along));\n"
+    "#ifdef ROADMAP\n"
+    "  b.z = b.w * (1.0 - exp2(-1.3 * max(tap(roadmap, at), 0.0) * along));\n"
+    "#endif\n"
+    "  result = b; }\n";
+
+static const char *const LIVE_HEAD = "#version 330 core\n";
+static const char *const DSA_HEAD = "#version 330 core\n#define SUBTRACTED\n";
 static const char *const BAKE_FRAGMENT =
-    "out vec4 result; uniform int mode; uniform float exposure, gain, weakest, mask_noise, dark; uniform vec4 blades; uniform float corner, soft;\n"
-    "uniform sampler2D noise; uniform ivec3 offset;\n"
-    "float normal(ivec2 p) { p = offset.z != 0 ? p.yx : p; return texelFetch(noise, (p + offset.xy) & 511, 0).r * 8.0 - 4.0; }\n"
-    "void main() { float a = attenuation(at), i = min(exp(exposure - a), 1.0); vec4 r;\n"
-    "  if (mode == 1) { float m = texture(mask, at).r, d = a - m;\n"
-    "    float im = max(min(exp(exposure - m), 1.0), weakest); d += mask_noise * inversesqrt(im) * normal(ivec2(gl_FragCoord.xy));\n"
-    "    r.x = min(dark * exp(-gain * d), 1.0); r.y = r.x * inversesqrt(max(i, weakest)) * sqrt(weakest); }\n"
-    "  else { r.x = pow(i, 0.72); r.y = pow(i, 0.22); }\n"
-    "  r.z = has.z ? 1.0 - exp(-0.9 * thickness(roadmap, at)) : 0.0; r.w = 1.0;\n"
+    "in vec2 at; out vec4 result; uniform sampler2D anatomy, mask, noise; uniform bool has_anatomy; uniform ivec3 offset;\n"
+    "uniform float exposure, gain, weakest, mask_noise, dark; uniform vec4 blades; uniform vec2 soft; uniform vec2 room;\n"
+    "void main() { float a = has_anatomy ? texture(anatomy, at).r : 0.0; vec2 r;\n"
+    "#ifdef SUBTRACTED\n"
+    "  float m = texture(mask, at).r, d = a - m; ivec2 g = ivec2(gl_FragCoord.xy); g = offset.z != 0 ? g.yx : g;\n"
+    "  d += mask_noise * inversesqrt(clamp(exp(exposure - m), weakest, 1.0)) * (texelFetch(noise, (g + offset.xy) & 511, 0).r * 8.0 - 4.0);\n"
+    "  r.x = dark * exp(-gain * d); r.y = r.x * inversesqrt(clamp(exp(exposure - a), weakest, 1.0)) * sqrt(weakest);\n"
+    "#else\n"
+    "  r = exp((exposure - a) * vec2(0.72, 0.22));\n"
+    "#endif\n"
     "  vec2 p = at - 0.5, middle = 0.5 * (blades.yw + blades.xz), half_side = 0.5 * (blades.yw - blades.xz);\n"
-    "  float c = min(corner, min(half_side.x, half_side.y)); vec2 q = abs(p - middle) - half_side + c;\n"
-    "  float outside = length(max(q, 0.0)) + min(max(q.x, q.y), 0.0) - c;\n"
-    "  float open = smoothstep(soft, -soft, outside);\n"
-    "  result = vec4(r.x * open, r.y * sqrt(open), r.z * open, 1.0); }\n";
+    "  float c = min(soft.x, min(half_side.x, half_side.y)); vec2 q = abs(p - middle) - half_side + c;\n"
+    "  float outside = length(max(q, 0.0)) + min(max(q.x, q.y), 0.0) - c, open = smoothstep(soft.y, -soft.y, outside);\n"
+    "  result = vec4(r / room * vec2(open, sqrt(open)), 0.0, open); }\n";
 
 static const char *const TOOL_VERTEX =
     "#version 330 core\n"
@@ -80,14 +96,18 @@ static const char *const TOOL_FRAGMENT =
     "  float mean = 0.25 * (area.y - area.x) + 0.5 * (area.z - area.y) + 0.25 * (area.w - area.z), a = chord.z * mean;\n"
     "  result = as_attenuation ? vec4(a) : vec4(exp(-power * a), 1.0, 1.0); }\n";
 
-static const char *const SHOW_FRAGMENT =
+// nearest texels by interpolated coordinates: half the time of texelFetch on llvmpipe
+static const char *const SHOW_VERTEX =
     "#version 330 core\n"
-    "out vec4 result; uniform sampler2D baked, noise; uniform ivec2 corner; uniform ivec3 offset; uniform float sigma; uniform bool tint;\n"
-    "void main() { ivec2 p = ivec2(gl_FragCoord.xy) - corner; vec4 b = texelFetch(baked, p, 0); p = offset.z != 0 ? p.yx : p;\n"
-    "  float n = texelFetch(noise, (p + offset.xy) & 511, 0).r * 8.0 - 4.0;\n"
-    "  float grey = clamp(1.75 * b.x + sigma * b.y * n, 0.016, 1.0);\n"
-    "  result = vec4(grey, grey, grey, 1.0);\n"
-    "  if (tint) result.rgb *= mix(vec3(1.0), vec3(0.60, 1.12, 1.20), 0.8 * b.z); }\n";
+    "uniform float side; uniform ivec3 offset; out vec2 at, grain;\n"
+    "void main() { at = vec2(gl_VertexID == 1 ? 2.0 : 0.0, gl_VertexID == 2 ? 2.0 : 0.0); gl_Position = vec4(2.0 * at - 1.0, 0.0, 1.0);\n"
+    "  vec2 p = at * side; grain = ((offset.z != 0 ? p.yx : p) + vec2(offset.xy)) / 512.0; }\n";
+static const char *const SHOW_FRAGMENT =
+    "in vec2 at, grain; out vec4 result; uniform sampler2D baked, noise; uniform vec2 scale;\n"
+    "void main() { vec4 b = texture(baked, at); float grey = scale.x * b.x + scale.y * b.y * (texture(noise, grain).r - 0.5);\n"
+    "  result = vec4(grey, grey, grey, 1.0); TINT }\n";
+static const char *const NO_TINT = "#version 330 core\n#define TINT\n";
+static const char *const TINT = "#version 330 core\n#define TINT result.rgb = clamp(result.rgb, 0.0, 1.0) * mix(vec3(1.0), vec3(0.60, 1.12, 1.20), 0.8 * b.z);\n";
 
 // --- random numbers ---
 
@@ -144,11 +164,11 @@ static bool make_noise(LayerPrograms *programs)
 
 // --- create ---
 
-static unsigned square_program(const char *head, const char *fragment, char *message, size_t capacity)
+static unsigned square_program(const char *vertex, const char *head, const char *fragment, char *message, size_t capacity)
 {
     char text[8192];
     snprintf(text, sizeof text, "%s%s", head, fragment);
-    return gl_program_create(SQUARE_VERTEX, text, message, capacity);
+    return gl_program_create(vertex, text, message, capacity);
 }
 
 static void send_volume(LayerPrograms *programs, const Anatomy *anatomy)
@@ -179,13 +199,23 @@ static void make_tool_array(LayerPrograms *programs)
 bool layers_create(LayerPrograms *programs, const Anatomy *anatomy, char *message, size_t capacity)
 {
     *programs = (LayerPrograms){0};
-    programs->anatomy = square_program("", ANATOMY_FRAGMENT, message, capacity);
-    programs->total = programs->anatomy ? square_program(ATTENUATION, TOTAL_FRAGMENT, message, capacity) : 0;
-    programs->bake = programs->total ? square_program(ATTENUATION, BAKE_FRAGMENT, message, capacity) : 0;
-    programs->tool = programs->bake ? gl_program_create(TOOL_VERTEX, TOOL_FRAGMENT, message, capacity) : 0;
-    programs->show = programs->tool ? square_program("", SHOW_FRAGMENT, message, capacity) : 0;
-    if (!programs->show)
-        return false;
+    struct {
+        unsigned *program;
+        const char *vertex, *head, *fragment;
+    } wanted[] = {{&programs->anatomy, SQUARE_VERTEX, "", ANATOMY_FRAGMENT},
+                  {&programs->total, SQUARE_VERTEX, LUMEN_HEAD[0][0], TOTAL_FRAGMENT},
+                  {&programs->bake[0], SQUARE_VERTEX, LIVE_HEAD, BAKE_FRAGMENT},
+                  {&programs->bake[1], SQUARE_VERTEX, DSA_HEAD, BAKE_FRAGMENT},
+                  {&programs->opacify[0][0], SQUARE_VERTEX, LUMEN_HEAD[0][0], OPACIFY_FRAGMENT},
+                  {&programs->opacify[0][1], SQUARE_VERTEX, LUMEN_HEAD[0][1], OPACIFY_FRAGMENT},
+                  {&programs->opacify[1][0], SQUARE_VERTEX, LUMEN_HEAD[1][0], OPACIFY_FRAGMENT},
+                  {&programs->opacify[1][1], SQUARE_VERTEX, LUMEN_HEAD[1][1], OPACIFY_FRAGMENT},
+                  {&programs->tool, TOOL_VERTEX, "", TOOL_FRAGMENT},
+                  {&programs->show[0], SHOW_VERTEX, NO_TINT, SHOW_FRAGMENT},
+                  {&programs->show[1], SHOW_VERTEX, TINT, SHOW_FRAGMENT}};
+    for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++)
+        if (!(*wanted[i].program = square_program(wanted[i].vertex, wanted[i].head, wanted[i].fragment, message, capacity)))
+            return false;
     if (!make_noise(programs))
         return message_fail(message, capacity, "not enough memory for the noise of fluoroscopy");
     glGenVertexArrays(1, &programs->empty_array);
@@ -197,8 +227,10 @@ bool layers_create(LayerPrograms *programs, const Anatomy *anatomy, char *messag
 
 void layers_destroy(LayerPrograms *programs)
 {
-    const unsigned program[5] = {programs->anatomy, programs->total, programs->bake, programs->tool, programs->show};
-    for (int i = 0; i < 5; i++)
+    const unsigned program[11] = {programs->anatomy,       programs->total,         programs->bake[0],       programs->bake[1],
+                                  programs->opacify[0][0], programs->opacify[0][1], programs->opacify[1][0], programs->opacify[1][1],
+                                  programs->tool,          programs->show[0],       programs->show[1]};
+    for (int i = 0; i < 11; i++)
         if (program[i])
             glDeleteProgram(program[i]);
     glDeleteVertexArrays(1, &programs->empty_array);
@@ -213,6 +245,7 @@ bool layer_fit(Layer *layer, int side, LayerFormat format)
 {
     if (layer->side == side)
         return true;
+    GLint filter = format == LAYER_R32F ? GL_LINEAR : GL_NEAREST;
     layer_destroy(layer);
     glGenTextures(1, &layer->texture);
     glBindTexture(GL_TEXTURE_2D, layer->texture);
@@ -220,8 +253,8 @@ bool layer_fit(Layer *layer, int side, LayerFormat format)
         glTexImage2D(GL_TEXTURE_2D, 0, GL_R32F, side, side, 0, GL_RED, GL_FLOAT, NULL);
     else
         glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA16, side, side, 0, GL_RGBA, GL_UNSIGNED_SHORT, NULL);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, filter);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, filter);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
     glGenFramebuffers(1, &layer->framebuffer);
@@ -319,29 +352,32 @@ void layers_draw_anatomy(const LayerPrograms *programs, const Anatomy *anatomy, 
     draw_square(programs);
 }
 
-static void set_stack(unsigned program, const LayerStack *stack, const CArm *c_arm, const LayerTone *tone)
+static unsigned texture_of(const Layer *layer) { return layer ? layer->texture : 0; }
+
+void layers_draw_total(const LayerPrograms *programs, const Layer *anatomy, const Layer *lumen, const CArm *c_arm, const LayerTone *tone, const Layer *to)
 {
-    static const char *const name[4] = {"anatomy", "lumen", "roadmap", "mask"};
-    const Layer *layer[4] = {stack->anatomy, stack->lumen, stack->roadmap, stack->mask};
+    unsigned program = programs->total;
+    bind_layer(to);
     glUseProgram(program);
-    for (int k = 0; k < 4; k++)
-        set_texture(program, name[k], k, GL_TEXTURE_2D, layer[k] ? layer[k]->texture : 0);
-    glUniform4i(glGetUniformLocation(program, "has"), stack->anatomy != NULL, stack->lumen != NULL, stack->roadmap != NULL, stack->mask != NULL);
+    set_texture(program, "anatomy", 0, GL_TEXTURE_2D, texture_of(anatomy));
+    set_texture(program, "lumen", 1, GL_TEXTURE_2D, texture_of(lumen));
+    glUniform2i(glGetUniformLocation(program, "has"), anatomy != NULL, lumen != NULL);
     set_float(program, "slant", c_arm->field_mm / C_ARM_SOURCE_MM);
     set_float(program, "contrast", tone->contrast);
-}
-
-void layers_draw_total(const LayerPrograms *programs, const LayerStack *stack, const CArm *c_arm, const LayerTone *tone, const Layer *to)
-{
-    bind_layer(to);
-    set_stack(programs->total, stack, c_arm, tone);
     draw_square(programs);
 }
 
-void layers_bake(const LayerPrograms *programs, const LayerStack *stack, const CArm *c_arm, const LayerTone *tone, const float blades[4], uint32_t mask_pulse,
+// By which powers of transmission brightness and noise go.
+static void tone_powers(const LayerTone *tone, double power[2])
+{
+    power[0] = tone->is_subtracted ? tone->gain : live_power;
+    power[1] = power[0] - 0.5;
+}
+
+void layers_bake(const LayerPrograms *programs, const Layer *anatomy, const Layer *mask, const LayerTone *tone, const float blades[4], uint32_t mask_pulse,
                  const Layer *to)
 {
-    unsigned program = programs->bake;
+    unsigned program = programs->bake[tone->is_subtracted];
     double edge[4];
     int offset[3];
     for (int k = 0; k < 4; k++) {
@@ -351,19 +387,43 @@ void layers_bake(const LayerPrograms *programs, const LayerStack *stack, const C
     }
     noise_offset(mask_pulse, offset);
     bind_layer(to);
-    set_stack(program, stack, c_arm, tone);
-    set_int(program, "mode", stack->mask && tone->mode == XRAY_DSA ? 1 : 0);
+    glUseProgram(program);
+    set_texture(program, "anatomy", 0, GL_TEXTURE_2D, texture_of(anatomy));
+    set_texture(program, "mask", 1, GL_TEXTURE_2D, texture_of(mask));
+    set_texture(program, "noise", 2, GL_TEXTURE_2D, programs->noise);
+    set_int(program, "has_anatomy", anatomy != NULL);
     set_float(program, "exposure", tone->exposure);
     set_float(program, "gain", tone->gain);
     set_float(program, "weakest", weakest);
     set_float(program, "mask_noise", tone->quanta > 0 ? 1 / sqrt(tone->quanta) : 0);
     set_float(program, "dark", subtracted / white);
     glUniform4f(glGetUniformLocation(program, "blades"), (float)edge[0], (float)edge[1], (float)edge[2], (float)edge[3]);
-    set_float(program, "corner", 0.05);
-    set_float(program, "soft", 10.0 / 720);
-    set_texture(program, "noise", 4, GL_TEXTURE_2D, programs->noise);
+    glUniform2f(glGetUniformLocation(program, "soft"), 0.05f, 10.0f / 720);
+    glUniform2f(glGetUniformLocation(program, "room"), (float)room[0], (float)room[1]);
     glUniform3iv(glGetUniformLocation(program, "offset"), 1, offset);
     draw_square(programs);
+}
+
+void layers_opacify(const LayerPrograms *programs, const Layer *bare, const Layer *lumen, const Layer *roadmap, const CArm *c_arm, const LayerTone *tone,
+                    const int low[2], const int high[2], const Layer *to)
+{
+    unsigned program = programs->opacify[lumen->side < to->side][roadmap != NULL];
+    const double to_base_two = tone->contrast / log(2);
+    double power[2];
+    tone_powers(tone, power);
+    if (high[0] <= low[0] || high[1] <= low[1])
+        return;
+    bind_layer(to);
+    glUseProgram(program);
+    set_texture(program, "bare", 0, GL_TEXTURE_2D, bare->texture);
+    set_texture(program, "lumen", 1, GL_TEXTURE_2D, lumen->texture);
+    set_texture(program, "roadmap", 2, GL_TEXTURE_2D, texture_of(roadmap));
+    set_float(program, "slant", c_arm->field_mm / C_ARM_SOURCE_MM);
+    glUniform2f(glGetUniformLocation(program, "power"), (float)(power[0] * to_base_two), (float)(power[1] * to_base_two));
+    glEnable(GL_SCISSOR_TEST);
+    glScissor(low[0], low[1], high[0] - low[0], high[1] - low[1]);
+    draw_square(programs);
+    glDisable(GL_SCISSOR_TEST);
 }
 
 void layers_draw_tool(const LayerPrograms *programs, const Ribbon *ribbon, const LayerTone *tone, bool as_attenuation, const Layer *to)
@@ -371,12 +431,12 @@ void layers_draw_tool(const LayerPrograms *programs, const Ribbon *ribbon, const
     if (ribbon->count < 1)
         return;
     unsigned program = programs->tool;
-    bool is_subtracted = tone->mode == XRAY_DSA;
+    double power[2];
+    tone_powers(tone, power);
     bind_layer(to);
     glUseProgram(program);
     set_float(program, "side", to->side);
-    glUniform2f(glGetUniformLocation(program, "power"), (float)(is_subtracted ? tone->gain : live_power),
-                (float)(is_subtracted ? tone->gain - 0.5 : live_power - 0.5));
+    glUniform2f(glGetUniformLocation(program, "power"), (float)power[0], (float)power[1]);
     set_int(program, "as_attenuation", as_attenuation);
     glEnable(GL_BLEND);
     glBlendEquation(GL_FUNC_ADD);
@@ -391,20 +451,19 @@ void layers_draw_tool(const LayerPrograms *programs, const Ribbon *ribbon, const
 
 void layers_show(const LayerPrograms *programs, const Layer *baked, const LayerTone *tone, uint32_t pulse, unsigned framebuffer, int x, int y)
 {
-    unsigned program = programs->show;
+    unsigned program = programs->show[tone->has_roadmap];
     int offset[3];
     noise_offset(pulse, offset);
-    // of a unit of the baked noise channel
-    double unit = tone->mode == XRAY_DSA ? white * tone->gain / sqrt(weakest) : white * live_power;
+    // of a unit of the baked noise channel; the tile holds n / 8
+    double unit = tone->is_subtracted ? white * tone->gain / sqrt(weakest) : white * live_power;
     bind_layer(baked);
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
     glViewport(x, y, baked->side, baked->side);
     glUseProgram(program);
     set_texture(program, "baked", 0, GL_TEXTURE_2D, baked->texture);
     set_texture(program, "noise", 1, GL_TEXTURE_2D, programs->noise);
-    glUniform2i(glGetUniformLocation(program, "corner"), x, y);
+    set_float(program, "side", baked->side);
     glUniform3iv(glGetUniformLocation(program, "offset"), 1, offset);
-    set_float(program, "sigma", tone->quanta > 0 ? unit / sqrt(tone->quanta) : 0);
-    set_int(program, "tint", tone->has_roadmap);
+    glUniform2f(glGetUniformLocation(program, "scale"), (float)(white * room[0]), tone->quanta > 0 ? (float)(8 * room[1] * unit / sqrt(tone->quanta)) : 0);
     draw_square(programs);
 }

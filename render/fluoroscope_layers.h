@@ -13,7 +13,10 @@ typedef struct Layer {
 typedef enum { LAYER_R32F, LAYER_RGBA16 } LayerFormat;
 
 typedef struct LayerPrograms {
-    unsigned anatomy, total, bake, tool, show;
+    unsigned anatomy, total, tool;
+    unsigned bake[2];        // live, subtracted
+    unsigned opacify[2][2];  // by a lumen of full or lower resolution; with a roadmap
+    unsigned show[2];        // with a roadmap
     unsigned empty_array;    // a full-screen triangle needs no vertices
     unsigned tool_array, tool_vertices;
     unsigned noise;          // NOISE_TILE^2 R8: normal numbers n as (n + 4) / 8
@@ -24,7 +27,7 @@ enum { NOISE_TILE = 512 };
 
 // How brightness follows from transmission; the tool multiplies it by T^brightness and the noise by T^noise.
 typedef struct LayerTone {
-    int mode;                // XrayMode
+    bool is_subtracted;      // DSA, with a mask
     double exposure;         // attenuation that automatic exposure takes away
     double contrast;         // [1/mm] attenuation of undiluted contrast agent
     double gain;             // of DSA
@@ -41,14 +44,16 @@ void layer_begin(const Layer *layer);   // bound, cleared to 0, viewport set
 
 void layers_draw_anatomy(const LayerPrograms *programs, const Anatomy *anatomy, const CArm *c_arm, const Layer *to, int steps);
 
-typedef struct LayerStack {  // what is baked
-    const Layer *anatomy, *lumen, *roadmap, *mask;   // NULL: none
-} LayerStack;
+// Layers that may be NULL are those that hold nothing.
 // Attenuation of anatomy and contrast agent, without exposure, into a float layer: DSA's mask.
-void layers_draw_total(const LayerPrograms *programs, const LayerStack *stack, const CArm *c_arm, const LayerTone *tone, const Layer *to);
-// Brightness / 1.75, noise sigma in units of layers_sigma, roadmap's opacity.
-void layers_bake(const LayerPrograms *programs, const LayerStack *stack, const CArm *c_arm, const LayerTone *tone, const float blades[4], uint32_t mask_pulse,
+void layers_draw_total(const LayerPrograms *programs, const Layer *anatomy, const Layer *lumen, const CArm *c_arm, const LayerTone *tone, const Layer *to);
+// Without the lumen: brightness and noise sigma, each with room above white, nothing, how open the blades are.
+void layers_bake(const LayerPrograms *programs, const Layer *anatomy, const Layer *mask, const LayerTone *tone, const float blades[4], uint32_t mask_pulse,
                  const Layer *to);
+// A baked layer darkened by the lumen, with the roadmap's opacity (of the lumen's resolution) in its third channel, within a box [pixel]. A lumen of less than
+// the full resolution is not blurred further.
+void layers_opacify(const LayerPrograms *programs, const Layer *bare, const Layer *lumen, const Layer *roadmap, const CArm *c_arm, const LayerTone *tone,
+                    const int low[2], const int high[2], const Layer *to);
 // The tool's shadow: multiplied into a baked layer, or (as attenuation) added into a float layer.
 void layers_draw_tool(const LayerPrograms *programs, const Ribbon *ribbon, const LayerTone *tone, bool as_attenuation, const Layer *to);
 // Baked layer and noise into the framebuffer, at x, y.

@@ -193,14 +193,35 @@ void lumen_layer_destroy(Lumen *lumen)
 
 // --- drawing ---
 
+static Vec3 box_corner(const Lumen *lumen, int corner)
+{
+    Vec3 p = {corner & 1 ? lumen->low.x : lumen->high.x, corner & 2 ? lumen->low.y : lumen->high.y, corner & 4 ? lumen->low.z : lumen->high.z};
+    return vec3_add(lumen->origin, p);
+}
+
 bool lumen_is_in_beam(const Lumen *lumen, const CArm *c_arm)
 {
     double nearest = HUGE_VAL;
-    for (int corner = 0; corner < 8; corner++) {
-        Vec3 p = {corner & 1 ? lumen->low.x : lumen->high.x, corner & 2 ? lumen->low.y : lumen->high.y, corner & 4 ? lumen->low.z : lumen->high.z};
-        nearest = fmin(nearest, c_arm_project(c_arm, vec3_add(lumen->origin, p)).z + C_ARM_SOURCE_MM);
-    }
+    for (int corner = 0; corner < 8; corner++)
+        nearest = fmin(nearest, c_arm_project(c_arm, box_corner(lumen, corner)).z + C_ARM_SOURCE_MM);
     return nearest > C_ARM_NEAREST_MM;
+}
+
+void lumen_box(const Lumen *lumen, const CArm *c_arm, int side, int low[2], int high[2])
+{
+    double least[2] = {HUGE_VAL, HUGE_VAL}, most[2] = {-HUGE_VAL, -HUGE_VAL};
+    for (int corner = 0; corner < 8; corner++) {
+        Vec3 p = c_arm_project(c_arm, box_corner(lumen, corner));
+        const double at[2] = {p.x, p.y};
+        for (int k = 0; k < 2; k++) {
+            least[k] = fmin(least[k], (at[k] + 0.5) * side);
+            most[k] = fmax(most[k], (at[k] + 0.5) * side);
+        }
+    }
+    for (int k = 0; k < 2; k++) {
+        low[k] = (int)fmin(fmax(floor(least[k]) - 4, 0), side);
+        high[k] = (int)fmin(fmax(ceil(most[k]) + 4, 0), side);
+    }
 }
 
 static void send_nodes(Lumen *lumen, const CArm *c_arm, const float *concentration)

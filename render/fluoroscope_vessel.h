@@ -33,6 +33,8 @@ bool lumen_layer_create(Lumen *lumen, const FluoroscopeOptions *options, const M
 void lumen_layer_destroy(Lumen *lumen);
 // Whether the whole lumen lies between source and detector as the C-arm stands: otherwise rays are wrong and nothing may be drawn.
 bool lumen_is_in_beam(const Lumen *lumen, const CArm *c_arm);
+// The pixels of a square of `side` that the lumen may cover, blur included; high exclusive.
+void lumen_box(const Lumen *lumen, const CArm *c_arm, int side, int low[2], int high[2]);
 // Adds F into the bound framebuffer of one float channel (depth along the C-arm's axis, without the rays' slant).
 void lumen_layer_draw(Lumen *lumen, const CArm *c_arm, const float *concentration, bool coarse);
 
