@@ -101,6 +101,8 @@ void gl_canvas_read(const GlCanvas *canvas, uint8_t *rgb)
     gl_framebuffer_read(canvas->resolved, canvas->width, canvas->height, rgb);
 }
 
+void gl_canvas_finish(void) { glFinish(); }
+
 static bool add_shader(unsigned program, GLenum kind, const char *text, char *message, size_t capacity)
 {
     unsigned shader = glCreateShader(kind);

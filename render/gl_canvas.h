@@ -25,6 +25,8 @@ void gl_canvas_read(const GlCanvas *canvas, uint8_t *rgb);
 // The same of any framebuffer that is not multisampled; 0 is the window's.
 void gl_framebuffer_read(unsigned framebuffer, int width, int height, uint8_t *rgb);
 
+void gl_canvas_finish(void);   // waits until everything is drawn, to measure it
+
 // 0 with the compiler's first lines in `message`.
 unsigned gl_program_create(const char *vertex_shader, const char *fragment_shader, char *message, size_t capacity);
 
