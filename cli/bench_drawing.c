@@ -87,13 +87,20 @@ typedef struct Case {
     int width, height;
     bool arm_turns, camera_turns;
     double must_ms;                  // issue 6; 0: none
+    int only;                        // 0: everything; else 1 + the one view that is drawn, or ONLY_PANELS
 } Case;
 
+enum { ONLY_PANELS = 1 + VIEW_COUNT };
+
 static const Case cases[] = {
-    {"fluoroscopy", VIEW_FLUOROSCOPY, 1280, 720, false, false, 12},   {"fluoroscopy", VIEW_FLUOROSCOPY, 1920, 1080, false, false, 20},
-    {"fluoroscopy, C-arm turns", VIEW_FLUOROSCOPY, 1280, 720, true, false, 40}, {"fluoroscopy, C-arm turns", VIEW_FLUOROSCOPY, 1920, 1080, true, false, 40},
-    {"3D", VIEW_3D, 1280, 720, false, false, 0},                      {"3D, camera turns", VIEW_3D, 1280, 720, false, true, 0},
-    {"angioscopy", VIEW_ANGIOSCOPY, 1280, 720, false, false, 33},     {"all three", VIEW_ALL, 1280, 720, false, false, 33},
+    {"fluoroscopy", VIEW_FLUOROSCOPY, 1280, 720, false, false, 12, 0},   {"fluoroscopy", VIEW_FLUOROSCOPY, 1920, 1080, false, false, 20, 0},
+    {"fluoroscopy, C-arm turns", VIEW_FLUOROSCOPY, 1280, 720, true, false, 40, 0}, {"fluoroscopy, C-arm turns", VIEW_FLUOROSCOPY, 1920, 1080, true, false, 40, 0},
+    {"3D", VIEW_3D, 1280, 720, false, false, 0, 0},                      {"3D, camera turns", VIEW_3D, 1280, 720, false, true, 0, 0},
+    {"angioscopy", VIEW_ANGIOSCOPY, 1280, 720, false, false, 33, 0},     {"all three", VIEW_ALL, 1280, 720, false, false, 33, 0},
+    {"- of the first: panels", VIEW_FLUOROSCOPY, 1280, 720, false, false, 0, ONLY_PANELS},
+    {"- fluoroscopy", VIEW_FLUOROSCOPY, 1280, 720, false, false, 0, 1 + VIEW_FLUOROSCOPY},
+    {"- 3D, inset", VIEW_FLUOROSCOPY, 1280, 720, false, false, 0, 1 + VIEW_3D},
+    {"- angioscopy, inset", VIEW_FLUOROSCOPY, 1280, 720, false, false, 0, 1 + VIEW_ANGIOSCOPY},
 };
 enum { CASES = sizeof cases / sizeof cases[0] };
 
@@ -110,11 +117,15 @@ static void draw(Studio *studio, const Case *what, int frame)
     ViewsFrame views = {.pose = pose, .xray = &xray, .contrast = lesson->node_count ? lesson->concentration : NULL, .pulse = ++studio->pulse,
                         .look = &studio->desk.look};
     WindowInput input = {.width = what->width, .height = what->height, .scale = 1, .mouse_x = -1, .mouse_y = -1, .has_focus = true};
+    for (int i = 0; what->only && i < VIEW_COUNT; i++)
+        if (what->only != 1 + i)
+            layout.view[i].width = 0;
     views_draw(studio->views, &views, &layout, what->width, what->height, studio->canvas.framebuffer);
     trainer_panel_show(&studio->shown, studio->scene.scene, pose, lesson, NULL, &xray);
     studio->shown.state.now_s = studio->shown.state.time_s = frame / 30.0;
     studio->shown.state.view = what->view;
-    panel_draw(studio->panel, &input, &studio->shown.state, studio->canvas.framebuffer);
+    if (what->only == 0 || what->only == ONLY_PANELS)
+        panel_draw(studio->panel, &input, &studio->shown.state, studio->canvas.framebuffer);
     gl_canvas_finish();
 }
 

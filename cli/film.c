@@ -123,7 +123,8 @@ static void film_draw(Film *film, double time_s)
     if (jumped)
         fluoroscope_forget(views_fluoroscope(film->views));
     ViewsFrame frame = {.pose = pose, .xray = &pose->xray, .contrast = playback_contrast(film->playback),
-                        .pulse = (uint32_t)playback_pulses(film->playback)->count, .look = &film->desk.look};
+                        .pulse = (uint32_t)playback_pulses(film->playback)->count, .look = &film->desk.look,
+                        .is_still = true};
     views_draw(film->views, &frame, &layout, options->width, options->height, film->canvas.framebuffer);
     if (options->has_panels) {
         WindowInput input = {.width = options->width, .height = options->height, .scale = 1, .mouse_x = -1, .mouse_y = -1, .has_focus = true};

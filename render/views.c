@@ -1,6 +1,7 @@
 #include "render/views.h"
 
 #include "geom/mesh_decimate.h"
+#include "render/gl_canvas.h"
 #include "render/message.h"
 
 #include <epoxy/gl.h>
@@ -10,10 +11,14 @@
 // The wall while camera or C-arm turn: this many triangles are drawn in time without a GPU (DESIGN section 8).
 enum { COARSE_TRIANGLES = 25000 };
 
+// A view beside the main one is kept as a picture and drawn anew in every second frame, the two in turn: nobody looks at both at once.
+
 struct Views {
     Fluoroscope *fluoroscope;
     VesselScene *scene;
     Angioscope *angioscope;
+    GlCanvas inset[VIEW_COUNT];      // zeroed: none yet
+    long frames;
 };
 
 static Fluoroscope *create_fluoroscope(const ViewsOptions *options, char *message, size_t capacity)
@@ -71,29 +76,61 @@ void views_destroy(Views *views)
     fluoroscope_destroy(views->fluoroscope);
     vessel_scene_destroy(views->scene);
     angioscope_destroy(views->angioscope);
+    for (int i = 0; i < VIEW_COUNT; i++)
+        gl_canvas_destroy(&views->inset[i]);
     free(views);
+}
+
+static void draw_view(Views *views, PanelView view, const ViewsFrame *frame, ViewPort port)
+{
+    if (view == VIEW_FLUOROSCOPY) {
+        FluoroscopeFrame xray = {.pose = frame->pose, .xray = *frame->xray, .contrast = frame->contrast, .pulse = frame->pulse};
+        fluoroscope_draw(views->fluoroscope, &xray, port);
+    } else if (view == VIEW_3D) {
+        vessel_scene_draw(views->scene, frame->pose, frame->look, port);
+    } else {
+        angioscope_draw(views->angioscope, frame->pose, port);
+    }
+}
+
+// A view beside the main one is kept as a picture and drawn anew in every second frame, the two in turn: nobody looks at both at once.
+static void draw_inset(Views *views, PanelView view, const ViewsFrame *frame, ViewPort port)
+{
+    GlCanvas *inset = &views->inset[view];
+    bool fits = inset->width == port.width && inset->height == port.height;
+    if (!fits) {
+        gl_canvas_destroy(inset);
+        if (!gl_canvas_create(inset, port.width, port.height, 1, NULL, 0)) {
+            *inset = (GlCanvas){0};
+            draw_view(views, view, frame, port);
+            return;
+        }
+    }
+    if (!fits || frame->is_still || (views->frames + (int)view) % 2 == 0)
+        draw_view(views, view, frame, (ViewPort){inset->framebuffer, 0, 0, port.width, port.height});
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, inset->framebuffer);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, port.framebuffer);
+    glBlitFramebuffer(0, 0, port.width, port.height, port.x, port.y, port.x + port.width, port.y + port.height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
 }
 
 void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout, int width, int height, unsigned framebuffer)
 {
-    ViewPort port[VIEW_COUNT];
-    for (int i = 0; i < VIEW_COUNT; i++) {
-        port[i] = layout->view[i];
-        port[i].framebuffer = framebuffer;
-    }
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
     glViewport(0, 0, width, height);
     glDisable(GL_SCISSOR_TEST);
     glClearColor(0.03F, 0.035F, 0.045F, 1);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-    if (port[VIEW_FLUOROSCOPY].width > 0) {
-        FluoroscopeFrame xray = {.pose = frame->pose, .xray = *frame->xray, .contrast = frame->contrast, .pulse = frame->pulse};
-        fluoroscope_draw(views->fluoroscope, &xray, port[VIEW_FLUOROSCOPY]);
+    for (int i = 0; i < VIEW_COUNT; i++) {
+        ViewPort port = layout->view[i];
+        port.framebuffer = framebuffer;
+        if (port.width <= 0 || port.height <= 0)
+            continue;
+        if (i == (int)layout->main || layout->main == VIEW_ALL)
+            draw_view(views, (PanelView)i, frame, port);
+        else
+            draw_inset(views, (PanelView)i, frame, port);
     }
-    if (port[VIEW_3D].width > 0)
-        vessel_scene_draw(views->scene, frame->pose, frame->look, port[VIEW_3D]);
-    if (port[VIEW_ANGIOSCOPY].width > 0)
-        angioscope_draw(views->angioscope, frame->pose, port[VIEW_ANGIOSCOPY]);
+    views->frames++;
 }
 
 const VesselScene *views_scene(const Views *views) { return views->scene; }

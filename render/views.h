@@ -32,9 +32,10 @@ typedef struct ViewsFrame {
     const float *contrast;           // (N of the tree), NULL: none
     uint32_t pulse;                  // number of X-ray pulses so far
     const VesselSceneLook *look;
+    bool is_still;                   // a picture for itself: nothing is taken from the frame before
 } ViewsFrame;
 
-// Draws each view that the layout shows into `framebuffer`, and dark ground into what lies between.
+// Draws each view that the layout shows (the ones beside the main view in turn) into `framebuffer`, and dark ground into what lies between.
 void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout, int width, int height, unsigned framebuffer);
 const VesselScene *views_scene(const Views *views);
 Fluoroscope *views_fluoroscope(Views *views);
