@@ -1,0 +1,318 @@
+// Device maps: what is read, every fault in one pass with its place, and the laws of axes and counters.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "input/gamepad.h"
+#include "input/map_state.h"
+#include "tests/input/hid_recordings.h"
+
+#include <dirent.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static Faults faults;
+
+static bool near(double a, double b) { return fabs(a - b) <= 1e-9 * (1 + fabs(b)); }
+
+static DeviceMap *parse(const char *text)
+{
+    faults_clear(&faults);
+    DeviceMap *map = device_map_parse(text, strlen(text), "m.yaml", &faults);
+    assert_int_equal(map == NULL, faults.count > 0);
+    return map;
+}
+
+static DeviceMap *must_parse(const char *text)
+{
+    DeviceMap *map = parse(text);
+    if (!map)
+        fail_msg("%s", faults.text[0]);
+    return map;
+}
+
+static HidDescriptor *descriptor_of(const char *hex)
+{
+    uint8_t bytes[HID_DESCRIPTOR_LIMIT];
+    faults_clear(&faults);
+    HidDescriptor *descriptor = hid_descriptor_parse(bytes, hid_bytes(hex, bytes), "device", &faults);
+    assert_non_null(descriptor);
+    return descriptor;
+}
+
+#define TOP "seldinger_device: 1\n"
+#define HID TOP "device: {usage: joystick}\n"
+
+static void every_fault_comes_in_one_pass(void **state)
+{
+    (void)state;
+    assert_null(parse("seldinger_device: 2\n"
+                      "device: {vendor_id: 70000, usage: jostick}\n"
+                      "push: {source: Q, mm_s: -3, mm_per_count: 1}\n"
+                      "twist: {source: X, mm_s: 3}\n"
+                      "pedal: {source: button_0}\n"
+                      "force: {max_n: 3}\n"));
+    const char *const places[] = {"m.yaml:1:", "m.yaml:2:", "m.yaml:2:", "m.yaml:3:", "m.yaml:4:", "m.yaml:5:", "m.yaml:6:"};
+    assert_true(faults.count >= 8);
+    for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
+        bool found = false;
+        for (int k = 0; k < faults.count; k++)
+            found |= !strncmp(faults.text[k], places[i], strlen(places[i]));
+        if (!found)
+            fail_msg("no fault at %s", places[i]);
+    }
+}
+
+static void expect_fault(const char *text, const char *words)
+{
+    assert_null(parse(text));
+    for (int i = 0; i < faults.count && i < FAULTS_CAPACITY; i++)
+        if (strstr(faults.text[i], words))
+            return;
+    fail_msg("<<%s>> gave '%s'; expected %s", text, faults.text[0], words);
+}
+
+static void what_does_not_fit_together_is_said(void **state)
+{
+    (void)state;
+    expect_fault("", "empty");
+    expect_fault("[1, 2]", "no device map");
+    expect_fault(TOP "device: {}\npush: {source: X, mm_s: 1}\n", "names none");
+    expect_fault(HID, "something to do");
+    expect_fault(HID "push: {source: X}\n", "one of mm_s and mm_per_count");
+    expect_fault(HID "push: {source: X, mm_s: 1, mm_per_count: 1}\n", "one of mm_s and mm_per_count");
+    expect_fault(HID "push: {source: X, mm_per_count: 1, dead_zone: 0.1}\n", "goes with a deflection");
+    expect_fault(HID "push: {source: X, mm_s: 1, counts_per_wrap: 16}\n", "goes with counts");
+    expect_fault(HID "push: {source: X, mm_s: 1, kind: counter}\n", "is deflection");
+    expect_fault(HID "push: {source: X, mm_s: 1, kind: circular}\n", "one of");
+    expect_fault(HID "push: {source: X, mm_s: 1, logical_min: 5, logical_max: 5}\n", "do not grow");
+    expect_fault(HID "push: {source: X, mm_s: 1, logical_min: 0, logical_centre: 9, logical_max: 5}\n", "do not grow");
+    expect_fault(HID "push: {source: X, mm_s: 2000}\n", "out of range");
+    expect_fault(HID "push: {source: X, cm_s: 2}\n", "mm_s");
+    expect_fault(HID "push: {source: X, mm_s: 2}\nforce: {full_scale_n: 2, max_n: 3}\n", "above");
+    expect_fault(TOP "device: {gamepad: true}\npush: {source: left_y, mm_per_count: 2}\n", "deflections");
+    expect_fault(TOP "device: {gamepad: true}\npush: {source: X, mm_s: 2}\n", "left_x");
+    expect_fault(TOP "device: {gamepad: true, joystick: \"*\"}\npush: {source: axis_0, mm_s: 2}\n", "is one of");
+    expect_fault(TOP "device: {gamepad: true}\npush: {source: left_y, mm_s: 2}\nforce: {full_scale_n: 1}\n", "through HID");
+    expect_fault(TOP "device: {usb: ftdi}\npush: {source: B, mm_per_count: 2}\n", "not among");
+    expect_fault(TOP "device: {usb: ftdi}\npush: {source: A, mm_s: 2}\n", "gives counts");
+    expect_fault(TOP "device: {usb: ftdi}\nserial: {counts: [A1, A1]}\npush: {source: A1, mm_per_count: 2}\n", "letters without digits");
+    expect_fault(TOP "device: {usb: ftdi}\nserial: {counts: [A, A]}\npush: {source: A, mm_per_count: 2}\n", "twice");
+    expect_fault(TOP "device: {usb: ftdi}\npedal: {source: A}\n", "no buttons");
+    expect_fault(TOP "device: {vendor_id: 046d}\npush: {source: X, mm_s: 2}\n", "0x");
+    expect_fault(HID "push: {source: X, mm_s: 2}\npush: {source: Y, mm_s: 2}\n", "second time");
+}
+
+static void built_in_and_example_maps_are_good(void **state)
+{
+    (void)state;
+    for (int i = 0; i < BUILT_IN_COUNT; i++) {
+        DeviceMap *map = must_parse(device_map_built_in_text((BuiltInMap)i));
+        assert_true(map->axis_count >= 2);
+        free(map);
+    }
+    DIR *folder = opendir(SOURCE_DIR "/scenes/devices");
+    int count = 0;
+    assert_non_null(folder);
+    for (struct dirent *entry; (entry = readdir(folder));) {
+        char path[512];
+        if (entry->d_name[0] == '.')
+            continue;
+        snprintf(path, sizeof path, SOURCE_DIR "/scenes/devices/%s", entry->d_name);
+        faults_clear(&faults);
+        DeviceMap *map = device_map_load(path, &faults);
+        if (!map)
+            fail_msg("%s", faults.text[0]);
+        free(map);
+        count++;
+    }
+    closedir(folder);
+    assert_true(count >= 5);
+}
+
+static void deflections_are_odd_monotone_and_continuous(void **state)
+{
+    (void)state;
+    for (double dead = 0; dead < 0.9; dead += 0.11)
+        for (double exponent = 0.5; exponent <= 4; exponent += 0.5) {
+            double before = -1;
+            assert_true(map_shape(0, dead, exponent) == 0 && near(map_shape(1, dead, exponent), 1) && near(map_shape(-1, dead, exponent), -1));
+            for (int i = -1000; i <= 1000; i++) {
+                double d = i / 1000.0, shaped = map_shape(d, dead, exponent);
+                assert_true(shaped == -map_shape(-d, dead, exponent));
+                assert_true(shaped >= before && fabs(shaped) <= 1);
+                if (fabs(d) <= dead)
+                    assert_true(shaped == 0);
+                before = shaped;
+            }
+            // just beyond the dead zone there is no step: |shape| <= (step / (1 - dead))^exponent
+            double step = 1e-6;
+            assert_true(map_shape(dead + step, dead, exponent) <= pow(1.01 * step / (1 - dead), exponent));
+        }
+}
+
+static void calibration_puts_ends_and_centre_where_it_says(void **state)
+{
+    (void)state;
+    // a centre off the middle: both sides reach full deflection
+    assert_true(near(map_deflection(100, 100, 300, 1000), -1) && map_deflection(300, 100, 300, 1000) == 0 && near(map_deflection(1000, 100, 300, 1000), 1));
+    assert_true(near(map_deflection(650, 100, 300, 1000), 0.5) && near(map_deflection(200, 100, 300, 1000), -0.5));
+    assert_true(near(map_deflection(5000, 100, 300, 1000), 1) && near(map_deflection(-5000, 100, 300, 1000), -1));
+    assert_true(map_deflection(-3, 0, 0, 10) == 0 && near(map_deflection(5, 0, 0, 10), 0.5));    // one-sided, a trigger
+    for (int raw = 0; raw < 256; raw++)    // mirrored about the middle of a range of even length
+        assert_true(near(map_deflection(raw, 0, 127.5, 255), -map_deflection(255 - raw, 0, 127.5, 255)));
+}
+
+static void counters_go_on_over_their_wrap(void **state)
+{
+    (void)state;
+    assert_true(map_counter_step(65530, 4, 65536) == 10 && map_counter_step(4, 65530, 65536) == -10);
+    assert_true(map_counter_step(-32760, 32760, 65536) == -16 && map_counter_step(1000, 1000, 65536) == 0);
+    assert_true(map_counter_step(10, 250, 0) == 240);
+    // a whole walk at any step below half a turn adds up, wherever it wraps
+    uint64_t random = 7;
+    int64_t position = 0, counted = 0;
+    for (int i = 0; i < 20000; i++) {
+        random = random * 6364136223846793005u + 1442695040888963407u;
+        int64_t step = (int64_t)(random >> 40) % 1000 - 500, next = position + step;
+        double a = (double)(((position % 1024) + 1024) % 1024), b = (double)(((next % 1024) + 1024) % 1024);
+        counted += (int64_t)map_counter_step(a, b, 1024);
+        position = next;
+    }
+    assert_int_equal(counted, position);
+}
+
+// The same way of a roller, reported at once, each count alone, or in between: the same port.
+static void ways_do_not_depend_on_how_often_is_reported(void **state)
+{
+    (void)state;
+    HidDescriptor *mouse = descriptor_of(boot_mouse);
+    DeviceMap *map = must_parse(TOP "device: {usage: mouse}\npush: {source: Y, mm_per_count: 0.1}\ntwist: {source: X, deg_per_count: 0.7, invert: true}\n");
+    double advanced[3], turned[3];
+    const int chunk[3] = {1, 7, 126};
+    for (int k = 0; k < 3; k++) {
+        MapState device;
+        HandPort port = {0};
+        assert_true(map_bind_hid(map, mouse, "mouse", &device, &faults));
+        for (int left = 126 * 21; left > 0; left -= chunk[k]) {
+            const uint8_t report[] = {0, (uint8_t)-chunk[k], (uint8_t)chunk[k]};
+            assert_true(map_take_report(map, mouse, report, sizeof report, &device));
+        }
+        map_publish(map, &device, &port);
+        advanced[k] = port.advanced_mm;
+        turned[k] = port.turned_deg;
+        assert_true(port.push_mm_s == 0 && port.twist_deg_s == 0);
+    }
+    assert_true(near(advanced[0], 0.1 * 126 * 21) && near(turned[0], 0.7 * 126 * 21));
+    assert_true(advanced[0] == advanced[1] && advanced[1] == advanced[2] && turned[0] == turned[1] && turned[1] == turned[2]);
+    free(mouse);
+    free(map);
+}
+
+static void real_reports_become_rates(void **state)
+{
+    (void)state;
+    HidDescriptor *wheel = descriptor_of(driving_force_pro);
+    DeviceMap *map = device_map_built_in(BUILT_IN_HID_JOYSTICK);
+    MapState device;
+    HandPort port = {0};
+    assert_true(map_bind_hid(map, wheel, "wheel", &device, &faults));
+    // X full left, button 2, hat north-east (1), Y far away
+    assert_true(map_take_report(map, wheel, (const uint8_t[]){0, 0x80, 0, 0x10, 0, 0, 0, 0}, 8, &device));
+    map_publish(map, &device, &port);
+    assert_true(near(port.push_mm_s, 40 + 2) && near(port.twist_deg_s, -240 + 20));
+    assert_int_equal(port.buttons, HAND_CONTRAST);
+    // hat released (8, outside its range), X and Y as near the middle as they come
+    assert_true(map_take_report(map, wheel, (const uint8_t[]){0xff, 0x1f, 0, 0x80, 127, 0, 0, 0}, 8, &device));
+    map_publish(map, &device, &port);
+    assert_true(port.push_mm_s == 0 && port.twist_deg_s == 0 && port.buttons == 0);
+    assert_false(map_take_report(map, wheel, (const uint8_t[]){0, 0, 0, 0, 0, 0, 0}, 7, &device));
+    assert_int_equal(device.bad_reports, 1);
+    map_take_report(map, wheel, (const uint8_t[]){0, 0x80, 0, 0x10, 0, 0, 0, 0}, 8, &device);
+    map_release(map, &device);
+    map_publish(map, &device, &port);
+    assert_true(port.push_mm_s == 0 && port.twist_deg_s == 0 && port.buttons == 0);
+    free(wheel);
+    free(map);
+}
+
+static void a_map_that_a_device_cannot_fill_is_refused(void **state)
+{
+    (void)state;
+    HidDescriptor *mouse = descriptor_of(boot_mouse), *space = descriptor_of(space_mouse);
+    MapState device;
+    DeviceMap *map = must_parse(TOP "device: {usage: mouse}\npush: {source: Rz, mm_s: 1}\ntwist: {source: X, deg_s: 5}\npedal: {source: button_9}\n");
+    assert_false(map_bind_hid(map, mouse, "mouse", &device, &faults));
+    assert_int_equal(faults.count, 3);    // no Rz, X is relative, no button 9: all at once, each with its place
+    assert_non_null(strstr(faults.text[0], "m.yaml:3:"));
+    assert_non_null(strstr(faults.text[1], "deg_per_count"));
+    free(map);
+    // a space mouse calls its deflections relative; the map says what they are
+    map = must_parse(TOP "device: {usage: multi_axis}\npush: {source: Y, mm_s: 35, dead_zone: 0, kind: deflection}\n");
+    HandPort port = {0};
+    assert_true(map_bind_hid(map, space, "space mouse", &device, &faults));
+    assert_true(map_take_report(map, space, (const uint8_t[]){1, 0, 0, 175, 0, 0, 0}, 7, &device));
+    map_publish(map, &device, &port);
+    assert_true(near(port.push_mm_s, 17.5));
+    free(map);
+    free(mouse);
+    free(space);
+}
+
+static void gamepads_are_plain_arrays(void **state)
+{
+    (void)state;
+    DeviceMap *map = device_map_built_in(BUILT_IN_GAMEPAD);
+    Gamepad pad = {0};
+    HandPort port = {0};
+    faults_clear(&faults);
+    assert_true(gamepad_bind(&pad, map, 6, 15, "pad", &faults));
+    float axes[6] = {0, -1, 0, 0, -1, -1};
+    unsigned char buttons[15] = {0};
+    gamepad_update(&pad, axes, 6, buttons, 15, &port);
+    assert_true(near(port.push_mm_s, 40) && port.twist_deg_s == 0 && port.buttons == 0 && port.state == HAND_READY);
+    axes[1] = 0.14f;      // within the dead zone
+    axes[2] = -1;
+    axes[5] = 0.2f;       // trigger more than half way
+    buttons[1] = 1;
+    gamepad_update(&pad, axes, 6, buttons, 15, &port);
+    assert_true(port.push_mm_s == 0 && near(port.twist_deg_s, -240));
+    assert_int_equal(port.buttons, HAND_PEDAL | HAND_STOP);
+    axes[2] = NAN;        // a driver's nonsense changes nothing
+    gamepad_update(&pad, axes, 6, buttons, 15, &port);
+    assert_true(near(port.twist_deg_s, -240));
+    gamepad_lost(&pad, &port);
+    assert_true(port.push_mm_s == 0 && port.twist_deg_s == 0 && port.buttons == 0 && port.state == HAND_LOST);
+    assert_false(gamepad_bind(&pad, map, 2, 15, "pad", &faults));
+    int vendor, product;
+    assert_true(gamepad_ids_of_guid("030000004c050000cc09000011010000", &vendor, &product));
+    assert_true(vendor == 0x054c && product == 0x09cc);
+    assert_false(gamepad_ids_of_guid("05000000536f6d65206e616d65000000", &vendor, &product));
+    assert_false(gamepad_ids_of_guid("03000000", &vendor, &product));
+    const DeviceMap *maps[] = {map};
+    assert_ptr_equal(gamepad_choose_map(maps, 1, true, "x"), map);
+    assert_null(gamepad_choose_map(maps, 1, false, "x"));
+    free(map);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_fault_comes_in_one_pass),
+        cmocka_unit_test(what_does_not_fit_together_is_said),
+        cmocka_unit_test(built_in_and_example_maps_are_good),
+        cmocka_unit_test(deflections_are_odd_monotone_and_continuous),
+        cmocka_unit_test(calibration_puts_ends_and_centre_where_it_says),
+        cmocka_unit_test(counters_go_on_over_their_wrap),
+        cmocka_unit_test(ways_do_not_depend_on_how_often_is_reported),
+        cmocka_unit_test(real_reports_become_rates),
+        cmocka_unit_test(a_map_that_a_device_cannot_fill_is_refused),
+        cmocka_unit_test(gamepads_are_plain_arrays),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

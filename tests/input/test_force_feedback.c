@@ -1,0 +1,340 @@
+// Force back to the hand: what is found in descriptors, the bytes that are sent, and what the guard lets through; with a clock of its own.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "input/force_feedback.h"
+#include "input/hand.h"
+#include "tests/input/fake_hid.h"
+#include "tests/input/hid_recordings.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+static Faults faults;
+
+static bool near(double a, double b) { return fabs(a - b) <= 1e-9; }
+
+static HidDescriptor *descriptor_of(const char *hex)
+{
+    static uint8_t bytes[HID_DESCRIPTOR_LIMIT];
+    faults_clear(&faults);
+    HidDescriptor *descriptor = hid_descriptor_parse(bytes, hid_bytes(hex, bytes), "device", &faults);
+    if (!descriptor)
+        fail_msg("%s", faults.text[0]);
+    return descriptor;
+}
+
+static DeviceMap *map_of(const char *text)
+{
+    faults_clear(&faults);
+    DeviceMap *map = device_map_parse(text, strlen(text), "m.yaml", &faults);
+    if (!map)
+        fail_msg("%s", faults.text[0]);
+    return map;
+}
+
+static void expect_bytes(const PidMessage *message, HidReportKind kind, const char *hex)
+{
+    uint8_t bytes[64];
+    size_t length = hid_bytes(hex, bytes);
+    char got[200] = "";
+    for (int i = 0; i < message->length; i++)
+        snprintf(got + 2 * i, 3, "%02x", message->bytes[i]);
+    if (message->kind != kind || (size_t)message->length != length || memcmp(bytes, message->bytes, length) != 0)
+        fail_msg("sent %s, expected %s", got, hex);
+}
+
+static void a_real_joystick_gets_the_reports_that_it_describes(void **state)
+{
+    (void)state;
+    HidDescriptor *stick = descriptor_of(sidewinder_2);
+    PidLayout layout;
+    PidMessage message;
+    char why[128];
+    int64_t value;
+    assert_true(pid_find(stick, &layout, why, sizeof why));
+    assert_true(pid_encode_reset(&layout, &message));
+    expect_bytes(&message, HID_OUTPUT, "0c04");      // the 4th of six device controls
+    assert_true(pid_encode_enable(&layout, &message));
+    expect_bytes(&message, HID_OUTPUT, "0c01");
+    assert_true(pid_encode_gain(&layout, &message));
+    expect_bytes(&message, HID_OUTPUT, "0dff");
+    assert_true(pid_encode_create(&layout, &message));
+    expect_bytes(&message, HID_FEATURE, "01010000");
+    assert_int_equal(pid_decode_block_load(&layout, (const uint8_t[]){2, 7, 1, 0, 1}, 5), 7);
+    assert_int_equal(pid_decode_block_load(&layout, (const uint8_t[]){2, 7, 2, 0, 1}, 5), 0);    // full
+    assert_int_equal(pid_decode_block_load(&layout, (const uint8_t[]){3, 7, 1, 0, 1}, 5), 0);    // another report
+    assert_int_equal(pid_decode_block_load(&layout, (const uint8_t[]){2, 7}, 2), 0);
+    // index, constant, duration for ever, two intervals, gain, no trigger, axes and direction enable, directions, delay
+    assert_true(pid_encode_effect(&layout, 7, 90, &message));
+    expect_bytes(&message, HID_OUTPUT, "010701" "ffff" "0000" "0000" "ff" "ff" "04" "4000" "0000");
+    assert_int_equal(pid_duration_ms(&layout), 0);
+    assert_true(pid_encode_force(&layout, 7, -1, &message, &value));
+    expect_bytes(&message, HID_OUTPUT, "050701ff");
+    assert_int_equal(value, -255);
+    assert_true(pid_encode_force(&layout, 7, 0.5, &message, &value));
+    expect_bytes(&message, HID_OUTPUT, "05078000");
+    assert_true(pid_encode_force(&layout, 7, 9, &message, &value) && value == 255);
+    assert_true(pid_encode_start(&layout, 7, &message));
+    expect_bytes(&message, HID_OUTPUT, "0a070101");
+    assert_true(pid_encode_stop(&layout, 7, &message));
+    expect_bytes(&message, HID_OUTPUT, "0a070300");
+    free(stick);
+}
+
+static void what_has_no_constant_force_says_so(void **state)
+{
+    (void)state;
+    static const struct { const char *hex, *words; } cases[] = {{xbox_one_s, "no constant force effect"}, {dualshock_4, "no force feedback"}, {boot_mouse, "no force feedback"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        HidDescriptor *device = descriptor_of(cases[i].hex);
+        PidLayout layout;
+        char why[128] = "";
+        assert_false(pid_find(device, &layout, why, sizeof why));
+        assert_non_null(strstr(why, cases[i].words));
+        free(device);
+    }
+}
+
+static void the_reaction_comes_from_where_the_stick_goes(void **state)
+{
+    (void)state;
+    static const struct { const char *push; double deg; } cases[] = {{"{source: X, mm_s: 1}", 90}, {"{source: X, mm_s: 1, invert: true}", 270},
+                                                                     {"{source: Y, mm_s: 1}", 180}, {"{source: Y, mm_s: 1, invert: true}", 0}};
+    char text[200];
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        snprintf(text, sizeof text, "seldinger_device: 1\ndevice: {usage: joystick}\npush: %s\n", cases[i].push);
+        DeviceMap *map = map_of(text);
+        map->force.direction_deg = NAN;
+        assert_true(force_direction_deg(map, false) == cases[i].deg);
+        free(map);
+    }
+    DeviceMap *map = map_of("seldinger_device: 1\ndevice: {usage: joystick}\npush: {source: slider, mm_s: 1}\nforce: {full_scale_n: 1}\n");
+    assert_true(isnan(force_direction_deg(map, false)));
+    free(map);
+}
+
+static const MapForce limits = {.is_wanted = true, .full_scale_n = 8, .max_n = 4, .slew_n_s = 200, .full_scale_n_mm = 40, .stall_ms = 50, .quiet_ms = 200};
+
+// A millisecond after another, the simulation and the device alive unless told otherwise.
+typedef struct Clock {
+    ForceGuard guard;
+    int64_t now, step, report;
+} Clock;
+
+static double tick(Clock *clock, double wanted, bool steps, bool reports, bool paused)
+{
+    clock->now += 1000;
+    clock->step += steps;
+    clock->report = reports ? clock->now : clock->report;
+    force_guard(&clock->guard, &limits, (const double[]){wanted, 0}, clock->step, clock->now, clock->report, paused);
+    return clock->guard.sent[0];
+}
+
+static void forces_are_clamped_and_grow_no_faster_than_the_slew(void **state)
+{
+    (void)state;
+    Clock clock = {.now = 5000000};
+    double before = 0;
+    assert_true(tick(&clock, 1, true, true, false) == 0);    // at first it is not known whether the simulation lives
+    for (int i = 0; i < 100; i++) {
+        double sent = tick(&clock, 100, true, true, false);
+        assert_true(fabs(sent - before) <= 0.2 + 1e-12 && sent <= 4);
+        before = sent;
+    }
+    assert_true(near(before, 4));
+    for (int i = 0; i < 100; i++) {
+        double sent = tick(&clock, -100, true, true, false);
+        assert_true(fabs(sent - before) <= 0.2 + 1e-12 && sent >= -4);
+        before = sent;
+    }
+    assert_true(near(before, -4));
+    for (int i = 0; i < 100; i++)
+        before = tick(&clock, 1.25, true, true, false);
+    assert_true(near(before, 1.25));
+}
+
+static void the_watchdog_takes_the_force_away_at_once(void **state)
+{
+    (void)state;
+    Clock clock = {.now = 1000000};
+    for (int i = 0; i < 50; i++)
+        tick(&clock, 3, true, true, false);
+    assert_true(near(clock.guard.sent[0], 3));
+    // the simulation stands: full force for less than 50 ms, then none
+    for (int i = 1; i < 50; i++)
+        assert_true(near(tick(&clock, 3, false, true, false), 3));
+    assert_true(tick(&clock, 3, false, true, false) == 0);
+    assert_non_null(strstr(clock.guard.why_zero, "simulation stands"));
+    assert_true(near(tick(&clock, 3, true, true, false), 0.2));    // and grows again by the slew
+    for (int i = 0; i < 50; i++)
+        tick(&clock, 3, true, true, false);
+    // the device is silent
+    for (int i = 1; i < 200; i++)
+        assert_true(near(tick(&clock, 3, true, false, false), 3));
+    assert_true(tick(&clock, 3, true, false, false) == 0);
+    assert_non_null(strstr(clock.guard.why_zero, "silent"));
+    for (int i = 0; i < 50; i++)
+        tick(&clock, 3, true, true, false);
+    assert_true(tick(&clock, 3, true, true, true) == 0);           // paused
+    for (int i = 0; i < 50; i++)
+        tick(&clock, 3, true, true, false);
+    assert_true(tick(&clock, NAN, true, true, false) == 0);
+    assert_true(tick(&clock, INFINITY, true, true, false) == 0);
+}
+
+static void a_late_tick_does_not_jump(void **state)
+{
+    (void)state;
+    Clock clock = {.now = 1000000};
+    tick(&clock, 4, true, true, false);
+    tick(&clock, 4, true, true, false);
+    clock.now += 3000000;
+    double before = clock.guard.sent[0], sent = tick(&clock, -4, true, true, false);
+    // a gap counts as 50 ms at most
+    assert_true(before - sent <= 200 * 0.05 + 1e-9);
+}
+
+// --- with the threads and a device that is only there in fake_hid.h ---
+
+#define wait_for(condition) \
+    do { \
+        int64_t until_ = fake_now_us() + 10000000; \
+        while (!(condition) && fake_now_us() < until_) \
+            fake_sleep_us(200); \
+        if (!(condition)) \
+            fail_msg("never: %s", #condition); \
+    } while (0)
+
+// The magnitude in the last Set Constant Force report; 0 where none was sent. *when: the time of it.
+static int last_magnitude(FakeHid *hid, int *writes)
+{
+    int magnitude = 0, count = 0;
+    pthread_mutex_lock(&hid->lock);
+    for (int i = 0; i < hid->device[0].written_count; i++)
+        if (hid->device[0].written[i].bytes[0] == 5) {
+            magnitude = (int16_t)(hid->device[0].written[i].bytes[2] | hid->device[0].written[i].bytes[3] << 8);
+            count++;
+        }
+    pthread_mutex_unlock(&hid->lock);
+    if (writes)
+        *writes = count;
+    return magnitude;
+}
+
+static void a_stick_feels_the_sheath_until_the_simulation_stands(void **state)
+{
+    (void)state;
+    static uint8_t bytes[HID_DESCRIPTOR_LIMIT];
+    size_t length = hid_bytes(sidewinder_2, bytes);
+    FakeHid *hid = calloc(1, sizeof *hid);
+    assert_non_null(hid);
+    HidTransport transport = fake_transport(hid);
+    HandsOptions options = hands_default_options();
+    // a watchdog slow enough for a busy machine
+    DeviceMap *map = map_of("seldinger_device: 1\ndevice: {usage: joystick}\npush: {source: Y, mm_s: 40, invert: true}\n"
+                            "force: {full_scale_n: 8, max_n: 4, stall_ms: 1000, quiet_ms: 10000}\n");
+    options.map = (const DeviceMap *const *)&map;
+    options.map_count = 1;
+    options.rescan_ms = 10;
+    options.transport = &transport;
+    hid->device[0].feature_answer = (FakeReport){.length = 5, .bytes = {2, 3, 1, 0, 1}};
+    fake_plug(hid, 0, 0x045e, 0x001b, "", HID_USAGE(1, 4), bytes, (int)length);
+    faults_clear(&faults);
+    Hands *hands = hands_open(&options, &faults);
+    assert_non_null(hands);
+    HandPort *port = hands_port(hands, 0);
+    wait_for(atomic_load(&port->state) == HAND_READY);
+    HandInfo info;
+    wait_for((hands_info(hands, 0, &info), strstr(info.force, "255 steps for 8 N")));
+    const uint8_t rest[] = {1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    // 2 N of 8 N: 64 of 255 steps, reached by the slew; steps and reports go on
+    atomic_store(&port->force_n, 2);
+    int64_t until = fake_now_us() + 10000000;
+    while (last_magnitude(hid, NULL) != 64 && fake_now_us() < until) {
+        atomic_fetch_add(&port->step, 1);
+        fake_report(hid, 0, rest, sizeof rest);
+        fake_sleep_us(500);
+    }
+    int writes;
+    assert_int_equal(last_magnitude(hid, &writes), 64);
+    // every magnitude once, in order, none faster than a millisecond after the one before
+    pthread_mutex_lock(&hid->lock);
+    int before = -1;
+    int64_t before_us = 0;
+    for (int i = 0; i < hid->device[0].written_count; i++) {
+        const FakeReport *report = &hid->device[0].written[i];
+        if (report->bytes[0] != 5)
+            continue;
+        int magnitude = (int16_t)(report->bytes[2] | report->bytes[3] << 8);
+        if (magnitude <= before)
+            fail_msg("%d follows %d", magnitude, before);
+        if (before > 0)
+            assert_true(hid->device[0].written_us[i] - before_us >= 900);
+        before = magnitude;
+        before_us = hid->device[0].written_us[i];
+    }
+    pthread_mutex_unlock(&hid->lock);
+    // the simulation stands
+    for (int i = 0; i < 2000 && last_magnitude(hid, NULL) != 0; i++) {
+        fake_report(hid, 0, rest, sizeof rest);
+        fake_sleep_us(1000);
+    }
+    assert_int_equal(last_magnitude(hid, NULL), 0);
+    // it goes on, and the session ends: zero, stop, and nothing after
+    until = fake_now_us() + 10000000;
+    while (last_magnitude(hid, NULL) != 64 && fake_now_us() < until) {
+        atomic_fetch_add(&port->step, 1);
+        fake_report(hid, 0, rest, sizeof rest);
+        fake_sleep_us(500);
+    }
+    assert_int_equal(last_magnitude(hid, NULL), 64);
+    hands_close(hands);
+    assert_int_equal(last_magnitude(hid, NULL), 0);
+    const FakeReport *last = &hid->device[0].written[hid->device[0].written_count - 1];
+    assert_true(last->bytes[0] == 0x0c && last->bytes[1] == 3);    // stop all effects
+    free(hid);
+    free(map);
+}
+
+static void a_haptic_joystick_needs_no_map_and_a_refused_effect_is_told(void **state)
+{
+    (void)state;
+    static uint8_t bytes[HID_DESCRIPTOR_LIMIT];
+    size_t length = hid_bytes(sidewinder_2, bytes);
+    FakeHid *hid = calloc(1, sizeof *hid);
+    assert_non_null(hid);
+    HidTransport transport = fake_transport(hid);
+    HandsOptions options = hands_default_options();
+    options.transport = &transport;
+    hid->device[0].feature_answer = (FakeReport){.length = 5, .bytes = {2, 0, 2, 0, 0}};    // its memory is full
+    fake_plug(hid, 0, 0x045e, 0x001b, "", HID_USAGE(1, 4), bytes, (int)length);
+    faults_clear(&faults);
+    Hands *hands = hands_open(&options, &faults);
+    assert_non_null(hands);
+    HandInfo info;
+    wait_for((hands_info(hands, 0, &info), info.state == HAND_READY));
+    assert_string_equal(info.map, "haptic joystick");
+    assert_non_null(strstr(info.force, "did not take"));
+    hands_close(hands);
+    free(hid);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_real_joystick_gets_the_reports_that_it_describes),
+        cmocka_unit_test(what_has_no_constant_force_says_so),
+        cmocka_unit_test(the_reaction_comes_from_where_the_stick_goes),
+        cmocka_unit_test(forces_are_clamped_and_grow_no_faster_than_the_slew),
+        cmocka_unit_test(the_watchdog_takes_the_force_away_at_once),
+        cmocka_unit_test(a_late_tick_does_not_jump),
+        cmocka_unit_test(a_stick_feels_the_sheath_until_the_simulation_stands),
+        cmocka_unit_test(a_haptic_joystick_needs_no_map_and_a_refused_effect_is_told),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
