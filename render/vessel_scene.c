@@ -215,11 +215,11 @@ static Vec3 between(const Pose *pose, int i, double t)
     return vec3_add_scaled(vec3_add_scaled(x, t * s * s, u), -t * t * s, v);
 }
 
-static void add_tool(VesselScene *scene, const Pose *pose, const VesselSceneLook *look)
+static void add_tool(VesselScene *scene, const Pose *pose, const VesselSceneLook *look, double line)
 {
     enum { PIECES = 6 };
     const Camera *camera = &scene->projection;
-    double thin = 1.25 * look->font_scale;
+    double thin = 1.25 * line;
     int first = pose->first_free_node;
     double stub = 0;
     while (first > 0 && stub < sheath_shown_mm) {
@@ -251,10 +251,12 @@ static void add_tool(VesselScene *scene, const Pose *pose, const VesselSceneLook
 
 // One arrow for each stretch of the tool of about 14 pixels, counted from the tip so that stretches stay the same nodes: the sum of their forces, its
 // head at the tool where the wall pushes.
-static void add_arrows(VesselScene *scene, const Pose *pose, const VesselSceneLook *look)
+static void add_arrows(VesselScene *scene, const Pose *pose, const VesselSceneLook *look, double line)
 {
     const double least = 0.01;   // of full scale: contacts that only rest there
-    double pixel = scene->projection.mm_per_pixel, stretch = 14 * look->font_scale * pixel, longest = 52 * look->font_scale * pixel;
+    const Camera *view = &scene->projection;
+    double pixel = view->mm_per_pixel, stretch = 14 * line * pixel;
+    double longest = fmin(52 * line, 0.10 * (view->width < view->height ? view->width : view->height)) * pixel;
     int end = pose->node_count;
     while (end > pose->first_free_node) {
         Vec3 sum = {0, 0, 0}, place = {0, 0, 0};
@@ -279,7 +281,7 @@ static void add_arrows(VesselScene *scene, const Pose *pose, const VesselSceneLo
         Vec3 direction = vec3_scale(sum, 1 / size), tip = vec3_add_scaled(vec3_scale(place, 1 / weight), -radius, direction);
         // square root: a tenth of the force is still seen
         double long_as = longest * sqrt(fmin(size / look->force_full_scale_n, 1.5));
-        strokes_arrow(&scene->strokes, vec3_add_scaled(tip, -long_as, direction), tip, 1.1 * look->font_scale, ARROW_COLOR);
+        strokes_arrow(&scene->strokes, vec3_add_scaled(tip, -long_as, direction), tip, 1.1 * line, ARROW_COLOR);
     }
 }
 
@@ -330,9 +332,9 @@ void vessel_scene_draw(VesselScene *scene, const Pose *pose, const VesselSceneLo
     if (look->show_model && pose)
         model_wires_add(scene->models, pose->node[pose->node_count - 1].vessel_node, &scene->strokes, line);
     if (pose)
-        add_tool(scene, pose, look);
+        add_tool(scene, pose, look, line);
     if (pose && look->show_arrows)
-        add_arrows(scene, pose, look);
+        add_arrows(scene, pose, look, line);
     strokes_draw(&scene->strokes, scene->layers, port);
 }
 

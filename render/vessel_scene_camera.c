@@ -1,6 +1,8 @@
 // The projection's axes are the rows of the turn's matrix: right = q x q*, up = q y q*, back = q z q*.
 #include "render/vessel_scene_camera.h"
 
+#include <stddef.h>
+
 static const double turn_per_pixel = 0.4 * PI / 180, zoom_per_notch = 1.15, extent_least = 1 / 400.0, extent_most = 20;
 
 static Vec3 right_of(const FreeCamera *camera) { return quat_rotate(camera->turn, vec3(1, 0, 0)); }
@@ -91,21 +93,27 @@ void free_camera_reset(FreeCamera *camera)
     camera->height_mm = camera->home_height_mm;
 }
 
+void free_camera_look_along(FreeCamera *camera, Vec3 view, Vec3 up)
+{
+    Camera axes = {0};
+    camera_orient(&axes, view, up, 0, NULL);
+    camera->turn = turn_of(axes.right, axes.up, axes.back);
+    Vec3 corner[8];
+    for (int k = 0; k < 8; k++)
+        corner[k] = vec3(k & 1 ? camera->high.x : camera->low.x, k & 2 ? camera->high.y : camera->low.y, k & 4 ? camera->high.z : camera->low.z);
+    frame_points(camera, 8, corner);
+}
+
 void free_camera_look_from(FreeCamera *camera, LookFrom from)
 {
     static const struct {
         Vec3 view, up;
     } side[] = {[LOOK_FRONT] = {{0, 1, 0}, {0, 0, 1}}, [LOOK_BACK] = {{0, -1, 0}, {0, 0, 1}}, [LOOK_RIGHT] = {{1, 0, 0}, {0, 0, 1}},
                 [LOOK_LEFT] = {{-1, 0, 0}, {0, 0, 1}}, [LOOK_TOP] = {{0, 0, -1}, {0, -1, 0}}, [LOOK_BOTTOM] = {{0, 0, 1}, {0, -1, 0}}};
-    if (from == LOOK_FACE_ON) {
+    if (from == LOOK_FACE_ON)
         free_camera_reset(camera);
-        return;
-    }
-    Vec3 back = vec3_negate(side[from].view), up = side[from].up, corner[8];
-    camera->turn = turn_of(vec3_cross(up, back), up, back);
-    for (int k = 0; k < 8; k++)
-        corner[k] = vec3(k & 1 ? camera->high.x : camera->low.x, k & 2 ? camera->high.y : camera->low.y, k & 4 ? camera->high.z : camera->low.z);
-    frame_points(camera, 8, corner);
+    else
+        free_camera_look_along(camera, side[from].view, side[from].up);
 }
 
 Camera free_camera_projection(const FreeCamera *camera, int width, int height, double depth)
