@@ -387,16 +387,16 @@ extern "C" void gui_text_wrapped(Gui *gui, GuiFont font, Color color, const char
     ImGui::PopTextWrapPos();
 }
 
-extern "C" void gui_row(Gui *gui, const char *label, Color color, const char *value)
+extern "C" void gui_row(Gui *gui, GuiFont size, const char *label, Color color, const char *value)
 {
     float width, height;
-    gui_text_extent(gui, GUI_NORMAL, value, &width, &height);
+    gui_text_extent(gui, size, value, &width, &height);
     GuiRect at = gui_place(gui, 0, height);
     float room = at.width - width - 4 * gui->scale;
     ImVec4 clip(at.x, at.y, at.x + std::fmax(0, room), at.y + height);
-    ImFont *font = gui->font[GUI_NORMAL];
+    ImFont *font = gui->font[size];
     list()->AddText(font, font->FontSize, ImVec2(at.x, at.y), packed(gui_colors.dim), label, nullptr, 0, &clip);
-    gui_draw_text(gui, at.x + at.width - width, at.y, GUI_NORMAL, color, value);
+    gui_draw_text(gui, at.x + at.width - width, at.y, size, color, value);
 }
 
 // ---- widgets

@@ -50,7 +50,7 @@ float gui_line_height(const Gui *gui, GuiFont font);
 
 void gui_text(Gui *gui, GuiFont font, Color color, const char *text);
 void gui_text_wrapped(Gui *gui, GuiFont font, Color color, const char *text);
-void gui_row(Gui *gui, const char *label, Color color, const char *value);        // label left, value right, in one line
+void gui_row(Gui *gui, GuiFont font, const char *label, Color color, const char *value);   // label left, value right, in one line
 
 typedef struct GuiPress { bool pressed, held; } GuiPress; // clicked in this frame; the mouse is down on it
 // `width` 0: all there is. `key` at its right end in small letters, where both fit. `is_on`: filled, with a tick.

@@ -307,12 +307,15 @@ void panel_draw(Panel *panel, const WindowInput *input, const PanelState *state,
     panel->layout = layout;
     panel->width = input->width;
     panel->height = input->height;
-    if (is_new)   // how much the contents need is known after they were laid out, and a scroll bar changes it
+    if (is_new) {
+        panel->is_dense = false;
+        // how much the contents need is known after they were laid out, and a scroll bar changes it
         for (int i = 0; i < 4; i++) {
             gui_begin(panel->gui, input, layout.scale, true);
             panel_draw_all(panel, input, state);
             gui_end(panel->gui, framebuffer);
         }
+    }
     panel->is_drawn = true;
     gui_begin(panel->gui, input, layout.scale, false);
     panel_draw_all(panel, input, state);

@@ -57,7 +57,7 @@ __attribute__((format(printf, 4, 5))) static void row(Panel *panel, const char *
     va_start(arguments, format);
     vsnprintf(text + strlen(text), sizeof text - strlen(text), format, arguments);
     va_end(arguments);
-    gui_row(panel->gui, label, mark_color(mark), text);
+    gui_row(panel->gui, panel->is_dense ? GUI_SMALL : GUI_NORMAL, label, mark_color(mark), text);
 }
 
 static void heading(Panel *panel, const char *text)
@@ -255,7 +255,7 @@ static void draw_exercise(Panel *panel, const PanelState *state)
     char text[160], value[48];
     heading(panel, "EXERCISE");
     if (text_or_empty(state->instructions)[0])
-        gui_text_wrapped(gui, GUI_NORMAL, gui_colors.text, state->instructions);
+        gui_text_wrapped(gui, panel->is_dense ? GUI_SMALL : GUI_NORMAL, gui_colors.text, state->instructions);
     if (state->hold_needed_s > 0) {
         const char *target = text_or_empty(state->target)[0] ? state->target : "target";
         if (state->hold_s > 0)
@@ -309,15 +309,17 @@ static void draw_hands(Panel *panel, const PanelState *state)
 
 static void draw_left(Panel *panel, const PanelState *state)
 {
-    float s = gui_scale(panel->gui);
-    gui_window_begin(panel->gui, "left", panel->layout.left, GUI_KEPT | GUI_SELDOM);
+    Gui *gui = panel->gui;
+    float s = gui_scale(gui), least = 44 * s;
+    gui_window_begin(gui, "left", panel->layout.left, GUI_KEPT | GUI_SELDOM);
     draw_exercise(panel, state);
     draw_tool(panel, state);
     draw_hands(panel, state);
-    // the plots take what the rest leaves
-    float room = panel->plot_height * (float)panel->plots - gui_window_end(panel->gui) - 2;
+    // the plots take what the rest leaves; where that is too little the rows become smaller, and last the column scrolls
+    float room = panel->plot_height * (float)panel->plots - gui_window_end(gui) - 2;
+    panel->is_dense = panel->is_dense || room < 2 * least;   // until the window is resized: no flicker between the two
     panel->plots = room >= 3 * 70 * s ? 3 : 2;
-    panel->plot_height = floorf(fminf(fmaxf(room / (float)panel->plots, 44 * s), 120 * s));
+    panel->plot_height = floorf(fminf(fmaxf(room / (float)panel->plots, least), 120 * s));
 }
 
 // ---- above, below
@@ -389,14 +391,9 @@ static void draw_log(Panel *panel, GuiRect at)
 
 static void small_row(Panel *panel, const char *label, PanelMark mark, const char *text)
 {
-    Gui *gui = panel->gui;
     char marked[96];
-    float width, height;
     snprintf(marked, sizeof marked, "%s%s", sign[mark], text);
-    GuiRect at = gui_place(gui, 0, gui_line_height(gui, GUI_SMALL));
-    gui_text_extent(gui, GUI_SMALL, marked, &width, &height);
-    gui_draw_text(gui, at.x, at.y, GUI_SMALL, gui_colors.dim, label);
-    gui_draw_text(gui, at.x + at.width - width, at.y, GUI_SMALL, mark_color(mark), marked);
+    gui_row(panel->gui, GUI_SMALL, label, mark_color(mark), marked);
 }
 
 static void draw_machine(Panel *panel, const PanelState *state, GuiRect at)

@@ -42,6 +42,7 @@ struct Panel {
     RunningPlot force, torque, wall;
     int plots;
     float plot_height;
+    bool is_dense;                 // the left column's rows in small letters, where they would not fit otherwise
     int message_count;             // of all; the last PANEL_MESSAGES are kept
     PanelMessage message[PANEL_MESSAGES];
 };

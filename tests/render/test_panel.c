@@ -146,6 +146,82 @@ static void pictures_at_all_sizes(void **unused)
     }
 }
 
+// ---- layout
+
+static bool overlap(PanelRect a, PanelRect b)
+{
+    return a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
+}
+
+// Any window, density and view: everything inside, nothing over anything else, the main view the largest, letters no smaller than 11 pixels.
+static void nothing_overlaps_at_any_size(void **unused)
+{
+    (void)unused;
+    static const double scales[] = {1, 1.25, 1.5, 2, 3};
+    for (int width = 640; width <= 3840; width += 71)
+        for (int height = 400; height <= 2160; height += 53)
+            for (int i = 0; i < 5 * 4 * 2; i++) {
+                PanelView view = (PanelView)(i / 2 % 4);
+                bool has_panels = i % 2;
+                PanelLayout l = panel_layout(width, height, scales[i / 8], view, has_panels);
+                assert_true(l.scale >= 0.5 && (width < 1024 || height < 600 || l.scale >= 0.85));
+                PanelRect rect[VIEW_COUNT + 4] = {l.view_rect[0], l.view_rect[1], l.view_rect[2], l.top, l.left, l.right, l.bottom};
+                for (int a = 0; a < VIEW_COUNT + 4; a++) {
+                    assert_true(rect[a].x >= 0 && rect[a].y >= 0 && rect[a].x + rect[a].width <= (float)width &&
+                                rect[a].y + rect[a].height <= (float)height);
+                    for (int b = 0; b < a; b++)
+                        if (overlap(rect[a], rect[b]))
+                            fail_msg("%d and %d overlap at %dx%d, view %d", a, b, width, height, view);
+                }
+                for (int v = 0; v < VIEW_COUNT; v++) {
+                    ViewPort p = l.view[v];
+                    assert_true((float)p.x == rect[v].x && (float)p.width == rect[v].width && (float)p.height == rect[v].height);
+                    assert_true((float)(height - p.y - p.height) == rect[v].y || p.width == 0);
+                    assert_true(p.width * p.height <= l.view[l.main].width * l.view[l.main].height);
+                }
+                bool is_usual = has_panels && width >= 1024 && height >= 600 && scales[i / 8] * 1024 <= width && scales[i / 8] * 600 <= height;
+                assert_true(!is_usual || l.right.height >= (float)(250 * l.scale));   // room for the longest tab
+                assert_true(!is_usual || l.view[l.main].width * l.view[l.main].height * 6 > width * height);
+            }
+}
+
+// ---- plots
+
+static void plots_keep_every_peak_and_forget_after_their_span(void **unused)
+{
+    (void)unused;
+    RunningPlot plot;
+    double least, most;
+    plot_clear(&plot);
+    assert_false(plot_range(&plot, &least, &most));
+    for (int i = 0; i < 5000; i++)   // 50 s; one peak up and one down, each a single sample
+        plot_add(&plot, 0.01 * i, i == 3500 ? 9 : i == 4000 ? -4 : 1);
+    assert_true(plot_range(&plot, &least, &most));
+    assert_true(least == -4 && most == 9);
+    for (int i = 5000; i < 5600; i++)   // 3500 is 21 s ago now, 4000 is 16
+        plot_add(&plot, 0.01 * i, 1);
+    assert_true(plot_range(&plot, &least, &most));
+    assert_true(least == -4 && most == 1);
+    plot_add(&plot, 56, NAN);   // not a number: left out
+    plot_add(&plot, INFINITY, 1);
+    assert_true(plot_range(&plot, &least, &most) && least == -4 && most == 1);
+    plot_add(&plot, 5, 2);   // a restart
+    assert_true(plot_range(&plot, &least, &most) && least == 2 && most == 2 && plot.count == 1);
+    plot_add(&plot, 500, 3);   // a jump
+    assert_true(plot_range(&plot, &least, &most) && least == 3 && most == 3 && plot.count == 1);
+}
+
+static void ticks_are_round(void **unused)
+{
+    (void)unused;
+    for (double span = 1e-6; span < 1e6; span *= 1.07)
+        for (int ticks = 2; ticks <= 6; ticks++) {
+            double step = plot_tick_step(span, ticks), mantissa = step / pow(10, floor(log10(step) + 1e-9));
+            assert_true(fabs(mantissa - 1) < 1e-9 || fabs(mantissa - 2) < 1e-9 || fabs(mantissa - 5) < 1e-9);
+            assert_true(span / step <= ticks * (1 + 1e-9) && span / step * 2.5 > ticks * (1 - 1e-9));
+        }
+}
+
 // ---- the mouse
 
 typedef struct Desk {            // a panel, what it is drawn into and what came out
@@ -246,6 +322,150 @@ static void every_action_has_a_button_that_works(void **unused)
     end_desk(&desk);
 }
 
+static void views_are_chosen_turned_and_scrolled_by_mouse(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    Desk desk = new_desk(1280, 720);
+    PanelRect main = desk.panel->layout.view_rect[VIEW_FLUOROSCOPY], inset = desk.panel->layout.view_rect[VIEW_3D];
+    bool seen[ACTION_COUNT] = {false};
+    click(&desk, inset.x + inset.width / 2, inset.y + inset.height / 2, seen);
+    for (int i = 0; i < ACTION_COUNT; i++)
+        assert_int_equal(seen[i], i == ACTION_VIEW_3D);
+    // a drag that begins in a view stays with it, beyond its edge too
+    desk.input.mouse_x = main.x + 0.25 * main.width;
+    desk.input.mouse_y = main.y + 0.75 * main.height;
+    desk.input.mouse_buttons = WINDOW_MOUSE_RIGHT;
+    frame(&desk);
+    assert_int_equal(desk.actions.mouse.view, VIEW_FLUOROSCOPY);
+    assert_true(fabs(desk.actions.mouse.x - 0.25) < 1e-9 && fabs(desk.actions.mouse.y - 0.25) < 1e-6);
+    assert_int_equal(desk.actions.mouse.buttons, WINDOW_MOUSE_RIGHT);
+    assert_true(desk.actions.mouse.drag_x == 0 && desk.actions.mouse.drag_y == 0);
+    desk.input.mouse_x -= 0.5 * main.height;   // out into the left column
+    desk.input.mouse_y -= 0.1 * main.height;
+    frame(&desk);
+    assert_int_equal(desk.actions.mouse.view, VIEW_FLUOROSCOPY);
+    assert_true(fabs(desk.actions.mouse.drag_x + 0.5) < 1e-6 && fabs(desk.actions.mouse.drag_y - 0.1) < 1e-6);
+    desk.input.mouse_buttons = 0;
+    frame(&desk);
+    assert_int_equal(desk.actions.mouse.view, -1);
+    // a press that began on the panel never becomes a drag in a view
+    desk.input.mouse_buttons = WINDOW_MOUSE_LEFT;
+    frame(&desk);
+    desk.input.mouse_x = main.x + 0.5 * main.width;
+    frame(&desk);
+    assert_int_equal(desk.actions.mouse.buttons, 0);
+    desk.input.mouse_buttons = 0;
+    add_event(&desk, (WindowEvent){.kind = WINDOW_SCROLL_EVENT, .scroll_y = -2});
+    frame(&desk);
+    assert_true(desk.actions.mouse.view == VIEW_FLUOROSCOPY && desk.actions.mouse.scroll == -2);
+    end_desk(&desk);
+}
+
+static void a_button_lets_go_when_the_focus_goes(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    Desk desk = new_desk(1280, 720);
+    PanelRect right = desk.panel->layout.right;
+    desk.input.mouse_x = right.x + right.width / 2;
+    desk.input.mouse_y = right.y + 42 * desk.panel->layout.scale;
+    desk.input.mouse_buttons = WINDOW_MOUSE_LEFT;
+    frame(&desk);
+    frame(&desk);
+    assert_true(desk.actions.held[ACTION_PUSH]);
+    desk.input.has_focus = false;
+    frame(&desk);
+    assert_false(desk.actions.held[ACTION_PUSH]);
+    end_desk(&desk);
+}
+
+static void names_are_typed_and_trimmed(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    Desk desk = new_desk(1024, 600);
+    tap(&desk, WINDOW_KEY_F1 + 2);
+    assert_true(panel_is_asking(desk.panel));
+    frame(&desk);
+    static const unsigned typed[] = {' ', 'J', 0xfc, 'r', 'g', ' ', 'f', ' '};   // Jürg f
+    for (size_t i = 0; i < sizeof typed / sizeof typed[0]; i++) {
+        add_event(&desk, (WindowEvent){.kind = WINDOW_TEXT_EVENT, .character = typed[i]});
+        if (typed[i] == 'f')
+            add_event(&desk, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = 'F'});
+        frame(&desk);
+        assert_false(desk.actions.held[ACTION_PEDAL]);
+    }
+    keep_picture(&desk.canvas, "trainee");
+    tap(&desk, WINDOW_KEY_ENTER);
+    for (int i = 0; i < 3 && !desk.actions.trainee_set; i++)
+        frame(&desk);
+    assert_true(desk.actions.trainee_set);
+    assert_string_equal(desk.actions.trainee, "J\u00fcrg f");
+    assert_false(panel_is_asking(desk.panel));
+    end_desk(&desk);
+}
+
+static void strange_states_draw(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    Desk desk = new_desk(640, 400);
+    desk.state = (PanelState){.time_s = NAN, .inserted_mm = INFINITY, .force_n = NAN, .hold_needed_s = 1, .hold_s = NAN, .warning = "x",
+                              .warnings = ~0u, .fluoro_s = -1, .contrast_ml = NAN, .step_median_us = NAN, .real_time_factor = NAN,
+                              .xray = {.lao_deg = NAN, .field_mm = NAN}, .view = VIEW_ALL};
+    static const PanelFigure nameless = {0};
+    desk.state.figure_count = 1;
+    desk.state.figure = &nameless;
+    for (int i = 0; i < 300; i++)
+        panel_message(desk.panel, i, (PanelMark)(i % 4), i % 2 ? "" : "%s%n a message with a sign that is no format");
+    frame(&desk);
+    frame(&desk);
+    assert_int_equal(glGetError(), GL_NO_ERROR);
+    end_desk(&desk);
+}
+
+// Kept pixels must be the ones that a fresh panel draws.
+static void kept_windows_show_what_a_new_panel_shows(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    Desk desk = new_desk(1280, 720);
+    size_t bytes = (size_t)1280 * 720 * 3;
+    uint8_t *rgb[2] = {malloc(bytes), malloc(bytes)};
+    assert_true(rgb[0] && rgb[1]);
+    for (int i = 0; i < 40; i++) {   // things change, come and go
+        desk.state.view = (PanelView)(i / 10);
+        desk.state.inserted_mm += 1;
+        desk.state.error_count = i % 3;
+        desk.state.xray.lao_deg = (float)i;
+        panel_show_help(desk.panel, i % 7 == 3);
+        frame(&desk);
+    }
+    desk.state.view = VIEW_FLUOROSCOPY;
+    for (int i = 0; i < 4; i++)   // the seldom ones catch up
+        frame(&desk);
+    gl_canvas_read(&desk.canvas, rgb[0]);
+    Panel *fresh = new_panel();
+    fresh->force = desk.panel->force;
+    fresh->torque = desk.panel->torque;
+    fresh->wall = desk.panel->wall;
+    fresh->is_dense = desk.panel->is_dense;
+    for (int i = 0; i < 4; i++)
+        draw(fresh, &desk.canvas, &desk.input, &desk.state);
+    gl_canvas_read(&desk.canvas, rgb[1]);
+    assert_memory_equal(rgb[0], rgb[1], bytes);
+    free(rgb[0]);
+    free(rgb[1]);
+    panel_destroy(fresh);
+    end_desk(&desk);
+}
+
 // Process CPU, the driver's threads with it.
 static double cpu_ms(void)
 {
@@ -294,6 +514,16 @@ static void what_a_frame_costs(void **unused)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(pictures_at_all_sizes), cmocka_unit_test(every_action_has_a_button_that_works), cmocka_unit_test(what_a_frame_costs)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(nothing_overlaps_at_any_size),
+                                       cmocka_unit_test(plots_keep_every_peak_and_forget_after_their_span),
+                                       cmocka_unit_test(ticks_are_round),
+                                       cmocka_unit_test(pictures_at_all_sizes),
+                                       cmocka_unit_test(every_action_has_a_button_that_works),
+                                       cmocka_unit_test(views_are_chosen_turned_and_scrolled_by_mouse),
+                                       cmocka_unit_test(a_button_lets_go_when_the_focus_goes),
+                                       cmocka_unit_test(names_are_typed_and_trimmed),
+                                       cmocka_unit_test(strange_states_draw),
+                                       cmocka_unit_test(kept_windows_show_what_a_new_panel_shows),
+                                       cmocka_unit_test(what_a_frame_costs)};
     return cmocka_run_group_tests(tests, open_gl, close_gl);
 }
