@@ -61,7 +61,7 @@ static const char *const OPACIFY_FRAGMENT =
     "void main() { vec2 f = slant * (at - 0.5); float along = sqrt(1.0 + dot(f, f)); vec4 b = texture(bare, at);\n"
     "  b.xy *= exp2(-power * (max(tap(lumen, at), 0.0) * along));\n"
     "#ifdef ROADMAP\n"
-    "  b.z = b.w * (1.0 - exp2(-1.3 * max(tap(roadmap, at), 0.0) * along));\n"
+    "  b.z = b.w * (1.0 - exp2(-0.45 * max(tap(roadmap, at), 0.0) * along));\n"
     "#endif\n"
     "  result = b; }\n";
 
@@ -107,7 +107,7 @@ static const char *const SHOW_FRAGMENT =
     "void main() { vec4 b = texture(baked, at); float grey = scale.x * b.x + scale.y * b.y * (texture(noise, grain).r - 0.5);\n"
     "  result = vec4(grey, grey, grey, 1.0); TINT }\n";
 static const char *const NO_TINT = "#version 330 core\n#define TINT\n";
-static const char *const TINT = "#version 330 core\n#define TINT result.rgb = clamp(result.rgb, 0.0, 1.0) * mix(vec3(1.0), vec3(0.60, 1.12, 1.20), 0.8 * b.z);\n";
+static const char *const TINT = "#version 330 core\n#define TINT result.rgb = clamp(result.rgb, 0.0, 1.0) * mix(vec3(1.0), vec3(0.55, 1.10, 1.20), 0.75 * b.z);\n";
 
 // --- random numbers ---
 
