@@ -6,6 +6,7 @@
 // and a fog exp(-(d / 8 R)^1.5) towards the dark.
 #include "render/angioscope.h"
 
+#include "render/drawable_mesh.h"
 #include "render/gl_canvas.h"
 #include "render/message.h"
 #include "render/solids.h"
@@ -187,18 +188,6 @@ static void measure(Angioscope *scope, const TriangleMesh *mesh)
     scope->mean_radius = area > 0 ? fmax(2 * volume / area, 0.02 * sqrt(area)) : 1;
 }
 
-static bool mesh_is_sound(const TriangleMesh *mesh)
-{
-    for (int i = 0; i < mesh->vertex_count; i++)
-        if (!vec3_is_finite(mesh->vertex[i]) || !vec3_is_finite(mesh->normal[i]))
-            return false;
-    for (int i = 0; i < mesh->triangle_count; i++)
-        for (int k = 0; k < 3; k++)
-            if (mesh->triangle[i][k] < 0 || mesh->triangle[i][k] >= mesh->vertex_count)
-                return false;
-    return true;
-}
-
 static const void *at_byte(size_t offset) { return (const void *)(uintptr_t)offset; }
 
 static bool set_wall(Angioscope *scope, const TriangleMesh *mesh, char *message, size_t capacity)
@@ -206,8 +195,8 @@ static bool set_wall(Angioscope *scope, const TriangleMesh *mesh, char *message,
     scope->mean_radius = 1;
     if (!mesh || mesh->triangle_count < 1)
         return true;
-    if (!mesh_is_sound(mesh))
-        return message_fail(message, capacity, "the surface to draw has indices out of range or numbers that are not finite");
+    if (!drawable_mesh_check(mesh, message, capacity))
+        return false;
     scope->origin = mesh->vertex[mesh->triangle[0][0]];
     measure(scope, mesh);
     size_t triangles = (size_t)mesh->triangle_count, patches = triangles / PATCH_TRIANGLES + 1;

@@ -6,6 +6,7 @@
 // lets the tool be seen. For two faces of one tube that is what a thin-walled glass tube does.
 #include "render/surface_view.h"
 
+#include "render/drawable_mesh.h"
 #include "render/gl_canvas.h"
 #include "render/message.h"
 
@@ -135,20 +136,6 @@ void surface_view_destroy(SurfaceView *view)
 
 static const void *at_byte(size_t offset) { return (const void *)(uintptr_t)offset; }
 
-static bool mesh_is_sound(const TriangleMesh *mesh)
-{
-    if (mesh->vertex_count < 0 || mesh->triangle_count < 0)
-        return false;
-    for (int i = 0; i < mesh->vertex_count; i++)
-        if (!vec3_is_finite(mesh->vertex[i]) || !vec3_is_finite(mesh->normal[i]))
-            return false;
-    for (int i = 0; i < mesh->triangle_count; i++)
-        for (int k = 0; k < 3; k++)
-            if (mesh->triangle[i][k] < 0 || mesh->triangle[i][k] >= mesh->vertex_count)
-                return false;
-    return true;
-}
-
 static Vec3 middle_of(const TriangleMesh *mesh)
 {
     Vec3 low = mesh->vertex[0], high = low;
@@ -165,26 +152,22 @@ bool surface_view_set_mesh(SurfaceView *view, const TriangleMesh *mesh, char *me
     view->vertex_count = view->triangle_count = 0;
     if (!mesh || mesh->vertex_count == 0)
         return true;
-    if (!mesh_is_sound(mesh))
-        return message_fail(message, capacity, "the surface to draw has indices out of range or numbers that are not finite");
+    if (!drawable_mesh_check(mesh, message, capacity))
+        return false;
     size_t vertices = (size_t)mesh->vertex_count, triangles = (size_t)mesh->triangle_count;
     free(view->position), free(view->triangle), free(view->sorted), free(view->bucket);
     view->position = malloc(vertices * 3 * sizeof *view->position);
     view->triangle = malloc((triangles + 1) * 3 * sizeof *view->triangle);
     view->sorted = malloc((triangles + 1) * 3 * sizeof *view->sorted);
     view->bucket = malloc((triangles + 1) * sizeof *view->bucket);
-    float *interleaved = malloc(vertices * 6 * sizeof *interleaved);
-    if (!view->position || !view->triangle || !view->sorted || !view->bucket || !interleaved) {
-        free(interleaved);
+    if (!view->position || !view->triangle || !view->sorted || !view->bucket)
         return message_fail(message, capacity, "not enough memory for a surface of %d triangles", mesh->triangle_count);
-    }
     view->origin = middle_of(mesh);
-    for (size_t i = 0; i < vertices; i++) {
-        Vec3 p = vec3_sub(mesh->vertex[i], view->origin), n = mesh->normal[i];
-        const float entry[6] = {(float)p.x, (float)p.y, (float)p.z, (float)n.x, (float)n.y, (float)n.z};
-        memcpy(interleaved + 6 * i, entry, sizeof entry);
-        memcpy(view->position + 3 * i, entry, 3 * sizeof *entry);
-    }
+    float *interleaved = drawable_mesh_floats(mesh, view->origin, message, capacity);
+    if (!interleaved)
+        return false;
+    for (size_t i = 0; i < vertices; i++)
+        memcpy(view->position + 3 * i, interleaved + 6 * i, 3 * sizeof *interleaved);
     for (size_t i = 0; i < triangles; i++)
         for (size_t k = 0; k < 3; k++)
             view->triangle[3 * i + k] = (uint32_t)mesh->triangle[i][k];

@@ -2,6 +2,7 @@
 // A wall seen face on is clear, edge on dense (1 - |n_z|)^p, as thin-walled glass is: outlines stand out, the middle lets the tool be seen.
 #include "render/vessel_scene_layers.h"
 
+#include "render/drawable_mesh.h"
 #include "render/gl_canvas.h"
 #include "render/message.h"
 
@@ -74,35 +75,19 @@ static const char *const JOIN_FRAGMENT =
 
 static const void *at_byte(size_t offset) { return (const void *)(uintptr_t)offset; }
 
-static bool mesh_is_sound(const TriangleMesh *mesh)
-{
-    if (mesh->vertex_count < 0 || mesh->triangle_count < 0)
-        return false;
-    for (int i = 0; i < mesh->vertex_count; i++)
-        if (!vec3_is_finite(mesh->vertex[i]) || !vec3_is_finite(mesh->normal[i]))
-            return false;
-    for (int i = 0; i < mesh->triangle_count; i++)
-        for (int k = 0; k < 3; k++)
-            if (mesh->triangle[i][k] < 0 || mesh->triangle[i][k] >= mesh->vertex_count)
-                return false;
-    return true;
-}
-
 static bool upload_wall(VesselLayers *layers, WallBuffers *wall, const TriangleMesh *mesh, char *message, size_t capacity)
 {
     if (!mesh || mesh->triangle_count == 0)
         return true;
-    if (!mesh_is_sound(mesh))
-        return message_fail(message, capacity, "the surface to draw has indices out of range or numbers that are not finite");
+    if (!drawable_mesh_check(mesh, message, capacity))
+        return false;
     size_t vertices = (size_t)mesh->vertex_count, indices = 3 * (size_t)mesh->triangle_count;
-    float *interleaved = malloc(vertices * 6 * sizeof *interleaved);
+    float *interleaved = drawable_mesh_floats(mesh, layers->origin, message, capacity);
     if (!interleaved)
-        return message_fail(message, capacity, "not enough memory for a surface of %d triangles", mesh->triangle_count);
+        return false;
     for (size_t i = 0; i < vertices; i++) {
-        Vec3 p = vec3_sub(mesh->vertex[i], layers->origin), n = mesh->normal[i];
-        layers->reach = fmax(layers->reach, vec3_norm(p));
-        const float entry[6] = {(float)p.x, (float)p.y, (float)p.z, (float)n.x, (float)n.y, (float)n.z};
-        memcpy(interleaved + 6 * i, entry, sizeof entry);
+        const float *p = interleaved + 6 * i;
+        layers->reach = fmax(layers->reach, vec3_norm(vec3(p[0], p[1], p[2])));
     }
     glGenVertexArrays(1, &wall->array);
     glGenBuffers(1, &wall->vertices);

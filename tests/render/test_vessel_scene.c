@@ -24,6 +24,12 @@ static TriangleMesh *tube_mesh(Vec3 start, Vec3 direction, double length, double
     return mesh;
 }
 
+static void take(ViewStage *stage, VesselScene *scene, const Pose *pose, const VesselSceneLook *look, StagePixels pixels)
+{
+    vessel_scene_draw(scene, pose, look, stage->port);
+    stage_read(stage, pixels);
+}
+
 static double distance_to_segment(double x, double y, Vec3 a, Vec3 b)
 {
     double dx = b.x - a.x, dy = b.y - a.y, t = ((x - a.x) * dx + (y - a.y) * dy) / fmax(dx * dx + dy * dy, 1e-12);
@@ -105,21 +111,18 @@ static void cached_walls_are_those_drawn_afresh(void **state)
     assert_int_equal(vessel_scene_layer_draws(scene), 6);
     look.camera = home;
     for (int k = 0; k < 5; k++)
-        vessel_scene_draw(scene, pose, &look, stage.port);
-    stage_read(&stage, cached);
+        take(&stage, scene, pose, &look, cached);
     assert_int_equal(vessel_scene_layer_draws(scene), 8);   // the turn back, and all of it once the camera stood still
     // after another size in between, too
     const ViewPort small = {stage.canvas.framebuffer, 10, 10, 120, 90};
     vessel_scene_draw(scene, pose, &look, small);
     for (int k = 0; k < 5; k++)
-        vessel_scene_draw(scene, pose, &look, stage.port);
-    stage_read(&stage, fresh);
+        take(&stage, scene, pose, &look, fresh);
     assert_int_equal(count_different(cached, fresh, 0), 0);
     vessel_scene_destroy(scene);
     scene = vessel_scene_create(&options, message, sizeof message);
     assert_non_null(scene);
-    vessel_scene_draw(scene, pose, &look, stage.port);
-    stage_read(&stage, fresh);
+    take(&stage, scene, pose, &look, fresh);
     assert_int_equal(count_different(cached, fresh, 0), 0);
     assert_true(count_different(cached, turned, 8) > 500);
     // the thinner mesh was what turned
@@ -150,17 +153,14 @@ static void a_section_takes_away_what_lies_before_its_plane(void **state)
     VesselSceneLook look = vessel_scene_default_look(scene);
     look.full_detail = true;
     free_camera_look_from(&look.camera, LOOK_FRONT);   // +x to the right
-    vessel_scene_draw(nothing, NULL, &look, stage.port);
-    stage_read(&stage, empty);
-    vessel_scene_draw(scene, NULL, &look, stage.port);
-    stage_read(&stage, whole);
+    take(&stage, nothing, NULL, &look, empty);
+    take(&stage, scene, NULL, &look, whole);
     const double offset[3] = {-4, 0, 5.5};
     for (int k = 0; k < 3; k++) {
         look.section = true;
         look.section_normal = vec3(2, 0, 0);
         look.section_offset_mm = offset[k];   // from the scene's middle, which is x = 0
-        vessel_scene_draw(scene, NULL, &look, stage.port);
-        stage_read(&stage, cut);
+        take(&stage, scene, NULL, &look, cut);
         const Camera *camera = vessel_scene_projection(scene);
         double edge = camera_project(camera, vec3(offset[k], 0, 0)).x;
         int gone = 0, kept = 0;
@@ -180,8 +180,7 @@ static void a_section_takes_away_what_lies_before_its_plane(void **state)
     // towards the eye: the near wall goes, the far one's inside stays, as wide as the tube
     look.section_normal = vec3(0, 0, 0);
     look.section_offset_mm = 0;
-    vessel_scene_draw(scene, NULL, &look, stage.port);
-    stage_read(&stage, cut);
+    take(&stage, scene, NULL, &look, cut);
     int x = STAGE_WIDTH / 2, y = STAGE_HEIGHT / 2;
     assert_true(pixel_difference(cut[y][x], empty[y][x]) > 10 && pixel_difference(cut[y][x], whole[y][x]) > 5);
     // through the tip: the plane moves with it
@@ -189,8 +188,7 @@ static void a_section_takes_away_what_lies_before_its_plane(void **state)
     look.section_normal = vec3(1, 0, 0);
     look.show_arrows = false;
     Pose *pose = straight_pose(5, vec3(-5, 0, 0), vec3(1, 0, 0), vec3(0, 1, 0), 1, 0.2);
-    vessel_scene_draw(scene, pose, &look, stage.port);
-    stage_read(&stage, cut);
+    take(&stage, scene, pose, &look, cut);
     double edge = camera_project(vessel_scene_projection(scene), pose->position[4]).x;
     int beyond = (int)edge + 8, before = (int)edge - 8;
     assert_int_equal(pixel_difference(cut[y + 12][beyond], empty[y + 12][beyond]), 0);
@@ -220,11 +218,9 @@ static void arrows_stand_only_where_there_is_force(void **state)
         if (loaded)
             pose->node[14].force = vec3(0, 0, 0.5);   // the wall pushes up: the arrow comes from below
         look.show_arrows = false;
-        vessel_scene_draw(scene, pose, &look, stage.port);
-        stage_read(&stage, without);
+        take(&stage, scene, pose, &look, without);
         look.show_arrows = true;
-        vessel_scene_draw(scene, pose, &look, stage.port);
-        stage_read(&stage, with);
+        take(&stage, scene, pose, &look, with);
         if (!loaded) {
             assert_int_equal(count_different(with, without, 0), 0);
             continue;
@@ -281,11 +277,9 @@ static void the_tip_s_own_model_is_a_wireframe(void **state)
     for (int k = 0; k < 4; k++) {
         pose->node[9].vessel_node = node[k];
         look.show_model = false;
-        vessel_scene_draw(scene, pose, &look, stage.port);
-        stage_read(&stage, without);
+        take(&stage, scene, pose, &look, without);
         look.show_model = true;
-        vessel_scene_draw(scene, pose, &look, stage.port);
-        stage_read(&stage, with);
+        take(&stage, scene, pose, &look, with);
         if (node[k] != 0) {
             assert_int_equal(count_different(with, without, 0), 0);
             continue;
@@ -324,15 +318,13 @@ static void a_tool_is_dimmed_by_the_walls_before_it(void **state)
     look.full_detail = true;
     for (int from = LOOK_FRONT; from <= LOOK_BACK; from++) {
         free_camera_look_from(&look.camera, (LookFrom)from);
-        vessel_scene_draw(scene, NULL, &look, stage.port);
-        stage_read(&stage, without);
+        take(&stage, scene, NULL, &look, without);
         const double depth[3] = {5, 0, -5};   // towards the eye: before, inside, behind
         double contrast[3];
         for (int k = 0; k < 3; k++) {
             Vec3 back = vessel_scene_projection(scene)->back;
             Pose *pose = straight_pose(9, vec3_add(vec3(-4, 0, 0), vec3_scale(back, depth[k])), vec3(1, 0, 0), vec3(0, 1, 0), 1, 0.4);
-            vessel_scene_draw(scene, pose, &look, stage.port);
-            stage_read(&stage, with);
+            take(&stage, scene, pose, &look, with);
             contrast[k] = pixel_difference(with[STAGE_HEIGHT / 2][STAGE_WIDTH / 2], without[STAGE_HEIGHT / 2][STAGE_WIDTH / 2]);
             pose_free(pose);
         }
@@ -511,8 +503,7 @@ static void broken_input_is_refused_or_left_out(void **state)
         vessel_scene_draw(scene, pose, &look, tiny);
         vessel_scene_draw(scene, pose, &look, none);
         assert_int_equal(glGetError(), GL_NO_ERROR);
-        vessel_scene_draw(scene, pose, &look, stage.port);
-        stage_read(&stage, pixels);
+        take(&stage, scene, pose, &look, pixels);
         assert_true(pixels[0][0][0] < 60 && pixels[0][0][2] > 10);   // the calm ground is still there
     }
     pose_free(pose);

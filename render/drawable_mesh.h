@@ -1,0 +1,14 @@
+// Whether a surface can be given to OpenGL.
+#ifndef SELDINGER_RENDER_DRAWABLE_MESH_H
+#define SELDINGER_RENDER_DRAWABLE_MESH_H
+
+#include "geom/isosurface.h"
+
+#include <stddef.h>
+
+// False with a reason where indices are out of range or numbers are not finite.
+bool drawable_mesh_check(const TriangleMesh *mesh, char *message, size_t capacity);
+// Position relative to `origin` and normal of each vertex, (vertex_count, 6) floats, to be freed. NULL with a reason where memory lacks.
+float *drawable_mesh_floats(const TriangleMesh *mesh, Vec3 origin, char *message, size_t capacity);
+
+#endif
