@@ -121,7 +121,7 @@ static void draw(Studio *studio, const Case *what, int frame)
         if (what->only != 1 + i)
             layout.view[i].width = 0;
     views_draw(studio->views, &views, &layout, what->width, what->height, studio->canvas.framebuffer);
-    trainer_panel_show(&studio->shown, studio->scene.scene, pose, lesson, NULL, &xray);
+    trainer_panel_show(&studio->shown, studio->scene.scene, pose, &lesson->score, NULL, &xray);
     studio->shown.state.now_s = studio->shown.state.time_s = frame / 30.0;
     studio->shown.state.view = what->view;
     if (what->only == 0 || what->only == ONLY_PANELS)

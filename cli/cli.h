@@ -12,7 +12,7 @@ enum { EXIT_DONE = 0, EXIT_DIFFERENT = 1, EXIT_BAD_INPUT = 2, EXIT_UNTRUSTED = 3
 
 typedef int VerbFunction(int argc, char **argv);   // argv[0] is "seldinger VERB"
 VerbFunction verb_run, verb_check, verb_segment, verb_import, verb_fit, verb_synth, verb_query, verb_export, verb_info, verb_bench, verb_replay,
-    verb_devices, verb_nav;
+    verb_devices, verb_nav, verb_report;
 
 // Prints all faults to standard error; returns EXIT_BAD_INPUT.
 int cli_bad_input(const Faults *faults);

@@ -1,6 +1,7 @@
 #include "cli/film.h"
 
 #include "cli/playback.h"
+#include "cli/rescore.h"
 #include "cli/scene_views.h"
 #include "cli/trainer_panel.h"
 #include "render/gl_canvas.h"
@@ -22,10 +23,8 @@ typedef struct Film {
     Desk desk;
     Playback *playback;
     TrainerPanel shown;
-    Simulator *simulator;            // goes through the recording again, for the score
-    Lesson *lesson;
-    LessonView *score;
-    int64_t simulated;               // steps; -1 once it gave another state than the recording holds
+    Rescore *rescore;
+    bool has_told_difference;
     double sampled_s;                // up to where the plots have samples
     uint8_t *rgb;                    // (height, width, 3)
 } Film;
@@ -44,9 +43,7 @@ static void film_close(Film *film)
     if (film->context)
         gl_canvas_destroy(&film->canvas);
     gl_context_destroy(film->context);
-    lesson_free(film->lesson);
-    simulator_destroy(film->simulator);
-    free(film->score);
+    rescore_free(film->rescore);
     free(film->rgb);
 }
 
@@ -57,10 +54,8 @@ static bool film_open(Film *film, const char *path, const FilmOptions *options, 
     *film = (Film){.options = options, .scene = scene, .run = run};
     film->rgb = malloc((size_t)options->width * (size_t)options->height * 3);
     film->context = gl_context_create(message, sizeof message);
-    film->simulator = simulator_create(scene, open->vessel, faults);
-    film->lesson = film->simulator ? lesson_create(film->simulator, open->tree) : NULL;
-    film->score = film->lesson ? calloc(1, lesson_view_bytes(film->lesson)) : NULL;
-    bool good = film->rgb && film->score && film->context && gl_canvas_create(&film->canvas, options->width, options->height, 1, message, sizeof message) &&
+    film->rescore = rescore_create(run, scene, open, faults);
+    bool good = film->rgb && film->rescore && film->context && gl_canvas_create(&film->canvas, options->width, options->height, 1, message, sizeof message) &&
                 (film->panel = panel_create(message, sizeof message)) &&
                 (film->views = scene_views_create(scene, open, &film->desk, message, sizeof message, faults));
     if (good) {
@@ -85,22 +80,15 @@ static bool film_open(Film *film, const char *path, const FilmOptions *options, 
     return false;
 }
 
-static void show_score(Film *film)
+static const ScoreFigures *score_now(Film *film)
 {
-    const RecordedRun *run = film->run;
-    int64_t to = playback_pose(film->playback)->step;
-    XrayControl unseen = {0};
-    for (; film->simulated >= 0 && film->simulated < to; film->simulated++) {
-        int64_t i = film->simulated;
-        Command command = {run->command[2 * i], run->command[2 * i + 1]};
-        simulator_step(film->simulator, command);
-        lesson_step(film->lesson, film->simulator, command, run->xray ? &run->xray[i] : &unseen);
-        if (simulator_hash(film->simulator) != run->state_hash[i]) {
-            fprintf(stderr, "the simulation differs from the recording from step %lld on: the score stands still from there\n", (long long)i);
-            film->simulated = -2;   // the loop adds one
-        }
+    rescore_advance(film->rescore, playback_pose(film->playback)->step, HUGE_VAL);
+    int64_t different = rescore_first_different(film->rescore);
+    if (different >= 0 && !film->has_told_difference) {
+        film->has_told_difference = true;
+        fprintf(stderr, "the simulation differs from the recording from step %lld on: the score stands still from there\n", (long long)different);
     }
-    lesson_publish(film->lesson, film->score);
+    return rescore_at(film->rescore, playback_time_s(film->playback));
 }
 
 // Running plots as they stood at `time_s`: 20 samples a second from the recorded steps.
@@ -128,9 +116,8 @@ static void film_draw(Film *film, double time_s)
     views_draw(film->views, &frame, &layout, options->width, options->height, film->canvas.framebuffer);
     if (options->has_panels) {
         WindowInput input = {.width = options->width, .height = options->height, .scale = 1, .mouse_x = -1, .mouse_y = -1, .has_focus = true};
-        show_score(film);
         sample_plots(film, time_s);
-        trainer_panel_show(&film->shown, film->scene, pose, film->score, NULL, &pose->xray);
+        trainer_panel_show(&film->shown, film->scene, pose, score_now(film), NULL, &pose->xray);
         film->shown.state.now_s = pose->time_s;
         film->shown.state.view = options->view;
         film->shown.state.step_median_us = film->shown.state.step_p999_us = film->shown.state.real_time_factor = NAN;
@@ -149,7 +136,7 @@ bool film_picture(const char *path, const FilmOptions *options, const RecordedRu
     film_draw(&film, options->from_s);   // a panel's widths are known from its frame before
     bool good = png_file_write(path, options->width, options->height, film.rgb, message, sizeof message);
     if (!good)
-        faults_add(faults, path, 0, 0, "%s", message);
+        faults_add(faults, "--picture", 0, 0, "%s", message);
     film_close(&film);
     return good;
 }
@@ -160,7 +147,7 @@ bool film_movie(const char *path, const FilmOptions *options, const RecordedRun 
     char message[512] = "";
     MovieFile *movie = movie_file_create(path, options->width, options->height, options->fps, message, sizeof message);
     if (!movie) {
-        faults_add(faults, path, 0, 0, "%s", message);
+        faults_add(faults, "--movie", 0, 0, "%s", message);
         return false;
     }
     if (!film_open(&film, path, options, run, scene, open, faults)) {
@@ -181,7 +168,7 @@ bool film_movie(const char *path, const FilmOptions *options, const RecordedRun 
     }
     good = movie_file_close(movie, message, sizeof message) && good;
     if (!good)
-        faults_add(faults, path, 0, 0, "%s", *message ? message : "the film could not be written to its end");
+        faults_add(faults, "--movie", 0, 0, "%s", *message ? message : "the film could not be written to its end");
     film_close(&film);
     return good;
 }

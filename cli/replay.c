@@ -6,6 +6,9 @@
 #include "sim/sha256.h"
 #ifdef SELDINGER_RENDER
 #include "cli/film.h"
+#include "cli/replay_window.h"
+#include "cli/trainer.h"
+#include "cli/trainer_files.h"
 #endif
 
 #include <getopt.h>
@@ -17,12 +20,13 @@
 
 static const char help[] =
     "Usage: seldinger replay REC.h5 [options]\n\n"
-    "Shows a recording that `nav` or `run --record` wrote.\n\n"
+    "Shows a recording that `nav` or `run --record` wrote, in a window: play, stop, search (Left, Right, the strip below), and go on from any moment (F5) as a\n"
+    "new session. With one of the first four options no window is opened.\n\n"
     "  --verify           simulates it again headless, with the recorded hand, and compares the state's hash at each step\n"
     "  --scene FOLDER     makes a regression scene of it: scene.yaml, hand.csv and the golden tool path, for `seldinger check FOLDER`\n"
-    "  --picture F.png    what the trainee saw at the end, off screen …\n"
-    "  --at S             … or at this moment [s of simulated time]\n"
     "  --movie F.mp4      all of it as a film (H.264 by ffmpeg), off screen\n"
+    "  --picture F.png    what the trainee saw at the end, off screen …\n"
+    "  --at S             … or at this moment [s of simulated time]; the window begins there\n"
     "  --from S, --to S   of a film [s of simulated time]\n"
     "  --fps N            frames a second of a film; default 30\n"
     "  --speed X          simulated seconds a second of film; default 1\n"
@@ -30,13 +34,15 @@ static const char help[] =
     "  --size WxH         [pixel]; default 1280x720\n"
     "  --no-panels        the views alone\n"
     "  --lao DEG, --cra DEG   C-arm for a recording that nobody looked at (`run --record`); negative: RAO, CAU\n"
+    "  --sessions FOLDER  where a session that goes on is recorded, as for `nav`\n"
+    "  --duration-s S     the window closes by itself after S seconds of real time\n"
     "  --threads N        threads of fitting a shape; default 0: all cores\n"
     "  --quiet            no progress; --verify says only what differs\n\n"
     "Exit codes: 0 done, the same; 1 a step differs; 2 wrong usage or bad input; 3 the run diverged.\n";
 
 typedef struct ReplayOptions {
-    const char *recording, *scene_folder, *picture, *movie;
-    double at_s, from_s, to_s, fps, speed, lao_deg, cra_deg;
+    const char *recording, *scene_folder, *picture, *movie, *sessions;
+    double duration_s, at_s, from_s, to_s, fps, speed, lao_deg, cra_deg;
     int width, height, view;
     bool verify, quiet, no_panels;
     int threads;
@@ -58,17 +64,18 @@ static const NumberOption number_option[] = {
     {"--at", 0, SCRIPT_LONGEST_S, offsetof(ReplayOptions, at_s)},     {"--from", 0, SCRIPT_LONGEST_S, offsetof(ReplayOptions, from_s)},
     {"--to", 0, SCRIPT_LONGEST_S, offsetof(ReplayOptions, to_s)},     {"--fps", 1, 240, offsetof(ReplayOptions, fps)},
     {"--speed", 0.01, 1000, offsetof(ReplayOptions, speed)},          {"--lao", -90, 90, offsetof(ReplayOptions, lao_deg)},
-    {"--cra", -45, 45, offsetof(ReplayOptions, cra_deg)},
+    {"--cra", -45, 45, offsetof(ReplayOptions, cra_deg)},             {"--duration-s", 0, SCRIPT_LONGEST_S, offsetof(ReplayOptions, duration_s)},
 };
 
 static int parse_options(int argc, char **argv, ReplayOptions *options)
 {
     // the first ones in the order of number_option
-    enum { NUMBERS = 256, VERIFY = 300, SCENE, PICTURE, MOVIE, VIEW, SIZE, NO_PANELS, THREADS, QUIET, HELP };
+    enum { NUMBERS = 256, VERIFY = 300, SCENE, PICTURE, MOVIE, SESSIONS, VIEW, SIZE, NO_PANELS, THREADS, QUIET, HELP };
     static const struct option table[] = {
         {"at", required_argument, NULL, NUMBERS},          {"from", required_argument, NULL, NUMBERS + 1}, {"to", required_argument, NULL, NUMBERS + 2},
         {"fps", required_argument, NULL, NUMBERS + 3},     {"speed", required_argument, NULL, NUMBERS + 4}, {"lao", required_argument, NULL, NUMBERS + 5},
-        {"cra", required_argument, NULL, NUMBERS + 6},     {"verify", no_argument, NULL, VERIFY},          {"scene", required_argument, NULL, SCENE},
+        {"cra", required_argument, NULL, NUMBERS + 6},     {"duration-s", required_argument, NULL, NUMBERS + 7},
+        {"sessions", required_argument, NULL, SESSIONS},   {"verify", no_argument, NULL, VERIFY},          {"scene", required_argument, NULL, SCENE},
         {"picture", required_argument, NULL, PICTURE},     {"movie", required_argument, NULL, MOVIE},      {"view", required_argument, NULL, VIEW},
         {"size", required_argument, NULL, SIZE},           {"no-panels", no_argument, NULL, NO_PANELS},    {"threads", required_argument, NULL, THREADS},
         {"quiet", no_argument, NULL, QUIET},               {"help", no_argument, NULL, HELP},              {0}};
@@ -87,6 +94,7 @@ static int parse_options(int argc, char **argv, ReplayOptions *options)
         case SCENE: options->scene_folder = optarg; break;
         case PICTURE: options->picture = optarg; break;
         case MOVIE: options->movie = optarg; break;
+        case SESSIONS: options->sessions = optarg; break;
         case NO_PANELS: options->no_panels = true; break;
         case QUIET: options->quiet = true; break;
         case VIEW:
@@ -212,6 +220,37 @@ static bool draw(const ReplayOptions *options, const RecordedRun *run, Scene *sc
 #endif
 }
 
+// The window; a session goes on from a moment of it where the user wants that.
+static int show(const ReplayOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults)
+{
+#ifdef SELDINGER_RENDER
+    ReplayWindowOptions window = {.name = options->recording, .width = options->width, .height = options->height, .view = (PanelView)options->view,
+                                  .at_s = isfinite(options->at_s) ? options->at_s : 0, .duration_s = options->duration_s, .lao_deg = options->lao_deg,
+                                  .cra_deg = options->cra_deg};
+    bool resumes = false;
+    double resume_s = 0;
+    setenv("LP_NUM_THREADS", "1", 0);
+    if (!replay_window_run(&window, run, scene, open, &resumes, &resume_s, faults))
+        return EXIT_BAD_INPUT;
+    if (!resumes)
+        return EXIT_DONE;
+    char folder[4096];
+    TrainerFigures figures = {0};
+    TrainerOptions trainer = {.folder = folder, .is_recorded = true, .trainee = "", .has_built_in_maps = true, .resume = run, .resume_s = resume_s,
+                              .width = options->width, .height = options->height, .view = window.view, .duration_s = options->duration_s};
+    if (!trainer_folder(options->sessions, folder, sizeof folder, faults))
+        return EXIT_BAD_INPUT;
+    int code = trainer_run(scene, open, &trainer, &figures, faults);
+    if (figures.recording[0] && !options->quiet)
+        printf("%s\n", figures.recording);
+    return code;
+#else
+    (void)run, (void)scene, (void)open, (void)options;
+    faults_add(faults, "replay", 0, 0, "this build has no window; --verify and --scene work, or build with -DSELDINGER_RENDER=ON");
+    return EXIT_BAD_INPUT;
+#endif
+}
+
 int verb_replay(int argc, char **argv)
 {
     ReplayOptions options;
@@ -219,6 +258,7 @@ int verb_replay(int argc, char **argv)
     int code = parse_options(argc, argv, &options);
     if (code >= 0)
         return code;
+    recording_prepare_process();
     faults_clear(&faults);
     OpenVessel open = {0};
     RecordedRun *run = recorded_run_load(options.recording, &faults);
@@ -230,6 +270,8 @@ int verb_replay(int argc, char **argv)
         code = EXIT_DONE;
         if (options.verify || options.scene_folder)
             code = simulate_again(&options, run, scene, &open, &faults);
+        else if (!options.picture && !options.movie)
+            code = show(&options, run, scene, &open, &faults);
         if (!draw(&options, run, scene, &open, &faults))
             code = EXIT_BAD_INPUT;
     }

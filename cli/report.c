@@ -7,7 +7,7 @@
 
 enum { PLOTS_MOST = 200, WORST = 10 };
 
-static const char style[] =
+const char report_style[] =
     ":root{color-scheme:light dark;--paper:#fff;--ink:#1a1d21;--muted:#545b64;--rule:#c9ced6;--panel:#f4f6f8;--o1:#0b5fa5;--o2:#a8480a;--o3:#00725a;--o4:#8a2d73;"
     "--o5:#6b5a00;--o6:#4a4f57;--bad:#b3001b;--wide:#8a5a00;--sac:#7a2ba0}\n"
     "@media (prefers-color-scheme:dark){:root{--paper:#14171a;--ink:#eceff2;--muted:#aeb6c0;--rule:#464d56;--panel:#1e2328;--o1:#6fb8f5;--o2:#f2a268;--o3:#4fd1ad;"
@@ -261,7 +261,7 @@ static void print_page(const Report *report)
     report_text(out, report->name);
     fprintf(out, "</title>\n<style>\n%s</style></head>\n<body><header><h1>Vessel %s report</h1>\n<p class=\"notice\" role=\"note\"><strong>For training and research. Not "
                  "a medical device:</strong> not for diagnosis or treatment. Everything here is measured by a program on a %s and was checked by nobody.</p></header>\n<main>\n",
-            style, model ? "model" : "tree", model ? "fitted model" : "tracked tree");
+            report_style, model ? "model" : "tree", model ? "fitted model" : "tracked tree");
     print_summary(report);
     print_tree(report);
     print_findings(report);

@@ -24,6 +24,9 @@ typedef struct Report {
     bool voxel_is_known;     // else the paper's 0.2 mm
 } Report;
 
+extern const char report_style[];                              // of every page: light, dark and paper
+// A round step (1, 2, 5 times a power of ten) so that at most `most` fit into `range`.
+double report_tick_step(double range, int most);
 // Text as HTML: markup escaped, bytes that are no UTF-8 and control characters replaced.
 void report_text(FILE *out, const char *text);
 // "S1", "D2", "A1": findings counted by kind.

@@ -8,8 +8,7 @@ static const char *const finding_class[] = {"stenosis", "dilatation", "aneurysm"
 
 static int order_class(int order) { return order < 6 ? order : 6; }
 
-// A round step (1, 2, 5 times a power of ten) so that at most `most` fit into `range`.
-static double tick_step(double range, int most)
+double report_tick_step(double range, int most)
 {
     double step = pow(10, floor(log10(range / most)));
     return range / step <= most ? step : range / (2 * step) <= most ? 2 * step : range / (5 * step) <= most ? 5 * step : 10 * step;
@@ -65,7 +64,7 @@ static void draw_projection(const Report *report, const Projection *p, int numbe
     FILE *out = report->out;
     const VesselTree *tree = report->tree;
     double width = p->scale * (p->high[p->across] - p->low[p->across]), height = p->scale * (p->high[p->up] - p->low[p->up]);
-    double bar = tick_step(width / p->scale, 4);
+    double bar = report_tick_step(width / p->scale, 4);
     double(*side)[2] = malloc(2 * (size_t)tree->node_count * sizeof *side);
     fprintf(out,
             "<svg class=\"tree\" role=\"img\" aria-labelledby=\"tree%d-t tree%d-d\" viewBox=\"-12 -24 %.1f %.1f\" width=\"%.0f\" height=\"%.0f\">\n"
@@ -131,11 +130,11 @@ static double chart_y(const Chart *c, double y) { return c->top + c->height * (1
 
 static void draw_axes(FILE *out, const Chart *c, int ticks_x, int ticks_y, const char *x_name)
 {
-    double step = tick_step(c->x_high, ticks_x);
+    double step = report_tick_step(c->x_high, ticks_x);
     fprintf(out, "<path class=\"axis\" d=\"M%.1f %.1f v%.1f h%.1f\"/>\n", c->left, c->top, c->height, c->width);
     for (int k = 0; k * step <= c->x_high * (1 + 1e-9); k++)
         fprintf(out, "<text class=\"tick\" text-anchor=\"middle\" x=\"%.1f\" y=\"%.1f\">%g</text>\n", chart_x(c, k * step), c->top + c->height + 14, k * step);
-    step = tick_step(c->y_high, ticks_y);
+    step = report_tick_step(c->y_high, ticks_y);
     for (int k = 0; k * step <= c->y_high * (1 + 1e-9); k++)
         fprintf(out, "<path class=\"grid\" d=\"M%.1f %.1f h%.1f\"/><text class=\"tick\" text-anchor=\"end\" x=\"%.1f\" y=\"%.1f\">%g</text>\n", c->left,
                 chart_y(c, k * step), c->width, c->left - 4, chart_y(c, k * step) + 4, k * step);

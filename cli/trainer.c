@@ -307,7 +307,7 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
                         .pulse = (uint32_t)trainer->pulses.count, .look = &trainer->desk.look};
     trainer_cine_frame(&trainer->cine, passed_s, &frame);
     views_draw(trainer->views, &frame, layout, input->width, input->height, 0);
-    trainer_panel_show(&trainer->shown, trainer->scene, pose, lesson, &moment->figures, xray);
+    trainer_panel_show(&trainer->shown, trainer->scene, pose, &lesson->score, &moment->figures, xray);
     PanelState *state = &trainer->shown.state;
     FluoroscopeState fluoroscope = fluoroscope_state(views_fluoroscope(trainer->views));
     state->now_s = since_begin(trainer);

@@ -110,7 +110,7 @@ static void warn(TrainerPanel *panel, const Pose *pose, const RealtimeFigures *f
     }
 }
 
-void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pose, const LessonView *lesson, const RealtimeFigures *figures,
+void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pose, const ScoreFigures *score, const RealtimeFigures *figures,
                         const XrayControl *xray)
 {
     PanelState *state = &panel->state;
@@ -132,6 +132,6 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
         state->real_time_factor = figures->real_time_factor;
         state->missed_deadlines = figures->deadline_misses;
     }
-    show_score(panel, scene, &lesson->score);
+    show_score(panel, scene, score);
     warn(panel, pose, figures);
 }

@@ -3,8 +3,8 @@
 #define SELDINGER_CLI_TRAINER_PANEL_H
 
 #include "render/desk.h"
-#include "sim/lesson.h"
 #include "sim/realtime.h"
+#include "sim/score.h"
 
 enum { PANEL_FIGURES = 12, PANEL_ERRORS = 12, PANEL_DEVICES = 14 };
 
@@ -22,7 +22,7 @@ typedef struct TrainerPanel {
 // Scene, exercise, tool: what does not change in a session.
 void trainer_panel_begin(TrainerPanel *panel, const Scene *scene, const char *trainee);
 // Pose, score and controls of now. `figures` NULL: no real time (a recording).
-void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pose, const LessonView *lesson,
+void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pose, const ScoreFigures *score,
                         const RealtimeFigures *figures, const XrayControl *xray);
 
 #endif

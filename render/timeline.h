@@ -1,0 +1,31 @@
+// The strip below the views where a recording is played, stopped, searched and gone on from. Draws with a Gui of its own over the panels' lower edge.
+#ifndef SELDINGER_RENDER_TIMELINE_H
+#define SELDINGER_RENDER_TIMELINE_H
+
+#include "render/panel.h"
+
+enum { TIMELINE_MARKS = 64 };
+
+typedef struct TimelineState {
+    double time_s, end_s;            // shown now, whole length; simulated time
+    bool is_playing;
+    float speed;                     // simulated over real time, 0.1 to 8
+    int mark_count;
+    double mark_s[TIMELINE_MARKS];   // bookmarks
+    const char *note;                // one line: what recording this is
+} TimelineState;
+
+typedef struct TimelineActions {
+    bool seek, toggle_play, resume;  // resume: a session shall go on from here
+    double seek_s;
+    float speed;                     // as set now
+} TimelineActions;
+
+typedef struct Timeline Timeline;
+
+Timeline *timeline_create(char *message, size_t capacity);   // needs a current GL context; NULL with a reason
+void timeline_destroy(Timeline *timeline);
+// A frame; `at` is the layout's bottom strip.
+TimelineActions timeline_draw(Timeline *timeline, const WindowInput *input, const TimelineState *state, double scale, PanelRect at, unsigned framebuffer);
+
+#endif
