@@ -201,10 +201,16 @@ static inline void fake_unplug(FakeHid *hid, int index)
     pthread_mutex_unlock(&hid->lock);
 }
 
+// Waits where the queue is full, as a device does that is asked for reports.
 static inline void fake_report(FakeHid *hid, int index, const uint8_t *bytes, int length)
 {
     FakeDevice *device = &hid->device[index];
     pthread_mutex_lock(&hid->lock);
+    while (device->last - device->first >= FAKE_QUEUE) {
+        pthread_mutex_unlock(&hid->lock);
+        fake_sleep_us(100);
+        pthread_mutex_lock(&hid->lock);
+    }
     FakeReport *report = &device->queue[device->last++ % FAKE_QUEUE];
     report->length = length;
     memcpy(report->bytes, bytes, (size_t)length);
