@@ -339,7 +339,11 @@ extern "C" void gui_window_begin(Gui *gui, const char *id, GuiRect at, unsigned 
         f |= ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_NoScrollbar;
     ImGui::SetNextWindowPos(ImVec2(at.x, at.y));
     ImGui::SetNextWindowSize(ImVec2(at.width, at.height));
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, flags & GUI_FRAMED ? 1.0f : 0.0f);
+    if (flags & GUI_VEIL)
+        ImGui::SetNextWindowBgAlpha(0.7f);
     ImGui::Begin(id, nullptr, f);
+    ImGui::PopStyleVar();
     if (flags & GUI_KEPT)
         keep_window(gui, at, flags);
     if (flags & GUI_ON_TOP)
@@ -524,11 +528,6 @@ extern "C" void gui_draw_fill(Gui *, GuiRect at, Color color)
     list()->AddRectFilled(ImVec2(at.x, at.y), ImVec2(at.x + at.width, at.y + at.height), packed(color));
 }
 
-extern "C" void gui_draw_frame(Gui *, GuiRect at, Color color)
-{
-    list()->AddRect(ImVec2(at.x, at.y), ImVec2(at.x + at.width, at.y + at.height), packed(color));
-}
-
 extern "C" void gui_draw_line(Gui *, float x0, float y0, float x1, float y1, Color color, float thickness)
 {
     list()->AddLine(ImVec2(x0, y0), ImVec2(x1, y1), packed(color), thickness);
@@ -544,4 +543,9 @@ extern "C" void gui_text_extent(Gui *gui, GuiFont font, const char *text, float 
     ImVec2 extent = gui->font[font]->CalcTextSizeA(gui->font[font]->FontSize, 1e9f, 0, text);
     *width = extent.x;
     *height = extent.y;
+}
+
+extern "C" float gui_wrapped_height(Gui *gui, GuiFont font, const char *text, float width)
+{
+    return gui->font[font]->CalcTextSizeA(gui->font[font]->FontSize, 1e9f, width, text).y;
 }

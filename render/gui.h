@@ -36,7 +36,8 @@ float gui_scale(const Gui *gui);        // of the current letters
 // Windows at a fixed place. Contents that do not fit scroll. NO_INPUT lets the mouse through; ON_TOP lies over the ones before and takes their clicks.
 // KEPT: opaque, overlapping no other but those on top; its pixels are kept and drawn anew only where its contents changed. SELDOM: a kept one whose
 // changes show in every third frame, for figures that nobody reads faster.
-enum { GUI_NO_BACKGROUND = 1, GUI_NO_INPUT = 2, GUI_ON_TOP = 4, GUI_SCROLL_TO_END = 8, GUI_KEPT = 16, GUI_SELDOM = 32 };
+// FRAMED: a line around it. VEIL: what lies below shines through.
+enum { GUI_NO_BACKGROUND = 1, GUI_NO_INPUT = 2, GUI_ON_TOP = 4, GUI_SCROLL_TO_END = 8, GUI_KEPT = 16, GUI_SELDOM = 32, GUI_FRAMED = 64, GUI_VEIL = 128 };
 void gui_window_begin(Gui *gui, const char *id, GuiRect at, unsigned flags);
 // The height [pixel] that the contents would need more than there is; negative: still free.
 float gui_window_end(Gui *gui);
@@ -71,10 +72,10 @@ bool gui_text_field(Gui *gui, const char *id, char *text, size_t capacity, bool 
 
 // Drawing, in the window that is open.
 void gui_draw_fill(Gui *gui, GuiRect at, Color color);
-void gui_draw_frame(Gui *gui, GuiRect at, Color color);
 void gui_draw_line(Gui *gui, float x0, float y0, float x1, float y1, Color color, float thickness);
 void gui_draw_text(Gui *gui, float x, float y, GuiFont font, Color color, const char *text);
 void gui_text_extent(Gui *gui, GuiFont font, const char *text, float *width, float *height);
+float gui_wrapped_height(Gui *gui, GuiFont font, const char *text, float width);
 
 #ifdef __cplusplus
 }

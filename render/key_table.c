@@ -73,6 +73,7 @@ const KeyAction key_table[ACTION_COUNT] = {
     {ACTION_FULL_SCREEN, GROUP_SESSION, ACTION_PRESS, F(11), "Full screen", "fill the screen; again for a window"},
     {ACTION_PANELS, GROUP_SESSION, ACTION_PRESS, KEY(TAB), "Panels", "hide or show the panels around the views"},
     {ACTION_HINTS, GROUP_SESSION, ACTION_PRESS, F(9), "Hints", "hide or show the hints at the bottom"},
+    {ACTION_BRIEFING, GROUP_SESSION, ACTION_PRESS, K('O'), "Instructions", "show or hide the whole text of the exercise"},
     {ACTION_HELP, GROUP_SESSION, ACTION_PRESS, WINDOW_KEY_F1, 0, '?', "Help", "this list of keys"},
     {ACTION_QUIT, GROUP_SESSION, ACTION_PRESS, KEY(ESCAPE), "Quit", "end the session (asks first); closes this list or a dialogue"},
 };

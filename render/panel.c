@@ -102,10 +102,29 @@ static void take_dialogue(Panel *panel, const WindowInput *input, PanelActions *
     panel->answer = 0;
 }
 
+// The text of the exercise goes by itself once it has been followed a little.
+static void take_briefing(Panel *panel, PanelActions *actions)
+{
+    static const ActionId follows[] = {ACTION_PUSH, ACTION_PULL, ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT, ACTION_PEDAL, ACTION_PEDAL_LATCH};
+    bool is_shown = panel->briefing_at.width > 0;
+    double used = 0;
+    for (size_t i = 0; i < sizeof follows / sizeof follows[0]; i++)
+        used += panel->used_s[follows[i]];
+    if (panel->briefing == BRIEFING_AT_BEGIN && used > 0.5)
+        panel->briefing = BRIEFING_CLOSED;
+    if (is_shown && !panel->has_help && actions->pressed[ACTION_QUIT] > 0) {
+        panel->briefing = BRIEFING_CLOSED;
+        actions->pressed[ACTION_QUIT] = 0;
+    }
+    if (actions->pressed[ACTION_BRIEFING] % 2)
+        panel->briefing = is_shown ? BRIEFING_CLOSED : BRIEFING_OPEN;
+}
+
 // What the panel itself does of what was pressed. Restart and quit are asked back first.
 static void take_own_actions(Panel *panel, const WindowInput *input, PanelActions *actions)
 {
     int *pressed = actions->pressed;
+    take_briefing(panel, actions);
     if (panel->has_help && pressed[ACTION_QUIT] > 0) {
         panel->has_help = false;
         pressed[ACTION_QUIT] = 0;
@@ -127,13 +146,15 @@ static void take_own_actions(Panel *panel, const WindowInput *input, PanelAction
         memset(actions->held, 0, sizeof actions->held);
 }
 
+static bool is_inside(GuiRect r, double x, double y) { return x >= r.x && x < r.x + r.width && y >= r.y && y < r.y + r.height; }
+
 static int view_at(const Panel *panel, double x, double y)
 {
-    for (int i = 0; i < VIEW_COUNT; i++) {
-        PanelRect r = panel->layout.view_rect[i];
-        if (x >= r.x && x < r.x + r.width && y >= r.y && y < r.y + r.height)
+    if (is_inside(panel->briefing_at, x, y))
+        return -1;
+    for (int i = 0; i < VIEW_COUNT; i++)
+        if (is_inside(panel->layout.view_rect[i], x, y))
             return i;
-    }
     return -1;
 }
 
@@ -181,6 +202,7 @@ static void take_mouse(Panel *panel, const WindowInput *input, PanelActions *act
 void panel_take_input(Panel *panel, const WindowInput *input, PanelActions *actions)
 {
     *actions = (PanelActions){.mouse.view = -1};
+    panel->is_interactive = true;
     key_state_begin(&panel->keys);
     key_state_feed(&panel->keys, input, panel->dialogue != DIALOGUE_NONE);
     bool is_mouse_down = (input->mouse_buttons & WINDOW_MOUSE_LEFT) && input->has_focus;

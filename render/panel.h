@@ -59,7 +59,8 @@ typedef struct PanelState {
     double time_s;                 // simulated
     bool is_paused;
     // exercise
-    const char *title, *instructions;
+    const char *title;
+    const char *instructions;      // its first line is always shown, the whole of it in a box at the beginning and when asked for
     const char *trainee;
     const char *target;            // name of the one to reach now
     double hold_s, hold_needed_s;  // progress of holding the target; hold_needed_s 0: no target

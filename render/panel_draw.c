@@ -103,8 +103,8 @@ const ButtonRow panel_button_row[] = {
     {TAB_SESSION, 2, {ACTION_BOOKMARK, ACTION_SAVE}},
     {TAB_SESSION, 2, {ACTION_TRAINEE, ACTION_SCREENSHOT}},
     {TAB_SESSION, 2, {ACTION_FULL_SCREEN, ACTION_PANELS}},
-    {TAB_SESSION, 2, {ACTION_HELP, ACTION_HINTS}},
-    {TAB_SESSION, 1, {ACTION_QUIT}},
+    {TAB_SESSION, 2, {ACTION_HELP, ACTION_BRIEFING}},
+    {TAB_SESSION, 2, {ACTION_HINTS, ACTION_QUIT}},
 };
 const int panel_button_row_count = sizeof panel_button_row / sizeof panel_button_row[0];
 
@@ -130,6 +130,7 @@ static bool is_on(const Panel *panel, const PanelState *state, ActionId id)
     case ACTION_HINTS: return panel->has_hints;
     case ACTION_PANELS: return panel->has_panels;
     case ACTION_HELP: return panel->has_help;
+    case ACTION_BRIEFING: return panel->briefing_at.width > 0;
     default: return panel->held[id];
     }
 }
@@ -249,13 +250,31 @@ static void draw_right(Panel *panel, const PanelState *state)
 
 // ---- left column
 
+static bool has_more_lines(const char *text)
+{
+    const char *end = strchr(text_or_empty(text), '\n');
+    return end && end[strspn(end, " \n\r\t")];
+}
+
+// Of the instructions; false where there is none.
+static bool first_line(const char *text, char *line, size_t capacity)
+{
+    snprintf(line, capacity, "%.*s", (int)strcspn(text_or_empty(text), "\n"), text_or_empty(text));
+    return line[0] != 0;
+}
+
 static void draw_exercise(Panel *panel, const PanelState *state)
 {
     Gui *gui = panel->gui;
-    char text[160], value[48];
+    char text[300], value[48];
     heading(panel, "EXERCISE");
-    if (text_or_empty(state->instructions)[0])
-        gui_text_wrapped(gui, panel->is_dense ? GUI_SMALL : GUI_NORMAL, gui_colors.text, state->instructions);
+    if (first_line(state->instructions, text, sizeof text)) {
+        gui_text_wrapped(gui, panel->is_dense ? GUI_SMALL : GUI_NORMAL, gui_colors.text, text);
+        if (has_more_lines(state->instructions)) {
+            snprintf(text, sizeof text, "All of it: %s", key_table_text(ACTION_BRIEFING, value, sizeof value));
+            gui_text(gui, GUI_SMALL, gui_colors.dim, text);
+        }
+    }
     if (state->hold_needed_s > 0) {
         const char *target = text_or_empty(state->target)[0] ? state->target : "target";
         if (state->hold_s > 0)
@@ -542,13 +561,54 @@ static void draw_over_views(Panel *panel, const PanelState *state)
     }
 }
 
-// ---- help and dialogues
+// ---- instructions, help and dialogues
+
+// Lines that a file's editor broke are joined: a break counts after the end of a sentence, before a list's mark and at an empty line.
+static void reflow(const char *from, char *to, size_t capacity)
+{
+    size_t length = 0;
+    for (; *from && length + 1 < capacity; from++) {
+        bool ends_sentence = length > 0 && strchr(".!?:\n", to[length - 1]);
+        bool is_break = *from == '\n' && !ends_sentence && from[1] && !strchr("\n-*0123456789", from[1]);
+        to[length++] = is_break ? ' ' : *from;
+    }
+    while (length > 0 && strchr(" \n", to[length - 1]))
+        length--;
+    to[length] = 0;
+}
+
+static void draw_briefing(Panel *panel, const PanelState *state)
+{
+    Gui *gui = panel->gui;
+    panel->briefing_at = (GuiRect){0};
+    bool is_wanted = panel->briefing == BRIEFING_OPEN || (panel->briefing == BRIEFING_AT_BEGIN && panel->is_interactive && panel->has_hints &&
+                                                          has_more_lines(state->instructions));
+    if (!is_wanted || !text_or_empty(state->instructions)[0])
+        return;
+    char text[4200];
+    reflow(state->instructions, text, sizeof text);
+    float s = gui_scale(gui), margin = floorf(12 * s), pad = floorf(20 * s);
+    GuiRect view = panel->layout.view_rect[panel->layout.main];
+    float width = floorf(fminf(view.width - 2 * margin, 640 * s));
+    float height = gui_wrapped_height(gui, GUI_NORMAL, text, width - pad) + floorf(84 * s);
+    height = floorf(fminf(height, view.height - 2 * margin));
+    GuiRect at = {floorf(view.x + (view.width - width) / 2), floorf(view.y + (view.height - height) / 2), width, height};
+    gui_window_begin(gui, "briefing", at, GUI_FRAMED);
+    gui_text_wrapped(gui, GUI_LARGE, gui_colors.text, text_or_empty(state->title));
+    gui_space(gui, floorf(2 * s));
+    gui_text_wrapped(gui, GUI_NORMAL, gui_colors.text, text);
+    gui_space(gui, floorf(2 * s));
+    char key[32];
+    if (gui_button(gui, "begin", "Close", key_table_text(ACTION_BRIEFING, key, sizeof key), floorf(110 * s), false).pressed)
+        panel->mouse_pressed[ACTION_BRIEFING]++;
+    gui_window_end(gui);
+    panel->briefing_at = at;
+}
 
 static void veil(Panel *panel, const WindowInput *input)
 {
     GuiRect all = {0, 0, (float)input->width, (float)input->height};
-    gui_window_begin(panel->gui, "veil", all, GUI_ON_TOP | GUI_NO_BACKGROUND);
-    gui_draw_fill(panel->gui, all, color_with_alpha(gui_colors.window, 0.6));
+    gui_window_begin(panel->gui, "veil", all, GUI_ON_TOP | GUI_VEIL);
     gui_window_end(panel->gui);
 }
 
@@ -603,11 +663,11 @@ static void draw_dialogue(Panel *panel, const WindowInput *input)
         [DIALOGUE_RESTART] = {"Begin anew?", "The exercise starts again from the beginning; this attempt is kept in the recording.", "Begin anew", "Go on"},
         [DIALOGUE_TRAINEE] = {"Who is practising?", "The name stands in the report, and earlier sessions of the same name are compared.", "Take", "Leave it"}};
     Gui *gui = panel->gui;
-    float s = gui_scale(gui), width = floorf(fminf(420 * s, (float)input->width - 20 * s)), height = floorf(150 * s);
+    float s = gui_scale(gui), width = floorf(fminf(420 * s, (float)input->width - 20 * s));
+    float height = floorf((panel->dialogue == DIALOGUE_TRAINEE ? 142 : 112) * s);
     veil(panel, input);
     GuiRect at = {floorf(((float)input->width - width) / 2), floorf(((float)input->height - height) / 2), width, height};
-    gui_window_begin(gui, "dialogue", at, GUI_ON_TOP);
-    gui_draw_frame(gui, at, gui_colors.dim);
+    gui_window_begin(gui, "dialogue", at, GUI_ON_TOP | GUI_FRAMED);
     gui_text(gui, GUI_LARGE, gui_colors.text, dialogue[panel->dialogue].title);
     gui_text_wrapped(gui, GUI_NORMAL, gui_colors.dim, dialogue[panel->dialogue].text);
     gui_space(gui, floorf(4 * s));
@@ -632,6 +692,7 @@ void panel_draw_all(Panel *panel, const WindowInput *input, const PanelState *st
         draw_right(panel, state);
         draw_bottom(panel, state);
     }
+    draw_briefing(panel, state);
     if (panel->has_help)
         draw_help(panel, input, state);
     if (panel->dialogue != DIALOGUE_NONE)

@@ -5,6 +5,7 @@
 #include "render/panel.h"
 #include "render/plot.h"
 
+typedef enum { BRIEFING_AT_BEGIN, BRIEFING_OPEN, BRIEFING_CLOSED } Briefing;   // AT_BEGIN: until the tool or the X-ray is used
 typedef enum { DIALOGUE_NONE, DIALOGUE_QUIT, DIALOGUE_RESTART, DIALOGUE_TRAINEE } Dialogue;
 enum { PANEL_MESSAGES = 100, PANEL_TABS = 5, BUTTONS_IN_ROW = 5 };
 
@@ -37,6 +38,9 @@ struct Panel {
     int answer;                    // a click on its yes (1) or no (-1)
     char name[64];                 // the text field
     bool has_help, has_panels, has_hints;
+    Briefing briefing;
+    bool is_interactive;           // somebody is there: panel_take_input was called
+    GuiRect briefing_at;           // as last drawn; zero width: not shown
     double used_s[ACTION_COUNT];   // how long an action was held, or 1 s for each press: hints disappear with use
     // plots and log
     RunningPlot force, torque, wall;

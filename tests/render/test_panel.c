@@ -409,6 +409,40 @@ static void names_are_typed_and_trimmed(void **unused)
     end_desk(&desk);
 }
 
+static void instructions_are_shown_until_followed(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    Desk desk = new_desk(1280, 720);
+    desk.state.instructions = "Bring the tip into the aneurysm.\n1. Hold the pedal.\n2. Push the wire past the bend, which lies\nabout 40 mm in.\n";
+    Panel *panel = desk.panel;
+    draw(panel, &desk.canvas, &desk.input, &desk.state);
+    assert_true(panel->briefing_at.width == 0);   // a film: nobody is there to close it
+    frame(&desk);
+    assert_true(panel->briefing_at.width > 0);
+    keep_picture(&desk.canvas, "briefing");
+    // no drag begins in the view below it
+    desk.input.mouse_x = panel->briefing_at.x + panel->briefing_at.width / 2;
+    desk.input.mouse_y = panel->briefing_at.y + 4;
+    desk.input.mouse_buttons = WINDOW_MOUSE_LEFT;
+    frame(&desk);
+    assert_int_equal(desk.actions.mouse.view, -1);
+    desk.input.mouse_buttons = 0;
+    // following it closes it
+    add_event(&desk, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = 'F'});
+    for (int i = 0; i < 20; i++)
+        frame(&desk);
+    assert_true(panel->briefing_at.width == 0);
+    tap(&desk, 'O');
+    assert_true(panel->briefing_at.width > 0);
+    tap(&desk, WINDOW_KEY_ESCAPE);
+    assert_true(panel->briefing_at.width == 0 && !panel_is_asking(panel));
+    tap(&desk, WINDOW_KEY_ESCAPE);
+    assert_true(panel_is_asking(panel));
+    end_desk(&desk);
+}
+
 static void strange_states_draw(void **unused)
 {
     (void)unused;
@@ -522,6 +556,7 @@ int main(void)
                                        cmocka_unit_test(views_are_chosen_turned_and_scrolled_by_mouse),
                                        cmocka_unit_test(a_button_lets_go_when_the_focus_goes),
                                        cmocka_unit_test(names_are_typed_and_trimmed),
+                                       cmocka_unit_test(instructions_are_shown_until_followed),
                                        cmocka_unit_test(strange_states_draw),
                                        cmocka_unit_test(kept_windows_show_what_a_new_panel_shows),
                                        cmocka_unit_test(what_a_frame_costs)};
