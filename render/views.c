@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The wall while camera or C-arm turn: this many triangles are drawn in time without a GPU (DESIGN section 8).
-enum { COARSE_TRIANGLES = 25000 };
+// Of the wall at rest, and while camera or C-arm turn: what can be drawn in time without a GPU (DESIGN section 8).
+enum { FINE_TRIANGLES = 90000, COARSE_TRIANGLES = 25000 };
 
 // A view beside the main one is kept as a picture and drawn anew in every second frame, the two in turn: nobody looks at both at once.
 
@@ -21,7 +21,7 @@ struct Views {
     long frames;
 };
 
-static Fluoroscope *create_fluoroscope(const ViewsOptions *options, char *message, size_t capacity)
+static Fluoroscope *create_fluoroscope(const ViewsOptions *options, const TriangleMesh *mesh, char *message, size_t capacity)
 {
     int nodes = options->pose->node_count;
     double *radius = calloc((size_t)nodes, sizeof *radius), *attenuation = calloc((size_t)nodes, sizeof *attenuation);
@@ -32,7 +32,7 @@ static Fluoroscope *create_fluoroscope(const ViewsOptions *options, char *messag
         attenuation[i] = scene_attenuation(options->scene, options->pose->node[i].s);
     }
     if (radius && attenuation) {
-        fluoroscope.vessel = options->mesh;
+        fluoroscope.vessel = mesh;
         fluoroscope.tree = options->tree;
         fluoroscope.node_count = nodes;
         fluoroscope.radius = radius;
@@ -54,14 +54,18 @@ static Fluoroscope *create_fluoroscope(const ViewsOptions *options, char *messag
 Views *views_create(const ViewsOptions *options, char *message, size_t capacity)
 {
     Views *views = calloc(1, sizeof *views);
-    TriangleMesh *coarse = options->mesh ? mesh_decimate(options->mesh, COARSE_TRIANGLES, HUGE_VAL) : NULL;
+    bool is_large = options->mesh && options->mesh->triangle_count > FINE_TRIANGLES;
+    TriangleMesh *fine = is_large ? mesh_decimate(options->mesh, FINE_TRIANGLES, HUGE_VAL) : NULL;
+    const TriangleMesh *mesh = fine ? fine : options->mesh;
+    TriangleMesh *coarse = mesh ? mesh_decimate(mesh, COARSE_TRIANGLES, HUGE_VAL) : NULL;
     const Scene *scene = options->scene;
-    VesselSceneOptions shown = {.vessel = options->mesh, .coarse = coarse, .tree = options->tree, .target_count = scene->target_count,
+    VesselSceneOptions shown = {.vessel = mesh, .coarse = coarse, .tree = options->tree, .target_count = scene->target_count,
                                 .target = scene->target, .has_entry = scene->wire.has_sheath, .entry = scene->wire.start,
                                 .entry_direction = scene->wire.direction};
     bool good = views && (views->scene = vessel_scene_create(&shown, message, capacity)) &&
-                (views->angioscope = angioscope_create(options->mesh, options->vessel, options->tree, message, capacity)) &&
-                (views->fluoroscope = create_fluoroscope(options, message, capacity));
+                (views->angioscope = angioscope_create(mesh, options->vessel, options->tree, message, capacity)) &&
+                (views->fluoroscope = create_fluoroscope(options, mesh, message, capacity));
+    triangle_mesh_free(fine);
     triangle_mesh_free(coarse);
     if (good)
         return views;
