@@ -317,9 +317,12 @@ static char *list_json(const DeviceList *list)
     }
     add_nodes(object, "joysticks", list->joystick, list->joystick_count);
     add_nodes(object, "events", list->event, list->event_count);
-    char *text = cJSON_Print(object);
+    char *text = cJSON_Print(object), *line = text ? malloc(strlen(text) + 2) : NULL;
+    if (line)
+        sprintf(line, "%s\n", text);
+    free(text);
     cJSON_Delete(object);
-    return text;
+    return line;
 }
 
 static bool write_json(const DeviceList *list, const char *path, Faults *faults)

@@ -21,7 +21,7 @@ struct Hands {
     HandShared shared;
     HidTransport *own_transport;
     UsbContext *usb;
-    bool has_tried_usb;
+    bool has_told_usb;
     DeviceMap *map[MOST_MAPS], *built_in[BUILT_IN_COUNT];
     int map_count, rescan_ms;
     bool use_built_in, use_usb;
@@ -140,6 +140,7 @@ static bool start_slot(HandSlot *slot, const HidDeviceInfo *device, const Device
     slot->info.vendor_id = device->vendor_id;
     slot->info.product_id = device->product_id;
     pthread_mutex_unlock(&shared->lock);
+    slot->encoder_runs = slot->encoder != NULL;
     slot->has_thread = pthread_create(&slot->thread, NULL, slot->encoder ? hand_run_encoder : hand_run_hid, slot) == 0;
     if (slot->has_thread)
         hand_say(shared, is_back ? "%s is back (map '%s')" : "%s drives the tool (map '%s')", name, map->name);
@@ -241,14 +242,21 @@ static const DeviceMap *encoder_map(const Hands *hands, const UsbDeviceInfo *dev
 static void look_for_encoders(Hands *hands)
 {
     UsbDeviceInfo found[HANDS_MOST * 2];
-    bool is_wanted = false;
+    bool is_wanted = false, is_one_open = false;
     for (int i = 0; i < hands->map_count; i++)
         is_wanted |= hands->map[i]->device.kind == MAP_FTDI;
     if (!hands->use_usb || !is_wanted)
         return;
-    if (!hands->usb && !hands->has_tried_usb && !(hands->usb = usb_context_open()))
+    // libusb hears of new devices from udevd; where none runs (a container) only a fresh start sees them, and no open device may stand in its way
+    for (int i = 0; i < HANDS_MOST; i++)
+        is_one_open |= hands->slot[i].has_thread && hands->slot[i].encoder_runs;
+    if (!is_one_open) {
+        usb_context_close(hands->usb);
+        hands->usb = usb_context_open();
+    }
+    if (!hands->usb && !hands->has_told_usb)
         hand_say(&hands->shared, "USB encoders cannot be used: libusb does not start");
-    hands->has_tried_usb = true;
+    hands->has_told_usb |= !hands->usb;
     int count = hands->usb ? usb_encoder_list(hands->usb, found, HANDS_MOST * 2) : 0;
     for (int i = 0; i < count; i++) {
         HidDeviceInfo device = {.vendor_id = found[i].vendor_id, .product_id = found[i].product_id, .interface_number = -1};

@@ -5,7 +5,7 @@
 #include <string.h>
 #include <time.h>
 
-enum { READ_WAIT_MS = 50, FORCE_WAIT_MS = 1, DRAIN_MOST = 512, INFO_US = 50000, COUNT_RATE_US = 1000000 };
+enum { READ_WAIT_MS = 50, FORCE_WAIT_MS = 1, DRAIN_MOST = 512, INFO_US = 50000, COUNT_RATE_US = 1000000, FAILURES_TOLD = 20 };
 
 int64_t hand_now_us(void)
 {
@@ -69,9 +69,13 @@ static void start_force(HandSlot *slot)
         hand_say(shared, "%s: force: %s", slot->info.name, slot->force.text);
 }
 
-// A force that the watchdog took away is told, once each time.
+// A force that the watchdog took away is told, once each time; and a device that takes none, once.
 static void tell_watchdog(HandSlot *slot, double sent_before)
 {
+    if (slot->force.failed_writes == FAILURES_TOLD) {
+        hand_say(slot->shared, "%s does not take the forces that are sent to it", slot->info.name);
+        slot->force.failed_writes++;
+    }
     const char *why = slot->force.guard.why_zero;
     if (sent_before != 0 && slot->force.guard.sent[0] == 0 && why && why[0] && strcmp(why, "paused") != 0)
         hand_say(slot->shared, "%s: force to zero, %s%s", slot->info.name, why,

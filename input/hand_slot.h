@@ -33,7 +33,7 @@ typedef struct HandSlot {
     UsbEncoder *encoder;             // the same of an encoder
     ForceFeedback force;
     pthread_t thread;
-    bool has_thread;
+    bool has_thread, encoder_runs;   // the scanner's: the thread is there, and for an encoder
     _Atomic bool has_ended;          // the device went; the scanner joins the thread
     HandInfo info;                   // under the lock
 } HandSlot;

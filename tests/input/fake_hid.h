@@ -28,7 +28,8 @@ typedef struct FakeDevice {
     int64_t written_us[FAKE_WRITTEN];
     int written_count, features_sent;
     uint8_t last_feature[FAKE_REPORT];
-    FakeReport feature_answer;       // what get_feature gives
+    FakeReport feature_answer;       // what get_feature gives; its byte 1 grows by `feature_grows` with each feature sent
+    int feature_grows;
     int flood_hz;                    // > 0: makes reports of its own, without end
     FakeReport flood;
 } FakeDevice;
@@ -139,6 +140,7 @@ static inline int fake_send_feature(void *context, void *opened, const uint8_t *
     FakeDevice *device = opened;
     pthread_mutex_lock(&hid->lock);
     device->features_sent++;
+    device->feature_answer.bytes[1] = (uint8_t)(device->feature_answer.bytes[1] + device->feature_grows);
     memcpy(device->last_feature, bytes, (size_t)(length < FAKE_REPORT ? length : FAKE_REPORT));
     pthread_mutex_unlock(&hid->lock);
     return length;

@@ -237,6 +237,19 @@ static void real_reports_become_rates(void **state)
     map_release(map, &device);
     map_publish(map, &device, &port);
     assert_true(port.push_mm_s == 0 && port.twist_deg_s == 0 && port.buttons == 0);
+    free(map);
+    // buttons that push, an axis that is a pedal, a pedal that is open at rest
+    map = must_parse(TOP "device: {usage: joystick}\npush: [{source: button_5, mm_s: 3}, {source: button_6, mm_s: 3, invert: true}]\n"
+                         "pedal: {source: Y, above: 0.5}\ncontrast: {source: button_1, invert: true}\n");
+    assert_true(map_bind_hid(map, wheel, "wheel", &device, &faults));
+    map_publish(map, &device, &port);
+    assert_int_equal(port.buttons, 0);    // before the first report nothing is held, inverted or not
+    assert_true(map_take_report(map, wheel, (const uint8_t[]){0, 0, 0x04, 0x80, 192, 0, 0, 0}, 8, &device));
+    map_publish(map, &device, &port);
+    assert_true(near(port.push_mm_s, 3) && port.buttons == (HAND_PEDAL | HAND_CONTRAST));
+    assert_true(map_take_report(map, wheel, (const uint8_t[]){0, 0x40, 0x08, 0x80, 190, 0, 0, 0}, 8, &device));
+    map_publish(map, &device, &port);
+    assert_true(near(port.push_mm_s, -3) && port.buttons == 0);
     free(wheel);
     free(map);
 }

@@ -324,6 +324,54 @@ static void a_haptic_joystick_needs_no_map_and_a_refused_effect_is_told(void **s
     free(hid);
 }
 
+// Two effects, force along Y and torque along X, each with its own full scale; pure calls, no thread.
+static void torque_is_a_second_effect(void **state)
+{
+    (void)state;
+    HidDescriptor *stick = descriptor_of(sidewinder_2);
+    DeviceMap *map = map_of("seldinger_device: 1\ndevice: {usage: joystick}\npush: {source: Y, mm_s: 40, invert: true}\ntwist: {source: X, deg_s: 90}\n"
+                            "force: {full_scale_n: 8, max_n: 8, slew_n_s: 100000, full_scale_n_mm: 40}\n");
+    FakeHid *hid = calloc(1, sizeof *hid);
+    assert_non_null(hid);
+    HidTransport transport = fake_transport(hid);
+    FakeDevice *device = fake_plug(hid, 0, 1, 2, "", HID_USAGE(1, 4), NULL, 0);
+    device->feature_answer = (FakeReport){.length = 5, .bytes = {2, 0, 1, 0, 1}};
+    device->feature_grows = 1;
+    ForceFeedback force;
+    HandPort port = {0};
+    int64_t now = 1000000;
+    assert_true(force_start(&force, map, stick, &transport, device, now));
+    assert_true(force.block[0] == 1 && force.block[1] == 2);
+    assert_non_null(strstr(force.text, "and torque"));
+    uint8_t direction[2];
+    int found = 0;
+    for (int i = 0; i < device->written_count; i++)
+        if (device->written[i].bytes[0] == 1)
+            direction[found++] = device->written[i].bytes[12];
+    assert_true(found == 2 && direction[0] == 0 && direction[1] == 64);    // from north, from east
+    atomic_store(&port.force_n, -4);
+    atomic_store(&port.torque_n_mm, 10);
+    for (int i = 0; i < 5; i++) {
+        now += 1000;
+        atomic_fetch_add(&port.step, 1);
+        force_tick(&force, &port, now, now, false, &transport, device);
+    }
+    assert_true(force.value[0] == -128 && force.value[1] == 64);    // half and a quarter of 255, rounded
+    int before = device->written_count;
+    for (int i = 0; i < 5; i++) {    // nothing new to say, nothing said
+        now += 1000;
+        atomic_fetch_add(&port.step, 1);
+        force_tick(&force, &port, now, now, false, &transport, device);
+    }
+    assert_int_equal(device->written_count, before);
+    now += 1000;
+    force_tick(&force, &port, now, now, true, &transport, device);
+    assert_true(force.value[0] == 0 && force.value[1] == 0);        // paused
+    free(stick);
+    free(map);
+    free(hid);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -333,6 +381,7 @@ int main(void)
         cmocka_unit_test(forces_are_clamped_and_grow_no_faster_than_the_slew),
         cmocka_unit_test(the_watchdog_takes_the_force_away_at_once),
         cmocka_unit_test(a_late_tick_does_not_jump),
+        cmocka_unit_test(torque_is_a_second_effect),
         cmocka_unit_test(a_stick_feels_the_sheath_until_the_simulation_stands),
         cmocka_unit_test(a_haptic_joystick_needs_no_map_and_a_refused_effect_is_told),
     };
