@@ -197,7 +197,7 @@ static RoadMap frame_path(const SessionPage *page)
     view.table_mm[0] = (float)middle.x, view.table_mm[1] = (float)middle.y, view.table_mm[2] = (float)middle.z;
     map.arm = c_arm_place(&view, &axes);
     c_arm_label(&view, map.label);
-    double margin = 4 + 0.1 * vec3_distance(low, high);
+    double margin = 3 + 0.05 * vec3_distance(low, high);
     for (int64_t i = 0; i < run->frame_count; i++)
         widen(&map, tip_at(run, i), margin, box);
     if (page->scene && page->scene->exercise) {
@@ -297,6 +297,7 @@ static void draw_marks(const SessionPage *page, const RoadMap *map)
         report_text(out, target->name);
         fprintf(out, "</text>\n");
     }
+    double last_x = -1e9, last_y = -1e9, shift = 0;
     for (int i = 0; i < page->session->event_count; i++) {
         int64_t low = 0, high = run->frame_count - 1;        // the first frame at or after it
         while (low < high) {
@@ -307,7 +308,9 @@ static void draw_marks(const SessionPage *page, const RoadMap *map)
                 high = at;
         }
         place(map, tip_at(run, low), &x, &y);
-        fprintf(out, "<circle class=\"error\" cx=\"%.1f\" cy=\"%.1f\" r=\"5\"/><text class=\"error label\" x=\"%.1f\" y=\"%.1f\">%c</text>\n", x, y, x + 7, y - 5,
+        shift = hypot(x - last_x, y - last_y) < 12 ? shift + 11 : 0;         // letters of one place stand side by side
+        last_x = x, last_y = y;
+        fprintf(out, "<circle class=\"error\" cx=\"%.1f\" cy=\"%.1f\" r=\"5\"/><text class=\"error label\" x=\"%.1f\" y=\"%.1f\">%c</text>\n", x, y, x + 7 + shift, y - 5,
                 session_error_letter(page->session->event[i].kind));
     }
 }

@@ -31,10 +31,10 @@ static const char own_style[] =
     ".bar{fill:currentColor}.error{stroke:var(--bad);fill:none;stroke-dasharray:3 3}text.error{fill:var(--bad);stroke:var(--panel);stroke-dasharray:none}"
     "svg text.error{fill:var(--bad)}circle.error{stroke-width:2;stroke-dasharray:none}\n"
     ".vessel path{fill:none;stroke:var(--muted);stroke-linecap:round}.vessel circle{fill:var(--muted)}.vessel{opacity:.32}svg.view{margin:0;max-width:none}\n"
-    ".halo{fill:none;stroke:var(--panel);stroke-width:5;stroke-linejoin:round;stroke-linecap:round}.way{fill:none;stroke-width:2.6;stroke-linejoin:round}"
+    ".halo{fill:none;stroke:#fff;stroke-width:5;stroke-linejoin:round;stroke-linecap:round}.way{fill:none;stroke-width:2.6;stroke-linejoin:round}"
     ".tool{fill:none;stroke:var(--ink);stroke-width:1}.held{fill:currentColor}.missed{fill:var(--panel);stroke:currentColor;stroke-width:2}\n"
     "tr.own{background:var(--panel);font-weight:600}td.mark-letter{color:var(--bad);font-weight:700}meter{width:7rem}\n"
-    "@media print{body{font-size:10pt}.halo{stroke:#fff}section{break-inside:auto}figure{max-width:100%}}\n";
+    "@media print{body{font-size:10pt}section{break-inside:auto}figure{max-width:100%}}\n";
 
 // --- the page ---
 
@@ -88,7 +88,7 @@ static void print_parts(const SessionPage *page)
     for (int i = 0; e && i < PART_COUNT; i++)
         weights += e->par[i] > 0 ? e->weight[i] : 0;
     fprintf(out, "<section id=\"parts\"><h2>Points</h2>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Part</th><th scope=\"col\">Measured</th><th scope=\"col\">Full "
-                 "points up to</th><th scope=\"col\">Weight</th><th scope=\"col\" class=\"words\">Share</th></tr></thead><tbody>\n");
+                 "points up to</th><th scope=\"col\">Weight</th><th scope=\"col\" class=\"words\">Reached</th></tr></thead><tbody>\n");
     for (int i = 0; i < PART_COUNT; i++) {
         bool judged = !e || (e->par[i] > 0 && e->weight[i] > 0);
         fprintf(out, "<tr><th scope=\"row\">%s [%s]</th><td>%.2f</td>", part_words[i], part_unit[i], figure[i]);
@@ -101,14 +101,14 @@ static void print_parts(const SessionPage *page)
         else
             fprintf(out, "<td class=\"words\">–</td></tr>\n");
     }
-    fprintf(out, "</tbody></table></div>\n<p>Shares by weight, ");
+    fprintf(out, "</tbody></table></div>\n<p>What was reached counts by weight, ");
     if (f->state == SCORE_REACHED)
-        fprintf(out, "all of them since the target was held");
+        fprintf(out, "in full since the target was held");
     else
         fprintf(out, "times half of the part of the way that was covered (%.0f %%), since the target was not held",
                 f->way_mm > 0 ? 100 * fmax(1 - f->least_remaining_mm / f->way_mm, 0) : 0);
-    if (e)
-        fprintf(out, "; %d error%s at %g points taken off", f->error_total, f->error_total == 1 ? "" : "s", e->error_points);
+    if (e && f->error_total > 0)
+        fprintf(out, "; less %g points for each of %d error%s", e->error_points, f->error_total, f->error_total == 1 ? "" : "s");
     fprintf(out, ".</p></section>\n");
 }
 
