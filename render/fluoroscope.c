@@ -429,6 +429,7 @@ FluoroscopeState fluoroscope_state(const Fluoroscope *f)
                               .has_mask = f->has_mask,
                               .mask_has_moved = f->has_mask && c_arms_differ(&f->mask_c_arm, &f->c_arm),
                               .has_roadmap = f->tone.has_roadmap,
+                              .is_out_of_beam = f->lumen_out_of_beam,
                               .shown = f->shown.xray,
                               .square = {f->corner[0], f->corner[1], f->side}};
 }

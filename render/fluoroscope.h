@@ -62,6 +62,7 @@ typedef struct FluoroscopeState {
     bool has_mask;                 // DSA: a mask is there …
     bool mask_has_moved;           // … but C-arm, table or field were moved since, so that bones do not cancel
     bool has_roadmap;              // an opacified lumen to overlay is there
+    bool is_out_of_beam;           // part of the vessel lies beside or behind the source as the C-arm and the table stand: no contrast is drawn
     XrayControl shown;             // what the picture on the screen was taken with
     int square[3];                 // x, y (from the port's lower left corner), side [pixel]: where the picture lies in the port
 } FluoroscopeState;

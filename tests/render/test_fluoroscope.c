@@ -1,0 +1,477 @@
+// The pictures of fluoroscopy: Beer and Lambert, noise, blades, DSA, roadmap, held image, mirrors, bad vessels. Skipped by name where no EGL is.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+#include "../geom/near.h"
+#include "../geom/small_meshes.h"
+#include "xray_room.h"
+
+static const float full = 1;
+
+static TriangleMesh ball_of(double radius, Vec3 place)
+{
+    TriangleMesh ball = sphere_mesh(24);
+    for (int v = 0; v < ball.vertex_count; v++)
+        ball.vertex[v] = vec3_add_scaled(place, radius, ball.vertex[v]);
+    return ball;
+}
+
+static FluoroscopeOptions quiet_room(const TriangleMesh *vessel)
+{
+    FluoroscopeOptions options = fluoroscope_default_options();
+    options.has_no_anatomy = true;
+    options.quanta = 0;
+    options.vessel = vessel;
+    return options;
+}
+
+// A straight tool of `count` nodes from a to b.
+typedef struct Tool {
+    Pose *pose;
+    double *radius, *attenuation;
+} Tool;
+static Tool tool_make(int count, Vec3 a, Vec3 b, double radius, double attenuation)
+{
+    Tool tool = {pose_create(count), malloc((size_t)count * sizeof(double)), malloc((size_t)count * sizeof(double))};
+    for (int i = 0; i < count; i++) {
+        tool.pose->position[i] = vec3_mix(a, b, i / (count - 1.0));
+        tool.radius[i] = radius;
+        tool.attenuation[i] = attenuation;
+    }
+    return tool;
+}
+
+static void tool_give(const Tool *tool, FluoroscopeOptions *options)
+{
+    options->node_count = tool->pose->node_count;
+    options->radius = tool->radius;
+    options->attenuation = tool->attenuation;
+}
+
+static void tool_free(Tool *tool)
+{
+    pose_free(tool->pose);
+    free(tool->radius);
+    free(tool->attenuation);
+}
+
+static void known_thickness_gives_known_grey(void **state)
+{
+    (void)state;
+    // a ball of contrast 16 mm across, a rod of 4 mm, one through the other at the top
+    TriangleMesh ball = ball_of(8, vec3(0, 0, 0));
+    FluoroscopeOptions options = quiet_room(&ball);
+    Tool rod = tool_make(31, vec3(-30, 0, -3), vec3(30, 0, -3), 2, 0.15);
+    tool_give(&rod, &options);
+    XrayRoom *s = room_open(&options, 240);
+    if (!s)
+        skip();
+    s->frame.pose = rod.pose;
+    for (int k = 0; k <= 4; k++) {
+        float c = 0.25f * (float)k;
+        s->frame.contrast = &c;
+        s->frame.pulse++;
+        room_draw(s);
+        // four pixels a millimetre; rays are almost parallel to the axis. Rounding of the picture is half a step, of the noise-free base less
+        double slab = 0.105 * (double)c;
+        assert_near(room_grey(s, 120, 120 + 16), live_grey(slab * 2 * sqrt(64 - 16)), 1.5);
+        assert_near(room_grey(s, 20, 120 - 12), live_grey(0.15 * 4), 1.5);
+        assert_near(room_grey(s, 120, 120 - 12), live_grey(0.15 * 4 + slab * 2 * sqrt(64 - 9)), 1.5);
+        assert_near(room_grey(s, 40, 200), live_grey(0), 1);
+    }
+    room_close(s);
+    tool_free(&rod);
+    mesh_clear(&ball);
+}
+
+static void noise_is_that_of_the_quanta(void **state)
+{
+    (void)state;
+    TriangleMesh slab;
+    const Vec3 corner[4] = {{-40, -10, 0}, {40, -10, 0}, {40, 10, 0}, {-40, 10, 0}};
+    slab = prism_mesh(corner, 4, 40);   // 20 mm of contrast in the upper half
+    FluoroscopeOptions options = quiet_room(&slab);
+    for (int k = 0; k < 2; k++) {
+        options.quanta = k ? 2000 : 550;
+        XrayRoom *s = room_open(&options, 400);
+        if (!s)
+            skip();
+        float part = 0.6f;
+        s->frame.contrast = &part;
+        room_draw(s);
+        Moments half[2] = {room_moments(s, 40, 40, 360, 180), room_moments(s, 40, 220, 360, 360)};
+        for (int h = 0; h < 2; h++) {
+            double attenuation = h ? 0.6 * 0.105 * 20 : 0, transmission = 0.27 * exp(-attenuation);
+            // sigma of 1.75 I^0.72 where sigma of I is sqrt(I / quanta); a step of 255 adds 1/12
+            double sigma = 255 * 1.75 * 0.72 * pow(transmission, 0.72 - 1) * sqrt(transmission / options.quanta);
+            print_message("quanta %g, I %.3f: grey %.2f (%.2f), sigma %.3f (%.3f)\n", options.quanta, transmission, half[h].mean, live_grey(attenuation),
+                          half[h].deviation, sqrt(sigma * sigma + 1.0 / 12));
+            // 44,800 pixels of which about seven share their noise: the estimate's own sigma is 0.9 %; rays through the slab's edges are a little longer
+            assert_near(half[h].deviation / sqrt(sigma * sigma + 1.0 / 12), 1, 0.03);
+            assert_near(half[h].mean, live_grey(attenuation), h ? 1.5 : 0.5);
+        }
+        room_close(s);
+    }
+    mesh_clear(&slab);
+}
+
+static void the_same_pulse_gives_the_same_picture(void **state)
+{
+    (void)state;
+    FluoroscopeOptions options = fluoroscope_default_options();
+    XrayRoom *s = room_open(&options, 160), *other = room_open(&options, 160);
+    if (!s || !other)
+        skip();
+    size_t bytes = 160 * 160 * 3;
+    uint8_t *first = malloc(bytes);
+    // `other` is the current context
+    for (uint32_t pulse = 1; pulse < 4; pulse++) {
+        other->frame.pulse = pulse;
+        room_draw(other);
+        if (pulse == 2)
+            memcpy(first, other->rgb, bytes);
+    }
+    assert_true(memcmp(first, other->rgb, bytes) != 0);
+    // pulses that are nothing to each other
+    double product = 0, square = 0;
+    uint8_t *last = malloc(bytes);
+    memcpy(last, other->rgb, bytes);
+    other->frame.pulse = 2;
+    room_draw(other);
+    assert_memory_equal(first, other->rgb, bytes);
+    Moments m = room_moments(other, 60, 60, 100, 100);
+    for (int y = 60; y < 100; y++)
+        for (int x = 60; x < 100; x++) {
+            size_t at = (size_t)(y * 160 + x) * 3;
+            product += (first[at] - m.mean) * (last[at] - m.mean);
+            square += (first[at] - m.mean) * (first[at] - m.mean);
+        }
+    assert_true(fabs(product / square) < 0.25);   // of 1,600 pixels, some 230 independent: three sigmas are 0.2
+    free(first);
+    free(last);
+    room_close(other);
+    room_close(s);
+}
+
+static void blades_cover_what_they_are_set_to(void **state)
+{
+    (void)state;
+    FluoroscopeOptions options = quiet_room(NULL);
+    XrayRoom *s = room_open(&options, 400);
+    if (!s)
+        skip();
+    s->frame.xray.collimator[0] = 0.5f;    // left half of the left half
+    s->frame.xray.collimator[3] = 0.25f;   // an eighth at the top
+    room_draw(s);
+    double open = live_grey(0);
+    assert_near(room_grey(s, 200, 200), open, 1);
+    assert_near(room_grey(s, 380, 20), open, 1);
+    assert_true(room_grey(s, 80, 200) < 12 && room_grey(s, 200, 370) < 12);
+    // the soft edge is half open where the blade ends, and rises over a few pixels
+    assert_near(room_grey(s, 100, 200) / open, 0.5, 0.1);
+    assert_near(room_grey(s, 200, 350) / open, 0.5, 0.1);
+    assert_true(room_grey(s, 92, 200) < 0.1 * open && room_grey(s, 108, 200) > 0.9 * open);
+    // rounded: the corner of the opening is dark a pixel or two inside
+    assert_true(room_grey(s, 103, 346) < 0.3 * open);
+    room_close(s);
+}
+
+static void dsa_shows_the_vessel_alone(void **state)
+{
+    (void)state;
+    TriangleMesh ball = ball_of(6, vec3(0, 0, 0));
+    FluoroscopeOptions options = fluoroscope_default_options();   // a plain head
+    options.vessel = &ball;
+    Tool wire = tool_make(31, vec3(-30, 0, 15), vec3(30, 0, 15), 0.5, 0.6);
+    tool_give(&wire, &options);
+    XrayRoom *s = room_open(&options, 320);
+    if (!s)
+        skip();
+    s->frame.xray.field_mm = 80;
+    s->frame.pose = wire.pose;
+    room_draw(s);
+    s->frame.pulse++;
+    s->frame.xray.mode = XRAY_DSA;
+    s->frame.xray.mask = 1;
+    room_draw(s);
+    assert_true(fluoroscope_state(s->view).has_mask && !fluoroscope_state(s->view).mask_has_moved);
+    s->frame.pulse++;
+    room_draw(s);
+    // an empty injection: flat within the noise of picture and mask, in front of bones, air cells and the wire
+    double flat = 255 * 0.62;
+    const CArm *c_arm = &s->view->c_arm;
+    for (int y = 30; y < 290; y += 20)
+        for (int x = 30; x < 290; x += 20) {
+            Moments m = room_moments(s, x, y, x + 20, y + 20);
+            double a = anatomy_along(&s->view->anatomy, c_arm_source(c_arm), pixel_ray(c_arm, 320, x + 10, y + 10));
+            double transmission = fmin(exp(s->view->tone.exposure - a), 1);
+            double sigma = flat * options.dsa_gain * sqrt(2 / (options.quanta * options.dsa_dose * transmission));
+            assert_near(m.mean, flat, 5 * sigma * 2.7 / 20 + 0.5);   // 400 pixels, noise alike over 2.7
+            assert_near(m.deviation / sigma, 1, 0.35);
+        }
+    // contrast: the ball alone
+    s->frame.contrast = &full;
+    s->frame.pulse++;
+    room_draw(s);
+    assert_near(room_moments(s, 157, 157, 163, 163).mean / (flat * exp(-options.dsa_gain * 0.105 * 12)), 1, 0.12);
+    assert_near(room_moments(s, 40, 40, 80, 80).mean, flat, 2);
+    // the mask stays while the tool moves: it is white where it was, dark where it is
+    s->frame.contrast = NULL;
+    for (int i = 0; i < 31; i++)
+        wire.pose->position[i].z -= 5;
+    s->frame.pulse++;
+    room_draw(s);
+    int was = 160 + 15 * 4, is = 160 + 10 * 4;
+    assert_true(room_moments(s, 60, was - 1, 260, was + 1).mean > flat + 20 && room_moments(s, 60, is - 1, 260, is + 1).mean < flat - 20);
+    // turned, the mask no longer fits
+    s->frame.xray.lao_deg = 10;
+    s->frame.pulse++;
+    room_draw(s);
+    assert_true(fluoroscope_state(s->view).mask_has_moved);
+    s->frame.xray.mask = 2;
+    s->frame.pulse++;
+    room_draw(s);
+    assert_false(fluoroscope_state(s->view).mask_has_moved);
+    room_close(s);
+    tool_free(&wire);
+    mesh_clear(&ball);
+}
+
+static int blueness(const XrayRoom *s, int x, int y)
+{
+    const uint8_t *p = s->rgb + ((size_t)(s->side - 1 - y) * (size_t)s->side + (size_t)x) * 3;
+    return p[2] - p[0];
+}
+
+static void the_roadmap_keeps_the_last_bolus(void **state)
+{
+    (void)state;
+    TriangleMesh ball = ball_of(6, vec3(0, 0, 0));
+    FluoroscopeOptions options = quiet_room(&ball);
+    Tool wire = tool_make(31, vec3(-30, 0, 0), vec3(30, 0, 0), 0.5, 0.6);
+    tool_give(&wire, &options);
+    XrayRoom *s = room_open(&options, 240);
+    if (!s)
+        skip();
+    s->frame.pose = wire.pose;
+    // before any contrast there is nothing to overlay
+    s->frame.xray.mode = XRAY_ROADMAP;
+    room_draw(s);
+    assert_false(fluoroscope_state(s->view).has_roadmap);
+    assert_int_equal(blueness(s, 120, 130), 0);
+    // a bolus comes and goes in live fluoroscopy; then the mask is taken
+    s->frame.xray.mode = XRAY_LIVE;
+    for (int k = 0; k < 5; k++) {
+        const float c[5] = {0, 0.5f, 1, 0.3f, 0};
+        s->frame.contrast = &c[k];
+        s->frame.pulse++;
+        room_draw(s);
+        assert_int_equal(blueness(s, 120, 130), 0);
+    }
+    s->frame.contrast = NULL;
+    s->frame.xray.mode = XRAY_ROADMAP;
+    s->frame.xray.mask = 1;
+    s->frame.pulse++;
+    room_draw(s);
+    assert_true(fluoroscope_state(s->view).has_roadmap);
+    assert_true(blueness(s, 120, 130) > 40);
+    assert_int_equal(blueness(s, 120, 200), 0);
+    // the live tool is seen over it, and the overlay turns with the C-arm
+    assert_true(room_grey(s, 120, 120) < 0.85 * room_grey(s, 120, 130));
+    s->frame.xray.lao_deg = 60;
+    s->frame.xray.field_mm = 100;
+    for (int k = 0; k < 2; k++) {
+        s->frame.pulse++;
+        room_draw(s);
+        assert_true(blueness(s, 120, 120 + 8) > 40 && blueness(s, 120, 120 + 19) == 0);
+    }
+    fluoroscope_forget(s->view);
+    s->frame.pulse++;
+    room_draw(s);
+    assert_false(fluoroscope_state(s->view).has_roadmap);
+    room_close(s);
+    tool_free(&wire);
+    mesh_clear(&ball);
+}
+
+static void without_pedal_the_last_image_holds(void **state)
+{
+    (void)state;
+    TriangleMesh ball = ball_of(6, vec3(0, 0, 0));
+    FluoroscopeOptions options = fluoroscope_default_options();
+    options.vessel = &ball;
+    Tool wire = tool_make(31, vec3(-30, 0, 0), vec3(30, 0, 10), 0.5, 0.6);
+    tool_give(&wire, &options);
+    XrayRoom *s = room_open(&options, 200);
+    if (!s)
+        skip();
+    size_t row = 200 * 3, bytes = 200 * row;
+    uint8_t *before = malloc(bytes);
+    s->frame.pose = wire.pose;
+    room_draw(s);
+    assert_false(fluoroscope_state(s->view).is_held);
+    memcpy(before, s->rgb, bytes);
+    // the pedal is off, everything moves, pulses are counted on: the picture stays but for the sign in its corner
+    s->frame.xray.pedal = 0;
+    s->frame.pulse += 5;
+    s->frame.contrast = &full;
+    s->frame.xray.lao_deg = 30;
+    wire.pose->position[30].z += 10;
+    room_draw(s);
+    assert_true(fluoroscope_state(s->view).is_held);
+    assert_near(fluoroscope_state(s->view).shown.lao_deg, 0, 0);
+    assert_memory_equal(before + 40 * row, s->rgb + 40 * row, bytes - 40 * row);
+    assert_true(memcmp(before, s->rgb, 40 * row) != 0);
+    // on again
+    s->frame.xray.pedal = 1;
+    s->frame.pulse++;
+    room_draw(s);
+    assert_true(memcmp(before + 40 * row, s->rgb + 40 * row, bytes - 40 * row) != 0);
+    assert_false(fluoroscope_state(s->view).is_held);
+    free(before);
+    room_close(s);
+    tool_free(&wire);
+    mesh_clear(&ball);
+}
+
+static void a_mirrored_scene_gives_the_mirrored_picture(void **state)
+{
+    (void)state;
+    uint8_t *picture[2] = {NULL, NULL};
+    for (int mirrored = 0; mirrored < 2; mirrored++) {
+        TriangleMesh mesh = bent_tube_mesh(2, -10, 5, 10, 1.4, 10, 0.5, 32);
+        if (mirrored)
+            mesh_move(&mesh, quat_identity(), vec3(0, 0, 0), true);
+        double side = mirrored ? -1 : 1;
+        FluoroscopeOptions options = quiet_room(&mesh);
+        Tool wire = tool_make(41, vec3(-25 * side, 3, -8), vec3(18 * side, -5, 20), 0.3, 0.8);
+        tool_give(&wire, &options);
+        XrayRoom *s = room_open(&options, 200);
+        if (!s)
+            skip();
+        s->frame.pose = wire.pose;
+        s->frame.contrast = &full;
+        s->frame.xray.lao_deg = (float)(25 * side);
+        s->frame.xray.cra_deg = 15;
+        room_draw(s);
+        picture[mirrored] = malloc(200 * 200 * 3);
+        memcpy(picture[mirrored], s->rgb, 200 * 200 * 3);
+        room_close(s);
+        tool_free(&wire);
+        mesh_clear(&mesh);
+    }
+    int differ = 0, dark = 0;
+    for (int y = 0; y < 200; y++)
+        for (int x = 0; x < 200; x++) {
+            int a = picture[0][(y * 200 + x) * 3], b = picture[1][(y * 200 + 199 - x) * 3];
+            differ += abs(a - b) > 2;
+            dark += a < live_grey(0.15);
+        }
+    assert_true(dark > 800);
+    assert_true(differ < 8);   // a tool's end that falls on the middle between pixels
+    free(picture[0]);
+    free(picture[1]);
+}
+
+static void unfit_vessels_are_told(void **state)
+{
+    (void)state;
+    TriangleMesh tube = bent_tube_mesh(3, -15, 15, 10, 0.1, 1, 0.5, 32);
+    FluoroscopeOptions options = quiet_room(&tube);
+    XrayRoom *s = room_open(&options, 200);
+    if (!s)
+        skip();
+    // open: closed by lids, and said so
+    assert_true(room_says(s, "open at 2 places"));
+    s->frame.contrast = &full;
+    room_draw(s);
+    assert_near(room_grey(s, 100, 100), live_grey(0.105 * 6), 2);
+    // before the source: nothing drawn, and said so
+    s->frame.xray.table_mm[1] = -790;   // the patient's front is -y
+    s->frame.pulse++;
+    room_draw(s);
+    assert_true(fluoroscope_state(s->view).is_out_of_beam);
+    assert_near(room_grey(s, 100, 100), live_grey(0), 1);
+    room_close(s);
+    // the other way round as a whole
+    for (int t = 0; t < tube.triangle_count; t++) {
+        int b = tube.triangle[t][1];
+        tube.triangle[t][1] = tube.triangle[t][2], tube.triangle[t][2] = b;
+    }
+    s = room_open(&options, 200);
+    assert_true(room_says(s, "inwards"));
+    s->frame.contrast = &full;
+    room_draw(s);
+    assert_near(room_grey(s, 100, 100), live_grey(0.105 * 6), 2);
+    room_close(s);
+    // one triangle turned: whole rays would be wrong
+    int b = tube.triangle[300][1];
+    tube.triangle[300][1] = tube.triangle[300][2], tube.triangle[300][2] = b;
+    s = room_open(&options, 200);
+    assert_non_null(s->view);
+    assert_true(room_says(s, "no contrast is drawn"));
+    s->frame.contrast = &full;
+    room_draw(s);
+    assert_near(room_grey(s, 100, 100), live_grey(0), 1);
+    room_close(s);
+    tube.vertex[5].x = NAN;
+    s = room_open(&options, 200);
+    assert_true(room_says(s, "no contrast is drawn"));
+    room_close(s);
+    mesh_clear(&tube);
+    // options that are wrong are refused with a reason
+    FluoroscopeOptions bad = quiet_room(NULL);
+    bad.patient.right = vec3(1, 1, 0);
+    s = room_open(&bad, 64);
+    assert_null(s->view);
+    assert_true(room_says(s, "axes"));
+    room_close(s);
+}
+
+static void odd_frames_are_survived(void **state)
+{
+    (void)state;
+    TriangleMesh ball = ball_of(6, vec3(0, 0, 0));
+    FluoroscopeOptions options = fluoroscope_default_options();
+    options.vessel = &ball;
+    Tool wire = tool_make(31, vec3(-30, 0, 0), vec3(30, 0, 10), 0.5, 0.6);
+    tool_give(&wire, &options);
+    XrayRoom *s = room_open(&options, 120);
+    if (!s)
+        skip();
+    const float lost = NAN;
+    s->frame.pose = wire.pose;
+    s->frame.contrast = &lost;
+    wire.pose->position[7] = vec3(NAN, 0, 0);
+    wire.pose->position[15] = vec3(0, 5000, 0);   // behind the source
+    s->frame.xray.field_mm = INFINITY;
+    s->frame.xray.mode = 77;
+    s->frame.xray.collimator[0] = NAN;
+    s->frame.xray.collimator[1] = 7;
+    for (int k = 0; k < 6; k++) {
+        s->frame.pulse++;
+        s->frame.xray.lao_deg = k == 3 ? NAN : 500.0f * (float)k;
+        fluoroscope_draw(s->view, &s->frame, (ViewPort){s->canvas.framebuffer, 3, 5, 110 - 20 * k, 60 + 10 * k});
+    }
+    fluoroscope_draw(s->view, &s->frame, (ViewPort){s->canvas.framebuffer, 0, 0, 0, 0});
+    assert_int_equal(glGetError(), GL_NO_ERROR);
+    room_close(s);
+    tool_free(&wire);
+    mesh_clear(&ball);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(known_thickness_gives_known_grey),      cmocka_unit_test(noise_is_that_of_the_quanta),
+        cmocka_unit_test(the_same_pulse_gives_the_same_picture), cmocka_unit_test(blades_cover_what_they_are_set_to),
+        cmocka_unit_test(dsa_shows_the_vessel_alone),            cmocka_unit_test(the_roadmap_keeps_the_last_bolus),
+        cmocka_unit_test(without_pedal_the_last_image_holds),    cmocka_unit_test(a_mirrored_scene_gives_the_mirrored_picture),
+        cmocka_unit_test(unfit_vessels_are_told),                cmocka_unit_test(odd_frames_are_survived),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
