@@ -405,7 +405,8 @@ static int choose_patches(Angioscope *scope, const AngioscopeView *view, double 
             continue;
         scope->seen[count++] = (SeenPatch){distance, i};
     }
-    qsort(scope->seen, (size_t)count, sizeof *scope->seen, nearer_first);
+    if (count > 1)
+        qsort(scope->seen, (size_t)count, sizeof *scope->seen, nearer_first);
     return count;
 }
 

@@ -165,3 +165,13 @@ void camera_matrix(const Camera *camera, Vec3 origin, float matrix[16])
     }
     matrix[15] = 1;
 }
+
+void camera_axes(const Camera *camera, float matrix[9])
+{
+    const Vec3 row[3] = {camera->right, camera->up, camera->back};
+    for (int i = 0; i < 3; i++) {
+        matrix[i] = (float)row[i].x;
+        matrix[3 + i] = (float)row[i].y;
+        matrix[6 + i] = (float)row[i].z;
+    }
+}

@@ -26,6 +26,8 @@ void camera_frame_sphere(Camera *camera, int width, int height, double border, V
 Vec3 camera_project(const Camera *camera, Vec3 point);
 // Column-major matrix from space relative to `origin` to clip space.
 void camera_matrix(const Camera *camera, Vec3 origin, float matrix[16]);
+// Column-major rotation from space to right, up and towards the eye, for normals.
+void camera_axes(const Camera *camera, float matrix[9]);
 // Eigenvectors of a symmetric matrix by Jacobi's rotations, values ascending; the signs are arbitrary but repeatable.
 void camera_principal_axes(const Sym3 *matrix, double value[3], Vec3 axis[3]);
 

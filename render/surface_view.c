@@ -223,13 +223,8 @@ static void set_camera(unsigned program, const Camera *camera, Vec3 origin)
     float clip[16];
     camera_matrix(camera, origin, clip);
     glUniformMatrix4fv(glGetUniformLocation(program, "clip"), 1, GL_FALSE, clip);
-    const Vec3 row[3] = {camera->right, camera->up, camera->back};
     float eye[9];
-    for (int i = 0; i < 3; i++) {
-        eye[i] = (float)row[i].x;
-        eye[3 + i] = (float)row[i].y;
-        eye[6 + i] = (float)row[i].z;
-    }
+    camera_axes(camera, eye);
     glUniformMatrix3fv(glGetUniformLocation(program, "eye"), 1, GL_FALSE, eye);
 }
 

@@ -228,13 +228,8 @@ static void set_wall_uniforms(const VesselLayers *layers, const LayersKey *key)
     float clip[16];
     camera_matrix(camera, layers->origin, clip);
     glUniformMatrix4fv(glGetUniformLocation(program, "clip"), 1, GL_FALSE, clip);
-    const Vec3 row[3] = {camera->right, camera->up, camera->back};
     float eye[9];
-    for (int i = 0; i < 3; i++) {
-        eye[i] = (float)row[i].x;
-        eye[3 + i] = (float)row[i].y;
-        eye[6 + i] = (float)row[i].z;
-    }
+    camera_axes(camera, eye);
     glUniformMatrix3fv(glGetUniformLocation(program, "eye"), 1, GL_FALSE, eye);
     Vec3 n = key->section_normal;
     double offset = key->section_offset - vec3_dot(n, layers->origin);
