@@ -1,7 +1,9 @@
 #include "cli/scene_views.h"
 
+#include "geom/sort_doubles.h"
 #include "recon/volume.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 // Shapes and tubes lie in no patient: they are taken to lie so that they are seen face on from the front.
@@ -14,8 +16,30 @@ static PatientAxes patient_of(const Scene *scene, const TriangleMesh *mesh)
     return (PatientAxes){.right = vec3_negate(camera.right), .anterior = camera.back, .superior = camera.up};
 }
 
+// Cells for a wall that is drawn live: coarse enough to be there soon, no coarser than the radius of all but the thinnest twentieth of the nodes, at which
+// a branch still has its shape.
+static double live_cell(const VesselTree *tree)
+{
+    enum { TRIANGLES = 150000 };
+    double area = 0, *radius = malloc((size_t)tree->node_count * sizeof *radius), thin = HUGE_VAL;
+    for (int i = 0; i < tree->node_count; i++) {
+        int parent = tree->parent[i];
+        area += parent < 0 ? 0 : 2 * PI * tree->radius[i] * vec3_distance(tree->center[i], tree->center[parent]);
+        if (radius)
+            radius[i] = tree->radius[i];
+    }
+    if (radius) {
+        sort_doubles(radius, (size_t)tree->node_count);
+        thin = radius[tree->node_count / 20];
+    }
+    free(radius);
+    return fmax(fmin(sqrt(2.3 * area / TRIANGLES), thin), isosurface_cell_for(tree));   // 2.3 triangles a cell's face on the average
+}
+
 static Views *create(Scene *scene, OpenVessel *open, const Volume *volume, const Pose *pose, Desk *desk, char *note, size_t capacity, Faults *faults)
 {
+    if (!open->mesh && open->tree)
+        open->mesh = isosurface_of_tree(open->tree, live_cell(open->tree));
     const TriangleMesh *mesh = open_vessel_mesh(scene, open);
     ViewsOptions options = {.scene = scene, .vessel = open->vessel, .tree = open->tree, .mesh = mesh, .pose = pose, .patient = patient_of(scene, mesh)};
     if (volume) {
