@@ -56,7 +56,7 @@ static void practice_step(Practice *p, double push_mm_s)
     score_step(p->score, p->simulator, command, p->watched ? &p->xray : NULL);
 }
 
-static ScoreFigures practice_go(Practice *p, double push_mm_s, double seconds)
+static inline ScoreFigures practice_go(Practice *p, double push_mm_s, double seconds)
 {
     for (int i = 0, steps = (int)(seconds * 1000 / p->scene->dt + 0.5); i < steps; i++)
         practice_step(p, push_mm_s);
