@@ -317,7 +317,7 @@ static void remove_folder(const char *path)
 {
     pid_t child = fork();
     if (child == 0) {
-        execlp("rm", "rm", "-r", "-f", "--", path, (char *)NULL);
+        execl("/bin/rm", "rm", "-r", "-f", "--", path, (char *)NULL);
         _exit(127);
     }
     if (child > 0)

@@ -1,0 +1,246 @@
+// `seldinger report`: a page that stands alone, is also XML, and holds what the session holds; without a recording, with another's, with earlier sessions;
+// a browser prints it. The browser's part is skipped by name where there is none.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "../sim/score_scene.h"
+#include "sim/session.h"
+
+#include <expat.h>
+#include <stdio.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+static char folder[] = "/tmp/seldinger-session-report-XXXXXX";
+#include "tests/cli/folder.h"
+
+#define SCENE "seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], inserted_mm: 2}\n" \
+    "targets: [{name: 'the <end> & more', point_mm: [30, 12, 0], radius_mm: 2}]\n" \
+    "vessel: {friction: 0.1, tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 15}, " \
+    "{arc: {radius_mm: 15, angle_deg: 90}}, {line_mm: 20}]}}\n" \
+    "exercise: {title: 'Into the <bend>', target: 'the <end> & more', hold_s: 0.3, rules: {blind_mm: 5, wall_force_n: 0.001}, par: {time_s: 1, path_ratio: 1}, error_points: 3}\n"
+
+static void make_session(const char *name, const char *trainee, time_t when, double push_mm_s, double push_s)
+{
+    char path[300], recorded[300];
+    Practice *p = practice_begin(SCENE, NULL);
+    RecordingOptions options = recording_default_options();
+    static Session session;
+    snprintf(recorded, sizeof recorded, "%s.h5", in_folder(name));
+    snprintf(path, sizeof path, "%s.json", in_folder(name));
+    Recording *recording = recording_create(recorded, p->simulator, &options, &p->faults);
+    assert_non_null(recording);
+    p->watched = true;
+    for (int i = 0; i < 2500; i++) {
+        double push = i < push_s * 1000 ? push_mm_s : 0;
+        p->xray.pedal = i % 700 < 200;
+        practice_step(p, push);
+        assert_true(recording_step(recording, p->simulator, (Command){push, 0}, &p->xray));
+    }
+    assert_true(recording_close(recording, p->simulator, &p->faults));
+    RecordedRun *run = recorded_run_load_series(recorded, &p->faults);
+    assert_non_null(run);
+    session_begin(&session, p->scene, trainee, "keys & wheels", when);
+    session_set_score(&session, p->score);
+    session_set_run(&session, run, strrchr(recorded, '/') + 1);
+    char *text = session_json(&session);
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fputs(text, file);
+    assert_int_equal(fclose(file), 0);
+    free(text);
+    recorded_run_free(run);
+    practice_end(p);
+}
+
+static int make_folder(void **state)
+{
+    (void)state;
+    if (!mkdtemp(folder))
+        return -1;
+    make_session("first", "Ada <script>", 1762000000, 20, 0.8);
+    make_session("second", "Ada <script>", 1762100000, 20, 1.9);
+    make_session("other", "Bob", 1762200000, 10, 1.9);
+    return 0;
+}
+
+static int report(const char *arguments)
+{
+    char command[1000];
+    snprintf(command, sizeof command, "%s report %s >'%s' 2>&1", SELDINGER_PROGRAM, arguments, in_folder("out.txt"));
+    int status = system(command);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+typedef struct Seen {
+    int pictures, unnamed, polylines, rows, outside, scripts, errors, circles;
+} Seen;
+
+static void on_start(void *data, const char *name, const char **attribute)
+{
+    Seen *seen = data;
+    bool named = false, inner = false;
+    for (int i = 0; attribute[i]; i += 2) {
+        const char *key = attribute[i], *value = attribute[i + 1];
+        seen->outside += !strcmp(key, "src") || !strcmp(key, "href") || strstr(value, "//") != NULL || strstr(value, "url(") != NULL;
+        seen->scripts += !strncmp(key, "on", 2);
+        named = named || !strcmp(key, "aria-labelledby");
+        inner = inner || (!strcmp(key, "class") && !strcmp(value, "view"));
+        seen->errors += !strcmp(name, "path") && !strcmp(key, "class") && !strcmp(value, "error");
+    }
+    seen->pictures += !strcmp(name, "svg") && !inner;
+    seen->unnamed += !strcmp(name, "svg") && !inner && !named;
+    seen->polylines += !strcmp(name, "polyline");
+    seen->rows += !strcmp(name, "tr");
+    seen->circles += !strcmp(name, "circle");
+    seen->scripts += !strcmp(name, "script") || !strcmp(name, "iframe") || !strcmp(name, "link") || !strcmp(name, "img");
+}
+
+// The page as XML; the text of the file goes to *text (the caller frees).
+static Seen look_at(const char *path, char **text)
+{
+    Seen seen = {0};
+    *text = text_of(path);
+    XML_Parser parser = XML_ParserCreate("UTF-8");
+    XML_SetUserData(parser, &seen);
+    XML_SetStartElementHandler(parser, on_start);
+    if (XML_Parse(parser, *text, (int)strlen(*text), 1) != XML_STATUS_OK)
+        fail_msg("%s:%lu: %s", path, XML_GetCurrentLineNumber(parser), XML_ErrorString(XML_GetErrorCode(parser)));
+    XML_ParserFree(parser);
+    assert_int_equal(seen.outside, 0);
+    assert_int_equal(seen.scripts, 0);
+    assert_int_equal(seen.unnamed, 0);
+    assert_null(strstr(*text, "nan"));
+    assert_null(strstr(*text, "inf,"));
+    return seen;
+}
+
+static void the_page_holds_the_session(void **state)
+{
+    (void)state;
+    char *text, arguments[400];
+    snprintf(arguments, sizeof arguments, "'%s'", in_folder("second.json"));
+    assert_int_equal(report(arguments), 0);
+    Seen seen = look_at(in_folder("second.html"), &text);
+    assert_int_equal(seen.pictures, 3);          // over time, path, sessions
+    assert_true(seen.polylines >= 24);           // the path by time
+    static Session session;
+    static Faults faults;
+    assert_true(session_load(in_folder("second.json"), &session, &faults));
+    assert_true(session.event_count > 0);
+    assert_int_equal(seen.errors, session.event_count);
+    assert_non_null(strstr(text, "Into the &lt;bend&gt;"));
+    assert_non_null(strstr(text, "the &lt;end&gt; &amp; more"));
+    assert_non_null(strstr(text, "Ada &lt;script&gt;"));
+    assert_non_null(strstr(text, "class=\"vessel\""));
+    assert_non_null(strstr(text, "target held"));
+    assert_non_null(strstr(text, "yes, its series have the session's sum"));
+    assert_null(strstr(text, "Bob"));
+    char points[64];
+    snprintf(points, sizeof points, "<div class=\"points\">%.0f <small>", session.figures.points);
+    assert_non_null(strstr(text, points));
+    free(text);
+}
+
+static void the_same_bytes_twice(void **state)
+{
+    (void)state;
+    char arguments[900], *one, *two;
+    snprintf(arguments, sizeof arguments, "'%s' --quiet --html '%s' && %s report '%s' --quiet --html '%s'", in_folder("first.json"), in_folder("p.html"), SELDINGER_PROGRAM,
+             in_folder("first.json"), in_folder("q.html"));
+    assert_int_equal(report(arguments), 0);
+    look_at(in_folder("p.html"), &one);
+    look_at(in_folder("q.html"), &two);
+    assert_string_equal(one, two);
+    free(one);
+    free(two);
+}
+
+static void what_lacks_is_said(void **state)
+{
+    (void)state;
+    char arguments[900], *text;
+    snprintf(arguments, sizeof arguments, "'%s' --html '%s'", in_folder("other.json"), in_folder("other.html"));
+    assert_int_equal(rename(in_folder("other.h5"), in_folder("kept.h5")), 0);
+    assert_int_equal(report(arguments), 0);
+    Seen seen = look_at(in_folder("other.html"), &text);
+    assert_int_equal(seen.pictures, 0);
+    assert_non_null(strstr(text, "recording was not found"));
+    assert_non_null(strstr(text, "only one that was found"));
+    free(text);
+    // another session's recording under its name
+    assert_int_equal(link(in_folder("first.h5"), in_folder("other.h5")), 0);
+    assert_int_equal(report(arguments), 0);
+    look_at(in_folder("other.html"), &text);
+    assert_non_null(strstr(text, "is another one"));
+    free(text);
+    assert_int_equal(unlink(in_folder("other.h5")), 0);
+    assert_int_equal(rename(in_folder("kept.h5"), in_folder("other.h5")), 0);
+}
+
+static void wrong_use_is_refused(void **state)
+{
+    (void)state;
+    char arguments[900];
+    assert_int_equal(report(""), 2);
+    assert_int_equal(report("a.json b.json"), 2);
+    assert_int_equal(report("--colour a.json"), 2);
+    assert_int_equal(report("/nowhere/x.json"), 2);
+    snprintf(arguments, sizeof arguments, "'%s' --html '%s'", in_folder("first.json"), in_folder("first.json"));
+    assert_int_equal(report(arguments), 2);
+    snprintf(arguments, sizeof arguments, "'%s' --html /nowhere/x.html", in_folder("first.json"));
+    assert_int_equal(report(arguments), 2);
+    snprintf(arguments, sizeof arguments, "'%s'", in_folder("first.h5"));
+    assert_int_equal(report(arguments), 2);
+    assert_int_not_equal(access(in_folder("first.html"), F_OK), 0);
+}
+
+static void a_browser_prints_it(void **state)
+{
+    (void)state;
+    if (system("command -v chromium chromium-browser google-chrome >/dev/null 2>&1") != 0 && system("command -v chromium >/dev/null 2>&1") != 0) {
+        print_message("skipped: no chromium\n");
+        skip();
+    }
+    char arguments[900];
+    snprintf(arguments, sizeof arguments, "'%s' --pdf '%s'", in_folder("second.json"), in_folder("page.pdf"));
+    assert_int_equal(report(arguments), 0);
+    FILE *file = fopen(in_folder("page.pdf"), "rb");
+    assert_non_null(file);
+    char head[5] = "";
+    assert_int_equal(fread(head, 1, 4, file), 4);
+    assert_string_equal(head, "%PDF");
+    fseek(file, 0, SEEK_END);
+    assert_true(ftell(file) > 20000);            // text and figures
+    fclose(file);
+}
+
+static void no_browser_is_said(void **state)
+{
+    (void)state;
+    char command[900];
+    snprintf(command, sizeof command, "PATH=/nowhere '%s' report '%s' --pdf '%s' 2>'%s'", SELDINGER_PROGRAM, in_folder("first.json"), in_folder("no.pdf"), in_folder("err.txt"));
+    int status = system(command);
+    assert_int_equal(WEXITSTATUS(status), 2);
+    char *text = text_of(in_folder("err.txt"));
+    assert_non_null(strstr(text, "no PDF"));
+    free(text);
+    assert_int_not_equal(access(in_folder("no.pdf"), F_OK), 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(wrong_use_is_refused),
+        cmocka_unit_test(the_page_holds_the_session),
+        cmocka_unit_test(the_same_bytes_twice),
+        cmocka_unit_test(what_lacks_is_said),
+        cmocka_unit_test(a_browser_prints_it),
+        cmocka_unit_test(no_browser_is_said),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
