@@ -1,5 +1,5 @@
 // When which layer is drawn. Each new pulse is compared with what the layers hold:
-//   C-arm, table or field moved: anatomy and lumen afresh, coarse (half the resolution, the decimated lumen); the first pulse after that at rest: fine.
+//   C-arm, table or field moved: all afresh and coarse (half the resolution, the decimated lumen); fine with the first pulses at rest.
 //   contrast agent moved on: the lumen afresh, decimated; fine once it stays.
 //   anything of these, blades, mode, mask: the base is baked from the layers.
 //   always: the base is copied back where the tool was, and the tool multiplied in.
@@ -75,9 +75,11 @@ static bool wall_is_fit(const FluoroscopeOptions *options, MeshClosure *closure,
     return true;
 }
 
+static int lumen_nodes(const Fluoroscope *f) { return f->lumen.is_there ? f->lumen.node_count : 0; }
+
 static bool take_memory(Fluoroscope *f, const FluoroscopeOptions *options)
 {
-    size_t tool = (size_t)options->node_count, nodes = f->lumen.is_there ? (size_t)f->lumen.node_count : 1;
+    size_t tool = (size_t)options->node_count, nodes = (size_t)lumen_nodes(f) + 1;
     f->radius = malloc((tool + 1) * sizeof *f->radius);
     f->attenuation = malloc((tool + 1) * sizeof *f->attenuation);
     f->shown.position = calloc(tool + 1, sizeof *f->shown.position);
@@ -143,8 +145,9 @@ void fluoroscope_destroy(Fluoroscope *f)
     anatomy_free(&f->anatomy);
     lumen_layer_destroy(&f->lumen);
     layers_destroy(&f->programs);
-    Layer *layer[7] = {&f->anatomy_layer, &f->lumen_layer, &f->roadmap_layer, &f->bare, &f->base, &f->picture, &f->mask};
-    for (int i = 0; i < 7; i++)
+    Layer *layer[10] = {&f->anatomy_layer, &f->lumen_layer,  &f->roadmap_layer, &f->mask,         &f->still.bare,
+                        &f->still.base,    &f->still.picture, &f->turning.bare,  &f->turning.base, &f->turning.picture};
+    for (int i = 0; i < 10; i++)
         layer_destroy(layer[i]);
     ribbon_free(&f->ribbon);
     free(f->radius), free(f->attenuation), free(f->shown.position), free(f->shown.contrast);
@@ -154,7 +157,7 @@ void fluoroscope_destroy(Fluoroscope *f)
 
 void fluoroscope_forget(Fluoroscope *f)
 {
-    size_t nodes = f->lumen.is_there ? (size_t)f->lumen.node_count : 1;
+    size_t nodes = (size_t)lumen_nodes(f);
     f->has_picture = f->has_mask = f->mask_is_due = f->was_opacified = false;
     f->layers_are_stale = true;
     f->mask_count = -1;
@@ -176,7 +179,7 @@ static bool is_seen(const float *contrast, int count)
 // What the pulse shows; mask and roadmap follow.
 static void take_exposure(Fluoroscope *f, const FluoroscopeFrame *frame)
 {
-    int nodes = f->lumen.is_there ? f->lumen.node_count : 0;
+    int nodes = lumen_nodes(f);
     const Pose *pose = frame->pose;
     f->shown.xray = frame->xray;
     f->shown.pulse = frame->pulse;
@@ -250,7 +253,7 @@ static void draw_lumen(Fluoroscope *f, Layer *layer, const CArm *c_arm, const fl
 
 static bool contrast_differs(const Fluoroscope *f)
 {
-    for (int n = 0; f->lumen.is_there && n < f->lumen.node_count; n++)
+    for (int n = 0; n < lumen_nodes(f); n++)
         if (fabsf(f->shown.contrast[n] - f->lumen_contrast[n]) > least_contrast)
             return true;
     return false;
@@ -260,42 +263,51 @@ typedef struct LayerChanges {
     bool anatomy, lumen;
 } LayerChanges;
 
-// Anatomy, lumen and roadmap brought up to the exposure.
+// Anatomy, lumen and roadmap brought up to the exposure. After a turn the anatomy becomes fine with the first pulse, the lumen with the next: not both in
+// one frame.
 static LayerChanges update_layers(Fluoroscope *f, bool is_fresh)
 {
     CArm c_arm = c_arm_place(&f->shown.xray, &f->options.patient);
     bool moved = is_fresh || c_arms_differ(&c_arm, &f->c_arm), flowed = contrast_differs(f), is_roadmap = lroundf(f->shown.xray.mode) == XRAY_ROADMAP;
-    bool coarse = (moved || flowed) && !is_fresh, refine = !moved && !flowed && f->layers_are_coarse;
-    f->roadmap_has_changed |= moved || refine;
+    bool anatomy = moved || f->anatomy_is_coarse, refine = !anatomy && !flowed && f->lumen_is_coarse;
+    bool lumen = moved || flowed || refine, coarse = !is_fresh && !refine && (lumen || f->lumen_is_coarse);
+    f->roadmap_has_changed |= lumen;
     bool roadmap = is_roadmap && f->roadmap_has_changed;
-    if (!moved && !flowed && !refine && !roadmap)
-        return (LayerChanges){false, false};
+    f->c_arm = c_arm;
     f->lumen_out_of_beam = f->lumen.is_there && !lumen_is_in_beam(&f->lumen, &c_arm);
-    bool anatomy = moved || (refine && f->anatomy_is_coarse);
     if (anatomy) {
-        f->anatomy_is_coarse = moved && coarse;
+        f->anatomy_is_coarse = moved && !is_fresh;
+        f->now = f->anatomy_is_coarse ? &f->turning : &f->still;
         draw_anatomy(f, &c_arm, f->anatomy_is_coarse);
         f->tone.exposure = find_exposure(f, &c_arm);
     }
-    draw_lumen(f, &f->lumen_layer, &c_arm, f->shown.contrast, coarse, &f->lumen_is_empty);
-    if (f->lumen.is_there)
-        memcpy(f->lumen_contrast, f->shown.contrast, (size_t)f->lumen.node_count * sizeof *f->lumen_contrast);
+    if (lumen) {
+        f->lumen_is_coarse = coarse;
+        draw_lumen(f, &f->lumen_layer, &c_arm, f->shown.contrast, coarse, &f->lumen_is_empty);
+        memcpy(f->lumen_contrast, f->shown.contrast, (size_t)lumen_nodes(f) * sizeof *f->lumen_contrast);
+    }
     if (roadmap) {
         draw_lumen(f, &f->roadmap_layer, &c_arm, f->roadmap, coarse, &f->roadmap_is_empty);
         f->roadmap_has_changed = false;
     }
-    f->layers_are_coarse = coarse;
-    f->c_arm = c_arm;
-    return (LayerChanges){anatomy, true};
+    return (LayerChanges){anatomy, lumen || roadmap};
 }
 
 static const Layer *anatomy_of(const Fluoroscope *f) { return has_anatomy(f) ? &f->anatomy_layer : NULL; }
 static const Layer *lumen_of(const Fluoroscope *f) { return f->lumen_is_empty ? NULL : &f->lumen_layer; }
 
+static void lay_tool(Fluoroscope *f, int side)
+{
+    f->ribbon.count = 0;
+    if (f->shown.has_tool)
+        ribbon_lay(&f->ribbon, &f->c_arm, side, f->options.node_count, f->shown.position, f->radius, f->attenuation);
+}
+
 static void take_mask(Fluoroscope *f)
 {
     if (!layer_fit(&f->mask, f->side, LAYER_R32F))
         return;
+    lay_tool(f, f->side);
     layers_draw_total(&f->programs, anatomy_of(f), lumen_of(f), &f->c_arm, &f->tone, &f->mask);
     layers_draw_tool(&f->programs, &f->ribbon, &f->tone, true, &f->mask);
     f->has_mask = true;
@@ -322,34 +334,36 @@ static void bake(Fluoroscope *f)
 {
     // subtraction has its own dose
     f->tone.quanta = f->options.quanta * (f->tone.is_subtracted ? f->options.dsa_dose : 1);
-    layers_bake(&f->programs, anatomy_of(f), f->tone.is_subtracted ? &f->mask : NULL, &f->tone, f->shown.xray.collimator, f->mask_pulse, &f->bare);
+    layers_bake(&f->programs, anatomy_of(f), f->tone.is_subtracted ? &f->mask : NULL, &f->tone, f->shown.xray.collimator, f->mask_pulse, &f->now->bare);
     f->baked = f->shown.xray;
+}
+
+static void copy_all(const Layer *from, const Layer *to)
+{
+    const int none[2] = {0, 0}, all[2] = {from->side, from->side};
+    copy_box(from, to, none, all);
 }
 
 static void opacify(Fluoroscope *f)
 {
-    const int none[2] = {0, 0}, all[2] = {f->side, f->side};
     int low[2], high[2];
-    lumen_box(&f->lumen, &f->c_arm, f->side, low, high);
-    copy_box(&f->bare, &f->base, none, all);
+    lumen_box(&f->lumen, &f->c_arm, f->now->base.side, low, high);
+    copy_all(&f->now->bare, &f->now->base);
     const Layer *lumen = &f->lumen_layer, *roadmap = f->tone.has_roadmap ? &f->roadmap_layer : NULL;
     if (f->lumen_is_empty && layer_fit(&f->lumen_layer, f->roadmap_layer.side, LAYER_R32F))
         layer_begin(lumen);
-    layers_opacify(&f->programs, &f->bare, lumen, roadmap, &f->c_arm, &f->tone, low, high, &f->base);
+    layers_opacify(&f->programs, &f->now->bare, lumen, roadmap, &f->c_arm, &f->tone, low, high, &f->now->base);
 }
 
 // The picture without its noise, for the exposure that was taken.
 static void make_picture(Fluoroscope *f, bool is_fresh)
 {
-    const int all[2] = {f->side, f->side}, none[2] = {0, 0};
     LayerChanges changes = update_layers(f, is_fresh);
+    PictureLayers *now = f->now;
     long mode = lroundf(f->shown.xray.mode);
     bool has_roadmap = mode == XRAY_ROADMAP && f->lumen.is_there && !f->roadmap_is_empty, has_new_mask = false;
     changes.lumen |= has_roadmap != f->tone.has_roadmap;
     f->tone.has_roadmap = has_roadmap;
-    f->ribbon.count = 0;
-    if (f->shown.has_tool)
-        ribbon_lay(&f->ribbon, &f->c_arm, f->side, f->options.node_count, f->shown.position, f->radius, f->attenuation);
     if (f->mask_is_due || (mode == XRAY_DSA && !f->has_mask)) {
         take_mask(f);
         has_new_mask = true;
@@ -358,16 +372,19 @@ static void make_picture(Fluoroscope *f, bool is_fresh)
     bool is_baked = changes.anatomy || has_new_mask || is_fresh || blades_or_mode_differ(&f->baked, &f->shown.xray);
     if (is_baked)
         bake(f);
-    const Layer *base = f->lumen_is_empty && !has_roadmap ? &f->bare : &f->base;
-    if (base == &f->base && (is_baked || changes.lumen))
+    const Layer *base = f->lumen_is_empty && !has_roadmap ? &now->bare : &now->base;
+    if (base == &now->base && (is_baked || changes.lumen))
         opacify(f);
     if (is_baked || changes.lumen)
-        copy_box(base, &f->picture, none, all);
+        copy_all(base, &now->picture);
     else
-        copy_box(base, &f->picture, f->drawn_low, f->drawn_high);
-    layers_draw_tool(&f->programs, &f->ribbon, &f->tone, false, &f->picture);
+        copy_box(base, &now->picture, f->drawn_low, f->drawn_high);
+    lay_tool(f, now->picture.side);
+    layers_draw_tool(&f->programs, &f->ribbon, &f->tone, false, &now->picture);
     memcpy(f->drawn_low, f->ribbon.low, sizeof f->drawn_low);
-    memcpy(f->drawn_high, f->ribbon.count > 0 ? f->ribbon.high : none, sizeof f->drawn_high);
+    memcpy(f->drawn_high, f->ribbon.high, sizeof f->drawn_high);
+    if (f->ribbon.count == 0)
+        f->drawn_high[0] = f->drawn_low[0];
 }
 
 // --- showing ---
@@ -400,6 +417,11 @@ static void draw_surroundings(const Fluoroscope *f, ViewPort port)
     glDisable(GL_SCISSOR_TEST);
 }
 
+static bool fit_picture(PictureLayers *layers, int side, LayerFormat format)
+{
+    return layer_fit(&layers->bare, side, format) && layer_fit(&layers->base, side, format) && layer_fit(&layers->picture, side, format);
+}
+
 void fluoroscope_draw(Fluoroscope *f, const FluoroscopeFrame *frame, ViewPort port)
 {
     int side = port.width < port.height ? port.width : port.height;
@@ -407,7 +429,7 @@ void fluoroscope_draw(Fluoroscope *f, const FluoroscopeFrame *frame, ViewPort po
         return;
     bool has_pedal = frame->xray.pedal > 0.5f, is_resized = side != f->side;
     bool is_pulse = !f->has_picture || (has_pedal && frame->pulse != f->shown.pulse);
-    if (is_resized && !(layer_fit(&f->bare, side, LAYER_RGBA16) && layer_fit(&f->base, side, LAYER_RGBA16) && layer_fit(&f->picture, side, LAYER_RGBA16)))
+    if (is_resized && (!fit_picture(&f->still, side, LAYER_RGBA16) || !fit_picture(&f->turning, (side + 1) / 2, LAYER_RGBA16_SMOOTH)))
         return;
     f->side = side;
     f->corner[0] = port.x + (port.width - side) / 2;
@@ -419,7 +441,7 @@ void fluoroscope_draw(Fluoroscope *f, const FluoroscopeFrame *frame, ViewPort po
         make_picture(f, f->layers_are_stale || is_resized);
     f->has_picture = true;
     f->layers_are_stale = false;
-    layers_show(&f->programs, &f->picture, &f->tone, f->shown.pulse, port.framebuffer, f->corner[0], f->corner[1]);
+    layers_show(&f->programs, &f->now->picture, &f->tone, f->shown.pulse, port.framebuffer, f->corner[0], f->corner[1], side);
     draw_surroundings(f, port);
 }
 

@@ -245,7 +245,7 @@ bool layer_fit(Layer *layer, int side, LayerFormat format)
 {
     if (layer->side == side)
         return true;
-    GLint filter = format == LAYER_R32F ? GL_LINEAR : GL_NEAREST;
+    GLint filter = format == LAYER_RGBA16 ? GL_NEAREST : GL_LINEAR;
     layer_destroy(layer);
     glGenTextures(1, &layer->texture);
     glBindTexture(GL_TEXTURE_2D, layer->texture);
@@ -449,7 +449,7 @@ void layers_draw_tool(const LayerPrograms *programs, const Ribbon *ribbon, const
     glDisable(GL_BLEND);
 }
 
-void layers_show(const LayerPrograms *programs, const Layer *baked, const LayerTone *tone, uint32_t pulse, unsigned framebuffer, int x, int y)
+void layers_show(const LayerPrograms *programs, const Layer *baked, const LayerTone *tone, uint32_t pulse, unsigned framebuffer, int x, int y, int side)
 {
     unsigned program = programs->show[tone->has_roadmap];
     int offset[3];
@@ -458,11 +458,11 @@ void layers_show(const LayerPrograms *programs, const Layer *baked, const LayerT
     double unit = tone->is_subtracted ? white * tone->gain / sqrt(weakest) : white * live_power;
     bind_layer(baked);
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
-    glViewport(x, y, baked->side, baked->side);
+    glViewport(x, y, side, side);
     glUseProgram(program);
     set_texture(program, "baked", 0, GL_TEXTURE_2D, baked->texture);
     set_texture(program, "noise", 1, GL_TEXTURE_2D, programs->noise);
-    set_float(program, "side", baked->side);
+    set_float(program, "side", side);
     glUniform3iv(glGetUniformLocation(program, "offset"), 1, offset);
     glUniform2f(glGetUniformLocation(program, "scale"), (float)(white * room[0]), tone->quanta > 0 ? (float)(8 * room[1] * unit / sqrt(tone->quanta)) : 0);
     draw_square(programs);

@@ -10,7 +10,7 @@ typedef struct Layer {
     int side;                // [pixel], 0: none yet
 } Layer;
 
-typedef enum { LAYER_R32F, LAYER_RGBA16 } LayerFormat;
+typedef enum { LAYER_R32F, LAYER_RGBA16, LAYER_RGBA16_SMOOTH } LayerFormat;   // smooth: to be shown larger
 
 typedef struct LayerPrograms {
     unsigned anatomy, total, tool;
@@ -56,7 +56,7 @@ void layers_opacify(const LayerPrograms *programs, const Layer *bare, const Laye
                     const int low[2], const int high[2], const Layer *to);
 // The tool's shadow: multiplied into a baked layer, or (as attenuation) added into a float layer.
 void layers_draw_tool(const LayerPrograms *programs, const Ribbon *ribbon, const LayerTone *tone, bool as_attenuation, const Layer *to);
-// Baked layer and noise into the framebuffer, at x, y.
-void layers_show(const LayerPrograms *programs, const Layer *baked, const LayerTone *tone, uint32_t pulse, unsigned framebuffer, int x, int y);
+// Baked layer, of whatever resolution, and noise into a square of the framebuffer at x, y.
+void layers_show(const LayerPrograms *programs, const Layer *baked, const LayerTone *tone, uint32_t pulse, unsigned framebuffer, int x, int y, int side);
 
 #endif

@@ -14,19 +14,24 @@ typedef struct Exposure {
     float *contrast;             // (N)
 } Exposure;
 
+typedef struct PictureLayers {
+    Layer bare, base, picture;   // without the lumen; with it; with the tool
+} PictureLayers;
+
 struct Fluoroscope {
     FluoroscopeOptions options;  // what it points to is gone
     double *radius, *attenuation;   // (M)
     Anatomy anatomy;
     Lumen lumen;
     LayerPrograms programs;
-    Layer anatomy_layer, lumen_layer, roadmap_layer, bare, base, picture, mask;   // bare: without the lumen
+    Layer anatomy_layer, lumen_layer, roadmap_layer, mask;
+    PictureLayers still, turning, *now;   // of full and half the resolution; which of them is shown
     Ribbon ribbon;
     int drawn_low[2], drawn_high[2];   // box of the tool in `picture`
     Exposure shown;
     bool has_picture;
     // what the layers hold
-    bool layers_are_stale, layers_are_coarse, anatomy_is_coarse, lumen_is_empty, roadmap_is_empty, lumen_out_of_beam;
+    bool layers_are_stale, lumen_is_coarse, anatomy_is_coarse, lumen_is_empty, roadmap_is_empty, lumen_out_of_beam;
     CArm c_arm;                  // of the layers
     float *lumen_contrast;       // (N) of the lumen layer
     XrayControl baked;           // of the base
