@@ -208,8 +208,8 @@ static void print_hid(const HidListing *listing)
 
 static void print_encoder(const UsbDeviceInfo *device, const DeviceMap *map)
 {
-    printf("%-14s %04x:%04x  %s%s%s\n", device->path, (unsigned)device->vendor_id, (unsigned)device->product_id, device->product[0] ? device->product : "(no name)",
-           device->serial[0] ? ", serial " : "", device->serial);
+    printf("%-14s %04x:%04x  %s%s%s\n", device->path, (unsigned)device->vendor_id, (unsigned)device->product_id,
+           device->product[0] ? device->product : "(no name)", device->serial[0] ? ", serial " : "", device->serial);
     if (!device->may_open)
         printf("    not usable: %s\n", device->why);
     else if (map)
@@ -265,7 +265,8 @@ static void add_inputs(cJSON *object, const HidDescriptor *descriptor)
     }
 }
 
-static cJSON *device_json(const char *path, int vendor_id, int product_id, const char *product, const char *serial, bool usable, const char *why, const DeviceMap *map)
+static cJSON *device_json(const char *path, int vendor_id, int product_id, const char *product, const char *serial, bool usable, const char *why,
+                          const DeviceMap *map)
 {
     cJSON *object = cJSON_CreateObject();
     cJSON_AddStringToObject(object, "path", path);
@@ -297,7 +298,8 @@ static char *list_json(const DeviceList *list)
     cJSON *hid = cJSON_AddArrayToObject(object, "hid"), *usb = cJSON_AddArrayToObject(object, "usb");
     for (int i = 0; i < list->hid_count; i++) {
         const HidListing *one = &list->hid[i];
-        cJSON *item = device_json(one->info.path, one->info.vendor_id, one->info.product_id, one->info.product, one->info.serial, one->is_usable, one->why, one->map);
+        cJSON *item = device_json(one->info.path, one->info.vendor_id, one->info.product_id, one->info.product, one->info.serial,
+                                  one->is_usable, one->why, one->map);
         cJSON *usages = cJSON_AddArrayToObject(item, "usages");
         for (int k = 0; k < one->info.usage_count; k++) {
             char name[32];
@@ -375,7 +377,8 @@ static bool read_options(int argc, char **argv, DevicesOptions *options, int *co
         }
     }
     if (optind != argc || (options->duration_s > 0 && !options->watch)) {
-        fprintf(stderr, optind != argc ? "seldinger devices: takes no file but by --map; see `seldinger devices --help`\n" : "--duration-s goes with --watch\n");
+        fprintf(stderr, "%s", optind != argc ? "seldinger devices: takes no file but by --map; see `seldinger devices --help`\n"
+                                             : "--duration-s goes with --watch\n");
         return false;
     }
     return true;

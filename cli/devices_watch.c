@@ -103,15 +103,16 @@ static void show(Watched *watched)
         if (control->field.flags & HID_RELATIVE)
             printf("  %-14s %8lld counts in all (last %lld)\n", name, (long long)control->sum, (long long)control->value);
         else
-            printf("  %-14s %8lld  logical_min %lld, logical_max %lld so far (descriptor: %lld to %lld)\n", name, (long long)control->value, (long long)control->least,
-                   (long long)control->most, (long long)control->field.logical_min, (long long)control->field.logical_max);
+            printf("  %-14s %8lld  logical_min %lld, logical_max %lld so far (descriptor: %lld to %lld)\n", name, (long long)control->value,
+                   (long long)control->least, (long long)control->most, (long long)control->field.logical_min, (long long)control->field.logical_max);
     }
     if (watched->is_mapped) {
         map_publish(watched->listing->map, &watched->state, &watched->port);
         unsigned buttons = atomic_load(&watched->port.buttons);
         printf("  -> push %.2f mm/s, twist %.1f deg/s, advanced %.3f mm, turned %.2f deg%s%s%s%s\n", atomic_load(&watched->port.push_mm_s),
                atomic_load(&watched->port.twist_deg_s), atomic_load(&watched->port.advanced_mm), atomic_load(&watched->port.turned_deg),
-               buttons & HAND_PEDAL ? ", pedal" : "", buttons & HAND_CONTRAST ? ", contrast" : "", buttons & HAND_STOP ? ", stop" : "", buttons & HAND_MARK ? ", mark" : "");
+               buttons & HAND_PEDAL ? ", pedal" : "", buttons & HAND_CONTRAST ? ", contrast" : "", buttons & HAND_STOP ? ", stop" : "",
+               buttons & HAND_MARK ? ", mark" : "");
     }
 }
 

@@ -31,7 +31,7 @@ typedef struct Film {
 
 FilmOptions film_default_options(void)
 {
-    return (FilmOptions){.width = 1280, .height = 720, .view = VIEW_FLUOROSCOPY, .has_panels = true, .to_s = HUGE_VAL, .fps = 30, .speed = 1};
+    return (FilmOptions){.width = 1280, .height = 720, .view = VIEW_FLUOROSCOPY, .has_panels = true, .to_s = HUGE_VAL, .fps = 30, .speed = 1, .lao_deg = NAN, .cra_deg = NAN};
 }
 
 static void film_close(Film *film)
@@ -61,8 +61,10 @@ static bool film_open(Film *film, const char *path, const FilmOptions *options, 
     if (good) {
         XrayControl watched = film->desk.xray;
         watched.pedal = 1;
-        watched.lao_deg = (float)options->lao_deg;
-        watched.cra_deg = (float)options->cra_deg;
+        if (!isnan(options->lao_deg))
+            watched.lao_deg = (float)options->lao_deg;
+        if (!isnan(options->cra_deg))
+            watched.cra_deg = (float)options->cra_deg;
         film->playback = playback_open(run, scene, open->tree, &watched);
         good = film->playback != NULL;
         snprintf(message, sizeof message, "the recording holds no frame");

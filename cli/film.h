@@ -13,7 +13,7 @@ typedef struct FilmOptions {
     double from_s, to_s;             // of a film; simulated time
     double fps, speed;               // frames a second; simulated seconds a second of film
     bool is_quiet;
-    double lao_deg, cra_deg;         // of a recording that nobody looked at
+    double lao_deg, cra_deg;         // of a recording that nobody looked at; NaN: as the scene says
 } FilmOptions;
 FilmOptions film_default_options(void);  // 1280x720, fluoroscopy with panels, all of it, 30 a second
 

@@ -79,7 +79,7 @@ static int parse_options(int argc, char **argv, ReplayOptions *options)
         {"picture", required_argument, NULL, PICTURE},     {"movie", required_argument, NULL, MOVIE},      {"view", required_argument, NULL, VIEW},
         {"size", required_argument, NULL, SIZE},           {"no-panels", no_argument, NULL, NO_PANELS},    {"threads", required_argument, NULL, THREADS},
         {"quiet", no_argument, NULL, QUIET},               {"help", no_argument, NULL, HELP},              {0}};
-    *options = (ReplayOptions){.at_s = HUGE_VAL, .to_s = HUGE_VAL, .fps = 30, .speed = 1, .width = 1280, .height = 720};
+    *options = (ReplayOptions){.lao_deg = NAN, .cra_deg = NAN, .at_s = HUGE_VAL, .to_s = HUGE_VAL, .fps = 30, .speed = 1, .width = 1280, .height = 720};
     double number;
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "h", table, NULL)) != -1;) {

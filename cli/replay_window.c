@@ -50,8 +50,10 @@ static bool replay_open(ReplayWindow *replay, OpenVessel *open, Faults *faults)
     if (good) {
         XrayControl watched = replay->desk.xray;
         watched.pedal = 1;
-        watched.lao_deg = (float)options->lao_deg;
-        watched.cra_deg = (float)options->cra_deg;
+        if (!isnan(options->lao_deg))
+            watched.lao_deg = (float)options->lao_deg;
+        if (!isnan(options->cra_deg))
+            watched.cra_deg = (float)options->cra_deg;
         replay->playback = playback_open(replay->run, replay->scene, open->tree, &watched);
         snprintf(message, sizeof message, "the recording holds no frame");
         good = replay->playback != NULL;

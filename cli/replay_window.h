@@ -12,7 +12,7 @@ typedef struct ReplayWindowOptions {
     PanelView view;
     double at_s;                     // first moment
     double duration_s;               // ends by itself after this much real time; 0: never
-    double lao_deg, cra_deg;         // of a recording that nobody looked at
+    double lao_deg, cra_deg;         // of a recording that nobody looked at; NaN: as the scene says
 } ReplayWindowOptions;
 
 // Until the user quits, or wants to go on from a moment: then true in *resumes and its time in *resume_s. False with faults where no window can be had.

@@ -2,7 +2,6 @@
 
 // How fast things go while a key is held.
 static const double arm_deg_s = 25, table_fields_s = 0.4, blade_s = 0.5, orbit_px_s = 220, section_mm_s = 15;
-static const double contrast_ml_s = 3;   // a hand injection through a diagnostic catheter
 static const float pulse_rates[] = {7.5F, 10, 15, 30};
 static const double field_step = 1.25;
 
@@ -10,7 +9,7 @@ static float clamped(double value, double least, double most) { return (float)fm
 
 Desk desk_create(const VesselScene *scene, int count, const Vec3 *point)
 {
-    Desk desk = {.xray = xray_default_control(), .push_mm_s = 10, .twist_deg_s = 120, .view = VIEW_FLUOROSCOPY,
+    Desk desk = {.xray = xray_default_control(), .push_mm_s = 10, .twist_deg_s = 120, .contrast_ml_s = 3, .view = VIEW_FLUOROSCOPY,
                  .look = vessel_scene_default_look(scene), .patient = patient_axes_lps()};
     Vec3 low = vec3(0, 0, 0), high = low;
     for (int i = 0; i < count; i++)
@@ -145,6 +144,6 @@ XrayControl desk_xray(const Desk *desk, const PanelActions *actions, unsigned ha
 {
     XrayControl xray = desk->xray;
     xray.pedal = desk->pedal_latched || actions->held[ACTION_PEDAL] || (hand_buttons & HAND_PEDAL);
-    xray.contrast_ml_s = actions->held[ACTION_CONTRAST] || (hand_buttons & HAND_CONTRAST) ? (float)contrast_ml_s : 0;
+    xray.contrast_ml_s = actions->held[ACTION_CONTRAST] || (hand_buttons & HAND_CONTRAST) ? (float)desk->contrast_ml_s : 0;
     return xray;
 }

@@ -13,6 +13,7 @@ typedef struct Desk {
     bool pedal_latched;
     PanelView view;
     VesselSceneLook look;        // of the 3D view
+    double contrast_ml_s;        // while injected, default 3
     double push_mm_s, twist_deg_s;   // of the keys at ordinary speed, default 10 and 120
 } Desk;
 

@@ -527,9 +527,22 @@ static void read_exercise(Reading *reading, YamlValue value)
 // What lies behind the vessel in the X-ray picture.
 static void read_fluoroscopy(Reading *reading, YamlValue value)
 {
-    static const char *const keys[] = {"volume", NULL};
+    static const char *const keys[] = {"volume", "anterior", "superior", "lao_deg", "cra_deg", NULL};
     YamlMap map = yaml_map(value, keys);
+    Scene *scene = reading->scene;
     const char *name;
+    Vec3 anterior = {0}, superior = {0};
+    bool has_anterior = yaml_map_unit_vector(&map, "anterior", false, &anterior), has_superior = yaml_map_unit_vector(&map, "superior", false, &superior);
+    if (yaml_has(&map, "anterior") != yaml_has(&map, "superior"))
+        yaml_fault(value, "'anterior' and 'superior' say together how the patient lies; both of them, or none");
+    else if (has_anterior && has_superior && fabs(vec3_dot(anterior, superior)) > 0.01)
+        yaml_fault(value, "'anterior' and 'superior' are not perpendicular");
+    else if (has_anterior && has_superior) {
+        scene->patient_superior = superior;
+        scene->patient_anterior = vec3_unit(vec3_add_scaled(anterior, -vec3_dot(anterior, superior), superior));
+    }
+    yaml_map_number(&map, "lao_deg", false, (NumberRange){-90, 90, false}, &scene->lao);
+    yaml_map_number(&map, "cra_deg", false, (NumberRange){-45, 45, false}, &scene->cra);
     if (yaml_has(&map, "volume") && yaml_text(yaml_get(&map, "volume", false), &name))
         reading->scene->anatomy_path = resolved(reading, name);
 }

@@ -46,6 +46,8 @@ typedef struct Scene {
     int target_count;
     SceneTarget *target;
     double marker_length, marker_attenuation;   // [mm], [1/mm] of the radio-opaque marker at the tip; length 0: none
+    Vec3 patient_anterior, patient_superior;     // unit, perpendicular, in the model's frame; zero: not said
+    double lao, cra;         // [deg] of the C-arm at the start
     char *anatomy_path;      // volume whose bone and soft tissue lie behind the vessel in fluoroscopy; NULL: a plain head
     Exercise *exercise;      // what a trainee has to do; NULL: nothing
     VerifyPlan verify;       // what `seldinger check` measures; case_count 0: nothing
