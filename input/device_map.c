@@ -130,7 +130,7 @@ static void read_source(const DeviceMap *map, const YamlMap *control, MapSource 
     if (map->device.kind == MAP_GAMEPAD || map->device.kind == MAP_JOYSTICK) {
         if (!plain_source(map, text, source))
             yaml_fault(value, "'%s' is '%.40s'; axis_0, button_0 …%s", value.name, text,
-                       map->device.kind == MAP_GAMEPAD ? " or left_x, left_y, right_x, right_y, left_trigger, right_trigger, a, b, x, y, left_bumper, dpad_up …" : "");
+                       map->device.kind == MAP_GAMEPAD ? " or left_x, left_y, right_x, right_y, left_trigger, right_trigger, a, b, x, y, dpad_up …" : "");
     } else if (map->device.kind == MAP_FTDI) {
         source->kind = SOURCE_COUNT;
         for (source->index = 0; source->index < map->serial.count_count; source->index++)
@@ -140,7 +140,8 @@ static void read_source(const DeviceMap *map, const YamlMap *control, MapSource 
     } else if (!strcmp(text, "hat_x") || !strcmp(text, "hat_y")) {
         source->kind = text[4] == 'x' ? SOURCE_HID_HAT_X : SOURCE_HID_HAT_Y;
     } else if (!(source->usage = hid_usage_of_name(text))) {
-        yaml_fault(value, "'%s' is '%.40s', no usage known here; X, Y, Z, Rx, Ry, Rz, slider, dial, wheel, button_1, hat_x, hat_y … or 0x0001:0x0031", value.name, text);
+        yaml_fault(value, "'%s' is '%.40s', no usage known here; X, Y, Z, Rx, Ry, Rz, slider, dial, wheel, button_1, hat_x, hat_y … or 0x0001:0x0031",
+                   value.name, text);
     }
     if (map->device.kind == MAP_HID && yaml_has(control, "index"))
         yaml_integer(yaml_get(control, "index", false), 0, HID_FIELD_LIMIT, &source->index);
@@ -187,10 +188,10 @@ static void check_kind(const YamlMap *control, const DeviceMap *map, const MapAx
 
 static void read_axis(YamlValue value, DeviceMap *map, bool is_twist)
 {
-    static const char *const push_keys[] = {"source", "index", "mm_s", "mm_per_count", "kind", "logical_min", "logical_centre", "logical_max", "counts_per_wrap",
-                                            "dead_zone", "exponent", "invert", "optional", NULL};
-    static const char *const twist_keys[] = {"source", "index", "deg_s", "deg_per_count", "kind", "logical_min", "logical_centre", "logical_max", "counts_per_wrap",
-                                             "dead_zone", "exponent", "invert", "optional", NULL};
+    static const char *const push_keys[] = {"source", "index", "mm_s", "mm_per_count", "kind", "logical_min", "logical_centre", "logical_max",
+                                            "counts_per_wrap", "dead_zone", "exponent", "invert", "optional", NULL};
+    static const char *const twist_keys[] = {"source", "index", "deg_s", "deg_per_count", "kind", "logical_min", "logical_centre", "logical_max",
+                                             "counts_per_wrap", "dead_zone", "exponent", "invert", "optional", NULL};
     static const char *const kinds[] = {"deflection", "relative", "counter", NULL};
     YamlMap control = yaml_map(value, is_twist ? twist_keys : push_keys);
     if (!control.value.node)
@@ -201,8 +202,8 @@ static void read_axis(YamlValue value, DeviceMap *map, bool is_twist)
     }
     const char *rate = is_twist ? "deg_s" : "mm_s", *count = is_twist ? "deg_per_count" : "mm_per_count";
     MapAxis *axis = &map->axis[map->axis_count++];
-    *axis = (MapAxis){.is_twist = is_twist, .is_rate = yaml_has(&control, rate), .logical_min = NAN, .logical_centre = NAN, .logical_max = NAN, .counts_per_wrap = NAN,
-                      .dead_zone = 0.05, .exponent = 1};
+    *axis = (MapAxis){.is_twist = is_twist, .is_rate = yaml_has(&control, rate), .logical_min = NAN, .logical_centre = NAN, .logical_max = NAN,
+                      .counts_per_wrap = NAN, .dead_zone = 0.05, .exponent = 1};
     read_source(map, &control, &axis->source);
     if (axis->is_rate == yaml_has(&control, count))
         yaml_fault(value, "'%s' has one of %s and %s", value.name, rate, count);
@@ -313,7 +314,10 @@ static void read_serial(YamlValue value, DeviceMap *map)
 static void read_map(YamlReader *reader, DeviceMap *map)
 {
     static const char *const keys[] = {"seldinger_device", "name", "device", "push", "twist", "pedal", "contrast", "stop", "mark", "force", "serial", NULL};
-    static const struct { const char *key; unsigned bit; } buttons[] = {{"pedal", HAND_PEDAL}, {"contrast", HAND_CONTRAST}, {"stop", HAND_STOP}, {"mark", HAND_MARK}};
+    static const struct ButtonKey {
+        const char *key;
+        unsigned bit;
+    } buttons[] = {{"pedal", HAND_PEDAL}, {"contrast", HAND_CONTRAST}, {"stop", HAND_STOP}, {"mark", HAND_MARK}};
     YamlValue root = yaml_root(reader);
     if (!yaml_is_map(root))
         yaml_fault(root, "is no device map; it begins with 'seldinger_device: 1'");

@@ -113,7 +113,15 @@ DeviceMap *device_map_parse(const char *text, size_t length, const char *file, F
 DeviceMap *device_map_load(const char *path, Faults *faults);
 
 // The built-in maps: any GLFW gamepad, any GLFW joystick, HID joystick, HID gamepad, HID multi-axis controller. A haptic joystick's has force.
-typedef enum { BUILT_IN_GAMEPAD, BUILT_IN_JOYSTICK, BUILT_IN_HID_JOYSTICK, BUILT_IN_HID_GAMEPAD, BUILT_IN_HID_MULTI_AXIS, BUILT_IN_HID_HAPTIC, BUILT_IN_COUNT } BuiltInMap;
+typedef enum {
+    BUILT_IN_GAMEPAD,
+    BUILT_IN_JOYSTICK,
+    BUILT_IN_HID_JOYSTICK,
+    BUILT_IN_HID_GAMEPAD,
+    BUILT_IN_HID_MULTI_AXIS,
+    BUILT_IN_HID_HAPTIC,
+    BUILT_IN_COUNT
+} BuiltInMap;
 const char *device_map_built_in_text(BuiltInMap which);
 DeviceMap *device_map_built_in(BuiltInMap which);     // NULL: no memory
 

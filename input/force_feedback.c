@@ -9,8 +9,8 @@
 #define PID(id) HID_USAGE(0x0f, id)
 
 // HID Usage Tables 1.4, section 18
-enum { SET_EFFECT = 0x21, BLOCK_INDEX = 0x22, EFFECT_TYPE = 0x25, CONSTANT_FORCE = 0x26, DURATION = 0x50, GAIN = 0x52, TRIGGER_BUTTON = 0x53, AXES_ENABLE = 0x55,
-       DIRECTION_ENABLE = 0x56, DIRECTION = 0x57, MAGNITUDE = 0x70, SET_CONSTANT_FORCE = 0x73, EFFECT_OPERATION_REPORT = 0x77, OP_START = 0x79, OP_STOP = 0x7b,
+enum { SET_EFFECT = 0x21, BLOCK_INDEX = 0x22, EFFECT_TYPE = 0x25, CONSTANT_FORCE = 0x26, DURATION = 0x50, GAIN = 0x52, TRIGGER_BUTTON = 0x53,
+       AXES_ENABLE = 0x55, DIRECTION_ENABLE = 0x56, DIRECTION = 0x57, MAGNITUDE = 0x70, SET_CONSTANT_FORCE = 0x73, EFFECT_OPERATION_REPORT = 0x77, OP_START = 0x79, OP_STOP = 0x7b,
        LOOP_COUNT = 0x7c, DEVICE_GAIN = 0x7e, BLOCK_LOAD = 0x89, LOAD_SUCCESS = 0x8c, ENABLE_ACTUATORS = 0x97, STOP_ALL = 0x99, DEVICE_RESET = 0x9a,
        CREATE_NEW_EFFECT = 0xab };
 enum { LEAST_GAP_US = 1000, LOAD_ATTEMPTS = 3 };
@@ -188,7 +188,8 @@ int pid_decode_block_load(const PidLayout *layout, const uint8_t *bytes, size_t 
 {
     int64_t index, status;
     const PidControl *success = &layout->load_success;
-    if (length < 2 || bytes[0] != layout->load_index.field.report_id || !hid_field_read(&layout->load_index.field, layout->load_index.slot, bytes + 1, length - 1, &index))
+    if (length < 2 || bytes[0] != layout->load_index.field.report_id ||
+        !hid_field_read(&layout->load_index.field, layout->load_index.slot, bytes + 1, length - 1, &index))
         return 0;
     if (same_report(success, &layout->load_index) &&
         (!hid_field_read(&success->field, success->slot, bytes + 1, length - 1, &status) || status != success->value))
@@ -361,8 +362,8 @@ bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor
         force->block[1] = 0, has_torque = false;
     force->restart_ms = pid_duration_ms(&force->layout) / 2;
     const HidField *field = &force->layout.magnitude.field;
-    snprintf(force->text, sizeof force->text, "constant force, %lld steps for %g N, at most %g N%s%s", (long long)field->logical_max, map->force.full_scale_n, map->force.max_n,
-             has_torque ? ", and torque" : map->force.full_scale_n_mm > 0 ? "; no torque, it has no second effect or axis" : "",
+    snprintf(force->text, sizeof force->text, "constant force, %lld steps for %g N, at most %g N%s%s", (long long)field->logical_max,
+             map->force.full_scale_n, map->force.max_n, has_torque ? ", and torque" : map->force.full_scale_n_mm > 0 ? "; no torque, it has no second effect or axis" : "",
              field->logical_min < 0 ? "" : "; one way only, its magnitude has no sign");
     return true;
 }

@@ -15,7 +15,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { HANDS_MOST = 8 };
+enum { HANDS_MOST = 8, HAND_MESSAGE_LENGTH = 400 };
 
 typedef struct Hands Hands;
 
@@ -57,7 +57,7 @@ bool hands_drives(Hands *hands, int vendor_id, int product_id);
 const DeviceMap *hands_choose_map(const DeviceMap *const *map, int count, const HidDeviceInfo *device);
 
 // The next message for the user ("roller unplugged: the tool stops; plug it in again to go on"), oldest first; false where there is none. At most 32 are
-// kept. Any thread but the 1 kHz one.
+// kept, none longer than HAND_MESSAGE_LENGTH with its NUL. Any thread but the 1 kHz one.
 bool hands_message(Hands *hands, char *text, size_t capacity);
 
 #endif

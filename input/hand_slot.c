@@ -24,7 +24,7 @@ void hand_say(HandShared *shared, const char *format, ...)
     }
     char *text = shared->message[(shared->message_first + shared->message_count++) % MESSAGES_KEPT];
     va_start(arguments, format);
-    vsnprintf(text, MESSAGE_LENGTH, format, arguments);
+    vsnprintf(text, HAND_MESSAGE_LENGTH, format, arguments);
     va_end(arguments);
     pthread_mutex_unlock(&shared->lock);
 }

@@ -9,7 +9,7 @@
 
 #include <pthread.h>
 
-enum { MESSAGES_KEPT = 32, MESSAGE_LENGTH = 400 };
+enum { MESSAGES_KEPT = 32 };
 
 // What all threads of a session share.
 typedef struct HandShared {
@@ -17,7 +17,7 @@ typedef struct HandShared {
     pthread_mutex_t lock;            // HandInfo of each slot, and messages
     pthread_cond_t wake;
     _Atomic bool quit, paused;
-    char message[MESSAGES_KEPT][MESSAGE_LENGTH];
+    char message[MESSAGES_KEPT][HAND_MESSAGE_LENGTH];
     int message_first, message_count;
 } HandShared;
 

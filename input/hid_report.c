@@ -94,7 +94,8 @@ static void read_local(Reading *reading, int tag, uint32_t value, int size)
         }
         reading->has_usage_min = false;
         if ((value & 0xffff) < (reading->usage_min & 0xffff) || (has_page && reading->usage_min_has_page && value >> 16 != reading->usage_min >> 16))
-            refuse(reading, "usages from 0x%x to 0x%x; the maximum is not below the minimum and of the same page", (unsigned)reading->usage_min, (unsigned)value);
+            refuse(reading, "usages from 0x%x to 0x%x; the maximum is not below the minimum and of the same page", (unsigned)reading->usage_min,
+                   (unsigned)value);
         else if (has_page || reading->usage_min_has_page) {
             uint32_t page = has_page ? value & 0xffff0000u : reading->usage_min & 0xffff0000u;
             add_usages(reading, page | (reading->usage_min & 0xffff), page | (value & 0xffff), true);
@@ -280,8 +281,9 @@ static void read_fields(Reading *reading, HidReportKind kind, uint32_t flags)
         refuse(reading, "report %d grows to %d bits; at most %d", report->id, report->bits + bits, HID_REPORT_BITS);
         return;
     }
-    HidField field = {.kind = kind, .report_id = global->report_id, .bit = report->bits, .size = (int)global->size, .count = (int)global->count, .unit = global->unit,
-                      .unit_exponent = global->unit_exponent, .flags = flags & 0x1ff, .collection = reading->open_count ? reading->open[reading->open_count - 1] : -1};
+    HidField field = {.kind = kind, .report_id = global->report_id, .bit = report->bits, .size = (int)global->size, .count = (int)global->count,
+                      .unit = global->unit, .unit_exponent = global->unit_exponent, .flags = flags & 0x1ff,
+                      .collection = reading->open_count ? reading->open[reading->open_count - 1] : -1};
     reading->has_field_without_id |= global->report_id == 0;
     report->bits += bits;
     choose_sign(global->logical_min, global->logical_max, &field.logical_min, &field.logical_max);

@@ -15,13 +15,15 @@
 // A usage with its page: page << 16 | usage, "0001:0030" in messages.
 #define HID_USAGE(page, id) ((uint32_t)(page) << 16 | (uint32_t)(id))
 
-enum { HID_DESCRIPTOR_LIMIT = 4096, HID_FIELD_LIMIT = 1024, HID_REPORT_BITS = 65536, HID_REPORT_LIMIT = 192, HID_COLLECTION_LIMIT = 256, HID_RANGE_LIMIT = 1024 };
+enum { HID_DESCRIPTOR_LIMIT = 4096, HID_FIELD_LIMIT = 1024, HID_REPORT_BITS = 65536, HID_REPORT_LIMIT = 192 };
+enum { HID_COLLECTION_LIMIT = 256, HID_RANGE_LIMIT = 1024 };
 enum { HID_REPORT_BYTES = HID_REPORT_BITS / 8 + 1 };   // with its id
 
 typedef enum { HID_INPUT, HID_OUTPUT, HID_FEATURE } HidReportKind;
 
 // Bits of a main item (section 6.2.2.5).
-enum { HID_CONSTANT = 1, HID_VARIABLE = 2, HID_RELATIVE = 4, HID_WRAP = 8, HID_NONLINEAR = 16, HID_NO_PREFERRED = 32, HID_NULL_STATE = 64, HID_VOLATILE = 128, HID_BUFFERED = 256 };
+enum { HID_CONSTANT = 1, HID_VARIABLE = 2, HID_RELATIVE = 4, HID_WRAP = 8, HID_NONLINEAR = 16, HID_NO_PREFERRED = 32, HID_NULL_STATE = 64,
+       HID_VOLATILE = 128, HID_BUFFERED = 256 };
 
 typedef struct HidUsageRange {
     uint32_t first, last;    // both included, of one page

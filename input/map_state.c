@@ -109,10 +109,12 @@ static bool bind_hid_axis(const DeviceMap *map, const MapAxis *axis, const HidDe
     return bound->kind != AXIS_DEFLECTION || check_calibration(map, &axis->source, device, bound, faults);
 }
 
-static bool bind_hid_button(const DeviceMap *map, const MapButton *button, const HidDescriptor *descriptor, const char *device, BoundControl *bound, Faults *faults)
+static bool bind_hid_button(const DeviceMap *map, const MapButton *button, const HidDescriptor *descriptor, const char *device, BoundControl *bound,
+                            Faults *faults)
 {
     // as an axis without a scale; on above half of its range
-    MapAxis axis = {.source = button->source, .kind = AXIS_DEFLECTION, .is_rate = true, .logical_min = NAN, .logical_centre = NAN, .logical_max = NAN, .counts_per_wrap = NAN};
+    MapAxis axis = {.source = button->source, .kind = AXIS_DEFLECTION, .is_rate = true, .logical_min = NAN, .logical_centre = NAN, .logical_max = NAN,
+                    .counts_per_wrap = NAN};
     return bind_hid_axis(map, &axis, descriptor, device, bound, faults);
 }
 
@@ -128,7 +130,8 @@ bool map_bind_hid(const DeviceMap *map, const HidDescriptor *descriptor, const c
     return good;
 }
 
-static bool plain_source(const DeviceMap *map, const MapSource *source, int axis_count, int button_count, const char *device, BoundControl *bound, Faults *faults)
+static bool plain_source(const DeviceMap *map, const MapSource *source, int axis_count, int button_count, const char *device, BoundControl *bound,
+                         Faults *faults)
 {
     char what[120];
     int count = source->kind == SOURCE_BUTTON ? button_count : axis_count;

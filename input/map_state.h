@@ -40,7 +40,8 @@ double map_counter_step(double previous, double now, double wrap);
 
 // Finds the map's controls in a device; false with faults (all) where one that is not optional is missing or fits badly. The state starts anew.
 bool map_bind_hid(const DeviceMap *map, const HidDescriptor *descriptor, const char *device_name, MapState *state, Faults *faults);
-bool map_bind_plain(const DeviceMap *map, int axis_count, int button_count, const char *device_name, MapState *state, Faults *faults);   // gamepads, count lines
+// The same for gamepads and joysticks, and for lines of counts.
+bool map_bind_plain(const DeviceMap *map, int axis_count, int button_count, const char *device_name, MapState *state, Faults *faults);
 
 // One input report. False (and bad_reports + 1) where it is short or of unknown id: nothing else changes then.
 bool map_take_report(const DeviceMap *map, const HidDescriptor *descriptor, const uint8_t *bytes, size_t length, MapState *state);

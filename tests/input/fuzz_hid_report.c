@@ -67,7 +67,8 @@ static void read_all(const HidDescriptor *descriptor, const uint8_t *report, siz
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    static const char counting[] = "seldinger_device: 1\ndevice: {usage: mouse}\npush: [{source: Y, mm_per_count: 1, optional: true}, {source: wheel, mm_per_count: 1, "
+    static const char counting[] = "seldinger_device: 1\ndevice: {usage: mouse}\npush: [{source: Y, mm_per_count: 1, optional: true}, "
+                                   "{source: wheel, mm_per_count: 1, "
                                    "kind: counter, optional: true}]\ntwist: {source: X, deg_per_count: 1, optional: true}\n";
     static DeviceMap *maps[3];
     Faults faults;

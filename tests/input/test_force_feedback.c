@@ -89,7 +89,8 @@ static void a_real_joystick_gets_the_reports_that_it_describes(void **state)
 static void what_has_no_constant_force_says_so(void **state)
 {
     (void)state;
-    static const struct { const char *hex, *words; } cases[] = {{xbox_one_s, "no constant force effect"}, {dualshock_4, "no force feedback"}, {boot_mouse, "no force feedback"}};
+    static const struct { const char *hex, *words; } cases[] = {{xbox_one_s, "no constant force effect"}, {dualshock_4, "no force feedback"},
+                                                                 {boot_mouse, "no force feedback"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         HidDescriptor *device = descriptor_of(cases[i].hex);
         PidLayout layout;

@@ -60,7 +60,8 @@ static bool line(const char *text, int64_t a, int64_t r)
 {
     EncoderLine out = {.count = {-1, -1}};
     bool good = encoder_parse_line(&serial, text, strlen(text), &out);
-    return good && (!out.fresh[0] || out.count[0] == a) && (!out.fresh[1] || out.count[1] == r) && out.fresh[0] == (a != INT64_MIN) && out.fresh[1] == (r != INT64_MIN);
+    return good && (!out.fresh[0] || out.count[0] == a) && (!out.fresh[1] || out.count[1] == r) &&
+           out.fresh[0] == (a != INT64_MIN) && out.fresh[1] == (r != INT64_MIN);
 }
 
 static void lines_are_counts_or_left_out(void **state)
