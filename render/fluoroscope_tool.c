@@ -1,10 +1,11 @@
 // Between two points of the tool the ray's way through it is the chord of the shadow's cross-section times L / l, with L their distance in space and l that of
 // their shadows, both in the same measure: what is seen foreshortened is darker, and the sum over the shadow stays mu pi r^2 L. Points whose shadows fall
-// within a pixel are joined, so that a tool seen along its axis becomes a dark spot and no row of slivers.
+// within a pixel or the tool's radius are joined, so that a tool seen along its axis becomes a dark spot and no row of slivers.
 #include "render/fluoroscope_tool.h"
 
 #include <stdlib.h>
 
+enum { PARTS = 4 };                      // between two nodes
 static const double margin = 2;          // [pixel] beside the shadow: half a pixel and the detector's blur
 
 typedef struct RibbonPoint {
@@ -31,29 +32,53 @@ static bool add_vertex(Ribbon *ribbon, const RibbonPoint *p, double nx, double n
     return true;
 }
 
+// Along the tool's nodes: a curve through them (Catmull and Rom's), so that a bend seen edge-on is no row of corners.
+static Vec3 between_nodes(int count, const Vec3 *position, int node, double u)
+{
+    Vec3 p[4];
+    for (int k = 0; k < 4; k++) {
+        int i = node - 1 + k;
+        p[k] = position[i < 0 ? 0 : i < count ? i : count - 1];
+    }
+    // straight where a neighbour has no place
+    if (u <= 0 || u >= 1 || !vec3_is_finite(p[0]) || !vec3_is_finite(p[3]))
+        return u <= 0 ? p[1] : vec3_mix(p[1], p[2], u);
+    Vec3 from = vec3_scale(vec3_sub(p[2], p[0]), node > 0 ? 0.5 : 1), to = vec3_scale(vec3_sub(p[3], p[1]), node + 2 < count ? 0.5 : 1);
+    Vec3 x = vec3_scale(p[1], (1 + 2 * u) * (1 - u) * (1 - u));
+    x = vec3_add_scaled(x, u * (1 - u) * (1 - u), from);
+    x = vec3_add_scaled(x, u * u * (3 - 2 * u), p[2]);
+    return vec3_add_scaled(x, u * u * (u - 1), to);
+}
+
+// Pieces shorter than they are thick would lie across each other where the shadow turns back.
+static double least_length(double radius) { return fmax(1, 1.5 * radius); }
+
 // The projected points, closer ones joined. Returns how many.
 static int project_points(RibbonPoint *out, const CArm *c_arm, int side, int count, const Vec3 *position, const double *radius, const double *attenuation)
 {
-    int points = 0;
+    int points = 0, last = (count - 1) * PARTS;
     bool broken = true;
     double length = 0;
     Vec3 before = {0, 0, 0};
-    for (int i = 0; i < count; i++) {
-        Vec3 p = c_arm_project(c_arm, position[i]);
+    for (int i = 0; i <= last; i++) {
+        int node = i / PARTS;
+        double u = (double)(i % PARTS) / PARTS;
+        Vec3 x = between_nodes(count, position, node, u), p = c_arm_project(c_arm, x);
         double distance = C_ARM_SOURCE_MM + p.z;
         if (!vec3_is_finite(p) || !(distance > C_ARM_NEAREST_MM) || fabs(p.x) > 1e3 || fabs(p.y) > 1e3) {
             broken = true;
             continue;
         }
         double pixel_mm = c_arm->field_mm / side * distance / C_ARM_SOURCE_MM;
-        RibbonPoint point = {(p.x + 0.5) * side, (p.y + 0.5) * side, radius[i] / pixel_mm, attenuation[i] * pixel_mm, 0, broken};
-        length = broken ? 0 : length + vec3_distance(position[i], before) / pixel_mm;
-        before = position[i];
-        point.length = length;
+        int next = node + 1 < count ? node + 1 : node;
+        double r = (1 - u) * radius[node] + u * radius[next], a = (1 - u) * attenuation[node] + u * attenuation[next];
+        length = broken ? 0 : length + vec3_distance(x, before) / pixel_mm;
+        before = x;
+        RibbonPoint point = {(p.x + 0.5) * side, (p.y + 0.5) * side, r / pixel_mm, a * pixel_mm, length, broken};
         // joined to the point before: the length adds up, the last place counts
-        bool is_near = !broken && hypot(point.x - out[points - 1].x, point.y - out[points - 1].y) < 1;
+        bool is_near = !broken && hypot(point.x - out[points - 1].x, point.y - out[points - 1].y) < least_length(r / pixel_mm);
         broken = false;
-        if (is_near && i < count - 1)
+        if (is_near && i < last)
             continue;
         out[points++] = point;
         length = 0;
@@ -69,14 +94,16 @@ static void shadow_normal(const RibbonPoint *a, const RibbonPoint *b, double nor
     normal[1] = l > 1e-9 ? dx / l : 1;
 }
 
-// The mitre at b between a-b and b-c, as long as both sides need; their own normal where the way turns back.
+// The mitre at b between a-b and b-c, as long as both sides need; their own normal where the way turns so sharply that the inner corner would lie behind the
+// other end of a piece.
 static void mitre(const RibbonPoint *a, const RibbonPoint *b, const RibbonPoint *c, const double own[2], double out[2])
 {
     double n[2][2];
     shadow_normal(a, b, n[0]);
     shadow_normal(b, c, n[1]);
     double sum[2] = {n[0][0] + n[1][0], n[0][1] + n[1][1]}, square = sum[0] * sum[0] + sum[1] * sum[1];
-    if (square < 1) {
+    double inner = (b->radius + margin) * sqrt(fmax(4 - square, 0)), shorter = fmin(hypot(b->x - a->x, b->y - a->y), hypot(c->x - b->x, c->y - b->y));
+    if (square < 1 || inner > 0.5 * shorter * sqrt(square)) {
         out[0] = own[0], out[1] = own[1];
         return;
     }
@@ -88,12 +115,13 @@ static bool lay_piece(Ribbon *ribbon, const RibbonPoint *before, const RibbonPoi
 {
     double own[2], n[2][2], l = hypot(b->x - a->x, b->y - a->y);
     RibbonPoint end[2] = {*a, *b};
-    if (l < 1) {
-        // all of it within a pixel: spread over one
+    double least = least_length(b->radius);
+    if (l < least) {
+        // all of it within one spot: spread over that
         double ux = l > 1e-9 ? (b->x - a->x) / l : 1, uy = l > 1e-9 ? (b->y - a->y) / l : 0, mx = (a->x + b->x) / 2, my = (a->y + b->y) / 2;
-        end[0].x = mx - ux / 2, end[0].y = my - uy / 2;
-        end[1].x = mx + ux / 2, end[1].y = my + uy / 2;
-        l = 1;
+        end[0].x = mx - least * ux / 2, end[0].y = my - least * uy / 2;
+        end[1].x = mx + least * ux / 2, end[1].y = my + least * uy / 2;
+        l = least;
         before = after = NULL;
     }
     shadow_normal(&end[0], &end[1], own);
@@ -130,7 +158,7 @@ static void find_box(Ribbon *ribbon, int side)
 bool ribbon_lay(Ribbon *ribbon, const CArm *c_arm, int side, int count, const Vec3 *position, const double *radius, const double *attenuation)
 {
     ribbon->count = 0;
-    RibbonPoint *point = malloc(((size_t)count + 1) * sizeof *point);
+    RibbonPoint *point = malloc(((size_t)count * PARTS + 1) * sizeof *point);
     if (!point)
         return false;
     int points = project_points(point, c_arm, side, count, position, radius, attenuation);
