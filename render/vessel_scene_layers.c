@@ -55,7 +55,8 @@ static const char *const WALL_FRAGMENT =
     "  vec3 toward = outer ? m : -m;\n"
     "  float light = 0.34 + 0.56 * max(dot(toward, key), 0.0) + 0.16 * max(dot(toward, fill), 0.0);\n"
     "  float shiny = opacity.w * pow(max(dot(toward, halfway), 0.0), 40.0);\n"
-    "  float a = mix(opacity.x, opacity.y, edge);\n"
+    // thin out at the very outline, or its pixels would stand in steps
+    "  float a = mix(opacity.x, opacity.y, edge) * smoothstep(-0.10, 0.38, z);\n"
     "  float far = clamp((depth - range.x) / (range.y - range.x), 0.0, 1.0);\n"
     "  vec3 k = mix(color * (light + 0.34 * edge), haze, range.z * far);\n"
     "  float rim = edge_width > 0.0 ? 1.0 - smoothstep(0.0, edge_width, cut / max(fwidth(cut), 1e-9)) : 0.0;\n"
