@@ -169,7 +169,7 @@ static void button_row(Panel *panel, const PanelState *state, const ButtonRow *b
 // A slider over a value of the X-ray control; `label` is part of what it shows.
 static void xray_slider(Panel *panel, const PanelState *state, float *value, float least, float most, const char *format, const char *tip, float width)
 {
-    char id[16];
+    char id[24];
     ptrdiff_t place = value - (float *)&panel->xray;
     snprintf(id, sizeof id, "xray%d", (int)place);
     XrayControl before = panel->xray_set ? panel->xray : state->xray;
@@ -204,7 +204,7 @@ static void pulse_buttons(Panel *panel, const PanelState *state)
 {
     float gap = floorf(3 * gui_scale(panel->gui)), width = floorf((gui_width(panel->gui) - 3 * gap) / 4);
     for (int i = 0; i < 4; i++) {
-        char label[16], id[16];
+        char label[16], id[24];
         snprintf(label, sizeof label, "%g/s", (double)pulse_rate[i]);
         snprintf(id, sizeof id, "pulse%d", i);
         if (i > 0)
@@ -443,6 +443,9 @@ static void draw_bottom(Panel *panel, const PanelState *state)
     log.width = machine.x - hints.width;
     if (hint >= 0) {
         gui_window_begin(gui, "hint", hints, GUI_NO_INPUT | GUI_KEPT);
+        gui_draw_fill(gui, (GuiRect){hints.x + floorf(5 * s), hints.y + floorf(8 * s), floorf(3 * s), hints.height - floorf(16 * s)}, gui_colors.accent);
+        gui_place(gui, floorf(4 * s), 1);
+        gui_beside(gui, 0);
         panel_hint_text(hint, text, sizeof text);
         gui_text_wrapped(gui, GUI_LARGE, gui_colors.text, text);
         gui_window_end(gui);
@@ -488,8 +491,8 @@ static void draw_fluoroscopy_labels(Panel *panel, const PanelState *state, GuiRe
     label_right(panel, right, y - 2 * normal, GUI_NORMAL, gui_colors.text, text);
     snprintf(text, sizeof text, "field %.0f mm", (double)state->xray.field_mm);
     label_right(panel, right, y - 3 * normal, GUI_NORMAL, gui_colors.text, text);
-    label(panel, at.x + pad, at.y + pad, GUI_LARGE, gui_colors.text, mode_name[state->mode]);
-    y = at.y + pad + gui_line_height(gui, GUI_LARGE) + floorf(6 * s);
+    label(panel, at.x + pad, at.y + pad / 2, GUI_LARGE, gui_colors.text, mode_name[state->mode]);
+    y = at.y + pad / 2 + gui_line_height(gui, GUI_LARGE) + floorf(6 * s);
     if (state->mode == PANEL_CINE) {
         snprintf(text, sizeof text, "frame %d of %d", state->cine_frame + 1, state->cine_frames);
         label(panel, at.x + pad, y, GUI_NORMAL, gui_colors.text, text);
