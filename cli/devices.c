@@ -18,11 +18,12 @@
 enum { MOST_DEVICES = 64, MOST_MAPS = 16, MOST_NODES = 64 };
 
 static const char help[] =
-    "Usage: seldinger devices [--map F.yaml]... [--json F] [--watch [--duration-s S]]\n\n"
+    "Usage: seldinger devices [--map F.yaml]... [--json F] [--quiet] [--watch [--duration-s S]]\n\n"
     "Lists HID devices, USB serial encoders and joysticks: which can drive the tool, by which map, with force or not, and why not.\n\n"
     "  --map F.yaml      a device map of yours (input/device_map.h explains; examples in scenes/devices); may be given several times;\n"
     "                    the first that fits a device is taken, then the built-in ones for joysticks, gamepads and multi-axis controllers\n"
     "  --json F          the list as JSON; - is standard output\n"
+    "  --quiet           no list\n"
     "  --watch           then prints each control's raw value, its least and most so far, and what the tool would be asked; Ctrl-C ends.\n"
     "                    For calibrating: let go for the centre, move each axis to its ends\n"
     "  --duration-s S    ends --watch by itself after S seconds\n\n"
@@ -344,16 +345,16 @@ static bool write_json(const DeviceList *list, const char *path, Faults *faults)
 typedef struct DevicesOptions {
     const char *map[MOST_MAPS], *json;
     int map_count;
-    bool watch;
+    bool watch, quiet;
     double duration_s;
 } DevicesOptions;
 
 // False where the verb ends here; *code is its exit code.
 static bool read_options(int argc, char **argv, DevicesOptions *options, int *code)
 {
-    enum { MAP = 256, JSON, WATCH, DURATION, HELP };
+    enum { MAP = 256, JSON, WATCH, DURATION, QUIET, HELP };
     static const struct option table[] = {{"map", required_argument, NULL, MAP}, {"json", required_argument, NULL, JSON}, {"watch", no_argument, NULL, WATCH},
-                                          {"duration-s", required_argument, NULL, DURATION}, {"help", no_argument, NULL, HELP}, {0}};
+                                          {"duration-s", required_argument, NULL, DURATION}, {"quiet", no_argument, NULL, QUIET}, {"help", no_argument, NULL, HELP}, {0}};
     *code = EXIT_BAD_INPUT;
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "h", table, NULL)) != -1;) {
@@ -366,6 +367,7 @@ static bool read_options(int argc, char **argv, DevicesOptions *options, int *co
             options->map[options->map_count++] = optarg;
             break;
         case JSON: options->json = optarg; break;
+        case QUIET: options->quiet = true; break;
         case WATCH: options->watch = true; break;
         case DURATION:
             if (!cli_number("--duration-s", optarg, 0.01, 86400, &options->duration_s))
@@ -414,7 +416,7 @@ int verb_devices(int argc, char **argv)
         look(list, transport);
         if (options.json)
             write_json(list, options.json, &faults);
-        if (!options.json || strcmp(options.json, "-") != 0)
+        if (!options.quiet && (!options.json || strcmp(options.json, "-") != 0))
             print_list(list);
         if (options.watch && transport && !devices_watch(transport, list->hid, list->hid_count, options.duration_s))
             fprintf(stderr, "seldinger devices: no device to watch that may be read\n");

@@ -76,15 +76,32 @@ static int list(void *context, HidDeviceInfo *out, int capacity)
     return count;
 }
 
+// The rule that lets whoever sits at the machine use this device, and no other (a keyboard's reports are nobody's business).
+static void udev_rule(const char *path, char *out, size_t capacity)
+{
+    char name[256], line[160];
+    const char *base = strrchr(path, '/');
+    unsigned bus, vendor, product;
+    snprintf(out, capacity, "KERNEL==\"hidraw*\", TAG+=\"uaccess\"");
+    snprintf(name, sizeof name, "/sys/class/hidraw/%.100s/device/uevent", base ? base + 1 : path);
+    FILE *file = fopen(name, "r");
+    while (file && fgets(line, (int)sizeof line, file))
+        if (sscanf(line, "HID_ID=%x:%x:%x", &bus, &vendor, &product) == 3)
+            snprintf(out, capacity, "KERNEL==\"hidraw*\", KERNELS==\"*:%04X:%04X.*\", TAG+=\"uaccess\"", vendor & 0xffff, product & 0xffff);
+    if (file)
+        fclose(file);
+}
+
 static void *open_device(void *context, const char *path, char *why, size_t capacity)
 {
     Hidapi *hidapi = context;
     if (access(path, R_OK | W_OK) != 0) {
         int code = errno;
+        char rule[120];
+        udev_rule(path, rule, sizeof rule);
         if (code == EACCES || code == EPERM)
-            snprintf(why, capacity,
-                     "%s may not be read and written by you; as root: echo 'KERNEL==\"hidraw*\", SUBSYSTEM==\"hidraw\", TAG+=\"uaccess\"' > "
-                     "/etc/udev/rules.d/70-seldinger.rules && udevadm control --reload && udevadm trigger, then plug it in again", path);
+            snprintf(why, capacity, "%s may not be read and written by you; as root: echo '%s' >> /etc/udev/rules.d/70-seldinger.rules && udevadm control --reload; "
+                                    "then plug it in again", path, rule);
         else
             snprintf(why, capacity, "%s: %s", path, strerror(code));
         return NULL;

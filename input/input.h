@@ -1,5 +1,5 @@
-// input: what the hand does. One command (push, twist) from a script now; gamepad, HID and USB devices join here.
-// Uses geom/faults.h only.
+// input: what the hand does, as one command (push, twist) from a script here, or as a port that gamepads (gamepad.h), HID and USB devices (hand.h)
+// write by a device map (device_map.h). Uses geom/faults.h only.
 #ifndef SELDINGER_INPUT_INPUT_H
 #define SELDINGER_INPUT_INPUT_H
 

@@ -1,0 +1,84 @@
+// The verb `devices` on whatever machine this is: it always ends well, says something, and tells wrong use and wrong maps.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <cjson/cJSON.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+// What the program says on both outputs; its exit code.
+static int run(const char *arguments, char *said, size_t capacity)
+{
+    char command[1024];
+    snprintf(command, sizeof command, "'%s' devices %s 2>&1", SELDINGER_PROGRAM, arguments);
+    FILE *pipe = popen(command, "r");
+    assert_non_null(pipe);
+    size_t used = fread(said, 1, capacity - 1, pipe);
+    said[used] = 0;
+    int status = pclose(pipe);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+static char said[1 << 18];
+
+static void the_list_names_all_kinds(void **state)
+{
+    (void)state;
+    assert_int_equal(run("", said, sizeof said), 0);
+    assert_true(strstr(said, "HID devices") && strstr(said, "USB serial encoders"));
+    assert_int_equal(run("--map scenes/devices/roller.yaml --map scenes/devices/serial_encoder.yaml --quiet", said, sizeof said), 0);
+    assert_string_equal(said, "");
+    assert_int_equal(run("--watch --duration-s 0.05", said, sizeof said), 0);
+}
+
+static void the_json_is_whole(void **state)
+{
+    (void)state;
+    assert_int_equal(run("--json -", said, sizeof said), 0);
+    cJSON *object = cJSON_Parse(said);
+    assert_non_null(object);
+    static const char *const arrays[] = {"hid", "usb", "joysticks", "events"};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
+        assert_true(cJSON_IsArray(cJSON_GetObjectItem(object, arrays[i])));
+    assert_true(cJSON_IsBool(cJSON_GetObjectItem(object, "has_hidraw")));
+    cJSON_Delete(object);
+}
+
+static void wrong_use_and_wrong_maps_are_told(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/seldinger-map-XXXXXX", arguments[64];
+    int file = mkstemp(path);
+    assert_true(file >= 0);
+    static const char text[] = "seldinger_device: 1\ndevice: {usage: joystick}\npush: {source: Y, mm: 3}\n";
+    assert_int_equal(write(file, text, sizeof text - 1), (long)sizeof text - 1);
+    close(file);
+    snprintf(arguments, sizeof arguments, "--map %s", path);
+    assert_int_equal(run(arguments, said, sizeof said), 2);
+    assert_non_null(strstr(said, ":3:"));
+    assert_null(strstr(said, "HID devices"));
+    unlink(path);
+    static const char *const wrong[] = {"--nothing", "file.yaml", "--map", "--map /nowhere.yaml", "--duration-s 3", "--watch --duration-s -1", "--json /nowhere/f.json"};
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
+        if (run(wrong[i], said, sizeof said) != 2 || !said[0])
+            fail_msg("devices %s said '%s'", wrong[i], said);
+    assert_int_equal(run("--help", said, sizeof said), 0);
+    assert_non_null(strstr(said, "--watch"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_list_names_all_kinds),
+        cmocka_unit_test(the_json_is_whole),
+        cmocka_unit_test(wrong_use_and_wrong_maps_are_told),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
