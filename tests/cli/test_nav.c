@@ -1,0 +1,225 @@
+// The trainer from outside, as a user has it: `seldinger nav` under a virtual X server, keys by xdotool; what it leaves, its replay, what goes on from it.
+// Skipped by name where Xvfb or xdotool is not installed.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "sim/recording.h"
+#include "sim/session.h"
+
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+static char folder[] = "/tmp/seldinger-nav-XXXXXX";
+#include "tests/cli/folder.h"
+
+static const char scene[] = "seldinger: 1\n"
+                            "vessel: {tube: {radius_mm: 1.2, normal: [0, 1, 0], path: [{line_mm: 15}, {arc: {radius_mm: 20, angle_deg: 60}}, {line_mm: 30}]}, "
+                            "contact: tube, friction: 0.05}\n"
+                            "wire: {elements: 40, sections: [{length_mm: 100, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
+                            "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n"
+                            "targets: [{name: bend, point_mm: [30, 7, 0], radius_mm: 3}]\n"
+                            "exercise: {title: To the bend, target: bend, hold_s: 1}\n";
+
+static pid_t server;
+
+static bool is_installed(const char *program)
+{
+    char command[200];
+    snprintf(command, sizeof command, "command -v %s >/dev/null 2>&1", program);
+    return system(command) == 0;
+}
+
+// Xvfb finds a free display by itself and says which.
+static int open_display(void **state)
+{
+    (void)state;
+    int said[2];
+    char number[16] = ":", display[32] = "-displayfd";
+    assert_non_null(mkdtemp(folder));
+    FILE *file = fopen(in_folder("scene.yaml"), "w");
+    fputs(scene, file);
+    fclose(file);
+    if (!is_installed("Xvfb") || !is_installed("xdotool"))
+        return 0;
+    assert_int_equal(pipe(said), 0);
+    server = fork();
+    if (server == 0) {
+        char descriptor[16];
+        snprintf(descriptor, sizeof descriptor, "%d", said[1]);
+        if (!freopen("/dev/null", "w", stderr))
+            _exit(1);
+        execlp("Xvfb", "Xvfb", display, descriptor, "-screen", "0", "1024x768x24", "-nolisten", "tcp", (char *)NULL);
+        _exit(1);
+    }
+    close(said[1]);
+    ssize_t length = read(said[0], number + 1, sizeof number - 2);
+    close(said[0]);
+    assert_true(length > 0);
+    number[strcspn(number, "\n")] = 0;
+    return setenv("DISPLAY", number, 1);
+}
+
+static int close_display(void **state)
+{
+    if (server > 0) {
+        kill(server, SIGTERM);
+        waitpid(server, NULL, 0);
+    }
+    return remove_folder(state);
+}
+
+static void need_display(void)
+{
+    if (server <= 0) {
+        print_message("skipped: Xvfb or xdotool is not installed\n");
+        skip();
+    }
+}
+
+static int run(const char *format, ...)
+{
+    char command[4000];
+    int length = snprintf(command, sizeof command, "cd '%s' || exit 9; ", folder);
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(command + length, sizeof command - (size_t)length, format, arguments);
+    va_end(arguments);
+    int status = system(command);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+// The same, and what it said where it does not end with `code`.
+#define RUNS(code, ...)                                                                                                                            \
+    do {                                                                                                                                           \
+        int ended = run(__VA_ARGS__);                                                                                                              \
+        if (ended != (code) && access(in_folder("out.txt"), R_OK) == 0)                                                                            \
+            print_message("%s", text_of(in_folder("out.txt")));                                                                                    \
+        assert_int_equal(ended, code);                                                                                                             \
+    } while (0)
+
+static bool ends_with(const char *text, const char *end) { return strlen(text) >= strlen(end) && !strcmp(text + strlen(text) - strlen(end), end); }
+
+// The newest recording in FOLDER/sessions; its path in a buffer of the function's.
+static const char *newest_recording(void)
+{
+    static char path[600];
+    char command[300];
+    snprintf(command, sizeof command, "ls -t '%s'/sessions/*.h5 | head -1", folder);
+    FILE *pipe = popen(command, "r");
+    assert_non_null(pipe);
+    assert_non_null(fgets(path, sizeof path, pipe));
+    pclose(pipe);
+    path[strcspn(path, "\n")] = 0;
+    assert_true(ends_with(path, ".h5"));
+    return path;
+}
+
+static Faults faults;
+
+static RecordedRun *load(const char *path)
+{
+    faults_clear(&faults);
+    RecordedRun *recorded = recorded_run_load_series(path, &faults);
+    if (!recorded)
+        fail_msg("%s", faults.text[0]);
+    return recorded;
+}
+
+// Waits for the window, then holds keys as a user does; the session is ended by Esc and Enter.
+static const char hand[] = "W=$(xdotool search --sync --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
+                           "xdotool key e; sleep 0.3; xdotool keydown Up; sleep 2; xdotool keyup Up; xdotool keydown Right; sleep 0.3; xdotool keyup Right; "
+                           "xdotool keydown c; sleep 0.3; xdotool keyup c; xdotool key b; sleep 0.3; xdotool key Escape; sleep 0.5; xdotool key Return";
+
+static void a_session_by_keys_is_recorded_scored_and_replayed(void **state)
+{
+    (void)state;
+    need_display();
+    RUNS(0, "(%s) & exec %s nav scene.yaml --sessions sessions --trainee Ada --duration-s 60 --size 800x600 --figures figures.json >out.txt 2>&1",
+                         hand, SELDINGER_PROGRAM);
+    char path[700], json[700];
+    snprintf(path, sizeof path, "%s", newest_recording());
+    RecordedRun *recorded = load(path);
+    double inserted = recorded->inserted[recorded->step_count - 1], twisted = 0;
+    bool was_on = false, flowed = false, marked = false;
+    for (int64_t i = 0; i < recorded->step_count; i++) {
+        was_on |= recorded->xray[i].pedal > 0;
+        flowed |= recorded->xray[i].contrast_ml_s > 0;
+        marked |= recorded->xray[i].bookmark > 0;
+        twisted += recorded->command[2 * i + 1] * recorded->step_ms / 1000;
+    }
+    print_message("%lld steps, %.1f mm in, %.0f degrees\n", (long long)recorded->step_count, inserted, twisted);
+    assert_true(was_on && flowed && marked);
+    assert_true(inserted > 2 + 5 && twisted > 5);
+    assert_true(recorded->step_count < 55000);   // Esc and Enter ended it, not the clock
+
+    snprintf(json, sizeof json, "%.*s.json", (int)strlen(path) - 3, path);
+    static Session session;
+    faults_clear(&faults);
+    assert_true(session_load(json, &session, &faults));
+    assert_string_equal(session.trainee, "Ada");
+    assert_string_equal(session.title, "To the bend");
+    assert_true(session_is_of(&session, recorded));
+    assert_true(session.state_hash == recorded->state_hash[recorded->step_count - 1]);
+    assert_true(session.figures.fluoroscopy_s > 0 && session.figures.contrast_ml > 0);
+    recorded_run_free(recorded);
+
+    RUNS(0, "%s replay '%s' --verify --quiet", SELDINGER_PROGRAM, path);
+    RUNS(0, "%s replay '%s' --scene again --quiet", SELDINGER_PROGRAM, path);
+    RUNS(0, "%s check again --quiet", SELDINGER_PROGRAM);
+    RUNS(0, "%s replay '%s' --picture seen.png --size 640x480 --quiet", SELDINGER_PROGRAM, path);
+    assert_int_equal(access(in_folder("seen.png"), R_OK), 0);
+}
+
+static void a_session_goes_on_from_a_moment_of_another(void **state)
+{
+    (void)state;
+    need_display();
+    char path[700];
+    snprintf(path, sizeof path, "%s", newest_recording());
+    RUNS(0, "exec %s nav scene.yaml --sessions sessions --resume '%s' --at 1.5 --duration-s 2 --size 640x480 >out.txt 2>&1", SELDINGER_PROGRAM, path);
+    RecordedRun *first = load(path), *second = load(newest_recording());
+    assert_true(second->step_count > 1500);
+    assert_memory_equal(first->state_hash, second->state_hash, 1500 * sizeof *first->state_hash);
+    recorded_run_free(first);
+    recorded_run_free(second);
+    RUNS(0, "%s replay '%s' --verify --quiet", SELDINGER_PROGRAM, newest_recording());
+    // not in another scene
+    RUNS(2, "sed 's/friction: 0.05/friction: 0.06/' scene.yaml > other.yaml; %s nav other.yaml --resume '%s' --duration-s 1 >out.txt 2>&1",
+                         SELDINGER_PROGRAM, path);
+    char *said = text_of(in_folder("out.txt"));
+    assert_non_null(strstr(said, "is a recording of another scene"));
+    free(said);
+}
+
+static void a_recording_is_shown_in_the_window(void **state)
+{
+    (void)state;
+    need_display();
+    RUNS(0, "exec %s replay '%s' --duration-s 3 --size 640x480 >out.txt 2>&1", SELDINGER_PROGRAM, newest_recording());
+}
+
+static void without_a_display_it_says_so(void **state)
+{
+    (void)state;
+    RUNS(2, "DISPLAY= WAYLAND_DISPLAY= %s nav scene.yaml --no-record >out.txt 2>&1", SELDINGER_PROGRAM);
+    char *said = text_of(in_folder("out.txt"));
+    assert_non_null(strstr(said, "no display"));
+    free(said);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_session_by_keys_is_recorded_scored_and_replayed),
+                                       cmocka_unit_test(a_session_goes_on_from_a_moment_of_another), cmocka_unit_test(a_recording_is_shown_in_the_window),
+                                       cmocka_unit_test(without_a_display_it_says_so)};
+    return cmocka_run_group_tests(tests, open_display, close_display);
+}
