@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define TOOL "wire: {elements: 60, sections: [{length_mm: 100, diameter_mm: 0.4, young_modulus_gpa: 20}], damping: {mass_1_s: 1, stiffness_s: 0.0005}}\n"
+#define TOOL "wire: {elements: 40, sections: [{length_mm: 100, diameter_mm: 0.4, young_modulus_gpa: 20}], damping: {mass_1_s: 1, stiffness_s: 0.0005}}\n"
 #define AT(x) "targets: [{name: there, point_mm: [" #x ", 0, 0], radius_mm: 1}]\n"
 #define IN_THE_OPEN "seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 1}\n" AT(20)
 #define EXERCISE(inner) "exercise: {title: Go there, target: there" inner "}\n"
