@@ -24,7 +24,7 @@ static PanelRect place_view(PanelLayout *layout, PanelView view, PanelRect rect,
 // The main one at the left, the two others one above the other.
 static void place_all_views(PanelLayout *layout, PanelRect centre, float gap, int window_height)
 {
-    float main_width = floorf(centre.width * 0.6f), side = centre.width - main_width - gap, half = floorf((centre.height - gap) / 2);
+    float main_width = floorf(centre.width * 0.62f), side = centre.width - main_width - gap, half = floorf((centre.height - gap) / 2);
     place_view(layout, VIEW_FLUOROSCOPY, (PanelRect){centre.x, centre.y, main_width, centre.height}, window_height);
     place_view(layout, VIEW_3D, (PanelRect){centre.x + main_width + gap, centre.y, side, half}, window_height);
     place_view(layout, VIEW_ANGIOSCOPY, (PanelRect){centre.x + main_width + gap, centre.y + half + gap, side, centre.height - half - gap}, window_height);
@@ -47,7 +47,8 @@ PanelLayout panel_layout(int width, int height, double scale, PanelView view, bo
     layout.bottom = (PanelRect){0, h - bottom, w, bottom};
     float left = floorf(268 * s);
     // the main view keeps a little more than a square, the insets take what is over
-    float right = floorf(fminf(fmaxf(w - left - 1.15f * middle, 268 * s), 380 * s)), right_x = w - right;
+    float most = view == VIEW_ALL ? 268 * s : 380 * s;
+    float right = floorf(fminf(fmaxf(w - left - 1.15f * middle, 268 * s), most)), right_x = w - right;
     layout.left = (PanelRect){0, y, left, middle};
     layout.right = (PanelRect){right_x, y, right, middle};
     PanelRect centre = {left + gap, y, right_x - left - 2 * gap, middle};

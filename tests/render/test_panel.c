@@ -322,6 +322,41 @@ static void every_action_has_a_button_that_works(void **unused)
     end_desk(&desk);
 }
 
+// A tooltip names the key once the mouse has rested, and goes with the mouse.
+static void a_tooltip_names_the_key(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    Desk desk = new_desk(1280, 720);
+    PanelRect right = desk.panel->layout.right;
+    size_t bytes = (size_t)1280 * 720 * 3;
+    uint8_t *rgb[2] = {malloc(bytes), malloc(bytes)};
+    assert_true(rgb[0] && rgb[1]);
+    desk.input.mouse_x = right.x + right.width / 2;
+    desk.input.mouse_y = right.y + 42 * desk.panel->layout.scale;
+    for (int i = 0; i < 6; i++)   // hot, but not for long enough
+        frame(&desk);
+    gl_canvas_read(&desk.canvas, rgb[0]);
+    for (int i = 0; i < 15; i++)
+        frame(&desk);
+    keep_picture(&desk.canvas, "tooltip");
+    gl_canvas_read(&desk.canvas, rgb[1]);
+    assert_memory_not_equal(rgb[0], rgb[1], bytes);
+    desk.input.mouse_x = desk.input.mouse_y = -1;
+    for (int i = 0; i < 5; i++)
+        frame(&desk);
+    gl_canvas_read(&desk.canvas, rgb[1]);
+    for (size_t i = 0; i < bytes; i++)   // the button is no longer hot: all else is as it was
+        if (rgb[0][i] != rgb[1][i]) {
+            size_t x = i / 3 % 1280, y = i / 3 / 1280;
+            assert_true((float)x >= right.x && (float)y >= right.y && (float)y < right.y + 70 * (float)desk.panel->layout.scale);
+        }
+    free(rgb[0]);
+    free(rgb[1]);
+    end_desk(&desk);
+}
+
 static void views_are_chosen_turned_and_scrolled_by_mouse(void **unused)
 {
     (void)unused;
@@ -553,6 +588,7 @@ int main(void)
                                        cmocka_unit_test(ticks_are_round),
                                        cmocka_unit_test(pictures_at_all_sizes),
                                        cmocka_unit_test(every_action_has_a_button_that_works),
+                                       cmocka_unit_test(a_tooltip_names_the_key),
                                        cmocka_unit_test(views_are_chosen_turned_and_scrolled_by_mouse),
                                        cmocka_unit_test(a_button_lets_go_when_the_focus_goes),
                                        cmocka_unit_test(names_are_typed_and_trimmed),
