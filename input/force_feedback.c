@@ -13,7 +13,8 @@ enum { SET_EFFECT = 0x21, BLOCK_INDEX = 0x22, EFFECT_TYPE = 0x25, CONSTANT_FORCE
        AXES_ENABLE = 0x55, DIRECTION_ENABLE = 0x56, DIRECTION = 0x57, MAGNITUDE = 0x70, SET_CONSTANT_FORCE = 0x73, EFFECT_OPERATION_REPORT = 0x77, OP_START = 0x79, OP_STOP = 0x7b,
        LOOP_COUNT = 0x7c, DEVICE_GAIN = 0x7e, BLOCK_LOAD = 0x89, LOAD_SUCCESS = 0x8c, ENABLE_ACTUATORS = 0x97, STOP_ALL = 0x99, DEVICE_RESET = 0x9a,
        CREATE_NEW_EFFECT = 0xab };
-enum { LEAST_GAP_US = 1000, LOAD_ATTEMPTS = 3 };
+// once a millisecond; a tick that comes a little early after a late one is taken, or reports each millisecond would let through every other one
+enum { PERIOD_US = 1000, LEAST_GAP_US = 750, LOAD_ATTEMPTS = 3 };
 
 // --- finding ---
 
@@ -330,7 +331,7 @@ static bool upload(ForceFeedback *force, int which, const HidTransport *transpor
 bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor *descriptor, const HidTransport *transport, void *device, int64_t now_us)
 {
     PidMessage message;
-    *force = (ForceFeedback){.map = map->force, .started_us = now_us, .written_us = now_us - LEAST_GAP_US};
+    *force = (ForceFeedback){.map = map->force, .started_us = now_us, .due_us = now_us};
     if (!map->force.is_wanted) {
         snprintf(force->text, sizeof force->text, "%s", pid_is_haptic(descriptor) ? "none: its map has no 'force'" : "");
         return false;
@@ -371,12 +372,12 @@ bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor
 void force_tick(ForceFeedback *force, const HandPort *port, int64_t now_us, int64_t report_us, bool paused, const HidTransport *transport, void *device)
 {
     PidMessage message;
-    if (force->block[0] == 0 || now_us - force->written_us < LEAST_GAP_US)
+    if (force->block[0] == 0 || now_us < force->due_us)
         return;
     double sign = force->map.invert ? -1 : 1;
     const double wanted[2] = {sign * atomic_load(&port->force_n), sign * atomic_load(&port->torque_n_mm)};
     force_guard(&force->guard, &force->map, wanted, atomic_load(&port->step), now_us, report_us, paused);
-    bool is_due = force->restart_ms > 0 && now_us - force->started_us >= 1000 * (int64_t)force->restart_ms;
+    bool has_written = false, is_due = force->restart_ms > 0 && now_us - force->started_us >= 1000 * (int64_t)force->restart_ms;
     for (int i = 0; i < 2 && force->block[i]; i++) {
         int64_t value;
         double full = pid_axis_sign(&force->layout, force->direction_deg[i]) * (i == 0 ? force->map.full_scale_n : force->map.full_scale_n_mm);
@@ -384,7 +385,7 @@ void force_tick(ForceFeedback *force, const HandPort *port, int64_t now_us, int6
             force->failed_writes += !send(&message, transport, device);
         if (!pid_encode_force(&force->layout, force->block[i], force->guard.sent[i] / full, &message, &value) || value == force->value[i])
             continue;
-        force->written_us = now_us;
+        has_written = true;
         force->writes++;
         if (send(&message, transport, device))
             force->value[i] = value;
@@ -393,6 +394,8 @@ void force_tick(ForceFeedback *force, const HandPort *port, int64_t now_us, int6
     }
     if (is_due)
         force->started_us = now_us;
+    if (has_written)
+        force->due_us = force->due_us + PERIOD_US > now_us + LEAST_GAP_US ? force->due_us + PERIOD_US : now_us + LEAST_GAP_US;
 }
 
 void force_stop(ForceFeedback *force, const HidTransport *transport, void *device)

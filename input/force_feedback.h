@@ -85,7 +85,7 @@ typedef struct ForceFeedback {
     double direction_deg[2];
     int block[2];                    // of force and torque; 0: none
     int64_t value[2];                // magnitudes written last
-    int64_t started_us, written_us;
+    int64_t started_us, due_us;      // when the effects were started, when the next magnitude may go
     int restart_ms;
     int64_t writes, failed_writes;
     ForceGuard guard;
@@ -94,7 +94,7 @@ typedef struct ForceFeedback {
 
 // Finds the effects and uploads them at zero force. False: `text` says why; the device's inputs are good all the same.
 bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor *descriptor, const HidTransport *transport, void *device, int64_t now_us);
-// Sends what the port and the guard say where it changed; at most once a millisecond. Nothing before force_start was true.
+// Sends what the port and the guard say where it changed; about once a millisecond at most. Nothing before force_start was true.
 void force_tick(ForceFeedback *force, const HandPort *port, int64_t now_us, int64_t report_us, bool paused, const HidTransport *transport, void *device);
 // Zero and stop, for the end of a session.
 void force_stop(ForceFeedback *force, const HidTransport *transport, void *device);

@@ -58,6 +58,16 @@ static int drain(HandSlot *slot, int wait_ms)
     return length < 0 ? -1 : count;
 }
 
+// Reports come when they like; a force that is due within the next millisecond is waited for, or it would wait for the report after next.
+static int64_t wait_for_force(const HandSlot *slot, int64_t now)
+{
+    int64_t left = slot->force.block[0] ? slot->force.due_us - now : 0;
+    if (left <= 0 || left > 1000)
+        return now;
+    nanosleep(&(struct timespec){.tv_nsec = (long)left * 1000}, NULL);
+    return hand_now_us();
+}
+
 static void start_force(HandSlot *slot)
 {
     HandShared *shared = slot->shared;
@@ -97,6 +107,7 @@ void *hand_run_hid(void *argument)
         double sent_before = slot->force.guard.sent[0];
         is_there = count >= 0;
         report_us = count > 0 ? now : report_us;
+        now = is_there ? wait_for_force(slot, now) : now;
         if (is_there)
             force_tick(&slot->force, &slot->port, now, report_us, atomic_load(&shared->paused), &shared->transport, slot->device);
         tell_watchdog(slot, sent_before);
