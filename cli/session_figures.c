@@ -3,6 +3,7 @@
 #include "cli/report.h"
 #include "cli/session_report.h"
 #include "render/c_arm.h"
+#include "render/camera.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -179,14 +180,27 @@ static void widen(const RoadMap *map, Vec3 point, double margin, double box[4])
     box[2] = fmin(box[2], at.y - around), box[3] = fmax(box[3], at.y + around);
 }
 
-// Frames the tip's path, the target and the mouth.
+// As the trainer has it: what the scene says; shapes and tubes, which lie in no patient, are seen face on from the front.
+static PatientAxes patient_of(const Scene *scene, const VesselTree *tree)
+{
+    if (scene && vec3_norm(scene->patient_superior) > 0)
+        return (PatientAxes){.right = vec3_cross(scene->patient_anterior, scene->patient_superior), .anterior = scene->patient_anterior,
+                             .superior = scene->patient_superior};
+    if (!scene || !tree || (scene->source != SOURCE_SHAPE && scene->source != SOURCE_TUBE))
+        return patient_axes_lps();
+    Camera camera = {0};
+    camera_orient(&camera, vec3(0, 0, 0), vec3(0, 0, 0), tree->node_count, tree->center);
+    return (PatientAxes){.right = vec3_negate(camera.right), .anterior = camera.back, .superior = camera.up};
+}
+
+// Frames the tip's path and the target.
 static RoadMap frame_path(const SessionPage *page)
 {
     const RecordedRun *run = page->run;
     RoadMap map = {.scale = 1};
     XrayControl view = usual_view(run);
     Vec3 low = tip_at(run, 0), high = low;
-    PatientAxes axes = patient_axes_lps();
+    PatientAxes axes = patient_of(page->scene, page->tree);
     double box[4] = {HUGE_VAL, -HUGE_VAL, HUGE_VAL, -HUGE_VAL};
     for (int64_t i = 0; i < run->frame_count; i++) {
         Vec3 p = tip_at(run, i);

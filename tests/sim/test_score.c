@@ -63,6 +63,9 @@ static void a_wrong_exercise_is_refused(void **state)
         {IN_THE_OPEN EXERCISE(", error_points: 101"), "out of range"},
         {IN_THE_OPEN EXERCISE(", colour: red"), "valid: title"},
         {IN_THE_OPEN "fluoroscopy: {volumes: a}\n", "'volume'"},
+        {IN_THE_OPEN "fluoroscopy: {anterior: [0, 1, 0]}\n", "say together"},
+        {IN_THE_OPEN "fluoroscopy: {anterior: [0, 1, 0], superior: [0, 1, 1]}\n", "not perpendicular"},
+        {IN_THE_OPEN "fluoroscopy: {lao_deg: 91}\n", "out of range"},
     };
     static Faults faults;
     int wrong = 0;
