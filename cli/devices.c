@@ -221,8 +221,7 @@ static void print_encoder(const UsbDeviceInfo *device, const DeviceMap *map)
 
 static void print_nodes(const char *title, const InputNode *node, int count)
 {
-    if (count > 0)
-        printf("\n%s\n", title);
+    printf("\n%s\n%s", title, count > 0 ? "" : "none\n");
     for (int i = 0; i < count; i++)
         printf("%-20s %s\n", node[i].node, node[i].name);
 }

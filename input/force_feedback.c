@@ -11,7 +11,7 @@
 // HID Usage Tables 1.4, section 18
 enum { SET_EFFECT = 0x21, BLOCK_INDEX = 0x22, EFFECT_TYPE = 0x25, CONSTANT_FORCE = 0x26, DURATION = 0x50, GAIN = 0x52, TRIGGER_BUTTON = 0x53,
        AXES_ENABLE = 0x55, DIRECTION_ENABLE = 0x56, DIRECTION = 0x57, MAGNITUDE = 0x70, SET_CONSTANT_FORCE = 0x73, EFFECT_OPERATION_REPORT = 0x77, OP_START = 0x79, OP_STOP = 0x7b,
-       LOOP_COUNT = 0x7c, DEVICE_GAIN = 0x7e, BLOCK_LOAD = 0x89, LOAD_SUCCESS = 0x8c, ENABLE_ACTUATORS = 0x97, STOP_ALL = 0x99, DEVICE_RESET = 0x9a,
+       LOOP_COUNT = 0x7c, DEVICE_GAIN = 0x7e, POOL = 0x7f, BLOCK_LOAD = 0x89, LOAD_SUCCESS = 0x8c, ENABLE_ACTUATORS = 0x97, STOP_ALL = 0x99, DEVICE_RESET = 0x9a, MANAGED = 0xa9,
        CREATE_NEW_EFFECT = 0xab };
 // once a millisecond; a tick that comes a little early after a late one is taken, or reports each millisecond would let through every other one
 enum { PERIOD_US = 1000, LEAST_GAP_US = 750, LOAD_ATTEMPTS = 3 };
@@ -123,6 +123,7 @@ bool pid_find(const HidDescriptor *descriptor, PidLayout *layout, char *why, siz
         snprintf(why, capacity, "no force feedback (PID page) in the descriptor");
         return false;
     }
+    layout->pool_managed = in_report(descriptor, POOL, MANAGED, false);
     layout->create_type = in_report(descriptor, CREATE_NEW_EFFECT, CONSTANT_FORCE, true);
     layout->load_index = in_report(descriptor, BLOCK_LOAD, BLOCK_INDEX, false);
     layout->load_success = in_report(descriptor, BLOCK_LOAD, LOAD_SUCCESS, true);
@@ -196,6 +197,14 @@ int pid_decode_block_load(const PidLayout *layout, const uint8_t *bytes, size_t 
         (!hid_field_read(&success->field, success->slot, bytes + 1, length - 1, &status) || status != success->value))
         return 0;
     return index > 0 && index <= 255 ? (int)index : 0;
+}
+
+bool pid_needs_host(const PidLayout *layout, const uint8_t *bytes, size_t length)
+{
+    const PidControl *managed = &layout->pool_managed;
+    int64_t value;
+    return managed->is_there && length > 1 && bytes[0] == managed->field.report_id &&
+           hid_field_read(&managed->field, managed->slot, bytes + 1, length - 1, &value) && value == 0;
 }
 
 static int64_t all_ones(const HidField *field) { return ((int64_t)1 << field->size) - 1; }
@@ -314,6 +323,13 @@ static int create_effect(const PidLayout *layout, const HidTransport *transport,
     return 0;
 }
 
+static bool needs_host(const PidLayout *layout, const HidTransport *transport, void *device)
+{
+    uint8_t answer[PID_MESSAGE_BYTES] = {(uint8_t)layout->pool_managed.field.report_id};
+    int length = layout->pool_managed.is_there ? transport->get_feature(transport->context, device, answer, (int)sizeof answer) : 0;
+    return length > 0 && pid_needs_host(layout, answer, (size_t)length);
+}
+
 // Uploads effect `which` at zero force and starts it.
 static bool upload(ForceFeedback *force, int which, const HidTransport *transport, void *device)
 {
@@ -345,6 +361,10 @@ bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor
         force->direction_deg[i] = force_direction_deg(map, i == 1);
     if (isnan(force->direction_deg[0])) {
         snprintf(force->text, sizeof force->text, "none: push comes from neither X nor Y; give force.direction_deg");
+        return false;
+    }
+    if (needs_host(&force->layout, transport, device)) {
+        snprintf(force->text, sizeof force->text, "none: its memory of effects is not managed by the device, and the host's part is not here");
         return false;
     }
     if (pid_encode_reset(&force->layout, &message))

@@ -33,6 +33,7 @@ typedef struct PidControl {
 } PidControl;
 
 typedef struct PidLayout {
+    PidControl pool_managed;                                         // PID Pool, a feature that is read: the device keeps its memory itself
     PidControl create_type;                                          // Create New Effect: constant force
     PidControl load_index, load_success;                             // Block Load, a feature that is read; its fields
     PidControl effect_index, effect_type, duration, trigger_button, gain, direction_enable, axis_x, axis_y, direction;   // Set Effect
@@ -54,6 +55,8 @@ bool pid_encode_gain(const PidLayout *layout, PidMessage *out);              // 
 bool pid_encode_create(const PidLayout *layout, PidMessage *out);
 // The effect's block from an answered Block Load report (`bytes` with id); 0: refused or full.
 int pid_decode_block_load(const PidLayout *layout, const uint8_t *bytes, size_t length);
+// Whether an answered PID Pool report says that the host would have to manage the device's memory, which is not done here.
+bool pid_needs_host(const PidLayout *layout, const uint8_t *bytes, size_t length);
 // `direction_deg`: where the force comes from, clockwise from north (away from the user). Duration for ever, largest gain, no trigger button.
 bool pid_encode_effect(const PidLayout *layout, int block, double direction_deg, PidMessage *out);
 // Without a direction field a force > 0 comes from the positive end of its axis (east, south); -1 for those that come from north or west.

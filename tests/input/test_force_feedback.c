@@ -69,6 +69,10 @@ static void a_real_joystick_gets_the_reports_that_it_describes(void **state)
     assert_int_equal(pid_decode_block_load(&layout, (const uint8_t[]){2, 7, 2, 0, 1}, 5), 0);    // full
     assert_int_equal(pid_decode_block_load(&layout, (const uint8_t[]){3, 7, 1, 0, 1}, 5), 0);    // another report
     assert_int_equal(pid_decode_block_load(&layout, (const uint8_t[]){2, 7}, 2), 0);
+    // PID Pool: 16 bits of size, 8 of effects at once, device managed, shared blocks
+    assert_false(pid_needs_host(&layout, (const uint8_t[]){3, 0, 1, 10, 1}, 5));
+    assert_true(pid_needs_host(&layout, (const uint8_t[]){3, 0, 1, 10, 2}, 5));
+    assert_false(pid_needs_host(&layout, (const uint8_t[]){3, 0, 1}, 3));
     // index, constant, duration for ever, two intervals, gain, no trigger, axes and direction enable, directions, delay
     assert_true(pid_encode_effect(&layout, 7, 90, &message));
     expect_bytes(&message, HID_OUTPUT, "010701" "ffff" "0000" "0000" "ff" "ff" "04" "4000" "0000");
