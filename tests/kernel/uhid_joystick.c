@@ -1,9 +1,10 @@
 // A force-feedback joystick that exists only in the kernel (uhid): to every program it is a HID device on a bus. Commands come by standard input,
-// one a line; each is answered by a line on standard output when it is done. Input reports go out each millisecond while the device is open.
+// one a line; each is answered by a line on standard output when it is done. Input reports go out every 8 ms while the device is open.
 //   usage: uhid_joystick NAME VENDOR:PRODUCT LOG [SERIAL [LIE]]      (ids in hexadecimal)
 // LIE: wide, its X has 64 bits; mixed, its input report has no id though others have; full, it never has room for an effect. The kernel takes them all.
 //   axis X DIAL      from now on the stick is at X (-32767..32767) and the dial turns by DIAL counts a report
 //   yield K          the hand yields: X becomes X + K * force / 100, the force as the device plays it (-10000..10000, > 0 to greater X)
+//   every MS         from now on the reports' interval
 //   quiet | loud     no reports although open; reports again
 //   flood N          N reports as fast as the kernel takes them, the last with the dial at 0
 //   short            one report of 2 bytes, where the descriptor says 6
@@ -91,7 +92,7 @@ typedef struct {
     bool plugged, open, quiet, actuators, paused;
     int device_gain, last_made;   // last_made: index that PID Block Load tells, 0 after a failure
     Effect effects[EFFECTS + 1];
-    int base, dial, yield, axis, force;
+    int base, dial, yield, axis, force, interval_ms;
     long reports, written;
     long long next_us;
 } Device;
@@ -305,9 +306,10 @@ static void take_event(Device *device)
     else if (event.type == UHID_GET_REPORT) give_feature(device, &event.u.get_report);
 }
 
-// Takes what the kernel has for us, at most wait_ms long, and sends the input report that is due. A slow machine skips reports: no device hurries.
-static void turn(Device *device, int wait_ms, struct pollfd *commands)
+// Takes what the kernel has for us and sends the input report that is due. A slow machine skips reports: no device hurries.
+static void turn(Device *device, struct pollfd *commands)
 {
+    const int wait_ms = device->force || device->interval_ms < 4 ? 1 : 4;   // an effect that ends is seen in time
     struct pollfd both[2] = {{.fd = device->fd, .events = POLLIN}, {.fd = commands ? commands->fd : -1, .events = POLLIN}};
     if (poll(both, 2, wait_ms) > 0 && both[0].revents & POLLIN) take_event(device);
     if (commands) commands->revents = both[1].revents;
@@ -315,7 +317,7 @@ static void turn(Device *device, int wait_ms, struct pollfd *commands)
     long long now = now_us();
     if (device->plugged && device->open && !device->quiet && now >= device->next_us) {
         send_report(device, device->dial, INPUT_SIZE);
-        device->next_us = now - device->next_us > 20000 ? now + 1000 : device->next_us + 1000;
+        device->next_us = (now - device->next_us > 20000 ? now : device->next_us) + 1000 * device->interval_ms;
     }
 }
 
@@ -330,7 +332,7 @@ static bool wait_for(Device *device, const char *what, long count)
         if (!strcmp(what, "rest") && device->force == 0) return true;
         if (!strcmp(what, "reports") && device->reports >= reports) return true;
         if (!strcmp(what, "written") && device->written >= count) return true;
-        turn(device, 1, NULL);
+        turn(device, NULL);
     }
     return false;
 }
@@ -349,6 +351,7 @@ static bool obey(Device *device, char *line)
         device->base = (int)a;
         device->dial = (int)b;
     } else if (!strcmp(verb, "yield") && sscanf(rest, "%ld", &a) == 1) device->yield = (int)a;
+    else if (!strcmp(verb, "every") && sscanf(rest, "%ld", &a) == 1 && a > 0) device->interval_ms = (int)a;
     else if (!strcmp(verb, "quiet") || !strcmp(verb, "loud")) device->quiet = verb[0] == 'q';
     else if (!strcmp(verb, "flood") && sscanf(rest, "%ld", &a) == 1) {
         long long begin = now_us();
@@ -369,7 +372,7 @@ static bool obey(Device *device, char *line)
 
 int main(int argc, char **argv)
 {
-    Device device = {.fd = open("/dev/uhid", O_RDWR | O_CLOEXEC), .axis = 1 << 20};
+    Device device = {.fd = open("/dev/uhid", O_RDWR | O_CLOEXEC), .axis = 1 << 20, .interval_ms = 8};
     if (argc < 4 || argc > 6 || sscanf(argv[2], "%x:%x", &device.vendor, &device.product) != 2) {
         fprintf(stderr, "usage: uhid_joystick NAME VENDOR:PRODUCT LOG [SERIAL [wide|mixed|full]]\n");
         return 2;
@@ -387,7 +390,7 @@ int main(int argc, char **argv)
     char line[256];
     size_t length = 0;
     for (bool going = true; going;) {
-        turn(&device, 1, &commands);
+        turn(&device, &commands);
         if (!(commands.revents & (POLLIN | POLLHUP))) continue;
         ssize_t got = read(STDIN_FILENO, line + length, 1);
         if (got <= 0) break;
