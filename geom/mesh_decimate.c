@@ -1,7 +1,7 @@
 // Rounds of collapses. In each round all edges are priced and sorted, and the cheap ones collapsed in that order, save those of which an end has been collapsed
-// in this round; so no heap is kept, and the lists of triangles around a vertex stay right where they are still looked at. Price: mean squared distance of the new vertex from the planes of the triangles
-// that have gone into both ends, Q(x) = (x' A x + 2 b' x + c) / w, weighted by their areas w; it is in mm2 of displacement, so that a thin branch,
-// curved more, keeps shorter edges than a wide one.
+// in this round; so no heap is kept, and the lists of triangles around a vertex stay right where they are still looked at. Price: mean squared distance of the
+// new vertex from the planes of the triangles that have gone into both ends, Q(x) = (x' A x + 2 b' x + c) / w, weighted by their areas w; it is in mm2 of
+// displacement, so that a thin branch, curved more, keeps shorter edges than a wide one.
 #include "geom/mesh_decimate.h"
 
 #include <stdlib.h>

@@ -32,8 +32,9 @@ static bool options_are_sound(const FluoroscopeOptions *options, char *message, 
         if (!(options->radius[i] > 0) || !isfinite(options->radius[i]) || !(options->attenuation[i] >= 0) || !isfinite(options->attenuation[i]))
             return message_fail(message, capacity, "the tool's node %d has radius %g mm and attenuation %g / mm; both must be finite, and not negative", i,
                                 options->radius[i], options->attenuation[i]);
-    if (!(options->contrast_attenuation >= 0) || !(options->quanta >= 0) || !(options->dsa_gain > 0.5) || !(options->dsa_dose > 0) || !isfinite(options->quanta))
-        return message_fail(message, capacity, "contrast, quanta or gain of fluoroscopy is negative");
+    bool has_dose = options->quanta >= 0 && isfinite(options->quanta) && options->dsa_dose > 0;
+    if (!has_dose || !(options->contrast_attenuation >= 0) || !(options->dsa_gain > 0.5))
+        return message_fail(message, capacity, "contrast or quanta of fluoroscopy is negative, or DSA's gain not above 0.5, or its dose not above 0");
     return true;
 }
 
@@ -66,7 +67,7 @@ static bool wall_is_fit(const FluoroscopeOptions *options, MeshClosure *closure,
         return message_fail(message, capacity, "no contrast is drawn: the vessel's wall encloses nothing");
     const char *facing = closure->volume < 0 ? "; its triangles face inwards, which is allowed for" : "";
     if (closure->rims > 0 && closure->unevenness > 0.25)
-        message_fail(message, capacity, "the vessel's wall is open at %d places, not all of them flat (up to %.0f %% of their radius): contrast is wrong there%s",
+        message_fail(message, capacity, "the vessel's wall is open at %d places, not all of them flat (to %.0f %% of their radius): contrast is wrong there%s",
                      closure->rims, 100 * closure->unevenness, facing);
     else if (closure->rims > 0)
         message_fail(message, capacity, "the vessel's wall is open at %d places; flat lids close it for contrast%s", closure->rims, facing);
@@ -431,6 +432,7 @@ void fluoroscope_draw(Fluoroscope *f, const FluoroscopeFrame *frame, ViewPort po
     bool is_pulse = !f->has_picture || (has_pedal && frame->pulse != f->shown.pulse);
     if (is_resized && (!fit_picture(&f->still, side, LAYER_RGBA16) || !fit_picture(&f->turning, (side + 1) / 2, LAYER_RGBA16_SMOOTH)))
         return;
+    layers_set_state();
     f->side = side;
     f->corner[0] = port.x + (port.width - side) / 2;
     f->corner[1] = port.y + (port.height - side) / 2;

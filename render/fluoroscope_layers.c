@@ -46,7 +46,8 @@ static const char *const ANATOMY_FRAGMENT =
 #define TAPS_4                                                                                                                                             \
     "#version 330 core\n"                                                                                                                                  \
     "float tap(sampler2D layer, vec2 at) { vec2 h = 0.5 / vec2(textureSize(layer, 0));\n"                                                                  \
-    "  return 0.25 * (texture(layer, at + h).r + texture(layer, at - h).r + texture(layer, at + vec2(h.x, -h.y)).r + texture(layer, at + vec2(-h.x, h.y)).r); }\n"
+    "  vec2 g = vec2(h.x, -h.y);\n"                                                                                                                         \
+    "  return 0.25 * (texture(layer, at + h).r + texture(layer, at - h).r + texture(layer, at + g).r + texture(layer, at - g).r); }\n"
 #define TAPS_1 "#version 330 core\nfloat tap(sampler2D layer, vec2 at) { return texture(layer, at).r; }\n"
 #define WITH_ROADMAP "#define ROADMAP\n"
 static const char *const LUMEN_HEAD[2][2] = {{TAPS_4, TAPS_4 WITH_ROADMAP}, {TAPS_1, TAPS_1 WITH_ROADMAP}};   // full or less than full resolution, roadmap
@@ -107,7 +108,8 @@ static const char *const SHOW_FRAGMENT =
     "void main() { vec4 b = texture(baked, at); float grey = scale.x * b.x + scale.y * b.y * (texture(noise, grain).r - 0.5);\n"
     "  result = vec4(grey, grey, grey, 1.0); TINT }\n";
 static const char *const NO_TINT = "#version 330 core\n#define TINT\n";
-static const char *const TINT = "#version 330 core\n#define TINT result.rgb = clamp(result.rgb, 0.0, 1.0) * mix(vec3(1.0), vec3(0.55, 1.10, 1.20), 0.75 * b.z);\n";
+static const char *const TINT = "#version 330 core\n"
+                                "#define TINT result.rgb = clamp(result.rgb, 0.0, 1.0) * mix(vec3(1.0), vec3(0.55, 1.10, 1.20), 0.75 * b.z);\n";
 
 // --- random numbers ---
 
@@ -279,15 +281,20 @@ void layer_destroy(Layer *layer)
 
 // --- passes ---
 
+void layers_set_state(void)
+{
+    static const GLenum off[] = {GL_SCISSOR_TEST, GL_DEPTH_TEST, GL_STENCIL_TEST, GL_CULL_FACE, GL_BLEND, GL_FRAMEBUFFER_SRGB, GL_COLOR_LOGIC_OP};
+    for (size_t i = 0; i < sizeof off / sizeof *off; i++)
+        glDisable(off[i]);
+    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+    glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+    glFrontFace(GL_CCW);
+}
+
 static void bind_layer(const Layer *layer)
 {
     glBindFramebuffer(GL_FRAMEBUFFER, layer->framebuffer);
     glViewport(0, 0, layer->side, layer->side);
-    glDisable(GL_SCISSOR_TEST);
-    glDisable(GL_DEPTH_TEST);
-    glDisable(GL_CULL_FACE);
-    glDisable(GL_BLEND);
-    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
 }
 
 void layer_begin(const Layer *layer)

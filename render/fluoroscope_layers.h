@@ -35,6 +35,7 @@ typedef struct LayerTone {
     bool has_roadmap;
 } LayerTone;
 
+void layers_set_state(void);   // all of GL's that the passes rely on, once before them: each pass puts back what it changes
 bool layers_create(LayerPrograms *programs, const Anatomy *anatomy, char *message, size_t capacity);
 void layers_destroy(LayerPrograms *programs);
 // Makes the layer anew where its side differs. False where the driver gives none.

@@ -262,8 +262,6 @@ void lumen_layer_draw(Lumen *lumen, const CArm *c_arm, const float *concentratio
     glUniform1i(glGetUniformLocation(program, "nodes"), 0);
     glActiveTexture(GL_TEXTURE0);
     glBindTexture(GL_TEXTURE_BUFFER, lumen->texture);
-    glDisable(GL_DEPTH_TEST);
-    glDisable(GL_CULL_FACE);
     glEnable(GL_DEPTH_CLAMP);   // far walls count, however far
     glEnable(GL_BLEND);
     glBlendEquation(GL_FUNC_ADD);

@@ -93,8 +93,8 @@ static void rays_matrix_and_magnification_agree(void **state)
     PatientAxes lps = patient_axes_lps();
     uint64_t seed = 7;
     for (int i = 0; i < 200; i++) {
-        XrayControl xray = {.lao_deg = (float)random_in(&seed, -90, 90), .cra_deg = (float)random_in(&seed, -45, 45), .field_mm = (float)random_in(&seed, 40, 400),
-                            .table_mm = {300, -200, 100}};
+        float lao = (float)random_in(&seed, -90, 90), cra = (float)random_in(&seed, -45, 45), field = (float)random_in(&seed, 40, 400);
+        XrayControl xray = {.lao_deg = lao, .cra_deg = cra, .field_mm = field, .table_mm = {300, -200, 100}};
         CArm c = c_arm_place(&xray, &lps);
         Vec3 p = vec3_add(vec3(300, -200, 100), random_in_box(&seed, 100)), q = c_arm_project(&c, p);
         // the ray of where it lands goes through the point

@@ -59,6 +59,31 @@ static void tool_free(Tool *tool)
     free(tool->attenuation);
 }
 
+// A ball of contrast of radius 6 in the middle, a wire from a to b.
+typedef struct Patient {
+    TriangleMesh ball;
+    Tool wire;
+    XrayRoom *room;
+} Patient;
+static XrayRoom *patient_open(Patient *patient, FluoroscopeOptions options, Vec3 a, Vec3 b, int side)
+{
+    *patient = (Patient){.ball = ball_of(6, vec3(0, 0, 0)), .wire = tool_make(31, a, b, 0.5, 0.6)};
+    options.vessel = &patient->ball;
+    tool_give(&patient->wire, &options);
+    patient->room = room_open(&options, side);
+    if (patient->room)
+        patient->room->frame.pose = patient->wire.pose;
+    return patient->room;
+}
+
+static void patient_close(Patient *patient)
+{
+    if (patient->room)
+        room_close(patient->room);
+    tool_free(&patient->wire);
+    mesh_clear(&patient->ball);
+}
+
 static void known_thickness_gives_known_grey(void **state)
 {
     (void)state;
@@ -183,16 +208,13 @@ static void blades_cover_what_they_are_set_to(void **state)
 static void dsa_shows_the_vessel_alone(void **state)
 {
     (void)state;
-    TriangleMesh ball = ball_of(6, vec3(0, 0, 0));
-    FluoroscopeOptions options = fluoroscope_default_options();   // a plain head
-    options.vessel = &ball;
-    Tool wire = tool_make(31, vec3(-30, 0, 15), vec3(30, 0, 15), 0.5, 0.6);
-    tool_give(&wire, &options);
-    XrayRoom *s = room_open(&options, 320);
-    if (!s)
+    Patient patient;
+    XrayRoom *s = patient_open(&patient, fluoroscope_default_options(), vec3(-30, 0, 15), vec3(30, 0, 15), 320);   // a plain head
+    if (!s) {
+        patient_close(&patient);
         skip();
+    }
     s->frame.xray.field_mm = 80;
-    s->frame.pose = wire.pose;
     room_draw(s);
     s->frame.pulse++;
     s->frame.xray.mode = XRAY_DSA;
@@ -209,7 +231,7 @@ static void dsa_shows_the_vessel_alone(void **state)
             Moments m = room_moments(s, x, y, x + 20, y + 20);
             double a = anatomy_along(&s->view->anatomy, c_arm_source(c_arm), pixel_ray(c_arm, 320, x + 10, y + 10));
             double transmission = fmin(exp(s->view->tone.exposure - a), 1);
-            double sigma = flat * options.dsa_gain * sqrt(2 / (options.quanta * options.dsa_dose * transmission));
+            double sigma = flat * s->view->options.dsa_gain * sqrt(2 / (s->view->options.quanta * s->view->options.dsa_dose * transmission));
             assert_near(m.mean, flat, 5 * sigma * 2.7 / 20 + 0.5);   // 400 pixels, noise alike over 2.7
             assert_near(m.deviation / sigma, 1, 0.35);
         }
@@ -217,12 +239,12 @@ static void dsa_shows_the_vessel_alone(void **state)
     s->frame.contrast = &full;
     s->frame.pulse++;
     room_draw(s);
-    assert_near(room_moments(s, 157, 157, 163, 163).mean / (flat * exp(-options.dsa_gain * 0.105 * 12)), 1, 0.12);
+    assert_near(room_moments(s, 157, 157, 163, 163).mean / (flat * exp(-s->view->options.dsa_gain * 0.105 * 12)), 1, 0.12);
     assert_near(room_moments(s, 40, 40, 80, 80).mean, flat, 2);
     // the mask stays while the tool moves: it is white where it was, dark where it is
     s->frame.contrast = NULL;
     for (int i = 0; i < 31; i++)
-        wire.pose->position[i].z -= 5;
+        patient.wire.pose->position[i].z -= 5;
     s->frame.pulse++;
     room_draw(s);
     int was = 160 + 15 * 4, is = 160 + 10 * 4;
@@ -236,9 +258,7 @@ static void dsa_shows_the_vessel_alone(void **state)
     s->frame.pulse++;
     room_draw(s);
     assert_false(fluoroscope_state(s->view).mask_has_moved);
-    room_close(s);
-    tool_free(&wire);
-    mesh_clear(&ball);
+    patient_close(&patient);
 }
 
 static int blueness(const XrayRoom *s, int x, int y)
@@ -250,14 +270,12 @@ static int blueness(const XrayRoom *s, int x, int y)
 static void the_roadmap_keeps_the_last_bolus(void **state)
 {
     (void)state;
-    TriangleMesh ball = ball_of(6, vec3(0, 0, 0));
-    FluoroscopeOptions options = quiet_room(&ball);
-    Tool wire = tool_make(31, vec3(-30, 0, 0), vec3(30, 0, 0), 0.5, 0.6);
-    tool_give(&wire, &options);
-    XrayRoom *s = room_open(&options, 240);
-    if (!s)
+    Patient patient;
+    XrayRoom *s = patient_open(&patient, quiet_room(NULL), vec3(-30, 0, 0), vec3(30, 0, 0), 240);
+    if (!s) {
+        patient_close(&patient);
         skip();
-    s->frame.pose = wire.pose;
+    }
     // before any contrast there is nothing to overlay
     s->frame.xray.mode = XRAY_ROADMAP;
     room_draw(s);
@@ -293,25 +311,20 @@ static void the_roadmap_keeps_the_last_bolus(void **state)
     s->frame.pulse++;
     room_draw(s);
     assert_false(fluoroscope_state(s->view).has_roadmap);
-    room_close(s);
-    tool_free(&wire);
-    mesh_clear(&ball);
+    patient_close(&patient);
 }
 
 static void without_pedal_the_last_image_holds(void **state)
 {
     (void)state;
-    TriangleMesh ball = ball_of(6, vec3(0, 0, 0));
-    FluoroscopeOptions options = fluoroscope_default_options();
-    options.vessel = &ball;
-    Tool wire = tool_make(31, vec3(-30, 0, 0), vec3(30, 0, 10), 0.5, 0.6);
-    tool_give(&wire, &options);
-    XrayRoom *s = room_open(&options, 200);
-    if (!s)
+    Patient patient;
+    XrayRoom *s = patient_open(&patient, fluoroscope_default_options(), vec3(-30, 0, 0), vec3(30, 0, 10), 200);
+    if (!s) {
+        patient_close(&patient);
         skip();
+    }
     size_t row = 200 * 3, bytes = 200 * row;
     uint8_t *before = malloc(bytes);
-    s->frame.pose = wire.pose;
     room_draw(s);
     assert_false(fluoroscope_state(s->view).is_held);
     memcpy(before, s->rgb, bytes);
@@ -320,7 +333,7 @@ static void without_pedal_the_last_image_holds(void **state)
     s->frame.pulse += 5;
     s->frame.contrast = &full;
     s->frame.xray.lao_deg = 30;
-    wire.pose->position[30].z += 10;
+    patient.wire.pose->position[30].z += 10;
     room_draw(s);
     assert_true(fluoroscope_state(s->view).is_held);
     assert_near(fluoroscope_state(s->view).shown.lao_deg, 0, 0);
@@ -333,9 +346,7 @@ static void without_pedal_the_last_image_holds(void **state)
     assert_true(memcmp(before + 40 * row, s->rgb + 40 * row, bytes - 40 * row) != 0);
     assert_false(fluoroscope_state(s->view).is_held);
     free(before);
-    room_close(s);
-    tool_free(&wire);
-    mesh_clear(&ball);
+    patient_close(&patient);
 }
 
 static void a_mirrored_scene_gives_the_mirrored_picture(void **state)
@@ -432,22 +443,61 @@ static void unfit_vessels_are_told(void **state)
     room_close(s);
 }
 
+static void whatever_state_gl_is_in(void **state)
+{
+    (void)state;
+    Patient patient;
+    XrayRoom *s = patient_open(&patient, fluoroscope_default_options(), vec3(-30, 0, 0), vec3(30, 0, 10), 120);
+    if (!s) {
+        patient_close(&patient);
+        skip();
+    }
+    size_t bytes = 120 * 120 * 3;
+    uint8_t *clean = malloc(bytes);
+    s->frame.contrast = &full;
+    for (int k = 0; k < 2; k++) {
+        fluoroscope_forget(s->view);
+        s->frame.pulse = 3;
+        for (int pulse = 0; pulse < 3; pulse++) {
+            s->frame.pulse++;
+            if (k == 1) {
+                static const GLenum on[] = {GL_SCISSOR_TEST, GL_DEPTH_TEST, GL_STENCIL_TEST, GL_CULL_FACE, GL_BLEND};
+                for (int i = 0; i < 5; i++)
+                    glEnable(on[i]);
+                glScissor(0, 0, 7, 5);
+                glBlendFunc(GL_DST_ALPHA, GL_ONE_MINUS_SRC_COLOR);
+                glBlendEquation(GL_MAX);
+                glFrontFace(GL_CW);
+                glPolygonMode(GL_FRONT_AND_BACK, GL_LINE);
+                glColorMask(GL_TRUE, GL_FALSE, GL_TRUE, GL_FALSE);
+                glDepthFunc(GL_NEVER);
+                glActiveTexture(GL_TEXTURE3);
+            }
+            room_draw(s);
+        }
+        if (k == 0)
+            memcpy(clean, s->rgb, bytes);
+    }
+    assert_memory_equal(clean, s->rgb, bytes);
+    assert_false(glIsEnabled(GL_SCISSOR_TEST));
+    assert_int_equal(glGetError(), GL_NO_ERROR);
+    free(clean);
+    patient_close(&patient);
+}
+
 static void odd_frames_are_survived(void **state)
 {
     (void)state;
-    TriangleMesh ball = ball_of(6, vec3(0, 0, 0));
-    FluoroscopeOptions options = fluoroscope_default_options();
-    options.vessel = &ball;
-    Tool wire = tool_make(31, vec3(-30, 0, 0), vec3(30, 0, 10), 0.5, 0.6);
-    tool_give(&wire, &options);
-    XrayRoom *s = room_open(&options, 120);
-    if (!s)
+    Patient patient;
+    XrayRoom *s = patient_open(&patient, fluoroscope_default_options(), vec3(-30, 0, 0), vec3(30, 0, 10), 120);
+    if (!s) {
+        patient_close(&patient);
         skip();
+    }
     const float lost = NAN;
-    s->frame.pose = wire.pose;
     s->frame.contrast = &lost;
-    wire.pose->position[7] = vec3(NAN, 0, 0);
-    wire.pose->position[15] = vec3(0, 5000, 0);   // behind the source
+    patient.wire.pose->position[7] = vec3(NAN, 0, 0);
+    patient.wire.pose->position[15] = vec3(0, 5000, 0);   // behind the source
     s->frame.xray.field_mm = INFINITY;
     s->frame.xray.mode = 77;
     s->frame.xray.collimator[0] = NAN;
@@ -459,9 +509,7 @@ static void odd_frames_are_survived(void **state)
     }
     fluoroscope_draw(s->view, &s->frame, (ViewPort){s->canvas.framebuffer, 0, 0, 0, 0});
     assert_int_equal(glGetError(), GL_NO_ERROR);
-    room_close(s);
-    tool_free(&wire);
-    mesh_clear(&ball);
+    patient_close(&patient);
 }
 
 int main(void)
@@ -472,6 +520,7 @@ int main(void)
         cmocka_unit_test(dsa_shows_the_vessel_alone),            cmocka_unit_test(the_roadmap_keeps_the_last_bolus),
         cmocka_unit_test(without_pedal_the_last_image_holds),    cmocka_unit_test(a_mirrored_scene_gives_the_mirrored_picture),
         cmocka_unit_test(unfit_vessels_are_told),                cmocka_unit_test(odd_frames_are_survived),
+        cmocka_unit_test(whatever_state_gl_is_in),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

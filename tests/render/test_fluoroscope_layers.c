@@ -239,6 +239,14 @@ static double exact_chord(double x, double radius)
     return sum;
 }
 
+// Ten pixels a millimetre, seen from the front.
+static CArm close_up(void)
+{
+    XrayControl xray = {.field_mm = 40};
+    PatientAxes axes = patient_axes_lps();
+    return c_arm_place(&xray, &axes);
+}
+
 static float *draw_ribbon(XrayRoom *s, Layer *layer, const CArm *c_arm, int count, const Vec3 *position, double radius, double attenuation)
 {
     double *r = malloc((size_t)count * sizeof *r), *a = malloc((size_t)count * sizeof *a);
@@ -265,9 +273,7 @@ static void the_ribbon_has_the_chord_of_a_cylinder(void **state)
     if (!s)
         skip();
     Layer layer = {0};
-    XrayControl xray = {.field_mm = 40};
-    PatientAxes axes = patient_axes_lps();
-    CArm c_arm = c_arm_place(&xray, &axes);
+    CArm c_arm = close_up();
     const double pixel_mm = 0.1, attenuation = 0.7;
     for (int k = 0; k < 24; k++) {
         double radius = 0.05 * pow(1.25, k), off = 0.37 * k - floor(0.37 * k);   // 0.05 to 8.5 pixels, between pixel centres
@@ -292,9 +298,7 @@ static void shadows_keep_what_the_tool_takes_away(void **state)
     if (!s)
         skip();
     Layer layer = {0};
-    XrayControl xray = {.field_mm = 40};
-    PatientAxes axes = patient_axes_lps();
-    CArm c_arm = c_arm_place(&xray, &axes);
+    CArm c_arm = close_up();
     const double radius = 0.18, attenuation = 0.5, length = 15;
     // straight ones at all slopes to the rays, up to end-on, and at all angles in the picture
     for (int k = 0; k < 12; k++)
@@ -384,7 +388,8 @@ static void bodies_and_volumes_are_integrated(void **state)
         double value = (double)hounsfield[(24 * NY + j) * NX + 19];
         by_hand += 3 * (value < 150 ? 0.0045 * (1 + value / 1000) : 0.005175 + (0.028 - 0.005175) * (value - 150) / 850);
     }
-    assert_near(anatomy_along(&s->view->anatomy, vec3(-60 + 19 * 3, -1000, -70 + 24 * 3), vec3(0, 1, 0)) / by_hand, 1, 0.02);   // a level of 255 is 2 % of soft tissue
+    // a level of 255 is 2 % of soft tissue
+    assert_near(anatomy_along(&s->view->anatomy, vec3(-60 + 19 * 3, -1000, -70 + 24 * 3), vec3(0, 1, 0)) / by_hand, 1, 0.02);
     room_close(s);
     free(hounsfield);
 }
