@@ -11,10 +11,10 @@ static const struct Verb {
     VerbFunction *call;
     const char *arguments, *does;
 } verbs[] = {
+    {"run", verb_run, "SCENE", "runs a scene headless: summary, final state, recording, picture"},
 #ifdef SELDINGER_RENDER
     {"nav", verb_nav, "SCENE", "the trainer: a window, keys and devices steer the tool, sessions are recorded and scored"},
 #endif
-    {"run", verb_run, "SCENE", "runs a scene headless: summary, final state, recording, picture"},
     {"check", verb_check, "PATH...", "runs every scene that has a golden tool path and compares"},
     {"segment", verb_segment, "VOLUME --start X,Y,Z -o TREE.h5", "RBT: an angiogram, from one click or --trace F.yaml, to a tree of nodes with local points"},
     {"import", verb_import, "--surface F -o TREE.h5", "the same tree from a surface, with centrelines or alone"},

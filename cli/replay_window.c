@@ -156,7 +156,7 @@ static void run_window(ReplayWindow *replay)
         last = now;
         panel_take_input(replay->panel, input, &actions);
         PanelLayout layout = panel_layout(input->width, input->height, input->scale, replay->desk.view, true);
-        desk_obey(&replay->desk, &actions, &layout, passed);
+        desk_obey(&replay->desk, views_scene(replay->views), &actions, &layout, passed);
         obey(replay, &actions, passed);
         goes_on = !replay->resumes && !actions.pressed[ACTION_QUIT] && input->close != WINDOW_ENDED &&
                   !(replay->options->duration_s > 0 && now - replay->begun_s > replay->options->duration_s);

@@ -365,7 +365,7 @@ static void run_window(Trainer *trainer, Faults *faults)
         double now = since_begin(trainer);
         panel_take_input(trainer->panel, input, &actions);
         PanelLayout layout = panel_layout(input->width, input->height, input->scale, trainer->desk.view, panel_has_panels(trainer->panel));
-        desk_obey(&trainer->desk, &actions, &layout, fmin(now - last, 0.1));
+        desk_obey(&trainer->desk, views_scene(trainer->views), &actions, &layout, fmin(now - last, 0.1));
         last = now;
         drive_by_keys(trainer, &actions);
         drive_by_pads(trainer);

@@ -77,7 +77,7 @@ static void obey_xray(Desk *desk, const PanelActions *actions)
     }
 }
 
-static void obey_mouse(Desk *desk, const PanelActions *actions, const PanelLayout *layout)
+static void obey_mouse(Desk *desk, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout)
 {
     const PanelMouse *mouse = &actions->mouse;
     if (mouse->view < 0 || mouse->view >= VIEW_COUNT)
@@ -88,8 +88,12 @@ static void obey_mouse(Desk *desk, const PanelActions *actions, const PanelLayou
         FreeCamera *camera = &desk->look.camera;
         if (mouse->buttons & WINDOW_MOUSE_LEFT)
             free_camera_orbit(camera, dx, dy);
-        else if (mouse->buttons)
+        else if (mouse->buttons && (mouse->drag_x != 0 || mouse->drag_y != 0)) {
+            if (desk->look.follow_tip)
+                *camera = vessel_scene_camera(scene);   // goes on from what is seen
+            desk->look.follow_tip = false;
             free_camera_pan(camera, dx, dy, port->width, port->height);
+        }
         if (mouse->scroll != 0)
             free_camera_zoom(camera, mouse->scroll, mouse->x * port->width, (1 - mouse->y) * port->height, port->width, port->height);
     } else if (mouse->view == VIEW_FLUOROSCOPY) {
@@ -123,12 +127,12 @@ static void obey_views(Desk *desk, const PanelActions *actions, double seconds)
     free_camera_zoom(&look->camera, 8 * seconds * held(actions, ACTION_CAMERA_NEARER, ACTION_CAMERA_FARTHER), 50, 50, 100, 100);
 }
 
-void desk_obey(Desk *desk, const PanelActions *actions, const PanelLayout *layout, double seconds)
+void desk_obey(Desk *desk, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout, double seconds)
 {
     obey_arm(&desk->xray, &desk->patient, actions, seconds);
     obey_xray(desk, actions);
     obey_views(desk, actions, seconds);
-    obey_mouse(desk, actions, layout);
+    obey_mouse(desk, scene, actions, layout);
 }
 
 Command desk_command(const Desk *desk, const PanelActions *actions)

@@ -21,7 +21,7 @@ typedef struct Desk {
 Desk desk_create(const VesselScene *scene, int count, const Vec3 *point);
 
 // One frame of `seconds`: obeys what is held and pressed. `layout`: where the mouse's views are.
-void desk_obey(Desk *desk, const PanelActions *actions, const PanelLayout *layout, double seconds);
+void desk_obey(Desk *desk, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout, double seconds);
 // What the held keys ask of the tool: fast is 3 times, slow a fifth of the ordinary speed.
 Command desk_command(const Desk *desk, const PanelActions *actions);
 // The controls with what hands (HAND_ bits) and held keys add for now: pedal, contrast.

@@ -62,6 +62,10 @@ Views *views_create(const ViewsOptions *options, char *message, size_t capacity)
     VesselSceneOptions shown = {.vessel = mesh, .coarse = coarse, .tree = options->tree, .target_count = scene->target_count,
                                 .target = scene->target, .has_entry = scene->wire.has_sheath, .entry = scene->wire.start,
                                 .entry_direction = scene->wire.direction};
+    if (!mesh) {
+        shown.frame_count = options->pose->node_count;
+        shown.frame = options->pose->position;
+    }
     bool good = views && (views->scene = vessel_scene_create(&shown, message, capacity)) &&
                 (views->angioscope = angioscope_create(mesh, options->vessel, options->tree, message, capacity)) &&
                 (views->fluoroscope = create_fluoroscope(options, mesh, message, capacity));
@@ -93,6 +97,7 @@ static void draw_view(Views *views, PanelView view, const ViewsFrame *frame, Vie
     } else if (view == VIEW_3D) {
         vessel_scene_draw(views->scene, frame->pose, frame->look, port);
     } else {
+        angioscope_set_full_detail(views->angioscope, frame->is_still);
         angioscope_draw(views->angioscope, frame->pose, port);
     }
 }
