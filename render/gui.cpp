@@ -538,6 +538,11 @@ extern "C" void gui_draw_text(Gui *gui, float x, float y, GuiFont font, Color co
     list()->AddText(gui->font[font], gui->font[font]->FontSize, ImVec2(whole(x), whole(y)), packed(color), text);   // whole pixels keep letters sharp
 }
 
+extern "C" void gui_draw_wrapped(Gui *gui, float x, float y, GuiFont font, Color color, const char *text, float width)
+{
+    list()->AddText(gui->font[font], gui->font[font]->FontSize, ImVec2(whole(x), whole(y)), packed(color), text, nullptr, width);
+}
+
 extern "C" void gui_text_extent(Gui *gui, GuiFont font, const char *text, float *width, float *height)
 {
     ImVec2 extent = gui->font[font]->CalcTextSizeA(gui->font[font]->FontSize, 1e9f, 0, text);

@@ -74,6 +74,7 @@ bool gui_text_field(Gui *gui, const char *id, char *text, size_t capacity, bool 
 void gui_draw_fill(Gui *gui, GuiRect at, Color color);
 void gui_draw_line(Gui *gui, float x0, float y0, float x1, float y1, Color color, float thickness);
 void gui_draw_text(Gui *gui, float x, float y, GuiFont font, Color color, const char *text);
+void gui_draw_wrapped(Gui *gui, float x, float y, GuiFont font, Color color, const char *text, float width);
 void gui_text_extent(Gui *gui, GuiFont font, const char *text, float *width, float *height);
 float gui_wrapped_height(Gui *gui, GuiFont font, const char *text, float width);
 

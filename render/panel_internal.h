@@ -1,4 +1,4 @@
-// What panel.c (input, dialogues, what the panel remembers) and panel_draw.c (what it looks like) share.
+// What panel.c (input, dialogues, what the panel remembers) and panel_draw.c, panel_controls.c, panel_views.c and panel_boxes.c (what it looks like) share.
 #ifndef SELDINGER_RENDER_PANEL_INTERNAL_H
 #define SELDINGER_RENDER_PANEL_INTERNAL_H
 
@@ -59,6 +59,24 @@ typedef struct ButtonRow {
 extern const ButtonRow panel_button_row[];
 extern const int panel_button_row_count;
 
+// panel_text.c
+extern const char *const panel_sign[MARK_BAD + 1];         // a tick, a triangle or a cross, before a marked text
+extern const char *const panel_mode_name[PANEL_CINE + 1];
+Color panel_mark_color(PanelMark mark);
+const char *panel_text(const char *text);                  // "" for NULL
+const char *panel_figure(char *text, size_t capacity, double value, int decimals, const char *unit);
+const char *panel_minutes(char *text, size_t capacity, double s);
+bool panel_has_more_lines(const char *text);
+bool panel_first_line(const char *text, char *line, size_t capacity);
+void panel_heading(Panel *panel, const char *text);
+
+// One button of the table of keys; `where` tells buttons of one action apart.
+void panel_action_button(Panel *panel, const PanelState *state, ActionId id, const char *where, float width);
+void panel_draw_controls(Panel *panel, const PanelState *state);
+void panel_draw_over_views(Panel *panel, const PanelState *state);
+void panel_draw_briefing(Panel *panel, const PanelState *state);
+void panel_draw_help(Panel *panel, const WindowInput *input, const PanelState *state);
+void panel_draw_dialogue(Panel *panel, const WindowInput *input);
 void panel_draw_all(Panel *panel, const WindowInput *input, const PanelState *state);
 int panel_current_hint(const Panel *panel);                // -1: none left
 void panel_hint_text(int hint, char *text, size_t capacity);

@@ -77,16 +77,16 @@ static void draw_line(const RunningPlot *plot, Gui *gui, GuiRect at, double low,
     float thick = fmaxf(1.5f, floorf(1.6f * gui_scale(gui))), scale = at.height / (float)(high - low), before = NAN;
     for (int i = plot->count - 1; i >= 0; i--) {
         int from = place(plot->last - i);
-        float least = plot->least[from], most = plot->most[from];
-        if (isnan(most)) {
-            before = NAN;
+        bool is_empty = isnan(plot->most[from]);   // a frame that came late: the value before stands
+        float least = is_empty ? before : plot->least[from], most = is_empty ? before : plot->most[from];
+        if (isnan(most))
             continue;
-        }
+        float middle = (least + most) / 2;
         if (before < least)   // NaN: neither
             least = before;
         if (before > most)
             most = before;
-        before = (plot->least[from] + plot->most[from]) / 2;
+        before = middle;
         float left = at.x + at.width * (float)(PLOT_BINS - 1 - i) / PLOT_BINS, right = at.x + at.width * (float)(PLOT_BINS - i) / PLOT_BINS;
         float top = at.y + ((float)high - most) * scale, bottom = at.y + ((float)high - least) * scale;
         gui_draw_fill(gui, (GuiRect){left, top - thick / 2, right - left, bottom - top + thick}, gui_colors.accent);

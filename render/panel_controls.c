@@ -1,0 +1,184 @@
+// The controls at the right: buttons, all from the table of keys, and the X-ray system's sliders.
+#include "render/panel_internal.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <stdio.h>
+
+static const float pulse_rate[] = {7.5f, 10, 15, 30};
+
+// Row by row; the X-ray and C-arm tabs put their sliders between (draw_tab).
+enum { TAB_TOOL, TAB_XRAY, TAB_C_ARM, TAB_VIEWS, TAB_SESSION };
+static const char *const tab_name[PANEL_TABS] = {"Tool", "X-ray", "C-arm", "Views", "Session"};
+const ButtonRow panel_button_row[] = {
+    {TAB_TOOL, 1, {ACTION_PUSH}},
+    {TAB_TOOL, 2, {ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT}},
+    {TAB_TOOL, 1, {ACTION_PULL}},
+    {TAB_TOOL, 2, {ACTION_FAST, ACTION_SLOW}},
+    {TAB_TOOL, 1, {ACTION_STOP}},
+    {TAB_TOOL, 2, {ACTION_PEDAL_LATCH, ACTION_CONTRAST}},
+    {TAB_XRAY, 2, {ACTION_PEDAL, ACTION_PEDAL_LATCH}},
+    {TAB_XRAY, 1, {ACTION_CONTRAST}},
+    {TAB_XRAY, 3, {ACTION_DSA, ACTION_ROADMAP, ACTION_MASK}},
+    {TAB_XRAY, 3, {ACTION_CINE_RECORD, ACTION_CINE_REPLAY, ACTION_CINE_SAVE}},
+    {TAB_XRAY, 3, {ACTION_MAGNIFY, ACTION_DEMAGNIFY, ACTION_PULSES}},
+    {TAB_C_ARM, 5, {ACTION_RAO, ACTION_LAO, ACTION_CRA, ACTION_CAU, ACTION_AP}},
+    {TAB_C_ARM, 2, {ACTION_TABLE_LEFT, ACTION_TABLE_RIGHT}},
+    {TAB_C_ARM, 2, {ACTION_TABLE_UP, ACTION_TABLE_DOWN}},
+    {TAB_C_ARM, 4, {ACTION_SIDES_CLOSE, ACTION_SIDES_OPEN, ACTION_ENDS_CLOSE, ACTION_ENDS_OPEN}},
+    {TAB_VIEWS, 2, {ACTION_VIEW_FLUOROSCOPY, ACTION_VIEW_3D}},
+    {TAB_VIEWS, 2, {ACTION_VIEW_ANGIOSCOPY, ACTION_VIEW_ALL}},
+    {TAB_VIEWS, 2, {ACTION_CAMERA_RESET, ACTION_CAMERA_FOLLOW}},
+    {TAB_VIEWS, 2, {ACTION_MODEL, ACTION_ARROWS}},
+    {TAB_VIEWS, 3, {ACTION_SECTION, ACTION_SECTION_NEARER, ACTION_SECTION_FARTHER}},
+    {TAB_VIEWS, 2, {ACTION_ORBIT_LEFT, ACTION_ORBIT_RIGHT}},
+    {TAB_VIEWS, 2, {ACTION_ORBIT_UP, ACTION_ORBIT_DOWN}},
+    {TAB_VIEWS, 2, {ACTION_CAMERA_NEARER, ACTION_CAMERA_FARTHER}},
+    {TAB_SESSION, 2, {ACTION_PAUSE, ACTION_RESTART}},
+    {TAB_SESSION, 2, {ACTION_BOOKMARK, ACTION_SAVE}},
+    {TAB_SESSION, 2, {ACTION_TRAINEE, ACTION_SCREENSHOT}},
+    {TAB_SESSION, 2, {ACTION_FULL_SCREEN, ACTION_PANELS}},
+    {TAB_SESSION, 2, {ACTION_HELP, ACTION_BRIEFING}},
+    {TAB_SESSION, 2, {ACTION_HINTS, ACTION_QUIT}},
+};
+const int panel_button_row_count = sizeof panel_button_row / sizeof panel_button_row[0];
+
+static bool is_on(const Panel *panel, const PanelState *state, ActionId id)
+{
+    switch (id) {
+    case ACTION_PEDAL: return state->xray.pedal > 0;
+    case ACTION_PEDAL_LATCH: return state->is_pedal_latched;
+    case ACTION_CONTRAST: return state->xray.contrast_ml_s > 0;
+    case ACTION_DSA: return (int)state->xray.mode == XRAY_DSA;
+    case ACTION_ROADMAP: return (int)state->xray.mode == XRAY_ROADMAP;
+    case ACTION_CINE_RECORD: return state->is_recording_cine;
+    case ACTION_CINE_REPLAY: return state->mode == PANEL_CINE;
+    case ACTION_VIEW_FLUOROSCOPY: return state->view == VIEW_FLUOROSCOPY;
+    case ACTION_VIEW_3D: return state->view == VIEW_3D;
+    case ACTION_VIEW_ANGIOSCOPY: return state->view == VIEW_ANGIOSCOPY;
+    case ACTION_VIEW_ALL: return state->view == VIEW_ALL;
+    case ACTION_CAMERA_FOLLOW: return state->is_following;
+    case ACTION_SECTION: return state->has_section;
+    case ACTION_MODEL: return state->has_model;
+    case ACTION_ARROWS: return state->has_arrows;
+    case ACTION_PAUSE: return state->is_paused;
+    case ACTION_HINTS: return panel->has_hints;
+    case ACTION_PANELS: return panel->has_panels;
+    case ACTION_HELP: return panel->has_help;
+    case ACTION_BRIEFING: return panel->briefing_at.width > 0;
+    default: return panel->held[id];
+    }
+}
+
+void panel_action_button(Panel *panel, const PanelState *state, ActionId id, const char *where, float width)
+{
+    const KeyAction *action = &key_table[id];
+    char key[32], name[32], last[64];
+    key_table_text(id, key, sizeof key);
+    snprintf(name, sizeof name, "%s%d", where, (int)id);
+    GuiPress press = gui_button(panel->gui, name, action->name, key, width, is_on(panel, state, id));
+    bool is_speed = id == ACTION_FAST || id == ACTION_SLOW;
+    if (is_speed && press.pressed) {
+        panel->latched[id] = !panel->latched[id];
+        panel->latched[id == ACTION_FAST ? ACTION_SLOW : ACTION_FAST] = false;
+    } else if (action->kind == ACTION_PRESS && press.pressed) {
+        panel->mouse_pressed[id]++;
+    } else if (action->kind == ACTION_HOLD && !is_speed && press.held) {
+        panel->mouse_held[id] = true;
+    }
+    snprintf(last, sizeof last, "Key: %s%s", key, is_speed ? "; a click keeps it on" : action->kind == ACTION_HOLD ? " (hold)" : "");
+    gui_tooltip(panel->gui, action->name, action->help, last);
+}
+
+static void button_row(Panel *panel, const PanelState *state, const ButtonRow *buttons)
+{
+    float gap = floorf(3 * gui_scale(panel->gui)), all = gui_width(panel->gui);
+    float width = floorf((all - gap * (float)(buttons->count - 1)) / (float)buttons->count);
+    for (int i = 0; i < buttons->count; i++) {
+        if (i > 0)
+            gui_beside(panel->gui, gap);
+        panel_action_button(panel, state, buttons->action[i], "tab", width);
+    }
+}
+
+// A slider over a value of the X-ray control; `label` is part of what it shows.
+static void xray_slider(Panel *panel, const PanelState *state, float *value, float least, float most, const char *format, const char *tip, float width)
+{
+    char id[24];
+    ptrdiff_t place = value - (float *)&panel->xray;
+    snprintf(id, sizeof id, "xray%d", (int)place);
+    XrayControl before = panel->xray_set ? panel->xray : state->xray;
+    panel->xray = before;
+    if (gui_slider(panel->gui, id, value, least, most, format, width))
+        panel->xray_set = true;
+    gui_tooltip(panel->gui, NULL, tip, NULL);
+}
+
+static void angle_sliders(Panel *panel, const PanelState *state)
+{
+    char format[32];
+    int lao = (int)lround(state->xray.lao_deg), cra = (int)lround(state->xray.cra_deg);
+    snprintf(format, sizeof format, "%s %d\u00b0", lao < 0 ? "RAO" : "LAO", lao < 0 ? -lao : lao);
+    xray_slider(panel, state, &panel->xray.lao_deg, -90, 90, format, "C-arm to the patient's right (RAO) or left (LAO), up to 90\u00b0", 0);
+    snprintf(format, sizeof format, "%s %d\u00b0", cra < 0 ? "CAU" : "CRA", cra < 0 ? -cra : cra);
+    xray_slider(panel, state, &panel->xray.cra_deg, -45, 45, format, "C-arm towards the feet (CAU) or the head (CRA), up to 45\u00b0", 0);
+}
+
+static void collimator_sliders(Panel *panel, const PanelState *state)
+{
+    static const char *const name[4] = {"left %.2f", "right %.2f", "lower %.2f", "upper %.2f"};
+    float gap = floorf(3 * gui_scale(panel->gui)), width = floorf((gui_width(panel->gui) - gap) / 2);
+    for (int i = 0; i < 4; i++) {
+        if (i % 2)
+            gui_beside(panel->gui, gap);
+        xray_slider(panel, state, &panel->xray.collimator[i], 0, 0.95f, name[i], "collimator blade: part of half the field that it covers", width);
+    }
+}
+
+static void pulse_buttons(Panel *panel, const PanelState *state)
+{
+    float gap = floorf(3 * gui_scale(panel->gui)), width = floorf((gui_width(panel->gui) - 3 * gap) / 4);
+    for (int i = 0; i < 4; i++) {
+        char label[16], id[24];
+        snprintf(label, sizeof label, "%g/s", (double)pulse_rate[i]);
+        snprintf(id, sizeof id, "pulse%d", i);
+        if (i > 0)
+            gui_beside(panel->gui, gap);
+        if (gui_button(panel->gui, id, label, NULL, width, fabsf(state->xray.pulses_s - pulse_rate[i]) < 0.01f).pressed) {
+            panel->xray = panel->xray_set ? panel->xray : state->xray;
+            panel->xray.pulses_s = pulse_rate[i];
+            panel->xray_set = true;
+        }
+        gui_tooltip(panel->gui, NULL, "fluoroscopy pulses a second: fewer is less dose, more is smoother", NULL);
+    }
+}
+
+static void draw_tab(Panel *panel, const PanelState *state, int tab)
+{
+    gui_space(panel->gui, 2 * gui_scale(panel->gui));
+    if (tab == TAB_C_ARM)
+        angle_sliders(panel, state);
+    for (int i = 0; i < panel_button_row_count; i++)
+        if (panel_button_row[i].tab == tab)
+            button_row(panel, state, &panel_button_row[i]);
+    if (tab == TAB_XRAY) {
+        pulse_buttons(panel, state);
+        xray_slider(panel, state, &panel->xray.field_mm, 40, 400, "field %.0f mm", "side of the square field at the isocentre", 0);
+    }
+    if (tab == TAB_C_ARM)
+        collimator_sliders(panel, state);
+}
+
+void panel_draw_controls(Panel *panel, const PanelState *state)
+{
+    gui_window_begin(panel->gui, "right", panel->layout.right, GUI_KEPT);
+    if (gui_tabs_begin(panel->gui, "controls")) {
+        for (int i = 0; i < PANEL_TABS; i++)
+            if (gui_tab_begin(panel->gui, tab_name[i])) {
+                draw_tab(panel, state, i);
+                gui_tab_end(panel->gui);
+            }
+        gui_tabs_end(panel->gui);
+    }
+    gui_window_end(panel->gui);
+}

@@ -1,0 +1,139 @@
+// Letters over the views: the image's mode and angles as in an angio suite, warnings, the views' names.
+#include "render/panel_internal.h"
+
+#include <math.h>
+#include <stdio.h>
+
+// "LAO 30  CRA 10": rounded first, so that there is no "RAO 0".
+static const char *angles(char *text, size_t capacity, const XrayControl *xray)
+{
+    int lao = (int)lround(xray->lao_deg), cra = (int)lround(xray->cra_deg);
+    if (lao == 0 && cra == 0)
+        snprintf(text, capacity, "AP 0");
+    else
+        snprintf(text, capacity, "%s %d  %s %d", lao < 0 ? "RAO" : "LAO", lao < 0 ? -lao : lao, cra < 0 ? "CAU" : "CRA", cra < 0 ? -cra : cra);
+    return text;
+}
+
+// Letters on a picture that may be white or black.
+static void label(Panel *panel, float x, float y, GuiFont font, Color color, const char *text)
+{
+    Gui *gui = panel->gui;
+    float width, height, pad = floorf(4 * gui_scale(gui));
+    gui_text_extent(gui, font, text, &width, &height);
+    gui_draw_fill(gui, (GuiRect){x - pad, y - pad / 2, width + 2 * pad, height + pad}, color_with_alpha(gui_colors.window, 0.6));
+    gui_draw_text(gui, x, y, font, color, text);
+}
+
+static void label_right(Panel *panel, float right, float y, GuiFont font, Color color, const char *text)
+{
+    float width, height;
+    gui_text_extent(panel->gui, font, text, &width, &height);
+    label(panel, right - width, y, font, color, text);
+}
+
+static void draw_fluoroscopy_labels(Panel *panel, const PanelState *state, GuiRect at, bool is_main)
+{
+    Gui *gui = panel->gui;
+    float s = gui_scale(gui), pad = floorf(10 * s), normal = gui_line_height(gui, GUI_NORMAL) + floorf(5 * s);
+    GuiFont large = is_main ? GUI_HUGE : GUI_NORMAL;
+    char text[64], time[32];
+    label(panel, at.x + pad, at.y + at.height - pad - gui_line_height(gui, large), large, gui_colors.text, angles(text, sizeof text, &state->xray));
+    if (!is_main)
+        return;
+    float right = at.x + at.width - pad, y = at.y + at.height - pad - normal;
+    snprintf(text, sizeof text, "contrast %.1f ml", isfinite(state->contrast_ml) ? state->contrast_ml : 0);
+    label_right(panel, right, y, GUI_NORMAL, gui_colors.text, text);
+    snprintf(text, sizeof text, "fluoroscopy %s", panel_minutes(time, sizeof time, state->fluoro_s));
+    label_right(panel, right, y - normal, GUI_NORMAL, gui_colors.text, text);
+    snprintf(text, sizeof text, "%g pulses/s", (double)state->xray.pulses_s);
+    label_right(panel, right, y - 2 * normal, GUI_NORMAL, gui_colors.text, text);
+    snprintf(text, sizeof text, "field %.0f mm", (double)state->xray.field_mm);
+    label_right(panel, right, y - 3 * normal, GUI_NORMAL, gui_colors.text, text);
+    label(panel, at.x + pad, at.y + pad / 2, GUI_LARGE, gui_colors.text, panel_mode_name[state->mode]);
+    y = at.y + pad / 2 + gui_line_height(gui, GUI_LARGE) + floorf(6 * s);
+    if (state->mode == PANEL_CINE) {
+        snprintf(text, sizeof text, "frame %d of %d", state->cine_frame + 1, state->cine_frames);
+        label(panel, at.x + pad, y, GUI_NORMAL, gui_colors.text, text);
+        y += normal;
+    }
+    if (state->xray.pedal > 0) {
+        label(panel, at.x + pad, y, GUI_NORMAL, gui_colors.warning, "\u25cf X-RAY ON");
+        y += normal;
+    }
+    if (state->is_recording_cine) {
+        label(panel, at.x + pad, y, GUI_NORMAL, gui_colors.bad, "\u25a0 recording cine");
+        y += normal;
+    }
+    if ((state->mode == PANEL_DSA || state->mode == PANEL_ROADMAP) && !state->is_roadmap_ready)
+        label(panel, at.x + pad, y, GUI_NORMAL, gui_colors.warning, "\u25b2 no mask yet: take one with the X-ray on");
+}
+
+// Text in a box, in the middle of the view's width; returns where the next one goes.
+static float banner(Panel *panel, GuiRect at, float y, Color ground, const char *text)
+{
+    Gui *gui = panel->gui;
+    float s = gui_scale(gui), pad = floorf(8 * s), room = at.width - 4 * pad, width, height;
+    gui_text_extent(gui, GUI_NORMAL, text, &width, &height);
+    width = fminf(width + 1, room);
+    height = gui_wrapped_height(gui, GUI_NORMAL, text, width);
+    GuiRect box = {floorf(at.x + (at.width - width) / 2 - pad), y, width + 2 * pad, height + pad};
+    gui_draw_fill(gui, box, ground);
+    gui_draw_wrapped(gui, box.x + pad, y + pad / 2, GUI_NORMAL, gui_colors.window, text, width);
+    return y + box.height + floorf(3 * s);
+}
+
+static void draw_banners(Panel *panel, const PanelState *state, GuiRect at)
+{
+    static const struct { unsigned bit; const char *text; } warning[] = {
+        {WARN_OUTSIDE, "The tool is outside the vessel: forces are not to be trusted"},
+        {WARN_STALLED, "The simulation stands still"},
+        {WARN_DEVICE_LOST, "A device is lost: the tool stands still until it is back"},
+        {WARN_NOT_CONVERGED, "Contact forces did not converge in the last step"},
+        {WARN_SLOW, "Simulation slower than real time"},
+        {WARN_NO_FIFO, "No real-time priority (SCHED_FIFO): steps may come late"}};
+    float y = at.y + floorf(52 * gui_scale(panel->gui));
+    char text[300], line[280];
+    if (state->is_finished && panel_first_line(state->instructions, line, sizeof line)) {
+        bool is_reached = state->hold_needed_s > 0 && state->hold_s >= state->hold_needed_s;
+        snprintf(text, sizeof text, "%s%s", panel_sign[is_reached ? MARK_GOOD : MARK_NONE], line);
+        y = banner(panel, at, y, gui_colors.accent, text);
+    }
+    for (size_t i = 0; i < sizeof warning / sizeof warning[0]; i++) {
+        if (!(state->warnings & warning[i].bit))
+            continue;
+        snprintf(text, sizeof text, "%s%s", panel_sign[MARK_WARNING], warning[i].text);
+        if (warning[i].bit == WARN_SLOW && isfinite(state->real_time_factor))
+            snprintf(text, sizeof text, "%s%s: \u00d7%.2f", panel_sign[MARK_WARNING], warning[i].text, state->real_time_factor);
+        y = banner(panel, at, y, gui_colors.warning, text);
+    }
+    if (panel_text(state->warning)[0]) {
+        snprintf(text, sizeof text, "%s%s", panel_sign[MARK_WARNING], state->warning);
+        banner(panel, at, y, gui_colors.warning, text);
+    }
+}
+
+void panel_draw_over_views(Panel *panel, const PanelState *state)
+{
+    static const char *const view_name[VIEW_COUNT] = {"X-ray", "3D", "Angioscopy"};
+    static const ActionId view_action[VIEW_COUNT] = {ACTION_VIEW_FLUOROSCOPY, ACTION_VIEW_3D, ACTION_VIEW_ANGIOSCOPY};
+    Gui *gui = panel->gui;
+    float pad = floorf(8 * gui_scale(gui));
+    for (int i = 0; i < VIEW_COUNT; i++) {
+        GuiRect at = panel->layout.view_rect[i];
+        bool is_main = i == (int)panel->layout.main;
+        if (at.width <= 0)
+            continue;
+        gui_window_begin(gui, view_name[i], at, GUI_NO_BACKGROUND | GUI_NO_INPUT);
+        if (i == VIEW_FLUOROSCOPY)
+            draw_fluoroscopy_labels(panel, state, at, is_main);
+        if (i != VIEW_FLUOROSCOPY || !is_main) {
+            char text[48], key[16];
+            snprintf(text, sizeof text, "%s  (%s)", view_name[i], key_table_text(view_action[i], key, sizeof key));
+            label(panel, at.x + pad, at.y + pad / 2, GUI_SMALL, gui_colors.dim, text);
+        }
+        if (is_main)
+            draw_banners(panel, state, at);
+        gui_window_end(gui);
+    }
+}
