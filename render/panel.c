@@ -274,6 +274,8 @@ static const Hint hint[] = {
      "Hold %s for X-ray: the picture is live while you hold it. %s keeps it on."},
     {{ACTION_PUSH, ACTION_PULL, NO, NO}, 1, {ACTION_PUSH, ACTION_PULL, ACTION_FAST, ACTION_SLOW},
      "Arrow %s pushes the tool, %s pulls it back; with %s faster, with %s slower. Keep the X-ray on."},
+    {{ACTION_MAGNIFY, ACTION_DEMAGNIFY, NO, NO}, 1, {ACTION_MAGNIFY, ACTION_DEMAGNIFY, NO, NO},
+     "The tool is thin: %s magnifies the picture, %s shows more of the patient again."},
     {{ACTION_CONTRAST, NO, NO, NO}, 0.5, {ACTION_CONTRAST, ACTION_PEDAL, NO, NO},
      "Hold %s with %s to inject contrast: the vessels downstream of the tip show for a moment."},
     {{ACTION_ROADMAP, ACTION_DSA, NO, NO}, 1, {ACTION_ROADMAP, ACTION_DSA, NO, NO},

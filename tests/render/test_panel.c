@@ -479,6 +479,34 @@ static void instructions_are_shown_until_followed(void **unused)
     end_desk(&desk);
 }
 
+// Doing what the hints say, one after the other, ends them; each names its keys and fits its place.
+static void hints_lead_on_with_use(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    Desk desk = new_desk(1024, 600);
+    static const ActionId follow[] = {ACTION_PEDAL, ACTION_PUSH, ACTION_MAGNIFY, ACTION_CONTRAST, ACTION_ROADMAP, ACTION_TWIST_RIGHT, ACTION_LAO,
+                                      ACTION_VIEW_3D, ACTION_HELP};
+    int count = sizeof follow / sizeof follow[0];
+    for (int i = 0; i < count; i++) {
+        const KeyAction *action = &key_table[follow[i]];
+        char text[256], key[32];
+        assert_int_equal(panel_current_hint(desk.panel), i);
+        panel_hint_text(i, text, sizeof text);
+        assert_non_null(strstr(text, key_table_text(follow[i], key, sizeof key)));
+        assert_null(strchr(text, '%'));
+        assert_in_range(strlen(text), 20, 120);   // two lines
+        add_event(&desk, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = action->key});
+        for (int k = 0; k < (action->kind == ACTION_HOLD ? 40 : 1); k++)
+            panel_take_input(desk.panel, &desk.input, &desk.actions), desk.input.event_count = 0;
+        add_event(&desk, (WindowEvent){.kind = WINDOW_KEY_UP_EVENT, .key = action->key});
+        frame(&desk);
+    }
+    assert_int_equal(panel_current_hint(desk.panel), -1);
+    end_desk(&desk);
+}
+
 static void strange_states_draw(void **unused)
 {
     (void)unused;
@@ -594,6 +622,7 @@ int main(void)
                                        cmocka_unit_test(a_button_lets_go_when_the_focus_goes),
                                        cmocka_unit_test(names_are_typed_and_trimmed),
                                        cmocka_unit_test(instructions_are_shown_until_followed),
+                                       cmocka_unit_test(hints_lead_on_with_use),
                                        cmocka_unit_test(strange_states_draw),
                                        cmocka_unit_test(kept_windows_show_what_a_new_panel_shows),
                                        cmocka_unit_test(what_a_frame_costs)};
