@@ -149,13 +149,20 @@ static void x_rays_are_counted_while_the_pedal_is_down(void **state)
     assert_int_equal(f.pulses, 45);
     assert_near(f.dose_area_cm2, 1500 + 1500, 1e-6);
     assert_near(f.fluoroscopy_s, 2, 1e-9);
+    for (int tap = 0; tap < 3; tap++) {  // each tap gives a pulse
+        p->xray.pedal = 0;
+        practice_go(p, 0, 0.01);
+        p->xray.pedal = 1;
+        f = practice_go(p, 0, 0.01);
+    }
+    assert_int_equal(f.pulses, 48);
     p->xray.contrast_ml_s = 2;
     f = practice_go(p, 0, 2.499);
     assert_int_equal(f.error[ERROR_CONTRAST].count, 0);
     f = practice_go(p, 0, 0.501);
     assert_near(f.contrast_ml, 6, 1e-6);
     assert_int_equal(f.error[ERROR_CONTRAST].count, 1);
-    assert_near(f.error[ERROR_CONTRAST].last_s, 3 + 2.5, 0.0015);
+    assert_near(f.error[ERROR_CONTRAST].last_s, 3.06 + 2.5, 0.0015);
     practice_end(p);
 }
 
@@ -219,7 +226,8 @@ static void the_border_decides(void **state)
 
 // --- the way through a tree ---
 
-// A trunk along x, 0 to 40 mm, radius 2; at 20 mm a branch to +y, 20 mm, radius 1; at its end a sac of two nodes. Every 2 mm a node.
+// A trunk along x, 0 to 40 mm, radius 2; at 20 mm a branch to +y, 20 mm, radius 1; at its end a sac of two nodes, 8 mm apart.
+// Else every 2 mm a node.
 enum { TRUNK = 21, BRANCH = 10, SAC = 2 };
 static VesselTree *forked(double mirror)
 {
@@ -227,7 +235,7 @@ static VesselTree *forked(double mirror)
     assert_non_null(t);
     for (int i = 0; i < t->node_count; i++) {
         int k = i - TRUNK + 1;
-        t->center[i] = k <= 0 ? vec3(2 * i, 0, 0) : vec3(20, mirror * 2 * k, 0);
+        t->center[i] = k <= 0 ? vec3(2 * i, 0, 0) : vec3(20, mirror * (k < BRANCH + SAC ? 2 * k : 2 * k + 6), 0);
         t->radius[i] = k <= 0 ? 2 : k <= BRANCH ? 1 : 3;
         t->direction[i] = k <= 0 ? vec3(1, 0, 0) : vec3(0, mirror, 0);
         t->height[i] = 2;
@@ -258,7 +266,7 @@ static void the_way_is_measured_along_the_tree(void **state)
     assert_near(way.off[20], 10 - 3, 1e-9);
     score_way_destroy(&way);
     // a sac is one place; the mouth may lie inside the tree, and all upstream of it is off the way
-    assert_true(score_way_create(&way, t, vec3(10, 0, 0), vec3(20, 24, 0), 1));
+    assert_true(score_way_create(&way, t, vec3(10, 0, 0), vec3(20, 22.5, 0), 1));
     assert_near(way.off[TRUNK + BRANCH], 0, 0);
     assert_near(way.off[TRUNK + BRANCH + 1], 0, 0);
     assert_near(way.off[0], 10 - 2, 1e-9);
@@ -293,7 +301,10 @@ static void a_wrong_branch_counts_once_each_time(void **state)
     assert_near(f.error[ERROR_WRONG_BRANCH].last_s, 2.6, 0.03);       // node 14 (28 mm) is the tip's from 27 mm on
     f = practice_go(p, 10, 0.5);
     assert_int_equal(f.error[ERROR_WRONG_BRANCH].count, 1);
-    practice_go(p, -10, 1.6);                      // to 20 mm
+    practice_go(p, -10, 1.3);                      // to 23 mm and at once in again: the same error goes on
+    f = practice_go(p, 10, 0.8);
+    assert_int_equal(f.error[ERROR_WRONG_BRANCH].count, 1);
+    practice_go(p, -10, 1.1);                      // to 20 mm, for a while
     practice_go(p, 0, 0.6);
     f = practice_go(p, 10, 1);
     assert_int_equal(f.error[ERROR_WRONG_BRANCH].count, 2);
@@ -306,6 +317,31 @@ static void a_wrong_branch_counts_once_each_time(void **state)
     f = practice_go(p, 0, 2);
     assert_int_equal(f.state, SCORE_REACHED);
     assert_near(f.efficiency, 1, 0.03);
+    practice_end(p);
+    vessel_tree_free(t);
+}
+
+// The tool goes straight on where the tree makes a long loop: it leaves one arm and enters the other.
+static void a_tip_in_another_branch_is_found(void **state)
+{
+    (void)state;
+    enum { ARM = 16, LOOP = 31 };
+    VesselTree *t = vessel_tree_create(2 * ARM + LOOP, 0, 0);
+    assert_non_null(t);
+    for (int i = 0; i < t->node_count; i++) {
+        int k = i - ARM, half = LOOP / 2;
+        t->center[i] = k < 0 ? vec3(2 * i, 0, 0) : k < LOOP ? vec3(33, 0, 2 * (half + 1 - abs(k - half))) : vec3(36 + 2 * (k - LOOP), 0, 0);
+        t->radius[i] = 2;
+        t->direction[i] = vec3(1, 0, 0);
+        t->parent[i] = i - 1;
+    }
+    assert_true(vessel_tree_link(t));
+    Practice *p = practice_begin("seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 1}\n" AT(60) EXERCISE(""), t);
+    practice_go(p, 20, 1.4);
+    assert_int_equal(score_figures(p->score).tip_node, 14);
+    ScoreFigures f = practice_go(p, 20, 0.55);               // to 40 mm
+    assert_int_equal(f.tip_node, ARM + LOOP + 2);
+    assert_near(f.remaining_mm, 20, 0.5);
     practice_end(p);
     vessel_tree_free(t);
 }
@@ -351,6 +387,10 @@ static void normal_bends_are_no_buckling(void **state)
         TUBE("{arc: {radius_mm: 15, angle_deg: 300}}, {line_mm: 30}", "open") EXERCISE(""),
         TUBE("{arc: {radius_mm: 10, angle_deg: 60}}, {arc: {radius_mm: 10, angle_deg: 60, plane_deg: 90}}, {arc: {radius_mm: 10, angle_deg: 90, plane_deg: 200}}, "
              "{line_mm: 60}", "open") EXERCISE(""),
+        // a curved tip drags across itself along the wall
+        "seldinger: 1\nwire: {elements: 50, sections: [{length_mm: 85, diameter_mm: 0.4, young_modulus_gpa: 20}, {length_mm: 15, diameter_mm: 0.4, "
+        "young_modulus_gpa: 5, rest_curvature_1_mm: 0.2}], damping: {mass_1_s: 1, stiffness_s: 0.0005}}\n"
+        "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n" AT(90) "vessel: {friction: 0.1, tube: {radius_mm: 2.5, path: [{line_mm: 60}]}}\n" EXERCISE(""),
     };
     for (size_t i = 0; i < sizeof scene / sizeof scene[0]; i++) {
         Practice *p = practice_begin(scene[i], NULL);
@@ -566,6 +606,7 @@ int main(void)
         cmocka_unit_test(the_border_decides),
         cmocka_unit_test(the_way_is_measured_along_the_tree),
         cmocka_unit_test(a_wrong_branch_counts_once_each_time),
+        cmocka_unit_test(a_tip_in_another_branch_is_found),
         cmocka_unit_test(a_tool_whose_tip_is_held_buckles_at_the_sheath),
         cmocka_unit_test(normal_bends_are_no_buckling),
         cmocka_unit_test(the_tips_force_is_the_walls),
