@@ -146,9 +146,9 @@ void fluoroscope_destroy(Fluoroscope *f)
     anatomy_free(&f->anatomy);
     lumen_layer_destroy(&f->lumen);
     layers_destroy(&f->programs);
-    Layer *layer[10] = {&f->anatomy_layer, &f->lumen_layer,  &f->roadmap_layer, &f->mask,         &f->still.bare,
-                        &f->still.base,    &f->still.picture, &f->turning.bare,  &f->turning.base, &f->turning.picture};
-    for (int i = 0; i < 10; i++)
+    Layer *layer[11] = {&f->anatomy_layer, &f->anatomy_next, &f->lumen_layer,   &f->roadmap_layer, &f->mask,           &f->still.bare,
+                        &f->still.base,    &f->still.picture, &f->turning.bare, &f->turning.base,  &f->turning.picture};
+    for (int i = 0; i < 11; i++)
         layer_destroy(layer[i]);
     ribbon_free(&f->ribbon);
     free(f->radius), free(f->attenuation), free(f->shown.position), free(f->shown.contrast);
@@ -233,13 +233,31 @@ static double find_exposure(const Fluoroscope *f, const CArm *c_arm)
 
 static bool has_anatomy(const Fluoroscope *f) { return f->anatomy.level || f->anatomy.ellipsoid_count > 0; }
 
-static void draw_anatomy(Fluoroscope *f, const CArm *c_arm, bool coarse)
+enum { ANATOMY_STRIPS = 4 };
+
+static void draw_coarse_anatomy(Fluoroscope *f, const CArm *c_arm)
 {
-    bool is_volume = f->anatomy.level != NULL;
-    int side = coarse ? (is_volume ? 96 : 160) : is_volume ? 256 : 384;
-    if (!has_anatomy(f) || !layer_fit(&f->anatomy_layer, side, LAYER_R32F))
-        return;
-    layers_draw_anatomy(&f->programs, &f->anatomy, c_arm, &f->anatomy_layer, coarse ? 64 : ANATOMY_GRID);
+    int side = f->anatomy.level ? 96 : 160;
+    f->anatomy_rows = 0;
+    if (has_anatomy(f) && layer_fit(&f->anatomy_layer, side, LAYER_R32F))
+        layers_draw_anatomy(&f->programs, &f->anatomy, c_arm, &f->anatomy_layer, 0, side, ANATOMY_GRID / 2);
+}
+
+// The next strip of the fine anatomy, or all that is left of it. True where it is whole, and in place.
+static bool draw_fine_anatomy(Fluoroscope *f, const CArm *c_arm, bool at_once)
+{
+    int side = f->anatomy.level ? 256 : 384, rows = at_once ? side - f->anatomy_rows : side / ANATOMY_STRIPS;
+    if (!has_anatomy(f) || !layer_fit(&f->anatomy_next, side, LAYER_R32F))
+        return true;
+    layers_draw_anatomy(&f->programs, &f->anatomy, c_arm, &f->anatomy_next, f->anatomy_rows, rows, ANATOMY_GRID);
+    f->anatomy_rows += rows;
+    if (f->anatomy_rows < side)
+        return false;
+    Layer whole = f->anatomy_next;
+    f->anatomy_next = f->anatomy_layer;
+    f->anatomy_layer = whole;
+    f->anatomy_rows = 0;
+    return true;
 }
 
 static void draw_lumen(Fluoroscope *f, Layer *layer, const CArm *c_arm, const float *contrast, bool coarse, bool *is_empty)
@@ -264,8 +282,8 @@ typedef struct LayerChanges {
     bool anatomy, lumen;
 } LayerChanges;
 
-// Anatomy, lumen and roadmap brought up to the exposure. After a turn the anatomy becomes fine with the first pulse, the lumen with the next: not both in
-// one frame.
+// Anatomy, lumen and roadmap brought up to the exposure. After a turn the anatomy becomes fine over the next pulses, in strips, then the lumen: no frame has to
+// wait for all of it.
 static LayerChanges update_layers(Fluoroscope *f, bool is_fresh)
 {
     CArm c_arm = c_arm_place(&f->shown.xray, &f->options.patient);
@@ -276,11 +294,17 @@ static LayerChanges update_layers(Fluoroscope *f, bool is_fresh)
     bool roadmap = is_roadmap && f->roadmap_has_changed;
     f->c_arm = c_arm;
     f->lumen_out_of_beam = f->lumen.is_there && !lumen_is_in_beam(&f->lumen, &c_arm);
+    if (moved) {
+        f->tone.exposure = find_exposure(f, &c_arm);
+        f->anatomy_rows = 0;
+    }
+    if (moved && !is_fresh)
+        draw_coarse_anatomy(f, &c_arm);
+    else if (anatomy)
+        anatomy = draw_fine_anatomy(f, &c_arm, is_fresh);
     if (anatomy) {
         f->anatomy_is_coarse = moved && !is_fresh;
         f->now = f->anatomy_is_coarse ? &f->turning : &f->still;
-        draw_anatomy(f, &c_arm, f->anatomy_is_coarse);
-        f->tone.exposure = find_exposure(f, &c_arm);
     }
     if (lumen) {
         f->lumen_is_coarse = coarse;

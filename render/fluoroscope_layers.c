@@ -323,7 +323,7 @@ static void set_texture(unsigned program, const char *name, int unit, GLenum tar
     glActiveTexture(GL_TEXTURE0);
 }
 
-void layers_draw_anatomy(const LayerPrograms *programs, const Anatomy *anatomy, const CArm *c_arm, const Layer *to, int steps)
+void layers_draw_anatomy(const LayerPrograms *programs, const Anatomy *anatomy, const CArm *c_arm, const Layer *to, int first, int rows, int steps)
 {
     unsigned program = programs->anatomy;
     const PatientAxes *axes = &anatomy->axes;
@@ -356,7 +356,10 @@ void layers_draw_anatomy(const LayerPrograms *programs, const Anatomy *anatomy, 
     set_int(program, "steps", programs->volume ? steps : 0);
     set_float(program, "most", anatomy->most);
     set_texture(program, "volume", 0, GL_TEXTURE_3D, programs->volume);
+    glEnable(GL_SCISSOR_TEST);
+    glScissor(0, first, to->side, rows);
     draw_square(programs);
+    glDisable(GL_SCISSOR_TEST);
 }
 
 static unsigned texture_of(const Layer *layer) { return layer ? layer->texture : 0; }

@@ -43,7 +43,8 @@ bool layer_fit(Layer *layer, int side, LayerFormat format);
 void layer_destroy(Layer *layer);
 void layer_begin(const Layer *layer);   // bound, cleared to 0, viewport set
 
-void layers_draw_anatomy(const LayerPrograms *programs, const Anatomy *anatomy, const CArm *c_arm, const Layer *to, int steps);
+// Rows `first` to `first` + `rows` of the layer.
+void layers_draw_anatomy(const LayerPrograms *programs, const Anatomy *anatomy, const CArm *c_arm, const Layer *to, int first, int rows, int steps);
 
 // Layers that may be NULL are those that hold nothing.
 // Attenuation of anatomy and contrast agent, without exposure, into a float layer: DSA's mask.

@@ -24,7 +24,8 @@ struct Fluoroscope {
     Anatomy anatomy;
     Lumen lumen;
     LayerPrograms programs;
-    Layer anatomy_layer, lumen_layer, roadmap_layer, mask;
+    Layer anatomy_layer, anatomy_next, lumen_layer, roadmap_layer, mask;
+    int anatomy_rows;            // drawn of anatomy_next, which takes the coarse one's place when it is whole
     PictureLayers still, turning, *now;   // of full and half the resolution; which of them is shown
     Ribbon ribbon;
     int drawn_low[2], drawn_high[2];   // box of the tool in `picture`

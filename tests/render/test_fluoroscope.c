@@ -443,6 +443,46 @@ static void unfit_vessels_are_told(void **state)
     room_close(s);
 }
 
+static void kept_layers_give_the_same_as_new_ones(void **state)
+{
+    (void)state;
+    Patient patient;
+    XrayRoom *s = patient_open(&patient, fluoroscope_default_options(), vec3(-30, 0, 0), vec3(30, 0, 10), 150);
+    if (!s) {
+        patient_close(&patient);
+        skip();
+    }
+    size_t bytes = 150 * 150 * 3;
+    uint8_t *kept = malloc(bytes);
+    uint64_t seed = 11;
+    float c = 0;
+    s->frame.contrast = &c;
+    for (int round = 0; round < 25; round++) {
+        // some pulses in which things move, some at rest; what is kept from them must not show
+        for (int pulse = 0; pulse < 9; pulse++) {
+            bool moves = pulse < 3;
+            if (moves && random_in(&seed, 0, 1) < 0.5)
+                s->frame.xray.lao_deg = (float)random_in(&seed, -90, 90);
+            if (moves && random_in(&seed, 0, 1) < 0.3)
+                s->frame.xray.field_mm = (float)random_in(&seed, 40, 120);
+            if (moves && random_in(&seed, 0, 1) < 0.5)
+                c = random_in(&seed, 0, 1) < 0.4 ? 0 : (float)random_in(&seed, 0.1, 1);
+            if (moves && random_in(&seed, 0, 1) < 0.3)
+                s->frame.xray.collimator[(int)random_in(&seed, 0, 3.99)] = (float)random_in(&seed, 0, 0.6);
+            if (random_in(&seed, 0, 1) < 0.5)
+                patient.wire.pose->position[(int)random_in(&seed, 0, 30.99)].z += 1;
+            s->frame.pulse++;
+            room_draw(s);
+        }
+        memcpy(kept, s->rgb, bytes);
+        fluoroscope_forget(s->view);
+        room_draw(s);
+        assert_memory_equal(kept, s->rgb, bytes);
+    }
+    free(kept);
+    patient_close(&patient);
+}
+
 static void whatever_state_gl_is_in(void **state)
 {
     (void)state;
@@ -520,7 +560,7 @@ int main(void)
         cmocka_unit_test(dsa_shows_the_vessel_alone),            cmocka_unit_test(the_roadmap_keeps_the_last_bolus),
         cmocka_unit_test(without_pedal_the_last_image_holds),    cmocka_unit_test(a_mirrored_scene_gives_the_mirrored_picture),
         cmocka_unit_test(unfit_vessels_are_told),                cmocka_unit_test(odd_frames_are_survived),
-        cmocka_unit_test(whatever_state_gl_is_in),
+        cmocka_unit_test(whatever_state_gl_is_in),               cmocka_unit_test(kept_layers_give_the_same_as_new_ones),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
