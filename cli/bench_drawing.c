@@ -123,7 +123,8 @@ static void draw(Studio *studio, const Case *what, int frame)
     views_draw(studio->views, &views, &layout, what->width, what->height, studio->canvas.framebuffer);
     trainer_panel_show(&studio->shown, studio->scene.scene, pose, &lesson->score, NULL, &xray);
     studio->shown.state.now_s = studio->shown.state.time_s = frame / 30.0;
-    studio->shown.state.view = what->view;
+    studio->desk.view = what->view;
+    trainer_panel_views(&studio->shown, &studio->desk, studio->views, &xray);
     if (what->only == 0 || what->only == ONLY_PANELS)
         panel_draw(studio->panel, &input, &studio->shown.state, studio->canvas.framebuffer);
     gl_canvas_finish();

@@ -121,7 +121,7 @@ static void film_draw(Film *film, double time_s)
         sample_plots(film, time_s);
         trainer_panel_show(&film->shown, film->scene, pose, score_now(film), NULL, &pose->xray);
         film->shown.state.now_s = pose->time_s;
-        film->shown.state.view = options->view;
+        trainer_panel_views(&film->shown, &film->desk, film->views, &pose->xray);
         film->shown.state.step_median_us = film->shown.state.step_p999_us = film->shown.state.real_time_factor = NAN;
         panel_draw(film->panel, &input, &film->shown.state, film->canvas.framebuffer);
     }

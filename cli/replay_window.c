@@ -128,11 +128,7 @@ static void draw(ReplayWindow *replay, const WindowInput *input, const PanelLayo
     trainer_panel_show(&replay->shown, replay->scene, pose, score_now(replay), NULL, &pose->xray);
     PanelState *state = &replay->shown.state;
     state->now_s = clock_s() - replay->begun_s;
-    state->view = replay->desk.view;
-    state->is_following = replay->desk.look.follow_tip;
-    state->has_section = replay->desk.look.section;
-    state->has_model = replay->desk.look.show_model;
-    state->has_arrows = replay->desk.look.show_arrows;
+    trainer_panel_views(&replay->shown, &replay->desk, replay->views, &pose->xray);
     state->is_paused = !replay->line.is_playing;
     state->step_median_us = state->step_p999_us = state->real_time_factor = NAN;
     panel_draw(replay->panel, input, state, 0);

@@ -309,15 +309,8 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
     views_draw(trainer->views, &frame, layout, input->width, input->height, 0);
     trainer_panel_show(&trainer->shown, trainer->scene, pose, &lesson->score, &moment->figures, xray);
     PanelState *state = &trainer->shown.state;
-    FluoroscopeState fluoroscope = fluoroscope_state(views_fluoroscope(trainer->views));
+    trainer_panel_views(&trainer->shown, &trainer->desk, trainer->views, xray);
     state->now_s = since_begin(trainer);
-    state->view = trainer->desk.view;
-    state->is_following = trainer->desk.look.follow_tip;
-    state->has_section = trainer->desk.look.section;
-    state->has_model = trainer->desk.look.show_model;
-    state->has_arrows = trainer->desk.look.show_arrows;
-    state->is_pedal_latched = trainer->desk.pedal_latched;
-    state->is_roadmap_ready = fluoroscope.has_roadmap;
     state->is_recording_cine = cine_is_recording(trainer->cine.cine);
     state->cine_frames = cine_count(trainer->cine.cine);
     if (trainer->cine.is_shown) {

@@ -135,3 +135,16 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
     show_score(panel, scene, score);
     warn(panel, pose, figures);
 }
+
+void trainer_panel_views(TrainerPanel *panel, const Desk *desk, Views *views, const XrayControl *xray)
+{
+    PanelState *state = &panel->state;
+    FluoroscopeState fluoroscope = fluoroscope_state(views_fluoroscope(views));
+    state->view = desk->view;
+    state->is_following = desk->look.follow_tip;
+    state->has_section = desk->look.section;
+    state->has_model = desk->look.show_model;
+    state->has_arrows = desk->look.show_arrows;
+    state->is_pedal_latched = desk->pedal_latched;
+    state->is_roadmap_ready = xray->mode == XRAY_DSA ? fluoroscope.has_mask : fluoroscope.has_roadmap;
+}

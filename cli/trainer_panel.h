@@ -3,6 +3,7 @@
 #define SELDINGER_CLI_TRAINER_PANEL_H
 
 #include "render/desk.h"
+#include "render/views.h"
 #include "sim/realtime.h"
 #include "sim/score.h"
 
@@ -24,5 +25,7 @@ void trainer_panel_begin(TrainerPanel *panel, const Scene *scene, const char *tr
 // Pose, score and controls of now. `figures` NULL: no real time (a recording).
 void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pose, const ScoreFigures *score,
                         const RealtimeFigures *figures, const XrayControl *xray);
+// What the desk and the views are set to; after they were drawn.
+void trainer_panel_views(TrainerPanel *panel, const Desk *desk, Views *views, const XrayControl *xray);
 
 #endif

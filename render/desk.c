@@ -66,8 +66,10 @@ static void obey_xray(Desk *desk, const PanelActions *actions)
         xray->mode = xray->mode == XRAY_DSA ? XRAY_LIVE : XRAY_DSA;
         xray->mask += xray->mode == XRAY_DSA;   // subtraction begins with a mask of its own
     }
-    if (actions->pressed[ACTION_ROADMAP] & 1)
+    if (actions->pressed[ACTION_ROADMAP] & 1) {
         xray->mode = xray->mode == XRAY_ROADMAP ? XRAY_LIVE : XRAY_ROADMAP;
+        xray->mask += xray->mode == XRAY_ROADMAP;   // the vessels of the last injection
+    }
     xray->mask += (float)actions->pressed[ACTION_MASK];
     if (actions->xray_set) {
         float pedal = xray->pedal, contrast = xray->contrast_ml_s;   // these two are held, not set
