@@ -379,6 +379,24 @@ static void a_tool_whose_tip_is_held_buckles_at_the_sheath(void **state)
     }
 }
 
+// Pushed into a blind end, 32 mm from the mouth, the tool folds within 5 mm, whatever its stiffness.
+static void a_blind_end_makes_it_buckle(void **state)
+{
+    (void)state;
+    for (int stiff = 0; stiff < 2; stiff++) {
+        char text[2048];
+        snprintf(text, sizeof text, "seldinger: 1\nwire: {elements: 60, sections: [{length_mm: 80, diameter_mm: 0.36, young_modulus_gpa: %d}], damping: {mass_1_s: 1, "
+                 "stiffness_s: 0.0005}}\nsheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n" AT(90)
+                 "vessel: {friction: 0.1, tube: {radius_mm: 2, ends: closed, path: [{line_mm: 30}]}}\n" EXERCISE(""), stiff ? 80 : 5);
+        Practice *p = practice_begin(text, NULL);
+        ScoreFigures f = practice_go(p, 20, 1.5);
+        assert_int_equal(f.error_total, 0);
+        f = practice_go(p, 20, 0.25);
+        assert_int_equal(f.error[ERROR_BUCKLING].count, 1);
+        practice_end(p);
+    }
+}
+
 static void normal_bends_are_no_buckling(void **state)
 {
     (void)state;
@@ -608,6 +626,7 @@ int main(void)
         cmocka_unit_test(a_wrong_branch_counts_once_each_time),
         cmocka_unit_test(a_tip_in_another_branch_is_found),
         cmocka_unit_test(a_tool_whose_tip_is_held_buckles_at_the_sheath),
+        cmocka_unit_test(a_blind_end_makes_it_buckle),
         cmocka_unit_test(normal_bends_are_no_buckling),
         cmocka_unit_test(the_tips_force_is_the_walls),
         cmocka_unit_test(wall_force_is_summed_over_time),
