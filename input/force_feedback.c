@@ -14,7 +14,7 @@ enum { SET_EFFECT = 0x21, BLOCK_INDEX = 0x22, EFFECT_TYPE = 0x25, CONSTANT_FORCE
        LOOP_COUNT = 0x7c, DEVICE_GAIN = 0x7e, POOL = 0x7f, BLOCK_LOAD = 0x89, LOAD_SUCCESS = 0x8c, ENABLE_ACTUATORS = 0x97, STOP_ALL = 0x99, DEVICE_RESET = 0x9a, MANAGED = 0xa9,
        CREATE_NEW_EFFECT = 0xab };
 // once a millisecond; a tick that comes a little early after a late one is taken, or reports each millisecond would let through every other one
-enum { PERIOD_US = 1000, LEAST_GAP_US = 750, LOAD_ATTEMPTS = 3 };
+enum { PERIOD_US = 1000, LEAST_GAP_US = 750, LOAD_ATTEMPTS = 3, MOST_FAILURES = 20 };
 
 // --- finding ---
 
@@ -402,18 +402,25 @@ void force_tick(ForceFeedback *force, const HandPort *port, int64_t now_us, int6
         int64_t value;
         double full = pid_axis_sign(&force->layout, force->direction_deg[i]) * (i == 0 ? force->map.full_scale_n : force->map.full_scale_n_mm);
         if (is_due && pid_encode_start(&force->layout, force->block[i], &message))
-            force->failed_writes += !send(&message, transport, device);
+            send(&message, transport, device);
         if (!pid_encode_force(&force->layout, force->block[i], force->guard.sent[i] / full, &message, &value) || value == force->value[i])
             continue;
         has_written = true;
         force->writes++;
-        if (send(&message, transport, device))
+        if (send(&message, transport, device)) {
             force->value[i] = value;
-        else
-            force->failed_writes++;
+            force->failures = 0;
+        } else {
+            force->failures++;
+        }
     }
     if (is_due)
         force->started_us = now_us;
+    if (force->failures >= MOST_FAILURES) {    // each may keep the thread from reading for as long as a transfer may take
+        force->block[0] = force->block[1] = 0;
+        force->guard.sent[0] = force->guard.sent[1] = 0;
+        snprintf(force->text, sizeof force->text, "none: the device takes no forces (%d writes one after the other failed)", MOST_FAILURES);
+    }
     if (has_written)
         force->due_us = force->due_us + PERIOD_US > now_us + LEAST_GAP_US ? force->due_us + PERIOD_US : now_us + LEAST_GAP_US;
 }

@@ -90,7 +90,8 @@ typedef struct ForceFeedback {
     int64_t value[2];                // magnitudes written last
     int64_t started_us, due_us;      // when the effects were started, when the next magnitude may go
     int restart_ms;
-    int64_t writes, failed_writes;
+    int64_t writes;
+    int failures;                    // writes that failed, one after the other; after 20 no more are tried
     ForceGuard guard;
     char text[160];                  // what it does, or why it does nothing
 } ForceFeedback;

@@ -5,7 +5,7 @@
 #include <string.h>
 #include <time.h>
 
-enum { READ_WAIT_MS = 50, FORCE_WAIT_MS = 1, DRAIN_MOST = 512, INFO_US = 50000, COUNT_RATE_US = 1000000, FAILURES_TOLD = 20 };
+enum { READ_WAIT_MS = 50, FORCE_WAIT_MS = 1, DRAIN_MOST = 512, INFO_US = 50000, COUNT_RATE_US = 1000000, TELL_AGAIN_US = 10000000 };
 
 int64_t hand_now_us(void)
 {
@@ -58,6 +58,13 @@ static int drain(HandSlot *slot, int wait_ms)
     return length < 0 ? -1 : count;
 }
 
+static void show_force(HandSlot *slot)
+{
+    pthread_mutex_lock(&slot->shared->lock);
+    snprintf(slot->info.force, sizeof slot->info.force, "%s", slot->force.text);
+    pthread_mutex_unlock(&slot->shared->lock);
+}
+
 // Reports come when they like; a force that is due within the next millisecond is waited for, or it would wait for the report after next.
 static int64_t wait_for_force(const HandSlot *slot, int64_t now)
 {
@@ -72,24 +79,25 @@ static void start_force(HandSlot *slot)
 {
     HandShared *shared = slot->shared;
     bool plays = force_start(&slot->force, slot->map, slot->descriptor, &shared->transport, slot->device, hand_now_us());
-    pthread_mutex_lock(&shared->lock);
-    snprintf(slot->info.force, sizeof slot->info.force, "%s", slot->force.text);
-    pthread_mutex_unlock(&shared->lock);
+    show_force(slot);
     if (slot->map->force.is_wanted && !plays)
         hand_say(shared, "%s: force: %s", slot->info.name, slot->force.text);
 }
 
-// A force that the watchdog took away is told, once each time; and a device that takes none, once.
-static void tell_watchdog(HandSlot *slot, double sent_before)
+// A force that the watchdog took away is told, but not again within TELL_AGAIN_US; and a device that takes no more, once.
+static void tell_watchdog(HandSlot *slot, double sent_before, bool played_before, int64_t now)
 {
-    if (slot->force.failed_writes == FAILURES_TOLD) {
-        hand_say(slot->shared, "%s does not take the forces that are sent to it", slot->info.name);
-        slot->force.failed_writes++;
+    if (played_before && !slot->force.block[0]) {
+        show_force(slot);
+        hand_say(slot->shared, "%s: force: %s", slot->info.name, slot->force.text);
+        return;
     }
     const char *why = slot->force.guard.why_zero;
-    if (sent_before != 0 && slot->force.guard.sent[0] == 0 && why && why[0] && strcmp(why, "paused") != 0)
+    if (sent_before != 0 && slot->force.guard.sent[0] == 0 && why && why[0] && strcmp(why, "paused") != 0 && now >= slot->tell_from_us) {
         hand_say(slot->shared, "%s: force to zero, %s%s", slot->info.name, why,
-            strstr(why, "silent") ? " (force: {quiet_ms: 0} in its map where it reports only changes)" : "");
+                 strstr(why, "silent") ? " (force: {quiet_ms: 0} in its map where it reports only changes)" : "");
+        slot->tell_from_us = now + TELL_AGAIN_US;
+    }
 }
 
 void *hand_run_hid(void *argument)
@@ -105,12 +113,13 @@ void *hand_run_hid(void *argument)
         int count = drain(slot, wait_ms);
         int64_t now = hand_now_us();
         double sent_before = slot->force.guard.sent[0];
+        bool played_before = slot->force.block[0] != 0;
         is_there = count >= 0;
         report_us = count > 0 ? now : report_us;
         now = is_there ? wait_for_force(slot, now) : now;
         if (is_there)
             force_tick(&slot->force, &slot->port, now, report_us, atomic_load(&shared->paused), &shared->transport, slot->device);
-        tell_watchdog(slot, sent_before);
+        tell_watchdog(slot, sent_before, played_before, now);
         if (now - counted_from >= COUNT_RATE_US) {
             hz = 1e6 * (double)(slot->state.reports - reports_then) / (double)(now - counted_from);
             counted_from = now;

@@ -32,6 +32,7 @@ typedef struct HandSlot {
     void *device;                    // while its thread runs; NULL for an encoder
     UsbEncoder *encoder;             // the same of an encoder
     ForceFeedback force;
+    int64_t tell_from_us;            // when the watchdog may be told of again
     pthread_t thread;
     bool has_thread, encoder_runs;   // the scanner's: the thread is there, and for an encoder
     _Atomic bool has_ended;          // the device went; the scanner joins the thread

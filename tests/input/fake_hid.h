@@ -21,7 +21,7 @@ typedef struct FakeDevice {
     HidDeviceInfo info;
     const uint8_t *descriptor;
     int descriptor_length;
-    bool is_plugged, is_open, may_not_open, is_gone;    // is_gone: unplugged while it was open
+    bool is_plugged, is_open, may_not_open, is_gone, takes_no_writes;    // is_gone: unplugged while it was open
     FakeReport queue[FAKE_QUEUE];
     long first, last;                // reports put in and taken out so far
     FakeReport written[FAKE_WRITTEN];
@@ -124,7 +124,7 @@ static inline int fake_write(void *context, void *opened, const uint8_t *bytes, 
     FakeHid *hid = context;
     FakeDevice *device = opened;
     pthread_mutex_lock(&hid->lock);
-    bool gone = device->is_gone;
+    bool gone = device->is_gone || device->takes_no_writes;
     if (!gone && device->written_count < FAKE_WRITTEN && length <= FAKE_REPORT) {
         device->written[device->written_count].length = length;
         memcpy(device->written[device->written_count].bytes, bytes, (size_t)length);

@@ -372,6 +372,14 @@ static void torque_is_a_second_effect(void **state)
     now += 1000;
     force_tick(&force, &port, now, now, true, &transport, device);
     assert_true(force.value[0] == 0 && force.value[1] == 0);        // paused
+    device->takes_no_writes = true;
+    for (int i = 0; i < 40; i++) {
+        now += 1000;
+        atomic_fetch_add(&port.step, 1);
+        force_tick(&force, &port, now, now, false, &transport, device);
+    }
+    assert_int_equal(force.block[0], 0);    // given up
+    assert_non_null(strstr(force.text, "takes no forces"));
     free(stick);
     free(map);
     free(hid);
