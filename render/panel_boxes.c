@@ -6,13 +6,18 @@
 #include <string.h>
 
 // Lines that a file's editor broke are joined: a break counts after the end of a sentence, before a list's mark and at an empty line.
-static void reflow(const char *from, char *to, size_t capacity)
+void panel_reflow(const char *from, char *to, size_t capacity)
 {
     size_t length = 0;
-    for (; *from && length + 1 < capacity; from++) {
+    while (*from && length + 1 < capacity) {
+        if (*from != '\n') {
+            to[length++] = *from++;
+            continue;
+        }
+        const char *next = from + 1 + strspn(from + 1, " \t\r");   // an indent is the editor's too
         bool ends_sentence = length > 0 && strchr(".!?:\n", to[length - 1]);
-        bool is_break = *from == '\n' && !ends_sentence && from[1] && !strchr("\n-*0123456789", from[1]);
-        to[length++] = is_break ? ' ' : *from;
+        to[length++] = ends_sentence || !*next || strchr("\n-*0123456789", *next) ? '\n' : ' ';
+        from = next;
     }
     while (length > 0 && strchr(" \n", to[length - 1]))
         length--;
@@ -28,7 +33,7 @@ void panel_draw_briefing(Panel *panel, const PanelState *state)
     if (!is_wanted || !panel_text(state->instructions)[0])
         return;
     char text[4200];
-    reflow(state->instructions, text, sizeof text);
+    panel_reflow(state->instructions, text, sizeof text);
     float s = gui_scale(gui), margin = floorf(12 * s), pad = floorf(20 * s);
     GuiRect view = panel->layout.view_rect[panel->layout.main];
     float width = floorf(fminf(view.width - 2 * margin, 640 * s));

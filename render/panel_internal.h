@@ -70,6 +70,8 @@ bool panel_has_more_lines(const char *text);
 bool panel_first_line(const char *text, char *line, size_t capacity);
 void panel_heading(Panel *panel, const char *text);
 
+void panel_reflow(const char *from, char *to, size_t capacity);
+
 // One button of the table of keys; `where` tells buttons of one action apart.
 void panel_action_button(Panel *panel, const PanelState *state, ActionId id, const char *where, float width);
 void panel_draw_controls(Panel *panel, const PanelState *state);

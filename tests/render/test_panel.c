@@ -445,6 +445,21 @@ static void names_are_typed_and_trimmed(void **unused)
     end_desk(&desk);
 }
 
+static void broken_lines_are_joined(void **unused)
+{
+    (void)unused;
+    static const struct { const char *from, *to; } text[] = {
+        {"", ""}, {"\n\n", ""}, {"One.", "One."}, {"One.\nTwo", "One.\nTwo"}, {"one\ntwo\n", "one two"}, {"along the\n   outside", "along the outside"},
+        {"Do:\n1. this\n   and that\n2. more", "Do:\n1. this and that\n2. more"}, {"a\n\nb", "a\n\nb"}, {"a\n- b", "a\n- b"}};
+    char out[64];
+    for (size_t i = 0; i < sizeof text / sizeof text[0]; i++) {
+        panel_reflow(text[i].from, out, sizeof out);
+        assert_string_equal(out, text[i].to);
+    }
+    panel_reflow("more than fits", out, 5);
+    assert_string_equal(out, "more");
+}
+
 static void instructions_are_shown_until_followed(void **unused)
 {
     (void)unused;
@@ -621,6 +636,7 @@ int main(void)
                                        cmocka_unit_test(views_are_chosen_turned_and_scrolled_by_mouse),
                                        cmocka_unit_test(a_button_lets_go_when_the_focus_goes),
                                        cmocka_unit_test(names_are_typed_and_trimmed),
+                                       cmocka_unit_test(broken_lines_are_joined),
                                        cmocka_unit_test(instructions_are_shown_until_followed),
                                        cmocka_unit_test(hints_lead_on_with_use),
                                        cmocka_unit_test(strange_states_draw),
