@@ -6,6 +6,11 @@
 
 #include <cmocka.h>
 
+#include "cli/devices.h"
+#include "input/hand.h"
+#include "tests/input/fake_hid.h"
+#include "tests/input/hid_recordings.h"
+
 #include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -73,11 +78,51 @@ static void wrong_use_and_wrong_maps_are_told(void **state)
     assert_non_null(strstr(said, "--watch"));
 }
 
+// The list and --watch's words on a device that is only there in fake_hid.h.
+static void watching_shows_raw_values_and_what_the_map_makes_of_them(void **state)
+{
+    (void)state;
+    static uint8_t bytes[HID_DESCRIPTOR_LIMIT];
+    static Faults faults;
+    FakeHid *hid = calloc(1, sizeof *hid);
+    assert_non_null(hid);
+    HidTransport transport = fake_transport(hid);
+    size_t length = hid_bytes(sidewinder_2, bytes);
+    fake_plug(hid, 0, 0x045e, 0x001b, "", HID_USAGE(1, 4), bytes, (int)length);
+    HidListing listing = {.info = hid->device[0].info, .descriptor = hid_descriptor_parse(bytes, length, "stick", &faults),
+                          .map = device_map_built_in(BUILT_IN_HID_HAPTIC)};
+    fake_report(hid, 0, (const uint8_t[]){1, 0, 0, 0xf0, 1, 0, 0, 0x8f, 0}, 9);      // Y at 496, hat released
+    fake_report(hid, 0, (const uint8_t[]){1, 0, 0}, 3);                              // short
+    fake_report(hid, 0, (const uint8_t[]){1, 0xff, 1, 0, 0xfe, 0, 0, 0x8f, 1}, 9);   // X at 511, Y at -512, button 1
+    char path[] = "/tmp/seldinger-watch-XXXXXX";
+    int file = mkstemp(path), kept = dup(STDOUT_FILENO);
+    assert_true(file >= 0 && kept >= 0);
+    fflush(stdout);
+    dup2(file, STDOUT_FILENO);
+    bool watched = devices_watch(&transport, &listing, 1, 0.2), none = devices_watch(&transport, NULL, 0, 0.2);
+    fflush(stdout);
+    dup2(kept, STDOUT_FILENO);
+    said[pread(file, said, sizeof said - 1, 0)] = 0;
+    close(file);
+    close(kept);
+    unlink(path);
+    assert_true(watched && !none);
+    static const char *const words[] = {"2 reports, 1 that the descriptor does not describe", "logical_min -512, logical_max 496 so far", "twist 240.0 deg/s",
+                                        "push 40.00 mm/s", ", pedal"};
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (!strstr(said, words[i]))
+            fail_msg("'%s' is not in <<%s>>", words[i], said);
+    free(listing.descriptor);
+    free((void *)(uintptr_t)listing.map);
+    free(hid);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_list_names_all_kinds),
         cmocka_unit_test(the_json_is_whole),
+        cmocka_unit_test(watching_shows_raw_values_and_what_the_map_makes_of_them),
         cmocka_unit_test(wrong_use_and_wrong_maps_are_told),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
