@@ -157,14 +157,14 @@ static bool keeps_topology(Decimation *d, int a, int b)
     return common == 2;
 }
 
-// Area over the square of the longest side, at most 0.43; its area vector too.
-static double triangle_fullness(const Vec3 p[3], Vec3 *area)
+// Squared: area over the square of the longest side, at most 0.43. Its area vector too.
+static double triangle_fullness2(const Vec3 p[3], Vec3 *area)
 {
     double longest = 0;
     for (int k = 0; k < 3; k++)
         longest = fmax(longest, vec3_norm2(vec3_sub(p[k], p[(k + 1) % 3])));
     *area = triangle_area_vector(p[0], p[1], p[2]);
-    return longest > 0 ? vec3_norm(*area) / longest : 0;
+    return longest > 0 ? vec3_norm2(*area) / (longest * longest) : 0;
 }
 
 // Triangles around v that stay must not turn by more than some 75 degrees, nor become needles. What is a needle already (marching cubes make many) faces
@@ -181,10 +181,10 @@ static bool keeps_facing(const Decimation *d, int v, int other, Vec3 place)
             p[k] = d->vertex[c[k]];
             q[k] = c[k] == v ? place : p[k];
         }
-        double full_before = triangle_fullness(p, &before), full_after = triangle_fullness(q, &after);
-        if (full_after < needle && full_after < 0.5 * full_before)
+        double full_before = triangle_fullness2(p, &before), full_after = triangle_fullness2(q, &after), along = vec3_dot(before, after);
+        if (full_after < needle * needle && full_after < 0.25 * full_before)
             return false;
-        if (full_before > needle && !(vec3_dot(before, after) > 0.25 * vec3_norm(before) * vec3_norm(after)))
+        if (full_before > needle * needle && !(along > 0 && along * along > 0.0625 * vec3_norm2(before) * vec3_norm2(after)))
             return false;
     }
     return true;

@@ -171,6 +171,10 @@ bool lumen_layer_create(Lumen *lumen, const FluoroscopeOptions *options, const M
     lumen->program = gl_program_create(LUMEN_VERTEX, LUMEN_FRAGMENT, message, capacity);
     if (!lumen->program)
         return false;
+    GLint most = 0;
+    glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &most);
+    if (options->tree && options->tree->node_count > most)
+        return message_fail(message, capacity, "a tree of %d nodes is too large for fluoroscopy here; %d", options->tree->node_count, (int)most);
     if (!take_nodes(lumen, options->tree) || !send_both(lumen, options, lids))
         return message_fail(message, capacity, "not enough memory for the vessel in fluoroscopy");
     lumen->is_there = true;
