@@ -58,8 +58,8 @@ static void draw_strip(FILE *out, const RecordedRun *run, const Strip *strip, in
     fprintf(out, "<text x=\"%d\" y=\"%d\">%s</text>\n", STRIP_LEFT, top - 6, strip->name);
     for (int k = 0; k * tick <= range * (1 + 1e-9); k++) {
         double y = top + STRIP - k * tick * scale;
-        fprintf(out, "<path class=\"grid\" d=\"M%d %.1f h%d\"/><text class=\"tick\" text-anchor=\"end\" x=\"%d\" y=\"%.1f\">%g</text>\n", STRIP_LEFT, y, COLUMNS,
-                STRIP_LEFT - 6, y + 4, fabs(floor_at + k * tick) < 1e-9 * range ? 0 : floor_at + k * tick);
+        fprintf(out, "<path class=\"grid\" d=\"M%d %.1f h%d\"/><text class=\"tick\" text-anchor=\"end\" x=\"%d\" y=\"%.1f\">%g</text>\n", STRIP_LEFT, y,
+                COLUMNS, STRIP_LEFT - 6, y + 4, fabs(floor_at + k * tick) < 1e-9 * range ? 0 : floor_at + k * tick);
     }
     fprintf(out, "<path class=\"line o%d\" d=\"M", strip->colour);
     for (int c = 0; c < columns; c++)
@@ -67,10 +67,11 @@ static void draw_strip(FILE *out, const RecordedRun *run, const Strip *strip, in
     fprintf(out, "%d %.1f\"/>\n", STRIP_LEFT + columns - 1, top + STRIP - (low[columns - 1] - floor_at) * scale);
 }
 
-static void draw_bars(FILE *out, const RecordedRun *run, const TimeAxis *axis, const char *name, bool (*is_on)(const RecordedRun *, int64_t), int colour, int top)
+static void draw_bars(FILE *out, const RecordedRun *run, const TimeAxis *axis, const char *name, bool (*is_on)(const RecordedRun *, int64_t), int colour,
+                      int top)
 {
-    fprintf(out, "<text class=\"tick\" text-anchor=\"end\" x=\"%d\" y=\"%d\">%s</text><path class=\"grid\" d=\"M%d %d h%d\"/><g class=\"o%d\">", STRIP_LEFT - 6, top + 11,
-            name, STRIP_LEFT, top + BARS, COLUMNS, colour);
+    fprintf(out, "<text class=\"tick\" text-anchor=\"end\" x=\"%d\" y=\"%d\">%s</text><path class=\"grid\" d=\"M%d %d h%d\"/><g class=\"o%d\">", STRIP_LEFT - 6,
+            top + 11, name, STRIP_LEFT, top + BARS, COLUMNS, colour);
     for (int64_t i = 0; i < run->step_count;) {
         int64_t from = i;
         if (!is_on(run, i++))
@@ -101,7 +102,9 @@ static void draw_errors(const SessionPage *page, const TimeAxis *axis, int botto
 
 void session_time_figure(const SessionPage *page)
 {
-    static const Strip strip[] = {{"Inserted length [mm]", inserted_of, 3}, {"Push force at the hand [N]", force_of, 1}, {"Torque at the hand [N mm]", torque_of, 2},
+    static const Strip strip[] = {{"Inserted length [mm]", inserted_of, 3},
+                                  {"Push force at the hand [N]", force_of, 1},
+                                  {"Torque at the hand [N mm]", torque_of, 2},
                                   {"Largest wall force [N]", wall_of, 4}};
     enum { STRIPS = sizeof strip / sizeof strip[0] };
     const RecordedRun *run = page->run;
@@ -110,9 +113,11 @@ void session_time_figure(const SessionPage *page)
         return;
     TimeAxis axis = {run->time_s[run->step_count - 1]};
     int bottom = STRIP_TOP + STRIPS * (STRIP + STRIP_GAP), bars = run->xray ? 2 : 0, foot = bottom + bars * (BARS + 8), width = STRIP_LEFT + COLUMNS + 16;
-    fprintf(out, "<figure id=\"figure-time\"><svg role=\"img\" aria-labelledby=\"time-t time-d\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\">\n"
-                 "<title id=\"time-t\">The session over time</title><desc id=\"time-d\">Inserted length, push force, torque and largest wall force over %.1f s, with %d "
-                 "errors marked.</desc>\n", width, foot + 36, width, foot + 36, axis.end_s, page->session->event_count);
+    fprintf(out,
+            "<figure id=\"figure-time\"><svg role=\"img\" aria-labelledby=\"time-t time-d\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\">\n"
+            "<title id=\"time-t\">The session over time</title><desc id=\"time-d\">Inserted length, push force, torque and largest wall force over %.1f s, "
+            "with %d errors marked.</desc>\n",
+            width, foot + 36, width, foot + 36, axis.end_s, page->session->event_count);
     for (int i = 0; i < STRIPS; i++)
         draw_strip(out, run, &strip[i], STRIP_TOP + 18 + i * (STRIP + STRIP_GAP));
     if (run->xray) {
@@ -122,10 +127,11 @@ void session_time_figure(const SessionPage *page)
     draw_errors(page, &axis, foot + 4);
     double tick = report_tick_step(axis.end_s, 10);
     for (int k = 0; k * tick <= axis.end_s * (1 + 1e-9); k++)
-        fprintf(out, "<path class=\"axis\" d=\"M%.1f %d v4\"/><text class=\"tick\" text-anchor=\"middle\" x=\"%.1f\" y=\"%d\">%g</text>\n", at_time(&axis, k * tick),
-                foot + 4, at_time(&axis, k * tick), foot + 19, k * tick);
-    fprintf(out, "<text class=\"tick\" text-anchor=\"end\" x=\"%d\" y=\"%d\">time [s]</text>\n</svg>\n<figcaption>Each column of pixels spans the least and the largest "
-                 "value of its steps. Dashed lines are errors, their letters as in the list above.%s</figcaption></figure>\n",
+        fprintf(out, "<path class=\"axis\" d=\"M%.1f %d v4\"/><text class=\"tick\" text-anchor=\"middle\" x=\"%.1f\" y=\"%d\">%g</text>\n",
+                at_time(&axis, k * tick), foot + 4, at_time(&axis, k * tick), foot + 19, k * tick);
+    fprintf(out,
+            "<text class=\"tick\" text-anchor=\"end\" x=\"%d\" y=\"%d\">time [s]</text>\n</svg>\n<figcaption>Each column of pixels spans the least and the "
+            "largest value of its steps. Dashed lines are errors, their letters as in the list above.%s</figcaption></figure>\n",
             STRIP_LEFT + COLUMNS, foot + 33, run->xray ? "" : " The recording has no X-ray controls.");
 }
 
@@ -324,8 +330,8 @@ static void draw_marks(const SessionPage *page, const RoadMap *map)
         place(map, tip_at(run, low), &x, &y);
         shift = hypot(x - last_x, y - last_y) < 12 ? shift + 11 : 0;         // letters of one place stand side by side
         last_x = x, last_y = y;
-        fprintf(out, "<circle class=\"error\" cx=\"%.1f\" cy=\"%.1f\" r=\"5\"/><text class=\"error label\" x=\"%.1f\" y=\"%.1f\">%c</text>\n", x, y, x + 7 + shift, y - 5,
-                session_error_letter(page->session->event[i].kind));
+        fprintf(out, "<circle class=\"error\" cx=\"%.1f\" cy=\"%.1f\" r=\"5\"/><text class=\"error label\" x=\"%.1f\" y=\"%.1f\">%c</text>\n", x, y,
+                x + 7 + shift, y - 5, session_error_letter(page->session->event[i].kind));
     }
 }
 
@@ -337,26 +343,29 @@ void session_path_figure(const SessionPage *page)
         return;
     RoadMap map = frame_path(page);
     double bar = report_tick_step(VIEW_WIDTH / map.mm, 5), foot = map.height + 44, end_s = run->time_s[run->step_count - 1];
-    fprintf(out, "<figure id=\"figure-path\"><svg role=\"img\" aria-labelledby=\"path-t path-d\" viewBox=\"0 0 %d %.0f\" width=\"%d\" height=\"%.0f\">\n"
-                 "<title id=\"path-t\">Path of the tip over the vessel</title><desc id=\"path-d\">The way of the tool's tip in %.1f s, seen in %s, over the vessel's "
-                 "silhouette, with target and errors.</desc>\n<svg class=\"view\" width=\"%d\" height=\"%.0f\">\n",
+    fprintf(out,
+            "<figure id=\"figure-path\"><svg role=\"img\" aria-labelledby=\"path-t path-d\" viewBox=\"0 0 %d %.0f\" width=\"%d\" height=\"%.0f\">\n"
+            "<title id=\"path-t\">Path of the tip over the vessel</title><desc id=\"path-d\">The way of the tool's tip in %.1f s, seen in %s, over the "
+            "vessel's silhouette, with target and errors.</desc>\n<svg class=\"view\" width=\"%d\" height=\"%.0f\">\n",
             VIEW_WIDTH, foot, VIEW_WIDTH, foot, end_s, map.label, VIEW_WIDTH, map.height);
     if (page->tree)
         draw_vessel(out, &map, page->tree);
     draw_tool(out, &map, run);
     draw_path(out, &map, run);
     draw_marks(page, &map);
-    fprintf(out, "</svg><path class=\"axis\" d=\"M12 %.1f h%.1f m0 -4 v8 M12 %.1f v8\"/><text x=\"%.1f\" y=\"%.1f\">%g mm</text>\n", map.height + 18, bar * map.mm,
-            map.height + 14, 12 + bar * map.mm + 6, map.height + 22, bar);
+    fprintf(out, "</svg><path class=\"axis\" d=\"M12 %.1f h%.1f m0 -4 v8 M12 %.1f v8\"/><text x=\"%.1f\" y=\"%.1f\">%g mm</text>\n", map.height + 18,
+            bar * map.mm, map.height + 14, 12 + bar * map.mm + 6, map.height + 22, bar);
     for (int k = 0; k < PATH_STEPS; k++) {
         char colour[8];
         time_colour((k + 0.5) / PATH_STEPS, colour);
         fprintf(out, "<rect x=\"%.1f\" y=\"%.1f\" width=\"7.6\" height=\"8\" fill=\"%s\"/>", VIEW_WIDTH - 232 + 7.5 * k, map.height + 14, colour);
     }
-    fprintf(out, "<text class=\"tick\" text-anchor=\"end\" x=\"%d\" y=\"%.1f\">0 s</text><text class=\"tick\" x=\"%d\" y=\"%.1f\">%.0f s</text><text class=\"tick\" "
-                 "x=\"12\" y=\"16\">%s</text>\n</svg>\n<figcaption>The tip's path by time, the tool at the end as a thin line, the target as a ring, the start as a dot, "
-                 "errors by their letters; the C-arm as it stood for most of the fluoroscopy.%s</figcaption></figure>\n",
-            VIEW_WIDTH - 238, map.height + 22, VIEW_WIDTH - 46, map.height + 22, end_s, map.label, page->tree ? "" : " The vessel is not drawn: it is no tree, or was not found.");
+    fprintf(out,
+            "<text class=\"tick\" text-anchor=\"end\" x=\"%d\" y=\"%.1f\">0 s</text><text class=\"tick\" x=\"%d\" y=\"%.1f\">%.0f s</text><text class=\"tick\" "
+            "x=\"12\" y=\"16\">%s</text>\n</svg>\n<figcaption>The tip's path by time, the tool at the end as a thin line, the target as a ring, the start as a "
+            "dot, errors by their letters; the C-arm as it stood for most of the fluoroscopy.%s</figcaption></figure>\n",
+            VIEW_WIDTH - 238, map.height + 22, VIEW_WIDTH - 46, map.height + 22, end_s, map.label,
+            page->tree ? "" : " The vessel is not drawn: it is no tree, or was not found.");
 }
 
 // --- earlier sessions ---
@@ -373,8 +382,8 @@ void session_trend_figure(const SessionPage *page)
                  "<title id=\"trend-t\">Points over sessions</title><desc id=\"trend-d\">Points of %d sessions, from %.0f to %.0f.</desc>\n", WIDTH + LEFT + 16,
             HEIGHT + TOP + 36, WIDTH + LEFT + 16, HEIGHT + TOP + 36, count, page->earlier[0].figures.points, page->earlier[count - 1].figures.points);
     for (int k = 0; k <= 4; k++)
-        fprintf(out, "<path class=\"grid\" d=\"M%d %d h%d\"/><text class=\"tick\" text-anchor=\"end\" x=\"%d\" y=\"%d\">%d</text>\n", LEFT, TOP + HEIGHT - HEIGHT * k / 4, WIDTH,
-                LEFT - 6, TOP + HEIGHT - HEIGHT * k / 4 + 4, 25 * k);
+        fprintf(out, "<path class=\"grid\" d=\"M%d %d h%d\"/><text class=\"tick\" text-anchor=\"end\" x=\"%d\" y=\"%d\">%d</text>\n", LEFT,
+                TOP + HEIGHT - HEIGHT * k / 4, WIDTH, LEFT - 6, TOP + HEIGHT - HEIGHT * k / 4 + 4, 25 * k);
     fprintf(out, "<polyline class=\"line o1\" points=\"");
     for (int i = 0; i < count; i++)
         fprintf(out, "%.1f,%.1f ", LEFT + 10 + step * i, TOP + HEIGHT * (1 - page->earlier[i].figures.points / 100));
@@ -382,11 +391,14 @@ void session_trend_figure(const SessionPage *page)
     for (int i = 0; i < count; i++) {
         const Session *s = &page->earlier[i];
         double x = LEFT + 10 + step * i, y = TOP + HEIGHT * (1 - s->figures.points / 100);
-        bool reached = s->figures.state == SCORE_REACHED, own = !strcmp(s->series_sha256, page->session->series_sha256) && !strcmp(s->date, page->session->date);
+        bool reached = s->figures.state == SCORE_REACHED,
+             own = !strcmp(s->series_sha256, page->session->series_sha256) && !strcmp(s->date, page->session->date);
         fprintf(out, "<circle class=\"%s\" cx=\"%.1f\" cy=\"%.1f\" r=\"%d\"/>", reached ? "held o1" : "missed o1", x, y, own ? 6 : 4);
         if (count <= 20 || i % (count / 10) == 0)
             fprintf(out, "<text class=\"tick\" text-anchor=\"middle\" x=\"%.1f\" y=\"%d\">%d</text>", x, TOP + HEIGHT + 15, i + 1);
     }
-    fprintf(out, "<text class=\"tick\" text-anchor=\"end\" x=\"%d\" y=\"%d\">session</text></svg>\n<figcaption>Points by session, as numbered in the table; filled: target held, "
-                 "open: not; the large dot is this session.</figcaption></figure>\n", LEFT + WIDTH, TOP + HEIGHT + 30);
+    fprintf(out,
+            "<text class=\"tick\" text-anchor=\"end\" x=\"%d\" y=\"%d\">session</text></svg>\n<figcaption>Points by session, as numbered in the table; filled: "
+            "target held, open: not; the large dot is this session.</figcaption></figure>\n",
+            LEFT + WIDTH, TOP + HEIGHT + 30);
 }

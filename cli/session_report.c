@@ -26,19 +26,21 @@ static const char help[] =
 
 static const char own_style[] =
     ".points{font-size:2.6rem;font-weight:700;line-height:1;font-variant-numeric:tabular-nums}.points small{font-size:1rem;font-weight:400;color:var(--muted)}\n"
-    ".top{display:flex;flex-wrap:wrap;gap:.5rem 2.5rem;align-items:center;margin:1rem 0}.state{font-weight:600;padding:.15rem .6rem;border:2px solid currentColor;"
-    "border-radius:1rem}.state.reached{color:var(--o3)}.state.time_out,.state.running,.state.waiting{color:var(--bad)}\n"
-    ".bar{fill:currentColor}.error{stroke:var(--bad);fill:none;stroke-dasharray:3 3}text.error{fill:var(--bad);stroke:var(--panel);stroke-dasharray:none}"
+    ".top{display:flex;flex-wrap:wrap;gap:.5rem 2.5rem;align-items:center;margin:1rem 0}\n"
+    ".state{font-weight:600;padding:.15rem .6rem;border:2px solid currentColor;border-radius:1rem}\n"
+    ".state.reached{color:var(--o3)}.state.time_out,.state.running,.state.waiting{color:var(--bad)}\n"
+    ".bar{fill:currentColor}.error{stroke:var(--bad);fill:none;stroke-dasharray:3 3}text.error{stroke:var(--panel);stroke-dasharray:none}\n"
     "svg text.error{fill:var(--bad)}circle.error{stroke-width:2;stroke-dasharray:none}\n"
     ".vessel path{fill:none;stroke:var(--muted);stroke-linecap:round}.vessel circle{fill:var(--muted)}.vessel{opacity:.32}svg.view{margin:0;max-width:none}\n"
-    ".halo{fill:none;stroke:#fff;stroke-width:5;stroke-linejoin:round;stroke-linecap:round}.way{fill:none;stroke-width:2.6;stroke-linejoin:round}"
+    ".halo{fill:none;stroke:#fff;stroke-width:5;stroke-linejoin:round;stroke-linecap:round}.way{fill:none;stroke-width:2.6;stroke-linejoin:round}\n"
     ".tool{fill:none;stroke:var(--ink);stroke-width:1}.held{fill:currentColor}.missed{fill:var(--panel);stroke:currentColor;stroke-width:2}\n"
     "tr.own{background:var(--panel);font-weight:600}td.mark-letter{color:var(--bad);font-weight:700}meter{width:7rem}\n"
     "@media print{body{font-size:10pt}section{break-inside:auto}figure{max-width:100%}}\n";
 
 // --- the page ---
 
-static const char *const part_words[PART_COUNT] = {"Time", "Fluoroscopy time", "Contrast agent", "Way of the tip", "Largest wall force", "Wall force over time"};
+static const char *const part_words[PART_COUNT] = {"Time",           "Fluoroscopy time",   "Contrast agent",
+                                                   "Way of the tip", "Largest wall force", "Wall force over time"};
 static const char *const part_unit[PART_COUNT] = {"s", "s", "ml", "times the straight way", "N", "N s"};
 
 static void figures_of(const ScoreFigures *f, double figure[PART_COUNT])
@@ -87,8 +89,8 @@ static void print_parts(const SessionPage *page)
         return;
     for (int i = 0; e && i < PART_COUNT; i++)
         weights += e->par[i] > 0 ? e->weight[i] : 0;
-    fprintf(out, "<section id=\"parts\"><h2>Points</h2>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Part</th><th scope=\"col\">Measured</th><th scope=\"col\">Full "
-                 "points up to</th><th scope=\"col\">Weight</th><th scope=\"col\" class=\"words\">Reached</th></tr></thead><tbody>\n");
+    fprintf(out, "<section id=\"parts\"><h2>Points</h2>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Part</th><th scope=\"col\">Measured</th><th "
+                 "scope=\"col\">Full points up to</th><th scope=\"col\">Weight</th><th scope=\"col\" class=\"words\">Reached</th></tr></thead><tbody>\n");
     for (int i = 0; i < PART_COUNT; i++) {
         bool judged = !e || (e->par[i] > 0 && e->weight[i] > 0);
         fprintf(out, "<tr><th scope=\"row\">%s [%s]</th><td>%.2f</td>", part_words[i], part_unit[i], figure[i]);
@@ -97,7 +99,8 @@ static void print_parts(const SessionPage *page)
         else
             fprintf(out, "<td>%s</td><td>–</td>", e ? "not judged" : "not known");
         if (judged)
-            fprintf(out, "<td class=\"words\"><meter min=\"0\" max=\"1\" value=\"%.3f\">%.0f %%</meter> %.0f %%</td></tr>\n", f->part[i], 100 * f->part[i], 100 * f->part[i]);
+            fprintf(out, "<td class=\"words\"><meter min=\"0\" max=\"1\" value=\"%.3f\">%.0f %%</meter> %.0f %%</td></tr>\n", f->part[i], 100 * f->part[i],
+                    100 * f->part[i]);
         else
             fprintf(out, "<td class=\"words\">–</td></tr>\n");
     }
@@ -116,9 +119,10 @@ static void print_figures(const SessionPage *page)
 {
     FILE *out = page->out;
     const ScoreFigures *f = &page->session->figures;
-    fprintf(out, "<section id=\"figures\"><h2>Figures</h2>\n<dl>\n<dt>Way of the tip</dt><dd>%.0f mm; straight way to the target %.0f mm; efficiency %.0f %%</dd>\n"
-                 "<dt>Tool</dt><dd>pushed in %.0f mm, pulled back %.0f mm in all</dd>\n<dt>Forces</dt><dd>wall at most %.3f N, over time %.2f N s; tip at most %.3f N "
-                 "(mean over 20 ms)</dd>\n",
+    fprintf(out,
+            "<section id=\"figures\"><h2>Figures</h2>\n<dl>\n<dt>Way of the tip</dt><dd>%.0f mm; straight way to the target %.0f mm; efficiency %.0f %%</dd>\n"
+            "<dt>Tool</dt><dd>pushed in %.0f mm, pulled back %.0f mm in all</dd>\n<dt>Forces</dt><dd>wall at most %.3f N, over time %.2f N s; tip at most %.3f "
+            "N (mean over 20 ms)</dd>\n",
             f->path_mm, f->way_mm, 100 * f->efficiency, f->inserted_mm, f->withdrawn_mm, f->wall_force_peak_n, f->wall_impulse_n_s, f->tip_force_peak_n);
     if (f->has_xray)
         fprintf(out, "<dt>X-rays</dt><dd>%.1f s, %lld pulses, %.0f cm² of open field summed over pulses; contrast agent %.1f ml</dd>\n", f->fluoroscopy_s,
@@ -137,8 +141,8 @@ static void print_errors(const SessionPage *page)
         fprintf(out, "<p>None.</p></section>\n");
         return;
     }
-    fprintf(out, "<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Mark</th><th scope=\"col\" class=\"words\">Error</th><th scope=\"col\">Times</th><th scope=\"col\" "
-                 "class=\"words\">Begun at [s]</th></tr></thead><tbody>\n");
+    fprintf(out, "<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Mark</th><th scope=\"col\" class=\"words\">Error</th><th "
+                 "scope=\"col\">Times</th><th scope=\"col\" class=\"words\">Begun at [s]</th></tr></thead><tbody>\n");
     for (int kind = 0; kind < ERROR_COUNT; kind++) {
         if (s->figures.error[kind].count == 0)
             continue;
@@ -167,17 +171,20 @@ static void print_earlier(const SessionPage *page)
         return;
     }
     session_trend_figure(page);
-    fprintf(out, "<div class=\"scroll\"><table><thead><tr><th scope=\"col\">No.</th><th scope=\"col\" class=\"words\">Date</th><th scope=\"col\">Points</th><th scope=\"col\" "
-                 "class=\"words\">Target</th><th scope=\"col\">Time [s]</th><th scope=\"col\">X-rays [s]</th><th scope=\"col\">Contrast [ml]</th><th scope=\"col\">Way / straight</th>"
+    fprintf(out, "<div class=\"scroll\"><table><thead><tr><th scope=\"col\">No.</th><th scope=\"col\" class=\"words\">Date</th><th "
+                 "scope=\"col\">Points</th><th scope=\"col\" class=\"words\">Target</th><th scope=\"col\">Time [s]</th><th scope=\"col\">X-rays [s]</th><th "
+                 "scope=\"col\">Contrast [ml]</th><th scope=\"col\">Way / straight</th>"
                  "<th scope=\"col\">Wall force [N]</th><th scope=\"col\">Errors</th></tr></thead><tbody>\n");
     for (int i = 0; i < page->earlier_count; i++) {
         const Session *s = &page->earlier[i];
         bool own = !strcmp(s->date, page->session->date) && !strcmp(s->series_sha256, page->session->series_sha256);
-        fprintf(out, "<tr%s><th scope=\"row\">%d</th><td class=\"words\">%s</td><td>%.0f</td><td class=\"words\">%s</td><td>%.1f</td><td>%.1f</td><td>%.1f</td><td>%.2f</td><td>%.3f</td>"
-                     "<td>%d</td></tr>\n",
+        fprintf(out,
+                "<tr%s><th scope=\"row\">%d</th><td class=\"words\">%s</td><td>%.0f</td><td "
+                "class=\"words\">%s</td><td>%.1f</td><td>%.1f</td><td>%.1f</td><td>%.2f</td><td>%.3f</td>"
+                "<td>%d</td></tr>\n",
                 own ? " class=\"own\"" : "", i + 1, s->date, s->figures.points, s->figures.state == SCORE_REACHED ? "held" : "not held", s->figures.time_s,
-                s->figures.fluoroscopy_s, s->figures.contrast_ml, s->figures.way_mm > 0 ? s->figures.path_mm / s->figures.way_mm : 0, s->figures.wall_force_peak_n,
-                s->figures.error_total);
+                s->figures.fluoroscopy_s, s->figures.contrast_ml, s->figures.way_mm > 0 ? s->figures.path_mm / s->figures.way_mm : 0,
+                s->figures.wall_force_peak_n, s->figures.error_total);
     }
     fprintf(out, "</tbody></table></div></section>\n");
 }
@@ -193,7 +200,10 @@ static void print_origin(const SessionPage *page)
     item(out, "Scene", s->scene_path);
     item(out, "Recording", s->recording_path);
     item(out, "Recorded", steps);
-    fprintf(out, "<dt>Recording is this session's</dt><dd>%s</dd>\n", !page->run ? "not there: no plots" : page->run_is_its ? "yes, its series have the session's sum" : "no");
+    fprintf(out, "<dt>Recording is this session's</dt><dd>%s</dd>\n",
+            !page->run         ? "not there: no plots"
+            : page->run_is_its ? "yes, its series have the session's sum"
+                               : "no");
     item(out, "Made by", s->version);
     fprintf(out, "</dl>\n<p>Written by seldinger " SELDINGER_VERSION ".</p></section></footer>");
 }
@@ -208,8 +218,8 @@ void session_page(const SessionPage *page)
     report_text(out, title);
     fprintf(out, "</title>\n<style>\n%s%s</style></head>\n<body><header><h1>", report_style, own_style);
     report_text(out, title);
-    fprintf(out, "</h1>\n<p class=\"notice\" role=\"note\"><strong>For training and research. Not a medical device:</strong> points compare sessions at this simulator; they say "
-                 "nothing about the treatment of patients.</p>\n");
+    fprintf(out, "</h1>\n<p class=\"notice\" role=\"note\"><strong>For training and research. Not a medical device:</strong> points compare sessions at this "
+                 "simulator; they say nothing about the treatment of patients.</p>\n");
     if (page->run && !page->run_is_its)
         fprintf(out, "<p class=\"notice\" role=\"alert\">The recording beside this session is another one: plots and path below are not this session's.</p>\n");
     fprintf(out, "</header>\n<main>\n");
@@ -365,8 +375,9 @@ typedef struct ReportOptions {
 static int parse_options(int argc, char **argv, ReportOptions *options)
 {
     enum { HTML = 256, PDF, WITH, QUIET, HELP };
-    static const struct option table[] = {{"html", required_argument, NULL, HTML}, {"pdf", required_argument, NULL, PDF}, {"with", required_argument, NULL, WITH},
-                                          {"quiet", no_argument, NULL, QUIET},     {"help", no_argument, NULL, HELP},     {0}};
+    static const struct option table[] = {{"html", required_argument, NULL, HTML}, {"pdf", required_argument, NULL, PDF},
+                                          {"with", required_argument, NULL, WITH}, {"quiet", no_argument, NULL, QUIET},
+                                          {"help", no_argument, NULL, HELP},       {0}};
     *options = (ReportOptions){0};
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "h", table, NULL)) != -1;) {

@@ -17,12 +17,12 @@
 //                 way along the tree to the way there, less the radius of that vessel. A sac that holds the target is no wrong branch.
 //   tip force     what the shaft carries into the last tip_length_mm (score_tip.h), at rest the resultant of the wall's forces on them
 //   wall force    largest contact force
-//   buckling      what goes in at the mouth does not go on: length lost next to the mouth, over the first 5 lumen diameters l beyond it (or up to where
-//                 its curved tip begins), as the integral of feed less the tool's motion along itself at l, fading over 2 l of feed. A tool that slides keeps it at 0 in
-//                 any bend, because each point follows the one before it. It may lie down on the other side of the lumen without buckling, which
-//                 takes 2 c theta where the vessel turns by theta over l and pi^2 c^2 / l for one bow from wall to wall (a half wave of amplitude a takes pi^2 a^2 / (4 l):
-//                 Timoshenko and Gere, Theory of Elastic Stability, 1961, 1.9), c being the lumen's radius less the tool's. More than that plus 1 mm,
-//                 while the hand pushes: the tool stands in folds between mouth and l.
+//   buckling      what goes in at the mouth does not go on: length lost next to the mouth, over the first 5 lumen diameters l beyond it (or up to
+//                 where its curved tip begins), as the integral of feed less the tool's motion along itself at l, fading over 2 l of feed. A tool that
+//                 slides keeps it at 0 in any bend, because each point follows the one before it. It may lie down on the other side of the lumen
+//                 without buckling, which takes 2 c theta where the vessel turns by theta over l and pi^2 c^2 / l for one bow from wall to wall (a half
+//                 wave of amplitude a takes pi^2 a^2 / (4 l): Timoshenko and Gere, Theory of Elastic Stability, 1961, 1.9), c being the lumen's radius
+//                 less the tool's. More than that plus 1 mm, while the hand pushes: the tool stands in folds between mouth and l.
 //   blind         the tool was moved by more than blind_mm since the pedal was last down
 //   contrast      more than contrast_ml in all; once
 #ifndef SELDINGER_SIM_SCORE_H

@@ -14,8 +14,8 @@ bool score_tip_create(ScoreTip *tip, const WireOptions *options, double tip_leng
     double *scratch = calloc(BEAM_REST_ARRAYS * count, sizeof *scratch);
     if (scratch) {
         BeamRest r = {0};
-        double **array[BEAM_REST_ARRAYS] = {&r.length, &r.extend, &r.axial, &r.near, &r.far, &r.twist, &r.half_w, &r.half_y, &r.half_z, &r.curvature, &r.bending,
-                                            &r.shear};
+        double **array[BEAM_REST_ARRAYS] = {&r.length, &r.extend, &r.axial,  &r.near,      &r.far,     &r.twist,
+                                            &r.half_w, &r.half_y, &r.half_z, &r.curvature, &r.bending, &r.shear};
         for (size_t i = 0; i < BEAM_REST_ARRAYS; i++)
             *array[i] = scratch + i * count;
         wire_rest(&wire, options, &r);

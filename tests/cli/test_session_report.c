@@ -18,11 +18,13 @@
 static char folder[] = "/tmp/seldinger-session-report-XXXXXX";
 #include "tests/cli/folder.h"
 
-#define SCENE "seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], inserted_mm: 2}\n" \
-    "targets: [{name: 'the <end> & more', point_mm: [30, 12, 0], radius_mm: 2}]\n" \
-    "vessel: {friction: 0.1, tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 15}, " \
-    "{arc: {radius_mm: 15, angle_deg: 90}}, {line_mm: 20}]}}\n" \
-    "exercise: {title: 'Into the <bend>', target: 'the <end> & more', hold_s: 0.3, rules: {blind_mm: 5, wall_force_n: 0.001}, par: {time_s: 1, path_ratio: 1}, error_points: 3}\n"
+#define SCENE                                                                                                                                                  \
+    "seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], inserted_mm: 2}\n"                                           \
+    "targets: [{name: 'the <end> & more', point_mm: [30, 12, 0], radius_mm: 2}]\n"                                                                             \
+    "vessel: {friction: 0.1, tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 15}, "                        \
+    "{arc: {radius_mm: 15, angle_deg: 90}}, {line_mm: 20}]}}\n"                                                                                                \
+    "exercise: {title: 'Into the <bend>', target: 'the <end> & more', hold_s: 0.3, rules: {blind_mm: 5, wall_force_n: 0.001}, par: {time_s: 1, path_ratio: "   \
+    "1}, error_points: 3}\n"
 
 static void make_session(const char *name, const char *trainee, time_t when, double push_mm_s, double push_s)
 {
@@ -150,8 +152,8 @@ static void the_same_bytes_twice(void **state)
 {
     (void)state;
     char arguments[900], *one, *two;
-    snprintf(arguments, sizeof arguments, "'%s' --quiet --html '%s' && %s report '%s' --quiet --html '%s'", in_folder("first.json"), in_folder("p.html"), SELDINGER_PROGRAM,
-             in_folder("first.json"), in_folder("q.html"));
+    snprintf(arguments, sizeof arguments, "'%s' --quiet --html '%s' && %s report '%s' --quiet --html '%s'", in_folder("first.json"), in_folder("p.html"),
+             SELDINGER_PROGRAM, in_folder("first.json"), in_folder("q.html"));
     assert_int_equal(report(arguments), 0);
     look_at(in_folder("p.html"), &one);
     look_at(in_folder("q.html"), &two);
@@ -223,7 +225,8 @@ static void no_browser_is_said(void **state)
 {
     (void)state;
     char command[900];
-    snprintf(command, sizeof command, "PATH=/nowhere '%s' report '%s' --pdf '%s' 2>'%s'", SELDINGER_PROGRAM, in_folder("first.json"), in_folder("no.pdf"), in_folder("err.txt"));
+    snprintf(command, sizeof command, "PATH=/nowhere '%s' report '%s' --pdf '%s' 2>'%s'", SELDINGER_PROGRAM, in_folder("first.json"), in_folder("no.pdf"),
+             in_folder("err.txt"));
     int status = system(command);
     assert_int_equal(WEXITSTATUS(status), 2);
     char *text = text_of(in_folder("err.txt"));

@@ -20,7 +20,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (!(f->points >= 0 && f->points <= 100) || !(f->path_mm >= 0) || session.event_count < 0 || session.event_count > SCORE_EVENTS_MOST || session.steps < 0)
         abort();
     char *text = session_json(&session);
-    if (!text || !session_parse(text, strlen(text), "again.json", &again, &faults) || again.figures.points != f->points || again.event_count != session.event_count)
+    if (!text || !session_parse(text, strlen(text), "again.json", &again, &faults) || again.figures.points != f->points ||
+        again.event_count != session.event_count)
         abort();
     free(text);
     return 0;

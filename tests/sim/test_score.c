@@ -19,8 +19,9 @@
 static void an_exercise_is_read(void **state)
 {
     (void)state;
-    Practice *p = practice_begin(IN_THE_OPEN EXERCISE(", instructions: Push., hold_s: 1.5, time_limit_s: 90, rules: {tip_force_n: 0.1, wrong_branch_mm: 4, buckling: "
-                                                      "false}, par: {path_ratio: 1.5}, weights: {path: 3}, error_points: 7"), NULL);
+    Practice *p = practice_begin(IN_THE_OPEN EXERCISE(", instructions: Push., hold_s: 1.5, time_limit_s: 90, rules: {tip_force_n: 0.1, wrong_branch_mm: 4, "
+                                                      "buckling: false}, par: {path_ratio: 1.5}, weights: {path: 3}, error_points: 7"),
+                                 NULL);
     const Exercise *e = p->scene->exercise;
     assert_string_equal(e->title, "Go there");
     assert_string_equal(e->instructions, "Push.");
@@ -348,9 +349,11 @@ static void a_tip_in_another_branch_is_found(void **state)
 
 // --- buckling ---
 
-#define TUBE(path, ends) \
-    "seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n" AT(90) "vessel: {friction: 0.1, tube: {start_mm: [0, 0, 0], " \
-    "direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, ends: " ends ", path: [" path "]}}\n"
+#define TUBE(path, ends)                                                                                                                                       \
+    "seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n" AT(90) "vessel: {friction: 0.1, tube: {start_mm: [0, 0, "    \
+                                                                                                         "0], "                                                \
+                                                                                                         "direction: [1, 0, 0], normal: [0, 1, 0], "           \
+                                                                                                         "radius_mm: 2, ends: " ends ", path: [" path "]}}\n"
 
 // The tip is held 18 mm beyond the mouth: what goes in stands in folds.
 static void a_tool_whose_tip_is_held_buckles_at_the_sheath(void **state)
@@ -359,8 +362,14 @@ static void a_tool_whose_tip_is_held_buckles_at_the_sheath(void **state)
     for (int judged = 0; judged < 2; judged++) {
         static const char *const exercise[] = {EXERCISE(", rules: {buckling: false}"), EXERCISE("")};
         char text[2048];
-        snprintf(text, sizeof text, "seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 18}\nrig: {fix: [{s_mm: end, dof: position}]}\n"
-                 AT(90) "vessel: {friction: 0.1, tube: {radius_mm: 2, path: [{line_mm: 60}]}}\n%s", exercise[judged]);
+        snprintf(text, sizeof text,
+                 "seldinger: 1\n" TOOL
+                 "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 18}\nrig: {fix: [{s_mm: end, dof: position}]}\n" AT(90) "vessel: {friction: "
+                                                                                                                                           "0.1, tube: "
+                                                                                                                                           "{radius_mm: 2, "
+                                                                                                                                           "path: [{line_mm: "
+                                                                                                                                           "60}]}}\n%s",
+                 exercise[judged]);
         Practice *p = practice_begin(text, NULL);
         // one bow from wall to wall takes pi^2 1.8^2 / 20 = 1.6 mm
         ScoreFigures f = practice_go(p, 10, 0.16);
@@ -385,9 +394,12 @@ static void a_blind_end_makes_it_buckle(void **state)
     (void)state;
     for (int stiff = 0; stiff < 2; stiff++) {
         char text[2048];
-        snprintf(text, sizeof text, "seldinger: 1\nwire: {elements: 60, sections: [{length_mm: 80, diameter_mm: 0.36, young_modulus_gpa: %d}], damping: {mass_1_s: 1, "
-                 "stiffness_s: 0.0005}}\nsheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n" AT(90)
-                 "vessel: {friction: 0.1, tube: {radius_mm: 2, ends: closed, path: [{line_mm: 30}]}}\n" EXERCISE(""), stiff ? 80 : 5);
+        snprintf(text, sizeof text,
+                 "seldinger: 1\nwire: {elements: 60, sections: [{length_mm: 80, diameter_mm: 0.36, young_modulus_gpa: %d}], damping: {mass_1_s: 1, "
+                 "stiffness_s: 0.0005}}\nsheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n" AT(90) "vessel: {friction: 0.1, tube: "
+                                                                                                                       "{radius_mm: 2, ends: closed, path: "
+                                                                                                                       "[{line_mm: 30}]}}\n" EXERCISE(""),
+                 stiff ? 80 : 5);
         Practice *p = practice_begin(text, NULL);
         ScoreFigures f = practice_go(p, 20, 1.5);
         assert_int_equal(f.error_total, 0);
@@ -403,12 +415,14 @@ static void normal_bends_are_no_buckling(void **state)
     static const char *const scene[] = {
         TUBE("{line_mm: 5}, {arc: {radius_mm: 12, angle_deg: 90}}, {arc: {radius_mm: 12, angle_deg: 120, plane_deg: 180}}, {line_mm: 60}", "open") EXERCISE(""),
         TUBE("{arc: {radius_mm: 15, angle_deg: 300}}, {line_mm: 30}", "open") EXERCISE(""),
-        TUBE("{arc: {radius_mm: 10, angle_deg: 60}}, {arc: {radius_mm: 10, angle_deg: 60, plane_deg: 90}}, {arc: {radius_mm: 10, angle_deg: 90, plane_deg: 200}}, "
-             "{line_mm: 60}", "open") EXERCISE(""),
+        TUBE("{arc: {radius_mm: 10, angle_deg: 60}}, {arc: {radius_mm: 10, angle_deg: 60, plane_deg: 90}}, {arc: {radius_mm: 10, angle_deg: 90, plane_deg: "
+             "200}}, {line_mm: 60}",
+             "open") EXERCISE(""),
         // a curved tip drags across itself along the wall
         "seldinger: 1\nwire: {elements: 50, sections: [{length_mm: 85, diameter_mm: 0.4, young_modulus_gpa: 20}, {length_mm: 15, diameter_mm: 0.4, "
         "young_modulus_gpa: 5, rest_curvature_1_mm: 0.2}], damping: {mass_1_s: 1, stiffness_s: 0.0005}}\n"
-        "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n" AT(90) "vessel: {friction: 0.1, tube: {radius_mm: 2.5, path: [{line_mm: 60}]}}\n" EXERCISE(""),
+        "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n" AT(90) "vessel: {friction: 0.1, tube: {radius_mm: 2.5, path: [{line_mm: "
+                                                                                       "60}]}}\n" EXERCISE(""),
     };
     for (size_t i = 0; i < sizeof scene / sizeof scene[0]; i++) {
         Practice *p = practice_begin(scene[i], NULL);
@@ -431,7 +445,8 @@ static void normal_bends_are_no_buckling(void **state)
 static void the_tips_force_is_the_walls(void **state)
 {
     (void)state;
-    Practice *p = practice_begin(TUBE("{arc: {radius_mm: 15, angle_deg: 90}}, {line_mm: 10}", "closed") EXERCISE(", rules: {tip_length_mm: 6, tip_force_n: 0.02}"), NULL);
+    Practice *p =
+        practice_begin(TUBE("{arc: {radius_mm: 15, angle_deg: 90}}, {line_mm: 10}", "closed") EXERCISE(", rules: {tip_length_mm: 6, tip_force_n: 0.02}"), NULL);
     practice_go(p, 20, 1.8);
     ScoreFigures f = practice_go(p, 0, 3);
     int nodes = simulator_state(p->simulator)->node_count;
@@ -475,7 +490,9 @@ static void wall_force_is_summed_over_time(void **state)
 
 // --- points ---
 
-#define JUDGED EXERCISE(", rules: {blind_mm: 5, contrast_ml: 3}, par: {time_s: 3, fluoroscopy_s: 2, contrast_ml: 1, path_ratio: 1.01, wall_force_n: 1, wall_impulse_n_s: 1}")
+#define JUDGED                                                                                                                                                 \
+    EXERCISE(", rules: {blind_mm: 5, contrast_ml: 3}, par: {time_s: 3, fluoroscopy_s: 2, contrast_ml: 1, path_ratio: 1.01, wall_force_n: 1, "                  \
+             "wall_impulse_n_s: 1}")
 
 typedef struct Hand {
     double wait_s, contrast_ml_s, detour_mm, pedal_off_s;    // what makes it worse
@@ -539,10 +556,15 @@ static ScoreFigures through_a_bend(bool mirrored)
 {
     VesselTree *tree = forked(mirrored ? -1 : 1);
     char text[2048];
-    snprintf(text, sizeof text, "seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, %d, 0], inserted_mm: 2}\n"
+    snprintf(text, sizeof text,
+             "seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, %d, 0], inserted_mm: 2}\n"
              "targets: [{name: there, point_mm: [20, %d, 0], radius_mm: 2}]\nvessel: {friction: 0.1, tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: "
-             "[0, %d, 0], radius_mm: 2, path: [{line_mm: 8}, {arc: {radius_mm: 12, angle_deg: 90}}, {line_mm: 20}]}}\n"
-             EXERCISE(", hold_s: 0.2, rules: {tip_force_n: 0.01, wall_force_n: 0.01, wrong_branch_mm: 3}, par: {time_s: 1, path_ratio: 1, wall_impulse_n_s: 0.01}"),
+             "[0, %d, 0], radius_mm: 2, path: [{line_mm: 8}, {arc: {radius_mm: 12, angle_deg: 90}}, {line_mm: 20}]}}\n" EXERCISE(", hold_s: 0.2, rules: "
+                                                                                                                                 "{tip_force_n: 0.01, "
+                                                                                                                                 "wall_force_n: 0.01, "
+                                                                                                                                 "wrong_branch_mm: 3}, par: "
+                                                                                                                                 "{time_s: 1, path_ratio: 1, "
+                                                                                                                                 "wall_impulse_n_s: 0.01}"),
              mirrored ? -1 : 1, mirrored ? -20 : 20, mirrored ? -1 : 1);
     Practice *p = practice_begin(text, tree);
     practice_go(p, 20, 1.55);
