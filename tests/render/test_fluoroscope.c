@@ -311,6 +311,16 @@ static void the_roadmap_keeps_the_last_bolus(void **state)
     s->frame.pulse++;
     room_draw(s);
     assert_false(fluoroscope_state(s->view).has_roadmap);
+    // the other way: first the roadmap, then the bolus; what it reached stays when it has gone
+    s->frame.xray.mask = 2;
+    for (int k = 0; k < 4; k++) {
+        const float c[4] = {0, 0.4f, 1, 0};
+        s->frame.contrast = &c[k];
+        s->frame.pulse++;
+        room_draw(s);
+        assert_true(fluoroscope_state(s->view).has_roadmap == (k > 0));
+    }
+    assert_true(blueness(s, 120, 120 + 8) > 40 && blueness(s, 120, 120 + 19) == 0);
     patient_close(&patient);
 }
 
