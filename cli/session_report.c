@@ -11,6 +11,7 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -25,7 +26,8 @@ static const char help[] =
     "Exit codes: 0 done (also where recording, vessel or scene lack and the page is shorter for it); 2 wrong usage or bad input.\n";
 
 static const char own_style[] =
-    ".points{font-size:2.6rem;font-weight:700;line-height:1;font-variant-numeric:tabular-nums}.points small{font-size:1rem;font-weight:400;color:var(--muted)}\n"
+    ".points{font-size:2.6rem;font-weight:700;line-height:1;font-variant-numeric:tabular-nums}\n"
+    ".points small{font-size:1rem;font-weight:400;color:var(--muted)}\n"
     ".top{display:flex;flex-wrap:wrap;gap:.5rem 2.5rem;align-items:center;margin:1rem 0}\n"
     ".state{font-weight:600;padding:.15rem .6rem;border:2px solid currentColor;border-radius:1rem}\n"
     ".state.reached{color:var(--o3)}.state.time_out,.state.running,.state.waiting{color:var(--bad)}\n"
@@ -230,7 +232,8 @@ void session_page(const SessionPage *page)
     session_time_figure(page);
     fprintf(out, "%s</section>\n<section id=\"path\"><h2>Path of the tip</h2>\n", page->run ? "" : "<p>The recording was not found.</p>");
     session_path_figure(page);
-    fprintf(out, "%s</section>\n", page->run ? "" : "<p>The recording was not found.</p>");
+    fprintf(out, "%s</section>\n",
+            !page->run ? "<p>The recording was not found.</p>" : page->run->frame_count < 1 ? "<p>The recording is too long for it, or holds no pictures.</p>" : "");
     print_figures(page);
     print_earlier(page);
     fprintf(out, "</main>\n");
@@ -262,6 +265,15 @@ static void say(const Faults *faults)
         fprintf(stderr, "seldinger report: %s\n", faults->text[i]);
 }
 
+// An hour's frames would fill the memory of a small machine: of such a recording only what every step has, and the path is left out.
+static RecordedRun *load_run(const char *path, Faults *faults)
+{
+    static const off_t most_bytes = 1500 * 1000 * (off_t)1000;
+    struct stat file;
+    bool is_long = stat(path, &file) == 0 && file.st_size > most_bytes;
+    return is_long ? recorded_run_load_series(path, faults) : recorded_run_load(path, faults);
+}
+
 static char *make_page(const char *path, const Session *session, const char *with, size_t *length, Faults *faults)
 {
     char *bytes = NULL, *recording = text_file_beside(path, session->recording_path);
@@ -271,7 +283,7 @@ static char *make_page(const char *path, const Session *session, const char *wit
         OpenVessel open = {0};
         VesselTree *tree = NULL;
         SessionPage page = {.out = out, .path = path, .session = session};
-        RecordedRun *run = *session->recording_path ? recorded_run_load(recording, gone) : NULL;
+        RecordedRun *run = *session->recording_path ? load_run(recording, gone) : NULL;
         Scene *scene = open_scene(run, &open, &tree, gone);
         Session *earlier = session_list(with, session->trainee, session->title, &page.earlier_count, &page.broken, gone);
         say(gone);
