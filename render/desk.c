@@ -27,6 +27,14 @@ Desk desk_create(const VesselScene *scene, int count, const Vec3 *point)
 
 static double held(const PanelActions *actions, ActionId more, ActionId less) { return (double)actions->held[more] - (double)actions->held[less]; }
 
+static void obey_sliders(XrayControl *xray, const PanelActions *actions)
+{
+    float pedal = xray->pedal, contrast = xray->contrast_ml_s;   // these two are held, not set
+    *xray = actions->xray;
+    xray->pedal = pedal;
+    xray->contrast_ml_s = contrast;
+}
+
 static void obey_arm(XrayControl *xray, const PatientAxes *patient, const PanelActions *actions, double seconds)
 {
     double turn = arm_deg_s * seconds * (actions->held[ACTION_SLOW] ? 0.2 : actions->held[ACTION_FAST] ? 3 : 1);
@@ -54,7 +62,7 @@ static void obey_xray(Desk *desk, const PanelActions *actions)
         xray->field_mm = clamped((double)xray->field_mm / field_step, 40, 400);
     for (int i = 0; i < actions->pressed[ACTION_DEMAGNIFY]; i++)
         xray->field_mm = clamped((double)xray->field_mm * field_step, 40, 400);
-    if (actions->pressed[ACTION_PULSES] & 1) {
+    for (int i = 0; i < actions->pressed[ACTION_PULSES]; i++) {
         int next = 0;
         while (next < 3 && pulse_rates[next] <= xray->pulses_s)
             next++;
@@ -71,12 +79,6 @@ static void obey_xray(Desk *desk, const PanelActions *actions)
         xray->mask += xray->mode == XRAY_ROADMAP;   // the vessels of the last injection
     }
     xray->mask += (float)actions->pressed[ACTION_MASK];
-    if (actions->xray_set) {
-        float pedal = xray->pedal, contrast = xray->contrast_ml_s;   // these two are held, not set
-        *xray = actions->xray;
-        xray->pedal = pedal;
-        xray->contrast_ml_s = contrast;
-    }
 }
 
 static void obey_mouse(Desk *desk, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout)
@@ -131,6 +133,9 @@ static void obey_views(Desk *desk, const PanelActions *actions, double seconds)
 
 void desk_obey(Desk *desk, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout, double seconds)
 {
+    // first: they hold all controls as they were shown, and keys count on top of that
+    if (actions->xray_set)
+        obey_sliders(&desk->xray, actions);
     obey_arm(&desk->xray, &desk->patient, actions, seconds);
     obey_xray(desk, actions);
     obey_views(desk, actions, seconds);
