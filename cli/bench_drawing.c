@@ -6,11 +6,11 @@
 #include "cli/trainer_panel.h"
 #include "render/gl_canvas.h"
 #include "render/gl_context.h"
+#include "sim/clock.h"
 
 #include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 static const char help[] =
     "Usage: seldinger bench drawing [SCENE] [options]\n\n"
@@ -39,13 +39,6 @@ typedef struct Studio {
     Pose *pose[MOMENTS];
     uint32_t pulse;
 } Studio;
-
-static double clock_s(clockid_t which)
-{
-    struct timespec now;
-    clock_gettime(which, &now);
-    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-}
 
 static LessonView *lesson_of(const Studio *studio, int moment) { return (LessonView *)(void *)((char *)studio->lesson + (size_t)moment * studio->stride); }
 

@@ -6,9 +6,9 @@
 #include "cli/trainer_panel.h"
 #include "render/timeline.h"
 #include "render/window.h"
+#include "sim/clock.h"
 
 #include <stdlib.h>
-#include <time.h>
 
 // Real time that a frame may spend on simulating the recording again, and simulated seconds that a held arrow key goes in one.
 static const double rescore_budget_s = 0.01, scrub_s_s = 4;
@@ -29,13 +29,6 @@ typedef struct ReplayWindow {
     bool resumes, has_told_difference;
     double begun_s;
 } ReplayWindow;
-
-static double clock_s(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-}
 
 static bool replay_open(ReplayWindow *replay, OpenVessel *open, Faults *faults)
 {
@@ -114,7 +107,7 @@ static const ScoreFigures *score_now(ReplayWindow *replay)
     int64_t different = rescore_first_different(replay->rescore);
     if (different >= 0 && !replay->has_told_difference) {
         replay->has_told_difference = true;
-        panel_message(replay->panel, clock_s() - replay->begun_s, MARK_WARNING, "simulated again, the recording gives another state: the score stops there");
+        panel_message(replay->panel, clock_s(CLOCK_MONOTONIC) - replay->begun_s, MARK_WARNING, "simulated again, the recording gives another state: the score stops there");
     }
     return rescore_at(replay->rescore, playback_time_s(replay->playback));
 }
@@ -127,7 +120,7 @@ static void draw(ReplayWindow *replay, const WindowInput *input, const PanelLayo
     views_draw(replay->views, &frame, layout, input->width, input->height, 0);
     trainer_panel_show(&replay->shown, replay->scene, pose, score_now(replay), NULL, &pose->xray);
     PanelState *state = &replay->shown.state;
-    state->now_s = clock_s() - replay->begun_s;
+    state->now_s = clock_s(CLOCK_MONOTONIC) - replay->begun_s;
     trainer_panel_views(&replay->shown, &replay->desk, replay->views, &pose->xray);
     state->is_paused = !replay->line.is_playing;
     state->step_median_us = state->step_p999_us = state->real_time_factor = NAN;
@@ -145,10 +138,10 @@ static void run_window(ReplayWindow *replay)
 {
     const WindowInput *input;
     PanelActions actions = {0};
-    double last = clock_s();
+    double last = clock_s(CLOCK_MONOTONIC);
     for (bool goes_on = true; goes_on;) {
         bool visible = window_next_frame(replay->window, &input);
-        double now = clock_s(), passed = fmin(now - last, 0.1);
+        double now = clock_s(CLOCK_MONOTONIC), passed = fmin(now - last, 0.1);
         last = now;
         panel_take_input(replay->panel, input, &actions);
         PanelLayout layout = panel_layout(input->width, input->height, input->scale, replay->desk.view, true);
@@ -167,7 +160,7 @@ static void run_window(ReplayWindow *replay)
 bool replay_window_run(const ReplayWindowOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, bool *resumes, double *resume_s,
                        Faults *faults)
 {
-    ReplayWindow replay = {.options = options, .run = run, .scene = scene, .begun_s = clock_s()};
+    ReplayWindow replay = {.options = options, .run = run, .scene = scene, .begun_s = clock_s(CLOCK_MONOTONIC)};
     bool good = replay_open(&replay, open, faults);
     if (good) {
         run_window(&replay);

@@ -1,9 +1,9 @@
 #include "cli/rescore.h"
 
+#include "sim/clock.h"
 #include "sim/lesson.h"
 
 #include <stdlib.h>
-#include <time.h>
 
 static const double kept_s = 0.1;
 
@@ -16,13 +16,6 @@ struct Rescore {
     ScoreFigures *kept;              // at 0, 0.1, 0.2 s …
     int capacity;
 };
-
-static double now_s(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-}
 
 static void keep(Rescore *rescore)
 {
@@ -64,10 +57,10 @@ void rescore_free(Rescore *rescore)
 void rescore_advance(Rescore *rescore, int64_t to, double budget_s)
 {
     const RecordedRun *run = rescore->run;
-    double until = now_s() + budget_s;
+    double until = clock_s(CLOCK_MONOTONIC) + budget_s;
     XrayControl unseen = {0};
     to = to < run->step_count ? to : run->step_count;
-    while (rescore->different < 0 && rescore->steps < to && now_s() < until) {
+    while (rescore->different < 0 && rescore->steps < to && clock_s(CLOCK_MONOTONIC) < until) {
         int64_t i = rescore->steps++;
         Command command = {run->command[2 * i], run->command[2 * i + 1]};
         simulator_step(rescore->simulator, command);

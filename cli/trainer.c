@@ -10,11 +10,11 @@
 #include "render/gl_canvas.h"
 #include "render/png_file.h"
 #include "render/pulse_clock.h"
+#include "sim/clock.h"
 
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 enum { PADS = 4 };
@@ -37,20 +37,13 @@ typedef struct Trainer {
     PulseClock pulses;
     TrainerCine cine;
     double begun_s;                  // wall clock
-    double frame_s, frame_cpu_s;     // … and process CPU time at the last frame
+    double frame_cpu_s;              // process CPU time at the last frame
     bool is_paused, has_told_end;
     char trainee[64];
     time_t began_at;
     TimeHistogram frame_cpu_ns;
     TrainerFigures *figures;
 } Trainer;
-
-static double clock_s(clockid_t which)
-{
-    struct timespec now;
-    clock_gettime(which, &now);
-    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-}
 
 static double since_begin(const Trainer *trainer) { return clock_s(CLOCK_MONOTONIC) - trainer->begun_s; }
 

@@ -1,5 +1,6 @@
 #include "sim/realtime.h"
 
+#include "sim/clock.h"
 #include "sim/triple_buffer.h"
 
 #include <pthread.h>
@@ -34,13 +35,6 @@ struct Realtime {
 
 RealtimeOptions realtime_default_options(void) { return (RealtimeOptions){.pose_ms = 10, .xray = xray_default_control()}; }
 
-static double wall_s(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-}
-
 static Command ask_hands(void *context)
 {
     Realtime *realtime = context;
@@ -63,7 +57,7 @@ static void renew_figures(Realtime *realtime)
     figures->late_us[0] = histogram_quantile(late, 0.5) / 1000;
     figures->late_us[1] = histogram_quantile(late, 0.99) / 1000;
     figures->late_us[2] = (double)late->largest / 1000;
-    double real = wall_s(), simulated = simulator_time_s(realtime->options.simulator);
+    double real = clock_s(CLOCK_MONOTONIC), simulated = simulator_time_s(realtime->options.simulator);
     if (real - realtime->factor_from_s >= 1) {
         figures->real_time_factor = (simulated - realtime->factor_from_simulated_s) / (real - realtime->factor_from_s);
         realtime->factor_from_s = real;
@@ -128,7 +122,7 @@ static void *run_session(void *argument)
             continue;
         }
         realtime->figures.state = REALTIME_RUNNING;
-        realtime->factor_from_s = wall_s();
+        realtime->factor_from_s = clock_s(CLOCK_MONOTONIC);
         realtime->factor_from_simulated_s = simulator_time_s(realtime->options.simulator);
         simulator_drive(realtime->options.simulator, &drive);
     }
@@ -193,10 +187,7 @@ const Moment *realtime_moment(Realtime *realtime)
 double realtime_cpu_s(const Realtime *realtime)
 {
     clockid_t clock;
-    struct timespec used = {0};
-    if (pthread_getcpuclockid(realtime->thread, &clock) == 0)
-        clock_gettime(clock, &used);
-    return (double)used.tv_sec + (double)used.tv_nsec * 1e-9;
+    return pthread_getcpuclockid(realtime->thread, &clock) == 0 ? clock_s(clock) : 0;
 }
 
 RealtimeFigures realtime_stop(Realtime *realtime)
