@@ -424,15 +424,17 @@ static void fill(int x, int y, int width, int height, float red, float green, fl
 }
 
 // What lies beside the square, and the sign of a held picture: two bars, as of a player that pauses.
-static void draw_surroundings(const Fluoroscope *f, ViewPort port)
+static void draw_surroundings(const Fluoroscope *f, ViewPort port, bool leaves_surroundings)
 {
     int x = f->corner[0], y = f->corner[1], side = f->side;
     const float dark = 0.016f;
     glEnable(GL_SCISSOR_TEST);
-    fill(port.x, port.y, x - port.x, port.height, dark, dark, dark);
-    fill(x + side, port.y, port.x + port.width - x - side, port.height, dark, dark, dark);
-    fill(x, port.y, side, y - port.y, dark, dark, dark);
-    fill(x, y + side, side, port.y + port.height - y - side, dark, dark, dark);
+    if (!leaves_surroundings) {
+        fill(port.x, port.y, x - port.x, port.height, dark, dark, dark);
+        fill(x + side, port.y, port.x + port.width - x - side, port.height, dark, dark, dark);
+        fill(x, port.y, side, y - port.y, dark, dark, dark);
+        fill(x, y + side, side, port.y + port.height - y - side, dark, dark, dark);
+    }
     if (f->is_held) {
         int unit = side / 90 > 2 ? side / 90 : 2, left = x + 5 * unit, bottom = y + side - 8 * unit;
         fill(left - unit, bottom - unit, 5 * unit, 5 * unit, 0.05f, 0.05f, 0.05f);
@@ -468,7 +470,7 @@ void fluoroscope_draw(Fluoroscope *f, const FluoroscopeFrame *frame, ViewPort po
     f->has_picture = true;
     f->layers_are_stale = false;
     layers_show(&f->programs, &f->now->picture, &f->tone, f->shown.pulse, port.framebuffer, f->corner[0], f->corner[1], side);
-    draw_surroundings(f, port);
+    draw_surroundings(f, port, frame->leaves_surroundings);
 }
 
 FluoroscopeState fluoroscope_state(const Fluoroscope *f)

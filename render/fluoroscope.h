@@ -51,6 +51,7 @@ typedef struct FluoroscopeFrame {
     XrayControl xray;
     const float *contrast;         // (N of the tree) concentration of contrast agent, 0 to 1; NULL: none
     uint32_t pulse;                // number of the X-ray pulse: seeds the noise; the same pulse gives the same picture
+    bool leaves_surroundings;      // what lies beside the square has been cleared and stays as it is: saves 1 ms of CPU without a GPU
 } FluoroscopeFrame;
 
 void fluoroscope_draw(Fluoroscope *fluoroscope, const FluoroscopeFrame *frame, ViewPort port);
