@@ -353,7 +353,8 @@ static bool read_options(int argc, char **argv, DevicesOptions *options, int *co
 {
     enum { MAP = 256, JSON, WATCH, DURATION, QUIET, HELP };
     static const struct option table[] = {{"map", required_argument, NULL, MAP}, {"json", required_argument, NULL, JSON}, {"watch", no_argument, NULL, WATCH},
-                                          {"duration-s", required_argument, NULL, DURATION}, {"quiet", no_argument, NULL, QUIET}, {"help", no_argument, NULL, HELP}, {0}};
+                                          {"duration-s", required_argument, NULL, DURATION}, {"quiet", no_argument, NULL, QUIET},
+                                          {"help", no_argument, NULL, HELP}, {0}};
     *code = EXIT_BAD_INPUT;
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "h", table, NULL)) != -1;) {

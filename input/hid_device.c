@@ -100,8 +100,9 @@ static void *open_device(void *context, const char *path, char *why, size_t capa
         char rule[120];
         udev_rule(path, rule, sizeof rule);
         if (code == EACCES || code == EPERM)
-            snprintf(why, capacity, "%s may not be read and written by you; as root: echo '%s' >> /etc/udev/rules.d/70-seldinger.rules && udevadm control --reload; "
-                                    "then plug it in again", path, rule);
+            snprintf(why, capacity,
+                     "%s may not be read and written by you; as root: echo '%s' >> /etc/udev/rules.d/70-seldinger.rules && udevadm control --reload; "
+                     "then plug it in again", path, rule);
         else
             snprintf(why, capacity, "%s: %s", path, strerror(code));
         return NULL;

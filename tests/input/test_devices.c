@@ -70,7 +70,8 @@ static void wrong_use_and_wrong_maps_are_told(void **state)
     assert_non_null(strstr(said, ":3:"));
     assert_null(strstr(said, "HID devices"));
     unlink(path);
-    static const char *const wrong[] = {"--nothing", "file.yaml", "--map", "--map /nowhere.yaml", "--duration-s 3", "--watch --duration-s -1", "--json /nowhere/f.json"};
+    static const char *const wrong[] = {"--nothing", "file.yaml", "--map", "--map /nowhere.yaml", "--duration-s 3", "--watch --duration-s -1",
+                                        "--json /nowhere/f.json"};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
         if (run(wrong[i], said, sizeof said) != 2 || !said[0])
             fail_msg("devices %s said '%s'", wrong[i], said);
@@ -107,7 +108,8 @@ static void watching_shows_raw_values_and_what_the_map_makes_of_them(void **stat
     close(kept);
     unlink(path);
     assert_true(watched && !none);
-    static const char *const words[] = {"2 reports, 1 that the descriptor does not describe", "logical_min -512, logical_max 496 so far", "twist 240.0 deg/s",
+    static const char *const words[] = {"2 reports, 1 that the descriptor does not describe", "logical_min -512, logical_max 496 so far",
+                                        "twist 240.0 deg/s",
                                         "push 40.00 mm/s", ", pedal"};
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
         if (!strstr(said, words[i]))
