@@ -11,7 +11,8 @@
 // HID Usage Tables 1.4, section 18
 enum { SET_EFFECT = 0x21, BLOCK_INDEX = 0x22, EFFECT_TYPE = 0x25, CONSTANT_FORCE = 0x26, DURATION = 0x50, GAIN = 0x52, TRIGGER_BUTTON = 0x53,
        AXES_ENABLE = 0x55, DIRECTION_ENABLE = 0x56, DIRECTION = 0x57, MAGNITUDE = 0x70, SET_CONSTANT_FORCE = 0x73, EFFECT_OPERATION_REPORT = 0x77,
-       OP_START = 0x79, OP_STOP = 0x7b, LOOP_COUNT = 0x7c, DEVICE_GAIN = 0x7e, POOL = 0x7f, BLOCK_LOAD = 0x89, LOAD_SUCCESS = 0x8c, ENABLE_ACTUATORS = 0x97, STOP_ALL = 0x99,
+       OP_START = 0x79, OP_STOP = 0x7b, LOOP_COUNT = 0x7c, DEVICE_GAIN = 0x7e, POOL = 0x7f,
+       BLOCK_LOAD = 0x89, LOAD_SUCCESS = 0x8c, ENABLE_ACTUATORS = 0x97, STOP_ALL = 0x99,
        DEVICE_RESET = 0x9a, MANAGED = 0xa9, CREATE_NEW_EFFECT = 0xab };
 // once a millisecond; a tick that comes a little early after a late one is taken, or reports each millisecond would let through every other one
 enum { PERIOD_US = 1000, LEAST_GAP_US = 750, LOAD_ATTEMPTS = 3, MOST_FAILURES = 20 };
