@@ -428,7 +428,7 @@ static void normal_bends_are_no_buckling(void **state)
         Practice *p = practice_begin(scene[i], NULL);
         double most = 0;
         for (int k = 0; k < 3; k++) {                        // in, half out, in again
-            for (int n = 0; n < 30; n++)
+            for (int n = 0; n < 22; n++)
                 most = fmax(most, practice_go(p, k == 1 ? -25 : 25, 0.1).lost_mm / score_figures(p->score).lost_limit_mm);
         }
         ScoreFigures f = score_figures(p->score);
