@@ -118,7 +118,7 @@ static void film_draw(Film *film, double time_s)
     views_draw(film->views, &frame, &layout, options->width, options->height, film->canvas.framebuffer);
     if (options->has_panels) {
         WindowInput input = {.width = options->width, .height = options->height, .scale = 1, .mouse_x = -1, .mouse_y = -1, .has_focus = true};
-        sample_plots(film, time_s);
+        sample_plots(film, pose->time_s);   // a time beyond the end is the end
         trainer_panel_show(&film->shown, film->scene, pose, score_now(film), NULL, &pose->xray);
         film->shown.state.now_s = pose->time_s;
         trainer_panel_views(&film->shown, &film->desk, film->views, &pose->xray);
@@ -128,12 +128,33 @@ static void film_draw(Film *film, double time_s)
     gl_canvas_read(&film->canvas, film->rgb);
 }
 
+// DSA and roadmap show what earlier pulses took: those of the last two minutes are gone through.
+static void take_earlier_pulses(Film *film, double time_s)
+{
+    const double most_s = 120;
+    playback_seek(film->playback, time_s);
+    if (playback_pose(film->playback)->xray.mode == (float)XRAY_LIVE)
+        return;
+    int64_t drawn = -1;
+    fluoroscope_forget(views_fluoroscope(film->views));
+    for (double t = fmax(0, time_s - most_s); t < time_s; t += 1.0 / 60) {
+        playback_seek(film->playback, t);
+        const PulseClock *pulses = playback_pulses(film->playback);
+        const Pose *pose = playback_pose(film->playback);
+        FluoroscopeFrame frame = {.pose = pose, .xray = pose->xray, .contrast = playback_contrast(film->playback), .pulse = (uint32_t)pulses->count};
+        if (pulses->count != drawn)
+            fluoroscope_draw(views_fluoroscope(film->views), &frame, (ViewPort){film->canvas.framebuffer, 0, 0, film->options->height, film->options->height});
+        drawn = pulses->count;
+    }
+}
+
 bool film_picture(const char *path, const FilmOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults)
 {
     Film film;
     char message[256];
     if (!film_open(&film, path, options, run, scene, open, faults))
         return false;
+    take_earlier_pulses(&film, options->from_s);
     film_draw(&film, options->from_s);
     film_draw(&film, options->from_s);   // a panel's widths are known from its frame before
     bool good = png_file_write(path, options->width, options->height, film.rgb, message, sizeof message);
@@ -161,6 +182,7 @@ bool film_movie(const char *path, const FilmOptions *options, const RecordedRun 
     ProgressBar bar;
     Progress progress = progress_bar(&bar, "film", options->is_quiet);
     bool good = true;
+    take_earlier_pulses(&film, options->from_s);
     film_draw(&film, options->from_s);
     for (long i = 0; good && i < count; i++) {
         film_draw(&film, options->from_s + (double)i * options->speed / options->fps);
