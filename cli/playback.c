@@ -9,6 +9,7 @@ enum { STRIDE = 10, KEEP_EVERY = 500, MOST_KEPT = 1024 };
 typedef struct Place {
     int64_t step;
     PulseClock pulses;
+    double injected_ml;          // since the last whole stride
     Contrast *contrast;
 } Place;
 
@@ -60,33 +61,33 @@ static void keep(Playback *playback)
         return;
     if (contrast)
         contrast_copy(contrast, playback->now.contrast);
-    *place = (Place){playback->now.step, playback->now.pulses, contrast};
+    *place = playback->now;
+    place->contrast = contrast;
     playback->kept_count++;
 }
 
+// Contrast goes on in whole strides only, as in the session: else what is seen would depend on where one stopped on the way.
 static void go_on(Playback *playback, int64_t step)
 {
     const RecordedRun *run = playback->run;
     Place *now = &playback->now;
+    double dt = run->step_ms / 1000, stride_s = STRIDE * dt;
     while (now->step < step) {
-        double injected = 0, dt = run->step_ms / 1000;
-        int64_t end = now->step + STRIDE < step ? now->step + STRIDE : step;
-        end -= end % STRIDE && end - now->step > end % STRIDE ? end % STRIDE : 0;   // whole strides but for the last
-        double passed = (double)(end - now->step) * dt;
-        for (; now->step < end; now->step++) {
-            const XrayControl *xray = control(playback, now->step);
-            pulse_clock_advance(&now->pulses, run->time_s[now->step], xray);
-            injected += (double)xray->contrast_ml_s * dt;
-        }
+        const XrayControl *xray = control(playback, now->step);
+        pulse_clock_advance(&now->pulses, run->time_s[now->step], xray);
+        now->injected_ml += (double)xray->contrast_ml_s * dt;
+        if (++now->step % STRIDE != 0)
+            continue;
         if (now->contrast)
-            contrast_advance(now->contrast, passed, tip_node(playback, now->step - 1), injected / passed);
+            contrast_advance(now->contrast, stride_s, tip_node(playback, now->step - 1), now->injected_ml / stride_s);
+        now->injected_ml = 0;
         keep(playback);
     }
 }
 
 Playback *playback_open(const RecordedRun *run, const Scene *scene, const VesselTree *tree, const XrayControl *unseen)
 {
-    Playback *playback = run->frame_count > 0 ? calloc(1, sizeof *playback) : NULL;
+    Playback *playback = run->step_count > 0 && run->frame_count > 0 ? calloc(1, sizeof *playback) : NULL;
     if (!playback)
         return NULL;
     playback->run = run;
@@ -125,16 +126,15 @@ bool playback_seek(Playback *playback, double time_s)
     const RecordedRun *run = playback->run;
     Place *now = &playback->now;
     double dt = run->step_ms / 1000, first = run->time_s[0] - dt;
-    int64_t step = (int64_t)floor((time_s - first) / dt + 1e-6), before = now->step;
-    step = step < 1 ? 1 : step > run->step_count ? run->step_count : step;
+    int64_t step = (int64_t)fmax(1, fmin(floor((time_s - first) / dt + 1e-6), (double)run->step_count)), before = now->step;
     int nearest = 0;
     while (nearest + 1 < playback->kept_count && playback->kept[nearest + 1].step <= step)
         nearest++;
     if (playback->kept_count > 0 && (step < now->step || playback->kept[nearest].step > now->step)) {
-        now->step = playback->kept[nearest].step;
-        now->pulses = playback->kept[nearest].pulses;
-        if (now->contrast)
-            contrast_copy(now->contrast, playback->kept[nearest].contrast);
+        Contrast *contrast = now->contrast;
+        *now = playback->kept[nearest];
+        if ((now->contrast = contrast))
+            contrast_copy(contrast, playback->kept[nearest].contrast);
     }
     go_on(playback, step);
     int64_t row = step - 1;

@@ -208,7 +208,7 @@ static bool draw(const ReplayOptions *options, const RecordedRun *run, Scene *sc
     film.is_quiet = options->quiet;
     film.lao_deg = options->lao_deg;
     film.cra_deg = options->cra_deg;
-    film.from_s = options->at_s;
+    film.from_s = fmin(options->at_s, run->step_count > 0 ? run->time_s[run->step_count - 1] : 0);
     bool good = !options->picture || film_picture(options->picture, &film, run, scene, open, faults);
     film.from_s = options->from_s;
     return (!options->movie || film_movie(options->movie, &film, run, scene, open, faults)) && good;
