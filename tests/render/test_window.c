@@ -1,6 +1,7 @@
 // The window under a virtual X server, driven from outside by xdotool as a user's keys and mouse would: what comes out of the window, the key table and
 // the panel together. Skipped by name where Xvfb or xdotool is not installed (packages xvfb, xdotool).
 #define _GNU_SOURCE   // dl_iterate_phdr
+#include "render/gl_canvas.h"
 #include "render/panel.h"
 #include "render/window.h"
 
@@ -78,7 +79,7 @@ static bool start_server(void)
         return false;
     char number[16];
     snprintf(number, sizeof number, "%d", end[1]);
-    char *argv[] = {"Xvfb", "-displayfd", number, "-screen", "0", "1600x1000x24", "-nolisten", "tcp", "-noreset", NULL};
+    char *argv[] = {"Xvfb", "-displayfd", number, "-screen", "0", "1920x1080x24", "-nolisten", "tcp", "-noreset", NULL};
     posix_spawn_file_actions_t quiet;
     posix_spawn_file_actions_init(&quiet);
     posix_spawn_file_actions_addopen(&quiet, 2, "/dev/null", O_WRONLY, 0);
@@ -174,7 +175,7 @@ static bool paused(void) { return desk.pressed[ACTION_PAUSE] > 0; }
 static bool has_focus(void) { return desk.input->has_focus; }
 static bool lost_focus(void) { return !desk.input->has_focus; }
 static bool is_resized(void) { return desk.input->width == 1024 && desk.input->height == 600; }
-static bool fills_screen(void) { return desk.input->width == 1600 && desk.input->height == 1000; }
+static bool fills_screen(void) { return desk.input->width == 1920 && desk.input->height == 1080; }
 static bool asks(void) { return panel_is_asking(desk.panel); }
 static bool asks_no_more(void) { return !asks(); }
 static bool quits(void) { return desk.pressed[ACTION_QUIT] > 0; }
@@ -368,17 +369,78 @@ static void a_name_is_typed(void **unused)
     assert_true(comes_to(asks_no_more));
 }
 
+// Process CPU, the driver's threads with it.
+static void print_cost(void)
+{
+    struct timespec t[2];
+    enum { FRAMES = 60 };
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t[0]);
+    for (int i = 0; i < FRAMES; i++) {
+        desk.state.time_s += 1.0 / 30;
+        desk.state.force_n = 0.06 + 0.02 * sin(0.3 * i);
+        panel_draw(desk.panel, desk.input, &desk.state, 0);
+        glFinish();
+    }
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t[1]);
+    double ms = 1e3 * (double)(t[1].tv_sec - t[0].tv_sec) + 1e-6 * (double)(t[1].tv_nsec - t[0].tv_nsec);
+    print_message("panel alone in a window of %dx%d: %.2f ms CPU a frame (%s)\n", desk.input->width, desk.input->height, ms / FRAMES,
+                  window_renderer(desk.window));
+}
+
+static void draw_fresh(unsigned framebuffer, const WindowInput *input)
+{
+    char message[256];
+    Panel *panel = panel_create(message, sizeof message);
+    assert_non_null(panel);
+    for (int i = 0; i < 4; i++) {
+        glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+        glClearColor(0.2f, 0.4f, 0.6f, 1);
+        glClear(GL_COLOR_BUFFER_BIT);
+        panel_draw(panel, input, &desk.state, framebuffer);
+    }
+    panel_destroy(panel);
+}
+
+// A window's buffer is filled in another way than one off screen (rows, order of bytes): the same picture must come out.
+static void the_window_shows_what_is_drawn_off_screen(void **unused)
+{
+    (void)unused;
+    if (!desk.panel)
+        skip();
+    WindowInput input = {.width = desk.input->width, .height = desk.input->height, .scale = 1, .mouse_x = -1, .mouse_y = -1, .has_focus = true};
+    size_t bytes = (size_t)input.width * (size_t)input.height * 3;
+    uint8_t *window = malloc(bytes), *canvas = malloc(bytes);
+    assert_true(window && canvas);
+    draw_fresh(0, &input);
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, 0);
+    glPixelStorei(GL_PACK_ALIGNMENT, 1);
+    glReadPixels(0, 0, input.width, input.height, GL_RGB, GL_UNSIGNED_BYTE, window);
+    GlCanvas off_screen;
+    char message[256];
+    assert_true(gl_canvas_create(&off_screen, input.width, input.height, 1, message, sizeof message));
+    draw_fresh(off_screen.framebuffer, &input);
+    gl_canvas_read(&off_screen, canvas);
+    size_t row = (size_t)input.width * 3;
+    for (int y = 0; y < input.height; y++)   // OpenGL's first row is the lowest, the canvas's the upper one
+        assert_memory_equal(window + (size_t)(input.height - 1 - y) * row, canvas + (size_t)y * row, row);
+    gl_canvas_destroy(&off_screen);
+    free(window);
+    free(canvas);
+}
+
 static void it_is_resized_and_fills_the_screen(void **unused)
 {
     (void)unused;
     if (!desk.panel)
         skip();
+    print_cost();
     hand("search --name Seldinger.window.test windowsize --sync 1024 600");
     assert_true(comes_to(is_resized));
     assert_int_equal(glGetError(), GL_NO_ERROR);
     window_set_full_screen(desk.window, true);
     assert_true(comes_to(fills_screen));
     assert_true(window_is_full_screen(desk.window));
+    print_cost();
     window_set_full_screen(desk.window, false);
     assert_true(comes_to(is_resized));
     assert_int_equal(glGetError(), GL_NO_ERROR);
@@ -450,26 +512,6 @@ static void no_joystick_is_no_joystick(void **unused)
         }
 }
 
-static void what_a_frame_costs_in_the_window(void **unused)
-{
-    (void)unused;
-    if (!desk.panel)
-        skip();
-    struct timespec t[2];
-    enum { FRAMES = 60 };
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t[0]);
-    for (int i = 0; i < FRAMES; i++) {
-        desk.state.time_s += 1.0 / 30;
-        desk.state.force_n = 0.06 + 0.02 * sin(0.3 * i);
-        panel_draw(desk.panel, desk.input, &desk.state, 0);
-        glFinish();
-    }
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t[1]);
-    double ms = 1e3 * (double)(t[1].tv_sec - t[0].tv_sec) + 1e-6 * (double)(t[1].tv_nsec - t[0].tv_nsec);
-    print_message("panel alone in a window of %dx%d: %.2f ms CPU a frame (%s)\n", desk.input->width, desk.input->height, ms / FRAMES,
-                  window_renderer(desk.window));
-}
-
 // A window that takes the focus, until SIGTERM.
 static int other_window(void)
 {
@@ -508,7 +550,7 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(the_mouse_turns_and_scrolls_in_a_view),
                                        cmocka_unit_test(loss_of_focus_stops_the_tool),
                                        cmocka_unit_test(a_name_is_typed),
-                                       cmocka_unit_test(what_a_frame_costs_in_the_window),
+                                       cmocka_unit_test(the_window_shows_what_is_drawn_off_screen),
                                        cmocka_unit_test(it_is_resized_and_fills_the_screen),
                                        cmocka_unit_test(no_joystick_is_no_joystick),
                                        cmocka_unit_test(frames_are_paced),
