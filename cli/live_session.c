@@ -60,9 +60,10 @@ bool live_session_open(LiveSession *session, const Scene *scene, const OpenVesse
     }
     if (good)
         return true;
-    if (session->recording)
+    if (session->recording) {
         recording_close(session->recording, session->simulator, faults);
-    session->recording = NULL;
+        remove(session->record_path);   // of a session that never was
+    }
     live_session_free(session);
     return false;
 }
