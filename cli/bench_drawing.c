@@ -78,7 +78,7 @@ typedef struct Case {
     const char *name;
     PanelView view;
     int width, height;
-    bool arm_turns, camera_turns;
+    bool flows, arm_turns, camera_turns;
     double must_ms;                  // issue 6; 0: none
     int only;                        // 0: everything; else 1 + the one view that is drawn, or ONLY_PANELS
 } Case;
@@ -86,14 +86,20 @@ typedef struct Case {
 enum { ONLY_PANELS = 1 + VIEW_COUNT };
 
 static const Case cases[] = {
-    {"fluoroscopy", VIEW_FLUOROSCOPY, 1280, 720, false, false, 12, 0},   {"fluoroscopy", VIEW_FLUOROSCOPY, 1920, 1080, false, false, 20, 0},
-    {"fluoroscopy, C-arm turns", VIEW_FLUOROSCOPY, 1280, 720, true, false, 40, 0}, {"fluoroscopy, C-arm turns", VIEW_FLUOROSCOPY, 1920, 1080, true, false, 40, 0},
-    {"3D", VIEW_3D, 1280, 720, false, false, 0, 0},                      {"3D, camera turns", VIEW_3D, 1280, 720, false, true, 0, 0},
-    {"angioscopy", VIEW_ANGIOSCOPY, 1280, 720, false, false, 33, 0},     {"all three", VIEW_ALL, 1280, 720, false, false, 33, 0},
-    {"- of the first: panels", VIEW_FLUOROSCOPY, 1280, 720, false, false, 0, ONLY_PANELS},
-    {"- fluoroscopy", VIEW_FLUOROSCOPY, 1280, 720, false, false, 0, 1 + VIEW_FLUOROSCOPY},
-    {"- 3D, inset", VIEW_FLUOROSCOPY, 1280, 720, false, false, 0, 1 + VIEW_3D},
-    {"- angioscopy, inset", VIEW_FLUOROSCOPY, 1280, 720, false, false, 0, 1 + VIEW_ANGIOSCOPY},
+    {"fluoroscopy", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 12, 0},
+    {"fluoroscopy", VIEW_FLUOROSCOPY, 1920, 1080, false, false, false, 20, 0},
+    {"fluoroscopy, contrast flows", VIEW_FLUOROSCOPY, 1280, 720, true, false, false, 12, 0},
+    {"fluoroscopy, contrast flows", VIEW_FLUOROSCOPY, 1920, 1080, true, false, false, 20, 0},
+    {"fluoroscopy, C-arm turns", VIEW_FLUOROSCOPY, 1280, 720, true, true, false, 40, 0},
+    {"fluoroscopy, C-arm turns", VIEW_FLUOROSCOPY, 1920, 1080, true, true, false, 40, 0},
+    {"3D", VIEW_3D, 1280, 720, true, false, false, 0, 0},
+    {"3D, camera turns", VIEW_3D, 1280, 720, true, false, true, 0, 0},
+    {"angioscopy", VIEW_ANGIOSCOPY, 1280, 720, true, false, false, 33, 0},
+    {"all three", VIEW_ALL, 1280, 720, true, false, false, 33, 0},
+    {"- of the first: panels", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 0, ONLY_PANELS},
+    {"- fluoroscopy", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 0, 1 + VIEW_FLUOROSCOPY},
+    {"- 3D, inset", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 0, 1 + VIEW_3D},
+    {"- angioscopy, inset", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 0, 1 + VIEW_ANGIOSCOPY},
 };
 enum { CASES = sizeof cases / sizeof cases[0] };
 
@@ -107,7 +113,7 @@ static void draw(Studio *studio, const Case *what, int frame)
     if (what->camera_turns)
         free_camera_orbit(&studio->desk.look.camera, 3, 0);
     PanelLayout layout = panel_layout(what->width, what->height, 1, what->view, true);
-    ViewsFrame views = {.pose = pose, .xray = &xray, .contrast = lesson->node_count ? lesson->concentration : NULL, .pulse = ++studio->pulse,
+    ViewsFrame views = {.pose = pose, .xray = &xray, .contrast = what->flows && lesson->node_count ? lesson->concentration : NULL, .pulse = ++studio->pulse,
                         .look = &studio->desk.look};
     WindowInput input = {.width = what->width, .height = what->height, .scale = 1, .mouse_x = -1, .mouse_y = -1, .has_focus = true};
     for (int i = 0; what->only && i < VIEW_COUNT; i++)

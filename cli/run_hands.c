@@ -20,7 +20,7 @@ static void nap(long milliseconds) { nanosleep(&(struct timespec){.tv_nsec = mil
 
 static void say_all(Hands *hands)
 {
-    char text[256];
+    char text[HAND_MESSAGE_LENGTH];
     while (hands_message(hands, text, sizeof text))
         fprintf(stderr, "device: %s\n", text);
 }

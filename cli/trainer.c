@@ -150,6 +150,13 @@ static void drive_by_pads(Trainer *trainer)
         WindowGamepad pad;
         Gamepad *gamepad = &trainer->gamepad[i];
         bool is_there = window_gamepad(trainer->window, i, &pad), was_there = atomic_load(&trainer->pad[i].state) == HAND_READY;
+        int vendor, product;
+        if (is_there && gamepad_ids_of_guid(pad.guid, &vendor, &product) && hands_drives(trainer->hands, vendor, product)) {
+            if (was_there)
+                gamepad_lost(gamepad, &trainer->pad[i]);   // its reports are read as they come: one hand, not two
+            gamepad->map = NULL;
+            continue;
+        }
         if (!is_there) {
             if (was_there) {
                 gamepad_lost(gamepad, &trainer->pad[i]);
@@ -257,7 +264,7 @@ static bool obey(Trainer *trainer, const PanelActions *actions, const WindowInpu
 
 static void tell_news(Trainer *trainer, const Moment *moment)
 {
-    char text[256];
+    char text[HAND_MESSAGE_LENGTH];
     const LessonView *lesson = moment->extra;
     while (trainer->hands && hands_message(trainer->hands, text, sizeof text))
         say(trainer, MARK_WARNING, "%s", text);

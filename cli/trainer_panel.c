@@ -146,5 +146,12 @@ void trainer_panel_views(TrainerPanel *panel, const Desk *desk, Views *views, co
     state->has_model = desk->look.show_model;
     state->has_arrows = desk->look.show_arrows;
     state->is_pedal_latched = desk->pedal_latched;
+    const char *line = fluoroscope.is_out_of_beam ? "Part of the vessel lies beside the beam: no contrast is drawn. Move the table or the C-arm back"
+                       : xray->mode == XRAY_DSA && fluoroscope.mask_has_moved ? "C-arm, table or field have moved since the mask was taken: M takes a new one"
+                                                                              : NULL;
+    if (line && !state->warning) {
+        snprintf(panel->warning, sizeof panel->warning, "%s", line);
+        state->warning = panel->warning;
+    }
     state->is_roadmap_ready = xray->mode == XRAY_DSA ? fluoroscope.has_mask : fluoroscope.has_roadmap;
 }

@@ -89,10 +89,11 @@ void views_destroy(Views *views)
     free(views);
 }
 
-static void draw_view(Views *views, PanelView view, const ViewsFrame *frame, ViewPort port)
+static void draw_view(Views *views, PanelView view, const ViewsFrame *frame, ViewPort port, bool is_cleared)
 {
     if (view == VIEW_FLUOROSCOPY) {
-        FluoroscopeFrame xray = {.pose = frame->pose, .xray = *frame->xray, .contrast = frame->contrast, .pulse = frame->pulse};
+        FluoroscopeFrame xray = {.pose = frame->pose, .xray = *frame->xray, .contrast = frame->contrast, .pulse = frame->pulse,
+                                 .leaves_surroundings = is_cleared};
         fluoroscope_draw(views->fluoroscope, &xray, port);
     } else if (view == VIEW_3D) {
         vessel_scene_draw(views->scene, frame->pose, frame->look, port);
@@ -111,12 +112,12 @@ static void draw_inset(Views *views, PanelView view, const ViewsFrame *frame, Vi
         gl_canvas_destroy(inset);
         if (!gl_canvas_create(inset, port.width, port.height, 1, NULL, 0)) {
             *inset = (GlCanvas){0};
-            draw_view(views, view, frame, port);
+            draw_view(views, view, frame, port, true);
             return;
         }
     }
     if (!fits || frame->is_still || (views->frames + (int)view) % 2 == 0)
-        draw_view(views, view, frame, (ViewPort){inset->framebuffer, 0, 0, port.width, port.height});
+        draw_view(views, view, frame, (ViewPort){inset->framebuffer, 0, 0, port.width, port.height}, false);
     glBindFramebuffer(GL_READ_FRAMEBUFFER, inset->framebuffer);
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, port.framebuffer);
     glBlitFramebuffer(0, 0, port.width, port.height, port.x, port.y, port.x + port.width, port.y + port.height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
@@ -135,7 +136,7 @@ void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout
         if (port.width <= 0 || port.height <= 0)
             continue;
         if (i == (int)layout->main || layout->main == VIEW_ALL)
-            draw_view(views, (PanelView)i, frame, port);
+            draw_view(views, (PanelView)i, frame, port, true);
         else
             draw_inset(views, (PanelView)i, frame, port);
     }
