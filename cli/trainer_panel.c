@@ -91,9 +91,9 @@ static void warn(TrainerPanel *panel, const Pose *pose, const RealtimeFigures *f
         state->warnings |= WARN_OUTSIDE;
     if (report->flags & STEP_NOT_CONVERGED)
         state->warnings |= WARN_NOT_CONVERGED;
-    if (report->flags & STEP_LIMITED)
-        state->warnings |= WARN_STALLED;
-    const char *line = report->flags & STEP_FULLY_INSERTED ? "The whole tool is in: there is no more to push" : NULL;
+    const char *line = report->flags & STEP_FULLY_INSERTED ? "The whole tool is in: there is no more to push"
+                       : report->flags & STEP_LIMITED      ? "The tool takes less than the hand feeds: it is jammed, or it snaps"
+                                                           : NULL;
     if (figures) {
         if (figures->state == REALTIME_RUNNING && figures->real_time_factor > 0 && figures->real_time_factor < slow_factor)
             state->warnings |= WARN_SLOW;
@@ -136,10 +136,36 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
     warn(panel, pose, figures);
 }
 
+// What lies where in the 3D view: targets with their distance from the tip, the sheath's mouth.
+static void label_scene(TrainerPanel *panel, const Desk *desk, const VesselScene *scene)
+{
+    PanelState *state = &panel->state;
+    VesselSceneLabel found[PANEL_LABELS];
+    int count = vessel_scene_labels(scene, found, PANEL_LABELS);
+    state->label_count = 0;
+    state->label = panel->label;
+    for (int i = 0; i < count && i < PANEL_LABELS; i++) {
+        const VesselSceneLabel *it = &found[i];
+        if (!it->is_in_view || it->kind == LABEL_TIP || (it->kind == LABEL_TARGET && !desk->look.show_targets))
+            continue;
+        char *text = panel->label_text[state->label_count];
+        if (it->kind == LABEL_TARGET && isfinite(it->distance_mm))
+            snprintf(text, sizeof panel->label_text[0], "%.63s, %.0f mm", it->name, it->distance_mm);
+        else
+            snprintf(text, sizeof panel->label_text[0], "%.63s", it->name);
+        panel->label[state->label_count++] = (PanelLabel){it->x, it->y, it->radius, text};
+    }
+    ScaleBar bar = vessel_scene_scale_bar(scene, 140);
+    state->bar_mm = bar.length_mm;
+    state->bar_pixels = bar.pixels;
+    state->force_full_scale_n = desk->look.force_full_scale_n;
+}
+
 void trainer_panel_views(TrainerPanel *panel, const Desk *desk, Views *views, const XrayControl *xray)
 {
     PanelState *state = &panel->state;
     FluoroscopeState fluoroscope = fluoroscope_state(views_fluoroscope(views));
+    label_scene(panel, desk, views_scene(views));
     state->view = desk->view;
     state->is_following = desk->look.follow_tip;
     state->has_section = desk->look.section;

@@ -7,7 +7,7 @@
 #include "sim/realtime.h"
 #include "sim/score.h"
 
-enum { PANEL_FIGURES = 12, PANEL_ERRORS = 12, PANEL_DEVICES = 14 };
+enum { PANEL_FIGURES = 12, PANEL_ERRORS = 12, PANEL_DEVICES = 14, PANEL_LABELS = 24 };
 
 typedef struct TrainerPanel {
     PanelState state;                // what panel_draw takes; its strings lie below
@@ -16,6 +16,8 @@ typedef struct TrainerPanel {
     const char *error[PANEL_ERRORS];
     char device_name[PANEL_DEVICES][96], device_note[PANEL_DEVICES][600];
     PanelDevice device[PANEL_DEVICES];
+    PanelLabel label[PANEL_LABELS];
+    char label_text[PANEL_LABELS][96];
     char tool[128], target[96], warning[200];
     char instructions[4200];
 } TrainerPanel;

@@ -53,6 +53,11 @@ typedef struct PanelDevice {
     const char *note;              // what it does or what is wrong; may be NULL
 } PanelDevice;
 
+typedef struct PanelLabel {        // words beside something in the 3D view; pixels from the view's upper left corner
+    double x, y, radius;           // its centre, and of what is drawn there
+    const char *text;
+} PanelLabel;
+
 // What is shown. Strings are borrowed for the call; NULL is an empty one. NaN in a figure shows as a dash.
 typedef struct PanelState {
     double now_s;                  // wall clock of the session, for messages and hints
@@ -82,6 +87,10 @@ typedef struct PanelState {
     // views
     PanelView view;
     bool is_following, has_section, has_model, has_arrows;
+    int label_count;
+    const PanelLabel *label;       // (label_count) of the 3D view
+    double bar_mm, bar_pixels;     // its scale bar; 0: none
+    double force_full_scale_n;     // top of its colours; 0: no legend
     // machine
     double step_median_us, step_p999_us, real_time_factor, frame_ms;
     int64_t missed_deadlines;

@@ -1,6 +1,8 @@
 // Letters over the views: the image's mode and angles as in an angio suite, warnings, the views' names.
 #include "render/panel_internal.h"
 
+#include "render/vessel_scene.h"
+
 #include <math.h>
 #include <stdio.h>
 
@@ -113,6 +115,49 @@ static void draw_banners(Panel *panel, const PanelState *state, GuiRect at)
     }
 }
 
+// A bar of colours for the wall force on the tool, least below.
+static void draw_force_legend(Panel *panel, GuiRect at, double full_scale_n)
+{
+    enum { STEPS = 32 };
+    Gui *gui = panel->gui;
+    float s = gui_scale(gui), pad = floorf(10 * s), width = floorf(12 * s), height = floorf(fminf(140 * s, at.height / 3));
+    float line = gui_line_height(gui, GUI_SMALL), x = at.x + at.width - pad - width, bottom = at.y + at.height - pad - line;
+    char text[32];
+    for (int i = 0; i < STEPS; i++) {
+        float top = bottom - height * (float)(i + 1) / STEPS;
+        gui_draw_fill(gui, (GuiRect){x, top, width, height / STEPS + 1}, vessel_scene_force_color(full_scale_n * (i + 0.5) / STEPS, full_scale_n));
+    }
+    snprintf(text, sizeof text, "%g N", full_scale_n);
+    label_right(panel, x - pad / 2, bottom - height, GUI_SMALL, gui_colors.text, text);
+    label_right(panel, x - pad / 2, bottom - line, GUI_SMALL, gui_colors.text, "0");
+    label_right(panel, at.x + at.width - pad, bottom + floorf(2 * s), GUI_SMALL, gui_colors.dim, "wall force");
+}
+
+static void draw_3d_labels(Panel *panel, const PanelState *state, GuiRect at)
+{
+    Gui *gui = panel->gui;
+    float s = gui_scale(gui), pad = floorf(10 * s), half = gui_line_height(gui, GUI_SMALL) / 2;
+    for (int i = 0; i < state->label_count; i++) {
+        const PanelLabel *words = &state->label[i];
+        float x = at.x + (float)words->x, y = at.y + (float)words->y - half, away = (float)words->radius + floorf(8 * s);
+        if (words->x < (double)at.width / 2)   // outwards: the vessel lies inwards
+            label_right(panel, x - away, y, GUI_SMALL, gui_colors.text, words->text);
+        else
+            label(panel, x + away, y, GUI_SMALL, gui_colors.text, words->text);
+    }
+    if (state->force_full_scale_n > 0)
+        draw_force_legend(panel, at, state->force_full_scale_n);
+    if (state->bar_pixels > 0) {
+        char text[32];
+        float x = at.x + pad, y = at.y + at.height - pad, end = x + (float)state->bar_pixels, tick = floorf(4 * s);
+        snprintf(text, sizeof text, "%g mm", state->bar_mm);
+        gui_draw_line(gui, x, y, end, y, gui_colors.text, floorf(2 * s));
+        gui_draw_line(gui, x, y - tick, x, y + 1, gui_colors.text, floorf(s));
+        gui_draw_line(gui, end, y - tick, end, y + 1, gui_colors.text, floorf(s));
+        label(panel, x, y - 2 * half - floorf(8 * s), GUI_SMALL, gui_colors.text, text);
+    }
+}
+
 void panel_draw_over_views(Panel *panel, const PanelState *state)
 {
     static const char *const view_name[VIEW_COUNT] = {"X-ray", "3D", "Angioscopy"};
@@ -132,6 +177,8 @@ void panel_draw_over_views(Panel *panel, const PanelState *state)
             snprintf(text, sizeof text, "%s  (%s)", view_name[i], key_table_text(view_action[i], key, sizeof key));
             label(panel, at.x + pad, at.y + pad / 2, GUI_SMALL, gui_colors.dim, text);
         }
+        if (i == VIEW_3D && is_main)
+            draw_3d_labels(panel, state, at);
         if (is_main)
             draw_banners(panel, state, at);
         gui_window_end(gui);
