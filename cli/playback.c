@@ -94,9 +94,7 @@ Playback *playback_open(const RecordedRun *run, const Scene *scene, const Vessel
     playback->scene = scene;
     playback->tree = tree;
     playback->unseen = *unseen;
-    // nobody looked where no step has a field
-    for (int64_t i = 0; run->xray && i < run->step_count && !playback->is_seen; i++)
-        playback->is_seen = run->xray[i].field_mm > 0;
+    playback->is_seen = recorded_run_was_watched(run);
     int64_t strides = (run->step_count / MOST_KEPT + 1) / STRIDE + 1;
     playback->keep_steps = STRIDE * (strides > KEEP_EVERY ? strides : KEEP_EVERY);
     playback->pose = pose_create(run->node_count);

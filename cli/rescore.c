@@ -12,6 +12,7 @@ struct Rescore {
     Simulator *simulator;
     Lesson *lesson;
     int64_t steps, different;
+    bool was_watched;
     int kept_count;
     ScoreFigures *kept;              // at 0, 0.1, 0.2 s …
     int capacity;
@@ -30,6 +31,7 @@ Rescore *rescore_create(const RecordedRun *run, const Scene *scene, const OpenVe
     if (rescore) {
         rescore->run = run;
         rescore->different = -1;
+        rescore->was_watched = recorded_run_was_watched(run);
         rescore->capacity = (int)fmin(1e7, (double)run->step_count * run->step_ms / 1000 / kept_s + 2);
         rescore->kept = calloc((size_t)rescore->capacity, sizeof *rescore->kept);
         rescore->simulator = simulator_create(scene, open->vessel, faults);
@@ -58,13 +60,12 @@ void rescore_advance(Rescore *rescore, int64_t to, double budget_s)
 {
     const RecordedRun *run = rescore->run;
     double until = clock_s(CLOCK_MONOTONIC) + budget_s;
-    XrayControl unseen = {0};
     to = to < run->step_count ? to : run->step_count;
     while (rescore->different < 0 && rescore->steps < to && clock_s(CLOCK_MONOTONIC) < until) {
         int64_t i = rescore->steps++;
         Command command = {run->command[2 * i], run->command[2 * i + 1]};
         simulator_step(rescore->simulator, command);
-        lesson_step(rescore->lesson, rescore->simulator, command, run->xray ? &run->xray[i] : &unseen);
+        lesson_step(rescore->lesson, rescore->simulator, command, rescore->was_watched ? &run->xray[i] : NULL);
         if (simulator_hash(rescore->simulator) != run->state_hash[i])
             rescore->different = i;
         else

@@ -239,3 +239,11 @@ void recorded_run_free(RecordedRun *run)
     free(run->scene_text);
     free(run);
 }
+
+bool recorded_run_was_watched(const RecordedRun *run)
+{
+    for (int64_t i = 0; run->xray && i < run->step_count; i++)
+        if (run->xray[i].field_mm > 0)
+            return true;
+    return false;
+}

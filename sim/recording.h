@@ -73,5 +73,7 @@ RecordedRun *recorded_run_load(const char *path, Faults *faults);
 // The same without frames and nodes, whose counts are 0: what every step has (an hour takes 0.6 GB instead of 2).
 RecordedRun *recorded_run_load_series(const char *path, Faults *faults);
 void recorded_run_free(RecordedRun *run);
+// Whether somebody saw the run: its steps have X-ray controls (`nav`). Else (`run --record`) nobody can have moved the tool blindly.
+bool recorded_run_was_watched(const RecordedRun *run);
 
 #endif

@@ -26,7 +26,7 @@ ReplayVerdict replay_verify(Simulator *simulator, const RecordedRun *run, int64_
                             bool (*each)(void *context, Simulator *simulator, Command command, const XrayControl *xray), void *context)
 {
     ReplayVerdict verdict = {.first_different = -1};
-    XrayControl unseen = {0};
+    bool was_watched = recorded_run_was_watched(run);
     int64_t count = steps < 0 || steps > run->step_count ? run->step_count : steps;
     for (int64_t i = 0; i < count; i++) {
         simulator_step(simulator, command_of(run, i));
@@ -37,7 +37,7 @@ ReplayVerdict replay_verify(Simulator *simulator, const RecordedRun *run, int64_
             if (verdict.recorded != verdict.simulated)
                 verdict.first_different = i;
         }
-        if (each && !each(context, simulator, command_of(run, i), run->xray ? &run->xray[i] : &unseen))
+        if (each && !each(context, simulator, command_of(run, i), was_watched ? &run->xray[i] : NULL))
             break;
         if (verdict.first_different >= 0 && !go_on)
             break;
