@@ -15,7 +15,7 @@ enum { SET_EFFECT = 0x21, BLOCK_INDEX = 0x22, EFFECT_TYPE = 0x25, CONSTANT_FORCE
        BLOCK_LOAD = 0x89, LOAD_SUCCESS = 0x8c, ENABLE_ACTUATORS = 0x97, STOP_ALL = 0x99,
        DEVICE_RESET = 0x9a, MANAGED = 0xa9, CREATE_NEW_EFFECT = 0xab };
 // once a millisecond; a tick that comes a little early after a late one is taken, or reports each millisecond would let through every other one
-enum { PERIOD_US = 1000, LEAST_GAP_US = 750, LOAD_ATTEMPTS = 3, MOST_FAILURES = 20 };
+enum { EFFECT_MS = 500, PERIOD_US = 1000, LEAST_GAP_US = 750, LOAD_ATTEMPTS = 3, MOST_FAILURES = 20 };
 
 // --- finding ---
 
@@ -210,17 +210,28 @@ bool pid_needs_host(const PidLayout *layout, const uint8_t *bytes, size_t length
 
 static int64_t all_ones(const HidField *field) { return ((int64_t)1 << field->size) - 1; }
 
-// Outside the range is "no value"; of a duration that is for ever, of a trigger none.
+// Outside the range is "no value", of a trigger: none.
 static bool has_null(const PidControl *control) { return control->field.logical_min >= 0 && all_ones(&control->field) > control->field.logical_max; }
+
+// [ms] of one count of the duration; 0x1001 and 0x1003 are seconds, without a unit milliseconds are meant.
+static double duration_unit_ms(const HidField *field)
+{
+    return 1000 * pow(10, field->unit == 0x1001 || field->unit == 0x1003 ? field->unit_exponent : -3);
+}
+
+// An effect ends by itself and is started again before that: a program that dies or hangs lets the hand go.
+static int64_t duration_value(const HidField *field)
+{
+    double value = ceil(EFFECT_MS / duration_unit_ms(field));
+    return (int64_t)fmax(fmax(1, (double)field->logical_min), fmin(value, (double)field->logical_max));
+}
 
 int pid_duration_ms(const PidLayout *layout)
 {
     const HidField *field = &layout->duration.field;
-    if (!layout->duration.is_there || has_null(&layout->duration))
+    if (!layout->duration.is_there)
         return 0;
-    // 0x1001 and 0x1003 are seconds; without a unit milliseconds are meant
-    int exponent = field->unit == 0x1001 || field->unit == 0x1003 ? field->unit_exponent : -3;
-    double ms = 1000 * (double)field->logical_max * pow(10, exponent);
+    double ms = (double)duration_value(field) * duration_unit_ms(field);
     return ms >= 1 && ms < 1e9 ? (int)ms : 0;
 }
 
@@ -231,7 +242,7 @@ bool pid_encode_effect(const PidLayout *layout, int block, double direction_deg,
     const PidControl *direction = &layout->direction, *trigger = &layout->trigger_button;
     put(out, &layout->effect_index, block);
     put(out, &layout->effect_type, layout->effect_type.value);
-    put(out, &layout->duration, has_null(&layout->duration) ? all_ones(&layout->duration.field) : layout->duration.field.logical_max);
+    put(out, &layout->duration, duration_value(&layout->duration.field));
     put(out, trigger, has_null(trigger) ? all_ones(&trigger->field) : trigger->field.logical_min > 0 ? 0 : trigger->field.logical_max);
     put(out, &layout->gain, layout->gain.field.logical_max);
     double turn = fmod(fmod(direction_deg, 360) + 360, 360) / 360;

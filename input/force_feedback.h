@@ -1,5 +1,6 @@
 // Force back to the hand by HID PID (USB Device Class Definition for Physical Interface Devices 1.0, usage page 0x0F): two constant-force effects, one
-// along push, one along twist where the device has a second axis, played for ever; only their magnitudes change, up to once a millisecond.
+// along push, one along twist where the device has a second axis, played for half a second and started again
+// before that, so that a program that dies lets the hand go; only their magnitudes change, up to once a millisecond.
 //
 // What may be sent is decided by force_guard, a pure function: scale, clamp, slew limit, and zero at once when the simulation stands, the device is
 // silent, the session is paused or a number is not finite. What is sent is encoded by pid_ functions, pure too. force_ functions talk to a device.
@@ -57,7 +58,8 @@ bool pid_encode_create(const PidLayout *layout, PidMessage *out);
 int pid_decode_block_load(const PidLayout *layout, const uint8_t *bytes, size_t length);
 // Whether an answered PID Pool report says that the host would have to manage the device's memory, which is not done here.
 bool pid_needs_host(const PidLayout *layout, const uint8_t *bytes, size_t length);
-// `direction_deg`: where the force comes from, clockwise from north (away from the user). Duration for ever, largest gain, no trigger button.
+// `direction_deg`: where the force comes from, clockwise from north (away from the user). Half a second or what is nearest to it, largest
+// gain, no trigger button.
 bool pid_encode_effect(const PidLayout *layout, int block, double direction_deg, PidMessage *out);
 // Without a direction field a force > 0 comes from the positive end of its axis (east, south); -1 for those that come from north or west.
 double pid_axis_sign(const PidLayout *layout, double direction_deg);

@@ -73,10 +73,10 @@ static void a_real_joystick_gets_the_reports_that_it_describes(void **state)
     assert_false(pid_needs_host(&layout, (const uint8_t[]){3, 0, 1, 10, 1}, 5));
     assert_true(pid_needs_host(&layout, (const uint8_t[]){3, 0, 1, 10, 2}, 5));
     assert_false(pid_needs_host(&layout, (const uint8_t[]){3, 0, 1}, 3));
-    // index, constant, duration for ever, two intervals, gain, no trigger, axes and direction enable, directions, delay
+    // index, constant, half a second, two intervals, gain, no trigger, axes and direction enable, directions, delay
     assert_true(pid_encode_effect(&layout, 7, 90, &message));
-    expect_bytes(&message, HID_OUTPUT, "010701" "ffff" "0000" "0000" "ff" "ff" "04" "4000" "0000");
-    assert_int_equal(pid_duration_ms(&layout), 0);
+    expect_bytes(&message, HID_OUTPUT, "010701" "f401" "0000" "0000" "ff" "ff" "04" "4000" "0000");
+    assert_int_equal(pid_duration_ms(&layout), 500);
     assert_true(pid_encode_force(&layout, 7, -1, &message, &value));
     expect_bytes(&message, HID_OUTPUT, "050701ff");
     assert_int_equal(value, -255);

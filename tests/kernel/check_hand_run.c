@@ -17,7 +17,7 @@ enum { LARGEST = 10000, AXIS = 32767 };   // of the joystick's descriptor
 
 typedef struct { double t; int value; } Entry;
 typedef struct { int count; Entry *entry; } Series;
-typedef struct { Series axis, force; int faults; char first_fault[160]; double ended; } Log;   // times in s
+typedef struct { Series axis, force, sent; int faults; char first_fault[160]; double ended; } Log;   // times in s
 
 static int wrong;
 #define CHECK(condition, ...)                                             \
@@ -48,6 +48,8 @@ static bool read_log(const char *path, Log *log)
             append(&log->axis, t, value);
         else if (!strcmp(kind, "force"))
             append(&log->force, t, value);
+        else if (!strcmp(kind, "magnitude"))
+            append(&log->sent, t, value);
         else if (!strcmp(kind, "fault") && log->faults++ == 0)
             snprintf(log->first_fault, sizeof log->first_fault, "%.150s", line);
     }
@@ -117,10 +119,13 @@ static void check_force(const RecordedRun *run, const Log *log, double full_scal
         if (now->value)
             last = i + 1 < force->count ? force->entry[i + 1].t : log->ended;
         largest = fmax(largest, abs(now->value));
+    }
+    // of what was sent, as the device lets go by itself where it is told too late to go on
+    for (int i = 0; i < log->sent.count; i++) {
         for (int j = 0; j < i; j++) {
-            double rise = (abs(now->value) - abs(force->entry[j].value)) * unit;
+            double rise = (abs(log->sent.entry[i].value) - abs(log->sent.entry[j].value)) * unit;
             if (rise > 0)
-                steepest = fmax(steepest, rise / (now->t - force->entry[j].t + lateness_s));
+                steepest = fmax(steepest, rise / (log->sent.entry[i].t - log->sent.entry[j].t + lateness_s));
         }
     }
     enum { SAMPLES = 400 };
@@ -166,5 +171,6 @@ int main(int argc, char **argv)
     recorded_run_free(run);
     free(log.axis.entry);
     free(log.force.entry);
+    free(log.sent.entry);
     return wrong > 0;
 }
