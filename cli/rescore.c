@@ -37,11 +37,16 @@ Rescore *rescore_create(const RecordedRun *run, const Scene *scene, const OpenVe
         rescore->simulator = simulator_create(scene, open->vessel, faults);
         rescore->lesson = rescore->simulator ? lesson_create(rescore->simulator, open->tree) : NULL;
     }
-    if (rescore && rescore->kept && rescore->lesson) {
+    int nodes = rescore && rescore->simulator ? simulator_state(rescore->simulator)->node_count : 0;
+    bool is_its_tool = run->frame_count == 0 || nodes == run->node_count;
+    if (rescore && rescore->kept && rescore->lesson && is_its_tool) {
         keep(rescore);
         return rescore;
     }
-    faults_add(faults, scene->path, 0, 0, "no memory to simulate it again");
+    if (nodes && !is_its_tool)
+        faults_add(faults, scene->path, 0, 0, "gives a tool of %d nodes, the recording holds one of %d", nodes, run->node_count);
+    else
+        faults_add(faults, scene->path, 0, 0, "no memory to simulate it again");
     rescore_free(rescore);
     return NULL;
 }

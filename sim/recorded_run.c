@@ -157,7 +157,7 @@ static void read_run(const Reader *reader, RecordedRun *run, bool with_frames)
     while (run->frame_count > 0 && run->frame_step[run->frame_count - 1] >= run->step_count)
         run->frame_count--;
     for (int64_t i = 0; i < run->frame_count; i++)
-        if (run->frame_step[i] < (i ? run->frame_step[i - 1] + 1 : 0)) {
+        if (i ? run->frame_step[i] <= run->frame_step[i - 1] : run->frame_step[i] < 0) {
             faults_add(reader->faults, reader->path, 0, 0, "frame %lld names step %lld; steps grow from 0", (long long)i, (long long)run->frame_step[i]);
             return;
         }
@@ -199,6 +199,8 @@ static RecordedRun *load(const char *path, bool with_frames, Faults *faults)
         run->sha256 = read_scene_attribute(reader.file, "sha256");
         run->contact = contact_of(read_scene_attribute(reader.file, "contact"));
         run->step_ms = read_step_ms(reader.file);
+        if (!(run->step_ms >= 0.001 && run->step_ms <= 100))
+            faults_add(faults, path, 0, 0, "has steps of %g ms; 0.001 to 100", run->step_ms);
     } else {
         faults_add(faults, path, 0, 0, "no memory");
     }

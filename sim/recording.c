@@ -5,6 +5,7 @@
 
 #include <errno.h>
 #include <hdf5.h>
+#include <limits.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -174,6 +175,29 @@ static bool write_node_figures(Recording *recording)
 
 enum { MOST_FILES = 64 };
 
+// A file as it is named from anywhere: a recording is replayed in other folders than the one it was made in.
+static void write_whole_path(FILE *stream, const char *path)
+{
+    char here[PATH_MAX];
+    if (*path != '/' && getcwd(here, sizeof here))
+        fprintf(stream, "%s/", here);
+    fputs(path, stream);
+}
+
+static char *whole_path(const char *path)
+{
+    char *whole = NULL;
+    size_t length;
+    FILE *stream = open_memstream(&whole, &length);
+    if (!stream)
+        return NULL;
+    write_whole_path(stream, path);
+    if (fclose(stream) == 0)
+        return whole;
+    free(whole);
+    return NULL;
+}
+
 // /scene: the text, and path and sha256 of every file that the run was made from, one a line.
 static bool write_scene(Recording *recording, const Scene *scene)
 {
@@ -189,26 +213,28 @@ static bool write_scene(Recording *recording, const Scene *scene)
         file[count++] = scene->script_path;
     for (int i = 0; i < recording->options.file_count && count < MOST_FILES; i++)
         file[count++] = recording->options.file[i];
-    char *paths = NULL, *sums = NULL;
+    char *paths = NULL, *sums = NULL, *path = whole_path(scene->path);
     size_t paths_length, sums_length;
     FILE *path_stream = open_memstream(&paths, &paths_length), *sum_stream = open_memstream(&sums, &sums_length);
     for (int i = 0; path_stream && sum_stream && i < count; i++) {
         char hex[65] = "unreadable";
         sha256_of_file(file[i], hex);
-        fprintf(path_stream, "%s%s", i ? "\n" : "", file[i]);
+        fputs(i ? "\n" : "", path_stream);
+        write_whole_path(path_stream, file[i]);
         fprintf(sum_stream, "%s%s", i ? "\n" : "", hex);
     }
-    bool good = path_stream && sum_stream;
+    bool good = path_stream && sum_stream && path;
     if (path_stream)
         good &= fclose(path_stream) == 0;
     if (sum_stream)
         good &= fclose(sum_stream) == 0;
     good = good && write_text(recording->file, NULL, "/scene", scene->text);
     hid_t place = good ? H5Dopen2(recording->file, "/scene", H5P_DEFAULT) : -1;
-    good = good && write_text(place, "path", NULL, scene->path) && write_text(place, "contact", NULL, contact_name[scene->contact]) &&
+    good = good && write_text(place, "path", NULL, path) && write_text(place, "contact", NULL, contact_name[scene->contact]) &&
            write_text(place, "files", NULL, paths) && write_text(place, "sha256", NULL, sums);
     if (place >= 0)
         H5Dclose(place);
+    free(path);
     free(paths);
     free(sums);
     return good;

@@ -1,4 +1,5 @@
-// A session recorded, gone on from at a moment of it and recorded again: the common part is the same, bit for bit, and what is not the session's own is refused.
+// A session recorded, gone on from at a moment of it and recorded again: the common part is the same, bit for bit, and what is not the session's own
+// is refused.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -315,7 +315,8 @@ static void the_mouse_moves_the_free_camera(void **state)
     // what is under the mouse stays there while it zooms
     actions.mouse = (PanelMouse){.view = VIEW_3D, .x = 0.8, .y = 0.3, .scroll = 2};
     Camera before = view;
-    Vec3 under = vec3_add_scaled(vec3_add_scaled(before.center, 0.3 * port->width * before.mm_per_pixel, before.right), -0.2 * port->height * before.mm_per_pixel, before.up);
+    double right_mm = 0.3 * port->width * before.mm_per_pixel, up_mm = -0.2 * port->height * before.mm_per_pixel;
+    Vec3 under = vec3_add_scaled(vec3_add_scaled(before.center, right_mm, before.right), up_mm, before.up);
     obey(&desk, &actions, 0.02);
     view = free_camera_projection(&desk.look.camera, port->width, port->height, 1);
     assert_true(view.mm_per_pixel < before.mm_per_pixel);
@@ -362,7 +363,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(the_c_arm_stops_at_its_limits), cmocka_unit_test(the_table_carries_the_patient_where_the_key_says),
                                        cmocka_unit_test(blades_and_field_keep_their_ranges), cmocka_unit_test(pulse_rates_go_round),
-                                       cmocka_unit_test(subtraction_and_roadmap_take_masks), cmocka_unit_test(pedal_and_contrast_come_from_latch_keys_and_hands),
+                                       cmocka_unit_test(subtraction_and_roadmap_take_masks),
+                                       cmocka_unit_test(pedal_and_contrast_come_from_latch_keys_and_hands),
                                        cmocka_unit_test(a_slider_sets_what_it_shows_and_no_more), cmocka_unit_test(the_tool_goes_at_three_speeds_and_stops),
                                        cmocka_unit_test(the_mouse_turns_the_c_arm_and_magnifies), cmocka_unit_test(the_mouse_moves_the_free_camera),
                                        cmocka_unit_test(keys_choose_what_is_seen)};
