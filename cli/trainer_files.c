@@ -21,7 +21,11 @@ static bool make_folders(char *path)
         if (!made)
             return false;
     }
-    return mkdir(path, 0777) == 0 || errno == EEXIST;
+    struct stat status;
+    if (mkdir(path, 0777) == 0 || (errno == EEXIST && stat(path, &status) == 0 && S_ISDIR(status.st_mode)))
+        return true;
+    errno = errno == EEXIST ? ENOTDIR : errno;
+    return false;
 }
 
 bool trainer_folder(const char *wanted, char *out, size_t capacity, Faults *faults)
@@ -31,7 +35,10 @@ bool trainer_folder(const char *wanted, char *out, size_t capacity, Faults *faul
                  : data && *data ? snprintf(out, capacity, "%s/seldinger/sessions", data)
                  : home && *home ? snprintf(out, capacity, "%s/.local/share/seldinger/sessions", home)
                                  : snprintf(out, capacity, "sessions");
-    if (length > 0 && (size_t)length < capacity - 512 && make_folders(out) && access(out, W_OK | X_OK) == 0)
+    bool fits = length > 0 && (size_t)length < capacity - 512;
+    if (!fits)
+        errno = ENAMETOOLONG;
+    if (fits && make_folders(out) && access(out, W_OK | X_OK) == 0)
         return true;
     faults_add(faults, wanted ? wanted : out, 0, 0, "cannot take sessions: %s; a folder with write permission, by --sessions FOLDER", strerror(errno));
     return false;

@@ -212,6 +212,64 @@ static void words_of_the_command_line(void **state)
         refused(nowhere[i], "cannot be written: No such file or directory");
 }
 
+static void verbs_of_the_trainer(void **state)
+{
+    (void)state;
+    put("free.yaml", "seldinger: 1\nwire: {sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
+                     "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\nscript: [[0, 10, 0], [0.05, 0, 0]]\n");
+    put("other.yaml", "seldinger: 1\nwire: {sections: [{length_mm: 50, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
+                      "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n");
+    put("noise.bin", "no file of any kind");
+    put("open.yaml", "x: [1\n");
+    put("empty.json", "{\"seldinger_session\": 1}");
+    assert_int_equal(run_in("", "run free.yaml --record free.h5 --quiet"), 0);
+    static const char *const lines[][2] = {
+        {"replay free.h5 --verify --banana", "see `seldinger replay --help`"},
+        {"replay free.yaml --verify", "free.yaml:byte 0: is no HDF5 file"},
+        {"replay tree.h5 --verify", "tree.h5: lacks the dataset"},
+        {"replay cut.h5 --scene out", "cut.h5:byte 0: is no HDF5 file"},
+        {"replay free.h5 --scene nowhere/out", "nowhere/out: cannot be made: No such file or directory"},
+        {"replay free.h5 --at -1 --picture out.png", "--at: '-1' is not valid"},
+        {"report", "takes one session file"},
+        {"report empty.json empty.json", "takes one session file"},
+        {"report nowhere.json", "nowhere.json: cannot be opened"},
+        {"report noise.bin --html out.html", "noise.bin:byte 0: is no JSON"},
+        {"report free.h5 --html out.html", "free.h5:byte 0: is no JSON"},
+        {"report empty.json --html out.html", "empty.json: 'score' is no object or is not there"},
+        {"report empty.json --banana", "see `seldinger report --help`"},
+        {"devices noise.bin", "takes no file but by --map"},
+        {"devices --banana", "see `seldinger devices --help`"},
+        {"devices --map nowhere.yaml", "nowhere.yaml: cannot be opened"},
+        {"devices --map open.yaml --json out.json", "open.yaml:2:1: is not YAML"},
+        {"devices --map free.yaml", "free.yaml:"},
+        {"devices --watch --duration-s 0", "--duration-s: '0' is not valid"},
+        {"devices --json nowhere/out.json", "nowhere/out.json: cannot be written"},
+#ifdef SELDINGER_RENDER
+        {"nav", "lacks the scene to steer in"},
+        {"nav free.yaml other.yaml", "one scene at a time, not also other.yaml"},
+        {"nav nowhere.yaml", "nowhere.yaml: cannot be opened"},
+        {"nav open.yaml", "open.yaml:2:1: is not YAML"},
+        {"nav free.h5", "free.h5:1:1: is not YAML"},
+        {"nav free.yaml --banana", "see `seldinger nav --help`"},
+        {"nav free.yaml --at x", "--at: 'x' is not valid"},
+        {"nav free.yaml --size 64x64", "--size: '64x64' is not valid"},
+        {"nav free.yaml --view banana", "--view: 'banana' is not valid"},
+        {"nav free.yaml --duration-s -1", "--duration-s: '-1' is not valid"},
+        {"nav free.yaml --threads 1.5", "--threads: '1.5' is not valid"},
+        {"nav free.yaml --no-record --device nowhere.yaml", "nowhere.yaml: cannot be opened"},
+        {"nav free.yaml --no-record --device open.yaml", "open.yaml:2:1: is not YAML"},
+        {"nav free.yaml --no-record --figures nowhere/out.json", "nowhere/out.json: cannot be written"},
+        {"nav free.yaml --no-record --resume nowhere.h5", "nowhere.h5: cannot be opened"},
+        {"nav free.yaml --no-record --resume tree.h5", "tree.h5: lacks the dataset"},
+        {"nav other.yaml --no-record --resume free.h5", "free.h5: is a recording of another scene than other.yaml"},
+        {"nav free.yaml --sessions noise.bin", "noise.bin: cannot take sessions: Not a directory"},
+        {"nav free.yaml --sessions noise.bin/out", "noise.bin/out: cannot take sessions: Not a directory"},
+#endif
+    };
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)
+        refused(lines[i][0], lines[i][1]);
+}
+
 // Every verb that writes, with no more than 4 kB to a file; what was there before stays as it was.
 static void a_full_disk(void **state)
 {
@@ -337,8 +395,10 @@ static int remove_folder(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(volumes_cut_off_or_lying), cmocka_unit_test(traces),      cmocka_unit_test(the_wrong_kind_of_file),
-        cmocka_unit_test(words_of_the_command_line), cmocka_unit_test(a_full_disk), cmocka_unit_test(a_stop_by_the_user), cmocka_unit_test(pipes_and_devices_stay_what_they_are),
+        cmocka_unit_test(volumes_cut_off_or_lying), cmocka_unit_test(traces),
+        cmocka_unit_test(the_wrong_kind_of_file),   cmocka_unit_test(words_of_the_command_line),
+        cmocka_unit_test(verbs_of_the_trainer),     cmocka_unit_test(a_full_disk),
+        cmocka_unit_test(a_stop_by_the_user),       cmocka_unit_test(pipes_and_devices_stay_what_they_are),
     };
     return cmocka_run_group_tests_name("bad_input", tests, make_folder, remove_folder);
 }
