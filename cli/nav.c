@@ -104,6 +104,8 @@ static int parse_options(int argc, char **argv, NavOptions *options)
     }
     if (optind != argc - 1)
         return usage_fault(optind < argc ? "one scene at a time, not also " : "lacks the scene to steer in", optind < argc ? argv[optind + 1] : "");
+    if (trainer->resume_s < SCRIPT_LONGEST_S && !options->resume)
+        return usage_fault("--at goes with --resume REC.h5", "");
     options->scene = argv[optind];
     return -1;
 }
