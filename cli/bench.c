@@ -88,9 +88,7 @@ bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, const Ste
         return false;
     int64_t steps = bench_steps(scene, most), begin = bench_cpu_ns();
     int cursor = 0, crowd = -1;
-    double fed = simulator_state(simulator)->inserted, length = 0;
-    for (int i = 0; i < scene->wire.section_count; i++)
-        length += scene->wire.section[i].length;
+    double fed = simulator_state(simulator)->inserted, length = wire_length(&scene->wire);
     for (int64_t i = 0; i < steps && !(simulator_last(simulator)->flags & STEP_DIVERGED); i++) {
         int64_t start = trace ? bench_cpu_ns() : 0;
         Command command = bench_command(scene, i, &cursor);

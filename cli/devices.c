@@ -319,24 +319,9 @@ static char *list_json(const DeviceList *list)
     }
     add_nodes(object, "joysticks", list->joystick, list->joystick_count);
     add_nodes(object, "events", list->event, list->event_count);
-    char *text = cJSON_Print(object), *line = text ? malloc(strlen(text) + 2) : NULL;
-    if (line)
-        sprintf(line, "%s\n", text);
-    free(text);
+    char *text = cJSON_Print(object);
     cJSON_Delete(object);
-    return line;
-}
-
-static bool write_json(const DeviceList *list, const char *path, Faults *faults)
-{
-    char *text = list_json(list);
-    if (!text) {
-        faults_add(faults, path, 0, 0, "no memory for the list");
-        return false;
-    }
-    bool good = output_write(path, text, strlen(text), faults);
-    free(text);
-    return good;
+    return text;
 }
 
 // --- the verb ---
@@ -415,7 +400,7 @@ int verb_devices(int argc, char **argv)
     } else if (output_check(options.json, &faults) && load_maps(list, &options, &faults)) {
         look(list, transport);
         if (options.json)
-            write_json(list, options.json, &faults);
+            output_write_line(options.json, list_json(list), &faults);
         if (!options.quiet && (!options.json || strcmp(options.json, "-") != 0))
             print_list(list);
         if (options.watch && transport && !devices_watch(transport, list->hid, list->hid_count, options.duration_s))

@@ -211,11 +211,9 @@ static bool describe_scene(cJSON *object, const char *path, Faults *faults)
 {
     static const char *const sources[] = {"model", "shape", "tube", "plane", "mesh", "none"};
     Scene *scene = scene_load(path, faults);
-    double length = 0;
     if (!scene)
         return false;
-    for (int i = 0; i < scene->wire.section_count; i++)
-        length += scene->wire.section[i].length;
+    double length = wire_length(&scene->wire);
     cJSON_AddStringToObject(object, "what", "scene");
     cJSON_AddStringToObject(object, "vessel", sources[scene->source]);
     if (scene->model_path)

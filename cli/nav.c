@@ -131,15 +131,7 @@ static void write_figures(const char *path, const TrainerFigures *figures, Fault
     cJSON_AddNumberToObject(out, "device_reports", (double)figures->reports);
     cJSON_AddStringToObject(out, "state_hash", figures->hash);
     cJSON_AddStringToObject(out, "recording", figures->recording);
-    char *text = cJSON_Print(out), *line = text ? malloc(strlen(text) + 2) : NULL;
-    if (line) {
-        sprintf(line, "%s\n", text);
-        output_write(path, line, strlen(line), faults);
-    } else {
-        faults_add(faults, path, 0, 0, "cannot be written: no memory");
-    }
-    free(line);
-    free(text);
+    output_write_line(path, cJSON_Print(out), faults);
     cJSON_Delete(out);
 }
 

@@ -89,6 +89,21 @@ bool output_write(const char *path, const void *bytes, size_t length, Faults *fa
     return good;
 }
 
+bool output_write_line(const char *path, char *text, Faults *faults)
+{
+    size_t length = text ? strlen(text) : 0;
+    char *line = text ? realloc(text, length + 2) : NULL;
+    if (!line) {
+        free(text);
+        faults_add(faults, path, 0, 0, "cannot be written: no memory");
+        return false;
+    }
+    memcpy(line + length, "\n", 2);
+    bool good = output_write(path, line, length + 1, faults);
+    free(line);
+    return good;
+}
+
 void output_extension(const char *path, char extension[16])
 {
     const char *slash = strrchr(path, '/'), *dot = strrchr(slash ? slash : path, '.');

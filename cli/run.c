@@ -254,9 +254,7 @@ static void draw_picture(const RunOptions *options, const Watch *watch, Simulato
     PictureTool tool[MOST_MOMENTS] = {0};
     double *radius = calloc((size_t)nodes, sizeof *radius);
     Vec3 *force = calloc((size_t)nodes * MOST_MOMENTS, sizeof *force);
-    double total = 0;
-    for (int i = 0; i < scene->wire.section_count; i++)
-        total += scene->wire.section[i].length;
+    double total = wire_length(&scene->wire);
     for (int m = 0; radius && force && m < watch->moment_count; m++) {
         const Moment *moment = &watch->moment[m];
         Vec3 *at = force + (size_t)m * (size_t)nodes;
@@ -302,17 +300,8 @@ static bool write_files(const RunOptions *options, Simulator *simulator, const D
 {
     int before = faults->count;
     size_t length;
-    if (options->summary) {
-        char *text = run_summary_json(simulator, drive, node), *line = text ? malloc(strlen(text) + 2) : NULL;
-        if (line) {
-            sprintf(line, "%s\n", text);
-            output_write(options->summary, line, strlen(line), faults);
-        } else {
-            faults_add(faults, options->summary, 0, 0, "cannot be written: no memory");
-        }
-        free(line);
-        free(text);
-    }
+    if (options->summary)
+        output_write_line(options->summary, run_summary_json(simulator, drive, node), faults);
     if (options->final) {
         char *text = run_final_csv(simulator, node, &length);
         if (text)

@@ -342,10 +342,8 @@ static void measure_frame(Trainer *trainer)
     else
         trainer->figures->first_picture_s = since_begin(trainer);
     trainer->frame_cpu_s = cpu;
-    double resident = resident_mb();
-    if (trainer->figures->frames == 1 || since_begin(trainer) < 60)
-        trainer->figures->resident_mb[0] = resident;
-    trainer->figures->resident_mb[1] = resident;
+    if (trainer->figures->frames == 1 || (trainer->figures->frames % 30 == 0 && since_begin(trainer) < 60))
+        trainer->figures->resident_mb[0] = resident_mb();
 }
 
 static void run_window(Trainer *trainer, Faults *faults)
@@ -440,10 +438,12 @@ int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, T
     if (open_window(trainer, faults) && open_views(trainer, faults) && open_hands(trainer, faults) &&
         begin_session(trainer, options->resume, faults) && open_cine(trainer, faults)) {
         run_window(trainer, faults);
+        double resident = resident_mb();   // before the session is put away
         bool is_open = trainer->session.realtime != NULL;
         const Moment *moment = is_open ? realtime_moment(trainer->session.realtime) : NULL;
         bool diverged = moment && moment->figures.state == REALTIME_DIVERGED;
         code = is_open && end_session(trainer, faults) ? diverged ? EXIT_UNTRUSTED : EXIT_DONE : EXIT_UNTRUSTED;
+        figures->resident_mb[1] = resident;
         figures->frames_skipped = window_frames_skipped(trainer->window);
         figures->frame_cpu_ms[0] = histogram_quantile(&trainer->frame_cpu_ns, 0.5) * 1e-6;
         figures->frame_cpu_ms[1] = histogram_quantile(&trainer->frame_cpu_ns, 0.99) * 1e-6;

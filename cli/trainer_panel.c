@@ -11,9 +11,7 @@ static const double slow_factor = 0.97;
 void trainer_panel_begin(TrainerPanel *panel, const Scene *scene, const char *trainee)
 {
     memset(panel, 0, sizeof *panel);
-    double length = 0;
-    for (int i = 0; i < scene->wire.section_count; i++)
-        length += scene->wire.section[i].length;
+    double length = wire_length(&scene->wire);
     const WireSection *tip = scene->wire.section_count ? &scene->wire.section[scene->wire.section_count - 1] : NULL;
     snprintf(panel->tool, sizeof panel->tool, "%s %.2f mm x %.0f mm%s", tip && tip->inner_diameter > 0 ? "catheter" : "wire", tip ? tip->diameter : 0, length,
              tip && tip->rest_curvature != 0 ? ", curved tip" : "");

@@ -76,9 +76,7 @@ void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64
     pose->command = (Command){run->command[2 * row], run->command[2 * row + 1]};
     pose->xray = run->xray ? run->xray[row] : xray_default_control();
     pose->inserted_mm = run->inserted[row];
-    pose->turned_deg = 0;
-    for (int64_t i = 0; i <= row; i++)
-        pose->turned_deg += run->command[2 * i + 1] * run->step_ms / 1000;
+    pose->turned_deg = run->turned[row];
     pose->report = (StepReport){.flags = run->flags[row], .proximal_force = run->proximal[2 * row], .proximal_torque = run->proximal[2 * row + 1],
                                 .wall_force_max = run->wall_force[2 * row], .wall_force_sum = run->wall_force[2 * row + 1]};
     memcpy(pose->position, run->position + first, nodes * sizeof *pose->position);

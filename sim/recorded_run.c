@@ -173,6 +173,15 @@ static ContactKind contact_of(char *name)
     return (ContactKind)kind;
 }
 
+static bool sum_turns(RecordedRun *run)
+{
+    double turned = 0;
+    run->turned = malloc(((size_t)run->step_count + 1) * sizeof *run->turned);
+    for (int64_t i = 0; run->turned && i < run->step_count; i++)
+        run->turned[i] = turned += run->command[2 * i + 1] * run->step_ms / 1000;
+    return run->turned != NULL;
+}
+
 static RecordedRun *load(const char *path, bool with_frames, Faults *faults)
 {
     int before = faults->count;
@@ -201,6 +210,8 @@ static RecordedRun *load(const char *path, bool with_frames, Faults *faults)
         run->step_ms = read_step_ms(reader.file);
         if (!(run->step_ms >= 0.001 && run->step_ms <= 100))
             faults_add(faults, path, 0, 0, "has steps of %g ms; 0.001 to 100", run->step_ms);
+        else if (faults->count == before && !sum_turns(run))
+            faults_add(faults, path, 0, 0, "no memory");
     } else {
         faults_add(faults, path, 0, 0, "no memory");
     }
@@ -231,6 +242,7 @@ void recorded_run_free(RecordedRun *run)
     free(run->gap);
     free(run->vessel_node);
     free(run->inserted);
+    free(run->turned);
     free(run->xray);
     free(run->flags);
     free(run->wall_force);

@@ -59,6 +59,7 @@ typedef struct RecordedRun {
     int32_t *vessel_node;    // (K, M)
     double *inserted;        // (S) [mm]
     XrayControl *xray;       // (S); NULL in recordings from before there was one
+    double *turned;          // (S) [deg] since the start, the sum of the commands
     uint32_t *flags;         // (S) STEP_ flags
     double *wall_force;      // (S, 2) [N] largest and sum
     double *s;               // (M) [mm]

@@ -138,15 +138,20 @@ static double wanted(const WireSection *section, double per_mm)
     return fmax(section->length * per_mm, fabs(section->rest_curvature) * section->length / REST_ANGLE_AIM);
 }
 
+double wire_length(const WireOptions *options)
+{
+    double total = 0;
+    for (int i = 0; i < options->section_count; i++)
+        total += options->section[i].length;
+    return total;
+}
+
 bool wire_divide(const WireOptions *options, int *elements)
 {
     int sections = options->section_count, left = options->elements - sections;
     if (left < 0)
         return false;
-    double total = 0, all = 0;
-    for (int i = 0; i < sections; i++)
-        total += options->section[i].length;
-    double per_mm = options->elements / total;
+    double all = 0, per_mm = options->elements / wire_length(options);
     for (int i = 0; i < sections; i++)
         all += wanted(&options->section[i], per_mm);
     // one for each, then again and again one to the section that lacks most: the finest division, and no tie but by index

@@ -85,6 +85,7 @@ typedef struct Wire {
 WireOptions wire_default_options(void);          // 200 elements, Rayleigh damping 1e-4 per ms and 0.2 ms, no section, along +x from the origin
 // Every option in range? Else false with a message in `why` (capacity >= 256).
 bool wire_check(const WireOptions *options, char *why, int capacity);
+double wire_length(const WireOptions *options);   // [mm] of all sections
 bool wire_create(Wire *wire, const WireOptions *options, char *why, int capacity);
 void wire_destroy(Wire *wire);
 // Elements per section, (section_count): in proportion to length, more where an element would turn by over 0.3 rad at rest, each at least one.
