@@ -182,8 +182,7 @@ static void answer_chunk(void *context, long chunk)
     const VesselTree *tree = a->tree;
     for (int i = (int)chunk * CHUNK; i < a->table->count && i < ((int)chunk + 1) * CHUNK; i++) {
         int node = a->node[i] = power_nearest(tree, a->table->point[i]);
-        int64_t first = tree->blob_offset[node];
-        Blobby model = {(int)(tree->blob_offset[node + 1] - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level};
+        Blobby model = blobby_of(tree, node);
         a->f[i] = blobby_gradient(&model, a->table->point[i], &a->gradient[i]);
     }
 }

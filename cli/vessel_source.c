@@ -135,7 +135,7 @@ static bool open_tree(VesselTree *tree, const char *path, OpenVessel *out, Fault
     if (!tree)
         return false;
     out->tree = tree;
-    out->vessel = vessel_tree_is_model(tree) ? lim_vessel_create(tree) : NULL;
+    out->vessel = vessel_tree_is_model(tree) ? model_vessel_create(tree) : NULL;
     if (!out->vessel)
         faults_add(faults, path, 0, 0, "is a tree without a model; make one with `seldinger fit`");
     return out->vessel != NULL;

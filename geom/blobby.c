@@ -2,6 +2,8 @@
 //
 // With d = X - C, q = |d|^2 / (5 rho^2), u = 1 / (1 + q):
 //   f = sum rho u^2 - T,  grad f = sum A u^3 d,  H = sum A u^3 I + B u^4 d d',  A = -4/(5 rho),  B = 24/(25 rho^3)
+// and for compact blobs with u = max(0, 1 - |d|^2 / R^2):
+//   f = sum a u^3 - T,  grad f = sum A u^2 d,  H = sum A u^2 I + B u d d',  A = -6 a / R^2,  B = 24 a / R^4
 //
 // The closest point minimises |p - X|^2 / 2 on f = 0: a Newton method on the surface. At p with unit normal n and the shape operator
 // S = P H P / |g| the gradient of the distance's half square along the surface is P (p - X) and its Hessian there I + gap S, gap = (X - p).n.
@@ -10,13 +12,32 @@
 // points, and one Taubin step is up to 2.3 times too long.
 #include "geom/blobby.h"
 
+// A blob's share of the field f, its gradient slope * d and its Hessian slope * I + bend * d d', d = x - centre.
+typedef struct BlobTerm {
+    Vec3 d;
+    double f, slope, bend;
+} BlobTerm;
+
+static inline BlobTerm blob_term(const Blobby *model, int j, Vec3 x)
+{
+    int k = blobby_row(model, j);
+    Vec3 d = vec3_sub(x, model->center[k]);
+    double width = model->width[k], width2 = width * width;
+    if (model->amplitude) {
+        double u = 1 - vec3_norm2(d) / width2;
+        u = u > 0 ? u : 0;
+        double a = model->amplitude[k], v = a * u / width2;
+        return (BlobTerm){d, a * u * (u * u), -6 * u * v, 24 * v / width2};
+    }
+    double u = 1 / (1 + vec3_norm2(d) / (5 * width2)), u2 = u * u;
+    return (BlobTerm){d, width * u2, -0.8 / width * (u2 * u), 0.96 / (width2 * width) * (u2 * u2)};
+}
+
 double blobby_field(const Blobby *model, Vec3 x)
 {
     double f = 0;
-    for (int j = 0; j < model->count; j++) {
-        double rho = model->width[j], u = 1 / (1 + vec3_norm2(vec3_sub(x, model->center[j])) / (5 * rho * rho));
-        f += rho * (u * u);
-    }
+    for (int j = 0; j < model->count; j++)
+        f += blob_term(model, j, x).f;
     return f - model->iso_level;
 }
 
@@ -25,10 +46,9 @@ double blobby_gradient(const Blobby *model, Vec3 x, Vec3 *gradient)
     double f = 0;
     Vec3 g = {0, 0, 0};
     for (int j = 0; j < model->count; j++) {
-        Vec3 d = vec3_sub(x, model->center[j]);
-        double rho = model->width[j], u = 1 / (1 + vec3_norm2(d) / (5 * rho * rho)), u2 = u * u;
-        f += rho * u2;
-        g = vec3_add_scaled(g, -0.8 / rho * (u2 * u), d);
+        BlobTerm t = blob_term(model, j, x);
+        f += t.f;
+        g = vec3_add_scaled(g, t.slope, t.d);
     }
     *gradient = g;
     return f - model->iso_level;
@@ -40,14 +60,13 @@ double blobby_hessian(const Blobby *model, Vec3 x, Vec3 *gradient, Sym3 *hessian
     Vec3 g = {0, 0, 0};
     Sym3 h = {0, 0, 0, 0, 0, 0};
     for (int j = 0; j < model->count; j++) {
-        Vec3 d = vec3_sub(x, model->center[j]);
-        double rho = model->width[j], u = 1 / (1 + vec3_norm2(d) / (5 * rho * rho)), u2 = u * u;
-        double a = -0.8 / rho * (u2 * u), b = 0.96 / (rho * rho * rho) * (u2 * u2);
-        f += rho * u2;
-        g = vec3_add_scaled(g, a, d);
-        trace += a;
-        h.xx += b * d.x * d.x, h.xy += b * d.x * d.y, h.xz += b * d.x * d.z;
-        h.yy += b * d.y * d.y, h.yz += b * d.y * d.z, h.zz += b * d.z * d.z;
+        BlobTerm t = blob_term(model, j, x);
+        Vec3 d = t.d, bd = vec3_scale(d, t.bend);
+        f += t.f;
+        g = vec3_add_scaled(g, t.slope, d);
+        trace += t.slope;
+        h.xx += bd.x * d.x, h.xy += bd.x * d.y, h.xz += bd.x * d.z;
+        h.yy += bd.y * d.y, h.yz += bd.y * d.z, h.zz += bd.z * d.z;
     }
     h.xx += trace, h.yy += trace, h.zz += trace;
     *gradient = g;
@@ -87,10 +106,10 @@ double blob_width_for_radius(double radius, double iso_level)
 
 static double local_scale(const Blobby *model)
 {
-    double least = model->width[0];
-    for (int j = 1; j < model->count; j++)
-        least = model->width[j] < least ? model->width[j] : least;
-    return least;
+    double least = HUGE_VAL;
+    for (int j = 0; j < model->count; j++)
+        least = fmin(least, model->width[blobby_row(model, j)]);
+    return model->amplitude ? 0.5 * least : least;
 }
 
 // A zero of f between `in` (f > 0) and `out` (f < 0): false position with the Illinois rule and bisection every third time.
@@ -137,7 +156,7 @@ static bool cross_towards_blobs(const Blobby *model, Vec3 x, double f, Vec3 *sta
 {
     double best = HUGE_VAL;
     for (int j = 0; j < model->count; j++) {
-        Vec3 c = model->center[j];
+        Vec3 c = model->center[blobby_row(model, j)];
         double fc = blobby_field(model, c);
         if (!(fc > 0))
             continue;
@@ -319,10 +338,12 @@ SurfacePoint blobby_project(const Blobby *model, Vec3 x, Vec3 start)
     SurfaceFrame best;
     if ((!warm && !start_on_surface(model, x, f, g, scale, &foot)) || !slide_to_closest(model, x, foot, scale, &best, &least)) {
         // no surface in reach: the distance to the nearest centre is all that can be said
-        Vec3 c = model->center[0];
-        for (int j = 1; j < model->count; j++)
-            if (vec3_norm2(vec3_sub(model->center[j], x)) < vec3_norm2(vec3_sub(c, x)))
-                c = model->center[j];
+        Vec3 c = model->center[blobby_row(model, 0)];
+        for (int j = 1; j < model->count; j++) {
+            Vec3 other = model->center[blobby_row(model, j)];
+            if (vec3_norm2(vec3_sub(other, x)) < vec3_norm2(vec3_sub(c, x)))
+                c = other;
+        }
         lost.foot = c;
         lost.normal = vec3_unit(vec3_sub(c, x));
         lost.distance = -vec3_distance(x, c);

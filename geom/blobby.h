@@ -1,7 +1,11 @@
-// A blobby model with the Cauchy kernel: f(X) = sum_j rho_j phi(|X - C_j| / rho_j) - T, phi(x) = (1 + x^2/5)^-2.
-// Kerrien et al. 2017, eq. (3), alpha_j = rho_j. f > 0 inside. With q = |X-C|^2 / (5 rho^2):
+// A blobby model: a sum of kernels about centres less a level, f > 0 inside. Two kernels:
+// Cauchy (local models): f(X) = sum_j rho_j phi(|X - C_j| / rho_j) - T, phi(x) = (1 + x^2/5)^-2. Kerrien et al. 2017, eq. (3), alpha_j = rho_j.
+//   With q = |X-C|^2 / (5 rho^2):
 //   grad f = sum -(4/(5 rho)) (1+q)^-3 (X-C)
 //   H      = sum -(4/(5 rho)) (1+q)^-3 I + (24/(25 rho^3)) (1+q)^-4 (X-C)(X-C)^T
+// Compact (shared blobs): f(X) = sum_j a_j u_j^3 - T, u = max(0, 1 - |X-C|^2 / R^2). Twice continuously differentiable.
+//   grad f = sum -(6 a u^2 / R^2) (X-C)
+//   H      = sum -(6 a u^2 / R^2) I + (24 a u / R^4) (X-C)(X-C)^T
 #ifndef SELDINGER_GEOM_BLOBBY_H
 #define SELDINGER_GEOM_BLOBBY_H
 
@@ -11,15 +15,23 @@
 typedef struct Blobby {
     int count;               // number of blobs
     const Vec3 *center;      // (count) [mm]
-    const double *width;     // (count) rho > 0 [mm]
+    const double *width;     // (count) rho, or R, > 0 [mm]
     double iso_level;        // T
+    const double *amplitude; // a of compact blobs; NULL: the kernel is Cauchy's
+    const int32_t *index;    // (count) which rows of center, width and amplitude the blobs are; NULL: the first ones
 } Blobby;
 
-// The local model of a node of a fitted tree; borrows the tree's arrays.
+static inline int blobby_row(const Blobby *model, int j) { return model->index ? model->index[j] : j; }
+
+// What a node of a fitted tree answers with: its local model, or the shared blobs that it sees. Borrows the tree's arrays.
 static inline Blobby blobby_of(const VesselTree *tree, int node)
 {
+    if (vessel_tree_is_shared(tree)) {
+        int64_t first = tree->seen_offset[node];
+        return (Blobby){(int)(tree->seen_offset[node + 1] - first), tree->blob_center, tree->blob_width, tree->iso_level, tree->blob_amplitude, tree->seen + first};
+    }
     int64_t first = tree->blob_offset[node];
-    return (Blobby){(int)(tree->blob_offset[node + 1] - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level};
+    return (Blobby){(int)(tree->blob_offset[node + 1] - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level, NULL, NULL};
 }
 
 double blobby_field(const Blobby *model, Vec3 x);

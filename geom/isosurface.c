@@ -26,11 +26,16 @@ typedef struct TreeMarch {
     NodeReach *node;                 // the march's balls
 } TreeMarch;
 
-// f > 0 needs a blob that alone gives T / n: rho (1 + x^2 / (5 rho^2))^-2 > T / n.
+// f > 0 needs a blob that alone gives T / n: rho (1 + x^2 / (5 rho^2))^-2 > T / n, or of compact blobs the support of one that adds.
 static double reach_of_model(const Blobby *m, Vec3 center)
 {
     double reach = 0;
-    for (int j = 0; j < m->count; j++) {
+    for (int j = 0; j < m->count && m->amplitude; j++) {
+        int k = blobby_row(m, j);
+        if (m->amplitude[k] > 0)
+            reach = fmax(reach, vec3_distance(center, m->center[k]) + m->width[k]);
+    }
+    for (int j = 0; j < m->count && !m->amplitude; j++) {
         double rho = m->width[j], ratio = rho * m->count / m->iso_level;
         if (ratio > 1)
             reach = fmax(reach, vec3_distance(center, m->center[j]) + rho * sqrt(5 * (sqrt(ratio) - 1)));
@@ -43,7 +48,14 @@ static void field_bounds(const Blobby *m, Vec3 x, double h, double *low, double 
 {
     *low = *high = -m->iso_level;
     for (int j = 0; j < m->count; j++) {
-        double rho = m->width[j], d = vec3_distance(x, m->center[j]), near = fmax(0, d - h), far = d + h;
+        int k = blobby_row(m, j);
+        double rho = m->width[k], d = vec3_distance(x, m->center[k]), near = fmax(0, d - h), far = d + h;
+        if (m->amplitude) {
+            double a = m->amplitude[k], u = fmax(0, 1 - near * near / (rho * rho)), v = fmax(0, 1 - far * far / (rho * rho));
+            *high += a * (a > 0 ? u * u * u : v * v * v);
+            *low += a * (a > 0 ? v * v * v : u * u * u);
+            continue;
+        }
         double u = 1 / (1 + near * near / (5 * rho * rho)), v = 1 / (1 + far * far / (5 * rho * rho));
         *high += rho * u * u;
         *low += rho * v * v;
@@ -154,8 +166,7 @@ static bool find_blocks(TreeMarch *job, int first, int end)
     if (!job->node)
         return false;
     for (int i = first; i < end; i++) {
-        int64_t a = tree->blob_offset[i], z = tree->blob_offset[i + 1];
-        NodeReach n = {i, {(int)(z - a), tree->blob_center + a, tree->blob_width + a, tree->iso_level}, 0};
+        NodeReach n = {i, blobby_of(tree, i), 0};
         n.reach = reach_of_model(&n.model, tree->center[i]);
         if (!(n.reach > 0))
             continue;

@@ -951,7 +951,7 @@ LimVesselOptions lim_vessel_default_options(void) { return (LimVesselOptions){.f
 
 Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *options)
 {
-    if (!tree || !vessel_tree_is_model(tree))
+    if (!tree || !vessel_tree_is_model(tree) || vessel_tree_is_shared(tree))
         return NULL;
     size_t groups = 0, near = 0;
     for (int i = 0; i < tree->node_count; i++) {

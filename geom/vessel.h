@@ -40,7 +40,7 @@ typedef struct VesselHit {
 
 typedef struct Vessel Vessel;
 struct Vessel {
-    const char *kind;        // "lim", "tube", "plane"
+    const char *kind;        // "field", "lim", "tube", "plane"
     // Answers for `count` points. memory[i] is updated. reach [mm]: gaps beyond it may be answered by VESSEL_FAR.
     void (*query)(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit);
     // First location of a point: the best node overall where `from` is -1, else the best reached by walking from node `from`
@@ -77,6 +77,12 @@ typedef struct LimVesselOptions {
 } LimVesselOptions;
 LimVesselOptions lim_vessel_default_options(void);
 Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *options);
+
+// --- The wall of shared blobs (vessel_tree_is_shared): one field, so that it is the same from both sides of every border between near cells. Borrows the
+// tree. NULL where the tree has no such model, or there is no memory. ---
+Vessel *field_vessel_create(const VesselTree *tree);
+// Whichever of the two answers for the tree's model; NULL where it has none.
+Vessel *model_vessel_create(const VesselTree *tree);
 
 // --- Exact tube: the union of spheres of one radius along lines and arcs, or along a polyline. ---
 typedef struct TubePiece {   // a line (angle 0) or an arc

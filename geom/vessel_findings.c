@@ -106,8 +106,7 @@ static double section_radius(const Blobby *model, Vec3 at, Vec3 axis, double lon
 static double neck_width(const VesselTree *tree, int sac, int vessel)
 {
     enum { SECTIONS = 40 };
-    int64_t first = tree->blob_offset[sac];
-    Blobby model = {(int)(tree->blob_offset[sac + 1] - first), tree->blob_center + first, tree->blob_width + first, tree->iso_level};
+    Blobby model = blobby_of(tree, sac);
     Vec3 to = vec3_sub(tree->center[sac], tree->center[vessel]);
     double way = vec3_norm(to), start = 0.7 * tree->radius[vessel], least = HUGE_VAL;
     if (model.count < 1 || !(way > start))

@@ -1,6 +1,8 @@
 // The tree's arrays, its rules and its neighbour lists. See vessel_tree.h; names in messages are those of the model file.
 #include "geom/vessel_tree.h"
 
+#include "geom/blob_flood.h"
+
 #include <limits.h>
 #include <stdlib.h>
 
@@ -51,6 +53,20 @@ VesselTree *vessel_tree_create(int node_count, int64_t point_count, int64_t blob
     return tree;
 }
 
+VesselTree *vessel_tree_create_shared(int node_count, int64_t point_count, int64_t blob_count)
+{
+    VesselTree *tree = vessel_tree_create(node_count, point_count, blob_count);
+    if (!tree)
+        return NULL;
+    tree->iso_level = 1;
+    tree->blob_amplitude = array(blob_count, sizeof *tree->blob_amplitude);
+    if (!tree->blob_amplitude) {
+        vessel_tree_free(tree);
+        return NULL;
+    }
+    return tree;
+}
+
 void vessel_tree_free(VesselTree *tree)
 {
     if (!tree)
@@ -65,12 +81,15 @@ void vessel_tree_free(VesselTree *tree)
     free(tree->point_offset);
     free(tree->blob_center);
     free(tree->blob_width);
+    free(tree->blob_amplitude);
     free(tree->blob_offset);
     free(tree->error);
     free(tree->neighbour_offset);
     free(tree->neighbour);
     free(tree->near_offset);
     free(tree->near);
+    free(tree->seen_offset);
+    free(tree->seen);
     free(tree);
 }
 
@@ -110,6 +129,15 @@ static void check_lengths(const double *v, int64_t count, bool positive, const c
         if (!(v[i] < MOST_MM) || v[i] < 0 || (positive && !(v[i] > 0))) {
             faults_add(faults, file, 0, 0, "%s[%lld] is %g; a number of mm %s 0 and below 1e9 is valid", name, (long long)i, v[i],
                        positive ? "above" : "of at least");
+            return;
+        }
+}
+
+static void check_amplitudes(const VesselTree *tree, const char *file, Faults *faults)
+{
+    for (int64_t i = 0; i < tree->blob_count; i++)
+        if (!(fabs(tree->blob_amplitude[i]) < MOST_MM)) {
+            faults_add(faults, file, 0, 0, "blobs/amplitude[%lld] is %g; finite numbers below 1e9 are valid", (long long)i, tree->blob_amplitude[i]);
             return;
         }
 }
@@ -154,6 +182,8 @@ bool vessel_tree_validate(const VesselTree *tree, const char *file, Faults *faul
     check_vectors(tree->blob_center, tree->blob_count, "blobs/center", file, faults);
     check_lengths(tree->blob_width, tree->blob_count, true, "blobs/width", file, faults);
     check_offsets(tree->blob_offset, n, tree->blob_count, "blobs", file, faults);
+    if (vessel_tree_is_shared(tree))
+        check_amplitudes(tree, file, faults);
     if (tree->blob_count > 0)
         check_lengths(tree->error, n, false, "blobs/error_mm", file, faults);
     if (!isfinite(tree->iso_level) || !(tree->iso_level > 0))
@@ -237,7 +267,7 @@ bool vessel_tree_link(VesselTree *tree)
         return false;
     for (int i = 0; i < n; i++)
         tree->near_offset[i + 1] = tree->near_offset[i] + collect_near(tree, i, largest, tree->near + tree->near_offset[i]);
-    return true;
+    return !vessel_tree_is_shared(tree) || blob_flood_list(tree);
 }
 
 bool vessel_tree_root_is_open(const VesselTree *tree)

@@ -397,7 +397,7 @@ static double node_error(const VesselTree *tree, int node, const Gather *gather,
         free(distance);
         return 0;
     }
-    Blobby blobby = {model->count, model->center, model->width, iso_level};
+    Blobby blobby = {.count = model->count, .center = model->center, .width = model->width, .iso_level = iso_level};
     for (int64_t i = 0; i < count; i++) {
         Vec3 g;
         double f = blobby_gradient(&blobby, point[i], &g);

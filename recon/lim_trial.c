@@ -64,7 +64,7 @@ static int build(int which, const double *size, Vec3 *center, double *width)
     return count;
 }
 
-static Blobby truth_of(const LimTrialShape *shape) { return (Blobby){shape->blob_count, shape->center, shape->width, ISO_LEVEL}; }
+static Blobby truth_of(const LimTrialShape *shape) { return (Blobby){.count = shape->blob_count, .center = shape->center, .width = shape->width, .iso_level = ISO_LEVEL}; }
 
 static void sizes_of(int which, double *size)
 {
@@ -76,7 +76,7 @@ static void sizes_of(int which, double *size)
         Vec3 center[MOST_BLOBS];
         double width[MOST_BLOBS];
         size[0] = 0.5 * (low + high);
-        Blobby model = {build(which, size, center, width), center, width, ISO_LEVEL};
+        Blobby model = {.count = build(which, size, center, width), .center = center, .width = width, .iso_level = ISO_LEVEL};
         Vec3 at = skeleton(which, 0, 0.5, size);
         if (blobby_field(&model, vec3(at.x, at.y, 1)) < 0)
             low = size[0];
@@ -223,7 +223,7 @@ static bool bounds(const LimTrialShape *shape, const Vec3 *point, const double *
                 Vec3 axis = vec3(k % 3 == 0, k % 3 == 1, k % 3 == 2);
                 center[j] = k < 6 ? vec3_add_scaled(c, by, vec3_cross(axis, c)) : vec3_add_scaled(c, by, axis);
             }
-            Blobby model = {count, center, width, ISO_LEVEL};
+            Blobby model = {.count = count, .center = center, .width = width, .iso_level = ISO_LEVEL};
             distances(&model, point, side ? column[parameters] : low);
         }
         for (int i = 0; i < LIM_TRIAL_POINTS; i++)
@@ -234,7 +234,7 @@ static bool bounds(const LimTrialShape *shape, const Vec3 *point, const double *
     parameters = 0;
     memcpy(center, shape->center, sizeof center);
     memcpy(width, shape->width, sizeof width);
-    Blobby model = {shape->blob_count, center, width, ISO_LEVEL};
+    Blobby model = {.count = shape->blob_count, .center = center, .width = width, .iso_level = ISO_LEVEL};
     for (int j = 0; j < shape->blob_count; j++)
         for (int k = 0; k < 4; k++) {
             double *p = k == 0 ? &center[j].x : k == 1 ? &center[j].y : k == 2 ? &center[j].z : &width[j], kept = *p;
@@ -284,7 +284,7 @@ bool lim_trial_run(const LimTrialShape *shape, double sigma, uint64_t seed, cons
         good = out->blobs > 0 && bounds(shape, exact, noise, out);
     }
     if (good) {
-        Blobby model = {out->blobs, center, width, options.iso_level};
+        Blobby model = {.count = out->blobs, .center = center, .width = width, .iso_level = options.iso_level};
         for (int i = 0; i < N; i++) {
             double far = blobby_project(&model, exact[i], exact[i]).distance;
             Vec3 g;

@@ -244,7 +244,7 @@ static void measure_node(void *context, long index)
         f->failed = true;
         return;
     }
-    if (tree->blob_offset[node + 1] > tree->blob_offset[node])
+    if (blobby_of(tree, node).count > 0)
         cast_rays_of(job, node, f);
     for (int k = 0; k < LINK_SAMPLES && parent >= 0; k++) {
         double t = (k + 0.5) / LINK_SAMPLES, radius = tree->radius[node] + t * (tree->radius[parent] - tree->radius[node]);
@@ -342,7 +342,7 @@ bool model_measure(const VesselTree *model, const Shape *truth, int threads, Mod
     Job job = {.tree = model, .truth = truth};
     if (!vessel_tree_is_model(model))
         return false;
-    Vessel *vessel = lim_vessel_create(model);
+    Vessel *vessel = model_vessel_create(model);
     uint8_t *place = find_places(model);
     job.vessel = vessel;
     job.place = place;

@@ -25,7 +25,7 @@ typedef struct Column {      // one dataset as the contract says it
     hsize_t size[2];         // found: rows, columns
 } Column;
 
-enum { CENTER, RADIUS, DIRECTION, HEIGHT, PARENT, KIND, POINT, POINT_OFFSET, BLOB_CENTER, BLOB_WIDTH, BLOB_OFFSET, ERROR_MM, COLUMN_COUNT };
+enum { CENTER, RADIUS, DIRECTION, HEIGHT, PARENT, KIND, POINT, POINT_OFFSET, BLOB_CENTER, BLOB_WIDTH, BLOB_OFFSET, ERROR_MM, BLOB_AMPLITUDE, COLUMN_COUNT };
 static const Column columns[COLUMN_COUNT] = {
     [CENTER] = {"/nodes", "/nodes/center", 2, H5T_FLOAT, {0}},
     [RADIUS] = {"/nodes", "/nodes/radius", 1, H5T_FLOAT, {0}},
@@ -39,6 +39,7 @@ static const Column columns[COLUMN_COUNT] = {
     [BLOB_WIDTH] = {"/blobs", "/blobs/width", 1, H5T_FLOAT, {0}},
     [BLOB_OFFSET] = {"/blobs", "/blobs/offset", 1, H5T_INTEGER, {0}},
     [ERROR_MM] = {"/blobs", "/blobs/error_mm", 1, H5T_FLOAT, {0}},
+    [BLOB_AMPLITUDE] = {"/blobs", "/blobs/amplitude", 1, H5T_FLOAT, {0}},
 };
 
 // The library prints nothing of its own while we work; the user's handler is put back.
@@ -197,15 +198,24 @@ static double read_number(const Reader *reader, const char *key, double otherwis
     return value;
 }
 
+enum { KERNEL_CAUCHY, KERNEL_COMPACT, KERNELS };
+static const char *const kernel_name[KERNELS] = {"cauchy", "compact"};   // of local models, of shared blobs
+
+static int read_kernel(const Reader *reader)
+{
+    char *text = read_text(reader, "kernel");
+    int kernel = text && strcmp(text, kernel_name[KERNEL_COMPACT]) == 0 ? KERNEL_COMPACT : KERNEL_CAUCHY;
+    if (text && text[0] && strcmp(text, kernel_name[kernel]))
+        faults_add(reader->faults, reader->name, 0, 0, "attribute kernel is '%.40s'; valid: cauchy (a local model a node), compact (shared blobs)", text);
+    free(text);
+    return kernel;
+}
+
 static double read_attributes(const Reader *reader, TreeFileInfo *info)
 {
     info->source = read_text(reader, "source");
     info->parameters = read_text(reader, "parameters");
     info->created_by = read_text(reader, "created_by");
-    char *kernel = read_text(reader, "kernel");
-    if (kernel && kernel[0] && strcmp(kernel, "cauchy"))
-        faults_add(reader->faults, reader->name, 0, 0, "attribute kernel is '%.40s'; valid: cauchy", kernel);
-    free(kernel);
     double version = read_number(reader, "version", FORMAT_VERSION), iso_level = read_number(reader, "iso_level", 0.1);
     if (version != FORMAT_VERSION)
         faults_add(reader->faults, reader->name, 0, 0, "attribute version is %g; valid: %d", version, FORMAT_VERSION);
@@ -222,7 +232,8 @@ static VesselTree *read_tree(const Reader *reader, TreeFileInfo *info)
     Column found[COLUMN_COUNT];
     memcpy(found, columns, sizeof found);
     bool is_model = H5Lexists(reader->file, "/blobs", H5P_DEFAULT) > 0;
-    int used = is_model ? COLUMN_COUNT : BLOB_CENTER;
+    bool is_shared = is_model && read_kernel(reader) == KERNEL_COMPACT;
+    int used = is_shared ? COLUMN_COUNT : is_model ? BLOB_AMPLITUDE : BLOB_CENTER;
     bool seen[COLUMN_COUNT] = {false};
     for (int i = 0; i < used; i++)
         seen[i] = inspect(reader, &found[i]);
@@ -234,8 +245,9 @@ static VesselTree *read_tree(const Reader *reader, TreeFileInfo *info)
         else if (seen[i] && (i == POINT_OFFSET || i == BLOB_OFFSET))
             expect_rows(reader, &found[i], nodes + 1, "the number of nodes and one");
     }
-    if (is_model && seen[BLOB_CENTER] && seen[BLOB_WIDTH])
-        expect_rows(reader, &found[BLOB_WIDTH], blobs, "the number of blobs");
+    for (int i = 0; i < used && is_model && seen[BLOB_CENTER]; i++)
+        if (seen[i] && (i == BLOB_WIDTH || i == BLOB_AMPLITUDE))
+            expect_rows(reader, &found[i], blobs, "the number of blobs");
     if (seen[CENTER] && (nodes < 1 || nodes > INT32_MAX - 1))
         faults_add(reader->faults, reader->name, 0, 0, "/nodes/center has %llu rows; valid: 1 to %d", (unsigned long long)nodes, INT32_MAX - 1);
     if (is_model && seen[BLOB_CENTER] && blobs < 1)
@@ -243,7 +255,7 @@ static VesselTree *read_tree(const Reader *reader, TreeFileInfo *info)
     if (reader->faults->count > before)
         return NULL;
 
-    VesselTree *tree = vessel_tree_create((int)nodes, (int64_t)points, (int64_t)blobs);
+    VesselTree *tree = (is_shared ? vessel_tree_create_shared : vessel_tree_create)((int)nodes, (int64_t)points, (int64_t)blobs);
     if (!tree) {
         faults_add(reader->faults, reader->name, 0, 0, "needs more memory than there is (%llu nodes, %llu points)", (unsigned long long)nodes,
                    (unsigned long long)points);
@@ -267,6 +279,7 @@ static VesselTree *read_tree(const Reader *reader, TreeFileInfo *info)
         {BLOB_WIDTH, H5T_NATIVE_DOUBLE, tree->blob_width},
         {BLOB_OFFSET, H5T_NATIVE_INT64, tree->blob_offset},
         {ERROR_MM, H5T_NATIVE_DOUBLE, tree->error},
+        {BLOB_AMPLITUDE, H5T_NATIVE_DOUBLE, tree->blob_amplitude},
     };
     bool good = true;
     for (int i = 0; i < used; i++)
@@ -274,7 +287,8 @@ static VesselTree *read_tree(const Reader *reader, TreeFileInfo *info)
     if (good && vessel_tree_validate(tree, reader->name, reader->faults)) {
         if (vessel_tree_link(tree))
             return tree;
-        faults_add(reader->faults, reader->name, 0, 0, "no memory for %d linked nodes; free some", tree->node_count);
+        faults_add(reader->faults, reader->name, 0, 0, "no memory for the links of %d nodes and for who sees %lld blobs; free some, or fit the tree again",
+                   tree->node_count, (long long)tree->blob_count);
     }
     vessel_tree_free(tree);
     return NULL;
@@ -373,7 +387,7 @@ static bool write_tree(hid_t file, const VesselTree *tree, const TreeFileInfo *i
     int64_t n = tree->node_count, p = tree->point_count, b = tree->blob_count;
     bool good = make_group(file, "/nodes") && make_group(file, "/points") && write_text(file, "format", b > 0 ? "seldinger-model" : "seldinger-tree") &&
                 write_scalar(file, "version", H5T_NATIVE_INT32, &version) &&
-                write_scalar(file, "iso_level", H5T_NATIVE_DOUBLE, &tree->iso_level) && write_text(file, "kernel", "cauchy") &&
+                write_scalar(file, "iso_level", H5T_NATIVE_DOUBLE, &tree->iso_level) && write_text(file, "kernel", kernel_name[vessel_tree_is_shared(tree) ? KERNEL_COMPACT : KERNEL_CAUCHY]) &&
                 write_text(file, "source", info ? info->source : "") && write_text(file, "parameters", info ? info->parameters : "") &&
                 write_text(file, "created_by", info && info->created_by ? info->created_by : "seldinger " SELDINGER_VERSION);
     good = good && write_column(file, "/nodes/center", H5T_NATIVE_DOUBLE, 2, n, tree->center) &&
@@ -388,7 +402,8 @@ static bool write_tree(hid_t file, const VesselTree *tree, const TreeFileInfo *i
         good = make_group(file, "/blobs") && write_column(file, "/blobs/center", H5T_NATIVE_DOUBLE, 2, b, tree->blob_center) &&
                write_column(file, "/blobs/width", H5T_NATIVE_DOUBLE, 1, b, tree->blob_width) &&
                write_column(file, "/blobs/offset", H5T_NATIVE_INT64, 1, n + 1, tree->blob_offset) &&
-               write_column(file, "/blobs/error_mm", H5T_NATIVE_DOUBLE, 1, n, tree->error);
+               write_column(file, "/blobs/error_mm", H5T_NATIVE_DOUBLE, 1, n, tree->error) &&
+               (!vessel_tree_is_shared(tree) || write_column(file, "/blobs/amplitude", H5T_NATIVE_DOUBLE, 1, b, tree->blob_amplitude));
     return good;
 }
 

@@ -33,7 +33,7 @@ static void split_table(void **state)
     for (int i = 0; i < 6; i++) {
         Vec3 center[2] = {{1, 2, 3}, {1, 2, 3}};
         double width[2] = {twin[i], twin[i]}, r = blob_radius(rho[i], 0.1);
-        Blobby two = {2, center, width, 0.1};
+        Blobby two = {.count = 2, .center = center, .width = width, .iso_level = 0.1};
         Vec3 g, x = vec3_add_scaled(center[0], r, vec3_unit(vec3(1, -2, 0.5)));
         double f = blobby_gradient(&two, x, &g);
         assert_true(fabs(f) / vec3_norm(g) < 2e-7);   // widths have 8 digits
@@ -47,7 +47,7 @@ static Blobby random_model(uint64_t *seed, Vec3 *center, double *width)
         center[j] = random_in_box(seed, 1);
         width[j] = random_in(seed, 0.15, 0.6);
     }
-    return (Blobby){BLOBS, center, width, 0.1};
+    return (Blobby){.count = BLOBS, .center = center, .width = width, .iso_level = 0.1};
 }
 
 static double gradient_error(const Blobby *m, Vec3 x, double h)
@@ -104,7 +104,7 @@ static void curvature_of_a_sphere(void **state)
     for (double r = 0.3; r < 5; r *= 1.5) {
         Vec3 c = {0.1, -0.2, 0.3}, g;
         double rho = blob_width_for_radius(r, 0.1);
-        Blobby one = {1, &c, &rho, 0.1};
+        Blobby one = {.count = 1, .center = &c, .width = &rho, .iso_level = 0.1};
         Sym3 h;
         blobby_hessian(&one, vec3_add_scaled(c, r, vec3_unit(vec3(1, 2, -3))), &g, &h);
         assert_near(blobby_curvature(g, &h) * r, 1, 1e-10);
@@ -128,7 +128,7 @@ static void sphere_is_exact(void **state)
     for (int trial = 0; trial < 500; trial++) {
         Vec3 c = random_in_box(&seed, 5), u = random_unit(&seed);
         double r = random_in(&seed, 0.2, 3), rho = blob_width_for_radius(r, 0.1), d = random_in(&seed, 0.001, 40) * (trial % 2 ? 1 : 0.02 * r);
-        Blobby one = {1, &c, &rho, 0.1};
+        Blobby one = {.count = 1, .center = &c, .width = &rho, .iso_level = 0.1};
         Vec3 x = vec3_add_scaled(c, d, u);
         // from nowhere, and from a last contact somewhere else on the sphere
         for (int warm = 0; warm < 2; warm++) {
@@ -149,7 +149,7 @@ static void centre_and_far_away(void **state)
     (void)state;
     Vec3 c = {1, 2, 3};
     double rho = blob_width_for_radius(1, 0.1);
-    Blobby one = {1, &c, &rho, 0.1};
+    Blobby one = {.count = 1, .center = &c, .width = &rho, .iso_level = 0.1};
     SurfacePoint a = blobby_project(&one, c, c), b = blobby_project(&one, c, c);
     assert_true(a.converged && fabs(a.distance - 1) < 1e-9);
     assert_true(vec3_distance(a.foot, b.foot) == 0);
@@ -168,7 +168,7 @@ static void centre_and_far_away(void **state)
         assert_true(s.converged);
     }
     double tiny = 0.05;   // below T there is no surface
-    Blobby none = {1, &c, &tiny, 0.1}, empty = {0, NULL, NULL, 0.1};
+    Blobby none = {.count = 1, .center = &c, .width = &tiny, .iso_level = 0.1}, empty = {.iso_level = 0.1};
     SurfacePoint s = blobby_project(&none, vec3(0, 0, 0), vec3(0, 0, 0));
     assert_true(!s.converged && s.distance < 0 && vec3_is_finite(s.normal));
     s = blobby_project(&empty, vec3(0, 0, 0), vec3(0, 0, 0));
@@ -186,7 +186,7 @@ static void tube_axis(void **state)
         center[j] = vec3(0.5 * (j - N / 2), 0, 0);
         width[j] = 0.3;
     }
-    Blobby tube = {N, center, width, 0.1};
+    Blobby tube = {.count = N, .center = center, .width = width, .iso_level = 0.1};
     SurfacePoint off = blobby_project(&tube, vec3(0, 0.3, 0), vec3(0, 0.3, 0));
     SurfacePoint on = blobby_project(&tube, vec3(0, 0, 0), vec3(0, 0, 0)), again = blobby_project(&tube, vec3(0, 0, 0), vec3(0, 0, 0));
     assert_true(off.converged && on.converged);
@@ -296,7 +296,7 @@ static void tapered_row(void **state)
             center[j] = vec3_scale(axis, 0.5 * (j - N / 2));
             width[j] = 0.25 + 0.008 * j;
         }
-        Blobby m = {N, center, width, 0.1};
+        Blobby m = {.count = N, .center = center, .width = width, .iso_level = 0.1};
         for (double s = -2; s <= 2; s += 0.25) {
             Vec3 x = vec3_scale(axis, s);
             SurfacePoint p = blobby_project(&m, x, x);

@@ -184,7 +184,7 @@ static void tree_joins_without_gap(void **state)
     for (int v = 0; v < m->vertex_count; v++) {
         int node = m->node[v];
         int64_t a = t->blob_offset[node];
-        Blobby b = {10, t->blob_center + a, t->blob_width + a, 0.1};
+        Blobby b = {.count = 10, .center = t->blob_center + a, .width = t->blob_width + a, .iso_level = 0.1};
         Vec3 g, x = m->vertex[v];
         double f = blobby_gradient(&b, x, &g);
         off += fabs(f) > 1e-9 * vec3_norm(g);

@@ -70,7 +70,7 @@ static void lanes_against_twin(void **state)
             center[j] = random_in_box(&seed, 2);
             width[j] = random_in(&seed, 0.1, 1);
         }
-        Blobby m = {count, center, width, 0.1};
+        Blobby m = {.count = count, .center = center, .width = width, .iso_level = 0.1};
         int groups = blob_groups_needed(count);
         BlobGroup *group = aligned_alloc(BLOB_GROUP_ALIGNMENT, (size_t)groups * sizeof *group);
         blob_groups_fill(group, &m);

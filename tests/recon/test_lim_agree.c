@@ -101,8 +101,8 @@ static void mirrored_and_turned_trees_give_the_same_wall(void **state)
         int count = 0;
         for (int n = 0; n < tree->node_count; n++) {
             int64_t a = plain->blob_offset[n], b = model->blob_offset[n];
-            Blobby here = {(int)(plain->blob_offset[n + 1] - a), plain->blob_center + a, plain->blob_width + a, plain->iso_level};
-            Blobby there = {(int)(model->blob_offset[n + 1] - b), model->blob_center + b, model->blob_width + b, model->iso_level};
+            Blobby here = {.count = (int)(plain->blob_offset[n + 1] - a), .center = plain->blob_center + a, .width = plain->blob_width + a, .iso_level = plain->iso_level};
+            Blobby there = {.count = (int)(model->blob_offset[n + 1] - b), .center = model->blob_center + b, .width = model->blob_width + b, .iso_level = model->iso_level};
             for (int64_t i = tree->point_offset[n]; i < tree->point_offset[n + 1]; i += 5) {
                 double far = fabs(blobby_project(&here, tree->point[i], tree->point[i]).distance -
                                   blobby_project(&there, other->point[i], other->point[i]).distance);

@@ -66,7 +66,7 @@ static void plain_energy(const Case *c, double *distance, double *bend)
         center[j] = vec3(c->blob[j].center[0], c->blob[j].center[1], c->blob[j].center[2]);
         width[j] = c->blob[j].width;
     }
-    Blobby model = {BLOBS, center, width, ISO_LEVEL};
+    Blobby model = {.count = BLOBS, .center = center, .width = width, .iso_level = ISO_LEVEL};
     *distance = *bend = 0;
     for (int i = 0; i < POINTS; i++) {
         Vec3 g;

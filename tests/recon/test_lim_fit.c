@@ -150,7 +150,7 @@ static void capsule_of_table_3(void **state)
             options.target_mm = 3 * sigma;
             LimFitTask task = {.point_count = N, .point = noisy, .center = {2, 0, 0}, .direction = {1, 0, 0}, .radius = 1};
             blobs[run] = lim_fit_model(&task, &options, center, width);
-            Blobby model = {blobs[run], center, width, options.iso_level};
+            Blobby model = {.count = blobs[run], .center = center, .width = width, .iso_level = options.iso_level};
             for (int i = 0; i < N; i++)
                 far[i] = fabs(blobby_project(&model, exact[i], exact[i]).distance);
             for (int i = 0; i < N; i++)   // sorted
@@ -219,7 +219,7 @@ static void inlet_is_tubular(void **state)
         }
         tree->point_count = kept;
         VesselTree *model = lim_fit(tree, &options, NULL, &faults);
-        Blobby root = {(int)model->blob_offset[1], model->blob_center, model->blob_width, model->iso_level};
+        Blobby root = {.count = (int)model->blob_offset[1], .center = model->blob_center, .width = model->blob_width, .iso_level = model->iso_level};
         double r = tree->radius[0], worst = 0;
         Vec3 d = tree->direction[0], e1 = vec3_normal_to(d), e2 = vec3_cross(d, e1);
         for (int k = 0; k <= 10; k++)
