@@ -4,6 +4,7 @@
 #include "cli/output.h"
 #include "geom/sort_doubles.h"
 #include "recon/blurred_edge.h"
+#include "recon/field_fit.h"
 #include "recon/lim_fit.h"
 #include "recon/model_measure.h"
 #include "recon/tree_file.h"
@@ -79,8 +80,8 @@ static int parse_options(int argc, char **argv, FitCommand *command)
         case QUIET: command->quiet = true; break;
         case MEASURE: command->measure = true; break;
         case PRESET:
-            if (strcmp(optarg, "default") && strcmp(optarg, "paper"))
-                return usage_fault("--preset is default or paper, not ", optarg);
+            if (strcmp(optarg, "default") && strcmp(optarg, "local") && strcmp(optarg, "paper"))
+                return usage_fault("--preset is default, local or paper, not ", optarg);
             command->preset = optarg;
             command->options = strcmp(optarg, "paper") ? lim_fit_default_options() : lim_fit_paper_options();
             break;
@@ -339,7 +340,17 @@ static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seco
         ProgressBar bar;
         Progress progress = progress_bar(&bar, "fit", command->quiet);
         double begin = seconds_now();
-        model = lim_fit(tree, &command->options, &progress, faults);
+        if (!strcmp(command->preset, "default")) {
+            FieldFitOptions options = field_fit_default_options();
+            options.threads = command->options.threads;
+            options.target_mm = command->options.target_mm;
+            if (getenv("FIELD_TOL")) options.tolerance = atof(getenv("FIELD_TOL"));
+            if (getenv("FIELD_SIG")) options.significance = atof(getenv("FIELD_SIG"));
+            if (getenv("FIELD_LEVELS")) options.levels = atoi(getenv("FIELD_LEVELS"));
+            model = field_fit(tree, &options, &progress, faults);
+        } else {
+            model = lim_fit(tree, &command->options, &progress, faults);
+        }
         *seconds = seconds_now() - begin;
     }
     vessel_tree_free(tree);

@@ -1,0 +1,28 @@
+// One field of shared blobs for the wall of a whole tree: f = sum a (1 - |x-c|^2/R^2)^3 - 1, f > 0 in the lumen (geom/blobby.h, vessel_tree.h).
+//
+// 1. A base: blobs of R = 2 r every 0.75 r along the tree (sacs 1.5 r), and upstream of an open inlet.
+// 2. Levels of ever smaller blobs, R = 1.4 r to 0.35 r: one where the residual, averaged over its support, is more than the tolerance and than the noise.
+// 3. After each level amplitudes, centres and radii of all blobs are fitted to all rows by Levenberg and Marquardt's method, region by region; each region
+//    accepts its own steps, so that no part of a tree waits for, or suffers from, another.
+// Rows are the data (distance f / |grad f|), their slope (|grad f| near 2/r keeps the field near a scaled distance) and one-sided guards: in the lumen
+// along the tree and between axis and wall, outside where neither tube nor data are. A link longer than the sum of its two radii is no lumen and stays shut.
+#ifndef SELDINGER_RECON_FIELD_FIT_H
+#define SELDINGER_RECON_FIELD_FIT_H
+
+#include "geom/vessel_tree.h"
+#include "recon/parallel.h"
+
+typedef struct FieldFitOptions {
+    double tolerance;        // the mean residual below which no blob is added, in local radii; 0.02
+    double target_mm;        // > 0: instead [mm], a fifth of it. 0: tolerance
+    double significance;     // a mean residual counts above this many standard deviations of the noise's mean; 4.5
+    int levels;              // of refinement, 0 to 8; 8
+    int threads;             // 0: all cores; the result does not depend on it
+} FieldFitOptions;
+
+FieldFitOptions field_fit_default_options(void);
+
+// A new tree: the input's nodes and points, with shared blobs. NULL with faults (options out of range, no points, no memory). The input must be linked.
+VesselTree *field_fit(const VesselTree *tree, const FieldFitOptions *options, const Progress *progress, Faults *faults);
+
+#endif

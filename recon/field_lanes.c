@@ -1,0 +1,49 @@
+#include "recon/field_lanes.h"
+
+#include "geom/simd.h"
+
+typedef struct FieldKernels {
+    void (*sum)(const float *, const float *, const float *, int, int, const LaneBlob *, int, float *, float *, float *, float *);
+    void (*columns)(const float *, const float *, const float *, int, int, const LaneBlob *, const float *, const float *, const float *, const float *,
+                    const float *, float *, int);
+} FieldKernels;
+
+#define TARGET
+#define KERNEL(name) name##_baseline
+#include "recon/field_kernel.inc"
+#undef TARGET
+#undef KERNEL
+static const FieldKernels baseline = {sum_baseline, columns_baseline};
+
+#if defined(__x86_64__) && defined(__GNUC__)
+#define TARGET __attribute__((target("avx2")))
+#define KERNEL(name) name##_avx2
+#include "recon/field_kernel.inc"
+#undef TARGET
+#undef KERNEL
+#define TARGET __attribute__((target("avx512f,avx512dq,avx512vl,prefer-vector-width=512")))
+#define KERNEL(name) name##_avx512
+#include "recon/field_kernel.inc"
+#undef TARGET
+#undef KERNEL
+static const FieldKernels avx2 = {sum_avx2, columns_avx2}, avx512 = {sum_avx512, columns_avx512};
+
+static const FieldKernels *kernels(void)
+{
+    static const FieldKernels *const of[SIMD_COUNT] = {&baseline, &avx2, &avx512};
+    return of[simd_level()];
+}
+#else
+static const FieldKernels *kernels(void) { return &baseline; }
+#endif
+
+void field_lanes_sum(const float *x, const float *y, const float *z, int rows, int sloped, const LaneBlob *blob, int count, float *f, float *const g[3])
+{
+    kernels()->sum(x, y, z, rows, sloped, blob, count, f, g[0], g[1], g[2]);
+}
+
+void field_lanes_columns(const float *x, const float *y, const float *z, int rows, int sloped, const LaneBlob *blob, const float *scale, const float *bend,
+                         const float *const n[3], float *column, int stride)
+{
+    kernels()->columns(x, y, z, rows, sloped, blob, scale, bend, n[0], n[1], n[2], column, stride);
+}
