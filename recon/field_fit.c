@@ -122,13 +122,13 @@ static bool fit(FieldModel *model, const FieldFitOptions *options, const Progres
     for (int level = 0; level < options->levels && !s.failed; level++) {
         FieldRefine how = {level_reach[level], options->tolerance, 0.2 * options->target_mm, options->significance};
         s.failed |= field_refine(model, &how) < 0;
-        for (int k = 0; k < 2; k++)
-            sweep(&s, 3);
+        for (int k = 0; k < (getenv("FS") ? atoi(getenv("FS")) : 2); k++)
+            sweep(&s, getenv("FT") ? atoi(getenv("FT")) : 3);
     }
     all_due(model);
     for (int k = 0; k < LAST_SWEEPS; k++) {
         model->guard_weight *= 1.5;
-        sweep(&s, 3);
+        sweep(&s, getenv("FL") ? atoi(getenv("FL")) : 3);
     }
     return !s.failed;
 }

@@ -2,10 +2,14 @@
 
 #include "geom/simd.h"
 
+#include <string.h>
+
 typedef struct FieldKernels {
     void (*sum)(const float *, const float *, const float *, int, int, const LaneBlob *, int, float *, float *, float *, float *);
     void (*columns)(const float *, const float *, const float *, int, int, const LaneBlob *, const float *, const float *, const float *, const float *,
                     const float *, float *, int);
+    void (*gram)(const float *, int, int, float *);
+    void (*mean)(const float *, const float *, const float *, const float *, const float *, int, const LaneBlob *, float (*)[FIELD_LANES]);
 } FieldKernels;
 
 #define TARGET
@@ -13,7 +17,7 @@ typedef struct FieldKernels {
 #include "recon/field_kernel.inc"
 #undef TARGET
 #undef KERNEL
-static const FieldKernels baseline = {sum_baseline, columns_baseline};
+static const FieldKernels baseline = {sum_baseline, columns_baseline, gram_baseline, mean_baseline};
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #define TARGET __attribute__((target("avx2")))
@@ -26,7 +30,7 @@ static const FieldKernels baseline = {sum_baseline, columns_baseline};
 #include "recon/field_kernel.inc"
 #undef TARGET
 #undef KERNEL
-static const FieldKernels avx2 = {sum_avx2, columns_avx2}, avx512 = {sum_avx512, columns_avx512};
+static const FieldKernels avx2 = {sum_avx2, columns_avx2, gram_avx2, mean_avx2}, avx512 = {sum_avx512, columns_avx512, gram_avx512, mean_avx512};
 
 static const FieldKernels *kernels(void)
 {
@@ -47,3 +51,11 @@ void field_lanes_columns(const float *x, const float *y, const float *z, int row
 {
     kernels()->columns(x, y, z, rows, sloped, blob, scale, bend, n[0], n[1], n[2], column, stride);
 }
+
+void field_lanes_mean(const float *x, const float *y, const float *z, const float *weight, const float *value, int rows, const LaneBlob *ball,
+                      float sum[4][FIELD_LANES])
+{
+    kernels()->mean(x, y, z, weight, value, rows, ball, sum);
+}
+
+void field_lanes_gram(const float *row, int rows, int stride, float *product) { kernels()->gram(row, rows, stride, product); }

@@ -127,39 +127,29 @@ void field_model_keep(FieldModel *model, const bool *keep)
     model->count = kept;
 }
 
-static LaneBlob lane_blob(const FieldModel *model, int node, int b)
+LaneBlob field_lane_blob(const VesselTree *tree, int node, const FieldBlob *blob)
 {
-    const FieldBlob *blob = &model->blob[b];
-    Vec3 c = vec3_sub(blob->center, model->tree->center[node]);
+    Vec3 c = vec3_sub(blob->center, tree->center[node]);
     return (LaneBlob){(float)c.x, (float)c.y, (float)c.z, (float)blob->reach, (float)blob->amplitude};
 }
 
-void field_model_sum(const FieldModel *model, int node, float *f, float *const g[3])
+bool field_tile_meets(const RowTile *tile, const LaneBlob *blob, float share)
 {
-    const NodeRows *rows = &model->rows->node[node];
-    int all = rows->data_padded + rows->guards_padded;
-    for (int i = 0; i < all; i++)
-        f[i] = -1;
-    for (int k = 0; k < 3; k++)
-        memset(g[k], 0, (size_t)rows->data_padded * sizeof *g[k]);
-    for (int64_t s = model->offset[node]; s < model->offset[node + 1]; s++) {
-        LaneBlob blob = lane_blob(model, node, model->seen[s]);
-        field_lanes_sum(rows->x, rows->y, rows->z, all, rows->data_padded, &blob, 1, f, g);
-    }
+    float dx = blob->x - tile->middle[0], dy = blob->y - tile->middle[1], dz = blob->z - tile->middle[2], far = share * blob->reach + tile->radius;
+    return dx * dx + dy * dy + dz * dz < far * far;
 }
 
-void field_model_residuals(const FieldModel *model, int node, float *distance)
+void field_model_residuals(const FieldModel *model, const RowTile *tile, float *distance)
 {
-    const NodeRows *rows = &model->rows->node[node];
-    int d = rows->data_padded, all = d + rows->guards_padded;
-    float least = 0.5f / (float)model->tree->radius[node];
-    float *f = malloc(((size_t)all + 3 * (size_t)d + 1) * sizeof *f), *const g[3] = {f + all, f + all + d, f + all + 2 * d};
-    if (!f) {
-        memset(distance, 0, (size_t)d * sizeof *distance);
-        return;
+    int d = tile->data_padded;
+    float least = 0.5f / (float)model->tree->radius[tile->node], sum[4][FIELD_TILE], *const g[3] = {sum[1], sum[2], sum[3]};
+    for (int i = 0; i < d; i++)
+        sum[0][i] = -1, sum[1][i] = sum[2][i] = sum[3][i] = 0;
+    for (int64_t s = model->offset[tile->node]; s < model->offset[tile->node + 1]; s++) {
+        LaneBlob blob = field_lane_blob(model->tree, tile->node, &model->blob[model->seen[s]]);
+        if (field_tile_meets(tile, &blob, 1))
+            field_lanes_sum(tile->x, tile->y, tile->z, d, d, &blob, 1, sum[0], g);
     }
-    field_model_sum(model, node, f, g);
-    for (int i = 0; i < rows->data; i++)
-        distance[i] = f[i] / fmaxf(sqrtf(g[0][i] * g[0][i] + g[1][i] * g[1][i] + g[2][i] * g[2][i]), least);
-    free(f);
+    for (int i = 0; i < tile->data; i++)
+        distance[i] = sum[0][i] / fmaxf(sqrtf(g[0][i] * g[0][i] + g[1][i] * g[1][i] + g[2][i] * g[2][i]), least);
 }

@@ -36,10 +36,11 @@ bool field_model_add(FieldModel *model, int owner, Vec3 center, double reach, do
 bool field_model_list(FieldModel *model);
 // Drops the blobs whose `keep` is false.
 void field_model_keep(FieldModel *model, const bool *keep);
-// Field and gradient at a node's rows; f and g are sized as the rows (g: the padded data).
-void field_model_sum(const FieldModel *model, int node, float *f, float *const g[3]);
-// Signed distances f/|grad f| [mm] of a node's data (padded), > 0 inside.
-void field_model_residuals(const FieldModel *model, int node, float *distance);
+// A blob as a tile's rows see it, and whether any of them is within `share` of its reach.
+LaneBlob field_lane_blob(const VesselTree *tree, int node, const FieldBlob *blob);
+bool field_tile_meets(const RowTile *tile, const LaneBlob *blob, float share);
+// Signed distances f/|grad f| [mm] of a tile's data (D), > 0 inside.
+void field_model_residuals(const FieldModel *model, const RowTile *tile, float *distance);
 // One sweep over all regions that hold due rows, `steps` accepted steps each at most; `shift` moves the regions' borders. The sum of squares gained,
 // as a share of the whole; < 0 without memory.
 double field_model_solve(FieldModel *model, int steps, bool shift);

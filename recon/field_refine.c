@@ -21,21 +21,21 @@ typedef struct Candidate {
 typedef struct Job {
     FieldModel *model;
     const FieldRefine *how;
-    float **residual;        // (N) of the data
+    float (*residual)[FIELD_TILE];   // (tiles) of the data
     double *noise;           // (N) [mm]
     Candidate **found;       // (N)
     int *count;              // (N)
     bool *failed;            // (N)
 } Job;
 
+static const RowTile *tile_of(const Job *job, int t) { return &job->model->rows->tile[t]; }
+
 static void measure_residuals(void *context, long index)
 {
     Job *job = context;
-    const NodeRows *rows = &job->model->rows->node[index];
-    job->residual[index] = calloc((size_t)rows->data_padded + 1, sizeof(float));
-    job->failed[index] = !job->residual[index];
-    if (!job->failed[index])
-        field_model_residuals(job->model, (int)index, job->residual[index]);
+    const int *first = job->model->rows->first;
+    for (int t = first[index]; t < first[index + 1]; t++)
+        field_model_residuals(job->model, tile_of(job, t), job->residual[t]);
 }
 
 typedef struct Mean {
@@ -43,54 +43,62 @@ typedef struct Mean {
 } Mean;
 
 // Of the data of `from` within `reach` of x.
-static void add_mean(const Job *job, int from, Vec3 x, double reach, Mean *mean)
+static void add_mean(const Job *job, int from, Vec3 x, double reach, float sum[4][FIELD_LANES])
 {
-    const NodeRows *rows = &job->model->rows->node[from];
-    const float *residual = job->residual[from];
+    const int *first = job->model->rows->first;
     Vec3 local = vec3_sub(x, job->model->tree->center[from]);
-    float cx = (float)local.x, cy = (float)local.y, cz = (float)local.z, inverse = 1 / (float)(reach * reach);
-    for (int i = 0; i < rows->data; i++) {
-        float dx = rows->x[i] - cx, dy = rows->y[i] - cy, dz = rows->z[i] - cz, u = 1 - (dx * dx + dy * dy + dz * dz) * inverse;
-        if (!(u > 0))
-            continue;
-        double w = (double)(u * u * u), e = (double)residual[i];
-        mean->weight += w, mean->weight2 += w * w, mean->sum += w * e, mean->sum2 += w * e * e;
+    LaneBlob ball = {(float)local.x, (float)local.y, (float)local.z, (float)reach, 0};
+    for (int t = first[from]; t < first[from + 1]; t++) {
+        const RowTile *tile = tile_of(job, t);
+        if (tile->data > 0 && field_tile_meets(tile, &ball, 1))
+            field_lanes_mean(tile->x, tile->y, tile->z, tile->weight, job->residual[t], tile->data_padded, &ball, sum);
     }
 }
 
 static Mean mean_about(const Job *job, int node, Vec3 x, double reach)
 {
     const VesselTree *tree = job->model->tree;
-    Mean mean = {0};
-    add_mean(job, node, x, reach, &mean);
-    for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++) {
-        int other = tree->near[k];
-        double far = reach + 2.5 * tree->radius[other] + tree->height[other];
-        if (vec3_norm2(vec3_sub(x, tree->center[other])) < far * far)
-            add_mean(job, other, x, reach, &mean);
-    }
-    return mean;
+    float lane[4][FIELD_LANES] = {{0}};
+    double sum[4] = {0};
+    add_mean(job, node, x, reach, lane);
+    for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++)
+        add_mean(job, tree->near[k], x, reach, lane);
+    for (int k = 0; k < 4; k++)
+        for (int l = 0; l < FIELD_LANES; l++)
+            sum[k] += (double)lane[k][l];
+    return (Mean){sum[0], sum[1], sum[2], sum[3]};
 }
 
-static Vec3 row_place(const Job *job, int node, int i)
+static Vec3 row_place(const Job *job, const RowTile *tile, int i)
 {
-    const NodeRows *rows = &job->model->rows->node[node];
-    return vec3_add(job->model->tree->center[node], vec3((double)rows->x[i], (double)rows->y[i], (double)rows->z[i]));
+    return vec3_add(job->model->tree->center[tile->node], vec3((double)tile->x[i], (double)tile->y[i], (double)tile->z[i]));
+}
+
+static int data_of(const Job *job, int node)
+{
+    int data = 0;
+    for (int t = job->model->rows->first[node]; t < job->model->rows->first[node + 1]; t++)
+        data += tile_of(job, t)->data;
+    return data;
 }
 
 static void measure_noise(void *context, long index)
 {
     enum { SAMPLES = 24 };
     Job *job = context;
-    int node = (int)index, count = job->model->rows->node[node].data, taken = 0;
+    const int *first = job->model->rows->first;
+    int node = (int)index, step = data_of(job, node) / SAMPLES + 1, taken = 0, next = 0;
     double spread[SAMPLES], r = job->model->tree->radius[node];
-    int step = count / SAMPLES + 1;
-    for (int i = 0; i < count && taken < SAMPLES; i += step) {
-        Mean m = mean_about(job, node, row_place(job, node, i), 0.7 * r);
-        double points = m.weight * m.weight / fmax(m.weight2, 1e-12), mean = m.sum / fmax(m.weight, 1e-12);
-        if (points < 3)
-            continue;
-        spread[taken++] = sqrt(fmax(0, m.sum2 / m.weight - mean * mean) * points / (points - 1));
+    for (int t = first[node]; t < first[node + 1]; t++) {
+        const RowTile *tile = tile_of(job, t);
+        for (; next < tile->data && taken < SAMPLES; next += step) {
+            Mean m = mean_about(job, node, row_place(job, tile, next), 0.7 * r);
+            double points = m.weight * m.weight / fmax(m.weight2, 1e-12), mean = m.sum / fmax(m.weight, 1e-12);
+            if (points >= 3)
+                spread[taken++] = sqrt(fmax(0, m.sum2 / m.weight - mean * mean) * points / (points - 1));
+        }
+        next -= tile->data;
+        next = next > 0 ? next : 0;
     }
     sort_doubles(spread, (size_t)taken);
     job->noise[node] = taken > 0 ? spread[taken / 2] : 0;
@@ -109,20 +117,23 @@ static int compare_candidates(const void *a, const void *b)
 static void find_candidates(void *context, long index)
 {
     Job *job = context;
-    int node = (int)index, count = job->model->rows->node[node].data, found = 0;
+    int node = (int)index, found = 0;
     double r = job->model->tree->radius[node], reach = job->how->reach * r;
     double tolerance = job->how->target_mm > 0 ? job->how->target_mm : job->how->tolerance * r;
-    Candidate *list = malloc(((size_t)count + 1) * sizeof *list);
+    const int *first = job->model->rows->first;
+    Candidate *list = malloc(((size_t)data_of(job, node) + 1) * sizeof *list);
     job->failed[node] = !list;
     job->found[node] = list;
-    for (int i = 0; i < count && list; i++) {
-        Vec3 x = row_place(job, node, i);
-        Mean m = mean_about(job, node, x, reach);
-        double mean = m.sum / m.weight, noise = job->noise[node] * sqrt(m.weight2) / m.weight, points = m.weight * m.weight / m.weight2;
-        double least = fmax(tolerance, job->how->significance * noise);
-        if (points < 4 || !(fabs(mean) > least))
-            continue;
-        list[found++] = (Candidate){fabs(mean) / least, node, x, mean};
+    for (int t = first[node]; t < first[node + 1] && list; t++) {
+        const RowTile *tile = tile_of(job, t);
+        for (int i = 0; i < tile->data; i++) {
+            Vec3 x = row_place(job, tile, i);
+            Mean m = mean_about(job, node, x, reach);
+            double mean = m.sum / m.weight, noise = job->noise[node] * sqrt(m.weight2) / m.weight, points = m.weight * m.weight / m.weight2;
+            double least = fmax(tolerance, job->how->significance * noise);
+            if (points >= 4 && fabs(mean) > least)
+                list[found++] = (Candidate){fabs(mean) / least, node, x, mean};
+        }
     }
     // those that a larger one of the same node stands too near to are out in any case
     if (found > 1)
@@ -191,8 +202,8 @@ static int take_candidates(Job *job)
 
 int field_refine(FieldModel *model, const FieldRefine *how)
 {
-    size_t n = (size_t)model->tree->node_count;
-    Job job = {.model = model, .how = how, .residual = calloc(n, sizeof *job.residual), .noise = calloc(n, sizeof *job.noise),
+    size_t n = (size_t)model->tree->node_count, tiles = (size_t)model->rows->first[n] + 1;
+    Job job = {.model = model, .how = how, .residual = calloc(tiles, sizeof *job.residual), .noise = calloc(n, sizeof *job.noise),
                .found = calloc(n, sizeof *job.found), .count = calloc(n, sizeof *job.count), .failed = calloc(n, sizeof *job.failed)};
     bool good = job.residual && job.noise && job.found && job.count && job.failed;
     void (*const stage[])(void *, long) = {measure_residuals, measure_noise, find_candidates};
@@ -202,10 +213,8 @@ int field_refine(FieldModel *model, const FieldRefine *how)
             good = good && !job.failed[i];
     }
     int before = model->count, added = good ? take_candidates(&job) : -1;
-    for (size_t i = 0; i < n && job.residual && job.found; i++) {
-        free(job.residual[i]);
+    for (size_t i = 0; i < n && job.found; i++)
         free(job.found[i]);
-    }
     free(job.residual);
     free(job.noise);
     free(job.found);

@@ -240,76 +240,141 @@ static void draft_node(void *context, long index)
         job->cell[node][d->data + i] = power_walk(tree, d->at[i], node, 8);
 }
 
-static bool reserve(NodeRows *n)
+// --- Tiles ---
+
+typedef struct Row {
+    float x[3], low, high;
+    bool is_data;
+} Row;
+
+// Where a node's rows are halved: the middle of the longest axis, counted in rows.
+static int compare_rows(const void *a, const void *b, int axis)
 {
-    n->data_padded = (n->data + FIELD_LANES - 1) / FIELD_LANES * FIELD_LANES;
-    n->guards_padded = (n->guards + FIELD_LANES - 1) / FIELD_LANES * FIELD_LANES;
-    size_t d = (size_t)n->data_padded, g = (size_t)n->guards_padded, all = 3 * (d + g) + d + 3 * g;
-    n->memory = aligned_alloc(64, (all + FIELD_LANES) * sizeof(float));
-    if (!n->memory)
-        return false;
-    memset(n->memory, 0, (all + FIELD_LANES) * sizeof(float));
-    n->x = n->memory, n->y = n->x + d + g, n->z = n->y + d + g;
-    n->weight = n->z + d + g, n->low = n->weight + d, n->high = n->low + g, n->guard = n->high + g;
-    n->data = n->guards = 0;
-    return true;
+    float x = ((const Row *)a)->x[axis], y = ((const Row *)b)->x[axis];
+    return (x > y) - (x < y);
+}
+static int by_x(const void *a, const void *b) { return compare_rows(a, b, 0); }
+static int by_y(const void *a, const void *b) { return compare_rows(a, b, 1); }
+static int by_z(const void *a, const void *b) { return compare_rows(a, b, 2); }
+
+static int padded(int count) { return (count + FIELD_LANES - 1) / FIELD_LANES * FIELD_LANES; }
+
+// Halves until a tile holds no more than it may; counts them, or with `tile` fills them, their numbers going to `memory`.
+static void split_rows(Row *row, int count, int node, RowTile **tile, float **memory, int *tiles, size_t *floats)
+{
+    int data = 0;
+    float low[3] = {HUGE_VALF, HUGE_VALF, HUGE_VALF}, high[3] = {-HUGE_VALF, -HUGE_VALF, -HUGE_VALF};
+    for (int i = 0; i < count; i++) {
+        data += row[i].is_data;
+        for (int k = 0; k < 3; k++)
+            low[k] = fminf(low[k], row[i].x[k]), high[k] = fmaxf(high[k], row[i].x[k]);
+    }
+    if (count == 0)
+        return;
+    if (data > FIELD_TILE || count - data > FIELD_TILE) {
+        int axis = high[1] - low[1] > high[0] - low[0] ? 1 : 0;
+        axis = high[2] - low[2] > high[axis] - low[axis] ? 2 : axis;
+        qsort(row, (size_t)count, sizeof *row, axis == 0 ? by_x : axis == 1 ? by_y : by_z);
+        split_rows(row, count / 2, node, tile, memory, tiles, floats);
+        split_rows(row + count / 2, count - count / 2, node, tile, memory, tiles, floats);
+        return;
+    }
+    int d = padded(data), g = padded(count - data);
+    *tiles += 1;
+    *floats += (size_t)(3 * (d + g) + d + 2 * g);
+    if (!tile)
+        return;
+    float *next = *memory;
+    RowTile *to = (*tile)++;
+    *to = (RowTile){.node = node, .data_padded = d, .guards_padded = g, .x = next, .y = next + d + g, .z = next + 2 * (d + g), .weight = next + 3 * (d + g)};
+    to->low = to->weight + d, to->high = to->low + g;
+    *memory = to->high + g;
+    for (int k = 0; k < 3; k++)
+        to->middle[k] = 0.5f * (low[k] + high[k]);
+    for (int i = 0; i < count; i++) {
+        int at = row[i].is_data ? to->data++ : d + to->guards++;
+        to->x[at] = row[i].x[0], to->y[at] = row[i].x[1], to->z[at] = row[i].x[2];
+        if (row[i].is_data)
+            to->weight[at] = 1;
+        else
+            to->low[at - d] = row[i].low, to->high[at - d] = row[i].high;
+        float dx = row[i].x[0] - to->middle[0], dy = row[i].x[1] - to->middle[1], dz = row[i].x[2] - to->middle[2];
+        to->radius = fmaxf(to->radius, sqrtf(dx * dx + dy * dy + dz * dz));
+    }
 }
 
-static void put_rows(const Job *job)
+// All rows, those of a cell side by side: (M), first (N+1).
+static Row *collect_rows(const Job *job, int *first)
 {
     const VesselTree *tree = job->tree;
-    for (int i = 0; i < tree->node_count; i++) {
+    int n = tree->node_count, total = 0;
+    for (int i = 0; i < n; i++) {
+        const Draft *d = &job->draft[i];
+        if (d->failed)
+            return NULL;
+        for (int k = 0; k < d->data + d->guards; k++)
+            first[job->cell[i][k] + 1]++;
+        total += d->data + d->guards;
+    }
+    Row *row = malloc(((size_t)total + 1) * sizeof *row);
+    int sum = 0;
+    for (int i = 0; i < n; i++) {   // first[i + 1] becomes where the next row of cell i goes, at last its end
+        int own = first[i + 1];
+        first[i + 1] = sum;
+        sum += own;
+    }
+    for (int i = 0; i < n && row; i++) {
         const Draft *d = &job->draft[i];
         for (int k = 0; k < d->data + d->guards; k++) {
             bool is_data = k < d->data;
             int cell = job->cell[i][k];
-            NodeRows *to = &job->rows->node[cell];
-            int at = is_data ? to->data++ : to->data_padded + to->guards++;
             Vec3 x = vec3_sub(is_data ? d->point[k] : d->at[k - d->data], tree->center[cell]);
-            to->x[at] = (float)x.x, to->y[at] = (float)x.y, to->z[at] = (float)x.z;
-            if (is_data) {
-                to->weight[at] = 1;
-                continue;
-            }
-            int g = at - to->data_padded;
             // in a cell wider than the vessel that the guard is of, its field rises more slowly
             float scale = (float)fmin(1, tree->radius[i] / tree->radius[cell]);
-            to->low[g] = d->bound[k - d->data][0] * scale, to->high[g] = d->bound[k - d->data][1] * scale;
-            to->guard[g] = 1;
+            row[first[cell + 1]++] = (Row){{(float)x.x, (float)x.y, (float)x.z}, is_data ? 0 : d->bound[k - d->data][0] * scale,
+                                           is_data ? 0 : d->bound[k - d->data][1] * scale, is_data};
         }
     }
+    return row;
 }
 
-static bool count_rows(const Job *job)
+static bool make_tiles(const Job *job)
 {
-    for (int i = 0; i < job->tree->node_count; i++) {
-        const Draft *d = &job->draft[i];
-        if (d->failed)
-            return false;
-        for (int k = 0; k < d->data + d->guards; k++)
-            if (k < d->data)
-                job->rows->node[job->cell[i][k]].data++;
-            else
-                job->rows->node[job->cell[i][k]].guards++;
+    FieldRows *rows = job->rows;
+    int n = rows->node_count, *first = calloc((size_t)n + 1, sizeof *first);
+    Row *row = first ? collect_rows(job, first) : NULL;
+    size_t floats = 0;
+    int tiles = 0;
+    for (int i = 0; i < n && row; i++) {
+        rows->first[i] = tiles;
+        split_rows(row + first[i], first[i + 1] - first[i], i, NULL, NULL, &tiles, &floats);
     }
-    for (int i = 0; i < job->tree->node_count; i++)
-        if (!reserve(&job->rows->node[i]))
-            return false;
-    return true;
+    rows->first[n] = tiles;
+    rows->tile = calloc((size_t)tiles + 1, sizeof *rows->tile);
+    rows->memory = aligned_alloc(64, (floats + FIELD_LANES) / FIELD_LANES * 64);
+    bool good = row && rows->tile && rows->memory;
+    if (good) {
+        memset(rows->memory, 0, floats * sizeof(float));
+        RowTile *tile = rows->tile;
+        float *memory = rows->memory;
+        for (int i = 0; i < n; i++)
+            split_rows(row + first[i], first[i + 1] - first[i], i, &tile, &memory, &tiles, &floats);
+    }
+    free(first);
+    free(row);
+    return good;
 }
 
 bool field_rows_create(FieldRows *rows, const VesselTree *tree, int threads)
 {
     size_t n = (size_t)tree->node_count;
-    *rows = (FieldRows){.node_count = tree->node_count, .node = calloc(n, sizeof *rows->node)};
+    *rows = (FieldRows){.node_count = tree->node_count, .first = calloc(n + 1, sizeof *rows->first)};
     Job job = {tree, calloc(n, sizeof *job.draft), calloc(n, sizeof *job.cell), rows, calloc(n, sizeof *job.dropped)};
-    bool good = rows->node && job.draft && job.cell && job.dropped;
+    bool good = rows->first && job.draft && job.cell && job.dropped;
     if (good) {
         parallel_for(threads, tree->node_count, draft_node, &job, NULL);
-        good = count_rows(&job);
+        good = make_tiles(&job);
     }
-    if (good)
-        put_rows(&job);
     for (int i = 0; i < tree->node_count && job.draft && job.cell && job.dropped; i++) {
         rows->dropped += job.dropped[i];
         free(job.draft[i].point);
@@ -327,8 +392,8 @@ bool field_rows_create(FieldRows *rows, const VesselTree *tree, int threads)
 
 void field_rows_free(FieldRows *rows)
 {
-    for (int i = 0; i < rows->node_count && rows->node; i++)
-        free(rows->node[i].memory);
-    free(rows->node);
+    free(rows->first);
+    free(rows->tile);
+    free(rows->memory);
     *rows = (FieldRows){0};
 }

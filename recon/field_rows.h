@@ -6,22 +6,25 @@
 #define SELDINGER_RECON_FIELD_ROWS_H
 
 #include "geom/vessel_tree.h"
+#include "recon/field_lanes.h"
 
-enum { FIELD_LANES = 16 };
+enum { FIELD_TILE = 64 };
 
-typedef struct NodeRows {
+typedef struct RowTile {     // up to FIELD_TILE neighbouring data and as many guards of one node
+    int node;
     int data, data_padded;   // D: points on the wall, f = 0
     int guards, guards_padded;   // G: f within [low, high]
     float *x, *y, *z;        // (padded D + padded G) [mm] from the node's centre
     float *weight;           // (padded D) of a point: 1, or 0 in the padding
     float *low, *high;       // (padded G)
-    float *guard;            // (padded G) weight of a guard: 1, or 0 in the padding
-    float *memory;           // all of these
-} NodeRows;
+    float middle[3], radius; // [mm] a ball about all of them
+} RowTile;
 
 typedef struct FieldRows {
     int node_count;          // N
-    NodeRows *node;          // (N)
+    int *first;              // (N+1) node i has tiles first[i] … first[i+1]-1
+    RowTile *tile;
+    float *memory;           // of all tiles
     int64_t dropped;         // data points left out: inside another tube's lumen
 } FieldRows;
 

@@ -16,11 +16,11 @@ static const double HUBER_RADII = 0.08, LEAST_SLOPE = 0.5;
 // Priors: a blob's place and size are held to where it was put, as firmly as a few points a hundredth of a radius off would.
 static const double PRIOR_PLACE = 0.02, PRIOR_AMPLITUDE = 0.002;
 
-typedef struct RegionNode {
-    int node, count;         // blobs of the region that it sees …
-    int *local;              // … their numbers in the region
+typedef struct TileWork {    // a tile's part in a region's solution
+    const RowTile *tile;
+    int count, *local;       // blobs of the region that reach it: their numbers in the region
     float *still_f, *still_g[3], *f, *g[3];
-} RegionNode;
+} TileWork;
 
 typedef struct Region {
     int first, count;        // blobs order[first … first+count-1]
@@ -33,7 +33,7 @@ typedef struct Region {
 typedef struct Sweep {
     FieldModel *model;
     int *order;              // (blobs) along the tree
-    int *region_of;          // (blobs)
+    int *region_of, *local_of;   // (blobs)
     int regions;
     Region *region;
     int batch_count, *batch; // regions of one colour
@@ -43,137 +43,144 @@ typedef struct Sweep {
 typedef struct Work {        // of one region
     const Sweep *sweep;
     const Region *region;
-    RegionNode *node;
+    int tiles;
+    TileWork *tile;
+    int *local;              // of all tiles
     float *memory;
     int unknowns;
     double *matrix, *slope;  // (U, U), (U)
     double *factor, *step;
     FieldBlob *trial;        // (region's blobs)
-    float *column;
-    double *gram;
-    int columns_most, length_most;
+    float *row, *gram;       // of a tile: the columns, row by row, and their product
 } Work;
-
-static const NodeRows *rows_of(const Work *w, int n) { return &w->sweep->model->rows->node[w->node[n].node]; }
-
-static LaneBlob lane_of(const VesselTree *tree, int node, const FieldBlob *blob)
-{
-    Vec3 c = vec3_sub(blob->center, tree->center[node]);
-    return (LaneBlob){(float)c.x, (float)c.y, (float)c.z, (float)blob->reach, (float)blob->amplitude};
-}
 
 // --- Setting up ---
 
-static int local_of(const Work *w, int blob)
+// Blobs may grow and move in a sweep: tiles just beyond their support are theirs too.
+static const float TILE_SHARE = 1.15f;
+
+static int tiles_of(const Sweep *sweep, const Region *region)
 {
-    const Sweep *s = w->sweep;
-    for (int k = 0; k < w->region->count; k++)
-        if (s->order[w->region->first + k] == blob)
-            return k;
-    return -1;
+    int tiles = 0;
+    for (int n = 0; n < region->nodes; n++)
+        tiles += sweep->model->rows->first[region->node[n] + 1] - sweep->model->rows->first[region->node[n]];
+    return tiles;
 }
+
+// The region's blobs that reach the tile, to `local`; returns their number.
+static int find_blobs(const Sweep *sweep, int region, const RowTile *tile, int *local)
+{
+    const FieldModel *model = sweep->model;
+    int count = 0;
+    for (int64_t s = model->offset[tile->node]; s < model->offset[tile->node + 1]; s++) {
+        int b = model->seen[s];
+        if (sweep->region_of[b] != region)
+            continue;
+        LaneBlob lane = field_lane_blob(model->tree, tile->node, &model->blob[b]);
+        if (field_tile_meets(tile, &lane, TILE_SHARE))
+            local[count++] = sweep->local_of[b];
+    }
+    return count;
+}
+
+// The sums of the blobs that stand still.
+static void sum_still(const Sweep *sweep, int region, TileWork *tw)
+{
+    const FieldModel *model = sweep->model;
+    const RowTile *tile = tw->tile;
+    int d = tile->data_padded, all = d + tile->guards_padded;
+    for (int i = 0; i < all; i++)
+        tw->still_f[i] = -1;
+    for (int k = 0; k < 3; k++)
+        memset(tw->still_g[k], 0, (size_t)d * sizeof(float));
+    for (int64_t s = model->offset[tile->node]; s < model->offset[tile->node + 1]; s++) {
+        int b = model->seen[s];
+        LaneBlob lane = field_lane_blob(model->tree, tile->node, &model->blob[b]);
+        if (sweep->region_of[b] != region && field_tile_meets(tile, &lane, 1))
+            field_lanes_sum(tile->x, tile->y, tile->z, all, d, &lane, 1, tw->still_f, tw->still_g);
+    }
+}
+
+enum { ROWS_MAX = 3 * FIELD_TILE };          // of a tile: data, guards, slopes
 
 static bool begin_work(Work *w, const Sweep *sweep, const Region *region)
 {
-    const FieldModel *model = sweep->model;
     *w = (Work){.sweep = sweep, .region = region, .unknowns = UNKNOWNS * region->count};
-    int number = (int)(region - sweep->region);
-    size_t floats = 0, locals = 0;
-    for (int n = 0; n < region->nodes; n++) {
-        int node = region->node[n];
-        const NodeRows *rows = &model->rows->node[node];
-        int d = rows->data_padded, all = d + rows->guards_padded, seen = 0;
-        floats += 2 * ((size_t)all + 3 * (size_t)d);
-        for (int64_t s = model->offset[node]; s < model->offset[node + 1]; s++)
-            seen += sweep->region_of[model->seen[s]] == number;
-        locals += (size_t)seen;
-        int columns = (UNKNOWNS * seen + 1 + 3) / 4 * 4;
-        w->columns_most = columns > w->columns_most ? columns : w->columns_most;
-        w->length_most = all + d > w->length_most ? all + d : w->length_most;
-    }
-    size_t u = (size_t)w->unknowns;
-    w->node = calloc((size_t)region->nodes, sizeof *w->node);
-    w->memory = malloc((floats + 1) * sizeof *w->memory);
-    int *local = malloc((locals + 1) * sizeof *local);
+    int number = (int)(region - sweep->region), most = tiles_of(sweep, region);
+    size_t u = (size_t)w->unknowns, stride = (u + FIELD_LANES) / FIELD_LANES * FIELD_LANES;
+    w->tile = calloc((size_t)most + 1, sizeof *w->tile);
+    w->local = malloc(((size_t)most * (size_t)region->count + 1) * sizeof *w->local);
+    w->memory = malloc(((size_t)most * 10 * FIELD_TILE + 1) * sizeof *w->memory);
     w->matrix = malloc(2 * (u * u + u) * sizeof *w->matrix);
     w->trial = malloc((size_t)region->count * sizeof *w->trial);
-    w->column = aligned_alloc(64, ((size_t)w->columns_most + 2) * ((size_t)w->length_most + 16) / 16 * 64 + 64);
-    w->gram = malloc((size_t)w->columns_most * (size_t)w->columns_most * sizeof *w->gram);
-    if (!w->node || !w->memory || !local || !w->matrix || !w->trial || !w->column || !w->gram) {
-        free(local);
+    w->row = aligned_alloc(64, stride * ROWS_MAX * sizeof *w->row);
+    w->gram = aligned_alloc(64, stride * stride * sizeof *w->gram);
+    if (!w->tile || !w->local || !w->memory || !w->matrix || !w->trial || !w->row || !w->gram)
         return false;
-    }
     w->slope = w->matrix + u * u, w->factor = w->slope + u, w->step = w->factor + u * u;
     float *next = w->memory;
-    for (int n = 0; n < region->nodes; n++) {
-        RegionNode *rn = &w->node[n];
-        int node = rn->node = region->node[n], d = model->rows->node[node].data_padded, all = d + model->rows->node[node].guards_padded;
-        rn->local = local;
-        rn->still_f = next, next += all;
-        rn->f = next, next += all;
-        for (int k = 0; k < 3; k++, next += 2 * (size_t)d)
-            rn->still_g[k] = next, rn->g[k] = next + d;
-        const NodeRows *rows = &model->rows->node[node];
-        for (int i = 0; i < all; i++)
-            rn->still_f[i] = -1;
-        for (int k = 0; k < 3; k++)
-            memset(rn->still_g[k], 0, (size_t)d * sizeof(float));
-        for (int64_t s = model->offset[node]; s < model->offset[node + 1]; s++) {
-            int b = model->seen[s];
-            if (sweep->region_of[b] == number) {
-                rn->local[rn->count++] = local_of(w, b);
+    int *local = w->local;
+    for (int n = 0; n < region->nodes; n++)
+        for (int t = sweep->model->rows->first[region->node[n]]; t < sweep->model->rows->first[region->node[n] + 1]; t++) {
+            TileWork *tw = &w->tile[w->tiles];
+            tw->tile = &sweep->model->rows->tile[t];
+            tw->local = local;
+            tw->count = find_blobs(sweep, number, tw->tile, local);
+            if (tw->count == 0)
                 continue;
-            }
-            LaneBlob lane = lane_of(model->tree, node, &model->blob[b]);
-            field_lanes_sum(rows->x, rows->y, rows->z, all, d, &lane, 1, rn->still_f, rn->still_g);
+            local += tw->count;
+            int d = tw->tile->data_padded, all = d + tw->tile->guards_padded;
+            tw->still_f = next, tw->f = next + all, next += 2 * all;
+            for (int k = 0; k < 3; k++, next += 2 * d)
+                tw->still_g[k] = next, tw->g[k] = next + d;
+            sum_still(sweep, number, tw);
+            w->tiles++;
         }
-        local += rn->count;
-    }
     return true;
 }
 
 static void end_work(Work *w)
 {
-    if (w->node)
-        free(w->node[0].local);
-    free(w->node);
+    free(w->tile);
+    free(w->local);
     free(w->memory);
     free(w->matrix);
     free(w->trial);
-    free(w->column);
+    free(w->row);
     free(w->gram);
 }
 
 // --- Rows ---
 
-static void sum_node(const Work *w, int n, const FieldBlob *blob)
+static void sum_tile(const Work *w, TileWork *tw, const FieldBlob *blob)
 {
-    const RegionNode *rn = &w->node[n];
-    const NodeRows *rows = rows_of(w, n);
-    int d = rows->data_padded, all = d + rows->guards_padded;
-    memcpy(rn->f, rn->still_f, (size_t)all * sizeof(float));
+    const RowTile *tile = tw->tile;
+    int d = tile->data_padded, all = d + tile->guards_padded;
+    memcpy(tw->f, tw->still_f, (size_t)all * sizeof(float));
     for (int k = 0; k < 3; k++)
-        memcpy(rn->g[k], rn->still_g[k], (size_t)d * sizeof(float));
-    for (int k = 0; k < rn->count; k++) {
-        LaneBlob lane = lane_of(w->sweep->model->tree, rn->node, &blob[rn->local[k]]);
-        field_lanes_sum(rows->x, rows->y, rows->z, all, d, &lane, 1, rn->f, rn->g);
+        memcpy(tw->g[k], tw->still_g[k], (size_t)d * sizeof(float));
+    for (int k = 0; k < tw->count; k++) {
+        LaneBlob lane = field_lane_blob(w->sweep->model->tree, tile->node, &blob[tw->local[k]]);
+        field_lanes_sum(tile->x, tile->y, tile->z, all, d, &lane, 1, tw->f, tw->g);
     }
 }
 
 static double huber(double e, double knee) { return fabs(e) <= knee ? e * e : knee * (2 * fabs(e) - knee); }
 
-// Sum of squares of a node's rows from the sums as they are.
-static double energy_of_rows(const FieldModel *model, int node, const NodeRows *rows, const float *f, float *const g[3])
+// Sum of squares of a tile's rows from the sums as they are.
+static double energy_of_tile(const FieldModel *model, const TileWork *tw)
 {
-    double r = model->tree->radius[node], knee = HUBER_RADII * r, least = LEAST_SLOPE / r, bend = model->smooth * r, sum = 0;
-    for (int i = 0; i < rows->data; i++) {
-        double slope = sqrt((double)(g[0][i] * g[0][i] + g[1][i] * g[1][i] + g[2][i] * g[2][i])), off = bend * (0.5 * r * slope - 1);
-        sum += huber((double)f[i] / fmax(slope, least), knee) + off * off;
+    const RowTile *tile = tw->tile;
+    double r = model->tree->radius[tile->node], knee = HUBER_RADII * r, least = LEAST_SLOPE / r, bend = model->smooth * r, sum = 0;
+    for (int i = 0; i < tile->data; i++) {
+        float gx = tw->g[0][i], gy = tw->g[1][i], gz = tw->g[2][i];
+        double slope = sqrt((double)(gx * gx + gy * gy + gz * gz)), off = bend * (0.5 * r * slope - 1);
+        sum += huber((double)tw->f[i] / fmax(slope, least), knee) + off * off;
     }
     double scale = 0.5 * r * model->guard_weight;
-    for (int i = 0; i < rows->guards; i++) {
-        float value = f[rows->data_padded + i];
-        double e = value < rows->low[i] ? (double)(value - rows->low[i]) : value > rows->high[i] ? (double)(value - rows->high[i]) : 0;
+    for (int i = 0; i < tile->guards; i++) {
+        float value = tw->f[tile->data_padded + i];
+        double e = value < tile->low[i] ? (double)(value - tile->low[i]) : value > tile->high[i] ? (double)(value - tile->high[i]) : 0;
         sum += scale * scale * e * e;
     }
     return sum;
@@ -188,9 +195,9 @@ static double prior_of(const FieldModel *model, const FieldBlob *b)
 static double energy(const Work *w, const FieldBlob *blob)
 {
     double sum = 0;
-    for (int n = 0; n < w->region->nodes; n++) {
-        sum_node(w, n, blob);
-        sum += energy_of_rows(w->sweep->model, w->node[n].node, rows_of(w, n), w->node[n].f, w->node[n].g);
+    for (int t = 0; t < w->tiles; t++) {
+        sum_tile(w, &w->tile[t], blob);
+        sum += energy_of_tile(w->sweep->model, &w->tile[t]);
     }
     for (int k = 0; k < w->region->count; k++)
         sum += prior_of(w->sweep->model, &blob[k]);
@@ -199,57 +206,79 @@ static double energy(const Work *w, const FieldBlob *blob)
 
 // --- Normal equations ---
 
-// The weights of a node's rows, sums made: scale (D + G), bend (D), unit normals in place of the gradients; and the residuals, as the columns stand.
-static void weigh_rows(const FieldModel *model, int node, const NodeRows *rows, RegionNode *rn, float *scale, float *bend, float *residual)
+// A tile's rows as they count in a linearisation: data, and those guards that are violated.
+typedef struct Weighed {
+    int data, rows;          // padded: D, D + guards
+    float x[2 * FIELD_TILE], y[2 * FIELD_TILE], z[2 * FIELD_TILE], scale[2 * FIELD_TILE], bend[FIELD_TILE], n[3][FIELD_TILE];
+} Weighed;
+
+// Sums made; the residuals go to `residual` as the columns stand: data, guards, slopes.
+static void weigh_rows(const FieldModel *model, const TileWork *tw, Weighed *to, float *residual)
 {
-    int d = rows->data_padded, g = rows->guards_padded;
-    float r = (float)model->tree->radius[node], knee = (float)HUBER_RADII * r, least = (float)LEAST_SLOPE / r, half = 0.5f * r, bw = (float)model->smooth * r * half,
-          gw = half * (float)model->guard_weight;
-    for (int i = 0; i < d; i++) {
-        float gx = rn->g[0][i], gy = rn->g[1][i], gz = rn->g[2][i], slope = sqrtf(gx * gx + gy * gy + gz * gz), held = slope > least ? slope : least;
-        float e = rn->f[i] / held, size = fabsf(e), w = rows->weight[i] * (size > knee ? sqrtf(knee / size) : 1.0f), unit = slope > 1e-6f ? 1 / slope : 0;
-        scale[i] = w / held;
-        residual[i] = w * e;
-        bend[i] = rows->weight[i] * bw;
-        residual[d + g + i] = bend[i] * (slope - 1 / half);
-        rn->g[0][i] = gx * unit, rn->g[1][i] = gy * unit, rn->g[2][i] = gz * unit;
+    const RowTile *tile = tw->tile;
+    int d = tile->data_padded, rows = d;
+    float r = (float)model->tree->radius[tile->node], knee = (float)HUBER_RADII * r, least = (float)LEAST_SLOPE / r, half = 0.5f * r,
+          bend = (float)model->smooth * r * half, guard = half * (float)model->guard_weight;
+    memcpy(to->x, tile->x, (size_t)d * sizeof(float)), memcpy(to->y, tile->y, (size_t)d * sizeof(float)), memcpy(to->z, tile->z, (size_t)d * sizeof(float));
+    for (int i = 0; i < tile->guards; i++) {
+        float f = tw->f[d + i], e = f < tile->low[i] ? f - tile->low[i] : f > tile->high[i] ? f - tile->high[i] : 0;
+        if (e == 0)
+            continue;
+        to->x[rows] = tile->x[d + i], to->y[rows] = tile->y[d + i], to->z[rows] = tile->z[d + i];
+        to->scale[rows] = guard;
+        residual[rows++] = guard * e;
     }
-    for (int i = 0; i < g; i++) {
-        float f = rn->f[d + i], e = f < rows->low[i] ? f - rows->low[i] : f > rows->high[i] ? f - rows->high[i] : 0;
-        scale[d + i] = e != 0 ? rows->guard[i] * gw : 0;
-        residual[d + i] = scale[d + i] * e;
+    for (; rows % FIELD_LANES != 0; rows++)
+        to->x[rows] = to->y[rows] = to->z[rows] = to->scale[rows] = residual[rows] = 0;
+    to->data = d, to->rows = rows;
+    for (int i = 0; i < d; i++) {
+        float gx = tw->g[0][i], gy = tw->g[1][i], gz = tw->g[2][i], slope = sqrtf(gx * gx + gy * gy + gz * gz), held = slope > least ? slope : least;
+        float e = tw->f[i] / held, size = fabsf(e), w = tile->weight[i] * (size > knee ? sqrtf(knee / size) : 1.0f), unit = slope > 1e-6f ? 1 / slope : 0;
+        to->scale[i] = w / held;
+        residual[i] = w * e;
+        to->bend[i] = tile->weight[i] * bend;
+        residual[rows + i] = to->bend[i] * (slope - 1 / half);
+        to->n[0][i] = gx * unit, to->n[1][i] = gy * unit, to->n[2][i] = gz * unit;
     }
 }
 
-static void add_node(Work *w, int n)
+// A pair of blobs' block of the product, to the upper triangle of the matrix.
+static void add_pair(Work *w, int a, int b, const float *block, int stride)
 {
-    RegionNode *rn = &w->node[n];
-    const NodeRows *rows = rows_of(w, n);
+    bool turned = a > b;     // as the numbers of a tile's blobs need not rise
+    double *to = w->matrix + (size_t)(UNKNOWNS * (turned ? b : a)) * (size_t)w->unknowns + (size_t)(UNKNOWNS * (turned ? a : b));
+    for (int i = 0; i < UNKNOWNS; i++)
+        for (int k = a == b ? i : 0; k < UNKNOWNS; k++)
+            to[(size_t)i * (size_t)w->unknowns + (size_t)k] += (double)(turned ? block[k * stride + i] : block[i * stride + k]);
+}
+
+static void add_tile(Work *w, const TileWork *tw)
+{
     const FieldModel *model = w->sweep->model;
-    int d = rows->data_padded, all = d + rows->guards_padded, length = all + d, columns = UNKNOWNS * rn->count + 1, padded = (columns + 3) / 4 * 4;
-    float *scale = w->column + (size_t)padded * (size_t)length, *bend = scale + all;
-    if (length == 0 || rn->count == 0)
-        return;
-    weigh_rows(model, rn->node, rows, rn, scale, bend, w->column + (size_t)(columns - 1) * (size_t)length);
-    memset(w->column + (size_t)columns * (size_t)length, 0, (size_t)(padded - columns) * (size_t)length * sizeof(float));
-    for (int k = 0; k < rn->count; k++) {
-        LaneBlob lane = lane_of(model->tree, rn->node, &w->trial[rn->local[k]]);
-        const float *normal[3] = {rn->g[0], rn->g[1], rn->g[2]};
-        field_lanes_columns(rows->x, rows->y, rows->z, all, d, &lane, scale, bend, normal, w->column + (size_t)(UNKNOWNS * k) * (size_t)length, length);
+    Weighed rows;
+    float residual[ROWS_MAX];
+    weigh_rows(model, tw, &rows, residual);
+    int length = rows.rows + rows.data, columns = UNKNOWNS * tw->count + 1, stride = (columns + FIELD_LANES - 1) / FIELD_LANES * FIELD_LANES;
+    const float *normal[3] = {rows.n[0], rows.n[1], rows.n[2]};
+    float column[UNKNOWNS][ROWS_MAX];
+    for (int i = 0; i < length; i++) {
+        for (int k = columns; k < stride; k++)
+            w->row[i * stride + k] = 0;
+        w->row[i * stride + columns - 1] = residual[i];
     }
-    for (int a = 0; a < padded; a += 4)
-        for (int b = a; b < padded; b += 4)
-            lim_energy_gram(w->column + (size_t)a * (size_t)length, w->column + (size_t)b * (size_t)length, (size_t)length, length,
-                            w->gram + (size_t)a * (size_t)padded + b, (size_t)padded);
-    for (int a = 0; a < columns - 1; a++) {
-        int to_a = UNKNOWNS * rn->local[a / UNKNOWNS] + a % UNKNOWNS;
-        for (int b = a; b < columns - 1; b++) {
-            int to_b = UNKNOWNS * rn->local[b / UNKNOWNS] + b % UNKNOWNS;
-            double value = w->gram[(size_t)a * (size_t)padded + (size_t)b];
-            w->matrix[(size_t)(to_a < to_b ? to_a : to_b) * (size_t)w->unknowns + (size_t)(to_a < to_b ? to_b : to_a)] += value;
-        }
-        w->slope[to_a] += w->gram[(size_t)a * (size_t)padded + (size_t)columns - 1];
+    for (int k = 0; k < tw->count; k++) {
+        LaneBlob lane = field_lane_blob(model->tree, tw->tile->node, &w->trial[tw->local[k]]);
+        field_lanes_columns(rows.x, rows.y, rows.z, rows.rows, rows.data, &lane, rows.scale, rows.bend, normal, column[0], ROWS_MAX);
+        for (int i = 0; i < length; i++)
+            for (int m = 0; m < UNKNOWNS; m++)
+                w->row[i * stride + UNKNOWNS * k + m] = column[m][i];
     }
+    field_lanes_gram(w->row, length, stride, w->gram);
+    for (int a = 0; a < tw->count; a++)
+        for (int b = a; b < tw->count; b++)
+            add_pair(w, tw->local[a], tw->local[b], w->gram + UNKNOWNS * (a * stride + b), stride);
+    for (int a = 0; a < UNKNOWNS * tw->count; a++)
+        w->slope[UNKNOWNS * tw->local[a / UNKNOWNS] + a % UNKNOWNS] += (double)w->gram[a * stride + columns - 1];
 }
 
 static void add_priors(Work *w)
@@ -274,8 +303,8 @@ static void linearise(Work *w)
 {
     memset(w->matrix, 0, (size_t)w->unknowns * (size_t)w->unknowns * sizeof *w->matrix);
     memset(w->slope, 0, (size_t)w->unknowns * sizeof *w->slope);
-    for (int n = 0; n < w->region->nodes; n++)
-        add_node(w, n);
+    for (int t = 0; t < w->tiles; t++)
+        add_tile(w, &w->tile[t]);
     add_priors(w);
 }
 
@@ -486,7 +515,7 @@ static bool make_regions(Sweep *s, bool shift)
         if (!collect_nodes(s, region))
             return false;
         for (int k = 0; k < size; k++)
-            s->region_of[s->order[first + k]] = s->regions;
+            s->region_of[s->order[first + k]] = s->regions, s->local_of[s->order[first + k]] = k;
         region->colour = is_due(s, region) ? 0 : -1;
         s->regions++;
         first += size;
@@ -497,10 +526,11 @@ static bool make_regions(Sweep *s, bool shift)
 double field_model_solve(FieldModel *model, int steps, bool shift)
 {
     size_t blobs = (size_t)model->count + 1;
-    Sweep s = {.model = model, .steps = steps, .order = malloc(blobs * sizeof *s.order), .region_of = malloc(blobs * sizeof *s.region_of)};
+    Sweep s = {.model = model, .steps = steps, .order = malloc(blobs * sizeof *s.order), .region_of = malloc(blobs * sizeof *s.region_of),
+               .local_of = malloc(blobs * sizeof *s.local_of)};
     s.region = calloc(blobs, sizeof *s.region);
     s.batch = malloc(blobs * sizeof *s.batch);
-    bool good = s.order && s.region_of && s.region && s.batch && order_blobs(&s) && make_regions(&s, shift);
+    bool good = s.order && s.region_of && s.local_of && s.region && s.batch && order_blobs(&s) && make_regions(&s, shift);
     int colours = good ? colour_regions(&s) : -1;
     memset(model->due, 0, (size_t)model->tree->node_count * sizeof *model->due);
     good = good && colours >= 0;
@@ -520,6 +550,7 @@ double field_model_solve(FieldModel *model, int steps, bool shift)
     }
     free(s.order);
     free(s.region_of);
+    free(s.local_of);
     free(s.region);
     free(s.batch);
     return good && field_model_list(model) ? 1 - after / before : -1;
