@@ -344,7 +344,9 @@ static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seco
             FieldFitOptions options = field_fit_default_options();
             options.threads = command->options.threads;
             options.target_mm = command->options.target_mm;
-            if (getenv("FIELD_TOL")) options.tolerance = atof(getenv("FIELD_TOL"));
+            options.voxel_mm = command->options.voxel_mm;
+            if (getenv("FIELD_TOL")) options.tolerance_voxels = atof(getenv("FIELD_TOL"));
+            if (getenv("FIELD_LEAST")) options.least_reach_voxels = atof(getenv("FIELD_LEAST"));
             if (getenv("FIELD_SIG")) options.significance = atof(getenv("FIELD_SIG"));
             if (getenv("FIELD_LEVELS")) options.levels = atoi(getenv("FIELD_LEVELS"));
             model = field_fit(tree, &options, &progress, faults);

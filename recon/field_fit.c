@@ -12,7 +12,10 @@ static const double BASE_APART = 0.75, BASE_REACH = 2, BASE_REACH_SAC = 1.5;   /
 static const double level_reach[] = {1.4, 1.4, 1, 1, 0.7, 0.7, 0.5, 0.35};
 enum { LEVELS = sizeof level_reach / sizeof level_reach[0], LAST_SWEEPS = 4 };
 
-FieldFitOptions field_fit_default_options(void) { return (FieldFitOptions){.tolerance = 0.02, .significance = 4.5, .levels = LEVELS}; }
+FieldFitOptions field_fit_default_options(void)
+{
+    return (FieldFitOptions){.tolerance_voxels = 0.05, .least_reach_voxels = 0.8, .tolerance = 0.004, .tolerance_unknown = 0.02, .significance = 4.5, .levels = LEVELS};
+}
 
 static bool check_options(const FieldFitOptions *o, Faults *faults)
 {
@@ -20,7 +23,9 @@ static bool check_options(const FieldFitOptions *o, Faults *faults)
     const struct {
         const char *name;
         double value, least, most;
-    } range[] = {{"tolerance", o->tolerance, 1e-4, 1}, {"target-mm", o->target_mm, 0, 100}, {"significance", o->significance, 0, 100}, {"levels", o->levels, 0, LEVELS}};
+    } range[] = {{"tolerance", o->tolerance, 1e-4, 1}, {"tolerance without voxel", o->tolerance_unknown, 1e-4, 1},
+                 {"tolerance in voxels", o->tolerance_voxels, 0, 10}, {"voxel-mm", o->voxel_mm, 0, 100}, {"least reach in voxels", o->least_reach_voxels, 0, 10},
+                 {"target-mm", o->target_mm, 0, 100}, {"significance", o->significance, 0, 100}, {"levels", o->levels, 0, LEVELS}};
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
         if (!(range[i].value >= range[i].least && range[i].value <= range[i].most))
             faults_add(faults, "fit", 0, 0, "%s is %g; valid: %g to %g", range[i].name, range[i].value, range[i].least, range[i].most);
@@ -120,7 +125,10 @@ static bool fit(FieldModel *model, const FieldFitOptions *options, const Progres
     for (int k = 0; k < 3; k++)
         sweep(&s, 3);
     for (int level = 0; level < options->levels && !s.failed; level++) {
-        FieldRefine how = {level_reach[level], options->tolerance, 0.2 * options->target_mm, options->significance};
+        bool known = options->voxel_mm > 0, given = options->target_mm > 0;
+        FieldRefine how = {level_reach[level], given ? 0 : known ? options->tolerance : options->tolerance_unknown,
+                           given ? options->target_mm : options->tolerance_voxels * options->voxel_mm,
+                           options->least_reach_voxels * options->voxel_mm, options->significance};
         s.failed |= field_refine(model, &how) < 0;
         for (int k = 0; k < (getenv("FS") ? atoi(getenv("FS")) : 2); k++)
             sweep(&s, getenv("FT") ? atoi(getenv("FT")) : 3);
@@ -128,7 +136,7 @@ static bool fit(FieldModel *model, const FieldFitOptions *options, const Progres
     all_due(model);
     for (int k = 0; k < LAST_SWEEPS; k++) {
         model->guard_weight *= 1.5;
-        sweep(&s, getenv("FL") ? atoi(getenv("FL")) : 3);
+        sweep(&s, 3);
     }
     return !s.failed;
 }

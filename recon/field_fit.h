@@ -13,8 +13,13 @@
 #include "recon/parallel.h"
 
 typedef struct FieldFitOptions {
-    double tolerance;        // the mean residual below which no blob is added, in local radii; 0.02
-    double target_mm;        // > 0: instead [mm], a fifth of it. 0: tolerance
+    // The mean residual below which no blob is added: target_mm where that is given, else the larger of the next two; without a voxel `tolerance_unknown`
+    double target_mm;        // [mm]; 0: not given
+    double voxel_mm;         // of the angiogram; 0: not known, as of a mesh
+    double tolerance_voxels; // 0.05
+    double tolerance;        // in local radii, 0.004
+    double tolerance_unknown;   // in local radii, 0.02
+    double least_reach_voxels;  // no blob's reach is less than what the image resolves; 0.8
     double significance;     // a mean residual counts above this many standard deviations of the noise's mean; 4.5
     int levels;              // of refinement, 0 to 8; 8
     int threads;             // 0: all cores; the result does not depend on it

@@ -119,12 +119,12 @@ static void find_candidates(void *context, long index)
     Job *job = context;
     int node = (int)index, found = 0;
     double r = job->model->tree->radius[node], reach = job->how->reach * r;
-    double tolerance = job->how->target_mm > 0 ? job->how->target_mm : job->how->tolerance * r;
+    double tolerance = fmax(job->how->tolerance_mm, job->how->tolerance * r);
     const int *first = job->model->rows->first;
     Candidate *list = malloc(((size_t)data_of(job, node) + 1) * sizeof *list);
     job->failed[node] = !list;
     job->found[node] = list;
-    for (int t = first[node]; t < first[node + 1] && list; t++) {
+    for (int t = first[node]; t < first[node + 1] && list && reach >= job->how->least_reach; t++) {
         const RowTile *tile = tile_of(job, t);
         for (int i = 0; i < tile->data; i++) {
             Vec3 x = row_place(job, tile, i);

@@ -6,8 +6,8 @@
 
 typedef struct FieldRefine {
     double reach;            // of the new blobs, in local radii
-    double tolerance;        // of a mean residual, in local radii …
-    double target_mm;        // … or, where > 0, in mm
+    double tolerance, tolerance_mm;   // of a mean residual: the larger of so many local radii and so many mm
+    double least_reach;      // [mm] no blob smaller than what the image resolves
     double significance;     // in standard deviations of the mean's noise
 } FieldRefine;
 

@@ -388,7 +388,7 @@ static void solve_region(void *context, long index)
     region->after = least;
     for (int k = 0; k < region->count; k++)
         model->blob[order[k]] = now[k];
-    bool gained = least < 0.995 * region->before;
+    bool gained = least < 0.98 * region->before;
     for (int n = 0; n < region->nodes; n++)
         model->due[region->node[n]] |= gained;
     end_work(&w);
