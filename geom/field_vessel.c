@@ -133,6 +133,20 @@ static int cell_of(const FieldVessel *field, Vec3 q, int node)
     return node;
 }
 
+// Does the node see all blobs that reach q? That holds to within a margin of its cell.
+static bool sees_all(const FieldVessel *field, Vec3 q, int node)
+{
+    const VesselTree *tree = field->tree;
+    double own = power_distance(q, tree->center[node], tree->radius[node]), far = 2 * BLOB_FLOOD_MARGIN * tree->radius[node];
+    for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++) {
+        int other = tree->near[k];
+        double beyond = own - power_distance(q, tree->center[other], tree->radius[other]);
+        if (beyond > 0 && beyond * beyond > far * far * vec3_norm2(vec3_sub(tree->center[other], tree->center[node])))
+            return false;
+    }
+    return true;
+}
+
 // Over a ball in which |X - C| is from `least` to `most`, a blob bends down by no more than *down and up by no more than *up.
 static void blob_bends(const FieldRow *row, double least, double most, double *down, double *up)
 {
@@ -327,7 +341,8 @@ static Foot project(const FieldVessel *field, Vec3 x, int node)
         Vec3 q = asked_at(field, &field->node[foot.node], foot.at);
         int cell = cell_of(field, q, foot.node);
         Foot next;
-        if (cell == foot.node || walls_apart(field, foot.node, cell, q) > AGREE || !settle(field, x, cell, foot.at, &next))
+        if (cell == foot.node || (sees_all(field, q, foot.node) && walls_apart(field, foot.node, cell, q) > AGREE) ||
+            !settle(field, x, cell, foot.at, &next))
             break;
         next.sure = true;
         foot = next;
@@ -425,13 +440,19 @@ static bool answer_cheaply(const FieldVessel *field, Vec3 x, double reach, Vesse
     return true;
 }
 
-// The foot has left what its memory holds: the cell and the list about q. False where the field there contradicts the node's own.
-static void hold_anew(const FieldVessel *field, VesselMemory *m, Vec3 q, double gap)
+// The foot has left what its memory holds: the cell and the list about q. False where q is too far from the cell for that. A node whose field there
+// contradicts the own one is not taken.
+static bool hold_anew(const FieldVessel *field, VesselMemory *m, Vec3 q, double gap)
 {
     int cell = cell_of(field, q, m->node);
-    if (cell != m->node && !(walls_apart(field, m->node, cell, q) > AGREE))
-        m->node = cell;
+    if (cell != m->node) {
+        if (!sees_all(field, q, m->node))
+            return false;
+        if (!(walls_apart(field, m->node, cell, q) > AGREE))
+            m->node = cell;
+    }
     hold_blobs(field, m, q, gap);
+    return true;
 }
 
 typedef struct Batch {
@@ -455,13 +476,17 @@ static void fill_lane(const FieldVessel *field, FieldBlock *b, int i, const Batc
         set_whole_list(field, b, i, m->node);
 }
 
+// Lanes that have left what they hold; those of which that is no small step are lost.
 static void lanes_hold_anew(const FieldVessel *field, FieldBlock *b, unsigned lanes, const Batch *batch, const int *point)
 {
     for (; lanes != 0; lanes &= lanes - 1) {
         int i = __builtin_ctz(lanes);
         VesselMemory *m = &batch->memory[point[i]];
         Vec3 p = vec3(b->foot.at.x[i], b->foot.at.y[i], b->foot.at.z[i]), q = asked_at(field, &field->node[m->node], p);
-        hold_anew(field, m, q, vec3_distance(p, batch->point[point[i]]));
+        if (!hold_anew(field, m, q, vec3_distance(p, batch->point[point[i]]))) {
+            b->foot.state[i] = FOOT_LOST;
+            continue;
+        }
         fill_lane(field, b, i, batch, point[i]);
         b->held_x[i] = m->held_at.x, b->held_y[i] = m->held_at.y, b->held_z[i] = m->held_at.z, b->held_for2[i] = m->held_for2;
         b->down[i] = m->bound[0], b->up[i] = m->bound[1], b->within[i] = m->bound[2];
@@ -523,7 +548,7 @@ static void follow_block(const FieldVessel *field, Batch *batch, const int *poin
     unsigned done = 0;
     for (int round = 0; round < (start ? AFTER_START : 1) && (done & all) != all; round++) {
         if (round > 0)
-            lanes_hold_anew(field, &b, moved_lanes(field, &b, 0, batch, point, count, true) & ~done, batch, point);
+            lanes_hold_anew(field, &b, moved_lanes(field, &b, 0, batch, point, count, true) & ~done & all, batch, point);
         sample(field, &b);
         done = field->kernels->newton(&b, false);
     }
