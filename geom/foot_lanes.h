@@ -28,6 +28,9 @@ enum { FOOT_BATCH = 80, FOOT_BLOCK = 8 };   // lanes a batch, and lanes that are
 #define FOOT_AGREE_RADII 0.5
 #define FOOT_AGREE 0.8
 
+// What an exact step leaves of the gap is taken to be the root of this times its length cubed in units of the curvature: see test_field_vessel.c.
+#define FOOT_THIRD 25.0
+
 // State of a lane, as a double so that it lives in the same vectors.
 #define FOOT_PENDING 0.0
 #define FOOT_DONE 1.0
@@ -101,8 +104,11 @@ static inline __attribute__((always_inline)) void foot_predict(FootBatch *restri
     }
 }
 
-// One step of a block's pending lanes from their samples. `careful`: goes on near focal points, with bounded steps.
-static inline __attribute__((always_inline)) void foot_newton(FootBatch *restrict b, int block, const bool careful)
+// One step of a block's pending lanes from their samples. `careful`: goes on near focal points, with bounded steps. `exact`: takes along what the step
+// down to the wall turns the normal by, w = P H n / |g| a millimetre, and the field's bend on the way down:
+//   t = -(I + g S)^-1 (r + g nu w), g = gap - nu, nu = -f/|g|;   nu = -q / (1 + w.t - n'H n q / (2 |g|)), q = f/|g| + t'S t / 2.
+// What then remains of the gap is of third order in the step.
+static inline __attribute__((always_inline)) void foot_newton(FootBatch *restrict b, int block, const bool careful, const bool exact)
 {
     for (int i = block; i < block + FOOT_BLOCK; i++) {
         double gx = b->at.gx[i], gy = b->at.gy[i], gz = b->at.gz[i], slope2 = gx * gx + gy * gy + gz * gz;
@@ -120,6 +126,14 @@ static inline __attribute__((always_inline)) void foot_newton(FootBatch *restric
         yy -= 2 * ny * vy, yz -= ny * vz + nz * vy, zz -= 2 * nz * vz;
         double trace = xx + yy + zz, size2 = xx * xx + yy * yy + zz * zz + 2 * (xy * xy + xz * xz + yz * yz);   // k1^2 + k2^2
         double product = 0.5 * (trace * trace - size2);
+        double taubin = b->at.f[i] * flat, longest = b->longest[i], wx = 0, wy = 0, wz = 0;
+        if (exact) {
+            double down = taubin < longest ? taubin : longest;
+            down = down > -longest ? down : -longest;
+            wx = vx - half * nx, wy = vy - half * ny, wz = vz - half * nz;   // v is H n / |g| less half of its part along n by now
+            gap += down;
+            rx -= gap * down * wx, ry -= gap * down * wy, rz -= gap * down * wz;
+        }
         // both 1 + gap k > 0.1: the product and the sum of (0.9 + gap k) are positive
         double deep = 0.81 + gap * (0.9 * trace + gap * product) > 0 && 1.8 + gap * trace > 0 ? 0.0 : 1.0;
         double c0, c1;
@@ -136,7 +150,7 @@ static inline __attribute__((always_inline)) void foot_newton(FootBatch *restric
         }
         double tx = -(c0 * rx + c1 * (xx * rx + xy * ry + xz * rz)), ty = -(c0 * ry + c1 * (xy * rx + yy * ry + yz * rz)),
                tz = -(c0 * rz + c1 * (xz * rx + yz * ry + zz * rz));
-        double taubin = b->at.f[i] * flat, longest = b->longest[i], along2 = tx * tx + ty * ty + tz * tz;
+        double along2 = tx * tx + ty * ty + tz * tz;
         double far = fabs(taubin) > longest || along2 > longest * longest ? 1.0 : 0.0;
         if (careful) {
             double shrink = along2 > longest * longest ? longest / sqrt(along2) : 1.0;
@@ -145,11 +159,23 @@ static inline __attribute__((always_inline)) void foot_newton(FootBatch *restric
             tx *= shrink, ty *= shrink, tz *= shrink, along2 *= shrink * shrink;
         }
         double sx = xx * tx + xy * ty + xz * tz, sy = xy * tx + yy * ty + yz * tz, sz = xz * tx + yz * ty + zz * tz;   // S t
-        double nu = -(taubin + 0.5 * (tx * sx + ty * sy + tz * sz)), step2 = nu * nu;
+        double nu = -(taubin + 0.5 * (tx * sx + ty * sy + tz * sz));
+        if (exact) {
+            double rate = 1 + (wx * tx + wy * ty + wz * tz) + half * nu;
+            nu /= rate > 0.5 ? rate : 0.5;
+            sx += nu * wx, sy += nu * wy, sz += nu * wz;
+        }
+        double step2 = nu * nu;
         px += tx + nu * nx, py += ty + nu * ny, pz += tz + nu * nz;
         // what the step leaves: of the foot's place (hence the normal) second order, of f/|g| third order, in units of the curvature; all squared
         double allowed = b->allowed[i] * b->allowed[i], curl = 2 * (size2 + b->bend[i] * b->bend[i]), left = curl * along2 * along2;
-        double done = left < 1e4 * allowed && 4 * curl * (along2 + step2) * (left + step2) < allowed ? 1.0 : 0.0;
+        double done;
+        if (exact) {
+            double all2 = along2 + step2, whole = curl * all2 * all2;
+            done = whole < 1e4 * allowed && FOOT_THIRD * curl * all2 * whole < allowed ? 1.0 : 0.0;
+        } else {
+            done = left < 1e4 * allowed && 4 * curl * (along2 + step2) * (left + step2) < allowed ? 1.0 : 0.0;
+        }
         // the normal turns by S t along the step; what that adds to its length is small where the step is the last
         double turn2 = sx * sx + sy * sy + sz * sz, unit = 1 - turn2 * (0.5 - 0.375 * turn2);
         nx = (nx + sx) * unit, ny = (ny + sy) * unit, nz = (nz + sz) * unit;

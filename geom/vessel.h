@@ -11,16 +11,27 @@
 #include "geom/linear.h"
 #include "geom/vessel_tree.h"
 
+enum { VESSEL_BLOBS = 24 };
 // What a tool point remembers between steps.
 typedef struct VesselMemory {
+    Vec3 foot;               // last projection, where Newton starts
+    Vec3 place, normal;      // where the foot was found from, the answer there …
+    Sym3 hessian;            // … and its curvature: they say where the foot has moved to
+    // Of the field of shared blobs. field_lanes.h loads the numbers from here to `bound` as one row of 32.
+    double slope;            // |grad f| at the foot
+    Vec3 miss, step;         // by how much the last prediction missed the foot, and the motion that it was made for
+    double trust;            // [mm] of travel in which the foot need not be compared with other walls
+    double near_trust;       // not used, keeps the row's length
+    Vec3 held_at;            // the blobs below are all that reach to within …
+    double held_for2;        // … the root of this [mm^2] of here, as `node` sees the field
+    double bound[4];         // within bound[2] mm of held_at f bends down by no more than bound[0], up by no more than bound[1] [1/mm^2]
+    double clearance;        // [mm] at `clear_place` the wall of `node` was at least this far; 0: not known. Lets far points pass unevaluated
+    Vec3 clear_place;
     int node;                // node of the tree, or segment of the tube; -1: not yet located
     int trusted;             // queries for which the foot need not be compared with other walls
     bool has_foot;
-    Vec3 foot;               // last projection, where Newton starts
-    double clearance;        // [mm] at `clear_place` the wall of `node` was at least this far; 0: not known. Lets far points pass unevaluated
-    Vec3 clear_place;
-    Vec3 place, normal;      // where the foot was found from, the answer there …
-    Sym3 hessian;            // … and its curvature: they say where the foot has moved to
+    int blobs;               // held; -1: more than there is room for
+    int32_t blob[VESSEL_BLOBS];      // rows of the field, those beyond `blobs` that of the blob without weight
 } VesselMemory;              // a fresh one: {.node = -1}
 
 enum {
@@ -28,6 +39,7 @@ enum {
     VESSEL_OPEN_END = 2,     // beyond an open end and clear of it: there is no wall, gap = +HUGE_VAL, normal 0
     VESSEL_BEYOND = 8,       // beyond an open end's plane, where the wall is what carries on from the end (a cylinder upstream, a bell downstream)
     VESSEL_UNSURE = 4,       // the projection did not converge: gap is Taubin's distance, normal the gradient's direction
+    VESSEL_DISAGREE = 16,    // the models that meet at the point put its wall at different places: a fault of the tree, see field_vessel_create
 };
 
 typedef struct VesselHit {
@@ -81,6 +93,8 @@ Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *o
 // --- The wall of shared blobs (vessel_tree_is_shared): one field, so that it is the same from both sides of every border between near cells. Borrows the
 // tree. NULL where the tree has no such model, or there is no memory. ---
 Vessel *field_vessel_create(const VesselTree *tree);
+// isa: 0: what simd_level() says; 1 SSE2, 2 AVX2, 3 AVX-512 (the widest there is, where absent). All give the same bits.
+Vessel *field_vessel_create_with(const VesselTree *tree, int isa);
 // Whichever of the two answers for the tree's model; NULL where it has none.
 Vessel *model_vessel_create(const VesselTree *tree);
 

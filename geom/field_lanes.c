@@ -1,0 +1,60 @@
+// One kernel text, three compilations. See field_lanes.h for the layouts and why the bits agree, blobby.h for the equations.
+// Compiled with -fno-math-errno and -fno-trapping-math, which change no result, so that roots and selects vectorise.
+#include "geom/field_lanes.h"
+#include "geom/simd.h"
+
+#include <stddef.h>
+#if defined(__x86_64__) && defined(__GNUC__)
+#include <immintrin.h>
+#endif
+
+_Static_assert(offsetof(VesselMemory, place) == 8 * MEMORY_PLACE && offsetof(VesselMemory, normal) == 8 * MEMORY_NORMAL &&
+              offsetof(VesselMemory, hessian) == 8 * MEMORY_HESSIAN && offsetof(VesselMemory, miss) == 8 * MEMORY_MISS &&
+              offsetof(VesselMemory, step) == 8 * MEMORY_STEP && offsetof(VesselMemory, trust) == 8 * MEMORY_TRUST &&
+              offsetof(VesselMemory, held_at) == 8 * MEMORY_HELD_AT && offsetof(VesselMemory, held_for2) == 8 * MEMORY_HELD_FOR2 &&
+              offsetof(VesselMemory, bound) == 8 * MEMORY_BOUND && offsetof(VesselMemory, clearance) == 8 * MEMORY_ROW, "memories are rows of doubles");
+_Static_assert(offsetof(VesselHit, normal) == 8 && offsetof(VesselHit, hessian) == 32 && offsetof(VesselHit, node) == 8 * HIT_ROW, "so are answers");
+
+#define KERNEL_TABLE(isa) {load_##isa, sample_##isa, newton_##isa, finish_##isa, store_##isa}
+
+#define WIDTH 2
+#define TARGET
+#define KERNEL(name) name##_baseline
+#include "geom/field_kernel.inc"
+#undef WIDTH
+#undef TARGET
+#undef KERNEL
+static const FieldKernels baseline = KERNEL_TABLE(baseline);
+
+#if defined(__x86_64__) && defined(__GNUC__)
+#define WIDTH 4
+#define TARGET __attribute__((target("avx2")))
+#define KERNEL(name) name##_avx2
+#include "geom/field_kernel.inc"
+#undef WIDTH
+#undef TARGET
+#undef KERNEL
+static const FieldKernels avx2 = KERNEL_TABLE(avx2);
+
+#define WIDTH 8
+#define TARGET __attribute__((target("avx512f,avx512dq,avx512vl")))
+#define KERNEL(name) name##_avx512
+#include "geom/field_kernel.inc"
+#undef WIDTH
+#undef TARGET
+#undef KERNEL
+static const FieldKernels avx512 = KERNEL_TABLE(avx512);
+
+const FieldKernels *field_kernels(int isa)
+{
+    static const FieldKernels *const of[SIMD_COUNT] = {&baseline, &avx2, &avx512};
+    int wanted = isa > 0 ? isa - 1 : (int)simd_level(), widest = (int)simd_widest();
+    return of[wanted < widest ? wanted : widest];
+}
+#else
+const FieldKernels *field_kernels(int isa)
+{
+    (void)isa;
+    return &baseline;
+}
+#endif
