@@ -15,6 +15,7 @@
 #include "recon/rbt_branches.h"
 #include "recon/rbt_exits.h"
 #include "recon/rbt_links.h"
+#include "recon/rbt_ostia.h"
 #include "recon/rbt_residue.h"
 #include "recon/rbt_start.h"
 #include "recon/rbt_tracker.h"
@@ -566,23 +567,29 @@ static bool adopt_branch(Tracker *t, const Track *out, const Track *back, int nu
     return true;
 }
 
-// Nodes of a branch follow each other; a later aneurysm may have joined some of them.
+// Nodes of a branch follow each other; a later aneurysm may have joined some of them. Nodes of links are counted, but say nothing of the vessel.
 static void report_branch(const Tracker *t, int number, double p_inl, RbtBranchReport *report)
 {
-    int first = t->tree.count, end = 0;
+    int first = t->tree.count, end = 0, links = 0;
     for (int i = 0; i < t->tree.count; i++)
         if (t->tree.node[i].branch == number) {
             first = i < first ? i : first;
             end = i + 1;
+            links += t->tree.node[i].is_link;
         }
     report->first_node = first;
     report->node_count = end - first;
-    int sacs = 0;
+    report->link_count = links;
+    int sacs = 0, tracked = end - first - links;
     double sac_radius = 0, widest = 0;
     report->inlier_rate_min = 1;
     for (int i = first; i < end; i++) {
         const TrackNode *n = &t->tree.node[i];
-        report->inlier_rate += n->inlier_rate / report->node_count;
+        if (n->parent >= 0)
+            report->length += vec3_distance(n->cylinder.center, t->tree.node[n->parent].cylinder.center);
+        if (n->is_link)
+            continue;
+        report->inlier_rate += n->inlier_rate / tracked;
         report->inlier_rate_min = fmin(report->inlier_rate_min, n->inlier_rate);
         report->relaxed_count += n->inlier_rate <= p_inl;
         report->retried_count += n->retried;
@@ -590,12 +597,10 @@ static void report_branch(const Tracker *t, int number, double p_inl, RbtBranchR
         bool is_sac = n->kind == NODE_ANEURYSM;
         sacs += is_sac;
         sac_radius += is_sac ? n->cylinder.radius : 0;
-        report->radius += n->cylinder.radius / report->node_count;
+        report->radius += n->cylinder.radius / tracked;
         if (!is_sac || n->cylinder.radius > widest)   // the widest of a sac's centres stands for it
             report->center = n->cylinder.center;
         widest = is_sac ? fmax(widest, n->cylinder.radius) : widest;
-        if (n->parent >= 0)
-            report->length += vec3_distance(n->cylinder.center, t->tree.node[n->parent].cylinder.center);
     }
     if (sacs > 0)
         report->radius = sac_radius / sacs;
@@ -1126,6 +1131,7 @@ static VesselTree *finish_tree(const Track *track)
 void rbt_report_free(RbtReport *report)
 {
     free(report->branch);
+    free(report->junction);
     *report = (RbtReport){0};
 }
 
@@ -1159,20 +1165,45 @@ static bool run_seed(Tracker *t, const Job *job, int i)
     return false;
 }
 
-// Branches that lost all of their nodes to a cut are left out.
-static bool make_report(Tracker *t, const Job *job, const RbtEnds *ends, RbtReport *report)
+// The numbers of the branches in the order of their nodes: one that was hung on a later one stands behind it. Returns how many have nodes.
+static int order_branches(const Track *tree, int total, int *order)
 {
-    int total = ends->count + job->aneurysm_count, used = 0;
-    int *renamed = malloc(((size_t)total + 1) * sizeof *renamed);
+    int count = 0;
+    for (int i = 0; i < tree->count; i++)
+        if (count < total && (i == 0 || tree->node[i].branch != tree->node[i - 1].branch))
+            order[count++] = tree->node[i].branch;
+    return count;
+}
+
+// Takes the junctions over, their branches by the report's numbers.
+static void report_junctions(RbtJunctions *junctions, const int *renamed, RbtReport *report)
+{
+    for (int i = 0; i < junctions->count; i++) {
+        RbtJunction *j = &junctions->junction[i];
+        j->branch = j->support == RBT_REFUSED && !j->is_inner ? -1 : renamed[j->branch];
+        j->parent = renamed[j->parent];
+    }
+    report->junction = junctions->junction;
+    report->junction_count = junctions->count;
+    *junctions = (RbtJunctions){0};
+}
+
+// Branches that lost all of their nodes are left out.
+static bool make_report(Tracker *t, const Job *job, const RbtEnds *ends, RbtJunctions *junctions, RbtReport *report)
+{
+    int total = ends->count + job->aneurysm_count;
+    int *renamed = malloc(((size_t)total + 1) * sizeof *renamed), *order = malloc(((size_t)total + 1) * sizeof *order);
     report->branch = calloc((size_t)total + 1, sizeof *report->branch);
-    bool good = renamed && report->branch;
-    for (int i = 0; good && i < total; i++) {
-        RbtBranchReport *b = &report->branch[used];
+    bool good = renamed && order && report->branch;
+    int count = good ? order_branches(&t->tree, total, order) : 0;
+    for (int i = 0; good && i < total; i++)
+        renamed[i] = -1;
+    for (int k = 0; good && k < count; k++) {
+        int i = order[k];
+        RbtBranchReport *b = &report->branch[k];
         *b = (RbtBranchReport){.is_aneurysm = i >= ends->count, .is_found = i < ends->count && ends->seed[i] < 0, .parent = -1, .order = 1};
         report_branch(t, i, t->parameters->p_inl, b);
-        renamed[i] = b->node_count > 0 ? used : -1;
-        if (b->node_count <= 0)
-            continue;
+        renamed[i] = k;
         if (b->is_aneurysm)
             memcpy(b->name, job->aneurysm[i - ends->count].name, sizeof b->name);
         else if (!b->is_found)
@@ -1184,10 +1215,12 @@ static bool make_report(Tracker *t, const Job *job, const RbtEnds *ends, RbtRepo
             b->parent = renamed[t->tree.node[parent].branch];
             b->order = b->parent >= 0 ? report->branch[b->parent].order + 1 : 1;
         }
-        used++;
     }
-    report->branch_count = used;
+    report->branch_count = count;
+    if (good)
+        report_junctions(junctions, renamed, report);
     free(renamed);
+    free(order);
     return good;
 }
 
@@ -1284,9 +1317,22 @@ static bool track_automatic(Tracker *t, const Job *job, RbtEnds *ends)
     return good;
 }
 
+// The ostia of the tree as it now is.
+static bool open_ostia(Tracker *t, const Job *job, const RbtEnds *ends, RbtJunctions *junctions)
+{
+    int total = ends->count + job->aneurysm_count;
+    bool *is_named = malloc(((size_t)total + 1) * sizeof *is_named), good = is_named != NULL;
+    for (int i = 0; good && i < total; i++)
+        is_named[i] = i >= ends->count || ends->seed[i] >= 0;
+    good = good && rbt_open_ostia(t, is_named, job->threads, junctions);
+    free(is_named);
+    return good;
+}
+
 static bool track_all(Tracker *t, const Job *job, RbtReport *report)
 {
     RbtEnds ends = {0};
+    RbtJunctions junctions = {0};
     bool automatic = t->parameters->automatic > 0, good = true;
     if (automatic)
         good = track_automatic(t, job, &ends);
@@ -1304,8 +1350,11 @@ static bool track_all(Tracker *t, const Job *job, RbtReport *report)
         if (good && job->progress && job->progress->call)
             job->progress->call(job->progress->context, job->seed_count + i + 1, job->seed_count + job->aneurysm_count);
     }
-    if (good && !make_report(t, job, &ends, report))
+    if (good && t->parameters->ostia > 0 && !open_ostia(t, job, &ends, &junctions))
         good = out_of_memory_at(job, ends.count);
+    if (good && !make_report(t, job, &ends, &junctions, report))
+        good = out_of_memory_at(job, ends.count);
+    free(junctions.junction);
     free(ends.why);
     free(ends.seed);
     return good;
@@ -1362,6 +1411,6 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
     if (tree && report)
         *report = own;
     else
-        free(own.branch);
+        rbt_report_free(&own);
     return tree;
 }
