@@ -388,8 +388,8 @@ static void corrections_leave_the_rest(void **state)
     Vec3 middle = volume_point_of(v, forbid.center);
     assert_true(nearest_to(without, middle) >= 1.2 && nearest_to(without, tip[2]) > 2);
     Vec3 stump = {6.8, 10, 12};
-    assert_true(missing_beside(whole, without, stump, 3) > 5);
-    missing_beside(without, whole, vec3(5.6, 10, 12.9), 4.35);   // the branch itself, short of the trunk
+    assert_true(missing_beside(whole, without, stump, 4.2) > 5);   // its link is measured by its own first nodes
+    missing_beside(without, whole, vec3(5.6, 10, 12.9), 5.6);   // the branch itself with its link
     // a branch that a start adds to the tree that was cut: nothing else moves
     p.forbid_count = 0;
     cut.center = vec3(7.5, 10, 11.1);
