@@ -24,6 +24,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+static const char ENTERS_FORBIDDEN[] = "enters a forbidden region";
 enum { CONTRAST_MEMORY = 8, MAX_NODES = 200000, MAX_HUB_ROUNDS = 2 };
 
 // --- growing tree ---
@@ -258,7 +259,7 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     t->why = "leaves the volume";
     if (!tracker_is_inside(t->volume, next->cylinder.center))
         return false;
-    t->why = "enters a forbidden region";
+    t->why = ENTERS_FORBIDDEN;
     if (tracker_is_forbidden(t, next->cylinder.center))
         return false;
     t->why = "steps back";
@@ -1239,6 +1240,36 @@ static void keep_nodes(Track *tree, const bool *keep, int *place)
     tree->count = used;
 }
 
+// Distance from x to node i, and to its link as far as that lies outside its parent's lumen: there the node's own branch is cut.
+static double distance_to_node(const Tracker *t, int i, Vec3 x)
+{
+    const TrackNode *n = &t->tree.node[i];
+    double least = vec3_distance(x, n->cylinder.center);
+    if (n->parent >= 0 && t->tree.node[n->parent].branch != n->branch) {
+        Cylinder p = t->tree.node[n->parent].cylinder;
+        double gap = vec3_distance(p.center, n->cylinder.center);
+        Vec3 wall = vec3_mix(p.center, n->cylinder.center, gap > 0 ? fmin(1, p.radius / gap) : 1);
+        least = fmin(least, segment_distance(x, wall, n->cylinder.center));
+    }
+    return least;
+}
+
+// What is left of a branch after a cut is a stub where it does not reach two of its radii beyond its parent's wall: it goes too.
+static void drop_stub(const Track *tree, int branch, bool *keep)
+{
+    int first = 0, last = -1;
+    while (first < tree->count && tree->node[first].branch != branch)
+        first++;
+    for (int i = first; i < tree->count && tree->node[i].branch == branch; i++)
+        last = keep[i] ? i : last;
+    if (first >= tree->count || last < 0 || tree->node[first].parent < 0)
+        return;
+    const Cylinder *tip = &tree->node[last].cylinder;
+    if (-rbt_depth_in_vessel(tree, tree->node[first].parent, tip->center) < 2 * tip->radius)
+        for (int i = first; i <= last; i++)
+            keep[i] = false;
+}
+
 // From the node nearest to each point on its branch goes, and all that hangs on what went. False with a fault where a point is on no branch.
 static bool make_cuts(Tracker *t, const Job *job)
 {
@@ -1254,21 +1285,50 @@ static bool make_cuts(Tracker *t, const Job *job)
         const RbtRegion *cut = &t->parameters->cut[k];
         Vec3 x = in_mm(t->volume, cut->center, cut->is_voxel);
         int nearest = 0;
-        for (int i = 0; i < tree->count; i++)
-            if (vec3_distance(x, tree->node[i].cylinder.center) < vec3_distance(x, tree->node[nearest].cylinder.center))
+        double distance = HUGE_VAL;
+        for (int i = 0; i < tree->count; i++) {
+            double d = distance_to_node(t, i, x);
+            if (d < distance) {
                 nearest = i;
-        double distance = vec3_distance(x, tree->node[nearest].cylinder.center), radius = tree->node[nearest].cylinder.radius;
+                distance = d;
+            }
+        }
+        double radius = tree->node[nearest].cylinder.radius;
         if (nearest == 0 || distance > 2 * radius + 3 * t->voxel) {
             faults_add(job->faults, job->path, cut->line, cut->column, "the cut at (%g, %g, %g) mm %s; a point on the branch that is to be cut", x.x, x.y, x.z,
                        nearest == 0 ? "leaves nothing of the tree" : "is on no branch");
             good = false;
         } else {
             keep[nearest] = false;
+            for (int i = nearest + 1; i < tree->count && tree->node[i].branch == tree->node[nearest].branch; i++)
+                keep[i] = keep[i] && keep[tree->node[i].parent];
+            drop_stub(tree, tree->node[nearest].branch, keep);
         }
     }
     for (int i = 0; good && i < tree->count; i++)
         if (tree->node[i].parent >= 0 && !keep[tree->node[i].parent])
             keep[i] = false;
+    if (good)
+        keep_nodes(tree, keep, place);
+    free(keep);
+    free(place);
+    return good;
+}
+
+// A found branch that ends in front of a forbidden region before it has left its parent is a stub. False: out of memory.
+static bool drop_forbidden_stubs(Tracker *t, const RbtEnds *ends)
+{
+    Track *tree = &t->tree;
+    bool *keep = malloc((size_t)tree->count * sizeof *keep);
+    int *place = malloc((size_t)tree->count * sizeof *place);
+    bool good = keep && place;
+    for (int i = 0; good && i < tree->count; i++)
+        keep[i] = true;
+    for (int b = 0; good && b < ends->count; b++)
+        if (ends->seed[b] < 0 && ends->why[b] == ENTERS_FORBIDDEN)
+            drop_stub(tree, b, keep);
+    for (int i = 0; good && i < tree->count; i++)
+        keep[i] = keep[i] && (tree->node[i].parent < 0 || keep[tree->node[i].parent]);
     if (good)
         keep_nodes(tree, keep, place);
     free(keep);
@@ -1350,6 +1410,8 @@ static bool track_all(Tracker *t, const Job *job, RbtReport *report)
         if (good && job->progress && job->progress->call)
             job->progress->call(job->progress->context, job->seed_count + i + 1, job->seed_count + job->aneurysm_count);
     }
+    if (good && t->parameters->forbid_count > 0 && !drop_forbidden_stubs(t, &ends))
+        good = out_of_memory_at(job, ends.count);
     if (good && t->parameters->ostia > 0 && !open_ostia(t, job, &ends, &junctions))
         good = out_of_memory_at(job, ends.count);
     if (good && !make_report(t, job, &ends, &junctions, report))
