@@ -263,14 +263,15 @@ static bool box_create(const Tracker *t, int node, const bool *hangs, double rea
         return false;
     for (size_t i = 0; i < n; i++)
         b->grid.lit[i] = -1;
-    // what hangs on the child is closed but for the child's own beginning; vessels are marked last, for a path may end where they touch it
+    // what hangs on the child is closed with its blurred rim, but for the child's own beginning; vessels are marked last, for a path may end where they
+    // touch it
     for (int pass = 0; pass < 2; pass++)
         for (int i = 0; i < t->tree.count; i++) {
             const Cylinder *other = &t->tree.node[i].cylinder;
             double distance = vec3_distance(other->center, child->center);
             if (hangs[i] != (pass == 0) || distance > 2 * reach + other->radius || (pass == 0 && distance < 2 * child->radius + t->voxel))
                 continue;
-            mark_ball(t, b, other->center, pass == 0 ? other->radius : fmax(0.8 * other->radius, 0.6 * t->voxel), pass == 0 ? -1 : i + 1);
+            mark_ball(t, b, other->center, pass == 0 ? 1.15 * other->radius + t->voxel : fmax(0.8 * other->radius, 0.6 * t->voxel), pass == 0 ? -1 : i + 1);
         }
     return true;
 }

@@ -318,7 +318,7 @@ static Link *collect_links(const Track *tree, const bool *is_named, int *count)
     return link;
 }
 
-// What hangs on `node`, itself included. Once is enough but where a branch was hung on a later one.
+// What hangs on `node`, itself included. Rounds until nothing is added: a branch may have been hung on a later one.
 static void mark_hanging(const Track *tree, int node, bool *hangs)
 {
     memset(hangs, 0, (size_t)tree->count * sizeof *hangs);
@@ -328,7 +328,7 @@ static void mark_hanging(const Track *tree, int node, bool *hangs)
         for (int i = 0; i < tree->count; i++)
             if (!hangs[i] && tree->node[i].parent >= 0 && hangs[tree->node[i].parent]) {
                 hangs[i] = true;
-                changed = changed || tree->node[i].parent > i;
+                changed = true;
             }
     }
 }
@@ -450,7 +450,7 @@ static bool rebuild_tree(Rebuild *r)
         most += r->link_of[i] >= 0 ? r->link[r->link_of[i]].nodes.count : 0;
     r->line = malloc((size_t)most * sizeof *r->line);
     r->place = malloc(((size_t)tree->count + 1) * sizeof *r->place);
-    r->first = malloc(((size_t)r->branches + 1) * sizeof *r->first);
+    r->first = calloc((size_t)r->branches + 1, sizeof *r->first);
     r->end = calloc((size_t)r->branches + 1, sizeof *r->end);
     r->is_done = calloc((size_t)r->branches + 1, sizeof *r->is_done);
     good = r->line && r->place && r->first && r->end && r->is_done;

@@ -2,6 +2,7 @@
 #include "geom/sort_doubles.h"
 #include "recon/phantom.h"
 #include "recon/rbt_link_path.h"
+#include "recon/rbt_ostia.h"
 #include "recon/rbt_track.h"
 #include "recon/track_score.h"
 
@@ -280,10 +281,164 @@ static void links_to_a_kissing_neighbour(void **state)
     }
 }
 
+// --- what the trace corrects ---
+
+// Every node but the root's branch hangs on lumen: its link is within both radii, or it leads into a branch that the report names as kept.
+static void check_hanging(const VesselTree *tree)
+{
+    for (int i = 1; i < tree->node_count; i++)
+        assert_true(ratio_of_link(tree, i) <= 1);
+}
+
+static int nodes_within(const VesselTree *tree, Vec3 x, double reach)
+{
+    int count = 0;
+    for (int i = 0; i < tree->node_count; i++)
+        count += vec3_distance(tree->center[i], x) < reach;
+    return count;
+}
+
+// A twig cut anywhere near its mouth, or forbidden there, goes as a whole; cut further out, its beginning stays and hangs on its parent.
+static void cuts_leave_no_stub(void **state)
+{
+    (void)state;
+    Kind kind = {"twig", {{"twig_radius_mm", "0.5"}, {"radius_mm", "2"}, {"points", "8"}}, 1};
+    Case c = make_case(&kind, 1, 0.05, true);
+    RbtSeed start = {.start = c.truth->center[2], .toward = vec3_add(c.truth->center[2], c.truth->direction[2]), .has_toward = true, .radius = c.truth->radius[2]};
+    int first = 0;
+    for (int i = 1; i < c.truth->node_count; i++)
+        first = c.truth->parent[i] != i - 1 ? i : first;
+    assert_int_equal(c.report.branch_count, 2);
+    const RbtBranchReport *twig = &c.report.branch[1];
+    // on the link outside the wall, at the first tracked node, and two nodes on
+    for (int way = 0; way < 5; way++) {
+        RbtParameters p = rbt_default_parameters();
+        RbtReport report = {0};
+        int node = twig->first_node + (way == 0 ? twig->link_count - 1 : way == 1 ? twig->link_count : way == 2 ? twig->link_count + 2 : twig->node_count / 2);
+        RbtRegion region = {.center = c.tree->center[way == 4 ? twig->first_node + twig->link_count : node], .radius = 1, .line = 1, .column = 1};
+        p.automatic = 1;
+        *(way == 4 ? &p.forbid : &p.cut) = &region;
+        *(way == 4 ? &p.forbid_count : &p.cut_count) = 1;
+        VesselTree *tree = rbt_track(c.volume, &p, &start, 1, NULL, 0, 0, NULL, &report, "t.yaml", &faults);
+        assert_non_null(tree);
+        check_hanging(tree);
+        Vec3 tip = c.truth->center[c.truth->node_count - 1];
+        assert_int_equal(nodes_within(tree, tip, 2), 0);
+        if (way == 3) {
+            assert_int_equal(report.branch_count, 2);
+            assert_true(report.branch[1].link_count > 0);
+        } else {
+            assert_int_equal(report.branch_count, 1);
+            assert_int_equal(report.junction_count, 0);
+        }
+        // the vessel itself is whole
+        assert_true(nodes_within(tree, c.truth->center[first - 2], 1) > 0);
+        rbt_report_free(&report);
+        vessel_tree_free(tree);
+    }
+    case_free(&c);
+}
+
+// --- what becomes of refused links ---
+
+// A tube of brightness 1 with a plain blurred edge.
+static void draw_tube(Volume *v, Vec3 a, Vec3 b, double radius)
+{
+    double voxel = v->axis[0].x;
+    for (int k = 0; k < v->size[2]; k++)
+        for (int j = 0; j < v->size[1]; j++)
+            for (int i = 0; i < v->size[0]; i++) {
+                Vec3 x = vec3(i * voxel, j * voxel, k * voxel), along = vec3_sub(b, a);
+                double s = fmax(0, fmin(1, vec3_dot(vec3_sub(x, a), along) / vec3_norm2(along)));
+                double depth = radius - vec3_distance(x, vec3_add_scaled(a, s, along));
+                float *old = &v->value[(k * v->size[1] + j) * v->size[0] + i];
+                *old = fmaxf(*old, (float)(1 / (1 + exp(-1.7 * depth / voxel))));
+            }
+    v->maximum = 1;
+}
+
+// Nodes from a to b as a branch (or the rest of one) that hangs on `parent`.
+static void add_nodes(Track *tree, Vec3 a, Vec3 b, double radius, int branch, int parent)
+{
+    double length = vec3_distance(a, b);
+    int n = (int)(length / (0.5 * radius)) + 1;
+    for (int i = 0; i < n; i++) {
+        TrackNode node = {.cylinder = {vec3_mix(a, b, (double)i / (n - 1)), radius, vec3_unit(vec3_sub(b, a)), radius}, .inlier_rate = 1, .contrast = 1,
+                          .parent = i > 0 ? tree->count - 1 : parent, .branch = branch, .kind = NODE_VESSEL};
+        assert_true(track_append(tree, &node, NULL));
+    }
+}
+
+static int nearest_node(const Track *tree, Vec3 x)
+{
+    int nearest = 0;
+    for (int i = 0; i < tree->count; i++)
+        if (vec3_distance(tree->node[i].cylinder.center, x) < vec3_distance(tree->node[nearest].cylinder.center, x))
+            nearest = i;
+    return nearest;
+}
+
+// A branch of one vessel that was hung on its neighbour goes back to the vessel that it comes from, though that one stands behind it; a branch that hangs
+// on nothing goes with what hangs on it; one that the trace names stays, its link shut.
+static void refused_links(void **state)
+{
+    (void)state;
+    Volume *v = volume_create((int[3]){110, 60, 100}, vec3(0, 0, 0), (Vec3[3]){{0.25, 0, 0}, {0, 0.25, 0}, {0, 0, 0.25}});
+    assert_non_null(v);
+    RbtParameters p = rbt_default_parameters();
+    Tracker *t = calloc(1, sizeof *t);
+    assert_non_null(t);
+    *t = tracker_of(v, &p);
+    t->ray_count = (int)p.n_r;
+    Vec3 trunk[2] = {{12, 7.5, 1}, {12, 7.5, 23}}, parent[2] = {{5, 7.5, 1}, {5, 7.5, 23}}, child[3] = {{8, 7.5, 10}, {9.5, 7.5, 10}, {9.5, 7.5, 22}},
+         lone[2] = {{20, 7.5, 5}, {20, 7.5, 15}}, twig[2] = {{21.5, 7.5, 12}, {26, 7.5, 12}};
+    draw_tube(v, trunk[0], trunk[1], 1.2);
+    draw_tube(v, parent[0], parent[1], 1.2);
+    draw_tube(v, vec3(5, 7.5, 10), child[1], 0.6);
+    draw_tube(v, child[1], child[2], 0.6);
+    draw_tube(v, lone[0], lone[1], 0.9);
+    draw_tube(v, vec3(20, 7.5, 12), twig[1], 0.5);
+    add_nodes(&t->tree, trunk[0], trunk[1], 1.2, 0, -1);
+    add_nodes(&t->tree, child[0], child[1], 0.6, 1, nearest_node(&t->tree, vec3(12, 7.5, 10)));
+    add_nodes(&t->tree, child[1], child[2], 0.6, 1, t->tree.count - 1);
+    add_nodes(&t->tree, parent[0], parent[1], 1.2, 2, 0);
+    add_nodes(&t->tree, lone[0], lone[1], 0.9, 3, 4);
+    add_nodes(&t->tree, twig[0], twig[1], 0.5, 4, nearest_node(&t->tree, vec3(20, 7.5, 12)));
+    const bool is_named[5] = {true, false, true, false, false};
+    RbtJunctions found = {0};
+    assert_true(rbt_open_ostia(t, is_named, 2, &found));
+    assert_int_equal(found.count, 3);
+    const RbtJunction *moved = &found.junction[0], *kept = &found.junction[1], *refused = &found.junction[2];
+    print_message("moved: share %.2f, %d nodes; kept: share %.2f; refused: share %.2f, %d nodes dropped\n", moved->share, moved->node_count, kept->share, refused->share,
+                  refused->dropped_nodes);
+    assert_true(moved->branch == 1 && moved->is_moved && moved->support == RBT_SUPPORTED && moved->parent == 2 && moved->node_count > 0);
+    assert_true(kept->branch == 2 && kept->support == RBT_KEPT && kept->share < 0.25 && kept->node_count == 0);
+    assert_true(refused->branch == 3 && refused->support == RBT_REFUSED && refused->dropped_nodes > 20);
+    int links = 0;
+    for (int i = 0; i < t->tree.count; i++) {
+        const TrackNode *n = &t->tree.node[i];
+        assert_true(n->parent < i && n->branch <= 2);
+        links += n->is_link;
+        if (n->parent < 0)
+            continue;
+        const Cylinder *a = &n->cylinder, *b = &t->tree.node[n->parent].cylinder;
+        bool is_shut = n->branch == 2 && t->tree.node[n->parent].branch == 0;
+        assert_true((vec3_distance(a->center, b->center) > a->radius + b->radius) == is_shut);
+        if (n->is_link)
+            assert_true(fabs(a->center.y - 7.5) < 0.2 && fabs(a->center.z - 10) < 0.2 && a->center.x > 4 && a->center.x < 8);
+    }
+    assert_int_equal(links, moved->node_count);
+    free(found.junction);
+    track_free(&t->tree);
+    free(t);
+    volume_free(v);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_ostium_is_described), cmocka_unit_test(links_turned_aside_are_refused), cmocka_unit_test(links_to_a_kissing_neighbour),
+        cmocka_unit_test(cuts_leave_no_stub), cmocka_unit_test(refused_links),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
