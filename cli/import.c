@@ -130,6 +130,28 @@ typedef struct Found {
     double seconds;
 } Found;
 
+static const char *const support_name[IMPORT_SUPPORTS] = {"supported", "doubtful", "refused"};
+
+static void print_junctions(const ImportReport *r)
+{
+    if (r->junction_count == 0)
+        return;
+    printf("junctions      %d: %d supported by the surface, %d doubtful, %d refused", r->junction_count, r->junctions_with[IMPORT_SUPPORTED],
+           r->junctions_with[IMPORT_DOUBTFUL], r->junctions_with[IMPORT_REFUSED]);
+    if (r->junctions_moved)
+        printf("; %d hung on another node", r->junctions_moved);
+    if (r->refused_nodes)
+        printf("; %d nodes left out", r->refused_nodes);
+    printf("; %d nodes on their links\n", r->link_nodes);
+    for (int i = 0; i < r->named_count; i++) {
+        const ImportJunction *j = &r->named[i];
+        printf("  %-9s junction at (%.2f, %.2f, %.2f) mm, link %.2f mm, leaves the lumen by %.2f mm, %.0f %% of the branch's radius\n", support_name[j->support],
+               j->place.x, j->place.y, j->place.z, j->length, j->outside, 100 * j->outside / j->radius);
+    }
+    if (r->junction_count - r->junctions_with[IMPORT_SUPPORTED] > r->named_count)
+        printf("  and %d more\n", r->junction_count - r->junctions_with[IMPORT_SUPPORTED] - r->named_count);
+}
+
 static void print_found(const ImportCommand *command, const Found *f)
 {
     char text[TEXT_MAX];
@@ -159,8 +181,9 @@ static void print_found(const ImportCommand *command, const Found *f)
            r->length, r->radius_min, r->radius_max);
     printf("ends           %d, %d of them open\n", r->end_count, r->open_end_count);
     printf("root           (%.5g, %.5g, %.5g) mm, %s\n", r->root.x, r->root.y, r->root.z, r->root_is_open ? "open" : "closed: no tool can enter there; --root X,Y,Z opens an end");
-    printf("nodes          %d, %ld points; %ld of them out of every node's sight; %ld more belong to no node\n", f->nodes, f->points, r->unseen_points,
-           r->left_points);
+    print_junctions(r);
+    printf("nodes          %d, %ld points; %ld of them out of every node's sight; %ld more belong to no node, %ld lie where a tool passes\n", f->nodes, f->points,
+           r->unseen_points, r->left_points, r->inner_points);
     printf("seconds        %.2f\n", f->seconds);
 }
 
@@ -168,6 +191,27 @@ static void json_vector(cJSON *root, const char *name, Vec3 v)
 {
     double number[3] = {v.x, v.y, v.z};
     cJSON_AddItemToObject(root, name, cJSON_CreateDoubleArray(number, 3));
+}
+
+static void add_junctions(cJSON *root, const ImportReport *r)
+{
+    cJSON *summary = cJSON_AddObjectToObject(root, "junctions"), *list = cJSON_AddArrayToObject(summary, "list");
+    cJSON_AddNumberToObject(summary, "count", r->junction_count);
+    for (int k = 0; k < IMPORT_SUPPORTS; k++)
+        cJSON_AddNumberToObject(summary, support_name[k], r->junctions_with[k]);
+    cJSON_AddNumberToObject(summary, "moved", r->junctions_moved);
+    cJSON_AddNumberToObject(summary, "nodes", r->link_nodes);
+    cJSON_AddNumberToObject(summary, "dropped_nodes", r->refused_nodes);
+    for (int i = 0; i < r->named_count; i++) {
+        const ImportJunction *j = &r->named[i];
+        cJSON *entry = cJSON_CreateObject();
+        cJSON_AddStringToObject(entry, "support", support_name[j->support]);
+        json_vector(entry, "place_mm", j->place);
+        cJSON_AddNumberToObject(entry, "length_mm", j->length);
+        cJSON_AddNumberToObject(entry, "outside_mm", j->outside);
+        cJSON_AddNumberToObject(entry, "radius_mm", j->radius);
+        cJSON_AddItemToArray(list, entry);
+    }
 }
 
 static bool write_json(const ImportCommand *command, const Found *f, Faults *faults)
@@ -184,7 +228,7 @@ static bool write_json(const ImportCommand *command, const Found *f, Faults *fau
     const struct { const char *name; double value; } tree[] = {
         {"curves", f->curve_count}, {"nodes", f->nodes}, {"points", (double)f->points}, {"branches", r->branch_count}, {"ends", r->end_count},
         {"open_ends", r->open_end_count}, {"lids", r->lid_count}, {"loops_cut", r->loop_count}, {"curves_lost", r->lost_curves},
-        {"components_unused", r->unused_components}, {"unseen_points", (double)r->unseen_points}, {"left_points", (double)r->left_points}, {"dropped_nodes", r->dropped_nodes},
+        {"components_unused", r->unused_components}, {"unseen_points", (double)r->unseen_points}, {"left_points", (double)r->left_points}, {"inner_points", (double)r->inner_points}, {"dropped_nodes", r->dropped_nodes},
         {"length_mm", r->length}, {"radius_min_mm", r->radius_min}, {"radius_max_mm", r->radius_max}, {"inside_percent", r->inside_percent},
         {"moved_percent", r->samples ? 100.0 * r->moved_samples / r->samples : 0},
         {"cut_percent", r->samples ? 100.0 * r->cut_samples / r->samples : 0}, {"root_cut_mm", r->root_cut}, {"curves_scaled", r->curves_scaled}, {"seconds", f->seconds}};
@@ -196,6 +240,7 @@ static bool write_json(const ImportCommand *command, const Found *f, Faults *fau
     cJSON_AddBoolToObject(root, "curves_flipped", r->curves_flipped);
     cJSON_AddBoolToObject(root, "root_is_open", r->root_is_open);
     json_vector(root, "root_mm", r->root);
+    add_junctions(root, r);
     char *text = cJSON_Print(root);
     bool good = text && output_write(command->json, text, strlen(text), faults);
     cJSON_free(text);

@@ -120,6 +120,52 @@ static double seconds(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
+static const char *const support_name[] = {"supported", "doubtful", "refused", "kept"};
+
+// How many junctions have this support; gaps within branches are none.
+static int junctions_with(const RbtReport *report, RbtSupport support)
+{
+    int count = 0;
+    for (int i = 0; i < report->junction_count; i++)
+        count += !report->junction[i].is_inner && report->junction[i].support == support;
+    return count;
+}
+
+// Names each junction that the image does not clearly support.
+static void print_junctions(const RbtReport *report)
+{
+    int moved = 0, inner = 0, nodes = 0;
+    long points = 0;
+    for (int i = 0; i < report->junction_count; i++) {
+        const RbtJunction *j = &report->junction[i];
+        moved += j->is_moved && j->support < RBT_REFUSED;
+        inner += j->is_inner;
+        nodes += j->node_count;
+        points += j->point_count;
+    }
+    if (report->junction_count == 0)
+        return;
+    printf("%d junctions: %d supported by the image, %d doubtful, %d refused", report->junction_count - inner, junctions_with(report, RBT_SUPPORTED),
+           junctions_with(report, RBT_DOUBTFUL), junctions_with(report, RBT_REFUSED) + junctions_with(report, RBT_KEPT));
+    if (moved)
+        printf("; %d hung on another parent", moved);
+    if (inner)
+        printf("; %d gaps within branches", inner);
+    printf("; %d nodes with %ld points on their links\n", nodes, points);
+    for (int i = 0; i < report->junction_count; i++) {
+        const RbtJunction *j = &report->junction[i];
+        if (j->support == RBT_SUPPORTED && !j->is_moved)
+            continue;
+        printf("  %-9s %s at (%.2f, %.2f, %.2f) mm, link %.2f mm, darkest place %.0f %% of the contrast", support_name[j->support], j->is_inner ? "gap" : "junction",
+               j->place.x, j->place.y, j->place.z, j->length, 100 * j->share);
+        if (j->support == RBT_REFUSED)
+            printf(": %d nodes, %.1f mm dropped", j->dropped_nodes, j->dropped_mm);
+        else
+            printf(": branch %d on %d%s", j->branch + 1, j->parent + 1, j->is_moved ? ", its second parent" : "");
+        printf("%s\n", j->support == RBT_KEPT ? "; warning: the trace names it, so it stays, but nothing opens into it" : "");
+    }
+}
+
 static void print_table(const VesselTree *tree, const RbtReport *report, double load_s, double track_s)
 {
     double length = 0;
@@ -141,6 +187,7 @@ static void print_table(const VesselTree *tree, const RbtReport *report, double 
     }
     if (report->start[0])
         printf("%s\n", report->start);
+    print_junctions(report);
     printf("%d branches, %.0f mm, %d nodes, %ld points; volume read in %.2f s, tracked in %.2f s\n", report->branch_count, length, tree->node_count, (long)tree->point_count,
            load_s, track_s);
 }
@@ -185,6 +232,33 @@ static char *parameters_text(const RbtParameters *parameters, const RbtReport *r
     return longer;
 }
 
+static void add_junctions(cJSON *root, const RbtReport *report)
+{
+    cJSON *summary = cJSON_AddObjectToObject(root, "junctions"), *list = cJSON_AddArrayToObject(summary, "list");
+    int inner = 0;
+    for (int i = 0; i < report->junction_count; i++) {
+        const RbtJunction *j = &report->junction[i];
+        cJSON *entry = cJSON_CreateObject();
+        inner += j->is_inner;
+        cJSON_AddStringToObject(entry, "support", support_name[j->support]);
+        cJSON_AddBoolToObject(entry, "within_branch", j->is_inner);
+        cJSON_AddBoolToObject(entry, "moved", j->is_moved);
+        cJSON_AddNumberToObject(entry, "branch", j->branch);
+        cJSON_AddNumberToObject(entry, "parent", j->parent);
+        cJSON_AddItemToObject(entry, "place_mm", cJSON_CreateDoubleArray((double[3]){j->place.x, j->place.y, j->place.z}, 3));
+        cJSON_AddNumberToObject(entry, "length_mm", j->length);
+        cJSON_AddNumberToObject(entry, "darkest_share", j->share);
+        cJSON_AddNumberToObject(entry, "nodes", j->node_count);
+        cJSON_AddNumberToObject(entry, "points", j->point_count);
+        cJSON_AddNumberToObject(entry, "dropped_nodes", j->dropped_nodes);
+        cJSON_AddNumberToObject(entry, "dropped_mm", j->dropped_mm);
+        cJSON_AddItemToArray(list, entry);
+    }
+    cJSON_AddNumberToObject(summary, "count", report->junction_count - inner);
+    for (int k = RBT_SUPPORTED; k <= RBT_KEPT; k++)
+        cJSON_AddNumberToObject(summary, support_name[k], junctions_with(report, (RbtSupport)k));
+}
+
 static bool write_json(const SegmentArguments *a, const VesselTree *tree, const RbtReport *report, double load_s, double track_s, Faults *faults)
 {
     cJSON *root = cJSON_CreateObject(), *list = cJSON_AddArrayToObject(root, "branches");
@@ -196,6 +270,7 @@ static bool write_json(const SegmentArguments *a, const VesselTree *tree, const 
         cJSON_AddStringToObject(root, "start", report->start);
     cJSON_AddNumberToObject(root, "load_s", load_s);
     cJSON_AddNumberToObject(root, "track_s", track_s);
+    add_junctions(root, report);
     for (int i = 0; i < report->branch_count; i++) {
         const RbtBranchReport *b = &report->branch[i];
         cJSON *entry = cJSON_CreateObject();
@@ -215,6 +290,7 @@ static bool write_json(const SegmentArguments *a, const VesselTree *tree, const 
         cJSON_AddNumberToObject(entry, "relaxed_nodes", b->relaxed_count);
         cJSON_AddNumberToObject(entry, "retried_nodes", b->retried_count);
         cJSON_AddNumberToObject(entry, "junction_nodes", b->junction_count);
+        cJSON_AddNumberToObject(entry, "link_nodes", b->link_count);
         cJSON_AddStringToObject(entry, "end", b->end);
         cJSON_AddItemToArray(list, entry);
     }

@@ -141,10 +141,10 @@ int cast_rays(const Volume *volume, Vec3 center, const Vec3 *direction, int coun
     return found;
 }
 
-void cast_rays_first_edge(const Volume *volume, Vec3 center, const Vec3 *direction, int count, const RayOptions *options, double *distance)
+void cast_rays_level_edge(const Volume *volume, Vec3 center, const Vec3 *direction, int count, const RayOptions *options, double level, double *distance)
 {
     Vec3 voxel = volume_voxel_of(volume, center);
-    double level = 0.5 * ((double)bspline_sample(volume, voxel) + (double)volume->minimum), slope;
+    double slope;
     RayProfile ray;
     for (int i = 0; i < count; i++) {
         sample_ray(volume, voxel, direction[i], options, &ray);
@@ -155,4 +155,10 @@ void cast_rays_first_edge(const Volume *volume, Vec3 center, const Vec3 *directi
         int first = crossing - window, last = crossing + window;
         distance[i] = crossing + 1 >= ray.samples ? 0 : steepest(&ray, first < 1 ? 1 : first, last > ray.samples - 2 ? ray.samples - 2 : last, &slope);
     }
+}
+
+void cast_rays_first_edge(const Volume *volume, Vec3 center, const Vec3 *direction, int count, const RayOptions *options, double *distance)
+{
+    double inside = (double)bspline_sample(volume, volume_voxel_of(volume, center));
+    cast_rays_level_edge(volume, center, direction, count, options, 0.5 * (inside + (double)volume->minimum), distance);
 }

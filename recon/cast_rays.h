@@ -23,8 +23,9 @@ int sphere_level_of(int count);
 // The steepest fall along each ray, to a fraction of a sample. Writes the points of the rays that have an edge, in the order of the rays;
 // returns their number.
 int cast_rays(const Volume *volume, Vec3 center, const Vec3 *direction, int count, const RayOptions *options, Vec3 *point);
-// The first fall through the level half way between the centre's brightness and the volume's minimum, moved to the steepest place within a
-// voxel: for sacs, whose rays may go on into other vessels. distance[i] is 0 where ray i has none.
+// The first fall through a brightness, moved to the steepest place within a voxel: distance[i] [mm], 0 where ray i has none.
+void cast_rays_level_edge(const Volume *volume, Vec3 center, const Vec3 *direction, int count, const RayOptions *options, double level, double *distance);
+// The same with the level half way between the centre's brightness and the volume's minimum: for sacs, whose rays may go on into other vessels.
 void cast_rays_first_edge(const Volume *volume, Vec3 center, const Vec3 *direction, int count, const RayOptions *options, double *distance);
 
 #endif

@@ -6,7 +6,7 @@
 // spheres shrink, it is that of the last sphere that reaches the end.
 #include "recon/import_surface.h"
 
-#include "recon/import_skeleton.h"
+#include "recon/import_ostia.h"
 #include "recon/mesh_tree.h"
 #include "recon/parallel.h"
 
@@ -20,14 +20,6 @@ static const double POINTS_MAX = 4e6, SEEN_REACH = 2.5, REACH = 2, ASIDE = 1.3, 
 ImportOptions import_default_options(void) { return (ImportOptions){.spacing = 0.5, .points_per_node = 108}; }
 
 // --- nodes ---
-
-typedef struct Nodes {
-    int count;
-    Vec3 *center, *direction;
-    double *radius;
-    int *parent;
-    bool *is_end;            // a leaf or the root: kept
-} Nodes;
 
 // Along the unbranched piece at `end`, `next` giving the sample after each: up to the last sphere that reaches the end, none is smaller than it.
 static void widen_end(Skeleton *s, int end, const int *next)
@@ -140,9 +132,7 @@ static bool choose_nodes(Skeleton *s, const Wall *wall, double spacing, Nodes *n
     int *node = malloc(room * sizeof *node);
     double *arc = calloc(room, sizeof *arc);
     bool *has_child = calloc(room, sizeof *has_child);
-    *nodes = (Nodes){0, calloc(room, sizeof(Vec3)), calloc(room, sizeof(Vec3)), calloc(room, sizeof(double)), calloc(room, sizeof(int)),
-                     calloc(room, sizeof(bool))};
-    bool good = node && arc && has_child && nodes->center && nodes->direction && nodes->radius && nodes->parent && nodes->is_end;
+    bool good = nodes_create(nodes, room) && node && arc && has_child;
     for (int i = 1; good && i < s->count; i++)
         has_child[s->parent[i]] = true;
     good = good && vessel_radii(s, wall);
@@ -162,6 +152,7 @@ static bool choose_nodes(Skeleton *s, const Wall *wall, double spacing, Nodes *n
             nodes->parent[n] = node[i];
         nodes->center[n] = s->point[i];
         nodes->radius[n] = s->radius[i];
+        nodes->sample[n] = i;
         nodes->is_end[n] = is_end;
         nodes->count++;
         node[i] = n;
@@ -171,15 +162,6 @@ static bool choose_nodes(Skeleton *s, const Wall *wall, double spacing, Nodes *n
     free(arc);
     free(has_child);
     return good;
-}
-
-static void nodes_free(Nodes *nodes)
-{
-    free(nodes->center);
-    free(nodes->direction);
-    free(nodes->radius);
-    free(nodes->parent);
-    free(nodes->is_end);
 }
 
 // Along the vessel: from the parent, and to the child that goes on straightest.
@@ -439,6 +421,7 @@ static int drop_nodes(Nodes *nodes, const long *points, int *place)
         }
         nodes->center[kept] = nodes->center[i];
         nodes->radius[kept] = nodes->radius[i];
+        nodes->sample[kept] = nodes->sample[i];
         nodes->is_end[kept] = nodes->is_end[i];
         nodes->parent[kept] = parent;
         place[i] = kept++;
@@ -454,7 +437,7 @@ static VesselTree *make_tree(const Nodes *nodes, const Sampling *s, ImportReport
         kept += s->owner[i] >= 0;
         report->unseen_points += s->unseen[i];
     }
-    report->left_points = s->count - kept;
+    report->left_points = s->count - kept - report->inner_points;
     VesselTree *tree = vessel_tree_create(nodes->count, kept, 0);
     if (!tree)
         return NULL;
@@ -493,7 +476,26 @@ static VesselTree *make_tree(const Nodes *nodes, const Sampling *s, ImportReport
     return tree;
 }
 
-static VesselTree *build(Nodes *nodes, Sampling *s, const ImportOptions *options, ImportReport *report, const char *name, Faults *faults)
+// Nodes on the links, then owners once more; points where a tool passes are no wall.
+static bool open_ostia(Nodes *nodes, const Skeleton *skeleton, Sampling *s, int threads, ImportReport *report)
+{
+    if (!nodes_open_ostia(nodes, skeleton, s->wall, report))
+        return false;
+    LumenLines *lines = nodes_lumen_lines(nodes);
+    if (!lines)
+        return false;
+    parallel_for(threads, (s->count + CHUNK - 1) / CHUNK, find_owners, s, NULL);
+    for (long i = 0; i < s->count; i++)
+        if (s->owner[i] >= 0 && lumen_lines_hold(lines, s->curved[i])) {
+            s->owner[i] = -1;
+            s->unseen[i] = false;
+            report->inner_points++;
+        }
+    lumen_lines_free(lines);
+    return true;
+}
+
+static VesselTree *build(Nodes *nodes, const Skeleton *skeleton, Sampling *s, const ImportOptions *options, ImportReport *report, const char *name, Faults *faults)
 {
     long *points = calloc((size_t)nodes->count + 1, sizeof *points);
     int *place = calloc((size_t)nodes->count + 1, sizeof *place);
@@ -510,8 +512,10 @@ static VesselTree *build(Nodes *nodes, Sampling *s, const ImportOptions *options
             if (!dropped)
                 break;
         }
-        set_directions(nodes);
-        tree = make_tree(nodes, s, report);
+        if (open_ostia(nodes, skeleton, s, options->threads, report)) {
+            set_directions(nodes);
+            tree = make_tree(nodes, s, report);
+        }
     }
     free(points);
     free(place);
@@ -552,7 +556,7 @@ VesselTree *import_surface(const SurfaceMesh *mesh, const CurveSet *given, const
     if (skeleton && choose_nodes(skeleton, &wall, options->spacing, &nodes)) {
         Sampling sampling = {.nodes = &nodes, .wall = &wall, .points_per_node = options->points_per_node, .spacing = options->spacing,
                              .root_is_cut = report->root_is_cut};
-        tree = build(&nodes, &sampling, options, report, name, faults);
+        tree = build(&nodes, skeleton, &sampling, options, report, name, faults);
         free(sampling.weight);
         free(sampling.component);
         free(sampling.used);

@@ -36,6 +36,7 @@ RbtParameters rbt_default_parameters(void)
     p.turn_deg = 110;
     p.look_ahead = 12;
     p.aneurysm_rays = 642;
+    p.ostia = 1;
     return p;
 }
 
@@ -71,6 +72,7 @@ const RbtParameterName rbt_parameter_table[] = {
     {"automatic", FIELD(automatic), 0, 1, true, "1: the whole tree from the first start; 0: what the trace names alone"},
     {"find_aneurysms", FIELD(find_aneurysms), 0, 1, true, "1: aneurysms are looked for too (automatic: 1)"},
     {"residue", FIELD(residue), 0.05, 0.5, false, "least contrast of a vessel that is looked for, share of its parent's"},
+    {"ostia", FIELD(ostia), 0, 1, true, "1: nodes along the links where branches leave, as far as the image supports them; 0: none"},
     {"seed", FIELD(seed), 0, 9007199254740991.0, true, "of the random numbers"},
 };
 const int rbt_parameter_count = sizeof rbt_parameter_table / sizeof rbt_parameter_table[0];

@@ -15,6 +15,7 @@
 #include "recon/rbt_branches.h"
 #include "recon/rbt_exits.h"
 #include "recon/rbt_links.h"
+#include "recon/rbt_ostia.h"
 #include "recon/rbt_residue.h"
 #include "recon/rbt_start.h"
 #include "recon/rbt_tracker.h"
@@ -23,6 +24,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+static const char ENTERS_FORBIDDEN[] = "enters a forbidden region";
 enum { CONTRAST_MEMORY = 8, MAX_NODES = 200000, MAX_HUB_ROUNDS = 2 };
 
 // --- growing tree ---
@@ -257,7 +259,7 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     t->why = "leaves the volume";
     if (!tracker_is_inside(t->volume, next->cylinder.center))
         return false;
-    t->why = "enters a forbidden region";
+    t->why = ENTERS_FORBIDDEN;
     if (tracker_is_forbidden(t, next->cylinder.center))
         return false;
     t->why = "steps back";
@@ -566,23 +568,29 @@ static bool adopt_branch(Tracker *t, const Track *out, const Track *back, int nu
     return true;
 }
 
-// Nodes of a branch follow each other; a later aneurysm may have joined some of them.
+// Nodes of a branch follow each other; a later aneurysm may have joined some of them. Nodes of links are counted, but say nothing of the vessel.
 static void report_branch(const Tracker *t, int number, double p_inl, RbtBranchReport *report)
 {
-    int first = t->tree.count, end = 0;
+    int first = t->tree.count, end = 0, links = 0;
     for (int i = 0; i < t->tree.count; i++)
         if (t->tree.node[i].branch == number) {
             first = i < first ? i : first;
             end = i + 1;
+            links += t->tree.node[i].is_link;
         }
     report->first_node = first;
     report->node_count = end - first;
-    int sacs = 0;
+    report->link_count = links;
+    int sacs = 0, tracked = end - first - links;
     double sac_radius = 0, widest = 0;
     report->inlier_rate_min = 1;
     for (int i = first; i < end; i++) {
         const TrackNode *n = &t->tree.node[i];
-        report->inlier_rate += n->inlier_rate / report->node_count;
+        if (n->parent >= 0)
+            report->length += vec3_distance(n->cylinder.center, t->tree.node[n->parent].cylinder.center);
+        if (n->is_link)
+            continue;
+        report->inlier_rate += n->inlier_rate / tracked;
         report->inlier_rate_min = fmin(report->inlier_rate_min, n->inlier_rate);
         report->relaxed_count += n->inlier_rate <= p_inl;
         report->retried_count += n->retried;
@@ -590,12 +598,10 @@ static void report_branch(const Tracker *t, int number, double p_inl, RbtBranchR
         bool is_sac = n->kind == NODE_ANEURYSM;
         sacs += is_sac;
         sac_radius += is_sac ? n->cylinder.radius : 0;
-        report->radius += n->cylinder.radius / report->node_count;
+        report->radius += n->cylinder.radius / tracked;
         if (!is_sac || n->cylinder.radius > widest)   // the widest of a sac's centres stands for it
             report->center = n->cylinder.center;
         widest = is_sac ? fmax(widest, n->cylinder.radius) : widest;
-        if (n->parent >= 0)
-            report->length += vec3_distance(n->cylinder.center, t->tree.node[n->parent].cylinder.center);
     }
     if (sacs > 0)
         report->radius = sac_radius / sacs;
@@ -1126,6 +1132,7 @@ static VesselTree *finish_tree(const Track *track)
 void rbt_report_free(RbtReport *report)
 {
     free(report->branch);
+    free(report->junction);
     *report = (RbtReport){0};
 }
 
@@ -1159,20 +1166,45 @@ static bool run_seed(Tracker *t, const Job *job, int i)
     return false;
 }
 
-// Branches that lost all of their nodes to a cut are left out.
-static bool make_report(Tracker *t, const Job *job, const RbtEnds *ends, RbtReport *report)
+// The numbers of the branches in the order of their nodes: one that was hung on a later one stands behind it. Returns how many have nodes.
+static int order_branches(const Track *tree, int total, int *order)
 {
-    int total = ends->count + job->aneurysm_count, used = 0;
-    int *renamed = malloc(((size_t)total + 1) * sizeof *renamed);
+    int count = 0;
+    for (int i = 0; i < tree->count; i++)
+        if (count < total && (i == 0 || tree->node[i].branch != tree->node[i - 1].branch))
+            order[count++] = tree->node[i].branch;
+    return count;
+}
+
+// Takes the junctions over, their branches by the report's numbers.
+static void report_junctions(RbtJunctions *junctions, const int *renamed, RbtReport *report)
+{
+    for (int i = 0; i < junctions->count; i++) {
+        RbtJunction *j = &junctions->junction[i];
+        j->branch = j->support == RBT_REFUSED && !j->is_inner ? -1 : renamed[j->branch];
+        j->parent = renamed[j->parent];
+    }
+    report->junction = junctions->junction;
+    report->junction_count = junctions->count;
+    *junctions = (RbtJunctions){0};
+}
+
+// Branches that lost all of their nodes are left out.
+static bool make_report(Tracker *t, const Job *job, const RbtEnds *ends, RbtJunctions *junctions, RbtReport *report)
+{
+    int total = ends->count + job->aneurysm_count;
+    int *renamed = malloc(((size_t)total + 1) * sizeof *renamed), *order = malloc(((size_t)total + 1) * sizeof *order);
     report->branch = calloc((size_t)total + 1, sizeof *report->branch);
-    bool good = renamed && report->branch;
-    for (int i = 0; good && i < total; i++) {
-        RbtBranchReport *b = &report->branch[used];
+    bool good = renamed && order && report->branch;
+    int count = good ? order_branches(&t->tree, total, order) : 0;
+    for (int i = 0; good && i < total; i++)
+        renamed[i] = -1;
+    for (int k = 0; good && k < count; k++) {
+        int i = order[k];
+        RbtBranchReport *b = &report->branch[k];
         *b = (RbtBranchReport){.is_aneurysm = i >= ends->count, .is_found = i < ends->count && ends->seed[i] < 0, .parent = -1, .order = 1};
         report_branch(t, i, t->parameters->p_inl, b);
-        renamed[i] = b->node_count > 0 ? used : -1;
-        if (b->node_count <= 0)
-            continue;
+        renamed[i] = k;
         if (b->is_aneurysm)
             memcpy(b->name, job->aneurysm[i - ends->count].name, sizeof b->name);
         else if (!b->is_found)
@@ -1184,10 +1216,12 @@ static bool make_report(Tracker *t, const Job *job, const RbtEnds *ends, RbtRepo
             b->parent = renamed[t->tree.node[parent].branch];
             b->order = b->parent >= 0 ? report->branch[b->parent].order + 1 : 1;
         }
-        used++;
     }
-    report->branch_count = used;
+    report->branch_count = count;
+    if (good)
+        report_junctions(junctions, renamed, report);
     free(renamed);
+    free(order);
     return good;
 }
 
@@ -1206,6 +1240,36 @@ static void keep_nodes(Track *tree, const bool *keep, int *place)
     tree->count = used;
 }
 
+// Distance from x to node i, and to its link as far as that lies outside its parent's lumen: there the node's own branch is cut.
+static double distance_to_node(const Tracker *t, int i, Vec3 x)
+{
+    const TrackNode *n = &t->tree.node[i];
+    double least = vec3_distance(x, n->cylinder.center);
+    if (n->parent >= 0 && t->tree.node[n->parent].branch != n->branch) {
+        Cylinder p = t->tree.node[n->parent].cylinder;
+        double gap = vec3_distance(p.center, n->cylinder.center);
+        Vec3 wall = vec3_mix(p.center, n->cylinder.center, gap > 0 ? fmin(1, p.radius / gap) : 1);
+        least = fmin(least, segment_distance(x, wall, n->cylinder.center));
+    }
+    return least;
+}
+
+// What is left of a branch after a cut is a stub where it does not reach two of its radii beyond its parent's wall: it goes too.
+static void drop_stub(const Track *tree, int branch, bool *keep)
+{
+    int first = 0, last = -1;
+    while (first < tree->count && tree->node[first].branch != branch)
+        first++;
+    for (int i = first; i < tree->count && tree->node[i].branch == branch; i++)
+        last = keep[i] ? i : last;
+    if (first >= tree->count || last < 0 || tree->node[first].parent < 0)
+        return;
+    const Cylinder *tip = &tree->node[last].cylinder;
+    if (-rbt_depth_in_vessel(tree, tree->node[first].parent, tip->center) < 2 * tip->radius)
+        for (int i = first; i <= last; i++)
+            keep[i] = false;
+}
+
 // From the node nearest to each point on its branch goes, and all that hangs on what went. False with a fault where a point is on no branch.
 static bool make_cuts(Tracker *t, const Job *job)
 {
@@ -1221,21 +1285,50 @@ static bool make_cuts(Tracker *t, const Job *job)
         const RbtRegion *cut = &t->parameters->cut[k];
         Vec3 x = in_mm(t->volume, cut->center, cut->is_voxel);
         int nearest = 0;
-        for (int i = 0; i < tree->count; i++)
-            if (vec3_distance(x, tree->node[i].cylinder.center) < vec3_distance(x, tree->node[nearest].cylinder.center))
+        double distance = HUGE_VAL;
+        for (int i = 0; i < tree->count; i++) {
+            double d = distance_to_node(t, i, x);
+            if (d < distance) {
                 nearest = i;
-        double distance = vec3_distance(x, tree->node[nearest].cylinder.center), radius = tree->node[nearest].cylinder.radius;
+                distance = d;
+            }
+        }
+        double radius = tree->node[nearest].cylinder.radius;
         if (nearest == 0 || distance > 2 * radius + 3 * t->voxel) {
             faults_add(job->faults, job->path, cut->line, cut->column, "the cut at (%g, %g, %g) mm %s; a point on the branch that is to be cut", x.x, x.y, x.z,
                        nearest == 0 ? "leaves nothing of the tree" : "is on no branch");
             good = false;
         } else {
             keep[nearest] = false;
+            for (int i = nearest + 1; i < tree->count && tree->node[i].branch == tree->node[nearest].branch; i++)
+                keep[i] = keep[i] && keep[tree->node[i].parent];
+            drop_stub(tree, tree->node[nearest].branch, keep);
         }
     }
     for (int i = 0; good && i < tree->count; i++)
         if (tree->node[i].parent >= 0 && !keep[tree->node[i].parent])
             keep[i] = false;
+    if (good)
+        keep_nodes(tree, keep, place);
+    free(keep);
+    free(place);
+    return good;
+}
+
+// A found branch that ends in front of a forbidden region before it has left its parent is a stub. False: out of memory.
+static bool drop_forbidden_stubs(Tracker *t, const RbtEnds *ends)
+{
+    Track *tree = &t->tree;
+    bool *keep = malloc((size_t)tree->count * sizeof *keep);
+    int *place = malloc((size_t)tree->count * sizeof *place);
+    bool good = keep && place;
+    for (int i = 0; good && i < tree->count; i++)
+        keep[i] = true;
+    for (int b = 0; good && b < ends->count; b++)
+        if (ends->seed[b] < 0 && ends->why[b] == ENTERS_FORBIDDEN)
+            drop_stub(tree, b, keep);
+    for (int i = 0; good && i < tree->count; i++)
+        keep[i] = keep[i] && (tree->node[i].parent < 0 || keep[tree->node[i].parent]);
     if (good)
         keep_nodes(tree, keep, place);
     free(keep);
@@ -1284,9 +1377,22 @@ static bool track_automatic(Tracker *t, const Job *job, RbtEnds *ends)
     return good;
 }
 
+// The ostia of the tree as it now is.
+static bool open_ostia(Tracker *t, const Job *job, const RbtEnds *ends, RbtJunctions *junctions)
+{
+    int total = ends->count + job->aneurysm_count;
+    bool *is_named = malloc(((size_t)total + 1) * sizeof *is_named), good = is_named != NULL;
+    for (int i = 0; good && i < total; i++)
+        is_named[i] = i >= ends->count || ends->seed[i] >= 0;
+    good = good && rbt_open_ostia(t, is_named, job->threads, junctions);
+    free(is_named);
+    return good;
+}
+
 static bool track_all(Tracker *t, const Job *job, RbtReport *report)
 {
     RbtEnds ends = {0};
+    RbtJunctions junctions = {0};
     bool automatic = t->parameters->automatic > 0, good = true;
     if (automatic)
         good = track_automatic(t, job, &ends);
@@ -1304,8 +1410,13 @@ static bool track_all(Tracker *t, const Job *job, RbtReport *report)
         if (good && job->progress && job->progress->call)
             job->progress->call(job->progress->context, job->seed_count + i + 1, job->seed_count + job->aneurysm_count);
     }
-    if (good && !make_report(t, job, &ends, report))
+    if (good && t->parameters->forbid_count > 0 && !drop_forbidden_stubs(t, &ends))
         good = out_of_memory_at(job, ends.count);
+    if (good && t->parameters->ostia > 0 && !open_ostia(t, job, &ends, &junctions))
+        good = out_of_memory_at(job, ends.count);
+    if (good && !make_report(t, job, &ends, &junctions, report))
+        good = out_of_memory_at(job, ends.count);
+    free(junctions.junction);
     free(ends.why);
     free(ends.seed);
     return good;
@@ -1362,6 +1473,6 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
     if (tree && report)
         *report = own;
     else
-        free(own.branch);
+        rbt_report_free(&own);
     return tree;
 }

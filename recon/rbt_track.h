@@ -58,6 +58,8 @@ typedef struct RbtParameters {
     double automatic;        // 1: branches and aneurysms that no seed names are looked for
     double find_aneurysms;   // 1: so are aneurysms
     double residue;          // a vessel's border is looked for at this share of the contrast of the vessel it leaves, after a half of it
+    // where branches leave their parents
+    double ostia;            // 1: links are measured in the image and get nodes, or are refused; 0: they stay as tracked
     // corrections by the trace; the owner of the parameters owns them
     const RbtRegion *forbid; // no centre of a node lies in these, nor does the search go through them
     int forbid_count;
@@ -103,6 +105,7 @@ typedef struct RbtBranchReport {
     int relaxed_count;       // nodes below p_inl
     int retried_count;       // nodes that took a longer step
     int junction_count;      // nodes in openings where no cylinder fits (their inlier rate is the share of rays that meet a near wall)
+    int link_count;          // nodes between the parent's axis and the first one that was tracked; in the counts and the length, in no mean
     bool is_aneurysm;
     bool is_found;           // by the program, no seed named it
     int parent, order;       // number of the branch that it hangs on, -1: none; 1 for the first, one more than its parent's
@@ -112,9 +115,32 @@ typedef struct RbtBranchReport {
     char end[96];            // why it ended
 } RbtBranchReport;
 
+// What the image says of a link between a branch and its parent: the darkest place of the best path, as a share of the child's contrast.
+typedef enum RbtSupport {
+    RBT_SUPPORTED,           // at least a half: it has nodes, none further from the next than the sum of their radii
+    RBT_DOUBTFUL,            // at least a quarter: the same, to be looked at
+    RBT_REFUSED,             // less: the branch was dropped with what hung on it
+    RBT_KEPT                 // less, but the trace names the branch: it stays, its link has no nodes, and no tool passes
+} RbtSupport;
+
+typedef struct RbtJunction {
+    int branch, parent;      // numbers in the report; -1: dropped
+    bool is_inner;           // no junction but a gap within the branch
+    bool is_moved;           // it hangs on another parent than at first, which the image did not support
+    Vec3 place;              // [mm] where the link leaves the parent's lumen; of one without a path, its middle
+    double length;           // [mm] of the link, from the parent's axis to the first node that was tracked
+    double share;            // 0 … 1
+    RbtSupport support;
+    int node_count, point_count;   // on the link
+    int dropped_nodes;       // with a refused one …
+    double dropped_mm;       // … and their length
+} RbtJunction;
+
 typedef struct RbtReport {
     int branch_count;
-    RbtBranchReport *branch; // one a seed, then one an aneurysm
+    RbtBranchReport *branch; // in the order of the tree's nodes: one a seed, those found, one an aneurysm
+    int junction_count;
+    RbtJunction *junction;   // none with `ostia` 0
     char start[256];         // what was estimated at the first start, and which end is the root; empty: it was given
 } RbtReport;
 void rbt_report_free(RbtReport *report);
