@@ -179,9 +179,16 @@ static double point_share(const Flood *f, const Link *l)
 {
     double pieces = ceil(FINE * l->length / l->radius);
     int count = pieces < 4 ? 4 : pieces > 2000 ? 2000 : (int)pieces, node = l->parent;
-    for (int k = 0; k <= count; k++)
-        if (!(field_at(f, vec3_mix(l->from, l->to, (double)k / count), &node) > 0))
-            return (double)(k > 0 ? k - 1 : 0) / count;
+    for (int k = 0; k <= count; k++) {
+        if (field_at(f, vec3_mix(l->from, l->to, (double)k / count), &node) > 0)
+            continue;
+        double open = (double)(k - 1) / count, shut = (double)k / count;
+        for (int i = 0; k > 0 && i < 12; i++) {
+            double middle = 0.5 * (open + shut);
+            *(field_at(f, vec3_mix(l->from, l->to, middle), &node) > 0 ? &open : &shut) = middle;
+        }
+        return fmax(open, 0);
+    }
     return 1;
 }
 
@@ -427,6 +434,28 @@ static void flood_links(Flood *f, Reach *reach)
     }
 }
 
+// What shuts a ball may lie ahead of where it stops: the least on the line from there on, by a diameter, along the children with most behind them.
+static void judge_stop(const Flood *f, const double *all, ReachStop *stop)
+{
+    const VesselTree *tree = f->tree;
+    double ahead = -2 * f->options->tool_radius;
+    stop->clearance = 4 * f->options->tool_radius;
+    stop->place = tree->center[stop->node];
+    for (int at = stop->node; at >= 0 && ahead <= 0;) {
+        Link l = tree->parent[at] >= 0 ? link_of(tree, at) : (Link){.from = tree->center[0], .to = tree->center[0], .radius = tree->radius[0]};
+        least_on_line(f, &l, &stop->clearance, &stop->place);
+        ahead += at == stop->node ? 0 : l.length;
+        int next = -1;
+        for (int k = tree->neighbour_offset[at]; k < tree->neighbour_offset[at + 1]; k++) {
+            int child = tree->neighbour[k];
+            if (child > at && tree->kind[child] == tree->kind[at] && (next < 0 || all[child] > all[next]))
+                next = child;
+        }
+        at = next;
+    }
+    stop->capped = stop->clearance < 0;
+}
+
 static bool list_stops(const Flood *f, Reach *reach)
 {
     const VesselTree *tree = f->tree;
@@ -452,10 +481,8 @@ static bool list_stops(const Flood *f, Reach *reach)
         if (!(reach->share[i][REACH_ASIDE] < 1) || (parent >= 0 && reach->share[parent][REACH_ASIDE] < 1))
             continue;
         ReachStop *stop = &reach->stop[count++];
-        *stop = (ReachStop){.node = i, .apart = apart, .lost = lost[i], .place = tree->center[i], .clearance = 4 * f->options->tool_radius};
-        Link l = parent >= 0 ? link_of(tree, i) : (Link){.from = tree->center[0], .to = tree->center[0], .radius = tree->radius[0]};
-        least_on_line(f, &l, &stop->clearance, &stop->place);
-        stop->capped = stop->clearance < 0;
+        *stop = (ReachStop){.node = i, .apart = apart, .lost = lost[i]};
+        judge_stop(f, all, stop);
     }
     free(lost);
     free(all);
