@@ -25,8 +25,9 @@
 
 enum { STATES_MAX = 8, CUBE_STATES_MAX = 8 * STATES_MAX, RIVALS_MAX = 24, PASSES_MAX = 100 };
 
-typedef struct Candidate {   // a node that reaches the block at hand, and that no other beats in all of it
+typedef struct Candidate {   // a node that reaches the block at hand, whose field may be above 0 there and that no other beats in all of it
     int node;
+    double low;              // its field is at least that
     Blobby model;
     double reach;            // [mm] no point of the model's surface lies further from the node's centre
     int rivals, rival[RIVALS_MAX];           // near nodes that beat it somewhere in the block
@@ -126,28 +127,22 @@ static bool find_blocks(SheetMarch *job, int first, int end)
 
 // --- Candidates of a block ---
 
-static double power_at(const VesselTree *tree, int node, Vec3 x) { return power_distance(x, tree->center[node], tree->radius[node]); }
-
-// How often `other` beats `node` at the block's corners: power distances differ by a linear function, so 8 means everywhere and 0 nowhere.
-static int corners_beaten(const VesselTree *tree, int node, int other, const Vec3 corner[8])
-{
-    int count = 0;
-    for (int c = 0; c < 8; c++)
-        count += power_at(tree, other, corner[c]) < power_at(tree, node, corner[c]);
-    return count;
-}
-
-// A walk moves to a better node only within two radii of it, or where that is nearer in radii (power_walk.h).
-static bool list_rivals(const SheetMarch *job, Candidate *c, const Vec3 corner[8], Vec3 middle, double h)
+// A walk moves to a better node only within two radii of it, or where that is nearer in radii (power_walk.h). The difference of two power distances is
+// linear, so its ends over the cube around `middle` (h: its circumscribed radius) follow from its slope.
+static bool list_rivals(const SheetMarch *job, Candidate *c, Vec3 middle, double h)
 {
     const VesselTree *tree = job->tree;
+    double half = h / sqrt(3), own_far = vec3_distance(middle, tree->center[c->node]), own_radius = tree->radius[c->node];
+    double own = own_far * own_far - own_radius * own_radius;
     c->rivals = 0;
     for (int k = tree->near_offset[c->node]; k < tree->near_offset[c->node + 1] && job->alone < 0; k++) {
-        int other = tree->near[k], beaten = corners_beaten(tree, c->node, other, corner);
-        double far = (vec3_distance(middle, tree->center[other]) + h) / tree->radius[other];
-        if (beaten == 8 && (far < 2 || far < (vec3_distance(middle, tree->center[c->node]) - h) / tree->radius[c->node]))
+        int other = tree->near[k];
+        double r = tree->radius[other], far = vec3_distance(middle, tree->center[other]), better = own - (far * far - r * r);
+        Vec3 apart = vec3_sub(tree->center[other], tree->center[c->node]);
+        double change = 2 * half * (fabs(apart.x) + fabs(apart.y) + fabs(apart.z));
+        if (better - change > 0 && (far + h < 2 * r || (far + h) * own_radius < (own_far - h) * r))
             return false;
-        if (beaten > 0 && c->rivals < RIVALS_MAX)
+        if (better + change > 0 && c->rivals < RIVALS_MAX)
             c->rival[c->rivals++] = other;
     }
     return true;
@@ -155,10 +150,8 @@ static bool list_rivals(const SheetMarch *job, Candidate *c, const Vec3 corner[8
 
 static bool list_candidates(SheetMarch *job, const MarchBlock *b)
 {
-    double h;
-    Vec3 middle = march_block_ball(&job->march, b, &h), corner[8];
-    for (int c = 0; c < 8; c++)
-        corner[c] = march_point(&job->march, b, MARCH_BLOCK * (c & 1), MARCH_BLOCK * (c >> 1 & 1), MARCH_BLOCK * (c >> 2 & 1));
+    double h, high;
+    Vec3 middle = march_block_ball(&job->march, b, &h);
     job->candidate_count = 0;
     for (int l = b->first; l >= 0; l = job->march.link[l].next) {
         if (job->candidate_count == job->candidate_capacity) {
@@ -173,30 +166,28 @@ static bool list_candidates(SheetMarch *job, const MarchBlock *b)
         Candidate *c = &job->candidate[job->candidate_count];
         c->node = job->node[ball];
         c->reach = job->reach[ball];
-        if (!list_rivals(job, c, corner, middle, h))
+        if (!list_rivals(job, c, middle, h))
             continue;
         c->model = blobby_of(job->tree, c->node);
-        job->candidate_count++;
+        field_bounds(&c->model, middle, h, &c->low, &high);
+        job->candidate_count += high > -1e-9;
     }
     return true;
 }
 
-// Whether the block is certainly without surface: every candidate says outside, or every one inside and in one of them a walk stays all over it.
+// Whether the block is certainly without surface: no model may be above 0 in it, or all are and in one of them a walk stays all over it.
 static bool block_is_plain(const SheetMarch *job, const MarchBlock *b)
 {
     double h;
     Vec3 middle = march_block_ball(&job->march, b, &h);
-    bool all_out = true, all_in = true, covered = false;
-    for (int k = 0; k < job->candidate_count && (all_out || all_in); k++) {
+    bool all_in = true, covered = false;
+    for (int k = 0; k < job->candidate_count && all_in; k++) {
         const Candidate *c = &job->candidate[k];
         double furthest = vec3_distance(middle, job->tree->center[c->node]) + h;
-        double low, high;
-        field_bounds(&c->model, middle, h, &low, &high);
-        all_out = all_out && high < -1e-9;
-        all_in = all_in && low > 1e-9;
+        all_in = c->low > 1e-9;
         covered = covered || (furthest < c->reach && (job->alone >= 0 || (c->rivals == 0 && furthest < 1.2 * job->tree->radius[c->node])));
     }
-    return all_out || (all_in && covered);
+    return job->candidate_count == 0 || (all_in && covered);
 }
 
 // --- States ---
