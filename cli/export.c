@@ -3,6 +3,7 @@
 
 #include "cli/file_kind.h"
 #include "cli/output.h"
+#include "geom/surface_parts.h"
 #include "recon/tree_file.h"
 #include "sim/recording.h"
 
@@ -24,6 +25,7 @@ static const char help[] =
     "  recording              .csv (a row a node and frame)  .vtp or .pvd (one .vtp a frame and a .pvd that names them)\n\n"
     "  --what surface|centreline  what a .vtp holds; default: the surface of a model, the centreline of a tree\n"
     "  --cell-mm X                size of the surface's cells [mm]; default: about ten to twenty cells round the thinnest branch\n"
+    "  --keep-floating            also the parts of a surface to which no point gets from the inlet; dropped otherwise, which is said\n"
     "  --open-inlet               the surface is cut open at the root's plane; blobs close it otherwise\n"
     "  --frame RAS|LPS            coordinate system that a .mrk.json names; coordinates are never converted; default LPS\n"
     "  -o OUT                     the file to write\n"
@@ -34,7 +36,7 @@ static const char help[] =
 typedef struct ExportOptions {
     const char *in, *out, *what, *frame;
     double cell_mm;          // 0: automatic
-    bool open_inlet, quiet;
+    bool open_inlet, keep_floating, quiet;
 } ExportOptions;
 
 // --- text that grows in memory, then one write ---
@@ -208,14 +210,60 @@ static void print_surface_vtp(FILE *out, const Surface *surface)
     vtp_end(out);
 }
 
-static void print_census(const SurfaceCensus *c, double cell_mm, int specks)
+static void print_census(const SurfaceCensus *c, double cell_mm, int bubbles)
 {
     printf("surface        %d vertices, %d triangles, cells of %.3g mm\n", c->vertices, c->triangles, cell_mm);
     printf("parts          %d, Euler characteristic %" PRId64 "%s\n", c->parts, c->euler,
-           specks ? "; specks where local models disagree were dropped" : "");
+           bubbles ? "; bubbles of wall inside the lumen were dropped" : "");
     printf("edges          %" PRId64 " open, %" PRId64 " non-manifold, %" PRId64 " between triangles turned against each other\n", c->open_edges,
            c->non_manifold_edges, c->turned_edges);
     printf("area, volume   %.6g mm2, %.6g mm3\n", c->area, c->volume);
+}
+
+// Parts that the flood from the inlet does not reach: how many and where, on standard error, so that it is seen whatever is asked for.
+static void say_dropped(const char *file, const SurfaceParts *parts)
+{
+    enum { SHOWN = 6 };
+    int count[PART_KINDS] = {0}, shown = 0;
+    double volume = 0;
+    for (int p = 0; p < parts->count; p++) {
+        const SurfacePart *part = &parts->part[p];
+        count[part->kind]++;
+        volume += part->kind == PART_SHUT || part->kind == PART_GHOST ? part->volume : 0;
+    }
+    if (count[PART_SHUT] + count[PART_GHOST] == 0)
+        return;
+    fprintf(stderr, "%s: %d part%s of the surface dropped, %.3g mm3: %d with nodes of the tree that are shut off from the inlet, %d that hold%s none (--keep-floating keeps them)\n",
+            file, count[PART_SHUT] + count[PART_GHOST], count[PART_SHUT] + count[PART_GHOST] == 1 ? "" : "s", volume, count[PART_SHUT], count[PART_GHOST],
+            count[PART_GHOST] == 1 ? "s" : "");
+    for (int p = 0; p < parts->count && shown < SHOWN; p++) {
+        const SurfacePart *part = &parts->part[p];
+        if (part->kind != PART_SHUT && part->kind != PART_GHOST)
+            continue;
+        shown++;
+        fprintf(stderr, "    %.3g mm3 with %d nodes at %.2f, %.2f, %.2f (node %d)\n", part->volume, part->nodes, part->place.x, part->place.y, part->place.z,
+                part->node);
+    }
+    if (count[PART_SHUT] + count[PART_GHOST] > shown)
+        fprintf(stderr, "    and %d smaller ones\n", count[PART_SHUT] + count[PART_GHOST] - shown);
+}
+
+// Bubbles in the lumen, and what hangs on nothing unless that is wanted. False where there is no memory.
+static bool drop_parts(const ExportOptions *options, const VesselTree *tree, TriangleMesh *mesh, int *bubbles)
+{
+    ReachOptions flood = reach_default_options();
+    Reach *reach = reach_create(tree, &flood);
+    SurfaceParts *parts = reach ? surface_parts_create(mesh, tree, reach) : NULL;
+    bool kinds[PART_KINDS] = {[PART_INLET] = true, [PART_SHUT] = options->keep_floating, [PART_GHOST] = options->keep_floating};
+    bool good = parts && surface_parts_keep(mesh, parts, kinds);
+    *bubbles = 0;
+    for (int p = 0; good && p < parts->count; p++)
+        *bubbles += parts->part[p].kind == PART_BUBBLE;
+    if (good && !options->keep_floating)
+        say_dropped(options->in, parts);
+    surface_parts_free(parts);
+    reach_free(reach);
+    return good;
 }
 
 // The surface as it will be written, what there is to say of it told. False with faults.
@@ -228,12 +276,13 @@ static bool make_surface(const ExportOptions *options, const VesselTree *tree, S
         return false;
     }
     SurfaceCensus census;
-    int specks = surface_drop_specks(mesh, 8 * cell * cell * cell);
+    int bubbles;
+    bool good = drop_parts(options, tree, mesh, &bubbles);
     if (options->open_inlet && !surface_open_inlet(mesh, tree)) {
         faults_add(faults, options->in, 0, 0, "has no inlet to open: the tree goes on upstream of its root, or the root's points close it; leave --open-inlet away");
         return false;
     }
-    bool good = specks >= 0 && surface_census(mesh, &census);
+    good = good && surface_census(mesh, &census);
     if (good && tree->point_count > 0) {
         surface->error = malloc(((size_t)mesh->vertex_count + 1) * sizeof *surface->error);
         surface->distance = malloc(((size_t)mesh->vertex_count + 1) * sizeof *surface->distance);
@@ -242,7 +291,7 @@ static bool make_surface(const ExportOptions *options, const VesselTree *tree, S
     if (!good)
         faults_add(faults, options->in, 0, 0, "gives no surface: no memory; a larger --cell-mm may do");
     else if (!options->quiet && strcmp(options->out, "-"))
-        print_census(&census, cell, specks);
+        print_census(&census, cell, bubbles);
     return good;
 }
 
@@ -558,11 +607,12 @@ static bool export_recording(const ExportOptions *options, const char *extension
 
 static int parse_options(int argc, char **argv, ExportOptions *options)
 {
-    enum { WHAT = 256, CELL, FRAME, OPEN, THREADS, QUIET, HELP };
+    enum { WHAT = 256, CELL, FRAME, OPEN, FLOATING, THREADS, QUIET, HELP };
     static const struct option table[] = {{"what", required_argument, NULL, WHAT},       {"cell-mm", required_argument, NULL, CELL},
                                           {"frame", required_argument, NULL, FRAME},     {"output", required_argument, NULL, 'o'},
                                           {"threads", required_argument, NULL, THREADS}, {"quiet", no_argument, NULL, QUIET},
-                                          {"open-inlet", no_argument, NULL, OPEN},       {"help", no_argument, NULL, HELP},
+                                          {"open-inlet", no_argument, NULL, OPEN},       {"keep-floating", no_argument, NULL, FLOATING},
+                                          {"help", no_argument, NULL, HELP},
                                           {0}};
     *options = (ExportOptions){.frame = "LPS"};
     double number;
@@ -595,6 +645,7 @@ static int parse_options(int argc, char **argv, ExportOptions *options)
                 return EXIT_BAD_INPUT;
             break;
         case OPEN: options->open_inlet = true; break;
+        case FLOATING: options->keep_floating = true; break;
         case QUIET: options->quiet = true; break;
         case HELP:
         case 'h': fputs(help, stdout); return EXIT_DONE;

@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "cli/output.h"
+#include "cli/reach_report.h"
 #include "geom/sort_doubles.h"
 #include "recon/blurred_edge.h"
 #include "recon/field_fit.h"
@@ -22,6 +23,7 @@ typedef struct FitCommand {
     const char *tree, *output, *json, *picture, *preset;
     LimFitOptions options;
     double edge_blur;        // [mm] < 0: what the tree's file says
+    double tool_radius;      // [mm] of the tool led from the inlet through the model
     bool has_voxel, quiet, measure;
 } FitCommand;
 
@@ -46,6 +48,7 @@ static const char help[] =
     "  --threads N            default 0: all cores; the result does not depend on it\n"
     "  --measure              also: how far neighbouring local models differ where a tool passes from one to the next, walls that no\n"
     "                         point supports, narrow links; without -o of the model given, which is then not fitted again\n"
+    "  --tool-radius-mm X     of the tool that is led from the model's inlet through the tree, for the report at the end; default 0.18\n"
     "  --json F               figures as JSON; - is standard output\n"
     "  --picture F.png        fitted surface coloured by the distance to the points, the worst local models cut open\n"
     "  --quiet                no summary, no progress\n\n"
@@ -60,15 +63,15 @@ static int usage_fault(const char *message, const char *what)
 // -1: go on; otherwise the exit code.
 static int parse_options(int argc, char **argv, FitCommand *command)
 {
-    enum { PRESET = 256, EDGE_BLUR, TARGET, BLOBS, VOXEL, ALPHA, BETA, POINTS, THREADS, JSON, PICTURE, QUIET, MEASURE };
+    enum { PRESET = 256, EDGE_BLUR, TARGET, BLOBS, VOXEL, ALPHA, BETA, POINTS, THREADS, JSON, PICTURE, QUIET, MEASURE, TOOL_RADIUS };
     static const struct option table[] = {
         {"output", required_argument, NULL, 'o'},      {"preset", required_argument, NULL, PRESET}, {"target-mm", required_argument, NULL, TARGET},
         {"max-blobs", required_argument, NULL, BLOBS}, {"voxel-mm", required_argument, NULL, VOXEL}, {"alpha", required_argument, NULL, ALPHA},
         {"beta", required_argument, NULL, BETA},       {"max-points", required_argument, NULL, POINTS}, {"threads", required_argument, NULL, THREADS},
         {"json", required_argument, NULL, JSON},       {"picture", required_argument, NULL, PICTURE}, {"quiet", no_argument, NULL, QUIET},
         {"measure", no_argument, NULL, MEASURE},       {"help", no_argument, NULL, 'h'},
-        {"edge-blur-mm", required_argument, NULL, EDGE_BLUR}, {0}};
-    *command = (FitCommand){.options = lim_fit_default_options(), .preset = "default", .edge_blur = -1};
+        {"edge-blur-mm", required_argument, NULL, EDGE_BLUR}, {"tool-radius-mm", required_argument, NULL, TOOL_RADIUS}, {0}};
+    *command = (FitCommand){.options = lim_fit_default_options(), .preset = "default", .edge_blur = -1, .tool_radius = reach_default_options().tool_radius};
     double number;
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "o:h", table, NULL)) != -1;) {
@@ -79,6 +82,10 @@ static int parse_options(int argc, char **argv, FitCommand *command)
         case PICTURE: command->picture = optarg; break;
         case QUIET: command->quiet = true; break;
         case MEASURE: command->measure = true; break;
+        case TOOL_RADIUS:
+            if (!cli_number("--tool-radius-mm", optarg, 0.01, 100, &command->tool_radius))
+                return EXIT_BAD_INPUT;
+            break;
         case PRESET:
             if (strcmp(optarg, "default") && strcmp(optarg, "local") && strcmp(optarg, "paper"))
                 return usage_fault("--preset is default, local or paper, not ", optarg);
@@ -262,9 +269,9 @@ static void print_figures(const VesselTree *model, const FitFigures *f, double v
     printf("seconds        %.2f\n", f->seconds);
 }
 
-static bool write_json(const char *path, const VesselTree *model, const FitFigures *f, const ModelMeasure *measure, double voxel, Faults *faults)
+// `root` becomes the file's.
+static bool write_json(const char *path, cJSON *root, const VesselTree *model, const FitFigures *f, const ModelMeasure *measure, double voxel, Faults *faults)
 {
-    cJSON *root = cJSON_CreateObject();
     cJSON_AddNumberToObject(root, "nodes", model->node_count);
     cJSON_AddNumberToObject(root, "points", (double)model->point_count);
     cJSON_AddNumberToObject(root, "blobs", (double)f->blobs);
@@ -286,7 +293,6 @@ static bool write_json(const char *path, const VesselTree *model, const FitFigur
     if (!text)
         faults_add(faults, path, 0, 0, "not enough memory");
     free(text);
-    cJSON_Delete(root);
     return good;
 }
 
@@ -383,13 +389,17 @@ int verb_fit(int argc, char **argv)
         if (command.output)
             good = good && tree_file_save(model, &info, command.output, &faults);
         free(info.parameters);
-        if (good && command.json)
-            good = write_json(command.json, model, &figures, command.measure ? &measure : NULL, voxel, &faults);
-        if (good && !command.quiet && !(command.json && !strcmp(command.json, "-"))) {
+        bool spoken = good && !command.quiet && !(command.json && !strcmp(command.json, "-"));
+        if (spoken)
             print_figures(model, &figures, voxel);
-            if (command.measure)
-                print_measure(&measure);
-        }
+        if (spoken && command.measure)
+            print_measure(&measure);
+        cJSON *root = cJSON_CreateObject();
+        if (spoken || command.json)
+            good = good && reach_report(model, command.tree, command.tool_radius, spoken ? stdout : NULL, root, &faults);
+        if (good && command.json)
+            good = write_json(command.json, root, model, &figures, command.measure ? &measure : NULL, voxel, &faults);
+        cJSON_Delete(root);
         if (good && command.picture)
             make_picture(command.picture, model);
     }

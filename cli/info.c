@@ -3,6 +3,7 @@
 
 #include "cli/file_kind.h"
 #include "cli/output.h"
+#include "cli/reach_report.h"
 #include "cli/report.h"
 #include "geom/sort_doubles.h"
 #include "recon/mesh_check.h"
@@ -20,11 +21,13 @@
 #include <string.h>
 
 static const char help[] = "Usage: seldinger info FILE [--json] [--report F.html] [--picture F.png]\n\n"
-                           "Says what FILE is (volume or folder of a DICOM series, surface, tree, model, recording, scene or script) and its figures. Lengths mm.\n\n"
+                           "Says what FILE is (volume or folder of a DICOM series, surface, tree, model, recording, scene or script) and its figures. Lengths mm.\n"
+                           "Of a model also where a tool gets to from the inlet, and what is shut and why.\n\n"
                            "  --json           as JSON on standard output\n"
                            "  --report F.html  of a tree or model: a page for readers, all in one file: tree, candidates (narrow places, wide places, aneurysms),\n"
                            "                   branches, radius along each, quality of the fit; for training and research, not a medical device\n"
                            "  --picture F.png  of a model: its surface coloured by the distance to the data, and the paper's Table 4 as a histogram\n"
+                           "  --tool-radius-mm X  of the tool that is led from a model's inlet through the tree; default 0.18\n"
                            "  --quiet          no figures as text: the report or picture alone\n\n"
                            "Exit codes: 0 done; 2 wrong usage or bad input.\n";
 
@@ -81,7 +84,23 @@ static void draw_model(const char *picture, const char *path, const VesselTree *
         fprintf(stderr, "%s: no picture: %s\n", picture, message);
 }
 
-static bool describe_tree(cJSON *object, const char *path, const char *report, const char *picture, Faults *faults)
+typedef struct TreeWishes {
+    const char *report, *picture;
+    double tool_radius;      // [mm]
+    char *reach;             // comes out: where a tool gets to, as text; the caller's to free
+} TreeWishes;
+
+static bool add_reach(cJSON *object, const char *path, const VesselTree *tree, TreeWishes *wishes, Faults *faults)
+{
+    size_t length;
+    FILE *out = open_memstream(&wishes->reach, &length);
+    bool good = reach_report(tree, path, wishes->tool_radius, out, object, faults);
+    if (out)
+        fclose(out);
+    return good;
+}
+
+static bool describe_tree(cJSON *object, const char *path, TreeWishes *wishes, Faults *faults)
 {
     TreeFileInfo info = {0};
     VesselTree *tree = tree_file_load(path, &info, faults);
@@ -117,9 +136,10 @@ static bool describe_tree(cJSON *object, const char *path, const char *report, c
         cJSON_AddStringToObject(object, "source", info.source);
     if (info.created_by)
         cJSON_AddStringToObject(object, "created_by", info.created_by);
-    bool good = !report || report_write(report, path, tree, &info, faults);
-    if (good && picture)
-        draw_model(picture, path, tree, &info);
+    bool good = add_reach(object, path, tree, wishes, faults);
+    good = good && (!wishes->report || report_write(wishes->report, path, tree, &info, faults));
+    if (good && wishes->picture)
+        draw_model(wishes->picture, path, tree, &info);
     tree_file_info_free(&info);
     vessel_tree_free(tree);
     return good;
@@ -276,18 +296,24 @@ static void print_value(const cJSON *value)
 
 int verb_info(int argc, char **argv)
 {
-    enum { JSON = 256, REPORT, PICTURE, QUIET, HELP };
+    enum { JSON = 256, REPORT, PICTURE, TOOL_RADIUS, QUIET, HELP };
     static const struct option table[] = {{"json", no_argument, NULL, JSON}, {"report", required_argument, NULL, REPORT},
-                                          {"picture", required_argument, NULL, PICTURE}, {"quiet", no_argument, NULL, QUIET}, {"help", no_argument, NULL, HELP}, {0}};
+                                          {"picture", required_argument, NULL, PICTURE},
+                                          {"tool-radius-mm", required_argument, NULL, TOOL_RADIUS}, {"quiet", no_argument, NULL, QUIET}, {"help", no_argument, NULL, HELP}, {0}};
     static Faults faults;
     const char *report = NULL, *picture = NULL;
     bool json = false, quiet = false;
+    TreeWishes wishes = {.tool_radius = reach_default_options().tool_radius};
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "h", table, NULL)) != -1;) {
         switch (choice) {
         case JSON: json = true; break;
         case REPORT: report = optarg; break;
         case PICTURE: picture = optarg; break;
+        case TOOL_RADIUS:
+            if (!cli_number("--tool-radius-mm", optarg, 0.01, 100, &wishes.tool_radius))
+                return EXIT_BAD_INPUT;
+            break;
         case QUIET: quiet = true; break;
         case HELP:
         case 'h': fputs(help, stdout); return EXIT_DONE;
@@ -303,6 +329,7 @@ int verb_info(int argc, char **argv)
     faults_clear(&faults);
     cJSON_AddStringToObject(object, "file", path);
     bool good = false;
+    wishes.report = report, wishes.picture = picture;
     FileKind kind = file_kind(path);
     if ((report || picture) && kind != FILE_TREE && kind != FILE_MISSING)
         faults_add(&faults, path, 0, 0, "is no tree or model; %s is made of those", report ? "--report" : "--picture");
@@ -317,7 +344,7 @@ int verb_info(int argc, char **argv)
         return cli_bad_input(&faults);
     }
     switch (kind) {
-    case FILE_TREE: good = describe_tree(object, path, report, picture, &faults); break;
+    case FILE_TREE: good = describe_tree(object, path, &wishes, &faults); break;
     case FILE_RECORDING: good = describe_recording(object, path, &faults); break;
     case FILE_SCENE: good = describe_scene(object, path, &faults); break;
     case FILE_SCRIPT: good = describe_script(object, path, &faults); break;
@@ -335,11 +362,15 @@ int verb_info(int argc, char **argv)
         free(text);
     } else if (good && !quiet && !(report && !strcmp(report, "-"))) {
         for (const cJSON *item = object->child; item; item = item->next) {
+            if (!strcmp(item->string, "reach"))
+                continue;
             printf("%-16s ", item->string);
             print_value(item);
             printf("\n");
         }
+        fputs(wishes.reach ? wishes.reach : "", stdout);
     }
+    free(wishes.reach);
     cJSON_Delete(object);
     return good ? EXIT_DONE : cli_bad_input(&faults);
 }

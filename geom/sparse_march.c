@@ -27,7 +27,7 @@ static bool grow(void **array, int count, int *capacity, size_t size)
     return true;
 }
 
-static uint64_t lattice_key(int i, int j, int k)
+uint64_t march_key(int i, int j, int k)
 {
     uint64_t offset = 1u << (LATTICE_BITS - 1);
     return ((uint64_t)((int64_t)i + (int64_t)offset) << (2 * LATTICE_BITS)) | ((uint64_t)((int64_t)j + (int64_t)offset) << LATTICE_BITS) |
@@ -46,7 +46,7 @@ bool march_begin(March *march, double cell, double least_share)
 static bool add_block(March *march, const int base[3], int ball)
 {
     bool is_new;
-    int *index = key_map_find_or_add(&march->block_of, lattice_key(base[0], base[1], base[2]), march->block_count, &is_new);
+    int *index = key_map_find_or_add(&march->block_of, march_key(base[0], base[1], base[2]), march->block_count, &is_new);
     if (!index)
         return false;
     if (is_new) {
@@ -94,7 +94,7 @@ bool march_add_ball(March *march, int index, Vec3 c, double ball_reach)
 int march_block_beside(const March *march, const MarchBlock *b, const int steps[3])
 {
     const int *base = b->base;
-    return key_map_find(&march->block_of, lattice_key(base[0] + MARCH_BLOCK * steps[0], base[1] + MARCH_BLOCK * steps[1], base[2] + MARCH_BLOCK * steps[2]));
+    return key_map_find(&march->block_of, march_key(base[0] + MARCH_BLOCK * steps[0], base[1] + MARCH_BLOCK * steps[1], base[2] + MARCH_BLOCK * steps[2]));
 }
 
 Vec3 march_block_ball(const March *march, const MarchBlock *b, double *radius)
@@ -104,17 +104,9 @@ Vec3 march_block_ball(const March *march, const MarchBlock *b, double *radius)
     return vec3(b->base[0] * march->cell + half, b->base[1] * march->cell + half, b->base[2] * march->cell + half);
 }
 
-static bool add_vertex(March *march, const MarchBlock *b, const int at[3], int axis, int *index)
+bool march_make_room(March *march)
 {
-    bool is_new;
-    uint64_t key = lattice_key(b->base[0] + at[0], b->base[1] + at[1], b->base[2] + at[2]) << 2 | (uint64_t)axis;
     TriangleMesh *mesh = march->mesh;
-    int *found = key_map_find_or_add(&march->vertex_of, key, mesh->vertex_count, &is_new);
-    if (!found)
-        return false;
-    *index = *found;
-    if (!is_new)
-        return true;
     int capacity = march->vertex_capacity, same = capacity;
     if (!grow((void **)&mesh->vertex, mesh->vertex_count, &capacity, sizeof *mesh->vertex))
         return false;
@@ -125,6 +117,31 @@ static bool add_vertex(March *march, const MarchBlock *b, const int at[3], int a
             return false;
         march->vertex_capacity = capacity;
     }
+    return true;
+}
+
+bool march_add_triangle(March *march, const int corner[3])
+{
+    TriangleMesh *mesh = march->mesh;
+    if (!grow((void **)&mesh->triangle, mesh->triangle_count, &march->triangle_capacity, sizeof *mesh->triangle))
+        return false;
+    memcpy(mesh->triangle[mesh->triangle_count++], corner, sizeof *mesh->triangle);
+    return true;
+}
+
+static bool add_vertex(March *march, const MarchBlock *b, const int at[3], int axis, int *index)
+{
+    bool is_new;
+    uint64_t key = march_key(b->base[0] + at[0], b->base[1] + at[1], b->base[2] + at[2]) << 2 | (uint64_t)axis;
+    TriangleMesh *mesh = march->mesh;
+    int *found = key_map_find_or_add(&march->vertex_of, key, mesh->vertex_count, &is_new);
+    if (!found)
+        return false;
+    *index = *found;
+    if (!is_new)
+        return true;
+    if (!march_make_room(march))
+        return false;
     int step[3] = {axis == 0, axis == 1, axis == 2}, low = march_index(at[0], at[1], at[2]);
     int high = low + march_index(step[0], step[1], step[2]);
     double f0 = march->value[low], f1 = march->value[high], t = f0 / (f0 - f1), least = march->least_share, most = 1 - least;
@@ -156,10 +173,8 @@ bool march_block(March *march, MarchBlock *b)
                         if (!add_vertex(march, b, at, edge / 4, &triangle[v]))
                             return false;
                     }
-                    TriangleMesh *mesh = march->mesh;
-                    if (!grow((void **)&mesh->triangle, mesh->triangle_count, &march->triangle_capacity, sizeof *mesh->triangle))
+                    if (!march_add_triangle(march, triangle))
                         return false;
-                    memcpy(mesh->triangle[mesh->triangle_count++], triangle, sizeof triangle);
                 }
             }
     return true;

@@ -40,7 +40,7 @@ struct March {
     double least_share;      // vertices stay this share of a cell away from lattice points, which other edges share
     double value[MARCH_POINTS];              // of the block at hand, see march_index
     int owner[MARCH_POINTS];                 // the caller's, handed back to `place`
-    // Fills the vertex for a crossing at p; `owner` is that of the inside end of its edge.
+    // Of march_block: fills the vertex for a crossing at p; `owner` is that of the inside end of its edge.
     void (*place)(March *march, const MarchBlock *block, Vec3 p, int owner, Vec3 *vertex, Vec3 *normal, int *node);
 };
 
@@ -58,6 +58,11 @@ bool march_begin(March *march, double cell, double least_share);
 bool march_add_ball(March *march, int index, Vec3 center, double reach);
 // The block `steps` away, -1 where there is none.
 int march_block_beside(const March *march, const MarchBlock *b, const int steps[3]);
+// A lattice point's key, below 2^60.
+uint64_t march_key(int i, int j, int k);
+// Room for one more vertex in the mesh's arrays; one more triangle. False where memory lacks.
+bool march_make_room(March *march);
+bool march_add_triangle(March *march, const int corner[3]);
 // Triangles of the block whose values are at hand. False where memory lacks.
 bool march_block(March *march, MarchBlock *b);
 // Frees what the march holds but the mesh.

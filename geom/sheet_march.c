@@ -1,0 +1,583 @@
+// The surface of a fitted tree as sheets: marching cubes in which a lattice point may lie in several lumens at once.
+//
+// A state is a lattice point x and a node at which a tool point that stands there may be, one that power_walk does not leave, whose field at x is above 0.
+// Where vessels kiss, x has a state for each of them; where they overlap both lumens hold it. Two states at the ends of an edge of the lattice are linked
+// where a tool point that moves from one to the other goes from one node to the other, in either direction. In each cube the states that hang together over
+// edges make a sheet, and each sheet gives the triangles of its own case. Neighbouring cubes give the same segments on their common face, because a
+// case cuts off each run of corners on a face by itself (cube_triangles.h), and runs follow from the edges of that face. So the surface is closed,
+// and lumens that only kiss neither merge nor cut each other open.
+//
+// Two rules make that hold where walks are not symmetric: states of one point in one sheet of some cube are one state everywhere, and two states at the
+// ends of an edge in one sheet are linked. Both are repeated until nothing changes, over the cubes in which some point has two states or some edge's states
+// are not linked; all other cubes are plain marching cubes.
+//
+// A block of the lattice (sparse_march.h) is touched only where some model reaches it, and left again where bounds of the kernels say that it is all outside
+// or all inside: work and memory grow with the surface. The lattice point (i, j, k) lies at cell * (i, j, k), for every tree the same.
+#include "geom/blobby.h"
+#include "geom/disjoint_sets.h"
+#include "geom/isosurface.h"
+#include "geom/power_walk.h"
+#include "geom/sparse_march.h"
+
+#include <limits.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { STATES_MAX = 8, CUBE_STATES_MAX = 8 * STATES_MAX, RIVALS_MAX = 24, PASSES_MAX = 100 };
+
+typedef struct Candidate {   // a node that reaches the block at hand, whose field may be above 0 there and that no other beats in all of it
+    int node;
+    double low;              // its field is at least that
+    Blobby model;
+    double reach;            // [mm] no point of the model's surface lies further from the node's centre
+    int rivals, rival[RIVALS_MAX];           // near nodes that beat it somewhere in the block
+} Candidate;
+
+typedef struct States {      // of a lattice point
+    int count, node[STATES_MAX];
+    double field[STATES_MAX];
+} States;
+
+typedef struct SheetPoint {  // a corner of a cube that is not plain
+    int at[3], first, count;
+} SheetPoint;
+typedef struct SheetCube {
+    int corner[8];           // points
+} SheetCube;
+
+typedef struct SheetMarch {
+    March march;
+    const VesselTree *tree;
+    int alone;               // the one node whose model is meshed; -1: the tree
+    int ball_count, *node;   // the march's balls: their nodes …
+    double *reach;           // … and reaches
+    int candidate_count, candidate_capacity;
+    Candidate *candidate;
+    States states[MARCH_POINTS];             // of the block at hand
+    // of cubes that are not plain
+    KeyMap point_of, link_of, vertex_of_state;
+    int point_count, point_capacity, cube_count, cube_capacity, state_count, state_capacity;
+    SheetPoint *point;
+    SheetCube *cube;
+    struct SheetState {
+        int node, point;
+        double field;
+    } *state;
+    int *same, same_capacity;                // disjoint sets of states that are one
+} SheetMarch;
+
+// --- Where models reach ---
+
+// f > 0 needs a blob that alone gives T / n: rho (1 + x^2 / (5 rho^2))^-2 > T / n, or of compact blobs the support of one that adds.
+static double reach_of_model(const Blobby *m, Vec3 center)
+{
+    double reach = 0;
+    for (int j = 0; j < m->count && m->amplitude; j++) {
+        int k = blobby_row(m, j);
+        if (m->amplitude[k] > 0)
+            reach = fmax(reach, vec3_distance(center, m->center[k]) + m->width[k]);
+    }
+    for (int j = 0; j < m->count && !m->amplitude; j++) {
+        double rho = m->width[j], ratio = rho * m->count / m->iso_level;
+        if (ratio > 1)
+            reach = fmax(reach, vec3_distance(center, m->center[j]) + rho * sqrt(5 * (sqrt(ratio) - 1)));
+    }
+    return reach;
+}
+
+// Bounds of a model's field over the ball of radius h about x.
+static void field_bounds(const Blobby *m, Vec3 x, double h, double *low, double *high)
+{
+    *low = *high = -m->iso_level;
+    for (int j = 0; j < m->count; j++) {
+        int k = blobby_row(m, j);
+        double rho = m->width[k], d = vec3_distance(x, m->center[k]), near = fmax(0, d - h), far = d + h;
+        if (m->amplitude) {
+            double a = m->amplitude[k], u = fmax(0, 1 - near * near / (rho * rho)), v = fmax(0, 1 - far * far / (rho * rho));
+            *high += a * (a > 0 ? u * u * u : v * v * v);
+            *low += a * (a > 0 ? v * v * v : u * u * u);
+            continue;
+        }
+        double u = 1 / (1 + near * near / (5 * rho * rho)), v = 1 / (1 + far * far / (5 * rho * rho));
+        *high += rho * u * u;
+        *low += rho * v * v;
+    }
+}
+
+static bool find_blocks(SheetMarch *job, int first, int end)
+{
+    const VesselTree *tree = job->tree;
+    job->node = malloc((size_t)(end - first) * sizeof *job->node);
+    job->reach = malloc((size_t)(end - first) * sizeof *job->reach);
+    if (!job->node || !job->reach)
+        return false;
+    for (int i = first; i < end; i++) {
+        Blobby model = blobby_of(tree, i);
+        double reach = reach_of_model(&model, tree->center[i]);
+        if (!(reach > 0))
+            continue;
+        job->node[job->ball_count] = i;
+        job->reach[job->ball_count++] = reach + 2 * job->march.cell;
+    }
+    for (int n = 0; n < job->ball_count; n++)
+        if (!march_add_ball(&job->march, n, tree->center[job->node[n]], job->reach[n]))
+            return false;
+    return true;
+}
+
+// --- Candidates of a block ---
+
+// A walk moves to a better node only within two radii of it, or where that is nearer in radii (power_walk.h). The difference of two power distances is
+// linear, so its ends over the cube around `middle` (h: its circumscribed radius) follow from its slope.
+static bool list_rivals(const SheetMarch *job, Candidate *c, Vec3 middle, double h)
+{
+    const VesselTree *tree = job->tree;
+    double half = h / sqrt(3), own_far = vec3_distance(middle, tree->center[c->node]), own_radius = tree->radius[c->node];
+    double own = own_far * own_far - own_radius * own_radius;
+    c->rivals = 0;
+    for (int k = tree->near_offset[c->node]; k < tree->near_offset[c->node + 1] && job->alone < 0; k++) {
+        int other = tree->near[k];
+        double r = tree->radius[other], far = vec3_distance(middle, tree->center[other]), better = own - (far * far - r * r);
+        Vec3 apart = vec3_sub(tree->center[other], tree->center[c->node]);
+        double change = 2 * half * (fabs(apart.x) + fabs(apart.y) + fabs(apart.z));
+        if (better - change > 0 && (far + h < 2 * r || (far + h) * own_radius < (own_far - h) * r))
+            return false;
+        if (better + change > 0 && c->rivals < RIVALS_MAX)
+            c->rival[c->rivals++] = other;
+    }
+    return true;
+}
+
+static bool list_candidates(SheetMarch *job, const MarchBlock *b)
+{
+    double h, high;
+    Vec3 middle = march_block_ball(&job->march, b, &h);
+    job->candidate_count = 0;
+    for (int l = b->first; l >= 0; l = job->march.link[l].next) {
+        if (job->candidate_count == job->candidate_capacity) {
+            int capacity = 2 * job->candidate_capacity + 64;
+            Candidate *more = realloc(job->candidate, (size_t)capacity * sizeof *more);
+            if (!more)
+                return false;
+            job->candidate = more;
+            job->candidate_capacity = capacity;
+        }
+        int ball = job->march.link[l].ball;
+        Candidate *c = &job->candidate[job->candidate_count];
+        c->node = job->node[ball];
+        c->reach = job->reach[ball];
+        if (!list_rivals(job, c, middle, h))
+            continue;
+        c->model = blobby_of(job->tree, c->node);
+        field_bounds(&c->model, middle, h, &c->low, &high);
+        job->candidate_count += high > -1e-9;
+    }
+    return true;
+}
+
+// Whether the block is certainly without surface: no model may be above 0 in it, or all are and in one of them a walk stays all over it.
+static bool block_is_plain(const SheetMarch *job, const MarchBlock *b)
+{
+    double h;
+    Vec3 middle = march_block_ball(&job->march, b, &h);
+    bool all_in = true, covered = false;
+    for (int k = 0; k < job->candidate_count && all_in; k++) {
+        const Candidate *c = &job->candidate[k];
+        double furthest = vec3_distance(middle, job->tree->center[c->node]) + h;
+        all_in = c->low > 1e-9;
+        covered = covered || (furthest < c->reach && (job->alone >= 0 || (c->rivals == 0 && furthest < 1.2 * job->tree->radius[c->node])));
+    }
+    return job->candidate_count == 0 || (all_in && covered);
+}
+
+// --- States ---
+
+static int walk_on(const SheetMarch *job, Vec3 x, int node) { return job->alone >= 0 ? node : power_walk(job->tree, x, node, 4); }
+
+static bool is_beaten(const SheetMarch *job, const Candidate *c, Vec3 x)
+{
+    const VesselTree *tree = job->tree;
+    double own_far2 = vec3_norm2(vec3_sub(x, tree->center[c->node])), own_r2 = tree->radius[c->node] * tree->radius[c->node], own = own_far2 - own_r2;
+    for (int k = 0; k < c->rivals; k++) {
+        int other = c->rival[k];
+        double r = tree->radius[other], far2 = vec3_norm2(vec3_sub(x, tree->center[other]));
+        if (far2 - r * r < own && (far2 < 4 * r * r || far2 * own_r2 < own_far2 * r * r))
+            return true;
+    }
+    return false;
+}
+
+static void find_states(SheetMarch *job, Vec3 x, States *states)
+{
+    states->count = 0;
+    for (int k = 0; k < job->candidate_count && states->count < STATES_MAX; k++) {
+        const Candidate *c = &job->candidate[k];
+        if (vec3_norm2(vec3_sub(x, job->tree->center[c->node])) > c->reach * c->reach || is_beaten(job, c, x))
+            continue;
+        double field = blobby_field(&c->model, x);
+        if (field > 0 && (job->alone >= 0 || power_walk(job->tree, x, c->node, 1) == c->node)) {
+            states->node[states->count] = c->node;
+            states->field[states->count++] = field;
+        }
+    }
+}
+
+static bool is_near(const VesselTree *tree, int node, int other)
+{
+    for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++)
+        if (tree->near[k] == other)
+            return true;
+    return false;
+}
+
+// Whether a tool point that moves between x, where it is at node a, and y comes to node b, or back.
+static bool is_linked(const SheetMarch *job, Vec3 x, int a, Vec3 y, int b)
+{
+    return a == b || is_near(job->tree, a, b) || is_near(job->tree, b, a) || walk_on(job, y, a) == b || walk_on(job, x, b) == a;
+}
+
+// --- Vertices ---
+
+// Onto the model's surface, by at most three quarters of a cell: where neighbouring models disagree there may be none near, and p stays.
+static Vec3 settle(const SheetMarch *job, const Blobby *m, Vec3 p, Vec3 *normal)
+{
+    Vec3 g, x = p;
+    for (int i = 0; i < 20; i++) {
+        double f = blobby_gradient(m, x, &g), g2 = vec3_norm2(g);
+        if (!(g2 > 1e-200))
+            break;
+        Vec3 step = vec3_scale(g, -f / g2);
+        x = vec3_add(x, step);
+        if (vec3_distance(x, p) > 0.75 * job->march.cell)
+            break;
+        if (vec3_norm(step) < 1e-12) {
+            *normal = vec3_unit(vec3_negate(g));
+            return x;
+        }
+    }
+    blobby_gradient(m, p, &g);
+    *normal = vec3_unit_or(vec3_negate(g), vec3(1, 0, 0));
+    return p;
+}
+
+static Vec3 lattice_point(const SheetMarch *job, const int at[3]) { return vec3(at[0] * job->march.cell, at[1] * job->march.cell, at[2] * job->march.cell); }
+
+static uint64_t lattice_key(const int at[3]) { return march_key(at[0], at[1], at[2]); }
+
+// The vertex on the edge from the inside point `at` along axis, up or down. `key` in `map`: what it is known by.
+static bool add_vertex(SheetMarch *job, KeyMap *map, uint64_t key, const int at[3], int axis, bool up, int node, double field, int *index)
+{
+    TriangleMesh *mesh = job->march.mesh;
+    bool is_new;
+    int *found = key_map_find_or_add(map, key, mesh->vertex_count, &is_new);
+    if (!found)
+        return false;
+    *index = *found;
+    if (!is_new)
+        return true;
+    if (!march_make_room(&job->march))
+        return false;
+    int beside[3] = {at[0], at[1], at[2]};
+    beside[axis] += up ? 1 : -1;
+    Vec3 in = lattice_point(job, at), out = lattice_point(job, beside);
+    Blobby model = blobby_of(job->tree, walk_on(job, out, node));
+    double there = blobby_field(&model, out), share = there < 0 ? field / (field - there) : 0.5, least = job->march.least_share;
+    Vec3 p = vec3_mix(in, out, fmin(fmax(share, least), 1 - least));
+    int v = mesh->vertex_count++, of = walk_on(job, p, node);
+    model = blobby_of(job->tree, of);
+    mesh->vertex[v] = settle(job, &model, p, &mesh->normal[v]);
+    mesh->node[v] = of;
+    return true;
+}
+
+// --- Cubes ---
+
+static const States *corner_states(const SheetMarch *job, int i, int j, int k, int corner)
+{
+    return &job->states[march_index(i + (corner & 1), j + (corner >> 1 & 1), k + (corner >> 2 & 1))];
+}
+
+static bool cube_is_plain(const SheetMarch *job, const MarchBlock *b, int i, int j, int k)
+{
+    for (int c = 0; c < 8; c++)
+        if (corner_states(job, i, j, k, c)->count > 1)
+            return false;
+    for (int edge = 0; edge < 12; edge++) {
+        int c = cube_edge_start(edge), d = cube_edge_end(edge);
+        const States *s = corner_states(job, i, j, k, c), *t = corner_states(job, i, j, k, d);
+        if (s->count == 0 || t->count == 0 || s->node[0] == t->node[0])
+            continue;
+        Vec3 x = march_point(&job->march, b, i + (c & 1), j + (c >> 1 & 1), k + (c >> 2 & 1));
+        Vec3 y = march_point(&job->march, b, i + (d & 1), j + (d >> 1 & 1), k + (d >> 2 & 1));
+        if (!is_linked(job, x, s->node[0], y, t->node[0]))
+            return false;
+    }
+    return true;
+}
+
+static bool march_plain_cube(SheetMarch *job, const MarchBlock *b, int i, int j, int k, int mask)
+{
+    const CubeCase *cube = &job->march.table.of[mask];
+    for (int t = 0; t < cube->count; t++) {
+        int triangle[3];
+        for (int v = 0; v < 3; v++) {
+            int edge = cube->edge[t][v], low = cube_edge_start(edge), high = cube_edge_end(edge);
+            bool up = mask >> low & 1;
+            int c = up ? low : high, axis = edge / 4, at[3] = {b->base[0] + i + (c & 1), b->base[1] + j + (c >> 1 & 1), b->base[2] + k + (c >> 2 & 1)};
+            const States *s = corner_states(job, i, j, k, c);
+            uint64_t key = lattice_key(at) << 3 | (uint64_t)(2 * axis + up);
+            if (!add_vertex(job, &job->march.vertex_of, key, at, axis, up, s->node[0], s->field[0], &triangle[v]))
+                return false;
+        }
+        if (!march_add_triangle(&job->march, triangle))
+            return false;
+    }
+    return true;
+}
+
+static bool grow_by(void **array, int count, int *capacity, int more, size_t size)
+{
+    if (count + more <= *capacity)
+        return true;
+    if (*capacity > INT_MAX / 4)
+        return false;
+    int bigger = 2 * *capacity + 1024;
+    void *moved = realloc(*array, (size_t)bigger * size);
+    if (!moved)
+        return false;
+    *array = moved;
+    *capacity = bigger;
+    return true;
+}
+
+// The point's number; new points bring their states. -1: no memory.
+static int keep_point(SheetMarch *job, const int at[3], const States *states)
+{
+    bool is_new;
+    int *found = key_map_find_or_add(&job->point_of, lattice_key(at), job->point_count, &is_new);
+    if (!found)
+        return -1;
+    if (!is_new)
+        return *found;
+    int index = *found;
+    if (!grow_by((void **)&job->point, job->point_count, &job->point_capacity, 1, sizeof *job->point) ||
+        !grow_by((void **)&job->state, job->state_count, &job->state_capacity, states->count, sizeof *job->state) ||
+        !grow_by((void **)&job->same, job->state_count, &job->same_capacity, states->count, sizeof *job->same))
+        return -1;
+    job->point[job->point_count++] = (SheetPoint){{at[0], at[1], at[2]}, job->state_count, states->count};
+    for (int s = 0; s < states->count; s++, job->state_count++) {
+        job->state[job->state_count] = (struct SheetState){states->node[s], index, states->field[s]};
+        job->same[job->state_count] = job->state_count;
+    }
+    return index;
+}
+
+static bool keep_cube(SheetMarch *job, const MarchBlock *b, int i, int j, int k)
+{
+    if (!grow_by((void **)&job->cube, job->cube_count, &job->cube_capacity, 1, sizeof *job->cube))
+        return false;
+    SheetCube *cube = &job->cube[job->cube_count++];
+    for (int c = 0; c < 8; c++) {
+        int at[3] = {b->base[0] + i + (c & 1), b->base[1] + j + (c >> 1 & 1), b->base[2] + k + (c >> 2 & 1)};
+        cube->corner[c] = keep_point(job, at, corner_states(job, i, j, k, c));
+        if (cube->corner[c] < 0)
+            return false;
+    }
+    return true;
+}
+
+static bool march_cubes(SheetMarch *job, const MarchBlock *b)
+{
+    for (int i = 0; i < MARCH_BLOCK; i++)
+        for (int j = 0; j < MARCH_BLOCK; j++)
+            for (int k = 0; k < MARCH_BLOCK; k++) {
+                int mask = 0;
+                for (int c = 0; c < 8; c++)
+                    mask |= (corner_states(job, i, j, k, c)->count > 0) << c;
+                if (mask == 0)
+                    continue;
+                if (!(cube_is_plain(job, b, i, j, k) ? march_plain_cube(job, b, i, j, k, mask) : keep_cube(job, b, i, j, k)))
+                    return false;
+            }
+    return true;
+}
+
+// --- Cubes that are not plain ---
+
+typedef struct CubeSheets {  // the states at a cube's corners; sheet[s]: the lowest of those it hangs together with
+    int count, state[CUBE_STATES_MAX], corner[CUBE_STATES_MAX], sheet[CUBE_STATES_MAX];
+} CubeSheets;
+
+static uint64_t pair_key(int a, int b) { return a < b ? (uint64_t)(uint32_t)a << 32 | (uint32_t)b : (uint64_t)(uint32_t)b << 32 | (uint32_t)a; }
+
+static bool states_linked(const SheetMarch *job, int a, int b)
+{
+    const struct SheetState *s = &job->state[a], *t = &job->state[b];
+    if (key_map_find(&job->link_of, pair_key(a, b)) >= 0)
+        return true;
+    return is_linked(job, lattice_point(job, job->point[s->point].at), s->node, lattice_point(job, job->point[t->point].at), t->node);
+}
+
+static void find_sheets(SheetMarch *job, const SheetCube *cube, CubeSheets *sheets)
+{
+    sheets->count = 0;
+    for (int c = 0; c < 8; c++) {
+        const SheetPoint *p = &job->point[cube->corner[c]];
+        for (int s = 0; s < p->count; s++) {
+            sheets->state[sheets->count] = p->first + s;
+            sheets->corner[sheets->count] = c;
+            sheets->sheet[sheets->count] = sheets->count;
+            sheets->count++;
+        }
+    }
+    for (int a = 0; a < sheets->count; a++)
+        for (int b = a + 1; b < sheets->count; b++) {
+            int apart = sheets->corner[a] ^ sheets->corner[b];
+            bool same = apart == 0 && disjoint_root(job->same, sheets->state[a]) == disjoint_root(job->same, sheets->state[b]);
+            if (apart == 1 || apart == 2 || apart == 4)
+                same = states_linked(job, sheets->state[a], sheets->state[b]);
+            if (same)
+                disjoint_join(sheets->sheet, a, b);
+        }
+    for (int a = 0; a < sheets->count; a++)
+        sheets->sheet[a] = disjoint_root(sheets->sheet, a);
+}
+
+// What hangs together in a cube must do so wherever its points and edges are met again. True where that was new.
+static bool unify(SheetMarch *job, const CubeSheets *sheets, bool *failed)
+{
+    bool changed = false;
+    for (int a = 0; a < sheets->count; a++)
+        for (int b = a + 1; b < sheets->count; b++) {
+            int apart = sheets->corner[a] ^ sheets->corner[b], s = sheets->state[a], t = sheets->state[b];
+            if (sheets->sheet[a] != sheets->sheet[b])
+                continue;
+            if (apart == 0 && disjoint_root(job->same, s) != disjoint_root(job->same, t)) {
+                disjoint_join(job->same, s, t);
+                changed = true;
+            }
+            if ((apart == 1 || apart == 2 || apart == 4) && !states_linked(job, s, t)) {
+                bool is_new;
+                *failed = *failed || !key_map_find_or_add(&job->link_of, pair_key(s, t), 0, &is_new);
+                changed = true;
+            }
+        }
+    return changed;
+}
+
+static bool march_sheet(SheetMarch *job, const SheetCube *cube, const CubeSheets *sheets, int sheet)
+{
+    int mask = 0, of[8];
+    for (int a = 0; a < sheets->count; a++)
+        if (sheets->sheet[a] == sheet) {
+            mask |= 1 << sheets->corner[a];
+            of[sheets->corner[a]] = disjoint_root(job->same, sheets->state[a]);
+        }
+    const CubeCase *triangles = &job->march.table.of[mask];
+    for (int t = 0; t < triangles->count; t++) {
+        int triangle[3];
+        for (int v = 0; v < 3; v++) {
+            int edge = triangles->edge[t][v], low = cube_edge_start(edge), high = cube_edge_end(edge), axis = edge / 4;
+            bool up = mask >> low & 1;
+            int c = up ? low : high;
+            const SheetPoint *p = &job->point[cube->corner[c]];
+            const struct SheetState *s = &job->state[of[c]];
+            bool several = p->count > 1;
+            uint64_t key = (several ? (uint64_t)of[c] : lattice_key(p->at)) << 3 | (uint64_t)(2 * axis + up);
+            if (!add_vertex(job, several ? &job->vertex_of_state : &job->march.vertex_of, key, p->at, axis, up, s->node, s->field, &triangle[v]))
+                return false;
+        }
+        if (!march_add_triangle(&job->march, triangle))
+            return false;
+    }
+    return true;
+}
+
+static bool march_kept_cubes(SheetMarch *job)
+{
+    CubeSheets sheets;
+    bool changed = true, failed = false;
+    for (int pass = 0; pass < PASSES_MAX && changed && !failed; pass++) {
+        changed = false;
+        for (int c = 0; c < job->cube_count; c++) {
+            find_sheets(job, &job->cube[c], &sheets);
+            changed = unify(job, &sheets, &failed) || changed;
+        }
+    }
+    for (int c = 0; c < job->cube_count && !failed; c++) {
+        find_sheets(job, &job->cube[c], &sheets);
+        for (int a = 0; a < sheets.count && !failed; a++)
+            if (sheets.sheet[a] == a)
+                failed = !march_sheet(job, &job->cube[c], &sheets, a);
+    }
+    return !failed;
+}
+
+// --- The surface ---
+
+static bool march_blocks(SheetMarch *job)
+{
+    March *march = &job->march;
+    for (int n = 0; n < march->block_count; n++) {
+        MarchBlock *b = &march->block[n];
+        if (!list_candidates(job, b))
+            return false;
+        if (block_is_plain(job, b))
+            continue;
+        for (int i = 0; i < MARCH_SIDE; i++)
+            for (int j = 0; j < MARCH_SIDE; j++)
+                for (int k = 0; k < MARCH_SIDE; k++)
+                    find_states(job, march_point(march, b, i, j, k), &job->states[march_index(i, j, k)]);
+        b->is_marched = true;
+        if (!march_cubes(job, b))
+            return false;
+    }
+    return true;
+}
+
+static void free_march(SheetMarch *job)
+{
+    march_end(&job->march);
+    key_map_free(&job->point_of);
+    key_map_free(&job->link_of);
+    key_map_free(&job->vertex_of_state);
+    free(job->node);
+    free(job->reach);
+    free(job->candidate);
+    free(job->point);
+    free(job->cube);
+    free(job->state);
+    free(job->same);
+    free(job);
+}
+
+static TriangleMesh *surface_of_nodes(const VesselTree *tree, int first, int end, double cell_mm)
+{
+    if (!tree || !vessel_tree_is_model(tree) || !isfinite(cell_mm) || !(cell_mm > 0))
+        return NULL;
+    SheetMarch *job = calloc(1, sizeof *job);
+    if (!job)
+        return NULL;
+    job->tree = tree;
+    job->alone = end - first == 1 ? first : -1;
+    bool good = march_begin(&job->march, cell_mm, 0.001) && find_blocks(job, first, end) && march_blocks(job) && march_kept_cubes(job);
+    TriangleMesh *mesh = job->march.mesh;
+    if (!good) {
+        triangle_mesh_free(mesh);
+        mesh = NULL;
+    }
+    free_march(job);
+    return mesh;
+}
+
+TriangleMesh *isosurface_of_model(const VesselTree *tree, int node, double cell_mm)
+{
+    if (!tree || node < 0 || node >= tree->node_count)
+        return NULL;
+    return surface_of_nodes(tree, node, node + 1, cell_mm);
+}
+
+TriangleMesh *isosurface_of_tree(const VesselTree *tree, double cell_mm)
+{
+    return tree ? surface_of_nodes(tree, 0, tree->node_count, cell_mm) : NULL;
+}
