@@ -1,0 +1,194 @@
+// The template is a cylinder of radius r and length 2 r in a ring from 1.4 r on. Against the noise of single voxels its score is contrast r^(3/2): the best is
+// taken over radii, axes and places. A planar step, such as the face of a bright band, has half of the ring as bright as the inside: what counts is the ring's
+// third and fourth brightest eighth, so that up to two neighbours may touch the vessel and a step scores nothing.
+#include "recon/rbt_scan.h"
+#include "recon/bspline.h"
+#include "recon/volume_noise.h"
+
+#include <stdlib.h>
+
+const double rbt_level_voxels[RBT_LEVELS] = {0, 0.7, 1.4, 2.8};
+enum { SECTORS = 8, STATIONS = 5 };
+static const double clear_contrast = 5;   // over the noise of a level: the steepest place of a ray is then its wall
+
+RbtLevels rbt_levels_of(const Volume *volume, int threads) { return (RbtLevels){.volume = volume, .noise = {-1, -1, -1, -1}, .threads = threads}; }
+
+const Volume *rbt_level(RbtLevels *levels, int level)
+{
+    if (level == 0)
+        return levels->volume;
+    if (!levels->smooth[level])
+        levels->smooth[level] = volume_smoothed(levels->volume, rbt_level_voxels[level] * volume_voxel_size(levels->volume), levels->threads);
+    return levels->smooth[level];
+}
+
+double rbt_level_noise(RbtLevels *levels, int level)
+{
+    const Volume *volume = rbt_level(levels, level);
+    if (volume && levels->noise[level] < 0)
+        levels->noise[level] = volume_noise(volume, (int)ceil(4 * rbt_level_voxels[level]) + 1);
+    return volume ? levels->noise[level] : 0;
+}
+
+void rbt_levels_free(RbtLevels *levels)
+{
+    for (int i = 0; i < RBT_LEVELS; i++)
+        volume_free(levels->smooth[i]);
+    *levels = (RbtLevels){0};
+}
+
+static void sort_falling(double value[SECTORS])
+{
+    for (int i = 1; i < SECTORS; i++)
+        for (int k = i; k > 0 && value[k] > value[k - 1]; k--) {
+            double swap = value[k];
+            value[k] = value[k - 1];
+            value[k - 1] = swap;
+        }
+}
+
+static int sector_of(double u, double v) { return (int)fmin(SECTORS - 1, floor((atan2(v, u) + PI) * SECTORS / (2 * PI))); }
+
+RbtSight rbt_sight_of(const Volume *volume, double noise, const Cylinder *tube)
+{
+    double voxel = volume_voxel_size(volume), r = tube->radius, half = fmax(r, 2 * voxel), in = 0.85 * r, from = 1.3 * r + 0.5 * voxel, to = 2 * r + voxel;
+    double sum = 0, ring[SECTORS] = {0}, reach = sqrt(to * to + half * half);
+    Vec3 e1 = vec3_normal_to(tube->axis), e2 = vec3_cross(tube->axis, e1), c = volume_voxel_of(volume, tube->center);
+    double at[3] = {c.x, c.y, c.z};
+    long inside = 0, count[SECTORS] = {0}, least = 0;
+    int low[3], high[3];
+    for (int i = 0; i < 3; i++) {
+        double extent = reach * vec3_norm(vec3(volume->to_voxel.m[i][0], volume->to_voxel.m[i][1], volume->to_voxel.m[i][2]));
+        low[i] = (int)fmax(0, ceil(at[i] - extent));
+        high[i] = (int)fmin(volume->size[i] - 1, floor(at[i] + extent));
+    }
+    for (int k = low[2]; k <= high[2]; k++)
+        for (int j = low[1]; j <= high[1]; j++)
+            for (int i = low[0]; i <= high[0]; i++) {
+                Vec3 q = vec3_sub(volume_point_of(volume, vec3(i, j, k)), tube->center);
+                double along = vec3_dot(q, tube->axis), u = vec3_dot(q, e1), v = vec3_dot(q, e2), rho = sqrt(u * u + v * v);
+                if (fabs(along) > half || rho > to || (rho > in && rho < from))
+                    continue;
+                double value = (double)volume->value[((size_t)k * (size_t)volume->size[1] + (size_t)j) * (size_t)volume->size[0] + (size_t)i];
+                if (rho <= in) {
+                    sum += value;
+                    inside++;
+                } else {
+                    int s = sector_of(u, v);
+                    ring[s] += value;
+                    count[s]++;
+                }
+            }
+    if (inside == 0)
+        return (RbtSight){0, 0};
+    int used = 0;
+    for (int s = 0; s < SECTORS; s++) {
+        ring[s] = count[s] > 0 ? ring[s] / (double)count[s] : -HUGE_VAL;   // outside the volume: sorted last
+        used += count[s] > 0;
+        least = s == 0 || count[s] < least ? count[s] : least;
+    }
+    sort_falling(ring);
+    if (used < 6)
+        return (RbtSight){0, 0};
+    double contrast = sum / (double)inside - (ring[2] + ring[3]) / 2, error = noise * sqrt(1.0 / (double)inside + 0.5 / (double)(least > 0 ? least : 1));
+    return (RbtSight){contrast, contrast <= 0 ? 0 : error > 0 ? contrast / error : HUGE_VAL};
+}
+
+// --- the search ---
+
+static double template_contrast(const Volume *volume, Vec3 center, Vec3 axis, double r, double voxel)
+{
+    enum { INNER = 6, OUTER = 16 };
+    Vec3 e1 = vec3_normal_to(axis), e2 = vec3_cross(axis, e1);
+    double inside = 0, ring[SECTORS] = {0};
+    for (int s = 0; s < STATIONS; s++) {
+        Vec3 x = vec3_add_scaled(center, (s - STATIONS / 2) * 0.5 * r, axis);
+        inside += (double)bspline_sample(volume, volume_voxel_of(volume, x));
+        for (int k = 0; k < 2 * INNER; k++) {
+            double a = PI * k / INNER, rho = (k % 2 ? 0.85 : 0.5) * r;
+            inside += (double)bspline_sample(volume, volume_voxel_of(volume, vec3_add_scaled(vec3_add_scaled(x, rho * cos(a), e1), rho * sin(a), e2)));
+        }
+        for (int k = 0; k < OUTER; k++) {
+            double a = 2 * PI * (k + 0.5) / OUTER, rho = (k % 2 ? 1.4 : 1.8) * r + 0.5 * voxel;
+            ring[k * SECTORS / OUTER] +=
+                (double)bspline_sample(volume, volume_voxel_of(volume, vec3_add_scaled(vec3_add_scaled(x, rho * cos(a), e1), rho * sin(a), e2)));
+        }
+    }
+    sort_falling(ring);
+    return inside / (STATIONS * (1 + 2 * INNER)) - 0.5 * (ring[2] + ring[3]) * SECTORS / OUTER / STATIONS;
+}
+
+typedef struct Scan {
+    const Tracker *t;
+    RbtLevels *levels;
+    Vec3 x;
+    const Vec3 *axis;        // NULL: all are tried
+    double radius[RBT_SCANS];
+    Cylinder best[RBT_SCANS];    // by radius
+    double score[RBT_SCANS];
+} Scan;
+
+static void scan_radius(void *context, long index)
+{
+    Scan *scan = context;
+    const Tracker *t = scan->t;
+    double r = scan->radius[index];
+    int level = 0;
+    while (level + 1 < RBT_LEVELS && rbt_level_voxels[level + 1] * t->voxel <= 0.4 * r)
+        level++;
+    const Volume *volume = level ? scan->levels->smooth[level] : scan->levels->volume;
+    for (int a = 0; a < (scan->axis ? 1 : t->axis_count); a++) {
+        Vec3 axis = scan->axis ? *scan->axis : t->axis[a], e1 = vec3_normal_to(axis), e2 = vec3_cross(axis, e1);
+        for (int i = -2; i <= 2; i++)
+            for (int k = -2; k <= 2; k++) {
+                Vec3 x = vec3_add_scaled(vec3_add_scaled(scan->x, 0.375 * i * r, e1), 0.375 * k * r, e2);
+                if (i * i + k * k > 4 || !tracker_is_inside(t->volume, x))
+                    continue;
+                double score = template_contrast(volume, x, axis, r, t->voxel) * pow(r, 1.5);
+                if (score > scan->score[index]) {
+                    scan->score[index] = score;
+                    scan->best[index] = (Cylinder){x, r, axis, 2 * r};
+                }
+            }
+    }
+}
+
+int rbt_scan(Tracker *t, RbtLevels *levels, Vec3 x, double radius, const Vec3 *axis, Cylinder *out)
+{
+    Scan scan = {.t = t, .levels = levels, .x = x, .axis = axis};
+    double widest = HUGE_VAL, certainty[RBT_SCANS];
+    int count = 0, found = 0;
+    for (int i = 0; i < 3; i++)
+        widest = fmin(widest, vec3_norm(t->volume->axis[i]) * t->volume->size[i] / 6);
+    for (double r = radius > 0 ? radius : t->voxel; count == 0 || (!(radius > 0) && r < widest && count < RBT_SCANS); r *= 1.35)
+        scan.radius[count++] = r;
+    for (int level = 1; level < RBT_LEVELS; level++)
+        if (rbt_level_voxels[level] * t->voxel <= 0.4 * scan.radius[count - 1] && !rbt_level(levels, level)) {
+            t->out_of_memory = true;
+            return 0;
+        }
+    parallel_for(levels->threads, count, scan_radius, &scan, NULL);
+    double noise = rbt_level_noise(levels, 0);
+    for (int i = 0; i < count; i++) {   // by what all voxels of each say, not by the template's samples
+        double own = scan.score[i] > 0 ? rbt_sight_of(levels->volume, fmax(noise, 1e-9), &scan.best[i]).certainty : 0;
+        int k = found;
+        if (!(own > 0))
+            continue;
+        for (found++; k > 0 && certainty[k - 1] < own; k--) {
+            certainty[k] = certainty[k - 1];
+            out[k] = out[k - 1];
+        }
+        certainty[k] = own;
+        out[k] = scan.best[i];
+    }
+    return found;
+}
+
+int rbt_level_for(RbtLevels *levels, const Cylinder *tube)
+{
+    double voxel = volume_voxel_size(levels->volume), contrast = rbt_sight_of(levels->volume, 0, tube).contrast;
+    int level = 0;
+    while (level + 1 < RBT_LEVELS && rbt_level_voxels[level + 1] * voxel <= 0.5 * tube->radius && contrast < clear_contrast * rbt_level_noise(levels, level))
+        level++;
+    return level;
+}

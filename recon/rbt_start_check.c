@@ -1,0 +1,229 @@
+// Limits: a click lies within one radius of the axis of the vessel that it names, at most within two; half of the edge points lie on the cylinder; the vessel is
+// narrower than the volume; inside and outside differ by six standard errors (fewer turn up among all tubes that can be laid through pure noise: see test_starts).
+#include "recon/rbt_start_check.h"
+#include "recon/rbt_start.h"
+#include "recon/volume_noise.h"
+
+#include <stdio.h>
+#include <string.h>
+
+const char *const rbt_doubt_name[RBT_DOUBTS] = {"drift", "inliers", "radius", "noise", "length"};
+
+static const double least_certainty = 6, least_inliers = 0.5, least_contrast = 4, certain_contrast = 8, least_length = 6;
+enum { NOISE_LAG = 3 };      // voxels: neighbours may share their noise
+
+static void doubt(RbtStartCheck *check, RbtDoubt kind, double measured, double limit, const char *text)
+{
+    if (check->warning_count == RBT_MAX_WARNINGS)
+        return;
+    RbtWarning *w = &check->warning[check->warning_count++];
+    *w = (RbtWarning){.kind = kind, .measured = measured, .limit = limit};
+    snprintf(w->text, sizeof w->text, "%s", text);
+}
+
+static double least_extent(const Volume *volume)
+{
+    double least = HUGE_VAL;
+    for (int i = 0; i < 3; i++)
+        least = fmin(least, vec3_norm(volume->axis[i]) * volume->size[i]);
+    return least;
+}
+
+typedef struct Verdict {
+    RbtStartCheck check;
+    char refusal[300];       // empty: it is not refused
+} Verdict;
+
+// The place along the tube counts only beyond four radii: the cylinder may be looked for further along the vessel.
+static double drift_of(Vec3 click, const Cylinder *c)
+{
+    Vec3 q = vec3_sub(click, c->center);
+    double along = vec3_dot(q, c->axis), across = sqrt(fmax(0, vec3_norm2(q) - along * along));
+    return hypot(across, fmax(0, fabs(along) - 4 * c->radius));
+}
+
+static Verdict judge(Tracker *t, RbtLevels *levels, Vec3 click, const Cylinder *c, double inlier_rate)
+{
+    Verdict v = {.check = {.click = click, .cylinder = *c, .drift = drift_of(click, c), .inlier_rate = inlier_rate, .noise = rbt_level_noise(levels, 0)}};
+    RbtSight sight = rbt_sight_of(levels->volume, v.check.noise, c);
+    double extent = least_extent(t->volume);
+    char text[240];
+    v.check.contrast = sight.contrast;
+    v.check.certainty = sight.certainty;
+    v.check.smoothing_mm = t->check.smoothing_mm;
+    if (v.check.drift > 2 * c->radius + t->voxel)
+        snprintf(v.refusal, sizeof v.refusal, "the vessel found there runs %.2f mm from the click at a radius of %.2f mm; a click within one radius of its axis",
+                 v.check.drift, c->radius);
+    else if (2 * c->radius > extent)
+        snprintf(v.refusal, sizeof v.refusal, "the radius found there, %.2f mm, is more than half of the volume's least extent of %.1f mm; a click in a vessel, or its radius_mm",
+                 c->radius, extent);
+    else if (v.check.noise > 0 && v.check.certainty < least_certainty)
+        snprintf(v.refusal, sizeof v.refusal,
+                 "noise hides the edge: the tube found there (radius %.2f mm) is %.3g grey values brighter than what is beside it at a noise of %.3g, %.1f standard "
+                 "errors; a place with at least %g, or a less noisy volume",
+                 c->radius, sight.contrast, v.check.noise, v.check.certainty, least_certainty);
+    if (v.check.drift > c->radius + 0.5 * t->voxel) {
+        snprintf(text, sizeof text, "the click lies %.2f mm from the axis of the vessel that was found, outside of its radius of %.2f mm", v.check.drift, c->radius);
+        doubt(&v.check, RBT_DRIFT, v.check.drift, c->radius, text);
+    }
+    if (inlier_rate < least_inliers) {
+        snprintf(text, sizeof text, "%.0f %% of the edge points at the start lie on its cylinder; a vessel has %.0f %% or more", 100 * inlier_rate, 100 * least_inliers);
+        doubt(&v.check, RBT_INLIERS, inlier_rate, least_inliers, text);
+    }
+    if (4 * c->radius > extent && 2 * c->radius <= extent) {
+        snprintf(text, sizeof text, "the radius found at the start, %.2f mm, is more than a quarter of the volume's least extent of %.1f mm", c->radius, extent);
+        doubt(&v.check, RBT_RADIUS, c->radius, extent / 4, text);
+    }
+    return v;
+}
+
+static void refuse(Tracker *t, const Verdict *v)
+{
+    t->check = v->check;
+    memcpy(t->refusal, v->refusal, sizeof t->refusal);
+}
+
+static int scan_at(Tracker *t, RbtLevels *levels, const RbtSeed *seed, Cylinder *out)
+{
+    Vec3 axis = seed->has_toward ? vec3_unit_or(vec3_sub(seed->toward, seed->start), vec3(0, 0, 1)) : vec3(0, 0, 1);
+    return rbt_scan(t, levels, seed->start, seed->radius, seed->has_toward ? &axis : NULL, out);
+}
+
+bool rbt_choose_level(Tracker *t, RbtLevels *levels, const RbtSeed *first)
+{
+    double noise = rbt_level_noise(levels, 0);
+    t->check.noise = noise;
+    if (!(noise > 0) || tracker_brightness(t, first->start) - t->background > certain_contrast * noise)
+        return true;
+    t->scan_count = scan_at(t, levels, first, t->scan);
+    if (t->out_of_memory)
+        return false;
+    RbtSight sight = t->scan_count > 0 ? rbt_sight_of(levels->volume, noise, &t->scan[0]) : (RbtSight){0, 0};
+    if (sight.contrast >= least_contrast * noise)
+        return true;
+    t->is_noisy = true;
+    if (sight.certainty < least_certainty) {
+        snprintf(t->refusal, sizeof t->refusal,
+                 "noise hides the edge: of all tubes around it the one that stands out most (radius %.2f mm) is %.3g grey values brighter than what is beside it at a "
+                 "noise of %.3g, %.1f standard errors; a place with at least %g, or a less noisy volume",
+                 t->scan[0].radius, sight.contrast, noise, sight.certainty, least_certainty);
+        return false;
+    }
+    int level = rbt_level_for(levels, &t->scan[0]);
+    t->volume = rbt_level(levels, level);
+    if (!t->volume) {
+        t->volume = levels->volume;
+        t->out_of_memory = true;
+        return false;
+    }
+    t->check.smoothing_mm = rbt_level_voxels[level] * t->voxel;
+    return true;
+}
+
+bool rbt_stands_out(Tracker *t, RbtLevels *levels, const RbtSeed *seed)
+{
+    Cylinder tubes[RBT_SCANS];
+    double noise = rbt_level_noise(levels, 0);
+    if (scan_at(t, levels, seed, tubes) == 0)
+        return false;
+    Cylinder tube = tubes[0];
+    RbtSight sight = rbt_sight_of(levels->volume, noise, &tube);
+    double beside = tracker_brightness(t, tube.center) - sight.contrast;
+    bool is_inside = tracker_brightness(t, seed->start) > beside + 0.4 * sight.contrast;
+    return sight.certainty >= least_certainty && (t->is_noisy || (is_inside && sight.contrast > 0.02 * ((double)t->volume->maximum - (double)t->volume->minimum)));
+}
+
+// Noise is no reason to refuse what is doubtful anyhow, but it is worth a word.
+static void say_noise(Tracker *t, RbtLevels *levels)
+{
+    char text[240];
+    RbtStartCheck *check = &t->check;
+    if (!t->is_noisy || !(check->noise > 0))
+        return;
+    snprintf(text, sizeof text, "at the start the contrast is %.3g at a noise of %.3g grey values a voxel (%.0f standard errors): a copy smoothed by %.2f mm was tracked, "
+             "thin branches are lost",
+             check->contrast, check->noise, check->certainty, check->smoothing_mm);
+    doubt(check, RBT_NOISE, check->contrast / check->noise, least_contrast, text);
+    (void)levels;
+}
+
+bool rbt_first_start(Tracker *t, RbtLevels *levels, const RbtSeed *seed, Cylinder *out)
+{
+    Verdict best;
+    Cylinder c;
+    double rate;
+    bool found = false;
+    if (!t->is_noisy && rbt_estimate_start(t, seed, &c, &rate)) {
+        best = judge(t, levels, seed->start, &c, rate);
+        *out = c;
+        found = true;
+    }
+    if (t->out_of_memory)
+        return false;
+    bool is_clean = found && !best.refusal[0] && best.check.warning_count == 0;
+    if (!is_clean && t->scan_count < 0)
+        t->scan_count = scan_at(t, levels, seed, t->scan);
+    for (int i = 0; !is_clean && i < t->scan_count; i++) {
+        double beside = tracker_brightness(t, t->scan[i].center) - 0.5 * rbt_sight_of(t->volume, 0, &t->scan[i]).contrast;
+        if (!rbt_refine_start(t, &t->scan[i], seed->radius > 0, beside, &c, &rate))
+            continue;
+        Verdict other = judge(t, levels, seed->start, &c, rate);
+        if (!found || (best.refusal[0] && !other.refusal[0]) ||
+            (!best.refusal[0] == !other.refusal[0] && other.check.warning_count < best.check.warning_count)) {
+            best = other;
+            *out = c;
+        }
+        found = true;
+        is_clean = !best.refusal[0] && best.check.warning_count == 0;
+    }
+    if (!found) {
+        t->why = "no tube around it";
+        return false;
+    }
+    refuse(t, &best);
+    say_noise(t, levels);
+    return !t->refusal[0];
+}
+
+bool rbt_check_given(Tracker *t, RbtLevels *levels, const RbtSeed *seed, const TrackNode *first)
+{
+    Verdict v = judge(t, levels, seed->start, &first->cylinder, first->inlier_rate);
+    refuse(t, &v);
+    say_noise(t, levels);
+    return !t->refusal[0];
+}
+
+void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
+{
+    enum { ROOT = 3 };
+    double sum = 0, root = 0, length = 0;
+    int faint = 0;
+    char text[240];
+    const Track *tree = &t->tree;
+    for (int i = 0; i < count; i++) {
+        const TrackNode *n = &tree->node[i];
+        sum += n->inlier_rate;
+        root += i < ROOT ? n->inlier_rate : 0;
+        length += i > 0 ? vec3_distance(n->cylinder.center, tree->node[i - 1].cylinder.center) : 0;
+        faint += t->check.noise > 0 && rbt_sight_of(levels->volume, t->check.noise, &n->cylinder).certainty < least_certainty / 2;
+    }
+    if (count == 0)
+        return;
+    if (sum < least_inliers * count) {
+        snprintf(text, sizeof text, "over the first branch %.0f %% of the edge points lie on its cylinders; a vessel has %.0f %% or more", 100 * sum / count, 100 * least_inliers);
+        doubt(&t->check, RBT_INLIERS, sum / count, least_inliers, text);
+    } else if (root < least_inliers * (count < ROOT ? count : ROOT)) {
+        snprintf(text, sizeof text, "at the root %.0f %% of the edge points lie on its cylinders; a vessel has %.0f %% or more", 100 * root / (count < ROOT ? count : ROOT),
+                 100 * least_inliers);
+        doubt(&t->check, RBT_INLIERS, root / (count < ROOT ? count : ROOT), least_inliers, text);
+    }
+    double radius = tree->node[count / 2].cylinder.radius;
+    if (length < least_length * radius) {
+        snprintf(text, sizeof text, "the first branch is %.1f mm long, %.1f of its radii; a vessel is %g or more", length, length / radius, least_length);
+        doubt(&t->check, RBT_LENGTH, length / radius, least_length, text);
+    }
+    if (faint > 0.2 * count) {
+        snprintf(text, sizeof text, "%.0f %% of the first branch does not stand out of the noise by %g standard errors", 100.0 * faint / count, least_certainty / 2);
+        doubt(&t->check, RBT_NOISE, (double)faint / count, 0.2, text);
+    }
+}
