@@ -1,17 +1,18 @@
 // The template is a cylinder of radius r and length 2 r in a ring from 1.4 r on. Against the noise of single voxels its score is contrast r^(3/2): the best is
-// taken over radii, axes and places. A planar step, such as the face of a bright band, has half of the ring as bright as the inside: what counts is the ring's
-// third and fourth brightest eighth, so that up to two neighbours may touch the vessel and a step scores nothing.
+// taken over radii, axes and places. The face of a bright band has half of the ring as bright as the inside, a band as wide as the tube a third of it: the search
+// takes the ring's third and fourth brightest twelfth for all of it, so that a neighbour may touch the vessel and a band scores nothing.
 #include "recon/rbt_scan.h"
 #include "recon/bspline.h"
 #include "recon/volume_noise.h"
 
 #include <stdlib.h>
 
-const double rbt_level_voxels[RBT_LEVELS] = {0, 0.7, 1.4, 2.8};
-enum { SECTORS = 8, STATIONS = 5 };
-static const double clear_contrast = 5;   // over the noise of a level: the steepest place of a ray is then its wall
+const double rbt_level_voxels[RBT_LEVELS] = {0, 0.7, 1.4, 2, 2.8};
+enum { SECTORS = 12, DROPPED = 2, STATIONS = 5, CERTAIN = 6 };
+static const double least_evenness = 0.35;
+static const double clear_contrast = 8;   // over the noise of a level: the steepest place of a ray is then its wall
 
-RbtLevels rbt_levels_of(const Volume *volume, int threads) { return (RbtLevels){.volume = volume, .noise = {-1, -1, -1, -1}, .threads = threads}; }
+RbtLevels rbt_levels_of(const Volume *volume, int threads) { return (RbtLevels){.volume = volume, .noise = {-1, -1, -1, -1, -1}, .threads = threads}; }
 
 const Volume *rbt_level(RbtLevels *levels, int level)
 {
@@ -51,11 +52,11 @@ static int sector_of(double u, double v) { return (int)fmin(SECTORS - 1, floor((
 
 RbtSight rbt_sight_of(const Volume *volume, double noise, const Cylinder *tube)
 {
-    double voxel = volume_voxel_size(volume), r = tube->radius, half = fmax(r, 2 * voxel), in = 0.85 * r, from = 1.3 * r + 0.5 * voxel, to = 2 * r + voxel;
+    double voxel = volume_voxel_size(volume), r = tube->radius, half = fmax(r, 2 * voxel), within = 0.85 * r, from = 1.25 * r + 0.5 * voxel, to = 1.8 * r + voxel;
     double sum = 0, ring[SECTORS] = {0}, reach = sqrt(to * to + half * half);
     Vec3 e1 = vec3_normal_to(tube->axis), e2 = vec3_cross(tube->axis, e1), c = volume_voxel_of(volume, tube->center);
     double at[3] = {c.x, c.y, c.z};
-    long inside = 0, count[SECTORS] = {0}, least = 0;
+    long inside = 0, count[SECTORS] = {0}, around = 0;
     int low[3], high[3];
     for (int i = 0; i < 3; i++) {
         double extent = reach * vec3_norm(vec3(volume->to_voxel.m[i][0], volume->to_voxel.m[i][1], volume->to_voxel.m[i][2]));
@@ -67,10 +68,10 @@ RbtSight rbt_sight_of(const Volume *volume, double noise, const Cylinder *tube)
             for (int i = low[0]; i <= high[0]; i++) {
                 Vec3 q = vec3_sub(volume_point_of(volume, vec3(i, j, k)), tube->center);
                 double along = vec3_dot(q, tube->axis), u = vec3_dot(q, e1), v = vec3_dot(q, e2), rho = sqrt(u * u + v * v);
-                if (fabs(along) > half || rho > to || (rho > in && rho < from))
+                if (fabs(along) > half || rho > to || (rho > within && rho < from))
                     continue;
                 double value = (double)volume->value[((size_t)k * (size_t)volume->size[1] + (size_t)j) * (size_t)volume->size[0] + (size_t)i];
-                if (rho <= in) {
+                if (rho <= within) {
                     sum += value;
                     inside++;
                 } else {
@@ -80,25 +81,30 @@ RbtSight rbt_sight_of(const Volume *volume, double noise, const Cylinder *tube)
                 }
             }
     if (inside == 0)
-        return (RbtSight){0, 0};
+        return (RbtSight){0, 0, 0};
     int used = 0;
     for (int s = 0; s < SECTORS; s++) {
         ring[s] = count[s] > 0 ? ring[s] / (double)count[s] : -HUGE_VAL;   // outside the volume: sorted last
         used += count[s] > 0;
-        least = s == 0 || count[s] < least ? count[s] : least;
+        around += count[s];
     }
     sort_falling(ring);
-    if (used < 6)
-        return (RbtSight){0, 0};
-    double contrast = sum / (double)inside - (ring[2] + ring[3]) / 2, error = noise * sqrt(1.0 / (double)inside + 0.5 / (double)(least > 0 ? least : 1));
-    return (RbtSight){contrast, contrast <= 0 ? 0 : error > 0 ? contrast / error : HUGE_VAL};
+    if (used < SECTORS / 2)
+        return (RbtSight){0, 0, 0};
+    double beside = 0, in = sum / (double)inside;
+    for (int s = DROPPED; s < used; s++)
+        beside += ring[s] / (used - DROPPED);
+    double contrast = in - beside, error = noise * sqrt(1.0 / (double)inside + 1.0 / (double)around);
+    return (RbtSight){contrast, contrast <= 0 ? 0 : error > 0 ? contrast / error : HUGE_VAL, contrast > 0 ? (in - 0.5 * (ring[2] + ring[3])) / contrast : 0};
 }
+
+bool rbt_is_tube(const RbtSight *sight) { return sight->evenness >= least_evenness; }
 
 // --- the search ---
 
 static double template_contrast(const Volume *volume, Vec3 center, Vec3 axis, double r, double voxel)
 {
-    enum { INNER = 6, OUTER = 16 };
+    enum { INNER = 6, OUTER = 2 * SECTORS };
     Vec3 e1 = vec3_normal_to(axis), e2 = vec3_cross(axis, e1);
     double inside = 0, ring[SECTORS] = {0};
     for (int s = 0; s < STATIONS; s++) {
@@ -109,7 +115,7 @@ static double template_contrast(const Volume *volume, Vec3 center, Vec3 axis, do
             inside += (double)bspline_sample(volume, volume_voxel_of(volume, vec3_add_scaled(vec3_add_scaled(x, rho * cos(a), e1), rho * sin(a), e2)));
         }
         for (int k = 0; k < OUTER; k++) {
-            double a = 2 * PI * (k + 0.5) / OUTER, rho = (k % 2 ? 1.4 : 1.8) * r + 0.5 * voxel;
+            double a = 2 * PI * (k + 0.5) / OUTER, rho = (k % 2 ? 1.35 : 1.7) * r + 0.5 * voxel;
             ring[k * SECTORS / OUTER] +=
                 (double)bspline_sample(volume, volume_voxel_of(volume, vec3_add_scaled(vec3_add_scaled(x, rho * cos(a), e1), rho * sin(a), e2)));
         }
@@ -156,7 +162,7 @@ static void scan_radius(void *context, long index)
 int rbt_scan(Tracker *t, RbtLevels *levels, Vec3 x, double radius, const Vec3 *axis, Cylinder *out)
 {
     Scan scan = {.t = t, .levels = levels, .x = x, .axis = axis};
-    double widest = HUGE_VAL, certainty[RBT_SCANS];
+    double widest = HUGE_VAL, merit[RBT_SCANS];
     int count = 0, found = 0;
     for (int i = 0; i < 3; i++)
         widest = fmin(widest, vec3_norm(t->volume->axis[i]) * t->volume->size[i] / 6);
@@ -168,17 +174,19 @@ int rbt_scan(Tracker *t, RbtLevels *levels, Vec3 x, double radius, const Vec3 *a
             return 0;
         }
     parallel_for(levels->threads, count, scan_radius, &scan, NULL);
-    double noise = rbt_level_noise(levels, 0);
-    for (int i = 0; i < count; i++) {   // by what all voxels of each say, not by the template's samples
-        double own = scan.score[i] > 0 ? rbt_sight_of(levels->volume, fmax(noise, 1e-9), &scan.best[i]).certainty : 0;
+    double noise = fmax(rbt_level_noise(levels, 0), 1e-9);
+    for (int i = 0; i < count; i++) {   // by all voxels of each, not by the template's samples
+        RbtSight sight = scan.score[i] > 0 ? rbt_sight_of(levels->volume, noise, &scan.best[i]) : (RbtSight){0, 0, 0};
+        // a ball round many vessels is more certain than one of them, but fainter
+        double own = rbt_is_tube(&sight) ? fmin(sight.certainty, CERTAIN) / CERTAIN * sight.evenness * sight.contrast * scan.radius[i] : 0;
         int k = found;
         if (!(own > 0))
             continue;
-        for (found++; k > 0 && certainty[k - 1] < own; k--) {
-            certainty[k] = certainty[k - 1];
+        for (found++; k > 0 && merit[k - 1] < own; k--) {
+            merit[k] = merit[k - 1];
             out[k] = out[k - 1];
         }
-        certainty[k] = own;
+        merit[k] = own;
         out[k] = scan.best[i];
     }
     return found;

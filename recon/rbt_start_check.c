@@ -1,5 +1,5 @@
 // Limits: a click lies within one radius of the axis of the vessel that it names, at most within two; half of the edge points lie on the cylinder; the vessel is
-// narrower than the volume; inside and outside differ by six standard errors (fewer turn up among all tubes that can be laid through pure noise: see test_starts).
+// narrower than the volume; inside and outside differ by five standard errors (fewer turn up among all tubes that can be laid through pure noise: see test_starts).
 #include "recon/rbt_start_check.h"
 #include "recon/rbt_start.h"
 #include "recon/volume_noise.h"
@@ -7,9 +7,9 @@
 #include <stdio.h>
 #include <string.h>
 
-const char *const rbt_doubt_name[RBT_DOUBTS] = {"drift", "inliers", "radius", "noise", "length"};
+const char *const rbt_doubt_name[RBT_DOUBTS] = {"drift", "inliers", "radius", "shape", "noise", "length"};
 
-static const double least_certainty = 6, least_inliers = 0.5, least_contrast = 4, certain_contrast = 8, least_length = 6;
+static const double least_certainty = 5, least_inliers = 0.5, least_contrast = 4, certain_contrast = 8, least_length = 6, node_certainty = 3.5;
 enum { NOISE_LAG = 3 };      // voxels: neighbours may share their noise
 
 static void doubt(RbtStartCheck *check, RbtDoubt kind, double measured, double limit, const char *text)
@@ -74,6 +74,11 @@ static Verdict judge(Tracker *t, RbtLevels *levels, Vec3 click, const Cylinder *
         snprintf(text, sizeof text, "the radius found at the start, %.2f mm, is more than a quarter of the volume's least extent of %.1f mm", c->radius, extent);
         doubt(&v.check, RBT_RADIUS, c->radius, extent / 4, text);
     }
+    if (!rbt_is_tube(&sight)) {
+        snprintf(text, sizeof text, "what was found at the start is bright on both sides too (its wall shows %.0f %% of its contrast there): a band or a sheet, or vessels that touch",
+                 100 * fmax(0, sight.evenness));
+        doubt(&v.check, RBT_SHAPE, sight.evenness, 0.35, text);
+    }
     return v;
 }
 
@@ -89,7 +94,7 @@ static int scan_at(Tracker *t, RbtLevels *levels, const RbtSeed *seed, Cylinder 
     return rbt_scan(t, levels, seed->start, seed->radius, seed->has_toward ? &axis : NULL, out);
 }
 
-bool rbt_choose_level(Tracker *t, RbtLevels *levels, const RbtSeed *first)
+bool rbt_look_at_noise(Tracker *t, RbtLevels *levels, const RbtSeed *first)
 {
     double noise = rbt_level_noise(levels, 0);
     t->check.noise = noise;
@@ -98,26 +103,37 @@ bool rbt_choose_level(Tracker *t, RbtLevels *levels, const RbtSeed *first)
     t->scan_count = scan_at(t, levels, first, t->scan);
     if (t->out_of_memory)
         return false;
-    RbtSight sight = t->scan_count > 0 ? rbt_sight_of(levels->volume, noise, &t->scan[0]) : (RbtSight){0, 0};
-    if (sight.contrast >= least_contrast * noise)
-        return true;
+    RbtSight best = {0, 0, 0};
+    double radius = 0;
+    for (int i = 0; i < t->scan_count; i++) {
+        RbtSight sight = rbt_sight_of(levels->volume, noise, &t->scan[i]);
+        if (sight.certainty >= least_certainty && sight.evenness * sight.contrast >= least_contrast * noise)
+            return true;
+        if (sight.certainty > best.certainty) {
+            best = sight;
+            radius = t->scan[i].radius;
+        }
+    }
     t->is_noisy = true;
-    if (sight.certainty < least_certainty) {
+    if (best.certainty < least_certainty) {
         snprintf(t->refusal, sizeof t->refusal,
                  "noise hides the edge: of all tubes around it the one that stands out most (radius %.2f mm) is %.3g grey values brighter than what is beside it at a "
                  "noise of %.3g, %.1f standard errors; a place with at least %g, or a less noisy volume",
-                 t->scan[0].radius, sight.contrast, noise, sight.certainty, least_certainty);
+                 radius, best.contrast, noise, best.certainty, least_certainty);
         return false;
     }
-    int level = rbt_level_for(levels, &t->scan[0]);
-    t->volume = rbt_level(levels, level);
-    if (!t->volume) {
-        t->volume = levels->volume;
-        t->out_of_memory = true;
-        return false;
-    }
-    t->check.smoothing_mm = rbt_level_voxels[level] * t->voxel;
     return true;
+}
+
+// What is tracked from now on: the copy that suits this tube.
+static bool take_level(Tracker *t, RbtLevels *levels, const Cylinder *tube)
+{
+    int level = t->is_noisy ? rbt_level_for(levels, tube) : 0;
+    const Volume *volume = rbt_level(levels, level);
+    t->out_of_memory = !volume;
+    t->volume = volume ? volume : levels->volume;
+    t->check.smoothing_mm = rbt_level_voxels[level] * t->voxel;
+    return volume != NULL;
 }
 
 bool rbt_stands_out(Tracker *t, RbtLevels *levels, const RbtSeed *seed)
@@ -134,7 +150,7 @@ bool rbt_stands_out(Tracker *t, RbtLevels *levels, const RbtSeed *seed)
 }
 
 // Noise is no reason to refuse what is doubtful anyhow, but it is worth a word.
-static void say_noise(Tracker *t, RbtLevels *levels)
+static void say_noise(Tracker *t)
 {
     char text[240];
     RbtStartCheck *check = &t->check;
@@ -144,7 +160,6 @@ static void say_noise(Tracker *t, RbtLevels *levels)
              "thin branches are lost",
              check->contrast, check->noise, check->certainty, check->smoothing_mm);
     doubt(check, RBT_NOISE, check->contrast / check->noise, least_contrast, text);
-    (void)levels;
 }
 
 bool rbt_first_start(Tracker *t, RbtLevels *levels, const RbtSeed *seed, Cylinder *out)
@@ -163,7 +178,10 @@ bool rbt_first_start(Tracker *t, RbtLevels *levels, const RbtSeed *seed, Cylinde
     bool is_clean = found && !best.refusal[0] && best.check.warning_count == 0;
     if (!is_clean && t->scan_count < 0)
         t->scan_count = scan_at(t, levels, seed, t->scan);
+    const Cylinder *suited = NULL;
     for (int i = 0; !is_clean && i < t->scan_count; i++) {
+        if (!take_level(t, levels, &t->scan[i]))
+            return false;
         double beside = tracker_brightness(t, t->scan[i].center) - 0.5 * rbt_sight_of(t->volume, 0, &t->scan[i]).contrast;
         if (!rbt_refine_start(t, &t->scan[i], seed->radius > 0, beside, &c, &rate))
             continue;
@@ -172,6 +190,7 @@ bool rbt_first_start(Tracker *t, RbtLevels *levels, const RbtSeed *seed, Cylinde
             (!best.refusal[0] == !other.refusal[0] && other.check.warning_count < best.check.warning_count)) {
             best = other;
             *out = c;
+            suited = &t->scan[i];
         }
         found = true;
         is_clean = !best.refusal[0] && best.check.warning_count == 0;
@@ -180,17 +199,26 @@ bool rbt_first_start(Tracker *t, RbtLevels *levels, const RbtSeed *seed, Cylinde
         t->why = "no tube around it";
         return false;
     }
+    if (suited && !take_level(t, levels, suited))
+        return false;
     refuse(t, &best);
-    say_noise(t, levels);
+    say_noise(t);
     return !t->refusal[0];
 }
+
+bool rbt_suit_given(Tracker *t, RbtLevels *levels, const Cylinder *given) { return take_level(t, levels, given); }
 
 bool rbt_check_given(Tracker *t, RbtLevels *levels, const RbtSeed *seed, const TrackNode *first)
 {
     Verdict v = judge(t, levels, seed->start, &first->cylinder, first->inlier_rate);
     refuse(t, &v);
-    say_noise(t, levels);
+    say_noise(t);
     return !t->refusal[0];
+}
+
+bool rbt_node_stands_out(const Tracker *t, const RbtLevels *levels, const Cylinder *tube)
+{
+    return rbt_sight_of(levels->volume, t->check.noise, tube).certainty >= node_certainty;
 }
 
 void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
@@ -205,7 +233,7 @@ void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
         sum += n->inlier_rate;
         root += i < ROOT ? n->inlier_rate : 0;
         length += i > 0 ? vec3_distance(n->cylinder.center, tree->node[i - 1].cylinder.center) : 0;
-        faint += t->check.noise > 0 && rbt_sight_of(levels->volume, t->check.noise, &n->cylinder).certainty < least_certainty / 2;
+        faint += t->check.noise > 0 && rbt_sight_of(levels->volume, t->check.noise, &n->cylinder).certainty < node_certainty;
     }
     if (count == 0)
         return;
@@ -223,7 +251,7 @@ void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
         doubt(&t->check, RBT_LENGTH, length / radius, least_length, text);
     }
     if (faint > 0.2 * count) {
-        snprintf(text, sizeof text, "%.0f %% of the first branch does not stand out of the noise by %g standard errors", 100.0 * faint / count, least_certainty / 2);
+        snprintf(text, sizeof text, "%.0f %% of the first branch does not stand out of the noise by %g standard errors", 100.0 * faint / count, node_certainty);
         doubt(&t->check, RBT_NOISE, (double)faint / count, 0.2, text);
     }
 }

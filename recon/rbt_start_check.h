@@ -5,15 +5,20 @@
 
 #include "recon/rbt_scan.h"
 
-// Measures the noise and looks at the first start [mm]; t->volume becomes the smoothed copy that its vessel needs, if any. False where no vessel
-// stands out of the noise there, with t->refusal, or out of memory. t->volume, t->voxel, t->background and the axes must be set.
-bool rbt_choose_level(Tracker *t, RbtLevels *levels, const RbtSeed *first);
+// Measures the noise and looks at the first start [mm]: is it noisier than the vessel there is bright (t->is_noisy)? False where no vessel stands out of
+// the noise, with t->refusal, or out of memory. t->volume, t->voxel, t->background and the axes must be set.
+bool rbt_look_at_noise(Tracker *t, RbtLevels *levels, const RbtSeed *first);
 // Whether a tube stands out around x, by the same measure: for starts that are no brighter than 0.2 of the volume's range (a bright band spans it).
 bool rbt_stands_out(Tracker *t, RbtLevels *levels, const RbtSeed *seed);
-// The cylinder at the first start (rbt_estimate_start, or about the tube that stands out most). False where none is found (t->why) or it is refused (t->refusal).
+// The cylinder at the first start (rbt_estimate_start, or about one of the tubes that stand out); in a
+// noisy volume t->volume becomes the smoothed copy that it needs. False where none is found (t->why) or it is refused (t->refusal).
 bool rbt_first_start(Tracker *t, RbtLevels *levels, const RbtSeed *seed, Cylinder *out);
+// Where the first start is given whole: t->volume becomes the copy that this tube needs. False: out of memory.
+bool rbt_suit_given(Tracker *t, RbtLevels *levels, const Cylinder *given);
 // Judges the first node that was tracked from a start that was given whole. False: refused.
 bool rbt_check_given(Tracker *t, RbtLevels *levels, const RbtSeed *seed, const TrackNode *first);
+// In a noisy volume: whether a node's tube stands out of it by itself. Less is asked than of a start: it has neighbours.
+bool rbt_node_stands_out(const Tracker *t, const RbtLevels *levels, const Cylinder *tube);
 // Adds to t->check what the first branch (nodes 0 … count-1 of the tree) leaves to be doubted.
 void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count);
 

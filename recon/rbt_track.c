@@ -287,6 +287,9 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     double contrast = recent_contrast(branch);
     if (next->contrast < p->contrast * contrast || !(next->contrast > 0.02 * ((double)t->volume->maximum - (double)t->volume->minimum)))
         return false;
+    t->why = "does not stand out of the noise";
+    if (t->is_noisy && !rbt_node_stands_out(t, t->levels, &next->cylinder))
+        return false;
     t->why = "too faint";
     if (t->is_guarded && tracker_brightness(t, next->cylinder.center) < t->floor)
         return false;
@@ -500,7 +503,7 @@ void tracker_run(Tracker *t, const Cylinder *start, Track *branch, bool until_tr
         found = next_node(t, branch, !left);
         bool swells = found && branch->count >= 6 && t->estimate.node.cylinder.radius > 1.35 * tracker_usual_radius(branch);
         rest -= rest > 0;
-        if (p->look_ahead > 0 && !until_tree && left && branch->count >= 6 && rest == 0 && (swells || !found)) {
+        if (p->look_ahead > 0 && !t->is_noisy && !until_tree && left && branch->count >= 6 && rest == 0 && (swells || !found)) {
             rest = 12;
             Estimate *kept = malloc(sizeof *kept);   // the search uses the tracker's own
             if (!kept) {
@@ -694,6 +697,8 @@ static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
             return track_both_ways(t, seed, &start, number);
         say_start(t, seed, &start, "the root is the start");
     }
+    if (is_first && seed->has_toward && seed->radius > 0 && !rbt_suit_given(t, t->levels, &start))
+        return false;
     if (!is_first) {
         Vec3 foot = seed->start;
         int parent = project_to_tree(t, seed->start, &foot);
@@ -1363,16 +1368,11 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
         sphere_directions(sphere_level_of(t->ray_count), t->ray);
         prepare_axes(t);
         t->levels = &levels;
-        if (seed_count > 0 && tracker_is_inside(volume, seed[0].start) && !rbt_choose_level(t, &levels, &seed[0])) {
+        if (seed_count > 0 && tracker_is_inside(volume, seed[0].start) && !rbt_look_at_noise(t, &levels, &seed[0])) {
             if (t->out_of_memory)
                 faults_add(faults, path, 0, 0, "out of memory");
             else
                 start_is_refused(t, &seed[0], 0, path, faults);
-        }
-        if (t->volume != volume) {
-            brightness_range(t->volume, &low, &high);
-            t->background = low;
-            t->dark = low + 0.2 * (high - low);
         }
         for (int i = 0; i < seed_count; i++)
             check_seed(t, &seed[i], i, path, faults);

@@ -117,6 +117,7 @@ typedef enum RbtDoubt {      // what makes a result doubtful
     RBT_DRIFT,               // [mm] the click's distance from the axis of the vessel that was found; limit: its radius
     RBT_INLIERS,             // share of the edge points on the cylinder at the start, at the root or over the first branch
     RBT_RADIUS,              // [mm] against the volume's least extent
+    RBT_SHAPE,               // share of its contrast that the wall of the start has on its brightest sides
     RBT_NOISE,               // contrast in standard errors or in standard deviations of the noise
     RBT_LENGTH,              // [radii] of the first branch
     RBT_DOUBTS
