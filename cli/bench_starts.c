@@ -317,7 +317,8 @@ bool bench_starts(FILE *out, int seeds, int threads, cJSON *root, bool *kept, Fa
         fprintf(out,
                 "right: the start within half a radius of the true axis, its radius within 30 %%, four fifths of the trunk tracked; ref.: refused; warn: tracked, with a\n"
                 "warning (other than that a smoothed copy was tracked: smth); wrong: tracked, not right, no such warning. drift: from the click to the axis found [true\n"
-                "radii], mean and most; radius: found over true; turn.: the root is not at the trunk's end (labels of these are not counted). In the last four kinds noise hides the vessel or none is there: a refusal is right.\n");
+                "radii], mean and most; radius: found over true; turn.: the root is not at the trunk's end (labels of these are not counted).\n"
+                "In the last four kinds noise hides the vessel or none is there: a refusal is right.\n");
         print_verdict(out, "right of those that can be seen [%]", 100 * right / seen, 80, true, kept);
         print_verdict(out, "refused of those that can be seen [%]", 100 * false_refusals / seen, 10, false, kept);
         print_verdict(out, "not refused of the hidden [%]", 100 * missing / hidden, 10, false, kept);

@@ -2,7 +2,6 @@
 // taken over radii, axes and places. The face of a bright band has half of the ring as bright as the inside, a band as wide as the tube a third of it: the search
 // takes the ring's third and fourth brightest twelfth for all of it, so that a neighbour may touch the vessel and a band scores nothing.
 #include "recon/rbt_scan.h"
-#include "recon/bspline.h"
 #include "recon/volume_noise.h"
 
 #include <stdlib.h>
@@ -102,6 +101,26 @@ bool rbt_is_tube(const RbtSight *sight) { return sight->evenness >= least_evenne
 
 // --- the search ---
 
+// Trilinear: on a smoothed copy as good as the spline, and several times cheaper. Outside stands the last voxel.
+static double smooth_value(const Volume *v, Vec3 x)
+{
+    Vec3 c = volume_voxel_of(v, x);
+    double at[3] = {c.x, c.y, c.z}, share[3], value = 0;
+    size_t low[3], step[3] = {1, (size_t)v->size[0], (size_t)v->size[0] * (size_t)v->size[1]}, first = 0;
+    for (int i = 0; i < 3; i++) {
+        at[i] = fmin(fmax(at[i], 0), v->size[i] - 1);
+        low[i] = (size_t)fmax(0, fmin(floor(at[i]), v->size[i] - 2));
+        share[i] = at[i] - (double)low[i];
+        step[i] = v->size[i] > 1 ? step[i] : 0;
+        first += low[i] * step[i];
+    }
+    for (int k = 0; k < 8; k++) {
+        size_t place = first + (k & 1 ? step[0] : 0) + (k & 2 ? step[1] : 0) + (k & 4 ? step[2] : 0);
+        value += (k & 1 ? share[0] : 1 - share[0]) * (k & 2 ? share[1] : 1 - share[1]) * (k & 4 ? share[2] : 1 - share[2]) * (double)v->value[place];
+    }
+    return value;
+}
+
 static double template_contrast(const Volume *volume, Vec3 center, Vec3 axis, double r, double voxel)
 {
     enum { INNER = 6, OUTER = 2 * SECTORS };
@@ -109,15 +128,15 @@ static double template_contrast(const Volume *volume, Vec3 center, Vec3 axis, do
     double inside = 0, ring[SECTORS] = {0};
     for (int s = 0; s < STATIONS; s++) {
         Vec3 x = vec3_add_scaled(center, (s - STATIONS / 2) * 0.5 * r, axis);
-        inside += (double)bspline_sample(volume, volume_voxel_of(volume, x));
+        inside += smooth_value(volume, x);
         for (int k = 0; k < 2 * INNER; k++) {
             double a = PI * k / INNER, rho = (k % 2 ? 0.85 : 0.5) * r;
-            inside += (double)bspline_sample(volume, volume_voxel_of(volume, vec3_add_scaled(vec3_add_scaled(x, rho * cos(a), e1), rho * sin(a), e2)));
+            inside += smooth_value(volume, vec3_add_scaled(vec3_add_scaled(x, rho * cos(a), e1), rho * sin(a), e2));
         }
         for (int k = 0; k < OUTER; k++) {
             double a = 2 * PI * (k + 0.5) / OUTER, rho = (k % 2 ? 1.35 : 1.7) * r + 0.5 * voxel;
             ring[k * SECTORS / OUTER] +=
-                (double)bspline_sample(volume, volume_voxel_of(volume, vec3_add_scaled(vec3_add_scaled(x, rho * cos(a), e1), rho * sin(a), e2)));
+                smooth_value(volume, vec3_add_scaled(vec3_add_scaled(x, rho * cos(a), e1), rho * sin(a), e2));
         }
     }
     sort_falling(ring);
@@ -178,7 +197,7 @@ int rbt_scan(Tracker *t, RbtLevels *levels, Vec3 x, double radius, const Vec3 *a
     for (int i = 0; i < count; i++) {   // by all voxels of each, not by the template's samples
         RbtSight sight = scan.score[i] > 0 ? rbt_sight_of(levels->volume, noise, &scan.best[i]) : (RbtSight){0, 0, 0};
         // a ball round many vessels is more certain than one of them, but fainter
-        double own = rbt_is_tube(&sight) ? fmin(sight.certainty, CERTAIN) / CERTAIN * sight.evenness * sight.contrast * scan.radius[i] : 0;
+        double own = rbt_is_tube(&sight) ? fmin(sight.certainty, CERTAIN) * pow(sight.evenness * sight.contrast, 2) * scan.radius[i] : 0;
         int k = found;
         if (!(own > 0))
             continue;

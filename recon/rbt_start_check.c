@@ -2,14 +2,15 @@
 // narrower than the volume; inside and outside differ by five standard errors (fewer turn up among all tubes that can be laid through pure noise: see test_starts).
 #include "recon/rbt_start_check.h"
 #include "recon/rbt_start.h"
+#include "geom/sort_doubles.h"
 #include "recon/volume_noise.h"
 
 #include <stdio.h>
 #include <string.h>
 
-const char *const rbt_doubt_name[RBT_DOUBTS] = {"drift", "inliers", "radius", "shape", "noise", "length"};
+const char *const rbt_doubt_name[RBT_DOUBTS] = {"drift", "inliers", "radius", "shape", "noise", "background", "length"};
 
-static const double least_certainty = 5, least_inliers = 0.5, least_contrast = 4, certain_contrast = 8, least_length = 6, node_certainty = 3.5;
+static const double least_certainty = 5, least_inliers = 0.5, least_contrast = 4, certain_contrast = 8, least_evenness = 0.5, least_length = 6, node_certainty = 3.5;
 enum { NOISE_LAG = 3 };      // voxels: neighbours may share their noise
 
 static void doubt(RbtStartCheck *check, RbtDoubt kind, double measured, double limit, const char *text)
@@ -74,10 +75,10 @@ static Verdict judge(Tracker *t, RbtLevels *levels, Vec3 click, const Cylinder *
         snprintf(text, sizeof text, "the radius found at the start, %.2f mm, is more than a quarter of the volume's least extent of %.1f mm", c->radius, extent);
         doubt(&v.check, RBT_RADIUS, c->radius, extent / 4, text);
     }
-    if (!rbt_is_tube(&sight)) {
+    if (sight.evenness < least_evenness) {
         snprintf(text, sizeof text, "what was found at the start is bright on both sides too (its wall shows %.0f %% of its contrast there): a band or a sheet, or vessels that touch",
                  100 * fmax(0, sight.evenness));
-        doubt(&v.check, RBT_SHAPE, sight.evenness, 0.35, text);
+        doubt(&v.check, RBT_SHAPE, sight.evenness, least_evenness, text);
     }
     return v;
 }
@@ -162,6 +163,31 @@ static void say_noise(Tracker *t)
     doubt(check, RBT_NOISE, check->contrast / check->noise, least_contrast, text);
 }
 
+// Is there a tube around the click that stands out much more than the one that was found, or much thinner within it? What was found is then, for example, a
+// band that the vessel lies in: inside of a wide vessel hardly anything
+// stands out.
+static bool is_outdone(Tracker *t, RbtLevels *levels, const RbtSeed *seed, RbtStartCheck *check)
+{
+    char text[240];
+    RbtSight own = rbt_sight_of(levels->volume, check->noise, &check->cylinder);
+    if (!(check->noise > 0))
+        return false;
+    if (t->scan_count < 0)
+        t->scan_count = scan_at(t, levels, seed, t->scan);
+    for (int i = 0; i < t->scan_count; i++) {
+        RbtSight sight = rbt_sight_of(levels->volume, check->noise, &t->scan[i]);
+        bool is_thin = t->scan[i].radius < 0.5 * check->cylinder.radius;
+        double share = is_thin && check->drift > 0.6 * check->cylinder.radius ? 0.2 : is_thin ? 0.5 : 1.5;
+        if (sight.certainty < certain_contrast || sight.evenness * sight.contrast < share * own.evenness * own.contrast)
+            continue;
+        snprintf(text, sizeof text, "a tube of radius %.2f mm stands out at the click, other than the one of %.2f mm that was found (%.3g and %.3g grey values)",
+                 t->scan[i].radius, check->cylinder.radius, sight.evenness * sight.contrast, own.evenness * own.contrast);
+        doubt(check, RBT_RADIUS, check->cylinder.radius, t->scan[i].radius, text);
+        return true;
+    }
+    return false;
+}
+
 bool rbt_first_start(Tracker *t, RbtLevels *levels, const RbtSeed *seed, Cylinder *out)
 {
     Verdict best;
@@ -175,10 +201,10 @@ bool rbt_first_start(Tracker *t, RbtLevels *levels, const RbtSeed *seed, Cylinde
     }
     if (t->out_of_memory)
         return false;
-    bool is_clean = found && !best.refusal[0] && best.check.warning_count == 0;
+    bool is_clean = found && !best.refusal[0] && best.check.warning_count == 0 && !is_outdone(t, levels, seed, &best.check);
+    const Cylinder *suited = NULL;
     if (!is_clean && t->scan_count < 0)
         t->scan_count = scan_at(t, levels, seed, t->scan);
-    const Cylinder *suited = NULL;
     for (int i = 0; !is_clean && i < t->scan_count; i++) {
         if (!take_level(t, levels, &t->scan[i]))
             return false;
@@ -221,6 +247,27 @@ bool rbt_node_stands_out(const Tracker *t, const RbtLevels *levels, const Cylind
     return rbt_sight_of(levels->volume, t->check.noise, tube).certainty >= node_certainty;
 }
 
+// A bright band or bone across the first branch: what is found from it is compared with its brightness, and lost where that does not hold.
+static void judge_background(Tracker *t, int count)
+{
+    enum { MOST = 512 };
+    double beside[MOST], contrast[MOST];
+    char text[240];
+    int n = 0, stride = count / MOST + 1;
+    for (int i = 0; i < count && n < MOST; i += stride) {
+        contrast[n] = t->tree.node[i].contrast;
+        beside[n++] = tracker_brightness(t, t->tree.node[i].cylinder.center) - t->tree.node[i].contrast;
+    }
+    sort_doubles(beside, (size_t)n);
+    sort_doubles(contrast, (size_t)n);
+    double low = beside[n / 10], high = beside[n - 1 - n / 10];
+    if (high - low <= contrast[n / 2])
+        return;
+    snprintf(text, sizeof text, "beside the first branch the volume changes from %.3g to %.3g grey values, by more than its contrast of %.3g (a bright band?): it may end early there, and branches may be lost",
+             low, high, contrast[n / 2]);
+    doubt(&t->check, RBT_BACKGROUND, high - low, contrast[n / 2], text);
+}
+
 void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
 {
     enum { ROOT = 3 };
@@ -245,6 +292,7 @@ void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
                  100 * least_inliers);
         doubt(&t->check, RBT_INLIERS, root / (count < ROOT ? count : ROOT), least_inliers, text);
     }
+    judge_background(t, count);
     double radius = tree->node[count / 2].cylinder.radius;
     if (length < least_length * radius) {
         snprintf(text, sizeof text, "the first branch is %.1f mm long, %.1f of its radii; a vessel is %g or more", length, length / radius, least_length);

@@ -119,6 +119,7 @@ typedef enum RbtDoubt {      // what makes a result doubtful
     RBT_RADIUS,              // [mm] against the volume's least extent
     RBT_SHAPE,               // share of its contrast that the wall of the start has on its brightest sides
     RBT_NOISE,               // contrast in standard errors or in standard deviations of the noise
+    RBT_BACKGROUND,          // [grey values] by which it changes beside the first branch; limit: its contrast
     RBT_LENGTH,              // [radii] of the first branch
     RBT_DOUBTS
 } RbtDoubt;

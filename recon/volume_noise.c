@@ -47,7 +47,7 @@ static void smooth_slab(void *context, long index)
     size_t nx = (size_t)v->size[0], plane = nx * (size_t)v->size[1], wide = s->axis == 0 ? 1 : nx;
     int n = v->size[s->axis];
     float *first = v->value + (size_t)index * (s->axis == 1 ? plane : nx), *copy = malloc((size_t)n * wide * sizeof *copy);
-    double *line = malloc(wide * sizeof *line);
+    float *line = malloc(wide * sizeof *line);
     size_t stride = s->axis == 0 ? 1 : s->axis == 1 ? nx : plane;
     s->failed[index] = !copy || !line;
     for (int i = 0; !s->failed[index] && i < n; i++)
@@ -57,12 +57,12 @@ static void smooth_slab(void *context, long index)
         for (int k = -s->reach; k <= s->reach; k++) {
             int at = i + k < 0 ? 0 : i + k >= n ? n - 1 : i + k;
             const float *from = copy + (size_t)at * wide;
-            double weight = s->kernel[abs(k)];
+            float weight = (float)s->kernel[abs(k)];
             for (size_t x = 0; x < wide; x++)
-                line[x] += weight * (double)from[x];
+                line[x] += weight * from[x];
         }
         for (size_t x = 0; x < wide; x++)
-            first[(size_t)i * stride + x] = (float)line[x];
+            first[(size_t)i * stride + x] = line[x];
     }
     free(copy);
     free(line);
