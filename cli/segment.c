@@ -7,6 +7,7 @@
 #include "recon/trace.h"
 #include "recon/tree_file.h"
 #include "recon/volume.h"
+#include "recon/volume_noise.h"
 #ifdef SELDINGER_RENDER
 #include "render/picture.h"
 #endif
@@ -166,6 +167,13 @@ static void print_junctions(const RbtReport *report)
     }
 }
 
+// What makes the result doubtful stands on standard error, with --quiet too.
+static void print_warnings(const SegmentArguments *a, const RbtStartCheck *check)
+{
+    for (int i = 0; i < check->warning_count; i++)
+        fprintf(stderr, "%s: warning: %s\n", a->volume, check->warning[i].text);
+}
+
 static void print_table(const VesselTree *tree, const RbtReport *report, double load_s, double track_s)
 {
     double length = 0;
@@ -192,11 +200,14 @@ static void print_table(const VesselTree *tree, const RbtReport *report, double 
            load_s, track_s);
 }
 
-// b [mm] of all that moved the edges that were tracked: the image's blur, or what its voxels and the spline make at least, and the average along the rays.
-static double edge_blur(const RbtParameters *parameters, const Volume *volume, const VesselTree *tree)
+// b [mm] of all that moved the edges that were tracked: the image's blur, or what its voxels and the spline make at least, the smoothing of a noisy volume, and
+// the average along the rays.
+static double edge_blur(const RbtParameters *parameters, const Volume *volume, double smoothing, const VesselTree *tree)
 {
-    double v2 = pow(volume_voxel_size(volume), 2), image = blurred_edge_measure(volume, tree);
-    return sqrt((image > 0 ? image * image : blurred_edge_grid2(v2)) + blurred_edge_average2(parameters->ray_smoothing_voxels, v2));
+    Volume *smooth = smoothing > 0 ? volume_smoothed(volume, smoothing, 0) : NULL;
+    double v2 = pow(volume_voxel_size(volume), 2), image = blurred_edge_measure(smooth ? smooth : volume, tree);
+    volume_free(smooth);
+    return sqrt((image > 0 ? image * image : blurred_edge_grid2(v2) + smoothing * smoothing) + blurred_edge_average2(parameters->ray_smoothing_voxels, v2));
 }
 
 // What was found beside the parameters that found it, in the words of a trace; to be freed.
@@ -212,7 +223,7 @@ static char *parameters_text(const RbtParameters *parameters, const RbtReport *r
         free(text);
         return NULL;
     }
-    used += (size_t)snprintf(longer + used, capacity - used, "edge_blur_mm: %.4f\n", edge_blur(parameters, volume, tree));
+    used += (size_t)snprintf(longer + used, capacity - used, "edge_blur_mm: %.4f\n", edge_blur(parameters, volume, report->check.smoothing_mm, tree));
     const char *head = "aneurysms_found:\n";
     for (int i = 0; i < report->branch_count; i++) {
         const RbtBranchReport *b = &report->branch[i];
@@ -259,6 +270,32 @@ static void add_junctions(cJSON *root, const RbtReport *report)
         cJSON_AddNumberToObject(summary, support_name[k], junctions_with(report, (RbtSupport)k));
 }
 
+static void json_check(cJSON *root, const RbtStartCheck *check)
+{
+    cJSON *item = cJSON_AddObjectToObject(root, "start_check"), *list = cJSON_AddArrayToObject(root, "warnings");
+    Vec3 c = check->cylinder.center;
+    if (check->cylinder.radius > 0) {
+        cJSON_AddItemToObject(item, "center_mm", cJSON_CreateDoubleArray((double[3]){c.x, c.y, c.z}, 3));
+        cJSON_AddNumberToObject(item, "drift_mm", check->drift);
+        cJSON_AddNumberToObject(item, "radius_mm", check->cylinder.radius);
+        cJSON_AddNumberToObject(item, "inlier_rate", check->inlier_rate);
+        cJSON_AddNumberToObject(item, "contrast", check->contrast);
+        if (check->certainty < HUGE_VAL)
+            cJSON_AddNumberToObject(item, "certainty", check->certainty);
+    }
+    cJSON_AddNumberToObject(item, "noise", check->noise);
+    cJSON_AddNumberToObject(item, "smoothing_mm", check->smoothing_mm);
+    for (int i = 0; i < check->warning_count; i++) {
+        const RbtWarning *w = &check->warning[i];
+        cJSON *entry = cJSON_CreateObject();
+        cJSON_AddStringToObject(entry, "kind", rbt_doubt_name[w->kind]);
+        cJSON_AddNumberToObject(entry, "measured", w->measured);
+        cJSON_AddNumberToObject(entry, "limit", w->limit);
+        cJSON_AddStringToObject(entry, "text", w->text);
+        cJSON_AddItemToArray(list, entry);
+    }
+}
+
 static bool write_json(const SegmentArguments *a, const VesselTree *tree, const RbtReport *report, double load_s, double track_s, Faults *faults)
 {
     cJSON *root = cJSON_CreateObject(), *list = cJSON_AddArrayToObject(root, "branches");
@@ -268,6 +305,7 @@ static bool write_json(const SegmentArguments *a, const VesselTree *tree, const 
     cJSON_AddNumberToObject(root, "points", (double)tree->point_count);
     if (report->start[0])
         cJSON_AddStringToObject(root, "start", report->start);
+    json_check(root, &report->check);
     cJSON_AddNumberToObject(root, "load_s", load_s);
     cJSON_AddNumberToObject(root, "track_s", track_s);
     add_junctions(root, report);
@@ -372,6 +410,8 @@ static int segment(const SegmentArguments *a, Faults *faults)
         good = good && (!a->json || write_json(a, tree, &report, load_s, track_s, faults));
         if (good && !a->quiet && !(a->json && !strcmp(a->json, "-")))
             print_table(tree, &report, load_s, track_s);
+        if (good)
+            print_warnings(a, &report.check);
         if (good && a->picture)
             draw_picture(a, volume, tree);
     }

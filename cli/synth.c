@@ -18,6 +18,7 @@ typedef struct SynthCommand {
     int option_count;
     char option[SHAPE_OPTIONS][2][64];
     double cell_mm, seed, gap_voxels;
+    double noise_grey, band_grey;    // noise -1: not given
     VolumeOptions volume;
     bool quiet;
 } SynthCommand;
@@ -64,6 +65,11 @@ static const char help[] =
     "  --saturate X         values above are cut; default none\n"
     "  --fade X             share of the brightness that is lost from the root to the furthest tip; default 0\n"
     "  --bone X             brightness of the blocks in contrasts; default 1.2\n"
+    "  --contrast-grey X    grey values: whole numbers from 0 to 255, vessels so many levels brighter than the background; default: not\n"
+    "  --background-grey X  grey value of the background, default 60; needs --contrast-grey\n"
+    "  --noise-grey X       standard deviation of the noise in grey values instead of --noise; needs --contrast-grey\n"
+    "  --band-grey X        a slab across the trunk is brighter by so many grey values, default 0: none; needs --contrast-grey\n"
+    "  --band-mm X          thickness of this slab [mm]; default 4; its place and direction come from the seed\n"
     "  --threads N          default 0: all cores; the volume does not depend on them\n\n"
     "Exit codes: 0 done; 2 wrong usage or bad input.\n";
 
@@ -94,10 +100,24 @@ static bool voxel_edges(const char *text, double edge[3])
     return true;
 }
 
+// What was given in grey values, in contrasts. False with a message where it needs a contrast in grey values.
+static bool take_grey_values(SynthCommand *command, double background)
+{
+    VolumeOptions *volume = &command->volume;
+    if (!(volume->contrast_grey > 0))
+        return background < 0 && command->noise_grey < 0 && command->band_grey == 0;
+    volume->background_grey = background < 0 ? volume->background_grey : background;
+    if (command->noise_grey >= 0)
+        volume->noise = command->noise_grey / volume->contrast_grey;
+    volume->band = command->band_grey / volume->contrast_grey;
+    return true;
+}
+
 // -1: go on; otherwise the exit code.
 static int parse_options(int argc, char **argv, SynthCommand *command)
 {
-    enum { MEASURE = 256, JSON, QUIET, CELL, VOXEL, PSF, NOISE, ROTATE, CLIP, SATURATE, FADE, BONE, THREADS, GAP_VOXELS };
+    enum { MEASURE = 256, JSON, QUIET, CELL, VOXEL, PSF, NOISE, ROTATE, CLIP, SATURATE, FADE, BONE, THREADS, GAP_VOXELS, CONTRAST_GREY, BACKGROUND_GREY, NOISE_GREY,
+           BAND_GREY, BAND };
     static const char *const keys[SHAPE_OPTIONS] = {"points",   "sac_points", "noise_mm",  "seed",           "spacing",
                                                     "blend_mm", "length_mm",  "radius_mm", "bend_radius_mm", "scale",  "rise_mm",
                                                     "turns",    "angle_deg",  "twig_radius_mm", "branches",  "sacs",   "blocks",    "gap_mm",
@@ -135,12 +155,17 @@ static int parse_options(int argc, char **argv, SynthCommand *command)
                                           {"saturate", required_argument, NULL, SATURATE},
                                           {"fade", required_argument, NULL, FADE},
                                           {"bone", required_argument, NULL, BONE},
+                                          {"contrast-grey", required_argument, NULL, CONTRAST_GREY},
+                                          {"background-grey", required_argument, NULL, BACKGROUND_GREY},
+                                          {"noise-grey", required_argument, NULL, NOISE_GREY},
+                                          {"band-grey", required_argument, NULL, BAND_GREY},
+                                          {"band-mm", required_argument, NULL, BAND},
                                           {"threads", required_argument, NULL, THREADS},
                                           {"help", no_argument, NULL, 'h'},
                                           {0}};
-    *command = (SynthCommand){.cell_mm = 0.25, .seed = 1, .gap_voxels = -1, .volume = volume_default_options()};
+    *command = (SynthCommand){.cell_mm = 0.25, .seed = 1, .gap_voxels = -1, .noise_grey = -1, .volume = volume_default_options()};
     VolumeOptions *volume = &command->volume;
-    double threads = 0;
+    double threads = 0, background = -1;
     optind = 1;
     for (int choice; (choice = getopt_long(argc, argv, "o:h", table, NULL)) != -1;) {
         if (choice >= FIRST_SHAPE_OPTION) {   // the shape itself says what is valid
@@ -162,6 +187,11 @@ static int parse_options(int argc, char **argv, SynthCommand *command)
         case SATURATE: good = cli_number("--saturate", optarg, -10, 10, &volume->saturate); break;
         case FADE: good = cli_number("--fade", optarg, 0, 1, &volume->fade); break;
         case BONE: good = cli_number("--bone", optarg, 0, 10, &volume->bone); break;
+        case CONTRAST_GREY: good = cli_number("--contrast-grey", optarg, 1, 255, &volume->contrast_grey); break;
+        case BACKGROUND_GREY: good = cli_number("--background-grey", optarg, 0, 255, &background); break;
+        case NOISE_GREY: good = cli_number("--noise-grey", optarg, 0, 255, &command->noise_grey); break;
+        case BAND_GREY: good = cli_number("--band-grey", optarg, -255, 255, &command->band_grey); break;
+        case BAND: good = cli_number("--band-mm", optarg, 0.01, 1000, &volume->band_mm); break;
         case THREADS: good = cli_whole_number("--threads", optarg, 0, 256, &threads); break;
         case GAP_VOXELS: good = cli_number("--gap-voxels", optarg, 0, 100, &command->gap_voxels); break;
         case 'h': fputs(help, stdout); return EXIT_DONE;
@@ -174,6 +204,8 @@ static int parse_options(int argc, char **argv, SynthCommand *command)
         return usage_fault(optind < argc ? "one shape at a time, not also " : "lacks a shape: ", optind < argc ? argv[optind + 1] : shape_names());
     if (!command->output == !command->measure)
         return usage_fault("give either -o F or --measure MODEL.h5", "");
+    if (!take_grey_values(command, background))
+        return usage_fault("--background-grey, --noise-grey and --band-grey need --contrast-grey X", "");
     if (command->json && !command->measure)
         return usage_fault("--json goes with --measure MODEL.h5", "");
     command->shape = argv[optind];
@@ -296,7 +328,7 @@ static bool write_output(const SynthCommand *command, const Shape *shape, Faults
             printf("%d nodes, %lld points\n", tree->node_count, (long long)tree->point_count);
     } else if (good && is_volume) {
         Volume *volume = shape_volume_with(shape, &command->volume, faults);
-        good = volume && volume_save_nrrd(volume, command->output, "float", faults);
+        good = volume && volume_save_nrrd(volume, command->output, command->volume.contrast_grey > 0 ? "uint8" : "float", faults);
         if (good && !command->quiet)
             printf("%d x %d x %d voxels of %g x %g x %g mm\n", volume->size[0], volume->size[1], volume->size[2], command->volume.voxel_mm[0],
                    command->volume.voxel_mm[1], command->volume.voxel_mm[2]);

@@ -84,6 +84,10 @@ typedef struct VolumeOptions {
     double clip, saturate;   // values below and above are cut, after the noise; -HUGE_VAL, HUGE_VAL: none
     double fade;             // share of the brightness that is lost on the way from the root to the furthest tip
     double bone;             // brightness of blocks (1.2)
+    double band;             // a slab across the trunk is brighter by so many contrasts (0: none), vessels in it too …
+    double band_mm;          // … its thickness [mm]; its place and direction come from the seed
+    double contrast_grey;    // > 0: whole grey values 0 to 255, vessels this much brighter than the background
+    double background_grey;  // 0 to 255
     int threads;             // 0: all cores; results do not depend on them
 } VolumeOptions;
 VolumeOptions volume_default_options(void);

@@ -205,11 +205,38 @@ static bool blur_axis(Volume *volume, int axis, double sigma, int threads)
     return good;
 }
 
-// --- Noise and clipping ---
+// --- A bright band ---
+
+typedef struct Band {        // a slab; its faces are as blurred as the vessels' walls
+    Vec3 center, normal;
+    double half, blur;       // [mm]
+} Band;
+
+// Across the trunk, between a fifth and four fifths of its length.
+static Band place_band(const Shape *shape, const VolumeOptions *o)
+{
+    const Part *trunk = &shape->part[0];
+    uint64_t state = o->seed * 0x9E3779B97F4A7C15u + 1;
+    double share = 0.2 + 0.6 * random_uniform(&state), z = 2 * random_uniform(&state) - 1, angle = 2 * PI * random_uniform(&state), voxel2 = 0;
+    for (int k = 0; k < 3; k++)
+        voxel2 += pow(o->voxel_mm[k], 2) / 3;
+    double ring = sqrt(1 - z * z);
+    return (Band){part_at(trunk, share * trunk->at[trunk->knot_count - 1]).center, vec3(ring * cos(angle), ring * sin(angle), z), 0.5 * o->band_mm,
+                  sqrt(pow(o->psf_mm, 2) + voxel2 / 12)};
+}
+
+static double band_at(const Band *band, Vec3 x)
+{
+    double d = vec3_dot(vec3_sub(x, band->center), band->normal), scale = sqrt(2) * band->blur;
+    return 0.5 * (erf((d + band->half) / scale) - erf((d - band->half) / scale));
+}
+
+// --- Noise, clipping, grey values ---
 
 typedef struct Finish {
     Volume *volume;
     const VolumeOptions *options;
+    Band band;
     float (*extreme)[2];     // (slices)
 } Finish;
 
@@ -221,9 +248,15 @@ static void finish_slice(void *context, long index)
     float low = HUGE_VALF, high = -HUGE_VALF;
     for (size_t i = first; i < first + plane; i++) {
         float *value = &f->volume->value[i];
+        if (f->options->band != 0) {
+            size_t at = i - first, nx = (size_t)f->volume->size[0];
+            *value += (float)(f->options->band * band_at(&f->band, volume_point_of(f->volume, vec3((double)(at % nx), (double)(at / nx), (double)index))));
+        }
         if (f->options->noise > 0)
             *value += (float)(f->options->noise * random_normal(&state));
         *value = fminf((float)f->options->saturate, fmaxf((float)f->options->clip, *value));
+        if (f->options->contrast_grey > 0)
+            *value = (float)fmin(255, fmax(0, floor(f->options->background_grey + f->options->contrast_grey * (double)*value + 0.5)));
         low = fminf(low, *value);
         high = fmaxf(high, *value);
     }
@@ -235,7 +268,8 @@ static void finish_slice(void *context, long index)
 
 VolumeOptions volume_default_options(void)
 {
-    return (VolumeOptions){.voxel_mm = {0.2, 0.2, 0.2}, .psf_mm = 0.2, .noise = 0.05, .seed = 2, .clip = -HUGE_VAL, .saturate = HUGE_VAL, .bone = 1.2};
+    return (VolumeOptions){.voxel_mm = {0.2, 0.2, 0.2}, .psf_mm = 0.2, .noise = 0.05, .seed = 2, .clip = -HUGE_VAL, .saturate = HUGE_VAL, .bone = 1.2, .band_mm = 4,
+                           .background_grey = 60};
 }
 
 static Volume *make_grid(const Shape *shape, const VolumeOptions *o, Faults *faults)
@@ -289,7 +323,7 @@ Volume *shape_volume_with(const Shape *shape, const VolumeOptions *options, Faul
     }
     p.diagonal = sqrt(p.diagonal);
     p.width = even ? options->voxel_mm[0] : 0;
-    Finish f = {.volume = volume, .options = options, .extreme = calloc((size_t)volume->size[2], sizeof *f.extreme)};
+    Finish f = {.volume = volume, .options = options, .band = place_band(shape, options), .extreme = calloc((size_t)volume->size[2], sizeof *f.extreme)};
     bool good = f.extreme && measure_ways(&p.layer[0]) && (!shape->neighbour || measure_ways(&p.layer[1]));
     if (good)
         parallel_for(options->threads, (long)p.cells[1] * p.cells[2], paint_layer, &p, NULL);

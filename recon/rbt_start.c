@@ -110,7 +110,8 @@ static Vec3 longest_of(const Tracker *t, const Chords *c)
 }
 
 // The cylinder of the highest inlier rate about the middle x, or somewhat further along. False where there is none.
-static bool best_cylinder(Tracker *t, Vec3 x, const Vec3 *axis, int axis_count, double radius, bool is_known, double level, Cylinder *out)
+static bool best_cylinder(Tracker *t, Vec3 x, const Vec3 *axis, int axis_count, double radius, bool is_known, double level, Cylinder *out,
+                          double *inlier_rate)
 {
     static const double along[] = {0, 1.5, -1.5, 3, -3}, size[] = {1, 0.75, 1.35};
     const RbtParameters *p = t->parameters;
@@ -129,10 +130,20 @@ static bool best_cylinder(Tracker *t, Vec3 x, const Vec3 *axis, int axis_count, 
                     best = n->inlier_rate;
                     *out = n->cylinder;
                 }
+    *inlier_rate = best;
     return best > 0;
 }
 
-bool rbt_estimate_start(Tracker *t, const RbtSeed *seed, Cylinder *out)
+bool rbt_refine_start(Tracker *t, const Cylinder *guess, bool radius_is_known, double level, Cylinder *out, double *inlier_rate)
+{
+    if (!best_cylinder(t, guess->center, &guess->axis, 1, guess->radius, radius_is_known, level, out, inlier_rate))
+        return false;
+    if (vec3_dot(out->axis, guess->axis) < 0)
+        out->axis = vec3_negate(out->axis);
+    return true;
+}
+
+bool rbt_estimate_start(Tracker *t, const RbtSeed *seed, Cylinder *out, double *inlier_rate)
 {
     Chords *chords = malloc(sizeof *chords);
     Vec3 x = seed->start, axis[2] = {{0, 0, 1}, {0, 0, 1}};
@@ -160,7 +171,7 @@ bool rbt_estimate_start(Tracker *t, const RbtSeed *seed, Cylinder *out)
         level = 0.5 * (inside + fmin(background_beside(t, x, axis[0], radius), inside));
     }
     free(chords);
-    if (best_cylinder(t, x, axis, seed->has_toward ? 1 : 2, radius, seed->radius > 0, level, out)) {
+    if (best_cylinder(t, x, axis, seed->has_toward ? 1 : 2, radius, seed->radius > 0, level, out, inlier_rate)) {
         if (vec3_dot(out->axis, axis[0]) < 0)
             out->axis = vec3_negate(out->axis);
         return true;

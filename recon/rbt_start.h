@@ -6,7 +6,9 @@
 #include "recon/rbt_tracker.h"
 
 // From a start [mm] in the lumen to a cylinder there; a `toward` or a radius of the seed is kept. False where none is found, with t->why.
-bool rbt_estimate_start(Tracker *t, const RbtSeed *seed, Cylinder *out);
+bool rbt_estimate_start(Tracker *t, const RbtSeed *seed, Cylinder *out, double *inlier_rate);
+// The cylinder of the highest inlier rate about the tube `guess`, or somewhat further along it, whose axis is brighter than `level`. False where there is none.
+bool rbt_refine_start(Tracker *t, const Cylinder *guess, bool radius_is_known, double level, Cylinder *out, double *inlier_rate);
 
 // Of the two ways tracked from one start: does the root lie at the end of `a`? The one end that reaches the volume's border is; where both or none does,
 // the wider one (medians of the last nodes), and of equals the one nearer to the border. Neither may be empty. *why says which.

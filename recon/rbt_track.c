@@ -18,6 +18,7 @@
 #include "recon/rbt_ostia.h"
 #include "recon/rbt_residue.h"
 #include "recon/rbt_start.h"
+#include "recon/rbt_start_check.h"
 #include "recon/rbt_tracker.h"
 
 #include <stdio.h>
@@ -288,6 +289,9 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     double contrast = recent_contrast(branch);
     if (next->contrast < p->contrast * contrast || !(next->contrast > 0.02 * ((double)t->volume->maximum - (double)t->volume->minimum)))
         return false;
+    t->why = "does not stand out of the noise";
+    if (t->is_noisy && !rbt_node_stands_out(t, t->levels, &next->cylinder))
+        return false;
     t->why = "too faint";
     if (t->is_guarded && tracker_brightness(t, next->cylinder.center) < t->floor)
         return false;
@@ -501,7 +505,7 @@ void tracker_run(Tracker *t, const Cylinder *start, Track *branch, bool until_tr
         found = next_node(t, branch, !left);
         bool swells = found && branch->count >= 6 && t->estimate.node.cylinder.radius > 1.35 * tracker_usual_radius(branch);
         rest -= rest > 0;
-        if (p->look_ahead > 0 && !until_tree && left && branch->count >= 6 && rest == 0 && (swells || !found)) {
+        if (p->look_ahead > 0 && !t->is_noisy && !until_tree && left && branch->count >= 6 && rest == 0 && (swells || !found)) {
             rest = 12;
             Estimate *kept = malloc(sizeof *kept);   // the search uses the tracker's own
             if (!kept) {
@@ -693,12 +697,14 @@ static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
     if (seed->has_toward)
         start.axis = vec3_unit(vec3_sub(seed->toward, seed->start));
     if (is_first && (!seed->has_toward || !(seed->radius > 0))) {
-        if (!rbt_estimate_start(t, seed, &start))
+        if (!rbt_first_start(t, t->levels, seed, &start))
             return false;
         if (!seed->has_toward)
             return track_both_ways(t, seed, &start, number);
         say_start(t, seed, &start, "the root is the start");
     }
+    if (is_first && seed->has_toward && seed->radius > 0 && !rbt_suit_given(t, t->levels, &start))
+        return false;
     if (!is_first) {
         Vec3 foot = seed->start;
         int parent = project_to_tree(t, seed->start, &foot);
@@ -718,6 +724,10 @@ static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
     if (out.count == 0)
         tracker_run(t, &start, &out, false);
     const char *why = t->why;
+    if (is_first && seed->has_toward && seed->radius > 0 && out.count > 0 && !rbt_check_given(t, t->levels, seed, &out.node[0])) {
+        track_free(&out);
+        return false;
+    }
     if (both_ways && out.count > 0 && !t->out_of_memory) {
         Cylinder behind = out.node[0].cylinder;
         behind.axis = vec3_negate(behind.axis);
@@ -1057,7 +1067,8 @@ static void brightness_range(const Volume *volume, double *low, double *high)
     }
 }
 
-static bool check_point(const Tracker *t, Vec3 x, const char *what, int line, int column, const char *path, Faults *faults)
+// `seed` is NULL for points that are no starts.
+static bool check_point(Tracker *t, Vec3 x, const RbtSeed *seed, const char *what, int line, int column, const char *path, Faults *faults)
 {
     Vec3 v = volume_voxel_of(t->volume, x);
     const int *size = t->volume->size;
@@ -1068,7 +1079,7 @@ static bool check_point(const Tracker *t, Vec3 x, const char *what, int line, in
         return false;
     }
     double value = tracker_brightness(t, x), low = (double)t->volume->minimum, high = (double)t->volume->maximum;
-    if (!(high > low) || value < fmax(low + 0.1 * (high - low), t->dark)) {
+    if (!(high > low) || (value < fmax(low + 0.1 * (high - low), t->dark) && !(seed ? rbt_stands_out(t, t->levels, seed) : t->is_noisy))) {
         faults_add(faults, path, line, column,
                    "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies on background (%g in a volume of %g to %g); a point inside a vessel, above %g",
                    what, x.x, x.y, x.z, v.x, v.y, v.z, value, low, high, fmax(low + 0.1 * (high - low), t->dark));
@@ -1077,15 +1088,12 @@ static bool check_point(const Tracker *t, Vec3 x, const char *what, int line, in
     return true;
 }
 
-static bool check_seed(const Tracker *t, RbtSeed *seed, int number, const char *path, Faults *faults)
+static bool check_seed(Tracker *t, RbtSeed *seed, int number, const char *path, Faults *faults)
 {
     char what[64];
     int before = faults->count;
-    seed->start = in_mm(t->volume, seed->start, seed->start_is_voxel);
-    seed->toward = in_mm(t->volume, seed->toward, seed->toward_is_voxel);
-    seed->start_is_voxel = seed->toward_is_voxel = false;
     snprintf(what, sizeof what, "the start of branch %d", number + 1);
-    check_point(t, seed->start, what, seed->line, seed->column, path, faults);
+    check_point(t, seed->start, seed, what, seed->line, seed->column, path, faults);
     if (tracker_is_forbidden(t, seed->start))
         faults_add(faults, path, seed->line, seed->column, "the start of branch %d lies in a region of `forbid`; a start outside of it", number + 1);
     if (seed->has_toward && !(vec3_distance(seed->start, seed->toward) > 1e-6 * t->voxel))
@@ -1098,6 +1106,15 @@ static bool check_seed(const Tracker *t, RbtSeed *seed, int number, const char *
         faults_add(faults, path, seed->line, seed->column, "the radius %g mm of branch %d is larger than the volume; at most %g mm", seed->radius,
                    number + 1, extent / 2);
     return faults->count == before;
+}
+
+static RbtSeed seed_in_mm(const Volume *volume, const RbtSeed *given)
+{
+    RbtSeed seed = *given;
+    seed.start = in_mm(volume, given->start, given->start_is_voxel);
+    seed.toward = in_mm(volume, given->toward, given->toward_is_voxel);
+    seed.start_is_voxel = seed.toward_is_voxel = false;
+    return seed;
 }
 
 static VesselTree *finish_tree(const Track *track)
@@ -1153,12 +1170,23 @@ static bool out_of_memory_at(const Job *job, int number)
     return false;
 }
 
+static bool start_is_refused(const Tracker *t, const RbtSeed *seed, int number, const char *path, Faults *faults)
+{
+    faults_add(faults, path, seed->line, seed->column, "the start of branch %d (%g, %g, %g) mm: %s", number + 1, seed->start.x, seed->start.y, seed->start.z, t->refusal);
+    return false;
+}
+
 static bool run_seed(Tracker *t, const Job *job, int i)
 {
-    if (track_seed(t, &job->seed[i], i))
+    if (track_seed(t, &job->seed[i], i)) {
+        if (i == 0)
+            rbt_judge_branch(t, t->levels, t->tree.count);
         return true;
+    }
     if (t->out_of_memory)
         return out_of_memory_at(job, i);
+    if (t->refusal[0])
+        return start_is_refused(t, &job->seed[i], i, job->path, job->faults);
     faults_add(job->faults, job->path, job->seed[i].line, job->seed[i].column,
                "nothing could be tracked from the start of branch %d (%s); a point well inside the vessel, "
                "about its true radius and direction",
@@ -1429,6 +1457,7 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
     RbtSeed *seed = malloc((size_t)(seed_count > 0 ? seed_count : 1) * sizeof *seed);
     Vec3 **center = calloc((size_t)(aneurysm_count > 0 ? aneurysm_count : 1), sizeof *center);
     RbtReport own = {0};
+    RbtLevels levels = rbt_levels_of(volume, threads);
     VesselTree *tree = NULL;
     bool good = t && seed && center;
     int before = faults->count;
@@ -1440,29 +1469,38 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
         faults_add(faults, path, 0, 0, "there is no branch to track; `branches` with at least one start");
     if (good) {
         *t = (Tracker){.volume = volume, .parameters = parameters, .voxel = volume_voxel_size(volume), .ray_count = (int)parameters->n_r,
-                       .axis_count = (int)parameters->n_d, .longest = HUGE_VAL};
+                       .axis_count = (int)parameters->n_d, .longest = HUGE_VAL, .scan_count = -1};
         double low, high;
         brightness_range(volume, &low, &high);
         t->background = low;
         t->dark = low + 0.2 * (high - low);
-        if (seed_count > 0)
-            memcpy(seed, given, (size_t)seed_count * sizeof *seed);
+        for (int i = 0; i < seed_count; i++)
+            seed[i] = seed_in_mm(volume, &given[i]);
+        sphere_directions(sphere_level_of(t->ray_count), t->ray);
+        prepare_axes(t);
+        t->levels = &levels;
+        if (seed_count > 0 && tracker_is_inside(volume, seed[0].start) && !rbt_look_at_noise(t, &levels, &seed[0])) {
+            if (t->out_of_memory)
+                faults_add(faults, path, 0, 0, "out of memory");
+            else
+                start_is_refused(t, &seed[0], 0, path, faults);
+        }
         for (int i = 0; i < seed_count; i++)
             check_seed(t, &seed[i], i, path, faults);
         for (int i = 0; i < aneurysm_count; i++)
             for (int k = 0; k < aneurysm[i].center_count; k++) {
                 center[i][k] = in_mm(volume, aneurysm[i].center[k], aneurysm[i].is_voxel);
-                check_point(t, center[i][k], "a centre of an aneurysm", aneurysm[i].line, aneurysm[i].column, path, faults);
+                check_point(t, center[i][k], NULL, "a centre of an aneurysm", aneurysm[i].line, aneurysm[i].column, path, faults);
             }
     }
     if (good && faults->count == before) {
-        sphere_directions(sphere_level_of(t->ray_count), t->ray);
-        prepare_axes(t);
         Job job = {seed, seed_count, aneurysm, center, aneurysm_count, threads, progress, path, faults};
         if (track_all(t, &job, &own) && !(tree = finish_tree(&t->tree)))
             faults_add(faults, path, 0, 0, "out of memory for a tree of %d nodes", t->tree.count);
         memcpy(own.start, t->start, sizeof own.start);
+        own.check = t->check;
     }
+    rbt_levels_free(&levels);
     if (t)
         track_free(&t->tree);
     for (int i = 0; center && i < aneurysm_count; i++)

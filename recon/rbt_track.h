@@ -9,6 +9,7 @@
 
 #include "geom/vessel_tree.h"
 #include "recon/parallel.h"
+#include "recon/ransac_cylinder.h"
 #include "recon/volume.h"
 
 #include <stdint.h>
@@ -136,12 +137,45 @@ typedef struct RbtJunction {
     double dropped_mm;       // … and their length
 } RbtJunction;
 
+typedef enum RbtDoubt {      // what makes a result doubtful
+    RBT_DRIFT,               // [mm] the click's distance from the axis of the vessel that was found; limit: its radius
+    RBT_INLIERS,             // share of the edge points on the cylinder at the start, at the root or over the first branch
+    RBT_RADIUS,              // [mm] against the volume's least extent
+    RBT_SHAPE,               // share of its contrast that the wall of the start has on its brightest sides
+    RBT_NOISE,               // contrast in standard errors or in standard deviations of the noise
+    RBT_BACKGROUND,          // [grey values] by which it changes beside the first branch; limit: its contrast
+    RBT_LENGTH,              // [radii] of the first branch
+    RBT_DOUBTS
+} RbtDoubt;
+extern const char *const rbt_doubt_name[RBT_DOUBTS];
+
+enum { RBT_MAX_WARNINGS = 12 };
+typedef struct RbtWarning {
+    RbtDoubt kind;
+    double measured, limit;
+    char text[240];          // what was measured, what is usual, what may help
+} RbtWarning;
+
+typedef struct RbtStartCheck {
+    Vec3 click;              // [mm] what was given …
+    Cylinder cylinder;       // … and what was found
+    double drift;            // [mm] from the click to its axis
+    double inlier_rate;
+    double noise;            // [grey values] standard deviation of a voxel of the volume
+    double contrast;         // [grey values] of the inside against what is beside it
+    double certainty;        // contrast in standard errors; HUGE_VAL without noise
+    double smoothing_mm;     // standard deviation of the Gaussian that the tracked copy was blurred with; 0: none
+    int warning_count;
+    RbtWarning warning[RBT_MAX_WARNINGS];
+} RbtStartCheck;
+
 typedef struct RbtReport {
     int branch_count;
     RbtBranchReport *branch; // in the order of the tree's nodes: one a seed, those found, one an aneurysm
     int junction_count;
     RbtJunction *junction;   // none with `ostia` 0
     char start[256];         // what was estimated at the first start, and which end is the root; empty: it was given
+    RbtStartCheck check;
 } RbtReport;
 void rbt_report_free(RbtReport *report);
 

@@ -54,6 +54,12 @@ typedef struct Tracker {
     bool out_of_memory;
     const char *why;         // the last estimate was refused
     char start[256];         // what was estimated at the first start; empty: nothing
+    struct RbtLevels *levels;// the volume and its smoothed copies, for the first start
+    bool is_noisy;           // single voxels are noisier than the first vessel is bright
+    int scan_count;          // tubes around the first start that stand out, best first; -1: not looked for
+    Cylinder scan[12];
+    RbtStartCheck check;
+    char refusal[300];       // why the first start is refused; empty: it is not
 } Tracker;
 
 bool track_append(Track *track, const TrackNode *node, const Vec3 *point);   // false: out of memory
