@@ -135,7 +135,7 @@ static bool fit(FieldModel *model, const FieldFitOptions *options, const Progres
     }
     all_due(model);
     for (int k = 0; k < LAST_SWEEPS; k++) {
-        model->guard_weight *= 1.5;
+        model->guard_weight *= getenv("GW") ? atof(getenv("GW")) : 1.5;
         sweep(&s, 3);
     }
     return !s.failed;

@@ -16,8 +16,12 @@
 #include <string.h>
 
 // Of a tube's radius: points nearer to its axis are not wall.
+// Inside the field stays near the scaled distance's 0 to 1 in this direction, too: large amplitudes that cancel at the wall leave hollows beside the axis.
+static const double MOST_INSIDE = 1.3;
 static const double LUMEN_POINT = 0.5;
-enum { GUARD_EVERY = 8, RING = 10, LINK_GUARDS = 4 };
+// A sac is no ball: only this share of it is lumen for certain, beyond that its data say where it ends.
+static const double SAC_BALL = 0.6;
+enum { GUARD_EVERY = 3, RING = 12, LINK_GUARDS = 4 };
 
 typedef struct Draft {       // rows of a node while they are collected
     int data, guards, data_room, guard_room;
@@ -103,8 +107,8 @@ static bool is_outside(const VesselTree *tree, int node, Vec3 x, double clear)
 {
     for (int k = tree->near_offset[node] - 1; k < tree->near_offset[node + 1]; k++) {
         int at = k < tree->near_offset[node] ? node : tree->near[k];
-        double r = tree->radius[at];
-        if (share_of_tube(tree, at, x) * r < 1.1 * r + 0.5 * clear)
+        double r = tree->radius[at], share = tree->kind[at] == NODE_VESSEL ? 1.1 : SAC_BALL;
+        if (share_of_tube(tree, at, x) * r < share * r + 0.5 * clear)
             return false;
         if (vec3_distance(x, tree->center[at]) > r + tree->height[at] + 2 * clear + 1.5 * r)
             continue;
@@ -134,7 +138,7 @@ static void guard_around_point(const VesselTree *tree, int node, Vec3 p, Draft *
     out = vec3_scale(out, 1 / far);
     for (int k = 1; k <= 2; k++) {
         double in = far * k / 3;
-        add_guard(d, vec3_add_scaled(p, -in, out), low_bound(0.5 * in, r), HUGE_VAL);
+        add_guard(d, vec3_add_scaled(p, -in, out), low_bound(0.5 * in, r), MOST_INSIDE);
     }
     for (int k = 0; k < 3; k++) {
         static const double away[3] = {0.35, 0.8, 1.4};
@@ -163,7 +167,7 @@ static void guard_axis(const VesselTree *tree, int node, Draft *d)
 {
     int parent = tree->parent[node];
     double r = tree->radius[node];
-    add_guard(d, tree->center[node], low_bound(0.5 * r, r), HUGE_VAL);
+    add_guard(d, tree->center[node], low_bound(0.5 * r, r), MOST_INSIDE);
     if (!field_link_is_lumen(tree, node))
         return;
     Vec3 a = tree->center[parent], b = tree->center[node], axis = vec3_unit_or(vec3_sub(b, a), tree->direction[node]);
@@ -172,10 +176,10 @@ static void guard_axis(const VesselTree *tree, int node, Draft *d)
     for (int k = 0; k < steps; k++) {
         double t = (k + 0.5) / steps, free = fmin(r, tree->radius[parent]);
         Vec3 x = vec3_mix(a, b, t);
-        add_guard(d, x, low_bound(0.5 * free, free), HUGE_VAL);
+        add_guard(d, x, low_bound(0.5 * free, free), MOST_INSIDE);
         for (int around = 0; around < 4; around++) {
             Vec3 side = around < 2 ? e1 : e2;
-            add_guard(d, vec3_add_scaled(x, (around % 2 ? 0.4 : -0.4) * free, side), low_bound(0.3 * free, free), HUGE_VAL);
+            add_guard(d, vec3_add_scaled(x, (around % 2 ? 0.4 : -0.4) * free, side), low_bound(0.3 * free, free), MOST_INSIDE);
         }
     }
 }
@@ -204,7 +208,7 @@ static void extend_inlet(const VesselTree *tree, Draft *d)
                 add_point(d, vec3_add_scaled(p, copy * slab, up));
         }
     for (int k = 1; k <= 4; k++)
-        add_guard(d, vec3_add_scaled(root, 0.5 * k * r, up), low_bound(0.5 * r, r), HUGE_VAL);
+        add_guard(d, vec3_add_scaled(root, 0.5 * k * r, up), low_bound(0.5 * r, r), MOST_INSIDE);
 }
 
 static void draft_node(void *context, long index)
@@ -271,7 +275,7 @@ static void split_rows(Row *row, int count, int node, RowTile **tile, float **me
     }
     if (count == 0)
         return;
-    if (data > FIELD_TILE || count - data > FIELD_TILE) {
+    if (data > FIELD_TILE || count - data > GUARD_TILE) {
         int axis = high[1] - low[1] > high[0] - low[0] ? 1 : 0;
         axis = high[2] - low[2] > high[axis] - low[axis] ? 2 : axis;
         qsort(row, (size_t)count, sizeof *row, axis == 0 ? by_x : axis == 1 ? by_y : by_z);
@@ -330,9 +334,8 @@ static Row *collect_rows(const Job *job, int *first)
             int cell = job->cell[i][k];
             Vec3 x = vec3_sub(is_data ? d->point[k] : d->at[k - d->data], tree->center[cell]);
             // in a cell wider than the vessel that the guard is of, its field rises more slowly
-            float scale = (float)fmin(1, tree->radius[i] / tree->radius[cell]);
-            row[first[cell + 1]++] = (Row){{(float)x.x, (float)x.y, (float)x.z}, is_data ? 0 : d->bound[k - d->data][0] * scale,
-                                           is_data ? 0 : d->bound[k - d->data][1] * scale, is_data};
+            float scale = (float)fmin(1, tree->radius[i] / tree->radius[cell]), low = is_data ? 0 : d->bound[k - d->data][0], high = is_data ? 0 : d->bound[k - d->data][1];
+            row[first[cell + 1]++] = (Row){{(float)x.x, (float)x.y, (float)x.z}, low * scale, high < 0 ? high * scale : high, is_data};
         }
     }
     return row;

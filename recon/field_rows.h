@@ -8,9 +8,9 @@
 #include "geom/vessel_tree.h"
 #include "recon/field_lanes.h"
 
-enum { FIELD_TILE = 64 };
+enum { FIELD_TILE = 64, GUARD_TILE = 128 };
 
-typedef struct RowTile {     // up to FIELD_TILE neighbouring data and as many guards of one node
+typedef struct RowTile {     // neighbouring rows of one node: up to FIELD_TILE data, GUARD_TILE guards
     int node;
     int data, data_padded;   // D: points on the wall, f = 0
     int guards, guards_padded;   // G: f within [low, high]

@@ -14,7 +14,7 @@
 enum { REGION_BLOBS = 28, UNKNOWNS = 5, COLOURS_MAX = 4096 };
 static const double HUBER_RADII = 0.08, LEAST_SLOPE = 0.5;
 // Priors: a blob's place and size are held to where it was put, as firmly as a few points a hundredth of a radius off would.
-static const double PRIOR_PLACE = 0.02, PRIOR_AMPLITUDE = 0.002;
+static const double PRIOR_PLACE = 0.02, PRIOR_AMPLITUDE = 0.005;
 
 typedef struct TileWork {    // a tile's part in a region's solution
     const RowTile *tile;
@@ -101,7 +101,7 @@ static void sum_still(const Sweep *sweep, int region, TileWork *tw)
     }
 }
 
-enum { ROWS_MAX = 3 * FIELD_TILE };          // of a tile: data, guards, slopes
+enum { POINTS_MAX = FIELD_TILE + GUARD_TILE, ROWS_MAX = POINTS_MAX + FIELD_TILE };          // of a tile: data, guards, slopes
 
 static bool begin_work(Work *w, const Sweep *sweep, const Region *region)
 {
@@ -110,7 +110,7 @@ static bool begin_work(Work *w, const Sweep *sweep, const Region *region)
     size_t u = (size_t)w->unknowns, stride = (u + FIELD_LANES) / FIELD_LANES * FIELD_LANES;
     w->tile = calloc((size_t)most + 1, sizeof *w->tile);
     w->local = malloc(((size_t)most * (size_t)region->count + 1) * sizeof *w->local);
-    w->memory = malloc(((size_t)most * 10 * FIELD_TILE + 1) * sizeof *w->memory);
+    w->memory = malloc(((size_t)most * (2 * POINTS_MAX + 6 * FIELD_TILE) + 1) * sizeof *w->memory);
     w->matrix = malloc(2 * (u * u + u) * sizeof *w->matrix);
     w->trial = malloc((size_t)region->count * sizeof *w->trial);
     w->row = aligned_alloc(64, stride * ROWS_MAX * sizeof *w->row);
@@ -209,7 +209,7 @@ static double energy(const Work *w, const FieldBlob *blob)
 // A tile's rows as they count in a linearisation: data, and those guards that are violated.
 typedef struct Weighed {
     int data, rows;          // padded: D, D + guards
-    float x[2 * FIELD_TILE], y[2 * FIELD_TILE], z[2 * FIELD_TILE], scale[2 * FIELD_TILE], bend[FIELD_TILE], n[3][FIELD_TILE];
+    float x[POINTS_MAX], y[POINTS_MAX], z[POINTS_MAX], scale[POINTS_MAX], bend[FIELD_TILE], n[3][FIELD_TILE];
 } Weighed;
 
 // Sums made; the residuals go to `residual` as the columns stand: data, guards, slopes.
