@@ -23,34 +23,41 @@ typedef struct FitCommand {
     const char *tree, *output, *json, *picture, *preset;
     LimFitOptions options;
     double edge_blur;        // [mm] < 0: what the tree's file says
+    double voxel;            // [mm] 0: not known
     double tool_radius;      // [mm] of the tool led from the inlet through the model
+    const char *local_option;   // one that only local models have, where it was given
     bool has_voxel, quiet, measure;
 } FitCommand;
+
+static bool is_shared_preset(const char *preset) { return !strcmp(preset, "default"); }
 
 static const char help[] =
     "Usage: seldinger fit TREE.h5 -o MODEL.h5 [options]\n"
     "       seldinger fit MODEL.h5 --measure [--json F]\n\n"
-    "Fits a local blobby model to the points around every node (LIM, Kerrien et al. 2017).\n\n"
+    "Fits an implicit wall to the points of a tree: one field of shared blobs of compact support, which is the same from both sides of every border\n"
+    "between neighbouring nodes; or, by preset, a local blobby model for each node (LIM, Kerrien et al. 2017).\n\n"
     "  -o, --output F.h5      the model\n"
-    "  --preset NAME          default, or paper: the published values and method; give it before other options\n"
-    "  --target-mm X          stop when every point is this near [mm]; default: max(0.5 voxel, min(0.2 r, 1.5 voxels)) of the node's radius r,\n"
-    "                         where no voxel is known 0.08 r; half of it near an aneurysm; paper 0.3\n"
-    "  --max-blobs N          blobs of a local model, at most; default 100\n"
+    "  --preset NAME          default: shared blobs; local: a model for each node, neighbours blended; paper: the published values and method.\n"
+    "                         Give it before other options\n"
+    "  --target-mm X          default preset: mean distance below which no blob is added; default 0.05 voxel, where no voxel is known 0.02 r of the\n"
+    "                         node's radius r. local: stop when every point is this near; default max(0.5 voxel, min(0.2 r, 1.5 voxels)), where no\n"
+    "                         voxel is known 0.08 r; half of it near an aneurysm. paper: 0.3\n"
+    "  --max-blobs N          local, paper: blobs of a local model, at most; default 100\n"
     "  --voxel-mm X           voxel size of the angiogram [mm]; default: what the tree's file says (`voxel_mm`), else not known: the classes of\n"
     "                         d_a are then of 0.2 mm\n"
     "  --edge-blur-mm X       blur (standard deviation) that has moved the points inside the wall; they are first moved out by what it did to a\n"
     "                         vessel of their radius, at most 0.2 X; default: what `segment` found (`edge_blur_mm`); with --preset paper 0\n"
-    "  --alpha X              weight of the cohesion of blobs; default 0, paper 1e-5\n"
-    "  --beta X               smoothing: by default 1e-4, which weighs curvature by the noise's variance times r^2 as found from the points (twice:\n"
+    "  --alpha X              local, paper: weight of the cohesion of blobs; default 0, paper 1e-5\n"
+    "  --beta X               local, paper: smoothing: by default 1e-4, which weighs curvature by the noise's variance times r^2 as found from the points (twice:\n"
     "                         twice that, 0: none); paper 1e-3, the weight of curvature itself [mm^4]\n"
-    "  --max-points N         points of a local model, at most (evenly thinned), five times as many near an aneurysm;\n"
+    "  --max-points N         local, paper: points of a local model, at most (evenly thinned), five times as many near an aneurysm;\n"
     "                         default 300, paper 1500\n"
     "  --threads N            default 0: all cores; the result does not depend on it\n"
-    "  --measure              also: how far neighbouring local models differ where a tool passes from one to the next, walls that no\n"
+    "  --measure              also: how far neighbouring nodes' walls differ where a tool passes from one to the next, walls that no\n"
     "                         point supports, narrow links; without -o of the model given, which is then not fitted again\n"
     "  --tool-radius-mm X     of the tool that is led from the model's inlet through the tree, for the report at the end; default 0.18\n"
     "  --json F               figures as JSON; - is standard output\n"
-    "  --picture F.png        fitted surface coloured by the distance to the points, the worst local models cut open\n"
+    "  --picture F.png        fitted surface coloured by the distance to the points, the worst nodes cut open\n"
     "  --quiet                no summary, no progress\n\n"
     "Exit codes: 0 done; 2 wrong usage or bad input.\n";
 
@@ -106,19 +113,23 @@ static int parse_options(int argc, char **argv, FitCommand *command)
             command->has_voxel = true;
             break;
         case ALPHA:
+            command->local_option = "--alpha";
             if (!cli_number("--alpha", optarg, 0, 1, &o->alpha))
                 return EXIT_BAD_INPUT;
             break;
         case BETA:
+            command->local_option = "--beta";
             if (!cli_number("--beta", optarg, 0, 10, &o->beta))
                 return EXIT_BAD_INPUT;
             break;
         case BLOBS:
+            command->local_option = "--max-blobs";
             if (!cli_whole_number("--max-blobs", optarg, 2, 1000, &number))
                 return EXIT_BAD_INPUT;
             o->max_blobs = (int)number;
             break;
         case POINTS:
+            command->local_option = "--max-points";
             if (!cli_whole_number("--max-points", optarg, 50, 100000, &number))
                 return EXIT_BAD_INPUT;
             o->max_points = (int)number;
@@ -136,25 +147,49 @@ static int parse_options(int argc, char **argv, FitCommand *command)
         return usage_fault(optind < argc ? "one tree at a time, not also " : "lacks the tree to fit", optind < argc ? argv[optind + 1] : "");
     if (!command->output && !command->measure)
         return usage_fault("lacks -o MODEL.h5", "");
+    if (command->local_option && is_shared_preset(command->preset))
+        return usage_fault("--preset local or paper is needed for ", command->local_option);
     command->tree = argv[optind];
     return -1;
+}
+
+static FieldFitOptions shared_options(const FitCommand *command)
+{
+    FieldFitOptions options = field_fit_default_options();
+    options.threads = command->options.threads;
+    options.target_mm = command->options.target_mm;
+    options.voxel_mm = command->voxel;
+    return options;
+}
+
+static int describe_fit(const FitCommand *command, char *text, size_t room)
+{
+    const LimFitOptions *o = &command->options;
+    if (is_shared_preset(command->preset)) {
+        FieldFitOptions f = shared_options(command);
+        return snprintf(text, room,
+                        "fit:\n  preset: %s\n  edge_blur_mm: %g\n  target_mm: %g\n  voxel_mm: %g\n  tolerance_voxels: %g\n  tolerance_radii: %g\n"
+                        "  tolerance_without_voxel_radii: %g\n  least_reach_voxels: %g\n  significance: %g\n  levels: %d\ntree:\n",
+                        command->preset, command->edge_blur, f.target_mm, f.voxel_mm, f.tolerance_voxels, f.tolerance, f.tolerance_unknown,
+                        f.least_reach_voxels, f.significance, f.levels);
+    }
+    return snprintf(text, room,
+                    "fit:\n  preset: %s\n  edge_blur_mm: %g\n  alpha: %g\n  beta: %g\n  s: %g\n  iso_level: %g\n  max_blobs: %d\n  target_mm: %g\n  voxel_mm: %g\n"
+                    "  topological_distance: %d\n  max_loops: %d\n  line_searches: %d\n  weigh_distance: %d\n  project_points: %d\n"
+                    "  sweep_all_blobs: %d\n  give_up_splits: %d\n  extend_inlet: %d\n  guard_shape: %d\n  agree: %d\n  max_points: %d\ntree:\n",
+                    command->preset, command->edge_blur, o->alpha, o->beta, o->s, o->iso_level, o->max_blobs, o->target_mm, o->voxel_mm,
+                    o->topological_distance, o->max_loops, o->line_searches, o->weigh_distance, o->project_points, o->sweep_all_blobs, o->give_up_splits,
+                    o->extend_inlet, o->guard_shape, o->agree, o->max_points);
 }
 
 // What was done, as YAML; the tree's own parameters below.
 static char *describe(const FitCommand *command, const TreeFileInfo *tree)
 {
-    const LimFitOptions *o = &command->options;
     size_t room = 1024 + 4 * (tree->parameters ? strlen(tree->parameters) : 0);
     char *text = malloc(room);
     if (!text)
         return NULL;
-    int n = snprintf(text, room,
-                     "fit:\n  preset: %s\n  edge_blur_mm: %g\n  alpha: %g\n  beta: %g\n  s: %g\n  iso_level: %g\n  max_blobs: %d\n  target_mm: %g\n  voxel_mm: %g\n"
-                     "  topological_distance: %d\n  max_loops: %d\n  line_searches: %d\n  weigh_distance: %d\n  project_points: %d\n"
-                     "  sweep_all_blobs: %d\n  give_up_splits: %d\n  extend_inlet: %d\n  guard_shape: %d\n  agree: %d\n  max_points: %d\ntree:\n",
-                     command->preset, command->edge_blur, o->alpha, o->beta, o->s, o->iso_level, o->max_blobs, o->target_mm, o->voxel_mm, o->topological_distance,
-                     o->max_loops, o->line_searches, o->weigh_distance, o->project_points, o->sweep_all_blobs, o->give_up_splits, o->extend_inlet,
-                     o->guard_shape, o->agree, o->max_points);
+    int n = describe_fit(command, text, room);
     char *out = text + n;
     bool line_start = true;
     for (const char *in = tree->parameters; in && *in && out < text + room - 4; in++) {
@@ -337,6 +372,7 @@ static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seco
             double said = tree_file_number(info, "voxel_mm", 0);
             command->options.voxel_mm = said > 1e-4 && said < 100 ? said : 0;
         }
+        command->voxel = command->options.voxel_mm;
         if (!command->output)
             return tree;
         if (command->edge_blur < 0)      // a model's points are where its fit has put them
@@ -346,15 +382,8 @@ static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seco
         ProgressBar bar;
         Progress progress = progress_bar(&bar, "fit", command->quiet);
         double begin = seconds_now();
-        if (!strcmp(command->preset, "default")) {
-            FieldFitOptions options = field_fit_default_options();
-            options.threads = command->options.threads;
-            options.target_mm = command->options.target_mm;
-            options.voxel_mm = command->options.voxel_mm;
-            if (getenv("FIELD_TOL")) options.tolerance_voxels = atof(getenv("FIELD_TOL"));
-            if (getenv("FIELD_LEAST")) options.least_reach_voxels = atof(getenv("FIELD_LEAST"));
-            if (getenv("FIELD_SIG")) options.significance = atof(getenv("FIELD_SIG"));
-            if (getenv("FIELD_LEVELS")) options.levels = atoi(getenv("FIELD_LEVELS"));
+        if (is_shared_preset(command->preset)) {
+            FieldFitOptions options = shared_options(command);
             model = field_fit(tree, &options, &progress, faults);
         } else {
             model = lim_fit(tree, &command->options, &progress, faults);

@@ -43,7 +43,8 @@ static const char help[] =
     "  --picture F.png    vessel and tool at the end\n"
     "  --picture-at S     instead of the end, this moment [s]; up to 6 of them stand side by side\n"
     "  --chart F.png      forces at the hand and the wall, contacts, depth, CPU time, iterations and residual over time\n"
-    "  --contact KIND     the surface that answers contact queries: lim, mesh, smooth_mesh, flat_mesh, grid or tube; default: the scene's\n"
+    "  --contact KIND     the surface that answers contact queries: lim, lim_blend, lim_switch, mesh, smooth_mesh,\n"
+    "                     flat_mesh, grid or tube; default: the scene's\n"
     "  --paced            one step each millisecond of real time, on SCHED_FIFO where that is permitted. Over load simulated time slows\n"
     "                     down and the summary says so (deadline_misses, slowed_s); no step is skipped, none is hurried afterwards\n"
     "  --threads N        threads of offline work such as fitting a shape; default 0: all cores\n"
@@ -145,7 +146,7 @@ static Scene *prepare_scene(const RunOptions *options, Faults *faults)
         if (!strcmp(options->contact, contact_name[i]))
             kind = i;
     if (options->contact && kind < 0)
-        faults_add(faults, "--contact", 0, 0, "'%.40s' is no kind; valid: lim, mesh, smooth_mesh, flat_mesh, grid, tube", options->contact);
+        faults_add(faults, "--contact", 0, 0, "'%.40s' is not known; valid: lim, lim_blend, lim_switch, mesh, smooth_mesh, flat_mesh, grid, tube", options->contact);
     output_check(options->summary, faults);
     output_check(options->final, faults);
     output_check(options->score, faults);

@@ -5,6 +5,7 @@
 #include "cli/contact_surface.h"
 #include "cli/tube_tree.h"
 #include "geom/mesh_vessel.h"
+#include "recon/field_fit.h"
 #include "recon/lim_fit.h"
 #include "recon/phantom.h"
 #include "recon/tree_file.h"
@@ -52,6 +53,7 @@ static bool cache_folder(char folder[CACHE_PATH])
 // never takes an older one's fit.
 static void cache_key(const Scene *scene, const LimFitOptions *options, char hex[65])
 {
+    bool local = contact_is_local(scene->contact);
     Sha256 sha;
     char program[65] = SELDINGER_VERSION;
     sha256_of_file("/proc/self/exe", program);
@@ -75,11 +77,23 @@ static void cache_key(const Scene *scene, const LimFitOptions *options, char hex
     sha256_begin(&sha);
     sha256_add(&sha, program, strlen(program));
     sha256_add(&sha, figures, sizeof figures);
+    sha256_add(&sha, &local, sizeof local);
     sha256_add(&sha, scene->shape_name, strlen(scene->shape_name) + 1);
     for (int i = 0; i < scene->shape_option_count; i++)
         for (int j = 0; j < 2; j++)
             sha256_add(&sha, scene->shape_option[i][j], strlen(scene->shape_option[i][j]) + 1);
     sha256_end(&sha, hex);
+}
+
+// Shared blobs, or a local model for each node where the contact asks for these.
+static VesselTree *fit_samples(const VesselTree *sampled, ContactKind contact, const LimFitOptions *options, const Progress *progress, Faults *faults)
+{
+    if (contact_is_local(contact))
+        return lim_fit(sampled, options, progress, faults);
+    FieldFitOptions shared = field_fit_default_options();
+    shared.voxel_mm = options->voxel_mm;
+    shared.threads = options->threads;
+    return field_fit(sampled, &shared, progress, faults);
 }
 
 static VesselTree *fit_shape(const Scene *scene, const LimFitOptions *options, bool quiet, Faults *faults)
@@ -88,7 +102,7 @@ static VesselTree *fit_shape(const Scene *scene, const LimFitOptions *options, b
     Progress progress = progress_bar(&bar, "fit", quiet);
     VesselTree *sampled =
         shape_tree(scene->shape_name, scene->shape_option_count, (const char(*)[2][64])scene->shape_option, scene->path, faults);
-    VesselTree *model = sampled ? lim_fit(sampled, options, &progress, faults) : NULL;
+    VesselTree *model = sampled ? fit_samples(sampled, scene->contact, options, &progress, faults) : NULL;
     vessel_tree_free(sampled);
     return model;
 }
@@ -130,14 +144,25 @@ static VesselTree *cached_shape(const Scene *scene, int threads, bool quiet, Fau
 
 enum { CELLS_ROUND_TUBE = 40 };
 
-static bool open_tree(VesselTree *tree, const char *path, OpenVessel *out, Faults *faults)
+static bool open_tree(VesselTree *tree, ContactKind contact, const char *path, OpenVessel *out, Faults *faults)
 {
     if (!tree)
         return false;
     out->tree = tree;
-    out->vessel = vessel_tree_is_model(tree) ? model_vessel_create(tree) : NULL;
-    if (!out->vessel)
+    if (!vessel_tree_is_model(tree)) {
         faults_add(faults, path, 0, 0, "is a tree without a model; make one with `seldinger fit`");
+        return false;
+    }
+    if (contact_is_local(contact) && vessel_tree_is_shared(tree)) {
+        faults_add(faults, path, 0, 0, "holds one field of shared blobs, where contact '%s' needs a local model for each node; `seldinger fit --preset local` makes "
+                   "these, contact 'lim' takes either", contact_name[contact]);
+        return false;
+    }
+    LimVesselOptions local = lim_vessel_default_options();
+    local.field = contact == CONTACT_LIM_SWITCH ? LIM_SWITCH : LIM_BLEND;
+    out->vessel = vessel_tree_is_shared(tree) ? field_vessel_create(tree) : lim_vessel_create_with(tree, &local);
+    if (!out->vessel)
+        faults_add(faults, path, 0, 0, "not enough memory for its contact");
     return out->vessel != NULL;
 }
 
@@ -150,11 +175,11 @@ static bool fit_tube(const Scene *scene, int threads, bool quiet, OpenVessel *ou
     options.voxel_mm = shape_options_voxel_mm(0, NULL);
     options.threads = threads;
     VesselTree *sampled = tube_tree(out->vessel, &scene->tube, scene->path, faults);
-    VesselTree *model = sampled ? lim_fit(sampled, &options, &progress, faults) : NULL;
+    VesselTree *model = sampled ? fit_samples(sampled, scene->contact, &options, &progress, faults) : NULL;
     vessel_tree_free(sampled);
     out->vessel->destroy(out->vessel);
     out->vessel = NULL;
-    return open_tree(model, scene->path, out, faults);
+    return open_tree(model, scene->contact, scene->path, out, faults);
 }
 
 // The wall of the open vessel as triangles or a grid, in its place. A tree stays: it says where the vessel runs.
@@ -209,12 +234,12 @@ static bool open_source(const Scene *scene, int threads, bool quiet, OpenVessel 
 {
     switch (scene->source) {
     case SOURCE_NONE: return true;
-    case SOURCE_MODEL: return open_tree(tree_file_load(scene->model_path, NULL, faults), scene->model_path, out, faults);
-    case SOURCE_SHAPE: return open_tree(cached_shape(scene, threads, quiet, faults), scene->path, out, faults);
+    case SOURCE_MODEL: return open_tree(tree_file_load(scene->model_path, NULL, faults), scene->contact, scene->model_path, out, faults);
+    case SOURCE_SHAPE: return open_tree(cached_shape(scene, threads, quiet, faults), scene->contact, scene->path, out, faults);
     case SOURCE_MESH: return open_mesh(scene, out, faults);
     case SOURCE_TUBE:
         out->vessel = tube_vessel_create(&scene->tube, scene->path, faults);
-        return out->vessel && (scene->contact != CONTACT_LIM || fit_tube(scene, threads, quiet, out, faults));
+        return out->vessel && (!contact_is_fitted(scene->contact) || fit_tube(scene, threads, quiet, out, faults));
     case SOURCE_PLANE:
         out->vessel = plane_vessel_create(scene->plane_point, scene->plane_normal);
         if (!out->vessel)
@@ -235,11 +260,11 @@ bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, F
     if (scene->source == SOURCE_NONE)
         return true;
     if (scene->contact == CONTACT_TUBE && !exact)
-        faults_add(faults, scene->path, 0, 0, "contact 'tube' needs the source 'tube'; a model or shape has lim, mesh, smooth_mesh, flat_mesh and "
-                   "grid, a mesh the last four");
-    else if (scene->contact == CONTACT_LIM && scene->source == SOURCE_MESH)
-        faults_add(faults, scene->path, 0, 0, "contact 'lim' needs local models: make them with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh, "
-                   "flat_mesh and grid");
+        faults_add(faults, scene->path, 0, 0, "contact 'tube' needs the source 'tube'; a model or shape has lim, lim_blend, lim_switch, mesh, smooth_mesh, "
+                   "flat_mesh and grid, a mesh the last four");
+    else if (contact_is_fitted(scene->contact) && scene->source == SOURCE_MESH)
+        faults_add(faults, scene->path, 0, 0, "contact '%s' needs a fitted model: make it with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh, "
+                   "flat_mesh and grid", name);
     else if (as_surface && scene->source == SOURCE_PLANE)
         faults_add(faults, scene->path, 0, 0, "contact '%s' needs a wall that ends somewhere; a plane has 'tube', which is the plane itself", name);
     else if ((as_mesh || scene->source == SOURCE_MESH) && !mesh_vessel_available())

@@ -4,11 +4,10 @@
 #include "geom/sort_doubles.h"
 #include "recon/field_refine.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const double BASE_APART = 0.75, BASE_REACH = 2, BASE_REACH_SAC = 1.5;   // of the base blobs, in local radii
+static const double BASE_APART = 0.75, BASE_REACH = 2;   // of the base blobs, in local radii: alone on a line or about a centre they have slope 2/r
 static const double level_reach[] = {1.4, 1.4, 1, 1, 0.7, 0.7, 0.5, 0.35};
 enum { LEVELS = sizeof level_reach / sizeof level_reach[0], LAST_SWEEPS = 4 };
 
@@ -53,7 +52,7 @@ static bool put_base(FieldModel *model, int *first, int **next, int *room, int n
     const VesselTree *tree = model->tree;
     if (is_crowded(model, first, *next, node, x))
         return true;
-    double reach = (tree->kind[node] == NODE_ANEURYSM ? BASE_REACH_SAC : BASE_REACH) * tree->radius[node];
+    double reach = BASE_REACH * tree->radius[node];
     if (model->count == *room) {
         int *more = realloc(*next, (size_t)(2 * *room + 256) * sizeof *more);
         if (!more)
@@ -63,7 +62,7 @@ static bool put_base(FieldModel *model, int *first, int **next, int *room, int n
     }
     (*next)[model->count] = first[node];
     first[node] = model->count;
-    return field_model_add(model, node, x, reach, tree->kind[node] == NODE_ANEURYSM ? 1.5 : 1.1);
+    return field_model_add(model, node, x, reach, tree->kind[node] == NODE_ANEURYSM ? 2.4 : 1.1);
 }
 
 static bool lay_base(FieldModel *model)
@@ -87,6 +86,8 @@ static bool lay_base(FieldModel *model)
         good = field_model_add(model, 0, vec3_add_scaled(tree->center[0], -k * BASE_APART * r, tree->direction[0]), BASE_REACH * r, 1.1);
     free(first);
     free(next);
+    for (int b = 0; b < model->count; b++)
+        model->blob[b].is_base = true;
     return good && field_model_list(model);
 }
 
@@ -106,8 +107,6 @@ static void sweep(Schedule *s, int steps)
     s->done++;
     if (s->progress && s->progress->call)
         s->progress->call(s->progress->context, s->done, s->total);
-    if (getenv("FIELD_TRACE"))
-        fprintf(stderr, "sweep %d: %d blobs, gain %.4f\n", s->done, s->model->count, gain);
 }
 
 static void all_due(FieldModel *model)
@@ -122,20 +121,23 @@ static bool fit(FieldModel *model, const FieldFitOptions *options, const Progres
     if (!lay_base(model))
         return false;
     all_due(model);
-    for (int k = 0; k < 3; k++)
+    // the amplitudes alone come first: places that start out far from the solution end up in bad ones, which no finer blob mends
+    for (int k = 0; k < 3; k++) {
+        model->amplitudes_only = k < 2;
         sweep(&s, 3);
+    }
     for (int level = 0; level < options->levels && !s.failed; level++) {
         bool known = options->voxel_mm > 0, given = options->target_mm > 0;
         FieldRefine how = {level_reach[level], given ? 0 : known ? options->tolerance : options->tolerance_unknown,
                            given ? options->target_mm : options->tolerance_voxels * options->voxel_mm,
                            options->least_reach_voxels * options->voxel_mm, options->significance};
         s.failed |= field_refine(model, &how) < 0;
-        for (int k = 0; k < (getenv("FS") ? atoi(getenv("FS")) : 2); k++)
-            sweep(&s, getenv("FT") ? atoi(getenv("FT")) : 3);
+        for (int k = 0; k < 2; k++)
+            sweep(&s, 3);
     }
-    all_due(model);
     for (int k = 0; k < LAST_SWEEPS; k++) {
-        model->guard_weight *= getenv("GW") ? atof(getenv("GW")) : 1.5;
+        all_due(model);
+        model->guard_weight *= 1.5;
         sweep(&s, 3);
     }
     return !s.failed;

@@ -12,7 +12,7 @@ static const double LIST_REACH = 1.15;
 bool field_model_create(FieldModel *model, const VesselTree *tree, const FieldRows *rows, int threads)
 {
     size_t n = (size_t)tree->node_count;
-    *model = (FieldModel){.tree = tree, .rows = rows, .threads = threads, .guard_weight = 1, .smooth = 0.1};
+    *model = (FieldModel){.tree = tree, .rows = rows, .threads = threads, .guard_weight = 2, .smooth = 0.1};
     model->offset = calloc(n + 1, sizeof *model->offset);
     model->due = calloc(n, sizeof *model->due);
     if (model->offset && model->due)

@@ -5,6 +5,9 @@
 #include "recon/field_lanes.h"
 #include "recon/field_rows.h"
 
+// Of the loss, in local radii: a point further from the wall than that contradicts the others more than it counts.
+#define FIELD_KNEE 0.25
+
 typedef struct FieldBlob {
     Vec3 center;
     double reach, amplitude;
@@ -12,6 +15,7 @@ typedef struct FieldBlob {
     Vec3 birth;              // where it was put, and how large: priors
     double birth_reach;
     int node_count, *node;   // nodes that see it, for a reach a little larger
+    bool is_base;            // its amplitude stays positive: the base is lumen
     bool moved;              // since those were found
 } FieldBlob;
 
@@ -24,6 +28,7 @@ typedef struct FieldModel {
     int64_t *offset;         // (N+1) node i sees blobs seen[offset[i] … offset[i+1]-1], ascending
     int *seen;
     bool *due;               // (N) rows of this node wait for a better fit
+    bool amplitudes_only;    // places and sizes stand still
     double guard_weight;     // of a guard against a data point
     double smooth;           // weight of the slope rows
 } FieldModel;

@@ -1,6 +1,6 @@
 // A candidate stands on each data point p: the residuals of the data near by, weighted by what a blob of reach R at p would be there, w = (1 - d^2/R^2)^3,
 // have the mean m = sum w e / sum w and, for noise of standard deviation s, the deviation s sqrt(sum w^2) / sum w. s is measured at each node, as the spread
-// of the residuals about their mean over half a radius. Candidates beyond tolerance and noise are taken by size, none within 0.8 R of one taken before.
+// of the residuals about their mean over 0.7 radii. Residuals count as they do in the fit: those beyond the loss's knee less and less. Candidates beyond tolerance and noise are taken by size, none within 0.8 R of one taken before.
 #include "recon/field_refine.h"
 
 #include "geom/sort_doubles.h"
@@ -10,6 +10,8 @@
 
 // A blob's centre stands this share of its reach inside the wall, and no two of a level nearer than this share.
 static const double INSIDE = 0.25, APART = 0.8;
+// Where fewer points than this are to be had for each blob, more blobs would only follow the noise.
+static const double POINTS_A_BLOB = 3;
 
 typedef struct Candidate {
     double score;            // of tolerances
@@ -34,8 +36,24 @@ static void measure_residuals(void *context, long index)
 {
     Job *job = context;
     const int *first = job->model->rows->first;
-    for (int t = first[index]; t < first[index + 1]; t++)
-        field_model_residuals(job->model, tile_of(job, t), job->residual[t]);
+    float knee = (float)(FIELD_KNEE * job->model->tree->radius[index]);
+    for (int t = first[index]; t < first[index + 1]; t++) {
+        float *residual = job->residual[t];
+        field_model_residuals(job->model, tile_of(job, t), residual);
+        for (int i = 0; i < tile_of(job, t)->data; i++) {
+            float share = residual[i] / knee, held = 1 / (1 + share * share);
+            residual[i] *= held * held;
+        }
+    }
+}
+
+// Blobs whose centres lie within `reach` of x.
+static int blobs_about(const FieldModel *model, int node, Vec3 x, double reach)
+{
+    int count = 0;
+    for (int64_t s = model->offset[node]; s < model->offset[node + 1]; s++)
+        count += vec3_norm2(vec3_sub(model->blob[model->seen[s]].center, x)) < reach * reach;
+    return count;
 }
 
 typedef struct Mean {
@@ -131,7 +149,7 @@ static void find_candidates(void *context, long index)
             Mean m = mean_about(job, node, x, reach);
             double mean = m.sum / m.weight, noise = job->noise[node] * sqrt(m.weight2) / m.weight, points = m.weight * m.weight / m.weight2;
             double least = fmax(tolerance, job->how->significance * noise);
-            if (points >= 4 && fabs(mean) > least)
+            if (points >= 4 && fabs(mean) > least && points >= POINTS_A_BLOB * (1 + blobs_about(job->model, node, x, reach)))
                 list[found++] = (Candidate){fabs(mean) / least, node, x, mean};
         }
     }

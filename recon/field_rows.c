@@ -17,7 +17,7 @@
 
 // Of a tube's radius: points nearer to its axis are not wall.
 // Inside the field stays near the scaled distance's 0 to 1 in this direction, too: large amplitudes that cancel at the wall leave hollows beside the axis.
-static const double MOST_INSIDE = 1.3;
+static const double MOST_INSIDE = 1.5;
 static const double LUMEN_POINT = 0.5;
 // A sac is no ball: only this share of it is lumen for certain, beyond that its data say where it ends.
 static const double SAC_BALL = 0.6;
@@ -41,7 +41,8 @@ typedef struct Job {
 bool field_link_is_lumen(const VesselTree *tree, int node)
 {
     int parent = tree->parent[node];
-    return parent >= 0 && vec3_distance(tree->center[node], tree->center[parent]) <= tree->radius[node] + tree->radius[parent];
+    bool at_sac = parent >= 0 && (tree->kind[node] != NODE_VESSEL || tree->kind[parent] != NODE_VESSEL);
+    return parent >= 0 && vec3_distance(tree->center[node], tree->center[parent]) <= (at_sac ? 1.5 : 1) * (tree->radius[node] + tree->radius[parent]);
 }
 
 static void add_point(Draft *d, Vec3 x)
@@ -103,7 +104,7 @@ static bool is_in_lumen(const VesselTree *tree, int node, Vec3 x)
 }
 
 // Whether x is clear by `clear` of every tube and of all data near the node.
-static bool is_outside(const VesselTree *tree, int node, Vec3 x, double clear)
+static bool is_clear(const VesselTree *tree, int node, Vec3 x, double clear)
 {
     for (int k = tree->near_offset[node] - 1; k < tree->near_offset[node + 1]; k++) {
         int at = k < tree->near_offset[node] ? node : tree->near[k];
@@ -117,6 +118,15 @@ static bool is_outside(const VesselTree *tree, int node, Vec3 x, double clear)
                 return false;
     }
     return true;
+}
+
+// The same near the node whose cell x lies in: just beyond a vessel's wall its sibling's lumen may begin, which is not near in the tree.
+static bool is_outside(const VesselTree *tree, int node, Vec3 x, double clear)
+{
+    if (!is_clear(tree, node, x, clear))
+        return false;
+    int cell = power_walk(tree, x, node, 8);
+    return cell == node || is_clear(tree, cell, x, clear);
 }
 
 static Vec3 axis_point(const VesselTree *tree, int node, Vec3 p)

@@ -28,7 +28,7 @@ typedef struct FieldRows {
     int64_t dropped;         // data points left out: inside another tube's lumen
 } FieldRows;
 
-// A link of the tree is lumen where its two balls meet.
+// A link of the tree is lumen where its two balls meet; a sac is no ball and may reach half as far again.
 bool field_link_is_lumen(const VesselTree *tree, int node);
 // How far upstream of an open inlet the wall is carried on, in the root's radii.
 #define FIELD_INLET_RADII 2.2

@@ -1,6 +1,6 @@
 // Levenberg and Marquardt's method on a region's blobs at a time, the others standing still.
 //
-// Rows, in mm: data  e = f/|g|, by Huber's loss;  slope  e = s r (r |g| / 2 - 1);  guards  e = w r/2 (f - clamp(f, low, high)). A linearisation holds
+// Rows, in mm: data  e = f/|g|, by Geman and McClure's loss;  slope  e = s r (r |g| / 2 - 1);  guards  e = w r/2 (f - clamp(f, low, high)). A linearisation holds
 // |g| and the direction of g. A region is some two dozen blobs that follow each other along the tree; its rows are those of all nodes that see one of
 // them, so that a step that is accepted lowers the sum of squares of the whole tree, whatever the other regions do. Regions that share a node's rows are
 // solved one after the other, in the order of their colours: the result does not depend on the threads.
@@ -12,9 +12,9 @@
 #include <string.h>
 
 enum { REGION_BLOBS = 28, UNKNOWNS = 5, COLOURS_MAX = 4096 };
-static const double HUBER_RADII = 0.08, LEAST_SLOPE = 0.5;
+static const double LEAST_SLOPE = 0.5;
 // Priors: a blob's place and size are held to where it was put, as firmly as a few points a hundredth of a radius off would.
-static const double PRIOR_PLACE = 0.02, PRIOR_AMPLITUDE = 0.005;
+static const double PRIOR_PLACE = 0.02, PRIOR_AMPLITUDE = 0.005, LEAST_BASE = 0.1;
 
 typedef struct TileWork {    // a tile's part in a region's solution
     const RowTile *tile;
@@ -165,17 +165,18 @@ static void sum_tile(const Work *w, TileWork *tw, const FieldBlob *blob)
     }
 }
 
-static double huber(double e, double knee) { return fabs(e) <= knee ? e * e : knee * (2 * fabs(e) - knee); }
+// Geman and McClure's loss: e^2 near 0, at most knee^2, so that points which contradict the others do not outweigh them.
+static double loss(double e, double knee) { return e * e / (1 + e * e / (knee * knee)); }
 
 // Sum of squares of a tile's rows from the sums as they are.
 static double energy_of_tile(const FieldModel *model, const TileWork *tw)
 {
     const RowTile *tile = tw->tile;
-    double r = model->tree->radius[tile->node], knee = HUBER_RADII * r, least = LEAST_SLOPE / r, bend = model->smooth * r, sum = 0;
+    double r = model->tree->radius[tile->node], knee = FIELD_KNEE * r, least = LEAST_SLOPE / r, bend = model->smooth * r, sum = 0;
     for (int i = 0; i < tile->data; i++) {
         float gx = tw->g[0][i], gy = tw->g[1][i], gz = tw->g[2][i];
         double slope = sqrt((double)(gx * gx + gy * gy + gz * gz)), off = bend * (0.5 * r * slope - 1);
-        sum += huber((double)tw->f[i] / fmax(slope, least), knee) + off * off;
+        sum += loss((double)tw->f[i] / fmax(slope, least), knee) + off * off;
     }
     double scale = 0.5 * r * model->guard_weight;
     for (int i = 0; i < tile->guards; i++) {
@@ -217,7 +218,7 @@ static void weigh_rows(const FieldModel *model, const TileWork *tw, Weighed *to,
 {
     const RowTile *tile = tw->tile;
     int d = tile->data_padded, rows = d;
-    float r = (float)model->tree->radius[tile->node], knee = (float)HUBER_RADII * r, least = (float)LEAST_SLOPE / r, half = 0.5f * r,
+    float r = (float)model->tree->radius[tile->node], knee = (float)FIELD_KNEE * r, least = (float)LEAST_SLOPE / r, half = 0.5f * r,
           bend = (float)model->smooth * r * half, guard = half * (float)model->guard_weight;
     memcpy(to->x, tile->x, (size_t)d * sizeof(float)), memcpy(to->y, tile->y, (size_t)d * sizeof(float)), memcpy(to->z, tile->z, (size_t)d * sizeof(float));
     for (int i = 0; i < tile->guards; i++) {
@@ -233,7 +234,7 @@ static void weigh_rows(const FieldModel *model, const TileWork *tw, Weighed *to,
     to->data = d, to->rows = rows;
     for (int i = 0; i < d; i++) {
         float gx = tw->g[0][i], gy = tw->g[1][i], gz = tw->g[2][i], slope = sqrtf(gx * gx + gy * gy + gz * gz), held = slope > least ? slope : least;
-        float e = tw->f[i] / held, size = fabsf(e), w = tile->weight[i] * (size > knee ? sqrtf(knee / size) : 1.0f), unit = slope > 1e-6f ? 1 / slope : 0;
+        float e = tw->f[i] / held, w = tile->weight[i] / (1 + e * e / (knee * knee)), unit = slope > 1e-6f ? 1 / slope : 0;
         to->scale[i] = w / held;
         residual[i] = w * e;
         to->bend[i] = tile->weight[i] * bend;
@@ -312,20 +313,21 @@ static void linearise(Work *w)
 
 static double bound(double value, double most) { return fmax(-most, fmin(most, value)); }
 
-static FieldBlob moved_by(const FieldModel *model, const FieldBlob *b, const double *step)
+static FieldBlob moved_by(const FieldBlob *b, const double *step)
 {
     FieldBlob to = *b;
-    double r = model->tree->radius[b->owner];
     to.amplitude += bound(step[0], 0.5 + 0.5 * fabs(b->amplitude));
+    to.amplitude = b->is_base ? fmax(to.amplitude, LEAST_BASE) : to.amplitude;
     Vec3 way = vec3_scale(vec3(step[1], step[2], step[3]), b->reach);
     double length = vec3_norm(way), most = 0.15 * b->reach;
     to.center = vec3_add_scaled(b->center, length > most ? most / length : 1, way);
     Vec3 off = vec3_sub(to.center, b->birth);
-    double away = vec3_norm(off), furthest = 0.8 * b->birth_reach;
+    double away = vec3_norm(off), furthest = (b->is_base ? 0.25 : 0.6) * b->birth_reach;
     if (away > furthest)
         to.center = vec3_add_scaled(b->birth, furthest / away, off);
     double reach = b->reach * exp(bound(step[4], 0.2));
-    to.reach = fmax(fmax(0.25 * r, 0.5 * b->birth_reach), fmin(fmin(reach, 1.12 * b->reach), fmin(3 * r, 2 * b->birth_reach)));
+    double least = (b->is_base ? 0.75 : 0.5) * b->birth_reach, largest = fmin((b->is_base ? 1.5 : 2) * b->birth_reach, 1.12 * b->reach);
+    to.reach = fmax(least, fmin(reach, largest));
     to.moved = true;
     return to;
 }
@@ -337,6 +339,10 @@ static bool solve_step(Work *w, double damping)
     for (size_t k = 0; k < u; k++) {
         w->factor[k * u + k] += damping * w->matrix[k * u + k] + 1e-18;
         w->step[k] = -w->slope[k];
+        if (w->sweep->model->amplitudes_only && k % UNKNOWNS != 0) {
+            w->factor[k * u + k] += 1e12;
+            w->step[k] = 0;
+        }
     }
     return lim_solve(w->factor, w->unknowns, w->unknowns, w->step);
 }
@@ -367,7 +373,7 @@ static void solve_region(void *context, long index)
         }
         if (solve_step(&w, damping)) {
             for (int k = 0; k < region->count; k++)
-                w.trial[k] = moved_by(model, &now[k], w.step + UNKNOWNS * k);
+                w.trial[k] = moved_by(&now[k], w.step + UNKNOWNS * k);
             double there = energy(&w, w.trial);
             if (there < least) {
                 bool enough = there > 0.999 * least;

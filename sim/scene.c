@@ -177,7 +177,7 @@ static void read_plane(Reading *reading, YamlValue value)
     yaml_map_unit_vector(&map, "normal", true, &reading->scene->plane_normal);
 }
 
-const char *const contact_name[CONTACT_COUNT + 1] = {"lim", "mesh", "tube", "smooth_mesh", "flat_mesh", "grid", NULL};
+const char *const contact_name[CONTACT_COUNT + 1] = {"lim", "mesh", "tube", "smooth_mesh", "flat_mesh", "grid", "lim_blend", "lim_switch", NULL};
 
 static void read_contact(const YamlMap *map, Scene *scene)
 {
@@ -188,9 +188,11 @@ static void read_contact(const YamlMap *map, Scene *scene)
     if (choice >= 0)
         scene->contact = (ContactKind)choice;
     if (choice == CONTACT_TUBE && (scene->source == SOURCE_MODEL || scene->source == SOURCE_SHAPE || scene->source == SOURCE_MESH))
-        yaml_fault(contact, "contact 'tube' needs the source 'tube'; a model or shape has lim, mesh, smooth_mesh, flat_mesh or grid");
-    else if (choice == CONTACT_LIM && scene->source == SOURCE_MESH)
-        yaml_fault(contact, "contact 'lim' needs local models: make them with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh, flat_mesh or grid");
+        yaml_fault(contact, "contact 'tube' needs the source 'tube'; a model or shape has lim, lim_blend, lim_switch, mesh, "
+                            "smooth_mesh, flat_mesh or grid");
+    else if (choice >= 0 && contact_is_fitted((ContactKind)choice) && scene->source == SOURCE_MESH)
+        yaml_fault(contact, "contact '%s' needs a fitted model: make it with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh, flat_mesh or grid",
+                   contact_name[choice]);
 }
 
 static void read_vessel(Reading *reading, YamlValue value)

@@ -12,7 +12,21 @@
 
 typedef enum { SOURCE_MODEL, SOURCE_SHAPE, SOURCE_TUBE, SOURCE_PLANE, SOURCE_MESH, SOURCE_NONE } VesselSourceKind;
 // `contact:` of the vessel, `--contact` on the command line.
-typedef enum { CONTACT_LIM, CONTACT_MESH, CONTACT_TUBE, CONTACT_SMOOTH_MESH, CONTACT_FLAT_MESH, CONTACT_GRID, CONTACT_COUNT } ContactKind;
+// lim: the wall of a fitted model, whichever it is; shapes and tubes are fitted by shared blobs. lim_blend, lim_switch: of local models only, neighbours mixed, or
+// the paper's one model a point.
+typedef enum {
+    CONTACT_LIM,
+    CONTACT_MESH,
+    CONTACT_TUBE,
+    CONTACT_SMOOTH_MESH,
+    CONTACT_FLAT_MESH,
+    CONTACT_GRID,
+    CONTACT_LIM_BLEND,
+    CONTACT_LIM_SWITCH,
+    CONTACT_COUNT
+} ContactKind;
+static inline bool contact_is_local(ContactKind contact) { return contact == CONTACT_LIM_BLEND || contact == CONTACT_LIM_SWITCH; }
+static inline bool contact_is_fitted(ContactKind contact) { return contact == CONTACT_LIM || contact_is_local(contact); }
 extern const char *const contact_name[CONTACT_COUNT + 1];  // as they are written; NULL at the end
 
 typedef struct SceneTarget {
