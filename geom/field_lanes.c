@@ -12,10 +12,11 @@ _Static_assert(offsetof(VesselMemory, place) == 8 * MEMORY_PLACE && offsetof(Ves
               offsetof(VesselMemory, hessian) == 8 * MEMORY_HESSIAN && offsetof(VesselMemory, miss) == 8 * MEMORY_MISS &&
               offsetof(VesselMemory, step) == 8 * MEMORY_STEP && offsetof(VesselMemory, trust) == 8 * MEMORY_TRUST &&
               offsetof(VesselMemory, held_at) == 8 * MEMORY_HELD_AT && offsetof(VesselMemory, held_for2) == 8 * MEMORY_HELD_FOR2 &&
-              offsetof(VesselMemory, bound) == 8 * MEMORY_BOUND && offsetof(VesselMemory, clearance) == 8 * MEMORY_ROW, "memories are rows of doubles");
+              offsetof(VesselMemory, bound_at) == 8 * MEMORY_BOUND_AT && offsetof(VesselMemory, bound_for) == 8 * MEMORY_BOUND_FOR &&
+              offsetof(VesselMemory, down) == 8 * MEMORY_DOWN && offsetof(VesselMemory, up) == 8 * MEMORY_UP, "memories are rows of doubles");
 _Static_assert(offsetof(VesselHit, normal) == 8 && offsetof(VesselHit, hessian) == 32 && offsetof(VesselHit, node) == 8 * HIT_ROW, "so are answers");
 
-#define KERNEL_TABLE(isa) {load_##isa, sample_##isa, newton_##isa, finish_##isa, store_##isa}
+#define KERNEL_TABLE(isa) {load_##isa, sample_##isa, newton_##isa, finish_##isa, store_##isa, pick_##isa, bends_##isa, look_##isa}
 
 #define WIDTH 2
 #define TARGET

@@ -15,12 +15,13 @@ typedef struct FieldRow {
     double cx, cy, cz;               // [mm]
     double inverse;                  // 1 / R^2 [1/mm^2]
     double amplitude;                // a
-    double unused[3];
+    double reach;                    // R [mm]
+    double unused[2];
 } __attribute__((aligned(64))) FieldRow;
 
 // Places in a row of a VesselMemory.
-enum { MEMORY_FOOT = 0, MEMORY_PLACE = 3, MEMORY_NORMAL = 6, MEMORY_HESSIAN = 9, MEMORY_SLOPE = 15, MEMORY_MISS = 16, MEMORY_STEP = 19, MEMORY_TRUST = 22,
-       MEMORY_WRITTEN = 24, MEMORY_HELD_AT = 24, MEMORY_HELD_FOR2 = 27, MEMORY_BOUND = 28, MEMORY_ROW = 32 };
+enum { MEMORY_FOOT = 0, MEMORY_PLACE = 3, MEMORY_NORMAL = 6, MEMORY_HESSIAN = 9, MEMORY_DOWN = 15, MEMORY_MISS = 16, MEMORY_STEP = 19, MEMORY_TRUST = 22,
+       MEMORY_UP = 23, MEMORY_WRITTEN = 24, MEMORY_HELD_AT = 24, MEMORY_HELD_FOR2 = 27, MEMORY_BOUND_AT = 28, MEMORY_BOUND_FOR = 31, MEMORY_ROW = 32 };
 enum { HIT_ROW = 10 };               // gap, normal, Hessian
 
 typedef double FieldLane[FOOT_BLOCK];
@@ -38,7 +39,7 @@ typedef struct FieldBlock {
     int slots;                               // lists are as long, filled up with the blob without weight; 0: only as their counts say
     FieldLane dx, dy, dz;            // the motion of X since the foot was found
     FieldLane straight_x, straight_y, straight_z;    // where the foot should be but for the last prediction's miss
-    FieldLane held_x, held_y, held_z, held_for2, down, up, within, trust;
+    FieldLane held_x, held_y, held_z, held_for2, bound_x, bound_y, bound_z, bound_for, down, up, trust;
 } FieldBlock;
 
 typedef struct FieldKernels {
@@ -52,6 +53,12 @@ typedef struct FieldKernels {
     unsigned (*finish)(FieldBlock *b);
     // Turns lanes into memories and answers.
     void (*store)(FieldBlock *b);
+    // Of the blobs of a list: a bit for each that reaches to within `skin` of q.
+    void (*pick)(const FieldRow *row, const int32_t *list, int count, Vec3 q, double skin, uint8_t *bits);
+    // No more than what the field of a list bends down and up by, anywhere within `ball` of q.
+    void (*bends)(const FieldRow *row, const int32_t *list, int count, Vec3 q, double ball, double *down, double *up);
+    // f of a list at eight points.
+    void (*look)(const FieldRow *row, const int32_t *list, int count, const double *x, const double *y, const double *z, double *f);
 } FieldKernels;
 // isa as for lane_kernels.
 const FieldKernels *field_kernels(int isa);

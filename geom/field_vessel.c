@@ -34,19 +34,21 @@ typedef struct FieldNode {
     bool carried;            // near the inlet: goes on upstream
 } FieldNode;
 
+enum { WAYS = 32 };
 typedef struct FieldVessel {
     Vessel vessel;           // first: a Vessel * to us is a FieldVessel *
     const VesselTree *tree;
     const FieldKernels *kernels;
     FieldRow *row;           // (B+1) the last one without weight
-    double *reach;           // (B+1) R
     FieldNode *node;         // (N)
     PowerBlocks blocks;      // for points without a node
     bool inlet_open;         // the root is an end of the tree
+    Vec3 way[WAYS];          // directions all around
 } FieldVessel;
 
-static const double SKIN = 0.15;             // of the radius, < BLOB_FLOOD_MARGIN
-static const double TRUST = 0.05;            // of the radius
+static const double SKIN = 0.15, SKIN_MOST = 0.2;    // of the radius, < BLOB_FLOOD_MARGIN; [mm]
+static const double BOUND = 0.1, BOUND_MOST = 0.15;  // what bounds are wider than the gap: of the radius; [mm]
+static const double TRUST = 0.05;            // of the radius: rivals that are this much farther are kept an eye on
 static const double REST = 1e-8;             // [mm] what Newton may leave of the gap
 // Feet on two nodes' walls that are closer together than this [mm] are the same.
 static const double AGREE = 1e-3;
@@ -147,49 +149,27 @@ static bool sees_all(const FieldVessel *field, Vec3 q, int node)
     return true;
 }
 
-// Over a ball in which |X - C| is from `least` to `most`, a blob bends down by no more than *down and up by no more than *up.
-static void blob_bends(const FieldRow *row, double least, double most, double *down, double *up)
+// Makes the list of a memory for feet about q, as its node sees them.
+static void hold_blobs(const FieldVessel *field, VesselMemory *m, Vec3 q)
 {
-    double high = 1 - least * least * row->inverse, low = fmax(1 - most * most * row->inverse, 0), six = 6 * fabs(row->amplitude) * row->inverse;
-    if (!(high > 0))
-        return;
-    // across the blob's radius 6 a u^2 / R^2 downwards, along it 6 a u (4 - 5 u) / R^2 upwards, which is most at u = 0.4
-    double across = six * high * high, u = high < 0.4 ? high : low > 0.4 ? low : 0.4, along = six * fmax(u * (4 - 5 * u), 0);
-    *down += row->amplitude > 0 ? across : along;
-    *up += row->amplitude > 0 ? along : across;
-}
-
-// No more than what f bends by within `within` of q.
-static void field_bends(const FieldVessel *field, const FieldNode *node, Vec3 q, double within, double *down, double *up)
-{
-    *down = *up = 0;
-    for (int k = 0; k < node->seen_count; k++) {
-        const FieldRow *row = &field->row[node->seen[k]];
-        double far2 = vec3_norm2(vec3_sub(q, vec3(row->cx, row->cy, row->cz))), reach = field->reach[node->seen[k]] + within;
-        if (far2 < reach * reach) {
-            double far = sqrt(far2);
-            blob_bends(row, fmax(far - within, 0), far + within, down, up);
-        }
-    }
-}
-
-// Makes the list of a memory for feet about q, as its node sees them; `gap`: how far from there X is.
-static void hold_blobs(const FieldVessel *field, VesselMemory *m, Vec3 q, double gap)
-{
+    enum { PART = 512 };
     const FieldNode *node = &field->node[m->node];
     double skin = node->skin;
     int count = VESSEL_BLOBS + 1;
     for (int shrink = 0; shrink < 3 && count > VESSEL_BLOBS; shrink++) {
+        uint8_t bits[PART / FOOT_BLOCK];
         skin = shrink ? 0.4 * skin : skin;
         count = 0;
-        for (int k = 0; k < node->seen_count && count <= VESSEL_BLOBS; k++) {
-            const FieldRow *row = &field->row[node->seen[k]];
-            double reach = field->reach[node->seen[k]] + skin;
-            if (!(vec3_norm2(vec3_sub(q, vec3(row->cx, row->cy, row->cz))) < reach * reach))
-                continue;
-            if (count < VESSEL_BLOBS)
-                m->blob[count] = node->seen[k];
-            count++;
+        for (int part = 0; part < node->seen_count && count <= VESSEL_BLOBS; part += PART) {
+            int n = node->seen_count - part < PART ? node->seen_count - part : PART;
+            const int32_t *seen = node->seen + part;
+            field->kernels->pick(field->row, seen, n, q, skin, bits);
+            for (int k = 0; k < n; k += FOOT_BLOCK) {
+                unsigned in = bits[k / FOOT_BLOCK] & (n - k < FOOT_BLOCK ? (1u << (n - k)) - 1 : 0xff);
+                for (; in != 0; in &= in - 1, count++)
+                    if (count < VESSEL_BLOBS)
+                        m->blob[count] = seen[k + __builtin_ctz(in)];
+            }
         }
     }
     m->blobs = count <= VESSEL_BLOBS ? count : -1;
@@ -197,10 +177,15 @@ static void hold_blobs(const FieldVessel *field, VesselMemory *m, Vec3 q, double
         m->blob[k] = (int32_t)field->tree->blob_count;
     m->held_at = q;
     m->held_for2 = skin * skin;
-    double within = 2 * fabs(gap) + 3 * skin;
-    field_bends(field, node, q, within, &m->bound[0], &m->bound[1]);
-    m->bound[2] = within - skin;
-    m->bound[3] = 0;
+}
+
+// Bounds of how f bends in a ball a little wider than the gap.
+static void hold_bounds(const FieldVessel *field, VesselMemory *m, int node, Vec3 x, double gap)
+{
+    const FieldNode *n = &field->node[node];
+    m->bound_at = x;
+    m->bound_for = fabs(gap) + fmin(BOUND * n->radius, BOUND_MOST);
+    field->kernels->bends(field->row, n->seen, n->seen_count, asked_at(field, n, x), m->bound_for, &m->down, &m->up);
 }
 
 // The field of a node at q, and the size of its slope.
@@ -250,30 +235,51 @@ static Foot lane_foot(const FieldBlock *b, int i, int node)
                   .hessian = {f->axx[i], f->axy[i], f->axz[i], f->ayy[i], f->ayz[i], f->azz[i]}};
 }
 
-// Careful Newton steps from a start, of one point, on all that its node sees. False where they do not arrive.
-static bool settle(const FieldVessel *field, Vec3 x, int node, Vec3 start, Foot *foot)
+// Careful Newton steps of one point from up to eight starts, on all that its node sees: the feet that arrive. On the axis of a round vessel all feet around
+// are equally near and Newton's steps go round for ever: any of them is right to second order in what is left along the wall.
+static int settle(const FieldVessel *field, Vec3 x, int node, const Vec3 *start, int count, Foot *foot)
 {
     enum { ROUNDS = 16 };
-    FieldBlock b = {.row = field->row};
+    static const double LEFT = 1e-4, OFF = 1e-5;     // of the radius: along the wall, and from it
+    FieldBlock b;
+    FootBatch *f = &b.foot;
+    unsigned done = 0;
+    int found = 0;
+    b.row = field->row;
+    b.foot.at.any_carried = false;
     for (int i = 0; i < FOOT_BLOCK; i++) {
+        const Vec3 *from = &start[i < count ? i : 0];
         set_lane(field, &b, i, node);
         set_whole_list(field, &b, i, node);
-        b.count[i] = i == 0 ? b.count[i] : 0;
-        b.foot.xx[i] = x.x, b.foot.xy[i] = x.y, b.foot.xz[i] = x.z;
-        b.foot.at.x[i] = start.x, b.foot.at.y[i] = start.y, b.foot.at.z[i] = start.z;
-        b.foot.longest[i] = 0.5 * b.foot.radius[i];
-        b.foot.state[i] = i == 0 ? FOOT_PENDING : FOOT_DONE;
+        f->xx[i] = x.x, f->xy[i] = x.y, f->xz[i] = x.z;
+        f->at.x[i] = from->x, f->at.y[i] = from->y, f->at.z[i] = from->z;
+        f->longest[i] = 0.5 * f->radius[i];
+        f->state[i] = FOOT_PENDING;
     }
-    for (int round = 0; round < ROUNDS && b.foot.state[0] == FOOT_PENDING; round++) {
+    for (int round = 0; round < ROUNDS && done != (1u << FOOT_BLOCK) - 1; round++) {
         sample(field, &b);
-        field->kernels->newton(&b, true);
+        done = field->kernels->newton(&b, true);
     }
-    if (b.foot.state[0] != FOOT_DONE)
-        return false;
+    if (done != (1u << FOOT_BLOCK) - 1)
+        sample(field, &b);
     field->kernels->finish(&b);
-    *foot = lane_foot(&b, 0, node);
-    return true;
+    for (int i = 0; i < count; i++) {
+        foot[found] = lane_foot(&b, i, node);
+        if (done >> i & 1) {
+            foot[found++].sure = true;
+            continue;
+        }
+        Vec3 g = {f->at.gx[i], f->at.gy[i], f->at.gz[i]}, n = vec3_unit_or(g, vec3(0, 0, 0)), away = vec3_sub(foot[found].at, x);
+        double gap = -vec3_dot(away, n), left = vec3_norm(vec3_add_scaled(away, gap, n)), slope = vec3_norm(g), radius = f->radius[i];
+        if (!(slope > 1e-100 && left < LEFT * radius && fabs(f->at.f[i]) < OFF * radius * slope))
+            continue;
+        foot[found].normal = n, foot[found].gap = gap - f->at.f[i] / slope, foot[found].sure = true;
+        found++;
+    }
+    return found;
 }
+
+// --- Looking around ---
 
 static double field_here(const FieldVessel *field, int node, Vec3 x)
 {
@@ -281,73 +287,137 @@ static double field_here(const FieldVessel *field, int node, Vec3 x)
     return blobby_field(&blobs, asked_at(field, &field->node[node], x));
 }
 
-// The wall in the plane through x across the inlet's direction: for points upstream, of which nothing else finds it.
-static bool project_in_section(const FieldVessel *field, Vec3 x, int node, Foot *foot)
+// What is found of a point's feet on the wall of a node.
+typedef struct Sheets {
+    bool found, has_rival;
+    Foot foot, rival;        // the closest, and the next one
+} Sheets;
+
+static void add_sheet(Sheets *s, const Foot *foot)
 {
-    enum { AROUND = 24, OUT = 24, HALVINGS = 30 };
-    Vec3 d = field->tree->direction[0], e1 = vec3_normal_to(d), e2 = vec3_cross(d, e1);
-    Vec3 axis = vec3_add_scaled(field->tree->center[0], inlet_height(field, x), d);
-    double radius = field->tree->radius[0], best = HUGE_VAL;
-    Vec3 from = field_here(field, node, x) > 0 ? x : axis, start = x;
-    for (int k = 0; k < AROUND; k++) {
-        double angle = 2 * PI * k / AROUND, in = 0, out = 0;
-        Vec3 way = vec3_add(vec3_scale(e1, cos(angle)), vec3_scale(e2, sin(angle)));
-        for (int step = 1; step <= OUT && out == 0; step++)
-            if (field_here(field, node, vec3_add_scaled(from, 0.15 * radius * step, way)) > 0)
-                in = 0.15 * radius * step;
-            else
-                out = 0.15 * radius * step;
-        if (out == 0)
-            continue;
-        for (int half = 0; half < HALVINGS; half++) {
-            double middle = 0.5 * (in + out);
-            *(field_here(field, node, vec3_add_scaled(from, middle, way)) > 0 ? &in : &out) = middle;
+    static const double SAME = 1e-4;         // [mm]
+    if (!s->found || fabs(foot->gap) < fabs(s->foot.gap)) {
+        if (s->found && vec3_distance(foot->at, s->foot.at) > SAME) {
+            s->rival = s->foot;
+            s->has_rival = true;
         }
-        Vec3 p = vec3_add_scaled(from, in, way);
-        double far = vec3_norm2(vec3_sub(p, x));
-        if (far < best) {
-            best = far;
-            start = p;
-        }
+        s->foot = *foot;
+        s->found = true;
+    } else if (vec3_distance(foot->at, s->foot.at) > SAME && (!s->has_rival || fabs(foot->gap) < fabs(s->rival.gap))) {
+        s->rival = *foot;
+        s->has_rival = true;
     }
-    return best < HUGE_VAL && settle(field, x, node, start, foot);
 }
 
-// The foot of x on the wall of one node, from scratch.
-static Foot project_on(const FieldVessel *field, Vec3 x, int node)
+// f at `far` from x in all directions.
+static void look_around(const FieldVessel *field, Vec3 x, int node, double far, double *f)
 {
-    Blobby blobs = blobby_of(field->tree, node);
+    const FieldNode *n = &field->node[node];
+    for (int k = 0; k < WAYS; k += FOOT_BLOCK) {
+        FieldLane at_x, at_y, at_z;
+        for (int i = 0; i < FOOT_BLOCK; i++) {
+            Vec3 q = asked_at(field, n, vec3_add_scaled(x, far, field->way[k + i]));
+            at_x[i] = q.x, at_y[i] = q.y, at_z[i] = q.z;
+        }
+        field->kernels->look(field->row, n->seen, n->seen_count, at_x, at_y, at_z, f + k);
+    }
+}
+
+// Feet from where directions cross the wall between two distances, the nearest crossings first and none beside one that is taken. `side`: 1 where x is
+// inside, -1 outside. False where none crosses.
+static bool settle_crossings(const FieldVessel *field, Vec3 x, int node, double side, const double *near_f, const double *far_f, double near, double far,
+                             Sheets *sheets)
+{
+    static const double APART = 0.8;         // cosine
+    Vec3 start[FOOT_BLOCK];
+    double at[WAYS];
+    int count = 0;
+    for (int k = 0; k < WAYS; k++)
+        at[k] = side * far_f[k] > 0 || !(side * near_f[k] > 0) ? HUGE_VAL : near + (far - near) * near_f[k] / (near_f[k] - far_f[k]);
+    while (count < FOOT_BLOCK) {
+        int best = 0;
+        for (int k = 1; k < WAYS; k++)
+            best = at[k] < at[best] ? k : best;
+        if (at[best] == HUGE_VAL)
+            break;
+        start[count] = vec3_add_scaled(x, at[best], field->way[best]);
+        count++;
+        for (int k = 0; k < WAYS; k++)
+            if (vec3_dot(field->way[k], field->way[best]) > APART)
+                at[k] = HUGE_VAL;
+    }
+    Foot foot[FOOT_BLOCK];
+    int found = count > 0 ? settle(field, x, node, start, count, foot) : 0;
+    for (int i = 0; i < found; i++)
+        if (foot[i].gap * side > -1e-9)
+            add_sheet(sheets, &foot[i]);
+    return count > 0;
+}
+
+// Looks for walls nearer than the foot, or hardly farther.
+static void look_for_rivals(const FieldVessel *field, Vec3 x, double side, Sheets *sheets)
+{
+    static const double part[] = {0.35, 0.7};
+    enum { PARTS = sizeof part / sizeof part[0] + 1 };
+    int node = sheets->foot.node;
+    double near_f[WAYS], far_f[WAYS], near = 0, gap = fabs(sheets->foot.gap), here = side;
+    for (int k = 0; k < WAYS; k++)
+        near_f[k] = here;
+    for (int p = 0; p < PARTS; p++) {
+        double far = p + 1 < PARTS ? part[p] * gap : gap + 2 * TRUST * field->node[node].radius;
+        look_around(field, x, node, far, far_f);
+        settle_crossings(field, x, node, side, near_f, far_f, near, far, sheets);
+        memcpy(near_f, far_f, sizeof near_f);
+        near = far;
+    }
+}
+
+// Feet of x on the wall of one node, from scratch.
+static Sheets find_sheets(const FieldVessel *field, Vec3 x, int node)
+{
+    Sheets sheets = {0};
+    double here = field_here(field, node, x), side = here > 0 ? 1 : -1, near_f[WAYS], far_f[WAYS], near = 0, radius = field->node[node].radius;
     Foot foot;
-    bool carried = field->node[node].carried;
-    if (carried && inlet_height(field, x) < inlet_zone(field) && project_in_section(field, x, node, &foot)) {
-        foot.sure = true;
-        return foot;
+    for (int k = 0; k < WAYS; k++)
+        near_f[k] = here;
+    for (double far = 0.3 * radius; far < 60 * radius && !sheets.found; near = far, far *= far < radius ? 1.7 : 1.4) {
+        look_around(field, x, node, far, far_f);
+        settle_crossings(field, x, node, side, near_f, far_f, near, far, &sheets);
+        memcpy(near_f, far_f, sizeof near_f);
     }
-    SurfacePoint s = blobby_project(&blobs, x, x);
-    if (s.converged && settle(field, x, node, s.foot, &foot) && fabs(foot.gap) < fabs(s.distance) + 1e-6) {
-        foot.sure = true;
-        return foot;
+    if (!sheets.found) {
+        Blobby blobs = blobby_of(field->tree, node);
+        SurfacePoint s = blobby_project(&blobs, x, x);
+        if (s.converged && settle(field, x, node, &s.foot, 1, &foot) > 0)
+            add_sheet(&sheets, &foot);
     }
-    foot = (Foot){.at = s.foot, .normal = s.normal, .gap = s.distance, .node = node, .sure = s.converged};
-    return foot;
+    if (sheets.found)
+        look_for_rivals(field, x, side, &sheets);
+    return sheets;
 }
 
-// The foot of x from scratch: on the wall of its own node, then on that of the cell in which the foot lies.
-static Foot project(const FieldVessel *field, Vec3 x, int node)
+// A foot belongs to the wall of the cell in which it lies: over to that. A node whose field there contradicts the own one is not taken.
+static void move_to_cell(const FieldVessel *field, Vec3 x, Foot *foot)
 {
     enum { CELLS = 4 };
-    Foot foot = project_on(field, x, node);
-    for (int k = 0; k < CELLS && foot.sure; k++) {
-        Vec3 q = asked_at(field, &field->node[foot.node], foot.at);
-        int cell = cell_of(field, q, foot.node);
+    for (int k = 0; k < CELLS; k++) {
+        Vec3 q = asked_at(field, &field->node[foot->node], foot->at);
+        int cell = cell_of(field, q, foot->node);
         Foot next;
-        if (cell == foot.node || (sees_all(field, q, foot.node) && walls_apart(field, foot.node, cell, q) > AGREE) ||
-            !settle(field, x, cell, foot.at, &next))
+        if (cell == foot->node || (sees_all(field, q, foot->node) && walls_apart(field, foot->node, cell, q) > AGREE) ||
+            settle(field, x, cell, &foot->at, 1, &next) == 0)
             break;
-        next.sure = true;
-        foot = next;
+        *foot = next;
     }
-    return foot;
+}
+
+// The feet of x from scratch.
+static Sheets project(const FieldVessel *field, Vec3 x, int node)
+{
+    Sheets sheets = find_sheets(field, x, node);
+    if (sheets.found)
+        move_to_cell(field, x, &sheets.foot);
+    return sheets;
 }
 
 // --- Queries ---
@@ -364,16 +434,15 @@ static void set_clearance(VesselMemory *m, Vec3 x, double clearance)
     m->clear_place = x;
 }
 
-// Is the ball about x with radius |gap| certainly all on x's side of the wall of which `foot` is the foot?
-static bool is_closest(const FieldVessel *field, Vec3 x, const Foot *foot)
+// Are bounds and foot such that the foot is certainly the closest?
+static bool is_closest(const FieldVessel *field, Vec3 x, const Foot *foot, const VesselMemory *m)
 {
+    double slope, size = fabs(foot->gap);
     const FieldNode *node = &field->node[foot->node];
-    double down, up, slope, size = fabs(foot->gap);
     if (node->carried && inlet_height(field, x) - size < inlet_zone(field))
         return false;
-    field_bends(field, node, x, size, &down, &up);
     field_at(field, foot->node, foot->at, &slope);
-    return (foot->gap > 0 ? down : up) * size < 0.99 * slope;
+    return vec3_distance(x, m->bound_at) + size <= m->bound_for && (foot->gap > 0 ? m->down : m->up) * size < 0.97 * slope;
 }
 
 // What is remembered and answered where lanes do not say it.
@@ -381,6 +450,8 @@ static void answer(const FieldVessel *field, Vec3 x, const Foot *foot, VesselMem
 {
     const FieldNode *node = &field->node[foot->node];
     *hit = (VesselHit){.gap = foot->gap, .normal = foot->normal, .hessian = foot->hessian, .node = foot->node, .flags = foot->sure ? 0 : VESSEL_UNSURE};
+    Vec3 q = asked_at(field, node, foot->at);
+    bool held = m->has_foot && m->node == foot->node && vec3_norm2(vec3_sub(q, m->held_at)) <= m->held_for2;
     m->node = foot->node;
     m->has_foot = foot->sure;
     m->foot = foot->at;
@@ -388,8 +459,11 @@ static void answer(const FieldVessel *field, Vec3 x, const Foot *foot, VesselMem
     m->normal = foot->normal;
     m->hessian = foot->hessian;
     m->miss = m->step = vec3(0, 0, 0);
-    if (foot->sure)
-        hold_blobs(field, m, asked_at(field, node, foot->at), foot->gap);
+    if (!foot->sure)
+        return;
+    if (!held)
+        hold_blobs(field, m, q);
+    hold_bounds(field, m, foot->node, x, foot->gap);
 }
 
 static void set_flags(const FieldVessel *field, Vec3 x, int node, VesselHit *hit)
@@ -398,21 +472,77 @@ static void set_flags(const FieldVessel *field, Vec3 x, int node, VesselHit *hit
         hit->flags |= VESSEL_BEYOND;
 }
 
-// A foot from scratch. The certainly clear ball about x, where it is wider than the foot is sure, is left to later.
+// Where no foot is found: Taubin's distance along the gradient, or that to the nearest node's wall, as if it were round.
+static Foot guess_foot(const FieldVessel *field, Vec3 x, int node)
+{
+    const FieldNode *n = &field->node[node];
+    Vec3 g, q = asked_at(field, n, x), out = vec3_sub(x, n->center);
+    Blobby blobs = blobby_of(field->tree, node);
+    double f = blobby_gradient(&blobs, q, &g), slope = vec3_norm(g), gap = n->radius - vec3_norm(out);
+    Vec3 normal = vec3_negate(vec3_unit_or(out, vec3_normal_to(field->tree->direction[node])));
+    if (slope > 1e-100 && fabs(f / slope) < fabs(gap)) {
+        gap = f / slope;
+        normal = vec3_unit_or(g, normal);
+    }
+    return (Foot){.at = vec3_add_scaled(x, -gap, normal), .normal = normal, .gap = gap, .node = node};
+}
+
 static void answer_afresh(const FieldVessel *field, Vec3 x, VesselMemory *m, VesselHit *hit)
 {
     int node = walk(field, x, m->node, 4);
-    Foot foot = project(field, x, node);
-    if (m->has_foot && m->node != foot.node) {
-        // the remembered node's wall may be the closer one: a foot follows its wall where the cell of X is another's
-        Foot other = project(field, x, m->node);
-        if (other.sure && (!foot.sure || fabs(other.gap) < fabs(foot.gap)))
-            foot = other;
+    Sheets sheets = project(field, x, node);
+    if (m->has_foot && m->node != node) {
+        // a foot follows its wall where the cell of X is another's: the remembered node's wall may be the closer one
+        Sheets other = project(field, x, m->node);
+        if (other.found && (!sheets.found || fabs(other.foot.gap) < fabs(sheets.foot.gap)))
+            sheets = other;
     }
+    Foot foot = sheets.found ? sheets.foot : guess_foot(field, x, node);
     answer(field, x, &foot, m, hit);
+    m->has_rival = sheets.has_rival && fabs(sheets.rival.gap) < fabs(foot.gap) + 2 * TRUST * field->node[foot.node].radius;
+    m->rival = sheets.rival.at;
     m->trust = foot.sure ? TRUST * field->node[foot.node].radius : 0;
-    set_clearance(m, x, foot.sure && is_closest(field, x, &foot) ? foot.gap : 0);
+    set_clearance(m, x, foot.sure && is_closest(field, x, &foot, m) ? foot.gap : 0);
     set_flags(field, x, foot.node, hit);
+}
+
+// A foot that was followed, but may not be the closest any more: the walls nearby are looked for.
+static void answer_around(const FieldVessel *field, Vec3 x, Foot foot, VesselMemory *m, VesselHit *hit)
+{
+    Sheets sheets = {.found = true, .foot = foot};
+    double side = field_here(field, foot.node, x) > 0 ? 1 : -1;
+    if (side * foot.gap < -1e-9) {
+        answer_afresh(field, x, m, hit);
+        return;
+    }
+    look_for_rivals(field, x, side, &sheets);
+    if (vec3_distance(sheets.foot.at, foot.at) > 1e-4)
+        move_to_cell(field, x, &sheets.foot);
+    answer(field, x, &sheets.foot, m, hit);
+    m->has_rival = sheets.has_rival && fabs(sheets.rival.gap) < fabs(sheets.foot.gap) + 2 * TRUST * field->node[foot.node].radius;
+    m->rival = sheets.rival.at;
+    m->trust = TRUST * field->node[foot.node].radius;
+    set_clearance(m, x, is_closest(field, x, &sheets.foot, m) ? sheets.foot.gap : 0);
+    set_flags(field, x, sheets.foot.node, hit);
+}
+
+// A foot that is trusted but for its rival, which has moved, too.
+static void answer_beside_rival(const FieldVessel *field, Vec3 x, Foot foot, VesselMemory *m, VesselHit *hit)
+{
+    Foot rival;
+    double trust = m->trust;
+    if (settle(field, x, foot.node, &m->rival, 1, &rival) == 0 || rival.gap * foot.gap < 0 || vec3_distance(rival.at, foot.at) < 1e-4) {
+        answer_around(field, x, foot, m, hit);
+        return;
+    }
+    bool other = fabs(rival.gap) < fabs(foot.gap);
+    if (other)
+        move_to_cell(field, x, &rival);
+    answer(field, x, other ? &rival : &foot, m, hit);
+    m->rival = other ? foot.at : rival.at;
+    m->trust = trust;
+    set_clearance(m, x, 0);
+    set_flags(field, x, m->node, hit);
 }
 
 // Answers where no field is needed; false where one is.
@@ -442,7 +572,7 @@ static bool answer_cheaply(const FieldVessel *field, Vec3 x, double reach, Vesse
 
 // The foot has left what its memory holds: the cell and the list about q. False where q is too far from the cell for that. A node whose field there
 // contradicts the own one is not taken.
-static bool hold_anew(const FieldVessel *field, VesselMemory *m, Vec3 q, double gap)
+static bool hold_anew(const FieldVessel *field, VesselMemory *m, Vec3 q)
 {
     int cell = cell_of(field, q, m->node);
     if (cell != m->node) {
@@ -451,7 +581,7 @@ static bool hold_anew(const FieldVessel *field, VesselMemory *m, Vec3 q, double 
         if (!(walls_apart(field, m->node, cell, q) > AGREE))
             m->node = cell;
     }
-    hold_blobs(field, m, q, gap);
+    hold_blobs(field, m, q);
     return true;
 }
 
@@ -483,13 +613,12 @@ static void lanes_hold_anew(const FieldVessel *field, FieldBlock *b, unsigned la
         int i = __builtin_ctz(lanes);
         VesselMemory *m = &batch->memory[point[i]];
         Vec3 p = vec3(b->foot.at.x[i], b->foot.at.y[i], b->foot.at.z[i]), q = asked_at(field, &field->node[m->node], p);
-        if (!hold_anew(field, m, q, vec3_distance(p, batch->point[point[i]]))) {
+        if (!hold_anew(field, m, q)) {
             b->foot.state[i] = FOOT_LOST;
             continue;
         }
         fill_lane(field, b, i, batch, point[i]);
         b->held_x[i] = m->held_at.x, b->held_y[i] = m->held_at.y, b->held_z[i] = m->held_at.z, b->held_for2[i] = m->held_for2;
-        b->down[i] = m->bound[0], b->up[i] = m->bound[1], b->within[i] = m->bound[2];
     }
 }
 
@@ -515,9 +644,10 @@ static unsigned sure_near_inlet(const FieldVessel *field, const FieldBlock *b, u
         if (!b->foot.at.carried[i])
             continue;
         double size = fabs(b->foot.gap[i]), bend = fmax(b->down[i], b->up[i]);
+        Vec3 x = {b->foot.xx[i], b->foot.xy[i], b->foot.xz[i]}, at = {b->bound_x[i], b->bound_y[i], b->bound_z[i]};
         Vec3 g = {b->foot.at.gx[i], b->foot.at.gy[i], b->foot.at.gz[i]};
         double along = fabs(vec3_dot(g, d)) + 2 * bend * size;
-        if (!((bend + more * along) * size < 0.95 * vec3_norm(g) && 2 * size <= b->within[i]))
+        if (!((bend + more * along) * size < 0.95 * vec3_norm(g) && vec3_distance(x, at) + size <= b->bound_for[i]))
             sure &= ~(1u << i);
     }
     return sure;
@@ -558,20 +688,30 @@ static void follow_block(const FieldVessel *field, Batch *batch, const int *poin
     for (int i = 0; i < FOOT_BLOCK; i++) {
         bool use = false;
         int p = point[i < count ? i : 0];
-        if (i < count && done >> i & 1) {
-            use = sure >> i & 1;
-            if (!use) {
-                b.trust[i] -= sqrt(b.dx[i] * b.dx[i] + b.dy[i] * b.dy[i] + b.dz[i] * b.dz[i]);
-                Foot foot = lane_foot(&b, i, batch->memory[p].node);
-                use = b.trust[i] > 0 || is_closest(field, batch->point[p], &foot);
-            }
-        }
-        if (i < count && !use) {
-            if (!start && b.foot.state[i] == FOOT_PENDING) {
-                batch->start[batch->later_count] = vec3(b.foot.at.x[i], b.foot.at.y[i], b.foot.at.z[i]);
-                batch->later[batch->later_count++] = p;
-            } else {
-                batch->afresh[batch->afresh_count++] = p;
+        if (i < count) {
+            VesselMemory *m = &batch->memory[p];
+            Foot foot = lane_foot(&b, i, m->node);
+            if (!(done >> i & 1)) {
+                if (!start && b.foot.state[i] == FOOT_PENDING) {
+                    batch->start[batch->later_count] = foot.at;
+                    batch->later[batch->later_count++] = p;
+                } else {
+                    batch->afresh[batch->afresh_count++] = p;
+                }
+            } else if (!(use = sure >> i & 1)) {
+                foot.sure = true;
+                if (b.trust[i] > 0 && !m->has_rival) {
+                    use = true;
+                } else if (b.trust[i] > 0) {
+                    m->trust = b.trust[i];
+                    answer_beside_rival(field, batch->point[p], foot, m, &batch->hit[p]);
+                } else {
+                    hold_bounds(field, m, m->node, batch->point[p], foot.gap);
+                    b.down[i] = m->down, b.up[i] = m->up;
+                    use = is_closest(field, batch->point[p], &foot, m);
+                    if (!use)
+                        answer_around(field, batch->point[p], foot, m, &batch->hit[p]);
+                }
             }
         }
         b.keep[i] = use ? &batch->memory[p].foot.x : spare;
@@ -631,7 +771,6 @@ static void field_destroy(Vessel *vessel)
     if (!field)
         return;
     free(field->row);
-    free(field->reach);
     free(field->node);
     power_blocks_free(&field->blocks);
     free(field);
@@ -645,11 +784,9 @@ static void fill_rows(FieldVessel *field)
     for (int64_t j = 0; j < tree->blob_count; j++) {
         Vec3 c = tree->blob_center[j];
         double width = tree->blob_width[j];
-        field->row[j] = (FieldRow){c.x, c.y, c.z, 1 / (width * width), tree->blob_amplitude[j], {0}};
-        field->reach[j] = width;
+        field->row[j] = (FieldRow){c.x, c.y, c.z, 1 / (width * width), tree->blob_amplitude[j], width, {0}};
     }
     field->row[tree->blob_count] = (FieldRow){0};
-    field->reach[tree->blob_count] = 0;
 }
 
 // A ball about the node's centre that is certainly lumen: f(C + v) >= f(C) - |grad f| |v| - M |v|^2 / 2.
@@ -658,7 +795,7 @@ static double clear_ball(const FieldVessel *field, int i)
     double slope, down, up, f = field_at(field, i, field->node[i].center, &slope);
     for (double part = 0.95; part > 0.2; part -= 0.15) {
         double ball = part * field->node[i].radius;
-        field_bends(field, &field->node[i], field->node[i].center, ball, &down, &up);
+        field->kernels->bends(field->row, field->node[i].seen, field->node[i].seen_count, field->node[i].center, ball, &down, &up);
         if (f - ball * (slope + 0.5 * ball * down) > 0)
             return ball;
     }
@@ -673,7 +810,7 @@ static void fill_nodes(FieldVessel *field)
         n->center = tree->center[i];
         n->radius = tree->radius[i];
         n->bend = 1 / n->radius;
-        n->skin = SKIN * n->radius;
+        n->skin = fmin(SKIN * n->radius, SKIN_MOST);
         n->seen = tree->seen + tree->seen_offset[i];
         n->seen_count = (int)(tree->seen_offset[i + 1] - tree->seen_offset[i]);
         n->clear = clear_ball(field, i);
@@ -698,18 +835,21 @@ Vessel *field_vessel_create_with(const VesselTree *tree, int isa)
     field->kernels = field_kernels(isa);
     size_t rows = (size_t)tree->blob_count + 1, nodes = (size_t)tree->node_count;
     field->row = aligned_alloc(64, rows * sizeof *field->row);
-    field->reach = calloc(rows, sizeof *field->reach);
     field->node = calloc(nodes, sizeof *field->node);
-    if (!power_blocks_create(&field->blocks, tree) || !field->row || !field->reach || !field->node) {
+    if (!power_blocks_create(&field->blocks, tree) || !field->row || !field->node) {
         field_destroy(&field->vessel);
         return NULL;
     }
     size_t links = (size_t)tree->near_offset[nodes];
-    field->vessel.bytes = sizeof *field + rows * (sizeof *field->row + sizeof *field->reach) + (size_t)tree->seen_offset[nodes] * sizeof *tree->seen +
+    field->vessel.bytes = sizeof *field + rows * sizeof *field->row + (size_t)tree->seen_offset[nodes] * sizeof *tree->seen +
                           nodes * (sizeof *field->node + sizeof(Vec3) + sizeof(double) + sizeof(int)) + links * sizeof *tree->near;
     for (int level = 0; level < field->blocks.levels; level++)
         field->vessel.bytes += (size_t)field->blocks.count[level] * sizeof(PowerBox);
     field->inlet_open = vessel_tree_root_is_open(tree);
+    for (int k = 0; k < WAYS; k++) {     // a spiral from pole to pole
+        double z = 1 - (2 * k + 1) / (double)WAYS, out = sqrt(1 - z * z), angle = k * PI * (3 - sqrt(5));
+        field->way[k] = vec3(out * cos(angle), out * sin(angle), z);
+    }
     fill_rows(field);
     fill_nodes(field);
     return &field->vessel;

@@ -17,14 +17,17 @@ typedef struct VesselMemory {
     Vec3 foot;               // last projection, where Newton starts
     Vec3 place, normal;      // where the foot was found from, the answer there …
     Sym3 hessian;            // … and its curvature: they say where the foot has moved to
-    // Of the field of shared blobs. field_lanes.h loads the numbers from here to `bound` as one row of 32.
-    double slope;            // |grad f| at the foot
+    // Of the field of shared blobs; field_lanes.h loads the numbers from `foot` to `bound_for` as one row of 32.
+    double down;             // within `bound_for` mm of `bound_at` f bends down by no more than this, and up …
     Vec3 miss, step;         // by how much the last prediction missed the foot, and the motion that it was made for
-    double trust;            // [mm] of travel in which the foot need not be compared with other walls
-    double near_trust;       // not used, keeps the row's length
+    double trust;            // [mm] of travel in which no walls but the rival's need be looked for
+    double up;               // … by no more than this [1/mm^2]
     Vec3 held_at;            // the blobs below are all that reach to within …
     double held_for2;        // … the root of this [mm^2] of here, as `node` sees the field
-    double bound[4];         // within bound[2] mm of held_at f bends down by no more than bound[0], up by no more than bound[1] [1/mm^2]
+    Vec3 bound_at;
+    double bound_for;
+    Vec3 rival;              // another foot, nearly as close
+    bool has_rival;
     double clearance;        // [mm] at `clear_place` the wall of `node` was at least this far; 0: not known. Lets far points pass unevaluated
     Vec3 clear_place;
     int node;                // node of the tree, or segment of the tube; -1: not yet located
