@@ -235,11 +235,11 @@ static Foot lane_foot(const FieldBlock *b, int i, int node)
                   .hessian = {f->axx[i], f->axy[i], f->axz[i], f->ayy[i], f->ayz[i], f->azz[i]}};
 }
 
+enum { ROUNDS = 16 };
 // Careful Newton steps of one point from up to eight starts, on all that its node sees: the feet that arrive. On the axis of a round vessel all feet around
 // are equally near and Newton's steps go round for ever: any of them is right to second order in what is left along the wall.
-static int settle(const FieldVessel *field, Vec3 x, int node, const Vec3 *start, int count, Foot *foot)
+static int settle(const FieldVessel *field, Vec3 x, int node, const Vec3 *start, int count, int rounds, Foot *foot)
 {
-    enum { ROUNDS = 16 };
     static const double LEFT = 1e-4, OFF = 1e-5;     // of the radius: along the wall, and from it
     FieldBlock b;
     FootBatch *f = &b.foot;
@@ -256,25 +256,26 @@ static int settle(const FieldVessel *field, Vec3 x, int node, const Vec3 *start,
         f->longest[i] = 0.5 * f->radius[i];
         f->state[i] = FOOT_PENDING;
     }
-    for (int round = 0; round < ROUNDS && done != (1u << FOOT_BLOCK) - 1; round++) {
+    for (int round = 0; round < rounds && done != (1u << FOOT_BLOCK) - 1; round++) {
         sample(field, &b);
         done = field->kernels->newton(&b, true);
     }
     if (done != (1u << FOOT_BLOCK) - 1)
         sample(field, &b);
     field->kernels->finish(&b);
-    for (int i = 0; i < count; i++) {
-        foot[found] = lane_foot(&b, i, node);
+    for (int i = 0; i < count; i++)
         if (done >> i & 1) {
+            foot[found] = lane_foot(&b, i, node);
             foot[found++].sure = true;
-            continue;
         }
-        Vec3 g = {f->at.gx[i], f->at.gy[i], f->at.gz[i]}, n = vec3_unit_or(g, vec3(0, 0, 0)), away = vec3_sub(foot[found].at, x);
+    for (int i = 0; i < count && found == 0; i++) {
+        foot[0] = lane_foot(&b, i, node);
+        Vec3 g = {f->at.gx[i], f->at.gy[i], f->at.gz[i]}, n = vec3_unit_or(g, vec3(0, 0, 0)), away = vec3_sub(foot[0].at, x);
         double gap = -vec3_dot(away, n), left = vec3_norm(vec3_add_scaled(away, gap, n)), slope = vec3_norm(g), radius = f->radius[i];
         if (!(slope > 1e-100 && left < LEFT * radius && fabs(f->at.f[i]) < OFF * radius * slope))
             continue;
-        foot[found].normal = n, foot[found].gap = gap - f->at.f[i] / slope, foot[found].sure = true;
-        found++;
+        foot[0].normal = n, foot[0].gap = gap - f->at.f[i] / slope, foot[0].sure = true;
+        found = 1;
     }
     return found;
 }
@@ -285,6 +286,43 @@ static double field_here(const FieldVessel *field, int node, Vec3 x)
 {
     Blobby blobs = blobby_of(field->tree, node);
     return blobby_field(&blobs, asked_at(field, &field->node[node], x));
+}
+
+// f at `far` from x in all directions.
+static void look_around(const FieldVessel *field, Vec3 x, int node, double far, double *f)
+{
+    const FieldNode *n = &field->node[node];
+    for (int k = 0; k < WAYS; k += FOOT_BLOCK) {
+        FieldLane at_x, at_y, at_z;
+        for (int i = 0; i < FOOT_BLOCK; i++) {
+            Vec3 q = asked_at(field, n, vec3_add_scaled(x, far, field->way[k + i]));
+            at_x[i] = q.x, at_y[i] = q.y, at_z[i] = q.z;
+        }
+        field->kernels->look(field->row, n->seen, n->seen_count, at_x, at_y, at_z, f + k);
+    }
+}
+
+// Is all on x's side in a ball that touches the wall at the foot and is wider than the gap by up to half a radius? Looks on three spheres in it: a flat wall
+// that comes nearer to the middle than 0.86 of the ball's radius shows in one of 32 directions. Returns how far x may go [mm] until another wall
+// than the foot's could be the closest; 0: no such ball.
+static double room_about(const FieldVessel *field, double side, const Foot *foot)
+{
+    static const double wider[] = {0.5, 0.25, 0.12}, sphere[] = {0.93, 0.62, 0.31};
+    enum { TRIES = sizeof wider / sizeof wider[0], SPHERES = sizeof sphere / sizeof sphere[0] };
+    double radius = field->node[foot->node].radius, size = fabs(foot->gap), f[WAYS];
+    for (int t = 0; t < TRIES; t++) {
+        double ball = size + wider[t] * radius, room = 0.4 * (0.86 * ball - size);
+        Vec3 middle = vec3_add_scaled(foot->at, side * ball, foot->normal);
+        bool clear = room > 0.01 * radius;
+        for (int k = 0; k < SPHERES && clear; k++) {
+            look_around(field, middle, foot->node, sphere[k] * ball, f);
+            for (int w = 0; w < WAYS; w++)
+                clear &= side * f[w] > 0;
+        }
+        if (clear)
+            return room;
+    }
+    return 0;
 }
 
 // What is found of a point's feet on the wall of a node.
@@ -306,20 +344,6 @@ static void add_sheet(Sheets *s, const Foot *foot)
     } else if (vec3_distance(foot->at, s->foot.at) > SAME && (!s->has_rival || fabs(foot->gap) < fabs(s->rival.gap))) {
         s->rival = *foot;
         s->has_rival = true;
-    }
-}
-
-// f at `far` from x in all directions.
-static void look_around(const FieldVessel *field, Vec3 x, int node, double far, double *f)
-{
-    const FieldNode *n = &field->node[node];
-    for (int k = 0; k < WAYS; k += FOOT_BLOCK) {
-        FieldLane at_x, at_y, at_z;
-        for (int i = 0; i < FOOT_BLOCK; i++) {
-            Vec3 q = asked_at(field, n, vec3_add_scaled(x, far, field->way[k + i]));
-            at_x[i] = q.x, at_y[i] = q.y, at_z[i] = q.z;
-        }
-        field->kernels->look(field->row, n->seen, n->seen_count, at_x, at_y, at_z, f + k);
     }
 }
 
@@ -347,7 +371,7 @@ static bool settle_crossings(const FieldVessel *field, Vec3 x, int node, double 
                 at[k] = HUGE_VAL;
     }
     Foot foot[FOOT_BLOCK];
-    int found = count > 0 ? settle(field, x, node, start, count, foot) : 0;
+    int found = count > 0 ? settle(field, x, node, start, count, ROUNDS, foot) : 0;
     for (int i = 0; i < found; i++)
         if (foot[i].gap * side > -1e-9)
             add_sheet(sheets, &foot[i]);
@@ -388,11 +412,9 @@ static Sheets find_sheets(const FieldVessel *field, Vec3 x, int node)
     if (!sheets.found) {
         Blobby blobs = blobby_of(field->tree, node);
         SurfacePoint s = blobby_project(&blobs, x, x);
-        if (s.converged && settle(field, x, node, &s.foot, 1, &foot) > 0)
+        if (s.converged && settle(field, x, node, &s.foot, 1, ROUNDS, &foot) > 0)
             add_sheet(&sheets, &foot);
     }
-    if (sheets.found)
-        look_for_rivals(field, x, side, &sheets);
     return sheets;
 }
 
@@ -405,16 +427,37 @@ static void move_to_cell(const FieldVessel *field, Vec3 x, Foot *foot)
         int cell = cell_of(field, q, foot->node);
         Foot next;
         if (cell == foot->node || (sees_all(field, q, foot->node) && walls_apart(field, foot->node, cell, q) > AGREE) ||
-            settle(field, x, cell, &foot->at, 1, &next) == 0)
+            settle(field, x, cell, &foot->at, 1, ROUNDS, &next) == 0)
             break;
         *foot = next;
     }
 }
 
-// The feet of x from scratch.
-static Sheets project(const FieldVessel *field, Vec3 x, int node)
+// A foot of x from scratch, the closest of those about the vessel's axis: where that does not lead to a foot on the right side, all around x.
+static Sheets project(const FieldVessel *field, Vec3 x, int node, double side)
 {
-    Sheets sheets = find_sheets(field, x, node);
+    enum { AROUND = 6, FEW_ROUNDS = 9 };
+    const FieldNode *n = &field->node[node];
+    Vec3 d = field->tree->direction[node], away = vec3_sub(x, n->center), start[FOOT_BLOCK], out, across, g;
+    Vec3 axis = vec3_add_scaled(n->center, vec3_dot(away, d), d);
+    Blobby blobs = blobby_of(field->tree, node);
+    Sheets sheets = {0};
+    Foot foot[FOOT_BLOCK];
+    if (field->tree->kind[node] == NODE_VESSEL) {
+        out = vec3_unit_or(vec3_sub(x, axis), vec3_normal_to(d));
+        across = vec3_cross(d, out);
+        for (int k = 0; k < AROUND; k++)
+            start[k] = vec3_add_scaled(vec3_add_scaled(axis, n->radius * cos(PI * k / 3), out), n->radius * sin(PI * k / 3), across);
+        double f = blobby_gradient(&blobs, asked_at(field, n, x), &g), slope = vec3_norm(g);
+        double step = slope > 1e-100 ? fmax(-n->radius, fmin(n->radius, f / slope)) : 0;
+        start[AROUND] = vec3_add_scaled(x, slope > 0 ? -step / slope : 0, g);
+        int found = settle(field, x, node, start, AROUND + 1, FEW_ROUNDS, foot);
+        for (int i = 0; i < found; i++)
+            if (foot[i].gap * side > 0)
+                add_sheet(&sheets, &foot[i]);
+    }
+    if (!sheets.found)
+        sheets = find_sheets(field, x, node);
     if (sheets.found)
         move_to_cell(field, x, &sheets.foot);
     return sheets;
@@ -487,43 +530,65 @@ static Foot guess_foot(const FieldVessel *field, Vec3 x, int node)
     return (Foot){.at = vec3_add_scaled(x, -gap, normal), .normal = normal, .gap = gap, .node = node};
 }
 
+// Makes sure that a foot is the closest, or finds that which is, and answers.
+static void answer_surely(const FieldVessel *field, Vec3 x, double side, Sheets sheets, VesselMemory *m, VesselHit *hit)
+{
+    double radius = field->node[sheets.foot.node].radius;
+    answer(field, x, &sheets.foot, m, hit);
+    m->has_rival = false;
+    m->trust = 0;
+    if (is_closest(field, x, &sheets.foot, m)) {
+        set_clearance(m, x, sheets.foot.gap);
+    } else {
+        set_clearance(m, x, 0);
+        m->trust = room_about(field, side, &sheets.foot);
+        if (m->trust == 0) {
+            Foot before = sheets.foot;
+            look_for_rivals(field, x, side, &sheets);
+            if (vec3_distance(sheets.foot.at, before.at) > 1e-4) {
+                move_to_cell(field, x, &sheets.foot);
+                answer(field, x, &sheets.foot, m, hit);
+            }
+            m->has_rival = sheets.has_rival && fabs(sheets.rival.gap) < fabs(sheets.foot.gap) + 2 * TRUST * radius;
+            m->rival = sheets.rival.at;
+            m->trust = TRUST * radius;
+        }
+    }
+    set_flags(field, x, m->node, hit);
+}
+
 static void answer_afresh(const FieldVessel *field, Vec3 x, VesselMemory *m, VesselHit *hit)
 {
     int node = walk(field, x, m->node, 4);
-    Sheets sheets = project(field, x, node);
+    double side = field_here(field, node, x) > 0 ? 1 : -1;
+    Sheets sheets = project(field, x, node, side);
     if (m->has_foot && m->node != node) {
         // a foot follows its wall where the cell of X is another's: the remembered node's wall may be the closer one
-        Sheets other = project(field, x, m->node);
-        if (other.found && (!sheets.found || fabs(other.foot.gap) < fabs(sheets.foot.gap)))
+        double other_side = field_here(field, m->node, x) > 0 ? 1 : -1;
+        Sheets other = project(field, x, m->node, other_side);
+        if (other.found && (!sheets.found || fabs(other.foot.gap) < fabs(sheets.foot.gap))) {
             sheets = other;
+            side = other_side;
+        }
     }
-    Foot foot = sheets.found ? sheets.foot : guess_foot(field, x, node);
-    answer(field, x, &foot, m, hit);
-    m->has_rival = sheets.has_rival && fabs(sheets.rival.gap) < fabs(foot.gap) + 2 * TRUST * field->node[foot.node].radius;
-    m->rival = sheets.rival.at;
-    m->trust = foot.sure ? TRUST * field->node[foot.node].radius : 0;
-    set_clearance(m, x, foot.sure && is_closest(field, x, &foot, m) ? foot.gap : 0);
-    set_flags(field, x, foot.node, hit);
-}
-
-// A foot that was followed, but may not be the closest any more: the walls nearby are looked for.
-static void answer_around(const FieldVessel *field, Vec3 x, Foot foot, VesselMemory *m, VesselHit *hit)
-{
-    Sheets sheets = {.found = true, .foot = foot};
-    double side = field_here(field, foot.node, x) > 0 ? 1 : -1;
-    if (side * foot.gap < -1e-9) {
-        answer_afresh(field, x, m, hit);
+    if (sheets.found) {
+        answer_surely(field, x, side, sheets, m, hit);
         return;
     }
-    look_for_rivals(field, x, side, &sheets);
-    if (vec3_distance(sheets.foot.at, foot.at) > 1e-4)
-        move_to_cell(field, x, &sheets.foot);
-    answer(field, x, &sheets.foot, m, hit);
-    m->has_rival = sheets.has_rival && fabs(sheets.rival.gap) < fabs(sheets.foot.gap) + 2 * TRUST * field->node[foot.node].radius;
-    m->rival = sheets.rival.at;
-    m->trust = TRUST * field->node[foot.node].radius;
-    set_clearance(m, x, is_closest(field, x, &sheets.foot, m) ? sheets.foot.gap : 0);
-    set_flags(field, x, sheets.foot.node, hit);
+    Foot foot = guess_foot(field, x, node);
+    answer(field, x, &foot, m, hit);
+    set_clearance(m, x, 0);
+    set_flags(field, x, node, hit);
+}
+
+// A foot that was followed, but may not be the closest any more.
+static void answer_around(const FieldVessel *field, Vec3 x, const Foot *foot, VesselMemory *m, VesselHit *hit)
+{
+    double side = field_here(field, foot->node, x) > 0 ? 1 : -1;
+    if (side * foot->gap < -1e-9)
+        answer_afresh(field, x, m, hit);
+    else
+        answer_surely(field, x, side, (Sheets){.found = true, .foot = *foot}, m, hit);
 }
 
 // A foot that is trusted but for its rival, which has moved, too.
@@ -531,8 +596,8 @@ static void answer_beside_rival(const FieldVessel *field, Vec3 x, Foot foot, Ves
 {
     Foot rival;
     double trust = m->trust;
-    if (settle(field, x, foot.node, &m->rival, 1, &rival) == 0 || rival.gap * foot.gap < 0 || vec3_distance(rival.at, foot.at) < 1e-4) {
-        answer_around(field, x, foot, m, hit);
+    if (settle(field, x, foot.node, &m->rival, 1, ROUNDS, &rival) == 0 || rival.gap * foot.gap < 0 || vec3_distance(rival.at, foot.at) < 1e-4) {
+        answer_around(field, x, &foot, m, hit);
         return;
     }
     bool other = fabs(rival.gap) < fabs(foot.gap);
@@ -706,11 +771,7 @@ static void follow_block(const FieldVessel *field, Batch *batch, const int *poin
                     m->trust = b.trust[i];
                     answer_beside_rival(field, batch->point[p], foot, m, &batch->hit[p]);
                 } else {
-                    hold_bounds(field, m, m->node, batch->point[p], foot.gap);
-                    b.down[i] = m->down, b.up[i] = m->up;
-                    use = is_closest(field, batch->point[p], &foot, m);
-                    if (!use)
-                        answer_around(field, batch->point[p], foot, m, &batch->hit[p]);
+                    answer_around(field, batch->point[p], &foot, m, &batch->hit[p]);
                 }
             }
         }
