@@ -16,7 +16,30 @@ _Static_assert(offsetof(VesselMemory, place) == 8 * MEMORY_PLACE && offsetof(Ves
               offsetof(VesselMemory, down) == 8 * MEMORY_DOWN && offsetof(VesselMemory, up) == 8 * MEMORY_UP, "memories are rows of doubles");
 _Static_assert(offsetof(VesselHit, normal) == 8 && offsetof(VesselHit, hessian) == 32 && offsetof(VesselHit, node) == 8 * HIT_ROW, "so are answers");
 
-#define KERNEL_TABLE(isa) {load_##isa, sample_##isa, newton_##isa, finish_##isa, store_##isa, pick_##isa, bends_##isa, look_##isa}
+void field_directions(Vec3 *way, int count)
+{
+    for (int k = 0; k < count; k++) {
+        double z = 1 - (2 * k + 1) / (double)count, out = sqrt(1 - z * z), angle = k * PI * (3 - sqrt(5));
+        way[k] = vec3(out * cos(angle), out * sin(angle), z);
+    }
+}
+
+void field_clear_points(ClearPoints *points)
+{
+    static const int count[] = {80, 32, 16};
+    static const double sphere[] = {0.95, 0.65, 0.35};
+    Vec3 way[80];
+    for (int s = 0, at = 0; s < 3; s++) {
+        field_directions(way, count[s]);
+        for (int k = 0; k < count[s]; k++, at++) {
+            points->x[at] = (float)(sphere[s] * way[k].x);
+            points->y[at] = (float)(sphere[s] * way[k].y);
+            points->z[at] = (float)(sphere[s] * way[k].z);
+        }
+    }
+}
+
+#define KERNEL_TABLE(isa) {load_##isa, sample_##isa, newton_##isa, finish_##isa, store_##isa, pick_##isa, bends_##isa, is_clear_##isa, look_##isa}
 
 #define WIDTH 2
 #define TARGET

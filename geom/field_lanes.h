@@ -24,6 +24,12 @@ enum { MEMORY_FOOT = 0, MEMORY_PLACE = 3, MEMORY_NORMAL = 6, MEMORY_HESSIAN = 9,
        MEMORY_UP = 23, MEMORY_WRITTEN = 24, MEMORY_HELD_AT = 24, MEMORY_HELD_FOR2 = 27, MEMORY_BOUND_AT = 28, MEMORY_BOUND_FOR = 31, MEMORY_ROW = 32 };
 enum { HIT_ROW = 10 };               // gap, normal, Hessian
 
+// Points in the unit ball: 80 at 0.95 of its radius, 32 at 0.65, 16 at 0.35.
+enum { CLEAR_POINTS = 128 };
+typedef struct ClearPoints {
+    float x[CLEAR_POINTS], y[CLEAR_POINTS], z[CLEAR_POINTS];
+} ClearPoints;
+
 typedef double FieldLane[FOOT_BLOCK];
 
 typedef struct FieldBlock {
@@ -57,9 +63,14 @@ typedef struct FieldKernels {
     void (*pick)(const FieldRow *row, const int32_t *list, int count, Vec3 q, double skin, uint8_t *bits);
     // No more than what the field of a list bends down and up by, anywhere within `ball` of q.
     void (*bends)(const FieldRow *row, const int32_t *list, int count, Vec3 q, double ball, double *down, double *up);
+    // Is f of a list on one side (f * side > 0) at all points of a ball about `middle`? In single precision.
+    bool (*is_clear)(const ClearPoints *point, const FieldRow *row, const int32_t *list, int count, Vec3 middle, double ball, double side);
     // f of a list at eight points.
     void (*look)(const FieldRow *row, const int32_t *list, int count, const double *x, const double *y, const double *z, double *f);
 } FieldKernels;
+// `count` directions all around: a spiral from pole to pole.
+void field_directions(Vec3 *way, int count);
+void field_clear_points(ClearPoints *points);
 // isa as for lane_kernels.
 const FieldKernels *field_kernels(int isa);
 

@@ -44,6 +44,7 @@ typedef struct FieldVessel {
     PowerBlocks blocks;      // for points without a node
     bool inlet_open;         // the root is an end of the tree
     Vec3 way[WAYS];          // directions all around
+    ClearPoints clear_points;
 } FieldVessel;
 
 static const double SKIN = 0.15, SKIN_MOST = 0.2;    // of the radius, < BLOB_FLOOD_MARGIN; [mm]
@@ -149,28 +150,35 @@ static bool sees_all(const FieldVessel *field, Vec3 q, int node)
     return true;
 }
 
+// Those of a node's blobs that reach to within `skin` of q; returns their number, of which at most `most` are listed.
+static int pick_blobs(const FieldVessel *field, const FieldNode *node, Vec3 q, double skin, int most, int32_t *list)
+{
+    enum { PART = 512 };
+    uint8_t bits[PART / FOOT_BLOCK];
+    int count = 0;
+    for (int part = 0; part < node->seen_count && count <= most; part += PART) {
+        int n = node->seen_count - part < PART ? node->seen_count - part : PART;
+        const int32_t *seen = node->seen + part;
+        field->kernels->pick(field->row, seen, n, q, skin, bits);
+        for (int k = 0; k < n; k += FOOT_BLOCK) {
+            unsigned in = bits[k / FOOT_BLOCK] & (n - k < FOOT_BLOCK ? (1u << (n - k)) - 1 : 0xff);
+            for (; in != 0; in &= in - 1, count++)
+                if (count < most)
+                    list[count] = seen[k + __builtin_ctz(in)];
+        }
+    }
+    return count;
+}
+
 // Makes the list of a memory for feet about q, as its node sees them.
 static void hold_blobs(const FieldVessel *field, VesselMemory *m, Vec3 q)
 {
-    enum { PART = 512 };
     const FieldNode *node = &field->node[m->node];
     double skin = node->skin;
-    int count = VESSEL_BLOBS + 1;
-    for (int shrink = 0; shrink < 3 && count > VESSEL_BLOBS; shrink++) {
-        uint8_t bits[PART / FOOT_BLOCK];
-        skin = shrink ? 0.4 * skin : skin;
-        count = 0;
-        for (int part = 0; part < node->seen_count && count <= VESSEL_BLOBS; part += PART) {
-            int n = node->seen_count - part < PART ? node->seen_count - part : PART;
-            const int32_t *seen = node->seen + part;
-            field->kernels->pick(field->row, seen, n, q, skin, bits);
-            for (int k = 0; k < n; k += FOOT_BLOCK) {
-                unsigned in = bits[k / FOOT_BLOCK] & (n - k < FOOT_BLOCK ? (1u << (n - k)) - 1 : 0xff);
-                for (; in != 0; in &= in - 1, count++)
-                    if (count < VESSEL_BLOBS)
-                        m->blob[count] = seen[k + __builtin_ctz(in)];
-            }
-        }
+    int count = pick_blobs(field, node, q, skin, VESSEL_BLOBS, m->blob);
+    for (int shrink = 0; shrink < 2 && count > VESSEL_BLOBS; shrink++) {
+        skin *= 0.4;
+        count = pick_blobs(field, node, q, skin, VESSEL_BLOBS, m->blob);
     }
     m->blobs = count <= VESSEL_BLOBS ? count : -1;
     for (int k = count; k < VESSEL_BLOBS; k++)
@@ -210,7 +218,7 @@ static double walls_apart(const FieldVessel *field, int a, int b, Vec3 q)
 typedef struct Foot {
     Vec3 at, normal;
     Sym3 hessian;            // of the gap at X
-    double gap;
+    double gap, slope;       // slope: |grad f| at the foot, or hardly aside
     int node;
     bool sure;
 } Foot;
@@ -232,10 +240,11 @@ static Foot lane_foot(const FieldBlock *b, int i, int node)
 {
     const FootBatch *f = &b->foot;
     return (Foot){.at = vec3(f->at.x[i], f->at.y[i], f->at.z[i]), .normal = vec3(f->nx[i], f->ny[i], f->nz[i]), .gap = f->gap[i], .node = node,
+                  .slope = sqrt(f->at.gx[i] * f->at.gx[i] + f->at.gy[i] * f->at.gy[i] + f->at.gz[i] * f->at.gz[i]),
                   .hessian = {f->axx[i], f->axy[i], f->axz[i], f->ayy[i], f->ayz[i], f->azz[i]}};
 }
 
-enum { ROUNDS = 16 };
+enum { ROUNDS = 16, FEW_ROUNDS = 8 };
 // Careful Newton steps of one point from up to eight starts, on all that its node sees: the feet that arrive. On the axis of a round vessel all feet around
 // are equally near and Newton's steps go round for ever: any of them is right to second order in what is left along the wall.
 static int settle(const FieldVessel *field, Vec3 x, int node, const Vec3 *start, int count, int rounds, Foot *foot)
@@ -284,8 +293,13 @@ static int settle(const FieldVessel *field, Vec3 x, int node, const Vec3 *start,
 
 static double field_here(const FieldVessel *field, int node, Vec3 x)
 {
-    Blobby blobs = blobby_of(field->tree, node);
-    return blobby_field(&blobs, asked_at(field, &field->node[node], x));
+    const FieldNode *n = &field->node[node];
+    FieldLane at_x, at_y, at_z, f;
+    Vec3 q = asked_at(field, n, x);
+    for (int i = 0; i < FOOT_BLOCK; i++)
+        at_x[i] = q.x, at_y[i] = q.y, at_z[i] = q.z;
+    field->kernels->look(field->row, n->seen, n->seen_count, at_x, at_y, at_z, f);
+    return f[0];
 }
 
 // f at `far` from x in all directions.
@@ -302,25 +316,39 @@ static void look_around(const FieldVessel *field, Vec3 x, int node, double far, 
     }
 }
 
-// Is all on x's side in a ball that touches the wall at the foot and is wider than the gap by up to half a radius? Looks on three spheres in it: a flat wall
-// that comes nearer to the middle than 0.86 of the ball's radius shows in one of 32 directions. Returns how far x may go [mm] until another wall
-// than the foot's could be the closest; 0: no such ball.
+static bool is_clear(const FieldVessel *field, const FieldNode *node, Vec3 middle, double ball, double side)
+{
+    enum { MOST = 64 };
+    int32_t list[MOST];
+    int count = pick_blobs(field, node, middle, ball, MOST, list);
+    bool all = count > MOST;
+    return field->kernels->is_clear(&field->clear_points, field->row, all ? node->seen : list, all ? node->seen_count : count, middle, ball, side);
+}
+
+// [mm] A sharply bent wall has other feet close by: the foot is not trusted over more than this of travel.
+static double bend_radius(const Foot *foot)
+{
+    const Sym3 *h = &foot->hessian;
+    double bend2 = h->xx * h->xx + h->yy * h->yy + h->zz * h->zz + 2 * (h->xy * h->xy + h->xz * h->xz + h->yz * h->yz);
+    return 0.15 / fmax(sqrt(bend2), 1e-3);
+}
+
+// Is all on x's side in a ball that touches the wall at the foot and is wider than the gap by up to half a radius? Looks at points on three spheres in it: a
+// flat wall that comes nearer to the middle than 0.92 of the ball's radius shows at one of 80. Returns how far x may go [mm] until another wall than the
+// foot's could be the closest; 0: no such ball.
 static double room_about(const FieldVessel *field, double side, const Foot *foot)
 {
-    static const double wider[] = {0.5, 0.25, 0.12}, sphere[] = {0.93, 0.62, 0.31};
-    enum { TRIES = sizeof wider / sizeof wider[0], SPHERES = sizeof sphere / sizeof sphere[0] };
-    double radius = field->node[foot->node].radius, size = fabs(foot->gap), f[WAYS];
+    static const double wider[] = {0.25, 0.1};
+    enum { TRIES = sizeof wider / sizeof wider[0] };
+    const FieldNode *node = &field->node[foot->node];
+    double size = fabs(foot->gap);
     for (int t = 0; t < TRIES; t++) {
-        double ball = size + wider[t] * radius, room = 0.4 * (0.86 * ball - size);
+        double ball = size + wider[t] * node->radius, room = 0.4 * (0.92 * ball - size);
         Vec3 middle = vec3_add_scaled(foot->at, side * ball, foot->normal);
-        bool clear = room > 0.01 * radius;
-        for (int k = 0; k < SPHERES && clear; k++) {
-            look_around(field, middle, foot->node, sphere[k] * ball, f);
-            for (int w = 0; w < WAYS; w++)
-                clear &= side * f[w] > 0;
-        }
-        if (clear)
-            return room;
+        if (node->carried && inlet_height(field, middle) - ball < inlet_zone(field))
+            continue;
+        if (room > 0.01 * node->radius && is_clear(field, node, middle, ball, side))
+            return fmin(room, bend_radius(foot));
     }
     return 0;
 }
@@ -371,7 +399,7 @@ static bool settle_crossings(const FieldVessel *field, Vec3 x, int node, double 
                 at[k] = HUGE_VAL;
     }
     Foot foot[FOOT_BLOCK];
-    int found = count > 0 ? settle(field, x, node, start, count, ROUNDS, foot) : 0;
+    int found = count > 0 ? settle(field, x, node, start, count, FEW_ROUNDS, foot) : 0;
     for (int i = 0; i < found; i++)
         if (foot[i].gap * side > -1e-9)
             add_sheet(sheets, &foot[i]);
@@ -436,7 +464,7 @@ static void move_to_cell(const FieldVessel *field, Vec3 x, Foot *foot)
 // A foot of x from scratch, the closest of those about the vessel's axis: where that does not lead to a foot on the right side, all around x.
 static Sheets project(const FieldVessel *field, Vec3 x, int node, double side)
 {
-    enum { AROUND = 6, FEW_ROUNDS = 9 };
+    enum { AROUND = 6 };
     const FieldNode *n = &field->node[node];
     Vec3 d = field->tree->direction[node], away = vec3_sub(x, n->center), start[FOOT_BLOCK], out, across, g;
     Vec3 axis = vec3_add_scaled(n->center, vec3_dot(away, d), d);
@@ -480,12 +508,11 @@ static void set_clearance(VesselMemory *m, Vec3 x, double clearance)
 // Are bounds and foot such that the foot is certainly the closest?
 static bool is_closest(const FieldVessel *field, Vec3 x, const Foot *foot, const VesselMemory *m)
 {
-    double slope, size = fabs(foot->gap);
+    double size = fabs(foot->gap);
     const FieldNode *node = &field->node[foot->node];
     if (node->carried && inlet_height(field, x) - size < inlet_zone(field))
         return false;
-    field_at(field, foot->node, foot->at, &slope);
-    return vec3_distance(x, m->bound_at) + size <= m->bound_for && (foot->gap > 0 ? m->down : m->up) * size < 0.97 * slope;
+    return vec3_distance(x, m->bound_at) + size <= m->bound_for && (foot->gap > 0 ? m->down : m->up) * size < 0.97 * foot->slope;
 }
 
 // What is remembered and answered where lanes do not say it.
@@ -551,7 +578,7 @@ static void answer_surely(const FieldVessel *field, Vec3 x, double side, Sheets 
             }
             m->has_rival = sheets.has_rival && fabs(sheets.rival.gap) < fabs(sheets.foot.gap) + 2 * TRUST * radius;
             m->rival = sheets.rival.at;
-            m->trust = TRUST * radius;
+            m->trust = fmin(TRUST * radius, bend_radius(&sheets.foot));
         }
     }
     set_flags(field, x, m->node, hit);
@@ -907,10 +934,8 @@ Vessel *field_vessel_create_with(const VesselTree *tree, int isa)
     for (int level = 0; level < field->blocks.levels; level++)
         field->vessel.bytes += (size_t)field->blocks.count[level] * sizeof(PowerBox);
     field->inlet_open = vessel_tree_root_is_open(tree);
-    for (int k = 0; k < WAYS; k++) {     // a spiral from pole to pole
-        double z = 1 - (2 * k + 1) / (double)WAYS, out = sqrt(1 - z * z), angle = k * PI * (3 - sqrt(5));
-        field->way[k] = vec3(out * cos(angle), out * sin(angle), z);
-    }
+    field_directions(field->way, WAYS);
+    field_clear_points(&field->clear_points);
     fill_rows(field);
     fill_nodes(field);
     return &field->vessel;
