@@ -50,7 +50,7 @@ typedef struct FieldVessel {
 static const double SKIN = 0.15, SKIN_MOST = 0.2;    // of the radius, < BLOB_FLOOD_MARGIN; [mm]
 static const double BOUND = 0.1, BOUND_MOST = 0.15;  // what bounds are wider than the gap: of the radius; [mm]
 static const double TRUST = 0.05;            // of the radius: rivals that are this much farther are kept an eye on
-static const double REST = 1e-8;             // [mm] what Newton may leave of the gap
+static const double REST = 1e-8, REST_FRESH = 1e-10;     // [mm] what Newton may leave of the gap: of a foot that is followed, of one from scratch
 // Feet on two nodes' walls that are closer together than this [mm] are the same.
 static const double AGREE = 1e-3;
 
@@ -263,6 +263,7 @@ static int settle(const FieldVessel *field, Vec3 x, int node, const Vec3 *start,
         f->xx[i] = x.x, f->xy[i] = x.y, f->xz[i] = x.z;
         f->at.x[i] = from->x, f->at.y[i] = from->y, f->at.z[i] = from->z;
         f->longest[i] = 0.5 * f->radius[i];
+        f->allowed[i] = REST_FRESH;
         f->state[i] = FOOT_PENDING;
     }
     for (int round = 0; round < rounds && done != (1u << FOOT_BLOCK) - 1; round++) {
@@ -499,6 +500,23 @@ static int walk(const FieldVessel *field, Vec3 x, int from, int hops)
     return known ? power_walk(field->tree, x, from, hops) : power_blocks_nearest(&field->blocks, x);
 }
 
+// A ball about x of at most `most` that is certainly lumen, f(x + v) >= f(x) - |grad f| |v| - M |v|^2 / 2 > 0; 0: none. Not where the inlet bends the field.
+static double clear_ball(const FieldVessel *field, const FieldNode *node, Vec3 x, double most)
+{
+    static const double part[] = {0.9, 0.65, 0.4};
+    enum { PARTS = sizeof part / sizeof part[0] };
+    if (!(most > 0.2 * node->radius) || (node->carried && inlet_height(field, x) - most < inlet_zone(field)))
+        return 0;
+    double slope, down, up, f = field_at(field, (int)(node - field->node), x, &slope);
+    for (int k = 0; k < PARTS; k++) {
+        double ball = part[k] * most;
+        field->kernels->bends(field->row, node->seen, node->seen_count, x, ball, &down, &up);
+        if (f - ball * (slope + 0.5 * ball * down) > 0)
+            return ball;
+    }
+    return 0;
+}
+
 static void set_clearance(VesselMemory *m, Vec3 x, double clearance)
 {
     m->clearance = clearance > 0 ? 0.999 * clearance : 0;
@@ -567,7 +585,7 @@ static void answer_surely(const FieldVessel *field, Vec3 x, double side, Sheets 
     if (is_closest(field, x, &sheets.foot, m)) {
         set_clearance(m, x, sheets.foot.gap);
     } else {
-        set_clearance(m, x, 0);
+        set_clearance(m, x, clear_ball(field, &field->node[sheets.foot.node], x, sheets.foot.gap));
         m->trust = room_about(field, side, &sheets.foot);
         if (m->trust == 0) {
             Foot before = sheets.foot;
@@ -633,7 +651,7 @@ static void answer_beside_rival(const FieldVessel *field, Vec3 x, Foot foot, Ves
     answer(field, x, other ? &rival : &foot, m, hit);
     m->rival = other ? foot.at : rival.at;
     m->trust = trust;
-    set_clearance(m, x, 0);
+    set_clearance(m, x, clear_ball(field, &field->node[m->node], x, hit->gap));
     set_flags(field, x, m->node, hit);
 }
 
@@ -644,21 +662,25 @@ static bool answer_cheaply(const FieldVessel *field, Vec3 x, double reach, Vesse
         *hit = (VesselHit){.node = m->node, .flags = VESSEL_UNSURE};
         return true;
     }
-    if (m->node < 0 || m->node >= field->tree->node_count) {
+    if (m->node < 0 || m->node >= field->tree->node_count)
         *m = (VesselMemory){.node = walk(field, x, -1, 0)};
-        double clear = field->node[m->node].clear - vec3_distance(x, field->node[m->node].center);
-        set_clearance(m, x, clear);
-    }
     if (m->node == 0 && field->inlet_open && !field->node[0].carried && inlet_height(field, x) < 0) {
         m->has_foot = false;
         m->clearance = 0;
         *hit = (VesselHit){.gap = HUGE_VAL, .node = m->node, .flags = VESSEL_OPEN_END};
         return true;
     }
-    double away = m->clearance - reach;
-    if (!(away > 0 && vec3_norm2(vec3_sub(x, m->clear_place)) < away * away))
-        return false;
-    *hit = (VesselHit){.gap = m->clearance - vec3_distance(x, m->clear_place), .node = m->node, .flags = VESSEL_FAR};
+    const FieldNode *node = &field->node[m->node];
+    double away = m->clearance - reach, gap;
+    if (away > 0 && vec3_norm2(vec3_sub(x, m->clear_place)) < away * away) {
+        gap = m->clearance - vec3_distance(x, m->clear_place);
+    } else {
+        away = node->clear - reach;
+        if (!(away > 0 && vec3_norm2(vec3_sub(x, node->center)) < away * away))
+            return false;
+        gap = node->clear - vec3_distance(x, node->center);
+    }
+    *hit = (VesselHit){.gap = gap, .node = m->node, .flags = VESSEL_FAR};
     return true;
 }
 
@@ -671,7 +693,7 @@ static bool hold_anew(const FieldVessel *field, VesselMemory *m, Vec3 q)
         if (!sees_all(field, q, m->node))
             return false;
         if (!(walls_apart(field, m->node, cell, q) > AGREE))
-            m->node = cell;
+            m->node = cell, m->clearance = 0;
     }
     hold_blobs(field, m, q);
     return true;
@@ -809,7 +831,8 @@ static void follow_block(const FieldVessel *field, Batch *batch, const int *poin
             VesselMemory *m = &batch->memory[p];
             hit->node = m->node;
             hit->flags = 0;
-            set_clearance(m, batch->point[p], sure >> i & 1 ? b.foot.gap[i] : 0);
+            if (sure >> i & 1)
+                set_clearance(m, batch->point[p], b.foot.gap[i]);
             set_flags(field, batch->point[p], m->node, hit);
         }
     }
@@ -877,17 +900,14 @@ static void fill_rows(FieldVessel *field)
     field->row[tree->blob_count] = (FieldRow){0};
 }
 
-// A ball about the node's centre that is certainly lumen: f(C + v) >= f(C) - |grad f| |v| - M |v|^2 / 2.
-static double clear_ball(const FieldVessel *field, int i)
+// From the node's centre no wall can be nearer than this.
+static double clear_about_center(const FieldVessel *field, int i)
 {
-    double slope, down, up, f = field_at(field, i, field->node[i].center, &slope);
-    for (double part = 0.95; part > 0.2; part -= 0.15) {
-        double ball = part * field->node[i].radius;
-        field->kernels->bends(field->row, field->node[i].seen, field->node[i].seen_count, field->node[i].center, ball, &down, &up);
-        if (f - ball * (slope + 0.5 * ball * down) > 0)
-            return ball;
-    }
-    return -HUGE_VAL;
+    const FieldNode *n = &field->node[i];
+    double clear = clear_ball(field, n, n->center, n->radius);
+    if (n->carried)
+        clear = fmin(clear, inlet_height(field, n->center) - inlet_zone(field));
+    return clear > 0 ? clear : -HUGE_VAL;
 }
 
 static void fill_nodes(FieldVessel *field)
@@ -901,15 +921,14 @@ static void fill_nodes(FieldVessel *field)
         n->skin = fmin(SKIN * n->radius, SKIN_MOST);
         n->seen = tree->seen + tree->seen_offset[i];
         n->seen_count = (int)(tree->seen_offset[i + 1] - tree->seen_offset[i]);
-        n->clear = clear_ball(field, i);
     }
     for (int k = tree->near_offset[0] - 1; k < tree->near_offset[1] && field->inlet_open; k++) {
         int node = k < tree->near_offset[0] ? 0 : tree->near[k];
         Blobby blobs = blobby_of(tree, node);
         field->node[node].carried = blobby_field(&blobs, tree->center[0]) > 0;
-        if (field->node[node].carried)
-            field->node[node].clear = fmin(field->node[node].clear, inlet_height(field, tree->center[node]) - inlet_zone(field));
     }
+    for (int i = 0; i < tree->node_count; i++)
+        field->node[i].clear = clear_about_center(field, i);
 }
 
 Vessel *field_vessel_create_with(const VesselTree *tree, int isa)

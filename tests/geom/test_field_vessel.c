@@ -1,0 +1,642 @@
+// Contact with a field of shared blobs: exact walls, the lanes against a plain twin on every instruction set, derivatives, feet that are followed against feet
+// from scratch, one wall across cells, kissing vessels, the inlet, motion and mirroring of the scene, places where no field is, no heap.
+#include "blob_tube.h"
+#include "field_tree.h"
+#include "geom/field_lanes.h"
+#include "geom/power_walk.h"
+#include "geom/vessel.h"
+#include "random_numbers.h"
+
+#include <malloc.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "near.h"
+
+enum { NODES = 60, OVER = 3 };
+
+static VesselTree *helix(int extra)
+{
+    Vec3 line[NODES + 2 * OVER];
+    helix_line(line, NODES + 2 * OVER, 6, 9, 0.7);
+    return field_tree_along(line, NODES, OVER, 1, extra, 21);
+}
+
+static VesselTree *straight(int nodes, double spacing)
+{
+    Vec3 line[128];
+    for (int i = 0; i < nodes + 2 * OVER; i++)
+        line[i] = vec3(spacing * (i - OVER), 0, 0);
+    return field_tree_along(line, nodes, OVER, 1, 0, 1);
+}
+
+static Vessel *make(const VesselTree *tree, int isa)
+{
+    Vessel *v = field_vessel_create_with(tree, isa);
+    assert_non_null(v);
+    return v;
+}
+
+static VesselHit ask(const Vessel *v, Vec3 x, int from, double reach)
+{
+    VesselMemory memory = {.node = from};
+    VesselHit hit;
+    vessel_query(v, 1, &x, reach, &memory, &hit);
+    return hit;
+}
+
+static bool same_hit(const VesselHit *a, const VesselHit *b)
+{
+    return memcmp(&a->gap, &b->gap, sizeof a->gap) == 0 && memcmp(&a->normal, &b->normal, sizeof a->normal) == 0 &&
+           memcmp(&a->hessian, &b->hessian, sizeof a->hessian) == 0 && a->node == b->node && a->flags == b->flags;
+}
+
+// A tool of points wandering along the tree, `aside` from its axis at most about.
+static Vec3 wander(const VesselTree *t, uint64_t *seed, int step, int steps, Vec3 x, double stride)
+{
+    double s = (double)step / steps * (t->node_count - 6.001) + 3;
+    int k = (int)s;
+    Vec3 axis = vec3_mix(t->center[k], t->center[k + 1], s - k), out = vec3_scale(vec3_sub(x, axis), 0.98);
+    return vec3_add(vec3_add(axis, out), random_in_box(seed, stride));
+}
+
+// --- exact walls ---
+
+static void one_blob_is_a_sphere(void **state)
+{
+    (void)state;
+    VesselTree *t = vessel_tree_create_shared(1, 0, 1);
+    t->center[0] = t->blob_center[0] = vec3(1, 2, 3);
+    t->radius[0] = 2;
+    t->direction[0] = vec3(-1, 0, 0);
+    t->parent[0] = -1;
+    t->blob_width[0] = 4;
+    t->blob_amplitude[0] = 1 / (0.75 * 0.75 * 0.75);     // u = 3/4 at d = 2
+    t->blob_offset[1] = 1;
+    assert_true(vessel_tree_link(t));
+    Vessel *v = make(t, 0);
+    uint64_t seed = 14;
+    for (int trial = 0; trial < 1000; trial++) {
+        Vec3 u = random_unit(&seed);
+        double d = random_in(&seed, 0.3, trial % 2 ? 2.5 : 30);
+        u.x = u.x > -0.6 ? -0.6 - fabs(u.x) : u.x;   // downstream of the inlet, which looks along -x
+        u = vec3_unit(u);
+        VesselHit hit = ask(v, vec3_add_scaled(t->center[0], d, u), 0, 100);
+        assert_int_equal(hit.flags, 0);
+        assert_near(hit.gap, 2 - d, 1e-9 * (1 + d));
+        assert_true(vec3_distance(hit.normal, vec3_negate(u)) < 1e-6);
+        if (d > 0.4)
+            assert_near(sym3_quadratic(&hit.hessian, vec3_normal_to(u)) * d, -1, 1e-4);   // of the last evaluation
+    }
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
+// A straight row of equal blobs is a tube with waves, whose depth falls quickly with the blobs' distance.
+static void row_becomes_a_tube(void **state)
+{
+    (void)state;
+    double worst[3] = {0};
+    static const double spacing[] = {1, 0.75, 0.5};
+    for (int k = 0; k < 3; k++) {
+        VesselTree *t = straight(60, spacing[k]);
+        Vessel *v = make(t, 0);
+        for (int i = 0; i < 300; i++) {
+            double s = 5 + 0.05 * i, angle = 0.7 * i;
+            VesselHit hit = ask(v, vec3(s, 0.8 * cos(angle), 0.8 * sin(angle)), -1, 5);
+            assert_int_equal(hit.flags, 0);
+            worst[k] = fmax(worst[k], fabs(hit.gap - 0.2));
+        }
+        v->destroy(v);
+        vessel_tree_free(t);
+    }
+    print_message("a row of blobs 1, 0.75, 0.5 r apart is a tube to %.1e, %.1e, %.1e r\n", worst[0], worst[1], worst[2]);
+    assert_true(worst[0] < 5e-2 && worst[1] < 0.5 * worst[0] && worst[2] < 0.3 * worst[1]);
+}
+
+// --- the plain twin ---
+
+// What a query should say, in the plainest way: feet from many starts by damped steps on what the foot's cell sees, the closest of them.
+typedef struct Twin {
+    double gap;
+    Vec3 foot, normal;
+    Sym3 hessian;
+    int node;
+} Twin;
+
+static int twin_cell(const VesselTree *t, Vec3 q, int node)
+{
+    for (;;) {
+        int best = node;
+        for (int k = t->near_offset[node]; k < t->near_offset[node + 1]; k++)
+            if (power_distance(q, t->center[t->near[k]], t->radius[t->near[k]]) < power_distance(q, t->center[best], t->radius[best]))
+                best = t->near[k];
+        if (best == node)
+            return node;
+        node = best;
+    }
+}
+
+static Twin twin_of(const VesselTree *t, Vec3 x, int node)
+{
+    Twin best = {.gap = HUGE_VAL};
+    uint64_t seed = 77;
+    for (int trial = 0; trial < 60; trial++) {
+        int cell = node;
+        Vec3 start = vec3_add_scaled(x, trial == 0 ? 1e-3 : 1.2, random_unit(&seed));
+        SurfacePoint s = {.foot = start};
+        for (int k = 0; k < 5; k++) {
+            Blobby blobs = blobby_of(t, cell);
+            s = blobby_project(&blobs, x, s.foot);
+            int next = twin_cell(t, s.foot, cell);
+            if (!s.converged || next == cell)
+                break;
+            cell = next;
+        }
+        if (!s.converged || fabs(s.distance) >= fabs(best.gap) - 1e-12)
+            continue;
+        Sym3 h = s.shape;
+        // S (I + gap S)^-1 by its series' closed form in the plane across the normal
+        Vec3 t1 = vec3_normal_to(s.normal), t2 = vec3_cross(s.normal, t1);
+        double a = sym3_quadratic(&h, t1), c = sym3_quadratic(&h, t2), b = vec3_dot(t1, sym3_mul_vec(&h, t2)), g = s.distance;
+        double det = (1 + g * a) * (1 + g * c) - g * g * b * b, flat = a * c - b * b;
+        double ga = (a + g * flat) / det, gc = (c + g * flat) / det, gb = b / det;
+        Sym3 hess = {0, 0, 0, 0, 0, 0};
+        sym3_add_outer(&hess, ga, t1), sym3_add_outer(&hess, gc, t2);
+        Vec3 plus = vec3_scale(vec3_add(t1, t2), sqrt(0.5)), minus = vec3_scale(vec3_sub(t1, t2), sqrt(0.5));
+        sym3_add_outer(&hess, gb, plus), sym3_add_outer(&hess, -gb, minus);
+        best = (Twin){s.distance, s.foot, s.normal, hess, cell};
+    }
+    return best;
+}
+
+// Points that creep along the wall, each answer compared with the twin's.
+static void walks_against_twin(void **state)
+{
+    (void)state;
+    VesselTree *t = helix(3);
+    Vessel *v = make(t, 0);
+    uint64_t seed = 15;
+    int compared = 0, farther = 0, nearer = 0, fast[3] = {0};
+    double worst = 0, turned = 0;
+    for (int run = 0; run < 3; run++) {
+        VesselMemory memory = {.node = -1};
+        Vec3 x = t->center[3];
+        for (int step = 0; step < 600; step++) {
+            VesselHit hit;
+            x = wander(t, &seed, step, 600, x, run == 0 ? 0.02 : run == 1 ? 0.08 : 0.3);
+            vessel_query(v, 1, &x, 5, &memory, &hit);
+            assert_true((hit.flags & (VESSEL_UNSURE | VESSEL_DISAGREE)) == 0);
+            if (hit.flags & VESSEL_FAR || fabs(hit.gap) > 0.6)
+                continue;
+            Twin twin = twin_of(t, x, hit.node);
+            compared++;
+            fast[run]++;
+            double differs = fabs(hit.gap) - fabs(twin.gap);
+            farther += differs > 1e-6;
+            nearer += differs < -1e-6;
+            if (fabs(differs) > 1e-6)
+                continue;
+            worst = fmax(worst, fabs(differs));
+            turned = fmax(turned, vec3_distance(hit.normal, twin.normal));
+            Vec3 rest = vec3_sub(vec3_sub(x, memory.foot), vec3_scale(hit.normal, hit.gap));
+            assert_true(vec3_norm(rest) < 1e-5);
+        }
+    }
+    print_message("%d answers against the twin: %d farther, %d nearer, else gap to %.1e mm and normal to %.1e\n", compared, farther, nearer, worst, turned);
+    assert_true(compared > 400 && farther == 0 && nearer <= 2);
+    assert_true(worst < 1e-8 && turned < 1e-4);
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
+// --- bits ---
+
+static void same_bits_on_every_isa(void **state)
+{
+    (void)state;
+    enum { POINTS = 37 };
+    VesselTree *t = helix(4);
+    Vessel *v[3];
+    static VesselMemory memory[3][POINTS];
+    VesselHit hit[3][POINTS];
+    Vec3 x[POINTS];
+    uint64_t seed = 13;
+    for (int i = 0; i < 3; i++)
+        v[i] = make(t, i + 1);
+    for (int k = 0; k < POINTS; k++) {
+        x[k] = t->center[3];
+        for (int i = 0; i < 3; i++)
+            memory[i][k] = (VesselMemory){.node = -1};
+    }
+    for (int step = 0; step < 300; step++) {
+        for (int k = 0; k < POINTS; k++)
+            x[k] = wander(t, &seed, step, 300, x[k], k % 3 == 0 ? 0.3 : 0.08);
+        for (int i = 0; i < 3; i++)
+            vessel_query(v[i], POINTS, x, 0.5, memory[i], hit[i]);
+        for (int k = 0; k < POINTS; k++)
+            for (int i = 1; i < 3; i++) {
+                assert_true(same_hit(&hit[0][k], &hit[i][k]));
+                assert_true(memory[0][k].blobs == memory[i][k].blobs && memory[0][k].trust == memory[i][k].trust);
+            }
+    }
+    for (int i = 0; i < 3; i++)
+        v[i]->destroy(v[i]);
+    vessel_tree_free(t);
+}
+
+// A point's answer does not depend on the points it is asked with, nor on which blobs its memory happens to hold.
+static void alone_as_in_company(void **state)
+{
+    (void)state;
+    enum { POINTS = 100 };
+    VesselTree *t = helix(4);
+    Vessel *v = make(t, 0);
+    static VesselMemory together[POINTS], alone[POINTS];
+    VesselHit hit[POINTS], one;
+    Vec3 x[POINTS];
+    uint64_t seed = 19;
+    for (int k = 0; k < POINTS; k++) {
+        x[k] = t->center[3];
+        together[k] = alone[k] = (VesselMemory){.node = -1};
+    }
+    for (int step = 0; step < 200; step++) {
+        for (int k = 0; k < POINTS; k++)
+            x[k] = wander(t, &seed, step, 200, x[k], k % 3 == 0 ? 0.3 : 0.05);
+        vessel_query(v, POINTS, x, 0.5, together, hit);
+        for (int k = POINTS - 1; k >= 0; k--) {
+            vessel_query(v, 1, &x[k], 0.5, &alone[k], &one);
+            assert_true(same_hit(&hit[k], &one));
+        }
+    }
+    // the same foot with a list from elsewhere within the skin
+    for (int k = 0; k < POINTS; k++) {
+        VesselMemory a = together[k], b = together[k];
+        if (!a.has_foot || a.blobs < 0)
+            continue;
+        b.held_for2 = -1;    // has to be made anew
+        VesselHit ha, hb;
+        vessel_query(v, 1, &x[k], 0.5, &a, &ha);
+        vessel_query(v, 1, &x[k], 0.5, &b, &hb);
+        assert_true(same_hit(&ha, &hb) || ha.node != hb.node);
+        assert_true(ha.gap == hb.gap);
+    }
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
+// --- derivatives ---
+
+static void derivatives_of_the_gap(void **state)
+{
+    (void)state;
+    VesselTree *t = helix(3);
+    Vessel *v = make(t, 0);
+    uint64_t seed = 16;
+    int checked = 0;
+    double worst_normal = 0, worst_bend = 0;
+    for (int trial = 0; trial < 1500; trial++) {
+        Vec3 c = t->center[5 + trial % 50], x = vec3_add_scaled(c, random_in(&seed, 0.6, 1.2), random_unit(&seed));
+        VesselMemory memory = {.node = -1};
+        VesselHit hit;
+        for (int k = 0; k < 2; k++)    // the Hessian is that of the last evaluation: asked again, of the foot
+            vessel_query(v, 1, &x, 5, &memory, &hit);
+        double bend = sqrt(sym3_quadratic(&hit.hessian, vec3(1, 0, 0)) * sym3_quadratic(&hit.hessian, vec3(1, 0, 0))) + fabs(sym3_trace(&hit.hessian));
+        if (fabs(hit.gap) > 0.4 || bend > 4)
+            continue;
+        double h = 1e-4;
+        Vec3 slope = {0, 0, 0};
+        bool same = true;
+        double bends = 0;
+        for (int k = 0; k < 3 && same; k++) {
+            Vec3 e = vec3(k == 0, k == 1, k == 2);
+            VesselHit side[2];
+            for (int s = 0; s < 2; s++) {
+                VesselMemory m = memory;
+                Vec3 y = vec3_add_scaled(x, s ? -h : h, e);
+                for (int again = 0; again < 2; again++)
+                    vessel_query(v, 1, &y, 5, &m, &side[s]);
+                same &= vec3_distance(m.foot, memory.foot) < 0.01;
+            }
+            slope = vec3_add_scaled(slope, (side[0].gap - side[1].gap) / (2 * h), e);
+            Vec3 turn = vec3_scale(vec3_sub(side[0].normal, side[1].normal), 1 / (2 * h));
+            bends = fmax(bends, vec3_distance(turn, sym3_mul_vec(&hit.hessian, e)));
+        }
+        if (!same)
+            continue;
+        checked++;
+        worst_normal = fmax(worst_normal, vec3_distance(slope, hit.normal));
+        worst_bend = fmax(worst_bend, bends);
+        assert_true(vec3_norm(sym3_mul_vec(&hit.hessian, hit.normal)) < 1e-9);
+    }
+    print_message("%d places: gradient of the gap is the normal to %.1e, of the normal the Hessian to %.1e\n", checked, worst_normal, worst_bend);
+    assert_true(checked > 300 && worst_normal < 1e-6 && worst_bend < 1e-5);
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
+// --- one wall ---
+
+// Along the wall in steps of 2 um: what the gap changes by beyond the motion is a jump of the wall.
+static void no_jump_between_cells(void **state)
+{
+    (void)state;
+    VesselTree *t = helix(4);
+    Vessel *v = make(t, 0);
+    double worst = 0, turn = 0;
+    int changes = 0;
+    for (int way = 0; way < 4; way++) {
+        VesselMemory memory = {.node = 5};
+        VesselHit last = {.gap = HUGE_VAL};
+        for (int k = 0; k < 8000; k++) {
+            double s = 5 + 0.003 * k, angle = 1.57 * way;
+            int i = (int)s;
+            Vec3 c = vec3_mix(t->center[i], t->center[i + 1], s - i), d = vec3_unit(vec3_sub(t->center[i + 1], t->center[i]));
+            Vec3 e1 = vec3_normal_to(vec3(0, 0, 1)), e2 = vec3_unit(vec3_cross(d, e1)), out = vec3_add(vec3_scale(vec3_cross(e2, d), cos(angle)), vec3_scale(e2, sin(angle)));
+            Vec3 x = vec3_add_scaled(c, 0.85, out);
+            VesselHit hit;
+            vessel_query(v, 1, &x, 5, &memory, &hit);
+            assert_int_equal(hit.flags, 0);
+            // another node for the same foot: ask the former one, too
+            if (last.gap < HUGE_VAL && last.node != hit.node) {
+                Blobby a = blobby_of(t, last.node), b = blobby_of(t, hit.node);
+                Vec3 ga, gb;
+                double fa = blobby_gradient(&a, memory.foot, &ga), fb = blobby_gradient(&b, memory.foot, &gb);
+                worst = fmax(worst, fabs(fa - fb) / vec3_norm(gb));
+                turn = fmax(turn, vec3_distance(vec3_unit(ga), vec3_unit(gb)));
+                changes++;
+            }
+            last = hit;
+        }
+    }
+    print_message("%d changes of node: walls differ by %.1e mm, normals by %.1e\n", changes, worst, turn);
+    assert_true(changes > 50 && worst < 1e-12 && turn < 1e-12);
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
+// Two arms of a hairpin whose walls touch: each is a tube as if the other were not there.
+static void kissing_vessels_keep_apart(void **state)
+{
+    (void)state;
+    enum { ARM = 40, BEND = 20, ALL = 2 * ARM + BEND };
+    Vec3 line[ALL + 2 * OVER];
+    double r = 2.1, spacing = PI * r / BEND;     // arms 4.2 apart, walls 2 mm each: 0.2 mm between
+    for (int i = 0; i < ALL + 2 * OVER; i++) {
+        int k = i - OVER;
+        double angle = PI * (k - ARM) / BEND;
+        line[i] = k < ARM ? vec3(spacing * (k - ARM), 0, 0)
+                  : k < ARM + BEND ? vec3(r * sin(angle), r - r * cos(angle), 0) : vec3(-spacing * (k - ARM - BEND), 2 * r, 0);
+    }
+    VesselTree *t = field_tree_along(line, ALL, OVER, 2, 0, 1);
+    Vessel *v = make(t, 0);
+    double worst = 0;
+    for (int k = 0; k < 100; k++) {
+        double s = -11 + 0.02 * k;
+        VesselHit hit = ask(v, vec3(s, 1.8, 0), 3, 5), far_side = ask(v, vec3(s, -1.8, 0), 3, 5);
+        assert_int_equal(hit.flags | far_side.flags, 0);
+        assert_true(hit.node < ARM);
+        worst = fmax(worst, fabs(hit.gap - far_side.gap));
+    }
+    print_message("kissing arms: the wall differs by %.1e mm from one without neighbour\n", worst);
+    assert_true(worst < 1e-9);
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
+static void inlet_is_open(void **state)
+{
+    (void)state;
+    VesselTree *t = straight(30, 0.75);
+    Vessel *v = make(t, 0);
+    Vec3 p, d;
+    assert_true(v->inlet(v, &p, &d) && vec3_norm(p) == 0 && vec3_distance(d, vec3(1, 0, 0)) < 1e-12);
+    for (double x = -5; x < -0.5; x += 0.3) {
+        VesselHit hit = ask(v, vec3(x, 0.3, 0.2), 0, 1), root = ask(v, vec3(-20, 0.3, 0.2), 0, 1);
+        assert_int_equal(hit.flags, VESSEL_BEYOND);
+        assert_near(hit.gap, root.gap, 1e-8);
+        assert_true(vec3_distance(hit.normal, root.normal) < 1e-6 && fabs(hit.normal.x) < 1e-9);
+        assert_near(hit.hessian.xx, 0, 1e-9);
+        assert_true(ask(v, vec3(x, 2, 0), 0, 1).gap < -0.5);
+    }
+    VesselMemory memory = {.node = -1};
+    VesselHit last = {.gap = HUGE_VAL};
+    for (double x = 3; x >= -3; x -= 0.01) {
+        VesselHit hit;
+        Vec3 at = {x, 0.7, 0};
+        vessel_query(v, 1, &at, 0.5, &memory, &hit);
+        assert_int_equal(hit.flags, x < 0 ? VESSEL_BEYOND : 0);
+        if (last.gap < 1) {      // smooth across the plane: the gap changes as the normal says, the normal as the Hessian says
+            assert_near(last.gap - hit.gap, 0.01 * 0.5 * (hit.normal.x + last.normal.x), 2e-5);
+            Vec3 bends = vec3_scale(vec3_sub(last.normal, hit.normal), 100);
+            assert_true(vec3_distance(bends, sym3_mul_vec(&hit.hessian, vec3(1, 0, 0))) < 0.1);
+        }
+        last = hit;
+        assert_near(hit.gap, 0.3, 0.02);
+    }
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
+static Vec3 mirrored(Vec3 v) { return vec3(v.x, -v.y, v.z); }
+
+static void moved_and_mirrored_scenes(void **state)
+{
+    (void)state;
+    Quat q = quat_from_rotation_vector(vec3(0.7, 0.2, -1.5));
+    Vec3 shift = {100, -50, 20};
+    VesselTree *t[3] = {helix(3), helix(3), helix(3)};
+    for (int i = 0; i < t[0]->node_count; i++) {
+        t[1]->center[i] = vec3_add(quat_rotate(q, t[0]->center[i]), shift);
+        t[1]->direction[i] = quat_rotate(q, t[0]->direction[i]);
+        t[2]->center[i] = mirrored(t[0]->center[i]);
+        t[2]->direction[i] = mirrored(t[0]->direction[i]);
+    }
+    for (int64_t j = 0; j < t[0]->blob_count; j++) {
+        t[1]->blob_center[j] = vec3_add(quat_rotate(q, t[0]->blob_center[j]), shift);
+        t[2]->blob_center[j] = mirrored(t[0]->blob_center[j]);
+    }
+    Vessel *v[3];
+    VesselMemory memory[3] = {{.node = 3}, {.node = 3}, {.node = 3}};
+    for (int i = 0; i < 3; i++) {
+        assert_true(vessel_tree_link(t[i]));
+        v[i] = make(t[i], 0);
+    }
+    uint64_t seed = 18;
+    Vec3 x = t[0]->center[3];
+    int compared = 0;
+    for (int step = 0; step < 1500; step++) {
+        x = wander(t[0], &seed, step, 1500, x, 0.2);
+        VesselHit hit[3];
+        vessel_query(v[0], 1, &x, 0.5, &memory[0], &hit[0]);
+        Vec3 moved = vec3_add(quat_rotate(q, x), shift), flipped = mirrored(x);
+        vessel_query(v[1], 1, &moved, 0.5, &memory[1], &hit[1]);
+        vessel_query(v[2], 1, &flipped, 0.5, &memory[2], &hit[2]);
+        if (hit[0].flags || hit[0].gap > 0.4)
+            continue;
+        compared++;
+        assert_near(hit[0].gap, hit[1].gap, 1e-8);
+        assert_near(hit[0].gap, hit[2].gap, 1e-8);
+        assert_true(vec3_distance(quat_rotate(q, hit[0].normal), hit[1].normal) < 1e-6);
+        assert_true(vec3_distance(mirrored(hit[0].normal), hit[2].normal) < 1e-6);
+    }
+    assert_true(compared > 300);
+    for (int i = 0; i < 3; i++) {
+        v[i]->destroy(v[i]);
+        vessel_tree_free(t[i]);
+    }
+}
+
+// --- where there is no field ---
+
+static void nowhere_is_survived(void **state)
+{
+    (void)state;
+    VesselTree *t = helix(2);
+    Vessel *v = make(t, 0);
+    uint64_t seed = 17;
+    static const double bad[] = {NAN, INFINITY, 1e100, 1e70, 1e30, 1e8, 1e3};
+    VesselMemory memory = {.node = 10};
+    for (int i = 0; i < 14; i++) {       // with and without history, and back again
+        VesselHit hit = ask(v, vec3(bad[i % 7], i % 2, 0), i % 2 ? -1 : 5, 1);
+        assert_true(hit.gap == hit.gap && vec3_is_finite(hit.normal));
+        Vec3 x = vec3(1, bad[i % 7], 0);
+        vessel_query(v, 1, &x, 1, &memory, &hit);
+        assert_true(hit.gap == hit.gap && vec3_is_finite(hit.normal));
+        (void)v->locate(v, x, -1);
+        x = vec3_add_scaled(t->center[10], 0.8, random_unit(&seed));
+        vessel_query(v, 1, &x, 5, &memory, &hit);
+        VesselHit fresh = ask(v, x, 10, 5);
+        assert_true(fabs(hit.gap - fresh.gap) < 1e-6);
+    }
+    for (int trial = 0; trial < 200; trial++) {      // on the axis, at nodes and between
+        int i = 5 + trial % 50;
+        VesselHit hit = ask(v, vec3_mix(t->center[i], t->center[i + 1], 0.005 * trial), -1, 5);
+        assert_int_equal(hit.flags, 0);
+        assert_true(hit.gap > 0.6 && hit.gap < 1.2);
+        assert_near(vec3_norm(hit.normal), 1, 1e-9);
+    }
+    for (int trial = 0; trial < 300; trial++) {      // from outside, also of all supports, the answer leads home
+        int node = 5 + trial % 50, steps = 0;
+        Vec3 x = vec3_add_scaled(t->center[node], random_in(&seed, 1.5, 6), random_unit(&seed));
+        VesselMemory m = {.node = node};
+        VesselHit hit;
+        do {
+            vessel_query(v, 1, &x, 0.5, &m, &hit);
+            assert_true(isfinite(hit.gap) && vec3_is_finite(hit.normal));
+            if (hit.gap < 0)
+                x = vec3_add_scaled(x, fmin(-hit.gap, 0.5) + 1e-3, hit.normal);
+        } while (hit.gap < 0 && ++steps < 40);
+        assert_true(steps < 40);
+    }
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
+// VESSEL_FAR is a bound: no wall of the point's part is nearer, and it is said only beyond reach.
+static void far_is_far(void **state)
+{
+    (void)state;
+    VesselTree *t = helix(3);
+    Vessel *v = make(t, 0);
+    uint64_t seed = 23;
+    VesselMemory memory = {.node = -1};
+    Vec3 x = t->center[3];
+    int far = 0;
+    for (int step = 0; step < 4000; step++) {
+        x = wander(t, &seed, step, 4000, x, step % 7 == 0 ? 0.2 : 0.03);
+        VesselHit hit;
+        vessel_query(v, 1, &x, 0.3, &memory, &hit);
+        if (!(hit.flags & VESSEL_FAR))
+            continue;
+        far++;
+        VesselHit exact = ask(v, x, hit.node, 100);
+        assert_true(hit.gap > 0.3 && exact.gap >= hit.gap - 1e-6);
+    }
+    print_message("far: %d of 4000\n", far);
+    assert_true(far > 300);
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
+// A memory that is copied and put back repeats to the bit; queries ask for no memory.
+static void copies_repeat_and_heap_rests(void **state)
+{
+    (void)state;
+    enum { POINTS = 20 };
+    VesselTree *t = helix(4);
+    Vessel *v = make(t, 0);
+    static VesselMemory memory[POINTS], kept[POINTS];
+    static Vec3 path[100][POINTS];
+    static VesselHit first[100][POINTS];
+    uint64_t seed = 29;
+    for (int k = 0; k < POINTS; k++)
+        memory[k] = (VesselMemory){.node = -1};
+    for (int step = 0; step < 100; step++)
+        for (int k = 0; k < POINTS; k++)
+            path[step][k] = wander(t, &seed, step, 100, step ? path[step - 1][k] : t->center[3], 0.1);
+    struct mallinfo2 before = mallinfo2();
+    for (int step = 0; step < 100; step++) {
+        if (step == 50)
+            memcpy(kept, memory, sizeof kept);
+        vessel_query(v, POINTS, path[step], 0.5, memory, first[step]);
+    }
+    memcpy(memory, kept, sizeof kept);
+    for (int step = 50; step < 100; step++) {
+        VesselHit hit[POINTS];
+        vessel_query(v, POINTS, path[step], 0.5, memory, hit);
+        for (int k = 0; k < POINTS; k++)
+            assert_true(same_hit(&hit[k], &first[step][k]));
+    }
+    struct mallinfo2 after = mallinfo2();
+    assert_true(before.uordblks == after.uordblks && before.fordblks == after.fordblks);
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
+// More blobs about a point than a memory holds: the whole list answers, and says the same.
+static void crowded_places(void **state)
+{
+    (void)state;
+    VesselTree *t = helix(60);
+    for (int64_t j = 0; j < t->blob_count; j++)
+        if (t->blob_width[j] < 1.9)
+            t->blob_amplitude[j] *= 0.1;
+    Vessel *v = make(t, 0);
+    uint64_t seed = 31;
+    VesselMemory memory = {.node = -1};
+    Vec3 x = t->center[3];
+    int crowded = 0;
+    for (int step = 0; step < 800; step++) {
+        x = wander(t, &seed, step, 800, x, 0.05);
+        VesselHit hit;
+        vessel_query(v, 1, &x, 5, &memory, &hit);
+        crowded += memory.blobs < 0;
+        assert_true((hit.flags & VESSEL_UNSURE) == 0);
+        Blobby blobs = blobby_of(t, hit.node);
+        Vec3 g;
+        double f = blobby_gradient(&blobs, memory.foot, &g);
+        assert_true(fabs(f) < 1e-7 * vec3_norm(g));
+    }
+    assert_true(crowded > 400);
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(one_blob_is_a_sphere), cmocka_unit_test(row_becomes_a_tube), cmocka_unit_test(walks_against_twin),
+        cmocka_unit_test(same_bits_on_every_isa), cmocka_unit_test(alone_as_in_company), cmocka_unit_test(derivatives_of_the_gap),
+        cmocka_unit_test(no_jump_between_cells), cmocka_unit_test(kissing_vessels_keep_apart), cmocka_unit_test(inlet_is_open),
+        cmocka_unit_test(moved_and_mirrored_scenes), cmocka_unit_test(nowhere_is_survived), cmocka_unit_test(far_is_far),
+        cmocka_unit_test(copies_repeat_and_heap_rests), cmocka_unit_test(crowded_places),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
