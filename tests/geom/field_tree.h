@@ -1,53 +1,97 @@
-// Trees with a field of shared blobs along a line, for tests: base blobs of R = 2 r, amplitude such that a straight row's mean wall stands at r, and
-// refinement blobs of either sign on the wall.
+// Small trees with a field of shared blobs, made branch by branch, for tests: nodes half a radius apart, a blob at each, whose amplitude makes the radius
+// right on a straight line. Include after the headers of cmocka.
 #ifndef SELDINGER_TESTS_FIELD_TREE_H
 #define SELDINGER_TESTS_FIELD_TREE_H
 
 #include "geom/blobby.h"
 #include "geom/vessel_tree.h"
-#include "random_numbers.h"
 
-// Amplitude of a straight row of blobs of R = 2 r, `pitch` apart, whose field is 0 at `radius`, averaged along the row.
-static inline double field_row_amplitude(double pitch, double radius)
+#include <stdbool.h>
+#include <stdlib.h>
+
+enum { FIELD_TREE_NODES = 4000, FIELD_TREE_BLOBS = 8000 };
+
+typedef struct FieldTree {
+    int nodes, blobs;
+    Vec3 center[FIELD_TREE_NODES], direction[FIELD_TREE_NODES];
+    double radius[FIELD_TREE_NODES];
+    int parent[FIELD_TREE_NODES];
+    uint8_t kind[FIELD_TREE_NODES];
+    Vec3 blob_center[FIELD_TREE_BLOBS];
+    double blob_width[FIELD_TREE_BLOBS], blob_amplitude[FIELD_TREE_BLOBS];
+    int blob_owner[FIELD_TREE_BLOBS];
+} FieldTree;
+
+// Amplitude of blobs of support 2 r, half a radius apart on a line, whose surface has radius r: 1 = a sum (1 - (r^2 + s^2) / (4 r^2))^3.
+static inline double field_tree_amplitude(void)
 {
-    enum { PLACES = 20 };
     double sum = 0;
-    for (int p = 0; p < PLACES; p++)
-        for (int j = -10; j <= 10; j++) {
-            double s = pitch * (j + (double)p / PLACES), u = fmax(1 - (s * s + radius * radius) / (4 * radius * radius), 0);
-            sum += u * u * u;
-        }
-    return PLACES / sum;
+    for (int k = -4; k <= 4; k++) {
+        double u = 1 - (1 + 0.25 * k * k) / 4;
+        sum += u > 0 ? u * u * u : 0;
+    }
+    return 1 / sum;
 }
 
-// `line` holds node_count + 2 * over points of equal spacing; node i sits at line[i + over]; each point of the line has a base blob, of the nearest node;
-// `extra` refinement blobs a node sit on the wall.
-static inline VesselTree *field_tree_along(const Vec3 *line, int node_count, int over, double radius, int extra, uint64_t seed)
+static inline void field_tree_blob(FieldTree *t, int owner, Vec3 center, double width, double amplitude)
 {
-    int all = node_count + 2 * over, at = 0;
-    VesselTree *t = vessel_tree_create_shared(node_count, 0, all + (int64_t)node_count * extra);
-    double spacing = vec3_distance(line[0], line[1]), a = field_row_amplitude(spacing, radius);
-    for (int i = 0; i < node_count; i++) {
-        t->center[i] = line[i + over];
+    int b = t->blobs++;
+    t->blob_center[b] = center;
+    t->blob_width[b] = width;
+    t->blob_amplitude[b] = amplitude;
+    t->blob_owner[b] = owner;
+}
+
+// From `from` to `to`, the first node's parent is `parent`; a blob at each node unless it lies within [bare_from, bare_to] mm from the beginning. The
+// row of blobs goes on for 2 r beyond an end that is `open_before` or at the last node: ends are flat there. Returns the last node.
+static inline int field_tree_branch(FieldTree *t, int parent, Vec3 from, Vec3 to, double radius, double bare_from, double bare_to)
+{
+    double length = vec3_distance(from, to), a = field_tree_amplitude();
+    int count = (int)(length / (0.5 * radius) + 0.5);
+    Vec3 d = vec3_unit(vec3_sub(to, from));
+    for (int k = 0; k <= count; k++) {
+        int i = t->nodes++;
+        double at = length * k / count;
+        t->center[i] = vec3_mix(from, to, (double)k / count);
+        t->direction[i] = d;
         t->radius[i] = radius;
-        t->direction[i] = vec3_unit(vec3_sub(line[i + over + 1], line[i + over - 1]));
-        t->height[i] = spacing;
-        t->parent[i] = i - 1;
-        int first = i == 0 ? 0 : i + over, last = i + 1 == node_count ? all - 1 : i + over;
-        for (int k = first; k <= last; k++, at++) {
-            t->blob_center[at] = line[k];
-            t->blob_width[at] = 2 * radius;
-            t->blob_amplitude[at] = a;
-        }
-        for (int k = 0; k < extra; k++, at++) {
-            t->blob_center[at] = vec3_add_scaled(t->center[i], radius, random_unit(&seed));
-            t->blob_width[at] = random_in(&seed, 0.5, 1.2) * radius;
-            t->blob_amplitude[at] = random_in(&seed, -0.08, 0.08);
-        }
-        t->blob_offset[i + 1] = at;
+        t->parent[i] = k > 0 ? i - 1 : parent;
+        t->kind[i] = NODE_VESSEL;
+        if (at < bare_from || at > bare_to)
+            field_tree_blob(t, i, t->center[i], 2 * radius, a);
     }
-    vessel_tree_link(t);
-    return t;
+    return t->nodes - 1;
+}
+
+// Blobs upstream of the root, so that the tube is whole there.
+static inline void field_tree_extend_root(FieldTree *t)
+{
+    for (int k = 1; k <= 4; k++)
+        field_tree_blob(t, 0, vec3_add_scaled(t->center[0], -0.5 * k * t->radius[0], t->direction[0]), 2 * t->radius[0], field_tree_amplitude());
+}
+
+// x -> turn x, where the rows of `turn` may mirror too.
+static inline VesselTree *field_tree_make(const FieldTree *t, const Mat3 *turn)
+{
+    VesselTree *tree = vessel_tree_create_shared(t->nodes, 0, t->blobs);
+    int64_t filled = 0;
+    for (int i = 0; i < t->nodes; i++) {
+        tree->center[i] = turn ? mat3_mul_vec(turn, t->center[i]) : t->center[i];
+        tree->direction[i] = turn ? mat3_mul_vec(turn, t->direction[i]) : t->direction[i];
+        tree->radius[i] = t->radius[i];
+        tree->parent[i] = t->parent[i];
+        tree->kind[i] = t->kind[i];
+        for (int b = 0; b < t->blobs; b++) {
+            if (t->blob_owner[b] != i)
+                continue;
+            tree->blob_center[filled] = turn ? mat3_mul_vec(turn, t->blob_center[b]) : t->blob_center[b];
+            tree->blob_width[filled] = t->blob_width[b];
+            tree->blob_amplitude[filled++] = t->blob_amplitude[b];
+        }
+        tree->blob_offset[i + 1] = filled;
+    }
+    vessel_tree_link(tree);
+    return tree;
 }
 
 #endif
