@@ -220,54 +220,112 @@ static void link_neighbours(VesselTree *tree)
     }
 }
 
-// A way through the tree, as far as it has been followed.
+// A way through the tree from a node, as far as it has been followed.
 typedef struct Way {
-    int node, from;
-    double length;
+    int node, from, top;     // top: the common ancestor of both ends
 } Way;
-enum { NEAR_MAX = 96 };      // ways followed from a node: bounds the work on crowded trees
 
-// The nodes near `node`, its neighbours always among them. Breadth first, so that the order is that of links, then of indices.
-static int collect_near(const VesselTree *tree, int node, double largest, int *near)
+typedef struct NearSearch {
+    const VesselTree *tree;
+    double *along;           // (N) [mm] from the root
+    double largest;          // radius
+    double part;             // of the distances that count as near: 1, or less where a tree is too crowded
+    Way *way;                // (N) a tree has one way to each node
+    int64_t visits;
+    int *near;               // all nodes' lists
+    size_t count, capacity;
+} NearSearch;
+
+// More than any vessel has; a broken file's nodes, all in one place, would be near each other in pairs.
+static const int64_t VISITS_MAX = (int64_t)1 << 27;
+static const size_t NEAR_MAX = (size_t)1 << 24;
+
+static bool add_near(NearSearch *s, int node)
 {
-    Way way[NEAR_MAX + 1] = {{node, -1, 0}};
-    int known = 1, count = 0;
-    for (int w = 0; w < known; w++) {
-        Way at = way[w];
-        double reach = tree->radius[node] + tree->radius[at.node];
+    if (s->count == s->capacity) {
+        size_t capacity = 2 * s->capacity + 1024;
+        int *more = realloc(s->near, capacity * sizeof *more);
+        if (!more)
+            return false;
+        s->near = more;
+        s->capacity = capacity;
+    }
+    s->near[s->count++] = node;
+    return true;
+}
+
+// The length of a way is the same from both of its ends, to the bit: so is who is near whom.
+static double way_length(const NearSearch *s, int from, Way way)
+{
+    return (s->along[from] - s->along[way.top]) + (s->along[way.node] - s->along[way.top]);
+}
+
+// The nodes near `node`, its neighbours always among them. Breadth first, so that the order is that of links, then of indices. False where there is
+// no memory.
+static bool collect_near(NearSearch *s, int node)
+{
+    const VesselTree *tree = s->tree;
+    int known = 1;
+    double farthest = s->part * 2 * (tree->radius[node] + s->largest);
+    s->way[0] = (Way){node, -1, node};
+    for (int w = 0; w < known; w++, s->visits++) {
+        Way at = s->way[w];
+        double reach = s->part * (tree->radius[node] + tree->radius[at.node]);
         bool is_neighbour = at.from == node, at_sac = tree->kind[node] != NODE_VESSEL || tree->kind[at.node] != NODE_VESSEL;
         double way_max = at_sac ? 2 : 1.5, apart_max = at_sac ? 1.5 : 1.2;
-        if (w > 0 && (is_neighbour || (at.length < way_max * reach && vec3_distance(tree->center[node], tree->center[at.node]) < apart_max * reach)))
-            near[count++] = at.node;
-        for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1] && known <= NEAR_MAX; k++) {
+        if (w > 0 && (is_neighbour ||
+                      (way_length(s, node, at) < way_max * reach && vec3_distance(tree->center[node], tree->center[at.node]) < apart_max * reach)) &&
+            !add_near(s, at.node))
+            return false;
+        for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1]; k++) {
             int next = tree->neighbour[k];
-            double length = at.length + vec3_distance(tree->center[at.node], tree->center[next]);
-            if (next != at.from && (w == 0 || length < 2 * (tree->radius[node] + largest)))
-                way[known++] = (Way){next, at.node, length};
+            Way way = {next, at.node, next < at.node ? next : at.top};
+            if (next != at.from && (w == 0 || way_length(s, node, way) < farthest))
+                s->way[known++] = way;
         }
     }
-    return count;
+    return true;
+}
+
+static bool link_near(VesselTree *tree, NearSearch *s)
+{
+    int n = tree->node_count;
+    for (int i = 0; i < n; i++) {
+        s->largest = fmax(s->largest, tree->radius[i]);
+        int p = tree->parent[i];
+        s->along[i] = p >= 0 && p < i ? s->along[p] + vec3_distance(tree->center[i], tree->center[p]) : 0;
+    }
+    for (s->part = 1;; s->part = s->part > 0.1 ? 0.5 * s->part : 0) {
+        s->visits = 0;
+        s->count = 0;
+        int i = 0;
+        for (; i < n && (s->part == 0 || (s->visits < VISITS_MAX && s->count < NEAR_MAX)); i++) {
+            if (!collect_near(s, i))
+                return false;
+            tree->near_offset[i + 1] = (int)s->count;
+        }
+        if (i == n)
+            return true;
+    }
 }
 
 bool vessel_tree_link(VesselTree *tree)
 {
+    size_t n = (size_t)tree->node_count;
     link_neighbours(tree);
-    int n = tree->node_count, near[NEAR_MAX + 1];
-    double largest = 0;
-    for (int i = 0; i < n; i++)
-        largest = fmax(largest, tree->radius[i]);
-    size_t total = 0;
-    for (int i = 0; i < n; i++)
-        total += (size_t)collect_near(tree, i, largest, near);
     free(tree->near_offset);
     free(tree->near);
-    tree->near_offset = calloc((size_t)n + 1, sizeof *tree->near_offset);
-    tree->near = calloc(total + 1, sizeof *tree->near);
-    if (total > INT_MAX || !tree->near_offset || !tree->near)
-        return false;
-    for (int i = 0; i < n; i++)
-        tree->near_offset[i + 1] = tree->near_offset[i] + collect_near(tree, i, largest, tree->near + tree->near_offset[i]);
-    return !vessel_tree_is_shared(tree) || blob_flood_list(tree);
+    tree->near = NULL;
+    tree->near_offset = calloc(n + 1, sizeof *tree->near_offset);
+    NearSearch search = {.tree = tree, .along = calloc(n, sizeof *search.along), .way = calloc(n, sizeof *search.way)};
+    bool good = tree->near_offset && search.along && search.way && link_near(tree, &search);
+    free(search.along);
+    free(search.way);
+    if (search.near)
+        tree->near = realloc(search.near, search.count * sizeof *search.near);
+    else
+        tree->near = calloc(1, sizeof *tree->near);
+    return good && tree->near && (!vessel_tree_is_shared(tree) || blob_flood_list(tree));
 }
 
 bool vessel_tree_root_is_open(const VesselTree *tree)

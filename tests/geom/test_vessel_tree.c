@@ -244,11 +244,72 @@ static void half_space(void **state)
     v->destroy(v);
 }
 
+static bool is_near(const VesselTree *t, int i, int j)
+{
+    for (int k = t->near_offset[i]; k < t->near_offset[i + 1]; k++)
+        if (t->near[k] == j)
+            return true;
+    return false;
+}
+
+// The way through the tree, by walking up to the common ancestor.
+static double way_between(const VesselTree *t, int i, int j)
+{
+    double length = 0;
+    while (i != j) {
+        int *up = i > j ? &i : &j;
+        length += vec3_distance(t->center[*up], t->center[t->parent[*up]]);
+        *up = t->parent[*up];
+    }
+    return length;
+}
+
+// Wide vessels whose nodes are close have hundreds of near ones: all are listed, on both sides.
+static void near_is_complete_and_mutual(void **state)
+{
+    (void)state;
+    enum { TRUNK = 300, TWIG = 60, ALL = TRUNK + 2 * TWIG + 1 };
+    VesselTree *t = vessel_tree_create(ALL, 0, 0);
+    uint64_t seed = 3;
+    for (int i = 0; i < ALL; i++) {
+        bool trunk = i < TRUNK, sac = i == ALL - 1;
+        int twig = trunk || sac ? -1 : (i - TRUNK) / TWIG, step = trunk ? i : (i - TRUNK) % TWIG, root = 100 + 90 * twig;
+        t->center[i] = trunk ? vec3(0.1 * i, 0.3 * sin(0.02 * i), 0) : sac ? vec3(20, -7, 0) : vec3(t->center[root].x + 0.05 * step, 0.1 * step, 0.02 * step);
+        t->radius[i] = trunk ? random_in(&seed, 3, 6) : sac ? 5 : 0.4;
+        t->direction[i] = vec3(1, 0, 0);
+        t->parent[i] = sac ? 200 : trunk || step > 0 ? i - 1 : root;
+        t->kind[i] = sac ? NODE_ANEURYSM : NODE_VESSEL;
+    }
+    assert_true(vessel_tree_link(t));
+    int most = 0;
+    for (int i = 0; i < ALL; i++) {
+        most = t->near_offset[i + 1] - t->near_offset[i] > most ? t->near_offset[i + 1] - t->near_offset[i] : most;
+        for (int j = 0; j < i; j++) {
+            double reach = t->radius[i] + t->radius[j], way = way_between(t, i, j), apart = vec3_distance(t->center[i], t->center[j]);
+            bool sac = i == ALL - 1, is = t->parent[i] == j || (way < (sac ? 2 : 1.5) * reach && apart < (sac ? 1.5 : 1.2) * reach);
+            assert_true(is_near(t, i, j) == is && is_near(t, j, i) == is);
+        }
+    }
+    assert_true(most > 150);
+    vessel_tree_free(t);
+    // a broken file's nodes, all in one place: lists are cut, alike, in bounded time and memory
+    enum { HEAP = 20000 };
+    t = vessel_tree_create(HEAP, 0, 0);
+    for (int i = 0; i < HEAP; i++) {
+        t->radius[i] = 1;
+        t->direction[i] = vec3(1, 0, 0);
+        t->parent[i] = i - 1;
+    }
+    assert_true(vessel_tree_link(t));
+    assert_true(is_near(t, 5, 6) && is_near(t, 6, 5) && t->near_offset[HEAP] < 1 << 25);
+    vessel_tree_free(t);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(create_guards),    cmocka_unit_test(neighbours),       cmocka_unit_test(rules),
-        cmocka_unit_test(nearest_by_power), cmocka_unit_test(kissing_branches), cmocka_unit_test(wide_sac),
+        cmocka_unit_test(nearest_by_power), cmocka_unit_test(kissing_branches), cmocka_unit_test(wide_sac), cmocka_unit_test(near_is_complete_and_mutual),
         cmocka_unit_test(half_space),
     };
     return cmocka_run_group_tests_name("vessel_tree", tests, NULL, NULL);
