@@ -344,6 +344,9 @@ static void say_untrusted(const Simulator *simulator, const DriveReport *drive)
         fprintf(stderr, "%s: warning: a node was %.3f mm outside the wall\n", path, totals->penetration_max);
     if (totals->flags & STEP_OUT_OF_VESSEL)
         fprintf(stderr, "%s: warning: the tool passed an open end of the vessel\n", path);
+    if (totals->disagreeing_steps > 0)
+        fprintf(stderr, "%s: warning: in %lld of %lld steps two parts of the vessel's model put the wall at different places; "
+                        "fit the model again with this version\n", path, (long long)totals->disagreeing_steps, (long long)totals->steps);
     if (totals->not_converged_steps > 0)
         fprintf(stderr, "%s: warning: the contact solve of %lld of %lld steps stopped at its cap (residual at most %.2g)\n", path,
                 (long long)totals->not_converged_steps, (long long)totals->steps, totals->residual_max);

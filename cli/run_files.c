@@ -92,10 +92,12 @@ char *run_summary_json(Simulator *simulator, const DriveReport *drive, const Nod
     double final = run_final_penetration_mm(node, state->node_count);
     add_numbers(part, 2, (const char *const[]){"max", "final"}, (double[]){fmax(totals->penetration_max, final), final});
     part = cJSON_AddObjectToObject(summary, "solver");
-    add_numbers(part, 6,
-                (const char *const[]){"iterations_median", "iterations_max", "not_converged_steps", "residual_max", "linearised_again_steps", "limited_steps"},
+    add_numbers(part, 7,
+                (const char *const[]){"iterations_median", "iterations_max", "not_converged_steps", "residual_max", "linearised_again_steps", "limited_steps",
+                                      "model_disagrees_steps"},
                 (double[]){histogram_quantile(&profile->iterations, 0.5), (double)profile->iterations.largest, (double)totals->not_converged_steps,
-                           totals->residual_max, (double)totals->further_linearisations, (double)totals->limited_steps});
+                           totals->residual_max, (double)totals->further_linearisations, (double)totals->limited_steps,
+                           (double)totals->disagreeing_steps});
     part = cJSON_AddObjectToObject(summary, "proximal");
     add_numbers(part, 2, (const char *const[]){"force_n", "torque_n_mm"}, (double[]){last->proximal_force, last->proximal_torque});
     part = cJSON_AddObjectToObject(summary, "wall_force_n");

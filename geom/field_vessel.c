@@ -554,6 +554,24 @@ static void answer(const FieldVessel *field, Vec3 x, const Foot *foot, VesselMem
     hold_bounds(field, m, foot->node, x, foot->gap);
 }
 
+// A gap is as long as the shortest way to the wall: it changes by no more than x moves, or the wall is another. `before`: the gap at the last place.
+static void compare_gaps(VesselMemory *m, double before, double travel, VesselHit *hit)
+{
+    static const double APART = 0.1, GIVES_WAY = 0.2;    // [mm], and per mm of travel
+    if (m->contradicted) {
+        m->credible -= GIVES_WAY * travel;
+    } else if (fabs(hit->gap - before) > travel + APART) {
+        hit->flags |= VESSEL_DISAGREE;
+        m->contradicted = true;
+        m->credible = before - travel;
+    }
+    m->contradicted = m->contradicted && hit->gap < m->credible;
+    if (m->contradicted) {
+        hit->gap = m->credible;
+        hit->flags |= VESSEL_DISAGREE;
+    }
+}
+
 static void set_flags(const FieldVessel *field, Vec3 x, int node, VesselHit *hit)
 {
     if (field->node[node].carried && inlet_height(field, x) < 0)
@@ -602,7 +620,7 @@ static void answer_surely(const FieldVessel *field, Vec3 x, double side, Sheets 
     set_flags(field, x, m->node, hit);
 }
 
-static void answer_afresh(const FieldVessel *field, Vec3 x, VesselMemory *m, VesselHit *hit)
+static void find_afresh(const FieldVessel *field, Vec3 x, VesselMemory *m, VesselHit *hit)
 {
     int node = walk(field, x, m->node, 4);
     double side = field_here(field, node, x) > 0 ? 1 : -1;
@@ -626,21 +644,33 @@ static void answer_afresh(const FieldVessel *field, Vec3 x, VesselMemory *m, Ves
     set_flags(field, x, node, hit);
 }
 
+static void answer_afresh(const FieldVessel *field, Vec3 x, VesselMemory *m, VesselHit *hit)
+{
+    bool known = m->has_foot;
+    double before = vec3_dot(vec3_sub(m->place, m->foot), m->normal), travel = vec3_distance(x, m->place);
+    find_afresh(field, x, m, hit);
+    if (known && !(hit->flags & VESSEL_UNSURE))
+        compare_gaps(m, before, travel, hit);
+}
+
 // A foot that was followed, but may not be the closest any more.
 static void answer_around(const FieldVessel *field, Vec3 x, const Foot *foot, VesselMemory *m, VesselHit *hit)
 {
-    double side = field_here(field, foot->node, x) > 0 ? 1 : -1;
-    if (side * foot->gap < -1e-9)
+    double side = field_here(field, foot->node, x) > 0 ? 1 : -1, travel = vec3_distance(x, m->place);
+    if (side * foot->gap < -1e-9) {
         answer_afresh(field, x, m, hit);
-    else
-        answer_surely(field, x, side, (Sheets){.found = true, .foot = *foot}, m, hit);
+        return;
+    }
+    answer_surely(field, x, side, (Sheets){.found = true, .foot = *foot}, m, hit);
+    if (m->contradicted)
+        compare_gaps(m, 0, travel, hit);
 }
 
 // A foot that is trusted but for its rival, which has moved, too.
 static void answer_beside_rival(const FieldVessel *field, Vec3 x, Foot foot, VesselMemory *m, VesselHit *hit)
 {
     Foot rival;
-    double trust = m->trust;
+    double trust = m->trust, travel = vec3_distance(x, m->place);
     if (settle(field, x, foot.node, &m->rival, 1, ROUNDS, &rival) == 0 || rival.gap * foot.gap < 0 || vec3_distance(rival.at, foot.at) < 1e-4) {
         answer_around(field, x, &foot, m, hit);
         return;
@@ -653,6 +683,8 @@ static void answer_beside_rival(const FieldVessel *field, Vec3 x, Foot foot, Ves
     m->trust = trust;
     set_clearance(m, x, clear_ball(field, &field->node[m->node], x, hit->gap));
     set_flags(field, x, m->node, hit);
+    if (m->contradicted)
+        compare_gaps(m, 0, travel, hit);
 }
 
 // Answers where no field is needed; false where one is.
@@ -796,7 +828,7 @@ static void follow_block(const FieldVessel *field, Batch *batch, const int *poin
         sample(field, &b);
         done = field->kernels->newton(&b, false);
     }
-    unsigned sure = field->kernels->finish(&b);
+    unsigned sure = field->kernels->finish(&b), contradicted = 0;
     if (b.foot.at.any_carried)
         sure = sure_near_inlet(field, &b, sure, count);
     for (int i = 0; i < FOOT_BLOCK; i++) {
@@ -834,9 +866,14 @@ static void follow_block(const FieldVessel *field, Batch *batch, const int *poin
             if (sure >> i & 1)
                 set_clearance(m, batch->point[p], b.foot.gap[i]);
             set_flags(field, batch->point[p], m->node, hit);
+            contradicted |= m->contradicted ? 1u << i : 0;
         }
     }
     field->kernels->store(&b);
+    for (; contradicted != 0; contradicted &= contradicted - 1) {
+        int i = __builtin_ctz(contradicted);
+        compare_gaps(&batch->memory[point[i]], 0, sqrt(b.dx[i] * b.dx[i] + b.dy[i] * b.dy[i] + b.dz[i] * b.dz[i]), &batch->hit[point[i]]);
+    }
 }
 
 static void query_batch(const FieldVessel *field, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)

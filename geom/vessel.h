@@ -28,6 +28,8 @@ typedef struct VesselMemory {
     double bound_for;
     Vec3 rival;              // another foot, nearly as close
     bool has_rival;
+    bool contradicted;       // by another node, which puts the wall nearer than it can be: for now
+    double credible;         // … the gap is this [mm]
     double clearance;        // [mm] at `clear_place` the wall of `node` was at least this far; 0: not known. Lets far points pass unevaluated
     Vec3 clear_place;
     int node;                // node of the tree, or segment of the tube; -1: not yet located
@@ -42,7 +44,7 @@ enum {
     VESSEL_OPEN_END = 2,     // beyond an open end and clear of it: there is no wall, gap = +HUGE_VAL, normal 0
     VESSEL_BEYOND = 8,       // beyond an open end's plane, where the wall is what carries on from the end (a cylinder upstream, a bell downstream)
     VESSEL_UNSURE = 4,       // the projection did not converge: gap is Taubin's distance, normal the gradient's direction
-    VESSEL_DISAGREE = 16,    // the models that meet at the point put its wall at different places: a fault of the tree, see field_vessel_create
+    VESSEL_DISAGREE = 16,    // two nodes put the point's wall at different places, see field_vessel_create: a fault of the model
 };
 
 typedef struct VesselHit {
@@ -95,6 +97,8 @@ Vessel *lim_vessel_create_with(const VesselTree *tree, const LimVesselOptions *o
 
 // --- The wall of shared blobs (vessel_tree_is_shared): one field, so that it is the same from both sides of every border between near cells. Borrows the
 // tree. NULL where the tree has no such model, or there is no memory. ---
+// A gap changes by no more than the point moves. Where it does by 0.1 mm more (no tool is thinner), because another node answers, the two contradict each
+// other: VESSEL_DISAGREE. A wall that is suddenly nearer than it can be throws no tool: the gap goes over to it as the point moves on, by 0.2 mm a mm.
 Vessel *field_vessel_create(const VesselTree *tree);
 // isa: 0: what simd_level() says; 1 SSE2, 2 AVX2, 3 AVX-512 (the widest there is, where absent). All give the same bits.
 Vessel *field_vessel_create_with(const VesselTree *tree, int isa);

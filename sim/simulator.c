@@ -7,7 +7,8 @@
 
 const char *const stage_name[STAGE_COUNT] = {"feed", "detect", "assemble", "factor", "contact", "correct"};
 const char *const step_flag_name[STEP_FLAG_COUNT] = {"diverged",        "not_converged", "deep",            "fully_inserted",
-                                                     "fully_withdrawn", "out_of_vessel", "detection_unsure", "limited"};
+                                                     "fully_withdrawn", "out_of_vessel", "detection_unsure", "limited",
+                                                     "model_disagrees"};
 
 struct Simulator {
     const Scene *scene;
@@ -91,6 +92,7 @@ static void accumulate(Simulator *simulator)
     totals->flags |= report->flags;
     totals->not_converged_steps += (report->flags & STEP_NOT_CONVERGED) != 0;
     totals->further_linearisations += report->newton > 0;
+    totals->disagreeing_steps += (report->flags & STEP_MODEL_DISAGREES) != 0;
     totals->limited_steps += (report->flags & STEP_LIMITED) != 0;
     totals->contacts_max = report->active > totals->contacts_max ? report->active : totals->contacts_max;
     totals->penetration_max = fmax(totals->penetration_max, report->penetration);

@@ -28,6 +28,7 @@ typedef struct RunTotals {
     unsigned flags;                  // every STEP_ flag that was seen
     int64_t not_converged_steps;
     int64_t further_linearisations;  // steps that took a second Newton iteration or more
+    int64_t disagreeing_steps;       // steps in which the vessel's model contradicted itself about the wall at a point of the tool
     int64_t limited_steps;           // steps whose motion was cut; the next ones completed it
     int contacts_max;                // contacts with force
     double penetration_max;          // [mm]
@@ -62,8 +63,8 @@ Stepper *simulator_stepper(Simulator *simulator);                 // for save, r
 uint64_t simulator_hash(const Simulator *simulator);
 double simulator_fastest_mm_s(const Simulator *simulator);        // the fastest node's speed, or the surface's where the tool turns
 
-// Names of STEP_ flags, for files: "diverged", "not_converged", …, "limited"; index 0 to STEP_FLAG_COUNT - 1 is the bit.
-enum { STEP_FLAG_COUNT = 8 };
+// Names of STEP_ flags, for files: "diverged", "not_converged", …, "limited", "model_disagrees"; index 0 to STEP_FLAG_COUNT - 1 is the bit.
+enum { STEP_FLAG_COUNT = 9 };
 extern const char *const step_flag_name[STEP_FLAG_COUNT];
 
 #endif

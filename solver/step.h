@@ -28,11 +28,13 @@ enum {
     STEP_DETECTION_UNSURE = 64,  // a projection did not converge
     STEP_LIMITED = 128,          // the motion was cut, later steps complete it: an element would have turned by more than 0.3 rad, the tool would have
                                  // gone through the wall, or the hand would have squeezed it by more than 3 % of its length
+    STEP_MODEL_DISAGREES = 256,  // two parts of the vessel's model contradict each other about the wall at a point; it is not thrown
 };
 
 typedef struct StepReport {
     unsigned flags;
     int candidates, active;
+    int disagreements;           // contact points at which the vessel's model contradicts itself
     int iterations;
     double residual, cone_violation;
     double penetration;          // [mm] deepest, >= 0, of the state at the step's start (true distance)

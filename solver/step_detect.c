@@ -546,6 +546,8 @@ static void report_wall(Stepper *s, int nodes, int count)
         }
         was_inside |= k < nodes;
         flags |= hit->flags & VESSEL_UNSURE ? STEP_DETECTION_UNSURE : 0;
+        flags |= hit->flags & VESSEL_DISAGREE ? STEP_MODEL_DISAGREES : 0;
+        s->report.disagreements += (hit->flags & VESSEL_DISAGREE) != 0;
         double outside = radius_of(s, s->query_which[k]) - hit->gap;
         deepest = outside > deepest ? outside : deepest;
     }

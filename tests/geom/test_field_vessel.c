@@ -89,8 +89,8 @@ static void one_blob_is_a_sphere(void **state)
         u = vec3_unit(u);
         VesselHit hit = ask(v, vec3_add_scaled(t->center[0], d, u), 0, 100);
         assert_int_equal(hit.flags, 0);
-        assert_near(hit.gap, 2 - d, 1e-8 * (1 + d));
-        assert_true(vec3_distance(hit.normal, vec3_negate(u)) < 1e-6);
+        assert_near(hit.gap, 2 - d, 1e-8 * (1 + d) * (1 + d));    // far off the normal's error counts
+        assert_true(vec3_distance(hit.normal, vec3_negate(u)) < 1e-5);
         if (d > 0.4)
             assert_near(sym3_quadratic(&hit.hessian, vec3_normal_to(u)) * d, -1, 1e-4);   // of the last evaluation
     }
@@ -629,6 +629,42 @@ static void crowded_places(void **state)
     vessel_tree_free(t);
 }
 
+// A model that contradicts itself: from the middle on nodes miss every second blob, so that their wall is narrower. That is marked, and throws nobody.
+static void contradiction_is_told(void **state)
+{
+    (void)state;
+    enum { N = 60, CUT = 30 };
+    VesselTree *t = straight(N, 0.5);
+    int64_t kept = 0;
+    for (int i = 0; i < N; i++) {
+        int64_t first = t->seen_offset[i], end = t->seen_offset[i + 1];
+        t->seen_offset[i] = kept;
+        for (int64_t k = first; k < end; k++)
+            if (i < CUT || t->seen[k] % 2 == 0)
+                t->seen[kept++] = t->seen[k];
+    }
+    t->seen_offset[N] = kept;
+    Vessel *v = make(t, 0);
+    VesselMemory memory = {.node = -1};
+    int flagged = 0, first = -1;
+    double last = 0.2;
+    for (int k = 0; k < 1000; k++) {
+        Vec3 x = {10 + 0.01 * k, 0.8, 0};
+        VesselHit hit;
+        vessel_query(v, 1, &x, 5, &memory, &hit);
+        if (hit.flags & VESSEL_DISAGREE) {
+            first = first < 0 ? k : first;
+            flagged++;
+        }
+        assert_true(fabs(hit.gap - last) < 0.015);
+        last = hit.gap;
+    }
+    print_message("the narrower wall is %.3f mm away; marked in %d of 1000 places, from x = %.2f\n", last, flagged, 10 + 0.01 * first);
+    assert_true(last < 0 && flagged > 50 && flagged < 400);
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -636,7 +672,7 @@ int main(void)
         cmocka_unit_test(same_bits_on_every_isa), cmocka_unit_test(alone_as_in_company), cmocka_unit_test(derivatives_of_the_gap),
         cmocka_unit_test(no_jump_between_cells), cmocka_unit_test(kissing_vessels_keep_apart), cmocka_unit_test(inlet_is_open),
         cmocka_unit_test(moved_and_mirrored_scenes), cmocka_unit_test(nowhere_is_survived), cmocka_unit_test(far_is_far),
-        cmocka_unit_test(copies_repeat_and_heap_rests), cmocka_unit_test(crowded_places),
+        cmocka_unit_test(copies_repeat_and_heap_rests), cmocka_unit_test(crowded_places), cmocka_unit_test(contradiction_is_told),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
