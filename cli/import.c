@@ -145,8 +145,11 @@ static void print_junctions(const ImportReport *r)
     printf("; %d nodes on their links\n", r->link_nodes);
     for (int i = 0; i < r->named_count; i++) {
         const ImportJunction *j = &r->named[i];
-        printf("  %-9s junction at (%.2f, %.2f, %.2f) mm, link %.2f mm, leaves the lumen by %.2f mm, %.0f %% of the branch's radius\n", support_name[j->support],
-               j->place.x, j->place.y, j->place.z, j->length, j->outside, 100 * j->outside / j->radius);
+        printf("  %-9s junction at (%.2f, %.2f, %.2f) mm, link %.2f mm", support_name[j->support], j->place.x, j->place.y, j->place.z, j->length);
+        if (j->support == IMPORT_REFUSED)
+            printf(", leaves the lumen\n");
+        else
+            printf(", narrowest place %.0f %% of the branch's radius\n", 100 * j->share);
     }
     if (r->junction_count - r->junctions_with[IMPORT_SUPPORTED] > r->named_count)
         printf("  and %d more\n", r->junction_count - r->junctions_with[IMPORT_SUPPORTED] - r->named_count);
@@ -208,8 +211,7 @@ static void add_junctions(cJSON *root, const ImportReport *r)
         cJSON_AddStringToObject(entry, "support", support_name[j->support]);
         json_vector(entry, "place_mm", j->place);
         cJSON_AddNumberToObject(entry, "length_mm", j->length);
-        cJSON_AddNumberToObject(entry, "outside_mm", j->outside);
-        cJSON_AddNumberToObject(entry, "radius_mm", j->radius);
+        cJSON_AddNumberToObject(entry, "narrowest_share", j->share);
         cJSON_AddItemToArray(list, entry);
     }
 }

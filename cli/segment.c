@@ -155,7 +155,7 @@ static void print_junctions(const RbtReport *report)
     printf("; %d nodes with %ld points on their links\n", nodes, points);
     for (int i = 0; i < report->junction_count; i++) {
         const RbtJunction *j = &report->junction[i];
-        if (j->support == RBT_SUPPORTED && !j->is_moved)
+        if ((j->support == RBT_SUPPORTED && !j->is_moved) || (j->is_inner && j->support == RBT_DOUBTFUL))
             continue;
         printf("  %-9s %s at (%.2f, %.2f, %.2f) mm, link %.2f mm, darkest place %.0f %% of the contrast", support_name[j->support], j->is_inner ? "gap" : "junction",
                j->place.x, j->place.y, j->place.z, j->length, 100 * j->share);
