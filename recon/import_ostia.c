@@ -18,6 +18,7 @@ static const double SPACING = 0.5, INSIDE = 1.5,   // in radii of the branch
 typedef struct Link {
     int node, parent;
     double radius, length;
+    bool is_inner;           // no branch begins here: it is looked at only where a wall crosses it
     bool is_moved, is_refused;
     Vec3 place;
     LinkPath path;
@@ -227,24 +228,26 @@ static bool attach_elsewhere(const Nodes *n, const Wall *wall, Link *link)
     return true;
 }
 
-// A branch's first node: its parent has an earlier child.
+// All of them: curves may lead through walls anywhere. A branch begins with a node whose parent has an earlier child.
 static Link *collect_links(const Nodes *n, int *first_child, int *count)
 {
     Link *link = calloc((size_t)n->count + 1, sizeof *link);
-    *count = 0;
     for (int i = 0; i < n->count; i++)
         first_child[i] = -1;
     for (int i = 1; i < n->count; i++)
         if (first_child[n->parent[i]] < 0)
             first_child[n->parent[i]] = i;
+    *count = link ? n->count - 1 : 0;
     for (int i = 1; link && i < n->count; i++)
-        if (first_child[n->parent[i]] != i)
-            link[(*count)++] = (Link){.node = i, .parent = n->parent[i]};
+        link[i - 1] = (Link){.node = i, .parent = n->parent[i], .is_inner = first_child[n->parent[i]] == i};
     return link;
 }
 
+// A refused link within a branch is one more junction: of two vessels that the curves take for one.
 static void report_link(const Nodes *n, const Link *link, ImportReport *report)
 {
+    if (link->is_inner && !link->is_refused && !link->is_moved)
+        return;
     ImportSupport support = link->is_refused ? IMPORT_REFUSED : link->path.share < DOUBTFUL ? IMPORT_DOUBTFUL : IMPORT_SUPPORTED;
     report->junction_count++;
     report->junctions_with[support]++;
@@ -291,13 +294,14 @@ static void rebuild(const Nodes *n, const Link *link, int link_count, const Wall
 
 static bool measure(const Nodes *n, const Skeleton *s, const Wall *wall, const int *first_child, Link *link)
 {
-    link->radius = root_radius(n, first_child, link->node);
+    link->radius = link->is_inner ? fmax(n->radius[link->node], n->radius[link->parent]) : root_radius(n, first_child, link->node);
     link->length = vec3_distance(n->center[link->node], n->center[link->parent]);
     if (!find_path(n, s, wall, link) || (link->path.count == 0 && !attach_elsewhere(n, wall, link)))
         return false;
     link->is_refused = link->path.count == 0;
     link->length = link->is_refused ? link->length : path_length(link);
-    return link->is_refused || place_stations(n, first_child, link);
+    bool needs_nodes = !link->is_inner || link->is_moved || link->length > n->radius[link->node] + n->radius[link->parent];
+    return link->is_refused || !needs_nodes || place_stations(n, first_child, link);
 }
 
 bool nodes_open_ostia(Nodes *nodes, const Skeleton *skeleton, const Wall *wall, ImportReport *report)
