@@ -89,9 +89,10 @@ static void every_ostium_is_described(void **state)
     static const struct {
         const char *name, option[3][2][64];
         int junctions;
-    } kinds[] = {{"tree", {{"branches", "15"}, {"radius_mm", "1.4"}, {"seed", "1"}}, 7},
-                 {"twig", {{"twig_radius_mm", "0.4"}, {"radius_mm", "2"}, {"seed", "1"}}, 1},
-                 {"y", {{"angle_deg", "60"}, {"radius_mm", "1"}, {"seed", "1"}}, 1}};
+        double cell, off;    // [mm] of the mesh, and how far its facets lie from the wall at most
+    } kinds[] = {{"tree", {{"branches", "15"}, {"radius_mm", "1.4"}, {"seed", "1"}}, 7, 0.3, 0.08},
+                 {"twig", {{"twig_radius_mm", "0.4"}, {"radius_mm", "2"}, {"seed", "1"}}, 1, 0.2, 0.05},
+                 {"y", {{"angle_deg", "60"}, {"radius_mm", "1"}, {"seed", "1"}}, 1, 0.2, 0.05}};
     for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; k++) {
         faults_clear(&faults);
         Shape *shape = shape_create(kinds[k].name, 3, kinds[k].option, "test", &faults);
@@ -101,12 +102,12 @@ static void every_ostium_is_described(void **state)
         ImportReport report = {.curves_scaled = 1};
         ImportOptions options = import_default_options();
         assert_non_null(truth);
-        add_surface(shape, 0.3, &mesh);
+        add_surface(shape, kinds[k].cell, &mesh);
         assert_true(mesh_repair(&mesh, &check));
         CurveSet *set = curves_of(truth);
         VesselTree *tree = import_surface(&mesh, set, &options, &report, kinds[k].name, &faults);
         assert_non_null(tree);
-        check_tree(kinds[k].name, tree, shape, &report, 0.08);
+        check_tree(kinds[k].name, tree, shape, &report, kinds[k].off);
         assert_int_equal(report.junction_count, kinds[k].junctions);
         assert_int_equal(report.junctions_with[IMPORT_SUPPORTED], kinds[k].junctions);
         assert_true(report.link_nodes > 0 || k == 2);   // a twig's own first nodes reach far enough into the wide vessel
