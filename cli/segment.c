@@ -88,10 +88,13 @@ static const char intro[] =
     "    - {centers_mm: [[44, 42.4, 64]]}\n"
     "  parameters: default        # or paper: the values of the paper, without what was added\n"
     "  p_inl: 0.7                 # and any of these by name\n\n"
+    "Where a branch leaves its parent the image decides: the best path beside the straight link is supported where its darkest place keeps half of the "
+    "branch's contrast, doubtful down to a quarter; with less the branch hangs on another vessel that a path leads to, or is left out with what hangs on "
+    "it (one that the trace names stays, with a warning, and nothing opens into it). The summary names all but the supported ones.\n\n"
     "Corrections leave the rest of the tree as it is, bit for bit; with automatic: 1 further branches are one, tracked after all that was found:\n\n"
     "  automatic: 1\n"
     "  forbid: [{center_voxel: [120, 90, 60], radius_mm: 3}]   # no node in this ball\n"
-    "  cut: [{point_mm: [40, 31, 22]}]                        # the nearest branch ends here, and what hangs on it goes\n\n"
+    "  cut: [{point_mm: [40, 31, 22]}]                        # the nearest branch ends here, and what hangs on it goes; a stub of it goes too\n\n"
     "Parameters of the tracking (default; paper):\n";
 
 // The introduction and a line for each parameter.
@@ -155,7 +158,7 @@ static void print_junctions(const RbtReport *report)
     printf("; %d nodes with %ld points on their links\n", nodes, points);
     for (int i = 0; i < report->junction_count; i++) {
         const RbtJunction *j = &report->junction[i];
-        if (j->support == RBT_SUPPORTED && !j->is_moved)
+        if ((j->support == RBT_SUPPORTED && !j->is_moved) || (j->is_inner && j->support == RBT_DOUBTFUL))
             continue;
         printf("  %-9s %s at (%.2f, %.2f, %.2f) mm, link %.2f mm, darkest place %.0f %% of the contrast", support_name[j->support], j->is_inner ? "gap" : "junction",
                j->place.x, j->place.y, j->place.z, j->length, 100 * j->share);
