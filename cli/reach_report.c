@@ -30,7 +30,8 @@ void reach_print(FILE *out, const VesselTree *tree, const Reach *reach)
         fprintf(out, "; %d of these and %d of these over links longer than their radii", reach->capped_apart, reach->narrow_apart);
     fprintf(out, "\n");
     if (reach->apart_links > 0)
-        fprintf(out, "links apart    %d longer than the sum of their radii, where nothing shows a vessel; behind them %.1f mm\n", reach->apart_links, reach->apart_length);
+        fprintf(out, "links apart    %d longer than the sum of their radii, where nothing shows a vessel, %d of them open; behind them %.1f mm\n", reach->apart_links,
+                reach->apart_open, reach->apart_length);
     if (reach->sac_nodes > 0)
         fprintf(out, "aneurysm nodes %d of %d are reached by a point\n", reach->sac_nodes_reached, reach->sac_nodes);
     if (reach->stop_count > 0)
@@ -119,6 +120,7 @@ void reach_add_json(cJSON *object, const VesselTree *tree, const Reach *reach)
     cJSON_AddNumberToObject(at, "narrow", reach->narrow);
     cJSON_AddNumberToObject(at, "narrow_apart", reach->narrow_apart);
     cJSON_AddNumberToObject(at, "apart_links", reach->apart_links);
+    cJSON_AddNumberToObject(at, "apart_open", reach->apart_open);
     cJSON_AddNumberToObject(at, "behind_apart_mm", reach->apart_length);
     cJSON_AddNumberToObject(at, "aneurysm_nodes", reach->sac_nodes);
     cJSON_AddNumberToObject(at, "aneurysm_nodes_reached", reach->sac_nodes_reached);

@@ -424,6 +424,7 @@ static void flood_links(Flood *f, Reach *reach)
         }
         bool apart = reach_link_is_apart(tree, i);
         reach->apart_links += apart;
+        reach->apart_open += apart && point_share(f, &l) >= 1;
         if (tree->kind[i] == NODE_VESSEL && !apart) {
             reach->length += l.length;
             for (int mode = 0; mode < REACH_MODES; mode++)

@@ -47,8 +47,8 @@ typedef struct Reach {
     ReachJunction *junction; // least clearance first
     int capped, capped_apart;                // junctions with the field below 0 somewhere on the joining line; those whose link is apart
     int narrow, narrow_apart;                // with a clearance less than the tool's radius, capped ones included; those whose link is apart
-    int apart_links;         // and the length of what hangs behind them [mm]
-    double apart_length;
+    int apart_links, apart_open;             // and those of them with lumen all along, which nothing shows
+    double apart_length;     // [mm] of what hangs behind them
     int sac_nodes, sac_nodes_reached;        // nodes of aneurysms; by a point
 } Reach;
 
