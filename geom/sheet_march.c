@@ -24,13 +24,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { STATES_MAX = 8, CUBE_STATES_MAX = 8 * STATES_MAX, RIVALS_MAX = 24, WAYS_MAX = 256, PASSES_MAX = 100 };
+enum { STATES_MAX = 8, CUBE_STATES_MAX = 8 * STATES_MAX, RIVALS_MAX = 96, WAYS_MAX = 256, PASSES_MAX = 100 };
 
-// A node answers for no lumen further from its centre [its radii]: other nodes lie nearer to that. Blobs of a sac reach far into all cells around it.
+// A node answers for no lumen further from its centre [its radii]: other nodes lie nearer to that. Blobs of a sac reach far into all cells around it. The
+// root, upstream of which nothing follows, answers for twice as much.
 static const double REACH_MOST = 3;
 
 typedef struct Candidate {   // a node that reaches the block at hand, whose field may be above 0 there and that no other beats in all of it
-    int node, ball;
+    int node, ball, first_row;
     double low;              // its field is at least that
     Blobby model;
     double reach;            // [mm] no point of the model's surface lies further from the node's centre
@@ -63,8 +64,11 @@ typedef struct SheetMarch {
     double *reach;           // … and reaches
     int *way_offset, way_capacity;           // (balls + 1) of each …
     Way *way;                // … the ways that look_around of power_walk.c would find, at most WAYS_MAX
-    int candidate_count, candidate_capacity;
+    int candidate_count, candidate_capacity, out_count, out_capacity;
     Candidate *candidate;
+    int *out;                // nodes that would be candidates, were their field not below 0 all over the block
+    int32_t *row;            // blobs of candidates that reach the block
+    int row_count, row_capacity;
     States states[MARCH_POINTS];             // of the block at hand
     // of cubes that are not plain
     KeyMap point_of, link_of, vertex_of_state;
@@ -163,7 +167,7 @@ static bool find_blocks(SheetMarch *job, int first, int end)
         if (!(reach > 0))
             continue;
         if (job->alone < 0)
-            reach = fmin(reach, REACH_MOST * tree->radius[i]);
+            reach = fmin(reach, (tree->parent[i] < 0 ? 2 : 1) * REACH_MOST * tree->radius[i]);
         job->node[job->ball_count] = i;
         job->reach[job->ball_count++] = reach + 2 * job->march.cell;
     }
@@ -213,20 +217,49 @@ static bool list_rivals(const SheetMarch *job, Candidate *c, Vec3 middle, double
     return true;
 }
 
+static bool grow_by(void **array, int count, int *capacity, int more, size_t size)
+{
+    if (count + more <= *capacity)
+        return true;
+    if (*capacity > INT_MAX / 4)
+        return false;
+    int bigger = 2 * *capacity + more + 1024;
+    void *moved = realloc(*array, (size_t)bigger * size);
+    if (!moved)
+        return false;
+    *array = moved;
+    *capacity = bigger;
+    return true;
+}
+
+// Of compact blobs only those that reach the ball (middle, h): the others' terms are 0 there. Their rows start at c->first_row.
+static bool narrow_model(SheetMarch *job, Candidate *c, Vec3 middle, double h)
+{
+    const Blobby *all = &c->model;
+    c->first_row = job->row_count;
+    if (!all->amplitude)
+        return true;
+    if (!grow_by((void **)&job->row, job->row_count, &job->row_capacity, all->count, sizeof *job->row))
+        return false;
+    for (int j = 0; j < all->count; j++) {
+        int k = blobby_row(all, j);
+        double most = all->width[k] + h;
+        if (vec3_norm2(vec3_sub(middle, all->center[k])) < most * most)
+            job->row[job->row_count++] = k;
+    }
+    c->model.count = job->row_count - c->first_row;
+    return true;
+}
+
 static bool list_candidates(SheetMarch *job, const MarchBlock *b)
 {
     double h, high;
     Vec3 middle = march_block_ball(&job->march, b, &h);
-    job->candidate_count = 0;
+    job->candidate_count = job->out_count = job->row_count = 0;
     for (int l = b->first; l >= 0; l = job->march.link[l].next) {
-        if (job->candidate_count == job->candidate_capacity) {
-            int capacity = 2 * job->candidate_capacity + 64;
-            Candidate *more = realloc(job->candidate, (size_t)capacity * sizeof *more);
-            if (!more)
-                return false;
-            job->candidate = more;
-            job->candidate_capacity = capacity;
-        }
+        if (!grow_by((void **)&job->candidate, job->candidate_count, &job->candidate_capacity, 1, sizeof *job->candidate) ||
+            !grow_by((void **)&job->out, job->out_count, &job->out_capacity, 1, sizeof *job->out))
+            return false;
         int ball = job->march.link[l].ball;
         Candidate *c = &job->candidate[job->candidate_count];
         c->node = job->node[ball];
@@ -236,9 +269,36 @@ static bool list_candidates(SheetMarch *job, const MarchBlock *b)
             continue;
         c->model = blobby_of(job->tree, c->node);
         field_bounds(&c->model, middle, h, &c->low, &high);
-        job->candidate_count += high > -1e-9;
+        if (!(high > -1e-9)) {
+            job->out[job->out_count++] = c->node;
+            continue;
+        }
+        if (!narrow_model(job, c, middle, 1.001 * h))
+            return false;
+        job->candidate_count++;
     }
+    for (int k = 0; k < job->candidate_count; k++)
+        if (job->candidate[k].model.amplitude)
+            job->candidate[k].model.index = job->row + job->candidate[k].first_row;
     return true;
+}
+
+static bool is_near(const VesselTree *tree, int node, int other)
+{
+    for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++)
+        if (tree->near[k] == other)
+            return true;
+    return false;
+}
+
+// Whether a walk from a candidate may lead to a node that says outside.
+static bool may_lead_out(const SheetMarch *job)
+{
+    for (int k = 0; k < job->candidate_count; k++)
+        for (int i = 0; i < job->out_count; i++)
+            if (is_near(job->tree, job->candidate[k].node, job->out[i]))
+                return true;
+    return false;
 }
 
 // Whether the block is certainly without surface: no model may be above 0 in it, or all are and in one of them a walk stays all over it.
@@ -253,7 +313,7 @@ static bool block_is_plain(const SheetMarch *job, const MarchBlock *b)
         all_in = c->low > 1e-9;
         covered = covered || (furthest < c->reach && (job->alone >= 0 || (c->rivals == 0 && furthest < 1.2 * job->tree->radius[c->node])));
     }
-    return job->candidate_count == 0 || (all_in && covered);
+    return job->candidate_count == 0 || (all_in && covered && (job->alone >= 0 || !may_lead_out(job)));
 }
 
 // --- States ---
@@ -290,6 +350,27 @@ static bool is_beaten(const SheetMarch *job, const Candidate *c, Vec3 x)
     return false;
 }
 
+// A node that is further from x than 1.2 of its radii does not answer for it where another one's ball holds x in its lumen: the cell of a vessel beside a
+// sac reaches all across it, and sees some of its blobs.
+static void drop_distant(const SheetMarch *job, Vec3 x, States *states)
+{
+    const VesselTree *tree = job->tree;
+    bool is_held = false;
+    int kept = 0;
+    for (int s = 0; s < states->count; s++) {
+        int node = states->node[s];
+        is_held = is_held || vec3_norm2(vec3_sub(x, tree->center[node])) < tree->radius[node] * tree->radius[node];
+    }
+    for (int s = 0; s < states->count; s++) {
+        int node = states->node[s];
+        if (is_held && vec3_norm2(vec3_sub(x, tree->center[node])) > 1.44 * tree->radius[node] * tree->radius[node])
+            continue;
+        states->node[kept] = node;
+        states->field[kept++] = states->field[s];
+    }
+    states->count = kept;
+}
+
 static void find_states(SheetMarch *job, Vec3 x, States *states)
 {
     states->count = 0;
@@ -303,14 +384,8 @@ static void find_states(SheetMarch *job, Vec3 x, States *states)
             states->field[states->count++] = field;
         }
     }
-}
-
-static bool is_near(const VesselTree *tree, int node, int other)
-{
-    for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++)
-        if (tree->near[k] == other)
-            return true;
-    return false;
+    if (states->count > 1)
+        drop_distant(job, x, states);
 }
 
 // Whether a tool point that moves between x, where it is at node a, and y comes to node b, or back.
@@ -415,21 +490,6 @@ static bool march_plain_cube(SheetMarch *job, const MarchBlock *b, int i, int j,
         if (!march_add_triangle(&job->march, triangle))
             return false;
     }
-    return true;
-}
-
-static bool grow_by(void **array, int count, int *capacity, int more, size_t size)
-{
-    if (count + more <= *capacity)
-        return true;
-    if (*capacity > INT_MAX / 4)
-        return false;
-    int bigger = 2 * *capacity + 1024;
-    void *moved = realloc(*array, (size_t)bigger * size);
-    if (!moved)
-        return false;
-    *array = moved;
-    *capacity = bigger;
     return true;
 }
 
@@ -629,6 +689,8 @@ static void free_march(SheetMarch *job)
     free(job->way_offset);
     free(job->way);
     free(job->candidate);
+    free(job->out);
+    free(job->row);
     free(job->point);
     free(job->cube);
     free(job->state);
