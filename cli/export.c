@@ -257,7 +257,7 @@ static bool drop_parts(const ExportOptions *options, double cell, const VesselTr
     bool kinds[PART_KINDS] = {[PART_INLET] = true, [PART_SHUT] = options->keep_floating, [PART_GHOST] = options->keep_floating};
     // specks of a few cells beside the lumen proper come from the lattice, not from the wall
     for (int p = 1; parts && p < parts->count; p++)
-        if (parts->part[p].kind == PART_INLET && parts->part[p].volume < 8 * cell * cell * cell)
+        if (parts->part[p].kind == PART_INLET && parts->part[p].volume < 64 * cell * cell * cell)
             parts->part[p].kind = PART_BUBBLE;
     bool good = parts && surface_parts_keep(mesh, parts, kinds);
     *bubbles = 0;
