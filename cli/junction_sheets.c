@@ -1,7 +1,6 @@
 // See junction_sheets.h.
 #include "cli/junction_sheets.h"
 
-#include "geom/power_walk.h"
 #include "geom/reach.h"
 #include "recon/tree_file.h"
 #include "recon/volume.h"
@@ -15,33 +14,41 @@
 enum { COMPARED = 10 };
 
 #ifdef SELDINGER_RENDER
-// The junctions next to the ten narrowest of the other model, which may have other nodes: by their branches' first nodes, each once.
-static int choose_compared(const VesselTree *model, const Reach *reach, const VesselTree *before, const Reach *other, ReachJunction *chosen)
+typedef struct Compared {
+    double before;           // [mm] clearance in the other model
+    int index;
+} Compared;
+
+static int by_before(const void *a, const void *b)
 {
+    const Compared *x = a, *y = b;
+    return x->before != y->before ? (x->before > y->before) - (x->before < y->before) : (x->index > y->index) - (x->index < y->index);
+}
+
+// Those that are narrowest in the other model, which may have other nodes: by the joining lines of this one. Returns their number, -1 without memory.
+static int choose_compared(const VesselTree *model, const Reach *reach, const VesselTree *before, double tool_radius, ReachJunction chosen[COMPARED])
+{
+    Compared *list = malloc(((size_t)reach->junction_count + 1) * sizeof *list);
     int count = 0;
-    for (int k = 0; k < other->junction_count && count < COMPARED; k++) {
-        Vec3 x = before->center[other->junction[k].node];
-        double reach_mm = 2 * before->radius[other->junction[k].node] + vec3_distance(x, before->center[other->junction[k].parent]), least = reach_mm;
-        int best = -1;
-        for (int i = 0; i < reach->junction_count; i++) {
-            double far = vec3_distance(model->center[reach->junction[i].last], x);
-            bool known = false;
-            for (int c = 0; c < count; c++)
-                known = known || chosen[c].node == reach->junction[i].node;
-            if (far < least && !known)
-                least = far, best = i;
-        }
-        if (best >= 0)
-            chosen[count++] = reach->junction[best];
+    for (int k = 0; k < reach->junction_count && list; k++) {
+        Vec3 place;
+        const ReachJunction *j = &reach->junction[k];
+        list[k] = (Compared){reach_on_line(model, j, before, fmax(model->radius[j->node], 2 * tool_radius), &place), k};
     }
-    return count;
+    if (list && reach->junction_count > 0)
+        qsort(list, (size_t)reach->junction_count, sizeof *list, by_before);
+    for (; list && count < COMPARED && count < reach->junction_count; count++)
+        chosen[count] = reach->junction[list[count].index];
+    bool good = list != NULL;
+    free(list);
+    return good ? count : -1;
 }
 
 static void draw(const JunctionSheets *sheets, const char *title, const VesselTree *model, const VesselTree *before, const Volume *volume)
 {
     ReachOptions flood = reach_default_options();
     flood.tool_radius = sheets->tool_radius;
-    Reach *reach = reach_create(model, &flood), *other = before ? reach_create(before, &flood) : NULL;
+    Reach *reach = reach_create(model, &flood);
     ReachJunction chosen[COMPARED];
     PictureOptions options = picture_default_options();
     char message[512] = "not enough memory";
@@ -49,10 +56,13 @@ static void draw(const JunctionSheets *sheets, const char *title, const VesselTr
     bool drawn = false;
     options.title = title;
     options.width = 1920, options.height = 1360;
-    if (reach && (!before || other)) {
+    if (reach) {
         PictureJunctions what = {.tree = model, .junction_count = reach->junction_count, .junction = reach->junction, .tool_radius = sheets->tool_radius, .before = before};
-        if (before)
-            what.junction_count = choose_compared(model, reach, before, other, chosen), what.junction = chosen;
+        if (before) {
+            int count = choose_compared(model, reach, before, sheets->tool_radius, chosen);
+            what.junction_count = count > 0 ? count : 0;
+            what.junction = chosen;
+        }
         if (volume) {
             for (int k = 0; k < 3; k++)
                 what.size[k] = volume->size[k], what.axis[k] = volume->axis[k];
@@ -64,7 +74,6 @@ static void draw(const JunctionSheets *sheets, const char *title, const VesselTr
     if (!drawn)
         fprintf(stderr, "%s: no picture: %s\n", sheets->picture, message);
     reach_free(reach);
-    reach_free(other);
 }
 #endif
 

@@ -60,6 +60,8 @@ void reach_free(Reach *reach);
 double reach_field(const VesselTree *tree, Vec3 x, int *node);
 // [mm] distance from x to the wall as a tool from `node` meets it, > 0 inside; no more than `most`, no less than -most.
 double reach_clearance(const VesselTree *tree, Vec3 x, int node, double most);
+// The least clearance [mm] along a junction's joining line, a line of the tree `of`, in another model of the same vessels; at most `most`, at `place`.
+double reach_on_line(const VesselTree *of, const ReachJunction *junction, const VesselTree *in, double most, Vec3 *place);
 static inline bool reach_link_is_apart(const VesselTree *tree, int node)
 {
     int parent = tree->parent[node];

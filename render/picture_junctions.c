@@ -185,26 +185,6 @@ static void draw_tree(JunctionDrawing *drawing, const JunctionCell *cell)
     }
 }
 
-// The least along the joining line in this model, and where; the line is the junction's own tree's.
-static double least_clearance(const VesselTree *of, const ReachJunction *junction, const VesselTree *in, double most, Vec3 *where)
-{
-    enum { PLACES = 40 };
-    int line[64], count = 0;
-    double least = most;
-    for (int at = junction->last; count < 62 && at != junction->parent && at >= 0; at = of->parent[at])
-        line[count++] = at;
-    line[count++] = junction->parent;
-    *where = of->center[junction->node];
-    for (int k = 0; k + 1 < count; k++)
-        for (int i = 0; i <= PLACES; i++) {
-            Vec3 x = vec3_mix(of->center[line[k]], of->center[line[k + 1]], (double)i / PLACES);
-            double c = reach_clearance(in, x, power_nearest(in, x), most);
-            if (c < least)
-                least = c, *where = x;
-        }
-    return least;
-}
-
 static void draw_cell(JunctionDrawing *drawing, const VesselTree *of, const ReachJunction *junction, const VesselTree *in, double clearance, Vec3 where,
                       const char *label, double x, double y, double side)
 {
@@ -285,7 +265,7 @@ static bool draw_page(JunctionDrawing *drawing, const PictureOptions *options, i
 {
     const PictureJunctions *what = drawing->what;
     Sheet *sheet = drawing->sheet;
-    double s = sheet->scale, gap = 12 * s, top = 66 * s, width = (sheet->width - gap) / COLUMNS - gap, height = (sheet->height - top) / ROWS - gap;
+    double s = sheet->scale, gap = 12 * s, top = 66 * s, width = (sheet->width - gap) / COLUMNS - gap, height = (options->height - top) / ROWS - gap;
     double side = fmin(width + 20 * s, height);
     draw_head(drawing, options->title, first, end, count);
     for (int k = first; k < end; k++) {
@@ -294,7 +274,7 @@ static bool draw_page(JunctionDrawing *drawing, const PictureOptions *options, i
         double x = gap + (slot % COLUMNS) * (width + gap), y = top + (slot / COLUMNS) * (height + gap);
         if (what->before) {
             Vec3 where;
-            double most = fmax(what->tree->radius[j->node], 2 * what->tool_radius), before = least_clearance(what->tree, j, what->before, most, &where);
+            double most = fmax(what->tree->radius[j->node], 2 * what->tool_radius), before = reach_on_line(what->tree, j, what->before, most, &where);
             draw_cell(drawing, what->tree, j, what->before, before, where, "before, ", x, y, side);
             x += width + gap;
         }
@@ -316,7 +296,9 @@ bool picture_of_junctions(const char *path, const PictureOptions *options, const
     for (int first = 0; first < what->junction_count; first += each, ++*pages) {
         int end = first + each < what->junction_count ? first + each : what->junction_count;
         Sheet sheet;
-        if (!sheet_open(&sheet, options, options->height, message, capacity))
+        int slots = (end - first) * (what->before ? 2 : 1), rows = (slots + COLUMNS - 1) / COLUMNS;
+        double top = 66 * sheet_scale_of(options);
+        if (!sheet_open(&sheet, options, (int)(top + (options->height - top) * rows / ROWS), message, capacity))
             return false;
         JunctionDrawing drawing = {.sheet = &sheet, .what = what, .field = malloc((CELLS + 1) * (CELLS + 1) * sizeof(float)), .grey = malloc(GREY * GREY)};
         page_path(path, *pages, name, sizeof name);

@@ -1,5 +1,6 @@
 // The surface of trees of shared blobs as sheets: one closed part where the lumen is one, also where it kisses itself or overlaps; what hangs on nothing is
 // found and dropped. Against trees made by hand; turned and mirrored.
+#include "geom/ghost_lumens.h"
 #include "geom/surface_parts.h"
 #include "geom/tree_surface.h"
 
@@ -154,12 +155,40 @@ static void what_hangs_on_nothing_is_found(void **state)
     }
 }
 
+static void ghosts_are_found_without_a_mesh(void **state)
+{
+    (void)state;
+    for (int turn = 0; turn < TURN_COUNT; turn++) {
+        FieldTree *t = fresh();
+        field_tree_branch(t, -1, vec3(0, 0, 0), vec3(30, 0, 0), 1, 1e9, 0);
+        field_tree_extend_root(t);
+        field_tree_branch(t, 40, vec3(20, 0.4, 0), vec3(20, 8, 0), 0.5, -1, 2.6);   // capped, but lumen of the tree
+        field_tree_blob(t, 20, vec3(10, 0.3, 2.1), 1, 2);
+        field_tree_blob(t, 8, vec3(4, 0, 1), 0.8, 0.5);                             // a bulge of the trunk is none
+        VesselTree *tree = field_tree_make(t, &TURNS[turn]);
+        GhostLumens *ghosts = ghost_lumens_find(tree);
+        assert_non_null(ghosts);
+        assert_int_equal(ghosts->count, 1);
+        assert_int_equal(ghosts->ghost[0].node, 20);
+        assert_true(vec3_distance(ghosts->ghost[0].place, mat3_mul_vec(&TURNS[turn], vec3(10, 0.3, 2.1))) < 0.3);
+        double r = sqrt(1 - cbrt(0.5)), volume = 4 * PI / 3 * r * r * r;
+        assert_near(ghosts->ghost[0].volume, volume, 0.15 * volume);
+        assert_true(ghosts->ghost[0].dissolves);
+        assert_int_equal(ghosts->drop_count, 1);
+        assert_near(tree->blob_amplitude[ghosts->drop[0]], 2, 0);
+        ghost_lumens_free(ghosts);
+        vessel_tree_free(tree);
+    }
+    assert_null(ghost_lumens_find(NULL));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(kissing_lumens_are_two_sheets),
         cmocka_unit_test(a_fork_is_one_part),
         cmocka_unit_test(what_hangs_on_nothing_is_found),
+        cmocka_unit_test(ghosts_are_found_without_a_mesh),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
