@@ -183,6 +183,22 @@ static void nodes_free(Nodes *nodes)
 }
 
 // Along the vessel: from the parent, and to the child that goes on straightest.
+// To the first node a radius on, along the widest children: the curve of a surface alone may come to the middle of its opening from the side, where a
+// stenosis follows, and the inlet would then look closed.
+static Vec3 root_direction(const Nodes *nodes)
+{
+    int at = 0;
+    for (bool found = true; found && vec3_distance(nodes->center[at], nodes->center[0]) < nodes->radius[0];) {
+        int next = -1;
+        for (int k = at + 1; k < nodes->count; k++)
+            if (nodes->parent[k] == at && (next < 0 || nodes->radius[k] > nodes->radius[next]))
+                next = k;
+        found = next >= 0;
+        at = found ? next : at;
+    }
+    return vec3_unit_or(vec3_sub(nodes->center[at], nodes->center[0]), vec3(1, 0, 0));
+}
+
 static void set_directions(Nodes *nodes)
 {
     for (int i = 0; i < nodes->count; i++) {
@@ -200,6 +216,8 @@ static void set_directions(Nodes *nodes)
         }
         nodes->direction[i] = vec3_unit_or(vec3_add(in, out), vec3(1, 0, 0));
     }
+    if (nodes->count > 1)
+        nodes->direction[0] = root_direction(nodes);
 }
 
 // --- points ---

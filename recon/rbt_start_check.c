@@ -115,6 +115,8 @@ bool rbt_look_at_noise(Tracker *t, RbtLevels *levels, const RbtSeed *first)
             radius = t->scan[i].radius;
         }
     }
+    if (best.certainty < least_certainty && tracker_brightness(t, first->start) < t->dark)
+        return true;   // background: said where all starts are looked at
     t->is_noisy = true;
     if (best.certainty < least_certainty) {
         snprintf(t->refusal, sizeof t->refusal,
