@@ -1,10 +1,10 @@
 // An end meets a node if it lies within reach of its tube, points at it, and the straight way there stays lumen; and if the way back along the tree is longer than
-// a bend of both vessels is: four times both radii. A ring that two ends close from both sides is one loop.
+// a bend of both vessels is: six times both radii. A ring that two ends close from both sides is one loop.
 #include "recon/rbt_loops.h"
 
 #include <stdlib.h>
 
-static const double least_lit = 0.5, least_round = 4;
+static const double least_lit = 0.5, least_round = 6;
 
 static double lit_between(const Tracker *t, const TrackNode *a, const TrackNode *b)
 {
