@@ -43,6 +43,15 @@ static double drift_of(Vec3 click, const Cylinder *c)
     return hypot(across, fmax(0, fabs(along) - 4 * c->radius));
 }
 
+// Of the copy that is tracked.
+static double level_noise(const Tracker *t, RbtLevels *levels)
+{
+    for (int i = RBT_LEVELS - 1; i > 0; i--)
+        if (levels->smooth[i] == t->volume)
+            return rbt_level_noise(levels, i);
+    return rbt_level_noise(levels, 0);
+}
+
 static Verdict judge(Tracker *t, RbtLevels *levels, Vec3 click, const Cylinder *c, double inlier_rate)
 {
     Verdict v = {.check = {.click = click, .cylinder = *c, .drift = drift_of(click, c), .inlier_rate = inlier_rate, .noise = rbt_level_noise(levels, 0)}};
@@ -63,6 +72,11 @@ static Verdict judge(Tracker *t, RbtLevels *levels, Vec3 click, const Cylinder *
                  "noise hides the edge: the tube found there (radius %.2f mm) is %.3g grey values brighter than what is beside it at a noise of %.3g, %.1f standard "
                  "errors; a place with at least %g, or a less noisy volume",
                  c->radius, sight.contrast, v.check.noise, v.check.certainty, least_certainty);
+    else if (t->is_noisy && sight.contrast < least_contrast * level_noise(t, levels))
+        snprintf(v.refusal, sizeof v.refusal,
+                 "noise hides the edge: the tube found there (radius %.2f mm) is %.3g grey values brighter than what is beside it, the smoothed copy that suits it has a noise "
+                 "of %.3g; %g times that, or a less noisy volume",
+                 c->radius, sight.contrast, level_noise(t, levels), least_contrast);
     if (v.check.drift > c->radius + 0.5 * t->voxel) {
         snprintf(text, sizeof text, "the click lies %.2f mm from the axis of the vessel that was found, outside of its radius of %.2f mm", v.check.drift, c->radius);
         doubt(&v.check, RBT_DRIFT, v.check.drift, c->radius, text);
@@ -115,6 +129,8 @@ bool rbt_look_at_noise(Tracker *t, RbtLevels *levels, const RbtSeed *first)
             radius = t->scan[i].radius;
         }
     }
+    if (best.certainty < least_certainty && tracker_brightness(t, first->start) < t->dark)
+        return true;   // background: said where all starts are looked at
     t->is_noisy = true;
     if (best.certainty < least_certainty) {
         snprintf(t->refusal, sizeof t->refusal,
