@@ -140,7 +140,8 @@ static bool open_model(WallBench *bench, WallModel *m, Faults *faults)
     vessel_tree_free(tree);
     if (!tree)
         return false;
-    snprintf(m->tree, PATH, "%s", given);
+    if (given != m->tree)
+        snprintf(m->tree, PATH, "%s", given);
     char path[PATH], name[48];
     snprintf(name, sizeof name, "model-%d", (int)(m - bench->model));
     work_path(bench, name, ".h5", path);
