@@ -13,7 +13,8 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { CLICK, FIVE, ARCH, NAMED, MODELS_MOST = NAMED + 8, ROWS = 13, PATH = 512 };
+enum { CLICK, FIVE, ARCH, NAMED, MODELS_MOST = NAMED + 8, PATH = 512 };
+enum { JUMPS, POINTS, TRUTH, NOISE, BLOBS, FIT, JUNCTIONS, FLOOD, SPREAD, STIFF, SPIRAL, PUSH, STEP, ROWS };
 
 static const char *const row_names[ROWS] = {"jumps", "points", "truth", "noise", "blobs", "fit", "junctions", "flood", "spread", "stiff", "spiral", "push", "step"};
 
@@ -306,7 +307,7 @@ static bool rows_of_model(WallBench *bench, const WallModel *m, Faults *faults)
     bool is_click = m == &bench->model[CLICK], good = true;
     Reach *reach = NULL;
     bench->table.on = m->name;
-    if (bench->wanted[6] || bench->wanted[7]) {
+    if (bench->wanted[JUNCTIONS] || bench->wanted[FLOOD]) {
         ReachOptions options = reach_default_options();
         reach = reach_create(m->model, &options);
         if (!reach)
@@ -318,13 +319,13 @@ static bool rows_of_model(WallBench *bench, const WallModel *m, Faults *faults)
         if (!bench->wanted[row])
             continue;
         switch (row) {
-        case 0: row_jumps(bench, m); break;
-        case 1: row_points(bench, m); break;
-        case 4: row_blobs(bench, m, is_click); break;
-        case 5: row_fit(bench, m, is_click); break;
-        case 6: row_junctions(bench, reach); break;
-        case 7: row_flood(bench, reach); break;
-        case 9: good = row_stiff(bench, m, faults); break;
+        case JUMPS: row_jumps(bench, m); break;
+        case POINTS: row_points(bench, m); break;
+        case BLOBS: row_blobs(bench, m, is_click); break;
+        case FIT: row_fit(bench, m, is_click); break;
+        case JUNCTIONS: row_junctions(bench, reach); break;
+        case FLOOD: row_flood(bench, reach); break;
+        case STIFF: good = row_stiff(bench, m, faults); break;
         default: break;
         }
     }
@@ -561,12 +562,12 @@ static bool rows_of_shapes(WallBench *bench, bool any_given, Faults *faults)
         if (!bench->wanted[row])
             continue;
         bench->table.row = row_names[row];
-        bench->table.on = row == 3 ? "phantom, 0.05 mm" : "phantom";
+        bench->table.on = row == NOISE ? "phantom, 0.05 mm" : "phantom";
         switch (row) {
-        case 2: good = row_truth(bench, false, faults); break;
-        case 3: good = row_truth(bench, true, faults); break;
-        case 6: good = (any_given && bench->common.quick) || row_synth_junctions(bench, faults); break;
-        case 8:
+        case TRUTH: good = row_truth(bench, false, faults); break;
+        case NOISE: good = row_truth(bench, true, faults); break;
+        case JUNCTIONS: good = (any_given && bench->common.quick) || row_synth_junctions(bench, faults); break;
+        case SPREAD:
             bench->table.on = "synth tree, 0.04 mm";
             good = row_spread(bench, NULL, faults);
             for (int k = CLICK; k <= FIVE && good; k++)
@@ -575,9 +576,9 @@ static bool rows_of_shapes(WallBench *bench, bool any_given, Faults *faults)
                     good = row_spread(bench, &bench->model[k], faults);
                 }
             break;
-        case 10: good = row_felt(bench, true, faults); break;
-        case 11: good = row_felt(bench, false, faults); break;
-        case 12: good = row_step(bench, faults); break;
+        case SPIRAL: good = row_felt(bench, true, faults); break;
+        case PUSH: good = row_felt(bench, false, faults); break;
+        case STEP: good = row_step(bench, faults); break;
         default: break;
         }
     }
@@ -655,7 +656,7 @@ static int parse(int argc, char **argv, WallBench *bench, bool *any_given)
 
 static bool needs_models(const WallBench *bench)
 {
-    static const int of_models[] = {0, 1, 4, 5, 6, 7, 8, 9, 12};
+    static const int of_models[] = {JUMPS, POINTS, BLOBS, FIT, JUNCTIONS, FLOOD, SPREAD, STIFF, STEP};
     for (size_t k = 0; k < sizeof of_models / sizeof of_models[0]; k++)
         if (bench->wanted[of_models[k]])
             return true;
