@@ -1,5 +1,5 @@
 // The surface decides. Nodes in the parent's lumen see no wall of their own and were left out, so that a branch began with a link from the parent's axis.
-// Where the skeleton's way there crosses a wall, a path beside it is looked for, within the branch's radius; where there is none the link is refused,
+// Where the skeleton crosses a wall there, a path beside it is looked for, within the branch's radius; where there is none the link is refused,
 // however thin the wall: vessels that touch are apart. Sheets inside the lumen, of vessels made of parts that overlap, are no walls: winding numbers tell.
 // How narrow the path is, as a share of the branch's radius, says how well it is supported. Nodes stand on it every half radius of the branch from one
 // and a half of its radii inside the parent's wall on.
@@ -58,14 +58,14 @@ static double depth_in_segment(const Nodes *n, int i, Vec3 x)
 // How deep x lies in the parent's vessel, < 0 outside: along the nodes up from it and down from it within three radii.
 static double depth_in_parent(const Nodes *n, const int *first_child, int parent, Vec3 x)
 {
-    double reach = 3 * n->radius[parent], deepest = depth_in_segment(n, parent, x), way = 0;
-    for (int i = parent; n->parent[i] >= 0 && way < reach; i = n->parent[i]) {
-        way += vec3_distance(n->center[i], n->center[n->parent[i]]);
+    double reach = 3 * n->radius[parent], deepest = depth_in_segment(n, parent, x), length = 0;
+    for (int i = parent; n->parent[i] >= 0 && length < reach; i = n->parent[i]) {
+        length += vec3_distance(n->center[i], n->center[n->parent[i]]);
         deepest = fmax(deepest, depth_in_segment(n, i, x));
     }
-    way = 0;
-    for (int i = first_child[parent]; i >= 0 && way < reach; i = first_child[i]) {
-        way += vec3_distance(n->center[i], n->center[n->parent[i]]);
+    length = 0;
+    for (int i = first_child[parent]; i >= 0 && length < reach; i = first_child[i]) {
+        length += vec3_distance(n->center[i], n->center[n->parent[i]]);
         deepest = fmax(deepest, depth_in_segment(n, i, x));
     }
     return deepest;
@@ -131,7 +131,7 @@ static bool follow_skeleton(const Nodes *n, const Skeleton *s, Link *link)
     return link->path.point != NULL;
 }
 
-// The skeleton's way, or the best one beside the straight link where a wall crosses that. False: out of memory.
+// The skeleton's path, or the best one beside the straight link where a wall crosses that. False: out of memory.
 static bool find_path(const Nodes *n, const Skeleton *s, const Wall *wall, Link *link)
 {
     Room room = {wall, link->radius};
@@ -318,10 +318,10 @@ bool nodes_open_ostia(Nodes *nodes, const Skeleton *skeleton, const Wall *wall, 
         stations += link[l].station_count;
     }
     for (int l = 0; good && l < count; l++) {
-        bool went = dropped[link[l].node] || dropped[link[l].parent];   // with what it hangs on
-        if (!went)
+        bool is_lost = dropped[link[l].node] || dropped[link[l].parent];   // with what it hangs on
+        if (!is_lost)
             report_link(nodes, &link[l], report);
-        if (!went && !link[l].is_refused)
+        if (!is_lost && !link[l].is_refused)
             continue;
         mark_hanging(nodes, link[l].node, hangs);
         for (int i = 0; i < nodes->count; i++) {

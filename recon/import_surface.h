@@ -19,11 +19,11 @@ typedef struct ImportOptions {
 } ImportOptions;
 ImportOptions import_default_options(void);
 
-// What the surface says of a link between a branch and its parent: the narrowest place of the way inside it, as a share of the branch's radius.
+// What the surface says of a link between a branch and its parent: the narrowest place of the path inside it, as a share of the branch's radius.
 typedef enum ImportSupport {
     IMPORT_SUPPORTED,        // at least a quarter: it has nodes, none further from the next than the sum of their radii
     IMPORT_DOUBTFUL,         // less: the same, to be looked at
-    IMPORT_REFUSED,          // no way inside, and no other vessel is in plain sight: the branch was left out with what hung on it
+    IMPORT_REFUSED,          // no path inside, and no other vessel is in plain sight: the branch was left out with what hung on it
     IMPORT_SUPPORTS
 } ImportSupport;
 

@@ -1,4 +1,4 @@
-// Internal to recon: the best path through the image from a vessel to the one it leaves, and how dark it gets on the way.
+// Internal to recon: the best path through the image from a vessel to the one it leaves, and how dark it gets there.
 #ifndef SELDINGER_RECON_RBT_LINK_PATH_H
 #define SELDINGER_RECON_RBT_LINK_PATH_H
 

@@ -40,16 +40,16 @@ typedef struct Link {
 // The nodes of the parent's branch within reach of `node`, and those that it hangs on; returns their number.
 static int nodes_about(const Track *tree, int node, int *list)
 {
-    double reach = NEAR_REACH * tree->node[node].cylinder.radius, way = 0;
+    double reach = NEAR_REACH * tree->node[node].cylinder.radius, length = 0;
     int count = 0;
     list[count++] = node;
-    for (int i = node; tree->node[i].parent >= 0 && way < reach && count < NEAR_MOST / 2; i = tree->node[i].parent) {
-        way += vec3_distance(tree->node[i].cylinder.center, tree->node[tree->node[i].parent].cylinder.center);
+    for (int i = node; tree->node[i].parent >= 0 && length < reach && count < NEAR_MOST / 2; i = tree->node[i].parent) {
+        length += vec3_distance(tree->node[i].cylinder.center, tree->node[tree->node[i].parent].cylinder.center);
         list[count++] = tree->node[i].parent;
     }
-    way = 0;
-    for (int i = node + 1; i < tree->count && tree->node[i].parent == i - 1 && tree->node[i].branch == tree->node[node].branch && way < reach && count < NEAR_MOST; i++) {
-        way += vec3_distance(tree->node[i].cylinder.center, tree->node[i - 1].cylinder.center);
+    length = 0;
+    for (int i = node + 1; i < tree->count && tree->node[i].parent == i - 1 && tree->node[i].branch == tree->node[node].branch && length < reach && count < NEAR_MOST; i++) {
+        length += vec3_distance(tree->node[i].cylinder.center, tree->node[i - 1].cylinder.center);
         list[count++] = i;
     }
     return count;
@@ -301,7 +301,7 @@ typedef struct Rebuild {
 
 static void add_line(Rebuild *r, Vec3 from, Vec3 to, double clear) { r->line[r->line_count++] = (LumenLine){from, to, clear}; }
 
-// A node with its link. What the points must keep clear of is collected on the way.
+// A node with its link. What the points must keep clear of is collected with it.
 static bool append_node(Rebuild *r, int i)
 {
     const Track *tree = &r->t->tree;
@@ -464,7 +464,7 @@ bool rbt_open_ostia(Tracker *t, const bool *is_named, int threads, RbtJunctions 
 {
     Track *tree = &t->tree;
     int count = 0;
-    rbt_recentre(t);
+    rbt_measure_set_nodes(t);
     Link *link = collect_links(tree, is_named, &count);
     bool *hangs = calloc((size_t)tree->count + 1, sizeof *hangs), *keep = calloc((size_t)tree->count + 1, sizeof *keep);
     int *link_of = malloc(((size_t)tree->count + 1) * sizeof *link_of);

@@ -4,7 +4,7 @@
 #include "recon/cast_rays.h"
 
 enum { SAMPLES_MOST = 160, SCALE_NODES = 8, ROUNDS = 2 };
-static const double MOST_MOVED = 0.8;     // of a node that was set on the way through the image, in its radii
+static const double MOST_MOVED = 0.8;     // of a node that was set on voxels, in its radii
 
 static double reach_of(const Tracker *t, double radius) { return 1.2 * RING_WIDEST * radius + 2 * t->voxel; }
 
@@ -82,7 +82,7 @@ static bool is_set(const Track *tree, int i) { return i > 0 && i < tree->count &
 
 static bool follows(const Track *tree, int i) { return i < tree->count && tree->node[i].parent == i - 1 && tree->node[i].branch == tree->node[i - 1].branch; }
 
-// To the middle of its own and the mean of its neighbours' places: a way from voxel to voxel is a staircase.
+// To the middle of its own and the mean of its neighbours' places: a path from voxel to voxel is a staircase.
 static void straighten(Track *tree)
 {
     Vec3 before = tree->count > 0 ? tree->node[0].cylinder.center : vec3(0, 0, 0);
@@ -105,27 +105,55 @@ static void set_axes(Track *tree)
         }
 }
 
-void rbt_recentre(Tracker *t)
+// The first node behind the stretch that was measured; `from` where there is none.
+static int measured_behind(const Track *tree, int from)
+{
+    int i = from;
+    while (is_set(tree, i) && follows(tree, i + 1))
+        i++;
+    return is_set(tree, i) ? from : i;
+}
+
+// Centre, radius and points by rays square to the vessel. Walls across it, which rays in all directions saw where it is dim, are gone then. What is
+// open to the side, so that the ring is not closed, stays as it was.
+static void measure_set_node(const Tracker *t, TrackNode *n, Vec3 *point, double scale)
+{
+    Cylinder *c = &n->cylinder;
+    LinkLight light = {tracker_brightness(t, c->center), tracker_brightness(t, c->center) - fmax(n->contrast, 0)};
+    Vec3 direction[RING], offset, from = c->center;
+    double distance[RING], most = RING_WIDEST * c->radius / scale;
+    for (int round = 0; round < ROUNDS; round++) {
+        rbt_ring_cast(t, c->center, c->axis, &light, c->radius, direction, distance);
+        Vec3 middle = rbt_ring_center(direction, distance, most, c->axis, &offset) ? vec3_add(c->center, offset) : from;
+        if (vec3_distance(middle, from) > MOST_MOVED * c->radius || tracker_is_forbidden(t, middle))
+            break;
+        c->center = middle;
+    }
+    rbt_ring_cast(t, c->center, c->axis, &light, c->radius, direction, distance);
+    double edge = rbt_ring_median(distance, most);
+    int kept = 0, met = 0;
+    for (int k = 0; k < RING; k++)
+        met += distance[k] > 0 && distance[k] < most;
+    if (!(edge > 0) || 4 * met < 3 * RING)
+        return;
+    c->radius = fmax(0.6 * c->radius, fmin(1.6 * c->radius, scale * edge));
+    for (int k = 0; k < RING && kept < n->point_count; k++)
+        if (distance[k] > 0 && distance[k] < most && scale * distance[k] < 1.6 * c->radius)
+            point[kept++] = vec3_add_scaled(c->center, scale * distance[k], direction[k]);
+    n->point_count = kept;   // the places behind are left unused
+}
+
+void rbt_measure_set_nodes(Tracker *t)
 {
     Track *tree = &t->tree;
     straighten(tree);
     set_axes(tree);
     for (int i = 1; i < tree->count; i++) {
-        Cylinder *c = &tree->node[i].cylinder;
-        LinkLight light = {0};
-        Vec3 direction[RING], offset, from = c->center;
-        double distance[RING];
         if (!is_set(tree, i) || !follows(tree, i + 1))
             continue;
-        light.inside = tracker_brightness(t, c->center);
-        light.outside = light.inside - fmax(tree->node[i].contrast, 0);
-        for (int round = 0; round < ROUNDS; round++) {
-            rbt_ring_cast(t, c->center, c->axis, &light, c->radius, direction, distance);
-            if (!rbt_ring_center(direction, distance, RING_WIDEST * c->radius, c->axis, &offset) ||
-                vec3_distance(vec3_add(c->center, offset), from) > MOST_MOVED * c->radius || tracker_is_forbidden(t, vec3_add(c->center, offset)))
-                break;
-            c->center = vec3_add(c->center, offset);
-        }
+        int behind = measured_behind(tree, i);
+        LinkLight light = rbt_link_light(tree, t, behind);
+        measure_set_node(t, &tree->node[i], tree->point + tree->node[i].point_start, rbt_ring_scale(t, behind, &light));
     }
     set_axes(tree);
 }

@@ -16,7 +16,7 @@ double rbt_ring_median(const double *distance, double most);
 bool rbt_ring_center(const Vec3 *direction, const double *distance, double most, Vec3 axis, Vec3 *offset);
 // Radius over edge at the first nodes of the vessel that begins at `node`, median; 1 where none shows its edge.
 double rbt_ring_scale(const Tracker *t, int node, const LinkLight *light);
-// Moves the nodes that were set on voxels, along the way through the lumen, to the middle of what they see.
-void rbt_recentre(Tracker *t);
+// Measures the nodes that were set on voxels, along a path through the lumen where no cylinder fits: they move to the middle of what they see square to it.
+void rbt_measure_set_nodes(Tracker *t);
 
 #endif

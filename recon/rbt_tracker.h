@@ -13,7 +13,7 @@ typedef struct TrackNode {
     double inlier_rate, contrast;
     int parent, kind, branch;
     bool retried, is_junction;
-    bool is_on_voxels;       // set along a way through the image's voxels (rbt_links.h), not measured
+    bool is_on_voxels;       // set along a path through the image's voxels (rbt_links.h), not measured
     bool is_link;            // between the parent's axis and the branch's first node (rbt_ostia.h)
     int64_t point_start;
     int point_count;
