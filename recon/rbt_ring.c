@@ -4,7 +4,8 @@
 #include "recon/cast_rays.h"
 
 enum { SAMPLES_MOST = 160, SCALE_NODES = 8, ROUNDS = 2 };
-static const double MOST_MOVED = 0.8;     // of a node that was set on voxels, in its radii
+static const double MOST_MOVED = 0.8;     // of a node that was set on voxels, in its radii, and a voxel at most
+static const double NARROW = 2;           // voxels: such a node's radius, at most
 
 static double reach_of(const Tracker *t, double radius) { return 1.2 * RING_WIDEST * radius + 2 * t->voxel; }
 
@@ -78,40 +79,45 @@ bool rbt_ring_center(const Vec3 *direction, const double *distance, double most,
 
 // --- nodes that were set on the image's voxels ---
 
-static bool is_set(const Track *tree, int i) { return i > 0 && i < tree->count && tree->node[i].is_on_voxels; }
+// In wide openings half a voxel is nothing, and rays in all directions see more.
+static bool is_set(const Track *tree, int i, double voxel)
+{
+    return i > 0 && i < tree->count && tree->node[i].is_on_voxels && tree->node[i].cylinder.radius < NARROW * voxel;
+}
 
 static bool follows(const Track *tree, int i) { return i < tree->count && tree->node[i].parent == i - 1 && tree->node[i].branch == tree->node[i - 1].branch; }
 
-// To the middle of its own and the mean of its neighbours' places: a path from voxel to voxel is a staircase.
-static void straighten(Track *tree)
+// To the middle of its own and the mean of its neighbours' places, half a voxel at most: a path from voxel to voxel is a staircase.
+static void straighten(Track *tree, double voxel)
 {
     Vec3 before = tree->count > 0 ? tree->node[0].cylinder.center : vec3(0, 0, 0);
     for (int i = 1; i < tree->count; i++) {
         Vec3 here = tree->node[i].cylinder.center;
-        if (is_set(tree, i) && follows(tree, i + 1)) {
+        if (is_set(tree, i, voxel) && follows(tree, i + 1)) {
             Vec3 up = tree->node[i].parent == i - 1 ? before : tree->node[tree->node[i].parent].cylinder.center;
-            tree->node[i].cylinder.center = vec3_add(vec3_scale(here, 0.5), vec3_scale(vec3_add(up, tree->node[i + 1].cylinder.center), 0.25));
+            Vec3 move = vec3_add_scaled(vec3_scale(vec3_add(up, tree->node[i + 1].cylinder.center), 0.25), -0.5, here);
+            tree->node[i].cylinder.center = vec3_add_scaled(here, fmin(1, 0.5 * voxel / fmax(vec3_norm(move), 1e-12)), move);
         }
         before = here;
     }
 }
 
-static void set_axes(Track *tree)
+static void set_axes(Track *tree, double voxel)
 {
     for (int i = 1; i < tree->count; i++)
-        if (is_set(tree, i) && follows(tree, i + 1)) {
+        if (is_set(tree, i, voxel) && follows(tree, i + 1)) {
             Vec3 along = vec3_sub(tree->node[i + 1].cylinder.center, tree->node[tree->node[i].parent].cylinder.center);
             tree->node[i].cylinder.axis = vec3_unit_or(along, tree->node[i].cylinder.axis);
         }
 }
 
 // The first node behind the stretch that was measured; `from` where there is none.
-static int measured_behind(const Track *tree, int from)
+static int measured_behind(const Track *tree, int from, double voxel)
 {
     int i = from;
-    while (is_set(tree, i) && follows(tree, i + 1))
+    while (is_set(tree, i, voxel) && follows(tree, i + 1))
         i++;
-    return is_set(tree, i) ? from : i;
+    return is_set(tree, i, voxel) ? from : i;
 }
 
 // Centre, radius and points by rays square to the vessel. Walls across it, which rays in all directions saw where it is dim, are gone then. What is
@@ -125,7 +131,7 @@ static void measure_set_node(const Tracker *t, TrackNode *n, Vec3 *point, double
     for (int round = 0; round < ROUNDS; round++) {
         rbt_ring_cast(t, c->center, c->axis, &light, c->radius, direction, distance);
         Vec3 middle = rbt_ring_center(direction, distance, most, c->axis, &offset) ? vec3_add(c->center, offset) : from;
-        if (vec3_distance(middle, from) > MOST_MOVED * c->radius || tracker_is_forbidden(t, middle))
+        if (vec3_distance(middle, from) > fmin(MOST_MOVED * c->radius, t->voxel) || tracker_is_forbidden(t, middle))
             break;
         c->center = middle;
     }
@@ -146,14 +152,14 @@ static void measure_set_node(const Tracker *t, TrackNode *n, Vec3 *point, double
 void rbt_measure_set_nodes(Tracker *t)
 {
     Track *tree = &t->tree;
-    straighten(tree);
-    set_axes(tree);
+    straighten(tree, t->voxel);
+    set_axes(tree, t->voxel);
     for (int i = 1; i < tree->count; i++) {
-        if (!is_set(tree, i) || !follows(tree, i + 1))
+        if (!is_set(tree, i, t->voxel) || !follows(tree, i + 1))
             continue;
-        int behind = measured_behind(tree, i);
+        int behind = measured_behind(tree, i, t->voxel);
         LinkLight light = rbt_link_light(tree, t, behind);
         measure_set_node(t, &tree->node[i], tree->point + tree->node[i].point_start, rbt_ring_scale(t, behind, &light));
     }
-    set_axes(tree);
+    set_axes(tree, t->voxel);
 }
