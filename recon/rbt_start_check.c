@@ -284,6 +284,27 @@ static void judge_background(Tracker *t, int count)
     doubt(&t->check, RBT_BACKGROUND, high - low, contrast[n / 2], text);
 }
 
+// It ends before something much brighter than itself, such as the face of a band that it may go on in.
+static void judge_ends(Tracker *t, int count)
+{
+    char text[240];
+    for (int end = 0; end < 2 && count > 3; end++) {
+        const TrackNode *n = &t->tree.node[end ? count - 1 : 0], *before = &t->tree.node[end ? count - 4 : 3];
+        Vec3 ahead = vec3_unit_or(vec3_sub(n->cylinder.center, before->cylinder.center), n->cylinder.axis), c = n->cylinder.center;
+        double brighter = 0;
+        for (int k = 2; k <= 5; k++) {
+            Vec3 x = vec3_add_scaled(c, k * n->cylinder.radius, ahead);
+            if (tracker_is_inside(t->volume, x))
+                brighter = fmax(brighter, tracker_brightness(t, x) - tracker_brightness(t, before->cylinder.center));
+        }
+        if (brighter <= 1.5 * before->contrast + 4 * level_noise(t, t->levels))
+            continue;
+        snprintf(text, sizeof text, "the first branch ends at (%.1f, %.1f, %.1f) mm before what is %.3g grey values brighter than itself, its contrast being %.3g (a bright band?): it may go on there",
+                 c.x, c.y, c.z, brighter, before->contrast);
+        doubt(&t->check, RBT_BACKGROUND, brighter, 1.5 * before->contrast, text);
+    }
+}
+
 void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
 {
     enum { ROOT = 3 };
@@ -309,6 +330,7 @@ void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
         doubt(&t->check, RBT_INLIERS, root / (count < ROOT ? count : ROOT), least_inliers, text);
     }
     judge_background(t, count);
+    judge_ends(t, count);
     double radius = tree->node[count / 2].cylinder.radius;
     if (length < least_length * radius) {
         snprintf(text, sizeof text, "the first branch is %.1f mm long, %.1f of its radii; a vessel is %g or more", length, length / radius, least_length);
