@@ -218,7 +218,7 @@ int rbt_level_for(RbtLevels *levels, const Cylinder *tube)
 {
     double voxel = volume_voxel_size(levels->volume), contrast = rbt_sight_of(levels->volume, 0, tube).contrast;
     int level = 0;
-    while (level + 1 < RBT_LEVELS && rbt_level_voxels[level + 1] * voxel <= 0.5 * tube->radius && contrast < clear_contrast * rbt_level_noise(levels, level))
+    while (level + 1 < RBT_LEVELS && rbt_level_voxels[level + 1] * voxel <= 0.62 * tube->radius && contrast < clear_contrast * rbt_level_noise(levels, level))
         level++;
     return level;
 }
