@@ -7,7 +7,7 @@
 
 #include <cJSON.h>
 
-VerbFunction bench_step, bench_peer, bench_track, bench_fit, bench_collision, bench_drawing;
+VerbFunction bench_step, bench_peer, bench_track, bench_fit, bench_collision, bench_wall, bench_drawing;
 
 typedef struct Spread {
     double median, p99, p999, max;
@@ -38,6 +38,9 @@ typedef struct StepTrace {   // of each step; arrays of the caller with room for
 } StepTrace;
 // Runs the script, at most `most` steps of it; stops where a step diverges. `trace` may be NULL. False with a fault.
 bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, const StepTrace *trace, StepFigures *figures, Faults *faults);
+
+// Detection of up to 80 points nearest to the wall at that step of the script [us], and how many they were.
+void bench_detection(const Scene *scene, const Vessel *vessel, int64_t step, double *detection_us, int *points, Faults *faults);
 
 // A scene with its vessel, opened; false with faults.
 typedef struct BenchScene {

@@ -187,13 +187,6 @@ static void run_trial(void *context, long index)
         trial->is_refused = !tracked;
         if (tracked)
             score_trial(trial, kind, truth, tracked, &report);
-        if (getenv("SELDINGER_BENCH_STARTS_DEBUG")) {
-            fprintf(stderr, "%s seed %d click %.17g,%.17g,%.17g: %s", kind->name, seed, click.start.x, click.start.y, click.start.z, tracked ? "" : faults->text[0]);
-            if (tracked)
-                fprintf(stderr, "right %d offset %.2f radius %.2f trunk %.2f %d/%d leaks %d warnings %d %s", trial->is_right, trial->offset, trial->radius, trial->trunk, trial->correct,
-                        trial->branches, trial->leaks, report.check.warning_count, report.check.warning_count ? report.check.warning[0].text : "");
-            fprintf(stderr, "\n");
-        }
         rbt_report_free(&report);
     }
     vessel_tree_free(tracked);
@@ -280,11 +273,13 @@ static void json_row(cJSON *list, const Kind *kind, const Row *r)
     cJSON_AddItemToArray(list, item);
 }
 
-static void print_verdict(FILE *out, const char *what, int found, int limit, bool at_least, bool *kept)
+// `kept` is NULL for an aim.
+static void print_verdict(FILE *out, const char *what, double found, double limit, bool at_least, bool *kept)
 {
     bool reached = at_least ? found >= limit : found <= limit;
-    fprintf(out, "must %-4s one click, noisy volumes: %s: %d, %s %d\n", reached ? "yes" : "NO", what, found, at_least ? "at least" : "at most", limit);
-    *kept = *kept && reached;
+    fprintf(out, "%-4s %-4s one click, noisy volumes: %s: %.3g, %s %g\n", kept ? "must" : "aim", reached ? "yes" : "NO", what, found, at_least ? "at least" : "at most", limit);
+    if (kept)
+        *kept = *kept && reached;
 }
 
 bool bench_starts(FILE *out, int seeds, int threads, cJSON *root, bool *kept, Faults *faults)
@@ -319,10 +314,11 @@ bool bench_starts(FILE *out, int seeds, int threads, cJSON *root, bool *kept, Fa
                 "warning (other than that a smoothed copy was tracked: smth); wrong: tracked, not right, no such warning. drift: from the click to the axis found [true\n"
                 "radii], mean and most; radius: found over true; turn.: the root is not at the trunk's end (labels of these are not counted).\n"
                 "In the last four kinds noise hides the vessel or none is there: a refusal is right.\n");
-        print_verdict(out, "right of those that can be seen [%]", 100 * right / seen, 80, true, kept);
-        print_verdict(out, "refused of those that can be seen [%]", 100 * false_refusals / seen, 10, false, kept);
-        print_verdict(out, "not refused of the hidden [%]", 100 * missing / hidden, 10, false, kept);
-        print_verdict(out, "wrong without a word", silent, 0, false, kept);
+        print_verdict(out, "right of those that can be seen [%]", percent(right, seen), 80, true, kept);
+        print_verdict(out, "refused of those that can be seen [%]", percent(false_refusals, seen), 10, false, kept);
+        print_verdict(out, "not refused of the hidden [%]", percent(missing, hidden), 5, false, kept);
+        print_verdict(out, "wrong without a word [% of all]", percent(silent, seen + hidden), 5, false, kept);
+        print_verdict(out, "wrong without a word [% of all]", percent(silent, seen + hidden), 0, false, NULL);
     } else if (faults->count == 0) {
         faults_add(faults, "bench track", 0, 0, "not enough memory");
     }

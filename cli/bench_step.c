@@ -254,7 +254,7 @@ static void call_query(void *context)
 }
 
 // The free nodes nearest to the wall at a crowded step, along the wire; moved to and fro by that step's motion.
-static void time_detection(const Scene *scene, const Vessel *vessel, int64_t step, double *detection, int *points, Faults *faults)
+void bench_detection(const Scene *scene, const Vessel *vessel, int64_t step, double *detection, int *points, Faults *faults)
 {
     Simulator *simulator = simulator_create(scene, vessel, faults);
     if (!simulator)
@@ -305,7 +305,7 @@ static bool run_cases(StepBench *bench, SimdLevel level, SimdLevel widest, Fault
             bench->kernels[level].factor_solve = time_factor_solve();
         }
         if (good)
-            time_detection(s.scene, s.open.vessel, run->crowded_step, &bench->kernels[level].detection[c], &bench->kernels[level].points[c], faults);
+            bench_detection(s.scene, s.open.vessel, run->crowded_step, &bench->kernels[level].detection[c], &bench->kernels[level].points[c], faults);
         if (good && level == widest) {
             uint64_t hash = 0;
             good = force_error(s.scene, s.open.vessel, run->steps, bench->options.quick ? 20 : 200, &bench->error[c], &hash, faults);

@@ -214,7 +214,7 @@ static void print_census(const SurfaceCensus *c, double cell_mm, int bubbles)
 {
     printf("surface        %d vertices, %d triangles, cells of %.3g mm\n", c->vertices, c->triangles, cell_mm);
     printf("parts          %d, Euler characteristic %" PRId64 "%s\n", c->parts, c->euler,
-           bubbles ? "; bubbles of wall inside the lumen were dropped" : "");
+           bubbles ? "; bubbles inside the lumen and specks beside it were dropped" : "");
     printf("edges          %" PRId64 " open, %" PRId64 " non-manifold, %" PRId64 " between triangles turned against each other\n", c->open_edges,
            c->non_manifold_edges, c->turned_edges);
     printf("area, volume   %.6g mm2, %.6g mm3\n", c->area, c->volume);
@@ -249,12 +249,16 @@ static void say_dropped(const char *file, const SurfaceParts *parts)
 }
 
 // Bubbles in the lumen, and what hangs on nothing unless that is wanted. False where there is no memory.
-static bool drop_parts(const ExportOptions *options, const VesselTree *tree, TriangleMesh *mesh, int *bubbles)
+static bool drop_parts(const ExportOptions *options, double cell, const VesselTree *tree, TriangleMesh *mesh, int *bubbles)
 {
     ReachOptions flood = reach_default_options();
     Reach *reach = reach_create(tree, &flood);
     SurfaceParts *parts = reach ? surface_parts_create(mesh, tree, reach) : NULL;
     bool kinds[PART_KINDS] = {[PART_INLET] = true, [PART_SHUT] = options->keep_floating, [PART_GHOST] = options->keep_floating};
+    // specks of a few cells beside the lumen proper come from the lattice, not from the wall
+    for (int p = 1; parts && p < parts->count; p++)
+        if (parts->part[p].kind == PART_INLET && parts->part[p].volume < 64 * cell * cell * cell)
+            parts->part[p].kind = PART_BUBBLE;
     bool good = parts && surface_parts_keep(mesh, parts, kinds);
     *bubbles = 0;
     for (int p = 0; good && p < parts->count; p++)
@@ -267,7 +271,7 @@ static bool drop_parts(const ExportOptions *options, const VesselTree *tree, Tri
 }
 
 // The surface as it will be written, what there is to say of it told. False with faults.
-static bool make_surface(const ExportOptions *options, const VesselTree *tree, Surface *surface, Faults *faults)
+static bool make_surface(const ExportOptions *options, bool with_error, const VesselTree *tree, Surface *surface, Faults *faults)
 {
     double cell = options->cell_mm > 0 ? options->cell_mm : isosurface_cell_for(tree);
     TriangleMesh *mesh = surface->mesh = isosurface_of_tree(tree, cell);
@@ -277,13 +281,13 @@ static bool make_surface(const ExportOptions *options, const VesselTree *tree, S
     }
     SurfaceCensus census;
     int bubbles;
-    bool good = drop_parts(options, tree, mesh, &bubbles);
+    bool good = drop_parts(options, cell, tree, mesh, &bubbles);
     if (options->open_inlet && !surface_open_inlet(mesh, tree)) {
         faults_add(faults, options->in, 0, 0, "has no inlet to open: the tree goes on upstream of its root, or the root's points close it; leave --open-inlet away");
         return false;
     }
     good = good && surface_census(mesh, &census);
-    if (good && tree->point_count > 0) {
+    if (good && with_error && tree->point_count > 0) {
         surface->error = malloc(((size_t)mesh->vertex_count + 1) * sizeof *surface->error);
         surface->distance = malloc(((size_t)mesh->vertex_count + 1) * sizeof *surface->distance);
         good = surface->error && surface->distance && surface_point_error(mesh, tree, surface->error, surface->distance);
@@ -299,7 +303,7 @@ static bool export_surface(const ExportOptions *options, const char *extension, 
 {
     Surface surface = {0};
     Text text;
-    bool good = make_surface(options, tree, &surface, faults);
+    bool good = make_surface(options, !strcmp(extension, ".ply") || !strcmp(extension, ".vtp"), tree, &surface, faults);
     if (good && !text_open(&text)) {
         faults_add(faults, options->out, 0, 0, "cannot be written: no memory");
         good = false;

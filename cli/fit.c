@@ -1,6 +1,7 @@
 // seldinger fit: a tree of point sets to a model (LIM), with the figures of the paper's tables 3 and 4.
 #include "cli/cli.h"
 
+#include "cli/junction_sheets.h"
 #include "cli/output.h"
 #include "cli/reach_report.h"
 #include "geom/sort_doubles.h"
@@ -24,6 +25,7 @@ typedef struct FitCommand {
     LimFitOptions options;
     double edge_blur;        // [mm] < 0: what the tree's file says
     double voxel;            // [mm] 0: not known
+    JunctionSheets junctions;
     double tool_radius;      // [mm] of the tool led from the inlet through the model
     const char *local_option;   // one that only local models have, where it was given
     bool has_voxel, quiet, measure;
@@ -58,6 +60,8 @@ static const char help[] =
     "  --tool-radius-mm X     of the tool that is led from the model's inlet through the tree, for the report at the end; default 0.18\n"
     "  --json F               figures as JSON; - is standard output\n"
     "  --picture F.png        fitted surface coloured by the distance to the points, the worst nodes cut open\n"
+    "  --junctions F.png      a section through each junction, the narrowest first; further pages are F-2.png and so on\n"
+    "  --volume V             the angiogram behind these\n"
     "  --quiet                no summary, no progress\n\n"
     "Exit codes: 0 done; 2 wrong usage or bad input.\n";
 
@@ -70,14 +74,15 @@ static int usage_fault(const char *message, const char *what)
 // -1: go on; otherwise the exit code.
 static int parse_options(int argc, char **argv, FitCommand *command)
 {
-    enum { PRESET = 256, EDGE_BLUR, TARGET, BLOBS, VOXEL, ALPHA, BETA, POINTS, THREADS, JSON, PICTURE, QUIET, MEASURE, TOOL_RADIUS };
+    enum { PRESET = 256, EDGE_BLUR, TARGET, BLOBS, VOXEL, ALPHA, BETA, POINTS, THREADS, JSON, PICTURE, QUIET, MEASURE, TOOL_RADIUS, JUNCTIONS, VOLUME };
     static const struct option table[] = {
         {"output", required_argument, NULL, 'o'},      {"preset", required_argument, NULL, PRESET}, {"target-mm", required_argument, NULL, TARGET},
         {"max-blobs", required_argument, NULL, BLOBS}, {"voxel-mm", required_argument, NULL, VOXEL}, {"alpha", required_argument, NULL, ALPHA},
         {"beta", required_argument, NULL, BETA},       {"max-points", required_argument, NULL, POINTS}, {"threads", required_argument, NULL, THREADS},
         {"json", required_argument, NULL, JSON},       {"picture", required_argument, NULL, PICTURE}, {"quiet", no_argument, NULL, QUIET},
         {"measure", no_argument, NULL, MEASURE},       {"help", no_argument, NULL, 'h'},
-        {"edge-blur-mm", required_argument, NULL, EDGE_BLUR}, {"tool-radius-mm", required_argument, NULL, TOOL_RADIUS}, {0}};
+        {"edge-blur-mm", required_argument, NULL, EDGE_BLUR}, {"tool-radius-mm", required_argument, NULL, TOOL_RADIUS},
+        {"junctions", required_argument, NULL, JUNCTIONS}, {"volume", required_argument, NULL, VOLUME}, {0}};
     *command = (FitCommand){.options = lim_fit_default_options(), .preset = "default", .edge_blur = -1, .tool_radius = reach_default_options().tool_radius};
     double number;
     optind = 1;
@@ -89,6 +94,8 @@ static int parse_options(int argc, char **argv, FitCommand *command)
         case PICTURE: command->picture = optarg; break;
         case QUIET: command->quiet = true; break;
         case MEASURE: command->measure = true; break;
+        case JUNCTIONS: command->junctions.picture = optarg; break;
+        case VOLUME: command->junctions.volume = optarg; break;
         case TOOL_RADIUS:
             if (!cli_number("--tool-radius-mm", optarg, 0.01, 100, &command->tool_radius))
                 return EXIT_BAD_INPUT;
@@ -429,6 +436,8 @@ int verb_fit(int argc, char **argv)
         if (good && command.json)
             good = write_json(command.json, root, model, &figures, command.measure ? &measure : NULL, voxel, &faults);
         cJSON_Delete(root);
+        command.junctions.tool_radius = command.tool_radius;
+        good = good && junction_sheets_draw(&command.junctions, command.output ? command.output : command.tree, model, &faults);
         if (good && command.picture)
             make_picture(command.picture, model);
     }

@@ -30,7 +30,8 @@ static const char help[] =
     "that leaves out more than 10 % of the surface is refused. Narrow branches that no centreline runs into are left out.\n"
     "Surface: STL, PLY, OBJ or VTK PolyData (.vtp), open or closed; flat lids over the ends of a closed one are taken off.\n"
     "Centrelines: VTK PolyData (.vtp), 3D Slicer Markups (.mrk.json), SWC; several files and overlapping curves make one tree.\n"
-    "What is wrong with the surface is told and mended.\n\n"
+    "What is wrong with the surface is named and mended.\n"
+    "A branch whose link to its parent has no path inside the surface hangs on another vessel in plain sight, or is left out; the summary names it.\n\n"
     "  --surface F          the surface (needed)\n"
     "  --centerline F...    centrelines; may be given again\n"
     "  -o, --output F.h5    the tree (needed)\n"
@@ -145,8 +146,11 @@ static void print_junctions(const ImportReport *r)
     printf("; %d nodes on their links\n", r->link_nodes);
     for (int i = 0; i < r->named_count; i++) {
         const ImportJunction *j = &r->named[i];
-        printf("  %-9s junction at (%.2f, %.2f, %.2f) mm, link %.2f mm, leaves the lumen by %.2f mm, %.0f %% of the branch's radius\n", support_name[j->support],
-               j->place.x, j->place.y, j->place.z, j->length, j->outside, 100 * j->outside / j->radius);
+        printf("  %-9s junction at (%.2f, %.2f, %.2f) mm, link %.2f mm", support_name[j->support], j->place.x, j->place.y, j->place.z, j->length);
+        if (j->support == IMPORT_REFUSED)
+            printf(", leaves the lumen\n");
+        else
+            printf(", narrowest place %.0f %% of the branch's radius\n", 100 * j->share);
     }
     if (r->junction_count - r->junctions_with[IMPORT_SUPPORTED] > r->named_count)
         printf("  and %d more\n", r->junction_count - r->junctions_with[IMPORT_SUPPORTED] - r->named_count);
@@ -208,8 +212,7 @@ static void add_junctions(cJSON *root, const ImportReport *r)
         cJSON_AddStringToObject(entry, "support", support_name[j->support]);
         json_vector(entry, "place_mm", j->place);
         cJSON_AddNumberToObject(entry, "length_mm", j->length);
-        cJSON_AddNumberToObject(entry, "outside_mm", j->outside);
-        cJSON_AddNumberToObject(entry, "radius_mm", j->radius);
+        cJSON_AddNumberToObject(entry, "narrowest_share", j->share);
         cJSON_AddItemToArray(list, entry);
     }
 }

@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "cli/file_kind.h"
+#include "cli/junction_sheets.h"
 #include "cli/output.h"
 #include "cli/reach_report.h"
 #include "cli/report.h"
@@ -27,6 +28,9 @@ static const char help[] = "Usage: seldinger info FILE [--json] [--report F.html
                            "  --report F.html  of a tree or model: a page for readers, all in one file: tree, candidates (narrow places, wide places, aneurysms),\n"
                            "                   branches, radius along each, quality of the fit; for training and research, not a medical device\n"
                            "  --picture F.png  of a model: its surface coloured by the distance to the data, and the paper's Table 4 as a histogram\n"
+                           "  --junctions F.png  of a model: a section through each junction, the narrowest first; further pages are F-2.png and so on\n"
+                           "  --volume V       the angiogram behind these\n"
+                           "  --before M.h5    another model of the same vessels: the ten narrowest junctions in that, beside what they are now\n"
                            "  --tool-radius-mm X  of the tool that is led from a model's inlet through the tree; default 0.18\n"
                            "  --quiet          no figures as text: the report or picture alone\n\n"
                            "Exit codes: 0 done; 2 wrong usage or bad input.\n";
@@ -86,6 +90,7 @@ static void draw_model(const char *picture, const char *path, const VesselTree *
 
 typedef struct TreeWishes {
     const char *report, *picture;
+    JunctionSheets junctions;
     double tool_radius;      // [mm]
     char *reach;             // comes out: where a tool gets to, as text; the caller's to free
 } TreeWishes;
@@ -138,6 +143,8 @@ static bool describe_tree(cJSON *object, const char *path, TreeWishes *wishes, F
         cJSON_AddStringToObject(object, "created_by", info.created_by);
     bool good = add_reach(object, path, tree, wishes, faults);
     good = good && (!wishes->report || report_write(wishes->report, path, tree, &info, faults));
+    wishes->junctions.tool_radius = wishes->tool_radius;
+    good = good && junction_sheets_draw(&wishes->junctions, path, tree, faults);
     if (good && wishes->picture)
         draw_model(wishes->picture, path, tree, &info);
     tree_file_info_free(&info);
@@ -296,10 +303,11 @@ static void print_value(const cJSON *value)
 
 int verb_info(int argc, char **argv)
 {
-    enum { JSON = 256, REPORT, PICTURE, TOOL_RADIUS, QUIET, HELP };
+    enum { JSON = 256, REPORT, PICTURE, TOOL_RADIUS, JUNCTIONS, VOLUME, BEFORE, QUIET, HELP };
     static const struct option table[] = {{"json", no_argument, NULL, JSON}, {"report", required_argument, NULL, REPORT},
                                           {"picture", required_argument, NULL, PICTURE},
-                                          {"tool-radius-mm", required_argument, NULL, TOOL_RADIUS}, {"quiet", no_argument, NULL, QUIET}, {"help", no_argument, NULL, HELP}, {0}};
+                                          {"tool-radius-mm", required_argument, NULL, TOOL_RADIUS}, {"junctions", required_argument, NULL, JUNCTIONS},
+                                          {"volume", required_argument, NULL, VOLUME}, {"before", required_argument, NULL, BEFORE}, {"quiet", no_argument, NULL, QUIET}, {"help", no_argument, NULL, HELP}, {0}};
     static Faults faults;
     const char *report = NULL, *picture = NULL;
     bool json = false, quiet = false;
@@ -310,6 +318,9 @@ int verb_info(int argc, char **argv)
         case JSON: json = true; break;
         case REPORT: report = optarg; break;
         case PICTURE: picture = optarg; break;
+        case JUNCTIONS: wishes.junctions.picture = optarg; break;
+        case VOLUME: wishes.junctions.volume = optarg; break;
+        case BEFORE: wishes.junctions.before = optarg; break;
         case TOOL_RADIUS:
             if (!cli_number("--tool-radius-mm", optarg, 0.01, 100, &wishes.tool_radius))
                 return EXIT_BAD_INPUT;
@@ -331,12 +342,16 @@ int verb_info(int argc, char **argv)
     bool good = false;
     wishes.report = report, wishes.picture = picture;
     FileKind kind = file_kind(path);
-    if ((report || picture) && kind != FILE_TREE && kind != FILE_MISSING)
-        faults_add(&faults, path, 0, 0, "is no tree or model; %s is made of those", report ? "--report" : "--picture");
+    if ((report || picture || wishes.junctions.picture) && kind != FILE_TREE && kind != FILE_MISSING)
+        faults_add(&faults, path, 0, 0, "is no tree or model; %s is made of those", report ? "--report" : picture ? "--picture" : "--junctions");
     if (report)
         output_check(report, &faults);
     if (picture)
         output_check_file(picture, &faults);
+    if (wishes.junctions.picture)
+        output_check_file(wishes.junctions.picture, &faults);
+    if ((wishes.junctions.volume || wishes.junctions.before) && !wishes.junctions.picture)
+        faults_add(&faults, path, 0, 0, "--volume and --before belong to the pictures of --junctions F.png");
     output_check_apart(report, path, &faults);
     output_check_apart(picture, path, &faults);
     if (faults.count > 0) {

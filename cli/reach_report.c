@@ -1,9 +1,10 @@
 // See reach_report.h.
 #include "cli/reach_report.h"
 
+#include "geom/ghost_lumens.h"
 #include "geom/vessel_branches.h"
 
-enum { STOPS_SHOWN = 12 };
+enum { STOPS_SHOWN = 12, GHOSTS_SHOWN = 6 };
 
 static double percent(const Reach *reach, double length) { return reach->length > 0 ? 100 * length / reach->length : 0; }
 
@@ -30,7 +31,8 @@ void reach_print(FILE *out, const VesselTree *tree, const Reach *reach)
         fprintf(out, "; %d of these and %d of these over links longer than their radii", reach->capped_apart, reach->narrow_apart);
     fprintf(out, "\n");
     if (reach->apart_links > 0)
-        fprintf(out, "links apart    %d longer than the sum of their radii, where nothing shows a vessel; behind them %.1f mm\n", reach->apart_links, reach->apart_length);
+        fprintf(out, "links apart    %d longer than the sum of their radii, where nothing shows a vessel, %d of them open; behind them %.1f mm\n", reach->apart_links,
+                reach->apart_open, reach->apart_length);
     if (reach->sac_nodes > 0)
         fprintf(out, "aneurysm nodes %d of %d are reached by a point\n", reach->sac_nodes_reached, reach->sac_nodes);
     if (reach->stop_count > 0)
@@ -119,12 +121,53 @@ void reach_add_json(cJSON *object, const VesselTree *tree, const Reach *reach)
     cJSON_AddNumberToObject(at, "narrow", reach->narrow);
     cJSON_AddNumberToObject(at, "narrow_apart", reach->narrow_apart);
     cJSON_AddNumberToObject(at, "apart_links", reach->apart_links);
+    cJSON_AddNumberToObject(at, "apart_open", reach->apart_open);
     cJSON_AddNumberToObject(at, "behind_apart_mm", reach->apart_length);
     cJSON_AddNumberToObject(at, "aneurysm_nodes", reach->sac_nodes);
     cJSON_AddNumberToObject(at, "aneurysm_nodes_reached", reach->sac_nodes_reached);
     add_stops(at, reach);
     add_junctions(at, reach);
     add_branches(at, tree, reach);
+}
+
+static void print_ghosts(FILE *out, const GhostLumens *ghosts)
+{
+    int dissolve = 0;
+    double volume = 0;
+    for (int k = 0; k < ghosts->count; k++) {
+        dissolve += ghosts->ghost[k].dissolves;
+        volume += ghosts->ghost[k].volume;
+    }
+    if (ghosts->count == 0) {
+        fprintf(out, "ghost lumens   none: all lumen hangs on the tree\n");
+        return;
+    }
+    fprintf(out, "ghost lumens   %d that hang on nothing, %.3g mm3", ghosts->count, volume);
+    if (ghosts->drop_count > 0)
+        fprintf(out, "; without %d blobs that serve nothing else %d of them would go", ghosts->drop_count, dissolve);
+    fprintf(out, "\n");
+    for (int k = 0; k < ghosts->count && k < GHOSTS_SHOWN; k++) {
+        const GhostLumen *g = &ghosts->ghost[k];
+        fprintf(out, "  %.3g mm3 at %.2f, %.2f, %.2f (node %d)\n", g->volume, g->place.x, g->place.y, g->place.z, g->node);
+    }
+    if (ghosts->count > GHOSTS_SHOWN)
+        fprintf(out, "  and %d smaller ones\n", ghosts->count - GHOSTS_SHOWN);
+}
+
+static void add_ghosts(cJSON *object, const GhostLumens *ghosts)
+{
+    cJSON *at = cJSON_AddObjectToObject(object, "ghosts"), *list = cJSON_AddArrayToObject(at, "lumens");
+    cJSON_AddNumberToObject(at, "count", ghosts->count);
+    cJSON_AddNumberToObject(at, "blobs_to_drop", ghosts->drop_count);
+    for (int k = 0; k < ghosts->count; k++) {
+        const GhostLumen *g = &ghosts->ghost[k];
+        cJSON *item = cJSON_CreateObject();
+        cJSON_AddNumberToObject(item, "node", g->node);
+        cJSON_AddNumberToObject(item, "volume_mm3", g->volume);
+        add_place(item, g->place);
+        cJSON_AddBoolToObject(item, "dissolves", g->dissolves);
+        cJSON_AddItemToArray(list, item);
+    }
 }
 
 bool reach_report(const VesselTree *tree, const char *file, double tool_radius, FILE *out, cJSON *json, Faults *faults)
@@ -134,14 +177,22 @@ bool reach_report(const VesselTree *tree, const char *file, double tool_radius, 
     ReachOptions options = reach_default_options();
     options.tool_radius = tool_radius;
     Reach *reach = reach_create(tree, &options);
-    if (!reach) {
+    GhostLumens *ghosts = ghost_lumens_find(tree);
+    if (!reach || !ghosts) {
+        reach_free(reach);
+        ghost_lumens_free(ghosts);
         faults_add(faults, file, 0, 0, "not enough memory to flood the model from its inlet");
         return false;
     }
-    if (out)
+    if (out) {
         reach_print(out, tree, reach);
-    if (json)
+        print_ghosts(out, ghosts);
+    }
+    if (json) {
         reach_add_json(json, tree, reach);
+        add_ghosts(cJSON_GetObjectItem(json, "reach"), ghosts);
+    }
+    ghost_lumens_free(ghosts);
     reach_free(reach);
     return true;
 }

@@ -18,11 +18,14 @@
 #include <string.h>
 #include <time.h>
 
-enum { KEY_TRACE = 't', KEY_OUT = 'o', KEY_QUIET = 'q', KEY_THREADS = 1000, KEY_SEED, KEY_JSON, KEY_PICTURE, KEY_START };
+enum { KEY_TRACE = 't', KEY_OUT = 'o', KEY_QUIET = 'q', KEY_THREADS = 1000, KEY_SEED, KEY_JSON, KEY_PICTURE, KEY_START, KEY_UNTIL, KEY_NOT };
+enum { MOST_POINTS = 64 };
 
 static const struct argp_option options[] = {
     {"trace", KEY_TRACE, "F.yaml", 0, "where branches start, aneurysms, parameters", 0},
     {"start", KEY_START, "X,Y,Z", 0, "instead of a trace: one point in a vessel [mm]; the whole tree is found from it", 0},
+    {"until", KEY_UNTIL, "X,Y,Z", 0, "the tree ends at this point in a vessel [mm]; may be given several times", 0},
+    {"not", KEY_NOT, "X,Y,Z", 0, "a point in a vessel that is not wanted [mm]: it is tracked too, and the tree ends where it meets it; several times", 0},
     {"output", KEY_OUT, "TREE.h5", 0, "the tree (needed)", 0},
     {"threads", KEY_THREADS, "N", 0, "threads, default 0: all cores; the tree does not depend on it", 0},
     {"seed", KEY_SEED, "N", 0, "seed of the random numbers, default 1 or the trace's", 0},
@@ -34,10 +37,22 @@ static const struct argp_option options[] = {
 
 typedef struct SegmentArguments {
     const char *volume, *trace, *start, *out, *json, *picture;
+    Vec3 until[MOST_POINTS], rival[MOST_POINTS];
+    int until_count, rival_count;
     int threads;
     double seed;             // -1: the trace's
     bool quiet;
 } SegmentArguments;
+
+static error_t take_point(struct argp_state *state, const char *option, const char *text, Vec3 *list, int *count)
+{
+    if (*count == MOST_POINTS)
+        argp_error(state, "%s is given more than %d times", option, MOST_POINTS);
+    if (!cli_point(option, text, &list[*count]))
+        argp_error(state, "%s takes a point X,Y,Z [mm]", option);
+    ++*count;
+    return 0;
+}
 
 static error_t parse_option(int key, char *text, struct argp_state *state)
 {
@@ -46,6 +61,8 @@ static error_t parse_option(int key, char *text, struct argp_state *state)
     switch (key) {
     case KEY_TRACE: a->trace = text; return 0;
     case KEY_START: a->start = text; return 0;
+    case KEY_UNTIL: return take_point(state, "--until", text, a->until, &a->until_count);
+    case KEY_NOT: return take_point(state, "--not", text, a->rival, &a->rival_count);
     case KEY_OUT: a->out = text; return 0;
     case KEY_JSON: a->json = text; return 0;
     case KEY_PICTURE: a->picture = text; return 0;
@@ -88,10 +105,21 @@ static const char intro[] =
     "    - {centers_mm: [[44, 42.4, 64]]}\n"
     "  parameters: default        # or paper: the values of the paper, without what was added\n"
     "  p_inl: 0.7                 # and any of these by name\n\n"
+    "Where a branch leaves its parent the image decides: the best path beside the straight link is supported where its darkest place keeps half of the "
+    "branch's contrast, doubtful down to a quarter; with less the branch hangs on another vessel that a path leads to, or is left out with what hangs on "
+    "it (one that the trace names stays, with a warning, and nothing opens into it). The summary names all but the supported ones.\n\n"
     "Corrections leave the rest of the tree as it is, bit for bit; with automatic: 1 further branches are one, tracked after all that was found:\n\n"
     "  automatic: 1\n"
     "  forbid: [{center_voxel: [120, 90, 60], radius_mm: 3}]   # no node in this ball\n"
-    "  cut: [{point_mm: [40, 31, 22]}]                        # the nearest branch ends here, and what hangs on it goes\n\n"
+    "  cut: [{point_mm: [40, 31, 22]}]                        # the nearest branch ends here, and what hangs on it goes; a stub of it goes too\n"
+    "  until: [{point_mm: [44, 20, 70]}]                      # (--until) tracking does not pass this point of a vessel\n"
+    "  not: [{point_voxel: [150, 40, 90]}]                    # (--not) in a vessel that is not wanted, say a sinus: it competes for the lumen\n\n"
+    "A vessel of `not` is tracked with its branches, and left out at the end: the tree ends where it meets it; one lumen that holds both points is divided at its "
+    "narrowest place between them. Where a branch's end meets another branch of the tree a loop is reported: the tree has none. `until` or `not` can take out the side "
+    "that is not wanted.\n\n"
+    "Starts are judged: refused where the vessel found lies more than two of its radii from the click, is wider than the volume, or does not stand out of the noise; "
+    "warned of (on standard error, and in --json) where the click lies outside its radius, where less than half of the edge points lie on the cylinders, and more. A volume "
+    "whose voxels are noisier than the vessel is bright is smoothed first, and that is said.\n\n"
     "Parameters of the tracking (default; paper):\n";
 
 // The introduction and a line for each parameter.
@@ -155,7 +183,7 @@ static void print_junctions(const RbtReport *report)
     printf("; %d nodes with %ld points on their links\n", nodes, points);
     for (int i = 0; i < report->junction_count; i++) {
         const RbtJunction *j = &report->junction[i];
-        if (j->support == RBT_SUPPORTED && !j->is_moved)
+        if ((j->support == RBT_SUPPORTED && !j->is_moved) || (j->is_inner && j->support == RBT_DOUBTFUL))
             continue;
         printf("  %-9s %s at (%.2f, %.2f, %.2f) mm, link %.2f mm, darkest place %.0f %% of the contrast", support_name[j->support], j->is_inner ? "gap" : "junction",
                j->place.x, j->place.y, j->place.z, j->length, 100 * j->share);
@@ -196,6 +224,12 @@ static void print_table(const VesselTree *tree, const RbtReport *report, double 
     if (report->start[0])
         printf("%s\n", report->start);
     print_junctions(report);
+    for (int i = 0; i < report->loop_count; i++) {
+        const RbtLoop *l = &report->loop[i];
+        printf("loop: the end of branch %d meets branch %d at (%.2f, %.2f, %.2f) mm, %.1f mm around\n", l->branch + 1, l->meets + 1, l->place.x, l->place.y, l->place.z, l->length);
+    }
+    if (report->left_out_count > 0)
+        printf("left out, as `not` says: %d branches, %.0f mm\n", report->left_out_count, report->left_out_length);
     printf("%d branches, %.0f mm, %d nodes, %ld points; volume read in %.2f s, tracked in %.2f s\n", report->branch_count, length, tree->node_count, (long)tree->point_count,
            load_s, track_s);
 }
@@ -296,6 +330,22 @@ static void json_check(cJSON *root, const RbtStartCheck *check)
     }
 }
 
+static void json_loops(cJSON *root, const RbtReport *report)
+{
+    cJSON *list = cJSON_AddArrayToObject(root, "loops"), *out = cJSON_AddObjectToObject(root, "left_out");
+    for (int i = 0; i < report->loop_count; i++) {
+        const RbtLoop *l = &report->loop[i];
+        cJSON *item = cJSON_CreateObject();
+        cJSON_AddItemToObject(item, "place_mm", cJSON_CreateDoubleArray((double[3]){l->place.x, l->place.y, l->place.z}, 3));
+        cJSON_AddNumberToObject(item, "branch", l->branch);
+        cJSON_AddNumberToObject(item, "meets", l->meets);
+        cJSON_AddNumberToObject(item, "length_mm", l->length);
+        cJSON_AddItemToArray(list, item);
+    }
+    cJSON_AddNumberToObject(out, "branches", report->left_out_count);
+    cJSON_AddNumberToObject(out, "length_mm", report->left_out_length);
+}
+
 static bool write_json(const SegmentArguments *a, const VesselTree *tree, const RbtReport *report, double load_s, double track_s, Faults *faults)
 {
     cJSON *root = cJSON_CreateObject(), *list = cJSON_AddArrayToObject(root, "branches");
@@ -306,6 +356,7 @@ static bool write_json(const SegmentArguments *a, const VesselTree *tree, const 
     if (report->start[0])
         cJSON_AddStringToObject(root, "start", report->start);
     json_check(root, &report->check);
+    json_loops(root, report);
     cJSON_AddNumberToObject(root, "load_s", load_s);
     cJSON_AddNumberToObject(root, "track_s", track_s);
     add_junctions(root, report);
@@ -360,12 +411,21 @@ static Trace *trace_of(const SegmentArguments *a, Faults *faults)
 {
     char text[160];
     Vec3 x;
-    if (!a->start)
-        return trace_load(a->trace, faults);
-    if (!cli_point("--start", a->start, &x))
-        return NULL;
-    int length = snprintf(text, sizeof text, "branches: [{start_mm: [%.17g, %.17g, %.17g]}]", x.x, x.y, x.z);
-    return trace_parse(text, (size_t)length, "--start", faults);
+    Trace *trace = NULL;
+    bool good = true;
+    if (!a->start) {
+        trace = trace_load(a->trace, faults);
+    } else if (cli_point("--start", a->start, &x)) {
+        int length = snprintf(text, sizeof text, "branches: [{start_mm: [%.17g, %.17g, %.17g]}]", x.x, x.y, x.z);
+        trace = trace_parse(text, (size_t)length, "--start", faults);
+    }
+    for (int i = 0; trace && good && i < a->until_count; i++)
+        good = trace_add_point(trace, "until", a->until[i]);
+    for (int i = 0; trace && good && i < a->rival_count; i++)
+        good = trace_add_point(trace, "not", a->rival[i]);
+    if (!good)
+        faults_add(faults, a->volume, 0, 0, "out of memory");
+    return trace;
 }
 
 static int segment(const SegmentArguments *a, Faults *faults)

@@ -113,7 +113,7 @@ static bool take_grey_values(SynthCommand *command, double background)
     return true;
 }
 
-// -1: go on; otherwise the exit code.
+// -1: go on; otherwise the exit code. Long because it holds the whole list of options.
 static int parse_options(int argc, char **argv, SynthCommand *command)
 {
     enum { MEASURE = 256, JSON, QUIET, CELL, VOXEL, PSF, NOISE, ROTATE, CLIP, SATURATE, FADE, BONE, THREADS, GAP_VOXELS, CONTRAST_GREY, BACKGROUND_GREY, NOISE_GREY,

@@ -123,6 +123,23 @@ double reach_clearance(const VesselTree *tree, Vec3 x, int node, double most)
     return clearance_at(&f, x, node, most);
 }
 
+double reach_on_line(const VesselTree *of, const ReachJunction *junction, const VesselTree *in, double most, Vec3 *place)
+{
+    enum { SAMPLES = 40 };
+    Flood f = {.tree = in, .open_root = vessel_tree_root_is_open(in)};
+    double least = most;
+    fill_directions(f.direction);
+    *place = of->center[junction->node];
+    for (int at = junction->last; at != junction->parent && at >= 0; at = of->parent[at])
+        for (int i = 0; i <= SAMPLES && of->parent[at] >= 0; i++) {
+            Vec3 x = vec3_mix(of->center[at], of->center[of->parent[at]], (double)i / SAMPLES);
+            double c = clearance_at(&f, x, power_nearest(in, x), most);
+            if (c < least)
+                least = c, *place = x;
+        }
+    return least;
+}
+
 static bool sphere_is_free(const Flood *f, Vec3 x, int node, double radius, int directions)
 {
     for (int k = 0; k < directions; k++) {
@@ -424,6 +441,7 @@ static void flood_links(Flood *f, Reach *reach)
         }
         bool apart = reach_link_is_apart(tree, i);
         reach->apart_links += apart;
+        reach->apart_open += apart && point_share(f, &l) >= 1;
         if (tree->kind[i] == NODE_VESSEL && !apart) {
             reach->length += l.length;
             for (int mode = 0; mode < REACH_MODES; mode++)

@@ -47,8 +47,8 @@ typedef struct Reach {
     ReachJunction *junction; // least clearance first
     int capped, capped_apart;                // junctions with the field below 0 somewhere on the joining line; those whose link is apart
     int narrow, narrow_apart;                // with a clearance less than the tool's radius, capped ones included; those whose link is apart
-    int apart_links;         // and the length of what hangs behind them [mm]
-    double apart_length;
+    int apart_links, apart_open;             // and those of them with lumen all along, which nothing shows
+    double apart_length;     // [mm] of what hangs behind them
     int sac_nodes, sac_nodes_reached;        // nodes of aneurysms; by a point
 } Reach;
 
@@ -60,6 +60,8 @@ void reach_free(Reach *reach);
 double reach_field(const VesselTree *tree, Vec3 x, int *node);
 // [mm] distance from x to the wall as a tool from `node` meets it, > 0 inside; no more than `most`, no less than -most.
 double reach_clearance(const VesselTree *tree, Vec3 x, int node, double most);
+// The least clearance [mm] along a junction's joining line, a line of the tree `of`, in another model of the same vessels; at most `most`, at `place`.
+double reach_on_line(const VesselTree *of, const ReachJunction *junction, const VesselTree *in, double most, Vec3 *place);
 static inline bool reach_link_is_apart(const VesselTree *tree, int node)
 {
     int parent = tree->parent[node];

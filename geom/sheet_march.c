@@ -1,6 +1,7 @@
 // The surface of a fitted tree as sheets: marching cubes in which a lattice point may lie in several lumens at once.
 //
-// A state is a lattice point x and a node at which a tool point that stands there may be, one that power_walk does not leave, whose field at x is above 0.
+// A state is a lattice point x and a node at which a tool point that stands there may be, whose field at x is above 0: of local models one that power_walk
+// does not leave; of shared blobs one that no near node beats by power distance, because only within those cells a node sees all blobs.
 // Where vessels kiss, x has a state for each of them; where they overlap both lumens hold it. Two states at the ends of an edge of the lattice are linked
 // where a tool point that moves from one to the other goes from one node to the other, in either direction. In each cube the states that hang together over
 // edges make a sheet, and each sheet gives the triangles of its own case. Neighbouring cubes give the same segments on their common face, because a
@@ -23,10 +24,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { STATES_MAX = 8, CUBE_STATES_MAX = 8 * STATES_MAX, RIVALS_MAX = 24, PASSES_MAX = 100 };
+enum { STATES_MAX = 8, CUBE_STATES_MAX = 8 * STATES_MAX, RIVALS_MAX = 96, WAYS_MAX = 256, PASSES_MAX = 100 };
+
+// A node answers for no lumen further from its centre [its radii]: other nodes lie nearer to that. Blobs of a sac reach far into all cells around it. The
+// root, upstream of which nothing follows, answers for twice as much.
+static const double REACH_MOST = 3;
 
 typedef struct Candidate {   // a node that reaches the block at hand, whose field may be above 0 there and that no other beats in all of it
-    int node;
+    int node, ball, first_row;
     double low;              // its field is at least that
     Blobby model;
     double reach;            // [mm] no point of the model's surface lies further from the node's centre
@@ -37,6 +42,11 @@ typedef struct States {      // of a lattice point
     int count, node[STATES_MAX];
     double field[STATES_MAX];
 } States;
+
+typedef struct Way {         // to a node whose ball may hold points that a node's model reaches
+    int node, from;
+    double length;           // [mm] through the tree
+} Way;
 
 typedef struct SheetPoint {  // a corner of a cube that is not plain
     int at[3], first, count;
@@ -49,10 +59,16 @@ typedef struct SheetMarch {
     March march;
     const VesselTree *tree;
     int alone;               // the one node whose model is meshed; -1: the tree
+    bool by_power;           // a point goes to any near node that is better by power distance: no further rules
     int ball_count, *node;   // the march's balls: their nodes …
     double *reach;           // … and reaches
-    int candidate_count, candidate_capacity;
+    int *way_offset, way_capacity;           // (balls + 1) of each …
+    Way *way;                // … the ways that look_around of power_walk.c would find, at most WAYS_MAX
+    int candidate_count, candidate_capacity, out_count, out_capacity;
     Candidate *candidate;
+    int *out;                // nodes that would be candidates, were their field not below 0 all over the block
+    int32_t *row;            // blobs of candidates that reach the block
+    int row_count, row_capacity;
     States states[MARCH_POINTS];             // of the block at hand
     // of cubes that are not plain
     KeyMap point_of, link_of, vertex_of_state;
@@ -91,9 +107,11 @@ static void field_bounds(const Blobby *m, Vec3 x, double h, double *low, double 
     *low = *high = -m->iso_level;
     for (int j = 0; j < m->count; j++) {
         int k = blobby_row(m, j);
-        double rho = m->width[k], d = vec3_distance(x, m->center[k]), near = fmax(0, d - h), far = d + h;
+        double rho = m->width[k], d = vec3_distance(x, m->center[k]), near = d > h ? d - h : 0, far = d + h;
         if (m->amplitude) {
-            double a = m->amplitude[k], u = fmax(0, 1 - near * near / (rho * rho)), v = fmax(0, 1 - far * far / (rho * rho));
+            if (near >= rho)
+                continue;
+            double a = m->amplitude[k], u = 1 - near * near / (rho * rho), v = far < rho ? 1 - far * far / (rho * rho) : 0;
             *high += a * (a > 0 ? u * u * u : v * v * v);
             *low += a * (a > 0 ? v * v * v : u * u * u);
             continue;
@@ -104,25 +122,76 @@ static void field_bounds(const Blobby *m, Vec3 x, double h, double *low, double 
     }
 }
 
+// Breadth first through the tree, as far as a point at the end of the ball's reach would look.
+static bool list_ways(SheetMarch *job, int ball)
+{
+    const VesselTree *tree = job->tree;
+    int node = job->node[ball], known = 1;
+    Way way[WAYS_MAX] = {{node, -1, 0}};
+    job->way_offset[ball + 1] = job->way_offset[ball];
+    for (int w = 0; w < known; w++) {
+        Way at = way[w];
+        for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1] && known < WAYS_MAX; k++) {
+            int next = tree->neighbour[k];
+            double length = at.length + vec3_distance(tree->center[at.node], tree->center[next]);
+            if (next != at.from && length < 2.5 * job->reach[ball])
+                way[known++] = (Way){next, at.node, length};
+        }
+        int *count = &job->way_offset[ball + 1];
+        if (w == 0 || vec3_distance(tree->center[at.node], tree->center[node]) - tree->radius[at.node] > job->reach[ball])
+            continue;
+        if (*count == job->way_capacity) {
+            int capacity = 2 * job->way_capacity + 4096;
+            Way *more = realloc(job->way, (size_t)capacity * sizeof *more);
+            if (!more)
+                return false;
+            job->way = more;
+            job->way_capacity = capacity;
+        }
+        job->way[(*count)++] = at;
+    }
+    return true;
+}
+
 static bool find_blocks(SheetMarch *job, int first, int end)
 {
     const VesselTree *tree = job->tree;
     job->node = malloc((size_t)(end - first) * sizeof *job->node);
     job->reach = malloc((size_t)(end - first) * sizeof *job->reach);
-    if (!job->node || !job->reach)
+    job->way_offset = calloc((size_t)(end - first) + 1, sizeof *job->way_offset);
+    if (!job->node || !job->reach || !job->way_offset)
         return false;
     for (int i = first; i < end; i++) {
         Blobby model = blobby_of(tree, i);
         double reach = reach_of_model(&model, tree->center[i]);
         if (!(reach > 0))
             continue;
+        if (job->alone < 0)
+            reach = fmin(reach, (tree->parent[i] < 0 ? 2 : 1) * REACH_MOST * tree->radius[i]);
         job->node[job->ball_count] = i;
         job->reach[job->ball_count++] = reach + 2 * job->march.cell;
     }
     for (int n = 0; n < job->ball_count; n++)
-        if (!march_add_ball(&job->march, n, tree->center[job->node[n]], job->reach[n]))
+        if ((job->alone < 0 && !list_ways(job, n)) || !march_add_ball(&job->march, n, tree->center[job->node[n]], job->reach[n]))
             return false;
     return true;
+}
+
+// Whether all points of the ball (x, h) that stand clearly outside their node's ball look around and go to a node whose ball they are in
+// (power_walk.h). The list of ways does not depend on the point, so that what holds for a block holds for its points.
+static bool goes_elsewhere(const SheetMarch *job, int ball, Vec3 x, double h)
+{
+    const VesselTree *tree = job->tree;
+    double near = vec3_distance(x, tree->center[job->node[ball]]) - h;
+    if (job->alone >= 0 || !(near > 1.2 * tree->radius[job->node[ball]]))
+        return false;
+    for (int k = job->way_offset[ball]; k < job->way_offset[ball + 1]; k++) {
+        const Way *way = &job->way[k];
+        double r = tree->radius[way->node] - h;
+        if (way->length < 2.5 * near && r > 0 && vec3_norm2(vec3_sub(x, tree->center[way->node])) < r * r)
+            return true;
+    }
+    return false;
 }
 
 // --- Candidates of a block ---
@@ -140,7 +209,7 @@ static bool list_rivals(const SheetMarch *job, Candidate *c, Vec3 middle, double
         double r = tree->radius[other], far = vec3_distance(middle, tree->center[other]), better = own - (far * far - r * r);
         Vec3 apart = vec3_sub(tree->center[other], tree->center[c->node]);
         double change = 2 * half * (fabs(apart.x) + fabs(apart.y) + fabs(apart.z));
-        if (better - change > 0 && (far + h < 2 * r || (far + h) * own_radius < (own_far - h) * r))
+        if (better - change > 0 && (job->by_power || far + h < 2 * r || (far + h) * own_radius < (own_far - h) * r))
             return false;
         if (better + change > 0 && c->rivals < RIVALS_MAX)
             c->rival[c->rivals++] = other;
@@ -148,31 +217,88 @@ static bool list_rivals(const SheetMarch *job, Candidate *c, Vec3 middle, double
     return true;
 }
 
+static bool grow_by(void **array, int count, int *capacity, int more, size_t size)
+{
+    if (count + more <= *capacity)
+        return true;
+    if (*capacity > INT_MAX / 4)
+        return false;
+    int bigger = 2 * *capacity + more + 1024;
+    void *moved = realloc(*array, (size_t)bigger * size);
+    if (!moved)
+        return false;
+    *array = moved;
+    *capacity = bigger;
+    return true;
+}
+
+// Of compact blobs only those that reach the ball (middle, h): the others' terms are 0 there. Their rows start at c->first_row.
+static bool narrow_model(SheetMarch *job, Candidate *c, Vec3 middle, double h)
+{
+    const Blobby *all = &c->model;
+    c->first_row = job->row_count;
+    if (!all->amplitude)
+        return true;
+    if (!grow_by((void **)&job->row, job->row_count, &job->row_capacity, all->count, sizeof *job->row))
+        return false;
+    for (int j = 0; j < all->count; j++) {
+        int k = blobby_row(all, j);
+        double most = all->width[k] + h;
+        if (vec3_norm2(vec3_sub(middle, all->center[k])) < most * most)
+            job->row[job->row_count++] = k;
+    }
+    c->model.count = job->row_count - c->first_row;
+    return true;
+}
+
 static bool list_candidates(SheetMarch *job, const MarchBlock *b)
 {
     double h, high;
     Vec3 middle = march_block_ball(&job->march, b, &h);
-    job->candidate_count = 0;
+    job->candidate_count = job->out_count = job->row_count = 0;
     for (int l = b->first; l >= 0; l = job->march.link[l].next) {
-        if (job->candidate_count == job->candidate_capacity) {
-            int capacity = 2 * job->candidate_capacity + 64;
-            Candidate *more = realloc(job->candidate, (size_t)capacity * sizeof *more);
-            if (!more)
-                return false;
-            job->candidate = more;
-            job->candidate_capacity = capacity;
-        }
+        if (!grow_by((void **)&job->candidate, job->candidate_count, &job->candidate_capacity, 1, sizeof *job->candidate) ||
+            !grow_by((void **)&job->out, job->out_count, &job->out_capacity, 1, sizeof *job->out))
+            return false;
         int ball = job->march.link[l].ball;
         Candidate *c = &job->candidate[job->candidate_count];
         c->node = job->node[ball];
+        c->ball = ball;
         c->reach = job->reach[ball];
-        if (!list_rivals(job, c, middle, h))
+        if (!list_rivals(job, c, middle, h) || goes_elsewhere(job, ball, middle, h))
             continue;
         c->model = blobby_of(job->tree, c->node);
         field_bounds(&c->model, middle, h, &c->low, &high);
-        job->candidate_count += high > -1e-9;
+        if (!(high > -1e-9)) {
+            job->out[job->out_count++] = c->node;
+            continue;
+        }
+        if (!narrow_model(job, c, middle, 1.001 * h))
+            return false;
+        job->candidate_count++;
     }
+    for (int k = 0; k < job->candidate_count; k++)
+        if (job->candidate[k].model.amplitude)
+            job->candidate[k].model.index = job->row + job->candidate[k].first_row;
     return true;
+}
+
+static bool is_near(const VesselTree *tree, int node, int other)
+{
+    for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++)
+        if (tree->near[k] == other)
+            return true;
+    return false;
+}
+
+// Whether a walk from a candidate may lead to a node that says outside.
+static bool may_lead_out(const SheetMarch *job)
+{
+    for (int k = 0; k < job->candidate_count; k++)
+        for (int i = 0; i < job->out_count; i++)
+            if (is_near(job->tree, job->candidate[k].node, job->out[i]))
+                return true;
+    return false;
 }
 
 // Whether the block is certainly without surface: no model may be above 0 in it, or all are and in one of them a walk stays all over it.
@@ -187,12 +313,29 @@ static bool block_is_plain(const SheetMarch *job, const MarchBlock *b)
         all_in = c->low > 1e-9;
         covered = covered || (furthest < c->reach && (job->alone >= 0 || (c->rivals == 0 && furthest < 1.2 * job->tree->radius[c->node])));
     }
-    return job->candidate_count == 0 || (all_in && covered);
+    return job->candidate_count == 0 || (all_in && covered && (job->alone >= 0 || !may_lead_out(job)));
 }
 
 // --- States ---
 
-static int walk_on(const SheetMarch *job, Vec3 x, int node) { return job->alone >= 0 ? node : power_walk(job->tree, x, node, 4); }
+static int walk_on(const SheetMarch *job, Vec3 x, int node)
+{
+    const VesselTree *tree = job->tree;
+    if (job->alone >= 0)
+        return node;
+    if (!job->by_power)
+        return power_walk(tree, x, node, 4);
+    double best = power_distance(x, tree->center[node], tree->radius[node]);
+    for (int here = -1; here != node;) {
+        here = node;
+        for (int k = tree->near_offset[here]; k < tree->near_offset[here + 1]; k++) {
+            double d = power_distance(x, tree->center[tree->near[k]], tree->radius[tree->near[k]]);
+            if (d < best)
+                best = d, node = tree->near[k];
+        }
+    }
+    return node;
+}
 
 static bool is_beaten(const SheetMarch *job, const Candidate *c, Vec3 x)
 {
@@ -201,10 +344,31 @@ static bool is_beaten(const SheetMarch *job, const Candidate *c, Vec3 x)
     for (int k = 0; k < c->rivals; k++) {
         int other = c->rival[k];
         double r = tree->radius[other], far2 = vec3_norm2(vec3_sub(x, tree->center[other]));
-        if (far2 - r * r < own && (far2 < 4 * r * r || far2 * own_r2 < own_far2 * r * r))
+        if (far2 - r * r < own && (job->by_power || far2 < 4 * r * r || far2 * own_r2 < own_far2 * r * r))
             return true;
     }
     return false;
+}
+
+// A node that is further from x than 1.2 of its radii does not answer for it where another one's ball holds x in its lumen: the cell of a vessel beside a
+// sac reaches all across it, and sees some of its blobs.
+static void drop_distant(const SheetMarch *job, Vec3 x, States *states)
+{
+    const VesselTree *tree = job->tree;
+    bool is_held = false;
+    int kept = 0;
+    for (int s = 0; s < states->count; s++) {
+        int node = states->node[s];
+        is_held = is_held || vec3_norm2(vec3_sub(x, tree->center[node])) < tree->radius[node] * tree->radius[node];
+    }
+    for (int s = 0; s < states->count; s++) {
+        int node = states->node[s];
+        if (is_held && vec3_norm2(vec3_sub(x, tree->center[node])) > 1.44 * tree->radius[node] * tree->radius[node])
+            continue;
+        states->node[kept] = node;
+        states->field[kept++] = states->field[s];
+    }
+    states->count = kept;
 }
 
 static void find_states(SheetMarch *job, Vec3 x, States *states)
@@ -212,22 +376,16 @@ static void find_states(SheetMarch *job, Vec3 x, States *states)
     states->count = 0;
     for (int k = 0; k < job->candidate_count && states->count < STATES_MAX; k++) {
         const Candidate *c = &job->candidate[k];
-        if (vec3_norm2(vec3_sub(x, job->tree->center[c->node])) > c->reach * c->reach || is_beaten(job, c, x))
+        if (vec3_norm2(vec3_sub(x, job->tree->center[c->node])) > c->reach * c->reach || is_beaten(job, c, x) || goes_elsewhere(job, c->ball, x, 0))
             continue;
         double field = blobby_field(&c->model, x);
-        if (field > 0 && (job->alone >= 0 || power_walk(job->tree, x, c->node, 1) == c->node)) {
+        if (field > 0) {
             states->node[states->count] = c->node;
             states->field[states->count++] = field;
         }
     }
-}
-
-static bool is_near(const VesselTree *tree, int node, int other)
-{
-    for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++)
-        if (tree->near[k] == other)
-            return true;
-    return false;
+    if (states->count > 1)
+        drop_distant(job, x, states);
 }
 
 // Whether a tool point that moves between x, where it is at node a, and y comes to node b, or back.
@@ -332,21 +490,6 @@ static bool march_plain_cube(SheetMarch *job, const MarchBlock *b, int i, int j,
         if (!march_add_triangle(&job->march, triangle))
             return false;
     }
-    return true;
-}
-
-static bool grow_by(void **array, int count, int *capacity, int more, size_t size)
-{
-    if (count + more <= *capacity)
-        return true;
-    if (*capacity > INT_MAX / 4)
-        return false;
-    int bigger = 2 * *capacity + 1024;
-    void *moved = realloc(*array, (size_t)bigger * size);
-    if (!moved)
-        return false;
-    *array = moved;
-    *capacity = bigger;
     return true;
 }
 
@@ -543,7 +686,11 @@ static void free_march(SheetMarch *job)
     key_map_free(&job->vertex_of_state);
     free(job->node);
     free(job->reach);
+    free(job->way_offset);
+    free(job->way);
     free(job->candidate);
+    free(job->out);
+    free(job->row);
     free(job->point);
     free(job->cube);
     free(job->state);
@@ -560,6 +707,7 @@ static TriangleMesh *surface_of_nodes(const VesselTree *tree, int first, int end
         return NULL;
     job->tree = tree;
     job->alone = end - first == 1 ? first : -1;
+    job->by_power = job->alone >= 0 || vessel_tree_is_shared(tree);
     bool good = march_begin(&job->march, cell_mm, 0.001) && find_blocks(job, first, end) && march_blocks(job) && march_kept_cubes(job);
     TriangleMesh *mesh = job->march.mesh;
     if (!good) {

@@ -54,10 +54,13 @@ static bool sees(const VesselTree *tree, int node, Vec3 x)
     Vec3 c = tree->center[node];
     double far = vec3_distance(c, x), pieces = ceil(far / (0.1 * tree->radius[node]));
     int count = pieces > 100 ? 100 : (int)pieces, at = node;
-    for (int k = 0; k < count; k++)
-        if (!(reach_field(tree, vec3_mix(c, x, 0.98 * k / count), &at) > 0))
+    for (int k = 0; k <= count; k++)
+        if (!(reach_field(tree, vec3_mix(c, x, 0.98 * k / fmax(count, 1)), &at) > 0))
             return false;
-    return true;
+    for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++)
+        if (tree->near[k] == at)
+            return true;
+    return at == node;       // elsewhere the way has led into another lumen
 }
 
 // Which nodes the parts hold; reached[part]: one of them is reached by a point.

@@ -1,24 +1,27 @@
 // The surface decides. Nodes in the parent's lumen see no wall of their own and were left out, so that a branch began with a link from the parent's axis.
-// On that link nodes stand every half radius of the branch from one and a half of its radii inside the parent's wall on, where the skeleton runs. What
-// leaves the lumen there is measured by winding numbers, for sheets inside of it (vessels made of parts that overlap) are none of its wall.
+// Where the skeleton crosses a wall there, a path beside it is looked for, within the branch's radius; where there is none the link is refused,
+// however thin the wall: vessels that touch are apart. Sheets inside the lumen, of vessels made of parts that overlap, are no walls: winding numbers tell.
+// How narrow the path is, as a share of the branch's radius, says how well it is supported. Nodes stand on it every half radius of the branch from one
+// and a half of its radii inside the parent's wall on.
 #include "recon/import_ostia.h"
 
 #include "geom/sort_doubles.h"
+#include "recon/link_lattice.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 enum { ROOT_NODES = 5, STATIONS_MOST = 2000 };
 static const double SPACING = 0.5, INSIDE = 1.5,   // in radii of the branch
-                    DOUBTFUL = 0.05, REFUSED = 0.25;   // of the branch's radii outside the lumen
+                    DOUBTFUL = 0.25;               // narrower than this share of the branch's radius
 
 typedef struct Link {
     int node, parent;
-    double radius, length, outside;
+    double radius, length;
+    bool is_inner;           // no branch begins here: it is looked at only where a wall crosses it
     bool is_moved, is_refused;
     Vec3 place;
-    Vec3 *path;              // from the parent to the branch's first node
-    int path_count;
+    LinkPath path;
     Vec3 *station;
     int station_count;
 } Link;
@@ -55,14 +58,14 @@ static double depth_in_segment(const Nodes *n, int i, Vec3 x)
 // How deep x lies in the parent's vessel, < 0 outside: along the nodes up from it and down from it within three radii.
 static double depth_in_parent(const Nodes *n, const int *first_child, int parent, Vec3 x)
 {
-    double reach = 3 * n->radius[parent], deepest = depth_in_segment(n, parent, x), way = 0;
-    for (int i = parent; n->parent[i] >= 0 && way < reach; i = n->parent[i]) {
-        way += vec3_distance(n->center[i], n->center[n->parent[i]]);
+    double reach = 3 * n->radius[parent], deepest = depth_in_segment(n, parent, x), length = 0;
+    for (int i = parent; n->parent[i] >= 0 && length < reach; i = n->parent[i]) {
+        length += vec3_distance(n->center[i], n->center[n->parent[i]]);
         deepest = fmax(deepest, depth_in_segment(n, i, x));
     }
-    way = 0;
-    for (int i = first_child[parent]; i >= 0 && way < reach; i = first_child[i]) {
-        way += vec3_distance(n->center[i], n->center[n->parent[i]]);
+    length = 0;
+    for (int i = first_child[parent]; i >= 0 && length < reach; i = first_child[i]) {
+        length += vec3_distance(n->center[i], n->center[n->parent[i]]);
         deepest = fmax(deepest, depth_in_segment(n, i, x));
     }
     return deepest;
@@ -80,29 +83,36 @@ static double root_radius(const Nodes *n, const int *first_child, int node)
 
 // --- the surface ---
 
-static bool meets_wall(const Wall *wall, Vec3 a, Vec3 b)
+typedef struct Room {        // what a path may use
+    const Wall *wall;
+    double radius;           // of the branch
+} Room;
+
+// Whether the step stays inside. Winding numbers cost all triangles each: only behind walls that it meets.
+static bool stays_inside(const void *context, Vec3 a, Vec3 b)
 {
-    double length = vec3_distance(a, b);
-    return length > 0 && isfinite(mesh_tree_ray(wall->tree, a, vec3_scale(vec3_sub(b, a), 1 / length), length, NULL));
+    const Room *room = context;
+    double length = vec3_distance(a, b), past = 1e-4 * room->radius;
+    Vec3 along = vec3_unit_or(vec3_sub(b, a), vec3(1, 0, 0));
+    for (int sheets = 0; length > 0 && sheets < 16; sheets++) {
+        double hit = mesh_tree_ray(room->wall->tree, a, along, length, NULL);
+        if (!isfinite(hit))
+            return true;
+        a = vec3_add_scaled(a, hit + past, along);
+        length -= hit + past;
+        if (mesh_winding(&room->wall->mesh, a) < 0.5)
+            return false;
+    }
+    return length <= 0;
 }
 
-// How far the path leaves the lumen [mm]. Winding numbers cost all triangles each: only where it meets a wall.
-static double outside_of(const Wall *wall, const Vec3 *path, int count, double radius)
+// Distance to the wall as a share of the branch's radius.
+static double room_at(const void *context, Vec3 x)
 {
-    bool meets = false;
-    double farthest = 0;
-    for (int i = 1; i < count; i++)
-        meets = meets || meets_wall(wall, path[i - 1], path[i]);
-    for (int i = 1; meets && i < count; i++) {
-        int steps = (int)fmin(100, ceil(vec3_distance(path[i - 1], path[i]) / (0.2 * radius)));
-        for (int k = 0; k < steps; k++) {
-            Vec3 x = vec3_mix(path[i - 1], path[i], (double)k / steps), foot;
-            int t = 0;
-            if (mesh_winding(&wall->mesh, x) < 0.5)
-                farthest = fmax(farthest, mesh_tree_nearest(wall->tree, x, INFINITY, &foot, &t));
-        }
-    }
-    return farthest;
+    const Room *room = context;
+    Vec3 foot;
+    int t = 0;
+    return fmin(1, mesh_tree_nearest(room->wall->tree, x, INFINITY, &foot, &t) / room->radius);
 }
 
 // --- links ---
@@ -113,34 +123,53 @@ static bool follow_skeleton(const Nodes *n, const Skeleton *s, Link *link)
     int count = 1, top = n->sample[link->parent], at = n->sample[link->node];
     for (int i = at; i != top && i >= 0; i = s->parent[i])
         count++;
-    link->path = malloc(((size_t)count + 1) * sizeof *link->path);
-    link->path_count = count;
-    for (int k = count - 1; link->path && k > 0; k--, at = s->parent[at])
-        link->path[k] = s->point[at];
-    if (link->path)
-        link->path[0] = n->center[link->parent];
-    return link->path != NULL;
+    link->path = (LinkPath){malloc(((size_t)count + 1) * sizeof(Vec3)), count, 1};
+    for (int k = count - 1; link->path.point && k > 0; k--, at = s->parent[at])
+        link->path.point[k] = s->point[at];
+    if (link->path.point)
+        link->path.point[0] = n->center[link->parent];
+    return link->path.point != NULL;
+}
+
+// The skeleton's path, or the best one beside the straight link where a wall crosses that. False: out of memory.
+static bool find_path(const Nodes *n, const Skeleton *s, const Wall *wall, Link *link)
+{
+    Room room = {wall, link->radius};
+    bool inside = true;
+    if (!follow_skeleton(n, s, link))
+        return false;
+    for (int i = 1; i < link->path.count; i++)
+        inside = inside && stays_inside(&room, link->path.point[i - 1], link->path.point[i]);
+    if (!inside) {
+        free(link->path.point);
+        if (!link_lattice_path(n->center[link->parent], n->center[link->node], link->radius, 0.2 * link->radius, &(LinkGround){room_at, stays_inside, &room}, &link->path))
+            return false;
+    }
+    for (int i = 0; i < link->path.count; i++)
+        link->path.share = fmin(link->path.share, room_at(&room, link->path.point[i]));
+    return true;
 }
 
 static Vec3 path_at(const Link *link, double arc)
 {
-    for (int i = 1; i < link->path_count; i++) {
-        double step = vec3_distance(link->path[i], link->path[i - 1]);
+    const LinkPath *path = &link->path;
+    for (int i = 1; i < path->count; i++) {
+        double step = vec3_distance(path->point[i], path->point[i - 1]);
         if (arc <= step && step > 0)
-            return vec3_mix(link->path[i - 1], link->path[i], fmax(0, arc) / step);
+            return vec3_mix(path->point[i - 1], path->point[i], fmax(0, arc) / step);
         arc -= step;
     }
-    return link->path[link->path_count - 1];
+    return path->point[path->count - 1];
 }
 
 // Arc from the parent's axis up to the last place that lies so deep in the parent.
 static double arc_at_depth(const Nodes *n, const int *first_child, const Link *link, double depth)
 {
     double arc = link->length;
-    for (int i = link->path_count - 1; i > 0; i--) {
-        if (depth_in_parent(n, first_child, link->parent, link->path[i]) >= depth)
+    for (int i = link->path.count - 1; i > 0; i--) {
+        if (depth_in_parent(n, first_child, link->parent, link->path.point[i]) >= depth)
             return arc;
-        arc -= vec3_distance(link->path[i], link->path[i - 1]);
+        arc -= vec3_distance(link->path.point[i], link->path.point[i - 1]);
     }
     return 0;
 }
@@ -159,8 +188,8 @@ static bool place_stations(const Nodes *n, const int *first_child, Link *link)
 static double path_length(const Link *link)
 {
     double length = 0;
-    for (int i = 1; i < link->path_count; i++)
-        length += vec3_distance(link->path[i], link->path[i - 1]);
+    for (int i = 1; i < link->path.count; i++)
+        length += vec3_distance(link->path.point[i], link->path.point[i - 1]);
     return length;
 }
 
@@ -172,57 +201,61 @@ static void mark_hanging(const Nodes *n, int node, bool *hangs)
         hangs[i] = n->parent[i] >= 0 && hangs[n->parent[i]];
 }
 
-// The nearest node before it in plain sight, by the distance that lies outside both vessels. Nodes stand behind what they hang on: later ones are not looked at.
+// The nearest node before it in plain sight, by the distance that lies outside both vessels, in link->path. Nodes stand behind what they hang on: later
+// ones are not looked at. False: out of memory.
 static bool attach_elsewhere(const Nodes *n, const Wall *wall, Link *link)
 {
+    Room room = {wall, link->radius};
     double least = 3 * link->radius;
     int best = -1;
     Vec3 x = n->center[link->node];
     for (int i = 0; i < link->node; i++) {
         double apart = vec3_distance(x, n->center[i]) - n->radius[i] - link->radius;
-        if (apart < least && !meets_wall(wall, n->center[i], x)) {
+        if (apart < least && stays_inside(&room, n->center[i], x)) {
             least = apart;
             best = i;
         }
     }
     if (best < 0)
-        return false;
+        return true;
     link->parent = best;
     link->is_moved = true;
-    link->outside = 0;
-    link->path_count = 2;
-    link->path[0] = n->center[best];
-    link->path[1] = x;
-    link->length = path_length(link);
+    link->path = (LinkPath){malloc(2 * sizeof(Vec3)), 2, fmin(room_at(&room, n->center[best]), room_at(&room, x))};
+    if (!link->path.point)
+        return false;
+    link->path.point[0] = n->center[best];
+    link->path.point[1] = x;
     return true;
 }
 
-// A branch's first node: its parent has an earlier child.
+// All of them: curves may lead through walls anywhere. A branch begins with a node whose parent has an earlier child.
 static Link *collect_links(const Nodes *n, int *first_child, int *count)
 {
     Link *link = calloc((size_t)n->count + 1, sizeof *link);
-    *count = 0;
     for (int i = 0; i < n->count; i++)
         first_child[i] = -1;
     for (int i = 1; i < n->count; i++)
         if (first_child[n->parent[i]] < 0)
             first_child[n->parent[i]] = i;
+    *count = link ? n->count - 1 : 0;
     for (int i = 1; link && i < n->count; i++)
-        if (first_child[n->parent[i]] != i)
-            link[(*count)++] = (Link){.node = i, .parent = n->parent[i]};
+        link[i - 1] = (Link){.node = i, .parent = n->parent[i], .is_inner = first_child[n->parent[i]] == i};
     return link;
 }
 
+// A refused link within a branch is one more junction: of two vessels that the curves take for one.
 static void report_link(const Nodes *n, const Link *link, ImportReport *report)
 {
-    ImportSupport support = link->is_refused ? IMPORT_REFUSED : link->outside > DOUBTFUL * link->radius ? IMPORT_DOUBTFUL : IMPORT_SUPPORTED;
+    if (link->is_inner && !link->is_refused && !link->is_moved)
+        return;
+    ImportSupport support = link->is_refused ? IMPORT_REFUSED : link->path.share < DOUBTFUL ? IMPORT_DOUBTFUL : IMPORT_SUPPORTED;
     report->junction_count++;
     report->junctions_with[support]++;
     report->junctions_moved += link->is_moved;
     if (support == IMPORT_SUPPORTED)
         return;
     if (report->named_count < IMPORT_NAMED_MOST)
-        report->named[report->named_count++] = (ImportJunction){link->is_refused ? n->center[link->node] : link->place, link->length, link->outside, link->radius, support};
+        report->named[report->named_count++] = (ImportJunction){link->is_refused ? n->center[link->node] : link->place, link->length, link->is_refused ? 0 : link->path.share, support};
 }
 
 // --- the new nodes ---
@@ -261,13 +294,14 @@ static void rebuild(const Nodes *n, const Link *link, int link_count, const Wall
 
 static bool measure(const Nodes *n, const Skeleton *s, const Wall *wall, const int *first_child, Link *link)
 {
-    link->radius = root_radius(n, first_child, link->node);
-    if (!follow_skeleton(n, s, link))
+    link->radius = link->is_inner ? fmax(n->radius[link->node], n->radius[link->parent]) : root_radius(n, first_child, link->node);
+    link->length = vec3_distance(n->center[link->node], n->center[link->parent]);
+    if (!find_path(n, s, wall, link) || (link->path.count == 0 && !attach_elsewhere(n, wall, link)))
         return false;
-    link->length = path_length(link);
-    link->outside = outside_of(wall, link->path, link->path_count, link->radius);
-    link->is_refused = link->outside > REFUSED * link->radius && !attach_elsewhere(n, wall, link);
-    return link->is_refused || place_stations(n, first_child, link);
+    link->is_refused = link->path.count == 0;
+    link->length = link->is_refused ? link->length : path_length(link);
+    bool needs_nodes = !link->is_inner || link->is_moved || link->length > n->radius[link->node] + n->radius[link->parent];
+    return link->is_refused || !needs_nodes || place_stations(n, first_child, link);
 }
 
 bool nodes_open_ostia(Nodes *nodes, const Skeleton *skeleton, const Wall *wall, ImportReport *report)
@@ -284,10 +318,10 @@ bool nodes_open_ostia(Nodes *nodes, const Skeleton *skeleton, const Wall *wall, 
         stations += link[l].station_count;
     }
     for (int l = 0; good && l < count; l++) {
-        bool went = dropped[link[l].node] || dropped[link[l].parent];   // with what it hangs on
-        if (!went)
+        bool is_lost = dropped[link[l].node] || dropped[link[l].parent];   // with what it hangs on
+        if (!is_lost)
             report_link(nodes, &link[l], report);
-        if (!went && !link[l].is_refused)
+        if (!is_lost && !link[l].is_refused)
             continue;
         mark_hanging(nodes, link[l].node, hangs);
         for (int i = 0; i < nodes->count; i++) {
@@ -304,7 +338,7 @@ bool nodes_open_ostia(Nodes *nodes, const Skeleton *skeleton, const Wall *wall, 
         nodes_free(&out);
     }
     for (int l = 0; link && l < count; l++) {
-        free(link[l].path);
+        free(link[l].path.point);
         free(link[l].station);
     }
     free(link);

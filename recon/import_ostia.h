@@ -17,8 +17,8 @@ typedef struct Nodes {
 
 bool nodes_create(Nodes *nodes, size_t room);   // false: out of memory
 void nodes_free(Nodes *nodes);
-// Puts nodes on the links between branches and their parents, along the skeleton. What the surface says is counted in the report: a link that
-// leaves the lumen by a quarter of the branch's radius is refused, and the branch hangs on another node in plain sight or goes. False: out of memory.
+// Puts nodes on the links between branches and their parents. What the surface says is counted in the report: a link without a path inside it is refused,
+// and the branch hangs on another node in plain sight or goes. False: out of memory.
 bool nodes_open_ostia(Nodes *nodes, const Skeleton *skeleton, const Wall *wall, ImportReport *report);
 // The lines inside of which no point is wall. NULL where memory lacks.
 LumenLines *nodes_lumen_lines(const Nodes *nodes);

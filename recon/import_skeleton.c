@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double STEP = 0.1, SAME = 0.35, EDGE = 0.1;
+static const double STEP = 0.1, SAME = 0.35, EDGE = 0.1, CORNER = 0.4;
 enum { SAMPLES_MAX = 4000000 };
 
 typedef struct Fine {        // the curves, sampled
@@ -285,6 +285,14 @@ static Vec3 way_out(const Opening *opening, Vec3 from)
     return vec3_distance(there, opening->center) < 0.3 * opening->radius ? there : opening->center;
 }
 
+// Whether a curve has run into the corner between an opening and its wall, or past the opening's plane.
+static bool is_in_corner(const Opening *opening, Vec3 p)
+{
+    Vec3 to = vec3_sub(p, opening->center);
+    double depth = -vec3_dot(to, opening->normal), aside = sqrt(fmax(0, vec3_norm2(to) - depth * depth));
+    return depth < EDGE * opening->radius || (depth < opening->radius && aside > CORNER * opening->radius);
+}
+
 // Takes the end's last samples back to before the opening's plane and leads it straight out.
 static bool lead_to_opening(Growing *g, const Wall *wall, int end, bool *kept, double reach)
 {
@@ -301,7 +309,7 @@ static bool lead_to_opening(Growing *g, const Wall *wall, int end, bool *kept, d
         return false;
     const Opening *opening = &wall->opening[o];
     int at = end;
-    while (s->parent[at] >= 0 && g->children[end] == 0 && vec3_dot(vec3_sub(s->point[at], opening->center), opening->normal) > -EDGE * opening->radius) {
+    while (s->parent[at] >= 0 && g->children[end] == 0 && is_in_corner(opening, s->point[at])) {
         int up = s->parent[at];
         bool branches = false;
         for (int k = up + 1; k < s->count && !branches; k++)
@@ -383,7 +391,7 @@ static bool build(Growing *g, Fine *fine, const Wall *wall, const ImportOptions 
     if (root.opening >= 0) {
         const Opening *opening = &wall->opening[root.opening];
         int last = root.step > 0 ? fine->offset[c + 1] - 1 : fine->offset[c];
-        for (; at != last && vec3_dot(vec3_sub(fine->point[at], opening->center), opening->normal) > -EDGE * opening->radius; at += root.step)
+        for (; at != last && is_in_corner(opening, fine->point[at]); at += root.step)
             fine->done[at] = true;
         Vec3 out = way_out(opening, fine->point[at]);
         double length = vec3_distance(fine->point[at], out);

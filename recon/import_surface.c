@@ -165,6 +165,34 @@ static bool choose_nodes(Skeleton *s, const Wall *wall, double spacing, Nodes *n
 }
 
 // Along the vessel: from the parent, and to the child that goes on straightest.
+// To the first node a radius on, along the children that most nodes hang on: the curve of a surface alone may come to the middle of its opening from the
+// side, where a stenosis follows, or leave a stub in the opening's corner, and the inlet would then look closed.
+static Vec3 root_direction(const Nodes *nodes)
+{
+    int at = 0;
+    for (bool found = true; found && vec3_distance(nodes->center[at], nodes->center[0]) < nodes->radius[0];) {
+        int next = -1, most = 0;
+        for (int k = at + 1; k < nodes->count; k++) {
+            if (nodes->parent[k] != at)
+                continue;
+            int hanging = 0;
+            for (int i = k; i < nodes->count; i++) {
+                int up = i;
+                while (up > k)
+                    up = nodes->parent[up];
+                hanging += up == k;
+            }
+            if (hanging > most) {
+                most = hanging;
+                next = k;
+            }
+        }
+        found = next >= 0;
+        at = found ? next : at;
+    }
+    return vec3_unit_or(vec3_sub(nodes->center[at], nodes->center[0]), vec3(1, 0, 0));
+}
+
 static void set_directions(Nodes *nodes)
 {
     for (int i = 0; i < nodes->count; i++) {
@@ -182,6 +210,8 @@ static void set_directions(Nodes *nodes)
         }
         nodes->direction[i] = vec3_unit_or(vec3_add(in, out), vec3(1, 0, 0));
     }
+    if (nodes->count > 1)
+        nodes->direction[0] = root_direction(nodes);
 }
 
 // --- points ---

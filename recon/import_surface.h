@@ -19,18 +19,18 @@ typedef struct ImportOptions {
 } ImportOptions;
 ImportOptions import_default_options(void);
 
-// What the surface says of a link between a branch and its parent: how far it leaves the lumen, in the branch's radii.
+// What the surface says of a link between a branch and its parent: the narrowest place of the path inside it, as a share of the branch's radius.
 typedef enum ImportSupport {
-    IMPORT_SUPPORTED,        // by 0.05 at most: it has nodes, none further from the next than the sum of their radii
-    IMPORT_DOUBTFUL,         // by 0.25 at most: the same
-    IMPORT_REFUSED,          // by more, and no other vessel is in plain sight: the branch was left out with what hung on it
+    IMPORT_SUPPORTED,        // at least a quarter: it has nodes, none further from the next than the sum of their radii
+    IMPORT_DOUBTFUL,         // less: the same, to be looked at
+    IMPORT_REFUSED,          // no path inside, and no other vessel is in plain sight: the branch was left out with what hung on it
     IMPORT_SUPPORTS
 } ImportSupport;
 
 typedef struct ImportJunction {
     Vec3 place;              // [mm] where the link leaves the parent's lumen; of a refused one the branch's first node
     double length;           // [mm] of the link
-    double outside, radius;  // [mm] how far it leaves the lumen; the branch's radius
+    double share;            // 0 … 1
     ImportSupport support;
 } ImportJunction;
 
@@ -56,7 +56,7 @@ typedef struct ImportReport {
     long left_points;        // and these to none: out of reach, beyond the root's cut, or of a narrow branch that has no centreline
     int dropped_nodes;       // whose sphere lies within their parent's
     int junction_count, junctions_with[IMPORT_SUPPORTS];
-    int junctions_moved;     // hung on another node, for the link that the curves have leaves the lumen
+    int junctions_moved;     // hung on another node, for the curves' own link leaves the lumen
     ImportJunction named[IMPORT_NAMED_MOST];   // the first that are not supported
     int named_count;
     int link_nodes;          // between parents' axes and the first nodes of branches

@@ -277,10 +277,15 @@ static bool path_lead_out(const Finding *f, Path *path)
 static void path_trim(Path *path)
 {
     int tip = path->count - 1, keep = tip;
-    double widest = 0;
-    for (int i = tip; i >= 0; i--)
-        if (vec3_distance(path->point[tip], path->point[i]) < 1.5 * path->radius[i])
-            widest = fmax(widest, path->radius[i]);
+    double widest = 0, in_wedge = 0;
+    for (int i = tip; i >= 0; i--) {
+        double apart = vec3_distance(path->point[tip], path->point[i]);
+        widest = apart < 1.5 * path->radius[i] ? fmax(widest, path->radius[i]) : widest;
+        in_wedge = apart < 3 * path->radius[i] ? fmax(in_wedge, path->radius[i]) : in_wedge;
+    }
+    // the corner of a lid that was cut obliquely, or of a flare, is sharper: its widest sphere lies up to three radii off
+    if (path->radius[tip] < 0.5 * in_wedge)
+        widest = in_wedge;
     // once only: a vessel that tapers would be eaten up
     while (keep > 1 && path->radius[tip] < 0.9 * widest && path->radius[keep] < 0.95 * widest)
         keep--;

@@ -1,6 +1,5 @@
-// Both searches are Dijkstra's over 26 neighbours, where a step costs its length over the fourth power of the brightness between background (0) and the
-// child's lumen (1): it keeps to the middle and crosses what is dim only where it must. Beside a straight link the places are a lattice along
-// that link, half a voxel apart; in search of another parent they are the image's voxels.
+// Beside a straight link the places are a lattice along it (link_lattice.h), half a voxel apart. In search of another parent they are the image's voxels,
+// with the same cost: the length of a step over the fourth power of the brightness between background (0) and the child's lumen (1).
 #include "recon/rbt_link_path.h"
 #include "geom/sort_doubles.h"
 #include "recon/bspline.h"
@@ -9,8 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FIRST_NODES = 9, ACROSS_MOST = 6, ALONG_MOST = 400, BOX_MOST = 96, SMOOTHINGS = 3 };
-static const double DARKEST = 0.05;   // brightness that a step is charged for at most
+enum { FIRST_NODES = 9, BOX_MOST = 96 };
 
 LinkLight rbt_link_light(const Track *tree, const Tracker *t, int node)
 {
@@ -89,12 +87,6 @@ static void set_lengths(Grid *g, const Vec3 step[3])
     }
 }
 
-static float step_cost(float length, double a, double b)
-{
-    double lit = fmax(DARKEST, 0.5 * (a + b)), square = lit * lit;
-    return length / (float)(square * square);
-}
-
 // The places from `goal` back to the start.
 static int count_back(const Grid *g, int goal)
 {
@@ -104,110 +96,23 @@ static int count_back(const Grid *g, int goal)
     return count;
 }
 
-// A path over a lattice is a staircase.
-static void smooth_path(LinkPath *path)
-{
-    for (int pass = 0; pass < SMOOTHINGS; pass++) {
-        Vec3 before = path->point[0];
-        for (int i = 1; i + 1 < path->count; i++) {
-            Vec3 here = path->point[i];
-            path->point[i] = vec3_add(vec3_scale(here, 0.5), vec3_scale(vec3_add(before, path->point[i + 1]), 0.25));
-            before = here;
-        }
-    }
-}
-
 // --- beside the link ---
 
-typedef struct Lattice {     // slices across the link, the first one at its start, the last at its end
-    Grid grid;
-    Vec3 from, step[3];      // step[2] along the link
-    int half;                // places to each side of the link
-} Lattice;
+typedef struct Lit {
+    const Tracker *t;
+    const LinkLight *light;
+} Lit;
 
-static Vec3 lattice_point(const Lattice *l, int i)
+static double lit_on_ground(const void *context, Vec3 x)
 {
-    int at[3];
-    place_in(&l->grid, i, at);
-    return vec3_add_scaled(vec3_add_scaled(vec3_add_scaled(l->from, at[0] - l->half, l->step[0]), at[1] - l->half, l->step[1]), at[2], l->step[2]);
-}
-
-static bool lattice_create(const Tracker *t, Vec3 from, Vec3 to, double beside, const LinkLight *light, Lattice *l)
-{
-    double gap = vec3_distance(from, to), across = fmax(0.5 * t->voxel, beside / ACROSS_MOST);
-    int along = (int)fmin(ceil(gap / fmin(across, t->voxel)), ALONG_MOST);
-    Vec3 axis = vec3_unit(vec3_sub(to, from)), u = vec3_normal_to(axis);
-    along = along < 1 ? 1 : along;
-    *l = (Lattice){.from = from, .half = (int)floor(beside / across)};
-    l->step[0] = vec3_scale(u, across);
-    l->step[1] = vec3_scale(vec3_cross(axis, u), across);
-    l->step[2] = vec3_scale(vec3_sub(to, from), 1.0 / along);
-    l->grid.size[0] = l->grid.size[1] = 2 * l->half + 1;
-    l->grid.size[2] = along + 1;
-    set_lengths(&l->grid, l->step);
-    if (!grid_create(&l->grid))
-        return false;
-    for (int i = 0; i < l->grid.size[0] * l->grid.size[1] * l->grid.size[2]; i++) {
-        int at[3];
-        place_in(&l->grid, i, at);
-        double aside = across * hypot(at[0] - l->half, at[1] - l->half);
-        l->grid.lit[i] = aside > beside + 1e-9 ? -1 : (float)lit_at(t, light, lattice_point(l, i));
-    }
-    return true;
-}
-
-// False: out of memory.
-static bool cross_lattice(Grid *g, int start, int goal)
-{
-    WayHeap heap = {0};
-    g->cost[start] = 0;
-    g->from[start] = -1;
-    bool good = way_heap_push(&heap, (WayEntry){0, start});
-    while (good && heap.count > 0) {
-        WayEntry here = way_heap_pop(&heap);
-        int at[3];
-        if (here.place == goal)
-            break;
-        if (here.way > g->cost[here.place])
-            continue;
-        place_in(g, here.place, at);
-        for (int n = 0; n < 27 && good; n++) {
-            int k = neighbour_in(g, at, n);
-            if (k < 0 || g->lit[k] < 0)
-                continue;
-            float cost = here.way + step_cost(g->length[n], (double)g->lit[here.place], (double)g->lit[k]);
-            if (cost < g->cost[k]) {
-                g->cost[k] = cost;
-                g->from[k] = here.place;
-                good = way_heap_push(&heap, (WayEntry){cost, k});
-            }
-        }
-    }
-    free(heap.entry);
-    return good;
+    const Lit *lit = context;
+    return lit_at(lit->t, lit->light, x);
 }
 
 bool rbt_link_path(const Tracker *t, Vec3 from, Vec3 to, double beside, const LinkLight *light, LinkPath *out)
 {
-    Lattice l;
-    bool good = lattice_create(t, from, to, beside, light, &l);
-    Grid *g = &l.grid;
-    *out = (LinkPath){.share = 1};
-    if (good) {
-        int middle = l.half * g->size[0] + l.half, start = middle, goal = (g->size[2] - 1) * g->size[0] * g->size[1] + middle;
-        good = cross_lattice(g, start, goal);
-        out->count = good ? count_back(g, goal) : 0;
-        out->point = good ? malloc((size_t)out->count * sizeof *out->point) : NULL;
-        good = out->point != NULL;
-        for (int i = goal, n = out->count; good && i >= 0; i = g->from[i]) {
-            out->point[--n] = lattice_point(&l, i);
-            out->share = fmin(out->share, (double)g->lit[i]);
-        }
-        if (good)
-            smooth_path(out);
-    }
-    grid_free(g);
-    return good;
+    Lit lit = {t, light};
+    return link_lattice_path(from, to, beside, 0.5 * t->voxel, &(LinkGround){lit_on_ground, NULL, &lit}, out);
 }
 
 // --- another parent ---
@@ -313,7 +218,7 @@ static int search_box(const Tracker *t, Box *b, int start, double reach, double 
             }
             if ((double)g->lit[k] < least)
                 continue;
-            float cost = here.way + step_cost(g->length[n], (double)g->lit[here.place], (double)g->lit[k]);
+            float cost = here.way + link_step_cost(g->length[n], (double)g->lit[here.place], (double)g->lit[k]);
             if (cost < g->cost[k] && (double)cost < most) {
                 g->cost[k] = cost;
                 g->from[k] = here.place;
@@ -354,7 +259,7 @@ bool rbt_link_search(const Tracker *t, int node, const bool *hangs, double reach
         if (good) {
             out->point[0] = t->tree.node[*met].cylinder.center;
             out->count++;
-            smooth_path(out);
+            link_path_smooth(out);
         }
     }
     box_free(&b);

@@ -183,6 +183,7 @@ static bool insert_nodes(Tracker *t, Track *out, const TrackNode *parent, const 
         }
         t->estimate.node.branch = number;
         t->estimate.node.parent = parent_index;
+        t->estimate.node.is_on_voxels = true;
         if (!track_append(out, &t->estimate.node, t->estimate.point))
             return false;
         parent_index = -2;   // the one appended before

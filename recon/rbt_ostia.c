@@ -9,18 +9,17 @@
 // link opened them, but not where the image has the mouth.
 #include "recon/rbt_ostia.h"
 #include "geom/sort_doubles.h"
-#include "recon/cast_rays.h"
 #include "recon/lumen_lines.h"
 #include "recon/rbt_link_path.h"
+#include "recon/rbt_ring.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-enum { RING = 24, RING_SAMPLES_MOST = 160, ROOT_NODES = 8, NEAR_MOST = 64, STATIONS_MOST = 2000 };
+enum { ROOT_NODES = 8, NEAR_MOST = 64, STATIONS_MOST = 2000 };
 static const double SPACING = 0.5,        // of the nodes, in radii of the child
                     INSIDE = 1.5,         // that far inside the parent's wall they begin, in radii of the child
                     NEAR_REACH = 3,       // of the parent's nodes about a mouth, in its radii
-                    WIDEST = 2,           // a mouth, in radii of the child
                     IN_PARENT = 0.1;      // a wall point may lie so deep in the parent, in its radii
 
 typedef struct Link {
@@ -41,16 +40,16 @@ typedef struct Link {
 // The nodes of the parent's branch within reach of `node`, and those that it hangs on; returns their number.
 static int nodes_about(const Track *tree, int node, int *list)
 {
-    double reach = NEAR_REACH * tree->node[node].cylinder.radius, way = 0;
+    double reach = NEAR_REACH * tree->node[node].cylinder.radius, length = 0;
     int count = 0;
     list[count++] = node;
-    for (int i = node; tree->node[i].parent >= 0 && way < reach && count < NEAR_MOST / 2; i = tree->node[i].parent) {
-        way += vec3_distance(tree->node[i].cylinder.center, tree->node[tree->node[i].parent].cylinder.center);
+    for (int i = node; tree->node[i].parent >= 0 && length < reach && count < NEAR_MOST / 2; i = tree->node[i].parent) {
+        length += vec3_distance(tree->node[i].cylinder.center, tree->node[tree->node[i].parent].cylinder.center);
         list[count++] = tree->node[i].parent;
     }
-    way = 0;
-    for (int i = node + 1; i < tree->count && tree->node[i].parent == i - 1 && tree->node[i].branch == tree->node[node].branch && way < reach && count < NEAR_MOST; i++) {
-        way += vec3_distance(tree->node[i].cylinder.center, tree->node[i - 1].cylinder.center);
+    length = 0;
+    for (int i = node + 1; i < tree->count && tree->node[i].parent == i - 1 && tree->node[i].branch == tree->node[node].branch && length < reach && count < NEAR_MOST; i++) {
+        length += vec3_distance(tree->node[i].cylinder.center, tree->node[i - 1].cylinder.center);
         list[count++] = i;
     }
     return count;
@@ -81,81 +80,6 @@ double rbt_depth_in_vessel(const Track *tree, int node, Vec3 x)
 {
     int list[NEAR_MOST];
     return depth_in(tree, list, nodes_about(tree, node, list), x);
-}
-
-// --- the wall of a mouth ---
-
-// Distances at which the rays square to `axis` leave the lumen: 0 where they do not. `direction`: (RING).
-static void cast_ring(const Tracker *t, Vec3 x, Vec3 axis, const LinkLight *light, double reach, Vec3 *direction, double *distance)
-{
-    Vec3 u = vec3_normal_to(axis), v = vec3_cross(axis, u);
-    int samples = (int)fmin(RING_SAMPLES_MOST, fmax(24, ceil(reach / (0.15 * t->voxel))));
-    RayOptions rays = {reach, samples, t->parameters->ray_smoothing_voxels * t->voxel, 0};
-    double inside = fmin(tracker_brightness(t, x), light->inside);
-    for (int k = 0; k < RING; k++) {
-        double angle = 2 * PI * (k + 0.5) / RING;
-        direction[k] = vec3_add(vec3_scale(u, cos(angle)), vec3_scale(v, sin(angle)));
-    }
-    cast_rays_level_edge(t->volume, x, direction, RING, &rays, light->outside + 0.5 * (inside - light->outside), distance);
-}
-
-// Median of the distances up to `most`; 0 where fewer than half of the rays have one.
-static double ring_median(const double *distance, double most)
-{
-    double sorted[RING];
-    int count = 0;
-    for (int k = 0; k < RING; k++)
-        if (distance[k] > 0 && distance[k] < most)
-            sorted[count++] = distance[k];
-    sort_doubles(sorted, (size_t)count);
-    return 2 * count >= RING ? 0.5 * (sorted[(count - 1) / 2] + sorted[count / 2]) : 0;
-}
-
-static double ring_reach(const Tracker *t, double radius) { return 1.2 * WIDEST * radius + 2 * t->voxel; }
-
-// Radius over edge at the child's own first nodes, median; 1 where none shows its edge.
-static double radius_to_edge(const Tracker *t, int node, const LinkLight *light)
-{
-    const Track *tree = &t->tree;
-    double ratio[ROOT_NODES], distance[RING];
-    Vec3 direction[RING];
-    int count = 0;
-    for (int i = node; i < tree->count && i < node + ROOT_NODES && tree->node[i].branch == tree->node[node].branch; i++) {
-        const Cylinder *c = &tree->node[i].cylinder;
-        cast_ring(t, c->center, c->axis, light, ring_reach(t, c->radius), direction, distance);
-        double edge = ring_median(distance, ring_reach(t, c->radius));
-        if (edge > 0 && tree->node[i].kind == NODE_VESSEL && !tree->node[i].is_junction)
-            ratio[count++] = c->radius / edge;
-    }
-    sort_doubles(ratio, (size_t)count);
-    return count > 0 ? fmax(0.6, fmin(1.5, ratio[count / 2])) : 1;
-}
-
-// The circle of least squares through the ring's edges: its centre, from x, in the plane. False where too little of the ring is there.
-static bool ring_center(const Vec3 *direction, const double *distance, double most, Vec3 axis, Vec3 *offset)
-{
-    Vec3 u = direction[0], v = vec3_cross(axis, u);
-    double a[3][3] = {{0}}, b[3] = {0};
-    int count = 0;
-    for (int k = 0; k < RING; k++) {
-        if (!(distance[k] > 0 && distance[k] < most))
-            continue;
-        double row[3] = {distance[k] * vec3_dot(direction[k], u), distance[k] * vec3_dot(direction[k], v), 1};
-        for (int i = 0; i < 3; i++) {
-            b[i] += row[i] * distance[k] * distance[k];
-            for (int j = 0; j < 3; j++)
-                a[i][j] += row[i] * row[j];
-        }
-        count++;
-    }
-    double det = a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) - a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
-                 a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
-    if (4 * count < 3 * RING || !(fabs(det) > 1e-300))
-        return false;
-    double p = b[0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) - a[0][1] * (b[1] * a[2][2] - a[1][2] * b[2]) + a[0][2] * (b[1] * a[2][1] - a[1][1] * b[2]);
-    double q = a[0][0] * (b[1] * a[2][2] - a[1][2] * b[2]) - b[0] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) + a[0][2] * (a[1][0] * b[2] - b[1] * a[2][0]);
-    *offset = vec3_add(vec3_scale(u, 0.5 * p / det), vec3_scale(v, 0.5 * q / det));
-    return true;
 }
 
 // --- nodes along the path ---
@@ -195,16 +119,16 @@ static double arc_at_depth(const Track *tree, const int *list, int count, const 
 static bool append_station(const Tracker *t, Link *link, Vec3 x, Vec3 axis, double spacing, const int *list, int near)
 {
     const TrackNode *child = &t->tree.node[link->node];
-    double reach = ring_reach(t, link->radius), most = WIDEST * link->radius / link->scale, distance[RING], r = link->radius;
+    double most = RING_WIDEST * link->radius / link->scale, distance[RING], r = link->radius;
     Vec3 direction[RING], offset, point[RING];
-    cast_ring(t, x, axis, &link->light, reach, direction, distance);
-    if (ring_center(direction, distance, most, axis, &offset) && vec3_norm(offset) < 0.5 * r) {
+    rbt_ring_cast(t, x, axis, &link->light, link->radius, direction, distance);
+    if (rbt_ring_center(direction, distance, most, axis, &offset) && vec3_norm(offset) < 0.5 * r) {
         x = vec3_add(x, offset);
-        cast_ring(t, x, axis, &link->light, reach, direction, distance);
+        rbt_ring_cast(t, x, axis, &link->light, link->radius, direction, distance);
     }
-    double edge = ring_median(distance, most);
+    double edge = rbt_ring_median(distance, most);
     int count = 0;
-    r = edge > 0 ? fmax(0.5 * r, fmin(WIDEST * r, link->scale * edge)) : r;
+    r = edge > 0 ? fmax(0.5 * r, fmin(RING_WIDEST * r, link->scale * edge)) : r;
     for (int k = 0; k < RING; k++) {
         Vec3 wall = vec3_add_scaled(x, link->scale * distance[k], direction[k]);
         bool is_own = distance[k] > 0 && distance[k] < most && link->scale * distance[k] < 1.6 * r;
@@ -274,7 +198,7 @@ static void measure_link(const Tracker *t, Link *link)
     link->radius = is_sac ? fmin(parent->cylinder.radius, child->cylinder.radius) : link->is_inner ? fmin(parent->cylinder.radius, child->cylinder.radius)
                                                                                                     : root_radius(&t->tree, link->node);
     link->light = rbt_link_light(&t->tree, t, link->node);
-    link->scale = is_sac ? 1 : radius_to_edge(t, link->node, &link->light);
+    link->scale = is_sac ? 1 : rbt_ring_scale(t, link->node, &link->light);
     link->failed = !rbt_link_path(t, parent->cylinder.center, child->cylinder.center, fmax(link->radius, t->voxel), &link->light, &link->path);
     link->share = link->path.share;
     link->support = support_of(link->share);
@@ -377,7 +301,7 @@ typedef struct Rebuild {
 
 static void add_line(Rebuild *r, Vec3 from, Vec3 to, double clear) { r->line[r->line_count++] = (LumenLine){from, to, clear}; }
 
-// A node with its link. What the points must keep clear of is collected on the way.
+// A node with its link. What the points must keep clear of is collected with it.
 static bool append_node(Rebuild *r, int i)
 {
     const Track *tree = &r->t->tree;
@@ -540,6 +464,7 @@ bool rbt_open_ostia(Tracker *t, const bool *is_named, int threads, RbtJunctions 
 {
     Track *tree = &t->tree;
     int count = 0;
+    rbt_measure_set_nodes(t);
     Link *link = collect_links(tree, is_named, &count);
     bool *hangs = calloc((size_t)tree->count + 1, sizeof *hangs), *keep = calloc((size_t)tree->count + 1, sizeof *keep);
     int *link_of = malloc(((size_t)tree->count + 1) * sizeof *link_of);

@@ -435,7 +435,8 @@ RbtLimb *rbt_find_limbs(const Tracker *t, const RbtPaint *paint, int first, int 
             for (at[1] = box.low[1]; at[1] <= box.high[1]; at[1]++)
                 for (at[0] = box.low[0]; at[0] <= box.high[0]; at[0]++) {
                     if (paint->owner[voxel_index(v, at)] || vec3_distance(volume_point_of(v, vec3(at[0], at[1], at[2])), c->center) > reach ||
-                        !is_residue(t, paint, at, &border[i - first]) || find_wet(&f, at) >= 0)
+                        !is_residue(t, paint, at, &border[i - first]) || find_wet(&f, at) >= 0 ||
+                        tracker_is_stopped(t, c->center, volume_point_of(v, vec3(at[0], at[1], at[2]))))
                         continue;
                     int wet = add_wet(&f, at, 0, -1, i);
                     if (wet >= 0)

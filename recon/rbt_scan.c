@@ -25,8 +25,11 @@ const Volume *rbt_level(RbtLevels *levels, int level)
 double rbt_level_noise(RbtLevels *levels, int level)
 {
     const Volume *volume = rbt_level(levels, level);
-    if (volume && levels->noise[level] < 0)
-        levels->noise[level] = volume_noise(volume, (int)ceil(4 * rbt_level_voxels[level]) + 1);
+    if (volume && levels->noise[level] < 0) {
+        double noise = volume_noise(volume, (int)ceil(4 * rbt_level_voxels[level]) + 1);
+        // less is rounding, or the tail of a blur
+        levels->noise[level] = noise > 1e-4 * ((double)volume->maximum - (double)volume->minimum) ? noise : 0;
+    }
     return volume ? levels->noise[level] : 0;
 }
 
@@ -215,7 +218,7 @@ int rbt_level_for(RbtLevels *levels, const Cylinder *tube)
 {
     double voxel = volume_voxel_size(levels->volume), contrast = rbt_sight_of(levels->volume, 0, tube).contrast;
     int level = 0;
-    while (level + 1 < RBT_LEVELS && rbt_level_voxels[level + 1] * voxel <= 0.5 * tube->radius && contrast < clear_contrast * rbt_level_noise(levels, level))
+    while (level + 1 < RBT_LEVELS && rbt_level_voxels[level + 1] * voxel <= 0.62 * tube->radius && contrast < clear_contrast * rbt_level_noise(levels, level))
         level++;
     return level;
 }

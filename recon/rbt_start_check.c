@@ -43,6 +43,15 @@ static double drift_of(Vec3 click, const Cylinder *c)
     return hypot(across, fmax(0, fabs(along) - 4 * c->radius));
 }
 
+// Of the copy that is tracked.
+static double level_noise(const Tracker *t, RbtLevels *levels)
+{
+    for (int i = RBT_LEVELS - 1; i > 0; i--)
+        if (levels->smooth[i] == t->volume)
+            return rbt_level_noise(levels, i);
+    return rbt_level_noise(levels, 0);
+}
+
 static Verdict judge(Tracker *t, RbtLevels *levels, Vec3 click, const Cylinder *c, double inlier_rate)
 {
     Verdict v = {.check = {.click = click, .cylinder = *c, .drift = drift_of(click, c), .inlier_rate = inlier_rate, .noise = rbt_level_noise(levels, 0)}};
@@ -63,6 +72,11 @@ static Verdict judge(Tracker *t, RbtLevels *levels, Vec3 click, const Cylinder *
                  "noise hides the edge: the tube found there (radius %.2f mm) is %.3g grey values brighter than what is beside it at a noise of %.3g, %.1f standard "
                  "errors; a place with at least %g, or a less noisy volume",
                  c->radius, sight.contrast, v.check.noise, v.check.certainty, least_certainty);
+    else if (t->is_noisy && sight.contrast < least_contrast * level_noise(t, levels))
+        snprintf(v.refusal, sizeof v.refusal,
+                 "noise hides the edge: the tube found there (radius %.2f mm) is %.3g grey values brighter than what is beside it, the smoothed copy that suits it has a noise "
+                 "of %.3g; %g times that, or a less noisy volume",
+                 c->radius, sight.contrast, level_noise(t, levels), least_contrast);
     if (v.check.drift > c->radius + 0.5 * t->voxel) {
         snprintf(text, sizeof text, "the click lies %.2f mm from the axis of the vessel that was found, outside of its radius of %.2f mm", v.check.drift, c->radius);
         doubt(&v.check, RBT_DRIFT, v.check.drift, c->radius, text);
@@ -115,6 +129,8 @@ bool rbt_look_at_noise(Tracker *t, RbtLevels *levels, const RbtSeed *first)
             radius = t->scan[i].radius;
         }
     }
+    if (best.certainty < least_certainty && tracker_brightness(t, first->start) < t->dark)
+        return true;   // background: said where all starts are looked at
     t->is_noisy = true;
     if (best.certainty < least_certainty) {
         snprintf(t->refusal, sizeof t->refusal,
@@ -268,6 +284,27 @@ static void judge_background(Tracker *t, int count)
     doubt(&t->check, RBT_BACKGROUND, high - low, contrast[n / 2], text);
 }
 
+// It ends before something much brighter than itself, such as the face of a band that it may go on in.
+static void judge_ends(Tracker *t, int count)
+{
+    char text[240];
+    for (int end = 0; end < 2 && count > 3; end++) {
+        const TrackNode *n = &t->tree.node[end ? count - 1 : 0], *before = &t->tree.node[end ? count - 4 : 3];
+        Vec3 ahead = vec3_unit_or(vec3_sub(n->cylinder.center, before->cylinder.center), n->cylinder.axis), c = n->cylinder.center;
+        double brighter = 0;
+        for (int k = 2; k <= 5; k++) {
+            Vec3 x = vec3_add_scaled(c, k * n->cylinder.radius, ahead);
+            if (tracker_is_inside(t->volume, x))
+                brighter = fmax(brighter, tracker_brightness(t, x) - tracker_brightness(t, before->cylinder.center));
+        }
+        if (brighter <= 1.5 * before->contrast + 4 * level_noise(t, t->levels))
+            continue;
+        snprintf(text, sizeof text, "the first branch ends at (%.1f, %.1f, %.1f) mm before what is %.3g grey values brighter than itself, its contrast being %.3g (a bright band?): it may go on there",
+                 c.x, c.y, c.z, brighter, before->contrast);
+        doubt(&t->check, RBT_BACKGROUND, brighter, 1.5 * before->contrast, text);
+    }
+}
+
 void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
 {
     enum { ROOT = 3 };
@@ -293,6 +330,7 @@ void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
         doubt(&t->check, RBT_INLIERS, root / (count < ROOT ? count : ROOT), least_inliers, text);
     }
     judge_background(t, count);
+    judge_ends(t, count);
     double radius = tree->node[count / 2].cylinder.radius;
     if (length < least_length * radius) {
         snprintf(text, sizeof text, "the first branch is %.1f mm long, %.1f of its radii; a vessel is %g or more", length, length / radius, least_length);

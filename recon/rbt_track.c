@@ -14,8 +14,10 @@
 #include "recon/ransac_cylinder.h"
 #include "recon/rbt_branches.h"
 #include "recon/rbt_exits.h"
+#include "recon/rbt_limits.h"
 #include "recon/rbt_links.h"
 #include "recon/rbt_ostia.h"
+#include "recon/rbt_loops.h"
 #include "recon/rbt_residue.h"
 #include "recon/rbt_start.h"
 #include "recon/rbt_start_check.h"
@@ -205,6 +207,23 @@ bool tracker_is_forbidden(const Tracker *t, Vec3 x)
     for (int i = 0; i < t->parameters->forbid_count; i++)
         if (vec3_distance(x, in_mm(t->volume, t->parameters->forbid[i].center, t->parameters->forbid[i].is_voxel)) < t->parameters->forbid[i].radius)
             return true;
+    for (int i = 0; i < t->stop_count; i++) {
+        Vec3 q = vec3_sub(x, t->stop[i].center);
+        double along = vec3_dot(q, t->stop[i].axis);
+        if (fabs(along) < t->stop[i].half && vec3_norm2(q) - along * along < t->stop[i].radius * t->stop[i].radius)
+            return true;
+    }
+    return false;
+}
+
+bool tracker_is_stopped(const Tracker *t, Vec3 a, Vec3 b)
+{
+    for (int i = 0; i < t->stop_count; i++) {
+        const RbtStop *s = &t->stop[i];
+        double from = vec3_dot(vec3_sub(a, s->center), s->axis), to = vec3_dot(vec3_sub(b, s->center), s->axis);
+        if (from * to <= 0 && from != to && vec3_distance(vec3_mix(a, b, from / (from - to)), s->center) < s->radius)
+            return true;
+    }
     return false;
 }
 
@@ -259,6 +278,9 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
     Vec3 move = vec3_sub(next->cylinder.center, last->cylinder.center);
     t->why = "leaves the volume";
     if (!tracker_is_inside(t->volume, next->cylinder.center))
+        return false;
+    t->why = "ends where `until` says";
+    if (tracker_is_stopped(t, last->cylinder.center, next->cylinder.center))
         return false;
     t->why = ENTERS_FORBIDDEN;
     if (tracker_is_forbidden(t, next->cylinder.center))
@@ -397,7 +419,7 @@ static bool join_exit(Tracker *t, Track *branch, int keep, const RbtExit *exit, 
     const Cylinder last = branch->node[keep - 1].cylinder;
     Cylinder predicted = {exit->center[place], exit->radius, exit->direction[place], 0};
     Track back = {0};
-    if (tracker_node_around(t, exit->center[place], 1) >= 0 ||
+    if (tracker_is_stopped(t, last.center, exit->center[place]) || tracker_node_around(t, exit->center[place], 1) >= 0 ||
         !(tracker_estimate(t, &predicted, p->r_t) || (p->r_t_second > 0 && tracker_estimate(t, &predicted, p->r_t_second))))
         return false;
     if (t->estimate.node.contrast < p->retry_contrast * recent_contrast(branch) || tracker_node_around(t, t->estimate.node.cylinder.center, p->overlap) >= 0)
@@ -424,7 +446,7 @@ static bool join_exit(Tracker *t, Track *branch, int keep, const RbtExit *exit, 
             break;
     }
     t->out_of_memory = !good;
-    good = good && joined >= 0;
+    good = good && joined >= 0 && !tracker_is_stopped(t, last.center, back.node[joined].cylinder.center);
     if (good) {
         track_cut(branch, keep);
         good = append_junction(t, branch, &last, &back.node[joined].cylinder);
@@ -655,7 +677,7 @@ static int nodes_before_meeting(const Track *way, const Track *other, double sha
 }
 
 // The first branch from a start without direction: it may lie anywhere along the vessel.
-static bool track_both_ways(Tracker *t, const RbtSeed *seed, const Cylinder *start, int number)
+bool tracker_both_ways(Tracker *t, const RbtSeed *seed, const Cylinder *start, int number)
 {
     Track way[2] = {{0}, {0}}, back = {0};
     const char *end[2], *why = "the vessel was tracked one way only";
@@ -700,7 +722,7 @@ static bool track_seed(Tracker *t, const RbtSeed *seed, int number)
         if (!rbt_first_start(t, t->levels, seed, &start))
             return false;
         if (!seed->has_toward)
-            return track_both_ways(t, seed, &start, number);
+            return tracker_both_ways(t, seed, &start, number);
         say_start(t, seed, &start, "the root is the start");
     }
     if (is_first && seed->has_toward && seed->radius > 0 && !rbt_suit_given(t, t->levels, &start))
@@ -1150,6 +1172,7 @@ void rbt_report_free(RbtReport *report)
 {
     free(report->branch);
     free(report->junction);
+    free(report->loop);
     *report = (RbtReport){0};
 }
 
@@ -1254,7 +1277,7 @@ static bool make_report(Tracker *t, const Job *job, const RbtEnds *ends, RbtJunc
 }
 
 // Node by node: those for which keep[i] is false go; nothing may hang on them that stays.
-static void keep_nodes(Track *tree, const bool *keep, int *place)
+void track_keep(Track *tree, const bool *keep, int *place)
 {
     int used = 0;
     for (int i = 0; i < tree->count; i++) {
@@ -1337,7 +1360,7 @@ static bool make_cuts(Tracker *t, const Job *job)
         if (tree->node[i].parent >= 0 && !keep[tree->node[i].parent])
             keep[i] = false;
     if (good)
-        keep_nodes(tree, keep, place);
+        track_keep(tree, keep, place);
     free(keep);
     free(place);
     return good;
@@ -1358,7 +1381,7 @@ static bool drop_forbidden_stubs(Tracker *t, const RbtEnds *ends)
     for (int i = 0; good && i < tree->count; i++)
         keep[i] = keep[i] && (tree->node[i].parent < 0 || keep[tree->node[i].parent]);
     if (good)
-        keep_nodes(tree, keep, place);
+        track_keep(tree, keep, place);
     free(keep);
     free(place);
     return good;
@@ -1373,10 +1396,45 @@ static bool grow(Tracker *t, const Job *job, RbtPaint *paint, int first, RbtEnds
     return rbt_grow_branches(t, paint, first, job->threads, job->progress, ends) || out_of_memory_at(job, ends->count);
 }
 
+// The vessels that `not` names compete with the first branch.
+static bool add_rivals(Tracker *t, const Job *job, RbtEnds *ends)
+{
+    if (!rbt_ends_add(ends, t->why, 0))
+        return out_of_memory_at(job, 0);
+    for (int i = 0; i < t->parameters->rival_count; i++) {
+        if (!rbt_add_rival(t, &t->parameters->rival[i], job->seed[0].start, ends->count, job->path, job->faults))
+            return t->out_of_memory ? out_of_memory_at(job, ends->count) : false;
+        if (!rbt_ends_add(ends, t->why, -1))
+            return out_of_memory_at(job, ends->count);
+    }
+    return true;
+}
+
+// What hangs on these goes; a branch that was named must not.
+static bool drop_rivals(Tracker *t, const Job *job, const RbtEnds *ends, RbtReport *report)
+{
+    if (t->parameters->rival_count == 0)
+        return true;
+    if (!rbt_drop_rivals(t, &report->left_out_count, &report->left_out_length))
+        return out_of_memory_at(job, 0);
+    for (int b = 0; b < ends->count; b++) {
+        bool has_nodes = false;
+        for (int i = 0; i < t->tree.count && !has_nodes; i++)
+            has_nodes = t->tree.node[i].branch == b;
+        if (has_nodes || ends->seed[b] < 0)
+            continue;
+        const RbtSeed *seed = &job->seed[ends->seed[b]];
+        faults_add(job->faults, job->path, seed->line, seed->column, "branch %d hangs on a vessel that `not` names; a start on the tree's own side, or another `not`",
+                   ends->seed[b] + 1);
+        return false;
+    }
+    return true;
+}
+
 // The whole tree: all that is found from the first start, then the cuts, then what the other starts add to the rest.
 static bool track_automatic(Tracker *t, const Job *job, RbtEnds *ends)
 {
-    bool is_joined, good = run_seed(t, job, 0) && ((rbt_ends_add(ends, t->why, 0) && rbt_mend_links(t, NULL, 0, &is_joined)) || out_of_memory_at(job, 0));
+    bool is_joined, good = run_seed(t, job, 0) && add_rivals(t, job, ends) && (rbt_mend_links(t, NULL, 0, &is_joined) || out_of_memory_at(job, 0));
     RbtPaint *paint = good ? rbt_paint_create(t->volume) : NULL;
     t->paint = paint;
     good = good && (paint || out_of_memory_at(job, 0)) && grow(t, job, paint, 0, ends);
@@ -1425,12 +1483,17 @@ static bool track_all(Tracker *t, const Job *job, RbtReport *report)
     if (automatic)
         good = track_automatic(t, job, &ends);
     for (int i = 0; good && !automatic && i < job->seed_count; i++) {
-        good = run_seed(t, job, i) && (rbt_ends_add(&ends, t->why, i) || out_of_memory_at(job, i));
+        int first = t->tree.count;
+        good = run_seed(t, job, i);
+        for (int k = first; good && k < t->tree.count; k++)
+            t->tree.node[k].branch = ends.count;
+        good = good && (i == 0 ? add_rivals(t, job, &ends) : rbt_ends_add(&ends, t->why, i) || out_of_memory_at(job, i));
         if (good && job->progress && job->progress->call)
             job->progress->call(job->progress->context, i + 1, job->seed_count + job->aneurysm_count);
     }
     if (good && !automatic && t->parameters->cut_count > 0)
         good = make_cuts(t, job);
+    good = good && drop_rivals(t, job, &ends, report);
     for (int i = 0; good && i < job->aneurysm_count; i++) {
         good = track_aneurysm(t, &job->aneurysm[i], job->center[i], ends.count + i, job->threads, job->faults, job->path);
         if (t->out_of_memory)
@@ -1442,7 +1505,7 @@ static bool track_all(Tracker *t, const Job *job, RbtReport *report)
         good = out_of_memory_at(job, ends.count);
     if (good && t->parameters->ostia > 0 && !open_ostia(t, job, &ends, &junctions))
         good = out_of_memory_at(job, ends.count);
-    if (good && !make_report(t, job, &ends, &junctions, report))
+    if (good && (!make_report(t, job, &ends, &junctions, report) || !rbt_find_loops(t, report)))
         good = out_of_memory_at(job, ends.count);
     free(junctions.junction);
     free(ends.why);
@@ -1493,6 +1556,8 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
                 check_point(t, center[i][k], NULL, "a centre of an aneurysm", aneurysm[i].line, aneurysm[i].column, path, faults);
             }
     }
+    if (good && faults->count == before && !rbt_place_stops(t, seed[0].start, path, faults) && faults->count == before)
+        faults_add(faults, path, 0, 0, "out of memory");
     if (good && faults->count == before) {
         Job job = {seed, seed_count, aneurysm, center, aneurysm_count, threads, progress, path, faults};
         if (track_all(t, &job, &own) && !(tree = finish_tree(&t->tree)))
@@ -1501,8 +1566,10 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
         own.check = t->check;
     }
     rbt_levels_free(&levels);
-    if (t)
+    if (t) {
         track_free(&t->tree);
+        free(t->stop);
+    }
     for (int i = 0; center && i < aneurysm_count; i++)
         free(center[i]);
     free(center);

@@ -66,6 +66,10 @@ typedef struct RbtParameters {
     int forbid_count;
     const RbtRegion *cut;    // the branch nearest to each is cut from there on, with what hangs on it
     int cut_count;
+    const RbtRegion *until;  // points in vessels that the tracking does not pass: the tree ends there
+    int until_count;
+    const RbtRegion *rival;  // `not`: points in vessels that are not wanted; these are tracked too, compete for the lumen and are left out
+    int rival_count;
 } RbtParameters;
 
 RbtParameters rbt_default_parameters(void);
@@ -169,6 +173,12 @@ typedef struct RbtStartCheck {
     RbtWarning warning[RBT_MAX_WARNINGS];
 } RbtStartCheck;
 
+typedef struct RbtLoop {     // the tree format has none: the branch ends where it meets the other
+    Vec3 place;              // [mm] of its end
+    int branch, meets;       // numbers in the report; may be the same
+    double length;           // [mm] once around, by the centrelines
+} RbtLoop;
+
 typedef struct RbtReport {
     int branch_count;
     RbtBranchReport *branch; // in the order of the tree's nodes: one a seed, those found, one an aneurysm
@@ -176,6 +186,10 @@ typedef struct RbtReport {
     RbtJunction *junction;   // none with `ostia` 0
     char start[256];         // what was estimated at the first start, and which end is the root; empty: it was given
     RbtStartCheck check;
+    int loop_count;
+    RbtLoop *loop;           // where a branch's end meets another branch of the tree
+    int left_out_count;      // branches of the vessels that `not` names …
+    double left_out_length;  // … and their length [mm]
 } RbtReport;
 void rbt_report_free(RbtReport *report);
 

@@ -13,6 +13,7 @@ typedef struct TrackNode {
     double inlier_rate, contrast;
     int parent, kind, branch;
     bool retried, is_junction;
+    bool is_on_voxels;       // set along a path through the image's voxels (rbt_links.h), not measured
     bool is_link;            // between the parent's axis and the branch's first node (rbt_ostia.h)
     int64_t point_start;
     int point_count;
@@ -29,6 +30,11 @@ typedef struct Track {       // nodes with their points, growing
     Vec3 *point;
     int64_t point_count, point_capacity;
 } Track;
+
+typedef struct RbtStop {     // of `until`: a disc across a vessel
+    Vec3 center, axis;
+    double radius, half;     // of the disc, half of its thickness
+} RbtStop;
 
 typedef struct Tracker {
     const Volume *volume;
@@ -59,6 +65,8 @@ typedef struct Tracker {
     int scan_count;          // tubes around the first start that stand out, best first; -1: not looked for
     Cylinder scan[12];
     RbtStartCheck check;
+    RbtStop *stop;           // (parameters->until_count)
+    int stop_count;
     char refusal[300];       // why the first start is refused; empty: it is not
 } Tracker;
 
@@ -70,6 +78,7 @@ double tracker_usual_radius(const Track *branch);   // the median of its last no
 double tracker_brightness(const Tracker *t, Vec3 point);   // the spline's value
 bool tracker_is_inside(const Volume *volume, Vec3 x);
 bool tracker_is_forbidden(const Tracker *t, Vec3 x);   // by the trace
+bool tracker_is_stopped(const Tracker *t, Vec3 a, Vec3 b);   // does the way from a to b pass a point of `until`?
 // A node of the finished tree whose centre is nearer to x than `share` of its radius, or -1.
 int tracker_node_around(const Tracker *t, Vec3 x, double share);
 // Darkest place on the straight way from a to b, as a share of the lumen's brightness at both ends.
@@ -80,6 +89,10 @@ bool tracker_estimate(Tracker *t, const Cylinder *predicted, double relative_thr
 void tracker_run(Tracker *t, const Cylinder *start, Track *branch, bool until_tree);
 // Turns the node at `c` into one whose points are the first walls that rays meet nearby, in t->estimate.
 void tracker_opening(Tracker *t, const Cylinder *c, double contrast);
+// Tracks from a cylinder both ways into the empty tree; nodes follow each other from the root on. False where nothing was found, or out of memory.
+bool tracker_both_ways(Tracker *t, const RbtSeed *seed, const Cylinder *start, int number);
+// Keeps the nodes for which keep[i] is true; nothing that stays may hang on one that goes. `place`: room for as many.
+void track_keep(Track *track, const bool *keep, int *place);
 int tracker_attachment(const Tracker *t, Vec3 x, int node_count);
 // Captures a sac (section 3.4) as branch `number`; false where it is none (a fault) or memory lacks.
 bool track_aneurysm(Tracker *t, const RbtAneurysm *aneurysm, const Vec3 *center, int number, int threads, Faults *faults, const char *path);

@@ -189,14 +189,32 @@ static void read_list(const Walk *w, const yaml_node_t *list, bool is_branches, 
     }
 }
 
-// `forbid`: balls; `cut`: points.
-static void read_region(const Walk *w, const yaml_node_t *map, bool is_cut, RbtRegion *out)
+// Lists of places: `forbid` holds balls, the others points.
+typedef struct PlaceKind {
+    const char *key, *what, *mm, *voxel;
+    bool has_radius;
+} PlaceKind;
+
+enum { PLACE_FORBID, PLACE_CUT, PLACE_UNTIL, PLACE_RIVAL, PLACE_KINDS };
+static const PlaceKind place_kinds[PLACE_KINDS] = {{"forbid", "forbidden region", "center_mm", "center_voxel", true},
+                                                   {"cut", "cut", "point_mm", "point_voxel", false},
+                                                   {"until", "point of `until`", "point_mm", "point_voxel", false},
+                                                   {"not", "point of `not`", "point_mm", "point_voxel", false}};
+
+static int place_kind_of(const char *key)
+{
+    for (int i = 0; i < PLACE_KINDS; i++)
+        if (!strcmp(key, place_kinds[i].key))
+            return i;
+    return -1;
+}
+
+static void read_region(const Walk *w, const yaml_node_t *map, const PlaceKind *kind, RbtRegion *out)
 {
     *out = (RbtRegion){.line = (int)map->start_mark.line + 1, .column = (int)map->start_mark.column + 1};
-    const char *mm = is_cut ? "point_mm" : "center_mm", *voxel = is_cut ? "point_voxel" : "center_voxel";
     bool has_center = false;
     if (map->type != YAML_MAPPING_NODE) {
-        FAULT(w, map, "%s", is_cut ? "a cut is not valid; {point_mm: [x, y, z]}" : "a forbidden region is not valid; {center_mm: [x, y, z], radius_mm: r}");
+        FAULT(w, map, "a %s is not valid; {%s: [x, y, z]%s}", kind->what, kind->mm, kind->has_radius ? ", radius_mm: r" : "");
         return;
     }
     for (int i = 0; i < pair_count(map); i++) {
@@ -204,26 +222,35 @@ static void read_region(const Walk *w, const yaml_node_t *map, bool is_cut, RbtR
         const char *key = key_of(w, map, i, &value);
         if (!key)
             continue;
-        if (!strcmp(key, mm) || !strcmp(key, voxel))
-            read_place(w, value, key, !strcmp(key, voxel), &has_center, &out->center, &out->is_voxel);
-        else if (!is_cut && !strcmp(key, "radius_mm"))
+        if (!strcmp(key, kind->mm) || !strcmp(key, kind->voxel))
+            read_place(w, value, key, !strcmp(key, kind->voxel), &has_center, &out->center, &out->is_voxel);
+        else if (kind->has_radius && !strcmp(key, "radius_mm"))
             read_number(w, value, key, 1e-3, 1e3, false, &out->radius);
         else
-            FAULT(w, value, "'%.40s' is no key of a %s; %s or %s%s", key, is_cut ? "cut" : "forbidden region", mm, voxel, is_cut ? "" : ", radius_mm");
+            FAULT(w, value, "'%.40s' is no key of a %s; %s or %s%s", key, kind->what, kind->mm, kind->voxel, kind->has_radius ? ", radius_mm" : "");
     }
     if (!has_center)
-        FAULT(w, map, "the %s has no place; %s (or %s)", is_cut ? "cut" : "forbidden region", mm, voxel);
-    if (!is_cut && !(out->radius > 0))
-        FAULT(w, map, "the forbidden region has no radius; radius_mm");
+        FAULT(w, map, "the %s has no place; %s (or %s)", kind->what, kind->mm, kind->voxel);
+    if (kind->has_radius && !(out->radius > 0))
+        FAULT(w, map, "the %s has no radius; radius_mm", kind->what);
 }
 
-static void read_regions(const Walk *w, const yaml_node_t *list, bool is_cut, Trace *trace)
+// Where the trace keeps the places of a kind.
+static RbtRegion **places_of(Trace *trace, int kind, int **count)
+{
+    RbtRegion **list[PLACE_KINDS] = {&trace->forbid, &trace->cut, &trace->until, &trace->rival};
+    int *counts[PLACE_KINDS] = {&trace->forbid_count, &trace->cut_count, &trace->until_count, &trace->rival_count};
+    *count = counts[kind];
+    return list[kind];
+}
+
+static void read_regions(const Walk *w, const yaml_node_t *list, int kind, Trace *trace)
 {
     if (list->type != YAML_SEQUENCE_NODE || item_count(list) > MAX_ENTRIES) {
-        FAULT(w, list, "%s is not valid; a list of at most %d entries", is_cut ? "cut" : "forbid", MAX_ENTRIES);
+        FAULT(w, list, "%s is not valid; a list of at most %d entries", place_kinds[kind].key, MAX_ENTRIES);
         return;
     }
-    int n = item_count(list);
+    int n = item_count(list), *count;
     RbtRegion *region = calloc((size_t)n + 1, sizeof *region);
     if (!region) {
         FAULT(w, list, "out of memory");
@@ -232,15 +259,10 @@ static void read_regions(const Walk *w, const yaml_node_t *list, bool is_cut, Tr
     for (int i = 0; i < n; i++) {
         yaml_node_t *item = node_at(w, list->data.sequence.items.start[i]);
         if (item)
-            read_region(w, item, is_cut, &region[i]);
+            read_region(w, item, &place_kinds[kind], &region[i]);
     }
-    if (is_cut) {
-        trace->cut = region;
-        trace->cut_count = n;
-    } else {
-        trace->forbid = region;
-        trace->forbid_count = n;
-    }
+    *places_of(trace, kind, &count) = region;
+    *count = n;
 }
 
 static void read_retry_steps(const Walk *w, const yaml_node_t *list, RbtParameters *p)
@@ -280,7 +302,7 @@ static void read_parameter(const Walk *w, const char *key, const yaml_node_t *va
         return;
     }
     FAULT(w, value,
-          "'%.40s' is no key of a trace; branches, aneurysms, forbid, cut, parameters (default or paper), or a parameter that `segment --help` lists",
+          "'%.40s' is no key of a trace; branches, aneurysms, forbid, cut, until, not, parameters (default or paper), or a parameter that `segment --help` lists",
           key);
 }
 
@@ -312,8 +334,8 @@ static void read_root(const Walk *w, const yaml_node_t *root, Trace *trace)
             read_number(w, value, key, 1, 1, true, &version);
         else if (!strcmp(key, "branches") || !strcmp(key, "aneurysms"))
             read_list(w, value, key[0] == 'b', trace);
-        else if (!strcmp(key, "forbid") || !strcmp(key, "cut"))
-            read_regions(w, value, key[0] == 'c', trace);
+        else if (place_kind_of(key) >= 0)
+            read_regions(w, value, place_kind_of(key), trace);
         else if (!strcmp(key, "retry_steps"))
             read_retry_steps(w, value, &trace->parameters);
         else
@@ -339,6 +361,8 @@ void trace_free(Trace *trace)
     free(trace->branch);
     free(trace->forbid);
     free(trace->cut);
+    free(trace->until);
+    free(trace->rival);
     free(trace);
 }
 
@@ -346,6 +370,31 @@ static void yaml_fault(const yaml_parser_t *parser, const char *path, Faults *fa
 {
     faults_add(faults, path, (int)parser->problem_mark.line + 1, (int)parser->problem_mark.column + 1, "is no YAML: %s; a map such as `branches: [...]`",
                parser->problem ? parser->problem : "unreadable");
+}
+
+static void point_to_places(Trace *trace)
+{
+    RbtParameters *p = &trace->parameters;
+    p->forbid = trace->forbid;
+    p->forbid_count = trace->forbid_count;
+    p->cut = trace->cut;
+    p->cut_count = trace->cut_count;
+    p->until = trace->until;
+    p->until_count = trace->until_count;
+    p->rival = trace->rival;
+    p->rival_count = trace->rival_count;
+}
+
+bool trace_add_point(Trace *trace, const char *key, Vec3 point)
+{
+    int *count, kind = place_kind_of(key);
+    RbtRegion **list = places_of(trace, kind, &count), *grown = realloc(*list, ((size_t)*count + 2) * sizeof *grown);
+    if (!grown)
+        return false;
+    *list = grown;
+    grown[(*count)++] = (RbtRegion){.center = point};
+    point_to_places(trace);
+    return true;
 }
 
 Trace *trace_parse(const char *text, size_t length, const char *path, Faults *faults)
@@ -382,10 +431,7 @@ Trace *trace_parse(const char *text, size_t length, const char *path, Faults *fa
         }
     }
     yaml_parser_delete(&parser);
-    trace->parameters.forbid = trace->forbid;
-    trace->parameters.forbid_count = trace->forbid_count;
-    trace->parameters.cut = trace->cut;
-    trace->parameters.cut_count = trace->cut_count;
+    point_to_places(trace);
     if (faults->count == before)
         return trace;
     trace_free(trace);

@@ -11,6 +11,7 @@
 #define SELDINGER_RENDER_PICTURE_H
 
 #include "geom/geom.h"
+#include "geom/reach.h"
 #include "sim/scene.h"
 
 typedef struct PictureOptions {
@@ -106,6 +107,20 @@ bool picture_of_fit(const char *path, const PictureOptions *options, const Vesse
 // > 0 inside; NaN grey), and the local models' d_a (tree->error) in voxels as a histogram with the borders of the paper's Table 4: half, one, two.
 bool picture_of_error(const char *path, const PictureOptions *options, const VesselTree *tree, const TriangleMesh *mesh, const double *error, double voxel_mm,
                       char *message, size_t capacity);
+
+// --- junctions ---
+typedef struct PictureJunctions {
+    const VesselTree *tree;          // a model
+    int junction_count;
+    const ReachJunction *junction;   // of that model (geom/reach.h), in the order in which they are drawn
+    double tool_radius;              // [mm] less than that is framed orange
+    const VesselTree *before;        // another model of the same vessels: each junction of both side by side, in the same plane; NULL
+    int size[3];                     // the voxel grid behind them, as of picture_of_tree; value NULL: none
+    Vec3 origin, axis[3];
+    const float *value;
+} PictureJunctions;
+// A small section for each junction, 24 a page (12 with `before`), the first page at `path`, the next at NAME-2.png and so on; `pages`: how many there are.
+bool picture_of_junctions(const char *path, const PictureOptions *options, const PictureJunctions *what, int *pages, char *message, size_t capacity);
 
 // --- time series ---
 typedef struct PictureLine {

@@ -46,6 +46,8 @@ static double number(const cJSON *object, const char *name)
     return item->valuedouble;
 }
 
+static void assert_near_number(double value, double wanted) { assert_true(fabs(value - wanted) < 1e-9 * fmax(1, fabs(wanted))); }
+
 static void step_tables(void **state)
 {
     (void)state;
@@ -208,10 +210,78 @@ static void a_chart_is_a_picture(void **state)
     assert_memory_equal(head, "\x89PNG\r\n\x1a\n", 8);
 }
 
+static const cJSON *wall_line(const cJSON *lines, const char *row, const char *what)
+{
+    const cJSON *at;
+    cJSON_ArrayForEach(at, lines) {
+        if (!strcmp(cJSON_GetObjectItem(at, "row")->valuestring, row) && !strcmp(cJSON_GetObjectItem(at, "what")->valuestring, what))
+            return at;
+    }
+    fail_msg("no line '%s' of '%s'", what, row);
+    return NULL;
+}
+
+// A fork with truth: its wall is one, its junction open, a tool gets everywhere; a tree is fitted first, a model taken as it is.
+static void wall_table(void **state)
+{
+    (void)state;
+    assert_int_equal(run("synth y --quiet -o /tmp/seldinger-wall-y.h5"), 0);
+    int code = run("bench wall --rows jumps,points,blobs,fit,junctions,flood --quick --json /tmp/seldinger-wall.json /tmp/seldinger-wall-y.h5 > /tmp/seldinger-wall.txt 2>&1");
+    assert_true(code == 0 || code == 1);
+    cJSON *root = load("/tmp/seldinger-wall.json");
+    const cJSON *lines = cJSON_GetObjectItem(root, "lines");
+    assert_true(number(wall_line(lines, "jumps", "raw jump of gap, max"), "value") < 0.01);
+    assert_true(number(wall_line(lines, "points", "points to wall, mean"), "value") < 0.05);
+    assert_true(number(wall_line(lines, "blobs", "blobs a mm"), "value") > 0);
+    assert_true(number(wall_line(lines, "fit", "fit, CPU of all threads over 2"), "value") > 0);
+    assert_near_number(number(wall_line(lines, "junctions", "junctions capped"), "value"), 0);
+    assert_near_number(number(wall_line(lines, "flood", "reached by a point"), "value"), 100);
+    assert_near_number(number(wall_line(lines, "flood", "by it up to 0.5 r aside"), "value"), 100);
+    assert_string_equal(cJSON_GetObjectItem(wall_line(lines, "flood", "reached by a point"), "verdict")->valuestring, "aim");
+    cJSON_Delete(root);
+    assert_int_equal(run("bench wall --rows flood,nothing > /tmp/seldinger-wall.txt 2>&1"), 2);
+    assert_int_equal(run("bench wall --seeds 1 > /tmp/seldinger-wall.txt 2>&1"), 2);
+    assert_int_equal(run("bench wall --rows flood /tmp/seldinger-no-such.h5 > /tmp/seldinger-wall.txt 2>&1"), 2);
+    assert_int_equal(run("bench wall --work /tmp/seldinger-no-such --rows flood > /tmp/seldinger-wall.txt 2>&1"), 2);
+    unlink("/tmp/seldinger-wall.txt");
+    unlink("/tmp/seldinger-wall-y.h5");
+}
+
+// What `fit` and `info` end with.
+static void reach_reports(void **state)
+{
+    (void)state;
+    assert_int_equal(run("synth y --quiet -o /tmp/seldinger-reach-tree.h5"), 0);
+    assert_int_equal(run("fit /tmp/seldinger-reach-tree.h5 -o /tmp/seldinger-reach.h5 --json /tmp/seldinger-reach.json > /dev/null"), 0);
+    cJSON *root = load("/tmp/seldinger-reach.json");
+    const cJSON *reach = cJSON_GetObjectItem(root, "reach");
+    assert_near_number(number(reach, "tool_radius_mm"), 0.18);
+    assert_near_number(number(reach, "point_percent"), 100);
+    assert_true(number(reach, "junction_count") >= 1);
+    cJSON_Delete(root);
+    // a tool wider than the vessel gets nowhere, and that is no fault
+    assert_int_equal(run("info /tmp/seldinger-reach.h5 --json --tool-radius-mm 50 > /tmp/seldinger-reach.json"), 0);
+    root = load("/tmp/seldinger-reach.json");
+    reach = cJSON_GetObjectItem(root, "reach");
+    assert_near_number(number(reach, "tool_aside_percent"), 0);
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(reach, "shut")), 1);
+    cJSON_Delete(root);
+    // a tree has no field to ask
+    assert_int_equal(run("info /tmp/seldinger-reach-tree.h5 --json > /tmp/seldinger-reach.json"), 0);
+    root = load("/tmp/seldinger-reach.json");
+    assert_null(cJSON_GetObjectItem(root, "reach"));
+    cJSON_Delete(root);
+    assert_int_equal(run("info /tmp/seldinger-reach.h5 --tool-radius-mm 0 > /dev/null 2>&1"), 2);
+    assert_int_equal(run("info /tmp/seldinger-reach.h5 --volume /tmp/seldinger-reach.h5 > /dev/null 2>&1"), 2);
+    assert_int_equal(run("info /tmp/seldinger-reach.h5 --junctions /tmp/seldinger-reach.png --before /tmp/seldinger-reach-tree.h5 > /dev/null 2>&1"), 2);
+    unlink("/tmp/seldinger-reach.h5");
+    unlink("/tmp/seldinger-reach-tree.h5");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(step_tables), cmocka_unit_test(peer_scenes_stay_inside), cmocka_unit_test(collision_of_a_scene),
                                        cmocka_unit_test(tables_that_are_not_there),
-                                       cmocka_unit_test(a_chart_is_a_picture)};
+                                       cmocka_unit_test(a_chart_is_a_picture), cmocka_unit_test(wall_table), cmocka_unit_test(reach_reports)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

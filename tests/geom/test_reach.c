@@ -162,6 +162,7 @@ static void junctions_are_open_capped_or_apart(void **state)
         assert_int_equal(reach->capped_apart, 1);
         assert_int_equal(reach->narrow, 2);
         assert_int_equal(reach->apart_links, 1);
+        assert_int_equal(reach->apart_open, 0);
         assert_near(reach->apart_length, 6, 1e-9);
         int first_of_a = 61;
         assert_int_equal(reach->junction[2].node, first_of_a);

@@ -311,20 +311,20 @@ static void cuts_leave_no_stub(void **state)
     assert_int_equal(c.report.branch_count, 2);
     const RbtBranchReport *twig = &c.report.branch[1];
     // on the link outside the wall, at the first tracked node, and two nodes on
-    for (int way = 0; way < 5; way++) {
+    for (int place = 0; place < 5; place++) {
         RbtParameters p = rbt_default_parameters();
         RbtReport report = {0};
-        int node = twig->first_node + (way == 0 ? twig->link_count - 1 : way == 1 ? twig->link_count : way == 2 ? twig->link_count + 2 : twig->node_count / 2);
-        RbtRegion region = {.center = c.tree->center[way == 4 ? twig->first_node + twig->link_count : node], .radius = 1, .line = 1, .column = 1};
+        int node = twig->first_node + (place == 0 ? twig->link_count - 1 : place == 1 ? twig->link_count : place == 2 ? twig->link_count + 2 : twig->node_count / 2);
+        RbtRegion region = {.center = c.tree->center[place == 4 ? twig->first_node + twig->link_count : node], .radius = 1, .line = 1, .column = 1};
         p.automatic = 1;
-        *(way == 4 ? &p.forbid : &p.cut) = &region;
-        *(way == 4 ? &p.forbid_count : &p.cut_count) = 1;
+        *(place == 4 ? &p.forbid : &p.cut) = &region;
+        *(place == 4 ? &p.forbid_count : &p.cut_count) = 1;
         VesselTree *tree = rbt_track(c.volume, &p, &start, 1, NULL, 0, 0, NULL, &report, "t.yaml", &faults);
         assert_non_null(tree);
         check_hanging(tree);
         Vec3 tip = c.truth->center[c.truth->node_count - 1];
         assert_int_equal(nodes_within(tree, tip, 2), 0);
-        if (way == 3) {
+        if (place == 3) {
             assert_int_equal(report.branch_count, 2);
             assert_true(report.branch[1].link_count > 0);
         } else {

@@ -455,13 +455,69 @@ static void bad_options_are_faults(void **state)
     shape_free(shape);
 }
 
+// Whole grey values, vessels and band brighter by what was asked for, the noise in grey values; the band goes through the trunk.
+static void grey_values_and_a_band(void **state)
+{
+    (void)state;
+    Shape *shape = make("tree", "branches 5 radius_mm 4 points 8");
+    VesselTree *truth = shape_sample(shape, &faults);
+    VolumeOptions o = volume_default_options();
+    o.voxel_mm[0] = o.voxel_mm[1] = o.voxel_mm[2] = 1;
+    o.psf_mm = 0.5;
+    o.noise = 0;
+    o.contrast_grey = 13;
+    o.background_grey = 70;
+    o.band = 40.0 / 13;
+    o.band_mm = 16;
+    for (uint64_t seed = 1; seed <= 6; seed++) {
+        long level[256] = {0}, whole = 0;
+        o.seed = seed;
+        o.threads = seed % 2 ? 1 : 3;
+        Volume *v = shape_volume_with(shape, &o, &faults);
+        assert_non_null(v);
+        long voxels = (long)v->size[0] * v->size[1] * v->size[2];
+        for (long i = 0; i < voxels; i++) {
+            double value = (double)v->value[i];
+            whole += value == floor(value) && value >= 0 && value <= 255;
+            level[(int)value]++;
+        }
+        assert_int_equal(whole, voxels);
+        assert_true(level[70] > voxels / 4 && level[110] > 1000 && level[83] > 50 && level[123] > 5);   // background, band, vessel, both
+        assert_true(v->minimum == 70 && v->maximum == 123);
+        bool crossed = false;
+        for (int i = 0; i < truth->node_count; i++) {
+            Vec3 at = volume_voxel_of(v, truth->center[i]);
+            size_t place = (size_t)(at.x + 0.5) + (size_t)v->size[0] * ((size_t)(at.y + 0.5) + (size_t)v->size[1] * (size_t)(at.z + 0.5));
+            crossed = crossed || v->value[place] > 118;
+        }
+        assert_true(crossed);
+        volume_free(v);
+    }
+    o.band = 0;
+    o.noise = 11.0 / 13;
+    Volume *v = shape_volume_with(shape, &o, &faults);
+    double sum = 0, square = 0;
+    long n = 0;
+    for (int k = 0; k < 4; k++)   // the margin is background
+        for (int i = 0; i < v->size[0] * v->size[1]; i++, n++) {
+            double value = (double)v->value[k * v->size[0] * v->size[1] + i];
+            sum += value;
+            square += value * value;
+        }
+    assert_near(sum / (double)n, 70, 0.5);
+    assert_near(sqrt(square / (double)n - pow(sum / (double)n, 2)), sqrt(121 + 1.0 / 12), 0.3);
+    volume_free(v);
+    vessel_tree_free(truth);
+    shape_free(shape);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(helix_is_a_helix),        cmocka_unit_test(y_is_symmetric_and_murrays), cmocka_unit_test(kissing_vessels_keep_their_gap),
         cmocka_unit_test(bone_touches),            cmocka_unit_test(random_tree_keeps_its_promises), cmocka_unit_test(the_seed_makes_the_tree),
         cmocka_unit_test(octree_changes_no_bit),   cmocka_unit_test(samples_lie_on_the_surface), cmocka_unit_test(voxels_hold_their_share),
-        cmocka_unit_test(blur_is_gaussian),        cmocka_unit_test(noise_is_white),             cmocka_unit_test(threads_change_no_bit),
+        cmocka_unit_test(blur_is_gaussian),        cmocka_unit_test(noise_is_white), cmocka_unit_test(grey_values_and_a_band),            cmocka_unit_test(threads_change_no_bit),
         cmocka_unit_test(brightness_is_where_it_should_be), cmocka_unit_test(bad_options_are_faults),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -75,6 +75,23 @@ static void automatic_and_corrections(void **state)
     trace_free(t);
 }
 
+// Points that the tree does not pass, and points in vessels that are not wanted; the command line adds to both.
+static void where_the_tree_ends(void **state)
+{
+    (void)state;
+    Trace *t = parse("branches: [{start_mm: [1, 2, 3]}]\nuntil: [{point_mm: [4, 5, 6]}, {point_voxel: [7, 8, 9]}]\nnot: [{point_voxel: [10, 11, 12]}]\n");
+    assert_true(t && t->parameters.until_count == 2 && t->parameters.rival_count == 1);
+    assert_true(!t->parameters.until[0].is_voxel && t->parameters.until[1].is_voxel && t->parameters.until[1].center.z == 9 && t->parameters.until[1].line == 2);
+    assert_true(t->parameters.rival[0].is_voxel && t->parameters.rival[0].center.x == 10 && t->parameters.rival[0].line == 3);
+    assert_true(trace_add_point(t, "until", vec3(1, 1, 1)) && trace_add_point(t, "not", vec3(2, 2, 2)) && trace_add_point(t, "not", vec3(3, 3, 3)));
+    assert_true(t->parameters.until_count == 3 && t->parameters.until[2].center.x == 1 && t->parameters.until[0].center.x == 4);
+    assert_true(t->parameters.rival_count == 3 && t->parameters.rival[2].center.x == 3 && t->parameters.rival[2].line == 0);
+    trace_free(t);
+    t = parse("branches: [{start_mm: [1, 2, 3]}]\n");
+    assert_true(t && t->parameters.until_count == 0 && trace_add_point(t, "until", vec3(1, 1, 1)) && t->parameters.until_count == 1);
+    trace_free(t);
+}
+
 static void every_parameter_by_name(void **state)
 {
     (void)state;
@@ -130,6 +147,13 @@ static void faults_with_their_place(void **state)
         {GOOD "cut: [{point_mm: [1, 2, 3], radius_mm: 1}]\n", "t.yaml:2:40", "no key of a cut"},
         {GOOD "cut: [{}]\n", "t.yaml:2:7", "has no place"},
         {GOOD "cut: [x]\n", "t.yaml:2:7", "a cut is not valid"},
+        {GOOD "until: {point_mm: [1, 2, 3]}\n", "t.yaml:2:8", "until is not valid"},
+        {GOOD "until: [{point_mm: [1, 2]}]\n", "t.yaml:2:20", "three numbers"},
+        {GOOD "until: [{radius_mm: 1}]\n", "t.yaml:2:21", "no key of a point of `until`"},
+        {GOOD "not: [{start_mm: [1, 2, 3]}]\n", "t.yaml:2:18", "no key of a point of `not`"},
+        {GOOD "not: [{}]\n", "t.yaml:2:7", "has no place"},
+        {GOOD "not: [{point_mm: [1, 2, 3], point_voxel: [1, 2, 3]}]\n", "t.yaml:2:42", "given twice"},
+        {GOOD "not: [[1, 2, 3]]\n", "t.yaml:2:7", "a point of `not` is not valid"},
         {GOOD "automatic: 2\n", "t.yaml:2:12", "automatic '2' is not valid"},
         {"branches: [{start_mm: [1, 2, 3], toward_mm: [2, 2, 3], radius: 1}]\n", "t.yaml:1:64", "'radius' is no key of a branch"},
         {GOOD "colour: red\n", "t.yaml:2:9", "'colour' is no key of a trace"},
@@ -161,6 +185,7 @@ static void faults_with_their_place(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(full_file), cmocka_unit_test(a_start_is_enough), cmocka_unit_test(automatic_and_corrections), cmocka_unit_test(every_parameter_by_name), cmocka_unit_test(faults_with_their_place)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(full_file), cmocka_unit_test(a_start_is_enough), cmocka_unit_test(automatic_and_corrections), cmocka_unit_test(where_the_tree_ends),
+                                       cmocka_unit_test(every_parameter_by_name), cmocka_unit_test(faults_with_their_place)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -11,6 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "tube_volume.h"
+
 static Faults faults;
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -18,58 +20,6 @@ static const bool is_slow = true;    // one case of a kind: the figures are the 
 #else
 static const bool is_slow = false;
 #endif
-
-// A union of tubes of brightness 1 on background 0, with a plain blurred edge and noise from the voxels' numbers.
-static Volume *dark_volume(int nx, int ny, int nz, double voxel)
-{
-    Volume *v = volume_create((int[3]){nx, ny, nz}, vec3(0, 0, 0), (Vec3[3]){{voxel, 0, 0}, {0, voxel, 0}, {0, 0, voxel}});
-    assert_non_null(v);
-    return v;
-}
-
-static void add_ball(Volume *v, Vec3 c, double radius, double brightness)
-{
-    double voxel = v->axis[0].x, reach = radius + 3 * voxel;
-    int low[3], high[3];
-    double at[3] = {c.x, c.y, c.z};
-    for (int i = 0; i < 3; i++) {
-        low[i] = (int)fmax(0, ceil((at[i] - reach) / voxel));
-        high[i] = (int)fmin(v->size[i] - 1, floor((at[i] + reach) / voxel));
-    }
-    for (int k = low[2]; k <= high[2]; k++)
-        for (int j = low[1]; j <= high[1]; j++)
-            for (int i = low[0]; i <= high[0]; i++) {
-                double depth = radius - vec3_distance(vec3(i * voxel, j * voxel, k * voxel), c);
-                float value = (float)(brightness / (1 + exp(-1.7 * depth / voxel))), *old = &v->value[(k * v->size[1] + j) * v->size[0] + i];
-                *old = value > *old ? value : *old;
-            }
-}
-
-static void add_tube(Volume *v, Vec3 a, Vec3 b, double radius)
-{
-    int n = (int)(vec3_distance(a, b) / 0.05) + 1;
-    for (int i = 0; i <= n; i++)
-        add_ball(v, vec3_mix(a, b, (double)i / n), radius, 1);
-}
-
-static void add_noise(Volume *v, double sigma)
-{
-    uint64_t state = 88172645463325252u;
-    v->minimum = 1e30f;
-    v->maximum = -1e30f;
-    for (int i = 0; i < v->size[0] * v->size[1] * v->size[2]; i++) {
-        double sum = 0;
-        for (int k = 0; k < 12; k++) {   // twelve uniform numbers have variance 1
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            sum += (double)(state >> 11) / 9007199254740992.0 - 0.5;
-        }
-        v->value[i] += (float)(sigma * sum);
-        v->minimum = fminf(v->minimum, v->value[i]);
-        v->maximum = fmaxf(v->maximum, v->value[i]);
-    }
-}
 
 // A trunk with four branches, one of which forks.
 static const Vec3 tip[6] = {{10, 10, 27.5}, {18, 10, 9}, {3, 10, 15}, {10, 17.5, 18}, {17, 4, 20}, {14, 2, 27}};

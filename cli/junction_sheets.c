@@ -1,0 +1,106 @@
+// See junction_sheets.h.
+#include "cli/junction_sheets.h"
+
+#include "geom/reach.h"
+#include "recon/tree_file.h"
+#include "recon/volume.h"
+#ifdef SELDINGER_RENDER
+#include "render/picture.h"
+#endif
+
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { COMPARED = 10 };
+
+#ifdef SELDINGER_RENDER
+typedef struct Compared {
+    double before;           // [mm] clearance in the other model
+    int index;
+} Compared;
+
+static int by_before(const void *a, const void *b)
+{
+    const Compared *x = a, *y = b;
+    return x->before != y->before ? (x->before > y->before) - (x->before < y->before) : (x->index > y->index) - (x->index < y->index);
+}
+
+// Those that are narrowest in the other model, which may have other nodes: by the joining lines of this one. Returns their number, -1 without memory.
+static int choose_compared(const VesselTree *model, const Reach *reach, const VesselTree *before, double tool_radius, ReachJunction chosen[COMPARED])
+{
+    Compared *list = malloc(((size_t)reach->junction_count + 1) * sizeof *list);
+    int count = 0;
+    for (int k = 0; k < reach->junction_count && list; k++) {
+        Vec3 place;
+        const ReachJunction *j = &reach->junction[k];
+        list[k] = (Compared){reach_on_line(model, j, before, fmax(model->radius[j->node], 2 * tool_radius), &place), k};
+    }
+    if (list && reach->junction_count > 0)
+        qsort(list, (size_t)reach->junction_count, sizeof *list, by_before);
+    for (; list && count < COMPARED && count < reach->junction_count; count++)
+        chosen[count] = reach->junction[list[count].index];
+    bool good = list != NULL;
+    free(list);
+    return good ? count : -1;
+}
+
+static void draw(const JunctionSheets *sheets, const char *title, const VesselTree *model, const VesselTree *before, const Volume *volume)
+{
+    ReachOptions flood = reach_default_options();
+    flood.tool_radius = sheets->tool_radius;
+    Reach *reach = reach_create(model, &flood);
+    ReachJunction chosen[COMPARED];
+    PictureOptions options = picture_default_options();
+    char message[512] = "not enough memory";
+    int pages = 0;
+    bool drawn = false;
+    options.title = title;
+    options.width = 1920, options.height = 1360;
+    if (reach) {
+        PictureJunctions what = {.tree = model, .junction_count = reach->junction_count, .junction = reach->junction, .tool_radius = sheets->tool_radius, .before = before};
+        if (before) {
+            int count = choose_compared(model, reach, before, sheets->tool_radius, chosen);
+            what.junction_count = count > 0 ? count : 0;
+            what.junction = chosen;
+        }
+        if (volume) {
+            for (int k = 0; k < 3; k++)
+                what.size[k] = volume->size[k], what.axis[k] = volume->axis[k];
+            what.origin = volume->origin;
+            what.value = volume->value;
+        }
+        drawn = picture_of_junctions(sheets->picture, &options, &what, &pages, message, sizeof message);
+    }
+    if (!drawn)
+        fprintf(stderr, "%s: no picture: %s\n", sheets->picture, message);
+    reach_free(reach);
+}
+#endif
+
+bool junction_sheets_draw(const JunctionSheets *sheets, const char *title, const VesselTree *model, Faults *faults)
+{
+    if (!sheets->picture)
+        return true;
+    if (!vessel_tree_is_model(model)) {
+        fprintf(stderr, "%s: no picture: the tree has no fitted model to draw\n", sheets->picture);
+        return true;
+    }
+#ifdef SELDINGER_RENDER
+    VesselTree *before = sheets->before ? tree_file_load(sheets->before, NULL, faults) : NULL;
+    Volume *volume = sheets->volume ? volume_load(sheets->volume, faults) : NULL;
+    bool good = (!sheets->before || before) && (!sheets->volume || volume);
+    if (before && !vessel_tree_is_model(before)) {
+        faults_add(faults, sheets->before, 0, 0, "is a tree without a model; `seldinger fit` makes one");
+        good = false;
+    }
+    if (good)
+        draw(sheets, title, model, before, volume);
+    volume_free(volume);
+    vessel_tree_free(before);
+    return good;
+#else
+    (void)title, (void)faults;
+    fprintf(stderr, "%s: no picture: built without pictures\n", sheets->picture);
+    return true;
+#endif
+}
