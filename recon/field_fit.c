@@ -8,6 +8,8 @@
 #include <string.h>
 
 static const double BASE_APART = 0.75, BASE_REACH = 2;   // of the base blobs, in local radii: alone on a line or about a centre they have slope 2/r
+// The mean distance that is aimed at where single points are to be within target_mm.
+static const double TARGET_SHARE = 0.2;
 static const double level_reach[] = {1.4, 1.4, 1, 1, 0.7, 0.7, 0.5, 0.35};
 enum { LEVELS = sizeof level_reach / sizeof level_reach[0], LAST_SWEEPS = 4 };
 
@@ -129,7 +131,7 @@ static bool fit(FieldModel *model, const FieldFitOptions *options, const Progres
     for (int level = 0; level < options->levels && !s.failed; level++) {
         bool known = options->voxel_mm > 0, given = options->target_mm > 0;
         FieldRefine how = {level_reach[level], given ? 0 : known ? options->tolerance : options->tolerance_unknown,
-                           given ? options->target_mm : options->tolerance_voxels * options->voxel_mm,
+                           given ? TARGET_SHARE * options->target_mm : options->tolerance_voxels * options->voxel_mm,
                            options->least_reach_voxels * options->voxel_mm, options->significance};
         s.failed |= field_refine(model, &how) < 0;
         for (int k = 0; k < 2; k++)

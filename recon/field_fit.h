@@ -13,8 +13,9 @@
 #include "recon/parallel.h"
 
 typedef struct FieldFitOptions {
-    // The mean residual below which no blob is added: target_mm where that is given, else the larger of the next two; without a voxel `tolerance_unknown`
-    double target_mm;        // [mm]; 0: not given
+    // The mean residual below which no blob is added: a fifth of target_mm where that is given, else the larger of tolerance_voxels and tolerance; without a
+    // voxel tolerance_unknown
+    double target_mm;        // [mm] that points should be near the wall; 0: not given
     double voxel_mm;         // of the angiogram; 0: not known, as of a mesh
     double tolerance_voxels; // 0.05
     double tolerance;        // in local radii, 0.004

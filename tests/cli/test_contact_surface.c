@@ -199,7 +199,7 @@ static void a_mesh_that_cannot_be_the_vessel_is_refused(void **state)
     scene_write("mesh: nothing.obj", "[0.5, 0, 0]");
     refused("nothing.obj");
     scene_write("mesh: pipe.obj, contact: lim", "[0.5, 0, 0]");
-    refused("contact 'lim' needs local models");
+    refused("contact 'lim' needs a fitted model");
     scene_write("mesh: pipe.obj, contact: tube", "[0.5, 0, 0]");
     refused("contact 'tube' needs the source 'tube'");
     scene_write("mesh: pipe.obj, plane: {normal: [0, 0, 1]}", "[0.5, 0, 0]");

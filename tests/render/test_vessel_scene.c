@@ -258,7 +258,7 @@ static VesselTree *sphere_tree(Vec3 center, double radius)
     tree->blob_center[0] = center;
     tree->blob_width[0] = blob_width_for_radius(radius, tree->iso_level);
     tree->blob_offset[1] = 1;
-    return tree;
+    return vessel_tree_link(tree) ? tree : NULL;
 }
 
 static void the_tip_s_own_model_is_a_wireframe(void **state)
