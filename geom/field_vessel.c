@@ -507,7 +507,7 @@ static double clear_ball(const FieldVessel *field, const FieldNode *node, Vec3 x
 {
     static const double part[] = {0.9, 0.65, 0.4};
     enum { PARTS = sizeof part / sizeof part[0] };
-    if (!(most > 0.2 * node->radius) || (node->carried && inlet_height(field, x) - most < inlet_zone(field)))
+    if (!(most > 0.5 * node->radius) || (node->carried && inlet_height(field, x) - most < inlet_zone(field)))
         return 0;
     double slope, down, up, f = field_at(field, (int)(node - field->node), x, &slope);
     for (int k = 0; k < PARTS; k++) {
