@@ -502,7 +502,7 @@ static bool row_felt(WallBench *bench, bool spiral, Faults *faults)
     bench->table.on = spiral ? "spiral" : "phantom";
     snprintf(note, sizeof note, "%s", felt.survived ? "without friction" : "without friction; the run did not stay sound to its end");
     if (spiral)
-        wall_add(&bench->table, "push over exact", 100 * felt.over_exact, "%", (WallLimits){3, 0.5, false}, note);
+        wall_add(&bench->table, felt.over_exact < 0 ? "push below exact" : "push over exact", 100 * fabs(felt.over_exact), "%", (WallLimits){3, 0.5, false}, note);
     else
         wall_add(&bench->table, "change of push a step over mean", 100 * felt.change_rms, "%", (WallLimits){1, 0.3, false}, note);
     return true;
