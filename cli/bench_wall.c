@@ -419,7 +419,8 @@ static bool row_synth_junctions(WallBench *bench, Faults *faults)
                 Vec3 at = truth ? vec3_add_scaled(truth->center[0], 2 * truth->radius[0], truth->direction[0]) : vec3(0, 0, 0);
                 snprintf(start, sizeof start, "%.4f,%.4f,%.4f", at.x, at.y, at.z);
                 vessel_tree_free(truth);
-                if (command(bench, (const char *const[]){"synth", "tree", "--branches", "51", "--seed", number, "--voxel-mm", voxel, "-o", volume, "--quiet", NULL}, NULL, faults) &&
+                const char *const synth[] = {"synth", "tree", "--branches", "51", "--seed", number, "--voxel-mm", voxel, "-o", volume, "--quiet", NULL};
+                if (command(bench, synth, NULL, faults) &&
                     command(bench, (const char *const[]){"segment", volume, "--start", start, "-o", tree, "--quiet", NULL}, NULL, faults) &&
                     fit(bench, tree, path, NULL, faults))
                     model = tree_file_load(path, NULL, faults);
@@ -502,7 +503,7 @@ static bool row_felt(WallBench *bench, bool spiral, Faults *faults)
     bench->table.on = spiral ? "spiral" : "phantom";
     snprintf(note, sizeof note, "%s", felt.survived ? "without friction" : "without friction; the run did not stay sound to its end");
     if (spiral)
-        wall_add(&bench->table, "push over exact", 100 * felt.over_exact, "%", (WallLimits){3, 0.5, false}, note);
+        wall_add(&bench->table, felt.over_exact < 0 ? "push below exact" : "push over exact", 100 * fabs(felt.over_exact), "%", (WallLimits){3, 0.5, false}, note);
     else
         wall_add(&bench->table, "change of push a step over mean", 100 * felt.change_rms, "%", (WallLimits){1, 0.3, false}, note);
     return true;

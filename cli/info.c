@@ -301,6 +301,19 @@ static void print_value(const cJSON *value)
     }
 }
 
+// Where a tool gets to has its own words.
+static void print_text(const cJSON *object, const char *reach)
+{
+    for (const cJSON *item = object->child; item; item = item->next) {
+        if (!strcmp(item->string, "reach"))
+            continue;
+        printf("%-16s ", item->string);
+        print_value(item);
+        printf("\n");
+    }
+    fputs(reach ? reach : "", stdout);
+}
+
 int verb_info(int argc, char **argv)
 {
     enum { JSON = 256, REPORT, PICTURE, TOOL_RADIUS, JUNCTIONS, VOLUME, BEFORE, QUIET, HELP };
@@ -376,14 +389,7 @@ int verb_info(int argc, char **argv)
         printf("%s\n", text ? text : "{}");
         free(text);
     } else if (good && !quiet && !(report && !strcmp(report, "-"))) {
-        for (const cJSON *item = object->child; item; item = item->next) {
-            if (!strcmp(item->string, "reach"))
-                continue;
-            printf("%-16s ", item->string);
-            print_value(item);
-            printf("\n");
-        }
-        fputs(wishes.reach ? wishes.reach : "", stdout);
+        print_text(object, wishes.reach);
     }
     free(wishes.reach);
     cJSON_Delete(object);

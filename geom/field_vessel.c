@@ -53,6 +53,8 @@ static const double TRUST = 0.05;            // of the radius: rivals that are t
 static const double REST = 1e-8, REST_FRESH = 1e-10;     // [mm] what Newton may leave of the gap: of a foot that is followed, of one from scratch
 // Feet on two nodes' walls that are closer together than this [mm] are the same.
 static const double AGREE = 1e-3;
+// Walls that are further apart than this [mm] contradict each other: less than any tool's radius.
+static const double APART = 0.1;
 
 // --- The inlet ---
 
@@ -282,7 +284,7 @@ static int settle(const FieldVessel *field, Vec3 x, int node, const Vec3 *start,
         foot[0] = lane_foot(&b, i, node);
         Vec3 g = {f->at.gx[i], f->at.gy[i], f->at.gz[i]}, n = vec3_unit_or(g, vec3(0, 0, 0)), away = vec3_sub(foot[0].at, x);
         double gap = -vec3_dot(away, n), left = vec3_norm(vec3_add_scaled(away, gap, n)), slope = vec3_norm(g), radius = f->radius[i];
-        if (!(slope > 1e-100 && left < LEFT * radius && fabs(f->at.f[i]) < OFF * radius * slope))
+        if (!(slope > 1e-100 && gap > 0.5 * radius && left < LEFT * radius && fabs(f->at.f[i]) < OFF * radius * slope))
             continue;
         foot[0].normal = n, foot[0].gap = gap - f->at.f[i] / slope, foot[0].sure = true;
         found = 1;
@@ -381,7 +383,7 @@ static void add_sheet(Sheets *s, const Foot *foot)
 static bool settle_crossings(const FieldVessel *field, Vec3 x, int node, double side, const double *near_f, const double *far_f, double near, double far,
                              Sheets *sheets)
 {
-    static const double APART = 0.8;         // cosine
+    static const double ASIDE = 0.8;         // cosine
     Vec3 start[FOOT_BLOCK];
     double at[WAYS];
     int count = 0;
@@ -396,7 +398,7 @@ static bool settle_crossings(const FieldVessel *field, Vec3 x, int node, double 
         start[count] = vec3_add_scaled(x, at[best], field->way[best]);
         count++;
         for (int k = 0; k < WAYS; k++)
-            if (vec3_dot(field->way[k], field->way[best]) > APART)
+            if (vec3_dot(field->way[k], field->way[best]) > ASIDE)
                 at[k] = HUGE_VAL;
     }
     Foot foot[FOOT_BLOCK];
@@ -480,7 +482,7 @@ static Sheets project(const FieldVessel *field, Vec3 x, int node, double side)
         double f = blobby_gradient(&blobs, asked_at(field, n, x), &g), slope = vec3_norm(g);
         double step = slope > 1e-100 ? fmax(-n->radius, fmin(n->radius, f / slope)) : 0;
         start[AROUND] = vec3_add_scaled(x, slope > 0 ? -step / slope : 0, g);
-        int found = settle(field, x, node, start, AROUND + 1, FEW_ROUNDS, foot);
+        int found = settle(field, x, node, start, AROUND + 1, side > 0 ? FEW_ROUNDS : ROUNDS, foot);
         for (int i = 0; i < found; i++)
             if (foot[i].gap * side > 0)
                 add_sheet(&sheets, &foot[i]);
@@ -505,7 +507,7 @@ static double clear_ball(const FieldVessel *field, const FieldNode *node, Vec3 x
 {
     static const double part[] = {0.9, 0.65, 0.4};
     enum { PARTS = sizeof part / sizeof part[0] };
-    if (!(most > 0.2 * node->radius) || (node->carried && inlet_height(field, x) - most < inlet_zone(field)))
+    if (!(most > 0.5 * node->radius) || (node->carried && inlet_height(field, x) - most < inlet_zone(field)))
         return 0;
     double slope, down, up, f = field_at(field, (int)(node - field->node), x, &slope);
     for (int k = 0; k < PARTS; k++) {
@@ -557,7 +559,7 @@ static void answer(const FieldVessel *field, Vec3 x, const Foot *foot, VesselMem
 // A gap is as long as the shortest way to the wall: it changes by no more than x moves, or the wall is another. `before`: the gap at the last place.
 static void compare_gaps(VesselMemory *m, double before, double travel, VesselHit *hit)
 {
-    static const double APART = 0.1, GIVES_WAY = 0.2;    // [mm], and per mm of travel
+    static const double GIVES_WAY = 0.2;     // per mm of travel
     if (m->contradicted) {
         m->credible -= GIVES_WAY * travel;
     } else if (fabs(hit->gap - before) > travel + APART) {
@@ -647,9 +649,15 @@ static void find_afresh(const FieldVessel *field, Vec3 x, VesselMemory *m, Vesse
 static void answer_afresh(const FieldVessel *field, Vec3 x, VesselMemory *m, VesselHit *hit)
 {
     bool known = m->has_foot;
+    int from = m->node;
     double before = vec3_dot(vec3_sub(m->place, m->foot), m->normal), travel = vec3_distance(x, m->place);
     find_afresh(field, x, m, hit);
-    if (known && !(hit->flags & VESSEL_UNSURE))
+    if (!known || hit->flags & VESSEL_UNSURE)
+        return;
+    // a foot that was not followed well is no fault of the model's: only where the former node knows of no wall here is it one
+    bool other = hit->node != from && travel < BLOB_FLOOD_MARGIN * field->node[from].radius &&
+                 walls_apart(field, from, hit->node, asked_at(field, &field->node[hit->node], m->foot)) > APART;
+    if (other || m->contradicted)
         compare_gaps(m, before, travel, hit);
 }
 

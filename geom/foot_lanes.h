@@ -171,8 +171,8 @@ static inline __attribute__((always_inline)) void foot_newton(FootBatch *restric
         double allowed = b->allowed[i] * b->allowed[i], curl = 2 * (size2 + b->bend[i] * b->bend[i]), left = curl * along2 * along2;
         double done;
         if (exact) {
-            double all2 = along2 + step2, whole = curl * all2 * all2;
-            done = whole < 1e4 * allowed && FOOT_THIRD * curl * all2 * whole < allowed ? 1.0 : 0.0;
+            double all2 = along2 + step2, whole = curl * all2 * all2, tilt = gap * curl * whole;   // of X's distance, by the normal's error
+            done = whole < 1e4 * allowed && FOOT_THIRD * curl * all2 * whole < allowed && tilt * tilt < allowed ? 1.0 : 0.0;
         } else {
             done = left < 1e4 * allowed && 4 * curl * (along2 + step2) * (left + step2) < allowed ? 1.0 : 0.0;
         }

@@ -5,6 +5,7 @@
 #include "recon/volume_noise.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 const double rbt_level_voxels[RBT_LEVELS] = {0, 0.7, 1.4, 2, 2.8};
 enum { SECTORS = 12, DROPPED = 2, STATIONS = 5, CERTAIN = 6 };
@@ -17,18 +18,68 @@ const Volume *rbt_level(RbtLevels *levels, int level)
 {
     if (level == 0)
         return levels->volume;
+    for (int i = 1; i < RBT_LEVELS; i++)
+        if (i != level) {
+            volume_free(levels->smooth[i]);
+            levels->smooth[i] = NULL;
+        }
     if (!levels->smooth[level])
         levels->smooth[level] = volume_smoothed(levels->volume, rbt_level_voxels[level] * volume_voxel_size(levels->volume), levels->threads);
     return levels->smooth[level];
 }
 
+static void free_near(RbtLevels *levels)
+{
+    for (int i = 0; i < RBT_LEVELS; i++) {
+        volume_free(levels->near[i]);
+        levels->near[i] = NULL;
+    }
+}
+
+// The voxels around x to levels->near[0]. False: out of memory.
+static bool crop_near(RbtLevels *levels, Vec3 x)
+{
+    enum { REACH = 84 };     // voxels: the widest template and its ring, and what smoothing looks at
+    const Volume *v = levels->volume;
+    if (levels->near[0] && vec3_distance(x, levels->center) == 0)
+        return true;
+    free_near(levels);
+    Vec3 c = volume_voxel_of(v, x);
+    double at[3] = {c.x, c.y, c.z};
+    int low[3], size[3];
+    for (int i = 0; i < 3; i++) {
+        low[i] = (int)fmax(0, floor(at[i]) - REACH);
+        size[i] = (int)fmin(v->size[i] - 1, floor(at[i]) + REACH) - low[i] + 1;
+    }
+    Volume *near = volume_create(size, volume_point_of(v, vec3(low[0], low[1], low[2])), v->axis);
+    if (!near)
+        return false;
+    for (int k = 0; k < size[2]; k++)
+        for (int j = 0; j < size[1]; j++)
+            memcpy(near->value + ((size_t)k * (size_t)size[1] + (size_t)j) * (size_t)size[0],
+                   v->value + ((size_t)(low[2] + k) * (size_t)v->size[1] + (size_t)(low[1] + j)) * (size_t)v->size[0] + low[0], (size_t)size[0] * sizeof *near->value);
+    near->minimum = v->minimum;
+    near->maximum = v->maximum;
+    levels->near[0] = near;
+    levels->center = x;
+    return true;
+}
+
+static const Volume *near_level(RbtLevels *levels, int level)
+{
+    if (!levels->near[level])
+        levels->near[level] = volume_smoothed(levels->near[0], rbt_level_voxels[level] * volume_voxel_size(levels->volume), levels->threads);
+    return levels->near[level];
+}
+
 double rbt_level_noise(RbtLevels *levels, int level)
 {
-    const Volume *volume = rbt_level(levels, level);
+    // smoothed copies: of what is near, where there is such a one
+    const Volume *volume = level == 0 ? levels->volume : levels->near[0] ? near_level(levels, level) : rbt_level(levels, level);
     if (volume && levels->noise[level] < 0) {
         double noise = volume_noise(volume, (int)ceil(4 * rbt_level_voxels[level]) + 1);
         // less is rounding, or the tail of a blur
-        levels->noise[level] = noise > 1e-4 * ((double)volume->maximum - (double)volume->minimum) ? noise : 0;
+        levels->noise[level] = noise > 1e-4 * ((double)levels->volume->maximum - (double)levels->volume->minimum) ? noise : 0;
     }
     return volume ? levels->noise[level] : 0;
 }
@@ -37,6 +88,7 @@ void rbt_levels_free(RbtLevels *levels)
 {
     for (int i = 0; i < RBT_LEVELS; i++)
         volume_free(levels->smooth[i]);
+    free_near(levels);
     *levels = (RbtLevels){0};
 }
 
@@ -164,7 +216,7 @@ static void scan_radius(void *context, long index)
     int level = 0;
     while (level + 1 < RBT_LEVELS && rbt_level_voxels[level + 1] * t->voxel <= 0.4 * r)
         level++;
-    const Volume *volume = level ? scan->levels->smooth[level] : scan->levels->volume;
+    const Volume *volume = scan->levels->near[level];
     for (int a = 0; a < (scan->axis ? 1 : t->axis_count); a++) {
         Vec3 axis = scan->axis ? *scan->axis : t->axis[a], e1 = vec3_normal_to(axis), e2 = vec3_cross(axis, e1);
         for (int i = -2; i <= 2; i++)
@@ -190,11 +242,11 @@ int rbt_scan(Tracker *t, RbtLevels *levels, Vec3 x, double radius, const Vec3 *a
         widest = fmin(widest, vec3_norm(t->volume->axis[i]) * t->volume->size[i] / 6);
     for (double r = radius > 0 ? radius : t->voxel; count == 0 || (!(radius > 0) && r < widest && count < RBT_SCANS); r *= 1.35)
         scan.radius[count++] = r;
-    for (int level = 1; level < RBT_LEVELS; level++)
-        if (rbt_level_voxels[level] * t->voxel <= 0.4 * scan.radius[count - 1] && !rbt_level(levels, level)) {
-            t->out_of_memory = true;
-            return 0;
-        }
+    t->out_of_memory = !crop_near(levels, x);
+    for (int level = 1; level < RBT_LEVELS && !t->out_of_memory; level++)
+        t->out_of_memory = rbt_level_voxels[level] * t->voxel <= 0.4 * scan.radius[count - 1] && !near_level(levels, level);
+    if (t->out_of_memory)
+        return 0;
     parallel_for(levels->threads, count, scan_radius, &scan, NULL);
     double noise = fmax(rbt_level_noise(levels, 0), 1e-9);
     for (int i = 0; i < count; i++) {   // by all voxels of each, not by the template's samples

@@ -9,13 +9,15 @@ extern const double rbt_level_voxels[RBT_LEVELS];   // standard deviation of eac
 
 typedef struct RbtLevels {   // the volume and smoothed copies of it, made when they are first asked for
     const Volume *volume;
-    Volume *smooth[RBT_LEVELS];
+    Volume *smooth[RBT_LEVELS];  // of the whole; at most one at a time
+    Volume *near[RBT_LEVELS];    // of what lies around the place that was scanned last, the first as it is
+    Vec3 center;
     double noise[RBT_LEVELS];    // standard deviation of a voxel [grey values]
     int threads;
 } RbtLevels;
 
 RbtLevels rbt_levels_of(const Volume *volume, int threads);
-// NULL: out of memory. The level stays the owner's.
+// NULL: out of memory. The level stays the owner's; the one asked for before is freed.
 const Volume *rbt_level(RbtLevels *levels, int level);
 double rbt_level_noise(RbtLevels *levels, int level);
 void rbt_levels_free(RbtLevels *levels);

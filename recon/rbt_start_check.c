@@ -186,7 +186,9 @@ static bool is_outdone(Tracker *t, RbtLevels *levels, const RbtSeed *seed, RbtSt
 {
     char text[240];
     RbtSight own = rbt_sight_of(levels->volume, check->noise, &check->cylinder);
-    if (!(check->noise > 0))
+    // the search takes a while: not where the click lies in the middle of a good cylinder
+    bool is_good = check->drift < 0.6 * check->cylinder.radius && check->inlier_rate > 0.6 && own.evenness > 0.6;
+    if (!(check->noise > 0) || (t->scan_count < 0 && is_good))
         return false;
     if (t->scan_count < 0)
         t->scan_count = scan_at(t, levels, seed, t->scan);
