@@ -32,7 +32,7 @@ static const Kind kinds[] = {
     {"contrast 12, noise 21, click beside", 12, 21, 0, 0, 4, true, true},
     {"contrast 15, noise 11, band 40, click beside", 15, 11, 40, 8, 4, true, true},
 };
-enum { KINDS = sizeof kinds / sizeof kinds[0] };
+enum { KINDS = sizeof kinds / sizeof kinds[0], ENOUGH = 8 };
 
 typedef struct Trial {
     bool is_refused, is_right, failed;
@@ -308,16 +308,17 @@ bool bench_starts(FILE *out, int seeds, int threads, cJSON *root, bool *kept, Fa
         missing += kinds[k].is_hidden ? row.tracked : 0;
         silent += row.silent;
     }
+    bool *judged = seeds >= ENOUGH ? kept : NULL;   // a seed or two say nothing about a rate
     if (good) {
         fprintf(out,
                 "right: the start within half a radius of the true axis, its radius within 30 %%, four fifths of the trunk tracked; ref.: refused; warn: tracked, with a\n"
                 "warning (other than that a smoothed copy was tracked: smth); wrong: tracked, not right, no such warning. drift: from the click to the axis found [true\n"
                 "radii], mean and most; radius: found over true; turn.: the root is not at the trunk's end (labels of these are not counted).\n"
                 "In the last four kinds noise hides the vessel or none is there: a refusal is right.\n");
-        print_verdict(out, "right of those that can be seen [%]", percent(right, seen), 80, true, kept);
-        print_verdict(out, "refused of those that can be seen [%]", percent(false_refusals, seen), 10, false, kept);
-        print_verdict(out, "not refused of the hidden [%]", percent(missing, hidden), 5, false, kept);
-        print_verdict(out, "wrong without a word [% of all]", percent(silent, seen + hidden), 5, false, kept);
+        print_verdict(out, "right of those that can be seen [%]", percent(right, seen), 80, true, judged);
+        print_verdict(out, "refused of those that can be seen [%]", percent(false_refusals, seen), 10, false, judged);
+        print_verdict(out, "not refused of the hidden [%]", percent(missing, hidden), 5, false, judged);
+        print_verdict(out, "wrong without a word [% of all]", percent(silent, seen + hidden), 5, false, judged);
         print_verdict(out, "wrong without a word [% of all]", percent(silent, seen + hidden), 0, false, NULL);
     } else if (faults->count == 0) {
         faults_add(faults, "bench track", 0, 0, "not enough memory");

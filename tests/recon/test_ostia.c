@@ -103,7 +103,8 @@ static void summarise(Figures *f, double *mean, double *rms, double *p99)
         f->error[i] = fabs(f->error[i]);
     }
     *rms = sqrt(*rms);
-    sort_doubles(f->error, (size_t)f->count);
+    if (f->count > 0)
+        sort_doubles(f->error, (size_t)f->count);
     *p99 = f->count > 0 ? f->error[(int)(0.99 * (f->count - 1))] : 0;
 }
 
