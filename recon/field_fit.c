@@ -186,13 +186,9 @@ static VesselTree *make_tree(const FieldModel *model, Faults *faults)
     return tree;
 }
 
-typedef struct ErrorJob {
-    VesselTree *tree;
-} ErrorJob;
-
 static void measure_error(void *context, long index)
 {
-    VesselTree *tree = ((ErrorJob *)context)->tree;
+    VesselTree *tree = context;
     int64_t first = tree->point_offset[index], count = tree->point_offset[index + 1] - first;
     double *distance = malloc(((size_t)count + 1) * sizeof *distance);
     Blobby model = blobby_of(tree, (int)index);
@@ -221,9 +217,8 @@ VesselTree *field_fit(const VesselTree *tree, const FieldFitOptions *options, co
     VesselTree *out = NULL;
     if (field_rows_create(&rows, tree, options->threads) && field_model_create(&model, tree, &rows, options->threads) && fit(&model, options, progress)) {
         out = make_tree(&model, faults);
-        ErrorJob job = {out};
         if (out)
-            parallel_for(options->threads, out->node_count, measure_error, &job, NULL);
+            parallel_for(options->threads, out->node_count, measure_error, out, NULL);
     } else {
         faults_add(faults, "fit", 0, 0, "not enough memory");
     }

@@ -15,9 +15,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Of a tube's radius: points nearer to its axis are not wall.
 // Inside the field stays near the scaled distance's 0 to 1 in this direction, too: large amplitudes that cancel at the wall leave hollows beside the axis.
 static const double MOST_INSIDE = 1.5;
+// Of a tube's radius: points nearer to its axis are not wall.
 static const double LUMEN_POINT = 0.5;
 // A sac is no ball: only this share of it is lumen for certain, beyond that its data say where it ends.
 static const double SAC_BALL = 0.6;

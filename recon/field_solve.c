@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { REGION_BLOBS = 28, UNKNOWNS = 5, COLOURS_MAX = 4096 };
+enum { REGION_BLOBS = 28, UNKNOWNS = 5};
 static const double LEAST_SLOPE = 0.5;
 // Priors: a blob's place and size are held to where it was put, as firmly as a few points a hundredth of a radius off would.
 static const double PRIOR_PLACE = 0.02, PRIOR_AMPLITUDE = 0.005, LEAST_BASE = 0.1;
@@ -482,7 +482,7 @@ static bool is_due(const Sweep *s, const Region *region)
     return false;
 }
 
-// Colours: a region takes the first that none before it has on any of its nodes. `last` (N, words) holds each node's colours as bits.
+// Colours: a region takes the first that none before it has on any of its nodes. `used` (N, WORDS) holds each node's colours as bits.
 static int colour_regions(const Sweep *s)
 {
     enum { WORDS = 4 };
