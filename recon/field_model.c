@@ -6,9 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Nodes are found for a reach so much larger, so that they still hold while a blob grows in a sweep.
-static const double LIST_REACH = 1.15;
-
 bool field_model_create(FieldModel *model, const VesselTree *tree, const FieldRows *rows, int threads)
 {
     size_t n = (size_t)tree->node_count;
@@ -67,7 +64,7 @@ static void flood_chunk(void *context, long index)
         FieldBlob *blob = &model->blob[b];
         if (!blob->moved)
             continue;
-        int count = blob_flood_nodes(&flood, model->tree, blob->owner, blob->center, LIST_REACH * blob->reach);
+        int count = blob_flood_nodes(&flood, model->tree, blob->owner, blob->center, FIELD_ROOM * blob->reach);
         int *node = realloc(blob->node, (size_t)count * sizeof *node);
         if (!node) {
             job->failed[index] = true;

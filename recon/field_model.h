@@ -7,6 +7,8 @@
 
 // Of the loss, in local radii: a point further from the wall than that contradicts the others more than it counts.
 #define FIELD_KNEE 0.25
+// How far, in its reach, a blob may come to reach in a sweep: nodes and rows are listed for that.
+#define FIELD_ROOM 1.15
 
 typedef struct FieldBlob {
     Vec3 center;
@@ -14,7 +16,7 @@ typedef struct FieldBlob {
     int owner;               // the node that the flood starts from
     Vec3 birth;              // where it was put, and how large: priors
     double birth_reach;
-    int node_count, *node;   // nodes that see it, for a reach a little larger
+    int node_count, *node;   // nodes that see it, for FIELD_ROOM times its reach
     bool is_base;            // its amplitude stays positive: the base is lumen
     bool moved;              // since those were found
 } FieldBlob;

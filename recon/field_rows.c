@@ -9,6 +9,7 @@
 // They act only where they are violated. Without them a fit of signed blobs grows sheets where nothing speaks against them.
 #include "recon/field_rows.h"
 
+#include "geom/power_blocks.h"
 #include "geom/power_walk.h"
 #include "recon/parallel.h"
 
@@ -32,6 +33,7 @@ typedef struct Draft {       // rows of a node while they are collected
 
 typedef struct Job {
     const VesselTree *tree;
+    PowerBlocks blocks;
     Draft *draft;            // (N) what each node's points and tube give …
     int **cell;              // … (N) and the cells that those rows lie in, data first
     FieldRows *rows;
@@ -120,13 +122,14 @@ static bool is_clear(const VesselTree *tree, int node, Vec3 x, double clear)
     return true;
 }
 
-// The same near the node whose cell x lies in: just beyond a vessel's wall its sibling's lumen may begin, which is not near in the tree.
-static bool is_outside(const VesselTree *tree, int node, Vec3 x, double clear)
+// The same near the node whose cell of the whole tree x lies in: just beyond a vessel's wall another's lumen may begin, a sibling's or that of the
+// vessel's own way back, which are not near in the tree but share blobs with it.
+static bool is_outside(const Job *job, int node, Vec3 x, double clear)
 {
-    if (!is_clear(tree, node, x, clear))
+    if (!is_clear(job->tree, node, x, clear))
         return false;
-    int cell = power_walk(tree, x, node, 8);
-    return cell == node || is_clear(tree, cell, x, clear);
+    int cell = power_blocks_nearest(&job->blocks, x);
+    return cell == node || is_clear(job->tree, cell, x, clear);
 }
 
 static Vec3 axis_point(const VesselTree *tree, int node, Vec3 p)
@@ -139,8 +142,9 @@ static Vec3 axis_point(const VesselTree *tree, int node, Vec3 p)
 // The bound of a place at `clear` mm from the wall in a vessel of radius r.
 static double low_bound(double clear, double r) { return 0.5 * fmin(1, 2 * clear / r); }
 
-static void guard_around_point(const VesselTree *tree, int node, Vec3 p, Draft *d)
+static void guard_around_point(const Job *job, int node, Vec3 p, Draft *d)
 {
+    const VesselTree *tree = job->tree;
     Vec3 axis = axis_point(tree, node, p), out = vec3_sub(p, axis);
     double r = tree->radius[node], far = vec3_norm(out);
     if (!(far > 0.2 * r))
@@ -153,13 +157,14 @@ static void guard_around_point(const VesselTree *tree, int node, Vec3 p, Draft *
     for (int k = 0; k < 3; k++) {
         static const double away[3] = {0.35, 0.8, 1.4};
         Vec3 x = vec3_add_scaled(p, away[k] * r, out);
-        if (is_outside(tree, node, x, 0.3 * r))
+        if (is_outside(job, node, x, 0.3 * r))
             add_guard(d, x, -HUGE_VAL, -fmin(0.5, 0.5 * away[k]));
     }
 }
 
-static void guard_ring(const VesselTree *tree, int node, Draft *d)
+static void guard_ring(const Job *job, int node, Draft *d)
 {
+    const VesselTree *tree = job->tree;
     Vec3 c = tree->center[node], axis = tree->direction[node], e1 = vec3_normal_to(axis), e2 = vec3_cross(axis, e1);
     double r = tree->radius[node];
     for (int k = 0; k < RING; k++) {
@@ -167,7 +172,7 @@ static void guard_ring(const VesselTree *tree, int node, Draft *d)
         Vec3 out = vec3_add(vec3_scale(e1, cos(angle)), vec3_scale(e2, sin(angle)));
         for (int far = 0; far < 2; far++) {
             Vec3 x = vec3_add_scaled(c, (1.6 + 0.6 * far) * r, out);
-            if (is_outside(tree, node, x, 0.4 * r))
+            if (is_outside(job, node, x, 0.4 * r))
                 add_guard(d, x, -HUGE_VAL, -0.4);
         }
     }
@@ -235,12 +240,12 @@ static void draft_node(void *context, long index)
             add_point(d, p);
     }
     for (int i = (node * 3) % GUARD_EVERY; i < d->data; i += GUARD_EVERY)
-        guard_around_point(tree, node, d->point[i], d);
+        guard_around_point(job, node, d->point[i], d);
     if (root_open)
         extend_inlet(tree, d);
     guard_axis(tree, node, d);
     if (tree->kind[node] == NODE_VESSEL)
-        guard_ring(tree, node, d);
+        guard_ring(job, node, d);
     if (d->failed)
         return;
     job->cell[node] = malloc(((size_t)(d->data + d->guards) + 1) * sizeof **job->cell);
@@ -382,8 +387,8 @@ bool field_rows_create(FieldRows *rows, const VesselTree *tree, int threads)
 {
     size_t n = (size_t)tree->node_count;
     *rows = (FieldRows){.node_count = tree->node_count, .first = calloc(n + 1, sizeof *rows->first)};
-    Job job = {tree, calloc(n, sizeof *job.draft), calloc(n, sizeof *job.cell), rows, calloc(n, sizeof *job.dropped)};
-    bool good = rows->first && job.draft && job.cell && job.dropped;
+    Job job = {.tree = tree, .draft = calloc(n, sizeof *job.draft), .cell = calloc(n, sizeof *job.cell), .rows = rows, .dropped = calloc(n, sizeof *job.dropped)};
+    bool good = power_blocks_create(&job.blocks, tree) && rows->first && job.draft && job.cell && job.dropped;
     if (good) {
         parallel_for(threads, tree->node_count, draft_node, &job, NULL);
         good = make_tiles(&job);
@@ -398,6 +403,7 @@ bool field_rows_create(FieldRows *rows, const VesselTree *tree, int threads)
     free(job.draft);
     free(job.cell);
     free(job.dropped);
+    power_blocks_free(&job.blocks);
     if (!good)
         field_rows_free(rows);
     return good;

@@ -56,9 +56,6 @@ typedef struct Work {        // of one region
 
 // --- Setting up ---
 
-// Blobs may grow and move in a sweep: tiles just beyond their support are theirs too.
-static const float TILE_SHARE = 1.15f;
-
 static int tiles_of(const Sweep *sweep, const Region *region)
 {
     int tiles = 0;
@@ -77,7 +74,7 @@ static int find_blobs(const Sweep *sweep, int region, const RowTile *tile, int *
         if (sweep->region_of[b] != region)
             continue;
         LaneBlob lane = field_lane_blob(model->tree, tile->node, &model->blob[b]);
-        if (field_tile_meets(tile, &lane, TILE_SHARE))
+        if (field_tile_meets(tile, &lane, (float)FIELD_ROOM))
             local[count++] = sweep->local_of[b];
     }
     return count;
@@ -313,7 +310,8 @@ static void linearise(Work *w)
 
 static double bound(double value, double most) { return fmax(-most, fmin(most, value)); }
 
-static FieldBlob moved_by(const FieldBlob *b, const double *step)
+// `start`: the blob as the sweep found it, whose rows are known to FIELD_ROOM times its reach: beyond that the step would be judged without the rows it spoils.
+static FieldBlob moved_by(const FieldBlob *b, const double *step, const FieldBlob *start)
 {
     FieldBlob to = *b;
     to.amplitude += bound(step[0], 0.5 + 0.5 * fabs(b->amplitude));
@@ -328,6 +326,12 @@ static FieldBlob moved_by(const FieldBlob *b, const double *step)
     double reach = b->reach * exp(bound(step[4], 0.2));
     double least = (b->is_base ? 0.75 : 0.5) * b->birth_reach, largest = fmin((b->is_base ? 1.5 : 2) * b->birth_reach, 1.12 * b->reach);
     to.reach = fmax(least, fmin(reach, largest));
+    Vec3 gone = vec3_sub(to.center, start->center);
+    double beyond = vec3_norm(gone) + fmax(0, to.reach - start->reach), room = (FIELD_ROOM - 1) * start->reach;
+    if (beyond > room) {
+        to.center = vec3_add_scaled(start->center, room / beyond, gone);
+        to.reach = to.reach > start->reach ? start->reach + room / beyond * (to.reach - start->reach) : to.reach;
+    }
     to.moved = true;
     return to;
 }
@@ -373,7 +377,7 @@ static void solve_region(void *context, long index)
         }
         if (solve_step(&w, damping)) {
             for (int k = 0; k < region->count; k++)
-                w.trial[k] = moved_by(&now[k], w.step + UNKNOWNS * k);
+                w.trial[k] = moved_by(&now[k], w.step + UNKNOWNS * k, &model->blob[order[k]]);
             double there = energy(&w, w.trial);
             if (there < least) {
                 bool enough = there > 0.999 * least;
