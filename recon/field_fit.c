@@ -11,6 +11,8 @@ static const double BASE_APART = 0.75, BASE_REACH = 2;   // of the base blobs, i
 // The mean distance that is aimed at where single points are to be within target_mm.
 static const double TARGET_SHARE = 0.2;
 static const double level_reach[] = {1.4, 1.4, 1, 1, 0.7, 0.7, 0.5, 0.35};
+// The loss gets sharper from level to level: with a sharp one from the start a wall that the base misses by much is an outlier for ever.
+static const double base_knee = 1, level_knee[] = {1, 0.5, 0.5, 0.25, 0.25, 0.25, 0.25, 0.25};
 enum { LEVELS = sizeof level_reach / sizeof level_reach[0], LAST_SWEEPS = 4 };
 
 FieldFitOptions field_fit_default_options(void)
@@ -123,6 +125,7 @@ static bool fit(FieldModel *model, const FieldFitOptions *options, const Progres
     if (!lay_base(model))
         return false;
     all_due(model);
+    model->knee = base_knee;
     // the amplitudes alone come first: places that start out far from the solution end up in bad ones, which no finer blob mends
     for (int k = 0; k < 3; k++) {
         model->amplitudes_only = k < 2;
@@ -133,6 +136,7 @@ static bool fit(FieldModel *model, const FieldFitOptions *options, const Progres
         FieldRefine how = {level_reach[level], given ? 0 : known ? options->tolerance : options->tolerance_unknown,
                            given ? TARGET_SHARE * options->target_mm : options->tolerance_voxels * options->voxel_mm,
                            options->least_reach_voxels * options->voxel_mm, options->significance};
+        model->knee = level_knee[level];
         s.failed |= field_refine(model, &how) < 0;
         for (int k = 0; k < 2; k++)
             sweep(&s, 3);

@@ -5,8 +5,6 @@
 #include "recon/field_lanes.h"
 #include "recon/field_rows.h"
 
-// Of the loss, in local radii: a point further from the wall than that contradicts the others more than it counts.
-#define FIELD_KNEE 0.25
 // How far, in its reach, a blob may come to reach in a sweep: nodes and rows are listed for that.
 #define FIELD_ROOM 1.15
 
@@ -33,6 +31,7 @@ typedef struct FieldModel {
     bool amplitudes_only;    // places and sizes stand still
     double guard_weight;     // of a guard against a data point
     double smooth;           // weight of the slope rows
+    double knee;             // of the loss, in local radii: a point further from the wall than that contradicts the others more than it counts
 } FieldModel;
 
 bool field_model_create(FieldModel *model, const VesselTree *tree, const FieldRows *rows, int threads);

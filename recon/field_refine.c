@@ -36,7 +36,7 @@ static void measure_residuals(void *context, long index)
 {
     Job *job = context;
     const int *first = job->model->rows->first;
-    float knee = (float)(FIELD_KNEE * job->model->tree->radius[index]);
+    float knee = (float)(job->model->knee * job->model->tree->radius[index]);
     for (int t = first[index]; t < first[index + 1]; t++) {
         float *residual = job->residual[t];
         field_model_residuals(job->model, tile_of(job, t), residual);

@@ -169,7 +169,7 @@ static double loss(double e, double knee) { return e * e / (1 + e * e / (knee * 
 static double energy_of_tile(const FieldModel *model, const TileWork *tw)
 {
     const RowTile *tile = tw->tile;
-    double r = model->tree->radius[tile->node], knee = FIELD_KNEE * r, least = LEAST_SLOPE / r, bend = model->smooth * r, sum = 0;
+    double r = model->tree->radius[tile->node], knee = model->knee * r, least = LEAST_SLOPE / r, bend = model->smooth * r, sum = 0;
     for (int i = 0; i < tile->data; i++) {
         float gx = tw->g[0][i], gy = tw->g[1][i], gz = tw->g[2][i];
         double slope = sqrt((double)(gx * gx + gy * gy + gz * gz)), off = bend * (0.5 * r * slope - 1);
@@ -215,7 +215,7 @@ static void weigh_rows(const FieldModel *model, const TileWork *tw, Weighed *to,
 {
     const RowTile *tile = tw->tile;
     int d = tile->data_padded, rows = d;
-    float r = (float)model->tree->radius[tile->node], knee = (float)FIELD_KNEE * r, least = (float)LEAST_SLOPE / r, half = 0.5f * r,
+    float r = (float)model->tree->radius[tile->node], knee = (float)model->knee * r, least = (float)LEAST_SLOPE / r, half = 0.5f * r,
           bend = (float)model->smooth * r * half, guard = half * (float)model->guard_weight;
     memcpy(to->x, tile->x, (size_t)d * sizeof(float)), memcpy(to->y, tile->y, (size_t)d * sizeof(float)), memcpy(to->z, tile->z, (size_t)d * sizeof(float));
     for (int i = 0; i < tile->guards; i++) {
