@@ -26,10 +26,10 @@ void field_directions(Vec3 *way, int count)
 
 void field_clear_points(ClearPoints *points)
 {
-    static const int count[] = {80, 32, 16};
-    static const double sphere[] = {0.95, 0.65, 0.35};
-    Vec3 way[80];
-    for (int s = 0, at = 0; s < 3; s++) {
+    static const int count[] = {CLEAR_ON_OUTER, CLEAR_ON_INNER};
+    static const double sphere[] = {CLEAR_OUTER, CLEAR_INNER};
+    Vec3 way[CLEAR_ON_OUTER];
+    for (int s = 0, at = 0; s < 2; s++) {
         field_directions(way, count[s]);
         for (int k = 0; k < count[s]; k++, at++) {
             points->x[at] = (float)(sphere[s] * way[k].x);

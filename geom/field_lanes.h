@@ -24,8 +24,10 @@ enum { MEMORY_FOOT = 0, MEMORY_PLACE = 3, MEMORY_NORMAL = 6, MEMORY_HESSIAN = 9,
        MEMORY_UP = 23, MEMORY_WRITTEN = 24, MEMORY_HELD_AT = 24, MEMORY_HELD_FOR2 = 27, MEMORY_BOUND_AT = 28, MEMORY_BOUND_FOR = 31, MEMORY_ROW = 32 };
 enum { HIT_ROW = 10 };               // gap, normal, Hessian
 
-// Points in the unit ball: 80 at 0.95 of its radius, 32 at 0.65, 16 at 0.35.
-enum { CLEAR_POINTS = 128 };
+// Points in the unit ball, on two spheres about its middle.
+#define CLEAR_OUTER 0.95
+#define CLEAR_INNER 0.5
+enum { CLEAR_ON_OUTER = 80, CLEAR_ON_INNER = 16, CLEAR_POINTS = CLEAR_ON_OUTER + CLEAR_ON_INNER };
 typedef struct ClearPoints {
     float x[CLEAR_POINTS], y[CLEAR_POINTS], z[CLEAR_POINTS];
 } ClearPoints;

@@ -152,15 +152,23 @@ static bool sees_all(const FieldVessel *field, Vec3 q, int node)
     return true;
 }
 
-// Those of a node's blobs that reach to within `skin` of q; returns their number, of which at most `most` are listed.
-static int pick_blobs(const FieldVessel *field, const FieldNode *node, Vec3 q, double skin, int most, int32_t *list)
+// A list of blobs: all that a node sees, or those of them that reach into a ball.
+enum { NEAR_BLOBS = 64 };
+typedef struct BlobList {
+    const int32_t *blob;
+    int count;
+    int32_t own[NEAR_BLOBS];
+} BlobList;
+
+// Those of a list that reach to within `skin` of q; returns their number, of which at most `most` are listed.
+static int pick_blobs(const FieldVessel *field, const int32_t *seen_blob, int seen_count, Vec3 q, double skin, int most, int32_t *list)
 {
     enum { PART = 512 };
     uint8_t bits[PART / FOOT_BLOCK];
     int count = 0;
-    for (int part = 0; part < node->seen_count && count <= most; part += PART) {
-        int n = node->seen_count - part < PART ? node->seen_count - part : PART;
-        const int32_t *seen = node->seen + part;
+    for (int part = 0; part < seen_count && count <= most; part += PART) {
+        int n = seen_count - part < PART ? seen_count - part : PART;
+        const int32_t *seen = seen_blob + part;
         field->kernels->pick(field->row, seen, n, q, skin, bits);
         for (int k = 0; k < n; k += FOOT_BLOCK) {
             unsigned in = bits[k / FOOT_BLOCK] & (n - k < FOOT_BLOCK ? (1u << (n - k)) - 1 : 0xff);
@@ -172,15 +180,27 @@ static int pick_blobs(const FieldVessel *field, const FieldNode *node, Vec3 q, d
     return count;
 }
 
-// Makes the list of a memory for feet about q, as its node sees them.
-static void hold_blobs(const FieldVessel *field, VesselMemory *m, Vec3 q)
+// A node's blobs that reach to within `far` of x. Near the inlet all: the field is asked elsewhere there.
+static void list_blobs(const FieldVessel *field, int node, Vec3 x, double far, BlobList *list)
 {
-    const FieldNode *node = &field->node[m->node];
-    double skin = node->skin;
-    int count = pick_blobs(field, node, q, skin, VESSEL_BLOBS, m->blob);
+    const FieldNode *n = &field->node[node];
+    list->blob = list->own;
+    list->count = n->carried || n->seen_count <= FOOT_BLOCK ? NEAR_BLOBS + 1 : pick_blobs(field, n->seen, n->seen_count, x, far, NEAR_BLOBS, list->own);
+    if (list->count > NEAR_BLOBS)
+        list->blob = n->seen, list->count = n->seen_count;
+}
+
+// How far about a point whoever looks for its closest wall asks, beyond the gap, in radii.
+static const double LOOK = 0.5;
+
+// Makes the list of a memory for feet about q, of those that reach there.
+static void hold_blobs(const FieldVessel *field, VesselMemory *m, Vec3 q, const BlobList *list)
+{
+    double skin = field->node[m->node].skin;
+    int count = pick_blobs(field, list->blob, list->count, q, skin, VESSEL_BLOBS, m->blob);
     for (int shrink = 0; shrink < 2 && count > VESSEL_BLOBS; shrink++) {
         skin *= 0.4;
-        count = pick_blobs(field, node, q, skin, VESSEL_BLOBS, m->blob);
+        count = pick_blobs(field, list->blob, list->count, q, skin, VESSEL_BLOBS, m->blob);
     }
     m->blobs = count <= VESSEL_BLOBS ? count : -1;
     for (int k = count; k < VESSEL_BLOBS; k++)
@@ -190,28 +210,39 @@ static void hold_blobs(const FieldVessel *field, VesselMemory *m, Vec3 q)
 }
 
 // Bounds of how f bends in a ball a little wider than the gap.
-static void hold_bounds(const FieldVessel *field, VesselMemory *m, int node, Vec3 x, double gap)
+static void hold_bounds(const FieldVessel *field, VesselMemory *m, int node, Vec3 x, double gap, const BlobList *list)
 {
     const FieldNode *n = &field->node[node];
     m->bound_at = x;
     m->bound_for = fabs(gap) + fmin(BOUND * n->radius, BOUND_MOST);
-    field->kernels->bends(field->row, n->seen, n->seen_count, asked_at(field, n, x), m->bound_for, &m->down, &m->up);
+    field->kernels->bends(field->row, list->blob, list->count, asked_at(field, n, x), m->bound_for, &m->down, &m->up);
 }
 
-// The field of a node at q, and the size of its slope.
-static double field_at(const FieldVessel *field, int node, Vec3 q, double *slope)
+// The field of a list at q, and the size of its slope.
+static double field_at(const FieldVessel *field, const BlobList *list, Vec3 q, double *slope)
 {
-    Blobby blobs = blobby_of(field->tree, node);
-    Vec3 g;
-    double f = blobby_gradient(&blobs, q, &g);
+    double f = -1;
+    Vec3 g = {0, 0, 0};
+    for (int k = 0; k < list->count; k++) {
+        const FieldRow *b = &field->row[list->blob[k]];
+        Vec3 d = {q.x - b->cx, q.y - b->cy, q.z - b->cz};
+        double u = fmax(0, 1 - vec3_norm2(d) * b->inverse);
+        f += b->amplitude * u * u * u;
+        g = vec3_add_scaled(g, -6 * b->amplitude * b->inverse * u * u, d);
+    }
     *slope = vec3_norm(g);
     return f;
 }
 
-// [mm] by which the walls of two nodes about a foot q differ.
+// [mm] by which the walls of two nodes about a foot q differ: not where both see the same blobs there.
 static double walls_apart(const FieldVessel *field, int a, int b, Vec3 q)
 {
-    double slope_a, slope_b, f_a = field_at(field, a, q, &slope_a), f_b = field_at(field, b, q, &slope_b), slope = fmax(slope_a, slope_b);
+    BlobList list_a, list_b;
+    list_blobs(field, a, q, 0, &list_a);
+    list_blobs(field, b, q, 0, &list_b);
+    if (list_a.count == list_b.count && !memcmp(list_a.blob, list_b.blob, (size_t)list_a.count * sizeof *list_a.blob))
+        return 0;
+    double slope_a, slope_b, f_a = field_at(field, &list_a, q, &slope_a), f_b = field_at(field, &list_b, q, &slope_b), slope = fmax(slope_a, slope_b);
     return fabs(f_a - f_b) / fmax(slope, 1e-3 / field->node[a].radius);
 }
 
@@ -246,34 +277,71 @@ static Foot lane_foot(const FieldBlock *b, int i, int node)
                   .hessian = {f->axx[i], f->axy[i], f->axz[i], f->ayy[i], f->ayz[i], f->azz[i]}};
 }
 
+// The blobs near each lane's running foot, for places within `skin` of where they were picked.
+enum { SETTLE_BLOBS = 64 };
+typedef struct NearLists {
+    Vec3 at[FOOT_BLOCK];
+    int32_t blob[FOOT_BLOCK][SETTLE_BLOBS];
+} NearLists;
+
+// Short lists are taken whole.
+static void list_near(const FieldVessel *field, FieldBlock *b, int i, int node, NearLists *lists, bool fresh)
+{
+    static const double SETTLE_SKIN = 0.25;      // of the radius
+    const FieldNode *n = &field->node[node];
+    if (n->seen_count <= SETTLE_BLOBS / 2) {
+        b->list[i] = n->seen, b->count[i] = n->seen_count;
+        return;
+    }
+    Vec3 q = asked_at(field, n, vec3(b->foot.at.x[i], b->foot.at.y[i], b->foot.at.z[i]));
+    double skin = SETTLE_SKIN * n->radius;
+    if (!fresh && vec3_norm2(vec3_sub(q, lists->at[i])) <= skin * skin)
+        return;
+    int count = vec3_norm2(q) < 1e100 ? pick_blobs(field, n->seen, n->seen_count, q, skin, SETTLE_BLOBS, lists->blob[i]) : 0;
+    bool all = count > SETTLE_BLOBS;
+    lists->at[i] = q;
+    b->list[i] = all ? n->seen : lists->blob[i], b->count[i] = all ? n->seen_count : count;
+}
+
 enum { ROUNDS = 16, FEW_ROUNDS = 8 };
-// Careful Newton steps of one point from up to eight starts, on all that its node sees: the feet that arrive. On the axis of a round vessel all feet around
+// Careful Newton steps of one point from up to eight starts: the feet that arrive. On the axis of a round vessel all feet around
 // are equally near and Newton's steps go round for ever: any of them is right to second order in what is left along the wall.
 static int settle(const FieldVessel *field, Vec3 x, int node, const Vec3 *start, int count, int rounds, Foot *foot)
 {
     static const double LEFT = 1e-4, OFF = 1e-5;     // of the radius: along the wall, and from it
     FieldBlock b;
+    NearLists lists;
     FootBatch *f = &b.foot;
     unsigned done = 0;
     int found = 0;
     b.row = field->row;
+    b.slots = 0;
     b.foot.at.any_carried = false;
     for (int i = 0; i < FOOT_BLOCK; i++) {
         const Vec3 *from = &start[i < count ? i : 0];
         set_lane(field, &b, i, node);
-        set_whole_list(field, &b, i, node);
         f->xx[i] = x.x, f->xy[i] = x.y, f->xz[i] = x.z;
         f->at.x[i] = from->x, f->at.y[i] = from->y, f->at.z[i] = from->z;
         f->longest[i] = 0.5 * f->radius[i];
         f->allowed[i] = REST_FRESH;
         f->state[i] = FOOT_PENDING;
+        if (i < count)
+            list_near(field, &b, i, node, &lists, true);
+        else
+            b.list[i] = b.list[0], b.count[i] = 0;   // idle
     }
-    for (int round = 0; round < rounds && done != (1u << FOOT_BLOCK) - 1; round++) {
+    unsigned all = (1u << count) - 1;
+    for (int round = 0; round <= rounds; round++) {
+        for (int i = 0; i < count && round > 0; i++)
+            if (!(done >> i & 1))
+                list_near(field, &b, i, node, &lists, false);
         sample(field, &b);
+        if (round == rounds)
+            break;
         done = field->kernels->newton(&b, true);
+        if ((done & all) == all)
+            break;
     }
-    if (done != (1u << FOOT_BLOCK) - 1)
-        sample(field, &b);
     field->kernels->finish(&b);
     for (int i = 0; i < count; i++)
         if (done >> i & 1) {
@@ -319,13 +387,12 @@ static void look_around(const FieldVessel *field, Vec3 x, int node, double far, 
     }
 }
 
-static bool is_clear(const FieldVessel *field, const FieldNode *node, Vec3 middle, double ball, double side)
+static bool is_clear(const FieldVessel *field, const BlobList *list, Vec3 middle, double ball, double side)
 {
-    enum { MOST = 64 };
-    int32_t list[MOST];
-    int count = pick_blobs(field, node, middle, ball, MOST, list);
-    bool all = count > MOST;
-    return field->kernels->is_clear(&field->clear_points, field->row, all ? node->seen : list, all ? node->seen_count : count, middle, ball, side);
+    int32_t in[NEAR_BLOBS];
+    int count = pick_blobs(field, list->blob, list->count, middle, ball, NEAR_BLOBS, in);
+    bool all = count > NEAR_BLOBS;
+    return field->kernels->is_clear(&field->clear_points, field->row, all ? list->blob : in, all ? list->count : count, middle, ball, side);
 }
 
 // [mm] A sharply bent wall has other feet close by: the foot is not trusted over more than this of travel.
@@ -336,10 +403,10 @@ static double bend_radius(const Foot *foot)
     return 0.15 / fmax(sqrt(bend2), 1e-3);
 }
 
-// Is all on x's side in a ball that touches the wall at the foot and is wider than the gap by up to half a radius? Looks at points on three spheres in it: a
+// Is all on x's side in a ball that touches the wall at the foot and is wider than the gap by up to half a radius? Looks at points on two spheres in it: a
 // flat wall that comes nearer to the middle than 0.92 of the ball's radius shows at one of 80. Returns how far x may go [mm] until another wall than the
 // foot's could be the closest; 0: no such ball.
-static double room_about(const FieldVessel *field, double side, const Foot *foot)
+static double room_about(const FieldVessel *field, double side, const Foot *foot, const BlobList *list)
 {
     static const double wider[] = {0.25, 0.1};
     enum { TRIES = sizeof wider / sizeof wider[0] };
@@ -350,7 +417,7 @@ static double room_about(const FieldVessel *field, double side, const Foot *foot
         Vec3 middle = vec3_add_scaled(foot->at, side * ball, foot->normal);
         if (node->carried && inlet_height(field, middle) - ball < inlet_zone(field))
             continue;
-        if (room > 0.01 * node->radius && is_clear(field, node, middle, ball, side))
+        if (room > 0.01 * node->radius && is_clear(field, list, middle, ball, side))
             return fmin(room, bend_radius(foot));
     }
     return 0;
@@ -503,16 +570,16 @@ static int walk(const FieldVessel *field, Vec3 x, int from, int hops)
 }
 
 // A ball about x of at most `most` that is certainly lumen, f(x + v) >= f(x) - |grad f| |v| - M |v|^2 / 2 > 0; 0: none. Not where the inlet bends the field.
-static double clear_ball(const FieldVessel *field, const FieldNode *node, Vec3 x, double most)
+static double clear_ball(const FieldVessel *field, const FieldNode *node, Vec3 x, double most, const BlobList *list)
 {
     static const double part[] = {0.9, 0.65, 0.4};
     enum { PARTS = sizeof part / sizeof part[0] };
     if (!(most > 0.5 * node->radius) || (node->carried && inlet_height(field, x) - most < inlet_zone(field)))
         return 0;
-    double slope, down, up, f = field_at(field, (int)(node - field->node), x, &slope);
+    double slope, down, up, f = field_at(field, list, x, &slope);
     for (int k = 0; k < PARTS; k++) {
         double ball = part[k] * most;
-        field->kernels->bends(field->row, node->seen, node->seen_count, x, ball, &down, &up);
+        field->kernels->bends(field->row, list->blob, list->count, x, ball, &down, &up);
         if (f - ball * (slope + 0.5 * ball * down) > 0)
             return ball;
     }
@@ -535,8 +602,14 @@ static bool is_closest(const FieldVessel *field, Vec3 x, const Foot *foot, const
     return vec3_distance(x, m->bound_at) + size <= m->bound_for && (foot->gap > 0 ? m->down : m->up) * size < 0.97 * foot->slope;
 }
 
-// What is remembered and answered where lanes do not say it.
-static void answer(const FieldVessel *field, Vec3 x, const Foot *foot, VesselMemory *m, VesselHit *hit)
+// The blobs that whoever makes sure of a foot asks for.
+static void list_about(const FieldVessel *field, Vec3 x, const Foot *foot, BlobList *list)
+{
+    list_blobs(field, foot->node, x, fabs(foot->gap) + LOOK * field->node[foot->node].radius, list);
+}
+
+// What is remembered and answered where lanes do not say it; `list`: as list_about says, or NULL where the foot is not sure.
+static void answer(const FieldVessel *field, Vec3 x, const Foot *foot, const BlobList *list, VesselMemory *m, VesselHit *hit)
 {
     const FieldNode *node = &field->node[foot->node];
     *hit = (VesselHit){.gap = foot->gap, .normal = foot->normal, .hessian = foot->hessian, .node = foot->node, .flags = foot->sure ? 0 : VESSEL_UNSURE};
@@ -552,8 +625,8 @@ static void answer(const FieldVessel *field, Vec3 x, const Foot *foot, VesselMem
     if (!foot->sure)
         return;
     if (!held)
-        hold_blobs(field, m, q);
-    hold_bounds(field, m, foot->node, x, foot->gap);
+        hold_blobs(field, m, q, list);
+    hold_bounds(field, m, foot->node, x, foot->gap, list);
 }
 
 // A gap is as long as the shortest way to the wall: it changes by no more than x moves, or the wall is another. `before`: the gap at the last place.
@@ -595,24 +668,25 @@ static Foot guess_foot(const FieldVessel *field, Vec3 x, int node)
     return (Foot){.at = vec3_add_scaled(x, -gap, normal), .normal = normal, .gap = gap, .node = node};
 }
 
-// Makes sure that a foot is the closest, or finds that which is, and answers.
-static void answer_surely(const FieldVessel *field, Vec3 x, double side, Sheets sheets, VesselMemory *m, VesselHit *hit)
+// Makes sure that a foot is the closest, or finds that which is, and answers; `list`: of the foot's list_about, used up.
+static void answer_surely(const FieldVessel *field, Vec3 x, double side, Sheets sheets, BlobList *list, VesselMemory *m, VesselHit *hit)
 {
     double radius = field->node[sheets.foot.node].radius;
-    answer(field, x, &sheets.foot, m, hit);
+    answer(field, x, &sheets.foot, list, m, hit);
     m->has_rival = false;
     m->trust = 0;
     if (is_closest(field, x, &sheets.foot, m)) {
         set_clearance(m, x, sheets.foot.gap);
     } else {
-        set_clearance(m, x, clear_ball(field, &field->node[sheets.foot.node], x, sheets.foot.gap));
-        m->trust = room_about(field, side, &sheets.foot);
+        set_clearance(m, x, clear_ball(field, &field->node[sheets.foot.node], x, sheets.foot.gap, list));
+        m->trust = room_about(field, side, &sheets.foot, list);
         if (m->trust == 0) {
             Foot before = sheets.foot;
             look_for_rivals(field, x, side, &sheets);
             if (vec3_distance(sheets.foot.at, before.at) > 1e-4) {
                 move_to_cell(field, x, &sheets.foot);
-                answer(field, x, &sheets.foot, m, hit);
+                list_about(field, x, &sheets.foot, list);
+                answer(field, x, &sheets.foot, list, m, hit);
             }
             m->has_rival = sheets.has_rival && fabs(sheets.rival.gap) < fabs(sheets.foot.gap) + 2 * TRUST * radius;
             m->rival = sheets.rival.at;
@@ -637,11 +711,13 @@ static void find_afresh(const FieldVessel *field, Vec3 x, VesselMemory *m, Vesse
         }
     }
     if (sheets.found) {
-        answer_surely(field, x, side, sheets, m, hit);
+        BlobList list;
+        list_about(field, x, &sheets.foot, &list);
+        answer_surely(field, x, side, sheets, &list, m, hit);
         return;
     }
     Foot foot = guess_foot(field, x, node);
-    answer(field, x, &foot, m, hit);
+    answer(field, x, &foot, NULL, m, hit);
     set_clearance(m, x, 0);
     set_flags(field, x, node, hit);
 }
@@ -664,12 +740,14 @@ static void answer_afresh(const FieldVessel *field, Vec3 x, VesselMemory *m, Ves
 // A foot that was followed, but may not be the closest any more.
 static void answer_around(const FieldVessel *field, Vec3 x, const Foot *foot, VesselMemory *m, VesselHit *hit)
 {
-    double side = field_here(field, foot->node, x) > 0 ? 1 : -1, travel = vec3_distance(x, m->place);
+    BlobList list;
+    list_about(field, x, foot, &list);
+    double slope, here = field_at(field, &list, asked_at(field, &field->node[foot->node], x), &slope), side = here > 0 ? 1 : -1, travel = vec3_distance(x, m->place);
     if (side * foot->gap < -1e-9) {
         answer_afresh(field, x, m, hit);
         return;
     }
-    answer_surely(field, x, side, (Sheets){.found = true, .foot = *foot}, m, hit);
+    answer_surely(field, x, side, (Sheets){.found = true, .foot = *foot}, &list, m, hit);
     if (m->contradicted)
         compare_gaps(m, 0, travel, hit);
 }
@@ -686,10 +764,12 @@ static void answer_beside_rival(const FieldVessel *field, Vec3 x, Foot foot, Ves
     bool other = fabs(rival.gap) < fabs(foot.gap);
     if (other)
         move_to_cell(field, x, &rival);
-    answer(field, x, other ? &rival : &foot, m, hit);
+    BlobList list;
+    list_about(field, x, other ? &rival : &foot, &list);
+    answer(field, x, other ? &rival : &foot, &list, m, hit);
     m->rival = other ? foot.at : rival.at;
     m->trust = trust;
-    set_clearance(m, x, clear_ball(field, &field->node[m->node], x, hit->gap));
+    set_clearance(m, x, clear_ball(field, &field->node[m->node], x, hit->gap, &list));
     set_flags(field, x, m->node, hit);
     if (m->contradicted)
         compare_gaps(m, 0, travel, hit);
@@ -735,7 +815,8 @@ static bool hold_anew(const FieldVessel *field, VesselMemory *m, Vec3 q)
         if (!(walls_apart(field, m->node, cell, q) > AGREE))
             m->node = cell, m->clearance = 0;
     }
-    hold_blobs(field, m, q);
+    const FieldNode *node = &field->node[m->node];
+    hold_blobs(field, m, q, &(BlobList){.blob = node->seen, .count = node->seen_count});
     return true;
 }
 
@@ -807,7 +888,9 @@ static unsigned sure_near_inlet(const FieldVessel *field, const FieldBlock *b, u
     return sure;
 }
 
-enum { AFTER_START = 5 };
+enum { AFTER_START = 8 };
+// So that a foot does not leave the margin about its cell in one step.
+static const double LONGEST_AFTER_START = 0.25;
 
 // Follows the feet of up to eight points; with `start` from there, by several steps.
 static void follow_block(const FieldVessel *field, Batch *batch, const int *point, int count, const Vec3 *start)
@@ -825,6 +908,7 @@ static void follow_block(const FieldVessel *field, Batch *batch, const int *poin
         for (int i = 0; i < FOOT_BLOCK; i++) {
             const Vec3 *p = &start[i < count ? i : 0];
             b.foot.at.x[i] = p->x, b.foot.at.y[i] = p->y, b.foot.at.z[i] = p->z;
+            b.foot.longest[i] = LONGEST_AFTER_START * b.foot.radius[i];
         }
     if (start || b.foot.at.any_carried)
         moved = moved_lanes(field, &b, moved, batch, point, count, start != NULL);
@@ -834,7 +918,7 @@ static void follow_block(const FieldVessel *field, Batch *batch, const int *poin
         if (round > 0)
             lanes_hold_anew(field, &b, moved_lanes(field, &b, 0, batch, point, count, true) & ~done & all, batch, point);
         sample(field, &b);
-        done = field->kernels->newton(&b, false);
+        done = field->kernels->newton(&b, start != NULL);
     }
     unsigned sure = field->kernels->finish(&b), contradicted = 0;
     if (b.foot.at.any_carried)
@@ -846,8 +930,8 @@ static void follow_block(const FieldVessel *field, Batch *batch, const int *poin
             VesselMemory *m = &batch->memory[p];
             Foot foot = lane_foot(&b, i, m->node);
             if (!(done >> i & 1)) {
-                if (!start && b.foot.state[i] == FOOT_PENDING) {
-                    batch->start[batch->later_count] = foot.at;
+                if (!start) {
+                    batch->start[batch->later_count] = b.foot.state[i] == FOOT_PENDING ? foot.at : m->foot;
                     batch->later[batch->later_count++] = p;
                 } else {
                     batch->afresh[batch->afresh_count++] = p;
@@ -949,7 +1033,7 @@ static void fill_rows(FieldVessel *field)
 static double clear_about_center(const FieldVessel *field, int i)
 {
     const FieldNode *n = &field->node[i];
-    double clear = clear_ball(field, n, n->center, n->radius);
+    double clear = clear_ball(field, n, n->center, n->radius, &(BlobList){.blob = n->seen, .count = n->seen_count});
     if (n->carried)
         clear = fmin(clear, inlet_height(field, n->center) - inlet_zone(field));
     return clear > 0 ? clear : -HUGE_VAL;
