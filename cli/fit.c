@@ -257,6 +257,7 @@ static void print_measure(const ModelMeasure *m)
     printf("jumps between  place          joins   gap p50      p99  max [mm] normal p50      p99 max [rad]   worst pair of nodes\n");
     print_jumps("raw", m->raw);
     print_jumps("as met", m->met);
+    print_jumps("cold", m->cold);
     printf("bare walls     %d nodes with wall further than 0.6 r from data", m->bare_nodes);
     if (m->bare_nodes > 0)
         printf(", at most %.3f mm (node %d)", m->bare_most_mm, m->bare_worst);
@@ -290,6 +291,7 @@ static void json_measure(cJSON *root, const ModelMeasure *m)
 {
     json_jumps(root, "jumps_raw", m->raw);
     json_jumps(root, "jumps_as_met", m->met);
+    json_jumps(root, "jumps_cold", m->cold);
     cJSON_AddNumberToObject(root, "bare_nodes", m->bare_nodes);
     cJSON_AddNumberToObject(root, "bare_max_mm", m->bare_most_mm);
     cJSON_AddNumberToObject(root, "bare_worst_node", m->bare_worst);

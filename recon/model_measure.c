@@ -16,9 +16,10 @@ enum { VESSEL_RAYS = 120, SAC_RAYS = 1500, LINK_SAMPLES = 5 };   // a sac's neck
 
 const char *const model_place_name[PLACES] = {"tube", "bifurcation", "sac", "end"};
 
+typedef enum { RAW, MET, COLD, JUMPS } Jump;
 typedef struct Join {
     int place, node, other;
-    double raw_gap, raw_normal, met_gap, met_normal;
+    double gap[JUMPS], normal[JUMPS];
 } Join;
 typedef struct WallPoint {
     int place;
@@ -127,12 +128,17 @@ static double distance_to_data(const VesselTree *tree, int node, Vec3 x)
 
 static int ray_count(const VesselTree *tree, int node) { return tree->kind[node] == NODE_ANEURYSM ? SAC_RAYS : VESSEL_RAYS; }
 
+static VesselHit ask_on(const Job *job, VesselMemory *memory, Vec3 x)
+{
+    VesselHit hit;
+    vessel_query(job->vessel, 1, &x, HUGE_VAL, memory, &hit);
+    return hit;
+}
+
 static VesselHit ask(const Job *job, int node, Vec3 x)
 {
     VesselMemory memory = {.node = node};
-    VesselHit hit;
-    vessel_query(job->vessel, 1, &x, HUGE_VAL, &memory, &hit);
-    return hit;
+    return ask_on(job, &memory, x);
 }
 
 // At x on the border of the cells of node and other.
@@ -141,9 +147,11 @@ static void add_join(const Job *job, int node, int other, Vec3 x, Vec3 across, N
     const double aside = 1e-4;   // [mm] beyond the rounding of the cells' planes
     Blobby a = blobby_of(job->tree, node), b = blobby_of(job->tree, other);
     SurfacePoint p = blobby_project(&a, x, x), q = blobby_project(&b, x, x);
-    VesselHit before = ask(job, node, vec3_add_scaled(x, -aside, across)), behind = ask(job, other, vec3_add_scaled(x, aside, across));
+    VesselMemory memory = {.node = node};
+    VesselHit before = ask_on(job, &memory, vec3_add_scaled(x, -aside, across)), behind = ask_on(job, &memory, vec3_add_scaled(x, aside, across));
+    VesselHit fresh = ask(job, other, vec3_add_scaled(x, aside, across));
     unsigned unfit = VESSEL_OPEN_END | VESSEL_BEYOND;
-    if ((before.flags | behind.flags) & unfit)
+    if ((before.flags | behind.flags | fresh.flags) & unfit)
         return;
     if (f->joins == f->join_capacity) {
         int capacity = f->join_capacity ? 2 * f->join_capacity : 64;
@@ -155,9 +163,10 @@ static void add_join(const Job *job, int node, int other, Vec3 x, Vec3 across, N
         f->join = more;
         f->join_capacity = capacity;
     }
-    double moved = aside * vec3_dot(vec3_add(before.normal, behind.normal), across);
-    f->join[f->joins++] = (Join){place_of(job, node, other), node, other, fabs(p.distance - q.distance), vec3_angle(p.normal, q.normal),
-                                 fabs(behind.gap - before.gap - moved), vec3_angle(before.normal, behind.normal)};
+    double moved = aside * vec3_dot(vec3_add(before.normal, behind.normal), across), anew = aside * vec3_dot(vec3_add(before.normal, fresh.normal), across);
+    f->join[f->joins++] = (Join){place_of(job, node, other), node, other,
+                                 {fabs(p.distance - q.distance), fabs(behind.gap - before.gap - moved), fabs(fresh.gap - before.gap - anew)},
+                                 {vec3_angle(p.normal, q.normal), vec3_angle(before.normal, behind.normal), vec3_angle(before.normal, fresh.normal)}};
 }
 
 // Moves x in the plane across `across` to the model's wall; false where that is further than `far` off after some steps.
@@ -189,7 +198,8 @@ static void look_at_wall(const Job *job, int node, Vec3 p, NodeFigures *f)
             continue;
         double beyond = (power_distance(p, tree->center[other], tree->radius[other]) - own) / (2 * apart);
         Vec3 across = vec3_scale(e, 1 / apart), x = vec3_add_scaled(p, beyond, across);
-        if (beyond < 0.1 * tree->radius[node] && slide_to_wall(&model, across, 0.01 * tree->radius[node], &x) && lim_is_in_cell(tree, node, other, x))
+        if (beyond < 0.1 * tree->radius[node] && slide_to_wall(&model, across, 0.01 * tree->radius[node], &x) &&
+            lim_is_in_cell(tree, node, other, x) && lim_is_in_cell(tree, other, node, x))
             add_join(job, node, other, x, across, f);
     }
     if (job->truth) {
@@ -257,7 +267,7 @@ static void measure_node(void *context, long index)
 
 static double part_of(const double *sorted, int count, double part) { return count > 0 ? sorted[(int)(part * (count - 1))] : 0; }
 
-static JumpRow jump_row(const Job *job, int place, bool met, double *value)
+static JumpRow jump_row(const Job *job, int place, Jump jump, double *value)
 {
     JumpRow row = {.worst_node = -1, .worst_other = -1};
     for (int what = 0; what < 2; what++) {
@@ -267,10 +277,10 @@ static JumpRow jump_row(const Job *job, int place, bool met, double *value)
                 const Join *join = &job->node[i].join[k];
                 if (join->place != place)
                     continue;
-                double gap = met ? join->met_gap : join->raw_gap;
+                double gap = join->gap[jump];
                 if (what == 0 && (count == 0 || gap > row.gap_most))
                     row.gap_most = gap, row.worst_node = join->node, row.worst_other = join->other;
-                value[count++] = what == 0 ? gap : met ? join->met_normal : join->raw_normal;
+                value[count++] = what == 0 ? gap : join->normal[jump];
             }
         sort_doubles(value, (size_t)count);
         row.count = count;
@@ -316,8 +326,9 @@ static bool add_up(const Job *job, ModelMeasure *out)
         return false;
     *out = (ModelMeasure){.bare_worst = -1, .ghost_worst = -1, .narrowest_node = -1, .least_clearance = HUGE_VAL};
     for (int place = 0; place < PLACES; place++) {
-        out->raw[place] = jump_row(job, place, false, value);
-        out->met[place] = jump_row(job, place, true, value);
+        out->raw[place] = jump_row(job, place, RAW, value);
+        out->met[place] = jump_row(job, place, MET, value);
+        out->cold[place] = jump_row(job, place, COLD, value);
         out->wall[place] = wall_row(job, place, value);
     }
     for (int i = 0; i < job->tree->node_count; i++) {

@@ -1,8 +1,9 @@
 // How well the local models of a tree agree with each other where a tool passes from one to the next, and, where the truth is known, with it.
 //
 // Places: a link of the tree is a tube, unless a sac, a branching or an end is near it along the tree.
-// A join is a point on the wall at the border of two nodes' power cells. Raw: what the two local models say there (the paper's switch). As met: what
-// the vessel answers (geom/vessel.h, LIM_BLEND) just before and just behind the border.
+// A join is a point on the wall at the border of two nodes' power cells, in no third node's. Raw: what the fields of the two nodes say there (the paper's
+// switch). As met: what the vessel answers (geom/vessel.h) to a point that passes the border, just before and just behind it. Cold: the same where the
+// answer behind it is sought from scratch.
 #ifndef SELDINGER_RECON_MODEL_MEASURE_H
 #define SELDINGER_RECON_MODEL_MEASURE_H
 
@@ -23,7 +24,7 @@ typedef struct WallRow {     // signed distances of the wall as met to the truth
     int worst_node;
 } WallRow;
 typedef struct ModelMeasure {
-    JumpRow raw[PLACES], met[PLACES];
+    JumpRow raw[PLACES], met[PLACES], cold[PLACES];
     WallRow wall[PLACES];    // counts 0 without a truth
     // Walls that no data point supports: further than 0.6 r from all points around. Bare: what the lumen ends at, over a hole in the data (ends have
     // such caps and are left out). Ghost: a further sheet beyond that wall, inside the node's power cell and within 3 r of its centre.
