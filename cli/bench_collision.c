@@ -1,4 +1,4 @@
-// seldinger bench collision: local models against triangles, the exact wall and a sampled distance, in one run (Kerrien 2017, sections 6.3 to 6.5).
+// seldinger bench collision: implicit models against triangles, the exact wall and a sampled distance, in one run (Kerrien 2017, sections 6.3 to 6.5).
 //
 //   same motion    where all free nodes were in a run on the exact wall, asked of each representation: what detection costs, and how far its answers are
 //                  from the truth
@@ -21,7 +21,7 @@
 
 enum { CASES = 7, SCENES_MOST = 16, CAPS = 4, FORMS = 2, SCENE_TRIANGLES = 105000, QUICK_STEPS = 300, QUICK_TRIANGLES = 12000 };
 enum { CLAMP_STEPS = 1000, POINTWISE_STEPS = 600, QUICK_POINTWISE_STEPS = 200 };
-enum { LARGE = 100000, TIMES_FASTER = 10 };  // what detection in local models is held to: so many times faster than on so many triangles …
+enum { LARGE = 100000, TIMES_FASTER = 8 };   // what detection in the field of blobs is held to: so many times faster than on so many triangles …
 static const double FLAT = 1.2;              // … and within this ratio whatever the size of the tree
 
 static const CollisionCase cases[CASES] = {
@@ -41,8 +41,8 @@ static const struct {
               {"peer b", "scenes/peer/tube-b-centreline.csv", "scenes/peer/prepare brings it"},
               {"peer c", "scenes/peer/tube-c-centreline.csv", "scenes/peer/prepare brings it"}};
 static const char legend[] =
-    "exact: the true wall, where it can be asked; lim: local models, neighbours blended; lim-switch: the paper's, a point's own model alone; lim fine:\n"
-    "fitted ten times closer; mesh full, warm, cached: a wall of planes, searched by Embree from nothing, within the last distance, and only where what is\n"
+    "exact: the true wall, where it can be asked; lim: one field of shared blobs; lim fine: the same fitted ten times closer; lim-blend: local models,\n"
+    "neighbours blended; lim-switch: the paper's, a point's own model alone; mesh full, warm, cached: a wall of planes, searched by Embree from nothing, within the last distance, and only where what is\n"
     "remembered of each triangle's surroundings does not do; mesh curved: its planes with the bend of the wall as Hessian; mesh smooth: interpolated\n"
     "normals; grid: a sampled distance, trilinear, with the mesh's edge as its cell\n";
 static const char *const in_quick[] = {"capsule", "spiral"}, *const clamped[] = {"capsule", "spiral", "phantom", "peer b"},
@@ -68,7 +68,7 @@ typedef struct Clamp {
     CollisionLoop loop;
 } Clamp;
 
-typedef struct EqualError {              // a mesh as wrong as the local models
+typedef struct EqualError {              // a mesh as wrong as the model
     const char *surface;
     double lim_um, mesh_um, lim_us, warm_us, cached_us;
     int triangles;
@@ -96,15 +96,15 @@ typedef struct CollisionBench {
 
 static const char help[] =
     "Usage: seldinger bench collision [SCENE...] [--quick] [--threads N] [--json F] [--chart F.svg]\n\n"
-    "Local models (LIM) against triangle meshes searched by Embree, the exact wall and a sampled distance, in one run: the surfaces of Kerrien 2017,\n"
-    "Table 6, the phantom, the aneurism and the peer tubes; cost on the same recorded motion, runs in closed loop, artificial friction, clamped contact\n"
-    "iterations, growth. Run it from the project's folder. Times are CPU times.\n\n"
+    "Implicit models (LIM: one field of blobs, and local models) against triangle meshes searched by Embree, the exact wall and a sampled distance, in\n"
+    "one run: the surfaces of Kerrien 2017, Table 6, the phantom, the aneurism and the peer tubes; cost on the same recorded motion, runs in closed loop,\n"
+    "artificial friction, clamped contact iterations, growth. Run it from the project's folder. Times are CPU times.\n\n"
     "  SCENE        instead of those: the vessel of this scene (tube, shape or model) as about 100,000 triangles, with its own tool and script\n"
     "  --quick      capsule and spiral; 300 steps, meshes to 12,000 triangles, fewer clamps; of a SCENE too\n"
     "  --threads N  threads for fitting; default 0: all cores. Figures but times do not depend on it\n"
     "  --json F     all figures as JSON; - is standard output, the tables then go to standard error\n"
     "  --chart F    a chart of them as SVG\n\n"
-    "Exit codes: 0 done; 1 local models missed a verdict; 2 wrong usage or bad input.\n";
+    "Exit codes: 0 done; 1 the model missed a verdict; 2 wrong usage or bad input.\n";
 
 static bool is_listed(const char *name, const char *const *list, size_t count)
 {
@@ -524,7 +524,7 @@ enum { NEAR_POINTS, ALL_POINTS, TIMES };
 
 static double time_of(const Row *row, int what) { return what == NEAR_POINTS ? row->motion.us_per_80_points : row->motion.us_per_step; }
 
-// The same motion's near points, which are what collision is about, and all, of which the solver leaves out most far ones. Embree is what local models are held
+// The same motion's near points, which are what collision is about, and all, of which the solver leaves out most far ones. Embree is what the field is held
 // to; the triangles remembered about each point (geom/triangle_groups.h), which do without it, they are to be no slower than.
 static bool judge_surface(CollisionBench *bench, const CollisionCase *of, Faults *faults)
 {
@@ -581,7 +581,7 @@ static void print_verdicts(FILE *out, const CollisionBench *bench)
 {
     for (int i = 0; i < bench->equal_count; i++) {
         const EqualError *e = &bench->equal[i];
-        fprintf(out, "\nequal error, %s: local models are wrong by %.3g um rms; so is a mesh of %d triangles (%.3g um).\n  80 near points: lim %.2f us, "
+        fprintf(out, "\nequal error, %s: the model is wrong by %.3g um rms; so is a mesh of %d triangles (%.3g um).\n  80 near points: lim %.2f us, "
                      "Embree in each step %.2f us (%.1f times), cached triangles %.2f us (%.1f times)\n",
                 e->surface, e->lim_um, e->triangles, e->mesh_um, e->lim_us, e->warm_us, e->warm_us / e->lim_us, e->cached_us, e->cached_us / e->lim_us);
     }

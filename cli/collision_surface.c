@@ -6,6 +6,7 @@
 #include "cli/tube_tree.h"
 #include "geom/grid_vessel.h"
 #include "geom/mesh_vessel.h"
+#include "recon/field_fit.h"
 #include "recon/lim_fit.h"
 #include "recon/shape_vessel.h"
 #include "recon/tree_file.h"
@@ -109,10 +110,23 @@ static bool open_capsule(CollisionSurface *s, Faults *faults)
 
 // --- what scenes name ---
 
-static VesselTree *fit(const VesselTree *nodes, double voxel_mm, int threads, double *cpu_s, Faults *faults)
+// `closer`: what the usual tolerances are divided by.
+static VesselTree *fit(const VesselTree *nodes, double voxel_mm, double closer, int threads, double *cpu_s, Faults *faults)
+{
+    FieldFitOptions options = field_fit_default_options();
+    options.voxel_mm = voxel_mm / closer;    // of which tolerance and least reach are multiples
+    options.tolerance /= closer;
+    options.threads = threads;
+    double begin = collision_build_clock_s();
+    VesselTree *model = field_fit(nodes, &options, NULL, faults);
+    *cpu_s = collision_build_clock_s() - begin;
+    return model;
+}
+
+static VesselTree *fit_local(const VesselTree *nodes, double voxel_mm, int threads, double *cpu_s, Faults *faults)
 {
     LimFitOptions options = lim_fit_default_options();
-    options.voxel_mm = voxel_mm;     // of which the target is a multiple
+    options.voxel_mm = voxel_mm;
     options.threads = threads;
     double begin = collision_build_clock_s();
     VesselTree *model = lim_fit(nodes, &options, NULL, faults);
@@ -198,7 +212,7 @@ static bool open_source(CollisionSurface *s, Faults *faults)
         s->model = tree_file_load(scene->model_path, NULL, faults);
         s->nodes = s->model;
         s->fit_s = NAN;
-        s->truth_is = "the local models themselves";
+        s->truth_is = "the model itself";
         s->truth_is_model = true;
         if (s->model && !vessel_tree_is_model(s->model))
             faults_add(faults, scene->model_path, 0, 0, "is a tree without a model; make one with `seldinger fit`");
@@ -215,15 +229,16 @@ bool collision_surface_open(const CollisionCase *of, int threads, CollisionSurfa
         return false;
     double voxel = shape_options_voxel_mm(out->scene->shape_option_count, (const char(*)[2][64])out->scene->shape_option);
     if (!out->model) {
-        out->model = fit(out->nodes, voxel, threads, &out->fit_s, faults);
-        out->fine = out->model ? fit(out->nodes, voxel / FINE, threads, &out->fine_s, faults) : NULL;
+        out->model = fit(out->nodes, voxel, 1, threads, &out->fit_s, faults);
+        out->local = out->model ? fit_local(out->nodes, voxel, threads, &out->local_s, faults) : NULL;
+        out->fine = out->local ? fit(out->nodes, voxel, FINE, threads, &out->fine_s, faults) : NULL;
         if (!out->fine)
             return false;
     }
     out->length_mm = vessel_tree_length(out->nodes);
-    out->lim = collision_lim(out->model, LIM_BLEND);
+    out->lim = model_vessel_create(out->model);
     if (!out->lim) {
-        faults_add(faults, of->scene, 0, 0, "no memory for the local models' vessel");
+        faults_add(faults, of->scene, 0, 0, "not enough memory for the model's vessel");
         return false;
     }
     if (!out->truth)
@@ -243,6 +258,7 @@ void collision_surface_close(CollisionSurface *s)
     if (s->nodes != s->model)
         vessel_tree_free(s->nodes);
     vessel_tree_free(s->model);
+    vessel_tree_free(s->local);
     vessel_tree_free(s->fine);
     vessel_tree_free(s->exact_tree);
     shape_free(s->shape);
@@ -371,19 +387,30 @@ static bool add_meshes(const CollisionSurface *s, CollisionWalls *walls, Faults 
     return true;
 }
 
-// Builds it anew, to know how long that takes.
-static bool add_lim(const CollisionSurface *s, CollisionWalls *walls, const char *name, const VesselTree *model, LimField field, double fit_s, Faults *faults)
+static bool add_lim(const CollisionSurface *s, CollisionWalls *walls, const char *name, Vessel *vessel, double begun_s, double fit_s, Faults *faults)
 {
-    double begin = collision_build_clock_s();
-    Vessel *vessel = collision_lim(model, field);
     if (!vessel) {
-        faults_add(faults, s->of->name, 0, 0, "no memory for the local models' vessel");
+        faults_add(faults, s->of->name, 0, 0, "not enough memory for the model's vessel");
         return false;
     }
     CollisionWall *wall = add_wall(walls, name, vessel, true);
-    wall->build_s = collision_build_clock_s() - begin;
+    wall->build_s = collision_build_clock_s() - begun_s;
     wall->surface_s = fit_s;
     return true;
+}
+
+// Vessels are built anew, to know how long that takes.
+static bool add_model(const CollisionSurface *s, CollisionWalls *walls, const char *name, const VesselTree *model, double fit_s, Faults *faults)
+{
+    double begin = collision_build_clock_s();
+    return !model || add_lim(s, walls, name, model_vessel_create(model), begin, fit_s, faults);
+}
+
+static bool add_local(const CollisionSurface *s, CollisionWalls *walls, const char *name, LimField field, Faults *faults)
+{
+    const VesselTree *local = s->local ? s->local : vessel_tree_is_shared(s->model) ? NULL : s->model;
+    double begin = collision_build_clock_s();
+    return !local || add_lim(s, walls, name, collision_lim(local, field), begin, s->local ? s->local_s : s->fit_s, faults);
 }
 
 bool collision_walls_open(const CollisionSurface *s, CollisionWalls *out, Faults *faults)
@@ -391,8 +418,8 @@ bool collision_walls_open(const CollisionSurface *s, CollisionWalls *out, Faults
     *out = (CollisionWalls){.without_mesh = mesh_vessel_available() ? NULL : "built without Embree"};
     if (s->exact)
         add_wall(out, "exact", s->exact, false);
-    return add_lim(s, out, "lim", s->model, LIM_BLEND, s->fit_s, faults) && add_lim(s, out, "lim-switch", s->model, LIM_SWITCH, s->fit_s, faults) &&
-           (!s->fine || add_lim(s, out, "lim fine", s->fine, LIM_BLEND, s->fine_s, faults)) && add_meshes(s, out, faults);
+    return add_model(s, out, "lim", s->model, s->fit_s, faults) && add_model(s, out, "lim fine", s->fine, s->fine_s, faults) &&
+           add_local(s, out, "lim-blend", LIM_BLEND, faults) && add_local(s, out, "lim-switch", LIM_SWITCH, faults) && add_meshes(s, out, faults);
 }
 
 void collision_walls_close(CollisionWalls *walls)

@@ -1,11 +1,11 @@
-// The surfaces of `bench collision` and what stands for each of them: the exact wall, local models, meshes, a sampled distance.
+// The surfaces of `bench collision` and what stands for each of them: the exact wall, blobs (one field, local models), meshes, a sampled distance.
 #ifndef SELDINGER_CLI_COLLISION_SURFACE_H
 #define SELDINGER_CLI_COLLISION_SURFACE_H
 
 #include "cli/cli.h"
 #include "recon/phantom.h"
 
-enum { SURFACE_MESHES = 3, WALLS_MOST = 5 + 5 * SURFACE_MESHES };
+enum { SURFACE_MESHES = 3, WALLS_MOST = 6 + 5 * SURFACE_MESHES };
 
 typedef struct PaperRow {    // Kerrien 2017, Table 6
     double ms;               // 0: the table has no such row
@@ -27,12 +27,12 @@ typedef struct CollisionSurface {
     const Vessel *truth;             // where the wall is
     const Vessel *truth_gap;         // the same without curvature, sooner answered
     const char *truth_is;            // in words
-    bool truth_is_model;             // the local models themselves: there is no other truth
+    bool truth_is_model;             // the model itself: there is no other truth
     VesselTree *nodes;               // centres, radii and samples: what was fitted, and where the wall is looked for
-    VesselTree *model;
-    double fit_s;                    // CPU time of the fit; NAN where the model came from a file
-    VesselTree *fine;                // the same points fitted to a tenth of the usual distance; NULL where the model came from a file
-    double fine_s;
+    VesselTree *model;               // the default: one field of shared blobs, or what a file holds
+    VesselTree *local;               // a model for each node of the same points; NULL where the model came from a file
+    VesselTree *fine;                // the default, fitted to a tenth of the usual distance; NULL where the model came from a file
+    double fit_s, local_s, fine_s;   // CPU time of the fits; NAN where the model came from a file
     double length_mm;                // of the centreline
     // owned
     Vessel *exact, *lim, *gap_only;
@@ -46,7 +46,7 @@ void collision_surface_close(CollisionSurface *surface);
 
 // One representation of the wall.
 typedef struct CollisionWall {
-    const char *name;        // "exact", "lim", "lim-switch", "lim fine", "mesh full", "mesh warm", "mesh cached", "mesh curved", "mesh smooth", "grid"
+    const char *name;        // "exact", "lim", "lim-blend", "lim-switch", "lim fine", "mesh full", "mesh warm", "mesh cached", "mesh curved", "mesh smooth", "grid"
     const Vessel *vessel;
     int triangles;           // of a mesh; 0
     int mesh;                // which of the case's meshes; -1
@@ -67,7 +67,7 @@ bool collision_walls_open(const CollisionSurface *surface, CollisionWalls *out, 
 void collision_walls_close(CollisionWalls *walls);
 const CollisionWall *collision_wall_find(const CollisionWalls *walls, const char *name, int mesh);   // NULL: not there
 
-// A mesh of the true wall with about `triangles` triangles: a coarse one tells the cell. A shape's is that of the local models, every vertex moved onto the
+// A mesh of the true wall with about `triangles` triangles: a coarse one tells the cell. A shape's is that of its model, every vertex moved onto the
 // shape (asking the shape itself at each point of a lattice takes ten times as long). NULL with a fault.
 typedef struct CollisionMesh {
     double cell_mm, made_s;  // CPU time, of the mesh alone
