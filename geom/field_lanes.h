@@ -48,6 +48,7 @@ typedef struct FieldBlock {
     FieldLane dx, dy, dz;            // the motion of X since the foot was found
     FieldLane straight_x, straight_y, straight_z;    // where the foot should be but for the last prediction's miss
     FieldLane held_x, held_y, held_z, held_for2, bound_x, bound_y, bound_z, bound_for, down, up, trust;
+    FieldLane room;                  // gaps in the lumen up to this are the closest wall's
 } FieldBlock;
 
 typedef struct FieldKernels {

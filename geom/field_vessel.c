@@ -29,6 +29,7 @@ typedef struct FieldNode {
     double radius, bend;     // [mm], and its inverse
     double skin;             // [mm] about the foot in which blobs are held
     double clear;            // [mm] the wall is certainly at least this far from the centre; < 0: not known
+    double room;             // [mm] of a point in the lumen that is nearer than that to a foot in the cell no wall is nearer: see measure_room
     const int32_t *seen;     // its blobs
     int seen_count;
     bool carried;            // near the inlet: goes on upstream
@@ -218,8 +219,8 @@ static void hold_bounds(const FieldVessel *field, VesselMemory *m, int node, Vec
     field->kernels->bends(field->row, list->blob, list->count, asked_at(field, n, x), m->bound_for, &m->down, &m->up);
 }
 
-// The field of a list at q, and the size of its slope.
-static double field_at(const FieldVessel *field, const BlobList *list, Vec3 q, double *slope)
+// The field of a list at q, and its gradient.
+static double field_at(const FieldVessel *field, const BlobList *list, Vec3 q, Vec3 *gradient)
 {
     double f = -1;
     Vec3 g = {0, 0, 0};
@@ -230,7 +231,7 @@ static double field_at(const FieldVessel *field, const BlobList *list, Vec3 q, d
         f += b->amplitude * u * u * u;
         g = vec3_add_scaled(g, -6 * b->amplitude * b->inverse * u * u, d);
     }
-    *slope = vec3_norm(g);
+    *gradient = g;
     return f;
 }
 
@@ -242,7 +243,8 @@ static double walls_apart(const FieldVessel *field, int a, int b, Vec3 q)
     list_blobs(field, b, q, 0, &list_b);
     if (list_a.count == list_b.count && !memcmp(list_a.blob, list_b.blob, (size_t)list_a.count * sizeof *list_a.blob))
         return 0;
-    double slope_a, slope_b, f_a = field_at(field, &list_a, q, &slope_a), f_b = field_at(field, &list_b, q, &slope_b), slope = fmax(slope_a, slope_b);
+    Vec3 g_a, g_b;
+    double f_a = field_at(field, &list_a, q, &g_a), f_b = field_at(field, &list_b, q, &g_b), slope = fmax(vec3_norm(g_a), vec3_norm(g_b));
     return fabs(f_a - f_b) / fmax(slope, 1e-3 / field->node[a].radius);
 }
 
@@ -261,6 +263,7 @@ static void set_lane(const FieldVessel *field, FieldBlock *b, int i, int node)
     const FieldNode *n = &field->node[node];
     b->foot.radius[i] = n->radius, b->foot.bend[i] = n->bend, b->foot.allowed[i] = REST;
     b->foot.at.carried[i] = n->carried, b->foot.at.any_carried |= n->carried;
+    b->room[i] = n->room;
 }
 
 static void set_whole_list(const FieldVessel *field, FieldBlock *b, int i, int node)
@@ -576,7 +579,8 @@ static double clear_ball(const FieldVessel *field, const FieldNode *node, Vec3 x
     enum { PARTS = sizeof part / sizeof part[0] };
     if (!(most > 0.5 * node->radius) || (node->carried && inlet_height(field, x) - most < inlet_zone(field)))
         return 0;
-    double slope, down, up, f = field_at(field, list, x, &slope);
+    Vec3 g;
+    double down, up, f = field_at(field, list, x, &g), slope = vec3_norm(g);
     for (int k = 0; k < PARTS; k++) {
         double ball = part[k] * most;
         field->kernels->bends(field->row, list->blob, list->count, x, ball, &down, &up);
@@ -597,6 +601,8 @@ static bool is_closest(const FieldVessel *field, Vec3 x, const Foot *foot, const
 {
     double size = fabs(foot->gap);
     const FieldNode *node = &field->node[foot->node];
+    if (foot->gap > 0 && foot->gap < node->room)
+        return true;
     if (node->carried && inlet_height(field, x) - size < inlet_zone(field))
         return false;
     return vec3_distance(x, m->bound_at) + size <= m->bound_for && (foot->gap > 0 ? m->down : m->up) * size < 0.97 * foot->slope;
@@ -742,7 +748,8 @@ static void answer_around(const FieldVessel *field, Vec3 x, const Foot *foot, Ve
 {
     BlobList list;
     list_about(field, x, foot, &list);
-    double slope, here = field_at(field, &list, asked_at(field, &field->node[foot->node], x), &slope), side = here > 0 ? 1 : -1, travel = vec3_distance(x, m->place);
+    Vec3 g;
+    double here = field_at(field, &list, asked_at(field, &field->node[foot->node], x), &g), side = here > 0 ? 1 : -1, travel = vec3_distance(x, m->place);
     if (side * foot->gap < -1e-9) {
         answer_afresh(field, x, m, hit);
         return;
@@ -1039,6 +1046,56 @@ static double clear_about_center(const FieldVessel *field, int i)
     return clear > 0 ? clear : -HUGE_VAL;
 }
 
+// Where the wall is first met from a node's centre, to a 250th of the radius; false where it is not within two radii or the cell.
+static bool wall_along(const FieldVessel *field, const BlobList *list, int node, Vec3 way, Vec3 *wall)
+{
+    enum { LOOKS = 3 };
+    const FieldNode *n = &field->node[node];
+    double from = 0, step = 0.25 * n->radius;
+    for (int look = 0; look < LOOKS; look++, step /= FOOT_BLOCK) {
+        FieldLane x, y, z, f;
+        int in = 0;
+        for (int i = 0; i < FOOT_BLOCK; i++) {
+            Vec3 q = vec3_add_scaled(n->center, from + (i + 1) * step, way);
+            x[i] = q.x, y[i] = q.y, z[i] = q.z;
+        }
+        field->kernels->look(field->row, list->blob, list->count, x, y, z, f);
+        while (in < FOOT_BLOCK && f[in] > 0)
+            in++;
+        if (look == 0 && in == FOOT_BLOCK)
+            return false;
+        from += in * step;
+    }
+    *wall = vec3_add_scaled(n->center, from, way);
+    return cell_of(field, *wall, node) == node;
+}
+
+// The wall's reach in a node's cell: how large a ball may be that touches the wall from within and meets no other part of it, at feet all around. A point
+// whose foot is nearer than that lies in such a ball with all that is as near to it.
+static double measure_room(const FieldVessel *field, int node)
+{
+    static const double part[] = {1.1, 1.05, 1, 0.95, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2};
+    static const double SHARE = 0.92;        // of a ball that is clear at the points at which it is looked at: see room_about
+    enum { PARTS = sizeof part / sizeof part[0], LEAST = 6 };
+    const FieldNode *n = &field->node[node];
+    BlobList list;
+    int size = 0, found = 0;
+    if (n->carried)
+        return 0;
+    list_blobs(field, node, n->center, 3 * n->radius, &list);
+    for (int k = 0; k < WAYS && size < PARTS; k++) {
+        Vec3 wall, in;
+        if (!wall_along(field, &list, node, field->way[k], &wall))
+            continue;
+        field_at(field, &list, wall, &in);
+        in = vec3_unit_or(in, vec3_negate(field->way[k]));
+        found++;
+        while (size < PARTS && !is_clear(field, &list, vec3_add_scaled(wall, part[size] * n->radius, in), part[size] * n->radius, 1))
+            size++;
+    }
+    return size < PARTS && found >= LEAST ? SHARE * part[size] * n->radius : 0;
+}
+
 static void fill_nodes(FieldVessel *field)
 {
     const VesselTree *tree = field->tree;
@@ -1057,7 +1114,7 @@ static void fill_nodes(FieldVessel *field)
         field->node[node].carried = blobby_field(&blobs, tree->center[0]) > 0;
     }
     for (int i = 0; i < tree->node_count; i++)
-        field->node[i].clear = clear_about_center(field, i);
+        field->node[i].clear = clear_about_center(field, i), field->node[i].room = measure_room(field, i);
 }
 
 Vessel *field_vessel_create_with(const VesselTree *tree, int isa)
