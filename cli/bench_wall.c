@@ -494,7 +494,7 @@ static bool row_spread(WallBench *bench, const WallModel *m, Faults *faults)
 
 static bool row_felt(WallBench *bench, bool spiral, Faults *faults)
 {
-    char path[PATH], note[64];
+    char path[PATH], note[112];
     PushFelt felt;
     const char *name = spiral ? "spiral" : "phantom-push";
     VesselTree *model = fit_synth(bench, name, spiral ? (const char *const[]){"spiral", NULL} : (const char *const[]){"phantom", NULL}, path, faults);
@@ -503,7 +503,7 @@ static bool row_felt(WallBench *bench, bool spiral, Faults *faults)
     if (!good)
         return false;
     bench->table.on = spiral ? "spiral" : "phantom";
-    snprintf(note, sizeof note, "%s", felt.survived ? "without friction" : "without friction; the run did not stay sound to its end");
+    snprintf(note, sizeof note, "without friction; %.3g %% on the exact wall%s", 100 * felt.exact_rms, felt.survived ? "" : "; the run did not stay sound to its end");
     if (spiral)
         wall_add(&bench->table, felt.over_exact < 0 ? "push below exact" : "push over exact", 100 * fabs(felt.over_exact), "%", (WallLimits){3, 0.5, false}, note);
     else

@@ -66,7 +66,8 @@ typedef struct StiffFigures {
 bool wall_stiff_run(const Vessel *vessel, double diameter_mm, double length_mm, double seconds, StiffRun run, StiffFigures *out, Faults *faults);
 typedef struct PushFelt {
     double over_exact;       // mean push without friction over that on the exact wall, less 1
-    double change_rms;       // change of the push from step to step over its mean
+    double change_rms;       // change of the push from step to step over its mean …
+    double exact_rms;        // … and on the exact wall, where it comes from the tool's snaps alone
     bool survived;
 } PushFelt;
 // The run of a scene of `bench collision` without friction, on the model and on the exact wall. False with faults.

@@ -54,7 +54,7 @@ bool wall_stiff_run(const Vessel *vessel, double diameter_mm, double length_mm, 
 
 bool wall_push_felt(const char *scene_path, const char *model_path, PushFelt *out, Faults *faults)
 {
-    *out = (PushFelt){NAN, NAN, false};
+    *out = (PushFelt){NAN, NAN, NAN, false};
     Scene *scene = scene_load(scene_path, faults);
     VesselTree *model = scene ? tree_file_load(model_path, NULL, faults) : NULL;
     OpenVessel open = {.vessel = model ? model_vessel_create(model) : NULL};
@@ -72,7 +72,8 @@ bool wall_push_felt(const char *scene_path, const char *model_path, PushFelt *ou
     }
     if (good && felt && right) {
         PushFigures push = collision_push(felt, loop.survived ? loop.steps : loop.failed_step, right, truth.survived ? truth.steps : truth.failed_step);
-        *out = (PushFelt){push.mean_n / push.reference_n - 1, push.jitter_rms, loop.survived};
+        int64_t sound = truth.survived ? truth.steps : truth.failed_step;
+        *out = (PushFelt){push.mean_n / push.reference_n - 1, push.jitter_rms, collision_push(right, sound, right, sound).jitter_rms, loop.survived};
     }
     free(felt);
     free(right);
