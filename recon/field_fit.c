@@ -143,7 +143,6 @@ static bool fit(FieldModel *model, const FieldFitOptions *options, const Progres
     }
     for (int k = 0; k < LAST_SWEEPS; k++) {
         all_due(model);
-        model->guard_weight *= 1.5;
         sweep(&s, 3);
     }
     return !s.failed;
