@@ -12,7 +12,7 @@ static const double BASE_APART = 0.75, BASE_REACH = 2;   // of the base blobs, i
 static const double TARGET_SHARE = 0.2;
 static const double level_reach[] = {1.4, 1.4, 1, 1, 0.7, 0.7, 0.5, 0.35};
 // The loss gets sharper from level to level: with a sharp one from the start a wall that the base misses by much is an outlier for ever.
-static const double base_knee = 1, level_knee[] = {1, 0.5, 0.5, 0.25, 0.25, 0.25, 0.25, 0.25};
+static const double base_knee = 1, level_knee[] = {0.35, 0.35, 0.35, 0.25, 0.25, 0.25, 0.25, 0.25};
 enum { LEVELS = sizeof level_reach / sizeof level_reach[0], LAST_SWEEPS = 4 };
 
 FieldFitOptions field_fit_default_options(void)
