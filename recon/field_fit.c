@@ -17,7 +17,7 @@ enum { LEVELS = sizeof level_reach / sizeof level_reach[0], LAST_SWEEPS = 4 };
 
 FieldFitOptions field_fit_default_options(void)
 {
-    return (FieldFitOptions){.tolerance_voxels = 0.05, .least_reach_voxels = 0.8, .tolerance = 0.004, .tolerance_unknown = 0.02, .significance = 4.5, .levels = LEVELS};
+    return (FieldFitOptions){.tolerance_voxels = 0.05, .least_reach_voxels = 0.8, .tolerance = 0.004, .tolerance_unknown = 0.02, .significance = 6.5, .levels = LEVELS};
 }
 
 static bool check_options(const FieldFitOptions *o, Faults *faults)
