@@ -12,12 +12,12 @@ static const double BASE_APART = 0.75, BASE_REACH = 2;   // of the base blobs, i
 static const double TARGET_SHARE = 0.2;
 static const double level_reach[] = {1.4, 1.4, 1, 1, 0.7, 0.7, 0.5, 0.35};
 // The loss gets sharper from level to level: with a sharp one from the start a wall that the base misses by much is an outlier for ever.
-static const double base_knee = 1, level_knee[] = {1, 0.5, 0.5, 0.25, 0.25, 0.25, 0.25, 0.25};
+static const double base_knee = 1, level_knee[] = {0.35, 0.35, 0.35, 0.25, 0.25, 0.25, 0.25, 0.25};
 enum { LEVELS = sizeof level_reach / sizeof level_reach[0], LAST_SWEEPS = 4 };
 
 FieldFitOptions field_fit_default_options(void)
 {
-    return (FieldFitOptions){.tolerance_voxels = 0.05, .least_reach_voxels = 0.8, .tolerance = 0.004, .tolerance_unknown = 0.02, .significance = 4.5, .levels = LEVELS};
+    return (FieldFitOptions){.tolerance_voxels = 0.05, .least_reach_voxels = 0.8, .tolerance = 0.004, .tolerance_unknown = 0.02, .significance = 6.5, .levels = LEVELS};
 }
 
 static bool check_options(const FieldFitOptions *o, Faults *faults)
@@ -143,7 +143,6 @@ static bool fit(FieldModel *model, const FieldFitOptions *options, const Progres
     }
     for (int k = 0; k < LAST_SWEEPS; k++) {
         all_due(model);
-        model->guard_weight *= 1.5;
         sweep(&s, 3);
     }
     return !s.failed;

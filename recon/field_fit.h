@@ -21,7 +21,7 @@ typedef struct FieldFitOptions {
     double tolerance;        // in local radii, 0.004
     double tolerance_unknown;   // in local radii, 0.02
     double least_reach_voxels;  // no blob's reach is less than what the image resolves; 0.8
-    double significance;     // a mean residual counts above this many standard deviations of the noise's mean; 4.5
+    double significance;     // a mean residual counts above this many standard deviations of the noise's mean; 6.5
     int levels;              // of refinement, 0 to 8; 8
     int threads;             // 0: all cores; the result does not depend on it
 } FieldFitOptions;

@@ -1,6 +1,6 @@
 // A candidate stands on each data point p: the residuals of the data near by, weighted by what a blob of reach R at p would be there, w = (1 - d^2/R^2)^3,
 // have the mean m = sum w e / sum w and, for noise of standard deviation s, the deviation s sqrt(sum w^2) / sum w. s is measured at each node, as the spread
-// of the residuals about their mean over 0.7 radii. Residuals count as they do in the fit: those beyond the loss's knee less and less. Candidates beyond tolerance and noise are taken by size, none within 0.8 R of one taken before.
+// of the residuals about their mean over a third of the radius: over more, what the field misses at a crotch passes for noise, and no blob comes to mend it. Residuals count as they do in the fit: those beyond the loss's knee less and less. Candidates beyond tolerance and noise are taken by size, none within 0.8 R of one taken before.
 #include "recon/field_refine.h"
 
 #include "geom/sort_doubles.h"
@@ -12,6 +12,8 @@
 static const double INSIDE = 0.25, APART = 0.8;
 // Where fewer points than this are to be had for each blob, more blobs would only follow the noise.
 static const double POINTS_A_BLOB = 3;
+// Over which the noise is measured, in local radii; twice that where points are few.
+static const double NOISE_REACH = 0.35;
 
 typedef struct Candidate {
     double score;            // of tolerances
@@ -100,6 +102,9 @@ static int data_of(const Job *job, int node)
     return data;
 }
 
+// How many points of equal weight the mean is worth.
+static double points_of(const Mean *m) { return m->weight * m->weight / fmax(m->weight2, 1e-12); }
+
 static void measure_noise(void *context, long index)
 {
     enum { SAMPLES = 24 };
@@ -110,8 +115,11 @@ static void measure_noise(void *context, long index)
     for (int t = first[node]; t < first[node + 1]; t++) {
         const RowTile *tile = tile_of(job, t);
         for (; next < tile->data && taken < SAMPLES; next += step) {
-            Mean m = mean_about(job, node, row_place(job, tile, next), 0.7 * r);
-            double points = m.weight * m.weight / fmax(m.weight2, 1e-12), mean = m.sum / fmax(m.weight, 1e-12);
+            Vec3 x = row_place(job, tile, next);
+            Mean m = mean_about(job, node, x, NOISE_REACH * r);
+            if (points_of(&m) < 4)
+                m = mean_about(job, node, x, 2 * NOISE_REACH * r);
+            double points = points_of(&m), mean = m.sum / fmax(m.weight, 1e-12);
             if (points >= 3)
                 spread[taken++] = sqrt(fmax(0, m.sum2 / m.weight - mean * mean) * points / (points - 1));
         }

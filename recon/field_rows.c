@@ -22,6 +22,11 @@ static const double MOST_INSIDE = 1.5;
 static const double LUMEN_POINT = 0.5;
 // A sac is no ball: only this share of it is lumen for certain, beyond that its data say where it ends.
 static const double SAC_BALL = 0.6;
+// Cosine of the angle about a direction from a sac's centre within which a point of its wall says how far it reaches there.
+static const double SAC_CONE = 0.97;
+// What a guard outside asks for, at most: enough that no sheet closes there. Between two walls a smooth field gets no deeper, and guards that ask for the
+// scaled distance there push the walls apart.
+static const double OUTSIDE = 0.15;
 enum { GUARD_EVERY = 3, RING = 12, LINK_GUARDS = 4 };
 
 typedef struct Draft {       // rows of a node while they are collected
@@ -105,6 +110,13 @@ static bool is_in_lumen(const VesselTree *tree, int node, Vec3 x)
     return false;
 }
 
+// Whether a sac's wall, seen from its centre, lies behind x: a vessel's guards reach far into a sac that stands on it.
+static bool is_between(Vec3 x, Vec3 wall)
+{
+    double along = vec3_dot(x, wall), x2 = vec3_norm2(x), wall2 = vec3_norm2(wall);
+    return along > 0 && wall2 > x2 && along * along > SAC_CONE * SAC_CONE * wall2 * x2;
+}
+
 // Whether x is clear by `clear` of every tube and of all data near the node.
 static bool is_clear(const VesselTree *tree, int node, Vec3 x, double clear)
 {
@@ -115,9 +127,13 @@ static bool is_clear(const VesselTree *tree, int node, Vec3 x, double clear)
             return false;
         if (vec3_distance(x, tree->center[at]) > r + tree->height[at] + 2 * clear + 1.5 * r)
             continue;
-        for (int64_t i = tree->point_offset[at]; i < tree->point_offset[at + 1]; i++)
+        Vec3 out = vec3_sub(x, tree->center[at]);
+        for (int64_t i = tree->point_offset[at]; i < tree->point_offset[at + 1]; i++) {
             if (vec3_norm2(vec3_sub(x, tree->point[i])) < clear * clear)
                 return false;
+            if (tree->kind[at] != NODE_VESSEL && is_between(out, vec3_sub(tree->point[i], tree->center[at])))
+                return false;
+        }
     }
     return true;
 }
@@ -158,7 +174,7 @@ static void guard_around_point(const Job *job, int node, Vec3 p, Draft *d)
         static const double away[3] = {0.35, 0.8, 1.4};
         Vec3 x = vec3_add_scaled(p, away[k] * r, out);
         if (is_outside(job, node, x, 0.3 * r))
-            add_guard(d, x, -HUGE_VAL, -fmin(0.5, 0.5 * away[k]));
+            add_guard(d, x, -HUGE_VAL, -OUTSIDE * fmin(1, away[k]));
     }
 }
 
@@ -173,7 +189,7 @@ static void guard_ring(const Job *job, int node, Draft *d)
         for (int far = 0; far < 2; far++) {
             Vec3 x = vec3_add_scaled(c, (1.6 + 0.6 * far) * r, out);
             if (is_outside(job, node, x, 0.4 * r))
-                add_guard(d, x, -HUGE_VAL, -0.4);
+                add_guard(d, x, -HUGE_VAL, -0.8 * OUTSIDE);
         }
     }
 }

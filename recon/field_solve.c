@@ -14,7 +14,7 @@
 enum { REGION_BLOBS = 28, UNKNOWNS = 5};
 static const double LEAST_SLOPE = 0.5;
 // Priors: a blob's place and size are held to where it was put, as firmly as a few points a hundredth of a radius off would.
-static const double PRIOR_PLACE = 0.02, PRIOR_AMPLITUDE = 0.005, LEAST_BASE = 0.1;
+static const double PRIOR_PLACE = 0.02, PRIOR_AMPLITUDE = 0.03, LEAST_BASE = 0.1;
 
 typedef struct TileWork {    // a tile's part in a region's solution
     const RowTile *tile;

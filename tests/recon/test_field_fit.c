@@ -39,15 +39,15 @@ static ModelMeasure measure(const char *name, const VesselTree *model, const Sha
     return m;
 }
 
-// Limits: twice what the shapes gave when this was written, in mm.
+// Limits in mm: about twice what the shapes gave when this was written; the phantom's, and its worst at the crotch, are those that the project asks for.
 static void exact_samples_give_the_wall(void **state)
 {
     (void)state;
     static const struct {
         const char *name;
-        double tube, bifurcation, sac;
-    } of[] = {{"arc", 0.002, 0, 0}, {"y", 0.002, 0.003, 0}, {"bifurcation", 0.003, 0.004, 0}, {"kissing", 0.002, 0, 0}, {"twig", 0.001, 0.006, 0}, {"helix", 0.002, 0, 0},
-              {"phantom", 0.004, 0.019, 0.010}};
+        double tube, bifurcation, sac, worst;
+    } of[] = {{"arc", 0.002, 0, 0, 0}, {"y", 0.002, 0.003, 0, 0}, {"bifurcation", 0.002, 0.003, 0, 0}, {"kissing", 0.002, 0, 0, 0}, {"twig", 0.001, 0.003, 0, 0}, {"helix", 0.002, 0, 0, 0},
+              {"phantom", 0.003, 0.006, 0.007, 0.040}};
     for (size_t i = 0; i < sizeof of / sizeof of[0] - (is_slow ? 3 : 0); i++) {
         Shape *shape = make(of[i].name, 0, NULL);
         VesselTree *model = shared_fit(shape, 0.05, 0);
@@ -55,6 +55,7 @@ static void exact_samples_give_the_wall(void **state)
         assert_int_equal(m.ghost_nodes, 0);
         assert_true(m.wall[PLACE_TUBE].rms < of[i].tube);
         assert_true(of[i].bifurcation == 0 || m.wall[PLACE_BIFURCATION].rms < of[i].bifurcation);
+        assert_true(of[i].worst == 0 || m.wall[PLACE_BIFURCATION].most < of[i].worst);
         assert_true(of[i].sac == 0 || m.wall[PLACE_SAC].rms < of[i].sac);
         vessel_tree_free(model);
         shape_free(shape);
@@ -68,8 +69,8 @@ static void noise_is_averaged(void **state)
     Shape *shape = make(is_slow ? "arc" : "phantom", 1, option);
     VesselTree *model = shared_fit(shape, 0.05, 0);
     ModelMeasure m = measure("noise 0.05 mm", model, shape);
-    assert_true(m.wall[PLACE_TUBE].rms < 0.018);
-    assert_true(is_slow || m.wall[PLACE_SAC].rms < 0.02);
+    assert_true(m.wall[PLACE_TUBE].rms < 0.012);
+    assert_true(is_slow || m.wall[PLACE_SAC].rms < 0.012);
     vessel_tree_free(model);
     shape_free(shape);
 }
