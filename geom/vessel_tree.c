@@ -260,22 +260,34 @@ static double way_length(const NearSearch *s, int from, Way way)
     return (s->along[from] - s->along[way.top]) + (s->along[way.node] - s->along[way.top]);
 }
 
+// How long a way and how far apart near nodes are at most, in sums of their radii: see vessel_tree_link.
+typedef struct NearLimits {
+    double way, apart;
+} NearLimits;
+
+static NearLimits near_limits(const VesselTree *tree, int a, int b)
+{
+    bool local_models = vessel_tree_is_model(tree) && !vessel_tree_is_shared(tree);
+    if (!local_models)
+        return (NearLimits){3, 1.5};
+    bool at_sac = tree->kind[a] != NODE_VESSEL || tree->kind[b] != NODE_VESSEL;
+    return at_sac ? (NearLimits){2, 1.5} : (NearLimits){1.5, 1.2};
+}
+
 // The nodes near `node`, its neighbours always among them. Breadth first, so that the order is that of links, then of indices. False where there is
 // no memory.
 static bool collect_near(NearSearch *s, int node)
 {
     const VesselTree *tree = s->tree;
     int known = 1;
-    double farthest = s->part * 2 * (tree->radius[node] + s->largest);
+    double farthest = s->part * 3 * (tree->radius[node] + s->largest);
     s->way[0] = (Way){node, -1, node};
     for (int w = 0; w < known; w++, s->visits++) {
         Way at = s->way[w];
         double reach = s->part * (tree->radius[node] + tree->radius[at.node]);
-        bool is_neighbour = at.from == node, at_sac = tree->kind[node] != NODE_VESSEL || tree->kind[at.node] != NODE_VESSEL;
-        double way_max = at_sac ? 2 : 1.5, apart_max = at_sac ? 1.5 : 1.2;
-        if (w > 0 && (is_neighbour ||
-                      (way_length(s, node, at) < way_max * reach && vec3_distance(tree->center[node], tree->center[at.node]) < apart_max * reach)) &&
-            !add_near(s, at.node))
+        NearLimits most = near_limits(tree, node, at.node);
+        bool is_near = way_length(s, node, at) < most.way * reach && vec3_distance(tree->center[node], tree->center[at.node]) < most.apart * reach;
+        if (w > 0 && (at.from == node || is_near) && !add_near(s, at.node))
             return false;
         for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1]; k++) {
             int next = tree->neighbour[k];

@@ -58,9 +58,11 @@ void vessel_tree_free(VesselTree *tree);
 bool vessel_tree_validate(const VesselTree *tree, const char *file, Faults *faults);
 // Fills the neighbour lists; call once after parents, centres and radii are set. False where there is no memory.
 // Near is wider than the paper's neighbours (6.2.1), which stall where a sac or a side branch opens over several nodes: a point at the far lip of
-// a mouth would have to pass nodes that are worse. Node j is near node i where their centres are closer than 1.2 (r_i + r_j) and the way
-// through the tree is shorter than 1.5 (r_i + r_j): a vessel that turns back on itself needs pi times its radius, so kissing walls stay apart.
-// A sac does not turn back: with one of its nodes it is 1.5 and 2 (on the phantom a tip slid out of the sac on the model of a node beside its neck).
+// a mouth would have to pass nodes that are worse. Node j is near node i where their centres are closer than 1.5 (r_i + r_j) and the way
+// through the tree is shorter than 3 (r_i + r_j): the nodes of a wide mouth are near those of the vessel that it opens into although the way leads
+// about its rim, and what lies between two limbs of a hairpin is for the one field of both to say. Local models know nothing of each other's walls: theirs
+// are 1.2 and 1.5 (a vessel that turns back on itself needs pi times its radius, so kissing walls stay apart), with a sac's node 1.5 and 2 (on the
+// phantom a tip slid out of the sac on the model of a node beside its neck).
 // Near is mutual, and complete: only where a tree has so many nodes in one place that the lists would not fit are these distances cut, for all alike.
 // Of shared blobs it makes the lists of who sees which, too.
 bool vessel_tree_link(VesselTree *tree);
