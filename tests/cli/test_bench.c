@@ -147,7 +147,7 @@ static void collision_of_a_scene(void **state)
     unlink("/tmp/seldinger-bench-bend.svg");
     cJSON *root = load("/tmp/seldinger-bench-bend.json"), *rows = cJSON_GetObjectItem(root, "rows"), *row;
     bool embree = cJSON_IsTrue(cJSON_GetObjectItem(root, "embree"));
-    assert_int_equal(cJSON_GetArraySize(rows), embree ? 10 : 5);
+    assert_int_equal(cJSON_GetArraySize(rows), embree ? 11 : 6);
     double exact_push = 0;
     cJSON_ArrayForEach(row, rows) {
         a_row_is_whole(row, 200);

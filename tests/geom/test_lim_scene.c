@@ -1,5 +1,5 @@
 // The wall of a real model as a tool feels it: its jump where the point's node changes, the same answers on every instruction set, and what 80 points
-// sliding along it cost. test_lim_scene [MODEL.h5 ...] (default: scenes/aneurism/aneurism.h5; skipped where that was not made).
+// sliding along it cost. test_lim_scene [MODEL.h5 ...] (default: scenes/aneurism/aneurism-local.h5; skipped where that was not made).
 #include "geom/simd.h"
 #include "geom/vessel.h"
 #include "random_numbers.h"
@@ -18,7 +18,7 @@
 
 static int model_count;
 static char **model_path;
-static char *default_path[] = {"scenes/aneurism/aneurism.h5"};
+static char *default_path[] = {"scenes/aneurism/aneurism-local.h5"};
 
 static int by_size(const void *a, const void *b)
 {
