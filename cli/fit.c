@@ -210,7 +210,7 @@ static char *describe(const FitCommand *command, const TreeFileInfo *tree)
 }
 
 typedef struct FitFigures {
-    long blobs;
+    long blobs, left_out;    // left_out: points
     int blobs_median, blobs_most;
     double error_median, error_worst, class_percent[4], seconds;
     int worst_node;
@@ -306,6 +306,8 @@ static void json_measure(cJSON *root, const ModelMeasure *m)
 static void print_figures(const VesselTree *model, const FitFigures *f, double voxel)
 {
     printf("nodes          %d, %lld points\n", model->node_count, (long long)model->point_count);
+    if (f->left_out > 0)
+        printf("left out       %ld points, in another vessel's lumen\n", f->left_out);
     printf("blobs          %ld: %.1f a node, median %d, most %d\n", f->blobs, (double)f->blobs / model->node_count, f->blobs_median, f->blobs_most);
     printf("d_a            median %.4f mm, worst %.4f mm (node %d)\n", f->error_median, f->error_worst, f->worst_node);
     printf("d_a classes    C1 < 0.5 voxel %.2f %%, C2 < 1 voxel %.2f %%, C3 < 2 voxels %.2f %%, C4 %.2f %% (voxel %g mm)\n", f->class_percent[0],
@@ -318,6 +320,7 @@ static bool write_json(const char *path, cJSON *root, const VesselTree *model, c
 {
     cJSON_AddNumberToObject(root, "nodes", model->node_count);
     cJSON_AddNumberToObject(root, "points", (double)model->point_count);
+    cJSON_AddNumberToObject(root, "points_left_out", (double)f->left_out);
     cJSON_AddNumberToObject(root, "blobs", (double)f->blobs);
     cJSON_AddNumberToObject(root, "blobs_per_node", (double)f->blobs / model->node_count);
     cJSON_AddNumberToObject(root, "blobs_median", f->blobs_median);
@@ -363,7 +366,7 @@ static double seconds_now(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seconds, Faults *faults)
+static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seconds, int64_t *left_out, Faults *faults)
 {
     if (command->output)
         output_check_file(command->output, faults);
@@ -393,6 +396,7 @@ static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seco
         double begin = seconds_now();
         if (is_shared_preset(command->preset)) {
             FieldFitOptions options = shared_options(command);
+            options.left_out = left_out;
             model = field_fit(tree, &options, &progress, faults);
         } else {
             model = lim_fit(tree, &command->options, &progress, faults);
@@ -412,11 +416,13 @@ int verb_fit(int argc, char **argv)
         return code;
     TreeFileInfo from = {0};
     double seconds = 0;
-    VesselTree *model = run_fit(&command, &from, &seconds, &faults);
+    int64_t left_out = 0;
+    VesselTree *model = run_fit(&command, &from, &seconds, &left_out, &faults);
     bool good = model != NULL;
     if (good) {
         double voxel = command.options.voxel_mm > 0 ? command.options.voxel_mm : lim_fit_default_options().voxel_mm;
         FitFigures figures = figures_of(model, voxel, seconds);
+        figures.left_out = (long)left_out;
         ModelMeasure measure;
         if (command.measure && !model_measure(model, NULL, command.options.threads, &measure)) {
             faults_add(&faults, command.tree, 0, 0, "not enough memory to measure the model");

@@ -220,6 +220,8 @@ VesselTree *field_fit(const VesselTree *tree, const FieldFitOptions *options, co
     VesselTree *out = NULL;
     if (field_rows_create(&rows, tree, options->threads) && field_model_create(&model, tree, &rows, options->threads) && fit(&model, options, progress)) {
         out = make_tree(&model, faults);
+        if (options->left_out)
+            *options->left_out = rows.dropped;
         if (out)
             parallel_for(options->threads, out->node_count, measure_error, out, NULL);
     } else {

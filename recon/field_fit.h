@@ -24,6 +24,7 @@ typedef struct FieldFitOptions {
     double significance;     // a mean residual counts above this many standard deviations of the noise's mean; 6.5
     int levels;              // of refinement, 0 to 8; 8
     int threads;             // 0: all cores; the result does not depend on it
+    int64_t *left_out;       // set to the number of points that lie in another vessel's lumen, which are not fitted; NULL: not asked
 } FieldFitOptions;
 
 FieldFitOptions field_fit_default_options(void);
