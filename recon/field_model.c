@@ -145,7 +145,7 @@ void field_model_residuals(const FieldModel *model, const RowTile *tile, float *
     for (int64_t s = model->offset[tile->node]; s < model->offset[tile->node + 1]; s++) {
         LaneBlob blob = field_lane_blob(model->tree, tile->node, &model->blob[model->seen[s]]);
         if (field_tile_meets(tile, &blob, 1))
-            field_lanes_sum(tile->x, tile->y, tile->z, d, d, &blob, 1, sum[0], g);
+            fit_lanes_sum(tile->x, tile->y, tile->z, d, d, &blob, 1, sum[0], g);
     }
     for (int i = 0; i < tile->data; i++)
         distance[i] = sum[0][i] / fmaxf(sqrtf(g[0][i] * g[0][i] + g[1][i] * g[1][i] + g[2][i] * g[2][i]), least);

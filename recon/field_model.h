@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RECON_FIELD_MODEL_H
 #define SELDINGER_RECON_FIELD_MODEL_H
 
-#include "recon/field_lanes.h"
+#include "recon/fit_lanes.h"
 #include "recon/field_rows.h"
 
 // How far, in its reach, a blob may come to reach in a sweep: nodes and rows are listed for that.

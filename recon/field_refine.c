@@ -71,7 +71,7 @@ static void add_mean(const Job *job, int from, Vec3 x, double reach, float sum[4
     for (int t = first[from]; t < first[from + 1]; t++) {
         const RowTile *tile = tile_of(job, t);
         if (tile->data > 0 && field_tile_meets(tile, &ball, 1))
-            field_lanes_mean(tile->x, tile->y, tile->z, tile->weight, job->residual[t], tile->data_padded, &ball, sum);
+            fit_lanes_mean(tile->x, tile->y, tile->z, tile->weight, job->residual[t], tile->data_padded, &ball, sum);
     }
 }
 

@@ -6,7 +6,7 @@
 #define SELDINGER_RECON_FIELD_ROWS_H
 
 #include "geom/vessel_tree.h"
-#include "recon/field_lanes.h"
+#include "recon/fit_lanes.h"
 
 enum { FIELD_TILE = 64, GUARD_TILE = 128 };
 

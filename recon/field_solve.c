@@ -94,7 +94,7 @@ static void sum_still(const Sweep *sweep, int region, TileWork *tw)
         int b = model->seen[s];
         LaneBlob lane = field_lane_blob(model->tree, tile->node, &model->blob[b]);
         if (sweep->region_of[b] != region && field_tile_meets(tile, &lane, 1))
-            field_lanes_sum(tile->x, tile->y, tile->z, all, d, &lane, 1, tw->still_f, tw->still_g);
+            fit_lanes_sum(tile->x, tile->y, tile->z, all, d, &lane, 1, tw->still_f, tw->still_g);
     }
 }
 
@@ -158,7 +158,7 @@ static void sum_tile(const Work *w, TileWork *tw, const FieldBlob *blob)
         memcpy(tw->g[k], tw->still_g[k], (size_t)d * sizeof(float));
     for (int k = 0; k < tw->count; k++) {
         LaneBlob lane = field_lane_blob(w->sweep->model->tree, tile->node, &blob[tw->local[k]]);
-        field_lanes_sum(tile->x, tile->y, tile->z, all, d, &lane, 1, tw->f, tw->g);
+        fit_lanes_sum(tile->x, tile->y, tile->z, all, d, &lane, 1, tw->f, tw->g);
     }
 }
 
@@ -266,12 +266,12 @@ static void add_tile(Work *w, const TileWork *tw)
     }
     for (int k = 0; k < tw->count; k++) {
         LaneBlob lane = field_lane_blob(model->tree, tw->tile->node, &w->trial[tw->local[k]]);
-        field_lanes_columns(rows.x, rows.y, rows.z, rows.rows, rows.data, &lane, rows.scale, rows.bend, normal, column[0], ROWS_MAX);
+        fit_lanes_columns(rows.x, rows.y, rows.z, rows.rows, rows.data, &lane, rows.scale, rows.bend, normal, column[0], ROWS_MAX);
         for (int i = 0; i < length; i++)
             for (int m = 0; m < UNKNOWNS; m++)
                 w->row[i * stride + UNKNOWNS * k + m] = column[m][i];
     }
-    field_lanes_gram(w->row, length, stride, w->gram);
+    fit_lanes_gram(w->row, length, stride, w->gram);
     for (int a = 0; a < tw->count; a++)
         for (int b = a; b < tw->count; b++)
             add_pair(w, tw->local[a], tw->local[b], w->gram + UNKNOWNS * (a * stride + b), stride);
