@@ -716,10 +716,10 @@ static bool compare_memory(Growth *g, const Wall *wall, const TriangleMesh *mesh
 {
     double length = vessel_tree_length(wall->nodes), edge = contact_surface_edge(mesh), dense = dense_grid_bytes(mesh, edge), begin = collision_build_clock_s();
     GridVesselOptions options = {.cell_mm = edge, .band_mm = fmax(0.25, 2.5 * edge)};
-    fprintf(g->out, "\n%s: %.0f mm of vessel, %d nodes; mesh and grid with edges of %.3f mm; errors against the local models\n", wall->name, length,
+    fprintf(g->out, "\n%s: %.0f mm of vessel, %d nodes; mesh and grid with edges of %.3f mm; errors against the model\n", wall->name, length,
             wall->nodes->node_count, edge);
     fputs("                 | primitives      MB   bytes/mm | ns: wire, all over | gap rms, max um, normal deg | s to build\n", g->out);
-    Vessel *lim = collision_lim(wall->nodes, LIM_BLEND);
+    Vessel *lim = model_vessel_create(wall->nodes);
     bool good = add_made(g, wall, length, "LIM", lim, 0, begin);
     for (int k = 0; good && k < SEARCHES && mesh_vessel_available(); k++) {
         char name[32];
@@ -745,8 +745,10 @@ static bool largest_tree(Growth *g)
         vessel_tree_free(model);
         return false;
     }
-    Vessel *lim = model ? collision_lim(model, LIM_BLEND) : NULL;
+    Vessel *lim = model ? model_vessel_create(model) : NULL;
     Wall wall = {.name = path, .exact = lim, .nodes = model};
+    if (model && !lim)
+        fault(g, "not enough memory for the largest tree");
     TriangleMesh *mesh = lim ? mesh_wall(&wall, 100000, g->faults) : NULL;
     bool good = mesh && open_wall(g, &wall, mesh) && compare_memory(g, &wall, mesh);
     triangle_mesh_free(mesh);
