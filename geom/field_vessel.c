@@ -24,12 +24,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { OCTANTS = 8 };
 typedef struct FieldNode {
     Vec3 center;
     double radius, bend;     // [mm], and its inverse
     double skin;             // [mm] about the foot in which blobs are held
     double clear;            // [mm] the wall is certainly at least this far from the centre; < 0: not known
-    double room;             // [mm] of a point in the lumen that is nearer than that to a foot in the cell no wall is nearer: see measure_room
+    float room[OCTANTS];     // [mm] of a point in the lumen that is nearer than that to a foot in the cell no wall is nearer, by the octant of the wall's
+                             // normal there: see measure_room
     const int32_t *seen;     // its blobs
     int seen_count;
     bool carried;            // near the inlet: goes on upstream
@@ -48,7 +50,7 @@ typedef struct FieldVessel {
     ClearPoints clear_points;
 } FieldVessel;
 
-static const double SKIN = 0.15, SKIN_MOST = 0.2;    // of the radius, < BLOB_FLOOD_MARGIN; [mm]
+static const double SKIN = 0.2, SKIN_MOST = 0.3;    // of the radius, < BLOB_FLOOD_MARGIN; [mm]
 static const double BOUND = 0.1, BOUND_MOST = 0.15;  // what bounds are wider than the gap: of the radius; [mm]
 static const double TRUST = 0.05;            // of the radius: rivals that are this much farther are kept an eye on
 static const double REST = 1e-8, REST_FRESH = 1e-10;     // [mm] what Newton may leave of the gap: of a foot that is followed, of one from scratch
@@ -263,8 +265,9 @@ static void set_lane(const FieldVessel *field, FieldBlock *b, int i, int node)
     const FieldNode *n = &field->node[node];
     b->foot.radius[i] = n->radius, b->foot.bend[i] = n->bend, b->foot.allowed[i] = REST;
     b->foot.at.carried[i] = n->carried, b->foot.at.any_carried |= n->carried;
-    b->room[i] = n->room;
 }
+
+static int octant_of(Vec3 n) { return (n.x > 0) | (n.y > 0) << 1 | (n.z > 0) << 2; }
 
 static void set_whole_list(const FieldVessel *field, FieldBlock *b, int i, int node)
 {
@@ -601,7 +604,7 @@ static bool is_closest(const FieldVessel *field, Vec3 x, const Foot *foot, const
 {
     double size = fabs(foot->gap);
     const FieldNode *node = &field->node[foot->node];
-    if (foot->gap > 0 && foot->gap < node->room)
+    if (foot->gap > 0 && foot->gap < node->room[octant_of(foot->normal)])
         return true;
     if (node->carried && inlet_height(field, x) - size < inlet_zone(field))
         return false;
@@ -827,20 +830,32 @@ static bool hold_anew(const FieldVessel *field, VesselMemory *m, Vec3 q)
     return true;
 }
 
+// Points of a batch that wait for the same, and from where their feet start.
+typedef struct Queue {
+    int count, point[FOOT_BATCH];
+    Vec3 start[FOOT_BATCH];
+} Queue;
+
 typedef struct Batch {
     const Vec3 *point;
     VesselMemory *memory;
     VesselHit *hit;
-    int count, lane[FOOT_BATCH];             // points whose feet are followed …
-    int later_count, later[FOOT_BATCH];      // … those for which one step did not do, from …
-    Vec3 start[FOOT_BATCH];
-    int afresh_count, afresh[FOOT_BATCH];    // … and those that start from scratch
+    Queue followed;          // feet that are followed by one or two steps …
+    Queue sought;            // … by careful steps, from where those stopped or from a guess …
+    Queue afresh;            // … and from scratch
 } Batch;
+
+static void put(Queue *queue, int point, Vec3 start)
+{
+    queue->start[queue->count] = start;
+    queue->point[queue->count++] = point;
+}
 
 static void fill_lane(const FieldVessel *field, FieldBlock *b, int i, const Batch *batch, int point)
 {
     VesselMemory *m = &batch->memory[point];
     set_lane(field, b, i, m->node);
+    b->room[i] = field->node[m->node].room[octant_of(m->normal)];
     b->point[i] = &batch->point[point].x;
     b->memory[i] = &m->foot.x;
     b->list[i] = m->blob, b->count[i] = m->blobs;
@@ -895,74 +910,72 @@ static unsigned sure_near_inlet(const FieldVessel *field, const FieldBlock *b, u
     return sure;
 }
 
-enum { AFTER_START = 8 };
-// So that a foot does not leave the margin about its cell in one step.
-static const double LONGEST_AFTER_START = 0.25;
+// Steps that follow a foot, and careful ones that seek it; these no longer [of the radius] than lets them see what reaches there.
+enum { FOLLOW_ROUNDS = 2, SEEK_ROUNDS = 8 };
+static const double LONGEST_SOUGHT = 0.25;
+static const double FOLLOWED = 0.5;          // of the radius: of a point that has moved further the foot is sought
 
-// Follows the feet of up to eight points; with `start` from there, by several steps.
-static void follow_block(const FieldVessel *field, Batch *batch, const int *point, int count, const Vec3 *start)
+// The feet of up to eight points of a queue, from its starts where they are sought.
+static void follow_block(const FieldVessel *field, Batch *batch, const Queue *queue, int first)
 {
     FieldBlock b;
     double spare[MEMORY_WRITTEN], no_hit[HIT_ROW];
-    unsigned all = (1u << count) - 1;
+    const int *point = queue->point + first, count = queue->count - first < FOOT_BLOCK ? queue->count - first : FOOT_BLOCK;
+    const bool seek = queue == &batch->sought;
+    unsigned all = (1u << count) - 1, done = 0;
     b.row = field->row;
     b.slots = VESSEL_BLOBS;
     b.foot.at.any_carried = false;
     for (int i = 0; i < FOOT_BLOCK; i++)
         fill_lane(field, &b, i, batch, point[i < count ? i : 0]);
     unsigned moved = field->kernels->load(&b) & all;
-    if (start)
+    if (seek)
         for (int i = 0; i < FOOT_BLOCK; i++) {
-            const Vec3 *p = &start[i < count ? i : 0];
+            const Vec3 *p = &queue->start[first + (i < count ? i : 0)];
             b.foot.at.x[i] = p->x, b.foot.at.y[i] = p->y, b.foot.at.z[i] = p->z;
-            b.foot.longest[i] = LONGEST_AFTER_START * b.foot.radius[i];
+            b.foot.longest[i] = LONGEST_SOUGHT * b.foot.radius[i];
         }
-    if (start || b.foot.at.any_carried)
-        moved = moved_lanes(field, &b, moved, batch, point, count, start != NULL);
+    if (seek || b.foot.at.any_carried)
+        moved = moved_lanes(field, &b, moved, batch, point, count, seek);
     lanes_hold_anew(field, &b, moved, batch, point);
-    unsigned done = 0;
-    for (int round = 0; round < (start ? AFTER_START : 1) && (done & all) != all; round++) {
+    for (int round = 0; round < (seek ? SEEK_ROUNDS : FOLLOW_ROUNDS) && (done & all) != all; round++) {
         if (round > 0)
             lanes_hold_anew(field, &b, moved_lanes(field, &b, 0, batch, point, count, true) & ~done & all, batch, point);
         sample(field, &b);
-        done = field->kernels->newton(&b, start != NULL);
+        done = field->kernels->newton(&b, seek);
+    }
+    if (seek) {              // the Hessian is that of the last place but one: a foot from afar is looked at once more
+        for (int i = 0; i < FOOT_BLOCK; i++)
+            b.foot.state[i] = b.foot.state[i] == FOOT_DONE ? FOOT_PENDING : b.foot.state[i];
+        sample(field, &b);
+        done &= field->kernels->newton(&b, true);
     }
     unsigned sure = field->kernels->finish(&b), contradicted = 0;
     if (b.foot.at.any_carried)
         sure = sure_near_inlet(field, &b, sure, count);
     for (int i = 0; i < FOOT_BLOCK; i++) {
-        bool use = false;
+        bool is_sure = sure & done & all & 1u << i, use = is_sure;
         int p = point[i < count ? i : 0];
-        if (i < count) {
-            VesselMemory *m = &batch->memory[p];
+        VesselMemory *m = &batch->memory[p];
+        VesselHit *hit = &batch->hit[p];
+        if (i < count && !is_sure) {
             Foot foot = lane_foot(&b, i, m->node);
-            if (!(done >> i & 1)) {
-                if (!start) {
-                    batch->start[batch->later_count] = b.foot.state[i] == FOOT_PENDING ? foot.at : m->foot;
-                    batch->later[batch->later_count++] = p;
-                } else {
-                    batch->afresh[batch->afresh_count++] = p;
-                }
-            } else if (!(use = sure >> i & 1)) {
-                foot.sure = true;
-                if (b.trust[i] > 0 && !m->has_rival) {
-                    use = true;
-                } else if (b.trust[i] > 0) {
-                    m->trust = b.trust[i];
-                    answer_beside_rival(field, batch->point[p], foot, m, &batch->hit[p]);
-                } else {
-                    answer_around(field, batch->point[p], &foot, m, &batch->hit[p]);
-                }
-            }
+            foot.sure = true;
+            if (!(done >> i & 1))
+                put(seek ? &batch->afresh : &batch->sought, p, b.foot.state[i] == FOOT_PENDING ? foot.at : m->foot);
+            else if (!(b.trust[i] > 0))
+                answer_around(field, batch->point[p], &foot, m, hit);
+            else if (m->has_rival)
+                m->trust = b.trust[i], answer_beside_rival(field, batch->point[p], foot, m, hit);
+            else
+                use = true;
         }
-        b.keep[i] = use ? &batch->memory[p].foot.x : spare;
-        b.hit[i] = use ? &batch->hit[p].gap : no_hit;
+        b.keep[i] = use ? &m->foot.x : spare;
+        b.hit[i] = use ? &hit->gap : no_hit;
         if (use) {
-            VesselHit *hit = &batch->hit[p];
-            VesselMemory *m = &batch->memory[p];
             hit->node = m->node;
             hit->flags = 0;
-            if (sure >> i & 1)
+            if (is_sure)
                 set_clearance(m, batch->point[p], b.foot.gap[i]);
             set_flags(field, batch->point[p], m->node, hit);
             contradicted |= m->contradicted ? 1u << i : 0;
@@ -975,23 +988,50 @@ static void follow_block(const FieldVessel *field, Batch *batch, const int *poin
     }
 }
 
+// Where the foot of a point that remembers none, or one of long ago, may be: outwards from the axis of the nearest node.
+static Vec3 guess_start(const FieldVessel *field, Vec3 x, VesselMemory *m)
+{
+    int node = walk(field, x, m->node, 4);
+    const FieldNode *n = &field->node[node];
+    Vec3 d = field->tree->direction[node], out = vec3_sub(x, n->center), axis = n->center;
+    if (field->tree->kind[node] == NODE_VESSEL) {
+        axis = vec3_add_scaled(axis, vec3_dot(out, d), d);
+        out = vec3_sub(x, axis);
+    }
+    out = vec3_unit_or(out, vec3_normal_to(d));
+    m->node = node;
+    m->foot = vec3_add_scaled(axis, n->radius, out);
+    m->place = x;
+    m->normal = vec3_negate(out);
+    m->hessian = (Sym3){0};
+    m->trust = m->clearance = m->bound_for = 0;
+    m->held_for2 = -1;
+    m->blobs = 0;
+    m->has_foot = true;
+    return m->foot;
+}
+
 static void query_batch(const FieldVessel *field, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
-    Batch batch = {.point = point, .memory = memory, .hit = hit};
+    Batch batch;
+    batch.point = point, batch.memory = memory, batch.hit = hit;
+    batch.followed.count = batch.sought.count = batch.afresh.count = 0;
     for (int i = 0; i < count; i++) {
-        if (answer_cheaply(field, point[i], reach, &memory[i], &hit[i]))
+        VesselMemory *m = &memory[i];
+        if (answer_cheaply(field, point[i], reach, m, &hit[i]))
             continue;
-        if (memory[i].has_foot)
-            batch.lane[batch.count++] = i;
+        double far = FOLLOWED * field->node[m->node].radius;
+        if (m->has_foot && vec3_norm2(vec3_sub(point[i], m->place)) < far * far)
+            put(&batch.followed, i, m->foot);
         else
-            batch.afresh[batch.afresh_count++] = i;
+            put(&batch.sought, i, guess_start(field, point[i], m));
     }
-    for (int i = 0; i < batch.count; i += FOOT_BLOCK)
-        follow_block(field, &batch, batch.lane + i, batch.count - i < FOOT_BLOCK ? batch.count - i : FOOT_BLOCK, NULL);
-    for (int i = 0; i < batch.later_count; i += FOOT_BLOCK)
-        follow_block(field, &batch, batch.later + i, batch.later_count - i < FOOT_BLOCK ? batch.later_count - i : FOOT_BLOCK, batch.start + i);
-    for (int i = 0; i < batch.afresh_count; i++)
-        answer_afresh(field, point[batch.afresh[i]], &memory[batch.afresh[i]], &hit[batch.afresh[i]]);
+    for (int i = 0; i < batch.followed.count; i += FOOT_BLOCK)
+        follow_block(field, &batch, &batch.followed, i);
+    for (int i = 0; i < batch.sought.count; i += FOOT_BLOCK)
+        follow_block(field, &batch, &batch.sought, i);
+    for (int i = 0; i < batch.afresh.count; i++)
+        answer_afresh(field, point[batch.afresh.point[i]], &memory[batch.afresh.point[i]], &hit[batch.afresh.point[i]]);
 }
 
 static void field_query(const Vessel *vessel, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
@@ -1071,29 +1111,42 @@ static bool wall_along(const FieldVessel *field, const BlobList *list, int node,
 }
 
 // The wall's reach in a node's cell: how large a ball may be that touches the wall from within and meets no other part of it, at feet all around. A point
-// whose foot is nearer than that lies in such a ball with all that is as near to it.
-static double measure_room(const FieldVessel *field, int node)
+// whose foot is nearer than that lies in such a ball with all that is as near to it. Feet are told apart by their normals; one near the border of two
+// octants counts for both.
+static void measure_room(const FieldVessel *field, int node, float *room)
 {
-    static const double part[] = {1.1, 1.05, 1, 0.95, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2};
+    static const double part[] = {1.1, 1.05, 1, 0.95, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0};
     static const double SHARE = 0.92;        // of a ball that is clear at the points at which it is looked at: see room_about
-    enum { PARTS = sizeof part / sizeof part[0], LEAST = 6 };
+    static const double ASIDE = 0.3;         // of a normal's component
+    enum { PARTS = sizeof part / sizeof part[0], LEAST = 2, AROUND = 16 };
     const FieldNode *n = &field->node[node];
     BlobList list;
-    int size = 0, found = 0;
+    int size[OCTANTS] = {0}, found[OCTANTS] = {0};
+    Vec3 d = field->tree->direction[node], across = vec3_normal_to(d), side = vec3_cross(d, across);
+    memset(room, 0, OCTANTS * sizeof *room);
     if (n->carried)
-        return 0;
+        return;
     list_blobs(field, node, n->center, 3 * n->radius, &list);
-    for (int k = 0; k < WAYS && size < PARTS; k++) {
-        Vec3 wall, in;
-        if (!wall_along(field, &list, node, field->way[k], &wall))
+    for (int k = 0; k < WAYS + AROUND; k++) {
+        double turn = 2 * PI * k / AROUND;
+        Vec3 wall, in, way = k < WAYS ? field->way[k] : vec3_add(vec3_scale(across, cos(turn)), vec3_scale(side, sin(turn)));
+        if (!wall_along(field, &list, node, way, &wall))
             continue;
         field_at(field, &list, wall, &in);
-        in = vec3_unit_or(in, vec3_negate(field->way[k]));
-        found++;
-        while (size < PARTS && !is_clear(field, &list, vec3_add_scaled(wall, part[size] * n->radius, in), part[size] * n->radius, 1))
-            size++;
+        in = vec3_unit_or(in, vec3_negate(way));
+        int at = 0;
+        while (part[at] > 0 && !is_clear(field, &list, vec3_add_scaled(wall, part[at] * n->radius, in), part[at] * n->radius, 1))
+            at++;
+        for (int o = 0; o < OCTANTS; o++) {
+            Vec3 sign = {o & 1 ? 1 : -1, o & 2 ? 1 : -1, o & 4 ? 1 : -1};
+            if (in.x * sign.x < -ASIDE || in.y * sign.y < -ASIDE || in.z * sign.z < -ASIDE)
+                continue;
+            found[o]++;
+            size[o] = at > size[o] ? at : size[o];
+        }
     }
-    return size < PARTS && found >= LEAST ? SHARE * part[size] * n->radius : 0;
+    for (int o = 0; o < OCTANTS; o++)
+        room[o] = found[o] >= LEAST ? (float)(SHARE * part[size[o]] * n->radius) : 0;
 }
 
 static void fill_nodes(FieldVessel *field)
@@ -1114,7 +1167,10 @@ static void fill_nodes(FieldVessel *field)
         field->node[node].carried = blobby_field(&blobs, tree->center[0]) > 0;
     }
     for (int i = 0; i < tree->node_count; i++)
-        field->node[i].clear = clear_about_center(field, i), field->node[i].room = measure_room(field, i);
+        {
+        field->node[i].clear = clear_about_center(field, i);
+        measure_room(field, i, field->node[i].room);
+    }
 }
 
 Vessel *field_vessel_create_with(const VesselTree *tree, int isa)
