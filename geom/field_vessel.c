@@ -50,7 +50,8 @@ typedef struct FieldVessel {
     ClearPoints clear_points;
 } FieldVessel;
 
-static const double SKIN = 0.2, SKIN_MOST = 0.3;    // of the radius, < BLOB_FLOOD_MARGIN; [mm]
+static const double SKIN = 0.2, SKIN_MOST = 0.3;    // of the radius, (1 + AHEAD) SKIN < BLOB_FLOOD_MARGIN; [mm]
+static const double AHEAD = 0.45;            // of the skin
 static const double BOUND = 0.1, BOUND_MOST = 0.15;  // what bounds are wider than the gap: of the radius; [mm]
 static const double TRUST = 0.05;            // of the radius: rivals that are this much farther are kept an eye on
 static const double REST = 1e-8, REST_FRESH = 1e-10;     // [mm] what Newton may leave of the gap: of a foot that is followed, of one from scratch
@@ -84,6 +85,12 @@ static Vec3 asked_at(const FieldVessel *field, const FieldNode *node, Vec3 x)
         return x;
     double slope, bend, z = inlet_height(field, x);
     return vec3_add_scaled(x, carried_height(z, inlet_zone(field), &slope, &bend) - z, field->tree->direction[0]);
+}
+
+// Is anything of a ball where the inlet bends the node's field?
+static bool is_at_inlet(const FieldVessel *field, const FieldNode *node, Vec3 middle, double ball)
+{
+    return node->carried && inlet_height(field, middle) - ball < inlet_zone(field);
 }
 
 // The field at the running feet of a block, near the inlet as it goes on upstream.
@@ -183,33 +190,39 @@ static int pick_blobs(const FieldVessel *field, const int32_t *seen_blob, int se
     return count;
 }
 
+// The same as a list of its own; all where that has no room for them.
+static void pick_list(const FieldVessel *field, const int32_t *seen, int seen_count, Vec3 q, double skin, BlobList *list)
+{
+    list->blob = list->own;
+    list->count = seen_count <= FOOT_BLOCK ? NEAR_BLOBS + 1 : pick_blobs(field, seen, seen_count, q, skin, NEAR_BLOBS, list->own);
+    if (list->count > NEAR_BLOBS)
+        list->blob = seen, list->count = seen_count;
+}
+
 // A node's blobs that reach to within `far` of x. Near the inlet all: the field is asked elsewhere there.
 static void list_blobs(const FieldVessel *field, int node, Vec3 x, double far, BlobList *list)
 {
     const FieldNode *n = &field->node[node];
-    list->blob = list->own;
-    list->count = n->carried || n->seen_count <= FOOT_BLOCK ? NEAR_BLOBS + 1 : pick_blobs(field, n->seen, n->seen_count, x, far, NEAR_BLOBS, list->own);
-    if (list->count > NEAR_BLOBS)
-        list->blob = n->seen, list->count = n->seen_count;
+    pick_list(field, n->seen, n->seen_count, x, n->carried ? HUGE_VAL : far, list);
 }
 
 // How far about a point whoever looks for its closest wall asks, beyond the gap, in radii.
 static const double LOOK = 0.5;
 
-// Makes the list of a memory for feet about q, of those that reach there.
+// Makes the list of a memory for feet about q, of those that reach there: a little ahead, where the last motion is going.
 static void hold_blobs(const FieldVessel *field, VesselMemory *m, Vec3 q, const BlobList *list)
 {
     double skin = field->node[m->node].skin;
-    int count = pick_blobs(field, list->blob, list->count, q, skin, VESSEL_BLOBS, m->blob);
-    for (int shrink = 0; shrink < 2 && count > VESSEL_BLOBS; shrink++) {
-        skin *= 0.4;
-        count = pick_blobs(field, list->blob, list->count, q, skin, VESSEL_BLOBS, m->blob);
+    Vec3 way = vec3_unit_or(m->step, vec3(0, 0, 0));
+    int count = VESSEL_BLOBS + 1;
+    for (int shrink = 0; shrink < 3 && count > VESSEL_BLOBS; shrink++, skin *= 0.4) {
+        m->held_at = vec3_add_scaled(q, AHEAD * skin, way);
+        m->held_for2 = skin * skin;
+        count = pick_blobs(field, list->blob, list->count, m->held_at, skin, VESSEL_BLOBS, m->blob);
     }
     m->blobs = count <= VESSEL_BLOBS ? count : -1;
     for (int k = count; k < VESSEL_BLOBS; k++)
         m->blob[k] = (int32_t)field->tree->blob_count;
-    m->held_at = q;
-    m->held_for2 = skin * skin;
 }
 
 // Bounds of how f bends in a ball a little wider than the gap.
@@ -260,11 +273,11 @@ typedef struct Foot {
     bool sure;
 } Foot;
 
-static void set_lane(const FieldVessel *field, FieldBlock *b, int i, int node)
+static void set_lane(const FieldVessel *field, FieldBlock *b, int i, int node, bool carried)
 {
     const FieldNode *n = &field->node[node];
     b->foot.radius[i] = n->radius, b->foot.bend[i] = n->bend, b->foot.allowed[i] = REST;
-    b->foot.at.carried[i] = n->carried, b->foot.at.any_carried |= n->carried;
+    b->foot.at.carried[i] = carried, b->foot.at.any_carried |= carried;
 }
 
 static int octant_of(Vec3 n) { return (n.x > 0) | (n.y > 0) << 1 | (n.z > 0) << 2; }
@@ -283,30 +296,23 @@ static Foot lane_foot(const FieldBlock *b, int i, int node)
                   .hessian = {f->axx[i], f->axy[i], f->axz[i], f->ayy[i], f->ayz[i], f->azz[i]}};
 }
 
-// The blobs near each lane's running foot, for places within `skin` of where they were picked.
-enum { SETTLE_BLOBS = 64 };
+// The blobs near each lane's running foot, for places within a skin of where they were picked.
 typedef struct NearLists {
     Vec3 at[FOOT_BLOCK];
-    int32_t blob[FOOT_BLOCK][SETTLE_BLOBS];
+    BlobList list[FOOT_BLOCK];
 } NearLists;
 
-// Short lists are taken whole.
 static void list_near(const FieldVessel *field, FieldBlock *b, int i, int node, NearLists *lists, bool fresh)
 {
     static const double SETTLE_SKIN = 0.25;      // of the radius
     const FieldNode *n = &field->node[node];
-    if (n->seen_count <= SETTLE_BLOBS / 2) {
-        b->list[i] = n->seen, b->count[i] = n->seen_count;
-        return;
-    }
     Vec3 q = asked_at(field, n, vec3(b->foot.at.x[i], b->foot.at.y[i], b->foot.at.z[i]));
     double skin = SETTLE_SKIN * n->radius;
     if (!fresh && vec3_norm2(vec3_sub(q, lists->at[i])) <= skin * skin)
         return;
-    int count = vec3_norm2(q) < 1e100 ? pick_blobs(field, n->seen, n->seen_count, q, skin, SETTLE_BLOBS, lists->blob[i]) : 0;
-    bool all = count > SETTLE_BLOBS;
     lists->at[i] = q;
-    b->list[i] = all ? n->seen : lists->blob[i], b->count[i] = all ? n->seen_count : count;
+    pick_list(field, n->seen, n->seen_count, q, skin, &lists->list[i]);
+    b->list[i] = lists->list[i].blob, b->count[i] = lists->list[i].count;
 }
 
 enum { ROUNDS = 16, FEW_ROUNDS = 8 };
@@ -325,7 +331,7 @@ static int settle(const FieldVessel *field, Vec3 x, int node, const Vec3 *start,
     b.foot.at.any_carried = false;
     for (int i = 0; i < FOOT_BLOCK; i++) {
         const Vec3 *from = &start[i < count ? i : 0];
-        set_lane(field, &b, i, node);
+        set_lane(field, &b, i, node, field->node[node].carried);
         f->xx[i] = x.x, f->xy[i] = x.y, f->xz[i] = x.z;
         f->at.x[i] = from->x, f->at.y[i] = from->y, f->at.z[i] = from->z;
         f->longest[i] = 0.5 * f->radius[i];
@@ -395,10 +401,9 @@ static void look_around(const FieldVessel *field, Vec3 x, int node, double far, 
 
 static bool is_clear(const FieldVessel *field, const BlobList *list, Vec3 middle, double ball, double side)
 {
-    int32_t in[NEAR_BLOBS];
-    int count = pick_blobs(field, list->blob, list->count, middle, ball, NEAR_BLOBS, in);
-    bool all = count > NEAR_BLOBS;
-    return field->kernels->is_clear(&field->clear_points, field->row, all ? list->blob : in, all ? list->count : count, middle, ball, side);
+    BlobList in;
+    pick_list(field, list->blob, list->count, middle, ball, &in);
+    return field->kernels->is_clear(&field->clear_points, field->row, in.blob, in.count, middle, ball, side);
 }
 
 // [mm] A sharply bent wall has other feet close by: the foot is not trusted over more than this of travel.
@@ -421,7 +426,7 @@ static double room_about(const FieldVessel *field, double side, const Foot *foot
     for (int t = 0; t < TRIES; t++) {
         double ball = size + wider[t] * node->radius, room = 0.4 * (0.92 * ball - size);
         Vec3 middle = vec3_add_scaled(foot->at, side * ball, foot->normal);
-        if (node->carried && inlet_height(field, middle) - ball < inlet_zone(field))
+        if (is_at_inlet(field, node, middle, ball))
             continue;
         if (room > 0.01 * node->radius && is_clear(field, list, middle, ball, side))
             return fmin(room, bend_radius(foot));
@@ -580,7 +585,7 @@ static double clear_ball(const FieldVessel *field, const FieldNode *node, Vec3 x
 {
     static const double part[] = {0.9, 0.65, 0.4};
     enum { PARTS = sizeof part / sizeof part[0] };
-    if (!(most > 0.5 * node->radius) || (node->carried && inlet_height(field, x) - most < inlet_zone(field)))
+    if (!(most > 0.5 * node->radius) || is_at_inlet(field, node, x, most))
         return 0;
     Vec3 g;
     double down, up, f = field_at(field, list, x, &g), slope = vec3_norm(g);
@@ -604,10 +609,10 @@ static bool is_closest(const FieldVessel *field, Vec3 x, const Foot *foot, const
 {
     double size = fabs(foot->gap);
     const FieldNode *node = &field->node[foot->node];
+    if (is_at_inlet(field, node, x, size))
+        return false;
     if (foot->gap > 0 && foot->gap < node->room[octant_of(foot->normal)])
         return true;
-    if (node->carried && inlet_height(field, x) - size < inlet_zone(field))
-        return false;
     return vec3_distance(x, m->bound_at) + size <= m->bound_for && (foot->gap > 0 ? m->down : m->up) * size < 0.97 * foot->slope;
 }
 
@@ -851,11 +856,19 @@ static void put(Queue *queue, int point, Vec3 start)
     queue->point[queue->count++] = point;
 }
 
-static void fill_lane(const FieldVessel *field, FieldBlock *b, int i, const Batch *batch, int point)
+// Steps that follow a foot, and careful ones that seek it; these no longer [of the radius] than lets them see what reaches there.
+enum { FOLLOW_ROUNDS = 2, SEEK_ROUNDS = 8 };
+static const double LONGEST_SOUGHT = 0.25;
+static const double FOLLOWED = 0.5;          // of the radius: of a point that has moved further the foot is sought
+
+// A followed foot goes no further than the prediction and its steps may: one that is far from the inlet needs not be asked about it.
+static void fill_lane(const FieldVessel *field, FieldBlock *b, int i, const Batch *batch, int point, bool seek)
 {
+    static const double REACH = 1.25;        // of the radius: 0.2 and two steps of a half
     VesselMemory *m = &batch->memory[point];
-    set_lane(field, b, i, m->node);
-    b->room[i] = field->node[m->node].room[octant_of(m->normal)];
+    const FieldNode *n = &field->node[m->node];
+    set_lane(field, b, i, m->node, n->carried && (seek || inlet_height(field, m->foot) < inlet_zone(field) + REACH * n->radius));
+    b->room[i] = n->room[octant_of(m->normal)];
     b->point[i] = &batch->point[point].x;
     b->memory[i] = &m->foot.x;
     b->list[i] = m->blob, b->count[i] = m->blobs;
@@ -864,7 +877,7 @@ static void fill_lane(const FieldVessel *field, FieldBlock *b, int i, const Batc
 }
 
 // Lanes that have left what they hold; those of which that is no small step are lost.
-static void lanes_hold_anew(const FieldVessel *field, FieldBlock *b, unsigned lanes, const Batch *batch, const int *point)
+static void lanes_hold_anew(const FieldVessel *field, FieldBlock *b, unsigned lanes, const Batch *batch, const int *point, bool seek)
 {
     for (; lanes != 0; lanes &= lanes - 1) {
         int i = __builtin_ctz(lanes);
@@ -874,7 +887,7 @@ static void lanes_hold_anew(const FieldVessel *field, FieldBlock *b, unsigned la
             b->foot.state[i] = FOOT_LOST;
             continue;
         }
-        fill_lane(field, b, i, batch, point[i]);
+        fill_lane(field, b, i, batch, point[i], seek);
         b->held_x[i] = m->held_at.x, b->held_y[i] = m->held_at.y, b->held_z[i] = m->held_at.z, b->held_for2[i] = m->held_for2;
     }
 }
@@ -898,10 +911,10 @@ static unsigned sure_near_inlet(const FieldVessel *field, const FieldBlock *b, u
     Vec3 d = field->tree->direction[0];
     double more = 0.75 / inlet_zone(field);
     for (int i = 0; i < count; i++) {
-        if (!b->foot.at.carried[i])
-            continue;
         double size = fabs(b->foot.gap[i]), bend = fmax(b->down[i], b->up[i]);
         Vec3 x = {b->foot.xx[i], b->foot.xy[i], b->foot.xz[i]}, at = {b->bound_x[i], b->bound_y[i], b->bound_z[i]};
+        if (!b->foot.at.carried[i] || inlet_height(field, x) - size >= inlet_zone(field))
+            continue;
         Vec3 g = {b->foot.at.gx[i], b->foot.at.gy[i], b->foot.at.gz[i]};
         double along = fabs(vec3_dot(g, d)) + 2 * bend * size;
         if (!((bend + more * along) * size < 0.95 * vec3_norm(g) && vec3_distance(x, at) + size <= b->bound_for[i]))
@@ -909,11 +922,6 @@ static unsigned sure_near_inlet(const FieldVessel *field, const FieldBlock *b, u
     }
     return sure;
 }
-
-// Steps that follow a foot, and careful ones that seek it; these no longer [of the radius] than lets them see what reaches there.
-enum { FOLLOW_ROUNDS = 2, SEEK_ROUNDS = 8 };
-static const double LONGEST_SOUGHT = 0.25;
-static const double FOLLOWED = 0.5;          // of the radius: of a point that has moved further the foot is sought
 
 // The feet of up to eight points of a queue, from its starts where they are sought.
 static void follow_block(const FieldVessel *field, Batch *batch, const Queue *queue, int first)
@@ -927,7 +935,7 @@ static void follow_block(const FieldVessel *field, Batch *batch, const Queue *qu
     b.slots = VESSEL_BLOBS;
     b.foot.at.any_carried = false;
     for (int i = 0; i < FOOT_BLOCK; i++)
-        fill_lane(field, &b, i, batch, point[i < count ? i : 0]);
+        fill_lane(field, &b, i, batch, point[i < count ? i : 0], seek);
     unsigned moved = field->kernels->load(&b) & all;
     if (seek)
         for (int i = 0; i < FOOT_BLOCK; i++) {
@@ -937,10 +945,10 @@ static void follow_block(const FieldVessel *field, Batch *batch, const Queue *qu
         }
     if (seek || b.foot.at.any_carried)
         moved = moved_lanes(field, &b, moved, batch, point, count, seek);
-    lanes_hold_anew(field, &b, moved, batch, point);
+    lanes_hold_anew(field, &b, moved, batch, point, seek);
     for (int round = 0; round < (seek ? SEEK_ROUNDS : FOLLOW_ROUNDS) && (done & all) != all; round++) {
         if (round > 0)
-            lanes_hold_anew(field, &b, moved_lanes(field, &b, 0, batch, point, count, true) & ~done & all, batch, point);
+            lanes_hold_anew(field, &b, moved_lanes(field, &b, 0, batch, point, count, true) & ~done & all, batch, point, seek);
         sample(field, &b);
         done = field->kernels->newton(&b, seek);
     }
@@ -1124,8 +1132,6 @@ static void measure_room(const FieldVessel *field, int node, float *room)
     int size[OCTANTS] = {0}, found[OCTANTS] = {0};
     Vec3 d = field->tree->direction[node], across = vec3_normal_to(d), side = vec3_cross(d, across);
     memset(room, 0, OCTANTS * sizeof *room);
-    if (n->carried)
-        return;
     list_blobs(field, node, n->center, 3 * n->radius, &list);
     for (int k = 0; k < WAYS + AROUND; k++) {
         double turn = 2 * PI * k / AROUND;
@@ -1134,16 +1140,25 @@ static void measure_room(const FieldVessel *field, int node, float *room)
             continue;
         field_at(field, &list, wall, &in);
         in = vec3_unit_or(in, vec3_negate(way));
-        int at = 0;
-        while (part[at] > 0 && !is_clear(field, &list, vec3_add_scaled(wall, part[at] * n->radius, in), part[at] * n->radius, 1))
-            at++;
+        bool counts[OCTANTS];
+        int at = PARTS - 1;      // larger balls than all its octants have already need not be tried
         for (int o = 0; o < OCTANTS; o++) {
-            Vec3 sign = {o & 1 ? 1 : -1, o & 2 ? 1 : -1, o & 4 ? 1 : -1};
-            if (in.x * sign.x < -ASIDE || in.y * sign.y < -ASIDE || in.z * sign.z < -ASIDE)
-                continue;
-            found[o]++;
-            size[o] = at > size[o] ? at : size[o];
+            counts[o] = in.x * (o & 1 ? 1 : -1) >= -ASIDE && in.y * (o & 2 ? 1 : -1) >= -ASIDE && in.z * (o & 4 ? 1 : -1) >= -ASIDE;
+            found[o] += counts[o];
+            at = counts[o] && size[o] < at ? size[o] : at;
         }
+        bool limits = false;
+        for (; part[at] > 0; at++) {
+            double ball = part[at] * n->radius;
+            Vec3 middle = vec3_add_scaled(wall, ball, in);
+            if (is_at_inlet(field, n, middle, ball))
+                continue;
+            if (is_clear(field, &list, middle, ball, 1))
+                break;
+            limits = true;
+        }
+        for (int o = 0; o < OCTANTS; o++)
+            size[o] = counts[o] && limits && at > size[o] ? at : size[o];
     }
     for (int o = 0; o < OCTANTS; o++)
         room[o] = found[o] >= LEAST ? (float)(SHARE * part[size[o]] * n->radius) : 0;

@@ -4,20 +4,20 @@
 
 #include <string.h>
 
-typedef struct FieldKernels {
+typedef struct FitKernels {
     void (*sum)(const float *, const float *, const float *, int, int, const LaneBlob *, int, float *, float *, float *, float *);
     void (*columns)(const float *, const float *, const float *, int, int, const LaneBlob *, const float *, const float *, const float *, const float *,
                     const float *, float *, int);
     void (*gram)(const float *, int, int, float *);
     void (*mean)(const float *, const float *, const float *, const float *, const float *, int, const LaneBlob *, float (*)[FIELD_LANES]);
-} FieldKernels;
+} FitKernels;
 
 #define TARGET
 #define KERNEL(name) name##_baseline
 #include "recon/fit_kernel.inc"
 #undef TARGET
 #undef KERNEL
-static const FieldKernels baseline = {sum_baseline, columns_baseline, gram_baseline, mean_baseline};
+static const FitKernels baseline = {sum_baseline, columns_baseline, gram_baseline, mean_baseline};
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #define TARGET __attribute__((target("avx2")))
@@ -30,15 +30,15 @@ static const FieldKernels baseline = {sum_baseline, columns_baseline, gram_basel
 #include "recon/fit_kernel.inc"
 #undef TARGET
 #undef KERNEL
-static const FieldKernels avx2 = {sum_avx2, columns_avx2, gram_avx2, mean_avx2}, avx512 = {sum_avx512, columns_avx512, gram_avx512, mean_avx512};
+static const FitKernels avx2 = {sum_avx2, columns_avx2, gram_avx2, mean_avx2}, avx512 = {sum_avx512, columns_avx512, gram_avx512, mean_avx512};
 
-static const FieldKernels *kernels(void)
+static const FitKernels *kernels(void)
 {
-    static const FieldKernels *const of[SIMD_COUNT] = {&baseline, &avx2, &avx512};
+    static const FitKernels *const of[SIMD_COUNT] = {&baseline, &avx2, &avx512};
     return of[simd_level()];
 }
 #else
-static const FieldKernels *kernels(void) { return &baseline; }
+static const FitKernels *kernels(void) { return &baseline; }
 #endif
 
 void fit_lanes_sum(const float *x, const float *y, const float *z, int rows, int sloped, const LaneBlob *blob, int count, float *f, float *const g[3])
