@@ -846,7 +846,7 @@ typedef struct Batch {
     VesselMemory *memory;
     VesselHit *hit;
     Queue followed;          // feet that are followed by one or two steps …
-    Queue sought;            // … by careful steps, from where those stopped or from a guess …
+    Queue sought;            // … by careful steps from where those stopped …
     Queue afresh;            // … and from scratch
 } Batch;
 
@@ -859,7 +859,7 @@ static void put(Queue *queue, int point, Vec3 start)
 // Steps that follow a foot, and careful ones that seek it; these no longer [of the radius] than lets them see what reaches there.
 enum { FOLLOW_ROUNDS = 2, SEEK_ROUNDS = 8 };
 static const double LONGEST_SOUGHT = 0.25;
-static const double FOLLOWED = 0.5;          // of the radius: of a point that has moved further the foot is sought
+static const double FOLLOWED = 1;          // of the radius: a point that has moved further has no foot to follow
 
 // A followed foot goes no further than the prediction and its steps may: one that is far from the inlet needs not be asked about it.
 static void fill_lane(const FieldVessel *field, FieldBlock *b, int i, const Batch *batch, int point, bool seek)
@@ -952,12 +952,6 @@ static void follow_block(const FieldVessel *field, Batch *batch, const Queue *qu
         sample(field, &b);
         done = field->kernels->newton(&b, seek);
     }
-    if (seek) {              // the Hessian is that of the last place but one: a foot from afar is looked at once more
-        for (int i = 0; i < FOOT_BLOCK; i++)
-            b.foot.state[i] = b.foot.state[i] == FOOT_DONE ? FOOT_PENDING : b.foot.state[i];
-        sample(field, &b);
-        done &= field->kernels->newton(&b, true);
-    }
     unsigned sure = field->kernels->finish(&b), contradicted = 0;
     if (b.foot.at.any_carried)
         sure = sure_near_inlet(field, &b, sure, count);
@@ -996,29 +990,6 @@ static void follow_block(const FieldVessel *field, Batch *batch, const Queue *qu
     }
 }
 
-// Where the foot of a point that remembers none, or one of long ago, may be: outwards from the axis of the nearest node.
-static Vec3 guess_start(const FieldVessel *field, Vec3 x, VesselMemory *m)
-{
-    int node = walk(field, x, m->node, 4);
-    const FieldNode *n = &field->node[node];
-    Vec3 d = field->tree->direction[node], out = vec3_sub(x, n->center), axis = n->center;
-    if (field->tree->kind[node] == NODE_VESSEL) {
-        axis = vec3_add_scaled(axis, vec3_dot(out, d), d);
-        out = vec3_sub(x, axis);
-    }
-    out = vec3_unit_or(out, vec3_normal_to(d));
-    m->node = node;
-    m->foot = vec3_add_scaled(axis, n->radius, out);
-    m->place = x;
-    m->normal = vec3_negate(out);
-    m->hessian = (Sym3){0};
-    m->trust = m->clearance = m->bound_for = 0;
-    m->held_for2 = -1;
-    m->blobs = 0;
-    m->has_foot = true;
-    return m->foot;
-}
-
 static void query_batch(const FieldVessel *field, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
 {
     Batch batch;
@@ -1029,10 +1000,8 @@ static void query_batch(const FieldVessel *field, int count, const Vec3 *point, 
         if (answer_cheaply(field, point[i], reach, m, &hit[i]))
             continue;
         double far = FOLLOWED * field->node[m->node].radius;
-        if (m->has_foot && vec3_norm2(vec3_sub(point[i], m->place)) < far * far)
-            put(&batch.followed, i, m->foot);
-        else
-            put(&batch.sought, i, guess_start(field, point[i], m));
+        m->has_foot = m->has_foot && vec3_norm2(vec3_sub(point[i], m->place)) < far * far;
+        put(m->has_foot ? &batch.followed : &batch.afresh, i, m->foot);
     }
     for (int i = 0; i < batch.followed.count; i += FOOT_BLOCK)
         follow_block(field, &batch, &batch.followed, i);
