@@ -26,7 +26,7 @@ enum { NEWTON_MAX = 4 };
 static const double OVERSHOOT = 0.015;
 // Where a motion is followed in halves: [mm] of depth that it may leave, and where nothing else goes; [mm] of the hand's advance that later steps make
 // up; halves at most, and how often linear walls are moved before.
-static const double DEPTH_MAX = 0.02, DEPTH_LAST = 0.1, OWED_MAX = 0.2;
+static const double DEPTH_MAX = 0.02, DEPTH_LAST = 0.045, OWED_MAX = 0.2;
 enum { HALVES_MAX = 6, MEETINGS_MAX = 2 };
 // A tool that is squeezed by more than this share of its length is beyond what its elements describe (and would have yielded): the hand stalls.
 // One that is squeezed by JAMMED has a reason to be stuck.
@@ -45,7 +45,7 @@ static double *take(double **from, size_t count)
 static bool allocate_scratch(Stepper *s)
 {
     size_t m = (size_t)s->wire.node_count, padded = m + BEAM_PADDING;
-    s->scratch = calloc((BEAM_REST_ARRAYS + 2 * BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1) * padded + 37 * m, sizeof *s->scratch);
+    s->scratch = calloc((BEAM_REST_ARRAYS + 2 * BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1) * padded + 43 * m, sizeof *s->scratch);
     if (!s->scratch)
         return false;
     double *at = s->scratch;
@@ -65,6 +65,7 @@ static bool allocate_scratch(Stepper *s)
     s->b = take(&at, 6 * m);
     s->u = take(&at, 6 * m);
     s->linearised = take(&at, 6 * m);
+    s->seen = take(&at, 6 * m);
     s->product = take(&at, 6 * m);
     s->kept = take(&at, 13 * m);
     return true;
@@ -95,20 +96,20 @@ static bool make_slots(Stepper *s, const WireOptions *o)
 static bool allocate(Stepper *s)
 {
     size_t m = (size_t)s->wire.node_count, points = (size_t)s->point_count;
-    s->memory_count = 13 * m + 4 * points;
+    s->memory_count = 13 * m + (4 + WALL_MET_DOUBLES) * points;
     s->memory = calloc(s->memory_count, sizeof *s->memory);
     s->place = calloc(points, sizeof *s->place);
     s->fixed = calloc(m, sizeof *s->fixed);
     s->start_position = calloc(m, sizeof *s->start_position);
     s->start_orientation = calloc(m, sizeof *s->start_orientation);
     s->slot_place = calloc(points, sizeof *s->slot_place);
-    s->query_point = calloc(points, sizeof *s->query_point);
-    s->query_place = calloc(points, sizeof *s->query_place);
-    s->query_hit = calloc(points, sizeof *s->query_hit);
-    s->query_which = calloc(3 * points + m, sizeof *s->query_which);
-    s->room = calloc(2 * points + m, sizeof *s->room);
-    s->set.point = calloc(points, sizeof *s->set.point);
-    s->set.capacity = s->point_count;
+    s->query_point = calloc(2 * points, sizeof *s->query_point);
+    s->query_place = calloc(2 * points, sizeof *s->query_place);
+    s->query_hit = calloc(2 * points, sizeof *s->query_hit);
+    s->query_which = calloc(4 * points + m, sizeof *s->query_which);
+    s->room = calloc(3 * points + m, sizeof *s->room);
+    s->set.point = calloc(2 * points, sizeof *s->set.point);
+    s->set.capacity = 2 * s->point_count;       // each with the wall across
     s->factor = block_factor_create(s->wire.node_count);
     s->solver = contact_solver_create(s->wire.node_count, s->set.capacity);
     if (!s->memory || !s->place || !s->fixed || !s->start_position || !s->start_orientation || !s->slot_place || !s->query_point || !s->query_place ||
@@ -122,11 +123,13 @@ static bool allocate(Stepper *s)
     s->state.orientation = (Quat *)(s->memory + 9 * m);
     s->force = (Vec3 *)(s->memory + 13 * m);
     s->clearance = s->memory + 13 * m + 3 * points;
+    s->met = (WallMet *)(s->clearance + points);
     s->linger = s->room + points;
-    s->range = s->linger + points;
+    s->lack = s->linger + points;
+    s->range = s->lack + points;
     s->query_near = s->query_which + points;
     s->candidate = s->query_near + points;
-    s->answer_of = s->candidate + points;
+    s->answer_of = s->candidate + 2 * points;
     for (size_t k = 0; k < points; k++)
         s->place[k].node = -1;
     return true;
@@ -391,6 +394,7 @@ void step_feed(Stepper *s, StepCommand command)
     memcpy(s->start_position, s->state.position, nodes * sizeof *s->start_position);
     memcpy(s->start_orientation, s->state.orientation, nodes * sizeof *s->start_orientation);
     memset(s->linearised, 0, 6 * nodes * sizeof *s->linearised);
+    memset(s->seen, 0, 6 * nodes * sizeof *s->seen);
 }
 
 void step_detect(Stepper *s) { stepper_detect(s); }
@@ -600,10 +604,8 @@ static double follow(Stepper *s, bool halfway)
         move(s, part);
         return part;
     }
-    if (s->energy_before < 0) {       // of x_n, or of an iterate beside it
+    if (s->energy_before < 0)         // of x_n, or of an iterate beside it
         s->energy_before = stepper_elastic_energy(s) + stepper_kinetic_energy(s);
-        s->depth = stepper_depth(s);
-    }
     double bound = s->has_sheath && s->load_count == 0 ? energy_bound(s) : HUGE_VAL;
     copy_iterate(s, false);
     double most = fmax(DEPTH_MAX, s->depth);
@@ -616,10 +618,8 @@ static double follow(Stepper *s, bool halfway)
         move(s, part);
         double depth = stepper_depth(s);
         bool contained = depth <= most;
-        if (contained && stepper_elastic_energy(s) <= bound) {
-            s->depth = depth;
+        if (contained && stepper_elastic_energy(s) <= bound)
             return part;
-        }
         bool meets = !contained && k < MEETINGS_MAX && stepper_meet_walls(s, part);
         copy_iterate(s, true);
         part /= 2;
@@ -639,6 +639,7 @@ void step_contact(Stepper *s)
     solve_contained(s);
     for (int iteration = 1; iteration < 2 * s->newton_max && !s->has_failed; iteration++) {
         bool turns = s->turn > (s->report.active > 0 ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION);
+
         s->overshoots = stepper_overshoot(s) > OVERSHOOT;
         if (!(turns && iteration < s->newton_max) && !s->overshoots)
             break;

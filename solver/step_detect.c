@@ -1,8 +1,12 @@
 // Candidates at the iterate: contact points whose gap could close in this step. A contact point p is node p, or beyond the nodes slot p - M
 // (slot.h). A point that is certainly further away is not asked again before it has travelled that far (DESIGN section 5).
 //
-// Nodes first. A slot between two nodes is asked only where their answers leave it in doubt: not where a node is known to be further from the
-// wall than from the slot, and in short elements not where the wall as both nodes see it, gap + n.d + d'Hd/2, comes no nearer than the nodes do.
+// Nodes first. A slot between two nodes is left out as long as they keep it off the wall: from the answers at the three, gaps, slopes and bends, follows how
+// far it may go until the element could be nearer to the wall there than at its nodes (guarded_for). That holds for elements of any length. Left to what
+// the nodes see alone, a ridge between those of 1.5 mm let a stiff wire in by 0.07 mm.
+//
+// Where a lumen is hardly wider than the tool, one linearised wall sends the point through the one across, and the next sends it back, for ever. So a point
+// remembers the wall that faces the one it sees, and has both (WallMet).
 #include "solver/step_internal.h"
 
 #include <string.h>
@@ -11,12 +15,16 @@ static const double REACH = 0.2;         // [mm] candidates beyond what the node
 static const double SHARED_TRAVEL = 0.3; // [mm] at most so much of what the fastest node may travel is expected of all others
 static const double SLOT_REACH = 0.1;    // [mm] the same for slots, whose nodes are candidates long before
 static const double REACH_MAX = 5;       // [mm]
+static const double SLEEP_MAX = 1;       // [mm] of travel: a vessel follows a wall from where it was known so far, not over any distance
 static const double STEP_OUT_MAX = 0.2;  // [mm] a deep point is brought back by this much a step, not thrown
 static const double DEEP = 0.2;          // [mm] STEP_DEEP
 static const double OVERSHOOT_TRAVEL = 0.05;   // [mm] a point that the solution moves less is where its linearised wall is
-static const double DIP_MIN = 0.002;     // [mm] by which the element may be nearer to the wall than its nodes before its slot counts
-static const double SIGHT = 2;           // [mm] longer elements' slots are asked at any rate
+static const double DIP_MIN = 0.002;     // [mm] by which the element may be nearer to the wall than its nodes before its slot counts …
+static const double DIP_MAX = 0.01;      // … and before it is asked again
+static const double GUARD_MAX = 0.3;     // [mm] of travel after which the wall between two nodes is another
 static const double LINGER = 0.9, LINGER_MAX = 0.006;     // of a gap, [mm]
+static const double MET_FAR = 0.2;       // [mm] from where it was met a wall across is remembered: as far as a plane stands for it
+static const double LACK_MAX = 0.045;    // [mm] of room between two walls that the wire may take, DEPTH_LAST of step.c
 static const double NOTHING_KNOWN = -1;  // as a clearance: neither place nor force is held
 // A contact between one free node and the sheath is one between nodes with no share for the second.
 static const double NO_SHARE = 1e-300;
@@ -71,6 +79,13 @@ static Vec3 motion(const Stepper *s, int point)
     return follow(s, point - nodes, move, turn);
 }
 
+// What a node has done since the wall was last asked.
+static Vec3 since(const Stepper *s, int node, int from)
+{
+    const double *k = s->linearised + 6 * (size_t)node + from, *seen = s->seen + 6 * (size_t)node + from;
+    return vec3(k[0] - seen[0], k[1] - seen[1], k[2] - seen[2]);
+}
+
 static Vec3 done(const Stepper *s, int node, int from)
 {
     const double *k = s->linearised + 6 * (size_t)node + from;
@@ -83,15 +98,18 @@ static double slot_travel(const Slot *slot, Vec3 move1, Vec3 turn1, Vec3 move2, 
     return sqrt(fmax(vec3_norm2(move1), vec3_norm2(move2))) + slot->near * vec3_norm(turn1) - slot->far * vec3_norm(turn2);
 }
 
-// [mm] that the solution moves a point by from the iterate; a bound where it is a slot.
-static double travel(const Stepper *s, int point)
+// [mm] that a point moves by, a bound where it is a slot: by the solution from the iterate, or since the wall was last asked.
+static double travel_of(const Stepper *s, int point, Vec3 (*way)(const Stepper *, int, int))
 {
     if (point < s->state.node_count)
-        return vec3_norm(change(s, point, 0));
+        return vec3_norm(way(s, point, 0));
     const Slot *slot = &s->slot[point - s->state.node_count];
     int i = slot->element;
-    return slot_travel(slot, change(s, i, 0), change(s, i, 3), change(s, i + 1, 0), change(s, i + 1, 3));
+    return slot_travel(slot, way(s, i, 0), way(s, i, 3), way(s, i + 1, 0), way(s, i + 1, 3));
 }
+
+static double travel(const Stepper *s, int point) { return travel_of(s, point, change); }
+static double travelled(const Stepper *s, int point) { return travel_of(s, point, since); }
 
 static Vec3 place_of(const Stepper *s, int point)
 {
@@ -124,49 +142,46 @@ bool stepper_escapes(const Stepper *s)
     return false;
 }
 
-// The node of the vessel from which a point's depth is asked where a solution leads; -1: not asked, as a short element's slots are guarded by its nodes.
-static int watched_from(const Stepper *s, int point)
-{
-    if (point < s->state.node_count)
-        return s->place[point].node;
-    int i = s->slot[point - s->state.node_count].element;
-    return s->wire.length[i] > SIGHT ? s->place[i + 1].node : -1;
-}
-
 // Asks for a point at x. One that slept may have left its part of the vessel long ago: it is looked for.
 static void ask_there(Stepper *s, int point, Vec3 x, int *count)
 {
+    int nodes = s->state.node_count, from = s->place[point].node;
     s->query_which[*count] = point;
     s->query_point[*count] = x;
     s->query_place[*count] = s->place[point];
+    if (from < 0 && point >= nodes)
+        from = s->place[s->slot[point - nodes].element + 1].node;
     if (s->place[point].node < 0 || s->clearance[point] > 0)
-        s->query_place[*count] = (VesselMemory){.node = s->vessel->locate(s->vessel, x, watched_from(s, point))};
+        s->query_place[*count] = (VesselMemory){.node = s->vessel->locate(s->vessel, x, from)};
     ++*count;
 }
 
-double stepper_overshoot(Stepper *s)
+// How deep outside the true wall [mm] the points are that have gone, or would go with the solution, beyond what is known of it there. Room that walls
+// across lack is not counted: no motion finds it.
+static double deepest_there(Stepper *s, bool would_go)
 {
     int count = 0;
     double deepest = 0;
-    if (!s->vessel)
-        return 0;
     for (int p = s->first_free; p < s->point_count; p++) {
         if (p == s->state.node_count)
             p = first_slot(s);
         if (p == s->point_count)
             break;
-        double far = travel(s, p);
-        if (far < OVERSHOOT_TRAVEL || s->clearance[p] > far || watched_from(s, p) < 0 || (p >= s->state.node_count && !place_slot(s, p - s->state.node_count)))
+        double far = would_go ? travel(s, p) : travelled(s, p);
+        if (far < (s->room[p] < HUGE_VAL ? s->room[p] : would_go ? OVERSHOOT_TRAVEL : 0) || (p >= s->state.node_count && !place_slot(s, p - s->state.node_count)))
             continue;
-        ask_there(s, p, vec3_add(place_of(s, p), motion(s, p)), &count);
+        ask_there(s, p, would_go ? vec3_add(place_of(s, p), motion(s, p)) : place_of(s, p), &count);
     }
     if (count > 0)
         vessel_query(s->vessel, count, s->query_point, 0.5, s->query_place, s->query_hit);
     for (int k = 0; k < count; k++)
         if (!(s->query_hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)))
-            deepest = fmax(deepest, radius_of(s, s->query_which[k]) - s->query_hit[k].gap);
+            deepest = fmax(deepest, radius_of(s, s->query_which[k]) - s->query_hit[k].gap - s->lack[s->query_which[k]]);
     return deepest;
 }
+
+double stepper_overshoot(Stepper *s) { return s->vessel ? deepest_there(s, true) : 0; }
+double stepper_depth(Stepper *s) { return deepest_there(s, false); }
 
 // How far a node may go in this step, by what is known. A spring runs along the wire: what one node does others may do next. (With that, a shorter
 // reach meets fewer points that went further than was looked.)
@@ -208,6 +223,7 @@ static void forget(Stepper *s, int point)
     s->place[point].has_foot = false;
     s->clearance[point] = NOTHING_KNOWN;
     s->force[point] = vec3(0, 0, 0);
+    s->met[point] = (WallMet){0};
 }
 
 void stepper_forget(Stepper *s, int node)
@@ -259,19 +275,63 @@ static void ask(Stepper *s, int point, int *count)
     s->query_place[(*count)++] = s->place[point];
 }
 
-// The gap that a slot would have where its element ran along the wall as its nodes do; HUGE_VAL where the nodes are not both near.
-static double gap_between(const Stepper *s, int k)
+// How much two bends differ [1/mm].
+static double unlike(const Sym3 *a, const Sym3 *b)
 {
-    int i = s->slot[k].element, a = s->answer_of[i], b = s->answer_of[i + 1];
-    if (i + 1 == s->first_free || a < 0 || b < 0 || (s->query_hit[a].flags | s->query_hit[b].flags) != 0)
-        return HUGE_VAL;
-    return s->query_hit[a].gap + s->slot[k].weight * (s->query_hit[b].gap - s->query_hit[a].gap);
+    Sym3 d = {a->xx - b->xx, a->xy - b->xy, a->xz - b->xz, a->yy - b->yy, a->yz - b->yz, a->zz - b->zz};
+    return sqrt(d.xx * d.xx + d.yy * d.yy + d.zz * d.zz + 2 * (d.xy * d.xy + d.xz * d.xz + d.yz * d.yz));
+}
+
+// [mm] of travel that a slope and a bend take to use up what there is, at most GUARD_MAX.
+static double until_used(double has, double slope, double bend)
+{
+    double root = slope + sqrt(slope * slope + 2 * bend * has);
+    return root * GUARD_MAX > 2 * has ? 2 * has / root : GUARD_MAX;
+}
+
+// [mm] that a slot may go until its element may be nearer to the wall there than its nodes are by DIP_MAX; < 0: it is by DIP_MIN, or they do not tell.
+// On the way the wall's slope against theirs takes from what it has over them, and its bend.
+static double guarded_for(const Stepper *s, int k, const VesselHit *hit, double *sleep)
+{
+    const Slot *slot = &s->slot[k];
+    int i = slot->element, a = s->answer_of[i], b = s->answer_of[i + 1];
+    if (i + 1 == s->first_free || a < 0 || b < 0 || (s->query_hit[a].flags | s->query_hit[b].flags | hit->flags) != 0)
+        return -1;
+    const VesselHit *near = &s->query_hit[a], *far = &s->query_hit[b];
+    double w = slot->weight, over = hit->gap - near->gap - w * (far->gap - near->gap);
+    if (!(over > -DIP_MIN))
+        return -1;
+    double slope = (1 - w) * vec3_distance(hit->normal, near->normal) + w * vec3_distance(hit->normal, far->normal);
+    double bend = (1 - w) * unlike(&hit->hessian, &near->hessian) + w * unlike(&hit->hessian, &far->hessian);
+    *sleep = until_used(over + DIP_MIN, slope, bend);
+    return until_used(over + DIP_MAX, slope, bend);
 }
 
 static bool presses(const Stepper *s, int point)
 {
     Vec3 f = s->force[point];
     return f.x != 0 || f.y != 0 || f.z != 0;
+}
+
+// [mm] of room that a point lacks between the wall that it sees and one across that it saw before, which is forgotten where it faces this one no more.
+static double meet_across(Stepper *s, int point, const VesselHit *hit)
+{
+    WallMet *met = &s->met[point];
+    Vec3 x = place_of(s, point);
+    double radius = radius_of(s, point), gap = hit->gap - radius;
+    if (vec3_dot(met->normal, hit->normal) < 0) {
+        met->across = met->normal;
+        met->beyond = met->offset;
+        met->where = x;
+    }
+    met->normal = hit->normal;
+    met->offset = vec3_dot(hit->normal, x) - gap;
+    // a point that is behind the other wall by more than its radius has gone over an edge instead
+    double other = vec3_dot(met->across, x) - met->beyond;
+    bool faces = vec3_dot(met->across, hit->normal) < 0 && other > -radius && vec3_distance(x, met->where) < MET_FAR;
+    if (!faces)
+        met->across = vec3(0, 0, 0);
+    return s->lack[point] = faces ? fmin(LACK_MAX, fmax(0, -other - gap)) : 0;
 }
 
 // Questions first to count-1, the answers judged: what is too far goes to sleep, candidates keep their question's number.
@@ -291,8 +351,14 @@ static int answer(Stepper *s, int first, int count, int *candidate)
         const VesselHit *hit = &s->query_hit[k];
         double gap = hit->gap - radius_of(s, point), own_reach = reach_of(s, point);
         s->place[point] = s->query_place[k];
-        if (point >= nodes && !presses(s, point) && hit->gap > gap_between(s, point - nodes) - DIP_MIN)
-            continue;        // its nodes keep it off the wall
+        if (!(hit->flags & (VESSEL_FAR | VESSEL_OPEN_END)))
+            s->depth = fmax(s->depth, -gap - meet_across(s, point, hit));
+        double sleep = 0, guarded = point < nodes || presses(s, point) ? -1 : guarded_for(s, point - nodes, hit, &sleep);
+        if (guarded > own_reach - SLOT_REACH) {
+            s->room[point] = guarded;
+            s->clearance[point] = sleep;
+            continue;
+        }
         if (!(hit->flags & (VESSEL_FAR | VESSEL_OPEN_END)) && gap < own_reach && vec3_is_finite(hit->normal)) {
             candidate[candidates++] = k;
             continue;
@@ -302,7 +368,7 @@ static int answer(Stepper *s, int first, int count, int *candidate)
             continue;
         s->room[point] = gap;
         if (gap > own_reach)
-            s->clearance[point] = gap - own_reach;
+            s->clearance[point] = fmin(gap - own_reach, SLEEP_MAX);
     }
     return candidates;
 }
@@ -318,26 +384,6 @@ static int ask_nodes(Stepper *s)
         ask(s, i, &count);
     }
     return count;
-}
-
-// The gap at a slot as the node sees it.
-static double gap_from(const Stepper *s, int node, Vec3 place)
-{
-    const VesselHit *hit = &s->query_hit[s->answer_of[node]];
-    Vec3 d = vec3_sub(place, s->state.position[node]);
-    return hit->gap + vec3_dot(hit->normal, d) + 0.5 * sym3_quadratic(&hit->hessian, d);
-}
-
-// Do the nodes of an element keep a slot off the wall, as far as they can see and agree?
-static bool is_covered(const Stepper *s, int k)
-{
-    int i = s->slot[k].element;
-    double alone = gap_between(s, k);
-    if (s->wire.length[i] > SIGHT || alone == HUGE_VAL || presses(s, s->state.node_count + k))
-        return false;
-    Vec3 place = s->slot_place[k].position;
-    double one = gap_from(s, i, place), other = gap_from(s, i + 1, place);
-    return fabs(one - other) < 5 * DIP_MIN && fmin(one, other) > alone - DIP_MIN;
 }
 
 // [mm] by which a slot is further from where it could touch than its nodes' clearances can tell; an arc is longer than its chord, 5 % are enough.
@@ -360,7 +406,7 @@ static int ask_slots(Stepper *s, int count)
             s->room[p] = bound + REACH;
             s->place[p].node = -1;      // may come far before it is asked again
         }
-        if (bound <= 0 && place_slot(s, k) && !is_covered(s, k))
+        if (bound <= 0 && place_slot(s, k))
             ask(s, p, &count);
         else if (s->clearance[p] != NOTHING_KNOWN)
             forget(s, p);    // what it knew grows old; its neighbours' knowledge does not
@@ -451,30 +497,23 @@ static void add_candidate(Stepper *s, int point, const VesselHit *hit)
         look_ahead(s->dt, p->tangent, vec3_mix(s->state.velocity[c->node], s->state.velocity[c->node + 1], p->weight), c);
     else
         look_ahead(s->dt, tangent_at(s, point), s->state.velocity[point], c);
-    if (p && at_mouth(s, c->node))
+    if (p && at_mouth(s, c->node)) {
         lean_on_sheath(s, point - nodes, c);
-}
-
-double stepper_depth(Stepper *s)
-{
-    int count = 0;
-    double deepest = 0;
-    for (int p = s->first_free; p < s->point_count; p++) {
-        int nodes = s->state.node_count;
-        if (p == nodes)
-            p = first_slot(s);
-        if (p == s->point_count || watched_from(s, p) < 0 || (p >= nodes && !place_slot(s, p - nodes)))
-            continue;
-        if (!s->is_iterate && s->clearance[p] > vec3_norm(done_at(s, p, vec3(0, 0, 0))))
-            continue;
-        ask_there(s, p, place_of(s, p), &count);
+        return;
     }
-    if (count > 0)
-        vessel_query(s->vessel, count, s->query_point, 0.5, s->query_place, s->query_hit);
-    for (int k = 0; k < count; k++)
-        if (!(s->query_hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)))
-            deepest = fmax(deepest, radius_of(s, s->query_which[k]) - s->query_hit[k].gap);
-    return deepest;
+    const WallMet *met = &s->met[point];
+    if (vec3_norm2(met->across) == 0)
+        return;
+    // between two walls: what room is lacking they give way by in equal parts
+    ContactPoint *across = &s->set.point[s->set.count];
+    s->candidate[s->set.count++] = point;
+    *across = *c;
+    c->gap += 0.5 * s->lack[point];
+    across->normal = met->across;
+    across->hessian = (Sym3){0};
+    across->gap = vec3_dot(met->across, place_of(s, point)) - met->beyond + 0.5 * s->lack[point];
+    if (s->is_iterate)
+        across->gap -= vec3_dot(done_at(s, point, vec3_scale(met->across, -radius)), met->across);
 }
 
 bool stepper_meet_walls(Stepper *s, double part)
@@ -491,7 +530,8 @@ bool stepper_meet_walls(Stepper *s, double part)
         ContactPoint *c = &s->set.point[k];
         double radius = radius_of(s, s->candidate[k]), gap = s->query_hit[k].gap - radius;
         double linear = c->gap + vec3_dot(done_at(s, s->candidate[k], vec3_scale(c->normal, -radius)), c->normal);
-        if ((s->query_hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)) || !(gap < 0 && gap < linear))
+        // not where another wall is met: moving this one would drive the point into that
+        if ((s->query_hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)) || !(gap < 0 && gap < linear) || vec3_dot(s->query_hit[k].normal, c->normal) < 0)
             continue;
         c->gap += fmax((gap - linear) / part, -STEP_OUT_MAX);
         any = true;
@@ -502,11 +542,12 @@ bool stepper_meet_walls(Stepper *s, double part)
 void stepper_keep_forces(Stepper *s)
 {
     int nodes = s->state.node_count;
+    for (int k = 0; k < s->set.count; k++)
+        s->force[s->candidate[k]] = vec3(0, 0, 0);
     for (int k = 0; k < s->set.count; k++) {
         int point = s->candidate[k];
-        s->force[point] = s->set.point[k].force;
-        if (point >= nodes && at_mouth(s, s->slot[point - nodes].element))
-            s->force[point] = vec3_scale(s->force[point], 1 / s->slot_place[point - nodes].weight);
+        bool leans = point >= nodes && at_mouth(s, s->slot[point - nodes].element);
+        s->force[point] = vec3_add_scaled(s->force[point], leans ? 1 / s->slot_place[point - nodes].weight : 1, s->set.point[k].force);
     }
 }
 
@@ -558,10 +599,12 @@ static void report_wall(Stepper *s, int nodes, int count)
 void stepper_detect(Stepper *s)
 {
     s->set.count = 0;
+    s->depth = 0;
     if (!s->vessel)
         return;
     if (!s->is_iterate && !s->knows_motion)
         memset(s->linger, 0, (size_t)s->point_count * sizeof *s->linger);
+    memset(s->lack, 0, (size_t)s->point_count * sizeof *s->lack);
     estimate_ranges(s);
     int *candidate = s->query_near, nodes = ask_nodes(s);
     int node_candidates = answer(s, 0, nodes, candidate);
@@ -578,19 +621,13 @@ void stepper_detect(Stepper *s)
 void stepper_use_clearance(Stepper *s)
 {
     int nodes = s->state.node_count;
-    if (s->is_iterate) {       // known from other places than x_n
-        memset(s->clearance, 0, (size_t)s->point_count * sizeof *s->clearance);
-        return;
-    }
     for (int i = s->first_free; i < nodes; i++)
         if (s->clearance[i] > 0)
-            s->clearance[i] -= vec3_norm(done(s, i, 0));
-    for (int p = first_slot(s); p < s->point_count; p++) {
-        const Slot *slot = &s->slot[p - nodes];
-        int i = slot->element;
+            s->clearance[i] = fmax(0, s->clearance[i] - travelled(s, i));
+    for (int p = first_slot(s); p < s->point_count; p++)
         if (s->clearance[p] > 0)
-            s->clearance[p] = fmax(0, s->clearance[p] - slot_travel(slot, done(s, i, 0), done(s, i, 3), done(s, i + 1, 0), done(s, i + 1, 3)));
-    }
+            s->clearance[p] = fmax(0, s->clearance[p] - travelled(s, p));
+    memcpy(s->seen, s->linearised, 6 * (size_t)nodes * sizeof *s->seen);
 }
 
 void stepper_share_forces(const Stepper *s, NodeReport *node)

@@ -15,6 +15,14 @@ typedef struct LoadPlace {
     double weight;           // … with weights 1 - weight and weight
 } LoadPlace;
 
+// The walls a point has met: where two of them face each other and leave less room than the tool needs, no motion is to blame for what is lacking.
+typedef struct WallMet {
+    Vec3 normal, across;     // of the last linearisation, and of the last one before that faced it; 0: none
+    double offset, beyond;   // their places: the gaps are n.x - offset
+    Vec3 where;              // where `across` was met
+} WallMet;
+enum { WALL_MET_DOUBLES = sizeof(WallMet) / sizeof(double) };
+
 struct Stepper {
     // given once
     Wire wire;
@@ -41,9 +49,10 @@ struct Stepper {
     // what the next step depends on: see checkpoint.c
     WireState state;         // arrays in `memory`; within a step the iterate
     size_t memory_count;
-    double *memory;          // position, orientation, velocity, spin, force, clearance
+    double *memory;          // position, orientation, velocity, spin, force, clearance, met
     Vec3 *force;             // (P) [N] of the wall on the point: warm start
     double *clearance;       // (P) [mm] how far the point may travel before it could touch: not queried until then
+    WallMet *met;            // (P)
     VesselMemory *place;     // (P)
     int first_free;          // nodes before it are held by the sheath
 
@@ -56,6 +65,7 @@ struct Stepper {
     SheathElement mouth_element;
     double *b, *u;           // (M, 6)
     double *linearised;      // (M, 6) displacement from x_n to the iterate about which the system is linear
+    double *seen;            // (M, 6) … at which the wall was last asked
     double *product;         // (M, 6)
     double *kept;            // (M, 13) an iterate to go back to: position, orientation, displacement
     double grip_diag[36], grip_lower[36], grip_b[6];     // rows of node 0 before its constraints
@@ -71,6 +81,7 @@ struct Stepper {
     int *candidate;          // (P) the points of `set`
     double *range;           // (M) [mm] or [mm/ms] that a node moves, or is likely to
     double *room;            // (P) [mm] how far a point that is no candidate may go from the iterate; HUGE_VAL for candidates
+    double *lack;            // (P) [mm] of room between walls that face each other
     double *linger;          // (P) [mm] by which the wall is taken to be nearer in this step
     double *scratch;         // owns the arrays of doubles
 
@@ -94,7 +105,7 @@ void stepper_keep_forces(Stepper *s);
 bool stepper_escapes(const Stepper *s);
 // How deep outside the true wall the solution would leave the points that it moves far from the iterate [mm], >= 0.
 double stepper_overshoot(Stepper *s);
-// How deep outside the true wall the nodes are that may have come near it in this step [mm], >= 0.
+// How deep outside it the points are that have gone beyond what is known of it since they were last asked [mm], >= 0.
 double stepper_depth(Stepper *s);
 // At a trial, `part` of the way: moves the candidates' linear walls in to where the trial finds the true ones. False where all stand right.
 bool stepper_meet_walls(Stepper *s, double part);

@@ -137,6 +137,62 @@ static void coarse_elements_stay_inside(void **state)
     }
 }
 
+// --- a ridge between two nodes ---
+
+// A floor at z = 0 with a ridge across it: a cylinder along y at x = RIDGE_AT that comes out by 0.2 mm, half as wide as an element.
+static const double RIDGE_AT = 2.25, RIDGE_RADIUS = 0.5, RIDGE_DEEP = 0.3;
+
+static void ridge_query(const Vessel *v, int count, const Vec3 *point, double reach, VesselMemory *memory, VesselHit *hit)
+{
+    (void)v, (void)reach;
+    for (int i = 0; i < count; i++) {
+        double x = point[i].x - RIDGE_AT, z = point[i].z + RIDGE_DEEP, r = sqrt(x * x + z * z);
+        Vec3 n = {x / r, 0, z / r};
+        memory[i].node = 0;
+        hit[i] = (VesselHit){.gap = point[i].z, .normal = {0, 0, 1}};
+        if (r - RIDGE_RADIUS < hit[i].gap)
+            hit[i] = (VesselHit){.gap = r - RIDGE_RADIUS, .normal = n, .hessian = {n.z * n.z / r, 0, -n.x * n.z / r, 0, 0, n.x * n.x / r}};
+    }
+}
+
+static int ridge_locate(const Vessel *v, Vec3 point, int from)
+{
+    (void)v, (void)point, (void)from;
+    return 0;
+}
+
+// Both nodes of an element see a flat floor, and the wire falls on what is between them.
+static void a_ridge_between_nodes_holds(void **state)
+{
+    (void)state;
+    Vessel ridge = {.kind = "ridge", .query = ridge_query, .locate = ridge_locate};
+    Bench b;
+    bench_start(&b, 6, 4, 1);
+    b.options.vessel = &ridge;
+    b.options.wire.fix_count = 0;
+    b.options.wire.start = vec3(0, 0, 0.4);
+    b.options.wire.gravity = vec3(0, 0, -9.81e-3);
+    Stepper *s = bench_make(&b);
+    double least = HUGE_VAL, radius = s->wire.radius[0], reported = 0;
+    for (int i = 0; i < 100; i++) {
+        reported = fmax(reported, step_once(s, 0, 0)->penetration);
+        for (int k = 0; k < s->slot_count; k++) {
+            const Slot *slot = &s->slot[k];
+            const WireState *w = stepper_state(s);
+            int e = slot->element;
+            Vec3 x = slot_place(slot, s->wire.length[e], w->position[e], quat_rotate(w->orientation[e], vec3(1, 0, 0)), w->position[e + 1],
+                                quat_rotate(w->orientation[e + 1], vec3(1, 0, 0))).position;
+            VesselMemory memory = {.node = 0};
+            VesselHit hit;
+            ridge_query(&ridge, 1, &x, 1, &memory, &hit);
+            least = fmin(least, hit.gap - radius);
+        }
+    }
+    print_message("a wire of 1.5 mm elements fallen on a ridge between two nodes: %.4f mm deep there (reported %.4f)\n", -least, reported);
+    assert_true(least > -0.02);
+    stepper_destroy(s);
+}
+
 // --- sleepers ---
 
 typedef struct CountingVessel {
@@ -431,6 +487,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(levers_follow_the_cubic),
         cmocka_unit_test(coarse_elements_stay_inside),
+        cmocka_unit_test(a_ridge_between_nodes_holds),
         cmocka_unit_test(sleepers_miss_nothing),
         cmocka_unit_test(push_is_smooth),
         cmocka_unit_test(push_through_local_models_is_smooth),
