@@ -99,6 +99,8 @@ static bool allocate(Stepper *s)
     s->memory_count = 13 * m + (4 + WALL_MET_DOUBLES) * points;
     s->memory = calloc(s->memory_count, sizeof *s->memory);
     s->place = calloc(points, sizeof *s->place);
+    s->trial = calloc(points, sizeof *s->trial);
+    s->tried = calloc(points, sizeof *s->tried);
     s->fixed = calloc(m, sizeof *s->fixed);
     s->start_position = calloc(m, sizeof *s->start_position);
     s->start_orientation = calloc(m, sizeof *s->start_orientation);
@@ -112,7 +114,7 @@ static bool allocate(Stepper *s)
     s->set.capacity = 2 * s->point_count;       // each with the wall across
     s->factor = block_factor_create(s->wire.node_count);
     s->solver = contact_solver_create(s->wire.node_count, s->set.capacity);
-    if (!s->memory || !s->place || !s->fixed || !s->start_position || !s->start_orientation || !s->slot_place || !s->query_point || !s->query_place ||
+    if (!s->memory || !s->place || !s->trial || !s->tried || !s->fixed || !s->start_position || !s->start_orientation || !s->slot_place || !s->query_point || !s->query_place ||
         !s->query_hit || !s->query_which || !s->room || !s->set.point || !s->factor || !s->solver || !block_chain_create(&s->chain, s->wire.node_count) ||
         !allocate_scratch(s))
         return false;
@@ -290,6 +292,8 @@ void stepper_destroy(Stepper *s)
     free(s->start_orientation);
     free(s->query_point);
     free(s->query_place);
+    free(s->trial);
+    free(s->tried);
     free(s->query_hit);
     free(s->query_which);
     free(s->slot_place);
@@ -639,7 +643,6 @@ void step_contact(Stepper *s)
     solve_contained(s);
     for (int iteration = 1; iteration < 2 * s->newton_max && !s->has_failed; iteration++) {
         bool turns = s->turn > (s->report.active > 0 ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION);
-
         s->overshoots = stepper_overshoot(s) > OVERSHOOT;
         if (!(turns && iteration < s->newton_max) && !s->overshoots)
             break;

@@ -142,18 +142,38 @@ bool stepper_escapes(const Stepper *s)
     return false;
 }
 
-// Asks for a point at x. One that slept may have left its part of the vessel long ago: it is looked for.
+// Asks for a point at x, where a trial has led it. One that slept may have left its part of the vessel long ago: it is looked for.
 static void ask_there(Stepper *s, int point, Vec3 x, int *count)
 {
     int nodes = s->state.node_count, from = s->place[point].node;
     s->query_which[*count] = point;
     s->query_point[*count] = x;
-    s->query_place[*count] = s->place[point];
+    s->query_place[*count] = s->tried[point] ? s->trial[point] : s->place[point];
     if (from < 0 && point >= nodes)
         from = s->place[s->slot[point - nodes].element + 1].node;
-    if (s->place[point].node < 0 || s->clearance[point] > 0)
+    if (!s->tried[point] && (s->place[point].node < 0 || s->clearance[point] > 0))
         s->query_place[*count] = (VesselMemory){.node = s->vessel->locate(s->vessel, x, from)};
     ++*count;
+}
+
+// The answers, and what was learned for the next trial.
+static void answer_there(Stepper *s, int count)
+{
+    if (count > 0)
+        vessel_query(s->vessel, count, s->query_point, 0.5, s->query_place, s->query_hit);
+    for (int k = 0; k < count; k++) {
+        s->trial[s->query_which[k]] = s->query_place[k];
+        s->tried[s->query_which[k]] = true;
+    }
+}
+
+// The iterate is where the last trial led.
+static void take_trials(Stepper *s)
+{
+    for (int p = 0; p < s->point_count; p++)
+        if (s->tried[p] && s->is_iterate)
+            s->place[p] = s->trial[p];
+    memset(s->tried, 0, (size_t)s->point_count * sizeof *s->tried);
 }
 
 // How deep outside the true wall [mm] the points are that have gone, or would go with the solution, beyond what is known of it there. Room that walls
@@ -172,8 +192,7 @@ static double deepest_there(Stepper *s, bool would_go)
             continue;
         ask_there(s, p, would_go ? vec3_add(place_of(s, p), motion(s, p)) : place_of(s, p), &count);
     }
-    if (count > 0)
-        vessel_query(s->vessel, count, s->query_point, 0.5, s->query_place, s->query_hit);
+    answer_there(s, count);
     for (int k = 0; k < count; k++)
         if (!(s->query_hit[k].flags & (VESSEL_FAR | VESSEL_OPEN_END)))
             deepest = fmax(deepest, radius_of(s, s->query_which[k]) - s->query_hit[k].gap - s->lack[s->query_which[k]]);
@@ -518,14 +537,11 @@ static void add_candidate(Stepper *s, int point, const VesselHit *hit)
 
 bool stepper_meet_walls(Stepper *s, double part)
 {
-    int count = s->set.count;
+    int count = 0;
     bool any = false;
-    for (int k = 0; k < count; k++) {
-        s->query_point[k] = place_of(s, s->candidate[k]);
-        s->query_place[k] = s->place[s->candidate[k]];
-    }
-    if (count > 0)
-        vessel_query(s->vessel, count, s->query_point, 0.5, s->query_place, s->query_hit);
+    for (int k = 0; k < s->set.count; k++)
+        ask_there(s, s->candidate[k], place_of(s, s->candidate[k]), &count);
+    answer_there(s, count);
     for (int k = 0; k < count; k++) {
         ContactPoint *c = &s->set.point[k];
         double radius = radius_of(s, s->candidate[k]), gap = s->query_hit[k].gap - radius;
@@ -605,6 +621,7 @@ void stepper_detect(Stepper *s)
     if (!s->is_iterate && !s->knows_motion)
         memset(s->linger, 0, (size_t)s->point_count * sizeof *s->linger);
     memset(s->lack, 0, (size_t)s->point_count * sizeof *s->lack);
+    take_trials(s);
     estimate_ranges(s);
     int *candidate = s->query_near, nodes = ask_nodes(s);
     int node_candidates = answer(s, 0, nodes, candidate);

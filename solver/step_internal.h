@@ -80,6 +80,8 @@ struct Stepper {
     int *answer_of;          // (M) the question about a node, -1: none
     int *candidate;          // (P) the points of `set`
     double *range;           // (M) [mm] or [mm/ms] that a node moves, or is likely to
+    VesselMemory *trial;     // (P) what was found of the wall where trials have led since the last detection …
+    bool *tried;             // (P) … of these points
     double *room;            // (P) [mm] how far a point that is no candidate may go from the iterate; HUGE_VAL for candidates
     double *lack;            // (P) [mm] of room between walls that face each other
     double *linger;          // (P) [mm] by which the wall is taken to be nearer in this step
