@@ -24,20 +24,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { OCTANTS = 8 };
 typedef struct FieldNode {
     Vec3 center;
     double radius, bend;     // [mm], and its inverse
     double skin;             // [mm] about the foot in which blobs are held
     double clear;            // [mm] the wall is certainly at least this far from the centre; < 0: not known
-    float room[OCTANTS];     // [mm] of a point in the lumen that is nearer than that to a foot in the cell no wall is nearer, by the octant of the wall's
-                             // normal there: see measure_room
+    double room;             // [mm] of a point in the lumen that is nearer than that to a foot in the cell no wall is nearer: see measure_room
     const int32_t *seen;     // its blobs
     int seen_count;
     bool carried;            // near the inlet: goes on upstream
 } FieldNode;
 
-enum { WAYS = 32 };
+enum { WAYS = 32, ROOM_WAYS = 64 };
 typedef struct FieldVessel {
     Vessel vessel;           // first: a Vessel * to us is a FieldVessel *
     const VesselTree *tree;
@@ -279,8 +277,6 @@ static void set_lane(const FieldVessel *field, FieldBlock *b, int i, int node, b
     b->foot.radius[i] = n->radius, b->foot.bend[i] = n->bend, b->foot.allowed[i] = REST;
     b->foot.at.carried[i] = carried, b->foot.at.any_carried |= carried;
 }
-
-static int octant_of(Vec3 n) { return (n.x > 0) | (n.y > 0) << 1 | (n.z > 0) << 2; }
 
 static void set_whole_list(const FieldVessel *field, FieldBlock *b, int i, int node)
 {
@@ -611,7 +607,7 @@ static bool is_closest(const FieldVessel *field, Vec3 x, const Foot *foot, const
     const FieldNode *node = &field->node[foot->node];
     if (is_at_inlet(field, node, x, size))
         return false;
-    if (foot->gap > 0 && foot->gap < node->room[octant_of(foot->normal)])
+    if (foot->gap > 0 && foot->gap < node->room)
         return true;
     return vec3_distance(x, m->bound_at) + size <= m->bound_for && (foot->gap > 0 ? m->down : m->up) * size < 0.97 * foot->slope;
 }
@@ -868,7 +864,7 @@ static void fill_lane(const FieldVessel *field, FieldBlock *b, int i, const Batc
     VesselMemory *m = &batch->memory[point];
     const FieldNode *n = &field->node[m->node];
     set_lane(field, b, i, m->node, n->carried && (seek || inlet_height(field, m->foot) < inlet_zone(field) + REACH * n->radius));
-    b->room[i] = n->room[octant_of(m->normal)];
+    b->room[i] = n->room;
     b->point[i] = &batch->point[point].x;
     b->memory[i] = &m->foot.x;
     b->list[i] = m->blob, b->count[i] = m->blobs;
@@ -1087,36 +1083,30 @@ static bool wall_along(const FieldVessel *field, const BlobList *list, int node,
     return cell_of(field, *wall, node) == node;
 }
 
-// The wall's reach in a node's cell: how large a ball may be that touches the wall from within and meets no other part of it, at feet all around. A point
-// whose foot is nearer than that lies in such a ball with all that is as near to it. Feet are told apart by their normals; one near the border of two
-// octants counts for both.
-static void measure_room(const FieldVessel *field, int node, float *room)
+// The wall's reach in a node's cell: how large a ball may be that touches the wall from within and meets no other part of it, at feet all around, the least of
+// all: what a cleft lets no ball into says little of the walls beside it alone. A point whose foot is nearer than that lies in such a ball with all that is
+// as near to it. Looks all around, and around the axis, as most of what is about a node may lie in other cells.
+static double measure_room(const FieldVessel *field, int node, const Vec3 way_all[ROOM_WAYS])
 {
     static const double part[] = {1.1, 1.05, 1, 0.95, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0};
     static const double SHARE = 0.92;        // of a ball that is clear at the points at which it is looked at: see room_about
-    static const double ASIDE = 0.3;         // of a normal's component
-    enum { PARTS = sizeof part / sizeof part[0], LEAST = 2, AROUND = 16 };
+    enum { LEAST = 4, AROUND = 16 };
     const FieldNode *n = &field->node[node];
     BlobList list;
-    int size[OCTANTS] = {0}, found[OCTANTS] = {0};
+    int size = 0, found = 0;
     Vec3 d = field->tree->direction[node], across = vec3_normal_to(d), side = vec3_cross(d, across);
-    memset(room, 0, OCTANTS * sizeof *room);
     list_blobs(field, node, n->center, 3 * n->radius, &list);
-    for (int k = 0; k < WAYS + AROUND; k++) {
+    for (int k = 0; k < ROOM_WAYS + AROUND && part[size] > 0; k++) {
         double turn = 2 * PI * k / AROUND;
-        Vec3 wall, in, way = k < WAYS ? field->way[k] : vec3_add(vec3_scale(across, cos(turn)), vec3_scale(side, sin(turn)));
+        Vec3 wall, in, way = k < ROOM_WAYS ? way_all[k] : vec3_add(vec3_scale(across, cos(turn)), vec3_scale(side, sin(turn)));
         if (!wall_along(field, &list, node, way, &wall))
             continue;
         field_at(field, &list, wall, &in);
         in = vec3_unit_or(in, vec3_negate(way));
-        bool counts[OCTANTS];
-        int at = PARTS - 1;      // larger balls than all its octants have already need not be tried
-        for (int o = 0; o < OCTANTS; o++) {
-            counts[o] = in.x * (o & 1 ? 1 : -1) >= -ASIDE && in.y * (o & 2 ? 1 : -1) >= -ASIDE && in.z * (o & 4 ? 1 : -1) >= -ASIDE;
-            found[o] += counts[o];
-            at = counts[o] && size[o] < at ? size[o] : at;
-        }
+        found++;
+        // a ball that reaches to where the inlet bends the field is nobody's
         bool limits = false;
+        int at = size;
         for (; part[at] > 0; at++) {
             double ball = part[at] * n->radius;
             Vec3 middle = vec3_add_scaled(wall, ball, in);
@@ -1126,11 +1116,9 @@ static void measure_room(const FieldVessel *field, int node, float *room)
                 break;
             limits = true;
         }
-        for (int o = 0; o < OCTANTS; o++)
-            size[o] = counts[o] && limits && at > size[o] ? at : size[o];
+        size = limits ? at : size;
     }
-    for (int o = 0; o < OCTANTS; o++)
-        room[o] = found[o] >= LEAST ? (float)(SHARE * part[size[o]] * n->radius) : 0;
+    return found >= LEAST ? SHARE * part[size] * n->radius : 0;
 }
 
 static void fill_nodes(FieldVessel *field)
@@ -1150,10 +1138,12 @@ static void fill_nodes(FieldVessel *field)
         Blobby blobs = blobby_of(tree, node);
         field->node[node].carried = blobby_field(&blobs, tree->center[0]) > 0;
     }
+    Vec3 way[ROOM_WAYS];
+    field_directions(way, ROOM_WAYS);
     for (int i = 0; i < tree->node_count; i++)
         {
         field->node[i].clear = clear_about_center(field, i);
-        measure_room(field, i, field->node[i].room);
+        field->node[i].room = measure_room(field, i, way);
     }
 }
 

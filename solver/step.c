@@ -648,6 +648,7 @@ void step_contact(Stepper *s)
             break;
         if (follow(s, iteration > 1 && s->vessel && goes_back(s)) == 0) {
             s->blocked = true;
+            stepper_doubt(s);
             break;
         }
         stepper_use_clearance(s);

@@ -245,6 +245,15 @@ static void forget(Stepper *s, int point)
     s->met[point] = (WallMet){0};
 }
 
+void stepper_doubt(Stepper *s)
+{
+    for (int p = 0; p < s->point_count; p++)
+        if (s->tried[p]) {
+            s->place[p].has_foot = false;
+            s->place[p].clearance = s->clearance[p] = 0;
+        }
+}
+
 void stepper_forget(Stepper *s, int node)
 {
     forget(s, node);

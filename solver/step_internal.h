@@ -105,6 +105,8 @@ void stepper_detect(Stepper *s);
 void stepper_keep_forces(Stepper *s);
 // Has a point that was no candidate gone further than its room?
 bool stepper_escapes(const Stepper *s);
+// No trial was good: the wall may be nearer than the detection found it. It is looked for from scratch next time, where trials have asked.
+void stepper_doubt(Stepper *s);
 // How deep outside the true wall the solution would leave the points that it moves far from the iterate [mm], >= 0.
 double stepper_overshoot(Stepper *s);
 // How deep outside it the points are that have gone beyond what is known of it since they were last asked [mm], >= 0.
