@@ -855,7 +855,7 @@ static void put(Queue *queue, int point, Vec3 start)
 // Steps that follow a foot, and careful ones that seek it; these no longer [of the radius] than lets them see what reaches there.
 enum { FOLLOW_ROUNDS = 2, SEEK_ROUNDS = 8 };
 static const double LONGEST_SOUGHT = 0.25;
-static const double FOLLOWED = 1;          // of the radius: a point that has moved further has no foot to follow
+static const double FOLLOWED = 1;            // of the radius: a point that has moved further has no foot to follow
 
 // A followed foot goes no further than the prediction and its steps may: one that is far from the inlet needs not be asked about it.
 static void fill_lane(const FieldVessel *field, FieldBlock *b, int i, const Batch *batch, int point, bool seek)
@@ -1140,8 +1140,7 @@ static void fill_nodes(FieldVessel *field)
     }
     Vec3 way[ROOM_WAYS];
     field_directions(way, ROOM_WAYS);
-    for (int i = 0; i < tree->node_count; i++)
-        {
+    for (int i = 0; i < tree->node_count; i++) {
         field->node[i].clear = clear_about_center(field, i);
         field->node[i].room = measure_room(field, i, way);
     }

@@ -265,13 +265,15 @@ typedef struct NearLimits {
     double way, apart;
 } NearLimits;
 
+static const NearLimits near_most = {3, 1.5}, near_local_sac = {2, 1.5}, near_local = {1.5, 1.2};
+
 static NearLimits near_limits(const VesselTree *tree, int a, int b)
 {
     bool local_models = vessel_tree_is_model(tree) && !vessel_tree_is_shared(tree);
     if (!local_models)
-        return (NearLimits){3, 1.5};
+        return near_most;
     bool at_sac = tree->kind[a] != NODE_VESSEL || tree->kind[b] != NODE_VESSEL;
-    return at_sac ? (NearLimits){2, 1.5} : (NearLimits){1.5, 1.2};
+    return at_sac ? near_local_sac : near_local;
 }
 
 // The nodes near `node`, its neighbours always among them. Breadth first, so that the order is that of links, then of indices. False where there is
@@ -280,7 +282,7 @@ static bool collect_near(NearSearch *s, int node)
 {
     const VesselTree *tree = s->tree;
     int known = 1;
-    double farthest = s->part * 3 * (tree->radius[node] + s->largest);
+    double farthest = s->part * near_most.way * (tree->radius[node] + s->largest);
     s->way[0] = (Way){node, -1, node};
     for (int w = 0; w < known; w++, s->visits++) {
         Way at = s->way[w];
