@@ -9,7 +9,7 @@ void beam_element(const BeamInput *in, BeamOutput *out)
 void beam_tangent(const BeamInput *in, const BeamOutput *out, double scale, BeamTangent *tangent)
 {
     double n[N_ROWS], f[F_ROWS];
-    tangent_rows(out, in->length, in->axial, in->near, in->far, in->twist, scale, out->tension > 0 ? out->tension : 0, n, 1, f, 1);
+    tangent_rows(out, in->length, in->axial, in->near, in->far, in->twist, scale, out->tension > 0 ? out->tension : 0, in->half_w < 1, n, 1, f, 1);
     double *k11 = tangent->k11, *k21 = tangent->k21, *k22 = tangent->k22;
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {

@@ -47,6 +47,8 @@ typedef struct BeamOutput {
     double bow;                      // [mm] arc length less chord, by the cubic shape
     Vec3 angle1, angle2;             // [rad] bending angles against the rest chord
     Vec3 turn1, turn2;               // [rad] from the chord to the nodes' tangents
+    Vec3 own1, own2;                 // the nodes' tangents
+    double spin1, spin2;             // [N mm] >= 0 stiffness of a spin about them: where a rest curvature is held bent the other way
     Vec3 chord1, chord2;             // [N mm] the part of moment1 and moment2 that comes through the rest chord (bending, torsion)
 } BeamOutput;
 void beam_element(const BeamInput *in, BeamOutput *out);

@@ -102,6 +102,8 @@ INLINE void element(const BeamInput *in, bool is_curved, BeamOutput *out)
     Vec3 m1 = vec3_add(vec3_scale(c1.angle, in->near), vec3_scale(c2.angle, in->far));
     Vec3 m2 = vec3_add(vec3_scale(c2.angle, in->near), vec3_scale(c1.angle, in->far));
     double energy = 0.5 * (tension * extension + vec3_dot(m1, c1.angle) + vec3_dot(m2, c2.angle));
+    // the second derivative of theta with a spin of the node is the rest angle back, b - c
+    double spin1 = is_curved ? vec3_dot(m1, vec3_sub(b1.angle, c1.angle)) : 0, spin2 = is_curved ? vec3_dot(m2, vec3_sub(b2.angle, c2.angle)) : 0;
 
     // torsion: p = (w, v) the rotation from F1 to F2, seen in F1
     Quat p = quat_mul(quat_conjugate(f1), f2);
@@ -123,6 +125,10 @@ INLINE void element(const BeamInput *in, bool is_curved, BeamOutput *out)
     out->tangent1 = c1.t;
     out->tangent2 = c2.t;
     out->stretch = vec3_add(e, bow_along);
+    out->own1 = b1.t;
+    out->own2 = b2.t;
+    out->spin1 = spin1 > 0 ? spin1 : 0;
+    out->spin2 = spin2 > 0 ? spin2 : 0;
     out->bow1 = by1;
     out->bow2 = by2;
     out->axis = axis;
@@ -174,7 +180,7 @@ INLINE Coupling coupling(Vec3 e, Vec3 sum, Vec3 tangent, double s, double invers
 
 // Rows of the tangent, main part times `scale`, geometric part of the tension `pull` >= 0, row k at [k * stride].
 INLINE void tangent_rows(const BeamOutput *o, double length, double axial, double near, double far, double twist, double scale,
-                         double pull, double *restrict n, int n_stride, double *restrict f, int f_stride)
+                         double pull, bool is_curved, double *restrict n, int n_stride, double *restrict f, int f_stride)
 {
     double inverse = o->inverse, ka = axial * scale, kt = twist * scale;
     double c = near * scale + pull * length * (4.0 / 30), d = far * scale - pull * length * (1.0 / 30);
@@ -184,6 +190,7 @@ INLINE void tangent_rows(const BeamOutput *o, double length, double axial, doubl
     Coupling u1 = coupling(e, vec3_add(vec3_scale(t1, c), vec3_scale(t2, d)), t1, s1, inverse);
     Coupling u2 = coupling(e, vec3_add(vec3_scale(t1, d), vec3_scale(t2, c)), t2, s2, inverse);
     Columns v = columns(e), ext = columns(o->stretch), w1 = columns(o->bow1), w2 = columns(o->bow2), g = columns(o->axis);
+    Columns a1 = columns(o->own1), a2 = columns(o->own2);
     Columns p1 = columns(t1), p2 = columns(t2), q1 = columns(vec3_add_scaled(t1, -s1, e)), q2 = columns(vec3_add_scaled(t2, -s2, e));
     UNROLL
     for (int i = 0; i < 3; i++) {
@@ -203,6 +210,8 @@ INLINE void tangent_rows(const BeamOutput *o, double length, double axial, doubl
             double tt = av * v.v[j] + x1 * q1.v[j] + x2 * q2.v[j] - ke * ext.v[j];
             double r11 = y11 * v.v[j] - z11 * p1.v[j] + k1 * w1.v[j] + kg * g.v[j];
             double r22 = y22 * v.v[j] - z22 * p2.v[j] + k2 * w2.v[j] + kg * g.v[j];
+            if (is_curved)
+                r11 += o->spin1 * a1.v[i] * a1.v[j], r22 += o->spin2 * a2.v[i] * a2.v[j];
             f[(F_TT + SYM[i][j]) * f_stride] = i == j ? tt - a : tt;
             n[(N_RR + SYM[i][j]) * n_stride] = i == j ? c * s1 * s1 + r11 : r11;
             f[(F_RR + SYM[i][j]) * f_stride] = i == j ? c * s2 * s2 + r22 : r22;
