@@ -29,7 +29,8 @@ typedef struct FieldNode {
     double radius, bend;     // [mm], and its inverse
     double skin;             // [mm] about the foot in which blobs are held
     double clear;            // [mm] the wall is certainly at least this far from the centre; < 0: not known
-    double room;             // [mm] of a point in the lumen that is nearer than that to a foot in the cell no wall is nearer: see measure_room
+    double room;             // [mm] of a point in the lumen that is nearer than that to a foot in the cell no wall is nearer …
+    double reach;            // … as far as its own walls tell: see measure_reach; HUGE_VAL where it has none
     const int32_t *seen;     // its blobs
     int seen_count;
     bool carried;            // near the inlet: goes on upstream
@@ -420,7 +421,7 @@ static double room_about(const FieldVessel *field, double side, const Foot *foot
     const FieldNode *node = &field->node[foot->node];
     double size = fabs(foot->gap);
     for (int t = 0; t < TRIES; t++) {
-        double ball = size + wider[t] * node->radius, room = 0.4 * (0.92 * ball - size);
+        double ball = size + wider[t] * node->radius, room = 0.55 * (0.92 * ball - size);
         Vec3 middle = vec3_add_scaled(foot->at, side * ball, foot->normal);
         if (is_at_inlet(field, node, middle, ball))
             continue;
@@ -752,8 +753,12 @@ static void answer_around(const FieldVessel *field, Vec3 x, const Foot *foot, Ve
 {
     BlobList list;
     list_about(field, x, foot, &list);
-    Vec3 g;
-    double here = field_at(field, &list, asked_at(field, &field->node[foot->node], x), &g), side = here > 0 ? 1 : -1, travel = vec3_distance(x, m->place);
+    // in the ball of its last gap it has met no wall
+    double before = vec3_dot(vec3_sub(m->place, m->foot), m->normal), travel = vec3_distance(x, m->place), side = before > 0 ? 1 : -1;
+    if (!(travel < fabs(before))) {
+        Vec3 g;
+        side = field_at(field, &list, asked_at(field, &field->node[foot->node], x), &g) > 0 ? 1 : -1;
+    }
     if (side * foot->gap < -1e-9) {
         answer_afresh(field, x, m, hit);
         return;
@@ -1059,38 +1064,51 @@ static double clear_about_center(const FieldVessel *field, int i)
     return clear > 0 ? clear : -HUGE_VAL;
 }
 
-// Where the wall is first met from a node's centre, to a 250th of the radius; false where it is not within two radii or the cell.
-static bool wall_along(const FieldVessel *field, const BlobList *list, int node, Vec3 way, Vec3 *wall)
+// Where the wall is met on a line from a node's centre, to a 250th of the radius, out to two radii and no further than the cell; through it, too: what is
+// behind it may be lumen again. Returns how often.
+enum { CROSSINGS = 4 };
+static int walls_along(const FieldVessel *field, const BlobList *list, int node, Vec3 way, Vec3 wall[CROSSINGS])
 {
-    enum { LOOKS = 3 };
+    enum { LOOKS = 2, PLACES = LOOKS * FOOT_BLOCK };
     const FieldNode *n = &field->node[node];
-    double from = 0, step = 0.25 * n->radius;
-    for (int look = 0; look < LOOKS; look++, step /= FOOT_BLOCK) {
-        FieldLane x, y, z, f;
-        int in = 0;
+    const double step = 2 * n->radius / PLACES, fine = step / FOOT_BLOCK;
+    double f[PLACES + 1] = {1}, between[FOOT_BLOCK];
+    FieldLane x, y, z;
+    int count = 0;
+    for (int k = 0; k < PLACES; k++) {
+        Vec3 q = vec3_add_scaled(n->center, (k + 1) * step, way);
+        int i = k % FOOT_BLOCK;
+        x[i] = q.x, y[i] = q.y, z[i] = q.z;
+        if (i == FOOT_BLOCK - 1)
+            field->kernels->look(field->row, list->blob, list->count, x, y, z, f + 1 + k - i);
+    }
+    for (int k = 0; k < PLACES && count < CROSSINGS; k++) {
+        if ((f[k] > 0) == (f[k + 1] > 0))
+            continue;
+        int at = 0;
         for (int i = 0; i < FOOT_BLOCK; i++) {
-            Vec3 q = vec3_add_scaled(n->center, from + (i + 1) * step, way);
+            Vec3 q = vec3_add_scaled(n->center, k * step + (i + 1) * fine, way);
             x[i] = q.x, y[i] = q.y, z[i] = q.z;
         }
-        field->kernels->look(field->row, list->blob, list->count, x, y, z, f);
-        while (in < FOOT_BLOCK && f[in] > 0)
-            in++;
-        if (look == 0 && in == FOOT_BLOCK)
-            return false;
-        from += in * step;
+        field->kernels->look(field->row, list->blob, list->count, x, y, z, between);
+        while (at < FOOT_BLOCK - 1 && (between[at] > 0) == (f[k] > 0))
+            at++;
+        double before = at > 0 ? between[at - 1] : f[k], part = before / (before - between[at]);
+        wall[count] = vec3_add_scaled(n->center, k * step + (at + part) * fine, way);
+        count += cell_of(field, wall[count], node) == node;
     }
-    *wall = vec3_add_scaled(n->center, from, way);
-    return cell_of(field, *wall, node) == node;
+    return count;
 }
 
 // The wall's reach in a node's cell: how large a ball may be that touches the wall from within and meets no other part of it, at feet all around, the least of
 // all: what a cleft lets no ball into says little of the walls beside it alone. A point whose foot is nearer than that lies in such a ball with all that is
-// as near to it. Looks all around, and around the axis, as most of what is about a node may lie in other cells.
-static double measure_room(const FieldVessel *field, int node, const Vec3 way_all[ROOM_WAYS])
+// as near to it. Looks all around, and around the axis, as most of what is about a node may lie in other cells,
+// and through walls, as a cleft is not seen from the centre.
+static double measure_reach(const FieldVessel *field, int node, const Vec3 way_all[ROOM_WAYS])
 {
     static const double part[] = {1.1, 1.05, 1, 0.95, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0};
     static const double SHARE = 0.92;        // of a ball that is clear at the points at which it is looked at: see room_about
-    enum { LEAST = 4, AROUND = 16 };
+    enum { AROUND = 16 };
     const FieldNode *n = &field->node[node];
     BlobList list;
     int size = 0, found = 0;
@@ -1098,27 +1116,43 @@ static double measure_room(const FieldVessel *field, int node, const Vec3 way_al
     list_blobs(field, node, n->center, 3 * n->radius, &list);
     for (int k = 0; k < ROOM_WAYS + AROUND && part[size] > 0; k++) {
         double turn = 2 * PI * k / AROUND;
-        Vec3 wall, in, way = k < ROOM_WAYS ? way_all[k] : vec3_add(vec3_scale(across, cos(turn)), vec3_scale(side, sin(turn)));
-        if (!wall_along(field, &list, node, way, &wall))
-            continue;
-        field_at(field, &list, wall, &in);
-        in = vec3_unit_or(in, vec3_negate(way));
-        found++;
-        // a ball that reaches to where the inlet bends the field is nobody's
-        bool limits = false;
-        int at = size;
-        for (; part[at] > 0; at++) {
-            double ball = part[at] * n->radius;
-            Vec3 middle = vec3_add_scaled(wall, ball, in);
-            if (is_at_inlet(field, n, middle, ball))
-                continue;
-            if (is_clear(field, &list, middle, ball, 1))
-                break;
-            limits = true;
+        Vec3 wall[CROSSINGS], in, way = k < ROOM_WAYS ? way_all[k] : vec3_add(vec3_scale(across, cos(turn)), vec3_scale(side, sin(turn)));
+        int crossings = walls_along(field, &list, node, way, wall);
+        for (int w = 0; w < crossings; w++, found++) {
+            field_at(field, &list, wall[w], &in);
+            in = vec3_unit_or(in, vec3_negate(way));
+            // a ball that reaches to where the inlet bends the field is nobody's
+            bool limits = false;
+            int at = size;
+            for (; part[at] > 0; at++) {
+                double ball = part[at] * n->radius;
+                Vec3 middle = vec3_add_scaled(wall[w], ball, in);
+                if (is_at_inlet(field, n, middle, ball))
+                    continue;
+                if (is_clear(field, &list, middle, ball, 1))
+                    break;
+                limits = true;
+            }
+            size = limits ? at : size;
         }
-        size = limits ? at : size;
     }
-    return found >= LEAST ? SHARE * part[size] * n->radius : 0;
+    return found > 0 ? SHARE * part[size] * n->radius : HUGE_VAL;
+}
+
+// The least of what is known of a node's wall and of those within half a radius: a cleft or a groove goes on from cell to cell, and looks that miss it in one meet
+// it in the next. Where there are any, nothing is taken for granted.
+static double least_reach(const FieldVessel *field, int node)
+{
+    static const double CLEFT = 0.3, BESIDE = 0.5;   // of the radius
+    const VesselTree *tree = field->tree;
+    const FieldNode *n = &field->node[node];
+    double least = n->reach;
+    for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++) {
+        const FieldNode *other = &field->node[tree->near[k]];
+        if (vec3_distance(n->center, other->center) < BESIDE * n->radius)
+            least = fmin(least, other->reach);
+    }
+    return least < CLEFT * n->radius ? 0 : least;
 }
 
 static void fill_nodes(FieldVessel *field)
@@ -1142,8 +1176,10 @@ static void fill_nodes(FieldVessel *field)
     field_directions(way, ROOM_WAYS);
     for (int i = 0; i < tree->node_count; i++) {
         field->node[i].clear = clear_about_center(field, i);
-        field->node[i].room = measure_room(field, i, way);
+        field->node[i].reach = measure_reach(field, i, way);
     }
+    for (int i = 0; i < tree->node_count; i++)
+        field->node[i].room = least_reach(field, i);
 }
 
 Vessel *field_vessel_create_with(const VesselTree *tree, int isa)
