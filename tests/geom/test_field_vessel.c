@@ -629,6 +629,44 @@ static void crowded_places(void **state)
     vessel_tree_free(t);
 }
 
+// A thin lumen beside a wide one, in the same cells, but hidden from their centres by the wide one's wall: a point that crosses it meets the wall across.
+static void cleft_behind_the_wall(void **state)
+{
+    (void)state;
+    enum { N = 60, THIN = 5 };
+    const double wide = 0.6, thin = 0.15, aside = 1.55, pitch = 0.5;
+    VesselTree *t = vessel_tree_create_shared(N, 0, N * (1 + THIN));
+    for (int i = 0, at = 0; i < N; i++) {
+        t->center[i] = vec3(pitch * i, 0, 0);
+        t->radius[i] = 1;
+        t->direction[i] = vec3(1, 0, 0);
+        t->height[i] = pitch;
+        t->parent[i] = i - 1;
+        for (int k = 0; k <= THIN; k++, at++) {
+            double radius = k == 0 ? wide : thin, x = pitch * (i + (k == 0 ? 0 : (k - 3.0) / THIN));
+            t->blob_center[at] = vec3(x, k == 0 ? 0 : aside, 0);
+            t->blob_width[at] = 2 * radius;
+            t->blob_amplitude[at] = field_row_amplitude(k == 0 ? pitch : pitch / THIN, radius);
+        }
+        t->blob_offset[i + 1] = at;
+    }
+    assert_true(vessel_tree_link(t));
+    Vessel *v = make(t, 0);
+    VesselMemory memory = {.node = -1};
+    double worst = 0;
+    for (int step = 0; step <= 40; step++) {
+        double off = 0.1 * (1 - step / 20.0);
+        Vec3 x = {15, aside + off, 0};
+        VesselHit hit;
+        vessel_query(v, 1, &x, 0.5, &memory, &hit);
+        worst = fmax(worst, hit.gap - (thin - fabs(off)));
+    }
+    print_message("across a thin lumen: at most %.4f mm farther than its wall\n", worst);
+    assert_true(worst < 0.02);
+    v->destroy(v);
+    vessel_tree_free(t);
+}
+
 // A model that contradicts itself: from the middle on nodes miss every second blob, so that their wall is narrower. That is marked, and throws nobody.
 static void contradiction_is_told(void **state)
 {
@@ -673,6 +711,7 @@ int main(void)
         cmocka_unit_test(no_jump_between_cells), cmocka_unit_test(kissing_vessels_keep_apart), cmocka_unit_test(inlet_is_open),
         cmocka_unit_test(moved_and_mirrored_scenes), cmocka_unit_test(nowhere_is_survived), cmocka_unit_test(far_is_far),
         cmocka_unit_test(copies_repeat_and_heap_rests), cmocka_unit_test(crowded_places), cmocka_unit_test(contradiction_is_told),
+        cmocka_unit_test(cleft_behind_the_wall),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
