@@ -47,7 +47,8 @@ typedef struct FieldBlock {
     int slots;                               // lists are as long, filled up with the blob without weight; 0: only as their counts say
     FieldLane dx, dy, dz;            // the motion of X since the foot was found
     FieldLane straight_x, straight_y, straight_z;    // where the foot should be but for the last prediction's miss
-    FieldLane held_x, held_y, held_z, held_for2, bound_x, bound_y, bound_z, bound_for, down, up, trust;
+    FieldLane held_x, held_y, held_z, held_for2, bound_x, bound_y, bound_z, bound_for, down, up, trusted;
+    FieldLane trust;                 // what is left of it
     FieldLane room;                  // gaps in the lumen up to this are the closest wall's
 } FieldBlock;
 

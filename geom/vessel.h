@@ -20,7 +20,7 @@ typedef struct VesselMemory {
     // Of the field of shared blobs; field_lanes.h loads the numbers from `foot` to `bound_for` as one row of 32.
     double down;             // within `bound_for` mm of `bound_at` f bends down by no more than this, and up …
     Vec3 miss, step;         // by how much the last prediction missed the foot, and the motion that it was made for
-    double trust;            // [mm] of travel in which no walls but the rival's need be looked for
+    double trust;            // [mm] from `bound_at` within which no walls but the rival's need be looked for
     double up;               // … by no more than this [1/mm^2]
     Vec3 held_at;            // the blobs below are all that reach to within …
     double held_for2;        // … the root of this [mm^2] of here, as `node` sees the field
