@@ -1140,7 +1140,7 @@ static double measure_reach(const FieldVessel *field, int node, const Vec3 way_a
 }
 
 // The least of what is known of a node's wall and of those within half a radius: a cleft or a groove goes on from cell to cell, and looks that miss it in one meet
-// it in the next. Where there are any, nothing is taken for granted.
+// it in the next. Where there are any, or no wall was met at all, nothing is taken for granted.
 static double least_reach(const FieldVessel *field, int node)
 {
     static const double CLEFT = 0.3, BESIDE = 0.5;   // of the radius
@@ -1152,7 +1152,7 @@ static double least_reach(const FieldVessel *field, int node)
         if (vec3_distance(n->center, other->center) < BESIDE * n->radius)
             least = fmin(least, other->reach);
     }
-    return least < CLEFT * n->radius ? 0 : least;
+    return least < CLEFT * n->radius || least == HUGE_VAL ? 0 : least;
 }
 
 static void fill_nodes(FieldVessel *field)
