@@ -12,34 +12,13 @@ typedef struct FitKernels {
     void (*mean)(const float *, const float *, const float *, const float *, const float *, int, const LaneBlob *, float (*)[FIELD_LANES]);
 } FitKernels;
 
-#define TARGET
-#define KERNEL(name) name##_baseline
-#include "recon/fit_kernel.inc"
-#undef TARGET
-#undef KERNEL
-static const FitKernels baseline = {sum_baseline, columns_baseline, gram_baseline, mean_baseline};
+#define KERNEL_TABLE(isa) {sum_##isa, columns_##isa, gram_##isa, mean_##isa}
 
-#if defined(__x86_64__) && defined(__GNUC__)
-#define TARGET __attribute__((target("avx2")))
-#define KERNEL(name) name##_avx2
-#include "recon/fit_kernel.inc"
-#undef TARGET
-#undef KERNEL
-#define TARGET __attribute__((target("avx512f,avx512dq,avx512vl,prefer-vector-width=512")))
-#define KERNEL(name) name##_avx512
-#include "recon/fit_kernel.inc"
-#undef TARGET
-#undef KERNEL
-static const FitKernels avx2 = {sum_avx2, columns_avx2, gram_avx2, mean_avx2}, avx512 = {sum_avx512, columns_avx512, gram_avx512, mean_avx512};
+#define KERNEL_TEXT "recon/fit_kernel.inc"
+#include "recon/each_isa.inc"
+static const FitKernels kernel_table[SIMD_COUNT] = EACH_ISA;
 
-static const FitKernels *kernels(void)
-{
-    static const FitKernels *const of[SIMD_COUNT] = {&baseline, &avx2, &avx512};
-    return of[simd_level()];
-}
-#else
-static const FitKernels *kernels(void) { return &baseline; }
-#endif
+static const FitKernels *kernels(void) { return &kernel_table[simd_level()]; }
 
 void fit_lanes_sum(const float *x, const float *y, const float *z, int rows, int sloped, const LaneBlob *blob, int count, float *f, float *const g[3])
 {

@@ -37,27 +37,9 @@ typedef struct LimKernels {
     {add_##isa, sum_##isa, taubin_##isa, approach_##isa, feet_##isa, moving_energy_##isa, total_energy_##isa, residuals_##isa, columns_##isa, gram_##isa, \
      dot_lanes_##isa, solve_##isa}
 
-#define TARGET
-#define KERNEL(name) name##_baseline
-#include "recon/lim_energy_kernel.inc"
-#undef TARGET
-#undef KERNEL
-
-#if defined(__x86_64__) && defined(__GNUC__)
-#define TARGET __attribute__((target("avx2")))
-#define KERNEL(name) name##_avx2
-#include "recon/lim_energy_kernel.inc"
-#undef TARGET
-#undef KERNEL
-#define TARGET __attribute__((target("avx512f,avx512dq,avx512vl,prefer-vector-width=512")))
-#define KERNEL(name) name##_avx512
-#include "recon/lim_energy_kernel.inc"
-#undef TARGET
-#undef KERNEL
-static const LimKernels kernel_table[SIMD_COUNT] = {KERNEL_TABLE(baseline), KERNEL_TABLE(avx2), KERNEL_TABLE(avx512)};
-#else
-static const LimKernels kernel_table[SIMD_COUNT] = {KERNEL_TABLE(baseline), KERNEL_TABLE(baseline), KERNEL_TABLE(baseline)};
-#endif
+#define KERNEL_TEXT "recon/lim_energy_kernel.inc"
+#include "recon/each_isa.inc"
+static const LimKernels kernel_table[SIMD_COUNT] = EACH_ISA;
 
 static const LimKernels *kernels(void) { return &kernel_table[simd_level()]; }
 
