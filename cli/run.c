@@ -347,6 +347,10 @@ static void say_untrusted(const Simulator *simulator, const DriveReport *drive)
     if (totals->disagreeing_steps > 0)
         fprintf(stderr, "%s: warning: in %lld of %lld steps two parts of the vessel's model put the wall at different places; "
                         "fit the model again with this version\n", path, (long long)totals->disagreeing_steps, (long long)totals->steps);
+    const EnergyBalance *energy = simulator_energy(simulator);
+    if (simulator_gains_energy(simulator))
+        fprintf(stderr, "%s: warning: single steps gained %.3g mJ that nobody gave, of %.4g mJ of work (most: %.3g mJ at %.3f s)\n", path, energy->gained,
+                energy->work, energy->gained_most, energy->gained_at_s);
     if (totals->not_converged_steps > 0)
         fprintf(stderr, "%s: warning: the contact solve of %lld of %lld steps stopped at its cap (residual at most %.2g)\n", path,
                 (long long)totals->not_converged_steps, (long long)totals->steps, totals->residual_max);
@@ -370,6 +374,7 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
         watch.recording = recording_create(options->record, simulator, &record, faults);
     if (options->score && !(watch.lesson = lesson_create(simulator, open->tree)))
         faults_add(faults, scene->path, 0, 0, "no memory");
+    simulator_watch_energy(simulator);
     if (options->device_count && faults->count == 0)
         watch.hands = run_hands_open(options->device_count, options->device, scene->dt, device_patience_s, faults);
     if (faults->count == 0) {

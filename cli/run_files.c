@@ -41,6 +41,16 @@ static void add_times(cJSON *summary, const StepProfile *profile)
         cJSON_AddNumberToObject(stages, stage_name[i], histogram_quantile(&profile->stage[i], 0.5) / 1000);
 }
 
+static const char *const energy_name[] = {"hand", "load", "elastic", "kinetic", "friction", "damping", "numerical", "wall", "gained", "gained_most_in_a_step",
+                                          "gained_most_at_s"};
+
+static void add_energy(cJSON *summary, const EnergyBalance *e)
+{
+    cJSON *energy = cJSON_AddObjectToObject(summary, "energy_mj");
+    double value[] = {e->hand, e->load, e->elastic, e->kinetic, e->friction, e->damping, e->numerical, e->wall, e->gained, e->gained_most, e->gained_at_s};
+    add_numbers(energy, (int)(sizeof value / sizeof *value), energy_name, value);
+}
+
 static void add_targets(cJSON *summary, const Simulator *simulator)
 {
     const Scene *scene = simulator_scene(simulator);
@@ -58,12 +68,15 @@ static void add_targets(cJSON *summary, const Simulator *simulator)
     }
 }
 
-static void add_flags(cJSON *summary, unsigned flags, const DriveReport *drive)
+static void add_flags(cJSON *summary, const Simulator *simulator, const DriveReport *drive)
 {
+    unsigned flags = simulator_totals(simulator)->flags;
     cJSON *list = cJSON_AddArrayToObject(summary, "flags");
     for (int i = 0; i < STEP_FLAG_COUNT; i++)
         if (flags & 1u << i)
             cJSON_AddItemToArray(list, cJSON_CreateString(step_flag_name[i]));
+    if (simulator_gains_energy(simulator))
+        cJSON_AddItemToArray(list, cJSON_CreateString("gains_energy"));
     if (drive->end == DRIVE_STOPPED)
         cJSON_AddItemToArray(list, cJSON_CreateString("stopped"));
 }
@@ -99,16 +112,20 @@ char *run_summary_json(Simulator *simulator, const DriveReport *drive, const Nod
                            totals->residual_max, (double)totals->further_linearisations, (double)totals->limited_steps,
                            (double)totals->disagreeing_steps});
     part = cJSON_AddObjectToObject(summary, "proximal");
-    add_numbers(part, 2, (const char *const[]){"force_n", "torque_n_mm"}, (double[]){last->proximal_force, last->proximal_torque});
+    add_numbers(part, 6, (const char *const[]){"force_n", "torque_n_mm", "force_least_n", "force_most_n", "slip_steps", "slipped_mm"},
+                (double[]){last->proximal_force, last->proximal_torque, totals->push_least, totals->push_most, (double)totals->hand_slip_steps,
+                           totals->hand_slipped});
     part = cJSON_AddObjectToObject(summary, "wall_force_n");
     add_numbers(part, 2, (const char *const[]){"max", "sum_final"}, (double[]){last->wall_force_max, last->wall_force_sum});
     add_vector(summary, "tip_mm", state->position[state->node_count - 1]);
     cJSON_AddNumberToObject(summary, "inserted_mm", state->inserted);
     cJSON_AddNumberToObject(summary, "elastic_energy_mj", stepper_elastic_energy(simulator_stepper(simulator)));
+    if (simulator_energy(simulator)->watched)
+        add_energy(summary, simulator_energy(simulator));
     cJSON_AddBoolToObject(summary, "settled", drive->settled);
     snprintf(hash, sizeof hash, "%016" PRIx64, simulator_hash(simulator));
     cJSON_AddStringToObject(summary, "state_hash", hash);
-    add_flags(summary, totals->flags, drive);
+    add_flags(summary, simulator, drive);
     add_targets(summary, simulator);
     char *text = cJSON_Print(summary);
     cJSON_Delete(summary);
@@ -151,12 +168,20 @@ void run_print(FILE *out, Simulator *simulator, const DriveReport *drive, const 
     fprintf(out, "step %.0f us median, %.0f us p99.9, %.0f us max; contact %.0f iterations median, %" PRId64 " max, residual at most %.1e\n",
             histogram_quantile(&profile->step, 0.5) / 1000, histogram_quantile(&profile->step, 0.999) / 1000, (double)profile->step.largest / 1000,
             histogram_quantile(&profile->iterations, 0.5), profile->iterations.largest, totals->residual_max);
-    fprintf(out, "tip at (%.3f, %.3f, %.3f) mm, %.2f mm inserted%s; push %.4f N, torque %.4f N mm\n", tip.x, tip.y, tip.z, state->inserted,
-            drive->settled ? ", at rest" : "", last->proximal_force, last->proximal_torque);
+    fprintf(out, "tip at (%.3f, %.3f, %.3f) mm, %.2f mm inserted%s; push %.4f N (from %.4f to %.4f), torque %.4f N mm\n", tip.x, tip.y, tip.z, state->inserted,
+            drive->settled ? ", at rest" : "", last->proximal_force, totals->push_least, totals->push_most, last->proximal_torque);
     fprintf(out, "%d contacts (at most %d), wall force %.4f N in sum; deepest penetration %.4f mm, %.4f mm at the end\n", last->active,
             totals->contacts_max, last->wall_force_sum, totals->penetration_max, run_final_penetration_mm(node, state->node_count));
     fprintf(out, "of all steps %" PRId64 " took a further linearisation, %" PRId64 " were cut short for the next to complete, %" PRId64
             " did not converge\n", totals->further_linearisations, totals->limited_steps, totals->not_converged_steps);
+    if (totals->hand_slip_steps)
+        fprintf(out, "the hand slipped in %" PRId64 " steps, %.2f mm along the tool: it holds no more than %g N\n", totals->hand_slip_steps, totals->hand_slipped,
+                scene->wire.hand_limit);
+    const EnergyBalance *e = simulator_energy(simulator);
+    if (e->watched)
+        fprintf(out, "energy [mJ]: hand %.4g, loads %.4g = elastic %.4g, kinetic %.2g, friction %.4g, damping %.4g, numerical %.4g (the wall gave %.3g); single steps "
+                     "gained %.2g, at most %.2g at %.3f s\n", e->hand, e->load, e->elastic, e->kinetic, e->friction, e->damping, e->numerical, e->wall, e->gained,
+                e->gained_most, e->gained_at_s);
     if (drive->deadline_misses)
         fprintf(out, "SLOWED: %" PRId64 " deadlines missed, the worst by %.2f ms; simulated time fell %.3f s behind real time\n", drive->deadline_misses,
                 drive->latest_s * 1000, drive->slowed_s);

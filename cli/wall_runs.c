@@ -14,7 +14,7 @@ static Scene *stiff_scene(double diameter, double length, double seconds, StiffR
     char text[1024];
     int elements = (int)fmin(600, fmax(100, length / 1.5));
     int n = snprintf(text, sizeof text,
-                     "seldinger: 1\nvessel:\n  shape: {name: capsule}\n  friction: %g\nwire:\n  elements: %d\n  sections:\n"
+                     "seldinger: 1\nvessel:\n  shape: {name: capsule}\n  friction: %g\nwire:\n  elements: %d\n  hand_limit_n: 0\n  sections:\n"
                      "    - {length_mm: %g, diameter_mm: %g, young_modulus_gpa: 100, poisson_ratio: 0.3, density_g_cm3: 6.45}\n"
                      "  damping: {mass_1_s: 0.1, stiffness_s: 0.0002}\nsheath: {inlet: root, inserted_mm: 2}\n"
                      "script: [{t_s: 0, push_mm_s: %g, twist_deg_s: 0}, {t_s: %g, push_mm_s: 0, twist_deg_s: 0}]\n",

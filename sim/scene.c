@@ -292,9 +292,11 @@ static void read_rest(Reading *reading, YamlValue list)
     free(piece);
 }
 
+static const double hand_limit_n = 20;       // about what two fingers hold
+
 static void read_wire(Reading *reading, YamlValue value)
 {
-    static const char *const keys[] = {"elements", "sections", "rest", "damping", "tip_marker", NULL};
+    static const char *const keys[] = {"elements", "sections", "rest", "damping", "tip_marker", "hand_limit_n", NULL};
     static const char *const marker_keys[] = {"length_mm", "attenuation_1_mm", NULL};
     static const char *const damping_keys[] = {"mass_1_s", "stiffness_s", NULL};
     WireOptions *wire = &reading->scene->wire;
@@ -308,6 +310,8 @@ static void read_wire(Reading *reading, YamlValue value)
     yaml_map_number(&damping, "stiffness_s", false, (NumberRange){0, 1000, false}, &stiffness);
     wire->damping_mass = mass / per_second;
     wire->damping_stiffness = stiffness * per_second;
+    wire->hand_limit = hand_limit_n;
+    yaml_map_number(&map, "hand_limit_n", false, (NumberRange){0, 1e6, false}, &wire->hand_limit);
     YamlMap marker = yaml_map(yaml_get(&map, "tip_marker", false), marker_keys);
     yaml_map_number(&marker, "length_mm", false, (NumberRange){0, 1000, false}, &reading->scene->marker_length);
     yaml_map_number(&marker, "attenuation_1_mm", false, (NumberRange){0, 100, false}, &reading->scene->marker_attenuation);

@@ -8,7 +8,7 @@
 const char *const stage_name[STAGE_COUNT] = {"feed", "detect", "assemble", "factor", "contact", "correct"};
 const char *const step_flag_name[STEP_FLAG_COUNT] = {"diverged",        "not_converged", "deep",            "fully_inserted",
                                                      "fully_withdrawn", "out_of_vessel", "detection_unsure", "limited",
-                                                     "model_disagrees"};
+                                                     "model_disagrees", "hand_slips"};
 
 struct Simulator {
     const Scene *scene;
@@ -16,6 +16,8 @@ struct Simulator {
     StepProfile profile;
     int64_t step_ns;
     RunTotals totals;
+    EnergyBalance energy;
+    StepEnergy before;       // of the state before
     TargetReach *target;
     double dt;               // [ms]
 };
@@ -84,6 +86,45 @@ static void timed(StepProfile *profile, Stage stage, int64_t *since)
     *since = now;
 }
 
+const double energy_gain_share = 1e-3;
+
+void simulator_watch_energy(Simulator *simulator)
+{
+    simulator->energy.watched = true;
+    simulator->before = (StepEnergy){.elastic = stepper_elastic_energy(simulator->stepper), .kinetic = stepper_kinetic_energy(simulator->stepper)};
+}
+
+const EnergyBalance *simulator_energy(const Simulator *simulator) { return &simulator->energy; }
+
+bool simulator_gains_energy(const Simulator *simulator)
+{
+    // what a state of some mJ is rounded by is no gain
+    return simulator->energy.gained > energy_gain_share * simulator->energy.work + 1e-6;
+}
+
+static void balance_energy(Simulator *simulator)
+{
+    EnergyBalance *sum = &simulator->energy;
+    StepEnergy e = stepper_energy(simulator->stepper);
+    double elastic = e.elastic - simulator->before.elastic, kinetic = e.kinetic - simulator->before.kinetic;
+    double numerical = e.hand + e.load - e.friction - e.damping - elastic - kinetic, gained = -numerical - e.wall;
+    simulator->before = e;
+    sum->hand += e.hand;
+    sum->load += e.load;
+    sum->wall += e.wall;
+    sum->friction += e.friction;
+    sum->damping += e.damping;
+    sum->elastic += elastic;
+    sum->kinetic += kinetic;
+    sum->numerical += numerical;
+    sum->work += fabs(e.hand) + fabs(e.load);
+    sum->gained += fmax(0, gained);
+    if (gained > sum->gained_most) {
+        sum->gained_most = gained;
+        sum->gained_at_s = simulator_time_s(simulator);
+    }
+}
+
 static void accumulate(Simulator *simulator)
 {
     const StepReport *report = step_report(simulator->stepper);
@@ -94,9 +135,13 @@ static void accumulate(Simulator *simulator)
     totals->further_linearisations += report->newton > 0;
     totals->disagreeing_steps += (report->flags & STEP_MODEL_DISAGREES) != 0;
     totals->limited_steps += (report->flags & STEP_LIMITED) != 0;
+    totals->hand_slip_steps += (report->flags & STEP_HAND_SLIPS) != 0;
+    totals->hand_slipped += fabs(report->slipped);
     totals->contacts_max = report->active > totals->contacts_max ? report->active : totals->contacts_max;
     totals->penetration_max = fmax(totals->penetration_max, report->penetration);
     totals->residual_max = fmax(totals->residual_max, report->residual);
+    totals->push_least = fmin(totals->push_least, report->proximal_force);
+    totals->push_most = fmax(totals->push_most, report->proximal_force);
     StepProfile *profile = &simulator->profile;
     histogram_add(&profile->iterations, report->iterations);
     histogram_add(&profile->candidates, report->candidates);
@@ -128,6 +173,8 @@ void simulator_step(Simulator *simulator, Command command)
     simulator->step_ns = since - start;
     histogram_add(&profile->step, simulator->step_ns);
     accumulate(simulator);
+    if (simulator->energy.watched)
+        balance_energy(simulator);
 }
 
 double simulator_time_s(const Simulator *simulator) { return (double)simulator->totals.steps * simulator->dt / 1000; }

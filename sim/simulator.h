@@ -30,10 +30,29 @@ typedef struct RunTotals {
     int64_t further_linearisations;  // steps that took a second Newton iteration or more
     int64_t disagreeing_steps;       // steps in which the vessel's model contradicted itself about the wall at a point of the tool
     int64_t limited_steps;           // steps whose motion was cut; the next ones completed it
+    int64_t hand_slip_steps;         // steps in which the tool asked for more force than the hand holds …
+    double hand_slipped;             // [mm] … and how far the hand slid along it, there and back
     int contacts_max;                // contacts with force
     double penetration_max;          // [mm]
     double residual_max;
+    double push_least, push_most;    // [N] at the hand
 } RunTotals;
+
+// Where the energy of a run has come from and gone to [mJ], once it is watched (solver/step.h, StepEnergy):
+//   hand + load = elastic + kinetic + friction + damping + numerical
+typedef struct EnergyBalance {
+    bool watched;
+    double hand, load, friction, damping;
+    double elastic, kinetic;         // more than at the start
+    double numerical;                // what is left: taken by implicit Euler, less what …
+    double wall;                     // … the wall's pressure gave to points that were outside
+    double work;                     // done by hand and loads, without sign
+    double gained;                   // sum of what single steps have gained that nobody gave
+    double gained_most;              // in one step …
+    double gained_at_s;              // … which ended then
+} EnergyBalance;
+// More than this share of the work is a gain that should be explained.
+extern const double energy_gain_share;
 
 // How near the tip came to a target of the scene.
 typedef struct TargetReach {
@@ -50,6 +69,11 @@ void simulator_destroy(Simulator *simulator);
 
 void simulator_step(Simulator *simulator, Command command);
 
+// Watches the energy from now on: about as much work a step as an assembly, outside the timed stages.
+void simulator_watch_energy(Simulator *simulator);
+const EnergyBalance *simulator_energy(const Simulator *simulator);
+bool simulator_gains_energy(const Simulator *simulator);           // more than energy_gain_share of the work
+
 double simulator_time_s(const Simulator *simulator);
 const WireState *simulator_state(const Simulator *simulator);
 const StepReport *simulator_last(const Simulator *simulator);     // of the last step; zeros before the first
@@ -63,8 +87,8 @@ Stepper *simulator_stepper(Simulator *simulator);                 // for save, r
 uint64_t simulator_hash(const Simulator *simulator);
 double simulator_fastest_mm_s(const Simulator *simulator);        // the fastest node's speed, or the surface's where the tool turns
 
-// Names of STEP_ flags, for files: "diverged", "not_converged", …, "limited", "model_disagrees"; index 0 to STEP_FLAG_COUNT - 1 is the bit.
-enum { STEP_FLAG_COUNT = 9 };
+// Names of STEP_ flags, for files: "diverged", "not_converged", …, "limited", "model_disagrees", "hand_slips"; index 0 to STEP_FLAG_COUNT - 1 is the bit.
+enum { STEP_FLAG_COUNT = 10 };
 extern const char *const step_flag_name[STEP_FLAG_COUNT];
 
 #endif

@@ -18,9 +18,30 @@ static Vec3 bending_axis(const BeamRest *rest, int index)
     return size > 0 ? vec3(0, y / size, z / size) : vec3(0, 0, 1);
 }
 
-Vec3 sheath_rest_curvature(const BeamRest *rest, int index, Quat q)
+static Vec3 own_curvature(const BeamRest *rest, int index) { return vec3_scale(bending_axis(rest, index), rest->curvature[index]); }
+
+Vec3 sheath_rest_curvature(const BeamRest *rest, int index, Quat q) { return quat_rotate(q, own_curvature(rest, index)); }
+
+const double sheath_border_share = 0.02;
+
+// How much of the element behind counts at the mouth, 0 to 1, where the inner node is `past` it [mm]; *sum: over the length that is past. The border is
+// spread over as much before the node as behind it, so that no energy is made.
+static double share_behind(const BeamRest *rest, int index, double past, double *sum)
 {
-    return quat_rotate(q, vec3_scale(bending_axis(rest, index), rest->curvature[index]));
+    double width = sheath_border_share * rest->length[index], from = past + 0.5 * width;
+    *sum = 0;
+    if (index == 0 || from <= 0)
+        return 0;
+    *sum = from < width ? 0.5 * from * from / width : past;
+    return fmin(from / width, 1);
+}
+
+static double straightening(const BeamRest *rest, int index) { return 0.5 * rest->bending[index] * rest->curvature[index] * rest->curvature[index]; }
+
+double sheath_straightening(const BeamRest *rest, int index, double coordinate)
+{
+    double sum, share = share_behind(rest, index, coordinate, &sum), own = straightening(rest, index);
+    return share > 0 ? own + share * (straightening(rest, index - 1) - own) : own;
 }
 
 // Rest length outside, kept above a hundredth of the element.
@@ -32,9 +53,25 @@ static double outside_of(double length, double coordinate)
 void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction, double coordinate, Quat q1, Vec3 x2, Quat q2,
                     double ahead, SheathElement *element)
 {
-    double length = rest->length[index], outside = outside_of(length, coordinate + ahead), now = outside_of(length, coordinate), k0 = rest->curvature[index], bending = rest->bending[index], slope;
-    double quarter = 0.25 * k0 * outside, near_slope, far_slope;
-    Vec3 plane = bending_axis(rest, index);
+    double length = rest->length[index], outside = outside_of(length, coordinate + ahead), now = outside_of(length, coordinate);
+    double bending = rest->bending[index], own = straightening(rest, index), stored = own * (length - outside), border = 0, sum, slope, near_slope, far_slope;
+    double past = outside - length, share = share_behind(rest, index, past, &sum), softer = 0;
+    Vec3 rest_here = own_curvature(rest, index), rest_outside = rest_here;
+    if (share > 0) {
+        Vec3 change = vec3_sub(own_curvature(rest, index - 1), rest_here);
+        double less = own - straightening(rest, index - 1);
+        rest_outside = vec3_add_scaled(rest_here, sum / outside, change);
+        rest_here = vec3_add_scaled(rest_here, share, change);
+        stored += less * sum;
+        border = share < 1 ? fmax(0, less) / (sheath_border_share * length) : 0;
+        own -= share * less;
+        // one after the other they give way like springs in series
+        double more = 1 / rest->bending[index - 1] - 1 / bending, flexibility = 1 / bending + more * sum / outside;
+        softer = (1 - (1 / bending + more * share) / flexibility) / outside;
+        bending = 1 / flexibility;
+    }
+    double k0 = vec3_norm(rest_outside), quarter = 0.25 * k0 * outside;
+    Vec3 plane = k0 > 0 ? vec3_scale(rest_outside, 1 / k0) : vec3(0, 0, 1);
     BeamInput in = {.x1 = mouth, .x2 = x2, .q1 = q1, .q2 = q2, .length = outside, .axial = rest->axial[index], .twist = rest->twist[index],
                     .half_w = cos(quarter), .half_y = sin(quarter) * plane.y, .half_z = sin(quarter) * plane.z};
     in.extend = length - beam_arc_rest(outside, k0, &slope) + coordinate;
@@ -43,10 +80,12 @@ void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction,
     BeamOutput out;
     beam_element(&in, &out);
 
-    double by_length = out.tension * (out.bow / outside + slope) - 0.5 * bending * k0 * k0;
+    double by_length = out.tension * (out.bow / outside + slope) - own;
     by_length += 0.5 * near_slope * (vec3_norm2(out.angle1) + vec3_norm2(out.angle2)) + far_slope * vec3_dot(out.angle1, out.angle2);
+    by_length += 0.5 * softer * (vec3_dot(out.angle1, vec3_add(vec3_scale(out.angle1, in.near), vec3_scale(out.angle2, in.far))) +
+                                 vec3_dot(out.angle2, vec3_add(vec3_scale(out.angle2, in.near), vec3_scale(out.angle1, in.far))));
     // a longer arc turns the rest chord in both nodes' frames
-    by_length += 0.5 * k0 * (vec3_dot(quat_rotate(q1, plane), out.chord1) - vec3_dot(quat_rotate(q2, plane), out.chord2));
+    by_length += 0.5 * (vec3_dot(quat_rotate(q1, rest_here), out.chord1) - vec3_dot(quat_rotate(q2, rest_here), out.chord2));
     // what the linearisation in phi at the new length misses where the curvature stays
     Vec3 phi = vec3_sub(out.turn1, out.turn2);
     double change = 1 / outside - 1 / now;
@@ -56,10 +95,12 @@ void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction,
         .outside = outside,
         .axial_gradient = by_length - out.tension,
         .twist_gradient = vec3_dot(direction, out.moment1),
-        .energy = out.energy + 0.5 * bending * k0 * k0 * (length - outside),
+        .energy = out.energy + stored,
         .beam = in,
         .out = out,
         .curvature = vec3_scale(phi, 1 / now),
+        .bending = bending,
+        .border = border,
     };
 }
 
@@ -90,7 +131,7 @@ void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const Sheat
         tangent->k21[i * 6] = -ka * column[i];
     // and through l: EI/l |d theta1 - d theta2 - k dl|^2, with B and D of beam_element.c
     Vec3 e = out->chord, t1 = out->tangent1, t2 = out->tangent2;
-    double k = rest->bending[index] / element->outside;
+    double k = element->bending / element->outside;
     Vec3 w = vec3_scale(element->curvature, -k), across = vec3_scale(vec3_cross(vec3_sub(t1, t2), w), out->inverse);
     across = vec3_add_scaled(across, -vec3_dot(across, e), e);
     Vec3 first = vec3_add_scaled(vec3_scale(w, vec3_dot(e, t1)), -vec3_dot(t1, w), e);
@@ -99,7 +140,8 @@ void sheath_tangent(const BeamRest *rest, int index, Vec3 direction, const Sheat
                           across.x, across.y, across.z, second.x, second.y, second.z};
     for (int i = 0; i < 12; i++)
         length_column[i] = through[i];
-    tangent->k11[0] += scale * through[0];
+    length_column[0] += element->border;
+    tangent->k11[0] += scale * through[0] + element->border;
     tangent->k11[3] += scale * through[3];
     tangent->k11[18] += scale * through[3];
     for (int i = 0; i < 6; i++)

@@ -31,6 +31,10 @@ enum { HALVES_MAX = 6, MEETINGS_MAX = 2 };
 // A tool that is squeezed by more than this share of its length is beyond what its elements describe (and would have yielded): the hand stalls.
 // One that is squeezed by JAMMED has a reason to be stuck.
 static const double SQUEEZE_MAX = 0.03, JAMMED = 0.002;
+static const double TAKE_BACK = 0.002;           // of an element's length past the mouth: a free node that would end nearer to it is held
+static const double BORDER_FORCE = 1e-3;         // of what straightening takes at the mouth: good enough
+enum { DRIVEN_TRIES = 6 };
+static const double MOUTH_TRAVEL = 1;            // of an element's length that the tool springs through the mouth in a step, besides what the hand feeds
 static const double LET_GO_TURN = 0.1;           // [rad] by which a node that is let go at the mouth is turned at most
 
 // --- creation ---
@@ -214,14 +218,13 @@ static bool check_options(const StepperOptions *o, char *why, int capacity)
     return true;
 }
 
-// Nodes up to the mouth are held. One that has passed it is let go a fiftieth of an element later, so that the piece outside has a
-// direction; one that would come back in this step is held from now on.
+// Nodes up to the mouth are held, and a little further (sheath_border_share); one that the hand brings back in this step is held from now on.
 static int count_held(const Stepper *s, double advance)
 {
     if (!s->has_sheath)
         return 0;
     int k = 1;
-    while (k < s->state.node_count && stepper_sheath_coordinate(s, k) + fmin(advance, 0) <= 0.02 * s->wire.length[k - 1])
+    while (k < s->state.node_count && stepper_sheath_coordinate(s, k) + fmin(advance, 0) <= sheath_border_share * s->wire.length[k - 1])
         k++;
     return k;
 }
@@ -253,6 +256,7 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
     s->damping_stiffness = o.wire.damping_stiffness;
     s->dt = o.dt;
     s->has_sheath = o.wire.has_sheath;
+    s->hand_limit = o.wire.has_sheath ? o.wire.hand_limit : 0;
     s->mouth = o.wire.start;
     s->line = wire_start_frame(&o.wire);
     Mat3 frame = quat_to_mat3(s->line);
@@ -368,12 +372,26 @@ static StepCommand stalled(Stepper *s, StepCommand command)
     return command;
 }
 
+// The step begins at the state's pose.
+static void begin(Stepper *s)
+{
+    size_t nodes = (size_t)s->state.node_count;
+    memcpy(s->start_position, s->state.position, nodes * sizeof *s->start_position);
+    memcpy(s->start_orientation, s->state.orientation, nodes * sizeof *s->start_orientation);
+    memset(s->linearised, 0, 6 * nodes * sizeof *s->linearised);
+    memset(s->seen, 0, 6 * nodes * sizeof *s->seen);
+    s->is_iterate = s->overshoots = s->blocked = false;
+    s->slips = 0;
+    s->energy_before = -1;
+    s->mouth_ahead = s->command.advance;
+}
+
 void step_feed(Stepper *s, StepCommand command)
 {
+    s->wall_force_max = s->report.wall_force_max;
+    s->wall_force_sum = s->report.wall_force_sum;
     s->report = (StepReport){0};
     s->has_failed = false;
-    s->is_iterate = s->overshoots = s->blocked = false;
-    s->energy_before = -1;
     if (!s->has_sheath || !isfinite(command.advance) || !isfinite(command.twist))
         command = (StepCommand){0};
     double inserted = s->state.inserted + command.advance, total = s->wire.total_length;
@@ -394,13 +412,8 @@ void step_feed(Stepper *s, StepCommand command)
     for (int i = s->first_free - 1; i >= held; i--)
         let_go(s, i);
     s->first_free = held;
-    size_t nodes = (size_t)s->state.node_count;
-    memcpy(s->start_position, s->state.position, nodes * sizeof *s->start_position);
-    memcpy(s->start_orientation, s->state.orientation, nodes * sizeof *s->start_orientation);
-    memset(s->linearised, 0, 6 * nodes * sizeof *s->linearised);
-    memset(s->seen, 0, 6 * nodes * sizeof *s->seen);
+    begin(s);
 }
-
 void step_detect(Stepper *s) { stepper_detect(s); }
 
 void step_assemble(Stepper *s) { stepper_assemble(s); }
@@ -458,15 +471,58 @@ static double largest_turn(const Stepper *s)
     return sqrt(largest);
 }
 
+// Where a border of the rest shape is at the mouth, straightening takes more on one side of it than on the other, and the wire may come to rest with the border
+// there. Is that force another one where the solution has the border than where it was taken? Then it is taken there, or first between the two.
+static bool misjudges_border(Stepper *s)
+{
+    int i = s->first_free - 1;
+    if (i < 0 || i + 1 >= s->state.node_count || s->has_failed)
+        return false;
+    const BeamRest *rest = &s->beam.rest;
+    double start = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]), width = sheath_border_share * rest->length[i];
+    double taken = start + s->mouth_ahead, ends = start + s->u[6 * (size_t)i];
+    double there = sheath_straightening(rest, i, ends), linear = sheath_straightening(rest, i, taken) - s->mouth_element.border * (ends - taken);
+    if (fabs(there - linear) < BORDER_FORCE * fmax(there, sheath_straightening(rest, i, taken)) + 1e-9)
+        return false;
+    bool crosses = fmin(taken, ends) < 0 && fmax(taken, ends) > 0, is_within = fabs(ends) <= 0.5 * width;
+    s->mouth_ahead = (crosses && !is_within ? 0 : ends) - start;
+    return true;
+}
+
+// The hand holds the tool up to its limit; beyond, the tool moves less than the hand, under that force.
+static bool misjudges_grip(Stepper *s)
+{
+    if (s->hand_limit == 0 || s->has_failed)
+        return false;
+    int was = s->slips;
+    double force = stepper_reaction(s, 0);
+    if (was == 0 && fabs(force) > s->hand_limit)
+        s->slips = force > 0 ? 1 : -1;
+    else if (was != 0 && was * (s->u[0] - stepper_wanted(s)) > 0)
+        s->slips = 0;
+    return s->slips != was;
+}
+
+// What the hand and the mouth do follows from the solution.
+static void solve_driven(Stepper *s)
+{
+    solve(s);
+    for (int i = 0; i < DRIVEN_TRIES && (misjudges_border(s) || misjudges_grip(s)); i++) {
+        stepper_assemble(s);
+        step_factor(s);
+        solve(s);
+    }
+}
+
 // A wire that springs goes further than anybody looked: look that far, and solve again.
 static void solve_contained(Stepper *s)
 {
-    solve(s);
+    solve_driven(s);
     for (int i = 0; i < 2 && !s->has_failed && stepper_escapes(s); i++) {
         s->knows_motion = true;
         stepper_detect(s);
         s->knows_motion = false;
-        solve(s);
+        solve_driven(s);
     }
     s->turn = s->has_failed ? 0 : largest_turn(s);
 }
@@ -581,7 +637,24 @@ static void copy_iterate(Stepper *s, bool back)
         memcpy(back ? live[i] : kept[i], back ? kept[i] : live[i], size[i]);
 }
 
-static double largest_part(const Stepper *s) { return s->turn > TURN_MAX ? TURN_MAX / s->turn : 1; }
+// The part of the way to a displacement `to` at which one of `from` reaches `most`.
+static double part_until(double from, double to, double most)
+{
+    if (fabs(to) <= most)
+        return 1;
+    return fmax(0, fmin(1, ((to > 0 ? most : -most) - from) / (to - from)));
+}
+
+// No element turns by more than TURN_MAX, and no more of the tool springs through the mouth than one element describes.
+static double largest_part(const Stepper *s)
+{
+    double part = s->turn > TURN_MAX ? TURN_MAX / s->turn : 1;
+    int i = s->first_free - 1;
+    if (i < 0 || i + 1 >= s->state.node_count)
+        return part;
+    size_t k = 6 * (size_t)i;
+    return fmin(part, part_until(s->linearised[k], s->u[k], fabs(s->command.advance) + MOUTH_TRAVEL * s->wire.length[i]));
+}
 
 // Does the solution go back to where the iterate came from? Over an edge of the wall two linearisations each send a tip to the other's place for ever:
 // the answer lies between.
@@ -638,9 +711,39 @@ static double follow(Stepper *s, bool halfway)
     return 0;
 }
 
+static void solve_system(Stepper *s)
+{
+    stepper_detect(s);
+    stepper_assemble(s);
+    step_factor(s);
+    solve_contained(s);
+}
+
+// The length of the mouth's element has no sign: the first free node must not come to lie behind it. Where the solution has it there, the sheath holds it from
+// the step's start on.
+static void take_back(Stepper *s)
+{
+    while (s->has_sheath && !s->has_failed && s->first_free < s->state.node_count) {
+        int node = s->first_free;
+        const double *u = s->u + 6 * (size_t)node;
+        double ends = vec3_dot(vec3_sub(vec3_add(s->start_position[node], vec3(u[0], u[1], u[2])), s->mouth), s->axis[0]);
+        if (ends >= TAKE_BACK * s->wire.length[node - 1])
+            return;
+        size_t nodes = (size_t)s->state.node_count;
+        memcpy(s->state.position, s->start_position, nodes * sizeof *s->start_position);
+        memcpy(s->state.orientation, s->start_orientation, nodes * sizeof *s->start_orientation);
+        hold(s, node);
+        stepper_forget(s, node);
+        s->first_free++;
+        begin(s);
+        solve_system(s);
+    }
+}
+
 void step_contact(Stepper *s)
 {
     solve_contained(s);
+    take_back(s);
     for (int iteration = 1; iteration < 2 * s->newton_max && !s->has_failed; iteration++) {
         bool turns = s->turn > (s->report.active > 0 ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION);
         s->overshoots = stepper_overshoot(s) > OVERSHOOT;
@@ -653,10 +756,8 @@ void step_contact(Stepper *s)
         }
         stepper_use_clearance(s);
         s->is_iterate = true;
-        stepper_detect(s);
-        stepper_assemble(s);
-        step_factor(s);
-        solve_contained(s);
+        solve_system(s);
+        take_back(s);
         s->report.newton = iteration;
         s->overshoots = true;
     }
@@ -712,11 +813,29 @@ static void report_forces(Stepper *s)
     }
 }
 
+// A motion that was cut short has not had the forces of the whole one: the hand feels the strain that there is, and the wall has come as far as the motion.
+static void report_cut_forces(Stepper *s, double part)
+{
+    s->report.flags |= STEP_LIMITED;
+    s->report.wall_force_max = s->wall_force_max + part * (s->report.wall_force_max - s->wall_force_max);
+    s->report.wall_force_sum = s->wall_force_sum + part * (s->report.wall_force_sum - s->wall_force_sum);
+    if (!s->has_sheath)
+        return;
+    double force = stepper_strain_force(s), most = s->hand_limit > 0 ? s->hand_limit : HUGE_VAL;
+    s->report.proximal_force = fmax(-most, fmin(most, force));
+}
+
 // What the hand has moved in fact. What a cut motion has left of an advance is owed, up to OWED_MAX.
 static void count_command(Stepper *s)
 {
     s->state.inserted += s->command.advance;
     s->state.twist += s->command.twist;
+    if (s->slips) {
+        double actual = s->wire.total_length + stepper_sheath_coordinate(s, 0);
+        s->report.flags |= STEP_HAND_SLIPS;
+        s->report.slipped = s->state.inserted - actual;
+        s->state.inserted = actual;
+    }
     if (!s->has_sheath || !(s->report.flags & STEP_LIMITED))
         return;
     double actual = s->wire.total_length + stepper_sheath_coordinate(s, 0);
@@ -729,8 +848,9 @@ void step_correct(Stepper *s)
     s->state.time += s->dt;
     if (!s->has_failed) {
         report_forces(s);
-        if (s->blocked || follow(s, false) < 1)
-            s->report.flags |= STEP_LIMITED;
+        double part = s->blocked ? 0 : follow(s, false);
+        if (part < 1)
+            report_cut_forces(s, part);
         set_velocities(s);
         count_command(s);
     }
@@ -762,47 +882,4 @@ void stepper_node_report(Stepper *s, NodeReport *node)
             node[i].gap = hit.gap - s->wire.radius[i];
     }
     stepper_share_forces(s, node);
-}
-
-double stepper_elastic_energy(const Stepper *s)
-{
-    double energy = 0;
-    int held = count_held(s, 0);
-    for (int i = 0; i < s->wire.element_count; i++) {
-        const BeamRest *r = &s->beam.rest;
-        const WireState *w = &s->state;
-        double k0 = r->curvature[i];
-        if (i + 1 < held) {
-            double strain = stepper_sheath_coordinate(s, i + 1) - stepper_sheath_coordinate(s, i) - r->length[i];
-            Quat p = quat_mul(quat_conjugate(w->orientation[i]), w->orientation[i + 1]);
-            double twist = 2 * atan2(p.x, p.w);
-            energy += 0.5 * (r->axial[i] * strain * strain + r->twist[i] * twist * twist + r->bending[i] * k0 * k0 * r->length[i]);
-        } else if (i + 1 == held) {
-            SheathElement e;
-            double coordinate = stepper_sheath_coordinate(s, i);
-            sheath_element(r, i, s->mouth, s->axis[0], coordinate, w->orientation[i], w->position[i + 1], w->orientation[i + 1],
-                           0, &e);
-            energy += e.energy;
-        } else {
-            BeamInput in = {.x1 = w->position[i], .x2 = w->position[i + 1], .q1 = w->orientation[i], .q2 = w->orientation[i + 1],
-                            .length = r->length[i], .extend = r->extend[i], .axial = r->axial[i], .near = r->near[i], .far = r->far[i],
-                            .twist = r->twist[i], .half_w = r->half_w[i], .half_y = r->half_y[i], .half_z = r->half_z[i]};
-            BeamOutput out;
-            beam_element(&in, &out);
-            energy += out.energy;
-        }
-    }
-    return energy;
-}
-
-double stepper_kinetic_energy(const Stepper *s)
-{
-    double twice = 0;
-    for (int i = 0; i < s->state.node_count; i++) {
-        Vec3 spin = s->state.spin[i], axis = quat_rotate(s->state.orientation[i], vec3(1, 0, 0));
-        double about = vec3_dot(spin, axis);
-        twice += s->wire.mass[i] * vec3_norm2(s->state.velocity[i]) + s->wire.inertia_lateral[i] * vec3_norm2(spin) +
-                 (s->wire.inertia_axial[i] - s->wire.inertia_lateral[i]) * about * about;
-    }
-    return 0.5 * twice;
 }

@@ -1,4 +1,4 @@
-// One implicit Euler step, in the stages in which the simulator calls and times them (sim/simulator.c reads like the paper):
+// One implicit Euler step (first order in dt), in the stages in which the simulator calls and times them (sim/simulator.c reads like the paper):
 //   step_feed      take the command: advance and rotation of the driven node become this step's prescribed displacement
 //   step_detect    candidates and gaps at x_n from the vessel
 //   step_assemble  (M/h^2 + D/h + K) u = M v/h + f(x_n) + ..., with tension and curvature terms, constraints as unit rows
@@ -29,6 +29,7 @@ enum {
     STEP_LIMITED = 128,          // the motion was cut, later steps complete it: an element would have turned by more than 0.3 rad, the tool would have
                                  // gone through the wall, or the hand would have squeezed it by more than 3 % of its length
     STEP_MODEL_DISAGREES = 256,  // two parts of the vessel's model contradict each other about the wall at a point; it is not thrown
+    STEP_HAND_SLIPS = 512,       // the tool asked for more force than the hand holds: the hand slid along it
 };
 
 typedef struct StepReport {
@@ -42,6 +43,7 @@ typedef struct StepReport {
     double proximal_torque;      // [N mm]
     double wall_force_max;       // [N] largest contact force
     double wall_force_sum;       // [N] sum of magnitudes
+    double slipped;              // [mm] that the hand moved further than the tool
     int newton;                  // further linearisations of this step, 0 in a quiet one
 } StepReport;
 
@@ -89,5 +91,18 @@ typedef struct NodeReport {
 void stepper_node_report(Stepper *stepper, NodeReport *node);
 double stepper_elastic_energy(const Stepper *stepper);    // [mJ]
 double stepper_kinetic_energy(const Stepper *stepper);    // [mJ]
+
+// What a state holds, and what the last step's motion has given to it or taken from it [mJ]. Between two steps
+//   elastic + kinetic grow by hand + load + wall - friction - damping - numerical.
+// `numerical` is what is left: implicit Euler takes energy from all that vibrates. Where it is negative the step has made energy.
+typedef struct StepEnergy {
+    double elastic, kinetic;     // of the state
+    double hand;                 // work of push and torque
+    double load;                 // work of gravity and of a rig's loads
+    double wall;                 // work of the wall's pressure: 0 but where a point was outside
+    double friction, damping;    // taken by friction, by Rayleigh damping
+} StepEnergy;
+// Of the step that step_correct() has ended. Costs about as much as an assembly.
+StepEnergy stepper_energy(Stepper *stepper);
 
 #endif

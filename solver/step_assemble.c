@@ -98,7 +98,7 @@ static void sheath_nodes(Stepper *s, double scale, double inertia)
 static void mouth_element(Stepper *s, double scale)
 {
     int i = s->first_free - 1;
-    double ahead = s->command.advance - s->linearised[6 * (size_t)i], column[12];
+    double ahead = s->mouth_ahead - s->linearised[6 * (size_t)i], column[12];
     SheathElement *e = &s->mouth_element;
     sheath_element(&s->beam.rest, i, s->mouth, s->axis[0], stepper_sheath_coordinate(s, i), s->state.orientation[i], s->state.position[i + 1],
                    s->state.orientation[i + 1], ahead, e);
@@ -129,24 +129,35 @@ static void mouth_element(Stepper *s, double scale)
         }
 }
 
-static void add_load(Stepper *s, int node, double weight, const WireLoad *load)
+bool stepper_load(const Stepper *s, const LoadPlace *place, int end, double time, Vec3 *force, Vec3 *moment)
 {
+    const WireLoad *load = &place->load;
+    double weight = end ? place->weight : 1 - place->weight, part = weight * (load->ramp > time ? time / load->ramp : 1);
     if (weight == 0)
-        return;
-    Vec3 force = load->force, moment = load->moment;
+        return false;
+    *force = vec3_scale(load->force, part);
+    *moment = vec3_scale(load->moment, part);
     if (load->follower) {
-        Quat turn = quat_mul(s->state.orientation[node], quat_conjugate(s->line));
-        force = quat_rotate(turn, force);
-        moment = quat_rotate(turn, moment);
+        Quat turn = quat_mul(s->state.orientation[place->node + end], quat_conjugate(s->line));
+        *force = quat_rotate(turn, *force);
+        *moment = quat_rotate(turn, *moment);
     }
-    double time = s->state.time + s->dt, *b = s->b + 6 * (size_t)node;
-    double part = weight * (load->ramp > time ? time / load->ramp : 1);
+    return true;
+}
+
+static void add_load(Stepper *s, const LoadPlace *place, int end)
+{
+    int node = place->node + end;
+    double *b = s->b + 6 * (size_t)node;
+    Vec3 force, moment;
+    if (!stepper_load(s, place, end, s->state.time + s->dt, &force, &moment))
+        return;
     if (node < s->first_free) {
-        b[0] += part * vec3_dot(force, s->axis[0]);
-        b[3] += part * vec3_dot(moment, s->axis[0]);
+        b[0] += vec3_dot(force, s->axis[0]);
+        b[3] += vec3_dot(moment, s->axis[0]);
     } else {
-        add_vec(b, vec3_scale(force, part));
-        add_vec(b + 3, vec3_scale(moment, part));
+        add_vec(b, force);
+        add_vec(b + 3, moment);
     }
 }
 
@@ -176,15 +187,23 @@ static void prescribe(Stepper *s, int node, int dof, double value)
     b[dof] = value;
 }
 
+double stepper_wanted(const Stepper *s)
+{
+    // to where the command says, whatever has been lost to rounding before
+    double coordinate = s->state.inserted + s->command.advance - s->wire.total_length;
+    return coordinate - vec3_dot(vec3_sub(s->start_position[0], s->mouth), s->axis[0]);
+}
+
 static void constraints(Stepper *s)
 {
     memcpy(s->grip_diag, s->chain.diag, sizeof s->grip_diag);
     memcpy(s->grip_b, s->b, sizeof s->grip_b);
     memcpy(s->grip_lower, s->chain.lower, sizeof s->grip_lower);
     if (s->has_sheath) {
-        // to where the command says, whatever has been lost to rounding before
-        double coordinate = s->state.inserted + s->command.advance - s->wire.total_length;
-        prescribe(s, 0, 0, coordinate - vec3_dot(vec3_sub(s->start_position[0], s->mouth), s->axis[0]));
+        if (s->slips)
+            s->b[0] += s->slips * s->hand_limit;
+        else
+            prescribe(s, 0, 0, stepper_wanted(s));
         prescribe(s, 0, 3, s->command.twist);
     }
     for (int i = s->first_free; i < s->chain.count; i++)
@@ -219,12 +238,56 @@ void stepper_assemble(Stepper *s)
             s->b[k] += s->product[k];
     }
     for (int i = 0; i < s->load_count; i++) {
-        const LoadPlace *p = &s->load[i];
-        add_load(s, p->node, 1 - p->weight, &p->load);
-        if (p->weight > 0)
-            add_load(s, p->node + 1, p->weight, &p->load);
+        add_load(s, &s->load[i], 0);
+        add_load(s, &s->load[i], 1);
     }
     constraints(s);
+}
+
+double stepper_stiffness_damping(Stepper *s)
+{
+    double rate = s->damping_stiffness / s->dt, work = 0, column[12];
+    const double *u = s->linearised;
+    int first = s->first_free, last = s->state.node_count - 1;
+    if (rate == 0)
+        return 0;
+    if (first < last) {
+        load_pose(s->state.position, s->state.orientation, first, last + 1, &s->beam.pose);
+        load_pose(s->start_position, s->start_orientation, first, last + 1, &s->start_pose);
+        beam_chain_damp(&s->beam, &s->start_pose, first, last, rate, s->product);
+        for (int k = 6 * first; k < 6 * (last + 1); k++)
+            work -= s->product[k] * u[k];
+    }
+    for (int i = 0; i + 1 < first; i++) {
+        const double *a = u + 6 * (size_t)i, *b = a + 6;
+        work += rate * (s->beam.rest.axial[i] * (b[0] - a[0]) * (b[0] - a[0]) + s->beam.rest.twist[i] * (b[3] - a[3]) * (b[3] - a[3]));
+    }
+    if (first == 0 || first > last)
+        return work;
+    // the mouth's element is damped by its displacement: u' K u
+    BeamTangent with, without;
+    sheath_tangent(&s->beam.rest, first - 1, s->axis[0], &s->mouth_element, 1 + rate, &with, column);
+    sheath_tangent(&s->beam.rest, first - 1, s->axis[0], &s->mouth_element, 1, &without, column);
+    const double *a = u + 6 * (size_t)(first - 1), *b = a + 6;
+    for (int r = 0; r < 6; r++)
+        for (int c = 0; c < 6; c++) {
+            int k = 6 * r + c;
+            work += a[r] * (with.k11[k] - without.k11[k]) * a[c] + b[r] * (with.k22[k] - without.k22[k]) * b[c] +
+                    2 * b[r] * (with.k21[k] - without.k21[k]) * a[c];
+        }
+    return work;
+}
+
+double stepper_strain_force(const Stepper *s)
+{
+    const WireState *w = &s->state;
+    const BeamRest *rest = &s->beam.rest;
+    double coordinate = stepper_sheath_coordinate(s, 0);
+    if (s->first_free > 1)
+        return -rest->axial[0] * (stepper_sheath_coordinate(s, 1) - coordinate - rest->length[0]);
+    SheathElement e;
+    sheath_element(rest, 0, s->mouth, s->axis[0], coordinate, w->orientation[0], w->position[1], w->orientation[1], 0, &e);
+    return e.axial_gradient;
 }
 
 double stepper_reaction(const Stepper *s, int dof)

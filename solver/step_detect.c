@@ -576,6 +576,26 @@ void stepper_keep_forces(Stepper *s)
     }
 }
 
+void stepper_wall_work(const Stepper *s, double *wall, double *friction)
+{
+    *wall = *friction = 0;
+    int nodes = s->state.node_count;
+    for (int k = 0; k < s->set.count; k++) {
+        const ContactPoint *c = &s->set.point[k];
+        int point = s->candidate[k];
+        bool leans = point >= nodes && at_mouth(s, s->slot[point - nodes].element);
+        Vec3 force = c->force, moved = done_at(s, point, vec3_scale(c->normal, -radius_of(s, point)));
+        if (leans) {
+            const SlotPlace *p = &s->slot_place[point - nodes];
+            force = vec3_scale(force, 1 / p->weight);
+            moved = vec3_add_scaled(moved, (1 - p->weight) * s->linearised[6 * (size_t)s->slot[point - nodes].element], p->tangent);
+        }
+        double pressure = vec3_dot(force, c->normal) * vec3_dot(moved, c->normal);
+        *wall += pressure;
+        *friction += pressure - vec3_dot(force, moved);
+    }
+}
+
 // In the order of the chain: a node, the slots behind it, the next node.
 static void collect(Stepper *s, const int *candidate, int node_count, int slot_count)
 {

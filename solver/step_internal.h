@@ -34,6 +34,7 @@ struct Stepper {
     Vec3 gravity;
     double damping_mass, damping_stiffness, dt;
     bool has_sheath;
+    double hand_limit;       // [N] 0: none
     Vec3 mouth;              // sheath's mouth, or the rig's start
     Quat line;               // the frame there
     Vec3 axis[3];            // its columns: direction, e2, e3
@@ -90,12 +91,15 @@ struct Stepper {
     // of this step
     StepCommand command;
     StepReport report;
+    int slips;               // the hand: 0 grips, 1 slides along a tool that it pushes, -1 that it pulls
+    double mouth_ahead;      // [mm] by how much the node behind the mouth is taken to move in this step
     double turn;             // [rad] largest of the solution against the iterate
     bool overshoots;         // the solution goes through the wall, or may
     bool blocked;            // no part of it could be followed
     double energy_before;    // [mJ] at x_n, elastic and kinetic; < 0: not asked for yet
     double depth;            // [mm] outside the wall at the iterate
     bool knows_motion;       // u is an answer to this iterate: detection looks as far as it goes
+    double wall_force_max, wall_force_sum;   // [N] of the step before
     bool has_failed;
     bool is_iterate;         // linearised about something else than x_n
 };
@@ -120,8 +124,18 @@ void stepper_forget(Stepper *s, int node);
 // Adds the slots' forces to the nodes between which they are.
 void stepper_share_forces(const Stepper *s, NodeReport *node);
 void stepper_assemble(Stepper *s);
+// What a load puts on its node (end 0) or the one after it (1) at this time, in space; false: nothing.
+bool stepper_load(const Stepper *s, const LoadPlace *place, int end, double time, Vec3 *force, Vec3 *moment);
+// [mJ] that stiffness damping took from the motion of this step …
+double stepper_stiffness_damping(Stepper *s);
+// … and what the wall's pressure gave and its friction took.
+void stepper_wall_work(const Stepper *s, double *wall, double *friction);
 double stepper_sheath_coordinate(const Stepper *s, int node);
+// [mm] displacement of node 0 in this step that the command asks for.
+double stepper_wanted(const Stepper *s);
 // [N] reaction on node 0 along (index 0 to 2) and about (3 to 5) the axes of its unknowns.
 double stepper_reaction(const Stepper *s, int dof);
+// [N] push that the tool's strain at the hand asks for.
+double stepper_strain_force(const Stepper *s);
 
 #endif

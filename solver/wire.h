@@ -51,6 +51,7 @@ typedef struct WireOptions {
     Vec3 direction;          // unit
     Vec3 normal;             // e2 at the start; zero: vec3_normal_to(direction)
     double inserted;         // [mm] sheath: length beyond the mouth at t = 0
+    double hand_limit;       // [N] sheath: above this push or pull the hand slips along the tool; 0 (default): it never does
     int fix_count;
     const WireFix *fix;
     int load_count;

@@ -1,0 +1,92 @@
+// Energies of a state, and what a step's motion has done to them: each force of the step's end times the motion, as implicit Euler has it.
+#include "solver/step_internal.h"
+
+static double element_energy(const Stepper *s, int i, int held)
+{
+    const BeamRest *r = &s->beam.rest;
+    const WireState *w = &s->state;
+    if (i + 1 < held) {
+        double k0 = r->curvature[i], strain = stepper_sheath_coordinate(s, i + 1) - stepper_sheath_coordinate(s, i) - r->length[i];
+        Quat p = quat_mul(quat_conjugate(w->orientation[i]), w->orientation[i + 1]);
+        double twist = 2 * atan2(p.x, p.w);
+        return 0.5 * (r->axial[i] * strain * strain + r->twist[i] * twist * twist + r->bending[i] * k0 * k0 * r->length[i]);
+    }
+    if (i + 1 == held) {
+        SheathElement e;
+        sheath_element(r, i, s->mouth, s->axis[0], stepper_sheath_coordinate(s, i), w->orientation[i], w->position[i + 1], w->orientation[i + 1], 0, &e);
+        return e.energy;
+    }
+    BeamInput in = {.x1 = w->position[i], .x2 = w->position[i + 1], .q1 = w->orientation[i], .q2 = w->orientation[i + 1],
+                    .length = r->length[i], .extend = r->extend[i], .axial = r->axial[i], .near = r->near[i], .far = r->far[i],
+                    .twist = r->twist[i], .half_w = r->half_w[i], .half_y = r->half_y[i], .half_z = r->half_z[i]};
+    BeamOutput out;
+    beam_element(&in, &out);
+    return out.energy;
+}
+
+double stepper_elastic_energy(const Stepper *s)
+{
+    double energy = 0;
+    for (int i = 0; i < s->wire.element_count; i++)
+        energy += element_energy(s, i, s->first_free);
+    return energy;
+}
+
+double stepper_kinetic_energy(const Stepper *s)
+{
+    double twice = 0;
+    for (int i = 0; i < s->state.node_count; i++) {
+        Vec3 spin = s->state.spin[i], axis = quat_rotate(s->state.orientation[i], vec3(1, 0, 0));
+        double about = vec3_dot(spin, axis);
+        twice += s->wire.mass[i] * vec3_norm2(s->state.velocity[i]) + s->wire.inertia_lateral[i] * vec3_norm2(spin) +
+                 (s->wire.inertia_axial[i] - s->wire.inertia_lateral[i]) * about * about;
+    }
+    return 0.5 * twice;
+}
+
+// What a node has done in this step, translation or turn, in space.
+static Vec3 done_in_space(const Stepper *s, int node, int from)
+{
+    const double *u = s->linearised + 6 * (size_t)node + from;
+    return node < s->first_free ? vec3_scale(s->axis[0], u[0]) : vec3(u[0], u[1], u[2]);
+}
+
+static double of_loads(const Stepper *s)
+{
+    double work = 0;
+    for (int i = 0; i < s->state.node_count; i++)
+        work += s->wire.mass[i] * vec3_dot(s->gravity, done_in_space(s, i, 0));
+    for (int k = 0; k < s->load_count; k++)
+        for (int e = 0; e < 2; e++) {
+            Vec3 force, moment;
+            int node = s->load[k].node + e;
+            if (stepper_load(s, &s->load[k], e, s->state.time, &force, &moment))
+                work += vec3_dot(force, done_in_space(s, node, 0)) + vec3_dot(moment, done_in_space(s, node, 3));
+        }
+    return work;
+}
+
+static double of_mass_damping(const Stepper *s)
+{
+    double sum = 0;
+    for (int i = 0; i < s->state.node_count; i++) {
+        Vec3 move = done_in_space(s, i, 0), turn = done_in_space(s, i, 3), axis = quat_rotate(s->state.orientation[i], vec3(1, 0, 0));
+        double about = vec3_dot(turn, axis);
+        sum += s->wire.mass[i] * vec3_norm2(move) + s->wire.inertia_lateral[i] * vec3_norm2(turn) +
+               (s->wire.inertia_axial[i] - s->wire.inertia_lateral[i]) * about * about;
+    }
+    return s->damping_mass / s->dt * sum;
+}
+
+StepEnergy stepper_energy(Stepper *s)
+{
+    StepEnergy e = {.elastic = stepper_elastic_energy(s), .kinetic = stepper_kinetic_energy(s)};
+    if (s->has_failed)
+        return e;
+    if (s->has_sheath)
+        e.hand = s->report.proximal_force * s->linearised[0] + s->report.proximal_torque * s->linearised[3];
+    e.load = of_loads(s);
+    e.damping = of_mass_damping(s) + stepper_stiffness_damping(s);
+    stepper_wall_work(s, &e.wall, &e.friction);
+    return e;
+}
