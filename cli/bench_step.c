@@ -213,9 +213,9 @@ static void call_factor_solve(void *context)
 static double time_factor_solve(void)
 {
     enum { NODES = 201 };
-    ChainSystem s = {.factor = block_factor_create(NODES), .b = calloc(12 * NODES, sizeof(double))};
+    ChainSystem s = {.factor = block_factor_create(NODES, 6), .b = calloc(12 * NODES, sizeof(double))};
     double time = 0;
-    if (block_chain_create(&s.chain, NODES) && s.factor && s.b) {
+    if (block_chain_create(&s.chain, NODES, 6) && s.factor && s.b) {
         s.x = s.b + 6 * NODES;
         for (int i = 0; i < NODES; i++)
             for (int k = 0; k < 36; k++) {
@@ -256,7 +256,7 @@ static void call_query(void *context)
 // The free nodes nearest to the wall at a crowded step, along the wire; moved to and fro by that step's motion.
 void bench_detection(const Scene *scene, const Vessel *vessel, int64_t step, double *detection, int *points, Faults *faults)
 {
-    Simulator *simulator = simulator_create(scene, vessel, faults);
+    Simulator *simulator = scene_has_one_tool(scene, "bench", faults) ? simulator_create(scene, vessel, faults) : NULL;
     if (!simulator)
         return;
     int nodes = simulator_state(simulator)->node_count, cursor = 0;

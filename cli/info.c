@@ -234,6 +234,20 @@ static bool describe_surface(cJSON *object, const char *path, Faults *faults)
     return good;
 }
 
+static void add_tools(cJSON *object, const Scene *scene)
+{
+    cJSON *list = cJSON_AddArrayToObject(object, "tools");
+    for (int k = 0; k < scene->tool_count; k++) {
+        WireOptions wire = scene_tool_wire(scene, k);
+        cJSON *tool = cJSON_CreateObject();
+        cJSON_AddStringToObject(tool, "name", scene->tool[k].name);
+        cJSON_AddStringToObject(tool, "kind", tool_kind_name[scene->tool[k].kind]);
+        cJSON_AddNumberToObject(tool, "length_mm", wire_length(&wire));
+        cJSON_AddNumberToObject(tool, "inserted_mm", wire.inserted);
+        cJSON_AddItemToArray(list, tool);
+    }
+}
+
 static bool describe_scene(cJSON *object, const char *path, Faults *faults)
 {
     static const char *const sources[] = {"model", "shape", "tube", "plane", "mesh", "none"};
@@ -251,6 +265,8 @@ static bool describe_scene(cJSON *object, const char *path, Faults *faults)
     if (scene->source == SOURCE_SHAPE)
         cJSON_AddStringToObject(object, "shape", scene->shape_name);
     cJSON_AddNumberToObject(object, "friction", scene->friction);
+    if (scene->tool_count > 1)
+        add_tools(object, scene);
     cJSON_AddNumberToObject(object, "elements", scene->wire.elements);
     cJSON_AddNumberToObject(object, "sections", scene->wire.section_count);
     cJSON_AddNumberToObject(object, "length_mm", length);

@@ -32,7 +32,7 @@ static bool take_over(LiveSession *session, const LiveSessionOptions *options, F
 bool live_session_open(LiveSession *session, const Scene *scene, const OpenVessel *open, const LiveSessionOptions *options, Faults *faults)
 {
     *session = (LiveSession){.scene = scene};
-    session->simulator = simulator_create(scene, open->vessel, faults);
+    session->simulator = scene_has_one_tool(scene, "a session", faults) ? simulator_create(scene, open->vessel, faults) : NULL;
     session->lesson = session->simulator ? lesson_create(session->simulator, open->tree) : NULL;
     if (session->simulator && !session->lesson)
         faults_add(faults, scene->path, 0, 0, "no memory for a session");

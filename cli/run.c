@@ -140,7 +140,8 @@ static int parse_options(int argc, char **argv, RunOptions *options)
 static Scene *prepare_scene(const RunOptions *options, Faults *faults)
 {
     Scene *scene = scene_load(options->scene, faults);
-    Script *script = options->script ? script_load(options->script, faults) : NULL;
+    ToolNames tools = scene ? scene_tool_names(scene) : (ToolNames){0};
+    Script *script = options->script ? script_load_tools(options->script, scene ? &tools : NULL, faults) : NULL;
     int kind = -1;
     for (int i = 0; options->contact && i < CONTACT_COUNT; i++)
         if (!strcmp(options->contact, contact_name[i]))
@@ -169,6 +170,9 @@ static Scene *prepare_scene(const RunOptions *options, Faults *faults)
         scene->contact = (ContactKind)kind;
     if (scene && !scene->script && options->duration_s < 0 && options->settle_s < 0)
         faults_add(faults, options->scene, 0, 0, "has no script; give --script F, --duration-s S or --settle-s S");
+    const char *single = options->record ? "--record" : options->score ? "--score" : options->device_count ? "--device" : options->picture ? "--picture" : NULL;
+    if (scene && single)
+        scene_has_one_tool(scene, single, faults);
     if (faults->count > 0) {
         scene_free(scene);
         return NULL;
@@ -362,7 +366,7 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
     Simulator *simulator = simulator_create(scene, open->vessel, faults);
     if (!simulator)
         return EXIT_BAD_INPUT;
-    int nodes = simulator_state(simulator)->node_count, code = EXIT_BAD_INPUT;
+    int nodes = stepper_node_capacity(simulator_stepper(simulator)), code = EXIT_BAD_INPUT;
     NodeReport *node = calloc((size_t)nodes, sizeof *node);
     RecordingOptions record = recording_default_options();
     record.expected_steps = expected_steps(options, scene);

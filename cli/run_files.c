@@ -51,6 +51,30 @@ static void add_energy(cJSON *summary, const EnergyBalance *e)
     add_numbers(energy, (int)(sizeof value / sizeof *value), energy_name, value);
 }
 
+// Of a scene with several tools: what each hand feels and where each tip is.
+static void add_tools(cJSON *summary, Simulator *simulator)
+{
+    const Scene *scene = simulator_scene(simulator);
+    Stepper *stepper = simulator_stepper(simulator);
+    const StepReport *last = simulator_last(simulator);
+    cJSON *tools = cJSON_AddArrayToObject(summary, "tools");
+    for (int k = 0; k < scene->tool_count; k++) {
+        int count = stepper_tool_nodes(stepper, k, NULL);
+        ToolNode *node = calloc((size_t)count, sizeof *node);
+        if (!node)
+            return;
+        stepper_tool_nodes(stepper, k, node);
+        cJSON *tool = cJSON_CreateObject(), *proximal;
+        cJSON_AddStringToObject(tool, "name", scene->tool[k].name);
+        proximal = cJSON_AddObjectToObject(tool, "proximal");
+        add_numbers(proximal, 2, (const char *const[]){"force_n", "torque_n_mm"}, (double[]){last->push[k], last->torque[k]});
+        add_vector(tool, "tip_mm", node[count - 1].position);
+        cJSON_AddNumberToObject(tool, "inserted_mm", stepper_tool_inserted(stepper, k));
+        cJSON_AddItemToArray(tools, tool);
+        free(node);
+    }
+}
+
 static void add_targets(cJSON *summary, const Simulator *simulator)
 {
     const Scene *scene = simulator_scene(simulator);
@@ -125,6 +149,8 @@ char *run_summary_json(Simulator *simulator, const DriveReport *drive, const Nod
     cJSON_AddBoolToObject(summary, "settled", drive->settled);
     snprintf(hash, sizeof hash, "%016" PRIx64, simulator_hash(simulator));
     cJSON_AddStringToObject(summary, "state_hash", hash);
+    if (simulator_scene(simulator)->tool_count > 1)
+        add_tools(summary, simulator);
     add_flags(summary, simulator, drive);
     add_targets(summary, simulator);
     char *text = cJSON_Print(summary);
@@ -132,13 +158,48 @@ char *run_summary_json(Simulator *simulator, const DriveReport *drive, const Nod
     return text;
 }
 
-char *run_final_csv(const Simulator *simulator, const NodeReport *node, size_t *length)
+// Of several tools every tool's own nodes, each where it lies on the shared centreline; what the wall does is said of the chain's nodes, the carriers'.
+static bool write_tools(FILE *stream, Simulator *simulator, const NodeReport *node)
+{
+    const Scene *scene = simulator_scene(simulator);
+    Stepper *stepper = simulator_stepper(simulator);
+    const WireState *state = simulator_state(simulator);
+    fprintf(stream, "tool,node,s_mm,x_mm,y_mm,z_mm,qw,qx,qy,qz,force_x_n,force_y_n,force_z_n,gap_mm,vessel_node,carrier\n");
+    for (int k = 0; k < scene->tool_count; k++) {
+        int count = stepper_tool_nodes(stepper, k, NULL);
+        ToolNode *own = calloc((size_t)count, sizeof *own);
+        if (!own)
+            return false;
+        stepper_tool_nodes(stepper, k, own);
+        for (int i = 0; i < count; i++) {
+            NodeReport wall = {.gap = HUGE_VAL, .vessel_node = -1};
+            for (int c = 0; own[i].carrier == k && c < state->node_count; c++)
+                if (vec3_distance(state->position[c], own[i].position) < 1e-9)
+                    wall = node[c];
+            Quat q = own[i].orientation;
+            Vec3 x = own[i].position, f = wall.force;
+            fprintf(stream, "%s,%d,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%.12g,%d,%s\n", scene->tool[k].name, i, own[i].s, x.x, x.y, x.z,
+                    q.w, q.x, q.y, q.z, f.x, f.y, f.z, wall.gap, wall.vessel_node, own[i].carrier < 0 ? "-" : scene->tool[own[i].carrier].name);
+        }
+        free(own);
+    }
+    return true;
+}
+
+char *run_final_csv(Simulator *simulator, const NodeReport *node, size_t *length)
 {
     const WireState *state = simulator_state(simulator);
     char *text = NULL;
     FILE *stream = open_memstream(&text, length);
     if (!stream)
         return NULL;
+    if (simulator_scene(simulator)->tool_count > 1) {
+        bool whole = write_tools(stream, simulator, node);
+        if (fclose(stream) == 0 && whole)
+            return text;
+        free(text);
+        return NULL;
+    }
     fprintf(stream, "node,s_mm,x_mm,y_mm,z_mm,qw,qx,qy,qz,force_x_n,force_y_n,force_z_n,gap_mm,vessel_node\n");
     for (int i = 0; i < state->node_count; i++) {
         Vec3 x = state->position[i], force = node[i].force;
@@ -170,6 +231,9 @@ void run_print(FILE *out, Simulator *simulator, const DriveReport *drive, const 
             histogram_quantile(&profile->iterations, 0.5), profile->iterations.largest, totals->residual_max);
     fprintf(out, "tip at (%.3f, %.3f, %.3f) mm, %.2f mm inserted%s; push %.4f N (from %.4f to %.4f), torque %.4f N mm\n", tip.x, tip.y, tip.z, state->inserted,
             drive->settled ? ", at rest" : "", last->proximal_force, totals->push_least, totals->push_most, last->proximal_torque);
+    for (int k = 0; scene->tool_count > 1 && k < scene->tool_count; k++)
+        fprintf(out, "tool %s: %.2f mm inserted, push %.4f N, torque %.4f N mm\n", scene->tool[k].name, stepper_tool_inserted(simulator_stepper(simulator), k),
+                last->push[k], last->torque[k]);
     fprintf(out, "%d contacts (at most %d), wall force %.4f N in sum; deepest penetration %.4f mm, %.4f mm at the end\n", last->active,
             totals->contacts_max, last->wall_force_sum, totals->penetration_max, run_final_penetration_mm(node, state->node_count));
     fprintf(out, "of all steps %" PRId64 " took a further linearisation, %" PRId64 " were cut short for the next to complete, %" PRId64

@@ -14,7 +14,7 @@ bool run_left_vessel(const RunTotals *totals);
 // Text of the summary (shared/CONTRACT.md, plus "targets"); the caller frees it. NULL where memory lacks.
 char *run_summary_json(Simulator *simulator, const DriveReport *drive, const NodeReport *node);
 // Text of the final state, one row a node.
-char *run_final_csv(const Simulator *simulator, const NodeReport *node, size_t *length);
+char *run_final_csv(Simulator *simulator, const NodeReport *node, size_t *length);
 void run_print(FILE *out, Simulator *simulator, const DriveReport *drive, const NodeReport *node);
 
 #endif

@@ -1,4 +1,4 @@
-// input: what the hand does, as one command (push, twist) from a script here, or as a port that gamepads (gamepad.h), HID and USB devices (hand.h)
+// input: what the hand does, as one command (push, twist) for each tool from a script here, or as a port that gamepads (gamepad.h), HID and USB devices (hand.h)
 // write by a device map (device_map.h). Uses geom/faults.h only.
 #ifndef SELDINGER_INPUT_INPUT_H
 #define SELDINGER_INPUT_INPUT_H
@@ -13,9 +13,21 @@ typedef struct Command {
     double twist_deg_s;      // right-handed about the direction of advance
 } Command;
 
+enum { TOOLS_MOST = 4, TOOL_NAME_SIZE = 32 };
+
+typedef struct ToolCommands {
+    Command tool[TOOLS_MOST];    // outermost first; a tool that is not named is pinned: 0
+} ToolCommands;
+
+typedef struct ToolNames {   // of the scene that a script is for, outermost first; NULL after the last
+    int count;
+    const char *name[TOOLS_MOST + 1];
+} ToolNames;
+
 typedef struct ScriptRow {
     double t_s;
-    Command command;
+    Command command;                 // of the first tool
+    Command inner[TOOLS_MOST - 1];   // of those within it
 } ScriptRow;
 
 typedef struct Script {      // each row holds from its time until the next; the last row's time ends the script
@@ -28,13 +40,18 @@ enum { SCRIPT_FASTEST_MM_S = 1000, SCRIPT_FASTEST_DEG_S = 36000, SCRIPT_LONGEST_
 // Parses the text of a script: CSV with the header t_s,push_mm_s,twist_deg_s, `#` comments. NULL with faults where it is wrong:
 // wrong header, not a number, times that go backwards, first time negative, |push| > 1000 mm/s, |twist| > 36,000 deg/s, no row.
 Script *script_parse(const char *text, size_t length, const char *file, Faults *faults);
+// For a scene's tools: the header above, which is that of the first tool, or t_s and NAME.push_mm_s with NAME.twist_deg_s for any of them, in any order.
+Script *script_parse_tools(const char *text, size_t length, const char *file, const ToolNames *tools, Faults *faults);
 // Reads the file (at most 64 MiB) and parses it.
 Script *script_load(const char *path, Faults *faults);
+Script *script_load_tools(const char *path, const ToolNames *tools, Faults *faults);
 void script_free(Script *script);
-// One row's rules, for whoever reads rows from elsewhere (a scene's inline script); `before` is the row before it or NULL.
-bool script_check_row(const ScriptRow *row, const ScriptRow *before, const char *file, int line, int column, Faults *faults);
+Command *script_row_command(ScriptRow *row, int tool);
+// One row's rules, for whoever reads rows from elsewhere (a scene's inline script); `before` is the row before it or NULL, `tools` NULL where there is one.
+bool script_check_row(const ScriptRow *row, const ScriptRow *before, const ToolNames *tools, const char *file, int line, int column, Faults *faults);
 double script_duration_s(const Script *script);
-// Command at simulated time t (zero before the first row and after the end). `cursor` remembers the row between calls, start with 0.
-Command script_at(const Script *script, double t_s, int *cursor);
+// Commands at simulated time t (zero before the first row and after the end). `cursor` remembers the row between calls, start with 0.
+ToolCommands script_tools_at(const Script *script, double t_s, int *cursor);
+Command script_at(const Script *script, double t_s, int *cursor);      // the first tool's
 
 #endif

@@ -12,11 +12,7 @@ typedef struct Cursor {
     int line;
 } Cursor;
 
-typedef struct Field {
-    const char *text;
-    size_t length;
-    int column;              // 1-based, for messages
-} Field;
+typedef NumberColumn Field;
 
 bool number_of_text(const char *text, size_t length, double *value)
 {
@@ -84,6 +80,23 @@ static bool next_line(Cursor *cursor, const char **line, const char **end)
     return false;
 }
 
+// A byte-order mark is no part of the header.
+static void skip_mark(Cursor *cursor)
+{
+    if (cursor->end - cursor->at >= 3 && !memcmp(cursor->at, "\xef\xbb\xbf", 3))
+        cursor->at += 3;
+}
+
+int number_table_columns(const char *text, size_t length, NumberColumn *column, int capacity, int *line)
+{
+    Cursor cursor = {.at = text, .end = text + length};
+    const char *start, *end;
+    skip_mark(&cursor);
+    int count = next_line(&cursor, &start, &end) ? split_fields(start, end, column, capacity) : 0;
+    *line = cursor.line;
+    return count;
+}
+
 static bool read_header(Cursor *cursor, int *column_count)
 {
     Field want[NUMBER_TABLE_COLUMNS], got[NUMBER_TABLE_COLUMNS];
@@ -96,12 +109,12 @@ static bool read_header(Cursor *cursor, int *column_count)
     int count = split_fields(line, end, got, NUMBER_TABLE_COLUMNS);
     for (int i = 0; i < *column_count || i < count; i++) {
         if (i < *column_count && i < count && i < NUMBER_TABLE_COLUMNS && got[i].length == want[i].length &&
-            !memcmp(got[i].text, want[i].text, want[i].length))
+            !memcmp(got[i].name, want[i].name, want[i].length))
             continue;
         int column = i < count && i < NUMBER_TABLE_COLUMNS ? got[i].column : (int)(end - line) + 1;
         int shown = i < count && i < NUMBER_TABLE_COLUMNS ? (int)(got[i].length < 40 ? got[i].length : 40) : 0;
         faults_add(cursor->faults, cursor->file, cursor->line, column, "column %d is headed '%.*s'; the header is '%s'", i + 1, shown,
-                   shown ? got[i].text : "", cursor->header);
+                   shown ? got[i].name : "", cursor->header);
         return false;
     }
     return true;
@@ -138,9 +151,7 @@ NumberTable *number_table_parse(const char *text, size_t length, const char *fil
         return NULL;
     }
     const char *line, *end;
-    // a byte-order mark is no part of the header
-    if (length >= 3 && !memcmp(text, "\xef\xbb\xbf", 3))
-        cursor.at += 3;
+    skip_mark(&cursor);
     if (!read_header(&cursor, &table->column_count)) {
         number_table_free(table);
         return NULL;
@@ -155,9 +166,9 @@ NumberTable *number_table_parse(const char *text, size_t length, const char *fil
         }
         bool good = true;
         for (int i = 0; i < count; i++)
-            if (!number_of_text(field[i].text, field[i].length, &row[i])) {
+            if (!number_of_text(field[i].name, field[i].length, &row[i])) {
                 faults_add(faults, file, cursor.line, field[i].column, "'%.*s' is not a number; a finite decimal number such as 1.5 or 2e-3",
-                           (int)(field[i].length < 40 ? field[i].length : 40), field[i].text);
+                           (int)(field[i].length < 40 ? field[i].length : 40), field[i].name);
                 good = false;
             }
         if (good && !append_row(table, &capacity, row, cursor.line)) {

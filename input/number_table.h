@@ -21,6 +21,14 @@ typedef struct NumberTable {
 NumberTable *number_table_parse(const char *text, size_t length, const char *file, const char *header, Faults *faults);
 void number_table_free(NumberTable *table);
 
+typedef struct NumberColumn {    // a field of the header, without the spaces around it
+    const char *name;        // points into the text, `length` bytes
+    size_t length;
+    int column;              // 1-based place in its line
+} NumberColumn;
+// The fields of the header, for whoever accepts more than one: how many there are (`capacity` of them written) and their line; 0 where there is no header.
+int number_table_columns(const char *text, size_t length, NumberColumn *column, int capacity, int *line);
+
 // The whole of text[0, length) as a finite decimal number; no hexadecimal, no nan, no inf, no spaces.
 bool number_of_text(const char *text, size_t length, double *value);
 

@@ -1,14 +1,36 @@
 #include "input/input.h"
 
+#include "input/nearest_name.h"
 #include "input/number_table.h"
 #include "input/text_file.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 static const char header[] = "t_s,push_mm_s,twist_deg_s";
+static const char *const quantity[] = {"push_mm_s", "twist_deg_s", NULL};
 
-bool script_check_row(const ScriptRow *row, const ScriptRow *before, const char *file, int line, int column, Faults *faults)
+// What the columns after t_s are: the tool of each, and which of its two quantities.
+typedef struct Columns {
+    int count;
+    int tool[2 * TOOLS_MOST], quantity[2 * TOOLS_MOST];
+    char header[(TOOL_NAME_SIZE + 16) * 2 * TOOLS_MOST];
+} Columns;
+
+Command *script_row_command(ScriptRow *row, int tool) { return tool == 0 ? &row->command : &row->inner[tool - 1]; }
+
+static void check_speed(double speed, int fastest, const char *name, const char *unit, const ToolNames *tools, int tool, const char *file, int line, int column,
+                        Faults *faults)
+{
+    bool named = tools && tools->count > 1;
+    if (fabs(speed) > fastest)
+        faults_add(faults, file, line, column, "%s%s%s %g is out of range; -%d to %d %s", named ? tools->name[tool] : "", named ? "." : "", name, speed, fastest,
+                   fastest, unit);
+}
+
+bool script_check_row(const ScriptRow *row, const ScriptRow *before, const ToolNames *tools, const char *file, int line, int column, Faults *faults)
 {
     int already = faults->count;
     if (row->t_s < 0)
@@ -17,18 +39,114 @@ bool script_check_row(const ScriptRow *row, const ScriptRow *before, const char 
         faults_add(faults, file, line, column, "t_s %g does not follow %g; times grow from row to row", row->t_s, before->t_s);
     if (row->t_s > SCRIPT_LONGEST_S)
         faults_add(faults, file, line, column, "t_s %g is too late; at most %g s", row->t_s, (double)SCRIPT_LONGEST_S);
-    if (fabs(row->command.push_mm_s) > SCRIPT_FASTEST_MM_S)
-        faults_add(faults, file, line, column, "push_mm_s %g is out of range; -%d to %d mm/s", row->command.push_mm_s, SCRIPT_FASTEST_MM_S,
-                   SCRIPT_FASTEST_MM_S);
-    if (fabs(row->command.twist_deg_s) > SCRIPT_FASTEST_DEG_S)
-        faults_add(faults, file, line, column, "twist_deg_s %g is out of range; -%d to %d deg/s", row->command.twist_deg_s,
-                   SCRIPT_FASTEST_DEG_S, SCRIPT_FASTEST_DEG_S);
+    for (int k = 0; k < (tools ? tools->count : 1); k++) {
+        const Command *command = k == 0 ? &row->command : &row->inner[k - 1];
+        check_speed(command->push_mm_s, SCRIPT_FASTEST_MM_S, quantity[0], "mm/s", tools, k, file, line, column, faults);
+        check_speed(command->twist_deg_s, SCRIPT_FASTEST_DEG_S, quantity[1], "deg/s", tools, k, file, line, column, faults);
+    }
     return faults->count == already;
 }
 
-Script *script_parse(const char *text, size_t length, const char *file, Faults *faults)
+static bool is_word(const char *text, size_t length, const char *word) { return length == strlen(word) && !memcmp(text, word, length); }
+
+static int find_word(const char *text, size_t length, const char *const *words)
 {
-    NumberTable *table = number_table_parse(text, length, file, header, faults);
+    for (int i = 0; words[i]; i++)
+        if (is_word(text, length, words[i]))
+            return i;
+    return -1;
+}
+
+static void fault_unknown_tool(const char *name, const NumberColumn *column, int line, const ToolNames *tools, const char *file, Faults *faults)
+{
+    char all[TOOLS_MOST * (TOOL_NAME_SIZE + 2)];
+    size_t used = 0;
+    int nearest = nearest_name(name, tools->name);
+    for (int i = 0; i < tools->count; i++)
+        used += (size_t)snprintf(all + used, sizeof all - used, "%s%s", i ? ", " : "", tools->name[i]);
+    if (nearest >= 0)
+        faults_add(faults, file, line, column->column, "no tool of the scene is named '%s'; did you mean '%s'?", name, tools->name[nearest]);
+    else
+        faults_add(faults, file, line, column->column, "no tool of the scene is named '%s'; it has: %s", name, all);
+}
+
+// One column that is not t_s: NAME.push_mm_s or NAME.twist_deg_s.
+static bool read_column(const NumberColumn *column, int line, const ToolNames *tools, const char *file, int *tool, int *which, Faults *faults)
+{
+    int shown = (int)(column->length < 80 ? column->length : 80);
+    const char *dot = memchr(column->name, '.', column->length);
+    size_t name_length = dot ? (size_t)(dot - column->name) : 0;
+    *which = dot ? find_word(dot + 1, column->length - name_length - 1, quantity) : -1;
+    if (*which < 0) {
+        const char *example = tools->name[0];
+        if (dot && (*tool = find_word(column->name, name_length, tools->name)) >= 0)
+            example = tools->name[*tool];
+        faults_add(faults, file, line, column->column, "a column is headed '%.*s'; beside named tools each is NAME.push_mm_s or NAME.twist_deg_s, such as '%s.push_mm_s'",
+                   shown, column->name, example);
+        return false;
+    }
+    *tool = find_word(column->name, name_length, tools->name);
+    if (*tool < 0) {
+        char name[80];
+        snprintf(name, sizeof name, "%.*s", (int)(name_length < sizeof name ? name_length : sizeof name - 1), column->name);
+        fault_unknown_tool(name, column, line, tools, file, faults);
+    }
+    return *tool >= 0;
+}
+
+// A header that names tools; all its faults.
+static bool read_columns(const NumberColumn *field, int count, int line, const ToolNames *tools, const char *file, Columns *columns, Faults *faults)
+{
+    int before = faults->count, place[TOOLS_MOST][2] = {{0}};
+    size_t used = (size_t)snprintf(columns->header, sizeof columns->header, "t_s");
+    if (count > NUMBER_TABLE_COLUMNS) {
+        faults_add(faults, file, line, 1, "has %d columns; t_s and two for each of the scene's %d tools", count, tools->count);
+        return false;
+    }
+    if (!is_word(field[0].name, field[0].length, "t_s"))
+        faults_add(faults, file, line, field[0].column, "column 1 is headed '%.*s'; it is 't_s'", (int)(field[0].length < 40 ? field[0].length : 40), field[0].name);
+    for (int i = 1; i < count; i++) {
+        int tool, which;
+        if (!read_column(&field[i], line, tools, file, &tool, &which, faults))
+            continue;
+        if (place[tool][which]) {
+            faults_add(faults, file, line, field[i].column, "'%s.%s' stands a second time; once", tools->name[tool], quantity[which]);
+            continue;
+        }
+        place[tool][which] = field[i].column;
+        columns->tool[columns->count] = tool;
+        columns->quantity[columns->count++] = which;
+        used += (size_t)snprintf(columns->header + used, sizeof columns->header - used, ",%s.%s", tools->name[tool], quantity[which]);
+    }
+    for (int k = 0; k < tools->count; k++)
+        for (int q = 0; q < 2; q++)
+            if (place[k][q] && !place[k][1 - q])
+                faults_add(faults, file, line, place[k][q], "'%s.%s' lacks its other half; '%s.%s' is a column too", tools->name[k], quantity[q], tools->name[k],
+                           quantity[1 - q]);
+    return faults->count == before;
+}
+
+// The columns of a text; those of the first tool alone where no name stands in the header.
+static bool find_columns(const char *text, size_t length, const char *file, const ToolNames *tools, Columns *columns, Faults *faults)
+{
+    NumberColumn field[NUMBER_TABLE_COLUMNS];
+    int line, count = number_table_columns(text, length, field, NUMBER_TABLE_COLUMNS, &line);
+    bool named = false;
+    for (int i = 0; i < count && i < NUMBER_TABLE_COLUMNS; i++)
+        named |= memchr(field[i].name, '.', field[i].length) != NULL;
+    *columns = (Columns){0};
+    if (tools && named)
+        return read_columns(field, count, line, tools, file, columns, faults);
+    columns->count = 2;
+    columns->quantity[1] = 1;
+    strcpy(columns->header, header);
+    return true;
+}
+
+Script *script_parse_tools(const char *text, size_t length, const char *file, const ToolNames *tools, Faults *faults)
+{
+    Columns columns;
+    NumberTable *table = find_columns(text, length, file, tools, &columns, faults) ? number_table_parse(text, length, file, columns.header, faults) : NULL;
     if (!table)
         return NULL;
     int faults_before = faults->count;
@@ -38,12 +156,17 @@ Script *script_parse(const char *text, size_t length, const char *file, Faults *
     if (!script || !script->row)
         faults_add(faults, file, 0, 0, "no memory for its rows");
     else if (table->row_count == 0)
-        faults_add(faults, file, 1, 1, "has no row; at least one '%s', the last row's time ends the script", header);
+        faults_add(faults, file, 1, 1, "has no row; at least one '%s', the last row's time ends the script", columns.header);
     else
         for (int i = 0; i < table->row_count; i++) {
-            const double *value = table->value + (size_t)i * 3;
-            script->row[i] = (ScriptRow){value[0], {value[1], value[2]}};
-            script_check_row(&script->row[i], i ? &script->row[i - 1] : NULL, file, table->line[i], 1, faults);
+            const double *value = table->value + (size_t)i * (size_t)table->column_count;
+            ScriptRow *row = &script->row[i];
+            row->t_s = value[0];
+            for (int c = 0; c < columns.count; c++) {
+                Command *command = script_row_command(row, columns.tool[c]);
+                *(columns.quantity[c] ? &command->twist_deg_s : &command->push_mm_s) = value[1 + c];
+            }
+            script_check_row(row, i ? row - 1 : NULL, tools, file, table->line[i], 1, faults);
             script->count = i + 1;
         }
     number_table_free(table);
@@ -54,16 +177,20 @@ Script *script_parse(const char *text, size_t length, const char *file, Faults *
     return script;
 }
 
-Script *script_load(const char *path, Faults *faults)
+Script *script_parse(const char *text, size_t length, const char *file, Faults *faults) { return script_parse_tools(text, length, file, NULL, faults); }
+
+Script *script_load_tools(const char *path, const ToolNames *tools, Faults *faults)
 {
     size_t length;
     char *text = text_file_read(path, &length, faults);
     if (!text)
         return NULL;
-    Script *script = script_parse(text, length, path, faults);
+    Script *script = script_parse_tools(text, length, path, tools, faults);
     free(text);
     return script;
 }
+
+Script *script_load(const char *path, Faults *faults) { return script_load_tools(path, NULL, faults); }
 
 void script_free(Script *script)
 {
@@ -75,7 +202,7 @@ void script_free(Script *script)
 
 double script_duration_s(const Script *script) { return script->count > 0 ? script->row[script->count - 1].t_s : 0; }
 
-Command script_at(const Script *script, double t_s, int *cursor)
+ToolCommands script_tools_at(const Script *script, double t_s, int *cursor)
 {
     int i = *cursor;
     if (i < 0 || i >= script->count || script->row[i].t_s > t_s)
@@ -85,6 +212,10 @@ Command script_at(const Script *script, double t_s, int *cursor)
     *cursor = i;
     // before the first row and from the last row's time on nothing moves
     if (script->count < 2 || t_s < script->row[0].t_s || i == script->count - 1)
-        return (Command){0, 0};
-    return script->row[i].command;
+        return (ToolCommands){0};
+    ToolCommands commands = {.tool = {script->row[i].command}};
+    memcpy(commands.tool + 1, script->row[i].inner, sizeof script->row[i].inner);
+    return commands;
 }
+
+Command script_at(const Script *script, double t_s, int *cursor) { return script_tools_at(script, t_s, cursor).tool[0]; }

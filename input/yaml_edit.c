@@ -15,8 +15,21 @@ static size_t byte_of(const char *text, size_t characters)
     return at;
 }
 
+// An item of a list by its number, from 0.
+static yaml_node_t *item_of(yaml_document_t *document, const yaml_node_t *list, const char *number)
+{
+    char *end;
+    long index = *number >= '0' && *number <= '9' ? strtol(number, &end, 10) : -1;
+    bool whole = index >= 0 && *end == '.' && index < list->data.sequence.items.top - list->data.sequence.items.start;
+    return whole ? yaml_document_get_node(document, list->data.sequence.items.start[index]) : NULL;
+}
+
 static yaml_node_t *value_of(yaml_document_t *document, const yaml_node_t *map, const char *key, size_t length)
 {
+    if (map->type == YAML_SEQUENCE_NODE)
+        return item_of(document, map, key);
+    if (map->type != YAML_MAPPING_NODE)
+        return NULL;
     for (yaml_node_pair_t *pair = map->data.mapping.pairs.start; pair < map->data.mapping.pairs.top; pair++) {
         const yaml_node_t *name = yaml_document_get_node(document, pair->key);
         if (name->type == YAML_SCALAR_NODE && name->data.scalar.length == length && !memcmp(name->data.scalar.value, key, length))
@@ -59,7 +72,7 @@ static char *edit_document(yaml_document_t *document, const char *text, const ch
 {
     const yaml_node_t *map = yaml_document_get_root_node(document), *node = NULL;
     const char *key = path;
-    for (const char *dot; map && map->type == YAML_MAPPING_NODE && (dot = strchr(key, '.')); key = dot + 1)
+    for (const char *dot; map && (dot = strchr(key, '.')); key = dot + 1)
         map = value_of(document, map, key, (size_t)(dot - key));
     if (!map || map->type != YAML_MAPPING_NODE)
         return NULL;

@@ -4,9 +4,9 @@
 
 #include <stdbool.h>
 
-// The text with the value at `path` ("vessel.model": maps by key from the root) replaced by the scalar `value` (quoted here); a last key that is not there
-// is added to its map where `add`. The caller frees the result. NULL where a map on the way is not there, the last key neither there nor to be added, the
-// text is no YAML, or memory lacks.
+// The text with the value at `path` replaced by the scalar `value` (quoted here); a last key that is not there is added to its map where `add`. A path
+// names keys of maps and numbers of list items from the root: "vessel.model", "tools.0.device". The caller frees the result. NULL where a map or item on
+// the way is not there, the last key neither there nor to be added, the text is no YAML, or memory lacks.
 char *yaml_edit(const char *text, const char *path, const char *value, bool add);
 
 #endif

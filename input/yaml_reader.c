@@ -1,6 +1,7 @@
 // libyaml's document API keeps the line and column of every node but accepts duplicate keys; they are refused here.
 #include "input/yaml_reader.h"
 
+#include "input/nearest_name.h"
 #include "input/number_table.h"
 
 #include <ctype.h>
@@ -61,30 +62,6 @@ static bool same_stem(const char *a, const char *b)
     return true;
 }
 
-enum { LONGEST_KEY = 40 };
-
-// Letters to change, insert or drop (Levenshtein); large where a name is longer than any key of ours.
-static int edit_distance(const char *a, const char *b)
-{
-    int n = (int)strnlen(a, LONGEST_KEY + 1), m = (int)strnlen(b, LONGEST_KEY + 1), row[LONGEST_KEY + 2];
-    if (n > LONGEST_KEY || m > LONGEST_KEY)
-        return 1000;
-    for (int j = 0; j <= m; j++)
-        row[j] = j;
-    for (int i = 1; i <= n; i++) {
-        int diagonal = row[0];
-        row[0] = i;
-        for (int j = 1; j <= m; j++) {
-            int change = diagonal + (tolower((unsigned char)a[i - 1]) != tolower((unsigned char)b[j - 1]));
-            diagonal = row[j];
-            int drop = row[j] + 1, insert = row[j - 1] + 1;
-            row[j] = change < drop ? change : drop;
-            row[j] = row[j] < insert ? row[j] : insert;
-        }
-    }
-    return row[m];
-}
-
 static void list_names(const char *const *names, char *out, size_t capacity)
 {
     size_t used = 0;
@@ -97,8 +74,7 @@ static void list_names(const char *const *names, char *out, size_t capacity)
 
 static void fault_unknown_key(YamlValue key, const char *name, const char *map_name, const char *const *keys)
 {
-    int nearest = -1, least = 1000;
-    for (int i = 0; keys[i]; i++) {
+    for (int i = 0; keys[i]; i++)
         if (same_stem(name, keys[i])) {
             if (stem_length(name) == strlen(name))
                 yaml_fault(key, "key '%s' lacks its unit; it is '%s'", name, keys[i]);
@@ -108,11 +84,8 @@ static void fault_unknown_key(YamlValue key, const char *name, const char *map_n
                 yaml_fault(key, "key '%s' has the wrong unit; it is '%s'", name, keys[i]);
             return;
         }
-        int distance = edit_distance(name, keys[i]);
-        if (distance < least)
-            least = distance, nearest = i;
-    }
-    if (nearest >= 0 && least <= 1 + (int)strlen(keys[nearest]) / 4) {
+    int nearest = nearest_name(name, keys);
+    if (nearest >= 0) {
         yaml_fault(key, "unknown key '%.60s'; did you mean '%s'?", name, keys[nearest]);
         return;
     }

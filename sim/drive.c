@@ -100,10 +100,13 @@ DriveReport simulator_drive(Simulator *simulator, const DriveOptions *options)
         if (options->paced && options->late_ns)
             histogram_add(options->late_ns, wall_ns() - (base + i * step_ns));
         bool scripted = options->script && i < driven;
-        Command command = scripted                     ? script_at(options->script, (double)i * scene->dt / 1000, &cursor)
-                          : options->hand && i < driven ? options->hand(options->hand_context)
-                                                        : (Command){0, 0};
-        simulator_step(simulator, command);
+        ToolCommands commands = {0};
+        if (scripted)
+            commands = script_tools_at(options->script, (double)i * scene->dt / 1000, &cursor);
+        else if (options->hand && i < driven)
+            commands.tool[0] = options->hand(options->hand_context);
+        Command command = commands.tool[0];
+        simulator_step_tools(simulator, &commands);
         at_rest_s = simulator_fastest_mm_s(simulator) <= rest_speed_mm_s ? at_rest_s + step_s : 0;
         bool goes_on = !options->after_step || options->after_step(options->context, simulator, command);
         if (options->paced)

@@ -211,6 +211,9 @@ static bool write_scene(Recording *recording, const Scene *scene)
         file[count++] = scene->tube_points_path;
     if (scene->script_path)
         file[count++] = scene->script_path;
+    for (int k = 0; k < scene->tool_count; k++)
+        if (scene->tool[k].device_path)
+            file[count++] = scene->tool[k].device_path;
     for (int i = 0; i < recording->options.file_count && count < MOST_FILES; i++)
         file[count++] = recording->options.file[i];
     char *paths = NULL, *sums = NULL, *path = whole_path(scene->path);

@@ -1,36 +1,19 @@
 // YAML text to a Scene in internal units: mm, g, ms (N, MPa, mJ), rad. The only place where a scene's units are converted.
 // One function a part of the file; each reads on after a fault, so one pass finds all.
-#include "sim/scene.h"
+#include "sim/scene_reading.h"
 
 #include "input/number_table.h"
 #include "input/text_file.h"
-#include "input/yaml_reader.h"
-#include "sim/rest_shape.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const double per_gpa = 1000;            // MPa
-static const double per_g_cm3 = 1e-3;          // g/mm3
-static const double per_second = 1000;         // ms
-static const double per_deg = PI / 180;        // rad
 static const double per_m_s2 = 1e-3;           // mm/ms2
-
 static const double farthest_mm = 1e5;
-enum { MOST_SECTIONS = 1000, MOST_PIECES = 10000, MOST_LOADS = 1000, MOST_TARGETS = 1000, MOST_ROWS = 100000, MOST_ELEMENTS = 10000 };
+enum { MOST_LOADS = 1000, MOST_TARGETS = 1000, MOST_ROWS = 100000 };
 
-typedef struct Reading {
-    Scene *scene;
-    YamlReader *reader;
-    const char *path;
-    Faults *faults;
-    double total_length;     // of the wire; 0 until known
-} Reading;
-
-static const NumberRange length_range = {0, 1e5, true}, friction_range = {0, 10, false};
-
-static void *zeroed(Reading *reading, int count, size_t size)
+void *scene_zeroed(Reading *reading, int count, size_t size)
 {
     void *memory = calloc((size_t)count + 1, size);
     if (!memory)
@@ -38,7 +21,7 @@ static void *zeroed(Reading *reading, int count, size_t size)
     return memory;
 }
 
-static char *resolved(Reading *reading, const char *name)
+char *scene_resolved(Reading *reading, const char *name)
 {
     char *path = text_file_beside(reading->path, name);
     if (!path)
@@ -65,7 +48,7 @@ static void read_shape(Reading *reading, YamlValue value)
     int count = 0;
     while (yaml_pair(&map, count, &key, &option))
         count++;
-    scene->shape_option = zeroed(reading, count, sizeof *scene->shape_option);
+    scene->shape_option = scene_zeroed(reading, count, sizeof *scene->shape_option);
     for (int i = 0; scene->shape_option && i < count; i++) {
         yaml_pair(&map, i, &key, &option);
         if (!key || !strcmp(key, "name") || !yaml_text(option, &text))
@@ -79,7 +62,7 @@ static void read_shape(Reading *reading, YamlValue value)
     }
 }
 
-static bool read_piece(YamlValue value, TubePiece *piece)
+bool scene_read_piece(YamlValue value, TubePiece *piece)
 {
     static const char *const kinds[] = {"line_mm", "arc", NULL};
     static const char *const arc_keys[] = {"radius_mm", "angle_deg", "plane_deg", NULL};
@@ -109,13 +92,13 @@ static void read_polyline(Reading *reading, YamlValue value)
     const char *name;
     if (!yaml_text(value, &name))
         return;
-    char *path = resolved(reading, name);
+    char *path = scene_resolved(reading, name);
     size_t length;
     char *text = path ? text_file_read(path, &length, reading->faults) : NULL;
     NumberTable *table = text ? number_table_parse(text, length, path, "x_mm,y_mm,z_mm", reading->faults) : NULL;
     if (table && table->row_count < 2)
         faults_add(reading->faults, path, 1, 1, "has %d points; a polyline has at least 2", table->row_count);
-    Vec3 *point = table ? zeroed(reading, table->row_count, sizeof *point) : NULL;
+    Vec3 *point = table ? scene_zeroed(reading, table->row_count, sizeof *point) : NULL;
     if (point) {
         for (int i = 0; i < table->row_count; i++) {
             const double *row = table->value + (size_t)i * 3;
@@ -158,12 +141,12 @@ static void read_tube(Reading *reading, YamlValue value)
     }
     YamlValue list = yaml_get(&map, "path", false);
     int count = yaml_count(list, 1, MOST_PIECES);
-    TubePiece *piece = count > 0 ? zeroed(reading, count, sizeof *piece) : NULL;
+    TubePiece *piece = count > 0 ? scene_zeroed(reading, count, sizeof *piece) : NULL;
     tube->piece = piece;
     tube->piece_count = piece ? count : 0;
     for (int i = 0; piece && i < count; i++) {
         YamlValue item = yaml_item(list, i);
-        if (read_piece(item, &piece[i]) && piece[i].angle > 0 && tube->radius > 0 && piece[i].arc_radius <= tube->radius)
+        if (scene_read_piece(item, &piece[i]) && piece[i].angle > 0 && tube->radius > 0 && piece[i].arc_radius <= tube->radius)
             yaml_fault(item, "an arc of radius %g mm is tighter than the lumen's radius %g mm; make it larger", piece[i].arc_radius, tube->radius);
     }
 }
@@ -216,7 +199,7 @@ static void read_vessel(Reading *reading, YamlValue value)
         yaml_fault(value, "'vessel' has no source; exactly one of model, shape, tube, plane, mesh");
     const char *text;
     if (yaml_has(&map, "model") && yaml_text(yaml_get(&map, "model", false), &text))
-        scene->model_path = resolved(reading, text);
+        scene->model_path = scene_resolved(reading, text);
     if (yaml_has(&map, "shape"))
         read_shape(reading, yaml_get(&map, "shape", false));
     if (yaml_has(&map, "tube"))
@@ -224,7 +207,7 @@ static void read_vessel(Reading *reading, YamlValue value)
     if (yaml_has(&map, "plane"))
         read_plane(reading, yaml_get(&map, "plane", false));
     if (yaml_has(&map, "mesh") && yaml_text(yaml_get(&map, "mesh", false), &text))
-        scene->mesh_path = resolved(reading, text);
+        scene->mesh_path = scene_resolved(reading, text);
     if (yaml_has(&map, "mesh_scale") && scene->source != SOURCE_MESH)
         yaml_fault(yaml_get(&map, "mesh_scale", false), "'mesh_scale' goes with the source 'mesh'");
     yaml_map_number(&map, "mesh_scale", false, (NumberRange){0, 1e9, true}, &scene->mesh_scale);
@@ -233,101 +216,7 @@ static void read_vessel(Reading *reading, YamlValue value)
     yaml_map_number(&map, "friction", false, friction_range, &scene->friction);
 }
 
-// --- wire, sheath, rig ---
-
-static const double wire_attenuation = 0.55, marker_attenuation = 1.2, marker_length = 3;   // DESIGN section 8, what convinced
-
-static void read_section(YamlValue value, WireSection *section)
-{
-    static const char *const keys[] = {"length_mm",     "diameter_mm",          "inner_diameter_mm",        "young_modulus_gpa", "poisson_ratio",
-                                       "density_g_cm3", "rest_curvature_1_mm", "rest_curvature_plane_deg", "friction",
-                                       "attenuation_1_mm", NULL};
-    YamlMap map = yaml_map(value, keys);
-    double young = 0, density = 6.45, plane = 0;
-    *section = (WireSection){.poisson_ratio = 0.3, .friction = -1, .attenuation = wire_attenuation};
-    yaml_map_number(&map, "length_mm", true, (NumberRange){0, 1e5, true}, &section->length);
-    yaml_map_number(&map, "diameter_mm", true, (NumberRange){0, 1000, true}, &section->diameter);
-    bool tubular = yaml_map_number(&map, "inner_diameter_mm", false, (NumberRange){0, 1000, false}, &section->inner_diameter);
-    if (tubular && section->diameter > 0 && section->inner_diameter >= section->diameter)
-        yaml_fault(yaml_get(&map, "inner_diameter_mm", false), "'inner_diameter_mm' %g is not below 'diameter_mm' %g", section->inner_diameter,
-                   section->diameter);
-    yaml_map_number(&map, "young_modulus_gpa", true, (NumberRange){0, 1e5, true}, &young);
-    yaml_map_number(&map, "poisson_ratio", false, (NumberRange){-0.99, 0.5, false}, &section->poisson_ratio);
-    yaml_map_number(&map, "density_g_cm3", false, (NumberRange){0, 100, true}, &density);
-    yaml_map_number(&map, "rest_curvature_1_mm", false, (NumberRange){-10, 10, false}, &section->rest_curvature);
-    yaml_map_number(&map, "rest_curvature_plane_deg", false, (NumberRange){-36000, 36000, false}, &plane);
-    yaml_map_number(&map, "friction", false, friction_range, &section->friction);
-    yaml_map_number(&map, "attenuation_1_mm", false, (NumberRange){0, 100, false}, &section->attenuation);
-    section->young_modulus = young * per_gpa;
-    section->density = density * per_g_cm3;
-    section->rest_plane = plane * per_deg;
-}
-
-// `rest`: the tool's shape by lines and arcs, as a tube's path; its last piece ends at the tip.
-static void read_rest(Reading *reading, YamlValue list)
-{
-    WireOptions *wire = &reading->scene->wire;
-    int before = reading->faults->count, count = yaml_count(list, 1, MOST_PIECES);
-    TubePiece *piece = count > 0 ? zeroed(reading, count, sizeof *piece) : NULL;
-    double thickest = 0;
-    for (int i = 0; i < wire->section_count; i++) {
-        thickest = fmax(thickest, wire->section[i].diameter);
-        if (wire->section[i].rest_curvature != 0)
-            yaml_fault(list, "'rest' and 'rest_curvature_1_mm' of section %d both give a shape; one of them", i);
-    }
-    for (int i = 0; piece && i < count; i++)
-        if (read_piece(yaml_item(list, i), &piece[i]) && piece[i].angle > 0 && piece[i].arc_radius < thickest)
-            yaml_fault(yaml_item(list, i), "an arc of radius %g mm is tighter than the tool is thick, %g mm; make it larger", piece[i].arc_radius, thickest);
-    double length = piece ? rest_shape_length(piece, count) : 0;
-    if (reading->total_length > 0 && length > reading->total_length + 0.01)
-        yaml_fault(list, "'rest' is %g mm long, the wire %g mm; at most as long, what it leaves at the proximal end is straight", length,
-                   reading->total_length);
-    if (piece && wire->section_count > 0 && reading->faults->count == before) {
-        WireSection *cut = rest_shape_sections(wire->section, wire->section_count, piece, count, &wire->section_count);
-        free((void *)wire->section);
-        wire->section = cut;
-        if (!cut)
-            faults_add(reading->faults, reading->path, 0, 0, "no memory");
-    }
-    free(piece);
-}
-
-static const double hand_limit_n = 20;       // about what two fingers hold
-
-static void read_wire(Reading *reading, YamlValue value)
-{
-    static const char *const keys[] = {"elements", "sections", "rest", "damping", "tip_marker", "hand_limit_n", NULL};
-    static const char *const marker_keys[] = {"length_mm", "attenuation_1_mm", NULL};
-    static const char *const damping_keys[] = {"mass_1_s", "stiffness_s", NULL};
-    WireOptions *wire = &reading->scene->wire;
-    YamlMap map = yaml_map(value, keys);
-    wire->elements = 200;
-    if (yaml_has(&map, "elements"))
-        yaml_integer(yaml_get(&map, "elements", false), 1, MOST_ELEMENTS, &wire->elements);
-    YamlMap damping = yaml_map(yaml_get(&map, "damping", false), damping_keys);
-    double mass = 0, stiffness = 0;
-    yaml_map_number(&damping, "mass_1_s", false, (NumberRange){0, 1e6, false}, &mass);
-    yaml_map_number(&damping, "stiffness_s", false, (NumberRange){0, 1000, false}, &stiffness);
-    wire->damping_mass = mass / per_second;
-    wire->damping_stiffness = stiffness * per_second;
-    wire->hand_limit = hand_limit_n;
-    yaml_map_number(&map, "hand_limit_n", false, (NumberRange){0, 1e6, false}, &wire->hand_limit);
-    YamlMap marker = yaml_map(yaml_get(&map, "tip_marker", false), marker_keys);
-    yaml_map_number(&marker, "length_mm", false, (NumberRange){0, 1000, false}, &reading->scene->marker_length);
-    yaml_map_number(&marker, "attenuation_1_mm", false, (NumberRange){0, 100, false}, &reading->scene->marker_attenuation);
-
-    YamlValue list = yaml_get(&map, "sections", true);
-    int count = yaml_count(list, 1, MOST_SECTIONS);
-    WireSection *section = count > 0 ? zeroed(reading, count, sizeof *section) : NULL;
-    wire->section = section;
-    wire->section_count = section ? count : 0;
-    for (int i = 0; section && i < count; i++) {
-        read_section(yaml_item(list, i), &section[i]);
-        reading->total_length += section[i].length;
-    }
-    if (yaml_has(&map, "rest"))
-        read_rest(reading, yaml_get(&map, "rest", false));
-}
+// --- sheath, rig ---
 
 // `normal` of a sheath or rig: the direction to which a rest curvature with plane 0 bends; default vec3_normal_to(direction).
 static void read_normal(const YamlMap *map, WireOptions *wire)
@@ -426,8 +315,8 @@ static void read_rig(Reading *reading, YamlValue value)
 
     YamlValue fixes = yaml_get(&map, "fix", false), loads = yaml_get(&map, "loads", false);
     int fix_count = yaml_count(fixes, 0, MOST_LOADS), load_count = yaml_count(loads, 0, MOST_LOADS);
-    WireFix *fix = fix_count > 0 ? zeroed(reading, fix_count, sizeof *fix) : NULL;
-    WireLoad *load = load_count > 0 ? zeroed(reading, load_count, sizeof *load) : NULL;
+    WireFix *fix = fix_count > 0 ? scene_zeroed(reading, fix_count, sizeof *fix) : NULL;
+    WireLoad *load = load_count > 0 ? scene_zeroed(reading, load_count, sizeof *load) : NULL;
     wire->fix = fix;
     wire->load = load;
     wire->fix_count = fix ? fix_count : 0;
@@ -455,42 +344,71 @@ static void read_simulation(Reading *reading, YamlValue value)
         scene->contact_options.form = form == 1 ? CONTACT_POINTWISE : CONTACT_BLOCK;
 }
 
+// The valid keys of a script's row: t_s, the first tool's two by their bare names, and each tool's by its name.
+typedef struct RowKeys {
+    const char *key[3 + 2 * TOOLS_MOST + 1];
+    char text[2 * TOOLS_MOST][TOOL_NAME_SIZE + 16];
+} RowKeys;
+
+static void list_row_keys(const ToolNames *tools, RowKeys *keys)
+{
+    static const char *const bare[] = {"t_s", "push_mm_s", "twist_deg_s"};
+    *keys = (RowKeys){.key = {bare[0], bare[1], bare[2]}};
+    for (int i = 0; i < 2 * tools->count; i++) {
+        snprintf(keys->text[i], sizeof keys->text[i], "%s.%s", tools->name[i / 2], bare[1 + i % 2]);
+        keys->key[3 + i] = keys->text[i];
+    }
+}
+
+static bool read_row(YamlValue item, const RowKeys *keys, int tools, ScriptRow *row)
+{
+    const NumberRange any = {-1e9, 1e9, false};
+    if (yaml_is_list(item))
+        return yaml_count(item, 3, 3) == 3 && yaml_number(yaml_item(item, 0), any, &row->t_s) && yaml_number(yaml_item(item, 1), any, &row->command.push_mm_s) &&
+               yaml_number(yaml_item(item, 2), any, &row->command.twist_deg_s);
+    YamlMap map = yaml_map(item, keys->key);
+    bool good = yaml_map_number(&map, "t_s", true, any, &row->t_s);
+    bool bare = yaml_map_number(&map, "push_mm_s", false, any, &row->command.push_mm_s);
+    bare |= yaml_map_number(&map, "twist_deg_s", false, any, &row->command.twist_deg_s);
+    for (int k = 0; k < tools; k++) {
+        const char *push = keys->key[3 + 2 * k], *twist = keys->key[4 + 2 * k];
+        Command *command = script_row_command(row, k);
+        bool has_push = yaml_map_number(&map, push, false, any, &command->push_mm_s), has_twist = yaml_map_number(&map, twist, false, any, &command->twist_deg_s);
+        if (yaml_has(&map, push) != yaml_has(&map, twist))
+            yaml_fault(item, "'%s' lacks its other half; give '%s' too", yaml_has(&map, push) ? push : twist, yaml_has(&map, push) ? twist : push);
+        if (bare && (has_push || has_twist))
+            yaml_fault(item, "a row names its tools or moves the first by bare 'push_mm_s' and 'twist_deg_s', not both; write '%s' and '%s'", keys->key[3], keys->key[4]);
+    }
+    return good;
+}
+
 static void read_script(Reading *reading, YamlValue value)
 {
-    static const char *const keys[] = {"t_s", "push_mm_s", "twist_deg_s", NULL};
-    const NumberRange any = {-1e9, 1e9, false};
     Scene *scene = reading->scene;
+    ToolNames tools = scene_tool_names(scene);
     const char *name;
-    if (!value.node)
+    if (!value.node || tools.count == 0)
         return;
     if (!yaml_is_list(value)) {
-        if (yaml_text(value, &name) && (scene->script_path = resolved(reading, name)))
-            scene->script = script_load(scene->script_path, reading->faults);
+        if (yaml_text(value, &name) && (scene->script_path = scene_resolved(reading, name)))
+            scene->script = script_load_tools(scene->script_path, &tools, reading->faults);
         return;
     }
     int count = yaml_count(value, 1, MOST_ROWS);
-    Script *script = count > 0 ? zeroed(reading, 1, sizeof *script) : NULL;
+    Script *script = count > 0 ? scene_zeroed(reading, 1, sizeof *script) : NULL;
+    RowKeys keys;
     if (!script)
         return;
     scene->script = script;
-    script->row = zeroed(reading, count, sizeof *script->row);
+    script->row = scene_zeroed(reading, count, sizeof *script->row);
+    list_row_keys(&tools, &keys);
     for (int i = 0; script->row && i < count; i++) {
         YamlValue item = yaml_item(value, i);
         ScriptRow *row = &script->row[i];
-        bool good;
-        if (yaml_is_list(item)) {
-            good = yaml_count(item, 3, 3) == 3 && yaml_number(yaml_item(item, 0), any, &row->t_s);
-            good = good && yaml_number(yaml_item(item, 1), any, &row->command.push_mm_s) && yaml_number(yaml_item(item, 2), any, &row->command.twist_deg_s);
-        } else {
-            YamlMap map = yaml_map(item, keys);
-            good = yaml_map_number(&map, "t_s", true, any, &row->t_s);
-            yaml_map_number(&map, "push_mm_s", false, any, &row->command.push_mm_s);
-            yaml_map_number(&map, "twist_deg_s", false, any, &row->command.twist_deg_s);
-        }
         int line, column;
         yaml_place(item, &line, &column);
-        if (good)
-            script_check_row(row, i ? row - 1 : NULL, reading->path, line, column, reading->faults);
+        if (read_row(item, &keys, tools.count, row))
+            script_check_row(row, i ? row - 1 : NULL, &tools, reading->path, line, column, reading->faults);
         script->count = i + 1;
     }
 }
@@ -500,7 +418,7 @@ static void read_targets(Reading *reading, YamlValue value)
     static const char *const keys[] = {"name", "point_mm", "radius_mm", NULL};
     Scene *scene = reading->scene;
     int count = yaml_count(value, 0, MOST_TARGETS);
-    if (count <= 0 || !(scene->target = zeroed(reading, count, sizeof *scene->target)))
+    if (count <= 0 || !(scene->target = scene_zeroed(reading, count, sizeof *scene->target)))
         return;
     scene->target_count = count;
     for (int i = 0; i < count; i++) {
@@ -521,8 +439,8 @@ static void read_targets(Reading *reading, YamlValue value)
 static void read_exercise(Reading *reading, YamlValue value)
 {
     Scene *scene = reading->scene;
-    const char **name = zeroed(reading, scene->target_count, sizeof *name);
-    scene->exercise = zeroed(reading, 1, sizeof *scene->exercise);
+    const char **name = scene_zeroed(reading, scene->target_count, sizeof *name);
+    scene->exercise = scene_zeroed(reading, 1, sizeof *scene->exercise);
     for (int i = 0; name && i < scene->target_count; i++)
         name[i] = scene->target[i].name;
     if (name && scene->exercise)
@@ -550,12 +468,12 @@ static void read_fluoroscopy(Reading *reading, YamlValue value)
     yaml_map_number(&map, "lao_deg", false, (NumberRange){-90, 90, false}, &scene->lao);
     yaml_map_number(&map, "cra_deg", false, (NumberRange){-45, 45, false}, &scene->cra);
     if (yaml_has(&map, "volume") && yaml_text(yaml_get(&map, "volume", false), &name))
-        reading->scene->anatomy_path = resolved(reading, name);
+        reading->scene->anatomy_path = scene_resolved(reading, name);
 }
 
 static void read_scene(Reading *reading)
 {
-    static const char *const keys[] = {"seldinger", "vessel", "wire", "sheath", "rig", "simulation", "script", "targets", "exercise", "fluoroscopy",
+    static const char *const keys[] = {"seldinger", "vessel", "wire", "tools", "sheath", "rig", "simulation", "script", "targets", "exercise", "fluoroscopy",
                                        "verify", NULL};
     YamlValue root = yaml_root(reading->reader);
     YamlMap map = yaml_map(root, keys);
@@ -565,12 +483,22 @@ static void read_scene(Reading *reading)
     yaml_integer(yaml_get(&map, "seldinger", true), 1, 1, &version);
     if (yaml_has(&map, "vessel"))
         read_vessel(reading, yaml_get(&map, "vessel", false));
-    read_wire(reading, yaml_get(&map, "wire", true));
+    bool several = yaml_has(&map, "tools");
+    if (several && yaml_has(&map, "wire"))
+        yaml_fault(yaml_get(&map, "tools", false), "the scene has 'wire' and 'tools'; one of them: 'wire' for one tool, 'tools' for up to %d", TOOLS_MOST);
+    else if (!several && !yaml_has(&map, "wire"))
+        yaml_fault(root, "'%s' lacks the key 'wire', or 'tools' for several of them", root.name);
+    if (several)
+        scene_read_tools(reading, yaml_get(&map, "tools", false));
+    else
+        scene_read_wire(reading, yaml_get(&map, "wire", false));
     if (yaml_has(&map, "sheath"))
         read_sheath(reading, yaml_get(&map, "sheath", false));
     if (yaml_has(&map, "rig"))
         read_rig(reading, yaml_get(&map, "rig", false));
-    if (!yaml_has(&map, "sheath") && !yaml_has(&map, "rig"))
+    bool placed = yaml_has(&map, "sheath") || yaml_has(&map, "rig");
+    scene_settle_tools(reading, placed);
+    if (!placed)
         yaml_fault(root, "the scene has neither 'sheath' nor 'rig'; one of them says where the wire starts");
     read_simulation(reading, yaml_get(&map, "simulation", false));
     read_script(reading, yaml_get(&map, "script", false));
@@ -606,10 +534,7 @@ Scene *scene_parse(const char *text, size_t length, const char *path, Faults *fa
         scene->text[length] = 0;
         scene->source = SOURCE_NONE;
         scene->dt = 1;
-        scene->marker_length = marker_length;
-        scene->marker_attenuation = marker_attenuation;
         scene->contact_options = (ContactOptions){.form = CONTACT_BLOCK, .max_iterations = 200, .tolerance = 1e-6};
-        scene->wire.direction = vec3(1, 0, 0);
         Reading reading = {.scene = scene, .reader = reader, .path = path, .faults = faults};
         read_scene(&reading);
     }
@@ -637,6 +562,11 @@ void scene_free(Scene *scene)
     free((void *)scene->tube.piece);
     free((void *)scene->tube.point);
     free((void *)scene->wire.section);
+    for (int k = 0; k < scene->tool_count; k++) {
+        if (k > 0)
+            free((void *)scene->tool[k].wire.section);
+        free(scene->tool[k].device_path);
+    }
     free((void *)scene->wire.fix);
     free((void *)scene->wire.load);
     script_free(scene->script);
@@ -655,9 +585,11 @@ void scene_free(Scene *scene)
     free(scene);
 }
 
-double scene_attenuation(const Scene *scene, double s)
+double scene_tool_attenuation(const Scene *scene, int tool, double s)
 {
-    const WireOptions *wire = &scene->wire;
+    const WireOptions *wire = tool == 0 ? &scene->wire : &scene->tool[tool].wire;
+    double marker = tool == 0 ? scene->marker_length : scene->tool[tool].marker_length;
+    double marked = tool == 0 ? scene->marker_attenuation : scene->tool[tool].marker_attenuation;
     double total = 0;
     int at = -1;
     for (int i = 0; i < wire->section_count; i++) {
@@ -665,5 +597,14 @@ double scene_attenuation(const Scene *scene, double s)
         if (at < 0 && (s < total || i == wire->section_count - 1))
             at = i;
     }
-    return at < 0 ? 0 : s > total - scene->marker_length ? scene->marker_attenuation : wire->section[at].attenuation;
+    return at < 0 ? 0 : s > total - marker ? marked : wire->section[at].attenuation;
+}
+
+double scene_attenuation(const Scene *scene, double s) { return scene_tool_attenuation(scene, 0, s); }
+
+bool scene_has_one_tool(const Scene *scene, const char *what, Faults *faults)
+{
+    if (scene->tool_count > 1)
+        faults_add(faults, scene->path, 0, 0, "has %d tools; %s works with one so far, `seldinger run` with several", scene->tool_count, what);
+    return scene->tool_count <= 1;
 }

@@ -35,6 +35,18 @@ typedef struct SceneTarget {
     double radius;
 } SceneTarget;
 
+typedef enum { TOOL_GUIDE_CATHETER, TOOL_CATHETER, TOOL_MICROCATHETER, TOOL_WIRE, TOOL_KIND_COUNT } ToolKind;
+extern const char *const tool_kind_name[TOOL_KIND_COUNT + 1];      // as they are written; NULL at the end
+
+typedef struct SceneTool {
+    char name[TOOL_NAME_SIZE];   // heads its script columns; no dot, comma or space
+    ToolKind kind;
+    WireOptions wire;            // as read, `inserted` included; scene_tool_wire has where it starts. Fixes and loads are the first tool's
+    double friction_inside;      // Coulomb coefficient of its lumen against the tool within
+    double marker_length, marker_attenuation;    // [mm], [1/mm] of the radio-opaque marker at the tip; length 0: none
+    char *device_path;           // the device file that its keys come from; NULL: none
+} SceneTool;
+
 typedef struct Scene {
     char *path;              // of the YAML file
     char *text;              // its full text, as read
@@ -51,7 +63,9 @@ typedef struct Scene {
     double mesh_cell;        // [mm] of a mesh or grid that another source is turned into; 0: chosen from the vessel
     ContactKind contact;
     double friction;
-    WireOptions wire;        // sections, fixes, loads owned by the scene
+    WireOptions wire;        // of the first tool; sections, fixes, loads owned by the scene. Whoever changes what is read does it here
+    int tool_count;          // 1 to 4, outermost first; with `wire:` one named "wire"
+    SceneTool tool[TOOLS_MOST];
     bool inlet_is_root;      // sheath `inlet: root`: start and direction to be taken from vessel->inlet
     ContactOptions contact_options;
     double dt;               // [ms]
@@ -59,7 +73,7 @@ typedef struct Scene {
     char *script_path;       // NULL where inline or none
     int target_count;
     SceneTarget *target;
-    double marker_length, marker_attenuation;   // [mm], [1/mm] of the radio-opaque marker at the tip; length 0: none
+    double marker_length, marker_attenuation;   // [mm], [1/mm] of the first tool's marker
     Vec3 patient_anterior, patient_superior;     // unit, perpendicular, in the model's frame; zero: not said
     double lao, cra;         // [deg] of the C-arm at the start
     char *anatomy_path;      // volume whose bone and soft tissue lie behind the vessel in fluoroscopy; NULL: a plain head
@@ -71,8 +85,15 @@ typedef struct Scene {
 Scene *scene_parse(const char *text, size_t length, const char *path, Faults *faults);
 Scene *scene_load(const char *path, Faults *faults);
 void scene_free(Scene *scene);
-// [1/mm] by which the tool takes X-rays away at arc length s from its proximal end.
+// A tool's options as they are now: scene->wire for the first, and for the others their own with start, direction, normal, sheath and gravity of scene->wire
+// (which `inlet: root` sets late).
+WireOptions scene_tool_wire(const Scene *scene, int tool);
+// A fault where the scene has several tools and `what` works with one so far.
+bool scene_has_one_tool(const Scene *scene, const char *what, Faults *faults);
+ToolNames scene_tool_names(const Scene *scene);      // as scripts know them; lives as long as the scene
+// [1/mm] by which the first tool, or any, takes X-rays away at arc length s from its proximal end.
 double scene_attenuation(const Scene *scene, double s);
+double scene_tool_attenuation(const Scene *scene, int tool, double s);
 // The file that the vessel comes from, a model or a mesh; NULL where it needs none.
 static inline const char *scene_needed_file(const Scene *scene) { return scene->source == SOURCE_MODEL ? scene->model_path : scene->mesh_path; }
 

@@ -46,6 +46,11 @@ Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *fa
     if (simulator && simulator->target) {
         StepperOptions options = {.wire = scene->wire, .vessel = vessel, .wall_friction = scene->friction, .contact = scene->contact_options,
                                   .dt = scene->dt};
+        WireOptions inner[TOOLS_MOST];
+        for (int k = 1; k < scene->tool_count; k++)
+            inner[k - 1] = scene_tool_wire(scene, k);
+        options.inner_count = scene->tool_count > 1 ? scene->tool_count - 1 : 0;
+        options.inner = inner;
         simulator->stepper = stepper_create(&options, why, (int)sizeof why);
     }
     if (!simulator || !simulator->stepper) {
@@ -152,12 +157,20 @@ static void accumulate(Simulator *simulator)
 
 void simulator_step(Simulator *simulator, Command command)
 {
+    simulator_step_tools(simulator, &(ToolCommands){{command}});
+}
+
+void simulator_step_tools(Simulator *simulator, const ToolCommands *commands)
+{
     Stepper *stepper = simulator->stepper;
     StepProfile *profile = &simulator->profile;
     double seconds = simulator->dt / 1000;
     int64_t start = thread_cpu_ns(), since = start;
 
-    step_feed(stepper, (StepCommand){.advance = command.push_mm_s * seconds, .twist = command.twist_deg_s * seconds * PI / 180});
+    StepCommand command[STEP_TOOLS_MAX];
+    for (int k = 0; k < STEP_TOOLS_MAX; k++)
+        command[k] = (StepCommand){.advance = commands->tool[k].push_mm_s * seconds, .twist = commands->tool[k].twist_deg_s * seconds * PI / 180};
+    step_feed_tools(stepper, command);
     timed(profile, STAGE_FEED, &since);
     step_detect(stepper);
     timed(profile, STAGE_DETECT, &since);

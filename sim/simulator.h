@@ -67,7 +67,8 @@ typedef struct Simulator Simulator;
 Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *faults);
 void simulator_destroy(Simulator *simulator);
 
-void simulator_step(Simulator *simulator, Command command);
+void simulator_step(Simulator *simulator, Command command);       // of several tools the inner ones are pinned
+void simulator_step_tools(Simulator *simulator, const ToolCommands *commands);
 
 // Watches the energy from now on: about as much work a step as an assembly, outside the timed stages.
 void simulator_watch_energy(Simulator *simulator);

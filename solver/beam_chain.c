@@ -49,7 +49,7 @@ INLINE void lane_element(const BeamChain *c, int base, int l, bool is_curved, do
     BeamOutput o;
     element(&in, is_curved, &o);
     double *near = &t->near[0][l], *far = &t->far[0][LANES + l], pull = o.tension + c->drag[base + l];
-    tangent_rows(&o, in.length, in.axial, in.near, in.far, in.twist, scale, pull > 0 ? pull : 0, is_curved, near, LANES, far, 2 * LANES);
+    tangent_rows(&o, in.length, in.axial, in.near, in.near, in.far, in.twist, scale, pull > 0 ? pull : 0, is_curved, near, LANES, far, 2 * LANES);
     put(near + N_MOMENT * LANES, LANES, o.moment1);
     put(far + F_FORCE * 2 * LANES, 2 * LANES, o.force2);
     put(far + F_MOMENT * 2 * LANES, 2 * LANES, o.moment2);

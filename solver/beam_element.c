@@ -9,21 +9,8 @@ void beam_element(const BeamInput *in, BeamOutput *out)
 void beam_tangent(const BeamInput *in, const BeamOutput *out, double scale, BeamTangent *tangent)
 {
     double n[N_ROWS], f[F_ROWS];
-    tangent_rows(out, in->length, in->axial, in->near, in->far, in->twist, scale, out->tension > 0 ? out->tension : 0, in->half_w < 1, n, 1, f, 1);
-    double *k11 = tangent->k11, *k21 = tangent->k21, *k22 = tangent->k22;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            int tt = 6 * i + j, tr = tt + 3, rt = 6 * (3 + j) + i, rr = 6 * (3 + i) + 3 + j, sym = SYM[i][j];
-            k21[tt] = f[F_TT + sym];
-            k21[tr] = n[N_TR + 3 * i + j];
-            k21[rt] = f[F_TR + 3 * i + j];
-            k21[rr] = n[N_FAR + 3 * i + j];
-            k11[tt] = k22[tt] = -f[F_TT + sym];
-            k11[tr] = k11[rt] = -n[N_TR + 3 * i + j];
-            k22[tr] = k22[rt] = -f[F_TR + 3 * i + j];
-            k11[rr] = n[N_RR + sym];
-            k22[rr] = f[F_RR + sym];
-        }
+    tangent_rows(out, in->length, in->axial, in->near, in->near, in->far, in->twist, scale, out->tension > 0 ? out->tension : 0, in->half_w < 1, n, 1, f, 1);
+    blocks_from_rows(n, f, tangent);
 }
 
 void beam_bending(double length, double bending, double shear, double *near, double *far)

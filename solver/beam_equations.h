@@ -9,6 +9,7 @@
 //   ext     = l + bow - extend
 //   E = EA/(2L) ext^2 + c/2 (|theta1|^2 + |theta2|^2) + d theta1 . theta2 + GJ/(2L) psi^2
 //   c - d = 2 EI / L,  c + d = 6 EI / ((1 + Phi) L),  Phi = 12 EI / (kappa G A L^2)
+// Several tools on one line (coaxial.c) need no more than a c at each end, c1 and c2, rest chords that are no mirror images and a twist at rest.
 // Forces are the exact derivative of E. E does not change when the nodes are swapped with e and the frames reversed, nor in a
 // rigid motion, nor when mirrored. The bow makes the chord shorten with the square of the bending angles: without it a chain rolls up
 // to a polygon whose chords (not arcs) have the rest length, (pi/N)^2/6 too large; its second derivative is the consistent
@@ -74,15 +75,22 @@ INLINE Vec3 bend_back(const Bend *b, Vec3 e, Vec3 m, Vec3 *along)
     return vec3_add_scaled(turn, -mn, b->n);
 }
 
-INLINE void element(const BeamInput *in, bool is_curved, BeamOutput *out)
+// What a mix of tools makes of an element's ends; one uniform tool has the same stiffness at both, mirrored rest chords and no twist (element()).
+typedef struct BeamEnds {
+    double near1, near2;     // [N mm] c of each end; d is in->far
+    Quat rest1, rest2;       // from each node's frame to the rest chord, (w, 0, y, z)
+    double twist;            // [rad] at rest
+} BeamEnds;
+
+INLINE void element_between(const BeamInput *in, BeamEnds ends, bool is_curved, BeamOutput *out)
 {
     Vec3 d = vec3_sub(in->x2, in->x1);
     double l = sqrt(vec3_norm2(d)), inverse = 1 / l;
     Vec3 e = vec3_scale(d, inverse);
     Quat f1 = in->q1, f2 = in->q2;
     if (is_curved) {
-        f1 = quat_mul(in->q1, (Quat){in->half_w, 0, in->half_y, in->half_z});
-        f2 = quat_mul(in->q2, (Quat){in->half_w, 0, -in->half_y, -in->half_z});
+        f1 = quat_mul(in->q1, ends.rest1);
+        f2 = quat_mul(in->q2, ends.rest2);
     }
     Bend c1 = bend_from(e, first_axis(f1)), c2 = bend_from(e, first_axis(f2));
     Bend b1 = c1, b2 = c2;
@@ -99,8 +107,8 @@ INLINE void element(const BeamInput *in, bool is_curved, BeamOutput *out)
     double extension = l + bow - in->extend, tension = in->axial * extension;
 
     // bending
-    Vec3 m1 = vec3_add(vec3_scale(c1.angle, in->near), vec3_scale(c2.angle, in->far));
-    Vec3 m2 = vec3_add(vec3_scale(c2.angle, in->near), vec3_scale(c1.angle, in->far));
+    Vec3 m1 = vec3_add(vec3_scale(c1.angle, ends.near1), vec3_scale(c2.angle, in->far));
+    Vec3 m2 = vec3_add(vec3_scale(c2.angle, ends.near2), vec3_scale(c1.angle, in->far));
     double energy = 0.5 * (tension * extension + vec3_dot(m1, c1.angle) + vec3_dot(m2, c2.angle));
     // the second derivative of theta with a spin of the node is the rest angle back, b - c
     double spin1 = is_curved ? vec3_dot(m1, vec3_sub(b1.angle, c1.angle)) : 0, spin2 = is_curved ? vec3_dot(m2, vec3_sub(b2.angle, c2.angle)) : 0;
@@ -108,7 +116,7 @@ INLINE void element(const BeamInput *in, bool is_curved, BeamOutput *out)
     // torsion: p = (w, v) the rotation from F1 to F2, seen in F1
     Quat p = quat_mul(quat_conjugate(f1), f2);
     double h, g = angle_over_sine(0.5 * (1 - p.w), &h);
-    double psi = 2 * g * p.x, torque = in->twist * psi;
+    double psi = 2 * g * p.x - ends.twist, torque = in->twist * psi;
     Vec3 axis = vec3(g * p.w - h * p.x * p.x, g * p.z - h * p.x * p.y, -g * p.y - h * p.x * p.z);
     axis = quat_rotate(f1, axis);
     Vec3 turn = vec3_scale(axis, torque);
@@ -146,6 +154,12 @@ INLINE void element(const BeamInput *in, bool is_curved, BeamOutput *out)
     out->turn2 = b2.angle;
 }
 
+INLINE void element(const BeamInput *in, bool is_curved, BeamOutput *out)
+{
+    Quat rest1 = {in->half_w, 0, in->half_y, in->half_z}, rest2 = {in->half_w, 0, -in->half_y, -in->half_z};
+    element_between(in, (BeamEnds){in->near, in->near, rest1, rest2, 0}, is_curved, out);
+}
+
 // The tangent of an element, its distinct entries: with A = [tt, tr; tr', rr] for the unknowns (displacement, rotation) of each node,
 //   k11 = [-F_TT, -N_TR; ., N_RR]   k21 = [F_TT, N_TR; F_TR', N_FAR]   k22 = [-F_TT, -F_TR; ., F_RR]
 // N_ rows belong to the element's first node, F_ rows to its second: signs are those of k21. Symmetric blocks hold six entries (SYM).
@@ -179,24 +193,24 @@ INLINE Coupling coupling(Vec3 e, Vec3 sum, Vec3 tangent, double s, double invers
 }
 
 // Rows of the tangent, main part times `scale`, geometric part of the tension `pull` >= 0, row k at [k * stride].
-INLINE void tangent_rows(const BeamOutput *o, double length, double axial, double near, double far, double twist, double scale,
+INLINE void tangent_rows(const BeamOutput *o, double length, double axial, double near1, double near2, double far, double twist, double scale,
                          double pull, bool is_curved, double *restrict n, int n_stride, double *restrict f, int f_stride)
 {
     double inverse = o->inverse, ka = axial * scale, kt = twist * scale;
-    double c = near * scale + pull * length * (4.0 / 30), d = far * scale - pull * length * (1.0 / 30);
+    double c1 = near1 * scale + pull * length * (4.0 / 30), c2 = near2 * scale + pull * length * (4.0 / 30), d = far * scale - pull * length * (1.0 / 30);
     Vec3 e = o->chord, t1 = o->tangent1, t2 = o->tangent2;
     double s1 = vec3_dot(e, t1), s2 = vec3_dot(e, t2), t12 = vec3_dot(t1, t2), i2 = inverse * inverse;
-    double a = 2 * (c + d * t12) * i2 + pull * inverse;
-    Coupling u1 = coupling(e, vec3_add(vec3_scale(t1, c), vec3_scale(t2, d)), t1, s1, inverse);
-    Coupling u2 = coupling(e, vec3_add(vec3_scale(t1, d), vec3_scale(t2, c)), t2, s2, inverse);
+    double a = (c1 + c2 + 2 * (d * t12)) * i2 + pull * inverse;
+    Coupling u1 = coupling(e, vec3_add(vec3_scale(t1, c1), vec3_scale(t2, d)), t1, s1, inverse);
+    Coupling u2 = coupling(e, vec3_add(vec3_scale(t1, d), vec3_scale(t2, c2)), t2, s2, inverse);
     Columns v = columns(e), ext = columns(o->stretch), w1 = columns(o->bow1), w2 = columns(o->bow2), g = columns(o->axis);
     Columns a1 = columns(o->own1), a2 = columns(o->own2);
     Columns p1 = columns(t1), p2 = columns(t2), q1 = columns(vec3_add_scaled(t1, -s1, e)), q2 = columns(vec3_add_scaled(t2, -s2, e));
     UNROLL
     for (int i = 0; i < 3; i++) {
         // rows of B_i' B_j and of the second-order rest of D_i' D_j
-        double av = a * v.v[i], x1 = i2 * (c * q1.v[i] + d * q2.v[i]), x2 = i2 * (c * q2.v[i] + d * q1.v[i]);
-        double y11 = c * (v.v[i] - s1 * p1.v[i]), z11 = c * s1 * v.v[i], y22 = c * (v.v[i] - s2 * p2.v[i]), z22 = c * s2 * v.v[i];
+        double av = a * v.v[i], x1 = i2 * (c1 * q1.v[i] + d * q2.v[i]), x2 = i2 * (c2 * q2.v[i] + d * q1.v[i]);
+        double y11 = c1 * (v.v[i] - s1 * p1.v[i]), z11 = c1 * s1 * v.v[i], y22 = c2 * (v.v[i] - s2 * p2.v[i]), z22 = c2 * s2 * v.v[i];
         double y21 = d * (t12 * v.v[i] - s2 * p1.v[i]), z21 = d * s1 * v.v[i];
         double ke = ka * ext.v[i], k1 = ka * w1.v[i], k2 = ka * w2.v[i], kg = kt * g.v[i];
         UNROLL
@@ -213,10 +227,29 @@ INLINE void tangent_rows(const BeamOutput *o, double length, double axial, doubl
             if (is_curved)
                 r11 += o->spin1 * a1.v[i] * a1.v[j], r22 += o->spin2 * a2.v[i] * a2.v[j];
             f[(F_TT + SYM[i][j]) * f_stride] = i == j ? tt - a : tt;
-            n[(N_RR + SYM[i][j]) * n_stride] = i == j ? c * s1 * s1 + r11 : r11;
-            f[(F_RR + SYM[i][j]) * f_stride] = i == j ? c * s2 * s2 + r22 : r22;
+            n[(N_RR + SYM[i][j]) * n_stride] = i == j ? c1 * s1 * s1 + r11 : r11;
+            f[(F_RR + SYM[i][j]) * f_stride] = i == j ? c2 * s2 * s2 + r22 : r22;
         }
     }
+}
+
+// One element's rows as blocks.
+INLINE void blocks_from_rows(const double n[N_ROWS], const double f[F_ROWS], BeamTangent *tangent)
+{
+    double *k11 = tangent->k11, *k21 = tangent->k21, *k22 = tangent->k22;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            int tt = 6 * i + j, tr = tt + 3, rt = 6 * (3 + j) + i, rr = 6 * (3 + i) + 3 + j, sym = SYM[i][j];
+            k21[tt] = f[F_TT + sym];
+            k21[tr] = n[N_TR + 3 * i + j];
+            k21[rt] = f[F_TR + 3 * i + j];
+            k21[rr] = n[N_FAR + 3 * i + j];
+            k11[tt] = k22[tt] = -f[F_TT + sym];
+            k11[tr] = k11[rt] = -n[N_TR + 3 * i + j];
+            k22[tr] = k22[rt] = -f[F_TR + 3 * i + j];
+            k11[rr] = n[N_RR + sym];
+            k22[rr] = f[F_RR + sym];
+        }
 }
 
 #endif

@@ -4,9 +4,10 @@
 //   D_i = T d T^T (T unit lower), Z = C T^-T d^-1, and the neighbour towards the middle loses Z d Z^T.
 // Forward: y = T^-1 b, the neighbour's b loses Z y. Backward: x = T^-T (d^-1 y - Z^T x'), x' of the neighbour towards the middle.
 //
-// The work is latency-bound (six divisions in a row per node), so the two ends are eliminated in one loop, interleaved pivot by pivot:
-// their chains of operations do not depend on each other. Columns are 8 lanes wide, 6 in use; lane 6 of the coupling carries the
-// right-hand side, which is how a factorisation with one solve (block_chain_factor_solve) gets its forward half for nothing.
+// The work is latency-bound (a division in a row for every unknown), so the two ends are eliminated in one loop, interleaved pivot by pivot:
+// their chains of operations do not depend on each other. Columns are 8 lanes wide for blocks of 6, 16 for larger ones; the lane behind the
+// last row of the coupling carries the right-hand side, which is how a factorisation with one solve (block_chain_factor_solve) gets its
+// forward half for nothing.
 // Pivots stay scalar: multiplying with explicit inverses of 6x6 blocks is faster by a third but loses the square root of the condition.
 #include "solver/block_chain.h"
 
@@ -18,9 +19,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Per node: T and Z by columns (6 x 8; z lane 6: d^-1 y of the fused solve), and 1/d.
+// Per node: T and Z by columns (size x BLOCK_COLUMN(size); z lane `size`: d^-1 y of the fused solve), and 1/d.
 struct BlockFactor {
-    int count;
+    int count, size;
     double *t, *z, *inverse;
 };
 
@@ -33,15 +34,17 @@ static double *aligned_zeros(size_t count)
     return p;
 }
 
-bool block_chain_create(BlockChain *chain, int count)
+bool block_size_is_known(int size) { return size == 6 || size == 8 || size == 10 || size == 12; }
+
+bool block_chain_create(BlockChain *chain, int count, int size)
 {
     *chain = (BlockChain){0};
-    if (count < 1)
+    if (count < 1 || !block_size_is_known(size))
         return false;
     chain->count = count;
-    // two doubles of padding: a row is read 8 wide
-    chain->diag = aligned_zeros((size_t)count * BLOCK + 2);
-    chain->lower = aligned_zeros((size_t)count * BLOCK + 2);
+    chain->size = size;
+    chain->diag = aligned_zeros(block_doubles(count, size));
+    chain->lower = aligned_zeros(block_doubles(count, size));
     if (!chain->diag || !chain->lower) {
         block_chain_destroy(chain);
         return false;
@@ -56,15 +59,17 @@ void block_chain_destroy(BlockChain *chain)
     *chain = (BlockChain){0};
 }
 
-BlockFactor *block_factor_create(int count)
+BlockFactor *block_factor_create(int count, int size)
 {
-    BlockFactor *f = count < 1 ? NULL : calloc(1, sizeof *f);
+    BlockFactor *f = count < 1 || !block_size_is_known(size) ? NULL : calloc(1, sizeof *f);
     if (!f)
         return NULL;
+    size_t m = (size_t)count;
     f->count = count;
-    f->t = aligned_zeros((size_t)count * PANEL);
-    f->z = aligned_zeros((size_t)count * PANEL);
-    f->inverse = aligned_zeros((size_t)count * COLUMN);
+    f->size = size;
+    f->t = aligned_zeros(m * (size_t)BLOCK_PANEL(size));
+    f->z = aligned_zeros(m * (size_t)BLOCK_PANEL(size));
+    f->inverse = aligned_zeros(m * (size_t)BLOCK_COLUMN(size));
     if (!f->t || !f->z || !f->inverse) {
         block_factor_destroy(f);
         return NULL;
@@ -82,162 +87,124 @@ void block_factor_destroy(BlockFactor *factor)
     free(factor);
 }
 
-// r = d^-1 y - Z^T x', then T^T x = r; y_scaled has stride `step` between its six entries.
-INLINE void back_substitute_node(const double *t, const double *z, const double *y_scaled, int step, const double *next, double *x)
-{
-    double r[6];
-    UNROLL
-    for (int k = 0; k < 6; k++) {
-        const double *q = z + COLUMN * k;
-        r[k] = y_scaled[step * k] - ((q[0] * next[0] + q[1] * next[1]) + (q[2] * next[2] + q[3] * next[3]) + (q[4] * next[4] + q[5] * next[5]));
-    }
-    UNROLL
-    for (int k = 5; k >= 0; k--)
-        UNROLL
-        for (int j = 0; j < k; j++)
-            r[j] -= t[COLUMN * j + k] * r[k];
-    UNROLL
-    for (int k = 0; k < 6; k++)
-        x[k] = r[k];
-}
+static const double zeros[BLOCK_LARGEST];
 
-// y = T^-1 b in place, and b' -= Z y.
-INLINE void forward_substitute_node(const double *t, const double *z, double *y, double *next)
-{
-    UNROLL
-    for (int k = 0; k < 6; k++)
-        UNROLL
-        for (int j = k + 1; j < 6; j++)
-            y[j] -= t[COLUMN * k + j] * y[k];
-    UNROLL
-    for (int j = 0; j < 6; j++)
-        next[j] -= (z[j] * y[0] + z[COLUMN + j] * y[1]) + (z[2 * COLUMN + j] * y[2] + z[3 * COLUMN + j] * y[3]) +
-                   (z[4 * COLUMN + j] * y[4] + z[5 * COLUMN + j] * y[5]);
-}
+#define KERNELS "solver/block_chain_kernel.inc"
+#define SMALL 8
+#include "solver/block_sizes.inc"
 
-static const double zeros[6];
-
-// All pivots positive and finite; looked at once, afterwards.
-INLINE bool pivots_hold(const BlockFactor *f)
-{
-    bool ok = true;
-    for (size_t i = 0; i < (size_t)f->count; i++)
-        for (size_t k = 0; k < 6; k++)
-            ok &= f->inverse[COLUMN * i + k] > 0 && f->inverse[COLUMN * i + k] <= DBL_MAX;
-    return ok;
-}
-
-#define WIDTH 2
-#define TARGET
-#define KERNEL(name) name##_baseline
-#include "solver/block_chain_kernel.inc"
-#undef WIDTH
-#undef TARGET
-#undef KERNEL
-#if BLOCK_HAS_AVX
-#define WIDTH 4
-#define TARGET __attribute__((target("avx2")))
-#define KERNEL(name) name##_avx2
-#include "solver/block_chain_kernel.inc"
-#undef WIDTH
-#undef TARGET
-#undef KERNEL
-#define WIDTH 8
-#define TARGET __attribute__((target("avx512f,avx512dq,avx512vl")))
-#define KERNEL(name) name##_avx512
-#include "solver/block_chain_kernel.inc"
-#undef WIDTH
-#undef TARGET
-#undef KERNEL
-#define ON(name) {name##_baseline, name##_avx2, name##_avx512}
-#else
-#define ON(name) {name##_baseline, name##_baseline, name##_baseline}
-#endif
-
-static bool (*const eliminate_on[SIMD_COUNT])(const BlockChain *, BlockFactor *, const double *) = ON(eliminate);
-static void (*const back_substitute_on[SIMD_COUNT])(const BlockFactor *, double *, const double *, int, int) = ON(back_substitute);
-static void (*const forward_substitute_on[SIMD_COUNT])(const BlockFactor *, double *) = ON(forward_substitute);
+static bool (*const eliminate_on[BLOCK_SIZES][SIMD_COUNT])(const BlockChain *, BlockFactor *, const double *) = BLOCK_FORMS(eliminate);
+static void (*const back_substitute_on[BLOCK_SIZES][SIMD_COUNT])(const BlockFactor *, double *, const double *, int, int) = BLOCK_FORMS(back_substitute);
+static void (*const forward_substitute_on[BLOCK_SIZES][SIMD_COUNT])(const BlockFactor *, double *) = BLOCK_FORMS(forward_substitute);
 
 bool block_chain_factor(const BlockChain *chain, BlockFactor *factor)
 {
     factor->count = chain->count;
-    return eliminate_on[simd_level()](chain, factor, NULL);
+    return chain->size == factor->size && eliminate_on[block_size_index(chain->size)][simd_level()](chain, factor, NULL);
 }
 
 bool block_chain_factor_solve(const BlockChain *chain, BlockFactor *factor, const double *b, double *x)
 {
+    int size = chain->size, form = block_size_index(size);
     factor->count = chain->count;
-    if (!eliminate_on[simd_level()](chain, factor, b))
+    if (size != factor->size || !eliminate_on[form][simd_level()](chain, factor, b))
         return false;
-    back_substitute_on[simd_level()](factor, x, factor->z + 6, PANEL, COLUMN);
+    back_substitute_on[form][simd_level()](factor, x, factor->z + size, BLOCK_PANEL(size), BLOCK_COLUMN(size));
     return true;
 }
 
 void block_factor_solve(const BlockFactor *factor, const double *b, double *x)
 {
+    int size = factor->size, form = block_size_index(size);
     if (x != b)
-        memcpy(x, b, (size_t)factor->count * 6 * sizeof *x);
-    forward_substitute_on[simd_level()](factor, x);
-    back_substitute_on[simd_level()](factor, x, x, 6, 1);
+        memcpy(x, b, (size_t)(factor->count * size) * sizeof *x);
+    forward_substitute_on[form][simd_level()](factor, x);
+    back_substitute_on[form][simd_level()](factor, x, x, size, 1);
 }
 
 // S_i = D_i^-1 + G^T S' G with G = Z T^-1 = C D_i^-1, S' the neighbour's towards the middle.
-static void inverse_block(const BlockFactor *f, size_t i, const double *towards, double *s)
+INLINE void inverse_block(const BlockFactor *f, size_t i, const double *towards, double *s, const int size)
 {
-    const double *t = f->t + i * PANEL, *z = f->z + i * PANEL, *inverse = f->inverse + i * COLUMN;
-    double ti[6][6] = {{0}}, g[6][6] = {{0}}, sg[6][6] = {{0}};
+    const int column = BLOCK_COLUMN(size), panel = BLOCK_PANEL(size);
+    const double *t = f->t + i * (size_t)panel, *z = f->z + i * (size_t)panel, *inverse = f->inverse + i * (size_t)column;
+    double ti[BLOCK_LARGEST][BLOCK_LARGEST], g[BLOCK_LARGEST][BLOCK_LARGEST], sg[BLOCK_LARGEST][BLOCK_LARGEST];
+    for (int c = 0; c < size; c++)
+        for (int r = 0; r < size; r++)
+            ti[c][r] = g[c][r] = sg[c][r] = 0;
     // ti = T^-1 by columns: ti[c][r]
-    for (int c = 0; c < 6; c++) {
+    for (int c = 0; c < size; c++) {
         ti[c][c] = 1;
-        for (int r = c + 1; r < 6; r++)
+        for (int r = c + 1; r < size; r++)
             for (int k = c; k < r; k++)
-                ti[c][r] -= t[COLUMN * k + r] * ti[c][k];
+                ti[c][r] -= t[column * k + r] * ti[c][k];
     }
     if (towards) {
-        for (int c = 0; c < 6; c++)
-            for (int k = c; k < 6; k++)
-                for (int r = 0; r < 6; r++)
-                    g[c][r] += z[COLUMN * k + r] * ti[c][k];
-        for (int c = 0; c < 6; c++)
-            for (int k = 0; k < 6; k++)
-                for (int r = 0; r < 6; r++)
-                    sg[c][r] += towards[6 * k + r] * g[c][k];
+        for (int c = 0; c < size; c++)
+            for (int k = c; k < size; k++)
+                for (int r = 0; r < size; r++)
+                    g[c][r] += z[column * k + r] * ti[c][k];
+        for (int c = 0; c < size; c++)
+            for (int k = 0; k < size; k++)
+                for (int r = 0; r < size; r++)
+                    sg[c][r] += towards[size * k + r] * g[c][k];
     }
-    for (int r = 0; r < 6; r++)
+    for (int r = 0; r < size; r++)
         for (int c = 0; c <= r; c++) {
             double sum = 0;
-            for (int k = r; k < 6; k++)
+            for (int k = r; k < size; k++)
                 sum += ti[r][k] * inverse[k] * ti[c][k];
-            for (int k = 0; k < 6; k++)
+            for (int k = 0; k < size; k++)
                 sum += g[r][k] * sg[c][k];
-            s[6 * r + c] = s[6 * c + r] = sum;
+            s[size * r + c] = s[size * c + r] = sum;
         }
 }
 
+INLINE void inverse_diagonal(const BlockFactor *factor, double *inverse, const int size)
+{
+    size_t count = (size_t)factor->count, m = count / 2, block = (size_t)(size * size);
+    inverse_block(factor, m, NULL, inverse + m * block, size);
+    for (size_t i = m; i-- > 0;)
+        inverse_block(factor, i, inverse + (i + 1) * block, inverse + i * block, size);
+    for (size_t i = m + 1; i < count; i++)
+        inverse_block(factor, i, inverse + (i - 1) * block, inverse + i * block, size);
+}
+
+INLINE void multiply(const BlockChain *chain, const double *x, double *y, const int size)
+{
+    const size_t block = (size_t)(size * size);
+    for (int i = 0; i < chain->count; i++) {
+        const double *d = chain->diag + (size_t)i * block, *before = chain->lower + (size_t)(i > 0 ? i - 1 : 0) * block,
+                     *after = chain->lower + (size_t)i * block;
+        for (int r = 0; r < size; r++) {
+            double sum = 0;
+            for (int c = 0; c < size; c++)
+                sum += d[size * r + c] * x[size * i + c];
+            for (int c = 0; i > 0 && c < size; c++)
+                sum += before[size * r + c] * x[size * (i - 1) + c];
+            for (int c = 0; i + 1 < chain->count && c < size; c++)
+                sum += after[size * c + r] * x[size * (i + 1) + c];
+            y[size * i + r] = sum;
+        }
+    }
+}
+
+// Loops over a size that is a constant are faster.
 void block_factor_inverse_diagonal(const BlockFactor *factor, double *inverse)
 {
-    size_t count = (size_t)factor->count, m = count / 2;
-    inverse_block(factor, m, NULL, inverse + m * BLOCK);
-    for (size_t i = m; i-- > 0;)
-        inverse_block(factor, i, inverse + (i + 1) * BLOCK, inverse + i * BLOCK);
-    for (size_t i = m + 1; i < count; i++)
-        inverse_block(factor, i, inverse + (i - 1) * BLOCK, inverse + i * BLOCK);
+    switch (factor->size) {
+    case 6: inverse_diagonal(factor, inverse, 6); break;
+    case 8: inverse_diagonal(factor, inverse, 8); break;
+    case 10: inverse_diagonal(factor, inverse, 10); break;
+    default: inverse_diagonal(factor, inverse, 12); break;
+    }
 }
 
 void block_chain_multiply(const BlockChain *chain, const double *x, double *y)
 {
-    for (int i = 0; i < chain->count; i++) {
-        const double *d = chain->diag + (size_t)i * BLOCK, *before = chain->lower + (size_t)(i > 0 ? i - 1 : 0) * BLOCK,
-                     *after = chain->lower + (size_t)i * BLOCK;
-        for (int r = 0; r < 6; r++) {
-            double sum = 0;
-            for (int c = 0; c < 6; c++)
-                sum += d[6 * r + c] * x[6 * i + c];
-            for (int c = 0; i > 0 && c < 6; c++)
-                sum += before[6 * r + c] * x[6 * (i - 1) + c];
-            for (int c = 0; i + 1 < chain->count && c < 6; c++)
-                sum += after[6 * c + r] * x[6 * (i + 1) + c];
-            y[6 * i + r] = sum;
-        }
+    switch (chain->size) {
+    case 6: multiply(chain, x, y, 6); break;
+    case 8: multiply(chain, x, y, 8); break;
+    case 10: multiply(chain, x, y, 10); break;
+    default: multiply(chain, x, y, 12); break;
     }
 }

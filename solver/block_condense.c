@@ -3,7 +3,7 @@
 //   D_i = T d T^T,  C = A(i', i) with the neighbour i' ahead,  O = A(origin, i),  Z = C T^-T d^-1,  H = O T^-T d^-1
 //   A(i', i') loses Z d Z^T,  A(origin, i') becomes -H d Z^T,  A(origin, origin) loses H d H^T
 //   y = T^-1 b,  b_i' loses Z y,  b_origin loses H y;   back:  x = T^-T (d^-1 y - Z^T x' - H^T x_origin)
-// Interleaved as in block_chain.c, and for the same reason; lane 6 of C and O carries y.
+// Interleaved as in block_chain.c, and for the same reason; the lane behind the last row of C and O carries y.
 #include "solver/block_condense.h"
 
 #include "geom/simd.h"
@@ -14,33 +14,38 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Per node, by columns of eight.
-typedef struct Node {
-    _Alignas(64) double t[6][COLUMN], z[6][COLUMN], h[6][COLUMN]; // z lane 6: d^-1 y
-    double inverse[COLUMN];
-    int place;                   // in the small chain, -1: eliminated …
-    int origin;                  // … into this one and the next ahead; -1: from an end of the chain
-} Node;
+// A node holds T, Z (lane n: d^-1 y) and H by columns, and 1/d.
+#define T_AT 0
+#define Z_AT PANEL
+#define H_AT (2 * PANEL)
+#define INVERSE_AT (3 * PANEL)
+#define NODE (3 * PANEL + COLUMN)
+static size_t node_doubles(int size) { return (size_t)(3 * BLOCK_PANEL(size) + BLOCK_COLUMN(size)); }
 
 struct BlockCondenser {
-    int count, middle;
+    int count, size, middle;
     bool *keep;
-    Node *node;
+    int *place;                  // (M) in the small chain, -1: eliminated …
+    int *origin;                 // (M) … into this one and the next ahead; -1: from an end of the chain
+    double *node;
     double *side;
     BlockChain small;
 };
 
-BlockCondenser *block_condenser_create(int count)
+BlockCondenser *block_condenser_create(int count, int size)
 {
-    BlockCondenser *k = count < 1 ? NULL : calloc(1, sizeof *k);
+    BlockCondenser *k = count < 1 || !block_size_is_known(size) ? NULL : calloc(1, sizeof *k);
     if (!k)
         return NULL;
-    size_t m = (size_t)count, bytes = m * sizeof *k->node;
+    size_t m = (size_t)count, bytes = m * node_doubles(size) * sizeof *k->node;
     k->count = count;
+    k->size = size;
     k->keep = calloc(m, sizeof *k->keep);
-    k->side = calloc(6 * m, sizeof *k->side);
+    k->place = calloc(m, sizeof *k->place);
+    k->origin = calloc(m, sizeof *k->origin);
+    k->side = calloc((size_t)size * m, sizeof *k->side);
     k->node = aligned_alloc(64, bytes);
-    if (!block_chain_create(&k->small, count) || !k->keep || !k->side || !k->node) {
+    if (!block_chain_create(&k->small, count, size) || !k->keep || !k->place || !k->origin || !k->side || !k->node) {
         block_condenser_destroy(k);
         return NULL;
     }
@@ -54,6 +59,8 @@ void block_condenser_destroy(BlockCondenser *k)
         return;
     block_chain_destroy(&k->small);
     free(k->keep);
+    free(k->place);
+    free(k->origin);
     free(k->side);
     free(k->node);
     free(k);
@@ -61,7 +68,7 @@ void block_condenser_destroy(BlockCondenser *k)
 
 bool *block_condenser_keep(BlockCondenser *k) { return k->keep; }
 double *block_condenser_side(BlockCondenser *k) { return k->side; }
-int block_condenser_place(const BlockCondenser *k, int node) { return k->node[node].place; }
+int block_condenser_place(const BlockCondenser *k, int node) { return k->place[node]; }
 
 // One end: the node it is at, and the kept one behind it.
 typedef struct Walk {
@@ -69,72 +76,30 @@ typedef struct Walk {
     bool runs;                   // the node before was eliminated
 } Walk;
 
-static double *coupling(BlockCondenser *k, int place) { return k->small.lower + (size_t)place * BLOCK; }
+static double *coupling(BlockCondenser *k, int place) { return k->small.lower + (size_t)place * (size_t)(k->size * k->size); }
 
 // Goes on to the next node to eliminate; false at the middle.
 static bool seek(BlockCondenser *k, const BlockChain *a, Walk *w)
 {
-    for (; w->at != k->middle && k->node[w->at].place >= 0; w->at += w->step) {
+    const size_t block = (size_t)(k->size * k->size);
+    for (; w->at != k->middle && k->place[w->at] >= 0; w->at += w->step) {
         int next = w->at + w->step, behind = w->step > 0 ? w->at : next;
-        if (k->node[next].place >= 0)
-            memcpy(coupling(k, k->node[behind].place), a->lower + (size_t)behind * BLOCK, BLOCK * sizeof(double));
+        if (k->place[next] >= 0)
+            memcpy(coupling(k, k->place[behind]), a->lower + (size_t)behind * block, block * sizeof(double));
         w->origin = w->at;
         w->runs = false;
     }
     return w->at != k->middle;
 }
 
-// r = d^-1 y - Z^T x' - H^T x_origin, then T^T x = r
-INLINE void expand_node(const Node *o, const double *next, const double *origin, double *x)
-{
-    double r[6];
-    UNROLL
-    for (int k = 0; k < 6; k++) {
-        const double *z = o->z[k], *h = o->h[k];
-        r[k] = z[6] - ((z[0] * next[0] + z[1] * next[1]) + (z[2] * next[2] + z[3] * next[3]) + (z[4] * next[4] + z[5] * next[5])) -
-               ((h[0] * origin[0] + h[1] * origin[1]) + (h[2] * origin[2] + h[3] * origin[3]) + (h[4] * origin[4] + h[5] * origin[5]));
-    }
-    UNROLL
-    for (int k = 5; k >= 0; k--)
-        UNROLL
-        for (int j = 0; j < k; j++)
-            r[j] -= o->t[j][k] * r[k];
-    UNROLL
-    for (int k = 0; k < 6; k++)
-        x[k] = r[k];
-}
+static const double zeros[BLOCK_LARGEST];
 
-static const double zeros[6];
+#define KERNELS "solver/block_condense_kernel.inc"
+#define SMALL 6
+#include "solver/block_sizes.inc"
 
-#define WIDTH 2
-#define TARGET
-#define KERNEL(name) name##_baseline
-#include "solver/block_condense_kernel.inc"
-#undef WIDTH
-#undef TARGET
-#undef KERNEL
-#if BLOCK_HAS_AVX
-#define WIDTH 4
-#define TARGET __attribute__((target("avx2")))
-#define KERNEL(name) name##_avx2
-#include "solver/block_condense_kernel.inc"
-#undef WIDTH
-#undef TARGET
-#undef KERNEL
-#define WIDTH 8
-#define TARGET __attribute__((target("avx512f,avx512dq,avx512vl")))
-#define KERNEL(name) name##_avx512
-#include "solver/block_condense_kernel.inc"
-#undef WIDTH
-#undef TARGET
-#undef KERNEL
-#define ON(name) {name##_baseline, name##_avx2, name##_avx512}
-#else
-#define ON(name) {name##_baseline, name##_baseline, name##_baseline}
-#endif
-
-static void (*const eliminate_on[SIMD_COUNT])(BlockCondenser *, const BlockChain *, const double *) = ON(eliminate);
-static void (*const expand_on[SIMD_COUNT])(const BlockCondenser *, double *) = ON(expand);
+static void (*const eliminate_on[BLOCK_SIZES][SIMD_COUNT])(BlockCondenser *, const BlockChain *, const double *) = BLOCK_FORMS(eliminate);
+static void (*const expand_on[BLOCK_SIZES][SIMD_COUNT])(const BlockCondenser *, double *) = BLOCK_FORMS(expand);
 
 // The eliminated node with as many eliminated ones before it as behind is kept.
 static void choose_middle(BlockCondenser *k)
@@ -153,29 +118,34 @@ static void choose_middle(BlockCondenser *k)
 
 const BlockChain *block_condense(BlockCondenser *k, const BlockChain *chain, const double *b)
 {
+    const size_t n = (size_t)k->size, block = n * n;
+    k->count = chain->count;
     choose_middle(k);
     k->small.count = 0;
     for (int i = 0; i < k->count; i++) {
-        k->node[i].place = k->keep[i] ? k->small.count : -1;
+        k->place[i] = k->keep[i] ? k->small.count : -1;
         if (!k->keep[i])
             continue;
         size_t p = (size_t)k->small.count++;
-        memcpy(k->small.diag + p * BLOCK, chain->diag + (size_t)i * BLOCK, BLOCK * sizeof(double));
-        memcpy(k->side + 6 * p, b + 6 * (size_t)i, 6 * sizeof(double));
+        memcpy(k->small.diag + p * block, chain->diag + (size_t)i * block, block * sizeof(double));
+        memcpy(k->side + n * p, b + n * (size_t)i, n * sizeof(double));
         k->keep[i] = false;
     }
-    eliminate_on[simd_level()](k, chain, b);
+    eliminate_on[block_size_index(k->size)][simd_level()](k, chain, b);
+    const size_t stride = node_doubles(k->size);
+    const double *inverse = k->node + stride - BLOCK_COLUMN(k->size);
     bool ok = true;
-    for (int i = 0; i < k->count; i++)
-        for (int j = 0; k->node[i].place < 0 && j < 6; j++)
-            ok &= k->node[i].inverse[j] > 0 && k->node[i].inverse[j] <= DBL_MAX;
+    for (int i = 0; i < k->count; i++, inverse += stride)
+        for (int j = 0; k->place[i] < 0 && j < k->size; j++)
+            ok &= inverse[j] > 0 && inverse[j] <= DBL_MAX;
     return ok ? &k->small : NULL;
 }
 
 void block_condenser_expand(const BlockCondenser *k, const double *kept, double *x)
 {
+    const size_t n = (size_t)k->size;
     for (int i = 0; i < k->count; i++)
-        if (k->node[i].place >= 0)
-            memcpy(x + 6 * (size_t)i, kept + 6 * (size_t)k->node[i].place, 6 * sizeof *x);
-    expand_on[simd_level()](k, x);
+        if (k->place[i] >= 0)
+            memcpy(x + n * (size_t)i, kept + n * (size_t)k->place[i], n * sizeof *x);
+    expand_on[block_size_index(k->size)][simd_level()](k, x);
 }

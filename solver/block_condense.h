@@ -8,7 +8,7 @@
 
 typedef struct BlockCondenser BlockCondenser;
 
-BlockCondenser *block_condenser_create(int count);
+BlockCondenser *block_condenser_create(int count, int size);
 void block_condenser_destroy(BlockCondenser *condenser);
 // Which nodes to keep: all flags are false, and false again after condensing.
 bool *block_condenser_keep(BlockCondenser *condenser);
@@ -18,7 +18,7 @@ const BlockChain *block_condense(BlockCondenser *condenser, const BlockChain *ch
 double *block_condenser_side(BlockCondenser *condenser);
 // The place of a kept node in the small chain.
 int block_condenser_place(const BlockCondenser *condenser, int node);
-// x (M, 6) of all nodes from that of the kept ones.
+// x (M, n) of all nodes from that of the kept ones.
 void block_condenser_expand(const BlockCondenser *condenser, const double *kept, double *x);
 
 #endif

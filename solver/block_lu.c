@@ -2,7 +2,7 @@
 //
 //   left:  C = A(i+1, i), B = A(i, i+1);  right: C = A(i-1, i), B = A(i, i-1)
 //   D_i = T V (T unit lower, V upper), Z = C V^-1, Y = T^-1 B, and the neighbour towards the middle loses Z Y.
-// The right-hand side travels as a seventh column of B. Backward: x = V^-1 (T^-1 b - Y x'), x' of the neighbour towards the middle.
+// The right-hand side travels as one more column of B. Backward: x = V^-1 (T^-1 b - Y x'), x' of the neighbour towards the middle.
 #include "solver/block_lu.h"
 
 #include "geom/simd.h"
@@ -13,32 +13,37 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Per node, all by columns of eight.
-typedef struct Node {
-    double t[6][COLUMN], v[6][COLUMN], z[6][COLUMN], y[7][COLUMN]; // of t the lanes below the diagonal count
-    double inverse[COLUMN];
-} Node;
+// A node holds T, V and Z, all by columns (of T the lanes below the diagonal count), Y and behind it the right-hand side's column, and 1/d.
+#define T_AT 0
+#define V_AT PANEL
+#define Z_AT (2 * PANEL)
+#define Y_AT (3 * PANEL)
+#define INVERSE_AT (4 * PANEL + COLUMN)
+#define NODE (4 * PANEL + 2 * COLUMN)
+static size_t node_doubles(int size) { return (size_t)(4 * BLOCK_PANEL(size) + 2 * BLOCK_COLUMN(size)); }
 
 struct BlockLu {
-    int count;
-    Node *node;
-    double *rest, *change;       // (M, 6) of the refinement
+    int count, size;
+    double *node;
+    double *rest, *change;       // (M, n) of the refinement
 };
 
-BlockLu *block_lu_create(int count)
+BlockLu *block_lu_create(int count, int size)
 {
-    BlockLu *lu = count < 1 ? NULL : calloc(1, sizeof *lu);
+    BlockLu *lu = count < 1 || !block_size_is_known(size) ? NULL : calloc(1, sizeof *lu);
     if (!lu)
         return NULL;
+    size_t m = (size_t)count, bytes = m * node_doubles(size) * sizeof *lu->node;
     lu->count = count;
-    lu->node = aligned_alloc(64, (size_t)count * sizeof *lu->node);
-    lu->rest = calloc((size_t)count * 12, sizeof *lu->rest);
-    lu->change = lu->rest + (size_t)count * 6;
+    lu->size = size;
+    lu->node = aligned_alloc(64, bytes);
+    lu->rest = calloc(2 * m * (size_t)size, sizeof *lu->rest);
     if (!lu->node || !lu->rest) {
         block_lu_destroy(lu);
         return NULL;
     }
-    memset(lu->node, 0, (size_t)count * sizeof *lu->node);
+    lu->change = lu->rest + m * (size_t)size;
+    memset(lu->node, 0, bytes);
     return lu;
 }
 
@@ -51,79 +56,50 @@ void block_lu_destroy(BlockLu *lu)
     free(lu);
 }
 
-static const double zeros[6];
+static const double zeros[BLOCK_LARGEST];
 
-// No pivot vanishes or overflows.
-INLINE bool pivots_hold(const BlockLu *f)
-{
-    bool ok = true;
-    for (int i = 0; i < f->count; i++)
-        for (int k = 0; k < 6; k++)
-            ok &= f->node[i].inverse[k] != 0 && fabs(f->node[i].inverse[k]) <= DBL_MAX;
-    return ok;
-}
+#define KERNELS "solver/block_lu_kernel.inc"
+#define SMALL 8
+#include "solver/block_sizes.inc"
 
-#define WIDTH 2
-#define TARGET
-#define KERNEL(name) name##_baseline
-#include "solver/block_lu_kernel.inc"
-#undef WIDTH
-#undef TARGET
-#undef KERNEL
-#if BLOCK_HAS_AVX
-#define WIDTH 4
-#define TARGET __attribute__((target("avx2")))
-#define KERNEL(name) name##_avx2
-#include "solver/block_lu_kernel.inc"
-#undef WIDTH
-#undef TARGET
-#undef KERNEL
-#define WIDTH 8
-#define TARGET __attribute__((target("avx512f,avx512dq,avx512vl")))
-#define KERNEL(name) name##_avx512
-#include "solver/block_lu_kernel.inc"
-#undef WIDTH
-#undef TARGET
-#undef KERNEL
-#define ON(name) {name##_baseline, name##_avx2, name##_avx512}
-#else
-#define ON(name) {name##_baseline, name##_baseline, name##_baseline}
-#endif
-
-static bool (*const eliminate_on[SIMD_COUNT])(BlockLu *, const double *, const double *, const double *, const double *) = ON(eliminate);
-static void (*const back_on[SIMD_COUNT])(const BlockLu *, double *) = ON(back);
-static void (*const forward_on[SIMD_COUNT])(const BlockLu *, const double *) = ON(forward);
+static bool (*const eliminate_on[BLOCK_SIZES][SIMD_COUNT])(BlockLu *, const double *, const double *, const double *, const double *) = BLOCK_FORMS(eliminate);
+static void (*const back_on[BLOCK_SIZES][SIMD_COUNT])(const BlockLu *, double *) = BLOCK_FORMS(back);
+static void (*const forward_on[BLOCK_SIZES][SIMD_COUNT])(const BlockLu *, const double *) = BLOCK_FORMS(forward);
 
 static bool all_positive(const BlockLu *lu)
 {
+    const size_t stride = node_doubles(lu->size);
+    const double *inverse = lu->node + stride - BLOCK_COLUMN(lu->size);
     bool ok = true;
-    for (int i = 0; i < lu->count; i++)
-        for (int k = 0; k < 6; k++)
-            ok &= lu->node[i].inverse[k] > 0;
+    for (int i = 0; i < lu->count; i++, inverse += stride)
+        for (int k = 0; k < lu->size; k++)
+            ok &= inverse[k] > 0;
     return ok;
 }
 
 // r -= B x of one block by columns
-static void take_off(const double *block, const double *x, double *r)
+static void take_off(const double *block, const double *x, double *r, int size)
 {
-    for (int c = 0; c < 6; c++)
-        for (int k = 0; k < 6; k++)
-            r[k] -= block[6 * c + k] * x[c];
+    for (int c = 0; c < size; c++)
+        for (int k = 0; k < size; k++)
+            r[k] -= block[size * c + k] * x[c];
 }
 
 static void refine(BlockLu *lu, const double *diag, const double *lower, const double *upper, const double *b, double *x)
 {
-    memcpy(lu->rest, b, (size_t)lu->count * 6 * sizeof *b);
+    const int size = lu->size;
+    const size_t n = (size_t)size, block = n * n;
+    memcpy(lu->rest, b, (size_t)lu->count * n * sizeof *b);
     for (int i = 0; i < lu->count; i++) {
-        double *r = lu->rest + 6 * (size_t)i, *at = x + 6 * (size_t)i;
-        take_off(diag + (size_t)i * BLOCK, at, r);
+        double *r = lu->rest + n * (size_t)i, *at = x + n * (size_t)i;
+        take_off(diag + (size_t)i * block, at, r, size);
         if (i > 0)
-            take_off(lower + (size_t)(i - 1) * BLOCK, at - 6, r);
+            take_off(lower + (size_t)(i - 1) * block, at - n, r, size);
         if (i + 1 < lu->count)
-            take_off(upper + (size_t)i * BLOCK, at + 6, r);
+            take_off(upper + (size_t)i * block, at + n, r, size);
     }
     block_lu_solve(lu, lu->rest, lu->change);
-    for (size_t k = 0; k < 6 * (size_t)lu->count; k++)
+    for (size_t k = 0; k < n * (size_t)lu->count; k++)
         x[k] += lu->change[k];
 }
 
@@ -131,9 +107,9 @@ bool block_lu_factor_solve(BlockLu *lu, int count, const double *diag, const dou
                            bool *exact)
 {
     lu->count = count;
-    if (!eliminate_on[simd_level()](lu, diag, lower, upper, b))
+    if (!eliminate_on[block_size_index(lu->size)][simd_level()](lu, diag, lower, upper, b))
         return false;
-    back_on[simd_level()](lu, x);
+    back_on[block_size_index(lu->size)][simd_level()](lu, x);
     *exact = all_positive(lu);
     if (!*exact)
         refine(lu, diag, lower, upper, b, x);
@@ -142,14 +118,22 @@ bool block_lu_factor_solve(BlockLu *lu, int count, const double *diag, const dou
 
 void block_lu_solve(const BlockLu *lu, const double *b, double *x)
 {
-    forward_on[simd_level()](lu, b);
-    back_on[simd_level()](lu, x);
+    forward_on[block_size_index(lu->size)][simd_level()](lu, b);
+    back_on[block_size_index(lu->size)][simd_level()](lu, x);
 }
 
-void block_lu_transpose(int count, const double *from, double *to)
+INLINE void transpose(int count, const double *from, double *to, const int size)
 {
-    for (int i = 0; i < count; i++, from += BLOCK, to += BLOCK)
-        for (int r = 0; r < 6; r++)
-            for (int c = 0; c < 6; c++)
-                to[6 * c + r] = from[6 * r + c];
+    for (int i = 0; i < count; i++, from += size * size, to += size * size)
+        for (int r = 0; r < size; r++)
+            for (int c = 0; c < size; c++)
+                to[size * c + r] = from[size * r + c];
+}
+
+void block_lu_transpose(int count, int size, const double *from, double *to)
+{
+    if (size == 6) // the usual one, as a constant
+        transpose(count, from, to, 6);
+    else
+        transpose(count, from, to, size);
 }

@@ -1,4 +1,4 @@
-// Block-tridiagonal systems with 6x6 blocks that are not symmetric: a sliding contact makes the tangential force follow the normal
+// Block-tridiagonal systems with blocks of 6, 8, 10 or 12 that are not symmetric: a sliding contact makes the tangential force follow the normal
 // one, but not the other way round. Same two-ended order and layout as block_chain.h; half as dear again.
 #ifndef SELDINGER_SOLVER_BLOCK_LU_H
 #define SELDINGER_SOLVER_BLOCK_LU_H
@@ -7,10 +7,10 @@
 
 typedef struct BlockLu BlockLu;
 
-BlockLu *block_lu_create(int count);
+BlockLu *block_lu_create(int count, int size);
 void block_lu_destroy(BlockLu *lu);
-// Blocks by columns: diag[i][c][r] of A(i, i), lower[i] of A(i+1, i), upper[i] of A(i, i+1), (M, 6, 6) each with two doubles of padding behind.
-// (A symmetric chain's diag and its row-major lower, taken as upper, are that already.) x = A^-1 b, both (M, 6), not the same.
+// Blocks by columns: diag[i][c][r] of A(i, i), lower[i] of A(i+1, i), upper[i] of A(i, i+1), (M, n, n), block_doubles() each.
+// (A symmetric chain's diag and its row-major lower, taken as upper, are that already.) x = A^-1 b, both (M, n), not the same.
 // M = `count` is at most what the factor was made for.
 // No pivoting: false where a pivot vanishes or is not finite. Where one is negative digits may be lost: such a solution is refined once,
 // and `exact` says false.
@@ -18,7 +18,7 @@ bool block_lu_factor_solve(BlockLu *lu, int count, const double *diag, const dou
                            bool *exact);
 // Another right-hand side with the same factor.
 void block_lu_solve(const BlockLu *lu, const double *b, double *x);
-// to[i] = from[i]^T of `count` 6x6 blocks.
-void block_lu_transpose(int count, const double *from, double *to);
+// to[i] = from[i]^T of `count` blocks.
+void block_lu_transpose(int count, int size, const double *from, double *to);
 
 #endif

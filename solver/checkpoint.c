@@ -1,12 +1,14 @@
 // Checkpoints: everything that the next step depends on. Restored, a run repeats bit for bit.
 // The hash is FNV-1a taken word by word (8 bytes) in four lanes, with a shift that carries high bits down; bytes would cost 100 us.
-#include "solver/step_internal.h"
+#include "solver/step_tools.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 struct Checkpoint {
-    int node_count, point_count, first_free;
+    int point_capacity, first_free;
+    int first[STEP_TOOLS_MAX], inside[STEP_TOOLS_MAX];
+    double tool_inserted[STEP_TOOLS_MAX], tool_twist[STEP_TOOLS_MAX];
     size_t memory_count;
     double time, inserted, twist;
     StepReport report;
@@ -26,7 +28,7 @@ void checkpoint_free(Checkpoint *c)
 Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
 {
     Checkpoint *c = reuse;
-    if (c && (c->node_count != s->state.node_count || c->point_count != s->point_count)) {
+    if (c && (c->memory_count != s->memory_count || c->point_capacity != s->point_capacity)) {
         checkpoint_free(c);
         c = NULL;
     }
@@ -34,10 +36,9 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
         c = calloc(1, sizeof *c);
         if (!c)
             return NULL;
-        c->node_count = s->state.node_count;
-        c->point_count = s->point_count;
+        c->point_capacity = s->point_capacity;
         c->memory_count = s->memory_count;
-        c->place = calloc((size_t)c->point_count, sizeof *c->place);
+        c->place = calloc((size_t)c->point_capacity, sizeof *c->place);
         c->memory = calloc(c->memory_count, sizeof *c->memory);
         if (!c->place || !c->memory) {
             checkpoint_free(c);
@@ -49,21 +50,36 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
     c->inserted = s->state.inserted;
     c->twist = s->state.twist;
     c->report = s->report;
-    memcpy(c->place, s->place, (size_t)c->point_count * sizeof *c->place);
+    for (int k = 0; s->tool_count > 1 && k < s->tool_count; k++) {
+        c->first[k] = s->tool[k].first;
+        c->inside[k] = s->tool[k].inside;
+        c->tool_inserted[k] = s->tool[k].inserted;
+        c->tool_twist[k] = s->tool[k].twist;
+    }
+    memcpy(c->place, s->place, (size_t)c->point_capacity * sizeof *c->place);
     memcpy(c->memory, s->memory, c->memory_count * sizeof *c->memory);
     return c;
 }
 
 void stepper_restore(Stepper *s, const Checkpoint *c)
 {
-    if (c->node_count != s->state.node_count || c->point_count != s->point_count)
+    if (c->memory_count != s->memory_count || c->point_capacity != s->point_capacity)
         return;
     s->first_free = c->first_free;
     s->state.time = c->time;
     s->state.inserted = c->inserted;
     s->state.twist = c->twist;
     s->report = c->report;
-    memcpy(s->place, c->place, (size_t)c->point_count * sizeof *c->place);
+    for (int k = 0; s->tool_count > 1 && k < s->tool_count; k++) {
+        s->tool[k].first = c->first[k];
+        s->tool[k].inserted = c->tool_inserted[k];
+        s->tool[k].twist = c->tool_twist[k];
+    }
+    if (s->tool_count > 1)
+        tools_chain(s);
+    for (int k = 1; k < s->tool_count; k++)
+        s->tool[k].inside = c->inside[k];
+    memcpy(s->place, c->place, (size_t)c->point_capacity * sizeof *c->place);
     memcpy(s->memory, c->memory, c->memory_count * sizeof *c->memory);
 }
 
@@ -88,6 +104,12 @@ uint64_t stepper_hash(const Stepper *s)
     hash_double(&hash, s->state.inserted);
     hash_double(&hash, s->state.twist);
     hash_double(&hash, s->first_free);
+    for (int k = 1; k < s->tool_count; k++) {
+        hash_double(&hash, s->tool[k].first);
+        hash_double(&hash, s->tool[k].inside);
+        hash_double(&hash, s->tool[k].inserted);
+        hash_double(&hash, s->tool[k].twist);
+    }
     for (size_t i = 0; i < s->memory_count; i++)
         hash_double(&hash, s->memory[i]);
     // field by field: padding holds anything

@@ -29,37 +29,39 @@ static void clamp_positive(double *xx, double *xy, double *yy)
 
 unsigned contact_free_dofs(const BlockChain *chain, int node)
 {
-    const double *d = chain->diag + 36 * (size_t)node;
+    const int n = chain->size;
+    const size_t block = (size_t)(n * n);
+    const double *d = chain->diag + block * (size_t)node;
     unsigned mask = 0;
-    for (int r = 0; r < 6; r++) {
-        int fixed = d[7 * r] == 1;
-        for (int c = 0; fixed && c < 6; c++)
-            fixed = c == r || d[6 * r + c] == 0;
+    for (int r = 0; r < n; r++) {
+        int fixed = d[(n + 1) * r] == 1;
+        for (int c = 0; fixed && c < n; c++)
+            fixed = c == r || d[n * r + c] == 0;
         if (fixed && node > 0) {
-            const double *l = chain->lower + 36 * (size_t)(node - 1);
-            for (int c = 0; fixed && c < 6; c++)
-                fixed = l[6 * r + c] == 0;
+            const double *l = chain->lower + block * (size_t)(node - 1);
+            for (int c = 0; fixed && c < n; c++)
+                fixed = l[n * r + c] == 0;
         }
         if (fixed && node + 1 < chain->count) {
-            const double *l = chain->lower + 36 * (size_t)node;
-            for (int c = 0; fixed && c < 6; c++)
-                fixed = l[6 * c + r] == 0;
+            const double *l = chain->lower + block * (size_t)node;
+            for (int c = 0; fixed && c < n; c++)
+                fixed = l[n * c + r] == 0;
         }
         mask |= fixed ? 0 : 1u << r;
     }
     return mask;
 }
 
-static void add_block(double *block, double k[3][3], unsigned mask)
+static void add_block(double *block, int stride, double k[3][3], unsigned mask)
 {
     for (int r = 0; r < 3; r++)
         for (int c = 0; c < 3; c++)
             if (mask >> r & mask >> c & 1)
-                block[6 * r + c] += k[r][c];
+                block[stride * r + c] += k[r][c];
 }
 
 // block += (w I, -[l]x)^T K (v I, -[m]x)
-static void add_levered(double *block, double k[3][3], double w, Vec3 l, unsigned rows, double v, Vec3 m, unsigned columns)
+static void add_levered(double *block, int stride, double k[3][3], double w, Vec3 l, unsigned rows, double v, Vec3 m, unsigned columns)
 {
     Mat3 left = mat3_skew(vec3_negate(l)), right = mat3_skew(vec3_negate(m));
     double a[3][6], b[3][6], kb[3][6];
@@ -74,11 +76,13 @@ static void add_levered(double *block, double k[3][3], double w, Vec3 l, unsigne
     for (int r = 0; r < 6; r++)
         for (int c = 0; c < 6; c++)
             if (rows >> r & columns >> c & 1)
-                block[6 * r + c] += a[0][r] * kb[0][c] + a[1][r] * kb[1][c] + a[2][r] * kb[2][c];
+                block[stride * r + c] += a[0][r] * kb[0][c] + a[1][r] * kb[1][c] + a[2][r] * kb[2][c];
 }
 
 void contact_add_curvature(const ContactSet *set, BlockChain *chain)
 {
+    const int n = chain->size;
+    const size_t block = (size_t)(n * n);
     for (int i = 0; i < set->count; i++) {
         const ContactPoint *p = &set->point[i];
         double force = vec3_dot(p->force, p->normal);
@@ -95,15 +99,15 @@ void contact_add_curvature(const ContactSet *set, BlockChain *chain)
             for (int c = 0; c < 3; c++)
                 k[r][c] = xx * a[r] * a[c] + xy * (a[r] * b[c] + b[r] * a[c]) + yy * b[r] * b[c];
         unsigned here = contact_free_dofs(chain, p->node);
-        double *diag = chain->diag + 36 * (size_t)p->node;
+        double *diag = chain->diag + block * (size_t)p->node;
         if (p->xi <= 0 || p->node + 1 >= chain->count) {
-            add_block(diag, k, here);
+            add_block(diag, n, k, here);
             continue;
         }
         unsigned next = contact_free_dofs(chain, p->node + 1);
         double near = 1 - p->xi, far = p->xi;
-        add_levered(diag, k, near, p->lever[0], here, near, p->lever[0], here);
-        add_levered(diag + 36, k, far, p->lever[1], next, far, p->lever[1], next);
-        add_levered(chain->lower + 36 * (size_t)p->node, k, far, p->lever[1], next, near, p->lever[0], here);
+        add_levered(diag, n, k, near, p->lever[0], here, near, p->lever[0], here);
+        add_levered(diag + block, n, k, far, p->lever[1], next, far, p->lever[1], next);
+        add_levered(chain->lower + block * (size_t)p->node, n, k, far, p->lever[1], next, near, p->lever[0], here);
     }
 }

@@ -6,6 +6,12 @@
 // Signorini:  0 <= gap + normal . d   perpendicular to   force_n >= 0.
 // Coulomb:    |force_t| <= friction * force_n, opposite to the tangential part of d where there is slip.
 // Forces in N act on the tool; `force` is the whole vector in space and is kept per material point from step to step as warm start.
+//
+// A slide is the friction between two coaxial tools at a node where they share the centreline: S and phi, a tool's material coordinate and its
+// angle there, are two of the node's unknowns.
+//   d = (S, radius phi) in the step;  |force| <= bound, opposite to d where there is slip.
+// The force acts on the unknowns as (force[0], radius force[1]). The bound (mu times the force between the tools) is given and does not follow
+// the solve. In an unknown that is constrained (a unit row), or with radius 0 in phi, a slide neither sees the motion nor acts.
 #ifndef SELDINGER_SOLVER_CONTACT_H
 #define SELDINGER_SOLVER_CONTACT_H
 
@@ -23,12 +29,22 @@ typedef struct ContactPoint {
     Vec3 force;              // [N] on the tool; in: warm start, out: solution
 } ContactPoint;
 
+typedef struct ContactSlide {
+    int node;
+    int unknown;             // of the node: S, and phi behind it; 6 or more
+    double radius;           // [mm] at which the tools touch
+    double bound;            // [N] >= 0
+    double force[2];         // [N]; in: warm start, out: solution
+} ContactSlide;
+
 typedef struct ContactSet {
     int count, capacity;
     ContactPoint *point;
+    int slide_count;         // count + slide_count is at most the solver's capacity
+    ContactSlide *slide;
 } ContactSet;
 
-// Adds the curvature stiffness of the set (warm-start forces) to a node's 6x6 diagonal blocks (and couplings where xi > 0).
+// Adds the curvature stiffness of the set (warm-start forces) to the first six unknowns of a node's diagonal block (and couplings where xi > 0).
 // DESIGN section 4, item 1.
 struct BlockChain;
 void contact_add_curvature(const ContactSet *set, struct BlockChain *chain);

@@ -7,7 +7,7 @@
 #include "solver/contact_rows.h"
 #include "solver/gauss_seidel.h"
 
-enum { BLOCK_DOUBLES = 36, CONTACT_SWEEPS_PER_FACTOR = 8 };
+enum { CONTACT_SWEEPS_PER_FACTOR = 8 };
 
 // What a contact does in one Newton iteration: f = force - C (further motion), C acting in space.
 typedef struct ContactLaw {
@@ -17,10 +17,11 @@ typedef struct ContactLaw {
     Mat3 c;
     Vec3 along;                  // mu p of a sliding contact
     Vec3 step;                   // motion under the whole step
+    Vec3 given;                  // the force that the contact began with
 } ContactLaw;
 
 typedef struct PointwiseWork PointwiseWork;
-PointwiseWork *pointwise_work_create(int node_count, int capacity);
+PointwiseWork *pointwise_work_create(int node_count, int size, int capacity);
 void pointwise_work_destroy(PointwiseWork *work);
 
 struct ContactSolver {
@@ -29,20 +30,23 @@ struct ContactSolver {
     Vec3 *motion;                // (capacity) d = J u
     ContactLaw *law;             // (capacity)
     Vec3 *best;                  // (capacity) forces of the best iterate …
-    double *best_u;              // … and its motion (M, 6)
+    double *best_u;              // … and its motion (M, n)
     bool *flag;                  // (capacity)
+    int wall_count, *wall;       // (capacity) which rows are contacts with the wall
     int stalls;                  // of the line search in this solve …
     double slope;                // … and what they make of r over k
+    double grip;                 // kappa over k while slides are soft, else 0 …
+    int soft;                    // … and iterations with it
     bool inexact;                // a factor of this solve may have lost digits
     bool symmetric;              // which of the two factors holds the matrix
-    double *rhs, *delta;         // (M, 6)
+    double *rhs, *delta;         // (M, n)
     BlockChain matrix;           // with the contacts' laws: diag and A(i, i+1) by columns (which is the row-major lower of a symmetric chain)
-    double *turned;              // (M, 6, 6) A(i+1, i) by columns …
+    double *turned;              // (M, n, n) A(i+1, i) by columns …
     double *turned_chain;        // … and that of the chain
     BlockLu *lu;
     BlockFactor *factor;
     BlockCondenser *condenser;
-    double *small_u;             // (M, 6)
+    double *small_u;             // (M, n)
     PointwiseWork *pointwise;
 };
 

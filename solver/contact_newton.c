@@ -6,6 +6,7 @@
 //   open   g = 0, C = 0
 //   stick  g = f - P v n - P_t d_t, C = P n n^T + P_t (I - n n^T): v and d_t become 0 up to 1/P, and the next iteration removes that rest
 //   slip   g_n = f_n - P v, g_t = mu g_n p - q (d_t across p), C = P n n^T + mu P p n^T + q (I - n n^T - p p^T)
+//   slides are always in one of the last two, without what is along n: g = f - P_t d, or g = bound p - q (d across p), which is symmetric
 // p is the direction of f_t - r d_t (Alart and Curnier 1991), q = mu f_n r / (|f_t - r d_t| - mu f_n) -> mu f_n / |d_t| the resistance against
 // turning. mu P p n^T makes the matrix unsymmetric: friction follows the normal force within the iteration. Without it (Tresca's friction
 // with the bound frozen, a fixed point over the bound) every outer round costs several factorisations and a wire in a spiral needs 5 to 20
@@ -25,6 +26,12 @@
 //   turned off or on again, every second time r is changed too, and after three stalls in a row the whole step is taken (after two, some solves
 //   go round for ever).
 //
+// - Many slides in a row that stick where they should slip free only their first one in an iteration, as each holds what is behind it. A solve that
+//   takes more than three iterations starts anew with soft slides, f = -bound d / sqrt(|d|^2 + (bound / kappa)^2), linearised in f and d as
+//   Chan, Golub and Mulet (1999) do for total variation: whole steps then find the front from anywhere, and hold while kappa grows until
+//   states can be read off. (An augmented Lagrangian with an exact line search on its convex energy
+//   stalls: its law has kinks too.)
+//
 // Forces leave cut to their cones, which changes them by no more than the residual. The motion is not balanced again with them: the wire's bending
 // is so soft against its stretching that a force off by 1e-8 of the largest moves it by as much as a residual of 0.1, so that iterates that
 // fulfil all laws would be refused for the rounding of a cut. Where the iterations end first, the best iterate is handed out in the same way.
@@ -41,6 +48,9 @@ static const double penalty = 1e4;
 static const double usual_slope = 1e-3, other_slope = 1e-2, merit_slope = 1e-2;
 enum { FIRST_SEARCH = 3, HALVINGS = 6, STALLS_IN_A_ROW = 3 };
 static const double stall = 0.05; // a step cut to less gets nowhere
+// kappa over k of soft slides: first, last, and how much harder they get after how many iterations.
+static const double first_grip = 1e-3, last_grip = 30, harder = 30;
+enum { SOFT_AT_ONCE = 2 };
 
 static double normal_violation(const ContactRow *c, Vec3 motion) { return c->gap + vec3_dot(motion, c->normal); }
 
@@ -54,31 +64,35 @@ static Vec3 slide_direction(const ContactRow *c, Vec3 motion, double slope, doub
 // mu f_n; of a contact that is just taken in, from its overlap
 static double friction_bound(const ContactRow *c, Vec3 motion)
 {
+    if (c->slide)
+        return c->bound;
     double fn = vec3_dot(c->force, c->normal);
     return c->friction * (fn > 0 ? fn : fmax(0, -0.01 * c->stiffness_n * normal_violation(c, motion)));
 }
 
-// Which contacts shall be active: those that press, and the deepest of each run of neighbours that overlap.
-static void choose_active(const ContactSolver *s, int count, bool *active)
+// Which contacts with the wall shall be active: those that press, and the deepest of each run of neighbours that overlap.
+static void choose_active(const ContactSolver *s, bool *active)
 {
+    const int count = s->wall_count, *wall = s->wall;
     int i = 0;
     while (i < count) {
-        const ContactRow *c = &s->row[i];
-        double v = normal_violation(c, s->motion[i]);
-        if (s->law[i].state != OPEN || !(v < 0)) {
-            active[i] = s->law[i].state != OPEN && vec3_dot(c->force, c->normal) > 0;
+        int at = wall[i];
+        const ContactRow *c = &s->row[at];
+        double v = normal_violation(c, s->motion[at]);
+        if (s->law[at].state != OPEN || !(v < 0)) {
+            active[at] = s->law[at].state != OPEN && vec3_dot(c->force, c->normal) > 0;
             i++;
             continue;
         }
-        int deepest = i, j = i;
-        for (; j < count && s->law[j].state == OPEN && (j == i || s->row[j].chain_node <= s->row[j - 1].chain_node + 1); j++) {
-            double vj = normal_violation(&s->row[j], s->motion[j]);
+        int deepest = at, j = i;
+        for (; j < count && s->law[wall[j]].state == OPEN && (j == i || s->row[wall[j]].chain_node <= s->row[wall[j - 1]].chain_node + 1); j++) {
+            double vj = normal_violation(&s->row[wall[j]], s->motion[wall[j]]);
             if (!(vj < 0))
                 break;
-            active[j] = false;
+            active[wall[j]] = false;
             if (vj < v) {
                 v = vj;
-                deepest = j;
+                deepest = wall[j];
             }
         }
         active[deepest] = true;
@@ -91,19 +105,18 @@ static int choose_states(ContactSolver *s, int count, bool first)
 {
     int changes = 0, pressing = 0;
     s->slope = s->stalls / 2 % 2 ? other_slope : usual_slope;
+    for (int i = 0; i < s->wall_count; i++)
+        pressing += s->law[s->wall[i]].state != OPEN;
     for (int i = 0; i < count; i++)
-        pressing += s->law[i].state != OPEN;
-    if (first && pressing > 0)
-        for (int i = 0; i < count; i++)
-            s->flag[i] = s->law[i].state != OPEN;
-    else
-        choose_active(s, count, s->flag);
+        s->flag[i] = s->law[i].state != OPEN;
+    if (!first || pressing == 0)
+        choose_active(s, s->flag);
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &s->row[i];
         int was = s->law[i].state, state = OPEN;
         if (s->flag[i]) {
             state = SLIP;
-            if (c->friction > 0) {
+            if (c->friction > 0 || c->slide) {
                 double size;
                 slide_direction(c, s->motion[i], s->slope, &size);
                 Vec3 slide = contact_tangential(s->motion[i], c->normal);
@@ -134,6 +147,8 @@ static void write_law(const ContactRow *c, Vec3 motion, Vec3 from, double slope,
     Vec3 n = c->normal, none = {0, 0, 0}, slide = contact_tangential(from, n), ft = contact_tangential(c->force, n);
     double kn = penalty * c->stiffness_n, kt = penalty * c->stiffness_t;
     double fn = vec3_dot(c->force, n), gn = fn - kn * normal_violation(c, from);
+    if (c->slide)
+        kn = gn = 0;
     Vec3 force = none, oblique = none, p = none;
     double across = 0;
     if (law->state == STICK) {
@@ -141,19 +156,32 @@ static void write_law(const ContactRow *c, Vec3 motion, Vec3 from, double slope,
         across = kt;
     } else if (law->state == SLIP) {
         force = vec3_scale(n, gn);
-        if (c->friction > 0) {
+        if (c->friction > 0 || c->slide) {
             double size, bound = friction_bound(c, motion);
             p = slide_direction(c, motion, slope, &size);
             across = size > bound ? fmin(kt, bound * slope * c->stiffness_t / (size - bound)) : size > 0 ? kt : 0;
             law->along = vec3_scale(p, c->friction);
             oblique = vec3_scale(law->along, kn);
-            force = vec3_add_scaled(force, c->friction * gn, p);
+            force = vec3_add_scaled(force, c->slide ? bound : c->friction * gn, p);
             force = vec3_add_scaled(force, -across, vec3_add_scaled(slide, -vec3_dot(slide, p), p));
         }
     }
     law->force = force;
     if (!keep_matrix && law->state != OPEN)
         law->c = law_matrix(n, kn, oblique, across, p);
+}
+
+// The same of a soft slide: bound d / eta in place of a sign, eta^2 = |d|^2 + (bound / kappa)^2.
+static void write_soft_law(const ContactRow *c, Vec3 motion, Vec3 from, double grip, ContactLaw *law)
+{
+    double edge = c->bound / (grip * c->stiffness_t), eta = sqrt(vec3_norm2(motion) + edge * edge);
+    Vec3 f = vec3_scale(contact_project(c, c->force), 1 / (eta * eta));
+    const double a[2] = {f.x, f.y}, d[2] = {motion.x, motion.y};
+    law->c = (Mat3){0};
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2; j++)
+            law->c.m[i][j] = (i == j) * c->bound / eta + (a[i] * d[j] + a[j] * d[i]) / 2;
+    law->force = vec3_sub(vec3_scale(motion, -c->bound / eta), mat3_mul_vec(&law->c, vec3_sub(from, motion)));
 }
 
 static void cross_into(double x, double y, double z, Vec3 b, double out[3])
@@ -165,7 +193,7 @@ static void cross_into(double x, double y, double z, Vec3 b, double out[3])
 
 // block += (w I, [r]x)^T K (v I, [q]x), by columns, where rows and columns are free. Rows of K [q]x are those of K times q, columns of [r]x^T K
 // those of K times r.
-static void add_coupling(const Mat3 *k, double w, Vec3 r, unsigned rows, double v, Vec3 q, unsigned columns, double *block)
+static void add_coupling(const Mat3 *k, double w, Vec3 r, unsigned rows, double v, Vec3 q, unsigned columns, double *block, int stride)
 {
     double j[6][6], kq[3][3]; // j: [column][row]
     for (int a = 0; a < 3; a++)
@@ -184,7 +212,7 @@ static void add_coupling(const Mat3 *k, double w, Vec3 r, unsigned rows, double 
                 j[b][a] = rows >> a & columns >> b & 1 ? j[b][a] : 0;
     for (int b = 0; b < 6; b++)
         for (int a = 0; a < 6; a++)
-            block[6 * b + a] += j[b][a];
+            block[stride * b + a] += j[b][a];
 }
 
 // The matrix += J^T C J with J = (w I, R) for each node, R = -[arm]x.
@@ -192,34 +220,45 @@ static void add_law(const ContactRow *c, const Mat3 *k, ContactSolver *s)
 {
     Vec3 r[2];
     const double *w = c->weight;
+    const int n = c->stride;
+    const size_t block = (size_t)(n * n), at = (size_t)c->node;
+    if (c->slide) {
+        const double arm[2] = {c->mask[0] & 1 ? 1 : 0, c->mask[0] & 2 ? c->radius : 0};
+        double *d = s->matrix.diag + block * at + (n + 1) * c->slide;
+        for (int b = 0; b < 2; b++)
+            for (int a = 0; a < 2; a++)
+                d[n * b + a] += arm[a] * k->m[a][b] * arm[b];
+        return;
+    }
     for (int e = 0; e < c->nodes; e++) {
         r[e] = contact_row_negative_arm(c, e);
-        add_coupling(k, w[e], r[e], c->mask[e], w[e], r[e], c->mask[e], s->matrix.diag + 36 * (size_t)(c->node + e));
+        add_coupling(k, w[e], r[e], c->mask[e], w[e], r[e], c->mask[e], s->matrix.diag + block * (at + (size_t)e), n);
     }
     if (c->nodes < 2)
         return;
-    add_coupling(k, w[1], r[1], c->mask[1], w[0], r[0], c->mask[0], s->turned + 36 * (size_t)c->node);
-    add_coupling(k, w[0], r[0], c->mask[0], w[1], r[1], c->mask[1], s->matrix.lower + 36 * (size_t)c->node);
+    add_coupling(k, w[1], r[1], c->mask[1], w[0], r[0], c->mask[0], s->turned + block * at, n);
+    add_coupling(k, w[0], r[0], c->mask[0], w[1], r[1], c->mask[1], s->matrix.lower + block * at, n);
 }
 
 // Row e of a sliding contact, [A(i, i-1) A(i, i) A(i, i+1) | rhs], loses J^T mu p for every part of it along n: what is left of the law's
 // P (n + mu p) n^T is P n n^T, and the elimination, which does not look for pivots, finds large positive ones.
 static void straighten(const ContactRow *c, Vec3 along, int e, ContactSolver *s)
 {
+    const int n = c->stride;
     double v[6], w = c->weight[e];
     if (c->mask[e] != 63 || w < 0.05)
         return;
     ContactRow here = *c;
-    double push[12] = {0};
+    double push[2 * BLOCK_LARGEST] = {0};
     here.node = 0;
     contact_row_push(&here, vec3_scale(along, 1 / w), push);
     for (int k = 0; k < 6; k++)
-        v[k] = push[6 * e + k];
-    size_t i = (size_t)(c->node + e), block = BLOCK_DOUBLES;
+        v[k] = push[n * e + k];
+    size_t i = (size_t)(c->node + e), block = (size_t)(n * n);
     double *columns[4] = {i > 0 ? s->turned + block * (i - 1) : NULL, s->matrix.diag + block * i,
-                          (int)i + 1 < s->matrix.count ? s->matrix.lower + block * i : NULL, s->rhs + 6 * i};
+                          (int)i + 1 < s->matrix.count ? s->matrix.lower + block * i : NULL, s->rhs + (size_t)n * i};
     for (int k = 0; k < 4; k++)
-        for (double *x = columns[k]; x && x < columns[k] + (k < 3 ? 36 : 6); x += 6) {
+        for (double *x = columns[k]; x && x < columns[k] + (k < 3 ? n * n : n); x += n) {
             double t = c->normal.x * x[0] + c->normal.y * x[1] + c->normal.z * x[2];
             for (int r = 0; r < 6; r++)
                 x[r] -= v[r] * t;
@@ -229,7 +268,7 @@ static void straighten(const ContactRow *c, Vec3 along, int e, ContactSolver *s)
 // The blocks of a contact's rows as the chain has them.
 static void restore(ContactSolver *s, const BlockChain *chain, const ContactRow *c)
 {
-    const size_t block = BLOCK_DOUBLES, bytes = block * sizeof(double), last = (size_t)(c->node + c->nodes - 1);
+    const size_t block = (size_t)(c->stride * c->stride), bytes = block * sizeof(double), last = (size_t)(c->node + c->nodes - 1);
     for (size_t i = (size_t)c->node; i <= last; i++)
         memcpy(s->matrix.diag + block * i, chain->diag + block * i, bytes);
     for (size_t i = (size_t)(c->node > 0 ? c->node - 1 : 0); i <= last && (int)i + 1 < chain->count; i++) {
@@ -256,10 +295,10 @@ static void assemble(ContactSolver *s, const BlockChain *chain, int count)
 
 static void assemble_reset(ContactSolver *s, const BlockChain *chain, int count)
 {
-    size_t blocks = (size_t)chain->count * 36 * sizeof(double);
+    size_t blocks = (size_t)chain->count * (size_t)(chain->size * chain->size) * sizeof(double);
     memcpy(s->matrix.diag, chain->diag, blocks);
     memcpy(s->matrix.lower, chain->lower, blocks);
-    block_lu_transpose(chain->count - 1, chain->lower, s->turned_chain);
+    block_lu_transpose(chain->count - 1, chain->size, chain->lower, s->turned_chain);
     memcpy(s->turned, s->turned_chain, blocks);
     for (int i = 0; i < count; i++)
         s->law[i].touched = false;
@@ -272,10 +311,10 @@ static double merit(const ContactSolver *s, int count, double t)
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &s->row[i];
         Vec3 d = vec3_add_scaled(s->motion[i], t, s->law[i].step);
-        if (c->inert || (contact_row_is_idle(c, d) && s->law[i].state == OPEN))
+        if (c->inert || (c->slide && s->grip > 0) || (contact_row_is_idle(c, d) && s->law[i].state == OPEN))
             continue;
-        Vec3 error = contact_error(c, vec3_mix(c->force, s->law[i].force, t), d, merit_slope);
-        sum += vec3_norm2(error);
+        Vec3 force = vec3_mix(c->force, s->law[i].force, t);
+        sum += vec3_norm2(contact_error(c, force, d, merit_slope));
     }
     return sum;
 }
@@ -299,7 +338,7 @@ static double step_length(const ContactSolver *s, int count)
 static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bool reuse, const double *b)
 {
     bool symmetric = true;
-    size_t bytes = (size_t)chain->count * 6 * sizeof *s->rhs;
+    size_t bytes = (size_t)(chain->count * chain->size) * sizeof *s->rhs;
     const Vec3 none = {0, 0, 0};
     if (b)
         memcpy(s->rhs, b, bytes);
@@ -311,7 +350,10 @@ static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bo
             s->law[i].force = none;
             continue;
         }
-        write_law(c, s->motion[i], b ? none : s->motion[i], s->slope, reuse, &s->law[i]);
+        if (c->slide && s->grip > 0 && s->law[i].state != OPEN)
+            write_soft_law(c, s->motion[i], b ? none : s->motion[i], s->grip, &s->law[i]);
+        else
+            write_law(c, s->motion[i], b ? none : s->motion[i], s->slope, reuse, &s->law[i]);
         symmetric &= s->law[i].state != SLIP || c->friction == 0;
         contact_row_push(c, b ? s->law[i].force : vec3_sub(s->law[i].force, c->force), s->rhs);
     }
@@ -355,11 +397,11 @@ static bool take_step(ContactSolver *s, int unknowns, int count, double t, doubl
 static double imbalance(ContactSolver *s, const BlockChain *chain, const double *b, int count, const double *u)
 {
     double worst = 0;
-    memcpy(s->rhs, b, (size_t)chain->count * 6 * sizeof *b);
+    memcpy(s->rhs, b, (size_t)(chain->count * chain->size) * sizeof *b);
     for (int i = 0; i < count; i++)
         contact_row_push(&s->row[i], s->row[i].force, s->rhs);
     block_chain_multiply(chain, u, s->delta);
-    for (int k = 0; k < 6 * chain->count; k++)
+    for (int k = 0; k < chain->size * chain->count; k++)
         worst = fmax(worst, fabs(s->delta[k] - s->rhs[k]));
     return worst;
 }
@@ -379,13 +421,40 @@ static void cut(ContactSolver *s, int count, ContactReport *report)
     report->cone_violation = 0;
     for (int i = 0; i < count; i++) {
         ContactRow *c = &s->row[i];
-        c->force = contact_project(c->force, c->normal, c->friction);
-        double fn = vec3_dot(c->force, c->normal);
-        if (!(fn > 0))
+        if (c->inert)
             continue;
-        report->active++;
-        report->cone_violation = fmax(report->cone_violation, vec3_norm(contact_tangential(c->force, c->normal)) / fn - c->friction);
+        c->force = contact_project(c, c->force);
+        bool presses = vec3_dot(c->force, c->normal) > 0;
+        report->active += presses;
+        if (presses || c->slide)
+            report->cone_violation = fmax(report->cone_violation, contact_row_excess(c));
     }
+}
+
+static bool has_slides(const ContactSolver *s, int count)
+{
+    for (int i = 0; i < count; i++)
+        if (s->row[i].slide && !s->row[i].inert)
+            return true;
+    return false;
+}
+
+// The forces that it was given become the present ones.
+static void begin(ContactSolver *s, const BlockFactor *factor, const double *b, int count, double *u)
+{
+    for (int i = 0; i < count; i++) {
+        const ContactRow *c = &s->row[i];
+        s->row[i].force = s->law[i].given;
+        s->law[i].state = vec3_dot(c->force, c->normal) > 0 || (c->slide && !c->inert) ? SLIP : OPEN;
+    }
+    contact_balance(s, factor, b, count, u);
+}
+
+// Soft slides get harder, and at last hard.
+static void harden(ContactSolver *s)
+{
+    if (++s->soft % SOFT_AT_ONCE == 0)
+        s->grip = s->grip < last_grip ? harder * s->grip : 0;
 }
 
 ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
@@ -393,15 +462,17 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
 {
     ContactReport report = {0};
     s->matrix.count = chain->count;
-    int unknowns = 6 * chain->count, most = options->max_iterations / CONTACT_SWEEPS_PER_FACTOR;
+    int unknowns = chain->size * chain->count, most = options->max_iterations / CONTACT_SWEEPS_PER_FACTOR;
     for (int i = 0; i < count; i++)
-        s->law[i].state = vec3_dot(s->row[i].force, s->row[i].normal) > 0 ? SLIP : OPEN;
-    contact_balance(s, factor, b, count, u);
+        s->law[i].given = s->row[i].force;
+    begin(s, factor, b, count, u);
     contact_residual(s->row, count, s->motion, &report);
     double least = HUGE_VAL, residual = report.residual; // of the best iterate, its error in N and its residual
     bool fresh = true, finite = true, unbalanced = false; // no factor yet
-    int in_a_row = 0;
+    int in_a_row = 0, start = 0;
     s->stalls = 0;
+    s->grip = 0;
+    s->soft = 0;
     s->inexact = false;
     while (report.residual > options->tolerance && report.iterations < most) {
         if (report.residual * report.largest < least) {
@@ -409,10 +480,15 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
             residual = report.residual;
             copy_iterate(s, unknowns, count, true, u);
         }
-        bool first = report.iterations == 0, search = report.iterations >= FIRST_SEARCH && !unbalanced;
-        if (first)
+        if (report.iterations == FIRST_SEARCH && has_slides(s, count)) { // anew, with soft ones
+            begin(s, factor, b, count, u);
+            start = report.iterations;
+            s->grip = first_grip;
+        }
+        bool first = report.iterations == start, search = report.iterations >= FIRST_SEARCH && s->grip == 0 && !unbalanced;
+        if (report.iterations == 0)
             assemble_reset(s, chain, count);
-        bool reuse = choose_states(s, count, first) == 0 && !fresh && report.residual < 1e-3 && s->symmetric;
+        bool reuse = choose_states(s, count, first) == 0 && !fresh && s->grip == 0 && report.residual < 1e-3 && s->symmetric;
         if (!newton_step(s, chain, count, reuse, search ? NULL : b))
             break;
         if (!search) {
@@ -431,6 +507,8 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
         if (!finite)
             break;
         contact_residual(s->row, count, s->motion, &report);
+        if (s->grip > 0)
+            harden(s);
         fresh = reuse && report.residual > 0.05 * before; // the old factor does not serve any more
         unbalanced = false;
         if (s->inexact && report.residual <= options->tolerance) { // digits lost on the way: once more for the whole motion

@@ -10,6 +10,7 @@
 //
 // The local problem, three unknowns, is solved exactly: open, stick, or slip with f_t = -(W_tt' + g)^-1 c, the scalar g > 0 such that
 // |f_t| = mu f_n. At least one such g exists for any mu (the difference of both sides changes sign between 0 and infinity).
+// A slide has two unknowns and a bound that is given: there is exactly one g.
 #include "solver/contact_forms.h"
 
 #include <stdlib.h>
@@ -19,30 +20,32 @@
 typedef struct Local {
     Vec3 axis[3];            // normal, two tangents
     Mat3 w;                  // own 3x3 of W on these axes
-    double response[3][12];  // motion of its one or two nodes under a unit force along an axis
+    double response[3][2 * BLOCK_LARGEST];  // motion of its one or two nodes under a unit force along an axis
     double g;                // of its last slip: where the next search starts
     Vec3 offset;             // what the recursion lacks against the factor's solution, by rounding
 } Local;
 
 struct PointwiseWork {
-    double *left, *right;    // (M, 6, 6) E_i, F_i
-    double *inverse, *pivot; // (M, 6, 6) S_i, D_i^-1
-    double *p, *q, *r;       // (M, 6)
+    int size;                // n
+    double *left, *right;    // (M, n, n) E_i, F_i
+    double *inverse, *pivot; // (M, n, n) S_i, D_i^-1
+    double *p, *q, *r;       // (M, n)
     Local *local;            // (capacity)
 };
 
-PointwiseWork *pointwise_work_create(int node_count, int capacity)
+PointwiseWork *pointwise_work_create(int node_count, int size, int capacity)
 {
     PointwiseWork *w = calloc(1, sizeof *w);
     if (!w)
         return NULL;
-    size_t m = (size_t)node_count;
+    size_t n = (size_t)size, m = (size_t)node_count;
+    w->size = size;
     double **block[] = {&w->left, &w->right, &w->inverse, &w->pivot}, **vector[] = {&w->p, &w->q, &w->r};
     bool ok = true;
     for (int i = 0; i < 4; i++)
-        ok &= (*block[i] = calloc(m * 36, sizeof(double))) != NULL;
+        ok &= (*block[i] = calloc(m * n * n, sizeof(double))) != NULL;
     for (int i = 0; i < 3; i++)
-        ok &= (*vector[i] = calloc(m * 6, sizeof(double))) != NULL;
+        ok &= (*vector[i] = calloc(m * n, sizeof(double))) != NULL;
     w->local = calloc((size_t)capacity + 1, sizeof *w->local);
     if (!ok || !w->local) {
         pointwise_work_destroy(w);
@@ -66,124 +69,129 @@ void pointwise_work_destroy(PointwiseWork *w)
     free(w);
 }
 
-// inverse = d^-1 of a symmetric positive definite 6x6; false where it is not.
-static bool invert(const double *d, double *inverse)
+// inverse = d^-1 of a symmetric positive definite block; false where it is not.
+static bool invert(int n, const double *d, double *inverse)
 {
-    double l[6][6], y[6][6];
-    for (int j = 0; j < 6; j++)
-        for (int i = j; i < 6; i++) {
-            double sum = d[6 * i + j];
+    double l[BLOCK_LARGEST][BLOCK_LARGEST], y[BLOCK_LARGEST][BLOCK_LARGEST];
+    for (int j = 0; j < n; j++)
+        for (int i = j; i < n; i++) {
+            double sum = d[n * i + j];
             for (int k = 0; k < j; k++)
                 sum -= l[i][k] * l[j][k];
             if (i == j && !(sum > 0))
                 return false;
             l[i][j] = i == j ? sqrt(sum) : sum / l[j][j];
         }
-    for (int c = 0; c < 6; c++) // y = l^-1 by columns
-        for (int i = c; i < 6; i++) {
+    for (int c = 0; c < n; c++) // y = l^-1 by columns
+        for (int i = c; i < n; i++) {
             double sum = i == c;
             for (int k = c; k < i; k++)
                 sum -= l[i][k] * y[k][c];
             y[i][c] = sum / l[i][i];
         }
-    for (int i = 0; i < 6; i++)
+    for (int i = 0; i < n; i++)
         for (int j = 0; j <= i; j++) {
             double sum = 0;
-            for (int k = i; k < 6; k++)
+            for (int k = i; k < n; k++)
                 sum += y[k][i] * y[k][j];
-            inverse[6 * i + j] = inverse[6 * j + i] = sum;
+            inverse[n * i + j] = inverse[n * j + i] = sum;
         }
     return true;
 }
 
 // y += s a x, or y += s a^T x
-static void add_product(const double *a, double s, const double *x, double *y)
+static void add_product(int n, const double *a, double s, const double *x, double *y)
 {
-    for (int i = 0; i < 6; i++) {
-        const double *r = a + 6 * i;
-        y[i] += s * (((r[0] * x[0] + r[1] * x[1]) + (r[2] * x[2] + r[3] * x[3])) + (r[4] * x[4] + r[5] * x[5]));
+    for (int i = 0; i < n; i++) {
+        const double *r = a + n * i;
+        double sum = r[0] * x[0] + r[1] * x[1];
+        for (int k = 2; k < n; k += 2)
+            sum += r[k] * x[k] + r[k + 1] * x[k + 1];
+        y[i] += s * sum;
     }
 }
 
-static void add_product_transposed(const double *a, double s, const double *x, double *y)
+static void add_product_transposed(int n, const double *a, double s, const double *x, double *y)
 {
-    for (int j = 0; j < 6; j++)
-        for (int i = 0; i < 6; i++)
-            y[j] += s * a[6 * i + j] * x[i];
+    for (int j = 0; j < n; j++)
+        for (int i = 0; i < n; i++)
+            y[j] += s * a[n * i + j] * x[i];
 }
 
 // Eliminations from both ends: E, F, S and D^-1.
 static bool prepare(PointwiseWork *w, const BlockChain *a)
 {
-    int m = a->count;
-    double d[36], inverse[36];
+    const int m = a->count, n = w->size, block = n * n;
+    const size_t bytes = (size_t)block * sizeof(double);
+    double d[BLOCK_LARGEST * BLOCK_LARGEST], inverse[BLOCK_LARGEST * BLOCK_LARGEST];
     for (int i = 0; i < m; i++) { // d = A_ii - L_(i-1) D_(i-1)^-1 L_(i-1)^T
-        memcpy(d, a->diag + 36 * (size_t)i, sizeof d);
-        for (int r = 0; i > 0 && r < 6; r++)
-            for (int c = 0; c < 6; c++)
-                for (int k = 0; k < 6; k++)
-                    d[6 * r + c] -= w->left[36 * (i - 1) + 6 * r + k] * a->lower[36 * (i - 1) + 6 * c + k];
-        memcpy(w->inverse + 36 * (size_t)i, d, sizeof d);
-        if (!invert(d, w->pivot + 36 * (size_t)i))
+        memcpy(d, a->diag + (size_t)block * (size_t)i, bytes);
+        for (int r = 0; i > 0 && r < n; r++)
+            for (int c = 0; c < n; c++)
+                for (int k = 0; k < n; k++)
+                    d[n * r + c] -= w->left[block * (i - 1) + n * r + k] * a->lower[block * (i - 1) + n * c + k];
+        memcpy(w->inverse + (size_t)block * (size_t)i, d, bytes);
+        if (!invert(n, d, w->pivot + (size_t)block * (size_t)i))
             return false;
-        for (int r = 0; i + 1 < m && r < 6; r++)
-            for (int c = 0; c < 6; c++) {
+        for (int r = 0; i + 1 < m && r < n; r++)
+            for (int c = 0; c < n; c++) {
                 double sum = 0;
-                for (int k = 0; k < 6; k++)
-                    sum += a->lower[36 * i + 6 * r + k] * w->pivot[36 * i + 6 * k + c];
-                w->left[36 * i + 6 * r + c] = sum;
+                for (int k = 0; k < n; k++)
+                    sum += a->lower[block * i + n * r + k] * w->pivot[block * i + n * k + c];
+                w->left[block * i + n * r + c] = sum;
             }
     }
     for (int i = m - 1; i >= 0; i--) { // d = A_ii - L_i^T B_(i+1)^-1 L_i
-        memcpy(d, a->diag + 36 * (size_t)i, sizeof d);
-        for (int r = 0; i + 1 < m && r < 6; r++)
-            for (int c = 0; c < 6; c++)
-                for (int k = 0; k < 6; k++)
-                    d[6 * r + c] -= w->right[36 * (i + 1) + 6 * r + k] * a->lower[36 * i + 6 * k + c];
-        if (!invert(d, inverse))
+        memcpy(d, a->diag + (size_t)block * (size_t)i, bytes);
+        for (int r = 0; i + 1 < m && r < n; r++)
+            for (int c = 0; c < n; c++)
+                for (int k = 0; k < n; k++)
+                    d[n * r + c] -= w->right[block * (i + 1) + n * r + k] * a->lower[block * i + n * k + c];
+        if (!invert(n, d, inverse))
             return false;
-        for (int r = 0; i > 0 && r < 6; r++)
-            for (int c = 0; c < 6; c++) {
+        for (int r = 0; i > 0 && r < n; r++)
+            for (int c = 0; c < n; c++) {
                 double sum = 0;
-                for (int k = 0; k < 6; k++)
-                    sum += a->lower[36 * (i - 1) + 6 * k + r] * inverse[6 * k + c];
-                w->right[36 * i + 6 * r + c] = sum;
+                for (int k = 0; k < n; k++)
+                    sum += a->lower[block * (i - 1) + n * k + r] * inverse[n * k + c];
+                w->right[block * i + n * r + c] = sum;
             }
-        for (int k = 0; k < 36; k++)
-            d[k] += w->inverse[36 * i + k] - a->diag[36 * i + k];
-        if (!invert(d, w->inverse + 36 * (size_t)i))
+        for (int k = 0; k < block; k++)
+            d[k] += w->inverse[block * i + k] - a->diag[block * i + k];
+        if (!invert(n, d, w->inverse + (size_t)block * (size_t)i))
             return false;
     }
     return true;
 }
 
-// Motion of a contact's nodes (12, the second half unused at a node) under loads g on them.
+// Motion of a contact's nodes (2 n, the second half unused at a node) under loads g on them.
 static void respond(const PointwiseWork *w, const ContactRow *c, const double *g, double *v)
 {
-    size_t i = (size_t)c->node;
-    memset(v, 0, 12 * sizeof *v);
+    const int n = w->size;
+    const size_t i = (size_t)c->node, block = (size_t)(n * n), bytes = (size_t)n * sizeof *v;
+    memset(v, 0, 2 * bytes);
     if (c->nodes == 1) {
-        add_product(w->inverse + 36 * i, 1, g, v);
+        add_product(n, w->inverse + block * i, 1, g, v);
         return;
     }
-    double load[6];
-    memcpy(load, g + 6, sizeof load);
-    add_product(w->left + 36 * i, -1, g, load);
-    add_product(w->inverse + 36 * (i + 1), 1, load, v + 6);
-    add_product(w->pivot + 36 * i, 1, g, v);
-    add_product_transposed(w->left + 36 * i, -1, v + 6, v);
+    double load[BLOCK_LARGEST];
+    memcpy(load, g + n, bytes);
+    add_product(n, w->left + block * i, -1, g, load);
+    add_product(n, w->inverse + block * (i + 1), 1, load, v + n);
+    add_product(n, w->pivot + block * i, 1, g, v);
+    add_product_transposed(n, w->left + block * i, -1, v + n, v);
 }
 
 static void prepare_local(const PointwiseWork *w, const ContactRow *c, Local *l)
 {
     l->g = 0;
     l->axis[0] = c->normal;
-    l->axis[1] = vec3_normal_to(c->normal);
+    l->axis[1] = c->slide ? vec3(1, 0, 0) : vec3_normal_to(c->normal);
     l->axis[2] = vec3_cross(c->normal, l->axis[1]);
     ContactRow here = *c;
     here.node = 0;
     for (int a = 0; a < 3; a++) {
-        double g[12] = {0};
+        double g[2 * BLOCK_LARGEST] = {0};
         contact_row_push(&here, l->axis[a], g);
         respond(w, c, g, l->response[a]);
         Vec3 d = contact_row_motion(&here, l->response[a]);
@@ -267,30 +275,50 @@ static void solve_local(const Mat3 *w, const double *d, double mu, double *start
     }
 }
 
+// One slide: d + w f. The search is Newton's on 1/|f|, which is concave in g and meets the root from below, at once where both directions give alike.
+static void solve_slide(const Mat3 *w, const double *d, double bound, double *f)
+{
+    double scale = w->m[1][1] + w->m[2][2], g = 1e-13 * scale; // a direction that is held has no motion: keeps the 2x2 regular
+    f[0] = f[1] = f[2] = 0;
+    for (int k = 0; k < 50 && scale > 0; k++) {
+        double xx = w->m[1][1] + g, xy = w->m[1][2], yy = w->m[2][2] + g, det = xx * yy - xy * xy;
+        f[1] = -(yy * d[1] - xy * d[2]) / det;
+        f[2] = -(xx * d[2] - xy * d[1]) / det;
+        double size2 = f[1] * f[1] + f[2] * f[2], size = sqrt(size2), excess = size / bound - 1;
+        if (!(excess > 1e-15))
+            return;
+        double fall = (yy * f[1] * f[1] - 2 * xy * f[1] * f[2] + xx * f[2] * f[2]) / det; // f (w + g)^-1 f
+        g += size2 / fall * excess;
+        f[1] *= bound / size;
+        f[2] *= bound / size;
+    }
+}
+
 // Motion of a place's one or two nodes under all forces.
 static void place_motion(const PointwiseWork *w, const ContactRow *first, double *v)
 {
-    size_t i = (size_t)first->node;
-    double load[6], left[6];
-    memset(v, 0, 12 * sizeof *v);
-    for (size_t k = 0; k < 6; k++) {
-        left[k] = w->p[6 * i + k] + w->r[6 * i + k];
-        load[k] = first->nodes == 1 ? left[k] + w->q[6 * i + k] : w->q[6 * i + 6 + k] + w->r[6 * i + 6 + k];
+    const size_t i = (size_t)first->node, n = (size_t)w->size, block = n * n;
+    const int size = w->size;
+    double load[BLOCK_LARGEST], left[BLOCK_LARGEST];
+    memset(v, 0, 2 * n * sizeof *v);
+    for (size_t k = 0; k < n; k++) {
+        left[k] = w->p[n * i + k] + w->r[n * i + k];
+        load[k] = first->nodes == 1 ? left[k] + w->q[n * i + k] : w->q[n * i + n + k] + w->r[n * i + n + k];
     }
     if (first->nodes == 1) {
-        add_product(w->inverse + 36 * i, 1, load, v);
+        add_product(size, w->inverse + block * i, 1, load, v);
         return;
     }
-    add_product(w->left + 36 * i, -1, left, load);
-    add_product(w->inverse + 36 * (i + 1), 1, load, v + 6);
-    add_product(w->pivot + 36 * i, 1, left, v);
-    add_product_transposed(w->left + 36 * i, -1, v + 6, v);
+    add_product(size, w->left + block * i, -1, left, load);
+    add_product(size, w->inverse + block * (i + 1), 1, load, v + n);
+    add_product(size, w->pivot + block * i, 1, left, v);
+    add_product_transposed(size, w->left + block * i, -1, v + n, v);
 }
 
 // The contacts [from, to) at one place, in turn; their nodes' motion is found once and kept up to date.
 static void visit(PointwiseWork *w, ContactRow *row, int from, int to, bool reverse)
 {
-    double v[12];
+    double v[2 * BLOCK_LARGEST];
     place_motion(w, &row[from], v);
     for (int n = 0; n < to - from; n++) {
         int k = reverse ? to - 1 - n : from + n;
@@ -307,11 +335,14 @@ static void visit(PointwiseWork *w, ContactRow *row, int from, int to, bool reve
         for (int a = 0; a < 3; a++)
             d[a] = vec3_dot(motion, l->axis[a]) - l->w.m[a][0] * old[0] - l->w.m[a][1] * old[1] - l->w.m[a][2] * old[2];
         d[0] += c->gap;
-        solve_local(&l->w, d, c->friction, &l->g, f);
+        if (c->slide)
+            solve_slide(&l->w, d, c->bound, f);
+        else
+            solve_local(&l->w, d, c->friction, &l->g, f);
         Vec3 force = vec3_add_scaled(vec3_add_scaled(vec3_scale(l->axis[0], f[0]), f[1], l->axis[1]), f[2], l->axis[2]);
         contact_row_push(c, vec3_sub(force, c->force), w->r);
         for (int a = 0; a < 3; a++)
-            for (int e = 0; e < 6 * c->nodes; e++)
+            for (int e = 0; e < w->size * c->nodes; e++)
                 v[e] += l->response[a][e] * (f[a] - old[a]);
         c->force = force;
     }
@@ -328,8 +359,9 @@ static int place_end(const ContactRow *row, int count, int from)
 
 static void pass_forth(PointwiseWork *w, ContactRow *row, int count, int m)
 {
+    const int n = w->size;
     int k = 0;
-    memset(w->p, 0, 6 * sizeof *w->p);
+    memset(w->p, 0, (size_t)n * sizeof *w->p);
     for (int i = 0; i < m; i++) {
         while (k < count && row[k].node == i) {
             int to = place_end(row, count, k);
@@ -338,19 +370,20 @@ static void pass_forth(PointwiseWork *w, ContactRow *row, int count, int m)
         }
         if (i + 1 == m)
             break;
-        double sum[6], *next = w->p + 6 * (size_t)(i + 1);
-        for (int e = 0; e < 6; e++) {
-            sum[e] = w->p[6 * i + e] + w->r[6 * i + e];
+        double sum[BLOCK_LARGEST], *next = w->p + n * (i + 1);
+        for (int e = 0; e < n; e++) {
+            sum[e] = w->p[n * i + e] + w->r[n * i + e];
             next[e] = 0;
         }
-        add_product(w->left + 36 * (size_t)i, -1, sum, next);
+        add_product(n, w->left + (ptrdiff_t)(n * n) * i, -1, sum, next);
     }
 }
 
 static void pass_back(PointwiseWork *w, ContactRow *row, int count, int m)
 {
+    const int n = w->size;
     int k = count;
-    memset(w->q + 6 * (size_t)(m - 1), 0, 6 * sizeof *w->q);
+    memset(w->q + n * (m - 1), 0, (size_t)n * sizeof *w->q);
     for (int i = m - 1; i >= 0; i--) {
         bool moved = i + 1 == m;
         for (;;) {
@@ -359,12 +392,12 @@ static void pass_back(PointwiseWork *w, ContactRow *row, int count, int m)
                 from--;
             bool node = from < k && row[from].nodes == 1;
             if ((from == k || node) && !moved) { // contacts between i and i+1 see q_(i+1); those at i need q_i
-                double sum[6], *next = w->q + 6 * (size_t)i;
-                for (int e = 0; e < 6; e++) {
-                    sum[e] = w->q[6 * (i + 1) + e] + w->r[6 * (i + 1) + e];
+                double sum[BLOCK_LARGEST], *next = w->q + n * i;
+                for (int e = 0; e < n; e++) {
+                    sum[e] = w->q[n * (i + 1) + e] + w->r[n * (i + 1) + e];
                     next[e] = 0;
                 }
-                add_product(w->right + 36 * (size_t)(i + 1), -1, sum, next);
+                add_product(n, w->right + (ptrdiff_t)(n * n) * (i + 1), -1, sum, next);
                 moved = true;
             }
             if (from == k)
@@ -379,8 +412,8 @@ static void pass_back(PointwiseWork *w, ContactRow *row, int count, int m)
 static void refresh(ContactSolver *s, int count, int m)
 {
     PointwiseWork *w = s->pointwise;
-    double v[12];
-    memcpy(w->r, s->rhs, (size_t)m * 6 * sizeof *w->r);
+    double v[2 * BLOCK_LARGEST];
+    memcpy(w->r, s->rhs, (size_t)(m * w->size) * sizeof *w->r);
     pass_forth(w, s->row, 0, m);
     pass_back(w, s->row, 0, m);
     for (int k = 0; k < count; k++) {

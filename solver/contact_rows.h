@@ -3,6 +3,9 @@
 //   d = J u = sum over its one or two nodes of w u_i + theta_i x (lever_i + w a),  a = -radius * normal
 // J^T f gives a node w f and (lever + w a) x f; constrained degrees of freedom (`mask`, unit rows) get nothing, but move the contact.
 // At a node w = 1 and there is no lever.
+//
+// Slides are rows too, in a space of their own: x is the displacement S, y is radius phi, and the normal z, along which nothing moves or presses,
+// so that what is tangential for a wall is all there is. In place of mu f_n they have their bound.
 #ifndef SELDINGER_SOLVER_CONTACT_ROWS_H
 #define SELDINGER_SOLVER_CONTACT_ROWS_H
 
@@ -13,19 +16,22 @@
 
 typedef struct ContactRow {
     int node, chain_node;        // in the chain that is solved, which may be condensed (block_condense.h), and in the caller's
-    int point;                   // its place in the caller's set
+    int stride;                  // unknowns of a node
+    int slide;                   // 0: a wall; else the first of a slide's two unknowns
+    int point;                   // its place in the caller's set, among the walls or the slides
     int nodes;                   // 1, or 2 where xi > 0
     double weight[2];
     Vec3 lever[2];               // looked at only where there are two nodes
-    unsigned mask[2];            // free degrees of freedom
-    bool inert;                  // the node cannot yield along the normal: no force
+    unsigned mask[2];            // free degrees of freedom: the first six, or a slide's two
+    bool inert;                  // the node cannot yield along the normal, or no slide can move or bear: no force
     Vec3 normal;
     double gap, radius, friction;
+    double bound;                // [N] of a slide
     double stiffness_n, stiffness_t; // [N/mm] of the node alone, neighbours held: the scale of the residual and of penalties
     Vec3 force;                  // on the tool
 } ContactRow;
 
-// Sorted by node, then xi (insertion sort: the caller's set comes nearly in order). Returns their number.
+// Sorted by node, then xi, the slides of a node behind its walls (insertion sort: the caller's set comes nearly in order). Returns their number.
 int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow *row);
 
 // Minus the arm at which node e's turn moves the contact: its motion is w u + negative_arm x theta.
@@ -37,11 +43,13 @@ static inline Vec3 contact_row_negative_arm(const ContactRow *c, int e)
 
 static inline Vec3 contact_row_motion(const ContactRow *c, const double *u)
 {
-    const double *v = u + 6 * (size_t)c->node;
+    const double *v = u + (size_t)c->stride * (size_t)c->node;
+    if (c->slide)
+        return vec3(c->mask[0] & 1 ? v[c->slide] : 0, c->mask[0] & 2 ? c->radius * v[c->slide + 1] : 0, 0);
     if (c->nodes == 1)
         return vec3_add_scaled(vec3(v[0], v[1], v[2]), c->radius, vec3_cross(c->normal, vec3(v[3], v[4], v[5])));
     Vec3 d = {0, 0, 0};
-    for (int e = 0; e < 2; e++, v += 6) {
+    for (int e = 0; e < 2; e++, v += c->stride) {
         d = vec3_add_scaled(d, c->weight[e], vec3(v[0], v[1], v[2]));
         d = vec3_add(d, vec3_cross(contact_row_negative_arm(c, e), vec3(v[3], v[4], v[5])));
     }
@@ -51,10 +59,16 @@ static inline Vec3 contact_row_motion(const ContactRow *c, const double *u)
 // y += J^T f
 static inline void contact_row_push(const ContactRow *c, Vec3 f, double *y)
 {
+    if (c->slide) {
+        double *v = y + (size_t)c->stride * (size_t)c->node + c->slide;
+        v[0] += c->mask[0] & 1 ? f.x : 0;
+        v[1] += c->mask[0] & 2 ? c->radius * f.y : 0;
+        return;
+    }
     for (int e = 0; e < c->nodes; e++) {
         Vec3 moment = c->nodes == 1 ? vec3_scale(vec3_cross(f, c->normal), c->radius) : vec3_cross(f, contact_row_negative_arm(c, e));
         const double w = c->weight[e], g[6] = {w * f.x, w * f.y, w * f.z, moment.x, moment.y, moment.z};
-        double *v = y + 6 * (size_t)(c->node + e);
+        double *v = y + (size_t)c->stride * (size_t)(c->node + e);
         if (c->mask[e] == 63)
             for (int k = 0; k < 6; k++)
                 v[k] += g[k];
@@ -66,21 +80,29 @@ static inline void contact_row_push(const ContactRow *c, Vec3 f, double *y)
 
 static inline Vec3 contact_tangential(Vec3 v, Vec3 normal) { return vec3_add_scaled(v, -vec3_dot(v, normal), normal); }
 
-// The nearest force in Coulomb's cone of the normal force that it has: f_n+ n, and the tangent cut to mu f_n+.
-static inline Vec3 contact_project(Vec3 f, Vec3 normal, double friction)
+// The nearest force in Coulomb's cone of the normal force that it has: f_n+ n, and the tangent cut to mu f_n+ (of a slide, to its bound).
+static inline Vec3 contact_project(const ContactRow *c, Vec3 f)
 {
+    Vec3 normal = c->normal;
     double fn = vec3_dot(f, normal);
-    if (!(fn > 0))
+    if (!(fn > 0) && !c->slide)
         return (Vec3){0, 0, 0};
     Vec3 t = contact_tangential(f, normal);
-    double size = vec3_norm(t), bound = friction * fn;
+    double size = vec3_norm(t), bound = c->slide ? c->bound : c->friction * fn;
     return vec3_add_scaled(vec3_scale(t, size > bound ? bound / size : 1), fn, normal);
 }
 
 // Most candidates: no force, and none due.
 static inline bool contact_row_is_idle(const ContactRow *c, Vec3 motion)
 {
-    return c->force.x == 0 && c->force.y == 0 && c->force.z == 0 && c->gap + vec3_dot(motion, c->normal) >= 0;
+    return !c->slide && c->force.x == 0 && c->force.y == 0 && c->force.z == 0 && c->gap + vec3_dot(motion, c->normal) >= 0;
+}
+
+// What the tangential force has more than it may, as a share of its normal force or of its bound.
+static inline double contact_row_excess(const ContactRow *c)
+{
+    double fn = vec3_dot(c->force, c->normal), ft = vec3_norm(contact_tangential(c->force, c->normal));
+    return c->slide ? ft / c->bound - 1 : ft / fn - c->friction;
 }
 
 // What is wrong with force f and motion d, in N: f less the nearest force in the cone to f - slope k violation, each direction by itself.
@@ -89,7 +111,7 @@ static inline Vec3 contact_error(const ContactRow *c, Vec3 f, Vec3 d, double slo
     Vec3 n = c->normal;
     double fn = vec3_dot(f, n), wish_n = fn - slope * c->stiffness_n * (c->gap + vec3_dot(d, n));
     Vec3 ft = contact_tangential(f, n), wish = vec3_add_scaled(ft, -slope * c->stiffness_t, contact_tangential(d, n));
-    double normal = wish_n > 0 ? fn - wish_n : fn, bound = fn > 0 ? c->friction * fn : 0, size = vec3_norm(wish);
+    double normal = wish_n > 0 ? fn - wish_n : fn, bound = c->slide ? c->bound : fn > 0 ? c->friction * fn : 0, size = vec3_norm(wish);
     return vec3_add_scaled(vec3_sub(ft, vec3_scale(wish, size > bound ? bound / size : 1)), normal, n);
 }
 

@@ -2,7 +2,7 @@
 //
 // Residual of a contact (Alart and Curnier's map), with its own stiffness k_n, k_t of the node alone in front of the violation:
 //   normal      f_n - (f_n - k_n (gap + d_n))+
-//   tangential  f_t - P(f_t - k_t d_t), P onto the disc of radius mu f_n
+//   tangential  f_t - P(f_t - k_t d_t), P onto the disc of radius mu f_n, or of a slide's bound
 // The node's own stiffness is the strictest sensible scale: the operator W between forces and motion is never smaller than 1/(4 k), so a
 // residual of 1e-6 is a force error of about 1e-6 also where a stiff straight wire carries many contacts and W is nearly singular.
 #include "solver/gauss_seidel.h"
@@ -20,7 +20,7 @@ ContactOptions contact_default_options(void)
     return (ContactOptions){.form = CONTACT_BLOCK, .max_iterations = 200, .tolerance = 1e-6};
 }
 
-static Sym3 block_at(const double *d) { return (Sym3){d[0], d[6], d[12], d[7], d[13], d[14]}; }
+static Sym3 block_at(const double *d, int n) { return (Sym3){d[0], d[n], d[2 * n], d[n + 1], d[2 * n + 1], d[2 * n + 2]}; }
 
 // The stiffness that a contact sees: its node's own, or of two nodes and their turns in series, each with its share.
 static void own_stiffness(const BlockChain *chain, ContactRow *c)
@@ -28,9 +28,10 @@ static void own_stiffness(const BlockChain *chain, ContactRow *c)
     double kn = 0, kt = 0, yields = 0, give_n = 0, give_t = 0;
     Vec3 n = c->normal;
     for (int e = 0; e < c->nodes; e++) {
-        const double *d = chain->diag + 36 * (size_t)(c->node + e), w = c->weight[e];
-        unsigned mask = c->mask[e] = contact_free_dofs(chain, c->node + e);
-        Sym3 k = block_at(d), turn = block_at(d + 21);
+        const int size = chain->size;
+        const double *d = chain->diag + (size_t)(size * size) * (size_t)(c->node + e), w = c->weight[e];
+        unsigned mask = c->mask[e] = contact_free_dofs(chain, c->node + e) & 63;
+        Sym3 k = block_at(d, size), turn = block_at(d + 3 * (size + 1), size);
         double normal = sym3_quadratic(&k, n), free = (mask & 1 ? n.x * n.x : 0) + (mask & 2 ? n.y * n.y : 0) + (mask & 4 ? n.z * n.z : 0);
         yields += w * w * free;
         kn += normal;
@@ -44,11 +45,30 @@ static void own_stiffness(const BlockChain *chain, ContactRow *c)
     c->inert = !(yields > 1e-8) || !isfinite(c->gap) || !vec3_is_finite(n);
 }
 
+// The mean over the directions in which it can move, as along a wall.
+static void slide_stiffness(const BlockChain *chain, ContactRow *c)
+{
+    const size_t n = (size_t)chain->size, at = (size_t)c->slide;
+    const double *d = chain->diag + n * n * (size_t)c->node + (n + 1) * at;
+    c->mask[0] = contact_free_dofs(chain, c->node) >> at & (c->radius > 0 ? 3 : 1);
+    double s = c->mask[0] & 1 ? d[0] : 0, phi = c->mask[0] & 2 ? d[n + 1] / (c->radius * c->radius) : 0;
+    c->stiffness_n = c->stiffness_t = (s + phi) / (c->mask[0] == 3 ? 2 : 1);
+    c->inert = c->mask[0] == 0 || !(c->bound > 0) || !isfinite(c->bound) || !isfinite(c->radius);
+}
+
+static void insert(ContactRow *row, int k, const ContactRow *c)
+{
+    for (; k > 0 && (row[k - 1].node > c->node || (row[k - 1].node == c->node && row[k - 1].weight[1] > c->weight[1])); k--)
+        row[k] = row[k - 1];
+    row[k] = *c;
+}
+
 int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow *row)
 {
+    const Vec3 none = {0, 0, 0};
     for (int i = 0; i < set->count; i++) {
         const ContactPoint *p = &set->point[i];
-        ContactRow c = {.node = p->node, .chain_node = p->node, .point = i, .nodes = p->xi > 0 && p->node + 1 < chain->count ? 2 : 1, .weight = {1, 0},
+        ContactRow c = {.node = p->node, .chain_node = p->node, .stride = chain->size, .point = i, .nodes = p->xi > 0 && p->node + 1 < chain->count ? 2 : 1, .weight = {1, 0},
                         .normal = p->normal, .gap = p->gap, .radius = p->tool_radius, .friction = fmax(0, p->friction)};
         if (c.nodes == 2)
             for (int e = 0; e < 2; e++) {
@@ -58,13 +78,19 @@ int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow
         own_stiffness(chain, &c);
         if (c.inert)
             c.gap = HUGE_VAL;
-        c.force = c.inert || !vec3_is_finite(p->force) ? (Vec3){0, 0, 0} : contact_project(p->force, p->normal, c.friction);
-        int k = i;
-        for (; k > 0 && (row[k - 1].node > c.node || (row[k - 1].node == c.node && row[k - 1].weight[1] > c.weight[1])); k--)
-            row[k] = row[k - 1];
-        row[k] = c;
+        c.force = c.inert || !vec3_is_finite(p->force) ? none : contact_project(&c, p->force);
+        insert(row, i, &c);
     }
-    return set->count;
+    for (int i = 0; i < set->slide_count; i++) {
+        const ContactSlide *p = &set->slide[i];
+        ContactRow c = {.node = p->node, .chain_node = p->node, .stride = chain->size, .slide = p->unknown, .point = i, .nodes = 1, .weight = {1, 0},
+                        .normal = {0, 0, 1}, .radius = p->radius, .bound = p->bound};
+        slide_stiffness(chain, &c);
+        Vec3 force = vec3(c.mask[0] & 1 ? p->force[0] : 0, c.mask[0] & 2 ? p->force[1] : 0, 0);
+        c.force = c.inert || !vec3_is_finite(force) ? none : contact_project(&c, force);
+        insert(row, set->count + i, &c);
+    }
+    return set->count + set->slide_count;
 }
 
 double contact_residual(const ContactRow *row, int count, const Vec3 *motion, ContactReport *report)
@@ -80,10 +106,9 @@ double contact_residual(const ContactRow *row, int count, const Vec3 *motion, Co
         double off = vec3_norm2(error), force = vec3_norm2(c->force);
         worst = off > worst ? off : worst;
         top = force > top ? force : top;
-        if (fn > 0) {
-            active++;
-            cone = fmax(cone, vec3_norm(contact_tangential(c->force, c->normal)) / fn - c->friction);
-        }
+        active += fn > 0;
+        if (fn > 0 || c->slide)
+            cone = fmax(cone, contact_row_excess(c));
     }
     report->active = active;
     report->largest = sqrt(top);
@@ -93,7 +118,7 @@ double contact_residual(const ContactRow *row, int count, const Vec3 *motion, Co
 
 void contact_balance(ContactSolver *s, const BlockFactor *factor, const double *b, int count, double *u)
 {
-    memcpy(s->rhs, b, (size_t)s->matrix.count * 6 * sizeof *b);
+    memcpy(s->rhs, b, (size_t)(s->matrix.count * s->matrix.size) * sizeof *b);
     for (int i = 0; i < count; i++)
         contact_row_push(&s->row[i], s->row[i].force, s->rhs);
     block_factor_solve(factor, s->rhs, u);
@@ -101,33 +126,34 @@ void contact_balance(ContactSolver *s, const BlockFactor *factor, const double *
         s->motion[i] = contact_row_motion(&s->row[i], u);
 }
 
-ContactSolver *contact_solver_create(int node_count, int contact_capacity)
+ContactSolver *contact_solver_create(int node_count, int size, int contact_capacity)
 {
     ContactSolver *s = calloc(1, sizeof *s);
-    if (!s || node_count < 1 || contact_capacity < 0) {
+    if (!s || node_count < 1 || !block_size_is_known(size) || contact_capacity < 0) {
         free(s);
         return NULL;
     }
-    size_t m = (size_t)node_count, k = (size_t)contact_capacity + 1;
+    size_t n = (size_t)node_count * (size_t)size, blocks = block_doubles(node_count, size), k = (size_t)contact_capacity + 1;
     s->node_count = node_count;
     s->capacity = contact_capacity;
     s->row = calloc(k, sizeof *s->row);
     s->motion = calloc(k, sizeof *s->motion);
     s->law = calloc(k, sizeof *s->law);
     s->best = calloc(k, sizeof *s->best);
-    s->best_u = calloc(6 * m, sizeof *s->best_u);
+    s->best_u = calloc(n, sizeof *s->best_u);
     s->flag = calloc(k, sizeof *s->flag);
-    s->rhs = calloc(6 * m, sizeof *s->rhs);
-    s->delta = calloc(6 * m, sizeof *s->delta);
-    s->turned = calloc(BLOCK_DOUBLES * m + 2, sizeof *s->turned);
-    s->turned_chain = calloc(BLOCK_DOUBLES * m + 2, sizeof *s->turned_chain);
-    s->small_u = calloc(6 * m, sizeof *s->small_u);
-    s->lu = block_lu_create(node_count);
-    s->condenser = block_condenser_create(node_count);
-    s->factor = block_factor_create(node_count);
-    s->pointwise = pointwise_work_create(node_count, contact_capacity);
-    bool ok = block_chain_create(&s->matrix, node_count) && s->pointwise && s->condenser && s->small_u && s->turned_chain;
-    if (!s->row || !s->motion || !s->law || !s->best || !s->best_u || !s->flag || !s->rhs || !s->delta || !s->turned || !s->lu || !s->factor || !ok) {
+    s->wall = calloc(k, sizeof *s->wall);
+    s->rhs = calloc(n, sizeof *s->rhs);
+    s->delta = calloc(n, sizeof *s->delta);
+    s->turned = calloc(blocks, sizeof *s->turned);
+    s->turned_chain = calloc(blocks, sizeof *s->turned_chain);
+    s->small_u = calloc(n, sizeof *s->small_u);
+    s->lu = block_lu_create(node_count, size);
+    s->condenser = block_condenser_create(node_count, size);
+    s->factor = block_factor_create(node_count, size);
+    s->pointwise = pointwise_work_create(node_count, size, contact_capacity);
+    bool ok = block_chain_create(&s->matrix, node_count, size) && s->pointwise && s->condenser && s->small_u && s->turned_chain;
+    if (!s->row || !s->motion || !s->law || !s->best || !s->best_u || !s->flag || !s->wall || !s->rhs || !s->delta || !s->turned || !s->lu || !s->factor || !ok) {
         contact_solver_destroy(s);
         return NULL;
     }
@@ -144,6 +170,7 @@ void contact_solver_destroy(ContactSolver *s)
     free(s->best);
     free(s->best_u);
     free(s->flag);
+    free(s->wall);
     free(s->rhs);
     free(s->delta);
     free(s->turned);
@@ -190,12 +217,23 @@ ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, cons
                             const ContactOptions *options, double *u)
 {
     int count = contact_rows_fill(set, chain, solver->row);
+    solver->wall_count = 0;
+    for (int i = 0; i < count; i++)
+        if (!solver->row[i].slide)
+            solver->wall[solver->wall_count++] = i;
     ContactReport report;
     if (options->form == CONTACT_POINTWISE)
         report = contact_pointwise(solver, chain, factor, b, count, options, u);
     else if (!solve_condensed(solver, chain, b, count, options, u, &report))
         report = contact_newton(solver, chain, factor, b, count, options, u);
-    for (int i = 0; i < count; i++)
-        set->point[solver->row[i].point].force = solver->row[i].force;
+    for (int i = 0; i < count; i++) {
+        const ContactRow *c = &solver->row[i];
+        if (c->slide) {
+            set->slide[c->point].force[0] = c->force.x;
+            set->slide[c->point].force[1] = c->force.y;
+        } else {
+            set->point[c->point].force = c->force;
+        }
+    }
     return report;
 }

@@ -1,4 +1,4 @@
-// The contact solve of a step. Find u and forces with   A u = b + sum_k J_k^T f_k,   Signorini and Coulomb (contact.h).
+// The contact solve of a step. Find u and forces with   A u = b + sum_k J_k^T f_k,   Signorini and Coulomb, and slides between tools (contact.h).
 //
 // Two forms behind one call (DESIGN section 4, items 5 and 6); both reach the same solution.
 //   pointwise: Gauss-Seidel over contacts (the paper's, and the reference), on the chain's semi-separable structure: W is never formed.
@@ -30,15 +30,16 @@ typedef struct ContactReport {
                              // least 1e-3 N). Forces have been cut to their cones by no more than this; also in a solve that stopped
                              // early no contact overlaps by more than residual * largest force / stiffness of its node
     double largest;          // [N] that largest force
-    double cone_violation;   // largest (|force_t| - mu force_n)+ over force_n
-    int active;              // contacts with force
+    double cone_violation;   // largest (|force_t| - mu force_n)+ over force_n, or (|force| - bound)+ over a slide's bound
+    int active;              // contacts with the wall that bear force
 } ContactReport;
 
 typedef struct ContactSolver ContactSolver;   // work space
-ContactSolver *contact_solver_create(int node_count, int contact_capacity);
+// Of chains with blocks of `size`; the capacity is that of contacts with the wall and slides together.
+ContactSolver *contact_solver_create(int node_count, int size, int contact_capacity);
 void contact_solver_destroy(ContactSolver *solver);
 
-// `factor` is that of `chain`. b (M, 6) in; u (M, 6) out. Rows of constrained degrees of freedom are already unit rows in
+// `factor` is that of `chain`. b (M, n) in; u (M, n) out. Rows of constrained degrees of freedom are already unit rows in
 // `chain` with their value in b, and no contact acts on a fully constrained node.
 ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, ContactSet *set,
                             const ContactOptions *options, double *u);

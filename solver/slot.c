@@ -30,6 +30,13 @@ Slot slot_make(int element, double length, int k, int count, double radius, doub
     return s;
 }
 
+Slot slot_shifted(const Slot *slot, double length, double xi)
+{
+    Slot s = *slot;
+    set_shape(&s, xi, length);
+    return s;
+}
+
 SlotPlace slot_place(const Slot *s, double length, Vec3 x1, Vec3 t1, Vec3 x2, Vec3 t2)
 {
     SlotPlace p = {.weight = s->weight, .lever = {vec3_scale(t1, s->near), vec3_scale(t2, s->far)}};
@@ -41,13 +48,17 @@ SlotPlace slot_place(const Slot *s, double length, Vec3 x1, Vec3 t1, Vec3 x2, Ve
     return p;
 }
 
-bool slot_place_at_mouth(const Slot *slot, double length, double coordinate, Vec3 mouth, Vec3 direction, Vec3 x2, Vec3 t2, SlotPlace *place)
+bool slot_place_beyond(const Slot *slot, double length, double behind, Vec3 x1, Vec3 t1, Vec3 x2, Vec3 t2, SlotPlace *place)
 {
-    double outside = length + coordinate, xi = outside > 0 ? (coordinate + slot->xi * length) / outside : 0;
+    double outside = length - behind, xi = outside > 0 ? (slot->xi * length - behind) / outside : 0;
     if (!(xi > MOUTH_PART && xi < 1))
         return false;
-    Slot s = *slot;
-    set_shape(&s, xi, outside);
-    *place = slot_place(&s, outside, mouth, direction, x2, t2);
+    Slot s = slot_shifted(slot, outside, xi);
+    *place = slot_place(&s, outside, x1, t1, x2, t2);
     return true;
+}
+
+bool slot_place_at_mouth(const Slot *slot, double length, double coordinate, Vec3 mouth, Vec3 direction, Vec3 x2, Vec3 t2, SlotPlace *place)
+{
+    return slot_place_beyond(slot, length, -coordinate, mouth, direction, x2, t2, place);
 }

@@ -29,9 +29,14 @@ typedef struct SlotPlace {   // where it is and how it follows its nodes
 int slot_count_of(double length);
 // The k-th of `count` slots.
 Slot slot_make(int element, double length, int k, int count, double radius, double friction);
+// A slot elsewhere on its element, 0 <= xi <= 1.
+Slot slot_shifted(const Slot *slot, double length, double xi);
 SlotPlace slot_place(const Slot *slot, double length, Vec3 x1, Vec3 t1, Vec3 x2, Vec3 t2);
 // On the element across the sheath's mouth, whose inner node is at `coordinate` <= 0 behind it (sheath.c): the cubic of the part outside, from
 // the mouth, clamped along `direction`, to the outer node. False where the slot is inside. lever[0] belongs to the clamp.
 bool slot_place_at_mouth(const Slot *slot, double length, double coordinate, Vec3 mouth, Vec3 direction, Vec3 x2, Vec3 t2, SlotPlace *place);
+
+// On an element whose first `behind` mm lie inside another tool: the cubic of the part beyond its tip, node 1. False where the slot is inside.
+bool slot_place_beyond(const Slot *slot, double length, double behind, Vec3 x1, Vec3 t1, Vec3 x2, Vec3 t2, SlotPlace *place);
 
 #endif

@@ -9,7 +9,7 @@
 // (follow). The whole wire is held back together, what the hand feeds included. What is not done after the last iteration is flagged
 // STEP_LIMITED and left to the next steps; so is an advance into a tool that is squeezed by more than SQUEEZE_MAX: the hand stalls.
 #include "solver/node_turn.h"
-#include "solver/step_internal.h"
+#include "solver/step_tools.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -49,7 +49,8 @@ static double *take(double **from, size_t count)
 static bool allocate_scratch(Stepper *s)
 {
     size_t m = (size_t)s->wire.node_count, padded = m + BEAM_PADDING;
-    s->scratch = calloc((BEAM_REST_ARRAYS + 2 * BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1) * padded + 43 * m, sizeof *s->scratch);
+    s->scratch = calloc((BEAM_REST_ARRAYS + 2 * BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1) * padded + (5 * (size_t)s->chain.size + 7 + (size_t)s->chain.size + 4 * (size_t)s->state.inner_count) * m,
+                        sizeof *s->scratch);
     if (!s->scratch)
         return false;
     double *at = s->scratch;
@@ -66,12 +67,15 @@ static bool allocate_scratch(Stepper *s)
         i->lateral[k] = s->wire.inertia_lateral[k];
         i->excess[k] = s->wire.inertia_axial[k] - s->wire.inertia_lateral[k];
     }
-    s->b = take(&at, 6 * m);
-    s->u = take(&at, 6 * m);
-    s->linearised = take(&at, 6 * m);
-    s->seen = take(&at, 6 * m);
-    s->product = take(&at, 6 * m);
-    s->kept = take(&at, 13 * m);
+    size_t rows = (size_t)s->chain.size * m, inner = (size_t)s->state.inner_count * m;
+    s->b = take(&at, rows);
+    s->u = take(&at, rows);
+    s->linearised = take(&at, rows);
+    s->seen = take(&at, rows);
+    s->product = take(&at, rows);
+    s->kept = take(&at, 7 * m + rows + 2 * inner);
+    s->start_slide = take(&at, inner);
+    s->start_angle = take(&at, inner);
     return true;
 }
 
@@ -81,6 +85,10 @@ static bool make_slots(Stepper *s, const WireOptions *o)
     s->slot_start = calloc((size_t)w->node_count, sizeof *s->slot_start);
     if (!s->slot_start)
         return false;
+    if (s->tool_count > 1) {         // room for all; which of them there are: tools_chain()
+        s->point_count = w->node_count + s->slot_count;
+        return (s->slot = calloc((size_t)s->slot_count + 1, sizeof *s->slot)) != NULL;
+    }
     for (int i = 0; i < w->element_count; i++)
         s->slot_start[i + 1] = s->slot_start[i] + slot_count_of(w->length[i]);
     s->slot_count = s->slot_start[w->element_count];
@@ -99,8 +107,10 @@ static bool make_slots(Stepper *s, const WireOptions *o)
 
 static bool allocate(Stepper *s)
 {
-    size_t m = (size_t)s->wire.node_count, points = (size_t)s->point_count;
-    s->memory_count = 13 * m + (4 + WALL_MET_DOUBLES) * points;
+    s->point_capacity = s->point_count;
+    size_t m = (size_t)s->wire.node_count, points = (size_t)s->point_count, inner = (size_t)s->state.inner_count * m;
+    int size = 6 + 2 * s->state.inner_count;
+    s->memory_count = 13 * m + (4 + WALL_MET_DOUBLES) * points + 4 * inner;
     s->memory = calloc(s->memory_count, sizeof *s->memory);
     s->place = calloc(points, sizeof *s->place);
     s->trial = calloc(points, sizeof *s->trial);
@@ -116,10 +126,12 @@ static bool allocate(Stepper *s)
     s->room = calloc(3 * points + m, sizeof *s->room);
     s->set.point = calloc(2 * points, sizeof *s->set.point);
     s->set.capacity = 2 * s->point_count;       // each with the wall across
-    s->factor = block_factor_create(s->wire.node_count);
-    s->solver = contact_solver_create(s->wire.node_count, s->set.capacity);
+    s->factor = block_factor_create(s->wire.node_count, size);
+    s->solver = contact_solver_create(s->wire.node_count, size, s->set.capacity);
+    s->carrier = calloc(m, sizeof *s->carrier);
+    s->own = calloc(m, sizeof *s->own);
     if (!s->memory || !s->place || !s->trial || !s->tried || !s->fixed || !s->start_position || !s->start_orientation || !s->slot_place || !s->query_point || !s->query_place ||
-        !s->query_hit || !s->query_which || !s->room || !s->set.point || !s->factor || !s->solver || !block_chain_create(&s->chain, s->wire.node_count) ||
+        !s->query_hit || !s->query_which || !s->room || !s->set.point || !s->factor || !s->solver || !s->carrier || !s->own || !block_chain_create(&s->chain, s->wire.node_count, size) ||
         !allocate_scratch(s))
         return false;
     s->state.node_count = s->wire.node_count;
@@ -130,6 +142,10 @@ static bool allocate(Stepper *s)
     s->force = (Vec3 *)(s->memory + 13 * m);
     s->clearance = s->memory + 13 * m + 3 * points;
     s->met = (WallMet *)(s->clearance + points);
+    s->state.slide = (double *)(s->met + points);
+    s->state.angle = s->state.slide + inner;
+    s->state.slide_velocity = s->state.angle + inner;
+    s->state.slide_spin = s->state.slide_velocity + inner;
     s->linger = s->room + points;
     s->lack = s->linger + points;
     s->range = s->lack + points;
@@ -192,6 +208,11 @@ static bool place_rig(Stepper *s, const WireOptions *o)
 
 static void place_wire(Stepper *s, const WireOptions *o)
 {
+    if (s->tool_count > 1) {
+        s->state.inserted = s->tool[0].inserted;
+        tools_place(s);
+        return;
+    }
     s->state.inserted = o->has_sheath ? fmin(o->inserted, s->wire.total_length) : s->wire.total_length;
     double behind = s->wire.total_length - s->state.inserted;
     for (int i = 0; i < s->wire.node_count; i++) {
@@ -245,12 +266,21 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
         stepper_destroy(s);
         return NULL;
     }
+    s->tool_count = 1 + o.inner_count;
+    s->state.inner_count = o.inner_count;
+    if (s->tool_count > 1 && !(tools_create(s, &o, why, capacity) && wire_reserve(&s->wire, s->capacity))) {
+        if (!why[0])
+            snprintf(why, (size_t)capacity, "no memory for %d tools", s->tool_count);
+        stepper_destroy(s);
+        return NULL;
+    }
     if (!make_slots(s, &o.wire) || !allocate(s) || !place_rig(s, &o.wire)) {
         snprintf(why, (size_t)capacity, "no memory for a wire of %d elements", o.wire.elements);
         stepper_destroy(s);
         return NULL;
     }
-    wire_rest(&s->wire, &o.wire, &s->beam.rest);
+    if (s->tool_count == 1)
+        wire_rest(&s->wire, &o.wire, &s->beam.rest);
     s->gravity = o.wire.gravity;
     s->damping_mass = o.wire.damping_mass;
     s->damping_stiffness = o.wire.damping_stiffness;
@@ -263,7 +293,7 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
     for (int k = 0; k < 3; k++)
         s->axis[k] = mat3_column(&frame, k);
     s->vessel = o.vessel;
-    if (s->vessel)
+    if (s->vessel && s->tool_count == 1)
         make_imperfect(&s->wire, &s->beam.rest);
     s->wall_friction = o.wall_friction;
     ContactOptions usual = contact_default_options();
@@ -282,6 +312,9 @@ void stepper_destroy(Stepper *s)
 {
     if (!s)
         return;
+    tools_destroy(s);
+    free(s->carrier);
+    free(s->own);
     wire_destroy(&s->wire);
     block_chain_destroy(&s->chain);
     if (s->factor)
@@ -331,17 +364,25 @@ static void hold(Stepper *s, int node)
     w->spin[node] = vec3_scale(s->axis[0], vec3_dot(w->spin[node], s->axis[0]));
 }
 
+static Vec3 mouth_curvature(const Stepper *s, int node)
+{
+    if (s->tool_count > 1)
+        return stepper_curvature(s, node);
+    const WireState *w = &s->state;
+    const BeamRest *r = &s->beam.rest;
+    SheathElement e;
+    sheath_element(r, node, s->mouth, s->axis[0], stepper_sheath_coordinate(s, node), w->orientation[node], w->position[node + 1], w->orientation[node + 1], 0, &e);
+    Vec3 moment = vec3_add_scaled(e.out.moment1, -vec3_dot(e.out.moment1, s->axis[0]), s->axis[0]);
+    return vec3_add_scaled(sheath_rest_curvature(r, node - 1, w->orientation[node]), -1 / r->bending[node - 1], moment);
+}
+
 static void let_go(Stepper *s, int node)
 {
     if (node + 1 >= s->state.node_count)
         return;
     WireState *w = &s->state;
-    const BeamRest *r = &s->beam.rest;
-    SheathElement e;
     double along = stepper_sheath_coordinate(s, node);
-    sheath_element(r, node, s->mouth, s->axis[0], along, w->orientation[node], w->position[node + 1], w->orientation[node + 1], 0, &e);
-    Vec3 moment = vec3_add_scaled(e.out.moment1, -vec3_dot(e.out.moment1, s->axis[0]), s->axis[0]);
-    Vec3 curvature = vec3_add_scaled(sheath_rest_curvature(r, node - 1, w->orientation[node]), -1 / r->bending[node - 1], moment);
+    Vec3 curvature = mouth_curvature(s, node);
     double bend = vec3_norm(curvature) * along;
     if (bend > LET_GO_TURN)          // sprang out of the sheath: no curve is known that far
         curvature = vec3_scale(curvature, LET_GO_TURN / bend);
@@ -378,15 +419,32 @@ static void begin(Stepper *s)
     size_t nodes = (size_t)s->state.node_count;
     memcpy(s->start_position, s->state.position, nodes * sizeof *s->start_position);
     memcpy(s->start_orientation, s->state.orientation, nodes * sizeof *s->start_orientation);
-    memset(s->linearised, 0, 6 * nodes * sizeof *s->linearised);
-    memset(s->seen, 0, 6 * nodes * sizeof *s->seen);
+    size_t inner = nodes * (size_t)s->state.inner_count * sizeof(double);
+    memcpy(s->start_slide, s->state.slide, inner);
+    memcpy(s->start_angle, s->state.angle, inner);
+    memset(s->linearised, 0, row_of(s, s->state.node_count) * sizeof *s->linearised);
+    memset(s->seen, 0, row_of(s, s->state.node_count) * sizeof *s->seen);
     s->is_iterate = s->overshoots = s->blocked = false;
     s->slips = 0;
     s->energy_before = -1;
     s->mouth_ahead = s->command.advance;
 }
 
+static void feed(Stepper *s, StepCommand command);
+
+void step_feed_tools(Stepper *s, const StepCommand *command)
+{
+    memcpy(s->tool_command, command, (size_t)s->tool_count * sizeof *command);
+    feed(s, command[0]);
+}
+
 void step_feed(Stepper *s, StepCommand command)
+{
+    StepCommand all[STEP_TOOLS_MAX] = {command};
+    step_feed_tools(s, all);
+}
+
+static void feed(Stepper *s, StepCommand command)
 {
     s->wall_force_max = s->report.wall_force_max;
     s->wall_force_sum = s->report.wall_force_sum;
@@ -404,6 +462,9 @@ void step_feed(Stepper *s, StepCommand command)
     }
     s->command = stalled(s, command);
     command = s->command;
+    s->tool_command[0] = command;
+    if (s->tool_count > 1)
+        tools_feed(s);
     int held = count_held(s, command.advance);
     for (int i = s->first_free; i < held; i++) {
         hold(s, i);
@@ -441,7 +502,7 @@ static void solve(Stepper *s)
         s->report.flags |= STEP_NOT_CONVERGED;
     stepper_keep_forces(s);
     double sum = 0;
-    for (int i = 0; i < 6 * s->state.node_count; i++)
+    for (size_t i = 0; i < row_of(s, s->state.node_count); i++)
         sum += s->u[i] * 0;          // 0, or not a number
     s->has_failed |= sum != 0;
 }
@@ -452,7 +513,7 @@ static double largest_turn(const Stepper *s)
     double largest = 0;
     Vec3 before = vec3(0, 0, 0);         // what the node before moves by
     for (int i = s->first_free; i < s->state.node_count; i++) {
-        const double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
+        const double *u = s->u + row_of(s, i), *k = s->linearised + row_of(s, i);
         Vec3 turn = vec3(u[3] - k[3], u[4] - k[4], u[5] - k[5]), moves = vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]);
         Quat q = s->state.orientation[i];
         Vec3 axis = vec3(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y));
@@ -476,11 +537,11 @@ static double largest_turn(const Stepper *s)
 static bool misjudges_border(Stepper *s)
 {
     int i = s->first_free - 1;
-    if (i < 0 || i + 1 >= s->state.node_count || s->has_failed)
+    if (s->tool_count > 1 || i < 0 || i + 1 >= s->state.node_count || s->has_failed)
         return false;
     const BeamRest *rest = &s->beam.rest;
     double start = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]), width = sheath_border_share * rest->length[i];
-    double taken = start + s->mouth_ahead, ends = start + s->u[6 * (size_t)i];
+    double taken = start + s->mouth_ahead, ends = start + s->u[row_of(s, i)];
     double there = sheath_straightening(rest, i, ends), linear = sheath_straightening(rest, i, taken) - s->mouth_element.border * (ends - taken);
     if (fabs(there - linear) < BORDER_FORCE * fmax(there, sheath_straightening(rest, i, taken)) + 1e-9)
         return false;
@@ -492,15 +553,20 @@ static bool misjudges_border(Stepper *s)
 // The hand holds the tool up to its limit; beyond, the tool moves less than the hand, under that force.
 static bool misjudges_grip(Stepper *s)
 {
-    if (s->hand_limit == 0 || s->has_failed)
+    if (s->has_failed)
         return false;
     int was = s->slips;
     double force = stepper_reaction(s, 0);
-    if (was == 0 && fabs(force) > s->hand_limit)
+    if (s->hand_limit == 0)
+        was = s->slips = 0;
+    else if (was == 0 && fabs(force) > s->hand_limit)
         s->slips = force > 0 ? 1 : -1;
     else if (was != 0 && was * (s->u[0] - stepper_wanted(s)) > 0)
         s->slips = 0;
-    return s->slips != was;
+    bool changes = s->slips != was;
+    for (int k = 1; k < s->tool_count; k++)
+        changes |= tools_misjudges_grip(s, k);
+    return changes;
 }
 
 // What the hand and the mouth do follows from the solution.
@@ -533,7 +599,7 @@ static void keep_mass_centre(Stepper *s, double part)
     Vec3 away = vec3(0, 0, 0);
     double mass = 0;
     for (int i = 0; i < s->state.node_count; i++) {
-        const double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
+        const double *u = s->u + row_of(s, i), *k = s->linearised + row_of(s, i);
         Vec3 linear = vec3(k[0] + part * (u[0] - k[0]), k[1] + part * (u[1] - k[1]), k[2] + part * (u[2] - k[2]));
         Vec3 real = vec3_sub(s->state.position[i], s->start_position[i]);
         away = vec3_add_scaled(away, s->wire.mass[i], vec3_sub(linear, real));
@@ -550,7 +616,7 @@ static void swing(Stepper *s, double part)
 {
     Vec3 from = s->mouth, moved = s->mouth, shift = vec3(0, 0, 0);
     for (int i = s->first_free; i < s->state.node_count; i++) {
-        const double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
+        const double *u = s->u + row_of(s, i), *k = s->linearised + row_of(s, i);
         Vec3 own = vec3_scale(vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]), part), here = s->state.position[i];
         if (i == 0) {
             moved = vec3_add(here, own);
@@ -570,7 +636,7 @@ static void swing(Stepper *s, double part)
 static void displace(Stepper *s, double part)
 {
     for (int i = s->first_free; i < s->state.node_count; i++) {
-        const double *u = s->u + 6 * (size_t)i, *k = s->linearised + 6 * (size_t)i;
+        const double *u = s->u + row_of(s, i), *k = s->linearised + row_of(s, i);
         Vec3 d = part < 1 ? vec3(k[0] + part * (u[0] - k[0]), k[1] + part * (u[1] - k[1]), k[2] + part * (u[2] - k[2])) : vec3(u[0], u[1], u[2]);
         s->state.position[i] = vec3_add(s->start_position[i], d);
     }
@@ -588,8 +654,8 @@ static void move(Stepper *s, double part)
         displace(s, part);
     for (int i = 0; i < held; i++) {
         // on the line exactly, whatever rounding does
-        const double *u = s->u + 6 * (size_t)i;
-        double *k = s->linearised + 6 * (size_t)i, turn = part * (u[3] - k[3]);
+        const double *u = s->u + row_of(s, i);
+        double *k = s->linearised + row_of(s, i), turn = part * (u[3] - k[3]);
         k[0] = part < 1 ? k[0] + part * (u[0] - k[0]) : u[0];
         k[3] += turn;
         double along = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]) + k[0];
@@ -597,8 +663,8 @@ static void move(Stepper *s, double part)
         rx[i] = turn * s->axis[0].x, ry[i] = turn * s->axis[0].y, rz[i] = turn * s->axis[0].z;
     }
     for (int i = held; i < nodes; i++) {
-        const double *u = s->u + 6 * (size_t)i;
-        double *k = s->linearised + 6 * (size_t)i;
+        const double *u = s->u + row_of(s, i);
+        double *k = s->linearised + row_of(s, i);
         k[0] = w->position[i].x - s->start_position[i].x;
         k[1] = w->position[i].y - s->start_position[i].y;
         k[2] = w->position[i].z - s->start_position[i].z;
@@ -610,6 +676,8 @@ static void move(Stepper *s, double part)
         rx[i] = turn.x, ry[i] = turn.y, rz[i] = turn.z;
     }
     node_turn(nodes, rx, ry, rz, w->orientation);
+    if (s->tool_count > 1)
+        tools_move(s, part);
 }
 
 static double energy_bound(const Stepper *s)
@@ -617,7 +685,7 @@ static double energy_bound(const Stepper *s)
     const Wire *w = &s->wire;
     double work = 0, bound = s->energy_before;
     for (int i = s->first_free; i < w->node_count; i++)
-        work += w->mass[i] * fabs(vec3_dot(s->gravity, vec3(s->u[6 * i], s->u[6 * i + 1], s->u[6 * i + 2])));
+        work += w->mass[i] * fabs(vec3_dot(s->gravity, vec3(s->u[row_of(s, i)], s->u[row_of(s, i) + 1], s->u[row_of(s, i) + 2])));
     for (int k = 0; k < s->set.count; k++)
         work += fmax(0, -s->set.point[k].gap) * vec3_norm(s->set.point[k].force);
     if (s->has_sheath) {
@@ -631,9 +699,11 @@ static double energy_bound(const Stepper *s)
 
 static void copy_iterate(Stepper *s, bool back)
 {
-    size_t m = (size_t)s->state.node_count, size[3] = {m * sizeof(Vec3), m * sizeof(Quat), 6 * m * sizeof(double)};
-    void *live[3] = {s->state.position, s->state.orientation, s->linearised}, *kept[3] = {s->kept, s->kept + 3 * m, s->kept + 7 * m};
-    for (int i = 0; i < 3; i++)
+    size_t m = (size_t)s->state.node_count, rows = row_of(s, (int)m), inner = m * (size_t)s->state.inner_count;
+    size_t size[5] = {m * sizeof(Vec3), m * sizeof(Quat), rows * sizeof(double), inner * sizeof(double), inner * sizeof(double)};
+    void *live[5] = {s->state.position, s->state.orientation, s->linearised, s->state.slide, s->state.angle};
+    void *kept[5] = {s->kept, s->kept + 3 * m, s->kept + 7 * m, s->kept + 7 * m + rows, s->kept + 7 * m + rows + inner};
+    for (int i = 0; i < 5; i++)
         memcpy(back ? live[i] : kept[i], back ? kept[i] : live[i], size[i]);
 }
 
@@ -652,7 +722,7 @@ static double largest_part(const Stepper *s)
     int i = s->first_free - 1;
     if (i < 0 || i + 1 >= s->state.node_count)
         return part;
-    size_t k = 6 * (size_t)i;
+    size_t k = row_of(s, i);
     return fmin(part, part_until(s->linearised[k], s->u[k], fabs(s->command.advance) + MOUTH_TRAVEL * s->wire.length[i]));
 }
 
@@ -662,8 +732,8 @@ static bool goes_back(const Stepper *s)
 {
     const double *before = s->kept + 7 * (size_t)s->state.node_count;
     double along = 0, came = 0;
-    for (int i = 6 * s->first_free; i < 6 * s->state.node_count; i += 6)
-        for (int k = i; k < i + 3; k++) {
+    for (int i = s->first_free; i < s->state.node_count; i++)
+        for (size_t k = row_of(s, i); k < row_of(s, i) + 3; k++) {
             double d = s->linearised[k] - before[k];
             along += d * (s->u[k] - s->linearised[k]);
             came += d * d;
@@ -725,13 +795,16 @@ static void take_back(Stepper *s)
 {
     while (s->has_sheath && !s->has_failed && s->first_free < s->state.node_count) {
         int node = s->first_free;
-        const double *u = s->u + 6 * (size_t)node;
+        const double *u = s->u + row_of(s, node);
         double ends = vec3_dot(vec3_sub(vec3_add(s->start_position[node], vec3(u[0], u[1], u[2])), s->mouth), s->axis[0]);
         if (ends >= TAKE_BACK * s->wire.length[node - 1])
             return;
         size_t nodes = (size_t)s->state.node_count;
         memcpy(s->state.position, s->start_position, nodes * sizeof *s->start_position);
         memcpy(s->state.orientation, s->start_orientation, nodes * sizeof *s->start_orientation);
+        size_t inner = nodes * (size_t)s->state.inner_count * sizeof(double);
+        memcpy(s->state.slide, s->start_slide, inner);
+        memcpy(s->state.angle, s->start_angle, inner);
         hold(s, node);
         stepper_forget(s, node);
         s->first_free++;
@@ -772,6 +845,11 @@ static void keep_last_state(Stepper *s)
     memset(s->state.spin, 0, nodes * sizeof *s->state.spin);
     memset(s->force, 0, (size_t)s->point_count * sizeof *s->force);
     memset(s->clearance, 0, (size_t)s->point_count * sizeof *s->clearance);
+    size_t inner = nodes * (size_t)s->state.inner_count * sizeof(double);
+    memcpy(s->state.slide, s->start_slide, inner);
+    memcpy(s->state.angle, s->start_angle, inner);
+    memset(s->state.slide_velocity, 0, inner);
+    memset(s->state.slide_spin, 0, inner);
     s->report.flags |= STEP_DIVERGED;
 }
 
@@ -780,7 +858,7 @@ static void set_velocities(Stepper *s)
     WireState *w = &s->state;
     double rate = 1 / s->dt;
     for (int i = 0; i < w->node_count; i++) {
-        const double *u = s->linearised + 6 * (size_t)i;      // what has been done, cut or not
+        const double *u = s->linearised + row_of(s, i);      // what has been done, cut or not
         if (i < s->first_free) {
             w->velocity[i] = vec3_scale(s->axis[0], u[0] * rate);
             w->spin[i] = vec3_scale(s->axis[0], u[3] * rate);
@@ -789,6 +867,8 @@ static void set_velocities(Stepper *s)
         w->velocity[i] = vec3(u[0] * rate, u[1] * rate, u[2] * rate);
         w->spin[i] = vec3(u[3] * rate, u[4] * rate, u[5] * rate);
     }
+    if (s->tool_count > 1)
+        tools_set_velocities(s);
     stepper_use_clearance(s);
 }
 
@@ -806,6 +886,7 @@ static void report_forces(Stepper *s)
         s->report.proximal_force = vec3_dot(force, s->axis[0]);
         s->report.proximal_torque = vec3_dot(torque, s->axis[0]);
     }
+    tools_report(s);
     for (int k = 0; k < s->set.count; k++) {
         double force = vec3_norm(s->force[s->candidate[k]]);
         s->report.wall_force_max = fmax(s->report.wall_force_max, force);
@@ -853,6 +934,8 @@ void step_correct(Stepper *s)
             report_cut_forces(s, part);
         set_velocities(s);
         count_command(s);
+        if (s->tool_count > 1)
+            tools_count_commands(s);
     }
     if (s->has_failed)
         keep_last_state(s);

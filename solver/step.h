@@ -13,6 +13,8 @@
 #include "solver/gauss_seidel.h"
 #include "solver/wire.h"
 
+enum { STEP_TOOLS_MAX = 4 };
+
 typedef struct StepCommand {
     double advance;          // [mm] in this step, > 0 into the patient
     double twist;            // [rad] in this step, right-handed about the direction of advance
@@ -41,6 +43,7 @@ typedef struct StepReport {
     double penetration;          // [mm] deepest, >= 0, of the state at the step's start (true distance)
     double proximal_force;       // [N] push reaction at the driven node, > 0 when the hand pushes
     double proximal_torque;      // [N mm]
+    double push[STEP_TOOLS_MAX], torque[STEP_TOOLS_MAX];     // [N], [N mm] of each tool's hand; [0] as proximal_force and proximal_torque
     double wall_force_max;       // [N] largest contact force
     double wall_force_sum;       // [N] sum of magnitudes
     double slipped;              // [mm] that the hand moved further than the tool
@@ -50,7 +53,11 @@ typedef struct StepReport {
 typedef struct Stepper Stepper;
 
 typedef struct StepperOptions {
-    WireOptions wire;
+    WireOptions wire;            // the tool, or the outermost of several
+    // Coaxial tools inside it, outermost first; of their options sections, elements, hand_limit and inserted (length beyond the mouth, or the
+    // rig's start) are read
+    int inner_count;             // up to STEP_TOOLS_MAX - 1
+    const WireOptions *inner;
     const Vessel *vessel;        // may be NULL: no walls
     double wall_friction;
     ContactOptions contact;
@@ -63,6 +70,8 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity);
 void stepper_destroy(Stepper *stepper);
 
 void step_feed(Stepper *stepper, StepCommand command);
+// The commands of all tools, [1 + inner_count]; step_feed() pins the inner ones.
+void step_feed_tools(Stepper *stepper, const StepCommand *command);
 void step_detect(Stepper *stepper);
 void step_assemble(Stepper *stepper);
 void step_factor(Stepper *stepper);
@@ -89,6 +98,18 @@ typedef struct NodeReport {
 } NodeReport;
 // Detects afresh at the current state (for the end of a run, not for a step).
 void stepper_node_report(Stepper *stepper, NodeReport *node);
+// Where a tool's own nodes are, behind the hub and inside other tools too. (elements + 1) of the tool.
+typedef struct ToolNode {
+    double s;                    // [mm] from its proximal end
+    Vec3 position;
+    Quat orientation;            // of its own frame
+    double radius;               // [mm]
+    int carrier;                 // the outermost tool there; -1: in the sheath or behind the hub
+} ToolNode;
+int stepper_node_capacity(const Stepper *stepper);       // M at most
+int stepper_tool_count(const Stepper *stepper);
+int stepper_tool_nodes(const Stepper *stepper, int tool, ToolNode *node);   // their number; node may be NULL
+double stepper_tool_inserted(const Stepper *stepper, int tool);             // [mm]
 double stepper_elastic_energy(const Stepper *stepper);    // [mJ]
 double stepper_kinetic_energy(const Stepper *stepper);    // [mJ]
 

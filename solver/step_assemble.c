@@ -5,7 +5,7 @@
 //
 // Unknowns are six a node in space axes; for nodes in the sheath they are in the line's axes, so that "stays on the line" is unit rows.
 // Reactions are read from node 0's rows as they were before its constraints.
-#include "solver/step_internal.h"
+#include "solver/step_tools.h"
 
 #include <string.h>
 
@@ -37,7 +37,7 @@ static void load_inertia(Stepper *s, double rate)
     for (int i = s->first_free; i < count; i++)
         tx[i] = spin[i].x * per, ty[i] = spin[i].y * per, tz[i] = spin[i].z * per;
     for (int i = s->first_free; i < count && s->is_iterate; i++) {
-        const double *u = s->linearised + 6 * (size_t)i;
+        const double *u = s->linearised + row_of(s, i);
         ax[i] -= rate * u[0], ay[i] -= rate * u[1], az[i] -= rate * u[2];
         tx[i] -= rate * u[3], ty[i] -= rate * u[4], tz[i] -= rate * u[5];
     }
@@ -52,7 +52,7 @@ static void add_vec(double *at, Vec3 v)
 static void free_nodes(Stepper *s, double scale, double inertia)
 {
     int first = s->first_free, count = s->state.node_count;
-    size_t from = 6 * (size_t)first, to = 6 * (size_t)count;
+    size_t from = row_of(s, first), to = row_of(s, count);
     load_pose(s->state.position, s->state.orientation, first, count, &s->beam.pose);
     load_inertia(s, inertia);
     memset(s->beam.drag, 0, (size_t)s->wire.element_count * sizeof(double));
@@ -71,8 +71,8 @@ static void sheath_nodes(Stepper *s, double scale, double inertia)
     const Wire *w = &s->wire;
     const double *done = s->linearised;
     for (int i = 0; i < s->first_free; i++) {
-        double *d = s->chain.diag + 36 * (size_t)i, *b = s->b + 6 * (size_t)i;
-        const double *u = done + 6 * (size_t)i;
+        double *d = s->chain.diag + block_of(s, i), *b = s->b + row_of(s, i);
+        const double *u = done + row_of(s, i);
         double push = vec3_dot(s->state.velocity[i], s->axis[0]) / s->dt + vec3_dot(s->gravity, s->axis[0]);
         d[0] += w->mass[i] * inertia;
         d[21] += w->inertia_axial[i] * inertia;
@@ -85,7 +85,7 @@ static void sheath_nodes(Stepper *s, double scale, double inertia)
         double strain = stepper_sheath_coordinate(s, i + 1) - stepper_sheath_coordinate(s, i) - s->beam.rest.length[i];
         Quat p = quat_mul(quat_conjugate(s->state.orientation[i]), s->state.orientation[i + 1]);
         double tension = ka * (strain + (scale - 1) * (u[6] - u[0])), torque = kt * (2 * atan2(p.x, p.w) + (scale - 1) * (u[9] - u[3]));
-        double *l = s->chain.lower + 36 * (size_t)i, *next = d + 36;
+        double *l = s->chain.lower + block_of(s, i), *next = d + 36;
         b[0] += tension, b[3] += torque;
         b[6] -= tension, b[9] -= torque;
         d[0] += ka * scale, d[21] += kt * scale;
@@ -98,13 +98,13 @@ static void sheath_nodes(Stepper *s, double scale, double inertia)
 static void mouth_element(Stepper *s, double scale)
 {
     int i = s->first_free - 1;
-    double ahead = s->mouth_ahead - s->linearised[6 * (size_t)i], column[12];
+    double ahead = s->mouth_ahead - s->linearised[row_of(s, i)], column[12];
     SheathElement *e = &s->mouth_element;
     sheath_element(&s->beam.rest, i, s->mouth, s->axis[0], stepper_sheath_coordinate(s, i), s->state.orientation[i], s->state.position[i + 1],
                    s->state.orientation[i + 1], ahead, e);
     BeamTangent t, damped;
     sheath_tangent(&s->beam.rest, i, s->axis[0], e, scale, &t, column);
-    double *b = s->b + 6 * (size_t)i, *d = s->chain.diag + 36 * (size_t)i, *l = s->chain.lower + 36 * (size_t)i;
+    double *b = s->b + row_of(s, i), *d = s->chain.diag + block_of(s, i), *l = s->chain.lower + block_of(s, i);
     b[0] -= e->axial_gradient;
     b[3] -= e->twist_gradient;
     add_vec(b + 6, vec3_negate(e->out.force2));
@@ -119,7 +119,7 @@ static void mouth_element(Stepper *s, double scale)
     if (!s->is_iterate)
         return;
     sheath_tangent(&s->beam.rest, i, s->axis[0], e, 1, &damped, column);
-    const double *u = s->linearised + 6 * (size_t)i;
+    const double *u = s->linearised + row_of(s, i);
     for (int r = 0; r < 6; r++)
         for (int c = 0; c < 6; c++) {
             int k = 6 * r + c;
@@ -148,7 +148,7 @@ bool stepper_load(const Stepper *s, const LoadPlace *place, int end, double time
 static void add_load(Stepper *s, const LoadPlace *place, int end)
 {
     int node = place->node + end;
-    double *b = s->b + 6 * (size_t)node;
+    double *b = s->b + row_of(s, node);
     Vec3 force, moment;
     if (!stepper_load(s, place, end, s->state.time + s->dt, &force, &moment))
         return;
@@ -161,29 +161,29 @@ static void add_load(Stepper *s, const LoadPlace *place, int end)
     }
 }
 
-// Row and column of one unknown become a unit row with its value.
-static void prescribe(Stepper *s, int node, int dof, double value)
+void stepper_prescribe(Stepper *s, int node, int dof, double value)
 {
-    double *d = s->chain.diag + 36 * (size_t)node, *b = s->b + 6 * (size_t)node;
-    for (int r = 0; r < 6; r++) {
-        b[r] -= d[6 * r + dof] * value;
-        d[6 * r + dof] = d[6 * dof + r] = 0;
+    int n = s->chain.size;
+    double *d = s->chain.diag + block_of(s, node), *b = s->b + row_of(s, node);
+    for (int r = 0; r < n; r++) {
+        b[r] -= d[n * r + dof] * value;
+        d[n * r + dof] = d[n * dof + r] = 0;
     }
     if (node + 1 < s->chain.count) {
-        double *l = s->chain.lower + 36 * (size_t)node;
-        for (int r = 0; r < 6; r++) {
-            b[6 + r] -= l[6 * r + dof] * value;
-            l[6 * r + dof] = 0;
+        double *l = s->chain.lower + block_of(s, node);
+        for (int r = 0; r < n; r++) {
+            b[n + r] -= l[n * r + dof] * value;
+            l[n * r + dof] = 0;
         }
     }
     if (node > 0) {
-        double *l = s->chain.lower + 36 * (size_t)(node - 1);
-        for (int c = 0; c < 6; c++) {
-            b[c - 6] -= l[6 * dof + c] * value;
-            l[6 * dof + c] = 0;
+        double *l = s->chain.lower + block_of(s, node - 1);
+        for (int c = 0; c < n; c++) {
+            b[c - n] -= l[n * dof + c] * value;
+            l[n * dof + c] = 0;
         }
     }
-    d[7 * dof] = 1;
+    d[(n + 1) * dof] = 1;
     b[dof] = value;
 }
 
@@ -196,45 +196,50 @@ double stepper_wanted(const Stepper *s)
 
 static void constraints(Stepper *s)
 {
-    memcpy(s->grip_diag, s->chain.diag, sizeof s->grip_diag);
-    memcpy(s->grip_b, s->b, sizeof s->grip_b);
-    memcpy(s->grip_lower, s->chain.lower, sizeof s->grip_lower);
+    memcpy(s->grip_diag, s->chain.diag, block_of(s, 1) * sizeof(double));
+    memcpy(s->grip_b, s->b, row_of(s, 1) * sizeof(double));
+    if (s->chain.count > 1)
+        memcpy(s->grip_lower, s->chain.lower, block_of(s, 1) * sizeof(double));
     if (s->has_sheath) {
         if (s->slips)
             s->b[0] += s->slips * s->hand_limit;
         else
-            prescribe(s, 0, 0, stepper_wanted(s));
-        prescribe(s, 0, 3, s->command.twist);
+            stepper_prescribe(s, 0, 0, stepper_wanted(s));
+        stepper_prescribe(s, 0, 3, s->command.twist);
     }
     for (int i = s->first_free; i < s->chain.count; i++)
         for (int k = 0; s->fixed[i] >> k; k++)
             if (s->fixed[i] >> k & 1)
-                prescribe(s, i, k, 0);
+                stepper_prescribe(s, i, k, 0);
 }
 
 static void clear_held(Stepper *s)
 {
-    size_t held = (size_t)s->first_free;
-    memset(s->chain.diag, 0, 36 * held * sizeof(double));
-    memset(s->b, 0, 6 * held * sizeof(double));
+    int held = s->first_free;
+    memset(s->chain.diag, 0, block_of(s, held) * sizeof(double));
+    memset(s->b, 0, row_of(s, held) * sizeof(double));
     if (held > 1)
-        memset(s->chain.lower, 0, 36 * (held - 1) * sizeof(double));
+        memset(s->chain.lower, 0, block_of(s, held - 1) * sizeof(double));
 }
 
 void stepper_assemble(Stepper *s)
 {
     double h = s->dt, scale = 1 + s->damping_stiffness / h, inertia = 1 / (h * h) + s->damping_mass / h;
-    clear_held(s);
-    if (s->first_free < s->chain.count) {
-        free_nodes(s, scale, inertia);
-        if (s->first_free > 0)
-            mouth_element(s, scale);
+    if (s->tool_count > 1) {
+        tools_assemble(s, scale, inertia);
+    } else {
+        clear_held(s);
+        if (s->first_free < s->chain.count) {
+            free_nodes(s, scale, inertia);
+            if (s->first_free > 0)
+                mouth_element(s, scale);
+        }
+        sheath_nodes(s, scale, inertia);
     }
-    sheath_nodes(s, scale, inertia);
     contact_add_curvature(&s->set, &s->chain);
     if (s->is_iterate) {
         block_chain_multiply(&s->chain, s->linearised, s->product);
-        for (int k = 0; k < 6 * s->chain.count; k++)
+        for (size_t k = 0; k < row_of(s, s->chain.count); k++)
             s->b[k] += s->product[k];
     }
     for (int i = 0; i < s->load_count; i++) {
@@ -242,6 +247,8 @@ void stepper_assemble(Stepper *s)
         add_load(s, &s->load[i], 1);
     }
     constraints(s);
+    if (s->tool_count > 1)
+        tools_constrain(s);
 }
 
 double stepper_stiffness_damping(Stepper *s)
@@ -251,15 +258,17 @@ double stepper_stiffness_damping(Stepper *s)
     int first = s->first_free, last = s->state.node_count - 1;
     if (rate == 0)
         return 0;
+    if (s->tool_count > 1)
+        return tools_stiffness_damping(s);
     if (first < last) {
         load_pose(s->state.position, s->state.orientation, first, last + 1, &s->beam.pose);
         load_pose(s->start_position, s->start_orientation, first, last + 1, &s->start_pose);
         beam_chain_damp(&s->beam, &s->start_pose, first, last, rate, s->product);
-        for (int k = 6 * first; k < 6 * (last + 1); k++)
+        for (size_t k = row_of(s, first); k < row_of(s, last + 1); k++)
             work -= s->product[k] * u[k];
     }
     for (int i = 0; i + 1 < first; i++) {
-        const double *a = u + 6 * (size_t)i, *b = a + 6;
+        const double *a = u + row_of(s, i), *b = a + 6;
         work += rate * (s->beam.rest.axial[i] * (b[0] - a[0]) * (b[0] - a[0]) + s->beam.rest.twist[i] * (b[3] - a[3]) * (b[3] - a[3]));
     }
     if (first == 0 || first > last)
@@ -268,7 +277,7 @@ double stepper_stiffness_damping(Stepper *s)
     BeamTangent with, without;
     sheath_tangent(&s->beam.rest, first - 1, s->axis[0], &s->mouth_element, 1 + rate, &with, column);
     sheath_tangent(&s->beam.rest, first - 1, s->axis[0], &s->mouth_element, 1, &without, column);
-    const double *a = u + 6 * (size_t)(first - 1), *b = a + 6;
+    const double *a = u + row_of(s, first - 1), *b = a + 6;
     for (int r = 0; r < 6; r++)
         for (int c = 0; c < 6; c++) {
             int k = 6 * r + c;
@@ -292,11 +301,12 @@ double stepper_strain_force(const Stepper *s)
 
 double stepper_reaction(const Stepper *s, int dof)
 {
+    int n = s->chain.size;
     double sum = -s->grip_b[dof];
-    for (int c = 0; c < 6; c++) {
-        sum += s->grip_diag[6 * dof + c] * s->u[c];
+    for (int c = 0; c < n; c++) {
+        sum += s->grip_diag[n * dof + c] * s->u[c];
         if (s->chain.count > 1)
-            sum += s->grip_lower[6 * c + dof] * s->u[6 + c];
+            sum += s->grip_lower[n * c + dof] * s->u[n + c];
     }
     return sum;
 }

@@ -7,7 +7,7 @@
 //
 // Where a lumen is hardly wider than the tool, one linearised wall sends the point through the one across, and the next sends it back, for ever. So a point
 // remembers the wall that faces the one it sees, and has both (WallMet).
-#include "solver/step_internal.h"
+#include "solver/step_tools.h"
 
 #include <string.h>
 
@@ -45,6 +45,8 @@ static bool place_slot(Stepper *s, int k)
     if (i + 1 == s->first_free)
         return i + 2 < s->state.node_count && slot_place_at_mouth(slot, length, stepper_sheath_coordinate(s, i), s->mouth, s->axis[0], x[i + 1],
                                                                   tangent_at(s, i + 1), &s->slot_place[k]);
+    if (s->tool_count > 1 && s->carrier[i] != s->carrier[i + 1])
+        return slot_place_beyond(slot, length, length - tools_span_length(s, i), x[i], tangent_at(s, i), x[i + 1], tangent_at(s, i + 1), &s->slot_place[k]);
     s->slot_place[k] = slot_place(slot, length, x[i], tangent_at(s, i), x[i + 1], tangent_at(s, i + 1));
     return true;
 }
@@ -52,7 +54,7 @@ static bool place_slot(Stepper *s, int k)
 // What the solution moves a node by from the iterate: 0 for translation, 3 for turn.
 static Vec3 change(const Stepper *s, int node, int from)
 {
-    const double *u = s->u + 6 * (size_t)node + from, *k = s->linearised + 6 * (size_t)node + from;
+    const double *u = s->u + row_of(s, node) + from, *k = s->linearised + row_of(s, node) + from;
     return vec3_sub(vec3(u[0], u[1], u[2]), vec3(k[0], k[1], k[2]));
 }
 
@@ -82,13 +84,13 @@ static Vec3 motion(const Stepper *s, int point)
 // What a node has done since the wall was last asked.
 static Vec3 since(const Stepper *s, int node, int from)
 {
-    const double *k = s->linearised + 6 * (size_t)node + from, *seen = s->seen + 6 * (size_t)node + from;
+    const double *k = s->linearised + row_of(s, node) + from, *seen = s->seen + row_of(s, node) + from;
     return vec3(k[0] - seen[0], k[1] - seen[1], k[2] - seen[2]);
 }
 
 static Vec3 done(const Stepper *s, int node, int from)
 {
-    const double *k = s->linearised + 6 * (size_t)node + from;
+    const double *k = s->linearised + row_of(s, node) + from;
     return vec3(k[0], k[1], k[2]);
 }
 
@@ -464,7 +466,7 @@ static Vec3 done_at(const Stepper *s, int point, Vec3 arm)
 static void lean_on_sheath(const Stepper *s, int k, ContactPoint *c)
 {
     const SlotPlace *p = &s->slot_place[k];
-    double w = p->weight, ahead = s->command.advance - (s->is_iterate ? s->linearised[6 * (size_t)s->slot[k].element] : 0);
+    double w = p->weight, ahead = s->command.advance - (s->is_iterate ? s->linearised[row_of(s, s->slot[k].element)] : 0);
     c->node = s->first_free;
     c->xi = NO_SHARE;
     c->gap = (c->gap + (1 - w) * ahead * vec3_dot(p->tangent, c->normal)) / w;
@@ -588,7 +590,7 @@ void stepper_wall_work(const Stepper *s, double *wall, double *friction)
         if (leans) {
             const SlotPlace *p = &s->slot_place[point - nodes];
             force = vec3_scale(force, 1 / p->weight);
-            moved = vec3_add_scaled(moved, (1 - p->weight) * s->linearised[6 * (size_t)s->slot[point - nodes].element], p->tangent);
+            moved = vec3_add_scaled(moved, (1 - p->weight) * s->linearised[row_of(s, s->slot[point - nodes].element)], p->tangent);
         }
         double pressure = vec3_dot(force, c->normal) * vec3_dot(moved, c->normal);
         *wall += pressure;
@@ -673,7 +675,7 @@ void stepper_use_clearance(Stepper *s)
     for (int p = first_slot(s); p < s->point_count; p++)
         if (s->clearance[p] > 0)
             s->clearance[p] = fmax(0, s->clearance[p] - travelled(s, p));
-    memcpy(s->seen, s->linearised, 6 * (size_t)nodes * sizeof *s->seen);
+    memcpy(s->seen, s->linearised, row_of(s, nodes) * sizeof *s->seen);
 }
 
 void stepper_share_forces(const Stepper *s, NodeReport *node)

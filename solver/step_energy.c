@@ -1,5 +1,5 @@
 // Energies of a state, and what a step's motion has done to them: each force of the step's end times the motion, as implicit Euler has it.
-#include "solver/step_internal.h"
+#include "solver/step_tools.h"
 
 static double element_energy(const Stepper *s, int i, int held)
 {
@@ -26,6 +26,8 @@ static double element_energy(const Stepper *s, int i, int held)
 
 double stepper_elastic_energy(const Stepper *s)
 {
+    if (s->tool_count > 1)
+        return tools_elastic_energy(s);
     double energy = 0;
     for (int i = 0; i < s->wire.element_count; i++)
         energy += element_energy(s, i, s->first_free);
@@ -34,6 +36,8 @@ double stepper_elastic_energy(const Stepper *s)
 
 double stepper_kinetic_energy(const Stepper *s)
 {
+    if (s->tool_count > 1)
+        return tools_kinetic_energy(s);
     double twice = 0;
     for (int i = 0; i < s->state.node_count; i++) {
         Vec3 spin = s->state.spin[i], axis = quat_rotate(s->state.orientation[i], vec3(1, 0, 0));
@@ -47,7 +51,7 @@ double stepper_kinetic_energy(const Stepper *s)
 // What a node has done in this step, translation or turn, in space.
 static Vec3 done_in_space(const Stepper *s, int node, int from)
 {
-    const double *u = s->linearised + 6 * (size_t)node + from;
+    const double *u = s->linearised + row_of(s, node) + from;
     return node < s->first_free ? vec3_scale(s->axis[0], u[0]) : vec3(u[0], u[1], u[2]);
 }
 
@@ -85,6 +89,8 @@ StepEnergy stepper_energy(Stepper *s)
         return e;
     if (s->has_sheath)
         e.hand = s->report.proximal_force * s->linearised[0] + s->report.proximal_torque * s->linearised[3];
+    for (int k = 1; k < s->tool_count; k++)
+        e.hand += tools_hand_work(s, k);
     e.load = of_loads(s);
     e.damping = of_mass_damping(s) + stepper_stiffness_damping(s);
     stepper_wall_work(s, &e.wall, &e.friction);

@@ -3,6 +3,7 @@
 #define SELDINGER_SOLVER_STEP_INTERNAL_H
 
 #include "solver/beam_element.h"
+#include "solver/coaxial.h"
 #include "solver/sheath.h"
 #include "solver/slot.h"
 #include "solver/step.h"
@@ -22,6 +23,24 @@ typedef struct WallMet {
     Vec3 where;              // where `across` was met
 } WallMet;
 enum { WALL_MET_DOUBLES = sizeof(WallMet) / sizeof(double) };
+
+// One of several coaxial tools. Its own elements do not change; which of its nodes are nodes of the chain does (step_tools.c).
+typedef struct Tool {
+    Wire wire;
+    BeamRest rest;           // (E) of its own elements
+    double *rest_memory;
+    CoaxialTool coaxial;     // its sections
+    CoaxialSection *section; // … owned
+    double *line_mass, *line_inertia;  // (sections) [g/mm], [g mm] about a diameter
+    Slot *slot;              // of its own elements
+    int *slot_start;         // (E + 1)
+    double hand_limit;       // [N] 0: none
+    // what changes
+    int first;               // own node from which on it carries the chain; node_count: nowhere
+    int start;               // … which is this node of the chain
+    int inside;              // it lies inside another tool at the chain's nodes before this one
+    double inserted, twist;  // [mm], [rad] prescribed
+} Tool;
 
 struct Stepper {
     // given once
@@ -44,8 +63,17 @@ struct Stepper {
     int newton_max;
     // contact points: the nodes, then the slots
     int slot_count, point_count;     // K, P = M + K
+    int point_capacity;              // of coaxial tools there may be more
     Slot *slot;              // (K) by element
     int *slot_start;         // (M) first slot of element i; of the last node K
+
+    int tool_count;          // 1: what follows is not used
+    Tool tool[STEP_TOOLS_MAX];
+    int *carrier, *own;      // (M) the tool that carries a node, and its own number there
+    StepCommand tool_command[STEP_TOOLS_MAX];
+    int tool_slips[STEP_TOOLS_MAX];    // as `slips`, of inner tools
+    double *start_slide, *start_angle; // (M, I) at x_n
+    int capacity;            // of nodes
 
     // what the next step depends on: see checkpoint.c
     WireState state;         // arrays in `memory`; within a step the iterate
@@ -69,7 +97,7 @@ struct Stepper {
     double *seen;            // (M, 6) … at which the wall was last asked
     double *product;         // (M, 6)
     double *kept;            // (M, 13) an iterate to go back to: position, orientation, displacement
-    double grip_diag[36], grip_lower[36], grip_b[6];     // rows of node 0 before its constraints
+    double grip_diag[BLOCK_LARGEST * BLOCK_LARGEST], grip_lower[BLOCK_LARGEST * BLOCK_LARGEST], grip_b[BLOCK_LARGEST];    // rows of node 0 before its constraints
     Vec3 *start_position;    // (M) x_n
     Quat *start_orientation;
     SlotPlace *slot_place;   // (K) where the iterate has them
@@ -104,6 +132,10 @@ struct Stepper {
     bool is_iterate;         // linearised about something else than x_n
 };
 
+// Where a node's unknowns begin in a vector, and its block in the matrix.
+static inline size_t row_of(const Stepper *s, int node) { return (size_t)s->chain.size * (size_t)node; }
+static inline size_t block_of(const Stepper *s, int node) { return (size_t)s->chain.size * row_of(s, node); }
+
 void stepper_detect(Stepper *s);
 // Forces of the solved set go to their points.
 void stepper_keep_forces(Stepper *s);
@@ -124,6 +156,8 @@ void stepper_forget(Stepper *s, int node);
 // Adds the slots' forces to the nodes between which they are.
 void stepper_share_forces(const Stepper *s, NodeReport *node);
 void stepper_assemble(Stepper *s);
+// Row and column of one unknown become a unit row with its value.
+void stepper_prescribe(Stepper *s, int node, int dof, double value);
 // What a load puts on its node (end 0) or the one after it (1) at this time, in space; false: nothing.
 bool stepper_load(const Stepper *s, const LoadPlace *place, int end, double time, Vec3 *force, Vec3 *moment);
 // [mJ] that stiffness damping took from the motion of this step …

@@ -199,25 +199,33 @@ static void fill(Wire *wire, const WireOptions *options, const int *elements)
     wire->total_length = start;
 }
 
+bool wire_reserve(Wire *wire, int nodes)
+{
+    size_t m = (size_t)nodes, e = m - 1;
+    wire_destroy(wire);
+    wire->section = calloc(e, sizeof *wire->section);
+    wire->s = calloc(6 * m + e, sizeof *wire->s);
+    if (!wire->section || !wire->s)
+        return false;
+    wire->element_count = nodes - 1;
+    wire->node_count = nodes;
+    wire->mass = wire->s + m;
+    wire->inertia_axial = wire->s + 2 * m;
+    wire->inertia_lateral = wire->s + 3 * m;
+    wire->radius = wire->s + 4 * m;
+    wire->friction = wire->s + 5 * m;
+    wire->length = wire->s + 6 * m;
+    return true;
+}
+
 bool wire_create(Wire *wire, const WireOptions *options, char *why, int capacity)
 {
     *wire = (Wire){0};
     if (!wire_check(options, why, capacity))
         return false;
-    size_t e = (size_t)options->elements, m = e + 1;
     int *elements = malloc((size_t)options->section_count * sizeof *elements);
-    wire->section = malloc(e * sizeof *wire->section);
-    wire->s = calloc(6 * m + e, sizeof *wire->s);
-    bool is_good = elements && wire->section && wire->s && wire_divide(options, elements);
+    bool is_good = elements && wire_reserve(wire, options->elements + 1) && wire_divide(options, elements);
     if (is_good) {
-        wire->element_count = options->elements;
-        wire->node_count = options->elements + 1;
-        wire->mass = wire->s + m;
-        wire->inertia_axial = wire->s + 2 * m;
-        wire->inertia_lateral = wire->s + 3 * m;
-        wire->radius = wire->s + 4 * m;
-        wire->friction = wire->s + 5 * m;
-        wire->length = wire->s + 6 * m;
         fill(wire, options, elements);
     } else {
         snprintf(why, (size_t)capacity, "no memory for a wire of %d elements", options->elements);

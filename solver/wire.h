@@ -67,6 +67,12 @@ typedef struct WireState {   // all that a step changes, M nodes; plain data, so
     Quat *orientation;       // (M)
     Vec3 *velocity;          // (M) [mm/ms]
     Vec3 *spin;              // (M) [rad/ms], space axes
+    // coaxial tools inside the one that carries a node (step.h); M is then not the same for ever
+    int inner_count;         // I = tools less one
+    double *slide;           // (M, I) [mm] material coordinate of tool 1 + i where it lies inside at that node
+    double *angle;           // (M, I) [rad] by which its frame is turned about the tangent against the node's
+    double *slide_velocity;  // (M, I) [mm/ms] of its material along the tangent
+    double *slide_spin;      // (M, I) [rad/ms] about it
 } WireState;
 
 // --- What the chain is made of; does not change after its creation. ---
@@ -88,6 +94,7 @@ WireOptions wire_default_options(void);          // 200 elements, Rayleigh dampi
 bool wire_check(const WireOptions *options, char *why, int capacity);
 double wire_length(const WireOptions *options);   // [mm] of all sections
 bool wire_create(Wire *wire, const WireOptions *options, char *why, int capacity);
+bool wire_reserve(Wire *wire, int nodes);      // room for so many nodes; what it holds is lost
 void wire_destroy(Wire *wire);
 // Elements per section, (section_count): in proportion to length, more where an element would turn by over 0.3 rad at rest, each at least one.
 // False where elements < sections.

@@ -10,17 +10,19 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static Faults faults;
     faults_clear(&faults);
-    Script *script = script_parse((const char *)data, size, "script", &faults);
+    const ToolNames tools = {.count = 3, .name = {"guide", "micro", "wire"}};
+    Script *script = script_parse_tools((const char *)data, size, "script", &tools, &faults);
     if (!script != (faults.count > 0))
         abort();
     if (script) {
         int cursor = 0;
         for (int i = 0; i < script->count; i++) {
-            Command command = script_at(script, script->row[i].t_s, &cursor);
+            ToolCommands commands = script_tools_at(script, script->row[i].t_s, &cursor);
             if (i && !(script->row[i].t_s > script->row[i - 1].t_s))
                 abort();
-            if (!(command.push_mm_s >= -1000 && command.push_mm_s <= 1000))
-                abort();
+            for (int k = 0; k < TOOLS_MOST; k++)
+                if (!(commands.tool[k].push_mm_s >= -1000 && commands.tool[k].push_mm_s <= 1000) || (k == tools.count && commands.tool[k].push_mm_s != 0))
+                    abort();
         }
         script_free(script);
     }

@@ -6,6 +6,20 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
+// A tool within its ranges that fits into the one around it.
+static void check_tool(const Scene *scene, int k)
+{
+    WireOptions wire = scene_tool_wire(scene, k);
+    if (wire.section_count < 1 || !scene->tool[k].name[0] || wire.inserted < 0 || wire.inserted > wire_length(&wire) * (1 + 1e-9))
+        abort();
+    for (int i = 0; i < wire.section_count; i++) {
+        if (!(wire.section[i].length > 0 && wire.section[i].young_modulus > 0))
+            abort();
+        if (k > 0 && !(wire.section[i].diameter < scene_tool_wire(scene, k - 1).section[0].inner_diameter))
+            abort();
+    }
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static Faults faults;
@@ -17,9 +31,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         if (scene->wire.section_count < 1 || scene->wire.elements < 1 || scene->wire.elements > 10000 || !(scene->dt > 0) ||
             !(fabs(vec3_norm(scene->wire.direction) - 1) < 1e-6))
             abort();
-        for (int i = 0; i < scene->wire.section_count; i++)
-            if (!(scene->wire.section[i].length > 0 && scene->wire.section[i].young_modulus > 0))
-                abort();
+        if (scene->tool_count < 1 || scene->tool_count > TOOLS_MOST)
+            abort();
+        for (int k = 0; k < scene->tool_count; k++)
+            check_tool(scene, k);
         scene_free(scene);
     }
     return 0;

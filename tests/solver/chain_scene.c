@@ -32,9 +32,9 @@ void chain_scene_create(ChainScene *s, const ChainSceneOptions *options)
     s->u = calloc(6 * n, sizeof *s->u);
     s->candidate_of = calloc(n, sizeof *s->candidate_of);
     s->set = (ContactSet){.capacity = m, .point = calloc(n, sizeof *s->set.point)};
-    block_chain_create(&s->chain, m);
-    s->factor = block_factor_create(m);
-    s->solver = contact_solver_create(m, m);
+    block_chain_create(&s->chain, m, 6);
+    s->factor = block_factor_create(m, 6);
+    s->solver = contact_solver_create(m, 6, m);
     for (int i = 0; i < m; i++) {
         s->position[i] = vec3(options->inserted - options->element_length * (options->elements - i), 0, 0);
         s->orientation[i] = quat_identity();

@@ -368,7 +368,7 @@ static void make_chain(Chain *c)
         m->ax[i] = a.x, m->ay[i] = a.y, m->az[i] = a.z, m->tx[i] = t.x, m->ty[i] = t.y, m->tz[i] = t.z;
     }
     wire_destroy(&wire);
-    assert_true(block_chain_create(&c->blocks, E + 1));
+    assert_true(block_chain_create(&c->blocks, E + 1, 6));
 }
 
 static BeamInput chain_input(const Chain *c, int i)
@@ -453,7 +453,7 @@ static void chain_equals_elements(void **state)
                 BlockChain own = wide.blocks;
                 wide = c;
                 if (!own.diag)
-                    assert_true(block_chain_create(&own, E + 1));
+                    assert_true(block_chain_create(&own, E + 1, 6));
                 wide.blocks = own;
                 memcpy(own.diag, c.blocks.diag, sizeof diag);
                 memcpy(own.lower, c.blocks.lower, 36 * E * sizeof(double));

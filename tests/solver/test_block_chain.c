@@ -1,4 +1,5 @@
-// Block-tridiagonal systems against dense Cholesky: random chains of many sizes and conditions, and the chain's own laws.
+// Block-tridiagonal systems against dense Cholesky: random chains of many sizes and conditions, and the chain's own laws. Compiled for every
+// size N of the blocks.
 #include "geom/simd.h"
 #include "solver/block_chain.h"
 #include "solver/block_condense.h"
@@ -32,28 +33,28 @@ static double uniform(void) // [-1, 1)
 static void random_chain(BlockChain *a, double decades)
 {
     int m = a->count;
-    double *low = calloc((size_t)m * 36, sizeof *low), *off = calloc((size_t)m * 36, sizeof *off);
+    double *low = calloc((size_t)m * N * N, sizeof *low), *off = calloc((size_t)m * N * N, sizeof *off);
     for (int i = 0; i < m; i++)
-        for (int c = 0; c < 6; c++) {
+        for (int c = 0; c < N; c++) {
             double scale = pow(10, decades / 4 * uniform());
-            for (int r = 0; r < 6; r++) {
-                low[36 * i + 6 * r + c] = r > c ? 0.3 * scale * uniform() : r == c ? scale * (1 + 0.3 * uniform()) : 0;
-                off[36 * i + 6 * r + c] = scale * 0.15 * uniform();
+            for (int r = 0; r < N; r++) {
+                low[N * N * i + N * r + c] = r > c ? 0.3 * scale * uniform() : r == c ? scale * (1 + 0.3 * uniform()) : 0;
+                off[N * N * i + N * r + c] = scale * 0.15 * uniform();
             }
         }
     for (int i = 0; i < m; i++)
-        for (int r = 0; r < 6; r++)
-            for (int c = 0; c < 6; c++) {
+        for (int r = 0; r < N; r++)
+            for (int c = 0; c < N; c++) {
                 double d = 0, l = 0;
-                for (int k = 0; k < 6; k++) {
-                    d += low[36 * i + 6 * r + k] * low[36 * i + 6 * c + k];
+                for (int k = 0; k < N; k++) {
+                    d += low[N * N * i + N * r + k] * low[N * N * i + N * c + k];
                     if (i > 0)
-                        d += off[36 * (i - 1) + 6 * r + k] * off[36 * (i - 1) + 6 * c + k];
-                    l += off[36 * i + 6 * r + k] * low[36 * i + 6 * c + k];
+                        d += off[N * N * (i - 1) + N * r + k] * off[N * N * (i - 1) + N * c + k];
+                    l += off[N * N * i + N * r + k] * low[N * N * i + N * c + k];
                 }
-                a->diag[36 * i + 6 * r + c] = d;
+                a->diag[N * N * i + N * r + c] = d;
                 if (i + 1 < m)
-                    a->lower[36 * i + 6 * r + c] = l;
+                    a->lower[N * N * i + N * r + c] = l;
             }
     free(low);
     free(off);
@@ -61,14 +62,14 @@ static void random_chain(BlockChain *a, double decades)
 
 static double *dense(const BlockChain *a)
 {
-    size_t n = (size_t)a->count * 6;
+    size_t n = (size_t)a->count * N;
     double *d = calloc(n * n, sizeof *d);
     for (size_t i = 0; i < (size_t)a->count; i++)
-        for (size_t r = 0; r < 6; r++)
-            for (size_t c = 0; c < 6; c++) {
-                d[(6 * i + r) * n + 6 * i + c] = a->diag[36 * i + 6 * r + c];
+        for (size_t r = 0; r < N; r++)
+            for (size_t c = 0; c < N; c++) {
+                d[(N * i + r) * n + N * i + c] = a->diag[N * N * i + N * r + c];
                 if (i + 1 < (size_t)a->count)
-                    d[(6 * i + 6 + r) * n + 6 * i + c] = d[(6 * i + c) * n + 6 * i + 6 + r] = a->lower[36 * i + 6 * r + c];
+                    d[(N * i + N + r) * n + N * i + c] = d[(N * i + c) * n + N * i + N + r] = a->lower[N * N * i + N * r + c];
             }
     return d;
 }
@@ -114,8 +115,8 @@ static double largest(const double *x, size_t n)
 
 static double relative_residual(const BlockChain *a, const double *x, const double *b)
 {
-    size_t n = (size_t)a->count * 6;
-    double *r = malloc(n * sizeof *r), top = fmax(largest(a->diag, n * 6), largest(a->lower, n * 6 - 36));
+    size_t n = (size_t)a->count * N;
+    double *r = malloc(n * sizeof *r), top = fmax(largest(a->diag, n * N), largest(a->lower, n * N - N * N));
     block_chain_multiply(a, x, r);
     for (size_t i = 0; i < n; i++)
         r[i] -= b[i];
@@ -132,10 +133,10 @@ static void solves_as_dense(void **state)
     for (size_t t = 0; t < sizeof counts / sizeof *counts; t++)
         for (int hard = 0; hard < 4; hard++) {
             int m = counts[t];
-            size_t n = (size_t)m * 6;
+            size_t n = (size_t)m * N;
             BlockChain a;
-            assert_true(block_chain_create(&a, m));
-            BlockFactor *f = block_factor_create(m);
+            assert_true(block_chain_create(&a, m, N));
+            BlockFactor *f = block_factor_create(m, N);
             random_chain(&a, 4.0 * hard); // condition 1, 1e4, 1e8, 1e12
             double *b = malloc(n * sizeof *b), *x = malloc(n * sizeof *x), *y = malloc(n * sizeof *y), *fused = malloc(n * sizeof *x);
             for (size_t i = 0; i < n; i++)
@@ -172,12 +173,12 @@ static void inverse_diagonal_as_dense(void **state)
     for (size_t t = 0; t + 1 < sizeof counts / sizeof *counts; t++)
         for (int hard = 0; hard < 2; hard++) {
             int m = counts[t];
-            size_t n = (size_t)m * 6;
+            size_t n = (size_t)m * N;
             BlockChain a;
-            assert_true(block_chain_create(&a, m));
-            BlockFactor *f = block_factor_create(m);
+            assert_true(block_chain_create(&a, m, N));
+            BlockFactor *f = block_factor_create(m, N);
             random_chain(&a, 3.0 * hard);
-            double *d = dense(&a), *s = malloc(n * 6 * sizeof *s), *e = malloc(n * sizeof *e);
+            double *d = dense(&a), *s = malloc(n * N * sizeof *s), *e = malloc(n * sizeof *e);
             assert_true(dense_cholesky(d, n));
             assert_true(block_chain_factor(&a, f));
             block_factor_inverse_diagonal(f, s);
@@ -185,8 +186,8 @@ static void inverse_diagonal_as_dense(void **state)
                 memset(e, 0, n * sizeof *e);
                 e[j] = 1;
                 dense_solve(d, n, e);
-                for (size_t r = 0; r < 6; r++)
-                    assert_true(fabs(e[j / 6 * 6 + r] - s[j / 6 * 36 + 6 * r + j % 6]) < 1e-8 * fabs(e[j]));
+                for (size_t r = 0; r < N; r++)
+                    assert_true(fabs(e[j / N * N + r] - s[j / N * N * N + N * r + j % N]) < 1e-8 * fabs(e[j]));
             }
             free(d);
             free(s);
@@ -202,45 +203,45 @@ static void lu_solves_unsymmetric(void **state)
     (void)state;
     for (size_t t = 0; t < sizeof counts / sizeof *counts; t++) {
         int m = counts[t];
-        size_t n = (size_t)m * 6;
+        size_t n = (size_t)m * N;
         BlockChain a;
-        assert_true(block_chain_create(&a, m));
-        BlockLu *lu = block_lu_create(m);
+        assert_true(block_chain_create(&a, m, N));
+        BlockLu *lu = block_lu_create(m, N);
         random_chain(&a, 2);
-        double *upper = calloc(n * 6 + 2, sizeof *upper), *diag = calloc(n * 6 + 2, sizeof *upper), *lower = calloc(n * 6 + 2, sizeof *upper);
+        double *upper = calloc(n * N + 8, sizeof *upper), *diag = calloc(n * N + 8, sizeof *upper), *lower = calloc(n * N + 8, sizeof *upper);
         double *b = malloc(n * sizeof *b), *x = malloc(n * sizeof *x), *y = malloc(n * sizeof *y);
-        memcpy(upper, a.lower, n * 6 * sizeof *upper);
+        memcpy(upper, a.lower, n * N * sizeof *upper);
         for (int i = 0; i < m; i++)
-            for (int r = 0; r < 6; r++)
-                for (int c = 0; c < 6; c++) {
+            for (int r = 0; r < N; r++)
+                for (int c = 0; c < N; c++) {
                     double skew = c > r ? 0.05 * uniform() : 0;
-                    a.diag[36 * i + 6 * r + c] += skew;
-                    a.diag[36 * i + 6 * c + r] -= skew;
+                    a.diag[N * N * i + N * r + c] += skew;
+                    a.diag[N * N * i + N * c + r] -= skew;
                     if (i + 1 < m)
-                        upper[36 * i + 6 * r + c] += 0.02 * uniform();
+                        upper[N * N * i + N * r + c] += 0.02 * uniform();
                 }
         for (int round = 0; round < 2; round++) {
             for (size_t i = 0; i < n; i++)
                 b[i] = uniform();
             if (round == 0) {
-                block_lu_transpose(m, a.diag, diag);
-                block_lu_transpose(m, a.lower, lower);
+                block_lu_transpose(m, N, a.diag, diag);
+                block_lu_transpose(m, N, a.lower, lower);
                 assert_true(block_lu_factor_solve(lu, m, diag, lower, upper, b, x, &exact));
             }
             if (round == 1)
                 block_lu_solve(lu, b, x);
             double worst = 0;
             for (int i = 0; i < m; i++)
-                for (int r = 0; r < 6; r++) {
-                    double sum = -b[6 * i + r];
-                    for (int c = 0; c < 6; c++) {
-                        sum += a.diag[36 * i + 6 * r + c] * x[6 * i + c];
-                        sum += i > 0 ? a.lower[36 * (i - 1) + 6 * r + c] * x[6 * (i - 1) + c] : 0;
-                        sum += i + 1 < m ? upper[36 * i + 6 * c + r] * x[6 * (i + 1) + c] : 0;
+                for (int r = 0; r < N; r++) {
+                    double sum = -b[N * i + r];
+                    for (int c = 0; c < N; c++) {
+                        sum += a.diag[N * N * i + N * r + c] * x[N * i + c];
+                        sum += i > 0 ? a.lower[N * N * (i - 1) + N * r + c] * x[N * (i - 1) + c] : 0;
+                        sum += i + 1 < m ? upper[N * N * i + N * c + r] * x[N * (i + 1) + c] : 0;
                     }
                     worst = fmax(worst, fabs(sum));
                 }
-            assert_true(worst < 1e-13 * (1 + largest(a.diag, n * 6) * largest(x, n)));
+            assert_true(worst < 1e-13 * (1 + largest(a.diag, n * N) * largest(x, n)));
         }
         free(upper);
         free(diag);
@@ -259,21 +260,21 @@ static void refuses_indefinite(void **state)
     for (size_t t = 0; t < sizeof counts / sizeof *counts; t++) {
         int m = counts[t];
         BlockChain a;
-        assert_true(block_chain_create(&a, m));
-        BlockFactor *f = block_factor_create(m);
-        double *b = calloc((size_t)m * 6, sizeof *b), *x = calloc((size_t)m * 6, sizeof *b);
+        assert_true(block_chain_create(&a, m, N));
+        BlockFactor *f = block_factor_create(m, N);
+        double *b = calloc((size_t)m * N, sizeof *b), *x = calloc((size_t)m * N, sizeof *b);
         for (int node = 0; node < m; node++) {
             random_chain(&a, 0);
             assert_true(block_chain_factor(&a, f));
-            double keep = a.diag[36 * node + 21];
-            a.diag[36 * node + 21] = -1e-3;
+            double keep = a.diag[N * N * node + 3 * (N + 1)];
+            a.diag[N * N * node + 3 * (N + 1)] = -1e-3;
             assert_false(block_chain_factor(&a, f));
             assert_false(block_chain_factor_solve(&a, f, b, x));
-            a.diag[36 * node + 21] = NAN;
+            a.diag[N * N * node + 3 * (N + 1)] = NAN;
             assert_false(block_chain_factor(&a, f));
-            a.diag[36 * node + 21] = keep;
+            a.diag[N * N * node + 3 * (N + 1)] = keep;
         }
-        memset(a.diag, 0, (size_t)m * 36 * sizeof *b);
+        memset(a.diag, 0, (size_t)m * N * N * sizeof *b);
         assert_false(block_chain_factor(&a, f));
         free(b);
         free(x);
@@ -281,8 +282,8 @@ static void refuses_indefinite(void **state)
         block_chain_destroy(&a);
     }
     BlockChain none;
-    assert_false(block_chain_create(&none, 0));
-    assert_null(block_factor_create(-1));
+    assert_false(block_chain_create(&none, 0, N));
+    assert_null(block_factor_create(-1, N));
 }
 
 // The factor reads the lower half of a diagonal block and unit rows stay exact: a constrained degree of freedom gets its value to the bit.
@@ -291,24 +292,24 @@ static void unit_rows_are_exact(void **state)
     (void)state;
     for (int m = 1; m < 8; m++) {
         BlockChain a;
-        assert_true(block_chain_create(&a, m));
-        BlockFactor *f = block_factor_create(m);
+        assert_true(block_chain_create(&a, m, N));
+        BlockFactor *f = block_factor_create(m, N);
         random_chain(&a, 2);
         int node = m / 2, dof = 4;
-        for (int k = 0; k < 6; k++) {
-            a.diag[36 * node + 6 * dof + k] = a.diag[36 * node + 6 * k + dof] = k == dof;
+        for (int k = 0; k < N; k++) {
+            a.diag[N * N * node + N * dof + k] = a.diag[N * N * node + N * k + dof] = k == dof;
             if (node > 0)
-                a.lower[36 * (node - 1) + 6 * dof + k] = 0;
+                a.lower[N * N * (node - 1) + N * dof + k] = 0;
             if (node + 1 < m)
-                a.lower[36 * node + 6 * k + dof] = 0;
+                a.lower[N * N * node + N * k + dof] = 0;
         }
-        double b[48], x[48];
-        for (int i = 0; i < 6 * m; i++)
+        double b[8 * N], x[8 * N];
+        for (int i = 0; i < N * m; i++)
             b[i] = uniform();
         assert_true(block_chain_factor_solve(&a, f, b, x));
-        assert_true(x[6 * node + dof] == b[6 * node + dof]);
+        assert_true(x[N * node + dof] == b[N * node + dof]);
         block_factor_solve(f, b, x);
-        assert_true(x[6 * node + dof] == b[6 * node + dof]);
+        assert_true(x[N * node + dof] == b[N * node + dof]);
         block_factor_destroy(f);
         block_chain_destroy(&a);
     }
@@ -319,14 +320,14 @@ static void same_bits_everywhere(void **state)
 {
     (void)state;
     for (int m = 1; m < 60; m += 7) {
-        size_t n = (size_t)m * 6;
+        size_t n = (size_t)m * N;
         BlockChain a;
-        assert_true(block_chain_create(&a, m));
-        BlockFactor *f = block_factor_create(m);
-        BlockLu *lu = block_lu_create(m);
+        assert_true(block_chain_create(&a, m, N));
+        BlockFactor *f = block_factor_create(m, N);
+        BlockLu *lu = block_lu_create(m, N);
         random_chain(&a, 8);
-        double *x = calloc(9 * n, sizeof *x), *b = malloc(n * sizeof *b), *lower = calloc(n * 6 + 2, sizeof *b);
-        block_lu_transpose(m, a.lower, lower);
+        double *x = calloc(9 * n, sizeof *x), *b = malloc(n * sizeof *b), *lower = calloc(n * N + 8, sizeof *b);
+        block_lu_transpose(m, N, a.lower, lower);
         for (size_t i = 0; i < n; i++)
             b[i] = uniform();
         for (int level = 0; level < SIMD_COUNT; level++) {
@@ -357,11 +358,11 @@ static void condensed_solves_as_whole(void **state)
         for (int every = 1; every < 50; every += every < 4 ? 1 : 11)
             for (int offset = 0; offset < 3; offset++) {
                 int m = sizes[t];
-                size_t n = (size_t)m * 6;
+                size_t n = (size_t)m * N;
                 BlockChain a;
-                assert_true(block_chain_create(&a, m));
-                BlockFactor *f = block_factor_create(m);
-                BlockCondenser *k = block_condenser_create(m);
+                assert_true(block_chain_create(&a, m, N));
+                BlockFactor *f = block_factor_create(m, N);
+                BlockCondenser *k = block_condenser_create(m, N);
                 random_chain(&a, 2);
                 double *b = malloc(n * sizeof *b), *x = malloc(n * sizeof *x), *y = malloc(3 * n * sizeof *y), *small = malloc(n * sizeof *small);
                 for (size_t i = 0; i < n; i++)
@@ -378,9 +379,9 @@ static void condensed_solves_as_whole(void **state)
                     for (int i = offset; i < m; i += every) {
                         int p = block_condenser_place(k, i);
                         assert_true(p >= 0);
-                        s->diag[36 * p] += 3;
-                        s->diag[36 * p + 21] += 100;
-                        block_condenser_side(k)[6 * p + 4] += 2;
+                        s->diag[N * N * p] += 3;
+                        s->diag[N * N * p + 3 * (N + 1)] += 100;
+                        block_condenser_side(k)[N * p + 4] += 2;
                     }
                     assert_true(block_chain_factor_solve(s, f, block_condenser_side(k), small));
                     block_condenser_expand(k, small, y + (size_t)level % 3 * n);
@@ -389,9 +390,9 @@ static void condensed_solves_as_whole(void **state)
                 }
                 simd_force(level_given);
                 for (int i = offset; i < m; i += every) {
-                    a.diag[36 * i] += 3;
-                    a.diag[36 * i + 21] += 100;
-                    b[6 * i + 4] += 2;
+                    a.diag[N * N * i] += 3;
+                    a.diag[N * N * i + 3 * (N + 1)] += 100;
+                    b[N * i + 4] += 2;
                 }
                 assert_true(block_chain_factor_solve(&a, f, b, x));
                 for (size_t i = 0; i < n; i++)
@@ -424,25 +425,25 @@ static void mirrored_signs_to_the_bit(void **state)
 {
     (void)state;
     enum { M = 9 };
-    const double sign[6] = {1, -1, 1, -1, 1, -1}; // mirror in xz: y of a vector, x and z of a rotation
+    const double sign[BLOCK_LARGEST] = {1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1}; // mirror in xz: y of a vector, x and z of a rotation
     BlockChain a, mirrored;
-    assert_true(block_chain_create(&a, M) && block_chain_create(&mirrored, M));
-    BlockFactor *f = block_factor_create(M);
+    assert_true(block_chain_create(&a, M, N) && block_chain_create(&mirrored, M, N));
+    BlockFactor *f = block_factor_create(M, N);
     random_chain(&a, 6);
-    double b[6 * M], x[6 * M], c[6 * M], y[6 * M];
-    for (int i = 0; i < 6 * M; i++) {
+    double b[N * M], x[N * M], c[N * M], y[N * M];
+    for (int i = 0; i < N * M; i++) {
         b[i] = uniform();
-        c[i] = sign[i % 6] * b[i];
+        c[i] = sign[i % N] * b[i];
     }
-    for (int i = 0; i < 36 * M; i++) {
-        mirrored.diag[i] = sign[i / 6 % 6] * sign[i % 6] * a.diag[i];
-        if (i < 36 * (M - 1))
-            mirrored.lower[i] = sign[i / 6 % 6] * sign[i % 6] * a.lower[i];
+    for (int i = 0; i < N * N * M; i++) {
+        mirrored.diag[i] = sign[i / N % N] * sign[i % N] * a.diag[i];
+        if (i < N * N * (M - 1))
+            mirrored.lower[i] = sign[i / N % N] * sign[i % N] * a.lower[i];
     }
     assert_true(block_chain_factor_solve(&a, f, b, x));
     assert_true(block_chain_factor_solve(&mirrored, f, c, y));
-    for (int i = 0; i < 6 * M; i++)
-        assert_true(y[i] == sign[i % 6] * x[i]);
+    for (int i = 0; i < N * M; i++)
+        assert_true(y[i] == sign[i % N] * x[i]);
     block_factor_destroy(f);
     block_chain_destroy(&a);
     block_chain_destroy(&mirrored);
@@ -458,16 +459,16 @@ static void prints_timings(void **state)
         print_message("%-8s ", simd_name[simd_level()]);
         enum { RUNS = 300 };
         BlockChain a;
-        assert_true(block_chain_create(&a, m));
-        BlockFactor *f = block_factor_create(m);
+        assert_true(block_chain_create(&a, m, N));
+        BlockFactor *f = block_factor_create(m, N);
         random_chain(&a, 4);
-        double *b = malloc((size_t)m * 6 * sizeof *b), *x = malloc((size_t)m * 6 * sizeof *b), *s = malloc((size_t)m * 36 * sizeof *b);
-        for (int i = 0; i < 6 * m; i++)
+        double *b = malloc((size_t)m * N * sizeof *b), *x = malloc((size_t)m * N * sizeof *b), *s = malloc((size_t)m * N * N * sizeof *b);
+        for (int i = 0; i < N * m; i++)
             b[i] = uniform();
-        BlockLu *lu = block_lu_create(m);
-        double *lower = calloc((size_t)m * 36 + 2, sizeof *lower);
-        block_lu_transpose(m, a.lower, lower);
-        BlockCondenser *condenser = block_condenser_create(m);
+        BlockLu *lu = block_lu_create(m, N);
+        double *lower = calloc((size_t)m * N * N + 8, sizeof *lower);
+        block_lu_transpose(m, N, a.lower, lower);
+        BlockCondenser *condenser = block_condenser_create(m, N);
         static double condense[RUNS], factor[RUNS], solve[RUNS], fused[RUNS], diagonal[RUNS], unsymmetric[RUNS];
         for (int i = 0; i < RUNS; i++) {
             double t0 = now();

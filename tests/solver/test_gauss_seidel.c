@@ -120,12 +120,12 @@ typedef struct Problem {
 
 static void problem_create(Problem *p, int nodes, int contacts)
 {
-    assert_true(block_chain_create(&p->chain, nodes));
-    p->factor = block_factor_create(nodes);
+    assert_true(block_chain_create(&p->chain, nodes, 6));
+    p->factor = block_factor_create(nodes, 6);
     p->b = calloc((size_t)nodes * 6, sizeof *p->b);
     p->u = calloc((size_t)nodes * 6, sizeof *p->u);
     p->set = (ContactSet){.count = contacts, .capacity = contacts, .point = calloc((size_t)contacts + 1, sizeof *p->set.point)};
-    p->solver = contact_solver_create(nodes, contacts);
+    p->solver = contact_solver_create(nodes, 6, contacts);
     assert_non_null(p->factor);
     assert_non_null(p->solver);
 }
@@ -569,7 +569,7 @@ static void curvature_follows_levers(void **state)
     (void)state;
     for (int trial = 0; trial < 20; trial++) {
         BlockChain chain;
-        assert_true(block_chain_create(&chain, 3));
+        assert_true(block_chain_create(&chain, 3, 6));
         for (int i = 0; i < 3; i++)
             for (int k = 0; k < 6; k++)
                 chain.diag[36 * i + 7 * k] = 2;

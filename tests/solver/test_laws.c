@@ -85,7 +85,7 @@ static void chain_at_rest(Chain *c, double curl)
         c->q[i + 1] = quat_unit(quat_mul(c->q[i], quat_from_rotation_vector(vec3_scale(axis, angle))));
     }
     wire_destroy(&wire);
-    assert_true(block_chain_create(&c->blocks, M));
+    assert_true(block_chain_create(&c->blocks, M, 6));
 }
 
 static void chain_bend(Chain *c, double scale)

@@ -1,0 +1,46 @@
+// What the parts of a scene's reader share (scene.c, scene_tools.c); nobody else includes it.
+#ifndef SELDINGER_SIM_SCENE_READING_H
+#define SELDINGER_SIM_SCENE_READING_H
+
+#include "input/yaml_reader.h"
+#include "sim/scene.h"
+
+typedef struct ToolReading { // what the rules that tie one tool to another need to know of how it was read
+    YamlValue whole, inserted;   // where it stands; its `inserted_mm`, node 0 where it has none
+    double inserted_mm;      // where `inserted_known`: it was given and in range
+    bool inserted_known;
+    double length;           // [mm] of all sections …
+    bool length_known;       // … unless one of them, or `length_mm`, had a fault
+    bool sound;              // its sections and rest shape had no fault at all
+} ToolReading;
+
+typedef struct Reading {
+    Scene *scene;
+    YamlReader *reader;
+    const char *path;
+    Faults *faults;
+    double total_length;     // of the first tool; 0 until known
+    ToolReading tool[TOOLS_MOST];
+} Reading;
+
+static const NumberRange length_range = {0, 1e5, true}, friction_range = {0, 10, false};
+
+static const double per_gpa = 1000;            // MPa
+static const double per_g_cm3 = 1e-3;          // g/mm3
+static const double per_second = 1000;         // ms
+static const double per_deg = PI / 180;        // rad
+
+enum { MOST_SECTIONS = 1000, MOST_PIECES = 10000, MOST_ELEMENTS = 10000 };
+
+void *scene_zeroed(Reading *reading, int count, size_t size);    // NULL with a fault
+char *scene_resolved(Reading *reading, const char *name);        // as seen from the scene's file; NULL with a fault
+bool scene_read_piece(YamlValue value, TubePiece *piece);        // a line or an arc, of a tube's path or a rest shape
+
+// `wire:` becomes the scene's one tool, `tools:` up to four; scene->wire is the first one's. Before `sheath:` and `rig:` are read …
+void scene_read_wire(Reading *reading, YamlValue value);
+void scene_read_tools(Reading *reading, YamlValue value);
+// … and after them: what a tool takes from where the scene starts, how far each is inserted, and whether each fits into the one around it. `placed`: a
+// sheath or a rig was there.
+void scene_settle_tools(Reading *reading, bool placed);
+
+#endif

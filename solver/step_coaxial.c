@@ -1,0 +1,862 @@
+// The linear system of coaxial tools: what step_assemble.c does for one tool, with coaxial elements (coaxial.c). Unknowns of a node: position and rotation,
+// then for each tool i inside, material coordinate and angle, at 6 + 2 i and 7 + 2 i. In the sheath, as for one tool, axial displacement (0) and turn (3).
+//
+// Mass: all tools at a node move together across the tangent t; along it each has its own velocity, t . dx/dt - dS/dt for one that lies inside, and its
+// own spin, t . omega + dphi/dt. What S carries from node to node (convection) is left out: of order v^2 dm/ds.
+#include "solver/step_tools.h"
+
+#include <string.h>
+
+enum { NODAL = 12 };
+static const double JUST_BEFORE = 1e-6;  // [mm] from a border: the section on the proximal side
+static const double SHORTEST = 0.01;     // of an element: what is left of it outside a mouth or a tip
+
+static double slide_at(const Stepper *s, int c, int k) { return s->state.slide[c * s->state.inner_count + k - 1]; }
+static double angle_at(const Stepper *s, int c, int k) { return s->state.angle[c * s->state.inner_count + k - 1]; }
+static int unknown_of(int k) { return 6 + 2 * (k - 1); }
+static bool is_inside(const Stepper *s, int c, int k) { return k > s->carrier[c] && c < s->tool[k].inside; }
+
+// The tools in element c, carrier first; returns their number. tool: which they are.
+static int spans(const Stepper *s, int c, CoaxialSpan *span, int *tool)
+{
+    int count = 0, first = s->carrier[c + 1];
+    for (int k = first; k < s->tool_count; k++) {
+        CoaxialSpan *p = &span[count];
+        bool carries = k == first, from_node = s->carrier[c] == k;
+        if (!carries && !is_inside(s, c, k))
+            continue;
+        *p = (CoaxialSpan){.tool = &s->tool[k].coaxial, .is_fixed = carries && from_node};
+        p->s1 = from_node ? s->wire.s[c] : slide_at(s, c, k);
+        p->phi1 = from_node ? 0 : angle_at(s, c, k);
+        if (carries) {
+            p->s2 = s->wire.s[c + 1];
+            p->s1 = fmin(p->s1, p->s2 - SHORTEST * s->wire.length[c]);
+            p->spread = s->wire.length[c];
+        } else if (is_inside(s, c + 1, k)) {
+            p->s2 = slide_at(s, c + 1, k);
+            p->phi2 = angle_at(s, c + 1, k);
+            p->spread = s->wire.length[c];
+        } else {
+            p->has_tip = true;
+        }
+        tool[count++] = k;
+    }
+    return count;
+}
+
+double tools_span_length(const Stepper *s, int c)
+{
+    int k = s->carrier[c + 1];
+    return s->wire.s[c + 1] - (s->carrier[c] == k ? s->wire.s[c] : slide_at(s, c, k));
+}
+
+double tools_twist(const Stepper *s, int c)
+{
+    Quat p = quat_mul(quat_conjugate(s->state.orientation[c]), s->state.orientation[c + 1]);
+    return 2 * atan2(p.x, p.w);
+}
+
+static bool is_at_tip(const Stepper *s, int c) { return s->carrier[c] != s->carrier[c + 1]; }
+
+// Behind a tip the frames of the two nodes belong to two tools: there node 1 is given that of the one that goes on.
+static CoaxialInput input_at(const Stepper *s, int c, int *tool)
+{
+    const WireState *w = &s->state;
+    CoaxialInput in = {.x1 = w->position[c], .x2 = w->position[c + 1], .q1 = w->orientation[c], .q2 = w->orientation[c + 1]};
+    in.count = spans(s, c, in.span, tool);
+    if (!is_at_tip(s, c))
+        return in;
+    double phi = in.span[0].phi1;
+    in.q1 = quat_mul(in.q1, quat_from_rotation_vector(vec3(phi, 0, 0)));
+    for (int i = 0; i < in.count; i++)
+        in.span[i].phi1 -= phi;
+    return in;
+}
+
+// One tool alone, between two of its own nodes.
+static bool is_plain(const Stepper *s, int c)
+{
+    if (s->carrier[c] != s->carrier[c + 1])
+        return false;
+    for (int k = s->carrier[c] + 1; k < s->tool_count; k++)
+        if (is_inside(s, c, k))
+            return false;
+    return true;
+}
+
+static BeamInput plain_input(const Stepper *s, int c)
+{
+    const BeamRest *r = &s->beam.rest;
+    const WireState *w = &s->state;
+    return (BeamInput){.x1 = w->position[c], .x2 = w->position[c + 1], .q1 = w->orientation[c], .q2 = w->orientation[c + 1], .length = r->length[c],
+                       .extend = r->extend[c], .axial = r->axial[c], .near = r->near[c], .far = r->far[c], .twist = r->twist[c], .half_w = r->half_w[c],
+                       .half_y = r->half_y[c], .half_z = r->half_z[c]};
+}
+
+// --- free elements ---
+
+// Gradient and tangent of an element in the unknowns of its two nodes, [2 n] and [2 n][2 n].
+typedef struct Local {
+    int n;
+    double gradient[2 * BLOCK_LARGEST], tangent[2 * BLOCK_LARGEST][2 * BLOCK_LARGEST];
+} Local;
+
+// Where the element's unknowns are among those of its nodes; -1: nowhere.
+static void places(const CoaxialInput *in, const int *tool, int n, int place[NODAL + COAXIAL_COLUMNS])
+{
+    for (int i = 0; i < 6; i++)
+        place[i] = i, place[6 + i] = n + i;
+    for (int i = 0; i < in->count; i++) {
+        int at = unknown_of(tool[i]), *p = place + NODAL + 4 * i;
+        bool is_free = !in->span[i].is_fixed, ends = i == 0 || in->span[i].has_tip;
+        p[COAXIAL_S1] = is_free ? at : -1;
+        p[COAXIAL_PHI1] = is_free ? at + 1 : -1;
+        p[COAXIAL_S2] = is_free && !ends ? n + at : -1;
+        p[COAXIAL_PHI2] = is_free && !ends ? n + at + 1 : -1;
+    }
+}
+
+static void add_local(Local *local, const CoaxialTangent *t, int columns, const int *place, double factor)
+{
+    for (int r = 0; r < 6; r++)
+        for (int c = 0; c < 6; c++) {
+            int n = local->n;
+            local->tangent[r][c] += factor * t->nodes.k11[6 * r + c];
+            local->tangent[n + r][c] += factor * t->nodes.k21[6 * r + c];
+            local->tangent[c][n + r] += factor * t->nodes.k21[6 * r + c];
+            local->tangent[n + r][n + c] += factor * t->nodes.k22[6 * r + c];
+        }
+    for (int p = 0; p < columns; p++) {
+        int at = place[NODAL + p];
+        if (at < 0)
+            continue;
+        for (int r = 0; r < NODAL; r++) {
+            local->tangent[place[r]][at] += factor * t->cross[r][p];
+            local->tangent[at][place[r]] += factor * t->cross[r][p];
+        }
+        for (int q = 0; q < columns; q++)
+            if (place[NODAL + q] >= 0)
+                local->tangent[at][place[NODAL + q]] += factor * t->own[p][q];
+    }
+}
+
+static void clear(Local *local, int n)
+{
+    local->n = n;
+    memset(local->gradient, 0, sizeof local->gradient);
+    for (int r = 0; r < 2 * n; r++)
+        memset(local->tangent[r], 0, (size_t)(2 * n) * sizeof(double));
+}
+
+// What one of an element's own unknowns (12 of the nodes, 4 a tool) is in those of its two nodes, [2 n]: a sum of at most two.
+typedef struct Way {
+    int count;
+    int at[2];
+    double by[2];
+} Way;
+
+static void put_nodes(const BeamTangent *t, double full[NODAL][NODAL])
+{
+    for (int r = 0; r < 6; r++)
+        for (int c = 0; c < 6; c++) {
+            full[r][c] = t->k11[6 * r + c];
+            full[6 + r][c] = full[c][6 + r] = t->k21[6 * r + c];
+            full[6 + r][6 + c] = t->k22[6 * r + c];
+        }
+}
+
+static void add_ways(const Way *way, const CoaxialTangent *t, int columns, double factor, Local *local)
+{
+    double nodes[NODAL][NODAL];
+    put_nodes(&t->nodes, nodes);
+    int all = NODAL + columns;
+    for (int r = 0; r < all; r++)
+        for (int c = 0; c < all; c++) {
+            double value = factor * (r < NODAL ? c < NODAL ? nodes[r][c] : t->cross[r][c - NODAL] : c < NODAL ? t->cross[c][r - NODAL] : t->own[r - NODAL][c - NODAL]);
+            for (int i = 0; i < way[r].count; i++)
+                for (int j = 0; j < way[c].count; j++)
+                    local->tangent[way[r].at[i]][way[c].at[j]] += value * way[r].by[i] * way[c].by[j];
+        }
+}
+
+// An element whose unknowns are not those of its nodes.
+static void element_by_ways(const Stepper *s, int c, const CoaxialInput *in, const Way *way, double scale, Local *local)
+{
+    int n = s->chain.size, columns = 4 * in->count;
+    const double *done[2] = {s->linearised + row_of(s, c), s->linearised + row_of(s, c + 1)};
+    CoaxialOutput out;
+    CoaxialTangent t;
+    coaxial_element(in, &out);
+    coaxial_tangent(in, &out, scale, &t);
+    clear(local, n);
+    add_ways(way, &t, columns, 1, local);
+    const BeamOutput *o = &out.beam;
+    double own[NODAL + COAXIAL_COLUMNS] = {-o->force2.x, -o->force2.y, -o->force2.z, o->moment1.x, o->moment1.y, o->moment1.z,
+                                           o->force2.x, o->force2.y, o->force2.z, o->moment2.x, o->moment2.y, o->moment2.z};
+    memcpy(own + NODAL, out.gradient, (size_t)columns * sizeof *own);
+    for (int r = 0; r < NODAL + columns; r++)
+        for (int i = 0; i < way[r].count; i++)
+            local->gradient[way[r].at[i]] += own[r] * way[r].by[i];
+    if (!s->is_iterate || scale == 1)
+        return;
+    Local elastic;
+    coaxial_tangent(in, &out, 1, &t);
+    clear(&elastic, n);
+    add_ways(way, &t, columns, 1, &elastic);
+    for (int r = 0; r < 2 * n; r++)
+        for (int k = 0; k < 2 * n; k++)
+            local->gradient[r] += (local->tangent[r][k] - elastic.tangent[r][k]) * done[k / n][k % n];
+}
+
+// At a tip node 1 has the frame of the tool that goes on: its turn about the tangent is that tool's angle too.
+static void tip_ways(const Stepper *s, int c, const CoaxialInput *in, const int *tool, Way way[NODAL + COAXIAL_COLUMNS])
+{
+    int n = s->chain.size, on = unknown_of(tool[0]);
+    Vec3 t = quat_rotate(s->state.orientation[c], vec3(1, 0, 0));
+    const double tangent[3] = {t.x, t.y, t.z};
+    for (int i = 0; i < 3; i++) {
+        way[i] = (Way){1, {i, 0}, {1, 0}};
+        way[3 + i] = (Way){2, {3 + i, on + 1}, {1, tangent[i]}};
+        way[6 + i] = (Way){1, {n + i, 0}, {1, 0}};
+        way[9 + i] = (Way){1, {n + 3 + i, 0}, {1, 0}};
+    }
+    for (int i = 0; i < in->count; i++) {
+        int at = unknown_of(tool[i]);
+        Way *w = way + NODAL + 4 * i;
+        bool ends = i == 0 || in->span[i].has_tip;
+        w[COAXIAL_S1] = (Way){1, {at, 0}, {1, 0}};
+        w[COAXIAL_PHI1] = i == 0 ? (Way){0} : (Way){2, {at + 1, on + 1}, {1, -1}};
+        w[COAXIAL_S2] = ends ? (Way){0} : (Way){1, {n + at, 0}, {1, 0}};
+        w[COAXIAL_PHI2] = ends ? (Way){0} : (Way){1, {n + at + 1, 0}, {1, 0}};
+    }
+}
+
+// Element c: its gradient, and its tangent (with the damping's, whose force on an iterate is that of the displacement so far).
+static void free_element(const Stepper *s, int c, double scale, Local *local)
+{
+    int n = s->chain.size, tool[STEP_TOOLS_MAX], place[NODAL + COAXIAL_COLUMNS];
+    clear(local, n);
+    const double *done[2] = {s->linearised + row_of(s, c), s->linearised + row_of(s, c + 1)};
+    CoaxialTangent t;
+    int columns = 0;
+    if (is_plain(s, c)) {
+        BeamInput in = plain_input(s, c);
+        BeamOutput out;
+        beam_element(&in, &out);
+        beam_tangent(&in, &out, scale, &t.nodes);
+        for (int i = 0; i < 3; i++) {
+            const double f[3] = {out.force2.x, out.force2.y, out.force2.z}, m1[3] = {out.moment1.x, out.moment1.y, out.moment1.z},
+                         m2[3] = {out.moment2.x, out.moment2.y, out.moment2.z};
+            local->gradient[i] = -f[i], local->gradient[n + i] = f[i];
+            local->gradient[3 + i] = m1[i], local->gradient[n + 3 + i] = m2[i];
+        }
+        add_local(local, &t, 0, place, 1);
+        if (s->is_iterate && scale != 1) {
+            CoaxialTangent main;
+            beam_tangent(&in, &out, 1, &main.nodes);
+            Local damped;
+            clear(&damped, n);
+            add_local(&damped, &t, 0, place, 1);
+            add_local(&damped, &main, 0, place, -1);
+            for (int r = 0; r < 2 * n; r++)
+                for (int k = 0; k < 2 * n; k++)
+                    local->gradient[r] += damped.tangent[r][k] * done[k / n][k % n];
+        }
+        return;
+    }
+    CoaxialInput in = input_at(s, c, tool);
+    CoaxialOutput out;
+    if (is_at_tip(s, c)) {
+        Way way[NODAL + COAXIAL_COLUMNS];
+        tip_ways(s, c, &in, tool, way);
+        element_by_ways(s, c, &in, way, scale, local);
+        return;
+    }
+    coaxial_element(&in, &out);
+    coaxial_tangent(&in, &out, scale, &t);
+    places(&in, tool, n, place);
+    columns = 4 * in.count;
+    const BeamOutput *o = &out.beam;
+    const double f[3] = {o->force2.x, o->force2.y, o->force2.z}, m1[3] = {o->moment1.x, o->moment1.y, o->moment1.z},
+                 m2[3] = {o->moment2.x, o->moment2.y, o->moment2.z};
+    for (int i = 0; i < 3; i++) {
+        local->gradient[i] = -f[i], local->gradient[n + i] = f[i];
+        local->gradient[3 + i] = m1[i], local->gradient[n + 3 + i] = m2[i];
+    }
+    for (int p = 0; p < columns; p++)
+        if (place[NODAL + p] >= 0)
+            local->gradient[place[NODAL + p]] += out.gradient[p];
+    add_local(local, &t, columns, place, 1);
+    if (s->is_iterate && scale != 1) {
+        CoaxialTangent main;
+        Local damped;
+        coaxial_tangent(&in, &out, 1, &main);
+        clear(&damped, n);
+        add_local(&damped, &t, columns, place, 1);
+        add_local(&damped, &main, columns, place, -1);
+        for (int r = 0; r < 2 * n; r++)
+            for (int k = 0; k < 2 * n; k++)
+                local->gradient[r] += damped.tangent[r][k] * done[k / n][k % n];
+    }
+}
+
+static void add_to_chain(Stepper *s, int c, const Local *local)
+{
+    int n = local->n;
+    double *d = s->chain.diag + block_of(s, c), *next = s->chain.diag + block_of(s, c + 1), *l = s->chain.lower + block_of(s, c), *b = s->b + row_of(s, c);
+    for (int r = 0; r < n; r++) {
+        for (int k = 0; k < n; k++) {
+            d[n * r + k] += local->tangent[r][k];
+            next[n * r + k] += local->tangent[n + r][n + k];
+            l[n * r + k] += local->tangent[n + r][k];
+        }
+        b[r] -= local->gradient[r];
+        b[n + r] -= local->gradient[n + r];
+    }
+}
+
+// --- the sheath ---
+
+static const CoaxialSection *section_at(const CoaxialTool *tool, double s)
+{
+    const CoaxialSection *section = tool->section, *last = section + tool->count - 1;
+    while (section < last && section->end <= s)
+        section++;
+    return section;
+}
+
+// [N] what it takes to straighten a length of a tool.
+static double straightening(const Tool *t, double s)
+{
+    const CoaxialSection *p = section_at(&t->coaxial, s);
+    return s >= t->wire.total_length ? 0 : 0.5 * p->bending * (p->curve[0] * p->curve[0] + p->curve[1] * p->curve[1]);
+}
+
+// [mJ] of the length from a to b.
+static double straightened(const Tool *t, double a, double b)
+{
+    double energy = 0;
+    for (const CoaxialSection *p = t->section; p < t->section + t->coaxial.count && a < b; p++) {
+        double to = fmin(b, p->end);
+        if (to <= a)
+            continue;
+        energy += 0.5 * p->bending * (p->curve[0] * p->curve[0] + p->curve[1] * p->curve[1]) * (to - a);
+        a = to;
+    }
+    return energy;
+}
+
+// Between two nodes in the sheath every tool is a spring along and about the line.
+static double sheath_element_of_tools(const Stepper *s, int c, double scale, Local *local)
+{
+    int n = s->chain.size, tool[STEP_TOOLS_MAX];
+    CoaxialInput in = input_at(s, c, tool);
+    CoaxialRest rest;
+    coaxial_rest(in.span, in.count, &rest);
+    const double *done[2] = {s->linearised + row_of(s, c), s->linearised + row_of(s, c + 1)};
+    double length = stepper_sheath_coordinate(s, c + 1) - stepper_sheath_coordinate(s, c), psi = tools_twist(s, c), energy = 0;
+    for (int i = 0; i < in.count; i++) {
+        const CoaxialSpan *p = &in.span[i];
+        energy += straightened(&s->tool[tool[i]], p->s1, p->has_tip ? s->tool[tool[i]].wire.total_length : p->s2);
+        if (p->has_tip)
+            continue;
+        int at = unknown_of(tool[i]), along[4] = {0, n, at, n + at}, about[4] = {3, n + 3, at + 1, n + at + 1};
+        double ka = rest.axial[i], kt = rest.torsion[i], strain = length - rest.own_length[i], turn = psi + p->phi2 - p->phi1;
+        static const double by_length[4] = {-1, 1, 1, -1}, by_turn[4] = {-1, 1, -1, 1};
+        double damped_strain = 0, damped_turn = 0;
+        int unknowns = p->is_fixed ? 2 : 4;
+        for (int k = 0; k < unknowns; k++) {
+            damped_strain += by_length[k] * done[along[k] / n][along[k] % n];
+            damped_turn += by_turn[k] * done[about[k] / n][about[k] % n];
+        }
+        energy += 0.5 * (ka * strain * strain + kt * turn * turn);
+        for (int r = 0; local && r < unknowns; r++) {
+            local->gradient[along[r]] += by_length[r] * ka * (strain + (scale - 1) * damped_strain);
+            local->gradient[about[r]] += by_turn[r] * kt * (turn + (scale - 1) * damped_turn);
+            for (int k = 0; k < unknowns; k++) {
+                local->tangent[along[r]][along[k]] += scale * ka * by_length[r] * by_length[k];
+                local->tangent[about[r]][about[k]] += scale * kt * by_turn[r] * by_turn[k];
+            }
+        }
+    }
+    return energy;
+}
+
+// The element across the mouth: from there to the next node, with the tools' coordinates at the mouth, S at the node behind it less that node's place.
+static CoaxialInput mouth_input(const Stepper *s, int *tool)
+{
+    int c = s->first_free - 1;
+    CoaxialInput in = input_at(s, c, tool);
+    double place = stepper_sheath_coordinate(s, c);
+    in.x1 = s->mouth;
+    for (int i = 0; i < in.count; i++) {
+        CoaxialSpan *p = &in.span[i];
+        p->s1 -= place;
+        p->is_fixed = false;
+        p->spread = s->wire.length[c];
+        p->spreads_twist = true;
+        double end = p->has_tip ? s->tool[tool[i]].wire.total_length : p->s2;
+        if (!p->has_tip)
+            p->s1 = fmin(p->s1, end - SHORTEST * s->wire.length[c]);
+    }
+    return in;
+}
+
+static void mouth_ways(const Stepper *s, const CoaxialInput *in, const int *tool, Way way[NODAL + COAXIAL_COLUMNS])
+{
+    int n = s->chain.size;
+    const double d[3] = {s->axis[0].x, s->axis[0].y, s->axis[0].z};
+    for (int i = 0; i < 3; i++) {
+        way[i] = (Way){0};
+        way[3 + i] = (Way){1, {3, 0}, {d[i], 0}};
+        way[6 + i] = (Way){1, {n + i, 0}, {1, 0}};
+        way[9 + i] = (Way){1, {n + 3 + i, 0}, {1, 0}};
+    }
+    for (int i = 0; i < in->count; i++) {
+        int at = unknown_of(tool[i]);
+        Way *w = way + NODAL + 4 * i;
+        bool ends = i == 0 || in->span[i].has_tip;
+        w[COAXIAL_S1] = i == 0 ? (Way){1, {0, 0}, {-1, 0}} : (Way){2, {at, 0}, {1, -1}};
+        w[COAXIAL_PHI1] = i == 0 ? (Way){0} : (Way){1, {at + 1, 0}, {1, 0}};
+        w[COAXIAL_S2] = ends ? (Way){0} : (Way){1, {n + at, 0}, {1, 0}};
+        w[COAXIAL_PHI2] = ends ? (Way){0} : (Way){1, {n + at + 1, 0}, {1, 0}};
+    }
+}
+
+static void mouth_element_of_tools(const Stepper *s, double scale, Local *local)
+{
+    int c = s->first_free - 1, tool[STEP_TOOLS_MAX];
+    CoaxialInput in = mouth_input(s, tool);
+    Way way[NODAL + COAXIAL_COLUMNS];
+    mouth_ways(s, &in, tool, way);
+    element_by_ways(s, c, &in, way, scale, local);
+    // what lies straight behind the mouth gets longer with S there
+    for (int i = 0; i < in.count; i++) {
+        const Way *w = &way[NODAL + 4 * i + COAXIAL_S1];
+        for (int j = 0; j < w->count; j++)
+            local->gradient[w->at[j]] += straightening(&s->tool[tool[i]], in.span[i].s1) * w->by[j];
+    }
+}
+
+// --- mass ---
+
+// [mm] of the curve that belong to node c.
+static double tributary(const Stepper *s, int c)
+{
+    double length = 0;
+    if (c > 0)
+        length += tools_span_length(s, c - 1);
+    if (c + 1 < s->state.node_count)
+        length += tools_span_length(s, c);
+    return 0.5 * length;
+}
+
+typedef struct Lump {        // of one tool at one node
+    double mass, about, across;    // [g], [g mm2]
+} Lump;
+
+static Lump lump_at(const Stepper *s, int c, int k)
+{
+    const Tool *t = &s->tool[k];
+    if (k == s->carrier[c])
+        return (Lump){s->wire.mass[c], s->wire.inertia_axial[c], s->wire.inertia_lateral[c]};
+    double at = slide_at(s, c, k), length = fmin(tributary(s, c), fmax(0, t->wire.total_length - at));
+    int section = (int)(section_at(&t->coaxial, at) - t->section);
+    // never nothing: rows of S and phi stay positive definite
+    length = fmax(length, SHORTEST * tributary(s, c));
+    return (Lump){t->line_mass[section] * length, 2 * t->line_inertia[section] * length, t->line_inertia[section] * length};
+}
+
+// A square m (g . (u - v h) ...): along g, a combination of a node's unknowns, moves at `velocity` [per ms].
+static void add_inertia(Stepper *s, int c, double inertia, double mass, const double *g, int first, int last, double velocity, double push)
+{
+    int n = s->chain.size;
+    double *d = s->chain.diag + block_of(s, c), *b = s->b + row_of(s, c), done = 0;
+    const double *u = s->linearised + row_of(s, c);
+    for (int i = first; i < last; i++)
+        done += g[i] * u[i];
+    double force = mass * (velocity / s->dt + push - inertia * done);
+    for (int r = first; r < last; r++) {
+        if (g[r] == 0)
+            continue;
+        b[r] += g[r] * force;
+        for (int k = first; k < last; k++)
+            d[n * r + k] += inertia * mass * g[r] * g[k];
+    }
+}
+
+static void node_inertia(Stepper *s, int c, double inertia)
+{
+    const WireState *w = &s->state;
+    bool held = c < s->first_free;
+    Vec3 t = held ? s->axis[0] : quat_rotate(w->orientation[c], vec3(1, 0, 0)), e = vec3_normal_to(t), f = vec3_cross(t, e);
+    Vec3 v = w->velocity[c], spin = w->spin[c];
+    Lump all = {0};
+    for (int k = s->carrier[c]; k < s->tool_count; k++) {
+        if (k != s->carrier[c] && !is_inside(s, c, k))
+            continue;
+        Lump lump = lump_at(s, c, k);
+        int at = unknown_of(k), i = c * w->inner_count + k - 1;
+        bool own = k == s->carrier[c];
+        double g[BLOCK_LARGEST] = {0}, turn[BLOCK_LARGEST] = {0};
+        if (held)
+            g[0] = turn[3] = 1;
+        else
+            g[0] = t.x, g[1] = t.y, g[2] = t.z, turn[3] = t.x, turn[4] = t.y, turn[5] = t.z;
+        if (!own)
+            g[at] = -1, turn[at + 1] = 1;
+        add_inertia(s, c, inertia, lump.mass, g, 0, s->chain.size, own ? vec3_dot(v, t) : w->slide_velocity[i], vec3_dot(s->gravity, t));
+        add_inertia(s, c, inertia, lump.about, turn, 0, s->chain.size, own ? vec3_dot(spin, t) : w->slide_spin[i], 0);
+        all.mass += lump.mass;
+        all.across += lump.across;
+    }
+    for (int side = 0; side < 2 && !held; side++) {
+        Vec3 a = side ? f : e;
+        const double g[6] = {a.x, a.y, a.z, 0, 0, 0}, turn[6] = {0, 0, 0, a.x, a.y, a.z};
+        add_inertia(s, c, inertia, all.mass, g, 0, 6, vec3_dot(v, a), vec3_dot(s->gravity, a));
+        add_inertia(s, c, inertia, all.across, turn, 0, 6, vec3_dot(spin, a), 0);
+    }
+}
+
+double tools_kinetic_energy(const Stepper *s)
+{
+    const WireState *w = &s->state;
+    double twice = 0;
+    for (int c = 0; c < w->node_count; c++) {
+        Vec3 t = quat_rotate(w->orientation[c], vec3(1, 0, 0));
+        double along = vec3_dot(w->velocity[c], t), about = vec3_dot(w->spin[c], t);
+        double across2 = vec3_norm2(w->velocity[c]) - along * along, turning2 = vec3_norm2(w->spin[c]) - about * about;
+        for (int k = s->carrier[c]; k < s->tool_count; k++) {
+            bool own = k == s->carrier[c];
+            if (!own && !is_inside(s, c, k))
+                continue;
+            Lump lump = lump_at(s, c, k);
+            double v = own ? along : w->slide_velocity[c * w->inner_count + k - 1], spin = own ? about : w->slide_spin[c * w->inner_count + k - 1];
+            twice += lump.mass * (v * v + across2) + lump.about * spin * spin + lump.across * turning2;
+        }
+    }
+    return 0.5 * twice;
+}
+
+// --- tips ---
+
+// Rest moment of a tool at a node, and its stiffness.
+static Vec3 rest_moment(const Stepper *s, int c, int k, double *bending)
+{
+    bool own = s->carrier[c] == k;
+    const CoaxialSection *p = section_at(&s->tool[k].coaxial, own ? s->wire.s[c] : slide_at(s, c, k));
+    Quat q = s->state.orientation[c];
+    if (!own)
+        q = quat_mul(q, quat_from_rotation_vector(vec3(angle_at(s, c, k), 0, 0)));
+    *bending = p->bending;
+    return vec3_scale(quat_rotate(q, vec3(0, -p->curve[1], p->curve[0])), p->bending);
+}
+
+Vec3 stepper_curvature(const Stepper *s, int c)
+{
+    int tool[STEP_TOOLS_MAX];
+    double bending = 0, one;
+    Vec3 sum = vec3(0, 0, 0);
+    if (c + 1 >= s->state.node_count) {      // a free end: the tools that go on are as at rest
+        for (int k = s->carrier[c] + 1; k < s->tool_count; k++)
+            if (is_inside(s, c, k)) {
+                sum = vec3_add(sum, rest_moment(s, c, k, &one));
+                bending += one;
+            }
+        return bending > 0 ? vec3_scale(sum, 1 / bending) : sum;
+    }
+    CoaxialInput in = c + 1 == s->first_free ? mouth_input(s, tool) : input_at(s, c, tool);
+    CoaxialOutput out;
+    coaxial_element(&in, &out);
+    sum = vec3_negate(out.end_moment[0]);
+    for (int i = 0; i < in.count; i++) {
+        sum = vec3_add(sum, rest_moment(s, c, tool[i], &one));
+        bending += one;
+    }
+    return vec3_scale(sum, 1 / bending);
+}
+
+// [N] what a length of tool k more adds to the energy at the distal end of element c, where the moment m there stays (coaxial.c: -V):
+// EI_k k_k^2 / 2 - |m + c|^2 / (2 B) with it, + |m + c'|^2 / (2 B') without.
+static double cost_of_length(const Stepper *s, int c, int k)
+{
+    int tool[STEP_TOOLS_MAX];
+    CoaxialInput in = input_at(s, c, tool);
+    CoaxialOutput out;
+    coaxial_element(&in, &out);
+    double bending = 0, own = 0;
+    Vec3 with = out.end_moment[1], mine = vec3(0, 0, 0);
+    for (int i = 0; i < in.count; i++) {
+        const CoaxialSpan *p = &in.span[i];
+        if (p->has_tip)
+            continue;
+        const CoaxialSection *section = section_at(p->tool, p->s2 - JUST_BEFORE);
+        Quat q = quat_mul(in.q2, quat_from_rotation_vector(vec3(p->phi2, 0, 0)));
+        Vec3 rest = vec3_scale(quat_rotate(q, vec3(0, -section->curve[1], section->curve[0])), section->bending);
+        with = vec3_add(with, rest);
+        bending += section->bending;
+        if (tool[i] == k) {
+            mine = rest;
+            own = section->bending;
+        }
+    }
+    Vec3 without = vec3_sub(with, mine);
+    return 0.5 * (vec3_norm2(mine) / own - vec3_norm2(with) / bending + vec3_norm2(without) / (bending - own));
+}
+
+// Tool k's last node inside lies past its tip by a little: what the element before it has too much of the tool is taken off. [mJ]; *force [N]: its slope with S
+// at that node, less.
+static double short_of_node(const Stepper *s, int k, double *force)
+{
+    const Tool *t = &s->tool[k];
+    int last = t->inside - 1;
+    *force = 0;
+    if (last < 1 || t->first < t->wire.node_count)
+        return 0;
+    double lacks = slide_at(s, last, k) - t->wire.total_length;
+    if (!(lacks > 0))
+        return 0;
+    *force = last < s->first_free ? straightening(t, t->wire.total_length - JUST_BEFORE) : cost_of_length(s, last - 1, k);
+    return -lacks * *force;
+}
+
+static void tips_short_of_nodes(Stepper *s)
+{
+    for (int k = 1; k < s->tool_count; k++) {
+        double force;
+        short_of_node(s, k, &force);
+        if (force > 0)
+            s->b[row_of(s, s->tool[k].inside - 1) + (size_t)unknown_of(k)] += force;
+    }
+}
+
+// --- all of it ---
+
+void tools_assemble(Stepper *s, double scale, double inertia)
+{
+    int nodes = s->state.node_count;
+    Local local;
+    memset(s->chain.diag, 0, block_of(s, nodes) * sizeof(double));
+    memset(s->chain.lower, 0, block_of(s, nodes - 1) * sizeof(double));
+    memset(s->b, 0, row_of(s, nodes) * sizeof(double));
+    for (int c = 0; c < nodes; c++)
+        node_inertia(s, c, inertia);
+    for (int c = 0; c + 1 < nodes; c++) {
+        if (c + 1 < s->first_free) {
+            clear(&local, s->chain.size);
+            sheath_element_of_tools(s, c, scale, &local);
+        } else if (c + 1 == s->first_free) {
+            mouth_element_of_tools(s, scale, &local);
+        } else {
+            free_element(s, c, scale, &local);
+        }
+        add_to_chain(s, c, &local);
+    }
+    tips_short_of_nodes(s);
+    static const int lateral[4] = {1, 2, 4, 5};
+    for (int c = 0; c < s->first_free; c++)
+        for (int i = 0; i < 4; i++)
+            stepper_prescribe(s, c, lateral[i], 0);
+}
+
+void tools_constrain(Stepper *s)
+{
+    for (int c = 0; c < s->chain.count; c++)
+        for (int k = 1; k < s->tool_count; k++)
+            for (int i = 0; !is_inside(s, c, k) && i < 2; i++)
+                stepper_prescribe(s, c, unknown_of(k) + i, 0);
+    for (int k = 1; k < s->tool_count; k++) {
+        const Tool *t = &s->tool[k], *out = &s->tool[0];
+        if (!is_inside(s, 0, k))
+            continue;
+        double hub = s->state.inserted + s->command.advance - out->wire.total_length;
+        double slide = t->wire.total_length - t->inserted - s->tool_command[k].advance + hub;
+        double angle = t->twist + s->tool_command[k].twist - (s->state.twist + s->command.twist);
+        if (s->tool_slips[k])
+            s->b[unknown_of(k)] -= s->tool_slips[k] * t->hand_limit;
+        else
+            stepper_prescribe(s, 0, unknown_of(k), slide - s->start_slide[k - 1]);
+        stepper_prescribe(s, 0, unknown_of(k) + 1, angle - s->start_angle[k - 1]);
+    }
+}
+
+double tools_elastic_energy(const Stepper *s)
+{
+    double energy = 0;
+    int tool[STEP_TOOLS_MAX];
+    double force;
+    for (int k = 1; k < s->tool_count; k++)
+        energy += short_of_node(s, k, &force);
+    // behind the hub all tools lie straight in the hands
+    for (int k = 1; s->first_free > 0 && k < s->tool_count; k++)
+        energy += straightened(&s->tool[k], 0, slide_at(s, 0, k));
+    for (int c = 0; c + 1 < s->state.node_count; c++) {
+        if (c + 1 < s->first_free) {
+            energy += sheath_element_of_tools(s, c, 1, NULL);
+        } else if (c + 1 == s->first_free) {
+            CoaxialInput in = mouth_input(s, tool);
+            CoaxialOutput out;
+            coaxial_element(&in, &out);
+            energy += out.energy;
+            for (int i = 0; i < in.count; i++) {
+                double from = s->carrier[c] == tool[i] ? s->wire.s[c] : slide_at(s, c, tool[i]);
+                energy += straightened(&s->tool[tool[i]], from, in.span[i].s1) - straightened(&s->tool[tool[i]], in.span[i].s1, from);
+            }
+        } else if (is_plain(s, c)) {
+            BeamInput in = plain_input(s, c);
+            BeamOutput out;
+            beam_element(&in, &out);
+            energy += out.energy;
+        } else {
+            CoaxialInput in = input_at(s, c, tool);
+            CoaxialOutput out;
+            coaxial_element(&in, &out);
+            energy += out.energy;
+        }
+    }
+    return energy;
+}
+
+void tools_report(Stepper *s)
+{
+    StepReport *r = &s->report;
+    r->push[0] = r->proximal_force;
+    r->torque[0] = r->proximal_torque;
+    for (int k = 1; k < s->tool_count; k++) {
+        if (!is_inside(s, 0, k))
+            continue;
+        // S falls as the hand pushes; the outermost tool's node 0 carries them along
+        r->push[k] = -stepper_reaction(s, unknown_of(k));
+        r->torque[k] = stepper_reaction(s, unknown_of(k) + 1);
+        r->push[0] -= r->push[k];
+        r->torque[0] -= r->torque[k];
+    }
+    r->proximal_force = r->push[0];
+    r->proximal_torque = r->torque[0];
+}
+
+double tools_stiffness_damping(const Stepper *s)
+{
+    int n = s->chain.size;
+    double work = 0, scale = 1 + s->damping_stiffness / s->dt;
+    Local with, without;
+    for (int c = 0; c + 1 < s->state.node_count; c++) {
+        const double *done[2] = {s->linearised + row_of(s, c), s->linearised + row_of(s, c + 1)};
+        for (int i = 0; i < 2; i++) {
+            Local *local = i ? &with : &without;
+            if (c + 1 < s->first_free) {
+                clear(local, n);
+                sheath_element_of_tools(s, c, i ? scale : 1, local);
+            } else if (c + 1 == s->first_free) {
+                mouth_element_of_tools(s, i ? scale : 1, local);
+            } else {
+                free_element(s, c, i ? scale : 1, local);
+            }
+        }
+        for (int r = 0; r < 2 * n; r++)
+            for (int k = 0; k < 2 * n; k++)
+                work += done[r / n][r % n] * (with.tangent[r][k] - without.tangent[r][k]) * done[k / n][k % n];
+    }
+    return work;
+}
+
+// --- hands ---
+
+bool tools_misjudges_grip(Stepper *s, int k)
+{
+    Tool *t = &s->tool[k];
+    int was = s->tool_slips[k], at = unknown_of(k);
+    if (t->hand_limit == 0 || !is_inside(s, 0, k))
+        return false;
+    double push = -stepper_reaction(s, at), hub = s->state.inserted + s->command.advance - s->tool[0].wire.total_length;
+    double wanted = t->wire.total_length - t->inserted - s->tool_command[k].advance + hub - s->start_slide[k - 1];
+    if (was == 0 && fabs(push) > t->hand_limit)
+        s->tool_slips[k] = push > 0 ? 1 : -1;
+    else if (was != 0 && was * (wanted - s->u[at]) > 0)
+        s->tool_slips[k] = 0;
+    return s->tool_slips[k] != was;
+}
+
+void tools_feed(Stepper *s)
+{
+    for (int k = 1; k < s->tool_count; k++) {
+        Tool *t = &s->tool[k];
+        StepCommand *command = &s->tool_command[k];
+        if (!isfinite(command->advance) || !isfinite(command->twist))
+            *command = (StepCommand){0};
+        s->tool_slips[k] = 0;
+        // its proximal end stays behind the hub, its tip beyond it
+        const Tool *out = &s->tool[0];
+        double hub = s->state.inserted + s->command.advance - out->wire.total_length;
+        double most = t->wire.total_length + hub - t->inserted, least = hub - t->inserted;
+        if (command->advance > most || command->advance < least)
+            s->report.flags |= command->advance > most ? STEP_FULLY_INSERTED : STEP_FULLY_WITHDRAWN;
+        command->advance = fmin(most, fmax(least, command->advance));
+    }
+    tools_pass(s);
+}
+
+void tools_move(Stepper *s, double part)
+{
+    for (int c = 0; c < s->state.node_count; c++)
+        for (int k = 1; k < s->tool_count; k++) {
+            if (!is_inside(s, c, k))
+                continue;
+            int at = unknown_of(k), i = c * s->state.inner_count + k - 1;
+            const double *u = s->u + row_of(s, c) + at;
+            double *done = s->linearised + row_of(s, c) + at;
+            done[0] = part < 1 ? done[0] + part * (u[0] - done[0]) : u[0];
+            done[1] = part < 1 ? done[1] + part * (u[1] - done[1]) : u[1];
+            s->state.slide[i] = s->start_slide[i] + done[0];
+            s->state.angle[i] = s->start_angle[i] + done[1];
+        }
+}
+
+void tools_set_velocities(Stepper *s)
+{
+    WireState *w = &s->state;
+    for (int c = 0; c < w->node_count; c++) {
+        Vec3 t = c < s->first_free ? s->axis[0] : quat_rotate(s->start_orientation[c], vec3(1, 0, 0));
+        for (int k = 1; k < s->tool_count; k++) {
+            if (!is_inside(s, c, k))
+                continue;
+            const double *u = s->linearised + row_of(s, c) + unknown_of(k);
+            int i = c * w->inner_count + k - 1;
+            w->slide_velocity[i] = vec3_dot(w->velocity[c], t) - u[0] / s->dt;
+            w->slide_spin[i] = vec3_dot(w->spin[c], t) + u[1] / s->dt;
+        }
+    }
+}
+
+// What tool k's hand has moved by in this step, along (0) and about (1) the line.
+static double hand_moved(const Stepper *s, int k, int which)
+{
+    const double *u = s->linearised;
+    return which == 0 ? u[0] - u[unknown_of(k)] : u[3] + u[unknown_of(k) + 1];
+}
+
+double tools_hand_work(const Stepper *s, int k)
+{
+    if (!is_inside(s, 0, k))
+        return 0;
+    return s->report.push[k] * hand_moved(s, k, 0) + s->report.torque[k] * hand_moved(s, k, 1);
+}
+
+void tools_count_commands(Stepper *s)
+{
+    for (int k = 1; k < s->tool_count; k++) {
+        Tool *t = &s->tool[k];
+        t->inserted += s->tool_command[k].advance;
+        t->twist += s->tool_command[k].twist;
+        if (!is_inside(s, 0, k))
+            continue;
+        // where it is in fact, cut or slipped
+        double hub = s->state.inserted - s->tool[0].wire.total_length, actual = t->wire.total_length + hub - slide_at(s, 0, k);
+        if (s->tool_slips[k])
+            s->report.flags |= STEP_HAND_SLIPS;
+        if (s->tool_slips[k] || (s->report.flags & STEP_LIMITED)) {
+            t->inserted = actual;
+            t->twist = s->state.twist + angle_at(s, 0, k);
+        }
+    }
+}

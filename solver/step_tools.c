@@ -1,0 +1,389 @@
+// Coaxial tools on one chain of nodes. The chain's nodes are those of the outermost tool from its hub to its tip, then those of the next that reaches
+// further, and so on: a node belongs to its carrier. Where a tool lies inside another its place at a node is two unknowns, material coordinate and angle.
+// As tools slide, nodes come and go at the tips (where a tool leaves the one around it), and unknowns where an inner tip passes a node.
+#include "solver/step_tools.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+// A node that has left the tip around it joins the chain at this share of its element from it, and leaves the chain nearer than that.
+static const double JOIN = 0.05, LEAVE = 0.04;
+// A tip that ended past its element's end would be cut there, so it passes the node this share of the element early, and on the way back late: more than
+// strain and friction keep it from where the hands would have it. What it lacks up to the node is taken off again (tips_short_of_nodes()).
+static const double EARLY = 0.01;
+
+// --- creation ---
+
+static bool make_tool(Tool *t, const WireOptions *o, char *why, int capacity)
+{
+    if (!wire_create(&t->wire, o, why, capacity))
+        return false;
+    size_t e = (size_t)t->wire.element_count, padded = e + 1 + BEAM_PADDING;
+    int sections = o->section_count;
+    t->rest_memory = calloc(BEAM_REST_ARRAYS * padded, sizeof *t->rest_memory);
+    t->section = calloc((size_t)sections, sizeof *t->section);
+    t->line_mass = calloc(2 * (size_t)sections, sizeof *t->line_mass);
+    t->slot_start = calloc(e + 1, sizeof *t->slot_start);
+    if (!t->rest_memory || !t->section || !t->line_mass || !t->slot_start)
+        return false;
+    t->line_inertia = t->line_mass + sections;
+    double *at = t->rest_memory;
+    double **array[] = {&t->rest.length, &t->rest.extend, &t->rest.axial, &t->rest.near, &t->rest.far, &t->rest.twist, &t->rest.half_w, &t->rest.half_y,
+                        &t->rest.half_z, &t->rest.curvature, &t->rest.bending, &t->rest.shear};
+    for (size_t k = 0; k < sizeof array / sizeof *array; k++, at += padded)
+        *array[k] = at;
+    wire_rest(&t->wire, o, &t->rest);
+    double end = 0;
+    for (int i = 0; i < sections; i++) {
+        const WireSection *section = &o->section[i];
+        WireStiffness stiffness = wire_stiffness(section);
+        end += section->length;
+        t->section[i] = (CoaxialSection){end, stiffness.bending, stiffness.axial, stiffness.torsion, stiffness.shear,
+                                         {section->rest_curvature * cos(section->rest_plane), section->rest_curvature * sin(section->rest_plane)}};
+        t->line_mass[i] = stiffness.line_mass;
+        t->line_inertia[i] = stiffness.line_inertia;
+    }
+    t->coaxial = (CoaxialTool){sections, t->section};
+    for (size_t i = 0; i < e; i++)
+        t->slot_start[i + 1] = t->slot_start[i] + slot_count_of(t->wire.length[i]);
+    t->slot = calloc((size_t)t->slot_start[e] + 1, sizeof *t->slot);
+    for (size_t i = 0; t->slot && i < e; i++) {
+        const WireSection *section = &o->section[t->wire.section[i]];
+        int count = t->slot_start[i + 1] - t->slot_start[i];
+        for (int k = 0; k < count; k++)
+            t->slot[t->slot_start[i] + k] = slot_make((int)i, t->wire.length[i], k, count, section->diameter / 2, section->friction);
+    }
+    t->hand_limit = o->hand_limit;
+    t->inserted = fmin(o->inserted, t->wire.total_length);
+    return t->slot != NULL;
+}
+
+bool tools_create(Stepper *s, const StepperOptions *o, char *why, int capacity)
+{
+    why[0] = '\0';
+    for (int k = 0; k < s->tool_count; k++) {
+        WireOptions own = k == 0 ? o->wire : o->inner[k - 1];
+        if (k > 0)       // where it stands and how it is held is the outermost's
+            own.has_sheath = true, own.fix_count = own.load_count = 0, own.start = own.normal = vec3(0, 0, 0), own.direction = vec3(1, 0, 0);
+        if (k == 0 && !own.has_sheath)
+            own.inserted = wire_length(&own);
+        if (!make_tool(&s->tool[k], &own, why, capacity))
+            return false;
+        s->capacity += s->tool[k].wire.node_count;
+        s->slot_count += s->tool[k].slot_start[s->tool[k].wire.element_count];
+        const Tool *around = &s->tool[k > 0 ? k - 1 : 0], *t = &s->tool[k];
+        if (t->wire.total_length - t->inserted < around->wire.total_length - around->inserted - 1e-9) {
+            snprintf(why, (size_t)capacity, "tool %d is too short: its proximal end would lie %g mm inside the hub of the tool around it; it must not", k + 1,
+                     around->wire.total_length - around->inserted - (t->wire.total_length - t->inserted));
+            return false;
+        }
+    }
+    return true;
+}
+
+void tools_destroy(Stepper *s)
+{
+    for (int k = 0; k < s->tool_count; k++) {
+        wire_destroy(&s->tool[k].wire);
+        free(s->tool[k].rest_memory);
+        free(s->tool[k].section);
+        free(s->tool[k].line_mass);
+        free(s->tool[k].slot);
+        free(s->tool[k].slot_start);
+    }
+}
+
+// --- the chain ---
+
+static void chain_node(Stepper *s, int c, int k, int j)
+{
+    const Tool *t = &s->tool[k];
+    Wire *w = &s->wire;
+    s->carrier[c] = k;
+    s->own[c] = j;
+    w->s[c] = t->wire.s[j];
+    w->mass[c] = t->wire.mass[j];
+    w->inertia_axial[c] = t->wire.inertia_axial[j];
+    w->inertia_lateral[c] = t->wire.inertia_lateral[j];
+    w->radius[c] = t->wire.radius[j];
+    w->friction[c] = t->wire.friction[j];
+}
+
+// The element before chain node c.
+static void chain_element(Stepper *s, int c, int k, int j)
+{
+    const Tool *t = &s->tool[k];
+    s->wire.length[c] = t->wire.length[j];
+    s->wire.section[c] = t->wire.section[j];
+    const BeamRest *from = &t->rest;
+    BeamRest *to = &s->beam.rest;
+    to->length[c] = from->length[j], to->extend[c] = from->extend[j], to->axial[c] = from->axial[j], to->near[c] = from->near[j], to->far[c] = from->far[j];
+    to->twist[c] = from->twist[j], to->half_w[c] = from->half_w[j], to->half_y[c] = from->half_y[j], to->half_z[c] = from->half_z[j];
+    to->curvature[c] = from->curvature[j], to->bending[c] = from->bending[j], to->shear[c] = from->shear[j];
+    int first = s->slot_start[c], count = t->slot_start[j + 1] - t->slot_start[j];
+    for (int i = 0; i < count; i++) {
+        s->slot[first + i] = t->slot[t->slot_start[j] + i];
+        s->slot[first + i].element = c;
+    }
+    s->slot_start[c + 1] = first + count;
+}
+
+// What the chain is made of, from where each tool begins to carry it.
+void tools_chain(Stepper *s)
+{
+    int c = 0;
+    s->slot_start[0] = 0;
+    for (int k = 0; k < s->tool_count; k++) {
+        Tool *t = &s->tool[k];
+        t->start = c;
+        for (int j = t->first; j < t->wire.node_count; j++, c++) {
+            chain_node(s, c, k, j);
+            if (c > 0)
+                chain_element(s, c - 1, k, j - 1);
+        }
+    }
+    s->wire.node_count = s->state.node_count = s->chain.count = c;
+    s->wire.element_count = c - 1;
+    s->wire.total_length = s->tool[0].wire.total_length;
+    s->slot_count = s->slot_start[c - 1];
+    s->point_count = c + s->slot_count;
+    for (int k = 1; k < s->tool_count; k++)
+        if (tools_carries(&s->tool[k]))
+            s->tool[k].inside = s->tool[k].start;
+}
+
+void tools_place(Stepper *s)
+{
+    double tip = s->tool[0].inserted;
+    s->tool[0].first = 0;
+    for (int k = 1; k < s->tool_count; k++) {
+        Tool *t = &s->tool[k];
+        double behind = t->wire.total_length - t->inserted;
+        t->first = t->wire.node_count;
+        if (!(t->inserted > tip))
+            continue;
+        for (int j = t->wire.node_count - 1; j > 0 && t->wire.s[j] - behind > tip + JOIN * t->wire.length[j - 1]; j--)
+            t->first = j;
+        tip = t->inserted;
+    }
+    tools_chain(s);
+    for (int c = 0; c < s->state.node_count; c++) {
+        const Tool *own = &s->tool[s->carrier[c]];
+        double x = s->wire.s[c] - own->wire.total_length + own->inserted;
+        s->state.position[c] = vec3_add_scaled(s->mouth, x, s->axis[0]);
+        s->state.orientation[c] = s->line;
+        for (int k = 1; k < s->tool_count; k++)
+            s->state.slide[c * s->state.inner_count + k - 1] = s->tool[k].wire.total_length - s->tool[k].inserted + x;
+    }
+    for (int k = 1; k < s->tool_count; k++) {
+        Tool *t = &s->tool[k];
+        for (t->inside = 0; t->inside < (tools_carries(t) ? t->start : s->state.node_count); t->inside++)
+            if (s->state.slide[t->inside * s->state.inner_count + k - 1] >= t->wire.total_length)
+                break;
+    }
+}
+
+// --- nodes that come and go ---
+
+static void open_gap(void *base, size_t size, int count, int at, int gap)
+{
+    char *p = (char *)base + (size_t)at * size;
+    memmove(p + (size_t)gap * size, p, (size_t)(count - at) * size);
+    memset(p, 0, (size_t)gap * size);
+}
+
+static void close_gap(void *base, size_t size, int count, int at, int gap)
+{
+    char *p = (char *)base + (size_t)at * size;
+    memmove(p, p + (size_t)gap * size, (size_t)(count - at - gap) * size);
+}
+
+// Makes room for chain node c, or takes it out; its element is the one before it. Arrays of points hold the nodes, then the slots.
+static void shift(Stepper *s, int c, int slots, bool opens)
+{
+    WireState *w = &s->state;
+    int nodes = w->node_count, points = s->point_count, first = nodes + s->slot_start[c - 1];
+    size_t inner = (size_t)w->inner_count * sizeof(double);
+    struct {
+        void *base;
+        size_t size;
+    } by_node[] = {{w->position, sizeof(Vec3)}, {w->orientation, sizeof(Quat)}, {w->velocity, sizeof(Vec3)}, {w->spin, sizeof(Vec3)},
+                   {w->slide, inner}, {w->angle, inner}, {w->slide_velocity, inner}, {w->slide_spin, inner}},
+      by_point[] = {{s->force, sizeof(Vec3)}, {s->clearance, sizeof(double)}, {s->met, sizeof(WallMet)}, {s->place, sizeof(VesselMemory)}};
+    for (size_t i = 0; i < sizeof by_node / sizeof *by_node; i++)
+        (opens ? open_gap : close_gap)(by_node[i].base, by_node[i].size, nodes, c, 1);
+    for (size_t i = 0; i < sizeof by_point / sizeof *by_point; i++) {
+        if (opens) {
+            open_gap(by_point[i].base, by_point[i].size, points, first, slots);
+            open_gap(by_point[i].base, by_point[i].size, points + slots, c, 1);
+        } else {
+            close_gap(by_point[i].base, by_point[i].size, points, first, slots);
+            close_gap(by_point[i].base, by_point[i].size, points - slots, c, 1);
+        }
+    }
+}
+
+static int slots_of(const Tool *t, int element) { return t->slot_start[element + 1] - t->slot_start[element]; }
+
+static double *slide_at(const Stepper *s, int c, int k) { return &s->state.slide[c * s->state.inner_count + k - 1]; }
+static double *angle_at(const Stepper *s, int c, int k) { return &s->state.angle[c * s->state.inner_count + k - 1]; }
+
+// Node c joins the chain behind node c - 1, which is the tip around it, at a distance d [mm] along the curve there.
+static void join(Stepper *s, int k, double d)
+{
+    Tool *t = &s->tool[k];
+    WireState *w = &s->state;
+    bool carries = tools_carries(t);
+    int c = carries ? t->start : 0, j = carries ? t->first - 1 : t->wire.node_count - 1;
+    if (!carries)       // behind all that carry before it
+        for (c = w->node_count; c > 0 && s->carrier[c - 1] > k; c--)
+            ;
+    int before = c - 1;
+    Vec3 curvature = stepper_curvature(s, before);
+    Vec3 tangent = quat_rotate(w->orientation[before], vec3(1, 0, 0)), moved = vec3_add_scaled(vec3_scale(tangent, d), 0.5 * d * d, vec3_cross(curvature, tangent));
+    double phi = *angle_at(s, before, k);
+    shift(s, c, slots_of(t, j - 1), true);
+    w->position[c] = vec3_add(w->position[before], moved);
+    Quat turned = quat_mul(w->orientation[before], quat_from_rotation_vector(vec3(phi, 0, 0)));
+    w->orientation[c] = quat_unit(quat_mul(quat_from_rotation_vector(vec3_scale(curvature, d)), turned));
+    // its material moves as it did inside
+    int i = before * w->inner_count + k - 1;
+    w->velocity[c] = vec3_add_scaled(w->velocity[before], w->slide_velocity[i] - vec3_dot(w->velocity[before], tangent), tangent);
+    w->spin[c] = vec3_add_scaled(w->spin[before], w->slide_spin[i] - vec3_dot(w->spin[before], tangent), tangent);
+    for (int m = k + 1; m < s->tool_count; m++) {
+        *slide_at(s, c, m) = *slide_at(s, before, m) + d;
+        *angle_at(s, c, m) = *angle_at(s, before, m) - phi;
+        w->slide_velocity[c * w->inner_count + m - 1] = w->slide_velocity[before * w->inner_count + m - 1];
+        w->slide_spin[c * w->inner_count + m - 1] = w->slide_spin[before * w->inner_count + m - 1];
+        if (!tools_carries(&s->tool[m]) && s->tool[m].inside > before)
+            s->tool[m].inside++;
+    }
+    t->first = j;
+    tools_chain(s);
+    stepper_forget(s, c);
+}
+
+static void leave(Stepper *s, int k)
+{
+    Tool *t = &s->tool[k];
+    int c = t->start;
+    shift(s, c, slots_of(t, t->first - 1), false);
+    for (int m = k + 1; m < s->tool_count; m++)
+        if (!tools_carries(&s->tool[m]) && s->tool[m].inside > c)
+            s->tool[m].inside--;
+    t->first++;
+    t->inside = c;
+    tools_chain(s);
+}
+
+// Tool k at the tip around it, where its material moves on by `ahead` [mm] in this step.
+static void pass_tip(Stepper *s, int k, double ahead)
+{
+    Tool *t = &s->tool[k];
+    for (;;) {
+        bool carries = tools_carries(t);
+        int tip = carries ? t->start - 1 : s->state.node_count - 1, j = carries ? t->first - 1 : t->wire.node_count - 1;
+        if (!carries)
+            for (; tip > 0 && s->carrier[tip] > k; tip--)
+                ;
+        if (t->inside <= tip && !carries)
+            return;          // its tip is behind
+        double out = *slide_at(s, tip, k), at = out - ahead;
+        if (j > 0 && t->wire.s[j] - at > JOIN * t->wire.length[j - 1])
+            join(s, k, t->wire.s[j] - out);
+        else if (carries && t->wire.s[t->first] - at < LEAVE * t->wire.length[t->first - 1])
+            leave(s, k);
+        else
+            return;
+    }
+}
+
+// The inner tip of tool k passes nodes.
+static void pass_nodes(Stepper *s, int k, double ahead)
+{
+    Tool *t = &s->tool[k];
+    WireState *w = &s->state;
+    while (!tools_carries(t)) {
+        int last = t->inside - 1;
+        double early = EARLY * s->wire.length[last > 0 ? last - 1 : 0] + fabs(ahead);
+        if (last > 0 && *slide_at(s, last, k) - ahead >= t->wire.total_length + 2 * early) {
+            t->inside--;
+            continue;
+        }
+        if (last < 0 || t->inside >= w->node_count || s->carrier[t->inside] > k)
+            return;
+        double length = tools_span_length(s, last), next = *slide_at(s, last, k) + length;
+        if (next - ahead >= t->wire.total_length + early)
+            return;
+        *slide_at(s, t->inside, k) = next;
+        // untwisted: turned against the node by what the carrier is twisted
+        *angle_at(s, t->inside, k) = *angle_at(s, last, k) - tools_twist(s, last);
+        w->slide_velocity[t->inside * w->inner_count + k - 1] = w->slide_velocity[last * w->inner_count + k - 1];
+        w->slide_spin[t->inside * w->inner_count + k - 1] = w->slide_spin[last * w->inner_count + k - 1];
+        t->inside++;
+    }
+}
+
+void tools_pass(Stepper *s)
+{
+    for (int k = 1; k < s->tool_count; k++) {
+        double ahead = s->tool_command[k].advance - s->tool_command[0].advance;
+        pass_nodes(s, k, ahead);
+        pass_tip(s, k, ahead);
+    }
+}
+
+// --- questions ---
+
+int stepper_node_capacity(const Stepper *s) { return s->tool_count > 1 ? s->capacity : s->state.node_count; }
+
+int stepper_tool_count(const Stepper *s) { return s->tool_count; }
+
+double stepper_tool_inserted(const Stepper *s, int tool) { return s->tool_count > 1 && tool > 0 ? s->tool[tool].inserted : s->state.inserted; }
+
+static bool lies_at(const Stepper *s, int c, int k) { return s->carrier[c] == k || c < s->tool[k].inside; }
+static double material_at(const Stepper *s, int c, int k) { return s->carrier[c] == k ? s->wire.s[c] : *slide_at(s, c, k); }
+static double turned_at(const Stepper *s, int c, int k) { return s->carrier[c] == k ? 0 : *angle_at(s, c, k); }
+
+static void between_nodes(const Stepper *s, int c, int k, double at, ToolNode *node)
+{
+    const WireState *w = &s->state;
+    double s1 = material_at(s, c, k), span = c + 1 < w->node_count && lies_at(s, c + 1, k) ? material_at(s, c + 1, k) - s1 : tools_span_length(s, c);
+    double xi = fmin(1, fmax(0, (at - s1) / span)), phi1 = turned_at(s, c, k), phi2 = c + 1 < w->node_count && lies_at(s, c + 1, k) ? turned_at(s, c + 1, k) : phi1;
+    Vec3 t1 = quat_rotate(w->orientation[c], vec3(1, 0, 0)), t2 = quat_rotate(w->orientation[c + 1], vec3(1, 0, 0));
+    Slot slot = slot_shifted(&(Slot){.element = c}, span, xi);
+    node->position = slot_place(&slot, span, w->position[c], t1, w->position[c + 1], t2).position;
+    Quat a = quat_mul(w->orientation[c], quat_from_rotation_vector(vec3(phi1, 0, 0))), b = quat_mul(w->orientation[c + 1], quat_from_rotation_vector(vec3(phi2, 0, 0)));
+    double same = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0 ? -1 : 1;
+    node->orientation = quat_unit((Quat){a.w + xi * (same * b.w - a.w), a.x + xi * (same * b.x - a.x), a.y + xi * (same * b.y - a.y), a.z + xi * (same * b.z - a.z)});
+    node->carrier = c + 1 < s->first_free ? -1 : s->carrier[c + 1];
+}
+
+int stepper_tool_nodes(const Stepper *s, int k, ToolNode *node)
+{
+    const WireState *w = &s->state;
+    const Wire *own = s->tool_count > 1 ? &s->tool[k].wire : &s->wire;
+    if (!node)
+        return own->node_count;
+    int c = 0;
+    for (int j = 0; j < own->node_count; j++) {
+        node[j] = (ToolNode){.s = own->s[j], .radius = own->radius[j]};
+        if (s->tool_count == 1) {
+            node[j].position = w->position[j];
+            node[j].orientation = w->orientation[j];
+            node[j].carrier = j < s->first_free ? -1 : 0;
+            continue;
+        }
+        double first = material_at(s, 0, k);
+        if (own->s[j] <= first) {
+            node[j].position = vec3_add_scaled(w->position[0], own->s[j] - first, quat_rotate(w->orientation[0], vec3(1, 0, 0)));
+            node[j].orientation = quat_mul(w->orientation[0], quat_from_rotation_vector(vec3(turned_at(s, 0, k), 0, 0)));
+            node[j].carrier = -1;
+            continue;
+        }
+        while (c + 2 < w->node_count && lies_at(s, c + 1, k) && material_at(s, c + 1, k) < own->s[j])
+            c++;
+        between_nodes(s, c, k, own->s[j], &node[j]);
+    }
+    return own->node_count;
+}

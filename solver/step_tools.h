@@ -1,0 +1,44 @@
+// Coaxial tools of a stepper: internal to solver. See step_tools.c and step_coaxial.c.
+#ifndef SELDINGER_SOLVER_STEP_TOOLS_H
+#define SELDINGER_SOLVER_STEP_TOOLS_H
+
+#include "solver/step_internal.h"
+
+#include <stdio.h>
+
+// Makes the tools, and says how many nodes and slots a chain of them has at most (capacity, slot_count).
+bool tools_create(Stepper *s, const StepperOptions *options, char *why, int capacity);
+void tools_destroy(Stepper *s);
+// All straight on the line, each as far in as it is told.
+void tools_place(Stepper *s);
+// The chain anew, after a tool's `first` has changed.
+void tools_chain(Stepper *s);
+// Nodes and unknowns come and go, by where the commands of this step will have moved the tools.
+void tools_pass(Stepper *s);
+static inline bool tools_carries(const Tool *t) { return t->first < t->wire.node_count; }
+
+// [mm] rest length of the chain's element c; [rad] its twist.
+double tools_span_length(const Stepper *s, int c);
+double tools_twist(const Stepper *s, int c);
+// [1/mm] of the tools together at node c, distal of it, as a vector along the axis of turning.
+Vec3 stepper_curvature(const Stepper *s, int c);
+
+// A step's commands, clamped to what is there, and the nodes that come and go by them.
+void tools_feed(Stepper *s);
+bool tools_misjudges_grip(Stepper *s, int tool);
+void tools_move(Stepper *s, double part);
+void tools_set_velocities(Stepper *s);
+void tools_count_commands(Stepper *s);
+double tools_hand_work(const Stepper *s, int tool);
+double tools_stiffness_damping(const Stepper *s);
+
+// The linear system of coaxial tools, all but what contacts, loads and constraints add.
+void tools_assemble(Stepper *s, double scale, double inertia);
+// What the hands prescribe at node 0, and unit rows where a tool is no unknown.
+void tools_constrain(Stepper *s);
+double tools_elastic_energy(const Stepper *s);
+double tools_kinetic_energy(const Stepper *s);
+// Forces of the hands, from the rows of node 0.
+void tools_report(Stepper *s);
+
+#endif

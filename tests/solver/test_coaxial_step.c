@@ -1,0 +1,353 @@
+// Coaxial tools in the stepper: exact references reached by moving hands, what comes and goes at tips, tools in a tube, save and restore.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "tube_scene.h"
+
+// A tube or rod of this bending stiffness [N mm2], whatever its material.
+static WireSection tube_section(double length, double bending, double curvature, double outer, double inner)
+{
+    double second = PI / 64 * (outer * outer * outer * outer - inner * inner * inner * inner);
+    return (WireSection){.length = length, .diameter = outer, .inner_diameter = inner, .young_modulus = bending / second, .poisson_ratio = 0.3,
+                         .density = 2e-3, .rest_curvature = curvature, .friction = -1};
+}
+
+typedef struct Coaxial {
+    WireSection section[3][2];
+    WireFix fix;
+    WireOptions inner[2];
+    StepperOptions options;
+    Stepper *stepper;
+} Coaxial;
+
+static WireOptions tool_options(const WireSection *section, int sections, int elements, double inserted)
+{
+    WireOptions o = wire_default_options();
+    o.section = section;
+    o.section_count = sections;
+    o.elements = elements;
+    o.inserted = inserted;
+    o.damping_mass = 0.5;
+    o.damping_stiffness = 5;
+    o.normal = vec3(0, 1, 0);
+    return o;
+}
+
+static void start(Coaxial *c, int inner_count, bool sheath)
+{
+    char why[256] = "";
+    c->fix = (WireFix){.s = 0, .dof = DOF_ALL};
+    WireOptions *w = &c->options.wire;
+    w->has_sheath = sheath;
+    if (!sheath) {
+        w->fix = &c->fix;
+        w->fix_count = 1;
+    }
+    c->options.inner_count = inner_count;
+    c->options.inner = c->inner;
+    c->stepper = stepper_create(&c->options, why, sizeof why);
+    if (!c->stepper)
+        print_message("%s\n", why);
+    assert_non_null(c->stepper);
+}
+
+static const StepReport *step_tools(Stepper *s, const StepCommand *command)
+{
+    step_feed_tools(s, command);
+    step_detect(s);
+    step_assemble(s);
+    step_factor(s);
+    step_contact(s);
+    step_correct(s);
+    return step_report(s);
+}
+
+// Tool k moves by a distance and a turn in so many steps, then all rest.
+static const StepReport *move_tool(Stepper *s, int k, double distance, double turn, int steps, int rest)
+{
+    StepCommand command[STEP_TOOLS_MAX] = {{0}}, none[STEP_TOOLS_MAX] = {{0}};
+    command[k] = (StepCommand){distance / steps, turn / steps};
+    for (int i = 0; i < steps; i++)
+        assert_true(!(step_tools(s, command)->flags & ~(unsigned)STEP_HAND_SLIPS));
+    const StepReport *r = step_report(s);
+    for (int i = 0; i < rest; i++)
+        r = step_tools(s, none);
+    return r;
+}
+
+// Reference 1 of issue 14: a straight wire of EI 40 in a clamped tube of EI 60 and curvature 0.05: 0.03 where both are.
+static void a_straight_wire_in_a_curved_tube(void **state)
+{
+    (void)state;
+    double error[2];
+    for (int fine = 0; fine < 2; fine++) {
+        int n = fine ? 60 : 20;
+        Coaxial c = {0};
+        c.section[0][0] = tube_section(60, 60, 0.05, 1, 0.8);
+        c.section[1][0] = tube_section(200, 40, 0, 0.5, 0);
+        c.options.wire = tool_options(c.section[0], 1, n, 0);
+        c.inner[0] = tool_options(c.section[1], 1, 3 * n, 0.5);
+        start(&c, 1, false);
+        const StepReport *r = move_tool(c.stepper, 1, 0, 0, 1, 400);
+        double least = HUGE_VAL, most = 0;
+        for (double d = 1.5; d < 30; d += 0.95) {
+            r = move_tool(c.stepper, 1, 0.95, 0, 20, 200);
+            least = fmin(least, r->push[1]);
+            most = fmax(most, r->push[1]);
+        }
+        r = move_tool(c.stepper, 1, 30 - stepper_tool_inserted(c.stepper, 1), 0, 10, 600);
+        Vec3 tip = stepper_state(c.stepper)->position[n];
+        error[fine] = vec3_distance(tip, vec3(23.953622, 39.793075, 0));
+        print_message("%d elements: push %.7f to %.7f N (0.03), tip %.2e mm off\n", n, least, most, error[fine]);
+        assert_true(least > 0.03 * (1 - 1e-4) && most < 0.03 * (1 + 1e-4));
+        stepper_destroy(c.stepper);
+    }
+    // what is left is the tools' own stretch
+    assert_true(error[1] < 2e-3);
+}
+
+// Reference 2: phi'' = c sin phi, phi'(L) = 0. At a base of 197.7856 degrees, L sqrt(c) = 2, the fold; below it, the tip turns with the base.
+static void turned_tubes_follow_up_to_the_fold(void **state)
+{
+    (void)state;
+    const double b1 = 60, b2 = 40, k = 0.05, nu = 0.3, L = 60;
+    double c0 = b1 * b2 / (b1 + b2) * k * k * ((1 + nu) / b1 + (1 + nu) / b2);
+    Coaxial c = {0};
+    c.section[0][0] = tube_section(L, b1, k, 1, 0.8);
+    c.section[1][0] = tube_section(L + 0.01, b2, k, 0.5, 0);
+    c.options.wire = tool_options(c.section[0], 1, 60, 0);
+    c.inner[0] = tool_options(c.section[1], 1, 60, L);
+    start(&c, 1, false);
+    move_tool(c.stepper, 1, 0, 0, 1, 800);
+    for (int turn = 60; turn <= 240; turn += 60) {
+        move_tool(c.stepper, 1, 0, PI / 3, 1500, 1500);
+        const WireState *w = stepper_state(c.stepper);
+        double tip = w->angle[60], phi = tip, slope = 0, h = L / 20000;
+        for (int i = 0; i < 20000; i++) {        // from the tip back
+            double mid = phi - 0.5 * h * slope, mid_slope = slope - 0.5 * h * c0 * sin(phi);
+            phi -= h * mid_slope;
+            slope -= h * c0 * sin(mid);
+        }
+        print_message("base %.3f degrees, tip %.4f: by the equation %.3f\n", w->angle[0] * 180 / PI, tip * 180 / PI, phi * 180 / PI);
+        assert_true(fabs(w->angle[0] - turn * PI / 180) < 1e-9);
+        assert_true(fabs(phi / w->angle[0] - 1) < 2e-3);
+    }
+    stepper_destroy(c.stepper);
+}
+
+// Reference 3: a J of EI 20 leaves a straight catheter of EI 60: 0, then -15 * 0.01 / 2 while the bend crosses the tip, then 0; there and back.
+static void a_bend_leaves_the_catheter(void **state)
+{
+    (void)state;
+    Coaxial c = {0};
+    c.section[0][0] = tube_section(60, 60, 0, 1, 0.8);
+    c.section[1][0] = tube_section(105, 20, 0, 0.5, 0);
+    c.section[1][1] = tube_section(15, 20, 0.1, 0.5, 0);
+    c.options.wire = tool_options(c.section[0], 1, 29, 0);
+    c.inner[0] = tool_options(c.section[1], 2, 61, 40);
+    start(&c, 1, false);
+    move_tool(c.stepper, 1, 0, 0, 1, 400);
+    Vec3 first = {0};
+    for (int round = 0; round < 3; round++) {
+        static const struct {
+            double at, push;
+        } stop[] = {{45, 0}, {52.41, 0}, {59, 0}, {61, -0.075}, {66.3, -0.075}, {74, -0.075}, {77, 0}, {79, 0}};
+        for (int i = 0; i < 16; i++) {
+            int k = i < 8 ? i : 15 - i;
+            double distance = stop[k].at - stepper_tool_inserted(c.stepper, 1);
+            const StepReport *r = move_tool(c.stepper, 1, distance, 0, 1 + (int)(fabs(distance) / 0.02), 400);
+            assert_true(fabs(r->push[1] - stop[k].push) < 2e-5);
+            assert_true(fabs(r->push[0] + stop[k].push) < 2e-5);
+            if (k != 7 || i > 7)
+                continue;
+            Vec3 tip = stepper_state(c.stepper)->position[stepper_state(c.stepper)->node_count - 1];
+            // 4 mm straight, then an arc of 1.5 rad
+            double off = vec3_distance(tip, vec3(64 + 10 * sin(1.5), 10 * (1 - cos(1.5)), 0));
+            print_message("round %d: tip %.2e mm off, %.1e from the first round's\n", round, off, round ? vec3_distance(tip, first) : 0);
+            assert_true(off < 2e-3 && (round == 0 || vec3_distance(tip, first) < 1e-6));
+            first = tip;
+        }
+    }
+    stepper_destroy(c.stepper);
+}
+
+// Out of the sheath: 0.1 N while the bend leaves straight into the open, 0.1 - 0.075 where it comes into the catheter; no energy from nowhere.
+static void tools_leave_the_sheath(void **state)
+{
+    (void)state;
+    Coaxial c = {0};
+    c.section[0][0] = tube_section(120, 60, 0, 1, 0.8);
+    c.section[1][0] = tube_section(165, 20, 0, 0.5, 0);
+    c.section[1][1] = tube_section(15, 20, 0.1, 0.5, 0);
+    c.options.wire = tool_options(c.section[0], 1, 57, 1);
+    c.inner[0] = tool_options(c.section[1], 2, 121, 1);
+    start(&c, 1, true);
+    const StepReport *r = move_tool(c.stepper, 1, 0, 0, 1, 600);
+    assert_true(fabs(r->push[0] - 0.075) < 1e-5 && fabs(r->push[1] + 0.1) < 1e-5);      // tips flush
+    StepEnergy before = stepper_energy(c.stepper);
+    double gained = 0, work = 0;
+    for (int i = 0; i < 5000; i++) {
+        StepCommand command[2] = {{0}};
+        if (i < 2000)
+            command[0].advance = command[1].advance = 0.01;
+        else if (i < 3500)
+            command[1] = (StepCommand){0.01, 0.001};
+        else
+            command[1].advance = -0.01;
+        r = step_tools(c.stepper, command);
+        assert_int_equal(r->flags, 0);
+        StepEnergy e = stepper_energy(c.stepper);
+        gained += fmax(0, e.elastic + e.kinetic - before.elastic - before.kinetic - e.hand + e.damping);
+        work += fabs(e.hand);
+        before = e;
+    }
+    print_message("work %.4f mJ, gained %.2e\n", work, gained);
+    assert_true(work > 0.1 && gained < 0.05 * work);
+    stepper_destroy(c.stepper);
+}
+
+static Vessel *winding_tube(void)
+{
+    TubePiece piece[] = {line_piece(20), arc_piece(15, 90, 0), line_piece(10), arc_piece(10, 90, 90), line_piece(30)};
+    return tube_of(piece, 5, 2);
+}
+
+static void three_in_a_tube(Coaxial *c, const Vessel *vessel)
+{
+    *c = (Coaxial){0};
+    c->section[0][0] = tube_section(150, 60, 0, 1.2, 1.0);
+    c->section[0][1] = tube_section(10, 20, 0.1, 1.2, 1.0);
+    c->section[1][0] = tube_section(200, 30, 0, 0.7, 0.5);
+    c->section[1][1] = tube_section(20, 5, 0.02, 0.7, 0.5);
+    c->section[2][0] = tube_section(220, 20, 0, 0.36, 0);
+    c->section[2][1] = tube_section(30, 1, 0.1, 0.36, 0);
+    c->options = (StepperOptions){.contact = contact_default_options(), .vessel = vessel, .wall_friction = 0.05};
+    c->options.wire = tool_options(c->section[0], 2, 80, 1);
+    c->options.wire.damping_stiffness = 0.2;
+    c->options.wire.damping_mass = 1e-3;
+    c->inner[0] = tool_options(c->section[1], 2, 100, 2);
+    c->inner[1] = tool_options(c->section[2], 2, 120, 3);
+    start(c, 2, true);
+}
+
+static void wire_first(int i, StepCommand *command)
+{
+    int phase = i / 500 % 4;
+    for (int k = 0; k < 3; k++)
+        command[k] = (StepCommand){0};
+    if (phase < 3)
+        command[2 - phase] = (StepCommand){0.03, phase == 0 ? 0.003 : 0};
+    else
+        for (int k = 0; k < 3; k++)
+            command[k].advance = -0.01;
+}
+
+static void three_tools_stay_in_the_tube(void **state)
+{
+    (void)state;
+    Vessel *vessel = winding_tube();
+    Coaxial c;
+    three_in_a_tube(&c, vessel);
+    double deepest = 0;
+    int nodes = 0;
+    for (int i = 0; i < 6000; i++) {
+        StepCommand command[3];
+        wire_first(i, command);
+        const StepReport *r = step_tools(c.stepper, command);
+        assert_false(r->flags & (STEP_DIVERGED | STEP_DEEP | STEP_NOT_CONVERGED));
+        deepest = fmax(deepest, r->penetration);
+        nodes = stepper_state(c.stepper)->node_count > nodes ? stepper_state(c.stepper)->node_count : nodes;
+        assert_true(fabs(r->push[0]) < 2 && fabs(r->push[1]) < 2 && fabs(r->push[2]) < 2);
+    }
+    print_message("deepest %.4f mm, at most %d nodes of %d\n", deepest, nodes, stepper_node_capacity(c.stepper));
+    assert_true(deepest < 0.05 && nodes > 85);
+    // every tool's nodes lie on one line, in order, as far apart as they are along the tool
+    for (int k = 0; k < 3; k++) {
+        ToolNode node[122];
+        int count = stepper_tool_nodes(c.stepper, k, NULL);
+        assert_true(count <= 122);
+        stepper_tool_nodes(c.stepper, k, node);
+        for (int j = 1; j < count; j++) {
+            double apart = node[j].s - node[j - 1].s, distance = vec3_distance(node[j].position, node[j - 1].position);
+            assert_true(distance < 1.001 * apart && distance > 0.93 * apart);
+        }
+    }
+    stepper_destroy(c.stepper);
+    vessel->destroy(vessel);
+}
+
+static void a_restored_run_repeats(void **state)
+{
+    (void)state;
+    Vessel *vessel = winding_tube();
+    Coaxial c;
+    StepCommand command[3];
+    three_in_a_tube(&c, vessel);
+    for (int i = 0; i < 1200; i++) {
+        wire_first(i, command);
+        step_tools(c.stepper, command);
+    }
+    Checkpoint *kept = stepper_save(c.stepper, NULL);
+    uint64_t hash[2];
+    for (int again = 0; again < 2; again++) {
+        for (int i = 1200; i < 2400; i++) {
+            wire_first(i, command);
+            step_tools(c.stepper, command);
+        }
+        hash[again] = stepper_hash(c.stepper);
+        stepper_restore(c.stepper, kept);
+    }
+    assert_true(hash[0] == hash[1]);
+    checkpoint_free(kept);
+    stepper_destroy(c.stepper);
+    vessel->destroy(vessel);
+}
+
+static void hands_stop_and_slip(void **state)
+{
+    (void)state;
+    Coaxial c = {0};
+    c.section[0][0] = tube_section(30, 60, 0, 1, 0.8);
+    c.section[1][0] = tube_section(60, 20, 0, 0.5, 0);
+    c.options.wire = tool_options(c.section[0], 1, 15, 0);
+    c.inner[0] = tool_options(c.section[1], 1, 30, 10);
+    start(&c, 1, false);
+    // pulled out of the hub it stops with its tip there, pushed in with its end there
+    StepCommand pull[2] = {{0}, {-0.5, 0}}, push[2] = {{0}, {0.5, 0}};
+    unsigned flags = 0;
+    for (int i = 0; i < 40; i++)
+        flags |= step_tools(c.stepper, pull)->flags;
+    assert_true(flags == STEP_FULLY_WITHDRAWN && fabs(stepper_tool_inserted(c.stepper, 1)) < 1e-9);
+    flags = 0;
+    for (int i = 0; i < 200; i++)
+        flags |= step_tools(c.stepper, push)->flags;
+    assert_true(flags == STEP_FULLY_INSERTED && fabs(stepper_tool_inserted(c.stepper, 1) - 60) < 1e-9);
+    stepper_destroy(c.stepper);
+    // a tool whose end would lie inside the hub
+    char why[256];
+    c.inner[0].inserted = 10;
+    c.section[1][0].length = 35;
+    c.options.wire.has_sheath = true;
+    c.options.wire.inserted = 0;
+    c.options.wire.fix_count = 0;
+    assert_null(stepper_create(&c.options, why, sizeof why));
+    assert_non_null(strstr(why, "too short"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_straight_wire_in_a_curved_tube), cmocka_unit_test(turned_tubes_follow_up_to_the_fold),
+        cmocka_unit_test(a_bend_leaves_the_catheter),       cmocka_unit_test(tools_leave_the_sheath),
+        cmocka_unit_test(three_tools_stay_in_the_tube),     cmocka_unit_test(a_restored_run_repeats),
+        cmocka_unit_test(hands_stop_and_slip),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
