@@ -48,7 +48,7 @@ Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *fa
                                   .dt = scene->dt};
         WireOptions inner[TOOLS_MOST];
         for (int k = 1; k < scene->tool_count; k++)
-            inner[k - 1] = scene_tool_wire(scene, k);
+            inner[k - 1] = scene_tool_wire(scene, k), options.inner_friction[k - 1] = scene->tool[k - 1].friction_inside;
         options.inner_count = scene->tool_count > 1 ? scene->tool_count - 1 : 0;
         options.inner = inner;
         simulator->stepper = stepper_create(&options, why, (int)sizeof why);

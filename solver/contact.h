@@ -8,7 +8,7 @@
 // Forces in N act on the tool; `force` is the whole vector in space and is kept per material point from step to step as warm start.
 //
 // A slide is the friction between two coaxial tools at a node where they share the centreline: S and phi, a tool's material coordinate and its
-// angle there, are two of the node's unknowns.
+// angle there, are two of the node's unknowns (against those of the tool around it: step_coaxial.c).
 //   d = (S, radius phi) in the step;  |force| <= bound, opposite to d where there is slip.
 // The force acts on the unknowns as (force[0], radius force[1]). The bound (mu times the force between the tools) is given and does not follow
 // the solve. In an unknown that is constrained (a unit row), or with radius 0 in phi, a slide neither sees the motion nor acts.

@@ -49,7 +49,7 @@ static double *take(double **from, size_t count)
 static bool allocate_scratch(Stepper *s)
 {
     size_t m = (size_t)s->wire.node_count, padded = m + BEAM_PADDING;
-    s->scratch = calloc((BEAM_REST_ARRAYS + 2 * BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1) * padded + (5 * (size_t)s->chain.size + 7 + (size_t)s->chain.size + 4 * (size_t)s->state.inner_count) * m,
+    s->scratch = calloc((BEAM_REST_ARRAYS + 2 * BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1) * padded + (5 * (size_t)s->chain.size + 7 + (size_t)s->chain.size + 8 * (size_t)s->state.inner_count + 2) * m,
                         sizeof *s->scratch);
     if (!s->scratch)
         return false;
@@ -76,6 +76,10 @@ static bool allocate_scratch(Stepper *s)
     s->kept = take(&at, 7 * m + rows + 2 * inner);
     s->start_slide = take(&at, inner);
     s->start_angle = take(&at, inner);
+    s->inner_moment = (Vec3 *)take(&at, 3 * inner);
+    s->inner_tension = take(&at, inner);
+    s->middle = take(&at, m);
+    s->bent = take(&at, m);
     return true;
 }
 
@@ -110,7 +114,7 @@ static bool allocate(Stepper *s)
     s->point_capacity = s->point_count;
     size_t m = (size_t)s->wire.node_count, points = (size_t)s->point_count, inner = (size_t)s->state.inner_count * m;
     int size = 6 + 2 * s->state.inner_count;
-    s->memory_count = 13 * m + (4 + WALL_MET_DOUBLES) * points + 4 * inner;
+    s->memory_count = 13 * m + (4 + WALL_MET_DOUBLES) * points + 7 * inner;
     s->memory = calloc(s->memory_count, sizeof *s->memory);
     s->place = calloc(points, sizeof *s->place);
     s->trial = calloc(points, sizeof *s->trial);
@@ -127,11 +131,11 @@ static bool allocate(Stepper *s)
     s->set.point = calloc(2 * points, sizeof *s->set.point);
     s->set.capacity = 2 * s->point_count;       // each with the wall across
     s->factor = block_factor_create(s->wire.node_count, size);
-    s->solver = contact_solver_create(s->wire.node_count, size, s->set.capacity);
+    s->set.slide = calloc(inner + 1, sizeof *s->set.slide);
+    s->solver = contact_solver_create(s->wire.node_count, size, s->set.capacity + (int)inner);
     s->carrier = calloc(m, sizeof *s->carrier);
-    s->own = calloc(m, sizeof *s->own);
     if (!s->memory || !s->place || !s->trial || !s->tried || !s->fixed || !s->start_position || !s->start_orientation || !s->slot_place || !s->query_point || !s->query_place ||
-        !s->query_hit || !s->query_which || !s->room || !s->set.point || !s->factor || !s->solver || !s->carrier || !s->own || !block_chain_create(&s->chain, s->wire.node_count, size) ||
+        !s->query_hit || !s->query_which || !s->room || !s->set.point || !s->factor || !s->solver || !s->carrier || !s->set.slide || !block_chain_create(&s->chain, s->wire.node_count, size) ||
         !allocate_scratch(s))
         return false;
     s->state.node_count = s->wire.node_count;
@@ -146,6 +150,7 @@ static bool allocate(Stepper *s)
     s->state.angle = s->state.slide + inner;
     s->state.slide_velocity = s->state.angle + inner;
     s->state.slide_spin = s->state.slide_velocity + inner;
+    s->state.slide_force = s->state.slide_spin + inner;
     s->linger = s->room + points;
     s->lack = s->linger + points;
     s->range = s->lack + points;
@@ -314,7 +319,6 @@ void stepper_destroy(Stepper *s)
         return;
     tools_destroy(s);
     free(s->carrier);
-    free(s->own);
     wire_destroy(&s->wire);
     block_chain_destroy(&s->chain);
     if (s->factor)
@@ -337,6 +341,7 @@ void stepper_destroy(Stepper *s)
     free(s->slot);
     free(s->slot_start);
     free(s->room);
+    free(s->set.slide);
     free(s->set.point);
     free(s->scratch);
     free(s);
@@ -430,20 +435,6 @@ static void begin(Stepper *s)
     s->mouth_ahead = s->command.advance;
 }
 
-static void feed(Stepper *s, StepCommand command);
-
-void step_feed_tools(Stepper *s, const StepCommand *command)
-{
-    memcpy(s->tool_command, command, (size_t)s->tool_count * sizeof *command);
-    feed(s, command[0]);
-}
-
-void step_feed(Stepper *s, StepCommand command)
-{
-    StepCommand all[STEP_TOOLS_MAX] = {command};
-    step_feed_tools(s, all);
-}
-
 static void feed(Stepper *s, StepCommand command)
 {
     s->wall_force_max = s->report.wall_force_max;
@@ -475,6 +466,18 @@ static void feed(Stepper *s, StepCommand command)
     s->first_free = held;
     begin(s);
 }
+void step_feed_tools(Stepper *s, const StepCommand *command)
+{
+    memcpy(s->tool_command, command, (size_t)s->tool_count * sizeof *command);
+    feed(s, command[0]);
+}
+
+void step_feed(Stepper *s, StepCommand command)
+{
+    StepCommand all[STEP_TOOLS_MAX] = {command};
+    step_feed_tools(s, all);
+}
+
 void step_detect(Stepper *s) { stepper_detect(s); }
 
 void step_assemble(Stepper *s) { stepper_assemble(s); }
@@ -489,10 +492,12 @@ static void solve(Stepper *s)
     if (s->has_failed)
         return;
     ContactReport report = {.converged = true};
-    if (s->set.count > 0)
+    if (s->set.count + s->set.slide_count > 0)
         report = contact_solve(s->solver, &s->chain, s->factor, s->b, &s->set, &s->contact, s->u);
     else
         block_factor_solve(s->factor, s->b, s->u);
+    if (s->tool_count > 1)
+        tools_from_slips(s);
     s->report.iterations += report.iterations;
     s->report.residual = report.residual;
     s->report.cone_violation = report.cone_violation;

@@ -58,6 +58,7 @@ typedef struct StepperOptions {
     // rig's start) are read
     int inner_count;             // up to STEP_TOOLS_MAX - 1
     const WireOptions *inner;
+    double inner_friction[STEP_TOOLS_MAX - 1];     // >= 0, Coulomb coefficient of each inner tool with the one around it
     const Vessel *vessel;        // may be NULL: no walls
     double wall_friction;
     ContactOptions contact;

@@ -247,8 +247,10 @@ void stepper_assemble(Stepper *s)
         add_load(s, &s->load[i], 1);
     }
     constraints(s);
-    if (s->tool_count > 1)
+    if (s->tool_count > 1) {
         tools_constrain(s);
+        tools_to_slips(s);
+    }
 }
 
 double stepper_stiffness_damping(Stepper *s)

@@ -11,11 +11,6 @@ enum { NODAL = 12 };
 static const double JUST_BEFORE = 1e-6;  // [mm] from a border: the section on the proximal side
 static const double SHORTEST = 0.01;     // of an element: what is left of it outside a mouth or a tip
 
-static double slide_at(const Stepper *s, int c, int k) { return s->state.slide[c * s->state.inner_count + k - 1]; }
-static double angle_at(const Stepper *s, int c, int k) { return s->state.angle[c * s->state.inner_count + k - 1]; }
-static int unknown_of(int k) { return 6 + 2 * (k - 1); }
-static bool is_inside(const Stepper *s, int c, int k) { return k > s->carrier[c] && c < s->tool[k].inside; }
-
 // The tools in element c, carrier first; returns their number. tool: which they are.
 static int spans(const Stepper *s, int c, CoaxialSpan *span, int *tool)
 {
@@ -56,6 +51,47 @@ double tools_twist(const Stepper *s, int c)
     return 2 * atan2(p.x, p.w);
 }
 
+static const CoaxialSection *section_at(const CoaxialTool *tool, double s)
+{
+    const CoaxialSection *section = tool->section, *last = section + tool->count - 1;
+    while (section < last && section->end <= s)
+        section++;
+    return section;
+}
+
+// For the friction between tools: what the tools from each one inwards bear at the middle of an element.
+static void keep_inner(const Stepper *s, int c, const CoaxialInput *in, const CoaxialOutput *out, const int *tool)
+{
+    int inner = s->state.inner_count;
+    Vec3 m = vec3_scale(vec3_sub(out->end_moment[1], out->end_moment[0]), 0.5), rest[STEP_TOOLS_MAX], total = m;
+    double bending = 0, own[STEP_TOOLS_MAX];
+    for (int i = 0; i < in->count; i++) {
+        const CoaxialSpan *p = &in->span[i];
+        double middle = p->s1 + 0.5 * out->rest.length, phi = p->has_tip ? p->phi1 : 0.5 * (p->phi1 + p->phi2);
+        bool ends = p->has_tip && middle > p->tool->section[p->tool->count - 1].end;
+        const CoaxialSection *section = section_at(p->tool, middle);
+        own[i] = ends ? 0 : section->bending;
+        rest[i] = vec3_scale(quat_rotate(quat_mul(in->q1, quat_from_rotation_vector(vec3(phi, 0, 0))), vec3(0, -section->curve[1], section->curve[0])), own[i]);
+        total = vec3_add(total, rest[i]);
+        bending += own[i];
+    }
+    Vec3 curvature = vec3_scale(total, 1 / bending), sum = vec3(0, 0, 0);
+    double tension = 0;
+    s->bent[c] = vec3_norm(curvature);
+    for (int k = 0; k < inner; k++) {
+        s->inner_moment[c * inner + k] = vec3(0, 0, 0);
+        s->inner_tension[c * inner + k] = 0;
+    }
+    for (int i = in->count - 1; i >= 0; i--) {
+        sum = vec3_add(sum, vec3_sub(vec3_scale(curvature, own[i]), rest[i]));
+        tension += out->tension[i];
+        for (int k = tool[i]; k > (i > 0 ? tool[i - 1] : 0) && k > 0; k--) {      // a tool that is not there has those inside it
+            s->inner_moment[c * inner + k - 1] = sum;
+            s->inner_tension[c * inner + k - 1] = tension;
+        }
+    }
+}
+
 static bool is_at_tip(const Stepper *s, int c) { return s->carrier[c] != s->carrier[c + 1]; }
 
 // Behind a tip the frames of the two nodes belong to two tools: there node 1 is given that of the one that goes on.
@@ -93,6 +129,18 @@ static BeamInput plain_input(const Stepper *s, int c)
                        .half_y = r->half_y[c], .half_z = r->half_z[c]};
 }
 
+static void keep_plain(const Stepper *s, int c, const BeamInput *in, const BeamOutput *out)
+{
+    int inner = s->state.inner_count;
+    Vec3 m = vec3_scale(vec3_sub(out->angle2, out->angle1), 0.5 * (in->near - in->far));
+    s->bent[c] = vec3_norm(vec3_sub(out->turn2, out->turn1)) / in->length;
+    for (int k = 0; k < inner; k++) {
+        bool bears = k < s->carrier[c + 1];
+        s->inner_moment[c * inner + k] = bears ? m : vec3(0, 0, 0);
+        s->inner_tension[c * inner + k] = bears ? out->tension : 0;
+    }
+}
+
 // --- free elements ---
 
 // Gradient and tangent of an element in the unknowns of its two nodes, [2 n] and [2 n][2 n].
@@ -116,27 +164,27 @@ static void places(const CoaxialInput *in, const int *tool, int n, int place[NOD
     }
 }
 
-static void add_local(Local *local, const CoaxialTangent *t, int columns, const int *place, double factor)
+static void add_local(Local *local, const CoaxialTangent *t, int columns, const int *place)
 {
+    int n = local->n;
     for (int r = 0; r < 6; r++)
         for (int c = 0; c < 6; c++) {
-            int n = local->n;
-            local->tangent[r][c] += factor * t->nodes.k11[6 * r + c];
-            local->tangent[n + r][c] += factor * t->nodes.k21[6 * r + c];
-            local->tangent[c][n + r] += factor * t->nodes.k21[6 * r + c];
-            local->tangent[n + r][n + c] += factor * t->nodes.k22[6 * r + c];
+            local->tangent[r][c] += t->nodes.k11[6 * r + c];
+            local->tangent[n + r][c] += t->nodes.k21[6 * r + c];
+            local->tangent[c][n + r] += t->nodes.k21[6 * r + c];
+            local->tangent[n + r][n + c] += t->nodes.k22[6 * r + c];
         }
     for (int p = 0; p < columns; p++) {
         int at = place[NODAL + p];
         if (at < 0)
             continue;
         for (int r = 0; r < NODAL; r++) {
-            local->tangent[place[r]][at] += factor * t->cross[r][p];
-            local->tangent[at][place[r]] += factor * t->cross[r][p];
+            local->tangent[place[r]][at] += t->cross[r][p];
+            local->tangent[at][place[r]] += t->cross[r][p];
         }
         for (int q = 0; q < columns; q++)
             if (place[NODAL + q] >= 0)
-                local->tangent[at][place[NODAL + q]] += factor * t->own[p][q];
+                local->tangent[at][place[NODAL + q]] += t->own[p][q];
     }
 }
 
@@ -165,47 +213,59 @@ static void put_nodes(const BeamTangent *t, double full[NODAL][NODAL])
         }
 }
 
-static void add_ways(const Way *way, const CoaxialTangent *t, int columns, double factor, Local *local)
+static void add_ways(const Way *way, const CoaxialTangent *t, int columns, Local *local)
 {
     double nodes[NODAL][NODAL];
     put_nodes(&t->nodes, nodes);
     int all = NODAL + columns;
     for (int r = 0; r < all; r++)
         for (int c = 0; c < all; c++) {
-            double value = factor * (r < NODAL ? c < NODAL ? nodes[r][c] : t->cross[r][c - NODAL] : c < NODAL ? t->cross[c][r - NODAL] : t->own[r - NODAL][c - NODAL]);
+            double value = r < NODAL ? c < NODAL ? nodes[r][c] : t->cross[r][c - NODAL] : c < NODAL ? t->cross[c][r - NODAL] : t->own[r - NODAL][c - NODAL];
             for (int i = 0; i < way[r].count; i++)
                 for (int j = 0; j < way[c].count; j++)
                     local->tangent[way[r].at[i]][way[c].at[j]] += value * way[r].by[i] * way[c].by[j];
         }
 }
 
-// An element whose unknowns are not those of its nodes.
-static void element_by_ways(const Stepper *s, int c, const CoaxialInput *in, const Way *way, double scale, Local *local)
+static void put(double *at, Vec3 v) { at[0] = v.x, at[1] = v.y, at[2] = v.z; }
+
+// The damping's force on an iterate is that of the displacement so far: what `local` has more of tangent than `elastic`.
+static void add_damping(const Stepper *s, int c, const Local *elastic, Local *local)
 {
-    int n = s->chain.size, columns = 4 * in->count;
+    int n = local->n;
     const double *done[2] = {s->linearised + row_of(s, c), s->linearised + row_of(s, c + 1)};
+    for (int r = 0; r < 2 * n; r++)
+        for (int k = 0; k < 2 * n; k++)
+            local->gradient[r] += (local->tangent[r][k] - elastic->tangent[r][k]) * done[k / n][k % n];
+}
+
+// An element whose unknowns are not those of its nodes.
+static void element_by_ways(const Stepper *s, int c, const CoaxialInput *in, const Way *way, const int *tool, double scale, Local *local)
+{
+    int columns = 4 * in->count;
+    bool damps = s->is_iterate && scale != 1;
     CoaxialOutput out;
     CoaxialTangent t;
+    Local elastic;
     coaxial_element(in, &out);
-    coaxial_tangent(in, &out, scale, &t);
-    clear(local, n);
-    add_ways(way, &t, columns, 1, local);
-    const BeamOutput *o = &out.beam;
-    double own[NODAL + COAXIAL_COLUMNS] = {-o->force2.x, -o->force2.y, -o->force2.z, o->moment1.x, o->moment1.y, o->moment1.z,
-                                           o->force2.x, o->force2.y, o->force2.z, o->moment2.x, o->moment2.y, o->moment2.z};
+    keep_inner(s, c, in, &out, tool);
+    for (int pass = 0; pass < 1 + damps; pass++) {
+        Local *to = pass ? &elastic : local;
+        coaxial_tangent(in, &out, pass ? 1 : scale, &t);
+        clear(to, s->chain.size);
+        add_ways(way, &t, columns, to);
+    }
+    double own[NODAL + COAXIAL_COLUMNS];
+    put(own, vec3_negate(out.beam.force2));
+    put(own + 3, out.beam.moment1);
+    put(own + 6, out.beam.force2);
+    put(own + 9, out.beam.moment2);
     memcpy(own + NODAL, out.gradient, (size_t)columns * sizeof *own);
     for (int r = 0; r < NODAL + columns; r++)
         for (int i = 0; i < way[r].count; i++)
             local->gradient[way[r].at[i]] += own[r] * way[r].by[i];
-    if (!s->is_iterate || scale == 1)
-        return;
-    Local elastic;
-    coaxial_tangent(in, &out, 1, &t);
-    clear(&elastic, n);
-    add_ways(way, &t, columns, 1, &elastic);
-    for (int r = 0; r < 2 * n; r++)
-        for (int k = 0; k < 2 * n; k++)
-            local->gradient[r] += (local->tangent[r][k] - elastic.tangent[r][k]) * done[k / n][k % n];
+    if (damps)
+        add_damping(s, c, &elastic, local);
 }
 
 // At a tip node 1 has the frame of the tool that goes on: its turn about the tangent is that tool's angle too.
@@ -231,73 +291,64 @@ static void tip_ways(const Stepper *s, int c, const CoaxialInput *in, const int 
     }
 }
 
-// Element c: its gradient, and its tangent (with the damping's, whose force on an iterate is that of the displacement so far).
-static void free_element(const Stepper *s, int c, double scale, Local *local)
+static void tip_element(const Stepper *s, int c, double scale, Local *local)
 {
-    int n = s->chain.size, tool[STEP_TOOLS_MAX], place[NODAL + COAXIAL_COLUMNS];
-    clear(local, n);
-    const double *done[2] = {s->linearised + row_of(s, c), s->linearised + row_of(s, c + 1)};
-    CoaxialTangent t;
-    int columns = 0;
-    if (is_plain(s, c)) {
-        BeamInput in = plain_input(s, c);
-        BeamOutput out;
-        beam_element(&in, &out);
-        beam_tangent(&in, &out, scale, &t.nodes);
-        for (int i = 0; i < 3; i++) {
-            const double f[3] = {out.force2.x, out.force2.y, out.force2.z}, m1[3] = {out.moment1.x, out.moment1.y, out.moment1.z},
-                         m2[3] = {out.moment2.x, out.moment2.y, out.moment2.z};
-            local->gradient[i] = -f[i], local->gradient[n + i] = f[i];
-            local->gradient[3 + i] = m1[i], local->gradient[n + 3 + i] = m2[i];
-        }
-        add_local(local, &t, 0, place, 1);
-        if (s->is_iterate && scale != 1) {
-            CoaxialTangent main;
-            beam_tangent(&in, &out, 1, &main.nodes);
-            Local damped;
-            clear(&damped, n);
-            add_local(&damped, &t, 0, place, 1);
-            add_local(&damped, &main, 0, place, -1);
-            for (int r = 0; r < 2 * n; r++)
-                for (int k = 0; k < 2 * n; k++)
-                    local->gradient[r] += damped.tangent[r][k] * done[k / n][k % n];
-        }
-        return;
-    }
+    int tool[STEP_TOOLS_MAX];
     CoaxialInput in = input_at(s, c, tool);
+    Way way[NODAL + COAXIAL_COLUMNS];
+    tip_ways(s, c, &in, tool, way);
+    element_by_ways(s, c, &in, way, tool, scale, local);
+}
+
+// Element c between two nodes of the same tool: its gradient, and its tangent with the damping's.
+static void inner_element(const Stepper *s, int c, double scale, Local *local)
+{
+    int n = s->chain.size, tool[STEP_TOOLS_MAX], place[NODAL + COAXIAL_COLUMNS], columns = 0;
+    bool plain = is_plain(s, c), damps = s->is_iterate && scale != 1;
+    BeamInput beam = plain_input(s, c);
+    BeamOutput own;
+    CoaxialInput in = {0};
     CoaxialOutput out;
-    if (is_at_tip(s, c)) {
-        Way way[NODAL + COAXIAL_COLUMNS];
-        tip_ways(s, c, &in, tool, way);
-        element_by_ways(s, c, &in, way, scale, local);
-        return;
+    CoaxialTangent t;
+    Local elastic;
+    const BeamOutput *o = &own;
+    if (plain) {
+        beam_element(&beam, &own);
+        keep_plain(s, c, &beam, &own);
+    } else {
+        in = input_at(s, c, tool);
+        columns = 4 * in.count;
+        coaxial_element(&in, &out);
+        keep_inner(s, c, &in, &out, tool);
+        o = &out.beam;
     }
-    coaxial_element(&in, &out);
-    coaxial_tangent(&in, &out, scale, &t);
     places(&in, tool, n, place);
-    columns = 4 * in.count;
-    const BeamOutput *o = &out.beam;
-    const double f[3] = {o->force2.x, o->force2.y, o->force2.z}, m1[3] = {o->moment1.x, o->moment1.y, o->moment1.z},
-                 m2[3] = {o->moment2.x, o->moment2.y, o->moment2.z};
-    for (int i = 0; i < 3; i++) {
-        local->gradient[i] = -f[i], local->gradient[n + i] = f[i];
-        local->gradient[3 + i] = m1[i], local->gradient[n + 3 + i] = m2[i];
+    for (int pass = 0; pass < 1 + damps; pass++) {
+        Local *to = pass ? &elastic : local;
+        if (plain)
+            beam_tangent(&beam, &own, pass ? 1 : scale, &t.nodes);
+        else
+            coaxial_tangent(&in, &out, pass ? 1 : scale, &t);
+        clear(to, n);
+        add_local(to, &t, columns, place);
     }
+    put(local->gradient, vec3_negate(o->force2));
+    put(local->gradient + 3, o->moment1);
+    put(local->gradient + n, o->force2);
+    put(local->gradient + n + 3, o->moment2);
     for (int p = 0; p < columns; p++)
         if (place[NODAL + p] >= 0)
             local->gradient[place[NODAL + p]] += out.gradient[p];
-    add_local(local, &t, columns, place, 1);
-    if (s->is_iterate && scale != 1) {
-        CoaxialTangent main;
-        Local damped;
-        coaxial_tangent(&in, &out, 1, &main);
-        clear(&damped, n);
-        add_local(&damped, &t, columns, place, 1);
-        add_local(&damped, &main, columns, place, -1);
-        for (int r = 0; r < 2 * n; r++)
-            for (int k = 0; k < 2 * n; k++)
-                local->gradient[r] += damped.tangent[r][k] * done[k / n][k % n];
-    }
+    if (damps)
+        add_damping(s, c, &elastic, local);
+}
+
+static void free_element(const Stepper *s, int c, double scale, Local *local)
+{
+    if (is_at_tip(s, c))
+        tip_element(s, c, scale, local);
+    else
+        inner_element(s, c, scale, local);
 }
 
 static void add_to_chain(Stepper *s, int c, const Local *local)
@@ -316,14 +367,6 @@ static void add_to_chain(Stepper *s, int c, const Local *local)
 }
 
 // --- the sheath ---
-
-static const CoaxialSection *section_at(const CoaxialTool *tool, double s)
-{
-    const CoaxialSection *section = tool->section, *last = section + tool->count - 1;
-    while (section < last && section->end <= s)
-        section++;
-    return section;
-}
 
 // [N] what it takes to straighten a length of a tool.
 static double straightening(const Tool *t, double s)
@@ -355,6 +398,9 @@ static double sheath_element_of_tools(const Stepper *s, int c, double scale, Loc
     coaxial_rest(in.span, in.count, &rest);
     const double *done[2] = {s->linearised + row_of(s, c), s->linearised + row_of(s, c + 1)};
     double length = stepper_sheath_coordinate(s, c + 1) - stepper_sheath_coordinate(s, c), psi = tools_twist(s, c), energy = 0;
+    int inner = s->state.inner_count;
+    for (int k = 0; local && k < inner; k++)
+        s->inner_moment[c * inner + k] = vec3(0, 0, 0), s->inner_tension[c * inner + k] = 0, s->bent[c] = 0;
     for (int i = 0; i < in.count; i++) {
         const CoaxialSpan *p = &in.span[i];
         energy += straightened(&s->tool[tool[i]], p->s1, p->has_tip ? s->tool[tool[i]].wire.total_length : p->s2);
@@ -370,6 +416,8 @@ static double sheath_element_of_tools(const Stepper *s, int c, double scale, Loc
             damped_turn += by_turn[k] * done[about[k] / n][about[k] % n];
         }
         energy += 0.5 * (ka * strain * strain + kt * turn * turn);
+        for (int k = 0; local && k < tool[i]; k++)
+            s->inner_tension[c * inner + k] += ka * strain;
         for (int r = 0; local && r < unknowns; r++) {
             local->gradient[along[r]] += by_length[r] * ka * (strain + (scale - 1) * damped_strain);
             local->gradient[about[r]] += by_turn[r] * kt * (turn + (scale - 1) * damped_turn);
@@ -429,7 +477,7 @@ static void mouth_element_of_tools(const Stepper *s, double scale, Local *local)
     CoaxialInput in = mouth_input(s, tool);
     Way way[NODAL + COAXIAL_COLUMNS];
     mouth_ways(s, &in, tool, way);
-    element_by_ways(s, c, &in, way, scale, local);
+    element_by_ways(s, c, &in, way, tool, scale, local);
     // what lies straight behind the mouth gets longer with S there
     for (int i = 0; i < in.count; i++) {
         const Way *w = &way[NODAL + 4 * i + COAXIAL_S1];
@@ -467,7 +515,7 @@ static Lump lump_at(const Stepper *s, int c, int k)
     return (Lump){t->line_mass[section] * length, 2 * t->line_inertia[section] * length, t->line_inertia[section] * length};
 }
 
-// A square m (g . (u - v h) ...): along g, a combination of a node's unknowns, moves at `velocity` [per ms].
+// Inertia of one direction g, a combination of a node's unknowns [first, last), that moves at `velocity` [per ms] and is pushed by `push` [per ms2].
 static void add_inertia(Stepper *s, int c, double inertia, double mass, const double *g, int first, int last, double velocity, double push)
 {
     int n = s->chain.size;
@@ -653,31 +701,12 @@ void tools_assemble(Stepper *s, double scale, double inertia)
         add_to_chain(s, c, &local);
     }
     tips_short_of_nodes(s);
+    if (!s->is_iterate)
+        tools_slides(s);
     static const int lateral[4] = {1, 2, 4, 5};
     for (int c = 0; c < s->first_free; c++)
         for (int i = 0; i < 4; i++)
             stepper_prescribe(s, c, lateral[i], 0);
-}
-
-void tools_constrain(Stepper *s)
-{
-    for (int c = 0; c < s->chain.count; c++)
-        for (int k = 1; k < s->tool_count; k++)
-            for (int i = 0; !is_inside(s, c, k) && i < 2; i++)
-                stepper_prescribe(s, c, unknown_of(k) + i, 0);
-    for (int k = 1; k < s->tool_count; k++) {
-        const Tool *t = &s->tool[k], *out = &s->tool[0];
-        if (!is_inside(s, 0, k))
-            continue;
-        double hub = s->state.inserted + s->command.advance - out->wire.total_length;
-        double slide = t->wire.total_length - t->inserted - s->tool_command[k].advance + hub;
-        double angle = t->twist + s->tool_command[k].twist - (s->state.twist + s->command.twist);
-        if (s->tool_slips[k])
-            s->b[unknown_of(k)] -= s->tool_slips[k] * t->hand_limit;
-        else
-            stepper_prescribe(s, 0, unknown_of(k), slide - s->start_slide[k - 1]);
-        stepper_prescribe(s, 0, unknown_of(k) + 1, angle - s->start_angle[k - 1]);
-    }
 }
 
 double tools_elastic_energy(const Stepper *s)
@@ -717,24 +746,6 @@ double tools_elastic_energy(const Stepper *s)
     return energy;
 }
 
-void tools_report(Stepper *s)
-{
-    StepReport *r = &s->report;
-    r->push[0] = r->proximal_force;
-    r->torque[0] = r->proximal_torque;
-    for (int k = 1; k < s->tool_count; k++) {
-        if (!is_inside(s, 0, k))
-            continue;
-        // S falls as the hand pushes; the outermost tool's node 0 carries them along
-        r->push[k] = -stepper_reaction(s, unknown_of(k));
-        r->torque[k] = stepper_reaction(s, unknown_of(k) + 1);
-        r->push[0] -= r->push[k];
-        r->torque[0] -= r->torque[k];
-    }
-    r->proximal_force = r->push[0];
-    r->proximal_torque = r->torque[0];
-}
-
 double tools_stiffness_damping(const Stepper *s)
 {
     int n = s->chain.size;
@@ -758,105 +769,4 @@ double tools_stiffness_damping(const Stepper *s)
                 work += done[r / n][r % n] * (with.tangent[r][k] - without.tangent[r][k]) * done[k / n][k % n];
     }
     return work;
-}
-
-// --- hands ---
-
-bool tools_misjudges_grip(Stepper *s, int k)
-{
-    Tool *t = &s->tool[k];
-    int was = s->tool_slips[k], at = unknown_of(k);
-    if (t->hand_limit == 0 || !is_inside(s, 0, k))
-        return false;
-    double push = -stepper_reaction(s, at), hub = s->state.inserted + s->command.advance - s->tool[0].wire.total_length;
-    double wanted = t->wire.total_length - t->inserted - s->tool_command[k].advance + hub - s->start_slide[k - 1];
-    if (was == 0 && fabs(push) > t->hand_limit)
-        s->tool_slips[k] = push > 0 ? 1 : -1;
-    else if (was != 0 && was * (wanted - s->u[at]) > 0)
-        s->tool_slips[k] = 0;
-    return s->tool_slips[k] != was;
-}
-
-void tools_feed(Stepper *s)
-{
-    for (int k = 1; k < s->tool_count; k++) {
-        Tool *t = &s->tool[k];
-        StepCommand *command = &s->tool_command[k];
-        if (!isfinite(command->advance) || !isfinite(command->twist))
-            *command = (StepCommand){0};
-        s->tool_slips[k] = 0;
-        // its proximal end stays behind the hub, its tip beyond it
-        const Tool *out = &s->tool[0];
-        double hub = s->state.inserted + s->command.advance - out->wire.total_length;
-        double most = t->wire.total_length + hub - t->inserted, least = hub - t->inserted;
-        if (command->advance > most || command->advance < least)
-            s->report.flags |= command->advance > most ? STEP_FULLY_INSERTED : STEP_FULLY_WITHDRAWN;
-        command->advance = fmin(most, fmax(least, command->advance));
-    }
-    tools_pass(s);
-}
-
-void tools_move(Stepper *s, double part)
-{
-    for (int c = 0; c < s->state.node_count; c++)
-        for (int k = 1; k < s->tool_count; k++) {
-            if (!is_inside(s, c, k))
-                continue;
-            int at = unknown_of(k), i = c * s->state.inner_count + k - 1;
-            const double *u = s->u + row_of(s, c) + at;
-            double *done = s->linearised + row_of(s, c) + at;
-            done[0] = part < 1 ? done[0] + part * (u[0] - done[0]) : u[0];
-            done[1] = part < 1 ? done[1] + part * (u[1] - done[1]) : u[1];
-            s->state.slide[i] = s->start_slide[i] + done[0];
-            s->state.angle[i] = s->start_angle[i] + done[1];
-        }
-}
-
-void tools_set_velocities(Stepper *s)
-{
-    WireState *w = &s->state;
-    for (int c = 0; c < w->node_count; c++) {
-        Vec3 t = c < s->first_free ? s->axis[0] : quat_rotate(s->start_orientation[c], vec3(1, 0, 0));
-        for (int k = 1; k < s->tool_count; k++) {
-            if (!is_inside(s, c, k))
-                continue;
-            const double *u = s->linearised + row_of(s, c) + unknown_of(k);
-            int i = c * w->inner_count + k - 1;
-            w->slide_velocity[i] = vec3_dot(w->velocity[c], t) - u[0] / s->dt;
-            w->slide_spin[i] = vec3_dot(w->spin[c], t) + u[1] / s->dt;
-        }
-    }
-}
-
-// What tool k's hand has moved by in this step, along (0) and about (1) the line.
-static double hand_moved(const Stepper *s, int k, int which)
-{
-    const double *u = s->linearised;
-    return which == 0 ? u[0] - u[unknown_of(k)] : u[3] + u[unknown_of(k) + 1];
-}
-
-double tools_hand_work(const Stepper *s, int k)
-{
-    if (!is_inside(s, 0, k))
-        return 0;
-    return s->report.push[k] * hand_moved(s, k, 0) + s->report.torque[k] * hand_moved(s, k, 1);
-}
-
-void tools_count_commands(Stepper *s)
-{
-    for (int k = 1; k < s->tool_count; k++) {
-        Tool *t = &s->tool[k];
-        t->inserted += s->tool_command[k].advance;
-        t->twist += s->tool_command[k].twist;
-        if (!is_inside(s, 0, k))
-            continue;
-        // where it is in fact, cut or slipped
-        double hub = s->state.inserted - s->tool[0].wire.total_length, actual = t->wire.total_length + hub - slide_at(s, 0, k);
-        if (s->tool_slips[k])
-            s->report.flags |= STEP_HAND_SLIPS;
-        if (s->tool_slips[k] || (s->report.flags & STEP_LIMITED)) {
-            t->inserted = actual;
-            t->twist = s->state.twist + angle_at(s, 0, k);
-        }
-    }
 }

@@ -596,6 +596,7 @@ void stepper_wall_work(const Stepper *s, double *wall, double *friction)
         *wall += pressure;
         *friction += pressure - vec3_dot(force, moved);
     }
+    *friction += tools_friction_work(s);
 }
 
 // In the order of the chain: a node, the slots behind it, the next node.

@@ -35,6 +35,7 @@ typedef struct Tool {
     Slot *slot;              // of its own elements
     int *slot_start;         // (E + 1)
     double hand_limit;       // [N] 0: none
+    double friction, clearance;    // with the tool around it; [mm] between them, radial
     // what changes
     int first;               // own node from which on it carries the chain; node_count: nowhere
     int start;               // … which is this node of the chain
@@ -69,10 +70,14 @@ struct Stepper {
 
     int tool_count;          // 1: what follows is not used
     Tool tool[STEP_TOOLS_MAX];
-    int *carrier, *own;      // (M) the tool that carries a node, and its own number there
+    int *carrier;            // (M) the tool that carries a node
     StepCommand tool_command[STEP_TOOLS_MAX];
     int tool_slips[STEP_TOOLS_MAX];    // as `slips`, of inner tools
     double *start_slide, *start_angle; // (M, I) at x_n
+    Vec3 *inner_moment;      // (E, I) [N mm] of tool 1 + i and all inside it at the middle of an element …
+    double *inner_tension;   // (E, I) [N] … and their tension
+    double *middle;          // (E) [mm] of an element along the line
+    double *bent;            // (E) [1/mm] size of its curvature
     int capacity;            // of nodes
 
     // what the next step depends on: see checkpoint.c

@@ -54,8 +54,20 @@ static bool make_tool(Tool *t, const WireOptions *o, char *why, int capacity)
             t->slot[t->slot_start[i] + k] = slot_make((int)i, t->wire.length[i], k, count, section->diameter / 2, section->friction);
     }
     t->hand_limit = o->hand_limit;
+    t->clearance = HUGE_VAL;
     t->inserted = fmin(o->inserted, t->wire.total_length);
     return t->slot != NULL;
+}
+
+// [mm] the least there is; at least a thousandth of the inner tool's diameter.
+static double clearance_between(const WireOptions *around, const WireOptions *inner)
+{
+    double lumen = HUGE_VAL, widest = 0;
+    for (int i = 0; i < around->section_count; i++)
+        lumen = fmin(lumen, around->section[i].inner_diameter);
+    for (int i = 0; i < inner->section_count; i++)
+        widest = fmax(widest, inner->section[i].diameter);
+    return fmax(0.5 * (lumen - widest), 1e-3 * widest);
 }
 
 bool tools_create(Stepper *s, const StepperOptions *o, char *why, int capacity)
@@ -71,7 +83,10 @@ bool tools_create(Stepper *s, const StepperOptions *o, char *why, int capacity)
             return false;
         s->capacity += s->tool[k].wire.node_count;
         s->slot_count += s->tool[k].slot_start[s->tool[k].wire.element_count];
-        const Tool *around = &s->tool[k > 0 ? k - 1 : 0], *t = &s->tool[k];
+        const Tool *around = &s->tool[k > 0 ? k - 1 : 0];
+        Tool *t = &s->tool[k];
+        t->friction = k > 0 ? o->inner_friction[k - 1] : 0;
+        t->clearance = k > 0 ? clearance_between(k == 1 ? &o->wire : &o->inner[k - 2], &own) : 0;
         if (t->wire.total_length - t->inserted < around->wire.total_length - around->inserted - 1e-9) {
             snprintf(why, (size_t)capacity, "tool %d is too short: its proximal end would lie %g mm inside the hub of the tool around it; it must not", k + 1,
                      around->wire.total_length - around->inserted - (t->wire.total_length - t->inserted));
@@ -100,7 +115,6 @@ static void chain_node(Stepper *s, int c, int k, int j)
     const Tool *t = &s->tool[k];
     Wire *w = &s->wire;
     s->carrier[c] = k;
-    s->own[c] = j;
     w->s[c] = t->wire.s[j];
     w->mass[c] = t->wire.mass[j];
     w->inertia_axial[c] = t->wire.inertia_axial[j];
@@ -208,7 +222,7 @@ static void shift(Stepper *s, int c, int slots, bool opens)
         void *base;
         size_t size;
     } by_node[] = {{w->position, sizeof(Vec3)}, {w->orientation, sizeof(Quat)}, {w->velocity, sizeof(Vec3)}, {w->spin, sizeof(Vec3)},
-                   {w->slide, inner}, {w->angle, inner}, {w->slide_velocity, inner}, {w->slide_spin, inner}},
+                   {w->slide, inner}, {w->angle, inner}, {w->slide_velocity, inner}, {w->slide_spin, inner}, {w->slide_force, 3 * inner}},
       by_point[] = {{s->force, sizeof(Vec3)}, {s->clearance, sizeof(double)}, {s->met, sizeof(WallMet)}, {s->place, sizeof(VesselMemory)}};
     for (size_t i = 0; i < sizeof by_node / sizeof *by_node; i++)
         (opens ? open_gap : close_gap)(by_node[i].base, by_node[i].size, nodes, c, 1);
@@ -225,8 +239,8 @@ static void shift(Stepper *s, int c, int slots, bool opens)
 
 static int slots_of(const Tool *t, int element) { return t->slot_start[element + 1] - t->slot_start[element]; }
 
-static double *slide_at(const Stepper *s, int c, int k) { return &s->state.slide[c * s->state.inner_count + k - 1]; }
-static double *angle_at(const Stepper *s, int c, int k) { return &s->state.angle[c * s->state.inner_count + k - 1]; }
+static double *slide_of(const Stepper *s, int c, int k) { return &s->state.slide[c * s->state.inner_count + k - 1]; }
+static double *angle_of(const Stepper *s, int c, int k) { return &s->state.angle[c * s->state.inner_count + k - 1]; }
 
 // Node c joins the chain behind node c - 1, which is the tip around it, at a distance d [mm] along the curve there.
 static void join(Stepper *s, int k, double d)
@@ -241,7 +255,7 @@ static void join(Stepper *s, int k, double d)
     int before = c - 1;
     Vec3 curvature = stepper_curvature(s, before);
     Vec3 tangent = quat_rotate(w->orientation[before], vec3(1, 0, 0)), moved = vec3_add_scaled(vec3_scale(tangent, d), 0.5 * d * d, vec3_cross(curvature, tangent));
-    double phi = *angle_at(s, before, k);
+    double phi = *angle_of(s, before, k);
     shift(s, c, slots_of(t, j - 1), true);
     w->position[c] = vec3_add(w->position[before], moved);
     Quat turned = quat_mul(w->orientation[before], quat_from_rotation_vector(vec3(phi, 0, 0)));
@@ -251,8 +265,8 @@ static void join(Stepper *s, int k, double d)
     w->velocity[c] = vec3_add_scaled(w->velocity[before], w->slide_velocity[i] - vec3_dot(w->velocity[before], tangent), tangent);
     w->spin[c] = vec3_add_scaled(w->spin[before], w->slide_spin[i] - vec3_dot(w->spin[before], tangent), tangent);
     for (int m = k + 1; m < s->tool_count; m++) {
-        *slide_at(s, c, m) = *slide_at(s, before, m) + d;
-        *angle_at(s, c, m) = *angle_at(s, before, m) - phi;
+        *slide_of(s, c, m) = *slide_of(s, before, m) + d;
+        *angle_of(s, c, m) = *angle_of(s, before, m) - phi;
         w->slide_velocity[c * w->inner_count + m - 1] = w->slide_velocity[before * w->inner_count + m - 1];
         w->slide_spin[c * w->inner_count + m - 1] = w->slide_spin[before * w->inner_count + m - 1];
         if (!tools_carries(&s->tool[m]) && s->tool[m].inside > before)
@@ -288,7 +302,7 @@ static void pass_tip(Stepper *s, int k, double ahead)
                 ;
         if (t->inside <= tip && !carries)
             return;          // its tip is behind
-        double out = *slide_at(s, tip, k), at = out - ahead;
+        double out = *slide_of(s, tip, k), at = out - ahead;
         if (j > 0 && t->wire.s[j] - at > JOIN * t->wire.length[j - 1])
             join(s, k, t->wire.s[j] - out);
         else if (carries && t->wire.s[t->first] - at < LEAVE * t->wire.length[t->first - 1])
@@ -306,18 +320,18 @@ static void pass_nodes(Stepper *s, int k, double ahead)
     while (!tools_carries(t)) {
         int last = t->inside - 1;
         double early = EARLY * s->wire.length[last > 0 ? last - 1 : 0] + fabs(ahead);
-        if (last > 0 && *slide_at(s, last, k) - ahead >= t->wire.total_length + 2 * early) {
+        if (last > 0 && *slide_of(s, last, k) - ahead >= t->wire.total_length + 2 * early) {
             t->inside--;
             continue;
         }
         if (last < 0 || t->inside >= w->node_count || s->carrier[t->inside] > k)
             return;
-        double length = tools_span_length(s, last), next = *slide_at(s, last, k) + length;
+        double length = tools_span_length(s, last), next = *slide_of(s, last, k) + length;
         if (next - ahead >= t->wire.total_length + early)
             return;
-        *slide_at(s, t->inside, k) = next;
+        *slide_of(s, t->inside, k) = next;
         // untwisted: turned against the node by what the carrier is twisted
-        *angle_at(s, t->inside, k) = *angle_at(s, last, k) - tools_twist(s, last);
+        *angle_of(s, t->inside, k) = *angle_of(s, last, k) - tools_twist(s, last);
         w->slide_velocity[t->inside * w->inner_count + k - 1] = w->slide_velocity[last * w->inner_count + k - 1];
         w->slide_spin[t->inside * w->inner_count + k - 1] = w->slide_spin[last * w->inner_count + k - 1];
         t->inside++;
@@ -342,8 +356,8 @@ int stepper_tool_count(const Stepper *s) { return s->tool_count; }
 double stepper_tool_inserted(const Stepper *s, int tool) { return s->tool_count > 1 && tool > 0 ? s->tool[tool].inserted : s->state.inserted; }
 
 static bool lies_at(const Stepper *s, int c, int k) { return s->carrier[c] == k || c < s->tool[k].inside; }
-static double material_at(const Stepper *s, int c, int k) { return s->carrier[c] == k ? s->wire.s[c] : *slide_at(s, c, k); }
-static double turned_at(const Stepper *s, int c, int k) { return s->carrier[c] == k ? 0 : *angle_at(s, c, k); }
+static double material_at(const Stepper *s, int c, int k) { return s->carrier[c] == k ? s->wire.s[c] : *slide_of(s, c, k); }
+static double turned_at(const Stepper *s, int c, int k) { return s->carrier[c] == k ? 0 : *angle_of(s, c, k); }
 
 static void between_nodes(const Stepper *s, int c, int k, double at, ToolNode *node)
 {

@@ -15,6 +15,11 @@ void tools_place(Stepper *s);
 void tools_chain(Stepper *s);
 // Nodes and unknowns come and go, by where the commands of this step will have moved the tools.
 void tools_pass(Stepper *s);
+// Tool k >= 1 at node c: does it lie inside another there, and then where [mm], how it is turned [rad], and its two unknowns' place among the node's.
+static inline bool is_inside(const Stepper *s, int c, int k) { return k > s->carrier[c] && c < s->tool[k].inside; }
+static inline double slide_at(const Stepper *s, int c, int k) { return s->state.slide[c * s->state.inner_count + k - 1]; }
+static inline double angle_at(const Stepper *s, int c, int k) { return s->state.angle[c * s->state.inner_count + k - 1]; }
+static inline int unknown_of(int k) { return 6 + 2 * (k - 1); }
 static inline bool tools_carries(const Tool *t) { return t->first < t->wire.node_count; }
 
 // [mm] rest length of the chain's element c; [rad] its twist.
@@ -31,6 +36,12 @@ void tools_set_velocities(Stepper *s);
 void tools_count_commands(Stepper *s);
 double tools_hand_work(const Stepper *s, int tool);
 double tools_stiffness_damping(const Stepper *s);
+
+// Friction between the tools: bounds from the state at the step's start, and the system's unknowns turned into slips against the tool around, and back.
+void tools_slides(Stepper *s);
+void tools_to_slips(Stepper *s);
+void tools_from_slips(Stepper *s);
+double tools_friction_work(const Stepper *s);      // [mJ] that it took in this step
 
 // The linear system of coaxial tools, all but what contacts, loads and constraints add.
 void tools_assemble(Stepper *s, double scale, double inertia);

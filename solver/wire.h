@@ -73,6 +73,7 @@ typedef struct WireState {   // all that a step changes, M nodes; plain data, so
     double *angle;           // (M, I) [rad] by which its frame is turned about the tangent against the node's
     double *slide_velocity;  // (M, I) [mm/ms] of its material along the tangent
     double *slide_spin;      // (M, I) [rad/ms] about it
+    double *slide_force;     // (M, I, 3) [N] friction of the tool around it, along and (over the radius) about the tangent, and its bound
 } WireState;
 
 // --- What the chain is made of; does not change after its creation. ---

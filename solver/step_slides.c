@@ -1,0 +1,126 @@
+// Friction between coaxial tools.
+//
+// A node's tool k presses on the one around it with N = |dM'/ds - T kappa|, M and T of tool k and all inside it: a length h of the line takes the jump of
+// M' over it, less T times the turn. Tools with clearance do not follow a jump of curvature at once: M is averaged over l = 7.3 sqrt(c / kappa), which the two
+// rods in contact give; else a couple at the end of a bend would bear a friction that grows without bound as elements shrink.
+
+#include "solver/step_tools.h"
+
+static const double FOLLOWS = 7.3;
+
+// M averaged over l has the slope (M(s + l/2) - M(s - l/2)) / l; M is that of the element at a place.
+static Vec3 moment_at(const Stepper *s, int k, double place)
+{
+    int low = 0, high = s->state.node_count - 1;      // of elements low to high - 1
+    while (high - low > 1) {
+        int mid = (low + high) / 2;
+        if (0.5 * (s->middle[mid - 1] + s->middle[mid]) <= place)
+            low = mid;
+        else
+            high = mid;
+    }
+    double end = s->middle[s->state.node_count - 2] + 0.5 * tools_span_length(s, s->state.node_count - 2);
+    return place > end || place < 0 ? vec3(0, 0, 0) : s->inner_moment[low * s->state.inner_count + k - 1];
+}
+
+static double pressure_at(const Stepper *s, int c, int k, double window)
+{
+    double h = s->middle[c] - s->middle[c - 1], l = fmax(window, h), half = 0.5 * l;
+    Vec3 right = vec3_sub(moment_at(s, k, s->middle[c] + half), moment_at(s, k, s->middle[c] - half));
+    Vec3 left = vec3_sub(moment_at(s, k, s->middle[c - 1] + half), moment_at(s, k, s->middle[c - 1] - half));
+    Vec3 jump = vec3_scale(vec3_sub(right, left), 1 / l);
+    const Vec3 *x = s->state.position;
+    Vec3 before = vec3_unit_or(vec3_sub(x[c], x[c - 1]), s->axis[0]), after = vec3_unit_or(vec3_sub(x[c + 1], x[c]), before);
+    int inner = s->state.inner_count;
+    double tension = 0.5 * (s->inner_tension[(c - 1) * inner + k - 1] + s->inner_tension[c * inner + k - 1]);
+    return vec3_norm(vec3_add_scaled(jump, -tension, vec3_cross(before, after)));
+}
+
+void tools_slides(Stepper *s)
+{
+    s->set.slide_count = 0;
+    int nodes = s->state.node_count, inner = s->state.inner_count;
+    double at = 0, most = 0;
+    for (int c = 0; c + 1 < nodes; c++) {
+        double length = tools_span_length(s, c);
+        s->middle[c] = at + 0.5 * length;
+        at += length;
+        most = fmax(most, s->bent[c]);
+    }
+    for (int c = 1; c + 1 < nodes; c++)
+        for (int k = 1; k < s->tool_count; k++) {
+            const Tool *t = &s->tool[k];
+            if (!is_inside(s, c, k) || !(t->friction > 0))
+                continue;
+            double window = most > 0 ? FOLLOWS * sqrt(t->clearance / most) : 0;
+            double *last = s->state.slide_force + 3 * (c * inner + k - 1), bound = t->friction * pressure_at(s, c, k, window);
+            // what slid goes on sliding: by the new bound
+            bool slid = hypot(last[0], last[1]) > 0.999999 * last[2];
+            double change = slid && last[2] > 0 ? bound / last[2] : 1;
+            last[2] = bound;
+            s->set.slide[s->set.slide_count++] = (ContactSlide){.node = c, .unknown = unknown_of(k), .radius = t->wire.radius[0], .bound = bound,
+                                                                 .force = {change * last[0], change * last[1]}};
+        }
+}
+
+// The tool that is next around tool k at node c and is an unknown there too; 0: none.
+static int around(const Stepper *s, int c, int k)
+{
+    for (k--; k > 0 && !is_inside(s, c, k); k--)
+        ;
+    return k;
+}
+
+// S of tool k is its slip plus the S of the one around it: the rows and columns of tool k are added to that one's, from the innermost outwards.
+void tools_to_slips(Stepper *s)
+{
+    int n = s->chain.size;
+    for (int c = 1; c < s->chain.count && s->tool_count > 2; c++)
+        for (int k = s->tool_count - 1; k > 1; k--) {
+            int out = is_inside(s, c, k) ? around(s, c, k) : 0;
+            for (int i = 0; out > 0 && i < 2; i++) {
+                int from = unknown_of(k) + i, to = unknown_of(out) + i;
+                double *d = s->chain.diag + block_of(s, c), *l = s->chain.lower + block_of(s, c), *before = l - n * n;
+                for (int j = 0; j < n; j++)
+                    d[n * to + j] += d[n * from + j];
+                for (int j = 0; j < n; j++)
+                    d[n * j + to] += d[n * j + from];
+                for (int j = 0; c + 1 < s->chain.count && j < n; j++)
+                    l[n * j + to] += l[n * j + from];
+                for (int j = 0; j < n; j++)
+                    before[n * to + j] += before[n * from + j];
+                s->b[row_of(s, c) + (size_t)to] += s->b[row_of(s, c) + (size_t)from];
+            }
+        }
+}
+
+void tools_from_slips(Stepper *s)
+{
+    int inner = s->state.inner_count;
+    for (int c = 1; c < s->chain.count; c++)
+        for (int k = 2; k < s->tool_count; k++) {
+            int out = is_inside(s, c, k) ? around(s, c, k) : 0;
+            for (int i = 0; out > 0 && i < 2; i++)
+                s->u[row_of(s, c) + (size_t)(unknown_of(k) + i)] += s->u[row_of(s, c) + (size_t)(unknown_of(out) + i)];
+        }
+    for (int i = 0; i < s->set.slide_count; i++) {
+        const ContactSlide *slide = &s->set.slide[i];
+        double *force = s->state.slide_force + 3 * (slide->node * inner + (slide->unknown - 6) / 2);
+        force[0] = slide->force[0], force[1] = slide->force[1];
+    }
+}
+
+double tools_friction_work(const Stepper *s)
+{
+    double work = 0;
+    for (int i = 0; s->tool_count > 1 && i < s->set.slide_count; i++) {
+        const ContactSlide *slide = &s->set.slide[i];
+        int k = 1 + (slide->unknown - 6) / 2, out = around(s, slide->node, k);
+        const double *u = s->linearised + row_of(s, slide->node);
+        for (int j = 0; j < 2; j++) {
+            double slip = u[slide->unknown + j] - (out > 0 ? u[unknown_of(out) + j] : 0);
+            work -= slide->force[j] * (j ? slide->radius : 1) * slip;
+        }
+    }
+    return work;
+}
