@@ -45,12 +45,6 @@ double tools_span_length(const Stepper *s, int c)
     return s->wire.s[c + 1] - (s->carrier[c] == k ? s->wire.s[c] : slide_at(s, c, k));
 }
 
-double tools_twist(const Stepper *s, int c)
-{
-    Quat p = quat_mul(quat_conjugate(s->state.orientation[c]), s->state.orientation[c + 1]);
-    return 2 * atan2(p.x, p.w);
-}
-
 static const CoaxialSection *section_at(const CoaxialTool *tool, double s)
 {
     const CoaxialSection *section = tool->section, *last = section + tool->count - 1;
@@ -93,6 +87,15 @@ static void keep_inner(const Stepper *s, int c, const CoaxialInput *in, const Co
 }
 
 static bool is_at_tip(const Stepper *s, int c) { return s->carrier[c] != s->carrier[c + 1]; }
+
+double tools_twist(const Stepper *s, int c)
+{
+    // whole turns of the tool that goes on at a tip count
+    double turned = is_at_tip(s, c) ? angle_at(s, c, s->carrier[c + 1]) : 0;
+    Quat q = quat_mul(s->state.orientation[c], quat_from_rotation_vector(vec3(remainder(turned, 2 * PI), 0, 0)));
+    Quat p = quat_mul(quat_conjugate(q), s->state.orientation[c + 1]);
+    return turned + 2 * atan(p.x / p.w);
+}
 
 // Behind a tip the frames of the two nodes belong to two tools: there node 1 is given that of the one that goes on.
 static CoaxialInput input_at(const Stepper *s, int c, int *tool)

@@ -242,6 +242,24 @@ static int slots_of(const Tool *t, int element) { return t->slot_start[element +
 static double *slide_of(const Stepper *s, int c, int k) { return &s->state.slide[c * s->state.inner_count + k - 1]; }
 static double *angle_of(const Stepper *s, int c, int k) { return &s->state.angle[c * s->state.inner_count + k - 1]; }
 
+static bool lies_at(const Stepper *s, int c, int k) { return s->carrier[c] == k || c < s->tool[k].inside; }
+static double material_at(const Stepper *s, int c, int k) { return s->carrier[c] == k ? s->wire.s[c] : *slide_of(s, c, k); }
+static double turned_at(const Stepper *s, int c, int k) { return s->carrier[c] == k ? 0 : *angle_of(s, c, k); }
+
+static void between_nodes(const Stepper *s, int c, int k, double at, ToolNode *node)
+{
+    const WireState *w = &s->state;
+    double s1 = material_at(s, c, k), span = c + 1 < w->node_count && lies_at(s, c + 1, k) ? material_at(s, c + 1, k) - s1 : tools_span_length(s, c);
+    double xi = fmin(1, fmax(0, (at - s1) / span)), phi1 = turned_at(s, c, k), phi2 = c + 1 < w->node_count && lies_at(s, c + 1, k) ? turned_at(s, c + 1, k) : phi1;
+    Vec3 t1 = quat_rotate(w->orientation[c], vec3(1, 0, 0)), t2 = quat_rotate(w->orientation[c + 1], vec3(1, 0, 0));
+    Slot slot = slot_shifted(&(Slot){.element = c}, span, xi);
+    node->position = slot_place(&slot, span, w->position[c], t1, w->position[c + 1], t2).position;
+    Quat a = quat_mul(w->orientation[c], quat_from_rotation_vector(vec3(phi1, 0, 0))), b = quat_mul(w->orientation[c + 1], quat_from_rotation_vector(vec3(phi2, 0, 0)));
+    double same = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0 ? -1 : 1;
+    node->orientation = quat_unit((Quat){a.w + xi * (same * b.w - a.w), a.x + xi * (same * b.x - a.x), a.y + xi * (same * b.y - a.y), a.z + xi * (same * b.z - a.z)});
+    node->carrier = c + 1 < s->first_free ? -1 : s->carrier[c + 1];
+}
+
 // Node c joins the chain behind node c - 1, which is the tip around it, at a distance d [mm] along the curve there.
 static void join(Stepper *s, int k, double d)
 {
@@ -253,13 +271,26 @@ static void join(Stepper *s, int k, double d)
         for (c = w->node_count; c > 0 && s->carrier[c - 1] > k; c--)
             ;
     int before = c - 1;
-    Vec3 curvature = stepper_curvature(s, before);
-    Vec3 tangent = quat_rotate(w->orientation[before], vec3(1, 0, 0)), moved = vec3_add_scaled(vec3_scale(tangent, d), 0.5 * d * d, vec3_cross(curvature, tangent));
     double phi = *angle_of(s, before, k);
+    Vec3 tangent = quat_rotate(w->orientation[before], vec3(1, 0, 0)), place;
+    Quat frame;
+    if (c < w->node_count) {         // on the line of the tool that has gone on from there
+        int m = s->carrier[c], element = before;
+        double at = *slide_of(s, before, m) + d;
+        while (element + 2 < w->node_count && s->carrier[element + 1] == m && s->wire.s[element + 1] < at)
+            element++;
+        ToolNode node;
+        between_nodes(s, element, m, at, &node);
+        place = node.position;
+        frame = quat_mul(node.orientation, quat_from_rotation_vector(vec3(remainder(phi - *angle_of(s, before, m), 2 * PI), 0, 0)));
+    } else {
+        Vec3 curvature = stepper_curvature(s, before), moved = vec3_add_scaled(vec3_scale(tangent, d), 0.5 * d * d, vec3_cross(curvature, tangent));
+        place = vec3_add(w->position[before], moved);
+        frame = quat_mul(quat_from_rotation_vector(vec3_scale(curvature, d)), quat_mul(w->orientation[before], quat_from_rotation_vector(vec3(remainder(phi, 2 * PI), 0, 0))));
+    }
     shift(s, c, slots_of(t, j - 1), true);
-    w->position[c] = vec3_add(w->position[before], moved);
-    Quat turned = quat_mul(w->orientation[before], quat_from_rotation_vector(vec3(phi, 0, 0)));
-    w->orientation[c] = quat_unit(quat_mul(quat_from_rotation_vector(vec3_scale(curvature, d)), turned));
+    w->position[c] = place;
+    w->orientation[c] = quat_unit(frame);
     // its material moves as it did inside
     int i = before * w->inner_count + k - 1;
     w->velocity[c] = vec3_add_scaled(w->velocity[before], w->slide_velocity[i] - vec3_dot(w->velocity[before], tangent), tangent);
@@ -303,7 +334,7 @@ static void pass_tip(Stepper *s, int k, double ahead)
         if (t->inside <= tip && !carries)
             return;          // its tip is behind
         double out = *slide_of(s, tip, k), at = out - ahead;
-        if (j > 0 && t->wire.s[j] - at > JOIN * t->wire.length[j - 1])
+        if (j > 0 && t->wire.s[j] - fmax(at, out) > JOIN * t->wire.length[j - 1])
             join(s, k, t->wire.s[j] - out);
         else if (carries && t->wire.s[t->first] - at < LEAVE * t->wire.length[t->first - 1])
             leave(s, k);
@@ -354,24 +385,6 @@ int stepper_node_capacity(const Stepper *s) { return s->tool_count > 1 ? s->capa
 int stepper_tool_count(const Stepper *s) { return s->tool_count; }
 
 double stepper_tool_inserted(const Stepper *s, int tool) { return s->tool_count > 1 && tool > 0 ? s->tool[tool].inserted : s->state.inserted; }
-
-static bool lies_at(const Stepper *s, int c, int k) { return s->carrier[c] == k || c < s->tool[k].inside; }
-static double material_at(const Stepper *s, int c, int k) { return s->carrier[c] == k ? s->wire.s[c] : *slide_of(s, c, k); }
-static double turned_at(const Stepper *s, int c, int k) { return s->carrier[c] == k ? 0 : *angle_of(s, c, k); }
-
-static void between_nodes(const Stepper *s, int c, int k, double at, ToolNode *node)
-{
-    const WireState *w = &s->state;
-    double s1 = material_at(s, c, k), span = c + 1 < w->node_count && lies_at(s, c + 1, k) ? material_at(s, c + 1, k) - s1 : tools_span_length(s, c);
-    double xi = fmin(1, fmax(0, (at - s1) / span)), phi1 = turned_at(s, c, k), phi2 = c + 1 < w->node_count && lies_at(s, c + 1, k) ? turned_at(s, c + 1, k) : phi1;
-    Vec3 t1 = quat_rotate(w->orientation[c], vec3(1, 0, 0)), t2 = quat_rotate(w->orientation[c + 1], vec3(1, 0, 0));
-    Slot slot = slot_shifted(&(Slot){.element = c}, span, xi);
-    node->position = slot_place(&slot, span, w->position[c], t1, w->position[c + 1], t2).position;
-    Quat a = quat_mul(w->orientation[c], quat_from_rotation_vector(vec3(phi1, 0, 0))), b = quat_mul(w->orientation[c + 1], quat_from_rotation_vector(vec3(phi2, 0, 0)));
-    double same = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0 ? -1 : 1;
-    node->orientation = quat_unit((Quat){a.w + xi * (same * b.w - a.w), a.x + xi * (same * b.x - a.x), a.y + xi * (same * b.y - a.y), a.z + xi * (same * b.z - a.z)});
-    node->carrier = c + 1 < s->first_free ? -1 : s->carrier[c + 1];
-}
 
 int stepper_tool_nodes(const Stepper *s, int k, ToolNode *node)
 {
