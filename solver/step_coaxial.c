@@ -123,15 +123,6 @@ static bool is_plain(const Stepper *s, int c)
     return true;
 }
 
-static BeamInput plain_input(const Stepper *s, int c)
-{
-    const BeamRest *r = &s->beam.rest;
-    const WireState *w = &s->state;
-    return (BeamInput){.x1 = w->position[c], .x2 = w->position[c + 1], .q1 = w->orientation[c], .q2 = w->orientation[c + 1], .length = r->length[c],
-                       .extend = r->extend[c], .axial = r->axial[c], .near = r->near[c], .far = r->far[c], .twist = r->twist[c], .half_w = r->half_w[c],
-                       .half_y = r->half_y[c], .half_z = r->half_z[c]};
-}
-
 static void keep_plain(const Stepper *s, int c, const BeamInput *in, const BeamOutput *out)
 {
     int inner = s->state.inner_count;
@@ -271,26 +262,35 @@ static void element_by_ways(const Stepper *s, int c, const CoaxialInput *in, con
         add_damping(s, c, &elastic, local);
 }
 
+// Node 2 is one as any: what is not its own is in how node 1 takes part.
+static void far_ways(const CoaxialInput *in, const int *tool, int n, Way way[NODAL + COAXIAL_COLUMNS])
+{
+    for (int i = 0; i < 6; i++)
+        way[6 + i] = (Way){1, {n + i, 0}, {1, 0}};
+    for (int i = 0; i < in->count; i++) {
+        int at = n + unknown_of(tool[i]);
+        bool ends = i == 0 || in->span[i].has_tip;
+        way[NODAL + 4 * i + COAXIAL_S2] = ends ? (Way){0} : (Way){1, {at, 0}, {1, 0}};
+        way[NODAL + 4 * i + COAXIAL_PHI2] = ends ? (Way){0} : (Way){1, {at + 1, 0}, {1, 0}};
+    }
+}
+
 // At a tip node 1 has the frame of the tool that goes on: its turn about the tangent is that tool's angle too.
 static void tip_ways(const Stepper *s, int c, const CoaxialInput *in, const int *tool, Way way[NODAL + COAXIAL_COLUMNS])
 {
-    int n = s->chain.size, on = unknown_of(tool[0]);
+    int on = unknown_of(tool[0]);
     Vec3 t = quat_rotate(s->state.orientation[c], vec3(1, 0, 0));
     const double tangent[3] = {t.x, t.y, t.z};
+    far_ways(in, tool, s->chain.size, way);
     for (int i = 0; i < 3; i++) {
         way[i] = (Way){1, {i, 0}, {1, 0}};
         way[3 + i] = (Way){2, {3 + i, on + 1}, {1, tangent[i]}};
-        way[6 + i] = (Way){1, {n + i, 0}, {1, 0}};
-        way[9 + i] = (Way){1, {n + 3 + i, 0}, {1, 0}};
     }
     for (int i = 0; i < in->count; i++) {
         int at = unknown_of(tool[i]);
         Way *w = way + NODAL + 4 * i;
-        bool ends = i == 0 || in->span[i].has_tip;
         w[COAXIAL_S1] = (Way){1, {at, 0}, {1, 0}};
         w[COAXIAL_PHI1] = i == 0 ? (Way){0} : (Way){2, {at + 1, on + 1}, {1, -1}};
-        w[COAXIAL_S2] = ends ? (Way){0} : (Way){1, {n + at, 0}, {1, 0}};
-        w[COAXIAL_PHI2] = ends ? (Way){0} : (Way){1, {n + at + 1, 0}, {1, 0}};
     }
 }
 
@@ -308,7 +308,7 @@ static void inner_element(const Stepper *s, int c, double scale, Local *local)
 {
     int n = s->chain.size, tool[STEP_TOOLS_MAX], place[NODAL + COAXIAL_COLUMNS], columns = 0;
     bool plain = is_plain(s, c), damps = s->is_iterate && scale != 1;
-    BeamInput beam = plain_input(s, c);
+    BeamInput beam = stepper_beam(s, c);
     BeamOutput own;
     CoaxialInput in = {0};
     CoaxialOutput out;
@@ -455,22 +455,17 @@ static CoaxialInput mouth_input(const Stepper *s, int *tool)
 
 static void mouth_ways(const Stepper *s, const CoaxialInput *in, const int *tool, Way way[NODAL + COAXIAL_COLUMNS])
 {
-    int n = s->chain.size;
     const double d[3] = {s->axis[0].x, s->axis[0].y, s->axis[0].z};
+    far_ways(in, tool, s->chain.size, way);
     for (int i = 0; i < 3; i++) {
         way[i] = (Way){0};
         way[3 + i] = (Way){1, {3, 0}, {d[i], 0}};
-        way[6 + i] = (Way){1, {n + i, 0}, {1, 0}};
-        way[9 + i] = (Way){1, {n + 3 + i, 0}, {1, 0}};
     }
     for (int i = 0; i < in->count; i++) {
         int at = unknown_of(tool[i]);
         Way *w = way + NODAL + 4 * i;
-        bool ends = i == 0 || in->span[i].has_tip;
         w[COAXIAL_S1] = i == 0 ? (Way){1, {0, 0}, {-1, 0}} : (Way){2, {at, 0}, {1, -1}};
         w[COAXIAL_PHI1] = i == 0 ? (Way){0} : (Way){1, {at + 1, 0}, {1, 0}};
-        w[COAXIAL_S2] = ends ? (Way){0} : (Way){1, {n + at, 0}, {1, 0}};
-        w[COAXIAL_PHI2] = ends ? (Way){0} : (Way){1, {n + at + 1, 0}, {1, 0}};
     }
 }
 
@@ -735,7 +730,7 @@ double tools_elastic_energy(const Stepper *s)
                 energy += straightened(&s->tool[tool[i]], from, in.span[i].s1) - straightened(&s->tool[tool[i]], in.span[i].s1, from);
             }
         } else if (is_plain(s, c)) {
-            BeamInput in = plain_input(s, c);
+            BeamInput in = stepper_beam(s, c);
             BeamOutput out;
             beam_element(&in, &out);
             energy += out.energy;

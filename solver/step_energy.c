@@ -1,6 +1,15 @@
 // Energies of a state, and what a step's motion has done to them: each force of the step's end times the motion, as implicit Euler has it.
 #include "solver/step_tools.h"
 
+BeamInput stepper_beam(const Stepper *s, int i)
+{
+    const BeamRest *r = &s->beam.rest;
+    const WireState *w = &s->state;
+    return (BeamInput){.x1 = w->position[i], .x2 = w->position[i + 1], .q1 = w->orientation[i], .q2 = w->orientation[i + 1], .length = r->length[i],
+                       .extend = r->extend[i], .axial = r->axial[i], .near = r->near[i], .far = r->far[i], .twist = r->twist[i], .half_w = r->half_w[i],
+                       .half_y = r->half_y[i], .half_z = r->half_z[i]};
+}
+
 static double element_energy(const Stepper *s, int i, int held)
 {
     const BeamRest *r = &s->beam.rest;
@@ -16,9 +25,7 @@ static double element_energy(const Stepper *s, int i, int held)
         sheath_element(r, i, s->mouth, s->axis[0], stepper_sheath_coordinate(s, i), w->orientation[i], w->position[i + 1], w->orientation[i + 1], 0, &e);
         return e.energy;
     }
-    BeamInput in = {.x1 = w->position[i], .x2 = w->position[i + 1], .q1 = w->orientation[i], .q2 = w->orientation[i + 1],
-                    .length = r->length[i], .extend = r->extend[i], .axial = r->axial[i], .near = r->near[i], .far = r->far[i],
-                    .twist = r->twist[i], .half_w = r->half_w[i], .half_y = r->half_y[i], .half_z = r->half_z[i]};
+    BeamInput in = stepper_beam(s, i);
     BeamOutput out;
     beam_element(&in, &out);
     return out.energy;

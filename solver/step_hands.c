@@ -2,6 +2,14 @@
 // S at the hub grow by a_0 - a_k, so its push is -dE/dS; the outermost tool's hand feels the total less the others'.
 #include "solver/step_tools.h"
 
+// [mm] displacement of S of tool k at the hub in this step that the commands ask for.
+static double wanted_slide(const Stepper *s, int k)
+{
+    const Tool *t = &s->tool[k];
+    double hub = s->state.inserted + s->command.advance - s->tool[0].wire.total_length;
+    return t->wire.total_length - t->inserted - s->tool_command[k].advance + hub - s->start_slide[k - 1];
+}
+
 void tools_constrain(Stepper *s)
 {
     for (int c = 0; c < s->chain.count; c++)
@@ -9,16 +17,14 @@ void tools_constrain(Stepper *s)
             for (int i = 0; !is_inside(s, c, k) && i < 2; i++)
                 stepper_prescribe(s, c, unknown_of(k) + i, 0);
     for (int k = 1; k < s->tool_count; k++) {
-        const Tool *t = &s->tool[k], *out = &s->tool[0];
+        const Tool *t = &s->tool[k];
         if (!is_inside(s, 0, k))
             continue;
-        double hub = s->state.inserted + s->command.advance - out->wire.total_length;
-        double slide = t->wire.total_length - t->inserted - s->tool_command[k].advance + hub;
         double angle = t->twist + s->tool_command[k].twist - (s->state.twist + s->command.twist);
         if (s->tool_slips[k])
             s->b[unknown_of(k)] -= s->tool_slips[k] * t->hand_limit;
         else
-            stepper_prescribe(s, 0, unknown_of(k), slide - s->start_slide[k - 1]);
+            stepper_prescribe(s, 0, unknown_of(k), wanted_slide(s, k));
         stepper_prescribe(s, 0, unknown_of(k) + 1, angle - s->start_angle[k - 1]);
     }
 }
@@ -47,11 +53,10 @@ bool tools_misjudges_grip(Stepper *s, int k)
     int was = s->tool_slips[k], at = unknown_of(k);
     if (t->hand_limit == 0 || !is_inside(s, 0, k))
         return false;
-    double push = -stepper_reaction(s, at), hub = s->state.inserted + s->command.advance - s->tool[0].wire.total_length;
-    double wanted = t->wire.total_length - t->inserted - s->tool_command[k].advance + hub - s->start_slide[k - 1];
+    double push = -stepper_reaction(s, at);
     if (was == 0 && fabs(push) > t->hand_limit)
         s->tool_slips[k] = push > 0 ? 1 : -1;
-    else if (was != 0 && was * (wanted - s->u[at]) > 0)
+    else if (was != 0 && was * (wanted_slide(s, k) - s->u[at]) > 0)
         s->tool_slips[k] = 0;
     return s->tool_slips[k] != was;
 }

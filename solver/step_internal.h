@@ -161,6 +161,8 @@ void stepper_forget(Stepper *s, int node);
 // Adds the slots' forces to the nodes between which they are.
 void stepper_share_forces(const Stepper *s, NodeReport *node);
 void stepper_assemble(Stepper *s);
+// Element i, between two nodes of one tool, as it is now.
+BeamInput stepper_beam(const Stepper *s, int i);
 // Row and column of one unknown become a unit row with its value.
 void stepper_prescribe(Stepper *s, int node, int dof, double value);
 // What a load puts on its node (end 0) or the one after it (1) at this time, in space; false: nothing.

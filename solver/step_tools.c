@@ -54,7 +54,6 @@ static bool make_tool(Tool *t, const WireOptions *o, char *why, int capacity)
             t->slot[t->slot_start[i] + k] = slot_make((int)i, t->wire.length[i], k, count, section->diameter / 2, section->friction);
     }
     t->hand_limit = o->hand_limit;
-    t->clearance = HUGE_VAL;
     t->inserted = fmin(o->inserted, t->wire.total_length);
     return t->slot != NULL;
 }
@@ -192,7 +191,7 @@ void tools_place(Stepper *s)
     for (int k = 1; k < s->tool_count; k++) {
         Tool *t = &s->tool[k];
         for (t->inside = 0; t->inside < (tools_carries(t) ? t->start : s->state.node_count); t->inside++)
-            if (s->state.slide[t->inside * s->state.inner_count + k - 1] >= t->wire.total_length)
+            if (slide_at(s, t->inside, k) >= t->wire.total_length)
                 break;
     }
 }
@@ -243,8 +242,8 @@ static double *slide_of(const Stepper *s, int c, int k) { return &s->state.slide
 static double *angle_of(const Stepper *s, int c, int k) { return &s->state.angle[c * s->state.inner_count + k - 1]; }
 
 static bool lies_at(const Stepper *s, int c, int k) { return s->carrier[c] == k || c < s->tool[k].inside; }
-static double material_at(const Stepper *s, int c, int k) { return s->carrier[c] == k ? s->wire.s[c] : *slide_of(s, c, k); }
-static double turned_at(const Stepper *s, int c, int k) { return s->carrier[c] == k ? 0 : *angle_of(s, c, k); }
+static double material_at(const Stepper *s, int c, int k) { return s->carrier[c] == k ? s->wire.s[c] : slide_at(s, c, k); }
+static double turned_at(const Stepper *s, int c, int k) { return s->carrier[c] == k ? 0 : angle_at(s, c, k); }
 
 static void between_nodes(const Stepper *s, int c, int k, double at, ToolNode *node)
 {
