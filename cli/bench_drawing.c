@@ -59,12 +59,12 @@ static bool take_moments(Studio *studio, Faults *faults)
     for (int64_t i = 0, taken = 0; good && taken < MOMENTS; i++) {
         Command command = bench_command(scene, i, &cursor);
         simulator_step(simulator, command);
-        lesson_step(lesson, simulator, command, &xray);
+        lesson_step(lesson, simulator, &(ToolCommands){.tool = {command}}, &xray);
         if (i < first || (i - first) % 33 != 0)
             continue;
-        good = (studio->pose[taken] = pose_create(simulator_state(simulator)->node_count)) != NULL;
+        good = (studio->pose[taken] = pose_create_for(simulator)) != NULL;
         if (good) {
-            pose_take(studio->pose[taken], simulator, command, &xray);
+            pose_take(studio->pose[taken], simulator, &(ToolCommands){.tool = {command}}, &xray);
             lesson_publish(lesson, lesson_of(studio, (int)taken));
         }
         taken++;

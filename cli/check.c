@@ -107,9 +107,9 @@ typedef struct Sampling {
     bool no_memory;
 } Sampling;
 
-static bool sample_step(void *context, Simulator *simulator, Command command)
+static bool sample_step(void *context, Simulator *simulator, const ToolCommands *commands)
 {
-    (void)command;
+    (void)commands;
     Sampling *sampling = context;
     sampling->no_memory |= !tool_path_sample(sampling->path, simulator, false);
     return !sampling->no_memory;

@@ -47,9 +47,9 @@ typedef struct Watch {
     bool rested;
 } Watch;
 
-static bool after_step(void *context, Simulator *simulator, Command command)
+static bool after_step(void *context, Simulator *simulator, const ToolCommands *commands)
 {
-    (void)command;
+    (void)commands;
     Watch *watch = context;
     double time_s = simulator_time_s(simulator);
     verify_measure_step(watch->measure, false);

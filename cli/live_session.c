@@ -7,11 +7,11 @@
 // As often as a film or the eye takes one; an hour of them takes 1.7 GB for 200 elements.
 static const double frame_ms = 33;
 
-static bool take_over_step(void *context, Simulator *simulator, Command command, const XrayControl *xray)
+static bool take_over_step(void *context, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray)
 {
     LiveSession *session = context;
-    lesson_step(session->lesson, simulator, command, xray);
-    return !session->recording || recording_step(session->recording, simulator, command, xray);
+    lesson_step(session->lesson, simulator, commands, xray);
+    return !session->recording || recording_step(session->recording, simulator, commands, xray);
 }
 
 static bool take_over(LiveSession *session, const LiveSessionOptions *options, Faults *faults)

@@ -143,9 +143,9 @@ typedef struct Sampling {
     bool no_memory;
 } Sampling;
 
-static bool sample(void *context, Simulator *simulator, Command command, const XrayControl *xray)
+static bool sample(void *context, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray)
 {
-    (void)command;
+    (void)commands;
     (void)xray;
     Sampling *sampling = context;
     sampling->no_memory |= sampling->path && !tool_path_sample(sampling->path, simulator, false);

@@ -68,9 +68,9 @@ void rescore_advance(Rescore *rescore, int64_t to, double budget_s)
     to = to < run->step_count ? to : run->step_count;
     while (rescore->different < 0 && rescore->steps < to && clock_s(CLOCK_MONOTONIC) < until) {
         int64_t i = rescore->steps++;
-        Command command = {run->command[2 * i], run->command[2 * i + 1]};
-        simulator_step(rescore->simulator, command);
-        lesson_step(rescore->lesson, rescore->simulator, command, rescore->was_watched ? &run->xray[i] : NULL);
+        ToolCommands commands = recorded_run_commands(run, i);
+        simulator_step_tools(rescore->simulator, &commands);
+        lesson_step(rescore->lesson, rescore->simulator, &commands, rescore->was_watched ? &run->xray[i] : NULL);
         if (simulator_hash(rescore->simulator) != run->state_hash[i])
             rescore->different = i;
         else

@@ -212,7 +212,7 @@ static void take_moment(Moment *moment, Simulator *simulator)
     moment->taken = true;
 }
 
-static bool watch_step(void *context, Simulator *simulator, Command command)
+static bool watch_step(void *context, Simulator *simulator, const ToolCommands *commands)
 {
     Watch *watch = context;
     for (int i = 0; i < watch->options->moment_count; i++)
@@ -221,10 +221,10 @@ static bool watch_step(void *context, Simulator *simulator, Command command)
     if (watch->hands)
         run_hands_answer(watch->hands, simulator_last(simulator), simulator_totals(simulator)->steps);
     if (watch->lesson)
-        lesson_step(watch->lesson, simulator, command, NULL);
+        lesson_step(watch->lesson, simulator, commands, NULL);
     if (watch->chart)
         run_chart_step(watch->chart, simulator);
-    if (watch->recording && !recording_step(watch->recording, simulator, command, NULL))
+    if (watch->recording && !recording_step(watch->recording, simulator, commands, NULL))
         watch->recording_failed = true;
     return !watch->recording_failed;
 }

@@ -97,10 +97,10 @@ RunHands *run_hands_open(int map_count, const char *const *map, double dt, doubl
     return NULL;
 }
 
-Command run_hands_command(void *context)
+ToolCommands run_hands_command(void *context)
 {
     RunHands *hands = context;
-    return hand_set_command(&hands->set, hands->dt);
+    return (ToolCommands){.tool = {hand_set_command(&hands->set, hands->dt)}};
 }
 
 void run_hands_answer(RunHands *hands, const StepReport *report, int64_t step) { hand_set_answer(&hands->set, report, step); }

@@ -10,7 +10,7 @@ enum { RUN_MAPS = 8 };
 
 // `map`: files of device maps; "auto" stands for the built-in ones. Waits up to `patience_s` for the first device. NULL with faults.
 RunHands *run_hands_open(int map_count, const char *const *map, double dt, double patience_s, Faults *faults);
-Command run_hands_command(void *hands);          // of the next step, as DriveOptions.hand wants it: `context` is the RunHands
+ToolCommands run_hands_command(void *hands);          // of the next step, as DriveOptions.hand wants it: `context` is the RunHands
 void run_hands_answer(RunHands *hands, const StepReport *report, int64_t step);
 void run_hands_close(RunHands *hands);           // NULL is fine
 

@@ -79,12 +79,12 @@ Views *scene_views_create(Scene *scene, OpenVessel *open, Desk *desk, char *note
     int before = faults->count;
     Volume *volume = scene->anatomy_path ? volume_load(scene->anatomy_path, faults) : NULL;
     Simulator *simulator = scene_has_one_tool(scene, "a window", faults) ? simulator_create(scene, open->vessel, faults) : NULL;
-    Pose *pose = simulator ? pose_create(simulator_state(simulator)->node_count) : NULL;
+    Pose *pose = simulator ? pose_create_for(simulator) : NULL;
     XrayControl xray = xray_default_control();
     Views *views = NULL;
     *note = 0;
     if (pose && faults->count == before) {
-        pose_take(pose, simulator, (Command){0, 0}, &xray);
+        pose_take(pose, simulator, &(ToolCommands){0}, &xray);
         views = create(scene, open, volume, pose, desk, note, capacity, faults);
     } else if (faults->count == before) {
         faults_add(faults, scene->path, 0, 0, "cannot be shown: no memory");

@@ -17,6 +17,7 @@ enum { TOOLS_MOST = 4, TOOL_NAME_SIZE = 32 };
 
 typedef struct ToolCommands {
     Command tool[TOOLS_MOST];    // outermost first; a tool that is not named is pinned: 0
+    unsigned released;           // bit k: no hand holds tool k, only the friction of the valve that it goes through
 } ToolCommands;
 
 typedef struct ToolNames {   // of the scene that a script is for, outermost first; NULL after the last

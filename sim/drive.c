@@ -104,11 +104,10 @@ DriveReport simulator_drive(Simulator *simulator, const DriveOptions *options)
         if (scripted)
             commands = script_tools_at(options->script, (double)i * scene->dt / 1000, &cursor);
         else if (options->hand && i < driven)
-            commands.tool[0] = options->hand(options->hand_context);
-        Command command = commands.tool[0];
+            commands = options->hand(options->hand_context);
         simulator_step_tools(simulator, &commands);
         at_rest_s = simulator_fastest_mm_s(simulator) <= rest_speed_mm_s ? at_rest_s + step_s : 0;
-        bool goes_on = !options->after_step || options->after_step(options->context, simulator, command);
+        bool goes_on = !options->after_step || options->after_step(options->context, simulator, &commands);
         if (options->paced)
             keep_pace(&report, options->live, &base, base + (i + 1) * step_ns);
         if (!goes_on) {

@@ -24,14 +24,14 @@ typedef struct DriveReport {
 
 typedef struct DriveOptions {
     const Script *script;            // NULL: no input …
-    Command (*hand)(void *hand_context);   // … or this instead, asked once before each step
+    ToolCommands (*hand)(void *hand_context);   // … or this instead, asked once before each step
     void *hand_context;
     double duration_s;               // < 0: the script's
     double settle_s;                 // afterwards, without input, at most this long, until nothing is faster than 0.01 mm/s for 0.1 s
     bool paced;                      // a step begins when the last one's millisecond is over, see below
     const volatile sig_atomic_t *stop;   // NULL, or stops before the next step once it is not 0
     // After each step, on the simulation thread; false stops. May be NULL.
-    bool (*after_step)(void *context, Simulator *simulator, Command command);
+    bool (*after_step)(void *context, Simulator *simulator, const ToolCommands *commands);
     DriveReport *live;               // NULL, or where deadlines of a paced run are counted while it goes; added to what is there
     TimeHistogram *late_ns;          // NULL, or by how much each paced step began late
     void *context;

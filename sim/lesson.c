@@ -36,10 +36,10 @@ void lesson_free(Lesson *lesson)
     free(lesson);
 }
 
-void lesson_step(void *context, Simulator *simulator, Command command, const XrayControl *xray)
+void lesson_step(void *context, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray)
 {
     Lesson *lesson = context;
-    score_step(lesson->score, simulator, command, xray);
+    score_step(lesson->score, simulator, commands, xray);
     lesson->injected += xray ? (double)xray->contrast_ml_s * lesson->dt_s : 0;
     if (++lesson->steps % CONTRAST_EVERY != 0)
         return;

@@ -19,7 +19,7 @@ typedef struct Lesson Lesson;
 Lesson *lesson_create(Simulator *simulator, const VesselTree *tree);
 void lesson_free(Lesson *lesson);
 // These two fit realtime's after_step and publish. Neither allocates.
-void lesson_step(void *lesson, Simulator *simulator, Command command, const XrayControl *xray);
+void lesson_step(void *lesson, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
 void lesson_publish(void *lesson, void *view);
 size_t lesson_view_bytes(const Lesson *lesson);
 const Score *lesson_score(const Lesson *lesson);

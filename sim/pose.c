@@ -3,25 +3,46 @@
 #include <stdlib.h>
 #include <string.h>
 
-Pose *pose_create(int node_count)
+Pose *pose_create_tools(int node_capacity, int tool_count, const int *tool_nodes)
 {
     Pose *pose = calloc(1, sizeof *pose);
     if (!pose)
         return NULL;
-    *pose = (Pose){.node_count = node_count,
-                   .position = calloc((size_t)node_count, sizeof *pose->position),
-                   .quaternion = calloc((size_t)node_count, sizeof *pose->quaternion),
-                   .node = calloc((size_t)node_count, sizeof *pose->node)};
-    if (pose->position && pose->quaternion && pose->node)
+    *pose = (Pose){.node_capacity = node_capacity,
+                   .node_count = node_capacity,
+                   .tool_count = tool_count,
+                   .position = calloc((size_t)node_capacity, sizeof *pose->position),
+                   .quaternion = calloc((size_t)node_capacity, sizeof *pose->quaternion),
+                   .node = calloc((size_t)node_capacity, sizeof *pose->node)};
+    bool good = pose->position && pose->quaternion && pose->node;
+    for (int k = 0; k < tool_count; k++) {
+        pose->tool[k].node_count = tool_nodes[k];
+        pose->tool[k].node = calloc((size_t)tool_nodes[k], sizeof *pose->tool[k].node);
+        good = good && pose->tool[k].node;
+    }
+    if (good)
         return pose;
     pose_free(pose);
     return NULL;
+}
+
+Pose *pose_create(int node_count) { return pose_create_tools(node_count, 1, &node_count); }
+
+Pose *pose_create_for(Simulator *simulator)
+{
+    const Stepper *stepper = simulator_stepper(simulator);
+    int nodes[STEP_TOOLS_MAX], count = stepper_tool_count(stepper);
+    for (int k = 0; k < count; k++)
+        nodes[k] = stepper_tool_nodes(stepper, k, NULL);
+    return pose_create_tools(stepper_node_capacity(stepper), count, nodes);
 }
 
 void pose_free(Pose *pose)
 {
     if (!pose)
         return;
+    for (int k = 0; k < STEP_TOOLS_MAX; k++)
+        free(pose->tool[k].node);
     free(pose->position);
     free(pose->quaternion);
     free(pose->node);
@@ -39,6 +60,11 @@ void pose_copy(Pose *to, const Pose *from)
     memcpy(to->position, from->position, count * sizeof *to->position);
     memcpy(to->quaternion, from->quaternion, count * sizeof *to->quaternion);
     memcpy(to->node, from->node, count * sizeof *to->node);
+    to->tool_count = arrays.tool_count;
+    for (int k = 0; k < to->tool_count; k++) {
+        to->tool[k].node = arrays.tool[k].node;
+        memcpy(to->tool[k].node, from->tool[k].node, (size_t)from->tool[k].node_count * sizeof *to->tool[k].node);
+    }
 }
 
 // Behind the mouth lies what is not inserted. Without a sheath all of the tool is.
@@ -50,21 +76,31 @@ static void find_first_free(Pose *pose, bool has_sheath)
         pose->first_free_node++;
 }
 
-void pose_take(Pose *pose, Simulator *simulator, Command command, const XrayControl *xray)
+void pose_take(Pose *pose, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray)
 {
     const WireState *state = simulator_state(simulator);
+    Stepper *stepper = simulator_stepper(simulator);
     size_t count = (size_t)state->node_count;
     pose->step = simulator_totals(simulator)->steps;
     pose->time_s = simulator_time_s(simulator);
-    pose->command = command;
+    pose->command = commands->tool[0];
     pose->xray = *xray;
     pose->inserted_mm = state->inserted;
     pose->turned_deg = state->twist * 180 / PI;
     pose->report = *simulator_last(simulator);
+    pose->node_count = state->node_count;
     memcpy(pose->position, state->position, count * sizeof *pose->position);
     memcpy(pose->quaternion, state->orientation, count * sizeof *pose->quaternion);
-    stepper_node_report(simulator_stepper(simulator), pose->node);
+    stepper_node_report(stepper, pose->node);
     find_first_free(pose, simulator_scene(simulator)->wire.has_sheath);
+    for (int k = 0; k < pose->tool_count; k++) {
+        PoseTool *tool = &pose->tool[k];
+        tool->command = commands->tool[k];
+        tool->inserted_mm = stepper_tool_inserted(stepper, k);
+        tool->push_n = pose->report.push[k];
+        tool->torque_n_mm = pose->report.torque[k];
+        stepper_tool_nodes(stepper, k, tool->node);
+    }
 }
 
 void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64_t frame)
@@ -87,4 +123,12 @@ void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64
                                      .gap = (double)run->gap[first + i], .vessel_node = run->vessel_node[first + i]};
     }
     find_first_free(pose, scene->wire.has_sheath);
+    PoseTool *tool = &pose->tool[0];
+    tool->command = pose->command;
+    tool->inserted_mm = pose->inserted_mm;
+    tool->push_n = pose->report.proximal_force;
+    tool->torque_n_mm = pose->report.proximal_torque;
+    for (int j = 0; j < pose->node_count; j++)
+        tool->node[j] = (ToolNode){.s = pose->node[j].s, .position = pose->position[j], .orientation = pose->quaternion[j], .radius = pose->node[j].radius,
+                                   .carrier = j < pose->first_free_node ? -1 : 0};
 }

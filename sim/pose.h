@@ -5,25 +5,41 @@
 
 #include "sim/recording.h"
 
+// One of the coaxial tools, all of it: behind the hub, in the sheath and inside other tools too. With one tool these are the pose's own nodes.
+typedef struct PoseTool {
+    Command command;         // of the last step
+    double inserted_mm;      // beyond the mouth
+    double push_n, torque_n_mm;      // that its hand feels
+    int node_count;          // does not change during a run
+    ToolNode *node;          // (node_count)
+} PoseTool;
+
 typedef struct Pose {
     int64_t step;            // steps so far
     double time_s;
-    Command command;         // of the last step
+    Command command;         // of the last step, the first tool's
     XrayControl xray;
     double inserted_mm, turned_deg;  // fed in beyond the mouth; turned since the start
     StepReport report;       // of the last step
-    int node_count;          // M, proximal to distal
+    int tool_count;          // outermost first
+    PoseTool tool[STEP_TOOLS_MAX];
+    // the shared centreline, which the wall touches
+    int node_capacity;       // M at most
+    int node_count;          // M, proximal to distal; with several tools nodes come and go
     int first_free_node;     // nodes below it lie in the sheath
     Vec3 *position;          // (M)
     Quat *quaternion;        // (M) its x axis is the tool's tangent towards the tip
     NodeReport *node;        // (M) radius, wall force, gap, vessel node
 } Pose;
 
-Pose *pose_create(int node_count);   // NULL where memory lacks
+Pose *pose_create(int node_count);   // for one tool with so many nodes; NULL where memory lacks
+// For `tool_nodes[k]` nodes of each tool.
+Pose *pose_create_tools(int node_capacity, int tool_count, const int *tool_nodes);
+Pose *pose_create_for(Simulator *simulator);
 void pose_free(Pose *pose);
-void pose_copy(Pose *to, const Pose *from);   // same node_count
+void pose_copy(Pose *to, const Pose *from);   // made for the same tools
 // Detects afresh (about 20 us): every 10 ms, not every step. Changes nothing that a later step depends on. Allocates nothing.
-void pose_take(Pose *pose, Simulator *simulator, Command command, const XrayControl *xray);
+void pose_take(Pose *pose, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
 // Frame `frame` of a recording of `scene` with as many nodes; what it does not hold (contacts, iterations) is 0.
 void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64_t frame);
 

@@ -35,12 +35,12 @@ struct Realtime {
 
 RealtimeOptions realtime_default_options(void) { return (RealtimeOptions){.pose_ms = 10, .xray = xray_default_control()}; }
 
-static Command ask_hands(void *context)
+static ToolCommands ask_hands(void *context)
 {
     Realtime *realtime = context;
     if (triple_buffer_fetch(&realtime->xray_buffer))
         realtime->now = realtime->xray[realtime->xray_buffer.reading];
-    return hand_set_command(&realtime->hands, simulator_scene(realtime->options.simulator)->dt);
+    return (ToolCommands){.tool = {hand_set_command(&realtime->hands, simulator_scene(realtime->options.simulator)->dt)}};
 }
 
 static void renew_figures(Realtime *realtime)
@@ -65,13 +65,13 @@ static void renew_figures(Realtime *realtime)
     }
 }
 
-static void publish(Realtime *realtime, Command command)
+static void publish(Realtime *realtime, const ToolCommands *commands)
 {
     const RealtimeOptions *options = &realtime->options;
     Moment *moment = &realtime->moment[realtime->moment_buffer.writing];
     if (realtime->moments++ % FIGURES_EVERY == 0)
         renew_figures(realtime);
-    pose_take(moment->pose, options->simulator, command, &realtime->now);
+    pose_take(moment->pose, options->simulator, commands, &realtime->now);
     moment->figures = realtime->figures;
     if (options->publish)
         options->publish(options->context, moment->extra);
@@ -79,20 +79,20 @@ static void publish(Realtime *realtime, Command command)
     realtime->since_pose = 0;
 }
 
-static bool after_step(void *context, Simulator *simulator, Command command)
+static bool after_step(void *context, Simulator *simulator, const ToolCommands *commands)
 {
     Realtime *realtime = context;
     const RealtimeOptions *options = &realtime->options;
     const StepReport *report = simulator_last(simulator);
     hand_set_answer(&realtime->hands, report, simulator_totals(simulator)->steps);
     if (options->after_step)
-        options->after_step(options->context, simulator, command, &realtime->now);
-    if (options->recording && !recording_step(options->recording, simulator, command, &realtime->now))
+        options->after_step(options->context, simulator, commands, &realtime->now);
+    if (options->recording && !recording_step(options->recording, simulator, commands, &realtime->now))
         realtime->figures.state = REALTIME_UNRECORDED;
     if (report->flags & STEP_DIVERGED)
         realtime->figures.state = REALTIME_DIVERGED;
     if (++realtime->since_pose >= realtime->pose_every || realtime->figures.state != REALTIME_RUNNING)
-        publish(realtime, command);
+        publish(realtime, commands);
     return realtime->figures.state == REALTIME_RUNNING && !atomic_load_explicit(&realtime->paused, memory_order_relaxed) &&
            !atomic_load_explicit(&realtime->ending, memory_order_relaxed);
 }
@@ -111,12 +111,12 @@ static void *run_session(void *argument)
     drive.context = realtime;
     drive.live = &realtime->live;
     drive.late_ns = &realtime->late_ns;
-    publish(realtime, (Command){0, 0});
+    publish(realtime, &(ToolCommands){0});
     while (!atomic_load(&realtime->ending) && realtime->figures.state < REALTIME_DIVERGED) {
         if (atomic_load(&realtime->paused)) {
             if (realtime->figures.state == REALTIME_RUNNING) {
                 realtime->figures.state = REALTIME_PAUSED;
-                publish(realtime, (Command){0, 0});
+                publish(realtime, &(ToolCommands){0});
             }
             nap(2);
             continue;
@@ -142,10 +142,9 @@ Realtime *realtime_start(const RealtimeOptions *options, Faults *faults)
 {
     Realtime *realtime = calloc(1, sizeof *realtime);
     const Scene *scene = simulator_scene(options->simulator);
-    int nodes = simulator_state(options->simulator)->node_count;
     bool good = realtime != NULL;
     for (int i = 0; good && i < 3; i++) {
-        realtime->moment[i].pose = pose_create(nodes);
+        realtime->moment[i].pose = pose_create_for(options->simulator);
         realtime->moment[i].extra = calloc(1, options->extra_bytes + 1);
         good = realtime->moment[i].pose && realtime->moment[i].extra;
     }

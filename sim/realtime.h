@@ -22,7 +22,7 @@ typedef struct RealtimeOptions {
     double pose_ms;                  // simulated time between moments, default 10
     bool paused;                     // at the start
     // On the thread, after each step; must not wait. May be NULL.
-    void (*after_step)(void *context, Simulator *simulator, Command command, const XrayControl *xray);
+    void (*after_step)(void *context, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
     // On the thread, with each moment: fills what else goes out with it (`extra_bytes`). May be NULL.
     void (*publish)(void *context, void *extra);
     void *context;

@@ -261,3 +261,8 @@ bool recorded_run_was_watched(const RecordedRun *run)
             return true;
     return false;
 }
+
+ToolCommands recorded_run_commands(const RecordedRun *run, int64_t step)
+{
+    return (ToolCommands){.tool = {{run->command[2 * step], run->command[2 * step + 1]}}};
+}

@@ -425,14 +425,14 @@ static bool push_frame(Recording *recording, Simulator *simulator)
     return true;
 }
 
-bool recording_step(Recording *recording, Simulator *simulator, Command command, const XrayControl *xray)
+bool recording_step(Recording *recording, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray)
 {
     if (!wait_for_room(recording, &recording->steps))
         return false;
     const StepReport *report = simulator_last(simulator);
     Ring *ring = &recording->steps;
     double time = simulator_time_s(simulator), inserted = simulator_state(simulator)->inserted, penetration = report->penetration;
-    double commanded[2] = {command.push_mm_s, command.twist_deg_s}, proximal[2] = {report->proximal_force, report->proximal_torque};
+    double commanded[2] = {commands->tool[0].push_mm_s, commands->tool[0].twist_deg_s}, proximal[2] = {report->proximal_force, report->proximal_torque};
     uint64_t hash = simulator_hash(simulator);
     double residual = report->residual, wall_force[2] = {report->wall_force_max, report->wall_force_sum};
     int32_t contacts = report->active, iterations = report->iterations, linearisations = 1 + report->newton;

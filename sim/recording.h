@@ -38,7 +38,7 @@ void recording_prepare_process(void);
 Recording *recording_create(const char *path, Simulator *simulator, const RecordingOptions *options, Faults *faults);
 // After a step. Allocates nothing, calls no file; waits where the disk is slower than the simulation. False once writing failed.
 // `xray` may be NULL: nobody sees the run.
-bool recording_step(Recording *recording, Simulator *simulator, Command command, const XrayControl *xray);
+bool recording_step(Recording *recording, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
 // Adds the last state as a frame, writes what is left, ends. False with a fault where writing failed; always frees.
 bool recording_close(Recording *recording, Simulator *simulator, Faults *faults);
 
@@ -74,6 +74,7 @@ RecordedRun *recorded_run_load(const char *path, Faults *faults);
 // The same without frames and nodes, whose counts are 0: what every step has (an hour takes 0.6 GB instead of 2).
 RecordedRun *recorded_run_load_series(const char *path, Faults *faults);
 void recorded_run_free(RecordedRun *run);
+ToolCommands recorded_run_commands(const RecordedRun *run, int64_t step);
 // Whether somebody saw the run: its steps have X-ray controls (`nav`). Else (`run --record`) nobody can have moved the tool blindly.
 bool recorded_run_was_watched(const RecordedRun *run);
 

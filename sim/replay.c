@@ -20,16 +20,15 @@ Scene *replay_scene(const RecordedRun *run, const char *path, Faults *faults)
     return scene;
 }
 
-static Command command_of(const RecordedRun *run, int64_t step) { return (Command){run->command[2 * step], run->command[2 * step + 1]}; }
-
 ReplayVerdict replay_verify(Simulator *simulator, const RecordedRun *run, int64_t steps, bool go_on,
-                            bool (*each)(void *context, Simulator *simulator, Command command, const XrayControl *xray), void *context)
+                            bool (*each)(void *context, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray), void *context)
 {
     ReplayVerdict verdict = {.first_different = -1};
     bool was_watched = recorded_run_was_watched(run);
     int64_t count = steps < 0 || steps > run->step_count ? run->step_count : steps;
     for (int64_t i = 0; i < count; i++) {
-        simulator_step(simulator, command_of(run, i));
+        ToolCommands commands = recorded_run_commands(run, i);
+        simulator_step_tools(simulator, &commands);
         verdict.steps = i + 1;
         if (verdict.first_different < 0) {
             verdict.recorded = run->state_hash[i];
@@ -37,7 +36,7 @@ ReplayVerdict replay_verify(Simulator *simulator, const RecordedRun *run, int64_
             if (verdict.recorded != verdict.simulated)
                 verdict.first_different = i;
         }
-        if (each && !each(context, simulator, command_of(run, i), was_watched ? &run->xray[i] : NULL))
+        if (each && !each(context, simulator, &commands, was_watched ? &run->xray[i] : NULL))
             break;
         if (verdict.first_different >= 0 && !go_on)
             break;
@@ -53,7 +52,7 @@ char *replay_script(const RecordedRun *run, size_t *length)
         return NULL;
     fprintf(stream, "t_s,push_mm_s,twist_deg_s\n");
     for (int64_t i = 0; i < run->step_count; i++) {
-        Command now = command_of(run, i), before = i ? command_of(run, i - 1) : (Command){0, 0};
+        Command now = recorded_run_commands(run, i).tool[0], before = i ? recorded_run_commands(run, i - 1).tool[0] : (Command){0, 0};
         if (i == 0 || memcmp(&now, &before, sizeof now) != 0)
             fprintf(stream, "%.17g,%.17g,%.17g\n", (double)i * run->step_ms / 1000, now.push_mm_s, now.twist_deg_s);
     }

@@ -17,7 +17,7 @@ typedef struct ReplayVerdict {
 // Steps a fresh simulator through the first `steps` commands (< 0: all) and compares. Goes on after a difference only with `go_on`.
 // `each` is called after each step (`xray` NULL: nobody watched); false stops. May be NULL.
 ReplayVerdict replay_verify(Simulator *simulator, const RecordedRun *run, int64_t steps, bool go_on,
-                            bool (*each)(void *context, Simulator *simulator, Command command, const XrayControl *xray), void *context);
+                            bool (*each)(void *context, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray), void *context);
 // The recorded commands as a script's text, runs of equal ones as one row; the caller frees it. NULL where memory lacks.
 char *replay_script(const RecordedRun *run, size_t *length);
 

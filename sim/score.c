@@ -313,8 +313,9 @@ static void give_points(Score *score)
         f->points = fmax(100 * share * (weights > 0 ? sum / weights : 1) - exercise->error_points * f->error_total, 0);
 }
 
-void score_step(Score *score, Simulator *simulator, Command command, const XrayControl *xray)
+void score_step(Score *score, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray)
 {
+    Command command = commands->tool[0];
     ScoreFigures *f = &score->figures;
     if (f->state == SCORE_REACHED || f->state == SCORE_TIME_OUT)
         return;

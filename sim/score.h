@@ -87,7 +87,7 @@ typedef struct Score Score;
 Score *score_create(Simulator *simulator, const VesselTree *tree);
 void score_free(Score *score);
 // After each simulator_step, with what it was given. `xray` NULL: nobody watches, so that nothing counts as blind.
-void score_step(Score *score, Simulator *simulator, Command command, const XrayControl *xray);
+void score_step(Score *score, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
 ScoreFigures score_figures(const Score *score);
 const ScoreEvent *score_events(const Score *score, int *count);
 // To go on from an earlier moment: `to` belongs to the same scene.

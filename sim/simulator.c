@@ -157,7 +157,7 @@ static void accumulate(Simulator *simulator)
 
 void simulator_step(Simulator *simulator, Command command)
 {
-    simulator_step_tools(simulator, &(ToolCommands){{command}});
+    simulator_step_tools(simulator, &(ToolCommands){.tool = {command}});
 }
 
 void simulator_step_tools(Simulator *simulator, const ToolCommands *commands)

@@ -62,9 +62,9 @@ static RecordedRun *load(const char *name)
     return run;
 }
 
-static bool score_again(void *context, Simulator *simulator, Command command, const XrayControl *xray)
+static bool score_again(void *context, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray)
 {
-    lesson_step(context, simulator, command, xray);
+    lesson_step(context, simulator, commands, xray);
     return true;
 }
 

@@ -59,8 +59,8 @@ static RecordedRun *record(TrainerScene *it, int64_t steps, bool is_watched, con
             break;
         XrayControl xray = desk_at(i);
         simulator_step(simulator, hand_at(i));
-        lesson_step(lesson, simulator, hand_at(i), is_watched ? &xray : NULL);
-        assert_true(recording_step(recording, simulator, hand_at(i), is_watched ? &xray : NULL));
+        lesson_step(lesson, simulator, &(ToolCommands){.tool = {hand_at(i)}}, is_watched ? &xray : NULL);
+        assert_true(recording_step(recording, simulator, &(ToolCommands){.tool = {hand_at(i)}}, is_watched ? &xray : NULL));
     }
     free(view);
     assert_true(recording_close(recording, simulator, &faults));

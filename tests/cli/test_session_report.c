@@ -41,7 +41,7 @@ static void make_session(const char *name, const char *trainee, time_t when, dou
         double push = i < push_s * 1000 ? push_mm_s : 0;
         p->xray.pedal = i % 700 < 200;
         practice_step(p, push);
-        assert_true(recording_step(recording, p->simulator, (Command){push, 0}, &p->xray));
+        assert_true(recording_step(recording, p->simulator, &(ToolCommands){.tool = {{push, 0}}}, &p->xray));
     }
     assert_true(recording_close(recording, p->simulator, &p->faults));
     RecordedRun *run = recorded_run_load_series(recorded, &p->faults);

@@ -118,8 +118,8 @@ static void the_session_file_is_of_its_recording(void **state)
     for (int i = 0; i < 200; i++) {
         Command command = {25, 40};
         simulator_step(simulator, command);
-        score_step(score, simulator, command, &xray);
-        assert_true(recording_step(recording, simulator, command, &xray));
+        score_step(score, simulator, &(ToolCommands){.tool = {command}}, &xray);
+        assert_true(recording_step(recording, simulator, &(ToolCommands){.tool = {command}}, &xray));
     }
     assert_true(recording_close(recording, simulator, &faults));
     assert_true(trainer_save_session(it.scene, "Ada \"the hand\"", "keyboard", 1700000000, score, path, &faults));

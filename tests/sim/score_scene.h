@@ -53,7 +53,7 @@ static void practice_step(Practice *p, double push_mm_s)
 {
     Command command = {push_mm_s, 0};
     simulator_step(p->simulator, command);
-    score_step(p->score, p->simulator, command, p->watched ? &p->xray : NULL);
+    score_step(p->score, p->simulator, &(ToolCommands){.tool = {command}}, p->watched ? &p->xray : NULL);
 }
 
 static inline ScoreFigures practice_go(Practice *p, double push_mm_s, double seconds)

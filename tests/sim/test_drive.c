@@ -31,10 +31,10 @@ static double now_s(void)
     return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 }
 
-static bool note_time(void *context, Simulator *simulator, Command command)
+static bool note_time(void *context, Simulator *simulator, const ToolCommands *commands)
 {
     (void)simulator;
-    (void)command;
+    (void)commands;
     Clock *clock = context;
     if (clock->stalls && clock->steps == STALL_AT)
         nanosleep(&(struct timespec){.tv_nsec = STALL_MS * 1000000}, NULL);

@@ -40,7 +40,7 @@ static unsigned run_watched(const char *name, const char *text, const Vessel *ve
         heap_watch(true);
         simulator_step(simulator, command);
         if (recording)
-            assert_true(recording_step(recording, simulator, command, NULL));
+            assert_true(recording_step(recording, simulator, &(ToolCommands){.tool = {command}}, NULL));
         heap_watch(false);
     }
     long used = heap_calls() - before;

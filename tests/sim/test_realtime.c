@@ -160,10 +160,10 @@ typedef struct Extra {
     int64_t steps;
 } Extra;
 
-static void count_step(void *context, Simulator *simulator, Command command, const XrayControl *xray)
+static void count_step(void *context, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray)
 {
     (void)simulator;
-    (void)command;
+    (void)commands;
     (void)xray;
     ((Extra *)context)->steps++;
 }

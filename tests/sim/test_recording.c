@@ -52,15 +52,15 @@ typedef struct Seen {
     Command command[MOST_STEPS];
 } Seen;
 
-static bool see(void *context, Simulator *simulator, Command command)
+static bool see(void *context, Simulator *simulator, const ToolCommands *commands)
 {
     Seen *seen = context;
     const WireState *state = simulator_state(simulator);
     seen->hash[seen->steps] = simulator_hash(simulator);
     seen->tip[seen->steps] = state->position[state->node_count - 1];
     seen->inserted[seen->steps] = state->inserted;
-    seen->command[seen->steps++] = command;
-    return !seen->recording || recording_step(seen->recording, simulator, command, NULL);
+    seen->command[seen->steps++] = commands->tool[0];
+    return !seen->recording || recording_step(seen->recording, simulator, commands, NULL);
 }
 
 static Seen run_once(const char *record)
@@ -132,7 +132,7 @@ static void record_for_ever(const char *path, int64_t expected_steps)
     for (int64_t i = 0; recording; i++) {
         Command command = script_at(scene->script, (double)(i % 400) / 1000, &cursor);
         simulator_step(simulator, command);
-        if (!recording_step(recording, simulator, command, NULL))
+        if (!recording_step(recording, simulator, &(ToolCommands){.tool = {command}}, NULL))
             break;
     }
     _exit(9);
@@ -327,7 +327,7 @@ static void every_state_in_a_flush_is_a_whole_file(void **state)
     assert_non_null(recording);
     for (int step = 1; step <= 260; step++) {
         simulator_step(simulator, (Command){5, 90});
-        assert_true(recording_step(recording, simulator, (Command){5, 90}, NULL));
+        assert_true(recording_step(recording, simulator, &(ToolCommands){.tool = {{5, 90}}}, NULL));
         if (step == 1) {
             // the file gets its name with the first rows
             while (access(watched.path, F_OK) != 0)
@@ -409,7 +409,7 @@ static void a_full_index_leaves_what_was_flushed(void **state)
         Recording *recording = recording_create(path, simulator, &options, &faults);
         for (int step = 0; recording && step < 600; step++) {
             simulator_step(simulator, (Command){0, 0});
-            recording_step(recording, simulator, (Command){0, 0}, NULL);
+            recording_step(recording, simulator, &(ToolCommands){0}, NULL);
             if (step % 100 == 0)
                 nap_ms(30);
         }
@@ -449,7 +449,7 @@ static void a_full_disk_leaves_what_was_flushed(void **state)
         int64_t steps = 0;
         for (; steps < 1000000; steps++) {
             simulator_step(simulator, (Command){0, 0});
-            if (!recording_step(recording, simulator, (Command){0, 0}, NULL))
+            if (!recording_step(recording, simulator, &(ToolCommands){0}, NULL))
                 break;
         }
         bool closed = recording_close(recording, simulator, &faults);

@@ -623,7 +623,7 @@ static void a_step_allocates_nothing(void **state)
     for (int i = 0; i < 2000; i++) {
         simulator_step(p->simulator, (Command){20, 0});
         heap_watch(true);
-        score_step(p->score, p->simulator, (Command){20, 0}, &p->xray);
+        score_step(p->score, p->simulator, &(ToolCommands){.tool = {{20, 0}}}, &p->xray);
         heap_watch(false);
     }
     assert_int_equal(heap_calls() - before, 0);

@@ -31,7 +31,7 @@ static void record(const char *path, Session *session, const char *trainee, time
     for (int i = 0; i < 1200; i++) {
         double push = i < 8 / push_mm_s * 1000 ? push_mm_s : 0;
         practice_step(p, push);
-        assert_true(recording_step(recording, p->simulator, (Command){push, 0}, &p->xray));
+        assert_true(recording_step(recording, p->simulator, &(ToolCommands){.tool = {{push, 0}}}, &p->xray));
     }
     assert_true(recording_close(recording, p->simulator, &faults));
     RecordedRun *run = recorded_run_load_series(path, &faults);
