@@ -14,6 +14,7 @@
 
 static const double wire_attenuation = 0.55, marker_attenuation = 1.2, marker_length = 3;   // DESIGN section 8, what convinced
 static const double hand_limit_n = 20;       // about what two fingers hold
+static const double valve_n = 0.2;           // of a haemostatic valve that is open for a tool to slide: an assumption
 // A lumen lined with PTFE. Handbooks give PTFE on steel 0.04 to 0.1; of the wires that Schroeder measured (Cardiovasc Intervent Radiol 1993;16:93-97) a
 // PTFE coat halved the friction of bare steel and a hydrophilic one brought it to a sixth.
 static const double friction_inside = 0.05;
@@ -144,6 +145,7 @@ static void read_tool(Reading *reading, const ToolSource *source, SceneTool *too
     WireOptions *wire = &tool->wire;
     wire->elements = 200;
     wire->hand_limit = hand_limit_n;
+    wire->valve_friction = valve_n;
     tool->marker_length = marker_length;
     tool->marker_attenuation = marker_attenuation;
     tool->friction_inside = friction_inside;
@@ -157,6 +159,7 @@ static void read_tool(Reading *reading, const ToolSource *source, SceneTool *too
     wire->damping_mass = mass / per_second;
     wire->damping_stiffness = stiffness * per_second;
     tool_number(source, "hand_limit_n", (NumberRange){0, 1e6, false}, &wire->hand_limit);
+    tool_number(source, "valve_n", (NumberRange){0, 1e6, false}, &wire->valve_friction);
     YamlMap marker = yaml_map(tool_get(source, "tip_marker", false), marker_keys);
     yaml_map_number(&marker, "length_mm", false, (NumberRange){0, 1000, false}, &tool->marker_length);
     yaml_map_number(&marker, "attenuation_1_mm", false, (NumberRange){0, 100, false}, &tool->marker_attenuation);
@@ -175,7 +178,7 @@ static void publish_first(Reading *reading)
 
 void scene_read_wire(Reading *reading, YamlValue value)
 {
-    static const char *const keys[] = {"elements", "sections", "rest", "damping", "tip_marker", "hand_limit_n", NULL};
+    static const char *const keys[] = {"elements", "sections", "rest", "damping", "tip_marker", "hand_limit_n", "valve_n", NULL};
     ToolSource source = {.own = yaml_map(value, keys)};
     SceneTool *tool = &reading->scene->tool[0];
     reading->scene->tool_count = 1;
@@ -191,7 +194,7 @@ void scene_read_wire(Reading *reading, YamlValue value)
 static YamlMap device_map_of(YamlReader *reader)
 {
     static const char *const keys[] = {"seldinger",  "title",         "kind",        "source", "uncertainty", "bending_n_mm2", "goes_through", "elements",
-                                       "sections",   "rest",          "damping",     "tip_marker", "hand_limit_n", "friction_inside", NULL};
+                                       "sections",   "rest",          "damping",     "tip_marker", "hand_limit_n", "valve_n", "friction_inside", NULL};
     YamlValue root = yaml_root(reader);
     strcpy(root.name, "device");
     return yaml_map(root, keys);
@@ -247,7 +250,7 @@ static void read_name(Reading *reading, YamlValue value, int index)
 static void read_entry(Reading *reading, YamlValue value, int index)
 {
     static const char *const keys[] = {"name", "kind", "device", "length_mm", "inserted_mm", "friction_inside", "elements", "sections", "rest", "damping",
-                                       "tip_marker", "hand_limit_n", NULL};
+                                       "tip_marker", "hand_limit_n", "valve_n", NULL};
     SceneTool *tool = &reading->scene->tool[index];
     ToolReading *read = &reading->tool[index];
     ToolSource source = {.own = yaml_map(value, keys)};

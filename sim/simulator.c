@@ -170,7 +170,7 @@ void simulator_step_tools(Simulator *simulator, const ToolCommands *commands)
     StepCommand command[STEP_TOOLS_MAX];
     for (int k = 0; k < STEP_TOOLS_MAX; k++)
         command[k] = (StepCommand){.advance = commands->tool[k].push_mm_s * seconds, .twist = commands->tool[k].twist_deg_s * seconds * PI / 180};
-    step_feed_tools(stepper, command);
+    step_feed_tools(stepper, command, commands->released);
     timed(profile, STAGE_FEED, &since);
     step_detect(stepper);
     timed(profile, STAGE_DETECT, &since);

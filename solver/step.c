@@ -24,9 +24,9 @@ enum { NEWTON_MAX = 4 };
 // A tip that snaps from one wall to another lands where nobody linearised: [mm] of true penetration that asks for another linearisation there, up to
 // twice NEWTON_MAX of them.
 static const double OVERSHOOT = 0.015;
-// Where a motion is followed in halves: [mm] of depth that it may leave, and where nothing else goes; [mm] of the hand's advance that later steps make
-// up; halves at most, and how often linear walls are moved before.
-static const double DEPTH_MAX = 0.02, DEPTH_LAST = 0.045, OWED_MAX = 0.2;
+// Where a motion is followed in halves: [mm] of depth that it may leave, and where nothing else goes; halves at most, and
+// how often linear walls are moved before.
+static const double DEPTH_MAX = 0.02, DEPTH_LAST = 0.045;
 enum { HALVES_MAX = 6, MEETINGS_MAX = 2 };
 // A tool that is squeezed by more than this share of its length is beyond what its elements describe (and would have yielded): the hand stalls.
 // One that is squeezed by JAMMED has a reason to be stuck.
@@ -291,7 +291,10 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
     s->damping_stiffness = o.wire.damping_stiffness;
     s->dt = o.dt;
     s->has_sheath = o.wire.has_sheath;
-    s->hand_limit = o.wire.has_sheath ? o.wire.hand_limit : 0;
+    for (int k = 0; k < s->tool_count; k++) {
+        const WireOptions *own = k == 0 ? &o.wire : &o.inner[k - 1];
+        s->hand[k] = (Hand){.limit = own->hand_limit, .valve = own->valve_friction};
+    }
     s->mouth = o.wire.start;
     s->line = wire_start_frame(&o.wire);
     Mat3 frame = quat_to_mat3(s->line);
@@ -430,18 +433,19 @@ static void begin(Stepper *s)
     memset(s->linearised, 0, row_of(s, s->state.node_count) * sizeof *s->linearised);
     memset(s->seen, 0, row_of(s, s->state.node_count) * sizeof *s->seen);
     s->is_iterate = s->overshoots = s->blocked = false;
-    s->slips = 0;
     s->energy_before = -1;
     s->mouth_ahead = s->command.advance;
 }
 
-static void feed(Stepper *s, StepCommand command)
+static void feed(Stepper *s, unsigned released)
 {
+    hands_feed(s, released);
+    StepCommand command = s->tool_command[0];
     s->wall_force_max = s->report.wall_force_max;
     s->wall_force_sum = s->report.wall_force_sum;
     s->report = (StepReport){0};
     s->has_failed = false;
-    if (!s->has_sheath || !isfinite(command.advance) || !isfinite(command.twist))
+    if (!s->has_sheath)
         command = (StepCommand){0};
     double inserted = s->state.inserted + command.advance, total = s->wire.total_length;
     if (inserted > total) {
@@ -466,16 +470,17 @@ static void feed(Stepper *s, StepCommand command)
     s->first_free = held;
     begin(s);
 }
-void step_feed_tools(Stepper *s, const StepCommand *command)
+
+void step_feed_tools(Stepper *s, const StepCommand *command, unsigned released)
 {
     memcpy(s->tool_command, command, (size_t)s->tool_count * sizeof *command);
-    feed(s, command[0]);
+    feed(s, released);
 }
 
 void step_feed(Stepper *s, StepCommand command)
 {
     StepCommand all[STEP_TOOLS_MAX] = {command};
-    step_feed_tools(s, all);
+    step_feed_tools(s, all, 0);
 }
 
 void step_detect(Stepper *s) { stepper_detect(s); }
@@ -498,6 +503,7 @@ static void solve(Stepper *s)
         block_factor_solve(s->factor, s->b, s->u);
     if (s->tool_count > 1)
         tools_from_slips(s);
+    hands_solved(s);
     s->report.iterations += report.iterations;
     s->report.residual = report.residual;
     s->report.cone_violation = report.cone_violation;
@@ -555,30 +561,11 @@ static bool misjudges_border(Stepper *s)
     return true;
 }
 
-// The hand holds the tool up to its limit; beyond, the tool moves less than the hand, under that force.
-static bool misjudges_grip(Stepper *s)
-{
-    if (s->has_failed)
-        return false;
-    int was = s->slips;
-    double force = stepper_reaction(s, 0);
-    if (s->hand_limit == 0)
-        was = s->slips = 0;
-    else if (was == 0 && fabs(force) > s->hand_limit)
-        s->slips = force > 0 ? 1 : -1;
-    else if (was != 0 && was * (s->u[0] - stepper_wanted(s)) > 0)
-        s->slips = 0;
-    bool changes = s->slips != was;
-    for (int k = 1; k < s->tool_count; k++)
-        changes |= tools_misjudges_grip(s, k);
-    return changes;
-}
-
 // What the hand and the mouth do follows from the solution.
 static void solve_driven(Stepper *s)
 {
     solve(s);
-    for (int i = 0; i < DRIVEN_TRIES && (misjudges_border(s) || misjudges_grip(s)); i++) {
+    for (int i = 0; i < DRIVEN_TRIES && (misjudges_border(s) || hands_misjudge(s)); i++) {
         stepper_assemble(s);
         step_factor(s);
         solve(s);
@@ -697,7 +684,7 @@ static double energy_bound(const Stepper *s)
         // the hand's force is that of before: a solution that is not to be trusted says anything
         double stiffness = s->beam.rest.axial[0], advance = fabs(s->u[0]);
         double squeezed = fabs(vec3_distance(s->start_position[1], s->start_position[0]) - s->beam.rest.length[0]);
-        work += stiffness * advance * (squeezed + advance * s->beam.rest.length[0] / w->total_length) + fabs(s->u[3] * stepper_reaction(s, 3));
+        work += stiffness * advance * (squeezed + advance * s->beam.rest.length[0] / w->total_length) + fabs(s->u[3] * hand_force(s, 0, 1));
     }
     return bound + 2 * work + 1e-6;
 }
@@ -879,10 +866,7 @@ static void set_velocities(Stepper *s)
 
 static void report_forces(Stepper *s)
 {
-    if (s->has_sheath) {
-        s->report.proximal_force = stepper_reaction(s, 0);
-        s->report.proximal_torque = stepper_reaction(s, 3);
-    } else {
+    if (!s->has_sheath) {
         Vec3 force = vec3(0, 0, 0), torque = vec3(0, 0, 0);
         double *f[] = {&force.x, &force.y, &force.z, &torque.x, &torque.y, &torque.z};
         for (int k = 0; k < 6; k++)
@@ -891,7 +875,7 @@ static void report_forces(Stepper *s)
         s->report.proximal_force = vec3_dot(force, s->axis[0]);
         s->report.proximal_torque = vec3_dot(torque, s->axis[0]);
     }
-    tools_report(s);
+    hands_report(s);
     for (int k = 0; k < s->set.count; k++) {
         double force = vec3_norm(s->force[s->candidate[k]]);
         s->report.wall_force_max = fmax(s->report.wall_force_max, force);
@@ -907,26 +891,8 @@ static void report_cut_forces(Stepper *s, double part)
     s->report.wall_force_sum = s->wall_force_sum + part * (s->report.wall_force_sum - s->wall_force_sum);
     if (!s->has_sheath)
         return;
-    double force = stepper_strain_force(s), most = s->hand_limit > 0 ? s->hand_limit : HUGE_VAL;
+    double force = stepper_strain_force(s), most = s->hand[0].limit > 0 ? s->hand[0].limit : HUGE_VAL;
     s->report.proximal_force = fmax(-most, fmin(most, force));
-}
-
-// What the hand has moved in fact. What a cut motion has left of an advance is owed, up to OWED_MAX.
-static void count_command(Stepper *s)
-{
-    s->state.inserted += s->command.advance;
-    s->state.twist += s->command.twist;
-    if (s->slips) {
-        double actual = s->wire.total_length + stepper_sheath_coordinate(s, 0);
-        s->report.flags |= STEP_HAND_SLIPS;
-        s->report.slipped = s->state.inserted - actual;
-        s->state.inserted = actual;
-    }
-    if (!s->has_sheath || !(s->report.flags & STEP_LIMITED))
-        return;
-    double actual = s->wire.total_length + stepper_sheath_coordinate(s, 0);
-    s->state.inserted = actual + fmax(-OWED_MAX, fmin(OWED_MAX, s->state.inserted - actual));
-    s->state.twist += s->linearised[3] - s->command.twist;
 }
 
 void step_correct(Stepper *s)
@@ -938,9 +904,7 @@ void step_correct(Stepper *s)
         if (part < 1)
             report_cut_forces(s, part);
         set_velocities(s);
-        count_command(s);
-        if (s->tool_count > 1)
-            tools_count_commands(s);
+        hands_count(s);
     }
     if (s->has_failed)
         keep_last_state(s);

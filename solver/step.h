@@ -54,7 +54,7 @@ typedef struct Stepper Stepper;
 
 typedef struct StepperOptions {
     WireOptions wire;            // the tool, or the outermost of several
-    // Coaxial tools inside it, outermost first; of their options sections, elements, hand_limit and inserted (length beyond the mouth, or the
+    // Coaxial tools inside it, outermost first; of their options sections, elements, hand_limit, valve_friction and inserted (length beyond the mouth, or the
     // rig's start) are read
     int inner_count;             // up to STEP_TOOLS_MAX - 1
     const WireOptions *inner;
@@ -71,8 +71,9 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity);
 void stepper_destroy(Stepper *stepper);
 
 void step_feed(Stepper *stepper, StepCommand command);
-// The commands of all tools, [1 + inner_count]; step_feed() pins the inner ones.
-void step_feed_tools(Stepper *stepper, const StepCommand *command);
+// The commands of all tools, [1 + inner_count]; step_feed() pins the inner ones. Bit k of `released`: no hand holds tool k, only the valve that it goes
+// through does, by friction (WireOptions.valve_friction).
+void step_feed_tools(Stepper *stepper, const StepCommand *command, unsigned released);
 void step_detect(Stepper *stepper);
 void step_assemble(Stepper *stepper);
 void step_factor(Stepper *stepper);

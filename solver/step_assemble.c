@@ -200,13 +200,7 @@ static void constraints(Stepper *s)
     memcpy(s->grip_b, s->b, row_of(s, 1) * sizeof(double));
     if (s->chain.count > 1)
         memcpy(s->grip_lower, s->chain.lower, block_of(s, 1) * sizeof(double));
-    if (s->has_sheath) {
-        if (s->slips)
-            s->b[0] += s->slips * s->hand_limit;
-        else
-            stepper_prescribe(s, 0, 0, stepper_wanted(s));
-        stepper_prescribe(s, 0, 3, s->command.twist);
-    }
+    hands_constrain(s);
     for (int i = s->first_free; i < s->chain.count; i++)
         for (int k = 0; s->fixed[i] >> k; k++)
             if (s->fixed[i] >> k & 1)
@@ -248,7 +242,7 @@ void stepper_assemble(Stepper *s)
     }
     constraints(s);
     if (s->tool_count > 1) {
-        tools_constrain(s);
+        tools_leave_out(s);
         tools_to_slips(s);
     }
 }

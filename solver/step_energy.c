@@ -94,12 +94,10 @@ StepEnergy stepper_energy(Stepper *s)
     StepEnergy e = {.elastic = stepper_elastic_energy(s), .kinetic = stepper_kinetic_energy(s)};
     if (s->has_failed)
         return e;
-    if (s->has_sheath)
-        e.hand = s->report.proximal_force * s->linearised[0] + s->report.proximal_torque * s->linearised[3];
-    for (int k = 1; k < s->tool_count; k++)
-        e.hand += tools_hand_work(s, k);
+    e.hand = hands_work(s);
     e.load = of_loads(s);
     e.damping = of_mass_damping(s) + stepper_stiffness_damping(s);
     stepper_wall_work(s, &e.wall, &e.friction);
+    e.friction += hands_valve_work(s);
     return e;
 }

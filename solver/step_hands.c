@@ -1,146 +1,264 @@
-// The hands of coaxial tools: what they prescribe at node 0, the hub of the outermost tool, what they feel, and how they slip. A hand k that moves by a_k makes
-// S at the hub grow by a_0 - a_k, so its push is -dE/dS; the outermost tool's hand feels the total less the others'.
+// The hands. Hand k moves tool k by a_k along and t_k about the line at node 0, the hub of the outermost tool, so S of an inner tool grows there by a_0 - a_k
+// and its angle by t_k - t_0. The system's unknowns at node 0 are turned into those of the hands: then a hand that holds its tool is a unit row, one that
+// slips a force in its own row, and what it feels is its row's reaction.
+//
+// A tool that no hand holds is held by the friction of the valve that it goes through, at the hub of the tool around it or at the sheath: its unknown is then
+// its slip through the valve, and that hub's hand feels what the valve takes.
 #include "solver/step_tools.h"
 
-// [mm] displacement of S of tool k at the hub in this step that the commands ask for.
-static double wanted_slide(const Stepper *s, int k)
+#include <string.h>
+
+static bool has_hand(const Stepper *s, int k) { return k == 0 ? s->has_sheath : is_inside(s, 0, k); }
+static int row_of_hand(int k, int about) { return k == 0 ? 3 * about : unknown_of(k) + about; }
+static bool rides(const Stepper *s, int k) { return k > 0 && s->hand[k].is_released; }
+
+// What a hand, or a valve, holds at most [N] or [N mm].
+static double holds(const Stepper *s, int k, int about)
 {
-    const Tool *t = &s->tool[k];
-    double hub = s->state.inserted + s->command.advance - s->tool[0].wire.total_length;
-    return t->wire.total_length - t->inserted - s->tool_command[k].advance + hub - s->start_slide[k - 1];
+    const Hand *hand = &s->hand[k];
+    double radius = s->tool_count > 1 ? s->tool[k].wire.radius[0] : s->wire.radius[0];
+    if (hand->is_released)
+        return about ? hand->valve * radius : hand->valve;
+    return about || hand->limit == 0 ? HUGE_VAL : hand->limit;
 }
 
-void tools_constrain(Stepper *s)
+// What the hand's unknown moves by in this step where the hand holds.
+static double wanted(const Stepper *s, int k, int about)
 {
-    for (int c = 0; c < s->chain.count; c++)
-        for (int k = 1; k < s->tool_count; k++)
-            for (int i = 0; !is_inside(s, c, k) && i < 2; i++)
-                stepper_prescribe(s, c, unknown_of(k) + i, 0);
-    for (int k = 1; k < s->tool_count; k++) {
-        const Tool *t = &s->tool[k];
-        if (!is_inside(s, 0, k))
-            continue;
-        double angle = t->twist + s->tool_command[k].twist - (s->state.twist + s->command.twist);
-        if (s->tool_slips[k])
-            s->b[unknown_of(k)] -= s->tool_slips[k] * t->hand_limit;
-        else
-            stepper_prescribe(s, 0, unknown_of(k), wanted_slide(s, k));
-        stepper_prescribe(s, 0, unknown_of(k) + 1, angle - s->start_angle[k - 1]);
+    const Hand *hand = &s->hand[k];
+    if (hand->is_released)
+        return 0;
+    if (k == 0)
+        return about ? s->command.twist : stepper_wanted(s);
+    // to where the commands say, whatever has been lost to rounding before
+    const Tool *t = &s->tool[k];
+    if (about)
+        return t->twist + s->tool_command[k].twist - s->state.twist - s->start_angle[k - 1];
+    double hub = s->has_sheath ? vec3_dot(vec3_sub(s->start_position[0], s->mouth), s->axis[0]) : 0;
+    return t->inserted + s->tool_command[k].advance - (t->wire.total_length + hub - s->start_slide[k - 1]);
+}
+
+// The hand's unknown in those of node 0. The hub of a rig does not move.
+static double hand_moves(const Stepper *s, int k, int about, const double *u)
+{
+    double hub = s->has_sheath ? u[3 * about] : 0, own = k == 0 ? hub : about ? hub + u[unknown_of(k) + 1] : hub - u[unknown_of(k)];
+    int out = rides(s, k) ? tools_around(s, 0, k) : 0;
+    if (!rides(s, k))
+        return own;
+    return own - (out == 0 ? hub : about ? hub + u[unknown_of(out) + 1] : hub - u[unknown_of(out)]);
+}
+
+// Node 0's unknowns are `basis` times the hands'.
+static void make_basis(Stepper *s)
+{
+    int n = s->chain.size;
+    double motion[STEP_TOOLS_MAX][2][BLOCK_LARGEST] = {{{0}}};       // of each tool in its hand's and the others' unknowns
+    memset(s->hand_basis, 0, sizeof s->hand_basis);
+    for (int i = 0; i < n; i++)
+        s->hand_basis[n * i + i] = 1;
+    for (int about = 0; about < 2; about++) {
+        if (s->has_sheath)
+            motion[0][about][3 * about] = 1;
+        for (int k = 1; k < s->tool_count; k++) {
+            if (!has_hand(s, k))
+                continue;
+            int at = row_of_hand(k, about), out = tools_around(s, 0, k);
+            double *own = motion[k][about], *slide = s->hand_basis + n * at;
+            for (int i = 0; i < n; i++)
+                own[i] = (i == at) + (rides(s, k) ? motion[out][about][i] : 0);
+            for (int i = 0; i < n; i++)
+                slide[i] = about ? own[i] - motion[0][about][i] : motion[0][about][i] - own[i];
+        }
     }
 }
 
-void tools_report(Stepper *s)
+// rows (n, n) times the basis.
+static void columns_to_hands(const Stepper *s, double *rows)
+{
+    int n = s->chain.size;
+    for (int r = 0; r < n; r++) {
+        double old[BLOCK_LARGEST];
+        memcpy(old, rows + n * r, (size_t)n * sizeof *old);
+        for (int c = 0; c < n; c++) {
+            double sum = 0;
+            for (int k = 0; k < n; k++)
+                sum += old[k] * s->hand_basis[n * k + c];
+            rows[n * r + c] = sum;
+        }
+    }
+}
+
+static void transpose(double *a, int n)
+{
+    for (int r = 0; r < n; r++)
+        for (int c = 0; c < r; c++) {
+            double x = a[n * r + c];
+            a[n * r + c] = a[n * c + r];
+            a[n * c + r] = x;
+        }
+}
+
+static void to_hands(Stepper *s)
+{
+    int n = s->chain.size;
+    double old[BLOCK_LARGEST];
+    make_basis(s);
+    columns_to_hands(s, s->chain.diag);
+    transpose(s->chain.diag, n);
+    columns_to_hands(s, s->chain.diag);
+    if (s->chain.count > 1)
+        columns_to_hands(s, s->chain.lower);
+    memcpy(old, s->b, (size_t)n * sizeof *old);
+    for (int c = 0; c < n; c++) {
+        s->b[c] = 0;
+        for (int k = 0; k < n; k++)
+            s->b[c] += s->hand_basis[n * k + c] * old[k];
+    }
+}
+
+void hands_solved(Stepper *s)
+{
+    int n = s->chain.size;
+    double moved[BLOCK_LARGEST];
+    if (s->tool_count == 1)
+        return;
+    memcpy(moved, s->u, (size_t)n * sizeof *moved);
+    for (int r = 0; r < n; r++) {
+        s->u[r] = 0;
+        for (int c = 0; c < n; c++)
+            s->u[r] += s->hand_basis[n * r + c] * moved[c];
+    }
+}
+
+void hands_constrain(Stepper *s)
+{
+    if (s->tool_count > 1)
+        to_hands(s);
+    for (int k = 0; k < s->tool_count; k++)
+        for (int about = 0; has_hand(s, k) && about < 2; about++) {
+            int slips = s->hand[k].slips[about], at = row_of_hand(k, about);
+            if (slips)
+                s->b[at] += slips * holds(s, k, about);
+            else
+                stepper_prescribe(s, 0, at, wanted(s, k, about));
+        }
+}
+
+double hand_force(const Stepper *s, int k, int about)
+{
+    int n = s->chain.size, at = row_of_hand(k, about);
+    double force = 0;
+    if (s->tool_count == 1)
+        return stepper_reaction(s, at);
+    for (int r = 0; r < n; r++)
+        if (s->hand_basis[n * r + at] != 0)
+            force += s->hand_basis[n * r + at] * stepper_reaction(s, r);
+    return force;
+}
+
+static bool misjudges(Stepper *s, int k, int about)
+{
+    int *slips = &s->hand[k].slips[about], was = *slips;
+    double most = holds(s, k, about), force = hand_force(s, k, about);
+    if (!(most < HUGE_VAL))
+        *slips = 0;
+    else if (was == 0 && fabs(force) > most)
+        *slips = force > 0 ? 1 : -1;
+    else if (was != 0 && most > 0 && was * (hand_moves(s, k, about, s->u) - wanted(s, k, about)) > 0)
+        *slips = 0;
+    return *slips != was;
+}
+
+bool hands_misjudge(Stepper *s)
+{
+    bool changes = false;
+    for (int k = 0; k < s->tool_count && !s->has_failed; k++)
+        for (int about = 0; has_hand(s, k) && about < 2; about++)
+            changes |= misjudges(s, k, about);
+    return changes;
+}
+
+void hands_feed(Stepper *s, unsigned released)
+{
+    for (int k = 0; k < s->tool_count; k++) {
+        Hand *hand = &s->hand[k];
+        StepCommand *command = &s->tool_command[k];
+        hand->is_released = released >> k & 1;
+        hand->slips[0] = hand->slips[1] = 0;
+        if (hand->is_released && k > 0)  // goes where its valve goes, or nearly
+            *command = s->tool_command[tools_around(s, 0, k)];
+        else if (hand->is_released || !isfinite(command->advance) || !isfinite(command->twist))
+            command->advance = command->twist = 0;
+    }
+}
+
+void hands_report(Stepper *s)
 {
     StepReport *r = &s->report;
-    r->push[0] = r->proximal_force;
-    r->torque[0] = r->proximal_torque;
-    for (int k = 1; k < s->tool_count; k++) {
-        if (!is_inside(s, 0, k))
-            continue;
-        // S falls as the hand pushes; the outermost tool's node 0 carries them along
-        r->push[k] = -stepper_reaction(s, unknown_of(k));
-        r->torque[k] = stepper_reaction(s, unknown_of(k) + 1);
-        r->push[0] -= r->push[k];
-        r->torque[0] -= r->torque[k];
+    for (int k = 0; k < s->tool_count; k++) {
+        bool feels = has_hand(s, k) && !s->hand[k].is_released;
+        r->push[k] = feels ? hand_force(s, k, 0) : 0;
+        r->torque[k] = feels ? hand_force(s, k, 1) : 0;
+    }
+    if (!s->has_sheath) {        // the rig holds the hub: what it bears, less what the hands do
+        r->push[0] = r->proximal_force;
+        r->torque[0] = r->proximal_torque;
+        for (int k = 1; k < s->tool_count; k++)
+            r->push[0] -= r->push[k], r->torque[0] -= r->torque[k];
     }
     r->proximal_force = r->push[0];
     r->proximal_torque = r->torque[0];
 }
 
-bool tools_misjudges_grip(Stepper *s, int k)
+double hands_work(const Stepper *s)
 {
-    Tool *t = &s->tool[k];
-    int was = s->tool_slips[k], at = unknown_of(k);
-    if (t->hand_limit == 0 || !is_inside(s, 0, k))
-        return false;
-    double push = -stepper_reaction(s, at);
-    if (was == 0 && fabs(push) > t->hand_limit)
-        s->tool_slips[k] = push > 0 ? 1 : -1;
-    else if (was != 0 && was * (wanted_slide(s, k) - s->u[at]) > 0)
-        s->tool_slips[k] = 0;
-    return s->tool_slips[k] != was;
+    double work = 0;
+    for (int k = 0; k < s->tool_count; k++)
+        if (has_hand(s, k) && !s->hand[k].is_released)
+            work += s->report.push[k] * hand_moves(s, k, 0, s->linearised) + s->report.torque[k] * hand_moves(s, k, 1, s->linearised);
+    return work;
 }
 
-void tools_feed(Stepper *s)
+double hands_valve_work(const Stepper *s)
 {
-    for (int k = 1; k < s->tool_count; k++) {
-        Tool *t = &s->tool[k];
-        StepCommand *command = &s->tool_command[k];
-        if (!isfinite(command->advance) || !isfinite(command->twist))
-            *command = (StepCommand){0};
-        s->tool_slips[k] = 0;
-        // its proximal end stays behind the hub, its tip beyond it
-        const Tool *out = &s->tool[0];
-        double hub = s->state.inserted + s->command.advance - out->wire.total_length;
-        double most = t->wire.total_length + hub - t->inserted, least = hub - t->inserted;
-        if (command->advance > most || command->advance < least)
-            s->report.flags |= command->advance > most ? STEP_FULLY_INSERTED : STEP_FULLY_WITHDRAWN;
-        command->advance = fmin(most, fmax(least, command->advance));
-    }
-    tools_pass(s);
+    double work = 0;
+    for (int k = 0; k < s->tool_count; k++)
+        for (int about = 0; has_hand(s, k) && s->hand[k].is_released && about < 2; about++)
+            work -= hand_force(s, k, about) * hand_moves(s, k, about, s->linearised);
+    return work;
 }
 
-void tools_move(Stepper *s, double part)
+// Where tool k is in fact: [mm] beyond the mouth.
+static double actual_inserted(const Stepper *s, int k)
 {
-    for (int c = 0; c < s->state.node_count; c++)
-        for (int k = 1; k < s->tool_count; k++) {
-            if (!is_inside(s, c, k))
-                continue;
-            int at = unknown_of(k), i = c * s->state.inner_count + k - 1;
-            const double *u = s->u + row_of(s, c) + at;
-            double *done = s->linearised + row_of(s, c) + at;
-            done[0] = part < 1 ? done[0] + part * (u[0] - done[0]) : u[0];
-            done[1] = part < 1 ? done[1] + part * (u[1] - done[1]) : u[1];
-            s->state.slide[i] = s->start_slide[i] + done[0];
-            s->state.angle[i] = s->start_angle[i] + done[1];
-        }
+    double hub = s->has_sheath ? stepper_sheath_coordinate(s, 0) : 0;
+    return k == 0 ? s->wire.total_length + hub : s->tool[k].wire.total_length + hub - slide_at(s, 0, k);
 }
 
-void tools_set_velocities(Stepper *s)
+void hands_count(Stepper *s)
 {
-    WireState *w = &s->state;
-    for (int c = 0; c < w->node_count; c++) {
-        Vec3 t = c < s->first_free ? s->axis[0] : quat_rotate(s->start_orientation[c], vec3(1, 0, 0));
-        for (int k = 1; k < s->tool_count; k++) {
-            if (!is_inside(s, c, k))
-                continue;
-            const double *u = s->linearised + row_of(s, c) + unknown_of(k);
-            int i = c * w->inner_count + k - 1;
-            w->slide_velocity[i] = vec3_dot(w->velocity[c], t) - u[0] / s->dt;
-            w->slide_spin[i] = vec3_dot(w->spin[c], t) + u[1] / s->dt;
-        }
-    }
-}
-
-// What tool k's hand has moved by in this step, along (0) and about (1) the line.
-static double hand_moved(const Stepper *s, int k, int which)
-{
-    const double *u = s->linearised;
-    return which == 0 ? u[0] - u[unknown_of(k)] : u[3] + u[unknown_of(k) + 1];
-}
-
-double tools_hand_work(const Stepper *s, int k)
-{
-    if (!is_inside(s, 0, k))
-        return 0;
-    return s->report.push[k] * hand_moved(s, k, 0) + s->report.torque[k] * hand_moved(s, k, 1);
-}
-
-void tools_count_commands(Stepper *s)
-{
-    for (int k = 1; k < s->tool_count; k++) {
-        Tool *t = &s->tool[k];
-        t->inserted += s->tool_command[k].advance;
-        t->twist += s->tool_command[k].twist;
-        if (!is_inside(s, 0, k))
+    bool was_cut = (s->report.flags & STEP_LIMITED) != 0;
+    for (int k = 0; k < s->tool_count; k++) {
+        double *inserted = k == 0 ? &s->state.inserted : &s->tool[k].inserted, *twist = k == 0 ? &s->state.twist : &s->tool[k].twist;
+        const Hand *hand = &s->hand[k];
+        if (!has_hand(s, k))
             continue;
-        // where it is in fact, cut or slipped
-        double hub = s->state.inserted - s->tool[0].wire.total_length, actual = t->wire.total_length + hub - slide_at(s, 0, k);
-        if (s->tool_slips[k])
+        *inserted += s->tool_command[k].advance;
+        *twist += s->tool_command[k].twist;
+        double actual = actual_inserted(s, k);
+        if (hand->slips[0] && !hand->is_released) {
             s->report.flags |= STEP_HAND_SLIPS;
-        if (s->tool_slips[k] || (s->report.flags & STEP_LIMITED)) {
-            t->inserted = actual;
-            t->twist = s->state.twist + angle_at(s, 0, k);
+            s->report.slipped += *inserted - actual;
         }
+        if (hand->slips[0] || hand->is_released || (was_cut && k > 0))
+            *inserted = actual;
+        if (was_cut && k == 0)       // what the motion has left of an advance is owed
+            *inserted = actual + fmax(-HAND_OWED_MAX, fmin(HAND_OWED_MAX, *inserted - actual));
+        if (!was_cut && !hand->is_released)
+            continue;
+        if (k == 0)
+            *twist += s->linearised[3] - s->tool_command[0].twist;
+        else
+            *twist = s->state.twist + angle_at(s, 0, k);
     }
 }

@@ -24,6 +24,15 @@ typedef struct WallMet {
 } WallMet;
 enum { WALL_MET_DOUBLES = sizeof(WallMet) / sizeof(double) };
 
+// Who holds a tool at its proximal end (step_hands.c).
+typedef struct Hand {
+    double limit;            // [N] above which it slips along the tool; 0: never
+    double valve;            // [N] friction of the valve that holds the tool while no hand does
+    // of this step
+    bool is_released;        // no hand holds it
+    int slips[2];            // along, about: 0 holds, 1 slips on a tool that it pushes, -1 that it pulls
+} Hand;
+
 // One of several coaxial tools. Its own elements do not change; which of its nodes are nodes of the chain does (step_tools.c).
 typedef struct Tool {
     Wire wire;
@@ -34,7 +43,6 @@ typedef struct Tool {
     double *line_mass, *line_inertia;  // (sections) [g/mm], [g mm] about a diameter
     Slot *slot;              // of its own elements
     int *slot_start;         // (E + 1)
-    double hand_limit;       // [N] 0: none
     double friction, clearance;    // with the tool around it; [mm] between them, radial
     // what changes
     int first;               // own node from which on it carries the chain; node_count: nowhere
@@ -54,7 +62,6 @@ struct Stepper {
     Vec3 gravity;
     double damping_mass, damping_stiffness, dt;
     bool has_sheath;
-    double hand_limit;       // [N] 0: none
     Vec3 mouth;              // sheath's mouth, or the rig's start
     Quat line;               // the frame there
     Vec3 axis[3];            // its columns: direction, e2, e3
@@ -68,11 +75,12 @@ struct Stepper {
     Slot *slot;              // (K) by element
     int *slot_start;         // (M) first slot of element i; of the last node K
 
+    Hand hand[STEP_TOOLS_MAX];
+    StepCommand tool_command[STEP_TOOLS_MAX];
+    double hand_basis[BLOCK_LARGEST * BLOCK_LARGEST];    // node 0's unknowns in those of the hands
     int tool_count;          // 1: what follows is not used
     Tool tool[STEP_TOOLS_MAX];
     int *carrier;            // (M) the tool that carries a node
-    StepCommand tool_command[STEP_TOOLS_MAX];
-    int tool_slips[STEP_TOOLS_MAX];    // as `slips`, of inner tools
     double *start_slide, *start_angle; // (M, I) at x_n
     Vec3 *inner_moment;      // (E, I) [N mm] of tool 1 + i and all inside it at the middle of an element …
     double *inner_tension;   // (E, I) [N] … and their tension
@@ -124,7 +132,6 @@ struct Stepper {
     // of this step
     StepCommand command;
     StepReport report;
-    int slips;               // the hand: 0 grips, 1 slides along a tool that it pushes, -1 that it pulls
     double mouth_ahead;      // [mm] by how much the node behind the mouth is taken to move in this step
     double turn;             // [rad] largest of the solution against the iterate
     bool overshoots;         // the solution goes through the wall, or may
@@ -176,6 +183,21 @@ double stepper_sheath_coordinate(const Stepper *s, int node);
 double stepper_wanted(const Stepper *s);
 // [N] reaction on node 0 along (index 0 to 2) and about (3 to 5) the axes of its unknowns.
 double stepper_reaction(const Stepper *s, int dof);
+// The commands of the step are taken.
+void hands_feed(Stepper *s, unsigned released);
+// What the hands prescribe at node 0; then, after the solve, back from their unknowns.
+void hands_constrain(Stepper *s);
+void hands_solved(Stepper *s);
+// Does a hand hold what it cannot, or slip where it could hold? Then it does otherwise from now on.
+bool hands_misjudge(Stepper *s);
+void hands_report(Stepper *s);
+// [N] or [N mm] that tool k's hand, or the valve that holds it, pushes along or turns about the line with.
+double hand_force(const Stepper *s, int tool, int about);
+void hands_count(Stepper *s);
+double hands_work(const Stepper *s);           // [mJ] that the hands have done in this step …
+double hands_valve_work(const Stepper *s);     // … and that the valves have taken
+// [mm] of a cut advance that later steps make up.
+static const double HAND_OWED_MAX = 0.2;
 // [N] push that the tool's strain at the hand asks for.
 double stepper_strain_force(const Stepper *s);
 

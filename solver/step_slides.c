@@ -63,8 +63,7 @@ void tools_slides(Stepper *s)
         }
 }
 
-// The tool that is next around tool k at node c and is an unknown there too; 0: none.
-static int around(const Stepper *s, int c, int k)
+int tools_around(const Stepper *s, int c, int k)
 {
     for (k--; k > 0 && !is_inside(s, c, k); k--)
         ;
@@ -77,7 +76,7 @@ void tools_to_slips(Stepper *s)
     int n = s->chain.size;
     for (int c = 1; c < s->chain.count && s->tool_count > 2; c++)
         for (int k = s->tool_count - 1; k > 1; k--) {
-            int out = is_inside(s, c, k) ? around(s, c, k) : 0;
+            int out = is_inside(s, c, k) ? tools_around(s, c, k) : 0;
             for (int i = 0; out > 0 && i < 2; i++) {
                 int from = unknown_of(k) + i, to = unknown_of(out) + i;
                 double *d = s->chain.diag + block_of(s, c), *l = s->chain.lower + block_of(s, c), *before = l - n * n;
@@ -99,7 +98,7 @@ void tools_from_slips(Stepper *s)
     int inner = s->state.inner_count;
     for (int c = 1; c < s->chain.count; c++)
         for (int k = 2; k < s->tool_count; k++) {
-            int out = is_inside(s, c, k) ? around(s, c, k) : 0;
+            int out = is_inside(s, c, k) ? tools_around(s, c, k) : 0;
             for (int i = 0; out > 0 && i < 2; i++)
                 s->u[row_of(s, c) + (size_t)(unknown_of(k) + i)] += s->u[row_of(s, c) + (size_t)(unknown_of(out) + i)];
         }
@@ -115,7 +114,7 @@ double tools_friction_work(const Stepper *s)
     double work = 0;
     for (int i = 0; s->tool_count > 1 && i < s->set.slide_count; i++) {
         const ContactSlide *slide = &s->set.slide[i];
-        int k = 1 + (slide->unknown - 6) / 2, out = around(s, slide->node, k);
+        int k = 1 + (slide->unknown - 6) / 2, out = tools_around(s, slide->node, k);
         const double *u = s->linearised + row_of(s, slide->node);
         for (int j = 0; j < 2; j++) {
             double slip = u[slide->unknown + j] - (out > 0 ? u[unknown_of(out) + j] : 0);

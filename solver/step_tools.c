@@ -53,7 +53,6 @@ static bool make_tool(Tool *t, const WireOptions *o, char *why, int capacity)
         for (int k = 0; k < count; k++)
             t->slot[t->slot_start[i] + k] = slot_make((int)i, t->wire.length[i], k, count, section->diameter / 2, section->friction);
     }
-    t->hand_limit = o->hand_limit;
     t->inserted = fmin(o->inserted, t->wire.total_length);
     return t->slot != NULL;
 }
@@ -368,12 +367,70 @@ static void pass_nodes(Stepper *s, int k, double ahead)
     }
 }
 
-void tools_pass(Stepper *s)
+static void pass(Stepper *s)
 {
     for (int k = 1; k < s->tool_count; k++) {
         double ahead = s->tool_command[k].advance - s->tool_command[0].advance;
         pass_nodes(s, k, ahead);
         pass_tip(s, k, ahead);
+    }
+}
+
+void tools_feed(Stepper *s)
+{
+    for (int k = 1; k < s->tool_count; k++) {
+        Tool *t = &s->tool[k];
+        StepCommand *command = &s->tool_command[k];
+        // its proximal end stays behind the hub, its tip beyond it
+        const Tool *out = &s->tool[0];
+        double hub = s->state.inserted + s->command.advance - out->wire.total_length;
+        double most = t->wire.total_length + hub - t->inserted, least = hub - t->inserted;
+        if (command->advance > most || command->advance < least)
+            s->report.flags |= command->advance > most ? STEP_FULLY_INSERTED : STEP_FULLY_WITHDRAWN;
+        command->advance = fmin(most, fmax(least, command->advance));
+    }
+    pass(s);
+}
+
+// --- motion ---
+
+void tools_leave_out(Stepper *s)
+{
+    for (int c = 0; c < s->chain.count; c++)
+        for (int k = 1; k < s->tool_count; k++)
+            for (int i = 0; !is_inside(s, c, k) && i < 2; i++)
+                stepper_prescribe(s, c, unknown_of(k) + i, 0);
+}
+
+void tools_move(Stepper *s, double part)
+{
+    for (int c = 0; c < s->state.node_count; c++)
+        for (int k = 1; k < s->tool_count; k++) {
+            if (!is_inside(s, c, k))
+                continue;
+            int at = unknown_of(k), i = c * s->state.inner_count + k - 1;
+            const double *u = s->u + row_of(s, c) + at;
+            double *done = s->linearised + row_of(s, c) + at;
+            done[0] = part < 1 ? done[0] + part * (u[0] - done[0]) : u[0];
+            done[1] = part < 1 ? done[1] + part * (u[1] - done[1]) : u[1];
+            s->state.slide[i] = s->start_slide[i] + done[0];
+            s->state.angle[i] = s->start_angle[i] + done[1];
+        }
+}
+
+void tools_set_velocities(Stepper *s)
+{
+    WireState *w = &s->state;
+    for (int c = 0; c < w->node_count; c++) {
+        Vec3 t = c < s->first_free ? s->axis[0] : quat_rotate(s->start_orientation[c], vec3(1, 0, 0));
+        for (int k = 1; k < s->tool_count; k++) {
+            if (!is_inside(s, c, k))
+                continue;
+            const double *u = s->linearised + row_of(s, c) + unknown_of(k);
+            int i = c * w->inner_count + k - 1;
+            w->slide_velocity[i] = vec3_dot(w->velocity[c], t) - u[0] / s->dt;
+            w->slide_spin[i] = vec3_dot(w->spin[c], t) + u[1] / s->dt;
+        }
     }
 }
 

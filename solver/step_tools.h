@@ -9,18 +9,19 @@
 // Makes the tools, and says how many nodes and slots a chain of them has at most (capacity, slot_count).
 bool tools_create(Stepper *s, const StepperOptions *options, char *why, int capacity);
 void tools_destroy(Stepper *s);
-// All straight on the line, each as far in as it is told.
+// All straight on the line, each as far in as it is inserted.
 void tools_place(Stepper *s);
 // The chain anew, after a tool's `first` has changed.
 void tools_chain(Stepper *s);
-// Nodes and unknowns come and go, by where the commands of this step will have moved the tools.
-void tools_pass(Stepper *s);
 // Tool k >= 1 at node c: does it lie inside another there, and then where [mm], how it is turned [rad], and its two unknowns' place among the node's.
 static inline bool is_inside(const Stepper *s, int c, int k) { return k > s->carrier[c] && c < s->tool[k].inside; }
 static inline double slide_at(const Stepper *s, int c, int k) { return s->state.slide[c * s->state.inner_count + k - 1]; }
 static inline double angle_at(const Stepper *s, int c, int k) { return s->state.angle[c * s->state.inner_count + k - 1]; }
 static inline int unknown_of(int k) { return 6 + 2 * (k - 1); }
 static inline bool tools_carries(const Tool *t) { return t->first < t->wire.node_count; }
+
+// The tool that is next around tool k at node c and is an unknown there too; 0: none.
+int tools_around(const Stepper *s, int c, int k);
 
 // [mm] rest length of the chain's element c; [rad] its twist.
 double tools_span_length(const Stepper *s, int c);
@@ -30,11 +31,8 @@ Vec3 stepper_curvature(const Stepper *s, int c);
 
 // A step's commands, clamped to what is there, and the nodes that come and go by them.
 void tools_feed(Stepper *s);
-bool tools_misjudges_grip(Stepper *s, int tool);
 void tools_move(Stepper *s, double part);
 void tools_set_velocities(Stepper *s);
-void tools_count_commands(Stepper *s);
-double tools_hand_work(const Stepper *s, int tool);
 double tools_stiffness_damping(const Stepper *s);
 
 // Friction between the tools: bounds from the state at the step's start, and the system's unknowns turned into slips against the tool around, and back.
@@ -43,13 +41,10 @@ void tools_to_slips(Stepper *s);
 void tools_from_slips(Stepper *s);
 double tools_friction_work(const Stepper *s);      // [mJ] that it took in this step
 
+// Unit rows where a tool is no unknown.
+void tools_leave_out(Stepper *s);
 // The linear system of coaxial tools, all but what contacts, loads and constraints add.
 void tools_assemble(Stepper *s, double scale, double inertia);
-// What the hands prescribe at node 0, and unit rows where a tool is no unknown.
-void tools_constrain(Stepper *s);
 double tools_elastic_energy(const Stepper *s);
 double tools_kinetic_energy(const Stepper *s);
-// Forces of the hands, from the rows of node 0.
-void tools_report(Stepper *s);
-
 #endif

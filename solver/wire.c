@@ -129,6 +129,8 @@ bool wire_check(const WireOptions *o, char *why, int capacity)
         return complain(why, capacity, "length of the wire's direction", -1, vec3_norm(o->direction), "a unit vector");
     if (!within(o->hand_limit, 0, 1e9))
         return complain(why, capacity, "hand_limit (N)", -1, o->hand_limit, "0 (never slips) to 1e9 N");
+    if (!within(o->valve_friction, 0, 1e9))
+        return complain(why, capacity, "valve_friction (N)", -1, o->valve_friction, "0 to 1e9 N");
     if (o->has_sheath && !within(o->inserted, 0, total * (1 + 1e-12)))
         return complain(why, capacity, "inserted_mm", -1, o->inserted, "0 to the wire's length");
     return check_rig(o, total, why, capacity);

@@ -52,6 +52,7 @@ typedef struct WireOptions {
     Vec3 normal;             // e2 at the start; zero: vec3_normal_to(direction)
     double inserted;         // [mm] sheath: length beyond the mouth at t = 0
     double hand_limit;       // [N] sheath: above this push or pull the hand slips along the tool; 0 (default): it never does
+    double valve_friction;   // [N] of the valve that it goes through, at the hub of the tool around it or at the sheath, while no hand holds it; default 0
     int fix_count;
     const WireFix *fix;
     int load_count;

@@ -20,7 +20,7 @@ static WireSection tube_section(double length, double bending, double curvature,
 }
 
 typedef struct Coaxial {
-    WireSection section[3][2];
+    WireSection section[3][3];
     WireFix fix;
     WireOptions inner[2];
     StepperOptions options;
@@ -58,9 +58,9 @@ static void start(Coaxial *c, int inner_count, bool sheath)
     assert_non_null(c->stepper);
 }
 
-static const StepReport *step_tools(Stepper *s, const StepCommand *command)
+static const StepReport *step_released(Stepper *s, const StepCommand *command, unsigned released)
 {
-    step_feed_tools(s, command);
+    step_feed_tools(s, command, released);
     step_detect(s);
     step_assemble(s);
     step_factor(s);
@@ -68,6 +68,8 @@ static const StepReport *step_tools(Stepper *s, const StepCommand *command)
     step_correct(s);
     return step_report(s);
 }
+
+static const StepReport *step_tools(Stepper *s, const StepCommand *command) { return step_released(s, command, 0); }
 
 // Tool k moves by a distance and a turn in so many steps, then all rest.
 static const StepReport *move_tool(Stepper *s, int k, double distance, double turn, int steps, int rest)
@@ -410,6 +412,84 @@ static void hands_stop_and_slip(void **state)
     assert_non_null(strstr(why, "too short"));
 }
 
+// A bend of which 9 mm are still inside is about to pull itself out of its catheter by 0.075 N; the 6 mm outside did so by 0.045 N. In a sheath, so that hands
+// can slip.
+static const double SOFTER = 0.0774597;      // [1/mm]
+static void start_kick(Coaxial *c, double limit, double valve, double inner_density)
+{
+    c->section[0][0] = tube_section(120, 60, 0, 1, 0.8);
+    c->section[0][0].density = 1;    // slow enough for steps of 1 ms
+    c->section[1][0] = tube_section(165, 20, 0, 0.5, 0);
+    c->section[1][1] = tube_section(9, 20, 0.1, 0.5, 0);
+    c->section[1][2] = tube_section(6, 20, SOFTER, 0.5, 0);
+    for (int i = 0; i < 3; i++)
+        c->section[1][i].density = inner_density;
+    c->options.wire = tool_options(c->section[0], 1, 57, 60);
+    c->inner[0] = tool_options(c->section[1], 3, 121, 60);
+    c->options.wire.damping_mass = 0;
+    c->options.wire.damping_stiffness = 0.2;
+    c->options.wire.hand_limit = limit;
+    c->inner[0].valve_friction = valve;
+    start(c, 1, true);
+    move_tool(c->stepper, 1, 6.02, 0, 602, 0);
+}
+
+// The outermost hand bears its own tool's push, not the sum of all (0 here), and slips above its limit of 0.05 N while the other hand keeps its tool where it is:
+// the catheter goes back by 9 mm with 0.025 N, and is then braked by 0.05 N over 4.5 mm.
+static void the_outermost_hand_slips_by_its_own_push(void **state)
+{
+    (void)state;
+    Coaxial c = {0};
+    start_kick(&c, 0.05, 0, 2e-4);
+    StepCommand none[2] = {{0}};
+    int slipping = 0;
+    for (int i = 0; i < 1500; i++) {
+        const StepReport *r = step_tools(c.stepper, none);
+        slipping += (r->flags & STEP_HAND_SLIPS) != 0;
+        assert_true(fabs(r->push[0]) < 0.05 * (1 + 1e-6) || !(r->flags & STEP_HAND_SLIPS));
+        assert_true(fabs(stepper_tool_inserted(c.stepper, 1) - 66.02) < 1e-6);
+    }
+    Vec3 after = stepper_state(c.stepper)->position[stepper_state(c.stepper)->node_count - 1];
+    double r = 1 / SOFTER, end = 0.9 + 6 * SOFTER;
+    Vec3 tip = vec3(51.02 + 10 * sin(0.9) + r * (sin(end) - sin(0.9)), 10 * (1 - cos(0.9)) + r * (cos(0.9) - cos(end)), 0);
+    print_message("slipped in %d steps, to %.3f mm (46.53); the tip of the other is %.1e mm from where it would be\n", slipping,
+                  stepper_tool_inserted(c.stepper, 0), vec3_distance(after, tip));
+    assert_true(slipping > 100 && slipping < 1000 && fabs(stepper_tool_inserted(c.stepper, 0) - 46.53) < 0.02 * 13.49);
+    assert_true(vec3_distance(after, tip) < 0.2);
+    stepper_destroy(c.stepper);
+}
+
+// Nobody holds the J: a valve of 0.1 N does, and takes it along with the catheter's hub, whose hand then feels nothing; one of 0.03 N lets it slide out.
+static void a_valve_holds_what_no_hand_does(void **state)
+{
+    (void)state;
+    for (int weak = 0; weak < 2; weak++) {
+        Coaxial c = {0};
+        start_kick(&c, 0, weak ? 0.03 : 0.1, weak ? 1 : 2e-4);
+        move_tool(c.stepper, 1, 0, 0, 1, 400);
+        StepCommand command[2] = {{0}};
+        double push = 0;
+        int slid_out = -1;
+        for (int i = 0; i < 1000; i++) {
+            command[0].advance = i < 500 ? 0.005 : 0;
+            const StepReport *r = step_released(c.stepper, command, 2);
+            assert_true(!(r->flags & (STEP_DIVERGED | STEP_HAND_SLIPS | STEP_LIMITED)));
+            assert_true(r->push[1] == 0);
+            if (i == 400)
+                push = r->push[0];
+            if (slid_out < 0 && stepper_tool_inserted(c.stepper, 1) - stepper_tool_inserted(c.stepper, 0) > 15)
+                slid_out = i;
+        }
+        double apart = stepper_tool_inserted(c.stepper, 1) - stepper_tool_inserted(c.stepper, 0);
+        print_message("valve of %.2f N: hand feels %.4f N, tips %.3f mm apart (at first 6), bend out after %d steps\n", weak ? 0.03 : 0.1, push, apart, slid_out);
+        if (weak)
+            assert_true(slid_out > 0 && apart > 15);
+        else
+            assert_true(fabs(apart - 6.02) < 1e-6 && fabs(stepper_tool_inserted(c.stepper, 1) - 68.52) < 1e-6);
+        stepper_destroy(c.stepper);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -418,6 +498,8 @@ int main(void)
         cmocka_unit_test(friction_in_a_bend),               cmocka_unit_test(friction_acts_between_neighbours),
         cmocka_unit_test(three_tools_stay_in_the_tube),     cmocka_unit_test(a_restored_run_repeats),
         cmocka_unit_test(hands_stop_and_slip),
+        cmocka_unit_test(the_outermost_hand_slips_by_its_own_push),
+        cmocka_unit_test(a_valve_holds_what_no_hand_does),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
