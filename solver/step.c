@@ -711,6 +711,8 @@ static double part_until(double from, double to, double most)
 static double largest_part(const Stepper *s)
 {
     double part = s->turn > TURN_MAX ? TURN_MAX / s->turn : 1;
+    if (s->tool_count > 1)
+        part = fmin(part, tools_largest_part(s));
     int i = s->first_free - 1;
     if (i < 0 || i + 1 >= s->state.node_count)
         return part;

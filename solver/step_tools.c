@@ -341,22 +341,29 @@ static void pass_tip(Stepper *s, int k, double ahead)
     }
 }
 
-// The inner tip of tool k passes nodes.
+// [mm] by which a tip passes a node early.
+static double pass_early(const Stepper *s, int last, double ahead) { return EARLY * s->wire.length[last > 0 ? last - 1 : 0] + fabs(ahead); }
+
+// The inner tip of tool k passes nodes, on the way back …
+static bool pass_nodes_back(Stepper *s, int k, double ahead)
+{
+    Tool *t = &s->tool[k];
+    int before = t->inside;
+    for (int last = t->inside - 1; last > 0 && *slide_of(s, last, k) - ahead >= t->wire.total_length + 2 * pass_early(s, last, ahead); last--)
+        t->inside--;
+    return t->inside < before;
+}
+
+// … or forth. Not both in a step: a tool that is squeezed in its last element would come and go for ever.
 static void pass_nodes(Stepper *s, int k, double ahead)
 {
     Tool *t = &s->tool[k];
     WireState *w = &s->state;
-    while (!tools_carries(t)) {
-        int last = t->inside - 1;
-        double early = EARLY * s->wire.length[last > 0 ? last - 1 : 0] + fabs(ahead);
-        if (last > 0 && *slide_of(s, last, k) - ahead >= t->wire.total_length + 2 * early) {
-            t->inside--;
-            continue;
-        }
-        if (last < 0 || t->inside >= w->node_count || s->carrier[t->inside] > k)
-            return;
-        double length = tools_span_length(s, last), next = *slide_of(s, last, k) + length;
-        if (next - ahead >= t->wire.total_length + early)
+    if (tools_carries(t) || pass_nodes_back(s, k, ahead))
+        return;
+    for (int last = t->inside - 1; last >= 0 && t->inside < w->node_count && s->carrier[t->inside] <= k; last++) {
+        double next = *slide_of(s, last, k) + tools_span_length(s, last);
+        if (next - ahead >= t->wire.total_length + pass_early(s, last, ahead))
             return;
         *slide_of(s, t->inside, k) = next;
         // untwisted: turned against the node by what the carrier is twisted
@@ -400,6 +407,22 @@ void tools_leave_out(Stepper *s)
         for (int k = 1; k < s->tool_count; k++)
             for (int i = 0; !is_inside(s, c, k) && i < 2; i++)
                 stepper_prescribe(s, c, unknown_of(k) + i, 0);
+}
+
+double tools_largest_part(const Stepper *s)
+{
+    double part = 1;
+    for (int k = 1; k < s->tool_count; k++) {
+        const Tool *t = &s->tool[k];
+        int last = t->inside - 1;
+        if (last < 0)
+            continue;
+        double end = tools_carries(t) ? t->wire.s[t->first] : t->wire.total_length, most = end + s->wire.length[last > 0 ? last - 1 : 0];
+        double from = slide_at(s, last, k), to = s->start_slide[last * s->state.inner_count + k - 1] + s->u[row_of(s, last) + (size_t)unknown_of(k)];
+        if (to > most && to > from)
+            part = fmin(part, fmax(0, most - from) / (to - from));
+    }
+    return part;
 }
 
 void tools_move(Stepper *s, double part)

@@ -31,6 +31,8 @@ Vec3 stepper_curvature(const Stepper *s, int c);
 
 // A step's commands, clamped to what is there, and the nodes that come and go by them.
 void tools_feed(Stepper *s);
+// The part of the solution that can be followed before a tip goes back by more than an element.
+double tools_largest_part(const Stepper *s);
 void tools_move(Stepper *s, double part);
 void tools_set_velocities(Stepper *s);
 double tools_stiffness_damping(const Stepper *s);
