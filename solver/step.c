@@ -34,6 +34,7 @@ static const double SQUEEZE_MAX = 0.03, JAMMED = 0.002;
 static const double TAKE_BACK = 0.002;           // of an element's length past the mouth: a free node that would end nearer to it is held
 static const double BORDER_FORCE = 1e-3;         // of what straightening takes at the mouth: good enough
 enum { DRIVEN_TRIES = 6 };
+static const double FIRMEST = 1e5;               // share of its stiffness by which an unknown is held to the iterate at most, where nothing less will do
 static const double MOUTH_TRAVEL = 1;            // of an element's length that the tool springs through the mouth in a step, besides what the hand feeds
 static const double LET_GO_TURN = 0.1;           // [rad] by which a node that is let go at the mouth is turned at most
 
@@ -444,7 +445,7 @@ static void feed(Stepper *s, unsigned released)
     s->wall_force_max = s->report.wall_force_max;
     s->wall_force_sum = s->report.wall_force_sum;
     s->report = (StepReport){0};
-    s->has_failed = false;
+    s->has_failed = s->was_held = false;
     if (!s->has_sheath)
         command = (StepCommand){0};
     double inserted = s->state.inserted + command.advance, total = s->wire.total_length;
@@ -487,9 +488,48 @@ void step_detect(Stepper *s) { stepper_detect(s); }
 
 void step_assemble(Stepper *s) { stepper_assemble(s); }
 
+// The iterate in the unknowns that are solved for: hands at node 0, slips elsewhere.
+static double solved_for(const Stepper *s, int c, int unknown)
+{
+    const double *u = s->linearised + row_of(s, c);
+    int k = unknown < 6 ? 0 : 1 + (unknown - 6) / 2, out = k > 0 && is_inside(s, c, k) ? tools_around(s, c, k) : 0;
+    if (c == 0 && k > 0 && is_inside(s, c, k))
+        return hand_moved(s, k, unknown % 2);
+    return u[unknown] - (c > 0 && out > 0 ? u[unknown_of(out) + unknown % 2] : 0);
+}
+
+static bool is_unit_row(const double *row, int n, int unknown)
+{
+    for (int i = 0; i < n; i++)
+        if (row[i] != (i == unknown))
+            return false;
+    return true;
+}
+
+// Holds the solution to the iterate by a share of each unknown's own stiffness.
+static void hold_to_iterate(Stepper *s, double share)
+{
+    int n = s->chain.size;
+    for (int c = 0; c < s->chain.count; c++)
+        for (int i = 0; i < n; i++) {
+            double *row = s->chain.diag + block_of(s, c) + n * i, more = share * fabs(row[i]);
+            if (is_unit_row(row, n, i))
+                continue;
+            row[i] += more;
+            s->b[row_of(s, c) + (size_t)i] += more * solved_for(s, c, i);
+        }
+}
+
+// A matrix that is not positive definite (a tool springs, and nothing holds it) is made so.
 void step_factor(Stepper *s)
 {
-    s->has_failed |= !block_chain_factor(&s->chain, s->factor);
+    bool good = block_chain_factor(&s->chain, s->factor);
+    for (double share = 0.01; !good && share < FIRMEST; share *= 10) {
+        hold_to_iterate(s, share);
+        good = block_chain_factor(&s->chain, s->factor);
+        s->was_held = true;
+    }
+    s->has_failed |= !good;
 }
 
 static void solve(Stepper *s)
@@ -902,6 +942,8 @@ void step_correct(Stepper *s)
     s->state.time += s->dt;
     if (!s->has_failed) {
         report_forces(s);
+        if (s->was_held)
+            s->report.flags |= STEP_NOT_CONVERGED;
         double part = s->blocked ? 0 : follow(s, false);
         if (part < 1)
             report_cut_forces(s, part);

@@ -48,6 +48,8 @@ static double hand_moves(const Stepper *s, int k, int about, const double *u)
     return own - (out == 0 ? hub : about ? hub + u[unknown_of(out) + 1] : hub - u[unknown_of(out)]);
 }
 
+double hand_moved(const Stepper *s, int k, int about) { return hand_moves(s, k, about, s->linearised); }
+
 // Node 0's unknowns are `basis` times the hands'.
 static void make_basis(Stepper *s)
 {
@@ -215,7 +217,7 @@ double hands_work(const Stepper *s)
     double work = 0;
     for (int k = 0; k < s->tool_count; k++)
         if (has_hand(s, k) && !s->hand[k].is_released)
-            work += s->report.push[k] * hand_moves(s, k, 0, s->linearised) + s->report.torque[k] * hand_moves(s, k, 1, s->linearised);
+            work += s->report.push[k] * hand_moved(s, k, 0) + s->report.torque[k] * hand_moved(s, k, 1);
     return work;
 }
 
@@ -224,7 +226,7 @@ double hands_valve_work(const Stepper *s)
     double work = 0;
     for (int k = 0; k < s->tool_count; k++)
         for (int about = 0; has_hand(s, k) && s->hand[k].is_released && about < 2; about++)
-            work -= hand_force(s, k, about) * hand_moves(s, k, about, s->linearised);
+            work -= hand_force(s, k, about) * hand_moved(s, k, about);
     return work;
 }
 

@@ -141,6 +141,7 @@ struct Stepper {
     bool knows_motion;       // u is an answer to this iterate: detection looks as far as it goes
     double wall_force_max, wall_force_sum;   // [N] of the step before
     bool has_failed;
+    bool was_held;           // some solve of the step was held to its iterate
     bool is_iterate;         // linearised about something else than x_n
 };
 
@@ -194,6 +195,7 @@ void hands_report(Stepper *s);
 // [N] or [N mm] that tool k's hand, or the valve that holds it, pushes along or turns about the line with.
 double hand_force(const Stepper *s, int tool, int about);
 void hands_count(Stepper *s);
+double hand_moved(const Stepper *s, int tool, int about);     // … in this step, to the iterate
 double hands_work(const Stepper *s);           // [mJ] that the hands have done in this step …
 double hands_valve_work(const Stepper *s);     // … and that the valves have taken
 // [mm] of a cut advance that later steps make up.

@@ -46,7 +46,7 @@ typedef struct Outcome {
 
 static void make_tool(Run *run, Random *random, int k, double outer, double inner)
 {
-    double modulus = draw_log(random, 300, 230000), softer = draw(random, 0.1, 1), curved = draw(random, 0, 1);
+    double modulus = inner > 0 ? draw_log(random, 300, 10000) : draw_log(random, 5000, 230000), softer = draw(random, 0.1, 1), curved = draw(random, 0, 1);
     double length[SECTIONS] = {260 + 95 * k, draw(random, 5, 30), draw(random, 3, 25)};
     for (int i = 0; i < SECTIONS; i++)
         run->section[k][i] = (WireSection){.length = length[i], .diameter = outer, .inner_diameter = inner, .poisson_ratio = 0.3, .density = 4e-3, .friction = -1,
@@ -56,6 +56,10 @@ static void make_tool(Run *run, Random *random, int k, double outer, double inne
     if (curved > 0.6) {
         run->section[k][2].rest_curvature = draw(random, 0, 0.25);
         run->section[k][2].rest_plane = draw(random, -PI, PI);
+    }
+    for (int i = 1; i < SECTIONS; i++) {         // not more than two fingers could straighten
+        double bending = wire_stiffness(&run->section[k][i]).bending;
+        run->section[k][i].rest_curvature = fmin(run->section[k][i].rest_curvature, sqrt(2 * 10 / bending));
     }
     WireOptions *o = k == 0 ? &run->options.wire : &run->inner[k - 1];
     *o = wire_default_options();
@@ -170,8 +174,6 @@ static Outcome drive(Run *run, Random *random, bool speaks)
             out.push = fmax(out.push, fabs(r->push[k]));
         }
         out.is_finite &= is_finite(run->stepper);
-        if (r->flags & STEP_DIVERGED && speaks)
-            printf("  step %d: diverged\n", i);
     }
     checkpoint_free(kept);
     return out;
