@@ -22,7 +22,8 @@ static const char help[] =
     "                         data_mm   distance of the vertex to that data point: large where there are no data, as on caps\n"
     "                         (.stl and .obj have no place for these)\n"
     "  tree or model, centreline  .vtp (lines with Radius)  .mrk.json (3D Slicer curves)  .swc\n"
-    "  recording              .csv (a row a node and frame)  .vtp or .pvd (one .vtp a frame and a .pvd that names them)\n\n"
+    "  recording              .csv (a row a node and frame)  .vtp or .pvd (one .vtp a frame and a .pvd that names them); of several\n"
+    "                         tools all nodes of each, with what carries them: a column of the .csv, numbers (0 outermost) in a .vtp\n\n"
     "  --what surface|centreline  what a .vtp holds; default: the surface of a model, the centreline of a tree\n"
     "  --cell-mm X                size of the surface's cells [mm]; default: about ten to twenty cells round the thinnest branch\n"
     "  --keep-floating            also the parts of a surface to which no point gets from the inlet; dropped otherwise, which is said\n"
@@ -513,22 +514,114 @@ static bool export_tree(const ExportOptions *options, const char *extension, Fau
 
 // --- recordings ---
 
+static void print_place(FILE *out, Vec3 x, Quat q) { fprintf(out, "%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", x.x, x.y, x.z, q.w, q.x, q.y, q.z); }
+
+static void print_frame_rows(FILE *out, const RecordedRun *run, int64_t frame)
+{
+    RecordedFrame at = recorded_run_frame(run, frame);
+    int64_t step = run->frame_step[frame];
+    for (int i = 0; i < at.node_count; i++) {
+        fprintf(out, "%.9g,%" PRId64 ",%d,", run->time_s[step], step, i);
+        print_place(out, at.position[i], at.quaternion[i]);
+        fputc('\n', out);
+    }
+}
+
+// Of several tools all their own nodes, as in the final state that `run` writes.
+static void print_tool_rows(FILE *out, const RecordedRun *run, int64_t frame)
+{
+    int64_t step = run->frame_step[frame];
+    for (int k = 0; k < run->tool_count; k++) {
+        const RecordedTool *tool = &run->tool[k];
+        for (int i = 0; i < tool->node_count; i++) {
+            int64_t at = frame * tool->node_count + i;
+            fprintf(out, "%.9g,%" PRId64 ",%s,%d,", run->time_s[step], step, tool->name, i);
+            print_place(out, tool->position[at], tool->quaternion[at]);
+            fprintf(out, ",%s\n", tool->carrier[at] < 0 ? "-" : run->tool[tool->carrier[at]].name);
+        }
+    }
+}
+
 static bool export_rows(const ExportOptions *options, const RecordedRun *run, Faults *faults)
 {
     Text text;
+    bool several = run->tool_count > 1;
     if (!text_open(&text)) {
         faults_add(faults, options->out, 0, 0, "cannot be written: no memory");
         return false;
     }
-    fprintf(text.stream, "t_s,step,node,x_mm,y_mm,z_mm,qw,qx,qy,qz\n");
+    fprintf(text.stream, "t_s,step,%snode,x_mm,y_mm,z_mm,qw,qx,qy,qz%s\n", several ? "tool," : "", several ? ",carrier" : "");
     for (int64_t k = 0; k < run->frame_count; k++)
-        for (int i = 0; i < run->node_count; i++) {
-            Vec3 x = run->position[k * run->node_count + i];
-            Quat q = run->quaternion[k * run->node_count + i];
-            fprintf(text.stream, "%.9g,%" PRId64 ",%d,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g\n", run->time_s[run->frame_step[k]], run->frame_step[k], i, x.x, x.y,
-                    x.z, q.w, q.x, q.y, q.z);
-        }
+        (several ? print_tool_rows : print_frame_rows)(text.stream, run, k);
     return text_write(&text, options->out, faults);
+}
+
+// A line of a frame: the single tool, or one of several with all its own nodes.
+typedef struct FrameLine {
+    int count;
+    const Vec3 *position;
+    const double *radius;
+    const int8_t *carrier;   // NULL: a single tool
+} FrameLine;
+
+static int lines_of(const RecordedRun *run, int64_t frame, FrameLine line[STEP_TOOLS_MAX])
+{
+    RecordedFrame at = recorded_run_frame(run, frame);
+    line[0] = (FrameLine){at.node_count, at.position, at.radius, NULL};
+    for (int k = 0; run->tool_count > 1 && k < run->tool_count; k++) {
+        const RecordedTool *tool = &run->tool[k];
+        int64_t first = frame * tool->node_count;
+        line[k] = (FrameLine){tool->node_count, tool->position + first, tool->radius, tool->carrier + first};
+    }
+    return run->tool_count;
+}
+
+static void print_tool_numbers(FILE *out, const FrameLine *line, int lines)
+{
+    vtp_array(out, "Int32", "tool", 1);
+    for (int k = 0; k < lines; k++)
+        for (int i = 0; i < line[k].count; i++)
+            fprintf(out, "%d\n", k);
+    vtp_array_end(out);
+    vtp_array(out, "Int32", "carrier", 1);
+    for (int k = 0; k < lines; k++)
+        for (int i = 0; i < line[k].count; i++)
+            fprintf(out, "%d\n", line[k].carrier[i]);
+    vtp_array_end(out);
+}
+
+static void print_frame_vtp(FILE *out, const RecordedRun *run, int64_t frame)
+{
+    FrameLine line[STEP_TOOLS_MAX];
+    int lines = lines_of(run, frame, line), points = 0, end = 0;
+    for (int k = 0; k < lines; k++)
+        points += line[k].count;
+    vtp_begin(out, points, lines, 0);
+    fprintf(out, "<PointData Scalars=\"Radius\">\n");
+    vtp_array(out, "Float64", "Radius", 1);
+    for (int k = 0; k < lines; k++)
+        for (int i = 0; i < line[k].count; i++)
+            fprintf(out, "%.9g\n", line[k].radius[i]);
+    vtp_array_end(out);
+    if (line[0].carrier)
+        print_tool_numbers(out, line, lines);
+    fprintf(out, "</PointData>\n<Points>\n");
+    vtp_array(out, "Float64", "Points", 3);
+    for (int k = 0; k < lines; k++)
+        for (int i = 0; i < line[k].count; i++)
+            fprintf(out, "%.9g %.9g %.9g\n", line[k].position[i].x, line[k].position[i].y, line[k].position[i].z);
+    vtp_array_end(out);
+    fprintf(out, "</Points>\n<Lines>\n");
+    vtp_array(out, "Int64", "connectivity", 1);
+    for (int i = 0; i < points; i++)
+        fprintf(out, "%d\n", i);
+    vtp_array_end(out);
+    vtp_array(out, "Int64", "offsets", 1);
+    for (int k = 0; k < lines; k++)
+        fprintf(out, "%d\n", end += line[k].count);
+    vtp_array_end(out);
+    fprintf(out, "</Lines>\n");
+    vtp_end(out);
 }
 
 static bool export_frame(const char *path, const RecordedRun *run, int64_t frame, Faults *faults)
@@ -538,25 +631,7 @@ static bool export_frame(const char *path, const RecordedRun *run, int64_t frame
         faults_add(faults, path, 0, 0, "cannot be written: no memory");
         return false;
     }
-    FILE *out = text.stream;
-    vtp_begin(out, run->node_count, 1, 0);
-    fprintf(out, "<PointData Scalars=\"Radius\">\n");
-    vtp_array(out, "Float64", "Radius", 1);
-    for (int i = 0; i < run->node_count; i++)
-        fprintf(out, "%.9g\n", run->radius[i]);
-    vtp_array_end(out);
-    fprintf(out, "</PointData>\n");
-    vtp_points(out, run->position + frame * run->node_count, run->node_count);
-    fprintf(out, "<Lines>\n");
-    vtp_array(out, "Int64", "connectivity", 1);
-    for (int i = 0; i < run->node_count; i++)
-        fprintf(out, "%d\n", i);
-    vtp_array_end(out);
-    vtp_array(out, "Int64", "offsets", 1);
-    fprintf(out, "%d\n", run->node_count);
-    vtp_array_end(out);
-    fprintf(out, "</Lines>\n");
-    vtp_end(out);
+    print_frame_vtp(text.stream, run, frame);
     return text_write(&text, path, faults);
 }
 

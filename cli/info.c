@@ -152,6 +152,23 @@ static bool describe_tree(cJSON *object, const char *path, TreeWishes *wishes, F
     return good;
 }
 
+static void add_recorded_tools(cJSON *object, const RecordedRun *run)
+{
+    cJSON *list = cJSON_AddArrayToObject(object, "tools");
+    for (int k = 0; k < run->tool_count; k++) {
+        const RecordedTool *own = &run->tool[k];
+        cJSON *tool = cJSON_CreateObject();
+        cJSON_AddStringToObject(tool, "name", own->name);
+        cJSON_AddStringToObject(tool, "kind", own->kind);
+        cJSON_AddNumberToObject(tool, "length_mm", own->s[own->node_count - 1]);
+        if (run->step_count > 0)
+            cJSON_AddNumberToObject(tool, "inserted_mm", own->inserted[run->step_count - 1]);
+        if (run->frame_count > 0)
+            add_vector(tool, "tip_mm", own->position[run->frame_count * own->node_count - 1]);
+        cJSON_AddItemToArray(list, tool);
+    }
+}
+
 static bool describe_recording(cJSON *object, const char *path, Faults *faults)
 {
     RecordedRun *run = recorded_run_load(path, faults);
@@ -163,8 +180,11 @@ static bool describe_recording(cJSON *object, const char *path, Faults *faults)
     cJSON_AddNumberToObject(object, "frames", (double)run->frame_count);
     cJSON_AddNumberToObject(object, "nodes", run->node_count);
     cJSON_AddNumberToObject(object, "simulated_s", run->step_count > 0 ? run->time_s[run->step_count - 1] : 0);
+    RecordedFrame last = recorded_run_frame(run, run->frame_count > 0 ? run->frame_count - 1 : 0);
     if (run->frame_count > 0)
-        add_vector(object, "tip_mm", run->position[run->frame_count * run->node_count - 1]);
+        add_vector(object, "tip_mm", last.position[last.node_count - 1]);
+    if (run->tool_count > 1)
+        add_recorded_tools(object, run);
     if (run->step_count > 0) {
         snprintf(hash, sizeof hash, "%016" PRIx64, run->state_hash[run->step_count - 1]);
         cJSON_AddStringToObject(object, "state_hash", hash);

@@ -46,8 +46,8 @@ static int64_t frame_at(const RecordedRun *run, int64_t step)
 
 static int tip_node(const Playback *playback, int64_t step)
 {
-    const RecordedRun *run = playback->run;
-    return run->vessel_node[(frame_at(run, step) + 1) * run->node_count - 1];
+    RecordedFrame frame = recorded_run_frame(playback->run, frame_at(playback->run, step));
+    return frame.vessel_node[frame.node_count - 1];
 }
 
 // Keeps the place reached where it is the next one to keep.
@@ -97,7 +97,7 @@ Playback *playback_open(const RecordedRun *run, const Scene *scene, const Vessel
     playback->is_seen = recorded_run_was_watched(run);
     int64_t strides = (run->step_count / MOST_KEPT + 1) / STRIDE + 1;
     playback->keep_steps = STRIDE * (strides > KEEP_EVERY ? strides : KEEP_EVERY);
-    playback->pose = pose_create(run->node_count);
+    playback->pose = pose_create_for_run(run);
     playback->now = (Place){.pulses = pulse_clock_start(0), .contrast = tree ? contrast_create(tree, NULL) : NULL};
     if (!playback->pose || (tree && !playback->now.contrast)) {
         playback_close(playback);
@@ -137,15 +137,8 @@ bool playback_seek(Playback *playback, double time_s)
     go_on(playback, step);
     int64_t row = step - 1;
     pose_from_run(playback->pose, playback->scene, run, frame_at(run, row));
-    playback->pose->step = step;
-    playback->pose->time_s = run->time_s[row];
+    pose_figures_from_run(playback->pose, run, row);
     playback->pose->xray = *control(playback, row);
-    playback->pose->command = (Command){run->command[2 * row], run->command[2 * row + 1]};
-    playback->pose->report.proximal_force = run->proximal[2 * row];
-    playback->pose->report.proximal_torque = run->proximal[2 * row + 1];
-    playback->pose->report.wall_force_max = run->wall_force[2 * row];
-    playback->pose->report.wall_force_sum = run->wall_force[2 * row + 1];
-    playback->pose->report.flags = run->flags[row];
     return step < before || (double)(step - before) * dt > 1;
 }
 

@@ -173,9 +173,7 @@ static int simulate_again(const ReplayOptions *options, const RecordedRun *run, 
     int code = EXIT_BAD_INPUT;
     if (!simulator)
         return code;
-    if (run->node_count != simulator_state(simulator)->node_count)
-        faults_add(faults, options->recording, 0, 0, "holds a tool of %d nodes, its scene one of %d", run->node_count, simulator_state(simulator)->node_count);
-    else if (options->scene_folder && !(sampling.path = tool_path_create(simulator, (double)run->step_count * run->step_ms / 1000)))
+    if (replay_fits(run, simulator, options->recording, faults) && options->scene_folder && !(sampling.path = tool_path_create(simulator, (double)run->step_count * run->step_ms / 1000)))
         faults_add(faults, options->recording, 0, 0, "no memory for its tool path");
     if (faults->count == 0) {
         ReplayVerdict verdict = replay_verify(simulator, run, -1, options->scene_folder != NULL, sample, &sampling);

@@ -2,6 +2,7 @@
 
 #include "sim/clock.h"
 #include "sim/lesson.h"
+#include "sim/replay.h"
 
 #include <stdlib.h>
 
@@ -34,18 +35,15 @@ Rescore *rescore_create(const RecordedRun *run, const Scene *scene, const OpenVe
         rescore->was_watched = recorded_run_was_watched(run);
         rescore->capacity = (int)fmin(1e7, (double)run->step_count * run->step_ms / 1000 / kept_s + 2);
         rescore->kept = calloc((size_t)rescore->capacity, sizeof *rescore->kept);
-        rescore->simulator = simulator_create(scene, open->vessel, faults);
+        rescore->simulator = scene_has_one_tool(scene, "a score", faults) ? simulator_create(scene, open->vessel, faults) : NULL;
         rescore->lesson = rescore->simulator ? lesson_create(rescore->simulator, open->tree) : NULL;
     }
-    int nodes = rescore && rescore->simulator ? simulator_state(rescore->simulator)->node_count : 0;
-    bool is_its_tool = run->frame_count == 0 || nodes == run->node_count;
-    if (rescore && rescore->kept && rescore->lesson && is_its_tool) {
+    bool fits = rescore && rescore->simulator && replay_fits(run, rescore->simulator, scene->path, faults);
+    if (fits && rescore->kept && rescore->lesson) {
         keep(rescore);
         return rescore;
     }
-    if (nodes && !is_its_tool)
-        faults_add(faults, scene->path, 0, 0, "gives a tool of %d nodes, the recording holds one of %d", nodes, run->node_count);
-    else
+    if (!rescore || (fits && !(rescore->kept && rescore->lesson)))
         faults_add(faults, scene->path, 0, 0, "no memory to simulate it again");
     rescore_free(rescore);
     return NULL;

@@ -170,7 +170,7 @@ static Scene *prepare_scene(const RunOptions *options, Faults *faults)
         scene->contact = (ContactKind)kind;
     if (scene && !scene->script && options->duration_s < 0 && options->settle_s < 0)
         faults_add(faults, options->scene, 0, 0, "has no script; give --script F, --duration-s S or --settle-s S");
-    const char *single = options->record ? "--record" : options->score ? "--score" : options->device_count ? "--device" : options->picture ? "--picture" : NULL;
+    const char *single = options->score ? "--score" : options->device_count ? "--device" : options->picture ? "--picture" : NULL;
     if (scene && single)
         scene_has_one_tool(scene, single, faults);
     if (faults->count > 0) {

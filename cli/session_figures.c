@@ -169,7 +169,11 @@ static XrayControl usual_view(const RecordedRun *run)
     return best;
 }
 
-static Vec3 tip_at(const RecordedRun *run, int64_t frame) { return run->position[frame * run->node_count + run->node_count - 1]; }
+static Vec3 tip_at(const RecordedRun *run, int64_t frame)
+{
+    RecordedFrame at = recorded_run_frame(run, frame);
+    return at.position[at.node_count - 1];
+}
 
 static void place(const RoadMap *map, Vec3 point, double *x, double *y)
 {
@@ -288,13 +292,14 @@ static void draw_path(FILE *out, const RoadMap *map, const RecordedRun *run)
 
 static void draw_tool(FILE *out, const RoadMap *map, const RecordedRun *run)
 {
-    const Vec3 *node = run->position + (run->frame_count - 1) * run->node_count;
-    double shown = run->s[run->node_count - 1] - run->inserted[run->step_count - 1], x, y;
+    RecordedFrame at = recorded_run_frame(run, run->frame_count - 1);
+    const RecordedTool *first = &run->tool[0];
+    double length = run->tool_count > 1 ? first->s[first->node_count - 1] : at.s[at.node_count - 1], shown = length - run->inserted[run->step_count - 1], x, y;
     fprintf(out, "<polyline class=\"tool\" points=\"");
-    for (int i = 0; i < run->node_count; i++) {
-        if (run->s[i] < shown)
+    for (int i = 0; i < at.node_count; i++) {
+        if (at.s[i] < shown)
             continue;
-        place(map, node[i], &x, &y);
+        place(map, at.position[i], &x, &y);
         fprintf(out, "%.1f,%.1f ", x, y);
     }
     fprintf(out, "\"/>\n");

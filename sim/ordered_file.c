@@ -8,7 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { WORD = 8, MOST_BLOCKS = 512, NODE_HEAD = 24 };
+enum { WORD = 8, MOST_BLOCKS = 512, MOST_PAGES = 2, NODE_HEAD = 24 };
 
 // A piece of metadata that the library writes as one.
 typedef struct Block {
@@ -27,6 +27,8 @@ struct OrderedFile {
     bool sealed;
     int index_entries, block_count;
     Block block[MOST_BLOCKS];
+    int page_count;
+    haddr_t page_start[MOST_PAGES];   // of those that hold headers
     unsigned char *page;   // page aligned: no fault in the middle of the kernel's copy
     const char *fault;
 };
@@ -341,7 +343,12 @@ OrderedFile *ordered_file_of(hid_t file)
 
 const char *ordered_file_fault(const OrderedFile *file) { return file->fault; }
 
-void ordered_file_start_page(OrderedFile *file) { file->end = (file->end + ORDERED_FILE_PAGE - 1) / ORDERED_FILE_PAGE * ORDERED_FILE_PAGE; }
+void ordered_file_start_page(OrderedFile *file)
+{
+    file->end = (file->end + ORDERED_FILE_PAGE - 1) / ORDERED_FILE_PAGE * ORDERED_FILE_PAGE;
+    if (file->page_count < MOST_PAGES)
+        file->page_start[file->page_count++] = file->end;
+}
 
 bool ordered_file_seal(OrderedFile *file, int index_entries, hsize_t ahead)
 {
@@ -404,26 +411,25 @@ static bool node_fits(const OrderedFile *file, const Block *block)
     return next_change(block, WORD) >= bound && new > little_endian(block->disk + last, WORD) && new >= little_endian(block->disk + leading, WORD);
 }
 
-// Rule 4: one word of each header, all within the page that the first of them lies in.
-static bool header_fits(const Block *block, haddr_t *page)
+static bool lies_in(haddr_t address, haddr_t page_start) { return address >= page_start && address < page_start + ORDERED_FILE_PAGE; }
+
+// Rule 4: one word of each header, in a started page.
+static bool header_fits(const OrderedFile *file, const Block *block)
 {
     size_t change = next_change(block, 0);
-    if (change == block->size)
-        return true;
-    haddr_t at = (block->address + change) / ORDERED_FILE_PAGE;
-    if (*page == HADDR_UNDEF)
-        *page = at;
-    return *page == at && next_change(block, change + WORD) == block->size;
+    bool inside = change == block->size;
+    for (int i = 0; i < file->page_count; i++)
+        inside |= lies_in(block->address + change, file->page_start[i]);
+    return inside && next_change(block, change + WORD) == block->size;
 }
 
-static bool all_fits(OrderedFile *file, haddr_t *page)
+static bool all_fits(OrderedFile *file)
 {
-    *page = HADDR_UNDEF;
     for (int i = 0; i < file->block_count; i++) {
         const Block *block = &file->block[i];
         bool good = !block->dirty || (block->type == H5FD_MEM_SUPER   ? superblock_fits(block)
                                       : block->type == H5FD_MEM_BTREE ? node_fits(file, block)
-                                      : block->type == H5FD_MEM_OHDR  ? header_fits(block, page)
+                                      : block->type == H5FD_MEM_OHDR  ? header_fits(file, block)
                                                                       : next_change(block, 0) == block->size);
         if (!good)
             return refuse(file, "the file's structure would change");
@@ -449,18 +455,15 @@ static bool write_words(OrderedFile *file, H5FD_mem_t type, size_t from, size_t 
     return true;
 }
 
-static bool write_extents(OrderedFile *file, haddr_t page)
+static bool write_extents(OrderedFile *file, haddr_t start)
 {
-    if (page == HADDR_UNDEF)
-        return true;
-    haddr_t start = page * ORDERED_FILE_PAGE;
     size_t first = ORDERED_FILE_PAGE, last = 0;
     if (!read_all(file->descriptor, file->page, ORDERED_FILE_PAGE, start))
         return false;
     for (int i = 0; i < file->block_count; i++) {
         Block *block = &file->block[i];
         size_t change = block->dirty && block->type == H5FD_MEM_OHDR ? next_change(block, 0) : block->size;
-        if (change == block->size)
+        if (change == block->size || !lies_in(block->address + change, start))
             continue;
         size_t at = (size_t)(block->address + change - start);
         memcpy(file->page + at, block->wanted + change, WORD);
@@ -468,6 +471,8 @@ static bool write_extents(OrderedFile *file, haddr_t page)
         first = at < first ? at : first;
         last = at + WORD > last ? at + WORD : last;
     }
+    if (last == 0)
+        return true;
     watch(false);
     // one call; a short one (a full disk cannot be the reason: the page is there) must not be followed by a second
     return pwrite(file->descriptor, file->page + first, last - first, (off_t)(start + first)) == (ssize_t)(last - first);
@@ -475,18 +480,18 @@ static bool write_extents(OrderedFile *file, haddr_t page)
 
 bool ordered_file_commit(OrderedFile *file)
 {
-    haddr_t page;
     if (file->fault)
         return false;
     watch(false);
     if (!grow(file->descriptor, file->end, 2 * file->ahead))
         return false;
     state_end_ahead(file);
-    if (!all_fits(file, &page))
+    if (!all_fits(file))
         return false;
     watch(false);
-    bool good = write_end(file) && write_words(file, H5FD_MEM_BTREE, WORD, SIZE_MAX) && write_words(file, H5FD_MEM_BTREE, 0, WORD) &&
-                write_extents(file, page);
+    bool good = write_end(file) && write_words(file, H5FD_MEM_BTREE, WORD, SIZE_MAX) && write_words(file, H5FD_MEM_BTREE, 0, WORD);
+    for (int i = 0; good && i < file->page_count; i++)
+        good = write_extents(file, file->page_start[i]);
     for (int i = 0; good && i < file->block_count; i++)
         file->block[i].dirty = false;
     watch(true);

@@ -37,6 +37,14 @@ Pose *pose_create_for(Simulator *simulator)
     return pose_create_tools(stepper_node_capacity(stepper), count, nodes);
 }
 
+Pose *pose_create_for_run(const RecordedRun *run)
+{
+    int nodes[STEP_TOOLS_MAX] = {run->node_count};
+    for (int k = 0; run->tool_count > 1 && k < run->tool_count; k++)
+        nodes[k] = run->tool[k].node_count;
+    return pose_create_tools(run->node_count, run->tool_count, nodes);
+}
+
 void pose_free(Pose *pose)
 {
     if (!pose)
@@ -67,10 +75,11 @@ void pose_copy(Pose *to, const Pose *from)
     }
 }
 
-// Behind the mouth lies what is not inserted. Without a sheath all of the tool is.
+// Behind the mouth lies what of the first tool is not inserted; s grows along the centreline, also from a tool to the one within. Without a sheath all is free.
 static void find_first_free(Pose *pose, bool has_sheath)
 {
-    double hidden = has_sheath ? pose->node[pose->node_count - 1].s - pose->inserted_mm : 0;
+    const PoseTool *first = &pose->tool[0];
+    double hidden = has_sheath ? first->node[first->node_count - 1].s - pose->inserted_mm : 0;
     pose->first_free_node = 0;
     while (pose->first_free_node < pose->node_count - 1 && pose->node[pose->first_free_node].s < hidden)
         pose->first_free_node++;
@@ -92,7 +101,6 @@ void pose_take(Pose *pose, Simulator *simulator, const ToolCommands *commands, c
     memcpy(pose->position, state->position, count * sizeof *pose->position);
     memcpy(pose->quaternion, state->orientation, count * sizeof *pose->quaternion);
     stepper_node_report(stepper, pose->node);
-    find_first_free(pose, simulator_scene(simulator)->wire.has_sheath);
     for (int k = 0; k < pose->tool_count; k++) {
         PoseTool *tool = &pose->tool[k];
         tool->command = commands->tool[k];
@@ -101,34 +109,59 @@ void pose_take(Pose *pose, Simulator *simulator, const ToolCommands *commands, c
         tool->torque_n_mm = pose->report.torque[k];
         stepper_tool_nodes(stepper, k, tool->node);
     }
+    find_first_free(pose, simulator_scene(simulator)->wire.has_sheath);
+}
+
+void pose_figures_from_run(Pose *pose, const RecordedRun *run, int64_t step)
+{
+    ToolCommands commands = recorded_run_commands(run, step);
+    pose->step = step + 1;
+    pose->time_s = run->time_s[step];
+    pose->command = commands.tool[0];
+    pose->xray = run->xray ? run->xray[step] : xray_default_control();
+    pose->report = (StepReport){.flags = run->flags[step], .proximal_force = run->proximal[2 * step], .proximal_torque = run->proximal[2 * step + 1],
+                                .wall_force_max = run->wall_force[2 * step], .wall_force_sum = run->wall_force[2 * step + 1]};
+    for (int k = 0; k < pose->tool_count; k++) {
+        PoseTool *tool = &pose->tool[k];
+        tool->command = commands.tool[k];
+        tool->push_n = pose->report.push[k] = run->tool[k].proximal[2 * step];
+        tool->torque_n_mm = pose->report.torque[k] = run->tool[k].proximal[2 * step + 1];
+    }
+}
+
+static void own_nodes_from_run(PoseTool *tool, const RecordedTool *recorded, int64_t frame)
+{
+    size_t first = (size_t)frame * (size_t)recorded->node_count;
+    for (int j = 0; j < tool->node_count; j++)
+        tool->node[j] = (ToolNode){.s = recorded->s[j], .radius = recorded->radius[j], .position = recorded->position[first + (size_t)j],
+                                   .orientation = recorded->quaternion[first + (size_t)j], .carrier = recorded->carrier[first + (size_t)j]};
 }
 
 void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64_t frame)
 {
     int64_t row = run->frame_step[frame];
-    size_t nodes = (size_t)run->node_count, first = (size_t)frame * nodes;
-    pose->step = row + 1;
-    pose->time_s = run->time_s[row];
-    pose->command = (Command){run->command[2 * row], run->command[2 * row + 1]};
-    pose->xray = run->xray ? run->xray[row] : xray_default_control();
+    RecordedFrame at = recorded_run_frame(run, frame);
+    pose_figures_from_run(pose, run, row);
     pose->inserted_mm = run->inserted[row];
     pose->turned_deg = run->turned[row];
-    pose->report = (StepReport){.flags = run->flags[row], .proximal_force = run->proximal[2 * row], .proximal_torque = run->proximal[2 * row + 1],
-                                .wall_force_max = run->wall_force[2 * row], .wall_force_sum = run->wall_force[2 * row + 1]};
-    memcpy(pose->position, run->position + first, nodes * sizeof *pose->position);
-    memcpy(pose->quaternion, run->quaternion + first, nodes * sizeof *pose->quaternion);
-    for (size_t i = 0; i < nodes; i++) {
-        const float *force = run->force + 3 * (first + i);
-        pose->node[i] = (NodeReport){.s = run->s[i], .radius = run->radius[i], .force = vec3((double)force[0], (double)force[1], (double)force[2]),
-                                     .gap = (double)run->gap[first + i], .vessel_node = run->vessel_node[first + i]};
+    pose->node_count = at.node_count;
+    memcpy(pose->position, at.position, (size_t)at.node_count * sizeof *pose->position);
+    memcpy(pose->quaternion, at.quaternion, (size_t)at.node_count * sizeof *pose->quaternion);
+    for (int i = 0; i < at.node_count; i++) {
+        const float *force = at.force + 3 * i;
+        pose->node[i] = (NodeReport){.s = at.s[i], .radius = at.radius[i], .force = vec3((double)force[0], (double)force[1], (double)force[2]),
+                                     .gap = (double)at.gap[i], .vessel_node = at.vessel_node[i]};
     }
+    for (int k = 0; k < pose->tool_count; k++) {
+        pose->tool[k].inserted_mm = run->tool[k].inserted[row];
+        if (pose->tool_count > 1)
+            own_nodes_from_run(&pose->tool[k], &run->tool[k], frame);
+    }
+    // a single tool's own nodes are those of the centreline
+    PoseTool *single = pose->tool_count == 1 ? &pose->tool[0] : NULL;
+    for (int j = 0; single && j < pose->node_count; j++)
+        single->node[j] = (ToolNode){.s = at.s[j], .position = pose->position[j], .orientation = pose->quaternion[j], .radius = at.radius[j]};
     find_first_free(pose, scene->wire.has_sheath);
-    PoseTool *tool = &pose->tool[0];
-    tool->command = pose->command;
-    tool->inserted_mm = pose->inserted_mm;
-    tool->push_n = pose->report.proximal_force;
-    tool->torque_n_mm = pose->report.proximal_torque;
-    for (int j = 0; j < pose->node_count; j++)
-        tool->node[j] = (ToolNode){.s = pose->node[j].s, .position = pose->position[j], .orientation = pose->quaternion[j], .radius = pose->node[j].radius,
-                                   .carrier = j < pose->first_free_node ? -1 : 0};
+    for (int j = 0; single && j < pose->first_free_node; j++)
+        single->node[j].carrier = -1;
 }

@@ -40,7 +40,10 @@ void pose_free(Pose *pose);
 void pose_copy(Pose *to, const Pose *from);   // made for the same tools
 // Detects afresh (about 20 us): every 10 ms, not every step. Changes nothing that a later step depends on. Allocates nothing.
 void pose_take(Pose *pose, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
-// Frame `frame` of a recording of `scene` with as many nodes; what it does not hold (contacts, iterations) is 0.
+Pose *pose_create_for_run(const RecordedRun *run);
+// Frame `frame` of a recording of `scene`; what it does not hold (contacts, iterations) is 0.
 void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64_t frame);
+// Time, commands, X-ray controls and forces of another step; nodes stay.
+void pose_figures_from_run(Pose *pose, const RecordedRun *run, int64_t step);
 
 #endif

@@ -1,5 +1,5 @@
-// Reading a recording back. Every dataset's type, rank and extent is checked before memory is taken; rows that one dataset has
-// more than another (a file still being written) are left out.
+// Reading a recording back. Every dataset's type, rank and extent is checked before memory is taken, and that the file holds what they promise; nothing is read
+// from other files. Rows that one dataset has more than another (a file still being written) are left out.
 #include "sim/recording.h"
 
 #include <hdf5.h>
@@ -9,17 +9,36 @@
 #include <sys/stat.h>
 
 typedef struct Reader {
-    hid_t file;
+    hid_t file, access;      // to datasets, groups and links
     const char *path;
     Faults *faults;
 } Reader;
 
 static const hsize_t most_values = (hsize_t)1 << 29;
+enum { MOST_SQUEEZED = 1100 };   // deflate makes bytes at most about so many times fewer
+
+// A link into another file is not followed.
+static herr_t refuse_link(const char *file, const char *group, const char *other, const char *object, unsigned *flags, hid_t access, void *context)
+{
+    (void)file, (void)group, (void)other, (void)object, (void)flags, (void)access, (void)context;
+    return -1;
+}
+
+// Whether a dataset's bytes lie in this file.
+static bool is_stored(hid_t set, hsize_t bytes)
+{
+    hid_t creation = H5Dget_create_plist(set);
+    H5D_layout_t layout = H5Pget_layout(creation);
+    hsize_t stored = H5Dget_storage_size(set), most = H5Pget_nfilters(creation) > 0 ? stored * MOST_SQUEEZED : stored;
+    bool good = (layout == H5D_COMPACT || layout == H5D_CONTIGUOUS || layout == H5D_CHUNKED) && H5Pget_external_count(creation) == 0 && bytes <= most;
+    H5Pclose(creation);
+    return good;
+}
 
 // Reads a dataset of `rank` dimensions whose trailing ones are shape[1 …] (0: any, filled in); shape[0] is filled in. NULL with a fault.
 static void *read_dataset(const Reader *reader, const char *name, hid_t type, int rank, hsize_t *shape)
 {
-    hid_t set = H5Dopen2(reader->file, name, H5P_DEFAULT);
+    hid_t set = H5Dopen2(reader->file, name, reader->access);
     if (set < 0) {
         faults_add(reader->faults, reader->path, 0, 0, "lacks the dataset '%s' of a recording", name);
         return NULL;
@@ -36,6 +55,8 @@ static void *read_dataset(const Reader *reader, const char *name, hid_t type, in
     void *data = NULL;
     if (!good || (class != H5T_FLOAT && class != H5T_INTEGER)) {
         faults_add(reader->faults, reader->path, 0, 0, "dataset '%s' does not have the shape or type of a recording's", name);
+    } else if (!is_stored(set, values * H5Tget_size(stored))) {
+        faults_add(reader->faults, reader->path, 0, 0, "dataset '%s' promises %llu values that the file does not hold", name, (unsigned long long)values);
     } else if (!(data = calloc((size_t)values + 1, H5Tget_size(type)))) {
         faults_add(reader->faults, reader->path, 0, 0, "no memory for dataset '%s'", name);
     } else if (values > 0 && H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0) {
@@ -50,15 +71,15 @@ static void *read_dataset(const Reader *reader, const char *name, hid_t type, in
     return data;
 }
 
-static char *read_scene_text(hid_t file)
+static char *read_scene_text(const Reader *reader)
 {
-    hid_t set = H5Dopen2(file, "/scene", H5P_DEFAULT);
+    hid_t set = H5Dopen2(reader->file, "/scene", reader->access);
     if (set < 0)
         return NULL;
     hid_t type = H5Dget_type(set);
     char *text = NULL;
     size_t size = H5Tget_size(type);
-    if (H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) <= 0 && size < ((size_t)1 << 27) && H5Dget_storage_size(set) == size) {
+    if (H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) <= 0 && size < ((size_t)1 << 27) && H5Dget_storage_size(set) == size && is_stored(set, size)) {
         text = calloc(size + 1, 1);
         if (text && H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text) < 0) {
             free(text);
@@ -70,10 +91,10 @@ static char *read_scene_text(hid_t file)
     return text;
 }
 
-// A text attribute of /scene; NULL where there is none.
-static char *read_scene_attribute(hid_t file, const char *name)
+// A text attribute of a dataset or group; NULL where there is none.
+static char *read_attribute(const Reader *reader, const char *object, const char *name)
 {
-    hid_t set = H5Dopen2(file, "/scene", H5P_DEFAULT), attribute = set >= 0 ? H5Aopen(set, name, H5P_DEFAULT) : -1;
+    hid_t place = H5Oopen(reader->file, object, reader->access), attribute = place >= 0 ? H5Aopen(place, name, H5P_DEFAULT) : -1;
     char *text = NULL;
     if (attribute >= 0) {
         hid_t type = H5Aget_type(attribute);
@@ -86,8 +107,8 @@ static char *read_scene_attribute(hid_t file, const char *name)
         H5Tclose(type);
         H5Aclose(attribute);
     }
-    if (set >= 0)
-        H5Dclose(set);
+    if (place >= 0)
+        H5Oclose(place);
     return text;
 }
 
@@ -107,60 +128,187 @@ static double read_step_ms(hid_t file)
 
 static int64_t least(int64_t a, hsize_t b) { return (hsize_t)a < b ? a : (int64_t)b; }
 
+static bool has(const Reader *reader, const char *name) { return H5Lexists(reader->file, name, reader->access) > 0; }
+
+// --- several tools ---
+
+static void copy_attribute(const Reader *reader, const char *group, const char *name, char text[TOOL_NAME_SIZE])
+{
+    char *read = read_attribute(reader, group, name);
+    if (read && strlen(read) < TOOL_NAME_SIZE)
+        strcpy(text, read);
+    else
+        faults_add(reader->faults, reader->path, 0, 0, "%s lacks its text attribute '%s' of less than %d letters", group, name, TOOL_NAME_SIZE);
+    free(read);
+}
+
+enum { GROUP_NAME = 24 };
+static void tool_group(int tool, char group[GROUP_NAME]) { snprintf(group, GROUP_NAME, "/tools/%d", tool); }
+
+static bool count_tools(const Reader *reader, RecordedRun *run)
+{
+    char group[GROUP_NAME] = "/tools/0";
+    run->tool_count = 1;
+    if (!has(reader, "/tools"))
+        return true;
+    for (run->tool_count = 0; run->tool_count <= STEP_TOOLS_MAX && has(reader, group);)
+        tool_group(++run->tool_count, group);
+    if (run->tool_count < 2 || run->tool_count > STEP_TOOLS_MAX) {
+        faults_add(reader->faults, reader->path, 0, 0, "/tools does not hold the groups 0 to 1 and up to 3 of several tools");
+        run->tool_count = 1;
+        return false;
+    }
+    return true;
+}
+
+// What a tool has in every step; the first one's stands at the root too, where that of a single tool does.
+static int64_t read_tool_series(const Reader *reader, const char *group, RecordedTool *tool)
+{
+    hsize_t command[2] = {0, 2}, proximal[2] = {0, 2}, inserted[1] = {0}, released[1] = {0};
+    char name[4][40];
+    static const char *const what[] = {"command", "proximal", "inserted_mm", "released"};
+    for (int i = 0; i < 4; i++)
+        snprintf(name[i], sizeof name[i], "%s/%s", group, what[i]);
+    tool->command = read_dataset(reader, name[0], H5T_NATIVE_DOUBLE, 2, command);
+    tool->proximal = read_dataset(reader, name[1], H5T_NATIVE_DOUBLE, 2, proximal);
+    tool->inserted = read_dataset(reader, name[2], H5T_NATIVE_DOUBLE, 1, inserted);
+    bool knows_release = *group || has(reader, name[3]);      // not in recordings from before hands could let go
+    tool->released = knows_release ? read_dataset(reader, name[3], H5T_NATIVE_UINT8, 1, released) : NULL;
+    int64_t count = least(least((int64_t)command[0], proximal[0]), inserted[0]);
+    return knows_release ? least(count, released[0]) : count;
+}
+
+// What a tool has in every frame.
+static int64_t read_tool_frames(const Reader *reader, const char *group, RecordedTool *tool)
+{
+    hsize_t s[1] = {0}, radius[1] = {0}, position[3] = {0, 0, 3}, quaternion[3] = {0, 0, 4}, carrier[2] = {0, 0};
+    char name[5][40];
+    static const char *const what[] = {"s_mm", "radius_mm", "position", "quaternion", "carrier"};
+    for (int i = 0; i < 5; i++)
+        snprintf(name[i], sizeof name[i], "%s/%s", group, what[i]);
+    tool->s = read_dataset(reader, name[0], H5T_NATIVE_DOUBLE, 1, s);
+    tool->radius = read_dataset(reader, name[1], H5T_NATIVE_DOUBLE, 1, radius);
+    position[1] = quaternion[1] = carrier[1] = s[0];
+    tool->position = read_dataset(reader, name[2], H5T_NATIVE_DOUBLE, 3, position);
+    tool->quaternion = read_dataset(reader, name[3], H5T_NATIVE_DOUBLE, 3, quaternion);
+    tool->carrier = read_dataset(reader, name[4], H5T_NATIVE_INT8, 2, carrier);
+    if (s[0] < 2 || s[0] > 100000 || radius[0] != s[0])
+        faults_add(reader->faults, reader->path, 0, 0, "%s holds %llu nodes and %llu radii; 2 to 100000 of each", group, (unsigned long long)s[0],
+                   (unsigned long long)radius[0]);
+    else
+        tool->node_count = (int)s[0];
+    return least(least((int64_t)position[0], quaternion[0]), carrier[0]);
+}
+
+static int64_t smaller(int64_t a, int64_t b) { return a < b ? a : b; }
+
 // What every step has.
 static int64_t read_series(const Reader *reader, RecordedRun *run)
 {
-    hsize_t time[1] = {0}, command[2] = {0, 2}, proximal[2] = {0, 2}, hash[1] = {0}, inserted[1] = {0}, flags[1] = {0}, wall[2] = {0, 2},
-            xray[2] = {0, XRAY_VALUES};
+    hsize_t time[1] = {0}, hash[1] = {0}, flags[1] = {0}, wall[2] = {0, 2}, xray[2] = {0, XRAY_VALUES};
     run->time_s = read_dataset(reader, "/time_s", H5T_NATIVE_DOUBLE, 1, time);
-    run->command = read_dataset(reader, "/command", H5T_NATIVE_DOUBLE, 2, command);
-    run->proximal = read_dataset(reader, "/proximal", H5T_NATIVE_DOUBLE, 2, proximal);
+    int64_t count = smaller((int64_t)time[0], read_tool_series(reader, "", &run->tool[0]));
+    run->command = run->tool[0].command;
+    run->proximal = run->tool[0].proximal;
+    run->inserted = run->tool[0].inserted;
     run->state_hash = read_dataset(reader, "/state_hash", H5T_NATIVE_UINT64, 1, hash);
-    run->inserted = read_dataset(reader, "/inserted_mm", H5T_NATIVE_DOUBLE, 1, inserted);
     run->flags = read_dataset(reader, "/report/flags", H5T_NATIVE_UINT32, 1, flags);
     run->wall_force = read_dataset(reader, "/report/wall_force_n", H5T_NATIVE_DOUBLE, 2, wall);
-    bool was_seen = H5Lexists(reader->file, "/xray", H5P_DEFAULT) > 0;   // not in recordings of before the trainer
+    bool was_seen = has(reader, "/xray");   // not in recordings of before the trainer
     run->xray = was_seen ? read_dataset(reader, "/xray", H5T_NATIVE_FLOAT, 2, xray) : NULL;
-    int64_t count = least(least(least(least(least(least((int64_t)time[0], command[0]), proximal[0]), hash[0]), inserted[0]), flags[0]), wall[0]);
+    count = least(least(least(count, hash[0]), flags[0]), wall[0]);
+    bool several = count_tools(reader, run) && run->tool_count > 1;
+    for (int k = 0; several && k < run->tool_count; k++) {
+        char group[GROUP_NAME];
+        tool_group(k, group);
+        copy_attribute(reader, group, "name", run->tool[k].name);
+        copy_attribute(reader, group, "kind", run->tool[k].kind);
+        if (k > 0)
+            count = smaller(count, read_tool_series(reader, group, &run->tool[k]));
+    }
     return run->xray ? least(count, xray[0]) : count;
+}
+
+static int64_t read_tools_frames(const Reader *reader, hsize_t nodes, RecordedRun *run)
+{
+    hsize_t count[1] = {0}, s[2] = {0, nodes}, radius[2] = {0, nodes};
+    run->frame_nodes = read_dataset(reader, "/wire/count", H5T_NATIVE_INT32, 1, count);
+    run->s = read_dataset(reader, "/wire/s_mm", H5T_NATIVE_DOUBLE, 2, s);
+    run->radius = read_dataset(reader, "/wire/radius_mm", H5T_NATIVE_DOUBLE, 2, radius);
+    int64_t frames = least(least((int64_t)count[0], s[0]), radius[0]);
+    for (int k = 0; k < run->tool_count; k++) {
+        char group[GROUP_NAME];
+        tool_group(k, group);
+        frames = smaller(frames, read_tool_frames(reader, group, &run->tool[k]));
+    }
+    return frames;
+}
+
+static int64_t read_nodes(const Reader *reader, hsize_t nodes, RecordedRun *run)
+{
+    hsize_t s[1] = {0}, radius[1] = {0};
+    run->s = read_dataset(reader, "/wire/s_mm", H5T_NATIVE_DOUBLE, 1, s);
+    run->radius = read_dataset(reader, "/wire/radius_mm", H5T_NATIVE_DOUBLE, 1, radius);
+    if (run->s && run->radius && (radius[0] != nodes || s[0] != nodes))
+        faults_add(reader->faults, reader->path, 0, 0, "holds %llu nodes and %llu radii; as many of each", (unsigned long long)nodes, (unsigned long long)radius[0]);
+    return INT64_MAX;
+}
+
+// What a reader takes for granted: steps that grow, counts and carriers that are there.
+static void check_frames(const Reader *reader, const RecordedRun *run)
+{
+    for (int64_t i = 0; i < run->frame_count; i++) {
+        if (i ? run->frame_step[i] <= run->frame_step[i - 1] : run->frame_step[i] < 0) {
+            faults_add(reader->faults, reader->path, 0, 0, "frame %lld names step %lld; steps grow from 0", (long long)i, (long long)run->frame_step[i]);
+            return;
+        }
+        if (run->frame_nodes && (run->frame_nodes[i] < 2 || run->frame_nodes[i] > run->node_count)) {
+            faults_add(reader->faults, reader->path, 0, 0, "frame %lld has %d nodes; 2 to %d", (long long)i, run->frame_nodes[i], run->node_count);
+            return;
+        }
+    }
+    for (int k = 0; run->frame_nodes && k < run->tool_count; k++)
+        for (int64_t i = 0; i < run->frame_count * run->tool[k].node_count; i++)
+            if (run->tool[k].carrier[i] < -1 || run->tool[k].carrier[i] > k) {
+                faults_add(reader->faults, reader->path, 0, 0, "/tools/%d/carrier names tool %d; -1 to %d", k, run->tool[k].carrier[i], k);
+                return;
+            }
+}
+
+static void read_frames(const Reader *reader, RecordedRun *run)
+{
+    int before = reader->faults->count;
+    hsize_t step[1] = {0}, position[3] = {0, 0, 3}, quaternion[3] = {0, 0, 4}, force[3] = {0, 0, 3}, gap[2] = {0, 0}, node[2] = {0, 0};
+    run->frame_step = read_dataset(reader, "/wire/step", H5T_NATIVE_INT64, 1, step);
+    run->position = read_dataset(reader, "/wire/position", H5T_NATIVE_DOUBLE, 3, position);
+    quaternion[1] = force[1] = gap[1] = node[1] = position[1];
+    run->quaternion = read_dataset(reader, "/wire/quaternion", H5T_NATIVE_DOUBLE, 3, quaternion);
+    run->force = read_dataset(reader, "/contact/force_n", H5T_NATIVE_FLOAT, 3, force);
+    run->gap = read_dataset(reader, "/contact/gap_mm", H5T_NATIVE_FLOAT, 2, gap);
+    run->vessel_node = read_dataset(reader, "/contact/vessel_node", H5T_NATIVE_INT32, 2, node);
+    if (reader->faults->count == before && (position[1] < 2 || position[1] > 100000))
+        faults_add(reader->faults, reader->path, 0, 0, "holds %llu nodes; 2 to 100000", (unsigned long long)position[1]);
+    if (reader->faults->count > before)
+        return;
+    int64_t others = run->tool_count > 1 ? read_tools_frames(reader, position[1], run) : read_nodes(reader, position[1], run);
+    if (reader->faults->count > before)
+        return;
+    run->node_count = (int)position[1];
+    run->frame_count = smaller(others, least(least(least(least(least((int64_t)step[0], position[0]), quaternion[0]), force[0]), gap[0]), node[0]));
+    while (run->frame_count > 0 && run->frame_step[run->frame_count - 1] >= run->step_count)
+        run->frame_count--;
+    check_frames(reader, run);
 }
 
 static void read_run(const Reader *reader, RecordedRun *run, bool with_frames)
 {
     int before = reader->faults->count;
-    hsize_t step[1] = {0}, position[3] = {0, 0, 3}, quaternion[3] = {0, 0, 4}, radius[1] = {0}, force[3] = {0, 0, 3}, gap[2] = {0, 0},
-            node[2] = {0, 0}, s[1] = {0};
     int64_t step_count = read_series(reader, run);
-    if (reader->faults->count == before)
-        run->step_count = step_count;
-    if (reader->faults->count > before || !with_frames)
-        return;
-    run->frame_step = read_dataset(reader, "/wire/step", H5T_NATIVE_INT64, 1, step);
-    run->position = read_dataset(reader, "/wire/position", H5T_NATIVE_DOUBLE, 3, position);
-    quaternion[1] = position[1];
-    run->quaternion = read_dataset(reader, "/wire/quaternion", H5T_NATIVE_DOUBLE, 3, quaternion);
-    run->radius = read_dataset(reader, "/wire/radius_mm", H5T_NATIVE_DOUBLE, 1, radius);
-    force[1] = gap[1] = node[1] = position[1];
-    run->force = read_dataset(reader, "/contact/force_n", H5T_NATIVE_FLOAT, 3, force);
-    run->gap = read_dataset(reader, "/contact/gap_mm", H5T_NATIVE_FLOAT, 2, gap);
-    run->vessel_node = read_dataset(reader, "/contact/vessel_node", H5T_NATIVE_INT32, 2, node);
-    run->s = read_dataset(reader, "/wire/s_mm", H5T_NATIVE_DOUBLE, 1, s);
     if (reader->faults->count > before)
         return;
-    if (position[1] < 2 || position[1] > 100000 || radius[0] != position[1] || s[0] != position[1]) {
-        faults_add(reader->faults, reader->path, 0, 0, "holds %llu nodes and %llu radii; 2 to 100000 of each", (unsigned long long)position[1],
-                   (unsigned long long)radius[0]);
-        return;
-    }
-    run->node_count = (int)position[1];
-    run->frame_count = least(least(least(least(least((int64_t)step[0], position[0]), quaternion[0]), force[0]), gap[0]), node[0]);
-    while (run->frame_count > 0 && run->frame_step[run->frame_count - 1] >= run->step_count)
-        run->frame_count--;
-    for (int64_t i = 0; i < run->frame_count; i++)
-        if (i ? run->frame_step[i] <= run->frame_step[i - 1] : run->frame_step[i] < 0) {
-            faults_add(reader->faults, reader->path, 0, 0, "frame %lld names step %lld; steps grow from 0", (long long)i, (long long)run->frame_step[i]);
-            return;
-        }
+    run->step_count = step_count;
+    if (with_frames)
+        read_frames(reader, run);
 }
 
 // Takes `name` over. CONTACT_COUNT where it is not known: then the scene's own.
@@ -193,20 +341,22 @@ static RecordedRun *load(const char *path, bool with_frames, Faults *faults)
     }
     hid_t access = H5Pcreate(H5P_FILE_ACCESS);
     H5Pset_file_locking(access, false, true);
-    Reader reader = {.path = path, .faults = faults, .file = H5Fopen(path, H5F_ACC_RDONLY, access)};
+    Reader reader = {.path = path, .faults = faults, .file = H5Fopen(path, H5F_ACC_RDONLY, access), .access = H5Pcreate(H5P_DATASET_ACCESS)};
+    H5Pset_elink_cb(reader.access, refuse_link, NULL);
     H5Pclose(access);
     if (reader.file < 0) {
+        H5Pclose(reader.access);
         faults_add_at_byte(faults, path, 0, "is no HDF5 file; a recording that `seldinger run --record` wrote is expected");
         return NULL;
     }
     RecordedRun *run = calloc(1, sizeof *run);
     if (run) {
         read_run(&reader, run, with_frames);
-        run->scene_text = read_scene_text(reader.file);
-        run->scene_path = read_scene_attribute(reader.file, "path");
-        run->files = read_scene_attribute(reader.file, "files");
-        run->sha256 = read_scene_attribute(reader.file, "sha256");
-        run->contact = contact_of(read_scene_attribute(reader.file, "contact"));
+        run->scene_text = read_scene_text(&reader);
+        run->scene_path = read_attribute(&reader, "/scene", "path");
+        run->files = read_attribute(&reader, "/scene", "files");
+        run->sha256 = read_attribute(&reader, "/scene", "sha256");
+        run->contact = contact_of(read_attribute(&reader, "/scene", "contact"));
         run->step_ms = read_step_ms(reader.file);
         if (!(run->step_ms >= 0.001 && run->step_ms <= 100))
             faults_add(faults, path, 0, 0, "has steps of %g ms; 0.001 to 100", run->step_ms);
@@ -215,6 +365,7 @@ static RecordedRun *load(const char *path, bool with_frames, Faults *faults)
     } else {
         faults_add(faults, path, 0, 0, "no memory");
     }
+    H5Pclose(reader.access);
     H5Fclose(reader.file);
     if (faults->count > before) {
         recorded_run_free(run);
@@ -230,18 +381,28 @@ void recorded_run_free(RecordedRun *run)
 {
     if (!run)
         return;
+    for (int k = 0; k < STEP_TOOLS_MAX; k++) {
+        RecordedTool *tool = &run->tool[k];
+        free(tool->command);
+        free(tool->proximal);
+        free(tool->inserted);
+        free(tool->released);
+        free(tool->position);
+        free(tool->quaternion);
+        free(tool->carrier);
+        free(tool->s);
+        free(tool->radius);
+    }
     free(run->time_s);
-    free(run->command);
-    free(run->proximal);
     free(run->state_hash);
     free(run->frame_step);
+    free(run->frame_nodes);
     free(run->position);
     free(run->quaternion);
     free(run->radius);
     free(run->force);
     free(run->gap);
     free(run->vessel_node);
-    free(run->inserted);
     free(run->turned);
     free(run->xray);
     free(run->flags);
@@ -264,5 +425,24 @@ bool recorded_run_was_watched(const RecordedRun *run)
 
 ToolCommands recorded_run_commands(const RecordedRun *run, int64_t step)
 {
-    return (ToolCommands){.tool = {{run->command[2 * step], run->command[2 * step + 1]}}};
+    ToolCommands commands = {0};
+    for (int k = 0; k < run->tool_count; k++) {
+        const RecordedTool *tool = &run->tool[k];
+        commands.tool[k] = (Command){tool->command[2 * step], tool->command[2 * step + 1]};
+        commands.released |= tool->released && tool->released[step] ? 1u << k : 0;
+    }
+    return commands;
+}
+
+RecordedFrame recorded_run_frame(const RecordedRun *run, int64_t frame)
+{
+    size_t nodes = (size_t)run->node_count, first = (size_t)frame * nodes;
+    RecordedFrame at = {.node_count = run->frame_nodes ? run->frame_nodes[frame] : run->node_count, .s = run->s, .radius = run->radius,
+                        .position = run->position + first, .quaternion = run->quaternion + first, .force = run->force + 3 * first, .gap = run->gap + first,
+                        .vessel_node = run->vessel_node + first};
+    if (run->frame_nodes) {
+        at.s += first;
+        at.radius += first;
+    }
+    return at;
 }

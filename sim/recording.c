@@ -21,7 +21,7 @@ enum { HALF_RANK_KNOWN = 128, HALF_RANK_UNKNOWN = 2048 };
 
 // A dataset that grows by rows, with its ring.
 typedef struct Column {
-    const char *name;
+    char name[40];
     int rank;                // of a row: 0 scalar, 1, 2
     hsize_t shape[2];
     size_t row_bytes;
@@ -29,8 +29,17 @@ typedef struct Column {
     hid_t type, dataset;
 } Column;
 
-enum { TIME, COMMAND, PROXIMAL, HASH, INSERTED, PENETRATION, CONTACTS, ITERATIONS, RESIDUAL, LINEARISATIONS, WALL_FORCE, FLAGS, XRAY, STEP_COLUMNS };
-enum { FRAME_STEP, POSITION, QUATERNION, FORCE, GAP, VESSEL_NODE, FRAME_COLUMNS };
+// What each tool has in every step comes first: the first tool's stands at the root, that of the others behind all else.
+enum { COMMAND, PROXIMAL, INSERTED, RELEASED, TOOL_STEP_COLUMNS };
+enum { TIME = TOOL_STEP_COLUMNS, HASH, PENETRATION, CONTACTS, ITERATIONS, RESIDUAL, LINEARISATIONS, WALL_FORCE, FLAGS, XRAY, STEP_COLUMNS };
+static const char *const tool_step_name[TOOL_STEP_COLUMNS] = {"command", "proximal", "inserted_mm", "released"};
+// Of a frame; from COUNT on of several tools only, then for each of them …
+enum { FRAME_STEP, POSITION, QUATERNION, FORCE, GAP, VESSEL_NODE, ONE_TOOL_COLUMNS, COUNT = ONE_TOOL_COLUMNS, ARC, RADIUS, FRAME_COLUMNS };
+enum { OWN_POSITION, OWN_QUATERNION, OWN_CARRIER, TOOL_FRAME_COLUMNS };      // … these
+enum { MOST_STEP_COLUMNS = STEP_COLUMNS + (STEP_TOOLS_MAX - 1) * TOOL_STEP_COLUMNS, MOST_FRAME_COLUMNS = FRAME_COLUMNS + STEP_TOOLS_MAX * TOOL_FRAME_COLUMNS };
+
+static int step_column_of(int tool, int which) { return tool == 0 ? which : STEP_COLUMNS + (tool - 1) * TOOL_STEP_COLUMNS + which; }
+static int frame_column_of(int tool, int which) { return FRAME_COLUMNS + tool * TOOL_FRAME_COLUMNS + which; }
 
 // Rows of all columns of one kind: written by the simulation thread at `head`, drained by the writer at `tail`; both only grow.
 typedef struct Ring {
@@ -43,10 +52,12 @@ typedef struct Ring {
 struct Recording {
     char *path, *part;
     RecordingOptions options;
-    int node_count;
+    int tool_count, tool_nodes[STEP_TOOLS_MAX];
+    int node_count;          // at most
     NodeReport *node;        // (M) scratch of the simulation thread
+    ToolNode *own;           // of a tool's nodes, the same
     int64_t frame_every, last_frame_step;
-    Column step_column[STEP_COLUMNS], frame_column[FRAME_COLUMNS];
+    Column step_column[MOST_STEP_COLUMNS], frame_column[MOST_FRAME_COLUMNS];
     Ring steps, frames;
     hid_t file;
     OrderedFile *ordered;
@@ -68,37 +79,64 @@ void recording_prepare_process(void)
 
 // --- making the file ---
 
-static Column column_of(const char *name, hid_t type, int rank, hsize_t first, hsize_t second)
+static Column column_of(const char *group, const char *name, hid_t type, int rank, hsize_t first, hsize_t second)
 {
-    Column column = {.name = name, .type = type, .rank = rank, .shape = {first, second}, .dataset = -1};
+    Column column = {.type = type, .rank = rank, .shape = {first, second}, .dataset = -1};
+    snprintf(column.name, sizeof column.name, "%s/%s", group, name);
     column.row_bytes = H5Tget_size(type) * (size_t)first * (size_t)second;
     return column;
+}
+
+enum { GROUP_NAME = 24 };
+static void tool_group(int tool, char group[GROUP_NAME]) { snprintf(group, GROUP_NAME, "/tools/%d", tool); }
+
+static void describe_tool_steps(Column *step, const char *group)
+{
+    step[COMMAND] = column_of(group, tool_step_name[COMMAND], H5T_NATIVE_DOUBLE, 1, 2, 1);
+    step[PROXIMAL] = column_of(group, tool_step_name[PROXIMAL], H5T_NATIVE_DOUBLE, 1, 2, 1);
+    step[INSERTED] = column_of(group, tool_step_name[INSERTED], H5T_NATIVE_DOUBLE, 0, 1, 1);
+    step[RELEASED] = column_of(group, tool_step_name[RELEASED], H5T_NATIVE_UINT8, 0, 1, 1);
 }
 
 static void describe_columns(Recording *recording)
 {
     hsize_t nodes = (hsize_t)recording->node_count;
     Column *step = recording->step_column, *frame = recording->frame_column;
-    step[TIME] = column_of("/time_s", H5T_NATIVE_DOUBLE, 0, 1, 1);
-    step[COMMAND] = column_of("/command", H5T_NATIVE_DOUBLE, 1, 2, 1);
-    step[PROXIMAL] = column_of("/proximal", H5T_NATIVE_DOUBLE, 1, 2, 1);
-    step[HASH] = column_of("/state_hash", H5T_NATIVE_UINT64, 0, 1, 1);
-    step[INSERTED] = column_of("/inserted_mm", H5T_NATIVE_DOUBLE, 0, 1, 1);
-    step[PENETRATION] = column_of("/report/penetration_mm", H5T_NATIVE_DOUBLE, 0, 1, 1);
-    step[CONTACTS] = column_of("/report/contacts", H5T_NATIVE_INT32, 0, 1, 1);
-    step[ITERATIONS] = column_of("/report/iterations", H5T_NATIVE_INT32, 0, 1, 1);
-    step[RESIDUAL] = column_of("/report/residual", H5T_NATIVE_DOUBLE, 0, 1, 1);
-    step[LINEARISATIONS] = column_of("/report/linearisations", H5T_NATIVE_INT32, 0, 1, 1);
-    step[WALL_FORCE] = column_of("/report/wall_force_n", H5T_NATIVE_DOUBLE, 1, 2, 1);
-    step[FLAGS] = column_of("/report/flags", H5T_NATIVE_UINT32, 0, 1, 1);
-    step[XRAY] = column_of("/xray", H5T_NATIVE_FLOAT, 1, XRAY_VALUES, 1);
-    frame[FRAME_STEP] = column_of("/wire/step", H5T_NATIVE_INT64, 0, 1, 1);
-    frame[POSITION] = column_of("/wire/position", H5T_NATIVE_DOUBLE, 2, nodes, 3);
-    frame[QUATERNION] = column_of("/wire/quaternion", H5T_NATIVE_DOUBLE, 2, nodes, 4);
-    frame[FORCE] = column_of("/contact/force_n", H5T_NATIVE_FLOAT, 2, nodes, 3);
-    frame[GAP] = column_of("/contact/gap_mm", H5T_NATIVE_FLOAT, 1, nodes, 1);
-    frame[VESSEL_NODE] = column_of("/contact/vessel_node", H5T_NATIVE_INT32, 1, nodes, 1);
+    describe_tool_steps(step, "");
+    step[TIME] = column_of("", "time_s", H5T_NATIVE_DOUBLE, 0, 1, 1);
+    step[HASH] = column_of("", "state_hash", H5T_NATIVE_UINT64, 0, 1, 1);
+    step[PENETRATION] = column_of("/report", "penetration_mm", H5T_NATIVE_DOUBLE, 0, 1, 1);
+    step[CONTACTS] = column_of("/report", "contacts", H5T_NATIVE_INT32, 0, 1, 1);
+    step[ITERATIONS] = column_of("/report", "iterations", H5T_NATIVE_INT32, 0, 1, 1);
+    step[RESIDUAL] = column_of("/report", "residual", H5T_NATIVE_DOUBLE, 0, 1, 1);
+    step[LINEARISATIONS] = column_of("/report", "linearisations", H5T_NATIVE_INT32, 0, 1, 1);
+    step[WALL_FORCE] = column_of("/report", "wall_force_n", H5T_NATIVE_DOUBLE, 1, 2, 1);
+    step[FLAGS] = column_of("/report", "flags", H5T_NATIVE_UINT32, 0, 1, 1);
+    step[XRAY] = column_of("", "xray", H5T_NATIVE_FLOAT, 1, XRAY_VALUES, 1);
+    frame[FRAME_STEP] = column_of("/wire", "step", H5T_NATIVE_INT64, 0, 1, 1);
+    frame[POSITION] = column_of("/wire", "position", H5T_NATIVE_DOUBLE, 2, nodes, 3);
+    frame[QUATERNION] = column_of("/wire", "quaternion", H5T_NATIVE_DOUBLE, 2, nodes, 4);
+    frame[FORCE] = column_of("/contact", "force_n", H5T_NATIVE_FLOAT, 2, nodes, 3);
+    frame[GAP] = column_of("/contact", "gap_mm", H5T_NATIVE_FLOAT, 1, nodes, 1);
+    frame[VESSEL_NODE] = column_of("/contact", "vessel_node", H5T_NATIVE_INT32, 1, nodes, 1);
+    frame[COUNT] = column_of("/wire", "count", H5T_NATIVE_INT32, 0, 1, 1);
+    frame[ARC] = column_of("/wire", "s_mm", H5T_NATIVE_DOUBLE, 1, nodes, 1);
+    frame[RADIUS] = column_of("/wire", "radius_mm", H5T_NATIVE_DOUBLE, 1, nodes, 1);
+    for (int k = 0; k < recording->tool_count; k++) {
+        char group[GROUP_NAME];
+        hsize_t own = (hsize_t)recording->tool_nodes[k];
+        tool_group(k, group);
+        if (k > 0)
+            describe_tool_steps(step + step_column_of(k, 0), group);
+        frame[frame_column_of(k, OWN_POSITION)] = column_of(group, "position", H5T_NATIVE_DOUBLE, 2, own, 3);
+        frame[frame_column_of(k, OWN_QUATERNION)] = column_of(group, "quaternion", H5T_NATIVE_DOUBLE, 2, own, 4);
+        frame[frame_column_of(k, OWN_CARRIER)] = column_of(group, "carrier", H5T_NATIVE_INT8, 1, own, 1);
+    }
 }
+
+static bool has_several(const Recording *recording) { return recording->tool_count > 1; }
+static int step_columns(const Recording *recording) { return step_column_of(recording->tool_count, 0); }
+static int frame_columns(const Recording *recording) { return has_several(recording) ? frame_column_of(recording->tool_count, 0) : ONE_TOOL_COLUMNS; }
 
 static bool make_ring(Ring *ring, int length, int column_count, Column *column, hsize_t chunk_rows)
 {
@@ -154,22 +192,44 @@ static bool write_number(hid_t place, const char *attribute, double value)
     return good;
 }
 
-static bool write_node_figures(Recording *recording)
+// Arc lengths and radii of a tool's nodes.
+static bool write_profile(hid_t file, const char *group, int count, const ToolNode *node)
 {
-    hsize_t count = (hsize_t)recording->node_count;
-    hid_t space = H5Screate_simple(1, &count, NULL);
+    hsize_t nodes = (hsize_t)count;
+    hid_t space = H5Screate_simple(1, &nodes, NULL);
     double *value = calloc((size_t)count, sizeof *value);
     bool good = value != NULL;
     for (int which = 0; good && which < 2; which++) {
-        hid_t set = H5Dcreate2(recording->file, which ? "/wire/radius_mm" : "/wire/s_mm", H5T_NATIVE_DOUBLE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-        for (hsize_t i = 0; i < count; i++)
-            value[i] = which ? recording->node[i].radius : recording->node[i].s;
+        char name[40];
+        snprintf(name, sizeof name, "%s/%s", group, which ? "radius_mm" : "s_mm");
+        hid_t set = H5Dcreate2(file, name, H5T_NATIVE_DOUBLE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+        for (int i = 0; i < count; i++)
+            value[i] = which ? node[i].radius : node[i].s;
         good = set >= 0 && H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, value) >= 0;
         if (set >= 0)
             H5Dclose(set);
     }
     free(value);
     H5Sclose(space);
+    return good;
+}
+
+// What does not change during the run.
+static bool write_tools(Recording *recording, const Scene *scene, const Stepper *stepper)
+{
+    bool good = true;
+    for (int k = 0; good && k < recording->tool_count; k++) {
+        char group[GROUP_NAME] = "/wire";
+        if (has_several(recording)) {
+            tool_group(k, group);
+            hid_t place = H5Gopen2(recording->file, group, H5P_DEFAULT);
+            good = place >= 0 && write_text(place, "name", NULL, scene->tool[k].name) && write_text(place, "kind", NULL, tool_kind_name[scene->tool[k].kind]);
+            if (place >= 0)
+                H5Gclose(place);
+        }
+        stepper_tool_nodes(stepper, k, recording->own);
+        good = good && write_profile(recording->file, group, recording->tool_nodes[k], recording->own);
+    }
     return good;
 }
 
@@ -256,38 +316,67 @@ static bool open_part(Recording *recording)
     return recording->ordered != NULL;
 }
 
+static bool create_ring_datasets(Recording *recording, Ring *ring)
+{
+    bool good = true;
+    for (int i = 0; good && i < ring->column_count; i++)
+        good = create_dataset(recording->file, &ring->column[i], ring->chunk_rows);
+    return good;
+}
+
+static bool link_ring_datasets(Recording *recording, const Ring *ring)
+{
+    bool good = true;
+    for (int i = 0; good && i < ring->column_count; i++)
+        good = H5Olink(ring->column[i].dataset, recording->file, ring->column[i].name, H5P_DEFAULT, H5P_DEFAULT) >= 0;
+    return good;
+}
+
 // Made without names one after the other, so that their headers lie side by side; then named.
 static bool create_datasets(Recording *recording)
 {
-    bool good = true;
     ordered_file_start_page(recording->ordered);
-    for (int i = 0; good && i < STEP_COLUMNS; i++)
-        good = create_dataset(recording->file, &recording->step_column[i], recording->steps.chunk_rows);
-    for (int i = 0; good && i < FRAME_COLUMNS; i++)
-        good = create_dataset(recording->file, &recording->frame_column[i], recording->frames.chunk_rows);
-    for (int i = 0; good && i < STEP_COLUMNS + FRAME_COLUMNS; i++) {
-        const Column *column = i < STEP_COLUMNS ? &recording->step_column[i] : &recording->frame_column[i - STEP_COLUMNS];
-        good = H5Olink(column->dataset, recording->file, column->name, H5P_DEFAULT, H5P_DEFAULT) >= 0;
+    bool good = create_ring_datasets(recording, &recording->steps);
+    if (has_several(recording))
+        ordered_file_start_page(recording->ordered);     // those of both kinds do not fit one page
+    good = good && create_ring_datasets(recording, &recording->frames);
+    good = good && link_ring_datasets(recording, &recording->steps) && link_ring_datasets(recording, &recording->frames);
+    for (int i = 0; good && has_several(recording) && i < TOOL_STEP_COLUMNS; i++) {
+        char name[40];
+        snprintf(name, sizeof name, "/tools/0/%s", tool_step_name[i]);
+        good = H5Olink(recording->step_column[i].dataset, recording->file, name, H5P_DEFAULT, H5P_DEFAULT) >= 0;
     }
     return good;
 }
 
-static bool build_file(Recording *recording, const Scene *scene)
+static bool create_group(hid_t file, const char *name)
 {
-    static const char *const groups[] = {"/wire", "/contact", "/report"};
+    hid_t group = H5Gcreate2(file, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    return group >= 0 && H5Gclose(group) >= 0;
+}
+
+static bool create_groups(const Recording *recording)
+{
+    bool good = create_group(recording->file, "/wire") && create_group(recording->file, "/contact") && create_group(recording->file, "/report");
+    if (has_several(recording))
+        good = good && create_group(recording->file, "/tools");
+    for (int k = 0; good && has_several(recording) && k < recording->tool_count; k++) {
+        char group[GROUP_NAME];
+        tool_group(k, group);
+        good = create_group(recording->file, group);
+    }
+    return good;
+}
+
+static bool build_file(Recording *recording, const Scene *scene, const Stepper *stepper)
+{
     if (!open_part(recording))
         return false;
     hid_t file = recording->file;
     bool good = write_text(file, "format", NULL, "seldinger-recording") && write_number(file, "version", 1) &&
                 write_text(file, "created_by", NULL, "seldinger " SELDINGER_VERSION) && write_number(file, "step_ms", scene->dt) &&
                 write_number(file, "frame_ms", recording->options.frame_ms);
-    for (int i = 0; good && i < 3; i++) {
-        hid_t group = H5Gcreate2(file, groups[i], H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-        good = group >= 0;
-        if (good)
-            H5Gclose(group);
-    }
-    return good && create_datasets(recording) && write_node_figures(recording) && write_scene(recording, scene);
+    return good && create_groups(recording) && create_datasets(recording) && write_tools(recording, scene, stepper) && write_scene(recording, scene);
 }
 
 // --- the writer's thread ---
@@ -399,28 +488,71 @@ static bool wait_for_room(Recording *recording, Ring *ring)
 
 static void publish(Ring *ring) { atomic_fetch_add_explicit(&ring->head, 1, memory_order_release); }
 
+static void put(Ring *ring, int column, const void *row) { memcpy(slot_of(ring, column), row, ring->column[column].row_bytes); }
+
+static void put_doubles(Ring *ring, int column, double first, double second) { put(ring, column, (const double[2]){first, second}); }
+static void put_count(Ring *ring, int column, int32_t count) { put(ring, column, &count); }
+
+static void put_tool_frame(Recording *recording, const Stepper *stepper, int tool)
+{
+    Ring *ring = &recording->frames;
+    Vec3 *position = slot_of(ring, frame_column_of(tool, OWN_POSITION));
+    Quat *quaternion = slot_of(ring, frame_column_of(tool, OWN_QUATERNION));
+    int8_t *carrier = slot_of(ring, frame_column_of(tool, OWN_CARRIER));
+    stepper_tool_nodes(stepper, tool, recording->own);
+    for (int j = 0; j < recording->tool_nodes[tool]; j++) {
+        position[j] = recording->own[j].position;
+        quaternion[j] = recording->own[j].orientation;
+        carrier[j] = (int8_t)recording->own[j].carrier;
+    }
+}
+
+static void put_tools_frame(Recording *recording, const Stepper *stepper, int nodes)
+{
+    Ring *ring = &recording->frames;
+    double *s = slot_of(ring, ARC), *radius = slot_of(ring, RADIUS);
+    put_count(ring, COUNT, nodes);
+    for (int i = 0; i < recording->node_count; i++) {
+        s[i] = i < nodes ? recording->node[i].s : NAN;
+        radius[i] = i < nodes ? recording->node[i].radius : NAN;
+    }
+    for (int k = 0; k < recording->tool_count; k++)
+        put_tool_frame(recording, stepper, k);
+}
+
 static bool push_frame(Recording *recording, Simulator *simulator)
 {
     if (!wait_for_room(recording, &recording->frames))
         return false;
+    static const NodeReport unused = {.force = {NAN, NAN, NAN}, .gap = NAN, .vessel_node = -1};
     const WireState *state = simulator_state(simulator);
-    int nodes = recording->node_count;
+    Stepper *stepper = simulator_stepper(simulator);
+    Ring *ring = &recording->frames;
+    int nodes = state->node_count;
     int64_t row = simulator_totals(simulator)->steps - 1;
-    stepper_node_report(simulator_stepper(simulator), recording->node);
-    memcpy(slot_of(&recording->frames, FRAME_STEP), &row, sizeof row);
-    memcpy(slot_of(&recording->frames, POSITION), state->position, (size_t)nodes * sizeof(Vec3));
-    memcpy(slot_of(&recording->frames, QUATERNION), state->orientation, (size_t)nodes * sizeof(Quat));
-    float *force = slot_of(&recording->frames, FORCE), *gap = slot_of(&recording->frames, GAP);
-    int32_t *vessel_node = slot_of(&recording->frames, VESSEL_NODE);
-    for (int i = 0; i < nodes; i++) {
-        const NodeReport *node = &recording->node[i];
+    stepper_node_report(stepper, recording->node);
+    put(ring, FRAME_STEP, &row);
+    Vec3 *position = slot_of(ring, POSITION);
+    Quat *quaternion = slot_of(ring, QUATERNION);
+    float *force = slot_of(ring, FORCE), *gap = slot_of(ring, GAP);
+    int32_t *vessel_node = slot_of(ring, VESSEL_NODE);
+    memcpy(position, state->position, (size_t)nodes * sizeof *position);
+    memcpy(quaternion, state->orientation, (size_t)nodes * sizeof *quaternion);
+    for (int i = 0; i < recording->node_count; i++) {
+        const NodeReport *node = i < nodes ? &recording->node[i] : &unused;
         force[3 * i] = (float)node->force.x;
         force[3 * i + 1] = (float)node->force.y;
         force[3 * i + 2] = (float)node->force.z;
         gap[i] = (float)node->gap;
         vessel_node[i] = node->vessel_node;
+        if (i >= nodes) {
+            position[i] = vec3(NAN, NAN, NAN);
+            quaternion[i] = (Quat){NAN, NAN, NAN, NAN};
+        }
     }
-    publish(&recording->frames);
+    if (has_several(recording))
+        put_tools_frame(recording, stepper, nodes);
+    publish(ring);
     recording->last_frame_step = row;
     return true;
 }
@@ -431,26 +563,28 @@ bool recording_step(Recording *recording, Simulator *simulator, const ToolComman
         return false;
     const StepReport *report = simulator_last(simulator);
     Ring *ring = &recording->steps;
-    double time = simulator_time_s(simulator), inserted = simulator_state(simulator)->inserted, penetration = report->penetration;
-    double commanded[2] = {commands->tool[0].push_mm_s, commands->tool[0].twist_deg_s}, proximal[2] = {report->proximal_force, report->proximal_torque};
+    double time = simulator_time_s(simulator);
     uint64_t hash = simulator_hash(simulator);
-    double residual = report->residual, wall_force[2] = {report->wall_force_max, report->wall_force_sum};
-    int32_t contacts = report->active, iterations = report->iterations, linearisations = 1 + report->newton;
     uint32_t flags = report->flags;
-    memcpy(slot_of(ring, TIME), &time, sizeof time);
-    memcpy(slot_of(ring, COMMAND), commanded, sizeof commanded);
-    memcpy(slot_of(ring, PROXIMAL), proximal, sizeof proximal);
-    memcpy(slot_of(ring, HASH), &hash, sizeof hash);
-    memcpy(slot_of(ring, INSERTED), &inserted, sizeof inserted);
-    memcpy(slot_of(ring, PENETRATION), &penetration, sizeof penetration);
-    memcpy(slot_of(ring, CONTACTS), &contacts, sizeof contacts);
-    memcpy(slot_of(ring, ITERATIONS), &iterations, sizeof iterations);
-    memcpy(slot_of(ring, RESIDUAL), &residual, sizeof residual);
-    memcpy(slot_of(ring, LINEARISATIONS), &linearisations, sizeof linearisations);
-    memcpy(slot_of(ring, WALL_FORCE), wall_force, sizeof wall_force);
-    memcpy(slot_of(ring, FLAGS), &flags, sizeof flags);
     XrayControl unseen = {0};
-    memcpy(slot_of(ring, XRAY), xray ? xray : &unseen, sizeof unseen);
+    for (int k = 0; k < recording->tool_count; k++) {
+        double inserted = stepper_tool_inserted(simulator_stepper(simulator), k);
+        uint8_t released = commands->released >> k & 1;
+        put_doubles(ring, step_column_of(k, COMMAND), commands->tool[k].push_mm_s, commands->tool[k].twist_deg_s);
+        put_doubles(ring, step_column_of(k, PROXIMAL), report->push[k], report->torque[k]);
+        put(ring, step_column_of(k, INSERTED), &inserted);
+        put(ring, step_column_of(k, RELEASED), &released);
+    }
+    put(ring, TIME, &time);
+    put(ring, HASH, &hash);
+    put(ring, PENETRATION, &report->penetration);
+    put_count(ring, CONTACTS, report->active);
+    put_count(ring, ITERATIONS, report->iterations);
+    put(ring, RESIDUAL, &report->residual);
+    put_count(ring, LINEARISATIONS, 1 + report->newton);
+    put_doubles(ring, WALL_FORCE, report->wall_force_max, report->wall_force_sum);
+    put(ring, FLAGS, &flags);
+    put(ring, XRAY, xray ? xray : &unseen);
     publish(ring);
     int64_t step = simulator_totals(simulator)->steps;
     return step % recording->frame_every != 0 && step != 1 ? true : push_frame(recording, simulator);
@@ -458,23 +592,28 @@ bool recording_step(Recording *recording, Simulator *simulator, const ToolComman
 
 static void recording_free(Recording *recording)
 {
-    for (int i = 0; i < STEP_COLUMNS; i++)
+    for (int i = 0; i < MOST_STEP_COLUMNS; i++)
         free(recording->step_column[i].ring);
-    for (int i = 0; i < FRAME_COLUMNS; i++)
+    for (int i = 0; i < MOST_FRAME_COLUMNS; i++)
         free(recording->frame_column[i].ring);
     free(recording->node);
+    free(recording->own);
     free(recording->path);
     free(recording->part);
     free(recording);
 }
 
-static bool close_file(Recording *recording)
+static bool close_datasets(const Ring *ring)
 {
     bool good = true;
-    for (int i = 0; i < STEP_COLUMNS + FRAME_COLUMNS; i++) {
-        Column *column = i < STEP_COLUMNS ? &recording->step_column[i] : &recording->frame_column[i - STEP_COLUMNS];
-        good &= column->dataset < 0 || H5Dclose(column->dataset) >= 0;
-    }
+    for (int i = 0; i < ring->column_count; i++)
+        good &= ring->column[i].dataset < 0 || H5Dclose(ring->column[i].dataset) >= 0;
+    return good;
+}
+
+static bool close_file(Recording *recording)
+{
+    bool good = close_datasets(&recording->steps) & close_datasets(&recording->frames);
     return (recording->file < 0 || H5Fclose(recording->file) >= 0) && good;
 }
 
@@ -510,18 +649,24 @@ Recording *recording_create(const char *path, Simulator *simulator, const Record
     recording->options = *options;
     recording->file = -1;
     recording->last_frame_step = -1;
-    recording->node_count = simulator_state(simulator)->node_count;
+    const Stepper *stepper = simulator_stepper(simulator);
+    int most_own = 0;
+    recording->node_count = stepper_node_capacity(stepper);
+    recording->tool_count = stepper_tool_count(stepper);
+    for (int k = 0; k < recording->tool_count; k++) {
+        recording->tool_nodes[k] = stepper_tool_nodes(stepper, k, NULL);
+        most_own = recording->tool_nodes[k] > most_own ? recording->tool_nodes[k] : most_own;
+    }
     recording->frame_every = (int64_t)fmax(1, floor(options->frame_ms / scene->dt + 0.5));
     describe_columns(recording);
     hsize_t step_rows, frame_rows;
     size_chunks(recording, options->expected_steps, &step_rows, &frame_rows);
-    bool good = (recording->node = calloc((size_t)recording->node_count, sizeof *recording->node)) != NULL;
-    good = good && make_ring(&recording->steps, STEP_RING, STEP_COLUMNS, recording->step_column, step_rows) &&
-           make_ring(&recording->frames, FRAME_RING, FRAME_COLUMNS, recording->frame_column, frame_rows);
-    if (good)
-        stepper_node_report(simulator_stepper(simulator), recording->node);
+    recording->node = calloc((size_t)recording->node_count, sizeof *recording->node);
+    recording->own = calloc((size_t)most_own, sizeof *recording->own);
+    bool good = recording->node && recording->own && make_ring(&recording->steps, STEP_RING, step_columns(recording), recording->step_column, step_rows) &&
+                make_ring(&recording->frames, FRAME_RING, frame_columns(recording), recording->frame_column, frame_rows);
     errno = 0;
-    good = good && build_file(recording, scene);
+    good = good && build_file(recording, scene, stepper);
     int reason = errno;
     recording->started = good && pthread_create(&recording->writer, NULL, write_rings, recording) == 0;
     if (!recording->started) {

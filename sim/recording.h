@@ -6,15 +6,21 @@
 //   - after that datasets grow only, and a flush writes metadata in an order of which every prefix is a whole file (sim/ordered_file.h);
 //   - superblock version 1 and object headers of version 1: no checksums and no "open for writing" mark, so no figure depends on another's bytes;
 //   - the extents of all datasets lie in one page and change in one write: after a kill all have the S, and all the K, of the same flush.
+//     Of several tools those with S rows have one page and those with K another, written in this order: S may be one flush ahead of K.
 // Only a reader that opens the file while it is written can meet datasets of two flushes, as it reads one after the other: it takes the
 // least S and K, and of the frames those whose step is below S.
 // After a failed write (full disk, full index) nothing more is written, the file stays as the last flush left it.
 //
-// Rows: /time_s (S) time at the end of each step, /command (S,2), /proximal (S,2), /state_hash (S), /inserted_mm (S), /xray (S,16: sim/xray.h), /report/penetration_mm,
-// contacts (with force), iterations and residual of the contact solve, linearisations (1 in a quiet step), flags (all S), wall_force_n (S,2):
-// largest and sum;
+// Rows: /time_s (S) time at the end of each step, /command (S,2), /proximal (S,2), /state_hash (S), /inserted_mm (S), /released (S) 1 where no hand holds the tool,
+// /xray (S,16: sim/xray.h), /report/penetration_mm, contacts (with force), iterations and residual of the contact solve, linearisations (1 in a quiet step), flags
+// (all S), wall_force_n (S,2): largest and sum;
 // frames: /wire/step (K) the row of the frame, /wire/position (K,M,3), /wire/quaternion (K,M,4) as w x y z, /contact/force_n (K,M,3),
 // /contact/gap_mm (K,M), /contact/vessel_node (K,M); once: /wire/s_mm (M), /wire/radius_mm (M), /scene (text; attributes path, contact, files, sha256).
+// Several tools: /wire and /contact are those of the shared centreline, whose nodes come and go. M is the most there can be, /wire/count (K) how many there are; the
+// rows beyond hold NaN (vessel_node -1), and /wire/s_mm and radius_mm are (K,M). Tool N, 0 the outermost, has a group /tools/N with the attributes name and kind,
+//   rows: command (S,2), proximal (S,2), inserted_mm (S), released (S); of tool 0 they are links to those at the root;
+//   frames of its own nodes, inside other tools and behind the hub too: position (K,MN,3), quaternion (K,MN,4), carrier (K,MN) the outermost tool there, -1 in the
+//   sheath or behind the hub; once: s_mm (MN), radius_mm (MN).
 #ifndef SELDINGER_SIM_RECORDING_H
 #define SELDINGER_SIM_RECORDING_H
 
@@ -43,15 +49,33 @@ bool recording_step(Recording *recording, Simulator *simulator, const ToolComman
 bool recording_close(Recording *recording, Simulator *simulator, Faults *faults);
 
 // --- reading, for export, info and comparison ---
+typedef struct RecordedTool {
+    char name[TOOL_NAME_SIZE];       // "" where the file names none: a single tool
+    char kind[TOOL_NAME_SIZE];
+    double *command;         // (S, 2); those of the first tool are the run's
+    double *proximal;        // (S, 2)
+    double *inserted;        // (S) [mm]
+    uint8_t *released;       // (S)
+    // of several tools only
+    int node_count;          // N
+    Vec3 *position;          // (K, N)
+    Quat *quaternion;        // (K, N)
+    int8_t *carrier;         // (K, N)
+    double *s, *radius;      // (N) [mm]
+} RecordedTool;
+
 typedef struct RecordedRun {
     int64_t step_count;      // S
     double *time_s;          // (S)
-    double *command;         // (S, 2)
+    double *command;         // (S, 2) of the first tool
     double *proximal;        // (S, 2)
     uint64_t *state_hash;    // (S)
+    int tool_count;          // outermost first
+    RecordedTool tool[STEP_TOOLS_MAX];
     int64_t frame_count;     // K
-    int node_count;          // M
+    int node_count;          // M, of several tools the most that a frame can have
     int64_t *frame_step;     // (K)
+    int32_t *frame_nodes;    // (K) nodes in use; NULL: all
     Vec3 *position;          // (K, M)
     Quat *quaternion;        // (K, M)
     float *force;            // (K, M, 3) [N] from the wall
@@ -62,8 +86,7 @@ typedef struct RecordedRun {
     double *turned;          // (S) [deg] since the start, the sum of the commands
     uint32_t *flags;         // (S) STEP_ flags
     double *wall_force;      // (S, 2) [N] largest and sum
-    double *s;               // (M) [mm]
-    double *radius;          // (M)
+    double *s, *radius;      // (M) [mm], of several tools (K, M)
     char *scene_text, *scene_path;   // NULL where the file lacks them
     char *files, *sha256;    // paths and sums of what the run was made from, one a line
     ContactKind contact;     // CONTACT_COUNT: not said, the scene's
@@ -74,6 +97,16 @@ RecordedRun *recorded_run_load(const char *path, Faults *faults);
 // The same without frames and nodes, whose counts are 0: what every step has (an hour takes 0.6 GB instead of 2).
 RecordedRun *recorded_run_load_series(const char *path, Faults *faults);
 void recorded_run_free(RecordedRun *run);
+// The centreline in a frame: pointers into the run.
+typedef struct RecordedFrame {
+    int node_count;
+    const double *s, *radius;
+    const Vec3 *position;
+    const Quat *quaternion;
+    const float *force, *gap;        // (node_count, 3), (node_count)
+    const int32_t *vessel_node;
+} RecordedFrame;
+RecordedFrame recorded_run_frame(const RecordedRun *run, int64_t frame);
 ToolCommands recorded_run_commands(const RecordedRun *run, int64_t step);
 // Whether somebody saw the run: its steps have X-ray controls (`nav`). Else (`run --record`) nobody can have moved the tool blindly.
 bool recorded_run_was_watched(const RecordedRun *run);

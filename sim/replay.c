@@ -44,19 +44,69 @@ ReplayVerdict replay_verify(Simulator *simulator, const RecordedRun *run, int64_
     return verdict;
 }
 
+bool replay_fits(const RecordedRun *run, Simulator *simulator, const char *path, Faults *faults)
+{
+    const Stepper *stepper = simulator_stepper(simulator);
+    int tools = stepper_tool_count(stepper), nodes = stepper_node_capacity(stepper);
+    if (tools != run->tool_count) {
+        faults_add(faults, path, 0, 0, "holds %d tools, its scene has %d", run->tool_count, tools);
+        return false;
+    }
+    bool fits = run->frame_count == 0 || run->node_count == nodes;
+    for (int k = 0; run->frame_count > 0 && tools > 1 && k < tools; k++)
+        fits &= run->tool[k].node_count == stepper_tool_nodes(stepper, k, NULL);
+    if (!fits)
+        faults_add(faults, path, 0, 0, "holds a tool of %d nodes, its scene one of %d", run->node_count, nodes);
+    return fits;
+}
+
+static void print_heads(FILE *stream, const RecordedRun *run, const bool *is_released)
+{
+    fputs("t_s", stream);
+    for (int k = 0; k < run->tool_count; k++) {
+        const char *name = run->tool_count > 1 ? run->tool[k].name : "", *dot = *name ? "." : "";
+        fprintf(stream, ",%s%spush_mm_s,%s%stwist_deg_s", name, dot, name, dot);
+        if (is_released[k])
+            fprintf(stream, ",%s%sreleased", name, dot);
+    }
+    fputc('\n', stream);
+}
+
+static void print_row(FILE *stream, const RecordedRun *run, double t_s, const ToolCommands *commands, const bool *is_released)
+{
+    fprintf(stream, "%.17g", t_s);
+    for (int k = 0; k < run->tool_count; k++) {
+        fprintf(stream, ",%.17g,%.17g", commands->tool[k].push_mm_s, commands->tool[k].twist_deg_s);
+        if (is_released[k])
+            fprintf(stream, ",%u", commands->released >> k & 1);
+    }
+    fputc('\n', stream);
+}
+
+static bool is_same(const ToolCommands *a, const ToolCommands *b)
+{
+    return memcmp(a->tool, b->tool, sizeof a->tool) == 0 && a->released == b->released;
+}
+
 char *replay_script(const RecordedRun *run, size_t *length)
 {
     char *text = NULL;
     FILE *stream = open_memstream(&text, length);
+    ToolCommands before = {0};
+    bool is_released[TOOLS_MOST] = {0};      // at some step
     if (!stream)
         return NULL;
-    fprintf(stream, "t_s,push_mm_s,twist_deg_s\n");
+    for (int k = 0; k < run->tool_count; k++)
+        for (int64_t i = 0; run->tool[k].released && i < run->step_count; i++)
+            is_released[k] |= run->tool[k].released[i];
+    print_heads(stream, run, is_released);
     for (int64_t i = 0; i < run->step_count; i++) {
-        Command now = recorded_run_commands(run, i).tool[0], before = i ? recorded_run_commands(run, i - 1).tool[0] : (Command){0, 0};
-        if (i == 0 || memcmp(&now, &before, sizeof now) != 0)
-            fprintf(stream, "%.17g,%.17g,%.17g\n", (double)i * run->step_ms / 1000, now.push_mm_s, now.twist_deg_s);
+        ToolCommands now = recorded_run_commands(run, i);
+        if (i == 0 || !is_same(&now, &before))
+            print_row(stream, run, (double)i * run->step_ms / 1000, &now, is_released);
+        before = now;
     }
-    fprintf(stream, "%.17g,0,0\n", (double)run->step_count * run->step_ms / 1000);
+    print_row(stream, run, (double)run->step_count * run->step_ms / 1000, &(ToolCommands){0}, is_released);
     if (fclose(stream) == 0)
         return text;
     free(text);

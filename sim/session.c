@@ -56,7 +56,11 @@ static void digest(const RecordedRun *run, char hex[65])
     size_t steps = (size_t)run->step_count;
     sha256_begin(&sha);
     sha256_add(&sha, run->time_s, steps * sizeof *run->time_s);
-    sha256_add(&sha, run->command, 2 * steps * sizeof *run->command);
+    for (int k = 0; k < run->tool_count; k++) {
+        sha256_add(&sha, run->tool[k].command, 2 * steps * sizeof *run->command);
+        if (run->tool[k].released)
+            sha256_add(&sha, run->tool[k].released, steps);
+    }
     if (run->xray)
         sha256_add(&sha, run->xray, steps * sizeof *run->xray);
     sha256_add(&sha, run->state_hash, steps * sizeof *run->state_hash);
