@@ -121,7 +121,7 @@ static ToolPath *run_path(Scene *scene, double duration_s, const CheckOptions *o
     OpenVessel open = {0};
     Sampling sampling = {0};
     Simulator *simulator = NULL;
-    if (scene_has_one_tool(scene, "a golden path", faults) && open_vessel(scene, options->threads, options->quiet, &open, faults) && open_vessel_inlet(scene, &open, faults))
+    if (open_vessel(scene, options->threads, options->quiet, &open, faults) && open_vessel_inlet(scene, &open, faults))
         simulator = simulator_create(scene, open.vessel, faults);
     if (simulator && (sampling.path = tool_path_create(simulator, duration_s))) {
         DriveOptions drive = drive_default_options();
@@ -162,18 +162,20 @@ static void save_golden(const char *path, const ToolPath *run, Faults *faults)
     free(text);
 }
 
-static void print_row(const char *scene, const PathDifference *difference, const CheckOptions *options)
+static void print_row(const char *path, const Scene *scene, const PathDifference *difference, const CheckOptions *options)
 {
     if (!difference->differs) {
         if (!options->quiet)
-            printf("%-44s same      %12.7f\n", scene, difference->worst_mm);
+            printf("%-44s same      %12.7f\n", path, difference->worst_mm);
         return;
     }
-    printf("%-44s DIFFERS   %12.7f", scene, difference->worst_mm);
+    printf("%-44s DIFFERS   %12.7f", path, difference->worst_mm);
     if (difference->first_node >= 0)
         printf("  %9.3f %5d %12.7f", difference->first_t_s, difference->first_node, difference->first_mm);
     else
         printf("  %9s %5s %12s", "-", "-", "-");
+    if (difference->first_node >= 0 && scene->tool_count > 1 && difference->first_tool < scene->tool_count)
+        printf("  of %s", scene->tool[difference->first_tool].name);
     printf("%s%s\n", difference->remark[0] ? "  " : "", difference->remark);
 }
 
@@ -210,7 +212,7 @@ static int check_scene(const char *path, const CheckOptions *options, Faults *fa
         }
     } else if (run && golden) {
         PathDifference difference = tool_path_compare(golden, run, options->tolerance_mm);
-        print_row(path, &difference, options);
+        print_row(path, scene, &difference, options);
         code = difference.differs ? EXIT_DIFFERENT : EXIT_DONE;
     }
     if (diverged) {

@@ -29,6 +29,7 @@ typedef struct ScriptRow {
     double t_s;
     Command command;                 // of the first tool
     Command inner[TOOLS_MOST - 1];   // of those within it
+    unsigned released;               // as in ToolCommands
 } ScriptRow;
 
 typedef struct Script {      // each row holds from its time until the next; the last row's time ends the script
@@ -39,9 +40,11 @@ typedef struct Script {      // each row holds from its time until the next; the
 enum { SCRIPT_FASTEST_MM_S = 1000, SCRIPT_FASTEST_DEG_S = 36000, SCRIPT_LONGEST_S = 86400 };
 
 // Parses the text of a script: CSV with the header t_s,push_mm_s,twist_deg_s, `#` comments. NULL with faults where it is wrong:
-// wrong header, not a number, times that go backwards, first time negative, |push| > 1000 mm/s, |twist| > 36,000 deg/s, no row.
+// wrong header, not a number, times that go backwards, first time negative, |push| > 1000 mm/s, |twist| > 36,000 deg/s, no row. A fourth column, released, is 1
+// where no hand holds the tool and 0 where one does; without it one does.
 Script *script_parse(const char *text, size_t length, const char *file, Faults *faults);
-// For a scene's tools: the header above, which is that of the first tool, or t_s and NAME.push_mm_s with NAME.twist_deg_s for any of them, in any order.
+// For a scene's tools: the header above, which is that of the first tool, or t_s and NAME.push_mm_s with NAME.twist_deg_s, or
+// NAME.released, for any of them, in any order.
 Script *script_parse_tools(const char *text, size_t length, const char *file, const ToolNames *tools, Faults *faults);
 // Reads the file (at most 64 MiB) and parses it.
 Script *script_load(const char *path, Faults *faults);

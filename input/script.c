@@ -9,14 +9,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char header[] = "t_s,push_mm_s,twist_deg_s";
-static const char *const quantity[] = {"push_mm_s", "twist_deg_s", NULL};
+enum { PUSH, TWIST, RELEASED, QUANTITIES };
+static const char header[] = "t_s,push_mm_s,twist_deg_s", header_with_release[] = "t_s,push_mm_s,twist_deg_s,released";
+static const char *const quantity[QUANTITIES + 1] = {"push_mm_s", "twist_deg_s", "released", NULL};
 
-// What the columns after t_s are: the tool of each, and which of its two quantities.
+// What the columns after t_s are: the tool of each, and which of its quantities.
 typedef struct Columns {
     int count;
-    int tool[2 * TOOLS_MOST], quantity[2 * TOOLS_MOST];
-    char header[(TOOL_NAME_SIZE + 16) * 2 * TOOLS_MOST];
+    int tool[QUANTITIES * TOOLS_MOST], quantity[QUANTITIES * TOOLS_MOST];
+    char header[(TOOL_NAME_SIZE + 16) * QUANTITIES * TOOLS_MOST];
 } Columns;
 
 Command *script_row_command(ScriptRow *row, int tool) { return tool == 0 ? &row->command : &row->inner[tool - 1]; }
@@ -70,7 +71,7 @@ static void fault_unknown_tool(const char *name, const NumberColumn *column, int
         faults_add(faults, file, line, column->column, "no tool of the scene is named '%s'; it has: %s", name, all);
 }
 
-// One column that is not t_s: NAME.push_mm_s or NAME.twist_deg_s.
+// One column that is not t_s: NAME.push_mm_s, NAME.twist_deg_s or NAME.released.
 static bool read_column(const NumberColumn *column, int line, const ToolNames *tools, const char *file, int *tool, int *which, Faults *faults)
 {
     int shown = (int)(column->length < 80 ? column->length : 80);
@@ -81,7 +82,7 @@ static bool read_column(const NumberColumn *column, int line, const ToolNames *t
         const char *example = tools->name[0];
         if (dot && (*tool = find_word(column->name, name_length, tools->name)) >= 0)
             example = tools->name[*tool];
-        faults_add(faults, file, line, column->column, "a column is headed '%.*s'; beside named tools each is NAME.push_mm_s or NAME.twist_deg_s, such as '%s.push_mm_s'",
+        faults_add(faults, file, line, column->column, "a column is headed '%.*s'; beside named tools each is NAME.push_mm_s, NAME.twist_deg_s or NAME.released, such as '%s.push_mm_s'",
                    shown, column->name, example);
         return false;
     }
@@ -97,10 +98,10 @@ static bool read_column(const NumberColumn *column, int line, const ToolNames *t
 // A header that names tools; all its faults.
 static bool read_columns(const NumberColumn *field, int count, int line, const ToolNames *tools, const char *file, Columns *columns, Faults *faults)
 {
-    int before = faults->count, place[TOOLS_MOST][2] = {{0}};
+    int before = faults->count, place[TOOLS_MOST][QUANTITIES] = {{0}};
     size_t used = (size_t)snprintf(columns->header, sizeof columns->header, "t_s");
     if (count > NUMBER_TABLE_COLUMNS) {
-        faults_add(faults, file, line, 1, "has %d columns; t_s and two for each of the scene's %d tools", count, tools->count);
+        faults_add(faults, file, line, 1, "has %d columns; t_s and up to three for each of the scene's %d tools", count, tools->count);
         return false;
     }
     if (!is_word(field[0].name, field[0].length, "t_s"))
@@ -119,7 +120,7 @@ static bool read_columns(const NumberColumn *field, int count, int line, const T
         used += (size_t)snprintf(columns->header + used, sizeof columns->header - used, ",%s.%s", tools->name[tool], quantity[which]);
     }
     for (int k = 0; k < tools->count; k++)
-        for (int q = 0; q < 2; q++)
+        for (int q = PUSH; q <= TWIST; q++)
             if (place[k][q] && !place[k][1 - q])
                 faults_add(faults, file, line, place[k][q], "'%s.%s' lacks its other half; '%s.%s' is a column too", tools->name[k], quantity[q], tools->name[k],
                            quantity[1 - q]);
@@ -137,10 +138,21 @@ static bool find_columns(const char *text, size_t length, const char *file, cons
     *columns = (Columns){0};
     if (tools && named)
         return read_columns(field, count, line, tools, file, columns, faults);
-    columns->count = 2;
-    columns->quantity[1] = 1;
-    strcpy(columns->header, header);
+    bool has_release = count == 4 && is_word(field[3].name, field[3].length, quantity[RELEASED]);
+    columns->count = has_release ? 3 : 2;
+    columns->quantity[1] = TWIST;
+    columns->quantity[2] = RELEASED;
+    strcpy(columns->header, has_release ? header_with_release : header);
     return true;
+}
+
+static void put_value(ScriptRow *row, int tool, int which, double value)
+{
+    Command *command = script_row_command(row, tool);
+    if (which == RELEASED)
+        row->released |= value != 0 ? 1u << tool : 0;
+    else
+        *(which == TWIST ? &command->twist_deg_s : &command->push_mm_s) = value;
 }
 
 Script *script_parse_tools(const char *text, size_t length, const char *file, const ToolNames *tools, Faults *faults)
@@ -163,8 +175,9 @@ Script *script_parse_tools(const char *text, size_t length, const char *file, co
             ScriptRow *row = &script->row[i];
             row->t_s = value[0];
             for (int c = 0; c < columns.count; c++) {
-                Command *command = script_row_command(row, columns.tool[c]);
-                *(columns.quantity[c] ? &command->twist_deg_s : &command->push_mm_s) = value[1 + c];
+                put_value(row, columns.tool[c], columns.quantity[c], value[1 + c]);
+                if (columns.quantity[c] == RELEASED && value[1 + c] != 0 && value[1 + c] != 1)
+                    faults_add(faults, file, table->line[i], 1, "released is %g; 0 where a hand holds the tool, 1 where none does", value[1 + c]);
             }
             script_check_row(row, i ? row - 1 : NULL, tools, file, table->line[i], 1, faults);
             script->count = i + 1;
@@ -213,7 +226,7 @@ ToolCommands script_tools_at(const Script *script, double t_s, int *cursor)
     // before the first row and from the last row's time on nothing moves
     if (script->count < 2 || t_s < script->row[0].t_s || i == script->count - 1)
         return (ToolCommands){0};
-    ToolCommands commands = {.tool = {script->row[i].command}};
+    ToolCommands commands = {.tool = {script->row[i].command}, .released = script->row[i].released};
     memcpy(commands.tool + 1, script->row[i].inner, sizeof script->row[i].inner);
     return commands;
 }

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char header[] = "t_s,node,x_mm,y_mm,z_mm";
+static const char header[] = "t_s,node,x_mm,y_mm,z_mm", tools_header[] = "t_s,tool,node,x_mm,y_mm,z_mm";
 static const double sample_s = 0.05;
 enum { SAMPLED_NODES = 21 };
 
@@ -35,36 +35,71 @@ static double comment_figure(const char *text, size_t length, const char *name, 
     return missing;
 }
 
+// The name of the comment that counts a tool's nodes.
+static const char *nodes_key(const ToolPath *path, int tool, char text[40])
+{
+    if (path->tool_count == 1)
+        return "nodes";
+    snprintf(text, 40, "nodes of tool %d", tool);
+    return text;
+}
+
+// How many tools and nodes there are.
+static void parse_counts(const char *text, size_t length, const char *file, ToolPath *path, Faults *faults)
+{
+    double tools = comment_figure(text, length, "tools", 1);
+    char key[40];
+    if (tools < 1 || tools > STEP_TOOLS_MAX || tools != floor(tools)) {
+        faults_add(faults, file, 1, 1, "has the comment '# tools: %g'; 1 to %d", tools, STEP_TOOLS_MAX);
+        return;
+    }
+    path->tool_count = (int)tools;
+    for (int k = 0; k < path->tool_count; k++) {
+        const char *name = nodes_key(path, k, key);
+        double nodes = comment_figure(text, length, name, -1);
+        if (nodes < 2 || nodes > 1e6 || nodes != floor(nodes))
+            faults_add(faults, file, 1, 1, "lacks the comment '# %s: N' with the tool's number of nodes; make the file with `seldinger check --update`", name);
+        else
+            path->node_count[k] = (int)nodes;
+    }
+}
+
+static bool is_whole(double value, int most) { return value >= 0 && value <= most && value == floor(value); }
+
+static void parse_rows(const NumberTable *table, const char *file, ToolPath *path, Faults *faults)
+{
+    bool several = path->tool_count > 1;
+    path->row_count = path->row_capacity = table->row_count;
+    for (int i = 0; i < table->row_count; i++) {
+        const double *value = table->value + (size_t)i * (size_t)table->column_count, *place = value + (several ? 2 : 1);
+        double tool = several ? value[1] : 0;
+        if (!is_whole(tool, path->tool_count - 1))
+            faults_add(faults, file, table->line[i], 1, "tool %g is no whole number from 0 to %d", tool, path->tool_count - 1);
+        else if (!is_whole(place[0], INT_MAX))
+            faults_add(faults, file, table->line[i], 1, "node %g is no whole number of at least 0", place[0]);
+        else
+            path->row[i] = (PathRow){value[0], (int)tool, (int)place[0], vec3(place[1], place[2], place[3])};
+    }
+    if (table->row_count == 0)
+        faults_add(faults, file, 0, 0, "has no row; make the file with `seldinger check --update`");
+}
+
 ToolPath *tool_path_parse(const char *text, size_t length, const char *file, Faults *faults)
 {
     int before = faults->count;
-    NumberTable *table = number_table_parse(text, length, file, header, faults);
-    if (!table)
-        return NULL;
     ToolPath *path = calloc(1, sizeof *path);
     if (path)
+        parse_counts(text, length, file, path, faults);
+    NumberTable *table = path && path->tool_count > 0 ? number_table_parse(text, length, file, path->tool_count > 1 ? tools_header : header, faults) : NULL;
+    if (table)
         path->row = calloc((size_t)table->row_count + 1, sizeof *path->row);
-    if (!path || !path->row) {
+    if (!path || (table && !path->row))
         faults_add(faults, file, 0, 0, "no memory for its rows");
-    } else {
-        double nodes = comment_figure(text, length, "nodes", -1);
+    if (table && path->row) {
         path->duration_s = comment_figure(text, length, "duration_s", -1);
-        path->row_count = path->row_capacity = table->row_count;
-        if (nodes < 2 || nodes > 1e6 || nodes != floor(nodes))
-            faults_add(faults, file, 1, 1, "lacks the comment '# nodes: N' with the tool's number of nodes; make the file with `seldinger check --update`");
-        else
-            path->node_count = (int)nodes;
         if (path->duration_s < 0 || path->duration_s > SCRIPT_LONGEST_S)
             faults_add(faults, file, 1, 1, "lacks the comment '# duration_s: S'; make the file with `seldinger check --update`");
-        for (int i = 0; i < table->row_count; i++) {
-            const double *value = table->value + (size_t)i * 5;
-            if (value[1] < 0 || value[1] > INT_MAX || value[1] != floor(value[1]))
-                faults_add(faults, file, table->line[i], 1, "node %g is no whole number of at least 0", value[1]);
-            else
-                path->row[i] = (PathRow){value[0], (int)value[1], vec3(value[2], value[3], value[4])};
-        }
-        if (table->row_count == 0)
-            faults_add(faults, file, 0, 0, "has no row; make the file with `seldinger check --update`");
+        parse_rows(table, file, path, faults);
     }
     number_table_free(table);
     if (faults->count > before) {
@@ -74,19 +109,28 @@ ToolPath *tool_path_parse(const char *text, size_t length, const char *file, Fau
     return path;
 }
 
+// + 0.0 turns a minus zero, which rounding can leave, into zero.
+static double rounded(double value) { return round(value * 1e7) / 1e7 + 0.0; }
+
 char *tool_path_print(const ToolPath *path, size_t *length)
 {
-    char *text = NULL;
+    char *text = NULL, key[40];
+    bool several = path->tool_count > 1;
     FILE *stream = open_memstream(&text, length);
     if (!stream)
         return NULL;
-    fprintf(stream, "# seldinger golden tool path; made by `seldinger check --update`\n# nodes: %d\n# duration_s: %.9g\n%s\n", path->node_count,
-            path->duration_s, header);
+    fprintf(stream, "# seldinger golden tool path; made by `seldinger check --update`\n");
+    if (several)
+        fprintf(stream, "# tools: %d\n", path->tool_count);
+    for (int k = 0; k < path->tool_count; k++)
+        fprintf(stream, "# %s: %d\n", nodes_key(path, k, key), path->node_count[k]);
+    fprintf(stream, "# duration_s: %.9g\n%s\n", path->duration_s, several ? tools_header : header);
     for (int i = 0; i < path->row_count; i++) {
         const PathRow *row = &path->row[i];
-        // + 0.0 turns a minus zero, which rounding can leave, into zero
-        fprintf(stream, "%.6g,%d,%.7f,%.7f,%.7f\n", row->t_s, row->node, round(row->position.x * 1e7) / 1e7 + 0.0,
-                round(row->position.y * 1e7) / 1e7 + 0.0, round(row->position.z * 1e7) / 1e7 + 0.0);
+        fprintf(stream, "%.6g,", row->t_s);
+        if (several)
+            fprintf(stream, "%d,", row->tool);
+        fprintf(stream, "%d,%.7f,%.7f,%.7f\n", row->node, rounded(row->position.x), rounded(row->position.y), rounded(row->position.z));
     }
     if (fclose(stream) != 0) {
         free(text);
@@ -100,6 +144,7 @@ void tool_path_free(ToolPath *path)
     if (!path)
         return;
     free(path->row);
+    free(path->node);
     free(path);
 }
 
@@ -119,17 +164,39 @@ char *golden_path_of(const char *scene_path)
     return path;
 }
 
-ToolPath *tool_path_create(const Simulator *simulator, double duration_s)
+ToolPath *tool_path_create(Simulator *simulator, double duration_s)
 {
     ToolPath *path = calloc(1, sizeof *path);
-    if (path) {
-        path->node_count = simulator_state(simulator)->node_count;
-        path->duration_s = duration_s;
+    const Stepper *stepper = simulator_stepper(simulator);
+    int most = 0;
+    if (!path)
+        return NULL;
+    path->duration_s = duration_s;
+    path->tool_count = stepper_tool_count(stepper);
+    for (int k = 0; k < path->tool_count; k++) {
+        path->node_count[k] = stepper_tool_nodes(stepper, k, NULL);
+        most = path->node_count[k] > most ? path->node_count[k] : most;
     }
-    return path;
+    if ((path->node = calloc((size_t)most, sizeof *path->node)))
+        return path;
+    tool_path_free(path);
+    return NULL;
 }
 
-bool tool_path_sample(ToolPath *path, const Simulator *simulator, bool last)
+static bool make_room(ToolPath *path, int rows)
+{
+    if (path->row_count + rows <= path->row_capacity)
+        return true;
+    int wanted = path->row_capacity * 2 + rows;
+    PathRow *row = path->row_capacity < INT_MAX / 4 ? realloc(path->row, (size_t)wanted * sizeof *row) : NULL;
+    if (!row)
+        return false;
+    path->row = row;
+    path->row_capacity = wanted;
+    return true;
+}
+
+bool tool_path_sample(ToolPath *path, Simulator *simulator, bool last)
 {
     double dt_s = simulator_scene(simulator)->dt / 1000;
     int64_t steps = simulator_totals(simulator)->steps, every = (int64_t)fmax(1, floor(sample_s / dt_s + 0.5));
@@ -137,40 +204,49 @@ bool tool_path_sample(ToolPath *path, const Simulator *simulator, bool last)
     // the end is sampled where it falls between two samples
     if (last ? due || steps == 0 : !due)
         return true;
-    if (path->row_count + SAMPLED_NODES > path->row_capacity) {
-        int wanted = path->row_capacity * 2 + SAMPLED_NODES;
-        PathRow *row = path->row_capacity < INT_MAX / 4 ? realloc(path->row, (size_t)wanted * sizeof *row) : NULL;
-        if (!row)
-            return false;
-        path->row = row;
-        path->row_capacity = wanted;
-    }
-    const WireState *state = simulator_state(simulator);
-    int tip = state->node_count - 1, count = tip + 1 < SAMPLED_NODES ? tip + 1 : SAMPLED_NODES;
-    for (int i = 0; i < count; i++) {
-        int node = (int)((int64_t)i * tip / (count - 1));
-        path->row[path->row_count++] = (PathRow){simulator_time_s(simulator), node, state->position[node]};
+    if (!make_room(path, SAMPLED_NODES * path->tool_count))
+        return false;
+    for (int k = 0; k < path->tool_count; k++) {
+        int tip = stepper_tool_nodes(simulator_stepper(simulator), k, path->node) - 1, count = tip + 1 < SAMPLED_NODES ? tip + 1 : SAMPLED_NODES;
+        for (int i = 0; i < count; i++) {
+            int node = (int)((int64_t)i * tip / (count - 1));
+            path->row[path->row_count++] = (PathRow){simulator_time_s(simulator), k, node, path->node[node].position};
+        }
     }
     return true;
+}
+
+// What differs in the tools' numbers of nodes.
+static void compare_counts(const ToolPath *golden, const ToolPath *run, PathDifference *difference)
+{
+    size_t room = sizeof difference->remark;
+    if (golden->tool_count != run->tool_count)
+        snprintf(difference->remark, room, "%d tools, the golden has %d", run->tool_count, golden->tool_count);
+    for (int k = 0; !difference->remark[0] && k < golden->tool_count; k++)
+        if (golden->node_count[k] != run->node_count[k])
+            snprintf(difference->remark, room, "%d nodes, the golden has %d", run->node_count[k], golden->node_count[k]);
+    difference->differs = difference->remark[0];
+}
+
+// Both are sorted by time, tool and node; times are printed with six digits.
+static bool comes_before(const PathRow *row, const PathRow *want, double slack)
+{
+    bool same_time = fabs(row->t_s - want->t_s) <= slack;
+    return row->t_s < want->t_s - slack || (same_time && (row->tool < want->tool || (row->tool == want->tool && row->node < want->node)));
 }
 
 PathDifference tool_path_compare(const ToolPath *golden, const ToolPath *run, double tolerance_mm)
 {
     PathDifference difference = {.first_node = -1};
-    if (golden->node_count != run->node_count) {
-        difference.differs = true;
-        snprintf(difference.remark, sizeof difference.remark, "%d nodes, the golden has %d", run->node_count, golden->node_count);
-    }
+    compare_counts(golden, run, &difference);
     int j = 0, missing = 0;
     double first_missing = 0;
     for (int i = 0; i < golden->row_count; i++) {
         const PathRow *want = &golden->row[i];
-        // both are sorted by time and node; times are printed with six digits
         double slack = 1e-5 * fmax(1, fabs(want->t_s));
-        while (j < run->row_count &&
-               (run->row[j].t_s < want->t_s - slack || (fabs(run->row[j].t_s - want->t_s) <= slack && run->row[j].node < want->node)))
+        while (j < run->row_count && comes_before(&run->row[j], want, slack))
             j++;
-        if (j == run->row_count || fabs(run->row[j].t_s - want->t_s) > slack || run->row[j].node != want->node) {
+        if (j == run->row_count || fabs(run->row[j].t_s - want->t_s) > slack || run->row[j].tool != want->tool || run->row[j].node != want->node) {
             first_missing = missing++ ? first_missing : want->t_s;
             continue;
         }
@@ -180,6 +256,7 @@ PathDifference tool_path_compare(const ToolPath *golden, const ToolPath *run, do
         if (!(distance <= tolerance_mm) && difference.first_node < 0) {
             difference.differs = true;
             difference.first_t_s = want->t_s;
+            difference.first_tool = want->tool;
             difference.first_node = want->node;
             difference.first_mm = distance;
         }

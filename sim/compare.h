@@ -7,6 +7,11 @@
 //   t_s,node,x_mm,y_mm,z_mm
 //   0.05,0,-12.0000000,0.0000000,0.0000000
 //
+// Of several tools each has its own nodes, 0 the outermost; tools and nodes are counted in comments "# tools: 2", "# nodes of tool 0: 31", …:
+//
+//   t_s,tool,node,x_mm,y_mm,z_mm
+//   0.05,1,60,0.5000000,0.0000000,0.0000000
+//
 // Positions have seven decimals: the rounding, 1e-7 mm, is far below the tolerance.
 #ifndef SELDINGER_SIM_COMPARE_H
 #define SELDINGER_SIM_COMPARE_H
@@ -15,15 +20,17 @@
 
 typedef struct PathRow {
     double t_s;
-    int node;
+    int tool, node;
     Vec3 position;
 } PathRow;
 
 typedef struct ToolPath {
-    int node_count;          // of the tool, not of the rows
+    int tool_count;
+    int node_count[STEP_TOOLS_MAX];  // of each tool, not of the rows
     double duration_s;       // how long the run was asked to last
     int row_count, row_capacity;
-    PathRow *row;            // by time, then by node
+    PathRow *row;            // by time, then by tool, then by node
+    ToolNode *node;          // scratch of whoever samples
 } ToolPath;
 
 // Default. Measured on wires pushed, turned and pulled back through bent tubes for 0.4 and 3.5 s: a change in the last bits (1e-13 to 1e-10 of a
@@ -39,14 +46,14 @@ void tool_path_free(ToolPath *path);
 char *golden_path_of(const char *scene_path);
 
 // Collects a path from a run: create, call after each step, and once more with `last` at the end. False where memory lacks.
-ToolPath *tool_path_create(const Simulator *simulator, double duration_s);
-bool tool_path_sample(ToolPath *path, const Simulator *simulator, bool last);
+ToolPath *tool_path_create(Simulator *simulator, double duration_s);
+bool tool_path_sample(ToolPath *path, Simulator *simulator, bool last);
 
 typedef struct PathDifference {
     double worst_mm;         // the largest distance between golden and run
     bool differs;            // beyond the tolerance, or another number of nodes, or missing rows
-    double first_t_s;        // the first time, node and distance beyond the tolerance
-    int first_node;
+    double first_t_s;        // the first time, tool, node and distance beyond the tolerance
+    int first_tool, first_node;
     double first_mm;
     char remark[160];        // what else differs; "" where nothing
 } PathDifference;

@@ -269,8 +269,9 @@ static void check_frames(const Reader *reader, const RecordedRun *run)
     }
     for (int k = 0; run->frame_nodes && k < run->tool_count; k++)
         for (int64_t i = 0; i < run->frame_count * run->tool[k].node_count; i++)
-            if (run->tool[k].carrier[i] < -1 || run->tool[k].carrier[i] > k) {
-                faults_add(reader->faults, reader->path, 0, 0, "/tools/%d/carrier names tool %d; -1 to %d", k, run->tool[k].carrier[i], k);
+            if (run->tool[k].carrier[i] < -1 || run->tool[k].carrier[i] >= run->tool_count) {
+                faults_add(reader->faults, reader->path, 0, 0, "/tools/%d/carrier names tool %d; -1 to %d", k, run->tool[k].carrier[i],
+                           run->tool_count - 1);
                 return;
             }
 }

@@ -344,20 +344,31 @@ static void read_simulation(Reading *reading, YamlValue value)
         scene->contact_options.form = form == 1 ? CONTACT_POINTWISE : CONTACT_BLOCK;
 }
 
-// The valid keys of a script's row: t_s, the first tool's two by their bare names, and each tool's by its name.
+// The valid keys of a script's row: t_s, the first tool's by their bare names, and each tool's by its name.
+enum { KEYS_OF_TOOL = 3, NAMED_KEYS = 1 + KEYS_OF_TOOL };
 typedef struct RowKeys {
-    const char *key[3 + 2 * TOOLS_MOST + 1];
-    char text[2 * TOOLS_MOST][TOOL_NAME_SIZE + 16];
+    const char *key[NAMED_KEYS + KEYS_OF_TOOL * TOOLS_MOST + 1];
+    char text[KEYS_OF_TOOL * TOOLS_MOST][TOOL_NAME_SIZE + 16];
 } RowKeys;
 
 static void list_row_keys(const ToolNames *tools, RowKeys *keys)
 {
-    static const char *const bare[] = {"t_s", "push_mm_s", "twist_deg_s"};
-    *keys = (RowKeys){.key = {bare[0], bare[1], bare[2]}};
-    for (int i = 0; i < 2 * tools->count; i++) {
-        snprintf(keys->text[i], sizeof keys->text[i], "%s.%s", tools->name[i / 2], bare[1 + i % 2]);
-        keys->key[3 + i] = keys->text[i];
+    static const char *const bare[] = {"t_s", "push_mm_s", "twist_deg_s", "released"};
+    *keys = (RowKeys){.key = {bare[0], bare[1], bare[2], bare[3]}};
+    for (int i = 0; i < KEYS_OF_TOOL * tools->count; i++) {
+        snprintf(keys->text[i], sizeof keys->text[i], "%s.%s", tools->name[i / KEYS_OF_TOOL], bare[1 + i % KEYS_OF_TOOL]);
+        keys->key[NAMED_KEYS + i] = keys->text[i];
     }
+}
+
+// 1 where no hand holds the tool. Whether the key is there.
+static bool read_released(const YamlMap *map, const char *key, int tool, ScriptRow *row)
+{
+    YamlValue value = yaml_get(map, key, false);
+    int released = 0;
+    if (value.node && yaml_integer(value, 0, 1, &released) && released)
+        row->released |= 1u << tool;
+    return value.node != 0;
 }
 
 static bool read_row(YamlValue item, const RowKeys *keys, int tools, ScriptRow *row)
@@ -370,14 +381,17 @@ static bool read_row(YamlValue item, const RowKeys *keys, int tools, ScriptRow *
     bool good = yaml_map_number(&map, "t_s", true, any, &row->t_s);
     bool bare = yaml_map_number(&map, "push_mm_s", false, any, &row->command.push_mm_s);
     bare |= yaml_map_number(&map, "twist_deg_s", false, any, &row->command.twist_deg_s);
+    bare |= read_released(&map, "released", 0, row);
     for (int k = 0; k < tools; k++) {
-        const char *push = keys->key[3 + 2 * k], *twist = keys->key[4 + 2 * k];
+        const char *const *key = keys->key + NAMED_KEYS + KEYS_OF_TOOL * k, *push = key[0], *twist = key[1];
         Command *command = script_row_command(row, k);
         bool has_push = yaml_map_number(&map, push, false, any, &command->push_mm_s), has_twist = yaml_map_number(&map, twist, false, any, &command->twist_deg_s);
         if (yaml_has(&map, push) != yaml_has(&map, twist))
             yaml_fault(item, "'%s' lacks its other half; give '%s' too", yaml_has(&map, push) ? push : twist, yaml_has(&map, push) ? twist : push);
-        if (bare && (has_push || has_twist))
-            yaml_fault(item, "a row names its tools or moves the first by bare 'push_mm_s' and 'twist_deg_s', not both; write '%s' and '%s'", keys->key[3], keys->key[4]);
+        bool has_release = read_released(&map, key[2], k, row);
+        if (bare && (has_push || has_twist || has_release))
+            yaml_fault(item, "a row names its tools or moves the first by bare 'push_mm_s' and 'twist_deg_s', not both; write '%s' and '%s'",
+                       keys->key[NAMED_KEYS], keys->key[NAMED_KEYS + 1]);
     }
     return good;
 }

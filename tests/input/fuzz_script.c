@@ -20,6 +20,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             ToolCommands commands = script_tools_at(script, script->row[i].t_s, &cursor);
             if (i && !(script->row[i].t_s > script->row[i - 1].t_s))
                 abort();
+            if (commands.released >> tools.count)
+                abort();
             for (int k = 0; k < TOOLS_MOST; k++)
                 if (!(commands.tool[k].push_mm_s >= -1000 && commands.tool[k].push_mm_s <= 1000) || (k == tools.count && commands.tool[k].push_mm_s != 0))
                     abort();

@@ -120,11 +120,36 @@ static void numbers_are_decimal_and_finite(void **state)
         assert_false(number_of_text(bad[i], strlen(bad[i]), &value));
 }
 
+static void a_hand_lets_go(void **state)
+{
+    (void)state;
+    Script *script = parse("t_s,push_mm_s,twist_deg_s,released\n0,20,0,0\n1,0,0,1\n2,5,0,0\n3,0,0,1\n");
+    assert_non_null(script);
+    int cursor = 0;
+    assert_int_equal(script_tools_at(script, 0.5, &cursor).released, 0);
+    assert_int_equal(script_tools_at(script, 1.5, &cursor).released, 1);
+    assert_int_equal(script_tools_at(script, 2.5, &cursor).released, 0);
+    assert_int_equal(script_tools_at(script, 3.5, &cursor).released, 0);   // the last row ends the script
+    script_free(script);
+    const ToolNames tools = {.count = 3, .name = {"guide", "micro", "wire"}};
+    static const char named[] = "t_s,wire.released,guide.push_mm_s,guide.twist_deg_s,guide.released\n0,1,2,3,0\n1,0,0,0,1\n2,0,0,0,0\n";
+    script = script_parse_tools(named, strlen(named), "s.csv", &tools, &faults);
+    assert_non_null(script);
+    ToolCommands commands = script_tools_at(script, 0.5, &cursor);
+    assert_true(commands.released == 4 && commands.tool[0].push_mm_s == 2 && commands.tool[2].push_mm_s == 0);
+    assert_int_equal(script_tools_at(script, 1.5, &cursor).released, 1);
+    script_free(script);
+    expect_fault("t_s,push_mm_s,twist_deg_s,released\n0,1,0,0.5\n1,0,0,0\n", "2:1", "released is 0.5; 0 where a hand holds the tool");
+    expect_fault("t_s,push_mm_s,twist_deg_s,released\n0,1,0,-1\n1,0,0,0\n", "2:1", "released is -1");
+    expect_fault("t_s,push_mm_s,released,twist_deg_s\n0,1,0,0\n1,0,0,0\n", "1:15", "twist_deg_s");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rows_hold_until_the_next),    cmocka_unit_test(every_millisecond_finds_its_row), cmocka_unit_test(each_fault_has_its_place),
         cmocka_unit_test(all_faults_come_in_one_pass), cmocka_unit_test(a_file_that_is_none_is_said),     cmocka_unit_test(numbers_are_decimal_and_finite),
+        cmocka_unit_test(a_hand_lets_go),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -85,25 +85,30 @@ static void sha256_gives_the_standards_vectors(void **state)
 
 // --- golden paths ---
 
-static ToolPath *path_of(int node_count, int moments, double shift)
+// The shift is that of the last tool's node 2 at the third moment.
+static ToolPath *path_of_tools(int tools, int node_count, int moments, double shift)
 {
     ToolPath *path = calloc(1, sizeof *path);
     assert_non_null(path);
-    path->node_count = node_count;
+    path->tool_count = tools;
     path->duration_s = 0.05 * moments;
-    path->row = calloc((size_t)(node_count * moments), sizeof *path->row);
+    path->row = calloc((size_t)(tools * node_count * moments), sizeof *path->row);
     assert_non_null(path->row);
+    for (int k = 0; k < tools; k++)
+        path->node_count[k] = node_count;
     for (int t = 1; t <= moments; t++)
-        for (int i = 0; i < node_count; i++)
-            path->row[path->row_count++] = (PathRow){0.05 * t, i, vec3(i + (t == 3 && i == 2 ? shift : 0), sin(t), -i / 3.0)};
+        for (int k = 0; k < tools; k++)
+            for (int i = 0; i < node_count; i++)
+                path->row[path->row_count++] = (PathRow){0.05 * t, k, i, vec3(i + (t == 3 && k == tools - 1 && i == 2 ? shift : 0), sin(t) + k, -i / 3.0)};
     return path;
 }
 
-static void printing_and_parsing_keeps_a_path(void **state)
+static ToolPath *path_of(int node_count, int moments, double shift) { return path_of_tools(1, node_count, moments, shift); }
+
+static void print_and_parse(int tools)
 {
-    (void)state;
     static Faults faults;
-    ToolPath *path = path_of(4, 5, 0);
+    ToolPath *path = path_of_tools(tools, 4, 5, 0);
     size_t length;
     char *text = tool_path_print(path, &length);
     assert_non_null(text);
@@ -123,6 +128,13 @@ static void printing_and_parsing_keeps_a_path(void **state)
     free(text);
     tool_path_free(again);
     tool_path_free(path);
+}
+
+static void printing_and_parsing_keeps_a_path(void **state)
+{
+    (void)state;
+    for (int tools = 1; tools <= 3; tools += 2)
+        print_and_parse(tools);
 }
 
 static void a_comparison_names_first_time_node_and_distance(void **state)
@@ -151,12 +163,33 @@ static void a_comparison_names_first_time_node_and_distance(void **state)
     tool_path_free(golden);
 }
 
+static void a_comparison_of_several_tools_names_the_tool(void **state)
+{
+    (void)state;
+    ToolPath *golden = path_of_tools(2, 4, 5, 0), *run = path_of_tools(2, 4, 5, 0.25), *single = path_of(4, 5, 0);
+    PathDifference difference = tool_path_compare(golden, run, 0.1);
+    assert_true(difference.differs && difference.first_tool == 1 && difference.first_node == 2);
+    assert_near(difference.first_t_s, 0.15, 1e-12);
+    difference = tool_path_compare(golden, single, 1);
+    assert_true(difference.differs);
+    assert_string_equal(difference.remark, "1 tools, the golden has 2; 20 of 40 golden rows have no counterpart, the first at 0.05 s");
+    run->node_count[1] = 5;
+    assert_non_null(strstr(tool_path_compare(golden, run, 1).remark, "5 nodes, the golden has 4"));
+    tool_path_free(single);
+    tool_path_free(run);
+    tool_path_free(golden);
+}
+
 static void a_broken_golden_is_a_fault(void **state)
 {
     (void)state;
     static Faults faults;
     const char *text[] = {"", "t_s,node,x_mm,y_mm,z_mm\n0,0,0,0,0\n", "# nodes: 5\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n",
-                          "# nodes: 5\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n0,1.5,0,0,0\n", "# nodes: 5\n# duration_s: 1\nt_s,node,x,y,z\n0,1,0,0,0\n"};
+                          "# nodes: 5\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n0,1.5,0,0,0\n", "# nodes: 5\n# duration_s: 1\nt_s,node,x,y,z\n0,1,0,0,0\n",
+                          "# tools: 5\n# nodes: 5\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n0,1,0,0,0\n",
+                          "# tools: 2\n# nodes of tool 0: 5\n# duration_s: 1\nt_s,tool,node,x_mm,y_mm,z_mm\n0,0,1,0,0,0\n",
+                          "# tools: 2\n# nodes of tool 0: 5\n# nodes of tool 1: 5\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n0,1,0,0,0\n",
+                          "# tools: 2\n# nodes of tool 0: 5\n# nodes of tool 1: 5\n# duration_s: 1\nt_s,tool,node,x_mm,y_mm,z_mm\n0,2,1,0,0,0\n"};
     for (size_t i = 0; i < sizeof text / sizeof *text; i++) {
         faults_clear(&faults);
         assert_null(tool_path_parse(text[i], strlen(text[i]), "g.csv", &faults));
@@ -172,7 +205,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(quantiles_are_exact_to_one_per_cent), cmocka_unit_test(small_counts_and_the_largest_are_exact),
         cmocka_unit_test(sha256_gives_the_standards_vectors),  cmocka_unit_test(printing_and_parsing_keeps_a_path),
-        cmocka_unit_test(a_comparison_names_first_time_node_and_distance), cmocka_unit_test(a_broken_golden_is_a_fault),
+        cmocka_unit_test(a_comparison_names_first_time_node_and_distance),
+        cmocka_unit_test(a_comparison_of_several_tools_names_the_tool), cmocka_unit_test(a_broken_golden_is_a_fault),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

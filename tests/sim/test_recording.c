@@ -9,7 +9,8 @@
 
 #include "sim/drive.h"
 #include "sim/ordered_file.h"
-#include "sim/recording.h"
+#include "sim/pose.h"
+#include "sim/replay.h"
 
 #include <hdf5.h>
 #include <signal.h>
@@ -32,10 +33,33 @@ static const char scene_text[] = "seldinger: 1\n"
                                  "rig: {gravity_m_s2: [0, 0, -9.81]}\n"
                                  "script: [[0, 10, 90], [0.2, -5, 0], [0.4, 0, 0]]\n";
 
+// As many as there can be, each going on from the one around it; the hands let tips come out and go in again.
+static const char tools_text[] =
+    "seldinger: 1\n"
+    "tools:\n"
+    "  - {name: guide, kind: guide_catheter, elements: 10, inserted_mm: 10, sections: [{length_mm: 30, diameter_mm: 2, inner_diameter_mm: 1.8, young_modulus_gpa: 1}]}\n"
+    "  - {name: catheter, kind: catheter, elements: 12, inserted_mm: 12, sections: [{length_mm: 40, diameter_mm: 1.6, inner_diameter_mm: 1.2, young_modulus_gpa: 1}]}\n"
+    "  - {name: micro, kind: microcatheter, elements: 14, inserted_mm: 11, sections: [{length_mm: 50, diameter_mm: 1, inner_diameter_mm: 0.6, young_modulus_gpa: 1}]}\n"
+    "  - {name: wire, kind: wire, elements: 16, inserted_mm: 14, sections: [{length_mm: 60, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
+    "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n";
+static const char *text_of_scene = scene_text;
+enum { TOOLS = 4 };
+
+// Each tool there and back at its own rhythm, 2 to 4 mm; now and then no hand holds the wire.
+static ToolCommands hands_at(int64_t step)
+{
+    ToolCommands commands = {.released = step % 500 > 400 ? 8 : 0};
+    for (int k = 0; k < TOOLS; k++) {
+        int64_t half = 100 + 30 * k;
+        commands.tool[k] = (Command){step / half % 2 ? -20 : 20, 40 * k};
+    }
+    return commands;
+}
+
 static Simulator *make_simulator(Scene **scene)
 {
     faults_clear(&faults);
-    *scene = scene_parse(scene_text, strlen(scene_text), "r.yaml", &faults);
+    *scene = scene_parse(text_of_scene, strlen(text_of_scene), "r.yaml", &faults);
     Simulator *simulator = *scene ? simulator_create(*scene, NULL, &faults) : NULL;
     if (!simulator)
         fail_msg("%s", faults.text[0]);
@@ -118,6 +142,221 @@ static void what_is_read_is_what_was_simulated(void **state)
     recorded_run_free(run);
 }
 
+// --- several tools ---
+
+static bool copy_file(const char *from, const char *to)
+{
+    static char buffer[1 << 20];
+    FILE *source = fopen(from, "rb"), *target = fopen(to, "wb");
+    bool good = source && target;
+    for (size_t size; good && (size = fread(buffer, 1, sizeof buffer, source)) > 0;)
+        good = fwrite(buffer, 1, size, target) == size;
+    if (source)
+        fclose(source);
+    return (!target || fclose(target) == 0) && good;
+}
+
+static void assert_same_pose(const Pose *a, const Pose *b)
+{
+    assert_true(a->step == b->step && a->inserted_mm == b->inserted_mm && a->node_count == b->node_count && a->first_free_node == b->first_free_node);
+    assert_memory_equal(a->position, b->position, (size_t)a->node_count * sizeof *a->position);
+    assert_memory_equal(a->quaternion, b->quaternion, (size_t)a->node_count * sizeof *a->quaternion);
+    for (int i = 0; i < a->node_count; i++)
+        assert_true(a->node[i].s == b->node[i].s && a->node[i].radius == b->node[i].radius);
+    for (int k = 0; k < a->tool_count; k++) {
+        const PoseTool *one = &a->tool[k], *other = &b->tool[k];
+        assert_true(one->push_n == other->push_n && one->torque_n_mm == other->torque_n_mm && one->inserted_mm == other->inserted_mm);
+        assert_true(one->command.push_mm_s == other->command.push_mm_s && one->command.twist_deg_s == other->command.twist_deg_s);
+        assert_int_equal(one->node_count, other->node_count);
+        for (int j = 0; j < one->node_count; j++) {
+            assert_memory_equal(&one->node[j].position, &other->node[j].position, sizeof(Vec3));
+            assert_memory_equal(&one->node[j].orientation, &other->node[j].orientation, sizeof(Quat));
+            assert_true(one->node[j].s == other->node[j].s && one->node[j].radius == other->node[j].radius && one->node[j].carrier == other->node[j].carrier);
+        }
+    }
+}
+
+static void assert_replays(const RecordedRun *run)
+{
+    Scene *scene = replay_scene(run, "tools.h5", &faults);
+    Simulator *simulator = scene ? simulator_create(scene, NULL, &faults) : NULL;
+    assert_non_null(simulator);
+    assert_true(replay_fits(run, simulator, "tools.h5", &faults));
+    ReplayVerdict verdict = replay_verify(simulator, run, -1, false, NULL, NULL);
+    assert_int_equal(verdict.first_different, -1);
+    assert_int_equal(verdict.steps, run->step_count);
+    simulator_destroy(simulator);
+    // and by the script that it makes
+    size_t length;
+    char *text = replay_script(run, &length);
+    ToolNames names = scene_tool_names(scene);
+    Script *script = script_parse_tools(text, length, "hand.csv", &names, &faults);
+    if (!script)
+        fail_msg("%s", faults.text[0]);
+    int cursor = 0;
+    for (int64_t i = 0; i < run->step_count; i++) {
+        ToolCommands read = script_tools_at(script, (double)i * run->step_ms / 1000, &cursor), was = recorded_run_commands(run, i);
+        assert_memory_equal(read.tool, was.tool, sizeof was.tool);
+        assert_int_equal(read.released, was.released);
+    }
+    script_free(script);
+    free(text);
+    scene_free(scene);
+}
+
+static void what_is_read_of_several_tools(void **state)
+{
+    (void)state;
+    enum { STEPS = 605 };
+    char path[256];
+    snprintf(path, sizeof path, "%s/tools.h5", folder);
+    text_of_scene = tools_text;
+    Scene *scene;
+    Simulator *simulator = make_simulator(&scene);
+    RecordingOptions options = recording_default_options();
+    Recording *recording = recording_create(path, simulator, &options, &faults);
+    assert_non_null(recording);
+    static Pose *seen[STEPS + 1];
+    static uint64_t hash[STEPS];
+    int least = 1000, most = 0;
+    for (int i = 0; i < STEPS; i++) {
+        ToolCommands commands = hands_at(i);
+        simulator_step_tools(simulator, &commands);
+        assert_true(recording_step(recording, simulator, &commands, NULL));
+        hash[i] = simulator_hash(simulator);
+        seen[i] = pose_create_for(simulator);
+        pose_take(seen[i], simulator, &commands, &(XrayControl){0});
+        least = seen[i]->node_count < least ? seen[i]->node_count : least;
+        most = seen[i]->node_count > most ? seen[i]->node_count : most;
+    }
+    assert_true(recording_close(recording, simulator, &faults));
+    RecordedRun *run = recorded_run_load(path, &faults);
+    if (!run)
+        fail_msg("%s", faults.text[0]);
+    print_message("%d to %d nodes of at most %d\n", least, most, run->node_count);
+    assert_true(least < most);   // nodes come and go
+    assert_int_equal(run->step_count, STEPS);
+    assert_int_equal(run->tool_count, TOOLS);
+    assert_int_equal(run->frame_count, 1 + 60 + 1);
+    assert_string_equal(run->tool[2].name, "micro");
+    assert_string_equal(run->tool[2].kind, "microcatheter");
+    assert_memory_equal(run->state_hash, hash, sizeof hash);
+    for (int i = 0; i < STEPS; i++) {
+        ToolCommands read = recorded_run_commands(run, i), given = hands_at(i);
+        assert_memory_equal(read.tool, given.tool, sizeof given.tool);
+        assert_int_equal(read.released, given.released);
+    }
+    Pose *pose = pose_create_for_run(run);
+    for (int64_t k = 0; k < run->frame_count; k++) {
+        pose_from_run(pose, scene, run, k);
+        assert_same_pose(pose, seen[run->frame_step[k]]);
+    }
+    // beyond the nodes in use there is nothing
+    int64_t unused = run->frame_nodes[0];
+    assert_true(unused < run->node_count && isnan(run->position[unused].x) && isnan(run->s[unused]) && run->vessel_node[unused] == -1);
+    assert_replays(run);
+    pose_free(pose);
+    for (int i = 0; i < STEPS; i++)
+        pose_free(seen[i]);
+    recorded_run_free(run);
+    RecordedRun *series = recorded_run_load_series(path, &faults);
+    assert_true(series && series->tool_count == TOOLS && series->frame_count == 0 && series->tool[3].inserted[STEPS - 1] > 0);
+    recorded_run_free(series);
+    simulator_destroy(simulator);
+    scene_free(scene);
+    text_of_scene = scene_text;
+}
+
+// A copy with a piece of it changed is refused with these words.
+static void expect_refused(const char *path, void (*change)(hid_t file), const char *words)
+{
+    char broken[256];
+    snprintf(broken, sizeof broken, "%s/broken.h5", folder);
+    assert_true(copy_file(path, broken));
+    hid_t file = H5Fopen(broken, H5F_ACC_RDWR, H5P_DEFAULT);
+    assert_true(file >= 0);
+    change(file);
+    assert_true(H5Fclose(file) >= 0);
+    faults_clear(&faults);
+    RecordedRun *run = recorded_run_load(broken, &faults);
+    if (run || !strstr(faults.text[0], words))
+        fail_msg("expected '%s', got '%s'", words, run ? "a recording" : faults.text[0]);
+}
+
+static void replace(hid_t file, const char *name, hid_t type, int rank, const hsize_t *size, hid_t creation)
+{
+    hid_t space = H5Screate_simple(rank, size, NULL);
+    H5Ldelete(file, name, H5P_DEFAULT);
+    hid_t set = H5Dcreate2(file, name, type, space, H5P_DEFAULT, creation, H5P_DEFAULT);
+    assert_true(set >= 0);
+    H5Dclose(set);
+    H5Sclose(space);
+}
+
+static void write_value(hid_t file, const char *name, hid_t type, const hsize_t *at, int rank, const void *value)
+{
+    hid_t set = H5Dopen2(file, name, H5P_DEFAULT), space = H5Dget_space(set), memory = H5Screate(H5S_SCALAR);
+    const hsize_t one[3] = {1, 1, 1};
+    assert_true(rank == H5Sget_simple_extent_ndims(space) && H5Sselect_hyperslab(space, H5S_SELECT_SET, at, NULL, one, NULL) >= 0);
+    assert_true(H5Dwrite(set, type, memory, space, H5P_DEFAULT, value) >= 0);
+    H5Sclose(memory);
+    H5Sclose(space);
+    H5Dclose(set);
+}
+
+static void lose_tool(hid_t file) { H5Ldelete(file, "/tools/1", H5P_DEFAULT); }
+static void lose_name(hid_t file) { H5Adelete_by_name(file, "/tools/2", "name", H5P_DEFAULT); }
+static void lose_hand(hid_t file) { H5Ldelete(file, "/tools/3/command", H5P_DEFAULT); }
+static void widen_hand(hid_t file) { replace(file, "/tools/1/proximal", H5T_NATIVE_DOUBLE, 2, (const hsize_t[]){605, 3}, H5P_DEFAULT); }
+static void other_nodes(hid_t file) { replace(file, "/tools/1/position", H5T_NATIVE_DOUBLE, 3, (const hsize_t[]){62, 99, 3}, H5P_DEFAULT); }
+static void too_many_nodes(hid_t file) { write_value(file, "/wire/count", H5T_NATIVE_INT, (const hsize_t[]){5}, 1, &(int){1000}); }
+static void no_node(hid_t file) { write_value(file, "/wire/count", H5T_NATIVE_INT, (const hsize_t[]){5}, 1, &(int){0}); }
+static void no_such_carrier(hid_t file) { write_value(file, "/tools/2/carrier", H5T_NATIVE_INT, (const hsize_t[]){3, 4}, 2, &(int){7}); }
+
+// Huge and empty: a chunk that was never written takes no room in the file.
+static void promise(hid_t file)
+{
+    hid_t creation = H5Pcreate(H5P_DATASET_CREATE);
+    H5Pset_chunk(creation, 1, &(hsize_t){1 << 20});
+    replace(file, "/time_s", H5T_NATIVE_DOUBLE, 1, &(hsize_t){1 << 28}, creation);
+    H5Pclose(creation);
+}
+
+static void read_elsewhere(hid_t file)
+{
+    hid_t creation = H5Pcreate(H5P_DATASET_CREATE);
+    H5Pset_external(creation, "/etc/passwd", 0, 800);
+    replace(file, "/time_s", H5T_NATIVE_DOUBLE, 1, &(hsize_t){100}, creation);
+    H5Pclose(creation);
+}
+
+static void link_elsewhere(hid_t file)
+{
+    char path[256];
+    snprintf(path, sizeof path, "%s/tools.h5", folder);
+    H5Ldelete(file, "/time_s", H5P_DEFAULT);
+    assert_true(H5Lcreate_external(path, "/inserted_mm", file, "/time_s", H5P_DEFAULT, H5P_DEFAULT) >= 0);
+}
+
+// After what_is_read_of_several_tools(), whose file it takes.
+static void what_is_broken_is_refused(void **state)
+{
+    (void)state;
+    char path[256];
+    snprintf(path, sizeof path, "%s/tools.h5", folder);
+    expect_refused(path, lose_tool, "/tools does not hold the groups 0 to 1");
+    expect_refused(path, lose_name, "/tools/2 lacks its text attribute 'name'");
+    expect_refused(path, lose_hand, "lacks the dataset '/tools/3/command'");
+    expect_refused(path, widen_hand, "'/tools/1/proximal' does not have the shape or type");
+    expect_refused(path, other_nodes, "'/tools/1/position' does not have the shape or type");
+    expect_refused(path, too_many_nodes, "frame 5 has 1000 nodes; 2 to 56");
+    expect_refused(path, no_node, "frame 5 has 0 nodes");
+    expect_refused(path, no_such_carrier, "/tools/2/carrier names tool 7; -1 to 3");
+    expect_refused(path, promise, "'/time_s' promises 268435456 values that the file does not hold");
+    expect_refused(path, read_elsewhere, "'/time_s' promises 100 values that the file does not hold");
+    expect_refused(path, link_elsewhere, "lacks the dataset '/time_s'");
+}
+
 // --- a child that records until it is ended ---
 
 static void record_for_ever(const char *path, int64_t expected_steps)
@@ -130,9 +369,9 @@ static void record_for_ever(const char *path, int64_t expected_steps)
     Recording *recording = recording_create(path, simulator, &options, &faults);
     int cursor = 0;
     for (int64_t i = 0; recording; i++) {
-        Command command = script_at(scene->script, (double)(i % 400) / 1000, &cursor);
-        simulator_step(simulator, command);
-        if (!recording_step(recording, simulator, &(ToolCommands){.tool = {command}}, NULL))
+        ToolCommands commands = scene->script ? script_tools_at(scene->script, (double)(i % 400) / 1000, &cursor) : hands_at(i);
+        simulator_step_tools(simulator, &commands);
+        if (!recording_step(recording, simulator, &commands, NULL))
             break;
     }
     _exit(9);
@@ -185,29 +424,50 @@ static bool unwritten(const char *name, const double *value, hsize_t values)
     return false;
 }
 
+// One dataset's part of check_file().
+static const char *check_rows(hid_t file, const char *name, hsize_t *count, bool first)
+{
+    hsize_t rows = 0, values = 0;
+    double *data = read_rows(file, name, &rows, &values);
+    if (first)
+        *count = rows;
+    const char *fault = !data ? "cannot be read" : rows != *count ? "rows differ" : unwritten(name, data, values) ? "unwritten rows" : NULL;
+    free(data);
+    return fault;
+}
+
 // Every dataset is read whole: all of one kind have the same rows, and every row was written. NULL or what is wrong.
 static const char *check_file(const char *path, hsize_t count[2])
 {
-    static const char *const names[2][14] = {{"/time_s", "/command", "/proximal", "/state_hash", "/inserted_mm", "/report/penetration_mm",
+    static const char *const names[2][15] = {{"/time_s", "/command", "/proximal", "/state_hash", "/inserted_mm", "/released", "/report/penetration_mm",
                                               "/report/contacts", "/report/iterations", "/report/residual", "/report/linearisations",
-                                              "/report/wall_force_n", "/report/flags"},
+                                              "/report/wall_force_n", "/report/flags", "/xray"},
                                              {"/wire/step", "/wire/position", "/wire/quaternion", "/contact/force_n", "/contact/gap_mm",
                                               "/contact/vessel_node"}};
+    static const char *const tool_names[2][5] = {{"command", "proximal", "inserted_mm", "released"}, {"position", "quaternion", "carrier"}};
+    static const char *const several_names[] = {"/wire/count", "/wire/s_mm", "/wire/radius_mm"};
     hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);   // locking on
     if (file < 0)
         return "cannot be opened";
     const char *fault = NULL;
-    for (int kind = 0; kind < 2; kind++)
-        for (int i = 0; !fault && names[kind][i]; i++) {
-            hsize_t rows = 0, values = 0;
-            double *data = read_rows(file, names[kind][i], &rows, &values);
-            if (i == 0)
-                count[kind] = rows;
-            fault = !data ? "cannot be read" : rows != count[kind] ? "rows differ" : unwritten(names[kind][i], data, values) ? "unwritten rows" : NULL;
-            if (data && !fault && kind == 1 && i == 0 && rows > 0 && data[rows - 1] >= (double)count[0])
-                fault = "a frame of a step that is not there";
-            free(data);
-        }
+    int tools = H5Lexists(file, "/tools", H5P_DEFAULT) > 0 ? TOOLS : 0;
+    for (int kind = 0; kind < 2; kind++) {
+        for (int i = 0; !fault && names[kind][i]; i++)
+            fault = check_rows(file, names[kind][i], &count[kind], i == 0);
+        for (int i = 0; !fault && tools && kind == 1 && i < 3; i++)
+            fault = check_rows(file, several_names[i], &count[kind], false);
+        for (int k = 0; k < tools; k++)
+            for (int i = 0; !fault && tool_names[kind][i]; i++) {
+                char name[40];
+                snprintf(name, sizeof name, "/tools/%d/%s", k, tool_names[kind][i]);
+                fault = check_rows(file, name, &count[kind], false);
+            }
+    }
+    hsize_t rows = 0, values = 0;
+    double *step = fault ? NULL : read_rows(file, "/wire/step", &rows, &values);
+    if (step && rows > 0 && step[rows - 1] >= (double)count[0])
+        fault = "a frame of a step that is not there";
+    free(step);
     H5Fclose(file);
     return fault;
 }
@@ -222,18 +482,6 @@ typedef struct Watched {
     const char *fault;
     atomic_llong committed;
 } Watched;
-
-static bool copy_file(const char *from, const char *to)
-{
-    static char buffer[1 << 20];
-    FILE *source = fopen(from, "rb"), *target = fopen(to, "wb");
-    bool good = source && target;
-    for (size_t size; good && (size = fread(buffer, 1, sizeof buffer, source)) > 0;)
-        good = fwrite(buffer, 1, size, target) == size;
-    if (source)
-        fclose(source);
-    return (!target || fclose(target) == 0) && good;
-}
 
 static off_t length_of(const char *path)
 {
@@ -290,7 +538,9 @@ static void look(void *context, bool done)
         fault = "an end that was not true a flush ago";
     if (!fault && used_end(watched->copy) > watched->end)
         fault = "chunks beyond the end of a flush ago";
-    if (!fault && !done && (count[0] != watched->before[0] || count[1] != watched->before[1]))
+    // of several tools the steps' page is written before the frames'
+    bool steps_may_lead = text_of_scene == tools_text;
+    if (!fault && !done && ((count[0] != watched->before[0] && !steps_may_lead) || count[1] != watched->before[1]))
         fault = "rows before the last write of the flush";
     if (!fault && done && (count[0] < watched->before[0] || count[1] < watched->before[1]))
         fault = "fewer rows after a flush";
@@ -311,10 +561,10 @@ static void look(void *context, bool done)
     }
 }
 
-static void every_state_in_a_flush_is_a_whole_file(void **state)
+static void look_at_every_state(void)
 {
-    (void)state;
     static Watched watched;
+    watched = (Watched){0};
     snprintf(watched.path, sizeof watched.path, "%s/states.h5", folder);
     snprintf(watched.copy, sizeof watched.copy, "%s/state.h5", folder);
     Scene *scene;
@@ -326,8 +576,9 @@ static void every_state_in_a_flush_is_a_whole_file(void **state)
     Recording *recording = recording_create(watched.path, simulator, &options, &faults);
     assert_non_null(recording);
     for (int step = 1; step <= 260; step++) {
-        simulator_step(simulator, (Command){5, 90});
-        assert_true(recording_step(recording, simulator, &(ToolCommands){.tool = {{5, 90}}}, NULL));
+        ToolCommands commands = hands_at(step);
+        simulator_step_tools(simulator, &commands);
+        assert_true(recording_step(recording, simulator, &commands, NULL));
         if (step == 1) {
             // the file gets its name with the first rows
             while (access(watched.path, F_OK) != 0)
@@ -353,6 +604,20 @@ static void every_state_in_a_flush_is_a_whole_file(void **state)
     assert_true(length_of(watched.path) == stated_end(watched.path));
 }
 
+static void every_state_in_a_flush_is_a_whole_file(void **state)
+{
+    (void)state;
+    look_at_every_state();
+}
+
+static void so_it_is_with_several_tools(void **state)
+{
+    (void)state;
+    text_of_scene = tools_text;
+    look_at_every_state();
+    text_of_scene = scene_text;
+}
+
 // --- kills ---
 
 static void kill_recordings(int trials)
@@ -361,6 +626,7 @@ static void kill_recordings(int trials)
     for (int trial = 0; trial < trials; trial++) {
         char path[256];
         snprintf(path, sizeof path, "%s/kill-%d.h5", folder, trial);
+        text_of_scene = trial % 2 ? tools_text : scene_text;
         pid_t child = fork();
         assert_true(child >= 0);
         if (child == 0)
@@ -385,6 +651,7 @@ static void kill_recordings(int trials)
         snprintf(path, sizeof path, "%s/kill-%d.h5.part-%ld", folder, trial, (long)child);
         assert_true(access(path, F_OK) != 0);
     }
+    text_of_scene = scene_text;
 }
 
 static void a_kill_leaves_a_file_that_opens(void **state)
@@ -518,7 +785,10 @@ int main(int count, char **argument)
         return cmocka_run_group_tests(((const struct CMUnitTest[]){cmocka_unit_test(kills_at_random)}), make_folder, remove_folder);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_read_is_what_was_simulated),
+        cmocka_unit_test(what_is_read_of_several_tools),
+        cmocka_unit_test(what_is_broken_is_refused),
         cmocka_unit_test(every_state_in_a_flush_is_a_whole_file),
+        cmocka_unit_test(so_it_is_with_several_tools),
         cmocka_unit_test(a_kill_leaves_a_file_that_opens),
         cmocka_unit_test(a_full_index_leaves_what_was_flushed),
         cmocka_unit_test(a_full_disk_leaves_what_was_flushed),

@@ -177,6 +177,17 @@ static void bare_columns_move_the_first_tool(void **state)
     scene_free(scene);
 }
 
+static void a_row_in_place_lets_a_tool_go(void **state)
+{
+    (void)state;
+    int cursor = 0;
+    Scene *scene = good(THREE "script: [{t_s: 0, wire.released: 1, guide.push_mm_s: 7, guide.twist_deg_s: 0}, {t_s: 1, released: 1}, {t_s: 2, wire.released: 0}, {t_s: 3}]\n");
+    assert_int_equal(script_tools_at(scene->script, 0.5, &cursor).released, 4);
+    assert_int_equal(script_tools_at(scene->script, 1.5, &cursor).released, 1);
+    assert_int_equal(script_tools_at(scene->script, 2.5, &cursor).released, 0);
+    scene_free(scene);
+}
+
 static const struct {
     const char *text, *place, *words;
 } broken_script[] = {
@@ -189,6 +200,8 @@ static const struct {
     {"t_s,push_mm_s,twist_deg_s,wire.push_mm_s,wire.twist_deg_s\n0,1,0,1,0\n", "1:5", "beside named tools"},
     {"t,wire.push_mm_s,wire.twist_deg_s\n0,1,0\n", "1:1", "it is 't_s'"},
     {"t_s,wire.push_mm_s,wire.twist_deg_s\n0,1\n", "2:1", "2 fields"},
+    {"t_s,wire.released\n0,2\n", "2:1", "released is 2; 0 where a hand"},
+    {"t_s,wire.released,wire.released\n0,1,1\n", "1:19", "second time"},
     {"t_s,wire.push_mm_s,wire.twist_deg_s\n0,1,0\n1,2000,0\n", "3:1", "wire.push_mm_s 2000 is out of range"},
     {"t_s,wire.push_mm_s,wire.twist_deg_s\n", "1:1", "no row"},
 };
@@ -536,6 +549,7 @@ int main(void)
         cmocka_unit_test(a_rig_begins_with_the_whole_first_tool),
         cmocka_unit_test(a_script_moves_the_tools_it_names),
         cmocka_unit_test(bare_columns_move_the_first_tool),
+        cmocka_unit_test(a_row_in_place_lets_a_tool_go),
         cmocka_unit_test(each_fault_of_a_script_has_its_place),
         cmocka_unit_test(each_fault_has_its_line_and_column),
         cmocka_unit_test(all_faults_come_in_one_pass),
