@@ -18,7 +18,7 @@ static bool take_over(LiveSession *session, const LiveSessionOptions *options, F
 {
     const RecordedRun *run = options->resume;
     int64_t steps = 0;
-    if (!replay_fits(run, session->simulator, session->scene->path, faults))
+    if (!replay_fits(run, session->simulator, faults))
         return false;
     while (steps < run->step_count && run->time_s[steps] <= options->resume_s + 1e-9)
         steps++;

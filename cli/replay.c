@@ -173,7 +173,8 @@ static int simulate_again(const ReplayOptions *options, const RecordedRun *run, 
     int code = EXIT_BAD_INPUT;
     if (!simulator)
         return code;
-    if (replay_fits(run, simulator, options->recording, faults) && options->scene_folder && !(sampling.path = tool_path_create(simulator, (double)run->step_count * run->step_ms / 1000)))
+    bool samples = replay_fits(run, simulator, faults) && options->scene_folder;
+    if (samples && !(sampling.path = tool_path_create(simulator, (double)run->step_count * run->step_ms / 1000)))
         faults_add(faults, options->recording, 0, 0, "no memory for its tool path");
     if (faults->count == 0) {
         ReplayVerdict verdict = replay_verify(simulator, run, -1, options->scene_folder != NULL, sample, &sampling);

@@ -38,7 +38,7 @@ Rescore *rescore_create(const RecordedRun *run, const Scene *scene, const OpenVe
         rescore->simulator = scene_has_one_tool(scene, "a score", faults) ? simulator_create(scene, open->vessel, faults) : NULL;
         rescore->lesson = rescore->simulator ? lesson_create(rescore->simulator, open->tree) : NULL;
     }
-    bool fits = rescore && rescore->simulator && replay_fits(run, rescore->simulator, scene->path, faults);
+    bool fits = rescore && rescore->simulator && replay_fits(run, rescore->simulator, faults);
     if (fits && rescore->kept && rescore->lesson) {
         keep(rescore);
         return rescore;

@@ -44,19 +44,20 @@ ReplayVerdict replay_verify(Simulator *simulator, const RecordedRun *run, int64_
     return verdict;
 }
 
-bool replay_fits(const RecordedRun *run, Simulator *simulator, const char *path, Faults *faults)
+bool replay_fits(const RecordedRun *run, Simulator *simulator, Faults *faults)
 {
+    const char *path = simulator_scene(simulator)->path;
     const Stepper *stepper = simulator_stepper(simulator);
     int tools = stepper_tool_count(stepper), nodes = stepper_node_capacity(stepper);
     if (tools != run->tool_count) {
-        faults_add(faults, path, 0, 0, "holds %d tools, its scene has %d", run->tool_count, tools);
+        faults_add(faults, path, 0, 0, "gives %d tools, the recording holds %d", tools, run->tool_count);
         return false;
     }
     bool fits = run->frame_count == 0 || run->node_count == nodes;
     for (int k = 0; run->frame_count > 0 && tools > 1 && k < tools; k++)
         fits &= run->tool[k].node_count == stepper_tool_nodes(stepper, k, NULL);
     if (!fits)
-        faults_add(faults, path, 0, 0, "holds a tool of %d nodes, its scene one of %d", run->node_count, nodes);
+        faults_add(faults, path, 0, 0, "gives a tool of %d nodes, the recording holds one of %d", nodes, run->node_count);
     return fits;
 }
 

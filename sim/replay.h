@@ -18,8 +18,8 @@ typedef struct ReplayVerdict {
 // `each` is called after each step (`xray` NULL: nobody watched); false stops. May be NULL.
 ReplayVerdict replay_verify(Simulator *simulator, const RecordedRun *run, int64_t steps, bool go_on,
                             bool (*each)(void *context, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray), void *context);
-// Whether the simulator steps tools with as many nodes as the recording's, else a fault.
-bool replay_fits(const RecordedRun *run, Simulator *simulator, const char *path, Faults *faults);
+// Whether the simulator's tools have as many nodes as the recording's, else a fault.
+bool replay_fits(const RecordedRun *run, Simulator *simulator, Faults *faults);
 // The recorded commands as a script's text, runs of equal ones as one row; the caller frees it. NULL where memory lacks.
 char *replay_script(const RecordedRun *run, size_t *length);
 

@@ -135,7 +135,7 @@ static void what_was_changed_is_found(void **state)
     change_scene("bend.h5", "slippery.h5", "friction: 0.05", "friction: 0.01");
     ends(1, "differs from step", "$S replay slippery.h5 --verify");
     change_scene("bend.h5", "longer.h5", "elements: 20", "elements: 40");
-    ends(2, "holds a tool of 21 nodes, its scene one of 41", "$S replay longer.h5 --verify");
+    ends(2, "gives a tool of 41 nodes, the recording holds one of 21", "$S replay longer.h5 --verify");
     change_scene("bend.h5", "broken.h5", "friction: 0.05", "friction: cold");
     ends(2, "friction", "$S replay broken.h5 --verify");
 }

@@ -181,7 +181,7 @@ static void assert_replays(const RecordedRun *run)
     Scene *scene = replay_scene(run, "tools.h5", &faults);
     Simulator *simulator = scene ? simulator_create(scene, NULL, &faults) : NULL;
     assert_non_null(simulator);
-    assert_true(replay_fits(run, simulator, "tools.h5", &faults));
+    assert_true(replay_fits(run, simulator, &faults));
     ReplayVerdict verdict = replay_verify(simulator, run, -1, false, NULL, NULL);
     assert_int_equal(verdict.first_different, -1);
     assert_int_equal(verdict.steps, run->step_count);
