@@ -95,8 +95,11 @@ static void drive(VerifyRun *run, const Scene *scene, Simulator *simulator)
 static void run_job(void *context, long index)
 {
     VerifyRun *run = &((VerifyRun *)context)[index];
-    Scene scene = *run->of->scene;       // shares all but the number of elements
+    const Scene *read = run->of->scene;
+    Scene scene = *read;     // shares all but the numbers of elements
     scene.wire.elements = run->elements;
+    for (int k = 1; k < scene.tool_count; k++)
+        scene.tool[k].wire.elements = (int)fmax(1, floor((double)read->tool[k].wire.elements * run->elements / read->wire.elements + 0.5));
     Simulator *simulator = simulator_create(&scene, run->of->open.vessel, &run->faults);
     if (simulator)
         drive(run, &scene, simulator);

@@ -462,6 +462,14 @@ static void read_exercise(Reading *reading, YamlValue value)
     free(name);
 }
 
+static void read_verify(Reading *reading, YamlValue value, bool has_script)
+{
+    VerifyTools tools = {.names = scene_tool_names(reading->scene)};
+    for (int k = 0; k < tools.names.count; k++)
+        tools.length[k] = reading->tool[k].length;
+    verify_read(value, &tools, has_script, &reading->scene->verify);
+}
+
 // What lies behind the vessel in the X-ray picture.
 static void read_fluoroscopy(Reading *reading, YamlValue value)
 {
@@ -523,7 +531,7 @@ static void read_scene(Reading *reading)
     if (yaml_has(&map, "fluoroscopy"))
         read_fluoroscopy(reading, yaml_get(&map, "fluoroscopy", false));
     if (yaml_has(&map, "verify"))
-        verify_read(yaml_get(&map, "verify", false), reading->total_length, yaml_has(&map, "script"), &reading->scene->verify);
+        read_verify(reading, yaml_get(&map, "verify", false), yaml_has(&map, "script"));
 }
 
 Scene *scene_parse(const char *text, size_t length, const char *path, Faults *faults)

@@ -7,6 +7,7 @@
 #define SELDINGER_SIM_VERIFY_H
 
 #include "geom/linear.h"
+#include "input/input.h"
 #include "input/yaml_reader.h"
 
 enum { VERIFY_MOST_ELEMENTS = 8, VERIFY_MOST_CASES = 100, VERIFY_NAME = 64 };
@@ -24,7 +25,8 @@ typedef struct VerifyCase {
     char name[VERIFY_NAME];
     VerifyQuantity quantity;
     VerifyTake take;
-    double s_mm;             // where along the wire; the end of a range for quantities of a range …
+    int tool;                // whose; of several the first unless it is named
+    double s_mm;             // where along the tool; the end of a range for quantities of a range …
     double from_s_mm;        // … which begins here
     bool has_axis;
     Vec3 axis;               // unit
@@ -40,8 +42,8 @@ typedef struct VerifyCase {
 } VerifyCase;
 
 typedef struct VerifyPlan {  // case_count 0: the scene has none
-    int element_count;       // 0: the wire's own
-    int element[VERIFY_MOST_ELEMENTS];           // rising
+    int element_count;       // 0: the tools' own
+    int element[VERIFY_MOST_ELEMENTS];           // rising; of the first tool, of the others in proportion
     double duration_s;       // < 0: the script's
     double rest_s;           // afterwards at most this long until nothing is faster than …
     double rest_speed_mm_s;
@@ -49,8 +51,13 @@ typedef struct VerifyPlan {  // case_count 0: the scene has none
     VerifyCase *cases;
 } VerifyPlan;
 
-// Reads the value of `verify:`; `total_length` [mm] of the wire, 0 where not known; `has_script`: the scene has one. The caller frees plan->cases.
-void verify_read(YamlValue value, double total_length, bool has_script, VerifyPlan *plan);
+// What of the scene's tools is known: their lengths [mm] are 0 where they are not.
+typedef struct VerifyTools {
+    ToolNames names;
+    double length[TOOLS_MOST];
+} VerifyTools;
+// Reads the value of `verify:`; `has_script`: the scene has one. The caller frees plan->cases.
+void verify_read(YamlValue value, const VerifyTools *tools, bool has_script, VerifyPlan *plan);
 
 // --- measuring: one for each run ---
 

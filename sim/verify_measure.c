@@ -18,8 +18,11 @@ typedef struct Trace {       // one case over its time
 struct VerifyMeasure {
     const VerifyPlan *plan;
     Simulator *simulator;
-    NodeReport *node;        // (M), as of node_step
+    NodeReport *node;        // (M) of the centreline, as of node_step
     int64_t node_step;
+    int own_count[STEP_TOOLS_MAX];
+    ToolNode *own[STEP_TOOLS_MAX];       // of each tool, as of own_step
+    int64_t own_step[STEP_TOOLS_MAX];
     Trace *trace;            // (case_count)
 };
 
@@ -29,9 +32,17 @@ VerifyMeasure *verify_measure_create(const VerifyPlan *plan, Simulator *simulato
     if (!m)
         return NULL;
     *m = (VerifyMeasure){.plan = plan, .simulator = simulator, .node_step = -1};
-    m->node = calloc((size_t)simulator_state(simulator)->node_count, sizeof *m->node);
+    const Stepper *stepper = simulator_stepper(simulator);
+    m->node = calloc((size_t)stepper_node_capacity(stepper), sizeof *m->node);
     m->trace = calloc((size_t)plan->case_count + 1, sizeof *m->trace);
-    if (m->node && m->trace)
+    bool good = m->node && m->trace;
+    for (int k = 0; k < stepper_tool_count(stepper); k++) {
+        m->own_step[k] = -1;
+        m->own_count[k] = stepper_tool_nodes(stepper, k, NULL);
+        m->own[k] = calloc((size_t)m->own_count[k], sizeof *m->own[k]);
+        good = good && m->own[k];
+    }
+    if (good)
         return m;
     verify_measure_free(m);
     return NULL;
@@ -39,6 +50,8 @@ VerifyMeasure *verify_measure_create(const VerifyPlan *plan, Simulator *simulato
 
 void verify_measure_free(VerifyMeasure *m)
 {
+    for (int k = 0; m && k < STEP_TOOLS_MAX; k++)
+        free(m->own[k]);
     if (m) {
         free(m->node);
         free(m->trace);
@@ -56,8 +69,18 @@ static const NodeReport *nodes_now(VerifyMeasure *m)
     return m->node;
 }
 
+// Where a tool's own nodes are, the same.
+static const ToolNode *own_now(VerifyMeasure *m, int tool)
+{
+    int64_t step = simulator_totals(m->simulator)->steps;
+    if (m->own_step[tool] != step)
+        stepper_tool_nodes(simulator_stepper(m->simulator), tool, m->own[tool]);
+    m->own_step[tool] = step;
+    return m->own[tool];
+}
+
 // The element that holds s and how far into it, 0 to 1.
-static int element_at(const NodeReport *node, int count, double s, double *part)
+static int element_at(const ToolNode *node, int count, double s, double *part)
 {
     int i = 0;
     while (i + 2 < count && node[i + 1].s <= s)
@@ -67,16 +90,15 @@ static int element_at(const NodeReport *node, int count, double s, double *part)
 }
 
 // Between nodes: the cubic through both positions and tangents.
-static void point_at(VerifyMeasure *m, double s, Vec3 *point, Vec3 *tangent)
+static void point_at(VerifyMeasure *m, const VerifyCase *c, Vec3 *point, Vec3 *tangent)
 {
-    const WireState *w = simulator_state(m->simulator);
-    const NodeReport *node = nodes_now(m);
     double x;
-    int i = element_at(node, w->node_count, s, &x);
+    const ToolNode *node = own_now(m, c->tool);
+    int i = element_at(node, m->own_count[c->tool], c->s_mm, &x);
     double length = node[i + 1].s - node[i].s;
-    Vec3 t1 = quat_rotate(w->orientation[i], vec3(1, 0, 0)), t2 = quat_rotate(w->orientation[i + 1], vec3(1, 0, 0));
-    Vec3 chord = vec3_sub(w->position[i + 1], w->position[i]);
-    *point = vec3_add_scaled(w->position[i], x * x * (3 - 2 * x), chord);
+    Vec3 t1 = quat_rotate(node[i].orientation, vec3(1, 0, 0)), t2 = quat_rotate(node[i + 1].orientation, vec3(1, 0, 0));
+    Vec3 chord = vec3_sub(node[i + 1].position, node[i].position);
+    *point = vec3_add_scaled(node[i].position, x * x * (3 - 2 * x), chord);
     *point = vec3_add_scaled(*point, length * x * (1 - x) * (1 - x), t1);
     *point = vec3_add_scaled(*point, -length * x * x * (1 - x), t2);
     *tangent = vec3_scale(chord, 6 * x * (1 - x) / length);
@@ -84,15 +106,14 @@ static void point_at(VerifyMeasure *m, double s, Vec3 *point, Vec3 *tangent)
     *tangent = vec3_unit(vec3_add_scaled(*tangent, x * (3 * x - 2), t2));
 }
 
-// Turn about the wire itself from one place to another, element by element: it counts whole turns.
-static double twist_between(VerifyMeasure *m, double from, double to)
+// Turn about the tool itself from one place to another, element by element: it counts whole turns.
+static double twist_between(VerifyMeasure *m, const VerifyCase *c)
 {
-    const WireState *w = simulator_state(m->simulator);
-    const NodeReport *node = nodes_now(m);
+    const ToolNode *node = own_now(m, c->tool);
     double sum = 0;
-    for (int i = 0; i + 1 < w->node_count; i++) {
-        double length = node[i + 1].s - node[i].s, part = (fmin(to, node[i + 1].s) - fmax(from, node[i].s)) / length;
-        Quat p = quat_mul(quat_conjugate(w->orientation[i]), w->orientation[i + 1]);
+    for (int i = 0; i + 1 < m->own_count[c->tool]; i++) {
+        double length = node[i + 1].s - node[i].s, part = (fmin(c->s_mm, node[i + 1].s) - fmax(c->from_s_mm, node[i].s)) / length;
+        Quat p = quat_mul(quat_conjugate(node[i].orientation), node[i + 1].orientation);
         if (part > 0)
             sum += part * 2 * atan2(p.w < 0 ? -p.x : p.x, fabs(p.w));
     }
@@ -104,7 +125,7 @@ static double of_range(VerifyMeasure *m, const VerifyCase *c)
     const WireState *w = simulator_state(m->simulator);
     const NodeReport *node = nodes_now(m);
     Vec3 sum = vec3(0, 0, 0), moment = vec3(0, 0, 0);
-    double size = 0, size_s = 0, deepest = 0, slack = 1e-9 * (1 + c->s_mm);
+    double size = 0, size_s = 0, deepest = 0, slack = 1e-9 * (1 + fmin(c->s_mm, 1e5));
     int contacts = 0;
     for (int i = 0; i < w->node_count; i++) {
         if (node[i].s < c->from_s_mm - slack || node[i].s > c->s_mm + slack)
@@ -133,16 +154,16 @@ static double value_now(VerifyMeasure *m, const VerifyCase *c, Vec3 *point)
     Vec3 tangent;
     switch (c->quantity) {
     case VERIFY_POSITION: {
-        point_at(m, c->s_mm, point, &tangent);
+        point_at(m, c, point, &tangent);
         Vec3 away = vec3_sub(*point, c->origin);
         return c->has_axis ? vec3_dot(away, c->axis) : vec3_norm(away);
     }
     case VERIFY_TANGENT:
-        point_at(m, c->s_mm, point, &tangent);
+        point_at(m, c, point, &tangent);
         return vec3_angle(tangent, c->axis) * deg;
-    case VERIFY_TWIST: return twist_between(m, c->from_s_mm, c->s_mm) * deg;
-    case VERIFY_PUSH_FORCE: return simulator_last(m->simulator)->proximal_force;
-    case VERIFY_PUSH_TORQUE: return simulator_last(m->simulator)->proximal_torque;
+    case VERIFY_TWIST: return twist_between(m, c) * deg;
+    case VERIFY_PUSH_FORCE: return simulator_last(m->simulator)->push[c->tool];
+    case VERIFY_PUSH_TORQUE: return simulator_last(m->simulator)->torque[c->tool];
     case VERIFY_ELASTIC_ENERGY: return stepper_elastic_energy(stepper);
     case VERIFY_KINETIC_ENERGY: return stepper_kinetic_energy(stepper);
     case VERIFY_SPEED: return simulator_fastest_mm_s(m->simulator);

@@ -14,12 +14,14 @@ static const double longest_s = 1e5, largest = 1e12;
 
 // What a quantity is asked with; a key that would say nothing is a fault.
 typedef struct Needs {
-    bool s, range, axis_must, axis_may, origin;
+    bool s, range, axis_must, axis_may, origin, tool;
 } Needs;
 static const Needs needs[] = {
-    [VERIFY_POSITION] = {.s = true, .axis_may = true, .origin = true},
-    [VERIFY_TANGENT] = {.s = true, .axis_must = true},
-    [VERIFY_TWIST] = {.range = true},
+    [VERIFY_POSITION] = {.s = true, .axis_may = true, .origin = true, .tool = true},
+    [VERIFY_TANGENT] = {.s = true, .axis_must = true, .tool = true},
+    [VERIFY_TWIST] = {.range = true, .tool = true},
+    [VERIFY_PUSH_FORCE] = {.tool = true},
+    [VERIFY_PUSH_TORQUE] = {.tool = true},
     [VERIFY_WALL_FORCE] = {.range = true, .axis_may = true},
     [VERIFY_WALL_MOMENT] = {.range = true, .axis_must = true, .origin = true},
     [VERIFY_WALL_CENTRE] = {.range = true},
@@ -34,7 +36,7 @@ static void refuse(const YamlMap *map, const char *key, const char *because)
         yaml_fault(yaml_get(map, key, false), "'%s' says nothing here; %s", key, because);
 }
 
-// A number from 0 to the wire's length, or `end`.
+// A number from 0 to the tool's length, or `end`.
 static void read_s(const YamlMap *map, const char *key, bool required, double total_length, double *s)
 {
     YamlValue value = yaml_get(map, key, required);
@@ -45,13 +47,24 @@ static void read_s(const YamlMap *map, const char *key, bool required, double to
         yaml_number(value, (NumberRange){0, total_length, false}, s);
 }
 
-static void read_place(const YamlMap *map, double total_length, VerifyCase *c)
+static void read_place(const YamlMap *map, const VerifyTools *tools, VerifyCase *c)
 {
     Needs need = needs[c->quantity];
     const char *quantity = verify_quantity_name[c->quantity];
     char because[96];
     snprintf(because, sizeof because, "'%s' is not asked for with it", quantity);
-    c->s_mm = total_length;
+    bool together = tools->names.count > 1 && !need.tool;    // of all tools, which have no arc length in common
+    if (need.tool && yaml_has(map, "tool"))
+        c->tool = yaml_choice(yaml_get(map, "tool", false), tools->names.name);
+    else
+        refuse(map, "tool", because);
+    c->tool = c->tool > 0 ? c->tool : 0;
+    double total_length = tools->length[c->tool] > 0 ? tools->length[c->tool] : 1e5;
+    if (together && need.range) {
+        need.range = false;
+        snprintf(because, sizeof because, "'%s' of several tools is that of all of them", quantity);
+    }
+    c->s_mm = together ? HUGE_VAL : total_length;
     if (need.s || need.range)
         read_s(map, "s_mm", need.s, total_length, &c->s_mm);
     else
@@ -107,9 +120,9 @@ static void read_tolerance(const YamlMap *map, const VerifyPlan *plan, VerifyCas
         yaml_fault(value, "no per cent of the reference 0; 'tolerance' is absolute");
 }
 
-static void read_case(YamlValue value, double total_length, const VerifyPlan *plan, VerifyCase *c)
+static void read_case(YamlValue value, const VerifyTools *tools, const VerifyPlan *plan, VerifyCase *c)
 {
-    static const char *const keys[] = {"name",  "quantity", "take",  "s_mm",      "from_s_mm", "axis",      "origin_mm",         "t_s",
+    static const char *const keys[] = {"name",  "quantity", "tool", "take",  "s_mm",      "from_s_mm", "axis",      "origin_mm",         "t_s",
                                        "from_t_s", "level",    "scale", "reference", "tolerance", "tolerance_percent", "order", "floor", NULL};
     YamlMap map = yaml_map(value, keys);
     const char *name;
@@ -128,7 +141,7 @@ static void read_case(YamlValue value, double total_length, const VerifyPlan *pl
     c->take = take >= 0 ? (VerifyTake)take : TAKE_LAST;
     if (choice >= 0) {
         c->quantity = (VerifyQuantity)choice;
-        read_place(&map, total_length, c);
+        read_place(&map, tools, c);
     }
     if (take >= 0)
         read_time(&map, c);
@@ -142,7 +155,7 @@ static void read_case(YamlValue value, double total_length, const VerifyPlan *pl
         yaml_fault(yaml_get(&map, "order", false), "an order needs at least two numbers in 'verify.elements'");
 }
 
-void verify_read(YamlValue value, double total_length, bool has_script, VerifyPlan *plan)
+void verify_read(YamlValue value, const VerifyTools *tools, bool has_script, VerifyPlan *plan)
 {
     static const char *const keys[] = {"elements", "duration_s", "rest_s", "rest_speed_mm_s", "cases", NULL};
     YamlMap map = yaml_map(value, keys);
@@ -167,5 +180,5 @@ void verify_read(YamlValue value, double total_length, bool has_script, VerifyPl
         yaml_fault(list, "no memory");
     plan->case_count = plan->cases ? count : 0;
     for (int i = 0; i < plan->case_count; i++)
-        read_case(yaml_item(list, i), total_length > 0 ? total_length : 1e5, plan, &plan->cases[i]);
+        read_case(yaml_item(list, i), tools, plan, &plan->cases[i]);
 }

@@ -96,6 +96,41 @@ static void bad_input_is_said(void **state)
     assert_non_null(strstr(output, "no key `verify:`"));
 }
 
+static void write_two_tools(const char *cases)
+{
+    char path[200];
+    snprintf(path, sizeof path, "%s/two.yaml", folder);
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fprintf(file,
+            "seldinger: 1\ntools:\n"
+            "  - {name: tube, kind: catheter, elements: 10, sections: [{length_mm: 60, diameter_mm: 1, inner_diameter_mm: 0.8, young_modulus_gpa: 2}]}\n"
+            "  - {name: core, kind: wire, elements: 20, inserted_mm: 5, sections: [{length_mm: 120, diameter_mm: 0.5, young_modulus_gpa: 13}]}\n"
+            "rig: {fix: [{s_mm: 0, dof: all}]}\nverify: {duration_s: 0.01, cases: [%s]}\n", cases);
+    fclose(file);
+}
+
+static void a_case_names_its_tool(void **state)
+{
+    (void)state;
+    // 5 mm of the core lie beyond the clamp, all of the tube
+    write_two_tools("{name: core, tool: core, quantity: position_mm, s_mm: end, reference: 5, tolerance: 1.0e-6}, "
+                    "{name: tube, tool: tube, quantity: position_mm, s_mm: end, reference: 60, tolerance: 1.0e-6}, "
+                    "{name: first, quantity: position_mm, s_mm: 60, reference: 60, tolerance: 1.0e-6}, "
+                    "{name: behind, tool: core, quantity: position_mm, s_mm: 100, axis: [1, 0, 0], reference: -15, tolerance: 1.0e-6}");
+    assert_int_equal(check("two.yaml"), 0);
+    write_two_tools("{name: x, tool: cor, quantity: position_mm, s_mm: end, reference: 5, tolerance: 1}");
+    assert_int_equal(check("two.yaml"), 2);
+    assert_non_null(strstr(output, "two.yaml:6:52: 'verify.cases[0].tool' is 'cor'; one of: tube, core"));
+    write_two_tools("{name: x, tool: tube, quantity: position_mm, s_mm: 61, reference: 5, tolerance: 1}");
+    assert_int_equal(check("two.yaml"), 2);
+    assert_non_null(strstr(output, "at most 60"));
+    write_two_tools("{name: x, quantity: wall_force_n, s_mm: 3, reference: 5, tolerance: 1}, {name: y, tool: core, quantity: wall_force_n, reference: 5, tolerance: 1}");
+    assert_int_equal(check("two.yaml"), 2);
+    assert_non_null(strstr(output, "'wall_force_n' of several tools is that of all of them"));
+    assert_non_null(strstr(output, "'tool' says nothing here"));
+}
+
 static void threads_change_nothing(void **state)
 {
     (void)state;
@@ -125,6 +160,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_case_passes),           cmocka_unit_test(a_missed_tolerance_fails), cmocka_unit_test(a_missed_order_fails),
         cmocka_unit_test(what_was_not_measured_fails), cmocka_unit_test(bad_input_is_said),        cmocka_unit_test(threads_change_nothing),
+        cmocka_unit_test(a_case_names_its_tool),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
