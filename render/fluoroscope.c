@@ -2,7 +2,7 @@
 //   C-arm, table or field moved: all afresh and coarse (half the resolution, the decimated lumen); fine with the first pulses at rest.
 //   contrast agent moved on: the lumen afresh, decimated; fine once it stays.
 //   anything of these, blades, mode, mask: the base is baked from the layers.
-//   always: the base is copied back where the tool was, and the tool multiplied in.
+//   always: the base is copied back where the tools were, and the tools multiplied in.
 // Showing adds the noise of the pulse; that alone is done where the picture is held.
 #include "render/fluoroscope_parts.h"
 
@@ -22,16 +22,30 @@ FluoroscopeOptions fluoroscope_default_options(void)
 
 // --- create ---
 
+static bool tool_is_sound(const ToolLook *tool, int index, char *message, size_t capacity)
+{
+    if (tool->stretch_count < 1)
+        return message_fail(message, capacity, "tool %d has no stretches", index);
+    for (int i = 0; i < tool->stretch_count; i++) {
+        const TubeStretch *stretch = &tool->stretch[i];
+        bool is_tube = stretch->radius > 0 && isfinite(stretch->radius) && stretch->lumen >= 0 && stretch->lumen < stretch->radius;
+        if (!is_tube || !(stretch->attenuation >= 0) || !isfinite(stretch->attenuation))
+            return message_fail(message, capacity,
+                                "stretch %d of tool %d has radius %g mm, lumen %g mm and attenuation %g / mm; finite, not negative, the lumen within the radius", i,
+                                index, stretch->radius, stretch->lumen, stretch->attenuation);
+    }
+    return true;
+}
+
 static bool options_are_sound(const FluoroscopeOptions *options, char *message, size_t capacity)
 {
     if (!patient_axes_are_sound(&options->patient))
         return message_fail(message, capacity, "the patient's axes are not unit vectors perpendicular to each other");
-    if (options->node_count < 0 || (options->node_count > 0 && (!options->radius || !options->attenuation)))
-        return message_fail(message, capacity, "a tool of %d nodes has no radii or attenuations", options->node_count);
-    for (int i = 0; i < options->node_count; i++)
-        if (!(options->radius[i] > 0) || !isfinite(options->radius[i]) || !(options->attenuation[i] >= 0) || !isfinite(options->attenuation[i]))
-            return message_fail(message, capacity, "the tool's node %d has radius %g mm and attenuation %g / mm; both must be finite, and not negative", i,
-                                options->radius[i], options->attenuation[i]);
+    if (options->tools && (!options->pose || options->pose->tool_count != options->tools->count))
+        return message_fail(message, capacity, "the pose is not one of the %d tools", options->tools->count);
+    for (int k = 0; options->tools && k < options->tools->count; k++)
+        if (!tool_is_sound(&options->tools->tool[k], k, message, capacity))
+            return false;
     bool has_dose = options->quanta >= 0 && isfinite(options->quanta) && options->dsa_dose > 0;
     if (!has_dose || !(options->contrast_attenuation >= 0) || !(options->dsa_gain > 0.5))
         return message_fail(message, capacity, "contrast or quanta of fluoroscopy is negative, or DSA's gain not above 0.5, or its dose not above 0");
@@ -78,23 +92,33 @@ static bool wall_is_fit(const FluoroscopeOptions *options, MeshClosure *closure,
 
 static int lumen_nodes(const Fluoroscope *f) { return f->lumen.is_there ? f->lumen.node_count : 0; }
 
+static bool make_paths(Fluoroscope *f, const FluoroscopeOptions *options)
+{
+    bool good = true;
+    f->tool_count = options->tools ? options->tools->count : 0;
+    for (int k = 0; good && k < f->tool_count; k++) {
+        const PoseTool *tool = &options->pose->tool[k];
+        const ToolLook *look = &options->tools->tool[k];
+        double *s = malloc((size_t)tool->node_count * sizeof *s);
+        for (int j = 0; s && j < tool->node_count; j++)
+            s[j] = tool->node[j].s;
+        good = s && ribbon_path_make(&f->tool[k], tool->node_count, s, look->stretch_count, look->stretch);
+        free(s);
+    }
+    return good;
+}
+
 static bool take_memory(Fluoroscope *f, const FluoroscopeOptions *options)
 {
-    size_t tool = (size_t)options->node_count, nodes = (size_t)lumen_nodes(f) + 1;
-    f->radius = malloc((tool + 1) * sizeof *f->radius);
-    f->attenuation = malloc((tool + 1) * sizeof *f->attenuation);
-    f->shown.position = calloc(tool + 1, sizeof *f->shown.position);
+    size_t tool_nodes = 1, nodes = (size_t)lumen_nodes(f) + 1;
+    for (int k = 0; options->tools && k < options->tools->count; k++)
+        tool_nodes += (size_t)options->pose->tool[k].node_count;
+    f->shown.position = calloc(tool_nodes, sizeof *f->shown.position);
     f->shown.contrast = calloc(nodes, sizeof *f->shown.contrast);
     f->lumen_contrast = calloc(nodes, sizeof *f->lumen_contrast);
     f->bolus = calloc(nodes, sizeof *f->bolus);
     f->roadmap = calloc(nodes, sizeof *f->roadmap);
-    if (!f->radius || !f->attenuation || !f->shown.position || !f->shown.contrast || !f->lumen_contrast || !f->bolus || !f->roadmap)
-        return false;
-    for (size_t i = 0; i < tool; i++) {
-        f->radius[i] = options->radius[i];
-        f->attenuation[i] = options->attenuation[i];
-    }
-    return true;
+    return f->shown.position && f->shown.contrast && f->lumen_contrast && f->bolus && f->roadmap && make_paths(f, options);
 }
 
 Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message, size_t capacity)
@@ -131,7 +155,8 @@ Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message
     f->options.vessel = NULL;
     f->options.vertex_node = NULL;
     f->options.tree = NULL;
-    f->options.radius = f->options.attenuation = NULL;
+    f->options.tools = NULL;
+    f->options.pose = NULL;
     f->options.anatomy_value = NULL;
     f->tone.contrast = options->contrast_attenuation;
     f->tone.gain = options->dsa_gain;
@@ -151,7 +176,9 @@ void fluoroscope_destroy(Fluoroscope *f)
     for (int i = 0; i < 11; i++)
         layer_destroy(layer[i]);
     ribbon_free(&f->ribbon);
-    free(f->radius), free(f->attenuation), free(f->shown.position), free(f->shown.contrast);
+    for (int k = 0; k < f->tool_count; k++)
+        ribbon_path_free(&f->tool[k]);
+    free(f->shown.position), free(f->shown.contrast);
     free(f->lumen_contrast), free(f->bolus), free(f->roadmap);
     free(f);
 }
@@ -177,6 +204,14 @@ static bool is_seen(const float *contrast, int count)
     return false;
 }
 
+static bool has_these_tools(const Fluoroscope *f, const Pose *pose)
+{
+    bool same = pose && pose->tool_count == f->tool_count;
+    for (int k = 0; same && k < f->tool_count; k++)
+        same = pose->tool[k].node_count == f->tool[k].node_count;
+    return same;
+}
+
 // What the pulse shows; mask and roadmap follow.
 static void take_exposure(Fluoroscope *f, const FluoroscopeFrame *frame)
 {
@@ -184,9 +219,12 @@ static void take_exposure(Fluoroscope *f, const FluoroscopeFrame *frame)
     const Pose *pose = frame->pose;
     f->shown.xray = frame->xray;
     f->shown.pulse = frame->pulse;
-    f->shown.has_tool = pose && f->options.node_count > 0 && pose->node_count == f->options.node_count;
-    if (f->shown.has_tool)
-        memcpy(f->shown.position, pose->position, (size_t)pose->node_count * sizeof *pose->position);
+    f->shown.has_tools = has_these_tools(f, pose);
+    for (int k = 0, i = 0; f->shown.has_tools && k < f->tool_count; k++) {
+        for (int j = 0; j < pose->tool[k].node_count; j++, i++)
+            f->shown.position[i] = pose->tool[k].node[j].position;
+        f->shown.filling[k] = frame->filling[k] > 0 ? fminf(frame->filling[k], 1) : 0;
+    }
     for (int n = 0; n < nodes; n++) {
         float c = frame->contrast ? frame->contrast[n] : 0;
         f->shown.contrast[n] = c > 0 ? fminf(c, 1) : 0;   // not a number: none
@@ -321,20 +359,24 @@ static LayerChanges update_layers(Fluoroscope *f, bool is_fresh)
 static const Layer *anatomy_of(const Fluoroscope *f) { return has_anatomy(f) ? &f->anatomy_layer : NULL; }
 static const Layer *lumen_of(const Fluoroscope *f) { return f->lumen_is_empty ? NULL : &f->lumen_layer; }
 
-static void lay_tool(Fluoroscope *f, int side)
+static void lay_tools(Fluoroscope *f, int side)
 {
-    f->ribbon.count = 0;
-    if (f->shown.has_tool)
-        ribbon_lay(&f->ribbon, &f->c_arm, side, f->options.node_count, f->shown.position, f->radius, f->attenuation);
+    const Vec3 *position = f->shown.position;
+    ribbon_begin(&f->ribbon);
+    for (int k = 0; f->shown.has_tools && k < f->tool_count; k++) {
+        ribbon_add(&f->ribbon, &f->c_arm, side, &f->tool[k], position, f->tone.contrast * (double)f->shown.filling[k]);
+        position += f->tool[k].node_count;
+    }
+    ribbon_end(&f->ribbon, side);
 }
 
 static void take_mask(Fluoroscope *f)
 {
     if (!layer_fit(&f->mask, f->side, LAYER_R32F))
         return;
-    lay_tool(f, f->side);
+    lay_tools(f, f->side);
     layers_draw_total(&f->programs, anatomy_of(f), lumen_of(f), &f->c_arm, &f->tone, &f->mask);
-    layers_draw_tool(&f->programs, &f->ribbon, &f->tone, true, &f->mask);
+    layers_draw_tools(&f->programs, &f->ribbon, &f->tone, true, &f->mask);
     f->has_mask = true;
     f->mask_is_due = false;
     f->mask_pulse = f->shown.pulse;
@@ -404,8 +446,8 @@ static void make_picture(Fluoroscope *f, bool is_fresh)
         copy_all(base, &now->picture);
     else
         copy_box(base, &now->picture, f->drawn_low, f->drawn_high);
-    lay_tool(f, now->picture.side);
-    layers_draw_tool(&f->programs, &f->ribbon, &f->tone, false, &now->picture);
+    lay_tools(f, now->picture.side);
+    layers_draw_tools(&f->programs, &f->ribbon, &f->tone, false, &now->picture);
     memcpy(f->drawn_low, f->ribbon.low, sizeof f->drawn_low);
     memcpy(f->drawn_high, f->ribbon.high, sizeof f->drawn_high);
     if (f->ribbon.count == 0)

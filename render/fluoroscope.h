@@ -1,9 +1,9 @@
 // Fluoroscopy: the first view of the trainer, drawn from a Pose and what is set at the X-ray system.
 //
-// Along each ray I = exp(-(anatomy + contrast + tool)); brightness 1.75 I^0.72, as an automatic exposure shows it; quantum noise whose sigma follows from I,
+// Along each ray I = exp(-(anatomy + contrast + tools)); brightness 1.75 I^0.72, as an automatic exposure shows it; quantum noise whose sigma follows from I,
 // softened by the detector; four blades with a rounded soft edge. The picture is the largest square in the middle of the ViewPort; the rest stays dark.
 // Drawn in layers, each only when its input changes (DESIGN section 8):
-//   anatomy and vessel thickness -> baked base (brightness, noise sigma) -> tool multiplied in -> noise by pulse.
+//   anatomy and vessel thickness -> baked base (brightness, noise sigma) -> tools multiplied in -> noise by pulse.
 // While `xray.pedal` is 0, or `pulse` stays the same, the last picture stays, whatever else has changed (last image hold).
 //
 // Needs a current OpenGL 3.3 context, the same in every call; one thread.
@@ -12,6 +12,7 @@
 
 #include "geom/isosurface.h"
 #include "render/c_arm.h"
+#include "render/tool_look.h"
 #include "render/view_port.h"
 #include "sim/pose.h"
 
@@ -23,10 +24,9 @@ typedef struct FluoroscopeOptions {
                                    // do not face one way is refused: the message says so and no contrast is drawn
     const int *vertex_node;        // (V) tree node of each vertex; NULL: mesh->node where `tree` is given and that fits, else the nearest
     const VesselTree *tree;        // NULL: the whole lumen is one node, 0
-    // tool
-    int node_count;                // M, as in the poses; 0: none
-    const double *radius;          // (M) [mm]
-    const double *attenuation;     // (M) [1/mm] >= 0 at each node: scene_attenuation() at its arc length
+    // tools; borrowed during create only
+    const ToolLooks *tools;        // NULL: none
+    const Pose *pose;              // any of these tools: how many nodes they have, at which arc lengths
     // anatomy: a volume (recon/volume.h), or none: value NULL. Then a plain head, or a trunk where the vessel is larger than a head
     int anatomy_size[3];
     Vec3 anatomy_origin;           // [mm] centre of voxel (0,0,0)
@@ -47,7 +47,8 @@ Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message
 void fluoroscope_destroy(Fluoroscope *fluoroscope);
 
 typedef struct FluoroscopeFrame {
-    const Pose *pose;              // positions are read; its node_count must be the options'. NULL: no tool
+    const Pose *pose;              // its tools' nodes are read, as many as the options' pose has. NULL: no tools
+    float filling[TOOLS_MOST];     // concentration of contrast agent in the lumen of each tool, 0 to 1
     XrayControl xray;
     const float *contrast;         // (N of the tree) concentration of contrast agent, 0 to 1; NULL: none
     uint32_t pulse;                // number of the X-ray pulse: seeds the noise; the same pulse gives the same picture

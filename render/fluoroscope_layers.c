@@ -10,6 +10,7 @@
 #include "render/message.h"
 
 #include <epoxy/gl.h>
+#include <stddef.h>
 #include <stdlib.h>
 
 static const double white = 1.75, live_power = 0.72, subtracted = 0.62;
@@ -86,15 +87,17 @@ static const char *const BAKE_FRAGMENT =
 
 static const char *const TOOL_VERTEX =
     "#version 330 core\n"
-    "layout(location = 0) in vec2 place; layout(location = 1) in vec3 profile; uniform float side; out vec3 chord;\n"
-    "void main() { gl_Position = vec4(2.0 * place / side - 1.0, 0.0, 1.0); chord = profile; }\n";
-// the integral of sqrt(r^2 - x^2) between pixel borders, of three pixels for the detector's blur
+    "layout(location = 0) in vec2 place; layout(location = 1) in vec3 profile; layout(location = 2) in vec2 density;\n"
+    "uniform float side; out vec3 tube; out vec2 d;\n"
+    "void main() { gl_Position = vec4(2.0 * place / side - 1.0, 0.0, 1.0); tube = profile; d = density; }\n";
+// of each circle the integral of sqrt(r^2 - x^2) between pixel borders, of three pixels for the detector's blur
 static const char *const TOOL_FRAGMENT =
     "#version 330 core\n"
-    "in vec3 chord; out vec4 result; uniform vec2 power; uniform bool as_attenuation;\n"
-    "void main() { float r = max(chord.y, 1e-6); vec4 u = clamp((chord.x + vec4(-1.5, -0.5, 0.5, 1.5)) / r, -1.0, 1.0);\n"
+    "in vec3 tube; in vec2 d; out vec4 result; uniform vec2 power; uniform bool as_attenuation;\n"
+    "float chord(float r) { vec4 u = clamp((tube.x + vec4(-1.5, -0.5, 0.5, 1.5)) / r, -1.0, 1.0);\n"
     "  vec4 area = r * r * (u * sqrt(max(1.0 - u * u, 0.0)) + asin(u));\n"
-    "  float mean = 0.25 * (area.y - area.x) + 0.5 * (area.z - area.y) + 0.25 * (area.w - area.z), a = chord.z * mean;\n"
+    "  return 0.25 * (area.y - area.x) + 0.5 * (area.z - area.y) + 0.25 * (area.w - area.z); }\n"
+    "void main() { float a = d.x * chord(max(tube.y, 1e-6)); if (tube.z > 0.0) a += d.y * chord(tube.z);\n"
     "  result = as_attenuation ? vec4(a) : vec4(exp(-power * a), 1.0, 1.0); }\n";
 
 // nearest texels by interpolated coordinates: half the time of texelFetch on llvmpipe
@@ -194,7 +197,9 @@ static void make_tool_array(LayerPrograms *programs)
     glEnableVertexAttribArray(0);
     glVertexAttribPointer(0, 2, GL_FLOAT, GL_FALSE, sizeof(RibbonVertex), NULL);
     glEnableVertexAttribArray(1);
-    glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, sizeof(RibbonVertex), (const void *)(2 * sizeof(float)));
+    glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, sizeof(RibbonVertex), (const void *)offsetof(RibbonVertex, across));
+    glEnableVertexAttribArray(2);
+    glVertexAttribPointer(2, 2, GL_FLOAT, GL_FALSE, sizeof(RibbonVertex), (const void *)offsetof(RibbonVertex, density));
     glBindVertexArray(0);
 }
 
@@ -436,7 +441,7 @@ void layers_opacify(const LayerPrograms *programs, const Layer *bare, const Laye
     glDisable(GL_SCISSOR_TEST);
 }
 
-void layers_draw_tool(const LayerPrograms *programs, const Ribbon *ribbon, const LayerTone *tone, bool as_attenuation, const Layer *to)
+void layers_draw_tools(const LayerPrograms *programs, const Ribbon *ribbon, const LayerTone *tone, bool as_attenuation, const Layer *to)
 {
     if (ribbon->count < 1)
         return;

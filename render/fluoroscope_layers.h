@@ -56,8 +56,8 @@ void layers_bake(const LayerPrograms *programs, const Layer *anatomy, const Laye
 // the full resolution is not blurred further.
 void layers_opacify(const LayerPrograms *programs, const Layer *bare, const Layer *lumen, const Layer *roadmap, const CArm *c_arm, const LayerTone *tone,
                     const int low[2], const int high[2], const Layer *to);
-// The tool's shadow: multiplied into a baked layer, or (as attenuation) added into a float layer.
-void layers_draw_tool(const LayerPrograms *programs, const Ribbon *ribbon, const LayerTone *tone, bool as_attenuation, const Layer *to);
+// The tools' shadow: multiplied into a baked layer, or (as attenuation) added into a float layer.
+void layers_draw_tools(const LayerPrograms *programs, const Ribbon *ribbon, const LayerTone *tone, bool as_attenuation, const Layer *to);
 // Baked layer, of whatever resolution, and noise into a square of the framebuffer at x, y.
 void layers_show(const LayerPrograms *programs, const Layer *baked, const LayerTone *tone, uint32_t pulse, unsigned framebuffer, int x, int y, int side);
 

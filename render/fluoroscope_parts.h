@@ -9,18 +9,20 @@
 typedef struct Exposure {
     XrayControl xray;
     uint32_t pulse;
-    bool has_tool;
-    Vec3 *position;              // (M)
+    bool has_tools;
+    Vec3 *position;              // (of all tools' nodes, one tool after the other)
+    float filling[TOOLS_MOST];
     float *contrast;             // (N)
 } Exposure;
 
 typedef struct PictureLayers {
-    Layer bare, base, picture;   // without the lumen; with it; with the tool
+    Layer bare, base, picture;   // without the lumen; with it; with the tools
 } PictureLayers;
 
 struct Fluoroscope {
     FluoroscopeOptions options;  // what it points to is gone
-    double *radius, *attenuation;   // (M)
+    int tool_count;
+    RibbonPath tool[TOOLS_MOST];
     Anatomy anatomy;
     Lumen lumen;
     LayerPrograms programs;
@@ -28,7 +30,7 @@ struct Fluoroscope {
     int anatomy_rows;            // drawn of anatomy_next, which takes the coarse one's place when it is whole
     PictureLayers still, turning, *now;   // of full and half the resolution; which of them is shown
     Ribbon ribbon;
-    int drawn_low[2], drawn_high[2];   // box of the tool in `picture`
+    int drawn_low[2], drawn_high[2];   // box of the tools in `picture`
     Exposure shown;
     bool has_picture;
     // what the layers hold

@@ -1,6 +1,8 @@
 // Between two points of the tool the ray's way through it is the chord of the shadow's cross-section times L / l, with L their distance in space and l that of
 // their shadows, both in the same measure: what is seen foreshortened is darker, and the sum over the shadow stays mu pi r^2 L. Points whose shadows fall
-// within a pixel or the tool's radius are joined, so that a tool seen along its axis becomes a dark spot and no row of slivers.
+// within a pixel or the tool's radius are joined, so that a tool seen along its axis becomes a dark spot and no row of slivers; a border between stretches
+// stays unless it is foreshortened, so that a marker band is as long as it is.
+// A tube is an outer circle of its wall and an inner one that takes the wall away again and puts in what fills the lumen.
 #include "render/fluoroscope_tool.h"
 
 #include <stdlib.h>
@@ -10,13 +12,49 @@ static const double margin = 2;          // [pixel] beside the shadow: half a pi
 
 typedef struct RibbonPoint {
     double x, y;                         // [pixel]
-    double radius;                       // [pixel]
-    double attenuation;                  // for each pixel of way
-    double length;                       // [pixel] in space, from the point before
+    double pixel_mm;                     // of the square at its depth
+    double way;                          // [pixel] in space, from the point before …
+    double wall;                         // … and the integral of the wall's attenuation along it
+    double radius, lumen;                // [mm] of what lies before it
     bool begins;                         // nothing before it
 } RibbonPoint;
 
-static bool add_vertex(Ribbon *ribbon, const RibbonPoint *p, double nx, double ny, double side, double density)
+// --- where there are points ---
+
+bool ribbon_path_make(RibbonPath *path, int node_count, const double *s, int stretch_count, const TubeStretch *stretch)
+{
+    const double same = 1e-6;            // [mm] a border at a point is that point
+    int room = node_count > 1 ? (node_count - 1) * PARTS + stretch_count + 1 : 1, at = 0;
+    *path = (RibbonPath){.node_count = node_count, .place = malloc((size_t)room * sizeof *path->place)};
+    if (!path->place)
+        return false;
+    double before = 0;
+    for (int i = 0; node_count > 1 && i <= (node_count - 1) * PARTS; i++) {
+        int node = i / PARTS < node_count - 1 ? i / PARTS : node_count - 2, from = i > 0 ? (i - 1) / PARTS : 0;
+        double u = (double)(i - node * PARTS) / PARTS, here = s[node] + u * (s[node + 1] - s[node]);
+        for (; at + 1 < stretch_count && stretch[at].end < here - same; at++) {
+            const TubeStretch *ends = &stretch[at];
+            if (i > 0 && ends->end > before + same)
+                path->place[path->count++] = (RibbonPlace){from, (ends->end - s[from]) / (s[from + 1] - s[from]), true, ends->radius, ends->lumen, ends->attenuation};
+            else if (i > 0)
+                path->place[path->count - 1].is_border = true;
+        }
+        path->place[path->count++] = (RibbonPlace){node, u, false, stretch[at].radius, stretch[at].lumen, stretch[at].attenuation};
+        before = here;
+    }
+    return true;
+}
+
+void ribbon_path_free(RibbonPath *path)
+{
+    free(path->place);
+    *path = (RibbonPath){0};
+}
+
+// --- laying ---
+
+// One side of the ribbon's end at p, by the tube of the piece that ends at `of`.
+static bool add_vertex(Ribbon *ribbon, const RibbonPoint *p, const RibbonPoint *of, const double normal[2], double side, const double density[2])
 {
     if (ribbon->count == ribbon->capacity) {
         int capacity = ribbon->capacity ? 2 * ribbon->capacity : 2048;
@@ -26,9 +64,12 @@ static bool add_vertex(Ribbon *ribbon, const RibbonPoint *p, double nx, double n
         ribbon->vertex = grown;
         ribbon->capacity = capacity;
     }
-    double across = side * (p->radius + margin);
-    ribbon->vertex[ribbon->count++] =
-        (RibbonVertex){{(float)(p->x + across * nx), (float)(p->y + across * ny)}, (float)across, (float)p->radius, (float)density};
+    double radius = of->radius / p->pixel_mm, across = side * (radius + margin);
+    ribbon->vertex[ribbon->count++] = (RibbonVertex){.place = {(float)(p->x + across * normal[0]), (float)(p->y + across * normal[1])},
+                                                     .across = (float)across,
+                                                     .radius = (float)radius,
+                                                     .lumen = (float)(of->lumen / p->pixel_mm),
+                                                     .density = {(float)density[0], (float)density[1]}};
     return true;
 }
 
@@ -50,38 +91,40 @@ static Vec3 between_nodes(int count, const Vec3 *position, int node, double u)
     return vec3_add_scaled(x, u * u * (u - 1), to);
 }
 
-// Pieces shorter than they are thick would lie across each other where the shadow turns back.
-static double least_length(double radius) { return fmax(1, 1.5 * radius); }
+// [pixel] Pieces shorter than they are thick would lie across each other where the shadow turns back.
+static double least_length(const RibbonPoint *p) { return fmax(1, 1.5 * p->radius / p->pixel_mm); }
+static double shadow_length(const RibbonPoint *a, const RibbonPoint *b) { return hypot(b->x - a->x, b->y - a->y); }
+// Seen at more than 60 degrees from the side.
+static bool is_foreshortened(const RibbonPoint *a, const RibbonPoint *b) { return shadow_length(a, b) < 0.5 * b->way; }
 
 // The projected points, closer ones joined. Returns how many.
-static int project_points(RibbonPoint *out, const CArm *c_arm, int side, int count, const Vec3 *position, const double *radius, const double *attenuation)
+static int project_points(RibbonPoint *out, const CArm *c_arm, int side, const RibbonPath *path, const Vec3 *position)
 {
-    int points = 0, last = (count - 1) * PARTS;
-    bool broken = true;
-    double length = 0;
+    int points = 0;
+    bool is_broken = true;
+    double way = 0, wall = 0;
     Vec3 before = {0, 0, 0};
-    for (int i = 0; i <= last; i++) {
-        int node = i / PARTS;
-        double u = (double)(i % PARTS) / PARTS;
-        Vec3 x = between_nodes(count, position, node, u), p = c_arm_project(c_arm, x);
+    for (int i = 0; i < path->count; i++) {
+        const RibbonPlace *place = &path->place[i];
+        Vec3 x = between_nodes(path->node_count, position, place->node, place->u), p = c_arm_project(c_arm, x);
         double distance = C_ARM_SOURCE_MM + p.z;
         if (!vec3_is_finite(p) || !(distance > C_ARM_NEAREST_MM) || fabs(p.x) > 1e3 || fabs(p.y) > 1e3) {
-            broken = true;
+            is_broken = true;
             continue;
         }
-        double pixel_mm = c_arm->field_mm / side * distance / C_ARM_SOURCE_MM;
-        int next = node + 1 < count ? node + 1 : node;
-        double r = (1 - u) * radius[node] + u * radius[next], a = (1 - u) * attenuation[node] + u * attenuation[next];
-        length = broken ? 0 : length + vec3_distance(x, before) / pixel_mm;
+        double pixel_mm = c_arm->field_mm / side * distance / C_ARM_SOURCE_MM, length = is_broken ? 0 : vec3_distance(x, before);
+        way = is_broken ? 0 : way + length / pixel_mm;
+        wall = is_broken ? 0 : wall + length * place->attenuation;
         before = x;
-        RibbonPoint point = {(p.x + 0.5) * side, (p.y + 0.5) * side, r / pixel_mm, a * pixel_mm, length, broken};
-        // joined to the point before: the length adds up, the last place counts
-        bool is_near = !broken && hypot(point.x - out[points - 1].x, point.y - out[points - 1].y) < least_length(r / pixel_mm);
-        broken = false;
-        if (is_near && i < last)
+        RibbonPoint point = {(p.x + 0.5) * side, (p.y + 0.5) * side, pixel_mm, way, wall, place->radius, place->lumen, is_broken};
+        // joined to the point before: way and wall add up, the last place counts
+        bool is_near = !is_broken && shadow_length(&out[points - 1], &point) < least_length(&point);
+        bool is_joined = is_near && i + 1 < path->count && (!place->is_border || is_foreshortened(&out[points - 1], &point));
+        is_broken = false;
+        if (is_joined)
             continue;
         out[points++] = point;
-        length = 0;
+        way = wall = 0;
     }
     return points;
 }
@@ -102,7 +145,7 @@ static void mitre(const RibbonPoint *a, const RibbonPoint *b, const RibbonPoint 
     shadow_normal(a, b, n[0]);
     shadow_normal(b, c, n[1]);
     double sum[2] = {n[0][0] + n[1][0], n[0][1] + n[1][1]}, square = sum[0] * sum[0] + sum[1] * sum[1];
-    double inner = (b->radius + margin) * sqrt(fmax(4 - square, 0)), shorter = fmin(hypot(b->x - a->x, b->y - a->y), hypot(c->x - b->x, c->y - b->y));
+    double inner = (b->radius / b->pixel_mm + margin) * sqrt(fmax(4 - square, 0)), shorter = fmin(shadow_length(a, b), shadow_length(b, c));
     if (square < 1 || inner > 0.5 * shorter * sqrt(square)) {
         out[0] = own[0], out[1] = own[1];
         return;
@@ -111,12 +154,11 @@ static void mitre(const RibbonPoint *a, const RibbonPoint *b, const RibbonPoint 
     out[1] = 2 * sum[1] / square;
 }
 
-static bool lay_piece(Ribbon *ribbon, const RibbonPoint *before, const RibbonPoint *a, const RibbonPoint *b, const RibbonPoint *after)
+static bool lay_piece(Ribbon *ribbon, const RibbonPoint *before, const RibbonPoint *a, const RibbonPoint *b, const RibbonPoint *after, double filling)
 {
-    double own[2], n[2][2], l = hypot(b->x - a->x, b->y - a->y);
+    double own[2], n[2][2], l = shadow_length(a, b), least = least_length(b);
     RibbonPoint end[2] = {*a, *b};
-    double least = least_length(b->radius);
-    if (l < least) {
+    if (l < least && is_foreshortened(a, b)) {
         // all of it within one spot: spread over that
         double ux = l > 1e-9 ? (b->x - a->x) / l : 1, uy = l > 1e-9 ? (b->y - a->y) / l : 0, mx = (a->x + b->x) / 2, my = (a->y + b->y) / 2;
         end[0].x = mx - least * ux / 2, end[0].y = my - least * uy / 2;
@@ -124,6 +166,8 @@ static bool lay_piece(Ribbon *ribbon, const RibbonPoint *before, const RibbonPoi
         l = least;
         before = after = NULL;
     }
+    if (!(l > 0))
+        return true;
     shadow_normal(&end[0], &end[1], own);
     n[0][0] = n[1][0] = own[0];
     n[0][1] = n[1][1] = own[1];
@@ -131,17 +175,41 @@ static bool lay_piece(Ribbon *ribbon, const RibbonPoint *before, const RibbonPoi
         mitre(before, a, b, own, n[0]);
     if (after)
         mitre(a, b, after, own, n[1]);
-    double stretch = b->length / l, density[2] = {a->attenuation * stretch, b->attenuation * stretch};
+    const double density[2] = {b->wall / l, (filling * b->way * b->pixel_mm - b->wall) / l};
     static const int order[6][2] = {{0, -1}, {1, -1}, {0, 1}, {0, 1}, {1, -1}, {1, 1}};
     for (int k = 0; k < 6; k++) {
         int e = order[k][0];
-        if (!add_vertex(ribbon, &end[e], n[e][0], n[e][1], order[k][1], density[e]))
+        if (!add_vertex(ribbon, &end[e], b, n[e], order[k][1], density))
             return false;
     }
     return true;
 }
 
-static void find_box(Ribbon *ribbon, int side)
+void ribbon_begin(Ribbon *ribbon) { ribbon->count = 0; }
+
+bool ribbon_add(Ribbon *ribbon, const CArm *c_arm, int side, const RibbonPath *path, const Vec3 *position, double filling)
+{
+    if (path->count > ribbon->point_capacity) {
+        RibbonPoint *grown = realloc(ribbon->point, (size_t)path->count * sizeof *grown);
+        if (!grown)
+            return false;
+        ribbon->point = grown;
+        ribbon->point_capacity = path->count;
+    }
+    const RibbonPoint *point = ribbon->point;
+    int points = project_points(ribbon->point, c_arm, side, path, position);
+    bool good = true;
+    for (int i = 1; good && i < points; i++) {
+        if (point[i].begins)
+            continue;
+        const RibbonPoint *before = i > 1 && !point[i - 1].begins ? &point[i - 2] : NULL;
+        const RibbonPoint *after = i + 1 < points && !point[i + 1].begins ? &point[i + 1] : NULL;
+        good = lay_piece(ribbon, before, &point[i - 1], &point[i], after, filling);
+    }
+    return good;
+}
+
+void ribbon_end(Ribbon *ribbon, int side)
 {
     double low[2] = {side, side}, high[2] = {0, 0};
     for (int i = 0; i < ribbon->count; i++)
@@ -155,28 +223,9 @@ static void find_box(Ribbon *ribbon, int side)
     }
 }
 
-bool ribbon_lay(Ribbon *ribbon, const CArm *c_arm, int side, int count, const Vec3 *position, const double *radius, const double *attenuation)
-{
-    ribbon->count = 0;
-    RibbonPoint *point = malloc(((size_t)count * PARTS + 1) * sizeof *point);
-    if (!point)
-        return false;
-    int points = project_points(point, c_arm, side, count, position, radius, attenuation);
-    bool good = true;
-    for (int i = 1; good && i < points; i++) {
-        if (point[i].begins)
-            continue;
-        const RibbonPoint *before = i > 1 && !point[i - 1].begins ? &point[i - 2] : NULL;
-        const RibbonPoint *after = i + 1 < points && !point[i + 1].begins ? &point[i + 1] : NULL;
-        good = lay_piece(ribbon, before, &point[i - 1], &point[i], after);
-    }
-    find_box(ribbon, side);
-    free(point);
-    return good;
-}
-
 void ribbon_free(Ribbon *ribbon)
 {
     free(ribbon->vertex);
+    free(ribbon->point);
     *ribbon = (Ribbon){0};
 }

@@ -1,24 +1,48 @@
-// The tool in fluoroscopy: one ribbon along its projection, as wide as its shadow, that carries how thick it is along the rays.
+// The tools in fluoroscopy: one ribbon along each one's projection, as wide as its shadow, that carries how thick wall and lumen are along the rays.
 #ifndef SELDINGER_RENDER_FLUOROSCOPE_TOOL_H
 #define SELDINGER_RENDER_FLUOROSCOPE_TOOL_H
 
 #include "render/c_arm.h"
+#include "render/tool_look.h"
 
 typedef struct RibbonVertex {
     float place[2];          // [pixel] of the square, y up
     float across;            // [pixel] from the tool's axis
-    float radius;            // [pixel] of the shadow
-    float density;           // attenuation for each pixel of chord: a ray through a chord of k pixels is taken away by exp(-density k)
+    float radius, lumen;     // [pixel] of the shadow's two circles
+    float density[2];        // a ray through k pixels of the outer circle and m of the inner one is taken away by exp(-density[0] k - density[1] m)
 } RibbonVertex;
 
-typedef struct Ribbon {
+typedef struct RibbonPlace { // where the ribbon may have a point
+    int node;                // after this one of the tool's nodes …
+    double u;                // … by this part of the way to the next
+    bool is_border;          // another stretch begins
+    double radius, lumen;    // [mm] of what lies before it …
+    double attenuation;      // [1/mm] … and of its wall
+} RibbonPlace;
+
+typedef struct RibbonPath {  // of one tool; zeroed: none
+    int node_count;
+    int count;
+    RibbonPlace *place;
+} RibbonPath;
+
+typedef struct Ribbon {      // zeroed: empty
     int count, capacity;     // vertices; triangles are (0,1,2), (3,4,5), …
     RibbonVertex *vertex;
     int low[2], high[2];     // [pixel] box of all within the square; high exclusive, nothing where high <= low
+    int point_capacity;      // scratch
+    struct RibbonPoint *point;
 } Ribbon;
 
-// `side` [pixel] of the square. Points nearer to the source than C_ARM_NEAREST_MM and what is not a number are left out. False where memory lacks.
-bool ribbon_lay(Ribbon *ribbon, const CArm *c_arm, int side, int count, const Vec3 *position, const double *radius, const double *attenuation);
+// `s` (node_count) [mm] of the nodes. False where memory lacks.
+bool ribbon_path_make(RibbonPath *path, int node_count, const double *s, int stretch_count, const TubeStretch *stretch);
+void ribbon_path_free(RibbonPath *path);
+
+void ribbon_begin(Ribbon *ribbon);
+// `side` [pixel] of the square; `filling` [1/mm]: attenuation of what fills the lumen. Points nearer to the source than C_ARM_NEAREST_MM and what is not a
+// number are left out. False where memory lacks.
+bool ribbon_add(Ribbon *ribbon, const CArm *c_arm, int side, const RibbonPath *path, const Vec3 *position, double filling);
+void ribbon_end(Ribbon *ribbon, int side);
 void ribbon_free(Ribbon *ribbon);
 
 #endif

@@ -14,6 +14,7 @@ enum { FINE_TRIANGLES = 90000, COARSE_TRIANGLES = 25000 };
 // A view beside the main one is kept as a picture and drawn anew in every second frame, the two in turn: nobody looks at both at once.
 
 struct Views {
+    ToolLooks tools;
     Fluoroscope *fluoroscope;
     VesselScene *scene;
     Angioscope *angioscope;
@@ -21,34 +22,19 @@ struct Views {
     long frames;
 };
 
-static Fluoroscope *create_fluoroscope(const ViewsOptions *options, const TriangleMesh *mesh, char *message, size_t capacity)
+static Fluoroscope *create_fluoroscope(const Views *views, const ViewsOptions *options, const TriangleMesh *mesh, char *message, size_t capacity)
 {
-    int nodes = options->pose->node_count;
-    double *radius = calloc((size_t)nodes, sizeof *radius), *attenuation = calloc((size_t)nodes, sizeof *attenuation);
     FluoroscopeOptions fluoroscope = fluoroscope_default_options();
-    Fluoroscope *made = NULL;
-    for (int i = 0; radius && attenuation && i < nodes; i++) {
-        radius[i] = options->pose->node[i].radius;
-        attenuation[i] = scene_attenuation(options->scene, options->pose->node[i].s);
-    }
-    if (radius && attenuation) {
-        fluoroscope.vessel = mesh;
-        fluoroscope.tree = options->tree;
-        fluoroscope.node_count = nodes;
-        fluoroscope.radius = radius;
-        fluoroscope.attenuation = attenuation;
-        fluoroscope.anatomy_value = options->anatomy_value;
-        memcpy(fluoroscope.anatomy_size, options->anatomy_size, sizeof fluoroscope.anatomy_size);
-        memcpy(fluoroscope.anatomy_axis, options->anatomy_axis, sizeof fluoroscope.anatomy_axis);
-        fluoroscope.anatomy_origin = options->anatomy_origin;
-        fluoroscope.patient = options->patient;
-        made = fluoroscope_create(&fluoroscope, message, capacity);
-    } else {
-        message_fail(message, capacity, "no memory for the views");
-    }
-    free(radius);
-    free(attenuation);
-    return made;
+    fluoroscope.vessel = mesh;
+    fluoroscope.tree = options->tree;
+    fluoroscope.tools = &views->tools;
+    fluoroscope.pose = options->pose;
+    fluoroscope.anatomy_value = options->anatomy_value;
+    memcpy(fluoroscope.anatomy_size, options->anatomy_size, sizeof fluoroscope.anatomy_size);
+    memcpy(fluoroscope.anatomy_axis, options->anatomy_axis, sizeof fluoroscope.anatomy_axis);
+    fluoroscope.anatomy_origin = options->anatomy_origin;
+    fluoroscope.patient = options->patient;
+    return fluoroscope_create(&fluoroscope, message, capacity);
 }
 
 Views *views_create(const ViewsOptions *options, char *message, size_t capacity)
@@ -66,9 +52,9 @@ Views *views_create(const ViewsOptions *options, char *message, size_t capacity)
         shown.frame_count = options->pose->node_count;
         shown.frame = options->pose->position;
     }
-    bool good = views && (views->scene = vessel_scene_create(&shown, message, capacity)) &&
+    bool good = views && (tool_looks_make(&views->tools, scene) || message_fail(message, capacity, "no memory for the views")) && (views->scene = vessel_scene_create(&shown, message, capacity)) &&
                 (views->angioscope = angioscope_create(mesh, options->vessel, options->tree, message, capacity)) &&
-                (views->fluoroscope = create_fluoroscope(options, mesh, message, capacity));
+                (views->fluoroscope = create_fluoroscope(views, options, mesh, message, capacity));
     triangle_mesh_free(fine);
     triangle_mesh_free(coarse);
     if (good)
@@ -84,6 +70,7 @@ void views_destroy(Views *views)
     fluoroscope_destroy(views->fluoroscope);
     vessel_scene_destroy(views->scene);
     angioscope_destroy(views->angioscope);
+    tool_looks_free(&views->tools);
     for (int i = 0; i < VIEW_COUNT; i++)
         gl_canvas_destroy(&views->inset[i]);
     free(views);

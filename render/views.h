@@ -15,7 +15,7 @@ typedef struct ViewsOptions {        // borrowed during create, but for scene, v
     const Vessel *vessel;            // NULL: none
     const VesselTree *tree;          // NULL: the vessel is no tree
     const TriangleMesh *mesh;        // the wall, NULL: none
-    const Pose *pose;                // any of the tool: nodes, radii, arc lengths
+    const Pose *pose;                // any of the scene's tools: how many nodes they have, at which arc lengths
     int anatomy_size[3];             // a volume behind the vessel, see FluoroscopeOptions; value NULL: none
     Vec3 anatomy_origin, anatomy_axis[3];
     const float *anatomy_value;

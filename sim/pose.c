@@ -75,11 +75,10 @@ void pose_copy(Pose *to, const Pose *from)
     }
 }
 
-// Behind the mouth lies what of the first tool is not inserted; s grows along the centreline, also from a tool to the one within. Without a sheath all is free.
-static void find_first_free(Pose *pose, bool has_sheath)
+// Behind the mouth lies what of the first tool, `length` [mm] long in all, is not inserted; s grows along the centreline, also from a tool to the one within. Without a sheath all is free.
+static void find_first_free(Pose *pose, bool has_sheath, double length)
 {
-    const PoseTool *first = &pose->tool[0];
-    double hidden = has_sheath ? first->node[first->node_count - 1].s - pose->inserted_mm : 0;
+    double hidden = has_sheath ? length - pose->inserted_mm : 0;
     pose->first_free_node = 0;
     while (pose->first_free_node < pose->node_count - 1 && pose->node[pose->first_free_node].s < hidden)
         pose->first_free_node++;
@@ -109,7 +108,36 @@ void pose_take(Pose *pose, Simulator *simulator, const ToolCommands *commands, c
         tool->torque_n_mm = pose->report.torque[k];
         stepper_tool_nodes(stepper, k, tool->node);
     }
-    find_first_free(pose, simulator_scene(simulator)->wire.has_sheath);
+    find_first_free(pose, simulator_scene(simulator)->wire.has_sheath, pose->tool[0].node[pose->tool[0].node_count - 1].s);
+}
+
+void pose_fill_single_tool(Pose *pose)
+{
+    PoseTool *tool = &pose->tool[0];
+    tool->command = pose->command;
+    tool->inserted_mm = pose->inserted_mm;
+    tool->push_n = pose->report.proximal_force;
+    tool->torque_n_mm = pose->report.proximal_torque;
+    for (int j = 0; j < pose->node_count; j++)
+        tool->node[j] = (ToolNode){.s = pose->node[j].s, .position = pose->position[j], .orientation = pose->quaternion[j], .radius = pose->node[j].radius,
+                                   .carrier = j < pose->first_free_node ? -1 : 0};
+}
+
+double pose_tool_end(const Pose *pose, int tool)
+{
+    const PoseTool *t = &pose->tool[tool];
+    Vec3 tip = t->node[t->node_count - 1].position;
+    double least = HUGE_VAL, end = pose->node_count - 1;
+    for (int i = pose->node_count - 1; i > 0; i--) {
+        Vec3 a = pose->position[i - 1], d = vec3_sub(pose->position[i], a);
+        double length2 = vec3_norm2(d), u = length2 > 0 ? fmin(fmax(vec3_dot(vec3_sub(tip, a), d) / length2, 0), 1) : 1;
+        double away2 = vec3_norm2(vec3_sub(tip, vec3_add_scaled(a, u, d)));
+        if (away2 < least) {
+            least = away2;
+            end = i - 1 + u;
+        }
+    }
+    return end;
 }
 
 void pose_figures_from_run(Pose *pose, const RecordedRun *run, int64_t step)
@@ -157,11 +185,8 @@ void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64
         if (pose->tool_count > 1)
             own_nodes_from_run(&pose->tool[k], &run->tool[k], frame);
     }
-    // a single tool's own nodes are those of the centreline
-    PoseTool *single = pose->tool_count == 1 ? &pose->tool[0] : NULL;
-    for (int j = 0; single && j < pose->node_count; j++)
-        single->node[j] = (ToolNode){.s = at.s[j], .position = pose->position[j], .orientation = pose->quaternion[j], .radius = at.radius[j]};
-    find_first_free(pose, scene->wire.has_sheath);
-    for (int j = 0; single && j < pose->first_free_node; j++)
-        single->node[j].carrier = -1;
+    const RecordedTool *first = &run->tool[0];
+    find_first_free(pose, scene->wire.has_sheath, pose->tool_count > 1 ? first->s[first->node_count - 1] : at.s[at.node_count - 1]);
+    if (pose->tool_count == 1)
+        pose_fill_single_tool(pose);
 }

@@ -40,6 +40,10 @@ void pose_free(Pose *pose);
 void pose_copy(Pose *to, const Pose *from);   // made for the same tools
 // Detects afresh (about 20 us): every 10 ms, not every step. Changes nothing that a later step depends on. Allocates nothing.
 void pose_take(Pose *pose, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
+// Its one tool's nodes from the shared centreline, which it is.
+void pose_fill_single_tool(Pose *pose);
+// Where a tool's tip lies on the shared centreline: a node's index and the part of the way to the next.
+double pose_tool_end(const Pose *pose, int tool);
 Pose *pose_create_for_run(const RecordedRun *run);
 // Frame `frame` of a recording of `scene`; what it does not hold (contacts, iterations) is 0.
 void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64_t frame);

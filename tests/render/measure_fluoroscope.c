@@ -76,7 +76,7 @@ static double measure(XrayRoom *s, Kind kind, int width, int height, float *cont
         for (int n = 0; n < NODES; n++)
             contrast[n] = kind == FLOWING || kind == DSA_FLOWING ? (float)exp(-0.0002 * (n - 8 * i) * (n - 8 * i)) : 1;
         for (int k = 0; k < WIRE; k++)
-            ((Pose *)s->frame.pose)->position[k] = coil_at((k + 0.05 * i) / (WIRE + 5.0), NULL);
+            s->frame.pose->tool[0].node[k].position = coil_at((k + 0.05 * i) / (WIRE + 5.0), NULL);
         double from = cpu_ms();
         fluoroscope_draw(s->view, &s->frame, (ViewPort){canvas.framebuffer, 0, 0, width, height});
         glFinish();
@@ -94,17 +94,15 @@ int main(void)
     TriangleMesh mesh = coil_mesh();
     VesselTree *tree = coil_tree();
     Pose *pose = pose_create(WIRE);
-    double radius[WIRE], attenuation[WIRE];
-    for (int i = 0; i < WIRE; i++) {
-        radius[i] = 0.18;
-        attenuation[i] = 0.55;
-    }
+    TubeStretch stretch = {.end = WIRE, .radius = 0.18, .attenuation = 0.55};
+    ToolLooks looks = {.count = 1, .tool = {{.stretch_count = 1, .stretch = &stretch}}};
+    for (int i = 0; i < WIRE; i++)
+        pose->tool[0].node[i].s = i;
     FluoroscopeOptions options = fluoroscope_default_options();
     options.vessel = &mesh;
     options.tree = tree;
-    options.node_count = WIRE;
-    options.radius = radius;
-    options.attenuation = attenuation;
+    options.tools = &looks;
+    options.pose = pose;
     double from = cpu_ms();
     XrayRoom *s = room_open(&options, 64);
     if (!s)

@@ -32,32 +32,25 @@ static FluoroscopeOptions quiet_room(const TriangleMesh *vessel)
 // A straight tool of `count` nodes from a to b.
 typedef struct Tool {
     Pose *pose;
-    double *radius, *attenuation;
+    TubeStretch stretch;
+    ToolLooks looks;
 } Tool;
 static Tool tool_make(int count, Vec3 a, Vec3 b, double radius, double attenuation)
 {
-    Tool tool = {pose_create(count), malloc((size_t)count * sizeof(double)), malloc((size_t)count * sizeof(double))};
-    for (int i = 0; i < count; i++) {
-        tool.pose->position[i] = vec3_mix(a, b, i / (count - 1.0));
-        tool.radius[i] = radius;
-        tool.attenuation[i] = attenuation;
-    }
+    Tool tool = {.pose = pose_create(count), .stretch = {.end = vec3_distance(a, b), .radius = radius, .attenuation = attenuation}, .looks = {.count = 1}};
+    for (int i = 0; i < count; i++)
+        tool.pose->tool[0].node[i] = (ToolNode){.s = vec3_distance(a, b) * i / (count - 1.0), .position = vec3_mix(a, b, i / (count - 1.0)), .radius = radius};
     return tool;
 }
 
-static void tool_give(const Tool *tool, FluoroscopeOptions *options)
+static void tool_give(Tool *tool, FluoroscopeOptions *options)
 {
-    options->node_count = tool->pose->node_count;
-    options->radius = tool->radius;
-    options->attenuation = tool->attenuation;
+    tool->looks.tool[0] = (ToolLook){.stretch_count = 1, .stretch = &tool->stretch};
+    options->tools = &tool->looks;
+    options->pose = tool->pose;
 }
 
-static void tool_free(Tool *tool)
-{
-    pose_free(tool->pose);
-    free(tool->radius);
-    free(tool->attenuation);
-}
+static void tool_free(Tool *tool) { pose_free(tool->pose); }
 
 // A ball of contrast of radius 6 in the middle, a wire from a to b.
 typedef struct Patient {
@@ -244,7 +237,7 @@ static void dsa_shows_the_vessel_alone(void **state)
     // the mask stays while the tool moves: it is white where it was, dark where it is
     s->frame.contrast = NULL;
     for (int i = 0; i < 31; i++)
-        patient.wire.pose->position[i].z -= 5;
+        patient.wire.pose->tool[0].node[i].position.z -= 5;
     s->frame.pulse++;
     room_draw(s);
     int was = 160 + 15 * 4, is = 160 + 10 * 4;
@@ -343,7 +336,7 @@ static void without_pedal_the_last_image_holds(void **state)
     s->frame.pulse += 5;
     s->frame.contrast = &full;
     s->frame.xray.lao_deg = 30;
-    patient.wire.pose->position[30].z += 10;
+    patient.wire.pose->tool[0].node[30].position.z += 10;
     room_draw(s);
     assert_true(fluoroscope_state(s->view).is_held);
     assert_near(fluoroscope_state(s->view).shown.lao_deg, 0, 0);
@@ -480,7 +473,7 @@ static void kept_layers_give_the_same_as_new_ones(void **state)
             if (moves && random_in(&seed, 0, 1) < 0.3)
                 s->frame.xray.collimator[(int)random_in(&seed, 0, 3.99)] = (float)random_in(&seed, 0, 0.6);
             if (random_in(&seed, 0, 1) < 0.5)
-                patient.wire.pose->position[(int)random_in(&seed, 0, 30.99)].z += 1;
+                patient.wire.pose->tool[0].node[(int)random_in(&seed, 0, 30.99)].position.z += 1;
             s->frame.pulse++;
             room_draw(s);
         }
@@ -546,8 +539,8 @@ static void odd_frames_are_survived(void **state)
     }
     const float lost = NAN;
     s->frame.contrast = &lost;
-    patient.wire.pose->position[7] = vec3(NAN, 0, 0);
-    patient.wire.pose->position[15] = vec3(0, 5000, 0);   // behind the source
+    patient.wire.pose->tool[0].node[7].position = vec3(NAN, 0, 0);
+    patient.wire.pose->tool[0].node[15].position = vec3(0, 5000, 0);   // behind the source
     s->frame.xray.field_mm = INFINITY;
     s->frame.xray.mode = 77;
     s->frame.xray.collimator[0] = NAN;

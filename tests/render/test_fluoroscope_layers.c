@@ -247,23 +247,40 @@ static CArm close_up(void)
     return c_arm_place(&xray, &axes);
 }
 
-static float *draw_ribbon(XrayRoom *s, Layer *layer, const CArm *c_arm, int count, const Vec3 *position, double radius, double attenuation)
+static RibbonPath path_of(int count, const Vec3 *position, int stretch_count, const TubeStretch *stretch)
 {
-    double *r = malloc((size_t)count * sizeof *r), *a = malloc((size_t)count * sizeof *a);
+    double *s = calloc((size_t)count, sizeof *s);
+    RibbonPath path;
+    for (int i = 1; i < count; i++)
+        s[i] = s[i - 1] + vec3_distance(position[i], position[i - 1]);
+    assert_true(ribbon_path_make(&path, count, s, stretch_count, stretch));
+    free(s);
+    return path;
+}
+
+// The attenuation of tools, of `count` nodes and one stretch each.
+static float *draw_ribbons(XrayRoom *s, Layer *layer, const CArm *c_arm, int tools, int count, const Vec3 *position, const TubeStretch *stretch, double filling)
+{
     Ribbon ribbon = {0};
-    for (int i = 0; i < count; i++) {
-        r[i] = radius;
-        a[i] = attenuation;
-    }
     assert_true(layer_fit(layer, s->side, LAYER_R32F));
-    assert_true(ribbon_lay(&ribbon, c_arm, s->side, count, position, r, a));
+    ribbon_begin(&ribbon);
+    for (int k = 0; k < tools; k++) {
+        RibbonPath path = path_of(count, position + k * count, 1, &stretch[k]);
+        assert_true(ribbon_add(&ribbon, c_arm, s->side, &path, position + k * count, filling));
+        ribbon_path_free(&path);
+    }
+    ribbon_end(&ribbon, s->side);
     LayerTone tone = {.quanta = 0};
     layer_begin(layer);
-    layers_draw_tool(&s->view->programs, &ribbon, &tone, true, layer);
+    layers_draw_tools(&s->view->programs, &ribbon, &tone, true, layer);
     ribbon_free(&ribbon);
-    free(r);
-    free(a);
     return layer_read(layer);
+}
+
+static float *draw_ribbon(XrayRoom *s, Layer *layer, const CArm *c_arm, int count, const Vec3 *position, double radius, double attenuation)
+{
+    const TubeStretch wire = {.radius = radius, .attenuation = attenuation};
+    return draw_ribbons(s, layer, c_arm, 1, count, position, &wire, 0);
 }
 
 static void the_ribbon_has_the_chord_of_a_cylinder(void **state)
@@ -286,6 +303,130 @@ static void the_ribbon_has_the_chord_of_a_cylinder(void **state)
             assert_near(drawn[y * s->side + 200], expected, 1e-3 * peak + 1e-6);
         }
         free(drawn);
+    }
+    layer_destroy(&layer);
+    room_close(s);
+}
+
+// A catheter of R 1.0 and lumen 0.6 mm with a wire of 0.3 mm in it, ten pixels a millimetre, seen from the side: two dark lines, a fainter lumen, the wire
+// dark in it; each pixel is the exact integral, whatever the tools' sizes in pixels, and what fills the lumen adds up.
+static void a_tube_is_its_wall_s_chord_and_tools_add_up(void **state)
+{
+    (void)state;
+    XrayRoom *s = room_open(NULL, 400);
+    if (!s)
+        skip();
+    Layer layer = {0};
+    CArm c_arm = close_up();
+    const double pixel_mm = 0.1;
+    for (int k = 0; k < 10; k++) {
+        double size = 0.06 * pow(1.45, k), off = 0.43 * k - floor(0.43 * k);     // outer radius 0.6 to 17 pixels
+        const TubeStretch tube[2] = {{.radius = size, .lumen = 0.6 * size, .attenuation = 0.4}, {.radius = 0.3 * size, .attenuation = 0.9}};
+        Vec3 position[42];
+        for (int i = 0; i < 42; i++)
+            position[i] = vec3((i % 21 - 10) * 2.5, 0, off * pixel_mm);
+        for (int kind = 0; kind < 3; kind++) {       // tube, tube filled, tube and wire
+            double filling = kind == 1 ? 0.3 : 0;
+            float *drawn = draw_ribbons(s, &layer, &c_arm, kind == 2 ? 2 : 1, 21, position, tube, filling);
+            for (int y = 170; y < 230; y++) {
+                double x = y + 0.5 - 200 - off, wall = exact_chord(x, size / pixel_mm), lumen = exact_chord(x, 0.6 * size / pixel_mm);
+                double expected = (0.4 * (wall - lumen) + filling * lumen + (kind == 2 ? 0.9 * exact_chord(x, 0.3 * size / pixel_mm) : 0)) * pixel_mm;
+                assert_near(drawn[y * s->side + 200], expected, 1e-3 * 2 * size * 0.9 + 1e-6);
+            }
+            if (k == 9 && kind < 2) {
+                const float *axis = drawn + 200 * s->side + 200, *wall_line = axis + 11 * s->side;
+                assert_true(kind == 1 || *wall_line > 1.5F * *axis);
+            }
+            free(drawn);
+        }
+    }
+    layer_destroy(&layer);
+    room_close(s);
+}
+
+// Against the chord through a pixel's middle the error, which is the pixel's and the detector's width, falls with the pixel's square.
+static void the_tube_converges_with_the_pixels(void **state)
+{
+    (void)state;
+    const int side[3] = {200, 400, 800};
+    double error[3];
+    for (int k = 0; k < 3; k++) {
+        XrayRoom *s = room_open(NULL, side[k]);
+        if (!s)
+            skip();
+        Layer layer = {0};
+        CArm c_arm = close_up();
+        const TubeStretch tube = {.radius = 2, .lumen = 1.25, .attenuation = 0.4};
+        Vec3 position[21];
+        for (int i = 0; i < 21; i++)
+            position[i] = vec3((i - 10) * 2.5, 0, 0);
+        float *drawn = draw_ribbons(s, &layer, &c_arm, 1, 21, position, &tube, 0);
+        double square = 0, count = 0;
+        for (int y = side[k] / 2; y < side[k]; y++) {
+            double z = ((y + 0.5) / side[k] - 0.5) * 40;
+            if (z > 0.85)                // at the lumen's border the profile has no slope
+                break;
+            double e = (double)drawn[y * side[k] + side[k] / 2] - 0.4 * 2 * (sqrt(4 - z * z) - sqrt(1.25 * 1.25 - z * z));
+            square += e * e;
+            count++;
+        }
+        error[k] = sqrt(square / count);
+        free(drawn);
+        layer_destroy(&layer);
+        room_close(s);
+    }
+    print_message("tube against its chord: %.2e, %.2e, %.2e, order %.2f and %.2f\n", error[0], error[1], error[2], log2(error[0] / error[1]), log2(error[1] / error[2]));
+    assert_near(log2(error[0] / error[1]), 2, 0.2);
+    assert_near(log2(error[1] / error[2]), 2, 0.2);
+}
+
+// A band of 1 mm on a tool with nodes every 2.5 mm, at any place between nodes, is as long and as dark as it is; seen from the side and at 50 degrees.
+static void marker_bands_are_as_long_as_they_are(void **state)
+{
+    (void)state;
+    XrayRoom *s = room_open(NULL, 400);
+    if (!s)
+        skip();
+    Layer layer = {0};
+    CArm c_arm = close_up();
+    const double radius = 0.4, lumen = 0.25, wall = 0.3, band = 4;
+    for (int k = 0; k < 12; k++) {
+        double slope = k % 2 * 50 * PI / 180, begin = 20 + 0.31 * k, sum = 0, first = HUGE_VAL, last = 0;
+        Vec3 position[21], along = vec3(cos(slope), sin(slope), 0);
+        for (int i = 0; i < 21; i++)
+            position[i] = vec3_scale(along, (i - 10) * 2.5);
+        float *drawn[2];
+        for (int with = 0; with < 2; with++) {
+            const TubeStretch tube[3] = {{begin, radius, lumen, wall}, {begin + 1, radius, lumen, with ? band : wall}, {50, radius, lumen, wall}};
+            RibbonPath path = path_of(21, position, 3, tube);
+            Ribbon ribbon = {0};
+            assert_true(layer_fit(&layer, s->side, LAYER_R32F));
+            ribbon_begin(&ribbon);
+            assert_true(ribbon_add(&ribbon, &c_arm, s->side, &path, position, 0));
+            ribbon_end(&ribbon, s->side);
+            LayerTone tone = {.quanta = 0};
+            layer_begin(&layer);
+            layers_draw_tools(&s->view->programs, &ribbon, &tone, true, &layer);
+            drawn[with] = layer_read(&layer);
+            ribbon_free(&ribbon);
+            ribbon_path_free(&path);
+        }
+        for (int y = 0; y < s->side; y++)
+            for (int x = 0; x < s->side; x++) {
+                double more = (double)(drawn[1][y * s->side + x] - drawn[0][y * s->side + x]);
+                sum += more * 0.1 * 0.1;
+                if (y == 200 && more > 0.1 * band) {
+                    first = fmin(first, x);
+                    last = fmax(last, x + 1);
+                }
+            }
+        // seen larger by its distance
+        double depth = c_arm_project(&c_arm, vec3_scale(along, begin + 0.5 - 25)).z, larger = C_ARM_SOURCE_MM / (C_ARM_SOURCE_MM + depth);
+        assert_near(sum / (PI * (radius * radius - lumen * lumen) * larger * larger * (band - wall)), 1, 0.07);   // whole pixels of 10 or 6.4
+        assert_near(last - first, 10 * larger * cos(slope), 1.01);
+        assert_near((first + last) / 2, 200 + 10 * larger * cos(slope) * (begin + 0.5 - 25), 0.6);
+        free(drawn[0]);
+        free(drawn[1]);
     }
     layer_destroy(&layer);
     room_close(s);
@@ -438,6 +579,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(thickness_is_that_of_a_ray_caster),      cmocka_unit_test(finer_meshes_come_closer_to_the_sphere),
         cmocka_unit_test(contrast_follows_the_nodes),             cmocka_unit_test(the_ribbon_has_the_chord_of_a_cylinder),
+        cmocka_unit_test(a_tube_is_its_wall_s_chord_and_tools_add_up),
+        cmocka_unit_test(the_tube_converges_with_the_pixels),
+        cmocka_unit_test(marker_bands_are_as_long_as_they_are),
         cmocka_unit_test(shadows_keep_what_the_tool_takes_away),  cmocka_unit_test(bodies_and_volumes_are_integrated),
         cmocka_unit_test(the_lumen_is_taken_out_of_the_volume),
     };

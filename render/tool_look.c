@@ -1,0 +1,91 @@
+#include "render/tool_look.h"
+
+#include <stdlib.h>
+
+// After Okabe and Ito: blue, sky blue, bluish green, and grey for wires, lighter on a dark ground and darker on paper; then their purple, for a kind that comes
+// again. Orange and yellow are left out: they are those of wall force.
+enum { COLORS = 7 };
+static const Color palette[2][COLORS] = {
+    {{70, 140, 215, 255}, {86, 190, 240, 255}, {60, 190, 150, 255}, {196, 203, 214, 255}, {214, 140, 190, 255}, {170, 150, 230, 255}, {130, 165, 165, 255}},
+    {{0, 90, 160, 255}, {60, 150, 200, 255}, {0, 140, 105, 255}, {90, 94, 100, 255}, {185, 95, 145, 255}, {120, 90, 190, 255}, {70, 105, 105, 255}}};
+_Static_assert((int)COLORS >= (int)TOOL_KIND_COUNT + TOOLS_MOST - 1, "four tools of one kind have colours of their own");
+
+void tool_colors(int count, const ToolKind *kind, bool on_paper, Color *color)
+{
+    bool used[COLORS] = {false};
+    int next = TOOL_KIND_COUNT;
+    for (int k = 0; k < count; k++) {
+        int choice = used[kind[k]] ? next++ : (int)kind[k];
+        used[choice] = true;
+        color[k] = palette[on_paper][choice];
+    }
+}
+
+static bool is_same_tube(const TubeStretch *a, const TubeStretch *b)
+{
+    return !(a->radius < b->radius || a->radius > b->radius || a->lumen < b->lumen || a->lumen > b->lumen || a->attenuation < b->attenuation ||
+             a->attenuation > b->attenuation);
+}
+
+// Sections that look the same, as those of a rest shape do, are one.
+static void add_stretch(ToolLook *look, TubeStretch stretch)
+{
+    TubeStretch *last = look->stretch_count > 0 ? &look->stretch[look->stretch_count - 1] : NULL;
+    if (last && is_same_tube(last, &stretch))
+        last->end = stretch.end;
+    else
+        look->stretch[look->stretch_count++] = stretch;
+}
+
+static bool make_look(ToolLook *look, const Scene *scene, int k)
+{
+    const WireOptions wire = scene_tool_wire(scene, k);
+    double marker = wire_length(&wire) - (k == 0 ? scene->marker_length : scene->tool[k].marker_length), begin = 0;
+    look->name = scene->tool[k].name;
+    look->stretch = malloc(((size_t)wire.section_count + 1) * sizeof *look->stretch);
+    for (int i = 0; look->stretch && i < wire.section_count; i++) {
+        double end = begin + wire.section[i].length;
+        TubeStretch stretch = {.radius = wire.section[i].diameter / 2, .lumen = wire.section[i].inner_diameter / 2};
+        const double cut[3] = {begin, fmin(fmax(marker, begin), end), end};
+        for (int part = 0; part < 2; part++) {
+            if (!(cut[part + 1] > cut[part]))
+                continue;
+            stretch.end = cut[part + 1];
+            stretch.attenuation = scene_tool_attenuation(scene, k, (cut[part] + cut[part + 1]) / 2);
+            add_stretch(look, stretch);
+        }
+        begin = end;
+    }
+    return look->stretch != NULL;
+}
+
+bool tool_looks_make(ToolLooks *looks, const Scene *scene)
+{
+    ToolKind kind[TOOLS_MOST];
+    Color color[TOOLS_MOST];
+    bool good = true;
+    *looks = (ToolLooks){.count = scene->tool_count};
+    for (int k = 0; k < looks->count; k++)
+        kind[k] = scene->tool[k].kind;
+    tool_colors(looks->count, kind, false, color);
+    for (int k = 0; good && k < looks->count; k++) {
+        looks->tool[k].color = color[k];
+        good = make_look(&looks->tool[k], scene, k);
+    }
+    return good;
+}
+
+void tool_looks_free(ToolLooks *looks)
+{
+    for (int k = 0; k < looks->count; k++)
+        free(looks->tool[k].stretch);
+    *looks = (ToolLooks){0};
+}
+
+const TubeStretch *tool_look_at(const ToolLook *look, double s)
+{
+    int i = 0;
+    while (i + 1 < look->stretch_count && s > look->stretch[i].end)
+        i++;
+    return &look->stretch[i];
+}

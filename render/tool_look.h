@@ -1,0 +1,35 @@
+// What the views know of a scene's tools besides their pose: names, colours, and where along each its width, lumen or attenuation changes.
+#ifndef SELDINGER_RENDER_TOOL_LOOK_H
+#define SELDINGER_RENDER_TOOL_LOOK_H
+
+#include "render/color_map.h"
+#include "sim/scene.h"
+
+typedef struct TubeStretch {     // of a tool, from the border before it to `end`
+    double end;                  // [mm] from the proximal end; the last one counts to the tip wherever it is
+    double radius, lumen;        // [mm] of its outer surface, > 0; of its inner one, 0 where it is solid
+    double attenuation;          // [1/mm] of the wall, >= 0
+} TubeStretch;
+
+typedef struct ToolLook {
+    const char *name;            // borrowed
+    Color color;
+    int stretch_count;           // >= 1
+    TubeStretch *stretch;
+} ToolLook;
+
+typedef struct ToolLooks {       // zeroed: none
+    int count;
+    ToolLook tool[TOOLS_MOST];   // outermost first
+} ToolLooks;
+
+// Of `scene`, which must outlive them. False where memory lacks; free them all the same.
+bool tool_looks_make(ToolLooks *looks, const Scene *scene);
+void tool_looks_free(ToolLooks *looks);
+// Where the arc length `s` lies; at a border what lies before it.
+const TubeStretch *tool_look_at(const ToolLook *look, double s);
+// Colours for tools of these kinds, told apart by the colour-blind too, on a dark ground or on paper: of each kind its own, of a kind that comes again one that
+// no other tool has.
+void tool_colors(int count, const ToolKind *kind, bool on_paper, Color *color);
+
+#endif
