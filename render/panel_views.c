@@ -125,7 +125,7 @@ static void draw_force_legend(Panel *panel, GuiRect at, double full_scale_n)
     char text[32];
     for (int i = 0; i < STEPS; i++) {
         float top = bottom - height * (float)(i + 1) / STEPS;
-        gui_draw_fill(gui, (GuiRect){x, top, width, height / STEPS + 1}, vessel_scene_force_color(full_scale_n * (i + 0.5) / STEPS, full_scale_n));
+        gui_draw_fill(gui, (GuiRect){x, top, width, height / STEPS + 1}, vessel_scene_force_color(full_scale_n * (i + 0.5) / STEPS, full_scale_n, gui_colors.dim));
     }
     snprintf(text, sizeof text, "%g N", full_scale_n);
     label_right(panel, x - pad / 2, bottom - height, GUI_SMALL, gui_colors.text, text);

@@ -9,10 +9,20 @@
 #include <stdlib.h>
 #include <string.h>
 
+typedef struct LinePoint {     // of the line that all tools lie on
+    int node;                  // after this one …
+    double part;               // … by this part of the way to the next
+    double at;                 // both together
+    double length;             // [mm] from the line's first point
+    double half;               // [pixel] of the tool that was added last …
+    int inside;                // … and how many there are further in
+} LinePoint;
+
 struct VesselScene {
     VesselLayers *layers;
     Strokes strokes;
     ModelWires *models;
+    const ToolLooks *tools;
     int target_count;
     const SceneTarget *target;
     bool has_entry;
@@ -29,24 +39,28 @@ struct VesselScene {
     bool is_following, is_gliding;
     Vec3 anchor;               // where the followed focus is
     bool has_tip;
-    Vec3 tip;
+    Vec3 tip;                  // the most distal one
+    int tip_count;
+    Vec3 tool_tip[TOOLS_MOST];
     long layer_draws;
-    // scratch for the tool's smoothed line
+    // scratch for the tools' smoothed line
     int capacity;
+    LinePoint *line;
     Vec3 *point;
     double *half;
     Color *color;
 };
 
 static const Color TARGET_COLOR = {102, 190, 255, 255}, ARROW_COLOR = {120, 235, 200, 255}, SHEATH_COLOR = {150, 156, 166, 255},
-                   NO_CONTACT_COLOR = {196, 203, 214, 255};
+                   TOOL_COLOR = {196, 203, 214, 255},
+                   LUMEN_COLOR = {16, 18, 24, 255};
 static const double sheath_shown_mm = 12;
 
-Color vessel_scene_force_color(double force_n, double full_scale_n)
+Color vessel_scene_force_color(double force_n, double full_scale_n, Color without)
 {
     const double least = 0.34;   // of the map: what lies below is too dark on a dark ground
     if (!(force_n > 0) || !(full_scale_n > 0))
-        return NO_CONTACT_COLOR;
+        return without;
     return color_sequential(least + (1 - least) * fmin(force_n / full_scale_n, 1));
 }
 
@@ -95,6 +109,7 @@ VesselScene *vessel_scene_create(const VesselSceneOptions *options, char *messag
         message_fail(message, capacity, "not enough memory for the 3D view");
         return NULL;
     }
+    scene->tools = options->tools;
     scene->target_count = options->target_count;
     scene->target = options->target;
     scene->has_entry = options->has_entry && vec3_is_finite(options->entry) && vec3_is_finite(options->entry_direction);
@@ -118,6 +133,7 @@ void vessel_scene_destroy(VesselScene *scene)
     vessel_layers_destroy(scene->layers);
     strokes_destroy(&scene->strokes);
     model_wires_free(scene->models);
+    free(scene->line);
     free(scene->point);
     free(scene->half);
     free(scene->color);
@@ -183,13 +199,15 @@ static bool reserve(VesselScene *scene, int count)
 {
     if (count <= scene->capacity)
         return true;
+    LinePoint *line = realloc(scene->line, (size_t)count * sizeof *line);
+    scene->line = line ? line : scene->line;
     Vec3 *point = realloc(scene->point, (size_t)count * sizeof *point);
     scene->point = point ? point : scene->point;
     double *half = realloc(scene->half, (size_t)count * sizeof *half);
     scene->half = half ? half : scene->half;
     Color *color = realloc(scene->color, (size_t)count * sizeof *color);
     scene->color = color ? color : scene->color;
-    if (!point || !half || !color)
+    if (!line || !point || !half || !color)
         return false;
     scene->capacity = count;
     return true;
@@ -215,38 +233,120 @@ static Vec3 between(const Pose *pose, int i, double t)
     return vec3_add_scaled(vec3_add_scaled(x, t * s * s, u), -t * t * s, v);
 }
 
-static void add_tool(VesselScene *scene, const Pose *pose, const VesselSceneLook *look, double line)
+// A node has six points of the line at most to the next, and those where tools end.
+static int line_pieces(const VesselScene *scene, const Pose *pose, int i)
 {
     enum { PIECES = 6 };
-    const Camera *camera = &scene->projection;
-    double thin = 1.25 * line;
-    int first = pose->first_free_node;
+    double pixels = vec3_distance(pose->position[i], pose->position[i + 1]) / scene->projection.mm_per_pixel;
+    int pieces = pixels < 3 ? 1 : pixels < 3 * PIECES ? (int)(pixels / 3) + 1 : PIECES;
+    return pieces > PIECES ? PIECES : pieces;
+}
+
+static void add_line_point(VesselScene *scene, const Pose *pose, int i, double t, int *count)
+{
+    LinePoint *p = &scene->line[*count];
+    Vec3 x = t > 0 ? between(pose, i, t) : pose->position[i];
+    double step = *count > 0 ? vec3_distance(x, scene->point[*count - 1]) : 0;
+    *p = (LinePoint){.node = i, .part = t, .at = i + t, .length = *count > 0 ? p[-1].length + (isfinite(step) ? step : 0) : 0};
+    scene->point[(*count)++] = x;
+}
+
+// The shared centreline from a stub in the sheath on, with a point where each tool ends. Returns how many.
+static int lay_line(VesselScene *scene, const Pose *pose, const double *end)
+{
+    enum { MOST_PIECES = 6 };
+    int first = pose->first_free_node, count = 0;
     double stub = 0;
     while (first > 0 && stub < sheath_shown_mm) {
         stub += vec3_distance(pose->position[first], pose->position[first - 1]);
         first--;
     }
-    if (!reserve(scene, (pose->node_count - first) * PIECES + 1))
-        return;
-    int count = 0;
+    if (!reserve(scene, (pose->node_count - first) * MOST_PIECES + TOOLS_MOST))
+        return 0;
     for (int i = first; i < pose->node_count; i++) {
-        const NodeReport *node = &pose->node[i], *next = i + 1 < pose->node_count ? node + 1 : node;
-        Color here = i < pose->first_free_node ? SHEATH_COLOR : vessel_scene_force_color(vec3_norm(node->force), look->force_full_scale_n);
-        Color there = i + 1 < pose->first_free_node ? SHEATH_COLOR : vessel_scene_force_color(vec3_norm(next->force), look->force_full_scale_n);
-        int pieces = 1;
-        if (next != node) {
-            double pixels = vec3_distance(pose->position[i], pose->position[i + 1]) / camera->mm_per_pixel;
-            pieces = pixels < 3 ? 1 : pixels < 3 * PIECES ? (int)(pixels / 3) + 1 : PIECES;
-            pieces = pieces > PIECES ? PIECES : pieces;
-        }
-        for (int k = 0; k < pieces; k++, count++) {
-            double t = (double)k / pieces;
-            scene->point[count] = k == 0 ? pose->position[i] : between(pose, i, t);
-            scene->half[count] = fmax((node->radius + t * (next->radius - node->radius)) / camera->mm_per_pixel, thin);
-            scene->color[count] = mix_colors(here, there, t);
+        int pieces = i + 1 < pose->node_count ? line_pieces(scene, pose, i) : 1;
+        for (int n = 0; n < pieces; n++) {
+            double t = (double)n / pieces, next = (double)(n + 1) / pieces;
+            add_line_point(scene, pose, i, t, &count);
+            for (int k = 0; k < pose->tool_count; k++)
+                if (end[k] > scene->line[count - 1].at && end[k] < i + next)
+                    add_line_point(scene, pose, i, end[k] - i, &count);
         }
     }
-    strokes_polyline(&scene->strokes, count, scene->point, scene->half, scene->color);
+    return count;
+}
+
+static const TubeStretch *stretch_at(const VesselScene *scene, int tool, double s)
+{
+    static const TubeStretch solid = {0};
+    return scene->tools && tool < scene->tools->count ? tool_look_at(&scene->tools->tool[tool], s) : &solid;
+}
+
+// [mm] by the tool's own nodes; `from` goes along.
+static double radius_at(const PoseTool *tool, double s, int *from)
+{
+    while (*from + 2 < tool->node_count && tool->node[*from + 1].s < s)
+        (*from)++;
+    if (tool->node_count < 2)
+        return tool->node_count > 0 ? tool->node[0].radius : 0;
+    const ToolNode *a = &tool->node[*from], *b = a + 1;
+    double t = fmin(fmax((s - a->s) / (b->s - a->s), 0), 1);
+    return a->radius + t * (b->radius - a->radius);
+}
+
+static Color node_color(const Pose *pose, int i, bool touches_wall, Color own, double full_scale_n)
+{
+    return i < pose->first_free_node ? SHEATH_COLOR : touches_wall ? vessel_scene_force_color(vec3_norm(pose->node[i].force), full_scale_n, own) : own;
+}
+
+// One tool along the line up to its end, coloured by wall force where it is the one that touches the wall. Where another lies in it its near wall is cut away:
+// its lumen is laid over it, and the other over that. However thin, each leaves a rim of the one around it.
+static void add_tool(VesselScene *scene, const Pose *pose, int k, const double *end, int count, const VesselSceneLook *look, double line)
+{
+    const PoseTool *tool = &pose->tool[k];
+    double pixel = scene->projection.mm_per_pixel, rim = 1.3 * line, length = tool->node_count > 0 ? tool->node[tool->node_count - 1].s : 0;
+    Color own = scene->tools && k < scene->tools->count ? scene->tools->tool[k].color : TOOL_COLOR;
+    int first = 0, last = 0, node = 0;
+    bool has_lumen = false;
+    while (k > 0 && first < count && scene->line[first].at < pose->first_free_node)
+        first++;
+    while (last < count && scene->line[last].at <= end[k])
+        last++;
+    for (int i = first; i < last; i++) {
+        LinePoint *p = &scene->line[i];
+        bool carries = true;
+        p->inside = 0;
+        for (int other = 0; other < pose->tool_count; other++) {
+            carries = carries && (other >= k || end[other] < p->at);
+            p->inside += other > k && end[other] >= p->at;
+        }
+        double s = length - (scene->line[last - 1].length - p->length);
+        p->half = fmax(radius_at(tool, s, &node) / pixel, 1.25 * line + rim * p->inside);
+        scene->half[i] = p->half;
+        Color here = node_color(pose, p->node, carries, own, look->force_full_scale_n);
+        scene->color[i] = p->part > 0 ? mix_colors(here, node_color(pose, p->node + 1, carries, own, look->force_full_scale_n), p->part) : here;
+        has_lumen |= stretch_at(scene, k, s)->lumen > 0;
+    }
+    strokes_polyline(&scene->strokes, last - first, scene->point + first, scene->half + first, scene->color + first, !has_lumen);
+    for (int i = first; i < last && has_lumen; i++) {
+        LinePoint *p = &scene->line[i];
+        bool is_open = p->inside > 0 && p->at >= pose->first_free_node;
+        double s = length - (scene->line[last - 1].length - p->length), least = 1.25 * line + rim * (p->inside - 0.6);
+        scene->half[i] = is_open ? fmin(fmax(stretch_at(scene, k, s)->lumen / pixel, least), p->half - 0.4 * rim) : NAN;
+        scene->color[i] = color_with_alpha(LUMEN_COLOR, 0.8);
+    }
+    if (has_lumen)
+        strokes_polyline(&scene->strokes, last - first, scene->point + first, scene->half + first, scene->color + first, false);
+}
+
+static void add_tools(VesselScene *scene, const Pose *pose, const VesselSceneLook *look, double line)
+{
+    double end[STEP_TOOLS_MAX];
+    for (int k = 0; k < pose->tool_count; k++)
+        end[k] = pose_tool_end(pose, k);
+    int count = lay_line(scene, pose, end);
+    for (int k = 0; k < pose->tool_count; k++)
+        add_tool(scene, pose, k, end, count, look, line);
 }
 
 // One arrow for each stretch of the tool of about 14 pixels, counted from the tip so that stretches stay the same nodes: the sum of their forces, its
@@ -317,6 +417,9 @@ void vessel_scene_draw(VesselScene *scene, const Pose *pose, const VesselSceneLo
     scene->has_tip = pose && vec3_is_finite(pose->position[pose->node_count - 1]);
     if (scene->has_tip)
         scene->tip = pose->position[pose->node_count - 1];
+    scene->tip_count = pose ? pose->tool_count : 0;
+    for (int k = 0; k < scene->tip_count; k++)
+        scene->tool_tip[k] = pose->tool[k].node[pose->tool[k].node_count - 1].position;
     LayersKey key = key_for(scene, look, port);
     key.is_quick = is_moving(scene, &key) && !look->full_detail;
     scene->projection = key.camera;
@@ -332,7 +435,7 @@ void vessel_scene_draw(VesselScene *scene, const Pose *pose, const VesselSceneLo
     if (look->show_model && pose)
         model_wires_add(scene->models, pose->node[pose->node_count - 1].vessel_node, &scene->strokes, line);
     if (pose)
-        add_tool(scene, pose, look, line);
+        add_tools(scene, pose, look, line);
     if (pose && look->show_arrows)
         add_arrows(scene, pose, look, line);
     strokes_draw(&scene->strokes, scene->layers, port);
@@ -358,8 +461,9 @@ int vessel_scene_labels(const VesselScene *scene, VesselSceneLabel *label, int c
     }
     if (scene->has_entry && count < capacity)
         label[count++] = label_at(scene, LABEL_SHEATH, "sheath", scene->entry, 6);
-    if (scene->has_tip && count < capacity)
-        label[count++] = label_at(scene, LABEL_TIP, "tip", scene->tip, 6);
+    for (int k = 0; k < scene->tip_count && count < capacity; k++)
+        if (vec3_is_finite(scene->tool_tip[k]))
+            label[count++] = label_at(scene, LABEL_TIP, scene->tools && scene->tip_count > 1 ? scene->tools->tool[k].name : "tip", scene->tool_tip[k], 6);
     return count;
 }
 

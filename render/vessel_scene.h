@@ -1,4 +1,5 @@
-// The live 3D view: a translucent vessel, the tool inside it coloured by wall force, the local model that answers at the tip as a wireframe
+// The live 3D view: a translucent vessel, the tools inside it coloured by wall force, their near wall cut away where another lies in it, the local model that
+// answers at the tip as a wireframe
 // (Kerrien 2017, Fig. 10), wall forces as arrows, the sheath's mouth, targets as wire spheres. Lengths mm, forces N. Needs a current GL context (3.3
 // core), always the same one; all calls from that context's thread.
 //
@@ -12,6 +13,7 @@
 #include "geom/isosurface.h"
 #include "render/color_map.h"
 #include "render/vessel_scene_camera.h"
+#include "render/tool_look.h"
 #include "render/view_port.h"
 #include "sim/pose.h"
 
@@ -21,6 +23,7 @@ typedef struct VesselSceneOptions {    // all borrowed: must outlive the scene, 
     const TriangleMesh *vessel;        // NULL: none (rigs, free wires)
     const TriangleMesh *coarse;        // of the same surface, for while the camera turns (mesh_decimate to 25,000); NULL: `vessel`
     const VesselTree *tree;            // NULL, or without model: no wireframe at the tip
+    const ToolLooks *tools;            // NULL: one solid tool
     int target_count;
     const SceneTarget *target;         // (target_count)
     bool has_entry;                    // a sheath …
@@ -56,7 +59,7 @@ void vessel_scene_draw(VesselScene *scene, const Pose *pose, const VesselSceneLo
 typedef enum { LABEL_TARGET, LABEL_SHEATH, LABEL_TIP } VesselSceneLabelKind;
 typedef struct VesselSceneLabel {
     VesselSceneLabelKind kind;
-    const char *name;                  // target's name, "sheath", "tip"
+    const char *name;                  // target's name, "sheath", of a tool's tip the tool's name; "tip" where there is one tool
     double x, y;                       // of its centre
     double radius;                     // [pixel] of what is drawn there: a label begins outside
     bool is_in_view;
@@ -69,8 +72,8 @@ typedef struct ScaleBar {
     double length_mm, pixels;
 } ScaleBar;
 ScaleBar vessel_scene_scale_bar(const VesselScene *scene, double most_pixels);
-// Colour of a wall force: grey where there is none, then the sequential map from purple to yellow; full scale and above are yellow.
-Color vessel_scene_force_color(double force_n, double full_scale_n);
+// Colour of a wall force: the tool's own where there is none, then the sequential map from purple to yellow; full scale and above are yellow.
+Color vessel_scene_force_color(double force_n, double full_scale_n, Color without);
 // The projection and the camera that were used (with follow_tip the focus that was found): where a point is seen, and where to go on from when
 // following ends.
 const Camera *vessel_scene_projection(const VesselScene *scene);

@@ -221,13 +221,13 @@ static void add_run(Strokes *strokes, int count, const Vec3 *point, const double
     }
 }
 
-void strokes_polyline(Strokes *strokes, int count, const Vec3 *point, const double *half_pixels, const Color *color)
+void strokes_polyline(Strokes *strokes, int count, const Vec3 *point, const double *half_pixels, const Color *color, bool has_round_ends)
 {
     for (int first = 0; first < count;) {
         int end = first;
         while (end < count && vec3_is_finite(point[end]) && isfinite(half_pixels[end]) && half_pixels[end] > 0)
             end++;
-        add_run(strokes, end - first, point + first, half_pixels + first, color + first, true);
+        add_run(strokes, end - first, point + first, half_pixels + first, color + first, has_round_ends);
         first = end + 1;
     }
 }

@@ -35,8 +35,9 @@ bool strokes_create(Strokes *strokes, char *message, size_t capacity);
 void strokes_destroy(Strokes *strokes);
 
 void strokes_begin(Strokes *strokes, const Camera *camera);
-// A tube through the points with round ends; half widths in pixels, colours with alpha. Points that are not finite end it, and it begins anew after them.
-void strokes_polyline(Strokes *strokes, int count, const Vec3 *point, const double *half_pixels, const Color *color);
+// A tube through the points with round or flat ends; half widths in pixels, colours with alpha. Points that are not finite end it, and it begins anew after
+// them. Of two through the same points the later lies over the earlier.
+void strokes_polyline(Strokes *strokes, int count, const Vec3 *point, const double *half_pixels, const Color *color, bool has_round_ends);
 void strokes_line(Strokes *strokes, Vec3 a, Vec3 b, double half_pixels, Color color);
 // A circle around `center` across the unit `axis`; its far half is fainter.
 void strokes_circle(Strokes *strokes, Vec3 center, Vec3 axis, double radius, double half_pixels, Color color);

@@ -45,7 +45,7 @@ Views *views_create(const ViewsOptions *options, char *message, size_t capacity)
     const TriangleMesh *mesh = fine ? fine : options->mesh;
     TriangleMesh *coarse = mesh ? mesh_decimate(mesh, COARSE_TRIANGLES, HUGE_VAL) : NULL;
     const Scene *scene = options->scene;
-    VesselSceneOptions shown = {.vessel = mesh, .coarse = coarse, .tree = options->tree, .target_count = scene->target_count,
+    VesselSceneOptions shown = {.vessel = mesh, .coarse = coarse, .tree = options->tree, .tools = views ? &views->tools : NULL, .target_count = scene->target_count,
                                 .target = scene->target, .has_entry = scene->wire.has_sheath, .entry = scene->wire.start,
                                 .entry_direction = scene->wire.direction};
     if (!mesh) {

@@ -100,6 +100,7 @@ static void cached_walls_are_those_drawn_afresh(void **state)
     for (int k = 0; k < 10; k++) {
         for (int i = 0; i < 12; i++)
             pose->position[i].x += 0.4;
+        pose_fill_single_tool(pose);
         vessel_scene_draw(scene, pose, &look, stage.port);
     }
     assert_int_equal(vessel_scene_layer_draws(scene), 1);
@@ -457,6 +458,7 @@ static void the_view_follows_the_tip_without_redrawing_at_each_step(void **state
     for (int k = 0; k < frames; k++) {
         for (int i = 0; i < 10; i++)
             pose->position[i].x += 0.2;
+        pose_fill_single_tool(pose);
         vessel_scene_draw(scene, pose, &look, stage.port);
         VesselSceneLabel label[2];
         assert_int_equal(vessel_scene_labels(scene, label, 2), 1);
@@ -466,6 +468,83 @@ static void the_view_follows_the_tip_without_redrawing_at_each_step(void **state
     pose_free(pose);
     vessel_scene_destroy(scene);
     triangle_mesh_free(mesh);
+    stage_close(&stage);
+}
+
+static bool is_white(const uint8_t *p) { return p[0] > 110 && p[1] > 110 && p[2] > 110; }
+static bool is_blue(const uint8_t *p) { return p[2] > p[0] + 40 && p[2] > 80; }
+static bool is_dark(const uint8_t *p) { return p[0] < 70 && p[1] < 70 && p[2] < 110; }
+
+// A catheter of R 1.0 and lumen 0.6 with a wire of 0.25 mm, close up and from far away, from many sides: the wire is white along the axis up to its tip, between
+// blue walls, beside it the dark lumen; where there is no wire the catheter is whole; labels stand at both tips.
+static void a_tool_is_seen_in_the_one_around_it(void **state)
+{
+    (void)state;
+    ViewStage stage;
+    if (!stage_open(&stage))
+        skip();
+    static StagePixels pixels;
+    static const Vec3 frame[2] = {{-1, -6, -6}, {17, 6, 6}};
+    CoaxialLooks two;
+    coaxial_looks(&two, 1, 0.6, 0.25);
+    char message[256];
+    VesselSceneOptions options = {.tools = &two.looks, .frame_count = 2, .frame = frame};
+    VesselScene *scene = vessel_scene_create(&options, message, sizeof message);
+    assert_non_null(scene);
+    const double wire[3] = {16, 6.3, 10};
+    for (int view = 0; view < 18; view++) {
+        VesselSceneLook look = vessel_scene_default_look(scene);
+        free_camera_orbit(&look.camera, 21.0 * view, -17.0 * view);
+        bool is_far = view % 2 == 1;         // all widths are the least there are
+        look.camera.width_mm *= is_far ? 6 : 1;
+        look.camera.height_mm *= is_far ? 6 : 1;
+        Pose *pose = coaxial_pose(10, wire[view / 2 % 3], 0.7, 1, 0.25);
+        double wire_tip = wire[view / 2 % 3];
+        take(&stage, scene, pose, &look, pixels);
+        const Camera *camera = vessel_scene_projection(scene);
+        double pixel = camera->mm_per_pixel;
+        for (double x = 0.8; x < fmax(10, wire_tip) - 0.3; x += 0.31) {
+            Vec3 p = camera_project(camera, vec3(x, 0, 0)), q = camera_project(camera, vec3(x + 1, 0, 0));
+            double dx = q.x - p.x, dy = q.y - p.y, length = hypot(dx, dy), margin = 1.5 * pixel;
+            if (length * pixel < 0.3)        // nearly along the axis
+                continue;
+            double across[2] = {-dy / length, dx / length};
+            const uint8_t *axis = pixels[(int)p.y][(int)p.x];
+            if (x < wire_tip - margin && !is_white(axis))
+                fail_msg("view %d: the wire is not seen at %.2f mm: %d %d %d", view, x, axis[0], axis[1], axis[2]);
+            if (x > wire_tip + 0.3 + 3 * margin && x < 10 - 0.3)
+                assert_true(is_blue(axis));
+            if (is_far || x > 9.5)
+                continue;
+            for (int side = -1; side <= 1; side += 2) {
+                double wall = side * 0.8 / pixel, lumen = side * 0.45 / pixel;
+                assert_true(is_blue(pixels[(int)(p.y + wall * across[1])][(int)(p.x + wall * across[0])]));
+                if (x < wire_tip - 0.5)
+                    assert_true(is_dark(pixels[(int)(p.y + lumen * across[1])][(int)(p.x + lumen * across[0])]));
+            }
+        }
+        VesselSceneLabel label[4];
+        assert_int_equal(vessel_scene_labels(scene, label, 4), 2);
+        for (int k = 0; k < 2; k++) {
+            Vec3 tip = camera_project(camera, vec3(k ? wire_tip : 10, 0, 0));
+            assert_true(label[k].kind == LABEL_TIP && fabs(label[k].x - tip.x) < 1e-9 && fabs(label[k].y - tip.y) < 1e-9);
+            assert_string_equal(label[k].name, k ? "wire" : "catheter");
+        }
+        pose_free(pose);
+    }
+    // the force on the catheter's wall colours the catheter, not the wire in it
+    VesselSceneLook look = vessel_scene_default_look(scene);
+    look.show_arrows = false;
+    free_camera_look_from(&look.camera, LOOK_FRONT);
+    Pose *pose = coaxial_pose(10, 16, 0.5, 1, 0.25);
+    for (int i = 8; i < 13; i++)
+        pose->node[i].force = vec3(0, 0, 0.5);
+    take(&stage, scene, pose, &look, pixels);
+    Vec3 p = camera_project(vessel_scene_projection(scene), vec3(5, 0, 0));
+    const uint8_t *wall = pixels[(int)(p.y + 0.8 / vessel_scene_projection(scene)->mm_per_pixel)][(int)p.x];
+    assert_true(wall[0] > wall[2] + 60 && is_white(pixels[(int)p.y][(int)p.x]));
+    pose_free(pose);
+    vessel_scene_destroy(scene);
     stage_close(&stage);
 }
 
@@ -498,6 +577,7 @@ static void broken_input_is_refused_or_left_out(void **state)
             pose->position[11].x = INFINITY, pose->node[3].force = vec3(NAN, 0, 1), pose->node[4].radius = NAN;
         if (k == 3)
             pose->first_free_node = 11;
+        pose_fill_single_tool(pose);
         vessel_scene_draw(scene, pose, &look, stage.port);
         const ViewPort tiny = {stage.canvas.framebuffer, 3, 3, 1, 1}, none = {stage.canvas.framebuffer, 0, 0, 0, 20};
         vessel_scene_draw(scene, pose, &look, tiny);
@@ -524,6 +604,7 @@ int main(void)
         cmocka_unit_test(labels_and_scale_bar_are_those_of_the_picture),
         cmocka_unit_test(the_free_camera_does_what_the_mouse_does),
         cmocka_unit_test(the_view_follows_the_tip_without_redrawing_at_each_step),
+        cmocka_unit_test(a_tool_is_seen_in_the_one_around_it),
         cmocka_unit_test(broken_input_is_refused_or_left_out),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
