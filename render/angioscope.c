@@ -49,7 +49,8 @@ struct Angioscope {
     SeenPatch *seen;           // (patch_count) scratch of a frame: patches to draw, near ones first
     GLsizei *draw_count;
     const void **draw_offset;
-    Solids tool;
+    const ToolLooks *tools;
+    Solids solids;             // the tools in the view
     unsigned program;
     unsigned wall_array, wall_vertices, wall_indices;
     unsigned tool_array, tool_vertices, tool_indices;
@@ -262,7 +263,7 @@ void angioscope_destroy(Angioscope *scope)
     const unsigned buffer[4] = {scope->wall_vertices, scope->wall_indices, scope->tool_vertices, scope->tool_indices};
     glDeleteBuffers(4, buffer);
     gl_canvas_destroy(&scope->canvas);
-    solids_free(&scope->tool);
+    solids_free(&scope->solids);
     free(scope->patch);
     free(scope->vertex);
     free(scope->node);
@@ -275,17 +276,42 @@ void angioscope_destroy(Angioscope *scope)
 // --- the eye ---
 
 // The tool's axis `back` mm behind its tip.
-static Vec3 axis_behind_tip(const Pose *pose, double back)
+static Vec3 axis_behind_tip(const PoseTool *tool, double back)
 {
-    int i = pose->node_count - 1;
+    int i = tool->node_count - 1;
     while (i > 0) {
-        double length = vec3_distance(pose->position[i], pose->position[i - 1]);
+        Vec3 here = tool->node[i].position, before = tool->node[i - 1].position;
+        double length = vec3_distance(here, before);
         if (!(length < back))
-            return length > 0 ? vec3_mix(pose->position[i], pose->position[i - 1], back / length) : pose->position[i];
+            return length > 0 ? vec3_mix(here, before, back / length) : here;
         back -= length;
         i--;
     }
-    return pose->position[0];
+    return tool->node[0].position;
+}
+
+static double lumen_at(const Angioscope *scope, int tool, double s)
+{
+    return scope->tools && tool < scope->tools->count ? tool_look_at(&scope->tools->tool[tool], s)->lumen : 0;
+}
+
+// The tool around the eye of `tool`, `back` mm behind its tip: the innermost whose lumen it lies in, or -1. `ahead` [mm]: how far the last one's end lies behind.
+static int tool_around(const Angioscope *scope, const Pose *pose, int tool, double back, double *lumen, double *ahead)
+{
+    double eye = pose->tool[tool].node[pose->tool[tool].node_count - 1].s - back;
+    *ahead = HUGE_VAL;
+    *lumen = HUGE_VAL;
+    for (int k = tool - 1; k >= 0; k--) {
+        const PoseTool *outer = &pose->tool[k];
+        double past = eye - pose_tool_passes(pose, tool, k), inner = lumen_at(scope, k, outer->node[outer->node_count - 1].s + fmin(past, 0));
+        if (past < *ahead && inner > 0) {
+            *ahead = past;
+            *lumen = inner;
+        }
+        if (past < 0 && inner > 0)
+            return k;
+    }
+    return -1;
 }
 
 // Gap and inward normal at a point; false where there is no wall near, or none that is known.
@@ -307,39 +333,56 @@ static Vec3 across(Vec3 v, Vec3 axis, Vec3 otherwise)
     return vec3_norm(flat) > 1e-6 ? vec3_unit(flat) : otherwise;
 }
 
-bool angioscope_view(const Angioscope *scope, const Pose *pose, AngioscopeView *view)
+// The chosen tool, or the one that reaches furthest; NULL where there is nothing to look from.
+static const PoseTool *looks_from(const Pose *pose, int *tool)
 {
-    if (!pose || pose->node_count < 2)
+    if (!pose || pose->node_count < 2 || *tool >= pose->tool_count)
+        return NULL;
+    *tool = *tool < 0 ? pose_most_distal(pose) : *tool;
+    return pose->tool[*tool].node_count > 1 ? &pose->tool[*tool] : NULL;
+}
+
+static int vessel_node_at_tip(const Pose *pose, int tool) { return pose->node[(int)lround(pose_tool_end(pose, tool))].vessel_node; }
+
+bool angioscope_view(const Angioscope *scope, const Pose *pose, int tool, AngioscopeView *view)
+{
+    const PoseTool *own = looks_from(pose, &tool);
+    if (!own)
         return false;
-    int last = pose->node_count - 1, node = pose->node[last].vessel_node;
-    double radius = fmax(pose->node[last].radius, 1e-3), back = 7.5 * radius, beside = 2.8 * radius, margin = 0.8 * radius;
-    Vec3 tip = pose->position[last], behind = axis_behind_tip(pose, back), forward = quat_rotate(pose->quaternion[last], vec3(1, 0, 0));
-    Vec3 upright = quat_rotate(pose->quaternion[last], vec3(0, 1, 0));
+    const ToolNode *last = &own->node[own->node_count - 1];
+    double radius = fmax(last->radius, 1e-3), back = 7.5 * radius, beside = 2.8 * radius, margin = 0.8 * radius;
+    Vec3 tip = last->position, behind = axis_behind_tip(own, back), forward = quat_rotate(last->orientation, vec3(1, 0, 0));
+    Vec3 upright = quat_rotate(last->orientation, vec3(0, 1, 0));
     if (!isfinite(radius) || !vec3_is_finite(tip) || !vec3_is_finite(behind) || !vec3_is_finite(forward) || !vec3_is_finite(upright))
         return false;
     forward = vec3_unit(forward);
     Vec3 up = across(upright, forward, vec3_normal_to(forward)), normal;
-    double gap, room = beside + margin;
+    double gap, room = beside + margin, lumen, ahead;
+    int node = vessel_node_at_tip(pose, tool), around = tool_around(scope, pose, tool, back, &lumen, &ahead);
+    // midway between the two where another tool is around; rises to its place as it leaves that one's end behind
+    double out = fmin(fmax(ahead / (4 * radius), 0), 1), near_axis = fmin((radius + lumen) / 2, beside);
+    beside = near_axis + (beside - near_axis) * out * out * (3 - 2 * out);
     // near a wall the eye rises off it, in the open it stays above the tool's own frame; in between both have a say
-    if (wall_at(scope, behind, node, 2 * room, &gap, &normal)) {
-        double t = fmin(fmax(2 - gap / room, 0), 1), weight = 2 * t * t * (3 - 2 * t);
+    if (around < 0 && wall_at(scope, behind, node, 2 * room, &gap, &normal)) {
+        double t = fmin(fmax(2 - gap / room, 0), 1), weight = 2 * t * t * (3 - 2 * t) * out;
         up = across(vec3_add_scaled(up, weight, normal), forward, up);
     }
     Vec3 eye = vec3_add_scaled(behind, beside, up);
     // a tool inside the vessel puts it outside by less than `room`; one that has left it is not brought back
-    for (int k = 0; k < 4 && wall_at(scope, eye, node, 2 * room, &gap, &normal) && gap < margin && gap > -room; k++)
-        eye = vec3_add_scaled(eye, margin - gap, normal);
+    for (int k = 0; k < 4 && around < 0 && wall_at(scope, eye, node, 2 * room, &gap, &normal) && gap < margin && gap > -room; k++)
+        eye = vec3_add_scaled(eye, out * (margin - gap), normal);
     *view = (AngioscopeView){.eye = eye, .right = vec3_cross(forward, up), .up = up, .forward = forward, .half_angle_tan = tan(half_angle)};
     return vec3_is_finite(eye);
 }
 
+void angioscope_set_tools(Angioscope *scope, const ToolLooks *tools) { scope->tools = tools; }
 void angioscope_set_full_detail(Angioscope *scope, bool on) { scope->full_detail = on; }
 
 // --- drawing ---
 
-static double lumen_radius(const Angioscope *scope, const Pose *pose)
+static double lumen_radius(const Angioscope *scope, const Pose *pose, int tool)
 {
-    int node = pose->node[pose->node_count - 1].vessel_node;
+    int node = vessel_node_at_tip(pose, tool);
     return scope->tree && node >= 0 && node < scope->tree->node_count ? scope->tree->radius[node] : scope->mean_radius;
 }
 
@@ -431,23 +474,48 @@ static void draw_wall(Angioscope *scope, const AngioscopeView *view, double aspe
     glMultiDrawElements(GL_TRIANGLES, scope->draw_count, GL_UNSIGNED_INT, scope->draw_offset, count);
 }
 
-static void draw_tool(Angioscope *scope, const Pose *pose, double reach)
+// The stretch of a tool that is near enough to be seen.
+static void add_tool(Angioscope *scope, const Pose *pose, int k, bool is_own, Vec3 eye, double reach)
 {
     enum { NODES = 160 };
-    double radius[NODES];
+    const PoseTool *tool = &pose->tool[k];
+    Vec3 point[NODES];
+    double radius[NODES], lumen[NODES], nearest = HUGE_VAL;
     Color color[NODES];
-    int last = pose->node_count - 1, first = last;
-    for (double length = 0; first > 0 && last - first < NODES - 1 && length < reach && vec3_is_finite(pose->position[first - 1]); first--)
-        length += vec3_distance(pose->position[first], pose->position[first - 1]);
-    for (int i = first; i <= last; i++) {
-        radius[i - first] = pose->node[i].radius;
-        color[i - first] = color_rgb(206, 212, 220);
+    int last = tool->node_count - 1, middle = last, count = 0;
+    // of the own tool the end, of another what lies around the eye
+    for (int i = last; i >= 0 && !is_own; i--) {
+        double distance = vec3_distance(tool->node[i].position, eye);
+        middle = distance < nearest ? i : middle;
+        nearest = fmin(nearest, distance);
     }
-    solids_clear(&scope->tool);
-    scope->tool.origin = scope->origin;
-    scope->tool.sides = 48;
-    solids_tube(&scope->tool, last - first + 1, pose->position + first, radius, color);
-    const Solids *tool = &scope->tool;
+    int first = middle, end = middle;
+    for (double way = 0; first > 0 && middle - first < NODES / 2 - 1 + is_own * NODES / 2 && way < reach && vec3_is_finite(tool->node[first - 1].position); first--)
+        way += vec3_distance(tool->node[first].position, tool->node[first - 1].position);
+    for (double way = 0; end < last && end - middle < NODES / 2 && way < reach && vec3_is_finite(tool->node[end + 1].position); end++)
+        way += vec3_distance(tool->node[end].position, tool->node[end + 1].position);
+    bool is_hollow = false;
+    for (int i = first; i <= end; i++, count++) {
+        point[count] = tool->node[i].position;
+        radius[count] = tool->node[i].radius;
+        lumen[count] = lumen_at(scope, k, tool->node[i].s);
+        color[count] = color_rgb(206, 212, 220);
+        is_hollow |= lumen[count] > 0;
+    }
+    scope->solids.sides = is_own ? 48 : 32;
+    if (is_hollow)
+        solids_pipe(&scope->solids, count, point, radius, lumen, color, color_rgb(58, 62, 70), NULL);
+    else
+        solids_tube(&scope->solids, count, point, radius, color);
+}
+
+static void draw_tools(Angioscope *scope, const Pose *pose, int own, Vec3 eye, double reach)
+{
+    solids_clear(&scope->solids);
+    scope->solids.origin = scope->origin;
+    for (int k = 0; k < pose->tool_count; k++)
+        add_tool(scope, pose, k, k == own, eye, reach);
+    const Solids *tool = &scope->solids;
     if (tool->index_count == 0)
         return;
     glBindVertexArray(scope->tool_array);
@@ -470,15 +538,16 @@ static void draw_tool(Angioscope *scope, const Pose *pose, double reach)
     glDrawElements(GL_TRIANGLES, tool->index_count, GL_UNSIGNED_INT, at_byte(0));
 }
 
-static void draw_inside(Angioscope *scope, const Pose *pose, ViewPort port)
+static void draw_inside(Angioscope *scope, const Pose *pose, int tool, ViewPort port)
 {
     AngioscopeView view;
-    if (!angioscope_view(scope, pose, &view))
+    const PoseTool *own = looks_from(pose, &tool);
+    if (!own || !angioscope_view(scope, pose, tool, &view))
         return;
-    double radius = lumen_radius(scope, pose), fog = fog_reach * radius, reach = fog_end * fog;
-    double aspect = (double)port.width / port.height, near = 0.1 * fmax(pose->node[pose->node_count - 1].radius, 1e-3);
+    double radius = lumen_radius(scope, pose, tool), fog = fog_reach * radius, reach = fog_end * fog;
+    double aspect = (double)port.width / port.height, near = 0.04 * fmax(own->node[own->node_count - 1].radius, 1e-3);
     // light comes on while the tip leaves the sheath
-    double hidden = pose->first_free_node >= pose->node_count - 1 ? pose->inserted_mm : HUGE_VAL, t = fmin(fmax(hidden, 0), 1);
+    double t = pose->first_free_node > 0 ? fmin(fmax(own->inserted_mm, 0), 1) : 1;
     float clip[16];
     view_matrix(&view, scope->origin, aspect, near, reach + near, clip);
     Vec3 eye = vec3_sub(view.eye, scope->origin);
@@ -494,14 +563,14 @@ static void draw_inside(Angioscope *scope, const Pose *pose, ViewPort port)
     glEnable(GL_CULL_FACE);
     glFrontFace(GL_CCW);
     draw_wall(scope, &view, aspect, reach);
-    draw_tool(scope, pose, reach);
+    draw_tools(scope, pose, tool, view.eye, reach);
     glBindVertexArray(0);
     glDisable(GL_BLEND);
     glDisable(GL_CULL_FACE);
     glDisable(GL_DEPTH_TEST);
 }
 
-void angioscope_draw(Angioscope *scope, const Pose *pose, ViewPort port)
+void angioscope_draw(Angioscope *scope, const Pose *pose, int tool, ViewPort port)
 {
     if (port.width < 1 || port.height < 1)
         return;
@@ -514,7 +583,7 @@ void angioscope_draw(Angioscope *scope, const Pose *pose, ViewPort port)
         scope->samples = samples;
     }
     gl_canvas_begin(canvas, dark);
-    draw_inside(scope, pose, port);
+    draw_inside(scope, pose, tool, port);
     gl_canvas_resolve(canvas);
     glBindFramebuffer(GL_READ_FRAMEBUFFER, canvas->resolved);
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, port.framebuffer);

@@ -1,11 +1,13 @@
-// Angioscopy: from the tip looking forward inside the lumen. Perspective; the lamp is at the eye, so that light falls off with distance and the far
+// Angioscopy: from a tool's tip looking forward inside the lumen. Perspective; the lamp is at the eye, so that light falls off with distance and the far
 // lumen is dark; the wall's normals are those of the vessel's own field. The eye rides on the tool, a little behind its tip and beside its axis, so that
-// the tool's end is seen at the picture's lower rim, and turns with the tool. Where it would come too near to a wall it is moved off it.
+// the tool's end is seen at the picture's lower rim, and turns with the tool. Where it would come too near to a wall it is moved off it. Within another tool it
+// lies between the two, and sees that one's lumen, its open end and what is beyond.
 // Needs a current GL context (3.3 core), always the same one. Lengths mm.
 #ifndef SELDINGER_RENDER_ANGIOSCOPE_H
 #define SELDINGER_RENDER_ANGIOSCOPE_H
 
 #include "geom/isosurface.h"
+#include "render/tool_look.h"
 #include "render/view_port.h"
 #include "sim/pose.h"
 
@@ -23,10 +25,12 @@ Angioscope *angioscope_create(const TriangleMesh *mesh, const Vessel *vessel, co
 void angioscope_destroy(Angioscope *scope);
 // Smooth edges of the wall too, at two to three times the cost: for pictures and films off screen. Default: off.
 void angioscope_set_full_detail(Angioscope *scope, bool on);
-// Draws all of the port's rectangle. In the sheath, outside of the vessel, without pose or with one that is not finite it is what can be seen from there:
+// Borrowed: lumens of the tools. NULL (default): all are solid.
+void angioscope_set_tools(Angioscope *scope, const ToolLooks *tools);
+// From the tip of `tool`; -1: of the one that reaches furthest. Draws all of the port's rectangle. In the sheath, outside of the vessel, without pose or with one that is not finite it is what can be seen from there:
 // the sheath's dark, or nothing.
-void angioscope_draw(Angioscope *scope, const Pose *pose, ViewPort port);
+void angioscope_draw(Angioscope *scope, const Pose *pose, int tool, ViewPort port);
 // The camera for a pose; false where the tip has no finite place.
-bool angioscope_view(const Angioscope *scope, const Pose *pose, AngioscopeView *view);
+bool angioscope_view(const Angioscope *scope, const Pose *pose, int tool, AngioscopeView *view);
 
 #endif

@@ -139,6 +139,80 @@ void solids_tube(Solids *solids, int count, const Vec3 *point, const double *rad
     add_cap(solids, point[count - 1], tangent, normal, radius[count - 1], color[count - 1], +1);
 }
 
+// --- pipes ---
+
+typedef struct PipeRing {      // where a ring's vertices begin
+    uint32_t outer, inner, cut;
+} PipeRing;
+
+// Two rows of `count` vertices become a strip; facing where a row runs counter-clockwise seen from the other's far side, or the other way.
+static void sew(Solids *solids, uint32_t row, uint32_t next, uint32_t count, bool flip)
+{
+    for (uint32_t k = 0; k + 1 < count; k++) {
+        uint32_t a = row + k, b = a + 1, c = next + k, d = c + 1;
+        const uint32_t corner[2][6] = {{a, b, c, c, b, d}, {a, c, b, c, d, b}};
+        memcpy(solids->index + solids->index_count, corner[flip], sizeof corner[flip]);
+        solids->index_count += 6;
+    }
+}
+
+// An arc of vertices; normals along `facing`, or where that is zero away from the axis (`side` 1) or towards it (-1).
+static uint32_t add_arc(Solids *solids, Vec3 center, const Vec3 axis[2], double radius, const double angle[2], int sides, Vec3 facing, double side, Color color)
+{
+    uint32_t first = (uint32_t)solids->vertex_count;
+    for (int k = 0; k <= sides; k++) {
+        double a = angle[0] + (angle[1] - angle[0]) * k / sides;
+        Vec3 radial = vec3_add_scaled(vec3_scale(axis[0], cos(a)), sin(a), axis[1]);
+        add_vertex(solids, vec3_add_scaled(center, radius, radial), vec3_norm2(facing) > 0 ? facing : vec3_scale(radial, side), color);
+    }
+    return first;
+}
+
+void solids_pipe(Solids *solids, int count, const Vec3 *point, const double *radius, const double *lumen, const Color *color, Color inside,
+                 const Vec3 *open_towards)
+{
+    int all = solids->sides > 2 ? solids->sides : USUAL_SIDES, sides = open_towards ? (all + 1) / 2 : all, rings = (count - 1) * SUBDIVISIONS + 1;
+    uint32_t row = (uint32_t)sides + 1;
+    const double angle[2] = {open_towards ? PI / 2 : 0, open_towards ? 3 * PI / 2 : 2 * PI};
+    if (count < 2 || !reserve(solids, rings * (2 * (sides + 1) + 4) + 4 * (sides + 1), (rings * (2 * sides + 2) + 2 * sides) * 6))
+        return;
+    Vec3 tangent = {1, 0, 0}, normal = {0, 0, 0};
+    PipeRing before = {0};
+    for (int i = 0; i < rings; i++) {
+        int from = i / SUBDIVISIONS < count - 1 ? i / SUBDIVISIONS : count - 2;
+        double t = (double)(i - from * SUBDIVISIONS) / SUBDIVISIONS;
+        // mirrored ghosts beyond the ends
+        Vec3 p[4] = {from > 0 ? point[from - 1] : vec3_sub(vec3_scale(point[0], 2), point[1]), point[from], point[from + 1],
+                     from + 2 < count ? point[from + 2] : vec3_sub(vec3_scale(point[from + 1], 2), point[from])};
+        Vec3 x = spline(p, t);
+        tangent = spline_tangent(p, t, tangent);
+        normal = carry(normal, tangent);
+        if (open_towards)
+            normal = vec3_unit_or(vec3_add_scaled(*open_towards, -vec3_dot(*open_towards, tangent), tangent), normal);
+        const Vec3 axis[2] = {normal, vec3_cross(tangent, normal)}, none = {0, 0, 0};
+        double out = radius[from] + t * (radius[from + 1] - radius[from]), in = lumen[from] + t * (lumen[from + 1] - lumen[from]);
+        Color c = mix_color(color[from], color[from + 1], t);
+        PipeRing ring = {.outer = add_arc(solids, x, axis, out, angle, sides, none, 1, c), .inner = add_arc(solids, x, axis, in, angle, sides, none, -1, inside)};
+        ring.cut = (uint32_t)solids->vertex_count;
+        for (int k = 0; k < 4 && open_towards; k++)          // first cut: outer, inner; second: inner, outer
+            add_vertex(solids, vec3_add_scaled(x, (k < 2 ? 1 : -1) * (k % 3 == 0 ? out : in), axis[1]), normal, c);
+        if (i > 0) {
+            sew(solids, before.outer, ring.outer, row, false);
+            sew(solids, before.inner, ring.inner, row, true);
+            if (open_towards) {
+                sew(solids, before.cut, ring.cut, 2, true);
+                sew(solids, before.cut + 2, ring.cut + 2, 2, true);
+            }
+        }
+        if (i == 0 || i == rings - 1) {
+            Vec3 facing = vec3_scale(tangent, i == 0 ? -1 : 1);
+            uint32_t rim = add_arc(solids, x, axis, out, angle, sides, facing, 0, c), hole = add_arc(solids, x, axis, in, angle, sides, facing, 0, c);
+            sew(solids, rim, hole, row, i == 0);
+        }
+        before = ring;
+    }
+}
+
 void solids_arrow(Solids *solids, Vec3 tail, Vec3 tip, double radius, Color color)
 {
     Vec3 along = vec3_sub(tip, tail);

@@ -29,6 +29,10 @@ void solids_free(Solids *solids);   // a zeroed list is fine
 
 // A round tube through the points (smoothed by a Catmull-Rom spline) with hemispherical ends; radius and colour at each point.
 void solids_tube(Solids *solids, int count, const Vec3 *point, const double *radius, const Color *color);
+// The same with a lumen and flat ends; of the lumen's wall the colour is `inside`. With `open_towards` only the half on the far side: cut open to the eye that is
+// there.
+void solids_pipe(Solids *solids, int count, const Vec3 *point, const double *radius, const double *lumen, const Color *color, Color inside,
+                 const Vec3 *open_towards);
 // The tip of the head lies at `tip`.
 void solids_arrow(Solids *solids, Vec3 tail, Vec3 tip, double radius, Color color);
 void solids_sphere(Solids *solids, Vec3 center, double radius, Color color);

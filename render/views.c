@@ -57,8 +57,10 @@ Views *views_create(const ViewsOptions *options, char *message, size_t capacity)
                 (views->fluoroscope = create_fluoroscope(views, options, mesh, message, capacity));
     triangle_mesh_free(fine);
     triangle_mesh_free(coarse);
-    if (good)
+    if (good) {
+        angioscope_set_tools(views->angioscope, &views->tools);
         return views;
+    }
     views_destroy(views);
     return NULL;
 }
@@ -86,7 +88,7 @@ static void draw_view(Views *views, PanelView view, const ViewsFrame *frame, Vie
         vessel_scene_draw(views->scene, frame->pose, frame->look, port);
     } else {
         angioscope_set_full_detail(views->angioscope, frame->is_still);
-        angioscope_draw(views->angioscope, frame->pose, port);
+        angioscope_draw(views->angioscope, frame->pose, frame->scope_tool - 1, port);
     }
 }
 

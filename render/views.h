@@ -32,6 +32,7 @@ typedef struct ViewsFrame {
     const float *contrast;           // (N of the tree), NULL: none
     uint32_t pulse;                  // number of X-ray pulses so far
     const VesselSceneLook *look;
+    int scope_tool;                  // from whose tip angioscopy looks, 1 to 4; 0: the one that reaches furthest
     bool is_still;                   // a picture for itself: nothing is taken from the frame before
 } ViewsFrame;
 

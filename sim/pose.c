@@ -123,21 +123,53 @@ void pose_fill_single_tool(Pose *pose)
                                    .carrier = j < pose->first_free_node ? -1 : 0};
 }
 
+// The nearest place to `x` between two points, from the first: 0 to 1; where it lies no nearer than `least2`: -1.
+static double nearest_between(Vec3 a, Vec3 b, Vec3 x, double *least2)
+{
+    Vec3 d = vec3_sub(b, a);
+    double length2 = vec3_norm2(d), u = length2 > 0 ? fmin(fmax(vec3_dot(vec3_sub(x, a), d) / length2, 0), 1) : 1;
+    double away2 = vec3_norm2(vec3_sub(x, vec3_add_scaled(a, u, d)));
+    if (!(away2 < *least2))
+        return -1;
+    *least2 = away2;
+    return u;
+}
+
+static Vec3 tip_of(const PoseTool *tool) { return tool->node[tool->node_count - 1].position; }
+
 double pose_tool_end(const Pose *pose, int tool)
 {
-    const PoseTool *t = &pose->tool[tool];
-    Vec3 tip = t->node[t->node_count - 1].position;
-    double least = HUGE_VAL, end = pose->node_count - 1;
+    Vec3 tip = tip_of(&pose->tool[tool]);
+    double least2 = HUGE_VAL, end = pose->node_count - 1;
     for (int i = pose->node_count - 1; i > 0; i--) {
-        Vec3 a = pose->position[i - 1], d = vec3_sub(pose->position[i], a);
-        double length2 = vec3_norm2(d), u = length2 > 0 ? fmin(fmax(vec3_dot(vec3_sub(tip, a), d) / length2, 0), 1) : 1;
-        double away2 = vec3_norm2(vec3_sub(tip, vec3_add_scaled(a, u, d)));
-        if (away2 < least) {
-            least = away2;
-            end = i - 1 + u;
-        }
+        double u = nearest_between(pose->position[i - 1], pose->position[i], tip, &least2);
+        end = u >= 0 ? i - 1 + u : end;
     }
     return end;
+}
+
+double pose_tool_passes(const Pose *pose, int tool, int other)
+{
+    const PoseTool *t = &pose->tool[tool];
+    Vec3 tip = tip_of(&pose->tool[other]);
+    double least2 = HUGE_VAL, s = t->node[t->node_count - 1].s;
+    for (int j = t->node_count - 1; j > 0; j--) {
+        double u = nearest_between(t->node[j - 1].position, t->node[j].position, tip, &least2);
+        s = u >= 0 ? t->node[j - 1].s + u * (t->node[j].s - t->node[j - 1].s) : s;
+    }
+    return s;
+}
+
+int pose_most_distal(const Pose *pose)
+{
+    int furthest = 0;
+    double most = pose_tool_end(pose, 0);
+    for (int k = 1; k < pose->tool_count; k++) {
+        double end = pose_tool_end(pose, k);
+        furthest = end >= most ? k : furthest;
+        most = fmax(most, end);
+    }
+    return furthest;
 }
 
 void pose_figures_from_run(Pose *pose, const RecordedRun *run, int64_t step)

@@ -44,6 +44,9 @@ void pose_take(Pose *pose, Simulator *simulator, const ToolCommands *commands, c
 void pose_fill_single_tool(Pose *pose);
 // Where a tool's tip lies on the shared centreline: a node's index and the part of the way to the next.
 double pose_tool_end(const Pose *pose, int tool);
+// [mm] from the proximal end of `tool`: where it passes the tip of `other`; its own length where `other` goes further.
+double pose_tool_passes(const Pose *pose, int tool, int other);
+int pose_most_distal(const Pose *pose);      // the tool that reaches furthest
 Pose *pose_create_for_run(const RecordedRun *run);
 // Frame `frame` of a recording of `scene`; what it does not hold (contacts, iterations) is 0.
 void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64_t frame);

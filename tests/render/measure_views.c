@@ -60,6 +60,7 @@ static void move_tool(Bench *bench, int frame)
 {
     for (int i = 0; i < NODES; i++)
         bench->pose->position[i] = vec3_add(bench->place[i], vec3(0, 0, 0.3 * sin(0.3 * frame)));
+    pose_fill_single_tool(bench->pose);
 }
 
 static bool measure(Bench *bench, int width, int height)
@@ -85,7 +86,7 @@ static bool measure(Bench *bench, int width, int height)
                 look.full_detail = kind == 2;
                 double before = cpu_ms();
                 if (kind == 3)
-                    angioscope_draw(scope, bench->pose, port);
+                    angioscope_draw(scope, bench->pose, 0, port);
                 else
                     vessel_scene_draw(scene, bench->pose, &look, port);
                 glFinish();

@@ -2,6 +2,7 @@
 // vessel's, the eye stays inside; broken input.
 #include "render/angioscope.h"
 #include "view_stage.h"
+#include "../geom/near.h"
 
 enum { SIDE = 300 };           // of a square port in the canvas' lower left corner
 
@@ -57,12 +58,13 @@ static Pose *pose_with_eye_at(const TubeScene *scene, Vec3 eye, Vec3 look, Angio
 {
     Pose *pose = straight_pose(12, vec3_add_scaled(eye, -11, look), look, vec3_normal_to(look), 1, tool_radius);
     for (int k = 0; k < 3; k++) {
-        assert_true(angioscope_view(scene->scope, pose, view));
+        assert_true(angioscope_view(scene->scope, pose, 0, view));
         Vec3 off = vec3_sub(eye, view->eye);
         for (int i = 0; i < 12; i++)
             pose->position[i] = vec3_add(pose->position[i], off);
+        pose_fill_single_tool(pose);
     }
-    assert_true(angioscope_view(scene->scope, pose, view));
+    assert_true(angioscope_view(scene->scope, pose, 0, view));
     assert_true(vec3_distance(view->eye, eye) < 1e-9);
     return pose;
 }
@@ -80,7 +82,7 @@ static void a_straight_tube_is_evenly_round(void **state)
         TubeScene scene = open_tube(start, direction[d], 200, 3);
         AngioscopeView view;
         Pose *pose = pose_with_eye_at(&scene, vec3_add_scaled(start, 50, direction[d]), direction[d], &view);
-        angioscope_draw(scene.scope, pose, square(&stage));
+        angioscope_draw(scene.scope, pose, 0, square(&stage));
         stage_read(&stage, pixels);
         double last = 1e9;
         for (double radius = 130; radius >= 10; radius -= 20) {
@@ -124,7 +126,7 @@ static void the_far_end_lies_where_the_axis_is_seen(void **state)
         AngioscopeView view;
         Vec3 up = vec3_normal_to(axis), look = vec3_add_scaled(vec3_add_scaled(axis, -below[k], up), side[k], vec3_cross(axis, up));
         Pose *pose = pose_with_eye_at(&scene, vec3_scale(axis, 60), vec3_unit(look), &view);
-        angioscope_draw(scene.scope, pose, square(&stage));
+        angioscope_draw(scene.scope, pose, 0, square(&stage));
         stage_read(&stage, pixels);
         Vec3 expected = seen_at(&view, axis);
         double x = 0, y = 0, count = 0;
@@ -181,7 +183,7 @@ static void a_mirrored_scene_gives_a_mirrored_picture(void **state)
         char message[256];
         Angioscope *scope = angioscope_create(mesh, vessel[side], NULL, message, sizeof message);
         assert_non_null(scope);
-        angioscope_draw(scope, pose, stage.port);
+        angioscope_draw(scope, pose, 0, stage.port);
         if (side == 0)
             stage_read(&stage, one);
         else
@@ -212,7 +214,7 @@ static void normals_are_the_vessel_s_own(void **state)
     static StagePixels exact, bent, lost;
     TubeScene scene = open_tube(vec3(0, 0, 0), vec3(0, 0, 1), 100, 2);
     Pose *pose = straight_pose(12, vec3(0.3, 0.2, 30), vec3_unit(vec3(0.1, 0, 1)), vec3(0, 1, 0), 1, tool_radius);
-    angioscope_draw(scene.scope, pose, stage.port);
+    angioscope_draw(scene.scope, pose, 0, stage.port);
     stage_read(&stage, exact);
     // a mesh whose normals are off by 40 degrees
     for (int i = 0; i < scene.mesh->vertex_count; i++)
@@ -222,7 +224,7 @@ static void normals_are_the_vessel_s_own(void **state)
     for (int k = 0; k < 2; k++) {
         Angioscope *scope = angioscope_create(scene.mesh, vessel[k], NULL, message, sizeof message);
         assert_non_null(scope);
-        angioscope_draw(scope, pose, stage.port);
+        angioscope_draw(scope, pose, 0, stage.port);
         if (k == 0)
             stage_read(&stage, bent);
         else
@@ -252,7 +254,7 @@ static void the_eye_stays_inside_and_sees_the_tip(void **state)
             double a = turn * PI / 360, off = lumen[k] - tool_radius - 0.01;
             Pose *pose = straight_pose(20, vec3(off, 10, 0), vec3(0, 1, 0), vec3(cos(a), 0, sin(a)), 1, tool_radius);
             AngioscopeView view;
-            assert_true(angioscope_view(scene.scope, pose, &view));
+            assert_true(angioscope_view(scene.scope, pose, 0, &view));
             VesselMemory memory = {.node = -1};
             VesselHit hit;
             vessel_query(scene.vessel, 1, &view.eye, 10, &memory, &hit);
@@ -268,6 +270,105 @@ static void the_eye_stays_inside_and_sees_the_tip(void **state)
         assert_true(furthest < 0.1);   // half a degree of turn never makes it leap
         close_tube(&scene);
     }
+    stage_close(&stage);
+}
+
+// A catheter of R 0.5 and lumen 0.3 mm with a wire of 0.18 mm in a vessel of radius 2.5 along x.
+static Pose *wire_in_catheter(double catheter, double wire) { return coaxial_pose(catheter, wire, 0.5, 0.5, tool_radius); }
+
+static void the_eye_goes_from_one_lumen_to_the_next(void **state)
+{
+    (void)state;
+    ViewStage stage;
+    if (!stage_open(&stage))
+        skip();
+    TubeScene scene = open_tube(vec3(-5, 0, 0), vec3(1, 0, 0), 60, 2.5);
+    CoaxialLooks two;
+    coaxial_looks(&two, 0.5, 0.3, tool_radius);
+    angioscope_set_tools(scene.scope, &two.looks);
+    AngioscopeView view, before = {0};
+    double most = 0;
+    for (int k = 0; k <= 900; k++) {
+        Pose *pose = wire_in_catheter(20, 16 + 0.01 * k);
+        assert_true(angioscope_view(scene.scope, pose, 1, &view));
+        double off = hypot(view.eye.y, view.eye.z);
+        if (view.eye.x < 20)
+            assert_true(off > tool_radius + 0.03 && off < 0.3 - 0.03);
+        else
+            assert_true(off > tool_radius + 0.03 && off < 2.5);
+        if (view.eye.x > 22)
+            assert_near(off, 2.8 * tool_radius, 1e-6);       // as if there were no catheter
+        most = k > 0 ? fmax(most, vec3_distance(view.eye, before.eye)) : 0;
+        before = view;
+        // from the one that reaches furthest
+        AngioscopeView furthest;
+        assert_true(angioscope_view(scene.scope, pose, -1, &furthest));
+        AngioscopeView same;
+        assert_true(angioscope_view(scene.scope, pose, 16 + 0.01 * k < 20 ? 0 : 1, &same));
+        assert_true(vec3_distance(furthest.eye, same.eye) < 1e-12);
+        pose_free(pose);
+    }
+    assert_true(most < 0.05);
+    close_tube(&scene);
+    stage_close(&stage);
+}
+
+static bool is_red(const uint8_t *p) { return p[0] > p[2] + 25; }
+static bool is_grey(const uint8_t *p, int least, int most) { return abs(p[0] - p[2]) < 25 && p[0] >= least && p[0] <= most; }
+
+static void tools_are_seen_from_in_each_other(void **state)
+{
+    (void)state;
+    ViewStage stage;
+    if (!stage_open(&stage))
+        skip();
+    static StagePixels pixels;
+    TubeScene scene = open_tube(vec3(-5, 0, 0), vec3(1, 0, 0), 60, 2.5);
+    CoaxialLooks two;
+    coaxial_looks(&two, 0.5, 0.3, tool_radius);
+    angioscope_set_tools(scene.scope, &two.looks);
+    AngioscopeView view;
+    // within the catheter: its dark lumen all around, in its open end a vessel that runs across
+    TubeScene crossing = open_tube(vec3(11.5, -17.3, 0), vec3_unit(vec3(1, sqrt(3), 0)), 40, 2.5);
+    angioscope_set_tools(crossing.scope, &two.looks);
+    Pose *pose = wire_in_catheter(20, 17);
+    assert_true(angioscope_view(crossing.scope, pose, 1, &view));
+    angioscope_draw(crossing.scope, pose, 1, square(&stage));
+    close_tube(&crossing);
+    stage_read(&stage, pixels);
+    int red = 0, dark = 0, outside = 0;
+    Vec3 mouth = seen_at(&view, vec3_sub(vec3(20, 0, 0), view.eye));
+    double mouth_radius = SIDE / 2.0 * 0.3 / ((20 - view.eye.x) * view.half_angle_tan);
+    for (int y = 0; y < SIDE; y++)
+        for (int x = 0; x < SIDE; x++) {
+            const uint8_t *p = pixels[y + STAGE_HEIGHT - SIDE][x];
+            double off = hypot(x + 0.5 - mouth.x, y + 0.5 - mouth.y);
+            red += off < mouth_radius - 1 && is_red(p);
+            outside += off > mouth_radius + 1.5 && is_red(p);
+            dark += off > mouth_radius + 1.5 && is_grey(p, 8, 110);
+        }
+    assert_true(mouth_radius > 5 && red > 0.3 * PI * mouth_radius * mouth_radius);
+    assert_int_equal(outside, 0);
+    assert_true(dark > 0.5 * SIDE * SIDE);
+    pose_free(pose);
+    // from the catheter, whose wire lies ahead: steel along the vessel's axis, and nothing without it
+    static StagePixels without;
+    pose = wire_in_catheter(20, 30);
+    angioscope_draw(scene.scope, pose, 0, square(&stage));
+    stage_read(&stage, pixels);
+    pose_free(pose);
+    pose = wire_in_catheter(20, 15);
+    assert_true(angioscope_view(scene.scope, pose, 0, &view));
+    angioscope_draw(scene.scope, pose, 0, square(&stage));
+    stage_read(&stage, without);
+    for (double x = 22.4; x < 24; x += 0.4) {
+        Vec3 at = seen_at(&view, vec3_sub(vec3(x, 0, 0), view.eye));
+        int row = (int)at.y + STAGE_HEIGHT - SIDE, column = (int)at.x;
+        assert_true(is_grey(pixels[row][column], 20, 255));
+        assert_true(brightness(pixels, at.x, at.y) > brightness(without, at.x, at.y) + 25);
+    }
+    pose_free(pose);
+    close_tube(&scene);
     stage_close(&stage);
 }
 
@@ -323,9 +424,10 @@ static void nothing_breaks_it(void **state)
         default:
             break;
         }
+        pose_fill_single_tool(pose);
         const ViewPort port = {stage.canvas.framebuffer, 30, 20, 200, 150}, tiny = {stage.canvas.framebuffer, 0, 0, 1, 1}, none = {0};
         stage_clear(&stage, 1, 0, 1);
-        angioscope_draw(scene.scope, pose, port);
+        angioscope_draw(scene.scope, pose, 0, port);
         stage_read(&stage, pixels);
         bool is_lit = false;
         for (int y = 0; y < STAGE_HEIGHT; y++)
@@ -339,10 +441,10 @@ static void nothing_breaks_it(void **state)
             assert_false(is_lit);
         if (k == 0 || k == 5)
             assert_true(is_lit);
-        angioscope_draw(empty, pose, port);
-        angioscope_draw(scene.scope, NULL, port);
-        angioscope_draw(scene.scope, pose, tiny);
-        angioscope_draw(scene.scope, pose, none);
+        angioscope_draw(empty, pose, 0, port);
+        angioscope_draw(scene.scope, NULL, 0, port);
+        angioscope_draw(scene.scope, pose, 0, tiny);
+        angioscope_draw(scene.scope, pose, 0, none);
         assert_int_equal(glGetError(), GL_NO_ERROR);
     }
     // a surface that cannot be drawn
@@ -363,6 +465,8 @@ int main(void)
         cmocka_unit_test(a_mirrored_scene_gives_a_mirrored_picture),
         cmocka_unit_test(normals_are_the_vessel_s_own),
         cmocka_unit_test(the_eye_stays_inside_and_sees_the_tip),
+        cmocka_unit_test(the_eye_goes_from_one_lumen_to_the_next),
+        cmocka_unit_test(tools_are_seen_from_in_each_other),
         cmocka_unit_test(nothing_breaks_it),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
