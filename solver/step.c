@@ -34,6 +34,7 @@ static const double SQUEEZE_MAX = 0.03, JAMMED = 0.002;
 static const double TAKE_BACK = 0.002;           // of an element's length past the mouth: a free node that would end nearer to it is held
 static const double BORDER_FORCE = 1e-3;         // of what straightening takes at the mouth: good enough
 enum { DRIVEN_TRIES = 6 };
+static const double LOST = 0.1;                  // residual of a contact solve that says nothing
 static const double FIRMEST = 1e5;               // share of its stiffness by which an unknown is held to the iterate at most, where nothing less will do
 static const double MOUTH_TRAVEL = 1;            // of an element's length that the tool springs through the mouth in a step, besides what the hand feeds
 static const double LET_GO_TURN = 0.1;           // [rad] by which a node that is let go at the mouth is turned at most
@@ -781,7 +782,8 @@ static bool goes_back(const Stepper *s)
 static double follow(Stepper *s, bool halfway)
 {
     double part = halfway ? fmin(0.5, largest_part(s)) : largest_part(s);
-    if (!s->vessel || (s->turn <= NEWTON_MOTION_IN_CONTACT && !s->overshoots)) {
+    bool is_trusted = !s->was_held && s->report.residual < LOST;
+    if (!s->vessel || (s->turn <= NEWTON_MOTION_IN_CONTACT && !s->overshoots && is_trusted)) {
         move(s, part);
         return part;
     }

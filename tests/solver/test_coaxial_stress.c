@@ -57,9 +57,9 @@ static void make_tool(Run *run, Random *random, int k, double outer, double inne
         run->section[k][2].rest_curvature = draw(random, 0, 0.25);
         run->section[k][2].rest_plane = draw(random, -PI, PI);
     }
-    for (int i = 1; i < SECTIONS; i++) {         // not more than two fingers could straighten
+    for (int i = 1; i < SECTIONS; i++) {         // a tip that its catheter can bear: a kick of 1 N
         double bending = wire_stiffness(&run->section[k][i]).bending;
-        run->section[k][i].rest_curvature = fmin(run->section[k][i].rest_curvature, sqrt(2 * 10 / bending));
+        run->section[k][i].rest_curvature = fmin(run->section[k][i].rest_curvature, sqrt(2 * 1 / bending));
     }
     WireOptions *o = k == 0 ? &run->options.wire : &run->inner[k - 1];
     *o = wire_default_options();
