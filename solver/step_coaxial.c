@@ -223,32 +223,17 @@ static void add_ways(const Way *way, const CoaxialTangent *t, int columns, Local
 
 static void put(double *at, Vec3 v) { at[0] = v.x, at[1] = v.y, at[2] = v.z; }
 
-// The damping's force on an iterate is that of the displacement so far: what `local` has more of tangent than `elastic`.
-static void add_damping(const Stepper *s, int c, const Local *elastic, Local *local)
-{
-    int n = local->n;
-    const double *done[2] = {s->linearised + row_of(s, c), s->linearised + row_of(s, c + 1)};
-    for (int r = 0; r < 2 * n; r++)
-        for (int k = 0; k < 2 * n; k++)
-            local->gradient[r] += (local->tangent[r][k] - elastic->tangent[r][k]) * done[k / n][k % n];
-}
-
 // An element whose unknowns are not those of its nodes.
 static void element_by_ways(const Stepper *s, int c, const CoaxialInput *in, const Way *way, const int *tool, double scale, Local *local)
 {
     int columns = 4 * in->count;
-    bool damps = s->is_iterate && scale != 1;
     CoaxialOutput out;
     CoaxialTangent t;
-    Local elastic;
     coaxial_element(in, &out);
     keep_inner(s, c, in, &out, tool);
-    for (int pass = 0; pass < 1 + damps; pass++) {
-        Local *to = pass ? &elastic : local;
-        coaxial_tangent(in, &out, pass ? 1 : scale, &t);
-        clear(to, s->chain.size);
-        add_ways(way, &t, columns, to);
-    }
+    coaxial_tangent(in, &out, scale, &t);
+    clear(local, s->chain.size);
+    add_ways(way, &t, columns, local);
     double own[NODAL + COAXIAL_COLUMNS];
     put(own, vec3_negate(out.beam.force2));
     put(own + 3, out.beam.moment1);
@@ -258,8 +243,6 @@ static void element_by_ways(const Stepper *s, int c, const CoaxialInput *in, con
     for (int r = 0; r < NODAL + columns; r++)
         for (int i = 0; i < way[r].count; i++)
             local->gradient[way[r].at[i]] += own[r] * way[r].by[i];
-    if (damps)
-        add_damping(s, c, &elastic, local);
 }
 
 // Node 2 is one as any: what is not its own is in how node 1 takes part.
@@ -303,38 +286,31 @@ static void tip_element(const Stepper *s, int c, double scale, Local *local)
     element_by_ways(s, c, &in, way, tool, scale, local);
 }
 
-// Element c between two nodes of the same tool: its gradient, and its tangent with the damping's.
+// Element c between two nodes of the same tool.
 static void inner_element(const Stepper *s, int c, double scale, Local *local)
 {
     int n = s->chain.size, tool[STEP_TOOLS_MAX], place[NODAL + COAXIAL_COLUMNS], columns = 0;
-    bool plain = is_plain(s, c), damps = s->is_iterate && scale != 1;
-    BeamInput beam = stepper_beam(s, c);
     BeamOutput own;
     CoaxialInput in = {0};
     CoaxialOutput out;
     CoaxialTangent t;
-    Local elastic;
     const BeamOutput *o = &own;
-    if (plain) {
+    if (is_plain(s, c)) {
+        BeamInput beam = stepper_beam(s, c);
         beam_element(&beam, &own);
         keep_plain(s, c, &beam, &own);
+        beam_tangent(&beam, &own, scale, &t.nodes);
     } else {
         in = input_at(s, c, tool);
         columns = 4 * in.count;
         coaxial_element(&in, &out);
         keep_inner(s, c, &in, &out, tool);
+        coaxial_tangent(&in, &out, scale, &t);
         o = &out.beam;
     }
     places(&in, tool, n, place);
-    for (int pass = 0; pass < 1 + damps; pass++) {
-        Local *to = pass ? &elastic : local;
-        if (plain)
-            beam_tangent(&beam, &own, pass ? 1 : scale, &t.nodes);
-        else
-            coaxial_tangent(&in, &out, pass ? 1 : scale, &t);
-        clear(to, n);
-        add_local(to, &t, columns, place);
-    }
+    clear(local, n);
+    add_local(local, &t, columns, place);
     put(local->gradient, vec3_negate(o->force2));
     put(local->gradient + 3, o->moment1);
     put(local->gradient + n, o->force2);
@@ -342,8 +318,6 @@ static void inner_element(const Stepper *s, int c, double scale, Local *local)
     for (int p = 0; p < columns; p++)
         if (place[NODAL + p] >= 0)
             local->gradient[place[NODAL + p]] += out.gradient[p];
-    if (damps)
-        add_damping(s, c, &elastic, local);
 }
 
 static void free_element(const Stepper *s, int c, double scale, Local *local)
@@ -399,7 +373,6 @@ static double sheath_element_of_tools(const Stepper *s, int c, double scale, Loc
     CoaxialInput in = input_at(s, c, tool);
     CoaxialRest rest;
     coaxial_rest(in.span, in.count, &rest);
-    const double *done[2] = {s->linearised + row_of(s, c), s->linearised + row_of(s, c + 1)};
     double length = stepper_sheath_coordinate(s, c + 1) - stepper_sheath_coordinate(s, c), psi = tools_twist(s, c), energy = 0;
     int inner = s->state.inner_count;
     for (int k = 0; local && k < inner; k++)
@@ -412,18 +385,13 @@ static double sheath_element_of_tools(const Stepper *s, int c, double scale, Loc
         int at = unknown_of(tool[i]), along[4] = {0, n, at, n + at}, about[4] = {3, n + 3, at + 1, n + at + 1};
         double ka = rest.axial[i], kt = rest.torsion[i], strain = length - rest.own_length[i], turn = psi + p->phi2 - p->phi1;
         static const double by_length[4] = {-1, 1, 1, -1}, by_turn[4] = {-1, 1, -1, 1};
-        double damped_strain = 0, damped_turn = 0;
         int unknowns = p->is_fixed ? 2 : 4;
-        for (int k = 0; k < unknowns; k++) {
-            damped_strain += by_length[k] * done[along[k] / n][along[k] % n];
-            damped_turn += by_turn[k] * done[about[k] / n][about[k] % n];
-        }
         energy += 0.5 * (ka * strain * strain + kt * turn * turn);
         for (int k = 0; local && k < tool[i]; k++)
             s->inner_tension[c * inner + k] += ka * strain;
         for (int r = 0; local && r < unknowns; r++) {
-            local->gradient[along[r]] += by_length[r] * ka * (strain + (scale - 1) * damped_strain);
-            local->gradient[about[r]] += by_turn[r] * kt * (turn + (scale - 1) * damped_turn);
+            local->gradient[along[r]] += by_length[r] * ka * strain;
+            local->gradient[about[r]] += by_turn[r] * kt * turn;
             for (int k = 0; k < unknowns; k++) {
                 local->tangent[along[r]][along[k]] += scale * ka * by_length[r] * by_length[k];
                 local->tangent[about[r]][about[k]] += scale * kt * by_turn[r] * by_turn[k];
@@ -476,7 +444,15 @@ static void mouth_element_of_tools(const Stepper *s, double scale, Local *local)
     Way way[NODAL + COAXIAL_COLUMNS];
     mouth_ways(s, &in, tool, way);
     element_by_ways(s, c, &in, way, tool, scale, local);
-    // what lies straight behind the mouth gets longer with S there
+}
+
+// What lies straight behind the mouth gets longer with S there.
+static void add_straightening(const Stepper *s, Local *local)
+{
+    int tool[STEP_TOOLS_MAX];
+    CoaxialInput in = mouth_input(s, tool);
+    Way way[NODAL + COAXIAL_COLUMNS];
+    mouth_ways(s, &in, tool, way);
     for (int i = 0; i < in.count; i++) {
         const Way *w = &way[NODAL + 4 * i + COAXIAL_S1];
         for (int j = 0; j < w->count; j++)
@@ -678,9 +654,48 @@ static void tips_short_of_nodes(Stepper *s)
 
 // --- all of it ---
 
+static void element(const Stepper *s, int c, double scale, Local *local)
+{
+    if (c + 1 < s->first_free) {
+        clear(local, s->chain.size);
+        sheath_element_of_tools(s, c, scale, local);
+    } else if (c + 1 == s->first_free) {
+        mouth_element_of_tools(s, scale, local);
+    } else {
+        free_element(s, c, scale, local);
+    }
+}
+
+// How element c has turned as a whole in this step; at the mouth it is clamped.
+static Quat turned_as_a_whole(const Stepper *s, int c)
+{
+    if (c < s->first_free)
+        return (Quat){1, 0, 0, 0};
+    const Quat *q = s->state.orientation + c, *p = s->start_orientation + c;
+    Quat turn[2] = {quat_mul(q[0], quat_conjugate(p[0])), quat_mul(q[1], quat_conjugate(p[1]))};
+    double same = turn[0].w * turn[1].w + turn[0].x * turn[1].x + turn[0].y * turn[1].y + turn[0].z * turn[1].z < 0 ? -1 : 1;
+    return quat_unit((Quat){turn[0].w + same * turn[1].w, turn[0].x + same * turn[1].x, turn[0].y + same * turn[1].y, turn[0].z + same * turn[1].z});
+}
+
+// What the elastic forces of element c have changed by since the step's start, the element's turn as a whole apart: C (strain - strain at the start).
+static void strained(const Stepper *s, int c, const double *gradient, double *change)
+{
+    int n = s->chain.size;
+    const double *start = s->start_gradient + 2 * row_of(s, c);
+    Quat turn = turned_as_a_whole(s, c);
+    for (int i = 0; i < 2 * n; i++)
+        change[i] = gradient[i] - start[i];
+    for (int node = 0; node < 2; node++)
+        for (int half = 0; half < 2 && c + node >= s->first_free; half++) {
+            int at = node * n + 3 * half;
+            Vec3 was = quat_rotate(turn, vec3(start[at], start[at + 1], start[at + 2]));
+            put(change + at, vec3_sub(vec3(gradient[at], gradient[at + 1], gradient[at + 2]), was));
+        }
+}
+
 void tools_assemble(Stepper *s, double scale, double inertia)
 {
-    int nodes = s->state.node_count;
+    int nodes = s->state.node_count, n = s->chain.size;
     Local local;
     memset(s->chain.diag, 0, block_of(s, nodes) * sizeof(double));
     memset(s->chain.lower, 0, block_of(s, nodes - 1) * sizeof(double));
@@ -688,14 +703,17 @@ void tools_assemble(Stepper *s, double scale, double inertia)
     for (int c = 0; c < nodes; c++)
         node_inertia(s, c, inertia);
     for (int c = 0; c + 1 < nodes; c++) {
-        if (c + 1 < s->first_free) {
-            clear(&local, s->chain.size);
-            sheath_element_of_tools(s, c, scale, &local);
-        } else if (c + 1 == s->first_free) {
-            mouth_element_of_tools(s, scale, &local);
-        } else {
-            free_element(s, c, scale, &local);
+        double *start = s->start_gradient + 2 * row_of(s, c), change[2 * BLOCK_LARGEST];
+        element(s, c, scale, &local);
+        if (!s->is_iterate) {
+            memcpy(start, local.gradient, 2 * (size_t)n * sizeof *start);
+        } else if (scale != 1) {
+            strained(s, c, local.gradient, change);
+            for (int i = 0; i < 2 * n; i++)
+                local.gradient[i] += (scale - 1) * change[i];
         }
+        if (c + 1 == s->first_free)
+            add_straightening(s, &local);
         add_to_chain(s, c, &local);
     }
     tips_short_of_nodes(s);
@@ -747,24 +765,14 @@ double tools_elastic_energy(const Stepper *s)
 double tools_stiffness_damping(const Stepper *s)
 {
     int n = s->chain.size;
-    double work = 0, scale = 1 + s->damping_stiffness / s->dt;
-    Local with, without;
+    double work = 0, change[2 * BLOCK_LARGEST];
+    Local local;
     for (int c = 0; c + 1 < s->state.node_count; c++) {
         const double *done[2] = {s->linearised + row_of(s, c), s->linearised + row_of(s, c + 1)};
-        for (int i = 0; i < 2; i++) {
-            Local *local = i ? &with : &without;
-            if (c + 1 < s->first_free) {
-                clear(local, n);
-                sheath_element_of_tools(s, c, i ? scale : 1, local);
-            } else if (c + 1 == s->first_free) {
-                mouth_element_of_tools(s, i ? scale : 1, local);
-            } else {
-                free_element(s, c, i ? scale : 1, local);
-            }
-        }
-        for (int r = 0; r < 2 * n; r++)
-            for (int k = 0; k < 2 * n; k++)
-                work += done[r / n][r % n] * (with.tangent[r][k] - without.tangent[r][k]) * done[k / n][k % n];
+        element(s, c, 1, &local);
+        strained(s, c, local.gradient, change);
+        for (int i = 0; i < 2 * n; i++)
+            work += change[i] * done[i / n][i % n];
     }
-    return work;
+    return s->damping_stiffness / s->dt * work;
 }

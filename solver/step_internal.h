@@ -82,6 +82,7 @@ struct Stepper {
     Tool tool[STEP_TOOLS_MAX];
     int *carrier;            // (M) the tool that carries a node
     double *start_slide, *start_angle; // (M, I) at x_n
+    double *start_gradient;  // (E, 2, 6 + 2 I) elastic forces of the elements at x_n
     Vec3 *inner_moment;      // (E, I) [N mm] of tool 1 + i and all inside it at the middle of an element …
     double *inner_tension;   // (E, I) [N] … and their tension
     double *middle;          // (E) [mm] of an element along the line
