@@ -249,6 +249,38 @@ static void friction_in_a_bend(void **state)
 
 // Three tools: the wire pulled alone slides in the middle one, which the outer tube's friction holds; wire and middle one pulled together slide in the outer one.
 // Either way it is reference 5, R 20 and clearance 0.05, with the stiffness of what is bent inside. Energy is accounted for.
+// Reference 4: a thread over a bend of 90 degrees with mu 0.1, a weight at its end: exp(0.1 pi / 2) = 1.1701 of the weight to pull it up, 1/1.1701 to let it down.
+static void a_thread_over_a_bend(void **state)
+{
+    (void)state;
+    for (int fine = 0; fine < 2; fine++) {
+        double arc = 20 * PI / 2, g = 0.0981;   // heavy, so that its stiffness does not count
+        WireSection tube[3] = {tube_section(20, 1e5, 0, 1.5, 0.14), tube_section(arc, 1e5, 0.05, 1.5, 0.14), tube_section(20, 1e5, 0, 1.5, 0.14)};
+        Coaxial c = {0};
+        c.section[1][0] = tube_section(180, 0.0032, 0, 0.1, 0);
+        c.section[1][1] = tube_section(20, 0.0032, 0, 0.1, 0);
+        c.section[1][0].density = 1e-4;
+        tube[0].density = tube[1].density = tube[2].density = 1e-6;
+        c.section[1][1].density = 1;
+        double weight = PI / 4 * 0.1 * 0.1 * 20 * g;
+        c.options.wire = tool_options(tube, 3, fine ? 80 : 40, 0);
+        c.options.wire.gravity = vec3(0, g, 0);          // the bend leads down
+        c.inner[0] = tool_options(c.section[1], 2, fine ? 240 : 120, 40 + arc - 3);
+        c.options.inner_friction[0] = 0.1;
+        c.options.wire.damping_mass = 0.05;
+        start(&c, 1, false);
+        StepCommand rest[2] = {{0}};
+        for (int k = 0; k < 800; k++)
+            step_tools(c.stepper, rest);
+        move_tool(c.stepper, 1, 33, 0, 3300, 200);
+        double up = -move_tool(c.stepper, 1, -2, 0, 2000, 0)->push[1] / weight;
+        double down = -move_tool(c.stepper, 1, 2, 0, 2000, 0)->push[1] / weight, exact = exp(0.1 * PI / 2);
+        print_message("%d elements: %.5f of the weight up (%.5f), %.5f down (%.5f)\n", fine ? 80 : 40, up, exact, down, 1 / exact);
+        assert_true(fabs(up / exact - 1) < 0.005 && fabs(down * exact - 1) < 0.005);
+        stepper_destroy(c.stepper);
+    }
+}
+
 static void friction_acts_between_neighbours(void **state)
 {
     (void)state;
@@ -283,13 +315,20 @@ static void friction_acts_between_neighbours(void **state)
     assert_true(fabs((push[1][1] + push[1][2]) / (-0.191 * 50 / 65.96) - 1) < 0.1);
 }
 
-static Vessel *winding_tube(void)
+// Turned as a whole by `turn`, or its mirror image in the plane of its first bend.
+static Vessel *winding_tube_as(Quat turn, bool mirrored)
 {
-    TubePiece piece[] = {line_piece(20), arc_piece(15, 90, 0), line_piece(10), arc_piece(10, 90, 90), line_piece(30)};
-    return tube_of(piece, 5, 2);
+    TubePiece piece[] = {line_piece(20), arc_piece(15, 90, 0), line_piece(10), arc_piece(10, 90, mirrored ? -90 : 90), line_piece(30)};
+    TubeOptions options = {.direction = quat_rotate(turn, vec3(1, 0, 0)), .normal = quat_rotate(turn, vec3(0, 1, 0)), .radius = 2, .piece_count = 5, .piece = piece};
+    Faults faults = {0};
+    Vessel *vessel = tube_vessel_create(&options, "test", &faults);
+    assert_non_null(vessel);
+    return vessel;
 }
 
-static void three_in_a_tube(Coaxial *c, const Vessel *vessel)
+static Vessel *winding_tube(void) { return winding_tube_as((Quat){1, 0, 0, 0}, false); }
+
+static void three_in_a_tube_as(Coaxial *c, const Vessel *vessel, Quat turn)
 {
     *c = (Coaxial){0};
     c->section[0][0] = tube_section(150, 60, 0, 1.2, 1.0);
@@ -302,10 +341,14 @@ static void three_in_a_tube(Coaxial *c, const Vessel *vessel)
     c->options.wire = tool_options(c->section[0], 2, 80, 1);
     c->options.wire.damping_stiffness = 0.2;
     c->options.wire.damping_mass = 1e-3;
+    c->options.wire.direction = quat_rotate(turn, vec3(1, 0, 0));
+    c->options.wire.normal = quat_rotate(turn, vec3(0, 1, 0));
     c->inner[0] = tool_options(c->section[1], 2, 100, 2);
     c->inner[1] = tool_options(c->section[2], 2, 120, 3);
     start(c, 2, true);
 }
+
+static void three_in_a_tube(Coaxial *c, const Vessel *vessel) { three_in_a_tube_as(c, vessel, (Quat){1, 0, 0, 0}); }
 
 static void wire_first(int i, StepCommand *command)
 {
@@ -352,6 +395,43 @@ static void three_tools_stay_in_the_tube(void **state)
     }
     stepper_destroy(c.stepper);
     vessel->destroy(vessel);
+}
+
+// Law 6: turned as a whole, and as its mirror image with the twists the other way round, a scene goes the same way.
+static void turned_and_mirrored_scenes_go_the_same_way(void **state)
+{
+    (void)state;
+    enum { STEPS = 2500 };
+    Quat turn[3] = {{1, 0, 0, 0}, quat_from_rotation_vector(vec3(0.7, -1.9, 0.4)), {1, 0, 0, 0}};
+    double push[3][3];
+    Vec3 tip[3];
+    for (int i = 0; i < 3; i++) {
+        bool mirrored = i == 2;
+        Coaxial c;
+        Vessel *vessel = winding_tube_as(turn[i], mirrored);
+        three_in_a_tube_as(&c, vessel, turn[i]);
+        for (int k = 0; k < STEPS; k++) {
+            StepCommand command[3];
+            wire_first(k, command);
+            for (int tool = 0; tool < 3; tool++)
+                command[tool].twist *= mirrored ? -1 : 1;
+            const StepReport *r = step_tools(c.stepper, command);
+            for (int tool = 0; tool < 3; tool++)
+                push[i][tool] = r->push[tool];
+        }
+        const WireState *w = stepper_state(c.stepper);
+        tip[i] = quat_rotate(quat_conjugate(turn[i]), w->position[w->node_count - 1]);
+        tip[i].z *= mirrored ? -1 : 1;
+        print_message("%s: tip %.7f %.7f %.7f, pushes %.7f %.7f %.7f\n", i == 0 ? "as it is" : i == 1 ? "turned" : "mirrored", tip[i].x, tip[i].y, tip[i].z, push[i][0], push[i][1],
+                      push[i][2]);
+        stepper_destroy(c.stepper);
+        vessel->destroy(vessel);
+    }
+    for (int i = 1; i < 3; i++) {
+        assert_true(vec3_distance(tip[i], tip[0]) < 1e-4);
+        for (int tool = 0; tool < 3; tool++)
+            assert_true(fabs(push[i][tool] - push[0][tool]) < 1e-4);
+    }
 }
 
 static void a_restored_run_repeats(void **state)
@@ -503,6 +583,8 @@ int main(void)
         cmocka_unit_test(friction_in_a_bend),               cmocka_unit_test(friction_acts_between_neighbours),
         cmocka_unit_test(three_tools_stay_in_the_tube),     cmocka_unit_test(a_restored_run_repeats),
         cmocka_unit_test(hands_stop_and_slip),
+        cmocka_unit_test(a_thread_over_a_bend),
+        cmocka_unit_test(turned_and_mirrored_scenes_go_the_same_way),
         cmocka_unit_test(the_outermost_hand_slips_by_its_own_push),
         cmocka_unit_test(a_valve_holds_what_no_hand_does),
     };
