@@ -418,8 +418,11 @@ static bool open_window(Trainer *trainer, Faults *faults)
 
 static bool open_cine(Trainer *trainer, Faults *faults)
 {
-    int nodes = simulator_state(trainer->session.simulator)->node_count, vessel_nodes = trainer->open->tree ? trainer->open->tree->node_count : 0;
-    if (trainer_cine_open(&trainer->cine, nodes, vessel_nodes, trainer->options->cine, faults))
+    Stepper *stepper = simulator_stepper(trainer->session.simulator);
+    CineShape shape = {.tool_count = stepper_tool_count(stepper), .contrast_count = trainer->open->tree ? trainer->open->tree->node_count : 0};
+    for (int k = 0; k < shape.tool_count; k++)
+        shape.tool_nodes[k] = stepper_tool_nodes(stepper, k, NULL);
+    if (trainer_cine_open(&trainer->cine, &shape, trainer->options->cine, faults))
         return true;
     end_session(trainer, faults);
     return false;

@@ -10,11 +10,11 @@
 
 enum { LOOP_IMAGES = 900, FILM_SIDE = 768 };
 
-bool trainer_cine_open(TrainerCine *cine, int node_count, int contrast_count, const char *path, Faults *faults)
+bool trainer_cine_open(TrainerCine *cine, const CineShape *shape, const char *path, Faults *faults)
 {
     *cine = (TrainerCine){0};
     if (!path) {
-        cine->cine = cine_create(node_count, contrast_count, LOOP_IMAGES);
+        cine->cine = cine_create(shape, LOOP_IMAGES);
         if (!cine->cine)
             faults_add(faults, "cine", 0, 0, "no memory for a loop of %d images", LOOP_IMAGES);
         return cine->cine != NULL;
@@ -23,9 +23,10 @@ bool trainer_cine_open(TrainerCine *cine, int node_count, int contrast_count, co
     char *bytes = whole_file_read(path, &length, faults);
     cine->cine = bytes ? cine_unpack((const uint8_t *)bytes, length, path, faults) : NULL;
     free(bytes);
-    if (cine->cine && (cine_node_count(cine->cine) != node_count || cine_contrast_count(cine->cine) != contrast_count)) {
-        faults_add(faults, path, 0, 0, "is a loop of a tool of %d nodes in a vessel of %d; this scene has %d and %d", cine_node_count(cine->cine),
-                   cine_contrast_count(cine->cine), node_count, contrast_count);
+    CineShape found = cine->cine ? cine_shape(cine->cine) : *shape;
+    if (cine->cine && !cine_shapes_same(&found, shape)) {
+        faults_add(faults, path, 0, 0, "is a loop of %d tools, the first of %d nodes, in a vessel of %d; this scene has %d, %d and %d", found.tool_count, found.tool_nodes[0],
+                   found.contrast_count, shape->tool_count, shape->tool_nodes[0], shape->contrast_count);
         trainer_cine_close(cine);
     }
     return cine->cine != NULL;

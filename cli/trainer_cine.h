@@ -13,7 +13,7 @@ typedef struct TrainerCine {
 } TrainerCine;
 
 // Room for half a minute at 30 images a second, or the loop in the file `path` where it is not NULL. False with faults.
-bool trainer_cine_open(TrainerCine *cine, int node_count, int contrast_count, const char *path, Faults *faults);
+bool trainer_cine_open(TrainerCine *cine, const CineShape *shape, const char *path, Faults *faults);
 void trainer_cine_close(TrainerCine *cine);
 // Record and replay as pressed; true where the picture jumps, so that the held one must be forgotten. `told`: what happened, "" where nothing.
 bool trainer_cine_obey(TrainerCine *cine, const PanelActions *actions, char *told, size_t capacity);

@@ -1,5 +1,5 @@
-// A ring of images in arrays taken at once. File, all little-endian: "SELDCINE", version, tool nodes, vessel nodes, images (4 bytes each); the images,
-// field by field in the order of walk_frame(); FNV-1a of all before (8 bytes).
+// A ring of images in arrays taken at once. File, all little-endian: "SELDCINE", version, tool nodes, vessel nodes, images (4 bytes each); with several tools,
+// which is version 2, their number and the nodes of each of four; the images, field by field in the order of walk_frame(); FNV-1a of all before (8 bytes).
 #include "render/cine.h"
 
 #include "render/message.h"
@@ -12,12 +12,14 @@
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "files are little-endian");
 
-enum { MOST_NODES = 100000, MOST_CONTRAST = 10000000, MOST_FRAMES = 1000000, VERSION = 1 };
+enum { MOST_NODES = 100000, MOST_CONTRAST = 10000000, MOST_FRAMES = 1000000, ONE_TOOL = 1, SEVERAL_TOOLS = 2 };
 static const uint64_t MOST_BYTES = (uint64_t)8 << 30;
 static const char magic[] = "SELDCINE";
 
 struct Cine {
-    int node_count, contrast_count, capacity;
+    CineShape shape;
+    int node_count;          // of all tools
+    int capacity;
     int first, count;        // ring
     int64_t dropped;
     bool is_recording, is_locked;
@@ -26,45 +28,81 @@ struct Cine {
     Vec3 *position;          // (capacity, node_count)
     Quat *quaternion;
     NodeReport *node;
-    float *contrast;         // (capacity, contrast_count)
+    ToolNode *tool_node;     // (capacity, node_count) one tool after the other
+    float *contrast;         // (capacity, shape.contrast_count)
 };
 
-static uint64_t bytes_of_frame(int node_count, int contrast_count)
+CineShape cine_shape_for(const Pose *pose, int contrast_count)
 {
-    return sizeof(Pose) + sizeof(uint32_t) + (uint64_t)node_count * (sizeof(Vec3) + sizeof(Quat) + sizeof(NodeReport)) +
-           (uint64_t)contrast_count * sizeof(float);
+    CineShape shape = {.tool_count = pose->tool_count, .contrast_count = contrast_count};
+    for (int k = 0; k < pose->tool_count; k++)
+        shape.tool_nodes[k] = pose->tool[k].node_count;
+    return shape;
 }
 
-size_t cine_bytes(int node_count, int contrast_count, int capacity)
+bool cine_shapes_same(const CineShape *a, const CineShape *b)
 {
-    if (node_count < 1 || node_count > MOST_NODES || contrast_count < 0 || contrast_count > MOST_CONTRAST || capacity < 1 || capacity > MOST_FRAMES)
+    bool same = a->tool_count == b->tool_count && a->contrast_count == b->contrast_count;
+    for (int k = 0; same && k < a->tool_count; k++)
+        same = a->tool_nodes[k] == b->tool_nodes[k];
+    return same;
+}
+
+// 0 where a count is unfit.
+static int nodes_of(const CineShape *shape)
+{
+    int sum = 0;
+    if (shape->tool_count < 1 || shape->tool_count > STEP_TOOLS_MAX)
         return 0;
-    uint64_t bytes = bytes_of_frame(node_count, contrast_count) * (uint64_t)capacity;
+    for (int k = 0; k < shape->tool_count; k++) {
+        if (shape->tool_nodes[k] < 1 || shape->tool_nodes[k] > MOST_NODES)
+            return 0;
+        sum += shape->tool_nodes[k];
+    }
+    return sum;
+}
+
+size_t cine_bytes(const CineShape *shape, int capacity)
+{
+    int nodes = nodes_of(shape);
+    if (nodes == 0 || shape->contrast_count < 0 || shape->contrast_count > MOST_CONTRAST || capacity < 1 || capacity > MOST_FRAMES)
+        return 0;
+    uint64_t image = sizeof(Pose) + sizeof(uint32_t) + (uint64_t)nodes * (sizeof(Vec3) + sizeof(Quat) + sizeof(NodeReport) + sizeof(ToolNode)) +
+                     (uint64_t)shape->contrast_count * sizeof(float);
+    uint64_t bytes = image * (uint64_t)capacity;
     return bytes <= MOST_BYTES ? (size_t)bytes : 0;
 }
 
-Cine *cine_create(int node_count, int contrast_count, int capacity)
+Cine *cine_create(const CineShape *shape, int capacity)
 {
-    Cine *cine = cine_bytes(node_count, contrast_count, capacity) > 0 ? calloc(1, sizeof *cine) : NULL;
+    Cine *cine = cine_bytes(shape, capacity) > 0 ? calloc(1, sizeof *cine) : NULL;
     if (!cine)
         return NULL;
+    int node_count = nodes_of(shape);
     size_t frames = (size_t)capacity, nodes = frames * (size_t)node_count;
-    *cine = (Cine){.node_count = node_count,
-                   .contrast_count = contrast_count,
+    *cine = (Cine){.shape = *shape,
+                   .node_count = node_count,
                    .capacity = capacity,
                    .pose = calloc(frames, sizeof *cine->pose),
                    .pulse = calloc(frames, sizeof *cine->pulse),
                    .position = calloc(nodes, sizeof *cine->position),
                    .quaternion = calloc(nodes, sizeof *cine->quaternion),
                    .node = calloc(nodes, sizeof *cine->node),
-                   .contrast = calloc(frames * (size_t)contrast_count + 1, sizeof *cine->contrast)};
-    if (!cine->pose || !cine->pulse || !cine->position || !cine->quaternion || !cine->node || !cine->contrast) {
+                   .tool_node = calloc(nodes, sizeof *cine->tool_node),
+                   .contrast = calloc(frames * (size_t)shape->contrast_count + 1, sizeof *cine->contrast)};
+    if (!cine->pose || !cine->pulse || !cine->position || !cine->quaternion || !cine->node || !cine->tool_node || !cine->contrast) {
         cine_free(cine);
         return NULL;
     }
     for (int i = 0; i < capacity; i++) {
         size_t at = (size_t)i * (size_t)node_count;
-        cine->pose[i] = (Pose){.node_count = node_count, .position = cine->position + at, .quaternion = cine->quaternion + at, .node = cine->node + at};
+        Pose *pose = &cine->pose[i];
+        *pose = (Pose){.tool_count = shape->tool_count, .node_capacity = node_count, .node_count = node_count, .position = cine->position + at,
+                       .quaternion = cine->quaternion + at, .node = cine->node + at};
+        for (int k = 0; k < shape->tool_count; k++) {
+            pose->tool[k] = (PoseTool){.node_count = shape->tool_nodes[k], .node = cine->tool_node + at};
+            at += (size_t)shape->tool_nodes[k];
+        }
     }
     return cine;
 }
@@ -78,12 +116,13 @@ void cine_free(Cine *cine)
     free(cine->position);
     free(cine->quaternion);
     free(cine->node);
+    free(cine->tool_node);
     free(cine->contrast);
     free(cine);
 }
 
 static int slot(const Cine *cine, int index) { return (cine->first + index) % cine->capacity; }
-static float *contrast_of(const Cine *cine, int place) { return cine->contrast + (size_t)place * (size_t)cine->contrast_count; }
+static float *contrast_of(const Cine *cine, int place) { return cine->contrast + (size_t)place * (size_t)cine->shape.contrast_count; }
 
 // --- recording ---
 
@@ -103,7 +142,9 @@ void cine_lock(Cine *cine, bool locked) { cine->is_locked = locked; }
 bool cine_add(Cine *cine, const CineFrame *frame)
 {
     bool is_known = cine->count > 0 && cine->pulse[slot(cine, cine->count - 1)] == frame->pulse, is_full = cine->count == cine->capacity;
-    if (!cine->is_recording || is_known || frame->pose->node_count != cine->node_count || (is_full && cine->is_locked))
+    CineShape shape = cine_shape_for(frame->pose, cine->shape.contrast_count);
+    bool fits = cine_shapes_same(&shape, &cine->shape) && frame->pose->node_count <= cine->node_count;
+    if (!cine->is_recording || is_known || !fits || (is_full && cine->is_locked))
         return false;
     if (is_full) {
         cine->first = slot(cine, 1);
@@ -114,13 +155,12 @@ bool cine_add(Cine *cine, const CineFrame *frame)
     pose_copy(&cine->pose[place], frame->pose);
     cine->pulse[place] = frame->pulse;
     float *contrast = contrast_of(cine, place);
-    for (int i = 0; i < cine->contrast_count; i++)
+    for (int i = 0; i < cine->shape.contrast_count; i++)
         contrast[i] = frame->contrast ? frame->contrast[i] : 0;
     return true;
 }
 
-int cine_node_count(const Cine *cine) { return cine->node_count; }
-int cine_contrast_count(const Cine *cine) { return cine->contrast_count; }
+CineShape cine_shape(const Cine *cine) { return cine->shape; }
 int cine_capacity(const Cine *cine) { return cine->capacity; }
 int cine_count(const Cine *cine) { return cine->count; }
 int64_t cine_dropped(const Cine *cine) { return cine->dropped; }
@@ -128,7 +168,7 @@ int64_t cine_dropped(const Cine *cine) { return cine->dropped; }
 CineFrame cine_frame(const Cine *cine, int index)
 {
     int place = slot(cine, index);
-    return (CineFrame){&cine->pose[place], cine->contrast_count > 0 ? contrast_of(cine, place) : NULL, cine->pulse[place]};
+    return (CineFrame){&cine->pose[place], cine->shape.contrast_count > 0 ? contrast_of(cine, place) : NULL, cine->pulse[place]};
 }
 
 double cine_frame_s(const Cine *cine, int index)
@@ -231,9 +271,27 @@ static void walk_report(Cursor *cursor, StepReport *report)
     WALK(cursor, report->newton);
 }
 
+static void walk_tool(Cursor *cursor, PoseTool *tool)
+{
+    WALK(cursor, tool->command.push_mm_s);
+    WALK(cursor, tool->command.twist_deg_s);
+    WALK(cursor, tool->inserted_mm);
+    WALK(cursor, tool->push_n);
+    WALK(cursor, tool->torque_n_mm);
+    for (int j = 0; j < tool->node_count; j++) {
+        ToolNode *node = &tool->node[j];
+        WALK(cursor, node->s);
+        WALK(cursor, node->position);
+        WALK(cursor, node->orientation);
+        WALK(cursor, node->radius);
+        WALK(cursor, node->carrier);
+    }
+}
+
 static void walk_frame(Cursor *cursor, Cine *cine, int place)
 {
     Pose *pose = &cine->pose[place];
+    bool has_several = cine->shape.tool_count > 1;
     WALK(cursor, cine->pulse[place]);
     WALK(cursor, pose->step);
     WALK(cursor, pose->time_s);
@@ -241,11 +299,17 @@ static void walk_frame(Cursor *cursor, Cine *cine, int place)
     WALK(cursor, pose->command.twist_deg_s);
     WALK(cursor, pose->xray);
     WALK(cursor, pose->inserted_mm);
+    if (has_several)
+        WALK(cursor, pose->node_count);
     WALK(cursor, pose->first_free_node);
     walk_report(cursor, &pose->report);
-    walk(cursor, pose->position, (size_t)cine->node_count * sizeof *pose->position);
-    walk(cursor, pose->quaternion, (size_t)cine->node_count * sizeof *pose->quaternion);
-    for (int i = 0; i < cine->node_count; i++) {
+    if (pose->node_count < 1 || pose->node_count > cine->node_count) {
+        cursor->good = false;
+        pose->node_count = cine->node_count;
+    }
+    walk(cursor, pose->position, (size_t)pose->node_count * sizeof *pose->position);
+    walk(cursor, pose->quaternion, (size_t)pose->node_count * sizeof *pose->quaternion);
+    for (int i = 0; i < pose->node_count; i++) {
         NodeReport *node = &pose->node[i];
         WALK(cursor, node->s);
         WALK(cursor, node->radius);
@@ -253,18 +317,28 @@ static void walk_frame(Cursor *cursor, Cine *cine, int place)
         WALK(cursor, node->gap);
         WALK(cursor, node->vessel_node);
     }
-    walk(cursor, contrast_of(cine, place), (size_t)cine->contrast_count * sizeof *cine->contrast);
+    for (int k = 0; has_several && k < pose->tool_count; k++)
+        walk_tool(cursor, &pose->tool[k]);
+    if (!has_several && !cursor->out)
+        pose_fill_single_tool(pose);
+    walk(cursor, contrast_of(cine, place), (size_t)cine->shape.contrast_count * sizeof *cine->contrast);
 }
 
 enum {
     HEAD_BYTES = 8 + 4 * 4,
+    TOOLS_BYTES = 4 + STEP_TOOLS_MAX * 4,
     FRAME_BYTES = 4 + 8 + 8 + 2 * 8 + (int)sizeof(XrayControl) + 8 + 4 + 4 * 4 + 7 * 8 + 4,
-    NODE_BYTES = 3 * 8 + 4 * 8 + 6 * 8 + 4
+    NODE_BYTES = 3 * 8 + 4 * 8 + 6 * 8 + 4,
+    TOOL_BYTES = 5 * 8,
+    TOOL_NODE_BYTES = 9 * 8 + 4
 };
 
-static uint64_t file_bytes(int node_count, int contrast_count, int count)
+// Of a file of so many images whose centrelines have `line_nodes` nodes in all.
+static uint64_t file_bytes(const CineShape *shape, int count, uint64_t line_nodes)
 {
-    return HEAD_BYTES + 8 + (uint64_t)count * (FRAME_BYTES + (uint64_t)node_count * NODE_BYTES + (uint64_t)contrast_count * 4);
+    bool has_several = shape->tool_count > 1;
+    uint64_t tools = has_several ? 4 + (uint64_t)shape->tool_count * TOOL_BYTES + (uint64_t)nodes_of(shape) * TOOL_NODE_BYTES : 0;
+    return (uint64_t)HEAD_BYTES + (has_several ? TOOLS_BYTES : 0) + 8 + line_nodes * NODE_BYTES + (uint64_t)count * (FRAME_BYTES + tools + (uint64_t)shape->contrast_count * 4);
 }
 
 static uint64_t checksum(const uint8_t *bytes, size_t length)
@@ -275,20 +349,43 @@ static uint64_t checksum(const uint8_t *bytes, size_t length)
     return hash;
 }
 
+static void walk_head(Cursor *cursor, uint32_t *version, CineShape *shape, int32_t *count)
+{
+    char mark[8];
+    memcpy(mark, magic, 8);
+    int32_t nodes[3] = {nodes_of(shape), shape->contrast_count, *count};
+    *version = shape->tool_count > 1 ? SEVERAL_TOOLS : ONE_TOOL;
+    WALK(cursor, mark);
+    WALK(cursor, *version);
+    WALK(cursor, nodes);
+    if (memcmp(mark, magic, sizeof mark) != 0)
+        *version = 0;
+    if (*version == SEVERAL_TOOLS) {
+        WALK(cursor, shape->tool_count);
+        WALK(cursor, shape->tool_nodes);
+    } else {
+        shape->tool_count = 1;
+        shape->tool_nodes[0] = nodes[0];
+    }
+    bool is_whole = cursor->good && (*version == ONE_TOOL || nodes[0] == nodes_of(shape));
+    shape->tool_count = is_whole ? shape->tool_count : 0;
+    shape->contrast_count = nodes[1];
+    *count = nodes[2];
+}
+
 uint8_t *cine_pack(const Cine *cine, size_t *length)
 {
-    *length = (size_t)file_bytes(cine->node_count, cine->contrast_count, cine->count);
+    uint64_t line_nodes = 0;
+    for (int i = 0; i < cine->count; i++)
+        line_nodes += (uint64_t)cine->pose[slot(cine, i)].node_count;
+    *length = (size_t)file_bytes(&cine->shape, cine->count, line_nodes);
     Cursor cursor = {.out = malloc(*length), .length = *length, .good = true};
     if (!cursor.out)
         return NULL;
-    uint32_t version = VERSION;
-    int32_t count[] = {cine->node_count, cine->contrast_count, cine->count};
-    char mark[8];
-    memcpy(mark, magic, 8);
-    WALK(&cursor, mark);
-    WALK(&cursor, version);
-    WALK(&cursor, count);
+    uint32_t version;
+    int32_t count = cine->count;
     Cine ring = *cine;   // walk_frame() writes where it reads a file, not here
+    walk_head(&cursor, &version, &ring.shape, &count);
     for (int i = 0; i < cine->count; i++)
         walk_frame(&cursor, &ring, slot(cine, i));
     uint64_t sum = checksum(cursor.out, cursor.at);
@@ -304,6 +401,20 @@ static bool all_finite(const double *value, size_t count)
     return true;
 }
 
+static bool is_unit(Quat q) { return fabs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1) < 1e-6; }
+
+static bool tool_is_sound(const PoseTool *tool, int tools)
+{
+    const double figures[] = {tool->command.push_mm_s, tool->command.twist_deg_s, tool->inserted_mm, tool->push_n, tool->torque_n_mm};
+    bool good = all_finite(figures, sizeof figures / sizeof *figures);
+    for (int j = 0; good && j < tool->node_count; j++) {
+        const ToolNode *node = &tool->node[j];
+        good = isfinite(node->s) && vec3_is_finite(node->position) && is_unit(node->orientation) && node->radius > 0 && isfinite(node->radius) &&
+               node->carrier >= -1 && node->carrier < tools;
+    }
+    return good;
+}
+
 // What drawing relies on. NULL or what is wrong.
 static const char *frame_fault(const Cine *cine, int index)
 {
@@ -317,19 +428,20 @@ static const char *frame_fault(const Cine *cine, int index)
             return "X-ray settings are finite numbers";
     if (!(pose->xray.field_mm > 0) || !all_finite(figures, sizeof figures / sizeof *figures))
         return "times, forces and lengths are finite numbers, a field is above 0";
-    if (pose->first_free_node < 0 || pose->first_free_node >= cine->node_count)
+    if (pose->first_free_node < 0 || pose->first_free_node >= pose->node_count)
         return "the first node outside of the sheath is one of the tool's";
-    for (int i = 0; i < cine->node_count; i++) {
+    for (int k = 0; k < pose->tool_count; k++)
+        if (!tool_is_sound(&pose->tool[k], pose->tool_count))
+            return "the tools' nodes have finite places, radii above 0, unit quaternions, and lie in one of the tools, or in none (-1)";
+    for (int i = 0; i < pose->node_count; i++) {
         const NodeReport *node = &pose->node[i];
-        Quat q = pose->quaternion[i];
-        double norm = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
         if (!vec3_is_finite(pose->position[i]) || !vec3_is_finite(node->force) || !isfinite(node->s) || !(node->radius > 0) || !isfinite(node->radius) ||
-            isnan(node->gap) || !(fabs(norm - 1) < 1e-6))
+            isnan(node->gap) || !is_unit(pose->quaternion[i]))
             return "the tool's nodes have finite places and forces, radii above 0, unit quaternions";
-        if (node->vessel_node < -1 || (cine->contrast_count > 0 && node->vessel_node >= cine->contrast_count))
+        if (node->vessel_node < -1 || (cine->shape.contrast_count > 0 && node->vessel_node >= cine->shape.contrast_count))
             return "the tool's nodes lie at nodes of the vessel, or at none (-1)";
     }
-    for (int i = 0; i < cine->contrast_count; i++)
+    for (int i = 0; i < cine->shape.contrast_count; i++)
         if (!(contrast[i] >= 0 && contrast[i] <= 1))
             return "concentrations are 0 to 1";
     return NULL;
@@ -338,46 +450,47 @@ static const char *frame_fault(const Cine *cine, int index)
 Cine *cine_unpack(const uint8_t *bytes, size_t length, const char *name, Faults *faults)
 {
     Cursor cursor = {.in = bytes, .length = length, .good = true};
-    char mark[8] = "";
-    uint32_t version = 0;
-    int32_t count[3] = {0};
-    WALK(&cursor, mark);
-    WALK(&cursor, version);
-    WALK(&cursor, count);
-    if (!cursor.good || memcmp(mark, magic, sizeof mark) != 0 || version != VERSION) {
-        faults_add_at_byte(faults, name, 0, "is no cine loop of version %d; a file that the trainer saved is expected", VERSION);
+    uint32_t version;
+    int32_t count = 0;
+    CineShape shape = {0};
+    walk_head(&cursor, &version, &shape, &count);
+    if (!cursor.good || (version != ONE_TOOL && version != SEVERAL_TOOLS)) {
+        faults_add_at_byte(faults, name, 0, "is no cine loop of version %d or %d; a file that the trainer saved is expected", ONE_TOOL, SEVERAL_TOOLS);
         return NULL;
     }
-    if (count[2] < 0 || cine_bytes(count[0], count[1], count[2] > 0 ? count[2] : 1) == 0) {
-        faults_add_at_byte(faults, name, 12, "says %d tool nodes, %d vessel nodes and %d images; 1 to %d, 0 to %d, 0 to %d, and 8 GB in all", (int)count[0],
-                           (int)count[1], (int)count[2], MOST_NODES, MOST_CONTRAST, MOST_FRAMES);
+    if (count < 0 || cine_bytes(&shape, count > 0 ? count : 1) == 0 || (version == SEVERAL_TOOLS && shape.tool_count < 2)) {
+        faults_add_at_byte(faults, name, 12, "says %d tools of %d nodes, %d vessel nodes and %d images; 1 to %d (2 or more in version 2), each of 1 to %d nodes, 0 to %d, "
+                           "0 to %d, and 8 GB in all", shape.tool_count, nodes_of(&shape), shape.contrast_count, (int)count, STEP_TOOLS_MAX, MOST_NODES, MOST_CONTRAST,
+                           MOST_FRAMES);
         return NULL;
     }
-    uint64_t expected = file_bytes(count[0], count[1], count[2]);
-    if (expected != length) {
-        faults_add_at_byte(faults, name, length, "has %zu bytes, its counts make %llu: it was cut or has grown", length, (unsigned long long)expected);
+    // with several tools centrelines have as many nodes as each image says
+    uint64_t all = (uint64_t)count * (uint64_t)nodes_of(&shape), expected = file_bytes(&shape, count, version == ONE_TOOL ? all : 0);
+    if (version == ONE_TOOL ? expected != length : expected > length || file_bytes(&shape, count, all) < length) {
+        faults_add_at_byte(faults, name, length, "has %zu bytes, its counts make %llu%s: it was cut or has grown", length, (unsigned long long)expected,
+                           version == ONE_TOOL ? "" : " at least");
         return NULL;
     }
-    Cine *cine = cine_create(count[0], count[1], count[2] > 0 ? count[2] : 1);
+    Cine *cine = cine_create(&shape, count > 0 ? count : 1);
     if (!cine) {
-        faults_add(faults, name, 0, 0, "not enough memory for its %d images", (int)count[2]);
+        faults_add(faults, name, 0, 0, "not enough memory for its %d images", (int)count);
         return NULL;
     }
     const char *fault = NULL;
     size_t at = 0;
-    for (int i = 0; i < count[2] && !fault; i++) {
+    for (int i = 0; i < count && !fault; i++) {
         at = cursor.at;
         walk_frame(&cursor, cine, i);
-        fault = frame_fault(cine, i);
+        fault = cursor.good ? frame_fault(cine, i) : "the centreline has no more nodes than the tools";
     }
     uint64_t sum = 0;
     WALK(&cursor, sum);
     if (fault)
         faults_add_at_byte(faults, name, at, "an image that cannot be drawn: %s; the file is damaged", fault);
-    else if (sum != checksum(bytes, length - sizeof sum))
+    else if (cursor.at != length || sum != checksum(bytes, length - sizeof sum))
         faults_add_at_byte(faults, name, length - sizeof sum, "has another checksum than it says; the file is damaged");
     else {
-        cine->count = count[2];
+        cine->count = count;
         return cine;
     }
     cine_free(cine);

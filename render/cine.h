@@ -1,6 +1,6 @@
-// A cine loop: the last X-ray images, kept as what they were drawn from (tool, X-ray settings, pulse number, contrast agent), so that they are drawn
-// again exactly, at any size, and may be looked at from the 3D view as well. An image is 120 bytes a tool node and 4 a vessel node: 30 s at 30/s with
-// 300 and 1,400 of them are 39 MB, taken once; the images themselves at 1024 x 1024 would be 900.
+// A cine loop: the last X-ray images, kept as what they were drawn from (tools, X-ray settings, pulse number, contrast agent), so that they are drawn
+// again exactly, at any size, and may be looked at from the 3D view as well. An image is 200 bytes a tool node and 4 a vessel node: 30 s at 30/s with
+// 300 and 1,400 of them are 60 MB, taken once; the images themselves at 1024 x 1024 would be 900.
 // A view that subtracts (DSA) takes the loop's first image as its mask: forget the held picture (fluoroscope_forget) where a loop begins.
 // Knows no OpenGL and no file: bytes in, bytes out. One thread.
 #ifndef SELDINGER_RENDER_CINE_H
@@ -11,17 +11,24 @@
 
 typedef struct CineFrame {
     const Pose *pose;            // at the pulse; X-ray settings and time are its own
-    const float *contrast;       // (contrast_count), NULL where that is 0
+    const float *contrast;       // (contrast_count of the shape), NULL where that is 0
     uint32_t pulse;              // number of the X-ray pulse
 } CineFrame;
 
 typedef struct Cine Cine;
 
-// [bytes] that a loop takes; 0 where it would be more than 8 GB or a count is unfit: 1 to 100,000 tool nodes, 0 to 10,000,000 vessel nodes, 1 to
+typedef struct CineShape {       // of each image
+    int tool_count;              // 1 to 4
+    int tool_nodes[STEP_TOOLS_MAX];      // of each; the shared centreline has no more than all of them
+    int contrast_count;          // nodes of the vessel tree, 0 without
+} CineShape;
+CineShape cine_shape_for(const Pose *pose, int contrast_count);
+bool cine_shapes_same(const CineShape *a, const CineShape *b);
+// [bytes] that a loop takes; 0 where it would be more than 8 GB or a count is unfit: 1 to 100,000 nodes of a tool, 0 to 10,000,000 vessel nodes, 1 to
 // 1,000,000 images.
-size_t cine_bytes(int node_count, int contrast_count, int capacity);
-// `contrast_count`: nodes of the vessel tree, 0 without. NULL where cine_bytes() is 0 or memory lacks.
-Cine *cine_create(int node_count, int contrast_count, int capacity);
+size_t cine_bytes(const CineShape *shape, int capacity);
+// NULL where cine_bytes() is 0 or memory lacks.
+Cine *cine_create(const CineShape *shape, int capacity);
 void cine_free(Cine *cine);
 
 // --- recording ---
@@ -35,8 +42,7 @@ bool cine_add(Cine *cine, const CineFrame *frame);
 // While it is replayed or saved: images stay, and stay where they are.
 void cine_lock(Cine *cine, bool locked);
 
-int cine_node_count(const Cine *cine);
-int cine_contrast_count(const Cine *cine);
+CineShape cine_shape(const Cine *cine);
 int cine_capacity(const Cine *cine);
 int cine_count(const Cine *cine);
 int64_t cine_dropped(const Cine *cine);                  // images that went since cine_record

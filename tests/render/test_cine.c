@@ -16,6 +16,12 @@
 enum { NODES = 5, TREE = 7 };
 static Faults faults;
 
+static Cine *create_cine(int nodes, int contrast_count, int capacity)
+{
+    const CineShape shape = {1, {nodes}, contrast_count};
+    return cine_create(&shape, capacity);
+}
+
 static void fill_pose(Pose *pose, int image, double time_s, double pulses_s)
 {
     pose->step = 1000 * image;
@@ -32,6 +38,7 @@ static void fill_pose(Pose *pose, int image, double time_s, double pulses_s)
         pose->quaternion[i] = quat_from_rotation_vector(vec3(0.1 * image, 0.2, i));
         pose->node[i] = (NodeReport){.s = i, .radius = 0.18, .force = vec3(0, 0, image), .gap = i ? 0.5 : HUGE_VAL, .vessel_node = i % TREE};
     }
+    pose_fill_single_tool(pose);
 }
 
 static bool add(Cine *cine, int image, double time_s, double pulses_s)
@@ -49,7 +56,7 @@ static bool add(Cine *cine, int image, double time_s, double pulses_s)
 
 static Cine *loop_of(int count, int capacity, double pulses_s)
 {
-    Cine *cine = cine_create(NODES, TREE, capacity);
+    Cine *cine = create_cine(NODES, TREE, capacity);
     assert_non_null(cine);
     assert_true(cine_record(cine));
     for (int i = 1; i <= count; i++)
@@ -73,6 +80,8 @@ static void check_image(const Cine *cine, int index, int image)
     assert_memory_equal(frame.pose->quaternion, pose->quaternion, sizeof(Quat) * NODES);
     for (int i = 0; i < NODES; i++) {
         const NodeReport *a = &frame.pose->node[i], *b = &pose->node[i];
+        const ToolNode *c = &frame.pose->tool[0].node[i], *d = &pose->tool[0].node[i];
+        assert_true(c->s == d->s && vec3_distance(c->position, d->position) == 0 && c->radius == d->radius && c->carrier == d->carrier);
         assert_true(a->s == b->s && a->radius == b->radius && a->force.z == b->force.z && a->gap == b->gap && a->vessel_node == b->vessel_node);
     }
     for (int i = 0; i < TREE; i++)
@@ -125,12 +134,15 @@ static void memory_is_said_and_bounded(void **state)
 {
     (void)state;
     // 30 s at 30/s of a usual tool and tree
-    size_t bytes = cine_bytes(301, 1372, 900);
-    assert_true(bytes > (size_t)900 * 300 * 100 && bytes < (size_t)50 << 20);
+    const CineShape usual = {1, {301}, 1372};
+    size_t bytes = cine_bytes(&usual, 900);
+    assert_true(bytes > (size_t)900 * 300 * 200 && bytes < (size_t)900 * (300 * 210 + 1372 * 4 + 1200));
     const int bad[][3] = {{0, 0, 10}, {-1, 0, 10}, {100001, 0, 10}, {10, -1, 10}, {10, 10000001, 1}, {10, 0, 0}, {10, 0, 1000001}, {100000, 10000000, 1000000}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-        assert_int_equal(cine_bytes(bad[i][0], bad[i][1], bad[i][2]), 0);
-        assert_null(cine_create(bad[i][0], bad[i][1], bad[i][2]));
+        const CineShape shape = {1, {bad[i][0]}, bad[i][1]}, second = {2, {3, bad[i][0]}, bad[i][1]};
+        assert_int_equal(cine_bytes(&shape, bad[i][2]), 0);
+        assert_int_equal(cine_bytes(&second, bad[i][2]), 0);
+        assert_null(create_cine(bad[i][0], bad[i][1], bad[i][2]));
     }
     cine_free(NULL);
 }
@@ -157,7 +169,7 @@ static void adding_allocates_nothing(void **state)
 static void other_tools_are_not_taken(void **state)
 {
     (void)state;
-    Cine *cine = cine_create(NODES + 1, 0, 3);
+    Cine *cine = create_cine(NODES + 1, 0, 3);
     assert_non_null(cine);
     cine_record(cine);
     assert_false(add(cine, 1, 1, 15));
@@ -205,7 +217,7 @@ static void replay_keeps_the_pulses_times(void **state)
 static void pauses_of_the_pedal_are_left_out(void **state)
 {
     (void)state;
-    Cine *cine = cine_create(NODES, TREE, 20);
+    Cine *cine = create_cine(NODES, TREE, 20);
     cine_record(cine);
     for (int i = 0; i < 5; i++)
         add(cine, 1 + i, 1 + 0.1 * i, 10);
@@ -219,7 +231,7 @@ static void pauses_of_the_pedal_are_left_out(void **state)
 static void an_empty_loop_shows_nothing(void **state)
 {
     (void)state;
-    Cine *cine = cine_create(NODES, 0, 4);
+    Cine *cine = create_cine(NODES, 0, 4);
     CinePlayer player = cine_player_start(cine);
     assert_int_equal(player.frame, -1);
     assert_int_equal(cine_player_advance(&player, cine, 1), -1);
@@ -246,7 +258,7 @@ static void a_file_comes_back_the_same(void **state)
     Cine *read = cine_unpack(bytes, length, "a.cine", &faults);
     if (!read)
         fail_msg("%s", faults.text[0]);
-    assert_true(cine_count(read) == 10 && cine_node_count(read) == NODES && cine_contrast_count(read) == TREE && cine_capacity(read) == 10);
+    assert_true(cine_count(read) == 10 && cine_shape(read).tool_nodes[0] == NODES && cine_shape(read).contrast_count == TREE && cine_capacity(read) == 10);
     for (int i = 0; i < 10; i++)
         check_image(read, i, 16 + i);
     uint8_t *second = cine_pack(read, &again);
@@ -256,10 +268,96 @@ static void a_file_comes_back_the_same(void **state)
     free(bytes);
     cine_free(read);
     cine_free(cine);
-    cine = cine_create(NODES, 0, 3);   // no images, no tree
+    cine = create_cine(NODES, 0, 3);   // no images, no tree
     bytes = cine_pack(cine, &length);
     read = cine_unpack(bytes, length, "empty.cine", &faults);
     assert_true(read && cine_count(read) == 0);
+    free(bytes);
+    cine_free(read);
+    cine_free(cine);
+}
+
+// Two tools whose shared centreline has another number of nodes in each image.
+static Pose *coaxial_image(int image)
+{
+    const int nodes[2] = {4, 6};
+    Pose *pose = pose_create_tools(10, 2, nodes);
+    assert_non_null(pose);
+    pose->node_count = 6 + image % 3;
+    pose->time_s = image;
+    pose->xray = xray_default_control();
+    pose->first_free_node = 2;
+    for (int i = 0; i < pose->node_count; i++) {
+        pose->position[i] = vec3(i, image, 0);
+        pose->quaternion[i] = quat_from_rotation_vector(vec3(0.1 * i, 0, image));
+        pose->node[i] = (NodeReport){.s = i, .radius = 0.2, .force = vec3(0, image, i), .vessel_node = -1};
+    }
+    for (int k = 0; k < 2; k++) {
+        pose->tool[k].inserted_mm = 3 * k + image;
+        pose->tool[k].push_n = 0.1 * k;
+        for (int j = 0; j < nodes[k]; j++)
+            pose->tool[k].node[j] = (ToolNode){j, vec3(j, image, k), quat_from_rotation_vector(vec3(0, j, k)), 0.4 - 0.2 * k, k - 1};
+    }
+    return pose;
+}
+
+static Cine *coaxial_loop(void)
+{
+    Pose *pose = coaxial_image(0);
+    CineShape shape = cine_shape_for(pose, 0);
+    Cine *cine = cine_create(&shape, 4);
+    assert_true(cine && cine_record(cine));
+    for (int i = 1; i <= 6; i++) {
+        pose_free(pose);
+        pose = coaxial_image(i);
+        assert_true(cine_add(cine, &(CineFrame){pose, NULL, (uint32_t)i}));
+    }
+    pose_free(pose);
+    return cine;
+}
+
+static void several_tools_are_kept(void **state)
+{
+    (void)state;
+    Cine *cine = coaxial_loop();
+    size_t length, again;
+    uint8_t *bytes = cine_pack(cine, &length);
+    faults_clear(&faults);
+    Cine *read = cine_unpack(bytes, length, "two.cine", &faults);
+    assert_non_null(read);
+    uint8_t *second = cine_pack(read, &again);
+    assert_int_equal(again, length);
+    assert_memory_equal(bytes, second, length);
+    for (int i = 0; i < 4; i++) {
+        Pose *expected = coaxial_image(3 + i);
+        const Pose *pose = cine_frame(read, i).pose;
+        assert_int_equal(pose->node_count, expected->node_count);
+        assert_memory_equal(pose->position, expected->position, (size_t)pose->node_count * sizeof *pose->position);
+        for (int k = 0; k < 2; k++) {
+            assert_true(pose->tool[k].inserted_mm == expected->tool[k].inserted_mm && pose->tool[k].push_n == expected->tool[k].push_n);
+            for (int j = 0; j < pose->tool[k].node_count; j++) {
+                const ToolNode *a = &pose->tool[k].node[j], *b = &expected->tool[k].node[j];
+                assert_true(a->s == b->s && vec3_distance(a->position, b->position) == 0 && a->orientation.z == b->orientation.z && a->radius == b->radius &&
+                            a->carrier == b->carrier);
+            }
+        }
+        pose_free(expected);
+    }
+    // a pose of other tools is not taken
+    Pose *other = pose_create(10);
+    assert_false(cine_add(read, &(CineFrame){other, NULL, 99}));
+    pose_free(other);
+    for (size_t n = 0; n < length; n++) {
+        faults_clear(&faults);
+        assert_null(cine_unpack(bytes, n, "cut.cine", &faults));
+        assert_int_equal(faults.count, 1);
+        bytes[n] ^= (uint8_t)(1u << n % 8);
+        faults_clear(&faults);
+        assert_null(cine_unpack(bytes, length, "flipped.cine", &faults));
+        assert_int_equal(faults.count, 1);
+        bytes[n] ^= (uint8_t)(1u << n % 8);
+    }
+    free(second);
     free(bytes);
     cine_free(read);
     cine_free(cine);
@@ -292,7 +390,7 @@ static void what_cannot_be_drawn_is_refused(void **state)
 {
     (void)state;
     for (int what = 0; what < 9; what++) {
-        Cine *cine = cine_create(NODES, TREE, 3);
+        Cine *cine = create_cine(NODES, TREE, 3);
         cine_record(cine);
         Pose *pose = pose_create(NODES);
         float contrast[TREE] = {0};
@@ -351,7 +449,7 @@ static void a_movie_lasts_as_long_as_the_loop(void **state)
     int file = mkstemp(path), images = 0;
     assert_true(file >= 0);
     close(file);
-    Cine *cine = cine_create(NODES, TREE, 40);
+    Cine *cine = create_cine(NODES, TREE, 40);
     cine_record(cine);
     for (int i = 0; i < 10; i++)   // a second at 10/s …
         add(cine, 1 + i, 0.1 * i, 10);
@@ -390,6 +488,7 @@ int main(void)
         cmocka_unit_test(pauses_of_the_pedal_are_left_out),
         cmocka_unit_test(an_empty_loop_shows_nothing),
         cmocka_unit_test(a_file_comes_back_the_same),
+        cmocka_unit_test(several_tools_are_kept),
         cmocka_unit_test(a_damaged_file_is_refused),
         cmocka_unit_test(what_cannot_be_drawn_is_refused),
         cmocka_unit_test(a_movie_lasts_as_long_as_the_loop),
