@@ -57,14 +57,14 @@ static bool take_moments(Studio *studio, Faults *faults)
     bool good = studio->lesson != NULL;
     int64_t steps = bench_steps(scene, 6000), first = steps > MOMENTS * 33 ? steps - MOMENTS * 33 : 0;
     for (int64_t i = 0, taken = 0; good && taken < MOMENTS; i++) {
-        Command command = bench_command(scene, i, &cursor);
-        simulator_step(simulator, command);
-        lesson_step(lesson, simulator, &(ToolCommands){.tool = {command}}, &xray);
+        ToolCommands commands = scene->script ? script_tools_at(scene->script, (double)i * scene->dt / 1000, &cursor) : (ToolCommands){0};
+        simulator_step_tools(simulator, &commands);
+        lesson_step(lesson, simulator, &commands, &xray);
         if (i < first || (i - first) % 33 != 0)
             continue;
         good = (studio->pose[taken] = pose_create_for(simulator)) != NULL;
         if (good) {
-            pose_take(studio->pose[taken], simulator, &(ToolCommands){.tool = {command}}, &xray);
+            pose_take(studio->pose[taken], simulator, &commands, &xray);
             lesson_publish(lesson, lesson_of(studio, (int)taken));
         }
         taken++;
@@ -216,6 +216,10 @@ static bool measure_disturbance(Studio *studio, double seconds, FILE *text, cJSO
     fprintf(text, "\nThe 1 kHz thread beside pictures of 1280x720 and beside none, %.0f s each\n", seconds);
     fprintf(text, "%-12s %12s %24s %30s %8s %10s\n", "", "pictures/s", "woke late by [us]", "CPU time of a step [us]", "missed", "SCHED_FIFO");
     fprintf(text, "%-12s %12s %8s %7s %7s %10s %9s %9s\n", "", "", "median", "p99", "max", "median", "p99.9", "max");
+    if (studio->scene.scene->tool_count > 1) {
+        fprintf(text, "none: a session drives one tool so far\n");
+        return true;
+    }
     if (!make_canvas(studio, cases[0].width, cases[0].height, faults))
         return false;
     for (int i = 0; i < TURNS; i++) {

@@ -6,6 +6,7 @@
 #include "cli/run_files.h"
 #include "cli/run_hands.h"
 #include "sim/lesson.h"
+#include "sim/pose.h"
 #include "sim/recording.h"
 #ifdef SELDINGER_RENDER
 #include "render/picture.h"
@@ -170,7 +171,7 @@ static Scene *prepare_scene(const RunOptions *options, Faults *faults)
         scene->contact = (ContactKind)kind;
     if (scene && !scene->script && options->duration_s < 0 && options->settle_s < 0)
         faults_add(faults, options->scene, 0, 0, "has no script; give --script F, --duration-s S or --settle-s S");
-    const char *single = options->score ? "--score" : options->device_count ? "--device" : options->picture ? "--picture" : NULL;
+    const char *single = options->score ? "--score" : options->device_count ? "--device" : NULL;
     if (scene && single)
         scene_has_one_tool(scene, single, faults);
     if (faults->count > 0) {
@@ -184,9 +185,7 @@ static Scene *prepare_scene(const RunOptions *options, Faults *faults)
 
 typedef struct Moment {
     bool taken;
-    double time_s, inserted_mm, force_n, torque_n_mm;
-    Vec3 *position;
-    NodeReport *node;
+    Pose *pose;
 } Moment;
 
 typedef struct Watch {       // what after_step sees
@@ -200,15 +199,10 @@ typedef struct Watch {       // what after_step sees
     bool recording_failed;
 } Watch;
 
-static void take_moment(Moment *moment, Simulator *simulator)
+static void take_moment(Moment *moment, Simulator *simulator, const ToolCommands *commands)
 {
-    const WireState *state = simulator_state(simulator);
-    memcpy(moment->position, state->position, (size_t)state->node_count * sizeof *moment->position);
-    stepper_node_report(simulator_stepper(simulator), moment->node);
-    moment->time_s = simulator_time_s(simulator);
-    moment->inserted_mm = state->inserted;
-    moment->force_n = simulator_last(simulator)->proximal_force;
-    moment->torque_n_mm = simulator_last(simulator)->proximal_torque;
+    const XrayControl xray = xray_default_control();
+    pose_take(moment->pose, simulator, commands, &xray);
     moment->taken = true;
 }
 
@@ -217,7 +211,7 @@ static bool watch_step(void *context, Simulator *simulator, const ToolCommands *
     Watch *watch = context;
     for (int i = 0; i < watch->options->moment_count; i++)
         if (!watch->moment[i].taken && simulator_time_s(simulator) >= watch->options->moment_s[i] - 1e-9)
-            take_moment(&watch->moment[i], simulator);
+            take_moment(&watch->moment[i], simulator, commands);
     if (watch->hands)
         run_hands_answer(watch->hands, simulator_last(simulator), simulator_totals(simulator)->steps);
     if (watch->lesson)
@@ -229,24 +223,19 @@ static bool watch_step(void *context, Simulator *simulator, const ToolCommands *
     return !watch->recording_failed;
 }
 
-static bool make_moments(Watch *watch, int node_count)
+static bool make_moments(Watch *watch, Simulator *simulator)
 {
     watch->moment_count = !watch->options->picture ? 0 : watch->options->moment_count ? watch->options->moment_count : 1;
-    for (int i = 0; i < watch->moment_count; i++) {
-        watch->moment[i].position = calloc((size_t)node_count, sizeof(Vec3));
-        watch->moment[i].node = calloc((size_t)node_count, sizeof(NodeReport));
-        if (!watch->moment[i].position || !watch->moment[i].node)
-            return false;
-    }
-    return true;
+    bool good = true;
+    for (int i = 0; good && i < watch->moment_count; i++)
+        good = (watch->moment[i].pose = pose_create_for(simulator)) != NULL;
+    return good;
 }
 
 static void free_moments(Watch *watch)
 {
-    for (int i = 0; i < MOST_MOMENTS; i++) {
-        free(watch->moment[i].position);
-        free(watch->moment[i].node);
-    }
+    for (int i = 0; i < MOST_MOMENTS; i++)
+        pose_free(watch->moment[i].pose);
 }
 
 #ifdef SELDINGER_RENDER
@@ -254,27 +243,26 @@ static void free_moments(Watch *watch)
 static void draw_picture(const RunOptions *options, const Watch *watch, Simulator *simulator, OpenVessel *open)
 {
     const Scene *scene = simulator_scene(simulator);
-    int nodes = simulator_state(simulator)->node_count, count = 0;
+    int nodes = stepper_node_capacity(simulator_stepper(simulator)), count = 0;
     char message[512] = "";
     PictureTool tool[MOST_MOMENTS] = {0};
-    double *radius = calloc((size_t)nodes, sizeof *radius);
+    ToolLooks looks;
+    bool has_looks = tool_looks_make(&looks, scene);
+    double *radius = calloc((size_t)nodes * MOST_MOMENTS, sizeof *radius);
     Vec3 *force = calloc((size_t)nodes * MOST_MOMENTS, sizeof *force);
-    double total = wire_length(&scene->wire);
-    for (int m = 0; radius && force && m < watch->moment_count; m++) {
-        const Moment *moment = &watch->moment[m];
+    for (int m = 0; has_looks && radius && force && m < watch->moment_count; m++) {
+        const Pose *pose = watch->moment[m].pose;
         Vec3 *at = force + (size_t)m * (size_t)nodes;
-        int first = 0;
-        if (!moment->taken)
+        double *thick = radius + (size_t)m * (size_t)nodes;
+        if (!watch->moment[m].taken)
             continue;
-        for (int i = 0; i < nodes; i++) {
-            radius[i] = moment->node[i].radius;
-            at[i] = moment->node[i].force;
-            if (scene->wire.has_sheath && moment->node[i].s < total - moment->inserted_mm)
-                first = i + 1;
+        for (int i = 0; i < pose->node_count; i++) {
+            thick[i] = pose->node[i].radius;
+            at[i] = pose->node[i].force;
         }
-        tool[count++] = (PictureTool){.node_count = nodes, .position = moment->position, .radius = radius, .force = at,
-                                      .first_free_node = first < nodes ? first : nodes - 1, .time_s = moment->time_s, .inserted_mm = moment->inserted_mm,
-                                      .push_force_n = moment->force_n, .torque_n_mm = moment->torque_n_mm};
+        tool[count++] = (PictureTool){.node_count = pose->node_count, .position = pose->position, .radius = thick, .force = at,
+                                      .first_free_node = pose->first_free_node, .time_s = pose->time_s, .inserted_mm = pose->inserted_mm,
+                                      .push_force_n = pose->report.proximal_force, .torque_n_mm = pose->report.proximal_torque, .pose = pose, .looks = &looks};
     }
     PictureOptions look = picture_default_options();
     PictureScene shown = {.vessel = open_vessel_mesh(scene, open), .target_count = scene->target_count, .target = scene->target,
@@ -289,6 +277,7 @@ static void draw_picture(const RunOptions *options, const Watch *watch, Simulato
         fprintf(stderr, "%s: no picture: %s\n", options->picture, message);
     free(radius);
     free(force);
+    tool_looks_free(&looks);
 }
 #endif
 
@@ -372,7 +361,7 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
     record.expected_steps = expected_steps(options, scene);
     if (options->chart)
         watch.chart = run_chart_create(record.expected_steps);
-    if (!node || !make_moments(&watch, nodes) || (options->chart && !watch.chart))
+    if (!node || !make_moments(&watch, simulator) || (options->chart && !watch.chart))
         faults_add(faults, scene->path, 0, 0, "no memory");
     else if (options->record)
         watch.recording = recording_create(options->record, simulator, &record, faults);
@@ -399,7 +388,7 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
                             "delay steps\n");
         stepper_node_report(simulator_stepper(simulator), node);
         if (options->picture && options->moment_count == 0)
-            take_moment(&watch.moment[0], simulator);
+            take_moment(&watch.moment[0], simulator, &(ToolCommands){0});
         bool whole = !watch.recording || recording_close(watch.recording, simulator, faults);
         whole &= write_files(options, simulator, &report, node, faults);
         whole &= write_score(options, &watch, scene, faults);

@@ -78,7 +78,7 @@ Views *scene_views_create(Scene *scene, OpenVessel *open, Desk *desk, char *note
 {
     int before = faults->count;
     Volume *volume = scene->anatomy_path ? volume_load(scene->anatomy_path, faults) : NULL;
-    Simulator *simulator = scene_has_one_tool(scene, "a window", faults) ? simulator_create(scene, open->vessel, faults) : NULL;
+    Simulator *simulator = simulator_create(scene, open->vessel, faults);
     Pose *pose = simulator ? pose_create_for(simulator) : NULL;
     XrayControl xray = xray_default_control();
     Views *views = NULL;

@@ -12,7 +12,8 @@
 
 #include "geom/geom.h"
 #include "geom/reach.h"
-#include "sim/scene.h"
+#include "render/tool_look.h"
+#include "sim/pose.h"
 
 typedef struct PictureOptions {
     int width, height;         // [pixel] 64 to 8192; default 1600 x 1000; projections and moments are cut to the height that they need
@@ -53,9 +54,12 @@ typedef struct PictureTool {   // the tool at one moment
     double push_force_n;       // at the proximal end
     double torque_n_mm;
     const char *label;         // NULL, or words for this moment ("past the neck")
+    const Pose *pose;          // several tools: all of them, the nodes above being those of its shared centreline; NULL: one
+    const ToolLooks *looks;    // of the pose's tools
 } PictureTool;
 
-// Large view of the vessel (translucent) with the tool (coloured by wall force), arrows, targets, scale bar, legend, and a close-up of the tip.
+// Large view of the vessel (translucent) with the tool (coloured by wall force), arrows, targets, scale bar, legend, and a close-up of the tip. Of several tools
+// the half towards the eye is cut away where another lies in them; the legend names them with what their hands feel.
 bool picture_of_run(const char *path, const PictureOptions *options, const PictureScene *scene, const PictureTool *tool, char *message,
                     size_t capacity);
 // Up to 6 moments side by side, same camera, same colour scale.

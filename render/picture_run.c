@@ -1,5 +1,7 @@
 // Vessel and tool: the large view, the close-up of the tip, and several moments side by side.
 //
+// Several tools lie on one line and are swept along the same points, so that each lies in the middle of the one around it.
+//
 // Depth: the tool's tube, arrows and target spheres are opaque and write depth; the vessel's wall, back and front faces, is blended over them from
 // far to near, so a tool inside is seen through exactly the walls that lie before it.
 #include "render/message.h"
@@ -14,8 +16,10 @@ typedef struct RunDrawing {
     ShellStyle style;
     double force_scale;        // [N] top of the map
     Solids solids;
-    double *radius;            // (longest tool) scratch
+    double *radius, *lumen;    // (longest tool and its tip) scratch
+    Vec3 *point;
     Color *color;
+    double thickest;           // [mm] radius of a tool
     int frame_count;
     Vec3 *frame_point;         // what the camera must show
 } RunDrawing;
@@ -78,6 +82,15 @@ static bool gather_frame(RunDrawing *drawing, int tool_count, const PictureTool 
     return true;
 }
 
+// All that is to be seen, with room in depth for tools as thick as they are drawn and for arrows: a plane tool has no depth of its own.
+static void frame_all(const RunDrawing *drawing, Camera *camera, int width, int height, double border, double scale)
+{
+    camera_frame(camera, width, height, border, drawing->frame_count, drawing->frame_point, 0);
+    double room = drawing->thickest + 80 * scale * camera->mm_per_pixel;
+    camera->near_depth += room;
+    camera->far_depth -= room;
+}
+
 static double largest_force(int tool_count, const PictureTool *tool)
 {
     double largest = 0;
@@ -108,7 +121,7 @@ static void add_arrows(RunDrawing *drawing, const Camera *camera, const PictureT
             sum = vec3_add(sum, tool->force[last]);
             place = vec3_add_scaled(place, size, tool->position[last]);
             weight += size;
-            radius = fmax(radius, drawing->radius[last]);
+            radius = fmax(radius, fmax(tool->radius[last], line));
             if (last + 1 < tool->node_count)
                 length += vec3_distance(tool->position[last], tool->position[last + 1]);
             last++;
@@ -126,6 +139,74 @@ static void add_arrows(RunDrawing *drawing, const Camera *camera, const PictureT
     }
 }
 
+// The line's nodes up to where tool k ends, with its tip where that lies between two; what it is there. Returns how many.
+static int lay_tool(RunDrawing *drawing, const PictureTool *tool, int k, const double *end, double thin, int *open_count)
+{
+    const Pose *pose = tool->pose;
+    const PoseTool *own = &pose->tool[k];
+    const ToolLook *look = &tool->looks->tool[k];
+    int whole = (int)end[k] + 1, count = whole, node = own->node_count - 2;
+    for (int i = 0; i < whole; i++)
+        drawing->point[i] = tool->position[i];
+    if (end[k] - (whole - 1) > 1e-6)
+        drawing->point[count++] = own->node[own->node_count - 1].position;
+    *open_count = 0;
+    double s = own->node[own->node_count - 1].s;
+    for (int i = count - 1; i >= 0; i--) {
+        double at = i < whole ? i : end[k];
+        int inside = 0;
+        bool touches = true;
+        for (int other = 0; other < pose->tool_count; other++) {
+            inside += other > k && end[other] >= at;
+            touches = touches && (other >= k || end[other] < at);
+        }
+        s -= i + 1 < count ? vec3_distance(drawing->point[i + 1], drawing->point[i]) : 0;
+        while (node > 0 && own->node[node].s > s)
+            node--;
+        *open_count = inside > 0 && i >= *open_count ? i + 1 : *open_count;
+        double radius = fmax(own->node[node].radius, thin * (1 + 1.1 * inside)), lumen = tool_look_at(look, s)->lumen;
+        drawing->radius[i] = radius;
+        drawing->lumen[i] = lumen > 0 ? fmin(fmax(lumen, inside > 0 ? thin * (1.1 * inside + 0.2) : 0), radius - 0.5 * thin) : 0;
+        double force = touches && tool->force && i < tool->node_count ? vec3_norm(tool->force[i]) : 0;
+        drawing->color[i] = i < first_free(tool) ? SHEATH_COLOR : force > 0 ? color_sequential(force / drawing->force_scale) : look->on_paper;
+    }
+    return count;
+}
+
+// Nodes `first` to `last` of what was laid, cut open or whole.
+static void add_stretch(RunDrawing *drawing, int first, int last, bool is_open, const Camera *camera)
+{
+    Color inside = color_rgb(232, 234, 238);
+    int count = last - first + 1;
+    bool is_hollow = false;
+    for (int i = first; i <= last; i++)
+        is_hollow |= drawing->lumen[i] > 0;
+    if (is_hollow)
+        solids_pipe(&drawing->solids, count, drawing->point + first, drawing->radius + first, drawing->lumen + first, drawing->color + first, inside,
+                    is_open ? &camera->back : NULL);
+    else
+        solids_tube(&drawing->solids, count, drawing->point + first, drawing->radius + first, drawing->color + first);
+}
+
+static void add_coaxial_tools(RunDrawing *drawing, const Camera *camera, const PictureTool *tool, double thin, int stub)
+{
+    double end[STEP_TOOLS_MAX];
+    for (int k = 0; k < tool->pose->tool_count; k++)
+        end[k] = pose_tool_end(tool->pose, k);
+    for (int k = 0; k < tool->pose->tool_count; k++) {
+        int open_count, count = lay_tool(drawing, tool, k, end, thin, &open_count), mouth = first_free(tool);
+        if (k == 0 && stub < mouth)
+            add_stretch(drawing, stub, mouth < count ? mouth : count - 1, false, camera);
+        if (open_count - 1 > mouth)
+            add_stretch(drawing, mouth, open_count - 1, true, camera);
+        int closed = open_count - 1 > mouth ? open_count - 1 : mouth;
+        if (closed < count - 1)
+            add_stretch(drawing, closed, count - 1, false, camera);
+    }
+}
+
+static bool has_several(const PictureTool *tool) { return tool->pose && tool->looks && tool->pose->tool_count > 1; }
+
 static void add_tool(RunDrawing *drawing, const Camera *camera, const PictureTool *tool)
 {
     double thin = 1.0 * drawing->sheet->scale * camera->mm_per_pixel;   // at least two pixels wide
@@ -141,7 +222,10 @@ static void add_tool(RunDrawing *drawing, const Camera *camera, const PictureToo
         stub += vec3_distance(tool->position[first], tool->position[first - 1]);
         first--;
     }
-    solids_tube(&drawing->solids, tool->node_count - first, tool->position + first, drawing->radius + first, drawing->color + first);
+    if (has_several(tool))
+        add_coaxial_tools(drawing, camera, tool, thin, first);
+    else
+        solids_tube(&drawing->solids, tool->node_count - first, tool->position + first, drawing->radius + first, drawing->color + first);
     add_arrows(drawing, camera, tool, thin);
 }
 
@@ -262,8 +346,27 @@ static void force_bar(RunDrawing *drawing, double x, double y, double width)
 
 static void readings_text(char *text, size_t capacity, const PictureTool *tool)
 {
+    if (has_several(tool)) {     // the legend has each one's
+        snprintf(text, capacity, "t %.2f s", tool->time_s);
+        return;
+    }
     snprintf(text, capacity, "t %.2f s   inserted %.1f mm   push %.3g N   torque %.3g N mm", tool->time_s, tool->inserted_mm, tool->push_force_n,
              tool->torque_n_mm);
+}
+
+// Each tool with its colour and what its hand feels. Returns the height.
+static double write_tools(RunDrawing *drawing, const PictureTool *tool, double x, double y)
+{
+    Sheet *sheet = drawing->sheet;
+    double s = sheet->scale, line = 23 * s;
+    for (int k = 0; k < tool->pose->tool_count; k++, y += 2 * line) {
+        const PoseTool *own = &tool->pose->tool[k];
+        const ToolLook *look = &tool->looks->tool[k];
+        overlay_fill(sheet->overlay, x, y + 3 * s, 14 * s, 14 * s, look->on_paper);
+        sheet_text(sheet, x + 22 * s, y, TEXT_NORMAL, SHEET_INK, "%s, %.1f mm inserted", look->name, own->inserted_mm);
+        sheet_text(sheet, x + 22 * s, y + 0.9 * line, TEXT_NORMAL, SHEET_MUTED, "push %.3g N, torque %.3g N mm", own->push_n, own->torque_n_mm);
+    }
+    return 2 * line * tool->pose->tool_count + 6 * s;
 }
 
 // Returns the height of what it wrote.
@@ -296,7 +399,7 @@ static bool draw_side_view(RunDrawing *drawing, const Camera *whole, const Pictu
     Sheet *sheet = drawing->sheet;
     double s = sheet->scale;
     Camera side = {.right = vec3_negate(whole->back), .up = whole->up, .back = whole->right};
-    camera_frame(&side, (int)width, (int)height, 12 * s, drawing->frame_count, drawing->frame_point, 0);
+    frame_all(drawing, &side, (int)width, (int)height, 12 * s, s);
     if (!draw_panel(drawing, &side, &drawing->style, tool, x, y))
         return false;
     sheet_label(sheet, x + 8 * s, y + 6 * s, 0, TEXT_SMALL, SHEET_MUTED, "from the right");
@@ -312,7 +415,7 @@ static bool draw_run(RunDrawing *drawing, const PictureTool *tool)
     int width = (int)(sheet->width - column - 3 * gap), height = (int)(sheet->height - top - gap);
     Camera whole = {0};
     camera_orient(&whole, options->view, options->up, drawing->frame_count, drawing->frame_point);
-    camera_frame(&whole, width, height, 34 * s, drawing->frame_count, drawing->frame_point, 0);
+    frame_all(drawing, &whole, width, height, 34 * s, s);
     if (options->focus_radius > 0)
         camera_frame_sphere(&whole, width, height, 8 * s, options->focus, options->focus_radius);
     if (!draw_panel(drawing, &whole, &drawing->style, tool, gap, top))
@@ -336,6 +439,8 @@ static bool draw_run(RunDrawing *drawing, const PictureTool *tool)
     }
     force_bar(drawing, left, below, column);
     below += 62 * s;
+    if (has_several(tool))
+        below += write_tools(drawing, tool, left, below);
     below += write_facts(drawing, tool, left, below, column) + 14 * s;
     double room_below = sheet->height - gap - below;
     if (room_below > 140 * s && !draw_side_view(drawing, &whole, tool, left, below, column, room_below))
@@ -382,7 +487,12 @@ static bool draw_moment(RunDrawing *drawing, const Camera *whole, const PictureT
     Sheet *sheet = drawing->sheet;
     double s = sheet->scale;
     char text[256];
-    snprintf(text, sizeof text, "t %.2f s   inserted %.1f mm   push %.3g N", tool->time_s, tool->inserted_mm, tool->push_force_n);
+    int length = snprintf(text, sizeof text, "t %.2f s", tool->time_s), tools = has_several(tool) ? tool->pose->tool_count : 0;
+    if (tools == 0)
+        snprintf(text + length, sizeof text - (size_t)length, "   inserted %.1f mm   push %.3g N", tool->inserted_mm, tool->push_force_n);
+    for (int k = 0; k < tools; k++)
+        length += snprintf(text + length, sizeof text - (size_t)length, "   %.31s %.1f mm, %.3g N", tool->looks->tool[k].name, tool->pose->tool[k].inserted_mm,
+                           tool->pose->tool[k].push_n);
     overlay_push_clip(sheet->overlay, x, y, whole->width, header);
     if (tool->label)
         sheet_text(sheet, x, y, TEXT_NORMAL, SHEET_INK, "%s", tool->label);
@@ -433,7 +543,7 @@ static MomentLayout lay_out_moments(const RunDrawing *drawing, int tool_count)
         int rows = (tool_count + columns - 1) / columns;
         int width = (int)fmax((options->width - layout.gap * (columns + 1)) / columns, 16);
         int height = (int)fmax((options->height - layout.top - foot) / rows - layout.header, 16);
-        camera_frame(&camera, width, height, border, drawing->frame_count, drawing->frame_point, 0);
+        frame_all(drawing, &camera, width, height, border, s);
         if (options->focus_radius > 0)
             camera_frame_sphere(&camera, width, height, 4 * s, options->focus, options->focus_radius);
         else {
@@ -483,11 +593,17 @@ static bool draw(const char *path, const PictureOptions *options, const PictureS
     drawing.force_scale = options->force_full_scale > 0 ? options->force_full_scale : largest > 0 ? sheet_scale_end(largest) : 0.1;
     int longest = 0;
     for (int k = 0; k < tool_count; k++)
+        for (int i = 0; i < tool[k].node_count; i++)
+            drawing.thickest = fmax(drawing.thickest, tool[k].radius[i]);
+    for (int k = 0; k < tool_count; k++)
         longest = tool[k].node_count > longest ? tool[k].node_count : longest;
-    drawing.radius = malloc((size_t)longest * sizeof *drawing.radius);
-    drawing.color = malloc((size_t)longest * sizeof *drawing.color);
+    size_t points = (size_t)longest + 1;
+    drawing.radius = malloc(points * sizeof *drawing.radius);
+    drawing.lumen = malloc(points * sizeof *drawing.lumen);
+    drawing.point = malloc(points * sizeof *drawing.point);
+    drawing.color = malloc(points * sizeof *drawing.color);
     bool drawn = false;
-    if (!drawing.radius || !drawing.color || !gather_frame(&drawing, tool_count, tool))
+    if (!drawing.radius || !drawing.lumen || !drawing.point || !drawing.color || !gather_frame(&drawing, tool_count, tool))
         message_fail(message, capacity, "not enough memory for a picture");
     else {
         Sheet sheet;
@@ -498,6 +614,8 @@ static bool draw(const char *path, const PictureOptions *options, const PictureS
         }
     }
     free(drawing.radius);
+    free(drawing.lumen);
+    free(drawing.point);
     free(drawing.color);
     free(drawing.frame_point);
     solids_free(&drawing.solids);

@@ -10,14 +10,14 @@ static const Color palette[2][COLORS] = {
     {{0, 90, 160, 255}, {60, 150, 200, 255}, {0, 140, 105, 255}, {90, 94, 100, 255}, {185, 95, 145, 255}, {120, 90, 190, 255}, {70, 105, 105, 255}}};
 _Static_assert((int)COLORS >= (int)TOOL_KIND_COUNT + TOOLS_MOST - 1, "four tools of one kind have colours of their own");
 
-void tool_colors(int count, const ToolKind *kind, bool on_paper, Color *color)
+void tool_colors(int count, const ToolKind *kind, bool is_on_paper, Color *color)
 {
     bool used[COLORS] = {false};
     int next = TOOL_KIND_COUNT;
     for (int k = 0; k < count; k++) {
         int choice = used[kind[k]] ? next++ : (int)kind[k];
         used[choice] = true;
-        color[k] = palette[on_paper][choice];
+        color[k] = palette[is_on_paper][choice];
     }
 }
 
@@ -62,14 +62,16 @@ static bool make_look(ToolLook *look, const Scene *scene, int k)
 bool tool_looks_make(ToolLooks *looks, const Scene *scene)
 {
     ToolKind kind[TOOLS_MOST];
-    Color color[TOOLS_MOST];
+    Color color[2][TOOLS_MOST];
     bool good = true;
     *looks = (ToolLooks){.count = scene->tool_count};
     for (int k = 0; k < looks->count; k++)
         kind[k] = scene->tool[k].kind;
-    tool_colors(looks->count, kind, false, color);
+    for (int paper = 0; paper < 2; paper++)
+        tool_colors(looks->count, kind, paper, color[paper]);
     for (int k = 0; good && k < looks->count; k++) {
-        looks->tool[k].color = color[k];
+        looks->tool[k].color = color[0][k];
+        looks->tool[k].on_paper = color[1][k];
         good = make_look(&looks->tool[k], scene, k);
     }
     return good;

@@ -13,7 +13,7 @@ typedef struct TubeStretch {     // of a tool, from the border before it to `end
 
 typedef struct ToolLook {
     const char *name;            // borrowed
-    Color color;
+    Color color, on_paper;       // on a dark ground and on white
     int stretch_count;           // >= 1
     TubeStretch *stretch;
 } ToolLook;
@@ -30,6 +30,6 @@ void tool_looks_free(ToolLooks *looks);
 const TubeStretch *tool_look_at(const ToolLook *look, double s);
 // Colours for tools of these kinds, told apart by the colour-blind too, on a dark ground or on paper: of each kind its own, of a kind that comes again one that
 // no other tool has.
-void tool_colors(int count, const ToolKind *kind, bool on_paper, Color *color);
+void tool_colors(int count, const ToolKind *kind, bool is_on_paper, Color *color);
 
 #endif

@@ -129,7 +129,8 @@ static inline void coaxial_looks(CoaxialLooks *c, double catheter_radius, double
 {
     c->stretch[0] = (TubeStretch){.end = HUGE_VAL, .radius = catheter_radius, .lumen = lumen, .attenuation = 0.5};
     c->stretch[1] = (TubeStretch){.end = HUGE_VAL, .radius = wire_radius, .attenuation = 0.5};
-    c->looks = (ToolLooks){.count = 2, .tool = {{"catheter", {0, 90, 255, 255}, 1, &c->stretch[0]}, {"wire", {250, 250, 250, 255}, 1, &c->stretch[1]}}};
+    c->looks = (ToolLooks){.count = 2, .tool = {{"catheter", {0, 90, 255, 255}, {0, 90, 255, 255}, 1, &c->stretch[0]},
+                                               {"wire", {250, 250, 250, 255}, {10, 10, 10, 255}, 1, &c->stretch[1]}}};
 }
 
 static inline double cpu_ms(void)
