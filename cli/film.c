@@ -100,7 +100,7 @@ static void sample_plots(Film *film, double time_s)
     int64_t every = (int64_t)fmax(1, floor(50 / run->step_ms));
     for (int64_t i = 0; i < run->step_count; i += every)
         if (run->time_s[i] > film->sampled_s && run->time_s[i] <= time_s && run->time_s[i] > time_s - 60)
-            panel_sample(film->panel, run->time_s[i], run->proximal[2 * i], run->proximal[2 * i + 1], run->wall_force[2 * i]);
+            panel_sample(film->panel, 0, run->time_s[i], run->proximal[2 * i], run->proximal[2 * i + 1], run->wall_force[2 * i]);
     film->sampled_s = time_s;
 }
 

@@ -7,7 +7,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { TIME, PUSH, TORQUE, WALL_SUM, WALL_LARGEST, CANDIDATES, CONTACTS, DEEPEST, STEP_TIME, MILLISECOND, ITERATIONS, RESIDUAL, COLUMNS };
+// push and torque of each tool's hand
+enum { TIME, PUSH, TORQUE = PUSH + STEP_TOOLS_MAX, WALL_SUM = TORQUE + STEP_TOOLS_MAX, WALL_LARGEST, CANDIDATES, CONTACTS, DEEPEST, STEP_TIME, MILLISECOND,
+       ITERATIONS, RESIDUAL, COLUMNS };
 enum { MOST_ROWS = 40000 };
 
 struct RunChart {
@@ -44,11 +46,14 @@ RunChart *run_chart_create(int64_t expected_steps)
 void run_chart_step(RunChart *chart, const Simulator *simulator)
 {
     const StepReport *r = simulator_last(simulator);
-    const double now[COLUMNS] = {[TIME] = simulator_time_s(simulator), [PUSH] = r->proximal_force, [TORQUE] = r->proximal_torque,
-                                 [WALL_SUM] = r->wall_force_sum, [WALL_LARGEST] = r->wall_force_max, [CANDIDATES] = r->candidates,
+    double now[COLUMNS] = {[TIME] = simulator_time_s(simulator), [WALL_SUM] = r->wall_force_sum, [WALL_LARGEST] = r->wall_force_max, [CANDIDATES] = r->candidates,
                                  [CONTACTS] = r->active, [DEEPEST] = r->penetration * 1000, [STEP_TIME] = (double)simulator_step_ns(simulator) / 1000,
                                  [MILLISECOND] = 1000, [ITERATIONS] = r->iterations, [RESIDUAL] = r->residual};
     int rows = chart->every > 1 ? 2 : 1;
+    for (int k = 0; k < STEP_TOOLS_MAX; k++) {
+        now[PUSH + k] = r->push[k];
+        now[TORQUE + k] = r->torque[k];
+    }
     if (chart->rows + rows > chart->capacity)
         return;
     for (int k = 0; k < COLUMNS; k++) {
@@ -64,19 +69,33 @@ void run_chart_step(RunChart *chart, const Simulator *simulator)
 }
 
 #ifdef SELDINGER_RENDER
-// The script's changes of the hand, where they are few enough to be read.
-static int list_events(const Scene *scene, double start_s, double end_s, PictureEvent *event, char (*label)[48], int most)
+enum { LABEL_SIZE = 96 };
+
+static void name_row(const Scene *scene, ScriptRow *row, char *label)
+{
+    int length = 0;
+    for (int k = 0; k < scene->tool_count && length < LABEL_SIZE; k++) {
+        Command c = *script_row_command(row, k);
+        if (c.push_mm_s == 0 && c.twist_deg_s == 0)
+            continue;
+        length += snprintf(label + length, (size_t)(LABEL_SIZE - length), "%s%s%s%g mm/s", length > 0 ? "; " : "", scene->tool_count > 1 ? scene->tool[k].name : "",
+                           scene->tool_count > 1 ? " " : "", c.push_mm_s);
+        if (c.twist_deg_s != 0 && length < LABEL_SIZE)
+            length += snprintf(label + length, (size_t)(LABEL_SIZE - length), ", %g°/s", c.twist_deg_s);
+    }
+    if (length == 0)
+        snprintf(label, LABEL_SIZE, "rest");
+}
+
+// The script's changes of the hands, where they are few enough to be read.
+static int list_events(const Scene *scene, double start_s, double end_s, PictureEvent *event, char (*label)[LABEL_SIZE], int most)
 {
     const Script *script = scene->script;
     int count = 0;
     if (!script || script->count > most)
         return 0;
     for (int i = 0; i < script->count && script->row[i].t_s < end_s; i++) {
-        Command c = script->row[i].command;
-        if (c.twist_deg_s == 0)
-            snprintf(label[count], 48, c.push_mm_s == 0 ? "rest" : "%g mm/s", c.push_mm_s);
-        else
-            snprintf(label[count], 48, "%g mm/s, %g°/s", c.push_mm_s, c.twist_deg_s);
+        name_row(scene, &script->row[i], label[count]);
         event[count] = (PictureEvent){fmax(script->row[i].t_s, start_s), label[count]};
         count++;
     }
@@ -86,25 +105,32 @@ static int list_events(const Scene *scene, double start_s, double end_s, Picture
 bool run_chart_draw(const RunChart *chart, const Simulator *simulator, const char *path, char *message, size_t capacity)
 {
     double *const *v = chart->value;
-    const PictureLine push[] = {{NULL, v[PUSH]}}, torque[] = {{NULL, v[TORQUE]}}, wall[] = {{"sum", v[WALL_SUM]}, {"largest", v[WALL_LARGEST]}},
+    const Scene *scene = simulator_scene(simulator);
+    int tools = scene->tool_count;
+    PictureLine push[STEP_TOOLS_MAX], torque[STEP_TOOLS_MAX];
+    for (int k = 0; k < tools; k++) {
+        const char *name = tools > 1 ? scene->tool[k].name : NULL;
+        push[k] = (PictureLine){name, v[PUSH + k]};
+        torque[k] = (PictureLine){name, v[TORQUE + k]};
+    }
+    const PictureLine wall[] = {{"sum", v[WALL_SUM]}, {"largest", v[WALL_LARGEST]}},
                       contacts[] = {{"candidates", v[CANDIDATES]}, {"with force", v[CONTACTS]}}, depth[] = {{NULL, v[DEEPEST]}},
                       cost[] = {{"step", v[STEP_TIME]}, {"1 ms", v[MILLISECOND]}}, iterations[] = {{NULL, v[ITERATIONS]}},
                       residual[] = {{NULL, v[RESIDUAL]}};
-    const PicturePanel panel[] = {{"push force at the hand [N]", 1, push, false},
-                                  {"torque at the hand [N mm]", 1, torque, false},
+    const PicturePanel panel[] = {{tools > 1 ? "push force of each hand [N]" : "push force at the hand [N]", tools, push, false},
+                                  {tools > 1 ? "torque of each hand [N mm]" : "torque at the hand [N mm]", tools, torque, false},
                                   {"wall forces on the tool [N]", 2, wall, false},
                                   {"contacts", 2, contacts, false},
                                   {"deepest node outside the wall [um]", 1, depth, false},
                                   {"CPU time of a step [us]", 2, cost, true},
                                   {"contact iterations of a step", 1, iterations, true},
                                   {"complementarity residual of a step", 1, residual, true}};
-    const Scene *scene = simulator_scene(simulator);
     PictureOptions look = picture_default_options();
     look.width = 1600;
     look.height = 1500;
     look.title = scene->path;
     PictureEvent event[16];
-    char label[16][48];
+    char label[16][LABEL_SIZE];
     int events = list_events(scene, v[TIME][0], simulator_time_s(simulator), event, label, 16);
     return picture_of_series(path, &look, chart->rows, v[TIME], (int)(sizeof panel / sizeof panel[0]), panel, events, event, message, capacity);
 }

@@ -1,5 +1,6 @@
 #include "cli/trainer_panel.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -11,12 +12,20 @@ static const double slow_factor = 0.97;
 void trainer_panel_begin(TrainerPanel *panel, const Scene *scene, const char *trainee)
 {
     memset(panel, 0, sizeof *panel);
-    double length = wire_length(&scene->wire);
-    const WireSection *tip = scene->wire.section_count ? &scene->wire.section[scene->wire.section_count - 1] : NULL;
-    snprintf(panel->tool, sizeof panel->tool, "%s %.2f mm x %.0f mm%s", tip && tip->inner_diameter > 0 ? "catheter" : "wire", tip ? tip->diameter : 0, length,
-             tip && tip->rest_curvature != 0 ? ", curved tip" : "");
     PanelState *state = &panel->state;
-    state->tool = panel->tool;
+    ToolKind kind[TOOLS_MOST];
+    Color color[TOOLS_MOST];
+    state->tool_count = scene->tool_count;
+    for (int k = 0; k < scene->tool_count; k++)
+        kind[k] = scene->tool[k].kind;
+    tool_colors(scene->tool_count, kind, false, color);
+    for (int k = 0; k < scene->tool_count; k++) {
+        const WireOptions wire = scene_tool_wire(scene, k);
+        const WireSection *tip = wire.section_count ? &wire.section[wire.section_count - 1] : NULL;
+        snprintf(panel->tool[k], sizeof panel->tool[k], "%s %.2f mm x %.0f mm%s", tip && tip->inner_diameter > 0 ? "catheter" : "wire", tip ? tip->diameter : 0,
+                 wire_length(&wire), tip && tip->rest_curvature != 0 ? ", curved tip" : "");
+        state->tool[k] = (PanelTool){.name = scene->tool[k].name, .what = panel->tool[k], .color = color[k]};
+    }
     state->trainee = trainee;
     state->title = scene->exercise ? scene->exercise->title : "Free practice";
     state->instructions = scene->exercise ? scene->exercise->instructions : "No exercise is set in this scene: go where you like.";
@@ -114,12 +123,19 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
 {
     PanelState *state = &panel->state;
     state->time_s = pose->time_s;
-    state->inserted_mm = pose->inserted_mm;
-    state->turned_deg = pose->turned_deg;
-    state->push_mm_s = pose->command.push_mm_s;
-    state->twist_deg_s = pose->command.twist_deg_s;
-    state->force_n = pose->report.proximal_force;
-    state->torque_n_mm = pose->report.proximal_torque;
+    for (int k = 0; k < state->tool_count && k < pose->tool_count; k++) {
+        const PoseTool *from = &pose->tool[k];
+        PanelTool *tool = &state->tool[k];
+        tool->inserted_mm = from->inserted_mm;
+        tool->turned_deg = k == 0 ? pose->turned_deg : NAN;      // the steps report the first tool's alone
+        tool->push_mm_s = from->command.push_mm_s;
+        tool->twist_deg_s = from->command.twist_deg_s;
+        tool->force_n = from->push_n;
+        tool->torque_n_mm = from->torque_n_mm;
+        bool is_in = from->node_count > 0 && from->inserted_mm >= from->node[from->node_count - 1].s - 1e-6;
+        tool->note = from->is_let_go ? "let go" : is_in && scene->wire.has_sheath ? "all of it is in" : NULL;
+        tool->mark = tool->note ? MARK_WARNING : MARK_NONE;
+    }
     state->wall_max_n = pose->report.wall_force_max;
     state->wall_sum_n = pose->report.wall_force_sum;
     state->xray = *xray;
@@ -145,7 +161,7 @@ static void label_scene(TrainerPanel *panel, const Desk *desk, const VesselScene
     state->label = panel->label;
     for (int i = 0; i < count && i < PANEL_LABELS; i++) {
         const VesselSceneLabel *it = &found[i];
-        if (!it->is_in_view || it->kind == LABEL_TIP || (it->kind == LABEL_TARGET && !desk->look.show_targets))
+        if (!it->is_in_view || (it->kind == LABEL_TIP && state->tool_count < 2) || (it->kind == LABEL_TARGET && !desk->look.show_targets))
             continue;
         char *text = panel->label_text[state->label_count];
         if (it->kind == LABEL_TARGET && isfinite(it->distance_mm))

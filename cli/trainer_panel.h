@@ -18,7 +18,7 @@ typedef struct TrainerPanel {
     PanelDevice device[PANEL_DEVICES];
     PanelLabel label[PANEL_LABELS];
     char label_text[PANEL_LABELS][96];
-    char tool[128], target[96], warning[200];
+    char tool[PANEL_TOOLS][128], target[96], warning[200];
     char instructions[4200];
 } TrainerPanel;
 

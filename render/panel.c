@@ -232,17 +232,19 @@ void panel_take_input(Panel *panel, const WindowInput *input, PanelActions *acti
 
 // ---- what it remembers
 
-void panel_sample(Panel *panel, double time_s, double force_n, double torque_n_mm, double wall_max_n)
+void panel_sample(Panel *panel, int tool, double time_s, double force_n, double torque_n_mm, double wall_max_n)
 {
-    plot_add(&panel->force, time_s, 1000 * force_n);
-    plot_add(&panel->torque, time_s, torque_n_mm);
+    plot_add(&panel->force[tool], time_s, 1000 * force_n);
+    plot_add(&panel->torque[tool], time_s, torque_n_mm);
     plot_add(&panel->wall, time_s, 1000 * wall_max_n);
 }
 
 void panel_forget_samples(Panel *panel)
 {
-    plot_clear(&panel->force);
-    plot_clear(&panel->torque);
+    for (int k = 0; k < PANEL_TOOLS; k++) {
+        plot_clear(&panel->force[k]);
+        plot_clear(&panel->torque[k]);
+    }
     plot_clear(&panel->wall);
 }
 
@@ -325,7 +327,8 @@ void panel_hint_text(int index, char *text, size_t capacity)
 
 void panel_draw(Panel *panel, const WindowInput *input, const PanelState *state, unsigned framebuffer)
 {
-    panel_sample(panel, state->time_s, state->force_n, state->torque_n_mm, state->wall_max_n);
+    for (int k = 0; k < state->tool_count; k++)
+        panel_sample(panel, k, state->time_s, state->tool[k].force_n, state->tool[k].torque_n_mm, state->wall_max_n);
     PanelLayout layout = panel_layout(input->width, input->height, input->scale, state->view, panel->has_panels);
     bool is_new = !panel->is_drawn || panel->width != input->width || panel->height != input->height || layout.scale != panel->layout.scale;
     panel->layout = layout;

@@ -23,6 +23,7 @@ typedef enum { VIEW_FLUOROSCOPY, VIEW_3D, VIEW_ANGIOSCOPY, VIEW_COUNT, VIEW_ALL 
 typedef enum { PANEL_LIVE, PANEL_LIH, PANEL_DSA, PANEL_ROADMAP, PANEL_CINE } PanelMode;   // LIH: last image hold
 typedef enum { MARK_NONE, MARK_GOOD, MARK_WARNING, MARK_BAD } PanelMark;                  // shown by a sign and a colour
 
+enum { PANEL_TOOLS = 4 };
 enum { WARN_OUTSIDE = 1, WARN_NOT_CONVERGED = 2, WARN_SLOW = 4, WARN_NO_FIFO = 8, WARN_DEVICE_LOST = 16, WARN_STALLED = 32 }; // bits of `warnings`
 
 typedef GuiRect PanelRect;   // x, y, width, height [pixel], y down from the upper left corner
@@ -46,6 +47,16 @@ typedef struct PanelFigure {       // one line of the score or of the exercise
     int decimals;
     PanelMark mark;
 } PanelFigure;
+
+typedef struct PanelTool {         // one of the coaxial tools
+    const char *name;              // one word, where there are several
+    const char *what;              // "catheter 0.70 mm x 160 mm"
+    Color color;                   // as in the 3D view
+    double inserted_mm, turned_deg, push_mm_s, twist_deg_s;
+    double force_n, torque_n_mm;   // of its hand, of the sheath, on it
+    PanelMark mark;                // of the note
+    const char *note;              // "let go" …, or NULL
+} PanelTool;
 
 typedef struct PanelDevice {
     const char *name;
@@ -73,11 +84,10 @@ typedef struct PanelState {
     int figure_count, error_count;
     const PanelFigure *figure;     // (figure_count) score so far
     const char *const *error;      // (error_count) handling errors so far, newest last
-    // tool
-    const char *tool;
-    double inserted_mm, turned_deg, push_mm_s, twist_deg_s;
-    double force_n, torque_n_mm;   // of the sheath on the tool
-    double wall_max_n, wall_sum_n;
+    // tools
+    int tool_count, chosen_tool;   // outermost first; the one that is shown in full
+    PanelTool tool[PANEL_TOOLS];
+    double wall_max_n, wall_sum_n; // of all
     // X-ray
     XrayControl xray;
     PanelMode mode;
@@ -128,8 +138,8 @@ void panel_destroy(Panel *panel);
 void panel_take_input(Panel *panel, const WindowInput *input, PanelActions *actions);
 void panel_draw(Panel *panel, const WindowInput *input, const PanelState *state, unsigned framebuffer);
 
-// A sample of the running plots; panel_draw takes one itself, more often than that is welcome (peaks are kept). Time simulated [s].
-void panel_sample(Panel *panel, double time_s, double force_n, double torque_n_mm, double wall_max_n);
+// A sample of a tool's running plots; panel_draw takes one itself, more often than that is welcome (peaks are kept). Time simulated [s].
+void panel_sample(Panel *panel, int tool, double time_s, double force_n, double torque_n_mm, double wall_max_n);
 void panel_forget_samples(Panel *panel);         // after a restart or a jump in time
 
 void panel_message(Panel *panel, double now_s, PanelMark mark, const char *text);   // into the log; the last 100 are kept

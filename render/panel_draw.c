@@ -51,19 +51,39 @@ static void draw_exercise(Panel *panel, const PanelState *state)
     }
 }
 
+// All tools in small: a dot for the one whose figures follow, how far it is in, what its hand feels, what is to be said of it.
+static void draw_tools(Panel *panel, const PanelState *state)
+{
+    char name[64], text[96], value[48], other[48];
+    for (int k = 0; k < state->tool_count; k++) {
+        const PanelTool *tool = &state->tool[k];
+        snprintf(name, sizeof name, "%s %d %s", k == state->chosen_tool ? "\u25cf" : "\u25cb", k + 1, panel_text(tool->name));
+        gui_row(panel->gui, GUI_SMALL, name, tool->color, panel_figure(value, sizeof value, tool->inserted_mm, 1, "mm"));
+        snprintf(text, sizeof text, "%s, %s", panel_figure(value, sizeof value, 1000 * tool->force_n, 0, "mN"),
+                 panel_figure(other, sizeof other, tool->torque_n_mm, 2, "N mm"));
+        snprintf(name, sizeof name, "      %s%.40s", panel_sign[tool->mark], panel_text(tool->note));
+        gui_row(panel->gui, GUI_SMALL, name, gui_colors.dim, text);
+    }
+}
+
 static void draw_tool(Panel *panel, const PanelState *state)
 {
     char value[48], other[48];
-    panel_heading(panel, "TOOL");
-    gui_text_wrapped(panel->gui, GUI_NORMAL, gui_colors.text, panel_text(state->tool));
-    row(panel, "Inserted", MARK_NONE, "%s at %s", panel_figure(value, sizeof value, state->inserted_mm, 1, "mm"),
-        panel_figure(other, sizeof other, state->push_mm_s, 1, "mm/s"));
-    row(panel, "Turned", MARK_NONE, "%s at %s", panel_figure(value, sizeof value, state->turned_deg, 0, "\u00b0"),
-        panel_figure(other, sizeof other, state->twist_deg_s, 0, "\u00b0/s"));
+    bool has_several = state->tool_count > 1;
+    int chosen = state->chosen_tool >= 0 && state->chosen_tool < state->tool_count ? state->chosen_tool : 0;
+    const PanelTool *tool = &state->tool[chosen];
+    panel_heading(panel, has_several ? "TOOLS" : "TOOL");
+    if (has_several)
+        draw_tools(panel, state);
+    gui_text_wrapped(panel->gui, has_several ? GUI_SMALL : GUI_NORMAL, gui_colors.text, panel_text(tool->what));
+    row(panel, "Inserted", MARK_NONE, "%s at %s", panel_figure(value, sizeof value, tool->inserted_mm, 1, "mm"),
+        panel_figure(other, sizeof other, tool->push_mm_s, 1, "mm/s"));
+    row(panel, "Turned", MARK_NONE, "%s at %s", panel_figure(value, sizeof value, tool->turned_deg, 0, "\u00b0"),
+        panel_figure(other, sizeof other, tool->twist_deg_s, 0, "\u00b0/s"));
     row(panel, "Wall, most / sum", MARK_NONE, "%s / %s", panel_figure(value, sizeof value, 1000 * state->wall_max_n, 0, ""),
         panel_figure(other, sizeof other, 1000 * state->wall_sum_n, 0, "mN"));
-    plot_draw(&panel->force, panel->gui, "Push force", "mN", 0, 100, panel->plot_height);
-    plot_draw(&panel->torque, panel->gui, "Torque", "N mm", 3, 0.02, panel->plot_height);
+    plot_draw(&panel->force[chosen], panel->gui, "Push force", "mN", 0, 100, panel->plot_height);
+    plot_draw(&panel->torque[chosen], panel->gui, "Torque", "N mm", 3, 0.02, panel->plot_height);
     if (panel->plots == 3)
         plot_draw(&panel->wall, panel->gui, "Wall force, largest", "mN", 0, 100, panel->plot_height);
 }

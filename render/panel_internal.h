@@ -43,7 +43,7 @@ struct Panel {
     GuiRect briefing_at;           // as last drawn; zero width: not shown
     double used_s[ACTION_COUNT];   // how long an action was held, or 1 s for each press: hints disappear with use
     // plots and log
-    RunningPlot force, torque, wall;
+    RunningPlot force[PANEL_TOOLS], torque[PANEL_TOOLS], wall;
     int plots;
     float plot_height;
     bool is_dense;                 // the left column's rows in small letters, where they would not fit otherwise

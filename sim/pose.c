@@ -104,6 +104,7 @@ void pose_take(Pose *pose, Simulator *simulator, const ToolCommands *commands, c
         PoseTool *tool = &pose->tool[k];
         tool->command = commands->tool[k];
         tool->inserted_mm = stepper_tool_inserted(stepper, k);
+        tool->is_let_go = commands->released >> k & 1;
         tool->push_n = pose->report.push[k];
         tool->torque_n_mm = pose->report.torque[k];
         stepper_tool_nodes(stepper, k, tool->node);

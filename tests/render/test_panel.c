@@ -52,8 +52,9 @@ static PanelState some_state(void)
                         .instructions = "Bring the tip from the internal carotid into the aneurysm and hold it there for two seconds. Do not enter the "
                                         "posterior communicating artery.",
                         .target = "aneurysm", .hold_s = 1.2, .hold_needed_s = 2, .figure_count = 6, .figure = figures, .error_count = 2,
-                        .error = errors, .tool = "0.014\" guidewire, J tip, 200 elements", .inserted_mm = 120.4, .turned_deg = -35, .push_mm_s = 12,
-                        .twist_deg_s = -40, .force_n = 0.061, .torque_n_mm = 0.0123, .wall_max_n = 0.18, .wall_sum_n = 0.93,
+                        .error = errors, .tool_count = 1,
+                        .tool = {{.name = "wire", .what = "0.014\" guidewire, J tip, 200 elements", .inserted_mm = 120.4, .turned_deg = -35, .push_mm_s = 12,
+                                  .twist_deg_s = -40, .force_n = 0.061, .torque_n_mm = 0.0123}}, .wall_max_n = 0.18, .wall_sum_n = 0.93,
                         .xray = {.pedal = 1, .pulses_s = 15, .lao_deg = 30, .cra_deg = -10, .field_mm = 160, .collimator = {0.1f, 0.2f, 0, 0.3f}},
                         .mode = PANEL_LIVE, .fluoro_s = 41.2, .contrast_ml = 12.5, .cine_frame = 11, .cine_frames = 120, .view = VIEW_FLUOROSCOPY,
                         .is_following = true, .step_median_us = 182, .step_p999_us = 403, .real_time_factor = 1, .frame_ms = 9.1,
@@ -71,7 +72,7 @@ static Panel *new_panel(void)
     Panel *panel = panel_create(message, sizeof message);
     assert_non_null(panel);
     for (int i = 0; i < 2000; i++)   // 20 s of samples
-        panel_sample(panel, 63.4 + 0.01 * i, 0.06 + 0.05 * sin(0.02 * i) + (i == 700 ? 0.2 : 0), 0.02 * sin(0.013 * i), 0.1 + 0.08 * cos(0.01 * i));
+        panel_sample(panel, 0, 63.4 + 0.01 * i, 0.06 + 0.05 * sin(0.02 * i) + (i == 700 ? 0.2 : 0), 0.02 * sin(0.013 * i), 0.1 + 0.08 * cos(0.01 * i));
     panel_message(panel, 12, MARK_NONE, "Session starts: phantom, 0.014\" guidewire");
     panel_message(panel, 62, MARK_BAD, "Wrong branch: left vertebral");
     panel_message(panel, 80, MARK_WARNING, "Roller encoder lost: unplugged");
@@ -528,7 +529,7 @@ static void strange_states_draw(void **unused)
     if (!context)
         skip();
     Desk desk = new_desk(640, 400);
-    desk.state = (PanelState){.time_s = NAN, .inserted_mm = INFINITY, .force_n = NAN, .hold_needed_s = 1, .hold_s = NAN, .warning = "x",
+    desk.state = (PanelState){.time_s = NAN, .tool_count = 1, .tool = {{.inserted_mm = INFINITY, .force_n = NAN}}, .hold_needed_s = 1, .hold_s = NAN, .warning = "x",
                               .warnings = ~0u, .fluoro_s = -1, .contrast_ml = NAN, .step_median_us = NAN, .real_time_factor = NAN,
                               .xray = {.lao_deg = NAN, .field_mm = NAN}, .view = VIEW_ALL};
     static const PanelFigure nameless = {0};
@@ -540,6 +541,47 @@ static void strange_states_draw(void **unused)
     frame(&desk);
     assert_int_equal(glGetError(), GL_NO_ERROR);
     end_desk(&desk);
+}
+
+// Four tools are all listed, the chosen one with its own plots; nothing of it is lost in the smallest usual window.
+static void several_tools_are_listed(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    const int size[2][2] = {{1280, 800}, {1024, 600}};
+    for (int s = 0; s < 2; s++) {
+        int width = size[s][0], height = size[s][1];
+        Desk desk = new_desk(width, height);
+        size_t bytes = (size_t)width * (size_t)height * 3;
+        uint8_t *before = malloc(bytes), *after = malloc(bytes);
+        assert_true(before && after);
+        static const char *const name[4] = {"guide", "catheter", "microcatheter", "wire"};
+        desk.state.tool_count = 4;
+        for (int k = 0; k < 4; k++)
+            desk.state.tool[k] = (PanelTool){.name = name[k], .what = "catheter 0.70 mm x 1500 mm, curved tip", .color = {80, 160, 220, 255}, .inserted_mm = 100 + k,
+                                             .turned_deg = 20, .force_n = 0.1 * k, .torque_n_mm = 0.02 * k, .note = k == 1 ? "let go" : NULL,
+                                             .mark = k == 1 ? MARK_WARNING : MARK_NONE};
+        for (int i = 0; i < 8; i++)
+            frame(&desk);
+        keep_picture(&desk.canvas, s ? "four-tools-small" : "four-tools");
+        gl_canvas_read(&desk.canvas, before);
+        for (int what = 0; what < 5; what++) {
+            PanelState kept = desk.state;
+            if (what < 4)
+                desk.state.tool[what].inserted_mm = 55.5;
+            else
+                desk.state.chosen_tool = 3;
+            for (int i = 0; i < 3; i++)
+                frame(&desk);
+            gl_canvas_read(&desk.canvas, after);
+            assert_true(memcmp(before, after, bytes) != 0);
+            desk.state = kept;
+        }
+        free(before);
+        free(after);
+        end_desk(&desk);
+    }
 }
 
 // Kept pixels must be the ones that a fresh panel draws.
@@ -554,7 +596,7 @@ static void kept_windows_show_what_a_new_panel_shows(void **unused)
     assert_true(rgb[0] && rgb[1]);
     for (int i = 0; i < 40; i++) {   // things change, come and go
         desk.state.view = (PanelView)(i / 10);
-        desk.state.inserted_mm += 1;
+        desk.state.tool[0].inserted_mm += 1;
         desk.state.error_count = i % 3;
         desk.state.xray.lao_deg = (float)i;
         panel_show_help(desk.panel, i % 7 == 3);
@@ -565,8 +607,8 @@ static void kept_windows_show_what_a_new_panel_shows(void **unused)
         frame(&desk);
     gl_canvas_read(&desk.canvas, rgb[0]);
     Panel *fresh = new_panel();
-    fresh->force = desk.panel->force;
-    fresh->torque = desk.panel->torque;
+    memcpy(fresh->force, desk.panel->force, sizeof fresh->force);
+    memcpy(fresh->torque, desk.panel->torque, sizeof fresh->torque);
     fresh->wall = desk.panel->wall;
     fresh->is_dense = desk.panel->is_dense;
     for (int i = 0; i < 4; i++)
@@ -607,8 +649,8 @@ static void what_a_frame_costs(void **unused)
         double ms[FRAMES];
         for (int k = 0; k < FRAMES; k++) {
             state.time_s += 1.0 / 30;
-            state.force_n = 0.06 + 0.02 * sin(0.3 * k);
-            state.inserted_mm += 0.4;
+            state.tool[0].force_n = 0.06 + 0.02 * sin(0.3 * k);
+            state.tool[0].inserted_mm += 0.4;
             double start = cpu_ms();
             panel_draw(panel, &input, &state, canvas.framebuffer);
             glFinish();
@@ -640,6 +682,7 @@ int main(void)
                                        cmocka_unit_test(instructions_are_shown_until_followed),
                                        cmocka_unit_test(hints_lead_on_with_use),
                                        cmocka_unit_test(strange_states_draw),
+        cmocka_unit_test(several_tools_are_listed),
                                        cmocka_unit_test(kept_windows_show_what_a_new_panel_shows),
                                        cmocka_unit_test(what_a_frame_costs)};
     return cmocka_run_group_tests(tests, open_gl, close_gl);

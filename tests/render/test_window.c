@@ -377,7 +377,7 @@ static void print_cost(void)
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t[0]);
     for (int i = 0; i < FRAMES; i++) {
         desk.state.time_s += 1.0 / 30;
-        desk.state.force_n = 0.06 + 0.02 * sin(0.3 * i);
+        desk.state.tool[0].force_n = 0.06 + 0.02 * sin(0.3 * i);
         panel_draw(desk.panel, desk.input, &desk.state, 0);
         glFinish();
     }
