@@ -2,12 +2,12 @@
 
 #include <stdlib.h>
 
-// After Okabe and Ito: blue, sky blue, bluish green, and grey for wires, lighter on a dark ground and darker on paper; then their purple, for a kind that comes
-// again. Orange and yellow are left out: they are those of wall force.
+// Blue, sky blue, bluish green, and grey for wires; then for a kind that comes again. Chosen so that any two lie far apart without red and green, too, and on
+// their ground; orange and yellow, which Okabe and Ito have besides, are those of wall force.
 enum { COLORS = 7 };
 static const Color palette[2][COLORS] = {
-    {{70, 140, 215, 255}, {86, 190, 240, 255}, {60, 190, 150, 255}, {196, 203, 214, 255}, {214, 140, 190, 255}, {170, 150, 230, 255}, {130, 165, 165, 255}},
-    {{0, 90, 160, 255}, {60, 150, 200, 255}, {0, 140, 105, 255}, {90, 94, 100, 255}, {185, 95, 145, 255}, {120, 90, 190, 255}, {70, 105, 105, 255}}};
+    {{64, 119, 227, 255}, {97, 212, 255, 255}, {30, 155, 124, 255}, {196, 203, 214, 255}, {175, 128, 189, 255}, {68, 213, 76, 255}, {68, 131, 74, 255}},
+    {{0, 68, 151, 255}, {85, 163, 224, 255}, {0, 146, 105, 255}, {74, 62, 79, 255}, {164, 80, 170, 255}, {50, 156, 42, 255}, {146, 16, 203, 255}}};
 _Static_assert((int)COLORS >= (int)TOOL_KIND_COUNT + TOOLS_MOST - 1, "four tools of one kind have colours of their own");
 
 void tool_colors(int count, const ToolKind *kind, bool is_on_paper, Color *color)

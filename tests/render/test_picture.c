@@ -16,6 +16,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "view_stage.h"
+
 static char folder[] = "/tmp/seldinger_picture_XXXXXX";
 static bool is_available;
 
@@ -181,6 +183,51 @@ static void moments_share_one_picture(void **state)
     assert_true(picture_of_run(in_folder("m.png"), &run.options, &run.scene, &run.tool, message, sizeof message));
     assert_int_equal(files_in_folder(), 1);
     remove(in_folder("m.png"));
+    run_close(&run);
+}
+
+static bool is_blue(const uint8_t *p) { return p[2] > p[0] + 60; }
+static bool is_dark(const uint8_t *p) { return p[0] < 90 && p[1] < 90 && p[2] < 90; }
+
+// A catheter of 10 mm, cut open, with a wire of 16 in it: dark between two blue lines, then dark alone.
+static void tools_are_cut_open_where_another_lies_in_them(void **state)
+{
+    (void)state;
+    if (!is_available)
+        skip();
+    Run run;
+    run_open(&run);
+    char message[256] = "";
+    CoaxialLooks two;
+    coaxial_looks(&two, 0.6, 0.45, 0.2);
+    Pose *pose = coaxial_pose(10, 16, 0.5, 0.6, 0.2);
+    double radius[100];
+    for (int i = 0; i < pose->node_count; i++)
+        radius[i] = pose->node[i].radius;
+    run.scene = (PictureScene){0};
+    run.options.inset = false;
+    PictureTool tool = {.node_count = pose->node_count, .position = pose->position, .radius = radius, .pose = pose, .looks = &two.looks};
+    if (!picture_of_run(in_folder("two.png"), &run.options, &run.scene, &tool, message, sizeof message))
+        fail_msg("%s", message);
+    Image image = load(in_folder("two.png"));
+    int nested = 0, alone = 0, whole = 0;
+    for (int x = 0; x < image.width * 3 / 5; x++) {
+        int first = -1, last = -1, dark = 0, before = 0;
+        for (int y = 50; y < image.height - 60; y++) {   // between the title and the scale bar
+            const uint8_t *p = image.rgb + 3 * ((size_t)y * (size_t)image.width + (size_t)x);
+            first = first < 0 && is_blue(p) ? y : first;
+            last = is_blue(p) ? y : last;
+            before = dark > 0 && is_blue(p) ? dark : before;
+            dark += is_dark(p);
+        }
+        nested += first >= 0 && before >= 3 && last > first + 8;
+        whole += first >= 0 && dark == 0;
+        alone += first < 0 && dark >= 3;
+    }
+    assert_true(nested > 100 && alone > 50 && whole < 8);
+    free(image.rgb);
+    remove(in_folder("two.png"));
+    pose_free(pose);
     run_close(&run);
 }
 
@@ -581,6 +628,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_same_run_gives_the_same_bytes),
         cmocka_unit_test(moments_share_one_picture),
+        cmocka_unit_test(tools_are_cut_open_where_another_lies_in_them),
         cmocka_unit_test(files_that_cannot_be_written_leave_nothing_behind),
         cmocka_unit_test(input_that_cannot_be_drawn_is_refused),
         cmocka_unit_test(the_tube_drawn_is_the_tube_touched),
