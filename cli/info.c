@@ -298,22 +298,42 @@ static bool describe_scene(cJSON *object, const char *path, Faults *faults)
     return true;
 }
 
-static bool describe_script(cJSON *object, const char *path, Faults *faults)
+// What a script does with one tool, in sum.
+static void add_hand(cJSON *object, const Script *script, int tool)
 {
-    Script *script = script_load(path, faults);
-    double push = 0, twist = 0;
-    if (!script)
-        return false;
+    double push = 0, twist = 0, released = 0;
     for (int i = 0; i + 1 < script->count; i++) {
         double seconds = script->row[i + 1].t_s - script->row[i].t_s;
-        push += script->row[i].command.push_mm_s * seconds;
-        twist += script->row[i].command.twist_deg_s * seconds;
+        const Command *command = script_row_command(&script->row[i], tool);
+        push += command->push_mm_s * seconds;
+        twist += command->twist_deg_s * seconds;
+        released += script->row[i].released >> tool & 1 ? seconds : 0;
     }
+    cJSON_AddNumberToObject(object, "push_mm", push);
+    cJSON_AddNumberToObject(object, "twist_deg", twist);
+    if (released > 0)
+        cJSON_AddNumberToObject(object, "released_s", released);
+}
+
+static bool describe_script(cJSON *object, const char *path, Faults *faults)
+{
+    ScriptTools tools;
+    Script *script = script_load_any(path, &tools, faults);
+    if (!script)
+        return false;
+    bool named = *tools.names.name[0];
     cJSON_AddStringToObject(object, "what", "script");
     cJSON_AddNumberToObject(object, "rows", script->count);
     cJSON_AddNumberToObject(object, "duration_s", script_duration_s(script));
-    cJSON_AddNumberToObject(object, "push_mm", push);
-    cJSON_AddNumberToObject(object, "twist_deg", twist);
+    cJSON *list = named ? cJSON_AddArrayToObject(object, "tools") : NULL;
+    for (int k = 0; k < tools.names.count; k++) {
+        cJSON *tool = named ? cJSON_CreateObject() : object;
+        if (named) {
+            cJSON_AddStringToObject(tool, "name", tools.names.name[k]);
+            cJSON_AddItemToArray(list, tool);
+        }
+        add_hand(tool, script, k);
+    }
     script_free(script);
     return true;
 }

@@ -33,7 +33,8 @@ typedef struct RunOptions {
 static const char help[] =
     "Usage: seldinger run SCENE [options]\n\n"
     "Runs a scene (YAML) headless, as fast as it goes, and prints a short summary.\n\n"
-    "  --script F         script of the hand (CSV t_s,push_mm_s,twist_deg_s) instead of the scene's\n"
+    "  --script F         script of the hand (CSV t_s,push_mm_s,twist_deg_s) instead of the scene's; of several tools\n"
+    "                     t_s,NAME.push_mm_s,NAME.twist_deg_s,…; a further column released, NAME.released, is 1 where no hand holds it\n"
     "  --device F.yaml    instead of a script a device drives, by this map or (auto) a built-in one; paced; repeated for up to 8 maps. Needs --duration-s\n"
     "  --duration-s S     simulated time [s]; default: the script's; needed where there is no script\n"
     "  --settle-s S       afterwards goes on without input for at most S [s], until nothing moves faster than 0.01 mm/s; default 0\n"

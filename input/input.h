@@ -49,6 +49,12 @@ Script *script_parse_tools(const char *text, size_t length, const char *file, co
 // Reads the file (at most 64 MiB) and parses it.
 Script *script_load(const char *path, Faults *faults);
 Script *script_load_tools(const char *path, const ToolNames *tools, Faults *faults);
+// Without a scene: the tools are those that the header names, in its order; one without a name where it names none.
+typedef struct ScriptTools {
+    ToolNames names;         // point into `text`
+    char text[TOOLS_MOST][TOOL_NAME_SIZE];
+} ScriptTools;
+Script *script_load_any(const char *path, ScriptTools *tools, Faults *faults);
 void script_free(Script *script);
 Command *script_row_command(ScriptRow *row, int tool);
 // One row's rules, for whoever reads rows from elsewhere (a scene's inline script); `before` is the row before it or NULL, `tools` NULL where there is one.

@@ -205,6 +205,37 @@ Script *script_load_tools(const char *path, const ToolNames *tools, Faults *faul
 
 Script *script_load(const char *path, Faults *faults) { return script_load_tools(path, NULL, faults); }
 
+// The names before the dots of a header. More than there can be are left out: parsing then faults them.
+static void find_names(const char *text, size_t length, ScriptTools *tools)
+{
+    NumberColumn field[NUMBER_TABLE_COLUMNS];
+    int line, count = number_table_columns(text, length, field, NUMBER_TABLE_COLUMNS, &line);
+    *tools = (ScriptTools){0};
+    for (int i = 0; i < count && i < NUMBER_TABLE_COLUMNS && tools->names.count < TOOLS_MOST; i++) {
+        const char *dot = memchr(field[i].name, '.', field[i].length);
+        size_t size = dot ? (size_t)(dot - field[i].name) : 0;
+        if (size == 0 || size >= TOOL_NAME_SIZE || find_word(field[i].name, size, tools->names.name) >= 0)
+            continue;
+        char *name = tools->text[tools->names.count];
+        memcpy(name, field[i].name, size);
+        tools->names.name[tools->names.count++] = name;
+    }
+    if (tools->names.count == 0)
+        tools->names = (ToolNames){.count = 1, .name = {tools->text[0]}};
+}
+
+Script *script_load_any(const char *path, ScriptTools *tools, Faults *faults)
+{
+    size_t length;
+    char *text = text_file_read(path, &length, faults);
+    if (!text)
+        return NULL;
+    find_names(text, length, tools);
+    Script *script = script_parse_tools(text, length, path, &tools->names, faults);
+    free(text);
+    return script;
+}
+
 void script_free(Script *script)
 {
     if (!script)

@@ -2,6 +2,7 @@
 // from other files. Rows that one dataset has more than another (a file still being written) are left out.
 #include "sim/recording.h"
 
+#include <ctype.h>
 #include <hdf5.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -132,13 +133,22 @@ static bool has(const Reader *reader, const char *name) { return H5Lexists(reade
 
 // --- several tools ---
 
+// As in a scene (sim/scene_tools.c): what a script's head, a CSV and a terminal can hold.
+static bool is_name(const char *text)
+{
+    bool good = *text && strlen(text) < TOOL_NAME_SIZE;
+    for (const char *c = text; good && *c; c++)
+        good = *c != '.' && *c != ',' && !isspace((unsigned char)*c) && !iscntrl((unsigned char)*c);
+    return good;
+}
+
 static void copy_attribute(const Reader *reader, const char *group, const char *name, char text[TOOL_NAME_SIZE])
 {
     char *read = read_attribute(reader, group, name);
-    if (read && strlen(read) < TOOL_NAME_SIZE)
+    if (read && is_name(read))
         strcpy(text, read);
     else
-        faults_add(reader->faults, reader->path, 0, 0, "%s lacks its text attribute '%s' of less than %d letters", group, name, TOOL_NAME_SIZE);
+        faults_add(reader->faults, reader->path, 0, 0, "%s lacks its text attribute '%s', a word of at most %d letters", group, name, TOOL_NAME_SIZE - 1);
     free(read);
 }
 

@@ -153,6 +153,7 @@ static void a_run_of_three_tools_is_recorded_and_simulated_again(void **state)
     ends(1, "differs from step 200", "replay $D/other.h5 --verify");
     // and as a scene with a golden path of each tool
     ends(0, "three-again: scene.yaml, hand.csv, scene.golden.csv", "replay $D/three.h5 --scene $D/three-again");
+    ends(0, "name guide, push_mm 6, twist_deg 0, name micro, push_mm 15, twist_deg 27, name wire, push_mm 3, twist_deg 13.5", "info $D/three-again/hand.csv");
     ends(0, "same", "check $D/three-again");
     put("three-again/scene.yaml", three_tools);
     ends(0, "same", "check $D/three-again");
@@ -169,6 +170,25 @@ static int lines_of(const char *text, const char *words)
     for (const char *at = text; (at = strstr(at, words)); at++)
         lines++;
     return lines;
+}
+
+static void a_tool_that_is_let_go_stays_so_in_a_replay(void **state)
+{
+    (void)state;
+    put("let-go.csv", "t_s,wire.push_mm_s,wire.twist_deg_s,guide.released,wire.released\n0,50,0,0,0\n0.2,0,0,0,1\n0.3,0,0,1,1\n0.4,0,0,0,0\n");
+    ends(0, "", "run $D/three.yaml --script $D/let-go.csv --record $D/let-go.h5 --quiet");
+    ends(0, "400 steps (0.400 s) simulated again, the same state at each", "replay $D/let-go.h5 --verify");
+    ends(0, "let-go: scene.yaml", "replay $D/let-go.h5 --scene $D/let-go");
+    ends(0, "same", "check $D/let-go");
+    ends(0, "name guide, push_mm 0, twist_deg 0, released_s 0.1, name micro, push_mm 0, twist_deg 0, name wire, push_mm 10, twist_deg 0, released_s 0.2",
+         "info $D/let-go/hand.csv");
+    // of a single tool too
+    put("one.yaml", "seldinger: 1\nwire: {elements: 20, sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80, rest_curvature_1_mm: 0.1}]}\n"
+                    "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 5}\n");
+    put("one.csv", "t_s,push_mm_s,twist_deg_s,released\n0,50,0,0\n0.2,0,0,1\n0.4,0,0,0\n");
+    ends(0, "", "run $D/one.yaml --script $D/one.csv --record $D/one.h5 --quiet");
+    ends(0, "400 steps (0.400 s) simulated again, the same state at each", "replay $D/one.h5 --verify");
+    ends(0, "released_s       0.2", "info $D/one.csv");
 }
 
 static void each_format_has_all_tools(void **state)
@@ -219,6 +239,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_reference_from_a_scene), cmocka_unit_test(two_tools_in_a_model_repeat),
         cmocka_unit_test(a_run_of_three_tools_is_recorded_and_simulated_again), cmocka_unit_test(each_format_has_all_tools),
+        cmocka_unit_test(a_tool_that_is_let_go_stays_so_in_a_replay),
         cmocka_unit_test(golden_paths_of_the_scenes_hold), cmocka_unit_test(what_takes_one_tool_says_so),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -306,6 +306,18 @@ static void write_value(hid_t file, const char *name, hid_t type, const hsize_t 
 
 static void lose_tool(hid_t file) { H5Ldelete(file, "/tools/1", H5P_DEFAULT); }
 static void lose_name(hid_t file) { H5Adelete_by_name(file, "/tools/2", "name", H5P_DEFAULT); }
+static void rename_tool(hid_t file)
+{
+    hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR), place = H5Gopen2(file, "/tools/2", H5P_DEFAULT);
+    H5Tset_size(type, 8);
+    H5Adelete(place, "name");
+    hid_t attribute = H5Acreate2(place, "name", type, space, H5P_DEFAULT, H5P_DEFAULT);
+    assert_true(H5Awrite(attribute, type, "a\nb,c\0\0") >= 0);
+    H5Aclose(attribute);
+    H5Gclose(place);
+    H5Sclose(space);
+    H5Tclose(type);
+}
 static void lose_hand(hid_t file) { H5Ldelete(file, "/tools/3/command", H5P_DEFAULT); }
 static void widen_hand(hid_t file) { replace(file, "/tools/1/proximal", H5T_NATIVE_DOUBLE, 2, (const hsize_t[]){605, 3}, H5P_DEFAULT); }
 static void other_nodes(hid_t file) { replace(file, "/tools/1/position", H5T_NATIVE_DOUBLE, 3, (const hsize_t[]){62, 99, 3}, H5P_DEFAULT); }
@@ -346,6 +358,7 @@ static void what_is_broken_is_refused(void **state)
     snprintf(path, sizeof path, "%s/tools.h5", folder);
     expect_refused(path, lose_tool, "/tools does not hold the groups 0 to 1");
     expect_refused(path, lose_name, "/tools/2 lacks its text attribute 'name'");
+    expect_refused(path, rename_tool, "/tools/2 lacks its text attribute 'name'");
     expect_refused(path, lose_hand, "lacks the dataset '/tools/3/command'");
     expect_refused(path, widen_hand, "'/tools/1/proximal' does not have the shape or type");
     expect_refused(path, other_nodes, "'/tools/1/position' does not have the shape or type");
