@@ -175,12 +175,14 @@ static int lines_of(const char *text, const char *words)
 static void a_tool_that_is_let_go_stays_so_in_a_replay(void **state)
 {
     (void)state;
-    put("let-go.csv", "t_s,wire.push_mm_s,wire.twist_deg_s,guide.released,wire.released\n0,50,0,0,0\n0.2,0,0,0,1\n0.3,0,0,1,1\n0.4,0,0,0,0\n");
+    put("let-go.csv", "t_s,guide.push_mm_s,guide.twist_deg_s,micro.released\n0,20,0,0\n0.1,20,0,1\n0.4,0,0,0\n");
     ends(0, "", "run $D/three.yaml --script $D/let-go.csv --record $D/let-go.h5 --quiet");
     ends(0, "400 steps (0.400 s) simulated again, the same state at each", "replay $D/let-go.h5 --verify");
+    // the guide took it along
+    ends(0, "name micro, kind microcatheter, length_mm 75, inserted_mm 10,", "info $D/let-go.h5");
     ends(0, "let-go: scene.yaml", "replay $D/let-go.h5 --scene $D/let-go");
     ends(0, "same", "check $D/let-go");
-    ends(0, "name guide, push_mm 0, twist_deg 0, released_s 0.1, name micro, push_mm 0, twist_deg 0, name wire, push_mm 10, twist_deg 0, released_s 0.2",
+    ends(0, "name guide, push_mm 8, twist_deg 0, name micro, push_mm 0, twist_deg 0, released_s 0.3, name wire, push_mm 0, twist_deg 0",
          "info $D/let-go/hand.csv");
     // of a single tool too
     put("one.yaml", "seldinger: 1\nwire: {elements: 20, sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80, rest_curvature_1_mm: 0.1}]}\n"
