@@ -7,7 +7,7 @@ loads are jumps of n and m, and both must vanish beyond the tip. Units mm, N, MP
 """
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq, root
+from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 
@@ -74,22 +74,6 @@ def show(name, found, unknown):
     print(f"  force ({unknown[0]:.9g}, {unknown[1]:.9g}, {unknown[2]:.9g}) and moment ({unknown[3]:.9g}, {unknown[4]:.9g}, {unknown[5]:.9g}) of what lies beyond the clamp on it")
 
 
-def turned_tubes(base_deg, ei=(60.0, 40.0), kappa=0.05, nu=0.3, length=60.0):
-    """Two tubes of equal rest curvature turned against each other: phi'' = c sin phi, phi'(L) = 0, shot from the tip. Beyond the snap phi is what lacks to a turn."""
-    gj = np.array(ei) / (1 + nu)
-    c = ei[0] * ei[1] / sum(ei) * kappa**2 * sum(1 / gj)
-    at_base = lambda tip: solve_ivp(lambda _, y: [-y[1], -c * np.sin(y[0])], (0, length), [tip, 0.0], rtol=1e-12, atol=1e-13).y[:, -1]
-    tips = np.radians(np.linspace(0.01, 170, 1701))
-    bases = np.array([at_base(tip)[0] for tip in tips])
-    fold = int(np.argmax(bases))
-    snapped = base_deg > np.degrees(bases[fold])
-    phi = np.radians(360 - base_deg if snapped else base_deg)
-    tip = brentq(lambda x: at_base(x)[0] - phi, 1e-6, tips[fold])
-    torque, twist = -at_base(tip)[1] / sum(1 / gj), np.degrees(tip - phi) / sum(1 / gj) / gj
-    sign = -1 if snapped else 1
-    print(f"turned {base_deg} degrees (they snap at {np.degrees(bases[fold]):.3f}): torque {sign * torque:.8f}, inner twist {sign * twist[1]:.8f}, outer {-sign * twist[0]:.8f}")
-
-
 def main():
     standard = lambda length: section(length, 0.36, 80e3)
     # space-load.yaml: unequal loads in three directions at two places, with a moment that twists
@@ -103,9 +87,6 @@ def main():
     show("follower", *solve([standard(50)], [dict(s=50, force=(0, 0, 0.08), follower=True)]))
     # sections.yaml: stiff to soft
     show("sections", *solve([section(40, 0.5, 80e3), section(30, 0.36, 20e3), section(10, 0.25, 1e3)], [dict(s=80, force=(0.001, 0.002, 0.004))], places=(40, 70)))
-    # coaxial-turn.yaml
-    for base_deg in (180, 279, 281):
-        turned_tubes(base_deg)
 
 
 main()
