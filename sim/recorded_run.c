@@ -16,7 +16,6 @@ typedef struct Reader {
 } Reader;
 
 static const hsize_t most_values = (hsize_t)1 << 29;
-enum { MOST_SQUEEZED = 1100 };   // deflate makes bytes at most about so many times fewer
 
 // A link into another file is not followed.
 static herr_t refuse_link(const char *file, const char *group, const char *other, const char *object, unsigned *flags, hid_t access, void *context)
@@ -25,13 +24,40 @@ static herr_t refuse_link(const char *file, const char *group, const char *other
     return -1;
 }
 
-// Whether a dataset's bytes lie in this file.
-static bool is_stored(hid_t set, hsize_t bytes)
+// Whether each chunk is there with all its bytes. The library takes as many as the index says, and reads as many as the shape says.
+static bool has_chunks(hid_t set, hid_t creation, int rank, const hsize_t *extent, size_t value_bytes)
+{
+    hsize_t chunk[3] = {0}, at[3] = {0}, bytes = value_bytes;
+    if (H5Pget_chunk(creation, 3, chunk) != rank)
+        return false;
+    for (int i = 0; i < rank; i++) {
+        if (chunk[i] == 0 || bytes > UINT32_MAX / chunk[i])
+            return false;
+        bytes *= chunk[i];
+    }
+    for (;;) {
+        hsize_t stored = 0;
+        haddr_t address = HADDR_UNDEF;
+        if (H5Dget_chunk_info_by_coord(set, at, NULL, &address, &stored) < 0 || address == HADDR_UNDEF || stored != bytes)
+            return false;
+        int i = rank - 1;
+        while (i >= 0 && (at[i] += chunk[i]) >= extent[i])
+            at[i--] = 0;
+        if (i < 0)
+            return true;
+    }
+}
+
+// Whether a dataset's bytes lie in this file, as a recording's do: plain.
+static bool is_stored(hid_t set, int rank, const hsize_t *extent, hsize_t values, size_t value_bytes)
 {
     hid_t creation = H5Dget_create_plist(set);
     H5D_layout_t layout = H5Pget_layout(creation);
-    hsize_t stored = H5Dget_storage_size(set), most = H5Pget_nfilters(creation) > 0 ? stored * MOST_SQUEEZED : stored;
-    bool good = (layout == H5D_COMPACT || layout == H5D_CONTIGUOUS || layout == H5D_CHUNKED) && H5Pget_external_count(creation) == 0 && bytes <= most;
+    bool good = H5Pget_nfilters(creation) == 0 && H5Pget_external_count(creation) == 0;
+    if (layout == H5D_CHUNKED)
+        good = good && (values == 0 || has_chunks(set, creation, rank, extent, value_bytes));
+    else
+        good = good && (layout == H5D_COMPACT || layout == H5D_CONTIGUOUS) && H5Dget_storage_size(set) == values * value_bytes;
     H5Pclose(creation);
     return good;
 }
@@ -54,10 +80,12 @@ static void *read_dataset(const Reader *reader, const char *name, hid_t type, in
     }
     H5T_class_t class = H5Tget_class(stored);
     void *data = NULL;
-    if (!good || (class != H5T_FLOAT && class != H5T_INTEGER)) {
+    size_t value_bytes = H5Tget_size(stored);
+    if (!good || (class != H5T_FLOAT && class != H5T_INTEGER) || value_bytes > 8) {
         faults_add(reader->faults, reader->path, 0, 0, "dataset '%s' does not have the shape or type of a recording's", name);
-    } else if (!is_stored(set, values * H5Tget_size(stored))) {
-        faults_add(reader->faults, reader->path, 0, 0, "dataset '%s' promises %llu values that the file does not hold", name, (unsigned long long)values);
+    } else if (!is_stored(set, rank, extent, values, value_bytes)) {
+        faults_add(reader->faults, reader->path, 0, 0, "dataset '%s' promises %llu values that the file does not hold plainly: they lack, are packed or lie elsewhere",
+                   name, (unsigned long long)values);
     } else if (!(data = calloc((size_t)values + 1, H5Tget_size(type)))) {
         faults_add(reader->faults, reader->path, 0, 0, "no memory for dataset '%s'", name);
     } else if (values > 0 && H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0) {
@@ -72,21 +100,27 @@ static void *read_dataset(const Reader *reader, const char *name, hid_t type, in
     return data;
 }
 
+static bool is_one_text(hid_t type, hid_t space, size_t most)
+{
+    return H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) <= 0 && H5Tget_size(type) < most && H5Sget_simple_extent_npoints(space) == 1;
+}
+
 static char *read_scene_text(const Reader *reader)
 {
     hid_t set = H5Dopen2(reader->file, "/scene", reader->access);
     if (set < 0)
         return NULL;
-    hid_t type = H5Dget_type(set);
+    hid_t type = H5Dget_type(set), space = H5Dget_space(set);
     char *text = NULL;
     size_t size = H5Tget_size(type);
-    if (H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) <= 0 && size < ((size_t)1 << 27) && H5Dget_storage_size(set) == size && is_stored(set, size)) {
+    if (is_one_text(type, space, (size_t)1 << 27) && is_stored(set, 0, NULL, 1, size)) {
         text = calloc(size + 1, 1);
         if (text && H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text) < 0) {
             free(text);
             text = NULL;
         }
     }
+    H5Sclose(space);
     H5Tclose(type);
     H5Dclose(set);
     return text;
@@ -98,13 +132,14 @@ static char *read_attribute(const Reader *reader, const char *object, const char
     hid_t place = H5Oopen(reader->file, object, reader->access), attribute = place >= 0 ? H5Aopen(place, name, H5P_DEFAULT) : -1;
     char *text = NULL;
     if (attribute >= 0) {
-        hid_t type = H5Aget_type(attribute);
+        hid_t type = H5Aget_type(attribute), space = H5Aget_space(attribute);
         size_t size = H5Tget_size(type);
-        if (H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) <= 0 && size < 1 << 20 && H5Aget_storage_size(attribute) == size &&
+        if (is_one_text(type, space, (size_t)1 << 20) && H5Aget_storage_size(attribute) == size &&
             (text = calloc(size + 1, 1)) && H5Aread(attribute, type, text) < 0) {
             free(text);
             text = NULL;
         }
+        H5Sclose(space);
         H5Tclose(type);
         H5Aclose(attribute);
     }

@@ -334,6 +334,29 @@ static void promise(hid_t file)
     H5Pclose(creation);
 }
 
+// Fewer bytes of a chunk in the file than its shape needs: packed, and the packing forgotten.
+static void pack(hid_t file)
+{
+    hid_t creation = H5Pcreate(H5P_DATASET_CREATE);
+    H5Pset_chunk(creation, 1, &(hsize_t){605});
+    H5Pset_deflate(creation, 9);
+    replace(file, "/time_s", H5T_NATIVE_DOUBLE, 1, &(hsize_t){605}, creation);
+    H5Pclose(creation);
+}
+
+// A chunk that holds less than its shape needs, as a damaged index would have it.
+static void cut_chunk(hid_t file)
+{
+    static const double value[605];
+    hid_t creation = H5Pcreate(H5P_DATASET_CREATE);
+    H5Pset_chunk(creation, 1, &(hsize_t){605});
+    replace(file, "/time_s", H5T_NATIVE_DOUBLE, 1, &(hsize_t){605}, creation);
+    H5Pclose(creation);
+    hid_t set = H5Dopen2(file, "/time_s", H5P_DEFAULT);
+    assert_true(H5Dwrite_chunk(set, H5P_DEFAULT, 0, &(hsize_t){0}, 64, value) >= 0);
+    H5Dclose(set);
+}
+
 static void read_elsewhere(hid_t file)
 {
     hid_t creation = H5Pcreate(H5P_DATASET_CREATE);
@@ -366,6 +389,8 @@ static void what_is_broken_is_refused(void **state)
     expect_refused(path, no_node, "frame 5 has 0 nodes");
     expect_refused(path, no_such_carrier, "/tools/2/carrier names tool 7; -1 to 3");
     expect_refused(path, promise, "'/time_s' promises 268435456 values that the file does not hold");
+    expect_refused(path, pack, "'/time_s' promises 605 values that the file does not hold plainly");
+    expect_refused(path, cut_chunk, "'/time_s' promises 605 values that the file does not hold plainly");
     expect_refused(path, read_elsewhere, "'/time_s' promises 100 values that the file does not hold");
     expect_refused(path, link_elsewhere, "lacks the dataset '/time_s'");
 }
