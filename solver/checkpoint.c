@@ -7,7 +7,7 @@
 
 struct Checkpoint {
     int point_capacity, first_free;
-    int first[STEP_TOOLS_MAX], inside[STEP_TOOLS_MAX];
+    int first[STEP_TOOLS_MAX], inside[STEP_TOOLS_MAX], fitted[STEP_TOOLS_MAX];
     double tool_inserted[STEP_TOOLS_MAX], tool_twist[STEP_TOOLS_MAX];
     size_t memory_count;
     double time, inserted, twist;
@@ -52,6 +52,7 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
     c->report = s->report;
     for (int k = 0; s->tool_count > 1 && k < s->tool_count; k++) {
         c->first[k] = s->tool[k].first;
+        c->fitted[k] = s->fitted[k];
         c->inside[k] = s->tool[k].inside;
         c->tool_inserted[k] = s->tool[k].inserted;
         c->tool_twist[k] = s->tool[k].twist;
@@ -70,6 +71,7 @@ void stepper_restore(Stepper *s, const Checkpoint *c)
     s->state.inserted = c->inserted;
     s->state.twist = c->twist;
     s->report = c->report;
+    tools_refit(s, c->fitted);
     for (int k = 0; s->tool_count > 1 && k < s->tool_count; k++) {
         s->tool[k].first = c->first[k];
         s->tool[k].inserted = c->tool_inserted[k];
@@ -104,6 +106,8 @@ uint64_t stepper_hash(const Stepper *s)
     hash_double(&hash, s->state.inserted);
     hash_double(&hash, s->state.twist);
     hash_double(&hash, s->first_free);
+    for (int k = 0; k < s->tool_count && s->spare_count[k] > 0; k++)
+        hash_double(&hash, s->fitted[k]);
     for (int k = 1; k < s->tool_count; k++) {
         hash_double(&hash, s->tool[k].first);
         hash_double(&hash, s->tool[k].inside);

@@ -51,7 +51,7 @@ static double *take(double **from, size_t count)
 static bool allocate_scratch(Stepper *s)
 {
     size_t m = (size_t)s->wire.node_count, padded = m + BEAM_PADDING;
-    s->scratch = calloc((BEAM_REST_ARRAYS + 2 * BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1) * padded + (7 * (size_t)s->chain.size + 7 + (size_t)s->chain.size + 8 * (size_t)s->state.inner_count + 2) * m,
+    s->scratch = calloc((BEAM_REST_ARRAYS + 2 * BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1) * padded + (5 * (size_t)s->chain.size + 7 + (size_t)s->chain.size + 8 * (size_t)s->state.inner_count + 2) * m,
                         sizeof *s->scratch);
     if (!s->scratch)
         return false;
@@ -82,7 +82,6 @@ static bool allocate_scratch(Stepper *s)
     s->inner_tension = take(&at, inner);
     s->middle = take(&at, m);
     s->bent = take(&at, m);
-    s->start_gradient = take(&at, 2 * rows);
     return true;
 }
 

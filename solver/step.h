@@ -13,7 +13,7 @@
 #include "solver/gauss_seidel.h"
 #include "solver/wire.h"
 
-enum { STEP_TOOLS_MAX = 4 };
+enum { STEP_TOOLS_MAX = 4, STEP_SPARES_MAX = 4 };
 
 typedef struct StepCommand {
     double advance;          // [mm] in this step, > 0 into the patient
@@ -52,6 +52,13 @@ typedef struct StepReport {
 
 typedef struct Stepper Stepper;
 
+// Another tool that may take the place of tool `tool` of several, once that has been drawn back to its hub (stepper_exchange()).
+typedef struct StepperSpare {
+    int tool;
+    WireOptions wire;        // sections, elements, hand_limit and valve_friction are read
+    double friction_inside;  // of its lumen with the tool within
+} StepperSpare;
+
 typedef struct StepperOptions {
     WireOptions wire;            // the tool, or the outermost of several
     // Coaxial tools inside it, outermost first; of their options sections, elements, hand_limit, valve_friction and inserted (length beyond the mouth, or the
@@ -59,6 +66,8 @@ typedef struct StepperOptions {
     int inner_count;             // up to STEP_TOOLS_MAX - 1
     const WireOptions *inner;
     double inner_friction[STEP_TOOLS_MAX - 1];     // >= 0, Coulomb coefficient of each inner tool with the one around it
+    int spare_count;             // at most STEP_SPARES_MAX a tool; none where there is one tool
+    const StepperSpare *spare;
     const Vessel *vessel;        // may be NULL: no walls
     double wall_friction;
     ContactOptions contact;
@@ -74,6 +83,17 @@ void step_feed(Stepper *stepper, StepCommand command);
 // The commands of all tools, [1 + inner_count]; step_feed() pins the inner ones. Bit k of `released`: no hand holds tool k, only the valve that it goes
 // through does, by friction (WireOptions.valve_friction).
 void step_feed_tools(Stepper *stepper, const StepCommand *command, unsigned released);
+// Between two steps: the first (0) or a spare tool (1, 2, … in the order of the options) takes the place of tool `tool`. Allocates nothing; poses of
+// the other tools stay, and what the old tool held by friction is let go.
+typedef enum {
+    EXCHANGE_DONE,
+    EXCHANGE_NO_SUCH_TOOL,
+    EXCHANGE_INSERTED,       // the tool must first be drawn back to its hub, or the outermost one to the sheath's mouth
+    EXCHANGE_TOO_SHORT,      // a proximal end would come to lie inside a hub: the tool within, or the new one, is too short
+} StepExchange;
+StepExchange stepper_exchange(Stepper *stepper, int tool, int which);
+int stepper_fitted(const Stepper *stepper, int tool);
+
 void step_detect(Stepper *stepper);
 void step_assemble(Stepper *stepper);
 void step_factor(Stepper *stepper);

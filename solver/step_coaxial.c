@@ -424,16 +424,18 @@ static CoaxialInput mouth_input(const Stepper *s, int *tool)
 static void mouth_ways(const Stepper *s, const CoaxialInput *in, const int *tool, Way way[NODAL + COAXIAL_COLUMNS])
 {
     const double d[3] = {s->axis[0].x, s->axis[0].y, s->axis[0].z};
+    bool at_tip = is_at_tip(s, s->first_free - 1);       // then the tool that goes on has a place and an angle at that node too
+    int on = unknown_of(tool[0]) + 1;
     far_ways(in, tool, s->chain.size, way);
     for (int i = 0; i < 3; i++) {
         way[i] = (Way){0};
-        way[3 + i] = (Way){1, {3, 0}, {d[i], 0}};
+        way[3 + i] = at_tip ? (Way){2, {3, on}, {d[i], d[i]}} : (Way){1, {3, 0}, {d[i], 0}};
     }
     for (int i = 0; i < in->count; i++) {
         int at = unknown_of(tool[i]);
         Way *w = way + NODAL + 4 * i;
-        w[COAXIAL_S1] = i == 0 ? (Way){1, {0, 0}, {-1, 0}} : (Way){2, {at, 0}, {1, -1}};
-        w[COAXIAL_PHI1] = i == 0 ? (Way){0} : (Way){1, {at + 1, 0}, {1, 0}};
+        w[COAXIAL_S1] = i == 0 && !at_tip ? (Way){1, {0, 0}, {-1, 0}} : (Way){2, {at, 0}, {1, -1}};
+        w[COAXIAL_PHI1] = i == 0 ? (Way){0} : at_tip ? (Way){2, {at + 1, on}, {1, -1}} : (Way){1, {at + 1, 0}, {1, 0}};
     }
 }
 
@@ -677,40 +679,48 @@ static Quat turned_as_a_whole(const Stepper *s, int c)
     return quat_unit((Quat){turn[0].w + same * turn[1].w, turn[0].x + same * turn[1].x, turn[0].y + same * turn[1].y, turn[0].z + same * turn[1].z});
 }
 
-// What the elastic forces of element c have changed by since the step's start, the element's turn as a whole apart: C (strain - strain at the start).
-static void strained(const Stepper *s, int c, const double *gradient, double *change)
+// What element c's unknowns have done in this step, its turn as a whole apart: in the linearised sense what strains it, however far it has turned.
+static void strained(const Stepper *s, int c, double *u)
 {
     int n = s->chain.size;
-    const double *start = s->start_gradient + 2 * row_of(s, c);
+    const WireState *w = &s->state;
+    memcpy(u, s->linearised + row_of(s, c), 2 * (size_t)n * sizeof *u);
+    if (c < s->first_free)
+        return;
     Quat turn = turned_as_a_whole(s, c);
-    for (int i = 0; i < 2 * n; i++)
-        change[i] = gradient[i] - start[i];
-    for (int node = 0; node < 2; node++)
-        for (int half = 0; half < 2 && c + node >= s->first_free; half++) {
-            int at = node * n + 3 * half;
-            Vec3 was = quat_rotate(turn, vec3(start[at], start[at + 1], start[at + 2]));
-            put(change + at, vec3_sub(vec3(gradient[at], gradient[at + 1], gradient[at + 2]), was));
-        }
+    Vec3 was = vec3_sub(s->start_position[c + 1], s->start_position[c]), is = vec3_sub(w->position[c + 1], w->position[c]), stretch = vec3_sub(is, quat_rotate(turn, was));
+    for (int node = 0; node < 2; node++) {
+        put(u + node * n, vec3_scale(stretch, node ? 0.5 : -0.5));
+        Quat q = quat_mul(w->orientation[c + node], quat_conjugate(quat_mul(turn, s->start_orientation[c + node])));
+        put(u + node * n + 3, vec3_scale(vec3(q.x, q.y, q.z), q.w < 0 ? -2 : 2));
+    }
+}
+
+// The damping's force on an iterate: `damped` is the element's tangent with it, of which `elastic` is without.
+static void add_damping(const Stepper *s, int c, const Local *elastic, Local *damped)
+{
+    int n = damped->n;
+    double u[2 * BLOCK_LARGEST];
+    strained(s, c, u);
+    for (int r = 0; r < 2 * n; r++)
+        for (int k = 0; k < 2 * n; k++)
+            damped->gradient[r] += (damped->tangent[r][k] - elastic->tangent[r][k]) * u[k];
 }
 
 void tools_assemble(Stepper *s, double scale, double inertia)
 {
-    int nodes = s->state.node_count, n = s->chain.size;
-    Local local;
+    int nodes = s->state.node_count;
+    Local local, elastic;
     memset(s->chain.diag, 0, block_of(s, nodes) * sizeof(double));
     memset(s->chain.lower, 0, block_of(s, nodes - 1) * sizeof(double));
     memset(s->b, 0, row_of(s, nodes) * sizeof(double));
     for (int c = 0; c < nodes; c++)
         node_inertia(s, c, inertia);
     for (int c = 0; c + 1 < nodes; c++) {
-        double *start = s->start_gradient + 2 * row_of(s, c), change[2 * BLOCK_LARGEST];
         element(s, c, scale, &local);
-        if (!s->is_iterate) {
-            memcpy(start, local.gradient, 2 * (size_t)n * sizeof *start);
-        } else if (scale != 1) {
-            strained(s, c, local.gradient, change);
-            for (int i = 0; i < 2 * n; i++)
-                local.gradient[i] += (scale - 1) * change[i];
+        if (s->is_iterate && scale != 1) {
+            element(s, c, 1, &elastic);
+            add_damping(s, c, &elastic, &local);
         }
         if (c + 1 == s->first_free)
             add_straightening(s, &local);
@@ -765,14 +775,16 @@ double tools_elastic_energy(const Stepper *s)
 double tools_stiffness_damping(const Stepper *s)
 {
     int n = s->chain.size;
-    double work = 0, change[2 * BLOCK_LARGEST];
-    Local local;
+    double work = 0, scale = 1 + s->damping_stiffness / s->dt;
+    Local local, elastic;
     for (int c = 0; c + 1 < s->state.node_count; c++) {
         const double *done[2] = {s->linearised + row_of(s, c), s->linearised + row_of(s, c + 1)};
-        element(s, c, 1, &local);
-        strained(s, c, local.gradient, change);
+        element(s, c, scale, &local);
+        element(s, c, 1, &elastic);
+        memset(local.gradient, 0, sizeof local.gradient);
+        add_damping(s, c, &elastic, &local);
         for (int i = 0; i < 2 * n; i++)
-            work += change[i] * done[i / n][i % n];
+            work += local.gradient[i] * done[i / n][i % n];
     }
-    return s->damping_stiffness / s->dt * work;
+    return work;
 }

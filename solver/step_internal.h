@@ -43,6 +43,9 @@ typedef struct Tool {
     double *line_mass, *line_inertia;  // (sections) [g/mm], [g mm] about a diameter
     Slot *slot;              // of its own elements
     int *slot_start;         // (E + 1)
+    double hand_limit, valve_friction;
+    double friction_inside;  // of its lumen
+    double lumen, widest;    // [mm] least inner and largest outer diameter
     double friction, clearance;    // with the tool around it; [mm] between them, radial
     // what changes
     int first;               // own node from which on it carries the chain; node_count: nowhere
@@ -50,6 +53,11 @@ typedef struct Tool {
     int inside;              // it lies inside another tool at the chain's nodes before this one
     double inserted, twist;  // [mm], [rad] prescribed
 } Tool;
+
+typedef struct Inside {      // what lies inside at a node in the sheath
+    double x;                // [mm] of the node along the line
+    double value[STEP_TOOLS_MAX - 1][4];         // of each inner tool: slide, angle against the hub, their velocities
+} Inside;
 
 struct Stepper {
     // given once
@@ -80,9 +88,11 @@ struct Stepper {
     double hand_basis[BLOCK_LARGEST * BLOCK_LARGEST];    // node 0's unknowns in those of the hands
     int tool_count;          // 1: what follows is not used
     Tool tool[STEP_TOOLS_MAX];
+    Tool *device[STEP_TOOLS_MAX][1 + STEP_SPARES_MAX];   // what may be tool k; own their arrays, which `tool` borrows
+    int spare_count[STEP_TOOLS_MAX], fitted[STEP_TOOLS_MAX];
+    Inside *inside;          // (M) of an exchange
     int *carrier;            // (M) the tool that carries a node
     double *start_slide, *start_angle; // (M, I) at x_n
-    double *start_gradient;  // (E, 2, 6 + 2 I) elastic forces of the elements at x_n
     Vec3 *inner_moment;      // (E, I) [N mm] of tool 1 + i and all inside it at the middle of an element …
     double *inner_tension;   // (E, I) [N] … and their tension
     double *middle;          // (E) [mm] of an element along the line

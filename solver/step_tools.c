@@ -54,37 +54,85 @@ static bool make_tool(Tool *t, const WireOptions *o, char *why, int capacity)
             t->slot[t->slot_start[i] + k] = slot_make((int)i, t->wire.length[i], k, count, section->diameter / 2, section->friction);
     }
     t->inserted = fmin(o->inserted, t->wire.total_length);
+    t->hand_limit = o->hand_limit;
+    t->valve_friction = o->valve_friction;
+    t->lumen = HUGE_VAL;
+    for (int i = 0; i < sections; i++) {
+        t->lumen = fmin(t->lumen, o->section[i].inner_diameter);
+        t->widest = fmax(t->widest, o->section[i].diameter);
+    }
     return t->slot != NULL;
 }
 
-// [mm] the least there is; at least a thousandth of the inner tool's diameter.
-static double clearance_between(const WireOptions *around, const WireOptions *inner)
+double tools_clearance(const Tool *around, const Tool *inner) { return fmax(0.5 * (around->lumen - inner->widest), 1e-3 * inner->widest); }
+
+static Tool *make_device(Stepper *s, int k, const WireOptions *options, char *why, int capacity)
 {
-    double lumen = HUGE_VAL, widest = 0;
-    for (int i = 0; i < around->section_count; i++)
-        lumen = fmin(lumen, around->section[i].inner_diameter);
-    for (int i = 0; i < inner->section_count; i++)
-        widest = fmax(widest, inner->section[i].diameter);
-    return fmax(0.5 * (lumen - widest), 1e-3 * widest);
+    WireOptions own = *options;
+    if (k > 0)       // where it stands and how it is held is the outermost's
+        own.has_sheath = true, own.fix_count = own.load_count = 0, own.start = own.normal = vec3(0, 0, 0), own.direction = vec3(1, 0, 0);
+    if (k == 0 && !own.has_sheath)
+        own.inserted = wire_length(&own);
+    Tool *t = calloc(1, sizeof *t);
+    s->device[k][s->spare_count[k]] = t;
+    return t && make_tool(t, &own, why, capacity) ? t : NULL;
+}
+
+static bool make_spares(Stepper *s, const StepperOptions *o, char *why, int capacity)
+{
+    for (int i = 0; i < o->spare_count; i++) {
+        const StepperSpare *spare = &o->spare[i];
+        int k = spare->tool;
+        if (k < 0 || k >= s->tool_count || s->spare_count[k] == STEP_SPARES_MAX) {
+            snprintf(why, (size_t)capacity, "spare %d is for tool %d; 0 to %d, at most %d for each", i + 1, k, s->tool_count - 1, STEP_SPARES_MAX);
+            return false;
+        }
+        s->spare_count[k]++;
+        Tool *t = make_device(s, k, &spare->wire, why, capacity);
+        if (!t)
+            return false;
+        t->friction_inside = spare->friction_inside;
+    }
+    return true;
+}
+
+// Room for the longest chain that the tools and their spares make.
+static void measure_chain(Stepper *s)
+{
+    for (int k = 0; k < s->tool_count; k++) {
+        int nodes = 0, slots = 0;
+        for (int i = 0; i <= s->spare_count[k]; i++) {
+            const Tool *t = s->device[k][i];
+            int own = t->slot_start[t->wire.element_count];
+            nodes = t->wire.node_count > nodes ? t->wire.node_count : nodes;
+            slots = own > slots ? own : slots;
+        }
+        s->capacity += nodes;
+        s->slot_count += slots;
+    }
 }
 
 bool tools_create(Stepper *s, const StepperOptions *o, char *why, int capacity)
 {
     why[0] = '\0';
     for (int k = 0; k < s->tool_count; k++) {
-        WireOptions own = k == 0 ? o->wire : o->inner[k - 1];
-        if (k > 0)       // where it stands and how it is held is the outermost's
-            own.has_sheath = true, own.fix_count = own.load_count = 0, own.start = own.normal = vec3(0, 0, 0), own.direction = vec3(1, 0, 0);
-        if (k == 0 && !own.has_sheath)
-            own.inserted = wire_length(&own);
-        if (!make_tool(&s->tool[k], &own, why, capacity))
+        Tool *t = make_device(s, k, k == 0 ? &o->wire : &o->inner[k - 1], why, capacity);
+        if (!t)
             return false;
-        s->capacity += s->tool[k].wire.node_count;
-        s->slot_count += s->tool[k].slot_start[s->tool[k].wire.element_count];
-        const Tool *around = &s->tool[k > 0 ? k - 1 : 0];
+        t->friction_inside = k + 1 < s->tool_count ? o->inner_friction[k] : 0;
+        s->tool[k] = *t;
+    }
+    if (!make_spares(s, o, why, capacity))
+        return false;
+    measure_chain(s);
+    s->inside = calloc((size_t)s->capacity, sizeof *s->inside);
+    if (!s->inside)
+        return false;
+    for (int k = 1; k < s->tool_count; k++) {
+        const Tool *around = &s->tool[k - 1];
         Tool *t = &s->tool[k];
-        t->friction = k > 0 ? o->inner_friction[k - 1] : 0;
-        t->clearance = k > 0 ? clearance_between(k == 1 ? &o->wire : &o->inner[k - 2], &own) : 0;
+        t->friction = around->friction_inside;
+        t->clearance = tools_clearance(around, t);
         if (t->wire.total_length - t->inserted < around->wire.total_length - around->inserted - 1e-9) {
             snprintf(why, (size_t)capacity, "tool %d is too short: its proximal end would lie %g mm inside the hub of the tool around it; it must not", k + 1,
                      around->wire.total_length - around->inserted - (t->wire.total_length - t->inserted));
@@ -96,14 +144,18 @@ bool tools_create(Stepper *s, const StepperOptions *o, char *why, int capacity)
 
 void tools_destroy(Stepper *s)
 {
-    for (int k = 0; k < s->tool_count; k++) {
-        wire_destroy(&s->tool[k].wire);
-        free(s->tool[k].rest_memory);
-        free(s->tool[k].section);
-        free(s->tool[k].line_mass);
-        free(s->tool[k].slot);
-        free(s->tool[k].slot_start);
-    }
+    free(s->inside);
+    for (int k = 0; k < STEP_TOOLS_MAX; k++)
+        for (int i = 0; i <= STEP_SPARES_MAX && s->device[k][i]; i++) {
+            Tool *t = s->device[k][i];
+            wire_destroy(&t->wire);
+            free(t->rest_memory);
+            free(t->section);
+            free(t->line_mass);
+            free(t->slot);
+            free(t->slot_start);
+            free(t);
+        }
 }
 
 // --- the chain ---
@@ -197,24 +249,23 @@ void tools_place(Stepper *s)
 
 // --- nodes that come and go ---
 
-static void open_gap(void *base, size_t size, int count, int at, int gap)
+// Opens a gap of so many at a place, or closes one (< 0).
+static void change_gap(void *base, size_t size, int count, int at, int gap)
 {
     char *p = (char *)base + (size_t)at * size;
+    if (gap < 0) {
+        memmove(p, p + (size_t)-gap * size, (size_t)(count - at + gap) * size);
+        return;
+    }
     memmove(p + (size_t)gap * size, p, (size_t)(count - at) * size);
     memset(p, 0, (size_t)gap * size);
 }
 
-static void close_gap(void *base, size_t size, int count, int at, int gap)
-{
-    char *p = (char *)base + (size_t)at * size;
-    memmove(p, p + (size_t)gap * size, (size_t)(count - at - gap) * size);
-}
-
-// Makes room for chain node c, or takes it out; its element is the one before it. Arrays of points hold the nodes, then the slots.
-static void shift(Stepper *s, int c, int slots, bool opens)
+// The state's and the wall's arrays, by nodes and by points; those of points hold the nodes, then the slots. Makes room for so many at a place, or takes them out.
+static void shift_at(Stepper *s, int node, int nodes, int slot, int slots)
 {
     WireState *w = &s->state;
-    int nodes = w->node_count, points = s->point_count, first = nodes + s->slot_start[c - 1];
+    int count = w->node_count, points = s->point_count, first = count + slot;
     size_t inner = (size_t)w->inner_count * sizeof(double);
     struct {
         void *base;
@@ -223,16 +274,86 @@ static void shift(Stepper *s, int c, int slots, bool opens)
                    {w->slide, inner}, {w->angle, inner}, {w->slide_velocity, inner}, {w->slide_spin, inner}, {w->slide_force, 3 * inner}},
       by_point[] = {{s->force, sizeof(Vec3)}, {s->clearance, sizeof(double)}, {s->met, sizeof(WallMet)}, {s->place, sizeof(VesselMemory)}};
     for (size_t i = 0; i < sizeof by_node / sizeof *by_node; i++)
-        (opens ? open_gap : close_gap)(by_node[i].base, by_node[i].size, nodes, c, 1);
+        change_gap(by_node[i].base, by_node[i].size, count, node, nodes);
     for (size_t i = 0; i < sizeof by_point / sizeof *by_point; i++) {
-        if (opens) {
-            open_gap(by_point[i].base, by_point[i].size, points, first, slots);
-            open_gap(by_point[i].base, by_point[i].size, points + slots, c, 1);
-        } else {
-            close_gap(by_point[i].base, by_point[i].size, points, first, slots);
-            close_gap(by_point[i].base, by_point[i].size, points - slots, c, 1);
+        change_gap(by_point[i].base, by_point[i].size, points, first, slots);
+        change_gap(by_point[i].base, by_point[i].size, points + slots, node, nodes);
+    }
+}
+
+// Makes room for chain node c, or takes it out; its element is the one before it.
+static void shift(Stepper *s, int c, int slots, bool opens)
+{
+    shift_at(s, c, opens ? 1 : -1, s->slot_start[c - 1], opens ? slots : -slots);
+}
+
+// --- the outermost tool's exchange ---
+
+// `turn` [rad] of the node about the line against the hub.
+static Inside inside_at_node(const Stepper *s, int c, double turn)
+{
+    Inside at = {.x = stepper_sheath_coordinate(s, c), };
+    const WireState *w = &s->state;
+    for (int k = 0; k < w->inner_count; k++) {
+        int i = c * w->inner_count + k;
+        const double value[4] = {w->slide[i], w->angle[i] + turn, w->slide_velocity[i], w->slide_spin[i]};
+        memcpy(at.value[k], value, sizeof value);
+    }
+    return at;
+}
+
+// At x [mm]: between two nodes, or behind the hub as strained as there.
+static Inside inside_between(const Inside *a, const Inside *b, double x, int inner_count)
+{
+    double xi = (x - a->x) / (b->x - a->x);
+    Inside at = {.x = x};
+    for (int k = 0; k < inner_count; k++)
+        for (int i = 0; i < 4; i++)
+            at.value[k][i] = a->value[k][i] + xi * (b->value[k][i] - a->value[k][i]);
+    return at;
+}
+
+void tools_exchange_outermost(Stepper *s, const Tool *next)
+{
+    WireState *w = &s->state;
+    int old_nodes = s->tool[0].wire.node_count, nodes = next->wire.node_count, more = nodes - old_nodes;
+    int old_slots = s->slot_start[old_nodes - 1], slots = next->slot_start[next->wire.element_count], more_slots = slots - old_slots;
+    double tip = stepper_sheath_coordinate(s, old_nodes - 1), turn = 0;
+    Inside *old = s->inside;
+    for (int c = 0; c < old_nodes; c++) {
+        Quat p = c > 0 ? quat_mul(quat_conjugate(w->orientation[c - 1]), w->orientation[c]) : (Quat){1, 0, 0, 0};
+        old[c] = inside_at_node(s, c, turn += 2 * atan2(p.x, p.w));
+    }
+    Quat hub = w->orientation[0];
+    Vec3 velocity = w->velocity[0], spin = w->spin[0];
+    shift_at(s, 0, more, 0, more_slots);
+    for (int c = 0, i = 0; c < nodes; c++) {
+        double x = tip + next->wire.s[c] - next->wire.total_length;
+        while (i + 2 < old_nodes && old[i + 1].x < x)
+            i++;
+        Inside at = inside_between(&old[i], &old[i + 1], x, w->inner_count);
+        w->position[c] = vec3_add_scaled(s->mouth, x, s->axis[0]);
+        w->orientation[c] = hub;
+        w->velocity[c] = velocity;
+        w->spin[c] = spin;
+        for (int k = 0; k < w->inner_count; k++) {
+            int j = c * w->inner_count + k;
+            w->slide[j] = at.value[k][0], w->angle[j] = at.value[k][1], w->slide_velocity[j] = at.value[k][2], w->slide_spin[j] = at.value[k][3];
+            memset(w->slide_force + 3 * j, 0, 3 * sizeof(double));
         }
     }
+    for (int k = 1; k < s->tool_count; k++) {
+        Tool *t = &s->tool[k];
+        if (tools_carries(t))
+            continue;
+        if (t->inside > old_nodes) {
+            t->inside += more;
+            continue;
+        }
+        for (t->inside = 1; t->inside < nodes && slide_at(s, t->inside, k) < t->wire.total_length; t->inside++)
+            ;
+    }
+    s->first_free += more;
 }
 
 static int slots_of(const Tool *t, int element) { return t->slot_start[element + 1] - t->slot_start[element]; }

@@ -29,6 +29,13 @@ double tools_twist(const Stepper *s, int c);
 // [1/mm] of the tools together at node c, distal of it, as a vector along the axis of turning.
 Vec3 stepper_curvature(const Stepper *s, int c);
 
+// [mm] radial, the least there is; at least a thousandth of the inner tool's diameter.
+double tools_clearance(const Tool *around, const Tool *inner);
+// Fits the tools of a checkpoint; the chain is to be made anew.
+void tools_refit(Stepper *s, const int *fitted);
+// The chain's nodes of the outermost tool, all of them in the sheath, become those of another one with its tip in the same place.
+void tools_exchange_outermost(Stepper *s, const Tool *next);
+
 // A step's commands, clamped to what is there, and the nodes that come and go by them.
 void tools_feed(Stepper *s);
 // The part of the solution that can be followed before a tip goes back by more than an element.

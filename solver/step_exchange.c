@@ -1,0 +1,83 @@
+// Exchange at the hub: a tool that has been drawn back to its tip goes, and another takes its place around the tools within it, which stay where they are.
+// All that a step needs of the spare tools is made at the start, so that an exchange allocates nothing.
+#include "solver/step_tools.h"
+
+#include <string.h>
+
+static const double AT_HUB = 1;          // [mm] from its hub: a tip that can be taken out …
+static const double LEAST_AHEAD = 0.01;  // … and that is put in
+
+int stepper_fitted(const Stepper *s, int k) { return s->fitted[k]; }
+
+static void fit(Stepper *s, int k, int which)
+{
+    Tool *t = &s->tool[k];
+    Tool was = *t;
+    *t = *s->device[k][which];
+    t->first = k == 0 ? 0 : t->wire.node_count;      // carries nothing of the chain yet
+    t->start = was.start;
+    t->inside = was.inside;
+    t->inserted = was.inserted;
+    t->twist = was.twist;
+    s->fitted[k] = which;
+    s->hand[k].limit = t->hand_limit;
+    s->hand[k].valve = t->valve_friction;
+    for (int m = 1; m < s->tool_count; m++) {
+        s->tool[m].friction = s->tool[m - 1].friction_inside;
+        s->tool[m].clearance = tools_clearance(&s->tool[m - 1], &s->tool[m]);
+    }
+}
+
+void tools_refit(Stepper *s, const int *fitted)
+{
+    for (int k = 0; s->tool_count > 1 && k < s->tool_count; k++)
+        if (s->fitted[k] != fitted[k])
+            fit(s, k, fitted[k]);
+}
+
+// [mm] of tool m that lies behind the hub of the outermost tool.
+static double behind_hub(const Stepper *s, int m) { return is_inside(s, 0, m) ? slide_at(s, 0, m) : HUGE_VAL; }
+
+StepExchange stepper_exchange(Stepper *s, int k, int which)
+{
+    if (k < 0 || k >= s->tool_count || s->tool_count == 1 || which < 0 || which > s->spare_count[k])
+        return EXCHANGE_NO_SUCH_TOOL;
+    if (which == s->fitted[k])
+        return EXCHANGE_DONE;
+    const Tool *t = &s->tool[k], *next = s->device[k][which];
+    bool is_out = k == 0 ? s->has_sheath && s->first_free >= t->wire.node_count
+                         : is_inside(s, 0, k) && t->inside == 1 && slide_at(s, 0, k) > t->wire.total_length - AT_HUB;
+    if (!is_out)
+        return EXCHANGE_INSERTED;
+    // the proximal ends of the tools within stay behind the new hub
+    double tip = k == 0 ? t->wire.total_length : 0;
+    for (int m = k + 1; m < s->tool_count; m++)
+        if (behind_hub(s, m) + tip < next->wire.total_length)
+            return EXCHANGE_TOO_SHORT;
+    for (int m = k - 1; m > 0; m--)      // nor may it be shorter than what it goes through, to its hub
+        if (next->wire.total_length < behind_hub(s, m))
+            return EXCHANGE_TOO_SHORT;
+    if (k == 0) {
+        tools_exchange_outermost(s, next);
+        fit(s, 0, which);
+        tools_chain(s);
+        for (int c = 0; c < s->tool[0].wire.node_count; c++)
+            stepper_forget(s, c);
+        for (int m = 1; m < s->tool_count; m++) {        // the hands hold where the new hub is
+            if (!is_inside(s, 0, m))
+                continue;
+            s->tool[m].inserted = s->tool[m].wire.total_length + stepper_sheath_coordinate(s, 0) - slide_at(s, 0, m);
+            s->tool[m].twist = s->state.twist + angle_at(s, 0, m);
+        }
+    } else {
+        int i = k - 1;
+        double ahead = fmax(LEAST_AHEAD, t->wire.total_length - s->state.slide[i]);
+        fit(s, k, which);
+        s->state.slide[i] = t->wire.total_length - ahead;        // tip where tip was
+        s->state.angle[i] = s->state.slide_velocity[i] = s->state.slide_spin[i] = 0;
+        memset(s->state.slide_force + 3 * i, 0, 3 * sizeof(double));
+        s->tool[k].inserted = (s->has_sheath ? stepper_sheath_coordinate(s, 0) : 0) + ahead;
+        s->tool[k].twist = s->state.twist;
+    }
+    return EXCHANGE_DONE;
+}
