@@ -47,6 +47,40 @@ static void film_close(Film *film)
     free(film->rgb);
 }
 
+// The middle of the tools' tips at the beginning.
+static Vec3 middle_of_tips(Film *film)
+{
+    Vec3 sum = {0, 0, 0};
+    playback_seek(film->playback, film->options->from_s);
+    const Pose *pose = playback_pose(film->playback);
+    for (int k = 0; k < pose->tool_count; k++)
+        sum = vec3_add(sum, pose->tool[k].node[pose->tool[k].node_count - 1].position);
+    return vec3_scale(sum, 1.0 / pose->tool_count);
+}
+
+static bool open_playback(Film *film, const VesselTree *tree)
+{
+    const FilmOptions *options = film->options;
+    XrayControl watched = film->desk.xray;
+    watched.pedal = 1;
+    if (!isnan(options->lao_deg))
+        watched.lao_deg = (float)options->lao_deg;
+    if (!isnan(options->cra_deg))
+        watched.cra_deg = (float)options->cra_deg;
+    film->playback = playback_open(film->run, film->scene, tree, &watched);
+    if (!film->playback || !(options->close_up_mm > 0))
+        return film->playback != NULL;
+    Vec3 middle = middle_of_tips(film);
+    watched.field_mm = (float)options->close_up_mm;
+    for (int k = 0; k < 3; k++)
+        watched.table_mm[k] = (float)(&middle.x)[k];
+    film->desk.look.camera.focus = middle;
+    film->desk.look.camera.width_mm = film->desk.look.camera.height_mm = options->close_up_mm;
+    playback_close(film->playback);
+    film->playback = playback_open(film->run, film->scene, tree, &watched);
+    return film->playback != NULL;
+}
+
 static bool film_open(Film *film, const char *path, const FilmOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, Faults *faults)
 {
     char message[512] = "";
@@ -59,14 +93,7 @@ static bool film_open(Film *film, const char *path, const FilmOptions *options, 
                 (film->panel = panel_create(message, sizeof message)) &&
                 (film->views = scene_views_create(scene, open, &film->desk, message, sizeof message, faults));
     if (good) {
-        XrayControl watched = film->desk.xray;
-        watched.pedal = 1;
-        if (!isnan(options->lao_deg))
-            watched.lao_deg = (float)options->lao_deg;
-        if (!isnan(options->cra_deg))
-            watched.cra_deg = (float)options->cra_deg;
-        film->playback = playback_open(run, scene, open->tree, &watched);
-        good = film->playback != NULL;
+        good = open_playback(film, open->tree);
         snprintf(message, sizeof message, "the recording holds no frame");
     }
     if (good) {
@@ -100,7 +127,8 @@ static void sample_plots(Film *film, double time_s)
     int64_t every = (int64_t)fmax(1, floor(50 / run->step_ms));
     for (int64_t i = 0; i < run->step_count; i += every)
         if (run->time_s[i] > film->sampled_s && run->time_s[i] <= time_s && run->time_s[i] > time_s - 60)
-            panel_sample(film->panel, 0, run->time_s[i], run->proximal[2 * i], run->proximal[2 * i + 1], run->wall_force[2 * i]);
+            for (int k = 0; k < run->tool_count; k++)
+                panel_sample(film->panel, k, run->time_s[i], run->tool[k].proximal[2 * i], run->tool[k].proximal[2 * i + 1], run->wall_force[2 * i]);
     film->sampled_s = time_s;
 }
 

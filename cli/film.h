@@ -14,6 +14,7 @@ typedef struct FilmOptions {
     double fps, speed;               // frames a second; simulated seconds a second of film
     bool is_quiet;
     double lao_deg, cra_deg;         // of a recording that nobody looked at; NaN: as the scene says
+    double close_up_mm;              // this much around the tools' tips at `from_s`: in 3D, and of a recording that nobody looked at in fluoroscopy; 0: all
 } FilmOptions;
 FilmOptions film_default_options(void);  // 1280x720, fluoroscopy with panels, all of it, 30 a second
 

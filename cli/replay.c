@@ -33,6 +33,7 @@ static const char help[] =
     "  --view V           fluoroscopy (default), 3d, angioscopy or all\n"
     "  --size WxH         [pixel]; default 1280x720\n"
     "  --no-panels        the views alone\n"
+    "  --close-up MM      so much around the tools' tips, as they are at the beginning: in 3D, and in X-ray (40 at least) where nobody looked at it\n"
     "  --lao DEG, --cra DEG   C-arm for a recording that nobody looked at (`run --record`); negative: RAO, CAU\n"
     "  --sessions FOLDER  where a session that goes on is recorded, as for `nav`\n"
     "  --duration-s S     the window closes by itself after S seconds of real time\n"
@@ -42,7 +43,7 @@ static const char help[] =
 
 typedef struct ReplayOptions {
     const char *recording, *scene_folder, *picture, *movie, *sessions;
-    double duration_s, at_s, from_s, to_s, fps, speed, lao_deg, cra_deg;
+    double duration_s, at_s, from_s, to_s, fps, speed, lao_deg, cra_deg, close_up_mm;
     int width, height, view;
     bool verify, quiet, no_panels;
     int threads;
@@ -65,6 +66,7 @@ static const NumberOption number_option[] = {
     {"--to", 0, SCRIPT_LONGEST_S, offsetof(ReplayOptions, to_s)},     {"--fps", 1, 240, offsetof(ReplayOptions, fps)},
     {"--speed", 0.01, 1000, offsetof(ReplayOptions, speed)},          {"--lao", -90, 90, offsetof(ReplayOptions, lao_deg)},
     {"--cra", -45, 45, offsetof(ReplayOptions, cra_deg)},             {"--duration-s", 0, SCRIPT_LONGEST_S, offsetof(ReplayOptions, duration_s)},
+    {"--close-up", 5, 400, offsetof(ReplayOptions, close_up_mm)},
 };
 
 static int parse_options(int argc, char **argv, ReplayOptions *options)
@@ -75,6 +77,7 @@ static int parse_options(int argc, char **argv, ReplayOptions *options)
         {"at", required_argument, NULL, NUMBERS},          {"from", required_argument, NULL, NUMBERS + 1}, {"to", required_argument, NULL, NUMBERS + 2},
         {"fps", required_argument, NULL, NUMBERS + 3},     {"speed", required_argument, NULL, NUMBERS + 4}, {"lao", required_argument, NULL, NUMBERS + 5},
         {"cra", required_argument, NULL, NUMBERS + 6},     {"duration-s", required_argument, NULL, NUMBERS + 7},
+        {"close-up", required_argument, NULL, NUMBERS + 8},
         {"sessions", required_argument, NULL, SESSIONS},   {"verify", no_argument, NULL, VERIFY},          {"scene", required_argument, NULL, SCENE},
         {"picture", required_argument, NULL, PICTURE},     {"movie", required_argument, NULL, MOVIE},      {"view", required_argument, NULL, VIEW},
         {"size", required_argument, NULL, SIZE},           {"no-panels", no_argument, NULL, NO_PANELS},    {"threads", required_argument, NULL, THREADS},
@@ -207,6 +210,7 @@ static bool draw(const ReplayOptions *options, const RecordedRun *run, Scene *sc
     film.is_quiet = options->quiet;
     film.lao_deg = options->lao_deg;
     film.cra_deg = options->cra_deg;
+    film.close_up_mm = options->close_up_mm;
     film.from_s = fmin(options->at_s, run->step_count > 0 ? run->time_s[run->step_count - 1] : 0);
     bool good = !options->picture || film_picture(options->picture, &film, run, scene, open, faults);
     film.from_s = options->from_s;

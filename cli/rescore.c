@@ -35,7 +35,7 @@ Rescore *rescore_create(const RecordedRun *run, const Scene *scene, const OpenVe
         rescore->was_watched = recorded_run_was_watched(run);
         rescore->capacity = (int)fmin(1e7, (double)run->step_count * run->step_ms / 1000 / kept_s + 2);
         rescore->kept = calloc((size_t)rescore->capacity, sizeof *rescore->kept);
-        rescore->simulator = scene_has_one_tool(scene, "a score", faults) ? simulator_create(scene, open->vessel, faults) : NULL;
+        rescore->simulator = simulator_create(scene, open->vessel, faults);
         rescore->lesson = rescore->simulator ? lesson_create(rescore->simulator, open->tree) : NULL;
     }
     bool fits = rescore && rescore->simulator && replay_fits(run, rescore->simulator, faults);

@@ -304,7 +304,7 @@ static Color node_color(const Pose *pose, int i, bool touches_wall, Color own, d
 static void add_tool(VesselScene *scene, const Pose *pose, int k, const double *end, int count, const VesselSceneLook *look, double line)
 {
     const PoseTool *tool = &pose->tool[k];
-    double pixel = scene->projection.mm_per_pixel, rim = 1.3 * line, length = tool->node_count > 0 ? tool->node[tool->node_count - 1].s : 0;
+    double pixel = scene->projection.mm_per_pixel, rim = 1.5 * line, length = tool->node_count > 0 ? tool->node[tool->node_count - 1].s : 0;
     Color own = scene->tools && k < scene->tools->count ? scene->tools->tool[k].color : TOOL_COLOR;
     int first = 0, last = 0, node = 0;
     bool has_lumen = false;
@@ -321,7 +321,7 @@ static void add_tool(VesselScene *scene, const Pose *pose, int k, const double *
             p->inside += other > k && end[other] >= p->at;
         }
         double s = length - (scene->line[last - 1].length - p->length);
-        p->half = fmax(radius_at(tool, s, &node) / pixel, 1.25 * line + rim * p->inside);
+        p->half = fmax(radius_at(tool, s, &node) / pixel, (carries ? 1.25 : 0.9) * line + rim * p->inside);
         scene->half[i] = p->half;
         Color here = node_color(pose, p->node, carries, own, look->force_full_scale_n);
         scene->color[i] = p->part > 0 ? mix_colors(here, node_color(pose, p->node + 1, carries, own, look->force_full_scale_n), p->part) : here;
@@ -331,7 +331,7 @@ static void add_tool(VesselScene *scene, const Pose *pose, int k, const double *
     for (int i = first; i < last && has_lumen; i++) {
         LinePoint *p = &scene->line[i];
         bool is_open = p->inside > 0 && p->at >= pose->first_free_node;
-        double s = length - (scene->line[last - 1].length - p->length), least = 1.25 * line + rim * (p->inside - 0.6);
+        double s = length - (scene->line[last - 1].length - p->length), least = 0.9 * line + rim * (p->inside - 0.6);
         scene->half[i] = is_open ? fmin(fmax(stretch_at(scene, k, s)->lumen / pixel, least), p->half - 0.4 * rim) : NAN;
         scene->color[i] = color_with_alpha(LUMEN_COLOR, 0.8);
     }

@@ -185,6 +185,7 @@ void pose_figures_from_run(Pose *pose, const RecordedRun *run, int64_t step)
     for (int k = 0; k < pose->tool_count; k++) {
         PoseTool *tool = &pose->tool[k];
         tool->command = commands.tool[k];
+        tool->is_let_go = commands.released >> k & 1;
         tool->push_n = pose->report.push[k] = run->tool[k].proximal[2 * step];
         tool->torque_n_mm = pose->report.torque[k] = run->tool[k].proximal[2 * step + 1];
     }

@@ -26,8 +26,8 @@ struct Score {
     ScoreWay way;
     ScoreSheath sheath;
     double dt;                   // [ms]
-    int node_count;
-    double *s;                   // (M) [mm] arc length of the nodes
+    int node_count;              // of the first tool
+    double *s;                   // (node_count) [mm] arc length of its nodes
     ScoreTip tip;
     double since_look;           // [ms]
     Vec3 path_from;              // where the last chord of the tip's path ended
@@ -111,8 +111,8 @@ Score *score_create(Simulator *simulator, const VesselTree *tree)
     score->scene = scene;
     score->exercise = scene->exercise ? *scene->exercise : exercise_default();
     score->dt = scene->dt;
-    score->node_count = state->node_count;
-    score->s = calloc((size_t)state->node_count, sizeof *score->s);
+    score->node_count = stepper_tool_nodes(simulator_stepper(simulator), 0, NULL);
+    score->s = calloc((size_t)score->node_count, sizeof *score->s);
     int at = score->exercise.target;
     Vec3 tip = tip_of(simulator), target = at >= 0 ? scene->target[at].point : tip;
     if (!score->s || !score_tip_create(&score->tip, &scene->wire, score->exercise.rules.tip_length_mm, score->s) ||
@@ -120,7 +120,7 @@ Score *score_create(Simulator *simulator, const VesselTree *tree)
         score_free(score);
         return NULL;
     }
-    score_sheath_start(&score->sheath, &scene->wire, lumen_radius(scene, simulator, tree), state->inserted);
+    score_sheath_start(&score->sheath, &scene->wire, score->node_count, lumen_radius(scene, simulator, tree), state->inserted);
     if (!find_turn(score, tree)) {
         score_free(score);
         return NULL;

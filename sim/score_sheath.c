@@ -4,14 +4,15 @@ static const double MARGIN = 1;              // [mm] over what the clearance tak
 enum { DIAMETERS = 5 };                      // of the lumen, in l
 static const double UNBENT = 0.1;            // [mm] lost by a tool that slides
 
-void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, double lumen_radius, double inserted)
+void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, int node_count, double lumen_radius, double inserted)
 {
     double thickest = 0, straight = 0;
     for (int i = 0; i < wire->section_count; i++)
         thickest = fmax(thickest, wire->section[i].diameter);
     for (int i = 0; i < wire->section_count && wire->section[i].rest_curvature == 0; i++)
         straight += wire->section[i].length;
-    *sheath = (ScoreSheath){.is_judged = wire->has_sheath && lumen_radius > 0 && isfinite(lumen_radius),
+    *sheath = (ScoreSheath){.node_count = node_count,
+                            .is_judged = wire->has_sheath && lumen_radius > 0 && isfinite(lumen_radius),
                             .mouth = wire->start,
                             .direction = vec3_unit(wire->direction),
                             .lumen_radius = lumen_radius,
@@ -43,10 +44,10 @@ double score_sheath_step(ScoreSheath *sheath, const WireState *state, const doub
     if (!sheath->is_judged || state->inserted <= 0)
         return fed;
     // a tip that is curved at rest moves across itself as it is dragged along a wall: it says nothing
-    double hidden = s[state->node_count - 1] - state->inserted, at = fmin(hidden + sheath->reach, sheath->straight);
+    double hidden = s[sheath->node_count - 1] - state->inserted, at = fmin(hidden + sheath->reach, sheath->straight);
     if (at <= hidden)
         return fed;
-    int i = element_at(s, state->node_count, at, &part);
+    int i = element_at(s, sheath->node_count, at, &part);
     Vec3 along = vec3_unit(vec3_sub(state->position[i + 1], state->position[i])), speed = vec3_mix(state->velocity[i], state->velocity[i + 1], part);
     double moved = vec3_dot(speed, along) * dt, fades = fmin(fabs(fed) / (2 * sheath->reach), 1);
     sheath->lost = fmax(sheath->lost * (1 - fades) + fed - moved, 0);
@@ -70,12 +71,12 @@ void score_sheath_look(ScoreSheath *sheath, const WireState *state, const double
 {
     if (!sheath->is_judged || sheath->turn_is_known || sheath->lost > UNBENT)
         return;
-    double hidden = s[state->node_count - 1] - state->inserted, stride = 2 * sheath->lumen_radius;
+    double hidden = s[sheath->node_count - 1] - state->inserted, stride = 2 * sheath->lumen_radius;
     Vec3 point[DIAMETERS + 1] = {sheath->mouth};
     int count = 1;
     for (; count <= DIAMETERS && count * stride <= state->inserted; count++) {
         double part;
-        int i = element_at(s, state->node_count, hidden + count * stride, &part);
+        int i = element_at(s, sheath->node_count, hidden + count * stride, &part);
         point[count] = vec3_mix(state->position[i], state->position[i + 1], part);
     }
     sheath->turn = turn_of(sheath, point, count);

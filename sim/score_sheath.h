@@ -7,6 +7,7 @@
 #include "solver/solver.h"
 
 typedef struct ScoreSheath {
+    int node_count;              // of the tool that goes through the sheath: of several the outermost, whose nodes are the first
     bool is_judged;              // a sheath, and a lumen whose radius is known
     Vec3 mouth, direction;
     double lumen_radius, clearance;      // [mm]
@@ -18,10 +19,10 @@ typedef struct ScoreSheath {
     double last_inserted;        // [mm]
 } ScoreSheath;
 
-void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, double lumen_radius, double inserted);
+void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, int node_count, double lumen_radius, double inserted);
 // The vessel's centreline from the mouth on, `count` points: sets the turn, by chords of one lumen diameter.
 void score_sheath_set_line(ScoreSheath *sheath, const Vec3 *point, int count);
-// `s` (M) [mm] arc length of the nodes. `dt` [ms]. Returns what was fed in [mm].
+// `s` (node_count) [mm] arc length of the nodes. `dt` [ms]. Returns what was fed in [mm].
 double score_sheath_step(ScoreSheath *sheath, const WireState *state, const double *s, double dt);
 void score_sheath_set_pieces(ScoreSheath *sheath, const TubePiece *piece, int count);   // the same of lines and arcs
 // Where the turn is not known: looks at the tool while next to nothing is lost.
