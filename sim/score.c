@@ -321,7 +321,9 @@ void score_step(Score *score, Simulator *simulator, const ToolCommands *commands
         return;
     const WireState *state = simulator_state(simulator);
     double now_s = simulator_time_s(simulator);
-    bool acts = command.push_mm_s != 0 || command.twist_deg_s != 0 || (xray && (xray->pedal > 0.5F || xray->contrast_ml_s > 0));
+    bool acts = xray && (xray->pedal > 0.5F || xray->contrast_ml_s > 0);
+    for (int k = 0; k < score->scene->tool_count; k++)
+        acts |= commands->tool[k].push_mm_s != 0 || commands->tool[k].twist_deg_s != 0;
     if (f->state == SCORE_WAITING && acts) {
         f->state = SCORE_RUNNING;
         f->start_s = now_s - score->dt / 1000;

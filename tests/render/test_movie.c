@@ -168,6 +168,22 @@ static void a_film_that_cannot_be_is_said(void **state)
     assert_int_equal(command("test -z \"$(find '%s' -name 'x.mp4*')\"", folder), 0);
 }
 
+// The middle of a close-up is the tool's tip: the picture of 60 mm is another than that of everything, and a close-up of nothing is refused.
+static void a_close_up_is_of_the_tips(void **state)
+{
+    (void)state;
+    need_everything();
+    char recording[200];
+    record(recording, sizeof recording);
+    const char *const options[2] = {"", "--close-up 12"};
+    for (int i = 0; i < 2; i++)
+        assert_int_equal(command("'%s' replay '%s' --picture '%s/close%d.png' --quiet --no-panels --view 3d --size 320x240 %s", SELDINGER_PROGRAM, recording, folder, i,
+                                 options[i]), 0);
+    assert_int_equal(command("cmp -s '%s/close0.png' '%s/close1.png'; test $? = 1", folder, folder), 0);
+    assert_int_equal(command("'%s' replay '%s' --picture '%s/x.png' --close-up 1 2>'%s/said'; test $? = 2 && grep -q -e '--close-up' '%s/said'", SELDINGER_PROGRAM,
+                             recording, folder, folder, folder), 0);
+}
+
 static int make_folder(void **state)
 {
     (void)state;
@@ -184,7 +200,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(contrast_comes_and_goes_in_a_film),
-        cmocka_unit_test(a_film_that_cannot_be_is_said),
+        cmocka_unit_test(a_film_that_cannot_be_is_said), cmocka_unit_test(a_close_up_is_of_the_tips),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
