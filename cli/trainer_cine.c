@@ -25,8 +25,8 @@ bool trainer_cine_open(TrainerCine *cine, const CineShape *shape, const char *pa
     free(bytes);
     CineShape found = cine->cine ? cine_shape(cine->cine) : *shape;
     if (cine->cine && !cine_shapes_same(&found, shape)) {
-        faults_add(faults, path, 0, 0, "is a loop of %d tools, the first of %d nodes, in a vessel of %d; this scene has %d, %d and %d", found.tool_count, found.tool_nodes[0],
-                   found.contrast_count, shape->tool_count, shape->tool_nodes[0], shape->contrast_count);
+        faults_add(faults, path, 0, 0, "is a loop of %d tools, the first of %d nodes, in a vessel of %d; this scene has %d, %d and %d", found.tool_count,
+                   found.tool_nodes[0], found.contrast_count, shape->tool_count, shape->tool_nodes[0], shape->contrast_count);
         trainer_cine_close(cine);
     }
     return cine->cine != NULL;

@@ -27,8 +27,8 @@ void angioscope_destroy(Angioscope *scope);
 void angioscope_set_full_detail(Angioscope *scope, bool on);
 // Borrowed: lumens of the tools. NULL (default): all are solid.
 void angioscope_set_tools(Angioscope *scope, const ToolLooks *tools);
-// From the tip of `tool`; -1: of the one that reaches furthest. Draws all of the port's rectangle. In the sheath, outside of the vessel, without pose or with one that is not finite it is what can be seen from there:
-// the sheath's dark, or nothing.
+// From the tip of `tool`; -1: of the one that reaches furthest. Draws all of the port's rectangle. In the sheath, outside of the vessel, without pose or with
+// one that is not finite it is what can be seen from there: the sheath's dark, or nothing.
 void angioscope_draw(Angioscope *scope, const Pose *pose, int tool, ViewPort port);
 // The camera for a pose; false where the tip has no finite place.
 bool angioscope_view(const Angioscope *scope, const Pose *pose, int tool, AngioscopeView *view);

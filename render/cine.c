@@ -338,7 +338,8 @@ static uint64_t file_bytes(const CineShape *shape, int count, uint64_t line_node
 {
     bool has_several = shape->tool_count > 1;
     uint64_t tools = has_several ? 4 + (uint64_t)shape->tool_count * TOOL_BYTES + (uint64_t)nodes_of(shape) * TOOL_NODE_BYTES : 0;
-    return (uint64_t)HEAD_BYTES + (has_several ? TOOLS_BYTES : 0) + 8 + line_nodes * NODE_BYTES + (uint64_t)count * (FRAME_BYTES + tools + (uint64_t)shape->contrast_count * 4);
+    uint64_t head = (uint64_t)HEAD_BYTES + (has_several ? TOOLS_BYTES : 0), image = FRAME_BYTES + tools + (uint64_t)shape->contrast_count * 4;
+    return head + 8 + line_nodes * NODE_BYTES + (uint64_t)count * image;
 }
 
 static uint64_t checksum(const uint8_t *bytes, size_t length)

@@ -34,8 +34,9 @@ bool ribbon_path_make(RibbonPath *path, int node_count, const double *s, int str
         double u = (double)(i - node * PARTS) / PARTS, here = s[node] + u * (s[node + 1] - s[node]);
         for (; at + 1 < stretch_count && stretch[at].end < here - same; at++) {
             const TubeStretch *ends = &stretch[at];
+            double part = (ends->end - s[from]) / (s[from + 1] - s[from]);
             if (i > 0 && ends->end > before + same)
-                path->place[path->count++] = (RibbonPlace){from, (ends->end - s[from]) / (s[from + 1] - s[from]), true, ends->radius, ends->lumen, ends->attenuation};
+                path->place[path->count++] = (RibbonPlace){from, part, true, ends->radius, ends->lumen, ends->attenuation};
             else if (i > 0)
                 path->place[path->count - 1].is_border = true;
         }
