@@ -12,6 +12,10 @@
 //   d = (S, radius phi) in the step;  |force| <= bound, opposite to d where there is slip.
 // The force acts on the unknowns as (force[0], radius force[1]). The bound (mu times the force between the tools) is given and does not follow
 // the solve. In an unknown that is constrained (a unit row), or with radius 0 in phi, a slide neither sees the motion nor acts.
+//
+// A pair is a contact of the tool with itself, between two places that may be anywhere on the chain: a point's laws, with
+//   d = d of its first end - d of its second,  a = -radius * normal at the first, +radius * normal at the second
+// and the opposite force on the second.
 #ifndef SELDINGER_SOLVER_CONTACT_H
 #define SELDINGER_SOLVER_CONTACT_H
 
@@ -37,9 +41,26 @@ typedef struct ContactSlide {
     double force[2];         // [N]; in: warm start, out: solution
 } ContactSlide;
 
+typedef struct ContactEnd {
+    int node;                // and the next, each with its share
+    double weight[2];        // less than 1 in sum where the sheath has a share
+    Vec3 lever[2];           // [mm]
+    double radius;           // [mm] from the axis to the point that both ends push at
+} ContactEnd;
+
+typedef struct ContactPair {
+    ContactEnd end[2];
+    Vec3 normal;             // unit, from the second end to the first
+    double gap;              // [mm] at x_n, both radii taken off
+    double friction;         // mu >= 0
+    Vec3 force;              // [N] on the first end; in: warm start, out: solution
+} ContactPair;
+
 typedef struct ContactSet {
     int count, capacity;
     ContactPoint *point;
+    int pair_count;          // at most what contact_solver_reserve_pairs() was told
+    ContactPair *pair;
     int slide_count;         // count + slide_count is at most the solver's capacity
     ContactSlide *slide;
 } ContactSet;

@@ -18,8 +18,11 @@ typedef struct ContactLaw {
     Vec3 along;                  // mu p of a sliding contact
     Vec3 step;                   // motion under the whole step
     Vec3 given;                  // the force that the contact began with
+    double lean[2][6];           // of a sliding contact, by which the rows of its nodes are straightened …
+    bool leans[2];               // … which they are
 } ContactLaw;
 
+typedef struct ContactPairs ContactPairs;      // see contact_pairs.c
 typedef struct PointwiseWork PointwiseWork;
 PointwiseWork *pointwise_work_create(int node_count, int size, int capacity);
 void pointwise_work_destroy(PointwiseWork *work);
@@ -33,6 +36,8 @@ struct ContactSolver {
     double *best_u;              // … and its motion (M, n)
     bool *flag;                  // (capacity)
     int wall_count, *wall;       // (capacity) which rows are contacts with the wall
+    int banded;                  // rows that are no pairs: the first ones
+    ContactPairs *pairs;         // NULL: room for none
     int stalls;                  // of the line search in this solve …
     double slope;                // … and what they make of r over k
     double grip;                 // kappa over k while slides are soft, else 0 …
@@ -55,6 +60,19 @@ void contact_balance(ContactSolver *solver, const BlockFactor *factor, const dou
 
 // Fills residual, cone_violation and active.
 double contact_residual(const ContactRow *row, int count, const Vec3 *motion, ContactReport *report);
+
+// The contacts of the tool with itself.
+ContactPairs *contact_pairs_create(int node_count, int size, int capacity);
+void contact_pairs_destroy(ContactPairs *pairs);
+ContactRow *contact_pairs_far(ContactPairs *pairs);
+// Solves with the chain's present matrix: x = A^-1 b, not the same.
+typedef void (*ContactSolve)(const ContactSolver *solver, const BlockFactor *factor, double *b, double *x);
+// W between the pairs in `list`, 3x3 blocks: their motion under each other's forces.
+void contact_pairs_compliance(ContactSolver *solver, const BlockFactor *factor, ContactSolve solve, const int *list, int count);
+// Of the k-th and the l-th in the list.
+Mat3 contact_pairs_block(const ContactPairs *pairs, int k, int l);
+// s->delta, which is what the rows of the chain give without the pairs that are not open, becomes that with them. False: singular.
+bool contact_pairs_step(ContactSolver *solver, int count, bool reuse, bool whole, ContactSolve solve);
 
 ContactReport contact_pointwise(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
                                 const ContactOptions *options, double *u);

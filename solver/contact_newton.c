@@ -12,6 +12,8 @@
 // with the bound frozen, a fixed point over the bound) every outer round costs several factorisations and a wire in a spiral needs 5 to 20
 // rounds, as friction builds up along it like a power series of exp(mu theta). With it: 3 to 5 iterations a step, quadratic at the end.
 //
+// Pairs, which touch two places of the chain, have the same laws; their C stays out of the matrix (contact_pairs.c).
+//
 // What makes it robust: how states change, and a line search.
 // - A stiff wire that overlaps the wall over a stretch does so nearly everywhere at once; taking in every overlapping contact brings large
 //   tensile forces and cycles. So of each run of neighbouring overlapping contacts only the deepest is taken in at a time: active sets are a few
@@ -38,6 +40,7 @@
 #include "solver/contact_forms.h"
 
 #include <float.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { OPEN, STICK, SLIP };
@@ -100,6 +103,25 @@ static void choose_active(const ContactSolver *s, bool *active)
     }
 }
 
+static bool are_neighbours(const ContactRow *a, const ContactRow *b)
+{
+    return abs(a->chain_node - b->chain_node) <= 1 && abs(a->far->chain_node - b->far->chain_node) <= 1;
+}
+
+// The same of pairs, which have neighbours on both strands.
+static void choose_active_pairs(const ContactSolver *s, int count, bool *active)
+{
+    for (int i = s->banded; i < count; i++) {
+        const ContactRow *c = &s->row[i];
+        double v = normal_violation(c, s->motion[i]);
+        active[i] = s->law[i].state != OPEN ? vec3_dot(c->force, c->normal) > 0 : v < 0;
+        for (int j = s->banded; j < count && active[i] && s->law[i].state == OPEN; j++) {
+            double other = normal_violation(&s->row[j], s->motion[j]);
+            active[i] = j == i || s->law[j].state != OPEN || !are_neighbours(c, &s->row[j]) || v < other || (v == other && i < j);
+        }
+    }
+}
+
 // States for the next iteration; returns how many changed.
 static int choose_states(ContactSolver *s, int count, bool first)
 {
@@ -107,10 +129,14 @@ static int choose_states(ContactSolver *s, int count, bool first)
     s->slope = s->stalls / 2 % 2 ? other_slope : usual_slope;
     for (int i = 0; i < s->wall_count; i++)
         pressing += s->law[s->wall[i]].state != OPEN;
+    for (int i = s->banded; i < count; i++)
+        pressing += s->law[i].state != OPEN;
     for (int i = 0; i < count; i++)
         s->flag[i] = s->law[i].state != OPEN;
-    if (!first || pressing == 0)
+    if (!first || pressing == 0) {
         choose_active(s, s->flag);
+        choose_active_pairs(s, count, s->flag);
+    }
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &s->row[i];
         int was = s->law[i].state, state = OPEN;
@@ -242,16 +268,17 @@ static void add_law(const ContactRow *c, const Mat3 *k, ContactSolver *s)
 
 // Row e of a sliding contact, [A(i, i-1) A(i, i) A(i, i+1) | rhs], loses J^T mu p for every part of it along n: what is left of the law's
 // P (n + mu p) n^T is P n n^T, and the elimination, which does not look for pivots, finds large positive ones.
-static void straighten(const ContactRow *c, Vec3 along, int e, ContactSolver *s)
+static void straighten(const ContactRow *c, ContactLaw *law, int e, ContactSolver *s)
 {
     const int n = c->stride;
-    double v[6], w = c->weight[e];
-    if (c->mask[e] != 63 || w < 0.05)
+    double *v = law->lean[e], w = c->weight[e];
+    law->leans[e] = c->mask[e] == 63 && !(w < 0.05);
+    if (!law->leans[e])
         return;
     ContactRow here = *c;
     double push[2 * BLOCK_LARGEST] = {0};
     here.node = 0;
-    contact_row_push(&here, vec3_scale(along, 1 / w), push);
+    contact_row_push(&here, vec3_scale(law->along, 1 / w), push);
     for (int k = 0; k < 6; k++)
         v[k] = push[n * e + k];
     size_t i = (size_t)(c->node + e), block = (size_t)(n * n);
@@ -263,6 +290,24 @@ static void straighten(const ContactRow *c, Vec3 along, int e, ContactSolver *s)
             for (int r = 0; r < 6; r++)
                 x[r] -= v[r] * t;
         }
+}
+
+// Another right-hand side with the same matrix, which is straightened as its rows were.
+static void solve_straightened(const ContactSolver *s, const BlockFactor *factor, double *b, double *x)
+{
+    if (s->symmetric) {
+        block_factor_solve(factor, b, x);
+        return;
+    }
+    for (int i = 0; i < s->banded; i++)
+        for (int e = 0; s->law[i].state == SLIP && s->row[i].friction > 0 && e < s->row[i].nodes; e++) {
+            const ContactRow *c = &s->row[i];
+            double *y = b + (size_t)c->stride * (size_t)(c->node + e);
+            double t = c->normal.x * y[0] + c->normal.y * y[1] + c->normal.z * y[2];
+            for (int r = 0; s->law[i].leans[e] && r < 6; r++)
+                y[r] -= s->law[i].lean[e][r] * t;
+        }
+    block_lu_solve(s->lu, b, x);
 }
 
 // The blocks of a contact's rows as the chain has them.
@@ -290,7 +335,7 @@ static void assemble(ContactSolver *s, const BlockChain *chain, int count)
     }
     for (int i = 0; i < count; i++)
         for (int e = 0; s->law[i].state == SLIP && s->row[i].friction > 0 && e < s->row[i].nodes; e++)
-            straighten(&s->row[i], s->law[i].along, e, s);
+            straighten(&s->row[i], &s->law[i], e, s);
 }
 
 static void assemble_reset(ContactSolver *s, const BlockChain *chain, int count)
@@ -354,6 +399,8 @@ static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bo
             write_soft_law(c, s->motion[i], b ? none : s->motion[i], s->grip, &s->law[i]);
         else
             write_law(c, s->motion[i], b ? none : s->motion[i], s->slope, reuse, &s->law[i]);
+        if (c->far && s->law[i].state != OPEN)
+            continue;
         symmetric &= s->law[i].state != SLIP || c->friction == 0;
         contact_row_push(c, b ? s->law[i].force : vec3_sub(s->law[i].force, c->force), s->rhs);
     }
@@ -361,13 +408,15 @@ static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bo
     if (reuse) {
         block_factor_solve(s->factor, s->rhs, s->delta);
     } else {
-        assemble(s, chain, count);
+        assemble(s, chain, s->banded);
         s->symmetric = symmetric;
         if (symmetric ? !block_chain_factor_solve(&s->matrix, s->factor, s->rhs, s->delta)
                       : !block_lu_factor_solve(s->lu, chain->count, s->matrix.diag, s->turned, s->matrix.lower, s->rhs, s->delta, &exact))
             return false;
     }
     s->inexact |= !exact;
+    if (s->banded < count && !contact_pairs_step(s, count, reuse, b != NULL, solve_straightened))
+        return false;
     for (int i = 0; i < count; i++) {
         ContactLaw *law = &s->law[i];
         law->step = contact_row_motion(&s->row[i], s->delta);
@@ -417,7 +466,7 @@ static void copy_iterate(ContactSolver *s, int unknowns, int count, bool keep, d
 // Cuts the forces to their cones.
 static void cut(ContactSolver *s, int count, ContactReport *report)
 {
-    report->active = 0;
+    report->active = report->pairs = 0;
     report->cone_violation = 0;
     for (int i = 0; i < count; i++) {
         ContactRow *c = &s->row[i];
@@ -425,7 +474,7 @@ static void cut(ContactSolver *s, int count, ContactReport *report)
             continue;
         c->force = contact_project(c, c->force);
         bool presses = vec3_dot(c->force, c->normal) > 0;
-        report->active += presses;
+        *(c->far ? &report->pairs : &report->active) += presses;
         if (presses || c->slide)
             report->cone_violation = fmax(report->cone_violation, contact_row_excess(c));
     }

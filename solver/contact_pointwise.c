@@ -424,6 +424,59 @@ static void refresh(ContactSolver *s, int count, int m)
     }
 }
 
+static void solve_chain(const ContactSolver *s, const BlockFactor *factor, double *b, double *x)
+{
+    (void)s;
+    block_factor_solve(factor, b, x);
+}
+
+// The pairs in turn, W being known; the contacts' motions follow only among them.
+static void visit_pairs(ContactSolver *s, const int *pair, int count)
+{
+    for (int k = 0; k < count; k++) {
+        ContactRow *c = &s->row[pair[k]];
+        Local *l = &s->pointwise->local[pair[k]];
+        if (c->inert)
+            continue;
+        double d[3], f[3];
+        for (int a = 0; a < 3; a++)
+            d[a] = vec3_dot(s->motion[pair[k]], l->axis[a]);
+        for (int a = 0; a < 3; a++)
+            for (int b = 0; b < 3; b++)
+                d[a] -= l->w.m[a][b] * vec3_dot(c->force, l->axis[b]);
+        d[0] += c->gap;
+        solve_local(&l->w, d, c->friction, &l->g, f);
+        Vec3 force = vec3_add_scaled(vec3_add_scaled(vec3_scale(l->axis[0], f[0]), f[1], l->axis[1]), f[2], l->axis[2]);
+        Vec3 change = vec3_sub(force, c->force);
+        for (int j = 0; j < count; j++) {
+            Mat3 w = contact_pairs_block(s->pairs, j, k);
+            s->motion[pair[j]] = vec3_add(s->motion[pair[j]], mat3_mul_vec(&w, change));
+        }
+        c->force = force;
+    }
+}
+
+static int prepare_pairs(ContactSolver *s, const BlockFactor *factor, int count, int *pair)
+{
+    int pairs = 0;
+    for (int i = s->banded; i < count; i++)
+        pair[pairs++] = i;
+    if (pairs > 0)
+        contact_pairs_compliance(s, factor, solve_chain, pair, pairs);
+    for (int k = 0; k < pairs; k++) {
+        Local *l = &s->pointwise->local[pair[k]];
+        l->g = 0;
+        l->axis[0] = s->row[pair[k]].normal;
+        l->axis[1] = vec3_normal_to(l->axis[0]);
+        l->axis[2] = vec3_cross(l->axis[0], l->axis[1]);
+        Mat3 w = contact_pairs_block(s->pairs, k, k);
+        for (int a = 0; a < 3; a++)
+            for (int b = 0; b < 3; b++)
+                l->w.m[a][b] = vec3_dot(l->axis[a], mat3_mul_vec(&w, l->axis[b]));
+    }
+    return pairs;
+}
+
 ContactReport contact_pointwise(ContactSolver *s, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
                                 const ContactOptions *options, double *u)
 {
@@ -435,21 +488,29 @@ ContactReport contact_pointwise(ContactSolver *s, const BlockChain *chain, const
     report.converged = report.residual <= options->tolerance;
     if (report.converged || count == 0 || !prepare(w, chain))
         return report;
-    for (int k = 0; k < count; k++)
+    int banded = s->banded, *pair = s->wall + s->wall_count, pairs = prepare_pairs(s, factor, count, pair);
+    for (int k = 0; k < banded; k++)
         if (!s->row[k].inert)
             prepare_local(w, &s->row[k], &w->local[k]);
-    refresh(s, count, m);
+    refresh(s, banded, m);
     while (report.iterations < options->max_iterations && !report.converged) {
         if (report.iterations % 2 == 0)
-            pass_forth(w, s->row, count, m);
+            pass_forth(w, s->row, banded, m);
         else
-            pass_back(w, s->row, count, m);
+            pass_back(w, s->row, banded, m);
         report.iterations++;
+        if (pairs > 0) {         // they see the whole chain
+            contact_balance(s, factor, b, count, u);
+            for (int k = 0; k < 4; k++)
+                visit_pairs(s, pair, pairs);
+            contact_balance(s, factor, b, count, u);
+            refresh(s, banded, m);
+        }
         // the residual costs two passes: look rarely
         if (report.iterations % 16 && report.iterations < options->max_iterations)
             continue;
         contact_balance(s, factor, b, count, u);
-        refresh(s, count, m);
+        refresh(s, banded, m);
         contact_residual(s->row, count, s->motion, &report);
         report.converged = report.residual <= options->tolerance;
     }

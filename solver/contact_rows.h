@@ -6,6 +6,8 @@
 //
 // Slides are rows too, in a space of their own: x is the displacement S, y is radius phi, and the normal z, along which nothing moves or presses,
 // so that what is tangential for a wall is all there is. In place of mu f_n they have their bound.
+//
+// A pair is the row of its first end, and `far` that of its second, where weights, levers and radius have the other sign: d and J^T f are the sums of both.
 #ifndef SELDINGER_SOLVER_CONTACT_ROWS_H
 #define SELDINGER_SOLVER_CONTACT_ROWS_H
 
@@ -14,11 +16,12 @@
 #include <stddef.h>
 #include "solver/contact.h"
 
-typedef struct ContactRow {
+typedef struct ContactRow ContactRow;
+struct ContactRow {
     int node, chain_node;        // in the chain that is solved, which may be condensed (block_condense.h), and in the caller's
     int stride;                  // unknowns of a node
     int slide;                   // 0: a wall; else the first of a slide's two unknowns
-    int point;                   // its place in the caller's set, among the walls or the slides
+    int point;                   // its place in the caller's set, among the walls, the slides or the pairs
     int nodes;                   // 1, or 2 where xi > 0
     double weight[2];
     Vec3 lever[2];               // looked at only where there are two nodes
@@ -29,10 +32,12 @@ typedef struct ContactRow {
     double bound;                // [N] of a slide
     double stiffness_n, stiffness_t; // [N/mm] of the node alone, neighbours held: the scale of the residual and of penalties
     Vec3 force;                  // on the tool
-} ContactRow;
+    ContactRow *far;             // NULL: no pair
+};
 
-// Sorted by node, then xi, the slides of a node behind its walls (insertion sort: the caller's set comes nearly in order). Returns their number.
-int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow *row);
+// Sorted by node, then xi, the slides of a node behind its walls (insertion sort: the caller's set comes nearly in order), pairs behind all others.
+// Returns their number. `far` has room for the pairs' second ends.
+int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow *row, ContactRow *far);
 
 // Minus the arm at which node e's turn moves the contact: its motion is w u + negative_arm x theta.
 static inline Vec3 contact_row_negative_arm(const ContactRow *c, int e)
@@ -41,7 +46,7 @@ static inline Vec3 contact_row_negative_arm(const ContactRow *c, int e)
     return c->nodes == 1 ? arm : vec3_sub(arm, c->lever[e]);
 }
 
-static inline Vec3 contact_row_motion(const ContactRow *c, const double *u)
+static inline Vec3 contact_end_motion(const ContactRow *c, const double *u)
 {
     const double *v = u + (size_t)c->stride * (size_t)c->node;
     if (c->slide)
@@ -56,8 +61,14 @@ static inline Vec3 contact_row_motion(const ContactRow *c, const double *u)
     return d;
 }
 
+static inline Vec3 contact_row_motion(const ContactRow *c, const double *u)
+{
+    Vec3 d = contact_end_motion(c, u);
+    return c->far ? vec3_add(d, contact_end_motion(c->far, u)) : d;
+}
+
 // y += J^T f
-static inline void contact_row_push(const ContactRow *c, Vec3 f, double *y)
+static inline void contact_end_push(const ContactRow *c, Vec3 f, double *y)
 {
     if (c->slide) {
         double *v = y + (size_t)c->stride * (size_t)c->node + c->slide;
@@ -76,6 +87,13 @@ static inline void contact_row_push(const ContactRow *c, Vec3 f, double *y)
             for (int k = 0; k < 6; k++)
                 v[k] += c->mask[e] >> k & 1 ? g[k] : 0;
     }
+}
+
+static inline void contact_row_push(const ContactRow *c, Vec3 f, double *y)
+{
+    contact_end_push(c, f, y);
+    if (c->far)
+        contact_end_push(c->far, f, y);
 }
 
 static inline Vec3 contact_tangential(Vec3 v, Vec3 normal) { return vec3_add_scaled(v, -vec3_dot(v, normal), normal); }

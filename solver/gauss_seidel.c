@@ -56,6 +56,34 @@ static void slide_stiffness(const BlockChain *chain, ContactRow *c)
     c->inert = c->mask[0] == 0 || !(c->bound > 0) || !isfinite(c->bound) || !isfinite(c->radius);
 }
 
+// Both ends give way.
+static void pair_stiffness(const BlockChain *chain, ContactRow *c, ContactRow *far)
+{
+    double give_n = 0, give_t = 0;
+    ContactRow *end[2] = {c, far};
+    for (int e = 0; e < 2; e++) {
+        own_stiffness(chain, end[e]);
+        give_n += end[e]->inert ? 0 : 1 / end[e]->stiffness_n;
+        give_t += end[e]->inert ? 0 : 1 / end[e]->stiffness_t;
+    }
+    c->inert &= far->inert;
+    c->stiffness_n = 1 / give_n;
+    c->stiffness_t = 1 / give_t;
+}
+
+static ContactRow pair_end(const ContactPair *p, int e, int stride)
+{
+    const ContactEnd *end = &p->end[e];
+    double sign = e ? -1 : 1;
+    ContactRow c = {.node = end->node, .chain_node = end->node, .stride = stride, .nodes = 2, .normal = p->normal, .gap = p->gap, .radius = sign * end->radius,
+                    .friction = fmax(0, p->friction)};
+    for (int k = 0; k < 2; k++) {
+        c.weight[k] = sign * end->weight[k];
+        c.lever[k] = vec3_scale(end->lever[k], sign);
+    }
+    return c;
+}
+
 static void insert(ContactRow *row, int k, const ContactRow *c)
 {
     for (; k > 0 && (row[k - 1].node > c->node || (row[k - 1].node == c->node && row[k - 1].weight[1] > c->weight[1])); k--)
@@ -63,7 +91,7 @@ static void insert(ContactRow *row, int k, const ContactRow *c)
     row[k] = *c;
 }
 
-int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow *row)
+int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow *row, ContactRow *far)
 {
     const Vec3 none = {0, 0, 0};
     for (int i = 0; i < set->count; i++) {
@@ -90,13 +118,26 @@ int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow
         c.force = c.inert || !vec3_is_finite(force) ? none : contact_project(&c, force);
         insert(row, set->count + i, &c);
     }
-    return set->count + set->slide_count;
+    int count = set->count + set->slide_count;
+    for (int i = 0; i < set->pair_count; i++) {
+        const ContactPair *p = &set->pair[i];
+        far[i] = pair_end(p, 1, chain->size);
+        ContactRow c = pair_end(p, 0, chain->size);
+        c.point = i;
+        c.far = &far[i];
+        pair_stiffness(chain, &c, &far[i]);
+        if (c.inert)
+            c.gap = HUGE_VAL;
+        c.force = c.inert || !vec3_is_finite(p->force) ? none : contact_project(&c, p->force);
+        row[count + i] = c;
+    }
+    return count + set->pair_count;
 }
 
 double contact_residual(const ContactRow *row, int count, const Vec3 *motion, ContactReport *report)
 {
     double worst = 0, top = 1e-6, cone = 0; // squares, the first two
-    int active = 0;
+    int active = 0, pairs = 0;
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &row[i];
         if (c->inert || contact_row_is_idle(c, motion[i]))
@@ -106,11 +147,12 @@ double contact_residual(const ContactRow *row, int count, const Vec3 *motion, Co
         double off = vec3_norm2(error), force = vec3_norm2(c->force);
         worst = off > worst ? off : worst;
         top = force > top ? force : top;
-        active += fn > 0;
+        *(c->far ? &pairs : &active) += fn > 0;
         if (fn > 0 || c->slide)
             cone = fmax(cone, contact_row_excess(c));
     }
     report->active = active;
+    report->pairs = pairs;
     report->largest = sqrt(top);
     report->cone_violation = cone;
     return report->residual = sqrt(worst) / report->largest;
@@ -160,6 +202,23 @@ ContactSolver *contact_solver_create(int node_count, int size, int contact_capac
     return s;
 }
 
+bool contact_solver_reserve_pairs(ContactSolver *s, int pairs)
+{
+    size_t k = (size_t)s->capacity + (size_t)pairs + 1;
+    free(s->row), free(s->motion), free(s->law), free(s->best), free(s->flag), free(s->wall);
+    pointwise_work_destroy(s->pointwise);
+    s->row = calloc(k, sizeof *s->row);
+    s->motion = calloc(k, sizeof *s->motion);
+    s->law = calloc(k, sizeof *s->law);
+    s->best = calloc(k, sizeof *s->best);
+    s->flag = calloc(k, sizeof *s->flag);
+    s->wall = calloc(k, sizeof *s->wall);
+    s->pointwise = pointwise_work_create(s->node_count, s->matrix.size, s->capacity + pairs);
+    contact_pairs_destroy(s->pairs);
+    s->pairs = contact_pairs_create(s->node_count, s->matrix.size, pairs);
+    return s->row && s->motion && s->law && s->best && s->flag && s->wall && s->pointwise && s->pairs;
+}
+
 void contact_solver_destroy(ContactSolver *s)
 {
     if (!s)
@@ -179,6 +238,7 @@ void contact_solver_destroy(ContactSolver *s)
     block_condenser_destroy(s->condenser);
     block_lu_destroy(s->lu);
     pointwise_work_destroy(s->pointwise);
+    contact_pairs_destroy(s->pairs);
     block_factor_destroy(s->factor);
     block_chain_destroy(&s->matrix);
     free(s);
@@ -196,6 +256,12 @@ static bool solve_condensed(ContactSolver *s, const BlockChain *chain, const dou
             kept += !*flag;
             *flag = true;
         }
+    for (int i = s->banded; i < count; i++)
+        for (int e = 0; e < 2; e++) {
+            bool *flag = &keep[s->row[i].far->chain_node + e];
+            kept += !*flag;
+            *flag = true;
+        }
     if (FULL_SHARE * kept > chain->count) {
         memset(keep, 0, (size_t)chain->count * sizeof *keep);
         return false;
@@ -205,6 +271,8 @@ static bool solve_condensed(ContactSolver *s, const BlockChain *chain, const dou
         return false;
     for (int i = 0; i < count; i++)
         s->row[i].node = block_condenser_place(s->condenser, s->row[i].chain_node);
+    for (int i = s->banded; i < count; i++)
+        s->row[i].far->node = block_condenser_place(s->condenser, s->row[i].far->chain_node);
     // an iteration costs what is left of the chain: up to twice as many are in the same bound
     ContactOptions longer = *options;
     longer.max_iterations = (int)(options->max_iterations * fmin(2, (double)chain->count / small->count));
@@ -216,9 +284,10 @@ static bool solve_condensed(ContactSolver *s, const BlockChain *chain, const dou
 ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, ContactSet *set,
                             const ContactOptions *options, double *u)
 {
-    int count = contact_rows_fill(set, chain, solver->row);
+    int count = contact_rows_fill(set, chain, solver->row, contact_pairs_far(solver->pairs));
+    solver->banded = count - set->pair_count;
     solver->wall_count = 0;
-    for (int i = 0; i < count; i++)
+    for (int i = 0; i < solver->banded; i++)
         if (!solver->row[i].slide)
             solver->wall[solver->wall_count++] = i;
     ContactReport report;
@@ -228,7 +297,9 @@ ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, cons
         report = contact_newton(solver, chain, factor, b, count, options, u);
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &solver->row[i];
-        if (c->slide) {
+        if (c->far) {
+            set->pair[c->point].force = c->force;
+        } else if (c->slide) {
             set->slide[c->point].force[0] = c->force.x;
             set->slide[c->point].force[1] = c->force.y;
         } else {

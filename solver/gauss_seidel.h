@@ -32,12 +32,15 @@ typedef struct ContactReport {
     double largest;          // [N] that largest force
     double cone_violation;   // largest (|force_t| - mu force_n)+ over force_n, or (|force| - bound)+ over a slide's bound
     int active;              // contacts with the wall that bear force
+    int pairs;               // … and contacts of the tool with itself
 } ContactReport;
 
 typedef struct ContactSolver ContactSolver;   // work space
 // Of chains with blocks of `size`; the capacity is that of contacts with the wall and slides together.
 ContactSolver *contact_solver_create(int node_count, int size, int contact_capacity);
 void contact_solver_destroy(ContactSolver *solver);
+// Room for so many pairs besides. False: no memory.
+bool contact_solver_reserve_pairs(ContactSolver *solver, int pairs);
 
 // `factor` is that of `chain`. b (M, n) in; u (M, n) out. Rows of constrained degrees of freedom are already unit rows in
 // `chain` with their value in b, and no contact acts on a fully constrained node.
