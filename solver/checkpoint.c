@@ -1,5 +1,6 @@
 // Checkpoints: everything that the next step depends on. Restored, a run repeats bit for bit.
 // The hash is FNV-1a taken word by word (8 bytes) in four lanes, with a shift that carries high bits down; bytes would cost 100 us.
+#include "solver/self_contact.h"
 #include "solver/step_tools.h"
 
 #include <stdlib.h>
@@ -14,6 +15,8 @@ struct Checkpoint {
     StepReport report;
     VesselMemory *place;
     double *memory;
+    size_t self_bytes;
+    void *self;
 };
 
 void checkpoint_free(Checkpoint *c)
@@ -22,13 +25,14 @@ void checkpoint_free(Checkpoint *c)
         return;
     free(c->place);
     free(c->memory);
+    free(c->self);
     free(c);
 }
 
 Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
 {
     Checkpoint *c = reuse;
-    if (c && (c->memory_count != s->memory_count || c->point_capacity != s->point_capacity)) {
+    if (c && (c->memory_count != s->memory_count || c->point_capacity != s->point_capacity || c->self_bytes != self_contact_bytes(s))) {
         checkpoint_free(c);
         c = NULL;
     }
@@ -40,7 +44,9 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
         c->memory_count = s->memory_count;
         c->place = calloc((size_t)c->point_capacity, sizeof *c->place);
         c->memory = calloc(c->memory_count, sizeof *c->memory);
-        if (!c->place || !c->memory) {
+        c->self_bytes = self_contact_bytes(s);
+        c->self = malloc(c->self_bytes + 1);
+        if (!c->place || !c->memory || !c->self) {
             checkpoint_free(c);
             return NULL;
         }
@@ -59,12 +65,13 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
     }
     memcpy(c->place, s->place, (size_t)c->point_capacity * sizeof *c->place);
     memcpy(c->memory, s->memory, c->memory_count * sizeof *c->memory);
+    self_contact_save(s, c->self);
     return c;
 }
 
 void stepper_restore(Stepper *s, const Checkpoint *c)
 {
-    if (c->memory_count != s->memory_count || c->point_capacity != s->point_capacity)
+    if (c->memory_count != s->memory_count || c->point_capacity != s->point_capacity || c->self_bytes != self_contact_bytes(s))
         return;
     s->first_free = c->first_free;
     s->state.time = c->time;
@@ -83,6 +90,7 @@ void stepper_restore(Stepper *s, const Checkpoint *c)
         s->tool[k].inside = c->inside[k];
     memcpy(s->place, c->place, (size_t)c->point_capacity * sizeof *c->place);
     memcpy(s->memory, c->memory, c->memory_count * sizeof *c->memory);
+    self_contact_restore(s, c->self);
 }
 
 typedef struct Hash {
@@ -125,6 +133,8 @@ uint64_t stepper_hash(const Stepper *s)
         hash_double(&hash, p->has_foot ? p->foot.y : 0);
         hash_double(&hash, p->has_foot ? p->foot.z : 0);
     }
+    for (int i = 0; i < self_contact_numbers(s); i++)
+        hash_double(&hash, self_contact_number(s, i));
     uint64_t result = basis;
     for (int k = 0; k < 4; k++) {
         result = (result ^ hash.lane[k]) * UINT64_C(0x100000001b3);

@@ -9,6 +9,7 @@
 // (follow). The whole wire is held back together, what the hand feeds included. What is not done after the last iteration is flagged
 // STEP_LIMITED and left to the next steps; so is an advance into a tool that is squeezed by more than SQUEEZE_MAX: the hand stalls.
 #include "solver/node_turn.h"
+#include "solver/self_contact.h"
 #include "solver/step_tools.h"
 
 #include <stdio.h>
@@ -23,7 +24,7 @@ static const double SWING_MOTION = 1e-5;         // [rad] nothing turns: displac
 enum { NEWTON_MAX = 4 };
 // A tip that snaps from one wall to another lands where nobody linearised: [mm] of true penetration that asks for another linearisation there, up to
 // twice NEWTON_MAX of them.
-static const double OVERSHOOT = 0.015;
+static const double OVERSHOOT = 0.015, SELF_OVERSHOOT = 0.005;
 // Where a motion is followed in halves: [mm] of depth that it may leave, and where nothing else goes; halves at most, and
 // how often linear walls are moved before.
 static const double DEPTH_MAX = 0.02, DEPTH_LAST = 0.045;
@@ -286,6 +287,11 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
         stepper_destroy(s);
         return NULL;
     }
+    if ((o.self_contact == SELF_CONTACT_ON || (o.self_contact == SELF_CONTACT_AUTO && o.vessel)) && !self_contact_create(s)) {
+        snprintf(why, (size_t)capacity, "no memory for a tool that meets itself");
+        stepper_destroy(s);
+        return NULL;
+    }
     if (s->tool_count == 1)
         wire_rest(&s->wire, &o.wire, &s->beam.rest);
     s->gravity = o.wire.gravity;
@@ -348,6 +354,8 @@ void stepper_destroy(Stepper *s)
     free(s->room);
     free(s->set.slide);
     free(s->set.point);
+    free(s->set.pair);
+    self_contact_destroy(s->self);
     free(s->scratch);
     free(s);
 }
@@ -485,7 +493,11 @@ void step_feed(Stepper *s, StepCommand command)
     step_feed_tools(s, all, 0);
 }
 
-void step_detect(Stepper *s) { stepper_detect(s); }
+void step_detect(Stepper *s)
+{
+    stepper_detect(s);
+    self_contact_detect(s);
+}
 
 void step_assemble(Stepper *s) { stepper_assemble(s); }
 
@@ -538,7 +550,7 @@ static void solve(Stepper *s)
     if (s->has_failed)
         return;
     ContactReport report = {.converged = true};
-    if (s->set.count + s->set.slide_count > 0)
+    if (s->set.count + s->set.slide_count + s->set.pair_count > 0)
         report = contact_solve(s->solver, &s->chain, s->factor, s->b, &s->set, &s->contact, s->u);
     else
         block_factor_solve(s->factor, s->b, s->u);
@@ -549,10 +561,12 @@ static void solve(Stepper *s)
     s->report.residual = report.residual;
     s->report.cone_violation = report.cone_violation;
     s->report.active = report.active;
+    s->report.self_contacts = report.pairs;
     s->report.flags &= ~(unsigned)STEP_NOT_CONVERGED;
     if (!report.converged)
         s->report.flags |= STEP_NOT_CONVERGED;
     stepper_keep_forces(s);
+    self_contact_keep_forces(s);
     double sum = 0;
     for (size_t i = 0; i < row_of(s, s->state.node_count); i++)
         sum += s->u[i] * 0;          // 0, or not a number
@@ -617,10 +631,15 @@ static void solve_driven(Stepper *s)
 static void solve_contained(Stepper *s)
 {
     solve_driven(s);
-    for (int i = 0; i < 2 && !s->has_failed && stepper_escapes(s); i++) {
-        s->knows_motion = true;
-        stepper_detect(s);
-        s->knows_motion = false;
+    for (int i = 0; i < 2 && !s->has_failed; i++) {
+        bool escapes = stepper_escapes(s);
+        if (escapes) {
+            s->knows_motion = true;
+            stepper_detect(s);
+            s->knows_motion = false;
+        }
+        if (!self_contact_misses(s) && !escapes)
+            break;
         solve_driven(s);
     }
     s->turn = s->has_failed ? 0 : largest_turn(s);
@@ -721,6 +740,8 @@ static double energy_bound(const Stepper *s)
         work += w->mass[i] * fabs(vec3_dot(s->gravity, vec3(s->u[row_of(s, i)], s->u[row_of(s, i) + 1], s->u[row_of(s, i) + 2])));
     for (int k = 0; k < s->set.count; k++)
         work += fmax(0, -s->set.point[k].gap) * vec3_norm(s->set.point[k].force);
+    for (int k = 0; k < s->set.pair_count; k++)
+        work += fmax(0, -s->set.pair[k].gap) * vec3_norm(s->set.pair[k].force);
     if (s->has_sheath) {
         // the hand's force is that of before: a solution that is not to be trusted says anything
         double stiffness = s->beam.rest.axial[0], advance = fabs(s->u[0]);
@@ -783,7 +804,7 @@ static double follow(Stepper *s, bool halfway)
 {
     double part = halfway ? fmin(0.5, largest_part(s)) : largest_part(s);
     bool is_trusted = !s->was_held && s->report.residual < LOST;
-    if (!s->vessel || (s->turn <= NEWTON_MOTION_IN_CONTACT && !s->overshoots && is_trusted)) {
+    if ((!s->vessel && !self_contact_is_near(s)) || (s->turn <= NEWTON_MOTION_IN_CONTACT && !s->overshoots && is_trusted)) {
         move(s, part);
         return part;
     }
@@ -799,11 +820,11 @@ static double follow(Stepper *s, bool halfway)
             most = fmax(most, DEPTH_LAST);
         }
         move(s, part);
-        double depth = stepper_depth(s);
+        double depth = fmax(stepper_depth(s), self_contact_depth(s, false));
         bool contained = depth <= most;
         if (contained && stepper_elastic_energy(s) <= bound)
             return part;
-        bool meets = !contained && k < MEETINGS_MAX && stepper_meet_walls(s, part);
+        bool meets = !contained && k < MEETINGS_MAX && stepper_meet_walls(s, part) + self_contact_meet(s, part) > 0;
         copy_iterate(s, true);
         part /= 2;
         if (meets) {
@@ -819,7 +840,7 @@ static double follow(Stepper *s, bool halfway)
 
 static void solve_system(Stepper *s)
 {
-    stepper_detect(s);
+    step_detect(s);
     stepper_assemble(s);
     step_factor(s);
     solve_contained(s);
@@ -855,7 +876,7 @@ void step_contact(Stepper *s)
     take_back(s);
     for (int iteration = 1; iteration < 2 * s->newton_max && !s->has_failed; iteration++) {
         bool turns = s->turn > (s->report.active > 0 ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION);
-        s->overshoots = stepper_overshoot(s) > OVERSHOOT;
+        s->overshoots = stepper_overshoot(s) > OVERSHOOT || self_contact_depth(s, true) > SELF_OVERSHOOT;
         if (!(turns && iteration < s->newton_max) && !s->overshoots)
             break;
         if (follow(s, iteration > 1 && s->vessel && goes_back(s)) == 0) {
@@ -881,6 +902,7 @@ static void keep_last_state(Stepper *s)
     memset(s->state.spin, 0, nodes * sizeof *s->state.spin);
     memset(s->force, 0, (size_t)s->point_count * sizeof *s->force);
     memset(s->clearance, 0, (size_t)s->point_count * sizeof *s->clearance);
+    self_contact_forget(s);
     size_t inner = nodes * (size_t)s->state.inner_count * sizeof(double);
     memcpy(s->state.slide, s->start_slide, inner);
     memcpy(s->state.angle, s->start_angle, inner);

@@ -46,6 +46,8 @@ typedef struct StepReport {
     double push[STEP_TOOLS_MAX], torque[STEP_TOOLS_MAX];     // [N], [N mm] of each tool's hand; [0] as proximal_force and proximal_torque
     double wall_force_max;       // [N] largest contact force
     double wall_force_sum;       // [N] sum of magnitudes
+    int self_contacts;           // places where the tool presses on itself
+    double self_overlap;         // [mm] deepest of the tool in itself, >= 0, of the state at the step's start
     double slipped;              // [mm] that the hand moved further than the tool
     int newton;                  // further linearisations of this step, 0 in a quiet one
 } StepReport;
@@ -59,6 +61,9 @@ typedef struct StepperSpare {
     double friction_inside;  // of its lumen with the tool within
 } StepperSpare;
 
+// Does a tool meet itself? By default where it can coil up: in a vessel. A rig's wire is the ideal one of the textbooks, which rolls up twice in a plane.
+typedef enum { SELF_CONTACT_AUTO, SELF_CONTACT_ON, SELF_CONTACT_OFF } SelfContactMode;
+
 typedef struct StepperOptions {
     WireOptions wire;            // the tool, or the outermost of several
     // Coaxial tools inside it, outermost first; of their options sections, elements, hand_limit, valve_friction and inserted (length beyond the mouth, or the
@@ -71,6 +76,7 @@ typedef struct StepperOptions {
     const Vessel *vessel;        // may be NULL: no walls
     double wall_friction;
     ContactOptions contact;
+    SelfContactMode self_contact;
     double dt;                   // [ms], default 1
     int newton_max;              // linearisations of a step at most, twice as many where a snap overshoots the wall; 0: the default, 4
 } StepperOptions;

@@ -7,6 +7,7 @@
 //
 // Where a lumen is hardly wider than the tool, one linearised wall sends the point through the one across, and the next sends it back, for ever. So a point
 // remembers the wall that faces the one it sees, and has both (WallMet).
+#include "solver/self_contact.h"
 #include "solver/step_tools.h"
 
 #include <string.h>
@@ -202,7 +203,7 @@ static double deepest_there(Stepper *s, bool would_go)
 }
 
 double stepper_overshoot(Stepper *s) { return s->vessel ? deepest_there(s, true) : 0; }
-double stepper_depth(Stepper *s) { return deepest_there(s, false); }
+double stepper_depth(Stepper *s) { return s->vessel ? deepest_there(s, false) : 0; }
 
 // How far a node may go in this step, by what is known. A spring runs along the wire: what one node does others may do next. (With that, a shorter
 // reach meets fewer points that went further than was looked.)
@@ -597,6 +598,7 @@ void stepper_wall_work(const Stepper *s, double *wall, double *friction)
         *friction += pressure - vec3_dot(force, moved);
     }
     *friction += tools_friction_work(s);
+    self_contact_work(s, wall, friction);
 }
 
 // In the order of the chain: a node, the slots behind it, the next node.
@@ -670,6 +672,7 @@ void stepper_detect(Stepper *s)
 void stepper_use_clearance(Stepper *s)
 {
     int nodes = s->state.node_count;
+    self_contact_use_clearance(s);
     for (int i = s->first_free; i < nodes; i++)
         if (s->clearance[i] > 0)
             s->clearance[i] = fmax(0, s->clearance[i] - travelled(s, i));

@@ -59,6 +59,8 @@ typedef struct Inside {      // what lies inside at a node in the sheath
     double value[STEP_TOOLS_MAX - 1][4];         // of each inner tool: slide, angle against the hub, their velocities
 } Inside;
 
+typedef struct SelfContact SelfContact;
+
 struct Stepper {
     // given once
     Wire wire;
@@ -115,6 +117,7 @@ struct Stepper {
     ContactSolver *solver;
     ContactSet set;
     BeamPose start_pose;     // x_n, for the damping of an iterate
+    SelfContact *self;       // NULL: the tool passes through itself (self_contact.h)
     SheathElement mouth_element;
     double *b, *u;           // (M, 6)
     double *linearised;      // (M, 6) displacement from x_n to the iterate about which the system is linear
