@@ -125,6 +125,9 @@ char *run_summary_json(Simulator *simulator, const DriveReport *drive, const Nod
     cJSON_AddBoolToObject(summary, "real_time_priority", drive->real_time_priority);
     part = cJSON_AddObjectToObject(summary, "contacts");
     add_numbers(part, 2, (const char *const[]){"max", "final"}, (double[]){totals->contacts_max, last->active});
+    part = cJSON_AddObjectToObject(summary, "self_contacts");
+    add_numbers(part, 3, (const char *const[]){"max", "final", "overlap_max_mm"},
+                (double[]){totals->self_contacts_max, last->self_contacts, totals->self_overlap_max});
     part = cJSON_AddObjectToObject(summary, "penetration_mm");
     double final = run_final_penetration_mm(node, state->node_count);
     add_numbers(part, 2, (const char *const[]){"max", "final"}, (double[]){fmax(totals->penetration_max, final), final});
@@ -236,6 +239,9 @@ void run_print(FILE *out, Simulator *simulator, const DriveReport *drive, const 
                 last->push[k], last->torque[k]);
     fprintf(out, "%d contacts (at most %d), wall force %.4f N in sum; deepest penetration %.4f mm, %.4f mm at the end\n", last->active,
             totals->contacts_max, last->wall_force_sum, totals->penetration_max, run_final_penetration_mm(node, state->node_count));
+    if (totals->self_contacts_max)
+        fprintf(out, "the tool touches itself at %d places (at most %d), %.4f mm deep at most\n", last->self_contacts, totals->self_contacts_max,
+                totals->self_overlap_max);
     fprintf(out, "of all steps %" PRId64 " took a further linearisation, %" PRId64 " were cut short for the next to complete, %" PRId64
             " did not converge\n", totals->further_linearisations, totals->limited_steps, totals->not_converged_steps);
     if (totals->hand_slip_steps)

@@ -68,6 +68,7 @@ typedef struct Scene {
     SceneTool tool[TOOLS_MOST];
     bool inlet_is_root;      // sheath `inlet: root`: start and direction to be taken from vessel->inlet
     ContactOptions contact_options;
+    SelfContactMode self_contact;
     double dt;               // [ms]
     Script *script;          // NULL: none
     char *script_path;       // NULL where inline or none

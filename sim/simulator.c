@@ -44,7 +44,7 @@ Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *fa
     if (simulator)
         simulator->target = calloc((size_t)scene->target_count + 1, sizeof *simulator->target);
     if (simulator && simulator->target) {
-        StepperOptions options = {.wire = scene->wire, .vessel = vessel, .wall_friction = scene->friction, .contact = scene->contact_options,
+        StepperOptions options = {.wire = scene->wire, .vessel = vessel, .wall_friction = scene->friction, .contact = scene->contact_options, .self_contact = scene->self_contact,
                                   .dt = scene->dt};
         WireOptions inner[TOOLS_MOST];
         for (int k = 1; k < scene->tool_count; k++)
@@ -143,6 +143,8 @@ static void accumulate(Simulator *simulator)
     totals->hand_slip_steps += (report->flags & STEP_HAND_SLIPS) != 0;
     totals->hand_slipped += fabs(report->slipped);
     totals->contacts_max = report->active > totals->contacts_max ? report->active : totals->contacts_max;
+    totals->self_contacts_max = report->self_contacts > totals->self_contacts_max ? report->self_contacts : totals->self_contacts_max;
+    totals->self_overlap_max = fmax(totals->self_overlap_max, report->self_overlap);
     totals->penetration_max = fmax(totals->penetration_max, report->penetration);
     totals->residual_max = fmax(totals->residual_max, report->residual);
     totals->push_least = fmin(totals->push_least, report->proximal_force);

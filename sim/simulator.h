@@ -33,6 +33,8 @@ typedef struct RunTotals {
     int64_t hand_slip_steps;         // steps in which the tool asked for more force than the hand holds …
     double hand_slipped;             // [mm] … and how far the hand slid along it, there and back
     int contacts_max;                // contacts with force
+    int self_contacts_max;           // places where the tool presses on itself …
+    double self_overlap_max;         // [mm] … and how deep it was in itself
     double penetration_max;          // [mm]
     double residual_max;
     double push_least, push_most;    // [N] at the hand

@@ -176,12 +176,22 @@ static void outputs_that_cannot_be_written_are_found_before_the_run(void **state
 
 // --- runs ---
 
+static void a_tool_that_touches_itself_is_told_of(void **state)
+{
+    (void)state;
+    assert_int_equal(run("run " SOURCE_DIR "/scenes/coil/sac.yaml --duration-s 0.8 --summary coil.json"), 0);
+    assert_non_null(strstr(output, "the tool touches itself at"));
+    cJSON *coil = summary("coil.json");
+    assert_true(figure(coil, "self_contacts", "max") > 0 && figure(coil, "self_contacts", "overlap_max_mm") < 0.01);
+    cJSON_Delete(coil);
+}
+
 static void a_run_leaves_its_files_and_repeats_bit_for_bit(void **state)
 {
     (void)state;
     static const char *const numbers[][2] = {{NULL, "steps"}, {NULL, "simulated_s"}, {NULL, "wall_s"}, {NULL, "real_time_factor"},
         {"step_us", "median"}, {"step_us", "p99"}, {"step_us", "p999"}, {"step_us", "max"}, {"stage_us", "assemble"}, {"stage_us", "factor"},
-        {"stage_us", "detect"}, {"stage_us", "contact"}, {"stage_us", "correct"}, {NULL, "deadline_misses"}, {"contacts", "max"}, {"contacts", "final"},
+        {"stage_us", "detect"}, {"stage_us", "contact"}, {"stage_us", "correct"}, {NULL, "deadline_misses"}, {"contacts", "max"}, {"contacts", "final"}, {"self_contacts", "max"}, {"self_contacts", "final"},
         {"penetration_mm", "max"}, {"penetration_mm", "final"}, {"solver", "iterations_median"}, {"solver", "iterations_max"},
         {"solver", "not_converged_steps"}, {"solver", "residual_max"}, {"proximal", "force_n"}, {"proximal", "torque_n_mm"}, {"wall_force_n", "max"},
         {"wall_force_n", "sum_final"}, {NULL, "inserted_mm"}, {NULL, "elastic_energy_mj"}};
@@ -412,6 +422,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bad_input_ends_with_2_and_says_where),
         cmocka_unit_test(outputs_that_cannot_be_written_are_found_before_the_run),
+        cmocka_unit_test(a_tool_that_touches_itself_is_told_of),
         cmocka_unit_test(a_run_leaves_its_files_and_repeats_bit_for_bit),
         cmocka_unit_test(a_script_on_the_command_line_and_a_duration_win),
         cmocka_unit_test(a_fitted_tube_answers_like_the_exact_one),

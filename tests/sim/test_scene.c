@@ -219,6 +219,7 @@ static const Broken broken[] = {
     {WHOLE "simulation: {step_ms: 0}\n", "4:23", "out of range"},
     {WHOLE "simulation: {contact_iterations: 0}\n", "4:34", "whole number"},
     {WHOLE "simulation: {contact_tolerance: -1}\n", "4:33", "out of range"},
+    {WHOLE "simulation: {self_contact: maybe}\n", "4:28", "auto, on, off"},
     {WHOLE "targets: [{name: a, point_mm: [0, 0, 0], radius_mm: 0}]\n", "4:53", "above 0"},
     {RIG("fix: [{s_mm: 200, dof: all}]"), "3:20", "at most 100"},
     {RIG("fix: [{s_mm: 0, dof: [x, w]}]"), "3:32", "one of: x, y, z"},
