@@ -24,7 +24,7 @@ static int make_folder(void **state)
     return mkdtemp(folder) ? 0 : -1;
 }
 
-// What holds of a run with up to 2 s of rest afterwards.
+// What holds of a run with up to 3 s of rest afterwards.
 typedef struct HardCase {
     const char *scene;
     double push, gained;         // [N] largest either way at the hand; [mJ] in one step that nobody gave
@@ -40,7 +40,7 @@ static double number(const cJSON *summary, const char *part, const char *name)
 static cJSON *run(const char *scene)
 {
     char command[1000];
-    snprintf(command, sizeof command, "%s run '%s/scenes/hard/%s.yaml' --settle-s 2 --summary '%s' --quiet 2>/dev/null", SELDINGER_PROGRAM, SOURCE_DIR, scene,
+    snprintf(command, sizeof command, "%s run '%s/scenes/hard/%s.yaml' --settle-s 3 --summary '%s' --quiet 2>/dev/null", SELDINGER_PROGRAM, SOURCE_DIR, scene,
              in_folder("summary.json"));
     int status = system(command);
     assert_true(WIFEXITED(status));
