@@ -172,9 +172,8 @@ static Scene *prepare_scene(const RunOptions *options, Faults *faults)
         scene->contact = (ContactKind)kind;
     if (scene && !scene->script && options->duration_s < 0 && options->settle_s < 0)
         faults_add(faults, options->scene, 0, 0, "has no script; give --script F, --duration-s S or --settle-s S");
-    const char *single = options->score ? "--score" : options->device_count ? "--device" : NULL;
-    if (scene && single)
-        scene_has_one_tool(scene, single, faults);
+    if (scene && options->device_count)
+        scene_has_one_tool(scene, "--device", faults);
     if (faults->count > 0) {
         scene_free(scene);
         return NULL;

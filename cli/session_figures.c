@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-char session_error_letter(ScoreError kind) { return "WTFBXC"[kind]; }
+char session_error_letter(ScoreError kind) { return "WTFBXCLK"[kind]; }
 
 // --- strips over time ---
 

@@ -123,15 +123,37 @@ static void print_figures(const SessionPage *page)
     const ScoreFigures *f = &page->session->figures;
     fprintf(out,
             "<section id=\"figures\"><h2>Figures</h2>\n<dl>\n<dt>Way of the tip</dt><dd>%.0f mm; straight way to the target %.0f mm; efficiency %.0f %%</dd>\n"
-            "<dt>Tool</dt><dd>pushed in %.0f mm, pulled back %.0f mm in all</dd>\n<dt>Forces</dt><dd>wall at most %.3f N, over time %.2f N s; tip at most %.3f "
+            "<dt>%s</dt><dd>pushed in %.0f mm, pulled back %.0f mm in all</dd>\n<dt>Forces</dt><dd>wall at most %.3f N, over time %.2f N s; tip at most %.3f "
             "N (mean over 20 ms)</dd>\n",
-            f->path_mm, f->way_mm, 100 * f->efficiency, f->inserted_mm, f->withdrawn_mm, f->wall_force_peak_n, f->wall_impulse_n_s, f->tip_force_peak_n);
+            f->path_mm, f->way_mm, 100 * f->efficiency, f->tool_count > 1 ? "Tools" : "Tool", f->inserted_mm, f->withdrawn_mm, f->wall_force_peak_n, f->wall_impulse_n_s, f->tip_force_peak_n);
     if (f->has_xray)
         fprintf(out, "<dt>X-rays</dt><dd>%.1f s, %lld pulses, %.0f cm² of open field summed over pulses; contrast agent %.1f ml</dd>\n", f->fluoroscopy_s,
                 (long long)f->pulses, f->dose_area_cm2, f->contrast_ml);
     else
         fprintf(out, "<dt>X-rays</dt><dd>nobody watched: a run without a screen</dd>\n");
     fprintf(out, "</dl></section>\n");
+}
+
+static void print_tools(const SessionPage *page)
+{
+    FILE *out = page->out;
+    const ScoreFigures *f = &page->session->figures;
+    if (f->tool_count < 2)
+        return;
+    fprintf(out, "<section id=\"tools\"><h2>Tools</h2>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Tool</th><th scope=\"col\">Pushed in [mm]</th>"
+                 "<th scope=\"col\">Pulled back [mm]</th><th scope=\"col\">Tip force [N]</th><th scope=\"col\">Tip's speed, hand at rest [mm/s]</th>"
+                 "<th scope=\"col\">Tip behind the one around it [mm]</th></tr></thead><tbody>\n");
+    for (int k = 0; k < f->tool_count; k++) {
+        const ScoreToolFigures *tool = &f->tool[k];
+        fprintf(out, "<tr><th scope=\"row\">");
+        report_text(out, tool->name);
+        fprintf(out, "</th><td>%.0f</td><td>%.0f</td><td>%.3f</td><td>%.0f</td>", tool->inserted_mm, tool->withdrawn_mm, tool->tip_force_peak_n, tool->kick_peak_mm_s);
+        if (k > 0)
+            fprintf(out, "<td>%.1f</td></tr>\n", tool->behind_mm);
+        else
+            fprintf(out, "<td>–</td></tr>\n");
+    }
+    fprintf(out, "</tbody></table></div><p>Forces and speeds are the largest of the session; where the tip is, is at its end.</p></section>\n");
 }
 
 static void print_errors(const SessionPage *page)
@@ -154,6 +176,11 @@ static void print_errors(const SessionPage *page)
         for (int i = 0; i < s->event_count; i++)
             if (s->event[i].kind == (ScoreError)kind) {
                 fprintf(out, "%s%.2f", comma, s->event[i].time_s);
+                if (s->figures.tool_count > 1 && s->event[i].tool >= 0) {
+                    fprintf(out, " (");
+                    report_text(out, s->figures.tool[s->event[i].tool].name);
+                    fprintf(out, ")");
+                }
                 comma = ", ";
             }
         fprintf(out, "</td></tr>\n");
@@ -235,6 +262,7 @@ void session_page(const SessionPage *page)
     fprintf(out, "%s</section>\n",
             !page->run ? "<p>The recording was not found.</p>" : page->run->frame_count < 1 ? "<p>The recording is too long for it, or holds no pictures.</p>" : "");
     print_figures(page);
+    print_tools(page);
     print_earlier(page);
     fprintf(out, "</main>\n");
     print_origin(page);

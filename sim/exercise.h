@@ -6,15 +6,18 @@
 //     instructions: |                       # text for the screen, at most 4000 bytes; default none
 //       Advance through the siphon …
 //     target: aneurysm                      # required: the name of one of the scene's targets
+//     tool: microcatheter                   # whose tip has to reach it; default: that of whichever tool is furthest in
 //     hold_s: 2                             # 0 to 60: the tip stays within the target that long
 //     time_limit_s: 600                     # above 0, to 86,400: from the first movement or X-ray on
 //     rules:                                # what is counted as a handling error; 0: not judged
-//       tip_force_n: 0.5                    # on the last tip_length_mm of the tool, from the wall
+//       tip_force_n: 0.5                    # on the last tip_length_mm of each tool, from the wall
 //       tip_length_mm: 5
 //       wall_force_n: 2                     # largest contact force anywhere
 //       wrong_branch_mm: 5                  # way into a branch that does not lead to the target, from its mouth
-//       blind_mm: 10                        # way that the tool is moved without X-rays
+//       blind_mm: 10                        # way that a tool is moved without X-rays
 //       contrast_ml: 30                     # contrast agent in all
+//       wire_behind_mm: 5                   # way by which an inner tool's tip lies behind the tip of the tool around it
+//       kick_mm_s: 100                      # speed of a tool's tip while its hand rests
 //       buckling: true                      # at the sheath, see score.h
 //     par:                                  # what is good enough for a part's full points; 0: the part is not judged
 //       time_s: 60
@@ -43,6 +46,8 @@ typedef struct ExerciseRules {   // limits; 0: not judged
     double wrong_branch_mm;
     double blind_mm;
     double contrast_ml;
+    double wire_behind_mm;
+    double kick_mm_s;
     bool buckling;
 } ExerciseRules;
 
@@ -50,6 +55,7 @@ typedef struct Exercise {
     char title[EXERCISE_TITLE];
     char *instructions;          // "" where there are none; owned
     int target;                  // index of the scene's targets; -1 in exercise_default
+    int tool;                    // index of the scene's tools; -1: whichever is furthest in
     double hold_s, time_limit_s;
     ExerciseRules rules;
     double par[PART_COUNT];      // s, s, ml, ratio, N, N s; 0: not judged
@@ -59,8 +65,8 @@ typedef struct Exercise {
 
 // What holds where the scene says nothing: 2 s, 600 s, buckling only, no par, all weights 1, 5 points an error.
 Exercise exercise_default(void);
-// Reads the value of `exercise:`; `target_name` are the names of the scene's targets. Faults go to the reader; the caller frees.
-void exercise_read(YamlValue value, int target_count, const char *const *target_name, Exercise *exercise);
+// Reads the value of `exercise:`; `target_name` and `tool_name` (0 where they could not be read) are the scene's. Faults go to the reader; the caller frees.
+void exercise_read(YamlValue value, int target_count, const char *const *target_name, int tool_count, const char *const *tool_name, Exercise *exercise);
 void exercise_free(Exercise *exercise);
 
 #endif

@@ -455,12 +455,14 @@ static void read_targets(Reading *reading, YamlValue value)
 static void read_exercise(Reading *reading, YamlValue value)
 {
     Scene *scene = reading->scene;
-    const char **name = scene_zeroed(reading, scene->target_count, sizeof *name);
+    const char **name = scene_zeroed(reading, scene->target_count, sizeof *name), *tool[TOOLS_MOST];
     scene->exercise = scene_zeroed(reading, 1, sizeof *scene->exercise);
     for (int i = 0; name && i < scene->target_count; i++)
         name[i] = scene->target[i].name;
+    for (int k = 0; k < scene->tool_count; k++)
+        tool[k] = scene->tool[k].name;
     if (name && scene->exercise)
-        exercise_read(value, scene->target_count, name, scene->exercise);
+        exercise_read(value, scene->target_count, name, scene->tool_count, tool, scene->exercise);
     free(name);
 }
 

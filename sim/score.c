@@ -1,20 +1,20 @@
 #include "sim/score.h"
 
 #include "geom/power_walk.h"
-#include "sim/score_sheath.h"
-#include "sim/score_tip.h"
+#include "sim/score_tool.h"
 #include "sim/score_way.h"
 
 #include <stdlib.h>
 
-const char *const score_error_name[ERROR_COUNT + 1] = {"wrong_branch", "tip_force", "wall_force", "buckling", "blind", "contrast", NULL};
+const char *const score_error_name[ERROR_COUNT + 1] = {"wrong_branch", "tip_force", "wall_force", "buckling", "blind", "contrast",
+                                                        "wire_lost",    "kick",      NULL};
 const char *const score_error_words[ERROR_COUNT] = {"wrong branch",          "tip force above the limit", "wall force above the limit",
-                                                    "buckling at the sheath", "tool moved without X-rays", "too much contrast agent"};
+                                                    "buckling at the sheath", "tool moved without X-rays", "too much contrast agent",
+                                                    "wire lost in the catheter", "tip jumped while its hand rested"};
 const char *const score_state_name[5] = {"waiting", "running", "reached", "time_out", NULL};
 
 static const double LOOK_MS = 10;            // between looks at where in the tree the tip is
 static const double CHORD_MM = 0.2;          // of the tip's path
-static const double FORCE_MEAN_MS = 20;
 static const double QUIET_MS = 500;          // until an episode is over
 static const double FORCE_AGAIN = 0.8, AGAIN = 0.5;      // parts of a limit below which a measure is back
 enum { HOPS = 8 };
@@ -24,15 +24,13 @@ struct Score {
     Exercise exercise;           // the scene's, or the default; its text is the scene's
     ScoreFigures figures;
     ScoreWay way;
-    ScoreSheath sheath;
+    int tool_count;
+    ScoreTool tool[TOOLS_MOST];
     double dt;                   // [ms]
-    int node_count;              // of the first tool
-    double *s;                   // (node_count) [mm] arc length of its nodes
-    ScoreTip tip;
     double since_look;           // [ms]
     Vec3 path_from;              // where the last chord of the tip's path ended
     double wall_force;           // [N] mean
-    double quiet[ERROR_COUNT];   // [ms] that an episode's measure has been back
+    ScoreEpisode episode[ERROR_COUNT];       // of what is no single tool's
     double pulse_phase;          // of the next X-ray pulse, 1: now
     bool had_pedal;
     int64_t held_steps;
@@ -40,10 +38,16 @@ struct Score {
     ScoreEvent event[SCORE_EVENTS_MOST];
 };
 
-static Vec3 tip_of(const Simulator *simulator)
+// The tool that has to reach the target. Of tools that end at one place the outermost.
+static int leader(const Score *score, const Stepper *stepper)
 {
-    const WireState *state = simulator_state(simulator);
-    return state->position[state->node_count - 1];
+    int foremost = 0;
+    if (score->exercise.tool >= 0)
+        return score->exercise.tool;
+    for (int k = 1; k < score->tool_count; k++)
+        if (stepper_tool_inserted(stepper, k) > stepper_tool_inserted(stepper, foremost))
+            foremost = k;
+    return foremost;
 }
 
 // The lumen's radius at the mouth: the tree's, the tube's, or as much room as the first free node has; HUGE_VAL where nothing says it.
@@ -78,9 +82,8 @@ static int follow(const Score *score, const VesselTree *tree, int node)
 }
 
 // By how much the vessel turns behind the mouth, which is where a tube begins. False where memory lacks.
-static bool find_turn(Score *score, const VesselTree *tree)
+static bool find_turn(Score *score, ScoreSheath *sheath, const VesselTree *tree)
 {
-    ScoreSheath *sheath = &score->sheath;
     const TubeOptions *tube = &score->scene->tube;
     if (score->scene->source == SOURCE_TUBE && tube->point_count > 0)
         score_sheath_set_line(sheath, tube->point, tube->point_count);
@@ -101,33 +104,40 @@ static bool find_turn(Score *score, const VesselTree *tree)
     return line != NULL;
 }
 
+static bool create_tools(Score *score, Simulator *simulator, const VesselTree *tree)
+{
+    double lumen = lumen_radius(score->scene, simulator, tree);
+    score->tool_count = score->figures.tool_count = stepper_tool_count(simulator_stepper(simulator));
+    for (int k = 0; k < score->tool_count; k++) {
+        ScoreTool *tool = &score->tool[k];
+        ScoreToolFigures *f = &score->figures.tool[k];
+        if (!score_tool_create(tool, simulator, k, lumen, score->exercise.rules.tip_length_mm, f) || !find_turn(score, &tool->sheath, tree))
+            return false;
+        f->tip_node = tree ? power_nearest(tree, tool->at) : -1;
+    }
+    return true;
+}
+
 Score *score_create(Simulator *simulator, const VesselTree *tree)
 {
     const Scene *scene = simulator_scene(simulator);
-    const WireState *state = simulator_state(simulator);
     Score *score = calloc(1, sizeof *score);
     if (!score)
         return NULL;
     score->scene = scene;
     score->exercise = scene->exercise ? *scene->exercise : exercise_default();
     score->dt = scene->dt;
-    score->node_count = stepper_tool_nodes(simulator_stepper(simulator), 0, NULL);
-    score->s = calloc((size_t)score->node_count, sizeof *score->s);
-    int at = score->exercise.target;
-    Vec3 tip = tip_of(simulator), target = at >= 0 ? scene->target[at].point : tip;
-    if (!score->s || !score_tip_create(&score->tip, &scene->wire, score->exercise.rules.tip_length_mm, score->s) ||
-        !score_way_create(&score->way, tree, scene->wire.start, target, at >= 0 ? scene->target[at].radius : 0)) {
-        score_free(score);
-        return NULL;
-    }
-    score_sheath_start(&score->sheath, &scene->wire, score->node_count, lumen_radius(scene, simulator, tree), state->inserted);
-    if (!find_turn(score, tree)) {
+    int at = score->exercise.target, led = leader(score, simulator_stepper(simulator));
+    Vec3 tip = stepper_tool_place(simulator_stepper(simulator), led, stepper_tool_length(simulator_stepper(simulator), led)).position;
+    Vec3 target = at >= 0 ? scene->target[at].point : tip;
+    // the way first: the vessel's turn behind the mouth is looked for along it
+    if (!score_way_create(&score->way, tree, scene->wire.start, target, at >= 0 ? scene->target[at].radius : 0) || !create_tools(score, simulator, tree)) {
         score_free(score);
         return NULL;
     }
     ScoreFigures *f = &score->figures;
     f->has_exercise = scene->exercise != NULL;
-    f->tip_node = tree ? power_nearest(tree, tip) : -1;
+    f->tip_node = f->tool[led].tip_node;
     f->way_mm = f->remaining_mm = f->least_remaining_mm = score_way_left(&score->way, tip, f->tip_node);
     f->target_distance_mm = vec3_distance(tip, target);
     for (int i = 0; i < PART_COUNT; i++)
@@ -141,30 +151,34 @@ void score_free(Score *score)
     if (!score)
         return;
     score_way_destroy(&score->way);
-    free(score->s);
     free(score);
 }
 
-// An episode of `kind` begins when it is `over` its limit and ends once it was `back` for `quiet_ms`.
-static void judge(Score *score, ScoreError kind, bool over, bool back, double quiet_ms, double elapsed_ms, double now_s)
+// An episode of `kind` begins when it is `over` its limit and ends once it was `back` for `quiet_ms`. Of `tool`, or (-1) of nobody alone.
+static void judge(Score *score, ScoreError kind, int tool, bool over, bool back, double quiet_ms, double elapsed_ms, double now_s)
 {
+    ScoreEpisode *episode = tool < 0 ? &score->episode[kind] : &score->tool[tool].episode[kind];
     ScoreErrorFigures *error = &score->figures.error[kind];
-    if (error->is_on) {
-        score->quiet[kind] = back ? score->quiet[kind] + elapsed_ms : 0;
-        error->is_on = !back || score->quiet[kind] < quiet_ms;
+    if (episode->is_on) {
+        episode->quiet = back ? episode->quiet + elapsed_ms : 0;
+        episode->is_on = !back || episode->quiet < quiet_ms;
     } else if (over) {
-        *error = (ScoreErrorFigures){error->count + 1, true, now_s};
-        score->quiet[kind] = 0;
+        *episode = (ScoreEpisode){.is_on = true};
+        error->count++;
+        error->last_s = now_s;
         score->figures.error_total++;
         if (score->event_count < SCORE_EVENTS_MOST)
-            score->event[score->event_count++] = (ScoreEvent){kind, now_s};
+            score->event[score->event_count++] = (ScoreEvent){kind, tool, now_s};
     }
+    error->is_on = score->episode[kind].is_on;
+    for (int k = 0; k < score->tool_count; k++)
+        error->is_on |= score->tool[k].episode[kind].is_on;
 }
 
-static void judge_limit(Score *score, ScoreError kind, double measure, double limit, double again, double elapsed_ms, double now_s)
+static void judge_limit(Score *score, ScoreError kind, int tool, double measure, double limit, double again, double elapsed_ms, double now_s)
 {
     if (limit > 0)
-        judge(score, kind, measure > limit, measure < again * limit, QUIET_MS, elapsed_ms, now_s);
+        judge(score, kind, tool, measure > limit, measure < again * limit, QUIET_MS, elapsed_ms, now_s);
 }
 
 // --- X-rays and contrast ---
@@ -192,7 +206,7 @@ static void count_pulses(Score *score, const XrayControl *xray, double seconds)
     score->had_pedal = pedal;
 }
 
-static void watch_xrays(Score *score, const XrayControl *xray, double fed, double now_s)
+static void watch_xrays(Score *score, const XrayControl *xray, double moved, double now_s)
 {
     ScoreFigures *f = &score->figures;
     const ExerciseRules *rules = &score->exercise.rules;
@@ -202,11 +216,11 @@ static void watch_xrays(Score *score, const XrayControl *xray, double fed, doubl
     f->has_xray = true;
     count_pulses(score, xray, seconds);
     f->contrast_ml += fmax((double)xray->contrast_ml_s, 0) * seconds;
-    f->blind_mm = score->had_pedal ? 0 : f->blind_mm + fabs(fed);
+    f->blind_mm = score->had_pedal ? 0 : f->blind_mm + moved;
     if (rules->contrast_ml > 0)
-        judge(score, ERROR_CONTRAST, f->contrast_ml > rules->contrast_ml * (1 + 1e-9), false, QUIET_MS, score->dt, now_s);
+        judge(score, ERROR_CONTRAST, -1, f->contrast_ml > rules->contrast_ml * (1 + 1e-9), false, QUIET_MS, score->dt, now_s);
     if (rules->blind_mm > 0)
-        judge(score, ERROR_BLIND, f->blind_mm > rules->blind_mm, f->blind_mm <= 0, 0, score->dt, now_s);
+        judge(score, ERROR_BLIND, -1, f->blind_mm > rules->blind_mm, f->blind_mm <= 0, 0, score->dt, now_s);
 }
 
 // --- the tool ---
@@ -227,20 +241,34 @@ static void watch_tip(Score *score, Vec3 tip)
     f->held_s = (double)score->held_steps * score->dt / 1000;
 }
 
-static double low_pass(double mean, double value, double elapsed_ms) { return mean + (value - mean) * -expm1(-elapsed_ms / FORCE_MEAN_MS); }
+static void watch_forces(Score *score, const StepReport *report, double now_s)
+{
+    ScoreFigures *f = &score->figures;
+    f->wall_force_peak_n = fmax(f->wall_force_peak_n, report->wall_force_max);
+    f->wall_impulse_n_s += report->wall_force_sum * score->dt / 1000;
+    score->wall_force = score_mean(score->wall_force, report->wall_force_max, score->dt);
+    judge_limit(score, ERROR_WALL_FORCE, -1, score->wall_force, score->exercise.rules.wall_force_n, FORCE_AGAIN, score->dt, now_s);
+}
 
-static void watch_forces(Score *score, const WireState *state, const StepReport *report, double now_s)
+static void watch_tools(Score *score, const Stepper *stepper, const ToolCommands *commands, double now_s)
 {
     ScoreFigures *f = &score->figures;
     const ExerciseRules *rules = &score->exercise.rules;
-    double hidden = score->scene->wire.has_sheath ? score->s[score->node_count - 1] - state->inserted : 0;
-    f->wall_force_peak_n = fmax(f->wall_force_peak_n, report->wall_force_max);
-    f->wall_impulse_n_s += report->wall_force_sum * score->dt / 1000;
-    f->tip_force_n = low_pass(f->tip_force_n, score_tip_force(&score->tip, state, hidden), score->dt);
+    f->tip_force_n = 0;
+    for (int k = 0; k < score->tool_count; k++) {
+        ScoreTool *tool = &score->tool[k];
+        ScoreToolFigures *own = &f->tool[k];
+        score_tool_watch(tool, stepper, commands, score->dt, own);
+        f->tip_force_n = fmax(f->tip_force_n, own->tip_force_n);
+        judge_limit(score, ERROR_TIP_FORCE, k, own->tip_force_n, rules->tip_force_n, FORCE_AGAIN, score->dt, now_s);
+        judge_limit(score, ERROR_KICK, k, own->kick_mm_s, rules->kick_mm_s, AGAIN, score->dt, now_s);
+        if (k == 0)
+            continue;
+        bool judged = rules->wire_behind_mm > 0;
+        judge(score, ERROR_WIRE_LOST, k, own->spare_mm < tool->hub_limit || (judged && own->behind_mm > rules->wire_behind_mm),
+              own->spare_mm > tool->hub_limit && !(judged && own->behind_mm > AGAIN * rules->wire_behind_mm), QUIET_MS, score->dt, now_s);
+    }
     f->tip_force_peak_n = fmax(f->tip_force_peak_n, f->tip_force_n);
-    score->wall_force = low_pass(score->wall_force, report->wall_force_max, score->dt);
-    judge_limit(score, ERROR_TIP_FORCE, f->tip_force_n, rules->tip_force_n, FORCE_AGAIN, score->dt, now_s);
-    judge_limit(score, ERROR_WALL_FORCE, score->wall_force, rules->wall_force_n, FORCE_AGAIN, score->dt, now_s);
 }
 
 // The tip's node, from its last one. A tip that snaps from one branch's mouth into another may leave its node's reach between two looks: it is outside
@@ -256,34 +284,45 @@ static int find_node(const VesselTree *tree, Vec3 tip, int node)
     return vec3_distance(tip, tree->center[nearest]) < tree->radius[nearest] ? nearest : node;
 }
 
-// Where in the tree the tip is, every 10 ms: a tool at 100 mm/s goes 1 mm in that time.
-static void look(Score *score, const WireState *state, Vec3 tip, double now_s)
+// Where in the tree the tips are, every 10 ms: a tool at 100 mm/s goes 1 mm in that time.
+static void look(Score *score, const Stepper *stepper, int led, double now_s)
 {
     ScoreFigures *f = &score->figures;
     double elapsed = score->since_look;
     score->since_look = 0;
-    score_sheath_look(&score->sheath, state, score->s);
-    if (score->way.tree)
-        f->tip_node = find_node(score->way.tree, tip, f->tip_node);
+    for (int k = 0; k < score->tool_count; k++) {
+        ScoreToolFigures *own = &f->tool[k];
+        score_sheath_look(&score->tool[k].sheath, stepper, k);
+        if (!score->way.tree)
+            continue;
+        own->tip_node = find_node(score->way.tree, score->tool[k].at, own->tip_node);
+        own->off_way_mm = score->exercise.target >= 0 ? score->way.off[own->tip_node] : 0;
+    }
+    f->tip_node = f->tool[led].tip_node;
     if (score->exercise.target < 0)
         return;
-    f->remaining_mm = score_way_left(&score->way, tip, f->tip_node);
+    f->remaining_mm = score_way_left(&score->way, score->tool[led].at, f->tip_node);
     f->least_remaining_mm = fmin(f->least_remaining_mm, f->remaining_mm);
-    f->off_way_mm = score->way.tree ? score->way.off[f->tip_node] : 0;
-    judge_limit(score, ERROR_WRONG_BRANCH, f->off_way_mm, score->exercise.rules.wrong_branch_mm, AGAIN, elapsed, now_s);
+    for (int k = 0; k < score->tool_count; k++)
+        judge_limit(score, ERROR_WRONG_BRANCH, k, f->tool[k].off_way_mm, score->exercise.rules.wrong_branch_mm, AGAIN, elapsed, now_s);
 }
 
-static double watch_sheath(Score *score, const WireState *state, Command command, double now_s)
+// Returns how far the fastest tool was moved [mm].
+static double watch_sheath(Score *score, const Stepper *stepper, const ToolCommands *commands, double now_s)
 {
     ScoreFigures *f = &score->figures;
-    double fed = score_sheath_step(&score->sheath, state, score->s, score->dt), limit = score_sheath_limit(&score->sheath);
-    f->inserted_mm += fmax(fed, 0);
-    f->withdrawn_mm += fmax(-fed, 0);
-    f->lost_mm = score->sheath.lost;
-    f->lost_limit_mm = limit;
-    if (score->exercise.rules.buckling && limit > 0)
-        judge(score, ERROR_BUCKLING, f->lost_mm > limit && command.push_mm_s > 0, f->lost_mm < AGAIN * limit, QUIET_MS, score->dt, now_s);
-    return fed;
+    double moved = 0;
+    f->inserted_mm = f->withdrawn_mm = 0;
+    for (int k = 0; k < score->tool_count; k++) {
+        ScoreToolFigures *own = &f->tool[k];
+        moved = fmax(moved, fabs(score_tool_feed(&score->tool[k], stepper, score->dt, own)));
+        f->inserted_mm += own->inserted_mm;
+        f->withdrawn_mm += own->withdrawn_mm;
+        if (score->exercise.rules.buckling && own->lost_limit_mm > 0)
+            judge(score, ERROR_BUCKLING, k, own->lost_mm > own->lost_limit_mm && commands->tool[k].push_mm_s > 0, own->lost_mm < AGAIN * own->lost_limit_mm,
+                  QUIET_MS, score->dt, now_s);
+    }
+    return moved;
 }
 
 // --- points ---
@@ -313,32 +352,38 @@ static void give_points(Score *score)
         f->points = fmax(100 * share * (weights > 0 ? sum / weights : 1) - exercise->error_points * f->error_total, 0);
 }
 
+static bool is_moved(const Score *score, const ToolCommands *commands)
+{
+    bool moves = false;
+    for (int k = 0; k < score->tool_count; k++)
+        moves |= commands->tool[k].push_mm_s != 0 || commands->tool[k].twist_deg_s != 0;
+    return moves;
+}
+
 void score_step(Score *score, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray)
 {
-    Command command = commands->tool[0];
     ScoreFigures *f = &score->figures;
     if (f->state == SCORE_REACHED || f->state == SCORE_TIME_OUT)
         return;
-    const WireState *state = simulator_state(simulator);
+    const Stepper *stepper = simulator_stepper(simulator);
     double now_s = simulator_time_s(simulator);
-    bool acts = xray && (xray->pedal > 0.5F || xray->contrast_ml_s > 0);
-    for (int k = 0; k < score->scene->tool_count; k++)
-        acts |= commands->tool[k].push_mm_s != 0 || commands->tool[k].twist_deg_s != 0;
+    bool acts = is_moved(score, commands) || (xray && (xray->pedal > 0.5F || xray->contrast_ml_s > 0));
     if (f->state == SCORE_WAITING && acts) {
         f->state = SCORE_RUNNING;
         f->start_s = now_s - score->dt / 1000;
     }
-    Vec3 tip = tip_of(simulator);
-    double fed = watch_sheath(score, state, command, now_s);
-    if (f->state == SCORE_WAITING)       // a tool that settles by itself is nobody's doing
+    double moved = watch_sheath(score, stepper, commands, now_s);
+    if (f->state == SCORE_WAITING)       // tools that settle by themselves are nobody's doing
         return;
+    int led = leader(score, stepper);
     f->time_s = now_s - f->start_s;
-    watch_xrays(score, xray, fed, now_s);
-    watch_tip(score, tip);
-    watch_forces(score, state, simulator_last(simulator), now_s);
+    watch_xrays(score, xray, moved, now_s);
+    watch_tip(score, score->tool[led].at);
+    watch_tools(score, stepper, commands, now_s);
+    watch_forces(score, simulator_last(simulator), now_s);
     score->since_look += score->dt;
     if (score->since_look >= LOOK_MS * (1 - 1e-9))
-        look(score, state, tip, now_s);
+        look(score, stepper, led, now_s);
     if (f->has_exercise && score->held_steps > 0 && f->held_s >= score->exercise.hold_s - 1e-9) {
         f->state = SCORE_REACHED;
         f->reached_s = now_s;
@@ -358,8 +403,7 @@ const ScoreEvent *score_events(const Score *score, int *count)
 
 void score_copy(Score *to, const Score *from)
 {
-    Score own = *to;
+    ScoreWay way = to->way;
     *to = *from;
-    to->way = own.way;
-    to->s = own.s;
+    to->way = way;
 }

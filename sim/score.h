@@ -5,6 +5,9 @@
 // The clock runs from the first step in which the hand moves the tool, the pedal is down or contrast flows. Once the target has been held, or the
 // time is over, all figures stand still. Without an exercise they are kept without an end.
 //
+// Of coaxial tools each is watched: its tip's force, its feed at the sheath, its tip in the tree. The tip that has to reach the target, whose path is
+// measured and at which contrast agent comes out is that of the exercise's `tool`, or of whichever tool is furthest in.
+//
 // Points: 100 g (sum of w q / sum of w) - e n, at least 0, over the parts that are judged (par > 0, w > 0), with
 //   q = par / max(par, figure), 1 down to 0; the figures are time, fluoroscopy time, contrast, path over way, wall-force peak, wall-force impulse;
 //   g = 1 once the target was held, else half the share of the way to it that was ever covered;
@@ -13,25 +16,30 @@
 //
 // Errors are counted by episode: one begins when its limit is passed and ends once its measure has been back below the limit's half (forces: 0.8 of
 // it) for half a second. Forces are judged by their mean over 20 ms (a low-pass of first order): a knock of a single step is no handling error.
-//   wrong branch  the tip's node lies more than wrong_branch_mm beyond the mouth of a branch that does not lead from the sheath to the target:
+//   wrong branch  a tip's node lies more than wrong_branch_mm beyond the mouth of a branch that does not lead from the sheath to the target:
 //                 way along the tree to the way there, less the radius of that vessel. A sac that holds the target is no wrong branch.
-//   tip force     what the shaft carries into the last tip_length_mm (score_tip.h), at rest the resultant of the wall's forces on them
+//   tip force     on the last tip_length_mm of a tool (score_tip.h): at rest the resultant of the wall's forces on them
 //   wall force    largest contact force
-//   buckling      what goes in at the mouth does not go on: length lost next to the mouth, over the first 5 lumen diameters l beyond it (or up to
+//   buckling      of any tool: what goes in at the mouth does not go on: length lost next to the mouth, over the first 5 lumen diameters l beyond it (or up to
 //                 where its curved tip begins), as the integral of feed less the tool's motion along itself at l, fading over 2 l of feed. A tool that
 //                 slides keeps it at 0 in any bend, because each point follows the one before it. It may lie down on the other side of the lumen
 //                 without buckling, which takes 2 c theta where the vessel turns by theta over l and pi^2 c^2 / l for one bow from wall to wall (a half
 //                 wave of amplitude a takes pi^2 a^2 / (4 l): Timoshenko and Gere, Theory of Elastic Stability, 1961, 1.9), c being the lumen's radius
 //                 less the tool's. More than that plus 1 mm, while the hand pushes: the tool stands in folds between mouth and l.
-//   blind         the tool was moved by more than blind_mm since the pedal was last down
+//   blind         the tools were moved by more than blind_mm since the pedal was last down; of tools that move together the fastest counts
 //   contrast      more than contrast_ml in all; once
+//   wire lost     an inner tool's tip lies more than wire_behind_mm behind the tip of the tool around it, or its proximal end has been drawn to less than
+//                 1 mm from that one's hub, where no hand holds it any more
+//   kick          a tool's tip moves faster than kick_mm_s, mean of its velocity over 20 ms, while its own hand has rested for 0.1 s: another tool's
+//                 friction or bending stiffness was stored in it and let go
 #ifndef SELDINGER_SIM_SCORE_H
 #define SELDINGER_SIM_SCORE_H
 
 #include "sim/simulator.h"
 #include "sim/xray.h"
 
-typedef enum { ERROR_WRONG_BRANCH, ERROR_TIP_FORCE, ERROR_WALL_FORCE, ERROR_BUCKLING, ERROR_BLIND, ERROR_CONTRAST, ERROR_COUNT } ScoreError;
+typedef enum { ERROR_WRONG_BRANCH, ERROR_TIP_FORCE, ERROR_WALL_FORCE, ERROR_BUCKLING, ERROR_BLIND, ERROR_CONTRAST, ERROR_WIRE_LOST,
+               ERROR_KICK, ERROR_COUNT } ScoreError;
 extern const char *const score_error_name[ERROR_COUNT + 1];    // in files: "wrong_branch", "tip_force", …; NULL at the end
 extern const char *const score_error_words[ERROR_COUNT];       // on screens: "wrong branch", "tip force above the limit", …
 
@@ -44,6 +52,19 @@ typedef struct ScoreErrorFigures {
     double last_s;               // simulated time at which the last one began; 0 where there was none
 } ScoreErrorFigures;
 
+// Of one tool. Names in files as here.
+typedef struct ScoreToolFigures {
+    char name[TOOL_NAME_SIZE];
+    double inserted_mm, withdrawn_mm;    // fed in and pulled out in all, both >= 0
+    double tip_force_n, tip_force_peak_n;    // means over 20 ms
+    double kick_mm_s, kick_peak_mm_s;    // of its tip while its hand rests, else 0
+    double lost_mm, lost_limit_mm;       // length lost next to the mouth and what may be (buckling); limit 0: not known yet
+    double behind_mm;            // its tip lies so far behind the tip of the tool around it, >= 0
+    double spare_mm;             // its proximal end lies so far behind that one's hub, >= 0
+    int tip_node;                // node of the tree at which its tip is; -1 without tree
+    double off_way_mm;           // beyond the mouth of a branch that leads elsewhere; 0 on the way
+} ScoreToolFigures;
+
 typedef struct ScoreFigures {
     ScoreState state;
     bool has_exercise, has_xray;     // has_xray: someone watches (xray not NULL)
@@ -55,28 +76,29 @@ typedef struct ScoreFigures {
     int64_t pulses;              // of X-rays
     double dose_area_cm2;        // pulses times the field's open area at the isocentre: proportional to the dose-area product
     double contrast_ml;
-    double path_mm;              // of the tip, in chords of 0.2 mm: what trembles counts for nothing
+    double path_mm;              // of the tip that has to reach the target, in chords of 0.2 mm: what trembles counts for nothing
     double way_mm;               // from where the tip was at the start to the target, along the tree's centrelines; straight where there is no tree
     double remaining_mm;         // of it, now
     double least_remaining_mm;
     double efficiency;           // way gained over path, 0 to 1
-    double inserted_mm, withdrawn_mm;    // fed in and pulled out in all, both >= 0
+    double inserted_mm, withdrawn_mm;    // of all tools in sum
     double wall_force_peak_n;    // largest contact force of any step
     double wall_impulse_n_s;     // sum of all contact forces over time
-    double tip_force_n, tip_force_peak_n;    // means over 20 ms
-    double lost_mm, lost_limit_mm;       // length lost next to the mouth and what may be (buckling); limit 0: not known yet
-    int tip_node;                // node of the tree at which the tip is; -1 without tree
-    double off_way_mm;           // beyond the mouth of a branch that leads elsewhere; 0 on the way
+    double tip_force_n, tip_force_peak_n;    // the largest of any tool's
+    int tip_node;                // of the tool that has to reach the target
     double blind_mm;             // moved since the pedal was last down
-    double target_distance_mm;   // from the tip, straight
+    double target_distance_mm;   // from that tool's tip, straight
     double held_s;               // within the target without a break
     double reached_s;            // simulated time at which it had been held; 0 before
     int error_total;
     ScoreErrorFigures error[ERROR_COUNT];
+    int tool_count;
+    ScoreToolFigures tool[TOOLS_MOST];   // outermost first
 } ScoreFigures;
 
 typedef struct ScoreEvent {
     ScoreError kind;
+    int tool;                    // whose it is; -1: nobody's alone (wall force, blind, contrast)
     double time_s;               // simulated
 } ScoreEvent;
 enum { SCORE_EVENTS_MOST = 200 };    // later ones are counted, not listed

@@ -34,22 +34,49 @@ static const struct Figure {
 #undef FIGURE
 };
 enum { FIGURES = sizeof figure_table / sizeof figure_table[0] };
-// after the numbers of the table
-static const char *const other_key[] = {"state", "has_exercise", "has_xray", "pulses", "error_total", "parts", "errors"};
+// after the numbers of the table; "tools" where there are several
+static const char *const other_key[] = {"state", "has_exercise", "has_xray", "pulses", "error_total", "parts", "errors", "tools"};
+// Of a tool. What goes on at the moment is not written.
+static const struct Figure tool_table[] = {
+#define FIGURE(name, most) {#name, offsetof(ScoreToolFigures, name), most}
+    FIGURE(inserted_mm, 1e12), FIGURE(withdrawn_mm, 1e12), FIGURE(tip_force_peak_n, 1e12), FIGURE(kick_peak_mm_s, 1e12), FIGURE(behind_mm, 1e9), FIGURE(spare_mm, 1e9),
+#undef FIGURE
+};
+enum { TOOL_FIGURES = sizeof tool_table / sizeof tool_table[0] };
+// Errors that earlier versions did not know.
+static bool is_later(ScoreError kind) { return kind > ERROR_CONTRAST; }
 enum { OTHERS = sizeof other_key / sizeof other_key[0] };
 
 static bool add(cJSON *to, const char *name, double value) { return cJSON_AddNumberToObject(to, name, value) != NULL; }
+
+static bool add_figures(cJSON *object, int count, const struct Figure *table, const void *figures)
+{
+    bool good = true;
+    for (int i = 0; good && i < count; i++) {
+        double value;
+        memcpy(&value, (const char *)figures + table[i].offset, sizeof value);
+        good = add(object, table[i].name, value);
+    }
+    return good;
+}
+
+static bool add_tools(cJSON *object, const ScoreFigures *f)
+{
+    cJSON *list = f->tool_count > 1 ? cJSON_AddArrayToObject(object, "tools") : NULL;
+    for (int k = 0; list && k < f->tool_count; k++) {
+        cJSON *tool = cJSON_CreateObject();
+        if (!tool || !cJSON_AddItemToArray(list, tool) || !cJSON_AddStringToObject(tool, "name", f->tool[k].name) ||
+            !add_figures(tool, TOOL_FIGURES, tool_table, &f->tool[k]))
+            return false;
+    }
+    return list || f->tool_count <= 1;
+}
 
 bool score_add_json(cJSON *object, const ScoreFigures *f)
 {
     bool good = cJSON_AddStringToObject(object, "state", score_state_name[f->state]) && cJSON_AddBoolToObject(object, "has_exercise", f->has_exercise) &&
                 cJSON_AddBoolToObject(object, "has_xray", f->has_xray);
-    for (int i = 0; good && i < FIGURES; i++) {
-        double value;
-        memcpy(&value, (const char *)f + figure_table[i].offset, sizeof value);
-        good = add(object, figure_table[i].name, value);
-    }
-    good = good && add(object, "pulses", (double)f->pulses) && add(object, "error_total", f->error_total);
+    good = good && add_figures(object, FIGURES, figure_table, f) && add(object, "pulses", (double)f->pulses) && add(object, "error_total", f->error_total);
     cJSON *parts = good ? cJSON_AddObjectToObject(object, "parts") : NULL, *errors = parts ? cJSON_AddObjectToObject(object, "errors") : NULL;
     good = good && parts && errors;
     for (int i = 0; good && i < PART_COUNT; i++)
@@ -58,7 +85,7 @@ bool score_add_json(cJSON *object, const ScoreFigures *f)
         cJSON *error = cJSON_AddObjectToObject(errors, score_error_name[i]);
         good = error && add(error, "count", f->error[i].count) && add(error, "last_s", f->error[i].last_s);
     }
-    return good;
+    return good && add_tools(object, f);
 }
 
 char *score_json(const ScoreFigures *figures, const Scene *scene)
@@ -142,6 +169,36 @@ static bool read_flag(const JsonReading *reading, const cJSON *object, const cha
     return cJSON_IsTrue(item);
 }
 
+static void read_figures(const JsonReading *reading, const cJSON *object, const char *where, int count, const struct Figure *table, void *figures)
+{
+    for (int i = 0; i < count; i++) {
+        double value = json_number(reading, object, where, table[i].name, 0, table[i].most);
+        memcpy((char *)figures + table[i].offset, &value, sizeof value);
+    }
+}
+
+// A single tool has no list.
+static void read_tools(const JsonReading *reading, const cJSON *list, ScoreFigures *f)
+{
+    const char *keys[TOOL_FIGURES + 2] = {"name"};
+    for (int i = 0; i < TOOL_FIGURES; i++)
+        keys[i + 1] = tool_table[i].name;
+    int count = cJSON_IsArray(list) ? cJSON_GetArraySize(list) : 0;
+    if (list && (count < 2 || count > TOOLS_MOST)) {
+        faults_add(reading->faults, reading->file, 0, 0, "'score.tools' is no list of 2 to %d", TOOLS_MOST);
+        return;
+    }
+    f->tool_count = list ? count : 1;
+    for (int k = 0; k < count; k++) {
+        const cJSON *tool = cJSON_GetArrayItem(list, k);
+        f->tool[k].tip_node = -1;
+        if (!json_keys(reading, tool, "score.tools", keys))
+            continue;
+        json_text(reading, tool, "score.tools", "name", sizeof f->tool[k].name, f->tool[k].name);
+        read_figures(reading, tool, "score.tools", TOOL_FIGURES, tool_table, &f->tool[k]);
+    }
+}
+
 void score_read_json(const JsonReading *reading, const cJSON *object, ScoreFigures *f)
 {
     static const char *const error_key[] = {"count", "last_s", NULL};
@@ -153,10 +210,8 @@ void score_read_json(const JsonReading *reading, const cJSON *object, ScoreFigur
     *f = (ScoreFigures){.tip_node = -1};
     if (!json_keys(reading, object, "score", keys))
         return;
-    for (int i = 0; i < FIGURES; i++) {
-        double value = json_number(reading, object, "score", figure_table[i].name, 0, figure_table[i].most);
-        memcpy((char *)f + figure_table[i].offset, &value, sizeof value);
-    }
+    read_figures(reading, object, "score", FIGURES, figure_table, f);
+    read_tools(reading, cJSON_GetObjectItemCaseSensitive(object, "tools"), f);
     f->state = (ScoreState)json_choice(reading, object, "score", "state", score_state_name);
     f->has_exercise = read_flag(reading, object, "has_exercise");
     f->has_xray = read_flag(reading, object, "has_xray");
@@ -171,7 +226,7 @@ void score_read_json(const JsonReading *reading, const cJSON *object, ScoreFigur
         return;
     for (int i = 0; i < ERROR_COUNT; i++) {
         const cJSON *error = cJSON_GetObjectItemCaseSensitive(errors, score_error_name[i]);
-        if (!json_keys(reading, error, score_error_name[i], error_key))
+        if ((!error && is_later((ScoreError)i)) || !json_keys(reading, error, score_error_name[i], error_key))
             continue;
         f->error[i].count = (int)json_count(reading, error, score_error_name[i], "count", INT32_MAX);
         f->error[i].last_s = json_number(reading, error, score_error_name[i], "last_s", 0, 1e7);

@@ -4,15 +4,14 @@ static const double MARGIN = 1;              // [mm] over what the clearance tak
 enum { DIAMETERS = 5 };                      // of the lumen, in l
 static const double UNBENT = 0.1;            // [mm] lost by a tool that slides
 
-void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, int node_count, double lumen_radius, double inserted)
+void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, double lumen_radius, double inserted)
 {
     double thickest = 0, straight = 0;
     for (int i = 0; i < wire->section_count; i++)
         thickest = fmax(thickest, wire->section[i].diameter);
     for (int i = 0; i < wire->section_count && wire->section[i].rest_curvature == 0; i++)
         straight += wire->section[i].length;
-    *sheath = (ScoreSheath){.node_count = node_count,
-                            .is_judged = wire->has_sheath && lumen_radius > 0 && isfinite(lumen_radius),
+    *sheath = (ScoreSheath){.is_judged = wire->has_sheath && lumen_radius > 0 && isfinite(lumen_radius),
                             .mouth = wire->start,
                             .direction = vec3_unit(wire->direction),
                             .lumen_radius = lumen_radius,
@@ -22,34 +21,18 @@ void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, int node_c
                             .last_inserted = inserted};
 }
 
-// The element that holds arc length `at`, and where in it (0 to 1).
-static int element_at(const double *s, int count, double at, double *part)
+double score_sheath_step(ScoreSheath *sheath, const Stepper *stepper, int tool, double dt)
 {
-    int low = 0, high = count - 2;
-    while (low < high) {
-        int middle = (low + high + 1) / 2;
-        if (s[middle] <= at)
-            low = middle;
-        else
-            high = middle - 1;
-    }
-    *part = fmin(fmax((at - s[low]) / (s[low + 1] - s[low]), 0), 1);
-    return low;
-}
-
-double score_sheath_step(ScoreSheath *sheath, const WireState *state, const double *s, double dt)
-{
-    double fed = state->inserted - sheath->last_inserted, part;
-    sheath->last_inserted = state->inserted;
-    if (!sheath->is_judged || state->inserted <= 0)
+    double inserted = stepper_tool_inserted(stepper, tool), fed = inserted - sheath->last_inserted;
+    sheath->last_inserted = inserted;
+    if (!sheath->is_judged || inserted <= 0)
         return fed;
     // a tip that is curved at rest moves across itself as it is dragged along a wall: it says nothing
-    double hidden = s[sheath->node_count - 1] - state->inserted, at = fmin(hidden + sheath->reach, sheath->straight);
+    double hidden = stepper_tool_length(stepper, tool) - inserted, at = fmin(hidden + sheath->reach, sheath->straight);
     if (at <= hidden)
         return fed;
-    int i = element_at(s, sheath->node_count, at, &part);
-    Vec3 along = vec3_unit(vec3_sub(state->position[i + 1], state->position[i])), speed = vec3_mix(state->velocity[i], state->velocity[i + 1], part);
-    double moved = vec3_dot(speed, along) * dt, fades = fmin(fabs(fed) / (2 * sheath->reach), 1);
+    ToolPlace place = stepper_tool_place(stepper, tool, at);
+    double moved = vec3_dot(place.velocity, place.along) * dt, fades = fmin(fabs(fed) / (2 * sheath->reach), 1);
     sheath->lost = fmax(sheath->lost * (1 - fades) + fed - moved, 0);
     return fed;
 }
@@ -67,18 +50,15 @@ static double turn_of(const ScoreSheath *sheath, const Vec3 *point, int count)
     return turn;
 }
 
-void score_sheath_look(ScoreSheath *sheath, const WireState *state, const double *s)
+void score_sheath_look(ScoreSheath *sheath, const Stepper *stepper, int tool)
 {
     if (!sheath->is_judged || sheath->turn_is_known || sheath->lost > UNBENT)
         return;
-    double hidden = s[sheath->node_count - 1] - state->inserted, stride = 2 * sheath->lumen_radius;
+    double inserted = stepper_tool_inserted(stepper, tool), hidden = stepper_tool_length(stepper, tool) - inserted, stride = 2 * sheath->lumen_radius;
     Vec3 point[DIAMETERS + 1] = {sheath->mouth};
     int count = 1;
-    for (; count <= DIAMETERS && count * stride <= state->inserted; count++) {
-        double part;
-        int i = element_at(s, sheath->node_count, hidden + count * stride, &part);
-        point[count] = vec3_mix(state->position[i], state->position[i + 1], part);
-    }
+    for (; count <= DIAMETERS && count * stride <= inserted; count++)
+        point[count] = stepper_tool_place(stepper, tool, hidden + count * stride).position;
     sheath->turn = turn_of(sheath, point, count);
 }
 

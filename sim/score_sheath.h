@@ -1,5 +1,5 @@
-// Buckling at the sheath: the length that went in at the mouth and did not go on, over the first part of the tool beyond it. What is measured and why
-// says score.h.
+// Buckling of one tool at the sheath: the length that went in at the mouth and did not go on, over the first part of the tool beyond it. What is measured
+// and why says score.h.
 #ifndef SELDINGER_SIM_SCORE_SHEATH_H
 #define SELDINGER_SIM_SCORE_SHEATH_H
 
@@ -7,7 +7,6 @@
 #include "solver/solver.h"
 
 typedef struct ScoreSheath {
-    int node_count;              // of the tool that goes through the sheath: of several the outermost, whose nodes are the first
     bool is_judged;              // a sheath, and a lumen whose radius is known
     Vec3 mouth, direction;
     double lumen_radius, clearance;      // [mm]
@@ -19,14 +18,14 @@ typedef struct ScoreSheath {
     double last_inserted;        // [mm]
 } ScoreSheath;
 
-void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, int node_count, double lumen_radius, double inserted);
+void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, double lumen_radius, double inserted);
 // The vessel's centreline from the mouth on, `count` points: sets the turn, by chords of one lumen diameter.
 void score_sheath_set_line(ScoreSheath *sheath, const Vec3 *point, int count);
-// `s` (node_count) [mm] arc length of the nodes. `dt` [ms]. Returns what was fed in [mm].
-double score_sheath_step(ScoreSheath *sheath, const WireState *state, const double *s, double dt);
+// Tool `tool` after a step of `dt` [ms]. Returns what was fed in [mm].
+double score_sheath_step(ScoreSheath *sheath, const Stepper *stepper, int tool, double dt);
 void score_sheath_set_pieces(ScoreSheath *sheath, const TubePiece *piece, int count);   // the same of lines and arcs
 // Where the turn is not known: looks at the tool while next to nothing is lost.
-void score_sheath_look(ScoreSheath *sheath, const WireState *state, const double *s);
+void score_sheath_look(ScoreSheath *sheath, const Stepper *stepper, int tool);
 // [mm] that may be lost without a fold.
 double score_sheath_limit(const ScoreSheath *sheath);
 

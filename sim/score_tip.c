@@ -1,13 +1,12 @@
 #include "sim/score_tip.h"
 
 #include <stdlib.h>
-#include <string.h>
 
-bool score_tip_create(ScoreTip *tip, const WireOptions *options, double tip_length, double *s)
+// The element behind the tip of a tool that is the only one.
+static bool find_element(ScoreTip *tip, const WireOptions *options, double tip_length)
 {
     char why[256];
     Wire wire;
-    *tip = (ScoreTip){.element = -1};
     if (!wire_create(&wire, options, why, (int)sizeof why))
         return false;
     size_t count = (size_t)wire.element_count;
@@ -19,7 +18,6 @@ bool score_tip_create(ScoreTip *tip, const WireOptions *options, double tip_leng
         for (size_t i = 0; i < BEAM_REST_ARRAYS; i++)
             *array[i] = scratch + i * count;
         wire_rest(&wire, options, &r);
-        memcpy(s, wire.s, (count + 1) * sizeof *s);
         int i = wire.element_count - 1;
         while (i > 0 && wire.total_length - wire.s[i] <= tip_length)
             i--;
@@ -35,10 +33,20 @@ bool score_tip_create(ScoreTip *tip, const WireOptions *options, double tip_leng
     return scratch != NULL;
 }
 
-double score_tip_force(ScoreTip *tip, const WireState *state, double hidden)
+bool score_tip_create(ScoreTip *tip, const Stepper *stepper, int tool, const WireOptions *options, double tip_length)
 {
+    *tip = (ScoreTip){.from = stepper_tool_length(stepper, tool) - tip_length, .is_single = stepper_tool_count(stepper) == 1, .element = -1};
+    return !tip->is_single || find_element(tip, options, tip_length);
+}
+
+double score_tip_force(ScoreTip *tip, const Stepper *stepper, int tool)
+{
+    if (!tip->is_single)
+        return vec3_norm(stepper_tool_wall_force(stepper, tool, tip->from));
+    // an element that is not out of the sheath carries its reaction
+    const WireState *state = stepper_state(stepper);
     int i = tip->element;
-    if (i < 0 || tip->s < hidden)
+    if (i < 0 || tip->s < stepper_tool_length(stepper, tool) - state->inserted - 1e-9)
         return 0;
     BeamOutput out;
     tip->rest.x1 = state->position[i];

@@ -110,7 +110,8 @@ static bool add_events(cJSON *root, const Session *s)
     for (int i = 0; list && i < s->event_count; i++) {
         cJSON *event = cJSON_CreateObject();
         if (!event || !cJSON_AddItemToArray(list, event) || !add_text(event, "kind", score_error_name[s->event[i].kind]) ||
-            !add_number(event, "time_s", s->event[i].time_s))
+            !add_number(event, "time_s", s->event[i].time_s) ||
+            (s->figures.tool_count > 1 && s->event[i].tool >= 0 && !add_text(event, "tool", s->figures.tool[s->event[i].tool].name)))
             return false;
     }
     return list != NULL;
@@ -160,9 +161,19 @@ static void read_recording(const JsonReading *reading, const cJSON *object, Sess
     s->state_hash = strtoull(hash, NULL, 16);
 }
 
+// Whose an error is stands there where there are several tools and it is one's alone.
+static int read_event_tool(const JsonReading *reading, const cJSON *event, const ScoreFigures *f)
+{
+    const char *names[TOOLS_MOST + 1] = {0};
+    for (int k = 0; k < f->tool_count; k++)
+        names[k] = f->tool[k].name;
+    bool says = cJSON_GetObjectItemCaseSensitive(event, "tool") != NULL;
+    return says && names[0] ? json_choice(reading, event, "events", "tool", names) : -1;
+}
+
 static void read_events(const JsonReading *reading, const cJSON *list, Session *s)
 {
-    static const char *const keys[] = {"kind", "time_s", NULL};
+    static const char *const keys[] = {"kind", "time_s", "tool", NULL};
     int count = cJSON_IsArray(list) ? cJSON_GetArraySize(list) : -1;
     if (count < 0 || count > SCORE_EVENTS_MOST) {
         faults_add(reading->faults, reading->file, 0, 0, "'events' is no list of at most %d", SCORE_EVENTS_MOST);
@@ -172,7 +183,8 @@ static void read_events(const JsonReading *reading, const cJSON *list, Session *
         if (!json_keys(reading, event, "events", keys))
             continue;
         int kind = json_choice(reading, event, "events", "kind", score_error_name);
-        s->event[s->event_count++] = (ScoreEvent){(ScoreError)kind, json_number(reading, event, "events", "time_s", 0, 1e7)};
+        int tool = read_event_tool(reading, event, &s->figures);
+        s->event[s->event_count++] = (ScoreEvent){(ScoreError)kind, tool, json_number(reading, event, "events", "time_s", 0, 1e7)};
     }
 }
 

@@ -4,8 +4,8 @@
 //   {"seldinger_session": 1, "trainee": "", "date": "2025-11-21T22:05:00Z", "device": "", "version": "",
 //    "scene": {"path": "", "sha256": "", "title": "", "target": ""},
 //    "recording": {"path": "", "steps": 0, "step_ms": 1, "series_sha256": "", "state_hash": ""},
-//    "score": {figures of score.h, "parts": {}, "errors": {"wrong_branch": {"count": 0, "last_s": 0}, …}},
-//    "events": [{"kind": "wrong_branch", "time_s": 0}]}
+//    "score": {figures of score.h, "parts": {}, "errors": {"wrong_branch": {"count": 0, "last_s": 0}, …}, "tools": [{"name": "", …}] of several},
+//    "events": [{"kind": "wrong_branch", "time_s": 0}]}       and, of several tools, "tool": whose error it is
 #ifndef SELDINGER_SIM_SESSION_H
 #define SELDINGER_SIM_SESSION_H
 

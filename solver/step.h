@@ -138,6 +138,16 @@ int stepper_node_capacity(const Stepper *stepper);       // M at most
 int stepper_tool_count(const Stepper *stepper);
 int stepper_tool_nodes(const Stepper *stepper, int tool, ToolNode *node);   // their number; node may be NULL
 double stepper_tool_inserted(const Stepper *stepper, int tool);             // [mm]
+double stepper_tool_length(const Stepper *stepper, int tool);               // [mm]
+// A material point of a tool, wherever it lies, on the chords of the chain's elements; for use in every step.
+typedef struct ToolPlace {
+    Vec3 position;
+    Vec3 along;              // unit, the chord towards the tip
+    Vec3 velocity;           // [mm/ms] of the tool's own material
+} ToolPlace;
+ToolPlace stepper_tool_place(const Stepper *stepper, int tool, double s);
+// [N] what the wall has done in the last step to the tool beyond s [mm], in sum: 0 where other tools are around it.
+Vec3 stepper_tool_wall_force(const Stepper *stepper, int tool, double s);
 double stepper_elastic_energy(const Stepper *stepper);    // [mJ]
 double stepper_kinetic_energy(const Stepper *stepper);    // [mJ]
 

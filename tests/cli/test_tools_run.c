@@ -222,7 +222,7 @@ static void golden_paths_of_the_scenes_hold(void **state)
 static void what_takes_one_tool_says_so(void **state)
 {
     (void)state;
-    static const char *const command[] = {"run scenes/coaxial/insert.yaml --score -", "nav scenes/coaxial/insert.yaml"};
+    static const char *const command[] = {"run scenes/coaxial/insert.yaml --device auto --duration-s 1", "nav scenes/coaxial/insert.yaml"};
     for (int i = 0; i < 2; i++) {
         int code = run(command[i]);
         char *text = text_of(in_folder("output.txt"));
@@ -235,6 +235,23 @@ static void what_takes_one_tool_says_so(void **state)
     }
 }
 
+static void a_score_has_each_tool(void **state)
+{
+    (void)state;
+    ends(0, "", "run $D/three.yaml --quiet --score $D/score.json");
+    char *text = text_of(in_folder("score.json"));
+    cJSON *root = cJSON_Parse(text);
+    free(text);
+    const cJSON *tools = cJSON_GetObjectItem(root, "tools");
+    assert_int_equal(cJSON_GetArraySize(tools), 3);
+    assert_string_equal(cJSON_GetObjectItem(cJSON_GetArrayItem(tools, 1), "name")->valuestring, "micro");
+    assert_true(fabs(value(cJSON_GetArrayItem(tools, 0), NULL, "inserted_mm") - 6) < 1e-6);
+    assert_true(fabs(value(cJSON_GetArrayItem(tools, 1), NULL, "withdrawn_mm") - 3) < 1e-6);
+    // the wire is drawn to 9 mm, the microcatheter stands at 19
+    assert_true(fabs(value(cJSON_GetArrayItem(tools, 2), NULL, "behind_mm") - 10) < 1e-6);
+    cJSON_Delete(root);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -242,6 +259,7 @@ int main(void)
         cmocka_unit_test(a_run_of_three_tools_is_recorded_and_simulated_again), cmocka_unit_test(each_format_has_all_tools),
         cmocka_unit_test(a_tool_that_is_let_go_stays_so_in_a_replay),
         cmocka_unit_test(golden_paths_of_the_scenes_hold), cmocka_unit_test(what_takes_one_tool_says_so),
+        cmocka_unit_test(a_score_has_each_tool),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -10,6 +10,13 @@
 #define TOOL "wire: {elements: 40, sections: [{length_mm: 100, diameter_mm: 0.4, young_modulus_gpa: 20}], damping: {mass_1_s: 1, stiffness_s: 0.0005}}\n"
 #define AT(x) "targets: [{name: there, point_mm: [" #x ", 0, 0], radius_mm: 1}]\n"
 #define IN_THE_OPEN "seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 1}\n" AT(20)
+// A catheter with a wire in it; `rest` is the catheter's, e.g. "rest: [{arc: {radius_mm: 8, angle_deg: 90}}], ".
+#define TWO_TOOLS(rest)                                                                                                                                        \
+    "tools:\n"                                                                                                                                                 \
+    "  - {name: catheter, kind: catheter, elements: 30, inserted_mm: 2, sections: [{length_mm: 60, diameter_mm: 1, inner_diameter_mm: 0.7, "                   \
+    "young_modulus_gpa: 0.5, density_g_cm3: 1.5}], " rest "damping: {mass_1_s: 1, stiffness_s: 0.0005}}\n"                                                     \
+    "  - {name: wire, kind: wire, elements: 40, inserted_mm: 2, sections: [{length_mm: 100, diameter_mm: 0.4, young_modulus_gpa: 20}]}\n"
+#define TWO_IN_THE_OPEN "seldinger: 1\n" TWO_TOOLS("") "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n" AT(20)
 #define EXERCISE(inner) "exercise: {title: Go there, target: there" inner "}\n"
 
 typedef struct Practice {
@@ -49,11 +56,19 @@ static Practice *practice_begin(const char *text, const VesselTree *tree)
     return p;
 }
 
-static void practice_step(Practice *p, double push_mm_s)
+static void practice_step_tools(Practice *p, const ToolCommands *commands)
 {
-    Command command = {push_mm_s, 0};
-    simulator_step(p->simulator, command);
-    score_step(p->score, p->simulator, &(ToolCommands){.tool = {command}}, p->watched ? &p->xray : NULL);
+    simulator_step_tools(p->simulator, commands);
+    score_step(p->score, p->simulator, commands, p->watched ? &p->xray : NULL);
+}
+
+static inline void practice_step(Practice *p, double push_mm_s) { practice_step_tools(p, &(ToolCommands){.tool = {{push_mm_s, 0}}}); }
+
+static inline ScoreFigures practice_go_tools(Practice *p, double outer_mm_s, double inner_mm_s, double seconds)
+{
+    for (int i = 0, steps = (int)(seconds * 1000 / p->scene->dt + 0.5); i < steps; i++)
+        practice_step_tools(p, &(ToolCommands){.tool = {{outer_mm_s, 0}, {inner_mm_s, 0}}});
+    return score_figures(p->score);
 }
 
 static inline ScoreFigures practice_go(Practice *p, double push_mm_s, double seconds)

@@ -51,6 +51,10 @@ static void a_wrong_exercise_is_refused(void **state)
         {IN_THE_OPEN "exercise: {title: a}\n", "lacks the key 'target'"},
         {IN_THE_OPEN "exercise: {title: a, target: their}\n", "no target of this scene"},
         {"seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\nexercise: {title: a, target: a}\n", "has no 'targets'"},
+        {IN_THE_OPEN EXERCISE(", tool: catheter"), "no tool of this scene; the first of its 1 is 'wire'"},
+        {TWO_IN_THE_OPEN EXERCISE(", tool: guide"), "the first of its 2 is 'catheter'"},
+        {IN_THE_OPEN EXERCISE(", rules: {wire_behind_mm: -1}"), "out of range"},
+        {IN_THE_OPEN EXERCISE(", rules: {kick_mm_s: fast}"), "kick_mm_s"},
         {IN_THE_OPEN EXERCISE(", hold: 2"), "'hold_s'"},
         {IN_THE_OPEN EXERCISE(", hold_s: -1"), "out of range"},
         {IN_THE_OPEN EXERCISE(", hold_s: 61"), "out of range"},
@@ -296,7 +300,7 @@ static void a_wrong_branch_counts_once_each_time(void **state)
     assert_near(score_figures(p->score).way_mm, 35, 1e-9);
     ScoreFigures f = practice_go(p, 10, 2.5);      // at 26 mm: 4 mm beyond the trunk's wall
     assert_int_equal(f.error_total, 0);
-    assert_near(f.off_way_mm, 4, 1e-9);
+    assert_near(f.tool[0].off_way_mm, 4, 1e-9);
     f = practice_go(p, 10, 0.5);                   // at 31 mm
     assert_int_equal(f.error[ERROR_WRONG_BRANCH].count, 1);
     assert_near(f.error[ERROR_WRONG_BRANCH].last_s, 2.6, 0.03);       // node 14 (28 mm) is the tip's from 27 mm on
@@ -373,15 +377,15 @@ static void a_tool_whose_tip_is_held_buckles_at_the_sheath(void **state)
         Practice *p = practice_begin(text, NULL);
         // one bow from wall to wall takes pi^2 1.8^2 / 20 = 1.6 mm
         ScoreFigures f = practice_go(p, 10, 0.16);
-        assert_near(f.lost_limit_mm, 1 + PI * PI * 1.8 * 1.8 / 20, 1e-9);
-        assert_near(f.lost_mm, 1.6, 0.15);
+        assert_near(f.tool[0].lost_limit_mm, 1 + PI * PI * 1.8 * 1.8 / 20, 1e-9);
+        assert_near(f.tool[0].lost_mm, 1.6, 0.15);
         assert_int_equal(f.error_total, 0);
         f = practice_go(p, 10, 0.14);
-        assert_near(f.lost_mm, 3, 0.3);
+        assert_near(f.tool[0].lost_mm, 3, 0.3);
         assert_int_equal(f.error[ERROR_BUCKLING].count, judged);
         assert_int_equal(f.error_total, judged);
         f = practice_go(p, -10, 0.3);              // pulled straight again
-        assert_near(f.lost_mm, 0, 0.3);
+        assert_near(f.tool[0].lost_mm, 0, 0.3);
         f = practice_go(p, 0, 0.6);
         assert_false(f.error[ERROR_BUCKLING].is_on);
         practice_end(p);
@@ -429,10 +433,10 @@ static void normal_bends_are_no_buckling(void **state)
         double most = 0;
         for (int k = 0; k < 3; k++) {                        // in, half out, in again
             for (int n = 0; n < 22; n++)
-                most = fmax(most, practice_go(p, k == 1 ? -25 : 25, 0.1).lost_mm / score_figures(p->score).lost_limit_mm);
+                most = fmax(most, practice_go(p, k == 1 ? -25 : 25, 0.1).tool[0].lost_mm / score_figures(p->score).tool[0].lost_limit_mm);
         }
         ScoreFigures f = score_figures(p->score);
-        print_message("bend %zu: at most %.2f of the limit %.2f mm; pushed %.2f N\n", i, most, f.lost_limit_mm, simulator_last(p->simulator)->proximal_force);
+        print_message("bend %zu: at most %.2f of the limit %.2f mm; pushed %.2f N\n", i, most, f.tool[0].lost_limit_mm, simulator_last(p->simulator)->proximal_force);
         assert_int_equal(f.error[ERROR_BUCKLING].count, 0);
         assert_true(most < 0.8);
         practice_end(p);
@@ -511,6 +515,184 @@ static void wall_force_is_summed_over_time(void **state)
     assert_int_equal(count, f.error_total);
     assert_int_equal(event[0].kind, ERROR_WALL_FORCE);
     assert_near(event[0].time_s, f.error[ERROR_WALL_FORCE].last_s, 0);
+    practice_end(p);
+}
+
+// --- several tools ---
+
+// The catheter stays behind, the wire goes to the target; then the catheter does.
+static void the_named_tool_has_to_be_there(void **state)
+{
+    (void)state;
+    static const char *const scene[] = {TWO_IN_THE_OPEN EXERCISE(", hold_s: 0.2"), TWO_IN_THE_OPEN EXERCISE(", hold_s: 0.2, tool: wire"),
+                                        TWO_IN_THE_OPEN EXERCISE(", hold_s: 0.2, tool: catheter, rules: {blind_mm: 25}")};
+    for (int i = 0; i < 3; i++) {
+        Practice *p = practice_begin(scene[i], NULL);
+        p->watched = i == 2;
+        practice_go_tools(p, 0, 20, 0.9);
+        ScoreFigures f = practice_go_tools(p, 0, 0, 0.4);
+        assert_int_equal(f.state, i == 2 ? SCORE_RUNNING : SCORE_REACHED);
+        assert_near(f.path_mm, i == 2 ? 0 : 18, 0.3);
+        assert_near(f.target_distance_mm, i == 2 ? 18 : 0, 0.05);
+        if (i == 2) {
+            practice_go_tools(p, 20, 0, 0.9);
+            f = practice_go_tools(p, 0, 0, 0.4);
+            assert_int_equal(f.state, SCORE_REACHED);
+            assert_near(f.path_mm, 18, 0.3);
+            assert_near(f.inserted_mm, 36, 1e-6);
+            assert_near(f.tool[0].inserted_mm, 18, 1e-6);
+            assert_int_equal(f.error[ERROR_BLIND].count, 1);
+        }
+        practice_end(p);
+    }
+}
+
+// Tools that move together are blind by as much as one of them.
+static void a_pair_moves_once(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(TWO_IN_THE_OPEN EXERCISE(", rules: {blind_mm: 9}"), NULL);
+    p->watched = true;
+    ScoreFigures f = practice_go_tools(p, 20, 20, 0.4);
+    assert_near(f.blind_mm, 8, 1e-6);
+    assert_int_equal(f.error_total, 0);
+    practice_end(p);
+}
+
+static void a_wire_that_is_drawn_back_is_lost(void **state)
+{
+    (void)state;
+    for (int judged = 0; judged < 2; judged++) {
+        static const char *const scene[] = {TWO_IN_THE_OPEN EXERCISE(""), TWO_IN_THE_OPEN EXERCISE(", rules: {wire_behind_mm: 4}")};
+        Practice *p = practice_begin(scene[judged], NULL);
+        practice_go_tools(p, 20, 20, 0.5);
+        ScoreFigures f = practice_go_tools(p, 0, -20, 0.19);
+        assert_int_equal(f.error_total, 0);
+        assert_near(f.tool[1].behind_mm, 3.8, 1e-6);
+        f = practice_go_tools(p, 0, -20, 0.1);
+        assert_int_equal(f.error[ERROR_WIRE_LOST].count, judged);
+        practice_go_tools(p, 0, 20, 0.2);          // ahead again, for long enough
+        f = practice_go_tools(p, 0, 0, 0.6);
+        assert_false(f.error[ERROR_WIRE_LOST].is_on);
+        f = practice_go_tools(p, 0, -20, 0.3);
+        assert_int_equal(f.error[ERROR_WIRE_LOST].count, 2 * judged);
+        int count;
+        const ScoreEvent *event = score_events(p->score, &count);
+        assert_int_equal(count, 2 * judged);
+        assert_int_equal(judged ? event[0].tool : 1, 1);
+        practice_end(p);
+    }
+}
+
+// 40 mm of wire behind the hub: they go in as the catheter is drawn out over a wire that is held.
+static void a_wire_drawn_into_the_hub_is_lost(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin("seldinger: 1\n" TWO_TOOLS("") "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n" AT(90) EXERCISE(""), NULL);
+    practice_go_tools(p, 0, 50, 0.7);
+    ScoreFigures f = practice_go_tools(p, 0, 10, 0.395);
+    assert_near(f.tool[1].spare_mm, 1.05, 1e-6);
+    assert_int_equal(f.error_total, 0);
+    f = practice_go_tools(p, 0, 10, 0.01);
+    assert_int_equal(f.error[ERROR_WIRE_LOST].count, 1);
+    practice_end(p);
+}
+
+// A catheter that is bent at rest and held straight by a wire: drawn out of it, the wire lets go.
+static void a_catheter_kicks_when_its_wire_leaves(void **state)
+{
+    (void)state;
+    double peak[2];
+    for (int fast = 0; fast < 2; fast++) {
+        Practice *p = practice_begin("seldinger: 1\n" TWO_TOOLS("rest: [{arc: {radius_mm: 8, angle_deg: 90}}], ")
+                                     "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n" AT(50) EXERCISE(", rules: {kick_mm_s: 60}"), NULL);
+        practice_go_tools(p, 50, 60, 0.5);
+        ScoreFigures f = practice_go_tools(p, 0, 0, 1);
+        assert_int_equal(f.error_total, 0);
+        f = practice_go_tools(p, 0, fast ? -150 : -10, fast ? 0.2 : 3);
+        peak[fast] = f.tool[0].kick_peak_mm_s;
+        assert_int_equal(f.error[ERROR_KICK].count, fast);
+        assert_near(f.tool[1].kick_peak_mm_s, 0, 5);         // its own hand moved, and before that nothing sprang
+        practice_end(p);
+    }
+    print_message("kick at 10 mm/s: %.1f, at 150 mm/s: %.1f mm/s\n", peak[0], peak[1]);
+    assert_true(peak[0] > 1 && peak[1] > 3 * peak[0]);
+}
+
+// Each tool's share of the wall's forces, where no other is around it.
+static void each_tip_bears_its_own(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin("seldinger: 1\n" TWO_TOOLS("") "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n" AT(90)
+                                 "vessel: {friction: 0.1, contact: tube, tube: {radius_mm: 2, normal: [0, 1, 0], ends: closed, path: [{arc: {radius_mm: 15, "
+                                 "angle_deg: 90}}, {line_mm: 20}]}}\n" EXERCISE(", rules: {tip_length_mm: 6, tip_force_n: 0.02}"), NULL);
+    practice_go_tools(p, 20, 40, 0.9);
+    practice_go_tools(p, 0, 20, 0.5);
+    ScoreFigures f = practice_go_tools(p, 0, 0, 2);
+    Simulator *simulator = p->simulator;
+    int nodes = simulator_state(simulator)->node_count;
+    NodeReport *node = calloc((size_t)nodes, sizeof *node);
+    assert_non_null(node);
+    stepper_node_report(simulator_stepper(simulator), node);
+    Vec3 sum[2] = {{0, 0, 0}, {0, 0, 0}}, all = {0, 0, 0};
+    int tool = 0;
+    for (int i = 0; i < nodes; i++) {
+        if (i > 0 && node[i - 1].s == 60)
+            tool = 1;
+        if (node[i].s >= (tool ? 100 : 60) - 6)
+            sum[tool] = vec3_add(sum[tool], node[i].force);
+        all = vec3_add(all, node[i].force);
+    }
+    Vec3 whole = vec3_add(stepper_tool_wall_force(simulator_stepper(simulator), 0, 0), stepper_tool_wall_force(simulator_stepper(simulator), 1, 0));
+    print_message("catheter's tip %.4f N (nodes %.4f), wire's %.4f N (nodes %.4f)\n", f.tool[0].tip_force_n, vec3_norm(sum[0]), f.tool[1].tip_force_n,
+                  vec3_norm(sum[1]));
+    assert_near(vec3_distance(whole, all), 0, 1e-9);
+    for (int k = 0; k < 2; k++)                    // a report gives a slot's force to the nodes beside it
+        assert_near(f.tool[k].tip_force_n, vec3_norm(sum[k]), 0.15 * vec3_norm(sum[k]));
+    assert_true(f.tool[1].tip_force_n > 0.05);
+    assert_near(f.tip_force_n, fmax(f.tool[0].tip_force_n, f.tool[1].tip_force_n), 0);
+    int count;
+    const ScoreEvent *event = score_events(p->score, &count);
+    assert_true(count > 0);
+    assert_int_equal(event[0].kind, ERROR_TIP_FORCE);
+    assert_int_equal(event[0].tool, 1);
+    // drawn back into the catheter the wire touches nothing
+    practice_go_tools(p, 0, -40, 0.8);
+    assert_near(practice_go_tools(p, 0, 0, 0.5).tool[1].tip_force_n, 0, 1e-6);
+    free(node);
+    practice_end(p);
+}
+
+// A tool's place is that of the nodes that are drawn, but for the chord; its velocity is how it moves.
+static void a_tools_place_is_where_it_is(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin("seldinger: 1\n" TWO_TOOLS("") "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n" AT(90)
+                                 "vessel: {friction: 0, contact: tube, tube: {radius_mm: 1.5, normal: [0, 1, 0], path: [{arc: {radius_mm: 15, angle_deg: 90}}, "
+                                 "{line_mm: 40}]}}\n", NULL);
+    Stepper *stepper = simulator_stepper(p->simulator);
+    double off = 0, slip = 0;
+    for (int i = 0; i < 900; i++) {
+        ToolNode node[41];
+        Vec3 before[3];
+        static const double at[3] = {70, 90, 100};
+        for (int j = 0; j < 3; j++)
+            before[j] = stepper_tool_place(stepper, 1, at[j]).position;
+        practice_step_tools(p, &(ToolCommands){.tool = {{i < 500 ? 40 : 0, 0}, {i < 500 ? 60 : -40, 0}}});
+        for (int k = 0; k < 2; k++) {
+            int count = stepper_tool_nodes(stepper, k, node);
+            for (int j = 0; j < count; j++)
+                off = fmax(off, vec3_distance(node[j].position, stepper_tool_place(stepper, k, node[j].s).position));
+        }
+        for (int j = 0; j < 3 && i > 50; j++) {
+            ToolPlace place = stepper_tool_place(stepper, 1, at[j]);
+            slip = fmax(slip, fabs(vec3_dot(place.velocity, place.along) - vec3_dot(vec3_sub(place.position, before[j]), place.along)));
+        }
+    }
+    print_message("places: at most %.4f mm off; along it %.2e mm a step\n", off, slip);
+    // h^2 / 8R; and what is no more than 0.04 of an element beyond the tip around it is drawn at that tip
+    assert_true(off < 2.5 * 2.5 / (8 * 12) + 0.04 * 2.5);
+    assert_true(slip < 5e-3);
     practice_end(p);
 }
 
@@ -656,6 +838,18 @@ static void a_step_allocates_nothing(void **state)
     assert_true(score_figures(p->score).error_total > 0);
     practice_end(p);
     vessel_tree_free(t);
+    p = practice_begin(TWO_IN_THE_OPEN EXERCISE(", rules: {tip_force_n: 0.1, kick_mm_s: 1, wire_behind_mm: 1}"), NULL);
+    before = heap_calls();
+    for (int i = 0; i < 800; i++) {
+        ToolCommands commands = {.tool = {{i < 400 ? 40 : 0, 0}, {i < 400 ? 60 : -60, 0}}};
+        simulator_step_tools(p->simulator, &commands);
+        heap_watch(true);
+        score_step(p->score, p->simulator, &commands, NULL);
+        heap_watch(false);
+    }
+    assert_int_equal(heap_calls() - before, 0);
+    assert_true(score_figures(p->score).error[ERROR_WIRE_LOST].count > 0);
+    practice_end(p);
 }
 
 int main(void)
@@ -679,6 +873,13 @@ int main(void)
         cmocka_unit_test(of_several_tools_the_first_is_judged_at_the_sheath),
         cmocka_unit_test(the_tips_force_is_the_walls),
         cmocka_unit_test(wall_force_is_summed_over_time),
+        cmocka_unit_test(the_named_tool_has_to_be_there),
+        cmocka_unit_test(a_pair_moves_once),
+        cmocka_unit_test(a_wire_that_is_drawn_back_is_lost),
+        cmocka_unit_test(a_wire_drawn_into_the_hub_is_lost),
+        cmocka_unit_test(a_catheter_kicks_when_its_wire_leaves),
+        cmocka_unit_test(each_tip_bears_its_own),
+        cmocka_unit_test(a_tools_place_is_where_it_is),
         cmocka_unit_test(a_worse_figure_never_gives_more_points),
         cmocka_unit_test(nothing_done_is_worth_nothing),
         cmocka_unit_test(a_mirrored_scene_gives_the_same_score),

@@ -110,6 +110,58 @@ static void the_score_alone_is_json_too(void **state)
     practice_end(p);
 }
 
+// Of two tools: each has its figures, an error says whose it is.
+static void several_tools_are_read_back(void **state)
+{
+    (void)state;
+    static Session two, back;
+    Practice *p = practice_begin(TWO_IN_THE_OPEN EXERCISE(", rules: {wire_behind_mm: 3}"), NULL);
+    practice_go_tools(p, 20, 20, 0.5);
+    practice_go_tools(p, 0, -20, 0.3);
+    session_begin(&two, p->scene, "Ada", "", 0);
+    session_set_score(&two, p->score);
+    practice_end(p);
+    memset(two.series_sha256, '0', 64);
+    assert_int_equal(two.event_count, 1);
+    char *text = session_json(&two);
+    faults_clear(&faults);
+    if (!session_parse(text, strlen(text), "two.json", &back, &faults))
+        fail_msg("%s", faults.text[0]);
+    assert_int_equal(back.figures.tool_count, 2);
+    assert_string_equal(back.figures.tool[1].name, "wire");
+    assert_true(back.figures.tool[1].withdrawn_mm == two.figures.tool[1].withdrawn_mm);
+    assert_int_equal(back.event[0].tool, 1);
+    assert_int_equal(back.event[0].kind, ERROR_WIRE_LOST);
+    char *again = session_json(&back);
+    assert_string_equal(again, text);
+    free(again);
+    char *name = strstr(strstr(text, "\"events\""), "\"wire\"");
+    assert_non_null(name);
+    memcpy(name, "\"mire\"", 6);
+    assert_false(session_parse(text, strlen(text), "two.json", &back, &faults));
+    assert_non_null(strstr(faults.text[0], "'events.tool' is 'mire'"));
+    free(text);
+}
+
+// A session of a version that did not know them has no wire lost and no kick.
+static void an_older_session_is_read(void **state)
+{
+    (void)state;
+    static Session back;
+    char *text = strdup(one_text), *from = strstr(text, ",\n\t\t\t\"wire_lost\"");
+    if (!from)
+        fail_msg("%s", text);
+    char *to = strstr(strstr(from, "\"kick\""), "}") + 1;
+    memmove(from, to, strlen(to) + 1);
+    assert_null(strstr(text, "kick"));
+    faults_clear(&faults);
+    if (!session_parse(text, strlen(text), "old.json", &back, &faults))
+        fail_msg("%s", faults.text[0]);
+    assert_true(back.figures.points == one.figures.points);
+    assert_int_equal(back.figures.tool_count, 1);
+    free(text);
+}
+
 static void every_prefix_and_a_byte_more_are_refused(void **state)
 {
     (void)state;
@@ -237,6 +289,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_written_is_read_back),
         cmocka_unit_test(the_score_alone_is_json_too),
+        cmocka_unit_test(several_tools_are_read_back),
+        cmocka_unit_test(an_older_session_is_read),
         cmocka_unit_test(every_prefix_and_a_byte_more_are_refused),
         cmocka_unit_test(each_wrong_value_is_told),
         cmocka_unit_test(a_folder_gives_the_trainees_own_in_order),

@@ -1,0 +1,34 @@
+// What a score measures of one of the tools, each step. score.h says what the figures are.
+#ifndef SELDINGER_SIM_SCORE_TOOL_H
+#define SELDINGER_SIM_SCORE_TOOL_H
+
+#include "sim/score.h"
+#include "sim/score_sheath.h"
+#include "sim/score_tip.h"
+
+typedef struct ScoreEpisode {
+    bool is_on;
+    double quiet;                // [ms] that its measure has been back
+} ScoreEpisode;
+
+typedef struct ScoreTool {
+    int index;                   // of the scene's tools
+    double length;               // [mm]
+    ScoreTip tip;
+    ScoreSheath sheath;
+    Vec3 at;                     // its tip
+    Vec3 drift;                  // [mm/ms] the tip's velocity, mean
+    double rested;               // [ms] that its hand has held it still
+    double hub_limit;            // [mm] spare_mm below which it counts as drawn in
+    ScoreEpisode episode[ERROR_COUNT];
+} ScoreTool;
+
+// `lumen_radius` [mm] of the vessel at the mouth, HUGE_VAL where nothing says it. False where memory lacks.
+bool score_tool_create(ScoreTool *tool, Simulator *simulator, int index, double lumen_radius, double tip_length, ScoreToolFigures *figures);
+// After a step of `dt` [ms]: what was fed [mm]. Sheath and ends only: a tool that settles by itself before anyone acts has no forces to answer for.
+double score_tool_feed(ScoreTool *tool, const Stepper *stepper, double dt, ScoreToolFigures *figures);
+void score_tool_watch(ScoreTool *tool, const Stepper *stepper, const ToolCommands *commands, double dt, ScoreToolFigures *figures);
+// The mean over 20 ms of what has been `value` for `elapsed_ms`.
+double score_mean(double mean, double value, double elapsed_ms);
+
+#endif
