@@ -25,7 +25,7 @@ typedef struct Watched {
     WatchedControl control[MOST_SHOWN];
     int control_count;
     MapState state;
-    HandPort port;
+    HandPort port[MAP_HANDS];
     bool is_mapped;
     long reports, bad_reports;
 } Watched;
@@ -107,12 +107,15 @@ static void show(Watched *watched)
                    (long long)control->least, (long long)control->most, (long long)control->field.logical_min, (long long)control->field.logical_max);
     }
     if (watched->is_mapped) {
-        map_publish(watched->listing->map, &watched->state, &watched->port);
-        unsigned buttons = atomic_load(&watched->port.buttons);
-        printf("  -> push %.2f mm/s, twist %.1f deg/s, advanced %.3f mm, turned %.2f deg%s%s%s%s\n", atomic_load(&watched->port.push_mm_s),
-               atomic_load(&watched->port.twist_deg_s), atomic_load(&watched->port.advanced_mm), atomic_load(&watched->port.turned_deg),
-               buttons & HAND_PEDAL ? ", pedal" : "", buttons & HAND_CONTRAST ? ", contrast" : "", buttons & HAND_STOP ? ", stop" : "",
-               buttons & HAND_MARK ? ", mark" : "");
+        const DeviceMap *map = watched->listing->map;
+        map_publish(map, &watched->state, watched->port);
+        for (int h = 0; h < map->hand_count; h++) {
+            HandPort *port = &watched->port[h];
+            unsigned buttons = atomic_load(&port->buttons);
+            printf("  -> tool %s: push %.2f mm/s, twist %.1f deg/s, advanced %.3f mm, turned %.2f deg%s%s%s%s\n", map->hand[h].tool, atomic_load(&port->push_mm_s),
+                   atomic_load(&port->twist_deg_s), atomic_load(&port->advanced_mm), atomic_load(&port->turned_deg), buttons & HAND_PEDAL ? ", pedal" : "",
+                   buttons & HAND_CONTRAST ? ", contrast" : "", buttons & HAND_STOP ? ", stop" : "", buttons & HAND_MARK ? ", mark" : "");
+        }
     }
 }
 

@@ -11,6 +11,7 @@ static bool take_over_step(void *context, Simulator *simulator, const ToolComman
 {
     LiveSession *session = context;
     lesson_step(session->lesson, simulator, commands, xray);
+    session->resumed_released = commands->released;
     return !session->recording || recording_step(session->recording, simulator, commands, xray);
 }
 
@@ -34,7 +35,7 @@ static bool take_over(LiveSession *session, const LiveSessionOptions *options, F
 bool live_session_open(LiveSession *session, const Scene *scene, const OpenVessel *open, const LiveSessionOptions *options, Faults *faults)
 {
     *session = (LiveSession){.scene = scene};
-    session->simulator = scene_has_one_tool(scene, "a session", faults) ? simulator_create(scene, open->vessel, faults) : NULL;
+    session->simulator = simulator_create(scene, open->vessel, faults);
     session->lesson = session->simulator ? lesson_create(session->simulator, open->tree) : NULL;
     if (session->simulator && !session->lesson)
         faults_add(faults, scene->path, 0, 0, "no memory for a session");
@@ -51,6 +52,8 @@ bool live_session_open(LiveSession *session, const Scene *scene, const OpenVesse
         realtime.recording = session->recording;
         realtime.hand_count = options->hand_count;
         realtime.hand = options->hand;
+        realtime.grip = options->grip;
+        realtime.grip.released |= session->resumed_released;
         realtime.xray = options->xray;
         realtime.paused = options->paused;
         realtime.after_step = lesson_step;

@@ -14,14 +14,16 @@ typedef struct LiveSession {
     Recording *recording;        // NULL: not recorded
     Realtime *realtime;
     char record_path[4096];      // "" where not recorded
-    double resumed_s;            // simulated time that was taken over from an earlier recording
+    double resumed_s;            // simulated time that was taken over from an earlier recording …
+    unsigned resumed_released;   // … and the tools that no hand held then (ToolCommands)
 } LiveSession;
 
 typedef struct LiveSessionOptions {
     const char *record_path;     // NULL: not recorded
     int hand_count;
     HandPort *const *hand;       // (hand_count)
-    XrayControl xray;            // at the start
+    HandGrip grip;               // at the start; of a resumed session `resumed_released` are let go too
+    XrayControl xray;            // the same
     const RecordedRun *resume;   // NULL, or what is gone through first, as fast as it goes …
     double resume_s;             // … up to this time
     bool paused;

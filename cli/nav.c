@@ -11,7 +11,7 @@
 
 static const char help[] =
     "Usage: seldinger nav SCENE [options]\n\n"
-    "Opens the trainer's window: steer the tool by keyboard, gamepad, HID or USB device. `?` lists the keys. Each session is recorded, and its score\n"
+    "Opens the trainer's window: steer the tools by keyboard, gamepad, HID or USB device. `?` lists the keys. Each session is recorded, and its score\n"
     "written beside the recording; `seldinger report` makes a report of it, `seldinger replay` shows it again.\n\n"
     "  --device F.yaml    map of a device (scenes/devices has examples, `seldinger devices` lists what is there); up to 8. Joysticks, gamepads and haptic\n"
     "                     devices have maps already\n"
@@ -149,10 +149,11 @@ static int steer(const NavOptions *options, Scene *scene, OpenVessel *open, cons
     TrainerOptions trainer = options->trainer;
     TrainerFigures figures = {0};
     DeviceMap *map[TRAINER_MAPS] = {0};
+    const ToolNames tools = scene_tool_names(scene);
     char folder[4096] = "";
     int code = EXIT_BAD_INPUT;
     for (int i = 0; i < options->map_count; i++)
-        if ((map[i] = device_map_load(options->map[i], faults)))
+        if ((map[i] = device_map_load(options->map[i], faults)) && device_map_find_tools(map[i], &tools, faults))
             trainer.map_count++;
     if (trainer.is_recorded)
         trainer_folder(options->sessions, folder, sizeof folder, faults);

@@ -369,7 +369,7 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
         faults_add(faults, scene->path, 0, 0, "no memory");
     simulator_watch_energy(simulator);
     if (options->device_count && faults->count == 0)
-        watch.hands = run_hands_open(options->device_count, options->device, scene->dt, device_patience_s, faults);
+        watch.hands = run_hands_open(options->device_count, options->device, scene, device_patience_s, faults);
     if (faults->count == 0) {
         DriveOptions drive = drive_default_options();
         drive.script = watch.hands ? NULL : scene->script;

@@ -44,10 +44,11 @@ static bool is_any_ready(Hands *hands)
     return false;
 }
 
-static Hands *open_devices(int map_count, const char *const *path, Faults *faults)
+static Hands *open_devices(int map_count, const char *const *path, const ToolNames *tools, Faults *faults)
 {
     DeviceMap *map[RUN_MAPS] = {0};
     HandsOptions options = hands_default_options();
+    char text[HAND_MESSAGE_LENGTH];
     int before = faults->count;
     options.use_built_in = false;
     options.map_count = 0;
@@ -55,24 +56,28 @@ static Hands *open_devices(int map_count, const char *const *path, Faults *fault
         if (!strcmp(path[i], "auto"))
             options.use_built_in = true;
         else if ((map[options.map_count] = device_map_load(path[i], faults)))
-            options.map_count++;
+            device_map_find_tools(map[options.map_count++], tools, faults);
     }
     options.map = (const DeviceMap *const *)map;
     Hands *hands = faults->count == before ? hands_open(&options, faults) : NULL;
+    for (int k = 0; hands && k < tools->count; k++)
+        if (device_maps_share(options.map, options.map_count, tools, k, text, sizeof text))
+            fprintf(stderr, "device: %s\n", text);
     for (int i = 0; i < RUN_MAPS; i++)
         free(map[i]);
     return hands;
 }
 
-RunHands *run_hands_open(int map_count, const char *const *map, double dt, double patience_s, Faults *faults)
+RunHands *run_hands_open(int map_count, const char *const *map, const Scene *scene, double patience_s, Faults *faults)
 {
     RunHands *hands = calloc(1, sizeof *hands);
+    const ToolNames tools = scene_tool_names(scene);
     if (!hands) {
         faults_add(faults, "--device", 0, 0, "no memory");
         return NULL;
     }
-    hands->dt = dt;
-    hands->hands = open_devices(map_count, map, faults);
+    hands->dt = scene->dt;
+    hands->hands = open_devices(map_count, map, &tools, faults);
     if (!hands->hands) {
         free(hands);
         return NULL;
@@ -86,9 +91,9 @@ RunHands *run_hands_open(int map_count, const char *const *map, double dt, doubl
         free(hands);
         return NULL;
     }
-    hand_set_init(&hands->set);
-    for (int i = 0; i < HANDS_MOST; i++)
-        hand_set_add(&hands->set, hands_port(hands->hands, i));
+    hand_set_init(&hands->set, scene->tool_count);
+    for (int i = 0; i < HANDS_MOST * MAP_HANDS; i++)
+        hand_set_add(&hands->set, hands_port(hands->hands, i / MAP_HANDS) + i % MAP_HANDS);
     if (pthread_create(&hands->speaker, NULL, speak, hands) == 0)
         return hands;
     faults_add(faults, "--device", 0, 0, "no thread for the devices' messages");
@@ -100,7 +105,7 @@ RunHands *run_hands_open(int map_count, const char *const *map, double dt, doubl
 ToolCommands run_hands_command(void *context)
 {
     RunHands *hands = context;
-    return (ToolCommands){.tool = {hand_set_command(&hands->set, hands->dt)}};
+    return hand_set_command(&hands->set, hands->dt);
 }
 
 void run_hands_answer(RunHands *hands, const StepReport *report, int64_t step) { hand_set_answer(&hands->set, report, step); }

@@ -65,7 +65,7 @@ static Views *create(Scene *scene, OpenVessel *open, const Volume *volume, const
         faults_add(faults, scene->path, 0, 0, "cannot be shown: %s", note);
         return NULL;
     }
-    *desk = mesh ? desk_create(views_scene(views), mesh->vertex_count, mesh->vertex) : desk_create(views_scene(views), pose->node_count, pose->position);
+    *desk = mesh ? desk_create(views_scene(views), scene->tool_count, mesh->vertex_count, mesh->vertex) : desk_create(views_scene(views), scene->tool_count, pose->node_count, pose->position);
     desk->patient = options.patient;
     desk->xray.lao_deg = (float)scene->lao;
     desk->xray.cra_deg = (float)scene->cra;

@@ -27,7 +27,7 @@ typedef struct Trainer {
     Panel *panel;
     Views *views;
     Desk desk;
-    HandPort keyboard, pad[PADS];
+    HandPort keyboard[2], pad[PADS][MAP_HANDS];  // of the keys: for the chosen tool and its partner
     bool pad_refused[PADS];
     Gamepad gamepad[PADS];
     DeviceMap *built_in[2];          // for gamepads, for joysticks
@@ -63,17 +63,21 @@ static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *f
 {
     const TrainerOptions *options = trainer->options;
     char path[4096];
-    HandPort *hand[1 + PADS + HANDS_MOST] = {&trainer->keyboard};
-    int count = 1;
-    for (int i = 0; i < PADS; i++)
-        hand[count++] = &trainer->pad[i];
-    for (int i = 0; trainer->hands && i < HANDS_MOST; i++)
-        hand[count++] = hands_port(trainer->hands, i);
+    HandPort *hand[2 + MAP_HANDS * (PADS + HANDS_MOST)];
+    int count = 0;
+    for (int i = 0; i < 2; i++)
+        hand[count++] = &trainer->keyboard[i];
+    for (int i = 0; i < PADS * MAP_HANDS; i++)
+        hand[count++] = &trainer->pad[i / MAP_HANDS][i % MAP_HANDS];
+    for (int i = 0; trainer->hands && i < HANDS_MOST * MAP_HANDS; i++)
+        hand[count++] = hands_port(trainer->hands, i / MAP_HANDS) + i % MAP_HANDS;
+    trainer->desk.grip = (HandGrip){.chosen = trainer->desk.grip.chosen};    // a new session: nothing is locked or let go
     trainer_file_name(options->folder, trainer->scene->path, ".h5", path, sizeof path);
-    LiveSessionOptions session = {.record_path = options->is_recorded ? path : NULL, .hand_count = count, .hand = hand, .xray = trainer->desk.xray,
+    LiveSessionOptions session = {.record_path = options->is_recorded ? path : NULL, .hand_count = count, .hand = hand, .grip = trainer->desk.grip, .xray = trainer->desk.xray,
                                   .resume = resume, .resume_s = options->resume_s, .paused = trainer->is_paused};
     if (!live_session_open(&trainer->session, trainer->scene, trainer->open, &session, faults))
         return false;
+    trainer->desk.grip.released = trainer->session.resumed_released;
     trainer->pulses = pulse_clock_start(trainer->session.resumed_s);
     trainer->began_at = time(NULL);
     trainer->has_told_end = false;
@@ -87,7 +91,7 @@ static void name_devices(Trainer *trainer, char out[SESSION_NAME])
     char all[2048] = "keyboard";
     size_t used = strlen(all);
     for (int i = 0; i < PADS; i++)
-        if (atomic_load(&trainer->pad[i].reports) > 0)
+        if (atomic_load(&trainer->pad[i]->reports) > 0)
             used += (size_t)snprintf(all + used, sizeof all - used, ", gamepad");
     for (int i = 0; trainer->hands && i < HANDS_MOST; i++) {
         HandInfo info;
@@ -125,11 +129,13 @@ static bool end_session(Trainer *trainer, Faults *faults)
 
 static void drive_by_keys(Trainer *trainer, const PanelActions *actions)
 {
-    Command command = desk_command(&trainer->desk, actions);
-    HandPort *port = &trainer->keyboard;
-    atomic_store_explicit(&port->push_mm_s, command.push_mm_s, memory_order_relaxed);
-    atomic_store_explicit(&port->twist_deg_s, command.twist_deg_s, memory_order_relaxed);
-    atomic_store_explicit(&port->buttons, actions->held[ACTION_STOP] ? HAND_STOP : 0, memory_order_relaxed);
+    const Command command[2] = {desk_command(&trainer->desk, actions), desk_partner_command(&trainer->desk, actions)};
+    for (int i = 0; i < 2; i++) {
+        atomic_store_explicit(&trainer->keyboard[i].push_mm_s, command[i].push_mm_s, memory_order_relaxed);
+        atomic_store_explicit(&trainer->keyboard[i].twist_deg_s, command[i].twist_deg_s, memory_order_relaxed);
+    }
+    atomic_store_explicit(&trainer->keyboard[0].buttons, actions->held[ACTION_STOP] ? HAND_STOP : 0, memory_order_relaxed);
+    realtime_set_grip(trainer->session.realtime, &trainer->desk.grip);
 }
 
 static const DeviceMap *map_for_pad(const Trainer *trainer, const WindowGamepad *pad)
@@ -149,17 +155,17 @@ static void drive_by_pads(Trainer *trainer)
     for (int i = 0; i < PADS; i++) {
         WindowGamepad pad;
         Gamepad *gamepad = &trainer->gamepad[i];
-        bool is_there = window_gamepad(trainer->window, i, &pad), was_there = atomic_load(&trainer->pad[i].state) == HAND_READY;
+        bool is_there = window_gamepad(trainer->window, i, &pad), was_there = atomic_load(&trainer->pad[i]->state) == HAND_READY;
         int vendor, product;
         if (is_there && gamepad_ids_of_guid(pad.guid, &vendor, &product) && hands_drives(trainer->hands, vendor, product)) {
             if (was_there)
-                gamepad_lost(gamepad, &trainer->pad[i]);   // its reports are read as they come: one hand, not two
+                gamepad_lost(gamepad, trainer->pad[i]);   // its reports are read as they come: one hand, not two
             gamepad->map = NULL;
             continue;
         }
         if (!is_there) {
             if (was_there) {
-                gamepad_lost(gamepad, &trainer->pad[i]);
+                gamepad_lost(gamepad, trainer->pad[i]);
                 say(trainer, MARK_WARNING, "%s unplugged: plug it in again to go on", window_gamepad_name(trainer->window, i));
             }
             gamepad->map = NULL;
@@ -174,7 +180,7 @@ static void drive_by_pads(Trainer *trainer)
             say(trainer, is_bound ? MARK_GOOD : MARK_BAD, "%s: %s", pad.name, is_bound ? map->name : faults.text[0]);
         }
         if (gamepad->map)
-            gamepad_update(gamepad, pad.axis, pad.axis_count, pad.button, pad.button_count, &trainer->pad[i]);
+            gamepad_update(gamepad, pad.axis, pad.axis_count, pad.button, pad.button_count, trainer->pad[i]);
     }
 }
 
@@ -182,13 +188,35 @@ static unsigned buttons_of_hands(const Trainer *trainer)
 {
     unsigned buttons = 0;
     for (int i = 0; i < PADS; i++)
-        buttons |= atomic_load_explicit(&trainer->pad[i].buttons, memory_order_relaxed);
+        buttons |= atomic_load_explicit(&trainer->pad[i]->buttons, memory_order_relaxed);
     for (int i = 0; trainer->hands && i < HANDS_MOST; i++)
         buttons |= atomic_load_explicit(&hands_port(trainer->hands, i)->buttons, memory_order_relaxed);
     return buttons;
 }
 
 // --- what is pressed ---
+
+static void tell_grip(Trainer *trainer, const HandGrip *before, const PanelActions *actions)
+{
+    const HandGrip *now = &trainer->desk.grip;
+    int count = trainer->scene->tool_count, partner = hand_grip_partner(now, count), outer = now->chosen < partner ? now->chosen : partner;
+    const char *name[TOOLS_MOST];
+    for (int k = 0; k < count; k++)
+        name[k] = trainer->scene->tool[k].name;
+    for (int k = count; k < TOOLS_MOST; k++)
+        if (actions->pressed[ACTION_TOOL_1 + k])
+            say(trainer, MARK_NONE, "there is no tool %d, the scene has %d; the views are on 5 to 8", k + 1, count);
+    if (now->chosen != before->chosen)
+        say(trainer, MARK_NONE, "tool %d in hand: %s", now->chosen + 1, name[now->chosen]);
+    if (now->locked != before->locked && hand_grip_pair_is_locked(now, count))
+        say(trainer, MARK_NONE, "%s and %s are locked: they move as one", name[outer], name[outer + 1]);
+    else if (now->locked != before->locked)
+        say(trainer, MARK_NONE, "a lock is open");
+    else if (count < 2 && actions->pressed[ACTION_LOCK])
+        say(trainer, MARK_NONE, "the scene has one tool: there is none to lock it to");
+    if (now->released != before->released)
+        say(trainer, MARK_NONE, now->released >> now->chosen & 1 ? "%s is let go: only its valve holds it" : "%s is in hand again", name[now->chosen]);
+}
 
 static void take_screenshot(Trainer *trainer, const WindowInput *input)
 {
@@ -356,7 +384,9 @@ static void run_window(Trainer *trainer, Faults *faults)
         double now = since_begin(trainer);
         panel_take_input(trainer->panel, input, &actions);
         PanelLayout layout = panel_layout(input->width, input->height, input->scale, trainer->desk.view, panel_has_panels(trainer->panel));
+        const HandGrip grip = trainer->desk.grip;
         desk_obey(&trainer->desk, views_scene(trainer->views), &actions, &layout, fmin(now - last, 0.1));
+        tell_grip(trainer, &grip, &actions);
         last = now;
         drive_by_keys(trainer, &actions);
         drive_by_pads(trainer);
@@ -393,8 +423,13 @@ static bool open_hands(Trainer *trainer, Faults *faults)
     hands.map_count = options->map_count;
     hands.use_built_in = options->has_built_in_maps;
     trainer->hands = hands_open(&hands, faults);
+    const ToolNames tools = scene_tool_names(trainer->scene);
+    char text[HAND_MESSAGE_LENGTH];
+    for (int k = 0; k < tools.count; k++)
+        if (device_maps_share(hands.map, hands.map_count, &tools, k, text, sizeof text))
+            say(trainer, MARK_WARNING, "%s", text);
     if (options->has_built_in_maps) {
-        trainer->built_in[0] = device_map_built_in(BUILT_IN_GAMEPAD);
+        trainer->built_in[0] = device_map_built_in(trainer->scene->tool_count > 1 ? BUILT_IN_GAMEPAD_PAIR : BUILT_IN_GAMEPAD);
         trainer->built_in[1] = device_map_built_in(BUILT_IN_JOYSTICK);
     }
     return trainer->hands != NULL;
@@ -436,7 +471,7 @@ int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, T
         faults_add(faults, scene->path, 0, 0, "no memory for a session");
         return code;
     }
-    *trainer = (Trainer){.options = options, .scene = scene, .open = open, .figures = figures, .begun_s = clock_s(CLOCK_MONOTONIC)};
+    *trainer = (Trainer){.options = options, .scene = scene, .open = open, .figures = figures, .keyboard = {[1] = {.drives = DRIVES_PARTNER}}, .begun_s = clock_s(CLOCK_MONOTONIC)};
     snprintf(trainer->trainee, sizeof trainer->trainee, "%s", options->trainee);
     if (open_window(trainer, faults) && open_views(trainer, faults) && open_hands(trainer, faults) &&
         begin_session(trainer, options->resume, faults) && open_cine(trainer, faults)) {

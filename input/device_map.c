@@ -2,7 +2,6 @@
 
 #include "input/hand_port.h"
 #include "input/hid_report.h"
-#include "input/input.h"
 #include "input/text_file.h"
 #include "input/yaml_reader.h"
 
@@ -93,6 +92,42 @@ static void read_device(YamlValue value, DeviceMap *map)
         yaml_fault(value, "GLFW's gamepads and joysticks have no ids or usages here; joystick: \"part of its name\" picks one");
     if (out->kind == MAP_FTDI && yaml_has(&device, "usage"))
         yaml_fault(usage_value, "'%s' goes with HID devices", usage_value.name);
+}
+
+// --- which tool ---
+
+static void read_tool(YamlValue value, MapHand *hand)
+{
+    const char *text;
+    char *end;
+    if (!yaml_text(value, &text))
+        return;
+    yaml_place(value, &hand->line, &hand->column);
+    long number = strtol(text, &end, 10);
+    if (!*end && (number < 1 || number > TOOLS_MOST))
+        yaml_fault(value, "'%s' is %.20s; 1 to %d, outermost first, or a tool's name", value.name, text, TOOLS_MOST);
+    else if (strpbrk(text, "., \t") || strlen(text) >= sizeof hand->tool)
+        yaml_fault(value, "'%s' is '%.40s'; chosen, outer, inner, outermost, innermost, 1 to %d, a tool's name or its kind", value.name, text, TOOLS_MOST);
+    else
+        snprintf(hand->tool, sizeof hand->tool, "%s", text);
+    hand->drives = !strcmp(text, "outer") ? DRIVES_OUTER : !strcmp(text, "inner") ? DRIVES_INNER : DRIVES_CHOSEN;
+}
+
+// The map's hand that moves the tool, a new one where none does yet.
+static int hand_for(const YamlMap *control, DeviceMap *map, const MapHand *usual)
+{
+    MapHand hand = *usual;
+    if (yaml_has(control, "tool"))
+        read_tool(yaml_get(control, "tool", false), &hand);
+    for (int i = 0; i < map->hand_count; i++)
+        if (!strcmp(map->hand[i].tool, hand.tool))
+            return i;
+    if (map->hand_count == MAP_HANDS) {
+        yaml_fault(control->value, "'%s' would move a fifth tool; a device moves up to %d", control->value.name, MAP_HANDS);
+        return 0;
+    }
+    map->hand[map->hand_count] = hand;
+    return map->hand_count++;
 }
 
 // --- sources ---
@@ -186,12 +221,12 @@ static void check_kind(const YamlMap *control, const DeviceMap *map, const MapAx
         yaml_fault(control->value, "GLFW's axes are deflections: mm_s or deg_s");
 }
 
-static void read_axis(YamlValue value, DeviceMap *map, bool is_twist)
+static void read_axis(YamlValue value, DeviceMap *map, const MapHand *usual, bool is_twist)
 {
     static const char *const push_keys[] = {"source", "index", "mm_s", "mm_per_count", "kind", "logical_min", "logical_centre", "logical_max",
-                                            "counts_per_wrap", "dead_zone", "exponent", "invert", "optional", NULL};
+                                            "counts_per_wrap", "dead_zone", "exponent", "invert", "optional", "tool", NULL};
     static const char *const twist_keys[] = {"source", "index", "deg_s", "deg_per_count", "kind", "logical_min", "logical_centre", "logical_max",
-                                             "counts_per_wrap", "dead_zone", "exponent", "invert", "optional", NULL};
+                                             "counts_per_wrap", "dead_zone", "exponent", "invert", "optional", "tool", NULL};
     static const char *const kinds[] = {"deflection", "relative", "counter", NULL};
     YamlMap control = yaml_map(value, is_twist ? twist_keys : push_keys);
     if (!control.value.node)
@@ -202,7 +237,7 @@ static void read_axis(YamlValue value, DeviceMap *map, bool is_twist)
     }
     const char *rate = is_twist ? "deg_s" : "mm_s", *count = is_twist ? "deg_per_count" : "mm_per_count";
     MapAxis *axis = &map->axis[map->axis_count++];
-    *axis = (MapAxis){.is_twist = is_twist, .is_rate = yaml_has(&control, rate), .logical_min = NAN, .logical_centre = NAN, .logical_max = NAN,
+    *axis = (MapAxis){.is_twist = is_twist, .hand = hand_for(&control, map, usual), .is_rate = yaml_has(&control, rate), .logical_min = NAN, .logical_centre = NAN, .logical_max = NAN,
                       .counts_per_wrap = NAN, .dead_zone = 0.05, .exponent = 1};
     read_source(map, &control, &axis->source);
     if (axis->is_rate == yaml_has(&control, count))
@@ -244,7 +279,7 @@ static void read_button(YamlValue value, DeviceMap *map, unsigned bit)
 }
 
 // One control or a list of them; `bit` 0: an axis.
-static void read_controls(YamlValue value, DeviceMap *map, bool is_twist, unsigned bit)
+static void read_controls(YamlValue value, DeviceMap *map, const MapHand *usual, bool is_twist, unsigned bit)
 {
     int count = !value.node ? 0 : yaml_is_list(value) ? yaml_count(value, 1, MAP_BUTTONS) : 1;
     for (int i = 0; i < count; i++) {
@@ -252,7 +287,7 @@ static void read_controls(YamlValue value, DeviceMap *map, bool is_twist, unsign
         if (bit)
             read_button(item, map, bit);
         else
-            read_axis(item, map, is_twist);
+            read_axis(item, map, usual, is_twist);
     }
 }
 
@@ -313,7 +348,7 @@ static void read_serial(YamlValue value, DeviceMap *map)
 
 static void read_map(YamlReader *reader, DeviceMap *map)
 {
-    static const char *const keys[] = {"seldinger_device", "name", "device", "push", "twist", "pedal", "contrast", "stop", "mark", "force", "serial", NULL};
+    static const char *const keys[] = {"seldinger_device", "name", "device", "tool", "push", "twist", "pedal", "contrast", "stop", "mark", "force", "serial", NULL};
     static const struct ButtonKey {
         const char *key;
         unsigned bit;
@@ -322,6 +357,7 @@ static void read_map(YamlReader *reader, DeviceMap *map)
     if (!yaml_is_map(root))
         yaml_fault(root, "is no device map; it begins with 'seldinger_device: 1'");
     YamlMap top = yaml_map(root, keys);
+    MapHand usual = {.tool = "chosen", .drives = DRIVES_CHOSEN};
     int version;
     if (!top.value.node)
         return;
@@ -334,10 +370,14 @@ static void read_map(YamlReader *reader, DeviceMap *map)
     map->device = (MapDevice){.kind = MAP_HID, .vendor_id = -1, .product_id = -1};
     read_device(yaml_get(&top, "device", true), map);
     read_serial(yaml_get(&top, "serial", false), map);
-    read_controls(yaml_get(&top, "push", false), map, false, 0);
-    read_controls(yaml_get(&top, "twist", false), map, true, 0);
+    if (yaml_has(&top, "tool"))
+        read_tool(yaml_get(&top, "tool", false), &usual);
+    read_controls(yaml_get(&top, "push", false), map, &usual, false, 0);
+    read_controls(yaml_get(&top, "twist", false), map, &usual, true, 0);
+    if (map->hand_count == 0)
+        map->hand[map->hand_count++] = usual;
     for (size_t i = 0; i < sizeof buttons / sizeof *buttons; i++)
-        read_controls(yaml_get(&top, buttons[i].key, false), map, false, buttons[i].bit);
+        read_controls(yaml_get(&top, buttons[i].key, false), map, &usual, false, buttons[i].bit);
     read_force(yaml_get(&top, "force", false), map);
     if (!yaml_has(&top, "push") && !yaml_has(&top, "twist") && map->button_count == 0)
         yaml_fault(root, "has none of push, twist, pedal, contrast, stop, mark; a map gives the device something to do");

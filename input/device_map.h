@@ -4,6 +4,8 @@
 //   name: roller
 //   device: {vendor_id: 0x1209, product_id: 0x0001, serial: A1}   # any of these; or {usage: joystick}, {usage_page: 1, usage: 4},
 //                                                                 # {gamepad: true}, {joystick: "part of its name, or *"} (GLFW), {usb: ftdi, serial: A1}
+//   tool: innermost             # what it moves: chosen (default), outer or inner (of the pair around the chosen one), outermost, innermost, 1 to 4 as the
+//                               # keys have it, a tool's name or its kind. Any control of push and twist may have a tool of its own
 //   push:                       # one, or a list that is summed: > 0 into the patient
 //     source: Y                 # usage by name or 0x0001:0x0031; GLFW: left_y, axis_1, button_2; hat_x, hat_y; ftdi: a count's name
 //     index: 0                  # the second control of the same usage is 1
@@ -19,7 +21,7 @@
 //     optional: true            # a device without it is good too
 //   twist: {source: X, deg_s: 180}                                 # or deg_per_count; right-handed about the direction of advance
 //   pedal: {source: button_1}   # also contrast, stop, mark; an axis with `above: 0.5` (part of full deflection); one or a list
-//   force:                      # HID PID (input/force_feedback.h)
+//   force:                      # HID PID (input/force_feedback.h), of the tool that the first control of push or twist moves
 //     full_scale_n: 8           # what the device gives at its largest magnitude
 //     max_n: 4
 //     slew_n_s: 200
@@ -34,13 +36,20 @@
 #ifndef SELDINGER_INPUT_DEVICE_MAP_H
 #define SELDINGER_INPUT_DEVICE_MAP_H
 
-#include "geom/faults.h"
+#include "input/input.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
-enum { MAP_AXES = 12, MAP_BUTTONS = 16, MAP_NAME = 64 };
+enum { MAP_AXES = 12, MAP_BUTTONS = 16, MAP_NAME = 64, MAP_HANDS = TOOLS_MOST };
+
+// One of the tools that a device moves, each by a HandPort of its own.
+typedef struct MapHand {
+    char tool[TOOL_NAME_SIZE];       // as it is written
+    int drives;                      // HandDrives: of a name, a number or an end DRIVES_CHOSEN until device_map_find_tools
+    int line, column;                // where it stands, 0 where it does not
+} MapHand;
 
 typedef enum { MAP_HID, MAP_GAMEPAD, MAP_JOYSTICK, MAP_FTDI } MapDeviceKind;
 
@@ -66,6 +75,7 @@ typedef enum { AXIS_BY_DESCRIPTOR, AXIS_DEFLECTION, AXIS_RELATIVE, AXIS_COUNTER 
 
 typedef struct MapAxis {
     bool is_twist;                   // else push
+    int hand;                        // whose
     MapSource source;
     AxisKind kind;
     bool is_rate;                    // scale is mm_s or deg_s at full deflection; else mm or deg per count
@@ -101,6 +111,8 @@ typedef struct MapSerial {
 typedef struct DeviceMap {
     char name[MAP_NAME], file[256];
     MapDevice device;
+    int hand_count;                  // at least 1; buttons are the first one's, and so is the force
+    MapHand hand[MAP_HANDS];
     int axis_count, button_count;
     MapAxis axis[MAP_AXES];
     MapButton button[MAP_BUTTONS];
@@ -111,10 +123,15 @@ typedef struct DeviceMap {
 // NULL with faults (all of them, FILE:LINE:COL) where it is wrong. Free with free().
 DeviceMap *device_map_parse(const char *text, size_t length, const char *file, Faults *faults);
 DeviceMap *device_map_load(const char *path, Faults *faults);
+// Finds the tools that a map names in a scene. False with faults, as above, where it has none of that name or several of that kind.
+bool device_map_find_tools(DeviceMap *map, const ToolNames *tools, Faults *faults);
+// "roller.yaml and stick.yaml both move wire …" where several of these maps name one tool, found before; else false.
+bool device_maps_share(const DeviceMap *const *map, int count, const ToolNames *tools, int tool, char *text, size_t capacity);
 
-// The built-in maps: any GLFW gamepad, any GLFW joystick, HID joystick, HID gamepad, HID multi-axis controller. A haptic joystick's has force.
+// The built-in maps: any GLFW gamepad, for one tool and for a tool in each stick, any GLFW joystick, HID joystick, HID gamepad, HID multi-axis controller. A haptic joystick's has force.
 typedef enum {
     BUILT_IN_GAMEPAD,
+    BUILT_IN_GAMEPAD_PAIR,
     BUILT_IN_JOYSTICK,
     BUILT_IN_HID_JOYSTICK,
     BUILT_IN_HID_GAMEPAD,

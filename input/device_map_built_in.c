@@ -9,6 +9,12 @@
     "stop: {source: button_3, optional: true}\n" \
     "mark: {source: button_4, optional: true}\n"
 
+#define PAD_BUTTONS \
+    "pedal: [{source: right_trigger, above: 0}, {source: a}]\n" \
+    "contrast: {source: x}\n" \
+    "stop: {source: b}\n" \
+    "mark: {source: y}\n"
+
 static const char *const texts[BUILT_IN_COUNT] = {
     [BUILT_IN_GAMEPAD] = "seldinger_device: 1\n"
                          "name: gamepad\n"
@@ -21,10 +27,21 @@ static const char *const texts[BUILT_IN_COUNT] = {
                          "  - {source: right_x, deg_s: 240, dead_zone: 0.15, exponent: 2}\n"
                          "  - {source: dpad_right, deg_s: 20}\n"
                          "  - {source: dpad_left, deg_s: 20, invert: true}\n"
-                         "pedal: [{source: right_trigger, above: 0}, {source: a}]\n"
-                         "contrast: {source: x}\n"
-                         "stop: {source: b}\n"
-                         "mark: {source: y}\n",
+                         PAD_BUTTONS,
+    [BUILT_IN_GAMEPAD_PAIR] = "seldinger_device: 1\n"
+                              "name: gamepad, a tool in each stick\n"
+                              "device: {gamepad: true}\n"
+                              "push:\n"
+                              "  - {source: left_y, mm_s: 40, dead_zone: 0.15, exponent: 2, invert: true, tool: outer}\n"
+                              "  - {source: right_y, mm_s: 40, dead_zone: 0.15, exponent: 2, invert: true, tool: inner}\n"
+                              "  - {source: dpad_up, mm_s: 2}\n"
+                              "  - {source: dpad_down, mm_s: 2, invert: true}\n"
+                              "twist:\n"
+                              "  - {source: left_x, deg_s: 240, dead_zone: 0.15, exponent: 2, tool: outer}\n"
+                              "  - {source: right_x, deg_s: 240, dead_zone: 0.15, exponent: 2, tool: inner}\n"
+                              "  - {source: dpad_right, deg_s: 20}\n"
+                              "  - {source: dpad_left, deg_s: 20, invert: true}\n"
+                              PAD_BUTTONS,
     [BUILT_IN_JOYSTICK] = "seldinger_device: 1\n"
                           "name: joystick\n"
                           "device: {joystick: \"*\"}\n"

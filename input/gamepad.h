@@ -13,7 +13,7 @@ typedef struct Gamepad {
 const DeviceMap *gamepad_choose_map(const DeviceMap *const *map, int count, bool is_gamepad, const char *name);
 // False with faults where the map needs more than the device has.
 bool gamepad_bind(Gamepad *gamepad, const DeviceMap *map, int axis_count, int button_count, const char *name, Faults *faults);
-// Once a frame: axes -1 to 1 (GLFWgamepadstate.axes or glfwGetJoystickAxes), buttons 0 or 1. Port state becomes HAND_READY.
+// Once a frame: axes -1 to 1 (GLFWgamepadstate.axes or glfwGetJoystickAxes), buttons 0 or 1. `port`: MAP_HANDS of them; the first one's state becomes HAND_READY.
 void gamepad_update(Gamepad *gamepad, const float *axes, int axis_count, const unsigned char *buttons, int button_count, HandPort *port);
 // Unplugged: rates and buttons zero, HAND_LOST.
 void gamepad_lost(Gamepad *gamepad, HandPort *port);

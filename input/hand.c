@@ -133,6 +133,7 @@ static bool start_slot(HandSlot *slot, const HidDeviceInfo *device, const Device
     slot->identity = *device;
     slot->map = map;
     slot->is_used = true;
+    map_publish(map, &slot->state, slot->port);      // whose force it gives back is known before its first report
     atomic_store(&slot->has_ended, false);
     pthread_mutex_lock(&shared->lock);
     snprintf(slot->info.name, sizeof slot->info.name, "%s", name);
@@ -391,7 +392,7 @@ void hands_close(Hands *hands)
     free(hands);
 }
 
-HandPort *hands_port(Hands *hands, int index) { return index >= 0 && index < HANDS_MOST ? &hands->slot[index].port : NULL; }
+HandPort *hands_port(Hands *hands, int index) { return index >= 0 && index < HANDS_MOST ? hands->slot[index].port : NULL; }
 
 void hands_pause(Hands *hands, bool paused) { atomic_store(&hands->shared.paused, paused); }
 

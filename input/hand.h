@@ -1,7 +1,8 @@
-// All HID and USB hands of a session: finds the devices that a map (the user's, else a built-in one) fits, opens them, and drives one HandPort each.
+// All HID and USB hands of a session: finds the devices that a map (the user's, else a built-in one) fits, opens them, and writes their HandPorts, up to
+// MAP_HANDS each: one for each tool that the map moves.
 //
 // One thread looks for devices every half second; one thread a device reads its reports and writes its forces. Ports are there from the start to the end,
-// HAND_ABSENT until a device is found, so the 1 kHz thread samples all HANDS_MOST of them and never waits. An unplugged device's port turns
+// HAND_ABSENT until a device is found, so the 1 kHz thread samples all of them and never waits. An unplugged device's (first) port turns
 // HAND_LOST, its rates and buttons zero, its ways stay; when it comes back (same vendor, product, serial, interface) it has the same port and goes on.
 // GLFW's gamepads and joysticks are not here (input/gamepad.h): GLFW wants the window's thread.
 #ifndef SELDINGER_INPUT_HAND_H
@@ -34,7 +35,7 @@ Hands *hands_open(const HandsOptions *options, Faults *faults);
 // Force to zero, devices given back, threads ended (within about 0.3 s).
 void hands_close(Hands *hands);
 
-HandPort *hands_port(Hands *hands, int index);           // 0 to HANDS_MOST - 1, the same address for the whole session
+HandPort *hands_port(Hands *hands, int index);           // the first of a device's MAP_HANDS ports, 0 to HANDS_MOST - 1; the same address for the whole session
 // Force to zero while paused (rates and ways go on being read); any thread.
 void hands_pause(Hands *hands, bool paused);
 

@@ -1,5 +1,5 @@
-// Between one hand (keyboard, gamepad, HID or USB device) and the 1 kHz thread, without locks: single values that one side writes and the other
-// reads. A hand gives rates (a stick, a key), ways (an encoder's counts), or both; ways are totals since the port was opened, so that none is
+// Between one hand (half a keyboard, a stick, a HID or USB device) and the 1 kHz thread, without locks: single values that one side writes and the other
+// reads. A hand moves one tool. It gives rates (a stick, a key), ways (an encoder's counts), or both; ways are totals since the port was opened, so that none is
 // lost or taken twice however often either side looks. One writer for each direction; a port outlives both.
 #ifndef SELDINGER_INPUT_HAND_PORT_H
 #define SELDINGER_INPUT_HAND_PORT_H
@@ -11,8 +11,18 @@ typedef enum { HAND_ABSENT, HAND_READY, HAND_LOST } HandState;   // LOST: was th
 
 enum { HAND_PEDAL = 1, HAND_CONTRAST = 2, HAND_STOP = 4, HAND_MARK = 8 };   // bits of `buttons`: X-ray pedal, injection, stop the tool, set a bookmark
 
+// Which tool a hand moves. The pair: the chosen tool and its partner, the next one inside it; of the innermost the next one around it.
+typedef enum {
+    DRIVES_CHOSEN,
+    DRIVES_PARTNER,
+    DRIVES_OUTER,                    // of the pair …
+    DRIVES_INNER,
+    DRIVES_TOOL                      // plus an index, outermost first: that tool, whichever is chosen
+} HandDrives;
+
 typedef struct HandPort {
     // from the hand
+    _Atomic int drives;              // HandDrives
     _Atomic double push_mm_s;        // rate it asks for now, > 0 into the patient
     _Atomic double twist_deg_s;
     _Atomic double advanced_mm;      // way it has gone in all
@@ -21,7 +31,7 @@ typedef struct HandPort {
     _Atomic int state;               // HandState
     _Atomic int64_t reports;         // read so far
     // to the hand, after each step
-    _Atomic double force_n;          // the sheath's reaction at the driven node, > 0 where the tool pushes back against a push
+    _Atomic double force_n;          // the reaction of the tool that it moves, > 0 where the tool pushes back against a push; of locked tools their sum
     _Atomic double torque_n_mm;
     _Atomic int64_t step;            // grows while the simulation lives: a watchdog looks at it
 } HandPort;

@@ -31,7 +31,7 @@ void hand_say(HandShared *shared, const char *format, ...)
 
 static void update_info(HandSlot *slot, HandState state, double report_hz)
 {
-    atomic_store(&slot->port.state, state);
+    atomic_store(&slot->port->state, state);
     pthread_mutex_lock(&slot->shared->lock);
     slot->info.state = state;
     slot->info.reports = slot->state.reports;
@@ -54,7 +54,7 @@ static int drain(HandSlot *slot, int wait_ms)
         length = transport->read(transport->context, slot->device, bytes, (int)sizeof bytes, 0);
     }
     if (count > 0)
-        map_publish(slot->map, &slot->state, &slot->port);
+        map_publish(slot->map, &slot->state, slot->port);
     return length < 0 ? -1 : count;
 }
 
@@ -118,7 +118,7 @@ void *hand_run_hid(void *argument)
         report_us = count > 0 ? now : report_us;
         now = is_there ? wait_for_force(slot, now) : now;
         if (is_there)
-            force_tick(&slot->force, &slot->port, now, report_us, atomic_load(&shared->paused), &shared->transport, slot->device);
+            force_tick(&slot->force, slot->port, now, report_us, atomic_load(&shared->paused), &shared->transport, slot->device);
         tell_watchdog(slot, sent_before, played_before, now);
         if (now - counted_from >= COUNT_RATE_US) {
             hz = 1e6 * (double)(slot->state.reports - reports_then) / (double)(now - counted_from);
@@ -135,7 +135,7 @@ void *hand_run_hid(void *argument)
         }
     }
     map_release(slot->map, &slot->state);
-    map_publish(slot->map, &slot->state, &slot->port);
+    map_publish(slot->map, &slot->state, slot->port);
     if (is_there)
         force_stop(&slot->force, &shared->transport, slot->device);
     update_info(slot, HAND_LOST, 0);
@@ -168,7 +168,7 @@ void *hand_run_encoder(void *argument)
         int64_t now = hand_now_us();
         slot->state.bad_reports = bad_before + stream->bad_lines + stream->errors;
         if (slot->state.reports > lines)
-            map_publish(slot->map, &slot->state, &slot->port);
+            map_publish(slot->map, &slot->state, slot->port);
         if (!has_told_bad && stream->bad_lines > 3 && stream->lines == 0) {
             hand_say(shared, "%s sends no line of counts as its map says; look at serial: {baud, counts}", slot->info.name);
             has_told_bad = true;
@@ -184,7 +184,7 @@ void *hand_run_encoder(void *argument)
         }
     }
     map_release(slot->map, &slot->state);
-    map_publish(slot->map, &slot->state, &slot->port);
+    map_publish(slot->map, &slot->state, slot->port);
     update_info(slot, HAND_LOST, 0);
     usb_encoder_close(slot->encoder);
     slot->encoder = NULL;

@@ -23,7 +23,7 @@ typedef struct HandShared {
 
 typedef struct HandSlot {
     HandShared *shared;
-    HandPort port;
+    HandPort port[MAP_HANDS];
     bool is_used;                    // has had a device
     HidDeviceInfo identity;          // of a USB encoder: path, ids and serial
     const DeviceMap *map;

@@ -23,6 +23,7 @@ typedef struct ToolCommands {
 typedef struct ToolNames {   // of the scene that a script is for, outermost first; NULL after the last
     int count;
     const char *name[TOOLS_MOST + 1];
+    const char *kind[TOOLS_MOST];    // "wire", "microcatheter" …
 } ToolNames;
 
 typedef struct ScriptRow {

@@ -278,23 +278,26 @@ static double clamp(double value, double most) { return fmax(-most, fmin(most, v
 
 void map_publish(const DeviceMap *map, const MapState *state, HandPort *port)
 {
-    double rate[2] = {0, 0}, way[2] = {0, 0};
+    double rate[MAP_HANDS][2] = {{0}}, way[MAP_HANDS][2] = {{0}};
     unsigned buttons = 0;
     for (int i = 0; i < map->axis_count; i++) {
         const MapAxis *axis = &map->axis[i];
         double sign = axis->invert ? -1 : 1;
         if (axis->is_rate)
-            rate[axis->is_twist] += sign * axis->scale * map_shape(state->axis_state[i].deflection, axis->dead_zone, axis->exponent);
+            rate[axis->hand][axis->is_twist] += sign * axis->scale * map_shape(state->axis_state[i].deflection, axis->dead_zone, axis->exponent);
         else
-            way[axis->is_twist] += sign * axis->scale * (double)state->axis_state[i].counts;
+            way[axis->hand][axis->is_twist] += sign * axis->scale * (double)state->axis_state[i].counts;
     }
     for (int i = 0; i < map->button_count; i++)
         if (state->held[i] != map->button[i].invert && state->button[i].is_there)
             buttons |= map->button[i].bit;
-    atomic_store(&port->push_mm_s, clamp(rate[0], SCRIPT_FASTEST_MM_S));
-    atomic_store(&port->twist_deg_s, clamp(rate[1], SCRIPT_FASTEST_DEG_S));
-    atomic_store(&port->advanced_mm, way[0]);
-    atomic_store(&port->turned_deg, way[1]);
+    for (int h = 0; h < map->hand_count; h++) {
+        atomic_store(&port[h].drives, map->hand[h].drives);
+        atomic_store(&port[h].push_mm_s, clamp(rate[h][0], SCRIPT_FASTEST_MM_S));
+        atomic_store(&port[h].twist_deg_s, clamp(rate[h][1], SCRIPT_FASTEST_DEG_S));
+        atomic_store(&port[h].advanced_mm, way[h][0]);
+        atomic_store(&port[h].turned_deg, way[h][1]);
+    }
     atomic_store(&port->buttons, buttons);
     atomic_store(&port->reports, state->reports);
 }

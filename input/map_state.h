@@ -1,4 +1,4 @@
-// From a device's values to its HandPort, by a map. Pure functions, no device: what a report, a gamepad or a line of counts says is put in, the port
+// From a device's values to its HandPorts, by a map. Pure functions, no device: what a report, a gamepad or a line of counts says is put in, the port
 // gets rates and ways. Ways are whole counts times a scale, so none is lost or taken twice, however the reports are cut.
 #ifndef SELDINGER_INPUT_MAP_STATE_H
 #define SELDINGER_INPUT_MAP_STATE_H
@@ -50,7 +50,7 @@ void map_take_plain(const DeviceMap *map, const float *axes, int axis_count, con
 // Counts as an encoder sends them; `fresh[i]`: counts[i] was in this line.
 void map_take_counts(const DeviceMap *map, const int64_t *counts, const bool *fresh, int count, MapState *state);
 
-// Rates, ways, buttons and number of reports to the port.
+// Rates and ways to the map's ports, [hand_count] of them, with which tool each moves; buttons and the number of reports to the first.
 void map_publish(const DeviceMap *map, const MapState *state, HandPort *port);
 // The device is gone: rates and buttons zero, ways stay; a counter's next value is where it goes on from, no step.
 void map_release(const DeviceMap *map, MapState *state);

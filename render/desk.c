@@ -7,10 +7,10 @@ static const double field_step = 1.25;
 
 static float clamped(double value, double least, double most) { return (float)fmax(least, fmin(most, value)); }
 
-Desk desk_create(const VesselScene *scene, int count, const Vec3 *point)
+Desk desk_create(const VesselScene *scene, int tool_count, int count, const Vec3 *point)
 {
     Desk desk = {.xray = xray_default_control(), .push_mm_s = 10, .twist_deg_s = 120, .contrast_ml_s = 3, .view = VIEW_FLUOROSCOPY,
-                 .look = vessel_scene_default_look(scene), .patient = patient_axes_lps()};
+                 .look = vessel_scene_default_look(scene), .patient = patient_axes_lps(), .tool_count = tool_count};
     Vec3 low = vec3(0, 0, 0), high = low;
     for (int i = 0; i < count; i++)
         for (int k = 0; k < 3; k++) {
@@ -131,6 +131,18 @@ static void obey_views(Desk *desk, const PanelActions *actions, double seconds)
     free_camera_zoom(&look->camera, 8 * seconds * held(actions, ACTION_CAMERA_NEARER, ACTION_CAMERA_FARTHER), 50, 50, 100, 100);
 }
 
+// The last choice of a frame counts; what is pressed with it is done to that tool.
+static void obey_grip(Desk *desk, const PanelActions *actions)
+{
+    for (int k = 0; k < desk->tool_count; k++)
+        if (actions->pressed[ACTION_TOOL_1 + k])
+            hand_grip_choose(&desk->grip, desk->tool_count, k);
+    if (actions->pressed[ACTION_LOCK] & 1)
+        hand_grip_lock(&desk->grip, desk->tool_count);
+    if (actions->pressed[ACTION_LET_GO] & 1)
+        hand_grip_release(&desk->grip);
+}
+
 void desk_obey(Desk *desk, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout, double seconds)
 {
     // first: they hold all controls as they were shown, and keys count on top of that
@@ -138,17 +150,28 @@ void desk_obey(Desk *desk, const VesselScene *scene, const PanelActions *actions
         obey_sliders(&desk->xray, actions);
     obey_arm(&desk->xray, &desk->patient, actions, seconds);
     obey_xray(desk, actions);
+    obey_grip(desk, actions);
     obey_views(desk, actions, seconds);
     obey_mouse(desk, scene, actions, layout);
 }
 
-Command desk_command(const Desk *desk, const PanelActions *actions)
+static Command command_by(const Desk *desk, const PanelActions *actions, ActionId push, ActionId pull, ActionId left, ActionId right)
 {
     if (actions->held[ACTION_STOP])
         return (Command){0, 0};
     double speed = actions->held[ACTION_FAST] ? 3 : actions->held[ACTION_SLOW] ? 0.2 : 1;
-    return (Command){speed * desk->push_mm_s * held(actions, ACTION_PUSH, ACTION_PULL),
-                     speed * desk->twist_deg_s * held(actions, ACTION_TWIST_RIGHT, ACTION_TWIST_LEFT)};
+    return (Command){speed * desk->push_mm_s * held(actions, push, pull), speed * desk->twist_deg_s * held(actions, right, left)};
+}
+
+Command desk_command(const Desk *desk, const PanelActions *actions)
+{
+    return command_by(desk, actions, ACTION_PUSH, ACTION_PULL, ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT);
+}
+
+Command desk_partner_command(const Desk *desk, const PanelActions *actions)
+{
+    return desk->tool_count < 2 ? (Command){0, 0}
+                                : command_by(desk, actions, ACTION_OTHER_PUSH, ACTION_OTHER_PULL, ACTION_OTHER_TWIST_LEFT, ACTION_OTHER_TWIST_RIGHT);
 }
 
 XrayControl desk_xray(const Desk *desk, const PanelActions *actions, unsigned hand_buttons)

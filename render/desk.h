@@ -6,6 +6,7 @@
 #include "render/c_arm.h"
 #include "render/panel.h"
 #include "render/vessel_scene.h"
+#include "sim/hand_grip.h"
 
 typedef struct Desk {
     XrayControl xray;            // pedal and contrast as the desk's own; a hand's buttons are added by desk_xray
@@ -15,15 +16,18 @@ typedef struct Desk {
     VesselSceneLook look;        // of the 3D view
     double contrast_ml_s;        // while injected, default 3
     double push_mm_s, twist_deg_s;   // of the keys at ordinary speed, default 10 and 120
+    int tool_count;
+    HandGrip grip;               // the keys' choice: which tool, which are locked or let go
 } Desk;
 
 // Isocentre in the middle of `points` (what is to be seen), the field around them.
-Desk desk_create(const VesselScene *scene, int count, const Vec3 *point);
+Desk desk_create(const VesselScene *scene, int tool_count, int count, const Vec3 *point);
 
 // One frame of `seconds`: obeys what is held and pressed. `layout`: where the mouse's views are.
 void desk_obey(Desk *desk, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout, double seconds);
-// What the held keys ask of the tool: fast is 3 times, slow a fifth of the ordinary speed.
+// What the held keys ask of the chosen tool, and of its partner (0 where there is none): fast is 3 times, slow a fifth of the ordinary speed.
 Command desk_command(const Desk *desk, const PanelActions *actions);
+Command desk_partner_command(const Desk *desk, const PanelActions *actions);
 // The controls with what hands (HAND_ bits) and held keys add for now: pedal, contrast.
 XrayControl desk_xray(const Desk *desk, const PanelActions *actions, unsigned hand_buttons);
 

@@ -1,5 +1,6 @@
 // One row an action, in the order of ActionId. A trainee's left hand lies on A S D W, C, E and F (C-arm, contrast, X-ray), the right one on the
-// arrows (tool), as they lie on the table's controls and on the wire in the angio suite.
+// arrows (tool), as they lie on the table's controls and on the wire in the angio suite. With a second tool to move the left hand goes to U H J K, which lie as
+// the arrows do on every layout of Latin letters; what is set once in a while (table, blades) is a letter with Alt.
 #include "render/key_table.h"
 
 #include <stdio.h>
@@ -7,6 +8,7 @@
 
 #define K(letter) letter, 0, 0
 #define KEY(name) WINDOW_KEY_##name, 0, 0
+#define ALT_K(letter) letter, WINDOW_ALT, 0
 #define ALT(name) WINDOW_KEY_##name, WINDOW_ALT, 0
 #define F(number) WINDOW_KEY_F1 + (number) - 1, 0, 0
 
@@ -17,15 +19,25 @@ const KeyAction key_table[ACTION_COUNT] = {
     {ACTION_TWIST_RIGHT, GROUP_TOOL, ACTION_HOLD, KEY(RIGHT), "Twist right", "turn the tool right (clockwise, seen from behind) while held"},
     {ACTION_FAST, GROUP_TOOL, ACTION_HOLD, KEY(SHIFT), "Fast", "with push, pull or twist: faster"},
     {ACTION_SLOW, GROUP_TOOL, ACTION_HOLD, KEY(CTRL), "Slow", "with push, pull or twist: slower, for the last millimetres"},
-    {ACTION_STOP, GROUP_TOOL, ACTION_HOLD, KEY(SPACE), "Hold tool", "the tool stands still while held, whatever other hands ask for"},
+    {ACTION_STOP, GROUP_TOOL, ACTION_HOLD, KEY(SPACE), "Hold tool", "all tools stand still while held, whatever other hands ask for"},
+    {ACTION_OTHER_PUSH, GROUP_TOOL, ACTION_HOLD, K('U'), "Push other", "push the pair's other tool while held"},
+    {ACTION_OTHER_PULL, GROUP_TOOL, ACTION_HOLD, K('J'), "Pull other", "pull the pair's other tool back while held"},
+    {ACTION_OTHER_TWIST_LEFT, GROUP_TOOL, ACTION_HOLD, K('H'), "Other left", "turn the pair's other tool left while held"},
+    {ACTION_OTHER_TWIST_RIGHT, GROUP_TOOL, ACTION_HOLD, K('K'), "Other right", "turn the pair's other tool right while held"},
+    {ACTION_TOOL_1, GROUP_TOOL, ACTION_PRESS, K('1'), "Tool 1", "take the outermost tool; with the next one inside it, or around the last, it is the pair"},
+    {ACTION_TOOL_2, GROUP_TOOL, ACTION_PRESS, K('2'), "Tool 2", "take the second tool; the others are pinned"},
+    {ACTION_TOOL_3, GROUP_TOOL, ACTION_PRESS, K('3'), "Tool 3", "take the third tool"},
+    {ACTION_TOOL_4, GROUP_TOOL, ACTION_PRESS, K('4'), "Tool 4", "take the fourth tool"},
+    {ACTION_LOCK, GROUP_TOOL, ACTION_PRESS, K('L'), "Lock pair", "lock the pair together: both move as one; again: open"},
+    {ACTION_LET_GO, GROUP_TOOL, ACTION_PRESS, K('G'), "Let go", "let the tool go: only its valve holds it; again: take it"},
 
     {ACTION_PEDAL, GROUP_XRAY, ACTION_HOLD, K('F'), "X-ray pedal", "fluoroscopy while held; let go and the last image stays"},
     {ACTION_PEDAL_LATCH, GROUP_XRAY, ACTION_PRESS, K('E'), "X-ray stays on", "fluoroscopy on until pressed again: a pedal for one hand"},
     {ACTION_CONTRAST, GROUP_XRAY, ACTION_HOLD, K('C'), "Inject contrast", "inject contrast agent from the tip while held; X-ray must be on to see it"},
-    {ACTION_DSA, GROUP_XRAY, ACTION_PRESS, K('X'), "DSA", "subtract the mask: contrast and tool alone; again for the live image"},
+    {ACTION_DSA, GROUP_XRAY, ACTION_PRESS, K('T'), "DSA", "subtract the mask: contrast and tool alone; again for the live image"},
     {ACTION_ROADMAP, GROUP_XRAY, ACTION_PRESS, K('R'), "Roadmap", "vessels of the last injection over the live image; again: off"},
     {ACTION_MASK, GROUP_XRAY, ACTION_PRESS, K('M'), "Take mask", "new mask for DSA and roadmap, after C-arm or table have moved"},
-    {ACTION_PULSES, GROUP_XRAY, ACTION_PRESS, K('U'), "Pulse rate", "next pulse rate: 7.5, 10, 15, 30 a second"},
+    {ACTION_PULSES, GROUP_XRAY, ACTION_PRESS, K('I'), "Pulse rate", "next pulse rate: 7.5, 10, 15, 30 a second"},
     {ACTION_MAGNIFY, GROUP_XRAY, ACTION_PRESS, WINDOW_KEY_KEYPAD_ADD, 0, '+', "Magnify", "smaller field, larger picture"},
     {ACTION_DEMAGNIFY, GROUP_XRAY, ACTION_PRESS, WINDOW_KEY_KEYPAD_SUBTRACT, 0, '-', "Demagnify", "larger field, smaller picture"},
     {ACTION_CINE_RECORD, GROUP_XRAY, ACTION_PRESS, F(6), "Record cine", "record the X-ray images as a cine loop; again to stop"},
@@ -37,19 +49,19 @@ const KeyAction key_table[ACTION_COUNT] = {
     {ACTION_CRA, GROUP_C_ARM, ACTION_HOLD, K('W'), "CRA", "tilt the C-arm towards the head (cranial) while held"},
     {ACTION_CAU, GROUP_C_ARM, ACTION_HOLD, K('S'), "CAU", "tilt the C-arm towards the feet (caudal) while held"},
     {ACTION_AP, GROUP_C_ARM, ACTION_PRESS, K('0'), "AP 0/0", "C-arm straight from the front: both angles 0"},
-    {ACTION_TABLE_UP, GROUP_C_ARM, ACTION_HOLD, K('I'), "Table up", "move the table so that the picture goes up while held"},
-    {ACTION_TABLE_DOWN, GROUP_C_ARM, ACTION_HOLD, K('K'), "Table down", "move the table so that the picture goes down while held"},
-    {ACTION_TABLE_LEFT, GROUP_C_ARM, ACTION_HOLD, K('J'), "Table left", "move the table so that the picture goes left while held"},
-    {ACTION_TABLE_RIGHT, GROUP_C_ARM, ACTION_HOLD, K('L'), "Table right", "move the table so that the picture goes right while held"},
-    {ACTION_SIDES_CLOSE, GROUP_C_ARM, ACTION_HOLD, K('G'), "Sides in", "close the collimator's left and right blades while held"},
-    {ACTION_SIDES_OPEN, GROUP_C_ARM, ACTION_HOLD, K('H'), "Sides out", "open the collimator's left and right blades while held"},
-    {ACTION_ENDS_CLOSE, GROUP_C_ARM, ACTION_HOLD, K('T'), "Ends in", "close the collimator's upper and lower blades while held"},
-    {ACTION_ENDS_OPEN, GROUP_C_ARM, ACTION_HOLD, K('Y'), "Ends out", "open the collimator's upper and lower blades while held"},
+    {ACTION_TABLE_UP, GROUP_C_ARM, ACTION_HOLD, ALT_K('I'), "Table up", "move the table so that the picture goes up while held"},
+    {ACTION_TABLE_DOWN, GROUP_C_ARM, ACTION_HOLD, ALT_K('K'), "Table down", "move the table so that the picture goes down while held"},
+    {ACTION_TABLE_LEFT, GROUP_C_ARM, ACTION_HOLD, ALT_K('J'), "Table left", "move the table so that the picture goes left while held"},
+    {ACTION_TABLE_RIGHT, GROUP_C_ARM, ACTION_HOLD, ALT_K('L'), "Table right", "move the table so that the picture goes right while held"},
+    {ACTION_SIDES_CLOSE, GROUP_C_ARM, ACTION_HOLD, ALT_K('G'), "Sides in", "close the collimator's left and right blades while held"},
+    {ACTION_SIDES_OPEN, GROUP_C_ARM, ACTION_HOLD, ALT_K('H'), "Sides out", "open the collimator's left and right blades while held"},
+    {ACTION_ENDS_CLOSE, GROUP_C_ARM, ACTION_HOLD, ALT_K('T'), "Ends in", "close the collimator's upper and lower blades while held"},
+    {ACTION_ENDS_OPEN, GROUP_C_ARM, ACTION_HOLD, ALT_K('Y'), "Ends out", "open the collimator's upper and lower blades while held"},
 
-    {ACTION_VIEW_FLUOROSCOPY, GROUP_VIEW, ACTION_PRESS, K('1'), "X-ray view", "fluoroscopy as the main view"},
-    {ACTION_VIEW_3D, GROUP_VIEW, ACTION_PRESS, K('2'), "3D view", "the vessel in 3D as the main view"},
-    {ACTION_VIEW_ANGIOSCOPY, GROUP_VIEW, ACTION_PRESS, K('3'), "Angioscopy", "the view from the tool's tip as the main view"},
-    {ACTION_VIEW_ALL, GROUP_VIEW, ACTION_PRESS, K('4'), "All views", "all three views side by side"},
+    {ACTION_VIEW_FLUOROSCOPY, GROUP_VIEW, ACTION_PRESS, K('5'), "X-ray view", "fluoroscopy as the main view"},
+    {ACTION_VIEW_3D, GROUP_VIEW, ACTION_PRESS, K('6'), "3D view", "the vessel in 3D as the main view"},
+    {ACTION_VIEW_ANGIOSCOPY, GROUP_VIEW, ACTION_PRESS, K('7'), "Angioscopy", "the view from the tool's tip as the main view"},
+    {ACTION_VIEW_ALL, GROUP_VIEW, ACTION_PRESS, K('8'), "All views", "all three views side by side"},
     {ACTION_CAMERA_RESET, GROUP_VIEW, ACTION_PRESS, KEY(HOME), "Reset camera", "3D: the whole vessel from the front"},
     {ACTION_CAMERA_FOLLOW, GROUP_VIEW, ACTION_PRESS, K('V'), "Follow tip", "3D: the camera keeps to the tool's tip"},
     {ACTION_SECTION, GROUP_VIEW, ACTION_PRESS, K('N'), "Section", "3D: cut the vessel open by a plane"},

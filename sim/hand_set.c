@@ -3,11 +3,24 @@
 #include <math.h>
 #include <string.h>
 
-void hand_set_init(HandSet *set)
+void hand_set_init(HandSet *set, int tool_count)
 {
     memset(set, 0, sizeof *set);
+    set->tool_count = tool_count;
     set->fastest_mm_s = 200;
     set->fastest_deg_s = 1440;
+}
+
+static int tool_of(const HandSet *set, const HandPort *port)
+{
+    int drives = atomic_load_explicit(&port->drives, memory_order_relaxed), chosen = set->grip.chosen, partner = hand_grip_partner(&set->grip, set->tool_count);
+    switch (drives) {
+    case DRIVES_CHOSEN: return chosen;
+    case DRIVES_PARTNER: return partner;
+    case DRIVES_OUTER: return chosen < partner ? chosen : partner;
+    case DRIVES_INNER: return chosen > partner ? chosen : partner;
+    default: return drives - DRIVES_TOOL < set->tool_count ? drives - DRIVES_TOOL : set->tool_count - 1;
+    }
 }
 
 bool hand_set_add(HandSet *set, HandPort *port)
@@ -16,6 +29,7 @@ bool hand_set_add(HandSet *set, HandPort *port)
         return false;
     set->taken_mm[set->count] = atomic_load(&port->advanced_mm);
     set->taken_deg[set->count] = atomic_load(&port->turned_deg);
+    set->held[set->count] = tool_of(set, port);
     set->port[set->count++] = port;
     return true;
 }
@@ -35,26 +49,38 @@ static double take_way(double total, double *taken, double moved, double most)
     return sum;
 }
 
-Command hand_set_command(HandSet *set, double dt)
+ToolCommands hand_set_command(HandSet *set, double dt)
 {
-    double seconds = dt / 1000, most_mm = set->fastest_mm_s * seconds, most_deg = set->fastest_deg_s * seconds, moved_mm = 0, turned_deg = 0;
-    bool stopped = hand_set_buttons(set) & HAND_STOP;
+    double seconds = dt / 1000, most_mm = set->fastest_mm_s * seconds, most_deg = set->fastest_deg_s * seconds;
+    double moved_mm[TOOLS_MOST] = {0}, turned_deg[TOOLS_MOST] = {0};     // of the outermost of the tools that move together
+    const HandGrip *grip = &set->grip;
+    bool is_stopped = hand_set_buttons(set) & HAND_STOP;
     for (int i = 0; i < set->count; i++) {
         const HandPort *port = set->port[i];
-        moved_mm = limited(moved_mm + limited(atomic_load_explicit(&port->push_mm_s, memory_order_relaxed), set->fastest_mm_s) * seconds, most_mm);
-        turned_deg = limited(turned_deg + limited(atomic_load_explicit(&port->twist_deg_s, memory_order_relaxed), set->fastest_deg_s) * seconds, most_deg);
+        int lead = hand_grip_lead(grip, tool_of(set, port));
+        double mm_s = atomic_load_explicit(&port->push_mm_s, memory_order_relaxed), deg_s = atomic_load_explicit(&port->twist_deg_s, memory_order_relaxed);
+        moved_mm[lead] = limited(moved_mm[lead] + limited(mm_s, set->fastest_mm_s) * seconds, most_mm);
+        turned_deg[lead] = limited(turned_deg[lead] + limited(deg_s, set->fastest_deg_s) * seconds, most_deg);
     }
     for (int i = 0; i < set->count; i++) {
         double mm = atomic_load_explicit(&set->port[i]->advanced_mm, memory_order_relaxed);
         double deg = atomic_load_explicit(&set->port[i]->turned_deg, memory_order_relaxed);
-        if (stopped) {
+        int tool = tool_of(set, set->port[i]), lead = hand_grip_lead(grip, tool);
+        if (is_stopped || (grip->released >> tool & 1) || tool != set->held[i]) {
             set->taken_mm[i] = mm;
             set->taken_deg[i] = deg;
         }
-        moved_mm = take_way(mm, &set->taken_mm[i], moved_mm, most_mm);
-        turned_deg = take_way(deg, &set->taken_deg[i], turned_deg, most_deg);
+        set->held[i] = tool;
+        moved_mm[lead] = take_way(mm, &set->taken_mm[i], moved_mm[lead], most_mm);
+        turned_deg[lead] = take_way(deg, &set->taken_deg[i], turned_deg[lead], most_deg);
     }
-    return stopped ? (Command){0, 0} : (Command){moved_mm / seconds, turned_deg / seconds};
+    ToolCommands commands = {.released = grip->released & ((1u << set->tool_count) - 1)};
+    for (int k = 0; k < set->tool_count && !is_stopped; k++) {
+        int lead = hand_grip_lead(grip, k);
+        if (!(commands.released >> k & 1))
+            commands.tool[k] = (Command){moved_mm[lead] / seconds, turned_deg[lead] / seconds};
+    }
+    return commands;
 }
 
 unsigned hand_set_buttons(const HandSet *set)
@@ -69,8 +95,9 @@ void hand_set_answer(HandSet *set, const StepReport *report, int64_t step)
 {
     for (int i = 0; i < set->count; i++) {
         HandPort *port = set->port[i];
-        atomic_store_explicit(&port->force_n, report->proximal_force, memory_order_relaxed);
-        atomic_store_explicit(&port->torque_n_mm, report->proximal_torque, memory_order_relaxed);
+        int tool = tool_of(set, port);
+        atomic_store_explicit(&port->force_n, hand_grip_sum(&set->grip, set->tool_count, tool, report->push), memory_order_relaxed);
+        atomic_store_explicit(&port->torque_n_mm, hand_grip_sum(&set->grip, set->tool_count, tool, report->torque), memory_order_relaxed);
         atomic_store_explicit(&port->step, step, memory_order_release);
     }
 }

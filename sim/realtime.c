@@ -15,8 +15,9 @@ struct Realtime {
     RealtimeOptions options;
     HandSet hands;
     // operator to thread
-    TripleBuffer xray_buffer;
+    TripleBuffer xray_buffer, grip_buffer;
     XrayControl xray[3];
+    HandGrip grip[3];
     _Atomic int paused, ending;
     // thread to window
     TripleBuffer moment_buffer;
@@ -40,7 +41,9 @@ static ToolCommands ask_hands(void *context)
     Realtime *realtime = context;
     if (triple_buffer_fetch(&realtime->xray_buffer))
         realtime->now = realtime->xray[realtime->xray_buffer.reading];
-    return (ToolCommands){.tool = {hand_set_command(&realtime->hands, simulator_scene(realtime->options.simulator)->dt)}};
+    if (triple_buffer_fetch(&realtime->grip_buffer))
+        realtime->hands.grip = realtime->grip[realtime->grip_buffer.reading];
+    return hand_set_command(&realtime->hands, simulator_scene(realtime->options.simulator)->dt);
 }
 
 static void renew_figures(Realtime *realtime)
@@ -152,10 +155,12 @@ Realtime *realtime_start(const RealtimeOptions *options, Faults *faults)
         realtime->options = *options;
         realtime->now = options->xray;
         realtime->pose_every = (int64_t)fmax(1, floor(options->pose_ms / scene->dt + 0.5));
-        hand_set_init(&realtime->hands);
+        hand_set_init(&realtime->hands, scene->tool_count);
+        realtime->hands.grip = options->grip;
         for (int i = 0; i < options->hand_count; i++)
             good &= hand_set_add(&realtime->hands, options->hand[i]);
         triple_buffer_init(&realtime->xray_buffer);
+        triple_buffer_init(&realtime->grip_buffer);
         triple_buffer_init(&realtime->moment_buffer);
         atomic_store(&realtime->paused, options->paused);
         good = good && pthread_create(&realtime->thread, NULL, run_session, realtime) == 0;
@@ -172,6 +177,12 @@ void realtime_set_xray(Realtime *realtime, const XrayControl *xray)
 {
     realtime->xray[realtime->xray_buffer.writing] = *xray;
     triple_buffer_publish(&realtime->xray_buffer);
+}
+
+void realtime_set_grip(Realtime *realtime, const HandGrip *grip)
+{
+    realtime->grip[realtime->grip_buffer.writing] = *grip;
+    triple_buffer_publish(&realtime->grip_buffer);
 }
 
 void realtime_pause(Realtime *realtime, bool paused) { atomic_store(&realtime->paused, paused); }

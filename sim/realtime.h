@@ -1,5 +1,5 @@
 // The 1 kHz thread: owns a simulator, takes commands from hands and controls from the operator, steps at the simulated clock's speed, and lets
-// moments out for whoever draws. No locks: hands write ports (input/hand_port.h), the operator's controls and the moments go through triple
+// moments out for whoever draws. No locks: hands write ports (input/hand_port.h), the operator's controls and grip and the moments go through triple
 // buffers. What it is given (simulator, recording) belongs to it from start to stop.
 //
 // A step that diverges ends the session: the state is the last good one, the moment says so. Nothing resets by itself.
@@ -18,7 +18,8 @@ typedef struct RealtimeOptions {
     Recording *recording;            // NULL: none
     int hand_count;                  // at most HANDS_SAMPLED
     HandPort *const *hand;           // (hand_count) borrowed, each with one writer
-    XrayControl xray;                // before the operator sets any
+    HandGrip grip;                   // before the operator sets any: default the first tool chosen, none locked or let go
+    XrayControl xray;                // the same
     double pose_ms;                  // simulated time between moments, default 10
     bool paused;                     // at the start
     // On the thread, after each step; must not wait. May be NULL.
@@ -52,6 +53,7 @@ typedef struct Moment {
 Realtime *realtime_start(const RealtimeOptions *options, Faults *faults);
 // The calls from here on are of one thread, the window's.
 void realtime_set_xray(Realtime *realtime, const XrayControl *xray);
+void realtime_set_grip(Realtime *realtime, const HandGrip *grip);
 void realtime_pause(Realtime *realtime, bool paused);
 // The newest moment; stays as it is until the next call. NULL before the first.
 const Moment *realtime_moment(Realtime *realtime);

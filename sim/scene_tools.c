@@ -371,6 +371,6 @@ ToolNames scene_tool_names(const Scene *scene)
 {
     ToolNames names = {.count = scene->tool_count};
     for (int k = 0; k < scene->tool_count; k++)
-        names.name[k] = scene->tool[k].name;
+        names.name[k] = scene->tool[k].name, names.kind[k] = tool_kind_name[scene->tool[k].kind];
     return names;
 }

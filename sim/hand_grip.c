@@ -1,0 +1,53 @@
+#include "sim/hand_grip.h"
+
+int hand_grip_partner(const HandGrip *grip, int tool_count)
+{
+    return grip->chosen + 1 < tool_count ? grip->chosen + 1 : grip->chosen > 0 ? grip->chosen - 1 : 0;
+}
+
+void hand_grip_choose(HandGrip *grip, int tool_count, int tool)
+{
+    if (tool >= 0 && tool < tool_count)
+        grip->chosen = tool;
+}
+
+static int inner_of_pair(const HandGrip *grip, int tool_count)
+{
+    int partner = hand_grip_partner(grip, tool_count);
+    return partner > grip->chosen ? partner : grip->chosen;
+}
+
+void hand_grip_lock(HandGrip *grip, int tool_count)
+{
+    int inner = inner_of_pair(grip, tool_count);
+    if (inner == 0)
+        return;
+    grip->locked ^= 1u << inner;
+    if (grip->locked >> inner & 1)
+        grip->released &= ~(3u << (inner - 1));
+}
+
+bool hand_grip_pair_is_locked(const HandGrip *grip, int tool_count) { return grip->locked >> inner_of_pair(grip, tool_count) & 1; }
+
+void hand_grip_release(HandGrip *grip)
+{
+    grip->released ^= 1u << grip->chosen;
+    if (grip->released >> grip->chosen & 1)
+        grip->locked &= ~(3u << grip->chosen);   // to the tool around it, and to the one inside
+}
+
+int hand_grip_lead(const HandGrip *grip, int tool)
+{
+    while (tool > 0 && grip->locked >> tool & 1)
+        tool--;
+    return tool;
+}
+
+double hand_grip_sum(const HandGrip *grip, int tool_count, int tool, const double *value)
+{
+    double sum = 0;
+    for (int k = 0; k < tool_count; k++)
+        if (hand_grip_lead(grip, k) == hand_grip_lead(grip, tool))
+            sum += value[k];
+    return sum;
+}

@@ -1,0 +1,30 @@
+// How the hands hold coaxial tools: one is chosen, others are pinned; neighbours may be locked together, any may be let go. The operator's, who changes it
+// between frames; hands obey it from the next step on.
+#ifndef SELDINGER_SIM_HAND_GRIP_H
+#define SELDINGER_SIM_HAND_GRIP_H
+
+#include "input/input.h"
+
+#include <stdbool.h>
+
+// A lock is two hands that move as one: letting a tool go opens its locks, and locking takes both tools in hand. So no tool is locked and let go.
+typedef struct HandGrip {
+    int chosen;              // moved by hands that name no tool
+    unsigned locked;         // bit k: tool k moves as tool k - 1 does
+    unsigned released;       // bit k: no hand holds tool k (input/input.h)
+} HandGrip;
+
+// The next tool inside the chosen one; of the innermost the next around it; of one tool itself. With the chosen one it is the pair.
+int hand_grip_partner(const HandGrip *grip, int tool_count);
+void hand_grip_choose(HandGrip *grip, int tool_count, int tool);       // nothing where there is no such tool
+// Locks the pair, or opens its lock. Nothing where there is one tool.
+void hand_grip_lock(HandGrip *grip, int tool_count);
+bool hand_grip_pair_is_locked(const HandGrip *grip, int tool_count);
+// Lets the chosen tool go, or takes it again.
+void hand_grip_release(HandGrip *grip);
+// The outermost of the tools that move as `tool` does.
+int hand_grip_lead(const HandGrip *grip, int tool);
+// Of `value` [tool_count] the sum over the tools that move as `tool` does: what a hand on it feels.
+double hand_grip_sum(const HandGrip *grip, int tool_count, int tool, const double *value);
+
+#endif
