@@ -338,6 +338,7 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
     trainer_panel_show(&trainer->shown, trainer->scene, pose, &lesson->score, &moment->figures, xray);
     PanelState *state = &trainer->shown.state;
     trainer_panel_views(&trainer->shown, &trainer->desk, trainer->views, xray);
+    trainer_panel_grip(&trainer->shown, &trainer->desk.grip);
     state->now_s = since_begin(trainer);
     state->is_recording_cine = cine_is_recording(trainer->cine.cine);
     state->cine_frames = cine_count(trainer->cine.cine);

@@ -181,6 +181,7 @@ void trainer_panel_views(TrainerPanel *panel, const Desk *desk, Views *views, co
     PanelState *state = &panel->state;
     FluoroscopeState fluoroscope = fluoroscope_state(views_fluoroscope(views));
     label_scene(panel, desk, views_scene(views));
+    state->chosen_tool = desk->grip.chosen;
     state->view = desk->view;
     state->is_following = desk->look.follow_tip;
     state->has_section = desk->look.section;
@@ -195,4 +196,24 @@ void trainer_panel_views(TrainerPanel *panel, const Desk *desk, Views *views, co
         state->warning = panel->warning;
     }
     state->is_roadmap_ready = xray->mode == XRAY_DSA ? fluoroscope.has_mask : fluoroscope.has_roadmap;
+}
+
+void trainer_panel_grip(TrainerPanel *panel, const HandGrip *grip)
+{
+    PanelState *state = &panel->state;
+    double force[PANEL_TOOLS];
+    for (int k = 0; k < state->tool_count; k++)
+        force[k] = state->tool[k].force_n;
+    for (int k = 0; k < state->tool_count; k++) {
+        int first = hand_grip_lead(grip, k), last = k;
+        while (last + 1 < state->tool_count && hand_grip_lead(grip, last + 1) == first)
+            last++;
+        if (last == first || state->tool[k].note)
+            continue;
+        snprintf(panel->tool_note[k], sizeof panel->tool_note[k], "locked %d%s%d: %.0f mN", first + 1, last > first + 1 ? "-" : "+", last + 1,
+                 1000 * hand_grip_sum(grip, state->tool_count, k, force));
+        state->tool[k].note = panel->tool_note[k];
+    }
+    state->is_pair_locked = hand_grip_pair_is_locked(grip, state->tool_count);
+    state->is_let_go = grip->released >> grip->chosen & 1;
 }

@@ -18,7 +18,7 @@ typedef struct TrainerPanel {
     PanelDevice device[PANEL_DEVICES];
     PanelLabel label[PANEL_LABELS];
     char label_text[PANEL_LABELS][96];
-    char tool[PANEL_TOOLS][128], target[96], warning[200];
+    char tool[PANEL_TOOLS][128], tool_note[PANEL_TOOLS][64], target[96], warning[200];
     char instructions[4200];
 } TrainerPanel;
 
@@ -29,5 +29,7 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
                         const RealtimeFigures *figures, const XrayControl *xray);
 // What the desk and the views are set to; after they were drawn.
 void trainer_panel_views(TrainerPanel *panel, const Desk *desk, Views *views, const XrayControl *xray);
+// How the hands hold the tools now, in a session; after trainer_panel_show.
+void trainer_panel_grip(TrainerPanel *panel, const HandGrip *grip);
 
 #endif

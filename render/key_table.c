@@ -20,15 +20,15 @@ const KeyAction key_table[ACTION_COUNT] = {
     {ACTION_FAST, GROUP_TOOL, ACTION_HOLD, KEY(SHIFT), "Fast", "with push, pull or twist: faster"},
     {ACTION_SLOW, GROUP_TOOL, ACTION_HOLD, KEY(CTRL), "Slow", "with push, pull or twist: slower, for the last millimetres"},
     {ACTION_STOP, GROUP_TOOL, ACTION_HOLD, KEY(SPACE), "Hold tool", "all tools stand still while held, whatever other hands ask for"},
-    {ACTION_OTHER_PUSH, GROUP_TOOL, ACTION_HOLD, K('U'), "Push other", "push the pair's other tool while held"},
-    {ACTION_OTHER_PULL, GROUP_TOOL, ACTION_HOLD, K('J'), "Pull other", "pull the pair's other tool back while held"},
+    {ACTION_OTHER_PUSH, GROUP_TOOL, ACTION_HOLD, K('U'), "Push other", "push the next tool inside, of the innermost the one around it, while held"},
+    {ACTION_OTHER_PULL, GROUP_TOOL, ACTION_HOLD, K('J'), "Pull other", "pull that tool, the other of the pair, back while held"},
     {ACTION_OTHER_TWIST_LEFT, GROUP_TOOL, ACTION_HOLD, K('H'), "Other left", "turn the pair's other tool left while held"},
     {ACTION_OTHER_TWIST_RIGHT, GROUP_TOOL, ACTION_HOLD, K('K'), "Other right", "turn the pair's other tool right while held"},
-    {ACTION_TOOL_1, GROUP_TOOL, ACTION_PRESS, K('1'), "Tool 1", "take the outermost tool; with the next one inside it, or around the last, it is the pair"},
-    {ACTION_TOOL_2, GROUP_TOOL, ACTION_PRESS, K('2'), "Tool 2", "take the second tool; the others are pinned"},
+    {ACTION_TOOL_1, GROUP_TOOL, ACTION_PRESS, K('1'), "Tool 1", "take the outermost tool: it is moved, the others are pinned"},
+    {ACTION_TOOL_2, GROUP_TOOL, ACTION_PRESS, K('2'), "Tool 2", "take the second tool, from the outermost inwards"},
     {ACTION_TOOL_3, GROUP_TOOL, ACTION_PRESS, K('3'), "Tool 3", "take the third tool"},
     {ACTION_TOOL_4, GROUP_TOOL, ACTION_PRESS, K('4'), "Tool 4", "take the fourth tool"},
-    {ACTION_LOCK, GROUP_TOOL, ACTION_PRESS, K('L'), "Lock pair", "lock the pair together: both move as one; again: open"},
+    {ACTION_LOCK, GROUP_TOOL, ACTION_PRESS, K('L'), "Lock pair", "lock the pair (tool and next inside, or around the last): they move as one"},
     {ACTION_LET_GO, GROUP_TOOL, ACTION_PRESS, K('G'), "Let go", "let the tool go: only its valve holds it; again: take it"},
 
     {ACTION_PEDAL, GROUP_XRAY, ACTION_HOLD, K('F'), "X-ray pedal", "fluoroscopy while held; let go and the last image stays"},
@@ -123,6 +123,45 @@ const char *key_table_text(ActionId id, char *text, size_t capacity)
     else
         snprintf(text, capacity, "%s%s", alt, key);
     return text;
+}
+
+// Keys of one kind share a line.
+static const struct {
+    ActionId first, last;
+    const char *help;
+} shared_line[] = {
+    {ACTION_PUSH, ACTION_PULL, "push the tool into the patient, pull it back, while held"},
+    {ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT, "turn the tool left, right (clockwise, seen from behind) while held"},
+    {ACTION_FAST, ACTION_SLOW, "with push, pull or twist: faster; slower, for the last millimetres"},
+    {ACTION_OTHER_PUSH, ACTION_OTHER_TWIST_RIGHT, "push, pull, turn left, right the pair's other tool while held"},
+    {ACTION_TOOL_1, ACTION_TOOL_4, "choose the tool to move, outermost first; the others are pinned"},
+    {ACTION_MAGNIFY, ACTION_DEMAGNIFY, "larger picture of a smaller field; smaller of a larger one"},
+    {ACTION_RAO, ACTION_LAO, "C-arm to the patient's right (RAO), left (LAO) while held"},
+    {ACTION_CRA, ACTION_CAU, "tilt the C-arm towards the head (CRA), the feet (CAU) while held"},
+    {ACTION_TABLE_UP, ACTION_TABLE_RIGHT, "move the picture up, down, left, right (the table) while held"},
+    {ACTION_SIDES_CLOSE, ACTION_SIDES_OPEN, "close, open the collimator's left and right blades while held"},
+    {ACTION_ENDS_CLOSE, ACTION_ENDS_OPEN, "close, open the collimator's upper and lower blades while held"},
+    {ACTION_SECTION_NEARER, ACTION_SECTION_FARTHER, "3D: move the section plane towards you, away, while held"},
+    {ACTION_ORBIT_UP, ACTION_ORBIT_DOWN, "3D: turn the camera up, down while held; or drag in the view"},
+    {ACTION_ORBIT_LEFT, ACTION_ORBIT_RIGHT, "3D: turn the camera left, right while held; or drag in the view"},
+};
+
+int key_table_line(ActionId first, char *keys, size_t capacity, const char **help)
+{
+    int last = (int)first;
+    *help = key_table[first].help;
+    for (size_t i = 0; i < sizeof shared_line / sizeof shared_line[0]; i++)
+        if (shared_line[i].first == first)
+            last = (int)shared_line[i].last, *help = shared_line[i].help;
+    size_t used = 0;
+    for (int id = (int)first; id <= last && used < capacity; id++) {
+        char text[32];
+        const char *key = key_table_text((ActionId)id, text, sizeof text);
+        if (id > (int)first && key_table[id].modifiers & WINDOW_ALT)
+            key += strlen("Alt+");       // said by the first one
+        used += (size_t)snprintf(keys + used, capacity - used, "%s%s", id > (int)first ? " " : "", key);
+    }
+    return last - (int)first + 1;
 }
 
 void key_state_begin(KeyState *state) { memset(state->pressed, 0, sizeof state->pressed); }

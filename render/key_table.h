@@ -49,6 +49,8 @@ extern const char *const action_group_name[ACTION_GROUPS];
 
 // "Alt+Up", "F1 or ?", as shown to the user; returns text.
 const char *key_table_text(ActionId id, char *text, size_t capacity);
+// A line of the list of keys, from this action on: "Alt+Up Down" and what they do. Returns how many actions it tells of, 1 or more.
+int key_table_line(ActionId first, char *keys, size_t capacity, const char **help);
 
 // Which actions are on. Start from zeros.
 typedef struct KeyState {

@@ -87,6 +87,7 @@ typedef struct PanelState {
     // tools
     int tool_count, chosen_tool;   // outermost first; the one that is shown in full
     PanelTool tool[PANEL_TOOLS];
+    bool is_pair_locked, is_let_go;  // the chosen tool and its partner; the chosen one
     double wall_max_n, wall_sum_n; // of all
     // X-ray
     XrayControl xray;

@@ -63,20 +63,22 @@ static void help_group(Panel *panel, ActionGroup group, GuiFont font, float key_
 {
     Gui *gui = panel->gui;
     panel_heading(panel, action_group_name[group]);
-    for (int i = 0; i < ACTION_COUNT; i++) {
+    for (int i = 0, covered = 1; i < ACTION_COUNT; i += covered) {
+        char keys[64];
+        const char *help;
+        covered = key_table_line((ActionId)i, keys, sizeof keys, &help);
         if (key_table[i].group != group)
             continue;
-        char key[32];
         GuiRect at = gui_place(gui, 0, gui_line_height(gui, font));
-        gui_draw_text(gui, at.x, at.y, font, gui_colors.accent, key_table_text((ActionId)i, key, sizeof key));
-        gui_draw_text(gui, at.x + key_width, at.y, font, gui_colors.text, key_table[i].help);
+        gui_draw_text(gui, at.x, at.y, font, gui_colors.accent, keys);
+        gui_draw_text(gui, at.x + key_width, at.y, font, gui_colors.text, help);
     }
 }
 
 void panel_draw_help(Panel *panel, const WindowInput *input, const PanelState *state)
 {
     Gui *gui = panel->gui;
-    float s = gui_scale(gui), margin = floorf(12 * s), key_width = floorf(90 * s), head = floorf(38 * s);
+    float s = gui_scale(gui), margin = floorf(12 * s), key_width = floorf(112 * s), head = floorf(38 * s);
     GuiRect at = {margin, margin, (float)input->width - 2 * margin, (float)input->height - 2 * margin};
     veil(panel, input);
     gui_window_begin(gui, "help", (GuiRect){at.x, at.y, at.width, head}, GUI_ON_TOP);
@@ -86,12 +88,20 @@ void panel_draw_help(Panel *panel, const WindowInput *input, const PanelState *s
     gui_beside(gui, margin);
     panel_action_button(panel, state, ACTION_HELP, "help", floorf(120 * s));
     gui_window_end(gui);
-    // larger letters where the longer column has room for them
+    // larger letters where the longer column and the widest line have room for them
     float half = floorf(at.width / 2);
     int lines = 0;
-    for (int i = 0; i < ACTION_COUNT; i++)
+    float widest = 0;
+    for (int i = 0; i < ACTION_COUNT;) {
+        char keys[64];
+        const char *help;
+        float width, height;
         lines += key_table[i].group < GROUP_VIEW;
-    bool has_room = (float)(lines + GROUP_VIEW + 1) * (gui_line_height(gui, GUI_NORMAL) + 4 * s) < at.height - head;
+        i += key_table_line((ActionId)i, keys, sizeof keys, &help);
+        gui_text_extent(gui, GUI_NORMAL, help, &width, &height);
+        widest = fmaxf(widest, width);
+    }
+    bool has_room = (float)(lines + GROUP_VIEW + 1) * (gui_line_height(gui, GUI_NORMAL) + 4 * s) < at.height - head && key_width + widest + 3 * margin < half;
     GuiFont font = has_room ? GUI_NORMAL : GUI_SMALL;
     for (int i = 0; i < 2; i++) {
         GuiRect part = {at.x + (i ? half : 0), at.y + head, i ? at.width - half : half, at.height - head};

@@ -11,35 +11,39 @@ static const float pulse_rate[] = {7.5f, 10, 15, 30};
 enum { TAB_TOOL, TAB_XRAY, TAB_C_ARM, TAB_VIEWS, TAB_SESSION };
 static const char *const tab_name[PANEL_TABS] = {"Tool", "X-ray", "C-arm", "Views", "Session"};
 const ButtonRow panel_button_row[] = {
-    {TAB_TOOL, 1, {ACTION_PUSH}},
-    {TAB_TOOL, 2, {ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT}},
-    {TAB_TOOL, 1, {ACTION_PULL}},
-    {TAB_TOOL, 2, {ACTION_FAST, ACTION_SLOW}},
-    {TAB_TOOL, 1, {ACTION_STOP}},
-    {TAB_TOOL, 2, {ACTION_PEDAL_LATCH, ACTION_CONTRAST}},
-    {TAB_XRAY, 2, {ACTION_PEDAL, ACTION_PEDAL_LATCH}},
-    {TAB_XRAY, 1, {ACTION_CONTRAST}},
-    {TAB_XRAY, 3, {ACTION_DSA, ACTION_ROADMAP, ACTION_MASK}},
-    {TAB_XRAY, 3, {ACTION_CINE_RECORD, ACTION_CINE_REPLAY, ACTION_CINE_SAVE}},
-    {TAB_XRAY, 3, {ACTION_MAGNIFY, ACTION_DEMAGNIFY, ACTION_PULSES}},
-    {TAB_C_ARM, 5, {ACTION_RAO, ACTION_LAO, ACTION_CRA, ACTION_CAU, ACTION_AP}},
-    {TAB_C_ARM, 2, {ACTION_TABLE_LEFT, ACTION_TABLE_RIGHT}},
-    {TAB_C_ARM, 2, {ACTION_TABLE_UP, ACTION_TABLE_DOWN}},
-    {TAB_C_ARM, 4, {ACTION_SIDES_CLOSE, ACTION_SIDES_OPEN, ACTION_ENDS_CLOSE, ACTION_ENDS_OPEN}},
-    {TAB_VIEWS, 2, {ACTION_VIEW_FLUOROSCOPY, ACTION_VIEW_3D}},
-    {TAB_VIEWS, 2, {ACTION_VIEW_ANGIOSCOPY, ACTION_VIEW_ALL}},
-    {TAB_VIEWS, 2, {ACTION_CAMERA_RESET, ACTION_CAMERA_FOLLOW}},
-    {TAB_VIEWS, 2, {ACTION_MODEL, ACTION_ARROWS}},
-    {TAB_VIEWS, 3, {ACTION_SECTION, ACTION_SECTION_NEARER, ACTION_SECTION_FARTHER}},
-    {TAB_VIEWS, 2, {ACTION_ORBIT_LEFT, ACTION_ORBIT_RIGHT}},
-    {TAB_VIEWS, 2, {ACTION_ORBIT_UP, ACTION_ORBIT_DOWN}},
-    {TAB_VIEWS, 2, {ACTION_CAMERA_NEARER, ACTION_CAMERA_FARTHER}},
-    {TAB_SESSION, 2, {ACTION_PAUSE, ACTION_RESTART}},
-    {TAB_SESSION, 2, {ACTION_BOOKMARK, ACTION_SAVE}},
-    {TAB_SESSION, 2, {ACTION_TRAINEE, ACTION_SCREENSHOT}},
-    {TAB_SESSION, 2, {ACTION_FULL_SCREEN, ACTION_PANELS}},
-    {TAB_SESSION, 2, {ACTION_HELP, ACTION_BRIEFING}},
-    {TAB_SESSION, 2, {ACTION_HINTS, ACTION_QUIT}},
+    {TAB_TOOL, 1, {ACTION_PUSH}, false},
+    {TAB_TOOL, 2, {ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT}, false},
+    {TAB_TOOL, 1, {ACTION_PULL}, false},
+    {TAB_TOOL, 2, {ACTION_FAST, ACTION_SLOW}, false},
+    {TAB_TOOL, 2, {ACTION_STOP, ACTION_LET_GO}, false},
+    {TAB_TOOL, 4, {ACTION_TOOL_1, ACTION_TOOL_2, ACTION_TOOL_3, ACTION_TOOL_4}, true},
+    {TAB_TOOL, 1, {ACTION_LOCK}, true},
+    {TAB_TOOL, 2, {ACTION_OTHER_PUSH, ACTION_OTHER_PULL}, true},
+    {TAB_TOOL, 2, {ACTION_OTHER_TWIST_LEFT, ACTION_OTHER_TWIST_RIGHT}, true},
+    {TAB_TOOL, 2, {ACTION_PEDAL_LATCH, ACTION_CONTRAST}, false},
+    {TAB_XRAY, 2, {ACTION_PEDAL, ACTION_PEDAL_LATCH}, false},
+    {TAB_XRAY, 1, {ACTION_CONTRAST}, false},
+    {TAB_XRAY, 3, {ACTION_DSA, ACTION_ROADMAP, ACTION_MASK}, false},
+    {TAB_XRAY, 3, {ACTION_CINE_RECORD, ACTION_CINE_REPLAY, ACTION_CINE_SAVE}, false},
+    {TAB_XRAY, 3, {ACTION_MAGNIFY, ACTION_DEMAGNIFY, ACTION_PULSES}, false},
+    {TAB_C_ARM, 5, {ACTION_RAO, ACTION_LAO, ACTION_CRA, ACTION_CAU, ACTION_AP}, false},
+    {TAB_C_ARM, 2, {ACTION_TABLE_LEFT, ACTION_TABLE_RIGHT}, false},
+    {TAB_C_ARM, 2, {ACTION_TABLE_UP, ACTION_TABLE_DOWN}, false},
+    {TAB_C_ARM, 4, {ACTION_SIDES_CLOSE, ACTION_SIDES_OPEN, ACTION_ENDS_CLOSE, ACTION_ENDS_OPEN}, false},
+    {TAB_VIEWS, 2, {ACTION_VIEW_FLUOROSCOPY, ACTION_VIEW_3D}, false},
+    {TAB_VIEWS, 2, {ACTION_VIEW_ANGIOSCOPY, ACTION_VIEW_ALL}, false},
+    {TAB_VIEWS, 2, {ACTION_CAMERA_RESET, ACTION_CAMERA_FOLLOW}, false},
+    {TAB_VIEWS, 2, {ACTION_MODEL, ACTION_ARROWS}, false},
+    {TAB_VIEWS, 3, {ACTION_SECTION, ACTION_SECTION_NEARER, ACTION_SECTION_FARTHER}, false},
+    {TAB_VIEWS, 2, {ACTION_ORBIT_LEFT, ACTION_ORBIT_RIGHT}, false},
+    {TAB_VIEWS, 2, {ACTION_ORBIT_UP, ACTION_ORBIT_DOWN}, false},
+    {TAB_VIEWS, 2, {ACTION_CAMERA_NEARER, ACTION_CAMERA_FARTHER}, false},
+    {TAB_SESSION, 2, {ACTION_PAUSE, ACTION_RESTART}, false},
+    {TAB_SESSION, 2, {ACTION_BOOKMARK, ACTION_SAVE}, false},
+    {TAB_SESSION, 2, {ACTION_TRAINEE, ACTION_SCREENSHOT}, false},
+    {TAB_SESSION, 2, {ACTION_FULL_SCREEN, ACTION_PANELS}, false},
+    {TAB_SESSION, 2, {ACTION_HELP, ACTION_BRIEFING}, false},
+    {TAB_SESSION, 2, {ACTION_HINTS, ACTION_QUIT}, false},
 };
 const int panel_button_row_count = sizeof panel_button_row / sizeof panel_button_row[0];
 
@@ -61,6 +65,12 @@ static bool is_on(const Panel *panel, const PanelState *state, ActionId id)
     case ACTION_SECTION: return state->has_section;
     case ACTION_MODEL: return state->has_model;
     case ACTION_ARROWS: return state->has_arrows;
+    case ACTION_TOOL_1:
+    case ACTION_TOOL_2:
+    case ACTION_TOOL_3:
+    case ACTION_TOOL_4: return state->chosen_tool == (int)(id - ACTION_TOOL_1);
+    case ACTION_LOCK: return state->is_pair_locked;
+    case ACTION_LET_GO: return state->is_let_go;
     case ACTION_PAUSE: return state->is_paused;
     case ACTION_HINTS: return panel->has_hints;
     case ACTION_PANELS: return panel->has_panels;
@@ -92,9 +102,14 @@ void panel_action_button(Panel *panel, const PanelState *state, ActionId id, con
 
 static void button_row(Panel *panel, const PanelState *state, const ButtonRow *buttons)
 {
+    int count = buttons->count;
+    if (buttons->is_of_several && state->tool_count < 2)
+        return;
+    while (buttons->action[count - 1] > ACTION_TOOL_1 && buttons->action[count - 1] <= ACTION_TOOL_4 && (int)(buttons->action[count - 1] - ACTION_TOOL_1) >= state->tool_count)
+        count--;
     float gap = floorf(3 * gui_scale(panel->gui)), all = gui_width(panel->gui);
-    float width = floorf((all - gap * (float)(buttons->count - 1)) / (float)buttons->count);
-    for (int i = 0; i < buttons->count; i++) {
+    float width = floorf((all - gap * (float)(count - 1)) / (float)count);
+    for (int i = 0; i < count; i++) {
         if (i > 0)
             gui_beside(panel->gui, gap);
         panel_action_button(panel, state, buttons->action[i], "tab", width);

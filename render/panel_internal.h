@@ -55,6 +55,7 @@ struct Panel {
 typedef struct ButtonRow {
     int tab, count;
     ActionId action[BUTTONS_IN_ROW];
+    bool is_of_several;            // not shown with one tool
 } ButtonRow;
 extern const ButtonRow panel_button_row[];
 extern const int panel_button_row_count;

@@ -36,6 +36,29 @@ static void every_action_has_one_row_a_key_and_help(void **unused)
     }
 }
 
+// The list of keys: every action in one line, with its key, and few enough lines for 1024x600.
+static void the_list_of_keys_tells_of_every_action(void **unused)
+{
+    (void)unused;
+    int lines[2] = {0};
+    for (int i = 0, covered = 1; i < ACTION_COUNT; i += covered) {
+        char keys[64], key[32];
+        const char *help;
+        covered = key_table_line((ActionId)i, keys, sizeof keys, &help);
+        assert_true(covered >= 1 && i + covered <= ACTION_COUNT);
+        assert_in_range(strlen(help), 8, 75);
+        assert_in_range(strlen(keys), 1, 16);
+        for (int j = i; j < i + covered; j++) {
+            assert_int_equal(key_table[j].group, key_table[i].group);
+            assert_int_equal(key_table[j].modifiers, key_table[i].modifiers);
+            const char *text = key_table_text((ActionId)j, key, sizeof key);
+            assert_non_null(strstr(keys, j > i && key_table[j].modifiers ? text + strlen("Alt+") : text));
+        }
+        lines[key_table[i].group >= GROUP_VIEW]++;
+    }
+    assert_true(lines[0] + 3 <= 34 && lines[1] + 2 <= 34);
+}
+
 // Signs that are typed must not also be printable keys of the table: one press would do two things.
 static void a_typed_sign_is_no_key_of_another_action(void **unused)
 {
@@ -219,7 +242,7 @@ static void random_events_end_released(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_action_has_one_row_a_key_and_help), cmocka_unit_test(a_typed_sign_is_no_key_of_another_action),
+        cmocka_unit_test(every_action_has_one_row_a_key_and_help), cmocka_unit_test(the_list_of_keys_tells_of_every_action), cmocka_unit_test(a_typed_sign_is_no_key_of_another_action),
         cmocka_unit_test(each_key_does_its_own_action_only),       cmocka_unit_test(two_keys_are_held_together),
         cmocka_unit_test(an_orbit_never_becomes_a_push),           cmocka_unit_test(loss_of_focus_lets_go_of_everything),
         cmocka_unit_test(a_text_field_takes_letters_but_not_releases), cmocka_unit_test(a_sign_is_typed_wherever_it_lies),

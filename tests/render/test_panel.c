@@ -291,6 +291,7 @@ static void every_action_has_a_button_that_works(void **unused)
     float s = (float)desk.panel->layout.scale;
     bool seen[ACTION_COUNT] = {false};
     int dialogues = 0, helps = 0, hidden = 0, xray_sets = 0;
+    desk.state.tool_count = PANEL_TOOLS;
     for (int tab = 0; tab < 5; tab++) {
         bool ignored[ACTION_COUNT] = {false};
         click(&desk, right.x + 10 * s + (float)(tab + 0.35) * 45 * s, right.y + 16 * s, ignored);
