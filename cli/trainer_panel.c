@@ -127,7 +127,7 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
         const PoseTool *from = &pose->tool[k];
         PanelTool *tool = &state->tool[k];
         tool->inserted_mm = from->inserted_mm;
-        tool->turned_deg = k == 0 ? pose->turned_deg : NAN;      // the steps report the first tool's alone
+        tool->turned_deg = from->turned_deg;
         tool->push_mm_s = from->command.push_mm_s;
         tool->twist_deg_s = from->command.twist_deg_s;
         tool->force_n = from->push_n;
@@ -201,18 +201,19 @@ void trainer_panel_views(TrainerPanel *panel, const Desk *desk, Views *views, co
 void trainer_panel_grip(TrainerPanel *panel, const HandGrip *grip)
 {
     PanelState *state = &panel->state;
-    double force[PANEL_TOOLS];
+    double force[PANEL_TOOLS], torque[PANEL_TOOLS];
     for (int k = 0; k < state->tool_count; k++)
-        force[k] = state->tool[k].force_n;
+        force[k] = state->tool[k].force_n, torque[k] = state->tool[k].torque_n_mm;
     for (int k = 0; k < state->tool_count; k++) {
         int first = hand_grip_lead(grip, k), last = k;
         while (last + 1 < state->tool_count && hand_grip_lead(grip, last + 1) == first)
             last++;
         if (last == first || state->tool[k].note)
             continue;
-        snprintf(panel->tool_note[k], sizeof panel->tool_note[k], "locked %d%s%d: %.0f mN", first + 1, last > first + 1 ? "-" : "+", last + 1,
-                 1000 * hand_grip_sum(grip, state->tool_count, k, force));
+        snprintf(panel->tool_note[k], sizeof panel->tool_note[k], "locked %d%s%d", first + 1, last > first + 1 ? " to " : " and ", last + 1);
         state->tool[k].note = panel->tool_note[k];
+        state->tool[k].force_n = hand_grip_sum(grip, state->tool_count, k, force);
+        state->tool[k].torque_n_mm = hand_grip_sum(grip, state->tool_count, k, torque);
     }
     state->is_pair_locked = hand_grip_pair_is_locked(grip, state->tool_count);
     state->is_let_go = grip->released >> grip->chosen & 1;

@@ -30,6 +30,7 @@ struct Gui {
     ImFont *font[GUI_FONTS];
     float scale;
     bool has_backend, is_silent;
+    bool scrolls_to_end;             // the window that was begun last
     bool released[WINDOW_KEYS];
     KeptWindow kept[KEPT_WINDOWS];
     int kept_count;
@@ -380,12 +381,14 @@ extern "C" void gui_window_begin(Gui *gui, const char *id, GuiRect at, unsigned 
         keep_window(gui, at, flags);
     if (flags & GUI_ON_TOP)
         ImGui::BringWindowToDisplayFront(ImGui::GetCurrentWindow());
-    if ((flags & GUI_SCROLL_TO_END) && ImGui::GetScrollY() >= ImGui::GetScrollMaxY())
-        ImGui::SetScrollHereY(1);
+    gui->scrolls_to_end = flags & GUI_SCROLL_TO_END;
 }
 
-extern "C" float gui_window_end(Gui *)
+extern "C" float gui_window_end(Gui *gui)
 {
+    // after the contents, so that "here" is their end; not where the user has scrolled up
+    if (gui->scrolls_to_end && ImGui::GetScrollY() >= ImGui::GetScrollMaxY())
+        ImGui::SetScrollHereY(1);
     const ImGuiWindow *window = ImGui::GetCurrentWindow();
     float bottom = window->DC.CursorMaxPos.y + window->Scroll.y + ImGui::GetStyle().WindowPadding.y;
     float over = bottom - (window->Pos.y + window->Size.y);

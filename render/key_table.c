@@ -28,7 +28,7 @@ const KeyAction key_table[ACTION_COUNT] = {
     {ACTION_TOOL_2, GROUP_TOOL, ACTION_PRESS, K('2'), "Tool 2", "take the second tool, from the outermost inwards"},
     {ACTION_TOOL_3, GROUP_TOOL, ACTION_PRESS, K('3'), "Tool 3", "take the third tool"},
     {ACTION_TOOL_4, GROUP_TOOL, ACTION_PRESS, K('4'), "Tool 4", "take the fourth tool"},
-    {ACTION_LOCK, GROUP_TOOL, ACTION_PRESS, K('L'), "Lock pair", "lock the pair (tool and next inside, or around the last): they move as one"},
+    {ACTION_LOCK, GROUP_TOOL, ACTION_PRESS, K('L'), "Lock", "lock the pair (tool and next inside, or around the last): they move as one"},
     {ACTION_LET_GO, GROUP_TOOL, ACTION_PRESS, K('G'), "Let go", "let the tool go: only its valve holds it; again: take it"},
 
     {ACTION_PEDAL, GROUP_XRAY, ACTION_HOLD, K('F'), "X-ray pedal", "fluoroscopy while held; let go and the last image stays"},

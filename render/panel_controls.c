@@ -16,8 +16,7 @@ const ButtonRow panel_button_row[] = {
     {TAB_TOOL, 1, {ACTION_PULL}, false},
     {TAB_TOOL, 2, {ACTION_FAST, ACTION_SLOW}, false},
     {TAB_TOOL, 2, {ACTION_STOP, ACTION_LET_GO}, false},
-    {TAB_TOOL, 4, {ACTION_TOOL_1, ACTION_TOOL_2, ACTION_TOOL_3, ACTION_TOOL_4}, true},
-    {TAB_TOOL, 1, {ACTION_LOCK}, true},
+    {TAB_TOOL, 5, {ACTION_TOOL_1, ACTION_TOOL_2, ACTION_TOOL_3, ACTION_TOOL_4, ACTION_LOCK}, true},
     {TAB_TOOL, 2, {ACTION_OTHER_PUSH, ACTION_OTHER_PULL}, true},
     {TAB_TOOL, 2, {ACTION_OTHER_TWIST_LEFT, ACTION_OTHER_TWIST_RIGHT}, true},
     {TAB_TOOL, 2, {ACTION_PEDAL_LATCH, ACTION_CONTRAST}, false},
@@ -102,17 +101,21 @@ void panel_action_button(Panel *panel, const PanelState *state, ActionId id, con
 
 static void button_row(Panel *panel, const PanelState *state, const ButtonRow *buttons)
 {
-    int count = buttons->count;
+    int count = 0;
+    ActionId action[BUTTONS_IN_ROW];
     if (buttons->is_of_several && state->tool_count < 2)
         return;
-    while (buttons->action[count - 1] > ACTION_TOOL_1 && buttons->action[count - 1] <= ACTION_TOOL_4 && (int)(buttons->action[count - 1] - ACTION_TOOL_1) >= state->tool_count)
-        count--;
+    for (int i = 0; i < buttons->count; i++) {
+        int tool = (int)buttons->action[i] - ACTION_TOOL_1;
+        if (tool < state->tool_count || tool >= PANEL_TOOLS)
+            action[count++] = buttons->action[i];
+    }
     float gap = floorf(3 * gui_scale(panel->gui)), all = gui_width(panel->gui);
     float width = floorf((all - gap * (float)(count - 1)) / (float)count);
     for (int i = 0; i < count; i++) {
         if (i > 0)
             gui_beside(panel->gui, gap);
-        panel_action_button(panel, state, buttons->action[i], "tab", width);
+        panel_action_button(panel, state, action[i], "tab", width);
     }
 }
 

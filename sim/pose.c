@@ -104,6 +104,7 @@ void pose_take(Pose *pose, Simulator *simulator, const ToolCommands *commands, c
         PoseTool *tool = &pose->tool[k];
         tool->command = commands->tool[k];
         tool->inserted_mm = stepper_tool_inserted(stepper, k);
+        tool->turned_deg = stepper_tool_turned(stepper, k) * 180 / PI;
         tool->is_let_go = commands->released >> k & 1;
         tool->push_n = pose->report.push[k];
         tool->torque_n_mm = pose->report.torque[k];
@@ -205,7 +206,7 @@ void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64
     RecordedFrame at = recorded_run_frame(run, frame);
     pose_figures_from_run(pose, run, row);
     pose->inserted_mm = run->inserted[row];
-    pose->turned_deg = run->turned[row];
+    pose->turned_deg = run->tool[0].turned[row];
     pose->node_count = at.node_count;
     memcpy(pose->position, at.position, (size_t)at.node_count * sizeof *pose->position);
     memcpy(pose->quaternion, at.quaternion, (size_t)at.node_count * sizeof *pose->quaternion);
@@ -216,6 +217,7 @@ void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64
     }
     for (int k = 0; k < pose->tool_count; k++) {
         pose->tool[k].inserted_mm = run->tool[k].inserted[row];
+        pose->tool[k].turned_deg = run->tool[k].turned[row];
         if (pose->tool_count > 1)
             own_nodes_from_run(&pose->tool[k], &run->tool[k], frame);
     }

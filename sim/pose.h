@@ -9,6 +9,7 @@
 typedef struct PoseTool {
     Command command;         // of the last step
     double inserted_mm;      // beyond the mouth
+    double turned_deg;       // by its hand, since the start
     double push_n, torque_n_mm;      // that its hand feels
     bool is_let_go;          // no hand holds it
     int node_count;          // does not change during a run

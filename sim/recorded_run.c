@@ -369,11 +369,16 @@ static ContactKind contact_of(char *name)
 
 static bool sum_turns(RecordedRun *run)
 {
-    double turned = 0;
-    run->turned = malloc(((size_t)run->step_count + 1) * sizeof *run->turned);
-    for (int64_t i = 0; run->turned && i < run->step_count; i++)
-        run->turned[i] = turned += run->command[2 * i + 1] * run->step_ms / 1000;
-    return run->turned != NULL;
+    bool good = true;
+    for (int k = 0; k < run->tool_count; k++) {
+        RecordedTool *tool = &run->tool[k];
+        double turned = 0;
+        tool->turned = malloc(((size_t)run->step_count + 1) * sizeof *tool->turned);
+        for (int64_t i = 0; tool->turned && i < run->step_count; i++)
+            tool->turned[i] = turned += tool->command[2 * i + 1] * run->step_ms / 1000;
+        good &= tool->turned != NULL;
+    }
+    return good;
 }
 
 static RecordedRun *load(const char *path, bool with_frames, Faults *faults)
@@ -433,6 +438,7 @@ void recorded_run_free(RecordedRun *run)
         free(tool->proximal);
         free(tool->inserted);
         free(tool->released);
+        free(tool->turned);
         free(tool->position);
         free(tool->quaternion);
         free(tool->carrier);
@@ -449,7 +455,6 @@ void recorded_run_free(RecordedRun *run)
     free(run->force);
     free(run->gap);
     free(run->vessel_node);
-    free(run->turned);
     free(run->xray);
     free(run->flags);
     free(run->wall_force);

@@ -56,6 +56,7 @@ typedef struct RecordedTool {
     double *proximal;        // (S, 2)
     double *inserted;        // (S) [mm]
     uint8_t *released;       // (S)
+    double *turned;          // (S) [deg] since the start, the sum of the commands
     // of several tools only
     int node_count;          // N
     Vec3 *position;          // (K, N)
@@ -83,7 +84,6 @@ typedef struct RecordedRun {
     int32_t *vessel_node;    // (K, M)
     double *inserted;        // (S) [mm]
     XrayControl *xray;       // (S); NULL in recordings from before there was one
-    double *turned;          // (S) [deg] since the start, the sum of the commands
     uint32_t *flags;         // (S) STEP_ flags
     double *wall_force;      // (S, 2) [N] largest and sum
     double *s, *radius;      // (M) [mm], of several tools (K, M)

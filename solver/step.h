@@ -138,6 +138,7 @@ int stepper_node_capacity(const Stepper *stepper);       // M at most
 int stepper_tool_count(const Stepper *stepper);
 int stepper_tool_nodes(const Stepper *stepper, int tool, ToolNode *node);   // their number; node may be NULL
 double stepper_tool_inserted(const Stepper *stepper, int tool);             // [mm]
+double stepper_tool_turned(const Stepper *stepper, int tool);               // [rad] by its hand, since the start
 double stepper_tool_length(const Stepper *stepper, int tool);               // [mm]
 // A material point of a tool, wherever it lies, on the chords of the chain's elements; for use in every step.
 typedef struct ToolPlace {

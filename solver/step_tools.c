@@ -586,6 +586,8 @@ int stepper_tool_count(const Stepper *s) { return s->tool_count; }
 
 double stepper_tool_inserted(const Stepper *s, int tool) { return s->tool_count > 1 && tool > 0 ? s->tool[tool].inserted : s->state.inserted; }
 
+double stepper_tool_turned(const Stepper *s, int tool) { return s->tool_count > 1 && tool > 0 ? s->tool[tool].twist : s->state.twist; }
+
 int stepper_tool_nodes(const Stepper *s, int k, ToolNode *node)
 {
     const WireState *w = &s->state;
