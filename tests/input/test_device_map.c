@@ -106,6 +106,114 @@ static void what_does_not_fit_together_is_said(void **state)
     expect_fault(TOP "device: {usb: ftdi}\npedal: {source: A}\n", "no buttons");
     expect_fault(TOP "device: {vendor_id: 046d}\npush: {source: X, mm_s: 2}\n", "0x");
     expect_fault(HID "push: {source: X, mm_s: 2}\npush: {source: Y, mm_s: 2}\n", "second time");
+    expect_fault(HID "tool: 0\npush: {source: X, mm_s: 2}\n", "1 to 4");
+    expect_fault(HID "tool: 5\npush: {source: X, mm_s: 2}\n", "1 to 4");
+    expect_fault(HID "tool: -1\npush: {source: X, mm_s: 2}\n", "1 to 4");
+    expect_fault(HID "tool: the wire\npush: {source: X, mm_s: 2}\n", "innermost");
+    expect_fault(HID "tool: 1.5\npush: {source: X, mm_s: 2}\n", "innermost");
+    expect_fault(HID "tool: a_name_that_is_far_too_long_for_any_tool\npush: {source: X, mm_s: 2}\n", "innermost");
+    expect_fault(HID "tool: [wire]\npush: {source: X, mm_s: 2}\n", "tool");
+    expect_fault(HID "pedal: {source: button_1, tool: wire}\n", "tool");
+    expect_fault(HID "push: [{source: X, mm_s: 2, tool: 1}, {source: Y, mm_s: 2, tool: 2}, {source: Z, mm_s: 2, tool: 3}, {source: Rx, mm_s: 2, tool: 4},"
+                     " {source: Ry, mm_s: 2, tool: wire}]\n", "fifth tool");
+}
+
+static const ToolNames three = {.count = 3, .name = {"guide", "micro", "thread"}, .kind = {"catheter", "catheter", "wire"}};
+
+// Which tool each way of naming one comes to.
+static void tools_are_found_in_the_scene(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *tool;
+        int drives;
+    } good[] = {{"chosen", DRIVES_CHOSEN},      {"outer", DRIVES_OUTER},           {"inner", DRIVES_INNER},  {"outermost", DRIVES_TOOL}, {"innermost", DRIVES_TOOL + 2},
+                {"1", DRIVES_TOOL},             {"3", DRIVES_TOOL + 2},            {"guide", DRIVES_TOOL},   {"micro", DRIVES_TOOL + 1}, {"thread", DRIVES_TOOL + 2},
+                {"wire", DRIVES_TOOL + 2}};
+    char text[300];
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
+        snprintf(text, sizeof text, HID "tool: %s\npush: {source: X, mm_s: 2}\n", good[i].tool);
+        DeviceMap *map = must_parse(text);
+        faults_clear(&faults);
+        assert_true(device_map_find_tools(map, &three, &faults));
+        assert_true(map->hand_count == 1 && map->hand[0].drives == good[i].drives);
+        free(map);
+    }
+    static const struct {
+        const char *tool, *said;
+    } bad[] = {{"4", "has not; guide, micro, thread, outermost"}, {"microcatheter", "has not"}, {"catheter", "2 of that kind; say which: guide, micro, thread"}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        snprintf(text, sizeof text, HID "twist: {source: X, deg_s: 2, tool: %s}\n", bad[i].tool);
+        DeviceMap *map = must_parse(text);
+        faults_clear(&faults);
+        assert_false(device_map_find_tools(map, &three, &faults));
+        assert_int_equal(faults.count, 1);
+        if (!strstr(faults.text[0], bad[i].said) || strncmp(faults.text[0], "m.yaml:3:", 9))
+            fail_msg("said: %s", faults.text[0]);
+        free(map);
+    }
+    // of one tool the ends are that one, and so are outer and inner
+    const ToolNames one = {.count = 1, .name = {"wire"}, .kind = {"wire"}};
+    DeviceMap *map = must_parse(HID "tool: innermost\npush: {source: X, mm_s: 2}\n");
+    faults_clear(&faults);
+    assert_true(device_map_find_tools(map, &one, &faults) && map->hand[0].drives == DRIVES_TOOL);
+    free(map);
+}
+
+// One device, several tools: each has its own rates and ways; the buttons are the first one's.
+static void a_device_moves_several_tools(void **state)
+{
+    (void)state;
+    DeviceMap *map = must_parse(TOP "device: {usb: ftdi}\ntool: micro\npush: [{source: A, mm_per_count: 0.5}, {source: R, mm_per_count: 0.1, tool: 3}]\n"
+                                    "twist: {source: R, deg_per_count: 2, tool: micro}\n");
+    HandPort port[MAP_HANDS] = {0};
+    MapState device;
+    faults_clear(&faults);
+    assert_true(device_map_find_tools(map, &three, &faults));
+    assert_int_equal(map->hand_count, 2);
+    assert_true(map_bind_plain(map, 2, 0, "encoder", &device, &faults));
+    map_take_counts(map, (const int64_t[]){0, 0}, (const bool[]){true, true}, 2, &device);
+    map_take_counts(map, (const int64_t[]){6, -10}, (const bool[]){true, true}, 2, &device);
+    map_publish(map, &device, port);
+    assert_true(port[0].drives == DRIVES_TOOL + 1 && near(port[0].advanced_mm, 3) && near(port[0].turned_deg, -20));
+    assert_true(port[1].drives == DRIVES_TOOL + 2 && near(port[1].advanced_mm, -1) && port[1].turned_deg == 0);
+    assert_true(port[2].drives == DRIVES_CHOSEN && port[2].advanced_mm == 0);
+
+    // two maps that name one tool are told of, one that names it twice is not
+    char text[400] = "";
+    DeviceMap *other = must_parse(HID "tool: innermost\npush: {source: X, mm_s: 2}\ntwist: {source: Y, deg_s: 2, tool: thread}\n");
+    assert_true(device_map_find_tools(other, &three, &faults));
+    const DeviceMap *maps[] = {other, map}, *alone[] = {other, NULL};
+    assert_true(device_maps_share(maps, 2, &three, 2, text, sizeof text));
+    assert_string_equal(text, "m.yaml and m.yaml both move 'thread': their rates add up");
+    assert_false(device_maps_share(maps, 2, &three, 1, text, sizeof text));
+    assert_false(device_maps_share(alone, 2, &three, 2, text, sizeof text));
+    free(map);
+    free(other);
+}
+
+static void a_gamepad_has_a_tool_in_each_stick(void **state)
+{
+    (void)state;
+    DeviceMap *map = device_map_built_in(BUILT_IN_GAMEPAD_PAIR);
+    Gamepad pad = {0};
+    HandPort port[MAP_HANDS] = {0};
+    faults_clear(&faults);
+    assert_true(gamepad_bind(&pad, map, 6, 15, "pad", &faults));
+    const float axes[6] = {1, -1, -1, 1, -1, -1};      // left stick away and to the right, right one back and to the left
+    const unsigned char buttons[15] = {[1] = 1, [11] = 1};     // B, and up on the cross
+    gamepad_update(&pad, axes, 6, buttons, 15, port);
+    for (int h = 0; h < map->hand_count; h++) {
+        int drives = port[h].drives;
+        double push = drives == DRIVES_OUTER ? 40 : drives == DRIVES_INNER ? -40 : 2, twist = drives == DRIVES_OUTER ? 240 : drives == DRIVES_INNER ? -240 : 0;
+        assert_true(drives <= DRIVES_INNER && near(port[h].push_mm_s, push) && near(port[h].twist_deg_s, twist));
+    }
+    assert_int_equal(map->hand_count, 3);
+    assert_int_equal(port[0].buttons, HAND_STOP);
+    gamepad_lost(&pad, port);
+    for (int h = 0; h < MAP_HANDS; h++)
+        assert_true(port[h].push_mm_s == 0 && port[h].twist_deg_s == 0);
+    free(map);
 }
 
 static void built_in_and_example_maps_are_good(void **state)
@@ -318,6 +426,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_fault_comes_in_one_pass),
         cmocka_unit_test(what_does_not_fit_together_is_said),
+        cmocka_unit_test(tools_are_found_in_the_scene),
+        cmocka_unit_test(a_device_moves_several_tools),
+        cmocka_unit_test(a_gamepad_has_a_tool_in_each_stick),
         cmocka_unit_test(built_in_and_example_maps_are_good),
         cmocka_unit_test(deflections_are_odd_monotone_and_continuous),
         cmocka_unit_test(calibration_puts_ends_and_centre_where_it_says),

@@ -267,9 +267,56 @@ static void short_reports_are_counted_and_change_nothing(void **state)
     close_session(&session);
 }
 
+// Two sticks, each with a tool of its own, which is known before the first report.
+static void each_device_has_its_tool(void **state)
+{
+    (void)state;
+    static Faults faults;
+    static const char *const text[] = {"seldinger_device: 1\ndevice: {usage: joystick, serial: A}\ntool: wire\npush: {source: Y, mm_s: 40, dead_zone: 0}\n",
+                                       "seldinger_device: 1\ndevice: {usage: joystick, serial: B}\npush: {source: Y, mm_s: 20, dead_zone: 0, tool: guide}\n"
+                                       "twist: {source: X, deg_s: 90, dead_zone: 0, tool: innermost}\n"};
+    const ToolNames tools = {.count = 2, .name = {"guide", "wire"}, .kind = {"guide_catheter", "wire"}};
+    FakeHid *hid = calloc(1, sizeof *hid);
+    DeviceMap *map[2];
+    assert_non_null(hid);
+    faults_clear(&faults);
+    for (int i = 0; i < 2; i++) {
+        map[i] = device_map_parse(text[i], strlen(text[i]), "map.yaml", &faults);
+        assert_true(map[i] && device_map_find_tools(map[i], &tools, &faults));
+    }
+    HidTransport transport = fake_transport(hid);
+    HandsOptions options = hands_default_options();
+    options.map = (const DeviceMap *const *)map;
+    options.map_count = 2;
+    options.rescan_ms = 10;
+    options.use_usb = false;
+    options.transport = &transport;
+    Hands *hands = hands_open(&options, &faults);
+    assert_non_null(hands);
+    HandPort *first = hands_port(hands, 0), *second = hands_port(hands, 1);
+    fake_plug(hid, 0, 1, 1, "A", HID_USAGE(1, 4), stick, sizeof stick);
+    wait_for(atomic_load(&first->state) == HAND_READY);
+    fake_plug(hid, 1, 1, 1, "B", HID_USAGE(1, 4), stick, sizeof stick);
+    wait_for(atomic_load(&second->state) == HAND_READY);
+    assert_int_equal(atomic_load(&first->drives), DRIVES_TOOL + 1);
+    assert_true(atomic_load(&second[0].drives) == DRIVES_TOOL && atomic_load(&second[1].drives) == DRIVES_TOOL + 1);
+    fake_report(hid, 1, (const uint8_t[]){0, 255, 0}, 3);
+    wait_for(atomic_load(&second->reports) == 1);
+    assert_true(near(atomic_load(&second[0].push_mm_s), 20) && near(atomic_load(&second[1].twist_deg_s), -90));
+    assert_true(atomic_load(&second[0].twist_deg_s) == 0 && atomic_load(&second[1].push_mm_s) == 0 && atomic_load(&first->push_mm_s) == 0);
+    fake_unplug(hid, 1);
+    wait_for(atomic_load(&second->state) == HAND_LOST);
+    assert_true(atomic_load(&second[0].push_mm_s) == 0 && atomic_load(&second[1].twist_deg_s) == 0);
+    hands_close(hands);
+    free(hid);
+    free(map[0]);
+    free(map[1]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(each_device_has_its_tool),
         cmocka_unit_test(a_joystick_without_a_map_drives_the_tool),
         cmocka_unit_test(unplugged_it_stops_and_replugged_it_goes_on),
         cmocka_unit_test(a_held_stick_stops_when_it_is_unplugged),

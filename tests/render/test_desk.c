@@ -265,6 +265,51 @@ static void the_tool_goes_at_three_speeds_and_stops(void **state)
     assert_true(command.push_mm_s == 0 && command.twist_deg_s == 0);
 }
 
+static void the_keys_choose_lock_and_let_go(void **state)
+{
+    (void)state;
+    Desk desk = desk_in_front();
+    desk.tool_count = 3;
+    press(&desk, ACTION_TOOL_3, 1);
+    assert_int_equal(desk.grip.chosen, 2);
+    press(&desk, ACTION_TOOL_4, 1);           // there is none
+    assert_int_equal(desk.grip.chosen, 2);
+    press(&desk, ACTION_LOCK, 1);             // the innermost with the one around it
+    assert_true(hand_grip_lead(&desk.grip, 2) == 1 && hand_grip_lead(&desk.grip, 1) == 1);
+    press(&desk, ACTION_LOCK, 2);             // twice in one frame: as before
+    assert_int_equal(desk.grip.locked, 4);
+    press(&desk, ACTION_LET_GO, 1);
+    assert_true(desk.grip.released == 4 && desk.grip.locked == 0);
+    press(&desk, ACTION_TOOL_1, 1);
+    assert_true(desk.grip.chosen == 0 && desk.grip.released == 4);
+    // chosen and locked in one frame: the one that was chosen
+    PanelActions actions = {.mouse.view = -1};
+    actions.pressed[ACTION_TOOL_2] = actions.pressed[ACTION_LOCK] = 1;
+    obey(&desk, &actions, 0.02);
+    assert_true(desk.grip.chosen == 1 && desk.grip.locked == 4 && desk.grip.released == 0);
+}
+
+static void a_second_hand_moves_the_other_of_the_pair(void **state)
+{
+    (void)state;
+    Desk desk = desk_in_front();
+    desk.tool_count = 2;
+    PanelActions actions = {.mouse.view = -1};
+    actions.held[ACTION_PULL] = actions.held[ACTION_OTHER_PUSH] = actions.held[ACTION_OTHER_TWIST_RIGHT] = actions.held[ACTION_SLOW] = true;
+    Command chosen = desk_command(&desk, &actions), partner = desk_partner_command(&desk, &actions);
+    assert_near(chosen.push_mm_s, -2, 1e-12);
+    assert_near(chosen.twist_deg_s, 0, 0);
+    assert_near(partner.push_mm_s, 2, 1e-12);
+    assert_near(partner.twist_deg_s, 24, 1e-12);
+    desk.tool_count = 1;                      // there is no other: its keys must not move the one
+    partner = desk_partner_command(&desk, &actions);
+    assert_true(partner.push_mm_s == 0 && partner.twist_deg_s == 0);
+    desk.tool_count = 2;
+    actions.held[ACTION_STOP] = true;
+    partner = desk_partner_command(&desk, &actions);
+    assert_true(partner.push_mm_s == 0 && partner.twist_deg_s == 0);
+}
+
 static void the_mouse_turns_the_c_arm_and_magnifies(void **state)
 {
     (void)state;
@@ -365,7 +410,8 @@ int main(void)
                                        cmocka_unit_test(blades_and_field_keep_their_ranges), cmocka_unit_test(pulse_rates_go_round),
                                        cmocka_unit_test(subtraction_and_roadmap_take_masks),
                                        cmocka_unit_test(pedal_and_contrast_come_from_latch_keys_and_hands),
-                                       cmocka_unit_test(a_slider_sets_what_it_shows_and_no_more), cmocka_unit_test(the_tool_goes_at_three_speeds_and_stops),
+                                       cmocka_unit_test(a_slider_sets_what_it_shows_and_no_more), cmocka_unit_test(the_tool_goes_at_three_speeds_and_stops), cmocka_unit_test(the_keys_choose_lock_and_let_go),
+                                       cmocka_unit_test(a_second_hand_moves_the_other_of_the_pair),
                                        cmocka_unit_test(the_mouse_turns_the_c_arm_and_magnifies), cmocka_unit_test(the_mouse_moves_the_free_camera),
                                        cmocka_unit_test(keys_choose_what_is_seen)};
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -325,6 +325,33 @@ static void every_action_has_a_button_that_works(void **unused)
     end_desk(&desk);
 }
 
+// The log shows its newest message, also with more of them than it has room for.
+static void the_newest_message_is_seen(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    size_t bytes = (size_t)1024 * 600 * 3;
+    uint8_t *rgb[2] = {malloc(bytes), malloc(bytes)};
+    assert_true(rgb[0] && rgb[1]);
+    for (int i = 0; i < 2; i++) {
+        Desk desk = new_desk(1024, 600);
+        for (int k = 0; k < 30; k++) {
+            panel_message(desk.panel, 90, MARK_NONE, k < 29 || i == 0 ? "one of many" : "the newest");
+            frame(&desk);
+        }
+        frame(&desk);
+        frame(&desk);
+        gl_canvas_read(&desk.canvas, rgb[i]);
+        if (i == 1)
+            keep_picture(&desk.canvas, "log");
+        end_desk(&desk);
+    }
+    assert_memory_not_equal(rgb[0], rgb[1], bytes);
+    free(rgb[0]);
+    free(rgb[1]);
+}
+
 // A tooltip names the key once the mouse has rested, and goes with the mouse.
 static void a_tooltip_names_the_key(void **unused)
 {
@@ -675,7 +702,7 @@ int main(void)
                                        cmocka_unit_test(ticks_are_round),
                                        cmocka_unit_test(pictures_at_all_sizes),
                                        cmocka_unit_test(every_action_has_a_button_that_works),
-                                       cmocka_unit_test(a_tooltip_names_the_key),
+                                       cmocka_unit_test(the_newest_message_is_seen), cmocka_unit_test(a_tooltip_names_the_key),
                                        cmocka_unit_test(views_are_chosen_turned_and_scrolled_by_mouse),
                                        cmocka_unit_test(a_button_lets_go_when_the_focus_goes),
                                        cmocka_unit_test(names_are_typed_and_trimmed),
