@@ -182,6 +182,98 @@ static void assert_refused(const LiveSessionOptions *options, const char *reason
     assert_true(!session.simulator && !session.lesson && !session.recording && !session.realtime);
 }
 
+static const char coaxial_text[] =
+    "seldinger: 1\n"
+    "tools:\n"
+    "  - {name: tube, kind: microcatheter, elements: 14, sections: [{length_mm: 60, diameter_mm: 0.8, inner_diameter_mm: 0.5, young_modulus_gpa: 1}]}\n"
+    "  - {name: thread, kind: wire, elements: 16, sections: [{length_mm: 90, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
+    "vessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], radius_mm: 1.5, path: [{line_mm: 10}, {arc: {radius_mm: 20, angle_deg: 50}}, {line_mm: 30}]}, "
+    "contact: tube, friction: 0.05}\n"
+    "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 4}\n";
+
+static bool goes_alike(const RecordedRun *run, int64_t step)
+{
+    const double *outer = run->tool[0].command + 2 * step, *inner = run->tool[1].command + 2 * step;
+    return outer[0] == inner[0] && outer[1] == inner[1];
+}
+
+// Two hands push two tools, lock them, let one go; recorded, the session gives its states again, and another goes on from it.
+static void two_tools_are_moved_locked_let_go_and_replayed(void **state)
+{
+    (void)state;
+    TrainerScene former = trainer;
+    faults_clear(&faults);
+    trainer = (TrainerScene){.scene = scene_parse(coaxial_text, strlen(coaxial_text), "coaxial.yaml", &faults)};
+    if (!trainer.scene)
+        fail_msg("%s", faults.text[0]);
+    trainer.open.vessel = tube_vessel_create(&trainer.scene->tube, "coaxial.yaml", &faults);
+    assert_non_null(trainer.open.vessel);
+    static HandPort pair[2];
+    static HandPort *const both[] = {&pair[0], &pair[1]};
+    atomic_store(&pair[0].drives, DRIVES_OUTER);
+    atomic_store(&pair[1].drives, DRIVES_TOOL + 1);
+    char path[200];
+    snprintf(path, sizeof path, "%s", in_folder("coaxial.h5"));
+    LiveSessionOptions options = {.record_path = path, .hand_count = 2, .hand = both, .xray = xray_default_control()};
+    LiveSession session = open_session(&options);
+    HandGrip grip = {0};
+    atomic_store(&pair[0].push_mm_s, 5);
+    atomic_store(&pair[1].push_mm_s, 30);
+    atomic_store(&pair[1].twist_deg_s, 90);
+    wait_for(&session, 0.3);
+    hand_grip_lock(&grip, 2);
+    realtime_set_grip(session.realtime, &grip);
+    wait_for(&session, 0.4);
+    // what a hand feels is what both tools ask of theirs
+    const StepReport report = realtime_moment(session.realtime)->pose->report;
+    assert_true(isfinite(atomic_load(&pair[0].force_n)) && report.push[0] != 0 && report.push[1] != 0);
+    wait_for(&session, 0.5);
+    hand_grip_lock(&grip, 2);
+    grip.chosen = 1;
+    hand_grip_release(&grip);
+    realtime_set_grip(session.realtime, &grip);
+    atomic_store(&pair[1].twist_deg_s, 0);
+    wait_for(&session, 0.8);
+    atomic_store(&pair[0].buttons, HAND_STOP);
+    wait_for(&session, 0.9);
+    ScoreFigures score = stop(&session);
+    RecordedRun *run = load("coaxial.h5");
+    assert_int_equal(run->tool_count, 2);
+    assert_replays(run, &score);
+
+    assert_true(run->tool[0].command[2 * 100] == 5 && run->tool[1].command[2 * 100] == 30 && run->tool[1].command[2 * 100 + 1] == 90);
+    assert_true(goes_alike(run, 450));
+    assert_near(run->tool[0].command[2 * 450], 35, 1e-9);
+    assert_near(run->tool[0].command[2 * 450 + 1], 90, 1e-9);
+    assert_true(run->tool[1].released[700] == 1 && run->tool[1].command[2 * 700] == 0 && run->tool[0].released[700] == 0);
+    assert_true(run->tool[0].command[2 * 700] == 5 && run->tool[1].proximal[2 * 700] == 0);
+    assert_true(run->tool[0].command[2 * 880] == 0 && run->tool[1].released[880] == 1);
+    assert_true(run->tool[0].inserted[700] > 4 + 0.3 * 5 + 0.2 * 35 && run->tool[1].inserted[499] > 4 + 0.3 * 30 + 0.1 * 35);
+
+    // from 0.7 s on: the thread is still let go, until it is taken
+    char again[200];
+    snprintf(again, sizeof again, "%s", in_folder("coaxial-again.h5"));
+    options.record_path = again;
+    options.resume = run;
+    options.resume_s = 0.7;
+    atomic_store(&pair[0].buttons, 0);
+    session = open_session(&options);
+    assert_int_equal(session.resumed_released, 2);
+    wait_for(&session, 0.8);
+    grip = (HandGrip){0};
+    realtime_set_grip(session.realtime, &grip);
+    wait_for(&session, 0.95);
+    score = stop(&session);
+    RecordedRun *second = load("coaxial-again.h5");
+    assert_memory_equal(run->state_hash, second->state_hash, 700 * sizeof *run->state_hash);
+    assert_true(second->tool[1].released[750] == 1 && second->tool[1].released[940] == 0 && second->tool[1].command[2 * 940] == 30);
+    assert_replays(second, &score);
+    recorded_run_free(run);
+    recorded_run_free(second);
+    trainer_scene_close(&trainer);
+    trainer = former;
+}
+
 static void what_is_not_the_recording_of_a_session_is_refused(void **state)
 {
     (void)state;
@@ -229,6 +321,7 @@ static void a_place_where_nothing_can_be_written_is_told(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_session_goes_on_from_a_moment_of_it),
+                                       cmocka_unit_test(two_tools_are_moved_locked_let_go_and_replayed),
                                        cmocka_unit_test(what_is_not_the_recording_of_a_session_is_refused),
                                        cmocka_unit_test(a_place_where_nothing_can_be_written_is_told)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
