@@ -35,7 +35,7 @@ static const char help[] =
     "Runs a scene (YAML) headless, as fast as it goes, and prints a short summary.\n\n"
     "  --script F         script of the hand (CSV t_s,push_mm_s,twist_deg_s) instead of the scene's; of several tools\n"
     "                     t_s,NAME.push_mm_s,NAME.twist_deg_s,…; a further column released, NAME.released, is 1 where no hand holds it\n"
-    "  --device F.yaml    instead of a script a device drives, by this map or (auto) a built-in one; paced; repeated for up to 8 maps. Needs --duration-s\n"
+    "  --device F.yaml    instead of a script a device drives, by this map or (auto) a built-in one, the first tool or that of the map's `tool:`; paced; repeated for up to 8 maps. Needs --duration-s\n"
     "  --duration-s S     simulated time [s]; default: the script's; needed where there is no script\n"
     "  --settle-s S       afterwards goes on without input for at most S [s], until nothing moves faster than 0.01 mm/s; default 0\n"
     "  --record F.h5      recording (HDF5): every step's figures, the wire every 10 ms; readable while it is written\n"
@@ -172,8 +172,6 @@ static Scene *prepare_scene(const RunOptions *options, Faults *faults)
         scene->contact = (ContactKind)kind;
     if (scene && !scene->script && options->duration_s < 0 && options->settle_s < 0)
         faults_add(faults, options->scene, 0, 0, "has no script; give --script F, --duration-s S or --settle-s S");
-    if (scene && options->device_count)
-        scene_has_one_tool(scene, "--device", faults);
     if (faults->count > 0) {
         scene_free(scene);
         return NULL;

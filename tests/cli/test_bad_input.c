@@ -228,6 +228,7 @@ static void verbs_of_the_trainer(void **state)
     put("noise.bin", "no file of any kind");
     put("open.yaml", "x: [1\n");
     put("empty.json", "{\"seldinger_session\": 1}");
+    put("guide.yaml", "seldinger_device: 1\ndevice: {usage: joystick}\npush: {source: Y, mm_s: 9}\ntwist: {source: X, deg_s: 9, optional: true, tool: guide}\n");
     assert_int_equal(run_in("", "run free.yaml --record free.h5 --quiet"), 0);
     static const char *const lines[][2] = {
         {"replay free.h5 --verify --banana", "see `seldinger replay --help`"},
@@ -264,6 +265,7 @@ static void verbs_of_the_trainer(void **state)
         {"nav free.yaml --threads 1.5", "--threads: '1.5' is not valid"},
         {"nav free.yaml --no-record --device nowhere.yaml", "nowhere.yaml: cannot be opened"},
         {"nav free.yaml --no-record --device open.yaml", "open.yaml:2:1: is not YAML"},
+        {"nav free.yaml --no-record --device guide.yaml", "guide.yaml:4:52: 'tool' is 'guide', which the scene has not; wire, outermost, innermost"},
         {"nav free.yaml --no-record --figures nowhere/out.json", "nowhere/out.json: cannot be written"},
         {"nav free.yaml --no-record --resume nowhere.h5", "nowhere.h5: cannot be opened"},
         {"nav free.yaml --no-record --resume tree.h5", "tree.h5: lacks the dataset"},

@@ -29,6 +29,15 @@ static const char scene[] = "seldinger: 1\n"
                             "targets: [{name: bend, point_mm: [30, 7, 0], radius_mm: 3}]\n"
                             "exercise: {title: To the bend, target: bend, hold_s: 1}\n";
 
+static const char coaxial[] = "seldinger: 1\n"
+                              "vessel: {tube: {radius_mm: 1.2, normal: [0, 1, 0], path: [{line_mm: 15}, {arc: {radius_mm: 20, angle_deg: 60}}, {line_mm: 30}]}, "
+                              "contact: tube, friction: 0.05}\n"
+                              "tools:\n"
+                              "  - {name: tube, kind: microcatheter, elements: 20, sections: [{length_mm: 80, diameter_mm: 0.8, inner_diameter_mm: 0.5, "
+                              "young_modulus_gpa: 1}]}\n"
+                              "  - {name: thread, kind: wire, elements: 25, sections: [{length_mm: 110, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
+                              "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 2}\n";
+
 static pid_t server;
 
 static bool is_installed(const char *program)
@@ -47,6 +56,9 @@ static int open_display(void **state)
     assert_non_null(mkdtemp(folder));
     FILE *file = fopen(in_folder("scene.yaml"), "w");
     fputs(scene, file);
+    fclose(file);
+    file = fopen(in_folder("coaxial.yaml"), "w");
+    fputs(coaxial, file);
     fclose(file);
 #ifdef KEEP_LIBRARIES
     // what LeakSanitizer then tells is ours; it must not insist on being the first library
@@ -206,6 +218,39 @@ static void a_session_goes_on_from_a_moment_of_another(void **state)
     free(said);
 }
 
+// The thread by the arrows, then both at once by two hands, then locked, then let go; the window drawn all the while.
+static const char two_hands[] = "W=$(xdotool search --sync --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
+                                "xdotool key 2; sleep 0.2; xdotool keydown Up; sleep 1; xdotool keydown u; sleep 0.8; xdotool keyup u; xdotool keyup Up; sleep 0.2; "
+                                "xdotool key l; sleep 0.2; xdotool keydown Right; sleep 0.5; xdotool keyup Right; sleep 0.2; "
+                                "xdotool key g; sleep 0.3; xdotool key 6; sleep 0.3; xdotool key 7; sleep 0.3; "
+                                "while xdotool search --name Seldinger: >/dev/null 2>&1; do xdotool key Escape; sleep 0.5; xdotool key Return; sleep 0.3; done";
+
+static void two_tools_are_moved_by_keys(void **state)
+{
+    (void)state;
+    need_display();
+    RUNS(0, "(%s) & exec %s nav coaxial.yaml --sessions sessions --duration-s 60 --size 800x600 >out.txt 2>&1", two_hands, SELDINGER_PROGRAM);
+    RecordedRun *recorded = load(newest_recording());
+    assert_int_equal(recorded->tool_count, 2);
+    double alone = 0, both = 0, together = 0;          // seconds in which the thread was pushed alone, both were, both were turned
+    for (int64_t i = 0; i < recorded->step_count; i++) {
+        const double *outer = recorded->tool[0].command + 2 * i, *inner = recorded->tool[1].command + 2 * i;
+        alone += inner[0] > 0 && outer[0] == 0 ? 0.001 : 0;
+        both += inner[0] > 0 && outer[0] > 0 ? 0.001 : 0;
+        together += inner[1] > 0 && outer[1] == inner[1] ? 0.001 : 0;
+        assert_true(outer[1] == inner[1]);
+    }
+    print_message("alone %.2f s, both %.2f s, locked %.2f s\n", alone, both, together);
+    assert_true(alone > 0.3 && both > 0.2 && together > 0.1);
+    assert_true(recorded->tool[1].released[recorded->step_count - 1] && !recorded->tool[0].released[recorded->step_count - 1]);
+    assert_true(recorded->tool[1].inserted[recorded->step_count - 1] > recorded->tool[0].inserted[recorded->step_count - 1] + 2);
+    recorded_run_free(recorded);
+    RUNS(0, "%s replay '%s' --verify --quiet", SELDINGER_PROGRAM, newest_recording());
+    RUNS(0, "exec %s replay '%s' --duration-s 2 --size 640x480 >out.txt 2>&1", SELDINGER_PROGRAM, newest_recording());
+    RUNS(0, "exec %s nav coaxial.yaml --sessions sessions --resume '%s' --at 1.5 --duration-s 2 --size 640x480 >out.txt 2>&1", SELDINGER_PROGRAM, newest_recording());
+    RUNS(0, "%s replay '%s' --verify --quiet", SELDINGER_PROGRAM, newest_recording());
+}
+
 static void a_recording_is_shown_in_the_window(void **state)
 {
     (void)state;
@@ -226,6 +271,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_session_by_keys_is_recorded_scored_and_replayed),
                                        cmocka_unit_test(a_session_goes_on_from_a_moment_of_another), cmocka_unit_test(a_recording_is_shown_in_the_window),
-                                       cmocka_unit_test(without_a_display_it_says_so)};
+                                       cmocka_unit_test(two_tools_are_moved_by_keys), cmocka_unit_test(without_a_display_it_says_so)};
     return cmocka_run_group_tests(tests, open_display, close_display);
 }
