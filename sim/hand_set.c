@@ -29,7 +29,6 @@ bool hand_set_add(HandSet *set, HandPort *port)
         return false;
     set->taken_mm[set->count] = atomic_load(&port->advanced_mm);
     set->taken_deg[set->count] = atomic_load(&port->turned_deg);
-    set->held[set->count] = tool_of(set, port);
     set->port[set->count++] = port;
     return true;
 }
@@ -49,6 +48,24 @@ static double take_way(double total, double *taken, double moved, double most)
     return sum;
 }
 
+// What a port has still to feed is let fall.
+static void forget_way(HandSet *set, int i)
+{
+    set->taken_mm[i] = atomic_load_explicit(&set->port[i]->advanced_mm, memory_order_relaxed);
+    set->taken_deg[i] = atomic_load_explicit(&set->port[i]->turned_deg, memory_order_relaxed);
+}
+
+void hand_set_grip(HandSet *set, const HandGrip *grip)
+{
+    int held[HANDS_SAMPLED];
+    for (int i = 0; i < set->count; i++)
+        held[i] = tool_of(set, set->port[i]);
+    set->grip = *grip;
+    for (int i = 0; i < set->count; i++)
+        if (tool_of(set, set->port[i]) != held[i])
+            forget_way(set, i);
+}
+
 ToolCommands hand_set_command(HandSet *set, double dt)
 {
     double seconds = dt / 1000, most_mm = set->fastest_mm_s * seconds, most_deg = set->fastest_deg_s * seconds;
@@ -57,20 +74,23 @@ ToolCommands hand_set_command(HandSet *set, double dt)
     bool is_stopped = hand_set_buttons(set) & HAND_STOP;
     for (int i = 0; i < set->count; i++) {
         const HandPort *port = set->port[i];
-        int lead = hand_grip_lead(grip, tool_of(set, port));
         double mm_s = atomic_load_explicit(&port->push_mm_s, memory_order_relaxed), deg_s = atomic_load_explicit(&port->twist_deg_s, memory_order_relaxed);
+        if (mm_s == 0 && deg_s == 0)         // most ports have no device
+            continue;
+        int lead = hand_grip_lead(grip, tool_of(set, port));
         moved_mm[lead] = limited(moved_mm[lead] + limited(mm_s, set->fastest_mm_s) * seconds, most_mm);
         turned_deg[lead] = limited(turned_deg[lead] + limited(deg_s, set->fastest_deg_s) * seconds, most_deg);
     }
     for (int i = 0; i < set->count; i++) {
         double mm = atomic_load_explicit(&set->port[i]->advanced_mm, memory_order_relaxed);
         double deg = atomic_load_explicit(&set->port[i]->turned_deg, memory_order_relaxed);
+        if (mm == set->taken_mm[i] && deg == set->taken_deg[i])
+            continue;
         int tool = tool_of(set, set->port[i]), lead = hand_grip_lead(grip, tool);
-        if (is_stopped || (grip->released >> tool & 1) || tool != set->held[i]) {
+        if (is_stopped || (grip->released >> tool & 1)) {
             set->taken_mm[i] = mm;
             set->taken_deg[i] = deg;
         }
-        set->held[i] = tool;
         moved_mm[lead] = take_way(mm, &set->taken_mm[i], moved_mm[lead], most_mm);
         turned_deg[lead] = take_way(deg, &set->taken_deg[i], turned_deg[lead], most_deg);
     }
@@ -93,11 +113,16 @@ unsigned hand_set_buttons(const HandSet *set)
 
 void hand_set_answer(HandSet *set, const StepReport *report, int64_t step)
 {
+    double force[TOOLS_MOST], torque[TOOLS_MOST];
+    for (int k = 0; k < set->tool_count; k++) {
+        force[k] = hand_grip_sum(&set->grip, set->tool_count, k, report->push);
+        torque[k] = hand_grip_sum(&set->grip, set->tool_count, k, report->torque);
+    }
     for (int i = 0; i < set->count; i++) {
         HandPort *port = set->port[i];
         int tool = tool_of(set, port);
-        atomic_store_explicit(&port->force_n, hand_grip_sum(&set->grip, set->tool_count, tool, report->push), memory_order_relaxed);
-        atomic_store_explicit(&port->torque_n_mm, hand_grip_sum(&set->grip, set->tool_count, tool, report->torque), memory_order_relaxed);
+        atomic_store_explicit(&port->force_n, force[tool], memory_order_relaxed);
+        atomic_store_explicit(&port->torque_n_mm, torque[tool], memory_order_relaxed);
         atomic_store_explicit(&port->step, step, memory_order_release);
     }
 }

@@ -15,16 +15,16 @@ enum { HANDS_SAMPLED = 64 };
 
 typedef struct HandSet {
     int tool_count;
-    HandGrip grip;
+    HandGrip grip;                   // hand_set_grip changes it
     int count;
     HandPort *port[HANDS_SAMPLED];   // (count) borrowed; each written by one hand, see input/hand_port.h
-    int held[HANDS_SAMPLED];         // the tool that each one held in the last step
     double taken_mm[HANDS_SAMPLED], taken_deg[HANDS_SAMPLED];   // of each port's ways; the simulation thread's
     double fastest_mm_s, fastest_deg_s;                   // what a tool is moved by at most, default 200 and 1440
 } HandSet;
 
 void hand_set_init(HandSet *set, int tool_count);  // the first tool chosen, none locked or let go
 bool hand_set_add(HandSet *set, HandPort *port);   // false where there is no room. What it has gone so far does not count
+void hand_set_grip(HandSet *set, const HandGrip *grip);
 // The commands of the next step of dt [ms]; a hand that holds HAND_STOP stops all tools.
 ToolCommands hand_set_command(HandSet *set, double dt);
 unsigned hand_set_buttons(const HandSet *set);

@@ -42,7 +42,7 @@ static ToolCommands ask_hands(void *context)
     if (triple_buffer_fetch(&realtime->xray_buffer))
         realtime->now = realtime->xray[realtime->xray_buffer.reading];
     if (triple_buffer_fetch(&realtime->grip_buffer))
-        realtime->hands.grip = realtime->grip[realtime->grip_buffer.reading];
+        hand_set_grip(&realtime->hands, &realtime->grip[realtime->grip_buffer.reading]);
     return hand_set_command(&realtime->hands, simulator_scene(realtime->options.simulator)->dt);
 }
 

@@ -26,6 +26,27 @@ static void take_hands(int tool_count)
         assert_true(hand_set_add(&set, &port[i]));
 }
 
+static void choose(int tool)
+{
+    HandGrip grip = set.grip;
+    hand_grip_choose(&grip, set.tool_count, tool);
+    hand_set_grip(&set, &grip);
+}
+
+static void lock(void)
+{
+    HandGrip grip = set.grip;
+    hand_grip_lock(&grip, set.tool_count);
+    hand_set_grip(&set, &grip);
+}
+
+static void let_go(void)
+{
+    HandGrip grip = set.grip;
+    hand_grip_release(&grip);
+    hand_set_grip(&set, &grip);
+}
+
 static void assert_command(const ToolCommands *commands, int tool, double push_mm_s, double twist_deg_s)
 {
     assert_near(commands->tool[tool].push_mm_s, push_mm_s, 1e-9);
@@ -93,12 +114,10 @@ static void each_hand_moves_its_tool(void **state)
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++)
         for (int drives = 0; drives < 5; drives++) {
             take_hands(cases[c].tools);
-            hand_grip_choose(&set.grip, set.tool_count, cases[c].chosen);
+            choose(cases[c].chosen);
             port[1].drives = drives == 4 ? DRIVES_TOOL + 2 : drives;
             port[1].push_mm_s = 5;
-            port[1].turned_deg = 0.1;
-            hand_set_command(&set, 1);         // here it may take the tool: its way so far is forgotten
-            port[1].turned_deg = 0.3;
+            port[1].turned_deg = 0.2;
             ToolCommands commands = hand_set_command(&set, 1);
             StepReport report = {.push = {1, 2, 3, 4}, .torque = {10, 20, 30, 40}};
             hand_set_answer(&set, &report, 7);
@@ -107,9 +126,9 @@ static void each_hand_moves_its_tool(void **state)
             assert_true(port[1].force_n == cases[c].moved[drives] + 1 && port[1].torque_n_mm == 10 * (cases[c].moved[drives] + 1) && port[1].step == 7);
             assert_true(port[0].force_n == cases[c].chosen + 1);
         }
-    hand_grip_choose(&set.grip, 4, 1);
-    hand_grip_choose(&set.grip, 4, 4);         // there is none: nothing changes
-    hand_grip_choose(&set.grip, 4, -1);
+    choose(1);
+    choose(4);                                 // there is none: nothing changes
+    choose(-1);
     assert_int_equal(set.grip.chosen, 1);
 }
 
@@ -120,7 +139,7 @@ static void what_is_still_owed_does_not_follow_to_another_tool(void **state)
     port[0].advanced_mm = 5;                   // takes 25 steps at the fastest
     ToolCommands commands = hand_set_command(&set, 1);
     assert_command(&commands, 0, 200, 0);
-    hand_grip_choose(&set.grip, 2, 1);
+    choose(1);
     commands = hand_set_command(&set, 1);
     assert_command(&commands, 0, 0, 0);
     assert_command(&commands, 1, 0, 0);
@@ -133,8 +152,8 @@ static void locked_tools_move_as_one_and_are_felt_together(void **state)
 {
     (void)state;
     take_hands(3);
-    hand_grip_choose(&set.grip, 3, 1);
-    hand_grip_lock(&set.grip, 3);              // the second and the third
+    choose(1);
+    lock();                                    // the second and the third
     assert_true(hand_grip_pair_is_locked(&set.grip, 3));
     port[0].push_mm_s = 10;
     port[1].drives = DRIVES_TOOL + 2;
@@ -165,22 +184,22 @@ static void locked_tools_move_as_one_and_are_felt_together(void **state)
     assert_near(fed[1], 5, 1e-9);
 
     // three of them, and open again
-    hand_grip_choose(&set.grip, 3, 0);
-    hand_grip_lock(&set.grip, 3);
+    choose(0);
+    lock();
     port[2].push_mm_s = 7;
     commands = hand_set_command(&set, 1);
     for (int k = 0; k < 3; k++)
         assert_command(&commands, k, 7, 0);
     hand_set_answer(&set, &report, 2);
     assert_true(port[0].force_n == 7 && port[1].force_n == 7 && port[2].force_n == 7);
-    hand_grip_lock(&set.grip, 3);
+    lock();
     assert_false(hand_grip_pair_is_locked(&set.grip, 3));
     commands = hand_set_command(&set, 1);
     assert_command(&commands, 0, 7, 0);
     assert_command(&commands, 1, 0, 0);
     // one tool has none to be locked to
     take_hands(1);
-    hand_grip_lock(&set.grip, 1);
+    lock();
     assert_true(set.grip.locked == 0 && !hand_grip_pair_is_locked(&set.grip, 1));
 }
 
@@ -189,21 +208,21 @@ static void a_tool_that_was_let_go_is_moved_by_no_hand(void **state)
     (void)state;
     take_hands(2);
     port[0].push_mm_s = 10;
-    hand_grip_release(&set.grip);
+    let_go();
     port[0].advanced_mm = 1;
     ToolCommands commands = hand_set_command(&set, 1);
     assert_true(commands.released == 1 && commands.tool[0].push_mm_s == 0 && commands.tool[0].twist_deg_s == 0);
-    hand_grip_release(&set.grip);
+    let_go();
     commands = hand_set_command(&set, 1);      // in hand again: the way it went alone is forgotten
     assert_int_equal(commands.released, 0);
     assert_command(&commands, 0, 10, 0);
     // a lock takes both in hand, letting go opens it
-    hand_grip_release(&set.grip);
-    hand_grip_lock(&set.grip, 2);
+    let_go();
+    lock();
     assert_true(set.grip.released == 0 && set.grip.locked == 2);
     commands = hand_set_command(&set, 1);
     assert_command(&commands, 1, 10, 0);
-    hand_grip_release(&set.grip);
+    let_go();
     assert_true(set.grip.released == 1 && set.grip.locked == 0);
     // stopped, a tool that is let go stays so
     port[1].buttons = HAND_STOP;
