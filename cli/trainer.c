@@ -303,6 +303,16 @@ static void tell_news(Trainer *trainer, const Moment *moment)
     }
 }
 
+// "wire, microcatheter: " as a device's hands move them now.
+static void name_moved(const Trainer *trainer, const HandPort *port, int hand_count, char *text, size_t capacity)
+{
+    size_t used = 0;
+    for (int h = 0; h < hand_count && used < capacity; h++) {
+        int tool = hand_grip_tool(&trainer->desk.grip, trainer->scene->tool_count, atomic_load(&port[h].drives));
+        used += (size_t)snprintf(text + used, capacity - used, "%s%s", trainer->scene->tool[tool].name, h + 1 < hand_count ? ", " : ": ");
+    }
+}
+
 static void show_devices(Trainer *trainer)
 {
     TrainerPanel *shown = &trainer->shown;
@@ -316,7 +326,10 @@ static void show_devices(Trainer *trainer)
             continue;
         int at = state->device_count++;
         snprintf(shown->device_name[at], sizeof shown->device_name[at], "%s", info.name);
-        snprintf(shown->device_note[at], sizeof shown->device_note[at], "%s, %.0f reports/s; %s", info.map, info.report_hz, info.force);
+        char moves[TOOLS_MOST * (TOOL_NAME_SIZE + 2)] = "";
+        if (trainer->scene->tool_count > 1)
+            name_moved(trainer, hands_port(trainer->hands, i), info.hand_count, moves, sizeof moves);
+        snprintf(shown->device_note[at], sizeof shown->device_note[at], "%s%s, %.0f reports/s; %s", moves, info.map, info.report_hz, info.force);
         shown->device[at] = (PanelDevice){shown->device_name[at], info.state, shown->device_note[at]};
         if (info.state == HAND_LOST)
             state->warnings |= WARN_DEVICE_LOST;

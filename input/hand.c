@@ -138,6 +138,7 @@ static bool start_slot(HandSlot *slot, const HidDeviceInfo *device, const Device
     pthread_mutex_lock(&shared->lock);
     snprintf(slot->info.name, sizeof slot->info.name, "%s", name);
     snprintf(slot->info.map, sizeof slot->info.map, "%s", map->name);
+    slot->info.hand_count = map->hand_count;
     slot->info.vendor_id = device->vendor_id;
     slot->info.product_id = device->product_id;
     pthread_mutex_unlock(&shared->lock);

@@ -1,8 +1,22 @@
 #include "sim/hand_grip.h"
 
+#include "input/hand_port.h"
+
 int hand_grip_partner(const HandGrip *grip, int tool_count)
 {
     return grip->chosen + 1 < tool_count ? grip->chosen + 1 : grip->chosen > 0 ? grip->chosen - 1 : 0;
+}
+
+int hand_grip_tool(const HandGrip *grip, int tool_count, int drives)
+{
+    int chosen = grip->chosen, partner = hand_grip_partner(grip, tool_count);
+    switch (drives) {
+    case DRIVES_CHOSEN: return chosen;
+    case DRIVES_PARTNER: return partner;
+    case DRIVES_OUTER: return chosen < partner ? chosen : partner;
+    case DRIVES_INNER: return chosen > partner ? chosen : partner;
+    default: return drives - DRIVES_TOOL < tool_count ? drives - DRIVES_TOOL : tool_count - 1;
+    }
 }
 
 void hand_grip_choose(HandGrip *grip, int tool_count, int tool)

@@ -16,6 +16,8 @@ typedef struct HandGrip {
 
 // The next tool inside the chosen one; of the innermost the next around it; of one tool itself. With the chosen one it is the pair.
 int hand_grip_partner(const HandGrip *grip, int tool_count);
+// The tool that a hand moves which drives this (HandDrives of input/hand_port.h).
+int hand_grip_tool(const HandGrip *grip, int tool_count, int drives);
 void hand_grip_choose(HandGrip *grip, int tool_count, int tool);       // nothing where there is no such tool
 // Locks the pair, or opens its lock. Nothing where there is one tool.
 void hand_grip_lock(HandGrip *grip, int tool_count);

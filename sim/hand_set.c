@@ -13,14 +13,7 @@ void hand_set_init(HandSet *set, int tool_count)
 
 static int tool_of(const HandSet *set, const HandPort *port)
 {
-    int drives = atomic_load_explicit(&port->drives, memory_order_relaxed), chosen = set->grip.chosen, partner = hand_grip_partner(&set->grip, set->tool_count);
-    switch (drives) {
-    case DRIVES_CHOSEN: return chosen;
-    case DRIVES_PARTNER: return partner;
-    case DRIVES_OUTER: return chosen < partner ? chosen : partner;
-    case DRIVES_INNER: return chosen > partner ? chosen : partner;
-    default: return drives - DRIVES_TOOL < set->tool_count ? drives - DRIVES_TOOL : set->tool_count - 1;
-    }
+    return hand_grip_tool(&set->grip, set->tool_count, atomic_load_explicit(&port->drives, memory_order_relaxed));
 }
 
 bool hand_set_add(HandSet *set, HandPort *port)
