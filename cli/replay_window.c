@@ -116,7 +116,7 @@ static void draw(ReplayWindow *replay, const WindowInput *input, const PanelLayo
 {
     const Pose *pose = playback_pose(replay->playback);
     ViewsFrame frame = {.pose = pose, .xray = &pose->xray, .contrast = playback_contrast(replay->playback),
-                        .pulse = (uint32_t)playback_pulses(replay->playback)->count, .look = &replay->desk.look};
+                        .pulse = (uint32_t)playback_pulses(replay->playback)->count, .look = &replay->desk.look, .scope_tool = replay->desk.grip.chosen + 1};
     views_draw(replay->views, &frame, layout, input->width, input->height, 0);
     trainer_panel_show(&replay->shown, replay->scene, pose, score_now(replay), NULL, &pose->xray);
     PanelState *state = &replay->shown.state;

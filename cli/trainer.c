@@ -345,7 +345,7 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
     const Pose *pose = moment->pose;
     pulse_clock_advance(&trainer->pulses, pose->time_s, &pose->xray);
     ViewsFrame frame = {.pose = pose, .xray = xray, .contrast = lesson->node_count > 0 ? lesson->concentration : NULL,
-                        .pulse = (uint32_t)trainer->pulses.count, .look = &trainer->desk.look};
+                        .pulse = (uint32_t)trainer->pulses.count, .look = &trainer->desk.look, .scope_tool = trainer->desk.grip.chosen + 1};
     trainer_cine_frame(&trainer->cine, passed_s, &frame);
     views_draw(trainer->views, &frame, layout, input->width, input->height, 0);
     trainer_panel_show(&trainer->shown, trainer->scene, pose, &lesson->score, &moment->figures, xray);

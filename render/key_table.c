@@ -60,7 +60,7 @@ const KeyAction key_table[ACTION_COUNT] = {
 
     {ACTION_VIEW_FLUOROSCOPY, GROUP_VIEW, ACTION_PRESS, K('5'), "X-ray view", "fluoroscopy as the main view"},
     {ACTION_VIEW_3D, GROUP_VIEW, ACTION_PRESS, K('6'), "3D view", "the vessel in 3D as the main view"},
-    {ACTION_VIEW_ANGIOSCOPY, GROUP_VIEW, ACTION_PRESS, K('7'), "Angioscopy", "the view from the tool's tip as the main view"},
+    {ACTION_VIEW_ANGIOSCOPY, GROUP_VIEW, ACTION_PRESS, K('7'), "Angioscopy", "the view from the chosen tool's tip as the main view"},
     {ACTION_VIEW_ALL, GROUP_VIEW, ACTION_PRESS, K('8'), "All views", "all three views side by side"},
     {ACTION_CAMERA_RESET, GROUP_VIEW, ACTION_PRESS, KEY(HOME), "Reset camera", "3D: the whole vessel from the front"},
     {ACTION_CAMERA_FOLLOW, GROUP_VIEW, ACTION_PRESS, K('V'), "Follow tip", "3D: the camera keeps to the tool's tip"},

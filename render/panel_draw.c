@@ -212,7 +212,7 @@ static void draw_bottom(Panel *panel, const PanelState *state)
     GuiRect at = panel->layout.bottom, hints = at, log = at, machine = at;
     float s = gui_scale(gui);
     char text[256];
-    int hint = panel->has_hints ? panel_current_hint(panel) : -1;
+    int hint = panel->has_hints ? panel_current_hint(panel, state->tool_count) : -1;
     machine.width = floorf(268 * s);
     machine.x = at.width - machine.width;
     hints.width = hint >= 0 ? floorf(machine.x * 0.58f) : 0;

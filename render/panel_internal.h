@@ -81,7 +81,7 @@ void panel_draw_briefing(Panel *panel, const PanelState *state);
 void panel_draw_help(Panel *panel, const WindowInput *input, const PanelState *state);
 void panel_draw_dialogue(Panel *panel, const WindowInput *input);
 void panel_draw_all(Panel *panel, const WindowInput *input, const PanelState *state);
-int panel_current_hint(const Panel *panel);                // -1: none left
+int panel_current_hint(const Panel *panel, int tool_count);        // -1: none left
 void panel_hint_text(int hint, char *text, size_t capacity);
 
 #endif

@@ -529,26 +529,30 @@ static void hints_lead_on_with_use(void **unused)
     (void)unused;
     if (!context)
         skip();
-    Desk desk = new_desk(1024, 600);
-    static const ActionId follow[] = {ACTION_PEDAL, ACTION_PUSH, ACTION_MAGNIFY, ACTION_CONTRAST, ACTION_ROADMAP, ACTION_TWIST_RIGHT, ACTION_LAO,
-                                      ACTION_VIEW_3D, ACTION_HELP};
-    int count = sizeof follow / sizeof follow[0];
-    for (int i = 0; i < count; i++) {
-        const KeyAction *action = &key_table[follow[i]];
-        char text[256], key[32];
-        assert_int_equal(panel_current_hint(desk.panel), i);
-        panel_hint_text(i, text, sizeof text);
-        assert_non_null(strstr(text, key_table_text(follow[i], key, sizeof key)));
-        assert_null(strchr(text, '%'));
-        assert_in_range(strlen(text), 20, 120);   // two lines
-        add_event(&desk, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = action->key});
-        for (int k = 0; k < (action->kind == ACTION_HOLD ? 40 : 1); k++)
-            panel_take_input(desk.panel, &desk.input, &desk.actions), desk.input.event_count = 0;
-        add_event(&desk, (WindowEvent){.kind = WINDOW_KEY_UP_EVENT, .key = action->key});
-        frame(&desk);
+    for (int tools = 1; tools <= 2; tools++) {
+        Desk desk = new_desk(1024, 600);
+        static const ActionId follow[] = {ACTION_PEDAL, ACTION_PUSH, ACTION_TOOL_2, ACTION_OTHER_PUSH, ACTION_MAGNIFY, ACTION_CONTRAST, ACTION_ROADMAP,
+                                          ACTION_TWIST_RIGHT, ACTION_LAO, ACTION_VIEW_3D, ACTION_HELP};
+        int count = sizeof follow / sizeof follow[0];
+        for (int i = 0; i < count; i++) {
+            const KeyAction *action = &key_table[follow[i]];
+            char text[256], key[32];
+            if (tools == 1 && (i == 2 || i == 3))     // of several tools
+                continue;
+            assert_int_equal(panel_current_hint(desk.panel, tools), i);
+            panel_hint_text(i, text, sizeof text);
+            assert_non_null(strstr(text, key_table_text(follow[i], key, sizeof key)));
+            assert_null(strchr(text, '%'));
+            assert_in_range(strlen(text), 20, 120);   // two lines
+            add_event(&desk, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = action->key});
+            for (int k = 0; k < (action->kind == ACTION_HOLD ? 40 : 1); k++)
+                panel_take_input(desk.panel, &desk.input, &desk.actions), desk.input.event_count = 0;
+            add_event(&desk, (WindowEvent){.kind = WINDOW_KEY_UP_EVENT, .key = action->key});
+            frame(&desk);
+        }
+        assert_int_equal(panel_current_hint(desk.panel, tools), -1);
+        end_desk(&desk);
     }
-    assert_int_equal(panel_current_hint(desk.panel), -1);
-    end_desk(&desk);
 }
 
 static void strange_states_draw(void **unused)
