@@ -71,6 +71,9 @@ bool panel_has_more_lines(const char *text);
 bool panel_first_line(const char *text, char *line, size_t capacity);
 void panel_heading(Panel *panel, const char *text);
 
+// Where words may stand, at `wanted` or as little as may be above or below it: what lies close together has one line each.
+GuiRect panel_free_place(GuiRect wanted, const GuiRect *taken, int count);
+
 void panel_reflow(const char *from, char *to, size_t capacity);
 
 // One button of the table of keys; `where` tells buttons of one action apart.

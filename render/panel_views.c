@@ -6,6 +6,8 @@
 #include <math.h>
 #include <stdio.h>
 
+enum { LABELS_PLACED = 32 };   // beside one another; later ones may lie on others
+
 // "LAO 30  CRA 10": rounded first, so that there is no "RAO 0".
 static const char *angles(char *text, size_t capacity, const XrayControl *xray)
 {
@@ -133,18 +135,45 @@ static void draw_force_legend(Panel *panel, GuiRect at, double full_scale_n)
     label_right(panel, at.x + at.width - pad, bottom + floorf(2 * s), GUI_SMALL, gui_colors.dim, "wall force");
 }
 
+static bool overlap(GuiRect a, GuiRect b) { return a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height; }
+
+GuiRect panel_free_place(GuiRect wanted, const GuiRect *taken, int count)
+{
+    for (int shift = 0; shift <= 2 * count; shift++) {
+        GuiRect place = wanted;
+        place.y += wanted.height * (float)(shift % 2 ? -(shift + 1) / 2 : shift / 2);
+        bool is_free = true;
+        for (int i = 0; i < count; i++)
+            is_free &= !overlap(place, taken[i]);
+        if (is_free)
+            return place;
+    }
+    return wanted;
+}
+
+static void draw_3d_words(Panel *panel, const PanelState *state, GuiRect at)
+{
+    Gui *gui = panel->gui;
+    GuiRect taken[LABELS_PLACED];
+    float s = gui_scale(gui), gap = floorf(8 * s), pad = floorf(4 * s);
+    for (int i = 0; i < state->label_count; i++) {
+        const PanelLabel *words = &state->label[i];
+        float width, height, x = at.x + (float)words->x, away = (float)words->radius + gap;
+        gui_text_extent(gui, GUI_SMALL, words->text, &width, &height);
+        bool is_left = words->x < (double)at.width / 2;      // outwards: the vessel lies inwards
+        GuiRect wanted = {is_left ? x - away - width - pad : x + away - pad, at.y + (float)words->y - height / 2 - pad / 2, width + 2 * pad, height + pad};
+        GuiRect place = panel_free_place(wanted, taken, i < LABELS_PLACED ? i : LABELS_PLACED);
+        if (i < LABELS_PLACED)
+            taken[i] = place;
+        label(panel, place.x + pad, place.y + pad / 2, GUI_SMALL, gui_colors.text, words->text);
+    }
+}
+
 static void draw_3d_labels(Panel *panel, const PanelState *state, GuiRect at)
 {
     Gui *gui = panel->gui;
     float s = gui_scale(gui), pad = floorf(10 * s), half = gui_line_height(gui, GUI_SMALL) / 2;
-    for (int i = 0; i < state->label_count; i++) {
-        const PanelLabel *words = &state->label[i];
-        float x = at.x + (float)words->x, y = at.y + (float)words->y - half, away = (float)words->radius + floorf(8 * s);
-        if (words->x < (double)at.width / 2)   // outwards: the vessel lies inwards
-            label_right(panel, x - away, y, GUI_SMALL, gui_colors.text, words->text);
-        else
-            label(panel, x + away, y, GUI_SMALL, gui_colors.text, words->text);
-    }
+    draw_3d_words(panel, state, at);
     if (state->force_full_scale_n > 0)
         draw_force_legend(panel, at, state->force_full_scale_n);
     if (state->bar_pixels > 0) {

@@ -325,6 +325,26 @@ static void every_action_has_a_button_that_works(void **unused)
     end_desk(&desk);
 }
 
+static void words_do_not_lie_on_words(void **unused)
+{
+    (void)unused;
+    srand(3);
+    for (int round = 0; round < 200; round++) {
+        GuiRect taken[24];
+        for (int i = 0; i < 24; i++) {
+            GuiRect wanted = {(float)(rand() % 60), (float)(rand() % 40), (float)(20 + rand() % 80), 15};
+            taken[i] = panel_free_place(wanted, taken, i);
+            assert_true(taken[i].x == wanted.x && taken[i].width == wanted.width);
+            for (int j = 0; j < i; j++)
+                assert_true(taken[i].y + 15 <= taken[j].y || taken[j].y + 15 <= taken[i].y || taken[i].x + taken[i].width <= taken[j].x ||
+                            taken[j].x + taken[j].width <= taken[i].x);
+        }
+    }
+    // alone it stands where it wants to
+    const GuiRect far = {500, 500, 50, 15}, wanted = {10, 20, 30, 15};
+    assert_true(panel_free_place(wanted, &far, 1).y == 20);
+}
+
 // The log shows its newest message, also with more of them than it has room for.
 static void the_newest_message_is_seen(void **unused)
 {
@@ -706,7 +726,7 @@ int main(void)
                                        cmocka_unit_test(ticks_are_round),
                                        cmocka_unit_test(pictures_at_all_sizes),
                                        cmocka_unit_test(every_action_has_a_button_that_works),
-                                       cmocka_unit_test(the_newest_message_is_seen), cmocka_unit_test(a_tooltip_names_the_key),
+                                       cmocka_unit_test(words_do_not_lie_on_words), cmocka_unit_test(the_newest_message_is_seen), cmocka_unit_test(a_tooltip_names_the_key),
                                        cmocka_unit_test(views_are_chosen_turned_and_scrolled_by_mouse),
                                        cmocka_unit_test(a_button_lets_go_when_the_focus_goes),
                                        cmocka_unit_test(names_are_typed_and_trimmed),
