@@ -12,6 +12,7 @@ struct RunHands {
     Hands *hands;
     HandSet set;
     double dt;
+    unsigned buttons;            // held in the last step
     pthread_t speaker;
     _Atomic int ending;
 };
@@ -105,6 +106,11 @@ RunHands *run_hands_open(int map_count, const char *const *map, const Scene *sce
 ToolCommands run_hands_command(void *context)
 {
     RunHands *hands = context;
+    HandGrip grip = hands->set.grip;
+    unsigned before = hands->buttons;
+    hand_grip_obey(&grip, hands->set.tool_count, hand_set_buttons(&hands->set), &hands->buttons);
+    if (hands->buttons & ~before)
+        hand_set_grip(&hands->set, &grip);
     return hand_set_command(&hands->set, hands->dt);
 }
 

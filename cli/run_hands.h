@@ -1,4 +1,5 @@
-// `run --device`: devices drive a headless run, what they have to say goes to standard error. Nobody chooses: a device whose map names no tool moves the first.
+// `run --device`: devices drive a headless run, what they have to say goes to standard error. A device whose map names no tool
+// moves the chosen one: the first, until a button of a device chooses another.
 #ifndef SELDINGER_CLI_RUN_HANDS_H
 #define SELDINGER_CLI_RUN_HANDS_H
 

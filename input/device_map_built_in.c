@@ -41,6 +41,10 @@ static const char *const texts[BUILT_IN_COUNT] = {
                               "  - {source: right_x, deg_s: 240, dead_zone: 0.15, exponent: 2, tool: inner}\n"
                               "  - {source: dpad_right, deg_s: 20}\n"
                               "  - {source: dpad_left, deg_s: 20, invert: true}\n"
+                              "choose_outer: {source: left_bumper}\n"
+                              "choose_inner: {source: right_bumper}\n"
+                              "lock: {source: start}\n"
+                              "let_go: {source: back}\n"
                               PAD_BUTTONS,
     [BUILT_IN_JOYSTICK] = "seldinger_device: 1\n"
                           "name: joystick\n"

@@ -50,6 +50,20 @@ void hand_grip_release(HandGrip *grip)
         grip->locked &= ~(3u << grip->chosen);   // to the tool around it, and to the one inside
 }
 
+void hand_grip_obey(HandGrip *grip, int tool_count, unsigned buttons, unsigned *before)
+{
+    unsigned pressed = buttons & ~*before;
+    *before = buttons;
+    if (pressed & HAND_CHOOSE_OUTER)
+        hand_grip_choose(grip, tool_count, grip->chosen - 1);
+    if (pressed & HAND_CHOOSE_INNER)
+        hand_grip_choose(grip, tool_count, grip->chosen + 1);
+    if (pressed & HAND_LOCK)
+        hand_grip_lock(grip, tool_count);
+    if (pressed & HAND_LET_GO)
+        hand_grip_release(grip);
+}
+
 int hand_grip_lead(const HandGrip *grip, int tool)
 {
     while (tool > 0 && grip->locked >> tool & 1)

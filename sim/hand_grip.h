@@ -24,6 +24,8 @@ void hand_grip_lock(HandGrip *grip, int tool_count);
 bool hand_grip_pair_is_locked(const HandGrip *grip, int tool_count);
 // Lets the chosen tool go, or takes it again.
 void hand_grip_release(HandGrip *grip);
+// What devices' buttons ask for (HAND_ bits) that were not held `before`, which becomes what is held now.
+void hand_grip_obey(HandGrip *grip, int tool_count, unsigned buttons, unsigned *before);
 // The outermost of the tools that move as `tool` does.
 int hand_grip_lead(const HandGrip *grip, int tool);
 // Of `value` [tool_count] the sum over the tools that move as `tool` does: what a hand on it feels.

@@ -210,6 +210,13 @@ static void a_gamepad_has_a_tool_in_each_stick(void **state)
     }
     assert_int_equal(map->hand_count, 3);
     assert_int_equal(port[0].buttons, HAND_STOP);
+    static const unsigned bits[][2] = {{4, HAND_CHOOSE_OUTER}, {5, HAND_CHOOSE_INNER}, {6, HAND_LET_GO}, {7, HAND_LOCK}};
+    for (int i = 0; i < 4; i++) {
+        unsigned char held[15] = {0};
+        held[bits[i][0]] = 1;
+        gamepad_update(&pad, axes, 6, held, 15, port);
+        assert_int_equal(port[0].buttons, bits[i][1]);
+    }
     gamepad_lost(&pad, port);
     for (int h = 0; h < MAP_HANDS; h++)
         assert_true(port[h].push_mm_s == 0 && port[h].twist_deg_s == 0);

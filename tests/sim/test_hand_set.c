@@ -229,6 +229,26 @@ static void a_tool_that_was_let_go_is_moved_by_no_hand(void **state)
     assert_int_equal(hand_set_command(&set, 1).released, 1);
 }
 
+// Buttons of devices act when they go down, not while they are held.
+static void buttons_choose_lock_and_let_go(void **state)
+{
+    (void)state;
+    HandGrip grip = {0};
+    unsigned before = 0;
+    hand_grip_obey(&grip, 3, HAND_CHOOSE_OUTER | HAND_PEDAL, &before);         // there is none further out
+    assert_int_equal(grip.chosen, 0);
+    hand_grip_obey(&grip, 3, HAND_CHOOSE_INNER, &before);
+    hand_grip_obey(&grip, 3, HAND_CHOOSE_INNER | HAND_PEDAL, &before);
+    assert_int_equal(grip.chosen, 1);
+    hand_grip_obey(&grip, 3, 0, &before);
+    hand_grip_obey(&grip, 3, HAND_CHOOSE_INNER | HAND_LOCK, &before);          // the innermost with the one around it
+    assert_true(grip.chosen == 2 && grip.locked == 4);
+    hand_grip_obey(&grip, 3, HAND_LET_GO, &before);
+    assert_true(grip.released == 4 && grip.locked == 0);
+    hand_grip_obey(&grip, 3, HAND_LET_GO | HAND_CHOOSE_OUTER, &before);
+    assert_true(grip.chosen == 1 && grip.released == 4);
+}
+
 // Any keys in any order: no tool is both locked and let go, and none but those that are there.
 static void no_grip_contradicts_itself(void **state)
 {
@@ -271,6 +291,7 @@ int main(void)
                                        cmocka_unit_test(what_is_still_owed_does_not_follow_to_another_tool),
                                        cmocka_unit_test(locked_tools_move_as_one_and_are_felt_together),
                                        cmocka_unit_test(a_tool_that_was_let_go_is_moved_by_no_hand),
+                                       cmocka_unit_test(buttons_choose_lock_and_let_go),
                                        cmocka_unit_test(no_grip_contradicts_itself),
                                        cmocka_unit_test(there_is_room_for_so_many_hands)};
     return cmocka_run_group_tests(tests, NULL, NULL);
