@@ -401,7 +401,9 @@ static void run_window(Trainer *trainer, Faults *faults)
         PanelLayout layout = panel_layout(input->width, input->height, input->scale, trainer->desk.view, panel_has_panels(trainer->panel));
         const HandGrip grip = trainer->desk.grip;
         desk_obey(&trainer->desk, views_scene(trainer->views), &actions, &layout, fmin(now - last, 0.1));
-        hand_grip_obey(&trainer->desk.grip, trainer->desk.tool_count, buttons_of_hands(trainer), &trainer->buttons);
+        unsigned buttons = buttons_of_hands(trainer);
+        actions.pressed[ACTION_BOOKMARK] += (buttons & ~trainer->buttons & HAND_MARK) != 0;
+        hand_grip_obey(&trainer->desk.grip, trainer->desk.tool_count, buttons, &trainer->buttons);
         tell_grip(trainer, &grip, &actions);
         last = now;
         drive_by_keys(trainer, &actions);

@@ -20,7 +20,8 @@
 //     invert: true
 //     optional: true            # a device without it is good too
 //   twist: {source: X, deg_s: 180}                                 # or deg_per_count; right-handed about the direction of advance
-//   pedal: {source: button_1}   # also contrast, stop, mark, choose_outer, choose_inner, lock, let_go (input/hand_port.h); an axis with `above: 0.5` (part of full deflection); one or a list
+//   pedal: {source: button_1}   # also contrast, stop, mark, choose_outer, choose_inner, lock, let_go (input/hand_port.h); one or a list; an axis with
+//                               # `above: 0.5` (part of full deflection)
 //   force:                      # HID PID (input/force_feedback.h), of the tool that the first control of push or twist moves
 //     full_scale_n: 8           # what the device gives at its largest magnitude
 //     max_n: 4
@@ -128,7 +129,8 @@ bool device_map_find_tools(DeviceMap *map, const ToolNames *tools, Faults *fault
 // "roller.yaml and stick.yaml both move wire …" where several of these maps name one tool, found before; else false.
 bool device_maps_share(const DeviceMap *const *map, int count, const ToolNames *tools, int tool, char *text, size_t capacity);
 
-// The built-in maps: any GLFW gamepad, for one tool and for a tool in each stick, any GLFW joystick, HID joystick, HID gamepad, HID multi-axis controller. A haptic joystick's has force.
+// The built-in maps: any GLFW gamepad (for one tool, and with a tool in each stick), any GLFW joystick, HID joystick, HID gamepad, HID multi-axis
+// controller. A haptic joystick's has force.
 typedef enum {
     BUILT_IN_GAMEPAD,
     BUILT_IN_GAMEPAD_PAIR,
