@@ -446,32 +446,6 @@ static void normal_bends_are_no_buckling(void **state)
 // --- forces ---
 
 // At rest against the end, what the shaft carries into the tip is the wall's resultant on it.
-// A wire goes 40 mm ahead of a catheter that stands: nodes come to the line, and the catheter's are still the first.
-static void of_several_tools_the_first_is_judged_at_the_sheath(void **state)
-{
-    (void)state;
-    Practice *p = practice_begin("seldinger: 1\n"
-                                 "vessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 150}]}}\n"
-                                 "tools:\n"
-                                 "  - {name: catheter, kind: catheter, elements: 20, inserted_mm: 22,\n"
-                                 "     sections: [{length_mm: 60, diameter_mm: 1, inner_diameter_mm: 0.6, young_modulus_gpa: 1}]}\n"
-                                 "  - {name: wire, kind: wire, elements: 120, inserted_mm: 22, sections: [{length_mm: 160, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
-                                 "sheath: {entry_mm: [1, 0, 0], direction: [1, 0, 0]}\n",
-                                 NULL);
-    int before = simulator_state(p->simulator)->node_count;
-    for (int i = 0; i < 1000; i++) {
-        ToolCommands commands = {.tool = {{0, 0}, {40, 0}}};
-        simulator_step_tools(p->simulator, &commands);
-        score_step(p->score, p->simulator, &commands, NULL);
-        assert_near(score_figures(p->score).lost_mm, 0, 0.05);
-    }
-    ScoreFigures f = score_figures(p->score);
-    assert_true(simulator_state(p->simulator)->node_count > before + 20);
-    assert_near(f.inserted_mm, 0, 1e-9);
-    assert_near(f.path_mm, 40, 0.5);     // of the tip that reaches furthest
-    practice_end(p);
-}
-
 static void the_tips_force_is_the_walls(void **state)
 {
     (void)state;
@@ -870,7 +844,6 @@ int main(void)
         cmocka_unit_test(a_tool_whose_tip_is_held_buckles_at_the_sheath),
         cmocka_unit_test(a_blind_end_makes_it_buckle),
         cmocka_unit_test(normal_bends_are_no_buckling),
-        cmocka_unit_test(of_several_tools_the_first_is_judged_at_the_sheath),
         cmocka_unit_test(the_tips_force_is_the_walls),
         cmocka_unit_test(wall_force_is_summed_over_time),
         cmocka_unit_test(the_named_tool_has_to_be_there),
