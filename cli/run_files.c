@@ -18,6 +18,17 @@ double run_final_penetration_mm(const NodeReport *node, int node_count)
 
 bool run_left_vessel(const RunTotals *totals) { return totals->penetration_max > lost_mm; }
 
+static const char *why_not_exchanged(StepExchange outcome)
+{
+    switch (outcome) {
+    case EXCHANGE_INSERTED: return "the tool was still in: an inner one is first drawn back to its hub, the outermost one to the sheath's mouth";
+    case EXCHANGE_TOO_SHORT: return "a tool is too short: the one within would end inside the new one's hub, or the new one inside the hub around it";
+    case EXCHANGE_NO_SUCH_TOOL: return "there is no such tool under its 'exchange:'";
+    case EXCHANGE_DONE: break;
+    }
+    return "";
+}
+
 static void add_numbers(cJSON *object, int count, const char *const *name, const double *value)
 {
     for (int i = 0; i < count; i++)
@@ -138,6 +149,8 @@ char *run_summary_json(Simulator *simulator, const DriveReport *drive, const Nod
                 (double[]){histogram_quantile(&profile->iterations, 0.5), (double)profile->iterations.largest, (double)totals->not_converged_steps,
                            totals->residual_max, (double)totals->further_linearisations, (double)totals->limited_steps,
                            (double)totals->disagreeing_steps});
+    part = cJSON_AddObjectToObject(summary, "exchanges");
+    add_numbers(part, 2, (const char *const[]){"done", "refused"}, (double[]){(double)totals->exchanges, (double)totals->refused_exchanges});
     part = cJSON_AddObjectToObject(summary, "proximal");
     add_numbers(part, 6, (const char *const[]){"force_n", "torque_n_mm", "force_least_n", "force_most_n", "slip_steps", "slipped_mm"},
                 (double[]){last->proximal_force, last->proximal_torque, totals->push_least, totals->push_most, (double)totals->hand_slip_steps,
@@ -247,6 +260,10 @@ void run_print(FILE *out, Simulator *simulator, const DriveReport *drive, const 
     if (totals->hand_slip_steps)
         fprintf(out, "the hand slipped in %" PRId64 " steps, %.2f mm along the tool: it holds no more than %g N\n", totals->hand_slip_steps, totals->hand_slipped,
                 scene->wire.hand_limit);
+    if (totals->exchanges)
+        fprintf(out, "%" PRId64 " tools were exchanged\n", totals->exchanges);
+    if (totals->refused_exchanges)
+        fprintf(out, "%" PRId64 " exchanges were refused, the last because %s\n", totals->refused_exchanges, why_not_exchanged(totals->refusal));
     const EnergyBalance *e = simulator_energy(simulator);
     if (e->watched)
         fprintf(out, "energy [mJ]: hand %.4g, loads %.4g = elastic %.4g, kinetic %.2g, friction %.4g, damping %.4g, numerical %.4g (the wall gave %.3g); single steps "

@@ -13,11 +13,12 @@ typedef struct Command {
     double twist_deg_s;      // right-handed about the direction of advance
 } Command;
 
-enum { TOOLS_MOST = 4, TOOL_NAME_SIZE = 32 };
+enum { TOOLS_MOST = 4, EXCHANGES_MOST = 4, TOOL_NAME_SIZE = 32 };
 
 typedef struct ToolCommands {
     Command tool[TOOLS_MOST];    // outermost first; a tool that is not named is pinned: 0
     unsigned released;           // bit k: no hand holds tool k, only the friction of the valve that it goes through
+    int fitted[TOOLS_MOST];      // which of the tools that may be tool k: 0 the scene's, 1, 2, … those under its `exchange:`
 } ToolCommands;
 
 typedef struct ToolNames {   // of the scene that a script is for, outermost first; NULL after the last
@@ -31,6 +32,7 @@ typedef struct ScriptRow {
     Command command;                 // of the first tool
     Command inner[TOOLS_MOST - 1];   // of those within it
     unsigned released;               // as in ToolCommands
+    int fitted[TOOLS_MOST];          // as in ToolCommands
 } ScriptRow;
 
 typedef struct Script {      // each row holds from its time until the next; the last row's time ends the script
@@ -45,7 +47,7 @@ enum { SCRIPT_FASTEST_MM_S = 1000, SCRIPT_FASTEST_DEG_S = 36000, SCRIPT_LONGEST_
 // where no hand holds the tool and 0 where one does; without it one does.
 Script *script_parse(const char *text, size_t length, const char *file, Faults *faults);
 // For a scene's tools: the header above, which is that of the first tool, or t_s and NAME.push_mm_s with NAME.twist_deg_s, or
-// NAME.released, for any of them, in any order.
+// NAME.released and NAME.exchange, for any of them, in any order.
 Script *script_parse_tools(const char *text, size_t length, const char *file, const ToolNames *tools, Faults *faults);
 // Reads the file (at most 64 MiB) and parses it.
 Script *script_load(const char *path, Faults *faults);

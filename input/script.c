@@ -9,9 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PUSH, TWIST, RELEASED, QUANTITIES };
+enum { PUSH, TWIST, RELEASED, EXCHANGE, QUANTITIES };
 static const char header[] = "t_s,push_mm_s,twist_deg_s", header_with_release[] = "t_s,push_mm_s,twist_deg_s,released";
-static const char *const quantity[QUANTITIES + 1] = {"push_mm_s", "twist_deg_s", "released", NULL};
+static const char *const quantity[QUANTITIES + 1] = {"push_mm_s", "twist_deg_s", "released", "exchange", NULL};
 
 // What the columns after t_s are: the tool of each, and which of its quantities.
 typedef struct Columns {
@@ -71,7 +71,7 @@ static void fault_unknown_tool(const char *name, const NumberColumn *column, int
         faults_add(faults, file, line, column->column, "no tool of the scene is named '%s'; it has: %s", name, all);
 }
 
-// One column that is not t_s: NAME.push_mm_s, NAME.twist_deg_s or NAME.released.
+// One column that is not t_s: NAME.push_mm_s, NAME.twist_deg_s, NAME.released or NAME.exchange.
 static bool read_column(const NumberColumn *column, int line, const ToolNames *tools, const char *file, int *tool, int *which, Faults *faults)
 {
     int shown = (int)(column->length < 80 ? column->length : 80);
@@ -82,7 +82,7 @@ static bool read_column(const NumberColumn *column, int line, const ToolNames *t
         const char *example = tools->name[0];
         if (dot && (*tool = find_word(column->name, name_length, tools->name)) >= 0)
             example = tools->name[*tool];
-        faults_add(faults, file, line, column->column, "a column is headed '%.*s'; beside named tools each is NAME.push_mm_s, NAME.twist_deg_s or NAME.released, such as '%s.push_mm_s'",
+        faults_add(faults, file, line, column->column, "a column is headed '%.*s'; beside named tools each is NAME.push_mm_s, NAME.twist_deg_s, NAME.released or NAME.exchange, such as '%s.push_mm_s'",
                    shown, column->name, example);
         return false;
     }
@@ -101,7 +101,7 @@ static bool read_columns(const NumberColumn *field, int count, int line, const T
     int before = faults->count, place[TOOLS_MOST][QUANTITIES] = {{0}};
     size_t used = (size_t)snprintf(columns->header, sizeof columns->header, "t_s");
     if (count > NUMBER_TABLE_COLUMNS) {
-        faults_add(faults, file, line, 1, "has %d columns; t_s and up to three for each of the scene's %d tools", count, tools->count);
+        faults_add(faults, file, line, 1, "has %d columns; t_s and up to four for each of the scene's %d tools", count, tools->count);
         return false;
     }
     if (!is_word(field[0].name, field[0].length, "t_s"))
@@ -151,6 +151,8 @@ static void put_value(ScriptRow *row, int tool, int which, double value)
     Command *command = script_row_command(row, tool);
     if (which == RELEASED)
         row->released |= value != 0 ? 1u << tool : 0;
+    else if (which == EXCHANGE)
+        row->fitted[tool] = (int)fmax(0, fmin(value, EXCHANGES_MOST));
     else
         *(which == TWIST ? &command->twist_deg_s : &command->push_mm_s) = value;
 }
@@ -178,6 +180,8 @@ Script *script_parse_tools(const char *text, size_t length, const char *file, co
                 put_value(row, columns.tool[c], columns.quantity[c], value[1 + c]);
                 if (columns.quantity[c] == RELEASED && value[1 + c] != 0 && value[1 + c] != 1)
                     faults_add(faults, file, table->line[i], 1, "released is %g; 0 where a hand holds the tool, 1 where none does", value[1 + c]);
+                if (columns.quantity[c] == EXCHANGE && (value[1 + c] < 0 || value[1 + c] > EXCHANGES_MOST || value[1 + c] != floor(value[1 + c])))
+                    faults_add(faults, file, table->line[i], 1, "exchange is %g; 0 for the scene's tool, 1 to %d for those under its 'exchange:'", value[1 + c], EXCHANGES_MOST);
             }
             script_check_row(row, i ? row - 1 : NULL, tools, file, table->line[i], 1, faults);
             script->count = i + 1;
@@ -258,6 +262,7 @@ ToolCommands script_tools_at(const Script *script, double t_s, int *cursor)
     if (script->count < 2 || t_s < script->row[0].t_s || i == script->count - 1)
         return (ToolCommands){0};
     ToolCommands commands = {.tool = {script->row[i].command}, .released = script->row[i].released};
+    memcpy(commands.fitted, script->row[i].fitted, sizeof commands.fitted);
     memcpy(commands.tool + 1, script->row[i].inner, sizeof script->row[i].inner);
     return commands;
 }

@@ -347,7 +347,7 @@ static void read_simulation(Reading *reading, YamlValue value)
 }
 
 // The valid keys of a script's row: t_s, the first tool's by their bare names, and each tool's by its name.
-enum { KEYS_OF_TOOL = 3, NAMED_KEYS = 1 + KEYS_OF_TOOL };
+enum { KEYS_OF_TOOL = 4, NAMED_KEYS = 1 + KEYS_OF_TOOL };
 typedef struct RowKeys {
     const char *key[NAMED_KEYS + KEYS_OF_TOOL * TOOLS_MOST + 1];
     char text[KEYS_OF_TOOL * TOOLS_MOST][TOOL_NAME_SIZE + 16];
@@ -355,8 +355,8 @@ typedef struct RowKeys {
 
 static void list_row_keys(const ToolNames *tools, RowKeys *keys)
 {
-    static const char *const bare[] = {"t_s", "push_mm_s", "twist_deg_s", "released"};
-    *keys = (RowKeys){.key = {bare[0], bare[1], bare[2], bare[3]}};
+    static const char *const bare[] = {"t_s", "push_mm_s", "twist_deg_s", "released", "exchange"};
+    *keys = (RowKeys){.key = {bare[0], bare[1], bare[2], bare[3], bare[4]}};
     for (int i = 0; i < KEYS_OF_TOOL * tools->count; i++) {
         snprintf(keys->text[i], sizeof keys->text[i], "%s.%s", tools->name[i / KEYS_OF_TOOL], bare[1 + i % KEYS_OF_TOOL]);
         keys->key[NAMED_KEYS + i] = keys->text[i];
@@ -391,6 +391,9 @@ static bool read_row(YamlValue item, const RowKeys *keys, int tools, ScriptRow *
         if (yaml_has(&map, push) != yaml_has(&map, twist))
             yaml_fault(item, "'%s' lacks its other half; give '%s' too", yaml_has(&map, push) ? push : twist, yaml_has(&map, push) ? twist : push);
         bool has_release = read_released(&map, key[2], k, row);
+        YamlValue exchange = yaml_get(&map, key[3], false);
+        if (exchange.node)
+            yaml_integer(exchange, 0, EXCHANGES_MOST, &row->fitted[k]);
         if (bare && (has_push || has_twist || has_release))
             yaml_fault(item, "a row names its tools or moves the first by bare 'push_mm_s' and 'twist_deg_s', not both; write '%s' and '%s'",
                        keys->key[NAMED_KEYS], keys->key[NAMED_KEYS + 1]);
@@ -593,6 +596,11 @@ void scene_free(Scene *scene)
             free((void *)scene->tool[k].wire.section);
         free(scene->tool[k].device_path);
     }
+    for (int i = 0; i < scene->exchange_count; i++) {
+        free((void *)scene->exchange[i].device.wire.section);
+        free(scene->exchange[i].device.device_path);
+    }
+    free(scene->exchange);
     free((void *)scene->wire.fix);
     free((void *)scene->wire.load);
     script_free(scene->script);
@@ -628,9 +636,14 @@ double scene_tool_attenuation(const Scene *scene, int tool, double s)
 
 double scene_attenuation(const Scene *scene, double s) { return scene_tool_attenuation(scene, 0, s); }
 
-bool scene_has_one_tool(const Scene *scene, const char *what, Faults *faults)
+bool scene_keeps_its_tools(const Scene *scene, const char *what, Faults *faults)
 {
-    if (scene->tool_count > 1)
-        faults_add(faults, scene->path, 0, 0, "has %d tools; %s works with one so far, `seldinger run` with several", scene->tool_count, what);
-    return scene->tool_count <= 1;
+    static const int first[TOOLS_MOST];
+    bool keeps = true;
+    for (int i = 0; scene->script && i < scene->script->count; i++)
+        keeps &= memcmp(scene->script->row[i].fitted, first, sizeof first) == 0;
+    if (!keeps)
+        faults_add(faults, scene->script_path ? scene->script_path : scene->path, 0, 0,
+                   "exchanges tools; %s cannot follow an exchange yet, `seldinger run` with --summary, --final and --chart does", what);
+    return keeps;
 }

@@ -47,6 +47,11 @@ typedef struct SceneTool {
     char *device_path;           // the device file that its keys come from; NULL: none
 } SceneTool;
 
+typedef struct SceneExchange {
+    int tool;                // whose place it may take
+    SceneTool device;        // its name is that tool's
+} SceneExchange;
+
 typedef struct Scene {
     char *path;              // of the YAML file
     char *text;              // its full text, as read
@@ -72,6 +77,8 @@ typedef struct Scene {
     double dt;               // [ms]
     Script *script;          // NULL: none
     char *script_path;       // NULL where inline or none
+    int exchange_count;      // tools that may take the place of one of `tool`: the script's exchange column names them by their order under that tool
+    SceneExchange *exchange;
     int target_count;
     SceneTarget *target;
     double marker_length, marker_attenuation;   // [mm], [1/mm] of the first tool's marker
@@ -89,8 +96,9 @@ void scene_free(Scene *scene);
 // A tool's options as they are now: scene->wire for the first, and for the others their own with start, direction, normal, sheath and gravity of scene->wire
 // (which `inlet: root` sets late).
 WireOptions scene_tool_wire(const Scene *scene, int tool);
-// A fault where the scene has several tools and `what` works with one so far.
-bool scene_has_one_tool(const Scene *scene, const char *what, Faults *faults);
+WireOptions scene_placed_wire(const Scene *scene, const WireOptions *own);
+// A fault where the script exchanges tools and `what` cannot follow that.
+bool scene_keeps_its_tools(const Scene *scene, const char *what, Faults *faults);
 ToolNames scene_tool_names(const Scene *scene);      // as scripts know them; lives as long as the scene
 // [1/mm] by which the first tool, or any, takes X-rays away at arc length s from its proximal end.
 double scene_attenuation(const Scene *scene, double s);

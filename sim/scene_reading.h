@@ -20,7 +20,7 @@ typedef struct Reading {
     const char *path;
     Faults *faults;
     double total_length;     // of the first tool; 0 until known
-    ToolReading tool[TOOLS_MOST];
+    ToolReading tool[TOOLS_MOST], exchange[TOOLS_MOST * EXCHANGES_MOST];
 } Reading;
 
 static const NumberRange length_range = {0, 1e5, true}, friction_range = {0, 10, false};

@@ -10,6 +10,7 @@
 
 #include <ctype.h>
 #include <stdlib.h>
+#include <stdio.h>
 #include <string.h>
 
 static const double wire_attenuation = 0.55, marker_attenuation = 1.2, marker_length = 3;   // DESIGN section 8, what convinced
@@ -247,21 +248,13 @@ static void read_name(Reading *reading, YamlValue value, int index)
     strcpy(scene->tool[index].name, name);
 }
 
-static void read_entry(Reading *reading, YamlValue value, int index)
+// What an entry of `tools:` and one of `exchange:` have in common, from the scene or a device file.
+static void read_device(Reading *reading, ToolSource *source, SceneTool *tool, ToolReading *read, bool needs_kind)
 {
-    static const char *const keys[] = {"name", "kind", "device", "length_mm", "inserted_mm", "friction_inside", "elements", "sections", "rest", "damping",
-                                       "tip_marker", "hand_limit_n", "valve_n", NULL};
-    SceneTool *tool = &reading->scene->tool[index];
-    ToolReading *read = &reading->tool[index];
-    ToolSource source = {.own = yaml_map(value, keys)};
     YamlReader *device = NULL;
     const char *file;
-    read->whole = value;
-    if (!source.own.value.node)
-        return;
-    read_name(reading, yaml_get(&source.own, "name", true), index);
-    if (yaml_has(&source.own, "device")) {
-        if (yaml_text(yaml_get(&source.own, "device", false), &file))
+    if (yaml_has(&source->own, "device")) {
+        if (yaml_text(yaml_get(&source->own, "device", false), &file))
             tool->device_path = scene_resolved(reading, file);
         size_t length;
         char *text = tool->device_path ? text_file_read(tool->device_path, &length, reading->faults) : NULL;
@@ -269,17 +262,51 @@ static void read_entry(Reading *reading, YamlValue value, int index)
         free(text);
         if (!device)
             return;          // its keys are not known to lack
-        source.device = device_map_of(device);
+        source->device = device_map_of(device);
     }
-    YamlValue kind = tool_get(&source, "kind", true);
+    YamlValue kind = tool_get(source, "kind", needs_kind);
     int choice = kind.node ? yaml_choice(kind, tool_kind_name) : -1;
     tool->kind = choice >= 0 ? (ToolKind)choice : TOOL_CATHETER;
-    read_tool(reading, &source, tool, read);
-    check_device(&source, tool, read->sound);
-    tool_number(&source, "friction_inside", friction_range, &tool->friction_inside);
+    read_tool(reading, source, tool, read);
+    check_device(source, tool, read->sound);
+    tool_number(source, "friction_inside", friction_range, &tool->friction_inside);
+    yaml_reader_close(device);
+}
+
+static void read_exchange(Reading *reading, YamlValue list, int index)
+{
+    static const char *const keys[] = {"device", "length_mm", "friction_inside", "elements", "sections", "rest", "damping", "tip_marker", "hand_limit_n", "valve_n", NULL};
+    Scene *scene = reading->scene;
+    int count = list.node ? yaml_count(list, 1, EXCHANGES_MOST) : 0;
+    for (int i = 0; i < count; i++) {
+        SceneExchange *e = &scene->exchange[scene->exchange_count];
+        ToolReading *read = &reading->exchange[scene->exchange_count];
+        ToolSource source = {.own = yaml_map(yaml_item(list, i), keys)};
+        *read = (ToolReading){.whole = yaml_item(list, i)};
+        if (!source.own.value.node)
+            continue;
+        scene->exchange_count++;
+        e->tool = index;
+        e->device.kind = scene->tool[index].kind;
+        snprintf(e->device.name, sizeof e->device.name, "%s", scene->tool[index].name);
+        read_device(reading, &source, &e->device, read, false);
+    }
+}
+
+static void read_entry(Reading *reading, YamlValue value, int index)
+{
+    static const char *const keys[] = {"name", "kind", "device", "length_mm", "inserted_mm", "friction_inside", "elements", "sections", "rest", "damping",
+                                       "tip_marker", "hand_limit_n", "valve_n", "exchange", NULL};
+    ToolReading *read = &reading->tool[index];
+    ToolSource source = {.own = yaml_map(value, keys)};
+    read->whole = value;
+    if (!source.own.value.node)
+        return;
+    read_name(reading, yaml_get(&source.own, "name", true), index);
+    read_device(reading, &source, &reading->scene->tool[index], read, true);
     read->inserted = yaml_get(&source.own, "inserted_mm", false);
     read->inserted_known = yaml_number(read->inserted, (NumberRange){0, read->length_known ? read->length : 1e5, false}, &read->inserted_mm);
-    yaml_reader_close(device);
+    read_exchange(reading, yaml_get(&source.own, "exchange", false), index);
 }
 
 void scene_read_tools(Reading *reading, YamlValue value)
@@ -289,6 +316,9 @@ void scene_read_tools(Reading *reading, YamlValue value)
     if (count > TOOLS_MOST)
         yaml_fault(yaml_item(value, TOOLS_MOST), "'%s' has %d tools; at most %d, from the outermost to the innermost", value.name, count, TOOLS_MOST);
     scene->tool_count = count < 0 ? 0 : count < TOOLS_MOST ? count : TOOLS_MOST;
+    scene->exchange = scene_zeroed(reading, TOOLS_MOST * EXCHANGES_MOST, sizeof *scene->exchange);
+    if (!scene->exchange)
+        return;
     for (int k = 0; k < scene->tool_count; k++)
         read_entry(reading, yaml_item(value, k), k);
     if (scene->tool_count > 0)
@@ -331,6 +361,24 @@ static void check_hub(const ToolReading *read, const SceneTool *inner, const Too
         yaml_fault(place, "'%s' is %g mm long, but '%s' around it has %g mm outside; make it at least %g mm long", inner_name, read->length, outer_name, behind, least);
 }
 
+// Each of them fits into all that may be around it, and around all that may be within.
+static void check_exchanges(const Reading *reading)
+{
+    const Scene *scene = reading->scene;
+    if (scene->exchange_count > 0 && scene->tool_count == 1)
+        yaml_fault(reading->exchange[0].whole, "the scene has one tool; over which wire, or in which catheter, is it to be exchanged? List two tools or more");
+    for (int i = 0; i < scene->exchange_count; i++) {
+        const SceneExchange *e = &scene->exchange[i];
+        if (e->tool > 0)
+            check_lumen(&reading->exchange[i], &e->device, &reading->tool[e->tool - 1], &scene->tool[e->tool - 1]);
+        if (e->tool + 1 < scene->tool_count)
+            check_lumen(&reading->tool[e->tool + 1], &scene->tool[e->tool + 1], &reading->exchange[i], &e->device);
+        for (int j = 0; j < scene->exchange_count; j++)
+            if (scene->exchange[j].tool == e->tool + 1)
+                check_lumen(&reading->exchange[j], &scene->exchange[j].device, &reading->exchange[i], &e->device);
+    }
+}
+
 void scene_settle_tools(Reading *reading, bool placed)
 {
     Scene *scene = reading->scene;
@@ -352,13 +400,14 @@ void scene_settle_tools(Reading *reading, bool placed)
             check_hub(read, &scene->tool[k], read - 1, &scene->tool[k - 1], around);
         around = scene->tool[k].wire.inserted;
     }
+    check_exchanges(reading);
 }
 
-WireOptions scene_tool_wire(const Scene *scene, int tool)
+WireOptions scene_tool_wire(const Scene *scene, int tool) { return tool == 0 ? scene->wire : scene_placed_wire(scene, &scene->tool[tool].wire); }
+
+WireOptions scene_placed_wire(const Scene *scene, const WireOptions *own)
 {
-    if (tool == 0)
-        return scene->wire;
-    WireOptions wire = scene->tool[tool].wire;
+    WireOptions wire = *own;
     wire.has_sheath = scene->wire.has_sheath;
     wire.start = scene->wire.start;
     wire.direction = scene->wire.direction;

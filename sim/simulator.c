@@ -20,6 +20,7 @@ struct Simulator {
     StepEnergy before;       // of the state before
     TargetReach *target;
     double dt;               // [ms]
+    int asked[TOOLS_MOST];   // which tools the last commands asked for
 };
 
 static void measure_targets(Simulator *simulator)
@@ -51,6 +52,13 @@ Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *fa
             inner[k - 1] = scene_tool_wire(scene, k), options.inner_friction[k - 1] = scene->tool[k - 1].friction_inside;
         options.inner_count = scene->tool_count > 1 ? scene->tool_count - 1 : 0;
         options.inner = inner;
+        StepperSpare spare[TOOLS_MOST * EXCHANGES_MOST];
+        for (int i = 0; i < scene->exchange_count; i++) {
+            const SceneExchange *e = &scene->exchange[i];
+            spare[i] = (StepperSpare){.tool = e->tool, .wire = scene_placed_wire(scene, &e->device.wire), .friction_inside = e->device.friction_inside};
+        }
+        options.spare_count = scene->exchange_count;
+        options.spare = spare;
         simulator->stepper = stepper_create(&options, why, (int)sizeof why);
     }
     if (!simulator || !simulator->stepper) {
@@ -162,8 +170,30 @@ void simulator_step(Simulator *simulator, Command command)
     simulator_step_tools(simulator, &(ToolCommands){.tool = {command}});
 }
 
+// A tool that cannot be exchanged is asked for once: until the command changes it stays refused.
+static void exchange(Simulator *simulator, const ToolCommands *commands)
+{
+    for (int k = 0; k < stepper_tool_count(simulator->stepper); k++) {
+        int asked = commands->fitted[k];
+        if (asked == simulator->asked[k])
+            continue;
+        simulator->asked[k] = asked;
+        double before = simulator->energy.watched ? stepper_elastic_energy(simulator->stepper) : 0;
+        StepExchange outcome = stepper_exchange(simulator->stepper, k, asked);
+        if (outcome == EXCHANGE_DONE) {
+            simulator->totals.exchanges++;
+            // what the tools hold behind the hub, straight in the hand, is not the run's
+            simulator->before.elastic += simulator->energy.watched ? stepper_elastic_energy(simulator->stepper) - before : 0;
+        } else {
+            simulator->totals.refused_exchanges++;
+            simulator->totals.refusal = outcome;
+        }
+    }
+}
+
 void simulator_step_tools(Simulator *simulator, const ToolCommands *commands)
 {
+    exchange(simulator, commands);
     Stepper *stepper = simulator->stepper;
     StepProfile *profile = &simulator->profile;
     double seconds = simulator->dt / 1000;

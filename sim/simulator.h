@@ -30,6 +30,9 @@ typedef struct RunTotals {
     int64_t further_linearisations;  // steps that took a second Newton iteration or more
     int64_t disagreeing_steps;       // steps in which the vessel's model contradicted itself about the wall at a point of the tool
     int64_t limited_steps;           // steps whose motion was cut; the next ones completed it
+    int64_t exchanges;               // of tools at the hub
+    int64_t refused_exchanges;       // that a command asked for where the tool was still in, or one too short: it stayed as it was …
+    StepExchange refusal;            // … and why, of the last
     int64_t hand_slip_steps;         // steps in which the tool asked for more force than the hand holds …
     double hand_slipped;             // [mm] … and how far the hand slid along it, there and back
     int contacts_max;                // contacts with force
