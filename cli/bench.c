@@ -70,6 +70,15 @@ Spread bench_spread(const TimeHistogram *histogram, double unit)
                     (double)histogram->largest / unit};
 }
 
+void bench_add_spread(cJSON *object, const char *name, Spread s)
+{
+    cJSON *at = cJSON_AddObjectToObject(object, name);
+    cJSON_AddNumberToObject(at, "median", s.median);
+    cJSON_AddNumberToObject(at, "p99", s.p99);
+    cJSON_AddNumberToObject(at, "p999", s.p999);
+    cJSON_AddNumberToObject(at, "max", s.max);
+}
+
 Command bench_command(const Scene *scene, int64_t step, int *cursor)
 {
     return scene->script ? script_at(scene->script, (double)step * scene->dt / 1000, cursor) : (Command){0, 0};

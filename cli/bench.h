@@ -29,6 +29,7 @@ typedef struct StepFigures { // of all steps of a run; times are the thread's CP
 
 int64_t bench_cpu_ns(void);
 Spread bench_spread(const TimeHistogram *histogram, double unit);
+void bench_add_spread(cJSON *object, const char *name, Spread s);
 // The command of step i, from the scene's script.
 Command bench_command(const Scene *scene, int64_t step, int *cursor);
 int64_t bench_steps(const Scene *scene, int64_t most);   // of the script, but not more than `most`

@@ -6,12 +6,13 @@
 //   growth       the spiral's wire in 50 to 800 elements
 //   levels       the same runs with each SIMD level forced: the state hash must not change
 //   kernels      assembly, factor and solve, detection alone, against the budgets (DESIGN.md section 7)
-#include "cli/bench.h"
+#include "cli/bench_tools.h"
 
 #include "cli/output.h"
 #include "geom/simd.h"
 #include "solver/block_chain.h"
 
+#include <getopt.h>
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -54,9 +55,10 @@ typedef struct StepBench {
 } StepBench;
 
 static const char help[] =
-    "Usage: seldinger bench step [--quick] [--threads N] [--json F]\n\n"
+    "Usage: seldinger bench step [--tools] [--quick] [--threads N] [--json F]\n\n"
     "What a simulation step costs, where, and how right it is: spiral at 100 GPa, phantom and aneurism; 50 to 800 elements; each SIMD level.\n"
     "Run it from the project's folder. Times are CPU times of the simulation's thread.\n\n"
+    "  --tools      coaxial tools instead: one to four of them with 50 to 200 nodes, in the phantom, the arch and the angiogram\n"
     "  --quick      200 steps of each scene, fewer samples\n"
     "  --threads N  threads of offline work such as fitting the shapes; default 0: all cores\n"
     "  --json F     the same figures as JSON; - is standard output, the tables then go to standard error\n\n"
@@ -436,15 +438,6 @@ static void print_budgets(FILE *out, const StepBench *bench, SimdLevel widest)
 
 // --- JSON ---
 
-static void add_spread(cJSON *object, const char *name, Spread s)
-{
-    cJSON *at = cJSON_AddObjectToObject(object, name);
-    cJSON_AddNumberToObject(at, "median", s.median);
-    cJSON_AddNumberToObject(at, "p99", s.p99);
-    cJSON_AddNumberToObject(at, "p999", s.p999);
-    cJSON_AddNumberToObject(at, "max", s.max);
-}
-
 static cJSON *run_json(const StepFigures *run)
 {
     cJSON *at = cJSON_CreateObject();
@@ -452,14 +445,14 @@ static cJSON *run_json(const StepFigures *run)
     snprintf(hash, sizeof hash, "%016" PRIx64, run->hash);
     cJSON_AddNumberToObject(at, "steps", (double)run->steps);
     cJSON_AddNumberToObject(at, "real_time_factor", run->simulated_s / run->cpu_s);
-    add_spread(at, "step_us", run->step_us);
+    bench_add_spread(at, "step_us", run->step_us);
     cJSON *stages = cJSON_AddObjectToObject(at, "stage_us");
     for (int k = 0; k < STAGE_COUNT; k++)
-        add_spread(stages, stage_name[k], run->stage_us[k]);
-    add_spread(at, "candidates", run->candidates);
-    add_spread(at, "contacts", run->contacts);
-    add_spread(at, "iterations", run->iterations);
-    add_spread(at, "penetration_um", run->penetration_um);
+        bench_add_spread(stages, stage_name[k], run->stage_us[k]);
+    bench_add_spread(at, "candidates", run->candidates);
+    bench_add_spread(at, "contacts", run->contacts);
+    bench_add_spread(at, "iterations", run->iterations);
+    bench_add_spread(at, "penetration_um", run->penetration_um);
     cJSON_AddNumberToObject(at, "not_converged_steps", (double)run->not_converged);
     cJSON_AddNumberToObject(at, "linearised_again_steps", (double)run->linearised_again);
     cJSON_AddNumberToObject(at, "limited_steps", (double)run->limited);
@@ -538,15 +531,52 @@ static bool write_json(const StepBench *bench, SimdLevel widest, Faults *faults)
 
 // --- the verb ---
 
+static int parse(int argc, char **argv, BenchOptions *options, bool *tools)
+{
+    enum { TOOLS = 256 };
+    static const struct option list[] = {{"tools", no_argument, NULL, TOOLS},          {"json", required_argument, NULL, 'j'}, {"quick", no_argument, NULL, 'q'},
+                                         {"threads", required_argument, NULL, 't'}, {"help", no_argument, NULL, 'h'},       {0}};
+    optind = 1;
+    for (int choice, code; (choice = getopt_long(argc, argv, "h", list, NULL)) != -1;)
+        if (choice == TOOLS)
+            *tools = true;
+        else if ((code = bench_take(choice, "step", help, options)) >= 0)
+            return code;
+    if (optind < argc) {
+        fprintf(stderr, "seldinger bench step: takes no '%s'; see --help\n", argv[optind]);
+        return EXIT_BAD_INPUT;
+    }
+    return -1;
+}
+
+static int tools_table(const BenchOptions *options, Faults *faults)
+{
+    static ToolsBench bench;
+    FILE *out = bench_text(options);
+    fprintf(out, "%s, %s\n", bench_processor(), simd_name[simd_level()]);
+    if (!bench_tools(options, &bench, faults))
+        return cli_bad_input(faults);
+    bench_tools_print(out, &bench);
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "processor", bench_processor());
+    bench_tools_json(cJSON_AddArrayToObject(root, "tools"), &bench);
+    bool good = bench_write_json(options, root, faults);
+    cJSON_Delete(root);
+    return good ? EXIT_DONE : cli_bad_input(faults);
+}
+
 int bench_step(int argc, char **argv)
 {
     static StepBench bench;
     static Faults faults;
-    int code = bench_parse(argc, argv, "step", help, &bench.options);
+    bool tools = false;
+    int code = parse(argc, argv, &bench.options, &tools);
     if (code >= 0)
         return code;
     if (!output_check(bench.options.json, &faults))
         return cli_bad_input(&faults);
+    if (tools)
+        return tools_table(&bench.options, &faults);
     FILE *out = bench_text(&bench.options);
     bench.most_steps = bench.options.quick ? 200 : INT64_MAX;
     SimdLevel widest = simd_level();

@@ -48,6 +48,9 @@ struct ContactSolver {
     BlockChain matrix;           // with the contacts' laws: diag and A(i, i+1) by columns (which is the row-major lower of a symmetric chain)
     double *turned;              // (M, n, n) A(i+1, i) by columns …
     double *turned_chain;        // … and that of the chain
+    BlockChain braced;           // the caller's chain with slides that give; `lower` is the caller's own …
+    double *side;                // … and its right-hand side (M, n)
+    BlockFactor *braced_factor;
     BlockLu *lu;
     BlockFactor *factor;
     BlockCondenser *condenser;
@@ -74,6 +77,10 @@ Mat3 contact_pairs_block(const ContactPairs *pairs, int k, int l);
 // s->delta, which is what the rows of the chain give without the pairs that are not open, becomes that with them. False: singular.
 bool contact_pairs_step(ContactSolver *solver, int count, bool reuse, bool whole, ContactSolve solve);
 
+// The contacts [0, count) with the wall, and rigid slides, on a chain that is not factored yet. False where it is not positive definite.
+bool contact_walls(ContactSolver *solver, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u, ContactReport *report);
+// These, and the slides [from, to) that give.
+ContactReport contact_slides(ContactSolver *solver, const BlockChain *chain, const double *b, int from, int to, const ContactOptions *options, double *u);
 ContactReport contact_pointwise(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
                                 const ContactOptions *options, double *u);
 ContactReport contact_newton(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,

@@ -276,8 +276,13 @@ static void solve_local(const Mat3 *w, const double *d, double mu, double *start
 }
 
 // One slide: d + w f. The search is Newton's on 1/|f|, which is concave in g and meets the root from below, at once where both directions give alike.
-static void solve_slide(const Mat3 *w, const double *d, double bound, double *f)
+// One that gives is rigid with a spring in series.
+static void solve_slide(const ContactRow *c, const Mat3 *own, const double *motion, double *f)
 {
+    const double bound = c->bound, soft = c->spring > 0 ? 1 / c->spring : 0;
+    const double d[3] = {0, motion[1] - soft * c->held.x, motion[2] - soft * c->held.y};
+    Mat3 spring = *own, *w = &spring;
+    spring.m[1][1] += soft, spring.m[2][2] += soft;
     double scale = w->m[1][1] + w->m[2][2], g = 1e-13 * scale; // a direction that is held has no motion: keeps the 2x2 regular
     f[0] = f[1] = f[2] = 0;
     for (int k = 0; k < 50 && scale > 0; k++) {
@@ -336,7 +341,7 @@ static void visit(PointwiseWork *w, ContactRow *row, int from, int to, bool reve
             d[a] = vec3_dot(motion, l->axis[a]) - l->w.m[a][0] * old[0] - l->w.m[a][1] * old[1] - l->w.m[a][2] * old[2];
         d[0] += c->gap;
         if (c->slide)
-            solve_slide(&l->w, d, c->bound, f);
+            solve_slide(c, &l->w, d, f);
         else
             solve_local(&l->w, d, c->friction, &l->g, f);
         Vec3 force = vec3_add_scaled(vec3_add_scaled(vec3_scale(l->axis[0], f[0]), f[1], l->axis[1]), f[2], l->axis[2]);

@@ -13,6 +13,7 @@
 
 #include "solver/block_chain.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 #include "solver/contact.h"
 
@@ -29,15 +30,18 @@ struct ContactRow {
     bool inert;                  // the node cannot yield along the normal, or no slide can move or bear: no force
     Vec3 normal;
     double gap, radius, friction;
-    double bound;                // [N] of a slide
+    double bound;                // [N] of a slide …
+    double spring;               // [N/mm] … and bound over give, 0: rigid …
+    Vec3 held;                   // … on the force that it began with
     double stiffness_n, stiffness_t; // [N/mm] of the node alone, neighbours held: the scale of the residual and of penalties
     Vec3 force;                  // on the tool
     ContactRow *far;             // NULL: no pair
 };
 
 // Sorted by node, then xi, the slides of a node behind its walls (insertion sort: the caller's set comes nearly in order), pairs behind all others.
-// Returns their number. `far` has room for the pairs' second ends.
-int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow *row, ContactRow *far);
+// Returns their number, without that of the slides that give where these are wanted apart: they then follow in the caller's order. `far` has room for the
+// pairs' second ends.
+int contact_rows_fill(const ContactSet *set, const BlockChain *chain, bool gives_apart, ContactRow *row, ContactRow *far);
 
 // Minus the arm at which node e's turn moves the contact: its motion is w u + negative_arm x theta.
 static inline Vec3 contact_row_negative_arm(const ContactRow *c, int e)
@@ -126,6 +130,8 @@ static inline double contact_row_excess(const ContactRow *c)
 // What is wrong with force f and motion d, in N: f less the nearest force in the cone to f - slope k violation, each direction by itself.
 static inline Vec3 contact_error(const ContactRow *c, Vec3 f, Vec3 d, double slope)
 {
+    if (c->spring > 0)
+        return vec3_sub(f, contact_project(c, vec3_add_scaled(c->held, -c->spring, d)));
     Vec3 n = c->normal;
     double fn = vec3_dot(f, n), wish_n = fn - slope * c->stiffness_n * (c->gap + vec3_dot(d, n));
     Vec3 ft = contact_tangential(f, n), wish = vec3_add_scaled(ft, -slope * c->stiffness_t, contact_tangential(d, n));

@@ -14,6 +14,7 @@
 
 // Condensing costs about as much as two factorisations of what goes: it pays unless nearly all nodes stay.
 static const double FULL_SHARE = 1.25;
+static const double LEAST_FORCE = 1e-3;  // [N] that errors are measured against
 
 ContactOptions contact_default_options(void)
 {
@@ -46,7 +47,7 @@ static void own_stiffness(const BlockChain *chain, ContactRow *c)
 }
 
 // The mean over the directions in which it can move, as along a wall.
-static void slide_stiffness(const BlockChain *chain, ContactRow *c)
+static void slide_stiffness(const BlockChain *chain, double give, ContactRow *c)
 {
     const size_t n = (size_t)chain->size, at = (size_t)c->slide;
     const double *d = chain->diag + n * n * (size_t)c->node + (n + 1) * at;
@@ -54,6 +55,7 @@ static void slide_stiffness(const BlockChain *chain, ContactRow *c)
     double s = c->mask[0] & 1 ? d[0] : 0, phi = c->mask[0] & 2 ? d[n + 1] / (c->radius * c->radius) : 0;
     c->stiffness_n = c->stiffness_t = (s + phi) / (c->mask[0] == 3 ? 2 : 1);
     c->inert = c->mask[0] == 0 || !(c->bound > 0) || !isfinite(c->bound) || !isfinite(c->radius);
+    c->spring = give > 0 && !c->inert ? c->bound / give : 0;
 }
 
 // Both ends give way.
@@ -91,9 +93,13 @@ static void insert(ContactRow *row, int k, const ContactRow *c)
     row[k] = *c;
 }
 
-int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow *row, ContactRow *far)
+int contact_rows_fill(const ContactSet *set, const BlockChain *chain, bool gives_apart, ContactRow *row, ContactRow *far)
 {
     const Vec3 none = {0, 0, 0};
+    int count = set->count, apart = 0;
+    for (int i = 0; gives_apart && i < set->slide_count; i++)
+        apart += set->slide[i].give > 0;
+    int behind = set->count + set->slide_count + set->pair_count - apart;
     for (int i = 0; i < set->count; i++) {
         const ContactPoint *p = &set->point[i];
         ContactRow c = {.node = p->node, .chain_node = p->node, .stride = chain->size, .point = i, .nodes = p->xi > 0 && p->node + 1 < chain->count ? 2 : 1, .weight = {1, 0},
@@ -113,12 +119,16 @@ int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow
         const ContactSlide *p = &set->slide[i];
         ContactRow c = {.node = p->node, .chain_node = p->node, .stride = chain->size, .slide = p->unknown, .point = i, .nodes = 1, .weight = {1, 0},
                         .normal = {0, 0, 1}, .radius = p->radius, .bound = p->bound};
-        slide_stiffness(chain, &c);
+        slide_stiffness(chain, p->give, &c);
         Vec3 force = vec3(c.mask[0] & 1 ? p->force[0] : 0, c.mask[0] & 2 ? p->force[1] : 0, 0);
         c.force = c.inert || !vec3_is_finite(force) ? none : contact_project(&c, force);
-        insert(row, set->count + i, &c);
+        Vec3 held = vec3(c.mask[0] & 1 ? p->held[0] : 0, c.mask[0] & 2 ? p->held[1] : 0, 0);
+        c.held = c.inert || !vec3_is_finite(held) ? none : contact_project(&c, held);
+        if (gives_apart && p->give > 0)
+            row[behind++] = c;
+        else
+            insert(row, count++, &c);
     }
-    int count = set->count + set->slide_count;
     for (int i = 0; i < set->pair_count; i++) {
         const ContactPair *p = &set->pair[i];
         far[i] = pair_end(p, 1, chain->size);
@@ -136,7 +146,7 @@ int contact_rows_fill(const ContactSet *set, const BlockChain *chain, ContactRow
 
 double contact_residual(const ContactRow *row, int count, const Vec3 *motion, ContactReport *report)
 {
-    double worst = 0, top = 1e-6, cone = 0; // squares, the first two
+    double worst = 0, top = LEAST_FORCE * LEAST_FORCE, cone = 0; // squares, the first two
     int active = 0, pairs = 0;
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &row[i];
@@ -190,11 +200,14 @@ ContactSolver *contact_solver_create(int node_count, int size, int contact_capac
     s->turned = calloc(blocks, sizeof *s->turned);
     s->turned_chain = calloc(blocks, sizeof *s->turned_chain);
     s->small_u = calloc(n, sizeof *s->small_u);
+    s->side = calloc(n, sizeof *s->side);
+    s->braced.diag = calloc(blocks, sizeof *s->braced.diag);
+    s->braced_factor = block_factor_create(node_count, size);
     s->lu = block_lu_create(node_count, size);
     s->condenser = block_condenser_create(node_count, size);
     s->factor = block_factor_create(node_count, size);
     s->pointwise = pointwise_work_create(node_count, size, contact_capacity);
-    bool ok = block_chain_create(&s->matrix, node_count, size) && s->pointwise && s->condenser && s->small_u && s->turned_chain;
+    bool ok = block_chain_create(&s->matrix, node_count, size) && s->pointwise && s->condenser && s->small_u && s->turned_chain && s->side && s->braced.diag && s->braced_factor;
     if (!s->row || !s->motion || !s->law || !s->best || !s->best_u || !s->flag || !s->wall || !s->rhs || !s->delta || !s->turned || !s->lu || !s->factor || !ok) {
         contact_solver_destroy(s);
         return NULL;
@@ -234,6 +247,9 @@ void contact_solver_destroy(ContactSolver *s)
     free(s->delta);
     free(s->turned);
     free(s->small_u);
+    free(s->side);
+    free(s->braced.diag);
+    block_factor_destroy(s->braced_factor);
     free(s->turned_chain);
     block_condenser_destroy(s->condenser);
     block_lu_destroy(s->lu);
@@ -281,25 +297,60 @@ static bool solve_condensed(ContactSolver *s, const BlockChain *chain, const dou
     return true;
 }
 
+bool contact_walls(ContactSolver *s, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u, ContactReport *report)
+{
+    *report = (ContactReport){.converged = true, .largest = LEAST_FORCE};
+    if (count == 0)
+        return block_chain_factor_solve(chain, s->factor, b, u);
+    if (solve_condensed(s, chain, b, count, options, u, report))
+        return true;
+    if (!block_chain_factor(chain, s->braced_factor))
+        return false;
+    for (int i = 0; i < count; i++)
+        s->row[i].node = s->row[i].chain_node;
+    for (int i = s->banded; i < count; i++)
+        s->row[i].far->node = s->row[i].far->chain_node;
+    *report = contact_newton(s, chain, s->braced_factor, b, count, options, u);
+    return true;
+}
+
+bool contact_needs_factor(const ContactSet *set, const ContactOptions *options)
+{
+    bool gives = false;
+    for (int i = 0; i < set->slide_count; i++)
+        gives |= set->slide[i].give > 0;
+    return !gives || options->form == CONTACT_POINTWISE;
+}
+
 ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, ContactSet *set,
                             const ContactOptions *options, double *u)
 {
-    int count = contact_rows_fill(set, chain, solver->row, contact_pairs_far(solver->pairs));
+    bool by_points = options->form == CONTACT_POINTWISE;
+    int count = contact_rows_fill(set, chain, !by_points, solver->row, contact_pairs_far(solver->pairs)), all = set->count + set->slide_count + set->pair_count;
     solver->banded = count - set->pair_count;
     solver->wall_count = 0;
     for (int i = 0; i < solver->banded; i++)
         if (!solver->row[i].slide)
             solver->wall[solver->wall_count++] = i;
     ContactReport report;
-    if (options->form == CONTACT_POINTWISE)
+    for (int i = count; i < all; i++) {
+        const double *slip = set->slide[solver->row[i].point].slip;
+        bool known = isfinite(slip[0]) && isfinite(slip[1]);
+        solver->motion[i] = vec3(known && solver->row[i].mask[0] & 1 ? slip[0] : 0, known && solver->row[i].mask[0] & 2 ? slip[1] : 0, 0);
+    }
+    if (by_points)
         report = contact_pointwise(solver, chain, factor, b, count, options, u);
+    else if (count < all)
+        report = contact_slides(solver, chain, b, count, all, options, u);
     else if (!solve_condensed(solver, chain, b, count, options, u, &report))
         report = contact_newton(solver, chain, factor, b, count, options, u);
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < all; i++) {
         const ContactRow *c = &solver->row[i];
         if (c->far) {
             set->pair[c->point].force = c->force;
         } else if (c->slide) {
+            set->slide[c->point].slip[0] = solver->motion[i].x;
+            set->slide[c->point].slip[1] = solver->motion[i].y;
             set->slide[c->point].force[0] = c->force.x;
             set->slide[c->point].force[1] = c->force.y;
         } else {

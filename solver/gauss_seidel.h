@@ -33,6 +33,7 @@ typedef struct ContactReport {
     double cone_violation;   // largest (|force_t| - mu force_n)+ over force_n, or (|force| - bound)+ over a slide's bound
     int active;              // contacts with the wall that bear force
     int pairs;               // … and contacts of the tool with itself
+    bool singular;           // the chain is not positive definite: nothing was solved
 } ContactReport;
 
 typedef struct ContactSolver ContactSolver;   // work space
@@ -46,6 +47,8 @@ bool contact_solver_reserve_pairs(ContactSolver *solver, int pairs);
 // `chain` with their value in b, and no contact acts on a fully constrained node.
 ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, ContactSet *set,
                             const ContactOptions *options, double *u);
+// False: it will not look at `factor`.
+bool contact_needs_factor(const ContactSet *set, const ContactOptions *options);
 ContactOptions contact_default_options(void);
 
 #endif

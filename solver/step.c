@@ -533,16 +533,23 @@ static void hold_to_iterate(Stepper *s, double share)
         }
 }
 
-// A matrix that is not positive definite (a tool springs, and nothing holds it) is made so.
+// A matrix that is not positive definite (a tool springs, and nothing holds it) is made so: by ever larger shares, from 0 on.
+static bool firmer(Stepper *s, double *share)
+{
+    *share = *share > 0 ? 10 * *share : 0.01;
+    if (!(*share < FIRMEST))
+        return false;
+    hold_to_iterate(s, *share);
+    return s->was_held = true;
+}
+
 void step_factor(Stepper *s)
 {
-    bool good = block_chain_factor(&s->chain, s->factor);
-    for (double share = 0.01; !good && share < FIRMEST; share *= 10) {
-        hold_to_iterate(s, share);
-        good = block_chain_factor(&s->chain, s->factor);
-        s->was_held = true;
-    }
-    s->has_failed |= !good;
+    if (!contact_needs_factor(&s->set, &s->contact))
+        return;
+    double share = 0;
+    while (!s->has_failed && !block_chain_factor(&s->chain, s->factor))
+        s->has_failed = !firmer(s, &share);
 }
 
 static void solve(Stepper *s)
@@ -550,10 +557,17 @@ static void solve(Stepper *s)
     if (s->has_failed)
         return;
     ContactReport report = {.converged = true};
-    if (s->set.count + s->set.slide_count + s->set.pair_count > 0)
-        report = contact_solve(s->solver, &s->chain, s->factor, s->b, &s->set, &s->contact, s->u);
-    else
+    if (s->set.count + s->set.slide_count + s->set.pair_count > 0) {
+        double share = 0;
+        do
+            report = contact_solve(s->solver, &s->chain, s->factor, s->b, &s->set, &s->contact, s->u);
+        while (report.singular && firmer(s, &share));
+        s->has_failed = report.singular;
+        if (s->has_failed)
+            return;
+    } else {
         block_factor_solve(s->factor, s->b, s->u);
+    }
     if (s->tool_count > 1)
         tools_from_slips(s);
     hands_solved(s);
@@ -925,8 +939,10 @@ static void set_velocities(Stepper *s)
         w->velocity[i] = vec3(u[0] * rate, u[1] * rate, u[2] * rate);
         w->spin[i] = vec3(u[3] * rate, u[4] * rate, u[5] * rate);
     }
-    if (s->tool_count > 1)
+    if (s->tool_count > 1) {
         tools_set_velocities(s);
+        tools_keep_slides(s);
+    }
     stepper_use_clearance(s);
 }
 

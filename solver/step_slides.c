@@ -7,6 +7,7 @@
 #include "solver/step_tools.h"
 
 static const double FOLLOWS = 7.3;
+static const double GIVE = 1e-4;         // [mm] by which tools that stick on each other follow a force, elastically
 
 // M averaged over l has the slope (M(s + l/2) - M(s - l/2)) / l; M is that of the element at a place.
 static Vec3 moment_at(const Stepper *s, int k, double place)
@@ -36,6 +37,25 @@ static double pressure_at(const Stepper *s, int c, int k, double window)
     return vec3_norm(vec3_add_scaled(jump, -tension, vec3_cross(before, after)));
 }
 
+// The tool that is next around tool k at node c and is an unknown there too; 0: none.
+int tools_around(const Stepper *s, int c, int k)
+{
+    for (k--; k > 0 && !is_inside(s, c, k); k--)
+        ;
+    return k;
+}
+
+// Slip of tool k in a step as the last one.
+static void last_slip(const Stepper *s, int c, int k, double slip[2])
+{
+    const WireState *w = &s->state;
+    const double *speed = w->slide_velocity + c * w->inner_count - 1, *spin = w->slide_spin + c * w->inner_count - 1;
+    int out = tools_around(s, c, k);
+    Vec3 t = quat_rotate(w->orientation[c], vec3(1, 0, 0));
+    slip[0] = s->dt * ((out > 0 ? speed[out] : vec3_dot(w->velocity[c], t)) - speed[k]);
+    slip[1] = s->dt * (spin[k] - (out > 0 ? spin[out] : vec3_dot(w->spin[c], t)));
+}
+
 void tools_slides(Stepper *s)
 {
     s->set.slide_count = 0;
@@ -53,21 +73,16 @@ void tools_slides(Stepper *s)
             if (!is_inside(s, c, k) || !(t->friction > 0))
                 continue;
             double window = most > 0 ? FOLLOWS * sqrt(t->clearance / most) : 0;
-            double *last = s->state.slide_force + 3 * (c * inner + k - 1), bound = t->friction * pressure_at(s, c, k, window);
+            const double *last = s->state.slide_force + 3 * (c * inner + k - 1), bound = t->friction * pressure_at(s, c, k, window);
             // what slid goes on sliding: by the new bound
             bool slid = hypot(last[0], last[1]) > 0.999999 * last[2];
             double change = slid && last[2] > 0 ? bound / last[2] : 1;
-            last[2] = bound;
-            s->set.slide[s->set.slide_count++] = (ContactSlide){.node = c, .unknown = unknown_of(k), .radius = t->wire.radius[0], .bound = bound,
-                                                                 .force = {change * last[0], change * last[1]}};
+            double slip[2], radius = t->wire.radius[0];
+            last_slip(s, c, k, slip);
+            double force[2] = {change * last[0], change * last[1]};
+            s->set.slide[s->set.slide_count++] = (ContactSlide){.node = c, .unknown = unknown_of(k), .radius = radius, .bound = bound, .give = GIVE,
+                                                                 .slip = {slip[0], radius * slip[1]}, .held = {force[0], force[1]}, .force = {force[0], force[1]}};
         }
-}
-
-int tools_around(const Stepper *s, int c, int k)
-{
-    for (k--; k > 0 && !is_inside(s, c, k); k--)
-        ;
-    return k;
 }
 
 // S of tool k is its slip plus the S of the one around it: the rows and columns of tool k are added to that one's, from the innermost outwards.
@@ -95,17 +110,20 @@ void tools_to_slips(Stepper *s)
 
 void tools_from_slips(Stepper *s)
 {
-    int inner = s->state.inner_count;
     for (int c = 1; c < s->chain.count; c++)
         for (int k = 2; k < s->tool_count; k++) {
             int out = is_inside(s, c, k) ? tools_around(s, c, k) : 0;
             for (int i = 0; out > 0 && i < 2; i++)
                 s->u[row_of(s, c) + (size_t)(unknown_of(k) + i)] += s->u[row_of(s, c) + (size_t)(unknown_of(out) + i)];
         }
+}
+
+void tools_keep_slides(Stepper *s)
+{
     for (int i = 0; i < s->set.slide_count; i++) {
         const ContactSlide *slide = &s->set.slide[i];
-        double *force = s->state.slide_force + 3 * (slide->node * inner + (slide->unknown - 6) / 2);
-        force[0] = slide->force[0], force[1] = slide->force[1];
+        double *force = s->state.slide_force + 3 * (slide->node * s->state.inner_count + (slide->unknown - 6) / 2);
+        force[0] = slide->force[0], force[1] = slide->force[1], force[2] = slide->bound;
     }
 }
 

@@ -48,6 +48,7 @@ double tools_stiffness_damping(const Stepper *s);
 void tools_slides(Stepper *s);
 void tools_to_slips(Stepper *s);
 void tools_from_slips(Stepper *s);
+void tools_keep_slides(Stepper *s);                // the forces of this step's solution, for the next step
 double tools_friction_work(const Stepper *s);      // [mJ] that it took in this step
 
 // Unit rows where a tool is no unknown.

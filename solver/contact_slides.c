@@ -1,0 +1,101 @@
+// Slides that give: Newton's method on their forces, which are functions of the motion, with the wall's contacts solved inside every iteration.
+//
+// f(d) = P(t), t = held - k d, k = bound / give, P onto the disc of radius `bound`. About a motion e, with t there and the last iterate's force f0:
+//   |t| <= bound   f = t - k (d - e)
+//   beyond         f = bound p - C (d - e),  p = t / |t|,  C = k / |t| (bound I - (f0 p^T + p f0^T) / 2)
+// The second linearises f |t| = bound t in force and motion together (Chan, Golub and Mulet 1999, for total variation). With p in place of f0 / bound a
+// slide that is pushed past its turning point is not resisted, and goes to and fro for ever; so whole steps find the answer from anywhere.
+//
+// C is symmetric and positive and goes to the node's diagonal block whether or not the slide slips. So an iteration leaves a symmetric chain A + J^T C J
+// on which the wall's contacts are alone, condensed to their nodes: the many slides cost one elimination, and what the wall does costs little more. From the
+// slip of the step before one or two are the rule, up to ten where hands turn round.
+#include "solver/contact_forms.h"
+
+#include <string.h>
+
+static Vec3 force_at(const ContactRow *c, Vec3 d) { return contact_project(c, vec3_add_scaled(c->held, -c->spring, d)); }
+
+// C about motion e.
+static Mat3 resistance(const ContactRow *c, Vec3 e)
+{
+    Vec3 t = vec3_add_scaled(c->held, -c->spring, e), f0 = contact_project(c, c->force);
+    double size = vec3_norm(t);
+    if (size <= c->bound)
+        return (Mat3){{{c->spring, 0, 0}, {0, c->spring, 0}, {0, 0, 0}}};
+    Vec3 p = vec3_scale(t, 1 / size);
+    double k = c->spring / size, xy = -0.5 * k * (p.x * f0.y + p.y * f0.x);
+    return (Mat3){{{k * (c->bound - p.x * f0.x), xy, 0}, {xy, k * (c->bound - p.y * f0.y), 0}, {0, 0, 0}}};
+}
+
+// The laws about each slide's motion: into the chain's diagonal, and their forces on what does not move into the right-hand side.
+static void write_laws(ContactSolver *s, const BlockChain *chain, const double *b, int from, int to)
+{
+    const int n = chain->size;
+    memcpy(s->side, b, (size_t)(chain->count * n) * sizeof *b);
+    for (int i = from; i < to; i++) {
+        const ContactRow *c = &s->row[i];
+        ContactLaw *law = &s->law[i];
+        law->force = vec3(0, 0, 0);
+        if (c->inert)
+            continue;
+        law->c = resistance(c, s->motion[i]);
+        law->force = vec3_add(force_at(c, s->motion[i]), mat3_mul_vec(&law->c, s->motion[i]));
+        contact_row_push(c, law->force, s->side);
+        const double arm[2] = {c->mask[0] & 1 ? 1 : 0, c->mask[0] & 2 ? c->radius : 0};
+        const size_t at = (size_t)(n * n) * (size_t)c->node + (size_t)((n + 1) * c->slide);
+        for (int q = 0; q < 2; q++)
+            for (int r = 0; r < 2; r++)
+                s->braced.diag[at + (size_t)(n * r + q)] = chain->diag[at + (size_t)(n * r + q)] + arm[r] * law->c.m[r][q] * arm[q];
+    }
+}
+
+// Forces by the laws and motion of a solution; returns how far these forces are from those due at the motion [N]. *largest: of the forces.
+static double read_solution(ContactSolver *s, const double *u, int from, int to, double *largest)
+{
+    double worst = 0, top = 0;
+    for (int i = from; i < to; i++) {
+        ContactRow *c = &s->row[i];
+        ContactLaw *law = &s->law[i];
+        law->step = contact_row_motion(c, u);
+        if (c->inert)
+            continue;
+        c->force = vec3_sub(law->force, mat3_mul_vec(&law->c, law->step));
+        worst = fmax(worst, vec3_norm2(vec3_sub(c->force, force_at(c, law->step))));
+        top = fmax(top, vec3_norm2(c->force));
+    }
+    *largest = fmax(*largest, sqrt(top));
+    return sqrt(worst);
+}
+
+ContactReport contact_slides(ContactSolver *s, const BlockChain *chain, const double *b, int from, int to, const ContactOptions *options, double *u)
+{
+    ContactReport report = {0};
+    const size_t block = (size_t)(chain->size * chain->size);
+    s->braced.count = chain->count;
+    s->braced.size = chain->size;
+    s->braced.lower = chain->lower;
+    memcpy(s->braced.diag, chain->diag, (size_t)chain->count * block * sizeof(double));
+    int most = options->max_iterations / CONTACT_SWEEPS_PER_FACTOR, iterations = 0;
+    for (int i = 0; i < most || i == 0; i++) {
+        write_laws(s, chain, b, from, to);
+        if (!contact_walls(s, &s->braced, s->side, from, options, u, &report)) {
+            report.singular = true;
+            return report;
+        }
+        iterations += 1 + report.iterations;
+        double wall = report.residual * report.largest, error = read_solution(s, u, from, to, &report.largest);
+        report.residual = fmax(wall, error) / report.largest;
+        report.converged &= error <= options->tolerance * report.largest;
+        if (error <= options->tolerance * report.largest)
+            break;
+        for (int k = from; k < to; k++)
+            s->motion[k] = s->law[k].step;
+    }
+    report.iterations = iterations;
+    for (int i = from; i < to; i++) {
+        ContactRow *c = &s->row[i];
+        s->motion[i] = s->law[i].step;
+        c->force = contact_project(c, c->force);
+    }
+    return report;
+}
