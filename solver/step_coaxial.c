@@ -158,30 +158,6 @@ static void places(const CoaxialInput *in, const int *tool, int n, int place[NOD
     }
 }
 
-static void add_local(Local *local, const CoaxialTangent *t, int columns, const int *place)
-{
-    int n = local->n;
-    for (int r = 0; r < 6; r++)
-        for (int c = 0; c < 6; c++) {
-            local->tangent[r][c] += t->nodes.k11[6 * r + c];
-            local->tangent[n + r][c] += t->nodes.k21[6 * r + c];
-            local->tangent[c][n + r] += t->nodes.k21[6 * r + c];
-            local->tangent[n + r][n + c] += t->nodes.k22[6 * r + c];
-        }
-    for (int p = 0; p < columns; p++) {
-        int at = place[NODAL + p];
-        if (at < 0)
-            continue;
-        for (int r = 0; r < NODAL; r++) {
-            local->tangent[place[r]][at] += t->cross[r][p];
-            local->tangent[at][place[r]] += t->cross[r][p];
-        }
-        for (int q = 0; q < columns; q++)
-            if (place[NODAL + q] >= 0)
-                local->tangent[at][place[NODAL + q]] += t->own[p][q];
-    }
-}
-
 static void clear(Local *local, int n)
 {
     local->n = n;
@@ -286,15 +262,75 @@ static void tip_element(const Stepper *s, int c, double scale, Local *local)
     element_by_ways(s, c, &in, way, tool, scale, local);
 }
 
-// Element c between two nodes of the same tool.
-static void inner_element(const Stepper *s, int c, double scale, Local *local)
+// The tangent of an element between two nodes of the same tool.
+static void add_tangent(const Stepper *s, int c, const CoaxialTangent *t, int columns, const int *place)
+{
+    int n = s->chain.size;
+    double *d = s->chain.diag + block_of(s, c), *next = s->chain.diag + block_of(s, c + 1), *l = s->chain.lower + block_of(s, c);
+    for (int r = 0; r < 6; r++)
+        for (int k = 0; k < 6; k++) {
+            d[n * r + k] += t->nodes.k11[6 * r + k];
+            l[n * r + k] += t->nodes.k21[6 * r + k];
+            next[n * r + k] += t->nodes.k22[6 * r + k];
+        }
+    for (int p = 0; p < columns; p++) {
+        int at = place[NODAL + p], far = at - n;
+        if (at < 0)
+            continue;
+        for (int r = 0; r < 6; r++) {
+            double near_row = t->cross[r][p], far_row = t->cross[6 + r][p];
+            if (far < 0) {
+                d[n * r + at] += near_row;
+                d[n * at + r] += near_row;
+                l[n * r + at] += far_row;
+            } else {
+                l[n * far + r] += near_row;
+                next[n * r + far] += far_row;
+                next[n * far + r] += far_row;
+            }
+        }
+        for (int q = 0; q < columns; q++) {
+            int to = place[NODAL + q];
+            if (to >= 0 && to < n && far < 0)
+                d[n * at + to] += t->own[p][q];
+            else if (to >= 0 && to < n)
+                l[n * far + to] += t->own[p][q];
+            else if (to >= n && far >= 0)
+                next[n * far + to - n] += t->own[p][q];
+        }
+    }
+}
+
+// y = T u, both [2 n].
+static void multiply_tangent(const CoaxialTangent *t, int columns, const int *place, int n, const double *u, double *y)
+{
+    memset(y, 0, 2 * (size_t)n * sizeof *y);
+    for (int r = 0; r < 6; r++)
+        for (int c = 0; c < 6; c++) {
+            y[r] += t->nodes.k11[6 * r + c] * u[c] + t->nodes.k21[6 * c + r] * u[n + c];
+            y[n + r] += t->nodes.k21[6 * r + c] * u[c] + t->nodes.k22[6 * r + c] * u[n + c];
+        }
+    for (int p = 0; p < columns; p++) {
+        int at = place[NODAL + p];
+        for (int r = 0; at >= 0 && r < NODAL; r++) {
+            y[place[r]] += t->cross[r][p] * u[at];
+            y[at] += t->cross[r][p] * u[place[r]];
+        }
+        for (int q = 0; at >= 0 && q < columns; q++)
+            y[at] += place[NODAL + q] >= 0 ? t->own[p][q] * u[place[NODAL + q]] : 0;
+    }
+}
+
+// Element c between two nodes of the same tool, as element().
+static void inner_element(const Stepper *s, int c, double scale, bool adds, double *gradient, const double *u, double *product)
 {
     int n = s->chain.size, tool[STEP_TOOLS_MAX], place[NODAL + COAXIAL_COLUMNS], columns = 0;
     BeamOutput own;
-    CoaxialInput in = {0};
+    CoaxialInput in;
     CoaxialOutput out;
     CoaxialTangent t;
     const BeamOutput *o = &own;
+    in.count = 0;
     if (is_plain(s, c)) {
         BeamInput beam = stepper_beam(s, c);
         beam_element(&beam, &own);
@@ -309,38 +345,30 @@ static void inner_element(const Stepper *s, int c, double scale, Local *local)
         o = &out.beam;
     }
     places(&in, tool, n, place);
-    clear(local, n);
-    add_local(local, &t, columns, place);
-    put(local->gradient, vec3_negate(o->force2));
-    put(local->gradient + 3, o->moment1);
-    put(local->gradient + n, o->force2);
-    put(local->gradient + n + 3, o->moment2);
+    if (adds)
+        add_tangent(s, c, &t, columns, place);
+    if (product)
+        multiply_tangent(&t, columns, place, n, u, product);
+    memset(gradient, 0, 2 * (size_t)n * sizeof *gradient);
+    put(gradient, vec3_negate(o->force2));
+    put(gradient + 3, o->moment1);
+    put(gradient + n, o->force2);
+    put(gradient + n + 3, o->moment2);
     for (int p = 0; p < columns; p++)
         if (place[NODAL + p] >= 0)
-            local->gradient[place[NODAL + p]] += out.gradient[p];
+            gradient[place[NODAL + p]] += out.gradient[p];
 }
 
-static void free_element(const Stepper *s, int c, double scale, Local *local)
-{
-    if (is_at_tip(s, c))
-        tip_element(s, c, scale, local);
-    else
-        inner_element(s, c, scale, local);
-}
-
-static void add_to_chain(Stepper *s, int c, const Local *local)
+static void add_to_chain(const Stepper *s, int c, const Local *local)
 {
     int n = local->n;
-    double *d = s->chain.diag + block_of(s, c), *next = s->chain.diag + block_of(s, c + 1), *l = s->chain.lower + block_of(s, c), *b = s->b + row_of(s, c);
-    for (int r = 0; r < n; r++) {
+    double *d = s->chain.diag + block_of(s, c), *next = s->chain.diag + block_of(s, c + 1), *l = s->chain.lower + block_of(s, c);
+    for (int r = 0; r < n; r++)
         for (int k = 0; k < n; k++) {
             d[n * r + k] += local->tangent[r][k];
             next[n * r + k] += local->tangent[n + r][n + k];
             l[n * r + k] += local->tangent[n + r][k];
         }
-        b[r] -= local->gradient[r];
-        b[n + r] -= local->gradient[n + r];
-    }
 }
 
 // --- the sheath ---
@@ -449,7 +477,7 @@ static void mouth_element_of_tools(const Stepper *s, double scale, Local *local)
 }
 
 // What lies straight behind the mouth gets longer with S there.
-static void add_straightening(const Stepper *s, Local *local)
+static void add_straightening(const Stepper *s, double *gradient)
 {
     int tool[STEP_TOOLS_MAX];
     CoaxialInput in = mouth_input(s, tool);
@@ -458,7 +486,7 @@ static void add_straightening(const Stepper *s, Local *local)
     for (int i = 0; i < in.count; i++) {
         const Way *w = &way[NODAL + 4 * i + COAXIAL_S1];
         for (int j = 0; j < w->count; j++)
-            local->gradient[w->at[j]] += straightening(&s->tool[tool[i]], in.span[i].s1) * w->by[j];
+            gradient[w->at[j]] += straightening(&s->tool[tool[i]], in.span[i].s1) * w->by[j];
     }
 }
 
@@ -656,16 +684,30 @@ static void tips_short_of_nodes(Stepper *s)
 
 // --- all of it ---
 
-static void element(const Stepper *s, int c, double scale, Local *local)
+// Gradient of element c [2 n]. Its tangent, the main stiffness times `scale`, goes to the chain where that is wanted, and times u to `product`, unless NULL.
+static void element(const Stepper *s, int c, double scale, bool adds, double *gradient, const double *u, double *product)
 {
-    if (c + 1 < s->first_free) {
-        clear(local, s->chain.size);
-        sheath_element_of_tools(s, c, scale, local);
-    } else if (c + 1 == s->first_free) {
-        mouth_element_of_tools(s, scale, local);
-    } else {
-        free_element(s, c, scale, local);
+    Local local;
+    if (c + 1 > s->first_free && !is_at_tip(s, c)) {
+        inner_element(s, c, scale, adds, gradient, u, product);
+        return;
     }
+    if (c + 1 < s->first_free) {
+        clear(&local, s->chain.size);
+        sheath_element_of_tools(s, c, scale, &local);
+    } else if (c + 1 == s->first_free) {
+        mouth_element_of_tools(s, scale, &local);
+    } else {
+        tip_element(s, c, scale, &local);
+    }
+    if (adds)
+        add_to_chain(s, c, &local);
+    for (int r = 0; product && r < 2 * local.n; r++) {
+        product[r] = 0;
+        for (int k = 0; k < 2 * local.n; k++)
+            product[r] += local.tangent[r][k] * u[k];
+    }
+    memcpy(gradient, local.gradient, 2 * (size_t)s->chain.size * sizeof *gradient);
 }
 
 // How element c has turned as a whole in this step; at the mouth it is clamped.
@@ -696,35 +738,34 @@ static void strained(const Stepper *s, int c, double *u)
     }
 }
 
-// The damping's force on an iterate: `damped` is the element's tangent with it, of which `elastic` is without.
-static void add_damping(const Stepper *s, int c, const Local *elastic, Local *damped)
+// The damping's force on an iterate: what the element's tangent with it has more than the elastic one.
+static void add_damping(const Stepper *s, int c, double scale, double *force)
 {
-    int n = damped->n;
-    double u[2 * BLOCK_LARGEST];
+    double u[2 * BLOCK_LARGEST], with[2 * BLOCK_LARGEST], without[2 * BLOCK_LARGEST], unused[2 * BLOCK_LARGEST];
     strained(s, c, u);
-    for (int r = 0; r < 2 * n; r++)
-        for (int k = 0; k < 2 * n; k++)
-            damped->gradient[r] += (damped->tangent[r][k] - elastic->tangent[r][k]) * u[k];
+    element(s, c, scale, false, unused, u, with);
+    element(s, c, 1, false, unused, u, without);
+    for (int i = 0; i < 2 * s->chain.size; i++)
+        force[i] += with[i] - without[i];
 }
 
 void tools_assemble(Stepper *s, double scale, double inertia)
 {
-    int nodes = s->state.node_count;
-    Local local, elastic;
+    int nodes = s->state.node_count, n = s->chain.size;
     memset(s->chain.diag, 0, block_of(s, nodes) * sizeof(double));
     memset(s->chain.lower, 0, block_of(s, nodes - 1) * sizeof(double));
     memset(s->b, 0, row_of(s, nodes) * sizeof(double));
     for (int c = 0; c < nodes; c++)
         node_inertia(s, c, inertia);
     for (int c = 0; c + 1 < nodes; c++) {
-        element(s, c, scale, &local);
-        if (s->is_iterate && scale != 1) {
-            element(s, c, 1, &elastic);
-            add_damping(s, c, &elastic, &local);
-        }
+        double *b = s->b + row_of(s, c), gradient[2 * BLOCK_LARGEST];
+        element(s, c, scale, true, gradient, NULL, NULL);
+        if (s->is_iterate && scale != 1)
+            add_damping(s, c, scale, gradient);
         if (c + 1 == s->first_free)
-            add_straightening(s, &local);
-        add_to_chain(s, c, &local);
+            add_straightening(s, gradient);
+        for (int i = 0; i < 2 * n; i++)
+            b[i] -= gradient[i];
     }
     tips_short_of_nodes(s);
     if (!s->is_iterate)
@@ -776,15 +817,12 @@ double tools_stiffness_damping(const Stepper *s)
 {
     int n = s->chain.size;
     double work = 0, scale = 1 + s->damping_stiffness / s->dt;
-    Local local, elastic;
     for (int c = 0; c + 1 < s->state.node_count; c++) {
-        const double *done[2] = {s->linearised + row_of(s, c), s->linearised + row_of(s, c + 1)};
-        element(s, c, scale, &local);
-        element(s, c, 1, &elastic);
-        memset(local.gradient, 0, sizeof local.gradient);
-        add_damping(s, c, &elastic, &local);
+        const double *done = s->linearised + row_of(s, c);
+        double force[2 * BLOCK_LARGEST] = {0};
+        add_damping(s, c, scale, force);
         for (int i = 0; i < 2 * n; i++)
-            work += local.gradient[i] * done[i / n][i % n];
+            work += force[i] * done[i];
     }
     return work;
 }
