@@ -27,28 +27,27 @@ static void clamp_positive(double *xx, double *xy, double *yy)
     *xy = top * s / 2;
 }
 
-unsigned contact_free_dofs(const BlockChain *chain, int node)
+bool contact_is_free(const BlockChain *chain, int node, int r)
 {
     const int n = chain->size;
     const size_t block = (size_t)(n * n);
-    const double *d = chain->diag + block * (size_t)node;
-    unsigned mask = 0;
-    for (int r = 0; r < n; r++) {
-        int fixed = d[(n + 1) * r] == 1;
-        for (int c = 0; fixed && c < n; c++)
-            fixed = c == r || d[n * r + c] == 0;
-        if (fixed && node > 0) {
-            const double *l = chain->lower + block * (size_t)(node - 1);
-            for (int c = 0; fixed && c < n; c++)
-                fixed = l[n * r + c] == 0;
-        }
-        if (fixed && node + 1 < chain->count) {
-            const double *l = chain->lower + block * (size_t)node;
-            for (int c = 0; fixed && c < n; c++)
-                fixed = l[n * c + r] == 0;
-        }
-        mask |= fixed ? 0 : 1u << r;
+    const double *d = chain->diag + block * (size_t)node, *before = chain->lower + block * (size_t)(node > 0 ? node - 1 : 0), *after = chain->lower + block * (size_t)node;
+    if (d[(n + 1) * r] != 1)
+        return true;
+    bool any = false;
+    for (int c = 0; c < n; c++) {
+        any |= c != r && d[n * r + c] != 0;
+        any |= node > 0 && before[n * r + c] != 0;
+        any |= node + 1 < chain->count && after[n * c + r] != 0;
     }
+    return any;
+}
+
+unsigned contact_free_dofs(const BlockChain *chain, int node)
+{
+    unsigned mask = 0;
+    for (int r = 0; r < 6; r++)
+        mask |= contact_is_free(chain, node, r) ? 1u << r : 0;
     return mask;
 }
 

@@ -23,6 +23,8 @@
 
 #include "geom/linear.h"
 
+#include <stdbool.h>
+
 typedef struct ContactPoint {
     int node;
     double xi;               // [0, 1); 0: at the node, the usual case
@@ -74,7 +76,8 @@ typedef struct ContactSet {
 // DESIGN section 4, item 1.
 struct BlockChain;
 void contact_add_curvature(const ContactSet *set, struct BlockChain *chain);
-// Bit k: degree of freedom k of the node is free. A constrained one is recognised by its unit row; contacts neither push nor stiffen it.
-unsigned contact_free_dofs(const struct BlockChain *chain, int node);
+// Is a degree of freedom of a node free? A constrained one is recognised by its unit row; contacts neither push nor stiffen it.
+bool contact_is_free(const struct BlockChain *chain, int node, int dof);
+unsigned contact_free_dofs(const struct BlockChain *chain, int node);        // of the first six
 
 #endif

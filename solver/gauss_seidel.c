@@ -31,7 +31,7 @@ static void own_stiffness(const BlockChain *chain, ContactRow *c)
     for (int e = 0; e < c->nodes; e++) {
         const int size = chain->size;
         const double *d = chain->diag + (size_t)(size * size) * (size_t)(c->node + e), w = c->weight[e];
-        unsigned mask = c->mask[e] = contact_free_dofs(chain, c->node + e) & 63;
+        unsigned mask = c->mask[e] = contact_free_dofs(chain, c->node + e);
         Sym3 k = block_at(d, size), turn = block_at(d + 3 * (size + 1), size);
         double normal = sym3_quadratic(&k, n), free = (mask & 1 ? n.x * n.x : 0) + (mask & 2 ? n.y * n.y : 0) + (mask & 4 ? n.z * n.z : 0);
         yields += w * w * free;
@@ -51,7 +51,7 @@ static void slide_stiffness(const BlockChain *chain, double give, ContactRow *c)
 {
     const size_t n = (size_t)chain->size, at = (size_t)c->slide;
     const double *d = chain->diag + n * n * (size_t)c->node + (n + 1) * at;
-    c->mask[0] = contact_free_dofs(chain, c->node) >> at & (c->radius > 0 ? 3 : 1);
+    c->mask[0] = (contact_is_free(chain, c->node, c->slide) ? 1u : 0) | (c->radius > 0 && contact_is_free(chain, c->node, c->slide + 1) ? 2u : 0);
     double s = c->mask[0] & 1 ? d[0] : 0, phi = c->mask[0] & 2 ? d[n + 1] / (c->radius * c->radius) : 0;
     c->stiffness_n = c->stiffness_t = (s + phi) / (c->mask[0] == 3 ? 2 : 1);
     c->inert = c->mask[0] == 0 || !(c->bound > 0) || !isfinite(c->bound) || !isfinite(c->radius);

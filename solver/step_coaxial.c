@@ -519,55 +519,71 @@ static Lump lump_at(const Stepper *s, int c, int k)
     return (Lump){t->line_mass[section] * length, 2 * t->line_inertia[section] * length, t->line_inertia[section] * length};
 }
 
-// Inertia of one direction g, a combination of a node's unknowns [first, last), that moves at `velocity` [per ms] and is pushed by `push` [per ms2].
-static void add_inertia(Stepper *s, int c, double inertia, double mass, const double *g, int first, int last, double velocity, double push)
+// Momentum of one motion of a tool at a node, `along` its tangent or about it: what the node's unknowns have of it, and the tool's own unknown `at` where it is
+// inside (0: where it is not) with the sign `own`, moves at `speed` [per ms] and is pushed by `push` [per ms2].
+typedef struct Motion {
+    int first, at;
+    double own, speed, push;
+} Motion;
+
+static void add_along(Stepper *s, int c, double inertia, double mass, Vec3 t, bool held, const Motion *m)
+{
+    int n = s->chain.size, at = m->at;
+    double *d = s->chain.diag + block_of(s, c), *b = s->b + row_of(s, c);
+    const double *u = s->linearised + row_of(s, c) + m->first;
+    const double g[3] = {held ? 1 : t.x, held ? 0 : t.y, held ? 0 : t.z};
+    double done = g[0] * u[0] + g[1] * u[1] + g[2] * u[2] + (at > 0 ? m->own * s->linearised[row_of(s, c) + (size_t)at] : 0);
+    double force = mass * (m->speed / s->dt + m->push - inertia * done), stiff = inertia * mass;
+    for (int r = 0; r < 3; r++) {
+        int row = m->first + r;
+        b[row] += g[r] * force;
+        for (int k = 0; k < 3; k++)
+            d[n * row + m->first + k] += stiff * g[r] * g[k];
+        if (at > 0) {
+            d[n * row + at] += stiff * m->own * g[r];
+            d[n * at + row] += stiff * m->own * g[r];
+        }
+    }
+    if (at > 0) {
+        d[(n + 1) * at] += stiff;
+        b[at] += m->own * force;
+    }
+}
+
+// The same of all tools together across the tangent.
+static void add_across(Stepper *s, int c, double inertia, double mass, Vec3 t, int first, Vec3 speed, Vec3 push)
 {
     int n = s->chain.size;
-    double *d = s->chain.diag + block_of(s, c), *b = s->b + row_of(s, c), done = 0;
-    const double *u = s->linearised + row_of(s, c);
-    for (int i = first; i < last; i++)
-        done += g[i] * u[i];
-    double force = mass * (velocity / s->dt + push - inertia * done);
-    for (int r = first; r < last; r++) {
-        if (g[r] == 0)
-            continue;
-        b[r] += g[r] * force;
-        for (int k = first; k < last; k++)
-            d[n * r + k] += inertia * mass * g[r] * g[k];
-    }
+    double *d = s->chain.diag + block_of(s, c) + (n + 1) * first, *b = s->b + row_of(s, c) + first;
+    const double *u = s->linearised + row_of(s, c) + first, g[3] = {t.x, t.y, t.z};
+    Vec3 force = vec3_add_scaled(vec3_add_scaled(push, 1 / s->dt, speed), -inertia, vec3(u[0], u[1], u[2]));
+    put(b, vec3_add_scaled(vec3(b[0], b[1], b[2]), mass, vec3_add_scaled(force, -vec3_dot(force, t), t)));
+    for (int r = 0; r < 3; r++)
+        for (int k = 0; k < 3; k++)
+            d[n * r + k] += inertia * mass * ((r == k) - g[r] * g[k]);
 }
 
 static void node_inertia(Stepper *s, int c, double inertia)
 {
     const WireState *w = &s->state;
     bool held = c < s->first_free;
-    Vec3 t = held ? s->axis[0] : quat_rotate(w->orientation[c], vec3(1, 0, 0)), e = vec3_normal_to(t), f = vec3_cross(t, e);
-    Vec3 v = w->velocity[c], spin = w->spin[c];
+    Vec3 t = held ? s->axis[0] : quat_rotate(w->orientation[c], vec3(1, 0, 0)), v = w->velocity[c], spin = w->spin[c];
     Lump all = {0};
     for (int k = s->carrier[c]; k < s->tool_count; k++) {
-        if (k != s->carrier[c] && !is_inside(s, c, k))
+        bool own = k == s->carrier[c];
+        if (!own && !is_inside(s, c, k))
             continue;
         Lump lump = lump_at(s, c, k);
-        int at = unknown_of(k), i = c * w->inner_count + k - 1;
-        bool own = k == s->carrier[c];
-        double g[BLOCK_LARGEST] = {0}, turn[BLOCK_LARGEST] = {0};
-        if (held)
-            g[0] = turn[3] = 1;
-        else
-            g[0] = t.x, g[1] = t.y, g[2] = t.z, turn[3] = t.x, turn[4] = t.y, turn[5] = t.z;
-        if (!own)
-            g[at] = -1, turn[at + 1] = 1;
-        add_inertia(s, c, inertia, lump.mass, g, 0, s->chain.size, own ? vec3_dot(v, t) : w->slide_velocity[i], vec3_dot(s->gravity, t));
-        add_inertia(s, c, inertia, lump.about, turn, 0, s->chain.size, own ? vec3_dot(spin, t) : w->slide_spin[i], 0);
+        int at = own ? 0 : unknown_of(k), i = c * w->inner_count + k - 1;
+        add_along(s, c, inertia, lump.mass, t, held, &(Motion){0, at, -1, own ? vec3_dot(v, t) : w->slide_velocity[i], vec3_dot(s->gravity, t)});
+        add_along(s, c, inertia, lump.about, t, held, &(Motion){3, own ? 0 : at + 1, 1, own ? vec3_dot(spin, t) : w->slide_spin[i], 0});
         all.mass += lump.mass;
         all.across += lump.across;
     }
-    for (int side = 0; side < 2 && !held; side++) {
-        Vec3 a = side ? f : e;
-        const double g[6] = {a.x, a.y, a.z, 0, 0, 0}, turn[6] = {0, 0, 0, a.x, a.y, a.z};
-        add_inertia(s, c, inertia, all.mass, g, 0, 6, vec3_dot(v, a), vec3_dot(s->gravity, a));
-        add_inertia(s, c, inertia, all.across, turn, 0, 6, vec3_dot(spin, a), 0);
-    }
+    if (held)
+        return;
+    add_across(s, c, inertia, all.mass, t, 0, v, s->gravity);
+    add_across(s, c, inertia, all.across, t, 3, spin, vec3(0, 0, 0));
 }
 
 double tools_kinetic_energy(const Stepper *s)

@@ -9,26 +9,23 @@
 static const double FOLLOWS = 7.3;
 static const double GIVE = 1e-4;         // [mm] by which tools that stick on each other follow a force, elastically
 
-// M averaged over l has the slope (M(s + l/2) - M(s - l/2)) / l; M is that of the element at a place.
-static Vec3 moment_at(const Stepper *s, int k, double place)
+// M averaged over l has the slope (M(s + l/2) - M(s - l/2)) / l; M is that of the element at a place, which is looked for from element *c on.
+static Vec3 moment_at(const Stepper *s, int k, double place, int *c)
 {
-    int low = 0, high = s->state.node_count - 1;      // of elements low to high - 1
-    while (high - low > 1) {
-        int mid = (low + high) / 2;
-        if (0.5 * (s->middle[mid - 1] + s->middle[mid]) <= place)
-            low = mid;
-        else
-            high = mid;
-    }
-    double end = s->middle[s->state.node_count - 2] + 0.5 * tools_span_length(s, s->state.node_count - 2);
-    return place > end || place < 0 ? vec3(0, 0, 0) : s->inner_moment[low * s->state.inner_count + k - 1];
+    int last = s->state.node_count - 2;
+    while (*c < last && 0.5 * (s->middle[*c] + s->middle[*c + 1]) <= place)
+        ++*c;
+    while (*c > 0 && 0.5 * (s->middle[*c - 1] + s->middle[*c]) > place)
+        --*c;
+    double end = s->middle[last] + 0.5 * tools_span_length(s, last);
+    return place > end || place < 0 ? vec3(0, 0, 0) : s->inner_moment[*c * s->state.inner_count + k - 1];
 }
 
-static double pressure_at(const Stepper *s, int c, int k, double window)
+static double pressure_at(const Stepper *s, int c, int k, double window, int at[2])
 {
     double h = s->middle[c] - s->middle[c - 1], l = fmax(window, h), half = 0.5 * l;
-    Vec3 right = vec3_sub(moment_at(s, k, s->middle[c] + half), moment_at(s, k, s->middle[c] - half));
-    Vec3 left = vec3_sub(moment_at(s, k, s->middle[c - 1] + half), moment_at(s, k, s->middle[c - 1] - half));
+    Vec3 right = vec3_sub(moment_at(s, k, s->middle[c] + half, &at[1]), moment_at(s, k, s->middle[c] - half, &at[0]));
+    Vec3 left = vec3_sub(moment_at(s, k, s->middle[c - 1] + half, &at[1]), moment_at(s, k, s->middle[c - 1] - half, &at[0]));
     Vec3 jump = vec3_scale(vec3_sub(right, left), 1 / l);
     const Vec3 *x = s->state.position;
     Vec3 before = vec3_unit_or(vec3_sub(x[c], x[c - 1]), s->axis[0]), after = vec3_unit_or(vec3_sub(x[c + 1], x[c]), before);
@@ -61,6 +58,7 @@ void tools_slides(Stepper *s)
     s->set.slide_count = 0;
     int nodes = s->state.node_count, inner = s->state.inner_count;
     double at = 0, most = 0;
+    int near[2] = {0, 0};     // the elements where the last averages began and ended
     for (int c = 0; c + 1 < nodes; c++) {
         double length = tools_span_length(s, c);
         s->middle[c] = at + 0.5 * length;
@@ -73,7 +71,7 @@ void tools_slides(Stepper *s)
             if (!is_inside(s, c, k) || !(t->friction > 0))
                 continue;
             double window = most > 0 ? FOLLOWS * sqrt(t->clearance / most) : 0;
-            const double *last = s->state.slide_force + 3 * (c * inner + k - 1), bound = t->friction * pressure_at(s, c, k, window);
+            const double *last = s->state.slide_force + 3 * (c * inner + k - 1), bound = t->friction * pressure_at(s, c, k, window, near);
             // what slid goes on sliding: by the new bound
             bool slid = hypot(last[0], last[1]) > 0.999999 * last[2];
             double change = slid && last[2] > 0 ? bound / last[2] : 1;

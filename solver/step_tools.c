@@ -526,8 +526,8 @@ void tools_leave_out(Stepper *s)
 {
     for (int c = 0; c < s->chain.count; c++)
         for (int k = 1; k < s->tool_count; k++)
-            for (int i = 0; !is_inside(s, c, k) && i < 2; i++)
-                stepper_prescribe(s, c, unknown_of(k) + i, 0);
+            for (int i = 0; !is_inside(s, c, k) && i < 2; i++)       // nothing has been added to these rows and columns
+                s->chain.diag[block_of(s, c) + (size_t)((s->chain.size + 1) * (unknown_of(k) + i))] = 1;
 }
 
 double tools_largest_part(const Stepper *s)

@@ -96,7 +96,7 @@ static void add_spring(Problem *p, int i, double k, const double *g)
 
 // --- The laws ---
 
-static bool is_free(const Problem *p, int node, int k) { return contact_free_dofs(&p->chain, node) >> k & 1; }
+static bool is_free(const Problem *p, int node, int k) { return contact_is_free(&p->chain, node, k); }
 
 // The largest of all errors over what a solve of this tolerance may leave: momentum, the wall's laws, the slides' laws. At most 1 where they hold.
 static double broken(const Problem *p, double tolerance)
