@@ -29,7 +29,7 @@ void pointwise_work_destroy(PointwiseWork *work);
 
 struct ContactSolver {
     int node_count, capacity;
-    ContactRow *row;             // (capacity)
+    ContactRow *row, *spare;     // (capacity)
     Vec3 *motion;                // (capacity) d = J u
     ContactLaw *law;             // (capacity)
     Vec3 *best;                  // (capacity) forces of the best iterate …

@@ -27,6 +27,7 @@ struct ContactRow {
     double weight[2];
     Vec3 lever[2];               // looked at only where there are two nodes
     unsigned mask[2];            // free degrees of freedom: the first six, or a slide's two
+    bool waits;                  // left out until something goes through it (contact_slides.c)
     bool inert;                  // the node cannot yield along the normal, or no slide can move or bear: no force
     Vec3 normal;
     double gap, radius, friction;

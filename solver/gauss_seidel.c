@@ -189,6 +189,7 @@ ContactSolver *contact_solver_create(int node_count, int size, int contact_capac
     s->node_count = node_count;
     s->capacity = contact_capacity;
     s->row = calloc(k, sizeof *s->row);
+    s->spare = calloc(k, sizeof *s->spare);
     s->motion = calloc(k, sizeof *s->motion);
     s->law = calloc(k, sizeof *s->law);
     s->best = calloc(k, sizeof *s->best);
@@ -208,7 +209,7 @@ ContactSolver *contact_solver_create(int node_count, int size, int contact_capac
     s->factor = block_factor_create(node_count, size);
     s->pointwise = pointwise_work_create(node_count, size, contact_capacity);
     bool ok = block_chain_create(&s->matrix, node_count, size) && s->pointwise && s->condenser && s->small_u && s->turned_chain && s->side && s->braced.diag && s->braced_factor;
-    if (!s->row || !s->motion || !s->law || !s->best || !s->best_u || !s->flag || !s->wall || !s->rhs || !s->delta || !s->turned || !s->lu || !s->factor || !ok) {
+    if (!s->row || !s->spare || !s->motion || !s->law || !s->best || !s->best_u || !s->flag || !s->wall || !s->rhs || !s->delta || !s->turned || !s->lu || !s->factor || !ok) {
         contact_solver_destroy(s);
         return NULL;
     }
@@ -237,6 +238,7 @@ void contact_solver_destroy(ContactSolver *s)
     if (!s)
         return;
     free(s->row);
+    free(s->spare);
     free(s->motion);
     free(s->law);
     free(s->best);
