@@ -12,7 +12,7 @@ static const char help[] =
     "Usage: seldinger bench collision|step|fit|track|wall|peer|drawing [options]\n\n"
     "Timing tables, each row measured in the same run.\n\n"
     "  collision  local models against meshes searched by Embree, the exact wall and a sampled distance: cost, error, friction that is not there\n"
-    "  step       a simulation step: spiral at 100 GPa, phantom, aneurism; growth with the elements; SIMD levels; budgets\n"
+    "  step       a simulation step: spiral at 100 GPa, phantom, aneurism; growth with the elements; SIMD levels; budgets; --tools: coaxial tools\n"
     "  fit        local models: the paper's tables 3, 4 and 5 beside its figures\n"
     "  track      trackers on synthetic angiograms with truth: the labels of the paper's Table 2, errors, times\n"
     "  wall       one table of what the wall of fitted trees is worth: agreement, accuracy, ostia, reach, tools in it\n"

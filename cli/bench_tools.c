@@ -109,7 +109,6 @@ static bool run(const Scene *scene, const Vessel *vessel, double depth, double s
 bool bench_tools(const BenchOptions *options, ToolsBench *bench, Faults *faults)
 {
     for (int v = 0; v < TOOLS_VESSELS; v++) {
-        if(getenv("V") && atoi(getenv("V"))!=v) continue;
         bench->present[v] = !stack[v].needs || access(stack[v].needs, R_OK) == 0;
         if (!bench->present[v])
             continue;
@@ -119,7 +118,6 @@ bool bench_tools(const BenchOptions *options, ToolsBench *bench, Faults *faults)
         good &= section != NULL;
         for (int n = 0; good && n < TOOLS_NODES; n++)
             for (int k = 0; good && k < TOOLS_MOST; k++) {
- if((getenv("N") && atoi(getenv("N"))!=n) || (getenv("K") && atoi(getenv("K"))!=k+1)) continue;
                 Scene scene = with_tools(s.scene, k + 1, tools_bench_nodes[n], stack[v].depth_mm, section);
                 good = run(&scene, s.open.vessel, stack[v].depth_mm, stack[v].speed_mm_s, options->quick, &bench->row[v][n][k], faults);
             }

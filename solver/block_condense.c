@@ -20,6 +20,7 @@
 #define H_AT (2 * PANEL)
 #define INVERSE_AT (3 * PANEL)
 #define NODE (3 * PANEL + COLUMN)
+enum { LIVE_BYTES = 1 + BLOCK_LARGEST };
 static size_t node_doubles(int size) { return (size_t)(3 * BLOCK_PANEL(size) + BLOCK_COLUMN(size)); }
 
 struct BlockCondenser {
@@ -27,6 +28,7 @@ struct BlockCondenser {
     bool *keep;
     int *place;                  // (M) in the small chain, -1: eliminated …
     int *origin;                 // (M) … into this one and the next ahead; -1: from an end of the chain
+    unsigned char *live;         // (M, LIVE_BYTES) how many unknowns of a node are coupled to anything, and which; the others have unit rows
     double *node;
     double *side;
     BlockChain small;
@@ -44,8 +46,9 @@ BlockCondenser *block_condenser_create(int count, int size)
     k->place = calloc(m, sizeof *k->place);
     k->origin = calloc(m, sizeof *k->origin);
     k->side = calloc((size_t)size * m, sizeof *k->side);
+    k->live = calloc(m, LIVE_BYTES);
     k->node = aligned_alloc(64, bytes);
-    if (!block_chain_create(&k->small, count, size) || !k->keep || !k->place || !k->origin || !k->side || !k->node) {
+    if (!block_chain_create(&k->small, count, size) || !k->keep || !k->place || !k->origin || !k->side || !k->live || !k->node) {
         block_condenser_destroy(k);
         return NULL;
     }
@@ -62,6 +65,7 @@ void block_condenser_destroy(BlockCondenser *k)
     free(k->place);
     free(k->origin);
     free(k->side);
+    free(k->live);
     free(k->node);
     free(k);
 }
@@ -116,11 +120,35 @@ static void choose_middle(BlockCondenser *k)
     k->keep[k->middle] = true;
 }
 
+static bool is_coupled(const BlockChain *a, int node, int r)
+{
+    const int n = a->size;
+    const size_t block = (size_t)(n * n), i = (size_t)node;
+    const double *d = a->diag + block * i, *before = a->lower + block * (i > 0 ? i - 1 : 0), *after = a->lower + block * i;
+    bool any = d[(n + 1) * r] != 1;
+    for (int c = 0; c < n && !any; c++)
+        any = (c != r && d[n * r + c] != 0) || (node > 0 && before[n * r + c] != 0) || (node + 1 < a->count && after[n * c + r] != 0);
+    return any;
+}
+
+static void find_live(BlockCondenser *k, const BlockChain *a)
+{
+    for (int i = 0; i < a->count; i++) {
+        unsigned char *live = k->live + LIVE_BYTES * i;
+        live[0] = 0;
+        for (int r = 0; r < a->size; r++)
+            if (is_coupled(a, i, r))
+                live[++live[0]] = (unsigned char)r;
+    }
+}
+
 const BlockChain *block_condense(BlockCondenser *k, const BlockChain *chain, const double *b)
 {
     const size_t n = (size_t)k->size, block = n * n;
     k->count = chain->count;
     choose_middle(k);
+    if (k->size > 6)     // of the smallest blocks the kernels take all
+        find_live(k, chain);
     k->small.count = 0;
     for (int i = 0; i < k->count; i++) {
         k->place[i] = k->keep[i] ? k->small.count : -1;

@@ -48,6 +48,25 @@ static double number(const cJSON *object, const char *name)
 
 static void assert_near_number(double value, double wanted) { assert_true(fabs(value - wanted) < 1e-9 * fmax(1, fabs(wanted))); }
 
+static void tools_table(void **state)
+{
+    (void)state;
+    assert_int_equal(run("bench step --tools --quick --json /tmp/seldinger-bench-tools.json > /tmp/seldinger-bench-tools.txt"), 0);
+    cJSON *root = load("/tmp/seldinger-bench-tools.json"), *at;
+    unlink("/tmp/seldinger-bench-tools.txt");
+    cJSON *rows = cJSON_GetObjectItem(root, "tools");
+    int count = 0;
+    assert_true(cJSON_GetArraySize(rows) >= 12 && cJSON_GetArraySize(rows) % 12 == 0);       // arch and angiogram are there or not
+    cJSON_ArrayForEach(at, rows) {
+        const cJSON *step = cJSON_GetObjectItem(at, "step_us");
+        assert_true(number(at, "tools") == 1 + count / 3 % 4 && number(at, "steps") == 200);
+        assert_true(number(step, "median") > 0 && number(step, "median") <= number(step, "p999"));
+        assert_true(number(at, "not_converged_steps") == 0 && number(at, "limited_steps") == 0);
+        count++;
+    }
+    cJSON_Delete(root);
+}
+
 static void step_tables(void **state)
 {
     (void)state;
@@ -280,7 +299,7 @@ static void reach_reports(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(step_tables), cmocka_unit_test(peer_scenes_stay_inside), cmocka_unit_test(collision_of_a_scene),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(step_tables), cmocka_unit_test(tools_table), cmocka_unit_test(peer_scenes_stay_inside), cmocka_unit_test(collision_of_a_scene),
                                        cmocka_unit_test(tables_that_are_not_there),
                                        cmocka_unit_test(a_chart_is_a_picture), cmocka_unit_test(wall_table), cmocka_unit_test(reach_reports)};
     return cmocka_run_group_tests(tests, NULL, NULL);
