@@ -71,6 +71,8 @@ static double read_solution(ContactSolver *s, const double *u, int from, int to,
 
 static bool comes_before(const ContactRow *a, const ContactRow *b)
 {
+    if (a->far || b->far)        // pairs behind all
+        return a->far && b->far ? a->point < b->point : b->far != NULL;
     if (a->chain_node != b->chain_node)
         return a->chain_node < b->chain_node;
     if (a->weight[1] != b->weight[1])
@@ -78,7 +80,7 @@ static bool comes_before(const ContactRow *a, const ContactRow *b)
     return (a->slide != 0) != (b->slide != 0) ? b->slide != 0 : a->point < b->point;
 }
 
-// The walls' contacts [0, to), those that wait behind the others, both in the order of the chain; they were so up to `before`. Returns how many do not wait.
+// The walls' contacts and the pairs [0, to), those that wait behind the others, both in the order of the chain; they were so up to `before`. Returns how many do not wait.
 static int put_in_order(ContactSolver *s, int before, int to)
 {
     ContactRow *row = s->row;
@@ -87,10 +89,11 @@ static int put_in_order(ContactSolver *s, int before, int to)
         s->spare[i] = b == to || (a < before && comes_before(&row[a], &row[b])) ? row[a++] : row[b++];
     for (int i = 0; i < to; i++)
         count += !s->spare[i].waits;
-    s->wall_count = 0;
+    s->wall_count = s->banded = 0;
     for (int i = 0, at = 0; i < to; i++) {
-        bool waits = s->spare[i].waits;
-        if (!waits && !s->spare[i].slide)
+        bool waits = s->spare[i].waits, pair = s->spare[i].far != NULL;
+        s->banded += !waits && !pair;
+        if (!waits && !pair && !s->spare[i].slide)
             s->wall[s->wall_count++] = at;
         row[waits ? count + waiting++ : at++] = s->spare[i];
     }
@@ -103,6 +106,9 @@ static int first_contacts(ContactSolver *s, int to)
     int last = -2;           // the last node where one presses
     for (int i = 0; i < to; i++) {
         ContactRow *c = &s->row[i];
+        c->waits = false;
+        if (c->far)
+            continue;
         bool presses = c->slide || vec3_norm2(c->force) > 0 || c->gap < 0;
         c->waits = !presses && c->chain_node > last + 1;
         last = presses ? c->chain_node + c->nodes - 1 : last;
@@ -110,6 +116,8 @@ static int first_contacts(ContactSolver *s, int to)
     last = INT_MAX - 1;
     for (int i = to - 1; i >= 0; i--) {
         ContactRow *c = &s->row[i];
+        if (c->far)
+            continue;
         bool presses = c->slide || vec3_norm2(c->force) > 0 || c->gap < 0;
         c->waits &= c->chain_node + c->nodes - 1 < last - 1;
         last = presses ? c->chain_node : last;
