@@ -258,7 +258,7 @@ static void call_query(void *context)
 // The free nodes nearest to the wall at a crowded step, along the wire; moved to and fro by that step's motion.
 void bench_detection(const Scene *scene, const Vessel *vessel, int64_t step, double *detection, int *points, Faults *faults)
 {
-    Simulator *simulator = scene_has_one_tool(scene, "bench", faults) ? simulator_create(scene, vessel, faults) : NULL;
+    Simulator *simulator = simulator_create(scene, vessel, faults);
     if (!simulator)
         return;
     int nodes = simulator_state(simulator)->node_count, cursor = 0;
