@@ -864,6 +864,10 @@ static void solve_system(Stepper *s)
 // the step's start on.
 static void take_back(Stepper *s)
 {
+    while (s->tool_count > 1 && tools_leave_back(s)) {
+        begin(s);
+        solve_system(s);
+    }
     while (s->has_sheath && !s->has_failed && s->first_free < s->state.node_count) {
         int node = s->first_free;
         const double *u = s->u + row_of(s, node);

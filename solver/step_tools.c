@@ -11,6 +11,7 @@ static const double JOIN = 0.05, LEAVE = 0.04;
 // A tip that ended past its element's end would be cut there, so it passes the node this share of the element early, and on the way back late: more than
 // strain and friction keep it from where the hands would have it. What it lacks up to the node is taken off again (tips_short_of_nodes()).
 static const double EARLY = 0.01;
+static const double TAKE_BACK = 0.002;           // of an element's length past the tip around it: a node that would end nearer to it leaves the chain
 
 // --- creation ---
 
@@ -440,6 +441,34 @@ static void leave(Stepper *s, int k)
     tools_chain(s);
 }
 
+// [mm/ms] by which S of tool k grew at node c in the last step.
+static double slide_rate(const Stepper *s, int c, int k)
+{
+    return vec3_dot(s->state.velocity[c], quat_rotate(s->state.orientation[c], vec3(1, 0, 0))) - s->state.slide_velocity[c * s->state.inner_count + k - 1];
+}
+
+bool tools_leave_back(Stepper *s)
+{
+    for (int k = 1; k < s->tool_count && !s->has_failed; k++) {
+        const Tool *t = &s->tool[k];
+        int tip = t->start - 1;
+        if (!tools_carries(t))
+            continue;
+        double ends = s->start_slide[tip * s->state.inner_count + k - 1] + s->u[row_of(s, tip) + (size_t)unknown_of(k)];
+        if (t->wire.s[t->first] - ends > TAKE_BACK * t->wire.length[t->first - 1])
+            continue;
+        size_t nodes = (size_t)s->state.node_count, inner = nodes * (size_t)s->state.inner_count * sizeof(double);
+        memcpy(s->state.position, s->start_position, nodes * sizeof *s->start_position);
+        memcpy(s->state.orientation, s->start_orientation, nodes * sizeof *s->start_orientation);
+        memcpy(s->state.slide, s->start_slide, inner);
+        memcpy(s->state.angle, s->start_angle, inner);
+        s->first_free -= t->start < s->first_free;
+        leave(s, k);
+        return true;
+    }
+    return false;
+}
+
 // Tool k at the tip around it, where its material moves on by `ahead` [mm] in this step.
 static void pass_tip(Stepper *s, int k, double ahead)
 {
@@ -452,7 +481,8 @@ static void pass_tip(Stepper *s, int k, double ahead)
                 ;
         if (t->inside <= tip && !carries)
             return;          // its tip is behind
-        double out = *slide_of(s, tip, k), at = out - ahead;
+        // as the hands move it, or as it last moved: friction may keep it from the one, and go on with the other
+        double out = *slide_of(s, tip, k), at = out - fmin(ahead, -slide_rate(s, tip, k) * s->dt);
         if (j > 0 && t->wire.s[j] - fmax(at, out) > JOIN * t->wire.length[j - 1])
             join(s, k, t->wire.s[j] - out);
         else if (carries && t->wire.s[t->first] - at < LEAVE * t->wire.length[t->first - 1])

@@ -51,6 +51,8 @@ void tools_from_slips(Stepper *s);
 void tools_keep_slides(Stepper *s);                // the forces of this step's solution, for the next step
 double tools_friction_work(const Stepper *s);      // [mJ] that it took in this step
 
+// Does a node of the solution come to lie behind the tip that it came out of? Then it leaves the chain, and the step begins anew. Whether one did.
+bool tools_leave_back(Stepper *s);
 // Unit rows where a tool is no unknown.
 void tools_leave_out(Stepper *s);
 // The linear system of coaxial tools, all but what contacts, loads and constraints add.
