@@ -216,13 +216,13 @@ static void a_late_tick_does_not_jump(void **state)
     } while (0)
 
 // The magnitude in the last Set Constant Force report; 0 where none was sent. *when: the time of it.
-static int last_magnitude(FakeHid *hid, int *writes)
+static int magnitude_of(FakeHid *hid, int index, int *writes)
 {
     int magnitude = 0, count = 0;
     pthread_mutex_lock(&hid->lock);
-    for (int i = 0; i < hid->device[0].written_count; i++)
-        if (hid->device[0].written[i].bytes[0] == 5) {
-            magnitude = (int16_t)(hid->device[0].written[i].bytes[2] | hid->device[0].written[i].bytes[3] << 8);
+    for (int i = 0; i < hid->device[index].written_count; i++)
+        if (hid->device[index].written[i].bytes[0] == 5) {
+            magnitude = (int16_t)(hid->device[index].written[i].bytes[2] | hid->device[index].written[i].bytes[3] << 8);
             count++;
         }
     pthread_mutex_unlock(&hid->lock);
@@ -230,6 +230,8 @@ static int last_magnitude(FakeHid *hid, int *writes)
         *writes = count;
     return magnitude;
 }
+
+static int last_magnitude(FakeHid *hid, int *writes) { return magnitude_of(hid, 0, writes); }
 
 static void a_stick_feels_the_sheath_until_the_simulation_stands(void **state)
 {
@@ -304,6 +306,62 @@ static void a_stick_feels_the_sheath_until_the_simulation_stands(void **state)
     assert_true(last->bytes[0] == 0x0c && last->bytes[1] == 3);    // stop all effects
     free(hid);
     free(map);
+}
+
+// Two tools, a stick each: what its first port says is felt, of whichever tool that is; the force of another tool that it moves too is not.
+static void two_sticks_feel_a_tool_each(void **state)
+{
+    (void)state;
+    static uint8_t bytes[HID_DESCRIPTOR_LIMIT];
+    size_t length = hid_bytes(sidewinder_2, bytes);
+    const ToolNames tools = {.count = 2, .name = {"guide", "wire"}, .kind = {"guide_catheter", "wire"}};
+    FakeHid *hid = calloc(1, sizeof *hid);
+    assert_non_null(hid);
+    HidTransport transport = fake_transport(hid);
+    HandsOptions options = hands_default_options();
+    static const char force[] = "force: {full_scale_n: 8, max_n: 4, stall_ms: 1000, quiet_ms: 10000}\n";
+    char text[2][400];
+    snprintf(text[0], sizeof text[0], "seldinger_device: 1\ndevice: {usage: joystick, serial: A}\ntool: wire\npush: {source: Y, mm_s: 40, invert: true}\n%s", force);
+    snprintf(text[1], sizeof text[1], "seldinger_device: 1\ndevice: {usage: joystick, serial: B}\npush: {source: Y, mm_s: 40, invert: true, tool: guide}\n"
+             "twist: {source: X, deg_s: 90, tool: wire}\n%s", force);
+    DeviceMap *map[2] = {map_of(text[0]), map_of(text[1])};
+    faults_clear(&faults);
+    for (int i = 0; i < 2; i++)
+        assert_true(device_map_find_tools(map[i], &tools, &faults));
+    options.map = (const DeviceMap *const *)map;
+    options.map_count = 2;
+    options.rescan_ms = 10;
+    options.transport = &transport;
+    Hands *hands = hands_open(&options, &faults);
+    assert_non_null(hands);
+    for (int i = 0; i < 2; i++) {
+        hid->device[i].feature_answer = (FakeReport){.length = 5, .bytes = {2, 3, 1, 0, 1}};
+        fake_plug(hid, i, 0x045e, 0x001b, i == 0 ? "A" : "B", HID_USAGE(1, 4), bytes, (int)length);
+        wait_for(atomic_load(&hands_port(hands, i)->state) == HAND_READY);
+    }
+    assert_true(atomic_load(&hands_port(hands, 0)->drives) == DRIVES_TOOL + 1 && atomic_load(&hands_port(hands, 1)->drives) == DRIVES_TOOL);
+    // as hand_set_answer has it: 1 N on the guide, 2 N on the wire
+    static const double push[] = {1, 2};
+    const uint8_t rest[] = {1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    int64_t until = fake_now_us() + 10000000;
+    while ((magnitude_of(hid, 0, NULL) != 64 || magnitude_of(hid, 1, NULL) != 32) && fake_now_us() < until) {
+        for (int i = 0; i < 2 * MAP_HANDS; i++) {
+            HandPort *port = hands_port(hands, i / MAP_HANDS) + i % MAP_HANDS;
+            int drives = atomic_load(&port->drives);
+            atomic_store(&port->force_n, push[drives >= DRIVES_TOOL ? drives - DRIVES_TOOL : 0]);
+            atomic_fetch_add(&port->step, 1);
+        }
+        fake_report(hid, 0, rest, sizeof rest);
+        fake_report(hid, 1, rest, sizeof rest);
+        fake_sleep_us(500);
+    }
+    assert_int_equal(magnitude_of(hid, 0, NULL), 64);
+    assert_int_equal(magnitude_of(hid, 1, NULL), 32);
+    hands_close(hands);
+    assert_true(magnitude_of(hid, 0, NULL) == 0 && magnitude_of(hid, 1, NULL) == 0);
+    free(hid);
+    free(map[0]);
+    free(map[1]);
 }
 
 static void a_haptic_joystick_needs_no_map_and_a_refused_effect_is_told(void **state)
@@ -396,6 +454,7 @@ int main(void)
         cmocka_unit_test(a_late_tick_does_not_jump),
         cmocka_unit_test(torque_is_a_second_effect),
         cmocka_unit_test(a_stick_feels_the_sheath_until_the_simulation_stands),
+        cmocka_unit_test(two_sticks_feel_a_tool_each),
         cmocka_unit_test(a_haptic_joystick_needs_no_map_and_a_refused_effect_is_told),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
