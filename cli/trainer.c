@@ -200,23 +200,23 @@ static unsigned buttons_of_hands(const Trainer *trainer)
 static void tell_grip(Trainer *trainer, const HandGrip *before, const PanelActions *actions)
 {
     const HandGrip *now = &trainer->desk.grip;
-    int count = trainer->scene->tool_count, partner = hand_grip_partner(now, count), outer = now->chosen < partner ? now->chosen : partner;
-    const char *name[TOOLS_MOST];
-    for (int k = 0; k < count; k++)
-        name[k] = trainer->scene->tool[k].name;
+    const SceneTool *tool = trainer->scene->tool;
+    int count = trainer->scene->tool_count;
+    char first[16], last[16];
     for (int k = count; k < TOOLS_MOST; k++)
         if (actions->pressed[ACTION_TOOL_1 + k])
-            say(trainer, MARK_NONE, "there is no tool %d, the scene has %d; the views are on 5 to 8", k + 1, count);
+            say(trainer, MARK_NONE, "there is no tool %d, the scene has %d; the views are on %s to %s", k + 1, count,
+                key_table_text(ACTION_VIEW_FLUOROSCOPY, first, sizeof first), key_table_text(ACTION_VIEW_ALL, last, sizeof last));
     if (now->chosen != before->chosen)
-        say(trainer, MARK_NONE, "tool %d in hand: %s", now->chosen + 1, name[now->chosen]);
-    if (now->locked != before->locked && hand_grip_pair_is_locked(now, count))
-        say(trainer, MARK_NONE, "%s and %s are locked: they move as one", name[outer], name[outer + 1]);
-    else if (now->locked != before->locked)
-        say(trainer, MARK_NONE, "a lock is open");
-    else if (count < 2 && actions->pressed[ACTION_LOCK])
+        say(trainer, MARK_NONE, "tool %d in hand: %s", now->chosen + 1, tool[now->chosen].name);
+    for (int k = 1; k < count; k++)
+        if ((now->locked ^ before->locked) >> k & 1)
+            say(trainer, MARK_NONE, now->locked >> k & 1 ? "%s and %s are locked: they move as one" : "%s and %s are unlocked", tool[k - 1].name, tool[k].name);
+    if (count < 2 && actions->pressed[ACTION_LOCK])
         say(trainer, MARK_NONE, "the scene has one tool: there is none to lock it to");
-    if (now->released != before->released)
-        say(trainer, MARK_NONE, now->released >> now->chosen & 1 ? "%s is let go: only its valve holds it" : "%s is in hand again", name[now->chosen]);
+    for (int k = 0; k < count; k++)
+        if ((now->released ^ before->released) >> k & 1)
+            say(trainer, MARK_NONE, now->released >> k & 1 ? "%s is let go: only its valve holds it" : "%s is in hand again", tool[k].name);
 }
 
 static void take_screenshot(Trainer *trainer, const WindowInput *input)
