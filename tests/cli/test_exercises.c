@@ -50,7 +50,9 @@ static cJSON *run(const char *name, const char *suffix, const char *model)
 static double number(const cJSON *json, const char *name) { return cJSON_GetObjectItem(json, name)->valuedouble; }
 static const char *state_of(const cJSON *score) { return cJSON_GetObjectItem(score, "state")->valuestring; }
 
-static void is_solved(const char *name, const char *model)
+// `unconverged`: steps whose contact solve may stop at its cap, and then gain up to a per cent of the hands' work: what is left to mend in coaxial steps. Of
+// other flags none.
+static void is_solved(const char *name, const char *model, int unconverged)
 {
     cJSON *score = run(name, "", model);
     assert_string_equal(state_of(score), "reached");
@@ -60,16 +62,28 @@ static void is_solved(const char *name, const char *model)
     cJSON_Delete(score);
     char *text = text_of(in_folder("summary.json"));
     cJSON *summary = cJSON_Parse(text);
-    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(summary, "flags")), 0);
+    const cJSON *flag, *energy = cJSON_GetObjectItem(summary, "energy_mj");
+    cJSON_ArrayForEach(flag, cJSON_GetObjectItem(summary, "flags"))
+        if (!unconverged || (strcmp(flag->valuestring, "not_converged") != 0 && strcmp(flag->valuestring, "gains_energy") != 0))
+            fail_msg("%s: %s", name, flag->valuestring);
+    assert_true(number(cJSON_GetObjectItem(summary, "solver"), "not_converged_steps") <= unconverged);
+    assert_true(!unconverged || number(energy, "gained") < 0.01 * number(energy, "hand"));
     cJSON_Delete(summary);
     free(text);
 }
 
-static void errs(const char *name, const char *model)
+static double errors_of(const cJSON *score, const char *kind)
+{
+    return number(cJSON_GetObjectItem(cJSON_GetObjectItem(score, "errors"), kind), "count");
+}
+
+// `kind`: an error that it makes besides going the wrong way; NULL: none in particular.
+static void errs(const char *name, const char *model, const char *kind)
 {
     cJSON *score = run(name, "-errors", model);
     assert_string_equal(state_of(score), "running");
-    assert_true(number(cJSON_GetObjectItem(cJSON_GetObjectItem(score, "errors"), "wrong_branch"), "count") >= 1);
+    assert_true(errors_of(score, "wrong_branch") >= 1);
+    assert_true(!kind || errors_of(score, kind) >= 1);
     assert_true(number(score, "points") < 50);
     cJSON_Delete(score);
 }
@@ -77,22 +91,30 @@ static void errs(const char *name, const char *model)
 static void the_aneurysm_is_reached(void **state)
 {
     (void)state;
-    is_solved("aneurysm", NULL);
-    errs("aneurysm", NULL);
+    is_solved("aneurysm", NULL, 0);
+    errs("aneurysm", NULL, NULL);
 }
 
 static void the_middle_cerebral_artery_is_selected(void **state)
 {
     (void)state;
-    is_solved("mca", SOURCE_DIR "/scenes/aneurism/aneurism.h5");
-    errs("mca", SOURCE_DIR "/scenes/aneurism/aneurism.h5");
+    is_solved("mca", SOURCE_DIR "/scenes/aneurism/aneurism.h5", 0);
+    errs("mca", SOURCE_DIR "/scenes/aneurism/aneurism.h5", NULL);
 }
 
 static void the_left_carotid_is_selected(void **state)
 {
     (void)state;
-    is_solved("left-carotid", SOURCE_DIR "/scenes/arch/arch.h5");
-    errs("left-carotid", SOURCE_DIR "/scenes/arch/arch.h5");
+    is_solved("left-carotid", SOURCE_DIR "/scenes/arch/arch.h5", 0);
+    errs("left-carotid", SOURCE_DIR "/scenes/arch/arch.h5", NULL);
+}
+
+// Over the wire that was led there; without a wire ahead of it, past it.
+static void the_microcatheter_follows_its_wire(void **state)
+{
+    (void)state;
+    is_solved("microcatheter", NULL, 3);
+    errs("microcatheter", NULL, "wire_lost");
 }
 
 int main(void)
@@ -101,6 +123,7 @@ int main(void)
         cmocka_unit_test(the_aneurysm_is_reached),
         cmocka_unit_test(the_middle_cerebral_artery_is_selected),
         cmocka_unit_test(the_left_carotid_is_selected),
+        cmocka_unit_test(the_microcatheter_follows_its_wire),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
