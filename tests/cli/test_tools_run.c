@@ -228,6 +228,32 @@ static void a_bench_experiment_is_met(void **state)
     cJSON_Delete(root);
 }
 
+// Scenes/coaxial/exchange.yaml, and what is refused: a tool that is in, one that does not fit, what cannot follow an exchange.
+static void a_script_exchanges_tools(void **state)
+{
+    (void)state;
+    cJSON *root = summary("exchange.yaml", "");
+    assert_true(value(root, "exchanges", "done") == 2 && value(root, "exchanges", "refused") == 0);
+    assert_true(value(root, "solver", "limited_steps") == 0 && value(root, "solver", "not_converged_steps") == 0);
+    cJSON_Delete(root);
+    put("early.csv", "t_s,microcatheter.exchange,wire.exchange\n0,0,0\n0.1,1,0\n0.2,1,1\n0.3,1,3\n0.4,1,3\n");
+    ends(0, "3 exchanges were refused, the last because there is no such tool", "run scenes/coaxial/exchange.yaml --script $D/early.csv");
+    ends(2, "early.csv: exchanges tools; --record cannot follow an exchange yet", "run scenes/coaxial/exchange.yaml --script $D/early.csv --record $D/e.h5");
+    put("wrong.csv", "t_s,wire.exchange\n0,0.5\n1,0\n");
+    ends(2, "wrong.csv:2:1: exchange is 0.5; 0 for the scene's tool, 1 to 4 for those under its 'exchange:'", "run scenes/coaxial/exchange.yaml --script $D/wrong.csv");
+    put("wide.yaml", "seldinger: 1\nvessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 60}]}}\ntools:\n"
+                     "  - {name: tube, kind: catheter, sections: [{length_mm: 60, diameter_mm: 1, inner_diameter_mm: 0.5, young_modulus_gpa: 1}]}\n"
+                     "  - {name: wire, kind: wire, sections: [{length_mm: 160, diameter_mm: 0.36, young_modulus_gpa: 20}],\n"
+                     "     exchange: [{sections: [{length_mm: 160, diameter_mm: 0.6, young_modulus_gpa: 20}]}]}\n"
+                     "sheath: {entry_mm: [1, 0, 0], direction: [1, 0, 0]}\n");
+    ends(2, "wide.yaml:6:17: 'wire' is up to 0.6 mm thick, but the lumen of 'tube' around it is 0.5 mm wide", "run $D/wide.yaml --duration-s 0.1");
+    put("single.yaml", "seldinger: 1\nvessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 60}]}}\ntools:\n"
+                       "  - {name: wire, kind: wire, sections: [{length_mm: 160, diameter_mm: 0.36, young_modulus_gpa: 20}],\n"
+                       "     exchange: [{sections: [{length_mm: 160, diameter_mm: 0.3, young_modulus_gpa: 20}]}]}\n"
+                       "sheath: {entry_mm: [1, 0, 0], direction: [1, 0, 0]}\n");
+    ends(2, "single.yaml:5:17: the scene has one tool", "run $D/single.yaml --duration-s 0.1");
+}
+
 static void golden_paths_of_the_scenes_hold(void **state)
 {
     (void)state;
@@ -268,7 +294,7 @@ int main(void)
         cmocka_unit_test(a_reference_from_a_scene), cmocka_unit_test(two_tools_in_a_model_repeat),
         cmocka_unit_test(a_run_of_three_tools_is_recorded_and_simulated_again), cmocka_unit_test(each_format_has_all_tools),
         cmocka_unit_test(a_tool_that_is_let_go_stays_so_in_a_replay),
-        cmocka_unit_test(a_bench_experiment_is_met), cmocka_unit_test(golden_paths_of_the_scenes_hold), cmocka_unit_test(a_map_names_a_tool_of_the_scene),
+        cmocka_unit_test(a_bench_experiment_is_met), cmocka_unit_test(a_script_exchanges_tools), cmocka_unit_test(golden_paths_of_the_scenes_hold), cmocka_unit_test(a_map_names_a_tool_of_the_scene),
         cmocka_unit_test(a_score_has_each_tool),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
