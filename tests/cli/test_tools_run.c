@@ -254,6 +254,31 @@ static void a_script_exchanges_tools(void **state)
     ends(2, "single.yaml:5:17: the scene has one tool", "run $D/single.yaml --duration-s 0.1");
 }
 
+// The two devices of DualDeviceNav, from the iliac artery into the left vertebral artery.
+static void two_devices_reach_a_vertebral_artery(void **state)
+{
+    (void)state;
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    print_message("skipped: a sanitizer is watching\n");
+    skip();
+#endif
+    if (access(SOURCE_DIR "/scenes/arch/arch.h5", R_OK) != 0) {
+        print_message("skipped: scenes/arch/arch.h5 is not made\n");
+        skip();
+    }
+    cJSON *root = summary("dual-device.yaml", "");
+    const cJSON *tools = cJSON_GetObjectItem(root, "tools");
+    for (int k = 0; k < 2; k++) {        // both tips end within the benchmark's 5 mm
+        const cJSON *tip = cJSON_GetObjectItem(cJSON_GetArrayItem(tools, k), "tip_mm");
+        double off = sqrt(pow(cJSON_GetArrayItem(tip, 0)->valuedouble + 490.9, 2) + pow(cJSON_GetArrayItem(tip, 1)->valuedouble - 35.1, 2) +
+                          pow(cJSON_GetArrayItem(tip, 2)->valuedouble + 31.5, 2));
+        print_message("tool %d: %.2f mm from the target\n", k, off);
+        assert_true(off < 5);
+    }
+    assert_true(value(root, "penetration_mm", "max") < 0.1);
+    cJSON_Delete(root);
+}
+
 static void golden_paths_of_the_scenes_hold(void **state)
 {
     (void)state;
@@ -294,7 +319,8 @@ int main(void)
         cmocka_unit_test(a_reference_from_a_scene), cmocka_unit_test(two_tools_in_a_model_repeat),
         cmocka_unit_test(a_run_of_three_tools_is_recorded_and_simulated_again), cmocka_unit_test(each_format_has_all_tools),
         cmocka_unit_test(a_tool_that_is_let_go_stays_so_in_a_replay),
-        cmocka_unit_test(a_bench_experiment_is_met), cmocka_unit_test(a_script_exchanges_tools), cmocka_unit_test(golden_paths_of_the_scenes_hold), cmocka_unit_test(a_map_names_a_tool_of_the_scene),
+        cmocka_unit_test(a_bench_experiment_is_met), cmocka_unit_test(two_devices_reach_a_vertebral_artery),
+        cmocka_unit_test(a_script_exchanges_tools), cmocka_unit_test(golden_paths_of_the_scenes_hold), cmocka_unit_test(a_map_names_a_tool_of_the_scene),
         cmocka_unit_test(a_score_has_each_tool),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
