@@ -140,14 +140,16 @@ static void print_tools(const SessionPage *page)
     const ScoreFigures *f = &page->session->figures;
     if (f->tool_count < 2)
         return;
-    fprintf(out, "<section id=\"tools\"><h2>Tools</h2>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Tool</th><th scope=\"col\">Pushed in [mm]</th>"
+    fprintf(out, "<section id=\"tools\"><h2>Tools</h2>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Tool</th>"
+                 "<th scope=\"col\">Pushed in [mm]</th>"
                  "<th scope=\"col\">Pulled back [mm]</th><th scope=\"col\">Tip force [N]</th><th scope=\"col\">Tip's speed, hand at rest [mm/s]</th>"
                  "<th scope=\"col\">Tip behind the one around it [mm]</th></tr></thead><tbody>\n");
     for (int k = 0; k < f->tool_count; k++) {
         const ScoreToolFigures *tool = &f->tool[k];
         fprintf(out, "<tr><th scope=\"row\">");
         report_text(out, tool->name);
-        fprintf(out, "</th><td>%.0f</td><td>%.0f</td><td>%.3f</td><td>%.0f</td>", tool->inserted_mm, tool->withdrawn_mm, tool->tip_force_peak_n, tool->kick_peak_mm_s);
+        fprintf(out, "</th><td>%.0f</td><td>%.0f</td><td>%.3f</td><td>%.0f</td>", tool->inserted_mm, tool->withdrawn_mm, tool->tip_force_peak_n,
+                tool->kick_peak_mm_s);
         if (k > 0)
             fprintf(out, "<td>%.1f</td></tr>\n", tool->behind_mm);
         else

@@ -39,7 +39,8 @@ static const char *const other_key[] = {"state", "has_exercise", "has_xray", "pu
 // Of a tool. What goes on at the moment is not written.
 static const struct Figure tool_table[] = {
 #define FIGURE(name, most) {#name, offsetof(ScoreToolFigures, name), most}
-    FIGURE(inserted_mm, 1e12), FIGURE(withdrawn_mm, 1e12), FIGURE(tip_force_peak_n, 1e12), FIGURE(kick_peak_mm_s, 1e12), FIGURE(behind_mm, 1e9), FIGURE(spare_mm, 1e9),
+    FIGURE(inserted_mm, 1e12), FIGURE(withdrawn_mm, 1e12), FIGURE(tip_force_peak_n, 1e12), FIGURE(kick_peak_mm_s, 1e12),
+    FIGURE(behind_mm, 1e9), FIGURE(spare_mm, 1e9),
 #undef FIGURE
 };
 enum { TOOL_FIGURES = sizeof tool_table / sizeof tool_table[0] };
