@@ -756,12 +756,7 @@ static double energy_bound(const Stepper *s)
         work += fmax(0, -s->set.point[k].gap) * vec3_norm(s->set.point[k].force);
     for (int k = 0; k < s->set.pair_count; k++)
         work += fmax(0, -s->set.pair[k].gap) * vec3_norm(s->set.pair[k].force);
-    if (s->has_sheath) {
-        // the hand's force is that of before: a solution that is not to be trusted says anything
-        double stiffness = s->beam.rest.axial[0], advance = fabs(s->u[0]);
-        double squeezed = fabs(vec3_distance(s->start_position[1], s->start_position[0]) - s->beam.rest.length[0]);
-        work += stiffness * advance * (squeezed + advance * s->beam.rest.length[0] / w->total_length) + fabs(s->u[3] * hand_force(s, 0, 1));
-    }
+    work += hands_work_bound(s);
     return bound + 2 * work + 1e-6;
 }
 

@@ -212,6 +212,25 @@ void hands_report(Stepper *s)
     r->proximal_torque = r->torque[0];
 }
 
+double hands_work_bound(const Stepper *s)
+{
+    double work = 0;
+    if (s->has_sheath) {
+        double length = vec3_distance(s->start_position[1], s->start_position[0]), rest = s->beam.rest.length[0], advance = fabs(s->u[0]);
+        work += s->beam.rest.axial[0] * advance * (fabs(length - rest) + advance * rest / s->wire.total_length) + fabs(s->u[3] * hand_force(s, 0, 1));
+    }
+    for (int k = 1; k < s->tool_count; k++) {
+        if (!has_hand(s, k))
+            continue;
+        const Tool *t = &s->tool[k];
+        const double *slide = s->start_slide + k - 1;
+        double length = vec3_distance(s->start_position[1], s->start_position[0]), rest = is_inside(s, 1, k) ? slide[s->state.inner_count] - slide[0] : length;
+        double advance = fabs(hand_moves(s, k, 0, s->u)), stiffness = t->section[0].axial / fmax(rest, 1e-3 * length);
+        work += stiffness * advance * (fabs(length - rest) + advance * rest / t->wire.total_length) + fabs(hand_moves(s, k, 1, s->u) * hand_force(s, k, 1));
+    }
+    return work;
+}
+
 double hands_work(const Stepper *s)
 {
     double work = 0;

@@ -210,6 +210,8 @@ void hands_report(Stepper *s);
 double hand_force(const Stepper *s, int tool, int about);
 void hands_count(Stepper *s);
 double hand_moved(const Stepper *s, int tool, int about);     // … in this step, to the iterate
+// [mJ] that they may do in the step: their forces are those of before, since a solution that is not to be trusted says anything.
+double hands_work_bound(const Stepper *s);
 double hands_work(const Stepper *s);           // [mJ] that the hands have done in this step …
 double hands_valve_work(const Stepper *s);     // … and that the valves have taken
 // [mm] of a cut advance that later steps make up.
