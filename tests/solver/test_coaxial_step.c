@@ -492,33 +492,6 @@ static void hands_stop_and_slip(void **state)
     assert_non_null(strstr(why, "too short"));
 }
 
-// The inner hand pushes a stiff J out of its catheter, with up to 12 N: its work is allowed for where a motion is judged by its energy.
-static void a_stiff_bend_is_pushed_out(void **state)
-{
-    (void)state;
-    Coaxial c = {0};
-    Vessel *vessel = bent_tube(60, 40, 0.5, 20, 10);
-    c.section[0][0] = tube_section(120, 150, 0, 1.67, 1.2);
-    c.section[1][0] = tube_section(170, 291, 0, 0.9, 0);
-    c.section[1][1] = tube_section(9.4, 200, 1 / 3.0, 0.9, 0);
-    c.options.vessel = vessel;
-    c.options.wire = tool_options(c.section[0], 1, 60, 2);
-    c.inner[0] = tool_options(c.section[1], 2, 90, 2);
-    start(&c, 1, true);
-    StepCommand push[2] = {{0}, {0.05, 0}};
-    int cut = 0;
-    double most = 0;
-    for (int i = 0; i < 400; i++) {
-        const StepReport *r = step_tools(c.stepper, push);
-        cut += (r->flags & STEP_LIMITED) != 0;
-        most = fmax(most, fabs(r->push[1]));
-    }
-    print_message("%.2f mm in, %d steps cut, push up to %.2f N\n", stepper_tool_inserted(c.stepper, 1), cut, most);
-    assert_true(cut <= 20 && stepper_tool_inserted(c.stepper, 1) > 21);
-    stepper_destroy(c.stepper);
-    vessel->destroy(vessel);
-}
-
 static double furthest_moved(const Vec3 *before, const WireState *w, int shift, int count)
 {
     double most = 0;
@@ -683,7 +656,6 @@ int main(void)
         cmocka_unit_test(friction_in_a_bend),               cmocka_unit_test(friction_acts_between_neighbours),
         cmocka_unit_test(three_tools_stay_in_the_tube),     cmocka_unit_test(a_restored_run_repeats),
         cmocka_unit_test(hands_stop_and_slip),
-        cmocka_unit_test(a_stiff_bend_is_pushed_out),
         cmocka_unit_test(a_thread_over_a_bend),
         cmocka_unit_test(tools_are_exchanged_at_the_hub),
         cmocka_unit_test(turned_and_mirrored_scenes_go_the_same_way),
