@@ -137,7 +137,6 @@ typedef struct ToolNode {
 int stepper_node_capacity(const Stepper *stepper);       // M at most
 int stepper_tool_count(const Stepper *stepper);
 int stepper_tool_nodes(const Stepper *stepper, int tool, ToolNode *node);   // their number; node may be NULL
-int stepper_tool_node_capacity(const Stepper *stepper, int tool);           // of the longest that may be fitted
 double stepper_tool_inserted(const Stepper *stepper, int tool);             // [mm]
 double stepper_tool_turned(const Stepper *stepper, int tool);               // [rad] by its hand, since the start
 double stepper_tool_length(const Stepper *stepper, int tool);               // [mm]

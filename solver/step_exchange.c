@@ -7,14 +7,6 @@
 static const double AT_HUB = 1;          // [mm] from its hub: a tip that can be taken out …
 static const double LEAST_AHEAD = 0.01;  // … and that is put in
 
-int stepper_tool_node_capacity(const Stepper *s, int k)
-{
-    int most = s->tool_count == 1 ? s->wire.node_count : 0;
-    for (int i = 0; s->tool_count > 1 && i <= s->spare_count[k]; i++)
-        most = s->device[k][i]->wire.node_count > most ? s->device[k][i]->wire.node_count : most;
-    return most;
-}
-
 int stepper_fitted(const Stepper *s, int k) { return s->fitted[k]; }
 
 static void fit(Stepper *s, int k, int which)
