@@ -431,6 +431,15 @@ static StepCommand stalled(Stepper *s, StepCommand command)
     return command;
 }
 
+void stepper_go_back(Stepper *s)
+{
+    size_t nodes = (size_t)s->state.node_count, inner = nodes * (size_t)s->state.inner_count * sizeof(double);
+    memcpy(s->state.position, s->start_position, nodes * sizeof *s->start_position);
+    memcpy(s->state.orientation, s->start_orientation, nodes * sizeof *s->start_orientation);
+    memcpy(s->state.slide, s->start_slide, inner);
+    memcpy(s->state.angle, s->start_angle, inner);
+}
+
 // The step begins at the state's pose.
 static void begin(Stepper *s)
 {
@@ -869,12 +878,7 @@ static void take_back(Stepper *s)
         double ends = vec3_dot(vec3_sub(vec3_add(s->start_position[node], vec3(u[0], u[1], u[2])), s->mouth), s->axis[0]);
         if (ends >= TAKE_BACK * s->wire.length[node - 1])
             return;
-        size_t nodes = (size_t)s->state.node_count;
-        memcpy(s->state.position, s->start_position, nodes * sizeof *s->start_position);
-        memcpy(s->state.orientation, s->start_orientation, nodes * sizeof *s->start_orientation);
-        size_t inner = nodes * (size_t)s->state.inner_count * sizeof(double);
-        memcpy(s->state.slide, s->start_slide, inner);
-        memcpy(s->state.angle, s->start_angle, inner);
+        stepper_go_back(s);
         hold(s, node);
         stepper_forget(s, node);
         s->first_free++;
@@ -908,17 +912,13 @@ void step_contact(Stepper *s)
 
 static void keep_last_state(Stepper *s)
 {
-    size_t nodes = (size_t)s->state.node_count;
-    memcpy(s->state.position, s->start_position, nodes * sizeof *s->start_position);
-    memcpy(s->state.orientation, s->start_orientation, nodes * sizeof *s->start_orientation);
+    size_t nodes = (size_t)s->state.node_count, inner = nodes * (size_t)s->state.inner_count * sizeof(double);
+    stepper_go_back(s);
     memset(s->state.velocity, 0, nodes * sizeof *s->state.velocity);
     memset(s->state.spin, 0, nodes * sizeof *s->state.spin);
     memset(s->force, 0, (size_t)s->point_count * sizeof *s->force);
     memset(s->clearance, 0, (size_t)s->point_count * sizeof *s->clearance);
     self_contact_forget(s);
-    size_t inner = nodes * (size_t)s->state.inner_count * sizeof(double);
-    memcpy(s->state.slide, s->start_slide, inner);
-    memcpy(s->state.angle, s->start_angle, inner);
     memset(s->state.slide_velocity, 0, inner);
     memset(s->state.slide_spin, 0, inner);
     s->report.flags |= STEP_DIVERGED;

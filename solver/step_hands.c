@@ -38,14 +38,18 @@ static double wanted(const Stepper *s, int k, int about)
     return t->inserted + s->tool_command[k].advance - (t->wire.total_length + hub - s->start_slide[k - 1]);
 }
 
-// The hand's unknown in those of node 0. The hub of a rig does not move.
+// What a tool moves by at the hub, from node 0's unknowns. The hub of a rig does not move.
+static double tool_moves(const Stepper *s, int k, int about, const double *u)
+{
+    double hub = s->has_sheath ? u[3 * about] : 0;
+    return k == 0 ? hub : about ? hub + u[unknown_of(k) + 1] : hub - u[unknown_of(k)];
+}
+
+// The hand's unknown.
 static double hand_moves(const Stepper *s, int k, int about, const double *u)
 {
-    double hub = s->has_sheath ? u[3 * about] : 0, own = k == 0 ? hub : about ? hub + u[unknown_of(k) + 1] : hub - u[unknown_of(k)];
-    int out = rides(s, k) ? tools_around(s, 0, k) : 0;
-    if (!rides(s, k))
-        return own;
-    return own - (out == 0 ? hub : about ? hub + u[unknown_of(out) + 1] : hub - u[unknown_of(out)]);
+    double own = tool_moves(s, k, about, u);
+    return rides(s, k) ? own - tool_moves(s, tools_around(s, 0, k), about, u) : own;
 }
 
 double hand_moved(const Stepper *s, int k, int about) { return hand_moves(s, k, about, s->linearised); }
@@ -214,19 +218,19 @@ void hands_report(Stepper *s)
 
 double hands_work_bound(const Stepper *s)
 {
-    double work = 0;
-    if (s->has_sheath) {
-        double length = vec3_distance(s->start_position[1], s->start_position[0]), rest = s->beam.rest.length[0], advance = fabs(s->u[0]);
-        work += s->beam.rest.axial[0] * advance * (fabs(length - rest) + advance * rest / s->wire.total_length) + fabs(s->u[3] * hand_force(s, 0, 1));
-    }
-    for (int k = 1; k < s->tool_count; k++) {
+    double work = 0, length = vec3_distance(s->start_position[1], s->start_position[0]);
+    for (int k = 0; k < s->tool_count; k++) {
         if (!has_hand(s, k))
             continue;
-        const Tool *t = &s->tool[k];
-        const double *slide = s->start_slide + k - 1;
-        double length = vec3_distance(s->start_position[1], s->start_position[0]), rest = is_inside(s, 1, k) ? slide[s->state.inner_count] - slide[0] : length;
-        double advance = fabs(hand_moves(s, k, 0, s->u)), stiffness = t->section[0].axial / fmax(rest, 1e-3 * length);
-        work += stiffness * advance * (fabs(length - rest) + advance * rest / t->wire.total_length) + fabs(hand_moves(s, k, 1, s->u) * hand_force(s, k, 1));
+        double rest = s->beam.rest.length[0], stiffness = s->beam.rest.axial[0], total = s->wire.total_length, advance = fabs(hand_moves(s, k, 0, s->u));
+        if (k > 0) {
+            const Tool *t = &s->tool[k];
+            const double *slide = s->start_slide + k - 1;
+            rest = is_inside(s, 1, k) ? slide[s->state.inner_count] - slide[0] : length;
+            stiffness = t->section[0].axial / fmax(rest, 1e-3 * length);
+            total = t->wire.total_length;
+        }
+        work += stiffness * advance * (fabs(length - rest) + advance * rest / total) + fabs(hand_moves(s, k, 1, s->u) * hand_force(s, k, 1));
     }
     return work;
 }

@@ -163,6 +163,8 @@ struct Stepper {
 static inline size_t row_of(const Stepper *s, int node) { return (size_t)s->chain.size * (size_t)node; }
 static inline size_t block_of(const Stepper *s, int node) { return (size_t)s->chain.size * row_of(s, node); }
 
+// The pose is that of the step's start again.
+void stepper_go_back(Stepper *s);
 void stepper_detect(Stepper *s);
 // Forces of the solved set go to their points.
 void stepper_keep_forces(Stepper *s);

@@ -457,11 +457,7 @@ bool tools_leave_back(Stepper *s)
         double ends = s->start_slide[tip * s->state.inner_count + k - 1] + s->u[row_of(s, tip) + (size_t)unknown_of(k)];
         if (t->wire.s[t->first] - ends > TAKE_BACK * t->wire.length[t->first - 1])
             continue;
-        size_t nodes = (size_t)s->state.node_count, inner = nodes * (size_t)s->state.inner_count * sizeof(double);
-        memcpy(s->state.position, s->start_position, nodes * sizeof *s->start_position);
-        memcpy(s->state.orientation, s->start_orientation, nodes * sizeof *s->start_orientation);
-        memcpy(s->state.slide, s->start_slide, inner);
-        memcpy(s->state.angle, s->start_angle, inner);
+        stepper_go_back(s);
         s->first_free -= t->start < s->first_free;
         leave(s, k);
         return true;
