@@ -366,7 +366,7 @@ static void check_exchanges(const Reading *reading)
 {
     const Scene *scene = reading->scene;
     if (scene->exchange_count > 0 && scene->tool_count == 1)
-        yaml_fault(reading->exchange[0].whole, "the scene has one tool; over which wire, or in which catheter, is it to be exchanged? List two tools or more");
+        yaml_fault(reading->exchange[0].whole, "the scene has one tool; an exchange needs two or more, since a tool is exchanged over the one within it or inside the one around it");
     for (int i = 0; i < scene->exchange_count; i++) {
         const SceneExchange *e = &scene->exchange[i];
         if (e->tool > 0)

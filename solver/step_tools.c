@@ -477,7 +477,7 @@ static void pass_tip(Stepper *s, int k, double ahead)
                 ;
         if (t->inside <= tip && !carries)
             return;          // its tip is behind
-        // as the hands move it, or as it last moved: friction may keep it from the one, and go on with the other
+        // by the hands' commands or by its last motion, whichever takes it further back: friction may hold it against its hand
         double out = *slide_of(s, tip, k), at = out - fmin(ahead, -slide_rate(s, tip, k) * s->dt);
         if (j > 0 && t->wire.s[j] - fmax(at, out) > JOIN * t->wire.length[j - 1])
             join(s, k, t->wire.s[j] - out);
