@@ -78,7 +78,9 @@ typedef struct Border {
 static const CoaxialSection *scan(const CoaxialSpan *span, int k, CoaxialRest *rest, Border *border, int *border_count)
 {
     const CoaxialSection *section = span->tool->section, *last = section + span->tool->count - 1;
-    double length = rest->own_length[k], s = span->s1, end = s + length, by_axial = 0, by_torsion = 0;
+    double length = rest->strained_length[k], s = span->s1, end = s + length, by_axial = 0, by_torsion = 0;
+    rest->ends[k] = k > 0 && !span->has_tip && last->end < end;
+    rest->own_length[k] = rest->ends[k] ? rest->length : length;
     while (section < last && section->end <= s)
         section++;
     if (span->has_tip && section->end <= s)
@@ -86,16 +88,18 @@ static const CoaxialSection *scan(const CoaxialSpan *span, int k, CoaxialRest *r
     const CoaxialSection *first = section;
     rest->is_whole[k] = true;
     for (;; section++) {
-        bool goes_on = section->end >= end || (section == last && !span->has_tip);
+        bool goes_on = section->end >= end || (section == last && k == 0);
         double to = goes_on ? end : section->end;
-        by_axial += (to - s) / section->axial;
-        by_torsion += (to - s) / section->torsion;
+        // what is past its tip stretches and twists with it
+        double strained = section == last && !span->has_tip ? end : to;
+        by_axial += (strained - s) / section->axial;
+        by_torsion += (strained - s) / section->torsion;
         if (goes_on)
             break;
         rest->is_whole[k] = false;
         if (*border_count < COAXIAL_BORDERS_MAX) {
             int at = (*border_count)++;
-            double x = (to - span->s1) / length;
+            double x = (to - span->s1) / rest->own_length[k];
             for (; at > 0 && border[at - 1].x > x; at--)
                 border[at] = border[at - 1];
             border[at] = (Border){x, k};
@@ -285,6 +289,18 @@ static CoaxialChord rest_chord(const double angle[2])
     return (CoaxialChord){.turn = {cosine, 0, 0.5 * half * y, 0.5 * half * z}, .v = {y, z}, .grow = grow, .stay = stay, .lean = 0.5 * half * half};
 }
 
+// A tool that ends inside bends as if S2 were S1 and the carrier's length.
+static void bend_with_carrier(CoaxialRest *rest, int k)
+{
+    const CoaxialSlope *by_end = &rest->slope[4 * k + COAXIAL_S2];
+    double slope[QUANTITIES] = {by_end->flexibility[0], by_end->flexibility[1], by_end->flexibility[2], by_end->angle[0][0], by_end->angle[0][1],
+                                by_end->angle[1][0], by_end->angle[1][1], by_end->waste};
+    slope_add(&rest->slope[4 * k + COAXIAL_S1], 1, slope);
+    slope_add(&rest->slope[4 * k + COAXIAL_S2], -1, slope);
+    slope_add(&rest->slope[COAXIAL_S1], -1, slope);
+    slope_add(&rest->slope[COAXIAL_S2], 1, slope);
+}
+
 void coaxial_rest(const CoaxialSpan *span, int count, CoaxialRest *rest)
 {
     memset(rest, 0, offsetof(CoaxialRest, piece));
@@ -294,7 +310,7 @@ void coaxial_rest(const CoaxialSpan *span, int count, CoaxialRest *rest)
     int border_count = 0;
     Parts parts;
     for (int k = 0; k < count; k++) {
-        rest->own_length[k] = span[k].has_tip ? rest->length : fmax(span[k].s2 - span[k].s1, LENGTH_MIN);
+        rest->strained_length[k] = span[k].has_tip ? rest->length : fmax(span[k].s2 - span[k].s1, LENGTH_MIN);
         parts.section[k] = scan(&span[k], k, rest, border, &border_count);
     }
     double from = 0, ends[2][QUANTITIES], before[QUANTITIES] = {0};
@@ -316,6 +332,9 @@ void coaxial_rest(const CoaxialSpan *span, int count, CoaxialRest *rest)
         memcpy(before, ends[1], sizeof before);
         from = to;
     }
+    for (int k = 1; k < count; k++)
+        if (rest->ends[k])
+            bend_with_carrier(rest, k);
     double f11 = rest->flexibility[0], f12 = rest->flexibility[1], f22 = rest->flexibility[2], unit = 1 / (f11 * f22 - f12 * f12);
     rest->near1 = f22 * unit, rest->near2 = f11 * unit, rest->far = -f12 * unit;
     if (rest->is_curved) {
@@ -404,7 +423,7 @@ void coaxial_element(const CoaxialInput *in, CoaxialOutput *out)
     for (int k = 0; k < count; k++) {
         own_turn[k] = in->span[k].has_tip ? 0 : in->span[k].phi2 - in->span[k].phi1;
         axial += rest->axial[k], torsion += rest->torsion[k];
-        length += rest->axial[k] * rest->own_length[k];
+        length += rest->axial[k] * rest->strained_length[k];
         turn += rest->torsion[k] * own_turn[k];
     }
     length /= axial, turn /= torsion;
@@ -419,7 +438,7 @@ void coaxial_element(const CoaxialInput *in, CoaxialOutput *out)
 
     double energy = o->energy + rest->waste, psi = o->torque / torsion - turn;
     for (int k = 0; k < count; k++) {
-        double short_by = length - rest->own_length[k], turned = own_turn[k] - turn;
+        double short_by = length - rest->strained_length[k], turned = own_turn[k] - turn;
         energy += 0.5 * (rest->axial[k] * short_by * short_by + rest->torsion[k] * turned * turned);
         out->tension[k] = rest->axial[k] * (o->tension / axial + short_by);
         out->torque[k] = rest->torsion[k] * (psi + own_turn[k]);

@@ -36,7 +36,7 @@ typedef struct CoaxialTool {
 
 typedef struct CoaxialSpan { // one tool in one element
     const CoaxialTool *tool;
-    double s1, s2;           // [mm] S at the nodes, s1 < s2; s2 not read where has_tip
+    double s1, s2;           // [mm] S at the nodes, s1 < s2; s2 not read where has_tip. What is past the tool's tip stretches and twists and does not bend
     double phi1, phi2;       // [rad], of any size; where has_tip, coaxial_element() takes for phi2 what leaves the tool without torque
     double spread;           // [mm] strain is that of at least this length, what is behind S1 counted in; default 0. For an element that begins at a
                              // mouth or a tip and may be short: the full element's length
@@ -77,7 +77,9 @@ typedef struct CoaxialRest {       // layer 1: what the tools are together
     double arc;              // [mm] length of the rest arc less chord and bow; its slopes with the length and with `angle`
     double arc_by_length, arc_by_angle[2][2];
     double waste;            // [mJ] energy of the tools' rest shapes against each other, where no force acts from outside
-    double own_length[COAXIAL_TOOLS_MAX];      // [mm] l_k
+    double own_length[COAXIAL_TOOLS_MAX];      // [mm] l_k; of a tool that ends inside the carrier's …
+    double strained_length[COAXIAL_TOOLS_MAX]; // … and S2 - S1 of what is stretched
+    bool ends[COAXIAL_TOOLS_MAX];              // inside, with S2 past its tip
     double axial[COAXIAL_TOOLS_MAX];           // [N/mm] 1 / integral of dS / EA, over `spread` at least; 0 where the tool has its tip inside
     double torsion[COAXIAL_TOOLS_MAX];         // [N mm] 1 / integral of dS / GJ; likewise
     double axial_end[COAXIAL_TOOLS_MAX][2], torsion_end[COAXIAL_TOOLS_MAX][2];     // minus and plus the slopes of these integrals with S1 and S2

@@ -39,6 +39,7 @@ static const double LOST = 0.1;                  // residual of a contact solve 
 static const double FIRMEST = 1e5;               // share of its stiffness by which an unknown is held to the iterate at most, where nothing less will do
 static const double MOUTH_TRAVEL = 1;            // of an element's length that the tool springs through the mouth in a step, besides what the hand feeds
 static const double LET_GO_TURN = 0.1;           // [rad] by which a node that is let go at the mouth is turned at most
+static const double SPRUNG = 0.1;                // of an element's length past the mouth: a node of several tools that has sprung so far stays on the line
 
 // --- creation ---
 
@@ -384,8 +385,6 @@ static void hold(Stepper *s, int node)
 
 static Vec3 mouth_curvature(const Stepper *s, int node)
 {
-    if (s->tool_count > 1)
-        return stepper_curvature(s, node);
     const WireState *w = &s->state;
     const BeamRest *r = &s->beam.rest;
     SheathElement e;
@@ -400,6 +399,14 @@ static void let_go(Stepper *s, int node)
         return;
     WireState *w = &s->state;
     double along = stepper_sheath_coordinate(s, node);
+    if (s->tool_count > 1) {
+        if (along > SPRUNG * s->wire.length[node - 1])
+            return;
+        ToolNode further = tools_further(s, node, along);
+        w->position[node] = further.position;
+        w->orientation[node] = further.orientation;
+        return;
+    }
     Vec3 curvature = mouth_curvature(s, node);
     double bend = vec3_norm(curvature) * along;
     if (bend > LET_GO_TURN)          // sprang out of the sheath: no curve is known that far

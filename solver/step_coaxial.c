@@ -8,7 +8,6 @@
 #include <string.h>
 
 enum { NODAL = 12 };
-static const double JUST_BEFORE = 1e-6;  // [mm] from a border: the section on the proximal side
 static const double SHORTEST = 0.01;     // of an element: what is left of it outside a mouth or a tip
 
 // The tools in element c, carrier first; returns their number. tool: which they are.
@@ -62,7 +61,7 @@ static void keep_inner(const Stepper *s, int c, const CoaxialInput *in, const Co
     for (int i = 0; i < in->count; i++) {
         const CoaxialSpan *p = &in->span[i];
         double middle = p->s1 + 0.5 * out->rest.length, phi = p->has_tip ? p->phi1 : 0.5 * (p->phi1 + p->phi2);
-        bool ends = p->has_tip && middle > p->tool->section[p->tool->count - 1].end;
+        bool ends = i > 0 && middle > p->tool->section[p->tool->count - 1].end;
         const CoaxialSection *section = section_at(p->tool, middle);
         own[i] = ends ? 0 : section->bending;
         rest[i] = vec3_scale(quat_rotate(quat_mul(in->q1, quat_from_rotation_vector(vec3(phi, 0, 0))), vec3(0, -section->curve[1], section->curve[0])), own[i]);
@@ -411,7 +410,7 @@ static double sheath_element_of_tools(const Stepper *s, int c, double scale, Loc
         if (p->has_tip)
             continue;
         int at = unknown_of(tool[i]), along[4] = {0, n, at, n + at}, about[4] = {3, n + 3, at + 1, n + at + 1};
-        double ka = rest.axial[i], kt = rest.torsion[i], strain = length - rest.own_length[i], turn = psi + p->phi2 - p->phi1;
+        double ka = rest.axial[i], kt = rest.torsion[i], strain = length - rest.strained_length[i], turn = psi + p->phi2 - p->phi1;
         static const double by_length[4] = {-1, 1, 1, -1}, by_turn[4] = {-1, 1, -1, 1};
         int unknowns = p->is_fixed ? 2 : 4;
         energy += 0.5 * (ka * strain * strain + kt * turn * turn);
@@ -608,94 +607,62 @@ double tools_kinetic_energy(const Stepper *s)
 
 // --- tips ---
 
-// Rest moment of a tool at a node, and its stiffness.
-static Vec3 rest_moment(const Stepper *s, int c, int k, double *bending)
-{
-    bool own = s->carrier[c] == k;
-    const CoaxialSection *p = section_at(&s->tool[k].coaxial, own ? s->wire.s[c] : slide_at(s, c, k));
-    Quat q = s->state.orientation[c];
-    if (!own)
-        q = quat_mul(q, quat_from_rotation_vector(vec3(angle_at(s, c, k), 0, 0)));
-    *bending = p->bending;
-    return vec3_scale(quat_rotate(q, vec3(0, -p->curve[1], p->curve[0])), p->bending);
-}
-
-Vec3 stepper_curvature(const Stepper *s, int c)
+// The tools from node c on, in the element there or, at a free end, beyond it; what strains that element.
+static CoaxialInput going_on(const Stepper *s, int c, CoaxialOutput *out)
 {
     int tool[STEP_TOOLS_MAX];
-    double bending = 0, one;
+    if (c + 1 < s->state.node_count) {
+        CoaxialInput in = c + 1 == s->first_free ? mouth_input(s, tool) : input_at(s, c, tool);
+        coaxial_element(&in, out);
+        return in;
+    }
+    *out = (CoaxialOutput){0};
+    CoaxialInput in = {.x1 = s->state.position[c], .q1 = s->state.orientation[c]};
+    for (int k = s->carrier[c] + 1; k < s->tool_count; k++)
+        if (is_inside(s, c, k))
+            in.span[in.count++] = (CoaxialSpan){.tool = &s->tool[k].coaxial, .s1 = slide_at(s, c, k), .phi1 = angle_at(s, c, k)};
+    return in;
+}
+
+// The tools at a distance d [mm] from node 1 of an element, where its frame is q: their bending and shear stiffness, and the moment of their rest shapes.
+static Vec3 stiffness_at(const CoaxialInput *in, double d, Quat q, double *bending, double *shear)
+{
     Vec3 sum = vec3(0, 0, 0);
-    if (c + 1 >= s->state.node_count) {      // a free end: the tools that go on are as at rest
-        for (int k = s->carrier[c] + 1; k < s->tool_count; k++)
-            if (is_inside(s, c, k)) {
-                sum = vec3_add(sum, rest_moment(s, c, k, &one));
-                bending += one;
-            }
-        return bending > 0 ? vec3_scale(sum, 1 / bending) : sum;
-    }
-    CoaxialInput in = c + 1 == s->first_free ? mouth_input(s, tool) : input_at(s, c, tool);
-    CoaxialOutput out;
-    coaxial_element(&in, &out);
-    sum = vec3_negate(out.end_moment[0]);
-    for (int i = 0; i < in.count; i++) {
-        sum = vec3_add(sum, rest_moment(s, c, tool[i], &one));
-        bending += one;
-    }
-    return vec3_scale(sum, 1 / bending);
-}
-
-// [N] what a length of tool k more adds to the energy at the distal end of element c, where the moment m there stays (coaxial.c: -V):
-// EI_k k_k^2 / 2 - |m + c|^2 / (2 B) with it, + |m + c'|^2 / (2 B') without.
-static double cost_of_length(const Stepper *s, int c, int k)
-{
-    int tool[STEP_TOOLS_MAX];
-    CoaxialInput in = input_at(s, c, tool);
-    CoaxialOutput out;
-    coaxial_element(&in, &out);
-    double bending = 0, own = 0;
-    Vec3 with = out.end_moment[1], mine = vec3(0, 0, 0);
-    for (int i = 0; i < in.count; i++) {
-        const CoaxialSpan *p = &in.span[i];
-        if (p->has_tip)
+    *bending = *shear = 0;
+    for (int i = 0; i < in->count; i++) {
+        const CoaxialSpan *p = &in->span[i];
+        if (i > 0 && p->s1 + d > p->tool->section[p->tool->count - 1].end)
             continue;
-        const CoaxialSection *section = section_at(p->tool, p->s2 - JUST_BEFORE);
-        Quat q = quat_mul(in.q2, quat_from_rotation_vector(vec3(p->phi2, 0, 0)));
-        Vec3 rest = vec3_scale(quat_rotate(q, vec3(0, -section->curve[1], section->curve[0])), section->bending);
-        with = vec3_add(with, rest);
-        bending += section->bending;
-        if (tool[i] == k) {
-            mine = rest;
-            own = section->bending;
-        }
+        const CoaxialSection *section = section_at(p->tool, p->s1 + d);
+        Quat own = quat_mul(q, quat_from_rotation_vector(vec3(p->phi1, 0, 0)));
+        sum = vec3_add_scaled(sum, section->bending, quat_rotate(own, vec3(0, -section->curve[1], section->curve[0])));
+        *bending += section->bending;
+        *shear += section->shear;
     }
-    Vec3 without = vec3_sub(with, mine);
-    return 0.5 * (vec3_norm2(mine) / own - vec3_norm2(with) / bending + vec3_norm2(without) / (bending - own));
+    return sum;
 }
 
-// Tool k's last node inside lies past its tip by a little: what the element before it has too much of the tool is taken off. [mJ]; *force [N]: its slope with S
-// at that node, less.
-static double short_of_node(const Stepper *s, int k, double *force)
+ToolNode tools_further(const Stepper *s, int c, double d)
 {
-    const Tool *t = &s->tool[k];
-    int last = t->inside - 1;
-    *force = 0;
-    if (last < 1 || t->first < t->wire.node_count)
-        return 0;
-    double lacks = slide_at(s, last, k) - t->wire.total_length;
-    if (!(lacks > 0))
-        return 0;
-    *force = last < s->first_free ? straightening(t, t->wire.total_length - JUST_BEFORE) : cost_of_length(s, last - 1, k);
-    return -lacks * *force;
-}
-
-static void tips_short_of_nodes(Stepper *s)
-{
-    for (int k = 1; k < s->tool_count; k++) {
-        double force;
-        short_of_node(s, k, &force);
-        if (force > 0)
-            s->b[row_of(s, s->tool[k].inside - 1) + (size_t)unknown_of(k)] += force;
+    enum { PARTS = 8 };
+    CoaxialOutput out;
+    CoaxialInput in = going_on(s, c, &out);
+    ToolNode node = {.position = in.x1, .orientation = in.q1};
+    if (in.count == 0)
+        return node;
+    const CoaxialSection *first = section_at(in.span[0].tool, in.span[0].s1);
+    double length = fmax(out.rest.length, d), ds = d / PARTS, stretch = out.tension[0] / first->axial, twist = ds * out.torque[0] / first->torsion;
+    for (int i = 0; i < PARTS; i++) {
+        double at = (i + 0.5) * ds, x = at / length, bending, shear;
+        Vec3 moment = vec3_add_scaled(stiffness_at(&in, at, node.orientation, &bending, &shear), x - 1, out.end_moment[0]);
+        Vec3 half = vec3_scale(vec3_add_scaled(moment, x, out.end_moment[1]), 0.5 * ds / bending);
+        node.orientation = quat_mul(quat_from_rotation_vector(half), node.orientation);
+        Vec3 tangent = quat_rotate(node.orientation, vec3(1, 0, 0)), force = out.beam.force2;
+        Vec3 slant = vec3_scale(vec3_add_scaled(force, -vec3_dot(force, tangent), tangent), 1 / shear);
+        node.position = vec3_add_scaled(node.position, ds, vec3_add_scaled(slant, 1 + stretch, tangent));
+        node.orientation = quat_unit(quat_mul(quat_mul(quat_from_rotation_vector(half), node.orientation), quat_from_rotation_vector(vec3(twist, 0, 0))));
     }
+    return node;
 }
 
 // --- all of it ---
@@ -783,7 +750,6 @@ void tools_assemble(Stepper *s, double scale, double inertia)
         for (int i = 0; i < 2 * n; i++)
             b[i] -= gradient[i];
     }
-    tips_short_of_nodes(s);
     if (!s->is_iterate)
         tools_slides(s);
     static const int lateral[4] = {1, 2, 4, 5};
@@ -796,9 +762,6 @@ double tools_elastic_energy(const Stepper *s)
 {
     double energy = 0;
     int tool[STEP_TOOLS_MAX];
-    double force;
-    for (int k = 1; k < s->tool_count; k++)
-        energy += short_of_node(s, k, &force);
     // behind the hub all tools lie straight in the hands
     for (int k = 1; s->first_free > 0 && k < s->tool_count; k++)
         energy += straightened(&s->tool[k], 0, slide_at(s, 0, k));

@@ -9,7 +9,7 @@
 // A node that has left the tip around it joins the chain at this share of its element from it, and leaves the chain nearer than that.
 static const double JOIN = 0.05, LEAVE = 0.04;
 // A tip that ended past its element's end would be cut there, so it passes the node this share of the element early, and on the way back late: more than
-// strain and friction keep it from where the hands would have it. What it lacks up to the node is taken off again (tips_short_of_nodes()).
+// strain and friction keep it from where the hands would have it. What lies past its tip does not bend.
 static const double EARLY = 0.01;
 static const double TAKE_BACK = 0.002;           // of an element's length past the tip around it: a node that would end nearer to it leaves the chain
 
@@ -391,26 +391,12 @@ static void join(Stepper *s, int k, double d)
         for (c = w->node_count; c > 0 && s->carrier[c - 1] > k; c--)
             ;
     int before = c - 1;
-    double phi = *angle_of(s, before, k);
-    Vec3 tangent = quat_rotate(w->orientation[before], vec3(1, 0, 0)), place;
-    Quat frame;
-    if (c < w->node_count) {         // on the line of the tool that has gone on from there
-        int m = s->carrier[c], element = before;
-        double at = *slide_of(s, before, m) + d;
-        while (element + 2 < w->node_count && s->carrier[element + 1] == m && s->wire.s[element + 1] < at)
-            element++;
-        ToolNode node;
-        between_nodes(s, element, m, at, &node);
-        place = node.position;
-        frame = quat_mul(node.orientation, quat_from_rotation_vector(vec3(remainder(phi - *angle_of(s, before, m), 2 * PI), 0, 0)));
-    } else {
-        Vec3 curvature = stepper_curvature(s, before), moved = vec3_add_scaled(vec3_scale(tangent, d), 0.5 * d * d, vec3_cross(curvature, tangent));
-        place = vec3_add(w->position[before], moved);
-        frame = quat_mul(quat_from_rotation_vector(vec3_scale(curvature, d)), quat_mul(w->orientation[before], quat_from_rotation_vector(vec3(remainder(phi, 2 * PI), 0, 0))));
-    }
+    double phi = *angle_of(s, before, k), turned = c < w->node_count ? *angle_of(s, before, s->carrier[c]) : 0;
+    Vec3 tangent = quat_rotate(w->orientation[before], vec3(1, 0, 0));
+    ToolNode further = tools_further(s, before, d);
     shift(s, c, slots_of(t, j - 1), true);
-    w->position[c] = place;
-    w->orientation[c] = quat_unit(frame);
+    w->position[c] = further.position;
+    w->orientation[c] = quat_unit(quat_mul(further.orientation, quat_from_rotation_vector(vec3(remainder(phi - turned, 2 * PI), 0, 0))));
     // its material moves as it did inside
     int i = before * w->inner_count + k - 1;
     w->velocity[c] = vec3_add_scaled(w->velocity[before], w->slide_velocity[i] - vec3_dot(w->velocity[before], tangent), tangent);

@@ -26,8 +26,9 @@ int tools_around(const Stepper *s, int c, int k);
 // [mm] rest length of the chain's element c; [rad] its twist.
 double tools_span_length(const Stepper *s, int c);
 double tools_twist(const Stepper *s, int c);
-// [1/mm] of the tools together at node c, distal of it, as a vector along the axis of turning.
-Vec3 stepper_curvature(const Stepper *s, int c);
+// Where the line is d [mm] from node c, or from the mouth where that is the last node in the sheath, as its element is bent, slanted by shear, stretched and
+// twisted there: position, and the frame of the tool that goes on, or at a free end of the one that ends.
+ToolNode tools_further(const Stepper *s, int c, double d);
 
 // [mm] radial, the least there is; at least a thousandth of the inner tool's diameter.
 double tools_clearance(const Tool *around, const Tool *inner);
