@@ -518,16 +518,16 @@ static void pass(Stepper *s)
 
 void tools_feed(Stepper *s)
 {
+    // where hubs will be; a tool's proximal end stays behind that of the tool around it, its tip beyond the outermost
+    double outermost = s->state.inserted + s->command.advance - s->tool[0].wire.total_length, around = outermost;
     for (int k = 1; k < s->tool_count; k++) {
         Tool *t = &s->tool[k];
         StepCommand *command = &s->tool_command[k];
-        // its proximal end stays behind the hub, its tip beyond it
-        const Tool *out = &s->tool[0];
-        double hub = s->state.inserted + s->command.advance - out->wire.total_length;
-        double most = t->wire.total_length + hub - t->inserted, least = hub - t->inserted;
+        double most = t->wire.total_length + around - t->inserted, least = fmin(most, outermost - t->inserted);
         if (command->advance > most || command->advance < least)
             s->report.flags |= command->advance > most ? STEP_FULLY_INSERTED : STEP_FULLY_WITHDRAWN;
         command->advance = fmin(most, fmax(least, command->advance));
+        around = t->inserted + command->advance - t->wire.total_length;
     }
     pass(s);
 }

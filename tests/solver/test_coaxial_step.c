@@ -532,6 +532,31 @@ static void events_leave_the_energy(void **state)
     stepper_destroy(c.stepper);
 }
 
+// A tool's end stops at the hub of the tool that it goes into, which is behind the outermost's.
+static void end_stops_at_the_hub_around_it(void **state)
+{
+    (void)state;
+    Coaxial c = {0};
+    c.section[0][0] = tube_section(30, 60, 0, 1.4, 1.2);
+    c.section[1][0] = tube_section(60, 40, 0, 1, 0.8);
+    c.section[2][0] = tube_section(80, 20, 0, 0.5, 0);
+    c.options.wire = tool_options(c.section[0], 1, 15, 0);
+    c.inner[0] = tool_options(c.section[1], 1, 30, 35);
+    c.inner[1] = tool_options(c.section[2], 1, 40, 45);
+    start(&c, 2, false);
+    const StepCommand push[3] = {[2] = {0.5, 0}}, pull[3] = {[1] = {-0.5, 0}};
+    unsigned flags = 0;
+    for (int i = 0; i < 40; i++)
+        flags |= step_tools(c.stepper, push)->flags;
+    assert_int_equal(flags, STEP_FULLY_INSERTED);
+    assert_true(fabs(stepper_tool_inserted(c.stepper, 2) - 55) < 1e-9);
+    // and goes back with that hub
+    for (int i = 0; i < 10; i++)
+        step_tools(c.stepper, pull);
+    assert_true(fabs(stepper_tool_inserted(c.stepper, 1) - 30) < 1e-9 && fabs(stepper_tool_inserted(c.stepper, 2) - 50) < 1e-9);
+    stepper_destroy(c.stepper);
+}
+
 static double furthest_moved(const Vec3 *before, const WireState *w, int shift, int count)
 {
     double most = 0;
@@ -696,6 +721,7 @@ int main(void)
         cmocka_unit_test(friction_in_a_bend),               cmocka_unit_test(friction_acts_between_neighbours),
         cmocka_unit_test(three_tools_stay_in_the_tube),     cmocka_unit_test(a_restored_run_repeats),
         cmocka_unit_test(hands_stop_and_slip),
+        cmocka_unit_test(end_stops_at_the_hub_around_it),
         cmocka_unit_test(events_leave_the_energy),
         cmocka_unit_test(a_thread_over_a_bend),
         cmocka_unit_test(tools_are_exchanged_at_the_hub),
