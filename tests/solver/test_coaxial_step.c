@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "tube_scene.h"
+#include "tests/short_run.h"
 
 // A tube or rod of this bending stiffness [N mm2], whatever its material.
 static WireSection tube_section(double length, double bending, double curvature, double outer, double inner)
@@ -89,7 +90,7 @@ static void a_straight_wire_in_a_curved_tube(void **state)
 {
     (void)state;
     double error[2];
-    for (int fine = 0; fine < 2; fine++) {
+    for (int fine = 0; fine < WHOLE_OR_SHORT(2, 1); fine++) {
         int n = fine ? 60 : 20;
         Coaxial c = {0};
         c.section[0][0] = tube_section(60, 60, 0.05, 1, 0.8);
@@ -112,7 +113,7 @@ static void a_straight_wire_in_a_curved_tube(void **state)
         stepper_destroy(c.stepper);
     }
     // what is left is the tools' own stretch
-    assert_true(error[1] < 2e-3);
+    assert_true(error[WHOLE_OR_SHORT(1, 0)] < 2e-3);
 }
 
 // Reference 2: phi'' = c sin phi, phi'(L) = 0. At a base of 197.7856 degrees, L sqrt(c) = 2, the fold; below it, the tip turns with the base.
@@ -128,7 +129,7 @@ static void turned_tubes_follow_up_to_the_fold(void **state)
     c.inner[0] = tool_options(c.section[1], 1, 60, L);
     start(&c, 1, false);
     move_tool(c.stepper, 1, 0, 0, 1, 800);
-    for (int turn = 60; turn <= 240; turn += 60) {
+    for (int turn = 60; turn <= WHOLE_OR_SHORT(240, 60); turn += 60) {
         move_tool(c.stepper, 1, 0, PI / 3, 1500, 1500);
         const WireState *w = stepper_state(c.stepper);
         double tip = w->angle[60], phi = tip, slope = 0, h = L / 20000;
@@ -157,7 +158,7 @@ static void a_bend_leaves_the_catheter(void **state)
     start(&c, 1, false);
     move_tool(c.stepper, 1, 0, 0, 1, 400);
     Vec3 first = {0};
-    for (int round = 0; round < 3; round++) {
+    for (int round = 0; round < WHOLE_OR_SHORT(3, 2); round++) {
         static const struct {
             double at, push;
         } stop[] = {{45, 0}, {52.41, 0}, {59, 0}, {61, -0.075}, {66.3, -0.075}, {74, -0.075}, {77, 0}, {79, 0}};
@@ -223,7 +224,7 @@ static void friction_in_a_bend(void **state)
     static const struct {
         double radius, clearance, force;
     } reference[] = {{20, 0.02, 0.308}, {20, 0.05, 0.191}, {20, 0.1, 0.130}, {10, 0.05, 0.525}, {40, 0.05, 0.068}};
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < WHOLE_OR_SHORT(5, 1); i++) {
         double pull[2];
         for (int fine = 0; fine < 2; fine++) {
             double arc = reference[i].radius * PI / 2, lumen = 0.36 + 2 * reference[i].clearance;
@@ -253,7 +254,7 @@ static void friction_in_a_bend(void **state)
 static void a_thread_over_a_bend(void **state)
 {
     (void)state;
-    for (int fine = 0; fine < 2; fine++) {
+    for (int fine = 0; fine < WHOLE_OR_SHORT(2, 1); fine++) {
         double arc = 20 * PI / 2, g = 0.0981;   // heavy, so that its stiffness does not count
         WireSection tube[3] = {tube_section(20, 1e5, 0, 1.5, 0.14), tube_section(arc, 1e5, 0.05, 1.5, 0.14), tube_section(20, 1e5, 0, 1.5, 0.14)};
         Coaxial c = {0};
@@ -370,7 +371,7 @@ static void three_tools_stay_in_the_tube(void **state)
     three_in_a_tube(&c, vessel);
     double deepest = 0;
     int nodes = 0, stuck = 0;
-    for (int i = 0; i < 6000; i++) {
+    for (int i = 0; i < WHOLE_OR_SHORT(6000, 4000); i++) {
         StepCommand command[3];
         wire_first(i, command);
         const StepReport *r = step_tools(c.stepper, command);
@@ -401,7 +402,7 @@ static void three_tools_stay_in_the_tube(void **state)
 static void turned_and_mirrored_scenes_go_the_same_way(void **state)
 {
     (void)state;
-    enum { STEPS = 2500 };
+    enum { STEPS = WHOLE_OR_SHORT(2500, 1000) };
     Quat turn[3] = {{1, 0, 0, 0}, quat_from_rotation_vector(vec3(0.7, -1.9, 0.4)), {1, 0, 0, 0}};
     double push[3][3];
     Vec3 tip[3];
@@ -441,14 +442,15 @@ static void a_restored_run_repeats(void **state)
     Coaxial c;
     StepCommand command[3];
     three_in_a_tube(&c, vessel);
-    for (int i = 0; i < 1200; i++) {
+    const int before = WHOLE_OR_SHORT(1200, 600);
+    for (int i = 0; i < before; i++) {
         wire_first(i, command);
         step_tools(c.stepper, command);
     }
     Checkpoint *kept = stepper_save(c.stepper, NULL);
     uint64_t hash[2];
     for (int again = 0; again < 2; again++) {
-        for (int i = 1200; i < 2400; i++) {
+        for (int i = before; i < 2 * before; i++) {
             wire_first(i, command);
             step_tools(c.stepper, command);
         }
@@ -615,7 +617,7 @@ static void tools_are_exchanged_at_the_hub(void **state)
     assert_true(stepper_hash(s) == hash);
     // the new one goes in over the wire, the wire comes out and a stiff one goes in
     move_tool(s, 0, 25, 0, 1500, 50);
-    move_tool(s, 1, -(stepper_tool_inserted(s, 1) - stepper_tool_inserted(s, 0) + 182) + 0.2, 0, 8000, 200);
+    move_tool(s, 1, -(stepper_tool_inserted(s, 1) - stepper_tool_inserted(s, 0) + 182) + 0.2, 0, WHOLE_OR_SHORT(8000, 2500), 200);
     for (int i = 0; i < 40; i++)
         before[i] = w->position[w->node_count - 1 - i];
     assert_true(stepper_exchange(s, 1, 1) == EXCHANGE_DONE);
@@ -623,7 +625,7 @@ static void tools_are_exchanged_at_the_hub(void **state)
     moved = furthest_moved(before, w, 0, 40);
     print_message("wire: nodes move by %.1e mm, the new one's push %.1e N\n", moved, r->push[1]);
     assert_true(moved < 1e-4 && fabs(r->push[1]) < 1e-3);
-    move_tool(s, 1, 200, 0, 8000, 50);
+    move_tool(s, 1, 200, 0, WHOLE_OR_SHORT(8000, 2500), 50);
     assert_true(stepper_tool_inserted(s, 1) > 30 && !(step_report(s)->flags & STEP_DIVERGED));
     checkpoint_free(kept);
     stepper_destroy(s);
