@@ -18,31 +18,9 @@
 #include <time.h>
 #include <unistd.h>
 
-static char folder[] = "/tmp/seldinger-bad-XXXXXX", output[1 << 16];
-
-static int run_in(const char *before, const char *arguments)
-{
-    char command[2000];
-    snprintf(command, sizeof command, "cd '%s' && %s %s %s 2>&1", folder, before, SELDINGER_PROGRAM, arguments);
-    FILE *pipe = popen(command, "r");
-    assert_non_null(pipe);
-    size_t length = fread(output, 1, sizeof output - 1, pipe);
-    output[length] = 0;
-    int status = pclose(pipe);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
-}
-
-static void put_bytes(const char *name, const void *bytes, size_t length)
-{
-    char path[300];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(bytes, 1, length, file), length);
-    assert_int_equal(fclose(file), 0);
-}
-
-static void put(const char *name, const char *text) { put_bytes(name, text, strlen(text)); }
+static char folder[] = "/tmp/seldinger-bad-XXXXXX";
+#include "tests/folder.h"
+#include "tests/cli/program.h"
 
 // Outputs of these tests are called out*.
 static void nothing_is_left(const char *arguments)
@@ -383,21 +361,11 @@ static void pipes_and_devices_stay_what_they_are(void **state)
     assert_true(stat(path, &status) == 0 && S_ISFIFO(status.st_mode));
 }
 
-static int make_folder(void **state)
+static int set_up(void **state)
 {
-    (void)state;
-    if (!mkdtemp(folder))
+    if (make_folder_with_cache(state) != 0)
         return -1;
-    setenv("SELDINGER_CACHE", folder, 1);
     return run_in("", "synth capsule -o tree.h5") || run_in("", "fit tree.h5 -o model.h5 --quiet") || run_in("head -c 3000 tree.h5 > cut.h5 &&", "--version");
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    char command[300];
-    snprintf(command, sizeof command, "rm -rf '%s'", folder);
-    return system(command);
 }
 
 int main(void)
@@ -408,5 +376,5 @@ int main(void)
         cmocka_unit_test(verbs_of_the_trainer),     cmocka_unit_test(a_full_disk),
         cmocka_unit_test(a_stop_by_the_user),       cmocka_unit_test(pipes_and_devices_stay_what_they_are),
     };
-    return cmocka_run_group_tests_name("bad_input", tests, make_folder, remove_folder);
+    return cmocka_run_group_tests_name("bad_input", tests, set_up, remove_folder);
 }

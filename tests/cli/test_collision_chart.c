@@ -17,7 +17,7 @@
 #include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-chart-XXXXXX";
-#include "tests/cli/folder.h"
+#include "tests/folder.h"
 
 enum { PANELS = 5, TICKS_MOST = 100, MARKS_MOST = 200 };
 static const char *const panel_id[PANELS] = {"detect", "error", "growth", "friction", "work"};
@@ -274,12 +274,6 @@ static void a_place_that_cannot_be_written_is_told(void **state)
     assert_false(collision_chart(root, "/nowhere/at/all.svg", &faults));
     assert_int_equal(faults.count, 1);
     cJSON_Delete(root);
-}
-
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
 }
 
 int main(void)

@@ -14,22 +14,13 @@
 #include <string.h>
 #include <sys/wait.h>
 
-static char folder[] = "/tmp/seldinger-surface-XXXXXX", output[1 << 16];
-
-#include "tests/cli/folder.h"
+static char folder[] = "/tmp/seldinger-surface-XXXXXX";
+#include "tests/folder.h"
+#include "tests/cli/program.h"
 
 enum { AROUND = 36, RINGS = 81, VERTICES = AROUND * RINGS + 2, TRIANGLES = 2 * AROUND * RINGS };
 
-static int run(const char *arguments)
-{
-    char command[1000];
-    snprintf(command, sizeof command, "cd '%s' && %s %s 2>&1", folder, SELDINGER_PROGRAM, arguments);
-    FILE *pipe = popen(command, "r");
-    assert_non_null(pipe);
-    output[fread(output, 1, sizeof output - 1, pipe)] = '\0';
-    int status = pclose(pipe);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
+static int run(const char *arguments) { return run_in("", arguments); }
 
 // --- A closed tube of radius 1 about the x axis, 40 mm long, facing out of the lumen ---
 
@@ -230,12 +221,6 @@ static void all_surfaces_of_a_tube_hold_the_same_wire(void **state)
         print_message("%s: tip %.4f mm from the exact tube's\n", kinds[k], between(tip, other));
         assert_true(between(tip, other) < 0.1);
     }
-}
-
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
 }
 
 int main(void)

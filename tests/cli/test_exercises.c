@@ -7,7 +7,6 @@
 
 #include <cmocka.h>
 
-#include <cJSON.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,20 +15,13 @@
 #include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-exercises-XXXXXX";
-#include "tests/cli/folder.h"
-
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
-}
+#include "tests/folder.h"
+#include "tests/cli/json_file.h"
+#include "tests/short_run.h"
 
 static cJSON *run(const char *name, const char *suffix, const char *model)
 {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    print_message("skipped: a sanitizer is watching\n");
-    skip();
-#endif
+    NEED_WHOLE_RUNS();
     if (model && access(model, R_OK) != 0) {
         print_message("skipped: %s is not made\n", model);
         skip();
@@ -40,11 +32,7 @@ static cJSON *run(const char *name, const char *suffix, const char *model)
     int status = system(command);
     assert_true(WIFEXITED(status));
     assert_int_equal(WEXITSTATUS(status), 0);
-    char *text = text_of(in_folder("score.json"));
-    cJSON *score = cJSON_Parse(text);
-    assert_non_null(score);
-    free(text);
-    return score;
+    return json_of("score.json");
 }
 
 static double number(const cJSON *json, const char *name) { return cJSON_GetObjectItem(json, name)->valuedouble; }
@@ -60,8 +48,7 @@ static void is_solved(const char *name, const char *model, int unconverged, doub
     assert_true(number(score, "error_total") == 0);
     assert_true(number(score, "points") > 90);
     cJSON_Delete(score);
-    char *text = text_of(in_folder("summary.json"));
-    cJSON *summary = cJSON_Parse(text);
+    cJSON *summary = json_of("summary.json");
     const cJSON *flag, *energy = cJSON_GetObjectItem(summary, "energy_mj");
     cJSON_ArrayForEach(flag, cJSON_GetObjectItem(summary, "flags"))
         if (!unconverged || (strcmp(flag->valuestring, "not_converged") != 0 && strcmp(flag->valuestring, "gains_energy") != 0))
@@ -69,7 +56,6 @@ static void is_solved(const char *name, const char *model, int unconverged, doub
     assert_true(number(cJSON_GetObjectItem(summary, "solver"), "not_converged_steps") <= unconverged);
     assert_true(!unconverged || number(energy, "gained") < gained * number(energy, "hand"));
     cJSON_Delete(summary);
-    free(text);
 }
 
 static double errors_of(const cJSON *score, const char *kind)

@@ -18,7 +18,7 @@
 #include <sys/wait.h>
 
 static char folder[] = "/tmp/seldinger-export-XXXXXX";
-#include "tests/cli/folder.h"
+#include "tests/folder.h"
 
 static int seldinger(const char *verb, const char *in, const char *more, const char *out)
 {
@@ -30,9 +30,8 @@ static int seldinger(const char *verb, const char *in, const char *more, const c
 
 static int make_model(void **state)
 {
-    (void)state;
     char command[1000];
-    if (!mkdtemp(folder))
+    if (make_folder(state) != 0)
         return -1;
     snprintf(command, sizeof command, "%s synth bifurcation --points 40 --quiet -o '%s'", SELDINGER_PROGRAM, in_folder("tree.h5"));
     return system(command) == 0 ? seldinger("fit", in_folder("tree.h5"), "--target-mm 0.1 --quiet", in_folder("model.h5")) : -1;

@@ -6,7 +6,6 @@
 
 #include <cmocka.h>
 
-#include <cJSON.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -16,13 +15,8 @@
 #include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-hard-XXXXXX";
-#include "tests/cli/folder.h"
-
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
-}
+#include "tests/folder.h"
+#include "tests/cli/json_file.h"
 
 // What holds of a run with up to 3 s of rest afterwards.
 typedef struct HardCase {
@@ -45,11 +39,7 @@ static cJSON *run(const char *scene)
     int status = system(command);
     assert_true(WIFEXITED(status));
     assert_int_equal(WEXITSTATUS(status), 0);
-    char *text = text_of(in_folder("summary.json"));
-    cJSON *summary = cJSON_Parse(text);
-    assert_non_null(summary);
-    free(text);
-    return summary;
+    return json_of("summary.json");
 }
 
 static cJSON *holds(HardCase c)

@@ -17,7 +17,7 @@
 #include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-live-XXXXXX";
-#include "tests/cli/folder.h"
+#include "tests/folder.h"
 
 static TrainerScene trainer;
 static HandPort port;
@@ -84,8 +84,7 @@ static void assert_replays(const RecordedRun *run, const ScoreFigures *score)
 
 static int set_up(void **state)
 {
-    (void)state;
-    assert_non_null(mkdtemp(folder));
+    assert_int_equal(make_folder(state), 0);
     trainer = trainer_scene_open(true);
     return 0;
 }

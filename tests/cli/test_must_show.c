@@ -20,22 +20,17 @@
 #include "recon/tree_file.h"
 #include "sim/recording.h"
 
-static char folder[] = "/tmp/seldinger-must-XXXXXX", output[1 << 16];
+static char folder[] = "/tmp/seldinger-must-XXXXXX";
 static Faults faults;
-#include "tests/cli/folder.h"
+#include "tests/folder.h"
+#include "tests/cli/program.h"
 
 // Runs `seldinger ARGUMENTS` in the folder; its words go to `output`. Fails where it does not end with 0.
 static void run(const char *arguments)
 {
-    char command[2000];
-    snprintf(command, sizeof command, "cd '%s' && %s %s 2>&1", folder, SELDINGER_PROGRAM, arguments);
-    FILE *pipe = popen(command, "r");
-    assert_non_null(pipe);
-    size_t length = fread(output, 1, sizeof output - 1, pipe);
-    output[length] = 0;
-    int status = pclose(pipe);
-    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
-        fail_msg("`%s` ended with %d: %s", arguments, status, output);
+    int code = run_in("", arguments);
+    if (code != 0)
+        fail_msg("`%s` ended with %d: %s", arguments, code, output);
 }
 
 static VesselTree *load(const char *name)
@@ -284,12 +279,10 @@ static void the_same_run_has_the_same_hash_and_finite_figures(void **state)
     all_numbers_are_finite("first.csv");
 }
 
-static int make_folder(void **state)
+static int set_up(void **state)
 {
-    (void)state;
-    if (!mkdtemp(folder))
+    if (make_folder_with_cache(state) != 0)
         return -1;
-    setenv("SELDINGER_CACHE", folder, 1);
     run("synth phantom -o tree.h5 --quiet");
     run("fit tree.h5 -o phantom.h5 --quiet");
     return 0;
@@ -304,5 +297,5 @@ int main(void)
         cmocka_unit_test(a_turned_and_shifted_scene_gives_the_same_path_there),
         cmocka_unit_test(the_same_run_has_the_same_hash_and_finite_figures),
     };
-    return cmocka_run_group_tests_name("must_show", tests, make_folder, remove_folder);
+    return cmocka_run_group_tests_name("must_show", tests, set_up, remove_folder);
 }

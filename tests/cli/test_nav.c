@@ -19,7 +19,7 @@
 #include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-nav-XXXXXX";
-#include "tests/cli/folder.h"
+#include "tests/folder.h"
 
 static const char scene[] = "seldinger: 1\n"
                             "vessel: {tube: {radius_mm: 1.2, normal: [0, 1, 0], path: [{line_mm: 15}, {arc: {radius_mm: 20, angle_deg: 60}}, {line_mm: 30}]}, "
@@ -50,16 +50,11 @@ static bool is_installed(const char *program)
 // Xvfb finds a free display by itself and says which.
 static int open_display(void **state)
 {
-    (void)state;
     int said[2];
     char number[16] = ":", display[32] = "-displayfd";
-    assert_non_null(mkdtemp(folder));
-    FILE *file = fopen(in_folder("scene.yaml"), "w");
-    fputs(scene, file);
-    fclose(file);
-    file = fopen(in_folder("coaxial.yaml"), "w");
-    fputs(coaxial, file);
-    fclose(file);
+    assert_int_equal(make_folder(state), 0);
+    put("scene.yaml", scene);
+    put("coaxial.yaml", coaxial);
 #ifdef KEEP_LIBRARIES
     // what LeakSanitizer then tells is ours; it must not insist on being the first library
     setenv("LD_PRELOAD", KEEP_LIBRARIES, 1);

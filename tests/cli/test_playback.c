@@ -16,7 +16,7 @@
 #include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-playback-XXXXXX";
-#include "tests/cli/folder.h"
+#include "tests/folder.h"
 
 // Longer than two of the places that a playback keeps.
 enum { STEPS = 10430, EACH_S = 100 };
@@ -75,8 +75,7 @@ static RecordedRun *record(TrainerScene *it, int64_t steps, bool is_watched, con
 
 static int set_up(void **state)
 {
-    (void)state;
-    assert_non_null(mkdtemp(folder));
+    assert_int_equal(make_folder(state), 0);
     trainer = trainer_scene_open(true);
     run = record(&trainer, STEPS, true, "session.h5");
     return 0;

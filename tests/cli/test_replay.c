@@ -19,7 +19,7 @@
 #include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-replay-XXXXXX", said[1 << 14];
-#include "tests/cli/folder.h"
+#include "tests/folder.h"
 
 static const char tube_scene[] = "seldinger: 1\n"
                                  "vessel: {tube: {radius_mm: 1.2, normal: [0, 1, 0], path: [{line_mm: 15}, {arc: {radius_mm: 20, angle_deg: 60}}, "
@@ -56,18 +56,9 @@ static void ends(int code, const char *words, const char *command)
         fail_msg("`%s` ended with %d and said: %s(expected %d and '%s')", command, ended, said, code, words);
 }
 
-static void put(const char *name, const char *text)
-{
-    FILE *file = fopen(in_folder(name), "w");
-    assert_non_null(file);
-    assert_true(fputs(text, file) >= 0 && fclose(file) == 0);
-}
-
 static int set_up(void **state)
 {
-    (void)state;
-    assert_non_null(mkdtemp(folder));
-    setenv("SELDINGER_CACHE", folder, 1);
+    assert_int_equal(make_folder_with_cache(state), 0);
     assert_int_equal(run("mkdir scenes models && $S synth capsule -o models/tree.h5 --quiet && $S fit models/tree.h5 -o models/capsule.h5 --quiet"), 0);
     put("scenes/bend.yaml", tube_scene);
     put("scenes/capsule.yaml", model_scene);

@@ -20,7 +20,7 @@
 #include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-report-XXXXXX";
-#include "tests/cli/folder.h"
+#include "tests/folder.h"
 static const char *browser;  // NULL: none
 static int branch_count;      // of the model
 
@@ -47,24 +47,15 @@ static int make_model(void)
     return good ? 0 : -1;
 }
 
-static int make_folder(void **state)
+static int set_up(void **state)
 {
-    (void)state;
     static const char *const names[] = {"chromium", "chromium-browser", "google-chrome"};
     for (int i = 0; i < 3 && !browser; i++) {
         char command[100];
         snprintf(command, sizeof command, "command -v %s >/dev/null 2>&1", names[i]);
         browser = system(command) == 0 ? names[i] : NULL;
     }
-    return mkdtemp(folder) ? make_model() : -1;
-}
-
-static void put(const char *path, const char *text)
-{
-    FILE *file = fopen(path, "w");
-    assert_non_null(file);
-    fputs(text, file);
-    assert_int_equal(fclose(file), 0);
+    return make_folder(state) == 0 ? make_model() : -1;
 }
 
 static int info(const char *arguments)
@@ -319,7 +310,7 @@ static void a_browser_shows_it(void **state)
     memset(policy, ' ', (size_t)(end + 2 - policy));
     char *worse = malloc(strlen(page) + 200);
     sprintf(worse, "%.*s<body><img src=\"http://seldinger.invalid/x.png\"/><script>boo()</script>%s", (int)(body - page), page, body + 6);
-    put(in_folder("worse.html"), worse);
+    put("worse.html", worse);
     shown = show(in_folder("worse.html"), false, in_folder("worse.png"));
     assert_true(occurrences(shown.log, "CONSOLE") > 0);
     assert_true(requests(shown.net) > 0);
@@ -336,5 +327,5 @@ int main(void)
         cmocka_unit_test(what_is_no_tree_gets_no_report),
         cmocka_unit_test(a_browser_shows_it),
     };
-    return cmocka_run_group_tests_name("report", tests, make_folder, remove_folder);
+    return cmocka_run_group_tests_name("report", tests, set_up, remove_folder);
 }

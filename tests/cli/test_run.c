@@ -6,7 +6,6 @@
 
 #include <cmocka.h>
 
-#include <cJSON.h>
 #include <math.h>
 #include <signal.h>
 #include <stdbool.h>
@@ -18,6 +17,9 @@
 #include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-run-XXXXXX";
+#include "tests/folder.h"
+#include "tests/cli/json_file.h"
+#include "tests/cli/program.h"
 
 // A tube with a bend, a wire that is pushed through it: contact, friction, a script. 0.4 s.
 #define SCENE(modulus, radius, elements, vessel_more, script) SCENE_MU("0.1", modulus, radius, elements, vessel_more, script)
@@ -36,64 +38,13 @@ static char folder[] = "/tmp/seldinger-run-XXXXXX";
 #define SCRIPT "[[0, 60, 30], [0.4, 0, 0]]"
 #define GOOD SCENE("80", "0.68", "40", "", SCRIPT)
 
-static void put(const char *name, const char *text)
-{
-    char path[300];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    FILE *file = fopen(path, "w");
-    assert_non_null(file);
-    fputs(text, file);
-    assert_int_equal(fclose(file), 0);
-}
-
 typedef struct Tip {
     double x[3];
 } Tip;
 
-static char output[1 << 16];
+static int run(const char *arguments) { return run_in("", arguments); }
 
-// Runs `seldinger ARGUMENTS` in the folder; standard output and error go to `output`. Returns the exit code, -signal where it was ended by one.
-static int run(const char *arguments)
-{
-    char command[2000];
-    snprintf(command, sizeof command, "cd '%s' && %s %s 2>&1", folder, SELDINGER_PROGRAM, arguments);
-    FILE *pipe = popen(command, "r");
-    assert_non_null(pipe);
-    size_t length = fread(output, 1, sizeof output - 1, pipe);
-    output[length] = 0;
-    int status = pclose(pipe);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
-}
-
-static bool exists(const char *name)
-{
-    char path[300];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    return access(path, F_OK) == 0;
-}
-
-static char *slurp(const char *name)
-{
-    char path[300];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    FILE *file = fopen(path, "r");
-    assert_non_null(file);
-    char *text = calloc(1, 1 << 20);
-    assert_non_null(text);
-    size_t length = fread(text, 1, (1 << 20) - 1, file);
-    text[length] = 0;
-    fclose(file);
-    return text;
-}
-
-static cJSON *summary(const char *name)
-{
-    char *text = slurp(name);
-    cJSON *json = cJSON_Parse(text);
-    assert_non_null(json);
-    free(text);
-    return json;
-}
+static bool exists(const char *name) { return access(in_folder(name), F_OK) == 0; }
 
 static double figure(const cJSON *json, const char *group, const char *name)
 {
@@ -181,7 +132,7 @@ static void a_tool_that_touches_itself_is_told_of(void **state)
     (void)state;
     assert_int_equal(run("run " SOURCE_DIR "/scenes/coil/sac.yaml --duration-s 0.8 --summary coil.json"), 0);
     assert_non_null(strstr(output, "the tool touches itself at"));
-    cJSON *coil = summary("coil.json");
+    cJSON *coil = json_of("coil.json");
     assert_true(figure(coil, "self_contacts", "max") > 0 && figure(coil, "self_contacts", "overlap_max_mm") < 0.01);
     cJSON_Delete(coil);
 }
@@ -199,7 +150,7 @@ static void a_run_leaves_its_files_and_repeats_bit_for_bit(void **state)
     assert_int_equal(run("run good.yaml --summary a.json --final a.csv --record a.h5"), 0);
     assert_int_equal(run("run good.yaml --json b.json --final b.csv --quiet --threads 2"), 0);
     assert_string_equal(output, "");
-    cJSON *a = summary("a.json"), *b = summary("b.json");
+    cJSON *a = json_of("a.json"), *b = json_of("b.json");
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
         figure(a, numbers[i][0], numbers[i][1]);
     assert_true(cJSON_IsBool(cJSON_GetObjectItem(a, "settled")) && cJSON_IsArray(cJSON_GetObjectItem(a, "flags")));
@@ -213,7 +164,7 @@ static void a_run_leaves_its_files_and_repeats_bit_for_bit(void **state)
     const cJSON *target = cJSON_GetArrayItem(cJSON_GetObjectItem(a, "targets"), 0);
     assert_true(cJSON_IsTrue(cJSON_GetObjectItem(target, "reached")));
 
-    char *first = slurp("a.csv"), *second = slurp("b.csv"), *line = first;
+    char *first = text_of(in_folder("a.csv")), *second = text_of(in_folder("b.csv")), *line = first;
     assert_string_equal(first, second);
     assert_int_equal(strncmp(first, "node,s_mm,x_mm,y_mm,z_mm,qw,qx,qy,qz,force_x_n,force_y_n,force_z_n,gap_mm,vessel_node\n", 86), 0);
     int rows = 0;
@@ -237,19 +188,19 @@ static void a_script_on_the_command_line_and_a_duration_win(void **state)
     put("good.yaml", GOOD);
     put("pull.csv", "t_s,push_mm_s,twist_deg_s\n0,-5,0\n0.2,0,0\n");
     assert_int_equal(run("run good.yaml --script pull.csv --summary s.json"), 0);
-    cJSON *json = summary("s.json");
+    cJSON *json = json_of("s.json");
     assert_true(fabs(figure(json, NULL, "inserted_mm") - 1) < 1e-9 && figure(json, NULL, "steps") == 200);
     cJSON_Delete(json);
     assert_int_equal(run("run good.yaml --duration-s 0.1 --summary s.json"), 0);
-    json = summary("s.json");
+    json = json_of("s.json");
     assert_true(fabs(figure(json, NULL, "inserted_mm") - 8) < 1e-9 && figure(json, NULL, "steps") == 100);
     cJSON_Delete(json);
     assert_int_equal(run("run good.yaml --duration-s 0.1 --settle-s 5 --summary s.json"), 0);
-    json = summary("s.json");
+    json = json_of("s.json");
     assert_true(figure(json, NULL, "steps") < 5100 && cJSON_IsTrue(cJSON_GetObjectItem(json, "settled")));
     cJSON_Delete(json);
     assert_int_equal(run("run good.yaml --paced --duration-s 0.3 --summary s.json"), 0);
-    json = summary("s.json");
+    json = json_of("s.json");
     assert_true(figure(json, NULL, "wall_s") >= 0.299 && figure(json, NULL, "steps") == 300);
     cJSON_Delete(json);
 }
@@ -261,7 +212,7 @@ static void a_fitted_tube_answers_like_the_exact_one(void **state)
     Tip tip[2];
     for (int i = 0; i < 2; i++) {
         assert_int_equal(run(i ? "run good.yaml --contact lim --summary s.json" : "run good.yaml --contact tube --summary s.json"), 0);
-        cJSON *json = summary("s.json");
+        cJSON *json = json_of("s.json");
         const cJSON *mm = cJSON_GetObjectItem(json, "tip_mm");
         for (int j = 0; j < 3; j++)
             tip[i].x[j] = cJSON_GetArrayItem(mm, j)->valuedouble;
@@ -279,7 +230,7 @@ static void no_step_is_a_run_too(void **state)
     (void)state;
     put("good.yaml", GOOD);
     assert_int_equal(run("run good.yaml --duration-s 0 --summary s.json --final f.csv --record r.h5"), 0);
-    cJSON *json = summary("s.json");
+    cJSON *json = json_of("s.json");
     assert_true(figure(json, NULL, "steps") == 0 && figure(json, NULL, "inserted_mm") == 2);
     assert_true(cJSON_IsNumber(cJSON_GetObjectItem(cJSON_GetArrayItem(cJSON_GetObjectItem(json, "targets"), 0), "distance_mm")));
     cJSON_Delete(json);
@@ -305,7 +256,7 @@ static void a_signal_stops_cleanly(void **state)
         int status;
         waitpid(child, &status, 0);
         assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 0);
-        cJSON *json = summary("stop.json");
+        cJSON *json = json_of("stop.json");
         double steps = figure(json, NULL, "steps");
         assert_true(steps > 0 && steps < 60000);
         assert_string_equal(cJSON_GetStringValue(cJSON_GetArrayItem(cJSON_GetObjectItem(json, "flags"), 0)), "stopped");
@@ -330,7 +281,7 @@ static void a_full_disk_ends_with_3(void **state)
     int status = system(command);
     assert_true(WIFEXITED(status));
     assert_true(WEXITSTATUS(status) == 3 || WEXITSTATUS(status) == 2);
-    char *said = slurp("full.txt");
+    char *said = text_of(in_folder("full.txt"));
     assert_non_null(strstr(said, "full.h5"));
     free(said);
     assert_false(exists("full.h5"));
@@ -400,23 +351,6 @@ static void help_names_every_option(void **state)
     }
 }
 
-static int make_folder(void **state)
-{
-    (void)state;
-    if (!mkdtemp(folder))
-        return -1;
-    setenv("SELDINGER_CACHE", folder, 1);
-    return 0;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    char command[300];
-    snprintf(command, sizeof command, "rm -rf '%s'", folder);
-    return system(command);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -432,5 +366,5 @@ int main(void)
         cmocka_unit_test(check_passes_on_identity_and_fails_on_one_per_cent),
         cmocka_unit_test(help_names_every_option),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, make_folder_with_cache, remove_folder);
 }

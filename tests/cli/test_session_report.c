@@ -16,7 +16,7 @@
 #include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-session-report-XXXXXX";
-#include "tests/cli/folder.h"
+#include "tests/folder.h"
 
 #define SCENE                                                                                                                                                  \
     "seldinger: 1\n" TOOL "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], inserted_mm: 2}\n"                                           \
@@ -59,10 +59,9 @@ static void make_session(const char *name, const char *trainee, time_t when, dou
     practice_end(p);
 }
 
-static int make_folder(void **state)
+static int set_up(void **state)
 {
-    (void)state;
-    if (!mkdtemp(folder))
+    if (make_folder(state) != 0)
         return -1;
     make_session("first", "Ada <script>", 1762000000, 20, 0.8);
     make_session("second", "Ada <script>", 1762100000, 20, 1.9);
@@ -245,5 +244,5 @@ int main(void)
         cmocka_unit_test(a_browser_prints_it),
         cmocka_unit_test(no_browser_is_said),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, set_up, remove_folder);
 }

@@ -6,7 +6,6 @@
 
 #include <cmocka.h>
 
-#include <cJSON.h>
 #include <hdf5.h>
 #include <math.h>
 #include <stdio.h>
@@ -16,13 +15,9 @@
 #include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-tools-XXXXXX";
-#include "tests/cli/folder.h"
-
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
-}
+#include "tests/folder.h"
+#include "tests/cli/json_file.h"
+#include "tests/short_run.h"
 
 static int run(const char *arguments)
 {
@@ -38,11 +33,7 @@ static cJSON *summary(const char *scene, const char *more)
     char arguments[800];
     snprintf(arguments, sizeof arguments, "run scenes/coaxial/%s --summary '%s' --final '%s' %s", scene, in_folder("summary.json"), in_folder("final.csv"), more);
     assert_int_equal(run(arguments), 0);
-    char *text = text_of(in_folder("summary.json"));
-    cJSON *root = cJSON_Parse(text);
-    assert_non_null(root);
-    free(text);
-    return root;
+    return json_of("summary.json");
 }
 
 static double value(const cJSON *tool, const char *part, const char *name)
@@ -81,7 +72,9 @@ static void two_tools_in_a_model_repeat(void **state)
     (void)state;
     char *hash[2];
     for (int i = 0; i < 2; i++) {
-        cJSON *root = summary("phantom.yaml", i ? "--duration-s 1.8 --threads 2" : "--duration-s 1.8");
+        char more[60];
+        snprintf(more, sizeof more, "--duration-s %g%s", WHOLE_OR_SHORT(1.8, 0.6), i ? " --threads 2" : "");
+        cJSON *root = summary("phantom.yaml", more);
         hash[i] = strdup(cJSON_GetObjectItem(root, "state_hash")->valuestring);
         assert_true(value(root, "penetration_mm", "max") < 0.05);
         cJSON_Delete(root);
@@ -103,12 +96,6 @@ static void ends(int code, const char *words, const char *arguments)
     if (ended != code || !strstr(text, words))
         fail_msg("`%s` ended with %d and said: %s(expected %d and '%s')", line, ended, text, code, words);
     free(text);
-}
-
-static void put(const char *name, const char *text)
-{
-    FILE *file = fopen(in_folder(name), "w");
-    assert_true(file && fputs(text, file) >= 0 && fclose(file) == 0);
 }
 
 // Three tools that go in and out of each other in a bend: nodes come and go.
@@ -217,6 +204,7 @@ static void each_format_has_all_tools(void **state)
 static void a_bench_experiment_is_met(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     cJSON *root = summary("zoarski.yaml", "");
     double push = value(root, "proximal", "force_most_n");
     print_message("largest push %.4f N\n", push);
@@ -258,10 +246,7 @@ static void a_script_exchanges_tools(void **state)
 static void two_devices_reach_a_vertebral_artery(void **state)
 {
     (void)state;
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    print_message("skipped: a sanitizer is watching\n");
-    skip();
-#endif
+    NEED_WHOLE_RUNS();
     if (access(SOURCE_DIR "/scenes/arch/arch.h5", R_OK) != 0) {
         print_message("skipped: scenes/arch/arch.h5 is not made\n");
         skip();
@@ -282,6 +267,7 @@ static void two_devices_reach_a_vertebral_artery(void **state)
 static void golden_paths_of_the_scenes_hold(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     ends(0, "same", "check scenes/coaxial");
 }
 

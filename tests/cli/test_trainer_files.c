@@ -14,25 +14,12 @@
 #include <unistd.h>
 
 static char folder[] = "/tmp/seldinger-files-XXXXXX";
-#include "tests/cli/folder.h"
-
-static int set_up(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
-}
+#include "tests/folder.h"
 
 static bool is_folder(const char *path)
 {
     struct stat status;
     return stat(path, &status) == 0 && S_ISDIR(status.st_mode);
-}
-
-static void put(const char *path)
-{
-    FILE *file = fopen(path, "w");
-    assert_non_null(file);
-    fclose(file);
 }
 
 static void the_folder_is_made_where_it_is_wanted(void **state)
@@ -65,7 +52,7 @@ static void what_is_no_folder_is_refused(void **state)
     char out[4096], far_too_long[4096];
     memset(far_too_long, 'x', sizeof far_too_long - 1);
     far_too_long[sizeof far_too_long - 1] = 0;
-    put(in_folder("file"));
+    put("file", "");
     static const char *const wrong[] = {"file", "file/inside", "e/../file"};
     for (int i = 0; i < 3; i++) {
         faults_clear(&faults);
@@ -91,7 +78,7 @@ static void no_name_is_taken_twice(void **state)
         assert_memory_equal(name[i] + strlen(folder), "/arch-20", 8);
         assert_string_equal(name[i] + strlen(name[i]) - 3, ".h5");
         assert_int_equal(access(name[i], F_OK), -1);
-        put(name[i]);
+        put(name[i] + strlen(folder) + 1, "");
     }
     char beside[4096];
     trainer_file_beside("/a.b/c.d.h5", ".json", beside, sizeof beside);
@@ -149,5 +136,5 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(the_folder_is_made_where_it_is_wanted), cmocka_unit_test(what_is_no_folder_is_refused),
                                        cmocka_unit_test(no_name_is_taken_twice), cmocka_unit_test(the_session_file_is_of_its_recording)};
-    return cmocka_run_group_tests(tests, set_up, remove_folder);
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

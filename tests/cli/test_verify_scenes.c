@@ -12,27 +12,21 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-static char folder[] = "/tmp/seldinger-verify-XXXXXX", output[1 << 16];
+static char folder[] = "/tmp/seldinger-verify-XXXXXX";
+#include "tests/folder.h"
+#include "tests/cli/program.h"
 
 // The exit code of `check OPTIONS`; what it prints goes to `output`.
 static int check(const char *options)
 {
-    char command[600];
-    snprintf(command, sizeof command, "cd '%s' && '%s' check %s 2>&1", folder, SELDINGER_PROGRAM, options);
-    FILE *pipe = popen(command, "r");
-    assert_non_null(pipe);
-    size_t length = fread(output, 1, sizeof output - 1, pipe);
-    output[length] = 0;
-    int status = pclose(pipe);
-    assert_true(WIFEXITED(status));
-    return WEXITSTATUS(status);
+    char arguments[600];
+    snprintf(arguments, sizeof arguments, "check %s", options);
+    return run_in("", arguments);
 }
 
 static void write_scene(const char *name, const char *plan)
 {
-    char path[200];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    FILE *file = fopen(path, "w");
+    FILE *file = fopen(in_folder(name), "w");
     assert_non_null(file);
     fprintf(file,
             "seldinger: 1\nwire:\n  sections: [{length_mm: 100, diameter_mm: 0.36, young_modulus_gpa: 80}]\n  damping: {mass_1_s: 50}\n"
@@ -140,19 +134,6 @@ static void threads_change_nothing(void **state)
     strcpy(one, output);
     assert_int_equal(check("--threads 4 a.yaml"), 0);
     assert_string_equal(one, output);
-}
-
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
-}
-static int remove_folder(void **state)
-{
-    (void)state;
-    char command[100];
-    snprintf(command, sizeof command, "rm -r '%s'", folder);
-    return system(command);
 }
 
 int main(void)

@@ -18,31 +18,8 @@
 #include <unistd.h>
 
 static Faults faults;
-static char folder[64];
-
-static char *in_folder(const char *name)
-{
-    static char path[4][128];
-    static int turn;
-    turn = (turn + 1) % 4;
-    snprintf(path[turn], sizeof path[turn], "%s/%s", folder, name);
-    return path[turn];
-}
-
-static int make_folder(void **state)
-{
-    (void)state;
-    snprintf(folder, sizeof folder, "/tmp/test_tree_file.XXXXXX");
-    return mkdtemp(folder) ? 0 : -1;
-}
-
-static int drop_folder(void **state)
-{
-    (void)state;
-    char command[128];
-    snprintf(command, sizeof command, "rm -r '%s'", folder);
-    return system(command);
-}
+static char folder[] = "/tmp/seldinger-tree-file-XXXXXX";
+#include "tests/folder.h"
 
 static VesselTree *make_tree(bool model)
 {
@@ -177,7 +154,7 @@ static hid_t fresh_file(const char *path)
     return file;
 }
 
-static void put(hid_t file, const char *path, hid_t type, int rank, const hsize_t *size, const void *data)
+static void put_data(hid_t file, const char *path, hid_t type, int rank, const hsize_t *size, const void *data)
 {
     if (H5Lexists(file, path, H5P_DEFAULT) > 0)
         H5Ldelete(file, path, H5P_DEFAULT);
@@ -238,7 +215,7 @@ static void lies_are_found(void **state)
     };
     for (size_t i = 0; i < sizeof lie / sizeof lie[0]; i++) {
         hid_t file = fresh_file(path);
-        put(file, lie[i].dataset, lie[i].type, lie[i].rank, lie[i].size, lie[i].data);
+        put_data(file, lie[i].dataset, lie[i].type, lie[i].rank, lie[i].size, lie[i].data);
         H5Fclose(file);
         expect_fault(path, lie[i].words);
     }
@@ -302,5 +279,5 @@ int main(void)
         cmocka_unit_test(save_load_is_equality),     cmocka_unit_test(long_parameters_survive),   cmocka_unit_test(missing_datasets_are_named),
         cmocka_unit_test(lies_are_found),            cmocka_unit_test(damaged_bytes_are_refused), cmocka_unit_test(a_full_disk_leaves_what_was_there),
     };
-    return cmocka_run_group_tests(tests, make_folder, drop_folder);
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

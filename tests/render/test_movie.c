@@ -19,6 +19,7 @@
 
 enum { WIDTH = 320, HEIGHT = 240, FPS = 20, STEPS = 2000, FRAMES = 41 };
 static char folder[] = "/tmp/seldinger-film-XXXXXX";
+#include "tests/folder.h"
 
 static const char scene_text[] =
     "seldinger: 1\n"
@@ -182,18 +183,6 @@ static void a_close_up_is_of_the_tips(void **state)
     assert_int_equal(command("cmp -s '%s/close0.png' '%s/close1.png'; test $? = 1", folder, folder), 0);
     assert_int_equal(command("'%s' replay '%s' --picture '%s/x.png' --close-up 1 2>'%s/said'; test $? = 2 && grep -q -e '--close-up' '%s/said'", SELDINGER_PROGRAM,
                              recording, folder, folder, folder), 0);
-}
-
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    return command("rm -r '%s'", folder);
 }
 
 int main(void)

@@ -26,6 +26,7 @@
 
 static Faults faults;
 static char folder[] = "/tmp/seldinger-recording-XXXXXX";
+#include "tests/folder.h"
 
 static const char scene_text[] = "seldinger: 1\n"
                                  "wire: {elements: 20, sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
@@ -795,19 +796,10 @@ static void what_is_no_recording_is_said(void **state)
     scene_free(scene);
 }
 
-static int make_folder(void **state)
+static int set_up(void **state)
 {
-    (void)state;
     recording_prepare_process();
-    return mkdtemp(folder) ? 0 : -1;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    char command[300];
-    snprintf(command, sizeof command, "rm -rf '%s'", folder);
-    return system(command);
+    return make_folder(state);
 }
 
 static int most_kills;
@@ -820,7 +812,7 @@ static void kills_at_random(void **state)
 int main(int count, char **argument)
 {
     if (count == 2 && (most_kills = atoi(argument[1])) > 0)
-        return cmocka_run_group_tests(((const struct CMUnitTest[]){cmocka_unit_test(kills_at_random)}), make_folder, remove_folder);
+        return cmocka_run_group_tests(((const struct CMUnitTest[]){cmocka_unit_test(kills_at_random)}), set_up, remove_folder);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_read_is_what_was_simulated),
         cmocka_unit_test(what_is_read_of_several_tools),
@@ -832,5 +824,5 @@ int main(int count, char **argument)
         cmocka_unit_test(a_full_disk_leaves_what_was_flushed),
         cmocka_unit_test(what_is_no_recording_is_said),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, set_up, remove_folder);
 }

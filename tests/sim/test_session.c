@@ -49,28 +49,23 @@ static void record(const char *path, Session *session, const char *trainee, time
 }
 
 static char folder[] = "/tmp/seldinger-session-XXXXXX";
+#include "tests/folder.h"
 static Session one;
 static char *one_text;
 
 static int make_one(void **state)
 {
-    (void)state;
-    char path[64];
-    if (!mkdtemp(folder))
+    if (make_folder(state) != 0)
         return -1;
-    snprintf(path, sizeof path, "%s/one.h5", folder);
-    record(path, &one, "Ada \xc3\xa9 <b>", 1762000000, 20);
+    record(in_folder("one.h5"), &one, "Ada \xc3\xa9 <b>", 1762000000, 20);
     one_text = session_json(&one);
     return one_text ? 0 : -1;
 }
 
 static int remove_all(void **state)
 {
-    (void)state;
-    char command[100];
     free(one_text);
-    snprintf(command, sizeof command, "rm -r '%s'", folder);
-    return system(command);
+    return remove_folder(state);
 }
 
 static void what_is_written_is_read_back(void **state)
@@ -221,16 +216,6 @@ static void each_wrong_value_is_told(void **state)
             wrong++, print_error("%s: expected %s; %d faults, the first: %s\n", cases[i].to, cases[i].words, faults.count, faults.text[0]);
     }
     assert_int_equal(wrong, 0);
-}
-
-static void put(const char *name, const char *text)
-{
-    char path[128];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    FILE *file = fopen(path, "w");
-    assert_non_null(file);
-    fputs(text, file);
-    assert_int_equal(fclose(file), 0);
 }
 
 static void put_session(const char *name, const Session *session)
