@@ -11,8 +11,8 @@
 // angle there, are two of the node's unknowns (against those of the tool around it: step_coaxial.c).
 //   d = (S, radius phi) in the step;  |force| <= bound, opposite to d where there is slip.
 // The force acts on the unknowns as (force[0], radius force[1]).
-// The bound (mu times the force between the tools) is given and does not follow the solve. A slide may give before it slips, like a bristle:
-// force = held - bound d / give, cut to the bound, `held` the force at x_n. It creeps no more than a rigid one, which is the same with give 0.
+// The bound (mu times the force between the tools) is given and does not follow the solve. A slide gives before it slips, like a bristle:
+// force = held - bound d / give, cut to the bound, `held` the force at x_n. It creeps no more than a rigid one.
 // In an unknown that is constrained (a unit row), or with radius 0 in phi, a slide neither sees the motion nor acts.
 //
 // A pair is a contact of the tool with itself, between two places that may be anywhere on the chain: a point's laws, with
@@ -42,9 +42,9 @@ typedef struct ContactSlide {
     int unknown;             // of the node: S, and phi behind it; 6 or more
     double radius;           // [mm] at which the tools touch
     double bound;            // [N] >= 0
-    double give;             // [mm] >= 0; 0: it sticks rigidly
-    double held[2];          // [N] where it gives: the force at x_n
-    double slip[2];          // [mm] d where it gives; in: about what it will be, out: solution
+    double give;             // [mm] > 0, by which it gives until it slips
+    double held[2];          // [N] the force at x_n
+    double slip[2];          // [mm] d; in: about what it will be, out: solution
     double force[2];         // [N]; in: warm start, out: solution
 } ContactSlide;
 

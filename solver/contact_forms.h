@@ -17,7 +17,6 @@ typedef struct ContactLaw {
     Mat3 c;
     Vec3 along;                  // mu p of a sliding contact
     Vec3 step;                   // motion under the whole step
-    Vec3 given;                  // the force that the contact began with
     double lean[2][6];           // of a sliding contact, by which the rows of its nodes are straightened …
     bool leans[2];               // … which they are
 } ContactLaw;
@@ -40,15 +39,13 @@ struct ContactSolver {
     ContactPairs *pairs;         // NULL: room for none
     int stalls;                  // of the line search in this solve …
     double slope;                // … and what they make of r over k
-    double grip;                 // kappa over k while slides are soft, else 0 …
-    int soft;                    // … and iterations with it
     bool inexact;                // a factor of this solve may have lost digits
     bool symmetric;              // which of the two factors holds the matrix
     double *rhs, *delta;         // (M, n)
     BlockChain matrix;           // with the contacts' laws: diag and A(i, i+1) by columns (which is the row-major lower of a symmetric chain)
     double *turned;              // (M, n, n) A(i+1, i) by columns …
     double *turned_chain;        // … and that of the chain
-    BlockChain braced;           // the caller's chain with slides that give; `lower` is the caller's own …
+    BlockChain braced;           // the caller's chain with slides; `lower` is the caller's own …
     double *side;                // … and its right-hand side (M, n)
     BlockFactor *braced_factor;
     BlockLu *lu;
@@ -77,9 +74,9 @@ Mat3 contact_pairs_block(const ContactPairs *pairs, int k, int l);
 // s->delta, which is what the rows of the chain give without the pairs that are not open, becomes that with them. False: singular.
 bool contact_pairs_step(ContactSolver *solver, int count, bool reuse, bool whole, ContactSolve solve);
 
-// The contacts [0, count) with the wall, and rigid slides, on a chain that is not factored yet. False where it is not positive definite.
+// The contacts [0, count) with the wall on a chain that is not factored yet. False where it is not positive definite.
 bool contact_walls(ContactSolver *solver, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u, ContactReport *report);
-// These, and the slides [from, to) that give.
+// These, and the slides [from, to).
 ContactReport contact_slides(ContactSolver *solver, const BlockChain *chain, const double *b, int from, int to, const ContactOptions *options, double *u);
 ContactReport contact_pointwise(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
                                 const ContactOptions *options, double *u);

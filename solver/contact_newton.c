@@ -6,7 +6,6 @@
 //   open   g = 0, C = 0
 //   stick  g = f - P v n - P_t d_t, C = P n n^T + P_t (I - n n^T): v and d_t become 0 up to 1/P, and the next iteration removes that rest
 //   slip   g_n = f_n - P v, g_t = mu g_n p - q (d_t across p), C = P n n^T + mu P p n^T + q (I - n n^T - p p^T)
-//   slides are always in one of the last two, without what is along n: g = f - P_t d, or g = bound p - q (d across p), which is symmetric
 // p is the direction of f_t - r d_t (Alart and Curnier 1991), q = mu f_n r / (|f_t - r d_t| - mu f_n) -> mu f_n / |d_t| the resistance against
 // turning. mu P p n^T makes the matrix unsymmetric: friction follows the normal force within the iteration. Without it (Tresca's friction
 // with the bound frozen, a fixed point over the bound) every outer round costs several factorisations and a wire in a spiral needs 5 to 20
@@ -28,12 +27,6 @@
 //   turned off or on again, every second time r is changed too, and after three stalls in a row the whole step is taken (after two, some solves
 //   go round for ever).
 //
-// - Many slides in a row that stick where they should slip free only their first one in an iteration, as each holds what is behind it. A solve that
-//   takes more than three iterations starts anew with soft slides, f = -bound d / sqrt(|d|^2 + (bound / kappa)^2), linearised in f and d as
-//   Chan, Golub and Mulet (1999) do for total variation: whole steps then find the front from anywhere, and hold while kappa grows until
-//   states can be read off. (An augmented Lagrangian with an exact line search on its convex energy
-//   stalls: its law has kinks too.)
-//
 // Forces leave cut to their cones, which changes them by no more than the residual. The motion is not balanced again with them: the wire's bending
 // is so soft against its stretching that a force off by 1e-8 of the largest moves it by as much as a residual of 0.1, so that iterates that
 // fulfil all laws would be refused for the rounding of a cut. Where the iterations end first, the best iterate is handed out in the same way.
@@ -51,9 +44,6 @@ static const double penalty = 1e4;
 static const double usual_slope = 1e-3, other_slope = 1e-2, merit_slope = 1e-2;
 enum { FIRST_SEARCH = 3, HALVINGS = 6, STALLS_IN_A_ROW = 3 };
 static const double stall = 0.05; // a step cut to less gets nowhere
-// kappa over k of soft slides: first, last, and how much harder they get after how many iterations.
-static const double first_grip = 1e-3, last_grip = 30, harder = 30;
-enum { SOFT_AT_ONCE = 2 };
 
 static double normal_violation(const ContactRow *c, Vec3 motion) { return c->gap + vec3_dot(motion, c->normal); }
 
@@ -67,8 +57,6 @@ static Vec3 slide_direction(const ContactRow *c, Vec3 motion, double slope, doub
 // mu f_n; of a contact that is just taken in, from its overlap
 static double friction_bound(const ContactRow *c, Vec3 motion)
 {
-    if (c->slide)
-        return c->bound;
     double fn = vec3_dot(c->force, c->normal);
     return c->friction * (fn > 0 ? fn : fmax(0, -0.01 * c->stiffness_n * normal_violation(c, motion)));
 }
@@ -142,7 +130,7 @@ static int choose_states(ContactSolver *s, int count, bool first)
         int was = s->law[i].state, state = OPEN;
         if (s->flag[i]) {
             state = SLIP;
-            if (c->friction > 0 || c->slide) {
+            if (c->friction > 0) {
                 double size;
                 slide_direction(c, s->motion[i], s->slope, &size);
                 Vec3 slide = contact_tangential(s->motion[i], c->normal);
@@ -173,8 +161,6 @@ static void write_law(const ContactRow *c, Vec3 motion, Vec3 from, double slope,
     Vec3 n = c->normal, none = {0, 0, 0}, slide = contact_tangential(from, n), ft = contact_tangential(c->force, n);
     double kn = penalty * c->stiffness_n, kt = penalty * c->stiffness_t;
     double fn = vec3_dot(c->force, n), gn = fn - kn * normal_violation(c, from);
-    if (c->slide)
-        kn = gn = 0;
     Vec3 force = none, oblique = none, p = none;
     double across = 0;
     if (law->state == STICK) {
@@ -182,32 +168,19 @@ static void write_law(const ContactRow *c, Vec3 motion, Vec3 from, double slope,
         across = kt;
     } else if (law->state == SLIP) {
         force = vec3_scale(n, gn);
-        if (c->friction > 0 || c->slide) {
+        if (c->friction > 0) {
             double size, bound = friction_bound(c, motion);
             p = slide_direction(c, motion, slope, &size);
             across = size > bound ? fmin(kt, bound * slope * c->stiffness_t / (size - bound)) : size > 0 ? kt : 0;
             law->along = vec3_scale(p, c->friction);
             oblique = vec3_scale(law->along, kn);
-            force = vec3_add_scaled(force, c->slide ? bound : c->friction * gn, p);
+            force = vec3_add_scaled(force, c->friction * gn, p);
             force = vec3_add_scaled(force, -across, vec3_add_scaled(slide, -vec3_dot(slide, p), p));
         }
     }
     law->force = force;
     if (!keep_matrix && law->state != OPEN)
         law->c = law_matrix(n, kn, oblique, across, p);
-}
-
-// The same of a soft slide: bound d / eta in place of a sign, eta^2 = |d|^2 + (bound / kappa)^2.
-static void write_soft_law(const ContactRow *c, Vec3 motion, Vec3 from, double grip, ContactLaw *law)
-{
-    double edge = c->bound / (grip * c->stiffness_t), eta = sqrt(vec3_norm2(motion) + edge * edge);
-    Vec3 f = vec3_scale(contact_project(c, c->force), 1 / (eta * eta));
-    const double a[2] = {f.x, f.y}, d[2] = {motion.x, motion.y};
-    law->c = (Mat3){0};
-    for (int i = 0; i < 2; i++)
-        for (int j = 0; j < 2; j++)
-            law->c.m[i][j] = (i == j) * c->bound / eta + (a[i] * d[j] + a[j] * d[i]) / 2;
-    law->force = vec3_sub(vec3_scale(motion, -c->bound / eta), mat3_mul_vec(&law->c, vec3_sub(from, motion)));
 }
 
 static void cross_into(double x, double y, double z, Vec3 b, double out[3])
@@ -248,14 +221,6 @@ static void add_law(const ContactRow *c, const Mat3 *k, ContactSolver *s)
     const double *w = c->weight;
     const int n = c->stride;
     const size_t block = (size_t)(n * n), at = (size_t)c->node;
-    if (c->slide) {
-        const double arm[2] = {c->mask[0] & 1 ? 1 : 0, c->mask[0] & 2 ? c->radius : 0};
-        double *d = s->matrix.diag + block * at + (n + 1) * c->slide;
-        for (int b = 0; b < 2; b++)
-            for (int a = 0; a < 2; a++)
-                d[n * b + a] += arm[a] * k->m[a][b] * arm[b];
-        return;
-    }
     for (int e = 0; e < c->nodes; e++) {
         r[e] = contact_row_negative_arm(c, e);
         add_coupling(k, w[e], r[e], c->mask[e], w[e], r[e], c->mask[e], s->matrix.diag + block * (at + (size_t)e), n);
@@ -356,7 +321,7 @@ static double merit(const ContactSolver *s, int count, double t)
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &s->row[i];
         Vec3 d = vec3_add_scaled(s->motion[i], t, s->law[i].step);
-        if (c->inert || (c->slide && s->grip > 0) || (contact_row_is_idle(c, d) && s->law[i].state == OPEN))
+        if (c->inert || (contact_row_is_idle(c, d) && s->law[i].state == OPEN))
             continue;
         Vec3 force = vec3_mix(c->force, s->law[i].force, t);
         sum += vec3_norm2(contact_error(c, force, d, merit_slope));
@@ -395,10 +360,7 @@ static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bo
             s->law[i].force = none;
             continue;
         }
-        if (c->slide && s->grip > 0 && s->law[i].state != OPEN)
-            write_soft_law(c, s->motion[i], b ? none : s->motion[i], s->grip, &s->law[i]);
-        else
-            write_law(c, s->motion[i], b ? none : s->motion[i], s->slope, reuse, &s->law[i]);
+        write_law(c, s->motion[i], b ? none : s->motion[i], s->slope, reuse, &s->law[i]);
         if (c->far && s->law[i].state != OPEN)
             continue;
         symmetric &= s->law[i].state != SLIP || c->friction == 0;
@@ -475,35 +437,9 @@ static void cut(ContactSolver *s, int count, ContactReport *report)
         c->force = contact_project(c, c->force);
         bool presses = vec3_dot(c->force, c->normal) > 0;
         *(c->far ? &report->pairs : &report->active) += presses;
-        if (presses || c->slide)
+        if (presses)
             report->cone_violation = fmax(report->cone_violation, contact_row_excess(c));
     }
-}
-
-static bool has_slides(const ContactSolver *s, int count)
-{
-    for (int i = 0; i < count; i++)
-        if (s->row[i].slide && !s->row[i].inert)
-            return true;
-    return false;
-}
-
-// The forces that it was given become the present ones.
-static void begin(ContactSolver *s, const BlockFactor *factor, const double *b, int count, double *u)
-{
-    for (int i = 0; i < count; i++) {
-        const ContactRow *c = &s->row[i];
-        s->row[i].force = s->law[i].given;
-        s->law[i].state = vec3_dot(c->force, c->normal) > 0 || (c->slide && !c->inert) ? SLIP : OPEN;
-    }
-    contact_balance(s, factor, b, count, u);
-}
-
-// Soft slides get harder, and at last hard.
-static void harden(ContactSolver *s)
-{
-    if (++s->soft % SOFT_AT_ONCE == 0)
-        s->grip = s->grip < last_grip ? harder * s->grip : 0;
 }
 
 ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
@@ -513,15 +449,13 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
     s->matrix.count = chain->count;
     int unknowns = chain->size * chain->count, most = options->max_iterations / CONTACT_SWEEPS_PER_FACTOR;
     for (int i = 0; i < count; i++)
-        s->law[i].given = s->row[i].force;
-    begin(s, factor, b, count, u);
+        s->law[i].state = vec3_dot(s->row[i].force, s->row[i].normal) > 0 ? SLIP : OPEN;
+    contact_balance(s, factor, b, count, u);
     contact_residual(s->row, count, s->motion, &report);
     double least = HUGE_VAL, residual = report.residual; // of the best iterate, its error in N and its residual
     bool fresh = true, finite = true, unbalanced = false; // no factor yet
-    int in_a_row = 0, start = 0;
+    int in_a_row = 0;
     s->stalls = 0;
-    s->grip = 0;
-    s->soft = 0;
     s->inexact = false;
     while (report.residual > options->tolerance && report.iterations < most) {
         if (report.residual * report.largest < least) {
@@ -529,15 +463,10 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
             residual = report.residual;
             copy_iterate(s, unknowns, count, true, u);
         }
-        if (report.iterations == FIRST_SEARCH && has_slides(s, count)) { // anew, with soft ones
-            begin(s, factor, b, count, u);
-            start = report.iterations;
-            s->grip = first_grip;
-        }
-        bool first = report.iterations == start, search = report.iterations >= FIRST_SEARCH && s->grip == 0 && !unbalanced;
-        if (report.iterations == 0)
+        bool first = report.iterations == 0, search = report.iterations >= FIRST_SEARCH && !unbalanced;
+        if (first)
             assemble_reset(s, chain, count);
-        bool reuse = choose_states(s, count, first) == 0 && !fresh && s->grip == 0 && report.residual < 1e-3 && s->symmetric;
+        bool reuse = choose_states(s, count, first) == 0 && !fresh && report.residual < 1e-3 && s->symmetric;
         if (!newton_step(s, chain, count, reuse, search ? NULL : b))
             break;
         if (!search) {
@@ -556,8 +485,6 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
         if (!finite)
             break;
         contact_residual(s->row, count, s->motion, &report);
-        if (s->grip > 0)
-            harden(s);
         fresh = reuse && report.residual > 0.05 * before; // the old factor does not serve any more
         unbalanced = false;
         if (s->inexact && report.residual <= options->tolerance) { // digits lost on the way: once more for the whole motion

@@ -276,10 +276,10 @@ static void solve_local(const Mat3 *w, const double *d, double mu, double *start
 }
 
 // One slide: d + w f. The search is Newton's on 1/|f|, which is concave in g and meets the root from below, at once where both directions give alike.
-// One that gives is rigid with a spring in series.
+// What a slide gives is a spring in series.
 static void solve_slide(const ContactRow *c, const Mat3 *own, const double *motion, double *f)
 {
-    const double bound = c->bound, soft = c->spring > 0 ? 1 / c->spring : 0;
+    const double bound = c->bound, soft = 1 / c->spring;
     const double d[3] = {0, motion[1] - soft * c->held.x, motion[2] - soft * c->held.y};
     Mat3 spring = *own, *w = &spring;
     spring.m[1][1] += soft, spring.m[2][2] += soft;

@@ -32,7 +32,7 @@ struct ContactRow {
     Vec3 normal;
     double gap, radius, friction;
     double bound;                // [N] of a slide …
-    double spring;               // [N/mm] … and bound over give, 0: rigid …
+    double spring;               // [N/mm] … and bound over give …
     Vec3 held;                   // … on the force that it began with
     double stiffness_n, stiffness_t; // [N/mm] of the node alone, neighbours held: the scale of the residual and of penalties
     Vec3 force;                  // on the tool
@@ -40,9 +40,9 @@ struct ContactRow {
 };
 
 // Sorted by node, then xi, the slides of a node behind its walls (insertion sort: the caller's set comes nearly in order), pairs behind all others.
-// Returns their number, without that of the slides that give where these are wanted apart: they then follow in the caller's order. `far` has room for the
+// Returns their number, without that of the slides where these are wanted apart: they then follow in the caller's order. `far` has room for the
 // pairs' second ends.
-int contact_rows_fill(const ContactSet *set, const BlockChain *chain, bool gives_apart, ContactRow *row, ContactRow *far);
+int contact_rows_fill(const ContactSet *set, const BlockChain *chain, bool slides_apart, ContactRow *row, ContactRow *far);
 
 // Minus the arm at which node e's turn moves the contact: its motion is w u + negative_arm x theta.
 static inline Vec3 contact_row_negative_arm(const ContactRow *c, int e)
@@ -131,12 +131,12 @@ static inline double contact_row_excess(const ContactRow *c)
 // What is wrong with force f and motion d, in N: f less the nearest force in the cone to f - slope k violation, each direction by itself.
 static inline Vec3 contact_error(const ContactRow *c, Vec3 f, Vec3 d, double slope)
 {
-    if (c->spring > 0)
+    if (c->slide)
         return vec3_sub(f, contact_project(c, vec3_add_scaled(c->held, -c->spring, d)));
     Vec3 n = c->normal;
     double fn = vec3_dot(f, n), wish_n = fn - slope * c->stiffness_n * (c->gap + vec3_dot(d, n));
     Vec3 ft = contact_tangential(f, n), wish = vec3_add_scaled(ft, -slope * c->stiffness_t, contact_tangential(d, n));
-    double normal = wish_n > 0 ? fn - wish_n : fn, bound = c->slide ? c->bound : fn > 0 ? c->friction * fn : 0, size = vec3_norm(wish);
+    double normal = wish_n > 0 ? fn - wish_n : fn, bound = fn > 0 ? c->friction * fn : 0, size = vec3_norm(wish);
     return vec3_add_scaled(vec3_sub(ft, vec3_scale(wish, size > bound ? bound / size : 1)), normal, n);
 }
 

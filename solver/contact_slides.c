@@ -1,4 +1,4 @@
-// Slides that give: Newton's method on their forces, which are functions of the motion, with the wall's contacts solved inside every iteration.
+// Slides: Newton's method on their forces, which are functions of the motion, with the wall's contacts solved inside every iteration.
 //
 // f(d) = P(t), t = held - k d, k = bound / give, P onto the disc of radius `bound`. About a motion e, with t there and the last iterate's force f0:
 //   |t| <= bound   f = t - k (d - e)
@@ -75,9 +75,7 @@ static bool comes_before(const ContactRow *a, const ContactRow *b)
         return a->far && b->far ? a->point < b->point : b->far != NULL;
     if (a->chain_node != b->chain_node)
         return a->chain_node < b->chain_node;
-    if (a->weight[1] != b->weight[1])
-        return a->weight[1] < b->weight[1];
-    return (a->slide != 0) != (b->slide != 0) ? b->slide != 0 : a->point < b->point;
+    return a->weight[1] != b->weight[1] ? a->weight[1] < b->weight[1] : a->point < b->point;
 }
 
 // The walls' contacts and the pairs [0, to), those that wait behind the others, both in the order of the chain; they were so up to `before`. Returns how many do not wait.
@@ -93,7 +91,7 @@ static int put_in_order(ContactSolver *s, int before, int to)
     for (int i = 0, at = 0; i < to; i++) {
         bool waits = s->spare[i].waits, pair = s->spare[i].far != NULL;
         s->banded += !waits && !pair;
-        if (!waits && !pair && !s->spare[i].slide)
+        if (!waits && !pair)
             s->wall[s->wall_count++] = at;
         row[waits ? count + waiting++ : at++] = s->spare[i];
     }
@@ -109,7 +107,7 @@ static int first_contacts(ContactSolver *s, int to)
         c->waits = false;
         if (c->far)
             continue;
-        bool presses = c->slide || vec3_norm2(c->force) > 0 || c->gap < 0;
+        bool presses = vec3_norm2(c->force) > 0 || c->gap < 0;
         c->waits = !presses && c->chain_node > last + 1;
         last = presses ? c->chain_node + c->nodes - 1 : last;
     }
@@ -118,7 +116,7 @@ static int first_contacts(ContactSolver *s, int to)
         ContactRow *c = &s->row[i];
         if (c->far)
             continue;
-        bool presses = c->slide || vec3_norm2(c->force) > 0 || c->gap < 0;
+        bool presses = vec3_norm2(c->force) > 0 || c->gap < 0;
         c->waits &= c->chain_node + c->nodes - 1 < last - 1;
         last = presses ? c->chain_node : last;
     }

@@ -55,7 +55,7 @@ static void slide_stiffness(const BlockChain *chain, double give, ContactRow *c)
     double s = c->mask[0] & 1 ? d[0] : 0, phi = c->mask[0] & 2 ? d[n + 1] / (c->radius * c->radius) : 0;
     c->stiffness_n = c->stiffness_t = (s + phi) / (c->mask[0] == 3 ? 2 : 1);
     c->inert = c->mask[0] == 0 || !(c->bound > 0) || !isfinite(c->bound) || !isfinite(c->radius);
-    c->spring = give > 0 && !c->inert ? c->bound / give : 0;
+    c->spring = c->inert ? 0 : c->bound / give;
 }
 
 // Both ends give way.
@@ -93,13 +93,10 @@ static void insert(ContactRow *row, int k, const ContactRow *c)
     row[k] = *c;
 }
 
-int contact_rows_fill(const ContactSet *set, const BlockChain *chain, bool gives_apart, ContactRow *row, ContactRow *far)
+int contact_rows_fill(const ContactSet *set, const BlockChain *chain, bool slides_apart, ContactRow *row, ContactRow *far)
 {
     const Vec3 none = {0, 0, 0};
-    int count = set->count, apart = 0;
-    for (int i = 0; gives_apart && i < set->slide_count; i++)
-        apart += set->slide[i].give > 0;
-    int behind = set->count + set->slide_count + set->pair_count - apart;
+    int count = set->count, behind = set->count + set->pair_count;
     for (int i = 0; i < set->count; i++) {
         const ContactPoint *p = &set->point[i];
         ContactRow c = {.node = p->node, .chain_node = p->node, .stride = chain->size, .point = i, .nodes = p->xi > 0 && p->node + 1 < chain->count ? 2 : 1, .weight = {1, 0},
@@ -124,7 +121,7 @@ int contact_rows_fill(const ContactSet *set, const BlockChain *chain, bool gives
         c.force = c.inert || !vec3_is_finite(force) ? none : contact_project(&c, force);
         Vec3 held = vec3(c.mask[0] & 1 ? p->held[0] : 0, c.mask[0] & 2 ? p->held[1] : 0, 0);
         c.held = c.inert || !vec3_is_finite(held) ? none : contact_project(&c, held);
-        if (gives_apart && p->give > 0)
+        if (slides_apart)
             row[behind++] = c;
         else
             insert(row, count++, &c);
@@ -318,10 +315,7 @@ bool contact_walls(ContactSolver *s, const BlockChain *chain, const double *b, i
 
 bool contact_needs_factor(const ContactSet *set, const ContactOptions *options)
 {
-    bool gives = false;
-    for (int i = 0; i < set->slide_count; i++)
-        gives |= set->slide[i].give > 0;
-    return !gives || options->form == CONTACT_POINTWISE;
+    return set->slide_count == 0 || options->form == CONTACT_POINTWISE;
 }
 
 ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, ContactSet *set,
