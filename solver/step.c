@@ -520,11 +520,10 @@ void step_assemble(Stepper *s) { stepper_assemble(s); }
 // The iterate in the unknowns that are solved for: hands at node 0, slips elsewhere.
 static double solved_for(const Stepper *s, int c, int unknown)
 {
-    const double *u = s->linearised + row_of(s, c);
-    int k = unknown < 6 ? 0 : 1 + (unknown - 6) / 2, out = k > 0 && is_inside(s, c, k) ? tools_around(s, c, k) : 0;
-    if (c == 0 && k > 0 && is_inside(s, c, k))
-        return hand_moved(s, k, unknown % 2);
-    return u[unknown] - (c > 0 && out > 0 ? u[unknown_of(out) + unknown % 2] : 0);
+    int k = unknown < 6 ? 0 : 1 + (unknown - 6) / 2;
+    if (k == 0 || !is_inside(s, c, k))
+        return s->linearised[row_of(s, c) + (size_t)unknown];
+    return c == 0 ? hand_moved(s, k, unknown % 2) : tools_slipped(s, c, k, unknown % 2);
 }
 
 static bool is_unit_row(const double *row, int n, int unknown)

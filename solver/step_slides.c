@@ -125,17 +125,20 @@ void tools_keep_slides(Stepper *s)
     }
 }
 
+double tools_slipped(const Stepper *s, int c, int k, int about)
+{
+    const double *u = s->linearised + row_of(s, c);
+    int out = tools_around(s, c, k);
+    return u[unknown_of(k) + about] - (out > 0 ? u[unknown_of(out) + about] : 0);
+}
+
 double tools_friction_work(const Stepper *s)
 {
     double work = 0;
     for (int i = 0; s->tool_count > 1 && i < s->set.slide_count; i++) {
         const ContactSlide *slide = &s->set.slide[i];
-        int k = 1 + (slide->unknown - 6) / 2, out = tools_around(s, slide->node, k);
-        const double *u = s->linearised + row_of(s, slide->node);
-        for (int j = 0; j < 2; j++) {
-            double slip = u[slide->unknown + j] - (out > 0 ? u[unknown_of(out) + j] : 0);
-            work -= slide->force[j] * (j ? slide->radius : 1) * slip;
-        }
+        for (int j = 0; j < 2; j++)
+            work -= slide->force[j] * (j ? slide->radius : 1) * tools_slipped(s, slide->node, 1 + (slide->unknown - 6) / 2, j);
     }
     return work;
 }

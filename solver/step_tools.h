@@ -49,6 +49,8 @@ double tools_stiffness_damping(const Stepper *s);
 void tools_slides(Stepper *s);
 void tools_to_slips(Stepper *s);
 void tools_from_slips(Stepper *s);
+// How far the iterate has moved tool k at node c, where it is inside, against the tool around it: along [mm], or about [rad].
+double tools_slipped(const Stepper *s, int c, int k, int about);
 void tools_keep_slides(Stepper *s);                // the forces of this step's solution, for the next step
 double tools_friction_work(const Stepper *s);      // [mJ] that it took in this step
 
