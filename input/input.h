@@ -19,6 +19,8 @@ typedef struct ToolCommands {
     Command tool[TOOLS_MOST];    // outermost first; a tool that is not named is pinned: 0
     unsigned released;           // bit k: no hand holds tool k, only the friction of the valve that it goes through
     int fitted[TOOLS_MOST];      // which of the tools that may be tool k: 0 the scene's, 1, 2, … those under its `exchange:`
+    double contrast_ml_s;        // that a script injects …
+    int contrast_tool;           // … through this tool, 1 the outermost; 0: nobody's
 } ToolCommands;
 
 typedef struct ToolNames {   // of the scene that a script is for, outermost first; NULL after the last
@@ -33,6 +35,7 @@ typedef struct ScriptRow {
     Command inner[TOOLS_MOST - 1];   // of those within it
     unsigned released;               // as in ToolCommands
     int fitted[TOOLS_MOST];          // as in ToolCommands
+    double contrast_ml_s[TOOLS_MOST];    // of each tool; at most one has any
 } ScriptRow;
 
 typedef struct Script {      // each row holds from its time until the next; the last row's time ends the script
@@ -40,14 +43,14 @@ typedef struct Script {      // each row holds from its time until the next; the
     ScriptRow *row;
 } Script;
 
-enum { SCRIPT_FASTEST_MM_S = 1000, SCRIPT_FASTEST_DEG_S = 36000, SCRIPT_LONGEST_S = 86400 };
+enum { SCRIPT_FASTEST_MM_S = 1000, SCRIPT_FASTEST_DEG_S = 36000, SCRIPT_LONGEST_S = 86400, SCRIPT_MOST_ML_S = 50 };
 
 // Parses the text of a script: CSV with the header t_s,push_mm_s,twist_deg_s, `#` comments. NULL with faults where it is wrong:
 // wrong header, not a number, times that go backwards, first time negative, |push| > 1000 mm/s, |twist| > 36,000 deg/s, no row. A fourth column, released, is 1
 // where no hand holds the tool and 0 where one does; without it one does.
 Script *script_parse(const char *text, size_t length, const char *file, Faults *faults);
 // For a scene's tools: the header above, which is that of the first tool, or t_s and NAME.push_mm_s with NAME.twist_deg_s, or
-// NAME.released and NAME.exchange, for any of them, in any order.
+// NAME.released, NAME.exchange and NAME.contrast_ml_s (contrast agent through that tool, 0 to 50, one tool at a time), for any of them, in any order.
 Script *script_parse_tools(const char *text, size_t length, const char *file, const ToolNames *tools, Faults *faults);
 // Reads the file (at most 64 MiB) and parses it.
 Script *script_load(const char *path, Faults *faults);

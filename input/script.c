@@ -9,9 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PUSH, TWIST, RELEASED, EXCHANGE, QUANTITIES };
+enum { PUSH, TWIST, RELEASED, EXCHANGE, CONTRAST, QUANTITIES };
 static const char header[] = "t_s,push_mm_s,twist_deg_s", header_with_release[] = "t_s,push_mm_s,twist_deg_s,released";
-static const char *const quantity[QUANTITIES + 1] = {"push_mm_s", "twist_deg_s", "released", "exchange", NULL};
+static const char *const quantity[QUANTITIES + 1] = {"push_mm_s", "twist_deg_s", "released", "exchange", "contrast_ml_s", NULL};
 
 // What the columns after t_s are: the tool of each, and which of its quantities.
 typedef struct Columns {
@@ -33,7 +33,7 @@ static void check_speed(double speed, int fastest, const char *name, const char 
 
 bool script_check_row(const ScriptRow *row, const ScriptRow *before, const ToolNames *tools, const char *file, int line, int column, Faults *faults)
 {
-    int already = faults->count;
+    int already = faults->count, injecting = 0;
     if (row->t_s < 0)
         faults_add(faults, file, line, column, "t_s %g is negative; a script starts at 0 or later", row->t_s);
     if (before && row->t_s <= before->t_s)
@@ -44,7 +44,12 @@ bool script_check_row(const ScriptRow *row, const ScriptRow *before, const ToolN
         const Command *command = k == 0 ? &row->command : &row->inner[k - 1];
         check_speed(command->push_mm_s, SCRIPT_FASTEST_MM_S, quantity[0], "mm/s", tools, k, file, line, column, faults);
         check_speed(command->twist_deg_s, SCRIPT_FASTEST_DEG_S, quantity[1], "deg/s", tools, k, file, line, column, faults);
+        injecting += row->contrast_ml_s[k] > 0;
+        if (!(row->contrast_ml_s[k] >= 0 && row->contrast_ml_s[k] <= SCRIPT_MOST_ML_S))
+            faults_add(faults, file, line, column, "contrast_ml_s %g is out of range; 0 to %d ml/s", row->contrast_ml_s[k], SCRIPT_MOST_ML_S);
     }
+    if (injecting > 1)
+        faults_add(faults, file, line, column, "contrast agent goes through %d tools at once; there is one injector, so one tool a row", injecting);
     return faults->count == already;
 }
 
@@ -71,7 +76,7 @@ static void fault_unknown_tool(const char *name, const NumberColumn *column, int
         faults_add(faults, file, line, column->column, "no tool of the scene is named '%s'; it has: %s", name, all);
 }
 
-// One column that is not t_s: NAME.push_mm_s, NAME.twist_deg_s, NAME.released or NAME.exchange.
+// One column that is not t_s: NAME.push_mm_s, NAME.twist_deg_s, NAME.released, NAME.exchange or NAME.contrast_ml_s.
 static bool read_column(const NumberColumn *column, int line, const ToolNames *tools, const char *file, int *tool, int *which, Faults *faults)
 {
     int shown = (int)(column->length < 80 ? column->length : 80);
@@ -82,7 +87,7 @@ static bool read_column(const NumberColumn *column, int line, const ToolNames *t
         const char *example = tools->name[0];
         if (dot && (*tool = find_word(column->name, name_length, tools->name)) >= 0)
             example = tools->name[*tool];
-        faults_add(faults, file, line, column->column, "a column is headed '%.*s'; beside named tools each is NAME.push_mm_s, NAME.twist_deg_s, NAME.released or NAME.exchange, such as '%s.push_mm_s'",
+        faults_add(faults, file, line, column->column, "a column is headed '%.*s'; beside named tools each is NAME.push_mm_s, NAME.twist_deg_s, NAME.released, NAME.exchange or NAME.contrast_ml_s, such as '%s.push_mm_s'",
                    shown, column->name, example);
         return false;
     }
@@ -101,7 +106,7 @@ static bool read_columns(const NumberColumn *field, int count, int line, const T
     int before = faults->count, place[TOOLS_MOST][QUANTITIES] = {{0}};
     size_t used = (size_t)snprintf(columns->header, sizeof columns->header, "t_s");
     if (count > NUMBER_TABLE_COLUMNS) {
-        faults_add(faults, file, line, 1, "has %d columns; t_s and up to four for each of the scene's %d tools", count, tools->count);
+        faults_add(faults, file, line, 1, "has %d columns; t_s and up to five for each of the scene's %d tools", count, tools->count);
         return false;
     }
     if (!is_word(field[0].name, field[0].length, "t_s"))
@@ -153,6 +158,8 @@ static void put_value(ScriptRow *row, int tool, int which, double value)
         row->released |= value != 0 ? 1u << tool : 0;
     else if (which == EXCHANGE)
         row->fitted[tool] = (int)fmax(0, fmin(value, EXCHANGES_MOST));
+    else if (which == CONTRAST)
+        row->contrast_ml_s[tool] = value;
     else
         *(which == TWIST ? &command->twist_deg_s : &command->push_mm_s) = value;
 }
@@ -263,6 +270,11 @@ ToolCommands script_tools_at(const Script *script, double t_s, int *cursor)
         return (ToolCommands){0};
     ToolCommands commands = {.tool = {script->row[i].command}, .released = script->row[i].released};
     memcpy(commands.fitted, script->row[i].fitted, sizeof commands.fitted);
+    for (int k = 0; k < TOOLS_MOST; k++)
+        if (script->row[i].contrast_ml_s[k] > 0) {
+            commands.contrast_ml_s = script->row[i].contrast_ml_s[k];
+            commands.contrast_tool = k + 1;
+        }
     memcpy(commands.tool + 1, script->row[i].inner, sizeof script->row[i].inner);
     return commands;
 }

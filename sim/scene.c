@@ -347,7 +347,7 @@ static void read_simulation(Reading *reading, YamlValue value)
 }
 
 // The valid keys of a script's row: t_s, the first tool's by their bare names, and each tool's by its name.
-enum { KEYS_OF_TOOL = 4, NAMED_KEYS = 1 + KEYS_OF_TOOL };
+enum { KEYS_OF_TOOL = 5, NAMED_KEYS = 1 + KEYS_OF_TOOL };
 typedef struct RowKeys {
     const char *key[NAMED_KEYS + KEYS_OF_TOOL * TOOLS_MOST + 1];
     char text[KEYS_OF_TOOL * TOOLS_MOST][TOOL_NAME_SIZE + 16];
@@ -355,8 +355,8 @@ typedef struct RowKeys {
 
 static void list_row_keys(const ToolNames *tools, RowKeys *keys)
 {
-    static const char *const bare[] = {"t_s", "push_mm_s", "twist_deg_s", "released", "exchange"};
-    *keys = (RowKeys){.key = {bare[0], bare[1], bare[2], bare[3], bare[4]}};
+    static const char *const bare[] = {"t_s", "push_mm_s", "twist_deg_s", "released", "exchange", "contrast_ml_s"};
+    *keys = (RowKeys){.key = {bare[0], bare[1], bare[2], bare[3], bare[4], bare[5]}};
     for (int i = 0; i < KEYS_OF_TOOL * tools->count; i++) {
         snprintf(keys->text[i], sizeof keys->text[i], "%s.%s", tools->name[i / KEYS_OF_TOOL], bare[1 + i % KEYS_OF_TOOL]);
         keys->key[NAMED_KEYS + i] = keys->text[i];
@@ -384,6 +384,7 @@ static bool read_row(YamlValue item, const RowKeys *keys, int tools, ScriptRow *
     bool bare = yaml_map_number(&map, "push_mm_s", false, any, &row->command.push_mm_s);
     bare |= yaml_map_number(&map, "twist_deg_s", false, any, &row->command.twist_deg_s);
     bare |= read_released(&map, "released", 0, row);
+    bare |= yaml_map_number(&map, "contrast_ml_s", false, any, &row->contrast_ml_s[0]);
     for (int k = 0; k < tools; k++) {
         const char *const *key = keys->key + NAMED_KEYS + KEYS_OF_TOOL * k, *push = key[0], *twist = key[1];
         Command *command = script_row_command(row, k);
@@ -391,10 +392,11 @@ static bool read_row(YamlValue item, const RowKeys *keys, int tools, ScriptRow *
         if (yaml_has(&map, push) != yaml_has(&map, twist))
             yaml_fault(item, "'%s' lacks its other half; give '%s' too", yaml_has(&map, push) ? push : twist, yaml_has(&map, push) ? twist : push);
         bool has_release = read_released(&map, key[2], k, row);
+        bool has_contrast = yaml_map_number(&map, key[4], false, any, &row->contrast_ml_s[k]);
         YamlValue exchange = yaml_get(&map, key[3], false);
         if (exchange.node)
             yaml_integer(exchange, 0, EXCHANGES_MOST, &row->fitted[k]);
-        if (bare && (has_push || has_twist || has_release))
+        if (bare && (has_push || has_twist || has_release || has_contrast))
             yaml_fault(item, "a row names its tools or moves the first by bare 'push_mm_s' and 'twist_deg_s', not both; write '%s' and '%s'",
                        keys->key[NAMED_KEYS], keys->key[NAMED_KEYS + 1]);
     }

@@ -144,12 +144,35 @@ static void a_hand_lets_go(void **state)
     expect_fault("t_s,push_mm_s,released,twist_deg_s\n0,1,0,0\n1,0,0,0\n", "1:15", "twist_deg_s");
 }
 
+static void one_injector_goes_through_one_tool(void **state)
+{
+    (void)state;
+    const ToolNames tools = {.count = 3, .name = {"guide", "micro", "wire"}};
+    static const char named[] = "t_s,guide.contrast_ml_s,micro.contrast_ml_s\n0,3,0\n1,0,0.5\n2,0,0\n3,1,0\n", both[] = "t_s,guide.contrast_ml_s,micro.contrast_ml_s\n0,3,1\n1,51,0\n2,-1,0\n";
+    int cursor = 0;
+    Script *script = script_parse_tools(named, strlen(named), "s.csv", &tools, &faults);
+    assert_non_null(script);
+    const double at[] = {0.5, 1.5, 2.5, 3.5}, rate[] = {3, 0.5, 0, 0};
+    const int tool[] = {1, 2, 0, 0};
+    for (int i = 0; i < 4; i++) {
+        ToolCommands commands = script_tools_at(script, at[i], &cursor);
+        assert_true(!(commands.contrast_ml_s < rate[i]) && !(commands.contrast_ml_s > rate[i]) && commands.contrast_tool == tool[i]);
+    }
+    script_free(script);
+    faults_clear(&faults);
+    assert_null(script_parse_tools(both, strlen(both), "s.csv", &tools, &faults));
+    assert_int_equal(faults.count, 3);
+    assert_non_null(strstr(faults.text[0], "2 tools at once"));
+    assert_non_null(strstr(faults.text[1], "contrast_ml_s 51 is out of range; 0 to 50"));
+    assert_non_null(strstr(faults.text[2], "contrast_ml_s -1 is out of range"));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rows_hold_until_the_next),    cmocka_unit_test(every_millisecond_finds_its_row), cmocka_unit_test(each_fault_has_its_place),
         cmocka_unit_test(all_faults_come_in_one_pass), cmocka_unit_test(a_file_that_is_none_is_said),     cmocka_unit_test(numbers_are_decimal_and_finite),
-        cmocka_unit_test(a_hand_lets_go),
+        cmocka_unit_test(a_hand_lets_go),              cmocka_unit_test(one_injector_goes_through_one_tool),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
