@@ -288,6 +288,9 @@ static void walk_tool(Cursor *cursor, PoseTool *tool)
     }
 }
 
+// Of the controls, what is seen of an image: not through which tool contrast agent is asked for.
+enum { XRAY_BYTES = XRAY_VALUES_BEFORE_TOOLS * (int)sizeof(float) };
+
 static void walk_frame(Cursor *cursor, Cine *cine, int place)
 {
     Pose *pose = &cine->pose[place];
@@ -297,7 +300,7 @@ static void walk_frame(Cursor *cursor, Cine *cine, int place)
     WALK(cursor, pose->time_s);
     WALK(cursor, pose->command.push_mm_s);
     WALK(cursor, pose->command.twist_deg_s);
-    WALK(cursor, pose->xray);
+    walk(cursor, &pose->xray, XRAY_BYTES);
     WALK(cursor, pose->inserted_mm);
     if (has_several)
         WALK(cursor, pose->node_count);
@@ -327,7 +330,7 @@ static void walk_frame(Cursor *cursor, Cine *cine, int place)
 enum {
     HEAD_BYTES = 8 + 4 * 4,
     TOOLS_BYTES = 4 + STEP_TOOLS_MAX * 4,
-    FRAME_BYTES = 4 + 8 + 8 + 2 * 8 + (int)sizeof(XrayControl) + 8 + 4 + 4 * 4 + 7 * 8 + 4,
+    FRAME_BYTES = 4 + 8 + 8 + 2 * 8 + XRAY_BYTES + 8 + 4 + 4 * 4 + 7 * 8 + 4,
     NODE_BYTES = 3 * 8 + 4 * 8 + 6 * 8 + 4,
     TOOL_BYTES = 5 * 8,
     TOOL_NODE_BYTES = 9 * 8 + 4

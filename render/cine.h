@@ -11,7 +11,7 @@
 
 typedef struct CineFrame {
     const Pose *pose;            // at the pulse; X-ray settings and time are its own
-    const float *contrast;       // (contrast_count of the shape), NULL where that is 0
+    const float *contrast;       // (contrast_count of the shape) at the vessel's nodes, then in the tools' lumens at theirs; NULL where that is 0
     uint32_t pulse;              // number of the X-ray pulse
 } CineFrame;
 
@@ -20,7 +20,7 @@ typedef struct Cine Cine;
 typedef struct CineShape {       // of each image
     int tool_count;              // 1 to 4
     int tool_nodes[STEP_TOOLS_MAX];      // of each; the shared centreline has no more than all of them
-    int contrast_count;          // nodes of the vessel tree, 0 without
+    int contrast_count;          // values of contrast agent: nodes of the vessel tree (0 without) and of all tools; 0: none
 } CineShape;
 CineShape cine_shape_for(const Pose *pose, int contrast_count);
 bool cine_shapes_same(const CineShape *a, const CineShape *b);

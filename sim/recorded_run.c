@@ -247,10 +247,28 @@ static int64_t read_tool_frames(const Reader *reader, const char *group, Recorde
 
 static int64_t smaller(int64_t a, int64_t b) { return a < b ? a : b; }
 
+// What was set at each step; rows from before contrast agent had a tool are one value shorter.
+static XrayControl *read_xray(const Reader *reader, hsize_t *count)
+{
+    hsize_t shape[2] = {0, 0};
+    float *value = read_dataset(reader, "/xray", H5T_NATIVE_FLOAT, 2, shape);
+    *count = shape[0];
+    if (!value || shape[1] == XRAY_VALUES)
+        return (XrayControl *)value;
+    XrayControl *xray = shape[1] == XRAY_VALUES_BEFORE_TOOLS ? calloc((size_t)shape[0] + 1, sizeof *xray) : NULL;
+    if (!xray)
+        faults_add(reader->faults, reader->path, 0, 0, "/xray has rows of %llu values; %d, or %d in older recordings", (unsigned long long)shape[1], XRAY_VALUES,
+                   XRAY_VALUES_BEFORE_TOOLS);
+    for (hsize_t i = 0; xray && i < shape[0]; i++)
+        memcpy(&xray[i], value + i * XRAY_VALUES_BEFORE_TOOLS, XRAY_VALUES_BEFORE_TOOLS * sizeof *value);
+    free(value);
+    return xray;
+}
+
 // What every step has.
 static int64_t read_series(const Reader *reader, RecordedRun *run)
 {
-    hsize_t time[1] = {0}, hash[1] = {0}, flags[1] = {0}, wall[2] = {0, 2}, xray[2] = {0, XRAY_VALUES};
+    hsize_t time[1] = {0}, hash[1] = {0}, flags[1] = {0}, wall[2] = {0, 2}, watched = 0;
     run->time_s = read_dataset(reader, "/time_s", H5T_NATIVE_DOUBLE, 1, time);
     int64_t count = smaller((int64_t)time[0], read_tool_series(reader, "", &run->tool[0]));
     run->command = run->tool[0].command;
@@ -260,7 +278,7 @@ static int64_t read_series(const Reader *reader, RecordedRun *run)
     run->flags = read_dataset(reader, "/report/flags", H5T_NATIVE_UINT32, 1, flags);
     run->wall_force = read_dataset(reader, "/report/wall_force_n", H5T_NATIVE_DOUBLE, 2, wall);
     bool was_seen = has(reader, "/xray");   // not in recordings of before the trainer
-    run->xray = was_seen ? read_dataset(reader, "/xray", H5T_NATIVE_FLOAT, 2, xray) : NULL;
+    run->xray = was_seen ? read_xray(reader, &watched) : NULL;
     count = least(least(least(count, hash[0]), flags[0]), wall[0]);
     bool several = count_tools(reader, run) && run->tool_count > 1;
     for (int k = 0; several && k < run->tool_count; k++) {
@@ -271,7 +289,7 @@ static int64_t read_series(const Reader *reader, RecordedRun *run)
         if (k > 0)
             count = smaller(count, read_tool_series(reader, group, &run->tool[k]));
     }
-    return run->xray ? least(count, xray[0]) : count;
+    return run->xray ? least(count, watched) : count;
 }
 
 static int64_t read_tools_frames(const Reader *reader, hsize_t nodes, RecordedRun *run)
@@ -481,6 +499,10 @@ ToolCommands recorded_run_commands(const RecordedRun *run, int64_t step)
         const RecordedTool *tool = &run->tool[k];
         commands.tool[k] = (Command){tool->command[2 * step], tool->command[2 * step + 1]};
         commands.released |= tool->released && tool->released[step] ? 1u << k : 0;
+    }
+    if (run->xray && run->xray[step].contrast_ml_s > 0 && run->xray[step].contrast_tool > 0) {
+        commands.contrast_ml_s = (double)run->xray[step].contrast_ml_s;
+        commands.contrast_tool = (int)fminf(run->xray[step].contrast_tool, TOOLS_MOST);
     }
     return commands;
 }

@@ -566,7 +566,7 @@ bool recording_step(Recording *recording, Simulator *simulator, const ToolComman
     double time = simulator_time_s(simulator);
     uint64_t hash = simulator_hash(simulator);
     uint32_t flags = report->flags;
-    XrayControl unseen = {0};
+    const XrayControl unseen = {.contrast_ml_s = (float)commands->contrast_ml_s, .contrast_tool = (float)commands->contrast_tool};
     for (int k = 0; k < recording->tool_count; k++) {
         double inserted = stepper_tool_inserted(simulator_stepper(simulator), k);
         uint8_t released = commands->released >> k & 1;

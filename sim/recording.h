@@ -12,8 +12,8 @@
 // After a failed write (full disk, full index) nothing more is written, the file stays as the last flush left it.
 //
 // Rows: /time_s (S) time at the end of each step, /command (S,2), /proximal (S,2), /state_hash (S), /inserted_mm (S), /released (S) 1 where no hand holds the tool,
-// /xray (S,16: sim/xray.h), /report/penetration_mm, contacts (with force), iterations and residual of the contact solve, linearisations (1 in a quiet step), flags
-// (all S), wall_force_n (S,2): largest and sum;
+// /xray (S,17: sim/xray.h; 16 in recordings from before contrast agent had a tool), /report/penetration_mm, contacts (with force), iterations
+// and residual of the contact solve, linearisations (1 in a quiet step), flags (all S), wall_force_n (S,2): largest and sum;
 // frames: /wire/step (K) the row of the frame, /wire/position (K,M,3), /wire/quaternion (K,M,4) as w x y z, /contact/force_n (K,M,3),
 // /contact/gap_mm (K,M), /contact/vessel_node (K,M); once: /wire/s_mm (M), /wire/radius_mm (M), /scene (text; attributes path, contact, files, sha256).
 // Several tools: /wire and /contact are those of the shared centreline, whose nodes come and go. M is the most there can be, /wire/count (K) how many there are; the
@@ -43,7 +43,7 @@ void recording_prepare_process(void);
 // NULL with a fault where the file cannot be made.
 Recording *recording_create(const char *path, Simulator *simulator, const RecordingOptions *options, Faults *faults);
 // After a step. Allocates nothing, calls no file; waits where the disk is slower than the simulation. False once writing failed.
-// `xray` may be NULL: nobody sees the run.
+// `xray` may be NULL: nobody sees the run; what its script injects is kept.
 bool recording_step(Recording *recording, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
 // Adds the last state as a frame, writes what is left, ends. False with a fault where writing failed; always frees.
 bool recording_close(Recording *recording, Simulator *simulator, Faults *faults);

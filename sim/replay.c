@@ -61,32 +61,56 @@ bool replay_fits(const RecordedRun *run, Simulator *simulator, Faults *faults)
     return fits;
 }
 
-static void print_heads(FILE *stream, const RecordedRun *run, const bool *is_released)
+// What the columns of a script have to say of each tool besides its motion, at some step.
+typedef struct ScriptUse {
+    bool releases[TOOLS_MOST], injects[TOOLS_MOST];
+} ScriptUse;
+
+// A single tool has no name, under which alone a script can inject.
+static ScriptUse find_use(const RecordedRun *run)
+{
+    ScriptUse use = {0};
+    for (int64_t i = 0; i < run->step_count; i++) {
+        ToolCommands commands = recorded_run_commands(run, i);
+        for (int k = 0; k < run->tool_count; k++) {
+            use.releases[k] |= commands.released >> k & 1;
+            use.injects[k] |= run->tool_count > 1 && commands.contrast_ml_s > 0 && commands.contrast_tool == k + 1;
+        }
+    }
+    return use;
+}
+
+static void print_heads(FILE *stream, const RecordedRun *run, const ScriptUse *use)
 {
     fputs("t_s", stream);
     for (int k = 0; k < run->tool_count; k++) {
         const char *name = run->tool_count > 1 ? run->tool[k].name : "", *dot = *name ? "." : "";
         fprintf(stream, ",%s%spush_mm_s,%s%stwist_deg_s", name, dot, name, dot);
-        if (is_released[k])
+        if (use->releases[k])
             fprintf(stream, ",%s%sreleased", name, dot);
+        if (use->injects[k])
+            fprintf(stream, ",%s%scontrast_ml_s", name, dot);
     }
     fputc('\n', stream);
 }
 
-static void print_row(FILE *stream, const RecordedRun *run, double t_s, const ToolCommands *commands, const bool *is_released)
+static void print_row(FILE *stream, const RecordedRun *run, double t_s, const ToolCommands *commands, const ScriptUse *use)
 {
     fprintf(stream, "%.17g", t_s);
     for (int k = 0; k < run->tool_count; k++) {
         fprintf(stream, ",%.17g,%.17g", commands->tool[k].push_mm_s, commands->tool[k].twist_deg_s);
-        if (is_released[k])
+        if (use->releases[k])
             fprintf(stream, ",%u", commands->released >> k & 1);
+        if (use->injects[k])
+            fprintf(stream, ",%.9g", commands->contrast_tool == k + 1 ? commands->contrast_ml_s : 0);
     }
     fputc('\n', stream);
 }
 
 static bool is_same(const ToolCommands *a, const ToolCommands *b)
 {
-    return memcmp(a->tool, b->tool, sizeof a->tool) == 0 && a->released == b->released;
+    return memcmp(a->tool, b->tool, sizeof a->tool) == 0 && a->released == b->released && !(a->contrast_ml_s < b->contrast_ml_s) &&
+           !(a->contrast_ml_s > b->contrast_ml_s) && a->contrast_tool == b->contrast_tool;
 }
 
 char *replay_script(const RecordedRun *run, size_t *length)
@@ -94,20 +118,17 @@ char *replay_script(const RecordedRun *run, size_t *length)
     char *text = NULL;
     FILE *stream = open_memstream(&text, length);
     ToolCommands before = {0};
-    bool is_released[TOOLS_MOST] = {0};      // at some step
     if (!stream)
         return NULL;
-    for (int k = 0; k < run->tool_count; k++)
-        for (int64_t i = 0; run->tool[k].released && i < run->step_count; i++)
-            is_released[k] |= run->tool[k].released[i];
-    print_heads(stream, run, is_released);
+    const ScriptUse use = find_use(run);
+    print_heads(stream, run, &use);
     for (int64_t i = 0; i < run->step_count; i++) {
         ToolCommands now = recorded_run_commands(run, i);
         if (i == 0 || !is_same(&now, &before))
-            print_row(stream, run, (double)i * run->step_ms / 1000, &now, is_released);
+            print_row(stream, run, (double)i * run->step_ms / 1000, &now, &use);
         before = now;
     }
-    print_row(stream, run, (double)run->step_count * run->step_ms / 1000, &(ToolCommands){0}, is_released);
+    print_row(stream, run, (double)run->step_count * run->step_ms / 1000, &(ToolCommands){0}, &use);
     if (fclose(stream) == 0)
         return text;
     free(text);

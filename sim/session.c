@@ -50,6 +50,16 @@ void session_set_score(Session *session, const Score *score)
     memcpy(session->event, event, (size_t)session->event_count * sizeof *event);
 }
 
+// The tool of the contrast agent counts where one was chosen: the sums of older sessions stay.
+static void digest_xray(Sha256 *sha, const RecordedRun *run)
+{
+    bool has_tool = false;
+    for (int64_t i = 0; i < run->step_count; i++)
+        has_tool |= run->xray[i].contrast_tool != 0;
+    for (int64_t i = 0; i < run->step_count; i++)
+        sha256_add(sha, &run->xray[i], (size_t)(has_tool ? XRAY_VALUES : XRAY_VALUES_BEFORE_TOOLS) * sizeof(float));
+}
+
 static void digest(const RecordedRun *run, char hex[65])
 {
     Sha256 sha;
@@ -62,7 +72,7 @@ static void digest(const RecordedRun *run, char hex[65])
             sha256_add(&sha, run->tool[k].released, steps);
     }
     if (run->xray)
-        sha256_add(&sha, run->xray, steps * sizeof *run->xray);
+        digest_xray(&sha, run);
     sha256_add(&sha, run->state_hash, steps * sizeof *run->state_hash);
     sha256_end(&sha, hex);
 }

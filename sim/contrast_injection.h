@@ -1,0 +1,47 @@
+// An injection as it is seen: contrast agent goes in at the hub of a tool, down its lumen (sim/contrast_lumen.h), out at its tip and on with the blood
+// (sim/contrast.h). A session and a replay of it go through the same.
+//
+// Through which tool: the one asked for, or the next around it that has a lumen (of a wire the catheter that it lies in). Where none has, as in scenes with a
+// wire alone, and in recordings from before a tool could be chosen, agent comes from the foremost tip at the asked rate, as if through a catheter that is
+// not there. The vessel takes from one tip at a time, whichever has most waiting: beside an injection the little that saline drives out of another tool comes
+// in bursts.
+//
+// A pure function of the calls; no call after create allocates. One thread at a time.
+#ifndef SELDINGER_SIM_CONTRAST_INJECTION_H
+#define SELDINGER_SIM_CONTRAST_INJECTION_H
+
+#include "sim/contrast.h"
+#include "sim/contrast_lumen.h"
+#include "sim/xray.h"
+
+typedef struct ContrastInjection ContrastInjection;
+
+// Where tools are: their lengths beyond the mouth [mm], the tree's nodes nearest to their tips (-1: in the sheath), and which tip is foremost.
+typedef struct TipPlaces {
+    double inserted[TOOLS_MOST];
+    int node[TOOLS_MOST];
+    int foremost_node;
+} TipPlaces;
+
+// `tree` may be NULL. `node_count` and `s`: see contrast_lumens_create. NULL where memory lacks.
+ContrastInjection *contrast_injection_create(const VesselTree *tree, const Scene *scene, const int *node_count, const double *const *s);
+void contrast_injection_free(ContrastInjection *injection);
+void contrast_injection_copy(ContrastInjection *to, const ContrastInjection *from);   // both made of the same scene
+
+// The tool that `xray` injects through, -1: none, see above.
+int contrast_injection_tool(const ContrastInjection *injection, const XrayControl *xray);
+// [ml/s] what flows of what `xray` asks for, at most what the tool's lumen passes.
+double contrast_injection_flow(ContrastInjection *injection, const XrayControl *xray, const double *inserted);
+// `dt_s` on (some ms), while `volume_ml` flowed as contrast_injection_flow said, by the controls `xray`.
+void contrast_injection_advance(ContrastInjection *injection, double dt_s, const XrayControl *xray, double volume_ml, const TipPlaces *places);
+
+// Nodes of the tree, 0 without, and of all tools.
+int contrast_injection_tree_nodes(const ContrastInjection *injection);
+int contrast_injection_node_count(const ContrastInjection *injection);   // of both
+// Concentrations, 0 to 1: (tree nodes) in the vessel, then (tools' nodes) in the lumens, one tool after the other.
+void contrast_injection_read(ContrastInjection *injection, float *concentration);
+double contrast_injection_injected_ml(const ContrastInjection *injection);   // injected = within + gone
+double contrast_injection_within_ml(const ContrastInjection *injection);     // in lumens and vessel
+double contrast_injection_gone_ml(const ContrastInjection *injection);
+
+#endif
