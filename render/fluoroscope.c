@@ -114,11 +114,12 @@ static bool take_memory(Fluoroscope *f, const FluoroscopeOptions *options)
     for (int k = 0; options->tools && k < options->tools->count; k++)
         tool_nodes += (size_t)options->pose->tool[k].node_count;
     f->shown.position = calloc(tool_nodes, sizeof *f->shown.position);
+    f->shown.filling = calloc(tool_nodes, sizeof *f->shown.filling);
     f->shown.contrast = calloc(nodes, sizeof *f->shown.contrast);
     f->lumen_contrast = calloc(nodes, sizeof *f->lumen_contrast);
     f->bolus = calloc(nodes, sizeof *f->bolus);
     f->roadmap = calloc(nodes, sizeof *f->roadmap);
-    return f->shown.position && f->shown.contrast && f->lumen_contrast && f->bolus && f->roadmap && make_paths(f, options);
+    return f->shown.position && f->shown.filling && f->shown.contrast && f->lumen_contrast && f->bolus && f->roadmap && make_paths(f, options);
 }
 
 Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message, size_t capacity)
@@ -178,7 +179,7 @@ void fluoroscope_destroy(Fluoroscope *f)
     ribbon_free(&f->ribbon);
     for (int k = 0; k < f->tool_count; k++)
         ribbon_path_free(&f->tool[k]);
-    free(f->shown.position), free(f->shown.contrast);
+    free(f->shown.position), free(f->shown.filling), free(f->shown.contrast);
     free(f->lumen_contrast), free(f->bolus), free(f->roadmap);
     free(f);
 }
@@ -221,9 +222,10 @@ static void take_exposure(Fluoroscope *f, const FluoroscopeFrame *frame)
     f->shown.pulse = frame->pulse;
     f->shown.has_tools = has_these_tools(f, pose);
     for (int k = 0, i = 0; f->shown.has_tools && k < f->tool_count; k++) {
-        for (int j = 0; j < pose->tool[k].node_count; j++, i++)
+        for (int j = 0; j < pose->tool[k].node_count; j++, i++) {
             f->shown.position[i] = pose->tool[k].node[j].position;
-        f->shown.filling[k] = frame->filling[k] > 0 ? fminf(frame->filling[k], 1) : 0;
+            f->shown.filling[i] = frame->filling && frame->filling[i] > 0 ? fminf(frame->filling[i], 1) : 0;
+        }
     }
     for (int n = 0; n < nodes; n++) {
         float c = frame->contrast ? frame->contrast[n] : 0;
@@ -362,10 +364,12 @@ static const Layer *lumen_of(const Fluoroscope *f) { return f->lumen_is_empty ? 
 static void lay_tools(Fluoroscope *f, int side)
 {
     const Vec3 *position = f->shown.position;
+    const float *filling = f->shown.filling;
     ribbon_begin(&f->ribbon);
     for (int k = 0; f->shown.has_tools && k < f->tool_count; k++) {
-        ribbon_add(&f->ribbon, &f->c_arm, side, &f->tool[k], position, f->tone.contrast * (double)f->shown.filling[k]);
+        ribbon_add(&f->ribbon, &f->c_arm, side, &f->tool[k], position, filling, f->tone.contrast);
         position += f->tool[k].node_count;
+        filling += f->tool[k].node_count;
     }
     ribbon_end(&f->ribbon, side);
 }

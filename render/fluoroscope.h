@@ -48,8 +48,8 @@ void fluoroscope_destroy(Fluoroscope *fluoroscope);
 
 typedef struct FluoroscopeFrame {
     const Pose *pose;              // its tools' nodes are read, as many as the options' pose has. NULL: no tools
-    // concentration of contrast agent in the lumen of each tool, 0 to 1. The whole lumen counts: what another tool in it takes the place of is not taken off
-    float filling[TOOLS_MOST];
+    const float *filling;          // (nodes of all tools, one tool after the other) contrast agent over the whole lumen about each node, what else lies in
+                                   // it included: 0 to 1; NULL: none
     XrayControl xray;
     const float *contrast;         // (N of the tree) concentration of contrast agent, 0 to 1; NULL: none
     uint32_t pulse;                // number of the X-ray pulse: seeds the noise; the same pulse gives the same picture

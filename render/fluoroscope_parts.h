@@ -11,7 +11,7 @@ typedef struct Exposure {
     uint32_t pulse;
     bool has_tools;
     Vec3 *position;              // (of all tools' nodes, one tool after the other)
-    float filling[TOOLS_MOST];
+    float *filling;              // (the same)
     float *contrast;             // (N)
 } Exposure;
 

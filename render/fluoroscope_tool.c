@@ -14,7 +14,7 @@ typedef struct RibbonPoint {
     double x, y;                         // [pixel]
     double pixel_mm;                     // of the square at its depth
     double way;                          // [pixel] in space, from the point before …
-    double wall;                         // … and the integral of the wall's attenuation along it
+    double wall, filling;                // … and the integrals of the wall's attenuation and of the lumen's filling along it
     double radius, lumen;                // [mm] of what lies before it
     bool begins;                         // nothing before it
 } RibbonPoint;
@@ -98,12 +98,17 @@ static double shadow_length(const RibbonPoint *a, const RibbonPoint *b) { return
 // Seen at more than 60 degrees from the side.
 static bool is_foreshortened(const RibbonPoint *a, const RibbonPoint *b) { return shadow_length(a, b) < 0.5 * b->way; }
 
-// The projected points, closer ones joined. Returns how many.
-static int project_points(RibbonPoint *out, const CArm *c_arm, int side, const RibbonPath *path, const Vec3 *position)
+static double filling_at(const float *filling, const RibbonPlace *place)
+{
+    return (double)filling[place->node] + place->u * ((double)filling[place->node + 1] - (double)filling[place->node]);
+}
+
+// The projected points, closer ones joined. Returns how many. `filling` NULL: none.
+static int project_points(RibbonPoint *out, const CArm *c_arm, int side, const RibbonPath *path, const Vec3 *position, const float *filling)
 {
     int points = 0;
     bool is_broken = true;
-    double way = 0, wall = 0;
+    double way = 0, wall = 0, filled = 0, last_filling = 0;
     Vec3 before = {0, 0, 0};
     for (int i = 0; i < path->count; i++) {
         const RibbonPlace *place = &path->place[i];
@@ -116,8 +121,11 @@ static int project_points(RibbonPoint *out, const CArm *c_arm, int side, const R
         double pixel_mm = c_arm->field_mm / side * distance / C_ARM_SOURCE_MM, length = is_broken ? 0 : vec3_distance(x, before);
         way = is_broken ? 0 : way + length / pixel_mm;
         wall = is_broken ? 0 : wall + length * place->attenuation;
+        double here = filling ? filling_at(filling, place) : 0;
+        filled = is_broken ? 0 : filled + length * (last_filling + here) / 2;
+        last_filling = here;
         before = x;
-        RibbonPoint point = {(p.x + 0.5) * side, (p.y + 0.5) * side, pixel_mm, way, wall, place->radius, place->lumen, is_broken};
+        RibbonPoint point = {(p.x + 0.5) * side, (p.y + 0.5) * side, pixel_mm, way, wall, filled, place->radius, place->lumen, is_broken};
         // joined to the point before: way and wall add up, the last place counts
         bool is_near = !is_broken && shadow_length(&out[points - 1], &point) < least_length(&point);
         bool is_joined = is_near && i + 1 < path->count && (!place->is_border || is_foreshortened(&out[points - 1], &point));
@@ -125,7 +133,7 @@ static int project_points(RibbonPoint *out, const CArm *c_arm, int side, const R
         if (is_joined)
             continue;
         out[points++] = point;
-        way = wall = 0;
+        way = wall = filled = 0;
     }
     return points;
 }
@@ -155,7 +163,7 @@ static void mitre(const RibbonPoint *a, const RibbonPoint *b, const RibbonPoint 
     out[1] = 2 * sum[1] / square;
 }
 
-static bool lay_piece(Ribbon *ribbon, const RibbonPoint *before, const RibbonPoint *a, const RibbonPoint *b, const RibbonPoint *after, double filling)
+static bool lay_piece(Ribbon *ribbon, const RibbonPoint *before, const RibbonPoint *a, const RibbonPoint *b, const RibbonPoint *after, double attenuation)
 {
     double own[2], n[2][2], l = shadow_length(a, b), least = least_length(b);
     RibbonPoint end[2] = {*a, *b};
@@ -176,7 +184,7 @@ static bool lay_piece(Ribbon *ribbon, const RibbonPoint *before, const RibbonPoi
         mitre(before, a, b, own, n[0]);
     if (after)
         mitre(a, b, after, own, n[1]);
-    const double density[2] = {b->wall / l, (filling * b->way * b->pixel_mm - b->wall) / l};
+    const double density[2] = {b->wall / l, (attenuation * b->filling - b->wall) / l};
     static const int order[6][2] = {{0, -1}, {1, -1}, {0, 1}, {0, 1}, {1, -1}, {1, 1}};
     for (int k = 0; k < 6; k++) {
         int e = order[k][0];
@@ -188,7 +196,7 @@ static bool lay_piece(Ribbon *ribbon, const RibbonPoint *before, const RibbonPoi
 
 void ribbon_begin(Ribbon *ribbon) { ribbon->count = 0; }
 
-bool ribbon_add(Ribbon *ribbon, const CArm *c_arm, int side, const RibbonPath *path, const Vec3 *position, double filling)
+bool ribbon_add(Ribbon *ribbon, const CArm *c_arm, int side, const RibbonPath *path, const Vec3 *position, const float *filling, double attenuation)
 {
     if (path->count > ribbon->point_capacity) {
         RibbonPoint *grown = realloc(ribbon->point, (size_t)path->count * sizeof *grown);
@@ -198,14 +206,14 @@ bool ribbon_add(Ribbon *ribbon, const CArm *c_arm, int side, const RibbonPath *p
         ribbon->point_capacity = path->count;
     }
     const RibbonPoint *point = ribbon->point;
-    int points = project_points(ribbon->point, c_arm, side, path, position);
+    int points = project_points(ribbon->point, c_arm, side, path, position, filling);
     bool good = true;
     for (int i = 1; good && i < points; i++) {
         if (point[i].begins)
             continue;
         const RibbonPoint *before = i > 1 && !point[i - 1].begins ? &point[i - 2] : NULL;
         const RibbonPoint *after = i + 1 < points && !point[i + 1].begins ? &point[i + 1] : NULL;
-        good = lay_piece(ribbon, before, &point[i - 1], &point[i], after, filling);
+        good = lay_piece(ribbon, before, &point[i - 1], &point[i], after, attenuation);
     }
     return good;
 }

@@ -82,7 +82,7 @@ void views_destroy(Views *views)
 static void draw_view(Views *views, PanelView view, const ViewsFrame *frame, ViewPort port, bool is_cleared)
 {
     if (view == VIEW_FLUOROSCOPY) {
-        FluoroscopeFrame xray = {.pose = frame->pose, .xray = *frame->xray, .contrast = frame->contrast, .pulse = frame->pulse,
+        FluoroscopeFrame xray = {.pose = frame->pose, .xray = *frame->xray, .contrast = frame->contrast, .filling = frame->filling, .pulse = frame->pulse,
                                  .leaves_surroundings = is_cleared};
         fluoroscope_draw(views->fluoroscope, &xray, port);
     } else if (view == VIEW_3D) {

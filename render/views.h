@@ -30,6 +30,7 @@ typedef struct ViewsFrame {
     const Pose *pose;
     const XrayControl *xray;
     const float *contrast;           // (N of the tree), NULL: none
+    const float *filling;            // (nodes of all tools) of their lumens by contrast agent, NULL: none
     uint32_t pulse;                  // number of X-ray pulses so far
     const VesselSceneLook *look;
     int scope_tool;                  // from whose tip angioscopy looks, 1 to 4; 0: the one that reaches furthest

@@ -266,7 +266,11 @@ static float *draw_ribbons(XrayRoom *s, Layer *layer, const CArm *c_arm, int too
     ribbon_begin(&ribbon);
     for (int k = 0; k < tools; k++) {
         RibbonPath path = path_of(count, position + k * count, 1, &stretch[k]);
-        assert_true(ribbon_add(&ribbon, c_arm, s->side, &path, position + k * count, filling));
+        float *full = malloc((size_t)count * sizeof *full);
+        for (int i = 0; i < count; i++)
+            full[i] = 1;
+        assert_true(ribbon_add(&ribbon, c_arm, s->side, &path, position + k * count, full, filling));
+        free(full);
         ribbon_path_free(&path);
     }
     ribbon_end(&ribbon, s->side);
@@ -402,7 +406,7 @@ static void marker_bands_are_as_long_as_they_are(void **state)
             Ribbon ribbon = {0};
             assert_true(layer_fit(&layer, s->side, LAYER_R32F));
             ribbon_begin(&ribbon);
-            assert_true(ribbon_add(&ribbon, &c_arm, s->side, &path, position, 0));
+            assert_true(ribbon_add(&ribbon, &c_arm, s->side, &path, position, NULL, 0));
             ribbon_end(&ribbon, s->side);
             LayerTone tone = {.quanta = 0};
             layer_begin(&layer);
