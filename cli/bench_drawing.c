@@ -113,7 +113,8 @@ static void draw(Studio *studio, const Case *what, int frame)
     if (what->camera_turns)
         free_camera_orbit(&studio->desk.look.camera, 3, 0);
     PanelLayout layout = panel_layout(what->width, what->height, 1, what->view, true);
-    ViewsFrame views = {.pose = pose, .xray = &xray, .contrast = what->flows && lesson->node_count ? lesson->concentration : NULL, .pulse = ++studio->pulse,
+    ViewsFrame views = {.pose = pose, .xray = &xray, .contrast = what->flows && lesson->node_count ? lesson->concentration : NULL,
+                        .filling = what->flows ? lesson->concentration + lesson->node_count : NULL, .pulse = ++studio->pulse,
                         .look = &studio->desk.look};
     WindowInput input = {.width = what->width, .height = what->height, .scale = 1, .mouse_x = -1, .mouse_y = -1, .has_focus = true};
     for (int i = 0; what->only && i < VIEW_COUNT; i++)

@@ -140,7 +140,7 @@ static void film_draw(Film *film, double time_s)
     PanelLayout layout = panel_layout(options->width, options->height, 1, options->view, options->has_panels);
     if (jumped)
         fluoroscope_forget(views_fluoroscope(film->views));
-    ViewsFrame frame = {.pose = pose, .xray = &pose->xray, .contrast = playback_contrast(film->playback),
+    ViewsFrame frame = {.pose = pose, .xray = &pose->xray, .contrast = playback_contrast(film->playback), .filling = playback_filling(film->playback),
                         .pulse = (uint32_t)playback_pulses(film->playback)->count, .look = &film->desk.look,
                         .is_still = true};
     views_draw(film->views, &frame, &layout, options->width, options->height, film->canvas.framebuffer);
@@ -150,6 +150,7 @@ static void film_draw(Film *film, double time_s)
         trainer_panel_show(&film->shown, film->scene, pose, score_now(film), NULL, &pose->xray);
         film->shown.state.now_s = pose->time_s;
         trainer_panel_views(&film->shown, &film->desk, film->views, &pose->xray);
+        trainer_panel_injection(&film->shown, film->scene, playback_contrast_tool(film->playback), playback_flow_ml_s(film->playback), &pose->xray);
         film->shown.state.step_median_us = film->shown.state.step_p999_us = film->shown.state.real_time_factor = NAN;
         panel_draw(film->panel, &input, &film->shown.state, film->canvas.framebuffer);
     }
@@ -169,7 +170,8 @@ static void take_earlier_pulses(Film *film, double time_s)
         playback_seek(film->playback, t);
         const PulseClock *pulses = playback_pulses(film->playback);
         const Pose *pose = playback_pose(film->playback);
-        FluoroscopeFrame frame = {.pose = pose, .xray = pose->xray, .contrast = playback_contrast(film->playback), .pulse = (uint32_t)pulses->count};
+        FluoroscopeFrame frame = {.pose = pose, .xray = pose->xray, .contrast = playback_contrast(film->playback),
+                                  .filling = playback_filling(film->playback), .pulse = (uint32_t)pulses->count};
         if (pulses->count != drawn)
             fluoroscope_draw(views_fluoroscope(film->views), &frame, (ViewPort){film->canvas.framebuffer, 0, 0, film->options->height, film->options->height});
         drawn = pulses->count;

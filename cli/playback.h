@@ -4,13 +4,13 @@
 #define SELDINGER_CLI_PLAYBACK_H
 
 #include "render/pulse_clock.h"
-#include "sim/contrast.h"
+#include "sim/contrast_injection.h"
 #include "sim/pose.h"
 
 typedef struct Playback Playback;
 
-// All borrowed; `tree` NULL: no contrast. A recording that nobody looked at (`run --record`) is shown with `unseen` as the controls of all its steps. NULL where
-// memory lacks or there is no frame.
+// All borrowed; `tree` NULL: contrast in the tools' lumens only. A recording that nobody looked at (`run --record`) is shown with `unseen` as the
+// controls of all its steps, but for what its script injected. NULL where memory lacks or there is no frame.
 Playback *playback_open(const RecordedRun *run, const Scene *scene, const VesselTree *tree, const XrayControl *unseen);
 void playback_close(Playback *playback);
 
@@ -21,7 +21,10 @@ double playback_end_s(const Playback *playback);
 // Of the moment sought: the last frame before it with the step's own controls and forces.
 const Pose *playback_pose(const Playback *playback);
 const float *playback_contrast(const Playback *playback);        // (N of the tree); NULL without tree
+const float *playback_filling(const Playback *playback);         // (nodes of all tools) of their lumens
 double playback_injected_ml(const Playback *playback);
+int playback_contrast_tool(const Playback *playback);            // through whose lumen contrast agent is asked for, -1: nobody's
+double playback_flow_ml_s(const Playback *playback);             // what flows of it
 const PulseClock *playback_pulses(const Playback *playback);
 // Times at which bookmarks were set; at most `capacity`, returns how many.
 int playback_bookmarks(const Playback *playback, double *time_s, int capacity);

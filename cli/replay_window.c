@@ -115,13 +115,14 @@ static const ScoreFigures *score_now(ReplayWindow *replay)
 static void draw(ReplayWindow *replay, const WindowInput *input, const PanelLayout *layout)
 {
     const Pose *pose = playback_pose(replay->playback);
-    ViewsFrame frame = {.pose = pose, .xray = &pose->xray, .contrast = playback_contrast(replay->playback),
+    ViewsFrame frame = {.pose = pose, .xray = &pose->xray, .contrast = playback_contrast(replay->playback), .filling = playback_filling(replay->playback),
                         .pulse = (uint32_t)playback_pulses(replay->playback)->count, .look = &replay->desk.look, .scope_tool = replay->desk.grip.chosen + 1};
     views_draw(replay->views, &frame, layout, input->width, input->height, 0);
     trainer_panel_show(&replay->shown, replay->scene, pose, score_now(replay), NULL, &pose->xray);
     PanelState *state = &replay->shown.state;
     state->now_s = clock_s(CLOCK_MONOTONIC) - replay->begun_s;
     trainer_panel_views(&replay->shown, &replay->desk, replay->views, &pose->xray);
+    trainer_panel_injection(&replay->shown, replay->scene, playback_contrast_tool(replay->playback), playback_flow_ml_s(replay->playback), &pose->xray);
     state->is_paused = !replay->line.is_playing;
     state->step_median_us = state->step_p999_us = state->real_time_factor = NAN;
     panel_draw(replay->panel, input, state, 0);

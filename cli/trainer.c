@@ -345,14 +345,15 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
     const LessonView *lesson = moment->extra;
     const Pose *pose = moment->pose;
     pulse_clock_advance(&trainer->pulses, pose->time_s, &pose->xray);
-    ViewsFrame frame = {.pose = pose, .xray = xray, .contrast = lesson->node_count > 0 ? lesson->concentration : NULL,
+    ViewsFrame frame = {.pose = pose, .xray = xray,
                         .pulse = (uint32_t)trainer->pulses.count, .look = &trainer->desk.look, .scope_tool = trainer->desk.grip.chosen + 1};
-    trainer_cine_frame(&trainer->cine, passed_s, &frame);
+    trainer_cine_frame(&trainer->cine, passed_s, lesson->concentration, &frame);
     views_draw(trainer->views, &frame, layout, input->width, input->height, 0);
     trainer_panel_show(&trainer->shown, trainer->scene, pose, &lesson->score, &moment->figures, xray);
     PanelState *state = &trainer->shown.state;
     trainer_panel_views(&trainer->shown, &trainer->desk, trainer->views, xray);
     trainer_panel_grip(&trainer->shown, &trainer->desk.grip);
+    trainer_panel_injection(&trainer->shown, trainer->scene, lesson->contrast_tool, lesson->flow_ml_s, xray);
     state->now_s = since_begin(trainer);
     state->is_recording_cine = cine_is_recording(trainer->cine.cine);
     state->cine_frames = cine_count(trainer->cine.cine);
@@ -473,8 +474,10 @@ static bool open_cine(Trainer *trainer, Faults *faults)
 {
     Stepper *stepper = simulator_stepper(trainer->session.simulator);
     CineShape shape = {.tool_count = stepper_tool_count(stepper), .contrast_count = trainer->open->tree ? trainer->open->tree->node_count : 0};
-    for (int k = 0; k < shape.tool_count; k++)
+    for (int k = 0; k < shape.tool_count; k++) {
         shape.tool_nodes[k] = stepper_tool_nodes(stepper, k, NULL);
+        shape.contrast_count += shape.tool_nodes[k];
+    }
     if (trainer_cine_open(&trainer->cine, &shape, trainer->options->cine, faults))
         return true;
     end_session(trainer, faults);

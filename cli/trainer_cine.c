@@ -12,7 +12,9 @@ enum { LOOP_IMAGES = 900, FILM_SIDE = 768 };
 
 bool trainer_cine_open(TrainerCine *cine, const CineShape *shape, const char *path, Faults *faults)
 {
-    *cine = (TrainerCine){0};
+    *cine = (TrainerCine){.tree_nodes = shape->contrast_count};
+    for (int k = 0; k < shape->tool_count; k++)
+        cine->tree_nodes -= shape->tool_nodes[k];
     if (!path) {
         cine->cine = cine_create(shape, LOOP_IMAGES);
         if (!cine->cine)
@@ -67,10 +69,17 @@ bool trainer_cine_obey(TrainerCine *cine, const PanelActions *actions, char *tol
     return true;
 }
 
-void trainer_cine_frame(TrainerCine *cine, double passed_s, ViewsFrame *frame)
+void trainer_cine_contrast(const TrainerCine *cine, const float *concentration, ViewsFrame *frame)
+{
+    frame->contrast = cine->tree_nodes > 0 ? concentration : NULL;
+    frame->filling = concentration ? concentration + cine->tree_nodes : NULL;
+}
+
+void trainer_cine_frame(TrainerCine *cine, double passed_s, const float *concentration, ViewsFrame *frame)
 {
     if (!cine->is_shown) {
-        CineFrame live = {.pose = frame->pose, .contrast = frame->contrast, .pulse = frame->pulse};
+        CineFrame live = {.pose = frame->pose, .contrast = concentration, .pulse = frame->pulse};
+        trainer_cine_contrast(cine, concentration, frame);
         if (frame->pose->xray.pedal > 0)
             cine_add(cine->cine, &live);
         return;
@@ -78,11 +87,12 @@ void trainer_cine_frame(TrainerCine *cine, double passed_s, ViewsFrame *frame)
     CineFrame image = cine_frame(cine->cine, cine_player_advance(&cine->player, cine->cine, passed_s));
     frame->pose = image.pose;
     frame->xray = &image.pose->xray;
-    frame->contrast = image.contrast;
+    trainer_cine_contrast(cine, image.contrast, frame);
     frame->pulse = image.pulse;
 }
 
 typedef struct Drawing {
+    const TrainerCine *cine;
     Views *views;
     GlCanvas canvas;
 } Drawing;
@@ -91,7 +101,9 @@ static bool draw_image(void *context, const CineFrame *image, uint8_t *rgb, char
 {
     (void)message, (void)capacity;
     Drawing *drawing = context;
-    FluoroscopeFrame frame = {.pose = image->pose, .xray = image->pose->xray, .contrast = image->contrast, .pulse = image->pulse};
+    ViewsFrame seen = {0};
+    trainer_cine_contrast(drawing->cine, image->contrast, &seen);
+    FluoroscopeFrame frame = {.pose = image->pose, .xray = image->pose->xray, .contrast = seen.contrast, .filling = seen.filling, .pulse = image->pulse};
     fluoroscope_draw(views_fluoroscope(drawing->views), &frame, (ViewPort){drawing->canvas.framebuffer, 0, 0, FILM_SIDE, FILM_SIDE});
     gl_canvas_read(&drawing->canvas, rgb);
     return true;
@@ -109,7 +121,7 @@ bool trainer_cine_save(TrainerCine *cine, Views *views, const char *stem, char *
     snprintf(path, sizeof path, "%.4000s.cine", stem);
     bool good = bytes && output_write(path, bytes, length, faults);
     free(bytes);
-    Drawing drawing = {.views = views};
+    Drawing drawing = {.cine = cine, .views = views};
     snprintf(path, sizeof path, "%.4000s.mp4", stem);
     bool film = good && gl_canvas_create(&drawing.canvas, FILM_SIDE, FILM_SIDE, 1, message, sizeof message);
     if (film) {

@@ -198,6 +198,20 @@ void trainer_panel_views(TrainerPanel *panel, const Desk *desk, Views *views, co
     state->is_roadmap_ready = xray->mode == XRAY_DSA ? fluoroscope.has_mask : fluoroscope.has_roadmap;
 }
 
+void trainer_panel_injection(TrainerPanel *panel, const Scene *scene, int tool, double flow_ml_s, const XrayControl *xray)
+{
+    const double well = 0.9;     // of what is asked for
+    double asked = (double)xray->contrast_ml_s;
+    if (!(asked > 0) || tool < 0 || flow_ml_s >= well * asked || panel->state.warning)
+        return;
+    const char *name = scene->tool[tool].name, *way = tool + 1 < scene->tool_count ? "; more once what lies in it is drawn back" : "";
+    if (flow_ml_s < 0.01 * asked)
+        snprintf(panel->warning, sizeof panel->warning, "Next to no contrast agent goes through %s: its lumen is full%s", name, way);
+    else
+        snprintf(panel->warning, sizeof panel->warning, "The injector's pressure brings %.2g of %.2g ml/s through the lumen of %s%s", flow_ml_s, asked, name, way);
+    panel->state.warning = panel->warning;
+}
+
 void trainer_panel_grip(TrainerPanel *panel, const HandGrip *grip)
 {
     PanelState *state = &panel->state;

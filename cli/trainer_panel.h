@@ -29,6 +29,8 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
                         const RealtimeFigures *figures, const XrayControl *xray);
 // What the desk and the views are set to; after they were drawn.
 void trainer_panel_views(TrainerPanel *panel, const Desk *desk, Views *views, const XrayControl *xray);
+// What flows of the contrast agent that is asked for, and through which tool (-1: none has a lumen); after trainer_panel_views.
+void trainer_panel_injection(TrainerPanel *panel, const Scene *scene, int tool, double flow_ml_s, const XrayControl *xray);
 // How the hands hold the tools now, in a session; after trainer_panel_show. Hands on locked tools feel their sum, so that is shown.
 void trainer_panel_grip(TrainerPanel *panel, const HandGrip *grip);
 

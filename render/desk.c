@@ -179,5 +179,6 @@ XrayControl desk_xray(const Desk *desk, const PanelActions *actions, unsigned ha
     XrayControl xray = desk->xray;
     xray.pedal = desk->pedal_latched || actions->held[ACTION_PEDAL] || (hand_buttons & HAND_PEDAL);
     xray.contrast_ml_s = actions->held[ACTION_CONTRAST] || (hand_buttons & HAND_CONTRAST) ? (float)desk->contrast_ml_s : 0;
+    xray.contrast_tool = (float)(desk->grip.chosen + 1);
     return xray;
 }

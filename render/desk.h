@@ -28,7 +28,7 @@ void desk_obey(Desk *desk, const VesselScene *scene, const PanelActions *actions
 // What the held keys ask of the chosen tool, and of its partner (0 where there is none): fast is 3 times, slow a fifth of the ordinary speed.
 Command desk_command(const Desk *desk, const PanelActions *actions);
 Command desk_partner_command(const Desk *desk, const PanelActions *actions);
-// The controls with what hands (HAND_ bits) and held keys add for now: pedal, contrast.
+// The controls with what hands (HAND_ bits) and held keys add for now: pedal, contrast through the chosen tool.
 XrayControl desk_xray(const Desk *desk, const PanelActions *actions, unsigned hand_buttons);
 
 #endif

@@ -2,15 +2,18 @@
 #ifndef SELDINGER_SIM_LESSON_H
 #define SELDINGER_SIM_LESSON_H
 
-#include "sim/contrast.h"
+#include "sim/contrast_injection.h"
 #include "sim/score.h"
 
 // What of it goes out with a moment; plain data of lesson_view_bytes().
 typedef struct LessonView {
     ScoreFigures score;
     double injected_ml;
+    double flow_ml_s;            // of contrast agent now, what is asked for or what the tool's lumen passes of it …
+    int contrast_tool;           // … through this tool; -1: none has a lumen
     int node_count;              // N of the tree, 0 without
-    float concentration[];       // (N) 0 to 1
+    int filling_count;           // M of all tools
+    float concentration[];       // (N + M) 0 to 1: contrast agent at the tree's nodes, then in the tools' lumens at theirs
 } LessonView;
 
 typedef struct Lesson Lesson;

@@ -187,6 +187,9 @@ static void pedal_and_contrast_come_from_latch_keys_and_hands(void **state)
     assert_true(desk_xray(&desk, &pedal, 0).pedal == 1 && desk_xray(&desk, &pedal, 0).contrast_ml_s == 0);
     assert_true(desk_xray(&desk, &none, HAND_PEDAL).pedal == 1);
     assert_true(desk_xray(&desk, &contrast, 0).contrast_ml_s == 3 && desk_xray(&desk, &contrast, 0).pedal == 0);
+    assert_true(desk_xray(&desk, &none, 0).contrast_tool == 1);   // through the chosen tool
+    desk.grip.chosen = 2;
+    assert_true(desk_xray(&desk, &contrast, 0).contrast_tool == 3);
     desk.contrast_ml_s = 15;
     assert_true(desk_xray(&desk, &none, HAND_CONTRAST | HAND_MARK).contrast_ml_s == 15);
     xray = desk_xray(&desk, &none, HAND_STOP | HAND_MARK);
