@@ -26,7 +26,7 @@ typedef struct SynthCommand {
 static const char help[] =
     "Usage: seldinger synth SHAPE [options] -o F\n"
     "       seldinger synth SHAPE [options] --measure MODEL.h5\n\n"
-    "Shapes: capsule, open-capsule, arc, bifurcation, spiral, phantom, helix, y, kissing, bone, twig, tree.\n"
+    "Shapes: capsule, open-capsule, arc, bifurcation, spiral, phantom, helix, y, kissing, bone, twig, tree, aorta.\n"
     "F.h5 is a tree of point sets, F.stl or F.ply the surface, F.nrrd a noisy volume; beside the last two stands the true centreline with exact\n"
     "surface points, F-truth.h5, and F-neighbour.h5 that of a kissing neighbour, which is no part of the truth.\n\n"
     "  -o, --output F       what to write, by its extension\n"

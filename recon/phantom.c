@@ -190,9 +190,9 @@ static bool build_twig(Shape *shape, const ShapeOptions *o)
            shape_add(shape, (const double (*)[4])branch, N, false, false, 0, NODE_VESSEL, NULL);
 }
 
-static const char *const names[] = {"capsule", "open-capsule", "arc", "bifurcation", "spiral", "phantom", "helix", "y", "kissing", "bone", "twig", "tree"};
+static const char *const names[] = {"capsule", "open-capsule", "arc", "bifurcation", "spiral", "phantom", "helix", "y", "kissing", "bone", "twig", "tree", "aorta"};
 
-const char *shape_names(void) { return "capsule, open-capsule, arc, bifurcation, spiral, phantom, helix, y, kissing, bone, twig, tree"; }
+const char *shape_names(void) { return "capsule, open-capsule, arc, bifurcation, spiral, phantom, helix, y, kissing, bone, twig, tree, aorta"; }
 
 static bool parse_options(int count, const char (*option)[2][64], const char *file, ShapeOptions *out, Faults *faults)
 {
@@ -252,7 +252,7 @@ static bool scale_shape(Shape *shape, double scale)
 
 Shape *shape_create(const char *name, int option_count, const char (*option)[2][64], const char *file, Faults *faults)
 {
-    enum { HELIX = 6, Y, KISSING, BONE, TWIG, TREE, SHAPES };
+    enum { HELIX = 6, Y, KISSING, BONE, TWIG, TREE, AORTA, SHAPES };
     ShapeOptions o = {.points = 108, .sac_points = 1500, .seed = 1, .spacing = 0.5, .length_mm = 4, .radius_mm = 1, .bend_radius_mm = 4, .scale = 1,
                       .turns = 2, .angle_deg = 37.5, .branches = 51, .twig_radius_mm = 0.2};
     int which = 0, before = faults->count;
@@ -293,6 +293,7 @@ Shape *shape_create(const char *name, int option_count, const char (*option)[2][
                  : which == KISSING ? build_kissing(shape, &o)
                  : which == BONE    ? build_bone(shape, &o)
                  : which == TWIG    ? build_twig(shape, &o)
+                 : which == AORTA   ? aorta_grow(shape)
                                     : build_tree(shape, &o, file, faults);
     built = built && scale_shape(shape, o.scale) && shape_finish(shape);
     if (built && shape->neighbour) {

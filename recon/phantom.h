@@ -1,4 +1,4 @@
-// Synthetic vessels with known truth: capsule, open-capsule, arc, bifurcation, spiral, phantom; helix, y, kissing, bone, twig, tree.
+// Synthetic vessels with known truth: capsule, open-capsule, arc, bifurcation, spiral, phantom; helix, y, kissing, bone, twig, tree, aorta.
 //
 // A shape is a set of parts: tubes (the union of spheres of smoothly varying radius along a smooth curve) and ellipsoids (sacs). Each
 // part's field is its signed distance, > 0 inside; parts that belong together are joined by a smooth maximum of width `blend_mm`, parts
@@ -62,7 +62,7 @@ double shape_field_cut(const Shape *shape, Vec3 x);
 // Signed distance to the true surface [mm], > 0 inside; `foot` (may be NULL) is the closest surface point. Near the medial axis the
 // local one that projection finds, never less than the field.
 double shape_distance(const Shape *shape, Vec3 x, Vec3 *foot);
-// Whether x lies beyond an open end (open-capsule, arc, bifurcation, spiral and phantom are open at the inlet; open-capsule at both
+// Whether x lies beyond an open end (open-capsule, arc, bifurcation, spiral, phantom and aorta are open at the inlet; open-capsule at both
 // ends): the surface there is no truth, the tube goes on.
 bool shape_beyond_open_end(const Shape *shape, Vec3 x);
 // Axis-aligned box around the surface.

@@ -75,6 +75,8 @@ double part_field(const Part *part, Vec3 x, double enough, bool cut, Vec3 *gradi
 
 // Appends a part; false where memory lacks.
 bool shape_add(Shape *shape, const double (*knot)[4], int count, bool open_start, bool open_end, int parent, uint8_t kind, const double (*end_slope)[4]);
+// The parts of the shape `aorta`.
+bool aorta_grow(Shape *shape);
 // After the last part: joints and octree. False where memory lacks.
 bool shape_finish(Shape *shape);
 // shape_field, and which part is the largest there and where on it.
