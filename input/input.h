@@ -66,7 +66,7 @@ Command *script_row_command(ScriptRow *row, int tool);
 // One row's rules, for whoever reads rows from elsewhere (a scene's inline script); `before` is the row before it or NULL, `tools` NULL where there is one.
 bool script_check_row(const ScriptRow *row, const ScriptRow *before, const ToolNames *tools, const char *file, int line, int column, Faults *faults);
 double script_duration_s(const Script *script);
-// Commands at simulated time t (zero before the first row and after the end). `cursor` remembers the row between calls, start with 0.
+// Commands at simulated time t (zero before the first row and after the end, but `fitted`, which stays as it was). `cursor` remembers the row between calls, start with 0.
 ToolCommands script_tools_at(const Script *script, double t_s, int *cursor);
 Command script_at(const Script *script, double t_s, int *cursor);      // the first tool's
 

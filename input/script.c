@@ -265,11 +265,15 @@ ToolCommands script_tools_at(const Script *script, double t_s, int *cursor)
     while (i + 1 < script->count && script->row[i + 1].t_s <= t_s)
         i++;
     *cursor = i;
-    // before the first row and from the last row's time on nothing moves
-    if (script->count < 2 || t_s < script->row[0].t_s || i == script->count - 1)
-        return (ToolCommands){0};
-    ToolCommands commands = {.tool = {script->row[i].command}, .released = script->row[i].released};
+    // before the first row and from the last row's time on nothing moves, but tools that were exchanged stay in
+    ToolCommands commands = {0};
+    if (script->count == 0 || t_s < script->row[0].t_s)
+        return commands;
     memcpy(commands.fitted, script->row[i].fitted, sizeof commands.fitted);
+    if (i == script->count - 1)
+        return commands;
+    commands.tool[0] = script->row[i].command;
+    commands.released = script->row[i].released;
     for (int k = 0; k < TOOLS_MOST; k++)
         if (script->row[i].contrast_ml_s[k] > 0) {
             commands.contrast_ml_s = script->row[i].contrast_ml_s[k];

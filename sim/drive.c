@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <pthread.h>
 #include <sched.h>
+#include <string.h>
 #include <time.h>
 
 static const double rest_speed_mm_s = 0.01;
@@ -72,6 +73,14 @@ static double last_ramp_s(const Scene *scene)
     return end;
 }
 
+// No input: nobody moves anything, but what was exchanged stays in.
+static ToolCommands settled(const ToolCommands *last)
+{
+    ToolCommands commands = {0};
+    memcpy(commands.fitted, last->fitted, sizeof commands.fitted);
+    return commands;
+}
+
 DriveOptions drive_default_options(void) { return (DriveOptions){.duration_s = -1}; }
 
 DriveReport simulator_drive(Simulator *simulator, const DriveOptions *options)
@@ -87,6 +96,7 @@ DriveReport simulator_drive(Simulator *simulator, const DriveOptions *options)
         options->live->real_time_priority = priority.raised;
     int64_t begin = wall_ns(), base = begin, step_ns = (int64_t)(scene->dt * 1e6 + 0.5);
     int cursor = 0;
+    ToolCommands commands = {0};
 
     for (int64_t i = 0; i < driven + settling; i++) {
         if (options->stop && *options->stop) {
@@ -100,11 +110,12 @@ DriveReport simulator_drive(Simulator *simulator, const DriveOptions *options)
         if (options->paced && options->late_ns)
             histogram_add(options->late_ns, wall_ns() - (base + i * step_ns));
         bool scripted = options->script && i < driven;
-        ToolCommands commands = {0};
         if (scripted)
             commands = script_tools_at(options->script, (double)i * scene->dt / 1000, &cursor);
         else if (options->hand && i < driven)
             commands = options->hand(options->hand_context);
+        else
+            commands = settled(&commands);
         simulator_step_tools(simulator, &commands);
         at_rest_s = simulator_fastest_mm_s(simulator) <= rest_speed_mm_s ? at_rest_s + step_s : 0;
         bool goes_on = !options->after_step || options->after_step(options->context, simulator, &commands);

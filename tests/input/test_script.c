@@ -139,6 +139,15 @@ static void a_hand_lets_go(void **state)
     assert_true(commands.released == 4 && commands.tool[0].push_mm_s == 2 && commands.tool[2].push_mm_s == 0);
     assert_int_equal(script_tools_at(script, 1.5, &cursor).released, 1);
     script_free(script);
+    // what was exchanged stays in when the script is over
+    static const char exchange[] = "t_s,wire.push_mm_s,wire.twist_deg_s,wire.exchange\n0.5,5,0,0\n1,5,0,2\n2,5,0,1\n";
+    script = script_parse_tools(exchange, strlen(exchange), "s.csv", &tools, &faults);
+    assert_non_null(script);
+    assert_int_equal(script_tools_at(script, 0.2, &cursor).fitted[2], 0);
+    assert_int_equal(script_tools_at(script, 1.5, &cursor).fitted[2], 2);
+    commands = script_tools_at(script, 3, &cursor);
+    assert_true(commands.fitted[2] == 1 && commands.fitted[0] == 0 && commands.tool[2].push_mm_s == 0);
+    script_free(script);
     expect_fault("t_s,push_mm_s,twist_deg_s,released\n0,1,0,0.5\n1,0,0,0\n", "2:1", "released is 0.5; 0 where a hand holds the tool");
     expect_fault("t_s,push_mm_s,twist_deg_s,released\n0,1,0,-1\n1,0,0,0\n", "2:1", "released is -1");
     expect_fault("t_s,push_mm_s,released,twist_deg_s\n0,1,0,0\n1,0,0,0\n", "1:15", "twist_deg_s");
