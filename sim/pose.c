@@ -16,7 +16,7 @@ Pose *pose_create_tools(int node_capacity, int tool_count, const int *tool_nodes
                    .node = calloc((size_t)node_capacity, sizeof *pose->node)};
     bool good = pose->position && pose->quaternion && pose->node;
     for (int k = 0; k < tool_count; k++) {
-        pose->tool[k].node_count = tool_nodes[k];
+        pose->tool[k].node_capacity = pose->tool[k].node_count = tool_nodes[k];
         pose->tool[k].node = calloc((size_t)tool_nodes[k], sizeof *pose->tool[k].node);
         good = good && pose->tool[k].node;
     }
@@ -33,7 +33,7 @@ Pose *pose_create_for(Simulator *simulator)
     const Stepper *stepper = simulator_stepper(simulator);
     int nodes[STEP_TOOLS_MAX], count = stepper_tool_count(stepper);
     for (int k = 0; k < count; k++)
-        nodes[k] = stepper_tool_nodes(stepper, k, NULL);
+        nodes[k] = scene_most_nodes(simulator_scene(simulator), k);
     return pose_create_tools(stepper_node_capacity(stepper), count, nodes);
 }
 
@@ -106,10 +106,13 @@ void pose_take(Pose *pose, Simulator *simulator, const ToolCommands *commands, c
         tool->inserted_mm = stepper_tool_inserted(stepper, k);
         tool->turned_deg = stepper_tool_turned(stepper, k) * 180 / PI;
         tool->is_let_go = commands->released >> k & 1;
+        tool->fitted = stepper_fitted(stepper, k);
         tool->push_n = pose->report.push[k];
         tool->torque_n_mm = pose->report.torque[k];
-        stepper_tool_nodes(stepper, k, tool->node);
+        tool->node_count = stepper_tool_nodes(stepper, k, tool->node);
     }
+    pose->refused_exchanges = simulator_totals(simulator)->refused_exchanges;
+    pose->refusal = simulator_totals(simulator)->refusal;
     find_first_free(pose, simulator_scene(simulator)->wire.has_sheath, pose->tool[0].node[pose->tool[0].node_count - 1].s);
 }
 
@@ -192,12 +195,13 @@ void pose_figures_from_run(Pose *pose, const RecordedRun *run, int64_t step)
     }
 }
 
-static void own_nodes_from_run(PoseTool *tool, const RecordedTool *recorded, int64_t frame)
+static void own_nodes_from_run(PoseTool *tool, const RecordedRun *run, int index, int64_t frame)
 {
-    size_t first = (size_t)frame * (size_t)recorded->node_count;
+    RecordedToolFrame at = recorded_run_tool_frame(run, index, frame);
+    tool->fitted = recorded_run_fitted(run, index, run->frame_step[frame]);
+    tool->node_count = at.node_count;
     for (int j = 0; j < tool->node_count; j++)
-        tool->node[j] = (ToolNode){.s = recorded->s[j], .radius = recorded->radius[j], .position = recorded->position[first + (size_t)j],
-                                   .orientation = recorded->quaternion[first + (size_t)j], .carrier = recorded->carrier[first + (size_t)j]};
+        tool->node[j] = (ToolNode){.s = at.s[j], .radius = at.radius[j], .position = at.position[j], .orientation = at.quaternion[j], .carrier = at.carrier[j]};
 }
 
 void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64_t frame)
@@ -219,10 +223,10 @@ void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64
         pose->tool[k].inserted_mm = run->tool[k].inserted[row];
         pose->tool[k].turned_deg = run->tool[k].turned[row];
         if (pose->tool_count > 1)
-            own_nodes_from_run(&pose->tool[k], &run->tool[k], frame);
+            own_nodes_from_run(&pose->tool[k], run, k, frame);
     }
-    const RecordedTool *first = &run->tool[0];
-    find_first_free(pose, scene->wire.has_sheath, pose->tool_count > 1 ? first->s[first->node_count - 1] : at.s[at.node_count - 1]);
+    const PoseTool *first = &pose->tool[0];
+    find_first_free(pose, scene->wire.has_sheath, pose->tool_count > 1 ? first->node[first->node_count - 1].s : at.s[at.node_count - 1]);
     if (pose->tool_count == 1)
         pose_fill_single_tool(pose);
 }

@@ -12,7 +12,9 @@ typedef struct PoseTool {
     double turned_deg;       // by its hand, since the start
     double push_n, torque_n_mm;      // that its hand feels
     bool is_let_go;          // no hand holds it
-    int node_count;          // does not change during a run
+    int fitted;              // which of its devices is in: 0 the scene's, 1, 2, … those under its `exchange:`
+    int node_capacity;       // at most, does not change during a run
+    int node_count;          // of the device that is in
     ToolNode *node;          // (node_count)
 } PoseTool;
 
@@ -25,6 +27,8 @@ typedef struct Pose {
     StepReport report;       // of the last step
     int tool_count;          // outermost first
     PoseTool tool[STEP_TOOLS_MAX];
+    int64_t refused_exchanges;       // so far …
+    StepExchange refusal;            // … and why the last one was; EXCHANGE_DONE: none
     // the shared centreline, which the wall touches
     int node_capacity;       // M at most
     int node_count;          // M, proximal to distal; with several tools nodes come and go
@@ -35,7 +39,7 @@ typedef struct Pose {
 } Pose;
 
 Pose *pose_create(int node_count);   // for one tool with so many nodes; NULL where memory lacks
-// For `tool_nodes[k]` nodes of each tool.
+// For at most `tool_nodes[k]` nodes of each tool, so many at first.
 Pose *pose_create_tools(int node_capacity, int tool_count, const int *tool_nodes);
 Pose *pose_create_for(Simulator *simulator);
 void pose_free(Pose *pose);
@@ -50,7 +54,7 @@ double pose_tool_end(const Pose *pose, int tool);
 double pose_tool_passes(const Pose *pose, int tool, int other);
 int pose_most_distal(const Pose *pose);      // the tool that reaches furthest
 Pose *pose_create_for_run(const RecordedRun *run);
-// Frame `frame` of a recording of `scene`; what it does not hold (contacts, iterations) is 0.
+// Frame `frame` of a recording of `scene`; what it does not hold (contacts, iterations, refusals) is 0.
 void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64_t frame);
 // Time, commands, X-ray controls and forces of another step; nodes stay.
 void pose_figures_from_run(Pose *pose, const RecordedRun *run, int64_t step);

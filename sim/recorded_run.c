@@ -223,25 +223,59 @@ static int64_t read_tool_series(const Reader *reader, const char *group, Recorde
     return knows_release ? least(count, released[0]) : count;
 }
 
-// What a tool has in every frame.
-static int64_t read_tool_frames(const Reader *reader, const char *group, RecordedTool *tool)
+// Which device was asked for and which was in, in every step, where there were tools to exchange.
+static int64_t read_exchanges(const Reader *reader, RecordedRun *run)
 {
-    hsize_t s[1] = {0}, radius[1] = {0}, position[3] = {0, 0, 3}, quaternion[3] = {0, 0, 4}, carrier[2] = {0, 0};
+    hsize_t size[3] = {0, (hsize_t)run->tool_count, 2};
+    run->exchange = read_dataset(reader, "/exchange", H5T_NATIVE_UINT8, 3, size);
+    for (hsize_t i = 0; run->exchange && i < 2 * size[0] * size[1]; i++)
+        if (run->exchange[i] > EXCHANGES_MOST) {
+            faults_add(reader->faults, reader->path, 0, 0, "/exchange names device %d in step %llu; 0 to %d", run->exchange[i], (unsigned long long)(i / size[1] / 2),
+                       EXCHANGES_MOST);
+            break;
+        }
+    return (int64_t)size[0];
+}
+
+// How many nodes each device has: the profile holds no number beyond them.
+static void count_device_nodes(const Reader *reader, const char *group, RecordedTool *tool)
+{
+    for (int i = 0; i < tool->device_count; i++) {
+        const double *s = tool->s + (size_t)i * (size_t)tool->node_count;
+        int *count = &tool->device_nodes[i];
+        while (*count < tool->node_count && !isnan(s[*count]))
+            ++*count;
+        if (*count < 2)
+            faults_add(reader->faults, reader->path, 0, 0, "%s/s_mm holds %d nodes of device %d; at least 2", group, *count, i);
+    }
+}
+
+// What a tool has in every frame, and its devices' profiles: of one that is not to be exchanged one, as a plain list.
+static int64_t read_tool_frames(const Reader *reader, const char *group, bool is_exchanged, RecordedTool *tool)
+{
+    int rank = is_exchanged ? 2 : 1;
+    hsize_t s[2] = {0, 0}, radius[2] = {0, 0}, position[3] = {0, 0, 3}, quaternion[3] = {0, 0, 4}, carrier[2] = {0, 0};
     char name[5][40];
     static const char *const what[] = {"s_mm", "radius_mm", "position", "quaternion", "carrier"};
     for (int i = 0; i < 5; i++)
         snprintf(name[i], sizeof name[i], "%s/%s", group, what[i]);
-    tool->s = read_dataset(reader, name[0], H5T_NATIVE_DOUBLE, 1, s);
-    tool->radius = read_dataset(reader, name[1], H5T_NATIVE_DOUBLE, 1, radius);
-    position[1] = quaternion[1] = carrier[1] = s[0];
+    tool->s = read_dataset(reader, name[0], H5T_NATIVE_DOUBLE, rank, s);
+    tool->radius = read_dataset(reader, name[1], H5T_NATIVE_DOUBLE, rank, radius);
+    hsize_t nodes = s[rank - 1], devices = is_exchanged ? s[0] : 1;
+    position[1] = quaternion[1] = carrier[1] = nodes;
     tool->position = read_dataset(reader, name[2], H5T_NATIVE_DOUBLE, 3, position);
     tool->quaternion = read_dataset(reader, name[3], H5T_NATIVE_DOUBLE, 3, quaternion);
     tool->carrier = read_dataset(reader, name[4], H5T_NATIVE_INT8, 2, carrier);
-    if (s[0] < 2 || s[0] > 100000 || radius[0] != s[0])
-        faults_add(reader->faults, reader->path, 0, 0, "%s holds %llu nodes and %llu radii; 2 to 100000 of each", group, (unsigned long long)s[0],
-                   (unsigned long long)radius[0]);
-    else
-        tool->node_count = (int)s[0];
+    if (nodes < 2 || nodes > 100000 || radius[rank - 1] != nodes || radius[0] != s[0]) {
+        faults_add(reader->faults, reader->path, 0, 0, "%s holds %llu nodes and %llu radii; 2 to 100000 of each", group, (unsigned long long)nodes,
+                   (unsigned long long)radius[rank - 1]);
+    } else if (devices < 1 || devices > 1 + EXCHANGES_MOST) {
+        faults_add(reader->faults, reader->path, 0, 0, "%s/s_mm has %llu devices; 1 to %d", group, (unsigned long long)devices, 1 + EXCHANGES_MOST);
+    } else if (tool->s) {
+        tool->node_count = (int)nodes;
+        tool->device_count = (int)devices;
+        count_device_nodes(reader, group, tool);
+    }
     return least(least((int64_t)position[0], quaternion[0]), carrier[0]);
 }
 
@@ -289,6 +323,8 @@ static int64_t read_series(const Reader *reader, RecordedRun *run)
         if (k > 0)
             count = smaller(count, read_tool_series(reader, group, &run->tool[k]));
     }
+    if (several && has(reader, "/exchange"))
+        count = smaller(count, read_exchanges(reader, run));
     return run->xray ? least(count, watched) : count;
 }
 
@@ -302,7 +338,7 @@ static int64_t read_tools_frames(const Reader *reader, hsize_t nodes, RecordedRu
     for (int k = 0; k < run->tool_count; k++) {
         char group[GROUP_NAME];
         tool_group(k, group);
-        frames = smaller(frames, read_tool_frames(reader, group, &run->tool[k]));
+        frames = smaller(frames, read_tool_frames(reader, group, run->exchange != NULL, &run->tool[k]));
     }
     return frames;
 }
@@ -330,6 +366,13 @@ static void check_frames(const Reader *reader, const RecordedRun *run)
             return;
         }
     }
+    for (int k = 0; run->exchange && k < run->tool_count; k++)
+        for (int64_t i = 0; i < run->frame_count; i++)
+            if (recorded_run_fitted(run, k, run->frame_step[i]) >= run->tool[k].device_count) {
+                faults_add(reader->faults, reader->path, 0, 0, "/exchange has device %d of tool %d in step %lld; the file holds %d of them",
+                           recorded_run_fitted(run, k, run->frame_step[i]), k, (long long)run->frame_step[i], run->tool[k].device_count);
+                return;
+            }
     for (int k = 0; run->frame_nodes && k < run->tool_count; k++)
         for (int64_t i = 0; i < run->frame_count * run->tool[k].node_count; i++)
             if (run->tool[k].carrier[i] < -1 || run->tool[k].carrier[i] >= run->tool_count) {
@@ -463,6 +506,7 @@ void recorded_run_free(RecordedRun *run)
         free(tool->s);
         free(tool->radius);
     }
+    free(run->exchange);
     free(run->time_s);
     free(run->state_hash);
     free(run->frame_step);
@@ -499,6 +543,7 @@ ToolCommands recorded_run_commands(const RecordedRun *run, int64_t step)
         const RecordedTool *tool = &run->tool[k];
         commands.tool[k] = (Command){tool->command[2 * step], tool->command[2 * step + 1]};
         commands.released |= tool->released && tool->released[step] ? 1u << k : 0;
+        commands.fitted[k] = run->exchange ? run->exchange[2 * (step * run->tool_count + k)] : 0;
     }
     if (run->xray && run->xray[step].contrast_ml_s > 0 && run->xray[step].contrast_tool > 0) {
         commands.contrast_ml_s = (double)run->xray[step].contrast_ml_s;
@@ -518,4 +563,18 @@ RecordedFrame recorded_run_frame(const RecordedRun *run, int64_t frame)
         at.radius += first;
     }
     return at;
+}
+
+int recorded_run_fitted(const RecordedRun *run, int tool, int64_t step)
+{
+    return run->exchange ? run->exchange[2 * (step * run->tool_count + tool) + 1] : 0;
+}
+
+RecordedToolFrame recorded_run_tool_frame(const RecordedRun *run, int tool, int64_t frame)
+{
+    const RecordedTool *t = &run->tool[tool];
+    int device = recorded_run_fitted(run, tool, run->frame_step[frame]);
+    size_t profile = (size_t)device * (size_t)t->node_count, first = (size_t)frame * (size_t)t->node_count;
+    return (RecordedToolFrame){.node_count = t->device_nodes[device], .s = t->s + profile, .radius = t->radius + profile, .position = t->position + first,
+                               .quaternion = t->quaternion + first, .carrier = t->carrier + first};
 }

@@ -32,11 +32,12 @@ typedef struct Column {
 // What each tool has in every step comes first: the first tool's stands at the root, that of the others behind all else.
 enum { COMMAND, PROXIMAL, INSERTED, RELEASED, TOOL_STEP_COLUMNS };
 enum { TIME = TOOL_STEP_COLUMNS, HASH, PENETRATION, CONTACTS, ITERATIONS, RESIDUAL, LINEARISATIONS, WALL_FORCE, FLAGS, XRAY, STEP_COLUMNS };
+// Behind those of all tools where any may be exchanged: the last that fits the page beside those of four.
 static const char *const tool_step_name[TOOL_STEP_COLUMNS] = {"command", "proximal", "inserted_mm", "released"};
 // Of a frame; from COUNT on of several tools only, then for each of them …
 enum { FRAME_STEP, POSITION, QUATERNION, FORCE, GAP, VESSEL_NODE, ONE_TOOL_COLUMNS, COUNT = ONE_TOOL_COLUMNS, ARC, RADIUS, FRAME_COLUMNS };
 enum { OWN_POSITION, OWN_QUATERNION, OWN_CARRIER, TOOL_FRAME_COLUMNS };      // … these
-enum { MOST_STEP_COLUMNS = STEP_COLUMNS + (STEP_TOOLS_MAX - 1) * TOOL_STEP_COLUMNS, MOST_FRAME_COLUMNS = FRAME_COLUMNS + STEP_TOOLS_MAX * TOOL_FRAME_COLUMNS };
+enum { MOST_STEP_COLUMNS = STEP_COLUMNS + (STEP_TOOLS_MAX - 1) * TOOL_STEP_COLUMNS + 1, MOST_FRAME_COLUMNS = FRAME_COLUMNS + STEP_TOOLS_MAX * TOOL_FRAME_COLUMNS };
 
 static int step_column_of(int tool, int which) { return tool == 0 ? which : STEP_COLUMNS + (tool - 1) * TOOL_STEP_COLUMNS + which; }
 static int frame_column_of(int tool, int which) { return FRAME_COLUMNS + tool * TOOL_FRAME_COLUMNS + which; }
@@ -52,7 +53,8 @@ typedef struct Ring {
 struct Recording {
     char *path, *part;
     RecordingOptions options;
-    int tool_count, tool_nodes[STEP_TOOLS_MAX];
+    int tool_count, tool_nodes[STEP_TOOLS_MAX];      // at most, whichever device is in
+    bool has_exchanges;
     int node_count;          // at most
     NodeReport *node;        // (M) scratch of the simulation thread
     ToolNode *own;           // of a tool's nodes, the same
@@ -98,6 +100,11 @@ static void describe_tool_steps(Column *step, const char *group)
     step[RELEASED] = column_of(group, tool_step_name[RELEASED], H5T_NATIVE_UINT8, 0, 1, 1);
 }
 
+static bool has_several(const Recording *recording) { return recording->tool_count > 1; }
+static int exchange_column(const Recording *recording) { return step_column_of(recording->tool_count, 0); }
+static int step_columns(const Recording *recording) { return exchange_column(recording) + recording->has_exchanges; }
+static int frame_columns(const Recording *recording) { return has_several(recording) ? frame_column_of(recording->tool_count, 0) : ONE_TOOL_COLUMNS; }
+
 static void describe_columns(Recording *recording)
 {
     hsize_t nodes = (hsize_t)recording->node_count;
@@ -132,11 +139,9 @@ static void describe_columns(Recording *recording)
         frame[frame_column_of(k, OWN_QUATERNION)] = column_of(group, "quaternion", H5T_NATIVE_DOUBLE, 2, own, 4);
         frame[frame_column_of(k, OWN_CARRIER)] = column_of(group, "carrier", H5T_NATIVE_INT8, 1, own, 1);
     }
+    if (recording->has_exchanges)
+        step[exchange_column(recording)] = column_of("", "exchange", H5T_NATIVE_UINT8, 2, (hsize_t)recording->tool_count, 2);
 }
-
-static bool has_several(const Recording *recording) { return recording->tool_count > 1; }
-static int step_columns(const Recording *recording) { return step_column_of(recording->tool_count, 0); }
-static int frame_columns(const Recording *recording) { return has_several(recording) ? frame_column_of(recording->tool_count, 0) : ONE_TOOL_COLUMNS; }
 
 static bool make_ring(Ring *ring, int length, int column_count, Column *column, hsize_t chunk_rows)
 {
@@ -192,30 +197,50 @@ static bool write_number(hid_t place, const char *attribute, double value)
     return good;
 }
 
-// Arc lengths and radii of a tool's nodes.
-static bool write_profile(hid_t file, const char *group, int count, const ToolNode *node)
+// Arc lengths and radii of a tool's nodes, (count) or of its devices (devices, count).
+static bool write_profile(hid_t file, const char *group, int devices, int count, const double *profile[2])
 {
-    hsize_t nodes = (hsize_t)count;
-    hid_t space = H5Screate_simple(1, &nodes, NULL);
-    double *value = calloc((size_t)count, sizeof *value);
-    bool good = value != NULL;
+    const hsize_t size[2] = {(hsize_t)devices, (hsize_t)count};
+    hid_t space = devices > 0 ? H5Screate_simple(2, size, NULL) : H5Screate_simple(1, size + 1, NULL);
+    bool good = true;
     for (int which = 0; good && which < 2; which++) {
         char name[40];
         snprintf(name, sizeof name, "%s/%s", group, which ? "radius_mm" : "s_mm");
         hid_t set = H5Dcreate2(file, name, H5T_NATIVE_DOUBLE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-        for (int i = 0; i < count; i++)
-            value[i] = which ? node[i].radius : node[i].s;
-        good = set >= 0 && H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, value) >= 0;
+        good = set >= 0 && H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, profile[which]) >= 0;
         if (set >= 0)
             H5Dclose(set);
     }
-    free(value);
     H5Sclose(space);
     return good;
 }
 
+// Of the device that is in, and of those that may be: each a row, filled up with what is no number.
+static bool write_profiles(const Recording *recording, const Scene *scene, int tool, const char *group)
+{
+    int devices = recording->has_exchanges ? scene_device_count(scene, tool) : 0, rows = devices > 0 ? devices : 1, count = recording->tool_nodes[tool];
+    size_t values = (size_t)rows * (size_t)count;
+    double *s = malloc(2 * values * sizeof *s);
+    bool good = s != NULL;
+    for (size_t i = 0; s && i < 2 * values; i++)
+        s[i] = NAN;
+    for (int i = 0; good && i < rows; i++) {
+        char why[256];
+        Wire wire;
+        const WireOptions options = scene_device_wire(scene, tool, i);
+        if (!(good = wire_create(&wire, &options, why, (int)sizeof why)))
+            break;
+        memcpy(s + i * count, wire.s, (size_t)wire.node_count * sizeof *s);
+        memcpy(s + values + i * count, wire.radius, (size_t)wire.node_count * sizeof *s);
+        wire_destroy(&wire);
+    }
+    good = good && write_profile(recording->file, group, devices, count, (const double *[]){s, s + values});
+    free(s);
+    return good;
+}
+
 // What does not change during the run.
-static bool write_tools(Recording *recording, const Scene *scene, const Stepper *stepper)
+static bool write_tools(Recording *recording, const Scene *scene)
 {
     bool good = true;
     for (int k = 0; good && k < recording->tool_count; k++) {
@@ -227,8 +252,7 @@ static bool write_tools(Recording *recording, const Scene *scene, const Stepper 
             if (place >= 0)
                 H5Gclose(place);
         }
-        stepper_tool_nodes(stepper, k, recording->own);
-        good = good && write_profile(recording->file, group, recording->tool_nodes[k], recording->own);
+        good = good && write_profiles(recording, scene, k, group);
     }
     return good;
 }
@@ -274,6 +298,9 @@ static bool write_scene(Recording *recording, const Scene *scene)
     for (int k = 0; k < scene->tool_count; k++)
         if (scene->tool[k].device_path)
             file[count++] = scene->tool[k].device_path;
+    for (int i = 0; i < scene->exchange_count; i++)
+        if (scene->exchange[i].device.device_path)
+            file[count++] = scene->exchange[i].device.device_path;
     for (int i = 0; i < recording->options.file_count && count < MOST_FILES; i++)
         file[count++] = recording->options.file[i];
     char *paths = NULL, *sums = NULL, *path = whole_path(scene->path);
@@ -368,7 +395,7 @@ static bool create_groups(const Recording *recording)
     return good;
 }
 
-static bool build_file(Recording *recording, const Scene *scene, const Stepper *stepper)
+static bool build_file(Recording *recording, const Scene *scene)
 {
     if (!open_part(recording))
         return false;
@@ -376,7 +403,7 @@ static bool build_file(Recording *recording, const Scene *scene, const Stepper *
     bool good = write_text(file, "format", NULL, "seldinger-recording") && write_number(file, "version", 1) &&
                 write_text(file, "created_by", NULL, "seldinger " SELDINGER_VERSION) && write_number(file, "step_ms", scene->dt) &&
                 write_number(file, "frame_ms", recording->options.frame_ms);
-    return good && create_groups(recording) && create_datasets(recording) && write_tools(recording, scene, stepper) && write_scene(recording, scene);
+    return good && create_groups(recording) && create_datasets(recording) && write_tools(recording, scene) && write_scene(recording, scene);
 }
 
 // --- the writer's thread ---
@@ -499,7 +526,9 @@ static void put_tool_frame(Recording *recording, const Stepper *stepper, int too
     Vec3 *position = slot_of(ring, frame_column_of(tool, OWN_POSITION));
     Quat *quaternion = slot_of(ring, frame_column_of(tool, OWN_QUATERNION));
     int8_t *carrier = slot_of(ring, frame_column_of(tool, OWN_CARRIER));
-    stepper_tool_nodes(stepper, tool, recording->own);
+    static const ToolNode unused = {.position = {NAN, NAN, NAN}, .orientation = {NAN, NAN, NAN, NAN}, .carrier = -1};
+    for (int j = stepper_tool_nodes(stepper, tool, recording->own); j < recording->tool_nodes[tool]; j++)
+        recording->own[j] = unused;
     for (int j = 0; j < recording->tool_nodes[tool]; j++) {
         position[j] = recording->own[j].position;
         quaternion[j] = recording->own[j].orientation;
@@ -557,6 +586,15 @@ static bool push_frame(Recording *recording, Simulator *simulator)
     return true;
 }
 
+static void put_exchange(Recording *recording, const Stepper *stepper, const ToolCommands *commands)
+{
+    uint8_t *row = slot_of(&recording->steps, exchange_column(recording));
+    for (int k = 0; k < recording->tool_count; k++) {
+        row[2 * k] = (uint8_t)commands->fitted[k];
+        row[2 * k + 1] = (uint8_t)stepper_fitted(stepper, k);
+    }
+}
+
 bool recording_step(Recording *recording, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray)
 {
     if (!wait_for_room(recording, &recording->steps))
@@ -575,6 +613,8 @@ bool recording_step(Recording *recording, Simulator *simulator, const ToolComman
         put(ring, step_column_of(k, INSERTED), &inserted);
         put(ring, step_column_of(k, RELEASED), &released);
     }
+    if (recording->has_exchanges)
+        put_exchange(recording, simulator_stepper(simulator), commands);
     put(ring, TIME, &time);
     put(ring, HASH, &hash);
     put(ring, PENETRATION, &report->penetration);
@@ -653,8 +693,9 @@ Recording *recording_create(const char *path, Simulator *simulator, const Record
     int most_own = 0;
     recording->node_count = stepper_node_capacity(stepper);
     recording->tool_count = stepper_tool_count(stepper);
+    recording->has_exchanges = scene->exchange_count > 0;
     for (int k = 0; k < recording->tool_count; k++) {
-        recording->tool_nodes[k] = stepper_tool_nodes(stepper, k, NULL);
+        recording->tool_nodes[k] = scene_most_nodes(scene, k);
         most_own = recording->tool_nodes[k] > most_own ? recording->tool_nodes[k] : most_own;
     }
     recording->frame_every = (int64_t)fmax(1, floor(options->frame_ms / scene->dt + 0.5));
@@ -666,7 +707,7 @@ Recording *recording_create(const char *path, Simulator *simulator, const Record
     bool good = recording->node && recording->own && make_ring(&recording->steps, STEP_RING, step_columns(recording), recording->step_column, step_rows) &&
                 make_ring(&recording->frames, FRAME_RING, frame_columns(recording), recording->frame_column, frame_rows);
     errno = 0;
-    good = good && build_file(recording, scene, stepper);
+    good = good && build_file(recording, scene);
     int reason = errno;
     recording->started = good && pthread_create(&recording->writer, NULL, write_rings, recording) == 0;
     if (!recording->started) {

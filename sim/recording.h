@@ -21,6 +21,9 @@
 //   rows: command (S,2), proximal (S,2), inserted_mm (S), released (S); of tool 0 they are links to those at the root;
 //   frames of its own nodes, inside other tools and behind the hub too: position (K,MN,3), quaternion (K,MN,4), carrier (K,MN) the outermost tool there, -1 in the
 //   sheath or behind the hub; once: s_mm (MN), radius_mm (MN).
+// Where the scene has tools to exchange, /exchange (S,T,2) says of each of the T tools in every step which of its devices was asked for and which is in (0 the
+//   scene's, 1, 2, … those under its `exchange:`). MN is the most that any of its D devices has, and s_mm and radius_mm are (D,MN); what is beyond a device's
+//   nodes is NaN, in the frames too (carrier -1).
 #ifndef SELDINGER_SIM_RECORDING_H
 #define SELDINGER_SIM_RECORDING_H
 
@@ -58,11 +61,13 @@ typedef struct RecordedTool {
     uint8_t *released;       // (S)
     double *turned;          // (S) [deg] since the start, the sum of the commands
     // of several tools only
-    int node_count;          // N
+    int node_count;          // N, the most that any of its devices has
+    int device_count;        // D, 1 where it was not to be exchanged
+    int device_nodes[1 + EXCHANGES_MOST];    // (D) of each
     Vec3 *position;          // (K, N)
     Quat *quaternion;        // (K, N)
     int8_t *carrier;         // (K, N)
-    double *s, *radius;      // (N) [mm]
+    double *s, *radius;      // (D, N) [mm]
 } RecordedTool;
 
 typedef struct RecordedRun {
@@ -73,6 +78,7 @@ typedef struct RecordedRun {
     uint64_t *state_hash;    // (S)
     int tool_count;          // outermost first
     RecordedTool tool[STEP_TOOLS_MAX];
+    uint8_t *exchange;       // (S, tool_count, 2) which device was asked for, which is in; NULL: none was to be exchanged
     int64_t frame_count;     // K
     int node_count;          // M, of several tools the most that a frame can have
     int64_t *frame_step;     // (K)
@@ -107,6 +113,16 @@ typedef struct RecordedFrame {
     const int32_t *vessel_node;
 } RecordedFrame;
 RecordedFrame recorded_run_frame(const RecordedRun *run, int64_t frame);
+// A tool's own nodes in a frame, of several tools.
+typedef struct RecordedToolFrame {
+    int node_count;
+    const double *s, *radius;
+    const Vec3 *position;
+    const Quat *quaternion;
+    const int8_t *carrier;
+} RecordedToolFrame;
+RecordedToolFrame recorded_run_tool_frame(const RecordedRun *run, int tool, int64_t frame);
+int recorded_run_fitted(const RecordedRun *run, int tool, int64_t step);     // which of its devices is in
 ToolCommands recorded_run_commands(const RecordedRun *run, int64_t step);
 // Whether somebody saw the run: its steps have X-ray controls (`nav`). Else (`run --record`) nobody can have moved the tool blindly.
 bool recorded_run_was_watched(const RecordedRun *run);

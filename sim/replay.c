@@ -55,7 +55,7 @@ bool replay_fits(const RecordedRun *run, Simulator *simulator, Faults *faults)
     }
     bool fits = run->frame_count == 0 || run->node_count == nodes;
     for (int k = 0; run->frame_count > 0 && tools > 1 && k < tools; k++)
-        fits &= run->tool[k].node_count == stepper_tool_nodes(stepper, k, NULL);
+        fits &= run->tool[k].node_count == (run->exchange ? scene_most_nodes(simulator_scene(simulator), k) : stepper_tool_nodes(stepper, k, NULL));
     if (!fits)
         faults_add(faults, path, 0, 0, "gives a tool of %d nodes, the recording holds one of %d", nodes, run->node_count);
     return fits;
@@ -63,7 +63,7 @@ bool replay_fits(const RecordedRun *run, Simulator *simulator, Faults *faults)
 
 // What the columns of a script have to say of each tool besides its motion, at some step.
 typedef struct ScriptUse {
-    bool releases[TOOLS_MOST], injects[TOOLS_MOST];
+    bool releases[TOOLS_MOST], injects[TOOLS_MOST], exchanges[TOOLS_MOST];
 } ScriptUse;
 
 // A single tool has no name, under which alone a script can inject.
@@ -74,6 +74,7 @@ static ScriptUse find_use(const RecordedRun *run)
         ToolCommands commands = recorded_run_commands(run, i);
         for (int k = 0; k < run->tool_count; k++) {
             use.releases[k] |= commands.released >> k & 1;
+            use.exchanges[k] |= commands.fitted[k] != 0;
             use.injects[k] |= run->tool_count > 1 && commands.contrast_ml_s > 0 && commands.contrast_tool == k + 1;
         }
     }
@@ -90,6 +91,8 @@ static void print_heads(FILE *stream, const RecordedRun *run, const ScriptUse *u
             fprintf(stream, ",%s%sreleased", name, dot);
         if (use->injects[k])
             fprintf(stream, ",%s%scontrast_ml_s", name, dot);
+        if (use->exchanges[k])
+            fprintf(stream, ",%s%sexchange", name, dot);
     }
     fputc('\n', stream);
 }
@@ -103,13 +106,15 @@ static void print_row(FILE *stream, const RecordedRun *run, double t_s, const To
             fprintf(stream, ",%u", commands->released >> k & 1);
         if (use->injects[k])
             fprintf(stream, ",%.9g", commands->contrast_tool == k + 1 ? commands->contrast_ml_s : 0);
+        if (use->exchanges[k])
+            fprintf(stream, ",%d", commands->fitted[k]);
     }
     fputc('\n', stream);
 }
 
 static bool is_same(const ToolCommands *a, const ToolCommands *b)
 {
-    return memcmp(a->tool, b->tool, sizeof a->tool) == 0 && a->released == b->released && !(a->contrast_ml_s < b->contrast_ml_s) &&
+    return memcmp(a->tool, b->tool, sizeof a->tool) == 0 && a->released == b->released && memcmp(a->fitted, b->fitted, sizeof a->fitted) == 0 && !(a->contrast_ml_s < b->contrast_ml_s) &&
            !(a->contrast_ml_s > b->contrast_ml_s) && a->contrast_tool == b->contrast_tool;
 }
 
@@ -128,7 +133,9 @@ char *replay_script(const RecordedRun *run, size_t *length)
             print_row(stream, run, (double)i * run->step_ms / 1000, &now, &use);
         before = now;
     }
-    print_row(stream, run, (double)run->step_count * run->step_ms / 1000, &(ToolCommands){0}, &use);
+    ToolCommands end = {0};
+    memcpy(end.fitted, before.fitted, sizeof end.fitted);
+    print_row(stream, run, (double)run->step_count * run->step_ms / 1000, &end, &use);
     if (fclose(stream) == 0)
         return text;
     free(text);

@@ -97,6 +97,11 @@ void scene_free(Scene *scene);
 // (which `inlet: root` sets late).
 WireOptions scene_tool_wire(const Scene *scene, int tool);
 WireOptions scene_placed_wire(const Scene *scene, const WireOptions *own);
+// What tool `tool` is as its device `which`, counted as scripts do: 0 as the scene has it, 1, 2, … under its `exchange:`. NULL where there is none.
+const SceneTool *scene_device(const Scene *scene, int tool, int which);
+WireOptions scene_device_wire(const Scene *scene, int tool, int which);
+int scene_device_count(const Scene *scene, int tool);      // 1 where it cannot be exchanged
+int scene_most_nodes(const Scene *scene, int tool);        // of whichever device is in
 // A fault where the script exchanges tools and `what` cannot follow that.
 bool scene_keeps_its_tools(const Scene *scene, const char *what, Faults *faults);
 ToolNames scene_tool_names(const Scene *scene);      // as scripts know them; lives as long as the scene

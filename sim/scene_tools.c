@@ -416,6 +416,39 @@ WireOptions scene_placed_wire(const Scene *scene, const WireOptions *own)
     return wire;
 }
 
+const SceneTool *scene_device(const Scene *scene, int tool, int which)
+{
+    if (which == 0)
+        return tool < scene->tool_count ? &scene->tool[tool] : NULL;
+    for (int i = 0; i < scene->exchange_count; i++)
+        if (scene->exchange[i].tool == tool && --which == 0)
+            return &scene->exchange[i].device;
+    return NULL;
+}
+
+WireOptions scene_device_wire(const Scene *scene, int tool, int which)
+{
+    return which == 0 ? scene_tool_wire(scene, tool) : scene_placed_wire(scene, &scene_device(scene, tool, which)->wire);
+}
+
+int scene_device_count(const Scene *scene, int tool)
+{
+    int count = 0;
+    while (scene_device(scene, tool, count))
+        count++;
+    return count;
+}
+
+int scene_most_nodes(const Scene *scene, int tool)
+{
+    int most = 0;
+    for (int i = 0; i < scene_device_count(scene, tool); i++) {
+        int nodes = scene_device_wire(scene, tool, i).elements + 1;
+        most = nodes > most ? nodes : most;
+    }
+    return most;
+}
+
 ToolNames scene_tool_names(const Scene *scene)
 {
     ToolNames names = {.count = scene->tool_count};

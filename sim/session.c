@@ -71,6 +71,8 @@ static void digest(const RecordedRun *run, char hex[65])
         if (run->tool[k].released)
             sha256_add(&sha, run->tool[k].released, steps);
     }
+    if (run->exchange)
+        sha256_add(&sha, run->exchange, 2 * (size_t)run->tool_count * steps);
     if (run->xray)
         digest_xray(&sha, run);
     sha256_add(&sha, run->state_hash, steps * sizeof *run->state_hash);

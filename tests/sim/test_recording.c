@@ -43,6 +43,19 @@ static const char tools_text[] =
     "  - {name: micro, kind: microcatheter, elements: 14, inserted_mm: 11, sections: [{length_mm: 50, diameter_mm: 1, inner_diameter_mm: 0.6, young_modulus_gpa: 1}]}\n"
     "  - {name: wire, kind: wire, elements: 16, inserted_mm: 14, sections: [{length_mm: 60, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
     "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n";
+// The same, each with another that may take its place.
+static const char devices_text[] =
+    "seldinger: 1\n"
+    "tools:\n"
+    "  - {name: guide, kind: guide_catheter, elements: 10, inserted_mm: 10, sections: [{length_mm: 30, diameter_mm: 2, inner_diameter_mm: 1.8, young_modulus_gpa: 1}],\n"
+    "     exchange: [{elements: 20, sections: [{length_mm: 30, diameter_mm: 2, inner_diameter_mm: 1.8, young_modulus_gpa: 1}]}]}\n"
+    "  - {name: catheter, kind: catheter, elements: 12, inserted_mm: 12, sections: [{length_mm: 40, diameter_mm: 1.6, inner_diameter_mm: 1.2, young_modulus_gpa: 1}],\n"
+    "     exchange: [{elements: 9, sections: [{length_mm: 40, diameter_mm: 1.6, inner_diameter_mm: 1.2, young_modulus_gpa: 1}]}]}\n"
+    "  - {name: micro, kind: microcatheter, elements: 14, inserted_mm: 11, sections: [{length_mm: 50, diameter_mm: 1, inner_diameter_mm: 0.6, young_modulus_gpa: 1}],\n"
+    "     exchange: [{elements: 17, sections: [{length_mm: 50, diameter_mm: 1, inner_diameter_mm: 0.6, young_modulus_gpa: 1}]}]}\n"
+    "  - {name: wire, kind: wire, elements: 16, inserted_mm: 14, sections: [{length_mm: 60, diameter_mm: 0.36, young_modulus_gpa: 20}],\n"
+    "     exchange: [{elements: 11, sections: [{length_mm: 60, diameter_mm: 0.36, young_modulus_gpa: 200}]}]}\n"
+    "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n";
 static const char *text_of_scene = scene_text;
 enum { TOOLS = 4 };
 
@@ -199,7 +212,11 @@ static void assert_replays(const RecordedRun *run)
         ToolCommands read = script_tools_at(script, (double)i * run->step_ms / 1000, &cursor), was = recorded_run_commands(run, i);
         assert_memory_equal(read.tool, was.tool, sizeof was.tool);
         assert_int_equal(read.released, was.released);
+        assert_memory_equal(read.fitted, was.fitted, sizeof was.fitted);
     }
+    // what is in at the end stays in
+    ToolCommands after = script_tools_at(script, 1e6, &cursor), last = recorded_run_commands(run, run->step_count - 1);
+    assert_memory_equal(after.fitted, last.fitted, sizeof last.fitted);
     script_free(script);
     free(text);
     scene_free(scene);
@@ -268,6 +285,80 @@ static void what_is_read_of_several_tools(void **state)
     text_of_scene = scene_text;
 }
 
+// --- tools that are exchanged ---
+
+static const char exchange_text[] =
+    "seldinger: 1\n"
+    "tools:\n"
+    "  - {name: micro, kind: microcatheter, elements: 10, inserted_mm: 8, sections: [{length_mm: 20, diameter_mm: 0.8, inner_diameter_mm: 0.5, young_modulus_gpa: 1}],\n"
+    "     exchange: [{elements: 16, sections: [{length_mm: 25, diameter_mm: 0.9, inner_diameter_mm: 0.6, young_modulus_gpa: 1}]}]}\n"
+    "  - {name: wire, kind: wire, elements: 16, inserted_mm: 10, sections: [{length_mm: 60, diameter_mm: 0.36, young_modulus_gpa: 20}],\n"
+    "     exchange: [{elements: 12, sections: [{length_mm: 55, diameter_mm: 0.3, young_modulus_gpa: 100}]},\n"
+    "                {elements: 21, sections: [{length_mm: 70, diameter_mm: 0.4, young_modulus_gpa: 200}]}]}\n"
+    "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n";
+
+// The wire is asked for too early, drawn back, exchanged twice, pushed in again; then the microcatheter is drawn back and exchanged over it.
+static ToolCommands exchange_at(int step)
+{
+    ToolCommands commands = {.fitted = {step >= 1000, step < 40 ? 0 : step < 60 ? 1 : step < 300 ? 0 : step < 310 ? 1 : 2}};
+    commands.tool[1].push_mm_s = step < 60 ? 0 : step < 300 ? -100 : step < 320 ? 0 : step < 620 ? 100 : 0;
+    commands.tool[0].push_mm_s = step < 700 ? 0 : step < 1000 ? -40 : 20;
+    return commands;
+}
+
+// Poses of other lengths and numbers of nodes, replayed to the bit.
+static void what_is_read_of_exchanged_tools(void **state)
+{
+    (void)state;
+    enum { STEPS = 1205 };
+    char path[256];
+    snprintf(path, sizeof path, "%s/exchange.h5", folder);
+    text_of_scene = exchange_text;
+    Scene *scene;
+    Simulator *simulator = make_simulator(&scene);
+    RecordingOptions options = recording_default_options();
+    Recording *recording = recording_create(path, simulator, &options, &faults);
+    assert_non_null(recording);
+    static Pose *seen[STEPS];
+    for (int i = 0; i < STEPS; i++) {
+        ToolCommands commands = exchange_at(i);
+        simulator_step_tools(simulator, &commands);
+        assert_true(recording_step(recording, simulator, &commands, NULL));
+        seen[i] = pose_create_for(simulator);
+        pose_take(seen[i], simulator, &commands, &(XrayControl){0});
+    }
+    assert_true(recording_close(recording, simulator, &faults));
+    assert_int_equal(simulator_totals(simulator)->exchanges, 4);     // 0 again at step 60, where it still is in
+    assert_int_equal(simulator_totals(simulator)->refused_exchanges, 1);
+    assert_true(seen[50]->refused_exchanges == 1 && seen[50]->refusal == EXCHANGE_INSERTED && seen[50]->tool[1].fitted == 0);
+    RecordedRun *run = recorded_run_load(path, &faults);
+    if (!run)
+        fail_msg("%s", faults.text[0]);
+    assert_int_equal(run->step_count, STEPS);
+    static const struct { int step, tool, asked, fitted, nodes; } in[] = {{0, 1, 0, 0, 17}, {50, 1, 1, 0, 17}, {305, 1, 1, 1, 13}, {900, 1, 2, 2, 22},
+                                                                          {900, 0, 0, 0, 11}, {1204, 0, 1, 1, 17}};
+    for (size_t i = 0; i < sizeof in / sizeof *in; i++) {
+        assert_int_equal(recorded_run_commands(run, in[i].step).fitted[in[i].tool], in[i].asked);
+        assert_int_equal(recorded_run_fitted(run, in[i].tool, in[i].step), in[i].fitted);
+        assert_int_equal(seen[in[i].step]->tool[in[i].tool].node_count, in[i].nodes);
+    }
+    Pose *pose = pose_create_for_run(run);
+    for (int64_t k = 0; k < run->frame_count; k++) {
+        pose_from_run(pose, scene, run, k);
+        assert_same_pose(pose, seen[run->frame_step[k]]);
+        for (int tool = 0; tool < 2; tool++)
+            assert_true(pose->tool[tool].fitted == seen[run->frame_step[k]]->tool[tool].fitted && pose->tool[tool].node_capacity == seen[0]->tool[tool].node_capacity);
+    }
+    assert_replays(run);
+    pose_free(pose);
+    for (int i = 0; i < STEPS; i++)
+        pose_free(seen[i]);
+    recorded_run_free(run);
+    simulator_destroy(simulator);
+    scene_free(scene);
+    text_of_scene = scene_text;
+}
+
 // A copy with a piece of it changed is refused with these words.
 static void expect_refused(const char *path, void (*change)(hid_t file), const char *words)
 {
@@ -324,6 +415,10 @@ static void widen_hand(hid_t file) { replace(file, "/tools/1/proximal", H5T_NATI
 static void other_nodes(hid_t file) { replace(file, "/tools/1/position", H5T_NATIVE_DOUBLE, 3, (const hsize_t[]){62, 99, 3}, H5P_DEFAULT); }
 static void too_many_nodes(hid_t file) { write_value(file, "/wire/count", H5T_NATIVE_INT, (const hsize_t[]){5}, 1, &(int){1000}); }
 static void no_node(hid_t file) { write_value(file, "/wire/count", H5T_NATIVE_INT, (const hsize_t[]){5}, 1, &(int){0}); }
+static void no_such_device(hid_t file) { write_value(file, "/exchange", H5T_NATIVE_INT, (const hsize_t[]){7, 1, 0}, 3, &(int){9}); }
+static void unknown_device(hid_t file) { write_value(file, "/exchange", H5T_NATIVE_INT, (const hsize_t[]){9, 0, 1}, 3, &(int){2}); }
+static void no_profile(hid_t file) { write_value(file, "/tools/1/s_mm", H5T_NATIVE_DOUBLE, (const hsize_t[]){1, 1}, 2, &(double){NAN}); }
+static void lose_exchange(hid_t file) { H5Ldelete(file, "/exchange", H5P_DEFAULT); }
 static void no_such_carrier(hid_t file) { write_value(file, "/tools/2/carrier", H5T_NATIVE_INT, (const hsize_t[]){3, 4}, 2, &(int){7}); }
 
 // Huge and empty: a chunk that was never written takes no room in the file.
@@ -394,6 +489,11 @@ static void what_is_broken_is_refused(void **state)
     expect_refused(path, cut_chunk, "'/time_s' promises 605 values that the file does not hold plainly");
     expect_refused(path, read_elsewhere, "'/time_s' promises 100 values that the file does not hold");
     expect_refused(path, link_elsewhere, "lacks the dataset '/time_s'");
+    snprintf(path, sizeof path, "%s/exchange.h5", folder);
+    expect_refused(path, no_such_device, "/exchange names device 9 in step 7; 0 to 4");
+    expect_refused(path, unknown_device, "/exchange has device 2 of tool 0 in step 9; the file holds 2 of them");
+    expect_refused(path, no_profile, "/tools/1/s_mm holds 1 nodes of device 1; at least 2");
+    expect_refused(path, lose_exchange, "'/tools/0/s_mm' does not have the shape or type");
 }
 
 // --- a child that records until it is ended ---
@@ -493,6 +593,8 @@ static const char *check_file(const char *path, hsize_t count[2])
     for (int kind = 0; kind < 2; kind++) {
         for (int i = 0; !fault && names[kind][i]; i++)
             fault = check_rows(file, names[kind][i], &count[kind], i == 0);
+        if (!fault && kind == 0 && H5Lexists(file, "/exchange", H5P_DEFAULT) > 0)
+            fault = check_rows(file, "/exchange", &count[kind], false);
         for (int i = 0; !fault && tools && kind == 1 && i < 3; i++)
             fault = check_rows(file, several_names[i], &count[kind], false);
         for (int k = 0; k < tools; k++)
@@ -578,7 +680,7 @@ static void look(void *context, bool done)
     if (!fault && used_end(watched->copy) > watched->end)
         fault = "chunks beyond the end of a flush ago";
     // of several tools the steps' page is written before the frames'
-    bool steps_may_lead = text_of_scene == tools_text;
+    bool steps_may_lead = text_of_scene != scene_text;
     if (!fault && !done && ((count[0] != watched->before[0] && !steps_may_lead) || count[1] != watched->before[1]))
         fault = "rows before the last write of the flush";
     if (!fault && done && (count[0] < watched->before[0] || count[1] < watched->before[1]))
@@ -654,6 +756,8 @@ static void so_it_is_with_several_tools(void **state)
     (void)state;
     text_of_scene = tools_text;
     look_at_every_state();
+    text_of_scene = devices_text;
+    look_at_every_state();
     text_of_scene = scene_text;
 }
 
@@ -665,7 +769,8 @@ static void kill_recordings(int trials)
     for (int trial = 0; trial < trials; trial++) {
         char path[256];
         snprintf(path, sizeof path, "%s/kill-%d.h5", folder, trial);
-        text_of_scene = trial % 2 ? tools_text : scene_text;
+        static const char *const texts[] = {scene_text, tools_text, scene_text, devices_text};
+        text_of_scene = texts[trial / 2 % 4];
         pid_t child = fork();
         assert_true(child >= 0);
         if (child == 0)
@@ -816,6 +921,7 @@ int main(int count, char **argument)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_read_is_what_was_simulated),
         cmocka_unit_test(what_is_read_of_several_tools),
+        cmocka_unit_test(what_is_read_of_exchanged_tools),
         cmocka_unit_test(what_is_broken_is_refused),
         cmocka_unit_test(every_state_in_a_flush_is_a_whole_file),
         cmocka_unit_test(so_it_is_with_several_tools),
