@@ -12,6 +12,7 @@ static bool take_over_step(void *context, Simulator *simulator, const ToolComman
     LiveSession *session = context;
     lesson_step(session->lesson, simulator, commands, xray);
     session->resumed_released = commands->released;
+    memcpy(session->resumed_fitted, commands->fitted, sizeof session->resumed_fitted);
     return !session->recording || recording_step(session->recording, simulator, commands, xray);
 }
 
@@ -54,6 +55,8 @@ bool live_session_open(LiveSession *session, const Scene *scene, const OpenVesse
         realtime.hand = options->hand;
         realtime.grip = options->grip;
         realtime.grip.released |= session->resumed_released;
+        if (options->resume)
+            memcpy(realtime.grip.fitted, session->resumed_fitted, sizeof session->resumed_fitted);
         realtime.xray = options->xray;
         realtime.paused = options->paused;
         realtime.after_step = lesson_step;

@@ -15,14 +15,15 @@ typedef struct LiveSession {
     Realtime *realtime;
     char record_path[4096];      // "" where not recorded
     double resumed_s;            // simulated time that was taken over from an earlier recording …
-    unsigned resumed_released;   // … and the tools that no hand held then (ToolCommands)
+    unsigned resumed_released;   // … the tools that no hand held then (ToolCommands) …
+    int resumed_fitted[TOOLS_MOST];  // … and which devices were asked for last
 } LiveSession;
 
 typedef struct LiveSessionOptions {
     const char *record_path;     // NULL: not recorded
     int hand_count;
     HandPort *const *hand;       // (hand_count)
-    HandGrip grip;               // at the start; of a resumed session `resumed_released` are let go too
+    HandGrip grip;               // at the start; of a resumed session `resumed_released` are let go too, and `fitted` is `resumed_fitted`
     XrayControl xray;            // the same
     const RecordedRun *resume;   // NULL, or what is gone through first, as fast as it goes …
     double resume_s;             // … up to this time

@@ -79,6 +79,7 @@ static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *f
     if (!live_session_open(&trainer->session, trainer->scene, trainer->open, &session, faults))
         return false;
     trainer->desk.grip.released = trainer->session.resumed_released;
+    memcpy(trainer->desk.grip.fitted, trainer->session.resumed_fitted, sizeof trainer->desk.grip.fitted);
     trainer->pulses = pulse_clock_start(trainer->session.resumed_s);
     trainer->began_at = time(NULL);
     trainer->has_told_end = false;

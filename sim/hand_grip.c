@@ -50,6 +50,15 @@ void hand_grip_release(HandGrip *grip)
         grip->locked &= ~(3u << grip->chosen);   // to the tool around it, and to the one inside
 }
 
+void hand_grip_fit(HandGrip *grip, int tool_count, int tool, int which)
+{
+    if (tool < 0 || tool >= tool_count || which < 0 || which > EXCHANGES_MOST || which == grip->fitted[tool])
+        return;
+    grip->fitted[tool] = which;
+    grip->released &= ~(1u << tool);
+    grip->locked &= ~(3u << tool);
+}
+
 void hand_grip_obey(HandGrip *grip, int tool_count, unsigned buttons, unsigned *before)
 {
     unsigned pressed = buttons & ~*before;

@@ -1,5 +1,5 @@
-// How the hands hold coaxial tools: one is chosen, others are pinned; neighbours may be locked together, any may be let go. The operator's, who changes it
-// between frames; hands obey it from the next step on.
+// How the hands hold coaxial tools: one is chosen, others are pinned; neighbours may be locked together, any may be let go or exchanged. The operator's, who
+// changes it between frames; hands obey it from the next step on.
 #ifndef SELDINGER_SIM_HAND_GRIP_H
 #define SELDINGER_SIM_HAND_GRIP_H
 
@@ -12,6 +12,7 @@ typedef struct HandGrip {
     int chosen;              // moved by hands that name no tool
     unsigned locked;         // bit k: tool k moves as tool k - 1 does
     unsigned released;       // bit k: no hand holds tool k (input/input.h)
+    int fitted[TOOLS_MOST];  // which of its devices each tool shall be (input/input.h): one that is not at its hub stays as it is, see hand_grip_fit()
 } HandGrip;
 
 // The next tool inside the chosen one; of the innermost the next around it; of one tool itself. With the chosen one it is the pair.
@@ -24,6 +25,10 @@ void hand_grip_lock(HandGrip *grip, int tool_count);
 bool hand_grip_pair_is_locked(const HandGrip *grip, int tool_count);
 // Lets the chosen tool go, or takes it again.
 void hand_grip_release(HandGrip *grip);
+// Asks for device `which` of tool `tool` (0: the scene's), in whose place another is: the hand that takes it holds it alone, so its locks open. Nothing where
+// there is no such tool. A refused exchange (Pose.refused_exchanges grows, Pose.refusal says why) is tried again only after something
+// else was asked for: set what is in (PoseTool.fitted), then ask again.
+void hand_grip_fit(HandGrip *grip, int tool_count, int tool, int which);
 // What devices' buttons ask for (HAND_ bits) that were not held `before`, which becomes what is held now.
 void hand_grip_obey(HandGrip *grip, int tool_count, unsigned buttons, unsigned *before);
 // The outermost of the tools that move as `tool` does.

@@ -88,6 +88,7 @@ ToolCommands hand_set_command(HandSet *set, double dt)
         turned_deg[lead] = take_way(deg, &set->taken_deg[i], turned_deg[lead], most_deg);
     }
     ToolCommands commands = {.released = grip->released & ((1u << set->tool_count) - 1)};
+    memcpy(commands.fitted, grip->fitted, (size_t)set->tool_count * sizeof *commands.fitted);
     for (int k = 0; k < set->tool_count && !is_stopped; k++) {
         int lead = hand_grip_lead(grip, k);
         if (!(commands.released >> k & 1))

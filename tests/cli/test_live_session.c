@@ -185,7 +185,8 @@ static const char coaxial_text[] =
     "seldinger: 1\n"
     "tools:\n"
     "  - {name: tube, kind: microcatheter, elements: 14, sections: [{length_mm: 60, diameter_mm: 0.8, inner_diameter_mm: 0.5, young_modulus_gpa: 1}]}\n"
-    "  - {name: thread, kind: wire, elements: 16, sections: [{length_mm: 90, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
+    "  - {name: thread, kind: wire, elements: 16, sections: [{length_mm: 90, diameter_mm: 0.36, young_modulus_gpa: 20}],\n"
+    "     exchange: [{elements: 24, sections: [{length_mm: 100, diameter_mm: 0.4, young_modulus_gpa: 80}]}]}\n"
     "vessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], radius_mm: 1.5, path: [{line_mm: 10}, {arc: {radius_mm: 20, angle_deg: 50}}, {line_mm: 30}]}, "
     "contact: tube, friction: 0.05}\n"
     "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 4}\n";
@@ -196,17 +197,22 @@ static bool goes_alike(const RecordedRun *run, int64_t step)
     return outer[0] == inner[0] && outer[1] == inner[1];
 }
 
-// Two hands push two tools, lock them, let one go; recorded, the session gives its states again, and another goes on from it.
-static void two_tools_are_moved_locked_let_go_and_replayed(void **state)
+static void open_coaxial(void)
 {
-    (void)state;
-    TrainerScene former = trainer;
     faults_clear(&faults);
     trainer = (TrainerScene){.scene = scene_parse(coaxial_text, strlen(coaxial_text), "coaxial.yaml", &faults)};
     if (!trainer.scene)
         fail_msg("%s", faults.text[0]);
     trainer.open.vessel = tube_vessel_create(&trainer.scene->tube, "coaxial.yaml", &faults);
     assert_non_null(trainer.open.vessel);
+}
+
+// Two hands push two tools, lock them, let one go; recorded, the session gives its states again, and another goes on from it.
+static void two_tools_are_moved_locked_let_go_and_replayed(void **state)
+{
+    (void)state;
+    TrainerScene former = trainer;
+    open_coaxial();
     static HandPort pair[2];
     static HandPort *const both[] = {&pair[0], &pair[1]};
     atomic_store(&pair[0].drives, DRIVES_OUTER);
@@ -273,6 +279,61 @@ static void two_tools_are_moved_locked_let_go_and_replayed(void **state)
     trainer = former;
 }
 
+// The operator asks for another wire, too early at first; recorded, the session gives its states again, and another goes on from it.
+static void a_tool_is_exchanged_and_replayed(void **state)
+{
+    (void)state;
+    TrainerScene former = trainer;
+    open_coaxial();
+    static HandPort hand;
+    static HandPort *const one[] = {&hand};
+    atomic_store(&hand.drives, DRIVES_TOOL + 1);
+    char path[200];
+    snprintf(path, sizeof path, "%s", in_folder("exchanged.h5"));
+    LiveSessionOptions options = {.record_path = path, .hand_count = 1, .hand = one, .xray = xray_default_control()};
+    LiveSession session = open_session(&options);
+    HandGrip grip = {0};
+    atomic_store(&hand.push_mm_s, -200);
+    hand_grip_fit(&grip, 2, 1, 1);
+    realtime_set_grip(session.realtime, &grip);
+    wait_for(&session, 0.1);
+    const Pose *pose = realtime_moment(session.realtime)->pose;
+    assert_true(pose->refused_exchanges == 1 && pose->refusal == EXCHANGE_INSERTED && pose->tool[1].fitted == 0 && pose->tool[1].node_count == 17);
+    hand_grip_fit(&grip, 2, 1, pose->tool[1].fitted);
+    realtime_set_grip(session.realtime, &grip);
+    wait_for(&session, 0.4);
+    hand_grip_fit(&grip, 2, 1, 1);
+    realtime_set_grip(session.realtime, &grip);
+    atomic_store(&hand.push_mm_s, 100);
+    wait_for(&session, 0.6);
+    pose = realtime_moment(session.realtime)->pose;
+    assert_true(pose->refused_exchanges == 1 && pose->tool[1].fitted == 1 && pose->tool[1].node_count == 25 && pose->tool[1].node[24].s == 100);
+    wait_for(&session, 0.8);
+    ScoreFigures score = stop(&session);
+    RecordedRun *run = load("exchanged.h5");
+    assert_true(recorded_run_fitted(run, 1, 90) == 0 && recorded_run_commands(run, 90).fitted[1] == 1 && recorded_run_fitted(run, 1, 700) == 1);
+    assert_replays(run, &score);
+
+    // from 0.6 s on the new wire is still in, and goes on
+    char again[200];
+    snprintf(again, sizeof again, "%s", in_folder("exchanged-again.h5"));
+    options.record_path = again;
+    options.resume = run;
+    options.resume_s = 0.6;
+    session = open_session(&options);
+    assert_int_equal(session.resumed_fitted[1], 1);
+    wait_for(&session, 0.75);
+    score = stop(&session);
+    RecordedRun *second = load("exchanged-again.h5");
+    assert_memory_equal(run->state_hash, second->state_hash, 600 * sizeof *run->state_hash);
+    assert_true(recorded_run_fitted(second, 1, 740) == 1 && second->tool[1].inserted[740] > second->tool[1].inserted[600]);
+    assert_replays(second, &score);
+    recorded_run_free(run);
+    recorded_run_free(second);
+    trainer_scene_close(&trainer);
+    trainer = former;
+}
+
 static void what_is_not_the_recording_of_a_session_is_refused(void **state)
 {
     (void)state;
@@ -321,6 +382,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_session_goes_on_from_a_moment_of_it),
                                        cmocka_unit_test(two_tools_are_moved_locked_let_go_and_replayed),
+                                       cmocka_unit_test(a_tool_is_exchanged_and_replayed),
                                        cmocka_unit_test(what_is_not_the_recording_of_a_session_is_refused),
                                        cmocka_unit_test(a_place_where_nothing_can_be_written_is_told)};
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -249,6 +249,30 @@ static void buttons_choose_lock_and_let_go(void **state)
     assert_true(grip.chosen == 1 && grip.released == 4);
 }
 
+// Asking for another device takes the tool in hand, alone; only tools and devices that there can be.
+static void a_device_is_asked_for(void **state)
+{
+    (void)state;
+    HandGrip grip = {.chosen = 1, .locked = 6, .released = 1};
+    hand_grip_fit(&grip, 3, 1, 2);
+    assert_true(grip.fitted[1] == 2 && grip.locked == 0 && grip.released == 1);
+    grip.released = 2;
+    hand_grip_fit(&grip, 3, 1, 2);      // is asked for already
+    assert_int_equal(grip.released, 2);
+    hand_grip_fit(&grip, 3, 1, 0);
+    assert_true(grip.fitted[1] == 0 && grip.released == 0);
+    const HandGrip before = grip;
+    hand_grip_fit(&grip, 3, 3, 1);
+    hand_grip_fit(&grip, 3, -1, 1);
+    hand_grip_fit(&grip, 3, 0, EXCHANGES_MOST + 1);
+    hand_grip_fit(&grip, 3, 0, -1);
+    assert_memory_equal(&grip, &before, sizeof grip);
+    hand_set_init(&set, 3);
+    hand_grip_fit(&grip, 3, 2, 4);
+    hand_set_grip(&set, &grip);
+    assert_int_equal(hand_set_command(&set, 1).fitted[2], 4);
+}
+
 // Any keys in any order: no tool is both locked and let go, and none but those that are there.
 static void no_grip_contradicts_itself(void **state)
 {
@@ -263,8 +287,10 @@ static void no_grip_contradicts_itself(void **state)
                 hand_grip_choose(&grip, tools, what % 5);
             else if (what < 12)
                 hand_grip_lock(&grip, tools);
-            else
+            else if (what < 14)
                 hand_grip_release(&grip);
+            else
+                hand_grip_fit(&grip, tools, i % tools, i / tools % 3);
             assert_true(grip.chosen >= 0 && grip.chosen < tools && grip.released >> tools == 0 && grip.locked >> tools == 0 && !(grip.locked & 1));
             for (int k = 0; k < tools; k++) {
                 bool is_locked = hand_grip_lead(&grip, k) != k || (k + 1 < tools && hand_grip_lead(&grip, k + 1) != k + 1);
@@ -292,6 +318,7 @@ int main(void)
                                        cmocka_unit_test(locked_tools_move_as_one_and_are_felt_together),
                                        cmocka_unit_test(a_tool_that_was_let_go_is_moved_by_no_hand),
                                        cmocka_unit_test(buttons_choose_lock_and_let_go),
+                                       cmocka_unit_test(a_device_is_asked_for),
                                        cmocka_unit_test(no_grip_contradicts_itself),
                                        cmocka_unit_test(there_is_room_for_so_many_hands)};
     return cmocka_run_group_tests(tests, NULL, NULL);
