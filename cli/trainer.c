@@ -476,7 +476,7 @@ static bool open_cine(Trainer *trainer, Faults *faults)
     Stepper *stepper = simulator_stepper(trainer->session.simulator);
     CineShape shape = {.tool_count = stepper_tool_count(stepper), .contrast_count = trainer->open->tree ? trainer->open->tree->node_count : 0};
     for (int k = 0; k < shape.tool_count; k++) {
-        shape.tool_nodes[k] = stepper_tool_nodes(stepper, k, NULL);
+        shape.tool_nodes[k] = scene_most_nodes(trainer->scene, k);
         shape.contrast_count += shape.tool_nodes[k];
     }
     if (trainer_cine_open(&trainer->cine, &shape, trainer->options->cine, faults))

@@ -290,9 +290,9 @@ static Vec3 axis_behind_tip(const PoseTool *tool, double back)
     return tool->node[0].position;
 }
 
-static double lumen_at(const Angioscope *scope, int tool, double s)
+static double lumen_at(const Angioscope *scope, const Pose *pose, int tool, double s)
 {
-    return scope->tools && tool < scope->tools->count ? tool_look_at(&scope->tools->tool[tool], s)->lumen : 0;
+    return scope->tools && tool < scope->tools->count ? tool_look_at(tool_looks_of(scope->tools, tool, pose->tool[tool].fitted), s)->lumen : 0;
 }
 
 // The tool around the eye of `tool`, `back` mm behind its tip: the innermost whose lumen it lies in, or -1. `ahead` [mm]: how far the last one's end lies behind.
@@ -303,7 +303,7 @@ static int tool_around(const Angioscope *scope, const Pose *pose, int tool, doub
     *lumen = HUGE_VAL;
     for (int k = tool - 1; k >= 0; k--) {
         const PoseTool *outer = &pose->tool[k];
-        double past = eye - pose_tool_passes(pose, tool, k), inner = lumen_at(scope, k, outer->node[outer->node_count - 1].s + fmin(past, 0));
+        double past = eye - pose_tool_passes(pose, tool, k), inner = lumen_at(scope, pose, k, outer->node[outer->node_count - 1].s + fmin(past, 0));
         if (past < *ahead && inner > 0) {
             *ahead = past;
             *lumen = inner;
@@ -498,7 +498,7 @@ static void add_tool(Angioscope *scope, const Pose *pose, int k, bool is_own, Ve
     for (int i = first; i <= end; i++, count++) {
         point[count] = tool->node[i].position;
         radius[count] = tool->node[i].radius;
-        lumen[count] = lumen_at(scope, k, tool->node[i].s);
+        lumen[count] = lumen_at(scope, pose, k, tool->node[i].s);
         color[count] = color_rgb(206, 212, 220);
         is_hollow |= lumen[count] > 0;
     }

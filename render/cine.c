@@ -1,5 +1,5 @@
 // A ring of images in arrays taken at once. File, all little-endian: "SELDCINE", version, tool nodes, vessel nodes, images (4 bytes each); with several tools,
-// which is version 2, their number and the nodes of each of four; the images, field by field in the order of walk_frame(); FNV-1a of all before (8 bytes).
+// which is version 3, their number and the most nodes of each of four; the images, field by field in the order of walk_frame(); FNV-1a of all before (8 bytes).
 #include "render/cine.h"
 
 #include "render/message.h"
@@ -12,7 +12,7 @@
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "files are little-endian");
 
-enum { MOST_NODES = 100000, MOST_CONTRAST = 10000000, MOST_FRAMES = 1000000, ONE_TOOL = 1, SEVERAL_TOOLS = 2 };
+enum { MOST_NODES = 100000, MOST_CONTRAST = 10000000, MOST_FRAMES = 1000000, ONE_TOOL = 1, SAME_TOOLS = 2, SEVERAL_TOOLS = 3 };
 static const uint64_t MOST_BYTES = (uint64_t)8 << 30;
 static const char magic[] = "SELDCINE";
 
@@ -36,7 +36,7 @@ CineShape cine_shape_for(const Pose *pose, int contrast_count)
 {
     CineShape shape = {.tool_count = pose->tool_count, .contrast_count = contrast_count};
     for (int k = 0; k < pose->tool_count; k++)
-        shape.tool_nodes[k] = pose->tool[k].node_count;
+        shape.tool_nodes[k] = pose->tool[k].node_capacity;
     return shape;
 }
 
@@ -100,7 +100,7 @@ Cine *cine_create(const CineShape *shape, int capacity)
         *pose = (Pose){.tool_count = shape->tool_count, .node_capacity = node_count, .node_count = node_count, .position = cine->position + at,
                        .quaternion = cine->quaternion + at, .node = cine->node + at};
         for (int k = 0; k < shape->tool_count; k++) {
-            pose->tool[k] = (PoseTool){.node_count = shape->tool_nodes[k], .node = cine->tool_node + at};
+            pose->tool[k] = (PoseTool){.node_capacity = shape->tool_nodes[k], .node_count = shape->tool_nodes[k], .node = cine->tool_node + at};
             at += (size_t)shape->tool_nodes[k];
         }
     }
@@ -237,6 +237,7 @@ typedef struct Cursor {
     const uint8_t *in;
     size_t at, length;
     bool good;
+    uint32_t version;
 } Cursor;
 
 static void walk(Cursor *cursor, void *value, size_t size)
@@ -278,6 +279,15 @@ static void walk_tool(Cursor *cursor, PoseTool *tool)
     WALK(cursor, tool->inserted_mm);
     WALK(cursor, tool->push_n);
     WALK(cursor, tool->torque_n_mm);
+    if (cursor->version == SEVERAL_TOOLS) {
+        WALK(cursor, tool->fitted);
+        WALK(cursor, tool->node_count);
+    }
+    if (tool->node_count < 1 || tool->node_count > tool->node_capacity || tool->fitted < 0 || tool->fitted > EXCHANGES_MOST) {
+        cursor->good = false;
+        tool->node_count = tool->node_capacity;
+        tool->fitted = 0;
+    }
     for (int j = 0; j < tool->node_count; j++) {
         ToolNode *node = &tool->node[j];
         WALK(cursor, node->s);
@@ -333,16 +343,17 @@ enum {
     FRAME_BYTES = 4 + 8 + 8 + 2 * 8 + XRAY_BYTES + 8 + 4 + 4 * 4 + 7 * 8 + 4,
     NODE_BYTES = 3 * 8 + 4 * 8 + 6 * 8 + 4,
     TOOL_BYTES = 5 * 8,
+    DEVICE_BYTES = 2 * 4,
     TOOL_NODE_BYTES = 9 * 8 + 4
 };
 
-// Of a file of so many images whose centrelines have `line_nodes` nodes in all.
-static uint64_t file_bytes(const CineShape *shape, int count, uint64_t line_nodes)
+// Of a file of so many images whose centrelines have `line_nodes` nodes in all, and the tools, of several, `tool_nodes`.
+static uint64_t file_bytes(const CineShape *shape, uint32_t version, int count, uint64_t line_nodes, uint64_t tool_nodes)
 {
     bool has_several = shape->tool_count > 1;
-    uint64_t tools = has_several ? 4 + (uint64_t)shape->tool_count * TOOL_BYTES + (uint64_t)nodes_of(shape) * TOOL_NODE_BYTES : 0;
+    uint64_t tools = has_several ? 4 + (uint64_t)shape->tool_count * (uint64_t)(TOOL_BYTES + (version == SEVERAL_TOOLS ? DEVICE_BYTES : 0)) : 0;
     uint64_t head = (uint64_t)HEAD_BYTES + (has_several ? TOOLS_BYTES : 0), image = FRAME_BYTES + tools + (uint64_t)shape->contrast_count * 4;
-    return head + 8 + line_nodes * NODE_BYTES + (uint64_t)count * image;
+    return head + 8 + line_nodes * NODE_BYTES + (has_several ? tool_nodes * TOOL_NODE_BYTES : 0) + (uint64_t)count * image;
 }
 
 static uint64_t checksum(const uint8_t *bytes, size_t length)
@@ -353,25 +364,25 @@ static uint64_t checksum(const uint8_t *bytes, size_t length)
     return hash;
 }
 
-static void walk_head(Cursor *cursor, uint32_t *version, CineShape *shape, int32_t *count)
+static void walk_head(Cursor *cursor, CineShape *shape, int32_t *count)
 {
     char mark[8];
     memcpy(mark, magic, 8);
     int32_t nodes[3] = {nodes_of(shape), shape->contrast_count, *count};
-    *version = shape->tool_count > 1 ? SEVERAL_TOOLS : ONE_TOOL;
+    cursor->version = shape->tool_count > 1 ? SEVERAL_TOOLS : ONE_TOOL;
     WALK(cursor, mark);
-    WALK(cursor, *version);
+    WALK(cursor, cursor->version);
     WALK(cursor, nodes);
     if (memcmp(mark, magic, sizeof mark) != 0)
-        *version = 0;
-    if (*version == SEVERAL_TOOLS) {
+        cursor->version = 0;
+    if (cursor->version == SAME_TOOLS || cursor->version == SEVERAL_TOOLS) {
         WALK(cursor, shape->tool_count);
         WALK(cursor, shape->tool_nodes);
     } else {
         shape->tool_count = 1;
         shape->tool_nodes[0] = nodes[0];
     }
-    bool is_whole = cursor->good && (*version == ONE_TOOL || nodes[0] == nodes_of(shape));
+    bool is_whole = cursor->good && (cursor->version == ONE_TOOL || nodes[0] == nodes_of(shape));
     shape->tool_count = is_whole ? shape->tool_count : 0;
     shape->contrast_count = nodes[1];
     *count = nodes[2];
@@ -379,17 +390,20 @@ static void walk_head(Cursor *cursor, uint32_t *version, CineShape *shape, int32
 
 uint8_t *cine_pack(const Cine *cine, size_t *length)
 {
-    uint64_t line_nodes = 0;
-    for (int i = 0; i < cine->count; i++)
-        line_nodes += (uint64_t)cine->pose[slot(cine, i)].node_count;
-    *length = (size_t)file_bytes(&cine->shape, cine->count, line_nodes);
+    uint64_t line_nodes = 0, tool_nodes = 0;
+    for (int i = 0; i < cine->count; i++) {
+        const Pose *pose = &cine->pose[slot(cine, i)];
+        line_nodes += (uint64_t)pose->node_count;
+        for (int k = 0; k < pose->tool_count; k++)
+            tool_nodes += (uint64_t)pose->tool[k].node_count;
+    }
+    *length = (size_t)file_bytes(&cine->shape, SEVERAL_TOOLS, cine->count, line_nodes, tool_nodes);
     Cursor cursor = {.out = malloc(*length), .length = *length, .good = true};
     if (!cursor.out)
         return NULL;
-    uint32_t version;
     int32_t count = cine->count;
     Cine ring = *cine;   // walk_frame() writes where it reads a file, not here
-    walk_head(&cursor, &version, &ring.shape, &count);
+    walk_head(&cursor, &ring.shape, &count);
     for (int i = 0; i < cine->count; i++)
         walk_frame(&cursor, &ring, slot(cine, i));
     uint64_t sum = checksum(cursor.out, cursor.at);
@@ -454,25 +468,25 @@ static const char *frame_fault(const Cine *cine, int index)
 Cine *cine_unpack(const uint8_t *bytes, size_t length, const char *name, Faults *faults)
 {
     Cursor cursor = {.in = bytes, .length = length, .good = true};
-    uint32_t version;
     int32_t count = 0;
     CineShape shape = {0};
-    walk_head(&cursor, &version, &shape, &count);
-    if (!cursor.good || (version != ONE_TOOL && version != SEVERAL_TOOLS)) {
-        faults_add_at_byte(faults, name, 0, "is no cine loop of version %d or %d; a file that the trainer saved is expected", ONE_TOOL, SEVERAL_TOOLS);
+    walk_head(&cursor, &shape, &count);
+    if (!cursor.good || cursor.version < ONE_TOOL || cursor.version > SEVERAL_TOOLS) {
+        faults_add_at_byte(faults, name, 0, "is no cine loop of version %d to %d; a file that the trainer saved is expected", ONE_TOOL, SEVERAL_TOOLS);
         return NULL;
     }
-    if (count < 0 || cine_bytes(&shape, count > 0 ? count : 1) == 0 || (version == SEVERAL_TOOLS && shape.tool_count < 2)) {
-        faults_add_at_byte(faults, name, 12, "says %d tools of %d nodes, %d vessel nodes and %d images; 1 to %d (2 or more in version 2), each of 1 to %d nodes, 0 to %d, "
+    if (count < 0 || cine_bytes(&shape, count > 0 ? count : 1) == 0 || (cursor.version > ONE_TOOL && shape.tool_count < 2)) {
+        faults_add_at_byte(faults, name, 12, "says %d tools of %d nodes, %d vessel nodes and %d images; 1 to %d (2 or more from version 2 on), each of 1 to %d nodes, 0 to %d, "
                            "0 to %d, and 8 GB in all", shape.tool_count, nodes_of(&shape), shape.contrast_count, (int)count, STEP_TOOLS_MAX, MOST_NODES, MOST_CONTRAST,
                            MOST_FRAMES);
         return NULL;
     }
-    // with several tools centrelines have as many nodes as each image says
-    uint64_t all = (uint64_t)count * (uint64_t)nodes_of(&shape), expected = file_bytes(&shape, count, version == ONE_TOOL ? all : 0);
-    if (version == ONE_TOOL ? expected != length : expected > length || file_bytes(&shape, count, all) < length) {
+    // with several tools centrelines have as many nodes as each image says, and so have the tools since version 3
+    uint64_t all = (uint64_t)count * (uint64_t)nodes_of(&shape);
+    uint64_t expected = file_bytes(&shape, cursor.version, count, cursor.version == ONE_TOOL ? all : 0, cursor.version == SEVERAL_TOOLS ? 0 : all);
+    if (cursor.version == ONE_TOOL ? expected != length : expected > length || file_bytes(&shape, cursor.version, count, all, all) < length) {
         faults_add_at_byte(faults, name, length, "has %zu bytes, its counts make %llu%s: it was cut or has grown", length, (unsigned long long)expected,
-                           version == ONE_TOOL ? "" : " at least");
+                           cursor.version == ONE_TOOL ? "" : " at least");
         return NULL;
     }
     Cine *cine = cine_create(&shape, count > 0 ? count : 1);
@@ -485,7 +499,7 @@ Cine *cine_unpack(const uint8_t *bytes, size_t length, const char *name, Faults 
     for (int i = 0; i < count && !fault; i++) {
         at = cursor.at;
         walk_frame(&cursor, cine, i);
-        fault = cursor.good ? frame_fault(cine, i) : "the centreline has no more nodes than the tools";
+        fault = cursor.good ? frame_fault(cine, i) : "neither centreline nor a tool has more nodes than the file's head says";
     }
     uint64_t sum = 0;
     WALK(&cursor, sum);

@@ -19,7 +19,7 @@ typedef struct Cine Cine;
 
 typedef struct CineShape {       // of each image
     int tool_count;              // 1 to 4
-    int tool_nodes[STEP_TOOLS_MAX];      // of each; the shared centreline has no more than all of them
+    int tool_nodes[STEP_TOOLS_MAX];      // of each at most; the shared centreline has no more than all of them
     int contrast_count;          // values of contrast agent: nodes of the vessel tree (0 without) and of all tools; 0: none
 } CineShape;
 CineShape cine_shape_for(const Pose *pose, int contrast_count);

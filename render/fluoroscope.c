@@ -44,8 +44,9 @@ static bool options_are_sound(const FluoroscopeOptions *options, char *message, 
     if (options->tools && (!options->pose || options->pose->tool_count != options->tools->count))
         return message_fail(message, capacity, "the pose is not one of the %d tools", options->tools->count);
     for (int k = 0; options->tools && k < options->tools->count; k++)
-        if (!tool_is_sound(&options->tools->tool[k], k, message, capacity))
-            return false;
+        for (int which = 0; which <= EXCHANGES_MOST; which++)
+            if (!tool_is_sound(tool_looks_of(options->tools, k, which), k, message, capacity))
+                return false;
     bool has_dose = options->quanta >= 0 && isfinite(options->quanta) && options->dsa_dose > 0;
     if (!has_dose || !(options->contrast_attenuation >= 0) || !(options->dsa_gain > 0.5))
         return message_fail(message, capacity, "contrast or quanta of fluoroscopy is negative, or DSA's gain not above 0.5, or its dose not above 0");
@@ -92,34 +93,41 @@ static bool wall_is_fit(const FluoroscopeOptions *options, MeshClosure *closure,
 
 static int lumen_nodes(const Fluoroscope *f) { return f->lumen.is_there ? f->lumen.node_count : 0; }
 
-static bool make_paths(Fluoroscope *f, const FluoroscopeOptions *options)
+// Of a tool that has as many nodes as ever in its place; NULL where it has another number of them than before, or memory lacks.
+static const RibbonPath *path_of(Fluoroscope *f, int k, const PoseTool *tool)
 {
-    bool good = true;
-    f->tool_count = options->tools ? options->tools->count : 0;
-    for (int k = 0; good && k < f->tool_count; k++) {
-        const PoseTool *tool = &options->pose->tool[k];
-        const ToolLook *look = &options->tools->tool[k];
+    int fitted = tool->fitted >= 0 && tool->fitted <= EXCHANGES_MOST ? tool->fitted : 0;
+    RibbonPath *path = &f->tool[k][fitted];
+    if (path->count == 0) {
+        const ToolLook *look = tool_looks_of(f->looks, k, fitted);
         double *s = malloc((size_t)tool->node_count * sizeof *s);
         for (int j = 0; s && j < tool->node_count; j++)
             s[j] = tool->node[j].s;
-        good = s && ribbon_path_make(&f->tool[k], tool->node_count, s, look->stretch_count, look->stretch);
+        bool good = s && ribbon_path_make(path, tool->node_count, s, look->stretch_count, look->stretch);
         free(s);
+        if (!good)
+            return NULL;
     }
-    return good;
+    return path->node_count == tool->node_count ? path : NULL;
 }
 
 static bool take_memory(Fluoroscope *f, const FluoroscopeOptions *options)
 {
     size_t tool_nodes = 1, nodes = (size_t)lumen_nodes(f) + 1;
-    for (int k = 0; options->tools && k < options->tools->count; k++)
-        tool_nodes += (size_t)options->pose->tool[k].node_count;
+    f->looks = options->tools;
+    f->tool_count = options->tools ? options->tools->count : 0;
+    for (int k = 0; k < f->tool_count; k++)
+        f->tool_room[k] = options->pose->tool[k].node_capacity, tool_nodes += (size_t)f->tool_room[k];
     f->shown.position = calloc(tool_nodes, sizeof *f->shown.position);
     f->shown.filling = calloc(tool_nodes, sizeof *f->shown.filling);
     f->shown.contrast = calloc(nodes, sizeof *f->shown.contrast);
     f->lumen_contrast = calloc(nodes, sizeof *f->lumen_contrast);
     f->bolus = calloc(nodes, sizeof *f->bolus);
     f->roadmap = calloc(nodes, sizeof *f->roadmap);
-    return f->shown.position && f->shown.filling && f->shown.contrast && f->lumen_contrast && f->bolus && f->roadmap && make_paths(f, options);
+    bool good = f->shown.position && f->shown.filling && f->shown.contrast && f->lumen_contrast && f->bolus && f->roadmap;
+    for (int k = 0; good && k < f->tool_count; k++)
+        good = path_of(f, k, &options->pose->tool[k]) != NULL;
+    return good;
 }
 
 Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message, size_t capacity)
@@ -178,7 +186,8 @@ void fluoroscope_destroy(Fluoroscope *f)
         layer_destroy(layer[i]);
     ribbon_free(&f->ribbon);
     for (int k = 0; k < f->tool_count; k++)
-        ribbon_path_free(&f->tool[k]);
+        for (int i = 0; i <= EXCHANGES_MOST; i++)
+            ribbon_path_free(&f->tool[k][i]);
     free(f->shown.position), free(f->shown.filling), free(f->shown.contrast);
     free(f->lumen_contrast), free(f->bolus), free(f->roadmap);
     free(f);
@@ -205,11 +214,11 @@ static bool is_seen(const float *contrast, int count)
     return false;
 }
 
-static bool has_these_tools(const Fluoroscope *f, const Pose *pose)
+static bool has_these_tools(Fluoroscope *f, const Pose *pose)
 {
     bool same = pose && pose->tool_count == f->tool_count;
     for (int k = 0; same && k < f->tool_count; k++)
-        same = pose->tool[k].node_count == f->tool[k].node_count;
+        same = pose->tool[k].node_count <= f->tool_room[k] && (f->shown.tool[k] = path_of(f, k, &pose->tool[k]));
     return same;
 }
 
@@ -367,9 +376,9 @@ static void lay_tools(Fluoroscope *f, int side)
     const float *filling = f->shown.filling;
     ribbon_begin(&f->ribbon);
     for (int k = 0; f->shown.has_tools && k < f->tool_count; k++) {
-        ribbon_add(&f->ribbon, &f->c_arm, side, &f->tool[k], position, filling, f->tone.contrast);
-        position += f->tool[k].node_count;
-        filling += f->tool[k].node_count;
+        ribbon_add(&f->ribbon, &f->c_arm, side, f->shown.tool[k], position, filling, f->tone.contrast);
+        position += f->shown.tool[k]->node_count;
+        filling += f->shown.tool[k]->node_count;
     }
     ribbon_end(&f->ribbon, side);
 }

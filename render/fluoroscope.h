@@ -24,9 +24,8 @@ typedef struct FluoroscopeOptions {
                                    // do not face one way is refused: the message says so and no contrast is drawn
     const int *vertex_node;        // (V) tree node of each vertex; NULL: mesh->node where `tree` is given and that fits, else the nearest
     const VesselTree *tree;        // NULL: the whole lumen is one node, 0
-    // tools; borrowed during create only
-    const ToolLooks *tools;        // NULL: none
-    const Pose *pose;              // any of these tools: how many nodes they have, at which arc lengths
+    const ToolLooks *tools;        // borrowed; NULL: none
+    const Pose *pose;              // any of these tools: how many nodes they have at most. Borrowed during create only
     // anatomy: a volume (recon/volume.h), or none: value NULL. Then a plain head, or a trunk where the vessel is larger than a head
     int anatomy_size[3];
     Vec3 anatomy_origin;           // [mm] centre of voxel (0,0,0)
@@ -47,7 +46,7 @@ Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message
 void fluoroscope_destroy(Fluoroscope *fluoroscope);
 
 typedef struct FluoroscopeFrame {
-    const Pose *pose;              // its tools' nodes are read, as many as the options' pose has. NULL: no tools
+    const Pose *pose;              // its tools' nodes are read, at most as many as the options' pose has room for. NULL: no tools
     const float *filling;          // (nodes of all tools, one tool after the other) contrast agent over the whole lumen about each node, what else lies in
                                    // it included: 0 to 1; NULL: none
     XrayControl xray;

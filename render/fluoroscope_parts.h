@@ -10,6 +10,7 @@ typedef struct Exposure {
     XrayControl xray;
     uint32_t pulse;
     bool has_tools;
+    const RibbonPath *tool[TOOLS_MOST];  // of the devices that were in
     Vec3 *position;              // (of all tools' nodes, one tool after the other)
     float *filling;              // (the same)
     float *contrast;             // (N)
@@ -22,7 +23,9 @@ typedef struct PictureLayers {
 struct Fluoroscope {
     FluoroscopeOptions options;  // what it points to is gone
     int tool_count;
-    RibbonPath tool[TOOLS_MOST];
+    const ToolLooks *looks;
+    int tool_room[TOOLS_MOST];   // nodes at most
+    RibbonPath tool[TOOLS_MOST][1 + EXCHANGES_MOST];     // of each device, made when it is first seen
     Anatomy anatomy;
     Lumen lumen;
     LayerPrograms programs;

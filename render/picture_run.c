@@ -144,7 +144,7 @@ static int lay_tool(RunDrawing *drawing, const PictureTool *tool, int k, const d
 {
     const Pose *pose = tool->pose;
     const PoseTool *own = &pose->tool[k];
-    const ToolLook *look = &tool->looks->tool[k];
+    const ToolLook *look = tool_looks_of(tool->looks, k, own->fitted);
     int whole = (int)end[k] + 1, count = whole, node = own->node_count - 2;
     for (int i = 0; i < whole; i++)
         drawing->point[i] = tool->position[i];

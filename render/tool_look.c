@@ -37,10 +37,10 @@ static void add_stretch(ToolLook *look, TubeStretch stretch)
         look->stretch[look->stretch_count++] = stretch;
 }
 
-static bool make_look(ToolLook *look, const Scene *scene, int k)
+static bool make_look(ToolLook *look, const Scene *scene, int k, int which)
 {
-    const WireOptions wire = scene_tool_wire(scene, k);
-    double marker = wire_length(&wire) - (k == 0 ? scene->marker_length : scene->tool[k].marker_length), begin = 0;
+    const WireOptions wire = scene_device_wire(scene, k, which);
+    double marker = wire_length(&wire) - scene_device_marker(scene, k, which), begin = 0;
     look->name = scene->tool[k].name;
     look->stretch = malloc(((size_t)wire.section_count + 1) * sizeof *look->stretch);
     for (int i = 0; look->stretch && i < wire.section_count; i++) {
@@ -51,7 +51,7 @@ static bool make_look(ToolLook *look, const Scene *scene, int k)
             if (!(cut[part + 1] > cut[part]))
                 continue;
             stretch.end = cut[part + 1];
-            stretch.attenuation = scene_tool_attenuation(scene, k, (cut[part] + cut[part + 1]) / 2);
+            stretch.attenuation = scene_device_attenuation(scene, k, which, (cut[part] + cut[part + 1]) / 2);
             add_stretch(look, stretch);
         }
         begin = end;
@@ -69,19 +69,30 @@ bool tool_looks_make(ToolLooks *looks, const Scene *scene)
         kind[k] = scene->tool[k].kind;
     for (int paper = 0; paper < 2; paper++)
         tool_colors(looks->count, kind, paper, color[paper]);
-    for (int k = 0; good && k < looks->count; k++) {
-        looks->tool[k].color = color[0][k];
-        looks->tool[k].on_paper = color[1][k];
-        good = make_look(&looks->tool[k], scene, k);
-    }
+    for (int k = 0; good && k < looks->count; k++)
+        for (int which = 0; good && which < scene_device_count(scene, k); which++) {
+            ToolLook *look = which == 0 ? &looks->tool[k] : &looks->spare[k][which - 1];
+            look->color = color[0][k];
+            look->on_paper = color[1][k];
+            good = make_look(look, scene, k, which);
+        }
     return good;
 }
 
 void tool_looks_free(ToolLooks *looks)
 {
-    for (int k = 0; k < looks->count; k++)
+    for (int k = 0; k < looks->count; k++) {
         free(looks->tool[k].stretch);
+        for (int i = 0; i < EXCHANGES_MOST; i++)
+            free(looks->spare[k][i].stretch);
+    }
     *looks = (ToolLooks){0};
+}
+
+const ToolLook *tool_looks_of(const ToolLooks *looks, int tool, int fitted)
+{
+    const ToolLook *spare = fitted > 0 && fitted <= EXCHANGES_MOST ? &looks->spare[tool][fitted - 1] : NULL;
+    return spare && spare->stretch_count > 0 ? spare : &looks->tool[tool];
 }
 
 const TubeStretch *tool_look_at(const ToolLook *look, double s)

@@ -21,11 +21,14 @@ typedef struct ToolLook {
 typedef struct ToolLooks {       // zeroed: none
     int count;
     ToolLook tool[TOOLS_MOST];   // outermost first
+    ToolLook spare[TOOLS_MOST][EXCHANGES_MOST];  // what may take their place, with the same name and colours; stretch_count 0: none
 } ToolLooks;
 
 // Of `scene`, which must outlive them. False where memory lacks; free them all the same.
 bool tool_looks_make(ToolLooks *looks, const Scene *scene);
 void tool_looks_free(ToolLooks *looks);
+// Of the device that is in (PoseTool.fitted).
+const ToolLook *tool_looks_of(const ToolLooks *looks, int tool, int fitted);
 // Where the arc length `s` lies; at a border what lies before it.
 const TubeStretch *tool_look_at(const ToolLook *look, double s);
 // Colours for tools of these kinds, told apart by the colour-blind too, on a dark ground or on paper: of each kind its own, of a kind that comes again one that

@@ -276,10 +276,10 @@ static int lay_line(VesselScene *scene, const Pose *pose, const double *end)
     return count;
 }
 
-static const TubeStretch *stretch_at(const VesselScene *scene, int tool, double s)
+static const TubeStretch *stretch_at(const VesselScene *scene, const Pose *pose, int tool, double s)
 {
     static const TubeStretch solid = {0};
-    return scene->tools && tool < scene->tools->count ? tool_look_at(&scene->tools->tool[tool], s) : &solid;
+    return scene->tools && tool < scene->tools->count ? tool_look_at(tool_looks_of(scene->tools, tool, pose->tool[tool].fitted), s) : &solid;
 }
 
 // [mm] by the tool's own nodes; `from` goes along.
@@ -325,14 +325,14 @@ static void add_tool(VesselScene *scene, const Pose *pose, int k, const double *
         scene->half[i] = p->half;
         Color here = node_color(pose, p->node, carries, own, look->force_full_scale_n);
         scene->color[i] = p->part > 0 ? mix_colors(here, node_color(pose, p->node + 1, carries, own, look->force_full_scale_n), p->part) : here;
-        has_lumen |= stretch_at(scene, k, s)->lumen > 0;
+        has_lumen |= stretch_at(scene, pose, k, s)->lumen > 0;
     }
     strokes_polyline(&scene->strokes, last - first, scene->point + first, scene->half + first, scene->color + first, !has_lumen);
     for (int i = first; i < last && has_lumen; i++) {
         LinePoint *p = &scene->line[i];
         bool is_open = p->inside > 0 && p->at >= pose->first_free_node;
         double s = length - (scene->line[last - 1].length - p->length), least = 0.9 * line + rim * (p->inside - 0.6);
-        scene->half[i] = is_open ? fmin(fmax(stretch_at(scene, k, s)->lumen / pixel, least), p->half - 0.4 * rim) : NAN;
+        scene->half[i] = is_open ? fmin(fmax(stretch_at(scene, pose, k, s)->lumen / pixel, least), p->half - 0.4 * rim) : NAN;
         scene->color[i] = color_with_alpha(LUMEN_COLOR, 0.8);
     }
     if (has_lumen)

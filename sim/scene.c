@@ -621,21 +621,25 @@ void scene_free(Scene *scene)
     free(scene);
 }
 
-double scene_tool_attenuation(const Scene *scene, int tool, double s)
+double scene_device_marker(const Scene *scene, int tool, int which)
 {
-    const WireOptions *wire = tool == 0 ? &scene->wire : &scene->tool[tool].wire;
-    double marker = tool == 0 ? scene->marker_length : scene->tool[tool].marker_length;
-    double marked = tool == 0 ? scene->marker_attenuation : scene->tool[tool].marker_attenuation;
-    double total = 0;
-    int at = -1;
-    for (int i = 0; i < wire->section_count; i++) {
-        total += wire->section[i].length;
-        if (at < 0 && (s < total || i == wire->section_count - 1))
-            at = i;
-    }
-    return at < 0 ? 0 : s > total - marker ? marked : wire->section[at].attenuation;
+    return tool == 0 && which == 0 ? scene->marker_length : scene_device(scene, tool, which)->marker_length;
 }
 
+double scene_device_attenuation(const Scene *scene, int tool, int which, double s)
+{
+    const WireOptions wire = scene_device_wire(scene, tool, which);
+    double marked = tool == 0 && which == 0 ? scene->marker_attenuation : scene_device(scene, tool, which)->marker_attenuation, total = 0;
+    int at = -1;
+    for (int i = 0; i < wire.section_count; i++) {
+        total += wire.section[i].length;
+        if (at < 0 && (s < total || i == wire.section_count - 1))
+            at = i;
+    }
+    return at < 0 ? 0 : s > total - scene_device_marker(scene, tool, which) ? marked : wire.section[at].attenuation;
+}
+
+double scene_tool_attenuation(const Scene *scene, int tool, double s) { return scene_device_attenuation(scene, tool, 0, s); }
 double scene_attenuation(const Scene *scene, double s) { return scene_tool_attenuation(scene, 0, s); }
 
 bool scene_keeps_its_tools(const Scene *scene, const char *what, Faults *faults)

@@ -108,6 +108,8 @@ ToolNames scene_tool_names(const Scene *scene);      // as scripts know them; li
 // [1/mm] by which the first tool, or any, takes X-rays away at arc length s from its proximal end.
 double scene_attenuation(const Scene *scene, double s);
 double scene_tool_attenuation(const Scene *scene, int tool, double s);
+double scene_device_attenuation(const Scene *scene, int tool, int which, double s);
+double scene_device_marker(const Scene *scene, int tool, int which);       // [mm] its length, 0: none
 // The file that the vessel comes from, a model or a mesh; NULL where it needs none.
 static inline const char *scene_needed_file(const Scene *scene) { return scene->source == SOURCE_MODEL ? scene->model_path : scene->mesh_path; }
 

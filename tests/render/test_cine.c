@@ -295,7 +295,12 @@ static Pose *coaxial_image(int image)
     for (int k = 0; k < 2; k++) {
         pose->tool[k].inserted_mm = 3 * k + image;
         pose->tool[k].push_n = 0.1 * k;
-        for (int j = 0; j < nodes[k]; j++)
+        // the inner one was exchanged for one of fewer nodes
+        if (k == 1 && image % 2) {
+            pose->tool[k].fitted = 2;
+            pose->tool[k].node_count = 5;
+        }
+        for (int j = 0; j < pose->tool[k].node_count; j++)
             pose->tool[k].node[j] = (ToolNode){j, vec3(j, image, k), quat_from_rotation_vector(vec3(0, j, k)), 0.4 - 0.2 * k, k - 1};
     }
     return pose;
@@ -335,6 +340,7 @@ static void several_tools_are_kept(void **state)
         assert_memory_equal(pose->position, expected->position, (size_t)pose->node_count * sizeof *pose->position);
         for (int k = 0; k < 2; k++) {
             assert_true(pose->tool[k].inserted_mm == expected->tool[k].inserted_mm && pose->tool[k].push_n == expected->tool[k].push_n);
+            assert_true(pose->tool[k].fitted == expected->tool[k].fitted && pose->tool[k].node_count == expected->tool[k].node_count);
             for (int j = 0; j < pose->tool[k].node_count; j++) {
                 const ToolNode *a = &pose->tool[k].node[j], *b = &expected->tool[k].node[j];
                 assert_true(a->s == b->s && vec3_distance(a->position, b->position) == 0 && a->orientation.z == b->orientation.z && a->radius == b->radius &&
@@ -361,6 +367,42 @@ static void several_tools_are_kept(void **state)
     free(bytes);
     cine_free(read);
     cine_free(cine);
+}
+
+// Version 2 knew no exchange: all nodes of each tool.
+static void loops_of_before_exchanges_are_read(void **state)
+{
+    (void)state;
+    Pose *pose = coaxial_image(0);
+    CineShape shape = cine_shape_for(pose, 0);
+    Cine *cine = cine_create(&shape, 4);
+    assert_true(cine && cine_record(cine) && cine_add(cine, &(CineFrame){pose, NULL, 1}));
+    size_t length;
+    uint8_t *bytes = cine_pack(cine, &length);
+    // the two counts of each tool stand behind its five figures, and are followed by its nodes: 4 and 6 of 76 bytes, then the checksum
+    size_t second = length - 8 - 6 * 76 - 8, first = second - 5 * 8 - 4 * 76 - 8;
+    const int32_t counts[2][2] = {{0, 4}, {0, 6}};
+    assert_memory_equal(bytes + first, counts[0], 8);
+    assert_memory_equal(bytes + second, counts[1], 8);
+    memmove(bytes + second, bytes + second + 8, length - second - 8);
+    memmove(bytes + first, bytes + first + 8, length - first - 16);
+    length -= 16;
+    const uint32_t version = 2;
+    memcpy(bytes + 8, &version, sizeof version);
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (size_t i = 0; i < length - 8; i++)
+        hash = (hash ^ bytes[i]) * 0x100000001b3u;
+    memcpy(bytes + length - 8, &hash, sizeof hash);
+    faults_clear(&faults);
+    Cine *read = cine_unpack(bytes, length, "two.cine", &faults);
+    if (!read)
+        fail_msg("%s", faults.text[0]);
+    const Pose *found = cine_frame(read, 0).pose;
+    assert_true(found->tool[1].node_count == 6 && found->tool[1].fitted == 0 && vec3_distance(found->tool[1].node[5].position, pose->tool[1].node[5].position) == 0);
+    free(bytes);
+    cine_free(read);
+    cine_free(cine);
+    pose_free(pose);
 }
 
 static void a_damaged_file_is_refused(void **state)
@@ -488,7 +530,7 @@ int main(void)
         cmocka_unit_test(pauses_of_the_pedal_are_left_out),
         cmocka_unit_test(an_empty_loop_shows_nothing),
         cmocka_unit_test(a_file_comes_back_the_same),
-        cmocka_unit_test(several_tools_are_kept),
+        cmocka_unit_test(several_tools_are_kept), cmocka_unit_test(loops_of_before_exchanges_are_read),
         cmocka_unit_test(a_damaged_file_is_refused),
         cmocka_unit_test(what_cannot_be_drawn_is_refused),
         cmocka_unit_test(a_movie_lasts_as_long_as_the_loop),

@@ -106,6 +106,55 @@ static void known_thickness_gives_known_grey(void **state)
     mesh_clear(&ball);
 }
 
+// A thicker device in the tool's place, with fewer nodes at other places: the same picture as if it had been there from the start; then the first one again.
+static void an_exchanged_tool_is_seen_as_it_is(void **state)
+{
+    (void)state;
+    TriangleMesh ball = ball_of(8, vec3(0, 0, 0));
+    FluoroscopeOptions options = quiet_room(&ball);
+    const Vec3 a = vec3(-30, 0, -3), b = vec3(30, 0, -3);
+    Tool rod = tool_make(31, a, b, 2, 0.15), thick = tool_make(21, a, b, 4, 0.1);
+    tool_give(&thick, &options);
+    XrayRoom *s = room_open(&options, 240);
+    if (!s)
+        skip();
+    s->frame.pose = thick.pose;
+    s->frame.pulse = 1;
+    room_draw(s);
+    double expected[2] = {room_grey(s, 20, 120 - 12), room_grey(s, 20, 120 - 12 + 12)}, first[2];
+    room_close(s);
+    tool_give(&rod, &options);
+    rod.looks.spare[0][0] = (ToolLook){.stretch_count = 1, .stretch = &thick.stretch};
+    s = room_open(&options, 240);
+    for (int turn = 0; turn < 3; turn++) {
+        Pose *pose = rod.pose;
+        if (turn == 1) {
+            pose->tool[0].fitted = 1;
+            pose->tool[0].node_count = thick.pose->tool[0].node_count;
+            memcpy(pose->tool[0].node, thick.pose->tool[0].node, (size_t)pose->tool[0].node_count * sizeof *pose->tool[0].node);
+        } else if (turn == 2) {
+            Tool again = tool_make(31, a, b, 2, 0.15);
+            pose_copy(pose, again.pose);
+            tool_free(&again);
+        }
+        s->frame.pose = pose;
+        s->frame.pulse++;
+        room_draw(s);
+        double seen[2] = {room_grey(s, 20, 120 - 12), room_grey(s, 20, 120 - 12 + 12)};
+        if (turn == 0)
+            memcpy(first, seen, sizeof first);
+        for (int i = 0; i < 2; i++)
+            assert_near(seen[i], turn == 1 ? expected[i] : first[i], 0);
+    }
+    assert_near(first[0], live_grey(0.15 * 4), 1.5);
+    assert_near(expected[0], live_grey(0.1 * 8), 1.5);
+    assert_true(first[1] > expected[1] + 5);       // 3 mm off the axis only the thick one is
+    room_close(s);
+    tool_free(&rod);
+    tool_free(&thick);
+    mesh_clear(&ball);
+}
+
 static void noise_is_that_of_the_quanta(void **state)
 {
     (void)state;
@@ -558,7 +607,7 @@ static void odd_frames_are_survived(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(known_thickness_gives_known_grey),      cmocka_unit_test(noise_is_that_of_the_quanta),
+        cmocka_unit_test(known_thickness_gives_known_grey), cmocka_unit_test(an_exchanged_tool_is_seen_as_it_is),      cmocka_unit_test(noise_is_that_of_the_quanta),
         cmocka_unit_test(the_same_pulse_gives_the_same_picture), cmocka_unit_test(blades_cover_what_they_are_set_to),
         cmocka_unit_test(dsa_shows_the_vessel_alone),            cmocka_unit_test(the_roadmap_keeps_the_last_bolus),
         cmocka_unit_test(without_pedal_the_last_image_holds),    cmocka_unit_test(a_mirrored_scene_gives_the_mirrored_picture),

@@ -26,6 +26,7 @@ static const char text[] = "seldinger: 1\n"
                            "    elements: 20\n"
                            "    sections: [{length_mm: 90, diameter_mm: 0.4, young_modulus_gpa: 20}]\n"
                            "    tip_marker: {length_mm: 0}\n"
+                           "    exchange: [{sections: [{length_mm: 100, diameter_mm: 0.6, young_modulus_gpa: 20}], tip_marker: {length_mm: 5, attenuation_1_mm: 7}}]\n"
                            "rig: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], fix: [{s_mm: 0, dof: all}]}\n";
 
 static void stretches_end_where_sections_and_markers_do(void **state)
@@ -54,6 +55,15 @@ static void stretches_end_where_sections_and_markers_do(void **state)
     assert_ptr_equal(tool_look_at(outer, -3), &outer->stretch[0]);
     assert_ptr_equal(tool_look_at(outer, 60.001), &outer->stretch[1]);
     assert_ptr_equal(tool_look_at(outer, 1000), &outer->stretch[2]);
+    // what may take the wire's place has its own section and marker, name and colours stay
+    const ToolLook *other = tool_looks_of(&looks, 1, 1);
+    assert_true(other != wire && other->stretch_count == 2 && other->name == wire->name && memcmp(&other->color, &wire->color, sizeof other->color) == 0);
+    assert_near(other->stretch[0].radius, 0.3, 1e-12);
+    assert_near(other->stretch[0].end, 95, 1e-12);
+    assert_near(other->stretch[1].attenuation, 7, 1e-12);
+    assert_ptr_equal(tool_looks_of(&looks, 1, 0), wire);
+    assert_ptr_equal(tool_looks_of(&looks, 1, 2), wire);
+    assert_ptr_equal(tool_looks_of(&looks, 0, 1), outer);
     tool_looks_free(&looks);
     scene_free(scene);
 }
