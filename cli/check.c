@@ -121,7 +121,7 @@ static ToolPath *run_path(Scene *scene, double duration_s, const CheckOptions *o
     OpenVessel open = {0};
     Sampling sampling = {0};
     Simulator *simulator = NULL;
-    if (scene_keeps_its_tools(scene, "a golden path", faults) && open_vessel(scene, options->threads, options->quiet, &open, faults) && open_vessel_inlet(scene, &open, faults))
+    if (open_vessel(scene, options->threads, options->quiet, &open, faults) && open_vessel_inlet(scene, &open, faults))
         simulator = simulator_create(scene, open.vessel, faults);
     if (simulator && (sampling.path = tool_path_create(simulator, duration_s))) {
         DriveOptions drive = drive_default_options();

@@ -532,12 +532,14 @@ static void print_tool_rows(FILE *out, const RecordedRun *run, int64_t frame)
 {
     int64_t step = run->frame_step[frame];
     for (int k = 0; k < run->tool_count; k++) {
-        const RecordedTool *tool = &run->tool[k];
-        for (int i = 0; i < tool->node_count; i++) {
-            int64_t at = frame * tool->node_count + i;
-            fprintf(out, "%.9g,%" PRId64 ",%s,%d,", run->time_s[step], step, tool->name, i);
-            print_place(out, tool->position[at], tool->quaternion[at]);
-            fprintf(out, ",%s\n", tool->carrier[at] < 0 ? "-" : run->tool[tool->carrier[at]].name);
+        const RecordedToolFrame at = recorded_run_tool_frame(run, k, frame);
+        for (int i = 0; i < at.node_count; i++) {
+            fprintf(out, "%.9g,%" PRId64 ",%s,%d,", run->time_s[step], step, run->tool[k].name, i);
+            print_place(out, at.position[i], at.quaternion[i]);
+            fprintf(out, ",%s", at.carrier[i] < 0 ? "-" : run->tool[at.carrier[i]].name);
+            if (run->exchange)
+                fprintf(out, ",%d", recorded_run_fitted(run, k, step));
+            fputc('\n', out);
         }
     }
 }
@@ -550,7 +552,7 @@ static bool export_rows(const ExportOptions *options, const RecordedRun *run, Fa
         faults_add(faults, options->out, 0, 0, "cannot be written: no memory");
         return false;
     }
-    fprintf(text.stream, "t_s,step,%snode,x_mm,y_mm,z_mm,qw,qx,qy,qz%s\n", several ? "tool," : "", several ? ",carrier" : "");
+    fprintf(text.stream, "t_s,step,%snode,x_mm,y_mm,z_mm,qw,qx,qy,qz%s%s\n", several ? "tool," : "", several ? ",carrier" : "", run->exchange ? ",exchange" : "");
     for (int64_t k = 0; k < run->frame_count; k++)
         (several ? print_tool_rows : print_frame_rows)(text.stream, run, k);
     return text_write(&text, options->out, faults);
@@ -569,9 +571,8 @@ static int lines_of(const RecordedRun *run, int64_t frame, FrameLine line[STEP_T
     RecordedFrame at = recorded_run_frame(run, frame);
     line[0] = (FrameLine){at.node_count, at.position, at.radius, NULL};
     for (int k = 0; run->tool_count > 1 && k < run->tool_count; k++) {
-        const RecordedTool *tool = &run->tool[k];
-        int64_t first = frame * tool->node_count;
-        line[k] = (FrameLine){tool->node_count, tool->position + first, tool->radius, tool->carrier + first};
+        const RecordedToolFrame own = recorded_run_tool_frame(run, k, frame);
+        line[k] = (FrameLine){own.node_count, own.position, own.radius, own.carrier};
     }
     return run->tool_count;
 }

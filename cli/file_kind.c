@@ -46,7 +46,7 @@ FileKind file_kind(const char *path)
     const char *name = strrchr(path, '.');
     if (strstr(text, "seldinger:") || (name && (!strcmp(name, ".yaml") || !strcmp(name, ".yml"))))
         return FILE_SCENE;
-    if (strstr(text, "t_s,") && (strstr(text, ".push_mm_s") || strstr(text, ".released")))
+    if (strstr(text, "t_s,") && (strstr(text, ".push_mm_s") || strstr(text, ".released") || strstr(text, ".exchange")))
         return FILE_SCRIPT;  // of several tools
     return surface_is_known(head, length, path) ? FILE_SURFACE : FILE_UNKNOWN;
 }

@@ -152,6 +152,23 @@ static bool describe_tree(cJSON *object, const char *path, TreeWishes *wishes, F
     return good;
 }
 
+// When which device took a tool's place.
+static void add_recorded_exchanges(cJSON *tool, const RecordedRun *run, int index)
+{
+    cJSON *list = cJSON_AddArrayToObject(tool, "exchanges");
+    int before = 0;
+    for (int64_t i = 0; i < run->step_count; i++) {
+        int fitted = recorded_run_fitted(run, index, i);
+        if (fitted != before) {
+            cJSON *exchange = cJSON_CreateObject();
+            cJSON_AddNumberToObject(exchange, "time_s", run->time_s[i] - run->step_ms / 1000);
+            cJSON_AddNumberToObject(exchange, "device", fitted);
+            cJSON_AddItemToArray(list, exchange);
+        }
+        before = fitted;
+    }
+}
+
 static void add_recorded_tools(cJSON *object, const RecordedRun *run)
 {
     cJSON *list = cJSON_AddArrayToObject(object, "tools");
@@ -160,11 +177,16 @@ static void add_recorded_tools(cJSON *object, const RecordedRun *run)
         cJSON *tool = cJSON_CreateObject();
         cJSON_AddStringToObject(tool, "name", own->name);
         cJSON_AddStringToObject(tool, "kind", own->kind);
-        cJSON_AddNumberToObject(tool, "length_mm", own->s[own->node_count - 1]);
+        RecordedToolFrame at = {.node_count = own->device_nodes[0], .s = own->s};
+        if (run->frame_count > 0)
+            at = recorded_run_tool_frame(run, k, run->frame_count - 1);
+        cJSON_AddNumberToObject(tool, "length_mm", at.s[at.node_count - 1]);
         if (run->step_count > 0)
             cJSON_AddNumberToObject(tool, "inserted_mm", own->inserted[run->step_count - 1]);
         if (run->frame_count > 0)
-            add_vector(tool, "tip_mm", own->position[run->frame_count * own->node_count - 1]);
+            add_vector(tool, "tip_mm", at.position[at.node_count - 1]);
+        if (run->exchange)
+            add_recorded_exchanges(tool, run, k);
         cJSON_AddItemToArray(list, tool);
     }
 }
@@ -264,6 +286,13 @@ static void add_tools(cJSON *object, const Scene *scene)
         cJSON_AddStringToObject(tool, "kind", tool_kind_name[scene->tool[k].kind]);
         cJSON_AddNumberToObject(tool, "length_mm", wire_length(&wire));
         cJSON_AddNumberToObject(tool, "inserted_mm", wire.inserted);
+        cJSON *spares = scene_device_count(scene, k) > 1 ? cJSON_AddArrayToObject(tool, "exchange") : NULL;
+        for (int i = 1; spares && i < scene_device_count(scene, k); i++) {
+            wire = scene_device_wire(scene, k, i);
+            cJSON *spare = cJSON_CreateObject();
+            cJSON_AddNumberToObject(spare, "length_mm", wire_length(&wire));
+            cJSON_AddItemToArray(spares, spare);
+        }
         cJSON_AddItemToArray(list, tool);
     }
 }
@@ -302,17 +331,22 @@ static bool describe_scene(cJSON *object, const char *path, Faults *faults)
 static void add_hand(cJSON *object, const Script *script, int tool)
 {
     double push = 0, twist = 0, released = 0;
+    int exchanges = 0, before = 0;
     for (int i = 0; i + 1 < script->count; i++) {
         double seconds = script->row[i + 1].t_s - script->row[i].t_s;
         const Command *command = script_row_command(&script->row[i], tool);
         push += command->push_mm_s * seconds;
         twist += command->twist_deg_s * seconds;
         released += script->row[i].released >> tool & 1 ? seconds : 0;
+        exchanges += script->row[i].fitted[tool] != before;
+        before = script->row[i].fitted[tool];
     }
     cJSON_AddNumberToObject(object, "push_mm", push);
     cJSON_AddNumberToObject(object, "twist_deg", twist);
     if (released > 0)
         cJSON_AddNumberToObject(object, "released_s", released);
+    if (exchanges > 0)
+        cJSON_AddNumberToObject(object, "exchanges", exchanges);
 }
 
 static bool describe_script(cJSON *object, const char *path, Faults *faults)

@@ -87,11 +87,15 @@ bool replay_write_scene(const RecordedRun *run, const Scene *scene, const char *
     good = good && rename_file(&text, "vessel.model", scene->model_path, whole, faults) && rename_file(&text, "vessel.mesh", scene->mesh_path, whole, faults) &&
            rename_file(&text, "vessel.tube.points", scene->tube_points_path, whole, faults) &&
            rename_file(&text, "fluoroscopy.volume", scene->anatomy_path, whole, faults);
-    for (int k = 0; good && k < scene->tool_count; k++) {
-        char key[32];
-        snprintf(key, sizeof key, "tools.%d.device", k);
-        good = rename_file(&text, key, scene->tool[k].device_path, whole, faults);
-    }
+    for (int k = 0; good && k < scene->tool_count; k++)
+        for (int i = 0; good && i < scene_device_count(scene, k); i++) {
+            char key[48];
+            if (i == 0)
+                snprintf(key, sizeof key, "tools.%d.device", k);
+            else
+                snprintf(key, sizeof key, "tools.%d.exchange.%d.device", k, i - 1);
+            good = rename_file(&text, key, scene_device(scene, k, i)->device_path, whole, faults);
+        }
     good = good && write_part(folder, "hand.csv", script, length, faults) && write_part(folder, "scene.yaml", text, strlen(text), faults);
     free(script);
     free(text);

@@ -169,9 +169,6 @@ static Scene *prepare_scene(const RunOptions *options, Faults *faults)
     } else {
         script_free(script);
     }
-    const char *follows = options->record ? "--record" : options->picture ? "--picture" : options->score ? "--score" : NULL;
-    if (scene && follows)
-        scene_keeps_its_tools(scene, follows, faults);
     if (scene && kind >= 0)
         scene->contact = (ContactKind)kind;
     if (scene && !scene->script && options->duration_s < 0 && options->settle_s < 0)

@@ -81,6 +81,8 @@ static void add_tools(cJSON *summary, Simulator *simulator)
         add_numbers(proximal, 2, (const char *const[]){"force_n", "torque_n_mm"}, (double[]){last->push[k], last->torque[k]});
         add_vector(tool, "tip_mm", node[count - 1].position);
         cJSON_AddNumberToObject(tool, "inserted_mm", stepper_tool_inserted(stepper, k));
+        if (scene_device_count(scene, k) > 1)
+            cJSON_AddNumberToObject(tool, "exchange", stepper_fitted(stepper, k));
         cJSON_AddItemToArray(tools, tool);
         free(node);
     }

@@ -293,8 +293,10 @@ static void draw_path(FILE *out, const RoadMap *map, const RecordedRun *run)
 static void draw_tool(FILE *out, const RoadMap *map, const RecordedRun *run)
 {
     RecordedFrame at = recorded_run_frame(run, run->frame_count - 1);
-    const RecordedTool *first = &run->tool[0];
-    double length = run->tool_count > 1 ? first->s[first->node_count - 1] : at.s[at.node_count - 1], shown = length - run->inserted[run->step_count - 1], x, y;
+    RecordedToolFrame first = {0};
+    if (run->tool_count > 1)
+        first = recorded_run_tool_frame(run, 0, run->frame_count - 1);
+    double length = run->tool_count > 1 ? first.s[first.node_count - 1] : at.s[at.node_count - 1], shown = length - run->inserted[run->step_count - 1], x, y;
     fprintf(out, "<polyline class=\"tool\" points=\"");
     for (int i = 0; i < at.node_count; i++) {
         if (at.s[i] < shown)

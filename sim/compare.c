@@ -175,7 +175,8 @@ ToolPath *tool_path_create(Simulator *simulator, double duration_s)
     path->tool_count = stepper_tool_count(stepper);
     for (int k = 0; k < path->tool_count; k++) {
         path->node_count[k] = stepper_tool_nodes(stepper, k, NULL);
-        most = path->node_count[k] > most ? path->node_count[k] : most;
+        int nodes = scene_most_nodes(simulator_scene(simulator), k);
+        most = nodes > most ? nodes : most;
     }
     if ((path->node = calloc((size_t)most, sizeof *path->node)))
         return path;

@@ -7,7 +7,8 @@
 //   t_s,node,x_mm,y_mm,z_mm
 //   0.05,0,-12.0000000,0.0000000,0.0000000
 //
-// Of several tools each has its own nodes, 0 the outermost; tools and nodes are counted in comments "# tools: 2", "# nodes of tool 0: 31", …:
+// Of several tools each has its own nodes, 0 the outermost; tools and nodes, those at the start, are counted in comments "# tools: 2", "# nodes of tool 0: 31", …
+// A tool that was exchanged has rows of the nodes of what is in:
 //
 //   t_s,tool,node,x_mm,y_mm,z_mm
 //   0.05,1,60,0.5000000,0.0000000,0.0000000
@@ -26,7 +27,7 @@ typedef struct PathRow {
 
 typedef struct ToolPath {
     int tool_count;
-    int node_count[STEP_TOOLS_MAX];  // of each tool, not of the rows
+    int node_count[STEP_TOOLS_MAX];  // of each tool at the start, not of the rows
     double duration_s;       // how long the run was asked to last
     int row_count, row_capacity;
     PathRow *row;            // by time, then by tool, then by node

@@ -641,15 +641,3 @@ double scene_device_attenuation(const Scene *scene, int tool, int which, double 
 
 double scene_tool_attenuation(const Scene *scene, int tool, double s) { return scene_device_attenuation(scene, tool, 0, s); }
 double scene_attenuation(const Scene *scene, double s) { return scene_tool_attenuation(scene, 0, s); }
-
-bool scene_keeps_its_tools(const Scene *scene, const char *what, Faults *faults)
-{
-    static const int first[TOOLS_MOST];
-    bool keeps = true;
-    for (int i = 0; scene->script && i < scene->script->count; i++)
-        keeps &= memcmp(scene->script->row[i].fitted, first, sizeof first) == 0;
-    if (!keeps)
-        faults_add(faults, scene->script_path ? scene->script_path : scene->path, 0, 0,
-                   "exchanges tools; %s cannot follow an exchange yet, `seldinger run` with --summary, --final and --chart does", what);
-    return keeps;
-}

@@ -102,8 +102,6 @@ const SceneTool *scene_device(const Scene *scene, int tool, int which);
 WireOptions scene_device_wire(const Scene *scene, int tool, int which);
 int scene_device_count(const Scene *scene, int tool);      // 1 where it cannot be exchanged
 int scene_most_nodes(const Scene *scene, int tool);        // of whichever device is in
-// A fault where the script exchanges tools and `what` cannot follow that.
-bool scene_keeps_its_tools(const Scene *scene, const char *what, Faults *faults);
 ToolNames scene_tool_names(const Scene *scene);      // as scripts know them; lives as long as the scene
 // [1/mm] by which the first tool, or any, takes X-rays away at arc length s from its proximal end.
 double scene_attenuation(const Scene *scene, double s);

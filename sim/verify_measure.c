@@ -38,8 +38,7 @@ VerifyMeasure *verify_measure_create(const VerifyPlan *plan, Simulator *simulato
     bool good = m->node && m->trace;
     for (int k = 0; k < stepper_tool_count(stepper); k++) {
         m->own_step[k] = -1;
-        m->own_count[k] = stepper_tool_nodes(stepper, k, NULL);
-        m->own[k] = calloc((size_t)m->own_count[k], sizeof *m->own[k]);
+        m->own[k] = calloc((size_t)scene_most_nodes(simulator_scene(simulator), k), sizeof *m->own[k]);
         good = good && m->own[k];
     }
     if (good)
@@ -74,7 +73,7 @@ static const ToolNode *own_now(VerifyMeasure *m, int tool)
 {
     int64_t step = simulator_totals(m->simulator)->steps;
     if (m->own_step[tool] != step)
-        stepper_tool_nodes(simulator_stepper(m->simulator), tool, m->own[tool]);
+        m->own_count[tool] = stepper_tool_nodes(simulator_stepper(m->simulator), tool, m->own[tool]);
     m->own_step[tool] = step;
     return m->own[tool];
 }
