@@ -8,7 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-char session_error_letter(ScoreError kind) { return "WTFBXCLK"[kind]; }
+static const char error_letter[] = "WTFBXCLKM";
+_Static_assert(sizeof error_letter == ERROR_COUNT + 1, "each error has its letter");
+char session_error_letter(ScoreError kind) { return error_letter[kind]; }
 
 // --- strips over time ---
 

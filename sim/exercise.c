@@ -11,35 +11,59 @@ static const double longest_s = 86400, largest = 1e6;
 Exercise exercise_default(void)
 {
     Exercise exercise = {.target = -1, .tool = -1, .hold_s = 2, .time_limit_s = 600, .rules = {.tip_length_mm = 5, .buckling = true}, .error_points = 5};
+    exercise.stays = exercise.stays_at = -1;
+    for (int k = 0; k < TOOLS_MOST; k++)
+        exercise.device[k] = -1;
     for (int i = 0; i < PART_COUNT; i++)
         exercise.weight[i] = 1;
     return exercise;
 }
 
-static void read_target(YamlValue value, int count, const char *const *names, Exercise *exercise)
+// Which of `names` the value is; -1 with a fault. `what`: "target", "tool".
+static int read_name(YamlValue value, const char *what, int count, const char *const *names)
 {
     const char *name;
     if (!yaml_text(value, &name))
-        return;
-    for (int i = 0; i < count && exercise->target < 0; i++)
-        if (!strcmp(name, names[i]))
-            exercise->target = i;
-    if (exercise->target < 0 && count > 0)
-        yaml_fault(value, "'%.60s' is no target of this scene; the first of its %d is '%s'", name, count, names[0]);
-    else if (exercise->target < 0)
-        yaml_fault(value, "the scene has no 'targets'; an exercise needs one");
-}
-
-static void read_tool(YamlValue value, int count, const char *const *names, Exercise *exercise)
-{
-    const char *name;
-    if (count == 0 || !yaml_text(value, &name))
-        return;
+        return -1;
     for (int i = 0; i < count; i++)
         if (!strcmp(name, names[i]))
-            exercise->tool = i;
-    if (exercise->tool < 0)
-        yaml_fault(value, "'%.60s' is no tool of this scene; the first of its %d is '%s'", name, count, names[0]);
+            return i;
+    if (count > 0)
+        yaml_fault(value, "'%.60s' is no %s of this scene; the first of its %d is '%s'", name, what, count, names[0]);
+    return -1;
+}
+
+static int read_target(YamlValue value, const ExerciseScene *scene)
+{
+    int target = read_name(value, "target", scene->target_count, scene->target);
+    if (value.node && scene->target_count == 0)
+        yaml_fault(value, "the scene has no 'targets'; an exercise needs one");
+    return target;
+}
+
+// Which device each tool has to be.
+static void read_devices(YamlValue value, const ExerciseScene *scene, int device[TOOLS_MOST])
+{
+    const char *keys[TOOLS_MOST + 1] = {0};
+    for (int k = 0; k < scene->tool_count; k++)
+        keys[k] = scene->tool[k];
+    if (scene->tool_count == 0)
+        return;
+    YamlMap map = yaml_map(value, keys);
+    for (int k = 0; map.value.node && k < scene->tool_count; k++)
+        if (yaml_has(&map, keys[k]))
+            yaml_integer(yaml_get(&map, keys[k], false), 0, scene->device_count[k] - 1, &device[k]);
+}
+
+static void read_stay(YamlValue value, const ExerciseScene *scene, Exercise *exercise)
+{
+    static const char *const keys[] = {"tool", "target", NULL};
+    YamlMap map = yaml_map(value, keys);
+    if (!map.value.node)
+        return;
+    if (scene->tool_count > 0)
+        exercise->stays = read_name(yaml_get(&map, "tool", true), "tool", scene->tool_count, scene->tool);
+    exercise->stays_at = read_target(yaml_get(&map, "target", true), scene);
 }
 
 static void read_texts(const YamlMap *map, Exercise *exercise)
@@ -79,17 +103,22 @@ static void read_rules(YamlValue value, ExerciseRules *rules)
         yaml_boolean(yaml_get(&map, "buckling", false), &rules->buckling);
 }
 
-void exercise_read(YamlValue value, int target_count, const char *const *target_name, int tool_count, const char *const *tool_name, Exercise *exercise)
+void exercise_read(YamlValue value, const ExerciseScene *scene, Exercise *exercise)
 {
-    static const char *const keys[] = {"title", "instructions", "target", "tool", "hold_s", "time_limit_s", "rules", "par", "weights", "error_points", NULL};
+    static const char *const keys[] = {"title", "instructions", "target", "tool",    "exchange",     "stays", "hold_s",
+                                       "time_limit_s", "rules", "par", "weights", "error_points", NULL};
     *exercise = exercise_default();
     YamlMap map = yaml_map(value, keys);
     if (!map.value.node)
         return;
     read_texts(&map, exercise);
-    read_target(yaml_get(&map, "target", true), target_count, target_name, exercise);
-    if (yaml_has(&map, "tool"))
-        read_tool(yaml_get(&map, "tool", false), tool_count, tool_name, exercise);
+    exercise->target = read_target(yaml_get(&map, "target", true), scene);
+    if (yaml_has(&map, "tool") && scene->tool_count > 0)
+        exercise->tool = read_name(yaml_get(&map, "tool", false), "tool", scene->tool_count, scene->tool);
+    if (yaml_has(&map, "exchange"))
+        read_devices(yaml_get(&map, "exchange", false), scene, exercise->device);
+    if (yaml_has(&map, "stays"))
+        read_stay(yaml_get(&map, "stays", false), scene, exercise);
     yaml_map_number(&map, "hold_s", false, (NumberRange){0, 60, false}, &exercise->hold_s);
     yaml_map_number(&map, "time_limit_s", false, (NumberRange){0, longest_s, true}, &exercise->time_limit_s);
     read_rules(yaml_get(&map, "rules", false), &exercise->rules);

@@ -7,6 +7,8 @@
 //       Advance through the siphon …
 //     target: aneurysm                      # required: the name of one of the scene's targets
 //     tool: microcatheter                   # whose tip has to reach it; default: that of whichever tool is furthest in
+//     exchange: {wire: 1}                   # the target counts only while these devices are in: 0 the tool itself, 1, 2, … those of its `exchange:`; default: any
+//     stays: {tool: catheter, target: left carotid}     # once its tip has been in that target for hold_s it must not leave it; default: none
 //     hold_s: 2                             # 0 to 60: the tip stays within the target that long
 //     time_limit_s: 600                     # above 0, to 86,400: from the first movement or X-ray on
 //     rules:                                # what is counted as a handling error; 0: not judged
@@ -31,6 +33,7 @@
 #ifndef SELDINGER_SIM_EXERCISE_H
 #define SELDINGER_SIM_EXERCISE_H
 
+#include "input/input.h"
 #include "input/yaml_reader.h"
 
 enum { EXERCISE_TITLE = 96, EXERCISE_TEXT_MOST = 4000 };
@@ -56,6 +59,8 @@ typedef struct Exercise {
     char *instructions;          // "" where there are none; owned
     int target;                  // index of the scene's targets; -1 in exercise_default
     int tool;                    // index of the scene's tools; -1: whichever is furthest in
+    int device[TOOLS_MOST];      // that has to be in of each tool; -1: any
+    int stays, stays_at;         // the tool whose tip must not leave a target once it has come there, and which target; -1: none
     double hold_s, time_limit_s;
     ExerciseRules rules;
     double par[PART_COUNT];      // s, s, ml, ratio, N, N s; 0: not judged
@@ -65,8 +70,13 @@ typedef struct Exercise {
 
 // What holds where the scene says nothing: 2 s, 600 s, buckling only, no par, all weights 1, 5 points an error.
 Exercise exercise_default(void);
-// Reads the value of `exercise:`; `target_name` and `tool_name` (0 where they could not be read) are the scene's. Faults go to the reader; the caller frees.
-void exercise_read(YamlValue value, int target_count, const char *const *target_name, int tool_count, const char *const *tool_name, Exercise *exercise);
+typedef struct ExerciseScene {   // what an exercise may name; counts are 0 where it could not be read
+    int target_count, tool_count;
+    const char *const *target, *tool[TOOLS_MOST];
+    int device_count[TOOLS_MOST];
+} ExerciseScene;
+// Reads the value of `exercise:`. Faults go to the reader; the caller frees.
+void exercise_read(YamlValue value, const ExerciseScene *scene, Exercise *exercise);
 void exercise_free(Exercise *exercise);
 
 #endif

@@ -460,14 +460,15 @@ static void read_targets(Reading *reading, YamlValue value)
 static void read_exercise(Reading *reading, YamlValue value)
 {
     Scene *scene = reading->scene;
-    const char **name = scene_zeroed(reading, scene->target_count, sizeof *name), *tool[TOOLS_MOST];
+    const char **name = scene_zeroed(reading, scene->target_count, sizeof *name);
+    ExerciseScene named = {.target_count = scene->target_count, .tool_count = scene->tool_count, .target = name};
     scene->exercise = scene_zeroed(reading, 1, sizeof *scene->exercise);
     for (int i = 0; name && i < scene->target_count; i++)
         name[i] = scene->target[i].name;
     for (int k = 0; k < scene->tool_count; k++)
-        tool[k] = scene->tool[k].name;
+        named.tool[k] = scene->tool[k].name, named.device_count[k] = scene_device_count(scene, k);
     if (name && scene->exercise)
-        exercise_read(value, scene->target_count, name, scene->tool_count, tool, scene->exercise);
+        exercise_read(value, &named, scene->exercise);
     free(name);
 }
 

@@ -7,10 +7,11 @@
 #include <stdlib.h>
 
 const char *const score_error_name[ERROR_COUNT + 1] = {"wrong_branch", "tip_force", "wall_force", "buckling", "blind", "contrast",
-                                                        "wire_lost",    "kick",      NULL};
+                                                        "wire_lost",    "kick",      "tip_moved", NULL};
 const char *const score_error_words[ERROR_COUNT] = {"wrong branch",          "tip force above the limit", "wall force above the limit",
                                                     "buckling at the sheath", "tool moved without X-rays", "too much contrast agent",
-                                                    "wire lost in the catheter", "tip jumped while its hand rested"};
+                                                    "wire lost in the catheter", "tip jumped while its hand rested",
+                                                    "tip left the place that it should keep"};
 const char *const score_state_name[5] = {"waiting", "running", "reached", "time_out", NULL};
 
 static const double LOOK_MS = 10;            // between looks at where in the tree the tip is
@@ -33,7 +34,9 @@ struct Score {
     ScoreEpisode episode[ERROR_COUNT];       // of what is no single tool's
     double pulse_phase;          // of the next X-ray pulse, 1: now
     bool had_pedal;
-    int64_t held_steps;
+    int64_t held_steps, stood_steps;         // within the target; the tool that stays within its own
+    bool stands;                 // it has come to stay …
+    Vec3 stood_at;               // … there
     int event_count;
     ScoreEvent event[SCORE_EVENTS_MOST];
 };
@@ -225,6 +228,35 @@ static void watch_xrays(Score *score, const XrayControl *xray, double moved, dou
 
 // --- the tool ---
 
+static bool has_its_devices(const Score *score)
+{
+    for (int k = 0; k < score->tool_count; k++)
+        if (score->exercise.device[k] >= 0 && score->exercise.device[k] != score->tool[k].fitted)
+            return false;
+    return true;
+}
+
+// The tool that stays: once its tip has come to its place, whether it keeps it.
+static void watch_stay(Score *score, double now_s)
+{
+    int k = score->exercise.stays;
+    if (k < 0)
+        return;
+    const SceneTarget *place = &score->scene->target[score->exercise.stays_at];
+    ScoreToolFigures *f = &score->figures.tool[k];
+    Vec3 tip = score->tool[k].at;
+    bool is_there = vec3_distance(tip, place->point) <= place->radius;
+    score->stood_steps = is_there ? score->stood_steps + 1 : 0;
+    if (!score->stands && (double)score->stood_steps * score->dt / 1000 >= score->exercise.hold_s - 1e-9) {
+        score->stands = true;
+        score->stood_at = tip;
+    }
+    if (!score->stands)
+        return;
+    f->strayed_mm = fmax(f->strayed_mm, vec3_distance(tip, score->stood_at));
+    judge(score, ERROR_TIP_MOVED, k, !is_there, is_there, QUIET_MS, score->dt, now_s);
+}
+
 static void watch_tip(Score *score, Vec3 tip)
 {
     ScoreFigures *f = &score->figures;
@@ -237,7 +269,7 @@ static void watch_tip(Score *score, Vec3 tip)
         return;
     const SceneTarget *target = &score->scene->target[score->exercise.target];
     f->target_distance_mm = vec3_distance(tip, target->point);
-    score->held_steps = f->target_distance_mm <= target->radius ? score->held_steps + 1 : 0;
+    score->held_steps = f->target_distance_mm <= target->radius && has_its_devices(score) ? score->held_steps + 1 : 0;
     f->held_s = (double)score->held_steps * score->dt / 1000;
 }
 
@@ -264,7 +296,8 @@ static void watch_tools(Score *score, const Stepper *stepper, const ToolCommands
         judge_limit(score, ERROR_KICK, k, own->kick_mm_s, rules->kick_mm_s, AGAIN, score->dt, now_s);
         if (k == 0)
             continue;
-        bool judged = rules->wire_behind_mm > 0;
+        // one that may be exchanged comes out for that: what is lost is the way on for the tool around it
+        bool judged = rules->wire_behind_mm > 0 && (scene_device_count(score->scene, k) == 1 || tool->episode[ERROR_WIRE_LOST].is_on || commands->tool[k - 1].push_mm_s > 0);
         judge(score, ERROR_WIRE_LOST, k, own->spare_mm < tool->hub_limit || (judged && own->behind_mm > rules->wire_behind_mm),
               own->spare_mm > tool->hub_limit && !(judged && own->behind_mm > AGAIN * rules->wire_behind_mm), QUIET_MS, score->dt, now_s);
     }
@@ -360,6 +393,16 @@ static bool is_moved(const Score *score, const ToolCommands *commands)
     return moves;
 }
 
+// What was exchanged in this step is another tool, and the others' hubs are elsewhere.
+static void refit_tools(Score *score, Simulator *simulator)
+{
+    bool was_exchanged = false;
+    for (int k = 0; k < score->tool_count; k++)
+        was_exchanged |= stepper_fitted(simulator_stepper(simulator), k) != score->tool[k].fitted;
+    for (int k = 0; was_exchanged && k < score->tool_count; k++)
+        score_tool_refit(&score->tool[k], simulator, &score->figures.tool[k]);
+}
+
 void score_step(Score *score, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray)
 {
     ScoreFigures *f = &score->figures;
@@ -372,6 +415,7 @@ void score_step(Score *score, Simulator *simulator, const ToolCommands *commands
         f->state = SCORE_RUNNING;
         f->start_s = now_s - score->dt / 1000;
     }
+    refit_tools(score, simulator);
     double moved = watch_sheath(score, stepper, commands, now_s);
     if (f->state == SCORE_WAITING)       // tools that settle by themselves are nobody's doing
         return;
@@ -380,6 +424,7 @@ void score_step(Score *score, Simulator *simulator, const ToolCommands *commands
     watch_xrays(score, xray, moved, now_s);
     watch_tip(score, score->tool[led].at);
     watch_tools(score, stepper, commands, now_s);
+    watch_stay(score, now_s);
     watch_forces(score, simulator_last(simulator), now_s);
     score->since_look += score->dt;
     if (score->since_look >= LOOK_MS * (1 - 1e-9))

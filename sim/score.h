@@ -29,9 +29,13 @@
 //   blind         the tools were moved by more than blind_mm since the pedal was last down; of tools that move together the fastest counts
 //   contrast      more than contrast_ml in all; once
 //   wire lost     an inner tool's tip lies more than wire_behind_mm behind the tip of the tool around it, or its proximal end has been drawn to less than
-//                 1 mm from that one's hub, where no hand holds it any more
+//                 1 mm from that one's hub, where no hand holds it any more. One that may be exchanged has to come out for that: its tip may be behind while
+//                 the tool around it is not pushed
 //   kick          a tool's tip moves faster than kick_mm_s, mean of its velocity over 20 ms, while its own hand has rested for 0.1 s: another tool's
 //                 friction or bending stiffness was stored in it and let go
+//   tip moved     the tip of the tool that stays has left its target, in which it had been for hold_s
+//
+// At an exchange nothing is moved: what takes a tool's place is measured afresh from there, its length, its tip, its shape at the sheath.
 #ifndef SELDINGER_SIM_SCORE_H
 #define SELDINGER_SIM_SCORE_H
 
@@ -39,7 +43,7 @@
 #include "sim/xray.h"
 
 typedef enum { ERROR_WRONG_BRANCH, ERROR_TIP_FORCE, ERROR_WALL_FORCE, ERROR_BUCKLING, ERROR_BLIND, ERROR_CONTRAST, ERROR_WIRE_LOST,
-               ERROR_KICK, ERROR_COUNT } ScoreError;
+               ERROR_KICK, ERROR_TIP_MOVED, ERROR_COUNT } ScoreError;
 extern const char *const score_error_name[ERROR_COUNT + 1];    // in files: "wrong_branch", "tip_force", …; NULL at the end
 extern const char *const score_error_words[ERROR_COUNT];       // on screens: "wrong branch", "tip force above the limit", …
 
@@ -61,6 +65,7 @@ typedef struct ScoreToolFigures {
     double lost_mm, lost_limit_mm;       // length lost next to the mouth and what may be (buckling); limit 0: not known yet
     double behind_mm;            // its tip lies so far behind the tip of the tool around it, >= 0
     double spare_mm;             // its proximal end lies so far behind that one's hub, >= 0
+    double strayed_mm;           // of the tool that stays: the most that its tip was away from where it had come to stay
     int tip_node;                // node of the tree at which its tip is; -1 without tree
     double off_way_mm;           // beyond the mouth of a branch that leads elsewhere; 0 on the way
 } ScoreToolFigures;

@@ -10,8 +10,9 @@ static const struct Figure {
     const char *name;
     size_t offset;
     double most;                 // from 0
+    bool is_later;               // earlier versions did not know it
 } figure_table[] = {
-#define FIGURE(name, most) {#name, offsetof(ScoreFigures, name), most}
+#define FIGURE(name, most) {#name, offsetof(ScoreFigures, name), most, false}
     FIGURE(points, 100),
     FIGURE(start_s, 1e7),
     FIGURE(time_s, 1e7),
@@ -38,9 +39,10 @@ enum { FIGURES = sizeof figure_table / sizeof figure_table[0] };
 static const char *const other_key[] = {"state", "has_exercise", "has_xray", "pulses", "error_total", "parts", "errors", "tools"};
 // Of a tool. What goes on at the moment is not written.
 static const struct Figure tool_table[] = {
-#define FIGURE(name, most) {#name, offsetof(ScoreToolFigures, name), most}
+#define FIGURE(name, most) {#name, offsetof(ScoreToolFigures, name), most, false}
     FIGURE(inserted_mm, 1e12), FIGURE(withdrawn_mm, 1e12), FIGURE(tip_force_peak_n, 1e12), FIGURE(kick_peak_mm_s, 1e12),
     FIGURE(behind_mm, 1e9), FIGURE(spare_mm, 1e9),
+    {"strayed_mm", offsetof(ScoreToolFigures, strayed_mm), 1e9, true},
 #undef FIGURE
 };
 enum { TOOL_FIGURES = sizeof tool_table / sizeof tool_table[0] };
@@ -173,6 +175,8 @@ static bool read_flag(const JsonReading *reading, const cJSON *object, const cha
 static void read_figures(const JsonReading *reading, const cJSON *object, const char *where, int count, const struct Figure *table, void *figures)
 {
     for (int i = 0; i < count; i++) {
+        if (table[i].is_later && !cJSON_GetObjectItemCaseSensitive(object, table[i].name))
+            continue;
         double value = json_number(reading, object, where, table[i].name, 0, table[i].most);
         memcpy((char *)figures + table[i].offset, &value, sizeof value);
     }

@@ -21,6 +21,14 @@ void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, double lum
                             .last_inserted = inserted};
 }
 
+void score_sheath_refit(ScoreSheath *sheath, const WireOptions *wire, double inserted)
+{
+    const ScoreSheath before = *sheath;
+    score_sheath_start(sheath, wire, before.lumen_radius, inserted);
+    sheath->turn = before.turn;
+    sheath->turn_is_known = before.turn_is_known;
+}
+
 double score_sheath_step(ScoreSheath *sheath, const Stepper *stepper, int tool, double dt)
 {
     double inserted = stepper_tool_inserted(stepper, tool), fed = inserted - sheath->last_inserted;

@@ -19,6 +19,8 @@ typedef struct ScoreSheath {
 } ScoreSheath;
 
 void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, double lumen_radius, double inserted);
+// Another tool in its place: mouth, lumen and the vessel's turn stay.
+void score_sheath_refit(ScoreSheath *sheath, const WireOptions *wire, double inserted);
 // The vessel's centreline from the mouth on, `count` points: sets the turn, by chords of one lumen diameter.
 void score_sheath_set_line(ScoreSheath *sheath, const Vec3 *point, int count);
 // Tool `tool` after a step of `dt` [ms]. Returns what was fed in [mm].

@@ -18,19 +18,43 @@ static void measure_ends(const ScoreTool *tool, const Stepper *stepper, ScoreToo
     f->spare_mm = fmax(tool->length - own - (stepper_tool_length(stepper, tool->index - 1) - around), 0);
 }
 
+// Where its tip is, and how near its end may come to the hub.
+static void find_ends(ScoreTool *tool, const Stepper *stepper, ScoreToolFigures *figures)
+{
+    tool->at = stepper_tool_place(stepper, tool->index, tool->length).position;
+    measure_ends(tool, stepper, figures);
+    tool->hub_limit = tool->index > 0 ? fmin(HUB_MM, figures->spare_mm / 2) : 0;
+}
+
 bool score_tool_create(ScoreTool *tool, Simulator *simulator, int index, double lumen_radius, double tip_length, ScoreToolFigures *figures)
 {
     const Scene *scene = simulator_scene(simulator);
     const Stepper *stepper = simulator_stepper(simulator);
     WireOptions wire = scene_tool_wire(scene, index);
-    *tool = (ScoreTool){.index = index, .length = stepper_tool_length(stepper, index)};
+    *tool = (ScoreTool){.index = index, .length = stepper_tool_length(stepper, index), .tip_length = tip_length};
     *figures = (ScoreToolFigures){.tip_node = -1};
     memcpy(figures->name, scene->tool[index].name, sizeof figures->name);
     score_sheath_start(&tool->sheath, &wire, lumen_radius, stepper_tool_inserted(stepper, index));
-    tool->at = stepper_tool_place(stepper, index, tool->length).position;
-    measure_ends(tool, stepper, figures);
-    tool->hub_limit = index > 0 ? fmin(HUB_MM, figures->spare_mm / 2) : 0;
+    find_ends(tool, stepper, figures);
     return score_tip_create(&tool->tip, stepper, index, &wire, tip_length);
+}
+
+void score_tool_refit(ScoreTool *tool, Simulator *simulator, ScoreToolFigures *figures)
+{
+    const Stepper *stepper = simulator_stepper(simulator);
+    int fitted = stepper_fitted(stepper, tool->index);
+    double inserted = stepper_tool_inserted(stepper, tool->index);
+    if (fitted != tool->fitted) {
+        WireOptions wire = scene_device_wire(simulator_scene(simulator), tool->index, fitted);
+        tool->fitted = fitted;
+        tool->length = stepper_tool_length(stepper, tool->index);
+        tool->drift = vec3(0, 0, 0);
+        tool->rested = 0;
+        score_sheath_refit(&tool->sheath, &wire, inserted);
+        score_tip_create(&tool->tip, stepper, tool->index, &wire, tool->tip_length);     // of several tools nothing is made
+    }
+    tool->sheath.last_inserted = inserted;
+    find_ends(tool, stepper, figures);
 }
 
 double score_tool_feed(ScoreTool *tool, const Stepper *stepper, double dt, ScoreToolFigures *f)

@@ -13,7 +13,9 @@ typedef struct ScoreEpisode {
 
 typedef struct ScoreTool {
     int index;                   // of the scene's tools
+    int fitted;                  // which of its devices it is
     double length;               // [mm]
+    double tip_length;           // [mm]
     ScoreTip tip;
     ScoreSheath sheath;
     Vec3 at;                     // its tip
@@ -25,6 +27,8 @@ typedef struct ScoreTool {
 
 // `lumen_radius` [mm] of the vessel at the mouth, HUGE_VAL where nothing says it. False where memory lacks.
 bool score_tool_create(ScoreTool *tool, Simulator *simulator, int index, double lumen_radius, double tip_length, ScoreToolFigures *figures);
+// Between a step in which any tool was exchanged and score_tool_feed(): goes on from where the tools are then. Allocates nothing.
+void score_tool_refit(ScoreTool *tool, Simulator *simulator, ScoreToolFigures *figures);
 // After a step of `dt` [ms]: what was fed [mm]. Sheath and ends only: a tool that settles by itself before anyone acts has no forces to answer for.
 double score_tool_feed(ScoreTool *tool, const Stepper *stepper, double dt, ScoreToolFigures *figures);
 void score_tool_watch(ScoreTool *tool, const Stepper *stepper, const ToolCommands *commands, double dt, ScoreToolFigures *figures);

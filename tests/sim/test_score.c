@@ -54,6 +54,13 @@ static void a_wrong_exercise_is_refused(void **state)
         {IN_THE_OPEN EXERCISE(", tool: catheter"), "no tool of this scene; the first of its 1 is 'wire'"},
         {TWO_IN_THE_OPEN EXERCISE(", tool: guide"), "the first of its 2 is 'catheter'"},
         {IN_THE_OPEN EXERCISE(", rules: {wire_behind_mm: -1}"), "out of range"},
+        {IN_THE_OPEN EXERCISE(", exchange: {wire: 1}"), "0 to 0"},
+        {IN_THE_OPEN EXERCISE(", exchange: {catheter: 1}"), "valid: wire"},
+        {IN_THE_OPEN EXERCISE(", exchange: 1"), "no map"},
+        {IN_THE_OPEN EXERCISE(", stays: {target: there}"), "lacks the key 'tool'"},
+        {IN_THE_OPEN EXERCISE(", stays: {tool: wire}"), "lacks the key 'target'"},
+        {IN_THE_OPEN EXERCISE(", stays: {tool: guide, target: there}"), "'guide' is no tool of this scene"},
+        {IN_THE_OPEN EXERCISE(", stays: {tool: wire, target: their}"), "'their' is no target of this scene"},
         {IN_THE_OPEN EXERCISE(", rules: {kick_mm_s: fast}"), "kick_mm_s"},
         {IN_THE_OPEN EXERCISE(", hold: 2"), "'hold_s'"},
         {IN_THE_OPEN EXERCISE(", hold_s: -1"), "out of range"},
@@ -593,6 +600,104 @@ static void a_catheter_kicks_when_its_wire_leaves(void **state)
     assert_true(peak[0] > 1 && peak[1] > 3 * peak[0]);
 }
 
+#define A_SPARE_WIRE                                                                                                                                           \
+    "seldinger: 1\n"                                                                                                                                           \
+    "tools:\n"                                                                                                                                                 \
+    "  - {name: catheter, kind: catheter, elements: 30, inserted_mm: 2, sections: [{length_mm: 60, diameter_mm: 1, inner_diameter_mm: 0.7, "                   \
+    "young_modulus_gpa: 0.5, density_g_cm3: 1.5}], damping: {mass_1_s: 1, stiffness_s: 0.0005},\n"                                                             \
+    "     exchange: [{elements: 20, sections: [{length_mm: 50, diameter_mm: 1, inner_diameter_mm: 0.7, young_modulus_gpa: 0.5, density_g_cm3: 1.5}]}]}\n"      \
+    "  - {name: wire, kind: wire, elements: 40, inserted_mm: 2, sections: [{length_mm: 100, diameter_mm: 0.4, young_modulus_gpa: 20}],\n"                      \
+    "     exchange: [{elements: 50, sections: [{length_mm: 115, diameter_mm: 0.5, young_modulus_gpa: 60}]}]}\n"                                                \
+    "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n" AT(20)
+
+static ScoreFigures go_with(Practice *p, double outer_mm_s, double inner_mm_s, int catheter, int wire, double seconds)
+{
+    const ToolCommands commands = {.tool = {{outer_mm_s, 0}, {inner_mm_s, 0}}, .fitted = {catheter, wire}};
+    for (int i = 0; i < (int)(seconds * 1000 + 0.5); i++)
+        practice_step_tools(p, &commands);
+    return score_figures(p->score);
+}
+
+// A wire that is exchanged is neither lost on its way out nor does its place jump; the new one has its own length. Then the catheter is, over it.
+static void an_exchange_is_no_error(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(A_SPARE_WIRE EXERCISE(", tool: wire, hold_s: 0.2, rules: {wire_behind_mm: 4, kick_mm_s: 20}"), NULL);
+    go_with(p, 10, 10, 0, 0, 0.5);
+    ScoreFigures f = go_with(p, 0, -100, 0, 0, 0.8);
+    double out = f.withdrawn_mm, spare = f.tool[1].spare_mm;
+    assert_near(f.tool[1].behind_mm, 60, 1.1);       // at the hub
+    assert_near(spare, 100, 1.1);
+    assert_true(out > 58);
+    f = go_with(p, 0, 0, 0, 1, 0.01);
+    assert_int_equal(simulator_totals(p->simulator)->exchanges, 1);
+    assert_near(f.withdrawn_mm, out, 0.01);          // nothing was moved
+    assert_near(f.tool[1].spare_mm, spare + 15, 0.1);
+    double path = f.path_mm;
+    f = go_with(p, 0, 50, 0, 1, 1);
+    assert_near(f.tool[1].behind_mm, 10, 1.1);
+    assert_near(f.path_mm - path, 50, 0.5);
+    assert_int_equal(f.error_total, 0);
+    assert_true(f.tool[0].kick_peak_mm_s < 1 && f.tool[1].kick_peak_mm_s < 1);
+    // the catheter pushed on ahead of it
+    f = go_with(p, 5, 0, 0, 1, 0.1);
+    assert_int_equal(f.error[ERROR_WIRE_LOST].count, 1);
+    f = go_with(p, 0, 50, 0, 1, 0.4);                // out of the catheter, to 17 mm from the mouth
+    f = go_with(p, -50, 0, 0, 1, 0.2);
+    double held = f.target_distance_mm, hub = f.tool[1].spare_mm;
+    f = go_with(p, 0, 0, 1, 1, 0.01);
+    assert_int_equal(simulator_totals(p->simulator)->exchanges, 2);
+    assert_near(f.target_distance_mm, held, 0.01);
+    assert_near(f.tool[1].spare_mm, hub + 10, 0.1);
+    f = go_with(p, 20, 0, 1, 1, 0.5);
+    assert_near(f.tool[0].tip_force_n, 0, 1e-9);
+    assert_int_equal(f.error_total, 1);
+    assert_true(f.tool[0].kick_peak_mm_s < 1 && f.tool[1].kick_peak_mm_s < 1);
+    practice_end(p);
+}
+
+// The target counts with the device that has to be in it.
+static void the_device_that_is_asked_for_has_to_be_there(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(A_SPARE_WIRE EXERCISE(", tool: wire, exchange: {wire: 1}, hold_s: 0.2"), NULL);
+    go_with(p, 0, 18, 0, 0, 1);
+    ScoreFigures f = go_with(p, 0, 0, 0, 0, 1);
+    assert_near(f.target_distance_mm, 0, 1e-3);
+    assert_true(f.state == SCORE_RUNNING && f.held_s == 0);
+    go_with(p, 0, -100, 0, 0, 0.9);
+    f = go_with(p, 0, 100, 0, 1, 0.775);
+    assert_int_equal(f.state, SCORE_RUNNING);
+    f = go_with(p, 0, 0, 0, 1, 0.3);
+    assert_int_equal(f.state, SCORE_REACHED);
+    practice_end(p);
+}
+
+// Only once it has stood there, and as often as it leaves.
+static void a_tool_that_stays_keeps_its_place(void **state)
+{
+    (void)state;
+    Practice *p = practice_begin(A_SPARE_WIRE EXERCISE(", tool: wire, exchange: {wire: 1}, stays: {tool: catheter, target: there}, hold_s: 0.5"), NULL);
+    go_with(p, 10, 0, 0, 0, 1.8);
+    ScoreFigures f = go_with(p, 10, 0, 0, 0, 0.2);        // through it
+    assert_int_equal(f.error_total, 0);
+    f = go_with(p, -10, 0, 0, 0, 0.2);
+    f = go_with(p, 0, 0, 0, 0, 0.6);
+    assert_near(f.tool[0].strayed_mm, 0, 1e-6);
+    f = go_with(p, 10, 0, 0, 0, 0.09);
+    assert_near(f.tool[0].strayed_mm, 0.9, 1e-3);
+    assert_int_equal(f.error_total, 0);
+    f = go_with(p, 10, 0, 0, 0, 0.05);
+    assert_near(f.tool[0].strayed_mm, 1.4, 1e-3);
+    assert_true(f.error[ERROR_TIP_MOVED].count == 1 && f.error[ERROR_TIP_MOVED].is_on);
+    go_with(p, -10, 0, 0, 0, 0.14);
+    f = go_with(p, 0, 0, 0, 0, 0.6);
+    assert_false(f.error[ERROR_TIP_MOVED].is_on);
+    f = go_with(p, -10, 0, 0, 0, 0.15);
+    assert_int_equal(f.error[ERROR_TIP_MOVED].count, 2);
+    practice_end(p);
+}
+
 // Each tool's share of the wall's forces, where no other is around it.
 static void each_tip_bears_its_own(void **state)
 {
@@ -851,6 +956,9 @@ int main(void)
         cmocka_unit_test(a_wire_that_is_drawn_back_is_lost),
         cmocka_unit_test(a_wire_drawn_into_the_hub_is_lost),
         cmocka_unit_test(a_catheter_kicks_when_its_wire_leaves),
+        cmocka_unit_test(an_exchange_is_no_error),
+        cmocka_unit_test(the_device_that_is_asked_for_has_to_be_there),
+        cmocka_unit_test(a_tool_that_stays_keeps_its_place),
         cmocka_unit_test(each_tip_bears_its_own),
         cmocka_unit_test(a_tools_place_is_where_it_is),
         cmocka_unit_test(a_worse_figure_never_gives_more_points),
