@@ -317,6 +317,13 @@ static int find_node(const VesselTree *tree, Vec3 tip, int node)
     return vec3_distance(tip, tree->center[nearest]) < tree->radius[nearest] ? nearest : node;
 }
 
+// Where a tool's tip is in the vessel: one that has been drawn out is at the sheath's mouth.
+static Vec3 place_in_vessel(const Score *score, const Stepper *stepper, int k)
+{
+    const WireOptions *wire = &score->scene->wire;
+    return wire->has_sheath && stepper_tool_inserted(stepper, k) < 0 ? wire->start : score->tool[k].at;
+}
+
 // Where in the tree the tips are, every 10 ms: a tool at 100 mm/s goes 1 mm in that time.
 static void look(Score *score, const Stepper *stepper, int led, double now_s)
 {
@@ -328,13 +335,13 @@ static void look(Score *score, const Stepper *stepper, int led, double now_s)
         score_sheath_look(&score->tool[k].sheath, stepper, k);
         if (!score->way.tree)
             continue;
-        own->tip_node = find_node(score->way.tree, score->tool[k].at, own->tip_node);
+        own->tip_node = find_node(score->way.tree, place_in_vessel(score, stepper, k), own->tip_node);
         own->off_way_mm = score->exercise.target >= 0 ? score->way.off[own->tip_node] : 0;
     }
     f->tip_node = f->tool[led].tip_node;
     if (score->exercise.target < 0)
         return;
-    f->remaining_mm = score_way_left(&score->way, score->tool[led].at, f->tip_node);
+    f->remaining_mm = score_way_left(&score->way, place_in_vessel(score, stepper, led), f->tip_node);
     f->least_remaining_mm = fmin(f->least_remaining_mm, f->remaining_mm);
     for (int k = 0; k < score->tool_count; k++)
         judge_limit(score, ERROR_WRONG_BRANCH, k, f->tool[k].off_way_mm, score->exercise.rules.wrong_branch_mm, AGAIN, elapsed, now_s);

@@ -656,6 +656,21 @@ static void an_exchange_is_no_error(void **state)
     practice_end(p);
 }
 
+// A wire that is drawn out past vessels which lie beside the sheath is in none of them.
+static void what_is_drawn_out_is_at_the_mouth(void **state)
+{
+    (void)state;
+    VesselTree *t = forked(1);
+    Practice *p = practice_begin("seldinger: 1\n" TWO_TOOLS("") "sheath: {entry_mm: [30, 0, 0], direction: [1, 0, 0]}\n"
+                                 "targets: [{name: there, point_mm: [38, 0, 0], radius_mm: 1}]\n" EXERCISE(", tool: wire, rules: {wrong_branch_mm: 3}"), t);
+    ScoreFigures f = practice_go_tools(p, 0, -50, 1);
+    assert_near(f.tool[1].behind_mm, 50, 1e-3);
+    assert_int_equal(f.error_total, 0);
+    assert_near(f.remaining_mm, 8, 1e-9);
+    practice_end(p);
+    vessel_tree_free(t);
+}
+
 // The target counts with the device that has to be in it.
 static void the_device_that_is_asked_for_has_to_be_there(void **state)
 {
@@ -957,6 +972,7 @@ int main(void)
         cmocka_unit_test(a_wire_drawn_into_the_hub_is_lost),
         cmocka_unit_test(a_catheter_kicks_when_its_wire_leaves),
         cmocka_unit_test(an_exchange_is_no_error),
+        cmocka_unit_test(what_is_drawn_out_is_at_the_mouth),
         cmocka_unit_test(the_device_that_is_asked_for_has_to_be_there),
         cmocka_unit_test(a_tool_that_stays_keeps_its_place),
         cmocka_unit_test(each_tip_bears_its_own),
