@@ -25,9 +25,9 @@ void hand_grip_lock(HandGrip *grip, int tool_count);
 bool hand_grip_pair_is_locked(const HandGrip *grip, int tool_count);
 // Lets the chosen tool go, or takes it again.
 void hand_grip_release(HandGrip *grip);
-// Asks for device `which` of tool `tool` (0: the scene's), in whose place another is: the hand that takes it holds it alone, so its locks open. Nothing where
-// there is no such tool. A refused exchange (Pose.refused_exchanges grows, Pose.refusal says why) is tried again only after something
-// else was asked for: set what is in (PoseTool.fitted), then ask again.
+// Asks for device `which` of tool `tool` (0: the scene's, 1, 2, … those under its `exchange:`). The tool is taken in hand for that, alone: its locks open.
+// Nothing where there is no such tool. An exchange that is refused (Pose.refused_exchanges grows, Pose.refusal says why) is tried again only after something
+// else was asked for: ask for what is in (PoseTool.fitted), then again.
 void hand_grip_fit(HandGrip *grip, int tool_count, int tool, int which);
 // What devices' buttons ask for (HAND_ bits) that were not held `before`, which becomes what is held now.
 void hand_grip_obey(HandGrip *grip, int tool_count, unsigned buttons, unsigned *before);

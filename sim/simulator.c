@@ -178,6 +178,8 @@ static void exchange(Simulator *simulator, const ToolCommands *commands)
         if (asked == simulator->asked[k])
             continue;
         simulator->asked[k] = asked;
+        if (asked == stepper_fitted(simulator->stepper, k))      // after one that was refused
+            continue;
         double before = simulator->energy.watched ? stepper_elastic_energy(simulator->stepper) : 0;
         StepExchange outcome = stepper_exchange(simulator->stepper, k, asked);
         if (outcome == EXCHANGE_DONE) {
