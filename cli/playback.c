@@ -76,7 +76,11 @@ static TipPlaces find_tips(const RecordedRun *run, int64_t step)
     find_inserted(run, step, places.inserted);
     for (int k = 0; k < run->tool_count; k++) {
         const RecordedTool *tool = &run->tool[k];
-        places.node[k] = tool->position ? node_at(&frame, tool->position[(at + 1) * tool->node_count - 1]) : places.foremost_node;
+        places.node[k] = places.foremost_node;
+        if (tool->position) {
+            RecordedToolFrame own = recorded_run_tool_frame(run, k, at);
+            places.node[k] = node_at(&frame, own.position[own.node_count - 1]);
+        }
     }
     return places;
 }
@@ -87,7 +91,7 @@ static ContrastInjection *create_injection(const Playback *playback)
     int count[TOOLS_MOST] = {run->node_count};
     const double *s[TOOLS_MOST] = {run->s};
     for (int k = 0; run->tool_count > 1 && k < run->tool_count; k++) {
-        count[k] = run->tool[k].node_count;
+        count[k] = run->tool[k].device_nodes[0];
         s[k] = run->tool[k].s;
     }
     return contrast_injection_create(playback->tree, playback->scene, count, s);
@@ -125,6 +129,10 @@ static void go_on(Playback *playback, int64_t step)
     while (now->step < step) {
         const XrayControl *xray = control(playback, now->step);
         pulse_clock_advance(&now->pulses, run->time_s[now->step], xray);
+        int fitted[TOOLS_MOST] = {0};
+        for (int k = 0; k < run->tool_count; k++)
+            fitted[k] = recorded_run_fitted(run, k, now->step);
+        contrast_injection_fit(now->injection, fitted);
         now->injected_ml += flow_at(playback, now->step) * dt;
         if (++now->step % STRIDE != 0)
             continue;

@@ -230,11 +230,13 @@ static void take_exposure(Fluoroscope *f, const FluoroscopeFrame *frame)
     f->shown.xray = frame->xray;
     f->shown.pulse = frame->pulse;
     f->shown.has_tools = has_these_tools(f, pose);
+    const float *filling = frame->filling;
     for (int k = 0, i = 0; f->shown.has_tools && k < f->tool_count; k++) {
         for (int j = 0; j < pose->tool[k].node_count; j++, i++) {
             f->shown.position[i] = pose->tool[k].node[j].position;
-            f->shown.filling[i] = frame->filling && frame->filling[i] > 0 ? fminf(frame->filling[i], 1) : 0;
+            f->shown.filling[i] = filling && filling[j] > 0 ? fminf(filling[j], 1) : 0;
         }
+        filling = filling ? filling + f->tool_room[k] : NULL;
     }
     for (int n = 0; n < nodes; n++) {
         float c = frame->contrast ? frame->contrast[n] : 0;

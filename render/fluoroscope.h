@@ -47,8 +47,8 @@ void fluoroscope_destroy(Fluoroscope *fluoroscope);
 
 typedef struct FluoroscopeFrame {
     const Pose *pose;              // its tools' nodes are read, at most as many as the options' pose has room for. NULL: no tools
-    const float *filling;          // (nodes of all tools, one tool after the other) contrast agent over the whole lumen about each node, what else lies in
-                                   // it included: 0 to 1; NULL: none
+    const float *filling;          // (nodes of all tools, one tool after the other, each with the room that it has in the options' pose) contrast agent over the
+                                   // whole lumen about each node, what else lies in it included: 0 to 1; NULL: none
     XrayControl xray;
     const float *contrast;         // (N of the tree) concentration of contrast agent, 0 to 1; NULL: none
     uint32_t pulse;                // number of the X-ray pulse: seeds the noise; the same pulse gives the same picture

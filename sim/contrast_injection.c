@@ -9,6 +9,7 @@ struct ContrastInjection {
     int tool_count;
     double injected;                 // [mm3] at hubs
     double waiting[TOOLS_MOST];      // [mm3] of agent that has left a tip and that the vessel has not taken yet
+    double taken_out;                // [mm3] of agent, with tools that were exchanged
     double inserted[TOOLS_MOST];     // at the last advance
 };
 
@@ -43,6 +44,12 @@ void contrast_injection_copy(ContrastInjection *to, const ContrastInjection *fro
     to->lumens = own.lumens;
     contrast_copy(to->vessel, from->vessel);
     contrast_lumens_copy(to->lumens, from->lumens);
+}
+
+void contrast_injection_fit(ContrastInjection *injection, const int *fitted)
+{
+    for (int k = 0; k < injection->tool_count; k++)
+        injection->taken_out += contrast_lumens_fit(injection->lumens, k, fitted[k]);
 }
 
 int contrast_injection_tool(const ContrastInjection *injection, const XrayControl *xray)
@@ -91,7 +98,7 @@ void contrast_injection_read(ContrastInjection *injection, float *concentration)
 }
 
 double contrast_injection_injected_ml(const ContrastInjection *injection) { return injection->injected / 1000; }
-double contrast_injection_gone_ml(const ContrastInjection *injection) { return contrast_gone_ml(injection->vessel); }
+double contrast_injection_gone_ml(const ContrastInjection *injection) { return contrast_gone_ml(injection->vessel) + injection->taken_out / 1000; }
 
 double contrast_injection_within_ml(const ContrastInjection *injection)
 {

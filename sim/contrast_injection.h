@@ -28,6 +28,8 @@ ContrastInjection *contrast_injection_create(const VesselTree *tree, const Scene
 void contrast_injection_free(ContrastInjection *injection);
 void contrast_injection_copy(ContrastInjection *to, const ContrastInjection *from);   // both made of the same scene
 
+// Which device each tool is from now on (tool_count): what another held has gone with it.
+void contrast_injection_fit(ContrastInjection *injection, const int *fitted);
 // The tool that `xray` injects through, -1: none, see above.
 int contrast_injection_tool(const ContrastInjection *injection, const XrayControl *xray);
 // [ml/s] what flows of what `xray` asks for, at most what the tool's lumen passes.
@@ -35,7 +37,7 @@ double contrast_injection_flow(ContrastInjection *injection, const XrayControl *
 // `dt_s` on (some ms), while `volume_ml` flowed as contrast_injection_flow said, by the controls `xray`.
 void contrast_injection_advance(ContrastInjection *injection, double dt_s, const XrayControl *xray, double volume_ml, const TipPlaces *places);
 
-// Nodes of the tree, 0 without, and of all tools.
+// Nodes of the tree, 0 without, and of all tools: of each as many as whichever of its devices has most.
 int contrast_injection_tree_nodes(const ContrastInjection *injection);
 int contrast_injection_node_count(const ContrastInjection *injection);   // of both
 // Concentrations, 0 to 1: (tree nodes) in the vessel, then (tools' nodes) in the lumens, one tool after the other.

@@ -33,7 +33,10 @@ typedef struct Piece {                       // of a lumen, where nothing change
 struct ContrastLumens {
     LumenOptions options;
     int tool_count, piece_count;
-    Bore bore[TOOLS_MOST];
+    Bore device[TOOLS_MOST][1 + EXCHANGES_MOST];     // of each that may be this tool …
+    Bore bore[TOOLS_MOST];                   // … of the one that is in, whose arrays these are
+    int room[TOOLS_MOST];                    // nodes of whichever has most
+    int fitted[TOOLS_MOST];
     Column column[TOOLS_MOST];
     Piece *piece;                            // of the lumen that is looked at
 };
@@ -73,6 +76,19 @@ static bool make_bore(Bore *bore, const WireOptions *wire, int node_count, const
     return true;
 }
 
+static bool make_spare(ContrastLumens *lumens, const Scene *scene, int tool, int which)
+{
+    char why[256];
+    Wire nodes;
+    WireOptions wire = scene_device_wire(scene, tool, which);
+    if (!wire_create(&nodes, &wire, why, (int)sizeof why))
+        return false;
+    bool good = make_bore(&lumens->device[tool][which], &wire, nodes.node_count, nodes.s);
+    lumens->room[tool] = nodes.node_count > lumens->room[tool] ? nodes.node_count : lumens->room[tool];
+    wire_destroy(&nodes);
+    return good;
+}
+
 ContrastLumens *contrast_lumens_create(const Scene *scene, const int *node_count, const double *const *s, const LumenOptions *options)
 {
     ContrastLumens *lumens = calloc(1, sizeof *lumens);
@@ -83,8 +99,15 @@ ContrastLumens *contrast_lumens_create(const Scene *scene, const int *node_count
     for (int k = 0; good && k < scene->tool_count; k++) {
         WireOptions wire = scene_tool_wire(scene, k);
         lumens->tool_count = k + 1;
-        good = make_bore(&lumens->bore[k], &wire, node_count[k], s[k]);
-        borders += (size_t)wire.section_count + 2;   // its sections' ends, tip and proximal end
+        lumens->room[k] = node_count[k];
+        good = make_bore(&lumens->device[k][0], &wire, node_count[k], s[k]);
+        size_t most = (size_t)wire.section_count;
+        for (int i = 1; good && i < scene_device_count(scene, k); i++) {
+            good = make_spare(lumens, scene, k, i);
+            most = (size_t)lumens->device[k][i].section_count > most ? (size_t)lumens->device[k][i].section_count : most;
+        }
+        lumens->bore[k] = lumens->device[k][0];
+        borders += most + 2;                 // its sections' ends, tip and proximal end
     }
     if (good && (lumens->piece = calloc(borders + 1, sizeof *lumens->piece)))
         return lumens;
@@ -96,15 +119,34 @@ void contrast_lumens_free(ContrastLumens *lumens)
 {
     if (!lumens)
         return;
-    for (int k = 0; k < lumens->tool_count; k++) {
-        free(lumens->bore[k].end);
-        free(lumens->bore[k].s);
-    }
+    for (int k = 0; k < lumens->tool_count; k++)
+        for (int i = 0; i <= EXCHANGES_MOST; i++) {
+            free(lumens->device[k][i].end);
+            free(lumens->device[k][i].s);
+        }
     free(lumens->piece);
     free(lumens);
 }
 
-void contrast_lumens_copy(ContrastLumens *to, const ContrastLumens *from) { memcpy(to->column, from->column, sizeof to->column); }
+void contrast_lumens_copy(ContrastLumens *to, const ContrastLumens *from)
+{
+    memcpy(to->column, from->column, sizeof to->column);
+    for (int k = 0; k < to->tool_count; k++) {
+        to->fitted[k] = from->fitted[k];
+        to->bore[k] = to->device[k][to->fitted[k]];
+    }
+}
+
+double contrast_lumens_fit(ContrastLumens *lumens, int tool, int which)
+{
+    if (which == lumens->fitted[tool] || which < 0 || which > EXCHANGES_MOST || lumens->device[tool][which].section_count == 0)
+        return 0;
+    double gone = contrast_lumens_within(lumens, tool);
+    lumens->fitted[tool] = which;
+    lumens->bore[tool] = lumens->device[tool][which];
+    lumens->column[tool].count = 0;
+    return gone;
+}
 
 int contrast_lumens_tool(const ContrastLumens *lumens, int tool)
 {
@@ -346,7 +388,7 @@ int contrast_lumens_node_count(const ContrastLumens *lumens)
 {
     int count = 0;
     for (int k = 0; k < lumens->tool_count; k++)
-        count += lumens->bore[k].node_count;
+        count += lumens->room[k];
     return count;
 }
 
@@ -385,6 +427,8 @@ void contrast_lumens_read(ContrastLumens *lumens, const double *inserted, float 
 {
     for (int k = 0; k < lumens->tool_count; k++) {
         read_tool(lumens, k, inserted, filling);
-        filling += lumens->bore[k].node_count;
+        for (int j = lumens->bore[k].node_count; j < lumens->room[k]; j++)
+            filling[j] = 0;
+        filling += lumens->room[k];
     }
 }

@@ -41,7 +41,10 @@ double contrast_lumens_passes(ContrastLumens *lumens, int tool, const double *in
 void contrast_lumens_advance(ContrastLumens *lumens, double dt_s, const double *inserted, int tool, double volume, double *out);
 double contrast_lumens_within(const ContrastLumens *lumens, int tool);      // agent in its lumen
 double contrast_lumens_front(ContrastLumens *lumens, int tool, const double *inserted);   // [mm] from its hub to where the agent ends, 0: none
-// At the nodes of all tools, one tool after the other: agent in the lumen about each over the lumen's volume there, 0 to 1. Its sum over the lumen is what is
+// Device `which` of `tool` (0: the scene's, 1, 2, … those under its `exchange:`) is in, from now on; it comes in full of saline. Returns the agent that went out
+// with another.
+double contrast_lumens_fit(ContrastLumens *lumens, int tool, int which);
+// At the nodes of all tools, one tool after the other, with room for whichever device has most of them: agent in the lumen about each over the lumen's volume there, 0 to 1. Its sum over the lumen is what is
 // within.
 int contrast_lumens_node_count(const ContrastLumens *lumens);
 void contrast_lumens_read(ContrastLumens *lumens, const double *inserted, float *filling);

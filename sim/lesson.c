@@ -78,6 +78,10 @@ void lesson_step(void *context, Simulator *simulator, const ToolCommands *comman
 {
     Lesson *lesson = context;
     const Stepper *stepper = simulator_stepper(simulator);
+    int fitted[TOOLS_MOST] = {0};
+    for (int k = 0; k < lesson->tool_count; k++)
+        fitted[k] = stepper_fitted(stepper, k);
+    contrast_injection_fit(lesson->injection, fitted);
     XrayControl flowing = xray ? *xray : (XrayControl){0};   // what a lumen does not pass is not used up
     if (flowing.contrast_ml_s > 0) {
         double inserted[TOOLS_MOST] = {0};

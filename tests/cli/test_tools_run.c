@@ -379,7 +379,6 @@ int main(void)
         cmocka_unit_test(a_bench_experiment_is_met), cmocka_unit_test(two_devices_reach_a_vertebral_artery),
         cmocka_unit_test(a_script_exchanges_tools), cmocka_unit_test(the_chain_follows_exchanges), cmocka_unit_test(golden_paths_of_the_scenes_hold), cmocka_unit_test(a_map_names_a_tool_of_the_scene),
         cmocka_unit_test(two_devices_reach_it_in_a_vessel_of_our_own),
-        cmocka_unit_test(a_script_exchanges_tools), cmocka_unit_test(golden_paths_of_the_scenes_hold), cmocka_unit_test(a_map_names_a_tool_of_the_scene),
         cmocka_unit_test(a_score_has_each_tool),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -403,11 +403,44 @@ static void a_copy_goes_on_the_same_and_no_advance_allocates(void **state)
     scene_free(scene);
 }
 
+// A narrower catheter with more nodes takes the place of one that holds agent: that goes out with it, and the new one passes less.
+static void another_device_brings_saline(void **state)
+{
+    (void)state;
+    Scene *scene = scene_of("seldinger: 1\ntools:\n"
+                              "  - {name: catheter, kind: catheter, sections: [{length_mm: 100, diameter_mm: 1.6, inner_diameter_mm: 1.2, young_modulus_gpa: 1}],\n"
+                              "     exchange: [{elements: 500, sections: [{length_mm: 80, diameter_mm: 1.2, inner_diameter_mm: 0.8, young_modulus_gpa: 1}]}]}\n"
+                              "  - {name: wire, kind: wire, inserted_mm: 20, sections: [{length_mm: 200, diameter_mm: 0.1, young_modulus_gpa: 20}]}\n"
+                              "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0], inserted_mm: 10}\n");
+    ContrastLumens *lumens = lumens_of(scene, NULL), *copy = lumens_of(scene, NULL);
+    const double withdrawn[TOOLS_MOST] = {10, -1000};
+    double out[TOOLS_MOST] = {0};
+    assert_int_equal(contrast_lumens_node_count(lumens), 501 + NODES);
+    double wide = contrast_lumens_passes(lumens, 0, withdrawn);
+    contrast_lumens_advance(lumens, 0.01, withdrawn, 0, 20, out);
+    assert_close(contrast_lumens_within(lumens, 0), 20, 1e-12);
+    assert_true(contrast_lumens_fit(lumens, 0, 0) == 0 && contrast_lumens_fit(lumens, 0, 2) == 0);      // it is in; there is none
+    assert_close(contrast_lumens_fit(lumens, 0, 1), 20, 1e-12);
+    assert_true(contrast_lumens_within(lumens, 0) == 0);
+    assert_close(wide / contrast_lumens_passes(lumens, 0, withdrawn), tube_resistance(80, 0.4) / tube_resistance(100, 0.6), 1e-9);
+    contrast_lumens_advance(lumens, 0.01, withdrawn, 0, 10, out);
+    contrast_lumens_copy(copy, lumens);
+    float filling[501 + NODES], again[501 + NODES];
+    contrast_lumens_read(lumens, withdrawn, filling);
+    contrast_lumens_read(copy, withdrawn, again);
+    assert_memory_equal(filling, again, sizeof filling);
+    assert_true(filling[0] > 0.99F && filling[500] <= 0);     // 20 of its 80 mm
+    contrast_lumens_free(lumens);
+    contrast_lumens_free(copy);
+    scene_free(scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_counter_counts),
         cmocka_unit_test(the_annulus_is_the_equation_of_motion_s),
+        cmocka_unit_test(another_device_brings_saline),
         cmocka_unit_test(flow_is_poiseuille_s_in_series_and_falls_beside_a_tool),
         cmocka_unit_test(a_wire_without_clearance_lets_next_to_nothing_through),
         cmocka_unit_test(the_front_goes_as_flow_over_area),
