@@ -7,6 +7,7 @@
 #include "geom/geom.h"
 #include "input/input.h"
 #include "sim/exercise.h"
+#include "sim/tip_shaping.h"
 #include "sim/verify.h"
 #include "solver/solver.h"
 
@@ -38,9 +39,16 @@ typedef struct SceneTarget {
 typedef enum { TOOL_GUIDE_CATHETER, TOOL_CATHETER, TOOL_MICROCATHETER, TOOL_WIRE, TOOL_KIND_COUNT } ToolKind;
 extern const char *const tool_kind_name[TOOL_KIND_COUNT + 1];      // as they are written; NULL at the end
 
+typedef enum { CORE_STEEL, CORE_NITINOL, CORE_COUNT } ToolCore;
+extern const char *const tool_core_name[CORE_COUNT + 1];           // as they are written; NULL at the end
+
 typedef struct SceneTool {
     char name[TOOL_NAME_SIZE];   // heads its script columns; no dot, comma or space
+    char title[80];              // what the device is called, "" where nothing says; longer ones are cut
     ToolKind kind;
+    ToolCore core;               // of a wire: steel keeps a bend that is made by hand, nitinol does not
+    TipShaping tip;              // how its tip was shaped (`wire` has it in its sections); length 0: it was not …
+    TipShaped tip_shaped;        // … and what that took
     WireOptions wire;            // as read, `inserted` included; scene_tool_wire has where it starts. Fixes and loads are the first tool's
     double friction_inside;      // Coulomb coefficient of its lumen against the tool within
     double marker_length, marker_attenuation;    // [mm], [1/mm] of the radio-opaque marker at the tip; length 0: none

@@ -21,6 +21,7 @@ static const double valve_n = 0.2;           // of a haemostatic valve that is o
 static const double friction_inside = 0.05;
 
 const char *const tool_kind_name[TOOL_KIND_COUNT + 1] = {"guide_catheter", "catheter", "microcatheter", "wire", NULL};
+const char *const tool_core_name[CORE_COUNT + 1] = {"steel", "nitinol", NULL};
 
 // Where a tool's keys come from: those beside it override its device file's.
 typedef struct ToolSource {
@@ -116,6 +117,40 @@ static bool read_length(YamlValue value, WireSection *first, double *total)
     return true;
 }
 
+// `shaped_tip`: bent by hand while the wire is out; the last part of its sections is made anew.
+static void read_shaped_tip(YamlValue value, SceneTool *tool)
+{
+    static const char *const keys[] = {"length_mm", "angle_deg", "mandrel_mm", NULL};
+    YamlMap map = yaml_map(value, keys);
+    WireOptions *wire = &tool->wire;
+    TipShaping tip = {0};
+    double angle = 0;
+    char why[FAULT_LENGTH / 2];
+    bool good = yaml_map_number(&map, "length_mm", true, length_range, &tip.length) && yaml_map_number(&map, "angle_deg", true, (NumberRange){0, 360, true}, &angle) &&
+                yaml_map_number(&map, "mandrel_mm", true, (NumberRange){0, 100, true}, &tip.mandrel);
+    if (tool->kind != TOOL_WIRE) {
+        yaml_fault(value, "'%s' of a %s; only a wire's tip is shaped by hand, a catheter's shape is given by 'rest'", value.name, tool_kind_name[tool->kind]);
+        return;
+    }
+    if (tool->core == CORE_NITINOL) {
+        yaml_fault(value, "'%s' of a core of nitinol, which springs back from any such bend; a wire with 'core: steel', or a shape of its maker's by 'rest'", value.name);
+        return;
+    }
+    if (!good || wire->section_count == 0)
+        return;
+    tip.angle = angle * per_deg;
+    int count;
+    WireSection *shaped = tip_shaped_sections(wire->section, wire->section_count, &tip, &count, &tool->tip_shaped, why, sizeof why);
+    if (!shaped) {
+        yaml_fault(value, "'%s': %s", value.name, why);
+        return;
+    }
+    free((void *)wire->section);
+    wire->section = shaped;
+    wire->section_count = count;
+    tool->tip = tip;
+}
+
 static void read_sections(Reading *reading, const ToolSource *source, SceneTool *tool, ToolReading *read)
 {
     int before = reading->faults->count;
@@ -135,7 +170,18 @@ static void read_sections(Reading *reading, const ToolSource *source, SceneTool 
     YamlValue rest = tool_get(source, "rest", false);
     if (rest.node)
         read_rest(reading, rest, tool, read->length);
+    YamlValue tip = tool_get(source, "shaped_tip", false);
+    if (tip.node && read->length_known && reading->faults->count == before)
+        read_shaped_tip(tip, tool);
     read->sound = reading->faults->count == before;
+}
+
+static void read_title(const ToolSource *source, SceneTool *tool)
+{
+    YamlValue value = tool_get(source, "title", false);
+    const char *title;
+    if (value.node && yaml_text(value, &title))
+        snprintf(tool->title, sizeof tool->title, "%s", title);
 }
 
 // What `wire:` and an entry of `tools:` have in common.
@@ -150,6 +196,10 @@ static void read_tool(Reading *reading, const ToolSource *source, SceneTool *too
     tool->marker_length = marker_length;
     tool->marker_attenuation = marker_attenuation;
     tool->friction_inside = friction_inside;
+    read_title(source, tool);
+    YamlValue core = tool_get(source, "core", false);
+    int metal = core.node ? yaml_choice(core, tool_core_name) : -1;
+    tool->core = metal >= 0 ? (ToolCore)metal : CORE_STEEL;
     YamlValue elements = tool_get(source, "elements", false);
     if (elements.node)
         yaml_integer(elements, 1, MOST_ELEMENTS, &wire->elements);
@@ -179,7 +229,7 @@ static void publish_first(Reading *reading)
 
 void scene_read_wire(Reading *reading, YamlValue value)
 {
-    static const char *const keys[] = {"elements", "sections", "rest", "damping", "tip_marker", "hand_limit_n", "valve_n", NULL};
+    static const char *const keys[] = {"title", "core", "elements", "sections", "rest", "shaped_tip", "damping", "tip_marker", "hand_limit_n", "valve_n", NULL};
     ToolSource source = {.own = yaml_map(value, keys)};
     SceneTool *tool = &reading->scene->tool[0];
     reading->scene->tool_count = 1;
@@ -195,7 +245,7 @@ void scene_read_wire(Reading *reading, YamlValue value)
 static YamlMap device_map_of(YamlReader *reader)
 {
     static const char *const keys[] = {"seldinger",  "title",         "kind",        "source", "uncertainty", "bending_n_mm2", "goes_through", "elements",
-                                       "sections",   "rest",          "damping",     "tip_marker", "hand_limit_n", "valve_n", "friction_inside", NULL};
+                                       "core",       "sections",   "rest",          "shaped_tip", "damping",     "tip_marker", "hand_limit_n", "valve_n", "friction_inside", NULL};
     YamlValue root = yaml_root(reader);
     strcpy(root.name, "device");
     return yaml_map(root, keys);
@@ -205,7 +255,7 @@ static YamlMap device_map_of(YamlReader *reader)
 // diameters must come to that.
 static void check_device(const ToolSource *source, const SceneTool *tool, bool sound)
 {
-    static const char *const texts[] = {"title", "source", "uncertainty", "goes_through", NULL};
+    static const char *const texts[] = {"source", "uncertainty", "goes_through", NULL};
     const YamlMap *device = &source->device;
     const char *text;
     int version;
@@ -266,7 +316,8 @@ static void read_device(Reading *reading, ToolSource *source, SceneTool *tool, T
     }
     YamlValue kind = tool_get(source, "kind", needs_kind);
     int choice = kind.node ? yaml_choice(kind, tool_kind_name) : -1;
-    tool->kind = choice >= 0 ? (ToolKind)choice : TOOL_CATHETER;
+    if (choice >= 0)
+        tool->kind = (ToolKind)choice;
     read_tool(reading, source, tool, read);
     check_device(source, tool, read->sound);
     tool_number(source, "friction_inside", friction_range, &tool->friction_inside);
@@ -275,7 +326,8 @@ static void read_device(Reading *reading, ToolSource *source, SceneTool *tool, T
 
 static void read_exchange(Reading *reading, YamlValue list, int index)
 {
-    static const char *const keys[] = {"device", "length_mm", "friction_inside", "elements", "sections", "rest", "damping", "tip_marker", "hand_limit_n", "valve_n", NULL};
+    static const char *const keys[] = {"device", "title", "core", "length_mm", "friction_inside", "elements", "sections", "rest", "shaped_tip", "damping", "tip_marker", "hand_limit_n", "valve_n",
+                                       NULL};
     Scene *scene = reading->scene;
     int count = list.node ? yaml_count(list, 1, EXCHANGES_MOST) : 0;
     for (int i = 0; i < count; i++) {
@@ -295,7 +347,7 @@ static void read_exchange(Reading *reading, YamlValue list, int index)
 
 static void read_entry(Reading *reading, YamlValue value, int index)
 {
-    static const char *const keys[] = {"name", "kind", "device", "length_mm", "inserted_mm", "friction_inside", "elements", "sections", "rest", "damping",
+    static const char *const keys[] = {"name", "title", "kind", "device", "core", "length_mm", "inserted_mm", "friction_inside", "elements", "sections", "rest", "shaped_tip", "damping",
                                        "tip_marker", "hand_limit_n", "valve_n", "exchange", NULL};
     ToolReading *read = &reading->tool[index];
     ToolSource source = {.own = yaml_map(value, keys)};

@@ -295,7 +295,35 @@ static const Broken broken[] = {
     {THREE "script: [{t_s: 0, wire.push_mm_s: 1}]\n", "7:10", "give 'wire.twist_deg_s' too"},
     {THREE "script: [{t_s: 0, push_mm_s: 1, wire.push_mm_s: 1, wire.twist_deg_s: 0}]\n", "7:10", "not both"},
     {THREE "script: [{t_s: 0, wire.push_mm_s: 1001, wire.twist_deg_s: 0}]\n", "7:10", "wire.push_mm_s 1001 is out of range"},
+    {TOOLS(GUIDE "  - {name: wire, kind: wire, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, angle_deg: 45, mandrel_mm: 50}}\n"), "5:113", "does not make the core yield"},
+    {TOOLS(GUIDE "  - {name: wire, kind: wire, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 1, angle_deg: 300, mandrel_mm: 1}}\n"), "5:113", "a longer tip, a smaller angle or a thinner mandrel"},
+    {TOOLS(GUIDE "  - {name: wire, kind: wire, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, angle_deg: 400, mandrel_mm: 1}}\n"), "", "angle_deg"},
+    {TOOLS(GUIDE "  - {name: wire, kind: wire, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, mandrel_mm: 1}}\n"), "", "'angle_deg'"},
+    {TOOLS(GUIDE "  - {name: wire, kind: wire, core: nitinol, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, angle_deg: 45, mandrel_mm: 1}}\n"), "", "springs back from any such bend"},
+    {TOOLS(GUIDE "  - {name: wire, kind: wire, core: gold, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, angle_deg: 45, mandrel_mm: 1}}\n"), "", "steel, nitinol"},
+    {TOOLS("  - {name: guide, kind: guide_catheter, shaped_tip: {length_mm: 5, angle_deg: 45, mandrel_mm: 1}, " SECTION("300", "2", "1.8") "}\n" WIRE), "", "only a wire's tip is shaped by hand"},
 };
+
+static void a_tip_is_shaped_by_hand(void **state)
+{
+    (void)state;
+    Scene *scene = good(TOOLS(GUIDE "  - {name: wire, kind: wire, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], "
+                                    "exchange: [{title: shaped, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], "
+                                    "shaped_tip: {length_mm: 5, angle_deg: 45, mandrel_mm: 1}}]}\n"));
+    const SceneTool *straight = &scene->tool[1], *shaped = &scene->exchange[0].device;
+    assert_near(straight->tip.length, 0, 0);
+    assert_string_equal(straight->title, "");
+    assert_string_equal(shaped->title, "shaped");
+    assert_int_equal(shaped->kind, TOOL_WIRE);
+    assert_near(shaped->tip.angle, PI / 4, 1e-15);
+    assert_near(shaped->tip.mandrel, 1, 0);
+    assert_near(wire_length(&shaped->wire), 700, 1e-9);
+    assert_int_equal(shaped->wire.section_count, 3);
+    assert_near(shaped->wire.section[0].length, 695, 1e-9);
+    assert_near(shaped->wire.section[1].length * shaped->wire.section[1].rest_curvature, PI / 4, 1e-12);
+    assert_near(shaped->wire.section[1].length, shaped->tip_shaped.arc, 1e-12);
+    scene_free(scene);
+}
 
 static void each_fault_has_its_line_and_column(void **state)
 {
@@ -551,6 +579,7 @@ int main(void)
         cmocka_unit_test(bare_columns_move_the_first_tool),
         cmocka_unit_test(a_row_in_place_lets_a_tool_go),
         cmocka_unit_test(each_fault_of_a_script_has_its_place),
+        cmocka_unit_test(a_tip_is_shaped_by_hand),
         cmocka_unit_test(each_fault_has_its_line_and_column),
         cmocka_unit_test(all_faults_come_in_one_pass),
         cmocka_unit_test(a_fault_hides_no_other_and_makes_none),
