@@ -49,8 +49,8 @@ static void write_quoted(FILE *stream, const char *value)
     fputc('"', stream);
 }
 
-// Replaces the bytes from `from` to `to`; `key` NULL, or what stands before the value.
-static char *spliced(const char *text, size_t from, size_t to, const char *key, const char *value, const char *after)
+// The bytes from `from` to `to` are replaced by `before`, the value (quoted where `is_quoted`) and `after`.
+static char *spliced(const char *text, size_t from, size_t to, const char *before, const char *value, bool is_quoted, const char *after)
 {
     char *out = NULL;
     size_t length;
@@ -58,9 +58,11 @@ static char *spliced(const char *text, size_t from, size_t to, const char *key, 
     if (!stream)
         return NULL;
     fwrite(text, 1, from, stream);
-    if (key)
-        fprintf(stream, "%s: ", key);
-    write_quoted(stream, value);
+    fputs(before, stream);
+    if (is_quoted)
+        write_quoted(stream, value);
+    else
+        fputs(value, stream);
     fprintf(stream, "%s%s", after, text + to);
     if (fclose(stream) == 0)
         return out;
@@ -68,32 +70,77 @@ static char *spliced(const char *text, size_t from, size_t to, const char *key, 
     return NULL;
 }
 
-static char *edit_document(yaml_document_t *document, const char *text, const char *path, const char *value, bool add)
+// The map that holds the last key of a path, which becomes *key; NULL where it is not there.
+static const yaml_node_t *map_of(yaml_document_t *document, const char *path, const char **key)
 {
-    const yaml_node_t *map = yaml_document_get_root_node(document), *node = NULL;
-    const char *key = path;
-    for (const char *dot; map && (dot = strchr(key, '.')); key = dot + 1)
-        map = value_of(document, map, key, (size_t)(dot - key));
-    if (!map || map->type != YAML_MAPPING_NODE)
-        return NULL;
-    node = value_of(document, map, key, strlen(key));
-    if (node) {
-        size_t from = byte_of(text, node->start_mark.index), to = byte_of(text, node->end_mark.index);
-        bool ends_line = to > from && text[to - 1] == '\n';   // a block's end is the next token
-        return spliced(text, from, to, NULL, value, ends_line ? "\n" : "");
-    }
-    if (!add)
-        return NULL;
-    size_t at = byte_of(text, map->start_mark.index);
-    if (map->data.mapping.style == YAML_FLOW_MAPPING_STYLE)
-        return spliced(text, at + 1, at + 1, key, value, map->data.mapping.pairs.start < map->data.mapping.pairs.top ? ", " : "");
-    char indent[256] = "\n";   // the next key stands below this one
-    size_t column = map->start_mark.column < sizeof indent - 2 ? map->start_mark.column : sizeof indent - 2;
-    memset(indent + 1, ' ', column);
-    return spliced(text, at, at, key, value, indent);
+    const yaml_node_t *map = yaml_document_get_root_node(document);
+    *key = path;
+    for (const char *dot; map && (dot = strchr(*key, '.')); *key = dot + 1)
+        map = value_of(document, map, *key, (size_t)(dot - *key));
+    return map && map->type == YAML_MAPPING_NODE ? map : NULL;
 }
 
-char *yaml_edit(const char *text, const char *path, const char *value, bool add)
+// A key that is not there, before the others of its map.
+static char *with_key(const char *text, const yaml_node_t *map, const char *key, const char *opening, const char *value, bool is_quoted, const char *closing)
+{
+    char before[256], after[300] = "";
+    size_t at = byte_of(text, map->start_mark.index);
+    bool is_flow = map->data.mapping.style == YAML_FLOW_MAPPING_STYLE;
+    if ((size_t)snprintf(before, sizeof before, "%s: %s", key, opening) >= sizeof before)
+        return NULL;
+    if (is_flow) {
+        snprintf(after, sizeof after, "%s%s", closing, map->data.mapping.pairs.start < map->data.mapping.pairs.top ? ", " : "");
+        return spliced(text, at + 1, at + 1, before, value, is_quoted, after);
+    }
+    // the next key stands below this one
+    int column = map->start_mark.column < 250 ? (int)map->start_mark.column : 250;
+    snprintf(after, sizeof after, "%s\n%*s", closing, column, "");
+    return spliced(text, at, at, before, value, is_quoted, after);
+}
+
+static char *edit_document(yaml_document_t *document, const char *text, const char *path, const char *value, bool add)
+{
+    const char *key;
+    const yaml_node_t *map = map_of(document, path, &key), *node = map ? value_of(document, map, key, strlen(key)) : NULL;
+    if (!node)
+        return map && add ? with_key(text, map, key, "", value, true, "") : NULL;
+    size_t from = byte_of(text, node->start_mark.index), to = byte_of(text, node->end_mark.index);
+    bool ends_line = to > from && text[to - 1] == '\n';   // a block's end is the next token
+    return spliced(text, from, to, "", value, true, ends_line ? "\n" : "");
+}
+
+// Behind the last item's last line: what follows it, comments and blank lines, belongs to what comes next.
+static size_t end_of_block(const char *text, size_t from, size_t to)
+{
+    size_t end = from;
+    while (from < to) {
+        size_t line = strcspn(text + from, "\n"), blank = strspn(text + from, " \t\r");
+        if (from + blank < to && blank < line && text[from + blank] != '#')
+            end = from + line;
+        from += line + 1;
+    }
+    return end;
+}
+
+static char *append_item(yaml_document_t *document, const char *text, const char *path, const char *item)
+{
+    const char *key;
+    const yaml_node_t *map = map_of(document, path, &key), *list = map ? value_of(document, map, key, strlen(key)) : NULL;
+    if (!list)
+        return map ? with_key(text, map, key, "[", item, false, "]") : NULL;
+    if (list->type != YAML_SEQUENCE_NODE)
+        return NULL;
+    size_t from = byte_of(text, list->start_mark.index), to = byte_of(text, list->end_mark.index);
+    if (list->data.sequence.style == YAML_FLOW_SEQUENCE_STYLE)
+        return spliced(text, to - 1, to - 1, list->data.sequence.items.start < list->data.sequence.items.top ? ", " : "", item, false, "");
+    char before[300];
+    int column = list->start_mark.column < 250 ? (int)list->start_mark.column : 250;
+    size_t end = end_of_block(text, from, to);
+    snprintf(before, sizeof before, "\n%*s- ", column, "");
+    return spliced(text, end, end, before, item, false, "");
+}
+
+static char *edit(const char *text, const char *path, const char *value, bool add, bool is_item)
 {
     yaml_parser_t parser;
     yaml_document_t document;
@@ -102,9 +149,13 @@ char *yaml_edit(const char *text, const char *path, const char *value, bool add)
         return NULL;
     yaml_parser_set_input_string(&parser, (const unsigned char *)text, strlen(text));
     if (yaml_parser_load(&parser, &document)) {
-        out = edit_document(&document, text, path, value, add);
+        out = is_item ? append_item(&document, text, path, value) : edit_document(&document, text, path, value, add);
         yaml_document_delete(&document);
     }
     yaml_parser_delete(&parser);
     return out;
 }
+
+char *yaml_edit(const char *text, const char *path, const char *value, bool add) { return edit(text, path, value, add, false); }
+
+char *yaml_edit_append(const char *text, const char *path, const char *item) { return edit(text, path, item, true, true); }

@@ -1,4 +1,4 @@
-// Changes one value in a YAML text and leaves the rest of it as it is, comments and layout too.
+// Changes one value in a YAML text, or adds an item to a list, and leaves the rest of it as it is, comments and layout too.
 #ifndef SELDINGER_INPUT_YAML_EDIT_H
 #define SELDINGER_INPUT_YAML_EDIT_H
 
@@ -8,5 +8,8 @@
 // names keys of maps and numbers of list items from the root: "vessel.model", "tools.0.device". The caller frees the result. NULL where a map or item on
 // the way is not there, the last key neither there nor to be added, the text is no YAML, or memory lacks.
 char *yaml_edit(const char *text, const char *path, const char *value, bool add);
+// The text with `item`, YAML in flow style on one line, as the last of the list at `path`; a last key that is not there is added with a list of that one
+// item. The caller frees the result. NULL as above, or where there is something other than a list.
+char *yaml_edit_append(const char *text, const char *path, const char *item);
 
 #endif

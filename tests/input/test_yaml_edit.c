@@ -38,6 +38,31 @@ static void keys_are_added(void **state)
     becomes("{}", "script", "h", "{script: \"h\"}");
 }
 
+static void grows(const char *text, const char *path, const char *expected)
+{
+    char *out = yaml_edit_append(text, path, "{a: 9}");
+    assert_non_null(out);
+    assert_string_equal(out, expected);
+    free(out);
+}
+
+static void items_are_appended(void **state)
+{
+    (void)state;
+    grows("t: [{a: 1}]\n", "t", "t: [{a: 1}, {a: 9}]\n");
+    grows("t: []   # c\n", "t", "t: [{a: 9}]   # c\n");
+    grows("t: [\n  {a: 1},  # c\n  {a: 2}\n]\nb: 1\n", "t", "t: [\n  {a: 1},  # c\n  {a: 2}\n, {a: 9}]\nb: 1\n");
+    grows("t:\n  - {a: 1}   # c\n\n# of b\nb: 1\n", "t", "t:\n  - {a: 1}   # c\n  - {a: 9}\n\n# of b\nb: 1\n");
+    grows("t:\n- a: 1\n  b:\n    - 2\nb: 1\n", "t", "t:\n- a: 1\n  b:\n    - 2\n- {a: 9}\nb: 1\n");
+    grows("t:\n  - a: 1", "t", "t:\n  - a: 1\n  - {a: 9}");
+    grows("x:\n  - n: a\n    t:\n      - {a: 1}\n  - n: b\n", "x.0.t", "x:\n  - n: a\n    t:\n      - {a: 1}\n      - {a: 9}\n  - n: b\n");
+    grows("x:\n  - n: a\n  - n: b\n", "x.1.t", "x:\n  - n: a\n  - t: [{a: 9}]\n    n: b\n");
+    grows("x: [{n: a}, {}]\n", "x.0.t", "x: [{t: [{a: 9}], n: a}, {}]\n");
+    grows("x: [{n: a}, {}]\n", "x.1.t", "x: [{n: a}, {t: [{a: 9}]}]\n");
+    assert_null(yaml_edit_append("t: 1\n", "t", "1"));
+    assert_null(yaml_edit_append("t: {}\n", "u.v", "1"));
+}
+
 static void what_cannot_be_edited_is_told(void **state)
 {
     (void)state;
@@ -53,7 +78,7 @@ static void what_cannot_be_edited_is_told(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(values_are_replaced_where_they_stand), cmocka_unit_test(keys_are_added),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(values_are_replaced_where_they_stand), cmocka_unit_test(keys_are_added), cmocka_unit_test(items_are_appended),
                                        cmocka_unit_test(what_cannot_be_edited_is_told)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
