@@ -470,8 +470,8 @@ int verb_info(int argc, char **argv)
     case FILE_VOLUME: good = describe_volume(object, path, &faults); break;
     case FILE_SURFACE: good = describe_surface(object, path, &faults); break;
     case FILE_UNKNOWN:
-        faults_add(&faults, path, 0, 0, "is nothing known here; volumes (NRRD, MetaImage, NIfTI, DICOM), surfaces (STL, PLY, OBJ, VTP), trees, models, recordings, "
-                                       "scenes and scripts are");
+        faults_add(&faults, path, 0, 0, "is of no kind that `info` can describe; it reads volumes (NRRD, MetaImage, NIfTI, DICOM), surfaces (STL, PLY, OBJ, VTP), trees, models, "
+                                       "recordings, scenes and scripts");
         break;
     }
     if (good && json && !(report && !strcmp(report, "-"))) {

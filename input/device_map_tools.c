@@ -47,7 +47,7 @@ static bool find_tool(const DeviceMap *map, MapHand *hand, const ToolNames *tool
     if (of_kind > 1)
         faults_add(faults, map->file, hand->line, hand->column, "'tool' is '%s', and the scene has %d of that kind; say which: %s", hand->tool, of_kind, names);
     else if (index < 0)
-        faults_add(faults, map->file, hand->line, hand->column, "'tool' is '%s', which the scene has not; %s, outermost, innermost, outer, inner or chosen", hand->tool,
+        faults_add(faults, map->file, hand->line, hand->column, "'tool' is '%s', but the scene has no such tool; write %s, outermost, innermost, outer, inner or chosen", hand->tool,
                    names);
     else
         hand->drives = DRIVES_TOOL + index;

@@ -85,7 +85,7 @@ static void volumes_cut_off_or_lying(void **state)
         if (strcmp(files[i][0], ".") && strcmp(files[i][0], "tree.h5")) {   // info knows a volume by the same signs
             snprintf(arguments, sizeof arguments, "info %s", files[i][0]);
             refused(arguments, files[i][0]);
-            assert_null(strstr(output, "is nothing known here"));
+            assert_null(strstr(output, "is of no kind that `info` can describe"));
         }
     }
 }
@@ -243,7 +243,7 @@ static void verbs_of_the_trainer(void **state)
         {"nav free.yaml --threads 1.5", "--threads: '1.5' is not valid"},
         {"nav free.yaml --no-record --device nowhere.yaml", "nowhere.yaml: cannot be opened"},
         {"nav free.yaml --no-record --device open.yaml", "open.yaml:2:1: is not YAML"},
-        {"nav free.yaml --no-record --device guide.yaml", "guide.yaml:4:52: 'tool' is 'guide', which the scene has not; wire, outermost, innermost"},
+        {"nav free.yaml --no-record --device guide.yaml", "guide.yaml:4:52: 'tool' is 'guide', but the scene has no such tool; write wire, outermost, innermost"},
         {"nav free.yaml --no-record --figures nowhere/out.json", "nowhere/out.json: cannot be written"},
         {"nav free.yaml --no-record --resume nowhere.h5", "nowhere.h5: cannot be opened"},
         {"nav free.yaml --no-record --resume tree.h5", "tree.h5: lacks the dataset"},

@@ -349,7 +349,7 @@ static void a_map_names_a_tool_of_the_scene(void **state)
     FILE *map = fopen(in_folder("map.yaml"), "w");
     fputs("seldinger_device: 1\ndevice: {usage: joystick}\ntool: guide\npush: {source: Y, mm_s: 10}\n", map);
     fclose(map);
-    ends(2, "map.yaml:3:7: 'tool' is 'guide', which the scene has not; microcatheter, wire, outermost, innermost",
+    ends(2, "map.yaml:3:7: 'tool' is 'guide', but the scene has no such tool; write microcatheter, wire, outermost, innermost",
          "run scenes/coaxial/phantom.yaml --device $D/map.yaml --duration-s 1");
 }
 

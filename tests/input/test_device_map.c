@@ -141,7 +141,7 @@ static void tools_are_found_in_the_scene(void **state)
     }
     static const struct {
         const char *tool, *said;
-    } bad[] = {{"4", "has not; guide, micro, thread, outermost"}, {"microcatheter", "has not"}, {"catheter", "2 of that kind; say which: guide, micro, thread"}};
+    } bad[] = {{"4", "the scene has no such tool; write guide, micro, thread, outermost"}, {"microcatheter", "no such tool"}, {"catheter", "2 of that kind; say which: guide, micro, thread"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         snprintf(text, sizeof text, HID "twist: {source: X, deg_s: 2, tool: %s}\n", bad[i].tool);
         DeviceMap *map = must_parse(text);
