@@ -154,6 +154,8 @@ Realtime *realtime_start(const RealtimeOptions *options, Faults *faults)
     if (good) {
         realtime->options = *options;
         realtime->now = options->xray;
+        realtime->factor_from_s = clock_s(CLOCK_MONOTONIC);
+        realtime->factor_from_simulated_s = simulator_time_s(options->simulator);
         realtime->pose_every = (int64_t)fmax(1, floor(options->pose_ms / scene->dt + 0.5));
         hand_set_init(&realtime->hands, scene->tool_count);
         realtime->hands.grip = options->grip;

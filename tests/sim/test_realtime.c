@@ -222,8 +222,26 @@ static void a_session_replays_bit_for_bit(void **state)
     unlink(path);
 }
 
+// What was gone through before the thread took over was not lived in real time.
+static void a_factor_is_not_known_before_a_second(void **state)
+{
+    (void)state;
+    Rig rig = rig_open();
+    for (int i = 0; i < 100; i++)
+        simulator_step(rig.simulator, (Command){0});
+    RealtimeOptions options = realtime_default_options();
+    options.simulator = rig.simulator;
+    Realtime *session = realtime_start(&options, &faults);
+    assert_non_null(session);
+    wait_for_time(session, 0.3);
+    assert_true(realtime_moment(session)->figures.real_time_factor == 0);
+    realtime_stop(session);
+    rig_close(&rig);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_fetched_is_whole_and_never_older), cmocka_unit_test(a_session_replays_bit_for_bit)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_fetched_is_whole_and_never_older), cmocka_unit_test(a_session_replays_bit_for_bit),
+                                       cmocka_unit_test(a_factor_is_not_known_before_a_second)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
