@@ -349,12 +349,13 @@ static void read_serial(YamlValue value, DeviceMap *map)
 static void read_map(YamlReader *reader, DeviceMap *map)
 {
     static const char *const keys[] = {"seldinger_device", "name", "device", "tool", "push", "twist", "pedal", "contrast", "stop", "mark",
-                                       "choose_outer", "choose_inner", "lock", "let_go", "force", "serial", NULL};
+                                       "choose_outer", "choose_inner", "lock", "let_go", "exchange", "force", "serial", NULL};
     static const struct ButtonKey {
         const char *key;
         unsigned bit;
     } buttons[] = {{"pedal", HAND_PEDAL}, {"contrast", HAND_CONTRAST}, {"stop", HAND_STOP}, {"mark", HAND_MARK},
-                 {"choose_outer", HAND_CHOOSE_OUTER}, {"choose_inner", HAND_CHOOSE_INNER}, {"lock", HAND_LOCK}, {"let_go", HAND_LET_GO}};
+                 {"choose_outer", HAND_CHOOSE_OUTER}, {"choose_inner", HAND_CHOOSE_INNER}, {"lock", HAND_LOCK}, {"let_go", HAND_LET_GO},
+                 {"exchange", HAND_EXCHANGE}};
     YamlValue root = yaml_root(reader);
     if (!yaml_is_map(root))
         yaml_fault(root, "is no device map; it begins with 'seldinger_device: 1'");
@@ -382,7 +383,7 @@ static void read_map(YamlReader *reader, DeviceMap *map)
         read_controls(yaml_get(&top, buttons[i].key, false), map, &usual, false, buttons[i].bit);
     read_force(yaml_get(&top, "force", false), map);
     if (!yaml_has(&top, "push") && !yaml_has(&top, "twist") && map->button_count == 0)
-        yaml_fault(root, "has none of push, twist, pedal, contrast, stop, mark, choose_outer, choose_inner, lock, let_go; a map gives the device something to do");
+        yaml_fault(root, "has none of push, twist, pedal, contrast, stop, mark, choose_outer, choose_inner, lock, let_go, exchange; a map gives the device something to do");
 }
 
 DeviceMap *device_map_parse(const char *text, size_t length, const char *file, Faults *faults)

@@ -20,7 +20,7 @@
 //     invert: true
 //     optional: true            # a device without it is good too
 //   twist: {source: X, deg_s: 180}                                 # or deg_per_count; right-handed about the direction of advance
-//   pedal: {source: button_1}   # also contrast, stop, mark, choose_outer, choose_inner, lock, let_go (input/hand_port.h); one or a list; an axis with
+//   pedal: {source: button_1}   # also contrast, stop, mark, choose_outer, choose_inner, lock, let_go, exchange (input/hand_port.h); one or a list; an axis with
 //                               # `above: 0.5` (part of full deflection)
 //   force:                      # HID PID (input/force_feedback.h), of the tool that the first control of push or twist moves
 //     full_scale_n: 8           # what the device gives at its largest magnitude

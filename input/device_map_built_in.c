@@ -45,6 +45,7 @@ static const char *const texts[BUILT_IN_COUNT] = {
                               "choose_inner: {source: right_bumper}\n"
                               "lock: {source: start}\n"
                               "let_go: {source: back}\n"
+                              "exchange: {source: left_thumb}\n"
                               PAD_BUTTONS,
     [BUILT_IN_JOYSTICK] = "seldinger_device: 1\n"
                           "name: joystick\n"

@@ -10,10 +10,11 @@
 typedef enum { HAND_ABSENT, HAND_READY, HAND_LOST } HandState;   // LOST: was there, unplugged or silent; may come back
 
 // Bits of `buttons`: X-ray pedal, injection, stop all tools, set a bookmark; and when pressed choose the next tool outwards or inwards, lock the pair or open
-// its lock, let the chosen tool go or take it again.
+// its lock, let the chosen tool go or take it again, open the tray. While that is open choose_outer and choose_inner go up and down in it, exchange puts in
+// what is chosen, let_go closes it.
 enum {
     HAND_PEDAL = 1, HAND_CONTRAST = 2, HAND_STOP = 4, HAND_MARK = 8,
-    HAND_CHOOSE_OUTER = 16, HAND_CHOOSE_INNER = 32, HAND_LOCK = 64, HAND_LET_GO = 128
+    HAND_CHOOSE_OUTER = 16, HAND_CHOOSE_INNER = 32, HAND_LOCK = 64, HAND_LET_GO = 128, HAND_EXCHANGE = 256
 };
 
 // Which tool a hand moves. The pair: the chosen tool and its partner, the next one inside it; of the innermost the next one around it.

@@ -405,6 +405,8 @@ extern "C" GuiRect gui_place(Gui *, float width, float height)
     return GuiRect{at.x, at.y, width, height};
 }
 
+extern "C" void gui_scroll_here(Gui *) { ImGui::SetScrollHereY(0.5f); }
+
 extern "C" void gui_beside(Gui *, float gap) { ImGui::SameLine(0, gap); }
 extern "C" void gui_space(Gui *, float height) { ImGui::Dummy(ImVec2(0, height)); }
 extern "C" float gui_width(Gui *) { return ImGui::GetContentRegionAvail().x; }

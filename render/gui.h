@@ -46,6 +46,7 @@ float gui_window_end(Gui *gui);
 GuiRect gui_place(Gui *gui, float width, float height);   // takes room (width 0: all there is) and says where it is, for drawing
 void gui_beside(Gui *gui, float gap);
 void gui_space(Gui *gui, float height);
+void gui_scroll_here(Gui *gui);                           // brings the last thing into sight, where the contents scroll
 float gui_width(Gui *gui);                                // left in this line
 float gui_line_height(const Gui *gui, GuiFont font);
 

@@ -30,6 +30,7 @@ const KeyAction key_table[ACTION_COUNT] = {
     {ACTION_TOOL_4, GROUP_TOOL, ACTION_PRESS, K('4'), "Tool 4", "take the fourth tool"},
     {ACTION_LOCK, GROUP_TOOL, ACTION_PRESS, K('L'), "Lock", "lock the pair (tool and next inside, or around the last): they move as one"},
     {ACTION_LET_GO, GROUP_TOOL, ACTION_PRESS, K('G'), "Let go", "let the tool go: only its valve holds it; again: take it"},
+    {ACTION_EXCHANGE, GROUP_TOOL, ACTION_PRESS, K('X'), "Exchange", "open the tray: another device for the tool, a tip to shape; again: close"},
 
     {ACTION_PEDAL, GROUP_XRAY, ACTION_HOLD, K('F'), "X-ray pedal", "fluoroscopy while held; let go and the last image stays"},
     {ACTION_PEDAL_LATCH, GROUP_XRAY, ACTION_PRESS, K('E'), "X-ray stays on", "fluoroscopy on until pressed again: a pedal for one hand"},

@@ -26,6 +26,7 @@ Panel *panel_create(char *message, size_t capacity)
     panel->drag_view = -1;
     panel->plots = 2;
     panel->plot_height = 60;
+    memcpy(panel->tray_value, (const float[3]){10, 45, 1}, sizeof panel->tray_value);
     panel_forget_samples(panel);
     return panel;
 }
@@ -76,12 +77,34 @@ static void confirm(Panel *panel, PanelActions *actions)
     panel->dialogue = DIALOGUE_NONE;
 }
 
-static bool has_key(const WindowInput *input, int key)
+// How often a key went down in this frame.
+static int presses(const WindowInput *input, int key)
 {
+    int count = 0;
     for (int i = 0; i < input->event_count; i++)
-        if (input->event[i].kind == WINDOW_KEY_DOWN_EVENT && input->event[i].key == key && !input->event[i].is_repeat)
-            return true;
-    return false;
+        count += input->event[i].kind == WINDOW_KEY_DOWN_EVENT && input->event[i].key == key && !input->event[i].is_repeat;
+    return count;
+}
+
+static bool has_key(const WindowInput *input, int key) { return presses(input, key) > 0; }
+
+// X closes what X has opened.
+static void take_tray(Panel *panel, const WindowInput *input, PanelActions *actions)
+{
+    bool is_closed = actions->pressed[ACTION_QUIT] > 0 || panel->answer < 0 || has_key(input, key_table[ACTION_EXCHANGE].key);
+    bool is_taken = panel->answer > 0 || has_key(input, WINDOW_KEY_ENTER);
+    panel_move_in_tray(panel, presses(input, WINDOW_KEY_DOWN) - presses(input, WINDOW_KEY_UP));
+    panel->tray.is_shaped ^= presses(input, 'S') % 2;
+    panel->tray_value[1] = fminf(330, fmaxf(5, panel->tray_value[1] + 5 * (float)(presses(input, WINDOW_KEY_RIGHT) - presses(input, WINDOW_KEY_LEFT))));
+    panel->answer = 0;
+    if (is_closed && !is_taken)
+        panel_close_tray(panel);
+    actions->tray = panel->tray;
+    actions->tray.is_open = panel->dialogue == DIALOGUE_TRAY;
+    actions->tray.is_taken = is_taken;
+    actions->tray.length_mm = (double)panel->tray_value[0];
+    actions->tray.angle_deg = (double)panel->tray_value[1];
+    actions->tray.mandrel_mm = (double)panel->tray_value[2];
 }
 
 static void take_dialogue(Panel *panel, const WindowInput *input, PanelActions *actions)
@@ -90,11 +113,15 @@ static void take_dialogue(Panel *panel, const WindowInput *input, PanelActions *
     // a second click on the title bar's cross means it
     bool is_confirmed = panel->answer > 0 || (panel->dialogue != DIALOGUE_TRAINEE && has_key(input, WINDOW_KEY_ENTER)) ||
                         (panel->dialogue == DIALOGUE_QUIT && input->close == WINDOW_CLOSE_ASKED);
+    if (panel->dialogue == DIALOGUE_TRAY)
+        take_tray(panel, input, actions);
     int full_screen = actions->pressed[ACTION_FULL_SCREEN], picture = actions->pressed[ACTION_SCREENSHOT];
     memset(actions->pressed, 0, sizeof actions->pressed);
     memset(actions->held, 0, sizeof actions->held);
     actions->pressed[ACTION_FULL_SCREEN] = full_screen;
     actions->pressed[ACTION_SCREENSHOT] = picture;
+    if (panel->dialogue == DIALOGUE_TRAY)
+        return;
     if (is_confirmed)
         confirm(panel, actions);
     else if (is_refused)
@@ -260,6 +287,28 @@ void panel_show_help(Panel *panel, bool is_shown) { panel->has_help = is_shown; 
 bool panel_has_panels(const Panel *panel) { return panel->has_panels; }
 void panel_show_hints(Panel *panel, bool is_shown) { panel->has_hints = is_shown; }
 bool panel_is_asking(const Panel *panel) { return panel->dialogue != DIALOGUE_NONE; }
+
+void panel_open_tray(Panel *panel, int device_count, int device)
+{
+    open_dialogue(panel, DIALOGUE_TRAY);
+    panel->tray_count = device_count;
+    panel->tray_shown = -1;
+    panel->tray = (PanelTrayChoice){.is_open = true, .device = device};
+}
+
+void panel_close_tray(Panel *panel)
+{
+    if (panel->dialogue == DIALOGUE_TRAY)
+        panel->dialogue = DIALOGUE_NONE;
+    panel->tray = (PanelTrayChoice){0};
+}
+
+void panel_move_in_tray(Panel *panel, int devices)
+{
+    int wanted = panel->tray.device + devices, last = panel->tray_count - 1;
+    panel->tray.device = wanted < 0 ? 0 : wanted > last ? last : wanted;
+    panel->tray.is_shaped &= devices == 0;
+}
 
 // ---- hints: what a new user needs next, until it was used
 

@@ -69,6 +69,30 @@ typedef struct PanelLabel {        // words beside something in the 3D view; pix
     const char *text;
 } PanelLabel;
 
+// A device on the tray: of the scene, or one that may be added to it.
+enum { TRAY_POINTS = 160, TRAY_STEPS = 64 };
+typedef struct PanelTrayDevice {
+    const char *name;
+    const char *what;              // kind, diameters, length
+    const char *note;              // why it cannot be put in, or NULL
+    const char *remark;            // what is to be said of it besides, or NULL
+    bool is_in;                    // it is the tool now
+    int point_count;
+    double point[TRAY_POINTS][2];  // [mm] (x, y) of its distal part when nothing holds it, the tip last; y up
+    int step_count;
+    double end_mm[TRAY_STEPS];     // rising: where each stretch ends, from the proximal end
+    double bending_n_mm2[TRAY_STEPS];   // of each stretch
+    bool can_be_shaped;            // a wire whose core keeps a bend
+} PanelTrayDevice;
+
+typedef struct PanelTray {         // the chosen tool's devices, while the tray is open
+    const char *tool;
+    const char *note;              // what to do before anything can be put in, or NULL
+    int device_count;
+    const PanelTrayDevice *device; // (device_count)
+    const PanelTrayDevice *shaped; // the chosen one with its tip as PanelActions.tray asks for, or NULL; where it does not stay, its note says why
+} PanelTray;
+
 // What is shown. Strings are borrowed for the call; NULL is an empty one. NaN in a figure shows as a dash.
 typedef struct PanelState {
     double now_s;                  // wall clock of the session, for messages and hints
@@ -88,6 +112,7 @@ typedef struct PanelState {
     int tool_count, chosen_tool;   // outermost first; the one that is shown in full
     PanelTool tool[PANEL_TOOLS];
     bool is_pair_locked, is_let_go;  // the chosen tool and its partner; the chosen one
+    const PanelTray *tray;         // NULL: closed, or not known yet
     double wall_max_n, wall_sum_n; // of all
     // X-ray
     XrayControl xray;
@@ -120,6 +145,15 @@ typedef struct PanelMouse {
     double scroll;
 } PanelMouse;
 
+// What the tray's user has chosen, while it is open.
+typedef struct PanelTrayChoice {
+    bool is_open;
+    int device;                    // of PanelTray.device
+    bool is_shaped;                // with its tip shaped: from the tip back to the bend, the angle that stays, the mandrel's radius
+    double length_mm, angle_deg, mandrel_mm;
+    bool is_taken;                 // in this frame: put it in
+} PanelTrayChoice;
+
 typedef struct PanelActions {
     bool held[ACTION_COUNT];       // by key or by the mouse on a button
     int pressed[ACTION_COUNT];     // times since the last frame. RESTART and QUIT only when confirmed; SIGINT, SIGTERM: QUIT at once
@@ -128,6 +162,7 @@ typedef struct PanelActions {
     bool trainee_set;
     char trainee[64];              // UTF-8, printable, no control characters, trimmed
     PanelMouse mouse;
+    PanelTrayChoice tray;
 } PanelActions;
 
 typedef struct Panel Panel;
@@ -148,5 +183,9 @@ void panel_show_help(Panel *panel, bool is_shown);
 bool panel_has_panels(const Panel *panel);       // Tab hides them: pass to panel_layout
 void panel_show_hints(Panel *panel, bool is_shown);
 bool panel_is_asking(const Panel *panel);        // a dialogue has the keyboard
+// The tray: the caller opens it (ACTION_EXCHANGE, a device's button), the user or the caller closes it. While it is open it has the keyboard.
+void panel_open_tray(Panel *panel, int device_count, int device);      // with this one chosen
+void panel_close_tray(Panel *panel);
+void panel_move_in_tray(Panel *panel, int devices);      // down, or up (< 0)
 
 #endif

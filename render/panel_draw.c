@@ -248,6 +248,8 @@ void panel_draw_all(Panel *panel, const WindowInput *input, const PanelState *st
     panel_draw_briefing(panel, state);
     if (panel->has_help)
         panel_draw_help(panel, input, state);
-    if (panel->dialogue != DIALOGUE_NONE)
+    if (panel->dialogue == DIALOGUE_TRAY)
+        panel_draw_tray(panel, input, state);
+    else if (panel->dialogue != DIALOGUE_NONE)
         panel_draw_dialogue(panel, input);
 }

@@ -1,4 +1,4 @@
-// What panel.c (input, dialogues, what the panel remembers) and panel_draw.c, panel_controls.c, panel_views.c and panel_boxes.c (what it looks like) share.
+// What panel.c (input, dialogues, what the panel remembers) and panel_draw.c, panel_controls.c, panel_views.c, panel_boxes.c and panel_tray.c (what it looks like) share.
 #ifndef SELDINGER_RENDER_PANEL_INTERNAL_H
 #define SELDINGER_RENDER_PANEL_INTERNAL_H
 
@@ -6,7 +6,7 @@
 #include "render/plot.h"
 
 typedef enum { BRIEFING_AT_BEGIN, BRIEFING_OPEN, BRIEFING_CLOSED } Briefing;   // AT_BEGIN: until the tool or the X-ray is used
-typedef enum { DIALOGUE_NONE, DIALOGUE_QUIT, DIALOGUE_RESTART, DIALOGUE_TRAINEE } Dialogue;
+typedef enum { DIALOGUE_NONE, DIALOGUE_QUIT, DIALOGUE_RESTART, DIALOGUE_TRAINEE, DIALOGUE_TRAY } Dialogue;
 enum { PANEL_MESSAGES = 100, PANEL_TABS = 5, BUTTONS_IN_ROW = 5 };
 
 typedef struct PanelMessage {
@@ -37,6 +37,10 @@ struct Panel {
     bool dialogue_is_new;
     int answer;                    // a click on its yes (1) or no (-1)
     char name[64];                 // the text field
+    PanelTrayChoice tray;
+    int tray_count, tray_shown;    // tray_shown: which was brought into sight
+    float tray_over;               // [pixel] that its contents lack, or < 0
+    float tray_value[3];           // of its sliders: length, angle, mandrel
     bool has_help, has_panels, has_hints;
     Briefing briefing;
     bool is_interactive;           // somebody is there: panel_take_input was called
@@ -83,6 +87,7 @@ void panel_draw_over_views(Panel *panel, const PanelState *state);
 void panel_draw_briefing(Panel *panel, const PanelState *state);
 void panel_draw_help(Panel *panel, const WindowInput *input, const PanelState *state);
 void panel_draw_dialogue(Panel *panel, const WindowInput *input);
+void panel_draw_tray(Panel *panel, const WindowInput *input, const PanelState *state);
 void panel_draw_all(Panel *panel, const WindowInput *input, const PanelState *state);
 int panel_current_hint(const Panel *panel, int tool_count);        // -1: none left
 void panel_hint_text(int hint, char *text, size_t capacity);

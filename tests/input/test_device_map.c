@@ -210,8 +210,8 @@ static void a_gamepad_has_a_tool_in_each_stick(void **state)
     }
     assert_int_equal(map->hand_count, 3);
     assert_int_equal(port[0].buttons, HAND_STOP);
-    static const unsigned bits[][2] = {{4, HAND_CHOOSE_OUTER}, {5, HAND_CHOOSE_INNER}, {6, HAND_LET_GO}, {7, HAND_LOCK}};
-    for (int i = 0; i < 4; i++) {
+    static const unsigned bits[][2] = {{4, HAND_CHOOSE_OUTER}, {5, HAND_CHOOSE_INNER}, {6, HAND_LET_GO}, {7, HAND_LOCK}, {9, HAND_EXCHANGE}};
+    for (size_t i = 0; i < sizeof bits / sizeof *bits; i++) {
         unsigned char held[15] = {0};
         held[bits[i][0]] = 1;
         gamepad_update(&pad, axes, 6, held, 15, port);

@@ -325,6 +325,126 @@ static void every_action_has_a_button_that_works(void **unused)
     end_desk(&desk);
 }
 
+// ---- the tray
+
+static PanelTrayDevice tray_device[3];
+static const PanelTray some_tray = {.tool = "wire", .note = "'wire' is still in: draw it back 312 mm, to the hub, then another can be put in", .device_count = 3, .device = tray_device};
+
+static void fill_tray(void)
+{
+    static const char *const name[] = {"0.014 inch wire, steel core", "0.014 inch wire, nitinol core", "0.014 inch wire, steel core, tip shaped to 45\u00b0"};
+    for (int i = 0; i < 3; i++) {
+        PanelTrayDevice *device = &tray_device[i];
+        *device = (PanelTrayDevice){.name = name[i], .what = "wire, steel core, 0.356 mm thick, 1900 mm long", .is_in = i == 0, .can_be_shaped = i != 1, .point_count = TRAY_POINTS,
+                                    .step_count = 3, .end_mm = {1650, 1850, 1900}, .bending_n_mm2 = {158, 40, 0.5}};
+        for (int k = 0; k < TRAY_POINTS; k++) {
+            device->point[k][0] = 0.2 * k;
+            device->point[k][1] = i * fmax(0, 0.1 * k - 10);
+        }
+    }
+    tray_device[0].remark = "Bent by 87\u00b0 round the mandrel it springs back to 55\u00b0, with a radius of 1.9 mm";
+}
+
+static void the_tray_fits_at_any_size(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    fill_tray();
+    static const struct { int width, height; double scale; } size[] = {{800, 600, 1}, {1024, 600, 1}, {1280, 720, 1}, {1920, 1080, 1}, {2560, 1440, 2}};
+    for (size_t i = 0; i < sizeof size / sizeof size[0]; i++) {
+        Desk desk = new_desk(size[i].width, size[i].height);
+        desk.input.scale = size[i].scale;
+        desk.state.tray = &some_tray;
+        panel_open_tray(desk.panel, 3, 0);
+        frame(&desk);
+        frame(&desk);
+        char name[40];
+        snprintf(name, sizeof name, "tray-%dx%d", size[i].width, size[i].height);
+        keep_picture(&desk.canvas, name);
+        if (desk.panel->tray_over > 0)
+            fail_msg("%d x %d: the tray lacks %.0f pixels", size[i].width, size[i].height, (double)desk.panel->tray_over);
+        assert_int_equal(glGetError(), GL_NO_ERROR);
+        end_desk(&desk);
+    }
+}
+
+static void keys_choose_shape_and_take_from_the_tray(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    fill_tray();
+    Desk desk = new_desk(1024, 600);
+    desk.state.tray = &some_tray;
+    tap(&desk, 'X');
+    assert_int_equal(desk.actions.pressed[ACTION_EXCHANGE], 1);      // the caller opens it, or says why not
+    assert_false(panel_is_asking(desk.panel));
+    panel_open_tray(desk.panel, 3, 0);
+    tap(&desk, WINDOW_KEY_DOWN);
+    assert_true(desk.actions.tray.is_open && desk.actions.tray.device == 1 && !desk.actions.held[ACTION_PULL]);
+    tap(&desk, WINDOW_KEY_UP);
+    for (int i = 0; i < 2; i++)          // in one frame
+        add_event(&desk, (WindowEvent){.kind = WINDOW_KEY_DOWN_EVENT, .key = WINDOW_KEY_DOWN});
+    frame(&desk);
+    assert_int_equal(desk.actions.tray.device, 2);
+    tap(&desk, WINDOW_KEY_UP);
+    tap(&desk, WINDOW_KEY_UP);
+    tap(&desk, WINDOW_KEY_UP);
+    assert_int_equal(desk.actions.tray.device, 0);
+    assert_false(desk.actions.tray.is_shaped);
+    double angle = desk.actions.tray.angle_deg;
+    tap(&desk, 'S');
+    tap(&desk, WINDOW_KEY_RIGHT);
+    assert_true(desk.actions.tray.is_shaped && desk.actions.tray.angle_deg == angle + 5 && desk.actions.held[ACTION_TWIST_RIGHT] == 0);
+    tap(&desk, WINDOW_KEY_ENTER);
+    assert_true(desk.actions.tray.is_taken && desk.actions.tray.is_open && desk.actions.tray.device == 0 && desk.actions.tray.is_shaped);
+    frame(&desk);
+    assert_false(desk.actions.tray.is_taken);
+    tap(&desk, WINDOW_KEY_DOWN);
+    assert_false(desk.actions.tray.is_shaped);               // the other device is as it is
+    tap(&desk, 'S');
+    frame(&desk);
+    assert_false(desk.actions.tray.is_shaped);               // and cannot be shaped
+    tap(&desk, 'X');
+    assert_false(desk.actions.tray.is_open || panel_is_asking(desk.panel));
+    panel_open_tray(desk.panel, 3, 0);
+    tap(&desk, WINDOW_KEY_ESCAPE);
+    assert_false(desk.actions.tray.is_open || panel_is_asking(desk.panel));
+    assert_int_equal(desk.actions.pressed[ACTION_QUIT], 0);
+    end_desk(&desk);
+}
+
+static void the_mouse_chooses_on_the_tray(void **unused)
+{
+    (void)unused;
+    if (!context)
+        skip();
+    fill_tray();
+    Desk desk = new_desk(800, 600);
+    desk.state.tray = &some_tray;
+    panel_open_tray(desk.panel, 3, 0);
+    frame(&desk);
+    bool chosen[3] = {false}, taken = false, shaped = false, closed = false;
+    for (float y = 130; y < 480; y += 14)
+        for (float x = 180; x < 700; x += 200) {
+            if (!panel_is_asking(desk.panel))
+                panel_open_tray(desk.panel, 3, 0);
+            desk.input.mouse_x = x;
+            desk.input.mouse_y = y;
+            for (int i = 0; i < 3; i++) {
+                desk.input.mouse_buttons = i < 2 ? WINDOW_MOUSE_LEFT : 0;
+                frame(&desk);
+                taken |= desk.actions.tray.is_taken;
+                shaped |= desk.actions.tray.is_shaped;
+                chosen[desk.actions.tray.device] = true;
+                closed |= !panel_is_asking(desk.panel);
+            }
+        }
+    assert_true(chosen[0] && chosen[1] && chosen[2] && taken && shaped && closed);
+    end_desk(&desk);
+}
+
 static void words_do_not_lie_on_words(void **unused)
 {
     (void)unused;
@@ -725,7 +845,8 @@ int main(void)
                                        cmocka_unit_test(plots_keep_every_peak_and_forget_after_their_span),
                                        cmocka_unit_test(ticks_are_round),
                                        cmocka_unit_test(pictures_at_all_sizes),
-                                       cmocka_unit_test(every_action_has_a_button_that_works),
+                                       cmocka_unit_test(every_action_has_a_button_that_works), cmocka_unit_test(the_tray_fits_at_any_size),
+        cmocka_unit_test(keys_choose_shape_and_take_from_the_tray), cmocka_unit_test(the_mouse_chooses_on_the_tray),
                                        cmocka_unit_test(words_do_not_lie_on_words), cmocka_unit_test(the_newest_message_is_seen), cmocka_unit_test(a_tooltip_names_the_key),
                                        cmocka_unit_test(views_are_chosen_turned_and_scrolled_by_mouse),
                                        cmocka_unit_test(a_button_lets_go_when_the_focus_goes),
