@@ -7,9 +7,19 @@
 // As often as a film or the eye takes one; an hour of them takes 1.7 GB for 200 elements.
 static const double frame_ms = 33;
 
+typedef struct TakeOver {
+    LiveSession *session;
+    const LiveSessionOptions *options;
+    int64_t done, steps;
+} TakeOver;
+
 static bool take_over_step(void *context, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray)
 {
-    LiveSession *session = context;
+    enum { TELL_EVERY = 64 };
+    TakeOver *take_over = context;
+    LiveSession *session = take_over->session;
+    if (take_over->options->progress && ++take_over->done % TELL_EVERY == 0)
+        take_over->options->progress(take_over->options->progress_context, (double)take_over->done / (double)take_over->steps);
     lesson_step(session->lesson, simulator, commands, xray);
     session->resumed_released = commands->released;
     memcpy(session->resumed_fitted, commands->fitted, sizeof session->resumed_fitted);
@@ -24,7 +34,8 @@ static bool take_over(LiveSession *session, const LiveSessionOptions *options, F
         return false;
     while (steps < run->step_count && run->time_s[steps] <= options->resume_s + 1e-9)
         steps++;
-    ReplayVerdict verdict = replay_verify(session->simulator, run, steps, false, take_over_step, session);
+    TakeOver through = {session, options, 0, steps};
+    ReplayVerdict verdict = replay_verify(session->simulator, run, steps, false, take_over_step, &through);
     session->resumed_s = simulator_time_s(session->simulator);
     if (verdict.first_different < 0)
         return true;

@@ -27,6 +27,8 @@ typedef struct LiveSessionOptions {
     XrayControl xray;            // the same
     const RecordedRun *resume;   // NULL, or what is gone through first, as fast as it goes …
     double resume_s;             // … up to this time
+    void (*progress)(void *context, double part);    // how much of that is done, now and then; NULL: nobody asks
+    void *progress_context;
     bool paused;
 } LiveSessionOptions;
 

@@ -21,6 +21,7 @@ static const char help[] =
     "  --no-record        leaves no recording and no session file\n"
     "  --resume REC.h5    goes on where a recording of this scene ended …\n"
     "  --at S             … or at this moment of it [s of simulated time]\n"
+    "  --tools FOLDER     device files that the tray offers where the scene names none under exchange:; default scenes/tools\n"
     "  --cine F.cine      a saved cine loop of this scene, to be replayed\n"
     "  --view V           first view: fluoroscopy (default), 3d, angioscopy or all\n"
     "  --size WxH         of the window [pixel]; default 1280x720\n"
@@ -47,11 +48,11 @@ static int usage_fault(const char *message, const char *what)
 
 static int parse_options(int argc, char **argv, NavOptions *options)
 {
-    enum { DEVICE = 256, ONLY_MAPPED, TRAINEE, SESSIONS, NO_RECORD, RESUME, AT, CINE, VIEW, SIZE, FULL_SCREEN, DURATION, FIGURES, THREADS, QUIET, HELP };
+    enum { DEVICE = 256, ONLY_MAPPED, TRAINEE, SESSIONS, NO_RECORD, RESUME, AT, TOOLS, CINE, VIEW, SIZE, FULL_SCREEN, DURATION, FIGURES, THREADS, QUIET, HELP };
     static const struct option table[] = {
         {"device", required_argument, NULL, DEVICE},   {"only-mapped", no_argument, NULL, ONLY_MAPPED}, {"trainee", required_argument, NULL, TRAINEE},
         {"sessions", required_argument, NULL, SESSIONS}, {"no-record", no_argument, NULL, NO_RECORD},   {"resume", required_argument, NULL, RESUME},
-        {"at", required_argument, NULL, AT},           {"cine", required_argument, NULL, CINE},         {"view", required_argument, NULL, VIEW},         {"size", required_argument, NULL, SIZE},
+        {"at", required_argument, NULL, AT},           {"tools", required_argument, NULL, TOOLS},       {"cine", required_argument, NULL, CINE},         {"view", required_argument, NULL, VIEW},         {"size", required_argument, NULL, SIZE},
         {"full-screen", no_argument, NULL, FULL_SCREEN}, {"duration-s", required_argument, NULL, DURATION}, {"figures", required_argument, NULL, FIGURES},
         {"threads", required_argument, NULL, THREADS}, {"quiet", no_argument, NULL, QUIET},             {"help", no_argument, NULL, HELP}, {0}};
     *options = (NavOptions){.trainer = {.is_recorded = true, .has_built_in_maps = true, .trainee = "", .resume_s = SCRIPT_LONGEST_S, .width = 1280, .height = 720}};
@@ -71,6 +72,7 @@ static int parse_options(int argc, char **argv, NavOptions *options)
         case SESSIONS: options->sessions = optarg; break;
         case NO_RECORD: trainer->is_recorded = false; break;
         case RESUME: options->resume = optarg; break;
+        case TOOLS: trainer->library = optarg; break;
         case CINE: trainer->cine = optarg; break;
         case FULL_SCREEN: trainer->is_full_screen = true; break;
         case FIGURES: options->figures = optarg; break;
@@ -140,7 +142,8 @@ static bool is_same_scene(const RecordedRun *run, const Scene *scene, const char
 {
     if (run->scene_text && !strcmp(run->scene_text, scene->text) && run->step_ms == scene->dt)
         return true;
-    faults_add(faults, recording, 0, 0, "is a recording of another scene than %s, or of an older state of it", scene->path);
+    faults_add(faults, recording, 0, 0, "is a recording of another scene than %s, of an older state of it, or with devices added from the tray; `seldinger replay` goes on from any (F5)",
+               scene->path);
     return false;
 }
 

@@ -5,6 +5,7 @@
 #include "cli/trainer_cine.h"
 #include "cli/trainer_files.h"
 #include "cli/trainer_panel.h"
+#include "cli/trainer_tray.h"
 #include "input/gamepad.h"
 #include "input/hand.h"
 #include "render/gl_canvas.h"
@@ -22,6 +23,8 @@ enum { PADS = 4 };
 typedef struct Trainer {
     const TrainerOptions *options;
     Scene *scene;
+    Scene *own_scene;                // where devices were added from the tray: `scene`, then not the caller's
+    int own_devices[TOOLS_MOST];     // of the caller's scene
     OpenVessel *open;
     Window *window;
     Panel *panel;
@@ -39,6 +42,11 @@ typedef struct Trainer {
     TrainerCine cine;
     double begun_s;                  // wall clock
     double frame_cpu_s;              // process CPU time at the last frame
+    TrainerTray tray;
+    bool has_tray, is_tray_due;      // it is open; what was taken is put in after the next picture
+    double progress_s;               // when it was last shown how much of a session was gone through again
+    int fitted[TOOLS_MOST];          // as told last, -1: not yet
+    int64_t refused;
     bool is_paused, has_told_end;
     char trainee[64];
     time_t began_at;
@@ -60,6 +68,29 @@ __attribute__((format(printf, 3, 4))) static void say(Trainer *trainer, PanelMar
 
 // --- a session's start and end ---
 
+// The window lives while a session is gone through again: the panel with a line of words, no views.
+static void show_progress(void *context, double part)
+{
+    Trainer *trainer = context;
+    const WindowInput *input;
+    const double now = since_begin(trainer);
+    char line[120];
+    if (now - trainer->progress_s < 0.1 || !window_next_frame(trainer->window, &input))
+        return;
+    trainer->progress_s = now;
+    PanelState state = trainer->shown.state;
+    snprintf(line, sizeof line, "The session is gone through again with the new device: %.0f %%", 100 * part);
+    state.warning = line;
+    state.warnings = 0;
+    state.label_count = 0;
+    state.bar_pixels = state.force_full_scale_n = 0;
+    state.tray = NULL;
+    state.now_s = now;
+    views_draw(trainer->views, &(ViewsFrame){0}, &(PanelLayout){0}, input->width, input->height, 0);
+    panel_draw(trainer->panel, input, &state, 0);
+    window_swap(trainer->window);
+}
+
 static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *faults)
 {
     const TrainerOptions *options = trainer->options;
@@ -75,7 +106,8 @@ static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *f
     trainer->desk.grip = (HandGrip){.chosen = trainer->desk.grip.chosen};    // a new session: nothing is locked or let go
     trainer_file_name(options->folder, trainer->scene->path, ".h5", path, sizeof path);
     LiveSessionOptions session = {.record_path = options->is_recorded ? path : NULL, .hand_count = count, .hand = hand, .grip = trainer->desk.grip, .xray = trainer->desk.xray,
-                                  .resume = resume, .resume_s = options->resume_s, .paused = trainer->is_paused};
+                                  .resume = resume, .resume_s = resume == options->resume ? options->resume_s : SCRIPT_LONGEST_S, .paused = trainer->is_paused,
+                                  .progress = trainer->figures->frames > 0 ? show_progress : NULL, .progress_context = trainer};
     if (!live_session_open(&trainer->session, trainer->scene, trainer->open, &session, faults))
         return false;
     trainer->desk.grip.released = trainer->session.resumed_released;
@@ -83,6 +115,8 @@ static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *f
     trainer->pulses = pulse_clock_start(trainer->session.resumed_s);
     trainer->began_at = time(NULL);
     trainer->has_told_end = false;
+    for (int k = 0; k < TOOLS_MOST; k++)
+        trainer->fitted[k] = -1;
     trainer_panel_begin(&trainer->shown, trainer->scene, trainer->trainee);
     return true;
 }
@@ -218,6 +252,184 @@ static void tell_grip(Trainer *trainer, const HandGrip *before, const PanelActio
     for (int k = 0; k < count; k++)
         if ((now->released ^ before->released) >> k & 1)
             say(trainer, MARK_NONE, now->released >> k & 1 ? "%s is let go: only its valve holds it" : "%s is in hand again", tool[k].name);
+}
+
+// --- the tray ---
+
+// scenes/tools as the program lies in its build folder, build/PRESET/seldinger.
+static const char *library(const Trainer *trainer, char *text, size_t capacity)
+{
+    if (trainer->options->library)
+        return trainer->options->library;
+    ssize_t length = readlink("/proc/self/exe", text, capacity - 1);
+    if (length <= 0)
+        return NULL;
+    text[length] = 0;
+    char *slash = strrchr(text, '/');
+    snprintf(slash, capacity - (size_t)(slash - text), "/../../scenes/tools");
+    return text;
+}
+
+static void open_tray(Trainer *trainer, const Pose *pose)
+{
+    const int tool = trainer->desk.grip.chosen;
+    char text[4200];
+    int in;
+    if (trainer->scene->tool_count < 2) {
+        say(trainer, MARK_WARNING, "the scene has one tool: a tool is exchanged over the one within it or inside the one around it");
+        return;
+    }
+    // the scene's author chose what there is, or left it open
+    const char *folder = trainer->own_devices[tool] > 1 ? NULL : library(trainer, text, sizeof text);
+    trainer->has_tray = trainer_tray_open(&trainer->tray, trainer->scene, tool, folder, pose, &in);
+    if (trainer->has_tray)
+        panel_open_tray(trainer->panel, trainer->tray.devices.count, in);
+    else
+        say(trainer, MARK_BAD, "no memory for the tray");
+}
+
+static void close_tray(Trainer *trainer)
+{
+    panel_close_tray(trainer->panel);
+    trainer_tray_close(&trainer->tray);
+    trainer->has_tray = trainer->is_tray_due = false;
+}
+
+// The session with a scene that has one device more: all that was done is gone through again, as fast as it goes, and recorded anew. True where the session
+// lives on, in the old scene where the new one was refused.
+static bool go_on_in(Trainer *trainer, Scene *scene, bool has_begun, Faults *faults)
+{
+    char path[sizeof trainer->session.record_path];
+    RealtimeFigures real;
+    Scene *before = trainer->scene;
+    const HandGrip grip = trainer->desk.grip;
+    const time_t began_at = trainer->began_at;
+    const bool has_told_end = trainer->has_told_end;
+    snprintf(path, sizeof path, "%s", trainer->session.record_path);
+    bool good = live_session_stop(&trainer->session, &real, faults);
+    live_session_free(&trainer->session);
+    RecordedRun *run = good && has_begun ? recorded_run_load_series(path, faults) : NULL;
+    good = good && (run || !has_begun);
+    trainer->scene = scene;
+    bool is_taken = good && begin_session(trainer, run, faults);
+    if (!is_taken) {
+        trainer->scene = before;
+        good = good && begin_session(trainer, run, faults);
+    }
+    recorded_run_free(run);
+    trainer->began_at = began_at;
+    trainer->has_told_end = has_told_end;
+    trainer->desk.grip.locked = good ? grip.locked & ~(trainer->desk.grip.released | trainer->desk.grip.released << 1) : 0;
+    if (good && path[0])
+        remove(path);            // all of it is in the new one
+    return good;
+}
+
+static void show_new_scene(Trainer *trainer, Faults *faults)
+{
+    Desk desk;
+    char note[512];
+    Views *views = scene_views_create(trainer->scene, trainer->open, &desk, note, sizeof note, faults);
+    if (views) {
+        views_destroy(trainer->views);
+        trainer->views = views;
+    }
+}
+
+// Puts a device into the scene that does not have it yet. False ends the session.
+static bool add_device(Trainer *trainer, bool has_begun, Faults *faults)
+{
+    TrainerTray *tray = &trainer->tray;
+    const TipShaping tip = trainer_tray_tip(tray);
+    Scene *scene = tray_scene_with(trainer->scene, tray->devices.tool, &tray->devices.device[tray->choice.device], &tip, faults);
+    if (scene)
+        scene->contact = trainer->scene->contact;    // a recording that is gone on from may have another than its text
+    bool good = scene && open_vessel_inlet(scene, trainer->open, faults), lives = !good || go_on_in(trainer, scene, has_begun, faults);
+    bool is_taken = good && lives && trainer->scene == scene;
+    if (is_taken)
+        show_new_scene(trainer, faults);
+    if (faults->count > 0)
+        say(trainer, MARK_BAD, "%s", faults->text[0]);
+    if (lives)
+        faults_clear(faults);
+    if (is_taken) {
+        scene_free(trainer->own_scene);
+        trainer->own_scene = scene;
+    } else {
+        scene_free(scene);
+    }
+    return lives;
+}
+
+static bool take_from_tray(Trainer *trainer, const Pose *pose, Faults *faults)
+{
+    TrainerTray *tray = &trainer->tray;
+    int tool = tray->devices.tool, which = tray->devices.device[tray->choice.device].which;
+    const char *obstacle = trainer_tray_obstacle(tray);
+    bool has_begun = pose->step > 0, is_new = which < 0 || trainer_tray_tip(tray).length > 0, lives = true;
+    if (!obstacle && is_new && has_begun && !trainer->session.record_path[0])
+        obstacle = "this session is not recorded, so it can only go on with the devices that it began with";
+    if (obstacle) {
+        say(trainer, MARK_WARNING, "%s", obstacle);
+        trainer->is_tray_due = false;
+        return true;
+    }
+    if (is_new && !trainer->is_tray_due) {
+        say(trainer, MARK_NONE, "the session is gone through again with the new device, %.0f s of it", pose->time_s);
+        return trainer->is_tray_due = true;
+    }
+    if (is_new) {
+        const Scene *before = trainer->scene;
+        lives = add_device(trainer, has_begun, faults);
+        which = lives && trainer->scene != before ? scene_device_count(trainer->scene, tool) - 1 : -1;
+    }
+    if (lives && which >= 0)
+        hand_grip_fit(&trainer->desk.grip, trainer->scene->tool_count, tool, which);
+    close_tray(trainer);
+    return lives;
+}
+
+// What was pressed on devices goes to the tray while it is open. False ends the session.
+static bool obey_tray(Trainer *trainer, const PanelActions *actions, unsigned pressed, Faults *faults)
+{
+    const Moment *moment = realtime_moment(trainer->session.realtime);
+    if (!moment)
+        return true;
+    if (!trainer->has_tray) {
+        if ((actions->pressed[ACTION_EXCHANGE] & 1) || (pressed & HAND_EXCHANGE))
+            open_tray(trainer, moment->pose);
+        return true;
+    }
+    panel_move_in_tray(trainer->panel, ((pressed & HAND_CHOOSE_INNER) != 0) - ((pressed & HAND_CHOOSE_OUTER) != 0));
+    if (!actions->tray.is_open && !actions->tray.is_taken && !trainer->is_tray_due) {
+        close_tray(trainer);
+        return true;
+    }
+    if (!trainer->is_tray_due)
+        trainer_tray_show(&trainer->tray, trainer->scene, moment->pose, &actions->tray);
+    if (pressed & HAND_LET_GO)
+        close_tray(trainer);
+    else if (actions->tray.is_taken || (pressed & HAND_EXCHANGE) || trainer->is_tray_due)
+        return take_from_tray(trainer, moment->pose, faults);
+    return true;
+}
+
+// What came of an exchange, and what is now asked for: that which is in.
+static void tell_exchanges(Trainer *trainer, const Pose *pose)
+{
+    HandGrip *grip = &trainer->desk.grip;
+    bool is_refused = pose->refused_exchanges > trainer->refused;
+    for (int k = 0; k < pose->tool_count; k++) {
+        const SceneTool *device = scene_device(trainer->scene, k, pose->tool[k].fitted);
+        if (trainer->fitted[k] >= 0 && pose->tool[k].fitted != trainer->fitted[k])
+            say(trainer, MARK_GOOD, "%s is now: %s", trainer->scene->tool[k].name, device && device->title[0] ? device->title : pose->tool[k].fitted ? "the spare one" : "the first one");
+        if (trainer->fitted[k] >= 0 && is_refused && grip->fitted[k] != pose->tool[k].fitted) {
+            say(trainer, MARK_WARNING, "%s was not exchanged: %s", trainer->scene->tool[k].name, trainer_tray_refusal(pose->refusal));
+            grip->fitted[k] = pose->tool[k].fitted;
+        }
+        trainer->fitted[k] = pose->tool[k].fitted;
+    }
+    trainer->refused = pose->refused_exchanges;
 }
 
 static void take_screenshot(Trainer *trainer, const WindowInput *input)
@@ -363,6 +575,8 @@ static void draw(Trainer *trainer, const WindowInput *input, const PanelLayout *
         state->cine_frame = trainer->cine.player.frame;
         state->xray = *frame.xray;
     }
+    state->tray = trainer->has_tray ? &trainer->tray.shown : NULL;
+    tell_exchanges(trainer, pose);
     state->frame_ms = 1000 * histogram_quantile(&trainer->frame_cpu_ns, 0.5) * 1e-9;
     tell_news(trainer, moment);
     show_devices(trainer);
@@ -405,6 +619,9 @@ static void run_window(Trainer *trainer, Faults *faults)
         desk_obey(&trainer->desk, views_scene(trainer->views), &actions, &layout, fmin(now - last, 0.1));
         unsigned buttons = buttons_of_hands(trainer);
         actions.pressed[ACTION_BOOKMARK] += (buttons & ~trainer->buttons & HAND_MARK) != 0;
+        const unsigned pressed = buttons & ~trainer->buttons;
+        if (trainer->has_tray)
+            trainer->buttons = buttons;
         hand_grip_obey(&trainer->desk.grip, trainer->desk.tool_count, buttons, &trainer->buttons);
         tell_grip(trainer, &grip, &actions);
         last = now;
@@ -412,7 +629,7 @@ static void run_window(Trainer *trainer, Faults *faults)
         drive_by_pads(trainer);
         XrayControl xray = desk_xray(&trainer->desk, &actions, buttons_of_hands(trainer));
         realtime_set_xray(trainer->session.realtime, &xray);
-        goes_on = obey(trainer, &actions, input, faults) && !(trainer->options->duration_s > 0 && now > trainer->options->duration_s);
+        goes_on = obey(trainer, &actions, input, faults) && obey_tray(trainer, &actions, pressed, faults) && !(trainer->options->duration_s > 0 && now > trainer->options->duration_s);
         if (!goes_on || !visible)
             continue;
         layout = panel_layout(input->width, input->height, input->scale, trainer->desk.view, panel_has_panels(trainer->panel));
@@ -494,6 +711,8 @@ int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, T
         return code;
     }
     *trainer = (Trainer){.options = options, .scene = scene, .open = open, .figures = figures, .keyboard = {[1] = {.drives = DRIVES_PARTNER}}, .begun_s = clock_s(CLOCK_MONOTONIC)};
+    for (int k = 0; k < scene->tool_count; k++)
+        trainer->own_devices[k] = scene_device_count(scene, k);
     snprintf(trainer->trainee, sizeof trainer->trainee, "%s", options->trainee);
     if (open_window(trainer, faults) && open_views(trainer, faults) && open_hands(trainer, faults) &&
         begin_session(trainer, options->resume, faults) && open_cine(trainer, faults)) {
@@ -516,6 +735,8 @@ int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, T
     if (trainer->window)
         views_destroy(trainer->views);
     trainer_cine_close(&trainer->cine);
+    trainer_tray_close(&trainer->tray);
+    scene_free(trainer->own_scene);
     panel_destroy(trainer->panel);
     if (trainer->window)
         window_destroy(trainer->window);

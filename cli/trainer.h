@@ -18,6 +18,7 @@ typedef struct TrainerOptions {
     bool has_built_in_maps;
     const RecordedRun *resume;       // NULL, or go on from there …
     double resume_s;
+    const char *library;             // folder of devices for the tray; NULL: scenes/tools beside the program's build folder
     const char *cine;                // NULL, or a cine loop to begin with
     int width, height;
     PanelView view;

@@ -9,6 +9,16 @@ static const double outside_mm = 0.2;
 // Below this part of real time the hand feels that the tool is slow.
 static const double slow_factor = 0.97;
 
+static void name_device(TrainerPanel *panel, const Scene *scene, int k, int which)
+{
+    const WireOptions wire = scene_device_wire(scene, k, which);
+    const WireSection *tip = wire.section_count ? &wire.section[wire.section_count - 1] : NULL;
+    const char *title = scene_device(scene, k, which)->title;
+    snprintf(panel->tool[k], sizeof panel->tool[k], "%s%s%s %.2f mm x %.0f mm%s", title, title[0] ? ": " : "", tip && tip->inner_diameter > 0 ? "catheter" : "wire",
+             tip ? tip->diameter : 0, wire_length(&wire), tip && tip->rest_curvature != 0 ? ", curved tip" : "");
+    panel->fitted[k] = which;
+}
+
 void trainer_panel_begin(TrainerPanel *panel, const Scene *scene, const char *trainee)
 {
     memset(panel, 0, sizeof *panel);
@@ -20,10 +30,7 @@ void trainer_panel_begin(TrainerPanel *panel, const Scene *scene, const char *tr
         kind[k] = scene->tool[k].kind;
     tool_colors(scene->tool_count, kind, false, color);
     for (int k = 0; k < scene->tool_count; k++) {
-        const WireOptions wire = scene_tool_wire(scene, k);
-        const WireSection *tip = wire.section_count ? &wire.section[wire.section_count - 1] : NULL;
-        snprintf(panel->tool[k], sizeof panel->tool[k], "%s %.2f mm x %.0f mm%s", tip && tip->inner_diameter > 0 ? "catheter" : "wire", tip ? tip->diameter : 0,
-                 wire_length(&wire), tip && tip->rest_curvature != 0 ? ", curved tip" : "");
+        name_device(panel, scene, k, 0);
         state->tool[k] = (PanelTool){.name = scene->tool[k].name, .what = panel->tool[k], .color = color[k]};
     }
     state->trainee = trainee;
@@ -126,6 +133,8 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
     for (int k = 0; k < state->tool_count && k < pose->tool_count; k++) {
         const PoseTool *from = &pose->tool[k];
         PanelTool *tool = &state->tool[k];
+        if (from->fitted != panel->fitted[k])
+            name_device(panel, scene, k, from->fitted);
         tool->inserted_mm = from->inserted_mm;
         tool->turned_deg = from->turned_deg;
         tool->push_mm_s = from->command.push_mm_s;

@@ -18,7 +18,8 @@ typedef struct TrainerPanel {
     PanelDevice device[PANEL_DEVICES];
     PanelLabel label[PANEL_LABELS];
     char label_text[PANEL_LABELS][96];
-    char tool[PANEL_TOOLS][128], tool_note[PANEL_TOOLS][64], target[96], warning[200];
+    int fitted[PANEL_TOOLS];         // whose words `tool` holds
+    char tool[PANEL_TOOLS][200], tool_note[PANEL_TOOLS][64], target[96], warning[200];
     char instructions[4200];
 } TrainerPanel;
 

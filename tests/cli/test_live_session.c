@@ -101,6 +101,16 @@ static void let_go(void)
     atomic_store(&port.twist_deg_s, 0);
 }
 
+static int told;
+
+static void take_note(void *context, double part)
+{
+    double *before = context;
+    assert_true(part > *before && part <= 1);
+    *before = part;
+    told++;
+}
+
 static void a_session_goes_on_from_a_moment_of_it(void **state)
 {
     (void)state;
@@ -130,8 +140,12 @@ static void a_session_goes_on_from_a_moment_of_it(void **state)
     options.resume = first;
     options.resume_s = 0.3;
     options.paused = true;
+    double part = 0;
+    options.progress = take_note;
+    options.progress_context = &part;
     atomic_store(&port.push_mm_s, -15);
     session = open_session(&options);
+    assert_true(told == 300 / 64 && part > 0.8);
     assert_near(session.resumed_s, 0.3, 1e-9);
     const Moment *moment;
     while (!(moment = realtime_moment(session.realtime)) || moment->figures.state != REALTIME_PAUSED)

@@ -246,6 +246,34 @@ static void two_tools_are_moved_by_keys(void **state)
     RUNS(0, "%s replay '%s' --verify --quiet", SELDINGER_PROGRAM, newest_recording());
 }
 
+// The thread is still in: refused. It is drawn back, its tip shaped on the tray, and pushed in again.
+static const char exchanging_hands[] =
+    "W=$(xdotool search --sync --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
+    "xdotool key 2; sleep 0.2; xdotool key x; sleep 0.7; xdotool key s; sleep 0.3; xdotool key Return; sleep 0.5; xdotool key x; sleep 0.3; "
+    "xdotool keydown shift; xdotool keydown Down; sleep 4; xdotool keyup Down; xdotool keyup shift; sleep 0.2; xdotool key x; sleep 0.7; xdotool key s; sleep 0.2; xdotool key Right; sleep 0.3; "
+    "xdotool key Return; sleep 3; xdotool keydown shift; xdotool keydown Up; sleep 4; xdotool keyup Up; xdotool keyup shift; sleep 0.3; "
+    "while xdotool search --name Seldinger: >/dev/null 2>&1; do xdotool key Escape; sleep 0.5; xdotool key Return; sleep 0.3; done";
+
+static void a_tip_is_shaped_and_put_in_from_the_tray(void **state)
+{
+    (void)state;
+    need_display();
+    RUNS(0, "rm -rf trays; (%s) & exec %s nav coaxial.yaml --sessions trays --duration-s 60 --size 800x600 >out.txt 2>&1", exchanging_hands, SELDINGER_PROGRAM);
+    RUNS(0, "test $(ls trays/*.h5 | wc -l) = 1 && test $(ls trays/*.json | wc -l) = 1 && mv trays/*.h5 tray.h5");
+    RecordedRun *recorded = load(in_folder("tray.h5"));
+    int64_t last = recorded->step_count - 1, exchanged = 0;
+    assert_non_null(strstr(recorded->scene_text, "shaped_tip: {length_mm: 10, angle_deg: 50, mandrel_mm: 1}"));
+    while (exchanged < last && recorded_run_fitted(recorded, 1, exchanged) == 0)
+        exchanged++;
+    print_message("exchanged after %.1f of %.1f s, at last %.1f mm in\n", 0.001 * (double)exchanged, 0.001 * (double)last, recorded->tool[1].inserted[last]);
+    assert_int_equal(recorded_run_fitted(recorded, 1, last), 1);
+    assert_true(recorded->tool[1].inserted[exchanged] < -76 && recorded->tool[1].inserted[last] > 2);
+    assert_int_equal(recorded_run_commands(recorded, last).fitted[1], 1);
+    recorded_run_free(recorded);
+    RUNS(0, "%s replay tray.h5 --verify --quiet", SELDINGER_PROGRAM);
+    RUNS(0, "rm -rf again; %s replay tray.h5 --scene again --quiet && %s check again --quiet", SELDINGER_PROGRAM, SELDINGER_PROGRAM);
+}
+
 static void a_recording_is_shown_in_the_window(void **state)
 {
     (void)state;
@@ -266,6 +294,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_session_by_keys_is_recorded_scored_and_replayed),
                                        cmocka_unit_test(a_session_goes_on_from_a_moment_of_another), cmocka_unit_test(a_recording_is_shown_in_the_window),
-                                       cmocka_unit_test(two_tools_are_moved_by_keys), cmocka_unit_test(without_a_display_it_says_so)};
+                                       cmocka_unit_test(two_tools_are_moved_by_keys), cmocka_unit_test(a_tip_is_shaped_and_put_in_from_the_tray),
+                                       cmocka_unit_test(without_a_display_it_says_so)};
     return cmocka_run_group_tests(tests, open_display, close_display);
 }
