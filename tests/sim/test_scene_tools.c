@@ -325,6 +325,17 @@ static void a_tip_is_shaped_by_hand(void **state)
     scene_free(scene);
 }
 
+// A wall of filled polymer lets more X-rays through than a wire's metal, so that a catheter shows as two lines.
+static void a_catheter_is_seen_as_polymer(void **state)
+{
+    (void)state;
+    Scene *scene = good(THREE);
+    assert_near(scene_tool_attenuation(scene, 0, 10), 0.15, 0);
+    assert_near(scene_tool_attenuation(scene, 1, 10), 0.15, 0);
+    assert_near(scene_tool_attenuation(scene, 2, 10), 0.55, 0);
+    scene_free(scene);
+}
+
 static void each_fault_has_its_line_and_column(void **state)
 {
     (void)state;
@@ -580,6 +591,7 @@ int main(void)
         cmocka_unit_test(a_row_in_place_lets_a_tool_go),
         cmocka_unit_test(each_fault_of_a_script_has_its_place),
         cmocka_unit_test(a_tip_is_shaped_by_hand),
+        cmocka_unit_test(a_catheter_is_seen_as_polymer),
         cmocka_unit_test(each_fault_has_its_line_and_column),
         cmocka_unit_test(all_faults_come_in_one_pass),
         cmocka_unit_test(a_fault_hides_no_other_and_makes_none),
