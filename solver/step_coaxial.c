@@ -660,8 +660,10 @@ ToolNode tools_further(const Stepper *s, int c, double d)
         Vec3 tangent = quat_rotate(node.orientation, vec3(1, 0, 0)), force = out.beam.force2;
         Vec3 slant = vec3_scale(vec3_add_scaled(force, -vec3_dot(force, tangent), tangent), 1 / shear);
         node.position = vec3_add_scaled(node.position, ds, vec3_add_scaled(slant, 1 + stretch, tangent));
-        node.orientation = quat_unit(quat_mul(quat_mul(quat_from_rotation_vector(half), node.orientation), quat_from_rotation_vector(vec3(twist, 0, 0))));
+        node.orientation = quat_mul(quat_mul(quat_from_rotation_vector(half), node.orientation), quat_from_rotation_vector(vec3(twist, 0, 0)));
     }
+    double turned = c + 1 < s->state.node_count && is_at_tip(s, c) ? angle_at(s, c, s->carrier[c + 1]) : 0;      // input_at()
+    node.orientation = quat_unit(quat_mul(node.orientation, quat_from_rotation_vector(vec3(remainder(-turned, 2 * PI), 0, 0))));
     return node;
 }
 

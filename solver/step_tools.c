@@ -391,12 +391,12 @@ static void join(Stepper *s, int k, double d)
         for (c = w->node_count; c > 0 && s->carrier[c - 1] > k; c--)
             ;
     int before = c - 1;
-    double phi = *angle_of(s, before, k), turned = c < w->node_count ? *angle_of(s, before, s->carrier[c]) : 0;
+    double phi = *angle_of(s, before, k);
     Vec3 tangent = quat_rotate(w->orientation[before], vec3(1, 0, 0));
     ToolNode further = tools_further(s, before, d);
     shift(s, c, slots_of(t, j - 1), true);
     w->position[c] = further.position;
-    w->orientation[c] = quat_unit(quat_mul(further.orientation, quat_from_rotation_vector(vec3(remainder(phi - turned, 2 * PI), 0, 0))));
+    w->orientation[c] = quat_unit(quat_mul(further.orientation, quat_from_rotation_vector(vec3(remainder(phi, 2 * PI), 0, 0))));
     // its material moves as it did inside
     int i = before * w->inner_count + k - 1;
     w->velocity[c] = vec3_add_scaled(w->velocity[before], w->slide_velocity[i] - vec3_dot(w->velocity[before], tangent), tangent);

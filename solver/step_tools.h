@@ -27,7 +27,7 @@ int tools_around(const Stepper *s, int c, int k);
 double tools_span_length(const Stepper *s, int c);
 double tools_twist(const Stepper *s, int c);
 // Where the line is d [mm] from node c, or from the mouth where that is the last node in the sheath, as its element is bent, slanted by shear, stretched and
-// twisted there: position, and the frame of the tool that goes on, or at a free end of the one that ends.
+// twisted there: position, and the node's frame carried along.
 ToolNode tools_further(const Stepper *s, int c, double d);
 
 // [mm] radial, the least there is; at least a thousandth of the inner tool's diameter.
