@@ -105,7 +105,7 @@ static const char three_tools[] =
     "tools:\n"
     "  - {name: guide, kind: guide_catheter, elements: 20, inserted_mm: 5, sections: [{length_mm: 60, diameter_mm: 2, inner_diameter_mm: 1.8, young_modulus_gpa: 0.1}]}\n"
     "  - {name: micro, kind: microcatheter, elements: 25, inserted_mm: 4, sections: [{length_mm: 75, diameter_mm: 0.8, inner_diameter_mm: 0.5, young_modulus_gpa: 0.5}]}\n"
-    "  - {name: wire, kind: wire, elements: 30, inserted_mm: 6, sections: [{length_mm: 90, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
+    "  - {name: wire, kind: wire, elements: 30, inserted_mm: 6, sections: [{length_mm: 95, diameter_mm: 0.36, young_modulus_gpa: 20}]}\n"
     "sheath: {entry_mm: [0, 0, 0], direction: [1, 0, 0]}\n"
     "script:\n"
     "  - {t_s: 0, wire.push_mm_s: 50, wire.twist_deg_s: 0}\n"
