@@ -3,6 +3,7 @@
 //
 // Mass: all tools at a node move together across the tangent t; along it each has its own velocity, t . dx/dt - dS/dt for one that lies inside, and its
 // own spin, t . omega + dphi/dt. What S carries from node to node (convection) is left out: of order v^2 dm/ds.
+#include "solver/coaxial_lanes.h"
 #include "solver/step_tools.h"
 
 #include <string.h>
@@ -734,24 +735,200 @@ static void add_damping(const Stepper *s, int c, double scale, double *force)
         force[i] += with[i] - without[i];
 }
 
+// --- elements of straight tools ---
+
+typedef struct Batch {       // what a tile has: which elements, and which tools in them
+    CoaxialTile tile;
+    int element[COAXIAL_LANES], tool[COAXIAL_LANES][STEP_TOOLS_MAX];
+} Batch;
+
+static void add_lane(const Stepper *s, const Batch *batch, int l)
+{
+    const CoaxialTile *t = &batch->tile;
+    int n = s->chain.size, c = batch->element[l];
+    double *d = s->chain.diag + block_of(s, c), *next = s->chain.diag + block_of(s, c + 1), *low = s->chain.lower + block_of(s, c);
+    for (int r = 0, at = 0; r < 6; r++) {
+        for (int k = 0; k < r; k++, at++) {
+            d[n * r + k] += t->k11[at][l], d[n * k + r] += t->k11[at][l];
+            next[n * r + k] += t->k22[at][l], next[n * k + r] += t->k22[at][l];
+        }
+        d[(n + 1) * r] += t->k11[at][l];
+        next[(n + 1) * r] += t->k22[at++][l];
+        for (int k = 0; k < 6; k++)
+            low[n * r + k] += t->k21[6 * r + k][l];
+    }
+    for (int i = 0; i + 1 < t->count; i++) {
+        int at = unknown_of(batch->tool[l][i + 1]);
+        for (int r = 0; r < 6; r++) {
+            double near = t->by_slide[i][r][l], far = t->by_slide[i][6 + r][l];
+            d[n * r + at] -= near, d[n * at + r] -= near;
+            next[n * r + at] += far, next[n * at + r] += far;
+            low[n * at + r] += near, low[n * r + at] -= far;
+        }
+        for (int r = 0; r < 3; r++) {
+            double turn = t->by_turn[i][r][l];
+            int row = 3 + r, phi = at + 1;
+            d[n * row + phi] += turn, d[n * phi + row] += turn;
+            next[n * row + phi] += turn, next[n * phi + row] += turn;
+            low[n * phi + row] -= turn, low[n * row + phi] -= turn;
+        }
+        const double turn_turn = t->turn_turn[i][l], slide_turn = t->slide_turn[i][l];
+        double *const block[3] = {d, next, low};
+        for (int q = 0; q < 3; q++) {
+            double sign = q < 2 ? 1 : -1;
+            block[q][(n + 1) * (at + 1)] += sign * turn_turn;
+            block[q][n * at + at + 1] += sign * slide_turn;
+            block[q][n * (at + 1) + at] += sign * slide_turn;
+            for (int j = 0; j + 1 < t->count; j++)
+                block[q][n * at + unknown_of(batch->tool[l][j + 1])] += sign * t->slide_slide[i][j][l];
+        }
+    }
+}
+
+// y += `sign` times the tangent times u, both [2 n].
+static void multiply_lane(const Batch *batch, int l, int n, double sign, const double *u, double *y)
+{
+    const CoaxialTile *t = &batch->tile;
+    int place[12];
+    for (int r = 0; r < 6; r++)
+        place[r] = r, place[6 + r] = n + r;
+    for (int r = 0; r < 6; r++)
+        for (int k = 0; k < 6; k++) {
+            int at = r >= k ? r * (r + 1) / 2 + k : k * (k + 1) / 2 + r;
+            y[r] += sign * (t->k11[at][l] * u[k] + t->k21[6 * k + r][l] * u[n + k]);
+            y[n + r] += sign * (t->k21[6 * r + k][l] * u[k] + t->k22[at][l] * u[n + k]);
+        }
+    for (int i = 0; i + 1 < t->count; i++) {
+        int at = unknown_of(batch->tool[l][i + 1]);
+        double slides = u[n + at] - u[at], turns = u[n + at + 1] - u[at + 1];
+        double by_slide = t->slide_turn[i][l] * turns, by_turn = t->slide_turn[i][l] * slides + t->turn_turn[i][l] * turns;
+        for (int r = 0; r < 12; r++) {
+            y[place[r]] += sign * t->by_slide[i][r][l] * slides;
+            by_slide += t->by_slide[i][r][l] * u[place[r]];
+        }
+        for (int r = 0; r < 3; r++) {
+            double turn = t->by_turn[i][r][l];
+            y[3 + r] -= sign * turn * turns;
+            y[n + 3 + r] += sign * turn * turns;
+            by_turn += turn * (u[n + 3 + r] - u[3 + r]);
+        }
+        for (int j = 0; j + 1 < t->count; j++) {
+            int other = unknown_of(batch->tool[l][j + 1]);
+            by_slide += t->slide_slide[i][j][l] * (u[n + other] - u[other]);
+        }
+        y[n + at] += sign * by_slide, y[at] -= sign * by_slide;
+        y[n + at + 1] += sign * by_turn, y[at + 1] -= sign * by_turn;
+    }
+}
+
+static void lane_gradient(const Batch *batch, int l, int n, double *gradient)
+{
+    const CoaxialTile *t = &batch->tile;
+    memset(gradient, 0, 2 * (size_t)n * sizeof *gradient);
+    for (int r = 0; r < 6; r++)
+        gradient[r] = t->force[r][l], gradient[n + r] = t->force[6 + r][l];
+    for (int i = 0; i + 1 < t->count; i++) {
+        int at = unknown_of(batch->tool[l][i + 1]);
+        gradient[n + at] = t->slide_force[i][l], gradient[at] = -t->slide_force[i][l];
+        gradient[n + at + 1] = t->turn_force[i][l], gradient[at + 1] = -t->turn_force[i][l];
+    }
+}
+
+// As keep_inner().
+static void keep_lane(const Stepper *s, const Batch *batch, int l)
+{
+    const CoaxialTile *t = &batch->tile;
+    int c = batch->element[l], inner = s->state.inner_count;
+    Vec3 *moment = s->inner_moment + c * inner;
+    double *tension = s->inner_tension + c * inner;
+    s->bent[c] = t->bent[l];
+    for (int k = 0; k < inner; k++)
+        moment[k] = vec3(0, 0, 0), tension[k] = 0;
+    for (int i = 0; i < t->count; i++)
+        for (int k = batch->tool[l][i]; k > (i > 0 ? batch->tool[l][i - 1] : 0); k--) {
+            moment[k - 1] = vec3(t->moment[i][0][l], t->moment[i][1][l], t->moment[i][2][l]);
+            tension[k - 1] = t->tension[i][l];
+        }
+}
+
+// The elements of the tile go to the system; it is empty then.
+static void add_batch(Stepper *s, Batch *batch, double scale)
+{
+    CoaxialTile *t = &batch->tile;
+    int n = s->chain.size;
+    bool damps = s->is_iterate && scale != 1;
+    double u[2 * BLOCK_LARGEST], force[COAXIAL_LANES][2 * BLOCK_LARGEST];
+    if (t->lanes == 0)
+        return;
+    coaxial_tile_find(t, scale);
+    for (int l = 0; l < t->lanes; l++) {
+        add_lane(s, batch, l);
+        keep_lane(s, batch, l);
+        lane_gradient(batch, l, n, force[l]);
+        if (damps) {
+            strained(s, batch->element[l], u);
+            multiply_lane(batch, l, n, 1, u, force[l]);
+        }
+    }
+    if (damps)               // less the elastic part
+        coaxial_tile_find(t, 1);
+    for (int l = 0; l < t->lanes; l++) {
+        double *b = s->b + row_of(s, batch->element[l]);
+        if (damps) {
+            strained(s, batch->element[l], u);
+            multiply_lane(batch, l, n, -1, u, force[l]);
+        }
+        for (int i = 0; i < 2 * n; i++)
+            b[i] -= force[l][i];
+    }
+    t->lanes = 0;
+}
+
+static bool takes_element(Stepper *s, int c, double scale, Batch *batch)
+{
+    if (c < s->first_free || is_at_tip(s, c))
+        return false;
+    int tool[STEP_TOOLS_MAX], l = batch->tile.lanes;
+    CoaxialInput in = input_at(s, c, tool);
+    if (l > 0 && in.count != batch->tile.count) {
+        add_batch(s, batch, scale);
+        l = 0;
+    }
+    if (!coaxial_tile_take(&batch->tile, &in))
+        return false;
+    batch->element[l] = c;
+    memcpy(batch->tool[l], tool, sizeof tool);
+    if (batch->tile.lanes == COAXIAL_LANES)
+        add_batch(s, batch, scale);
+    return true;
+}
+
+static void add_element(Stepper *s, int c, double scale)
+{
+    double *b = s->b + row_of(s, c), gradient[2 * BLOCK_LARGEST];
+    element(s, c, scale, true, gradient, NULL, NULL);
+    if (s->is_iterate && scale != 1)
+        add_damping(s, c, scale, gradient);
+    if (c + 1 == s->first_free)
+        add_straightening(s, gradient);
+    for (int i = 0; i < 2 * s->chain.size; i++)
+        b[i] -= gradient[i];
+}
+
 void tools_assemble(Stepper *s, double scale, double inertia)
 {
-    int nodes = s->state.node_count, n = s->chain.size;
+    int nodes = s->state.node_count;
     memset(s->chain.diag, 0, block_of(s, nodes) * sizeof(double));
     memset(s->chain.lower, 0, block_of(s, nodes - 1) * sizeof(double));
     memset(s->b, 0, row_of(s, nodes) * sizeof(double));
     for (int c = 0; c < nodes; c++)
         node_inertia(s, c, inertia);
-    for (int c = 0; c + 1 < nodes; c++) {
-        double *b = s->b + row_of(s, c), gradient[2 * BLOCK_LARGEST];
-        element(s, c, scale, true, gradient, NULL, NULL);
-        if (s->is_iterate && scale != 1)
-            add_damping(s, c, scale, gradient);
-        if (c + 1 == s->first_free)
-            add_straightening(s, gradient);
-        for (int i = 0; i < 2 * n; i++)
-            b[i] -= gradient[i];
-    }
+    Batch batch;
+    batch.tile.lanes = 0;
+    for (int c = 0; c + 1 < nodes; c++)
+        if (!takes_element(s, c, scale, &batch))
+            add_element(s, c, scale);
+    add_batch(s, &batch, scale);
     if (!s->is_iterate)
         tools_slides(s);
     static const int lateral[4] = {1, 2, 4, 5};

@@ -1,5 +1,7 @@
 // Coaxial tools on one centreline: laws of the element, and chains of them against exact references.
+#include "geom/simd.h"
 #include "solver/coaxial.h"
+#include "solver/coaxial_lanes.h"
 #include "solver/wire.h"
 #include "tests/short_run.h"
 
@@ -1218,6 +1220,162 @@ static void print_times(void)
         }
 }
 
+// --- eight at a time ---
+
+typedef struct Dense {       // gradient, tangent, and what else a tile tells, of one element; a carrier's unknowns stay 0
+    double gradient[UNKNOWNS], tangent[UNKNOWNS][UNKNOWNS];
+} Dense;
+
+static void dense_of_element(const CoaxialInput *in, const CoaxialOutput *out, double scale, Dense *d)
+{
+    static CoaxialTangent t;
+    *d = (Dense){0};
+    gradient_of(in, d->gradient);
+    coaxial_tangent(in, out, scale, &t);
+    int columns = 4 * in->count;
+    for (int r = 0; r < 6; r++)
+        for (int c = 0; c < 6; c++) {
+            d->tangent[r][c] = t.nodes.k11[6 * r + c];
+            d->tangent[6 + r][c] = d->tangent[c][6 + r] = t.nodes.k21[6 * r + c];
+            d->tangent[6 + r][6 + c] = t.nodes.k22[6 * r + c];
+        }
+    for (int p = 0; p < columns; p++) {
+        for (int r = 0; r < 12; r++)
+            d->tangent[r][12 + p] = d->tangent[12 + p][r] = t.cross[r][p];
+        for (int q = 0; q < columns; q++)
+            d->tangent[12 + p][12 + q] = t.own[p][q];
+    }
+}
+
+static void dense_of_lane(const CoaxialTile *t, int l, Dense *d)
+{
+    *d = (Dense){0};
+    for (int r = 0; r < 12; r++)
+        d->gradient[r] = t->force[r][l];
+    for (int r = 0; r < 6; r++)
+        for (int c = 0; c < 6; c++) {
+            int at = r >= c ? r * (r + 1) / 2 + c : c * (c + 1) / 2 + r;
+            d->tangent[r][c] = t->k11[at][l];
+            d->tangent[6 + r][c] = d->tangent[c][6 + r] = t->k21[6 * r + c][l];
+            d->tangent[6 + r][6 + c] = t->k22[at][l];
+        }
+    for (int k = 1; k < t->count; k++)
+        for (int end = 0; end < 2; end++) {
+            double sign = end ? 1 : -1;
+            int i = k - 1, s = 12 + 4 * k + 2 * end, phi = s + 1;
+            d->gradient[s] = sign * t->slide_force[i][l];
+            d->gradient[phi] = sign * t->turn_force[i][l];
+            for (int r = 0; r < 12; r++)
+                d->tangent[r][s] = d->tangent[s][r] = sign * t->by_slide[i][r][l];
+            for (int r = 0; r < 3; r++) {
+                d->tangent[3 + r][phi] = d->tangent[phi][3 + r] = -sign * t->by_turn[i][r][l];
+                d->tangent[9 + r][phi] = d->tangent[phi][9 + r] = sign * t->by_turn[i][r][l];
+            }
+            for (int other = 0; other < 2; other++) {
+                double both = other == end ? 1 : -1;
+                int so = 12 + 4 * k + 2 * other;
+                d->tangent[phi][so + 1] = both * t->turn_turn[i][l];
+                d->tangent[phi][so] = d->tangent[so][phi] = both * t->slide_turn[i][l];
+                for (int j = 1; j < t->count; j++)
+                    d->tangent[s][12 + 4 * j + 2 * other] = both * t->slide_slide[i][j - 1][l];
+            }
+        }
+}
+
+static double dense_difference(const Dense *a, const Dense *b, int unknowns)
+{
+    double worst = 0, largest = 0;
+    for (int r = 0; r < unknowns; r++)
+        largest = fmax(largest, fabs(a->gradient[r]));
+    for (int r = 0; r < unknowns; r++) {
+        worst = fmax(worst, fabs(a->gradient[r] - b->gradient[r]) / largest);
+        for (int c = 0; c < unknowns; c++)
+            worst = fmax(worst, fabs(a->tangent[r][c] - b->tangent[r][c]) / sqrt(a->tangent[r][r] * a->tangent[c][c] + 1e-300));
+    }
+    return worst;
+}
+
+static void straight_mix(Mix *m, int count)
+{
+    make_mix(m, count, false, false, 1.5, 0.3, 0);
+    m->in.span[0].is_fixed = true;
+    m->in.span[0].phi1 = m->in.span[0].phi2 = 0;
+    for (int k = 0; k < count; k++)          // some longer than it, some shorter
+        m->in.span[k].spread = 1.5 * 1.002;
+}
+
+// The lanes of a tile = the elements one by one; the same bits at every SIMD level, and however many of the lanes are taken.
+static void lanes_equal_elements(void **state)
+{
+    (void)state;
+    static CoaxialTile tile, wide, one;
+    static Mix m[COAXIAL_LANES];
+    double worst = 0;
+    for (int trial = 0; trial < 40; trial++) {
+        int count = 1 + trial % 4;
+        double scale = trial & 4 ? 1.3 : 1;
+        memset(&tile, 0, sizeof tile);
+        for (int l = 0; l < COAXIAL_LANES; l++) {
+            straight_mix(&m[l], count);
+            assert_true(coaxial_tile_take(&tile, &m[l].in));
+        }
+        for (int level = (int)simd_widest(); level >= 0; level--) {
+            simd_force((SimdLevel)level);
+            coaxial_tile_find(&tile, scale);
+            if (level == (int)simd_widest())
+                wide = tile;
+            assert_memory_equal(&wide, &tile, sizeof tile);
+        }
+        simd_force(simd_widest());
+        memset(&one, 0, sizeof one);
+        assert_true(coaxial_tile_take(&one, &m[3].in));
+        coaxial_tile_find(&one, scale);
+        assert_int_equal(one.lanes, 1);
+        for (int l = 0; l < COAXIAL_LANES; l++) {
+            static Dense exact, lane;
+            static CoaxialOutput out;
+            coaxial_element(&m[l].in, &out);
+            dense_of_element(&m[l].in, &out, scale, &exact);
+            dense_of_lane(&tile, l, &lane);
+            worst = fmax(worst, dense_difference(&exact, &lane, 12 + 4 * count));
+            double tension = 0, bending = 0;
+            for (int k = count - 1; k >= 0; k--) {
+                tension += out.tension[k];
+                bending += m[l].section[k][1].bending;
+                assert_true(fabs(tile.tension[k][l] - tension) < 1e-10 * (fabs(tension) + 1));
+            }
+            Vec3 held = vec3(tile.moment[0][0][l], tile.moment[0][1][l], tile.moment[0][2][l]);
+            Vec3 middle = vec3_scale(vec3_sub(out.end_moment[1], out.end_moment[0]), 0.5);
+            assert_true(vec3_distance(held, middle) < 1e-11 * vec3_norm(middle));
+            assert_true(fabs(tile.bent[l] - vec3_norm(middle) / bending) < 1e-11 * tile.bent[l]);
+        }
+        static Dense first, third;
+        dense_of_lane(&one, 0, &first);
+        dense_of_lane(&tile, 3, &third);
+        assert_memory_equal(&first, &third, sizeof first);
+    }
+    print_message("lanes against elements: %.1e\n", worst);
+    assert_true(worst < 1e-10);
+}
+
+static void lanes_refuse_what_they_cannot(void **state)
+{
+    (void)state;
+    static CoaxialTile tile;
+    static Mix m;
+    for (int kind = 0; kind < 6; kind++)
+        for (int trial = 0; trial < 20; trial++) {
+            memset(&tile, 0, sizeof tile);
+            make_mix(&m, 3, kind == 1, kind == 2, 1.5, 0.3, kind == 0 ? 0.2 : 0);
+            m.in.span[0].is_fixed = kind != 3;
+            m.in.span[1].spreads_twist = kind == 4;
+            if (kind == 5)       // S2 is past its tip
+                m.tool[2].count = 1, m.section[2][0].end = m.in.span[2].s2 - 0.3;
+            assert_false(coaxial_tile_take(&tile, &m.in));
+            assert_int_equal(tile.lanes, 0);
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -1235,6 +1393,8 @@ int main(void)
         cmocka_unit_test(tangent_is_positive),
         cmocka_unit_test(tangent_against_the_true_hessian),
         cmocka_unit_test(carrier_at_a_mouth),
+        cmocka_unit_test(lanes_equal_elements),
+        cmocka_unit_test(lanes_refuse_what_they_cannot),
     };
     if (getenv("SELDINGER_TIMES"))
         print_times();
