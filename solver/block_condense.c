@@ -3,7 +3,7 @@
 //   D_i = T d T^T,  C = A(i', i) with the neighbour i' ahead,  O = A(origin, i),  Z = C T^-T d^-1,  H = O T^-T d^-1
 //   A(i', i') loses Z d Z^T,  A(origin, i') becomes -H d Z^T,  A(origin, origin) loses H d H^T
 //   y = T^-1 b,  b_i' loses Z y,  b_origin loses H y;   back:  x = T^-T (d^-1 y - Z^T x' - H^T x_origin)
-// Interleaved as in block_chain.c, and for the same reason; the lane behind the last row of C and O carries y.
+// Interleaved as in block_chain.c, and for the same reason.
 #include "solver/block_condense.h"
 
 #include "geom/simd.h"
@@ -11,24 +11,33 @@
 
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-// A node holds T, Z (lane n: d^-1 y) and H by columns, and 1/d.
-#define T_AT 0
-#define Z_AT PANEL
-#define H_AT (2 * PANEL)
-#define INVERSE_AT (3 * PANEL)
-#define NODE (3 * PANEL + COLUMN)
-enum { LIVE_BYTES = 1 + BLOCK_LARGEST };
-static size_t node_doubles(int size) { return (size_t)(3 * BLOCK_PANEL(size) + BLOCK_COLUMN(size)); }
+// Which unknowns of a node of a large block are worked on. Others, of tools that carry the node or have ended before it, have unit rows.
+typedef struct BlockShape {
+    unsigned char count;                 // of them; packed they are 0 to count - 1
+    unsigned char place[BLOCK_LARGEST];  // … and stand there
+    unsigned char shift;                 // 0 to 5 stay where they are, the others stand so much further on …
+    bool is_scattered;                   // … or anywhere
+    unsigned coupled;                    // a bit for each that is coupled to anything
+} BlockShape;
+
+static size_t node_doubles(int size)
+{
+    size_t large = (size_t)((size + 7) / 8 * 8);
+    return size == 6 ? (size_t)(3 * BLOCK_PANEL(6) + BLOCK_COLUMN(6)) : (3 * (size_t)size + 3) * large;
+}
+// The inverse pivots are a node's last ones.
+static size_t inverse_at(int size) { return node_doubles(size) - (size == 6 ? (size_t)BLOCK_COLUMN(6) : (size_t)((size + 7) / 8 * 8)); }
 
 struct BlockCondenser {
     int count, size, middle;
     bool *keep;
     int *place;                  // (M) in the small chain, -1: eliminated …
     int *origin;                 // (M) … into this one and the next ahead; -1: from an end of the chain
-    unsigned char *live;         // (M, LIVE_BYTES) how many unknowns of a node are coupled to anything, and which; the others have unit rows
+    BlockShape *shape;           // (M) of large blocks
     double *node;
     double *side;
     BlockChain small;
@@ -46,9 +55,9 @@ BlockCondenser *block_condenser_create(int count, int size)
     k->place = calloc(m, sizeof *k->place);
     k->origin = calloc(m, sizeof *k->origin);
     k->side = calloc((size_t)size * m, sizeof *k->side);
-    k->live = calloc(m, LIVE_BYTES);
+    k->shape = calloc(m, sizeof *k->shape);
     k->node = aligned_alloc(64, bytes);
-    if (!block_chain_create(&k->small, count, size) || !k->keep || !k->place || !k->origin || !k->side || !k->live || !k->node) {
+    if (!block_chain_create(&k->small, count, size) || !k->keep || !k->place || !k->origin || !k->side || !k->shape || !k->node) {
         block_condenser_destroy(k);
         return NULL;
     }
@@ -65,7 +74,7 @@ void block_condenser_destroy(BlockCondenser *k)
     free(k->place);
     free(k->origin);
     free(k->side);
-    free(k->live);
+    free(k->shape);
     free(k->node);
     free(k);
 }
@@ -120,25 +129,66 @@ static void choose_middle(BlockCondenser *k)
     k->keep[k->middle] = true;
 }
 
-static bool is_coupled(const BlockChain *a, int node, int r)
+typedef uint64_t Bits __attribute__((may_alias));
+
+// Anything but zeros, of either sign, in every `stride`th place. No branches: it nearly always looks at all of them.
+INLINE bool holds_any(const double *x, int stride, const int size)
 {
-    const int n = a->size;
-    const size_t block = (size_t)(n * n), i = (size_t)node;
-    const double *d = a->diag + block * i, *before = a->lower + block * (i > 0 ? i - 1 : 0), *after = a->lower + block * i;
-    bool any = d[(n + 1) * r] != 1;
-    for (int c = 0; c < n && !any; c++)
-        any = (c != r && d[n * r + c] != 0) || (node > 0 && before[n * r + c] != 0) || (node + 1 < a->count && after[n * c + r] != 0);
-    return any;
+    const Bits *entry = (const Bits *)x;
+    uint64_t all = 0;
+    for (int i = 0; i < size; i++)
+        all |= entry[stride * i] << 1;
+    return all != 0;
 }
 
-static void find_live(BlockCondenser *k, const BlockChain *a)
+INLINE bool is_coupled(const BlockChain *a, int node, int r, const int size)
+{
+    const size_t block = (size_t)(size * size), i = (size_t)node;
+    const double *row = a->diag + block * i + size * r;
+    if (row[r] != 1 || holds_any(row, 1, r) || holds_any(row + r + 1, 1, size - 1 - r))
+        return true;
+    return (node > 0 && holds_any(a->lower + block * (i - 1) + size * r, 1, size)) || (node + 1 < a->count && holds_any(a->lower + block * i + r, size, size));
+}
+
+static void shape(BlockShape *s, unsigned coupled)
+{
+    int first = 6, end = 6, count = 0;
+    for (int r = BLOCK_LARGEST - 1; r >= 0; r--) {
+        count += (int)(coupled >> r & 1);
+        if (r < 6 || !(coupled >> r & 1))
+            continue;
+        first = r / 2 * 2;
+        end = end > 6 ? end : r / 2 * 2 + 2;
+    }
+    s->coupled = coupled;
+    s->shift = (unsigned char)(first - 6);
+    s->count = 0;
+    s->is_scattered = count + 1 < 6 + end - first;
+    for (int r = 0; r < BLOCK_LARGEST; r++)
+        if (s->is_scattered ? coupled >> r & 1 : r < 6 || (r >= first && r < end))
+            s->place[s->count++] = (unsigned char)r;
+}
+
+INLINE void find_shapes(BlockCondenser *k, const BlockChain *a, const int size)
 {
     for (int i = 0; i < a->count; i++) {
-        unsigned char *live = k->live + LIVE_BYTES * i;
-        live[0] = 0;
-        for (int r = 0; r < a->size; r++)
-            if (is_coupled(a, i, r))
-                live[++live[0]] = (unsigned char)r;
+        unsigned coupled = 0;
+        for (int r = 0; r < size; r++)
+            coupled |= (unsigned)is_coupled(a, i, r, size) << r;
+        if (i > 0 && coupled == k->shape[i - 1].coupled)
+            k->shape[i] = k->shape[i - 1];
+        else
+            shape(&k->shape[i], coupled);
+    }
+}
+
+void block_condenser_survey(BlockCondenser *k, const BlockChain *chain)
+{
+    switch (k->size) {
+    case 8: find_shapes(k, chain, 8); break;
+    case 10: find_shapes(k, chain, 10); break;
+    case 12: find_shapes(k, chain, 12); break;
+    default: break;          // of the smallest blocks the kernels take all
     }
 }
 
@@ -147,8 +197,6 @@ const BlockChain *block_condense(BlockCondenser *k, const BlockChain *chain, con
     const size_t n = (size_t)k->size, block = n * n;
     k->count = chain->count;
     choose_middle(k);
-    if (k->size > 6)     // of the smallest blocks the kernels take all
-        find_live(k, chain);
     k->small.count = 0;
     for (int i = 0; i < k->count; i++) {
         k->place[i] = k->keep[i] ? k->small.count : -1;
@@ -161,7 +209,7 @@ const BlockChain *block_condense(BlockCondenser *k, const BlockChain *chain, con
     }
     eliminate_on[block_size_index(k->size)][simd_level()](k, chain, b);
     const size_t stride = node_doubles(k->size);
-    const double *inverse = k->node + stride - BLOCK_COLUMN(k->size);
+    const double *inverse = k->node + inverse_at(k->size);
     bool ok = true;
     for (int i = 0; i < k->count; i++, inverse += stride)
         for (int j = 0; k->place[i] < 0 && j < k->size; j++)

@@ -12,6 +12,8 @@ BlockCondenser *block_condenser_create(int count, int size);
 void block_condenser_destroy(BlockCondenser *condenser);
 // Which nodes to keep: all flags are false, and false again after condensing.
 bool *block_condenser_keep(BlockCondenser *condenser);
+// Looks which unknowns of a chain are coupled to anything: once for all chains that are condensed until the next time, which may have more in no other place.
+void block_condenser_survey(BlockCondenser *condenser, const BlockChain *chain);
 // The chain of the flagged nodes and one more, which balances the work, and its right-hand side; NULL where A is not positive definite.
 // Valid until the next call.
 const BlockChain *block_condense(BlockCondenser *condenser, const BlockChain *chain, const double *b);

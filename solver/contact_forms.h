@@ -17,6 +17,7 @@ typedef struct ContactLaw {
     Mat3 c;
     Vec3 along;                  // mu p of a sliding contact
     Vec3 step;                   // motion under the whole step
+    double own[4];               // of a slide: what the chain has without it in its unknowns
     double lean[2][6];           // of a sliding contact, by which the rows of its nodes are straightened …
     bool leans[2];               // … which they are
 } ContactLaw;
@@ -45,9 +46,8 @@ struct ContactSolver {
     BlockChain matrix;           // with the contacts' laws: diag and A(i, i+1) by columns (which is the row-major lower of a symmetric chain)
     double *turned;              // (M, n, n) A(i+1, i) by columns …
     double *turned_chain;        // … and that of the chain
-    BlockChain braced;           // the caller's chain with slides; `lower` is the caller's own …
-    double *side;                // … and its right-hand side (M, n)
-    BlockFactor *braced_factor;
+    double *side;                // (M, n) the right-hand side of the chain with slides …
+    BlockFactor *braced_factor;  // … and its factor
     BlockLu *lu;
     BlockFactor *factor;
     BlockCondenser *condenser;

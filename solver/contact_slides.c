@@ -29,6 +29,23 @@ static Mat3 resistance(const ContactRow *c, Vec3 e)
     return (Mat3){{{k * (c->bound - p.x * f0.x), xy, 0}, {xy, k * (c->bound - p.y * f0.y), 0}, {0, 0, 0}}};
 }
 
+static double *slide_block(const BlockChain *chain, const ContactRow *c)
+{
+    const size_t n = (size_t)chain->size;
+    return chain->diag + n * n * (size_t)c->node + (n + 1) * (size_t)c->slide;
+}
+
+// What the chain has without the laws, aside, or back again.
+static void keep_own(ContactSolver *s, const BlockChain *chain, int from, int to, bool back)
+{
+    const int n = chain->size;
+    for (int i = from; i < to; i++) {
+        double *at = slide_block(chain, &s->row[i]), *own = s->law[i].own;
+        for (int k = 0; k < 4; k++)
+            *(back ? &at[n * (k / 2) + k % 2] : &own[k]) = back ? own[k] : at[n * (k / 2) + k % 2];
+    }
+}
+
 // The laws about each slide's motion: into the chain's diagonal, and their forces on what does not move into the right-hand side.
 static void write_laws(ContactSolver *s, const BlockChain *chain, const double *b, int from, int to)
 {
@@ -44,10 +61,10 @@ static void write_laws(ContactSolver *s, const BlockChain *chain, const double *
         law->force = vec3_add(force_at(c, s->motion[i]), mat3_mul_vec(&law->c, s->motion[i]));
         contact_row_push(c, law->force, s->side);
         const double arm[2] = {c->mask[0] & 1 ? 1 : 0, c->mask[0] & 2 ? c->radius : 0};
-        const size_t at = (size_t)(n * n) * (size_t)c->node + (size_t)((n + 1) * c->slide);
+        double *at = slide_block(chain, c);
         for (int q = 0; q < 2; q++)
             for (int r = 0; r < 2; r++)
-                s->braced.diag[at + (size_t)(n * r + q)] = chain->diag[at + (size_t)(n * r + q)] + arm[r] * law->c.m[r][q] * arm[q];
+                at[n * r + q] = law->own[2 * r + q] + arm[r] * law->c.m[r][q] * arm[q];
     }
 }
 
@@ -139,18 +156,13 @@ static double look_at_waiting(ContactSolver *s, const double *u, int from, int t
 ContactReport contact_slides(ContactSolver *s, const BlockChain *chain, const double *b, int from, int to, const ContactOptions *options, double *u)
 {
     ContactReport report = {0};
-    const size_t block = (size_t)(chain->size * chain->size);
-    s->braced.count = chain->count;
-    s->braced.size = chain->size;
-    s->braced.lower = chain->lower;
-    memcpy(s->braced.diag, chain->diag, (size_t)chain->count * block * sizeof(double));
+    keep_own(s, chain, from, to, false);
     int most = options->max_iterations / CONTACT_SWEEPS_PER_FACTOR, iterations = 0, walls = first_contacts(s, from);
     for (int i = 0; i < most || i == 0; i++) {
         write_laws(s, chain, b, from, to);
-        if (!contact_walls(s, &s->braced, s->side, walls, options, u, &report)) {
-            report.singular = true;
-            return report;
-        }
+        report.singular = !contact_walls(s, chain, s->side, walls, options, u, &report);
+        if (report.singular)
+            break;
         iterations += 1 + report.iterations;
         double wall = report.residual * report.largest, error = read_solution(s, u, from, to, &report.largest);
         double allowed = options->tolerance * report.largest, passed = look_at_waiting(s, u, walls, from, allowed);
@@ -164,6 +176,9 @@ ContactReport contact_slides(ContactSolver *s, const BlockChain *chain, const do
         for (int k = from; k < to; k++)
             s->motion[k] = s->law[k].step;
     }
+    keep_own(s, chain, from, to, true);
+    if (report.singular)
+        return report;
     report.iterations = iterations;
     for (int i = from; i < to; i++) {
         ContactRow *c = &s->row[i];

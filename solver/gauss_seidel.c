@@ -199,13 +199,12 @@ ContactSolver *contact_solver_create(int node_count, int size, int contact_capac
     s->turned_chain = calloc(blocks, sizeof *s->turned_chain);
     s->small_u = calloc(n, sizeof *s->small_u);
     s->side = calloc(n, sizeof *s->side);
-    s->braced.diag = calloc(blocks, sizeof *s->braced.diag);
     s->braced_factor = block_factor_create(node_count, size);
     s->lu = block_lu_create(node_count, size);
     s->condenser = block_condenser_create(node_count, size);
     s->factor = block_factor_create(node_count, size);
     s->pointwise = pointwise_work_create(node_count, size, contact_capacity);
-    bool ok = block_chain_create(&s->matrix, node_count, size) && s->pointwise && s->condenser && s->small_u && s->turned_chain && s->side && s->braced.diag && s->braced_factor;
+    bool ok = block_chain_create(&s->matrix, node_count, size) && s->pointwise && s->condenser && s->small_u && s->turned_chain && s->side && s->braced_factor;
     if (!s->row || !s->spare || !s->motion || !s->law || !s->best || !s->best_u || !s->flag || !s->wall || !s->rhs || !s->delta || !s->turned || !s->lu || !s->factor || !ok) {
         contact_solver_destroy(s);
         return NULL;
@@ -247,7 +246,6 @@ void contact_solver_destroy(ContactSolver *s)
     free(s->turned);
     free(s->small_u);
     free(s->side);
-    free(s->braced.diag);
     block_factor_destroy(s->braced_factor);
     free(s->turned_chain);
     block_condenser_destroy(s->condenser);
@@ -329,6 +327,8 @@ ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, cons
         if (!solver->row[i].slide)
             solver->wall[solver->wall_count++] = i;
     ContactReport report;
+    if (!by_points)
+        block_condenser_survey(solver->condenser, chain);
     for (int i = count; i < all; i++) {
         const double *slip = set->slide[solver->row[i].point].slip;
         bool known = isfinite(slip[0]) && isfinite(slip[1]);

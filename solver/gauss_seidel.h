@@ -44,7 +44,8 @@ void contact_solver_destroy(ContactSolver *solver);
 bool contact_solver_reserve_pairs(ContactSolver *solver, int pairs);
 
 // `factor` is that of `chain`. b (M, n) in; u (M, n) out. Rows of constrained degrees of freedom are already unit rows in
-// `chain` with their value in b, and no contact acts on a fully constrained node.
+// `chain` with their value in b, and no contact acts on a fully constrained node. While it solves, slides are in the chain's diagonal; afterwards
+// the chain is as it was.
 ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, ContactSet *set,
                             const ContactOptions *options, double *u);
 // False: it will not look at `factor`.
