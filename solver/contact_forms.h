@@ -41,6 +41,7 @@ struct ContactSolver {
     int stalls;                  // of the line search in this solve …
     double slope;                // … and what they make of r over k
     bool inexact;                // a factor of this solve may have lost digits
+    bool knows_motion;           // `motion` is a guess that is better than what the forces would give
     bool symmetric;              // which of the two factors holds the matrix
     double *rhs, *delta;         // (M, n)
     BlockChain matrix;           // with the contacts' laws: diag and A(i, i+1) by columns (which is the row-major lower of a symmetric chain)

@@ -121,7 +121,7 @@ static int choose_states(ContactSolver *s, int count, bool first)
         pressing += s->law[i].state != OPEN;
     for (int i = 0; i < count; i++)
         s->flag[i] = s->law[i].state != OPEN;
-    if (!first || pressing == 0) {
+    if (!first || pressing == 0 || s->knows_motion) {
         choose_active(s, s->flag);
         choose_active_pairs(s, count, s->flag);
     }
@@ -450,15 +450,16 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
     int unknowns = chain->size * chain->count, most = options->max_iterations / CONTACT_SWEEPS_PER_FACTOR;
     for (int i = 0; i < count; i++)
         s->law[i].state = vec3_dot(s->row[i].force, s->row[i].normal) > 0 ? SLIP : OPEN;
-    contact_balance(s, factor, b, count, u);
+    if (!s->knows_motion)    // better than what the forces give
+        contact_balance(s, factor, b, count, u);
     contact_residual(s->row, count, s->motion, &report);
     double least = HUGE_VAL, residual = report.residual; // of the best iterate, its error in N and its residual
     bool fresh = true, finite = true, unbalanced = false; // no factor yet
     int in_a_row = 0;
     s->stalls = 0;
     s->inexact = false;
-    while (report.residual > options->tolerance && report.iterations < most) {
-        if (report.residual * report.largest < least) {
+    while ((report.residual > options->tolerance || s->knows_motion) && report.iterations < most) {
+        if (report.residual * report.largest < least && !s->knows_motion) {
             least = report.residual * report.largest;
             residual = report.residual;
             copy_iterate(s, unknowns, count, true, u);
@@ -467,8 +468,11 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
         if (first)
             assemble_reset(s, chain, count);
         bool reuse = choose_states(s, count, first) == 0 && !fresh && report.residual < 1e-3 && s->symmetric;
-        if (!newton_step(s, chain, count, reuse, search ? NULL : b))
+        if (!newton_step(s, chain, count, reuse, search ? NULL : b)) {
+            if (s->knows_motion && block_chain_factor(chain, s->factor))       // u is not set yet
+                contact_balance(s, s->factor, b, count, u);
             break;
+        }
         if (!search) {
             memset(u, 0, (size_t)unknowns * sizeof *u);
             memset(s->motion, 0, (size_t)count * sizeof *s->motion);
@@ -481,6 +485,7 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
             in_a_row = 0;
         }
         report.iterations++;
+        s->knows_motion = false;         // from now on it is the iterate's
         finite = take_step(s, unknowns, count, t, u);
         if (!finite)
             break;
@@ -493,6 +498,7 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
             s->inexact = false;
         }
     }
+    s->knows_motion = false;
     report.converged = finite && report.residual <= options->tolerance;
     if (!report.converged && report.iterations > 0 && !(finite && report.residual * report.largest < least)) {
         copy_iterate(s, unknowns, count, false, u);

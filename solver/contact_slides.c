@@ -158,6 +158,10 @@ ContactReport contact_slides(ContactSolver *s, const BlockChain *chain, const do
     ContactReport report = {0};
     keep_own(s, chain, from, to, false);
     int most = options->max_iterations / CONTACT_SWEEPS_PER_FACTOR, iterations = 0, walls = first_contacts(s, from);
+    // Forces of the step before do not balance the new loads, and would send contacts that slide anywhere at first: those are taken to move as the caller thinks.
+    for (int i = 0; i < walls; i++)
+        s->motion[i] = contact_row_motion(&s->row[i], u);
+    s->knows_motion = walls > 0;
     for (int i = 0; i < most || i == 0; i++) {
         write_laws(s, chain, b, from, to);
         report.singular = !contact_walls(s, chain, s->side, walls, options, u, &report);

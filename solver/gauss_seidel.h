@@ -43,9 +43,9 @@ void contact_solver_destroy(ContactSolver *solver);
 // Room for so many pairs besides. False: no memory.
 bool contact_solver_reserve_pairs(ContactSolver *solver, int pairs);
 
-// `factor` is that of `chain`. b (M, n) in; u (M, n) out. Rows of constrained degrees of freedom are already unit rows in
-// `chain` with their value in b, and no contact acts on a fully constrained node. While it solves, slides are in the chain's diagonal; afterwards
-// the chain is as it was.
+// `factor` is that of `chain`. b (M, n) in; u (M, n) out, and where there are slides, in: about what it will be. Rows of constrained degrees of freedom are
+// already unit rows in `chain` with their value in b, and no contact acts on a fully constrained node. While it solves, slides are in the chain's diagonal;
+// afterwards the chain is as it was.
 ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, ContactSet *set,
                             const ContactOptions *options, double *u);
 // False: it will not look at `factor`.

@@ -447,6 +447,18 @@ void stepper_go_back(Stepper *s)
     memcpy(s->state.angle, s->start_angle, inner);
 }
 
+// A contact solve with coaxial tools begins with what it expects the motion to be: that of the step before.
+static void expect_last_motion(Stepper *s)
+{
+    memset(s->u, 0, row_of(s, s->state.node_count) * sizeof *s->u);
+    for (int i = s->first_free; i < s->state.node_count; i++) {
+        double *u = s->u + row_of(s, i);
+        Vec3 moves = vec3_scale(s->state.velocity[i], s->dt), turns = vec3_scale(s->state.spin[i], s->dt);
+        u[0] = moves.x, u[1] = moves.y, u[2] = moves.z;
+        u[3] = turns.x, u[4] = turns.y, u[5] = turns.z;
+    }
+}
+
 // The step begins at the state's pose.
 static void begin(Stepper *s)
 {
@@ -461,6 +473,8 @@ static void begin(Stepper *s)
     s->is_iterate = s->overshoots = s->blocked = false;
     s->energy_before = -1;
     s->mouth_ahead = s->command.advance;
+    if (s->tool_count > 1)
+        expect_last_motion(s);
 }
 
 static void feed(Stepper *s, unsigned released)
