@@ -4,6 +4,7 @@
 #include "cli/output.h"
 
 #include <getopt.h>
+#include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -79,6 +80,30 @@ void bench_add_spread(cJSON *object, const char *name, Spread s)
     cJSON_AddNumberToObject(at, "max", s.max);
 }
 
+cJSON *bench_figures_json(const StepFigures *run)
+{
+    cJSON *at = cJSON_CreateObject();
+    char hash[17];
+    snprintf(hash, sizeof hash, "%016" PRIx64, run->hash);
+    cJSON_AddNumberToObject(at, "steps", (double)run->steps);
+    cJSON_AddNumberToObject(at, "real_time_factor", run->simulated_s / run->cpu_s);
+    bench_add_spread(at, "step_us", run->step_us);
+    cJSON *stages = cJSON_AddObjectToObject(at, "stage_us");
+    for (int k = 0; k < STAGE_COUNT; k++)
+        bench_add_spread(stages, stage_name[k], run->stage_us[k]);
+    bench_add_spread(at, "candidates", run->candidates);
+    bench_add_spread(at, "contacts", run->contacts);
+    bench_add_spread(at, "iterations", run->iterations);
+    bench_add_spread(at, "penetration_um", run->penetration_um);
+    cJSON_AddNumberToObject(at, "not_converged_steps", (double)run->not_converged);
+    cJSON_AddNumberToObject(at, "linearised_again_steps", (double)run->linearised_again);
+    cJSON_AddNumberToObject(at, "limited_steps", (double)run->limited);
+    cJSON_AddNumberToObject(at, "residual_max", run->residual_max);
+    cJSON_AddNumberToObject(at, "stalled_mm", run->stalled_mm);
+    cJSON_AddStringToObject(at, "state_hash", hash);
+    return at;
+}
+
 Command bench_command(const Scene *scene, int64_t step, int *cursor)
 {
     return scene->script ? script_at(scene->script, (double)step * scene->dt / 1000, cursor) : (Command){0, 0};
@@ -88,6 +113,30 @@ int64_t bench_steps(const Scene *scene, int64_t most)
 {
     int64_t steps = scene->script ? (int64_t)ceil(script_duration_s(scene->script) * 1000 / scene->dt - 1e-6) : 0;
     return steps < most ? steps : most;
+}
+
+void bench_figures(const Simulator *simulator, double cpu_s, StepFigures *figures)
+{
+    figures->cpu_s = cpu_s;
+    const StepProfile *profile = simulator_profile(simulator);
+    const RunTotals *totals = simulator_totals(simulator);
+    figures->steps = totals->steps;
+    figures->simulated_s = simulator_time_s(simulator);
+    figures->step_us = bench_spread(&profile->step, 1000);
+    for (int k = 0; k < STAGE_COUNT; k++)
+        figures->stage_us[k] = bench_spread(&profile->stage[k], 1000);
+    figures->candidates = bench_spread(&profile->candidates, 1);
+    figures->contacts = bench_spread(&profile->contacts, 1);
+    figures->iterations = bench_spread(&profile->iterations, 1);
+    figures->penetration_um = bench_spread(&profile->penetration_nm, 1000);
+    figures->not_converged = totals->not_converged_steps;
+    figures->linearised_again = totals->further_linearisations;
+    figures->limited = totals->limited_steps;
+    figures->residual_max = totals->residual_max;
+    figures->flags = totals->flags;
+    figures->last = *simulator_last(simulator);
+    figures->inserted_mm = simulator_state(simulator)->inserted;
+    figures->hash = simulator_hash(simulator);
 }
 
 bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, const StepTrace *trace, StepFigures *figures, Faults *faults)
@@ -113,27 +162,8 @@ bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, const Ste
             figures->crowded_step = i;
         }
     }
-    figures->cpu_s = (double)(bench_cpu_ns() - begin) * 1e-9;
-    const StepProfile *profile = simulator_profile(simulator);
-    const RunTotals *totals = simulator_totals(simulator);
-    figures->steps = totals->steps;
-    figures->simulated_s = simulator_time_s(simulator);
-    figures->step_us = bench_spread(&profile->step, 1000);
-    for (int k = 0; k < STAGE_COUNT; k++)
-        figures->stage_us[k] = bench_spread(&profile->stage[k], 1000);
-    figures->candidates = bench_spread(&profile->candidates, 1);
-    figures->contacts = bench_spread(&profile->contacts, 1);
-    figures->iterations = bench_spread(&profile->iterations, 1);
-    figures->penetration_um = bench_spread(&profile->penetration_nm, 1000);
-    figures->not_converged = totals->not_converged_steps;
-    figures->linearised_again = totals->further_linearisations;
-    figures->limited = totals->limited_steps;
-    figures->residual_max = totals->residual_max;
-    figures->flags = totals->flags;
-    figures->last = *simulator_last(simulator);
-    figures->inserted_mm = simulator_state(simulator)->inserted;
+    bench_figures(simulator, (double)(bench_cpu_ns() - begin) * 1e-9, figures);
     figures->stalled_mm = scene->wire.has_sheath ? fed - figures->inserted_mm : 0;
-    figures->hash = simulator_hash(simulator);
     simulator_destroy(simulator);
     return true;
 }

@@ -28,8 +28,11 @@ typedef struct StepFigures { // of all steps of a run; times are the thread's CP
 } StepFigures;
 
 int64_t bench_cpu_ns(void);
+// What a simulator tells at the end of a run; all but `crowded_step` and `stalled_mm`. cpu_s: what the run took.
+void bench_figures(const Simulator *simulator, double cpu_s, StepFigures *figures);
 Spread bench_spread(const TimeHistogram *histogram, double unit);
 void bench_add_spread(cJSON *object, const char *name, Spread s);
+cJSON *bench_figures_json(const StepFigures *figures);
 // The command of step i, from the scene's script.
 Command bench_command(const Scene *scene, int64_t step, int *cursor);
 int64_t bench_steps(const Scene *scene, int64_t most);   // of the script, but not more than `most`

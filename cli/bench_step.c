@@ -58,7 +58,7 @@ static const char help[] =
     "Usage: seldinger bench step [--tools] [--quick] [--threads N] [--json F]\n\n"
     "What a simulation step costs, where, and how right it is: spiral at 100 GPa, phantom and aneurism; 50 to 800 elements; each SIMD level.\n"
     "Run it from the project's folder. Times are CPU times of the simulation's thread.\n\n"
-    "  --tools      coaxial tools instead: one to four of them with 50 to 200 nodes, in the phantom, the arch and the angiogram\n"
+    "  --tools      coaxial tools instead: one to four of them with 50 to 400 nodes, in the phantom, the arch and the angiogram\n"
     "  --quick      200 steps of each scene, fewer samples\n"
     "  --threads N  threads of offline work such as fitting the shapes; default 0: all cores\n"
     "  --json F     the same figures as JSON; - is standard output, the tables then go to standard error\n\n"
@@ -438,30 +438,6 @@ static void print_budgets(FILE *out, const StepBench *bench, SimdLevel widest)
 
 // --- JSON ---
 
-static cJSON *run_json(const StepFigures *run)
-{
-    cJSON *at = cJSON_CreateObject();
-    char hash[17];
-    snprintf(hash, sizeof hash, "%016" PRIx64, run->hash);
-    cJSON_AddNumberToObject(at, "steps", (double)run->steps);
-    cJSON_AddNumberToObject(at, "real_time_factor", run->simulated_s / run->cpu_s);
-    bench_add_spread(at, "step_us", run->step_us);
-    cJSON *stages = cJSON_AddObjectToObject(at, "stage_us");
-    for (int k = 0; k < STAGE_COUNT; k++)
-        bench_add_spread(stages, stage_name[k], run->stage_us[k]);
-    bench_add_spread(at, "candidates", run->candidates);
-    bench_add_spread(at, "contacts", run->contacts);
-    bench_add_spread(at, "iterations", run->iterations);
-    bench_add_spread(at, "penetration_um", run->penetration_um);
-    cJSON_AddNumberToObject(at, "not_converged_steps", (double)run->not_converged);
-    cJSON_AddNumberToObject(at, "linearised_again_steps", (double)run->linearised_again);
-    cJSON_AddNumberToObject(at, "limited_steps", (double)run->limited);
-    cJSON_AddNumberToObject(at, "residual_max", run->residual_max);
-    cJSON_AddNumberToObject(at, "stalled_mm", run->stalled_mm);
-    cJSON_AddStringToObject(at, "state_hash", hash);
-    return at;
-}
-
 static void add_levels(cJSON *list, const StepBench *bench, SimdLevel widest)
 {
     for (int level = SIMD_SSE2; level <= (int)widest; level++) {
@@ -473,7 +449,7 @@ static void add_levels(cJSON *list, const StepBench *bench, SimdLevel widest)
         for (int c = 0; c < CASES; c++) {
             if (!bench->present[c])
                 continue;
-            cJSON *run = run_json(&bench->run[level][c]);
+            cJSON *run = bench_figures_json(&bench->run[level][c]);
             cJSON_AddNumberToObject(run, "detection_us", k->detection[c]);
             cJSON_AddNumberToObject(run, "detection_points", k->points[c]);
             cJSON_AddItemToObject(at, cases[c].name, run);
@@ -490,7 +466,7 @@ static bool write_json(const StepBench *bench, SimdLevel widest, Faults *faults)
         if (!bench->present[c])
             continue;
         const ForceError *error = &bench->error[c];
-        cJSON_AddItemToArray(scenes, at = run_json(&bench->run[widest][c]));
+        cJSON_AddItemToArray(scenes, at = bench_figures_json(&bench->run[widest][c]));
         cJSON_AddStringToObject(at, "name", cases[c].name);
         cJSON_AddStringToObject(at, "level", simd_name[widest]);
         cJSON *e = cJSON_AddObjectToObject(at, "force_error");
@@ -506,7 +482,7 @@ static bool write_json(const StepBench *bench, SimdLevel widest, Faults *faults)
     }
     cJSON *growth = cJSON_AddArrayToObject(root, "growth");
     for (int e = 0; e < GROWTHS; e++) {
-        cJSON_AddItemToArray(growth, at = run_json(&bench->growth[e]));
+        cJSON_AddItemToArray(growth, at = bench_figures_json(&bench->growth[e]));
         cJSON_AddNumberToObject(at, "elements", growth_elements[e]);
     }
     add_levels(cJSON_AddArrayToObject(root, "levels"), bench, widest);

@@ -1,20 +1,16 @@
-// The table of `bench step --tools`: steps of one to four coaxial tools in three vessels, with 50 to 200 nodes.
+// The table of `bench step --tools`: steps of one to four coaxial tools in three vessels, with 50 to 400 nodes.
 #ifndef SELDINGER_CLI_BENCH_TOOLS_H
 #define SELDINGER_CLI_BENCH_TOOLS_H
 
 #include "cli/bench.h"
 
-enum { TOOLS_VESSELS = 3, TOOLS_NODES = 3 };
+enum { TOOLS_VESSELS = 3, TOOLS_NODES = 4 };
 extern const int tools_bench_nodes[TOOLS_NODES];
 
 typedef struct ToolsRow {
     int tools, chain_nodes;              // at the end
-    int64_t steps;
-    Spread step_us, stage_us[STAGE_COUNT], iterations, penetration_um;
+    StepFigures run;
     double push_most;                    // [N] of any hand
-    int64_t not_converged, limited;
-    unsigned flags;
-    uint64_t hash;
 } ToolsRow;
 
 typedef struct ToolsBench {

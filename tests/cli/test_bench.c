@@ -56,10 +56,10 @@ static void tools_table(void **state)
     unlink("/tmp/seldinger-bench-tools.txt");
     cJSON *rows = cJSON_GetObjectItem(root, "tools");
     int count = 0;
-    assert_true(cJSON_GetArraySize(rows) >= 12 && cJSON_GetArraySize(rows) % 12 == 0);       // arch and angiogram are there or not
+    assert_true(cJSON_GetArraySize(rows) >= 16 && cJSON_GetArraySize(rows) % 16 == 0);       // arch and angiogram are there or not
     cJSON_ArrayForEach(at, rows) {
         const cJSON *step = cJSON_GetObjectItem(at, "step_us");
-        assert_true(number(at, "tools") == 1 + count / 3 % 4 && number(at, "steps") == 200);
+        assert_true(number(at, "tools") == 1 + count / 4 % 4 && number(at, "steps") == 200);
         assert_true(number(step, "median") > 0 && number(step, "median") <= number(step, "p999"));
         assert_true(number(at, "not_converged_steps") == 0 && number(at, "limited_steps") == 0);
         count++;
