@@ -41,7 +41,8 @@ struct ContactSolver {
     int stalls;                  // of the line search in this solve …
     double slope;                // … and what they make of r over k
     bool inexact;                // a factor of this solve may have lost digits
-    bool knows_motion;           // `motion` is a guess that is better than what the forces would give
+    bool knows_motion;           // `motion` is a guess that is better than what the forces would give …
+    bool is_positive;            // … and the chain was looked at: without slides' laws it is what it was, and these only add to it
     bool symmetric;              // which of the two factors holds the matrix
     double *rhs, *delta;         // (M, n)
     BlockChain matrix;           // with the contacts' laws: diag and A(i, i+1) by columns (which is the row-major lower of a symmetric chain)

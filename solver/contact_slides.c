@@ -153,17 +153,29 @@ static double look_at_waiting(ContactSolver *s, const double *u, int from, int t
     return worst;
 }
 
+// Forces of the step before do not balance the new loads, and would send contacts that slide anywhere at first: those are taken to move as in u, which is what
+// the caller expects, and then the last solution.
+static void expect_motion(ContactSolver *s, int walls, const double *u)
+{
+    for (int i = 0; i < walls; i++) {
+        ContactRow *c = &s->row[i];
+        c->node = c->chain_node;
+        if (c->far)
+            c->far->node = c->far->chain_node;
+        s->motion[i] = contact_row_motion(c, u);
+    }
+    s->knows_motion = walls > 0;
+}
+
 ContactReport contact_slides(ContactSolver *s, const BlockChain *chain, const double *b, int from, int to, const ContactOptions *options, double *u)
 {
     ContactReport report = {0};
     keep_own(s, chain, from, to, false);
     int most = options->max_iterations / CONTACT_SWEEPS_PER_FACTOR, iterations = 0, walls = first_contacts(s, from);
-    // Forces of the step before do not balance the new loads, and would send contacts that slide anywhere at first: those are taken to move as the caller thinks.
-    for (int i = 0; i < walls; i++)
-        s->motion[i] = contact_row_motion(&s->row[i], u);
-    s->knows_motion = walls > 0;
     for (int i = 0; i < most || i == 0; i++) {
         write_laws(s, chain, b, from, to);
+        expect_motion(s, walls, u);
+        s->is_positive = i > 0 && walls > 0;
         report.singular = !contact_walls(s, chain, s->side, walls, options, u, &report);
         if (report.singular)
             break;
@@ -180,6 +192,7 @@ ContactReport contact_slides(ContactSolver *s, const BlockChain *chain, const do
         for (int k = from; k < to; k++)
             s->motion[k] = s->law[k].step;
     }
+    s->is_positive = false;
     keep_own(s, chain, from, to, true);
     if (report.singular)
         return report;

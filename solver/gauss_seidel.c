@@ -280,7 +280,7 @@ static bool solve_condensed(ContactSolver *s, const BlockChain *chain, const dou
         return false;
     }
     const BlockChain *small = block_condense(s->condenser, chain, b);
-    if (!small || !block_chain_factor(small, s->factor))
+    if (!small || !(s->is_positive || block_chain_factor(small, s->factor)))
         return false;
     for (int i = 0; i < count; i++)
         s->row[i].node = block_condenser_place(s->condenser, s->row[i].chain_node);
