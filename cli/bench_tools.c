@@ -18,10 +18,10 @@ static const struct {
                           {"scenes/coaxial/arch.yaml", "scenes/arch/arch.h5", 300, 48},
                           {"scenes/coaxial/angiogram.yaml", "scenes/aneurism/aneurism.h5", 100, 20}};
 const int tools_bench_nodes[TOOLS_NODES] = {50, 100, 200, 400};
-static const double margin_mm = 15;      // of the outermost tool, in the sheath at the end
+static const double margin_mm = 15, hub_mm = 25;     // of the outermost tool, in the sheath at the end; by which the hub of each inner one is further back
 // What so many tools with so many nodes are to cost at most: median and p99.9.
 static const double must_us[2] = {300, 1000};
-enum { MUST_TOOLS = 3, MUST_NODES = 200 };
+enum { MUST_TOOLS = 3, MUST_NODES = 200, SECTIONS_MOST = 64 };
 
 // Keeps the distal `length` of a tool. `section` has room for all of them.
 static void cut(WireOptions *wire, double length, WireSection *section)
@@ -37,7 +37,7 @@ static void cut(WireOptions *wire, double length, WireSection *section)
     wire->section_count = count;
 }
 
-// The scene with `tools` of its four. `section`: room for the outermost one's.
+// The scene with `tools` of its four. `section`: room for theirs.
 static Scene with_tools(const Scene *scene, int tools, int nodes, double depth, WireSection *section)
 {
     static const int kept[4][4] = {{3}, {2, 3}, {0, 2, 3}, {0, 1, 2, 3}};
@@ -47,8 +47,7 @@ static Scene with_tools(const Scene *scene, int tools, int nodes, double depth, 
     for (int k = 0; k < tools; k++) {
         s.tool[k] = scene->tool[kept[tools - 1][k]];
         WireOptions *wire = &s.tool[k].wire;
-        if (k == 0)
-            cut(wire, depth / tools + margin_mm, section);
+        cut(wire, depth * (k + 1) / tools + margin_mm + k * hub_mm, section + k * SECTIONS_MOST);
         wire->inserted = inserted;
         wire->elements = (int)ceil(wire_length(wire) / spacing);
     }
@@ -104,7 +103,7 @@ bool bench_tools(const BenchOptions *options, ToolsBench *bench, Faults *faults)
             continue;
         BenchScene s;
         bool good = bench_open(stack[v].path, options->threads, &s, faults);
-        WireSection *section = good ? calloc(64, sizeof *section) : NULL;
+        WireSection *section = good ? calloc(TOOLS_MOST * SECTIONS_MOST, sizeof *section) : NULL;
         good &= section != NULL;
         for (int n = 0; good && n < TOOLS_NODES; n++)
             for (int k = 0; good && k < TOOLS_MOST; k++) {
