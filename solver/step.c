@@ -29,6 +29,9 @@ static const double OVERSHOOT = 0.015, SELF_OVERSHOOT = 0.005;
 // how often linear walls are moved before.
 static const double DEPTH_MAX = 0.02, DEPTH_LAST = 0.045;
 enum { HALVES_MAX = 6, MEETINGS_MAX = 2 };
+// Contact iterations after which a step looks no further, neither for walls nor for another place to linearise about: a jammed stiff tool would use hundreds a
+// step and not come further. What it then has is followed as far as it is good. Not where a tool meets itself: what nobody has looked for overlaps.
+enum { ITERATIONS_ENOUGH = 60 };
 // A tool that is squeezed by more than this share of its length is beyond what its elements describe (and would have yielded): the hand stalls.
 // One that is squeezed by JAMMED has a reason to be stuck.
 static const double SQUEEZE_MAX = 0.03, JAMMED = 0.002;
@@ -670,11 +673,13 @@ static void solve_driven(Stepper *s)
     }
 }
 
+static bool is_spent(const Stepper *s) { return s->report.iterations >= ITERATIONS_ENOUGH && s->set.pair_count == 0; }
+
 // A wire that springs goes further than anybody looked: look that far, and solve again.
 static void solve_contained(Stepper *s)
 {
     solve_driven(s);
-    for (int i = 0; i < 2 && !s->has_failed; i++) {
+    for (int i = 0; i < 2 && !s->has_failed && !is_spent(s); i++) {
         bool escapes = stepper_escapes(s);
         if (escapes) {
             s->knows_motion = true;
@@ -862,7 +867,7 @@ static double follow(Stepper *s, bool halfway)
         bool contained = depth <= most;
         if (contained && stepper_elastic_energy(s) <= bound)
             return part;
-        bool meets = !contained && k < MEETINGS_MAX && stepper_meet_walls(s, part) + self_contact_meet(s, part) > 0;
+        bool meets = !contained && k < MEETINGS_MAX && !is_spent(s) && stepper_meet_walls(s, part) + self_contact_meet(s, part) > 0;
         copy_iterate(s, true);
         part /= 2;
         if (meets) {
@@ -911,7 +916,7 @@ void step_contact(Stepper *s)
 {
     solve_contained(s);
     take_back(s);
-    for (int iteration = 1; iteration < 2 * s->newton_max && !s->has_failed; iteration++) {
+    for (int iteration = 1; iteration < 2 * s->newton_max && !s->has_failed && !is_spent(s); iteration++) {
         bool turns = s->turn > (s->report.active > 0 ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION);
         s->overshoots = stepper_overshoot(s) > OVERSHOOT || self_contact_depth(s, true) > SELF_OVERSHOOT;
         if (!(turns && iteration < s->newton_max) && !s->overshoots)
@@ -928,6 +933,7 @@ void step_contact(Stepper *s)
         s->report.newton = iteration;
         s->overshoots = true;
     }
+    s->overshoots |= is_spent(s);        // nobody has looked
 }
 
 static void keep_last_state(Stepper *s)
