@@ -1,7 +1,7 @@
 // seldinger bench step --tools: what a step of coaxial tools costs, by their number and the number of nodes.
 //
 // Stacks of four library tools in the phantom, the arch and the angiogram; with three the intermediate catheter is taken out, with two the guide too, with one
-// the microcatheter. Nodes are spread evenly over the depth to which the wire goes, and tool j of K goes to (j + 1) / K of it: each layer has the same share.
+// the microcatheter. Nodes are spread evenly from the outermost hub to the depth to which the wire goes, and tool j of K goes to (j + 1) / K of it: each layer has the same share.
 // First all hands push until the tips are there, each at its own speed; then all move against each other, along and about; then they rest.
 #include "cli/bench_tools.h"
 
@@ -43,7 +43,7 @@ static Scene with_tools(const Scene *scene, int tools, int nodes, double depth, 
     static const int kept[4][4] = {{3}, {2, 3}, {0, 2, 3}, {0, 1, 2, 3}};
     Scene s = *scene;
     s.tool_count = tools;
-    double spacing = depth / nodes, inserted = scene->wire.inserted;
+    double spacing = (depth + margin_mm) / nodes, inserted = scene->wire.inserted;
     for (int k = 0; k < tools; k++) {
         s.tool[k] = scene->tool[kept[tools - 1][k]];
         WireOptions *wire = &s.tool[k].wire;
