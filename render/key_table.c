@@ -34,7 +34,7 @@ const KeyAction key_table[ACTION_COUNT] = {
 
     {ACTION_PEDAL, GROUP_XRAY, ACTION_HOLD, K('F'), "X-ray pedal", "fluoroscopy while held; let go and the last image stays"},
     {ACTION_PEDAL_LATCH, GROUP_XRAY, ACTION_PRESS, K('E'), "X-ray stays on", "fluoroscopy on until pressed again: a pedal for one hand"},
-    {ACTION_CONTRAST, GROUP_XRAY, ACTION_HOLD, K('C'), "Inject contrast", "inject contrast agent through the chosen tool while held; X-ray must be on to see it"},
+    {ACTION_CONTRAST, GROUP_XRAY, ACTION_HOLD, K('C'), "Inject contrast", "inject contrast agent through the chosen tool; only X-ray shows it"},
     {ACTION_DSA, GROUP_XRAY, ACTION_PRESS, K('T'), "DSA", "subtract the mask: contrast and tool alone; again for the live image"},
     {ACTION_ROADMAP, GROUP_XRAY, ACTION_PRESS, K('R'), "Roadmap", "vessels of the last injection over the live image; again: off"},
     {ACTION_MASK, GROUP_XRAY, ACTION_PRESS, K('M'), "Take mask", "new mask for DSA and roadmap, after C-arm or table have moved"},
