@@ -31,6 +31,7 @@
 #include <stddef.h>
 #include <string.h>
 
+static const double SOFT_MOST = 0.4;     // of an element: over which a border is spread at most
 static const double LENGTH_MIN = 1e-6;   // [mm] of a tool between two nodes: so that a wild iterate stays finite
 
 typedef struct Two {         // about e2 and e3
@@ -70,62 +71,89 @@ INLINE void slope_add(CoaxialSlope *to, double factor, const double v[QUANTITIES
 static const CoaxialSection NOTHING = {0};     // past a tip
 
 typedef struct Border {
-    double x;
+    double x;                // where it counts
+    double by[2], bends;     // slopes of x with S1 and S2; its second derivative with where it is
     int tool;
 } Border;
 
-// One tool's borders inside the element, in among the others by place; its compliance; the section at node 1.
-static const CoaxialSection *scan(const CoaxialSpan *span, int k, CoaxialRest *rest, Border *border, int *border_count)
+// [mm] before a node, of the element, that a border p [mm] past the node before it leaves to what lies behind: p, spread over w to either side of 0.
+static double before_border(double p, double w, double *slope)
 {
-    const CoaxialSection *section = span->tool->section, *last = section + span->tool->count - 1;
-    double length = rest->strained_length[k], s = span->s1, end = s + length, by_axial = 0, by_torsion = 0;
-    rest->ends[k] = k > 0 && !span->has_tip && last->end < end;
-    rest->own_length[k] = rest->ends[k] ? rest->length : length;
+    bool is_near = fabs(p) < w;
+    *slope = is_near ? 0.5 * (w + p) / w : p > 0;
+    return is_near ? 0.25 * (w + p) * (w + p) / w : fmax(0, p);
+}
+
+// A border at `place` [mm] past node 1 of an element that is `length` long.
+static Border border_at(const double soft_at[2], int tool, double place, double length)
+{
+    bool end = 2 * place > length;
+    double p = end ? length - place : place, soft = soft_at[end], slope, x = before_border(p, soft, &slope) / length, near = -(slope - x) / length, far = -x / length;
+    return (Border){end ? 1 - x : x, {end ? far : near, end ? near : far}, fabs(p) < soft ? (end ? -0.5 : 0.5) / (soft * length) : 0, tool};
+}
+
+static const CoaxialSection *section_past(const CoaxialTool *tool, double s)
+{
+    const CoaxialSection *section = tool->section, *last = section + tool->count - 1;
     while (section < last && section->end <= s)
         section++;
-    if (span->has_tip && section->end <= s)
+    return section;
+}
+
+static void put_border(Border *border, int *count, Border own)
+{
+    if (*count == COAXIAL_BORDERS_MAX)
+        return;
+    int at = (*count)++;
+    for (; at > 0 && border[at - 1].x > own.x; at--)
+        border[at] = border[at - 1];
+    border[at] = own;
+}
+
+// One tool's borders inside the element, and a little further where they are spread, in among the others by place; the section at node 1.
+static const CoaxialSection *scan(const CoaxialSpan *span, int k, CoaxialRest *rest, Border *border, int *border_count)
+{
+    const CoaxialSection *last = span->tool->section + span->tool->count - 1;
+    double length = rest->strained_length[k], end = span->s1 + length;
+    const double soft[2] = {fmin(span->soft[0], SOFT_MOST * length), fmin(span->soft[1], SOFT_MOST * length)}, from = span->s1 - soft[0], to = end + soft[1];
+    rest->ends[k] = k > 0 && !span->has_tip && last->end < end;
+    rest->own_length[k] = rest->ends[k] ? rest->length : rest->strained_length[k];
+    bool has_end = span->has_tip || rest->ends[k];
+    if (has_end && last->end <= span->s1)
         return &NOTHING;
-    const CoaxialSection *first = section;
+    const CoaxialSection *first = section_past(span->tool, from), *section = first;
     rest->is_whole[k] = true;
-    for (;; section++) {
-        bool goes_on = section->end >= end || (section == last && k == 0);
-        double to = goes_on ? end : section->end;
-        // what is past its tip stretches and twists with it
-        double strained = section == last && !span->has_tip ? end : to;
-        by_axial += (strained - s) / section->axial;
-        by_torsion += (strained - s) / section->torsion;
-        if (goes_on)
-            break;
+    for (; section < last && section->end < to; section++) {
         rest->is_whole[k] = false;
-        if (*border_count < COAXIAL_BORDERS_MAX) {
-            int at = (*border_count)++;
-            double x = (to - span->s1) / rest->own_length[k];
-            for (; at > 0 && border[at - 1].x > x; at--)
-                border[at] = border[at - 1];
-            border[at] = (Border){x, k};
-        }
-        if (section == last)
-            break;
-        s = to;
+        put_border(border, border_count, border_at(soft, k, section->end - span->s1, rest->own_length[k]));
     }
-    if (!span->has_tip) {
-        // from `spread` before S2 on; what is behind S1 has its own sections
-        double behind = span->spread > length ? span->spread - length : 0, start = span->s1 - behind, at = span->s1;
-        const CoaxialSection *back = first;
-        for (bool reaches = false; !reaches; back -= !reaches) {
-            reaches = back == span->tool->section || (back - 1)->end <= start;
-            double from = reaches ? start : (back - 1)->end;
-            by_axial += (at - from) / back->axial;
-            by_torsion += span->spreads_twist ? (at - from) / back->torsion : 0;
-            at = from;
-        }
-        double moves = behind > 0 ? 0 : 1, turns = behind > 0 && span->spreads_twist ? 0 : 1;
-        rest->axial[k] = 1 / by_axial;
-        rest->torsion[k] = 1 / by_torsion;
-        rest->axial_end[k][0] = moves / first->axial, rest->axial_end[k][1] = 1 / section->axial - (1 - moves) / back->axial;
-        rest->torsion_end[k][0] = turns / first->torsion, rest->torsion_end[k][1] = 1 / section->torsion - (1 - turns) / back->torsion;
+    static const double sharp[2] = {0, 0};
+    if (has_end && last->end < end) {
+        rest->is_whole[k] = false;
+        put_border(border, border_count, border_at(sharp, k, last->end - span->s1, rest->own_length[k]));
     }
     return first;
+}
+
+// One tool's compliance: of S1 to S2, and of what is behind S1 where `spread` is longer. What is past its tip is strained as its last section.
+static void strain(const CoaxialSpan *span, int k, CoaxialRest *rest)
+{
+    double length = rest->strained_length[k], end = span->s1 + length, start = end - fmax(span->spread, length), axial = 0, torsion = 0;
+    const CoaxialSection *last = span->tool->section + span->tool->count - 1, *back = section_past(span->tool, start), *first = section_past(span->tool, span->s1);
+    const CoaxialSection *section = back;
+    for (double at = start;; section++) {
+        double to = section == last ? end : fmin(section->end, end), from = span->spreads_twist ? at : fmax(at, span->s1);
+        axial += (to - at) / section->axial;
+        torsion += fmax(0, to - from) / section->torsion;
+        at = to;
+        if (section == last || section->end >= end)
+            break;
+    }
+    bool is_spread = start < span->s1, spreads_twist = is_spread && span->spreads_twist;
+    rest->axial[k] = 1 / axial;
+    rest->torsion[k] = 1 / torsion;
+    rest->axial_end[k][0] = is_spread ? 0 : 1 / first->axial, rest->axial_end[k][1] = 1 / section->axial - (is_spread ? 1 / back->axial : 0);
+    rest->torsion_end[k][0] = spreads_twist ? 0 : 1 / first->torsion, rest->torsion_end[k][1] = 1 / section->torsion - (spreads_twist ? 1 / back->torsion : 0);
 }
 
 // A piece's tools: what they add to the element, and the derivatives of that.
@@ -163,8 +191,9 @@ static void add_piece(const CoaxialSpan *span, double a, double b, Parts *p, Coa
         double cosine = 1, sine = 0;
         if (turn != 0)
             cosine = small_cosine(turn * reach, &sine), sine *= turn * reach;
-        own_held[k] = 0.5 * c->bending * (c->curve[0] * c->curve[0] + c->curve[1] * c->curve[1]) * width;
-        held += own_held[k] * length;
+        double straight = 0.5 * c->bending * (c->curve[0] * c->curve[0] + c->curve[1] * c->curve[1]);
+        own_held[k] = straight * width;
+        held += straight * length;
         p->curve[k] = u, p->turn[k] = turn, p->cosine[k] = cosine, p->sine[k] = sine;
         p->even[k] = two_scale(u, cosine);
         p->odd[k] = two_scale(two_turned(u), reach * sine);
@@ -223,8 +252,8 @@ static void add_piece(const CoaxialSpan *span, double a, double b, Parts *p, Coa
                 }
             }
         }
-        value[WASTE] = held - weight * square;
-        by_width[WASTE] = held / width - flexible * square - weight * square_width;
+        value[WASTE] = held * width - weight * square;
+        by_width[WASTE] = held - flexible * square - weight * square_width;
         by_mid[WASTE] = -weight * square_mid;
         for (int g = 0; g < curved_count; g++) {
             int k = curved[g];
@@ -312,17 +341,25 @@ void coaxial_rest(const CoaxialSpan *span, int count, CoaxialRest *rest)
     for (int k = 0; k < count; k++) {
         rest->strained_length[k] = span[k].has_tip ? rest->length : fmax(span[k].s2 - span[k].s1, LENGTH_MIN);
         parts.section[k] = scan(&span[k], k, rest, border, &border_count);
+        if (!span[k].has_tip)
+            strain(&span[k], k, rest);
     }
     double from = 0, ends[2][QUANTITIES], before[QUANTITIES] = {0};
     for (int i = 0; i <= border_count; i++) {
         double to = i < border_count ? border[i].x : 1;
         add_piece(span, from, to, &parts, rest, ends);
         if (i > 0) {         // the border that ends the piece before and starts this one
-            int k = border[i - 1].tool;
+            const Border *b = &border[i - 1];
+            int k = b->tool;
             for (int q = 0; q < QUANTITIES; q++)
                 before[q] += ends[0][q];
-            slope_add(&rest->slope[4 * k + COAXIAL_S1], -(1 - from) / rest->own_length[k], before);
-            slope_add(&rest->slope[4 * k + COAXIAL_S2], -from / rest->own_length[k], before);
+            if (b->bends != 0 && rest->soft_count < COAXIAL_TOOLS_MAX) {
+                CoaxialSoft *soft = &rest->soft[rest->soft_count++];
+                *soft = (CoaxialSoft){.tool = k, .end = b->x > 0.5, .bends = b->bends};
+                slope_add(&soft->slope, 1, before);
+            }
+            slope_add(&rest->slope[4 * k + COAXIAL_S1], b->by[0], before);
+            slope_add(&rest->slope[4 * k + COAXIAL_S2], b->by[1], before);
         }
         if (i < border_count) {
             const CoaxialTool *tool = span[border[i].tool].tool;
@@ -402,6 +439,18 @@ static double frames_twist(const CoaxialInput *in, Vec3 *axis)
     return 2 * g * p.x;
 }
 
+typedef struct Bent {        // an element's end moments: half their squares and their product; what the rest angles' change costs
+    double square[3];
+    Two by[2];
+} Bent;
+
+// [mJ] of the energy with something that changes `rest` by s.
+static double energy_slope(const Bent *b, const CoaxialSlope *s)
+{
+    return s->waste - (b->square[0] * s->flexibility[0] + b->square[1] * s->flexibility[1] + b->square[2] * s->flexibility[2]) + b->by[0].y * s->angle[0][0] +
+           b->by[0].z * s->angle[0][1] + b->by[1].y * s->angle[1][0] + b->by[1].z * s->angle[1][1];
+}
+
 void coaxial_element(const CoaxialInput *in, CoaxialOutput *out)
 {
     CoaxialRest *rest = &out->rest;
@@ -455,13 +504,13 @@ void coaxial_element(const CoaxialInput *in, CoaxialOutput *out)
         by1 = two_add((Two){-by1.y, -by1.z}, o->tension, (Two){rest->arc_by_angle[0][0], rest->arc_by_angle[0][1]});
         by2 = two_add((Two){-by2.y, -by2.z}, o->tension, (Two){rest->arc_by_angle[1][0], rest->arc_by_angle[1][1]});
     }
+    const Bent bent = {{square1, square12, square2}, {by1, by2}};
     double *g = out->gradient;
+    for (int i = 0; i < rest->soft_count; i++)
+        rest->soft[i].stiffness = fmax(0, energy_slope(&bent, &rest->soft[i].slope) * rest->soft[i].bends);
     for (int k = 0; k < count; k++) {
-        for (int j = 0; j < 4; j++) {
-            const CoaxialSlope *s = &rest->slope[4 * k + j];
-            g[4 * k + j] = s->waste - (square1 * s->flexibility[0] + square12 * s->flexibility[1] + square2 * s->flexibility[2]) +
-                           by1.y * s->angle[0][0] + by1.z * s->angle[0][1] + by2.y * s->angle[1][0] + by2.z * s->angle[1][1];
-        }
+        for (int j = 0; j < 4; j++)
+            g[4 * k + j] = energy_slope(&bent, &rest->slope[4 * k + j]);
         double t = out->tension[k], q = out->torque[k];
         if (in->span[k].has_tip)
             continue;
@@ -558,6 +607,15 @@ static void add_sharing(const CoaxialInput *in, const CoaxialOutput *out, Coaxia
             if (j < i)
                 add_lengths(t, j, i, sum[i][j]);
         }
+}
+
+// A border that goes from one element to the next is held the more the further it is: by S at the node between.
+static void add_soft(const CoaxialRest *rest, CoaxialTangent *t)
+{
+    for (int n = 0; n < rest->soft_count; n++) {
+        int k = rest->soft[n].tool, at = 4 * k + (rest->soft[n].end && !rest->ends[k] ? COAXIAL_S2 : COAXIAL_S1);
+        t->own[at][at] += rest->soft[n].stiffness;
+    }
 }
 
 INLINE void put_rows(double (*row)[COAXIAL_COLUMNS], int column, Vec3 v)
@@ -749,6 +807,7 @@ void coaxial_tangent(const CoaxialInput *in, const CoaxialOutput *out, double sc
     multiply_columns(&w, tangent);
     if (count > 1)
         add_sharing(in, out, tangent);
+    add_soft(rest, tangent);
     for (int k = 0; k < count; k++) {
         tangent->own[4 * k + COAXIAL_PHI1][4 * k + COAXIAL_PHI1] += w.spin[0][k];
         tangent->own[4 * k + COAXIAL_PHI2][4 * k + COAXIAL_PHI2] += w.spin[1][k];

@@ -41,6 +41,8 @@ typedef struct CoaxialSpan { // one tool in one element
     double spread;           // [mm] strain is that of at least this length, what is behind S1 counted in; default 0. For an element that begins at a
                              // mouth or a tip and may be short: the full element's length
     bool spreads_twist;      // the twist too: at a mouth, where the tools' angles at node 1 are those of a node behind it
+    double soft[2];          // [mm] default 0: over so much to either side of node 1, of node 2, a border of this tool goes from this element to the one there.
+                             // Where the carrier's section changes or ends the energy would have a kink, and a step a force that depends on the side
     bool has_tip;            // it ends inside, at its last section's end: it bends with the others up to there, as long as the carrier and not turned
                              // along it, and has no tension and no torque. S1 and phi1 are all that it has. Not for the carrier
     bool is_fixed;           // its values are no unknowns: no derivatives with them, which saves time
@@ -57,6 +59,14 @@ typedef struct CoaxialPiece {      // part of an element between two borders
 typedef struct CoaxialSlope {
     double flexibility[3], angle[2][2], waste;
 } CoaxialSlope;
+
+typedef struct CoaxialSoft {       // a border that goes from one element to the next
+    int tool;
+    bool end;                // at node 2
+    double bends;            // [1/mm2] second derivative of where it counts, in shares of the element, with S at that node
+    CoaxialSlope slope;      // with where it counts
+    double stiffness;        // [N/mm] with that S, if positive; coaxial_element() sets it
+} CoaxialSoft;
 
 typedef struct CoaxialChord {      // the rest chord in a node's frame
     Quat turn;               // from the frame to it, by minus the rest angle, v
@@ -84,6 +94,8 @@ typedef struct CoaxialRest {       // layer 1: what the tools are together
     double torsion[COAXIAL_TOOLS_MAX];         // [N mm] 1 / integral of dS / GJ; likewise
     double axial_end[COAXIAL_TOOLS_MAX][2], torsion_end[COAXIAL_TOOLS_MAX][2];     // minus and plus the slopes of these integrals with S1 and S2
     CoaxialSlope slope[COAXIAL_COLUMNS];       // [4 k + COAXIAL_S1 ...]; not set for fixed spans
+    int soft_count;
+    CoaxialSoft soft[COAXIAL_TOOLS_MAX];
     // second derivatives of the waste with phi1 phi1, phi1 phi2, phi2 phi2 of tool i against tool j < i, where positive
     double couple[COAXIAL_TOOLS_MAX][COAXIAL_TOOLS_MAX][3];
     int piece_count;

@@ -206,10 +206,10 @@ bool coaxial_tile_take(CoaxialTile *tile, const CoaxialInput *in)
     const CoaxialSection *section[COAXIAL_TOOLS_MAX];
     for (int k = 0; k < in->count; k++) {
         const CoaxialSpan *p = &in->span[k];
-        double back = fmin(p->s1, p->s2 - p->spread);
+        double back = fmin(p->s1 - p->soft[0], p->s2 - p->spread);
         if (p->has_tip || p->spreads_twist || p->is_fixed != (k == 0) || !(p->s2 - p->s1 > 1e-3 * in->span[0].spread))
             return false;
-        section[k] = only_section(p->tool, back, p->s2, k == 0);
+        section[k] = only_section(p->tool, back, p->s2 + p->soft[1], k == 0);
         if (!section[k])
             return false;
     }

@@ -10,17 +10,25 @@
 
 enum { NODAL = 12 };
 static const double SHORTEST = 0.01;     // of an element: what is left of it outside a mouth or a tip
+static const double SOFT = 0.02;         // … over which a border of one tool passes one of another. No more than by how much tips pass nodes early
+
+// Does the section of the tool that carries node c change there, or end?
+static bool is_border(const Stepper *s, int c)
+{
+    return c + 1 == s->state.node_count || s->carrier[c] != s->carrier[c + 1] || (c > 0 && s->carrier[c - 1] == s->carrier[c] && s->wire.section[c - 1] != s->wire.section[c]);
+}
 
 // The tools in element c, carrier first; returns their number. tool: which they are.
 static int spans(const Stepper *s, int c, CoaxialSpan *span, int *tool)
 {
     int count = 0, first = s->carrier[c + 1];
+    double soft[2] = {is_border(s, c) ? SOFT * s->wire.length[c] : 0, is_border(s, c + 1) ? SOFT * s->wire.length[c] : 0};
     for (int k = first; k < s->tool_count; k++) {
         CoaxialSpan *p = &span[count];
         bool carries = k == first, from_node = s->carrier[c] == k;
         if (!carries && !is_inside(s, c, k))
             continue;
-        *p = (CoaxialSpan){.tool = &s->tool[k].coaxial, .is_fixed = carries && from_node};
+        *p = (CoaxialSpan){.tool = &s->tool[k].coaxial, .is_fixed = carries && from_node, .soft = {soft[0], soft[1]}};
         p->s1 = from_node ? s->wire.s[c] : slide_at(s, c, k);
         p->phi1 = from_node ? 0 : angle_at(s, c, k);
         if (carries) {
@@ -442,6 +450,7 @@ static CoaxialInput mouth_input(const Stepper *s, int *tool)
         p->is_fixed = false;
         p->spread = s->wire.length[c];
         p->spreads_twist = true;
+        p->soft[0] = 0;
         double end = p->has_tip ? s->tool[tool[i]].wire.total_length : p->s2;
         if (!p->has_tip)
             p->s1 = fmin(p->s1, end - SHORTEST * s->wire.length[c]);

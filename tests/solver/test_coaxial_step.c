@@ -495,7 +495,8 @@ static void hands_stop_and_slip(void **state)
 }
 
 // Nodes and unknowns come and go as borders, bends and tips pass the mouth, the tip and nodes: the energy is that of the same pose before and after. What it
-// may change by is the strain of the last length up to a node, and what eight parts of a line miss of its curve.
+// may change by is the strain of the last length up to a node, what eight parts of a line miss of its curve, and that a border is spread from the node on that has
+// left the mouth.
 static void events_leave_the_energy(void **state)
 {
     (void)state;
