@@ -30,7 +30,8 @@ static const double OVERSHOOT = 0.015, SELF_OVERSHOOT = 0.005;
 static const double DEPTH_MAX = 0.02, DEPTH_LAST = 0.045;
 enum { HALVES_MAX = 6, MEETINGS_MAX = 2 };
 // Contact iterations after which a step looks no further, neither for walls nor for another place to linearise about: a jammed stiff tool would use hundreds a
-// step and not come further. What it then has is followed as far as it is good. Not where a tool meets itself: what nobody has looked for overlaps.
+// step and not come further. What it then has is followed as far as it is good. Not where a tool meets itself: what nobody has looked for overlaps; nor with
+// several tools, which snap over more rounds and came to lie 1.3 mm outside.
 enum { ITERATIONS_ENOUGH = 60 };
 // A tool that is squeezed by more than this share of its length is beyond what its elements describe (and would have yielded): the hand stalls.
 // One that is squeezed by JAMMED has a reason to be stuck.
@@ -673,7 +674,7 @@ static void solve_driven(Stepper *s)
     }
 }
 
-static bool is_spent(const Stepper *s) { return s->report.iterations >= ITERATIONS_ENOUGH && s->set.pair_count == 0; }
+static bool is_spent(const Stepper *s) { return s->tool_count == 1 && s->report.iterations >= ITERATIONS_ENOUGH && s->set.pair_count == 0; }
 
 // A wire that springs goes further than anybody looked: look that far, and solve again.
 static void solve_contained(Stepper *s)
