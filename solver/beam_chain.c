@@ -204,26 +204,8 @@ INLINE void leave_to_next(Tile *t, int lanes)
         t->far[k][LANES - 1] = t->far[k][LANES - 1 + lanes];
 }
 
-#define TARGET
-#define KERNEL(name) name##_sse2
-#include "solver/beam_chain.inc"
-#undef TARGET
-#undef KERNEL
-#if defined(__GNUC__) && defined(__x86_64__)
-#define TARGET __attribute__((target("avx2")))
-#define KERNEL(name) name##_avx2
-#include "solver/beam_chain.inc"
-#undef TARGET
-#undef KERNEL
-#define TARGET __attribute__((target("avx512f,avx512dq,avx512vl")))
-#define KERNEL(name) name##_avx512
-#include "solver/beam_chain.inc"
-#undef TARGET
-#undef KERNEL
-#define ON(name) {name##_sse2, name##_avx2, name##_avx512}
-#else
-#define ON(name) {name##_sse2, name##_sse2, name##_sse2}
-#endif
+#define KERNEL_TEXT "solver/beam_chain.inc"
+#include "solver/each_isa.inc"
 
 static void (*const assemble_on[SIMD_COUNT])(const BeamChain *, int, int, double, double, BlockChain *, double *) = ON(assemble);
 

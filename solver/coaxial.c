@@ -5,7 +5,8 @@
 //   B = sum EI_k / l_k,  c = sum EI_k u_k,  q = (m'M + c) / B
 //   U = 1/2 (alpha - alpha0)' F^-1 (alpha - alpha0) + W,   F = integral m m' / B dx + 1 / sum(kappa G A_k l_k),   alpha0 = integral m c / B dx
 //   W = integral of (1/2 sum EI_k l_k |kappa_k|^2 - |c|^2 / (2 B)) dx
-// B and kappa_k are constant in a piece, between the borders of all tools; a border at S_b lies at x = (S_b - S1) / l_k and moves with both.
+// B and kappa_k are constant in a piece, between the borders of all tools; a border at S_b lies at x = (S_b - S1) / l_k and moves with both. Near a node where
+// the carrier has a border too it lies in both elements, a part of its way in each (before_border()): of two borders that pass each other W would have a kink.
 // The moment is linear and F exact for any pieces: with the cubic's curvature instead a partly covered element held the inner tool in cogs.
 // Over a piece, u_k turns by a little; integrals of its first two moments are exact. In W, only |c|^2 turns, by the pairs' angle d = phi_i - phi_j:
 // the mean of cos d is taken as cos(d_mid) cos(r D), D the element's difference of d and r^2 = (width^2 + 1) / 12. r^2 = width^2 / 12 would be the
@@ -76,7 +77,7 @@ typedef struct Border {
     int tool;
 } Border;
 
-// [mm] before a node, of the element, that a border p [mm] past the node before it leaves to what lies behind: p, spread over w to either side of 0.
+// [mm] of an element from its node to a border p [mm] past that node: p, and over w to either side of the node a parabola from 0 to w. *slope: with p.
 static double before_border(double p, double w, double *slope)
 {
     bool is_near = fabs(p) < w;
@@ -90,14 +91,6 @@ static Border border_at(const double soft_at[2], int tool, double place, double 
     bool end = 2 * place > length;
     double p = end ? length - place : place, soft = soft_at[end], slope, x = before_border(p, soft, &slope) / length, near = -(slope - x) / length, far = -x / length;
     return (Border){end ? 1 - x : x, {end ? far : near, end ? near : far}, fabs(p) < soft ? (end ? -0.5 : 0.5) / (soft * length) : 0, tool};
-}
-
-static const CoaxialSection *section_past(const CoaxialTool *tool, double s)
-{
-    const CoaxialSection *section = tool->section, *last = section + tool->count - 1;
-    while (section < last && section->end <= s)
-        section++;
-    return section;
 }
 
 static void put_border(Border *border, int *count, Border own)
@@ -121,7 +114,7 @@ static const CoaxialSection *scan(const CoaxialSpan *span, int k, CoaxialRest *r
     bool has_end = span->has_tip || rest->ends[k];
     if (has_end && last->end <= span->s1)
         return &NOTHING;
-    const CoaxialSection *first = section_past(span->tool, from), *section = first;
+    const CoaxialSection *first = coaxial_section_at(span->tool, from), *section = first;
     rest->is_whole[k] = true;
     for (; section < last && section->end < to; section++) {
         rest->is_whole[k] = false;
@@ -139,7 +132,7 @@ static const CoaxialSection *scan(const CoaxialSpan *span, int k, CoaxialRest *r
 static void strain(const CoaxialSpan *span, int k, CoaxialRest *rest)
 {
     double length = rest->strained_length[k], end = span->s1 + length, start = end - fmax(span->spread, length), axial = 0, torsion = 0;
-    const CoaxialSection *last = span->tool->section + span->tool->count - 1, *back = section_past(span->tool, start), *first = section_past(span->tool, span->s1);
+    const CoaxialSection *last = span->tool->section + span->tool->count - 1, *back = coaxial_section_at(span->tool, start), *first = coaxial_section_at(span->tool, span->s1);
     const CoaxialSection *section = back;
     for (double at = start;; section++) {
         double to = section == last ? end : fmin(section->end, end), from = span->spreads_twist ? at : fmax(at, span->s1);
@@ -609,7 +602,7 @@ static void add_sharing(const CoaxialInput *in, const CoaxialOutput *out, Coaxia
         }
 }
 
-// A border that goes from one element to the next is held the more the further it is: by S at the node between.
+// The force on a border changes as it goes from one element to the next: with S at the node between.
 static void add_soft(const CoaxialRest *rest, CoaxialTangent *t)
 {
     for (int n = 0; n < rest->soft_count; n++) {

@@ -34,6 +34,15 @@ typedef struct CoaxialTool {
     const CoaxialSection *section;
 } CoaxialTool;
 
+// The section at a material coordinate s, at a border the distal one; past the tip the last.
+static inline const CoaxialSection *coaxial_section_at(const CoaxialTool *tool, double s)
+{
+    const CoaxialSection *section = tool->section, *last = section + tool->count - 1;
+    while (section < last && section->end <= s)
+        section++;
+    return section;
+}
+
 typedef struct CoaxialSpan { // one tool in one element
     const CoaxialTool *tool;
     double s1, s2;           // [mm] S at the nodes, s1 < s2; s2 not read where has_tip. What is past the tool's tip stretches and twists and does not bend
@@ -41,8 +50,8 @@ typedef struct CoaxialSpan { // one tool in one element
     double spread;           // [mm] strain is that of at least this length, what is behind S1 counted in; default 0. For an element that begins at a
                              // mouth or a tip and may be short: the full element's length
     bool spreads_twist;      // the twist too: at a mouth, where the tools' angles at node 1 are those of a node behind it
-    double soft[2];          // [mm] default 0: over so much to either side of node 1, of node 2, a border of this tool goes from this element to the one there.
-                             // Where the carrier's section changes or ends the energy would have a kink, and a step a force that depends on the side
+    double soft[2];          // [mm] default 0: over so much to either side of node 1, of node 2, a section's border of this tool goes from this element to the one
+                             // there; its tip does not. Where the carrier's section changes or ends the energy would have a kink, and a step a force that depends on the side
     bool has_tip;            // it ends inside, at its last section's end: it bends with the others up to there, as long as the carrier and not turned
                              // along it, and has no tension and no torque. S1 and phi1 are all that it has. Not for the carrier
     bool is_fixed;           // its values are no unknowns: no derivatives with them, which saves time

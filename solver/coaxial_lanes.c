@@ -160,30 +160,12 @@ INLINE void find_lane(CoaxialTile *t, int l, const int count, double scale)
     }
 }
 
-#define TARGET
-#define KERNEL(name) name##_sse2
-#include "solver/coaxial_lanes.inc"
-#undef TARGET
-#undef KERNEL
-#if defined(__GNUC__) && defined(__x86_64__)
-#define TARGET __attribute__((target("avx2")))
-#define KERNEL(name) name##_avx2
-#include "solver/coaxial_lanes.inc"
-#undef TARGET
-#undef KERNEL
-#define TARGET __attribute__((target("avx512f,avx512dq,avx512vl")))
-#define KERNEL(name) name##_avx512
-#include "solver/coaxial_lanes.inc"
-#undef TARGET
-#undef KERNEL
-#define LEVELS(name) {name##_sse2, name##_avx2, name##_avx512}
-#else
-#define LEVELS(name) {name##_sse2, name##_sse2, name##_sse2}
-#endif
+#define KERNEL_TEXT "solver/coaxial_lanes.inc"
+#include "solver/each_isa.inc"
 
 void coaxial_tile_find(CoaxialTile *tile, double scale)
 {
-    static void (*const find_on[COAXIAL_TOOLS_MAX][SIMD_COUNT])(CoaxialTile *, double) = {LEVELS(find_1), LEVELS(find_2), LEVELS(find_3), LEVELS(find_4)};
+    static void (*const find_on[COAXIAL_TOOLS_MAX][SIMD_COUNT])(CoaxialTile *, double) = {ON(find_1), ON(find_2), ON(find_3), ON(find_4)};
     // lanes without an element compute the first one's
     for (int l = tile->lanes; l < LANES; l++)
         for (double(*row)[LANES] = tile->x1; row < tile->k11; row++)
@@ -194,9 +176,7 @@ void coaxial_tile_find(CoaxialTile *tile, double scale)
 // The section from `from` to `to`; NULL where a border is between, or the tool's end unless it `carries`, or where it is curved.
 static const CoaxialSection *only_section(const CoaxialTool *tool, double from, double to, bool carries)
 {
-    const CoaxialSection *section = tool->section, *last = section + tool->count - 1;
-    while (section < last && section->end <= from)
-        section++;
+    const CoaxialSection *section = coaxial_section_at(tool, from), *last = tool->section + tool->count - 1;
     bool reaches = section->end >= to || (carries && section == last);
     return reaches && section->curve[0] == 0 && section->curve[1] == 0 ? section : NULL;
 }

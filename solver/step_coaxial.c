@@ -10,12 +10,16 @@
 
 enum { NODAL = 12 };
 static const double SHORTEST = 0.01;     // of an element: what is left of it outside a mouth or a tip
-static const double SOFT = 0.02;         // … over which a border of one tool passes one of another. No more than by how much tips pass nodes early
+static const double SOFT = 0.02;         // … over which, to either side, a border of one tool passes one of another. Less than where a node joins the chain
+
+static bool is_at_tip(const Stepper *s, int c) { return s->carrier[c] != s->carrier[c + 1]; }
 
 // Does the section of the tool that carries node c change there, or end?
 static bool is_border(const Stepper *s, int c)
 {
-    return c + 1 == s->state.node_count || s->carrier[c] != s->carrier[c + 1] || (c > 0 && s->carrier[c - 1] == s->carrier[c] && s->wire.section[c - 1] != s->wire.section[c]);
+    if (c + 1 == s->state.node_count || is_at_tip(s, c))
+        return true;
+    return c > 0 && !is_at_tip(s, c - 1) && s->wire.section[c - 1] != s->wire.section[c];
 }
 
 // The tools in element c, carrier first; returns their number. tool: which they are.
@@ -53,14 +57,6 @@ double tools_span_length(const Stepper *s, int c)
     return s->wire.s[c + 1] - (s->carrier[c] == k ? s->wire.s[c] : slide_at(s, c, k));
 }
 
-static const CoaxialSection *section_at(const CoaxialTool *tool, double s)
-{
-    const CoaxialSection *section = tool->section, *last = section + tool->count - 1;
-    while (section < last && section->end <= s)
-        section++;
-    return section;
-}
-
 // For the friction between tools: what the tools from each one inwards bear at the middle of an element.
 static void keep_inner(const Stepper *s, int c, const CoaxialInput *in, const CoaxialOutput *out, const int *tool)
 {
@@ -71,7 +67,7 @@ static void keep_inner(const Stepper *s, int c, const CoaxialInput *in, const Co
         const CoaxialSpan *p = &in->span[i];
         double middle = p->s1 + 0.5 * out->rest.length, phi = p->has_tip ? p->phi1 : 0.5 * (p->phi1 + p->phi2);
         bool ends = i > 0 && middle > p->tool->section[p->tool->count - 1].end;
-        const CoaxialSection *section = section_at(p->tool, middle);
+        const CoaxialSection *section = coaxial_section_at(p->tool, middle);
         own[i] = ends ? 0 : section->bending;
         rest[i] = vec3_scale(quat_rotate(quat_mul(in->q1, quat_from_rotation_vector(vec3(phi, 0, 0))), vec3(0, -section->curve[1], section->curve[0])), own[i]);
         total = vec3_add(total, rest[i]);
@@ -93,8 +89,6 @@ static void keep_inner(const Stepper *s, int c, const CoaxialInput *in, const Co
         }
     }
 }
-
-static bool is_at_tip(const Stepper *s, int c) { return s->carrier[c] != s->carrier[c + 1]; }
 
 double tools_twist(const Stepper *s, int c)
 {
@@ -384,7 +378,7 @@ static void add_to_chain(const Stepper *s, int c, const Local *local)
 // [N] what it takes to straighten a length of a tool.
 static double straightening(const Tool *t, double s)
 {
-    const CoaxialSection *p = section_at(&t->coaxial, s);
+    const CoaxialSection *p = coaxial_section_at(&t->coaxial, s);
     return s >= t->wire.total_length ? 0 : 0.5 * p->bending * (p->curve[0] * p->curve[0] + p->curve[1] * p->curve[1]);
 }
 
@@ -522,7 +516,7 @@ static Lump lump_at(const Stepper *s, int c, int k)
     if (k == s->carrier[c])
         return (Lump){s->wire.mass[c], s->wire.inertia_axial[c], s->wire.inertia_lateral[c]};
     double at = slide_at(s, c, k), length = fmin(tributary(s, c), fmax(0, t->wire.total_length - at));
-    int section = (int)(section_at(&t->coaxial, at) - t->section);
+    int section = (int)(coaxial_section_at(&t->coaxial, at) - t->section);
     // never nothing: rows of S and phi stay positive definite
     length = fmax(length, SHORTEST * tributary(s, c));
     return (Lump){t->line_mass[section] * length, 2 * t->line_inertia[section] * length, t->line_inertia[section] * length};
@@ -643,7 +637,7 @@ static Vec3 stiffness_at(const CoaxialInput *in, double d, Quat q, double *bendi
         const CoaxialSpan *p = &in->span[i];
         if (i > 0 && p->s1 + d > p->tool->section[p->tool->count - 1].end)
             continue;
-        const CoaxialSection *section = section_at(p->tool, p->s1 + d);
+        const CoaxialSection *section = coaxial_section_at(p->tool, p->s1 + d);
         Quat own = quat_mul(q, quat_from_rotation_vector(vec3(p->phi1, 0, 0)));
         sum = vec3_add_scaled(sum, section->bending, quat_rotate(own, vec3(0, -section->curve[1], section->curve[0])));
         *bending += section->bending;
@@ -660,7 +654,7 @@ ToolNode tools_further(const Stepper *s, int c, double d)
     ToolNode node = {.position = in.x1, .orientation = in.q1};
     if (in.count == 0)
         return node;
-    const CoaxialSection *first = section_at(in.span[0].tool, in.span[0].s1);
+    const CoaxialSection *first = coaxial_section_at(in.span[0].tool, in.span[0].s1);
     double length = fmax(out.rest.length, d), ds = d / PARTS, stretch = out.tension[0] / first->axial, twist = ds * out.torque[0] / first->torsion;
     for (int i = 0; i < PARTS; i++) {
         double at = (i + 0.5) * ds, x = at / length, bending, shear;
