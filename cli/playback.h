@@ -10,7 +10,7 @@
 typedef struct Playback Playback;
 
 // All borrowed; `tree` NULL: contrast in the tools' lumens only. A recording that nobody looked at (`run --record`) is shown with `unseen` as the
-// controls of all its steps, but for what its script injected. NULL where memory lacks or there is no frame.
+// controls of all its steps, but for what its script injected. NULL when out of memory or there is no frame.
 Playback *playback_open(const RecordedRun *run, const Scene *scene, const VesselTree *tree, const XrayControl *unseen);
 void playback_close(Playback *playback);
 

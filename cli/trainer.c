@@ -45,7 +45,7 @@ typedef struct Trainer {
     TrainerTray tray;
     bool has_tray, is_tray_due;      // it is open; what was taken is put in after the next picture
     double progress_s;               // when it was last shown how much of a session was gone through again
-    int fitted[TOOLS_MOST];          // as told last, -1: not yet
+    int fitted[TOOLS_MOST];          // as last reported, -1: not yet
     int64_t refused;
     bool is_paused, has_told_end;
     char trainee[64];
@@ -79,7 +79,7 @@ static void show_progress(void *context, double part)
         return;
     trainer->progress_s = now;
     PanelState state = trainer->shown.state;
-    snprintf(line, sizeof line, "The session is gone through again with the new device: %.0f %%", 100 * part);
+    snprintf(line, sizeof line, "Computing the session again with the new device: %.0f %%", 100 * part);
     state.warning = line;
     state.warnings = 0;
     state.label_count = 0;
@@ -368,14 +368,14 @@ static bool take_from_tray(Trainer *trainer, const Pose *pose, Faults *faults)
     const char *obstacle = trainer_tray_obstacle(tray);
     bool has_begun = pose->step > 0, is_new = which < 0 || trainer_tray_tip(tray).length > 0, lives = true;
     if (!obstacle && is_new && has_begun && !trainer->session.record_path[0])
-        obstacle = "this session is not recorded, so it can only go on with the devices that it began with";
+        obstacle = "this session is not recorded: it can only use the devices that it began with";
     if (obstacle) {
         say(trainer, MARK_WARNING, "%s", obstacle);
         trainer->is_tray_due = false;
         return true;
     }
     if (is_new && !trainer->is_tray_due) {
-        say(trainer, MARK_NONE, "the session is gone through again with the new device, %.0f s of it", pose->time_s);
+        say(trainer, MARK_NONE, "computing the session again with the new device, %.0f s of it", pose->time_s);
         return trainer->is_tray_due = true;
     }
     if (is_new) {

@@ -247,7 +247,7 @@ void trainer_tray_show(TrainerTray *tray, const Scene *scene, const Pose *pose, 
     tray->shown.shaped = &tray->shaped_shown;
 }
 
-// The tool that is still in comes last: what never fits is told first.
+// The tool that is still in comes last: what never fits is said first.
 const char *trainer_tray_obstacle(const TrainerTray *tray)
 {
     const PanelTrayChoice *choice = &tray->choice;

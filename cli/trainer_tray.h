@@ -18,7 +18,7 @@ typedef struct TrainerTray {
     PanelTrayChoice choice;      // of the last frame
 } TrainerTray;
 
-// Fills the tray for a tool, and says which of its devices is in. `library` as in tray_devices_find. False where memory lacks.
+// Fills the tray for a tool, and says which of its devices is in. `library` as in tray_devices_find. False when out of memory.
 bool trainer_tray_open(TrainerTray *tray, const Scene *scene, int tool, const char *library, const Pose *pose, int *in);
 void trainer_tray_close(TrainerTray *tray);
 // Each frame while it is open: what the user has chosen, and how the tools stand now.

@@ -20,7 +20,7 @@ typedef struct TrayDevices {
 } TrayDevices;
 
 // Finds them. `library`: a folder of device files (*.yaml), or NULL for the scene's own devices alone; each is cut to the length and divided into the elements of
-// the scene's tool, and left out where it is of another kind, does not fit the tools around it and within it, or cannot be read. False where memory lacks.
+// the scene's tool, and left out where it is of another kind, does not fit the tools around it and within it, or cannot be read. False when out of memory.
 bool tray_devices_find(TrayDevices *tray, const Scene *scene, int tool, const char *library);
 void tray_devices_free(TrayDevices *tray);
 // `from` with its tip shaped. False with the reason in `why` where it does not keep that shape.

@@ -40,7 +40,7 @@ void ribbon_path_free(RibbonPath *path);
 
 void ribbon_begin(Ribbon *ribbon);
 // `side` [pixel] of the square; `filling` (node_count) of the lumen at each node, 0 to 1, by what takes `attenuation` [1/mm]; NULL: none. Points nearer to the
-// source than C_ARM_NEAREST_MM and what is not a number are left out. False where memory lacks.
+// source than C_ARM_NEAREST_MM and what is not a number are left out. False when out of memory.
 bool ribbon_add(Ribbon *ribbon, const CArm *c_arm, int side, const RibbonPath *path, const Vec3 *position, const float *filling, double attenuation);
 void ribbon_end(Ribbon *ribbon, int side);
 void ribbon_free(Ribbon *ribbon);

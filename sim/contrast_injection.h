@@ -23,7 +23,7 @@ typedef struct TipPlaces {
     int foremost_node;
 } TipPlaces;
 
-// `tree` may be NULL. `node_count` and `s`: see contrast_lumens_create. NULL where memory lacks.
+// `tree` may be NULL. `node_count` and `s`: see contrast_lumens_create. NULL when out of memory.
 ContrastInjection *contrast_injection_create(const VesselTree *tree, const Scene *scene, const int *node_count, const double *const *s);
 void contrast_injection_free(ContrastInjection *injection);
 void contrast_injection_copy(ContrastInjection *to, const ContrastInjection *from);   // both made of the same scene

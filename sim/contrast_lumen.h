@@ -27,7 +27,7 @@ double lumen_annulus_share(double ratio);
 typedef struct ContrastLumens ContrastLumens;
 
 // Of the scene's tools, at whose own nodes (`node_count`[k] of them, at arc lengths `s`[k] from the proximal end) the lumen is read; copied. `options` NULL:
-// default. NULL where memory lacks.
+// default. NULL when out of memory.
 ContrastLumens *contrast_lumens_create(const Scene *scene, const int *node_count, const double *const *s, const LumenOptions *options);
 void contrast_lumens_free(ContrastLumens *lumens);
 void contrast_lumens_copy(ContrastLumens *to, const ContrastLumens *from);   // both made of the same tools

@@ -25,7 +25,7 @@ typedef struct TwoRods {
     double *gradient;        // (the same)
 } TwoRods;
 
-// A catheter clamped at its hub: straight, an arc, straight. Its node positions are at multiples of `h`; the arc's turn is exact. False where memory lacks.
+// A catheter clamped at its hub: straight, an arc, straight. Its node positions are at multiples of `h`; the arc's turn is exact. False when out of memory.
 bool two_rods_make(TwoRods *rods, double before, double radius, double angle, double after, double h);
 void two_rods_free(TwoRods *rods);
 // Energy and gradient at x.
