@@ -287,7 +287,6 @@ int bench_drawing(int argc, char **argv)
         fprintf(stderr, "seldinger bench drawing: one scene at a time, not also %s\n", argv[optind + 1]);
         return EXIT_BAD_INPUT;
     }
-    setenv("LP_NUM_THREADS", "1", 0);   // as `nav` does
     Studio studio = {.options = &options};
     cJSON *root = cJSON_CreateObject();
     FILE *text = bench_text(&options);

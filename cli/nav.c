@@ -182,7 +182,6 @@ int verb_nav(int argc, char **argv)
     int code = parse_options(argc, argv, &options);
     if (code >= 0)
         return code;
-    setenv("LP_NUM_THREADS", "1", 0);   // llvmpipe would take the core that the 1 kHz thread needs (DESIGN section 8)
     recording_prepare_process();
     faults_clear(&faults);
     OpenVessel open = {0};

@@ -232,7 +232,6 @@ static int show(const ReplayOptions *options, const RecordedRun *run, Scene *sce
                                   .cra_deg = options->cra_deg};
     bool resumes = false;
     double resume_s = 0;
-    setenv("LP_NUM_THREADS", "1", 0);
     if (!replay_window_run(&window, run, scene, open, &resumes, &resume_s, faults))
         return EXIT_BAD_INPUT;
     if (!resumes)

@@ -5,6 +5,7 @@
 #include "render/gl_context.h"
 
 #include "render/message.h"
+#include "render/software_driver.h"
 
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
@@ -64,6 +65,7 @@ GlContext *gl_context_create(char *message, size_t capacity)
         message_fail(message, capacity, "not enough memory for a picture");
         return NULL;
     }
+    software_driver_without_threads();
     context->previous_display = eglGetCurrentDisplay();
     context->previous_context = eglGetCurrentContext();
     context->previous_draw = eglGetCurrentSurface(EGL_DRAW);

@@ -3,6 +3,7 @@
 #include "render/window.h"
 
 #include "render/message.h"
+#include "render/software_driver.h"
 
 #include <epoxy/gl.h>
 #define GLFW_INCLUDE_NONE
@@ -227,7 +228,12 @@ bool window_next_frame(Window *w, const WindowInput **input)
     return !(*input)->is_iconified && (*input)->width > 0 && (*input)->height > 0;
 }
 
-void window_swap(Window *w) { glfwSwapBuffers(w->window); }
+void window_swap(Window *w)
+{
+    if (!glfwGetWindowAttrib(w->window, GLFW_VISIBLE))
+        glfwShowWindow(w->window);
+    glfwSwapBuffers(w->window);
+}
 
 int64_t window_frames_skipped(const Window *w) { return w->skipped; }
 
@@ -332,6 +338,7 @@ static GLFWwindow *open_window(const char *title, int width, int height)
     glfwWindowHint(GLFW_SAMPLES, 0);   // views smooth their own edges
     glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
     glfwWindowHint(GLFW_AUTO_ICONIFY, GLFW_FALSE);
+    glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);   // until there is a picture to show: keys pressed before would wait for it
     GLFWmonitor *monitor = glfwGetPrimaryMonitor();
     if (monitor) {
         int x, y, most_wide, most_high;
@@ -347,6 +354,7 @@ static GLFWwindow *open_window(const char *title, int width, int height)
 Window *window_create(const char *title, int width, int height, double hz, char *message, size_t capacity)
 {
     const char *reason = NULL;
+    software_driver_without_threads();
     if (!glfwInit()) {
         int code = glfwGetError(&reason);
         if (code == GLFW_PLATFORM_ERROR)

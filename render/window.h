@@ -77,7 +77,7 @@ const WindowInput *window_poll(Window *window);
 // Sleeps to the next frame's deadline (absolute: a late frame does not shift the ones after it; whole periods are left out when it was later than
 // one), then polls. False where nothing should be drawn: iconified, or no pixel large.
 bool window_next_frame(Window *window, const WindowInput **input);
-void window_swap(Window *window);
+void window_swap(Window *window);   // the first time it also shows the window, which is hidden until then
 int64_t window_frames_skipped(const Window *window);   // periods left out because a frame took longer
 
 // A joystick as it is now, `index` 0 to 15. False where there is none.

@@ -146,8 +146,9 @@ static RecordedRun *load(const char *path)
     return recorded;
 }
 
-// Waits for the window, then holds keys as a user does; the session is ended by Esc and Enter.
-static const char hand[] = "W=$(xdotool search --sync --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
+// Waits until the window shows a picture, then holds keys as a user does; the session is ended by Esc and Enter. A key is seen once a picture, and
+// a picture can take half a second under a sanitizer on a loaded machine: what is compared is held for longer.
+static const char hand[] = "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
                            "xdotool key e; sleep 0.3; xdotool keydown Up; sleep 2; xdotool keyup Up; xdotool keydown Right; sleep 0.3; xdotool keyup Right; "
                            "xdotool keydown c; sleep 0.3; xdotool keyup c; xdotool key b; sleep 0.3; "
                            "while xdotool search --name Seldinger: >/dev/null 2>&1; do xdotool key Escape; sleep 0.5; xdotool key Return; sleep 0.3; done";
@@ -214,9 +215,9 @@ static void a_session_goes_on_from_a_moment_of_another(void **state)
 }
 
 // The thread by the arrows, then both at once by two hands, then locked, then let go; the window drawn all the while.
-static const char two_hands[] = "W=$(xdotool search --sync --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
-                                "xdotool key 2; sleep 0.2; xdotool keydown Up; sleep 1; xdotool keydown u; sleep 0.8; xdotool keyup u; xdotool keyup Up; sleep 0.2; "
-                                "xdotool key l; sleep 0.2; xdotool keydown Right; sleep 0.5; xdotool keyup Right; sleep 0.2; "
+static const char two_hands[] = "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
+                                "xdotool key 2; sleep 0.2; xdotool keydown Up; sleep 2; xdotool keydown u; sleep 1.5; xdotool keyup u; xdotool keyup Up; sleep 0.2; "
+                                "xdotool key l; sleep 0.2; xdotool keydown Right; sleep 1.5; xdotool keyup Right; sleep 0.2; "
                                 "xdotool key g; sleep 0.3; xdotool key 6; sleep 0.3; xdotool key 7; sleep 0.3; "
                                 "while xdotool search --name Seldinger: >/dev/null 2>&1; do xdotool key Escape; sleep 0.5; xdotool key Return; sleep 0.3; done";
 
@@ -248,7 +249,7 @@ static void two_tools_are_moved_by_keys(void **state)
 
 // The thread is still in: refused. It is drawn back, its tip shaped on the tray, and pushed in again.
 static const char exchanging_hands[] =
-    "W=$(xdotool search --sync --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
+    "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
     "xdotool key 2; sleep 0.2; xdotool key x; sleep 0.7; xdotool key s; sleep 0.3; xdotool key Return; sleep 0.5; xdotool key x; sleep 0.3; "
     "xdotool keydown shift; xdotool keydown Down; sleep 4; xdotool keyup Down; xdotool keyup shift; sleep 0.2; xdotool key x; sleep 0.7; xdotool key s; sleep 0.2; xdotool key Right; sleep 0.3; "
     "xdotool key Return; sleep 3; xdotool keydown shift; xdotool keydown Up; sleep 4; xdotool keyup Up; xdotool keyup shift; sleep 0.3; "

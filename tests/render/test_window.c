@@ -520,6 +520,7 @@ static int other_window(void)
     dl_iterate_phdr(keep_driver, NULL);
     const WindowInput *input = NULL;
     double end = now_s() + 60;
+    window_swap(window);   // it is seen from its first picture on
     do {
         window_next_frame(window, &input);
     } while (input->close != WINDOW_ENDED && now_s() < end);
