@@ -18,17 +18,6 @@ double run_final_penetration_mm(const NodeReport *node, int node_count)
 
 bool run_left_vessel(const RunTotals *totals) { return totals->penetration_max > lost_mm; }
 
-static const char *why_not_exchanged(StepExchange outcome)
-{
-    switch (outcome) {
-    case EXCHANGE_INSERTED: return "the tool was still in: an inner one is first drawn back to its hub, the outermost one to the sheath's mouth";
-    case EXCHANGE_TOO_SHORT: return "a tool is too short: the one within would end inside the new one's hub, or the new one inside the hub around it";
-    case EXCHANGE_NO_SUCH_TOOL: return "there is no such tool under its 'exchange:'";
-    case EXCHANGE_DONE: break;
-    }
-    return "";
-}
-
 static void add_numbers(cJSON *object, int count, const char *const *name, const double *value)
 {
     for (int i = 0; i < count; i++)
@@ -265,7 +254,7 @@ void run_print(FILE *out, Simulator *simulator, const DriveReport *drive, const 
     if (totals->exchanges)
         fprintf(out, "%" PRId64 " tools were exchanged\n", totals->exchanges);
     if (totals->refused_exchanges)
-        fprintf(out, "%" PRId64 " exchanges were refused, the last because %s\n", totals->refused_exchanges, why_not_exchanged(totals->refusal));
+        fprintf(out, "%" PRId64 " exchanges were refused, the last because %s\n", totals->refused_exchanges, step_exchange_refusal(totals->refusal));
     const EnergyBalance *e = simulator_energy(simulator);
     if (e->watched)
         fprintf(out, "energy [mJ]: hand %.4g, loads %.4g = elastic %.4g, kinetic %.2g, friction %.4g, damping %.4g, numerical %.4g (the wall gave %.3g); single steps "

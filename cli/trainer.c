@@ -424,7 +424,7 @@ static void tell_exchanges(Trainer *trainer, const Pose *pose)
         if (trainer->fitted[k] >= 0 && pose->tool[k].fitted != trainer->fitted[k])
             say(trainer, MARK_GOOD, "%s is now: %s", trainer->scene->tool[k].name, device && device->title[0] ? device->title : pose->tool[k].fitted ? "the spare one" : "the first one");
         if (trainer->fitted[k] >= 0 && is_refused && grip->fitted[k] != pose->tool[k].fitted) {
-            say(trainer, MARK_WARNING, "%s was not exchanged: %s", trainer->scene->tool[k].name, trainer_tray_refusal(pose->refusal));
+            say(trainer, MARK_WARNING, "%s was not exchanged: %s", trainer->scene->tool[k].name, step_exchange_refusal(pose->refusal));
             grip->fitted[k] = pose->tool[k].fitted;
         }
         trainer->fitted[k] = pose->tool[k].fitted;

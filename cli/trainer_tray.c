@@ -162,17 +162,6 @@ static const char *why_not(TrainerTray *tray, int index, const TrayDevice *devic
     return why_too_long_or_short(text, scene, pose, tool, wire_length(&device->tool.wire));
 }
 
-const char *trainer_tray_refusal(StepExchange refusal)
-{
-    switch (refusal) {
-    case EXCHANGE_INSERTED: return "it is still in: draw it back to the hub first, the outermost tool to the sheath's mouth";
-    case EXCHANGE_TOO_SHORT: return "a tool is too short: the wire must be as long outside as the tool that goes over it";
-    case EXCHANGE_NO_SUCH_TOOL: return "the scene does not have it";
-    case EXCHANGE_DONE: break;
-    }
-    return "";
-}
-
 // --- each frame ---
 
 bool trainer_tray_open(TrainerTray *tray, const Scene *scene, int tool, const char *library, const Pose *pose, int *in)

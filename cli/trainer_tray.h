@@ -27,7 +27,5 @@ void trainer_tray_show(TrainerTray *tray, const Scene *scene, const Pose *pose, 
 const char *trainer_tray_obstacle(const TrainerTray *tray);
 // The tip as the user wants it, length 0 where it is left as it is.
 TipShaping trainer_tray_tip(const TrainerTray *tray);
-// What the solver's refusal means to the hand.
-const char *trainer_tray_refusal(StepExchange refusal);
 
 #endif

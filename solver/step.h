@@ -98,6 +98,7 @@ typedef enum {
     EXCHANGE_TOO_SHORT,      // a proximal end would come to lie inside a hub: the tool within, or the new one, is too short
 } StepExchange;
 StepExchange stepper_exchange(Stepper *stepper, int tool, int which);
+const char *step_exchange_refusal(StepExchange outcome);   // why, after "because" or a colon, with what would help; "" for EXCHANGE_DONE
 int stepper_fitted(const Stepper *stepper, int tool);
 
 void step_detect(Stepper *stepper);

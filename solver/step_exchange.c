@@ -7,6 +7,17 @@
 static const double AT_HUB = 1;          // [mm] from its hub: a tip that can be taken out …
 static const double LEAST_AHEAD = 0.01;  // … and that is put in
 
+const char *step_exchange_refusal(StepExchange outcome)
+{
+    switch (outcome) {
+    case EXCHANGE_INSERTED: return "the tool is still in: draw an inner one back to its hub first, the outermost one to the sheath's mouth";
+    case EXCHANGE_TOO_SHORT: return "a tool is too short: an inner one must be as long outside the patient as the tool that goes over it";
+    case EXCHANGE_NO_SUCH_TOOL: return "the scene has no such tool under its 'exchange:'";
+    case EXCHANGE_DONE: break;
+    }
+    return "";
+}
+
 int stepper_fitted(const Stepper *s, int k) { return s->fitted[k]; }
 
 static void fit(Stepper *s, int k, int which)

@@ -225,7 +225,7 @@ static void a_script_exchanges_tools(void **state)
     assert_true(value(root, "solver", "limited_steps") == 0 && value(root, "solver", "not_converged_steps") == 0);
     cJSON_Delete(root);
     put("early.csv", "t_s,microcatheter.exchange,wire.exchange\n0,0,0\n0.1,1,0\n0.2,1,1\n0.3,1,3\n0.4,1,3\n");
-    ends(0, "3 exchanges were refused, the last because there is no such tool", "run scenes/coaxial/exchange.yaml --script $D/early.csv");
+    ends(0, "3 exchanges were refused, the last because the scene has no such tool", "run scenes/coaxial/exchange.yaml --script $D/early.csv");
     put("wrong.csv", "t_s,wire.exchange\n0,0.5\n1,0\n");
     ends(2, "wrong.csv:2:1: exchange is 0.5; 0 for the scene's tool, 1 to 4 for those under its 'exchange:'", "run scenes/coaxial/exchange.yaml --script $D/wrong.csv");
     put("wide.yaml", "seldinger: 1\nvessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 60}]}}\ntools:\n"
