@@ -1,9 +1,9 @@
 #include "cli/file_kind.h"
 
+#include "recon/hdf5_reader.h"
 #include "recon/surface_file.h"
 #include "recon/volume.h"
 
-#include <hdf5.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
@@ -11,17 +11,12 @@
 
 static FileKind kind_of_hdf5(const char *path)
 {
-    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
-    hid_t access = H5Pcreate(H5P_FILE_ACCESS);
-    H5Pset_file_locking(access, false, true);
-    hid_t file = H5Fopen(path, H5F_ACC_RDONLY, access);
-    H5Pclose(access);
-    if (file < 0)
+    Faults unread = {0};
+    Hdf5Reader *reader = hdf5_reader_open(path, "", &unread);
+    if (!reader)
         return FILE_TREE;   // cut off or damaged: the reader of trees says so
-    FileKind kind = H5Lexists(file, "nodes", H5P_DEFAULT) > 0  ? FILE_TREE
-                    : H5Lexists(file, "wire", H5P_DEFAULT) > 0 ? FILE_RECORDING
-                                                               : FILE_UNKNOWN;
-    H5Fclose(file);
+    FileKind kind = hdf5_has(reader, "/nodes") ? FILE_TREE : hdf5_has(reader, "/wire") ? FILE_RECORDING : FILE_UNKNOWN;
+    hdf5_reader_close(reader);
     return kind;
 }
 

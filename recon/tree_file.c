@@ -3,199 +3,56 @@
 // Metadata are written in the 1.8 format, whose checksums make the library refuse damaged headers.
 #include "recon/tree_file.h"
 
+#include "recon/hdf5_reader.h"
 #include "recon/whole_file.h"
 
 #include <hdf5.h>
+#include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { FORMAT_VERSION = 1, TEXT_LIMIT = 1 << 24 };
+enum { FORMAT_VERSION = 1 };
 
 typedef struct Reader {
-    hid_t file;
+    Hdf5Reader *file;
     const char *name;
     Faults *faults;
 } Reader;
 
-typedef struct Column {      // one dataset as the contract says it
-    const char *group, *path;
-    int rank;
-    H5T_class_t class;
-    hsize_t size[2];         // found: rows, columns
-} Column;
-
 enum { CENTER, RADIUS, DIRECTION, HEIGHT, PARENT, KIND, POINT, POINT_OFFSET, BLOB_CENTER, BLOB_WIDTH, BLOB_OFFSET, ERROR_MM, BLOB_AMPLITUDE, COLUMN_COUNT };
-static const Column columns[COLUMN_COUNT] = {
-    [CENTER] = {"/nodes", "/nodes/center", 2, H5T_FLOAT, {0}},
-    [RADIUS] = {"/nodes", "/nodes/radius", 1, H5T_FLOAT, {0}},
-    [DIRECTION] = {"/nodes", "/nodes/direction", 2, H5T_FLOAT, {0}},
-    [HEIGHT] = {"/nodes", "/nodes/height", 1, H5T_FLOAT, {0}},
-    [PARENT] = {"/nodes", "/nodes/parent", 1, H5T_INTEGER, {0}},
-    [KIND] = {"/nodes", "/nodes/kind", 1, H5T_INTEGER, {0}},
-    [POINT] = {"/points", "/points/xyz", 2, H5T_FLOAT, {0}},
-    [POINT_OFFSET] = {"/points", "/points/offset", 1, H5T_INTEGER, {0}},
-    [BLOB_CENTER] = {"/blobs", "/blobs/center", 2, H5T_FLOAT, {0}},
-    [BLOB_WIDTH] = {"/blobs", "/blobs/width", 1, H5T_FLOAT, {0}},
-    [BLOB_OFFSET] = {"/blobs", "/blobs/offset", 1, H5T_INTEGER, {0}},
-    [ERROR_MM] = {"/blobs", "/blobs/error_mm", 1, H5T_FLOAT, {0}},
-    [BLOB_AMPLITUDE] = {"/blobs", "/blobs/amplitude", 1, H5T_FLOAT, {0}},
+static const Hdf5Dataset columns[COLUMN_COUNT] = {     // as the contract says them
+    [CENTER] = {"/nodes/center", HDF5_DOUBLE, 2, {0, 3}, false},
+    [RADIUS] = {"/nodes/radius", HDF5_DOUBLE, 1, {0}, false},
+    [DIRECTION] = {"/nodes/direction", HDF5_DOUBLE, 2, {0, 3}, false},
+    [HEIGHT] = {"/nodes/height", HDF5_DOUBLE, 1, {0}, false},
+    [PARENT] = {"/nodes/parent", HDF5_INT32, 1, {0}, false},
+    [KIND] = {"/nodes/kind", HDF5_UINT8, 1, {0}, false},
+    [POINT] = {"/points/xyz", HDF5_DOUBLE, 2, {0, 3}, false},
+    [POINT_OFFSET] = {"/points/offset", HDF5_INT64, 1, {0}, false},
+    [BLOB_CENTER] = {"/blobs/center", HDF5_DOUBLE, 2, {0, 3}, false},
+    [BLOB_WIDTH] = {"/blobs/width", HDF5_DOUBLE, 1, {0}, false},
+    [BLOB_OFFSET] = {"/blobs/offset", HDF5_INT64, 1, {0}, false},
+    [ERROR_MM] = {"/blobs/error_mm", HDF5_DOUBLE, 1, {0}, false},
+    [BLOB_AMPLITUDE] = {"/blobs/amplitude", HDF5_DOUBLE, 1, {0}, false},
 };
-
-// The library prints nothing of its own while we work; the user's handler is put back.
-typedef struct Silence {
-    H5E_auto2_t handler;
-    void *data;
-} Silence;
-
-static Silence silence_begin(void)
-{
-    Silence kept = {0};
-    H5Eget_auto2(H5E_DEFAULT, &kept.handler, &kept.data);
-    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
-    return kept;
-}
-static void silence_end(Silence kept) { H5Eset_auto2(H5E_DEFAULT, kept.handler, kept.data); }
 
 // --- reading ---
 
-// Only hard links are followed: a file may not make us open other files.
-static bool is_hard_link(hid_t file, const char *path)
-{
-    H5L_info_t link;
-    return H5Lexists(file, path, H5P_DEFAULT) > 0 && H5Lget_info(file, path, &link, H5P_DEFAULT) >= 0 && link.type == H5L_TYPE_HARD;
-}
-
-static hid_t open_dataset(const Reader *reader, const Column *column)
-{
-    if (!is_hard_link(reader->file, column->group) || !is_hard_link(reader->file, column->path)) {
-        faults_add(reader->faults, reader->name, 0, 0, "has no dataset %s; a tree needs /nodes and /points, a model /blobs too", column->path);
-        return -1;
-    }
-    hid_t dataset = H5Dopen2(reader->file, column->path, H5P_DEFAULT);
-    if (dataset < 0)
-        faults_add(reader->faults, reader->name, 0, 0, "%s cannot be opened; it must be a dataset", column->path);
-    return dataset;
-}
-
-// Whether the bytes that the shape promises can be in the file: no external storage, and not more than deflate can squeeze.
-static bool storage_is_plausible(hid_t dataset, hsize_t count)
-{
-    hid_t plist = H5Dget_create_plist(dataset);
-    if (plist < 0)
-        return false;
-    H5D_layout_t layout = H5Pget_layout(plist);
-    bool fits = layout == H5D_COMPACT || layout == H5D_CONTIGUOUS || layout == H5D_CHUNKED;
-    fits = fits && H5Pget_external_count(plist) == 0;
-    H5Pclose(plist);
-    hsize_t stored = H5Dget_storage_size(dataset);
-    return fits && count / 1100 <= stored && (count == 0 || stored > 0);
-}
-
-// Fills column->size; false with a fault that says what is valid.
-static bool inspect(const Reader *reader, Column *column)
-{
-    hid_t dataset = open_dataset(reader, column);
-    if (dataset < 0)
-        return false;
-    hid_t space = H5Dget_space(dataset), type = H5Dget_type(dataset);
-    const char *wanted_class = column->class == H5T_FLOAT ? "float" : "integer";
-    bool good = true;
-    if (space < 0 || type < 0 || H5Tget_class(type) != column->class || H5Tget_size(type) > 8) {
-        faults_add(reader->faults, reader->name, 0, 0, "%s has the wrong type; valid: %s of at most 64 bits", column->path, wanted_class);
-        good = false;
-    }
-    hsize_t size[H5S_MAX_RANK] = {0};
-    if (space < 0 || H5Sget_simple_extent_type(space) != H5S_SIMPLE || H5Sget_simple_extent_ndims(space) != column->rank ||
-        H5Sget_simple_extent_dims(space, size, NULL) < 0 || (column->rank == 2 && size[1] != 3)) {
-        faults_add(reader->faults, reader->name, 0, 0, "%s has the wrong shape; valid: %s", column->path, column->rank == 2 ? "(rows, 3)" : "(rows)");
-        good = false;
-    } else {
-        column->size[0] = size[0];
-        column->size[1] = column->rank == 2 ? 3 : 1;
-        if (size[0] > (hsize_t)1 << 40 || !storage_is_plausible(dataset, size[0] * column->size[1])) {
-            faults_add(reader->faults, reader->name, 0, 0, "%s promises %llu rows that the file does not hold", column->path,
-                       (unsigned long long)size[0]);
-            good = false;
-        }
-    }
-    if (space >= 0)
-        H5Sclose(space);
-    if (type >= 0)
-        H5Tclose(type);
-    H5Dclose(dataset);
-    return good;
-}
-
-static bool expect_rows(const Reader *reader, const Column *column, hsize_t rows, const char *meaning)
+static bool expect_rows(const Reader *reader, const Hdf5Dataset *column, uint64_t rows, const char *meaning)
 {
     if (column->size[0] == rows)
         return true;
-    faults_add(reader->faults, reader->name, 0, 0, "%s has %llu rows; valid: %llu, %s", column->path, (unsigned long long)column->size[0],
-               (unsigned long long)rows, meaning);
+    faults_add(reader->faults, reader->name, 0, 0, "%s has %" PRIu64 " rows; valid: %" PRIu64 ", %s", column->path, column->size[0], rows, meaning);
     return false;
 }
 
-static bool read_column(const Reader *reader, const Column *column, hid_t memory_type, void *out)
-{
-    hid_t dataset = H5Dopen2(reader->file, column->path, H5P_DEFAULT);
-    bool good = dataset >= 0 && (column->size[0] == 0 || H5Dread(dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, out) >= 0);
-    if (dataset >= 0)
-        H5Dclose(dataset);
-    if (!good)
-        faults_add(reader->faults, reader->name, 0, 0, "%s cannot be read: its data are damaged or cut off", column->path);
-    return good;
-}
-
-// A text attribute, of fixed or variable length; an empty text where there is none.
+// An empty text where there is none.
 static char *read_text(const Reader *reader, const char *key)
 {
-    char *text = NULL;
-    hid_t attribute = H5Aexists(reader->file, key) > 0 ? H5Aopen(reader->file, key, H5P_DEFAULT) : -1;
-    hid_t type = attribute >= 0 ? H5Aget_type(attribute) : -1, space = attribute >= 0 ? H5Aget_space(attribute) : -1;
-    if (type >= 0 && space >= 0 && H5Tget_class(type) == H5T_STRING && H5Sget_simple_extent_npoints(space) == 1) {
-        if (H5Tis_variable_str(type) > 0) {
-            char *held = NULL;
-            if (H5Aread(attribute, type, &held) >= 0 && held) {
-                text = strdup(held);
-                H5Dvlen_reclaim(type, space, H5P_DEFAULT, &held);
-            }
-        } else {
-            size_t size = H5Tget_size(type);
-            if (size < TEXT_LIMIT && (text = calloc(size + 1, 1)) && H5Aread(attribute, type, text) < 0)
-                text[0] = '\0';
-        }
-    } else if (attribute >= 0) {
-        faults_add(reader->faults, reader->name, 0, 0, "attribute %s is not a text; valid: one string", key);
-    }
-    if (space >= 0)
-        H5Sclose(space);
-    if (type >= 0)
-        H5Tclose(type);
-    if (attribute >= 0)
-        H5Aclose(attribute);
+    char *text = hdf5_text_attribute(reader->file, "/", key);
     return text ? text : strdup("");
-}
-
-static double read_number(const Reader *reader, const char *key, double otherwise)
-{
-    if (H5Aexists(reader->file, key) <= 0)
-        return otherwise;
-    double value = NAN;
-    hid_t attribute = H5Aopen(reader->file, key, H5P_DEFAULT), space = attribute >= 0 ? H5Aget_space(attribute) : -1;
-    hid_t type = attribute >= 0 ? H5Aget_type(attribute) : -1;
-    bool numeric = type >= 0 && (H5Tget_class(type) == H5T_FLOAT || H5Tget_class(type) == H5T_INTEGER);
-    if (!numeric || space < 0 || H5Sget_simple_extent_npoints(space) != 1 || H5Aread(attribute, H5T_NATIVE_DOUBLE, &value) < 0) {
-        faults_add(reader->faults, reader->name, 0, 0, "attribute %s is not a number; valid: one number", key);
-        value = otherwise;
-    }
-    if (type >= 0)
-        H5Tclose(type);
-    if (space >= 0)
-        H5Sclose(space);
-    if (attribute >= 0)
-        H5Aclose(attribute);
-    return value;
 }
 
 enum { KERNEL_CAUCHY, KERNEL_COMPACT, KERNELS };
@@ -216,7 +73,7 @@ static double read_attributes(const Reader *reader, TreeFileInfo *info)
     info->source = read_text(reader, "source");
     info->parameters = read_text(reader, "parameters");
     info->created_by = read_text(reader, "created_by");
-    double version = read_number(reader, "version", FORMAT_VERSION), iso_level = read_number(reader, "iso_level", 0.1);
+    double version = hdf5_number(reader->file, "version", FORMAT_VERSION), iso_level = hdf5_number(reader->file, "iso_level", 0.1);
     if (version != FORMAT_VERSION)
         faults_add(reader->faults, reader->name, 0, 0, "attribute version is %g; valid: %d", version, FORMAT_VERSION);
     if (!(iso_level > 0 && iso_level < 1e6)) {
@@ -229,16 +86,16 @@ static double read_attributes(const Reader *reader, TreeFileInfo *info)
 static VesselTree *read_tree(const Reader *reader, TreeFileInfo *info)
 {
     int before = reader->faults->count;
-    Column found[COLUMN_COUNT];
+    Hdf5Dataset found[COLUMN_COUNT];
     memcpy(found, columns, sizeof found);
-    bool is_model = H5Lexists(reader->file, "/blobs", H5P_DEFAULT) > 0;
+    bool is_model = hdf5_has(reader->file, "/blobs");
     bool is_shared = is_model && read_kernel(reader) == KERNEL_COMPACT;
     int used = is_shared ? COLUMN_COUNT : is_model ? BLOB_AMPLITUDE : BLOB_CENTER;
     bool seen[COLUMN_COUNT] = {false};
     for (int i = 0; i < used; i++)
-        seen[i] = inspect(reader, &found[i]);
+        seen[i] = hdf5_inspect(reader->file, &found[i]);
     double iso_level = read_attributes(reader, info);
-    hsize_t nodes = found[CENTER].size[0], points = found[POINT].size[0], blobs = is_model ? found[BLOB_CENTER].size[0] : 0;
+    uint64_t nodes = found[CENTER].size[0], points = found[POINT].size[0], blobs = is_model ? found[BLOB_CENTER].size[0] : 0;
     for (int i = 0; i < used && seen[CENTER]; i++) {
         if (seen[i] && (i <= KIND || i == ERROR_MM))
             expect_rows(reader, &found[i], nodes, "the number of nodes");
@@ -262,28 +119,15 @@ static VesselTree *read_tree(const Reader *reader, TreeFileInfo *info)
         return NULL;
     }
     tree->iso_level = iso_level;
-    const struct {
-        int column;
-        hid_t type;
-        void *out;
-    } target[COLUMN_COUNT] = {
-        {CENTER, H5T_NATIVE_DOUBLE, tree->center},
-        {RADIUS, H5T_NATIVE_DOUBLE, tree->radius},
-        {DIRECTION, H5T_NATIVE_DOUBLE, tree->direction},
-        {HEIGHT, H5T_NATIVE_DOUBLE, tree->height},
-        {PARENT, H5T_NATIVE_INT32, tree->parent},
-        {KIND, H5T_NATIVE_UINT8, tree->kind},
-        {POINT, H5T_NATIVE_DOUBLE, tree->point},
-        {POINT_OFFSET, H5T_NATIVE_INT64, tree->point_offset},
-        {BLOB_CENTER, H5T_NATIVE_DOUBLE, tree->blob_center},
-        {BLOB_WIDTH, H5T_NATIVE_DOUBLE, tree->blob_width},
-        {BLOB_OFFSET, H5T_NATIVE_INT64, tree->blob_offset},
-        {ERROR_MM, H5T_NATIVE_DOUBLE, tree->error},
-        {BLOB_AMPLITUDE, H5T_NATIVE_DOUBLE, tree->blob_amplitude},
+    void *const target[COLUMN_COUNT] = {
+        [CENTER] = tree->center,           [RADIUS] = tree->radius,         [DIRECTION] = tree->direction,     [HEIGHT] = tree->height,
+        [PARENT] = tree->parent,           [KIND] = tree->kind,             [POINT] = tree->point,             [POINT_OFFSET] = tree->point_offset,
+        [BLOB_CENTER] = tree->blob_center, [BLOB_WIDTH] = tree->blob_width, [BLOB_OFFSET] = tree->blob_offset, [ERROR_MM] = tree->error,
+        [BLOB_AMPLITUDE] = tree->blob_amplitude,
     };
     bool good = true;
     for (int i = 0; i < used; i++)
-        good = read_column(reader, &found[target[i].column], target[i].type, target[i].out) && good;
+        good = hdf5_read_into(reader->file, &found[i], target[i]) && good;
     if (good && vessel_tree_validate(tree, reader->name, reader->faults)) {
         if (vessel_tree_link(tree))
             return tree;
@@ -296,23 +140,10 @@ static VesselTree *read_tree(const Reader *reader, TreeFileInfo *info)
 
 VesselTree *tree_file_parse(const void *bytes, size_t length, const char *name, TreeFileInfo *info, Faults *faults)
 {
-    Silence kept = silence_begin();
-    VesselTree *tree = NULL;
     TreeFileInfo held = {0};
-    hid_t access = H5Pcreate(H5P_FILE_ACCESS);
-    Reader reader = {.file = -1, .name = name, .faults = faults};
-    // the library copies the image and never writes to it: the cast is its missing const
-    if (access >= 0 && length > 0 && H5Pset_fapl_core(access, 1 << 16, 0) >= 0 && H5Pset_file_image(access, (void *)(uintptr_t)bytes, length) >= 0)
-        reader.file = H5Fopen("/dev/null/image", H5F_ACC_RDONLY, access);   // the library refuses an image whose name is that of a file
-    if (reader.file >= 0) {
-        tree = read_tree(&reader, &held);
-        H5Fclose(reader.file);
-    } else {
-        faults_add_at_byte(faults, name, 0, "is not a readable HDF5 file (cut off, damaged or of another kind); a tree or model of seldinger is needed");
-    }
-    if (access >= 0)
-        H5Pclose(access);
-    silence_end(kept);
+    Reader reader = {.file = hdf5_reader_parse(bytes, length, name, "a tree has /nodes and /points, a model /blobs too", faults), .name = name, .faults = faults};
+    VesselTree *tree = reader.file ? read_tree(&reader, &held) : NULL;
+    hdf5_reader_close(reader.file);
     if (tree && info)
         *info = held;
     else
@@ -330,6 +161,21 @@ VesselTree *tree_file_load(const char *path, TreeFileInfo *info, Faults *faults)
 }
 
 // --- writing ---
+
+// The library prints nothing of its own while we work; the user's handler is put back.
+typedef struct Silence {
+    H5E_auto2_t handler;
+    void *data;
+} Silence;
+
+static Silence silence_begin(void)
+{
+    Silence kept = {0};
+    H5Eget_auto2(H5E_DEFAULT, &kept.handler, &kept.data);
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+    return kept;
+}
+static void silence_end(Silence kept) { H5Eset_auto2(H5E_DEFAULT, kept.handler, kept.data); }
 
 static bool write_column(hid_t file, const char *path, hid_t type, int rank, int64_t rows, const void *data)
 {

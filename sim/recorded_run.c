@@ -1,170 +1,33 @@
-// Reading a recording back. Every dataset's type, rank and extent is checked before memory is taken, and that the file holds what they promise; nothing is read
-// from other files. Rows that one dataset has more than another (a file still being written) are left out.
+// Reading a recording back (recon/hdf5_reader.h checks what it holds). Rows that one dataset has more than another (a file still being written) are left out.
 #include "sim/recording.h"
 
+#include "recon/hdf5_reader.h"
+
 #include <ctype.h>
-#include <hdf5.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 typedef struct Reader {
-    hid_t file, access;      // to datasets, groups and links
+    Hdf5Reader *file;
     const char *path;
     Faults *faults;
 } Reader;
 
-static const hsize_t most_values = (hsize_t)1 << 29;
-
-// A link into another file is not followed.
-static herr_t refuse_link(const char *file, const char *group, const char *other, const char *object, unsigned *flags, hid_t access, void *context)
-{
-    (void)file, (void)group, (void)other, (void)object, (void)flags, (void)access, (void)context;
-    return -1;
-}
-
-// Whether each chunk is there with all its bytes. The library takes as many as the index says, and reads as many as the shape says.
-static bool has_chunks(hid_t set, hid_t creation, int rank, const hsize_t *extent, size_t value_bytes)
-{
-    hsize_t chunk[3] = {0}, at[3] = {0}, bytes = value_bytes;
-    if (H5Pget_chunk(creation, 3, chunk) != rank)
-        return false;
-    for (int i = 0; i < rank; i++) {
-        if (chunk[i] == 0 || bytes > UINT32_MAX / chunk[i])
-            return false;
-        bytes *= chunk[i];
-    }
-    for (;;) {
-        hsize_t stored = 0;
-        haddr_t address = HADDR_UNDEF;
-        if (H5Dget_chunk_info_by_coord(set, at, NULL, &address, &stored) < 0 || address == HADDR_UNDEF || stored != bytes)
-            return false;
-        int i = rank - 1;
-        while (i >= 0 && (at[i] += chunk[i]) >= extent[i])
-            at[i--] = 0;
-        if (i < 0)
-            return true;
-    }
-}
-
-// Whether a dataset's bytes lie in this file, as a recording's do: plain.
-static bool is_stored(hid_t set, int rank, const hsize_t *extent, hsize_t values, size_t value_bytes)
-{
-    hid_t creation = H5Dget_create_plist(set);
-    H5D_layout_t layout = H5Pget_layout(creation);
-    bool good = H5Pget_nfilters(creation) == 0 && H5Pget_external_count(creation) == 0;
-    if (layout == H5D_CHUNKED)
-        good = good && (values == 0 || has_chunks(set, creation, rank, extent, value_bytes));
-    else
-        good = good && (layout == H5D_COMPACT || layout == H5D_CONTIGUOUS) && H5Dget_storage_size(set) == values * value_bytes;
-    H5Pclose(creation);
-    return good;
-}
-
 // Reads a dataset of `rank` dimensions whose trailing ones are shape[1 …] (0: any, filled in); shape[0] is filled in. NULL with a fault.
-static void *read_dataset(const Reader *reader, const char *name, hid_t type, int rank, hsize_t *shape)
+static void *read_dataset(const Reader *reader, const char *name, Hdf5Type type, int rank, uint64_t *shape)
 {
-    hid_t set = H5Dopen2(reader->file, name, reader->access);
-    if (set < 0) {
-        faults_add(reader->faults, reader->path, 0, 0, "lacks the dataset '%s' of a recording", name);
-        return NULL;
-    }
-    hid_t space = H5Dget_space(set), stored = H5Dget_type(set);
-    hsize_t extent[3] = {0, 0, 0}, values = 1;
-    bool good = H5Sget_simple_extent_ndims(space) == rank && H5Sget_simple_extent_dims(space, extent, NULL) == rank;
-    for (int i = 0; good && i < rank; i++) {
-        good = i == 0 || shape[i] == 0 || shape[i] == extent[i];
-        good = good && (extent[i] == 0 || values <= most_values / extent[i]);
-        values *= extent[i];
-    }
-    H5T_class_t class = H5Tget_class(stored);
-    void *data = NULL;
-    size_t value_bytes = H5Tget_size(stored);
-    if (!good || (class != H5T_FLOAT && class != H5T_INTEGER) || value_bytes > 8) {
-        faults_add(reader->faults, reader->path, 0, 0, "dataset '%s' does not have the shape or type of a recording's", name);
-    } else if (!is_stored(set, rank, extent, values, value_bytes)) {
-        faults_add(reader->faults, reader->path, 0, 0, "dataset '%s' promises %llu values that the file does not hold plainly: they lack, are packed or lie elsewhere",
-                   name, (unsigned long long)values);
-    } else if (!(data = calloc((size_t)values + 1, H5Tget_size(type)))) {
-        faults_add(reader->faults, reader->path, 0, 0, "no memory for dataset '%s'", name);
-    } else if (values > 0 && H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0) {
-        faults_add(reader->faults, reader->path, 0, 0, "dataset '%s' cannot be read; the file is damaged", name);
-        free(data);
-        data = NULL;
-    }
-    memcpy(shape, extent, (size_t)rank * sizeof *shape);
-    H5Tclose(stored);
-    H5Sclose(space);
-    H5Dclose(set);
-    return data;
+    Hdf5Dataset dataset = {.path = name, .type = type, .rank = rank};
+    memcpy(dataset.size + 1, shape + 1, (size_t)(rank - 1) * sizeof *shape);
+    void *values = hdf5_read(reader->file, &dataset);
+    memcpy(shape, dataset.size, (size_t)rank * sizeof *shape);
+    return values;
 }
 
-static bool is_one_text(hid_t type, hid_t space, size_t most)
-{
-    return H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) <= 0 && H5Tget_size(type) < most && H5Sget_simple_extent_npoints(space) == 1;
-}
+static int64_t least(int64_t a, uint64_t b) { return (uint64_t)a < b ? a : (int64_t)b; }
 
-static char *read_scene_text(const Reader *reader)
-{
-    hid_t set = H5Dopen2(reader->file, "/scene", reader->access);
-    if (set < 0)
-        return NULL;
-    hid_t type = H5Dget_type(set), space = H5Dget_space(set);
-    char *text = NULL;
-    size_t size = H5Tget_size(type);
-    if (is_one_text(type, space, (size_t)1 << 27) && is_stored(set, 0, NULL, 1, size)) {
-        text = calloc(size + 1, 1);
-        if (text && H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text) < 0) {
-            free(text);
-            text = NULL;
-        }
-    }
-    H5Sclose(space);
-    H5Tclose(type);
-    H5Dclose(set);
-    return text;
-}
-
-// A text attribute of a dataset or group; NULL where there is none.
-static char *read_attribute(const Reader *reader, const char *object, const char *name)
-{
-    hid_t place = H5Oopen(reader->file, object, reader->access), attribute = place >= 0 ? H5Aopen(place, name, H5P_DEFAULT) : -1;
-    char *text = NULL;
-    if (attribute >= 0) {
-        hid_t type = H5Aget_type(attribute), space = H5Aget_space(attribute);
-        size_t size = H5Tget_size(type);
-        if (is_one_text(type, space, (size_t)1 << 20) && H5Aget_storage_size(attribute) == size &&
-            (text = calloc(size + 1, 1)) && H5Aread(attribute, type, text) < 0) {
-            free(text);
-            text = NULL;
-        }
-        H5Sclose(space);
-        H5Tclose(type);
-        H5Aclose(attribute);
-    }
-    if (place >= 0)
-        H5Oclose(place);
-    return text;
-}
-
-static double read_step_ms(hid_t file)
-{
-    double value = 1;
-    hid_t attribute = H5Aexists(file, "step_ms") > 0 ? H5Aopen(file, "step_ms", H5P_DEFAULT) : -1;
-    if (attribute >= 0) {
-        hid_t type = H5Aget_type(attribute);
-        if (H5Tget_class(type) == H5T_FLOAT && H5Aget_storage_size(attribute) == H5Tget_size(type))
-            H5Aread(attribute, H5T_NATIVE_DOUBLE, &value);
-        H5Tclose(type);
-        H5Aclose(attribute);
-    }
-    return value;
-}
-
-static int64_t least(int64_t a, hsize_t b) { return (hsize_t)a < b ? a : (int64_t)b; }
-
-static bool has(const Reader *reader, const char *name) { return H5Lexists(reader->file, name, reader->access) > 0; }
+static bool has(const Reader *reader, const char *name) { return hdf5_has(reader->file, name); }
 
 // --- several tools ---
 
@@ -179,7 +42,7 @@ static bool is_name(const char *text)
 
 static void copy_attribute(const Reader *reader, const char *group, const char *name, char text[TOOL_NAME_SIZE])
 {
-    char *read = read_attribute(reader, group, name);
+    char *read = hdf5_text_attribute(reader->file, group, name);
     if (read && is_name(read))
         strcpy(text, read);
     else
@@ -209,16 +72,16 @@ static bool count_tools(const Reader *reader, RecordedRun *run)
 // What a tool has in every step; the first one's stands at the root too, where that of a single tool does.
 static int64_t read_tool_series(const Reader *reader, const char *group, RecordedTool *tool)
 {
-    hsize_t command[2] = {0, 2}, proximal[2] = {0, 2}, inserted[1] = {0}, released[1] = {0};
+    uint64_t command[2] = {0, 2}, proximal[2] = {0, 2}, inserted[1] = {0}, released[1] = {0};
     char name[4][40];
     static const char *const what[] = {"command", "proximal", "inserted_mm", "released"};
     for (int i = 0; i < 4; i++)
         snprintf(name[i], sizeof name[i], "%s/%s", group, what[i]);
-    tool->command = read_dataset(reader, name[0], H5T_NATIVE_DOUBLE, 2, command);
-    tool->proximal = read_dataset(reader, name[1], H5T_NATIVE_DOUBLE, 2, proximal);
-    tool->inserted = read_dataset(reader, name[2], H5T_NATIVE_DOUBLE, 1, inserted);
+    tool->command = read_dataset(reader, name[0], HDF5_DOUBLE, 2, command);
+    tool->proximal = read_dataset(reader, name[1], HDF5_DOUBLE, 2, proximal);
+    tool->inserted = read_dataset(reader, name[2], HDF5_DOUBLE, 1, inserted);
     bool knows_release = *group || has(reader, name[3]);      // not in recordings from before hands could let go
-    tool->released = knows_release ? read_dataset(reader, name[3], H5T_NATIVE_UINT8, 1, released) : NULL;
+    tool->released = knows_release ? read_dataset(reader, name[3], HDF5_UINT8, 1, released) : NULL;
     int64_t count = least(least((int64_t)command[0], proximal[0]), inserted[0]);
     return knows_release ? least(count, released[0]) : count;
 }
@@ -226,9 +89,9 @@ static int64_t read_tool_series(const Reader *reader, const char *group, Recorde
 // Which device was asked for and which was in, in every step, where there were tools to exchange.
 static int64_t read_exchanges(const Reader *reader, RecordedRun *run)
 {
-    hsize_t size[3] = {0, (hsize_t)run->tool_count, 2};
-    run->exchange = read_dataset(reader, "/exchange", H5T_NATIVE_UINT8, 3, size);
-    for (hsize_t i = 0; run->exchange && i < 2 * size[0] * size[1]; i++)
+    uint64_t size[3] = {0, (uint64_t)run->tool_count, 2};
+    run->exchange = read_dataset(reader, "/exchange", HDF5_UINT8, 3, size);
+    for (uint64_t i = 0; run->exchange && i < 2 * size[0] * size[1]; i++)
         if (run->exchange[i] > EXCHANGES_MOST) {
             faults_add(reader->faults, reader->path, 0, 0, "/exchange names device %d in step %llu; 0 to %d", run->exchange[i], (unsigned long long)(i / size[1] / 2),
                        EXCHANGES_MOST);
@@ -254,18 +117,18 @@ static void count_device_nodes(const Reader *reader, const char *group, Recorded
 static int64_t read_tool_frames(const Reader *reader, const char *group, bool is_exchanged, RecordedTool *tool)
 {
     int rank = is_exchanged ? 2 : 1;
-    hsize_t s[2] = {0, 0}, radius[2] = {0, 0}, position[3] = {0, 0, 3}, quaternion[3] = {0, 0, 4}, carrier[2] = {0, 0};
+    uint64_t s[2] = {0, 0}, radius[2] = {0, 0}, position[3] = {0, 0, 3}, quaternion[3] = {0, 0, 4}, carrier[2] = {0, 0};
     char name[5][40];
     static const char *const what[] = {"s_mm", "radius_mm", "position", "quaternion", "carrier"};
     for (int i = 0; i < 5; i++)
         snprintf(name[i], sizeof name[i], "%s/%s", group, what[i]);
-    tool->s = read_dataset(reader, name[0], H5T_NATIVE_DOUBLE, rank, s);
-    tool->radius = read_dataset(reader, name[1], H5T_NATIVE_DOUBLE, rank, radius);
-    hsize_t nodes = s[rank - 1], devices = is_exchanged ? s[0] : 1;
+    tool->s = read_dataset(reader, name[0], HDF5_DOUBLE, rank, s);
+    tool->radius = read_dataset(reader, name[1], HDF5_DOUBLE, rank, radius);
+    uint64_t nodes = s[rank - 1], devices = is_exchanged ? s[0] : 1;
     position[1] = quaternion[1] = carrier[1] = nodes;
-    tool->position = read_dataset(reader, name[2], H5T_NATIVE_DOUBLE, 3, position);
-    tool->quaternion = read_dataset(reader, name[3], H5T_NATIVE_DOUBLE, 3, quaternion);
-    tool->carrier = read_dataset(reader, name[4], H5T_NATIVE_INT8, 2, carrier);
+    tool->position = read_dataset(reader, name[2], HDF5_DOUBLE, 3, position);
+    tool->quaternion = read_dataset(reader, name[3], HDF5_DOUBLE, 3, quaternion);
+    tool->carrier = read_dataset(reader, name[4], HDF5_INT8, 2, carrier);
     if (nodes < 2 || nodes > 100000 || radius[rank - 1] != nodes || radius[0] != s[0]) {
         faults_add(reader->faults, reader->path, 0, 0, "%s holds %llu nodes and %llu radii; 2 to 100000 of each", group, (unsigned long long)nodes,
                    (unsigned long long)radius[rank - 1]);
@@ -282,10 +145,10 @@ static int64_t read_tool_frames(const Reader *reader, const char *group, bool is
 static int64_t smaller(int64_t a, int64_t b) { return a < b ? a : b; }
 
 // What was set at each step; rows from before contrast agent had a tool are one value shorter.
-static XrayControl *read_xray(const Reader *reader, hsize_t *count)
+static XrayControl *read_xray(const Reader *reader, uint64_t *count)
 {
-    hsize_t shape[2] = {0, 0};
-    float *value = read_dataset(reader, "/xray", H5T_NATIVE_FLOAT, 2, shape);
+    uint64_t shape[2] = {0, 0};
+    float *value = read_dataset(reader, "/xray", HDF5_FLOAT, 2, shape);
     *count = shape[0];
     if (!value || shape[1] == XRAY_VALUES)
         return (XrayControl *)value;
@@ -293,7 +156,7 @@ static XrayControl *read_xray(const Reader *reader, hsize_t *count)
     if (!xray)
         faults_add(reader->faults, reader->path, 0, 0, "/xray has rows of %llu values; %d, or %d in older recordings", (unsigned long long)shape[1], XRAY_VALUES,
                    XRAY_VALUES_BEFORE_TOOLS);
-    for (hsize_t i = 0; xray && i < shape[0]; i++)
+    for (uint64_t i = 0; xray && i < shape[0]; i++)
         memcpy(&xray[i], value + i * XRAY_VALUES_BEFORE_TOOLS, XRAY_VALUES_BEFORE_TOOLS * sizeof *value);
     free(value);
     return xray;
@@ -302,15 +165,15 @@ static XrayControl *read_xray(const Reader *reader, hsize_t *count)
 // What every step has.
 static int64_t read_series(const Reader *reader, RecordedRun *run)
 {
-    hsize_t time[1] = {0}, hash[1] = {0}, flags[1] = {0}, wall[2] = {0, 2}, watched = 0;
-    run->time_s = read_dataset(reader, "/time_s", H5T_NATIVE_DOUBLE, 1, time);
+    uint64_t time[1] = {0}, hash[1] = {0}, flags[1] = {0}, wall[2] = {0, 2}, watched = 0;
+    run->time_s = read_dataset(reader, "/time_s", HDF5_DOUBLE, 1, time);
     int64_t count = smaller((int64_t)time[0], read_tool_series(reader, "", &run->tool[0]));
     run->command = run->tool[0].command;
     run->proximal = run->tool[0].proximal;
     run->inserted = run->tool[0].inserted;
-    run->state_hash = read_dataset(reader, "/state_hash", H5T_NATIVE_UINT64, 1, hash);
-    run->flags = read_dataset(reader, "/report/flags", H5T_NATIVE_UINT32, 1, flags);
-    run->wall_force = read_dataset(reader, "/report/wall_force_n", H5T_NATIVE_DOUBLE, 2, wall);
+    run->state_hash = read_dataset(reader, "/state_hash", HDF5_UINT64, 1, hash);
+    run->flags = read_dataset(reader, "/report/flags", HDF5_UINT32, 1, flags);
+    run->wall_force = read_dataset(reader, "/report/wall_force_n", HDF5_DOUBLE, 2, wall);
     bool was_seen = has(reader, "/xray");   // not in recordings of before the trainer
     run->xray = was_seen ? read_xray(reader, &watched) : NULL;
     count = least(least(least(count, hash[0]), flags[0]), wall[0]);
@@ -328,12 +191,12 @@ static int64_t read_series(const Reader *reader, RecordedRun *run)
     return run->xray ? least(count, watched) : count;
 }
 
-static int64_t read_tools_frames(const Reader *reader, hsize_t nodes, RecordedRun *run)
+static int64_t read_tools_frames(const Reader *reader, uint64_t nodes, RecordedRun *run)
 {
-    hsize_t count[1] = {0}, s[2] = {0, nodes}, radius[2] = {0, nodes};
-    run->frame_nodes = read_dataset(reader, "/wire/count", H5T_NATIVE_INT32, 1, count);
-    run->s = read_dataset(reader, "/wire/s_mm", H5T_NATIVE_DOUBLE, 2, s);
-    run->radius = read_dataset(reader, "/wire/radius_mm", H5T_NATIVE_DOUBLE, 2, radius);
+    uint64_t count[1] = {0}, s[2] = {0, nodes}, radius[2] = {0, nodes};
+    run->frame_nodes = read_dataset(reader, "/wire/count", HDF5_INT32, 1, count);
+    run->s = read_dataset(reader, "/wire/s_mm", HDF5_DOUBLE, 2, s);
+    run->radius = read_dataset(reader, "/wire/radius_mm", HDF5_DOUBLE, 2, radius);
     int64_t frames = least(least((int64_t)count[0], s[0]), radius[0]);
     for (int k = 0; k < run->tool_count; k++) {
         char group[GROUP_NAME];
@@ -343,11 +206,11 @@ static int64_t read_tools_frames(const Reader *reader, hsize_t nodes, RecordedRu
     return frames;
 }
 
-static int64_t read_nodes(const Reader *reader, hsize_t nodes, RecordedRun *run)
+static int64_t read_nodes(const Reader *reader, uint64_t nodes, RecordedRun *run)
 {
-    hsize_t s[1] = {0}, radius[1] = {0};
-    run->s = read_dataset(reader, "/wire/s_mm", H5T_NATIVE_DOUBLE, 1, s);
-    run->radius = read_dataset(reader, "/wire/radius_mm", H5T_NATIVE_DOUBLE, 1, radius);
+    uint64_t s[1] = {0}, radius[1] = {0};
+    run->s = read_dataset(reader, "/wire/s_mm", HDF5_DOUBLE, 1, s);
+    run->radius = read_dataset(reader, "/wire/radius_mm", HDF5_DOUBLE, 1, radius);
     if (run->s && run->radius && (radius[0] != nodes || s[0] != nodes))
         faults_add(reader->faults, reader->path, 0, 0, "holds %llu nodes and %llu radii; as many of each", (unsigned long long)nodes, (unsigned long long)radius[0]);
     return INT64_MAX;
@@ -385,14 +248,14 @@ static void check_frames(const Reader *reader, const RecordedRun *run)
 static void read_frames(const Reader *reader, RecordedRun *run)
 {
     int before = reader->faults->count;
-    hsize_t step[1] = {0}, position[3] = {0, 0, 3}, quaternion[3] = {0, 0, 4}, force[3] = {0, 0, 3}, gap[2] = {0, 0}, node[2] = {0, 0};
-    run->frame_step = read_dataset(reader, "/wire/step", H5T_NATIVE_INT64, 1, step);
-    run->position = read_dataset(reader, "/wire/position", H5T_NATIVE_DOUBLE, 3, position);
+    uint64_t step[1] = {0}, position[3] = {0, 0, 3}, quaternion[3] = {0, 0, 4}, force[3] = {0, 0, 3}, gap[2] = {0, 0}, node[2] = {0, 0};
+    run->frame_step = read_dataset(reader, "/wire/step", HDF5_INT64, 1, step);
+    run->position = read_dataset(reader, "/wire/position", HDF5_DOUBLE, 3, position);
     quaternion[1] = force[1] = gap[1] = node[1] = position[1];
-    run->quaternion = read_dataset(reader, "/wire/quaternion", H5T_NATIVE_DOUBLE, 3, quaternion);
-    run->force = read_dataset(reader, "/contact/force_n", H5T_NATIVE_FLOAT, 3, force);
-    run->gap = read_dataset(reader, "/contact/gap_mm", H5T_NATIVE_FLOAT, 2, gap);
-    run->vessel_node = read_dataset(reader, "/contact/vessel_node", H5T_NATIVE_INT32, 2, node);
+    run->quaternion = read_dataset(reader, "/wire/quaternion", HDF5_DOUBLE, 3, quaternion);
+    run->force = read_dataset(reader, "/contact/force_n", HDF5_FLOAT, 3, force);
+    run->gap = read_dataset(reader, "/contact/gap_mm", HDF5_FLOAT, 2, gap);
+    run->vessel_node = read_dataset(reader, "/contact/vessel_node", HDF5_INT32, 2, node);
     if (reader->faults->count == before && (position[1] < 2 || position[1] > 100000))
         faults_add(reader->faults, reader->path, 0, 0, "holds %llu nodes; 2 to 100000", (unsigned long long)position[1]);
     if (reader->faults->count > before)
@@ -442,43 +305,32 @@ static bool sum_turns(RecordedRun *run)
     return good;
 }
 
+static void read_scene(const Reader *reader, RecordedRun *run)
+{
+    run->scene_text = hdf5_text(reader->file, "/scene");
+    run->scene_path = hdf5_text_attribute(reader->file, "/scene", "path");
+    run->files = hdf5_text_attribute(reader->file, "/scene", "files");
+    run->sha256 = hdf5_text_attribute(reader->file, "/scene", "sha256");
+    run->contact = contact_of(hdf5_text_attribute(reader->file, "/scene", "contact"));
+    run->step_ms = hdf5_number(reader->file, "step_ms", 1);
+}
+
 static RecordedRun *load(const char *path, bool with_frames, Faults *faults)
 {
     int before = faults->count;
-    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
-    struct stat status;
-    if (stat(path, &status) != 0 || !S_ISREG(status.st_mode)) {
-        faults_add(faults, path, 0, 0, "cannot be opened; a recording that `seldinger run --record` wrote is expected");
-        return NULL;
-    }
-    hid_t access = H5Pcreate(H5P_FILE_ACCESS);
-    H5Pset_file_locking(access, false, true);
-    Reader reader = {.path = path, .faults = faults, .file = H5Fopen(path, H5F_ACC_RDONLY, access), .access = H5Pcreate(H5P_DATASET_ACCESS)};
-    H5Pset_elink_cb(reader.access, refuse_link, NULL);
-    H5Pclose(access);
-    if (reader.file < 0) {
-        H5Pclose(reader.access);
-        faults_add_at_byte(faults, path, 0, "is no HDF5 file; a recording that `seldinger run --record` wrote is expected");
-        return NULL;
-    }
-    RecordedRun *run = calloc(1, sizeof *run);
+    Reader reader = {.file = hdf5_reader_open(path, "a recording that `seldinger run --record` wrote is expected", faults), .path = path, .faults = faults};
+    RecordedRun *run = reader.file ? calloc(1, sizeof *run) : NULL;
     if (run) {
         read_run(&reader, run, with_frames);
-        run->scene_text = read_scene_text(&reader);
-        run->scene_path = read_attribute(&reader, "/scene", "path");
-        run->files = read_attribute(&reader, "/scene", "files");
-        run->sha256 = read_attribute(&reader, "/scene", "sha256");
-        run->contact = contact_of(read_attribute(&reader, "/scene", "contact"));
-        run->step_ms = read_step_ms(reader.file);
+        read_scene(&reader, run);
         if (!(run->step_ms >= 0.001 && run->step_ms <= 100))
             faults_add(faults, path, 0, 0, "has steps of %g ms; 0.001 to 100", run->step_ms);
         else if (faults->count == before && !sum_turns(run))
             faults_add(faults, path, 0, 0, "no memory");
-    } else {
+    } else if (reader.file) {
         faults_add(faults, path, 0, 0, "no memory");
     }
-    H5Pclose(reader.access);
-    H5Fclose(reader.file);
+    hdf5_reader_close(reader.file);
     if (faults->count > before) {
         recorded_run_free(run);
         return NULL;

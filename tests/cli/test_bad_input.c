@@ -210,9 +210,9 @@ static void verbs_of_the_trainer(void **state)
     assert_int_equal(run_in("", "run free.yaml --record free.h5 --quiet"), 0);
     static const char *const lines[][2] = {
         {"replay free.h5 --verify --banana", "see `seldinger replay --help`"},
-        {"replay free.yaml --verify", "free.yaml:byte 0: is no HDF5 file"},
+        {"replay free.yaml --verify", "free.yaml:byte 0: is not a readable HDF5 file"},
         {"replay tree.h5 --verify", "tree.h5: lacks the dataset"},
-        {"replay cut.h5 --scene out", "cut.h5:byte 0: is no HDF5 file"},
+        {"replay cut.h5 --scene out", "cut.h5:byte 0: is not a readable HDF5 file"},
         {"replay free.h5 --scene nowhere/out", "nowhere/out: cannot be made: No such file or directory"},
         {"replay free.h5 --at -1 --picture out.png", "--at: '-1' is not valid"},
         {"report", "takes one session file"},

@@ -179,7 +179,7 @@ static void what_is_no_recording_is_refused(void **state)
     (void)state;
     put("noise.h5", "no file of any kind");
     ends(2, "nowhere.h5: cannot be opened", "$S replay nowhere.h5 --verify");
-    ends(2, "noise.h5:byte 0: is no HDF5 file", "$S replay noise.h5 --verify");
+    ends(2, "noise.h5:byte 0: is not a readable HDF5 file", "$S replay noise.h5 --verify");
     ends(2, "models/tree.h5: lacks the dataset", "$S replay models/tree.h5 --verify");
     ends(2, "scenes: cannot be opened", "$S replay scenes --verify");
     ends(2, "", "head -c 20000 bend.h5 > cut.h5 && $S replay cut.h5 --verify");

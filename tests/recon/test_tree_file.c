@@ -221,6 +221,25 @@ static void lies_are_found(void **state)
     }
 }
 
+// A chunk that unpacks to less than its shape needs: the library would read what lies behind it in memory.
+static void what_is_packed_is_refused(void **state)
+{
+    (void)state;
+    static const unsigned char stream[] = {0x78, 0x9c, 0x63, 0x60, 0x80, 0x00, 0x00, 0x00, 0x08, 0x00, 0x01};     // eight zero bytes
+    const hsize_t rows = 4;
+    hid_t file = fresh_file(in_folder("packed.h5")), space = H5Screate_simple(1, &rows, NULL), creation = H5Pcreate(H5P_DATASET_CREATE);
+    H5Pset_chunk(creation, 1, &rows);
+    H5Pset_deflate(creation, 6);
+    H5Ldelete(file, "/blobs/error_mm", H5P_DEFAULT);
+    hid_t set = H5Dcreate2(file, "/blobs/error_mm", H5T_NATIVE_DOUBLE, space, H5P_DEFAULT, creation, H5P_DEFAULT);
+    assert_true(H5Dwrite_chunk(set, H5P_DEFAULT, 0, &(hsize_t){0}, sizeof stream, stream) >= 0);
+    H5Dclose(set);
+    H5Sclose(space);
+    H5Pclose(creation);
+    H5Fclose(file);
+    expect_fault(in_folder("packed.h5"), "/blobs/error_mm promises 4 values, but is packed");
+}
+
 static void damaged_bytes_are_refused(void **state)
 {
     (void)state;
@@ -278,6 +297,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(save_load_is_equality),     cmocka_unit_test(long_parameters_survive),   cmocka_unit_test(missing_datasets_are_named),
         cmocka_unit_test(lies_are_found),            cmocka_unit_test(damaged_bytes_are_refused), cmocka_unit_test(a_full_disk_leaves_what_was_there),
+        cmocka_unit_test(what_is_packed_is_refused),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

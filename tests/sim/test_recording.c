@@ -469,6 +469,63 @@ static void link_elsewhere(hid_t file)
     assert_true(H5Lcreate_external(path, "/inserted_mm", file, "/time_s", H5P_DEFAULT, H5P_DEFAULT) >= 0);
 }
 
+// Many chunks that all lie in the same bytes: the index's children are made the first, and the file ends behind it.
+enum { SHARED_CHUNKS = 60, SHARED_ROWS = 1 << 18 };
+static void make_shared_chunk(const char *path)
+{
+    hid_t file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT), creation = H5Pcreate(H5P_DATASET_CREATE);
+    H5Pset_chunk(creation, 1, &(hsize_t){SHARED_ROWS});
+    H5Pset_fill_time(creation, H5D_FILL_TIME_NEVER);
+    replace(file, "/time_s", H5T_NATIVE_DOUBLE, 1, &(hsize_t){SHARED_CHUNKS * SHARED_ROWS}, creation);
+    H5Pclose(creation);
+    double *value = malloc(SHARED_ROWS * sizeof *value);
+    for (int i = 0; i < SHARED_ROWS; i++)
+        value[i] = 0.001 * (i + 1);
+    hid_t set = H5Dopen2(file, "/time_s", H5P_DEFAULT);
+    haddr_t address = HADDR_UNDEF, at;
+    hsize_t size;
+    for (int i = 0; i < SHARED_CHUNKS; i++) {
+        const hsize_t row = (hsize_t)i * SHARED_ROWS;
+        assert_true(H5Dwrite_chunk(set, H5P_DEFAULT, 0, &row, SHARED_ROWS * sizeof *value, value) >= 0);
+        assert_true(H5Dget_chunk_info_by_coord(set, &row, NULL, &at, &size) >= 0);
+        address = at < address ? at : address;
+    }
+    free(value);
+    H5Dclose(set);
+    assert_true(H5Fclose(file) >= 0);
+
+    FILE *stream = fopen(path, "r+b");
+    unsigned char *bytes = malloc(address + size);
+    assert_int_equal(fread(bytes, 1, address + size, stream), address + size);
+    size_t node = 0, step = 24 + 8;     // of an entry: a key (size, mask, two offsets) and a child
+    for (size_t i = 0; i + 8 < address; i++)
+        if (!memcmp(bytes + i, "TREE\1\0", 6) && bytes[i + 6] == SHARED_CHUNKS)
+            node = i;
+    assert_true(node > 0);
+    for (size_t i = 0; i < SHARED_CHUNKS; i++)
+        memcpy(bytes + node + 24 + 24 + i * step, &(uint64_t){address}, 8);
+    memcpy(bytes + 44, &(uint64_t){address + size}, 8);     // the end that the superblock states
+    rewind(stream);
+    assert_int_equal(fwrite(bytes, 1, address + size, stream), address + size);
+    assert_int_equal(fclose(stream), 0);
+    assert_int_equal(truncate(path, (off_t)(address + size)), 0);
+    free(bytes);
+}
+
+static void one_chunk_is_not_read_many_times(void **state)
+{
+    (void)state;
+    char path[256], shared[256];
+    snprintf(path, sizeof path, "%s/tools.h5", folder);
+    snprintf(shared, sizeof shared, "%s/shared.h5", folder);
+    assert_true(copy_file(path, shared));
+    make_shared_chunk(shared);
+    faults_clear(&faults);
+    RecordedRun *run = recorded_run_load(shared, &faults);
+    if (run || !strstr(faults.text[0], "/time_s promises 15728640 values, but has more or larger chunks than the file"))
+        fail_msg("expected a refusal, got '%s'", run ? "a recording" : faults.text[0]);
+}
+
 // After what_is_read_of_several_tools(), whose file it takes.
 static void what_is_broken_is_refused(void **state)
 {
@@ -478,22 +535,22 @@ static void what_is_broken_is_refused(void **state)
     expect_refused(path, lose_tool, "/tools does not hold the groups 0 to 1");
     expect_refused(path, lose_name, "/tools/2 lacks its text attribute 'name'");
     expect_refused(path, rename_tool, "/tools/2 lacks its text attribute 'name'");
-    expect_refused(path, lose_hand, "lacks the dataset '/tools/3/command'");
-    expect_refused(path, widen_hand, "'/tools/1/proximal' does not have the shape or type");
-    expect_refused(path, other_nodes, "'/tools/1/position' does not have the shape or type");
+    expect_refused(path, lose_hand, "lacks the dataset /tools/3/command");
+    expect_refused(path, widen_hand, "/tools/1/proximal has the wrong shape (605, 3); valid: (any, 2)");
+    expect_refused(path, other_nodes, "/tools/1/position has the wrong shape (62, 99, 3); valid: (any, 13, 3)");
     expect_refused(path, too_many_nodes, "frame 5 has 1000 nodes; 2 to 56");
     expect_refused(path, no_node, "frame 5 has 0 nodes");
     expect_refused(path, no_such_carrier, "/tools/2/carrier names tool 7; -1 to 3");
-    expect_refused(path, promise, "'/time_s' promises 268435456 values that the file does not hold");
-    expect_refused(path, pack, "'/time_s' promises 605 values that the file does not hold plainly");
-    expect_refused(path, cut_chunk, "'/time_s' promises 605 values that the file does not hold plainly");
-    expect_refused(path, read_elsewhere, "'/time_s' promises 100 values that the file does not hold");
-    expect_refused(path, link_elsewhere, "lacks the dataset '/time_s'");
+    expect_refused(path, promise, "/time_s promises 268435456 values, but has more or larger chunks than the file");
+    expect_refused(path, pack, "/time_s promises 605 values, but is packed");
+    expect_refused(path, cut_chunk, "/time_s promises 605 values, but has chunks that are cut off");
+    expect_refused(path, read_elsewhere, "/time_s promises 100 values, but is stored in another file");
+    expect_refused(path, link_elsewhere, "/time_s is a soft or external link; valid: a dataset of this file");
     snprintf(path, sizeof path, "%s/exchange.h5", folder);
     expect_refused(path, no_such_device, "/exchange names device 9 in step 7; 0 to 4");
     expect_refused(path, unknown_device, "/exchange has device 2 of tool 0 in step 9; the file holds 2 of them");
     expect_refused(path, no_profile, "/tools/1/s_mm holds 1 nodes of device 1; at least 2");
-    expect_refused(path, lose_exchange, "'/tools/0/s_mm' does not have the shape or type");
+    expect_refused(path, lose_exchange, "/tools/0/s_mm has the wrong shape");
 }
 
 // --- a child that records until it is ended ---
@@ -923,6 +980,7 @@ int main(int count, char **argument)
         cmocka_unit_test(what_is_read_of_several_tools),
         cmocka_unit_test(what_is_read_of_exchanged_tools),
         cmocka_unit_test(what_is_broken_is_refused),
+        cmocka_unit_test(one_chunk_is_not_read_many_times),
         cmocka_unit_test(every_state_in_a_flush_is_a_whole_file),
         cmocka_unit_test(so_it_is_with_several_tools),
         cmocka_unit_test(a_kill_leaves_a_file_that_opens),

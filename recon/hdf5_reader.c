@@ -1,0 +1,446 @@
+// The rules stand in the header. What of the library is relied upon: creation lists, links and types are read without reading data or opening files.
+#include "recon/hdf5_reader.h"
+
+#include <hdf5.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+struct Hdf5Reader {
+    hid_t file;
+    const char *name, *needs;
+    Faults *faults;
+    hsize_t length, left;    // [bytes] of the file, and of it what no dataset has taken yet
+    H5E_auto2_t handler;     // of the library's own messages, as it was
+    void *handler_data;
+};
+
+enum { MOST_PATH = 256 };
+
+// --- opening ---
+
+static void be_silent(Hdf5Reader *reader)
+{
+    H5Eget_auto2(H5E_DEFAULT, &reader->handler, &reader->handler_data);
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+}
+
+static Hdf5Reader *make_reader(const char *name, const char *needs, size_t length, Faults *faults)
+{
+    Hdf5Reader *reader = malloc(sizeof *reader);
+    if (!reader) {
+        faults_add(faults, name, 0, 0, "cannot be read: not enough memory");
+        return NULL;
+    }
+    *reader = (Hdf5Reader){.file = -1, .name = name, .needs = needs, .faults = faults, .length = length};
+    reader->left = length < HDF5_READER_MOST_BYTES ? length : HDF5_READER_MOST_BYTES;
+    be_silent(reader);
+    H5PLset_loading_state(0);
+    return reader;
+}
+
+// Takes `access`.
+static Hdf5Reader *open_with(Hdf5Reader *reader, const char *path, hid_t access)
+{
+    reader->file = access >= 0 ? H5Fopen(path, H5F_ACC_RDONLY, access) : -1;
+    if (access >= 0)
+        H5Pclose(access);
+    if (reader->file >= 0)
+        return reader;
+    faults_add_at_byte(reader->faults, reader->name, 0, "is not a readable HDF5 file (cut off, damaged or of another kind); %s", reader->needs);
+    hdf5_reader_close(reader);
+    return NULL;
+}
+
+Hdf5Reader *hdf5_reader_open(const char *path, const char *needs, Faults *faults)
+{
+    struct stat status;
+    if (stat(path, &status) != 0 || !S_ISREG(status.st_mode)) {
+        faults_add(faults, path, 0, 0, "cannot be opened as a regular file; %s", needs);
+        return NULL;
+    }
+    Hdf5Reader *reader = make_reader(path, needs, (size_t)status.st_size, faults);
+    hid_t access = reader ? H5Pcreate(H5P_FILE_ACCESS) : -1;
+    if (access >= 0)
+        H5Pset_file_locking(access, false, true);   // a recording is read while it is written
+    return reader ? open_with(reader, path, access) : NULL;
+}
+
+Hdf5Reader *hdf5_reader_parse(const void *bytes, size_t length, const char *name, const char *needs, Faults *faults)
+{
+    Hdf5Reader *reader = make_reader(name, needs, length, faults);
+    hid_t access = reader && length > 0 ? H5Pcreate(H5P_FILE_ACCESS) : -1;
+    // the library copies the image and never writes to it: the cast is its missing const
+    if (access >= 0 && (H5Pset_fapl_core(access, 1 << 16, 0) < 0 || H5Pset_file_image(access, (void *)(uintptr_t)bytes, length) < 0)) {
+        H5Pclose(access);
+        access = -1;
+    }
+    return reader ? open_with(reader, "/dev/null/image", access) : NULL;   // the library refuses an image whose name is that of a file
+}
+
+void hdf5_reader_close(Hdf5Reader *reader)
+{
+    if (!reader)
+        return;
+    if (reader->file >= 0)
+        H5Fclose(reader->file);
+    H5Eset_auto2(H5E_DEFAULT, reader->handler, reader->handler_data);
+    free(reader);
+}
+
+// --- links ---
+
+typedef enum { LINK_NONE, LINK_HARD, LINK_OTHER } LinkKind;
+
+// Looks at each link of the path before the library follows it.
+static LinkKind link_kind(const Hdf5Reader *reader, const char *path)
+{
+    char part[MOST_PATH];
+    size_t length = strlen(path);
+    if (length >= sizeof part)
+        return LINK_NONE;
+    for (size_t end = 1; end <= length; end++) {
+        if (path[end] != '/' && path[end] != '\0')
+            continue;
+        H5L_info_t link;
+        memcpy(part, path, end);
+        part[end] = '\0';
+        if (H5Lexists(reader->file, part, H5P_DEFAULT) <= 0 || H5Lget_info(reader->file, part, &link, H5P_DEFAULT) < 0)
+            return LINK_NONE;
+        if (link.type != H5L_TYPE_HARD)
+            return LINK_OTHER;
+    }
+    return LINK_HARD;
+}
+
+bool hdf5_has(const Hdf5Reader *reader, const char *path) { return link_kind(reader, path) != LINK_NONE; }
+
+static hid_t open_dataset(const Hdf5Reader *reader, const char *path)
+{
+    LinkKind kind = link_kind(reader, path);
+    hid_t set = kind == LINK_HARD ? H5Dopen2(reader->file, path, H5P_DEFAULT) : -1;
+    if (kind == LINK_NONE)
+        faults_add(reader->faults, reader->name, 0, 0, "lacks the dataset %s; %s", path, reader->needs);
+    else if (kind == LINK_OTHER)
+        faults_add(reader->faults, reader->name, 0, 0, "%s is a soft or external link; valid: a dataset of this file", path);
+    else if (set < 0)
+        faults_add(reader->faults, reader->name, 0, 0, "%s cannot be opened; valid: a dataset whose header is whole", path);
+    return set;
+}
+
+// --- types and shapes ---
+
+static bool is_float(Hdf5Type type) { return type == HDF5_FLOAT || type == HDF5_DOUBLE; }
+
+static hid_t memory_type(Hdf5Type type)
+{
+    switch (type) {
+    case HDF5_INT8: return H5T_NATIVE_INT8;
+    case HDF5_UINT8: return H5T_NATIVE_UINT8;
+    case HDF5_INT32: return H5T_NATIVE_INT32;
+    case HDF5_UINT32: return H5T_NATIVE_UINT32;
+    case HDF5_INT64: return H5T_NATIVE_INT64;
+    case HDF5_UINT64: return H5T_NATIVE_UINT64;
+    case HDF5_FLOAT: return H5T_NATIVE_FLOAT;
+    default: return H5T_NATIVE_DOUBLE;
+    }
+}
+
+static bool is_one_of(hid_t type, const hid_t *standard, int count)
+{
+    bool found = false;
+    for (int i = 0; i < count && !found; i++)
+        found = H5Tequal(type, standard[i]) > 0;
+    return found;
+}
+
+static bool is_plain_float(hid_t type)
+{
+    const hid_t standard[] = {H5T_IEEE_F64LE, H5T_IEEE_F64BE, H5T_IEEE_F32LE, H5T_IEEE_F32BE};
+    return is_one_of(type, standard, 4);
+}
+
+static bool is_plain_integer(hid_t type)
+{
+    const hid_t standard[] = {H5T_STD_I8LE,  H5T_STD_U8LE,  H5T_STD_I8BE,  H5T_STD_U8BE,  H5T_STD_I16LE, H5T_STD_U16LE, H5T_STD_I16BE, H5T_STD_U16BE,
+                              H5T_STD_I32LE, H5T_STD_U32LE, H5T_STD_I32BE, H5T_STD_U32BE, H5T_STD_I64LE, H5T_STD_U64LE, H5T_STD_I64BE, H5T_STD_U64BE};
+    return is_one_of(type, standard, 16);
+}
+
+static void print_size(char text[80], int rank, const uint64_t *size)
+{
+    int used = 0;
+    for (int i = 0; i < rank && used < 72; i++)
+        used += size[i] ? snprintf(text + used, 80 - (size_t)used, "%s%" PRIu64, i ? ", " : "(", size[i]) : snprintf(text + used, 80 - (size_t)used, "%sany", i ? ", " : "(");
+    snprintf(text + used, 80 - (size_t)used, ")");
+}
+
+// Fills in what was found.
+static bool has_shape(const Hdf5Reader *reader, hid_t space, Hdf5Dataset *dataset)
+{
+    hsize_t found[H5S_MAX_RANK] = {0};
+    int rank = H5Sget_simple_extent_type(space) == H5S_SIMPLE ? H5Sget_simple_extent_dims(space, found, NULL) : -1;
+    bool fits = rank == dataset->rank;
+    for (int i = 0; fits && i < rank; i++)
+        fits = dataset->size[i] == 0 || dataset->size[i] == found[i];
+    if (!fits) {
+        char valid[80], is[80] = "none";
+        print_size(valid, dataset->rank, dataset->size);
+        if (rank >= 0 && rank <= 3)
+            print_size(is, rank, (const uint64_t[]){found[0], found[1], found[2]});
+        faults_add(reader->faults, reader->name, 0, 0, "%s has the wrong shape %s; valid: %s", dataset->path, is, valid);
+        return false;
+    }
+    for (int i = 0; i < rank; i++)
+        dataset->size[i] = found[i];
+    return true;
+}
+
+// The product, UINT64_MAX where it is larger.
+static uint64_t times(uint64_t a, uint64_t b) { return b > 0 && a > UINT64_MAX / b ? UINT64_MAX : a * b; }
+
+static uint64_t value_count(const Hdf5Dataset *dataset)
+{
+    uint64_t values = 1;
+    for (int i = 0; i < dataset->rank; i++)
+        values = times(values, dataset->size[i]);
+    return values;
+}
+
+// --- storage ---
+
+static bool lies_in_file(const Hdf5Reader *reader, haddr_t address, hsize_t bytes)
+{
+    return address != HADDR_UNDEF && bytes <= reader->length && address <= reader->length - bytes;
+}
+
+// Each chunk is there with all its bytes: the library takes as many as the index says, and reads as many as the shape says. NULL, or what is wrong.
+static const char *chunk_trouble(Hdf5Reader *reader, hid_t set, hid_t creation, const Hdf5Dataset *dataset, hsize_t value_bytes)
+{
+    static const char *const huge = "has more or larger chunks than the file, or than are read (4096, 16 GiB)";
+    hsize_t chunk[3] = {0}, at[3] = {0}, bytes = value_bytes, count = 1;
+    if (H5Pget_chunk(creation, 3, chunk) != dataset->rank)
+        return "has chunks of another rank";
+    for (int i = 0; i < dataset->rank; i++) {
+        if (chunk[i] == 0)
+            return "has empty chunks";
+        bytes = times(bytes, chunk[i]);
+        count = times(count, (dataset->size[i] - 1) / chunk[i] + 1);
+    }
+    if (count > HDF5_READER_MOST_CHUNKS || times(bytes, count) > reader->left)
+        return huge;
+    for (hsize_t i = 0; i < count; i++) {
+        hsize_t stored = 0;
+        haddr_t address = HADDR_UNDEF;
+        if (H5Dget_chunk_info_by_coord(set, at, NULL, &address, &stored) < 0 || address == HADDR_UNDEF)
+            return "has chunks that were never written";
+        if (stored != bytes || !lies_in_file(reader, address, stored))
+            return "has chunks that are cut off";
+        for (int k = dataset->rank - 1; k >= 0 && (at[k] += chunk[k]) >= dataset->size[k]; k--)
+            at[k] = 0;
+    }
+    reader->left -= bytes * count;
+    return NULL;
+}
+
+static const char *contiguous_trouble(Hdf5Reader *reader, hid_t set, uint64_t bytes, bool is_compact)
+{
+    if (H5Dget_storage_size(set) != bytes)
+        return "does not have as many bytes as its shape needs";
+    if (bytes > reader->left || (!is_compact && !lies_in_file(reader, H5Dget_offset(set), bytes)))
+        return "has more bytes than the file, or than are read (16 GiB)";
+    reader->left -= bytes;
+    return NULL;
+}
+
+// NULL, or why a dataset's bytes do not lie in this file as a recording's and a tree's do.
+static const char *storage_trouble(Hdf5Reader *reader, hid_t set, const Hdf5Dataset *dataset, size_t value_bytes)
+{
+    hid_t creation = H5Dget_create_plist(set);
+    if (creation < 0)
+        return "does not say how it is stored";
+    uint64_t values = value_count(dataset);
+    H5D_layout_t layout = H5Pget_layout(creation);
+    const char *trouble = NULL;
+    if (H5Pget_external_count(creation) != 0)
+        trouble = "is stored in another file";
+    else if (layout == H5D_VIRTUAL)
+        trouble = "is put together from other files";
+    else if (H5Pget_nfilters(creation) != 0)
+        trouble = "is packed (`h5repack -f NONE IN OUT` unpacks it)";
+    else if (values > 0 && layout == H5D_CHUNKED)
+        trouble = chunk_trouble(reader, set, creation, dataset, value_bytes);
+    else if (values > 0)
+        trouble = contiguous_trouble(reader, set, times(values, value_bytes), layout == H5D_COMPACT);
+    H5Pclose(creation);
+    return trouble;
+}
+
+// --- datasets ---
+
+static bool inspect_open(Hdf5Reader *reader, hid_t set, hid_t type, hid_t space, Hdf5Dataset *dataset)
+{
+    if (type < 0 || !(is_float(dataset->type) ? is_plain_float(type) : is_plain_integer(type))) {
+        faults_add(reader->faults, reader->name, 0, 0, "%s has the wrong type; valid: %s", dataset->path,
+                   is_float(dataset->type) ? "IEEE floats of 32 or 64 bits" : "integers of 8 to 64 bits");
+        return false;
+    }
+    if (space < 0 || !has_shape(reader, space, dataset))
+        return false;
+    const char *trouble = storage_trouble(reader, set, dataset, H5Tget_size(type));
+    if (trouble)
+        faults_add(reader->faults, reader->name, 0, 0, "%s promises %" PRIu64 " values, but %s; valid: plain bytes in this file", dataset->path, value_count(dataset),
+                   trouble);
+    return !trouble;
+}
+
+bool hdf5_inspect(Hdf5Reader *reader, Hdf5Dataset *dataset)
+{
+    hid_t set = open_dataset(reader, dataset->path);
+    if (set < 0)
+        return false;
+    hid_t type = H5Dget_type(set), space = H5Dget_space(set);
+    bool good = inspect_open(reader, set, type, space, dataset);
+    if (space >= 0)
+        H5Sclose(space);
+    if (type >= 0)
+        H5Tclose(type);
+    H5Dclose(set);
+    return good;
+}
+
+static bool is_finite(const Hdf5Reader *reader, const Hdf5Dataset *dataset, const void *values)
+{
+    uint64_t count = value_count(dataset);
+    for (uint64_t i = 0; i < count; i++) {
+        double value = dataset->type == HDF5_FLOAT ? (double)((const float *)values)[i] : ((const double *)values)[i];
+        if (!isfinite(value)) {
+            faults_add(reader->faults, reader->name, 0, 0, "%s holds %g in row %" PRIu64 "; valid: finite numbers", dataset->path, value, i / (count / dataset->size[0]));
+            return false;
+        }
+    }
+    return true;
+}
+
+bool hdf5_read_into(Hdf5Reader *reader, const Hdf5Dataset *dataset, void *out)
+{
+    uint64_t values = value_count(dataset);
+    hid_t set = H5Dopen2(reader->file, dataset->path, H5P_DEFAULT);
+    bool good = set >= 0 && (values == 0 || H5Dread(set, memory_type(dataset->type), H5S_ALL, H5S_ALL, H5P_DEFAULT, out) >= 0);
+    if (set >= 0)
+        H5Dclose(set);
+    if (!good)
+        faults_add(reader->faults, reader->name, 0, 0, "%s cannot be read: its data are damaged or cut off", dataset->path);
+    return good && (!dataset->is_finite || !is_float(dataset->type) || is_finite(reader, dataset, out));
+}
+
+void *hdf5_read(Hdf5Reader *reader, Hdf5Dataset *dataset)
+{
+    if (!hdf5_inspect(reader, dataset))
+        return NULL;
+    void *values = calloc(value_count(dataset) + 1, H5Tget_size(memory_type(dataset->type)));
+    if (!values)
+        faults_add(reader->faults, reader->name, 0, 0, "%s needs more memory than there is (%" PRIu64 " values)", dataset->path, value_count(dataset));
+    else if (hdf5_read_into(reader, dataset, values))
+        return values;
+    free(values);
+    return NULL;
+}
+
+// --- texts and numbers ---
+
+static bool is_one_text(hid_t type, hid_t space)
+{
+    return H5Tget_class(type) == H5T_STRING && H5Sget_simple_extent_npoints(space) == 1 && (H5Tis_variable_str(type) > 0 || H5Tget_size(type) <= HDF5_READER_MOST_TEXT);
+}
+
+static char *fixed_text(const Hdf5Reader *reader, hid_t type, hid_t set, hid_t attribute)
+{
+    size_t size = H5Tget_size(type);
+    char *text = size <= reader->length ? calloc(size + 1, 1) : NULL;
+    if (text && (set >= 0 ? H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text) : H5Aread(attribute, type, text)) >= 0)
+        return text;
+    free(text);
+    return NULL;
+}
+
+// As other writers have it (h5py).
+static char *variable_text(hid_t type, hid_t space, hid_t attribute)
+{
+    char *held = NULL, *text = NULL;
+    if (H5Aread(attribute, type, &held) < 0)
+        return NULL;
+    text = strdup(held ? held : "");
+    H5Dvlen_reclaim(type, space, H5P_DEFAULT, &held);
+    return text;
+}
+
+char *hdf5_text(Hdf5Reader *reader, const char *path)
+{
+    hid_t set = hdf5_has(reader, path) ? open_dataset(reader, path) : -1;
+    if (set < 0)
+        return NULL;
+    hid_t type = H5Dget_type(set), space = H5Dget_space(set);
+    char *text = NULL;
+    if (type >= 0 && space >= 0 && is_one_text(type, space) && H5Tis_variable_str(type) <= 0 &&
+        !storage_trouble(reader, set, &(Hdf5Dataset){.path = path, .rank = 0}, H5Tget_size(type)))
+        text = fixed_text(reader, type, set, -1);
+    if (!text)
+        faults_add(reader->faults, reader->name, 0, 0, "%s is no text; valid: one text of fixed length, stored in this file", path);
+    if (space >= 0)
+        H5Sclose(space);
+    if (type >= 0)
+        H5Tclose(type);
+    H5Dclose(set);
+    return text;
+}
+
+// -1 where there is none.
+static hid_t open_attribute(const Hdf5Reader *reader, const char *object, const char *name)
+{
+    bool is_here = strcmp(object, "/") == 0 || link_kind(reader, object) == LINK_HARD;
+    if (!is_here || H5Aexists_by_name(reader->file, object, name, H5P_DEFAULT) <= 0)
+        return -1;
+    return H5Aopen_by_name(reader->file, object, name, H5P_DEFAULT, H5P_DEFAULT);
+}
+
+char *hdf5_text_attribute(Hdf5Reader *reader, const char *object, const char *name)
+{
+    hid_t attribute = open_attribute(reader, object, name);
+    if (attribute < 0)
+        return NULL;
+    hid_t type = H5Aget_type(attribute), space = H5Aget_space(attribute);
+    char *text = NULL;
+    if (type >= 0 && space >= 0 && is_one_text(type, space))
+        text = H5Tis_variable_str(type) > 0 ? variable_text(type, space, attribute) : fixed_text(reader, type, -1, attribute);
+    if (!text)
+        faults_add(reader->faults, reader->name, 0, 0, "attribute %s of %s is not a text; valid: one text", name, object);
+    if (space >= 0)
+        H5Sclose(space);
+    if (type >= 0)
+        H5Tclose(type);
+    H5Aclose(attribute);
+    return text;
+}
+
+double hdf5_number(Hdf5Reader *reader, const char *name, double otherwise)
+{
+    hid_t attribute = open_attribute(reader, "/", name);
+    if (attribute < 0)
+        return otherwise;
+    double value = NAN;
+    hid_t type = H5Aget_type(attribute), space = H5Aget_space(attribute);
+    bool is_number = type >= 0 && space >= 0 && (is_plain_float(type) || is_plain_integer(type)) && H5Sget_simple_extent_npoints(space) == 1;
+    if (!is_number || H5Aread(attribute, H5T_NATIVE_DOUBLE, &value) < 0) {
+        faults_add(reader->faults, reader->name, 0, 0, "attribute %s is not a number; valid: one number", name);
+        value = otherwise;
+    }
+    if (space >= 0)
+        H5Sclose(space);
+    if (type >= 0)
+        H5Tclose(type);
+    H5Aclose(attribute);
+    return value;
+}

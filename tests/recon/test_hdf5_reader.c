@@ -1,0 +1,291 @@
+// The guarded reader of HDF5: a dataset as ours are is read; whatever lies elsewhere, is packed, is no number or promises what is not there is refused by name.
+#include "recon/hdf5_reader.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include <hdf5.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static Faults faults;
+static char folder[] = "/tmp/seldinger-hdf5-reader-XXXXXX";
+#include "tests/folder.h"
+
+enum { ROWS = 50 };
+static const double numbers[ROWS] = {1, 2, 3};
+
+static hid_t new_file(void)
+{
+    return H5Fcreate(in_folder("a.h5"), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+}
+
+// A dataset of ROWS values, with the numbers unless `data` is NULL; takes `creation`.
+static void put_with(hid_t file, const char *name, hid_t type, hsize_t rows, hid_t creation, const void *data)
+{
+    hid_t space = H5Screate_simple(1, &rows, NULL), set = H5Dcreate2(file, name, type, space, H5P_DEFAULT, creation, H5P_DEFAULT);
+    assert_true(set >= 0);
+    if (data)
+        assert_true(H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0);
+    H5Dclose(set);
+    H5Sclose(space);
+    if (creation != H5P_DEFAULT)
+        H5Pclose(creation);
+}
+static void put_numbers(hid_t file, const char *name, hid_t type) { put_with(file, name, type, ROWS, H5P_DEFAULT, numbers); }
+
+static hid_t chunks(hsize_t rows)
+{
+    hid_t creation = H5Pcreate(H5P_DATASET_CREATE);
+    H5Pset_chunk(creation, 1, &rows);
+    return creation;
+}
+
+static Hdf5Reader *open_file(hid_t file)
+{
+    assert_true(H5Fclose(file) >= 0);
+    faults_clear(&faults);
+    Hdf5Reader *reader = hdf5_reader_open(in_folder("a.h5"), "a test has it", &faults);
+    assert_non_null(reader);
+    return reader;
+}
+
+// Takes the file.
+static void refused(hid_t file, Hdf5Dataset dataset, const char *words)
+{
+    Hdf5Reader *reader = open_file(file);
+    void *values = hdf5_read(reader, &dataset);
+    if (values || faults.count != 1 || !strstr(faults.text[0], words) || !strstr(faults.text[0], dataset.path) || !strstr(faults.text[0], "a.h5: "))
+        fail_msg("expected '%s', got '%s'", words, values ? "values" : faults.text[0]);
+    hdf5_reader_close(reader);
+}
+
+static const Hdf5Dataset plain = {"/x", HDF5_DOUBLE, 1, {0}, false};
+
+static void what_is_plain_is_read(void **state)
+{
+    (void)state;
+    const hid_t stored[] = {H5T_IEEE_F64LE, H5T_IEEE_F64BE, H5T_IEEE_F32LE, H5T_IEEE_F32BE};
+    for (int i = 0; i < 4; i++) {
+        hid_t file = new_file();
+        put_numbers(file, "/x", stored[i]);
+        put_with(file, "/n", i % 2 ? H5T_STD_I16BE : H5T_STD_U64LE, ROWS, chunks(7), numbers);
+        Hdf5Reader *reader = open_file(file);
+        Hdf5Dataset x = {"/x", HDF5_DOUBLE, 1, {ROWS}, true}, n = {"/n", HDF5_INT32, 1, {0}, false};
+        double *values = hdf5_read(reader, &x);
+        int32_t *counts = hdf5_read(reader, &n);
+        assert_non_null(values);
+        assert_non_null(counts);
+        assert_int_equal(n.size[0], ROWS);
+        for (int k = 0; k < ROWS; k++)
+            assert_true(values[k] == numbers[k] && counts[k] == (int)numbers[k]);
+        assert_true(hdf5_has(reader, "/x") && !hdf5_has(reader, "/y") && !hdf5_has(reader, "/x/y"));
+        assert_int_equal(faults.count, 0);
+        free(values);
+        free(counts);
+        hdf5_reader_close(reader);
+    }
+}
+
+static void links_out_are_not_followed(void **state)
+{
+    (void)state;
+    hid_t other = H5Fcreate(in_folder("other.h5"), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+    put_numbers(other, "/x", H5T_IEEE_F64LE);
+    H5Fclose(other);
+    hid_t file = new_file();
+    H5Lcreate_external(in_folder("other.h5"), "/x", file, "/x", H5P_DEFAULT, H5P_DEFAULT);
+    refused(file, plain, "soft or external link");
+    file = new_file();
+    H5Lcreate_external(in_folder("other.h5"), "/", file, "/group", H5P_DEFAULT, H5P_DEFAULT);
+    refused(file, (Hdf5Dataset){"/group/x", HDF5_DOUBLE, 1, {0}, false}, "soft or external link");
+    file = new_file();
+    H5Lcreate_external(in_folder("other.h5"), "/x", file, "/out", H5P_DEFAULT, H5P_DEFAULT);
+    H5Lcreate_soft("/out", file, "/x", H5P_DEFAULT, H5P_DEFAULT);
+    refused(file, plain, "soft or external link");
+    file = new_file();
+    H5Gclose(H5Gcreate2(file, "/x", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+    refused(file, plain, "cannot be opened");
+    refused(new_file(), plain, "lacks the dataset /x; a test has it");
+}
+
+static void data_elsewhere_are_not_read(void **state)
+{
+    (void)state;
+    hid_t file = new_file(), creation = H5Pcreate(H5P_DATASET_CREATE);
+    H5Pset_external(creation, "/etc/passwd", 0, 400);
+    put_with(file, "/x", H5T_IEEE_F64LE, ROWS, creation, NULL);
+    refused(file, plain, "is stored in another file");
+    const hsize_t rows = ROWS;
+    hid_t space = H5Screate_simple(1, &rows, NULL);
+    creation = H5Pcreate(H5P_DATASET_CREATE);
+    H5Pset_virtual(creation, space, in_folder("other.h5"), "/x", space);
+    H5Sclose(space);
+    file = new_file();
+    put_with(file, "/x", H5T_IEEE_F64LE, ROWS, creation, NULL);
+    refused(file, plain, "is put together from other files");
+    creation = H5Pcreate(H5P_DATASET_CREATE);
+    H5Pset_external(creation, "/etc/passwd", 0, 400);
+    hid_t text = H5Tcopy(H5T_C_S1);
+    H5Tset_size(text, 400);
+    file = new_file();
+    put_with(file, "/text", text, 1, creation, NULL);
+    H5Tclose(text);
+    Hdf5Reader *reader = open_file(file);
+    assert_null(hdf5_text(reader, "/text"));
+    assert_true(faults.count == 1 && strstr(faults.text[0], "/text is no text"));
+    hdf5_reader_close(reader);
+}
+
+static size_t pass_filter(unsigned flags, size_t parameter_count, const unsigned parameters[], size_t bytes, size_t *size, void **buffer)
+{
+    (void)flags, (void)parameter_count, (void)parameters, (void)size, (void)buffer;
+    return bytes;
+}
+
+static void what_is_packed_is_refused(void **state)
+{
+    (void)state;
+    static const H5Z_class2_t own = {H5Z_CLASS_T_VERS, 300, 1, 1, "own", NULL, NULL, pass_filter};
+    hid_t file = new_file(), creation = chunks(ROWS);
+    H5Pset_deflate(creation, 6);
+    put_with(file, "/x", H5T_IEEE_F64LE, ROWS, creation, numbers);
+    refused(file, plain, "is packed");
+    creation = chunks(ROWS);
+    assert_true(H5Zregister(&own) >= 0);
+    H5Pset_filter(creation, 300, H5Z_FLAG_OPTIONAL, 0, NULL);
+    file = new_file();
+    put_with(file, "/x", H5T_IEEE_F64LE, ROWS, creation, numbers);
+    refused(file, plain, "is packed");
+    unsigned may_load = 1;
+    H5PLget_loading_state(&may_load);
+    assert_int_equal(may_load, 0);
+}
+
+static void what_is_not_there_is_refused(void **state)
+{
+    (void)state;
+    hid_t file = new_file();
+    put_with(file, "/x", H5T_IEEE_F64LE, (hsize_t)1 << 40, H5P_DEFAULT, NULL);
+    refused(file, plain, "does not have as many bytes");
+    file = new_file();
+    put_with(file, "/x", H5T_IEEE_F64LE, ROWS, chunks(10), NULL);
+    refused(file, plain, "never written");
+    file = new_file();
+    put_with(file, "/x", H5T_IEEE_F64LE, (hsize_t)1 << 30, chunks(1), NULL);
+    refused(file, plain, "more or larger chunks");
+    file = new_file();
+    put_with(file, "/x", H5T_IEEE_F64LE, (hsize_t)1 << 28, chunks((hsize_t)1 << 28), NULL);
+    refused(file, plain, "more or larger chunks");
+    // one dataset under many names takes the file's bytes once
+    file = new_file();
+    put_with(file, "/x", H5T_IEEE_F64LE, ROWS, chunks(ROWS), numbers);
+    H5Lcreate_hard(file, "/x", file, "/y", H5P_DEFAULT, H5P_DEFAULT);
+    Hdf5Reader *reader = open_file(file);
+    int read = 0;
+    for (int i = 0; i < 100 && faults.count == 0; i++) {
+        Hdf5Dataset x = {i % 2 ? "/x" : "/y", HDF5_DOUBLE, 1, {0}, false};
+        read += hdf5_inspect(reader, &x);
+    }
+    struct stat status;
+    assert_int_equal(stat(in_folder("a.h5"), &status), 0);
+    assert_int_equal(read, status.st_size / (off_t)sizeof numbers);
+    hdf5_reader_close(reader);
+}
+
+static void what_is_no_number_is_refused(void **state)
+{
+    (void)state;
+    hid_t odd = H5Tcopy(H5T_IEEE_F64LE), pair = H5Tcreate(H5T_COMPOUND, 16), list = H5Tvlen_create(H5T_IEEE_F64LE);
+    H5Tset_ebias(odd, 7);
+    H5Tinsert(pair, "a", 0, H5T_IEEE_F64LE);
+    const hid_t type[] = {odd, pair, list, H5T_STD_REF_OBJ, H5T_STD_I32LE, H5T_STD_B64LE};
+    for (int i = 0; i < 6; i++) {
+        hid_t file = new_file();
+        put_with(file, "/x", type[i], ROWS, H5P_DEFAULT, NULL);
+        refused(file, plain, "wrong type; valid: IEEE floats");
+    }
+    hid_t file = new_file();
+    put_numbers(file, "/x", H5T_IEEE_F64LE);
+    refused(file, (Hdf5Dataset){"/x", HDF5_INT32, 1, {0}, false}, "wrong type; valid: integers");
+    file = new_file();
+    put_numbers(file, "/x", H5T_IEEE_F64LE);
+    refused(file, (Hdf5Dataset){"/x", HDF5_DOUBLE, 1, {ROWS - 1}, false}, "wrong shape (50); valid: (49)");
+    file = new_file();
+    put_numbers(file, "/x", H5T_IEEE_F64LE);
+    refused(file, (Hdf5Dataset){"/x", HDF5_DOUBLE, 2, {0, 3}, false}, "wrong shape (50); valid: (any, 3)");
+    static const double bad[] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
+    for (int i = 0; i < 3; i++) {
+        double some[ROWS] = {0};
+        some[17] = bad[i];
+        file = new_file();
+        put_with(file, "/x", i ? H5T_IEEE_F32BE : H5T_IEEE_F64LE, ROWS, H5P_DEFAULT, some);
+        refused(file, (Hdf5Dataset){"/x", i ? HDF5_FLOAT : HDF5_DOUBLE, 1, {0}, true}, "in row 17; valid: finite numbers");
+    }
+    H5Tclose(odd);
+    H5Tclose(pair);
+    H5Tclose(list);
+}
+
+// --- attributes ---
+
+static void put_text(hid_t file, const char *name, const char *text, bool is_variable)
+{
+    hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
+    H5Tset_size(type, is_variable ? H5T_VARIABLE : strlen(text));
+    hid_t attribute = H5Acreate2(file, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
+    assert_true(H5Awrite(attribute, type, is_variable ? (const void *)&text : text) >= 0);
+    H5Aclose(attribute);
+    H5Sclose(space);
+    H5Tclose(type);
+}
+
+static void put_number(hid_t file, const char *name, hsize_t count)
+{
+    hid_t space = H5Screate_simple(1, &count, NULL), attribute = H5Acreate2(file, name, H5T_STD_I32BE, space, H5P_DEFAULT, H5P_DEFAULT);
+    assert_true(H5Awrite(attribute, H5T_NATIVE_DOUBLE, numbers + 1) >= 0);
+    H5Aclose(attribute);
+    H5Sclose(space);
+}
+
+static void attributes_are_texts_or_numbers(void **state)
+{
+    (void)state;
+    hid_t file = new_file();
+    put_text(file, "fixed", "unterminated", false);
+    put_text(file, "variable", "of any length", true);
+    put_number(file, "two", 1);
+    put_number(file, "several", 3);
+    Hdf5Reader *reader = open_file(file);
+    char *fixed = hdf5_text_attribute(reader, "/", "fixed"), *variable = hdf5_text_attribute(reader, "/", "variable");
+    assert_string_equal(fixed, "unterminated");
+    assert_string_equal(variable, "of any length");
+    assert_null(hdf5_text_attribute(reader, "/", "none"));
+    assert_null(hdf5_text_attribute(reader, "/none", "none"));
+    assert_true(hdf5_number(reader, "two", 7) == 2 && hdf5_number(reader, "none", 7) == 7);
+    assert_int_equal(faults.count, 0);
+    assert_null(hdf5_text_attribute(reader, "/", "two"));
+    assert_true(hdf5_number(reader, "fixed", 7) == 7 && hdf5_number(reader, "several", 7) == 7);
+    assert_int_equal(faults.count, 3);
+    free(fixed);
+    free(variable);
+    hdf5_reader_close(reader);
+}
+
+int main(void)
+{
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_plain_is_read),        cmocka_unit_test(links_out_are_not_followed), cmocka_unit_test(data_elsewhere_are_not_read),
+        cmocka_unit_test(what_is_packed_is_refused),    cmocka_unit_test(what_is_not_there_is_refused),
+        cmocka_unit_test(what_is_no_number_is_refused), cmocka_unit_test(attributes_are_texts_or_numbers),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
