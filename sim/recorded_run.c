@@ -13,17 +13,20 @@ typedef struct Reader {
     Hdf5Reader *file;
     const char *path;
     Faults *faults;
+    bool is_finite;          // what is read now holds no NaN and no infinity
 } Reader;
 
 // Reads a dataset of `rank` dimensions whose trailing ones are shape[1 …] (0: any, filled in); shape[0] is filled in. NULL with a fault.
 static void *read_dataset(const Reader *reader, const char *name, Hdf5Type type, int rank, uint64_t *shape)
 {
-    Hdf5Dataset dataset = {.path = name, .type = type, .rank = rank};
+    Hdf5Dataset dataset = {.path = name, .type = type, .rank = rank, .is_finite = reader->is_finite};
     memcpy(dataset.size + 1, shape + 1, (size_t)(rank - 1) * sizeof *shape);
     void *values = hdf5_read(reader->file, &dataset);
     memcpy(shape, dataset.size, (size_t)rank * sizeof *shape);
     return values;
 }
+
+#define MOST_TIME_S 1e7      // a hundred days
 
 static int64_t least(int64_t a, uint64_t b) { return (uint64_t)a < b ? a : (int64_t)b; }
 
@@ -216,6 +219,33 @@ static int64_t read_nodes(const Reader *reader, uint64_t nodes, RecordedRun *run
     return INT64_MAX;
 }
 
+static bool are_numbers(const double *value, int64_t count)
+{
+    bool good = true;
+    for (int64_t i = 0; good && i < count; i++)
+        good = isfinite(value[i]);
+    return good;
+}
+
+// Of the nodes that are there; the rows beyond hold NaN.
+static void check_numbers(const Reader *reader, const RecordedRun *run)
+{
+    for (int64_t i = 0; i < run->frame_count; i++) {
+        RecordedFrame at = recorded_run_frame(run, i);
+        bool good = are_numbers(&at.position->x, 3 * at.node_count) && are_numbers(&at.quaternion->w, 4 * at.node_count) && are_numbers(at.s, at.node_count) &&
+                    are_numbers(at.radius, at.node_count);
+        for (int k = 0; good && run->frame_nodes && k < run->tool_count; k++) {
+            RecordedToolFrame own = recorded_run_tool_frame(run, k, i);
+            good = are_numbers(&own.position->x, 3 * own.node_count) && are_numbers(&own.quaternion->w, 4 * own.node_count) && are_numbers(own.s, own.node_count) &&
+                   are_numbers(own.radius, own.node_count);
+        }
+        if (!good) {
+            faults_add(reader->faults, reader->path, 0, 0, "frame %lld has a node that is not a number; valid: finite positions, turns, lengths and radii", (long long)i);
+            return;
+        }
+    }
+}
+
 // What a reader takes for granted: steps that grow, counts and carriers that are there.
 static void check_frames(const Reader *reader, const RecordedRun *run)
 {
@@ -268,15 +298,65 @@ static void read_frames(const Reader *reader, RecordedRun *run)
     while (run->frame_count > 0 && run->frame_step[run->frame_count - 1] >= run->step_count)
         run->frame_count--;
     check_frames(reader, run);
+    if (reader->faults->count == before)
+        check_numbers(reader, run);
 }
 
-static void read_run(const Reader *reader, RecordedRun *run, bool with_frames)
+// Steps of one length, as the simulator makes them: who plays the recording counts rows by time.
+static void check_times(const Reader *reader, const RecordedRun *run)
+{
+    double dt = run->step_ms / 1000;
+    for (int64_t i = 0; i < run->step_count; i++) {
+        double due = (i > 0 ? run->time_s[0] : dt) + (double)i * dt;
+        bool is_due = i > 0 ? fabs(run->time_s[i] - due) < 0.01 * dt : run->time_s[0] > 0 && run->time_s[0] < MOST_TIME_S;
+        if (!is_due) {
+            faults_add(reader->faults, reader->path, 0, 0, "/time_s holds %g s in row %lld; valid: rows %g s apart from %g s on", run->time_s[i], (long long)i, dt,
+                       i > 0 ? run->time_s[0] : dt);
+            return;
+        }
+    }
+}
+
+// What an X-ray system and an injector can be set to: wider than ours can, within what is counted and drawn.
+static void check_xray(const Reader *reader, const RecordedRun *run)
+{
+    static const struct {
+        float least, most;
+    } valid[XRAY_VALUES] = {{0, 1}, {0, 1000}, {-360, 360}, {-360, 360}, {0, 1e4F}, {-1e5F, 1e5F}, {-1e5F, 1e5F}, {-1e5F, 1e5F}, {0, 1}, {0, 1}, {0, 1}, {0, 1},
+                            {0, 1000}, {XRAY_LIVE, XRAY_ROADMAP}, {0, 1e9F}, {0, 1e9F}, {0, TOOLS_MOST}};
+    for (int64_t i = 0; i < run->step_count; i++) {
+        float value[XRAY_VALUES];
+        memcpy(value, &run->xray[i], sizeof value);
+        for (int k = 0; k < XRAY_VALUES; k++)
+            if (!(value[k] >= valid[k].least && value[k] <= valid[k].most)) {
+                faults_add(reader->faults, reader->path, 0, 0, "/xray holds %g in row %lld, column %d; valid: %g to %g", (double)value[k], (long long)i, k,
+                           (double)valid[k].least, (double)valid[k].most);
+                return;
+            }
+    }
+}
+
+static double read_step_ms(const Reader *reader)
+{
+    double step_ms = hdf5_number(reader->file, "step_ms", 1);
+    if (!(step_ms >= 0.001 && step_ms <= 100))
+        faults_add(reader->faults, reader->path, 0, 0, "has steps of %g ms; 0.001 to 100", step_ms);
+    return step_ms;
+}
+
+static void read_run(Reader *reader, RecordedRun *run, bool with_frames)
 {
     int before = reader->faults->count;
+    run->step_ms = read_step_ms(reader);
+    reader->is_finite = true;
     int64_t step_count = read_series(reader, run);
+    reader->is_finite = false;      // frames have NaN where they have no nodes
     if (reader->faults->count > before)
         return;
     run->step_count = step_count;
+    check_times(reader, run);
+    if (run->xray)
+        check_xray(reader, run);
     if (with_frames)
         read_frames(reader, run);
 }
@@ -312,7 +392,6 @@ static void read_scene(const Reader *reader, RecordedRun *run)
     run->files = hdf5_text_attribute(reader->file, "/scene", "files");
     run->sha256 = hdf5_text_attribute(reader->file, "/scene", "sha256");
     run->contact = contact_of(hdf5_text_attribute(reader->file, "/scene", "contact"));
-    run->step_ms = hdf5_number(reader->file, "step_ms", 1);
 }
 
 static RecordedRun *load(const char *path, bool with_frames, Faults *faults)
@@ -323,9 +402,7 @@ static RecordedRun *load(const char *path, bool with_frames, Faults *faults)
     if (run) {
         read_run(&reader, run, with_frames);
         read_scene(&reader, run);
-        if (!(run->step_ms >= 0.001 && run->step_ms <= 100))
-            faults_add(faults, path, 0, 0, "has steps of %g ms; 0.001 to 100", run->step_ms);
-        else if (faults->count == before && !sum_turns(run))
+        if (faults->count == before && !sum_turns(run))
             faults_add(faults, path, 0, 0, "no memory");
     } else if (reader.file) {
         faults_add(faults, path, 0, 0, "no memory");

@@ -396,6 +396,18 @@ static void write_value(hid_t file, const char *name, hid_t type, const hsize_t 
     H5Dclose(set);
 }
 
+static void time_is(hid_t file, int row, double time_s) { write_value(file, "/time_s", H5T_NATIVE_DOUBLE, (const hsize_t[]){(hsize_t)row}, 1, &time_s); }
+static void time_is_nan(hid_t file) { time_is(file, 7, NAN); }
+static void time_is_infinite(hid_t file) { time_is(file, 604, INFINITY); }
+static void time_begins_nowhere(hid_t file) { time_is(file, 0, NAN); }
+static void time_begins_late(hid_t file) { time_is(file, 0, 1e300); }
+static void time_jumps(hid_t file) { time_is(file, 604, 1e300); }
+static void time_goes_back(hid_t file) { time_is(file, 7, 0.004); }
+static void time_stands(hid_t file) { time_is(file, 7, 0.007); }
+static void push_is_nan(hid_t file) { write_value(file, "/command", H5T_NATIVE_DOUBLE, (const hsize_t[]){7, 0}, 2, &(double){NAN}); }
+static void turns_without_end(hid_t file) { write_value(file, "/xray", H5T_NATIVE_DOUBLE, (const hsize_t[]){7, 2}, 2, &(double){1e30}); }
+static void node_is_nowhere(hid_t file) { write_value(file, "/wire/position", H5T_NATIVE_DOUBLE, (const hsize_t[]){3, 1, 2}, 3, &(double){NAN}); }
+static void own_node_is_nowhere(hid_t file) { write_value(file, "/tools/1/quaternion", H5T_NATIVE_DOUBLE, (const hsize_t[]){3, 1, 2}, 3, &(double){INFINITY}); }
 static void lose_tool(hid_t file) { H5Ldelete(file, "/tools/1", H5P_DEFAULT); }
 static void lose_name(hid_t file) { H5Adelete_by_name(file, "/tools/2", "name", H5P_DEFAULT); }
 static void rename_tool(hid_t file)
@@ -532,6 +544,17 @@ static void what_is_broken_is_refused(void **state)
     (void)state;
     char path[256];
     snprintf(path, sizeof path, "%s/tools.h5", folder);
+    expect_refused(path, time_is_nan, "/time_s holds nan in row 7; valid: finite numbers");
+    expect_refused(path, time_is_infinite, "/time_s holds inf in row 604");
+    expect_refused(path, time_begins_nowhere, "/time_s holds nan in row 0");
+    expect_refused(path, time_begins_late, "/time_s holds 1e+300 s in row 0");
+    expect_refused(path, time_jumps, "/time_s holds 1e+300 s in row 604; valid: rows 0.001 s apart from 0.001 s on");
+    expect_refused(path, time_goes_back, "/time_s holds 0.004 s in row 7");
+    expect_refused(path, time_stands, "/time_s holds 0.007 s in row 7");
+    expect_refused(path, push_is_nan, "/command holds nan in row 7");
+    expect_refused(path, turns_without_end, "/xray holds 1e+30 in row 7, column 2; valid: -360 to 360");
+    expect_refused(path, node_is_nowhere, "frame 3 has a node that is not a number");
+    expect_refused(path, own_node_is_nowhere, "frame 3 has a node that is not a number");
     expect_refused(path, lose_tool, "/tools does not hold the groups 0 to 1");
     expect_refused(path, lose_name, "/tools/2 lacks its text attribute 'name'");
     expect_refused(path, rename_tool, "/tools/2 lacks its text attribute 'name'");
