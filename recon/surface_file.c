@@ -392,8 +392,10 @@ static void ply_entry(Growing *g, PlyBody *body, const PlyElement *e, int vertex
     for (int k = 0; k < e->property_count && !g->bad; k++) {
         const PlyProperty *p = &e->property[k];
         double entries = 1;
-        if (p->list_size && (!ply_value(body, p->list_size, false, p->list_signed, &entries) || !(entries >= 0 && entries <= COUNT_MAX)))
+        if (p->list_size && (!ply_value(body, p->list_size, false, p->list_signed, &entries) || !(entries >= 0 && entries <= COUNT_MAX))) {
             ply_fault(g, body, "is cut short, or a list has no count");
+            return;
+        }
         int first = -1, before = -1;
         for (int i = 0; i < (int)entries && !g->bad; i++) {
             if (!ply_value(body, p->size, p->is_float, p->is_signed, &number))
