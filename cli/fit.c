@@ -4,6 +4,7 @@
 #include "cli/junction_sheets.h"
 #include "cli/output.h"
 #include "cli/reach_report.h"
+#include "geom/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/blurred_edge.h"
 #include "recon/field_fit.h"
@@ -193,9 +194,7 @@ static int describe_fit(const FitCommand *command, char *text, size_t room)
 static char *describe(const FitCommand *command, const TreeFileInfo *tree)
 {
     size_t room = 1024 + 4 * (tree->parameters ? strlen(tree->parameters) : 0);
-    char *text = malloc(room);
-    if (!text)
-        return NULL;
+    char *text = HEAP_ZEROED(room, 1);
     int n = describe_fit(command, text, room);
     char *out = text + n;
     bool line_start = true;

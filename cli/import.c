@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "cli/output.h"
+#include "geom/heap.h"
 #include "recon/centreline_file.h"
 #include "recon/import_surface.h"
 #include "recon/mesh_centreline.h"
@@ -318,9 +319,9 @@ static bool import(const ImportCommand *command, Faults *faults)
 
 int verb_import(int argc, char **argv)
 {
-    ImportCommand *command = calloc(1, sizeof *command);
-    Faults *faults = calloc(1, sizeof *faults);
-    int code = command && faults ? parse_options(argc, argv, command) : EXIT_BAD_INPUT;
+    ImportCommand *command = HEAP_ZEROED(1, sizeof *command);
+    Faults *faults = HEAP_ZEROED(1, sizeof *faults);
+    int code = parse_options(argc, argv, command);
     if (code < 0) {
         output_check_file(command->output, faults);
         output_check(command->json, faults);

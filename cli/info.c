@@ -6,6 +6,7 @@
 #include "cli/output.h"
 #include "cli/reach_report.h"
 #include "cli/report.h"
+#include "geom/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/mesh_check.h"
 #include "recon/tree_file.h"
@@ -43,9 +44,9 @@ static void add_vector(cJSON *object, const char *name, Vec3 v)
 // {"least", "median", "largest"} of `count` values.
 static void add_spread(cJSON *object, const char *name, const double *value, int count)
 {
-    double *sorted = count > 0 ? malloc((size_t)count * sizeof *sorted) : NULL;
-    if (!sorted)
+    if (count == 0)
         return;
+    double *sorted = HEAP_ZEROED((size_t)count, sizeof *sorted);
     memcpy(sorted, value, (size_t)count * sizeof *sorted);
     sort_doubles(sorted, (size_t)count);
     cJSON *spread = cJSON_AddObjectToObject(object, name);
@@ -99,9 +100,11 @@ static bool add_reach(cJSON *object, const char *path, const VesselTree *tree, T
 {
     size_t length;
     FILE *out = open_memstream(&wishes->reach, &length);
+    if (!out)
+        heap_is_empty(BUFSIZ, __FILE__);
     bool good = reach_report(tree, path, wishes->tool_radius, out, object, faults);
-    if (out)
-        fclose(out);
+    if (fclose(out) != 0)
+        heap_is_empty(length, __FILE__);
     return good;
 }
 
@@ -112,12 +115,12 @@ static bool describe_tree(cJSON *object, const char *path, TreeWishes *wishes, F
     if (!tree)
         return false;
     bool model = vessel_tree_is_model(tree);
-    int *children = calloc((size_t)tree->node_count, sizeof *children), branches = 1, ends = 0, aneurysm = 0;
+    int *children = HEAP_ZEROED((size_t)tree->node_count, sizeof *children), branches = 1, ends = 0, aneurysm = 0;
     for (int i = 1; i < tree->node_count; i++)
-        if (children && children[tree->parent[i]]++ > 0)
+        if (children[tree->parent[i]]++ > 0)
             branches++;
     for (int i = 0; i < tree->node_count; i++) {
-        ends += children && children[i] == 0;
+        ends += children[i] == 0;
         aneurysm += tree->kind[i] == NODE_ANEURYSM;
     }
     free(children);

@@ -1,6 +1,9 @@
 // seldinger: the table of verbs and what the verbs share.
 #include "cli/cli.h"
 
+#include "geom/heap.h"
+
+#include <cjson/cJSON.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
@@ -58,8 +61,12 @@ static void install_stop(int number)
         sigaction(number, &(struct sigaction){.sa_handler = stop, .sa_flags = (int)SA_RESETHAND}, NULL);
 }
 
+// The library's JSON is otherwise silently without what it had no memory for.
+static void *json_memory(size_t bytes) { return HEAP_ZEROED(bytes, 1); }
+
 int main(int argc, char **argv)
 {
+    cJSON_InitHooks(&(cJSON_Hooks){.malloc_fn = json_memory, .free_fn = free});
     install_stop(SIGINT);
     install_stop(SIGTERM);
     // a file-size limit is then a failed write with a message, and no part of a file is left

@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "cli/output.h"
+#include "geom/heap.h"
 #include "recon/blurred_edge.h"
 #include "recon/rbt_track.h"
 #include "recon/trace.h"
@@ -128,9 +129,7 @@ static char *help_text(void)
     enum { LINE = 260 };
     RbtParameters ours = rbt_default_parameters(), paper = rbt_paper_parameters();
     size_t capacity = sizeof intro + LINE * (size_t)(rbt_parameter_count + 2);
-    char *text = malloc(capacity);
-    if (!text)
-        return NULL;
+    char *text = HEAP_ZEROED(capacity, 1);
     size_t used = (size_t)snprintf(text, capacity, "%s", intro);
     for (int i = 0; i < rbt_parameter_count; i++) {
         const RbtParameterName *p = &rbt_parameter_table[i];
@@ -249,14 +248,12 @@ static char *parameters_text(const RbtParameters *parameters, const RbtReport *r
 {
     enum { LINE = 120 };
     char *text = rbt_parameters_text(parameters, volume_voxel_size(volume));
-    size_t used = text ? strlen(text) : 0, capacity = used + LINE * ((size_t)report->branch_count + 3);
+    size_t used = strlen(text), capacity = used + LINE * ((size_t)report->branch_count + 3);
     for (int i = 0; i < tree->node_count; i++)
         capacity += tree->kind[i] == NODE_ANEURYSM ? LINE : 0;
-    char *longer = text ? realloc(text, capacity) : NULL;
-    if (!longer) {
-        free(text);
-        return NULL;
-    }
+    char *longer = realloc(text, capacity);
+    if (!longer)
+        heap_is_empty(capacity, __FILE__);
     used += (size_t)snprintf(longer + used, capacity - used, "edge_blur_mm: %.4f\n", edge_blur(parameters, volume, report->check.smoothing_mm, tree));
     const char *head = "aneurysms_found:\n";
     for (int i = 0; i < report->branch_count; i++) {
@@ -457,14 +454,9 @@ static int segment(const SegmentArguments *a, Faults *faults)
     if (good) {
         double track_s = seconds() - start - load_s;
         char created_by[] = "seldinger " SELDINGER_VERSION " segment", *text = parameters_text(&trace->parameters, &report, volume, tree);
-        size_t length = strlen(a->volume);
-        char *source = malloc(length + 1);
-        good = source && text;
-        if (good) {
-            memcpy(source, a->volume, length + 1);
-            TreeFileInfo info = {.source = source, .parameters = text, .created_by = created_by};
-            good = tree_file_save(tree, &info, a->out, faults);
-        }
+        char *source = HEAP_TEXT(a->volume);
+        TreeFileInfo info = {.source = source, .parameters = text, .created_by = created_by};
+        good = tree_file_save(tree, &info, a->out, faults);
         free(source);
         free(text);
         good = good && (!a->json || write_json(a, tree, &report, load_s, track_s, faults));
@@ -487,13 +479,11 @@ int verb_segment(int argc, char **argv)
     SegmentArguments a = {.seed = -1};
     char *help = help_text();
     struct argp argp = {options, parse_option, "VOLUME --trace F.yaml -o TREE.h5\nVOLUME --start X,Y,Z -o TREE.h5", help, NULL, NULL, NULL};
-    Faults *faults = calloc(1, sizeof *faults);
+    Faults *faults = HEAP_ZEROED(1, sizeof *faults);
     int code = EXIT_BAD_INPUT;
     argp_err_exit_status = EXIT_BAD_INPUT;
     setenv("ARGP_HELP_FMT", "rmargin=160", 0);   // lines of YAML stay whole
-    if (!faults)
-        fprintf(stderr, "out of memory\n");
-    else if (argp_parse(&argp, argc, argv, 0, NULL, &a) == 0)
+    if (argp_parse(&argp, argc, argv, 0, NULL, &a) == 0)
         code = segment(&a, faults);
     free(faults);
     free(help);

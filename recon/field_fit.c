@@ -1,6 +1,7 @@
 #include "recon/field_fit.h"
 
 #include "geom/blobby.h"
+#include "geom/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/field_refine.h"
 
@@ -193,14 +194,14 @@ static void measure_error(void *context, long index)
 {
     VesselTree *tree = context;
     int64_t first = tree->point_offset[index], count = tree->point_offset[index + 1] - first;
-    double *distance = malloc(((size_t)count + 1) * sizeof *distance);
+    double *distance = HEAP_ZEROED((size_t)count, sizeof *distance);
     Blobby model = blobby_of(tree, (int)index);
-    for (int64_t i = 0; i < count && distance; i++) {
+    for (int64_t i = 0; i < count; i++) {
         Vec3 g;
         double f = blobby_gradient(&model, tree->point[first + i], &g);
         distance[i] = fmin(fabs(f) / fmax(vec3_norm(g), 0.5 / tree->radius[index]), 10 * tree->radius[index]);
     }
-    if (distance && count > 0) {
+    if (count > 0) {
         sort_doubles(distance, (size_t)count);
         tree->error[index] = distance[(int64_t)(0.9 * (double)(count - 1) + 0.5)];
     }

@@ -6,6 +6,7 @@
 // spheres shrink, it is that of the last sphere that reaches the end.
 #include "recon/import_surface.h"
 
+#include "geom/heap.h"
 #include "recon/import_ostia.h"
 #include "recon/mesh_tree.h"
 #include "recon/parallel.h"
@@ -558,11 +559,11 @@ static void describe_ends(const VesselTree *tree, const Skeleton *skeleton, Impo
     report->root_is_open = vessel_tree_root_is_open(tree);
     for (int i = 0; i < skeleton->count; i++)
         report->open_end_count += skeleton->is_open_end[i];
-    int *children = calloc((size_t)tree->node_count, sizeof *children);
-    for (int i = 1; children && i < tree->node_count; i++)
+    int *children = HEAP_ZEROED((size_t)tree->node_count, sizeof *children);
+    for (int i = 1; i < tree->node_count; i++)
         children[tree->parent[i]]++;
     report->branch_count = 1;
-    for (int i = 0; children && i < tree->node_count; i++)
+    for (int i = 0; i < tree->node_count; i++)
         report->branch_count += children[i] > 1 ? children[i] : 0;
     free(children);
 }

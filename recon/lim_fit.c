@@ -13,6 +13,7 @@
 #include "recon/lim_fit.h"
 
 #include "geom/blobby.h"
+#include "geom/heap.h"
 #include "geom/power_walk.h"
 #include "geom/sort_doubles.h"
 #include "recon/lim_agree.h"
@@ -392,11 +393,9 @@ static double node_error(const VesselTree *tree, int node, const Gather *gather,
     int64_t first = tree->point_offset[node], own = tree->point_offset[node + 1] - first;
     const Vec3 *point = own > 0 ? tree->point + first : gather->point;
     int64_t count = own > 0 ? own : gather->point_count;
-    double *distance = malloc((size_t)(count + 1) * sizeof *distance);
-    if (!distance || count == 0) {
-        free(distance);
+    if (count == 0)
         return 0;
-    }
+    double *distance = HEAP_ZEROED((size_t)count, sizeof *distance);
     Blobby blobby = {.count = model->count, .center = model->center, .width = model->width, .iso_level = iso_level};
     for (int64_t i = 0; i < count; i++) {
         Vec3 g;
@@ -544,8 +543,10 @@ static void fit_node(void *context, long index)
     }
     model->failed = !good;
     if (good) {
-        model->center = realloc(center, (size_t)model->count * sizeof *center);
-        model->width = realloc(width, (size_t)model->count * sizeof *width);
+        Vec3 *less_center = realloc(center, (size_t)model->count * sizeof *center);
+        double *less_width = realloc(width, (size_t)model->count * sizeof *width);
+        model->center = less_center ? less_center : center;
+        model->width = less_width ? less_width : width;
         model->error = node_error(tree, node, gather, model, options.iso_level);
     } else {
         free(center);

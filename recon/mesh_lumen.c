@@ -3,6 +3,7 @@
 #include "recon/mesh_lumen.h"
 
 #include "geom/disjoint_sets.h"
+#include "geom/heap.h"
 #include "recon/mesh_edges.h"
 #include "recon/parallel.h"
 
@@ -94,9 +95,9 @@ static int compare_probes(const void *a, const void *b)
 static double smallest_radius(const SurfaceMesh *mesh, const MeshTree *tree, double size)
 {
     int stride = mesh->triangle_count / PROBES + 1, count = 0;
-    Probe *probe = malloc(((size_t)mesh->triangle_count / (size_t)stride + 1) * sizeof *probe);
+    Probe *probe = HEAP_ZEROED((size_t)mesh->triangle_count / (size_t)stride + 1, sizeof *probe);
     double all = 0, sum = 0;
-    for (int t = 0; probe && t < mesh->triangle_count; t += stride) {
+    for (int t = 0; t < mesh->triangle_count; t += stride) {
         Vec3 a = mesh->vertex[mesh->triangle[t][0]], b = mesh->vertex[mesh->triangle[t][1]], c = mesh->vertex[mesh->triangle[t][2]];
         Vec3 area = vec3_scale(vec3_cross(vec3_sub(b, a), vec3_sub(c, a)), 0.5), n = vec3_negate(vec3_unit(area));
         Vec3 from = vec3_add_scaled(vec3_scale(vec3_add(a, vec3_add(b, c)), 1.0 / 3), 1e-6 * size, n);

@@ -1,6 +1,8 @@
 // The parameters of the tracking: defaults, the paper's values, and the table that trace files and --help read.
 #include "recon/rbt_track.h"
 
+#include "geom/heap.h"
+
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -80,9 +82,7 @@ const int rbt_parameter_count = sizeof rbt_parameter_table / sizeof rbt_paramete
 char *rbt_parameters_text(const RbtParameters *parameters, double voxel_mm)
 {
     size_t capacity = 64 * (size_t)(rbt_parameter_count + RBT_MAX_RETRIES + 1), used = 0;
-    char *text = malloc(capacity);
-    if (!text)
-        return NULL;
+    char *text = HEAP_ZEROED(capacity, 1);
     used += (size_t)snprintf(text, capacity, "voxel_mm: %.17g\n", voxel_mm);
     for (int i = 0; i < rbt_parameter_count; i++) {
         double value = *(const double *)(const void *)((const char *)parameters + rbt_parameter_table[i].offset);

@@ -1,6 +1,7 @@
 // YAML by libyaml's document interface: it keeps the line and column of every node, and this walker refuses what it lets pass (keys given twice,
 // unknown keys, several documents).
 #include "recon/trace.h"
+#include "geom/heap.h"
 #include "recon/cast_rays.h"
 #include "recon/whole_file.h"
 
@@ -168,11 +169,7 @@ static void read_list(const Walk *w, const yaml_node_t *list, bool is_branches, 
         return;
     }
     int n = item_count(list);
-    void *memory = calloc((size_t)(n > 0 ? n : 1), is_branches ? sizeof *trace->branch : sizeof *trace->aneurysm);
-    if (!memory) {
-        FAULT(w, list, "out of memory");
-        return;
-    }
+    void *memory = HEAP_ZEROED((size_t)n, is_branches ? sizeof *trace->branch : sizeof *trace->aneurysm);
     if (is_branches) {
         trace->branch = memory;
         trace->branch_count = n;

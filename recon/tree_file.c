@@ -3,6 +3,7 @@
 // Metadata are written in the 1.8 format, whose checksums make the library refuse damaged headers.
 #include "recon/tree_file.h"
 
+#include "geom/heap.h"
 #include "recon/hdf5_reader.h"
 #include "recon/whole_file.h"
 
@@ -52,7 +53,7 @@ static bool expect_rows(const Reader *reader, const Hdf5Dataset *column, uint64_
 static char *read_text(const Reader *reader, const char *key)
 {
     char *text = hdf5_text_attribute(reader->file, "/", key);
-    return text ? text : strdup("");
+    return text ? text : HEAP_TEXT("");
 }
 
 enum { KERNEL_CAUCHY, KERNEL_COMPACT, KERNELS };

@@ -1,0 +1,35 @@
+#include "geom/heap.h"
+
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+// Other threads may be at work: nothing that they use is taken down.
+void heap_is_empty(size_t bytes, const char *file)
+{
+    const char *folder = strrchr(file, '/'), *from = folder;
+    while (from && from > file && from[-1] != '/')      // with the folder that it is in: "recon/field_fit.c"
+        from--;
+    char message[200];
+    int length = snprintf(message, sizeof message, "seldinger: out of memory (asked for %zu bytes in %.100s); free some, or give it less to do\n", bytes,
+                          from ? from : file);
+    ssize_t said = write(STDERR_FILENO, message, (size_t)length);
+    (void)said;
+    _exit(2);
+}
+
+void *heap_zeroed(size_t count, size_t size, const char *file)
+{
+    void *memory = calloc(count > 0 ? count : 1, size > 0 ? size : 1);
+    if (!memory)
+        heap_is_empty(size > 0 && count > SIZE_MAX / size ? SIZE_MAX : count * size, file);
+    return memory;
+}
+
+char *heap_text(const char *text, const char *file)
+{
+    size_t bytes = strlen(text) + 1;
+    return memcpy(heap_zeroed(bytes, 1, file), text, bytes);
+}

@@ -1,0 +1,17 @@
+// Memory without which a computation cannot go on, for offline work deep in loops and callbacks that have no way to say that it lacks: a program that cannot have it
+// ends there, with one message and exit code 2, instead of going on with less. Not for a simulation's step, nor where a file is being written: those return faults.
+#ifndef SELDINGER_GEOM_HEAP_H
+#define SELDINGER_GEOM_HEAP_H
+
+#include <stddef.h>
+
+// `count` values of `size` bytes, all zero; never NULL, also for none. `file` stands in the message. The caller frees.
+void *heap_zeroed(size_t count, size_t size, const char *file);
+#define HEAP_ZEROED(count, size) heap_zeroed(count, size, __FILE__)
+// A copy of a text.
+char *heap_text(const char *text, const char *file);
+#define HEAP_TEXT(text) heap_text(text, __FILE__)
+// What cannot be had: says so and ends the program.
+_Noreturn void heap_is_empty(size_t bytes, const char *file);
+
+#endif

@@ -1,0 +1,61 @@
+// What cannot be had ends the program, once and in one message.
+#include "geom/heap.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+// What a process says that asks for so much; its exit code.
+static int ask(size_t count, size_t size, char said[500])
+{
+    int ends[2], status;
+    assert_int_equal(pipe(ends), 0);
+    pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        dup2(ends[1], STDERR_FILENO);
+        char *memory = heap_zeroed(count, size, "/somewhere/recon/field_fit.c");
+        _exit(memory && memory[0] == 0 ? 0 : 1);
+    }
+    close(ends[1]);
+    ssize_t length = read(ends[0], said, 499);
+    said[length > 0 ? length : 0] = '\0';
+    close(ends[0]);
+    assert_int_equal(waitpid(child, &status, 0), child);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+static void what_cannot_be_had_ends_the_program(void **state)
+{
+    (void)state;
+    char said[500];
+    assert_int_equal(ask((size_t)1 << 60, 1, said), 2);
+    assert_string_equal(said, "seldinger: out of memory (asked for 1152921504606846976 bytes in recon/field_fit.c); free some, or give it less to do\n");
+    assert_int_equal(ask(SIZE_MAX / 4, 24, said), 2);     // more than a size can say
+    assert_non_null(strstr(said, "asked for 18446744073709551615 bytes"));
+    assert_int_equal(ask(100, 24, said), 0);
+    assert_int_equal(ask(0, 0, said), 0);
+    assert_string_equal(said, "");
+}
+
+static void a_text_is_copied(void **state)
+{
+    (void)state;
+    char *copy = HEAP_TEXT("a text");
+    assert_string_equal(copy, "a text");
+    free(copy);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(what_cannot_be_had_ends_the_program), cmocka_unit_test(a_text_is_copied)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
