@@ -1,18 +1,24 @@
 // The rules stand in the header. What of the library is relied upon: creation lists, links and types are read without reading data or opening files.
 #include "recon/hdf5_reader.h"
 
+#include "geom/heap.h"
+#include "recon/hdf5_source.h"
+
+#include <fcntl.h>
 #include <hdf5.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 struct Hdf5Reader {
+    Hdf5Source source;
     hid_t file;
     const char *name, *needs;
     Faults *faults;
-    hsize_t length, left;    // [bytes] of the file, and of it what no dataset has taken yet
+    hsize_t left;            // [bytes] of the file that no dataset has taken yet
     H5E_auto2_t handler;     // of the library's own messages, as it was
     void *handler_data;
 };
@@ -21,35 +27,26 @@ enum { MOST_PATH = 256 };
 
 // --- opening ---
 
+// The library's closing at exit, which writes nothing of what was read, stumbles over what it leaves of a damaged file ("infinite loop closing library").
 static void be_silent(Hdf5Reader *reader)
 {
+    H5dont_atexit();      // where it is not in use yet
     H5Eget_auto2(H5E_DEFAULT, &reader->handler, &reader->handler_data);
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
 }
 
-static Hdf5Reader *make_reader(const char *name, const char *needs, size_t length, Faults *faults)
+// Takes the source's file.
+static Hdf5Reader *open_source(const Hdf5Source *source, const char *name, const char *needs, Faults *faults)
 {
-    Hdf5Reader *reader = malloc(sizeof *reader);
-    if (!reader) {
-        faults_add(faults, name, 0, 0, "cannot be read: not enough memory");
-        return NULL;
-    }
-    *reader = (Hdf5Reader){.file = -1, .name = name, .needs = needs, .faults = faults, .length = length};
-    reader->left = length < HDF5_READER_MOST_BYTES ? length : HDF5_READER_MOST_BYTES;
+    Hdf5Reader *reader = HEAP_ZEROED(1, sizeof *reader);
+    *reader = (Hdf5Reader){.source = *source, .file = -1, .name = name, .needs = needs, .faults = faults,
+                           .left = source->length < HDF5_READER_MOST_BYTES ? source->length : HDF5_READER_MOST_BYTES};
     be_silent(reader);
     H5PLset_loading_state(0);
-    return reader;
-}
-
-// Takes `access`.
-static Hdf5Reader *open_with(Hdf5Reader *reader, const char *path, hid_t access)
-{
-    reader->file = access >= 0 ? H5Fopen(path, H5F_ACC_RDONLY, access) : -1;
-    if (access >= 0)
-        H5Pclose(access);
+    reader->file = hdf5_source_open(source);
     if (reader->file >= 0)
         return reader;
-    faults_add_at_byte(reader->faults, reader->name, 0, "is not a readable HDF5 file (cut off, damaged or of another kind); %s", reader->needs);
+    faults_add_at_byte(faults, name, 0, "is not a readable HDF5 file (cut off, damaged or of another kind); %s", needs);
     hdf5_reader_close(reader);
     return NULL;
 }
@@ -57,27 +54,19 @@ static Hdf5Reader *open_with(Hdf5Reader *reader, const char *path, hid_t access)
 Hdf5Reader *hdf5_reader_open(const char *path, const char *needs, Faults *faults)
 {
     struct stat status;
-    if (stat(path, &status) != 0 || !S_ISREG(status.st_mode)) {
+    int file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);     // not to wait for a pipe's other end
+    if (file < 0 || fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
         faults_add(faults, path, 0, 0, "cannot be opened as a regular file; %s", needs);
+        if (file >= 0)
+            close(file);
         return NULL;
     }
-    Hdf5Reader *reader = make_reader(path, needs, (size_t)status.st_size, faults);
-    hid_t access = reader ? H5Pcreate(H5P_FILE_ACCESS) : -1;
-    if (access >= 0)
-        H5Pset_file_locking(access, false, true);   // a recording is read while it is written
-    return reader ? open_with(reader, path, access) : NULL;
+    return open_source(&(Hdf5Source){.file = file, .length = (size_t)status.st_size}, path, needs, faults);
 }
 
 Hdf5Reader *hdf5_reader_parse(const void *bytes, size_t length, const char *name, const char *needs, Faults *faults)
 {
-    Hdf5Reader *reader = make_reader(name, needs, length, faults);
-    hid_t access = reader && length > 0 ? H5Pcreate(H5P_FILE_ACCESS) : -1;
-    // the library copies the image and never writes to it: the cast is its missing const
-    if (access >= 0 && (H5Pset_fapl_core(access, 1 << 16, 0) < 0 || H5Pset_file_image(access, (void *)(uintptr_t)bytes, length) < 0)) {
-        H5Pclose(access);
-        access = -1;
-    }
-    return reader ? open_with(reader, "/dev/null/image", access) : NULL;   // the library refuses an image whose name is that of a file
+    return open_source(&(Hdf5Source){.file = -1, .bytes = bytes, .length = length}, name, needs, faults);
 }
 
 void hdf5_reader_close(Hdf5Reader *reader)
@@ -86,6 +75,8 @@ void hdf5_reader_close(Hdf5Reader *reader)
         return;
     if (reader->file >= 0)
         H5Fclose(reader->file);
+    if (reader->source.file >= 0)
+        close(reader->source.file);
     H5Eset_auto2(H5E_DEFAULT, reader->handler, reader->handler_data);
     free(reader);
 }
@@ -213,7 +204,7 @@ static uint64_t value_count(const Hdf5Dataset *dataset)
 
 static bool lies_in_file(const Hdf5Reader *reader, haddr_t address, hsize_t bytes)
 {
-    return address != HADDR_UNDEF && bytes <= reader->length && address <= reader->length - bytes;
+    return address != HADDR_UNDEF && bytes <= reader->source.length && address <= reader->source.length - bytes;
 }
 
 // Each chunk is there with all its bytes: the library takes as many as the index says, and reads as many as the shape says. NULL, or what is wrong.
@@ -359,7 +350,7 @@ static bool is_one_text(hid_t type, hid_t space)
 static char *fixed_text(const Hdf5Reader *reader, hid_t type, hid_t set, hid_t attribute)
 {
     size_t size = H5Tget_size(type);
-    char *text = size <= reader->length ? calloc(size + 1, 1) : NULL;
+    char *text = size <= reader->source.length ? HEAP_ZEROED(size + 1, 1) : NULL;
     if (text && (set >= 0 ? H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text) : H5Aread(attribute, type, text)) >= 0)
         return text;
     free(text);
@@ -372,7 +363,7 @@ static char *variable_text(hid_t type, hid_t space, hid_t attribute)
     char *held = NULL, *text = NULL;
     if (H5Aread(attribute, type, &held) < 0)
         return NULL;
-    text = strdup(held ? held : "");
+    text = HEAP_TEXT(held ? held : "");
     H5Dvlen_reclaim(type, space, H5P_DEFAULT, &held);
     return text;
 }

@@ -31,7 +31,7 @@ typedef struct Hdf5Dataset {
 
 // NULL with a fault. `needs` ends the message on a dataset that lacks: "a recording has it". Both it and `path` are kept, not copied.
 Hdf5Reader *hdf5_reader_open(const char *path, const char *needs, Faults *faults);
-// The same from memory, which is copied; `name` stands in the messages.
+// The same from memory, which must stay until the reader is closed; `name` stands in the messages.
 Hdf5Reader *hdf5_reader_parse(const void *bytes, size_t length, const char *name, const char *needs, Faults *faults);
 // Also where it is NULL.
 void hdf5_reader_close(Hdf5Reader *reader);
