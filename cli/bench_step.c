@@ -9,6 +9,7 @@
 #include "cli/bench_tools.h"
 
 #include "cli/output.h"
+#include "geom/heap.h"
 #include "geom/simd.h"
 #include "solver/block_chain.h"
 
@@ -215,9 +216,9 @@ static void call_factor_solve(void *context)
 static double time_factor_solve(void)
 {
     enum { NODES = 201 };
-    ChainSystem s = {.factor = block_factor_create(NODES, 6), .b = calloc(12 * NODES, sizeof(double))};
+    ChainSystem s = {.factor = block_factor_create(NODES, 6), .b = HEAP_ZEROED(12 * NODES, sizeof(double))};
     double time = 0;
-    if (block_chain_create(&s.chain, NODES, 6) && s.factor && s.b) {
+    if (block_chain_create(&s.chain, NODES, 6) && s.factor) {
         s.x = s.b + 6 * NODES;
         for (int i = 0; i < NODES; i++)
             for (int k = 0; k < 36; k++) {
@@ -262,29 +263,27 @@ void bench_detection(const Scene *scene, const Vessel *vessel, int64_t step, dou
     if (!simulator)
         return;
     int nodes = simulator_state(simulator)->node_count, cursor = 0;
-    NodeReport *node = calloc((size_t)nodes, sizeof *node);
-    Vec3 *before = calloc((size_t)nodes, sizeof *before);
-    double *gap = calloc((size_t)nodes, sizeof *gap);
+    NodeReport *node = HEAP_ZEROED((size_t)nodes, sizeof *node);
+    Vec3 *before = HEAP_ZEROED((size_t)nodes, sizeof *before);
+    double *gap = HEAP_ZEROED((size_t)nodes, sizeof *gap);
     Detection d = {.vessel = vessel, .reach = 1};   // what a step at this speed asks for
-    if (node && before && gap) {
-        for (int64_t i = 0; i <= step; i++) {
-            memcpy(before, simulator_state(simulator)->position, (size_t)nodes * sizeof *before);
-            simulator_step(simulator, bench_command(scene, i, &cursor));
-        }
-        stepper_node_report(simulator_stepper(simulator), node);
-        for (int i = 0; i < nodes; i++)
-            gap[i] = node[i].gap;
-        qsort(gap, (size_t)nodes, sizeof *gap, ascending);
-        double limit = fmin(gap[nodes < POINTS ? nodes - 1 : POINTS - 1], d.reach);
-        for (int i = 0; i < nodes && d.count < POINTS; i++)
-            if (node[i].gap <= limit && node[i].vessel_node >= 0) {
-                d.memory[d.count] = (VesselMemory){.node = node[i].vessel_node};
-                d.point[0][d.count] = before[i];
-                d.point[1][d.count++] = simulator_state(simulator)->position[i];
-            }
-        *points = d.count;
-        *detection = time_of(call_query, &d);
+    for (int64_t i = 0; i <= step; i++) {
+        memcpy(before, simulator_state(simulator)->position, (size_t)nodes * sizeof *before);
+        simulator_step(simulator, bench_command(scene, i, &cursor));
     }
+    stepper_node_report(simulator_stepper(simulator), node);
+    for (int i = 0; i < nodes; i++)
+        gap[i] = node[i].gap;
+    qsort(gap, (size_t)nodes, sizeof *gap, ascending);
+    double limit = fmin(gap[nodes < POINTS ? nodes - 1 : POINTS - 1], d.reach);
+    for (int i = 0; i < nodes && d.count < POINTS; i++)
+        if (node[i].gap <= limit && node[i].vessel_node >= 0) {
+            d.memory[d.count] = (VesselMemory){.node = node[i].vessel_node};
+            d.point[0][d.count] = before[i];
+            d.point[1][d.count++] = simulator_state(simulator)->position[i];
+        }
+    *points = d.count;
+    *detection = time_of(call_query, &d);
     free(gap);
     free(before);
     free(node);

@@ -4,6 +4,7 @@
 #include "cli/wall_bench.h"
 
 #include "cli/output.h"
+#include "geom/heap.h"
 #include "geom/simd.h"
 #include "recon/model_measure.h"
 #include "recon/tree_file.h"
@@ -77,10 +78,7 @@ void wall_add(WallTable *table, const char *what, double value, const char *unit
 {
     if (table->count == table->capacity) {
         int capacity = 2 * table->capacity + 64;
-        WallLine *more = realloc(table->line, (size_t)capacity * sizeof *more);
-        if (!more)
-            return;
-        table->line = more;
+        table->line = HEAP_GROWN(table->line, (size_t)capacity, sizeof *table->line);
         table->capacity = capacity;
     }
     WallLine *line = &table->line[table->count++];

@@ -3,6 +3,7 @@
 #include "cli/check_verify.h"
 
 #include "cli/output.h"
+#include "geom/heap.h"
 #include "input/text_file.h"
 #include "sim/compare.h"
 #include "sim/drive.h"
@@ -83,11 +84,9 @@ static void find_scenes(const char *folder, int depth, SceneList *list)
     for (struct dirent *entry; open && (entry = readdir(open));) {
         struct stat status;
         size_t room = strlen(folder) + strlen(entry->d_name) + 2;
-        char *path = malloc(room);
-        if (!path || entry->d_name[0] == '.') {
-            free(path);
+        if (entry->d_name[0] == '.')
             continue;
-        }
+        char *path = HEAP_ZEROED(room, 1);
         bool slash = ends_with(folder, "/");
         snprintf(path, room, "%s%s%s", folder, slash ? "" : "/", entry->d_name);
         if (lstat(path, &status) == 0 && S_ISDIR(status.st_mode))

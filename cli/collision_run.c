@@ -1,5 +1,6 @@
 #include "cli/collision_run.h"
 
+#include "geom/heap.h"
 #include "geom/sort_doubles.h"
 
 #include <stdlib.h>
@@ -477,11 +478,9 @@ PushFigures collision_push(const double *push_n, int64_t steps, const double *re
 {
     PushFigures out = {0};
     int64_t common = steps < reference_steps ? steps : reference_steps;
-    double *change = calloc((size_t)common + 1, sizeof *change), square = 0;
-    if (common < 2 || !change) {
-        free(change);
+    if (common < 2)
         return out;
-    }
+    double *change = HEAP_ZEROED((size_t)common, sizeof *change), square = 0;
     for (int64_t i = 0; i < common; i++) {
         out.mean_n += push_n[i] / (double)common;
         out.reference_n += reference_n[i] / (double)common;

@@ -3,6 +3,7 @@
 
 #include "cli/file_kind.h"
 #include "cli/output.h"
+#include "geom/heap.h"
 #include "geom/surface_parts.h"
 #include "recon/tree_file.h"
 #include "sim/recording.h"
@@ -63,6 +64,13 @@ static bool text_write(Text *text, const char *path, Faults *faults)
     whole = whole && output_write(path, text->bytes, text->length, faults);
     free(text->bytes);
     return whole;
+}
+
+static bool text_forget(Text *text)
+{
+    fclose(text->stream);
+    free(text->bytes);
+    return false;
 }
 
 // --- surfaces ---
@@ -327,16 +335,15 @@ static bool export_surface(const ExportOptions *options, const char *extension, 
 
 // The branches of a tree: a branch is a chain from a child of a fork (or the root) to the next fork or end; it begins with the fork's node, so
 // that lines join. Calls `branch(context, nodes, count)` for each.
-static bool each_branch(const VesselTree *tree, void (*branch)(void *context, const int *node, int count), void *context)
+static void each_branch(const VesselTree *tree, void (*branch)(void *context, const int *node, int count), void *context)
 {
-    int *children = calloc((size_t)tree->node_count, sizeof *children), *only = calloc((size_t)tree->node_count, sizeof *only),
-        *chain = calloc((size_t)tree->node_count + 1, sizeof *chain);
-    bool good = children && only && chain;
-    for (int i = 1; good && i < tree->node_count; i++) {
+    size_t nodes = (size_t)tree->node_count;
+    int *children = HEAP_ZEROED(nodes, sizeof *children), *only = HEAP_ZEROED(nodes, sizeof *only), *chain = HEAP_ZEROED(nodes + 1, sizeof *chain);
+    for (int i = 1; i < tree->node_count; i++) {
         children[tree->parent[i]]++;
         only[tree->parent[i]] = i;
     }
-    for (int i = 0; good && i < tree->node_count; i++) {
+    for (int i = 0; i < tree->node_count; i++) {
         int parent = tree->parent[i], count = 0;
         if (parent >= 0 && children[parent] == 1)
             continue;
@@ -352,7 +359,6 @@ static bool each_branch(const VesselTree *tree, void (*branch)(void *context, co
     free(children);
     free(only);
     free(chain);
-    return good;
 }
 
 typedef struct Lines {
@@ -376,7 +382,8 @@ static bool print_centreline_vtp(FILE *out, const VesselTree *tree)
     Text connectivity, offsets;
     bool first = text_open(&connectivity), second = text_open(&offsets), good = first && second;
     Lines lines = {.connectivity = connectivity.stream, .offsets = offsets.stream};
-    good = good && each_branch(tree, add_line, &lines);
+    if (good)
+        each_branch(tree, add_line, &lines);
     good &= !first || fclose(connectivity.stream) == 0;
     good &= !second || fclose(offsets.stream) == 0;
     if (good) {
@@ -466,8 +473,9 @@ static bool print_markups(FILE *out, const VesselTree *tree, const char *frame)
     cJSON_AddStringToObject(root, "@schema",
                             "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/Resources/Schema/markups-schema-v1.0.3.json#");
     Curves curves = {.tree = tree, .frame = frame, .list = cJSON_AddArrayToObject(root, "markups")};
-    bool good = curves.list && each_branch(tree, add_curve, &curves);
-    char *text = good ? cJSON_Print(root) : NULL;
+    if (curves.list)
+        each_branch(tree, add_curve, &curves);
+    char *text = curves.list ? cJSON_Print(root) : NULL;
     if (text)
         fprintf(out, "%s\n", text);
     free(text);
@@ -487,7 +495,7 @@ static bool export_centreline(const ExportOptions *options, const char *extensio
                                              : print_markups(text.stream, tree, options->frame);
     if (!good)
         faults_add(faults, options->out, 0, 0, "cannot be written: no memory");
-    return text_write(&text, options->out, faults) && good;
+    return good ? text_write(&text, options->out, faults) : text_forget(&text);
 }
 
 static bool export_tree(const ExportOptions *options, const char *extension, Faults *faults)

@@ -219,7 +219,7 @@ static FitFigures figures_of(const VesselTree *model, double voxel, double secon
 {
     int n = model->node_count;
     FitFigures figures = {.blobs = (long)model->blob_count, .seconds = seconds};
-    double *sorted = calloc((size_t)n, sizeof *sorted);
+    double *sorted = HEAP_ZEROED((size_t)n, sizeof *sorted);
     for (int i = 0; i < n; i++) {
         double error = model->error[i];
         int kind = error < 0.5 * voxel ? 0 : error < voxel ? 1 : error < 2 * voxel ? 2 : 3;
@@ -228,17 +228,15 @@ static FitFigures figures_of(const VesselTree *model, double voxel, double secon
             figures.worst_node = i;
     }
     figures.error_worst = model->error[figures.worst_node];
-    if (sorted) {
-        memcpy(sorted, model->error, (size_t)n * sizeof *sorted);
-        sort_doubles(sorted, (size_t)n);
-        figures.error_median = sorted[n / 2];
-        for (int i = 0; i < n; i++)
-            sorted[i] = (double)(model->blob_offset[i + 1] - model->blob_offset[i]);
-        sort_doubles(sorted, (size_t)n);
-        figures.blobs_median = (int)sorted[n / 2];
-        figures.blobs_most = (int)sorted[n - 1];
-        free(sorted);
-    }
+    memcpy(sorted, model->error, (size_t)n * sizeof *sorted);
+    sort_doubles(sorted, (size_t)n);
+    figures.error_median = sorted[n / 2];
+    for (int i = 0; i < n; i++)
+        sorted[i] = (double)(model->blob_offset[i + 1] - model->blob_offset[i]);
+    sort_doubles(sorted, (size_t)n);
+    figures.blobs_median = (int)sorted[n / 2];
+    figures.blobs_most = (int)sorted[n - 1];
+    free(sorted);
     return figures;
 }
 

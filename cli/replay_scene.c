@@ -106,6 +106,8 @@ bool replay_write_golden(const ToolPath *path, const char *folder, Faults *fault
 {
     size_t length;
     char *text = tool_path_print(path, &length);
+    if (!text)
+        faults_add(faults, folder, 0, 0, "no memory for the golden path");
     bool good = text && write_part(folder, "scene.golden.csv", text, length, faults);
     free(text);
     return good;

@@ -1,6 +1,8 @@
 // The report's figures. Colours are classes that the page's style sheet sets for light, dark and paper.
 #include "cli/report.h"
 
+#include "geom/heap.h"
+
 #include <stdlib.h>
 
 enum { LABELS_MOST = 80, BINS = 40 };
@@ -65,7 +67,7 @@ static void draw_projection(const Report *report, const Projection *p, int numbe
     const VesselTree *tree = report->tree;
     double width = p->scale * (p->high[p->across] - p->low[p->across]), height = p->scale * (p->high[p->up] - p->low[p->up]);
     double bar = report_tick_step(width / p->scale, 4);
-    double(*side)[2] = malloc(2 * (size_t)tree->node_count * sizeof *side);
+    double(*side)[2] = HEAP_ZEROED(2 * (size_t)tree->node_count, sizeof *side);
     fprintf(out,
             "<svg class=\"tree\" role=\"img\" aria-labelledby=\"tree%d-t tree%d-d\" viewBox=\"-12 -24 %.1f %.1f\" width=\"%.0f\" height=\"%.0f\">\n"
             "<title id=\"tree%d-t\">Vessel tree, %c across and %c up</title><desc id=\"tree%d-d\">Outlines and centrelines of %d branches, coloured by "
@@ -73,7 +75,7 @@ static void draw_projection(const Report *report, const Projection *p, int numbe
             number, number, width + 24, height + 56, width + 24, height + 56, number, axis[p->across], axis[p->up], number, report->branches->count,
             report->finding_count);
     fprintf(out, "<text x=\"0\" y=\"-8\">%c across, %c up</text>\n", axis[p->across], axis[p->up]);
-    for (int i = 0; side && i < report->branches->count; i++)
+    for (int i = 0; i < report->branches->count; i++)
         draw_branch(report, p, i, side, side + tree->node_count);
     for (int i = 0; i < tree->node_count; i++)
         if (tree->kind[i] == NODE_ANEURYSM)

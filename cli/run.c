@@ -5,6 +5,7 @@
 #include "cli/run_chart.h"
 #include "cli/run_files.h"
 #include "cli/run_hands.h"
+#include "geom/heap.h"
 #include "sim/lesson.h"
 #include "sim/pose.h"
 #include "sim/recording.h"
@@ -165,7 +166,7 @@ static Scene *prepare_scene(const RunOptions *options, Faults *faults)
         script_free(scene->script);
         free(scene->script_path);
         scene->script = script;
-        scene->script_path = strdup(options->script);
+        scene->script_path = HEAP_TEXT(options->script);
     } else {
         script_free(script);
     }
@@ -247,9 +248,9 @@ static void draw_picture(const RunOptions *options, const Watch *watch, Simulato
     PictureTool tool[MOST_MOMENTS] = {0};
     ToolLooks looks;
     bool has_looks = tool_looks_make(&looks, scene);
-    double *radius = calloc((size_t)nodes * MOST_MOMENTS, sizeof *radius);
-    Vec3 *force = calloc((size_t)nodes * MOST_MOMENTS, sizeof *force);
-    for (int m = 0; has_looks && radius && force && m < watch->moment_count; m++) {
+    double *radius = HEAP_ZEROED((size_t)nodes * MOST_MOMENTS, sizeof *radius);
+    Vec3 *force = HEAP_ZEROED((size_t)nodes * MOST_MOMENTS, sizeof *force);
+    for (int m = 0; has_looks && m < watch->moment_count; m++) {
         const Pose *pose = watch->moment[m].pose;
         Vec3 *at = force + (size_t)m * (size_t)nodes;
         double *thick = radius + (size_t)m * (size_t)nodes;

@@ -1,5 +1,7 @@
 #include "cli/run_files.h"
 
+#include "geom/heap.h"
+
 #include <cJSON.h>
 #include <inttypes.h>
 #include <stdlib.h>
@@ -60,9 +62,7 @@ static void add_tools(cJSON *summary, Simulator *simulator)
     cJSON *tools = cJSON_AddArrayToObject(summary, "tools");
     for (int k = 0; k < scene->tool_count; k++) {
         int count = stepper_tool_nodes(stepper, k, NULL);
-        ToolNode *node = calloc((size_t)count, sizeof *node);
-        if (!node)
-            return;
+        ToolNode *node = HEAP_ZEROED((size_t)count, sizeof *node);
         stepper_tool_nodes(stepper, k, node);
         cJSON *tool = cJSON_CreateObject(), *proximal;
         cJSON_AddStringToObject(tool, "name", scene->tool[k].name);

@@ -1,5 +1,6 @@
 #include "cli/scene_views.h"
 
+#include "geom/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/volume.h"
 
@@ -24,17 +25,14 @@ static PatientAxes patient_of(const Scene *scene, const TriangleMesh *mesh)
 static double live_cell(const VesselTree *tree)
 {
     enum { TRIANGLES = 150000 };
-    double area = 0, *radius = malloc((size_t)tree->node_count * sizeof *radius), thin = HUGE_VAL;
+    double area = 0, *radius = HEAP_ZEROED((size_t)tree->node_count, sizeof *radius);
     for (int i = 0; i < tree->node_count; i++) {
         int parent = tree->parent[i];
         area += parent < 0 ? 0 : 2 * PI * tree->radius[i] * vec3_distance(tree->center[i], tree->center[parent]);
-        if (radius)
-            radius[i] = tree->radius[i];
+        radius[i] = tree->radius[i];
     }
-    if (radius) {
-        sort_doubles(radius, (size_t)tree->node_count);
-        thin = radius[tree->node_count / 20];
-    }
+    sort_doubles(radius, (size_t)tree->node_count);
+    double thin = radius[tree->node_count / 20];
     free(radius);
     return fmax(fmin(sqrt(2.3 * area / TRIANGLES), thin), isosurface_cell_for(tree));   // 2.3 triangles a cell's face on the average
 }

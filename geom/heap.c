@@ -20,11 +20,22 @@ void heap_is_empty(size_t bytes, const char *file)
     _exit(2);
 }
 
+static size_t bytes_of(size_t count, size_t size) { return size > 0 && count > SIZE_MAX / size ? SIZE_MAX : count * size; }
+
 void *heap_zeroed(size_t count, size_t size, const char *file)
 {
     void *memory = calloc(count > 0 ? count : 1, size > 0 ? size : 1);
     if (!memory)
-        heap_is_empty(size > 0 && count > SIZE_MAX / size ? SIZE_MAX : count * size, file);
+        heap_is_empty(bytes_of(count, size), file);
+    return memory;
+}
+
+void *heap_grown(void *old, size_t count, size_t size, const char *file)
+{
+    size_t bytes = bytes_of(count, size);
+    void *memory = bytes < SIZE_MAX ? realloc(old, bytes > 0 ? bytes : 1) : NULL;
+    if (!memory)
+        heap_is_empty(bytes, file);
     return memory;
 }
 

@@ -5,13 +5,24 @@
 
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 // `count` values of `size` bytes, all zero; never NULL, also for none. `file` stands in the message. The caller frees.
 void *heap_zeroed(size_t count, size_t size, const char *file);
 #define HEAP_ZEROED(count, size) heap_zeroed(count, size, __FILE__)
+// The same, `old` made longer or shorter; what is new is not set.
+void *heap_grown(void *old, size_t count, size_t size, const char *file);
+#define HEAP_GROWN(old, count, size) heap_grown(old, count, size, __FILE__)
 // A copy of a text.
 char *heap_text(const char *text, const char *file);
 #define HEAP_TEXT(text) heap_text(text, __FILE__)
 // What cannot be had: says so and ends the program.
-_Noreturn void heap_is_empty(size_t bytes, const char *file);
+__attribute__((noreturn)) void heap_is_empty(size_t bytes, const char *file);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -47,7 +47,7 @@ void *hdf5_read(Hdf5Reader *reader, Hdf5Dataset *dataset);
 
 // A text that is a dataset. NULL without a fault where there is none, with one where it is no text.
 char *hdf5_text(Hdf5Reader *reader, const char *path);
-// A text attribute of an object ("/": the file). NULL as above.
+// A text attribute of an object ("/": the file). NULL as above. One of variable length is read in a child process, for as long as a damaged file takes the library.
 char *hdf5_text_attribute(Hdf5Reader *reader, const char *object, const char *name);
 // A number of the file's own; `otherwise` where there is none, and with a fault where it is no number.
 double hdf5_number(Hdf5Reader *reader, const char *name, double otherwise);

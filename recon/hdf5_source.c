@@ -1,5 +1,7 @@
 #include "recon/hdf5_source.h"
 
+#include "geom/heap.h"
+
 #include <errno.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -16,9 +18,9 @@ static H5FD_t *driver_open(const char *name, unsigned flags, hid_t access, haddr
 {
     (void)name, (void)most;
     const Hdf5Source *source = H5Pget_driver_info(access);
-    Driver *it = source && !(flags & (H5F_ACC_RDWR | H5F_ACC_TRUNC | H5F_ACC_CREAT)) ? calloc(1, sizeof *it) : NULL;
-    if (!it)
+    if (!source || flags & (H5F_ACC_RDWR | H5F_ACC_TRUNC | H5F_ACC_CREAT))
         return NULL;
+    Driver *it = HEAP_ZEROED(1, sizeof *it);
     it->source = *source;
     return &it->driver;
 }
@@ -103,14 +105,23 @@ static const H5FD_class_t driver_class = {
     .fl_map = H5FD_FLMAP_DICHOTOMY,
 };
 
+// Kept until the program ends: a damaged file makes the library let go of its driver once too often.
+static hid_t driver_id(void)
+{
+    static hid_t driver = -1;
+    if (driver < 0 || H5Iis_valid(driver) <= 0)
+        driver = H5FDregister(&driver_class);
+    else
+        H5Iinc_ref(driver);
+    return driver;
+}
+
 hid_t hdf5_source_open(const Hdf5Source *source)
 {
-    hid_t driver = H5FDregister(&driver_class), access = H5Pcreate(H5P_FILE_ACCESS);
+    hid_t driver = driver_id(), access = H5Pcreate(H5P_FILE_ACCESS);
     bool good = driver >= 0 && access >= 0 && H5Pset_driver(access, driver, source) >= 0;
     hid_t file = good ? H5Fopen("source", H5F_ACC_RDONLY, access) : -1;
     if (access >= 0)
         H5Pclose(access);
-    if (driver >= 0)
-        H5FDunregister(driver);      // the file and the list hold it
     return file;
 }

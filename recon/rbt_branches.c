@@ -3,6 +3,7 @@
 //
 // Limbs of a round are tracked at the same time on the tree as it was, and adopted widest first; what lies in a tube that was adopted before is left out.
 #include "recon/rbt_branches.h"
+#include "geom/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/rbt_links.h"
@@ -20,6 +21,7 @@ typedef struct Found {       // what became of a limb
     double radius;           // of its first nodes
     int limb;
     bool good, is_sac;       // a sac is one node in `out`
+    bool out_of_memory;
 } Found;
 
 typedef struct Round {
@@ -205,12 +207,8 @@ static void track_limb(void *context, long index)
     Round *round = context;
     Found *found = &round->found[index];
     const RbtLimb *limb = &round->limb[index];
-    Tracker *t = malloc(sizeof *t);
+    Tracker *t = HEAP_ZEROED(1, sizeof *t);
     found->limb = (int)index;
-    if (!t) {
-        found->why = "out of memory";
-        return;
-    }
     *t = *round->t;
     t->random = random_from_seed((uint64_t)t->parameters->seed, limb->key);
     t->is_guarded = true;
@@ -239,8 +237,7 @@ static void track_limb(void *context, long index)
             found->good = found->out.count > 0 && !t->out_of_memory && is_tube(t, found->out.node, found->out.count) && !is_dense(t, limb, &found->out);
         }
     }
-    if (t->out_of_memory)
-        found->why = "out of memory";
+    found->out_of_memory = t->out_of_memory;
     free(t);
 }
 
@@ -365,8 +362,10 @@ static bool grow_wave(Tracker *t, RbtPaint *paint, const RbtLimb *limb, int coun
     bool good = true;
     Round round = {t, paint, limb, found, share, noise};
     parallel_for(threads, count, track_limb, &round, NULL);
-    for (int i = 0; i < count; i++)
+    for (int i = 0; i < count; i++) {
         order[i] = &found[i];
+        good = good && !found[i].out_of_memory;
+    }
     qsort(order, (size_t)count, sizeof(*order), compare_found);
     for (int i = 0; good && i < count; i++)
         if (order[i]->good)

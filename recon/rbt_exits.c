@@ -4,6 +4,8 @@
 // after one that is none is an exit. (Walking back from the last pieces instead lost the exits that soon fork.)
 #include "recon/rbt_exits.h"
 
+#include "geom/heap.h"
+
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,21 +32,17 @@ typedef struct Piece {
 
 static bool heap_before(HeapEntry a, HeapEntry b) { return a.way < b.way || (a.way == b.way && a.voxel < b.voxel); }
 
-static bool heap_push(Flood *f, HeapEntry entry)
+static void heap_push(Flood *f, HeapEntry entry)
 {
     if (f->heap_count == f->heap_capacity) {
         int capacity = f->heap_capacity ? 2 * f->heap_capacity : 4096;
-        HeapEntry *grown = realloc(f->heap, (size_t)capacity * sizeof *grown);
-        if (!grown)
-            return false;
-        f->heap = grown;
+        f->heap = HEAP_GROWN(f->heap, (size_t)capacity, sizeof *f->heap);
         f->heap_capacity = capacity;
     }
     int i = f->heap_count++;
     for (; i > 0 && heap_before(entry, f->heap[(i - 1) / 2]); i = (i - 1) / 2)
         f->heap[i] = f->heap[(i - 1) / 2];
     f->heap[i] = entry;
-    return true;
 }
 
 static HeapEntry heap_pop(Flood *f)
@@ -101,7 +99,7 @@ static bool neighbour_of(const Flood *f, const int at[3], int n, int next[3], in
     return n != 13;
 }
 
-static bool flood(Flood *f, int32_t first, Vec3 start, Vec3 direction, double radius, double reach, double level, const RbtBlock *block, int block_count)
+static void flood(Flood *f, int32_t first, Vec3 start, Vec3 direction, double radius, double reach, double level, const RbtBlock *block, int block_count)
 {
     float length[27];
     for (int n = 0; n < 27; n++) {
@@ -111,8 +109,7 @@ static bool flood(Flood *f, int32_t first, Vec3 start, Vec3 direction, double ra
     }
     f->way[first] = 0;
     f->from[first] = -1;
-    if (!heap_push(f, (HeapEntry){0, first}))
-        return false;
+    heap_push(f, (HeapEntry){0, first});
     while (f->heap_count > 0) {
         HeapEntry here = heap_pop(f);
         int at[3], next[3];
@@ -127,31 +124,23 @@ static bool flood(Flood *f, int32_t first, Vec3 start, Vec3 direction, double ra
                 continue;
             f->way[voxel] = way;
             f->from[voxel] = here.voxel;
-            if (!heap_push(f, (HeapEntry){way, voxel}))
-                return false;
+            heap_push(f, (HeapEntry){way, voxel});
         }
     }
-    return true;
 }
 
 // Connected voxels of one shell are a piece; its parent is the piece that its first voxel was reached from. Pieces are numbered by shells.
 static Piece *cut_into_pieces(Flood *f, double thickness, int shells, int *piece_count)
 {
     int box = f->size[0] * f->size[1] * f->size[2], count = 0, capacity = 256;
-    Piece *piece = malloc((size_t)capacity * sizeof *piece);
-    int32_t *stack = malloc((size_t)box * sizeof *stack);
-    for (int32_t i = 0; piece && stack && i < box; i++) {
+    Piece *piece = HEAP_ZEROED((size_t)capacity, sizeof *piece);
+    int32_t *stack = HEAP_ZEROED((size_t)box, sizeof *stack);
+    for (int32_t i = 0; i < box; i++) {
         if (f->way[i] > 1e30f || f->piece[i] >= 0)
             continue;
         if (count == capacity) {
-            Piece *grown = realloc(piece, 2 * (size_t)capacity * sizeof *piece);
-            if (!grown) {
-                free(piece);
-                piece = NULL;
-                break;
-            }
-            piece = grown;
             capacity *= 2;
+            piece = HEAP_GROWN(piece, (size_t)capacity, sizeof *piece);
         }
         int shell = (int)((double)f->way[i] / thickness), held = 0;
         piece[count] = (Piece){.shell = shell < shells ? shell : shells - 1, .parent = i};   // for now: one of its voxels
@@ -172,7 +161,7 @@ static Piece *cut_into_pieces(Flood *f, double thickness, int shells, int *piece
         count++;
     }
     free(stack);
-    for (int i = 0; piece && i < count; i++) {
+    for (int i = 0; i < count; i++) {
         int32_t voxel = piece[i].parent;
         while (voxel >= 0 && f->piece[voxel] == i)
             voxel = f->from[voxel];
@@ -245,21 +234,18 @@ int rbt_find_exits(const Volume *volume, Vec3 start, Vec3 direction, double radi
     int found = 0, piece_count = 0;
     double thickness = fmax(0.5 * radius, 1.5 * volume_voxel_size(volume));
     int shells = (int)(reach / thickness) + 1;
-    f.way = malloc(box * sizeof *f.way);
-    f.from = malloc(box * sizeof *f.from);
-    f.piece = malloc(box * sizeof *f.piece);
-    Piece *piece = NULL;
-    if (f.way && f.from && f.piece) {
-        for (size_t i = 0; i < box; i++)
-            f.way[i] = HUGE_VALF;
-        memset(f.piece, 0xff, box * sizeof *f.piece);
-        int first[3];
-        for (int i = 0; i < 3; i++)
-            first[i] = (int)fmax(0, fmin(f.size[i] - 1, floor(at[i] + 0.5) - f.low[i]));
-        if (flood(&f, (first[2] * f.size[1] + first[1]) * f.size[0] + first[0], start, direction, radius, reach, level, block, block_count))
-            piece = cut_into_pieces(&f, thickness, shells, &piece_count);
-    }
-    for (int i = 0; piece && i < piece_count; i++) {
+    f.way = HEAP_ZEROED(box, sizeof *f.way);
+    f.from = HEAP_ZEROED(box, sizeof *f.from);
+    f.piece = HEAP_ZEROED(box, sizeof *f.piece);
+    for (size_t i = 0; i < box; i++)
+        f.way[i] = HUGE_VALF;
+    memset(f.piece, 0xff, box * sizeof *f.piece);
+    int first[3];
+    for (int i = 0; i < 3; i++)
+        first[i] = (int)fmax(0, fmin(f.size[i] - 1, floor(at[i] + 0.5) - f.low[i]));
+    flood(&f, (first[2] * f.size[1] + first[1]) * f.size[0] + first[0], start, direction, radius, reach, level, block, block_count);
+    Piece *piece = cut_into_pieces(&f, thickness, shells, &piece_count);
+    for (int i = 0; i < piece_count; i++) {
         RbtExit exit;
         double width;
         // the head of a tube: what comes before it is none

@@ -2,6 +2,7 @@
 // a forest by the way they were reached (as in rbt_exits.c). Its deepest leaf with the way down to a root is a limb, then the deepest of what is left, and
 // so on; short ones are ragged edges.
 #include "recon/rbt_residue.h"
+#include "geom/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/way_heap.h"
@@ -251,20 +252,14 @@ typedef struct Piece {
 static Piece *cut_into_pieces(Flood *f, double thickness, int *piece_count)
 {
     int count = 0, capacity = 256;
-    Piece *piece = malloc((size_t)capacity * sizeof *piece);
-    int *stack = malloc(((size_t)f->count + 1) * sizeof *stack);
-    for (int i = 0; piece && stack && i < f->count; i++) {
+    Piece *piece = HEAP_ZEROED((size_t)capacity, sizeof *piece);
+    int *stack = HEAP_ZEROED((size_t)f->count, sizeof *stack);
+    for (int i = 0; i < f->count; i++) {
         if (f->wet[i].piece >= 0)
             continue;
         if (count == capacity) {
-            Piece *grown = realloc(piece, 2 * (size_t)capacity * sizeof *piece);
-            if (!grown) {
-                free(piece);
-                piece = NULL;
-                break;
-            }
-            piece = grown;
             capacity *= 2;
+            piece = HEAP_GROWN(piece, (size_t)capacity, sizeof *piece);
         }
         int shell = (int)((double)f->wet[i].way / thickness), held = 0;
         piece[count] = (Piece){.shell = shell, .parent = i, .node = f->wet[i].node, .farthest = i, .limb = -1};
@@ -292,7 +287,7 @@ static Piece *cut_into_pieces(Flood *f, double thickness, int *piece_count)
         count++;
     }
     free(stack);
-    for (int i = 0; piece && i < count; i++) {
+    for (int i = 0; i < count; i++) {
         int wet = piece[i].parent;   // so far one of its voxels
         while (wet >= 0 && f->wet[wet].piece == i)
             wet = f->wet[wet].from;
@@ -319,15 +314,13 @@ static RbtLimb *gather_limbs(const Flood *f, Piece *piece, int piece_count, cons
 {
     const Volume *v = f->volume;
     double voxel = volume_voxel_size(v), voxel_volume = fabs(vec3_dot(v->axis[0], vec3_cross(v->axis[1], v->axis[2])));
-    Order *order = malloc(((size_t)piece_count + 1) * sizeof *order);
+    Order *order = HEAP_ZEROED((size_t)piece_count, sizeof *order);
     RbtLimb *limb = NULL;
     int capacity = 0, used = 0;
-    *count = order ? 0 : -1;
-    for (int i = 0; order && i < piece_count; i++)
+    for (int i = 0; i < piece_count; i++)
         order[i] = (Order){piece[i].shell, i, voxel_index(v, f->wet[piece[i].farthest].at)};
-    if (order)
-        qsort(order, (size_t)piece_count, sizeof *order, compare_depth);
-    for (int k = 0; order && k < piece_count; k++) {
+    qsort(order, (size_t)piece_count, sizeof *order, compare_depth);
+    for (int k = 0; k < piece_count; k++) {
         int leaf = order[k].index, length = 0, top = leaf;
         if (piece[leaf].limb != -1)
             continue;
@@ -347,14 +340,7 @@ static RbtLimb *gather_limbs(const Flood *f, Piece *piece, int piece_count, cons
         }
         if (used == capacity) {
             capacity = capacity ? 2 * capacity : 16;
-            RbtLimb *grown = realloc(limb, (size_t)capacity * sizeof *grown);
-            if (!grown) {
-                free(limb);
-                free(order);
-                *count = -1;
-                return NULL;
-            }
-            limb = grown;
+            limb = HEAP_GROWN(limb, (size_t)capacity, sizeof *limb);
         }
         RbtLimb *l = &limb[used];
         const Border *b = &border[piece[leaf].node - first];
@@ -418,12 +404,10 @@ RbtLimb *rbt_find_limbs(const Tracker *t, const RbtPaint *paint, int first, int 
 {
     const Volume *v = t->volume;
     Flood f = {.volume = v};
-    Border *border = malloc((size_t)(end - first + 1) * sizeof *border);
+    Border *border = HEAP_ZEROED((size_t)(end - first), sizeof *border);
     RbtLimb *limb = NULL;
     double thickness = 2 * t->voxel;
     *count = -1;
-    if (!border)
-        return NULL;
     set_borders(t, first, end, share, noise, border);
     for (int i = first; i < end; i++) {
         const Cylinder *c = &t->tree.node[i].cylinder;

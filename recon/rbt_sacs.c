@@ -5,6 +5,7 @@
 // A sac that is no ball gets further centres (section 3.4 has several in a giant one): of the places between the first centre and its walls the one
 // whose inscribed ball sticks out furthest of the other centres' balls, until none does by much. A ball stays alone.
 #include "recon/rbt_sacs.h"
+#include "geom/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/cast_rays.h"
@@ -80,14 +81,12 @@ bool rbt_is_sac(Tracker *t, const RbtPaint *paint, const RbtLimb *limb)
         }
     if (t->parameters->find_aneurysms <= 0 || t->tree.node[limb->contact].kind == NODE_ANEURYSM || widest < wider * beside || widest < 2.5 * t->voxel)
         return false;
-    Vec3 *ray = malloc(MAX_RAYS * sizeof *ray);
-    double *distance = malloc(2 * MAX_RAYS * sizeof *distance), radius = 0;
+    Vec3 *ray = HEAP_ZEROED(MAX_RAYS, sizeof *ray);
+    double *distance = HEAP_ZEROED(2 * MAX_RAYS, sizeof *distance), radius = 0;
     Estimate *e = &t->estimate;
-    bool good = ray && distance;
+    bool good = true;
     int rays = (int)t->parameters->aneurysm_rays, met = 0;
-    t->out_of_memory = !good;
-    if (good)
-        sphere_directions(sphere_level_of(rays), ray);
+    sphere_directions(sphere_level_of(rays), ray);
     for (int round = 0; good && round <= ROUNDS; round++) {
         double reach = fmax(4 * widest, 2.5 * radius), *sorted = distance + MAX_RAYS;
         good = is_lumen(t, limb, center);
@@ -136,27 +135,24 @@ bool rbt_fill_sac(Tracker *t, const RbtPaint *paint, const RbtLimb *limb, Track 
 {
     enum { MOST = 8, RAYS = 162, STEPS = 3 };
     int rays = (int)t->parameters->aneurysm_rays, count = 0, used = 0, parent[MOST] = {0};
-    Vec3 *ray = malloc(MAX_RAYS * sizeof *ray), center = sac->node[0].cylinder.center, *coarse = malloc(RAYS * sizeof *coarse);
-    double *distance = malloc(2 * MAX_RAYS * sizeof *distance), *sorted = distance + MAX_RAYS, reach = 2.5 * sac->node[0].cylinder.radius;
-    Lobe *lobe = malloc(RAYS * STEPS * sizeof *lobe), chosen[MOST];
-    double *far = malloc(RAYS * sizeof *far);
-    t->out_of_memory = !ray || !coarse || !distance || !lobe || !far;
-    if (!t->out_of_memory) {
-        sphere_directions(sphere_level_of(rays), ray);
-        sphere_directions(sphere_level_of(RAYS), coarse);
-        int met = see_walls(t, center, coarse, RAYS, reach, far, sorted);
-        double median = met > 0 ? sorted[met / 2] : 0;
-        chosen[used++] = (Lobe){center, met > 0 ? sorted[met / 10] : 0};
-        for (int i = 0; i < RAYS * STEPS; i++) {
-            Lobe l = {.center = vec3_add_scaled(center, (0.8 - 0.2 * (i % STEPS)) * far[i / STEPS], coarse[i / STEPS])};
-            if (!(far[i / STEPS] > 0 && far[i / STEPS] < 2 * median) || tracker_node_around(t, l.center, 1) >= 0 ||
-                tracker_is_forbidden(t, l.center) || !is_lumen(t, limb, l.center))
-                continue;
-            met = see_walls(t, l.center, coarse, RAYS, reach, distance, sorted);
-            if (met >= least_closed * RAYS && sorted[met / 10] >= fmax(least_lobe * chosen[0].inscribed, 2.5 * t->voxel)) {
-                l.inscribed = sorted[met / 10];
-                lobe[count++] = l;
-            }
+    Vec3 *ray = HEAP_ZEROED(MAX_RAYS, sizeof *ray), center = sac->node[0].cylinder.center, *coarse = HEAP_ZEROED(RAYS, sizeof *coarse);
+    double *distance = HEAP_ZEROED(2 * MAX_RAYS, sizeof *distance), *sorted = distance + MAX_RAYS, reach = 2.5 * sac->node[0].cylinder.radius;
+    Lobe *lobe = HEAP_ZEROED(RAYS * STEPS, sizeof *lobe), chosen[MOST];
+    double *far = HEAP_ZEROED(RAYS, sizeof *far);
+    sphere_directions(sphere_level_of(rays), ray);
+    sphere_directions(sphere_level_of(RAYS), coarse);
+    int met = see_walls(t, center, coarse, RAYS, reach, far, sorted);
+    double median = met > 0 ? sorted[met / 2] : 0;
+    chosen[used++] = (Lobe){center, met > 0 ? sorted[met / 10] : 0};
+    for (int i = 0; i < RAYS * STEPS; i++) {
+        Lobe l = {.center = vec3_add_scaled(center, (0.8 - 0.2 * (i % STEPS)) * far[i / STEPS], coarse[i / STEPS])};
+        if (!(far[i / STEPS] > 0 && far[i / STEPS] < 2 * median) || tracker_node_around(t, l.center, 1) >= 0 ||
+            tracker_is_forbidden(t, l.center) || !is_lumen(t, limb, l.center))
+            continue;
+        met = see_walls(t, l.center, coarse, RAYS, reach, distance, sorted);
+        if (met >= least_closed * RAYS && sorted[met / 10] >= fmax(least_lobe * chosen[0].inscribed, 2.5 * t->voxel)) {
+            l.inscribed = sorted[met / 10];
+            lobe[count++] = l;
         }
     }
     while (!t->out_of_memory && used < MOST) {
@@ -179,7 +175,7 @@ bool rbt_fill_sac(Tracker *t, const RbtPaint *paint, const RbtLimb *limb, Track 
                 parent[used] = k;
         Vec3 *point = t->estimate.point, middle;
         double radius;
-        int met = see_walls(t, chosen[used].center, ray, rays, reach, distance, sorted);
+        met = see_walls(t, chosen[used].center, ray, rays, reach, distance, sorted);
         int kept = near_walls(chosen[used].center, ray, rays, distance, met > 0 ? sorted[met / 2] : 0, point);
         bool good = kept > 3 && sphere_fit(point, kept, &middle, &radius);
         kept = drop_painted(paint, point, kept);

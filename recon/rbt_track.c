@@ -8,6 +8,7 @@
 // way is straight on into the sac, and the tracking ends at its bottom. Where a branch swells or ends, the lumen ahead is searched for tubes that
 // leave it (rbt_exits.h), and the branch goes on from the widest one that tracks.
 #include "recon/rbt_track.h"
+#include "geom/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/cast_rays.h"
@@ -467,17 +468,15 @@ static bool look_ahead(Tracker *t, Track *branch)
     enum { MAX_EXITS = 16 };
     RbtExit exit[MAX_EXITS];
     double radius = tracker_usual_radius(branch), base = (double)t->volume->minimum;
-    int keep = branch->count, found = 0;
+    int keep = branch->count;
     while (keep > 2 && branch->node[keep - 1].cylinder.radius > 1.15 * radius)
         keep--;
     const Cylinder *last = &branch->node[keep - 1].cylinder;
     double level = base + 0.5 * (tracker_brightness(t, last->center) - base);
-    RbtBlock *block = malloc((size_t)keep * sizeof *block);
-    if (block) {
-        for (int i = 0; i < keep; i++)
-            block[i] = (RbtBlock){branch->node[i].cylinder.center, 1.4 * branch->node[i].cylinder.radius};
-        found = rbt_find_exits(t->volume, last->center, last->axis, radius, t->parameters->look_ahead * radius, level, block, keep, exit, MAX_EXITS);
-    }
+    RbtBlock *block = HEAP_ZEROED((size_t)keep, sizeof *block);
+    for (int i = 0; i < keep; i++)
+        block[i] = (RbtBlock){branch->node[i].cylinder.center, 1.4 * branch->node[i].cylinder.radius};
+    int found = rbt_find_exits(t->volume, last->center, last->axis, radius, t->parameters->look_ahead * radius, level, block, keep, exit, MAX_EXITS);
     free(block);
     const char *why = t->why;
     for (int i = 0; i < found && !t->out_of_memory; i++)

@@ -1,5 +1,6 @@
 // sigma = 1.4826 MAD / sqrt(2) for differences of independent values; the Gaussian is applied axis by axis.
 #include "recon/volume_noise.h"
+#include "geom/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/parallel.h"
 
@@ -11,9 +12,9 @@ double volume_noise(const Volume *volume, int lag)
     enum { SAMPLES = 30000 };
     const int *size = volume->size;
     size_t voxels = (size_t)size[0] * (size_t)size[1] * (size_t)size[2], step[3] = {1, (size_t)size[0], (size_t)size[0] * (size_t)size[1]};
-    double *value = malloc(SAMPLES * sizeof *value), sum = 0;
+    double *value = HEAP_ZEROED(SAMPLES, sizeof *value), sum = 0;
     int axes = 0;
-    for (int axis = 0; value && axis < 3; axis++) {
+    for (int axis = 0; axis < 3; axis++) {
         int n = 0;
         for (size_t i = (size_t)axis, stride = voxels / SAMPLES + 1; i < voxels && n < SAMPLES; i += stride)
             if ((int)(i / step[axis] % (size_t)size[axis]) + lag < size[axis])

@@ -4,6 +4,7 @@
 #include "render/gui.h"
 
 #include "render/font.h"
+#include "render/imgui_heap.h"
 
 #include <cmath>
 #include <cstring>
@@ -102,6 +103,7 @@ extern "C" Gui *gui_create(char *message, size_t capacity)
         return nullptr;
     }
     ImGuiContext *previous = ImGui::GetCurrentContext();
+    imgui_use_heap();
     gui->context = ImGui::CreateContext();
     ImGui::SetCurrentContext(gui->context);
     ImGuiIO &io = ImGui::GetIO();

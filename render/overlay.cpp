@@ -2,6 +2,7 @@
 #include "render/overlay.h"
 
 #include "render/font.h"
+#include "render/imgui_heap.h"
 
 #include <cstdint>
 #include <imgui.h>
@@ -27,6 +28,7 @@ extern "C" Overlay *overlay_create(int width, int height, float scale)
     if (!overlay)
         return nullptr;
     overlay->previous = ImGui::GetCurrentContext();
+    imgui_use_heap();
     overlay->context = ImGui::CreateContext();
     ImGui::SetCurrentContext(overlay->context);
     ImGuiIO &io = ImGui::GetIO();

@@ -86,6 +86,21 @@ static void make_recording(const char *text, const char *path)
     scene_free(scene);
 }
 
+// A text of any length, as other writers have it: it lies in a heap without a checksum.
+static void put_variable_text(const char *path)
+{
+    const char *text = "from another writer";
+    hid_t file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT), type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
+    H5Tset_size(type, H5T_VARIABLE);
+    H5Adelete(file, "source");
+    hid_t attribute = H5Acreate2(file, "source", type, space, H5P_DEFAULT, H5P_DEFAULT);
+    need(attribute >= 0 && H5Awrite(attribute, type, &text) >= 0, "write a text");
+    H5Aclose(attribute);
+    H5Sclose(space);
+    H5Tclose(type);
+    H5Fclose(file);
+}
+
 static void make_trees(void)
 {
     VesselTree *model = tree_file_load(SOURCE_DIR "/tests/fuzz/corpus/tree_file/model.h5", NULL, &faults);
@@ -101,6 +116,7 @@ static void make_trees(void)
     memcpy(tree->point, model->point, (size_t)model->point_count * sizeof *tree->point);
     memcpy(tree->point_offset, model->point_offset, (n + 1) * sizeof *tree->point_offset);
     need(tree_file_save(tree, NULL, in_folder(file_name[TREE]), &faults) && tree_file_save(model, NULL, in_folder(file_name[MODEL]), &faults), "write the trees");
+    put_variable_text(in_folder(file_name[TREE]));
     vessel_tree_free(tree);
     vessel_tree_free(model);
 }
@@ -335,7 +351,7 @@ static size_t change_bytes(unsigned char *bytes, size_t length)
 
 // --- reading in a process of its own ---
 enum { REFUSED = 0, READ = 1, WITHOUT_REASON = 2 };
-enum { SECONDS = 10 };
+enum { SECONDS = 20 };
 #define ADDRESS_SPACE ((rlim_t)1 << 30)
 
 static volatile double sink;

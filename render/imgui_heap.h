@@ -1,0 +1,15 @@
+// Dear ImGui goes on with a null pointer where memory lacks: it is to ask where the program ends instead. C++ only; before a context is made.
+#ifndef SELDINGER_RENDER_IMGUI_HEAP_H
+#define SELDINGER_RENDER_IMGUI_HEAP_H
+
+#include "geom/heap.h"
+
+#include <cstdlib>
+#include <imgui.h>
+
+inline void imgui_use_heap()
+{
+    ImGui::SetAllocatorFunctions([](size_t bytes, void *) { return HEAP_GROWN(nullptr, bytes, 1); }, [](void *memory, void *) { std::free(memory); });
+}
+
+#endif
