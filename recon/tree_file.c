@@ -1,4 +1,4 @@
-// Trees and models in HDF5. Both directions go through memory (the core driver with a file image): a full disk is then our own write's
+// Trees and models in HDF5. Both directions go through memory (writing by the core driver, whose image we keep): a full disk is then our own write's
 // error and not one in the middle of the library, the same code serves the fuzz target, and a file cannot change under us.
 // Metadata are written in the 1.8 format, whose checksums make the library refuse damaged headers.
 #include "recon/tree_file.h"

@@ -190,6 +190,13 @@ static void what_is_no_recording_is_refused(void **state)
     int64_t step = INT64_MAX;
     change_row("bend.h5", "frame.h5", "/wire/step", 3, 1, H5T_NATIVE_INT64, &step);
     ends(2, "steps grow from 0", "$S replay frame.h5 --verify");
+    // the window counts rows by time
+    static const double bad_time[] = {(double)NAN, (double)INFINITY, 1e300};
+    for (int i = 0; i < 3; i++) {
+        change_row("bend.h5", "time.h5", "/time_s", 0, 1, H5T_NATIVE_DOUBLE, &bad_time[i]);
+        ends(2, "time.h5: /time_s holds ", "$S replay time.h5");
+        ends(2, "time.h5: /time_s holds ", "$S replay time.h5 --verify");
+    }
     static const double bad_step[] = {0, -1, 1e300, (double)NAN};
     for (int i = 0; i < 4; i++) {
         file = open_copy("bend.h5", "step.h5");
