@@ -4,7 +4,9 @@
 //   - plain numbers, little- or big-endian integers and IEEE floats, and texts: no conversion by code of the file's own making;
 //   - each byte that a shape promises is in the file, and all datasets together take no more of it than it has, nor than HDF5_READER_MOST_BYTES: N bytes of file
 //     take at most 8 N of memory (a byte read into a word);
-//   - no more than HDF5_READER_MOST_CHUNKS chunks a dataset, which the library looks up one by one.
+//   - no more than HDF5_READER_MOST_CHUNKS chunks a dataset, which the library looks up one by one;
+//   - the library survives it: a child process looks at the whole structure first (a fork and some milliseconds), as the library (1.10) overruns its memory where
+//     sizes in old headers are damaged.
 // Messages name the file, the dataset, what is wrong and what is valid. The library prints nothing between opening and closing.
 // Not thread-safe, as the library is not.
 #ifndef SELDINGER_RECON_HDF5_READER_H
@@ -31,8 +33,8 @@ typedef struct Hdf5Dataset {
 
 // NULL with a fault. `needs` ends the message on a dataset that lacks: "a recording has it". Both it and `path` are kept, not copied.
 Hdf5Reader *hdf5_reader_open(const char *path, const char *needs, Faults *faults);
-// The same from memory, which must stay until the reader is closed; `name` stands in the messages.
-Hdf5Reader *hdf5_reader_parse(const void *bytes, size_t length, const char *name, const char *needs, Faults *faults);
+// The same from memory, which must stay until the reader is closed; `name` stands in the messages. Without the rehearsal a fuzzer is fifty times as fast.
+Hdf5Reader *hdf5_reader_parse(const void *bytes, size_t length, bool has_rehearsal, const char *name, const char *needs, Faults *faults);
 // Also where it is NULL.
 void hdf5_reader_close(Hdf5Reader *reader);
 

@@ -1,33 +1,20 @@
 #include "recon/hdf5_source.h"
 
-#include "geom/heap.h"
-
 #include <errno.h>
 #include <stdbool.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-typedef struct Driver {
-    H5FD_t driver;           // the library's part; first
-    Hdf5Source source;
-    haddr_t end;             // that the library knows of
-} Driver;
 
 static H5FD_t *driver_open(const char *name, unsigned flags, hid_t access, haddr_t most)
 {
     (void)name, (void)most;
-    const Hdf5Source *source = H5Pget_driver_info(access);
-    if (!source || flags & (H5F_ACC_RDWR | H5F_ACC_TRUNC | H5F_ACC_CREAT))
-        return NULL;
-    Driver *it = HEAP_ZEROED(1, sizeof *it);
-    it->source = *source;
-    return &it->driver;
+    Hdf5Source *const *source = H5Pget_driver_info(access);
+    return source && !(flags & (H5F_ACC_RDWR | H5F_ACC_TRUNC | H5F_ACC_CREAT)) ? &(*source)->driver : NULL;
 }
 
 static herr_t driver_close(H5FD_t *driver)
 {
-    free(driver);
+    (void)driver;
     return 0;
 }
 
@@ -42,20 +29,20 @@ static herr_t driver_query(const H5FD_t *driver, unsigned long *flags)
 static haddr_t driver_get_eoa(const H5FD_t *driver, H5FD_mem_t type)
 {
     (void)type;
-    return ((const Driver *)driver)->end;
+    return ((const Hdf5Source *)driver)->end;
 }
 
 static herr_t driver_set_eoa(H5FD_t *driver, H5FD_mem_t type, haddr_t end)
 {
     (void)type;
-    ((Driver *)driver)->end = end;
+    ((Hdf5Source *)driver)->end = end;
     return 0;
 }
 
 static haddr_t driver_get_eof(const H5FD_t *driver, H5FD_mem_t type)
 {
     (void)type;
-    return ((const Driver *)driver)->source.length;
+    return ((const Hdf5Source *)driver)->length;
 }
 
 static bool read_file(int file, char *data, size_t size, haddr_t address)
@@ -74,7 +61,7 @@ static bool read_file(int file, char *data, size_t size, haddr_t address)
 static herr_t driver_read(H5FD_t *driver, H5FD_mem_t type, hid_t transfer, haddr_t address, size_t size, void *data)
 {
     (void)type, (void)transfer;
-    const Hdf5Source *source = &((const Driver *)driver)->source;
+    const Hdf5Source *source = (const Hdf5Source *)driver;
     if (size > source->length || address > source->length - size)
         return -1;
     if (source->file >= 0)
@@ -93,7 +80,7 @@ static const H5FD_class_t driver_class = {
     .name = "seldinger-source",
     .maxaddr = INT64_MAX,
     .fc_degree = H5F_CLOSE_STRONG,
-    .fapl_size = sizeof(Hdf5Source),
+    .fapl_size = sizeof(Hdf5Source *),
     .open = driver_open,
     .close = driver_close,
     .query = driver_query,
@@ -116,10 +103,10 @@ static hid_t driver_id(void)
     return driver;
 }
 
-hid_t hdf5_source_open(const Hdf5Source *source)
+hid_t hdf5_source_open(Hdf5Source *source)
 {
     hid_t driver = driver_id(), access = H5Pcreate(H5P_FILE_ACCESS);
-    bool good = driver >= 0 && access >= 0 && H5Pset_driver(access, driver, source) >= 0;
+    bool good = driver >= 0 && access >= 0 && H5Pset_driver(access, driver, &source) >= 0;
     hid_t file = good ? H5Fopen("source", H5F_ACC_RDONLY, access) : -1;
     if (access >= 0)
         H5Pclose(access);

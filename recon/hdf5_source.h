@@ -7,12 +7,14 @@
 #include <stddef.h>
 
 typedef struct Hdf5Source {
+    H5FD_t driver;           // the library's part; first
+    haddr_t end;             // that the library knows of
     int file;                // an open descriptor, -1: memory
     const void *bytes;
     size_t length;           // of either
 } Hdf5Source;
 
-// Opens it for reading; the source's descriptor or bytes must stay until the file is closed. Negative where the library refuses it.
-hid_t hdf5_source_open(const Hdf5Source *source);
+// Opens it for reading; the source must stay, where it is, until the file is closed. Negative where the library refuses it.
+hid_t hdf5_source_open(Hdf5Source *source);
 
 #endif

@@ -139,10 +139,11 @@ static VesselTree *read_tree(const Reader *reader, TreeFileInfo *info)
     return NULL;
 }
 
-VesselTree *tree_file_parse(const void *bytes, size_t length, const char *name, TreeFileInfo *info, Faults *faults)
+static VesselTree *parse(const void *bytes, size_t length, bool has_rehearsal, const char *name, TreeFileInfo *info, Faults *faults)
 {
     TreeFileInfo held = {0};
-    Reader reader = {.file = hdf5_reader_parse(bytes, length, name, "a tree has /nodes and /points, a model /blobs too", faults), .name = name, .faults = faults};
+    Reader reader = {.file = hdf5_reader_parse(bytes, length, has_rehearsal, name, "a tree has /nodes and /points, a model /blobs too", faults),
+                     .name = name, .faults = faults};
     VesselTree *tree = reader.file ? read_tree(&reader, &held) : NULL;
     hdf5_reader_close(reader.file);
     if (tree && info)
@@ -152,11 +153,16 @@ VesselTree *tree_file_parse(const void *bytes, size_t length, const char *name, 
     return tree;
 }
 
+VesselTree *tree_file_parse(const void *bytes, size_t length, const char *name, TreeFileInfo *info, Faults *faults)
+{
+    return parse(bytes, length, false, name, info, faults);
+}
+
 VesselTree *tree_file_load(const char *path, TreeFileInfo *info, Faults *faults)
 {
     size_t length;
     char *bytes = whole_file_read(path, &length, faults);
-    VesselTree *tree = bytes ? tree_file_parse(bytes, length, path, info, faults) : NULL;
+    VesselTree *tree = bytes ? parse(bytes, length, true, path, info, faults) : NULL;
     free(bytes);
     return tree;
 }

@@ -13,7 +13,7 @@ typedef struct TreeFileInfo {  // root attributes
 
 // NULL with faults. `info` may be NULL; free it with tree_file_info_free.
 VesselTree *tree_file_load(const char *path, TreeFileInfo *info, Faults *faults);
-// The same from memory; `name` stands in the messages.
+// The same from memory, without the rehearsal by a child process (recon/hdf5_reader.h); `name` stands in the messages.
 VesselTree *tree_file_parse(const void *bytes, size_t length, const char *name, TreeFileInfo *info, Faults *faults);
 bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char *path, Faults *faults);
 void tree_file_info_free(TreeFileInfo *info);

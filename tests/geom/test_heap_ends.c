@@ -13,8 +13,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+// Under ASan a heap returns null too, with a warning.
+const char *__asan_default_options(void);
+const char *__asan_default_options(void) { return "allocator_may_return_null=1"; }
+
 // What a process says that asks for so much; its exit code.
-static int ask(size_t count, size_t size, char said[500])
+static int ask(size_t count, size_t size, char said[2000])
 {
     int ends[2], status;
     assert_int_equal(pipe(ends), 0);
@@ -26,8 +30,10 @@ static int ask(size_t count, size_t size, char said[500])
         _exit(memory && memory[0] == 0 ? 0 : 1);
     }
     close(ends[1]);
-    ssize_t length = read(ends[0], said, 499);
-    said[length > 0 ? length : 0] = '\0';
+    size_t length = 0;
+    for (ssize_t got; length < 1999 && (got = read(ends[0], said + length, 1999 - length)) > 0;)
+        length += (size_t)got;
+    said[length] = '\0';
     close(ends[0]);
     assert_int_equal(waitpid(child, &status, 0), child);
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
@@ -36,9 +42,9 @@ static int ask(size_t count, size_t size, char said[500])
 static void what_cannot_be_had_ends_the_program(void **state)
 {
     (void)state;
-    char said[500];
+    char said[2000];
     assert_int_equal(ask((size_t)1 << 60, 1, said), 2);
-    assert_string_equal(said, "seldinger: out of memory (asked for 1152921504606846976 bytes in recon/field_fit.c); free some, or give it less to do\n");
+    assert_non_null(strstr(said, "seldinger: out of memory (asked for 1152921504606846976 bytes in recon/field_fit.c); free some, or give it less to do\n"));
     assert_int_equal(ask(SIZE_MAX / 4, 24, said), 2);     // more than a size can say
     assert_non_null(strstr(said, "asked for 18446744073709551615 bytes"));
     assert_int_equal(ask(100, 24, said), 0);
