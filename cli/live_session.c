@@ -54,6 +54,8 @@ bool live_session_open(LiveSession *session, const Scene *scene, const OpenVesse
     if (session->lesson && options->record_path) {
         RecordingOptions record = recording_default_options();
         record.frame_ms = frame_ms;
+        record.trainee = options->trainee;
+        record.date = options->date;
         snprintf(session->record_path, sizeof session->record_path, "%s", options->record_path);
         session->recording = recording_create(options->record_path, session->simulator, &record, faults);
     }

@@ -21,6 +21,7 @@ typedef struct LiveSession {
 
 typedef struct LiveSessionOptions {
     const char *record_path;     // NULL: not recorded
+    const char *trainee, *date;  // who practises and since when (session_date()), kept in the recording; NULL: no trainee's session
     int hand_count;
     HandPort *const *hand;       // (hand_count)
     HandGrip grip;               // at the start; of a resumed session `resumed_released` are let go too, and `fitted` is `resumed_fitted`

@@ -83,3 +83,5 @@ const ScoreFigures *rescore_at(Rescore *rescore, double time_s)
 }
 
 int64_t rescore_first_different(const Rescore *rescore) { return rescore->different; }
+int64_t rescore_steps(const Rescore *rescore) { return rescore->steps; }
+const Score *rescore_score(const Rescore *rescore) { return lesson_score(rescore->lesson); }

@@ -17,5 +17,7 @@ void rescore_advance(Rescore *rescore, int64_t to, double budget_s);
 const ScoreFigures *rescore_at(Rescore *rescore, double time_s);
 // Index of the first step that gave another state than the recording holds, where it stopped; -1: none so far.
 int64_t rescore_first_different(const Rescore *rescore);
+int64_t rescore_steps(const Rescore *rescore);           // that were simulated
+const Score *rescore_score(const Rescore *rescore);      // after them
 
 #endif

@@ -1,8 +1,11 @@
 // seldinger report: a session's file, its recording beside it and earlier sessions of the same trainee as one page, and that printed by a browser.
 #include "cli/session_report.h"
 
+#include "cli/file_kind.h"
 #include "cli/output.h"
+#include "cli/recover.h"
 #include "cli/report.h"
+#include "cli/trainer_files.h"
 #include "cli/tube_tree.h"
 #include "input/text_file.h"
 #include "sim/recording.h"
@@ -16,9 +19,10 @@
 #include <unistd.h>
 
 static const char help[] =
-    "Usage: seldinger report SESSION.json [options]\n\n"
+    "Usage: seldinger report SESSION.json|RECORDING.h5 [options]\n\n"
     "A page about a trainee's session: points and how they came about, errors, plots over time, the tip's path over the vessel, and earlier\n"
-    "sessions of the same trainee at the same exercise. The recording is looked for where the session says, beside it.\n\n"
+    "sessions of the same trainee at the same exercise. The recording is looked for where the session says, beside it. Of a recording without a\n"
+    "session file, as of a program that was killed, the session file is made first, by simulating it again.\n\n"
     "  --html F.html   the page, one file that needs nothing else; default: SESSION.html, unless --pdf is given\n"
     "  --pdf F.pdf     the same on paper, printed by chromium where that is installed\n"
     "  --with FOLDER   where earlier sessions lie; default: the session's own folder\n"
@@ -411,7 +415,7 @@ static bool write_pdf(const char *path, const char *page, size_t length, Faults 
 typedef struct ReportOptions {
     const char *session, *html, *pdf, *with;
     bool quiet;
-    char own_html[4096], own_folder[4096];
+    char own_html[4096], own_folder[4096], beside[4096];
 } ReportOptions;
 
 static int parse_options(int argc, char **argv, ReportOptions *options)
@@ -434,7 +438,7 @@ static int parse_options(int argc, char **argv, ReportOptions *options)
         }
     }
     if (optind != argc - 1 || strlen(argv[optind]) > sizeof options->own_html - 16) {
-        fprintf(stderr, "seldinger report: takes one session file; see `seldinger report --help`\n");
+        fprintf(stderr, "seldinger report: takes one session file or recording; see `seldinger report --help`\n");
         return EXIT_BAD_INPUT;
     }
     options->session = argv[optind];
@@ -447,6 +451,21 @@ static int parse_options(int argc, char **argv, ReportOptions *options)
     if (!options->with)
         options->with = options->own_folder;
     return -1;
+}
+
+// Of a recording: its session file, made by simulating it again where it has none.
+static bool find_session_file(ReportOptions *options, Faults *faults)
+{
+    if (file_kind(options->session) != FILE_RECORDING)
+        return true;
+    trainer_file_beside(options->session, ".json", options->beside, sizeof options->beside);
+    bool is_there = access(options->beside, F_OK) == 0;
+    if (!is_there && !options->quiet)
+        fprintf(stderr, "%s has no session file; simulating it again\n", options->session);
+    if (!is_there && !recover_session(options->session, NULL, NULL, faults))
+        return false;
+    options->session = options->beside;
+    return true;
 }
 
 int verb_report(int argc, char **argv)
@@ -464,7 +483,7 @@ int verb_report(int argc, char **argv)
     output_check_file(options.pdf, &faults);
     output_check_apart(options.html, options.session, &faults);
     output_check_apart(options.pdf, options.session, &faults);
-    bool good = session && session_load(options.session, session, &faults) && faults.count == 0;
+    bool good = session && faults.count == 0 && find_session_file(&options, &faults) && session_load(options.session, session, &faults);
     page = good ? make_page(options.session, session, options.with, &length, &faults) : NULL;
     good = page && (!options.html || output_write(options.html, page, length, &faults));
     good = good && (!options.pdf || write_pdf(options.pdf, page, length, &faults));

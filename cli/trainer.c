@@ -1,6 +1,7 @@
 #include "cli/trainer.h"
 
 #include "cli/live_session.h"
+#include "cli/recover.h"
 #include "cli/scene_views.h"
 #include "cli/trainer_cine.h"
 #include "cli/trainer_files.h"
@@ -49,7 +50,8 @@ typedef struct Trainer {
     int64_t refused;
     bool is_paused, has_told_end;
     char trainee[64];
-    time_t began_at;
+    char date[SESSION_DATE];         // of the session's begin
+    const char *progress;            // what is computed meanwhile
     TimeHistogram frame_cpu_ns;
     TrainerFigures *figures;
 } Trainer;
@@ -68,7 +70,22 @@ __attribute__((format(printf, 3, 4))) static void say(Trainer *trainer, PanelMar
 
 // --- a session's start and end ---
 
-// The window lives while a session is gone through again: the panel with a line of words, no views.
+// While there is no session to be seen: the panel with a line of words, no views.
+static void draw_panel_alone(Trainer *trainer, const WindowInput *input, const char *line)
+{
+    PanelState state = trainer->shown.state;
+    state.warning = line;
+    state.warnings = 0;
+    state.label_count = 0;
+    state.bar_pixels = state.force_full_scale_n = 0;
+    state.tray = NULL;
+    state.now_s = since_begin(trainer);
+    views_draw(trainer->views, &(ViewsFrame){0}, &(PanelLayout){0}, input->width, input->height, 0);
+    panel_draw(trainer->panel, input, &state, 0);
+    window_swap(trainer->window);
+}
+
+// The window lives while a session is gone through again.
 static void show_progress(void *context, double part)
 {
     Trainer *trainer = context;
@@ -78,17 +95,48 @@ static void show_progress(void *context, double part)
     if (now - trainer->progress_s < 0.1 || !window_next_frame(trainer->window, &input))
         return;
     trainer->progress_s = now;
-    PanelState state = trainer->shown.state;
-    snprintf(line, sizeof line, "Computing the session again with the new device: %.0f %%", 100 * part);
-    state.warning = line;
-    state.warnings = 0;
-    state.label_count = 0;
-    state.bar_pixels = state.force_full_scale_n = 0;
-    state.tray = NULL;
-    state.now_s = now;
-    views_draw(trainer->views, &(ViewsFrame){0}, &(PanelLayout){0}, input->width, input->height, 0);
-    panel_draw(trainer->panel, input, &state, 0);
-    window_swap(trainer->window);
+    snprintf(line, sizeof line, "%s: %.0f %%", trainer->progress, 100 * part);
+    draw_panel_alone(trainer, input, line);
+}
+
+// True: yes. The time that the window was to be open counts.
+static bool is_answered_yes(Trainer *trainer, PanelQuestion question)
+{
+    const WindowInput *input;
+    PanelActions actions = {0};
+    panel_ask(trainer->panel, question);
+    while (panel_is_asking(trainer->panel) && !actions.pressed[ACTION_QUIT] &&
+           !(trainer->options->duration_s > 0 && since_begin(trainer) > trainer->options->duration_s)) {
+        bool visible = window_next_frame(trainer->window, &input);
+        panel_take_input(trainer->panel, input, &actions);
+        if (visible)
+            draw_panel_alone(trainer, input, NULL);
+    }
+    return actions.answer > 0;
+}
+
+// Sessions that were cut off: asked before the first one begins.
+static void offer_recovery(Trainer *trainer)
+{
+    char text[300];
+    CutOff found = trainer_find_cut_off(trainer->options->folder);
+    Faults *faults = found.count > 0 ? calloc(1, sizeof *faults) : NULL;
+    if (faults) {
+        const char *slash = strrchr(found.path[found.count - 1], '/');
+        snprintf(text, sizeof text, found.count > 1 ? "%d sessions were cut off before their end, the last is %s. Their reports can still be made: they are simulated again." :
+                 "%d session was cut off before its end: %s. Its report can still be made: it is simulated again.", found.count, slash ? slash + 1 : "");
+        bool wanted = is_answered_yes(trainer, (PanelQuestion){"Recover what was cut off?", text, "Recover", "Not now"});
+        trainer->progress = "Simulating the session again";
+        for (int i = 0; wanted && i < found.count; i++) {
+            faults_clear(faults);
+            if (recover_session(found.path[i], show_progress, trainer, faults))
+                say(trainer, MARK_GOOD, "recovered; seldinger report %s", found.path[i]);
+            else
+                say(trainer, MARK_BAD, "%s", faults->text[0]);
+        }
+    }
+    free(faults);
+    trainer_free_cut_off(&found);
 }
 
 static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *faults)
@@ -105,7 +153,7 @@ static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *f
         hand[count++] = hands_port(trainer->hands, i / MAP_HANDS) + i % MAP_HANDS;
     trainer->desk.grip = (HandGrip){.chosen = trainer->desk.grip.chosen};    // a new session: nothing is locked or let go
     trainer_file_name(options->folder, trainer->scene->path, ".h5", path, sizeof path);
-    LiveSessionOptions session = {.record_path = options->is_recorded ? path : NULL, .hand_count = count, .hand = hand, .grip = trainer->desk.grip, .xray = trainer->desk.xray,
+    LiveSessionOptions session = {.record_path = options->is_recorded ? path : NULL, .trainee = trainer->trainee, .date = trainer->date, .hand_count = count, .hand = hand, .grip = trainer->desk.grip, .xray = trainer->desk.xray,
                                   .resume = resume, .resume_s = resume == options->resume ? options->resume_s : SCRIPT_LONGEST_S, .paused = trainer->is_paused,
                                   .progress = trainer->figures->frames > 0 ? show_progress : NULL, .progress_context = trainer};
     if (!live_session_open(&trainer->session, trainer->scene, trainer->open, &session, faults))
@@ -113,7 +161,6 @@ static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *f
     trainer->desk.grip.released = trainer->session.resumed_released;
     memcpy(trainer->desk.grip.fitted, trainer->session.resumed_fitted, sizeof trainer->desk.grip.fitted);
     trainer->pulses = pulse_clock_start(trainer->session.resumed_s);
-    trainer->began_at = time(NULL);
     trainer->has_told_end = false;
     for (int k = 0; k < TOOLS_MOST; k++)
         trainer->fitted[k] = -1;
@@ -156,7 +203,7 @@ static bool end_session(Trainer *trainer, Faults *faults)
     snprintf(figures->recording, sizeof figures->recording, "%s", session->record_path);
     name_devices(trainer, device);
     if (whole && session->record_path[0])
-        whole = trainer_save_session(trainer->scene, trainer->trainee, device, trainer->began_at, lesson_score(session->lesson), session->record_path, faults);
+        whole = trainer_save_session(trainer->scene, trainer->trainee, device, trainer->date, lesson_score(session->lesson), session->record_path, faults);
     live_session_free(session);
     return whole;
 }
@@ -303,9 +350,9 @@ static bool go_on_in(Trainer *trainer, Scene *scene, bool has_begun, Faults *fau
     RealtimeFigures real;
     Scene *before = trainer->scene;
     const HandGrip grip = trainer->desk.grip;
-    const time_t began_at = trainer->began_at;
     const bool has_told_end = trainer->has_told_end;
     snprintf(path, sizeof path, "%s", trainer->session.record_path);
+    trainer->progress = "Computing the session again with the new device";
     bool good = live_session_stop(&trainer->session, &real, faults);
     live_session_free(&trainer->session);
     RecordedRun *run = good && has_begun ? recorded_run_load_series(path, faults) : NULL;
@@ -317,7 +364,6 @@ static bool go_on_in(Trainer *trainer, Scene *scene, bool has_begun, Faults *fau
         good = good && begin_session(trainer, run, faults);
     }
     recorded_run_free(run);
-    trainer->began_at = began_at;
     trainer->has_told_end = has_told_end;
     trainer->desk.grip.locked = good ? grip.locked & ~(trainer->desk.grip.released | trainer->desk.grip.released << 1) : 0;
     if (good && path[0])
@@ -469,6 +515,7 @@ static bool restart(Trainer *trainer, Faults *faults)
     say(trainer, whole ? MARK_GOOD : MARK_BAD, whole ? "a new session; the last one is saved" : "a new session; the last one could not be saved: %s", faults->text[0]);
     faults_clear(faults);
     trainer->is_paused = false;
+    session_date(time(NULL), trainer->date);
     return begin_session(trainer, NULL, faults);
 }
 
@@ -714,11 +761,16 @@ int trainer_run(Scene *scene, OpenVessel *open, const TrainerOptions *options, T
     for (int k = 0; k < scene->tool_count; k++)
         trainer->own_devices[k] = scene_device_count(scene, k);
     snprintf(trainer->trainee, sizeof trainer->trainee, "%s", options->trainee);
-    if (open_window(trainer, faults) && open_views(trainer, faults) && open_hands(trainer, faults) &&
-        begin_session(trainer, options->resume, faults) && open_cine(trainer, faults)) {
+    bool is_open = open_window(trainer, faults) && open_views(trainer, faults) && open_hands(trainer, faults);
+    if (is_open && options->is_recorded) {
+        trainer_panel_begin(&trainer->shown, trainer->scene, trainer->trainee);
+        offer_recovery(trainer);
+    }
+    session_date(time(NULL), trainer->date);
+    if (is_open && begin_session(trainer, options->resume, faults) && open_cine(trainer, faults)) {
         run_window(trainer, faults);
         double resident = resident_mb();   // before the session is put away
-        bool is_open = trainer->session.realtime != NULL;
+        is_open = trainer->session.realtime != NULL;
         const Moment *moment = is_open ? realtime_moment(trainer->session.realtime) : NULL;
         bool diverged = moment && moment->figures.state == REALTIME_DIVERGED;
         code = is_open && end_session(trainer, faults) ? diverged ? EXIT_UNTRUSTED : EXIT_DONE : EXIT_UNTRUSTED;

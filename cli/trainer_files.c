@@ -1,7 +1,10 @@
 #include "cli/trainer_files.h"
 
 #include "cli/output.h"
+#include "recon/hdf5_reader.h"
+#include "sim/ordered_file.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -65,7 +68,7 @@ void trainer_file_beside(const char *recording, const char *extension, char *out
     snprintf(out, capacity, "%.*s%s", stem, recording, extension);
 }
 
-bool trainer_save_session(const Scene *scene, const char *trainee, const char *device, time_t when, const Score *score, const char *recording,
+bool trainer_save_session(const Scene *scene, const char *trainee, const char *device, const char *date, const Score *score, const char *recording,
                           Faults *faults)
 {
     char path[4096];
@@ -74,7 +77,7 @@ bool trainer_save_session(const Scene *scene, const char *trainee, const char *d
     Session *session = run ? calloc(1, sizeof *session) : NULL;
     char *text = NULL;
     if (session) {
-        session_begin(session, scene, trainee, device, when);
+        session_begin(session, scene, trainee, device, date);
         session_set_score(session, score);
         session_set_run(session, run, name ? name + 1 : recording);
         text = session_json(session);
@@ -89,4 +92,57 @@ bool trainer_save_session(const Scene *scene, const char *trainee, const char *d
     bool good = output_write(path, text, strlen(text), faults);
     free(text);
     return good;
+}
+
+// --- sessions that were cut off ---
+
+static bool has_session_file(const char *recording)
+{
+    char path[4200];
+    trainer_file_beside(recording, ".json", path, sizeof path);
+    return access(path, F_OK) == 0;
+}
+
+static bool is_cut_off(const char *recording)
+{
+    if (has_session_file(recording) || ordered_file_is_being_written(recording))
+        return false;
+    Faults *ignored = calloc(1, sizeof *ignored);
+    Hdf5Reader *file = ignored ? hdf5_reader_open(recording, "", ignored) : NULL;
+    char *trainee = file ? hdf5_text_attribute(file, "/scene", "trainee") : NULL;
+    bool is_session = trainee != NULL;
+    hdf5_reader_close(file);
+    free(trainee);
+    free(ignored);
+    return is_session;
+}
+
+static int compare_paths(const void *a, const void *b) { return strcmp(a, b); }
+
+CutOff trainer_find_cut_off(const char *folder)
+{
+    CutOff found = {0};
+    DIR *directory = opendir(folder);
+    for (struct dirent *entry; directory && (entry = readdir(directory));) {
+        char path[sizeof *found.path];
+        const char *dot = strrchr(entry->d_name, '.');
+        if (!dot || strcmp(dot, ".h5") != 0 || (size_t)snprintf(path, sizeof path, "%s/%s", folder, entry->d_name) >= sizeof path || !is_cut_off(path))
+            continue;
+        char(*more)[4096] = realloc(found.path, (size_t)(found.count + 1) * sizeof *found.path);
+        if (!more)
+            break;
+        found.path = more;
+        memcpy(found.path[found.count++], path, sizeof path);
+    }
+    if (directory)
+        closedir(directory);
+    if (found.count > 1)
+        qsort(found.path, (size_t)found.count, sizeof *found.path, compare_paths);
+    return found;
+}
+
+void trainer_free_cut_off(CutOff *found)
+{
+    free(found->path);
+    *found = (CutOff){0};
 }

@@ -12,7 +12,16 @@ void trainer_file_name(const char *folder, const char *scene_path, const char *e
 // Beside a recording: its name with another extension.
 void trainer_file_beside(const char *recording, const char *extension, char *out, size_t capacity);
 // Writes the session file beside a recording that is closed. False with faults.
-bool trainer_save_session(const Scene *scene, const char *trainee, const char *device, time_t when, const Score *score, const char *recording,
+bool trainer_save_session(const Scene *scene, const char *trainee, const char *device, const char *date, const Score *score, const char *recording,
                           Faults *faults);
+
+typedef struct CutOff {
+    int count;
+    char (*path)[4096];          // (count) recordings, by name
+} CutOff;
+// The sessions in a folder that were cut off: recordings that hold a session, have no session file beside them, and are written by no program at the
+// moment. Other files are passed over.
+CutOff trainer_find_cut_off(const char *folder);
+void trainer_free_cut_off(CutOff *found);
 
 #endif

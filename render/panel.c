@@ -74,6 +74,8 @@ static void confirm(Panel *panel, PanelActions *actions)
         trim_name(panel->name, actions->trainee, sizeof actions->trainee);
         actions->trainee_set = actions->trainee[0] != 0;
     }
+    if (panel->dialogue == DIALOGUE_QUESTION)
+        actions->answer = 1;
     panel->dialogue = DIALOGUE_NONE;
 }
 
@@ -124,8 +126,10 @@ static void take_dialogue(Panel *panel, const WindowInput *input, PanelActions *
         return;
     if (is_confirmed)
         confirm(panel, actions);
-    else if (is_refused)
+    else if (is_refused) {
+        actions->answer = panel->dialogue == DIALOGUE_QUESTION ? -1 : 0;
         panel->dialogue = DIALOGUE_NONE;
+    }
     panel->answer = 0;
 }
 
@@ -287,6 +291,12 @@ void panel_show_help(Panel *panel, bool is_shown) { panel->has_help = is_shown; 
 bool panel_has_panels(const Panel *panel) { return panel->has_panels; }
 void panel_show_hints(Panel *panel, bool is_shown) { panel->has_hints = is_shown; }
 bool panel_is_asking(const Panel *panel) { return panel->dialogue != DIALOGUE_NONE; }
+
+void panel_ask(Panel *panel, PanelQuestion question)
+{
+    open_dialogue(panel, DIALOGUE_QUESTION);
+    panel->question = question;
+}
 
 void panel_open_tray(Panel *panel, int device_count, int device)
 {

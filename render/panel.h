@@ -163,7 +163,13 @@ typedef struct PanelActions {
     char trainee[64];              // UTF-8, printable, no control characters, trimmed
     PanelMouse mouse;
     PanelTrayChoice tray;
+    int answer;                    // to panel_ask(): 1 yes, -1 no, 0 none in this frame
 } PanelActions;
+
+// Texts are the caller's and live until it is answered.
+typedef struct PanelQuestion {
+    const char *title, *text, *yes, *no;
+} PanelQuestion;
 
 typedef struct Panel Panel;
 
@@ -183,6 +189,7 @@ void panel_show_help(Panel *panel, bool is_shown);
 bool panel_has_panels(const Panel *panel);       // Tab hides them: pass to panel_layout
 void panel_show_hints(Panel *panel, bool is_shown);
 bool panel_is_asking(const Panel *panel);        // a dialogue has the keyboard
+void panel_ask(Panel *panel, PanelQuestion question);    // Enter or Esc, a button: PanelActions.answer
 // The tray: the caller opens it (ACTION_EXCHANGE, a device's button), the user or the caller closes it. While it is open it has the keyboard.
 void panel_open_tray(Panel *panel, int device_count, int device);      // with this one chosen
 void panel_close_tray(Panel *panel);

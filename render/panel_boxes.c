@@ -115,27 +115,28 @@ void panel_draw_help(Panel *panel, const WindowInput *input, const PanelState *s
 
 void panel_draw_dialogue(Panel *panel, const WindowInput *input)
 {
-    static const struct { const char *title, *text, *yes, *no; } dialogue[] = {
+    static const PanelQuestion own[] = {
         [DIALOGUE_QUIT] = {"End the session?", "The session is saved as it is now.", "End", "Go on"},
         [DIALOGUE_RESTART] = {"Begin anew?", "The exercise starts again from the beginning; this attempt is kept in the recording.", "Begin anew", "Go on"},
         [DIALOGUE_TRAINEE] = {"Who is practising?", "The name stands in the report, and earlier sessions of the same name are compared.", "Take", "Leave it"}};
+    const PanelQuestion *question = panel->dialogue == DIALOGUE_QUESTION ? &panel->question : &own[panel->dialogue];
     Gui *gui = panel->gui;
     float s = gui_scale(gui), width = floorf(fminf(420 * s, (float)input->width - 20 * s));
-    float height = floorf((panel->dialogue == DIALOGUE_TRAINEE ? 142 : 112) * s);
+    float height = floorf((panel->dialogue == DIALOGUE_TRAINEE || panel->dialogue == DIALOGUE_QUESTION ? 142 : 112) * s);
     veil(panel, input);
     GuiRect at = {floorf(((float)input->width - width) / 2), floorf(((float)input->height - height) / 2), width, height};
     gui_window_begin(gui, "dialogue", at, GUI_ON_TOP | GUI_FRAMED);
-    gui_text(gui, GUI_LARGE, gui_colors.text, dialogue[panel->dialogue].title);
-    gui_text_wrapped(gui, GUI_NORMAL, gui_colors.dim, dialogue[panel->dialogue].text);
+    gui_text(gui, GUI_LARGE, gui_colors.text, question->title);
+    gui_text_wrapped(gui, GUI_NORMAL, gui_colors.dim, question->text);
     gui_space(gui, floorf(4 * s));
     if (panel->dialogue == DIALOGUE_TRAINEE && gui_text_field(gui, "name", panel->name, sizeof panel->name, panel->dialogue_is_new))
         panel->answer = 1;
     gui_space(gui, floorf(2 * s));
     float gap = floorf(8 * s), button = floorf((gui_width(gui) - gap) / 2);
-    if (gui_button(gui, "yes", dialogue[panel->dialogue].yes, "Enter", button, false).pressed)
+    if (gui_button(gui, "yes", question->yes, "Enter", button, false).pressed)
         panel->answer = 1;
     gui_beside(gui, gap);
-    if (gui_button(gui, "no", dialogue[panel->dialogue].no, "Esc", button, false).pressed)
+    if (gui_button(gui, "no", question->no, "Esc", button, false).pressed)
         panel->answer = -1;
     gui_window_end(gui);
 }

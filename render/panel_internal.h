@@ -6,7 +6,7 @@
 #include "render/plot.h"
 
 typedef enum { BRIEFING_AT_BEGIN, BRIEFING_OPEN, BRIEFING_CLOSED } Briefing;   // AT_BEGIN: until the tool or the X-ray is used
-typedef enum { DIALOGUE_NONE, DIALOGUE_QUIT, DIALOGUE_RESTART, DIALOGUE_TRAINEE, DIALOGUE_TRAY } Dialogue;
+typedef enum { DIALOGUE_NONE, DIALOGUE_QUIT, DIALOGUE_RESTART, DIALOGUE_TRAINEE, DIALOGUE_QUESTION, DIALOGUE_TRAY } Dialogue;
 enum { PANEL_MESSAGES = 100, PANEL_TABS = 5, BUTTONS_IN_ROW = 5 };
 
 typedef struct PanelMessage {
@@ -35,6 +35,7 @@ struct Panel {
     // what is open
     Dialogue dialogue;
     bool dialogue_is_new;
+    PanelQuestion question;
     int answer;                    // a click on its yes (1) or no (-1)
     char name[64];                 // the text field
     PanelTrayChoice tray;

@@ -1,3 +1,4 @@
+#define _GNU_SOURCE   // locks of an open file, not of a process
 #include "sim/ordered_file.h"
 
 #include <errno.h>
@@ -157,6 +158,16 @@ static bool write_end(OrderedFile *file)
 
 // --- what the library calls ---
 
+bool ordered_file_is_being_written(const char *path)
+{
+    struct flock lock = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
+    int descriptor = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    bool is_locked = descriptor >= 0 && fcntl(descriptor, F_OFD_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
+    if (descriptor >= 0)
+        close(descriptor);
+    return is_locked;
+}
+
 static H5FD_t *driver_open(const char *name, unsigned flags, hid_t access, haddr_t most)
 {
     (void)access;
@@ -168,6 +179,8 @@ static H5FD_t *driver_open(const char *name, unsigned flags, hid_t access, haddr
         return NULL;
     file->page = aligned_alloc(ORDERED_FILE_PAGE, ORDERED_FILE_PAGE);
     file->descriptor = file->page ? open(name, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666) : -1;
+    if (file->descriptor >= 0)
+        (void)fcntl(file->descriptor, F_OFD_SETLK, &(struct flock){.l_type = F_WRLCK, .l_whence = SEEK_SET});   // some file systems have none
     if (file->descriptor < 0) {
         free(file->page);
         free(file);

@@ -36,6 +36,8 @@ hid_t ordered_file_create(const char *path, hid_t creation, hid_t access);
 OrderedFile *ordered_file_of(hid_t file);
 // What is allocated next starts a page: the object headers of datasets that are to grow together, made right after. Two pages at most.
 void ordered_file_start_page(OrderedFile *file);
+// Whether a program, this one too, has the file open for writing. The lock is the kernel's and advisory: it ends with the program, and readers are not kept out.
+bool ordered_file_is_being_written(const char *path);
 // After an H5Fflush(). `index_entries`: of a chunk index' node, twice H5Pset_istore_k()'s value. `ahead`: bytes that may be allocated
 // between a reader's first look and its last.
 bool ordered_file_seal(OrderedFile *file, int index_entries, hsize_t ahead);

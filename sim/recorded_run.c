@@ -392,6 +392,8 @@ static void read_scene(const Reader *reader, RecordedRun *run)
     run->files = hdf5_text_attribute(reader->file, "/scene", "files");
     run->sha256 = hdf5_text_attribute(reader->file, "/scene", "sha256");
     run->contact = contact_of(hdf5_text_attribute(reader->file, "/scene", "contact"));
+    run->trainee = hdf5_text_attribute(reader->file, "/scene", "trainee");
+    run->date = hdf5_text_attribute(reader->file, "/scene", "date");
 }
 
 static RecordedRun *load(const char *path, bool with_frames, Faults *faults)
@@ -451,6 +453,8 @@ void recorded_run_free(RecordedRun *run)
     free(run->wall_force);
     free(run->s);
     free(run->scene_path);
+    free(run->trainee);
+    free(run->date);
     free(run->files);
     free(run->sha256);
     free(run->scene_text);

@@ -282,6 +282,11 @@ static char *whole_path(const char *path)
     return NULL;
 }
 
+static bool write_session(hid_t place, const RecordingOptions *options)
+{
+    return !options->trainee || (write_text(place, "trainee", NULL, options->trainee) && write_text(place, "date", NULL, options->date));
+}
+
 // /scene: the text, and path and sha256 of every file that the run was made from, one a line.
 static bool write_scene(Recording *recording, const Scene *scene)
 {
@@ -321,7 +326,7 @@ static bool write_scene(Recording *recording, const Scene *scene)
     good = good && write_text(recording->file, NULL, "/scene", scene->text);
     hid_t place = good ? H5Dopen2(recording->file, "/scene", H5P_DEFAULT) : -1;
     good = good && write_text(place, "path", NULL, path) && write_text(place, "contact", NULL, contact_name[scene->contact]) &&
-           write_text(place, "files", NULL, paths) && write_text(place, "sha256", NULL, sums);
+           write_text(place, "files", NULL, paths) && write_text(place, "sha256", NULL, sums) && write_session(place, &recording->options);
     if (place >= 0)
         H5Dclose(place);
     free(path);

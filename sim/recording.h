@@ -15,7 +15,8 @@
 // /xray (S,17: sim/xray.h; 16 in recordings from before contrast agent had a tool), /report/penetration_mm, contacts (with force), iterations
 // and residual of the contact solve, linearisations (1 in a quiet step), flags (all S), wall_force_n (S,2): largest and sum;
 // frames: /wire/step (K) the row of the frame, /wire/position (K,M,3), /wire/quaternion (K,M,4) as w x y z, /contact/force_n (K,M,3),
-// /contact/gap_mm (K,M), /contact/vessel_node (K,M); once: /wire/s_mm (M), /wire/radius_mm (M), /scene (text; attributes path, contact, files, sha256).
+// /contact/gap_mm (K,M), /contact/vessel_node (K,M); once: /wire/s_mm (M), /wire/radius_mm (M), /scene (text; attributes path, contact, files, sha256,
+// of a session trainee and date, UTC as in its session file).
 // Several tools: /wire and /contact are those of the shared centreline, whose nodes come and go. M is the most there can be, /wire/count (K) how many there are; the
 // rows beyond hold NaN (vessel_node -1), and /wire/s_mm and radius_mm are (K,M). Tool N, 0 the outermost, has a group /tools/N with the attributes name and kind,
 //   rows: command (S,2), proximal (S,2), inserted_mm (S), released (S); of tool 0 they are links to those at the root;
@@ -33,6 +34,7 @@
 typedef struct RecordingOptions {
     double frame_ms;         // simulated time between frames, default 10
     double flush_s;          // wall time between flushes, default 0.2
+    const char *trainee, *date;      // of a session (session_date()), else NULL
     int64_t expected_steps;  // sizes the chunks and their index; 0 or 1: unknown
     int file_count;          // further files that the run depends on, besides what the scene names
     const char *const *file;
@@ -94,6 +96,7 @@ typedef struct RecordedRun {
     double *wall_force;      // (S, 2) [N] largest and sum
     double *s, *radius;      // (M) [mm], of several tools (K, M)
     char *scene_text, *scene_path;   // NULL where the file lacks them
+    char *trainee, *date;    // of a session, else NULL
     char *files, *sha256;    // paths and sums of what the run was made from, one a line
     ContactKind contact;     // CONTACT_COUNT: not said, the scene's
     double step_ms;

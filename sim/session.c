@@ -23,17 +23,32 @@ static void copy_text(char *to, size_t capacity, const char *from)
     to[length] = 0;
 }
 
-void session_begin(Session *session, const Scene *scene, const char *trainee, const char *device, time_t when)
+// YYYY-MM-DDThh:mm:ssZ, so that dates sort as text.
+bool session_is_date(const char *text)
+{
+    static const char form[] = "0000-00-00T00:00:00Z";
+    for (size_t i = 0; i < sizeof form; i++)
+        if (form[i] == '0' ? text[i] < '0' || text[i] > '9' : text[i] != form[i])
+            return false;
+    return true;
+}
+
+void session_date(time_t when, char text[SESSION_DATE])
+{
+    struct tm utc = {0};
+    gmtime_r(&when, &utc);
+    strftime(text, SESSION_DATE, "%Y-%m-%dT%H:%M:%SZ", &utc);
+}
+
+void session_begin(Session *session, const Scene *scene, const char *trainee, const char *device, const char *date)
 {
     Sha256 sha;
-    struct tm utc = {0};
     *session = (Session){.step_ms = scene->dt};
     copy_text(session->trainee, sizeof session->trainee, trainee);
     copy_text(session->device, sizeof session->device, device);
     copy_text(session->version, sizeof session->version, "seldinger " SELDINGER_VERSION);
     copy_text(session->scene_path, sizeof session->scene_path, scene->path);
-    gmtime_r(&when, &utc);
-    strftime(session->date, sizeof session->date, "%Y-%m-%dT%H:%M:%SZ", &utc);
+    copy_text(session->date, sizeof session->date, date);
     sha256_begin(&sha);
     sha256_add(&sha, scene->text, strlen(scene->text));
     sha256_end(&sha, session->scene_sha256);
@@ -149,16 +164,6 @@ static void read_hex(const JsonReading *reading, const cJSON *object, const char
         faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' has %zu hexadecimal digits, small letters", where, key, digits);
 }
 
-// YYYY-MM-DDThh:mm:ssZ, so that dates sort as text.
-static bool is_date(const char *text)
-{
-    static const char form[] = "0000-00-00T00:00:00Z";
-    for (size_t i = 0; i < sizeof form; i++)
-        if (form[i] == '0' ? text[i] < '0' || text[i] > '9' : text[i] != form[i])
-            return false;
-    return true;
-}
-
 static void read_recording(const JsonReading *reading, const cJSON *object, Session *s)
 {
     static const char *const keys[] = {"path", "steps", "step_ms", "series_sha256", "state_hash", NULL};
@@ -211,7 +216,7 @@ static void read_session(const JsonReading *reading, const cJSON *root, Session 
     json_text(reading, root, "session", "device", sizeof s->device, s->device);
     json_text(reading, root, "session", "version", sizeof s->version, s->version);
     json_text(reading, root, "session", "date", sizeof s->date, s->date);
-    if (!is_date(s->date))
+    if (!session_is_date(s->date))
         faults_add(reading->faults, reading->file, 0, 0, "'date' is '%.24s'; as in 2025-11-21T22:05:00Z", s->date);
     const cJSON *scene = cJSON_GetObjectItemCaseSensitive(root, "scene");
     if (json_keys(reading, scene, "scene", scene_keys)) {

@@ -14,11 +14,11 @@
 
 #include <time.h>
 
-enum { SESSION_NAME = 96, SESSION_PATH = 1024, SESSION_BYTES_MOST = 1 << 20 };
+enum { SESSION_DATE = 24, SESSION_NAME = 96, SESSION_PATH = 1024, SESSION_BYTES_MOST = 1 << 20 };
 
 typedef struct Session {
     char trainee[SESSION_NAME], device[SESSION_NAME];
-    char date[24];               // UTC, as above
+    char date[SESSION_DATE];     // UTC, as above
     char version[SESSION_NAME];  // of the program
     char scene_path[SESSION_PATH], scene_sha256[65];     // of its text
     char title[EXERCISE_TITLE], target[64];              // "" without exercise
@@ -32,8 +32,10 @@ typedef struct Session {
     ScoreEvent event[SCORE_EVENTS_MOST];
 } Session;
 
+void session_date(time_t when, char text[SESSION_DATE]);     // UTC, as in the file
+bool session_is_date(const char *text);
 // Who, when and where. Texts are cut to their room at a whole UTF-8 character.
-void session_begin(Session *session, const Scene *scene, const char *trainee, const char *device, time_t when);
+void session_begin(Session *session, const Scene *scene, const char *trainee, const char *device, const char *date);
 void session_set_score(Session *session, const Score *score);
 // What the recording holds, read back after it was closed; `path` as it shall stand in the file.
 void session_set_run(Session *session, const RecordedRun *run, const char *path);

@@ -282,6 +282,31 @@ static void a_recording_is_shown_in_the_window(void **state)
     RUNS(0, "exec %s replay '%s' --duration-s 3 --size 640x480 >out.txt 2>&1", SELDINGER_PROGRAM, newest_recording());
 }
 
+// Killed while a key is held; the next start asks, and Enter has it scored.
+static const char killing_hand[] = "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 0.5; "
+                                   "xdotool key e; xdotool keydown Up; sleep 3; kill -9 $(xdotool getwindowpid $W); xdotool keyup Up";
+static const char recovering_hand[] = "W=$(xdotool search --sync --onlyvisible --name Seldinger: | head -1); xdotool windowfocus --sync $W 2>/dev/null; sleep 1; "
+                                      "xdotool key Return; while ! ls killed/*.json >/dev/null 2>&1; do sleep 0.2; done; sleep 1; "
+                                      "while xdotool search --name Seldinger: >/dev/null 2>&1; do xdotool key Escape; sleep 0.5; xdotool key Return; sleep 0.3; done";
+
+static void a_session_that_was_cut_off_is_recovered(void **state)
+{
+    (void)state;
+    need_display();
+    RUNS(137, "(%s) & %s nav scene.yaml --sessions killed --trainee Eve --duration-s 60 --size 800x600 >out.txt 2>&1; exit $?", killing_hand, SELDINGER_PROGRAM);
+    RUNS(0, "test $(ls killed/*.h5 | wc -l) = 1 && ! ls killed/*.json 2>/dev/null && cp killed/*.h5 cut-off.h5");
+    RUNS(0, "(%s) & exec %s nav scene.yaml --sessions killed --duration-s 60 --size 800x600 >out.txt 2>&1", recovering_hand, SELDINGER_PROGRAM);
+    RUNS(0, "grep -q '\"trainee\":[[:space:]]*\"Eve\"' killed/*.json");
+    // the same by the report alone
+    RUNS(0, "%s report cut-off.h5 --quiet && grep -q '\"trainee\":[[:space:]]*\"Eve\"' cut-off.json && test -s cut-off.html", SELDINGER_PROGRAM);
+    RecordedRun *recorded = load(in_folder("cut-off.h5"));
+    static Session session;
+    faults_clear(&faults);
+    assert_true(session_load(in_folder("cut-off.json"), &session, &faults));
+    assert_true(session_is_of(&session, recorded) && session.steps > 1000 && session.figures.path_mm > 1);
+    recorded_run_free(recorded);
+}
+
 static void without_a_display_it_says_so(void **state)
 {
     (void)state;
@@ -296,6 +321,6 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_session_by_keys_is_recorded_scored_and_replayed),
                                        cmocka_unit_test(a_session_goes_on_from_a_moment_of_another), cmocka_unit_test(a_recording_is_shown_in_the_window),
                                        cmocka_unit_test(two_tools_are_moved_by_keys), cmocka_unit_test(a_tip_is_shaped_and_put_in_from_the_tray),
-                                       cmocka_unit_test(without_a_display_it_says_so)};
+                                       cmocka_unit_test(a_session_that_was_cut_off_is_recovered), cmocka_unit_test(without_a_display_it_says_so)};
     return cmocka_run_group_tests(tests, open_display, close_display);
 }

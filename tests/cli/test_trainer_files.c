@@ -89,15 +89,26 @@ static void no_name_is_taken_twice(void **state)
     assert_string_equal(beside, "c.json");
 }
 
+static void expect_cut_off(int count)
+{
+    CutOff found = trainer_find_cut_off(folder);
+    assert_int_equal(found.count, count);
+    for (int i = 0; i < count; i++)
+        assert_string_equal(found.path[i], in_folder("bend.h5"));
+    trainer_free_cut_off(&found);
+}
+
 static void the_session_file_is_of_its_recording(void **state)
 {
     (void)state;
-    char path[200];
+    char path[200], report[5000];
     snprintf(path, sizeof path, "%s", in_folder("bend.h5"));
     TrainerScene it = trainer_scene_open(false);
     Simulator *simulator = simulator_create(it.scene, it.open.vessel, &faults);
     Score *score = score_create(simulator, NULL);
     RecordingOptions options = recording_default_options();
+    options.trainee = "Ada \"the hand\"";
+    options.date = "2023-11-14T22:13:20Z";
     Recording *recording = recording_create(path, simulator, &options, &faults);
     assert_true(score && recording);
     XrayControl xray = xray_default_control();
@@ -108,8 +119,9 @@ static void the_session_file_is_of_its_recording(void **state)
         score_step(score, simulator, &(ToolCommands){.tool = {command}}, &xray);
         assert_true(recording_step(recording, simulator, &(ToolCommands){.tool = {command}}, &xray));
     }
+    expect_cut_off(0);           // it is being written
     assert_true(recording_close(recording, simulator, &faults));
-    assert_true(trainer_save_session(it.scene, "Ada \"the hand\"", "keyboard", 1700000000, score, path, &faults));
+    assert_true(trainer_save_session(it.scene, "Ada \"the hand\"", "keyboard", "2023-11-14T22:13:20Z", score, path, &faults));
     static Session session;
     assert_true(session_load(in_folder("bend.json"), &session, &faults));
     assert_string_equal(session.trainee, "Ada \"the hand\"");
@@ -122,9 +134,22 @@ static void the_session_file_is_of_its_recording(void **state)
     run->command[10] += 1;
     assert_false(session_is_of(&session, run));
     recorded_run_free(run);
+    // a program that was killed leaves no session file
+    Session saved = session;
+    remove(in_folder("bend.json"));
+    expect_cut_off(1);
+    snprintf(report, sizeof report, "%s report --quiet '%s'", SELDINGER_PROGRAM, path);
+    assert_int_equal(system(report), 0);
+    expect_cut_off(0);
+    assert_true(session_load(in_folder("bend.json"), &session, &faults));
+    assert_string_equal(session.device, "not known: the session was cut off");
+    memcpy(session.device, saved.device, sizeof saved.device);
+    assert_true(strstr(session.scene_path, saved.scene_path) > session.scene_path);      // named from anywhere
+    memcpy(session.scene_path, saved.scene_path, sizeof saved.scene_path);
+    assert_memory_equal(&session, &saved, sizeof session);
     // a recording that is not there
     faults_clear(&faults);
-    assert_false(trainer_save_session(it.scene, "Ada", "keyboard", 1700000000, score, in_folder("nowhere.h5"), &faults));
+    assert_false(trainer_save_session(it.scene, "Ada", "keyboard", "2023-11-14T22:13:20Z", score, in_folder("nowhere.h5"), &faults));
     assert_true(faults.count > 0);
     assert_int_equal(access(in_folder("nowhere.json"), F_OK), -1);
     score_free(score);

@@ -36,7 +36,9 @@ static void record(const char *path, Session *session, const char *trainee, time
     assert_true(recording_close(recording, p->simulator, &faults));
     RecordedRun *run = recorded_run_load_series(path, &faults);
     assert_non_null(run);
-    session_begin(session, p->scene, trainee, "a keyboard", when);
+    char date[SESSION_DATE];
+    session_date(when, date);
+    session_begin(session, p->scene, trainee, "a keyboard", date);
     session_set_score(session, p->score);
     session_set_run(session, run, strrchr(path, '/') + 1);
     assert_int_equal(session->figures.state, SCORE_REACHED);
@@ -113,7 +115,7 @@ static void several_tools_are_read_back(void **state)
     Practice *p = practice_begin(TWO_IN_THE_OPEN EXERCISE(", rules: {wire_behind_mm: 3}"), NULL);
     practice_go_tools(p, 20, 20, 0.5);
     practice_go_tools(p, 0, -20, 0.3);
-    session_begin(&two, p->scene, "Ada", "", 0);
+    session_begin(&two, p->scene, "Ada", "", "1970-01-01T00:00:00Z");
     session_set_score(&two, p->score);
     practice_end(p);
     memset(two.series_sha256, '0', 64);
@@ -271,7 +273,7 @@ static void long_names_are_cut_at_a_character(void **state)
     Practice *p = practice_begin(SCENE, NULL);
     for (int i = 0; i < 149; i++)
         memcpy(name + 2 * i, "\xc3\xa9", 3);
-    session_begin(&session, p->scene, name, "x", 0);
+    session_begin(&session, p->scene, name, "x", "1970-01-01T00:00:00Z");
     assert_int_equal(strlen(session.trainee), 94);           // 95 bytes would end within one
     assert_string_equal(session.date, "1970-01-01T00:00:00Z");
     practice_end(p);
