@@ -3,6 +3,7 @@
 
 #include "cli/junction_sheets.h"
 #include "cli/output.h"
+#include "cli/output_plan.h"
 #include "cli/reach_report.h"
 #include "geom/sort_doubles.h"
 #include "recon/blurred_edge.h"
@@ -368,11 +369,13 @@ static double seconds_now(void)
 
 static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seconds, int64_t *left_out, Faults *faults)
 {
-    if (command->output)
-        output_check_file(command->output, faults);
-    output_check(command->json, faults);
-    if (command->picture)
-        output_check_file(command->picture, faults);
+    OutputPlan plan = {.faults = faults};
+    output_plan_write_file(&plan, "-o", command->output);
+    output_plan_write(&plan, "--json", command->json);
+    output_plan_write_file(&plan, "--picture", command->picture);
+    output_plan_write_file(&plan, "--junctions", command->junctions.picture);
+    output_plan_read(&plan, "the tree", command->tree);
+    output_plan_read_volume(&plan, "--volume", command->junctions.volume);
     VesselTree *tree = tree_file_load(command->tree, info, faults), *model = NULL;
     if (tree && tree->point_count < 4)
         faults_add(faults, command->tree, 0, 0, "has %d nodes and %lld points; at least 4 points on the wall are needed", tree->node_count,

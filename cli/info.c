@@ -3,7 +3,7 @@
 
 #include "cli/file_kind.h"
 #include "cli/junction_sheets.h"
-#include "cli/output.h"
+#include "cli/output_plan.h"
 #include "cli/reach_report.h"
 #include "cli/report.h"
 #include "geom/sort_doubles.h"
@@ -447,16 +447,15 @@ int verb_info(int argc, char **argv)
     FileKind kind = file_kind(path);
     if ((report || picture || wishes.junctions.picture) && kind != FILE_TREE && kind != FILE_MISSING)
         faults_add(&faults, path, 0, 0, "is no tree or model; %s is made of those", report ? "--report" : picture ? "--picture" : "--junctions");
-    if (report)
-        output_check(report, &faults);
-    if (picture)
-        output_check_file(picture, &faults);
-    if (wishes.junctions.picture)
-        output_check_file(wishes.junctions.picture, &faults);
+    OutputPlan plan = {.faults = &faults};
+    output_plan_write(&plan, "--report", report);
+    output_plan_write_file(&plan, "--picture", picture);
+    output_plan_write_file(&plan, "--junctions", wishes.junctions.picture);
+    output_plan_read(&plan, "the file", path);
+    output_plan_read(&plan, "--before", wishes.junctions.before);
+    output_plan_read_volume(&plan, "--volume", wishes.junctions.volume);
     if ((wishes.junctions.volume || wishes.junctions.before) && !wishes.junctions.picture)
         faults_add(&faults, path, 0, 0, "--volume and --before belong to the pictures of --junctions F.png");
-    output_check_apart(report, path, &faults);
-    output_check_apart(picture, path, &faults);
     if (faults.count > 0) {
         cJSON_Delete(object);
         return cli_bad_input(&faults);

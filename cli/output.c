@@ -64,17 +64,6 @@ bool output_check_file(const char *path, Faults *faults)
     return output_check(path, faults);
 }
 
-bool output_check_apart(const char *path, const char *input, Faults *faults)
-{
-    struct stat out, in;
-    if (!path || !input || !strcmp(path, "-") || stat(path, &out) || stat(input, &in))
-        return true;
-    if (!S_ISREG(out.st_mode) || out.st_dev != in.st_dev || out.st_ino != in.st_ino)
-        return true;
-    faults_add(faults, path, 0, 0, "is read here and would be lost; another name to write");
-    return false;
-}
-
 bool output_write(const char *path, const void *bytes, size_t length, Faults *faults)
 {
     if (!is_special(path))

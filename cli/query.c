@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "cli/output.h"
+#include "cli/output_plan.h"
 #include "recon/tree_file.h"
 #include "recon/whole_file.h"
 
@@ -241,9 +242,10 @@ int verb_query(int argc, char **argv)
     if (!points || !output)
         return usage_fault(points ? "lacks -o F.csv" : "lacks --points F.csv", "");
     PointTable table = {0};
-    output_check(output, &faults);
-    output_check_apart(output, argv[optind], &faults);
-    output_check_apart(output, points, &faults);
+    OutputPlan plan = {.faults = &faults};
+    output_plan_write(&plan, "-o", output);
+    output_plan_read(&plan, "the model", argv[optind]);
+    output_plan_read(&plan, "--points", points);
     VesselTree *tree = tree_file_load(argv[optind], NULL, &faults);
     if (tree && !vessel_tree_is_model(tree))
         faults_add(&faults, argv[optind], 0, 0, "is a tree without a model; make one with `seldinger fit`");

@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "cli/output.h"
+#include "cli/output_plan.h"
 #include "cli/run_chart.h"
 #include "cli/run_files.h"
 #include "cli/run_hands.h"
@@ -151,12 +152,17 @@ static Scene *prepare_scene(const RunOptions *options, Faults *faults)
             kind = i;
     if (options->contact && kind < 0)
         faults_add(faults, "--contact", 0, 0, "'%.40s' is not known; valid: lim, lim_blend, lim_switch, mesh, smooth_mesh, flat_mesh, grid, tube", options->contact);
-    output_check(options->summary, faults);
-    output_check(options->final, faults);
-    output_check(options->score, faults);
-    output_check_file(options->picture, faults);
-    output_check_file(options->chart, faults);
-    output_check_file(options->record, faults);
+    OutputPlan plan = {.faults = faults};
+    output_plan_write(&plan, "--summary", options->summary);
+    output_plan_write(&plan, "--final", options->final);
+    output_plan_write(&plan, "--score", options->score);
+    output_plan_write_file(&plan, "--picture", options->picture);
+    output_plan_write_file(&plan, "--chart", options->chart);
+    output_plan_write_file(&plan, "--record", options->record);
+    output_plan_read_scene(&plan, scene);
+    output_plan_read(&plan, "--script", options->script);
+    for (int i = 0; i < options->device_count; i++)
+        output_plan_read(&plan, "--device", options->device[i]);
 #ifndef SELDINGER_RENDER
     if (options->picture || options->chart)
         faults_add(faults, options->picture ? "--picture" : "--chart", 0, 0, "this build has no pictures; build with -DSELDINGER_RENDER=ON");

@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "cli/output.h"
+#include "cli/output_plan.h"
 #include "recon/blurred_edge.h"
 #include "recon/rbt_track.h"
 #include "recon/trace.h"
@@ -430,15 +431,12 @@ static Trace *trace_of(const SegmentArguments *a, Faults *faults)
 
 static int segment(const SegmentArguments *a, Faults *faults)
 {
-    output_check_file(a->out, faults);
-    output_check(a->json, faults);
-    if (a->picture)
-        output_check_file(a->picture, faults);
-    const char *outputs[] = {a->out, a->json, a->picture};
-    for (size_t i = 0; i < sizeof outputs / sizeof outputs[0]; i++) {
-        output_check_apart(outputs[i], a->volume, faults);
-        output_check_apart(outputs[i], a->trace, faults);
-    }
+    OutputPlan plan = {.faults = faults};
+    output_plan_write_file(&plan, "-o", a->out);
+    output_plan_write(&plan, "--json", a->json);
+    output_plan_write_file(&plan, "--picture", a->picture);
+    output_plan_read_volume(&plan, "the volume", a->volume);
+    output_plan_read(&plan, "--trace", a->trace);
     double start = seconds();
     Trace *trace = trace_of(a, faults);
     Volume *volume = volume_load(a->volume, faults);

@@ -2,6 +2,7 @@
 #include "cli/session_report.h"
 
 #include "cli/output.h"
+#include "cli/output_plan.h"
 #include "cli/report.h"
 #include "cli/tube_tree.h"
 #include "input/text_file.h"
@@ -460,10 +461,11 @@ int verb_report(int argc, char **argv)
     faults_clear(&faults);
     Session *session = calloc(1, sizeof *session);
     char *page = NULL;
-    output_check(options.html, &faults);
-    output_check_file(options.pdf, &faults);
-    output_check_apart(options.html, options.session, &faults);
-    output_check_apart(options.pdf, options.session, &faults);
+    OutputPlan plan = {.faults = &faults};
+    output_plan_write(&plan, "--html", options.html);
+    output_plan_write_file(&plan, "--pdf", options.pdf);
+    output_plan_read(&plan, "the session", options.session);
+    output_plan_read_folder(&plan, "the session", options.with, ".json");
     bool good = session && session_load(options.session, session, &faults) && faults.count == 0;
     page = good ? make_page(options.session, session, options.with, &length, &faults) : NULL;
     good = page && (!options.html || output_write(options.html, page, length, &faults));

@@ -3,10 +3,12 @@
 //
 // A header can lie. Before memory is taken the promised samples are held against the bytes that are there: raw data must be there in full,
 // a deflate stream cannot grow by more than 1032 times, a number written as text takes two bytes.
+#include "base/regular_file.h"
 #include "geom/stops.h"
 #include "recon/volume_format.h"
 
 #include <ctype.h>
+#include <dirent.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,7 +18,7 @@
 #include <zlib.h>
 
 #define VOXEL_LIMIT ((size_t)1 << 31)
-enum { DEFLATE_GROWTH = 1032 };
+enum { DEFLATE_GROWTH = 1032, HEADER_MOST = 1 << 20, MOST_FILES_NAMED = 100000 };
 
 // --- text ---
 
@@ -508,6 +510,104 @@ Volume *volume_decode_several(const VolumeHeader *header, const char *header_pat
     Volume *volume = good ? volume_decode(&plain, &all, faults) : NULL;
     free(joined);
     return volume;
+}
+
+// --- which files a volume is made of ---
+
+typedef void FileCall(void *context, const char *path);
+
+// The name that an option like `data file: NAME` gives, in the header's folder.
+static void call_beside(const char *header_path, const char *name, size_t length, FileCall *call, void *context)
+{
+    char path[4096];
+    const char *slash = strrchr(header_path, '/');
+    while (length > 0 && isspace((unsigned char)*name))
+        name++, length--;
+    while (length > 0 && isspace((unsigned char)name[length - 1]))
+        length--;
+    int wrote = snprintf(path, sizeof path, "%.*s%.*s", slash ? (int)(slash - header_path) + 1 : 0, header_path, length < 1024 ? (int)length : 1024, name);
+    if (length > 0 && wrote > 0 && wrote < (int)sizeof path)
+        call(context, path);
+}
+
+static void call_named(const char *header_path, const char *text, size_t length, LineCursor names, FileCall *call, void *context)
+{
+    NumberedName numbered;
+    char name[1200];
+    int line;
+    bool by_list = is_list(text, length);
+    if (!data_names_several(text, length))
+        call_beside(header_path, text, length, call, context);
+    else if (by_list || read_numbered(text, length, &numbered))
+        for (long i = 0; i < MOST_FILES_NAMED && next_name(by_list ? NULL : &numbered, &names, i, name, &line); i++)
+            call_beside(header_path, name, strlen(name), call, context);
+}
+
+static void call_folder(const char *folder, FileCall *call, void *context)
+{
+    DIR *directory = opendir(folder);
+    char path[4096];
+    for (struct dirent *entry; directory && (entry = readdir(directory));)
+        if (entry->d_name[0] != '.' && snprintf(path, sizeof path, "%s/%s", folder, entry->d_name) < (int)sizeof path)
+            call(context, path);
+    if (directory)
+        closedir(directory);
+}
+
+// Header and samples of a NIfTI pair, whichever was named.
+static void call_pair(const char *path, FileCall *call, void *context)
+{
+    static const char *const endings[] = {".hdr", ".img", ".hdr.gz", ".img.gz"};
+    size_t n = strlen(path), stem = n > 3 && !strcmp(path + n - 3, ".gz") ? n - 3 : n;
+    char other[4096];
+    if (stem < 5 || (memcmp(path + stem - 4, ".hdr", 4) && memcmp(path + stem - 4, ".img", 4)))
+        return;
+    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
+        if (snprintf(other, sizeof other, "%.*s%s", (int)(stem - 4), path, endings[i]) < (int)sizeof other)
+            call(context, other);
+}
+
+static void call_header(const FileBytes *file, FileCall *call, void *context)
+{
+    bool is_nrrd = volume_is_nrrd(file);
+    LineCursor cursor = {file->byte, file->length, 0, 0};
+    const char *text;
+    size_t length;
+    while (line_cursor_next(&cursor, &text, &length) && length > 0) {
+        const char *sign = memchr(text, is_nrrd ? ':' : '=', length);
+        size_t named = sign ? (size_t)(sign - text) : 0;
+        bool is_key = is_nrrd ? header_text_is(text, named, "data file") || header_text_is(text, named, "datafile") : header_text_is(text, named, "ElementDataFile");
+        if (sign && is_key) {
+            call_named(file->path, sign + 1, length - named - 1, cursor, call, context);
+            return;
+        }
+    }
+}
+
+void volume_each_data_file(const char *path, FileCall *call, void *context)
+{
+    struct stat status;
+    const char *why;
+    if (stat(path, &status) == 0 && S_ISDIR(status.st_mode)) {
+        call_folder(path, call, context);
+        return;
+    }
+    call_pair(path, call, context);
+    int descriptor = regular_file_open(path, &status, &why);
+    uint8_t *byte = descriptor >= 0 ? malloc(HEADER_MOST) : NULL;
+    size_t length = byte ? regular_file_read(descriptor, byte, HEADER_MOST) : 0;
+    if (descriptor >= 0)
+        close(descriptor);
+    const FileBytes file = {byte, length, 0, path};
+    if (byte && (volume_is_nrrd(&file) || volume_is_metaimage(&file))) {
+        call_header(&file, call, context);
+    } else if (byte && volume_is_dicom(&file)) {
+        char folder[4096];
+        const char *slash = strrchr(path, '/');
+        snprintf(folder, sizeof folder, "%.*s", slash ? (int)(slash - path) : 1, slash ? path : ".");
+        call_folder(folder[0] ? folder : "/", call, context);
+    }
+    free(byte);
 }
 
 // --- the public face ---
