@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
-static const char irregular[] = "it is a folder, a pipe or a device, not a regular file";
+static const char irregular[] = "it is not a regular file but a folder, a pipe or a device";
 
 int regular_file_open(const char *path, struct stat *status, const char **why)
 {

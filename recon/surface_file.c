@@ -11,7 +11,7 @@
 #include <strings.h>
 
 static const double COORDINATE_MAX = 1e9;
-enum { COUNT_MAX = 100000000 };
+enum { COUNT_MAX = 100000000, SURFACE_BYTES_MOST = INT_MAX };
 
 // A mesh that grows while it is read.
 typedef struct Growing {
@@ -540,7 +540,7 @@ SurfaceMesh *surface_parse(const void *bytes, size_t length, const char *name, F
 SurfaceMesh *surface_load(const char *path, Faults *faults)
 {
     size_t length;
-    char *bytes = whole_file_read(path, &length, faults);
+    char *bytes = whole_file_read_most(path, SURFACE_BYTES_MOST, &length, faults);
     SurfaceMesh *mesh = bytes ? surface_parse(bytes, length, path, faults) : NULL;
     free(bytes);
     return mesh;

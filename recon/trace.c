@@ -9,6 +9,8 @@
 #include <string.h>
 #include <yaml.h>
 
+enum { TRACE_BYTES_MOST = 1 << 20 };
+
 enum { MAX_ENTRIES = 4096 };
 
 typedef struct Walk {
@@ -441,7 +443,7 @@ Trace *trace_parse(const char *text, size_t length, const char *path, Faults *fa
 Trace *trace_load(const char *path, Faults *faults)
 {
     size_t length;
-    char *text = whole_file_read(path, &length, faults);
+    char *text = whole_file_read_most(path, TRACE_BYTES_MOST, &length, faults);
     Trace *trace = text ? trace_parse(text, length, path, faults) : NULL;
     free(text);
     return trace;

@@ -2,41 +2,35 @@
 // through: renaming over it would replace it.
 #include "recon/whole_file.h"
 
+#include "base/regular_file.h"
 #include "geom/stops.h"
 
 #include <errno.h>
 #include <fcntl.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-char *whole_file_read(const char *path, size_t *length, Faults *faults)
+char *whole_file_read_most(const char *path, size_t most, size_t *length, Faults *faults)
 {
-    int file = open(path, O_RDONLY | O_CLOEXEC);
     struct stat status;
-    if (file < 0 || fstat(file, &status)) {
-        faults_add(faults, path, 0, 0, "cannot be opened: %s; an existing readable file is needed", strerror(errno));
-        if (file >= 0)
-            close(file);
+    const char *why;
+    int file = regular_file_open(path, &status, &why);
+    if (file < 0) {
+        faults_add(faults, path, 0, 0, "cannot be opened: %s; an existing readable file is needed", why);
         return NULL;
     }
-    if (!S_ISREG(status.st_mode)) {
-        faults_add(faults, path, 0, 0, "is not a regular file; an existing readable file is needed");
+    size_t size = (size_t)status.st_size;
+    if (size > most) {
+        faults_add(faults, path, 0, 0, "is %zu bytes long; at most %zu are read of a file of this kind", size, most);
         close(file);
         return NULL;
     }
-    size_t size = (size_t)status.st_size, got = 0;
     char *bytes = malloc(size + 1);
-    while (bytes && got < size) {
-        ssize_t n = read(file, bytes + got, size - got);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0)
-            break;
-        got += (size_t)n;
-    }
+    size_t got = bytes ? regular_file_read(file, bytes, size) : 0;
     close(file);
     if (!bytes || got < size) {
         faults_add(faults, path, 0, 0, "cannot be read: %s", bytes ? "it ends early" : "not enough memory");
@@ -47,6 +41,8 @@ char *whole_file_read(const char *path, size_t *length, Faults *faults)
     *length = size;
     return bytes;
 }
+
+char *whole_file_read(const char *path, size_t *length, Faults *faults) { return whole_file_read_most(path, SIZE_MAX - 1, length, faults); }
 
 static bool write_all(int file, const char *bytes, size_t length)
 {
