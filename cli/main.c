@@ -1,6 +1,8 @@
 // seldinger: the table of verbs and what the verbs share.
 #include "cli/cli.h"
 
+#include "base/part_file.h"
+
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
@@ -38,15 +40,17 @@ static void print_help(FILE *out)
         fprintf(out, "  %-8s %-34s %s\n", verbs[i].name, verbs[i].arguments, verbs[i].does);
     fprintf(out, "\n`seldinger VERB --help` explains every option with its unit and default.\n"
                  "Exit codes: 0 done; 1 a comparison failed; 2 wrong usage or bad input; 3 the simulation could not be trusted.\n"
-                 "Stopped by the user (SIGINT, SIGTERM) a verb leaves no unfinished file and ends by that signal (130 or 143); `run` ends in order.\n");
+                 "Stopped by the user (SIGINT, SIGTERM, SIGHUP) a verb leaves no unfinished file and ends by that signal (130, 143 or 129); `run` ends in order.\n");
 }
 
-// What is written is whole or not there (geom/stops.h); the exit status is the signal's, 130 in a shell for SIGINT.
-static void stop(int number)
+// What is written is whole or not there (base/part_file.h); the exit status is the signal's, 130 in a shell for SIGINT.
+void cli_stop(int number)
 {
+    part_files_remove();
     static const char message[] = "\nstopped; no unfinished file is left\n";
     ssize_t said = write(STDERR_FILENO, message, sizeof message - 1);
     (void)said;
+    signal(number, SIG_DFL);
     raise(number);
 }
 
@@ -55,13 +59,14 @@ static void install_stop(int number)
     struct sigaction former;
     // what a shell has a job in the background ignore stays ignored
     if (sigaction(number, NULL, &former) == 0 && former.sa_handler != SIG_IGN)
-        sigaction(number, &(struct sigaction){.sa_handler = stop, .sa_flags = (int)SA_RESETHAND}, NULL);
+        sigaction(number, &(struct sigaction){.sa_handler = cli_stop, .sa_flags = (int)SA_RESETHAND}, NULL);
 }
 
 int main(int argc, char **argv)
 {
     install_stop(SIGINT);
     install_stop(SIGTERM);
+    install_stop(SIGHUP);
     // a file-size limit is then a failed write with a message, and no part of a file is left
     sigaction(SIGXFSZ, &(struct sigaction){.sa_handler = SIG_IGN}, NULL);
     if (argc < 2) {

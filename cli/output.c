@@ -1,6 +1,6 @@
 #include "cli/output.h"
 
-#include "geom/stops.h"
+#include "base/part_file.h"
 #include "recon/whole_file.h"
 
 #include <ctype.h>
@@ -12,31 +12,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static bool is_special(const char *path)
-{
-    struct stat status;
-    return !strcmp(path, "-") || (stat(path, &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode));
-}
+static bool is_special(const char *path) { return !strcmp(path, "-") || part_file_is_through(path); }
 
 static bool can_create_beside(const char *path)
 {
-    size_t room = strlen(path) + 32;
-    char *part = malloc(room);
-    if (!part)
+    PartFile part;
+    if (!part_file_begin(&part, path))
         return false;
-    snprintf(part, room, "%s.part-%ld", path, (long)getpid());
-    sigset_t before;
-    stops_hold(&before);
-    int file = open(part, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    int reason = errno;
-    if (file >= 0) {
-        close(file);
-        unlink(part);
-    }
-    stops_release(&before);
-    free(part);
-    errno = reason;
-    return file >= 0;
+    part_file_drop(&part);
+    return true;
 }
 
 bool output_check(const char *path, Faults *faults)

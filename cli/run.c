@@ -63,7 +63,9 @@ static volatile sig_atomic_t stop_requested;
 
 static void request_stop(int signal_number)
 {
-    (void)signal_number;
+    // a second one ends the program at once
+    if (stop_requested)
+        cli_stop(signal_number);
     stop_requested = 1;
 }
 
@@ -368,14 +370,17 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
         watch.chart = run_chart_create(record.expected_steps);
     if (!node || !make_moments(&watch, simulator) || (options->chart && !watch.chart))
         faults_add(faults, scene->path, 0, 0, "no memory");
-    else if (options->record)
-        watch.recording = recording_create(options->record, simulator, &record, faults);
     if (options->score && !(watch.lesson = lesson_create(simulator, open->tree)))
         faults_add(faults, scene->path, 0, 0, "no memory");
     simulator_watch_energy(simulator);
     if (options->device_count && faults->count == 0)
         watch.hands = run_hands_open(options->device_count, options->device, scene, device_patience_s, faults);
-    if (faults->count == 0) {
+    // last, as it begins a file
+    if (options->record && faults->count == 0)
+        watch.recording = recording_create(options->record, simulator, &record, faults);
+    if (faults->count > 0)
+        run_hands_close(watch.hands);
+    else {
         DriveOptions drive = drive_default_options();
         drive.script = watch.hands ? NULL : scene->script;
         drive.hand = watch.hands ? run_hands_command : NULL;
@@ -419,8 +424,7 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
 
 static void install_signals(void)
 {
-    // a second signal ends the program at once
-    struct sigaction stop = {.sa_handler = request_stop, .sa_flags = (int)(SA_RESTART | SA_RESETHAND)};
+    struct sigaction stop = {.sa_handler = request_stop, .sa_flags = SA_RESTART};
     sigaction(SIGINT, &stop, NULL);
     sigaction(SIGTERM, &stop, NULL);
 }

@@ -3,8 +3,8 @@
 //
 // A header can lie. Before memory is taken the promised samples are held against the bytes that are there: raw data must be there in full,
 // a deflate stream cannot grow by more than 1032 times, a number written as text takes two bytes. Nor is more of a file read than its header promises.
+#include "base/part_file.h"
 #include "base/regular_file.h"
-#include "geom/stops.h"
 #include "recon/volume_format.h"
 
 #include <ctype.h>
@@ -897,14 +897,11 @@ bool volume_save_nrrd(const Volume *volume, const char *path, const char *type_n
     for (size_t i = 0; i < sizeof save_types / sizeof save_types[0]; i++)
         if (!strcmp(save_types[i].name, type_name))
             type = &save_types[i];
-    char part[4096];
-    int named = snprintf(part, sizeof part, "%s.part-%ld", path, (long)getpid());
-    if (!type || named < 0 || named >= (int)sizeof part) {
-        faults_add(faults, path, 0, 0, type ? "the path is too long; at most 4000 bytes" : "'%s' is no sample type; float, uint8 or int16", type_name);
+    if (!type) {
+        faults_add(faults, path, 0, 0, "'%s' is no sample type; float, uint8 or int16", type_name);
         return false;
     }
-    struct stat status;
-    if (!stat(path, &status) && !S_ISREG(status.st_mode)) {   // renaming over a device would replace it
+    if (part_file_is_through(path)) {
         faults_add(faults, path, 0, 0, "is there and no regular file; another name");
         return false;
     }
@@ -912,12 +909,10 @@ bool volume_save_nrrd(const Volume *volume, const char *path, const char *type_n
     uint8_t *sample = encode_samples(volume, count, type, path, faults);
     if (!sample)
         return false;
-    sigset_t before;
-    stops_hold(&before);
-    FILE *file = fopen(part, "wb");
-    bool good = file != NULL;
-    int reason = errno;
-    if (good) {
+    PartFile part;
+    bool good = part_file_begin(&part, path);
+    FILE *file = good ? part_file_stream(&part) : NULL;
+    if (file) {
         const Vec3 *a = volume->axis, o = volume->origin;
         fprintf(file, "NRRD0004\ntype: %s\ndimension: 3\n", type->name);
         if (volume->frame[0])
@@ -928,15 +923,12 @@ bool volume_save_nrrd(const Volume *volume, const char *path, const char *type_n
         for (int i = 0; i < 3; i++)
             fprintf(file, " (%.17g,%.17g,%.17g)", a[i].x, a[i].y, a[i].z);
         fprintf(file, "\nkinds: domain domain domain\nendian: little\nencoding: gzip\nspace origin: (%.17g,%.17g,%.17g)\n\n", o.x, o.y, o.z);
-        good = write_gzip(file, sample, count * type->size);
-        good = fclose(file) == 0 && good;
-        good = good && rename(part, path) == 0;
-        reason = errno;
-        if (!good)
-            remove(part);
+        good = write_gzip(file, sample, count * type->size) && part_file_finish_synced(&part);
     }
-    stops_release(&before);
+    int reason = errno;
+    part_file_drop(&part);
     free(sample);
+    good = good && file;
     if (!good)
         faults_add(faults, path, 0, 0, "cannot be written: %s; a folder that exists, may be written to, and has room", strerror(reason));
     return good;

@@ -1,4 +1,4 @@
-// Whole files: read at once, and written so that no half file is ever left (beside, synced, then renamed).
+// Whole files: read at once, and written so that no half file is ever left (base/part_file.h).
 #ifndef SELDINGER_RECON_WHOLE_FILE_H
 #define SELDINGER_RECON_WHOLE_FILE_H
 
