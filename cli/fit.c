@@ -344,19 +344,22 @@ static bool write_json(const char *path, cJSON *root, const VesselTree *model, c
     return good;
 }
 
-// A picture is never worth a failed fit: what stops it is said, and the command succeeds.
-static void make_picture(const char *path, const VesselTree *model)
+// False with a fault where there is none; the model is written all the same.
+static bool make_picture(const char *path, const VesselTree *model, Faults *faults)
 {
 #ifdef SELDINGER_RENDER
     char message[256] = "";
     TriangleMesh *mesh = isosurface_of_tree(model, isosurface_cell_for(model));
     PictureOptions options = picture_default_options();
-    if (!picture_of_fit(path, &options, model, mesh, NULL, message, sizeof message))
-        fprintf(stderr, "%s: no picture: %s\n", path, message);
+    bool drawn = picture_of_fit(path, &options, model, mesh, NULL, message, sizeof message);
+    if (!drawn)
+        faults_add(faults, path, 0, 0, "no picture: %s", message);
     triangle_mesh_free(mesh);
+    return drawn;
 #else
     (void)model;
-    fprintf(stderr, "%s: this build has no pictures; build with -DSELDINGER_RENDER=ON\n", path);
+    faults_add(faults, path, 0, 0, "this build has no pictures; build with -DSELDINGER_RENDER=ON");
+    return false;
 #endif
 }
 
@@ -449,8 +452,7 @@ int verb_fit(int argc, char **argv)
         cJSON_Delete(root);
         command.junctions.tool_radius = command.tool_radius;
         good = good && junction_sheets_draw(&command.junctions, command.output ? command.output : command.tree, model, &faults);
-        if (good && command.picture)
-            make_picture(command.picture, model);
+        good = good && (!command.picture || make_picture(command.picture, model, &faults));
     }
     vessel_tree_free(model);
     tree_file_info_free(&from);

@@ -66,8 +66,7 @@ static void add_box(cJSON *object, const Vec3 *point, int count)
     add_vector(object, "high_mm", high);
 }
 
-// A picture is never worth a failed command: what stops it is said.
-static void draw_model(const char *picture, const char *path, const VesselTree *tree, const TreeFileInfo *info)
+static bool draw_model(const char *picture, const char *path, const VesselTree *tree, const TreeFileInfo *info, Faults *faults)
 {
     char message[512] = "the tree has no fitted model to draw";
 #ifdef SELDINGER_RENDER
@@ -85,7 +84,8 @@ static void draw_model(const char *picture, const char *path, const VesselTree *
     snprintf(message, sizeof message, "built without pictures");
 #endif
     if (!drawn)
-        fprintf(stderr, "%s: no picture: %s\n", picture, message);
+        faults_add(faults, picture, 0, 0, "no picture: %s", message);
+    return drawn;
 }
 
 typedef struct TreeWishes {
@@ -145,8 +145,7 @@ static bool describe_tree(cJSON *object, const char *path, TreeWishes *wishes, F
     good = good && (!wishes->report || report_write(wishes->report, path, tree, &info, faults));
     wishes->junctions.tool_radius = wishes->tool_radius;
     good = good && junction_sheets_draw(&wishes->junctions, path, tree, faults);
-    if (good && wishes->picture)
-        draw_model(wishes->picture, path, tree, &info);
+    good = good && (!wishes->picture || draw_model(wishes->picture, path, tree, &info, faults));
     tree_file_info_free(&info);
     vessel_tree_free(tree);
     return good;

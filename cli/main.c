@@ -3,6 +3,8 @@
 
 #include "base/part_file.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
@@ -62,13 +64,8 @@ static void install_stop(int number)
         sigaction(number, &(struct sigaction){.sa_handler = cli_stop, .sa_flags = (int)SA_RESETHAND}, NULL);
 }
 
-int main(int argc, char **argv)
+static int call_verb(int argc, char **argv)
 {
-    install_stop(SIGINT);
-    install_stop(SIGTERM);
-    install_stop(SIGHUP);
-    // a file-size limit is then a failed write with a message, and no part of a file is left
-    sigaction(SIGXFSZ, &(struct sigaction){.sa_handler = SIG_IGN}, NULL);
     if (argc < 2) {
         print_help(stderr);
         return EXIT_BAD_INPUT;
@@ -87,17 +84,49 @@ int main(int argc, char **argv)
         char name[64];
         snprintf(name, sizeof name, "seldinger %s", verbs[i].name);
         argv[1] = name;
-        int code = verbs[i].call(argc - 1, argv + 1);
-        bool lost = fflush(stdout) != 0 || ferror(stdout);
-        if (lost)
-            fprintf(stderr, "-: standard output cannot be written to its end; a place with free space\n");
-        return lost && code == EXIT_DONE ? EXIT_BAD_INPUT : code;
+        return verbs[i].call(argc - 1, argv + 1);
     }
     fprintf(stderr, "seldinger: no verb '%s'; valid:", argv[1]);
     for (int i = 0; i < VERB_COUNT; i++)
         fprintf(stderr, " %s", verbs[i].name);
     fprintf(stderr, "\n");
     return EXIT_BAD_INPUT;
+}
+
+static int exit_code = EXIT_DONE;
+
+// However the program ends (argp's --help ends it by itself). Some file systems tell only at the end that they are full; a standard output that was
+// closed from the start has lost nothing that was not written.
+static void check_output(void)
+{
+    bool lost = fflush(stdout) != 0 || ferror(stdout);
+    errno = 0;
+    lost = (fclose(stdout) != 0 && errno != EBADF) || lost;
+    if (!lost)
+        return;
+    fprintf(stderr, "-: standard output cannot be written to its end; a place with free space\n");
+    _exit(exit_code != EXIT_DONE ? exit_code : EXIT_BAD_INPUT);
+}
+
+// The number of a standard stream that is closed would be the next file's, which then got what is printed. Reading and writing fail as before.
+static void fill_standard_streams(void)
+{
+    for (int i = 0; i < 3; i++)
+        if (fcntl(i, F_GETFD) < 0 && open("/dev/null", i == 0 ? O_WRONLY : O_RDONLY) != i)
+            _exit(EXIT_BAD_INPUT);
+}
+
+int main(int argc, char **argv)
+{
+    fill_standard_streams();
+    install_stop(SIGINT);
+    install_stop(SIGTERM);
+    install_stop(SIGHUP);
+    // a file-size limit is then a failed write with a message, and no part of a file is left
+    sigaction(SIGXFSZ, &(struct sigaction){.sa_handler = SIG_IGN}, NULL);
+    atexit(check_output);
+    exit_code = call_verb(argc, argv);
+    return exit_code;
 }
 
 void cli_notes(FILE *out, const char *path, const char *text)

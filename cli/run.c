@@ -246,8 +246,8 @@ static void free_moments(Watch *watch)
 }
 
 #ifdef SELDINGER_RENDER
-// A picture is never worth a failed run: what goes wrong is said, no more.
-static void draw_picture(const RunOptions *options, const Watch *watch, Simulator *simulator, OpenVessel *open)
+// False with a fault where there is none: what was asked for is missing, though the run is as good as it was.
+static bool draw_picture(const RunOptions *options, const Watch *watch, Simulator *simulator, OpenVessel *open, Faults *faults)
 {
     const Scene *scene = simulator_scene(simulator);
     int nodes = stepper_node_capacity(simulator_stepper(simulator)), count = 0;
@@ -281,10 +281,11 @@ static void draw_picture(const RunOptions *options, const Watch *watch, Simulato
                 : count > 1 ? picture_of_moments(options->picture, &look, &shown, count, tool, message, sizeof message)
                             : (snprintf(message, sizeof message, "the run ended before the first moment of --picture-at"), false);
     if (!good)
-        fprintf(stderr, "%s: no picture: %s\n", options->picture, message);
+        faults_add(faults, options->picture, 0, 0, "no picture: %s", message[0] ? message : "not enough memory");
     free(radius);
     free(force);
     tool_looks_free(&looks);
+    return good;
 }
 #endif
 
@@ -406,12 +407,13 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
             run_print(options->summary && !strcmp(options->summary, "-") ? stderr : stdout, simulator, &report, node);
         say_untrusted(simulator, &report);
 #ifdef SELDINGER_RENDER
-        if (options->picture)
-            draw_picture(options, &watch, simulator, open);
+        whole = (!options->picture || draw_picture(options, &watch, simulator, open, faults)) && whole;
 #endif
         char message[512];
-        if (options->chart && !run_chart_draw(watch.chart, simulator, options->chart, message, sizeof message))
-            fprintf(stderr, "%s: no chart: %s\n", options->chart, message);
+        if (options->chart && !run_chart_draw(watch.chart, simulator, options->chart, message, sizeof message)) {
+            faults_add(faults, options->chart, 0, 0, "no chart: %s", message);
+            whole = false;
+        }
         code = whole && report.end != DRIVE_DIVERGED && !run_left_vessel(simulator_totals(simulator)) ? EXIT_DONE : EXIT_UNTRUSTED;
     }
     lesson_free(watch.lesson);

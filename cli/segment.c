@@ -391,8 +391,8 @@ static bool write_json(const SegmentArguments *a, const VesselTree *tree, const 
     return good;
 }
 
-// A picture is never worth a failed run: says why there is none and goes on.
-static void draw_picture(const SegmentArguments *a, const Volume *volume, const VesselTree *tree)
+// False with a fault where there is none; the tree is written all the same.
+static bool draw_picture(const SegmentArguments *a, const Volume *volume, const VesselTree *tree, Faults *faults)
 {
     char message[512] = "built without pictures";
     bool drawn = false;
@@ -405,7 +405,8 @@ static void draw_picture(const SegmentArguments *a, const Volume *volume, const 
     (void)tree;
 #endif
     if (!drawn)
-        fprintf(stderr, "%s: no picture: %s\n", a->picture, message);
+        faults_add(faults, a->picture, 0, 0, "no picture: %s", message);
+    return drawn;
 }
 
 static Trace *trace_of(const SegmentArguments *a, Faults *faults)
@@ -470,8 +471,7 @@ static int segment(const SegmentArguments *a, Faults *faults)
             print_table(tree, &report, load_s, track_s);
         if (good)
             print_warnings(a, &report.check);
-        if (good && a->picture)
-            draw_picture(a, volume, tree);
+        good = good && (!a->picture || draw_picture(a, volume, tree, faults));
     }
     rbt_report_free(&report);
     vessel_tree_free(tree);
