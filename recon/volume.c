@@ -794,12 +794,10 @@ static bool read_promised(const char *path, FileBytes *out, Faults *faults)
     bool is_dicom = volume_is_dicom(&head) && !volume_is_nrrd(&head) && !volume_is_nifti(&head) && !volume_is_metaimage(&head);
     if (!is_dicom)
         parse(&head, &ignored);
-    if (is_dicom)
-        needed = out->whole;
-    else if (needed == 0)   // detached, or bad: the fault is found again
+    if (!is_dicom && needed == 0)   // detached, or bad: the fault is found again
         return true;
     file_bytes_free(out);
-    return file_bytes_read(path, needed, out, faults);
+    return is_dicom ? dicom_bytes_read(path, out, faults) : file_bytes_read(path, needed, out, faults);
 }
 
 Volume *volume_load(const char *path, Faults *faults)

@@ -18,6 +18,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+// the length of pixels is written in 32 bits
+#define DICOM_BYTES_MOST (((size_t)1 << 32) + ((size_t)1 << 26))
+
 enum { PREAMBLE = 128, UID_ROOM = 68, MAX_DEPTH = 24 };
 #define UNDEFINED_LENGTH 0xffffffffu
 #define TAG(GROUP, ELEMENT) ((uint32_t)(GROUP) << 16 | (ELEMENT))
@@ -608,6 +611,15 @@ static void convert_slice(const DicomImage *m, const Plane *p, const uint8_t *sa
     }
 }
 
+bool dicom_bytes_read(const char *path, FileBytes *out, Faults *faults)
+{
+    struct stat status;
+    if (stat(path, &status) != 0 || (size_t)status.st_size <= DICOM_BYTES_MOST)
+        return file_bytes_read(path, DICOM_BYTES_MOST, out, faults);
+    faults_add(faults, path, 0, 0, "is %zu bytes long; at most %zu are read of a DICOM file", (size_t)status.st_size, (size_t)DICOM_BYTES_MOST);
+    return false;
+}
+
 // `whole`: the bytes of the only file, or NULL where they are read file by file.
 static Volume *assemble(const Series *series, const FileBytes *whole, Faults *faults)
 {
@@ -648,7 +660,7 @@ static Volume *assemble(const Series *series, const FileBytes *whole, Faults *fa
     for (int i = 0; good && i < count; i++) {
         const DicomFile *file = slice[i].file;
         FileBytes bytes = {0};
-        good = whole || file_bytes_read(file->path, SIZE_MAX - 1, &bytes, faults);
+        good = whole || dicom_bytes_read(file->path, &bytes, faults);
         const FileBytes *from = whole ? whole : &bytes;
         size_t length = voxels * (size_t)(file->image.allocated / 8), start = file->image.pixel_place + (size_t)slice[i].frame * length;
         if (good && (start > from->length || from->length - start < length)) {
@@ -733,7 +745,7 @@ static bool gather_folder(const char *folder, const DicomImage *wanted, Series *
         DicomImage image;
         Faults own;
         faults_clear(&own);
-        if (wrote < 0 || wrote >= (int)sizeof path || !looks_like_dicom(path) || !file_bytes_read(path, SIZE_MAX - 1, &file, faults))
+        if (wrote < 0 || wrote >= (int)sizeof path || !looks_like_dicom(path) || !dicom_bytes_read(path, &file, faults))
             continue;
         bool good = read_image(&file, &image, &own), is_other = wanted && image.series[0] && strcmp(image.series, wanted->series) != 0;
         if (!good && !is_other && !(image.is_walked && !image.has_pixels))

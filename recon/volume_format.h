@@ -62,6 +62,8 @@ bool volume_inflate_head(const FileBytes *data, uint8_t *out, size_t wanted, Fau
 // The first bytes of a regular file, at most `most`, to be freed (file_bytes_free).
 bool file_bytes_read(const char *path, size_t most, FileBytes *out, Faults *faults);
 void file_bytes_free(FileBytes *file);
+// A whole DICOM file, which has 4 GB at most.
+bool dicom_bytes_read(const char *path, FileBytes *out, Faults *faults);
 // Reads of the data file that a detached header names what it promises. It must lie in the header's folder or below: a header cannot point anywhere
 // else unseen.
 bool file_bytes_read_beside(const char *header_path, int line, const char *name, size_t name_length, const VolumeHeader *header, FileBytes *out,

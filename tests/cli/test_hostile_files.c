@@ -171,6 +171,8 @@ static void make_long(const char *name, const char *head)
 static void long_files_are_not_read_whole(void **state)
 {
     (void)state;
+    static unsigned char dicom[132];
+    memcpy(dicom + 128, "DICM", 4);
     make_long("long.nrrd", "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 4 4\nencoding: raw\n\n");
     make_long("tail.nrrd", "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 4 4\nencoding: raw\nbyte skip: -1\n\n");
     make_long("long.raw", "");
@@ -180,9 +182,12 @@ static void long_files_are_not_read_whole(void **state)
     make_long("long.csv", "x_mm,y_mm,z_mm\n0,0,0\n");
     make_long("long.swc", "1 1 0 0 0 1 -1\n2 1 1 0 0 1 1\n");
     make_long("long.obj", "v 0 0 0\n");
+    put_bytes("long.dcm", dicom, sizeof dicom);
+    assert_int_equal(truncate(in_folder("long.dcm"), (off_t)8 << 30), 0);
     ends_in_little_memory("info long.nrrd", 0, "");
     ends_in_little_memory("info long.nhdr", 0, "");
     ends_in_little_memory("info long.mhd", 0, "");
+    ends_in_little_memory("info long.dcm", 2, "are read of a DICOM file");
     ends_in_little_memory("info tail.nrrd", 2, "where its header promises");
     ends_in_little_memory("segment fits.nrrd --trace long.yaml -o out.h5", 2, "at most 1048576 are read");
     ends_in_little_memory("query model.h5 --points long.csv -o out.csv", 2, "at most 1073741824 are read");
