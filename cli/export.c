@@ -753,6 +753,7 @@ int verb_export(int argc, char **argv)
     output_extension(options.out, extension);
     OutputPlan plan = {.faults = &faults};
     output_plan_write(&plan, "-o", options.out);
+    output_plan_series(&plan, "-o", ".vtp");
     output_plan_read(&plan, "the file", options.in);
     bool good = faults.count == 0;
     switch (good ? file_kind(options.in) : FILE_UNKNOWN) {

@@ -377,6 +377,7 @@ static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seco
     output_plan_write(&plan, "--json", command->json);
     output_plan_write_file(&plan, "--picture", command->picture);
     output_plan_write_file(&plan, "--junctions", command->junctions.picture);
+    output_plan_series(&plan, "--junctions", ".png");
     output_plan_read(&plan, "the tree", command->tree);
     output_plan_read_volume(&plan, "--volume", command->junctions.volume);
     VesselTree *tree = tree_file_load(command->tree, info, faults), *model = NULL;

@@ -450,6 +450,7 @@ int verb_info(int argc, char **argv)
     output_plan_write(&plan, "--report", report);
     output_plan_write_file(&plan, "--picture", picture);
     output_plan_write_file(&plan, "--junctions", wishes.junctions.picture);
+    output_plan_series(&plan, "--junctions", ".png");
     output_plan_read(&plan, "the file", path);
     output_plan_read(&plan, "--before", wishes.junctions.before);
     output_plan_read_volume(&plan, "--volume", wishes.junctions.volume);

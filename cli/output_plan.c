@@ -60,6 +60,19 @@ static bool is_same_file(const PlannedOutput *output, const char *path)
     return resolve(path, whole) && !strcmp(whole, output->whole);
 }
 
+// NAME, a number after - or _, the ending.
+static bool is_of_series(const PlannedOutput *output, const char *path)
+{
+    char whole[PATH_MAX];
+    const char *slash = strrchr(output->whole, '/'), *dot = strrchr(output->whole, '.');
+    size_t stem = dot && dot > slash ? (size_t)(dot - output->whole) : strlen(output->whole);
+    if (!output->ending || !output->whole[0] || !resolve(path, whole) || strncmp(whole, output->whole, stem) != 0)
+        return false;
+    const char *rest = whole + stem;
+    size_t number = strspn(rest, "-_0123456789");
+    return number > 0 && !strcmp(rest + number, output->ending);
+}
+
 static void add(OutputPlan *plan, const char *option, const char *path, bool is_good)
 {
     struct stat status;
@@ -72,6 +85,7 @@ static void add(OutputPlan *plan, const char *option, const char *path, bool is_
     PlannedOutput *output = &plan->output[plan->count++];
     output->option = option;
     output->path = path;
+    output->ending = NULL;
     output->whole[0] = 0;
     if (!special && !resolve(path, output->whole))
         output->whole[0] = 0;
@@ -89,10 +103,17 @@ void output_plan_write_file(OutputPlan *plan, const char *option, const char *pa
         add(plan, option, path, output_check_file(path, plan->faults));
 }
 
+void output_plan_series(OutputPlan *plan, const char *option, const char *ending)
+{
+    for (int i = 0; i < plan->count; i++)
+        if (!strcmp(plan->output[i].option, option))
+            plan->output[i].ending = ending;
+}
+
 void output_plan_read(OutputPlan *plan, const char *what, const char *path)
 {
     for (int i = 0; path && i < plan->count; i++)
-        if (is_same_file(&plan->output[i], path))
+        if (is_same_file(&plan->output[i], path) || is_of_series(&plan->output[i], path))
             faults_add(plan->faults, plan->output[i].path, 0, 0, "%s would overwrite %s %s; choose another name", plan->output[i].option, what, path);
 }
 

@@ -12,6 +12,7 @@ enum { OUTPUT_PLAN_MOST = 8 };
 
 typedef struct PlannedOutput {
     const char *option, *path;       // as the user gave them
+    const char *ending;              // of its further files; NULL: it has none
     char whole[PATH_MAX];            // absolute and without links; "" where nothing can be lost: "-", a device, a pipe
 } PlannedOutput;
 
@@ -25,6 +26,8 @@ typedef struct OutputPlan {
 void output_plan_write(OutputPlan *plan, const char *option, const char *path);
 // The same for what only whole files can hold (HDF5, PNG): a device, a pipe or "-" is a fault too.
 void output_plan_write_file(OutputPlan *plan, const char *option, const char *path);
+// What `option` writes becomes several files: beside NAME.EXT also NAME-2.ENDING or NAME_00000.ENDING and on.
+void output_plan_series(OutputPlan *plan, const char *option, const char *ending);
 // `what` the user knows it as: "--script", "the scene".
 void output_plan_read(OutputPlan *plan, const char *what, const char *path);
 // A volume and the files that hold its samples: those that its header names, and all of a DICOM series' folder.

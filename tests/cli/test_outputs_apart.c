@@ -109,6 +109,12 @@ static void trees_and_models_are_kept(void **state)
     refused("export model.h5 -o model.h5", "-o would overwrite the file model.h5");
     refused("info model.h5 --report model.h5", "--report would overwrite the file model.h5");
     refused("info model.h5 --picture p.png --junctions p.png", "--picture and --junctions would write the same file");
+    char path[200];
+    assert_int_equal(link(strcpy(path, in_folder("model.h5")), in_folder("sheet-2.png")), 0);
+    refused("info sheet-2.png --junctions sheet.png", "--junctions would overwrite the file sheet-2.png");
+    assert_int_equal(rename(strcpy(path, in_folder("sheet-2.png")), in_folder("sheet_00007.vtp")), 0);
+    refused("export sheet_00007.vtp -o sheet.pvd", "-o would overwrite the file sheet_00007.vtp");
+    unlink(in_folder("sheet_00007.vtp"));
     refused("info model.h5 --junctions tree.h5 --before tree.h5", "--junctions would overwrite --before tree.h5");
 }
 
