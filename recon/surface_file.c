@@ -395,7 +395,7 @@ static void ply_entry(Growing *g, PlyBody *body, const PlyElement *e, int vertex
         if (p->list_size && (!ply_value(body, p->list_size, false, p->list_signed, &entries) || !(entries >= 0 && entries <= COUNT_MAX)))
             ply_fault(g, body, "is cut short, or a list has no count");
         int first = -1, before = -1;
-        for (int i = 0; i < (int)entries && !g->bad; i++) {
+        for (int i = 0; !g->bad && i < (int)entries; i++) {
             if (!ply_value(body, p->size, p->is_float, p->is_signed, &number))
                 ply_fault(g, body, "is cut short or holds something that is no number");
             else if (e->kind == 1 && p->role == 3) {
