@@ -11,7 +11,7 @@
 #include "cli/collision_growth.h"
 #include "cli/collision_run.h"
 #include "cli/collision_surface.h"
-#include "cli/output.h"
+#include "cli/output_plan.h"
 #include "geom/mesh_vessel.h"
 
 #include <getopt.h>
@@ -781,7 +781,10 @@ int bench_collision(int argc, char **argv)
     int code = parse(argc, argv, &bench);
     if (code >= 0)
         return code;
-    if (!output_check(bench.common.json, &faults) || !output_check(bench.chart, &faults))
+    OutputPlan plan = {.faults = &faults};
+    output_plan_write(&plan, "--json", bench.common.json);
+    output_plan_write(&plan, "--chart", bench.chart);
+    if (faults.count > 0)
         return cli_bad_input(&faults);
     bench.out = bench_text(&bench.common);
     fprintf(bench.out, "%s\n%s", bench_processor(), legend);

@@ -1,7 +1,7 @@
 // seldinger bench fit: tables 3, 4 and 5 of Kerrien et al. 2017 beside the paper's figures, and the cost of a local model.
 #include "cli/bench.h"
 
-#include "cli/output.h"
+#include "cli/output_plan.h"
 #include "geom/isosurface.h"
 #include "geom/simd.h"
 #include "geom/sort_doubles.h"
@@ -402,6 +402,12 @@ int bench_fit(int argc, char **argv)
         return code;
     Faults faults;
     faults_clear(&faults);
+    OutputPlan plan = {.faults = &faults};
+    output_plan_write(&plan, "--json", bench.common.json);
+    for (int i = 0; i < bench.tree_count; i++)
+        output_plan_read(&plan, "--tree", bench.tree[i]);
+    if (faults.count > 0)
+        return cli_bad_input(&faults);
     cJSON *root = cJSON_CreateObject();
     FILE *text = bench_text(&bench.common);
     code = bench.table3 ? table_3(&bench, text, root, &faults) : tables_45(&bench, text, root, &faults);

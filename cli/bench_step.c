@@ -9,7 +9,7 @@
 #include "cli/bench_tools.h"
 
 #include "cli/output.h"
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "geom/simd.h"
 #include "solver/block_chain.h"
 

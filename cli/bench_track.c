@@ -4,6 +4,7 @@
 // voxels, contrast that fades, clipped brightness. "from one click" tracks the whole tree from the root's start. The others are run as the authors ran
 // them (5.2.1): one run a branch, started in it with the true point, direction and radius, and judged on that branch alone.
 #include "cli/bench.h"
+#include "cli/output.h"
 #include "cli/bench_starts.h"
 
 #include "recon/blurred_edge.h"
@@ -557,6 +558,8 @@ int bench_track(int argc, char **argv)
     if (code >= 0)
         return code;
     BenchOptions options = bench.common;
+    if (!output_check(options.json, &faults))
+        return cli_bad_input(&faults);
     Case *cases = calloc(MOST_CASES, sizeof *cases);
     Group *groups = calloc(MOST_GROUPS, sizeof *groups);
     bool good = cases && groups, kept = true;

@@ -4,7 +4,8 @@
 #include "cli/wall_bench.h"
 
 #include "cli/output.h"
-#include "geom/heap.h"
+#include "cli/output_plan.h"
+#include "base/heap.h"
 #include "geom/simd.h"
 #include "recon/model_measure.h"
 #include "recon/tree_file.h"
@@ -728,6 +729,15 @@ static bool write_json(const WallBench *bench, Faults *faults)
     return good;
 }
 
+static bool plan_output(const WallBench *bench, Faults *faults)
+{
+    OutputPlan plan = {.faults = faults};
+    output_plan_write(&plan, "--json", bench->common.json);
+    for (int i = 0; i < NAMED; i++)
+        output_plan_read(&plan, "the tree", bench->model[i].tree[0] ? bench->model[i].tree : NULL);
+    return faults->count == 0;
+}
+
 int bench_wall(int argc, char **argv)
 {
     static WallBench bench;
@@ -736,7 +746,7 @@ int bench_wall(int argc, char **argv)
     int code = parse(argc, argv, &bench, &any_given), missed = 0;
     if (code >= 0)
         return code;
-    if (!output_check(bench.common.json, &faults) || !make_work(&bench, &faults))
+    if (!plan_output(&bench, &faults) || !make_work(&bench, &faults))
         return cli_bad_input(&faults);
     bench.table.out = bench_text(&bench.common);
     fprintf(bench.table.out, "%s, %s\n%-10s %-22s %-34s %10s %-7s %8s %8s\n", bench_processor(), simd_name[simd_level()], "row", "on", "what", "value", "", "must", "aim");

@@ -3,7 +3,8 @@
 #include "cli/check_verify.h"
 
 #include "cli/output.h"
-#include "geom/heap.h"
+#include "cli/output_plan.h"
+#include "base/heap.h"
 #include "input/text_file.h"
 #include "sim/compare.h"
 #include "sim/drive.h"
@@ -204,7 +205,11 @@ static int check_scene(const char *path, const CheckOptions *options, Faults *fa
     if (scene && faults->count == before)
         run = run_path(scene, duration, options, &diverged, faults);
     if (run && options->update) {
-        save_golden(golden_path, run, faults);
+        OutputPlan plan = {.faults = faults};
+        output_plan_write_file(&plan, "--update", golden_path);
+        output_plan_read_scene(&plan, scene);
+        if (faults->count == before)
+            save_golden(golden_path, run, faults);
         if (faults->count == before) {
             printf("%-44s %s   %12s\n", path, there ? "rewritten" : "written  ", "");
             code = EXIT_DONE;

@@ -1,6 +1,6 @@
 #include "cli/collision_run.h"
 
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "geom/sort_doubles.h"
 
 #include <stdlib.h>

@@ -3,6 +3,7 @@
 
 #include "cli/devices.h"
 #include "cli/output.h"
+#include "cli/output_plan.h"
 #include "input/force_feedback.h"
 #include "input/hand.h"
 #include "input/map_state.h"
@@ -385,6 +386,15 @@ static bool load_maps(DeviceList *list, const DevicesOptions *options, Faults *f
     return faults->count == 0;
 }
 
+static bool plan_output(const DevicesOptions *options, Faults *faults)
+{
+    OutputPlan plan = {.faults = faults};
+    output_plan_write(&plan, "--json", options->json);
+    for (int i = 0; i < options->map_count; i++)
+        output_plan_read(&plan, "--map", options->map[i]);
+    return faults->count == 0;
+}
+
 int verb_devices(int argc, char **argv)
 {
     static Faults faults;
@@ -397,7 +407,7 @@ int verb_devices(int argc, char **argv)
     faults_clear(&faults);
     if (!list) {
         faults_add(&faults, "devices", 0, 0, "no memory");
-    } else if (output_check(options.json, &faults) && load_maps(list, &options, &faults)) {
+    } else if (plan_output(&options, &faults) && load_maps(list, &options, &faults)) {
         look(list, transport);
         if (options.json)
             output_write_line(options.json, list_json(list), &faults);

@@ -3,7 +3,8 @@
 
 #include "cli/file_kind.h"
 #include "cli/output.h"
-#include "geom/heap.h"
+#include "cli/output_plan.h"
+#include "base/heap.h"
 #include "geom/surface_parts.h"
 #include "recon/tree_file.h"
 #include "sim/recording.h"
@@ -758,7 +759,11 @@ int verb_export(int argc, char **argv)
         return code;
     faults_clear(&faults);
     output_extension(options.out, extension);
-    bool good = output_check(options.out, &faults) && output_check_apart(options.out, options.in, &faults);
+    OutputPlan plan = {.faults = &faults};
+    output_plan_write(&plan, "-o", options.out);
+    output_plan_series(&plan, "-o", ".vtp");
+    output_plan_read(&plan, "the file", options.in);
+    bool good = faults.count == 0;
     switch (good ? file_kind(options.in) : FILE_UNKNOWN) {
     case FILE_TREE: good = export_tree(&options, extension, &faults); break;
     case FILE_RECORDING: good = export_recording(&options, extension, &faults); break;

@@ -1,5 +1,6 @@
 #include "cli/file_kind.h"
 
+#include "base/regular_file.h"
 #include "recon/hdf5_reader.h"
 #include "recon/surface_file.h"
 #include "recon/volume.h"
@@ -8,6 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 static FileKind kind_of_hdf5(const char *path)
 {
@@ -26,11 +28,12 @@ FileKind file_kind(const char *path)
     struct stat status;
     if (stat(path, &status) == 0 && S_ISDIR(status.st_mode))
         return FILE_VOLUME;
-    FILE *file = stat(path, &status) == 0 && S_ISREG(status.st_mode) ? fopen(path, "rb") : NULL;
-    if (!file)
+    const char *why;
+    int file = regular_file_open(path, &status, &why);
+    if (file < 0)
         return FILE_MISSING;
-    size_t length = fread(head, 1, sizeof head - 1, file);
-    fclose(file);
+    size_t length = regular_file_read(file, head, sizeof head - 1);
+    close(file);
     const char *text = (const char *)head;
     if (length >= 8 && !memcmp(head, "\x89HDF\r\n\x1a\n", 8))
         return kind_of_hdf5(path);

@@ -3,8 +3,9 @@
 
 #include "cli/junction_sheets.h"
 #include "cli/output.h"
+#include "cli/output_plan.h"
 #include "cli/reach_report.h"
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/blurred_edge.h"
 #include "recon/field_fit.h"
@@ -340,19 +341,22 @@ static bool write_json(const char *path, cJSON *root, const VesselTree *model, c
     return good;
 }
 
-// A picture is never worth a failed fit: what stops it is said, and the command succeeds.
-static void make_picture(const char *path, const VesselTree *model)
+// False with a fault where there is none; the model is written all the same.
+static bool make_picture(const char *path, const VesselTree *model, Faults *faults)
 {
 #ifdef SELDINGER_RENDER
     char message[256] = "";
     TriangleMesh *mesh = isosurface_of_tree(model, isosurface_cell_for(model));
     PictureOptions options = picture_default_options();
-    if (!picture_of_fit(path, &options, model, mesh, NULL, message, sizeof message))
-        fprintf(stderr, "%s: no picture: %s\n", path, message);
+    bool drawn = picture_of_fit(path, &options, model, mesh, NULL, message, sizeof message);
+    if (!drawn)
+        faults_add(faults, path, 0, 0, "no picture: %s", message);
     triangle_mesh_free(mesh);
+    return drawn;
 #else
     (void)model;
-    fprintf(stderr, "%s: this build has no pictures; build with -DSELDINGER_RENDER=ON\n", path);
+    faults_add(faults, path, 0, 0, "this build has no pictures; build with -DSELDINGER_RENDER=ON");
+    return false;
 #endif
 }
 
@@ -365,11 +369,14 @@ static double seconds_now(void)
 
 static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seconds, int64_t *left_out, Faults *faults)
 {
-    if (command->output)
-        output_check_file(command->output, faults);
-    output_check(command->json, faults);
-    if (command->picture)
-        output_check_file(command->picture, faults);
+    OutputPlan plan = {.faults = faults};
+    output_plan_write_file(&plan, "-o", command->output);
+    output_plan_write(&plan, "--json", command->json);
+    output_plan_write_file(&plan, "--picture", command->picture);
+    output_plan_write_file(&plan, "--junctions", command->junctions.picture);
+    output_plan_series(&plan, "--junctions", ".png");
+    output_plan_read(&plan, "the tree", command->tree);
+    output_plan_read_volume(&plan, "--volume", command->junctions.volume);
     VesselTree *tree = tree_file_load(command->tree, info, faults), *model = NULL;
     if (tree && tree->point_count < 4)
         faults_add(faults, command->tree, 0, 0, "has %d nodes and %lld points; at least 4 points on the wall are needed", tree->node_count,
@@ -443,8 +450,7 @@ int verb_fit(int argc, char **argv)
         cJSON_Delete(root);
         command.junctions.tool_radius = command.tool_radius;
         good = good && junction_sheets_draw(&command.junctions, command.output ? command.output : command.tree, model, &faults);
-        if (good && command.picture)
-            make_picture(command.picture, model);
+        good = good && (!command.picture || make_picture(command.picture, model, &faults));
     }
     vessel_tree_free(model);
     tree_file_info_free(&from);

@@ -2,7 +2,8 @@
 #include "cli/cli.h"
 
 #include "cli/output.h"
-#include "geom/heap.h"
+#include "cli/output_plan.h"
+#include "base/heap.h"
 #include "recon/centreline_file.h"
 #include "recon/import_surface.h"
 #include "recon/mesh_centreline.h"
@@ -323,15 +324,13 @@ int verb_import(int argc, char **argv)
     Faults *faults = HEAP_ZEROED(1, sizeof *faults);
     int code = parse_options(argc, argv, command);
     if (code < 0) {
-        output_check_file(command->output, faults);
-        output_check(command->json, faults);
-        output_check(command->centreline_out, faults);
-        const char *outputs[] = {command->output, command->json, command->centreline_out};
-        for (size_t i = 0; i < sizeof outputs / sizeof outputs[0]; i++) {
-            output_check_apart(outputs[i], command->surface, faults);
-            for (int k = 0; k < command->centreline_count; k++)
-                output_check_apart(outputs[i], command->centreline[k], faults);
-        }
+        OutputPlan plan = {.faults = faults};
+        output_plan_write_file(&plan, "-o", command->output);
+        output_plan_write(&plan, "--json", command->json);
+        output_plan_write(&plan, "--centerline-out", command->centreline_out);
+        output_plan_read(&plan, "--surface", command->surface);
+        for (int k = 0; k < command->centreline_count; k++)
+            output_plan_read(&plan, "--centreline", command->centreline[k]);
         code = faults->count == 0 && import(command, faults) ? EXIT_DONE : cli_bad_input(faults);
     }
     free(command);

@@ -3,10 +3,10 @@
 
 #include "cli/file_kind.h"
 #include "cli/junction_sheets.h"
-#include "cli/output.h"
+#include "cli/output_plan.h"
 #include "cli/reach_report.h"
 #include "cli/report.h"
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/mesh_check.h"
 #include "recon/tree_file.h"
@@ -67,8 +67,7 @@ static void add_box(cJSON *object, const Vec3 *point, int count)
     add_vector(object, "high_mm", high);
 }
 
-// A picture is never worth a failed command: what stops it is said.
-static void draw_model(const char *picture, const char *path, const VesselTree *tree, const TreeFileInfo *info)
+static bool draw_model(const char *picture, const char *path, const VesselTree *tree, const TreeFileInfo *info, Faults *faults)
 {
     char message[512] = "the tree has no fitted model to draw";
 #ifdef SELDINGER_RENDER
@@ -86,7 +85,8 @@ static void draw_model(const char *picture, const char *path, const VesselTree *
     snprintf(message, sizeof message, "built without pictures");
 #endif
     if (!drawn)
-        fprintf(stderr, "%s: no picture: %s\n", picture, message);
+        faults_add(faults, picture, 0, 0, "no picture: %s", message);
+    return drawn;
 }
 
 typedef struct TreeWishes {
@@ -148,8 +148,7 @@ static bool describe_tree(cJSON *object, const char *path, TreeWishes *wishes, F
     good = good && (!wishes->report || report_write(wishes->report, path, tree, &info, faults));
     wishes->junctions.tool_radius = wishes->tool_radius;
     good = good && junction_sheets_draw(&wishes->junctions, path, tree, faults);
-    if (good && wishes->picture)
-        draw_model(wishes->picture, path, tree, &info);
+    good = good && (!wishes->picture || draw_model(wishes->picture, path, tree, &info, faults));
     tree_file_info_free(&info);
     vessel_tree_free(tree);
     return good;
@@ -450,16 +449,16 @@ int verb_info(int argc, char **argv)
     FileKind kind = file_kind(path);
     if ((report || picture || wishes.junctions.picture) && kind != FILE_TREE && kind != FILE_MISSING)
         faults_add(&faults, path, 0, 0, "is no tree or model; %s is made of those", report ? "--report" : picture ? "--picture" : "--junctions");
-    if (report)
-        output_check(report, &faults);
-    if (picture)
-        output_check_file(picture, &faults);
-    if (wishes.junctions.picture)
-        output_check_file(wishes.junctions.picture, &faults);
+    OutputPlan plan = {.faults = &faults};
+    output_plan_write(&plan, "--report", report);
+    output_plan_write_file(&plan, "--picture", picture);
+    output_plan_write_file(&plan, "--junctions", wishes.junctions.picture);
+    output_plan_series(&plan, "--junctions", ".png");
+    output_plan_read(&plan, "the file", path);
+    output_plan_read(&plan, "--before", wishes.junctions.before);
+    output_plan_read_volume(&plan, "--volume", wishes.junctions.volume);
     if ((wishes.junctions.volume || wishes.junctions.before) && !wishes.junctions.picture)
         faults_add(&faults, path, 0, 0, "--volume and --before belong to the pictures of --junctions F.png");
-    output_check_apart(report, path, &faults);
-    output_check_apart(picture, path, &faults);
     if (faults.count > 0) {
         cJSON_Delete(object);
         return cli_bad_input(&faults);

@@ -44,7 +44,7 @@ static int choose_compared(const VesselTree *model, const Reach *reach, const Ve
     return good ? count : -1;
 }
 
-static void draw(const JunctionSheets *sheets, const char *title, const VesselTree *model, const VesselTree *before, const Volume *volume)
+static bool draw(const JunctionSheets *sheets, const char *title, const VesselTree *model, const VesselTree *before, const Volume *volume, Faults *faults)
 {
     ReachOptions flood = reach_default_options();
     flood.tool_radius = sheets->tool_radius;
@@ -72,8 +72,9 @@ static void draw(const JunctionSheets *sheets, const char *title, const VesselTr
         drawn = picture_of_junctions(sheets->picture, &options, &what, &pages, message, sizeof message);
     }
     if (!drawn)
-        fprintf(stderr, "%s: no picture: %s\n", sheets->picture, message);
+        faults_add(faults, sheets->picture, 0, 0, "no picture: %s", message);
     reach_free(reach);
+    return drawn;
 }
 #endif
 
@@ -82,8 +83,8 @@ bool junction_sheets_draw(const JunctionSheets *sheets, const char *title, const
     if (!sheets->picture)
         return true;
     if (!vessel_tree_is_model(model)) {
-        fprintf(stderr, "%s: no picture: the tree has no fitted model to draw\n", sheets->picture);
-        return true;
+        faults_add(faults, sheets->picture, 0, 0, "no picture: the tree has no fitted model to draw");
+        return false;
     }
 #ifdef SELDINGER_RENDER
     VesselTree *before = sheets->before ? tree_file_load(sheets->before, NULL, faults) : NULL;
@@ -93,14 +94,13 @@ bool junction_sheets_draw(const JunctionSheets *sheets, const char *title, const
         faults_add(faults, sheets->before, 0, 0, "is a tree without a model; `seldinger fit` makes one");
         good = false;
     }
-    if (good)
-        draw(sheets, title, model, before, volume);
+    good = good && draw(sheets, title, model, before, volume, faults);
     volume_free(volume);
     vessel_tree_free(before);
     return good;
 #else
-    (void)title, (void)faults;
-    fprintf(stderr, "%s: no picture: built without pictures\n", sheets->picture);
-    return true;
+    (void)title;
+    faults_add(faults, sheets->picture, 0, 0, "no picture: built without pictures");
+    return false;
 #endif
 }

@@ -81,10 +81,7 @@ bool live_session_open(LiveSession *session, const Scene *scene, const OpenVesse
     }
     if (good)
         return true;
-    if (session->recording) {
-        recording_close(session->recording, session->simulator, faults);
-        remove(session->record_path);   // of a session that never was
-    }
+    recording_abandon(session->recording);
     live_session_free(session);
     return false;
 }

@@ -1,9 +1,12 @@
 // seldinger: the table of verbs and what the verbs share.
 #include "cli/cli.h"
 
-#include "geom/heap.h"
+#include "base/part_file.h"
+#include "base/heap.h"
 
 #include <cjson/cJSON.h>
+#include <errno.h>
+#include <fcntl.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
@@ -41,15 +44,17 @@ static void print_help(FILE *out)
         fprintf(out, "  %-8s %-34s %s\n", verbs[i].name, verbs[i].arguments, verbs[i].does);
     fprintf(out, "\n`seldinger VERB --help` explains every option with its unit and default.\n"
                  "Exit codes: 0 done; 1 a comparison failed; 2 wrong usage or bad input; 3 the simulation could not be trusted.\n"
-                 "Stopped by the user (SIGINT, SIGTERM) a verb leaves no unfinished file and ends by that signal (130 or 143); `run` ends in order.\n");
+                 "Stopped by the user (SIGINT, SIGTERM, SIGHUP) a verb leaves no unfinished file and ends by that signal (130, 143 or 129); `run` ends in order.\n");
 }
 
-// What is written is whole or not there (geom/stops.h); the exit status is the signal's, 130 in a shell for SIGINT.
-static void stop(int number)
+// What is written is whole or not there (base/part_file.h); the exit status is the signal's, 130 in a shell for SIGINT.
+void cli_stop(int number)
 {
+    part_files_remove();
     static const char message[] = "\nstopped; no unfinished file is left\n";
     ssize_t said = write(STDERR_FILENO, message, sizeof message - 1);
     (void)said;
+    signal(number, SIG_DFL);
     raise(number);
 }
 
@@ -58,19 +63,11 @@ static void install_stop(int number)
     struct sigaction former;
     // what a shell has a job in the background ignore stays ignored
     if (sigaction(number, NULL, &former) == 0 && former.sa_handler != SIG_IGN)
-        sigaction(number, &(struct sigaction){.sa_handler = stop, .sa_flags = (int)SA_RESETHAND}, NULL);
+        sigaction(number, &(struct sigaction){.sa_handler = cli_stop, .sa_flags = (int)SA_RESETHAND}, NULL);
 }
 
-// The library's JSON is otherwise silently without what it had no memory for.
-static void *json_memory(size_t bytes) { return HEAP_ZEROED(bytes, 1); }
-
-int main(int argc, char **argv)
+static int call_verb(int argc, char **argv)
 {
-    cJSON_InitHooks(&(cJSON_Hooks){.malloc_fn = json_memory, .free_fn = free});
-    install_stop(SIGINT);
-    install_stop(SIGTERM);
-    // a file-size limit is then a failed write with a message, and no part of a file is left
-    sigaction(SIGXFSZ, &(struct sigaction){.sa_handler = SIG_IGN}, NULL);
     if (argc < 2) {
         print_help(stderr);
         return EXIT_BAD_INPUT;
@@ -89,17 +86,53 @@ int main(int argc, char **argv)
         char name[64];
         snprintf(name, sizeof name, "seldinger %s", verbs[i].name);
         argv[1] = name;
-        int code = verbs[i].call(argc - 1, argv + 1);
-        bool lost = fflush(stdout) != 0 || ferror(stdout);
-        if (lost)
-            fprintf(stderr, "-: standard output cannot be written to its end; a place with free space\n");
-        return lost && code == EXIT_DONE ? EXIT_BAD_INPUT : code;
+        return verbs[i].call(argc - 1, argv + 1);
     }
     fprintf(stderr, "seldinger: no verb '%s'; valid:", argv[1]);
     for (int i = 0; i < VERB_COUNT; i++)
         fprintf(stderr, " %s", verbs[i].name);
     fprintf(stderr, "\n");
     return EXIT_BAD_INPUT;
+}
+
+static int exit_code = EXIT_DONE;
+
+// However the program ends (argp's --help ends it by itself). Some file systems tell only at the end that they are full; a standard output that was
+// closed from the start has lost nothing that was not written.
+static void check_output(void)
+{
+    bool lost = fflush(stdout) != 0 || ferror(stdout);
+    errno = 0;
+    lost = (fclose(stdout) != 0 && errno != EBADF) || lost;
+    if (!lost)
+        return;
+    fprintf(stderr, "-: standard output cannot be written to its end; a place with free space\n");
+    _exit(exit_code != EXIT_DONE ? exit_code : EXIT_BAD_INPUT);
+}
+
+// The number of a standard stream that is closed would be the next file's, which then got what is printed. Reading and writing fail as before.
+static void fill_standard_streams(void)
+{
+    for (int i = 0; i < 3; i++)
+        if (fcntl(i, F_GETFD) < 0 && open("/dev/null", i == 0 ? O_WRONLY : O_RDONLY) != i)
+            _exit(EXIT_BAD_INPUT);
+}
+
+// The library's JSON is otherwise silently without what it had no memory for.
+static void *json_memory(size_t bytes) { return HEAP_ZEROED(bytes, 1); }
+
+int main(int argc, char **argv)
+{
+    cJSON_InitHooks(&(cJSON_Hooks){.malloc_fn = json_memory, .free_fn = free});
+    fill_standard_streams();
+    install_stop(SIGINT);
+    install_stop(SIGTERM);
+    install_stop(SIGHUP);
+    // a file-size limit is then a failed write with a message, and no part of a file is left
+    sigaction(SIGXFSZ, &(struct sigaction){.sa_handler = SIG_IGN}, NULL);
+    atexit(check_output);
+    exit_code = call_verb(argc, argv);
+    return exit_code;
 }
 
 void cli_notes(FILE *out, const char *path, const char *text)

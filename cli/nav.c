@@ -1,5 +1,6 @@
 // seldinger nav: the trainer.
 #include "cli/output.h"
+#include "cli/output_plan.h"
 #include "cli/trainer.h"
 #include "cli/trainer_files.h"
 #include "sim/replay.h"
@@ -186,7 +187,12 @@ int verb_nav(int argc, char **argv)
     faults_clear(&faults);
     OpenVessel open = {0};
     Scene *scene = scene_load(options.scene, &faults);
-    output_check(options.figures, &faults);
+    OutputPlan plan = {.faults = &faults};
+    output_plan_write(&plan, "--figures", options.figures);
+    output_plan_read_scene(&plan, scene);
+    output_plan_read(&plan, "--resume", options.resume);
+    for (int i = 0; i < options.map_count; i++)
+        output_plan_read(&plan, "--device", options.map[i]);
     RecordedRun *resume = scene && options.resume ? recorded_run_load_series(options.resume, &faults) : NULL;
     code = EXIT_BAD_INPUT;
     if (scene && (!resume || is_same_scene(resume, scene, options.resume, &faults)) && faults.count == 0 &&

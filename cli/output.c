@@ -1,6 +1,6 @@
 #include "cli/output.h"
 
-#include "geom/stops.h"
+#include "base/part_file.h"
 #include "recon/whole_file.h"
 
 #include <ctype.h>
@@ -12,31 +12,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static bool is_special(const char *path)
-{
-    struct stat status;
-    return !strcmp(path, "-") || (stat(path, &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode));
-}
+static bool is_special(const char *path) { return !strcmp(path, "-") || part_file_is_through(path); }
 
 static bool can_create_beside(const char *path)
 {
-    size_t room = strlen(path) + 32;
-    char *part = malloc(room);
-    if (!part)
+    PartFile part;
+    if (!part_file_begin(&part, path))
         return false;
-    snprintf(part, room, "%s.part-%ld", path, (long)getpid());
-    sigset_t before;
-    stops_hold(&before);
-    int file = open(part, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    int reason = errno;
-    if (file >= 0) {
-        close(file);
-        unlink(part);
-    }
-    stops_release(&before);
-    free(part);
-    errno = reason;
-    return file >= 0;
+    part_file_drop(&part);
+    return true;
 }
 
 bool output_check(const char *path, Faults *faults)
@@ -62,17 +46,6 @@ bool output_check_file(const char *path, Faults *faults)
         return false;
     }
     return output_check(path, faults);
-}
-
-bool output_check_apart(const char *path, const char *input, Faults *faults)
-{
-    struct stat out, in;
-    if (!path || !input || !strcmp(path, "-") || stat(path, &out) || stat(input, &in))
-        return true;
-    if (!S_ISREG(out.st_mode) || out.st_dev != in.st_dev || out.st_ino != in.st_ino)
-        return true;
-    faults_add(faults, path, 0, 0, "is read here and would be lost; another name to write");
-    return false;
 }
 
 bool output_write(const char *path, const void *bytes, size_t length, Faults *faults)

@@ -12,8 +12,6 @@
 bool output_check(const char *path, Faults *faults);
 // The same for what only whole files can hold (HDF5, PNG): a device, a pipe or "-" is a fault too.
 bool output_check_file(const char *path, Faults *faults);
-// A fault where `path` is the file `input` (either NULL: nothing to check): what is read would be lost.
-bool output_check_apart(const char *path, const char *input, Faults *faults);
 bool output_write(const char *path, const void *bytes, size_t length, Faults *faults);
 // `text` and a newline; takes it over and frees it. NULL is a fault: no memory.
 bool output_write_line(const char *path, char *text, Faults *faults);

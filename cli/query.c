@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "cli/output.h"
+#include "cli/output_plan.h"
 #include "recon/tree_file.h"
 #include "recon/whole_file.h"
 
@@ -14,7 +15,8 @@ static const char help[] =
     "Usage: seldinger query MODEL.h5 --points F.csv -o F.csv\n\n"
     "Evaluates a fitted model at points: the node by power distance over the whole tree, field f (> 0 inside), its gradient, and the signed\n"
     "Taubin distance f / |grad f| (> 0 inside).\n\n"
-    "  --points F.csv   a header with x_mm,y_mm,z_mm (any order, other columns are ignored), a point a line; # begins a comment\n"
+    "  --points F.csv   a header with x_mm,y_mm,z_mm (any order, other columns are ignored), a point a line; # begins a comment;\n"
+    "                   at most 1 GB\n"
     "  -o, --output F   x_mm,y_mm,z_mm,node,f,gx,gy,gz,distance_mm,inside; - is standard output\n"
     "  --threads N      default 0: all cores; the answers do not depend on it\n"
     "  --quiet          no summary\n\n"
@@ -28,7 +30,7 @@ static int usage_fault(const char *message, const char *what)
 
 // --- points ---
 
-enum { COLUMNS_MOST = 64 };
+enum { COLUMNS_MOST = 64, POINTS_BYTES_MOST = 1 << 30 };
 
 typedef struct PointTable {
     int count, capacity;
@@ -91,7 +93,7 @@ static bool read_points(const char *path, PointTable *table, Faults *faults)
 {
     size_t length;
     int before = faults->count, which[3], columns = 0, line = 0;
-    char *text = whole_file_read(path, &length, faults), *next = text;
+    char *text = whole_file_read_most(path, POINTS_BYTES_MOST, &length, faults), *next = text;
     if (text && memchr(text, '\0', length)) {
         faults_add_at_byte(faults, path, strlen(text), "a zero byte; valid: text");
         next = NULL;
@@ -241,9 +243,10 @@ int verb_query(int argc, char **argv)
     if (!points || !output)
         return usage_fault(points ? "lacks -o F.csv" : "lacks --points F.csv", "");
     PointTable table = {0};
-    output_check(output, &faults);
-    output_check_apart(output, argv[optind], &faults);
-    output_check_apart(output, points, &faults);
+    OutputPlan plan = {.faults = &faults};
+    output_plan_write(&plan, "-o", output);
+    output_plan_read(&plan, "the model", argv[optind]);
+    output_plan_read(&plan, "--points", points);
     VesselTree *tree = tree_file_load(argv[optind], NULL, &faults);
     if (tree && !vessel_tree_is_model(tree))
         faults_add(&faults, argv[optind], 0, 0, "is a tree without a model; make one with `seldinger fit`");

@@ -1,7 +1,7 @@
 // seldinger replay: a recording shown, simulated again, made into a scene.
 #include "cli/cli.h"
 
-#include "cli/output.h"
+#include "cli/output_plan.h"
 #include "cli/replay_scene.h"
 #include "sim/sha256.h"
 #ifdef SELDINGER_RENDER
@@ -17,6 +17,7 @@
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 static const char help[] =
     "Usage: seldinger replay REC.h5 [options]\n\n"
@@ -253,6 +254,24 @@ static int show(const ReplayOptions *options, const RecordedRun *run, Scene *sce
 #endif
 }
 
+// The scene's folder gets three files; the recording's own scene may lie in it.
+static void plan_outputs(const ReplayOptions *options, const RecordedRun *run, const Scene *scene, Faults *faults)
+{
+    static const char *const part[] = {"scene.yaml", "hand.csv", "scene.golden.csv"};
+    char path[3][PATH_MAX];
+    OutputPlan plan = {.faults = faults};
+    output_plan_write_file(&plan, "--picture", options->picture);
+    output_plan_write_file(&plan, "--movie", options->movie);
+    bool is_there = options->scene_folder && access(options->scene_folder, F_OK) == 0;
+    for (int i = 0; is_there && i < 3; i++)
+        if (snprintf(path[i], sizeof path[i], "%s/%s", options->scene_folder, part[i]) < (int)sizeof path[i])
+            output_plan_write_file(&plan, "--scene", path[i]);
+    output_plan_read(&plan, "the recording", options->recording);
+    output_plan_read_scene(&plan, scene);
+    if (run && run->scene_path)
+        output_plan_read(&plan, "the recording's scene", run->scene_path);
+}
+
 int verb_replay(int argc, char **argv)
 {
     ReplayOptions options;
@@ -266,8 +285,7 @@ int verb_replay(int argc, char **argv)
     RecordedRun *run = recorded_run_load(options.recording, &faults);
     Scene *scene = run ? replay_scene(run, options.recording, &faults) : NULL;
     code = EXIT_BAD_INPUT;
-    output_check_file(options.picture, &faults);
-    output_check_file(options.movie, &faults);
+    plan_outputs(&options, run, scene, &faults);
     if (scene && faults.count == 0 && open_vessel(scene, options.threads, options.quiet, &open, &faults) && open_vessel_inlet(scene, &open, &faults)) {
         code = EXIT_DONE;
         if (options.verify || options.scene_folder)

@@ -1,7 +1,7 @@
 // The report's figures. Colours are classes that the page's style sheet sets for light, dark and paper.
 #include "cli/report.h"
 
-#include "geom/heap.h"
+#include "base/heap.h"
 
 #include <stdlib.h>
 

@@ -2,10 +2,11 @@
 #include "cli/cli.h"
 
 #include "cli/output.h"
+#include "cli/output_plan.h"
 #include "cli/run_chart.h"
 #include "cli/run_files.h"
 #include "cli/run_hands.h"
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "sim/lesson.h"
 #include "sim/pose.h"
 #include "sim/recording.h"
@@ -63,7 +64,9 @@ static volatile sig_atomic_t stop_requested;
 
 static void request_stop(int signal_number)
 {
-    (void)signal_number;
+    // a second one ends the program at once
+    if (stop_requested)
+        cli_stop(signal_number);
     stop_requested = 1;
 }
 
@@ -152,12 +155,17 @@ static Scene *prepare_scene(const RunOptions *options, Faults *faults)
             kind = i;
     if (options->contact && kind < 0)
         faults_add(faults, "--contact", 0, 0, "'%.40s' is not known; valid: lim, lim_blend, lim_switch, mesh, smooth_mesh, flat_mesh, grid, tube", options->contact);
-    output_check(options->summary, faults);
-    output_check(options->final, faults);
-    output_check(options->score, faults);
-    output_check_file(options->picture, faults);
-    output_check_file(options->chart, faults);
-    output_check_file(options->record, faults);
+    OutputPlan plan = {.faults = faults};
+    output_plan_write(&plan, "--summary", options->summary);
+    output_plan_write(&plan, "--final", options->final);
+    output_plan_write(&plan, "--score", options->score);
+    output_plan_write_file(&plan, "--picture", options->picture);
+    output_plan_write_file(&plan, "--chart", options->chart);
+    output_plan_write_file(&plan, "--record", options->record);
+    output_plan_read_scene(&plan, scene);
+    output_plan_read(&plan, "--script", options->script);
+    for (int i = 0; i < options->device_count; i++)
+        output_plan_read(&plan, "--device", options->device[i]);
 #ifndef SELDINGER_RENDER
     if (options->picture || options->chart)
         faults_add(faults, options->picture ? "--picture" : "--chart", 0, 0, "this build has no pictures; build with -DSELDINGER_RENDER=ON");
@@ -239,8 +247,8 @@ static void free_moments(Watch *watch)
 }
 
 #ifdef SELDINGER_RENDER
-// A picture is never worth a failed run: what goes wrong is said, no more.
-static void draw_picture(const RunOptions *options, const Watch *watch, Simulator *simulator, OpenVessel *open)
+// False with a fault where there is none: what was asked for is missing, though the run is as good as it was.
+static bool draw_picture(const RunOptions *options, const Watch *watch, Simulator *simulator, OpenVessel *open, Faults *faults)
 {
     const Scene *scene = simulator_scene(simulator);
     int nodes = stepper_node_capacity(simulator_stepper(simulator)), count = 0;
@@ -274,10 +282,11 @@ static void draw_picture(const RunOptions *options, const Watch *watch, Simulato
                 : count > 1 ? picture_of_moments(options->picture, &look, &shown, count, tool, message, sizeof message)
                             : (snprintf(message, sizeof message, "the run ended before the first moment of --picture-at"), false);
     if (!good)
-        fprintf(stderr, "%s: no picture: %s\n", options->picture, message);
+        faults_add(faults, options->picture, 0, 0, "no picture: %s", message[0] ? message : "not enough memory");
     free(radius);
     free(force);
     tool_looks_free(&looks);
+    return good;
 }
 #endif
 
@@ -363,14 +372,17 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
         watch.chart = run_chart_create(record.expected_steps);
     if (!node || !make_moments(&watch, simulator) || (options->chart && !watch.chart))
         faults_add(faults, scene->path, 0, 0, "no memory");
-    else if (options->record)
-        watch.recording = recording_create(options->record, simulator, &record, faults);
     if (options->score && !(watch.lesson = lesson_create(simulator, open->tree)))
         faults_add(faults, scene->path, 0, 0, "no memory");
     simulator_watch_energy(simulator);
     if (options->device_count && faults->count == 0)
         watch.hands = run_hands_open(options->device_count, options->device, scene, device_patience_s, faults);
-    if (faults->count == 0) {
+    // last, as it begins a file
+    if (options->record && faults->count == 0)
+        watch.recording = recording_create(options->record, simulator, &record, faults);
+    if (faults->count > 0)
+        run_hands_close(watch.hands);
+    else {
         DriveOptions drive = drive_default_options();
         drive.script = watch.hands ? NULL : scene->script;
         drive.hand = watch.hands ? run_hands_command : NULL;
@@ -396,12 +408,13 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
             run_print(options->summary && !strcmp(options->summary, "-") ? stderr : stdout, simulator, &report, node);
         say_untrusted(simulator, &report);
 #ifdef SELDINGER_RENDER
-        if (options->picture)
-            draw_picture(options, &watch, simulator, open);
+        whole = (!options->picture || draw_picture(options, &watch, simulator, open, faults)) && whole;
 #endif
         char message[512];
-        if (options->chart && !run_chart_draw(watch.chart, simulator, options->chart, message, sizeof message))
-            fprintf(stderr, "%s: no chart: %s\n", options->chart, message);
+        if (options->chart && !run_chart_draw(watch.chart, simulator, options->chart, message, sizeof message)) {
+            faults_add(faults, options->chart, 0, 0, "no chart: %s", message);
+            whole = false;
+        }
         code = whole && report.end != DRIVE_DIVERGED && !run_left_vessel(simulator_totals(simulator)) ? EXIT_DONE : EXIT_UNTRUSTED;
     }
     lesson_free(watch.lesson);
@@ -414,8 +427,7 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
 
 static void install_signals(void)
 {
-    // a second signal ends the program at once
-    struct sigaction stop = {.sa_handler = request_stop, .sa_flags = (int)(SA_RESTART | SA_RESETHAND)};
+    struct sigaction stop = {.sa_handler = request_stop, .sa_flags = SA_RESTART};
     sigaction(SIGINT, &stop, NULL);
     sigaction(SIGTERM, &stop, NULL);
 }

@@ -1,6 +1,6 @@
 #include "cli/run_files.h"
 
-#include "geom/heap.h"
+#include "base/heap.h"
 
 #include <cJSON.h>
 #include <inttypes.h>

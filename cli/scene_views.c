@@ -1,6 +1,6 @@
 #include "cli/scene_views.h"
 
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/volume.h"
 

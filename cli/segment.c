@@ -2,7 +2,8 @@
 #include "cli/cli.h"
 
 #include "cli/output.h"
-#include "geom/heap.h"
+#include "cli/output_plan.h"
+#include "base/heap.h"
 #include "recon/blurred_edge.h"
 #include "recon/rbt_track.h"
 #include "recon/trace.h"
@@ -387,8 +388,8 @@ static bool write_json(const SegmentArguments *a, const VesselTree *tree, const 
     return good;
 }
 
-// A picture is never worth a failed run: says why there is none and goes on.
-static void draw_picture(const SegmentArguments *a, const Volume *volume, const VesselTree *tree)
+// False with a fault where there is none; the tree is written all the same.
+static bool draw_picture(const SegmentArguments *a, const Volume *volume, const VesselTree *tree, Faults *faults)
 {
     char message[512] = "built without pictures";
     bool drawn = false;
@@ -401,7 +402,8 @@ static void draw_picture(const SegmentArguments *a, const Volume *volume, const 
     (void)tree;
 #endif
     if (!drawn)
-        fprintf(stderr, "%s: no picture: %s\n", a->picture, message);
+        faults_add(faults, a->picture, 0, 0, "no picture: %s", message);
+    return drawn;
 }
 
 static Trace *trace_of(const SegmentArguments *a, Faults *faults)
@@ -427,15 +429,12 @@ static Trace *trace_of(const SegmentArguments *a, Faults *faults)
 
 static int segment(const SegmentArguments *a, Faults *faults)
 {
-    output_check_file(a->out, faults);
-    output_check(a->json, faults);
-    if (a->picture)
-        output_check_file(a->picture, faults);
-    const char *outputs[] = {a->out, a->json, a->picture};
-    for (size_t i = 0; i < sizeof outputs / sizeof outputs[0]; i++) {
-        output_check_apart(outputs[i], a->volume, faults);
-        output_check_apart(outputs[i], a->trace, faults);
-    }
+    OutputPlan plan = {.faults = faults};
+    output_plan_write_file(&plan, "-o", a->out);
+    output_plan_write(&plan, "--json", a->json);
+    output_plan_write_file(&plan, "--picture", a->picture);
+    output_plan_read_volume(&plan, "the volume", a->volume);
+    output_plan_read(&plan, "--trace", a->trace);
     double start = seconds();
     Trace *trace = trace_of(a, faults);
     Volume *volume = volume_load(a->volume, faults);
@@ -464,8 +463,7 @@ static int segment(const SegmentArguments *a, Faults *faults)
             print_table(tree, &report, load_s, track_s);
         if (good)
             print_warnings(a, &report.check);
-        if (good && a->picture)
-            draw_picture(a, volume, tree);
+        good = good && (!a->picture || draw_picture(a, volume, tree, faults));
     }
     rbt_report_free(&report);
     vessel_tree_free(tree);

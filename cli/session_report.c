@@ -3,11 +3,13 @@
 
 #include "cli/file_kind.h"
 #include "cli/output.h"
+#include "cli/output_plan.h"
 #include "cli/recover.h"
 #include "cli/report.h"
 #include "cli/trainer_files.h"
 #include "cli/tube_tree.h"
 #include "input/text_file.h"
+#include "recon/whole_file.h"
 #include "sim/recording.h"
 
 #include <getopt.h>
@@ -16,6 +18,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 static const char help[] =
@@ -348,8 +351,28 @@ static char *make_page(const char *path, const Session *session, const char *wit
 
 // --- paper ---
 
+// A stop by the user that waits for the folder to be removed.
+static bool is_stopped(void)
+{
+    sigset_t pending;
+    return sigpending(&pending) == 0 && (sigismember(&pending, SIGINT) == 1 || sigismember(&pending, SIGTERM) == 1 || sigismember(&pending, SIGHUP) == 1);
+}
+
+// Of the browser and what it has started, which are a group of their own; stopped with us.
+static bool has_succeeded(pid_t child)
+{
+    int status = -1;
+    pid_t ended;
+    while ((ended = waitpid(child, &status, WNOHANG)) == 0) {
+        if (is_stopped())
+            kill(-child, SIGKILL);
+        nanosleep(&(struct timespec){.tv_nsec = 20000000}, NULL);
+    }
+    return ended == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
 // Runs a browser without a shell; its own chatter is not ours. False where it cannot be run or fails.
-static bool browser_prints(const char *browser, const char *html, const char *pdf)
+static bool browser_prints(const char *browser, const char *html, const char *pdf, const sigset_t *signals)
 {
     char print[4200], url[4200], profile[4200];
     snprintf(print, sizeof print, "--print-to-pdf=%s", pdf);
@@ -359,14 +382,17 @@ static bool browser_prints(const char *browser, const char *html, const char *pd
                               geteuid() == 0 ? "--no-sandbox" : url, geteuid() == 0 ? url : NULL, NULL};
     pid_t child = fork();
     if (child == 0) {
+        setpgid(0, 0);
+        sigprocmask(SIG_SETMASK, signals, NULL);
         if (!freopen("/dev/null", "w", stdout) || !freopen("/dev/null", "w", stderr))
             _exit(127);
         alarm(120);
         execvp(browser, (char *const *)argument);
         _exit(127);
     }
-    int status = -1;
-    return child > 0 && waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
+    if (child > 0)
+        setpgid(child, child);
+    return child > 0 && has_succeeded(child);
 }
 
 static void remove_folder(const char *path)
@@ -380,33 +406,47 @@ static void remove_folder(const char *path)
         waitpid(child, NULL, 0);
 }
 
-static bool write_pdf(const char *path, const char *page, size_t length, Faults *faults)
+// The PDF's bytes; NULL where no browser made it. The caller frees.
+static char *print_page(const char *folder, const char *path, const char *page, size_t length, const sigset_t *signals, size_t *pdf_length, Faults *faults)
 {
     static const char *const browsers[] = {"chromium", "chromium-browser", "google-chrome"};
-    char folder[] = "/tmp/seldinger-page-XXXXXX", html[64], pdf[64];
-    if (!mkdtemp(folder)) {
-        faults_add(faults, path, 0, 0, "no folder for the browser could be made in /tmp");
-        return false;
-    }
+    char html[64], pdf[64];
     snprintf(html, sizeof html, "%s/page.html", folder);
     snprintf(pdf, sizeof pdf, "%s/page.pdf", folder);
     bool written = output_write(html, page, length, faults), printed = false;
-    for (int i = 0; written && i < 3 && !printed; i++)
-        printed = browser_prints(browsers[i], html, pdf) && access(pdf, R_OK) == 0;
-    FILE *file = printed ? fopen(pdf, "rb") : NULL;
-    char *bytes = NULL;
-    long size = file && fseek(file, 0, SEEK_END) == 0 ? ftell(file) : -1;
-    if (size > 0 && (bytes = malloc((size_t)size))) {
-        rewind(file);
-        size = fread(bytes, 1, (size_t)size, file) == (size_t)size ? size : -1;
-    }
-    if (file)
-        fclose(file);
-    bool good = bytes && size > 4 && !memcmp(bytes, "%PDF", 4) && output_write(path, bytes, (size_t)size, faults);
-    if (written && !good)
-        faults_add(faults, path, 0, 0, "no PDF: chromium is not installed or could not print; --html F.html needs no browser");
+    for (int i = 0; written && i < 3 && !printed && !is_stopped(); i++)
+        printed = browser_prints(browsers[i], html, pdf, signals) && access(pdf, R_OK) == 0;
+    Faults own;
+    faults_clear(&own);
+    char *bytes = printed ? whole_file_read(pdf, pdf_length, &own) : NULL;
+    if (bytes && *pdf_length > 4 && !memcmp(bytes, "%PDF", 4))
+        return bytes;
     free(bytes);
-    remove_folder(folder);
+    if (written)
+        faults_add(faults, path, 0, 0, "no PDF: chromium is not installed or could not print; --html F.html needs no browser");
+    return NULL;
+}
+
+static bool write_pdf(const char *path, const char *page, size_t length, Faults *faults)
+{
+    char folder[] = "/tmp/seldinger-page-XXXXXX";
+    sigset_t stops, before;
+    size_t pdf_length = 0;
+    // the folder holds a trainee's page: a stop waits until it is removed
+    sigemptyset(&stops);
+    sigaddset(&stops, SIGINT);
+    sigaddset(&stops, SIGTERM);
+    sigaddset(&stops, SIGHUP);
+    sigprocmask(SIG_BLOCK, &stops, &before);
+    bool is_made = mkdtemp(folder) != NULL;
+    char *pdf = is_made ? print_page(folder, path, page, length, &before, &pdf_length, faults) : NULL;
+    if (is_made)
+        remove_folder(folder);
+    else
+        faults_add(faults, path, 0, 0, "no folder for the browser could be made in /tmp");
+    sigprocmask(SIG_SETMASK, &before, NULL);
+    bool good = pdf && output_write(path, pdf, pdf_length, faults);
+    free(pdf);
     return good;
 }
 
@@ -479,10 +519,11 @@ int verb_report(int argc, char **argv)
     faults_clear(&faults);
     Session *session = calloc(1, sizeof *session);
     char *page = NULL;
-    output_check(options.html, &faults);
-    output_check_file(options.pdf, &faults);
-    output_check_apart(options.html, options.session, &faults);
-    output_check_apart(options.pdf, options.session, &faults);
+    OutputPlan plan = {.faults = &faults};
+    output_plan_write(&plan, "--html", options.html);
+    output_plan_write_file(&plan, "--pdf", options.pdf);
+    output_plan_read(&plan, "the session", options.session);
+    output_plan_read_folder(&plan, "the session", options.with, ".json");
     bool good = session && faults.count == 0 && find_session_file(&options, &faults) && session_load(options.session, session, &faults);
     page = good ? make_page(options.session, session, options.with, &length, &faults) : NULL;
     good = page && (!options.html || output_write(options.html, page, length, &faults));

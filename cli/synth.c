@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "cli/output.h"
+#include "cli/output_plan.h"
 #include "recon/lim_fit.h"
 #include "recon/phantom_measure.h"
 #include "recon/tree_file.h"
@@ -416,9 +417,10 @@ int verb_synth(int argc, char **argv)
     if (code >= 0)
         return code;
     Shape *shape = shape_create(command.shape, command.option_count, (const char(*)[2][64])command.option, "synth", &faults);
-    if (command.output)
-        output_check_file(command.output, &faults);
-    output_check(command.json, &faults);
+    OutputPlan plan = {.faults = &faults};
+    output_plan_write_file(&plan, "-o", command.output);
+    output_plan_write(&plan, "--json", command.json);
+    output_plan_read(&plan, "--measure", command.measure);
     bool good = faults.count == 0 && (command.measure ? measure(&command, shape, &faults) : write_output(&command, shape, &faults));
     shape_free(shape);
     return good ? EXIT_DONE : cli_bad_input(&faults);

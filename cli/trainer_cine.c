@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LOOP_IMAGES = 900, FILM_SIDE = 768 };
+enum { LOOP_IMAGES = 900, FILM_SIDE = 768, CINE_BYTES_MOST = 1 << 30 };
 
 bool trainer_cine_open(TrainerCine *cine, const CineShape *shape, const char *path, Faults *faults)
 {
@@ -22,7 +22,7 @@ bool trainer_cine_open(TrainerCine *cine, const CineShape *shape, const char *pa
         return cine->cine != NULL;
     }
     size_t length;
-    char *bytes = whole_file_read(path, &length, faults);
+    char *bytes = whole_file_read_most(path, CINE_BYTES_MOST, &length, faults);
     cine->cine = bytes ? cine_unpack((const uint8_t *)bytes, length, path, faults) : NULL;
     free(bytes);
     CineShape found = cine->cine ? cine_shape(cine->cine) : *shape;

@@ -15,7 +15,7 @@ enum { SET_EFFECT = 0x21, BLOCK_INDEX = 0x22, EFFECT_TYPE = 0x25, CONSTANT_FORCE
        BLOCK_LOAD = 0x89, LOAD_SUCCESS = 0x8c, ENABLE_ACTUATORS = 0x97, STOP_ALL = 0x99,
        DEVICE_RESET = 0x9a, MANAGED = 0xa9, CREATE_NEW_EFFECT = 0xab };
 // once a millisecond; a tick that comes a little early after a late one is taken, or reports each millisecond would let through every other one
-enum { EFFECT_MS = 500, PERIOD_US = 1000, LEAST_GAP_US = 750, LOAD_ATTEMPTS = 3, MOST_FAILURES = 20 };
+enum { EFFECT_MS = 500, SHORTEST_MS = 10, LONGEST_MS = 1000, PERIOD_US = 1000, LEAST_GAP_US = 750, LOAD_ATTEMPTS = 3, STOP_ATTEMPTS = 2, MOST_FAILURES = 20 };
 
 // --- finding ---
 
@@ -102,8 +102,53 @@ static PidControl in_report(const HidDescriptor *descriptor, int report, int usa
     return is_choice ? find_choice(descriptor, PID(usage), collection) : find_number(descriptor, PID(usage), collection);
 }
 
+static int64_t all_ones(const HidField *field) { return ((int64_t)1 << field->size) - 1; }
+
+// A value beyond the field's bits would be sent as some other one.
+static bool range_fits(const HidField *field)
+{
+    int64_t half = (all_ones(field) + 1) / 2;
+    return field->logical_min < 0 ? field->logical_min >= -half && field->logical_max < half : field->logical_max <= all_ones(field);
+}
+
+// [ms] of one count of the duration; 0x1001 and 0x1003 are seconds, without a unit milliseconds are meant.
+static double duration_unit_ms(const HidField *field)
+{
+    return 1000 * pow(10, field->unit == 0x1001 || field->unit == 0x1003 ? field->unit_exponent : -3);
+}
+
+// An effect ends by itself and is started again before that: a program that dies or hangs lets the hand go.
+static int64_t duration_value(const HidField *field)
+{
+    // all ones would mean: without end
+    int64_t most = field->logical_max < all_ones(field) ? field->logical_max : all_ones(field) - 1;
+    double value = ceil(EFFECT_MS / duration_unit_ms(field));
+    return (int64_t)fmax(fmax(1, (double)field->logical_min), fmin(value, (double)most));
+}
+
+int pid_duration_ms(const PidLayout *layout)
+{
+    const HidField *field = &layout->duration.field;
+    if (!layout->duration.is_there)
+        return 0;
+    double ms = (double)duration_value(field) * duration_unit_ms(field);
+    return ms >= 1 && ms < 1e9 ? (int)ms : 0;
+}
+
+// Why an effect would not end by itself soon after the program does; NULL: it would.
+static const char *why_endless(const PidLayout *layout)
+{
+    if (!same_report(&layout->duration, &layout->effect_type))
+        return "no duration of effects in the descriptor: a force would go on after the program";
+    if (!range_fits(&layout->duration.field))
+        return "the duration's range does not fit its bits in the descriptor";
+    int ms = pid_duration_ms(layout);
+    return ms < SHORTEST_MS || ms > LONGEST_MS ? "its effects cannot be made to end by themselves after 0.01 to 1 s" : NULL;
+}
+
 static const char *what_is_missing(const PidLayout *layout)
 {
+    const HidField *magnitude = &layout->magnitude.field;
     if (!layout->create_type.is_there || !layout->effect_type.is_there || !layout->magnitude.is_there)
         return "no constant force effect in the descriptor";
     if (!layout->load_index.is_there)
@@ -112,9 +157,13 @@ static const char *what_is_missing(const PidLayout *layout)
         return "its effect reports have no effect block index in the descriptor";
     if (!layout->start.is_there || !same_report(&layout->operation_index, &layout->start))
         return "no effect operation (start) in the descriptor";
-    if (layout->magnitude.field.logical_max <= 0)
+    if (magnitude->logical_max <= 0)
         return "the magnitude of constant forces has no positive range in the descriptor";
-    return NULL;
+    if (magnitude->logical_min > 0)
+        return "the magnitude of constant forces has no zero in the descriptor";
+    if (!range_fits(magnitude))
+        return "the magnitude's range does not fit its bits in the descriptor";
+    return why_endless(layout);
 }
 
 bool pid_find(const HidDescriptor *descriptor, PidLayout *layout, char *why, size_t capacity)
@@ -208,32 +257,8 @@ bool pid_needs_host(const PidLayout *layout, const uint8_t *bytes, size_t length
            hid_field_read(&managed->field, managed->slot, bytes + 1, length - 1, &value) && value == 0;
 }
 
-static int64_t all_ones(const HidField *field) { return ((int64_t)1 << field->size) - 1; }
-
 // Outside the range is "no value", of a trigger: none.
 static bool has_null(const PidControl *control) { return control->field.logical_min >= 0 && all_ones(&control->field) > control->field.logical_max; }
-
-// [ms] of one count of the duration; 0x1001 and 0x1003 are seconds, without a unit milliseconds are meant.
-static double duration_unit_ms(const HidField *field)
-{
-    return 1000 * pow(10, field->unit == 0x1001 || field->unit == 0x1003 ? field->unit_exponent : -3);
-}
-
-// An effect ends by itself and is started again before that: a program that dies or hangs lets the hand go.
-static int64_t duration_value(const HidField *field)
-{
-    double value = ceil(EFFECT_MS / duration_unit_ms(field));
-    return (int64_t)fmax(fmax(1, (double)field->logical_min), fmin(value, (double)field->logical_max));
-}
-
-int pid_duration_ms(const PidLayout *layout)
-{
-    const HidField *field = &layout->duration.field;
-    if (!layout->duration.is_there)
-        return 0;
-    double ms = (double)duration_value(field) * duration_unit_ms(field);
-    return ms >= 1 && ms < 1e9 ? (int)ms : 0;
-}
 
 bool pid_encode_effect(const PidLayout *layout, int block, double direction_deg, PidMessage *out)
 {
@@ -269,7 +294,7 @@ bool pid_encode_force(const PidLayout *layout, int block, double magnitude, PidM
     double most = (double)field->logical_max;
     if (field->logical_min < 0 && (double)-field->logical_min < most)
         most = (double)-field->logical_min;
-    *value = llround(fmax(-1, fmin(1, magnitude)) * most);
+    *value = isfinite(magnitude) ? llround(fmax(-1, fmin(1, magnitude)) * most) : 0;
     if (*value < field->logical_min)
         *value = field->logical_min;
     put(out, &layout->force_index, block);
@@ -316,7 +341,8 @@ static bool send(const PidMessage *message, const HidTransport *transport, void 
 {
     int sent = message->kind == HID_FEATURE ? transport->send_feature(transport->context, device, message->bytes, message->length)
                                             : transport->write(transport->context, device, message->bytes, message->length);
-    return sent > 0;
+    // a transfer cut short is none; some buses do not count the id of a report that has none
+    return sent >= message->length - (message->bytes[0] == 0);
 }
 
 // A fresh effect's block; 0: the device gives none.
@@ -328,6 +354,8 @@ static int create_effect(const PidLayout *layout, const HidTransport *transport,
     for (int i = 0; i < LOAD_ATTEMPTS; i++) {
         uint8_t answer[PID_MESSAGE_BYTES] = {(uint8_t)layout->load_index.field.report_id};
         int length = transport->get_feature(transport->context, device, answer, (int)sizeof answer);
+        if (length > (int)sizeof answer)
+            return 0;
         int block = length > 0 ? pid_decode_block_load(layout, answer, (size_t)length) : 0;
         if (block > 0)
             return block;
@@ -339,10 +367,10 @@ static bool needs_host(const PidLayout *layout, const HidTransport *transport, v
 {
     uint8_t answer[PID_MESSAGE_BYTES] = {(uint8_t)layout->pool_managed.field.report_id};
     int length = layout->pool_managed.is_there ? transport->get_feature(transport->context, device, answer, (int)sizeof answer) : 0;
-    return length > 0 && pid_needs_host(layout, answer, (size_t)length);
+    return length > 0 && length <= (int)sizeof answer && pid_needs_host(layout, answer, (size_t)length);
 }
 
-// Uploads effect `which` at zero force and starts it.
+// Uploads effect `which` at zero force; it is started by the first force_tick that may.
 static bool upload(ForceFeedback *force, int which, const HidTransport *transport, void *device)
 {
     const PidLayout *layout = &force->layout;
@@ -352,14 +380,13 @@ static bool upload(ForceFeedback *force, int which, const HidTransport *transpor
         return false;
     force->block[which] = block;
     return pid_encode_effect(layout, block, force->direction_deg[which], &message) && send(&message, transport, device) &&
-           pid_encode_force(layout, block, 0, &message, &force->value[which]) && send(&message, transport, device) &&
-           pid_encode_start(layout, block, &message) && send(&message, transport, device);
+           pid_encode_force(layout, block, 0, &message, &force->value[which]) && (force->is_known[which] = send(&message, transport, device));
 }
 
 bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor *descriptor, const HidTransport *transport, void *device, int64_t now_us)
 {
     PidMessage message;
-    *force = (ForceFeedback){.map = map->force, .started_us = now_us, .due_us = now_us};
+    *force = (ForceFeedback){.map = map->force, .due_us = now_us};
     if (!map->force.is_wanted) {
         snprintf(force->text, sizeof force->text, "%s", pid_is_haptic(descriptor) ? "none: its map has no 'force'" : "");
         return false;
@@ -393,7 +420,7 @@ bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor
     bool has_torque = map->force.full_scale_n_mm > 0 && !isnan(force->direction_deg[1]) && force->layout.direction.is_there;
     if (has_torque && !upload(force, 1, transport, device))
         force->block[1] = 0, has_torque = false;
-    force->restart_ms = pid_duration_ms(&force->layout) / 2;
+    force->effect_us = 1000 * (int64_t)pid_duration_ms(&force->layout);
     const HidField *field = &force->layout.magnitude.field;
     snprintf(force->text, sizeof force->text, "constant force, %lld steps for %g N, at most %g N%s%s", (long long)field->logical_max,
              map->force.full_scale_n, map->force.max_n,
@@ -402,40 +429,117 @@ bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor
     return true;
 }
 
-void force_tick(ForceFeedback *force, const HandPort *port, int64_t now_us, int64_t report_us, bool paused, const HidTransport *transport, void *device)
+// Counted, so that a device that takes nothing is given up: each failure may keep the thread from reading for as long as a transfer may take.
+static bool try_send(ForceFeedback *force, const PidMessage *message, const HidTransport *transport, void *device)
+{
+    bool is_sent = send(message, transport, device);
+    force->writes++;
+    force->failures = is_sent ? 0 : force->failures + 1;
+    return is_sent;
+}
+
+// The part of its full scale that an effect shall play, where the device is not known to hold it already.
+static bool write_force(ForceFeedback *force, int which, double part, const HidTransport *transport, void *device)
 {
     PidMessage message;
+    int64_t value;
+    if (!pid_encode_force(&force->layout, force->block[which], part, &message, &value))
+        return false;
+    if (force->is_known[which] && value == force->value[which])
+        return true;
+    force->value[which] = value;
+    force->is_known[which] = try_send(force, &message, transport, device);
+    return force->is_known[which];
+}
+
+static bool start_effects(ForceFeedback *force, int64_t now_us, const HidTransport *transport, void *device)
+{
+    PidMessage message;
+    // also where the device denies it
+    force->may_play = true;
+    force->started_us = now_us;
+    for (int i = 0; i < 2 && force->block[i]; i++)
+        if (!pid_encode_start(&force->layout, force->block[i], &message) || !try_send(force, &message, transport, device))
+            return false;
+    return true;
+}
+
+// Zero and stop of each effect; what fails keeps none of the rest from being tried.
+static bool rest(ForceFeedback *force, const HidTransport *transport, void *device)
+{
+    PidMessage message;
+    bool good = true;
+    for (int i = 0; i < 2 && force->block[i]; i++)
+        good &= write_force(force, i, 0, transport, device);
+    for (int i = 0; i < 2 && force->block[i] && force->may_play; i++)
+        if (pid_encode_stop(&force->layout, force->block[i], &message))
+            good &= try_send(force, &message, transport, device);
+    force->may_play = force->may_play && !good;
+    return good;
+}
+
+// An effect is started at a known zero alone: what the device held when it stopped was meant for then.
+static bool play(ForceFeedback *force, int64_t now_us, const HidTransport *transport, void *device)
+{
+    if (!force->may_play) {
+        for (int i = 0; i < 2 && force->block[i]; i++)
+            if (!write_force(force, i, 0, transport, device))
+                return false;
+        if (!start_effects(force, now_us, transport, device))
+            return false;
+    }
+    for (int i = 0; i < 2 && force->block[i]; i++) {
+        double full = pid_axis_sign(&force->layout, force->direction_deg[i]) * (i == 0 ? force->map.full_scale_n : force->map.full_scale_n_mm);
+        if (!write_force(force, i, force->guard.sent[i] / full, transport, device))
+            return false;
+    }
+    return 2 * (now_us - force->started_us) < force->effect_us || start_effects(force, now_us, transport, device);
+}
+
+static void let_go(ForceFeedback *force, const char *why)
+{
+    force->guard.sent[0] = force->guard.sent[1] = 0;
+    force->guard.why_zero = why;
+}
+
+static void give_up(ForceFeedback *force, const HidTransport *transport, void *device)
+{
+    force_stop(force, transport, device);
+    let_go(force, "the device takes no forces");
+    snprintf(force->text, sizeof force->text, "none: the device takes no forces (%d writes one after the other failed)", MOST_FAILURES);
+}
+
+void force_tick(ForceFeedback *force, const HandPort *port, int64_t now_us, int64_t report_us, bool paused, const HidTransport *transport, void *device)
+{
     if (force->block[0] == 0 || now_us < force->due_us)
         return;
     double sign = force->map.invert ? -1 : 1;
     const double wanted[2] = {sign * atomic_load(&port->force_n), sign * atomic_load(&port->torque_n_mm)};
+    int64_t writes = force->writes;
+    // an effect that has ended by itself while nobody looked holds nothing: the force grows from zero
+    bool has_ended = force->may_play && now_us - force->started_us >= force->effect_us;
     force_guard(&force->guard, &force->map, wanted, atomic_load(&port->step), now_us, report_us, paused);
-    bool has_written = false, is_due = force->restart_ms > 0 && now_us - force->started_us >= 1000 * (int64_t)force->restart_ms;
-    for (int i = 0; i < 2 && force->block[i]; i++) {
-        int64_t value;
-        double full = pid_axis_sign(&force->layout, force->direction_deg[i]) * (i == 0 ? force->map.full_scale_n : force->map.full_scale_n_mm);
-        if (is_due && pid_encode_start(&force->layout, force->block[i], &message))
-            send(&message, transport, device);
-        if (!pid_encode_force(&force->layout, force->block[i], force->guard.sent[i] / full, &message, &value) || value == force->value[i])
-            continue;
-        has_written = true;
-        force->writes++;
-        if (send(&message, transport, device)) {
-            force->value[i] = value;
-            force->failures = 0;
-        } else {
-            force->failures++;
-        }
+    if (has_ended && !force->guard.why_zero[0])
+        let_go(force, "it ended before it was started again");
+    else if (force->must_rest && !force->guard.why_zero[0])
+        let_go(force, "the device did not take a report");
+    bool is_played = !force->guard.why_zero[0] && play(force, now_us, transport, device);
+    if (!is_played) {
+        if (!force->guard.why_zero[0])
+            let_go(force, "the device did not take a report");
+        force->must_rest = !rest(force, transport, device);
     }
-    if (is_due)
-        force->started_us = now_us;
-    if (force->failures >= MOST_FAILURES) {    // each may keep the thread from reading for as long as a transfer may take
-        force->block[0] = force->block[1] = 0;
-        force->guard.sent[0] = force->guard.sent[1] = 0;
-        snprintf(force->text, sizeof force->text, "none: the device takes no forces (%d writes one after the other failed)", MOST_FAILURES);
-    }
-    if (has_written)
+    if (force->failures >= MOST_FAILURES)
+        give_up(force, transport, device);
+    if (force->writes > writes)
         force->due_us = force->due_us + PERIOD_US > now_us + LEAST_GAP_US ? force->due_us + PERIOD_US : now_us + LEAST_GAP_US;
+}
+
+// Said twice where it was not taken: nothing comes after it.
+static void insist(const PidMessage *message, const HidTransport *transport, void *device)
+{
+    for (int i = 0; i < STOP_ATTEMPTS && !send(message, transport, device); i++)
+        continue;
 }
 
 void force_stop(ForceFeedback *force, const HidTransport *transport, void *device)
@@ -444,11 +548,11 @@ void force_stop(ForceFeedback *force, const HidTransport *transport, void *devic
     int64_t value;
     for (int i = 0; i < 2; i++) {
         if (force->block[i] && pid_encode_force(&force->layout, force->block[i], 0, &message, &value))
-            send(&message, transport, device);
+            insist(&message, transport, device);
         if (force->block[i] && pid_encode_stop(&force->layout, force->block[i], &message))
-            send(&message, transport, device);
+            insist(&message, transport, device);
     }
     if (force->block[0] && encode_choice(&force->layout, &force->layout.stop_all, &message))
-        send(&message, transport, device);
+        insist(&message, transport, device);
     force->block[0] = force->block[1] = 0;
 }

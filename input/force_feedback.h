@@ -1,6 +1,8 @@
 // Force back to the hand by HID PID (USB Device Class Definition for Physical Interface Devices 1.0, usage page 0x0F): two constant-force effects, one
 // along push, one along twist where the device has a second axis, played for half a second and started again
-// before that, so that a program that dies lets the hand go; only their magnitudes change, up to once a millisecond.
+// before that, so that a program that dies lets the hand go; only their magnitudes change, up to once a millisecond. A device on which an effect
+// cannot be made to end by itself is refused. An effect is started at zero alone; after a report that the device did not take, and after a
+// time in which the effect ended by itself, the force is zero and grows again by its slew.
 //
 // What may be sent is decided by force_guard, a pure function: scale, clamp, slew limit, and zero at once when the simulation stands, the device is
 // silent, the session is paused or a number is not finite. What is sent is encoded by pid_ functions, pure too. force_ functions talk to a device.
@@ -63,11 +65,11 @@ bool pid_needs_host(const PidLayout *layout, const uint8_t *bytes, size_t length
 bool pid_encode_effect(const PidLayout *layout, int block, double direction_deg, PidMessage *out);
 // Without a direction field a force > 0 comes from the positive end of its axis (east, south); -1 for those that come from north or west.
 double pid_axis_sign(const PidLayout *layout, double direction_deg);
-// magnitude -1 to 1 of the device's largest; `value`: what was written.
+// magnitude -1 to 1 of the device's largest, zero where it is not finite; `value`: what was written.
 bool pid_encode_force(const PidLayout *layout, int block, double magnitude, PidMessage *out, int64_t *value);
 bool pid_encode_start(const PidLayout *layout, int block, PidMessage *out);
 bool pid_encode_stop(const PidLayout *layout, int block, PidMessage *out);
-// [ms] after which a started effect ends by itself; 0: never.
+// [ms] after which a started effect ends by itself; 0: never, or the field is not there.
 int pid_duration_ms(const PidLayout *layout);
 
 // Direction of the reaction to a push along a stick's axis: it comes from where the stick goes when the tool is pushed.
@@ -90,10 +92,13 @@ typedef struct ForceFeedback {
     double direction_deg[2];
     int block[2];                    // of force and torque; 0: none
     int64_t value[2];                // magnitudes written last
+    bool is_known[2];                // the device took them
+    bool may_play;                   // started, and not known to be stopped
+    bool must_rest;                  // zero and stop were not taken yet
     int64_t started_us, due_us;      // when the effects were started, when the next magnitude may go
-    int restart_ms;
-    int64_t writes;
-    int failures;                    // writes that failed, one after the other; after 20 no more are tried
+    int64_t effect_us;               // how long they play
+    int64_t writes;                  // reports tried
+    int failures;                    // writes that failed, one after the other; after 20 the effects are stopped, and no more are tried
     ForceGuard guard;
     char text[160];                  // what it does, or why it does nothing
 } ForceFeedback;
@@ -101,8 +106,9 @@ typedef struct ForceFeedback {
 // Finds the effects and uploads them at zero force. False: `text` says why; the device's inputs are good all the same.
 bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor *descriptor, const HidTransport *transport, void *device, int64_t now_us);
 // Sends what the port and the guard say where it changed; about once a millisecond at most. Nothing before force_start was true.
+// Where the guard says zero, or a report was not taken, zero and stop are sent, until they are taken.
 void force_tick(ForceFeedback *force, const HandPort *port, int64_t now_us, int64_t report_us, bool paused, const HidTransport *transport, void *device);
-// Zero and stop, for the end of a session.
+// Zero and stop, each tried again once where it was not taken; for the end of a session.
 void force_stop(ForceFeedback *force, const HidTransport *transport, void *device);
 
 #endif

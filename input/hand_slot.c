@@ -136,8 +136,8 @@ void *hand_run_hid(void *argument)
     }
     map_release(slot->map, &slot->state);
     map_publish(slot->map, &slot->state, slot->port);
-    if (is_there)
-        force_stop(&slot->force, &shared->transport, slot->device);
+    // also where reading failed: a device that is there after all must not go on pushing
+    force_stop(&slot->force, &shared->transport, slot->device);
     update_info(slot, HAND_LOST, 0);
     shared->transport.close(shared->transport.context, slot->device);
     slot->device = NULL;

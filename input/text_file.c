@@ -1,57 +1,32 @@
 #include "input/text_file.h"
 
-#include <errno.h>
-#include <fcntl.h>
+#include "base/regular_file.h"
+
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-static char *read_open_file(int descriptor, const char *path, size_t *length, Faults *faults)
-{
-    struct stat status;
-    if (fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
-        faults_add(faults, path, 0, 0, "is not a regular file; give a text file");
-        return NULL;
-    }
-    if (status.st_size > TEXT_FILE_LIMIT) {
-        faults_add(faults, path, 0, 0, "is %lld bytes long; at most %d are read", (long long)status.st_size, TEXT_FILE_LIMIT);
-        return NULL;
-    }
-    size_t size = (size_t)status.st_size, used = 0;
-    char *text = malloc(size + 1);
-    if (!text) {
-        faults_add(faults, path, 0, 0, "needs %zu bytes of memory; there are not so many", size);
-        return NULL;
-    }
-    while (used < size) {
-        ssize_t got = read(descriptor, text + used, size - used);
-        if (got < 0 && errno == EINTR)
-            continue;
-        if (got < 0) {
-            faults_add(faults, path, 0, 0, "cannot be read: %s", strerror(errno));
-            free(text);
-            return NULL;
-        }
-        if (got == 0)
-            break;
-        used += (size_t)got;
-    }
-    text[used] = 0;
-    *length = used;
-    return text;
-}
-
 char *text_file_read(const char *path, size_t *length, Faults *faults)
 {
-    // non-blocking, so that opening a named pipe does not wait for its other end
-    int descriptor = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-    if (descriptor < 0) {
-        faults_add(faults, path, 0, 0, "cannot be opened: %s; give a file that can be read", strerror(errno));
+    struct stat status;
+    const char *why;
+    int file = regular_file_open(path, &status, &why);
+    if (file < 0) {
+        faults_add(faults, path, 0, 0, "cannot be opened: %s; give a text file that can be read", why);
         return NULL;
     }
-    char *text = read_open_file(descriptor, path, length, faults);
-    close(descriptor);
+    size_t size = (size_t)status.st_size;
+    char *text = NULL;
+    if (size > TEXT_FILE_LIMIT)
+        faults_add(faults, path, 0, 0, "is %zu bytes long; at most %d are read", size, TEXT_FILE_LIMIT);
+    else if (!(text = malloc(size + 1)))
+        faults_add(faults, path, 0, 0, "needs %zu bytes of memory; there are not so many", size);
+    if (text) {
+        *length = regular_file_read(file, text, size);
+        text[*length] = 0;
+    }
+    close(file);
     return text;
 }
 

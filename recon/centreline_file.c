@@ -11,6 +11,8 @@
 #include <string.h>
 #include <strings.h>
 
+enum { CENTRELINE_BYTES_MOST = 1 << 28 };
+
 static const double COORDINATE_MAX = 1e9;
 
 CurveSet *curve_set_create(void)
@@ -362,7 +364,7 @@ bool centreline_parse(const void *bytes, size_t length, const char *name, CurveS
 bool centreline_load(const char *path, CurveSet *set, Faults *faults)
 {
     size_t length;
-    char *bytes = whole_file_read(path, &length, faults);
+    char *bytes = whole_file_read_most(path, CENTRELINE_BYTES_MOST, &length, faults);
     bool good = bytes && centreline_parse(bytes, length, path, set, faults);
     free(bytes);
     return good;

@@ -1,6 +1,6 @@
 // Centrelines from files, recognised by their content: VTK XML PolyData (.vtp; lines, with VMTK's MaximumInscribedSphereRadius where it is there),
 // 3D Slicer Markups curves (.mrk.json, with a `Radius` measurement where it is there) and SWC. Several files make one set: curves may overlap.
-// Coordinates are taken as they stand; what `coordinateSystem` says is kept for messages only (import_surface.h looks at the mesh instead).
+// A file has at most 256 MB. Coordinates are taken as they stand; what `coordinateSystem` says is kept for messages only (import_surface.h looks at the mesh instead).
 #ifndef SELDINGER_RECON_CENTRELINE_FILE_H
 #define SELDINGER_RECON_CENTRELINE_FILE_H
 

@@ -1,7 +1,7 @@
 #include "recon/field_fit.h"
 
 #include "geom/blobby.h"
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/field_refine.h"
 

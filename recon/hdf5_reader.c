@@ -1,7 +1,7 @@
 // The rules stand in the header. What of the library is relied upon: creation lists, links and types are read without reading data or opening files.
 #include "recon/hdf5_reader.h"
 
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "recon/hdf5_source.h"
 
 #include <errno.h>

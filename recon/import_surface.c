@@ -6,7 +6,7 @@
 // spheres shrink, it is that of the last sphere that reaches the end.
 #include "recon/import_surface.h"
 
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "recon/import_ostia.h"
 #include "recon/mesh_tree.h"
 #include "recon/parallel.h"

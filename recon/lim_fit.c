@@ -13,7 +13,7 @@
 #include "recon/lim_fit.h"
 
 #include "geom/blobby.h"
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "geom/power_walk.h"
 #include "geom/sort_doubles.h"
 #include "recon/lim_agree.h"

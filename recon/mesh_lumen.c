@@ -3,7 +3,7 @@
 #include "recon/mesh_lumen.h"
 
 #include "geom/disjoint_sets.h"
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "recon/mesh_edges.h"
 #include "recon/parallel.h"
 

@@ -4,7 +4,7 @@
 // after one that is none is an exit. (Walking back from the last pieces instead lost the exits that soon fork.)
 #include "recon/rbt_exits.h"
 
-#include "geom/heap.h"
+#include "base/heap.h"
 
 #include <stdint.h>
 #include <stdlib.h>

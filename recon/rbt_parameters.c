@@ -1,7 +1,7 @@
 // The parameters of the tracking: defaults, the paper's values, and the table that trace files and --help read.
 #include "recon/rbt_track.h"
 
-#include "geom/heap.h"
+#include "base/heap.h"
 
 #include <stddef.h>
 #include <stdio.h>

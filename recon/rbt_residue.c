@@ -2,7 +2,7 @@
 // a forest by the way they were reached (as in rbt_exits.c). Its deepest leaf with the way down to a root is a limb, then the deepest of what is left, and
 // so on; short ones are ragged edges.
 #include "recon/rbt_residue.h"
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/way_heap.h"

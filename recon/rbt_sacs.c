@@ -5,7 +5,7 @@
 // A sac that is no ball gets further centres (section 3.4 has several in a giant one): of the places between the first centre and its walls the one
 // whose inscribed ball sticks out furthest of the other centres' balls, until none does by much. A ball stays alone.
 #include "recon/rbt_sacs.h"
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/cast_rays.h"

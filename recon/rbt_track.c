@@ -8,7 +8,7 @@
 // way is straight on into the sac, and the tracking ends at its bottom. Where a branch swells or ends, the lumen ahead is searched for tubes that
 // leave it (rbt_exits.h), and the branch goes on from the widest one that tracks.
 #include "recon/rbt_track.h"
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/cast_rays.h"

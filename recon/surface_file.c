@@ -11,7 +11,7 @@
 #include <strings.h>
 
 static const double COORDINATE_MAX = 1e9;
-enum { COUNT_MAX = 100000000 };
+enum { COUNT_MAX = 100000000, SURFACE_BYTES_MOST = INT_MAX };
 
 // A mesh that grows while it is read.
 typedef struct Growing {
@@ -397,7 +397,7 @@ static void ply_entry(Growing *g, PlyBody *body, const PlyElement *e, int vertex
             return;
         }
         int first = -1, before = -1;
-        for (int i = 0; i < (int)entries && !g->bad; i++) {
+        for (int i = 0; !g->bad && i < (int)entries; i++) {
             if (!ply_value(body, p->size, p->is_float, p->is_signed, &number))
                 ply_fault(g, body, "is cut short or holds something that is no number");
             else if (e->kind == 1 && p->role == 3) {
@@ -542,7 +542,7 @@ SurfaceMesh *surface_parse(const void *bytes, size_t length, const char *name, F
 SurfaceMesh *surface_load(const char *path, Faults *faults)
 {
     size_t length;
-    char *bytes = whole_file_read(path, &length, faults);
+    char *bytes = whole_file_read_most(path, SURFACE_BYTES_MOST, &length, faults);
     SurfaceMesh *mesh = bytes ? surface_parse(bytes, length, path, faults) : NULL;
     free(bytes);
     return mesh;

@@ -1,6 +1,6 @@
 // Triangle surfaces from files, recognised by their content: STL (text, binary), PLY (text, binary of either byte order), OBJ, and VTK XML
 // PolyData (.vtp). Polygons are cut into triangles as fans. What is read is what the file says: mesh_check.h tells and mends what is wrong
-// with it as a surface. The caller owns the mesh.
+// with it as a surface. A file has at most 2 GB. The caller owns the mesh.
 #ifndef SELDINGER_RECON_SURFACE_FILE_H
 #define SELDINGER_RECON_SURFACE_FILE_H
 

@@ -1,7 +1,7 @@
 // YAML by libyaml's document interface: it keeps the line and column of every node, and this walker refuses what it lets pass (keys given twice,
 // unknown keys, several documents).
 #include "recon/trace.h"
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "recon/cast_rays.h"
 #include "recon/whole_file.h"
 
@@ -9,6 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <yaml.h>
+
+enum { TRACE_BYTES_MOST = 1 << 20 };
 
 enum { MAX_ENTRIES = 4096 };
 
@@ -438,7 +440,7 @@ Trace *trace_parse(const char *text, size_t length, const char *path, Faults *fa
 Trace *trace_load(const char *path, Faults *faults)
 {
     size_t length;
-    char *text = whole_file_read(path, &length, faults);
+    char *text = whole_file_read_most(path, TRACE_BYTES_MOST, &length, faults);
     Trace *trace = text ? trace_parse(text, length, path, faults) : NULL;
     free(text);
     return trace;

@@ -1,6 +1,6 @@
 // The trace file of `segment` (YAML): where branches start, where aneurysms are, where the tree ends, corrections, and parameters of the tracking by name. `automatic` is
 // 1 where no branch beyond the first is named and the file does not say.
-// shared/CONTRACT.md "Trace". Every fault of a file is reported in one pass, with line and column.
+// shared/CONTRACT.md "Trace". A file has at most 1 MB. Every fault of a file is reported in one pass, with line and column.
 #ifndef SELDINGER_RECON_TRACE_H
 #define SELDINGER_RECON_TRACE_H
 

@@ -3,7 +3,7 @@
 // Metadata are written in the 1.8 format, whose checksums make the library refuse damaged headers.
 #include "recon/tree_file.h"
 
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "recon/hdf5_reader.h"
 #include "recon/whole_file.h"
 

@@ -2,11 +2,13 @@
 // volume_nifti.c and volume_dicom.c; what they share is volume_format.h.
 //
 // A header can lie. Before memory is taken the promised samples are held against the bytes that are there: raw data must be there in full,
-// a deflate stream cannot grow by more than 1032 times, a number written as text takes two bytes.
-#include "geom/stops.h"
+// a deflate stream cannot grow by more than 1032 times, a number written as text takes two bytes. Nor is more of a file read than its header promises.
+#include "base/part_file.h"
+#include "base/regular_file.h"
 #include "recon/volume_format.h"
 
 #include <ctype.h>
+#include <dirent.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,7 +18,7 @@
 #include <zlib.h>
 
 #define VOXEL_LIMIT ((size_t)1 << 31)
-enum { DEFLATE_GROWTH = 1032 };
+enum { DEFLATE_GROWTH = 1032, HEADER_MOST = 1 << 20, MOST_FILES_NAMED = 100000, TEXT_NUMBER_MOST = 64, SLACK = 1 << 24, PIECE = 1 << 20 };
 
 // --- text ---
 
@@ -92,29 +94,26 @@ bool header_text_is(const char *text, size_t length, const char *wanted)
 
 // --- files ---
 
-bool file_bytes_read(const char *path, FileBytes *out, Faults *faults)
+bool file_bytes_read(const char *path, size_t most, FileBytes *out, Faults *faults)
 {
     struct stat status;
-    FILE *file = fopen(path, "rb");
-    if (!file || fstat(fileno(file), &status)) {
-        faults_add(faults, path, 0, 0, "cannot be opened; a readable file");
-    } else if (!S_ISREG(status.st_mode)) {
-        faults_add(faults, path, 0, 0, "is not a regular file; a volume is a file on disk");
-    } else {
-        size_t length = (size_t)status.st_size;
-        uint8_t *byte = malloc(length + 1);
-        size_t got = byte ? fread(byte, 1, length, file) : 0;
-        if (byte && got == length) {
-            fclose(file);
-            *out = (FileBytes){byte, length, 0, path};
-            return true;
-        }
+    const char *why;
+    int file = regular_file_open(path, &status, &why);
+    if (file < 0) {
+        faults_add(faults, path, 0, 0, "cannot be opened: %s; a readable file on disk", why);
+        return false;
+    }
+    size_t whole = (size_t)status.st_size, length = whole < most ? whole : most;
+    uint8_t *byte = malloc(length + 1);
+    size_t got = byte ? regular_file_read(file, byte, length) : 0;
+    close(file);
+    if (!byte || got < length) {
         faults_add(faults, path, 0, 0, byte ? "cannot be read to its end" : "is larger than the memory that is free");
         free(byte);
+        return false;
     }
-    if (file)
-        fclose(file);
-    return false;
+    *out = (FileBytes){.byte = byte, .length = length, .path = path, .whole = whole};
+    return true;
 }
 
 void file_bytes_free(FileBytes *file)
@@ -123,7 +122,31 @@ void file_bytes_free(FileBytes *file)
     *file = (FileBytes){0};
 }
 
-bool file_bytes_read_beside(const char *header_path, int line, const char *name, size_t length, FileBytes *out, char path[4096], Faults *faults)
+// Bytes of a data file that are looked at: what the header promises, and how much longer that may be in the file.
+static size_t data_most(const VolumeHeader *header)
+{
+    size_t count = (size_t)header->size[0] * (size_t)header->size[1] * (size_t)header->size[2], bytes = count * voxel_type_size(header->type);
+    size_t skip = header->byte_skip > 0 ? (size_t)header->byte_skip : 0;
+    bytes = header->encoding == ENCODING_TEXT ? TEXT_NUMBER_MOST * count : bytes;
+    if (bytes > SIZE_MAX / 2 - skip)
+        return SIZE_MAX / 2;
+    bytes += skip;
+    // deflate may also grow: 5 bytes a block of 16 KB, and a head
+    return header->encoding == ENCODING_RAW && header->line_skip == 0 && header->byte_skip >= 0 ? bytes : bytes + bytes / 1000 + SLACK;
+}
+
+// Samples at the end of a file, or after lines, say nothing about where they are: a file much longer than they is another file.
+static bool is_not_too_long(const VolumeHeader *header, const FileBytes *file, Faults *faults)
+{
+    if (file->whole <= file->length || (header->byte_skip >= 0 && header->line_skip == 0))
+        return true;
+    faults_add(faults, file->path, 0, 0, "is %zu bytes long where its header promises %zu; at most %d more are read over", file->whole,
+               data_most(header) - SLACK, SLACK);
+    return false;
+}
+
+bool file_bytes_read_beside(const char *header_path, int line, const char *name, size_t length, const VolumeHeader *header, FileBytes *out,
+                            char path[4096], Faults *faults)
 {
     while (length > 0 && isspace((unsigned char)*name))
         name++, length--;
@@ -150,7 +173,7 @@ bool file_bytes_read_beside(const char *header_path, int line, const char *name,
         faults_add(faults, header_path, line, 0, "the data file '%.*s' is not there; it must stand in the header's folder", (int)length, name);
         return false;
     }
-    return file_bytes_read(path, out, faults);
+    return file_bytes_read(path, data_most(header), out, faults);
 }
 
 // --- checks ---
@@ -189,47 +212,76 @@ bool volume_header_check(const VolumeHeader *header, const char *path, int line,
 
 // --- samples ---
 
-uint8_t *volume_inflate(const FileBytes *data, size_t wanted, Faults *faults)
+// A gzip or zlib stream; a gzip file may be several members on end.
+typedef struct Inflater {
+    z_stream stream;
+    const FileBytes *data;
+    size_t in;               // compressed bytes taken
+    int state;
+} Inflater;
+
+static bool inflater_open(Inflater *inflater, const FileBytes *data)
 {
-    if (wanted / DEFLATE_GROWTH > data->length) {
-        faults_add_at_byte(faults, data->path, data->offset, "%zu compressed bytes cannot hold the %zu bytes that the header promises; a header and data "
-                           "that belong together", data->length, wanted);
-        return NULL;
-    }
-    uint8_t *out = malloc(wanted ? wanted : 1);
-    z_stream stream = {0};
-    if (!out || inflateInit2(&stream, 15 + 32) != Z_OK) {
-        faults_add(faults, data->path, 0, 0, "needs %zu bytes of memory, more than is free", wanted);
-        free(out);
-        return NULL;
-    }
-    size_t in = 0, made = 0;
-    int state = Z_OK;
+    *inflater = (Inflater){.data = data, .state = Z_OK};
+    return inflateInit2(&inflater->stream, 15 + 32) == Z_OK;
+}
+
+// The next `wanted` bytes, fewer where the stream ends or is damaged.
+static size_t inflater_read(Inflater *inflater, uint8_t *out, size_t wanted)
+{
     const size_t chunk = (size_t)1 << 30;
-    while (made < wanted && (state == Z_OK || state == Z_STREAM_END)) {
-        if (state == Z_STREAM_END && inflateReset(&stream) != Z_OK)   // a gzip file may be several members on end
+    const FileBytes *data = inflater->data;
+    z_stream *stream = &inflater->stream;
+    size_t made = 0;
+    while (made < wanted && (inflater->state == Z_OK || inflater->state == Z_STREAM_END)) {
+        size_t left = data->length - inflater->in;
+        if (left == 0 || (inflater->state == Z_STREAM_END && inflateReset(stream) != Z_OK))
             break;
-        uInt give = (uInt)(data->length - in < chunk ? data->length - in : chunk), take = (uInt)(wanted - made < chunk ? wanted - made : chunk);
-        if (give == 0)
-            break;
-        stream.next_in = (Bytef *)(uintptr_t)(data->byte + in);
-        stream.avail_in = give;
-        stream.next_out = out + made;
-        stream.avail_out = take;
-        state = inflate(&stream, Z_NO_FLUSH);
-        in += give - stream.avail_in;
-        made += take - stream.avail_out;
+        uInt give = (uInt)(left < chunk ? left : chunk), take = (uInt)(wanted - made < chunk ? wanted - made : chunk);
+        stream->next_in = (Bytef *)(uintptr_t)(data->byte + inflater->in);
+        stream->avail_in = give;
+        stream->next_out = out + made;
+        stream->avail_out = take;
+        inflater->state = inflate(stream, Z_NO_FLUSH);
+        inflater->in += give - stream->avail_in;
+        made += take - stream->avail_out;
     }
-    inflateEnd(&stream);
-    if (made == wanted)
-        return out;
-    if (state == Z_DATA_ERROR || state == Z_NEED_DICT)
-        faults_add_at_byte(faults, data->path, data->offset + in, "the compressed data is damaged; an intact gzip or zlib stream");
+    return made;
+}
+
+static void say_short(const Inflater *inflater, size_t made, size_t wanted, Faults *faults)
+{
+    const FileBytes *data = inflater->data;
+    if (inflater->state == Z_DATA_ERROR || inflater->state == Z_NEED_DICT)
+        faults_add_at_byte(faults, data->path, data->offset + inflater->in, "the compressed data is damaged; an intact gzip or zlib stream");
     else
-        faults_add_at_byte(faults, data->path, data->offset + in, "the data ends after %zu of %zu bytes; the whole file, or a header with the true sizes", made,
-                           wanted);
-    free(out);
-    return NULL;
+        faults_add_at_byte(faults, data->path, data->offset + inflater->in, "the data ends after %zu of %zu bytes; the whole file, or a header with the true sizes",
+                           made, wanted);
+}
+
+static bool can_hold(const FileBytes *data, size_t wanted, Faults *faults)
+{
+    if (wanted / DEFLATE_GROWTH <= data->length)
+        return true;
+    faults_add_at_byte(faults, data->path, data->offset, "%zu compressed bytes cannot hold the %zu bytes that the header promises; a header and data "
+                       "that belong together", data->length, wanted);
+    return false;
+}
+
+bool volume_inflate_head(const FileBytes *data, uint8_t *out, size_t wanted, Faults *faults)
+{
+    Inflater inflater;
+    if (!can_hold(data, wanted, faults))
+        return false;
+    if (!inflater_open(&inflater, data)) {
+        faults_add(faults, data->path, 0, 0, "needs more memory than is free");
+        return false;
+    }
+    size_t made = inflater_read(&inflater, out, wanted);
+    inflateEnd(&inflater.stream);
+    if (made < wanted)
+        say_short(&inflater, made, wanted, faults);
+    return made == wanted;
 }
 
 static uint64_t load_bits(const uint8_t *p, size_t size, bool big_endian)
@@ -326,57 +378,112 @@ static Volume *decode_text(const VolumeHeader *header, const FileBytes *data, si
     return volume;
 }
 
+// Skips, then converts piece by piece: a stream takes no memory but the voxels'. One byte more than the header promises shows that they do not belong together.
+static bool inflate_values(const VolumeHeader *header, const FileBytes *data, size_t skip, size_t count, Volume *volume, Faults *faults)
+{
+    Inflater inflater;
+    size_t sample = voxel_type_size(header->type), wanted = skip + count * sample, made = 0, got = 0;
+    uint8_t *piece = malloc(PIECE), excess;
+    if (!piece || !inflater_open(&inflater, data)) {
+        faults_add(faults, data->path, 0, 0, "needs more memory than is free");
+        free(piece);
+        return false;
+    }
+    while (made < wanted) {
+        size_t left = made < skip ? skip - made : wanted - made, next = left < PIECE ? left : PIECE;
+        got = inflater_read(&inflater, piece, next);
+        if (got < next)
+            break;
+        if (made >= skip)
+            convert(header, piece, next / sample, volume->value + (made - skip) / sample);
+        made += got;
+        got = 0;
+    }
+    bool good = made == wanted;
+    if (!good) {
+        say_short(&inflater, made + got, wanted, faults);
+    } else if (inflater_read(&inflater, &excess, 1) > 0) {
+        faults_add_at_byte(faults, data->path, data->offset, "the compressed data holds more than the %zu bytes that the header promises; a header and data "
+                           "that belong together", wanted);
+        good = false;
+    }
+    inflateEnd(&inflater.stream);
+    free(piece);
+    return good;
+}
+
+static Volume *finished(Volume *volume, bool good, const FileBytes *data, size_t start, size_t sample, Faults *faults)
+{
+    if (volume && (!good || !volume_finish_values(volume, data, start, sample, faults))) {
+        volume_free(volume);
+        return NULL;
+    }
+    return volume;
+}
+
+static Volume *decode_deflate(const VolumeHeader *header, const FileBytes *data, size_t count, Faults *faults)
+{
+    size_t skip = (size_t)header->byte_skip, bytes = count * voxel_type_size(header->type);
+    if (skip > SIZE_MAX - bytes) {
+        faults_add(faults, data->path, 0, 0, "the byte skip %zu is not valid; a skip within the file", skip);
+        return NULL;
+    }
+    if (!can_hold(data, skip + bytes, faults))
+        return NULL;
+    Volume *volume = volume_of_header(header, data->path, faults);
+    // bytes inside a compressed stream have no place in the file: tell where it starts
+    return finished(volume, volume && inflate_values(header, data, skip, count, volume, faults), data, data->offset, 0, faults);
+}
+
+static bool skip_lines(FileBytes *data, long lines, Faults *faults)
+{
+    LineCursor cursor = {data->byte, data->length, 0, 0};
+    for (long i = 0; i < lines; i++) {
+        const char *text;
+        size_t length;
+        if (!line_cursor_next(&cursor, &text, &length)) {
+            faults_add(faults, data->path, 0, 0, "has %ld lines, fewer than the header's line skip of %ld; a skip within the file", i, lines);
+            return false;
+        }
+    }
+    *data = (FileBytes){.byte = data->byte + cursor.position, .length = data->length - cursor.position, .offset = data->offset + cursor.position,
+                        .path = data->path};
+    return true;
+}
+
 Volume *volume_decode(const VolumeHeader *header, const FileBytes *file, Faults *faults)
 {
     FileBytes data = *file;
     size_t count = (size_t)header->size[0] * (size_t)header->size[1] * (size_t)header->size[2], sample = voxel_type_size(header->type);
     size_t bytes = count * sample;
-    LineCursor cursor = {data.byte, data.length, 0, 0};
-    for (long i = 0; i < header->line_skip; i++) {
-        const char *text;
-        size_t length;
-        if (!line_cursor_next(&cursor, &text, &length)) {
-            faults_add(faults, data.path, 0, 0, "has %ld lines, fewer than the header's line skip of %ld; a skip within the file", i, header->line_skip);
-            return NULL;
-        }
+    if (file->needed) {
+        *file->needed = file->offset + data_most(header);
+        return NULL;
     }
-    data = (FileBytes){data.byte + cursor.position, data.length - cursor.position, data.offset + cursor.position, data.path};
-    uint8_t *inflated = NULL;
+    if (!is_not_too_long(header, file, faults) || !skip_lines(&data, header->line_skip, faults))
+        return NULL;
+    if (header->encoding == ENCODING_DEFLATE)
+        return decode_deflate(header, &data, count, faults);
     size_t skip = header->byte_skip > 0 ? (size_t)header->byte_skip : 0;
-    if (header->encoding == ENCODING_DEFLATE) {
-        if (skip > SIZE_MAX - bytes || !(inflated = volume_inflate(&data, skip + bytes, faults))) {
-            if (skip > SIZE_MAX - bytes)
-                faults_add(faults, data.path, 0, 0, "the byte skip %zu is not valid; a skip within the file", skip);
-            return NULL;
-        }
-    } else {
-        if (header->byte_skip < 0)
-            skip = data.length > bytes ? data.length - bytes : 0;
-        if (skip > data.length) {
-            faults_add_at_byte(faults, data.path, data.offset, "the byte skip %zu goes past the end; at most %zu", skip, data.length);
-            return NULL;
-        }
-        data = (FileBytes){data.byte + skip, data.length - skip, data.offset + skip, data.path};
-        if (header->encoding == ENCODING_TEXT)
-            return decode_text(header, &data, count, faults);
-        if (data.length < bytes) {
-            faults_add_at_byte(faults, data.path, data.offset + data.length, "the data ends after %zu of %zu bytes (%d x %d x %d voxels of %zu); the "
-                               "whole file, "
-                               "or a header with the true sizes", data.length, bytes, header->size[0], header->size[1], header->size[2], sample);
-            return NULL;
-        }
+    if (header->byte_skip < 0)
+        skip = data.length > bytes ? data.length - bytes : 0;
+    if (skip > data.length) {
+        faults_add_at_byte(faults, data.path, data.offset, "the byte skip %zu goes past the end; at most %zu", skip, data.length);
+        return NULL;
+    }
+    data = (FileBytes){.byte = data.byte + skip, .length = data.length - skip, .offset = data.offset + skip, .path = data.path};
+    if (header->encoding == ENCODING_TEXT)
+        return decode_text(header, &data, count, faults);
+    if (data.length < bytes) {
+        faults_add_at_byte(faults, data.path, data.offset + data.length, "the data ends after %zu of %zu bytes (%d x %d x %d voxels of %zu); the "
+                           "whole file, "
+                           "or a header with the true sizes", data.length, bytes, header->size[0], header->size[1], header->size[2], sample);
+        return NULL;
     }
     Volume *volume = volume_of_header(header, data.path, faults);
-    if (volume) {
-        convert(header, inflated ? inflated + skip : data.byte, count, volume->value);
-        // bytes inside a compressed stream have no place in the file: tell where it starts
-        if (!volume_finish_values(volume, &data, data.offset, inflated ? 0 : sample, faults)) {
-            volume_free(volume);
-            volume = NULL;
-        }
-    }
-    free(inflated);
-    return volume;
+    if (volume)
+        convert(header, data.byte, count, volume->value);
+    return finished(volume, true, &data, data.offset, sample, faults);
 }
 
 // --- samples in several files ---
@@ -487,7 +594,7 @@ Volume *volume_decode_several(const VolumeHeader *header, const char *header_pat
     for (size_t i = 0; good && i < files; i++) {
         FileBytes data;
         next_name(how, &names, (long)i, name, &at);
-        good = file_bytes_read_beside(header_path, at, name, strlen(name), &data, path, faults);
+        good = file_bytes_read_beside(header_path, at, name, strlen(name), header, &data, path, faults);
         if (!good)
             break;
         size_t skip = header->byte_skip >= 0 ? (size_t)header->byte_skip : data.length > share ? data.length - share : 0;
@@ -504,10 +611,108 @@ Volume *volume_decode_several(const VolumeHeader *header, const char *header_pat
     }
     VolumeHeader plain = *header;
     plain.byte_skip = 0;
-    FileBytes all = {joined, bytes, 0, header_path};
+    FileBytes all = {.byte = joined, .length = bytes, .path = header_path};
     Volume *volume = good ? volume_decode(&plain, &all, faults) : NULL;
     free(joined);
     return volume;
+}
+
+// --- which files a volume is made of ---
+
+typedef void FileCall(void *context, const char *path);
+
+// The name that an option like `data file: NAME` gives, in the header's folder.
+static void call_beside(const char *header_path, const char *name, size_t length, FileCall *call, void *context)
+{
+    char path[4096];
+    const char *slash = strrchr(header_path, '/');
+    while (length > 0 && isspace((unsigned char)*name))
+        name++, length--;
+    while (length > 0 && isspace((unsigned char)name[length - 1]))
+        length--;
+    int wrote = snprintf(path, sizeof path, "%.*s%.*s", slash ? (int)(slash - header_path) + 1 : 0, header_path, length < 1024 ? (int)length : 1024, name);
+    if (length > 0 && wrote > 0 && wrote < (int)sizeof path)
+        call(context, path);
+}
+
+static void call_named(const char *header_path, const char *text, size_t length, LineCursor names, FileCall *call, void *context)
+{
+    NumberedName numbered;
+    char name[1200];
+    int line;
+    bool by_list = is_list(text, length);
+    if (!data_names_several(text, length))
+        call_beside(header_path, text, length, call, context);
+    else if (by_list || read_numbered(text, length, &numbered))
+        for (long i = 0; i < MOST_FILES_NAMED && next_name(by_list ? NULL : &numbered, &names, i, name, &line); i++)
+            call_beside(header_path, name, strlen(name), call, context);
+}
+
+static void call_folder(const char *folder, FileCall *call, void *context)
+{
+    DIR *directory = opendir(folder);
+    char path[4096];
+    for (struct dirent *entry; directory && (entry = readdir(directory));)
+        if (entry->d_name[0] != '.' && snprintf(path, sizeof path, "%s/%s", folder, entry->d_name) < (int)sizeof path)
+            call(context, path);
+    if (directory)
+        closedir(directory);
+}
+
+// Header and samples of a NIfTI pair, whichever was named.
+static void call_pair(const char *path, FileCall *call, void *context)
+{
+    static const char *const endings[] = {".hdr", ".img", ".hdr.gz", ".img.gz"};
+    size_t n = strlen(path), stem = n > 3 && !strcmp(path + n - 3, ".gz") ? n - 3 : n;
+    char other[4096];
+    if (stem < 5 || (memcmp(path + stem - 4, ".hdr", 4) && memcmp(path + stem - 4, ".img", 4)))
+        return;
+    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
+        if (snprintf(other, sizeof other, "%.*s%s", (int)(stem - 4), path, endings[i]) < (int)sizeof other)
+            call(context, other);
+}
+
+static void call_header(const FileBytes *file, FileCall *call, void *context)
+{
+    bool is_nrrd = volume_is_nrrd(file);
+    LineCursor cursor = {file->byte, file->length, 0, 0};
+    const char *text;
+    size_t length;
+    while (line_cursor_next(&cursor, &text, &length) && length > 0) {
+        const char *sign = memchr(text, is_nrrd ? ':' : '=', length);
+        size_t named = sign ? (size_t)(sign - text) : 0;
+        bool is_key = is_nrrd ? header_text_is(text, named, "data file") || header_text_is(text, named, "datafile") : header_text_is(text, named, "ElementDataFile");
+        if (sign && is_key) {
+            call_named(file->path, sign + 1, length - named - 1, cursor, call, context);
+            return;
+        }
+    }
+}
+
+void volume_each_data_file(const char *path, FileCall *call, void *context)
+{
+    struct stat status;
+    const char *why;
+    if (stat(path, &status) == 0 && S_ISDIR(status.st_mode)) {
+        call_folder(path, call, context);
+        return;
+    }
+    call_pair(path, call, context);
+    int descriptor = regular_file_open(path, &status, &why);
+    uint8_t *byte = descriptor >= 0 ? malloc(HEADER_MOST) : NULL;
+    size_t length = byte ? regular_file_read(descriptor, byte, HEADER_MOST) : 0;
+    if (descriptor >= 0)
+        close(descriptor);
+    const FileBytes file = {.byte = byte, .length = length, .path = path};
+    if (byte && (volume_is_nrrd(&file) || volume_is_metaimage(&file))) {
+        call_header(&file, call, context);
+    } else if (byte && volume_is_dicom(&file)) {
+        char folder[4096];
+        const char *slash = strrchr(path, '/');
+        snprintf(folder, sizeof folder, "%.*s", slash ? (int)(slash - path) : 1, slash ? path : ".");
+        call_folder(folder[0] ? folder : "/", call, context);
+    }
+    free(byte);
 }
 
 // --- the public face ---
@@ -550,23 +755,49 @@ static bool names_samples_of_pair(const char *path)
 
 bool volume_is_known(const void *bytes, size_t length, const char *path)
 {
-    FileBytes file = {bytes, length, 0, path};
+    FileBytes file = {.byte = bytes, .length = length, .path = path};
     return volume_is_nrrd(&file) || volume_is_nifti(&file) || volume_is_metaimage(&file) || volume_is_dicom(&file) || names_samples_of_pair(path);
+}
+
+static Volume *parse(const FileBytes *file, Faults *faults)
+{
+    if (volume_is_nrrd(file))
+        return volume_parse_nrrd(file, faults);
+    if (volume_is_nifti(file))
+        return volume_parse_nifti(file, faults);
+    if (volume_is_metaimage(file))
+        return volume_parse_metaimage(file, faults);
+    if (volume_is_dicom(file))
+        return volume_parse_dicom(file, faults);
+    faults_add_at_byte(faults, file->path, 0, "is no volume that can be read; NRRD (.nrrd .nhdr), MetaImage (.mha .mhd), NIfTI (.nii .nii.gz .hdr) or DICOM");
+    return NULL;
 }
 
 Volume *volume_parse(const void *bytes, size_t length, const char *path, Faults *faults)
 {
-    FileBytes file = {bytes, length, 0, path};
-    if (volume_is_nrrd(&file))
-        return volume_parse_nrrd(&file, faults);
-    if (volume_is_nifti(&file))
-        return volume_parse_nifti(&file, faults);
-    if (volume_is_metaimage(&file))
-        return volume_parse_metaimage(&file, faults);
-    if (volume_is_dicom(&file))
-        return volume_parse_dicom(&file, faults);
-    faults_add_at_byte(faults, path, 0, "is no volume that can be read; NRRD (.nrrd .nhdr), MetaImage (.mha .mhd), NIfTI (.nii .nii.gz .hdr) or DICOM");
-    return NULL;
+    const FileBytes file = {.byte = bytes, .length = length, .path = path};
+    return parse(&file, faults);
+}
+
+// Of a file that is longer than its header can be, as much as that promises; a DICOM file is its own header.
+static bool read_promised(const char *path, FileBytes *out, Faults *faults)
+{
+    if (!file_bytes_read(path, HEADER_MOST, out, faults))
+        return false;
+    if (out->length == out->whole)
+        return true;
+    Faults ignored;
+    FileBytes head = *out;
+    size_t needed = 0;
+    head.needed = &needed;
+    faults_clear(&ignored);
+    bool is_dicom = volume_is_dicom(&head) && !volume_is_nrrd(&head) && !volume_is_nifti(&head) && !volume_is_metaimage(&head);
+    if (!is_dicom)
+        parse(&head, &ignored);
+    if (!is_dicom && needed == 0)   // detached, or bad: the fault is found again
+        return true;
+    file_bytes_free(out);
+    return is_dicom ? dicom_bytes_read(path, out, faults) : file_bytes_read(path, needed, out, faults);
 }
 
 Volume *volume_load(const char *path, Faults *faults)
@@ -575,7 +806,7 @@ Volume *volume_load(const char *path, Faults *faults)
     struct stat status;
     if (!stat(path, &status) && S_ISDIR(status.st_mode))
         return volume_load_dicom_folder(path, faults);
-    if (!file_bytes_read(path, &file, faults))
+    if (!read_promised(path, &file, faults))
         return NULL;
     size_t n = strlen(path);
     char header[4096];
@@ -585,13 +816,13 @@ Volume *volume_load(const char *path, Faults *faults)
         memcpy(header, path, n - 3);
         memcpy(header + n - 3, "hdr", 4);
         FileBytes other;
-        if (!access(header, R_OK) && file_bytes_read(header, &other, faults)) {
+        if (!access(header, R_OK) && file_bytes_read(header, HEADER_MOST, &other, faults)) {
             file_bytes_free(&file);
             file = other;
             path = header;
         }
     }
-    Volume *volume = volume_parse(file.byte, file.length, path, faults);
+    Volume *volume = parse(&file, faults);
     file_bytes_free(&file);
     return volume;
 }
@@ -664,14 +895,11 @@ bool volume_save_nrrd(const Volume *volume, const char *path, const char *type_n
     for (size_t i = 0; i < sizeof save_types / sizeof save_types[0]; i++)
         if (!strcmp(save_types[i].name, type_name))
             type = &save_types[i];
-    char part[4096];
-    int named = snprintf(part, sizeof part, "%s.part-%ld", path, (long)getpid());
-    if (!type || named < 0 || named >= (int)sizeof part) {
-        faults_add(faults, path, 0, 0, type ? "the path is too long; at most 4000 bytes" : "'%s' is no sample type; float, uint8 or int16", type_name);
+    if (!type) {
+        faults_add(faults, path, 0, 0, "'%s' is no sample type; float, uint8 or int16", type_name);
         return false;
     }
-    struct stat status;
-    if (!stat(path, &status) && !S_ISREG(status.st_mode)) {   // renaming over a device would replace it
+    if (part_file_is_through(path)) {
         faults_add(faults, path, 0, 0, "is there and no regular file; another name");
         return false;
     }
@@ -679,12 +907,10 @@ bool volume_save_nrrd(const Volume *volume, const char *path, const char *type_n
     uint8_t *sample = encode_samples(volume, count, type, path, faults);
     if (!sample)
         return false;
-    sigset_t before;
-    stops_hold(&before);
-    FILE *file = fopen(part, "wb");
-    bool good = file != NULL;
-    int reason = errno;
-    if (good) {
+    PartFile part;
+    bool good = part_file_begin(&part, path);
+    FILE *file = good ? part_file_stream(&part) : NULL;
+    if (file) {
         const Vec3 *a = volume->axis, o = volume->origin;
         fprintf(file, "NRRD0004\ntype: %s\ndimension: 3\n", type->name);
         if (volume->frame[0])
@@ -695,15 +921,12 @@ bool volume_save_nrrd(const Volume *volume, const char *path, const char *type_n
         for (int i = 0; i < 3; i++)
             fprintf(file, " (%.17g,%.17g,%.17g)", a[i].x, a[i].y, a[i].z);
         fprintf(file, "\nkinds: domain domain domain\nendian: little\nencoding: gzip\nspace origin: (%.17g,%.17g,%.17g)\n\n", o.x, o.y, o.z);
-        good = write_gzip(file, sample, count * type->size);
-        good = fclose(file) == 0 && good;
-        good = good && rename(part, path) == 0;
-        reason = errno;
-        if (!good)
-            remove(part);
+        good = write_gzip(file, sample, count * type->size) && part_file_finish_synced(&part);
     }
-    stops_release(&before);
+    int reason = errno;
+    part_file_drop(&part);
     free(sample);
+    good = good && file;
     if (!good)
         faults_add(faults, path, 0, 0, "cannot be written: %s; a folder that exists, may be written to, and has room", strerror(reason));
     return good;

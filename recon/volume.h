@@ -30,6 +30,9 @@ Volume *volume_load(const char *path, Faults *faults);
 Volume *volume_parse(const void *bytes, size_t length, const char *path, Faults *faults);
 // Whether a file that begins with these bytes (4096 tell) is one for volume_load; by `path` the samples of a NIfTI pair.
 bool volume_is_known(const void *bytes, size_t length, const char *path);
+// Calls for each file, there or not, from which volume_load(path) would take samples besides `path` itself: those that a header names, the other half
+// of a NIfTI pair, every file of a DICOM series' folder.
+void volume_each_data_file(const char *path, void (*call)(void *context, const char *path), void *context);
 // A volume of the given grid, values zero. NULL where size is not positive or memory lacks.
 Volume *volume_create(const int size[3], Vec3 origin, const Vec3 axis[3]);
 void volume_free(Volume *volume);

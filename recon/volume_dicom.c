@@ -7,6 +7,7 @@
 // samples bright: its samples are turned round within their range first, so that bright is bright.
 //
 // Two passes: headers of all files of the folder, then the samples file by file, so that no more than one file is in memory beside the volume.
+#include "base/regular_file.h"
 #include "recon/volume_format.h"
 
 #include <ctype.h>
@@ -15,6 +16,10 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
+
+// the length of pixels is written in 32 bits
+#define DICOM_BYTES_MOST (((size_t)1 << 32) + ((size_t)1 << 26))
 
 enum { PREAMBLE = 128, UID_ROOM = 68, MAX_DEPTH = 24 };
 #define UNDEFINED_LENGTH 0xffffffffu
@@ -421,7 +426,7 @@ static bool read_image(const FileBytes *file, DicomImage *image, Faults *faults)
             is_explicit = true;
         }
     } else if (!bare) {
-        FileBytes rest = {file->byte + c.at, file->length - c.at, 0, file->path};
+        FileBytes rest = {.byte = file->byte + c.at, .length = file->length - c.at, .path = file->path};
         if (!begins_bare(&rest, &is_explicit, &is_big))
             return fail(&c, c.at, "no transfer syntax, and nothing that tells the encoding; an intact DICOM file");
     }
@@ -606,6 +611,15 @@ static void convert_slice(const DicomImage *m, const Plane *p, const uint8_t *sa
     }
 }
 
+bool dicom_bytes_read(const char *path, FileBytes *out, Faults *faults)
+{
+    struct stat status;
+    if (stat(path, &status) != 0 || (size_t)status.st_size <= DICOM_BYTES_MOST)
+        return file_bytes_read(path, DICOM_BYTES_MOST, out, faults);
+    faults_add(faults, path, 0, 0, "is %zu bytes long; at most %zu are read of a DICOM file", (size_t)status.st_size, (size_t)DICOM_BYTES_MOST);
+    return false;
+}
+
 // `whole`: the bytes of the only file, or NULL where they are read file by file.
 static Volume *assemble(const Series *series, const FileBytes *whole, Faults *faults)
 {
@@ -646,7 +660,7 @@ static Volume *assemble(const Series *series, const FileBytes *whole, Faults *fa
     for (int i = 0; good && i < count; i++) {
         const DicomFile *file = slice[i].file;
         FileBytes bytes = {0};
-        good = whole || file_bytes_read(file->path, &bytes, faults);
+        good = whole || dicom_bytes_read(file->path, &bytes, faults);
         const FileBytes *from = whole ? whole : &bytes;
         size_t length = voxels * (size_t)(file->image.allocated / 8), start = file->image.pixel_place + (size_t)slice[i].frame * length;
         if (good && (start > from->length || from->length - start < length)) {
@@ -706,11 +720,12 @@ static bool looks_like_dicom(const char *path)
 {
     uint8_t head[PREAMBLE + 16];
     struct stat status;
-    FILE *file = !stat(path, &status) && S_ISREG(status.st_mode) ? fopen(path, "rb") : NULL;
-    if (!file)
+    const char *why;
+    int file = regular_file_open(path, &status, &why);
+    if (file < 0)
         return false;
-    FileBytes bytes = {head, fread(head, 1, sizeof head, file), 0, path};
-    fclose(file);
+    FileBytes bytes = {.byte = head, .length = regular_file_read(file, head, sizeof head), .path = path};
+    close(file);
     return volume_is_dicom(&bytes);
 }
 
@@ -730,7 +745,7 @@ static bool gather_folder(const char *folder, const DicomImage *wanted, Series *
         DicomImage image;
         Faults own;
         faults_clear(&own);
-        if (wrote < 0 || wrote >= (int)sizeof path || !looks_like_dicom(path) || !file_bytes_read(path, &file, faults))
+        if (wrote < 0 || wrote >= (int)sizeof path || !looks_like_dicom(path) || !dicom_bytes_read(path, &file, faults))
             continue;
         bool good = read_image(&file, &image, &own), is_other = wanted && image.series[0] && strcmp(image.series, wanted->series) != 0;
         if (!good && !is_other && !(image.is_walked && !image.has_pixels))

@@ -31,6 +31,8 @@ typedef struct FileBytes {   // a file, or a part of one
     size_t length;
     size_t offset;           // of byte[0] in the file, for messages
     const char *path;
+    size_t whole;            // the file's length where less of it was read
+    size_t *needed;          // not NULL: nothing is decoded, the file's bytes that the header promises are told here
 } FileBytes;
 
 // A line of a text header, without its end. False at the end of the bytes.
@@ -55,13 +57,17 @@ Volume *volume_decode(const VolumeHeader *header, const FileBytes *data, Faults 
 Volume *volume_of_header(const VolumeHeader *header, const char *path, Faults *faults);
 // Sets minimum and maximum; a fault at the first voxel that is not finite. Samples of `sample_size` bytes begin at `start` of the file; 0: no byte to tell.
 bool volume_finish_values(Volume *volume, const FileBytes *data, size_t start, size_t sample_size, Faults *faults);
-// Exactly `wanted` bytes inflated from a gzip or zlib stream, to be freed; NULL with a fault.
-uint8_t *volume_inflate(const FileBytes *data, size_t wanted, Faults *faults);
-// The whole of a regular file, to be freed (file_bytes_free).
-bool file_bytes_read(const char *path, FileBytes *out, Faults *faults);
+// The first `wanted` bytes of a gzip or zlib stream.
+bool volume_inflate_head(const FileBytes *data, uint8_t *out, size_t wanted, Faults *faults);
+// The first bytes of a regular file, at most `most`, to be freed (file_bytes_free).
+bool file_bytes_read(const char *path, size_t most, FileBytes *out, Faults *faults);
 void file_bytes_free(FileBytes *file);
-// Opens the data file that a detached header names. It must lie in the header's folder or below: a header cannot point anywhere else unseen.
-bool file_bytes_read_beside(const char *header_path, int line, const char *name, size_t name_length, FileBytes *out, char path[4096], Faults *faults);
+// A whole DICOM file, which has 4 GB at most.
+bool dicom_bytes_read(const char *path, FileBytes *out, Faults *faults);
+// Reads of the data file that a detached header names what it promises. It must lie in the header's folder or below: a header cannot point anywhere
+// else unseen.
+bool file_bytes_read_beside(const char *header_path, int line, const char *name, size_t name_length, const VolumeHeader *header, FileBytes *out,
+                            char path[4096], Faults *faults);
 
 // Raw samples in several files of equal share, one after the other: either numbered, where `text` is `NAME%03d.raw FIRST LAST [STEP [N]]`, or `LIST [N]`, where
 // `names` holds a name a line (of the file `header_path`). `line` is that of `text`.

@@ -176,14 +176,17 @@ Volume *volume_parse_metaimage(const FileBytes *file, Faults *faults)
         return NULL;
     const KeyValue *name = &value[DATA_FILE];
     if (header_text_is(name->text, name->length, "LOCAL")) {
-        FileBytes data = {file->byte + end, file->length - end, end, file->path};
+        FileBytes data = {.byte = file->byte + end, .length = file->length - end, .offset = end, .path = file->path,
+                          .whole = file->whole > file->length ? file->whole - end : 0, .needed = file->needed};
         return volume_decode(&header, &data, faults);
     }
+    if (file->needed)
+        return NULL;
     if (data_names_several(name->text, name->length))
         return volume_decode_several(&header, file->path, name->line, name->text, name->length, (LineCursor){file->byte, file->length, end, name->line}, faults);
     char path[4096];
     FileBytes data;
-    if (!file_bytes_read_beside(file->path, name->line, name->text, name->length, &data, path, faults))
+    if (!file_bytes_read_beside(file->path, name->line, name->text, name->length, &header, &data, path, faults))
         return NULL;
     data.path = path;
     Volume *volume = volume_decode(&header, &data, faults);

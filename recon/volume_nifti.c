@@ -180,11 +180,14 @@ static Volume *read_pair(const FileBytes *file, VolumeHeader *header, size_t sta
     Faults first;
     faults_clear(&first);
     snprintf(name, sizeof name, "%.*s.img", (int)(stem < 900 ? stem : 900), base);
-    bool found = file_bytes_read_beside(file->path, 0, name, strlen(name), &data, path, &first);
+    // as long as either encoding may be
+    header->encoding = ENCODING_DEFLATE;
+    header->byte_skip = (long)start;
+    bool found = file_bytes_read_beside(file->path, 0, name, strlen(name), header, &data, path, &first);
     if (!found) {
         size_t n = strlen(name);
         memcpy(name + n, ".gz", 4);
-        found = file_bytes_read_beside(file->path, 0, name, n + 3, &data, path, &first);
+        found = file_bytes_read_beside(file->path, 0, name, n + 3, header, &data, path, &first);
         if (!found) {
             faults_add(faults, file->path, 0, 0, "the samples' file '%.*s' is not there; it must stand beside the header", (int)n, name);
             return NULL;
@@ -192,7 +195,6 @@ static Volume *read_pair(const FileBytes *file, VolumeHeader *header, size_t sta
     }
     data.path = path;
     header->encoding = is_gzip(&data) ? ENCODING_DEFLATE : ENCODING_RAW;
-    header->byte_skip = (long)start;
     Volume *volume = volume_decode(header, &data, faults);
     file_bytes_free(&data);
     return volume;
@@ -204,16 +206,17 @@ Volume *volume_parse_nifti(const FileBytes *file, Faults *faults)
     NiftiBytes h;
     size_t start = 0;
     bool is_pair = false, gzip = is_gzip(file);
-    uint8_t *inflated = NULL;
+    uint8_t inflated[HEADER_BYTES];
     FileBytes head = *file;
     if (gzip) {
-        if (!(inflated = volume_inflate(file, HEADER_BYTES, faults)))
+        if (!volume_inflate_head(file, inflated, HEADER_BYTES, faults))
             return NULL;
-        head = (FileBytes){inflated, HEADER_BYTES, 0, file->path};
+        head = (FileBytes){.byte = inflated, .length = HEADER_BYTES, .path = file->path};
     }
     bool good = read_header(&head, &h, &header, &start, &is_pair, faults);
-    free(inflated);
     if (!good)
+        return NULL;
+    if (is_pair && file->needed)
         return NULL;
     if (is_pair)
         return read_pair(file, &header, start, faults);

@@ -1,6 +1,6 @@
 // sigma = 1.4826 MAD / sqrt(2) for differences of independent values; the Gaussian is applied axis by axis.
 #include "recon/volume_noise.h"
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/parallel.h"
 

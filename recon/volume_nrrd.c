@@ -342,15 +342,18 @@ Volume *volume_parse_nrrd(const FileBytes *file, Faults *faults)
             faults_add_at_byte(faults, file->path, file->length, "the file ends within the header; an empty line and the data after it, or `data file: NAME`");
             return NULL;
         }
-        FileBytes data = {file->byte + h.end, file->length - h.end, h.end, file->path};
+        FileBytes data = {.byte = file->byte + h.end, .length = file->length - h.end, .offset = h.end, .path = file->path,
+                          .whole = file->whole > file->length ? file->whole - h.end : 0, .needed = file->needed};
         return volume_decode(&header, &data, faults);
     }
+    if (file->needed)
+        return NULL;
     if (data_names_several(detached->text, detached->length))
         return volume_decode_several(&header, file->path, detached->line, detached->text, detached->length,
                                      (LineCursor){file->byte, file->length, h.end, detached->line}, faults);
     char path[4096];
     FileBytes data;
-    if (!file_bytes_read_beside(file->path, detached->line, detached->text, detached->length, &data, path, faults))
+    if (!file_bytes_read_beside(file->path, detached->line, detached->text, detached->length, &header, &data, path, faults))
         return NULL;
     data.path = path;
     Volume *volume = volume_decode(&header, &data, faults);

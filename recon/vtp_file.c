@@ -14,6 +14,7 @@
 enum { SECTION_NONE, SECTION_POINT_DATA, SECTION_POINTS, SECTION_LINES, SECTION_POLYS, SECTION_STRIPS };
 enum { ROLE_NONE, ROLE_POINTS, ROLE_RADIUS, ROLE_CONNECTIVITY, ROLE_OFFSETS };
 enum { FORMAT_ASCII, FORMAT_BASE64, FORMAT_APPENDED };
+enum { VALUES_MOST = 1 << 26 };    // of all arrays of a file
 
 typedef struct Number {      // type of an array's entries
     int size;
@@ -29,6 +30,7 @@ typedef struct Array {       // an array that is wanted
     size_t length, capacity;
     double *value;           // decoded
     size_t count;
+    size_t promised;         // values at most
 } Array;
 
 typedef struct Reader {
@@ -40,6 +42,8 @@ typedef struct Reader {
     int array_count, array_capacity, open_array, array_depth;
     bool is_big_endian, is_polydata, is_compressed, appended_base64, has_appended, stopped;
     int header_size;
+    size_t promised[SECTION_STRIPS + 1];     // points or cells of each section of the piece, as its head says
+    size_t values_left;      // of VALUES_MOST
 } Reader;
 
 static void stop(Reader *reader)
@@ -86,6 +90,23 @@ static void start_file(Reader *reader, const char **list)
         stop(reader);
 }
 
+static void start_piece(Reader *reader, const char **list)
+{
+    static const char *const keys[] = {NULL, "NumberOfPoints", "NumberOfPoints", "NumberOfLines", "NumberOfPolys", "NumberOfStrips"};
+    reader->piece++;
+    for (int i = 1; i <= SECTION_STRIPS; i++) {
+        unsigned long long count = strtoull(attribute(list, keys[i]), NULL, 10);
+        reader->promised[i] = count < VALUES_MOST ? (size_t)count : VALUES_MOST;
+    }
+}
+
+// Values that an array may hold; how many indices the cells have, no head says.
+static size_t promised_values(const Reader *reader, int role)
+{
+    size_t count = reader->promised[reader->section], most = role == ROLE_CONNECTIVITY ? VALUES_MOST : role == ROLE_POINTS ? 3 * count : count;
+    return most < VALUES_MOST ? most : VALUES_MOST;
+}
+
 static void start_array(Reader *reader, const char **list)
 {
     const char *name = attribute(list, "Name"), *format = attribute(list, "format");
@@ -107,6 +128,7 @@ static void start_array(Reader *reader, const char **list)
         return;
     }
     array.offset = (size_t)strtoull(attribute(list, "offset"), NULL, 10);
+    array.promised = promised_values(reader, role);
     if (reader->array_count == reader->array_capacity) {
         int capacity = 2 * reader->array_capacity + 8;
         Array *grown = realloc(reader->array, (size_t)capacity * sizeof *grown);
@@ -137,7 +159,7 @@ static void start_element(void *context, const char *element, const char **list)
     if (!strcmp(element, "VTKFile"))
         start_file(reader, list);
     else if (!strcmp(element, "Piece"))
-        reader->piece++;
+        start_piece(reader, list);
     else if (!strcmp(element, "DataArray"))
         start_array(reader, list);
     else if (!strcmp(element, "AppendedData")) {
@@ -262,8 +284,9 @@ static bool body_take(Body *body, size_t count, unsigned char *out)
 }
 
 static const char *const cut_short = "array data are cut short or damaged";
+static const char *const too_many = "array data hold more values than the head of their piece promises, or more than 67 million in all";
 
-static const char *decode_compressed(const Reader *reader, Body body, unsigned char **bytes, size_t *length)
+static const char *decode_compressed(const Reader *reader, Body body, size_t most, unsigned char **bytes, size_t *length)
 {
     unsigned char head[24];
     size_t w = (size_t)reader->header_size;
@@ -274,10 +297,12 @@ static const char *decode_compressed(const Reader *reader, Body body, unsigned c
     bool big = reader->is_big_endian;
     uint64_t blocks = word_at(head, (int)w, big), block = word_at(head + w, (int)w, big), last = word_at(head + 2 * w, (int)w, big);
     // zlib packs at most 1032 to 1; a last block of size 0 is a whole one; an array of no block names the usual size of one
-    uint64_t most = 1032 * (uint64_t)body.length + 1024, whole = blocks - (blocks && last);
-    if (blocks > body.length / w || last > block || (blocks && (last > most || (whole && block > (most - last) / whole))))
+    uint64_t grown = 1032 * (uint64_t)body.length + 1024, whole = blocks - (blocks && last);
+    if (blocks > body.length / w || last > block || (blocks && (last > grown || (whole && block > (grown - last) / whole))))
         return cut_short;
     size_t header = (3 + (size_t)blocks) * w, total = blocks ? (size_t)(whole * block + last) : 0;
+    if (total > most)
+        return too_many;
     unsigned char *sizes = malloc(header), *packed = malloc(body.length + 1), *out = malloc(total + 1);
     const char *fault = !sizes || !packed || !out ? "not enough memory" : !body_take(&body, header, sizes) ? cut_short : NULL;
     size_t done = 0, packed_total = 0;
@@ -308,7 +333,7 @@ static const char *decode_compressed(const Reader *reader, Body body, unsigned c
     return fault;
 }
 
-static const char *decode_plain(const Reader *reader, Body body, unsigned char **bytes, size_t *length)
+static const char *decode_plain(const Reader *reader, Body body, size_t most, unsigned char **bytes, size_t *length)
 {
     unsigned char head[8];
     size_t w = (size_t)reader->header_size;
@@ -318,6 +343,8 @@ static const char *decode_plain(const Reader *reader, Body body, unsigned char *
     uint64_t count = word_at(head, (int)w, reader->is_big_endian);
     if (count > body.length)
         return cut_short;
+    if (count > most)
+        return too_many;
     unsigned char *all = malloc((size_t)count + w);
     if (!all)
         return "not enough memory";
@@ -350,7 +377,7 @@ static const char *decode_ascii(Array *array)
     return NULL;
 }
 
-static const char *decode_array(const Reader *reader, Array *array, const char *appended, size_t appended_length)
+static const char *decode_array(Reader *reader, Array *array, const char *appended, size_t appended_length)
 {
     if (array->format == FORMAT_ASCII)
         return decode_ascii(array);
@@ -365,10 +392,12 @@ static const char *decode_array(const Reader *reader, Array *array, const char *
     }
     unsigned char *bytes = NULL;
     size_t length = 0;
-    const char *fault = reader->is_compressed ? decode_compressed(reader, body, &bytes, &length) : decode_plain(reader, body, &bytes, &length);
+    size_t most = (array->promised < reader->values_left ? array->promised : reader->values_left) * (size_t)array->number.size;
+    const char *fault = reader->is_compressed ? decode_compressed(reader, body, most, &bytes, &length) : decode_plain(reader, body, most, &bytes, &length);
     if (fault)
         return fault;
     array->count = length / (size_t)array->number.size;
+    reader->values_left -= array->count;
     array->value = calloc(array->count + 1, sizeof *array->value);
     for (size_t i = 0; array->value && i < array->count; i++)
         array->value[i] = number_at(bytes + i * (size_t)array->number.size, array->number, reader->is_big_endian);
@@ -495,7 +524,7 @@ VtpData *vtp_parse(const void *bytes, size_t length, const char *name, Faults *f
 {
     int before = faults->count;
     VtpData *data = calloc(1, sizeof *data);
-    Reader reader = {.name = name, .faults = faults, .open_array = -1, .parser = XML_ParserCreate(NULL)};
+    Reader reader = {.name = name, .faults = faults, .open_array = -1, .values_left = VALUES_MOST, .parser = XML_ParserCreate(NULL)};
     if (!data || !reader.parser || length > INT_MAX) {
         faults_add(faults, name, 0, 0, length > INT_MAX ? "is larger than 2 GB" : "not enough memory");
         if (reader.parser)

@@ -1,42 +1,33 @@
-// Writing goes to `path.part-PID`, is synced, then renamed over `path`; whatever fails removes the part. A device or pipe is written straight
-// through: renaming over it would replace it.
 #include "recon/whole_file.h"
 
-#include "geom/stops.h"
+#include "base/part_file.h"
+#include "base/regular_file.h"
 
 #include <errno.h>
 #include <fcntl.h>
-#include <stdio.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-char *whole_file_read(const char *path, size_t *length, Faults *faults)
+char *whole_file_read_most(const char *path, size_t most, size_t *length, Faults *faults)
 {
-    int file = open(path, O_RDONLY | O_CLOEXEC);
     struct stat status;
-    if (file < 0 || fstat(file, &status)) {
-        faults_add(faults, path, 0, 0, "cannot be opened: %s; an existing readable file is needed", strerror(errno));
-        if (file >= 0)
-            close(file);
+    const char *why;
+    int file = regular_file_open(path, &status, &why);
+    if (file < 0) {
+        faults_add(faults, path, 0, 0, "cannot be opened: %s; an existing readable file is needed", why);
         return NULL;
     }
-    if (!S_ISREG(status.st_mode)) {
-        faults_add(faults, path, 0, 0, "is not a regular file; an existing readable file is needed");
+    size_t size = (size_t)status.st_size;
+    if (size > most) {
+        faults_add(faults, path, 0, 0, "is %zu bytes long; at most %zu are read of a file of this kind", size, most);
         close(file);
         return NULL;
     }
-    size_t size = (size_t)status.st_size, got = 0;
     char *bytes = malloc(size + 1);
-    while (bytes && got < size) {
-        ssize_t n = read(file, bytes + got, size - got);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0)
-            break;
-        got += (size_t)n;
-    }
+    size_t got = bytes ? regular_file_read(file, bytes, size) : 0;
     close(file);
     if (!bytes || got < size) {
         faults_add(faults, path, 0, 0, "cannot be read: %s", bytes ? "it ends early" : "not enough memory");
@@ -48,59 +39,33 @@ char *whole_file_read(const char *path, size_t *length, Faults *faults)
     return bytes;
 }
 
-static bool write_all(int file, const char *bytes, size_t length)
-{
-    while (length > 0) {
-        ssize_t n = write(file, bytes, length);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0)
-            return false;
-        bytes += n;
-        length -= (size_t)n;
-    }
-    return true;
-}
+char *whole_file_read(const char *path, size_t *length, Faults *faults) { return whole_file_read_most(path, SIZE_MAX - 1, length, faults); }
 
-static bool write_through(const char *path, const void *bytes, size_t length, Faults *faults)
+static bool write_through(const char *path, const void *bytes, size_t length)
 {
-    int file = open(path, O_WRONLY | O_CLOEXEC | O_NOCTTY);
-    bool written = file >= 0 && write_all(file, bytes, length);
+    PartFile device = {.descriptor = open(path, O_WRONLY | O_APPEND | O_CLOEXEC | O_NOCTTY)};
+    if (device.descriptor < 0)
+        return false;
+    bool written = part_file_write(&device, bytes, length);
     int reason = errno;
-    if (file >= 0 && close(file) && written)
-        written = false, reason = errno;
-    if (!written)
-        faults_add(faults, path, 0, 0, "cannot be written: %s; a regular file in a folder with free space is valid", strerror(reason));
+    if (close(device.descriptor) && written)
+        return false;
+    errno = reason;
     return written;
 }
 
 bool whole_file_write(const char *path, const void *bytes, size_t length, Faults *faults)
 {
-    struct stat status;
-    if (stat(path, &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode))
-        return write_through(path, bytes, length, faults);
-    size_t room = strlen(path) + 32;
-    char *part = malloc(room);
-    if (!part) {
-        faults_add(faults, path, 0, 0, "cannot be written: not enough memory");
-        return false;
+    bool is_through = part_file_is_through(path), written;
+    PartFile part;
+    if (is_through) {
+        written = write_through(path, bytes, length);
+    } else if ((written = part_file_begin(&part, path))) {
+        written = part_file_write(&part, bytes, length) && part_file_finish_synced(&part);
+        part_file_drop(&part);
     }
-    snprintf(part, room, "%s.part-%ld", path, (long)getpid());
-    sigset_t before;
-    stops_hold(&before);
-    int file = open(part, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    bool written = file >= 0 && write_all(file, bytes, length) && (fsync(file) == 0 || errno == EINVAL);
-    int reason = errno;
-    if (file >= 0 && close(file) && written)
-        written = false, reason = errno;
-    if (written && rename(part, path))
-        written = false, reason = errno;
-    if (!written) {
-        if (file >= 0)
-            unlink(part);
-        faults_add(faults, path, 0, 0, "cannot be written: %s; a folder with write permission and free space is needed", strerror(reason));
-    }
-    stops_release(&before);
-    free(part);
+    if (!written)
+        faults_add(faults, path, 0, 0, "cannot be written: %s; a %s is needed", strerror(errno),
+                   is_through ? "device with free space, or a regular file," : "folder with write permission and free space");
     return written;
 }

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_RENDER_IMGUI_HEAP_H
 #define SELDINGER_RENDER_IMGUI_HEAP_H
 
-#include "geom/heap.h"
+#include "base/heap.h"
 
 #include <cstdlib>
 #include <imgui.h>

@@ -3,7 +3,7 @@
 // Colours are BT.709 in studio range and say so, as players expect of high definition.
 #include "render/movie_file.h"
 
-#include "geom/stops.h"
+#include "base/part_file.h"
 #include "render/message.h"
 
 #include <errno.h>
@@ -49,19 +49,11 @@ static void forget(MovieFile *movie)
 // A file in the folder of `path` that has no name any more; -1 with errno.
 static int nameless_file(const char *path)
 {
-    size_t length = strlen(path) + 16;
-    char *name = malloc(length);
-    if (!name)
+    PartFile part;
+    if (!part_file_begin(&part, path))
         return -1;
-    snprintf(name, length, "%s.partXXXXXX", path);
-    sigset_t before;
-    stops_hold(&before);
-    int file = mkstemp(name), why = errno;
-    if (file >= 0)
-        unlink(name);
-    stops_release(&before);
-    free(name);
-    errno = why;
+    int file = fcntl(part.descriptor, F_DUPFD_CLOEXEC, 0);
+    part_file_drop(&part);
     return file;
 }
 
@@ -247,32 +239,19 @@ static int end_encoder(MovieFile *movie, bool kill_it)
 // The file without a name to its name. False with errno.
 static bool publish(const MovieFile *movie)
 {
-    size_t length = strlen(movie->path) + 32, room = 1 << 20;
-    char *beside = malloc(length), *buffer = malloc(room);
-    bool good = beside && buffer;
-    if (good) {
-        snprintf(beside, length, "%s.part%ld", movie->path, (long)getpid());
-        sigset_t before;
-        stops_hold(&before);
-        FILE *file = fopen(beside, "wb");
-        ssize_t count = 0;
-        off_t at = 0;
-        good = file != NULL;
-        while (good && (count = pread(movie->output, buffer, room, at)) > 0) {
-            good = fwrite(buffer, 1, (size_t)count, file) == (size_t)count;
-            at += count;
-        }
-        good = good && count == 0;
-        if (file && fclose(file) != 0)
-            good = false;
-        good = good && rename(beside, movie->path) == 0;
-        int why = errno;
-        if (file && !good)
-            remove(beside);
-        stops_release(&before);
-        errno = why;
+    size_t room = 1 << 20;
+    char *buffer = malloc(room);
+    PartFile part;
+    if (!buffer || !part_file_begin(&part, movie->path)) {
+        free(buffer);
+        return false;
     }
-    free(beside);
+    ssize_t count = 0;
+    bool good = true;
+    for (off_t at = 0; good && (count = pread(movie->output, buffer, room, at)) > 0; at += count)
+        good = part_file_write(&part, buffer, (size_t)count);
+    good = good && count == 0 && part_file_finish_synced(&part);
+    part_file_drop(&part);
     free(buffer);
     return good;
 }

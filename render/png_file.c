@@ -1,7 +1,7 @@
 // No time stamp and a fixed compression level: the same pixels give the same bytes.
 #include "render/png_file.h"
 
-#include "geom/stops.h"
+#include "base/part_file.h"
 #include "render/message.h"
 
 #include <errno.h>
@@ -48,30 +48,15 @@ static bool write_pixels(FILE *file, int width, int height, const uint8_t *rgb)
 
 bool png_file_write(const char *path, int width, int height, const uint8_t *rgb, char *message, size_t capacity)
 {
-    struct stat status;
-    if (stat(path, &status) == 0 && !S_ISREG(status.st_mode))   // renaming over a device would replace it
+    if (part_file_is_through(path))
         return message_fail(message, capacity, "%s: is there and no regular file; give another name", path);
-    size_t length = strlen(path) + 32;
-    char *beside = malloc(length);
-    if (!beside)
-        return message_fail(message, capacity, "%s: not enough memory", path);
-    snprintf(beside, length, "%s.part%ld", path, (long)getpid());
-    sigset_t before;
-    stops_hold(&before);
+    PartFile part;
     errno = 0;
-    FILE *file = fopen(beside, "wb");
-    bool written = file && write_pixels(file, width, height, rgb);
-    if (file && fclose(file) != 0)
-        written = false;
-    if (written && rename(beside, path) != 0)
-        written = false;
-    if (!written) {
-        int why = errno;
-        if (file)
-            remove(beside);
-        message_fail(message, capacity, "%s: cannot be written: %s", path, why ? strerror(why) : "write error");
-    }
-    stops_release(&before);
-    free(beside);
+    bool written = part_file_begin(&part, path);
+    FILE *file = written ? part_file_stream(&part) : NULL;
+    written = file && write_pixels(file, width, height, rgb) && part_file_finish_synced(&part);
+    if (!written)
+        message_fail(message, capacity, "%s: cannot be written: %s", path, errno ? strerror(errno) : "write error");
+    part_file_drop(&part);
     return written;
 }

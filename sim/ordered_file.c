@@ -178,7 +178,7 @@ static H5FD_t *driver_open(const char *name, unsigned flags, hid_t access, haddr
     if (!file)
         return NULL;
     file->page = aligned_alloc(ORDERED_FILE_PAGE, ORDERED_FILE_PAGE);
-    file->descriptor = file->page ? open(name, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666) : -1;
+    file->descriptor = file->page ? open(name, O_RDWR | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0666) : -1;
     if (file->descriptor >= 0)
         (void)fcntl(file->descriptor, F_OFD_SETLK, &(struct flock){.l_type = F_WRLCK, .l_whence = SEEK_SET});   // some file systems have none
     if (file->descriptor < 0) {

@@ -1,5 +1,6 @@
 #include "sim/recording.h"
 
+#include "base/part_file.h"
 #include "sim/ordered_file.h"
 #include "sim/sha256.h"
 
@@ -51,7 +52,8 @@ typedef struct Ring {
 } Ring;
 
 struct Recording {
-    char *path, *part;
+    char *path;
+    PartFile part;           // until it is named
     RecordingOptions options;
     int tool_count, tool_nodes[STEP_TOOLS_MAX];      // at most, whichever device is in
     bool has_exchanges;
@@ -67,7 +69,7 @@ struct Recording {
     bool named;              // renamed to its path
     pthread_t writer;
     bool started;
-    atomic_bool finish, failed;
+    atomic_bool finish, failed, abandoned;
     char reason[200];        // set by the writer before `failed`
 };
 
@@ -341,7 +343,7 @@ static bool open_part(Recording *recording)
     H5Pset_istore_k(creation, (unsigned)recording->half_rank);
     H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
     H5Pset_file_locking(access, false, true);
-    recording->file = ordered_file_create(recording->part, creation, access);
+    recording->file = ordered_file_create(recording->part.name, creation, access);
     recording->ordered = recording->file >= 0 ? ordered_file_of(recording->file) : NULL;
     H5Pclose(access);
     H5Pclose(creation);
@@ -459,7 +461,7 @@ static bool flush(Recording *recording)
     if (recording->named)
         return ordered_file_commit(recording->ordered);
     hsize_t ahead = 2 * (chunk_bytes(&recording->steps) + chunk_bytes(&recording->frames));
-    if (!ordered_file_seal(recording->ordered, 2 * recording->half_rank, ahead) || rename(recording->part, recording->path) != 0)
+    if (!ordered_file_seal(recording->ordered, 2 * recording->half_rank, ahead) || !part_file_finish(&recording->part))
         return false;
     recording->named = true;
     return true;
@@ -481,6 +483,8 @@ static void *write_rings(void *argument)
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);   // each thread has its own
     for (bool last = false; !last;) {
         last = atomic_load(&recording->finish);
+        if (atomic_load(&recording->abandoned))
+            break;
         // frames first: the rows that they name were pushed before them
         long long frames = atomic_load_explicit(&recording->frames.head, memory_order_acquire);
         long long steps = atomic_load_explicit(&recording->steps.head, memory_order_acquire);
@@ -644,7 +648,7 @@ static void recording_free(Recording *recording)
     free(recording->node);
     free(recording->own);
     free(recording->path);
-    free(recording->part);
+    part_file_drop(&recording->part);
     free(recording);
 }
 
@@ -682,14 +686,12 @@ Recording *recording_create(const char *path, Simulator *simulator, const Record
 {
     const Scene *scene = simulator_scene(simulator);
     Recording *recording = calloc(1, sizeof *recording);
-    size_t room = strlen(path) + 32;
-    if (!recording || !(recording->path = strdup(path)) || !(recording->part = malloc(room))) {
+    if (!recording || !(recording->path = strdup(path))) {
         faults_add(faults, path, 0, 0, "cannot be recorded: no memory");
         if (recording)
             recording_free(recording);
         return NULL;
     }
-    snprintf(recording->part, room, "%s.part-%ld", path, (long)getpid());
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
     recording->options = *options;
     recording->file = -1;
@@ -712,14 +714,13 @@ Recording *recording_create(const char *path, Simulator *simulator, const Record
     bool good = recording->node && recording->own && make_ring(&recording->steps, STEP_RING, step_columns(recording), recording->step_column, step_rows) &&
                 make_ring(&recording->frames, FRAME_RING, frame_columns(recording), recording->frame_column, frame_rows);
     errno = 0;
-    good = good && build_file(recording, scene);
+    good = good && part_file_begin(&recording->part, path) && build_file(recording, scene);
     int reason = errno;
     recording->started = good && pthread_create(&recording->writer, NULL, write_rings, recording) == 0;
     if (!recording->started) {
         faults_add(faults, path, 0, 0, "cannot be recorded: %s; a folder with write permission and free space is needed",
                    reason ? strerror(reason) : "the HDF5 library could not make the file");
         close_file(recording);
-        unlink(recording->part);
         recording_free(recording);
         return NULL;
     }
@@ -743,9 +744,19 @@ bool recording_close(Recording *recording, Simulator *simulator, Faults *faults)
         faults_add(faults, recording->path, 0, 0, "recording stopped after %.3f s: %s; %s, free some space or record elsewhere",
                    (double)atomic_load(&recording->steps.tail) * simulator_scene(simulator)->dt / 1000, recording->reason,
                    recording->named ? "the file is whole up to its last flush" : "no file was made");
-        if (!recording->named)
-            unlink(recording->part);
     }
     recording_free(recording);
     return !failed;
+}
+
+void recording_abandon(Recording *recording)
+{
+    if (!recording)
+        return;
+    atomic_store(&recording->abandoned, true);
+    pthread_join(recording->writer, NULL);
+    close_file(recording);
+    if (recording->named)
+        unlink(recording->path);
+    recording_free(recording);
 }

@@ -52,6 +52,8 @@ Recording *recording_create(const char *path, Simulator *simulator, const Record
 bool recording_step(Recording *recording, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
 // Adds the last state as a frame, writes what is left, ends. False with a fault where writing failed; always frees.
 bool recording_close(Recording *recording, Simulator *simulator, Faults *faults);
+// Ends without a file: of a run that never was. NULL: none.
+void recording_abandon(Recording *recording);
 
 // --- reading, for export, info and comparison ---
 typedef struct RecordedTool {

@@ -1,7 +1,10 @@
 #include "sim/sha256.h"
 
+#include "base/regular_file.h"
+
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 static const uint32_t round_constant[64] = {
     0x428a2f98, 0x71374491, 0xb5c0fbcf, 0xe9b5dba5, 0x3956c25b, 0x59f111f1, 0x923f82a4, 0xab1c5ed5, 0xd807aa98, 0x12835b01, 0x243185be,
@@ -69,17 +72,20 @@ void sha256_end(Sha256 *sha, char hex[65])
 
 bool sha256_of_file(const char *path, char hex[65])
 {
-    FILE *file = fopen(path, "rb");
+    struct stat status;
+    const char *why;
     unsigned char part[65536];
+    size_t length = 0;
     Sha256 sha;
-    if (!file)
+    int file = regular_file_open(path, &status, &why);
+    if (file < 0)
         return false;
     sha256_begin(&sha);
-    for (size_t got; (got = fread(part, 1, sizeof part, file)) > 0;)
+    for (size_t got; (got = regular_file_read(file, part, sizeof part)) > 0; length += got)
         sha256_add(&sha, part, got);
-    bool good = !ferror(file);
-    fclose(file);
-    if (good)
-        sha256_end(&sha, hex);
-    return good;
+    close(file);
+    if (length < (size_t)status.st_size)
+        return false;
+    sha256_end(&sha, hex);
+    return true;
 }

@@ -188,7 +188,7 @@ static void words_of_the_command_line(void **state)
                                        "segment capsule.nrrd --trace trace.yaml -o out.h5 --json trace.yaml", "import --surface tube.stl -o tube.stl"};
     assert_int_equal(run_in("ln -s model.h5 alias.stl &&", "synth open-capsule -o tube.stl --quiet"), 0);
     for (size_t i = 0; i < sizeof same / sizeof same[0]; i++)
-        refused(same[i], "is read here and would be lost");
+        refused(same[i], " would overwrite ");
     static const char *const nowhere[] = {"fit tree.h5 -o nowhere/x", "synth capsule -o nowhere/x.h5", "synth capsule -o nowhere/x.nrrd",
                                           "query model.h5 --points ok.csv -o nowhere/x.csv", "export model.h5 -o nowhere/x.stl",
                                           "segment capsule.nrrd --trace trace.yaml -o nowhere/x.h5"};

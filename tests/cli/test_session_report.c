@@ -11,7 +11,9 @@
 #include "sim/session.h"
 
 #include <expat.h>
+#include <signal.h>
 #include <stdio.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -235,6 +237,53 @@ static void no_browser_is_said(void **state)
     assert_int_not_equal(access(in_folder("no.pdf"), F_OK), 0);
 }
 
+static bool comes(const char *path)
+{
+    for (int i = 0; i < 4000 && access(path, F_OK) != 0; i++)
+        nanosleep(&(struct timespec){.tv_nsec = 5000000}, NULL);
+    return access(path, F_OK) == 0;
+}
+
+// With a browser that never ends and says where the page is: the trainee's page goes with the program.
+static void a_stopped_report_leaves_no_page(void **state)
+{
+    (void)state;
+    static const int signals[] = {SIGTERM, SIGINT, SIGHUP};
+    char path[4096], script[1200], at_path[200], pdf[300], session[300];
+    snprintf(at_path, sizeof at_path, "%s", in_folder("at.txt"));
+    snprintf(pdf, sizeof pdf, "%s", in_folder("stopped.pdf"));
+    snprintf(session, sizeof session, "%s", in_folder("second.json"));
+    snprintf(script, sizeof script, "#!/bin/sh\nfor a; do case \"$a\" in file://*) echo \"${a#file://}\" >'%s.tmp'; mv '%s.tmp' '%s';; esac; done\nsleep 300 & wait\n",
+             at_path, at_path, at_path);
+    mkdir(in_folder("bin"), 0755);
+    put("bin/chromium", script);
+    chmod(in_folder("bin/chromium"), 0755);
+    snprintf(path, sizeof path, "%s:%s", in_folder("bin"), getenv("PATH"));
+    for (int i = 0; i < 3; i++) {
+        pid_t child = fork();
+        if (child == 0) {
+            setenv("PATH", path, 1);
+            if (freopen(in_folder("stopped.txt"), "w", stderr))
+                execl(SELDINGER_PROGRAM, "seldinger", "report", session, "--pdf", pdf, (char *)NULL);
+            _exit(127);
+        }
+        bool came = comes(at_path);
+        kill(child, came ? signals[i] : SIGKILL);
+        int status;
+        waitpid(child, &status, 0);
+        assert_true(came);
+        assert_true(WIFSIGNALED(status) && WTERMSIG(status) == signals[i]);
+        char *at = text_of(at_path);
+        at[strcspn(at, "\n")] = 0;
+        assert_int_not_equal(access(at, F_OK), 0);
+        *strrchr(at, '/') = 0;
+        assert_int_not_equal(access(at, F_OK), 0);
+        assert_int_not_equal(access(pdf, F_OK), 0);
+        free(at);
+        unlink(at_path);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -244,6 +293,7 @@ int main(void)
         cmocka_unit_test(what_lacks_is_said),
         cmocka_unit_test(a_browser_prints_it),
         cmocka_unit_test(no_browser_is_said),
+        cmocka_unit_test(a_stopped_report_leaves_no_page),
     };
     return cmocka_run_group_tests(tests, set_up, remove_folder);
 }

@@ -1,5 +1,5 @@
 // What cannot be had ends the program, once and in one message.
-#include "geom/heap.h"
+#include "base/heap.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,4 +1,6 @@
-#include "geom/heap.h"
+#include "base/heap.h"
+
+#include "base/part_file.h"
 
 #include <stdint.h>
 #include <stdio.h>
@@ -17,6 +19,7 @@ void heap_is_empty(size_t bytes, const char *file)
                           from ? from : file);
     ssize_t said = write(STDERR_FILENO, message, (size_t)length);
     (void)said;
+    part_files_remove();
     _exit(2);
 }
 

@@ -1,7 +1,7 @@
 // Memory without which a computation cannot go on, for offline work deep in loops and callbacks that have no way to say that it lacks: a program that cannot have it
 // ends there, with one message and exit code 2, instead of going on with less. Not for a simulation's step, nor where a file is being written: those return faults.
-#ifndef SELDINGER_GEOM_HEAP_H
-#define SELDINGER_GEOM_HEAP_H
+#ifndef SELDINGER_BASE_HEAP_H
+#define SELDINGER_BASE_HEAP_H
 
 #include <stddef.h>
 
