@@ -105,6 +105,9 @@ static bool seek(BlockCondenser *k, const BlockChain *a, Walk *w)
     return w->at != k->middle;
 }
 
+// Was the node before i, on the way to the middle, eliminated?
+static bool runs_into(const BlockCondenser *k, int i, int step) { return i != (step > 0 ? 0 : k->count - 1) && k->place[i - step] < 0; }
+
 static const double zeros[BLOCK_LARGEST];
 
 #define KERNELS "solver/block_condense_kernel.inc"
@@ -112,6 +115,7 @@ static const double zeros[BLOCK_LARGEST];
 #include "solver/block_sizes.inc"
 
 static void (*const eliminate_on[BLOCK_SIZES][SIMD_COUNT])(BlockCondenser *, const BlockChain *, const double *) = BLOCK_FORMS(eliminate);
+static void (*const forward_on[BLOCK_SIZES][SIMD_COUNT])(BlockCondenser *, const double *) = BLOCK_FORMS(forward);
 static void (*const expand_on[BLOCK_SIZES][SIMD_COUNT])(const BlockCondenser *, double *) = BLOCK_FORMS(expand);
 
 // The eliminated node with as many eliminated ones before it as behind is kept.
@@ -215,6 +219,15 @@ const BlockChain *block_condense(BlockCondenser *k, const BlockChain *chain, con
         for (int j = 0; k->place[i] < 0 && j < k->size; j++)
             ok &= inverse[j] > 0 && inverse[j] <= DBL_MAX;
     return ok ? &k->small : NULL;
+}
+
+void block_condenser_turn_to(BlockCondenser *k, const double *b)
+{
+    const size_t n = (size_t)k->size;
+    for (int i = 0; i < k->count; i++)
+        if (k->place[i] >= 0)
+            memcpy(k->side + n * (size_t)k->place[i], b + n * (size_t)i, n * sizeof *b);
+    forward_on[block_size_index(k->size)][simd_level()](k, b);
 }
 
 void block_condenser_expand(const BlockCondenser *k, const double *kept, double *x)

@@ -18,6 +18,8 @@ void block_condenser_survey(BlockCondenser *condenser, const BlockChain *chain);
 // Valid until the next call.
 const BlockChain *block_condense(BlockCondenser *condenser, const BlockChain *chain, const double *b);
 double *block_condenser_side(BlockCondenser *condenser);
+// Another right-hand side of the chain that was condensed last: the small chain's becomes that of b (M, n), and what is expanded next belongs to it.
+void block_condenser_turn_to(BlockCondenser *condenser, const double *b);
 // The place of a kept node in the small chain.
 int block_condenser_place(const BlockCondenser *condenser, int node);
 // x (M, n) of all nodes from that of the kept ones.
