@@ -53,7 +53,8 @@ struct ContactSolver {
     BlockLu *lu;
     BlockFactor *factor;
     BlockCondenser *condenser;
-    double *small_u;             // (M, n)
+    const BlockChain *small;     // the condensed chain of the last solve; NULL: it was not condensed …
+    double *small_u;             // (M, n) … and its solution
     PointwiseWork *pointwise;
 };
 
@@ -78,11 +79,18 @@ bool contact_pairs_step(ContactSolver *solver, int count, bool reuse, bool whole
 
 // The contacts [0, count) with the wall on a chain that is not factored yet. False where it is not positive definite.
 bool contact_walls(ContactSolver *solver, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u, ContactReport *report);
+// The same after b has changed by `change` (M, n), with the same matrix and states, which is quick and good where little changes. False where it cannot.
+bool contact_walls_again(ContactSolver *solver, const BlockChain *chain, const double *change, int count, double *u, ContactReport *report);
 // These, and the slides [from, to).
 ContactReport contact_slides(ContactSolver *solver, const BlockChain *chain, const double *b, int from, int to, const ContactOptions *options, double *u);
 ContactReport contact_pointwise(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
                                 const ContactOptions *options, double *u);
+// Forces are left as they balance the motion: contact_cut() follows.
 ContactReport contact_newton(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
                              const ContactOptions *options, double *u);
+// One more step with the last factor and states, after b has changed by `change`; solver->delta: by how much u. False: it is not finite.
+bool contact_newton_again(ContactSolver *solver, const BlockChain *chain, const double *change, int count, double *u, ContactReport *report);
+// Cuts forces to their cones, and counts those that press.
+void contact_cut(ContactSolver *solver, int count, ContactReport *report);
 
 #endif

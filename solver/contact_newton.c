@@ -342,33 +342,28 @@ static double step_length(const ContactSolver *s, int count)
     return best;
 }
 
-// The step of the present states: s->delta, and of each contact its motion and its force afterwards. With `b`, of the first iterations, it is
-// the whole motion: forces that fit badly may have moved the wire anywhere, and the rounding of that shall not stay.
+// The step of the present states: s->delta, and of each contact its motion and its force afterwards. s->rhs is what else the right-hand side has.
+// `whole`, in the first iterations, it is the whole motion: forces that fit badly may have moved the wire anywhere, and the rounding of that shall not stay.
 // False where the matrix cannot be factored.
-static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bool reuse, const double *b)
+static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bool reuse, bool whole)
 {
     bool symmetric = true;
-    size_t bytes = (size_t)(chain->count * chain->size) * sizeof *s->rhs;
     const Vec3 none = {0, 0, 0};
-    if (b)
-        memcpy(s->rhs, b, bytes);
-    else
-        memset(s->rhs, 0, bytes);
     for (int i = 0; i < count; i++) {
         const ContactRow *c = &s->row[i];
         if (s->law[i].state == OPEN && contact_row_is_idle(c, s->motion[i])) {
             s->law[i].force = none;
             continue;
         }
-        write_law(c, s->motion[i], b ? none : s->motion[i], s->slope, reuse, &s->law[i]);
+        write_law(c, s->motion[i], whole ? none : s->motion[i], s->slope, reuse, &s->law[i]);
         if (c->far && s->law[i].state != OPEN)
             continue;
         symmetric &= s->law[i].state != SLIP || c->friction == 0;
-        contact_row_push(c, b ? s->law[i].force : vec3_sub(s->law[i].force, c->force), s->rhs);
+        contact_row_push(c, whole ? s->law[i].force : vec3_sub(s->law[i].force, c->force), s->rhs);
     }
     bool exact = true;
     if (reuse) {
-        block_factor_solve(s->factor, s->rhs, s->delta);
+        solve_straightened(s, s->factor, s->rhs, s->delta);
     } else {
         assemble(s, chain, s->banded);
         s->symmetric = symmetric;
@@ -377,7 +372,7 @@ static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bo
             return false;
     }
     s->inexact |= !exact;
-    if (s->banded < count && !contact_pairs_step(s, count, reuse, b != NULL, solve_straightened))
+    if (s->banded < count && !contact_pairs_step(s, count, reuse, whole, solve_straightened))
         return false;
     for (int i = 0; i < count; i++) {
         ContactLaw *law = &s->law[i];
@@ -425,8 +420,7 @@ static void copy_iterate(ContactSolver *s, int unknowns, int count, bool keep, d
         *(keep ? &s->best[i] : &s->row[i].force) = keep ? s->row[i].force : s->best[i];
 }
 
-// Cuts the forces to their cones.
-static void cut(ContactSolver *s, int count, ContactReport *report)
+void contact_cut(ContactSolver *s, int count, ContactReport *report)
 {
     report->active = report->pairs = 0;
     report->cone_violation = 0;
@@ -440,6 +434,15 @@ static void cut(ContactSolver *s, int count, ContactReport *report)
         if (presses)
             report->cone_violation = fmax(report->cone_violation, contact_row_excess(c));
     }
+}
+
+bool contact_newton_again(ContactSolver *s, const BlockChain *chain, const double *change, int count, double *u, ContactReport *report)
+{
+    int unknowns = chain->size * chain->count;
+    memcpy(s->rhs, change, (size_t)unknowns * sizeof *s->rhs);
+    bool finite = newton_step(s, chain, count, true, false) && take_step(s, unknowns, count, 1, u);
+    contact_residual(s->row, count, s->motion, report);
+    return finite;
 }
 
 ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
@@ -468,7 +471,11 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
         if (first)
             assemble_reset(s, chain, count);
         bool reuse = choose_states(s, count, first) == 0 && !fresh && report.residual < 1e-3 && s->symmetric;
-        if (!newton_step(s, chain, count, reuse, search ? NULL : b)) {
+        if (search)
+            memset(s->rhs, 0, (size_t)unknowns * sizeof *s->rhs);
+        else
+            memcpy(s->rhs, b, (size_t)unknowns * sizeof *s->rhs);
+        if (!newton_step(s, chain, count, reuse, !search)) {
             if (s->knows_motion && block_chain_factor(chain, s->factor))       // u is not set yet
                 contact_balance(s, s->factor, b, count, u);
             break;
@@ -504,6 +511,5 @@ ContactReport contact_newton(ContactSolver *s, const BlockChain *chain, const Bl
         copy_iterate(s, unknowns, count, false, u);
         report.residual = residual;
     }
-    cut(s, count, &report);
     return report;
 }

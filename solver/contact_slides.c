@@ -6,6 +6,8 @@
 // The second linearises f |t| = bound t in force and motion together (Chan, Golub and Mulet 1999, for total variation). With p in place of f0 / bound a
 // slide that is pushed past its turning point is not resisted, and goes to and fro for ever; so whole steps find the answer from anywhere.
 //
+// C changes little between the last iterations. Then the same matrix, condensed and factored, serves once more: the right-hand side has what forces lack.
+//
 // C is symmetric and positive and goes to the node's diagonal block whether or not the slide slips. So an iteration leaves a symmetric chain A + J^T C J
 // on which the wall's contacts are alone, condensed to their nodes: the many slides cost one elimination, and what the wall does costs little more. Contacts
 // far from those that press wait until an iteration's motion goes through them. From the slip of the step before one or two iterations are the rule, up to ten
@@ -14,6 +16,9 @@
 
 #include <limits.h>
 #include <string.h>
+
+// The same matrix is tried again from this error on, as a share of the largest force, and as long as no more than this part of an error stays.
+static const double NEAR = 1e-4, STAYS = 0.3;
 
 static Vec3 force_at(const ContactRow *c, Vec3 d) { return contact_project(c, vec3_add_scaled(c->held, -c->spring, d)); }
 
@@ -167,6 +172,72 @@ static void expect_motion(ContactSolver *s, int walls, const double *u)
     s->knows_motion = walls > 0;
 }
 
+typedef struct Errors {      // [N]
+    double wall, slide, passed;  // of walls, of slides, of walls that wait
+    double allowed;
+} Errors;
+
+static bool is_good(const Errors *e) { return e->wall <= e->allowed && e->slide <= e->allowed && e->passed <= e->allowed; }
+
+static Errors look(ContactSolver *s, const double *u, int walls, int from, int to, double tolerance, ContactReport *report)
+{
+    Errors e = {.wall = report->residual * report->largest};
+    e.slide = read_solution(s, u, from, to, &report->largest);
+    e.allowed = tolerance * report->largest;
+    e.passed = look_at_waiting(s, u, walls, from, e.allowed);
+    report->residual = fmax(e.wall, fmax(e.slide, e.passed)) / report->largest;
+    return e;
+}
+
+// What slides' forces lack, to s->side; their laws have it from now on.
+static void add_missing(ContactSolver *s, const BlockChain *chain, int from, int to)
+{
+    memset(s->side, 0, (size_t)(chain->count * chain->size) * sizeof *s->side);
+    for (int i = from; i < to; i++) {
+        ContactRow *c = &s->row[i];
+        ContactLaw *law = &s->law[i];
+        if (c->inert)
+            continue;
+        Vec3 missing = vec3_sub(force_at(c, law->step), c->force);
+        contact_row_push(c, missing, s->side);
+        law->force = vec3_add(law->force, missing);
+    }
+}
+
+// Forces of an iterate and slides' motion, aside, or back again.
+static void keep_forces(ContactSolver *s, int walls, int from, int to, bool back)
+{
+    for (int i = 0; i < to; i = i + 1 == walls ? from : i + 1) {
+        *(back ? &s->row[i].force : &s->best[i]) = back ? s->best[i] : s->row[i].force;
+        if (i >= from)
+            *(back ? &s->law[i].step : &s->motion[i]) = back ? s->motion[i] : s->law[i].step;
+    }
+}
+
+// Near the answer the matrix hardly changes any more: it serves again, for what forces still lack, as long as most of that goes each time. Where that does
+// not lead to the end everything is as before: a force between two iterations' would be a bad f0, which sends slides to and fro.
+static Errors refine(ContactSolver *s, const BlockChain *chain, int walls, int from, int to, double tolerance, double *u, Errors e, ContactReport *report)
+{
+    const ContactReport first_report = *report;
+    const Errors first = e;
+    if (is_good(&e) || e.slide > NEAR * report->largest || e.passed > e.allowed)
+        return e;
+    double before = HUGE_VAL;
+    keep_forces(s, walls, from, to, false);
+    while (!is_good(&e) && e.slide < STAYS * before) {
+        before = e.slide;
+        add_missing(s, chain, from, to);
+        if (!contact_walls_again(s, chain, s->side, walls, u, report))
+            break;
+        e = look(s, u, walls, from, to, tolerance, report);
+    }
+    if (is_good(&e))
+        return e;
+    keep_forces(s, walls, from, to, true);
+    *report = first_report;
+    return first;
+}
+
 ContactReport contact_slides(ContactSolver *s, const BlockChain *chain, const double *b, int from, int to, const ContactOptions *options, double *u)
 {
     ContactReport report = {0};
@@ -180,14 +251,13 @@ ContactReport contact_slides(ContactSolver *s, const BlockChain *chain, const do
         if (report.singular)
             break;
         iterations += 1 + report.iterations;
-        double wall = report.residual * report.largest, error = read_solution(s, u, from, to, &report.largest);
-        double allowed = options->tolerance * report.largest, passed = look_at_waiting(s, u, walls, from, allowed);
-        error = fmax(error, passed);
-        report.residual = fmax(wall, error) / report.largest;
-        report.converged &= error <= allowed;
-        if (error <= allowed)
+        Errors e = look(s, u, walls, from, to, options->tolerance, &report);
+        if (report.converged)
+            e = refine(s, chain, walls, from, to, options->tolerance, u, e, &report);
+        report.converged &= is_good(&e);
+        if (fmax(e.slide, e.passed) <= e.allowed)
             break;
-        if (passed > allowed)
+        if (e.passed > e.allowed)
             walls = put_in_order(s, walls, from);
         for (int k = from; k < to; k++)
             s->motion[k] = s->law[k].step;

@@ -289,6 +289,7 @@ static bool solve_condensed(ContactSolver *s, const BlockChain *chain, const dou
     // an iteration costs what is left of the chain: up to twice as many are in the same bound
     ContactOptions longer = *options;
     longer.max_iterations = (int)(options->max_iterations * fmin(2, (double)chain->count / small->count));
+    s->small = small;
     *report = contact_newton(s, small, s->factor, block_condenser_side(s->condenser), count, &longer, s->small_u);
     block_condenser_expand(s->condenser, s->small_u, u);
     return true;
@@ -297,6 +298,7 @@ static bool solve_condensed(ContactSolver *s, const BlockChain *chain, const dou
 bool contact_walls(ContactSolver *s, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u, ContactReport *report)
 {
     *report = (ContactReport){.converged = true, .largest = LEAST_FORCE};
+    s->small = NULL;
     if (count == 0)
         return block_chain_factor_solve(chain, s->factor, b, u);
     if (solve_condensed(s, chain, b, count, options, u, report))
@@ -308,6 +310,25 @@ bool contact_walls(ContactSolver *s, const BlockChain *chain, const double *b, i
     for (int i = s->banded; i < count; i++)
         s->row[i].far->node = s->row[i].far->chain_node;
     *report = contact_newton(s, chain, s->braced_factor, b, count, options, u);
+    return true;
+}
+
+bool contact_walls_again(ContactSolver *s, const BlockChain *chain, const double *change, int count, double *u, ContactReport *report)
+{
+    double *more = s->best_u;    // not in use between solves
+    if (!s->small && count > 0)
+        return false;
+    if (!s->small) {
+        block_factor_solve(s->factor, change, more);
+        report->residual = 0;
+    } else {
+        block_condenser_turn_to(s->condenser, change);
+        if (!contact_newton_again(s, s->small, block_condenser_side(s->condenser), count, s->small_u, report))
+            return false;
+        block_condenser_expand(s->condenser, s->delta, more);
+    }
+    for (int i = 0; i < chain->size * chain->count; i++)
+        u[i] += more[i];
     return true;
 }
 
@@ -340,6 +361,8 @@ ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, cons
         report = contact_slides(solver, chain, b, count, all, options, u);
     else if (!solve_condensed(solver, chain, b, count, options, u, &report))
         report = contact_newton(solver, chain, factor, b, count, options, u);
+    if (!by_points)
+        contact_cut(solver, count, &report);
     for (int i = 0; i < all; i++) {
         const ContactRow *c = &solver->row[i];
         if (c->far) {
