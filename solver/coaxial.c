@@ -149,6 +149,14 @@ static void strain(const CoaxialSpan *span, int k, CoaxialRest *rest)
     rest->torsion_end[k][0] = spreads_twist ? 0 : 1 / first->torsion, rest->torsion_end[k][1] = 1 / section->torsion - (spreads_twist ? 1 / back->torsion : 0);
 }
 
+CoaxialSprings coaxial_springs(const CoaxialSpan *span)
+{
+    CoaxialRest rest;
+    rest.strained_length[0] = fmax(span->s2 - span->s1, LENGTH_MIN);
+    strain(span, 0, &rest);
+    return (CoaxialSprings){rest.strained_length[0], rest.axial[0], rest.torsion[0]};
+}
+
 // A piece's tools: what they add to the element, and the derivatives of that.
 typedef struct Parts {
     const CoaxialSection *section[COAXIAL_TOOLS_MAX];

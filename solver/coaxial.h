@@ -114,6 +114,12 @@ typedef struct CoaxialRest {       // layer 1: what the tools are together
 // The tools of an element, carrier first, 1 <= count <= COAXIAL_TOOLS_MAX.
 void coaxial_rest(const CoaxialSpan *span, int count, CoaxialRest *rest);
 
+// One tool alone, straight, without its tip: as `strained_length`, `axial` and `torsion` of the element.
+typedef struct CoaxialSprings {
+    double length, axial, torsion;
+} CoaxialSprings;
+CoaxialSprings coaxial_springs(const CoaxialSpan *span);
+
 typedef struct CoaxialInput {
     Vec3 x1, x2;
     Quat q1, q2;

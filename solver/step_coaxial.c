@@ -396,39 +396,82 @@ static double straightened(const Tool *t, double a, double b)
     return energy;
 }
 
-// Between two nodes in the sheath every tool is a spring along and about the line.
-static double sheath_element_of_tools(const Stepper *s, int c, double scale, Local *local)
+// Between two nodes in the sheath every tool is a spring along and one about the line, between what w = side x_b - x_a is at its two nodes: x_a the node's place
+// or turn, x_b the tool's S or angle there.
+typedef struct Spring {
+    int a, b;                // unknowns of a node; b < 0: none
+    double side, stiffness, force;   // 1 or -1, [N/mm] or [N mm], [N] or [N mm]
+} Spring;
+
+// Returns their number, at most two a tool. spring: NULL where the energy alone is wanted.
+static int sheath_springs(const Stepper *s, int c, double scale, Spring *spring, double *energy)
 {
-    int n = s->chain.size, tool[STEP_TOOLS_MAX];
+    int tool[STEP_TOOLS_MAX], inner = s->state.inner_count, count = 0;
     CoaxialInput in = input_at(s, c, tool);
-    CoaxialRest rest;
-    coaxial_rest(in.span, in.count, &rest);
-    double length = stepper_sheath_coordinate(s, c + 1) - stepper_sheath_coordinate(s, c), psi = tools_twist(s, c), energy = 0;
-    int inner = s->state.inner_count;
-    for (int k = 0; local && k < inner; k++)
+    double length = stepper_sheath_coordinate(s, c + 1) - stepper_sheath_coordinate(s, c), psi = tools_twist(s, c);
+    *energy = 0;
+    for (int k = 0; spring && k < inner; k++)
         s->inner_moment[c * inner + k] = vec3(0, 0, 0), s->inner_tension[c * inner + k] = 0, s->bent[c] = 0;
     for (int i = 0; i < in.count; i++) {
         const CoaxialSpan *p = &in.span[i];
-        energy += straightened(&s->tool[tool[i]], p->s1, p->has_tip ? s->tool[tool[i]].wire.total_length : p->s2);
+        *energy += straightened(&s->tool[tool[i]], p->s1, p->has_tip ? s->tool[tool[i]].wire.total_length : p->s2);
         if (p->has_tip)
             continue;
-        int at = unknown_of(tool[i]), along[4] = {0, n, at, n + at}, about[4] = {3, n + 3, at + 1, n + at + 1};
-        double ka = rest.axial[i], kt = rest.torsion[i], strain = length - rest.strained_length[i], turn = psi + p->phi2 - p->phi1;
-        static const double by_length[4] = {-1, 1, 1, -1}, by_turn[4] = {-1, 1, -1, 1};
-        int unknowns = p->is_fixed ? 2 : 4;
-        energy += 0.5 * (ka * strain * strain + kt * turn * turn);
-        for (int k = 0; local && k < tool[i]; k++)
-            s->inner_tension[c * inner + k] += ka * strain;
-        for (int r = 0; local && r < unknowns; r++) {
-            local->gradient[along[r]] += by_length[r] * ka * strain;
-            local->gradient[about[r]] += by_turn[r] * kt * turn;
-            for (int k = 0; k < unknowns; k++) {
-                local->tangent[along[r]][along[k]] += scale * ka * by_length[r] * by_length[k];
-                local->tangent[about[r]][about[k]] += scale * kt * by_turn[r] * by_turn[k];
-            }
-        }
+        CoaxialSprings own = coaxial_springs(p);
+        int at = unknown_of(tool[i]);
+        double strain = length - own.length, turn = psi + p->phi2 - p->phi1;
+        *energy += 0.5 * (own.axial * strain * strain + own.torsion * turn * turn);
+        if (!spring)
+            continue;
+        for (int k = 0; k < tool[i]; k++)
+            s->inner_tension[c * inner + k] += own.axial * strain;
+        spring[count++] = (Spring){0, p->is_fixed ? -1 : at, 1, scale * own.axial, own.axial * strain};
+        spring[count++] = (Spring){3, p->is_fixed ? -1 : at + 1, -1, scale * own.torsion, own.torsion * turn};
     }
-    return energy;
+    return count;
+}
+
+// stiffness times the product of w's slopes
+static void add_products(double *block, int n, const Spring *p, double stiffness)
+{
+    block[(n + 1) * p->a] += stiffness;
+    if (p->b < 0)
+        return;
+    block[(n + 1) * p->b] += stiffness;
+    block[n * p->a + p->b] -= p->side * stiffness;
+    block[n * p->b + p->a] -= p->side * stiffness;
+}
+
+static void add_slopes(double *x, const Spring *p, double by)
+{
+    x[p->a] -= by;
+    if (p->b >= 0)
+        x[p->b] += p->side * by;
+}
+
+// As element().
+static void sheath_element_of_tools(const Stepper *s, int c, double scale, bool adds, double *gradient, const double *u, double *product)
+{
+    Spring spring[2 * STEP_TOOLS_MAX];
+    double energy;
+    int n = s->chain.size, count = sheath_springs(s, c, scale, spring, &energy);
+    memset(gradient, 0, 2 * (size_t)n * sizeof *gradient);
+    if (product)
+        memset(product, 0, 2 * (size_t)n * sizeof *product);
+    for (const Spring *p = spring; p < spring + count; p++) {
+        add_slopes(gradient, p, p->force);
+        add_slopes(gradient + n, p, -p->force);
+        if (product) {
+            double more = u[n + p->a] - u[p->a] + (p->b >= 0 ? p->side * (u[p->b] - u[n + p->b]) : 0);
+            add_slopes(product, p, p->stiffness * more);
+            add_slopes(product + n, p, -p->stiffness * more);
+        }
+        if (!adds)
+            continue;
+        add_products(s->chain.diag + block_of(s, c), n, p, p->stiffness);
+        add_products(s->chain.diag + block_of(s, c + 1), n, p, p->stiffness);
+        add_products(s->chain.lower + block_of(s, c), n, p, -p->stiffness);
+    }
 }
 
 // The element across the mouth: from there to the next node, with the tools' coordinates at the mouth, S at the node behind it less that node's place.
@@ -682,13 +725,13 @@ static void element(const Stepper *s, int c, double scale, bool adds, double *gr
         return;
     }
     if (c + 1 < s->first_free) {
-        clear(&local, s->chain.size);
-        sheath_element_of_tools(s, c, scale, &local);
-    } else if (c + 1 == s->first_free) {
-        mouth_element_of_tools(s, scale, &local);
-    } else {
-        tip_element(s, c, scale, &local);
+        sheath_element_of_tools(s, c, scale, adds, gradient, u, product);
+        return;
     }
+    if (c + 1 == s->first_free)
+        mouth_element_of_tools(s, scale, &local);
+    else
+        tip_element(s, c, scale, &local);
     if (adds)
         add_to_chain(s, c, &local);
     for (int r = 0; product && r < 2 * local.n; r++) {
@@ -934,10 +977,10 @@ void tools_assemble(Stepper *s, double scale, double inertia)
     add_batch(s, &batch, scale);
     if (!s->is_iterate)
         tools_slides(s);
-    static const int lateral[4] = {1, 2, 4, 5};
+    static const int lateral[4] = {1, 2, 4, 5};      // in the sheath nothing has been added to these rows and columns
     for (int c = 0; c < s->first_free; c++)
         for (int i = 0; i < 4; i++)
-            stepper_prescribe(s, c, lateral[i], 0);
+            s->chain.diag[block_of(s, c) + (size_t)((s->chain.size + 1) * lateral[i])] = 1;
 }
 
 double tools_elastic_energy(const Stepper *s)
@@ -949,7 +992,9 @@ double tools_elastic_energy(const Stepper *s)
         energy += straightened(&s->tool[k], 0, slide_at(s, 0, k));
     for (int c = 0; c + 1 < s->state.node_count; c++) {
         if (c + 1 < s->first_free) {
-            energy += sheath_element_of_tools(s, c, 1, NULL);
+            double own;
+            sheath_springs(s, c, 1, NULL, &own);
+            energy += own;
         } else if (c + 1 == s->first_free) {
             CoaxialInput in = mouth_input(s, tool);
             CoaxialOutput out;
