@@ -18,7 +18,7 @@
 // Which unknowns of a node of a large block are worked on. Others, of tools that carry the node or have ended before it, have unit rows.
 typedef struct BlockShape {
     unsigned char count;                 // of them; packed they are 0 to count - 1
-    unsigned char place[BLOCK_LARGEST];  // … and stand there
+    unsigned char place[BLOCK_LARGEST];  // … and stand there; then the others, which have unit rows
     unsigned char shift;                 // 0 to 5 stay where they are, the others stand so much further on …
     bool is_scattered;                   // … or anywhere
     unsigned coupled;                    // a bit for each that is coupled to anything
@@ -36,6 +36,7 @@ struct BlockCondenser {
     int count, size, middle;
     bool *keep;
     int *place;                  // (M) in the small chain, -1: eliminated …
+    unsigned char *live;         // … where so many unknowns come first, the others behind them have unit rows
     int *origin;                 // (M) … into this one and the next ahead; -1: from an end of the chain
     BlockShape *shape;           // (M) of large blocks
     double *node;
@@ -54,10 +55,11 @@ BlockCondenser *block_condenser_create(int count, int size)
     k->keep = calloc(m, sizeof *k->keep);
     k->place = calloc(m, sizeof *k->place);
     k->origin = calloc(m, sizeof *k->origin);
+    k->live = calloc(m, sizeof *k->live);
     k->side = calloc((size_t)size * m, sizeof *k->side);
     k->shape = calloc(m, sizeof *k->shape);
     k->node = aligned_alloc(64, bytes);
-    if (!block_chain_create(&k->small, count, size) || !k->keep || !k->place || !k->origin || !k->side || !k->shape || !k->node) {
+    if (!block_chain_create(&k->small, count, size) || !k->keep || !k->place || !k->origin || !k->live || !k->side || !k->shape || !k->node) {
         block_condenser_destroy(k);
         return NULL;
     }
@@ -73,6 +75,7 @@ void block_condenser_destroy(BlockCondenser *k)
     free(k->keep);
     free(k->place);
     free(k->origin);
+    free(k->live);
     free(k->side);
     free(k->shape);
     free(k->node);
@@ -81,6 +84,7 @@ void block_condenser_destroy(BlockCondenser *k)
 
 bool *block_condenser_keep(BlockCondenser *k) { return k->keep; }
 double *block_condenser_side(BlockCondenser *k) { return k->side; }
+const unsigned char *block_condenser_live(const BlockCondenser *k) { return k->live; }
 int block_condenser_place(const BlockCondenser *k, int node) { return k->place[node]; }
 
 // One end: the node it is at, and the kept one behind it.
@@ -88,6 +92,37 @@ typedef struct Walk {
     int step, at, origin;
     bool runs;                   // the node before was eliminated
 } Walk;
+
+// Where a packed unknown stands in a kept node of the small chain: packed too, so that unit rows are the last ones.
+static inline int spot(const BlockShape *s, int k) { return s->is_scattered ? s->place[k] : k; }
+static bool is_moved(const BlockShape *s) { return s->shift > 0 && !s->is_scattered; }
+static int unknown_at(const BlockShape *s, int k) { return is_moved(s) ? s->place[k] : k; }
+
+// A block of the chain as the small one has it, with rows and columns of these nodes.
+static void pack_block(const double *from, const BlockShape *rows, const BlockShape *columns, int n, double *to)
+{
+    if (!is_moved(rows) && !is_moved(columns)) {
+        memcpy(to, from, (size_t)(n * n) * sizeof *to);
+        return;
+    }
+    for (int r = 0; r < n; r++)
+        for (int c = 0; c < n; c++)
+            to[n * r + c] = from[n * unknown_at(rows, r) + unknown_at(columns, c)];
+}
+
+static void pack_side(const double *b, const BlockShape *s, int n, double *to)
+{
+    memcpy(to, b, (size_t)n * sizeof *to);
+    for (int k = 0; is_moved(s) && k < n; k++)
+        to[k] = b[s->place[k]];
+}
+
+static void unpack_side(const double *from, const BlockShape *s, int n, double *to)
+{
+    memcpy(to, from, (size_t)n * sizeof *to);
+    for (int k = 0; is_moved(s) && k < n; k++)
+        to[s->place[k]] = from[k];
+}
 
 static double *coupling(BlockCondenser *k, int place) { return k->small.lower + (size_t)place * (size_t)(k->size * k->size); }
 
@@ -98,7 +133,7 @@ static bool seek(BlockCondenser *k, const BlockChain *a, Walk *w)
     for (; w->at != k->middle && k->place[w->at] >= 0; w->at += w->step) {
         int next = w->at + w->step, behind = w->step > 0 ? w->at : next;
         if (k->place[next] >= 0)
-            memcpy(coupling(k, k->place[behind]), a->lower + (size_t)behind * block, block * sizeof(double));
+            pack_block(a->lower + (size_t)behind * block, &k->shape[behind + 1], &k->shape[behind], k->size, coupling(k, k->place[behind]));
         w->origin = w->at;
         w->runs = false;
     }
@@ -171,6 +206,9 @@ static void shape(BlockShape *s, unsigned coupled)
     for (int r = 0; r < BLOCK_LARGEST; r++)
         if (s->is_scattered ? coupled >> r & 1 : r < 6 || (r >= first && r < end))
             s->place[s->count++] = (unsigned char)r;
+    for (int r = 6, at = s->count; r < BLOCK_LARGEST && !s->is_scattered; r++)
+        if (r < first || r >= end)
+            s->place[at++] = (unsigned char)r;
 }
 
 INLINE void find_shapes(BlockCondenser *k, const BlockChain *a, const int size)
@@ -207,8 +245,10 @@ const BlockChain *block_condense(BlockCondenser *k, const BlockChain *chain, con
         if (!k->keep[i])
             continue;
         size_t p = (size_t)k->small.count++;
-        memcpy(k->small.diag + p * block, chain->diag + (size_t)i * block, block * sizeof(double));
-        memcpy(k->side + n * p, b + n * (size_t)i, n * sizeof(double));
+        const BlockShape *s = &k->shape[i];
+        pack_block(chain->diag + (size_t)i * block, s, s, k->size, k->small.diag + p * block);
+        pack_side(b + n * (size_t)i, s, k->size, k->side + n * p);
+        k->live[p] = (unsigned char)(k->size == 6 || s->is_scattered ? k->size : s->count);
         k->keep[i] = false;
     }
     eliminate_on[block_size_index(k->size)][simd_level()](k, chain, b);
@@ -226,7 +266,7 @@ void block_condenser_turn_to(BlockCondenser *k, const double *b)
     const size_t n = (size_t)k->size;
     for (int i = 0; i < k->count; i++)
         if (k->place[i] >= 0)
-            memcpy(k->side + n * (size_t)k->place[i], b + n * (size_t)i, n * sizeof *b);
+            pack_side(b + n * (size_t)i, &k->shape[i], k->size, k->side + n * (size_t)k->place[i]);
     forward_on[block_size_index(k->size)][simd_level()](k, b);
 }
 
@@ -235,6 +275,6 @@ void block_condenser_expand(const BlockCondenser *k, const double *kept, double 
     const size_t n = (size_t)k->size;
     for (int i = 0; i < k->count; i++)
         if (k->place[i] >= 0)
-            memcpy(x + n * (size_t)i, kept + n * (size_t)k->place[i], n * sizeof *x);
+            unpack_side(kept + n * (size_t)k->place[i], &k->shape[i], k->size, x + n * (size_t)i);
     expand_on[block_size_index(k->size)][simd_level()](k, x);
 }

@@ -20,6 +20,8 @@ const BlockChain *block_condense(BlockCondenser *condenser, const BlockChain *ch
 double *block_condenser_side(BlockCondenser *condenser);
 // Another right-hand side of the chain that was condensed last: the small chain's becomes that of b (M, n), and what is expanded next belongs to it.
 void block_condenser_turn_to(BlockCondenser *condenser, const double *b);
+// How many of a node's unknowns are coupled to anything, by nodes of the small chain: they come first there, unless they lie scattered.
+const unsigned char *block_condenser_live(const BlockCondenser *condenser);
 // The place of a kept node in the small chain.
 int block_condenser_place(const BlockCondenser *condenser, int node);
 // x (M, n) of all nodes from that of the kept ones.

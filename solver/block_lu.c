@@ -24,6 +24,7 @@ static size_t node_doubles(int size) { return (size_t)(4 * BLOCK_PANEL(size) + 2
 
 struct BlockLu {
     int count, size;
+    unsigned char *live;         // (M) unknowns of each node that come before its unit rows
     double *node;
     double *rest, *change;       // (M, n) of the refinement
 };
@@ -37,8 +38,9 @@ BlockLu *block_lu_create(int count, int size)
     lu->count = count;
     lu->size = size;
     lu->node = aligned_alloc(64, bytes);
+    lu->live = calloc(m, 1);
     lu->rest = calloc(2 * m * (size_t)size, sizeof *lu->rest);
-    if (!lu->node || !lu->rest) {
+    if (!lu->node || !lu->rest || !lu->live) {
         block_lu_destroy(lu);
         return NULL;
     }
@@ -52,6 +54,7 @@ void block_lu_destroy(BlockLu *lu)
     if (!lu)
         return;
     free(lu->node);
+    free(lu->live);
     free(lu->rest);
     free(lu);
 }
@@ -104,9 +107,13 @@ static void refine(BlockLu *lu, const double *diag, const double *lower, const d
 }
 
 bool block_lu_factor_solve(BlockLu *lu, int count, const double *diag, const double *lower, const double *upper, const double *b, double *x,
-                           bool *exact)
+                           const unsigned char *live, bool *exact)
 {
     lu->count = count;
+    if (live)
+        memcpy(lu->live, live, (size_t)count);
+    else
+        memset(lu->live, lu->size, (size_t)count);
     if (!eliminate_on[block_size_index(lu->size)][simd_level()](lu, diag, lower, upper, b))
         return false;
     back_on[block_size_index(lu->size)][simd_level()](lu, x);

@@ -368,7 +368,8 @@ static bool newton_step(ContactSolver *s, const BlockChain *chain, int count, bo
         assemble(s, chain, s->banded);
         s->symmetric = symmetric;
         if (symmetric ? !block_chain_factor_solve(&s->matrix, s->factor, s->rhs, s->delta)
-                      : !block_lu_factor_solve(s->lu, chain->count, s->matrix.diag, s->turned, s->matrix.lower, s->rhs, s->delta, &exact))
+                      : !block_lu_factor_solve(s->lu, chain->count, s->matrix.diag, s->turned, s->matrix.lower, s->rhs, s->delta,
+                                             chain == s->small ? block_condenser_live(s->condenser) : NULL, &exact))
             return false;
     }
     s->inexact |= !exact;

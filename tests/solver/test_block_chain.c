@@ -226,7 +226,7 @@ static void lu_solves_unsymmetric(void **state)
             if (round == 0) {
                 block_lu_transpose(m, N, a.diag, diag);
                 block_lu_transpose(m, N, a.lower, lower);
-                assert_true(block_lu_factor_solve(lu, m, diag, lower, upper, b, x, &exact));
+                assert_true(block_lu_factor_solve(lu, m, diag, lower, upper, b, x, NULL, &exact));
             }
             if (round == 1)
                 block_lu_solve(lu, b, x);
@@ -335,7 +335,7 @@ static void same_bits_everywhere(void **state)
             simd_force((SimdLevel)level);
             assert_true(block_chain_factor_solve(&a, f, b, y));
             block_factor_solve(f, b, y + n);
-            assert_true(block_lu_factor_solve(lu, a.count, a.diag, lower, a.lower, b, y + 2 * n, &exact));
+            assert_true(block_lu_factor_solve(lu, a.count, a.diag, lower, a.lower, b, y + 2 * n, NULL, &exact));
         }
         simd_force(level_given);
         assert_memory_equal(x, x + 3 * n, 3 * n * sizeof *x);
@@ -479,6 +479,10 @@ static void condensed_with_unknowns_left_out(void **state)
             assert_non_null(s);
             if (trial % 2)
                 block_condenser_turn_to(k, b);
+            for (int p = 0; p < s->count; p++)
+                for (int r = block_condenser_live(k)[p]; r < N; r++)
+                    for (int c = 0; c < N; c++)
+                        assert_true(s->diag[N * N * p + N * r + c] == (r == c) && (p == 0 || s->lower[N * N * (p - 1) + N * r + c] == 0));
             assert_true(block_chain_factor_solve(s, f, block_condenser_side(k), small));
             block_condenser_expand(k, small, y[level]);
             assert_memory_equal(y[0], y[level], sizeof y[0]);
@@ -490,6 +494,49 @@ static void condensed_with_unknowns_left_out(void **state)
     }
     block_condenser_destroy(k);
     block_factor_destroy(f);
+    block_chain_destroy(&a);
+}
+
+// Unit rows behind a node's live ones, which the factorisation is told of: same solution.
+static void unsymmetric_with_unknowns_left_out(void **state)
+{
+    (void)state;
+    enum { M = 23 };
+    BlockChain a;
+    assert_true(block_chain_create(&a, M, N));
+    BlockLu *lu = block_lu_create(M, N);
+    double *diag = calloc(block_doubles(M, N), sizeof *diag), *lower = calloc(block_doubles(M, N), sizeof *lower);
+    static double b[M * N], x[M * N], z[M * N], y[SIMD_COUNT][M * N];
+    for (int trial = 0; trial < 40; trial++) {
+        int m = 1 + trial % M;
+        unsigned char live[M];
+        random_chain(&a, 2);
+        for (int i = 0; i < M; i++) {
+            live[i] = (unsigned char)(trial % 2 ? 6 + 2 * (i * (N - 4) / 2 / M) : N - 2 * ((i + trial) % ((N - 4) / 2)));
+            for (int r = live[i]; r < N; r++)
+                leave_out(&a, i, r);
+        }
+        block_lu_transpose(M - 1, N, a.lower, lower);
+        memcpy(diag, a.diag, (size_t)(M * N * N) * sizeof *diag);
+        for (int i = 0; i < M; i++)
+            for (int c = 0; c < live[i]; c++)    // not symmetric, and still well conditioned
+                diag[N * N * i + N * c] += 0.1 * uniform();
+        for (int i = 0; i < M * N; i++)
+            b[i] = uniform();
+        assert_true(block_lu_factor_solve(lu, m, diag, lower, a.lower, b, x, NULL, &exact));
+        for (int level = 0; level < SIMD_COUNT; level++) {
+            simd_force((SimdLevel)level);
+            assert_true(block_lu_factor_solve(lu, m, diag, lower, a.lower, b, y[level], live, &exact));
+            assert_memory_equal(y[0], y[level], (size_t)(m * N) * sizeof y[0][0]);
+            block_lu_solve(lu, b, z);
+            for (int i = 0; i < m * N; i++)
+                assert_true(fabs(x[i] - y[level][i]) < 1e-12 * largest(x, (size_t)(m * N)) && fabs(x[i] - z[i]) < 1e-12 * largest(x, (size_t)(m * N)));
+        }
+        simd_force(level_given);
+    }
+    free(diag);
+    free(lower);
+    block_lu_destroy(lu);
     block_chain_destroy(&a);
 }
 
@@ -566,7 +613,7 @@ static void prints_timings(void **state)
             double t3 = now();
             block_factor_inverse_diagonal(f, s);
             double t4 = now();
-            assert_true(block_lu_factor_solve(lu, a.count, a.diag, lower, a.lower, b, x, &exact));
+            assert_true(block_lu_factor_solve(lu, a.count, a.diag, lower, a.lower, b, x, NULL, &exact));
             unsymmetric[i] = now() - t4;
             for (int j = 5; j < m; j += 10)
                 block_condenser_keep(condenser)[j] = true;
@@ -603,7 +650,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(solves_as_dense),       cmocka_unit_test(inverse_diagonal_as_dense), cmocka_unit_test(refuses_indefinite),
         cmocka_unit_test(lu_solves_unsymmetric), cmocka_unit_test(unit_rows_are_exact),   cmocka_unit_test(mirrored_signs_to_the_bit), cmocka_unit_test(same_bits_everywhere), 
-        cmocka_unit_test(condensed_solves_as_whole), cmocka_unit_test(condensed_with_unknowns_left_out), cmocka_unit_test(prints_timings),
+        cmocka_unit_test(condensed_solves_as_whole), cmocka_unit_test(condensed_with_unknowns_left_out), cmocka_unit_test(unsymmetric_with_unknowns_left_out), cmocka_unit_test(prints_timings),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
