@@ -21,17 +21,16 @@ static Vec3 moment_at(const Stepper *s, int k, double place, int *c)
     return place > end || place < 0 ? vec3(0, 0, 0) : s->inner_moment[*c * s->state.inner_count + k - 1];
 }
 
-static double pressure_at(const Stepper *s, int c, int k, double window, int at[2])
+// `turn`: of the line at node c, before x after.
+static double pressure_at(const Stepper *s, int c, int k, double window, Vec3 turn, int at[2])
 {
     double h = s->middle[c] - s->middle[c - 1], l = fmax(window, h), half = 0.5 * l;
     Vec3 right = vec3_sub(moment_at(s, k, s->middle[c] + half, &at[1]), moment_at(s, k, s->middle[c] - half, &at[0]));
     Vec3 left = vec3_sub(moment_at(s, k, s->middle[c - 1] + half, &at[1]), moment_at(s, k, s->middle[c - 1] - half, &at[0]));
     Vec3 jump = vec3_scale(vec3_sub(right, left), 1 / l);
-    const Vec3 *x = s->state.position;
-    Vec3 before = vec3_unit_or(vec3_sub(x[c], x[c - 1]), s->axis[0]), after = vec3_unit_or(vec3_sub(x[c + 1], x[c]), before);
     int inner = s->state.inner_count;
     double tension = 0.5 * (s->inner_tension[(c - 1) * inner + k - 1] + s->inner_tension[c * inner + k - 1]);
-    return vec3_norm(vec3_add_scaled(jump, -tension, vec3_cross(before, after)));
+    return vec3_norm(vec3_add_scaled(jump, -tension, turn));
 }
 
 // The tool that is next around tool k at node c and is an unknown there too; 0: none.
@@ -42,13 +41,12 @@ int tools_around(const Stepper *s, int c, int k)
     return k;
 }
 
-// Slip of tool k in a step as the last one.
-static void last_slip(const Stepper *s, int c, int k, double slip[2])
+// Slip of tool k in a step as the last one. t: the node's tangent.
+static void last_slip(const Stepper *s, int c, int k, Vec3 t, double slip[2])
 {
     const WireState *w = &s->state;
     const double *speed = w->slide_velocity + c * w->inner_count - 1, *spin = w->slide_spin + c * w->inner_count - 1;
     int out = tools_around(s, c, k);
-    Vec3 t = quat_rotate(w->orientation[c], vec3(1, 0, 0));
     slip[0] = s->dt * ((out > 0 ? speed[out] : vec3_dot(w->velocity[c], t)) - speed[k]);
     slip[1] = s->dt * (spin[k] - (out > 0 ? spin[out] : vec3_dot(w->spin[c], t)));
 }
@@ -65,22 +63,30 @@ void tools_slides(Stepper *s)
         at += length;
         most = fmax(most, s->bent[c]);
     }
-    for (int c = 1; c + 1 < nodes; c++)
+    double window[STEP_TOOLS_MAX];
+    for (int k = 1; k < s->tool_count; k++)
+        window[k] = most > 0 ? FOLLOWS * sqrt(s->tool[k].clearance / most) : 0;
+    const Vec3 *x = s->state.position;
+    Vec3 before, after = vec3_unit_or(vec3_sub(x[1], x[0]), s->axis[0]);
+    for (int c = 1; c + 1 < nodes; c++) {
+        before = after;
+        after = vec3_unit_or(vec3_sub(x[c + 1], x[c]), before);
+        Vec3 turn = vec3_cross(before, after), tangent = quat_rotate(s->state.orientation[c], vec3(1, 0, 0));
         for (int k = 1; k < s->tool_count; k++) {
             const Tool *t = &s->tool[k];
             if (!is_inside(s, c, k) || !(t->friction > 0))
                 continue;
-            double window = most > 0 ? FOLLOWS * sqrt(t->clearance / most) : 0;
-            const double *last = s->state.slide_force + 3 * (c * inner + k - 1), bound = t->friction * pressure_at(s, c, k, window, near);
+            const double *last = s->state.slide_force + 3 * (c * inner + k - 1), bound = t->friction * pressure_at(s, c, k, window[k], turn, near);
             // what slid goes on sliding: by the new bound
             bool slid = hypot(last[0], last[1]) > 0.999999 * last[2];
             double change = slid && last[2] > 0 ? bound / last[2] : 1;
             double slip[2], radius = t->wire.radius[0];
-            last_slip(s, c, k, slip);
+            last_slip(s, c, k, tangent, slip);
             double force[2] = {change * last[0], change * last[1]};
             s->set.slide[s->set.slide_count++] = (ContactSlide){.node = c, .unknown = unknown_of(k), .radius = radius, .bound = bound, .give = GIVE,
                                                                  .slip = {slip[0], radius * slip[1]}, .held = {force[0], force[1]}, .force = {force[0], force[1]}};
         }
+    }
 }
 
 // S of tool k is its slip plus the S of the one around it: the rows and columns of tool k are added to that one's, from the innermost outwards.
