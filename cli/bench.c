@@ -10,13 +10,14 @@
 #include <time.h>
 
 static const char help[] =
-    "Usage: seldinger bench collision|step|fit|track|wall|peer|drawing [options]\n\n"
+    "Usage: seldinger bench collision|step|fit|track|wall|torture|peer|drawing [options]\n\n"
     "Timing tables, each row measured in the same run.\n\n"
     "  collision  local models against meshes searched by Embree, the exact wall and a sampled distance: cost, error, friction that is not there\n"
     "  step       a simulation step: spiral at 100 GPa, phantom, aneurism; growth with the elements; SIMD levels; budgets; --tools: coaxial tools\n"
     "  fit        local models: the paper's tables 3, 4 and 5 beside its figures\n"
     "  track      trackers on synthetic angiograms with truth: the labels of the paper's Table 2, errors, times\n"
     "  wall       one table of what the wall of fitted trees is worth: agreement, accuracy, ostia, reach, tools in it\n"
+    "  torture    random hands, tools and vessels, judged by the true wall\n"
     "  peer       the scenes on which SOFA with BeamAdapter was measured, beside its figures\n"
     "  drawing    the trainer's pictures: CPU time, and the 1 kHz thread with and without them\n\n"
     "`seldinger bench NAME --help` explains the options.\n"
@@ -27,7 +28,7 @@ int verb_bench(int argc, char **argv)
     static const struct {
         const char *name;
         VerbFunction *call;
-    } table[] = {{"step", bench_step}, {"peer", bench_peer}, {"collision", bench_collision}, {"fit", bench_fit}, {"track", bench_track}, {"wall", bench_wall},
+    } table[] = {{"step", bench_step}, {"peer", bench_peer}, {"collision", bench_collision}, {"fit", bench_fit}, {"track", bench_track}, {"wall", bench_wall}, {"torture", bench_torture},
 #ifdef SELDINGER_RENDER
                  {"drawing", bench_drawing},
 #endif
@@ -41,7 +42,7 @@ int verb_bench(int argc, char **argv)
         if (!strcmp(name, table[i].name))
             return table[i].call(argc - 1, argv + 1);
     }
-    fprintf(stderr, "seldinger bench: %s%s%s; valid: collision, step, fit, track, wall, peer, drawing\n", *name ? "no table '" : "lacks the name of a table", name, *name ? "'" : "");
+    fprintf(stderr, "seldinger bench: %s%s%s; valid: collision, step, fit, track, wall, torture, peer, drawing\n", *name ? "no table '" : "lacks the name of a table", name, *name ? "'" : "");
     return EXIT_BAD_INPUT;
 }
 

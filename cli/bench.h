@@ -7,7 +7,7 @@
 
 #include <cJSON.h>
 
-VerbFunction bench_step, bench_peer, bench_track, bench_fit, bench_collision, bench_wall, bench_drawing;
+VerbFunction bench_step, bench_peer, bench_track, bench_fit, bench_collision, bench_wall, bench_torture, bench_drawing;
 
 typedef struct Spread {
     double median, p99, p999, max;
