@@ -38,6 +38,7 @@ enum { ITERATIONS_ENOUGH = 60 };
 static const double SQUEEZE_MAX = 0.03, JAMMED = 0.002;
 static const double TAKE_BACK = 0.002;           // of an element's length past the mouth: a free node that would end nearer to it is held
 static const double BORDER_FORCE = 1e-3;         // of what straightening takes at the mouth: good enough
+static const double MOUTH_LENGTH = 0.1;          // share by which the length outside may end otherwise than it was taken, where the hand slips
 enum { DRIVEN_TRIES = 6 };
 static const double LOST = 0.1;                  // residual of a contact solve that says nothing
 static const double FIRMEST = 1e5;               // share of its stiffness by which an unknown is held to the iterate at most, where nothing less will do
@@ -654,7 +655,13 @@ static bool misjudges_border(Stepper *s)
         return false;
     const BeamRest *rest = &s->beam.rest;
     double start = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]), width = sheath_border_share * rest->length[i];
-    double taken = start + s->mouth_ahead, ends = start + s->u[row_of(s, i)];
+    double taken = start + s->mouth_ahead, ends = start + s->u[row_of(s, i)], least = 0.01 * rest->length[i];
+    // the tool has not gone as the hand was told to: the element's stiffness was that of another length
+    double length = fmax(rest->length[i] + taken, least), real = fmax(rest->length[i] + ends, least);
+    if (s->hand[0].slips[0] && fabs(length - real) > MOUTH_LENGTH * fmin(length, real)) {
+        s->mouth_ahead = ends - start;
+        return true;
+    }
     double there = sheath_straightening(rest, i, ends), linear = sheath_straightening(rest, i, taken) - s->mouth_element.border * (ends - taken);
     if (fabs(there - linear) < BORDER_FORCE * fmax(there, sheath_straightening(rest, i, taken)) + 1e-9)
         return false;

@@ -216,6 +216,15 @@ static void clear_held(Stepper *s)
         memset(s->chain.lower, 0, block_of(s, held - 1) * sizeof(double));
 }
 
+// Where the whole tool is held, what is past the mouth of its tip is not straightened: a constant force over this step's way.
+static void tip_at_mouth(Stepper *s)
+{
+    int last = s->first_free - 1;
+    double before = vec3_dot(vec3_sub(s->start_position[last], s->mouth), s->axis[0]), after = before + s->mouth_ahead, way = after - before;
+    double share = fabs(way) > 1e-9 ? (fmax(after, 0) - fmax(before, 0)) / way : before > 1e-6;
+    s->b[row_of(s, last)] += share * stepper_tip_straightening(s);
+}
+
 void stepper_assemble(Stepper *s)
 {
     double h = s->dt, scale = 1 + s->damping_stiffness / h, inertia = 1 / (h * h) + s->damping_mass / h;
@@ -230,6 +239,8 @@ void stepper_assemble(Stepper *s)
         }
         sheath_nodes(s, scale, inertia);
     }
+    if (s->first_free == s->chain.count)
+        tip_at_mouth(s);
     contact_add_curvature(&s->set, &s->chain);
     if (s->is_iterate) {
         block_chain_multiply(&s->chain, s->linearised, s->product);

@@ -382,6 +382,12 @@ static double straightening(const Tool *t, double s)
     return s >= t->wire.total_length ? 0 : 0.5 * p->bending * (p->curve[0] * p->curve[0] + p->curve[1] * p->curve[1]);
 }
 
+double tools_tip_straightening(const Stepper *s)
+{
+    const Tool *t = &s->tool[s->carrier[s->state.node_count - 1]];
+    return straightening(t, t->wire.s[t->wire.node_count - 2]);
+}
+
 // [mJ] of the length from a to b.
 static double straightened(const Tool *t, double a, double b)
 {
@@ -399,7 +405,7 @@ static double straightened(const Tool *t, double a, double b)
 // Between two nodes in the sheath every tool is a spring along and one about the line, between what w = side x_b - x_a is at its two nodes: x_a the node's place
 // or turn, x_b the tool's S or angle there.
 typedef struct Spring {
-    int a, b;                // unknowns of a node; b < 0: none
+    int a, b[2];             // unknowns of the two nodes; b < 0: none
     double side, stiffness, force;   // 1 or -1, [N/mm] or [N mm], [N] or [N mm]
 } Spring;
 
@@ -408,7 +414,9 @@ static int sheath_springs(const Stepper *s, int c, double scale, Spring *spring,
 {
     int tool[STEP_TOOLS_MAX], inner = s->state.inner_count, count = 0;
     CoaxialInput in = input_at(s, c, tool);
-    double length = stepper_sheath_coordinate(s, c + 1) - stepper_sheath_coordinate(s, c), psi = tools_twist(s, c);
+    // input_at() has turned node 1 at a tip
+    double length = stepper_sheath_coordinate(s, c + 1) - stepper_sheath_coordinate(s, c);
+    double psi = tools_twist(s, c) - (is_at_tip(s, c) ? angle_at(s, c, s->carrier[c + 1]) : 0);
     *energy = 0;
     for (int k = 0; spring && k < inner; k++)
         s->inner_moment[c * inner + k] = vec3(0, 0, 0), s->inner_tension[c * inner + k] = 0, s->bent[c] = 0;
@@ -425,28 +433,31 @@ static int sheath_springs(const Stepper *s, int c, double scale, Spring *spring,
             continue;
         for (int k = 0; k < tool[i]; k++)
             s->inner_tension[c * inner + k] += own.axial * strain;
-        spring[count++] = (Spring){0, p->is_fixed ? -1 : at, 1, scale * own.axial, own.axial * strain};
-        spring[count++] = (Spring){3, p->is_fixed ? -1 : at + 1, -1, scale * own.torsion, own.torsion * turn};
+        int b = p->is_fixed ? -1 : at, beyond = i == 0 ? -1 : at;     // beyond a tip the tool that goes on is the node itself
+        spring[count++] = (Spring){0, {b, beyond}, 1, scale * own.axial, own.axial * strain};
+        spring[count++] = (Spring){3, {b < 0 ? -1 : b + 1, beyond < 0 ? -1 : beyond + 1}, -1, scale * own.torsion, own.torsion * turn};
     }
     return count;
 }
 
-// stiffness times the product of w's slopes
-static void add_products(double *block, int n, const Spring *p, double stiffness)
+// stiffness times the product of w's slopes at nodes `row` and `column`, 0 or 1
+static void add_products(double *block, int n, const Spring *p, int row, int column, double stiffness)
 {
+    int r = p->b[row], c = p->b[column];
     block[(n + 1) * p->a] += stiffness;
-    if (p->b < 0)
-        return;
-    block[(n + 1) * p->b] += stiffness;
-    block[n * p->a + p->b] -= p->side * stiffness;
-    block[n * p->b + p->a] -= p->side * stiffness;
+    if (r >= 0)
+        block[n * r + p->a] -= p->side * stiffness;
+    if (c >= 0)
+        block[n * p->a + c] -= p->side * stiffness;
+    if (r >= 0 && c >= 0)
+        block[n * r + c] += stiffness;
 }
 
-static void add_slopes(double *x, const Spring *p, double by)
+static void add_slopes(double *x, const Spring *p, int node, double by)
 {
     x[p->a] -= by;
-    if (p->b >= 0)
-        x[p->b] += p->side * by;
+    if (p->b[node] >= 0)
+        x[p->b[node]] += p->side * by;
 }
 
 // As element().
@@ -459,18 +470,18 @@ static void sheath_element_of_tools(const Stepper *s, int c, double scale, bool 
     if (product)
         memset(product, 0, 2 * (size_t)n * sizeof *product);
     for (const Spring *p = spring; p < spring + count; p++) {
-        add_slopes(gradient, p, p->force);
-        add_slopes(gradient + n, p, -p->force);
+        add_slopes(gradient, p, 0, p->force);
+        add_slopes(gradient + n, p, 1, -p->force);
         if (product) {
-            double more = u[n + p->a] - u[p->a] + (p->b >= 0 ? p->side * (u[p->b] - u[n + p->b]) : 0);
-            add_slopes(product, p, p->stiffness * more);
-            add_slopes(product + n, p, -p->stiffness * more);
+            double more = u[n + p->a] - u[p->a] + (p->b[0] >= 0 ? p->side * u[p->b[0]] : 0) - (p->b[1] >= 0 ? p->side * u[n + p->b[1]] : 0);
+            add_slopes(product, p, 0, p->stiffness * more);
+            add_slopes(product + n, p, 1, -p->stiffness * more);
         }
         if (!adds)
             continue;
-        add_products(s->chain.diag + block_of(s, c), n, p, p->stiffness);
-        add_products(s->chain.diag + block_of(s, c + 1), n, p, p->stiffness);
-        add_products(s->chain.lower + block_of(s, c), n, p, -p->stiffness);
+        add_products(s->chain.diag + block_of(s, c), n, p, 0, 0, p->stiffness);
+        add_products(s->chain.diag + block_of(s, c + 1), n, p, 1, 1, p->stiffness);
+        add_products(s->chain.lower + block_of(s, c), n, p, 1, 0, -p->stiffness);
     }
 }
 

@@ -31,13 +31,19 @@ static double element_energy(const Stepper *s, int i, int held)
     return out.energy;
 }
 
+double stepper_tip_straightening(const Stepper *s)
+{
+    int last = s->state.node_count - 1;
+    return s->tool_count > 1 ? tools_tip_straightening(s) : sheath_straightening(&s->beam.rest, last - 1, stepper_sheath_coordinate(s, last - 1));
+}
+
 double stepper_elastic_energy(const Stepper *s)
 {
-    if (s->tool_count > 1)
-        return tools_elastic_energy(s);
-    double energy = 0;
-    for (int i = 0; i < s->wire.element_count; i++)
+    double energy = s->tool_count > 1 ? tools_elastic_energy(s) : 0;
+    for (int i = 0; s->tool_count == 1 && i < s->wire.element_count; i++)
         energy += element_energy(s, i, s->first_free);
+    if (s->first_free == s->state.node_count)
+        energy -= stepper_tip_straightening(s) * fmax(stepper_sheath_coordinate(s, s->first_free - 1), 0);
     return energy;
 }
 

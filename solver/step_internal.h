@@ -198,6 +198,8 @@ void stepper_wall_work(const Stepper *s, double *wall, double *friction);
 double stepper_sheath_coordinate(const Stepper *s, int node);
 // [mm] displacement of node 0 in this step that the command asks for.
 double stepper_wanted(const Stepper *s);
+// [N] what it takes to straighten the tip, where the whole tool is held: its length past the mouth is bent as it likes.
+double stepper_tip_straightening(const Stepper *s);
 // [N] reaction on node 0 along (index 0 to 2) and about (3 to 5) the axes of its unknowns.
 double stepper_reaction(const Stepper *s, int dof);
 // The commands of the step are taken.

@@ -61,5 +61,6 @@ void tools_leave_out(Stepper *s);
 // The linear system of coaxial tools, all but what contacts, loads and constraints add.
 void tools_assemble(Stepper *s, double scale, double inertia);
 double tools_elastic_energy(const Stepper *s);
+double tools_tip_straightening(const Stepper *s);
 double tools_kinetic_energy(const Stepper *s);
 #endif
