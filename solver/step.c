@@ -400,11 +400,10 @@ static Vec3 mouth_curvature(const Stepper *s, int node)
 
 static void let_go(Stepper *s, int node)
 {
-    if (node + 1 >= s->state.node_count)
-        return;
     WireState *w = &s->state;
+    bool is_tip = node + 1 >= s->state.node_count;
     double along = stepper_sheath_coordinate(s, node);
-    if (s->tool_count > 1) {
+    if (s->tool_count > 1 && !is_tip) {
         if (along > SPRUNG * s->wire.length[node - 1])
             return;
         ToolNode further = tools_further(s, node, along);
@@ -412,7 +411,7 @@ static void let_go(Stepper *s, int node)
         w->orientation[node] = further.orientation;
         return;
     }
-    Vec3 curvature = mouth_curvature(s, node);
+    Vec3 curvature = is_tip ? stepper_tip_curvature(s) : mouth_curvature(s, node);
     double bend = vec3_norm(curvature) * along;
     if (bend > LET_GO_TURN)          // sprang out of the sheath: no curve is known that far
         curvature = vec3_scale(curvature, LET_GO_TURN / bend);

@@ -388,6 +388,14 @@ double tools_tip_straightening(const Stepper *s)
     return straightening(t, t->wire.s[t->wire.node_count - 2]);
 }
 
+Vec3 tools_tip_curvature(const Stepper *s)
+{
+    int last = s->state.node_count - 1;
+    const Tool *t = &s->tool[s->carrier[last]];
+    const CoaxialSection *p = coaxial_section_at(&t->coaxial, t->wire.s[t->wire.node_count - 2]);
+    return quat_rotate(s->state.orientation[last], vec3(0, -p->curve[1], p->curve[0]));
+}
+
 // [mJ] of the length from a to b.
 static double straightened(const Tool *t, double a, double b)
 {

@@ -37,6 +37,12 @@ double stepper_tip_straightening(const Stepper *s)
     return s->tool_count > 1 ? tools_tip_straightening(s) : sheath_straightening(&s->beam.rest, last - 1, stepper_sheath_coordinate(s, last - 1));
 }
 
+Vec3 stepper_tip_curvature(const Stepper *s)
+{
+    int last = s->state.node_count - 1;
+    return s->tool_count > 1 ? tools_tip_curvature(s) : sheath_rest_curvature(&s->beam.rest, last - 1, s->state.orientation[last]);
+}
+
 double stepper_elastic_energy(const Stepper *s)
 {
     double energy = s->tool_count > 1 ? tools_elastic_energy(s) : 0;

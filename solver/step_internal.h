@@ -200,6 +200,7 @@ double stepper_sheath_coordinate(const Stepper *s, int node);
 double stepper_wanted(const Stepper *s);
 // [N] what it takes to straighten the tip, where the whole tool is held: its length past the mouth is bent as it likes.
 double stepper_tip_straightening(const Stepper *s);
+Vec3 stepper_tip_curvature(const Stepper *s);    // [1/mm] at rest, in space
 // [N] reaction on node 0 along (index 0 to 2) and about (3 to 5) the axes of its unknowns.
 double stepper_reaction(const Stepper *s, int dof);
 // The commands of the step are taken.

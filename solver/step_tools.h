@@ -62,5 +62,6 @@ void tools_leave_out(Stepper *s);
 void tools_assemble(Stepper *s, double scale, double inertia);
 double tools_elastic_energy(const Stepper *s);
 double tools_tip_straightening(const Stepper *s);
+Vec3 tools_tip_curvature(const Stepper *s);
 double tools_kinetic_energy(const Stepper *s);
 #endif
