@@ -16,6 +16,7 @@
 enum { MODELS_MOST = 8, TRUTH_EVERY = 5, FAULT_TEXT = 240 };
 static const double outside_mm = 0.2;     // deeper in the true wall than this: failed
 static const double unreported_mm = 0.05; // or by this much deeper than the program says
+static const double kink_rad = 1;         // an element that turns by more is no beam any longer: such runs are counted, and their energy is not judged
 static const double stuck_mm = 10;        // of what the hand fed did not go in, and went in where steps and elements were half as long
 
 static const char help[] =
@@ -23,7 +24,7 @@ static const char help[] =
     "Random scripts (push and pull to 100 mm/s, twist to 1000 degrees a second), tools (0.2 to 2 mm, 5 to 200 GPa, J, Simmons, pigtail, two to four in each\n"
     "other), vessels (exact tubes of random bends, synthetic shapes, models of real vessels) and steps of 0.5 to 4 ms. Each run is judged by the true wall, not\n"
     "by what the contact saw: a node more than 0.2 mm outside, or outside without being reported; a number that is none; single steps that gain more than 1e-3\n"
-    "of the work; a tool that is stuck where a finer run is not. The scene of each run that fails is kept and can be replayed.\n\n"
+    "of the work (where no element is bent by more than a radian: a kink); a tool that is stuck where a finer run is not. The scene of each run that fails is kept and can be replayed.\n\n"
     "  --runs N         default 200\n"
     "  --first N        the first seed; default 1\n"
     "  --steps N        of each run; default 2000\n"
@@ -47,7 +48,7 @@ typedef struct Outcome {
     double deepest, unreported;      // [mm] in the true wall; by how much more than reported
     double deepest_s, gained, work;  // when; [mJ]
     double not_taken;                // [mm] that the hands fed and no tool took
-    bool was_compared;
+    bool was_compared, kinks;
     char reason[FAULT_TEXT];         // FAILED_REFUSED
 } Outcome;
 
@@ -100,6 +101,18 @@ static double true_depth(const Witness *w)
     return deepest;
 }
 
+static bool is_kinked(const WireState *state)
+{
+    for (int i = 0; i + 1 < state->node_count; i++) {
+        const Quat *p = &state->orientation[i], *q = p + 1;
+        // about the axes across; the twist does not count
+        Quat turn = quat_mul(quat_conjugate(*p), *q);
+        if (2 * asin(fmin(1, hypot(turn.y, turn.z))) > kink_rad)
+            return true;
+    }
+    return false;
+}
+
 static bool is_finite(const WireState *state)
 {
     double sum = 0;
@@ -124,6 +137,7 @@ static bool watch_step(void *context, Simulator *simulator, const ToolCommands *
         w->outcome->failed |= FAILED_NUMBER;
         return false;
     }
+    w->outcome->kinks |= is_kinked(stepper_state(w->stepper));
     w->outside_before = true_depth(w);
     if (w->outside_before > w->outcome->deepest) {
         w->outcome->deepest = w->outside_before;
@@ -157,7 +171,7 @@ static void drive(const Scene *scene, const Vessel *contact, const Vessel *truth
         for (int k = 0; k < tools; k++)
             outcome->not_taken = fmax(outcome->not_taken, fabs(inserted[k] + witness.fed[k] - stepper_tool_inserted(witness.stepper, k)));
         outcome->failed |= (report.end == DRIVE_DIVERGED ? FAILED_NUMBER : 0) | (outcome->deepest > outside_mm ? FAILED_DEEP : 0) |
-                           (outcome->unreported > unreported_mm ? FAILED_UNREPORTED : 0) | (simulator_gains_energy(simulator) ? FAILED_ENERGY : 0);
+                           (outcome->unreported > unreported_mm ? FAILED_UNREPORTED : 0) | (simulator_gains_energy(simulator) && !outcome->kinks ? FAILED_ENERGY : 0);
     }
     free(witness.node);
     simulator_destroy(simulator);
@@ -240,7 +254,7 @@ static void run_seed(void *context, long index)
 // --- the table ---
 
 typedef struct Row {
-    int64_t runs, steps, cut, not_converged, compared;
+    int64_t runs, steps, cut, not_converged, compared, kinked;
     int64_t failed[FAILURES];
     double deepest, unreported, gained_share;
 } Row;
@@ -252,17 +266,18 @@ static void add_run(Row *row, const Outcome *o)
     row->cut += o->cut;
     row->not_converged += o->not_converged;
     row->compared += o->was_compared;
+    row->kinked += o->kinks;
     row->deepest = fmax(row->deepest, o->deepest);
     row->unreported = fmax(row->unreported, o->unreported);
-    row->gained_share = fmax(row->gained_share, o->work > 0 ? o->gained / o->work : 0);
+    row->gained_share = fmax(row->gained_share, o->work > 0 && !o->kinks ? o->gained / o->work : 0);
     for (int i = 0; i < FAILURES; i++)
         row->failed[i] += o->failed >> i & 1;
 }
 
 static void print_row(FILE *out, const char *vessel, const char *tool, const Row *row)
 {
-    fprintf(out, "%-7s %-18s %6lld %10lld %9.3f %9.3f %9.1e %8lld %8lld |%5lld %5lld %5lld %5lld %5lld/%-4lld %5lld\n", vessel, tool, (long long)row->runs, (long long)row->steps,
-            row->deepest, row->unreported, row->gained_share, (long long)row->cut, (long long)row->not_converged, (long long)row->failed[0], (long long)row->failed[1],
+    fprintf(out, "%-7s %-18s %6lld %10lld %9.3f %9.3f %9.1e %8lld %8lld %6lld |%5lld %5lld %5lld %5lld %5lld/%-4lld %5lld\n", vessel, tool, (long long)row->runs, (long long)row->steps,
+            row->deepest, row->unreported, row->gained_share, (long long)row->cut, (long long)row->not_converged, (long long)row->kinked, (long long)row->failed[0], (long long)row->failed[1],
             (long long)row->failed[2], (long long)row->failed[3], (long long)row->failed[4], (long long)row->compared, (long long)row->failed[5]);
 }
 
@@ -273,7 +288,7 @@ static cJSON *row_json(const char *vessel, const char *tool, const Row *row)
         const char *name;
         double value;
     } figure[] = {{"runs", (double)row->runs}, {"steps", (double)row->steps}, {"deepest_mm", row->deepest}, {"unreported_mm", row->unreported}, {"gained_share", row->gained_share},
-                  {"cut_steps", (double)row->cut}, {"not_converged_steps", (double)row->not_converged}, {"compared", (double)row->compared}};
+                  {"cut_steps", (double)row->cut}, {"not_converged_steps", (double)row->not_converged}, {"compared", (double)row->compared}, {"kinked", (double)row->kinked}};
     cJSON_AddStringToObject(at, "vessel", vessel);
     cJSON_AddStringToObject(at, "tool", tool);
     for (size_t i = 0; i < sizeof figure / sizeof figure[0]; i++)
@@ -293,8 +308,8 @@ static bool print_table(const Torture *torture, cJSON *list)
         add_run(&row[torture->outcome[i].vessel][torture->outcome[i].tool], &torture->outcome[i]);
         add_run(&all, &torture->outcome[i]);
     }
-    fprintf(out, "vessel  tool                 runs      steps   deepest  not said    gained     cut    not conv. | deep silent  NaN energy stuck/of  refused\n"
-                 "                                                  [mm]      [mm]   of work   [steps]  [steps] | runs that failed\n");
+    fprintf(out, "vessel  tool                 runs      steps   deepest  not said    gained     cut    not conv. kinked | deep silent  NaN energy stuck/of  refused\n"
+                 "                                                  [mm]      [mm]   of work   [steps]  [steps]   runs | runs that failed\n");
     for (int v = 0; v < TORTURE_VESSELS; v++)
         for (int t = 0; t < TORTURE_TOOLS; t++)
             if (row[v][t].runs > 0) {
