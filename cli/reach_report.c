@@ -2,6 +2,7 @@
 #include "cli/reach_report.h"
 
 #include "geom/ghost_lumens.h"
+#include "geom/heap.h"
 #include "geom/vessel_branches.h"
 
 enum { STOPS_SHOWN = 12, GHOSTS_SHOWN = 6 };
@@ -81,8 +82,10 @@ static void add_junctions(cJSON *object, const Reach *reach)
 static void add_branches(cJSON *object, const VesselTree *tree, const Reach *reach)
 {
     VesselBranches *branches = vessel_branches_create(tree);
+    if (!branches)
+        heap_is_empty((size_t)tree->node_count * sizeof *branches->node, __FILE__);
     cJSON *list = cJSON_AddArrayToObject(object, "branches");
-    for (int b = 0; branches && b < branches->count; b++) {
+    for (int b = 0; b < branches->count; b++) {
         const VesselBranch *branch = &branches->branch[b];
         double reached[REACH_MODES] = {0}, length = 0;
         for (int k = 0; k < branch->count; k++) {
