@@ -44,20 +44,16 @@ typedef struct CheckOptions {
 
 // --- which scenes ---
 
-static bool list_add(SceneList *list, const char *path)
+static void list_add(SceneList *list, const char *path)
 {
     for (int i = 0; i < list->count; i++)
         if (!strcmp(list->path[i], path))
-            return true;
+            return;
     if (list->count == list->capacity) {
-        int wanted = list->capacity * 2 + 16;
-        char **grown = realloc(list->path, (size_t)wanted * sizeof *grown);
-        if (!grown)
-            return false;
-        list->path = grown;
-        list->capacity = wanted;
+        list->capacity = list->capacity * 2 + 16;
+        list->path = HEAP_GROWN(list->path, (size_t)list->capacity, sizeof *list->path);
     }
-    return (list->path[list->count] = strdup(path)) && ++list->count;
+    list->path[list->count++] = HEAP_TEXT(path);
 }
 
 static bool ends_with(const char *text, const char *end)
@@ -66,10 +62,18 @@ static bool ends_with(const char *text, const char *end)
     return n > m && !strcmp(text + n - m, end);
 }
 
-static bool has_golden(const char *scene)
+static char *golden_of(const char *scene)
 {
     char *golden = golden_path_of(scene);
-    bool there = golden && access(golden, F_OK) == 0;
+    if (!golden)
+        heap_is_empty(strlen(scene), __FILE__);
+    return golden;
+}
+
+static bool has_golden(const char *scene)
+{
+    char *golden = golden_of(scene);
+    bool there = access(golden, F_OK) == 0;
     free(golden);
     return there;
 }
@@ -183,10 +187,10 @@ static void print_row(const char *path, const Scene *scene, const PathDifference
 static int check_scene(const char *path, const CheckOptions *options, Faults *faults)
 {
     int before = faults->count, code = EXIT_BAD_INPUT;
-    char *golden_path = golden_path_of(path);
+    char *golden_path = golden_of(path);
     Scene *scene = scene_load(path, faults);
     ToolPath *golden = NULL, *run = NULL;
-    bool diverged = false, there = golden_path && access(golden_path, F_OK) == 0;
+    bool diverged = false, there = access(golden_path, F_OK) == 0;
     const char *needed = scene ? scene_needed_file(scene) : NULL;
     if (needed && access(needed, F_OK) != 0) {
         printf("%-44s skipped   %s is not there\n", path, needed);
