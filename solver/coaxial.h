@@ -51,7 +51,8 @@ typedef struct CoaxialSpan { // one tool in one element
                              // mouth or a tip and may be short: the full element's length
     bool spreads_twist;      // the twist too: at a mouth, where the tools' angles at node 1 are those of a node behind it
     double soft[2];          // [mm] default 0: over so much to either side of node 1, of node 2, a section's border of this tool goes from this element to the one
-                             // there; its tip does not. Where the carrier's section changes or ends the energy would have a kink, and a step a force that depends on the side
+                             // there; its tip does not. Where the carrier's section changes or ends the energy would have a kink, and a step a force that depends on the side.
+                             // 0 for the carrier
     bool has_tip;            // it ends inside, at its last section's end: it bends with the others up to there, as long as the carrier and not turned
                              // along it, and has no tension and no torque. S1 and phi1 are all that it has. Not for the carrier
     bool is_fixed;           // its values are no unknowns: no derivatives with them, which saves time

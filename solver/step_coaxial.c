@@ -22,17 +22,31 @@ static bool is_border(const Stepper *s, int c)
     return c > 0 && !is_at_tip(s, c - 1) && s->wire.section[c - 1] != s->wire.section[c];
 }
 
+// [mm] to either side of node c over which an inner tool's borders pass the carrier's, the same in both elements. The carrier's own border stays where it is:
+// with both of them spread the two would pass each other in each element, and the kink would be there.
+static double soft_at(const Stepper *s, int c)
+{
+    double before = c > 0 ? s->wire.length[c - 1] : HUGE_VAL, after = c + 1 < s->state.node_count ? s->wire.length[c] : HUGE_VAL;
+    if (!is_border(s, c))
+        return 0;
+    double soft = SOFT * fmin(before, after);
+    // in the sheath nothing passes: from where the node leaves its line on
+    return c > s->first_free ? soft : fmax(0, fmin(soft, stepper_sheath_coordinate(s, c) - sheath_border_share * before));
+}
+
 // The tools in element c, carrier first; returns their number. tool: which they are.
 static int spans(const Stepper *s, int c, CoaxialSpan *span, int *tool)
 {
     int count = 0, first = s->carrier[c + 1];
-    double soft[2] = {is_border(s, c) ? SOFT * s->wire.length[c] : 0, is_border(s, c + 1) ? SOFT * s->wire.length[c] : 0};
+    double soft[2] = {soft_at(s, c), soft_at(s, c + 1)};
     for (int k = first; k < s->tool_count; k++) {
         CoaxialSpan *p = &span[count];
         bool carries = k == first, from_node = s->carrier[c] == k;
         if (!carries && !is_inside(s, c, k))
             continue;
-        *p = (CoaxialSpan){.tool = &s->tool[k].coaxial, .is_fixed = carries && from_node, .soft = {soft[0], soft[1]}};
+        *p = (CoaxialSpan){.tool = &s->tool[k].coaxial, .is_fixed = carries && from_node};
+        if (!carries)
+            p->soft[0] = soft[0], p->soft[1] = soft[1];
         p->s1 = from_node ? s->wire.s[c] : slide_at(s, c, k);
         p->phi1 = from_node ? 0 : angle_at(s, c, k);
         if (carries) {

@@ -181,6 +181,37 @@ static void a_bend_leaves_the_catheter(void **state)
     stepper_destroy(c.stepper);
 }
 
+// Flush and with the same J, tools lie in each other without a force, and either way out of there costs energy: they rest, and at rest nothing is gained.
+static void equal_bends_with_flush_tips_rest(void **state)
+{
+    (void)state;
+    Coaxial c = {0};
+    c.section[0][0] = tube_section(60, 6.6, 0, 0.7, 0.57);
+    c.section[0][1] = tube_section(15, 1.2, 0.08, 0.6, 0.57);
+    c.section[1][0] = tube_section(85, 0.8, 0, 0.36, 0);
+    c.section[1][1] = tube_section(15, 0.8, 0.08, 0.36, 0);
+    c.options.wire = tool_options(c.section[0], 2, 25, 0);
+    c.inner[0] = tool_options(c.section[1], 2, 33, 74.9995);
+    c.options.wire.damping_mass = 0.05;
+    c.options.wire.damping_stiffness = 0.2;
+    start(&c, 1, false);
+    const int tip = 25;
+    double gained = 0, moved = 0, push = fabs(move_tool(c.stepper, 1, 0, 0, 1, 2000)->push[1]), at = stepper_state(c.stepper)->slide[tip];
+    StepEnergy before = stepper_energy(c.stepper);
+    for (int i = 0; i < 500; i++) {
+        move_tool(c.stepper, 1, 0, 0, 1, 0);
+        StepEnergy e = stepper_energy(c.stepper);
+        gained += fmax(0, e.elastic + e.kinetic - before.elastic - before.kinetic - e.hand + e.damping);
+        moved = fmax(moved, fabs(stepper_state(c.stepper)->slide[tip] - at));
+        before = e;
+    }
+    // beyond the fiftieth of an element: half the EI that the two have in series, times the curvature squared
+    double beyond = 0.5 * 0.8 * 1.2 / (0.8 + 1.2) * 0.08 * 0.08;
+    print_message("gained %.1e of %.1e mJ, moved by %.1e mm, push %.1e N (%.1e beyond)\n", gained, before.elastic, moved, push, beyond);
+    assert_true(gained < 1e-9 && moved < 1e-6 && push < beyond);
+    stepper_destroy(c.stepper);
+}
+
 // Out of the sheath: 0.1 N while the bend leaves straight into the open, 0.1 - 0.075 where it comes into the catheter; no energy from nowhere.
 static void tools_leave_the_sheath(void **state)
 {
@@ -726,7 +757,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_straight_wire_in_a_curved_tube), cmocka_unit_test(turned_tubes_follow_up_to_the_fold),
-        cmocka_unit_test(a_bend_leaves_the_catheter),       cmocka_unit_test(tools_leave_the_sheath),
+        cmocka_unit_test(a_bend_leaves_the_catheter),       cmocka_unit_test(equal_bends_with_flush_tips_rest), cmocka_unit_test(tools_leave_the_sheath),
         cmocka_unit_test(friction_in_a_bend),               cmocka_unit_test(friction_acts_between_neighbours),
         cmocka_unit_test(three_tools_stay_in_the_tube),     cmocka_unit_test(a_restored_run_repeats),
         cmocka_unit_test(hands_stop_and_slip),
