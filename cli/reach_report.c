@@ -2,7 +2,7 @@
 #include "cli/reach_report.h"
 
 #include "geom/ghost_lumens.h"
-#include "geom/heap.h"
+#include "base/heap.h"
 #include "geom/vessel_branches.h"
 
 enum { STOPS_SHOWN = 12, GHOSTS_SHOWN = 6 };

@@ -29,7 +29,8 @@ static double soft_at(const Stepper *s, int c)
     double before = c > 0 ? s->wire.length[c - 1] : HUGE_VAL, after = c + 1 < s->state.node_count ? s->wire.length[c] : HUGE_VAL;
     if (!is_border(s, c))
         return 0;
-    double soft = SOFT * fmin(before, after);
+    // of the longer neighbour; at a tip that is nearly flush there is no more of it than the short one
+    double near = fmin(before, after), far = fmax(before < HUGE_VAL ? before : 0, after < HUGE_VAL ? after : 0), soft = fmin(SOFT * far, 0.4 * near);
     // in the sheath nothing passes: from where the node leaves its line on
     return c > s->first_free ? soft : fmax(0, fmin(soft, stepper_sheath_coordinate(s, c) - sheath_border_share * before));
 }
