@@ -184,7 +184,8 @@ static TortureScene make(uint64_t seed, int64_t steps, int model_count, const ch
     fprintf(draws.out, "# bench torture, seed %llu: %s in a %s\nseldinger: 1\n", (unsigned long long)seed, torture_tool_name[scene.tool], torture_vessel_name[scene.vessel]);
     write_vessel(&draws, scene.vessel, model_count, model, lumen_mm);
     int tools = write_tools(&draws, scene.tool);
-    fprintf(draws.out, "simulation: {step_ms: %g}\n", scene.step_ms / finer);
+    const char *points = draw(&draws, 0, 1) < 0.25 ? ", contact_points: follow" : "";
+    fprintf(draws.out, "simulation: {step_ms: %g%s}\n", scene.step_ms / finer, points);
     write_script(&draws, tools, (double)steps * scene.step_ms / 1000);
     bool good = !ferror(draws.out);
     if (fclose(draws.out) != 0 || !good) {

@@ -331,8 +331,8 @@ static void read_rig(Reading *reading, YamlValue value)
 
 static void read_simulation(Reading *reading, YamlValue value)
 {
-    static const char *const keys[] = {"step_ms", "contact_iterations", "contact_tolerance", "contact_form", "self_contact", NULL};
-    static const char *const forms[] = {"block", "pointwise", NULL}, *const self[] = {"auto", "on", "off", NULL};
+    static const char *const keys[] = {"step_ms", "contact_iterations", "contact_tolerance", "contact_form", "contact_points", "self_contact", NULL};
+    static const char *const forms[] = {"block", "pointwise", NULL}, *const points[] = {"fixed", "follow", NULL}, *const self[] = {"auto", "on", "off", NULL};
     Scene *scene = reading->scene;
     YamlMap map = yaml_map(value, keys);
     yaml_map_number(&map, "step_ms", false, (NumberRange){0.001, 100, false}, &scene->dt);
@@ -342,6 +342,7 @@ static void read_simulation(Reading *reading, YamlValue value)
     int form = yaml_has(&map, "contact_form") ? yaml_choice(yaml_get(&map, "contact_form", false), forms) : -1;
     if (form >= 0)
         scene->contact_options.form = form == 1 ? CONTACT_POINTWISE : CONTACT_BLOCK;
+    scene->follows_touch = yaml_has(&map, "contact_points") && yaml_choice(yaml_get(&map, "contact_points", false), points) == 1;
     int choice = yaml_has(&map, "self_contact") ? yaml_choice(yaml_get(&map, "self_contact", false), self) : 0;
     scene->self_contact = choice == 1 ? SELF_CONTACT_ON : choice == 2 ? SELF_CONTACT_OFF : SELF_CONTACT_AUTO;
 }

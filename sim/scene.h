@@ -82,6 +82,7 @@ typedef struct Scene {
     bool inlet_is_root;      // sheath `inlet: root`: start and direction to be taken from vessel->inlet
     ContactOptions contact_options;
     SelfContactMode self_contact;
+    bool follows_touch;              // contact points follow the place where the tool touches (StepperOptions)
     double dt;               // [ms]
     Script *script;          // NULL: none
     char *script_path;       // NULL where inline or none

@@ -45,7 +45,7 @@ Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *fa
     if (simulator)
         simulator->target = calloc((size_t)scene->target_count + 1, sizeof *simulator->target);
     if (simulator && simulator->target) {
-        StepperOptions options = {.wire = scene->wire, .vessel = vessel, .wall_friction = scene->friction, .contact = scene->contact_options, .self_contact = scene->self_contact,
+        StepperOptions options = {.wire = scene->wire, .vessel = vessel, .wall_friction = scene->friction, .contact = scene->contact_options, .self_contact = scene->self_contact, .follows_touch = scene->follows_touch,
                                   .dt = scene->dt};
         WireOptions inner[TOOLS_MOST];
         for (int k = 1; k < scene->tool_count; k++)

@@ -50,9 +50,11 @@ INLINE void lane_element(const BeamChain *c, int base, int l, bool is_curved, do
     element(&in, is_curved, &o);
     double *near = &t->near[0][l], *far = &t->far[0][LANES + l], pull = o.tension + c->drag[base + l];
     tangent_rows(&o, in.length, in.axial, in.near, in.near, in.far, in.twist, scale, pull > 0 ? pull : 0, is_curved, near, LANES, far, 2 * LANES);
-    put(near + N_MOMENT * LANES, LANES, o.moment1);
-    put(far + F_FORCE * 2 * LANES, 2 * LANES, o.force2);
-    put(far + F_MOMENT * 2 * LANES, 2 * LANES, o.moment2);
+    double taut = pull > 0 ? pull : 0;
+    Vec3 turn = vec3_scale(vec3_cross(o.chord, vec3_sub(o.own2, o.own1)), c->slides * o.inverse);
+    put(near + N_MOMENT * LANES, LANES, vec3_add(o.moment1, vec3_cross(turn, vec3_add_scaled(o.moment1, -taut, o.bow1))));
+    put(far + F_FORCE * 2 * LANES, 2 * LANES, vec3_add(o.force2, vec3_cross(turn, vec3_add_scaled(o.force2, -taut, o.stretch))));
+    put(far + F_MOMENT * 2 * LANES, 2 * LANES, vec3_add(o.moment2, vec3_cross(turn, vec3_add_scaled(o.moment2, -taut, o.bow2))));
 }
 
 // A node has its element's first end, the second end of the one before, and its inertia.

@@ -65,12 +65,14 @@ typedef struct BeamChain {
     BeamRest rest;
     BeamPose pose;
     BeamInertia inertia;
+    double slides;           // [mm] by which the chain is expected to slide along itself: its forces are those of the elements turned so
     double *drag;            // (E) [N] viscous tension, which stiffens like the elastic one: 0, or what beam_chain_damp() left
 } BeamChain;
 
 // Elements first to last-1 with the nodes first to last, into `chain` and b (M, 6): the lower blocks of the elements, the diagonal blocks and the
 // right-hand side of the nodes, written, not added to (so what joins node `first` from before comes afterwards).
 //   block = scale K_main + positive part of the geometric stiffness + rate M,   b = M a - gradient of the energy
+// The gradient is turned with each chord by `slides`, but for a tension, which the geometric stiffness turns.
 void beam_chain_assemble(const BeamChain *beam, int first, int last, double scale, double rate, BlockChain *chain, double *b);
 
 // For an iterate, before its assembly: drag, and in b (M, 6), written for the nodes first to last, the forces of stiffness damping between the poses

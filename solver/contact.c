@@ -78,7 +78,42 @@ static void add_levered(double *block, int stride, double k[3][3], double w, Vec
                 block[stride * r + c] += a[0][r] * kb[0][c] + a[1][r] * kb[1][c] + a[2][r] * kb[2][c];
 }
 
-void contact_add_curvature(const ContactSet *set, BlockChain *chain)
+// b += J' push, for a contact on the axis.
+static void add_push(const ContactPoint *p, Vec3 push, const unsigned mask[2], int n, double *b)
+{
+    const double weight[2] = {1 - p->xi, p->xi};
+    for (int e = 0; e < (p->xi > 0 ? 2 : 1); e++) {
+        Vec3 f = vec3_scale(push, weight[e]), m = p->xi > 0 ? vec3_cross(p->lever[e], push) : vec3(0, 0, 0);
+        const double all[6] = {f.x, f.y, f.z, m.x, m.y, m.z};
+        for (int r = 0; r < 6; r++)
+            b[(size_t)n * (size_t)(p->node + e) + (size_t)r] += mask[e] >> r & 1 ? all[r] : 0;
+    }
+}
+
+// force roll lean lean', and what it does to `leant`.
+static void add_roll(const ContactPoint *p, double force, const unsigned mask[2], BlockChain *chain, double *b)
+{
+    const int n = chain->size;
+    const size_t block = (size_t)(n * n), at = (size_t)p->node;
+    double k = force * p->roll, lean[2][6], *diag = chain->diag + block * at, *lower = chain->lower + block * at;
+    for (int e = 0; e < 2; e++)
+        for (int r = 0; r < 6; r++)
+            lean[e][r] = mask[e] >> r & 1 ? p->lean[e][r] : 0;
+    for (int r = 0; r < 6; r++) {
+        double near = k * lean[0][r], far = k * lean[1][r];
+        for (int c = 0; c < 6; c++) {
+            diag[n * r + c] += near * lean[0][c];
+            diag[block + (size_t)(n * r + c)] += far * lean[1][c];
+            lower[n * r + c] += far * lean[0][c];
+        }
+        if (b) {
+            b[(size_t)n * at + (size_t)r] += near * p->leant;
+            b[(size_t)n * (at + 1) + (size_t)r] += far * p->leant;
+        }
+    }
+}
+
+void contact_add_curvature(const ContactSet *set, BlockChain *chain, double *b)
 {
     const int n = chain->size;
     const size_t block = (size_t)(n * n);
@@ -87,23 +122,30 @@ void contact_add_curvature(const ContactSet *set, BlockChain *chain)
         double force = vec3_dot(p->force, p->normal);
         if (!(force > 0))
             continue;
+        bool has_two = p->xi > 0 && p->node + 1 < chain->count;
+        const unsigned mask[2] = {contact_free_dofs(chain, p->node), has_two ? contact_free_dofs(chain, p->node + 1) : 0};
+        if (p->roll > 0 && has_two)
+            add_roll(p, force, mask, chain, b);
         Vec3 e = vec3_normal_to(p->normal), f = vec3_cross(p->normal, e);
         Vec3 he = sym3_mul_vec(&p->hessian, e);
         double xx = -force * vec3_dot(e, he), xy = -force * vec3_dot(f, he), yy = -force * sym3_quadratic(&p->hessian, f);
         if (!isfinite(xx) || !isfinite(xy) || !isfinite(yy))
             continue;
         clamp_positive(&xx, &xy, &yy);
-        double a[3] = {e.x, e.y, e.z}, b[3] = {f.x, f.y, f.z}, k[3][3];
+        if (b && (xx != 0 || yy != 0) && vec3_norm2(p->slid) > 0) {
+            double along = vec3_dot(e, p->slid), across = vec3_dot(f, p->slid);
+            add_push(p, vec3_add(vec3_scale(e, xx * along + xy * across), vec3_scale(f, xy * along + yy * across)), mask, n, b);
+        }
+        double x[3] = {e.x, e.y, e.z}, y[3] = {f.x, f.y, f.z}, k[3][3];
         for (int r = 0; r < 3; r++)
             for (int c = 0; c < 3; c++)
-                k[r][c] = xx * a[r] * a[c] + xy * (a[r] * b[c] + b[r] * a[c]) + yy * b[r] * b[c];
-        unsigned here = contact_free_dofs(chain, p->node);
+                k[r][c] = xx * x[r] * x[c] + xy * (x[r] * y[c] + y[r] * x[c]) + yy * y[r] * y[c];
+        unsigned here = mask[0], next = mask[1];
         double *diag = chain->diag + block * (size_t)p->node;
-        if (p->xi <= 0 || p->node + 1 >= chain->count) {
+        if (!has_two) {
             add_block(diag, n, k, here);
             continue;
         }
-        unsigned next = contact_free_dofs(chain, p->node + 1);
         double near = 1 - p->xi, far = p->xi;
         add_levered(diag, n, k, near, p->lever[0], here, near, p->lever[0], here);
         add_levered(diag + block, n, k, far, p->lever[1], next, far, p->lever[1], next);

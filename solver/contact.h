@@ -7,6 +7,10 @@
 // Coulomb:    |force_t| <= friction * force_n, opposite to the tangential part of d where there is slip.
 // Forces in N act on the tool; `force` is the whole vector in space and is kept per material point from step to step as warm start.
 //
+// Where the wall bends away from the tool along it, the place where they touch stays in space while the tool slides through it: the touching point of the tool
+// rolls back along its line by roll (lean . (u - slid)), which stiffens the wire by force_n roll lean lean' (`lean`: how the gap's slope along the tool changes
+// with the unknowns, `slid` the motion along itself that gap and normal are already for). The wall's curvature acts on u - slid too.
+//
 // A slide is the friction between two coaxial tools at a node where they share the centreline: S and phi, a tool's material coordinate and its
 // angle there, are two of the node's unknowns (against those of the tool around it: step_coaxial.c).
 //   d = (S, radius phi) in the step;  |force| <= bound, opposite to d where there is slip.
@@ -35,6 +39,10 @@ typedef struct ContactPoint {
     double friction;         // mu >= 0
     double tool_radius;      // [mm]
     Vec3 force;              // [N] on the tool; in: warm start, out: solution
+    double roll;             // [mm] >= 0, 0: the touching point is one of the tool's
+    double lean[2][6];       // [1/mm], [1] of both nodes' unknowns; looked at where roll > 0
+    double leant;            // lean . slid
+    Vec3 slid;               // [mm] at the contact
 } ContactPoint;
 
 typedef struct ContactSlide {
@@ -72,10 +80,10 @@ typedef struct ContactSet {
     ContactSlide *slide;
 } ContactSet;
 
-// Adds the curvature stiffness of the set (warm-start forces) to the first six unknowns of a node's diagonal block (and couplings where xi > 0).
-// DESIGN section 4, item 1.
+// Adds the curvature and roll stiffness of the set (warm-start forces) to the first six unknowns of a node's diagonal block (and couplings where
+// xi > 0), and to `b`, which may be NULL, what it does to `slid`. DESIGN section 4, item 1.
 struct BlockChain;
-void contact_add_curvature(const ContactSet *set, struct BlockChain *chain);
+void contact_add_curvature(const ContactSet *set, struct BlockChain *chain, double *b);
 // Is a degree of freedom of a node free? A constrained one is recognised by its unit row; contacts neither push nor stiffen it.
 bool contact_is_free(const struct BlockChain *chain, int node, int dof);
 unsigned contact_free_dofs(const struct BlockChain *chain, int node);        // of the first six

@@ -123,7 +123,7 @@ static bool allocate(Stepper *s)
     s->point_capacity = s->point_count;
     size_t m = (size_t)s->wire.node_count, points = (size_t)s->point_count, inner = (size_t)s->state.inner_count * m;
     int size = 6 + 2 * s->state.inner_count;
-    s->memory_count = 13 * m + (4 + WALL_MET_DOUBLES) * points + 7 * inner;
+    s->memory_count = 13 * m + (5 + WALL_MET_DOUBLES) * points + 7 * inner;
     s->memory = calloc(s->memory_count, sizeof *s->memory);
     s->place = calloc(points, sizeof *s->place);
     s->trial = calloc(points, sizeof *s->trial);
@@ -136,7 +136,7 @@ static bool allocate(Stepper *s)
     s->query_place = calloc(2 * points, sizeof *s->query_place);
     s->query_hit = calloc(2 * points, sizeof *s->query_hit);
     s->query_which = calloc(4 * points + m, sizeof *s->query_which);
-    s->room = calloc(3 * points + m, sizeof *s->room);
+    s->room = calloc(4 * points + m, sizeof *s->room);
     s->set.point = calloc(2 * points, sizeof *s->set.point);
     s->set.capacity = 2 * s->point_count;       // each with the wall across
     s->factor = block_factor_create(s->wire.node_count, size);
@@ -155,14 +155,16 @@ static bool allocate(Stepper *s)
     s->force = (Vec3 *)(s->memory + 13 * m);
     s->clearance = s->memory + 13 * m + 3 * points;
     s->met = (WallMet *)(s->clearance + points);
-    s->state.slide = (double *)(s->met + points);
+    s->touch = (double *)(s->met + points);
+    s->state.slide = s->touch + points;
     s->state.angle = s->state.slide + inner;
     s->state.slide_velocity = s->state.angle + inner;
     s->state.slide_spin = s->state.slide_velocity + inner;
     s->state.slide_force = s->state.slide_spin + inner;
     s->linger = s->room + points;
     s->lack = s->linger + points;
-    s->range = s->lack + points;
+    s->touch_next = s->lack + points;
+    s->range = s->touch_next + points;
     s->query_near = s->query_which + points;
     s->candidate = s->query_near + points;
     s->answer_of = s->candidate + 2 * points;
@@ -325,6 +327,7 @@ Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
     if (s->contact.tolerance == 0)
         s->contact.tolerance = usual.tolerance;
     s->newton_max = o.newton_max > 0 ? o.newton_max : NEWTON_MAX;
+    s->is_slender = o.follows_touch && stepper_is_slender(s);
     place_wire(s, &o.wire);
     s->first_free = count_held(s, 0);
     return s;
@@ -477,6 +480,7 @@ static void begin(Stepper *s)
     s->is_iterate = s->overshoots = s->blocked = false;
     s->energy_before = -1;
     s->mouth_ahead = s->command.advance;
+    s->slides = stepper_slides(s);
     if (s->tool_count > 1)
         expect_last_motion(s);
 }
@@ -951,6 +955,7 @@ static void keep_last_state(Stepper *s)
     memset(s->state.spin, 0, nodes * sizeof *s->state.spin);
     memset(s->force, 0, (size_t)s->point_count * sizeof *s->force);
     memset(s->clearance, 0, (size_t)s->point_count * sizeof *s->clearance);
+    memset(s->touch, 0, (size_t)s->point_count * sizeof *s->touch);
     self_contact_forget(s);
     memset(s->state.slide_velocity, 0, inner);
     memset(s->state.slide_spin, 0, inner);
@@ -976,6 +981,7 @@ static void set_velocities(Stepper *s)
         tools_keep_slides(s);
     }
     stepper_use_clearance(s);
+    touch_keep(s);
 }
 
 static void report_forces(Stepper *s)

@@ -55,6 +55,7 @@ static void free_nodes(Stepper *s, double scale, double inertia)
     size_t from = row_of(s, first), to = row_of(s, count);
     load_pose(s->state.position, s->state.orientation, first, count, &s->beam.pose);
     load_inertia(s, inertia);
+    s->beam.slides = s->is_iterate ? 0 : s->slides;
     memset(s->beam.drag, 0, (size_t)s->wire.element_count * sizeof(double));
     if (s->is_iterate) {
         load_pose(s->start_position, s->start_orientation, first, count, &s->start_pose);
@@ -241,7 +242,7 @@ void stepper_assemble(Stepper *s)
     }
     if (s->first_free == s->chain.count)
         tip_at_mouth(s);
-    contact_add_curvature(&s->set, &s->chain);
+    contact_add_curvature(&s->set, &s->chain, s->b);
     if (s->is_iterate) {
         block_chain_multiply(&s->chain, s->linearised, s->product);
         for (size_t k = 0; k < row_of(s, s->chain.count); k++)

@@ -26,9 +26,9 @@ static const double GUARD_MAX = 0.3;     // [mm] of travel after which the wall 
 static const double LINGER = 0.9, LINGER_MAX = 0.006;     // of a gap, [mm]
 static const double MET_FAR = 0.2;       // [mm] from where it was met a wall across is remembered: as far as a plane stands for it
 static const double LACK_MAX = 0.045;    // [mm] of room between two walls that the wire may take, DEPTH_LAST of step.c
+static const double TOUCH_REACH = 0.05;  // [mm] of gap: further from the wall a point may touch as it is (step_touch.c)
 static const double NOTHING_KNOWN = -1;  // as a clearance: neither place nor force is held
 // A contact between one free node and the sheath is one between nodes with no share for the second.
-static const double NO_SHARE = 1e-300;
 
 static Vec3 tangent_at(const Stepper *s, int node)
 {
@@ -246,6 +246,7 @@ static void forget(Stepper *s, int point)
     s->clearance[point] = NOTHING_KNOWN;
     s->force[point] = vec3(0, 0, 0);
     s->met[point] = (WallMet){0};
+    s->touch[point] = s->touch_next[point] = 0;
 }
 
 void stepper_doubt(Stepper *s)
@@ -302,7 +303,8 @@ static void ask(Stepper *s, int point, int *count)
         locate(s, point);
     s->clearance[point] = 0;
     s->query_which[*count] = point;
-    s->query_point[*count] = place_of(s, point);
+    Touch touch;
+    s->query_point[*count] = touch_of(s, point, &touch) ? touch.place.position : place_of(s, point);
     s->query_place[(*count)++] = s->place[point];
 }
 
@@ -328,7 +330,8 @@ static double guarded_for(const Stepper *s, int k, const VesselHit *hit, double 
     int i = slot->element, a = s->answer_of[i], b = s->answer_of[i + 1];
     if (i + 1 == s->first_free || a < 0 || b < 0 || (s->query_hit[a].flags | s->query_hit[b].flags | hit->flags) != 0)
         return -1;
-    const VesselHit *near = &s->query_hit[a], *far = &s->query_hit[b];
+    VesselHit first = touch_back(s, i, &s->query_hit[a]), second = touch_back(s, i + 1, &s->query_hit[b]);
+    const VesselHit *near = &first, *far = &second;
     double w = slot->weight, over = hit->gap - near->gap - w * (far->gap - near->gap);
     if (!(over > -DIP_MIN))
         return -1;
@@ -338,17 +341,10 @@ static double guarded_for(const Stepper *s, int k, const VesselHit *hit, double 
     return until_used(over + DIP_MAX, slope, bend);
 }
 
-static bool presses(const Stepper *s, int point)
-{
-    Vec3 f = s->force[point];
-    return f.x != 0 || f.y != 0 || f.z != 0;
-}
-
 // [mm] of room that a point lacks between the wall that it sees and one across that it saw before, which is forgotten where it faces this one no more.
-static double meet_across(Stepper *s, int point, const VesselHit *hit)
+static double meet_across(Stepper *s, int point, Vec3 x, const VesselHit *hit)
 {
     WallMet *met = &s->met[point];
-    Vec3 x = place_of(s, point);
     double radius = radius_of(s, point), gap = hit->gap - radius;
     if (vec3_dot(met->normal, hit->normal) < 0) {
         met->across = met->normal;
@@ -363,6 +359,13 @@ static double meet_across(Stepper *s, int point, const VesselHit *hit)
     if (!faces)
         met->across = vec3(0, 0, 0);
     return s->lack[point] = faces ? fmin(LACK_MAX, fmax(0, -other - gap)) : 0;
+}
+
+// A point that is no candidate is asked at its own place again, from which it may be as far as it was from where it touched.
+static void leave_touch(Stepper *s, int point)
+{
+    s->clearance[point] = fmax(0, s->clearance[point] - fabs(s->touch_next[point]));
+    s->touch_next[point] = 0;
 }
 
 // Questions first to count-1, the answers judged: what is too far goes to sleep, candidates keep their question's number.
@@ -383,11 +386,12 @@ static int answer(Stepper *s, int first, int count, int *candidate)
         double gap = hit->gap - radius_of(s, point), own_reach = reach_of(s, point);
         s->place[point] = s->query_place[k];
         if (!(hit->flags & (VESSEL_FAR | VESSEL_OPEN_END)))
-            s->depth = fmax(s->depth, -gap - meet_across(s, point, hit));
-        double sleep = 0, guarded = point < nodes || presses(s, point) ? -1 : guarded_for(s, point - nodes, hit, &sleep);
+            s->depth = fmax(s->depth, -gap - meet_across(s, point, s->query_point[k], hit));
+        double sleep = 0, guarded = point < nodes || stepper_presses(s, point) ? -1 : guarded_for(s, point - nodes, hit, &sleep);
         if (guarded > own_reach - SLOT_REACH) {
             s->room[point] = guarded;
             s->clearance[point] = sleep;
+            leave_touch(s, point);
             continue;
         }
         if (!(hit->flags & (VESSEL_FAR | VESSEL_OPEN_END)) && gap < own_reach && vec3_is_finite(hit->normal)) {
@@ -395,11 +399,14 @@ static int answer(Stepper *s, int first, int count, int *candidate)
             continue;
         }
         s->force[point] = vec3(0, 0, 0);
-        if (hit->flags & VESSEL_OPEN_END)
+        if (hit->flags & VESSEL_OPEN_END) {
+            leave_touch(s, point);
             continue;
+        }
         s->room[point] = gap;
         if (gap > own_reach)
             s->clearance[point] = fmin(gap - own_reach, SLEEP_MAX);
+        leave_touch(s, point);
     }
     return candidates;
 }
@@ -451,6 +458,9 @@ static int ask_slots(Stepper *s, int count)
 static Vec3 done_at(const Stepper *s, int point, Vec3 arm)
 {
     int nodes = s->state.node_count;
+    Touch touch;
+    if (s->touch_next[point] != 0 && touch_at(s, point, s->touch_next[point], &touch))
+        return touch_done(s, &touch, arm);
     if (point < nodes)
         return vec3_add(done(s, point, 0), vec3_cross(done(s, point, 3), arm));
     int k = point - nodes, i = s->slot[k].element;
@@ -499,9 +509,16 @@ static void look_ahead(double dt, Vec3 axis, Vec3 velocity, ContactPoint *c)
 // um, and a wire that followed at once would kick the hand. A point that pressed in the last step goes after it by a part of the gap a step instead.
 static double linger(Stepper *s, int point, double gap)
 {
-    if (!s->is_iterate && !s->knows_motion && presses(s, point) && gap > 0)
+    if (!s->is_iterate && !s->knows_motion && stepper_presses(s, point) && gap > 0)
         s->linger[point] = LINGER * fmin(gap, LINGER_MAX);
     return s->linger[point];
+}
+
+// Where the contact of a point is now.
+static Vec3 touched(const Stepper *s, int point)
+{
+    Touch touch;
+    return s->touch_next[point] != 0 && touch_at(s, point, s->touch_next[point], &touch) ? touch.place.position : place_of(s, point);
 }
 
 static void add_candidate(Stepper *s, int point, const VesselHit *hit)
@@ -522,17 +539,26 @@ static void add_candidate(Stepper *s, int point, const VesselHit *hit)
     c->friction = friction >= 0 ? friction : s->wall_friction;
     c->tool_radius = radius;
     c->force = s->force[point];
-    if (s->is_iterate)
+    c->roll = 0;
+    c->slid = vec3(0, 0, 0);
+    Touch touch;
+    const WallMet *met = &s->met[point];
+    double offset = s->is_iterate ? s->touch_next[point] : s->touch[point];
+    bool touches = (offset != 0 || (gap < TOUCH_REACH && !s->is_iterate && s->slides != 0)) && touch_at(s, point, offset, &touch);
+    if (touches)
+        touch_contact(s, point, hit, c->gap, &touch, c);
+    else if (s->is_iterate)
         c->gap -= vec3_dot(done_at(s, point, vec3_scale(hit->normal, -radius)), hit->normal);
-    else if (p)
-        look_ahead(s->dt, p->tangent, vec3_mix(s->state.velocity[c->node], s->state.velocity[c->node + 1], p->weight), c);
-    else
-        look_ahead(s->dt, tangent_at(s, point), s->state.velocity[point], c);
+    if (!s->is_iterate && !touches) {
+        int node = c->node;
+        bool is_between = p || touches;
+        look_ahead(s->dt, touches ? touch.place.tangent : p ? p->tangent : tangent_at(s, point),
+                   is_between ? vec3_mix(s->state.velocity[node], s->state.velocity[node + 1], touches ? touch.place.weight : p->weight) : s->state.velocity[node], c);
+    }
     if (p && at_mouth(s, c->node)) {
         lean_on_sheath(s, point - nodes, c);
         return;
     }
-    const WallMet *met = &s->met[point];
     if (vec3_norm2(met->across) == 0)
         return;
     // between two walls: what room is lacking they give way by in equal parts
@@ -542,7 +568,9 @@ static void add_candidate(Stepper *s, int point, const VesselHit *hit)
     c->gap += 0.5 * s->lack[point];
     across->normal = met->across;
     across->hessian = (Sym3){0};
-    across->gap = vec3_dot(met->across, place_of(s, point)) - met->beyond + 0.5 * s->lack[point];
+    across->gap = vec3_dot(met->across, touched(s, point)) - met->beyond + 0.5 * s->lack[point];
+    across->roll = 0;
+    across->slid = vec3(0, 0, 0);
     if (s->is_iterate)
         across->gap -= vec3_dot(done_at(s, point, vec3_scale(met->across, -radius)), met->across);
 }
@@ -552,7 +580,7 @@ bool stepper_meet_walls(Stepper *s, double part)
     int count = 0;
     bool any = false;
     for (int k = 0; k < s->set.count; k++)
-        ask_there(s, s->candidate[k], place_of(s, s->candidate[k]), &count);
+        ask_there(s, s->candidate[k], touched(s, s->candidate[k]), &count);
     answer_there(s, count);
     for (int k = 0; k < count; k++) {
         ContactPoint *c = &s->set.point[k];
@@ -655,6 +683,8 @@ void stepper_detect(Stepper *s)
     if (!s->is_iterate && !s->knows_motion)
         memset(s->linger, 0, (size_t)s->point_count * sizeof *s->linger);
     memset(s->lack, 0, (size_t)s->point_count * sizeof *s->lack);
+    if (!s->is_iterate)
+        memcpy(s->touch_next, s->touch, (size_t)s->point_count * sizeof *s->touch);
     take_trials(s);
     estimate_ranges(s);
     int *candidate = s->query_near, nodes = ask_nodes(s);
@@ -682,8 +712,23 @@ void stepper_use_clearance(Stepper *s)
     memcpy(s->seen, s->linearised, row_of(s, nodes) * sizeof *s->seen);
 }
 
+// Forces at nodes that touch beside them.
+static void share_touches(const Stepper *s, NodeReport *node)
+{
+    Touch t;
+    for (int i = s->first_free; i < s->state.node_count; i++) {
+        if (s->touch[i] == 0 || !touch_at(s, i, s->touch[i], &t))
+            continue;
+        node[i].force = vec3_sub(node[i].force, s->force[i]);
+        node[t.element].force = vec3_add_scaled(node[t.element].force, 1 - t.xi, s->force[i]);
+        node[t.element + 1].force = vec3_add_scaled(node[t.element + 1].force, t.xi, s->force[i]);
+    }
+}
+
 void stepper_share_forces(const Stepper *s, NodeReport *node)
 {
+    Touch touch;
+    share_touches(s, node);
     for (int k = 0; k < s->slot_count; k++) {
         Vec3 force = s->force[s->state.node_count + k], x2 = s->state.position[s->slot[k].element + 1];
         int i = s->slot[k].element;
@@ -691,6 +736,8 @@ void stepper_share_forces(const Stepper *s, NodeReport *node)
         SlotPlace place;
         if (at_mouth(s, i) && slot_place_at_mouth(&s->slot[k], s->wire.length[i], stepper_sheath_coordinate(s, i), s->mouth, s->axis[0], x2, s->axis[0], &place))
             w = place.weight;
+        if (s->touch[s->state.node_count + k] != 0 && touch_at(s, s->state.node_count + k, s->touch[s->state.node_count + k], &touch))
+            i = touch.element, w = touch.xi;
         node[i].force = vec3_add_scaled(node[i].force, 1 - w, force);
         node[i + 1].force = vec3_add_scaled(node[i + 1].force, w, force);
     }

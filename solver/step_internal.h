@@ -104,8 +104,9 @@ struct Stepper {
     // what the next step depends on: see checkpoint.c
     WireState state;         // arrays in `memory`; within a step the iterate
     size_t memory_count;
-    double *memory;          // position, orientation, velocity, spin, force, clearance, met
+    double *memory;          // position, orientation, velocity, spin, force, clearance, met, touch
     Vec3 *force;             // (P) [N] of the wall on the point: warm start
+    double *touch;           // (P) [mm] along the tool from the point to where it touches, or may next (step_touch.c)
     double *clearance;       // (P) [mm] how far the point may travel before it could touch: not queried until then
     WallMet *met;            // (P)
     VesselMemory *place;     // (P)
@@ -140,12 +141,15 @@ struct Stepper {
     bool *tried;             // (P) … of these points
     double *room;            // (P) [mm] how far a point that is no candidate may go from the iterate; HUGE_VAL for candidates
     double *lack;            // (P) [mm] of room between walls that face each other
+    double *touch_next;      // (P) [mm] `touch` at this step's end
     double *linger;          // (P) [mm] by which the wall is taken to be nearer in this step
     double *scratch;         // owns the arrays of doubles
 
     // of this step
     StepCommand command;
     StepReport report;
+    bool is_slender;         // of one tool: elements bend more than they shear
+    double slides;           // [mm] by which the tool is expected to slide along itself
     double mouth_ahead;      // [mm] by how much the node behind the mouth is taken to move in this step
     double turn;             // [rad] largest of the solution against the iterate
     bool overshoots;         // the solution goes through the wall, or may
@@ -162,6 +166,12 @@ struct Stepper {
 // Where a node's unknowns begin in a vector, and its block in the matrix.
 static inline size_t row_of(const Stepper *s, int node) { return (size_t)s->chain.size * (size_t)node; }
 static inline size_t block_of(const Stepper *s, int node) { return (size_t)s->chain.size * row_of(s, node); }
+
+static inline bool stepper_presses(const Stepper *s, int point)
+{
+    Vec3 f = s->force[point];
+    return f.x != 0 || f.y != 0 || f.z != 0;
+}
 
 // The pose is that of the step's start again.
 void stepper_go_back(Stepper *s);
@@ -185,6 +195,33 @@ void stepper_forget(Stepper *s, int node);
 // Adds the slots' forces to the nodes between which they are.
 void stepper_share_forces(const Stepper *s, NodeReport *node);
 void stepper_assemble(Stepper *s);
+// By how much the tool slides along itself in this step, as far as can be foreseen.
+double stepper_slides(const Stepper *s);
+bool stepper_is_slender(const Stepper *s);
+// The cell of the tool for which a contact point stands, and where in it the point is asked about (step_touch.c).
+static const double NO_SHARE = 1e-300;   // of a contact between two nodes that is at the first one
+typedef struct Touch {
+    int element;             // between nodes `element` and the next
+    double xi;               // (0, 1) of its rest length
+    double offset;           // [mm] along the tool from the contact point
+    double half;             // [mm] to each side of it the cell's share reaches
+    Vec3 own1, own2;         // the nodes' tangents
+    Vec3 bend;               // [1/mm] the line's curvature
+    SlotPlace place;
+} Touch;
+// False where the point touches at its own place.
+// (step_touch.c)
+bool touch_at(const Stepper *s, int point, double offset, Touch *touch);
+// ... as the step has it.
+bool touch_of(const Stepper *s, int point, Touch *touch);
+// What the wall is at the point's own place, by what it is where it was asked.
+VesselHit touch_back(const Stepper *s, int point, const VesselHit *hit);
+// Makes of what the wall is at `touch` the contact there; `advance` [mm]: what the tool slides in this step.
+void touch_contact(Stepper *s, int point, const VesselHit *hit, double gap, const Touch *touch, ContactPoint *contact);
+// The displacement of the step so far at a contact between two nodes, at `arm` from the axis.
+Vec3 touch_done(const Stepper *s, const Touch *touch, Vec3 arm);
+// The step is done: contacts that have left their cell go over to the next one's point.
+void touch_keep(Stepper *s);
 // Element i, between two nodes of one tool, as it is now.
 BeamInput stepper_beam(const Stepper *s, int i);
 // Row and column of one unknown become a unit row with its value.

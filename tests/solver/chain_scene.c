@@ -195,7 +195,7 @@ void chain_scene_prepare(ChainScene *s, double advance, double twist)
                                                       .tool_radius = radius,
                                                       .force = s->force[i]};
     }
-    contact_add_curvature(&s->set, &s->chain);
+    contact_add_curvature(&s->set, &s->chain, NULL);
     for (int i = 0; i < s->nodes; i++)
         if (i == 0 || (s->position[i].x <= 0 && fabs(s->position[i].y) < 1e-9)) {
             if (i == 0) {

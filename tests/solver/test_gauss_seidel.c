@@ -586,7 +586,7 @@ static void curvature_follows_levers(void **state)
         double before[2][36], lower[36];
         memcpy(before, chain.diag + 36, sizeof before);
         memcpy(lower, chain.lower + 36, sizeof lower);
-        contact_add_curvature(&(ContactSet){.count = 1, .capacity = 1, .point = &c}, &chain);
+        contact_add_curvature(&(ContactSet){.count = 1, .capacity = 1, .point = &c}, &chain, NULL);
         ContactPoint axis = c;
         axis.tool_radius = 0;
         for (int i = 0; i < 12; i++)

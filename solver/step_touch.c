@@ -1,0 +1,213 @@
+// Where between its neighbours a contact point touches the wall.
+//
+// A contact point stands for the cell of the tool that is nearer to it than to its neighbours. Left where it is, it slides with the tool over every bend of the
+// wall: the normal leans along the tool, to and fro as one point after the other takes the force, and the hand feels N l / (2 R). A tool touches where its
+// line is nearest to the wall, which stays in space while it slides. With g(s) the gap along the line, t its tangent, k its curvature, n and H of the wall:
+//   g' = n.t,   g'' = t'Ht + n.k,   offset = -g' / g''   (Newton's method for the least gap, from where was asked last)
+// The normal is there perpendicular to the tool, and nothing leans. Of the energy of that least gap the second derivative is H - (dg')(dg')' / g'', dg' how
+// g' changes with the unknowns: the contact rolls back along a tool that turns, which is `roll` of contact.h, and without which it goes to and fro in steps.
+// STIFF is the bend of a weak spring that holds the offset at 0 where the wall says little about it; its energy belongs to the gap.
+//
+// All is at the step's end: the tool slides by `slides`, so the point of the tool that will be there is as much behind.
+#include "solver/step_internal.h"
+
+#include <string.h>
+
+static const double STIFF = 0.02;        // [1/mm] bend of the weak spring …
+static const double FIRM = 0.1;          // … which makes up to this where the gap bends less: nothing tells there where the tool touches
+static const double REACH_OUT = 1.2;     // of half a cell: as far as the offset goes
+static const double LEAVES = 1.1;        // of half a cell: further out the contact goes over to the next point
+static const double STRIDE = 5, STRIDE_LEAST = 0.02, STRIDE_MAX = 0.1;        // of what the tool slides, [mm]: so far the offset goes besides; further the wall was not asked
+// Phi = 12 EI / (kappa G A L^2) above which the cubic through the nodes is not the tool's line: elements that are hardly longer than thick shear instead.
+static const double SHEARS = 2;
+static const double BLEND = 0.5;          // of half a cell
+static const double SLIDE_MAX = 0.1;     // [mm] that the tool is expected to slide at most
+static const double SLIDE_PART = 0.5;    // of half a cell: the same
+
+bool stepper_is_slender(const Stepper *s)
+{
+    const BeamRest *r = &s->beam.rest;
+    bool is_slender = s->has_sheath && s->tool_count == 1;
+    for (int i = 0; i < s->wire.element_count && is_slender; i++)
+        is_slender = 12 * r->bending[i] < SHEARS * r->shear[i] * r->length[i] * r->length[i];
+    return is_slender;
+}
+
+double stepper_slides(const Stepper *s)
+{
+    if (!s->is_slender)
+        return 0;
+    // a hand that slips, or begins to move, moves no tool: as far as it went in the last step too
+    double asked = s->command.advance, went = s->dt * vec3_dot(s->state.velocity[0], s->axis[0]), least = fmin(fabs(asked), fmin(fabs(went), SLIDE_MAX));
+    return asked * went > 0 ? asked > 0 ? least : -least : 0;
+}
+
+static Vec3 own_tangent(const Stepper *s, int node) { return quat_rotate(s->state.orientation[node], vec3(1, 0, 0)); }
+
+static int points_on(const Stepper *s, int element) { return 1 + s->slot_start[element + 1] - s->slot_start[element]; }
+
+// The cubic's second derivative; `at` of its rest length.
+static Vec3 bend_of(const Stepper *s, int e, double at)
+{
+    double l = s->wire.length[e];
+    Vec3 bend = vec3_scale(vec3_sub(s->state.position[e + 1], s->state.position[e]), (6 - 12 * at) / (l * l));
+    return vec3_add(bend, vec3_add_scaled(vec3_scale(own_tangent(s, e), (6 * at - 4) / l), (6 * at - 2) / l, own_tangent(s, e + 1)));
+}
+
+// It jumps at nodes that bear a force, where the tool shears: near them it is mixed.
+static Vec3 bend_at(const Stepper *s, const Touch *t)
+{
+    int e = t->element, node = t->xi < 0.5 ? e : e + 1;
+    double away = (t->xi < 0.5 ? t->xi : t->xi - 1) * s->wire.length[e], share = 0.5 + 0.5 * away / (BLEND * t->half);
+    Vec3 own = bend_of(s, e, t->xi);
+    if (!(share > 0 && share < 1))
+        return own;
+    return node == e ? vec3_mix(bend_of(s, e - 1, 1), own, share) : vec3_mix(own, bend_of(s, e + 1, 0), share);
+}
+
+bool touch_at(const Stepper *s, int point, double offset, Touch *t)
+{
+    int nodes = s->state.node_count, e = point < nodes ? point : s->slot[point - nodes].element;
+    // the mouth's element and the last one are left out: the line ends there
+    if (s->tool_count > 1 || e <= s->first_free || e + 2 >= nodes)
+        return false;
+    const double *length = s->wire.length;
+    double half = 0.5 * length[e] / points_on(s, e), xi = offset / length[e];
+    if (point < nodes)
+        half = fmin(half, 0.5 * length[e - 1] / points_on(s, e - 1));
+    else
+        xi += s->slot[point - nodes].xi;
+    if (xi < 0) {
+        e--;
+        xi = 1 + offset / length[e];
+    }
+    *t = (Touch){.element = e, .xi = xi, .offset = offset, .half = half, .own1 = own_tangent(s, e), .own2 = own_tangent(s, e + 1)};
+    Slot slot = slot_shifted(&(Slot){.element = e}, length[e], xi);
+    t->place = slot_place(&slot, length[e], s->state.position[e], t->own1, s->state.position[e + 1], t->own2);
+    t->bend = bend_at(s, t);
+    return true;
+}
+
+bool touch_of(const Stepper *s, int point, Touch *t)
+{
+    double offset = s->is_iterate ? s->touch_next[point] : s->touch[point];
+    return offset != 0 && touch_at(s, point, offset, t);
+}
+
+Vec3 touch_done(const Stepper *s, const Touch *t, Vec3 arm)
+{
+    const double weight[2] = {1 - t->place.weight, t->place.weight};
+    Vec3 sum = vec3(0, 0, 0);
+    for (int e = 0; e < 2; e++) {
+        const double *u = s->linearised + row_of(s, t->element + e);
+        sum = vec3_add_scaled(sum, weight[e], vec3(u[0], u[1], u[2]));
+        sum = vec3_add(sum, vec3_cross(vec3(u[3], u[4], u[5]), vec3_add_scaled(t->place.lever[e], weight[e], arm)));
+    }
+    return sum;
+}
+
+VesselHit touch_back(const Stepper *s, int point, const VesselHit *hit)
+{
+    VesselHit own = *hit;
+    Touch t;
+    if ((hit->flags & (VESSEL_FAR | VESSEL_OPEN_END)) || !touch_of(s, point, &t))
+        return own;
+    Vec3 back = vec3_add_scaled(vec3_scale(t.place.tangent, -t.offset), 0.5 * t.offset * t.offset, t.bend), turn = sym3_mul_vec(&hit->hessian, back);
+    own.gap += vec3_dot(hit->normal, back) + 0.5 * vec3_dot(back, turn);
+    own.normal = vec3_unit(vec3_add(hit->normal, turn));
+    return own;
+}
+
+// How g' = n.t changes with the unknowns of both nodes: t' of the cubic, and the point's motion by H t.
+static void lean(const Stepper *s, const Touch *t, Vec3 normal, Vec3 turns, ContactPoint *c)
+{
+    double l = s->wire.length[t->element], xi = t->xi, slope = 6 * xi * (1 - xi) / l;
+    const double weight[2] = {1 - t->place.weight, t->place.weight}, chord[2] = {-slope, slope};
+    const double share[2] = {(1 - xi) * (1 - 3 * xi), xi * (3 * xi - 2)};
+    const Vec3 own[2] = {t->own1, t->own2};
+    for (int e = 0; e < 2; e++) {
+        Vec3 move = vec3_add_scaled(vec3_scale(turns, weight[e]), chord[e], normal);
+        Vec3 turn = vec3_add_scaled(vec3_cross(t->place.lever[e], turns), share[e], vec3_cross(own[e], normal));
+        const double all[6] = {move.x, move.y, move.z, turn.x, turn.y, turn.z};
+        memcpy(c->lean[e], all, sizeof all);
+    }
+}
+
+void touch_contact(Stepper *s, int point, const VesselHit *hit, double gap, const Touch *asked, ContactPoint *c)
+{
+    Vec3 along = asked->place.tangent, turns = sym3_mul_vec(&hit->hessian, along);
+    double slope = vec3_dot(hit->normal, along), bend = fmax(0, vec3_dot(along, turns) + vec3_dot(hit->normal, asked->bend)), stiff = fmax(STIFF, FIRM - bend), roll = 1 / (bend + stiff);
+    double wish = asked->offset - (slope + stiff * asked->offset) * roll, most = REACH_OUT * asked->half;
+    bool rolls = fabs(wish) < most;
+    wish = rolls ? wish : wish > 0 ? most : -most;
+    // an iterate keeps the points of the tool that touch
+    double step = wish - asked->offset, stride = s->is_iterate ? 0 : fmin(STRIDE_MAX, fmax(STRIDE_LEAST, STRIDE * fabs(s->slides)));
+    rolls &= fabs(step) < stride;
+    step = fmax(-stride, fmin(stride, step));
+    double slides = s->is_iterate ? 0 : fmax(-SLIDE_PART * asked->half, fmin(SLIDE_PART * asked->half, s->slides)), offset = asked->offset + step;
+    Touch t;
+    touch_at(s, point, offset - slides, &t);
+    if (!s->is_iterate)
+        s->touch_next[point] = t.offset;
+    c->node = t.element;
+    c->xi = fmax(t.place.weight, NO_SHARE);
+    c->lever[0] = t.place.lever[0];
+    c->lever[1] = t.place.lever[1];
+    Vec3 on = vec3_add_scaled(vec3_scale(along, step), 0.5 * step * step, asked->bend);
+    c->normal = vec3_unit(vec3_add(hit->normal, sym3_mul_vec(&hit->hessian, on)));
+    c->gap = gap + step * (slope + 0.5 * bend * step) - slides * vec3_dot(c->normal, along);
+    c->slid = vec3_scale(along, slides);
+    if (s->is_iterate)
+        c->gap -= vec3_dot(touch_done(s, &t, vec3_scale(c->normal, -c->tool_radius)), c->normal);
+    if (!rolls)
+        return;
+    lean(s, &t, c->normal, vec3_add_scaled(turns, -vec3_dot(turns, hit->normal), hit->normal), c);
+    c->roll = roll;
+    c->leant = slides * bend;
+}
+
+// The next contact point along the tool (way 1) or the one before (-1).
+static int neighbour(const Stepper *s, int point, int way)
+{
+    int nodes = s->state.node_count;
+    if (point < nodes) {
+        int e = way > 0 ? point : point - 1;
+        return points_on(s, e) == 1 ? point + way : nodes + (way > 0 ? s->slot_start[e] : s->slot_start[e + 1] - 1);
+    }
+    int k = point - nodes, e = s->slot[k].element;
+    if (way > 0)
+        return k + 1 < s->slot_start[e + 1] ? point + 1 : e + 1;
+    return k > s->slot_start[e] ? point - 1 : e;
+}
+
+static void go_over(Stepper *s, int from, int to, double offset)
+{
+    s->touch[to] = offset;
+    s->force[to] = s->force[from];
+    s->place[to] = s->place[from];
+    s->met[to] = s->met[from];
+    s->touch[from] = 0;
+    s->force[from] = vec3(0, 0, 0);
+    s->clearance[to] = s->clearance[from] = 0;
+}
+
+void touch_keep(Stepper *s)
+{
+    if (s->tool_count > 1 || !s->vessel)
+        return;
+    if (s->report.flags & STEP_LIMITED) {
+        memset(s->touch, 0, (size_t)s->point_count * sizeof *s->touch);
+        return;
+    }
+    memcpy(s->touch, s->touch_next, (size_t)s->point_count * sizeof *s->touch);
+    for (int p = s->first_free; p < s->point_count; p++) {
+        Touch here, there;
+        if (!stepper_presses(s, p))
+            s->touch[p] = 0;
+        if (s->touch[p] == 0 || !touch_at(s, p, 0, &here) || fabs(s->touch[p]) <= LEAVES * here.half)
+            continue;
+        int way = s->touch[p] > 0 ? 1 : -1, to = neighbour(s, p, way);
+        if (!stepper_presses(s, to) && touch_at(s, to, 0, &there))
+            go_over(s, p, to, s->touch[p] - way * (here.half + there.half));
+    }
+}
