@@ -219,7 +219,6 @@ static void verbs_of_the_trainer(void **state)
         {"report empty.json empty.json", "takes one session file"},
         {"report nowhere.json", "nowhere.json: cannot be opened"},
         {"report noise.bin --html out.html", "noise.bin:byte 0: is no JSON"},
-        {"report free.h5 --html out.html", "free.h5:byte 0: is no JSON"},
         {"report empty.json --html out.html", "empty.json: 'score' is no object or is not there"},
         {"report empty.json --banana", "see `seldinger report --help`"},
         {"devices noise.bin", "takes no file but by --map"},
