@@ -41,7 +41,7 @@ static void find_range(Chart *chart, int count, const PicturePanel *panel)
     }
     double room = high > low ? 0.06 * (high - low) : fmax(0.1 * fabs(high), 1e-3);
     chart->low = low == 0 ? 0 : low - room;
-    chart->high = high == 0 ? 0 : high + room;
+    chart->high = high == 0 && low < 0 ? 0 : high + room;     // nothing but zeros has a range too
 }
 
 // Cut at sharp turns: ImGui's mitred joints tear there, as noisy data shows.
@@ -165,6 +165,8 @@ static void draw_panel(Sheet *sheet, Chart *chart, int count, const double *time
         }
 }
 
+static const double LEAST_SPAN = 1e-3;   // [s] of the time axis, also of a single sample
+
 bool picture_of_series(const char *path, const PictureOptions *options, int count, const double *time_s, int panel_count, const PicturePanel *panel,
                        int event_count, const PictureEvent *event, char *message, size_t capacity)
 {
@@ -183,7 +185,7 @@ bool picture_of_series(const char *path, const PictureOptions *options, int coun
     float(*point)[2] = malloc((4 * (size_t)count + 4) * sizeof *point);
     if (!point)
         drawn = message_fail(message, capacity, "not enough memory for a chart of %d samples", count);
-    Chart chart = {.x = left, .width = sheet.width - left - 24 * s, .height = each - head, .t0 = time_s[0], .t1 = time_s[count - 1]};
+    Chart chart = {.x = left, .width = sheet.width - left - 24 * s, .height = each - head, .t0 = time_s[0], .t1 = fmax(time_s[count - 1], time_s[0] + LEAST_SPAN)};
     if (!(chart.t1 > chart.t0))
         chart.t1 = chart.t0 + 1;
     for (int k = 0; drawn && k < panel_count; k++) {

@@ -16,6 +16,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/short_run.h"
+
 static int run(const char *arguments)
 {
     char line[1024];
@@ -101,6 +103,7 @@ static void step_tables(void **state)
 static void peer_scenes_stay_inside(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     bool tubes = access("../shared/data/peer-tubes/tube-b-centreline.csv", R_OK) == 0 && system("scenes/peer/prepare") == 0;
     int code = run("bench peer --quick --json /tmp/seldinger-bench-peer.json > /tmp/seldinger-bench-peer.txt");
     cJSON *root = load("/tmp/seldinger-bench-peer.json"), *rows = cJSON_GetObjectItem(root, "rows"), *at;
@@ -297,10 +300,31 @@ static void reach_reports(void **state)
     unlink("/tmp/seldinger-reach-tree.h5");
 }
 
+// Random runs: inside the true wall, nothing unreported, numbers all of them. Some gain more than 1e-3 of the work (exit code 1); their scenes are kept.
+static void random_runs_stay_inside(void **state)
+{
+    (void)state;
+    char folder[] = "/tmp/seldinger-torture-XXXXXX", command[300];
+    assert_non_null(mkdtemp(folder));
+    snprintf(command, sizeof command, "bench torture --runs %d --steps 200 --finer 4 --keep %s --json %s/t.json >/dev/null 2>&1", WHOLE_OR_SHORT(12, 3), folder, folder);
+    int code = run(command);
+    snprintf(command, sizeof command, "%s/t.json", folder);
+    cJSON *root = load(command), *rows = cJSON_GetObjectItem(root, "rows"), *all = cJSON_GetArrayItem(rows, cJSON_GetArraySize(rows) - 1);
+    static const char *const never[] = {"outside the wall", "outside and not reported", "diverged or not a number", "refused"};
+    assert_true(code == 0 || code == 1);
+    assert_int_equal(cJSON_GetObjectItem(all, "runs")->valueint, WHOLE_OR_SHORT(12, 3));
+    assert_int_equal(cJSON_GetObjectItem(all, "steps")->valueint, 200 * WHOLE_OR_SHORT(12, 3));
+    for (size_t i = 0; i < sizeof never / sizeof never[0]; i++)
+        assert_int_equal(cJSON_GetObjectItem(cJSON_GetObjectItem(all, "failed"), never[i])->valueint, 0);
+    cJSON_Delete(root);
+    snprintf(command, sizeof command, "rm -rf %s", folder);
+    assert_int_equal(system(command), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(step_tables), cmocka_unit_test(tools_table), cmocka_unit_test(peer_scenes_stay_inside), cmocka_unit_test(collision_of_a_scene),
                                        cmocka_unit_test(tables_that_are_not_there),
-                                       cmocka_unit_test(a_chart_is_a_picture), cmocka_unit_test(wall_table), cmocka_unit_test(reach_reports)};
+                                       cmocka_unit_test(a_chart_is_a_picture), cmocka_unit_test(wall_table), cmocka_unit_test(reach_reports), cmocka_unit_test(random_runs_stay_inside)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -137,7 +137,7 @@ static void every_type_in_both_orders(void **state)
             for (int i = 0; i < 24; i++) {
                 double x = i % 2 ? types[t].high : types[t].low;
                 float f = (float)x;
-                uint64_t bits = x < 0 ? (uint64_t)(int64_t)x : (uint64_t)x;
+                uint64_t bits = types[t].kind != 0 ? 0 : x < 0 ? (uint64_t)(int64_t)x : (uint64_t)x;
                 if (types[t].kind == 2)
                     memcpy(&bits, &x, 8);
                 if (types[t].kind == 1) {

@@ -9,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "tests/short_run.h"
 #include "tube_scene.h"
 
 typedef struct Pulley {
@@ -132,8 +133,8 @@ static void capstan_pull(void **state)
 {
     (void)state;
     static const double friction[] = {0.1, 0.2, 0.4};
-    for (int k = 0; k < 4; k++)
-        for (int m = 0; m < 3; m++)
+    for (int k = 0; k < 4; k += WHOLE_OR_SHORT(1, 2))
+        for (int m = 0; m < 3; m += WHOLE_OR_SHORT(1, 2))
             for (double a = 20; a <= 40; a *= 2) {
                 const Pulley *p = PULLEYS[k];
                 double mu = friction[m], tension = a * EI_STANDARD / (p->radius * p->radius), c = p->radius / 2 / a;
@@ -150,7 +151,7 @@ static void capstan_pull(void **state)
 static void capstan_push(void **state)
 {
     (void)state;
-    for (int k = 0; k < 4; k++)
+    for (int k = 0; k < 4; k += WHOLE_OR_SHORT(1, 3))
         for (double mu = 0.1; mu < 0.25; mu += 0.1) {
             const Pulley *p = PULLEYS[k];
             double tension = 20 * EI_STANDARD / (p->radius * p->radius), exact = tension * exp(mu * p->angle);
@@ -167,7 +168,7 @@ static void capstan_push(void **state)
 static void friction_does_not_depend_on_speed(void **state)
 {
     (void)state;
-    for (int k = 0; k < 4; k++)
+    for (int k = 0; k < 4; k += WHOLE_OR_SHORT(1, 3))
         for (int way = -1; way <= 1; way += 2) {
             const Pulley *p = PULLEYS[k];
             double tension = 20 * EI_STANDARD / (p->radius * p->radius), c = way < 0 ? p->radius / 40 : 0.1;
