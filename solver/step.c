@@ -658,9 +658,9 @@ static bool misjudges_border(Stepper *s)
         return false;
     const BeamRest *rest = &s->beam.rest;
     double start = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]), width = sheath_border_share * rest->length[i];
-    double taken = start + s->mouth_ahead, ends = start + s->u[row_of(s, i)], least = 0.01 * rest->length[i];
+    double taken = start + s->mouth_ahead, ends = start + s->u[row_of(s, i)];
     // the tool has not gone as the hand was told to: the element's stiffness was that of another length
-    double length = fmax(rest->length[i] + taken, least), real = fmax(rest->length[i] + ends, least);
+    double length = sheath_outside(rest->length[i], taken), real = sheath_outside(rest->length[i], ends);
     if (s->hand[0].slips[0] && fabs(length - real) > MOUTH_LENGTH * fmin(length, real)) {
         s->mouth_ahead = ends - start;
         return true;
