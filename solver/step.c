@@ -649,16 +649,16 @@ static double largest_turn(const Stepper *s)
     return sqrt(largest);
 }
 
-// [rad] The turn of the chord from the mouth to the first node outside: a short one stretches by as much as a long one.
+// [rad] The turn of the chord from the mouth to the first node outside: a short one stretches by as much as a long one. Where the hand holds the tool; one that
+// springs through the mouth changes that chord's length by more.
 static double turn_at_mouth(const Stepper *s)
 {
     int i = s->first_free;
-    if (!s->has_sheath || i >= s->state.node_count)
+    if (!s->has_sheath || i >= s->state.node_count || s->hand[0].is_released || s->hand[0].slips[0])
         return 0;
     const double *u = s->u + row_of(s, i), *k = s->linearised + row_of(s, i);
-    Vec3 moves = vec3_cross(vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]), s->axis[0]);
-    double outside = vec3_dot(vec3_sub(s->state.position[i], s->mouth), s->axis[0]) + vec3_dot(vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]), s->axis[0]);
-    return vec3_norm(moves) / fmax(outside, sheath_border_share * s->wire.length[i - 1]);
+    Vec3 moves = vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]), ends = vec3_add(vec3_sub(s->state.position[i], s->mouth), moves);
+    return vec3_norm(vec3_cross(moves, s->axis[0])) / fmax(vec3_dot(ends, s->axis[0]), sheath_border_share * s->wire.length[i - 1]);
 }
 
 // Where a border of the rest shape is at the mouth, straightening takes more on one side of it than on the other, and the wire may come to rest with the border
@@ -924,7 +924,8 @@ static void take_back(Stepper *s)
         int node = s->first_free;
         const double *u = s->u + row_of(s, node);
         double ends = vec3_dot(vec3_sub(vec3_add(s->start_position[node], vec3(u[0], u[1], u[2])), s->mouth), s->axis[0]);
-        if (ends >= TAKE_BACK * s->wire.length[node - 1])
+        double began = vec3_dot(vec3_sub(s->start_position[node], s->mouth), s->axis[0]);
+        if (ends >= TAKE_BACK * s->wire.length[node - 1] || began > s->wire.length[node - 1] + fabs(s->command.advance))
             return;
         stepper_go_back(s);
         hold(s, node);

@@ -390,17 +390,52 @@ static void add_to_chain(const Stepper *s, int c, const Local *local)
 
 // --- the sheath ---
 
-// [N] what it takes to straighten a length of a tool.
-static double straightening(const Tool *t, double s)
+static double density(const CoaxialSection *p) { return 0.5 * p->bending * (p->curve[0] * p->curve[0] + p->curve[1] * p->curve[1]); }
+
+// [mJ mm] twice integrated over S, from the hub to s, what it takes to straighten a length of a tool; past either end as at that end.
+static double straightened_twice(const Tool *t, double s)
 {
-    const CoaxialSection *p = coaxial_section_at(&t->coaxial, s);
-    return s >= t->wire.total_length ? 0 : 0.5 * p->bending * (p->curve[0] * p->curve[0] + p->curve[1] * p->curve[1]);
+    const CoaxialSection *p = t->section, *last = p + t->coaxial.count - 1;
+    double sum = 0, once = 0, from = 0;
+    for (;; from = p->end, p++) {
+        double way = (p < last ? fmin(s, p->end) : s) - from;
+        sum += once * way + 0.5 * density(p) * way * way;
+        once += density(p) * way;
+        if (p == last || s <= p->end)
+            return sum;
+    }
+}
+
+// [mJ] once integrated, and averaged over the width of a border: a border that passes the mouth changes the push over that way, and not within a step.
+static double straightened_before(const Tool *t, double s)
+{
+    return (straightened_twice(t, s + 0.5 * t->border) - straightened_twice(t, s - 0.5 * t->border)) / t->border;
+}
+
+static double straightened(const Tool *t, double a, double b)
+{
+    double end = fmin(b, t->wire.total_length);
+    return a < end ? straightened_before(t, end) - straightened_before(t, a) : 0;
+}
+
+// [N] what it takes to straighten a length of a tool, and *slope [N/mm] with S.
+static double straightening(const Tool *t, double s, double *slope)
+{
+    const CoaxialSection *from = coaxial_section_at(&t->coaxial, s - 0.5 * t->border), *to = coaxial_section_at(&t->coaxial, s + 0.5 * t->border);
+    *slope = 0;
+    if (s >= t->wire.total_length)
+        return 0;
+    double sum = 0, at = s - 0.5 * t->border;
+    for (const CoaxialSection *p = from; p < to; at = p->end, p++)
+        sum += density(p) * (p->end - at);
+    *slope = (density(to) - density(from)) / t->border;
+    return (sum + density(to) * (s + 0.5 * t->border - at)) / t->border;
 }
 
 double tools_tip_straightening(const Stepper *s)
 {
     const Tool *t = &s->tool[s->carrier[s->state.node_count - 1]];
-    return straightening(t, t->wire.s[t->wire.node_count - 2]);
+    return density(coaxial_section_at(&t->coaxial, t->wire.s[t->wire.node_count - 2]));
 }
 
 Vec3 tools_tip_curvature(const Stepper *s)
@@ -409,20 +444,6 @@ Vec3 tools_tip_curvature(const Stepper *s)
     const Tool *t = &s->tool[s->carrier[last]];
     const CoaxialSection *p = coaxial_section_at(&t->coaxial, t->wire.s[t->wire.node_count - 2]);
     return quat_rotate(s->state.orientation[last], vec3(0, -p->curve[1], p->curve[0]));
-}
-
-// [mJ] of the length from a to b.
-static double straightened(const Tool *t, double a, double b)
-{
-    double energy = 0;
-    for (const CoaxialSection *p = t->section; p < t->section + t->coaxial.count && a < b; p++) {
-        double to = fmin(b, p->end);
-        if (to <= a)
-            continue;
-        energy += 0.5 * p->bending * (p->curve[0] * p->curve[0] + p->curve[1] * p->curve[1]) * (to - a);
-        a = to;
-    }
-    return energy;
 }
 
 // Between two nodes in the sheath every tool is a spring along and one about the line, between what w = side x_b - x_a is at its two nodes: x_a the node's place
@@ -556,17 +577,23 @@ static void mouth_element_of_tools(const Stepper *s, double scale, Local *local)
     element_by_ways(s, c, &in, way, tool, scale, local);
 }
 
-// What lies straight behind the mouth gets longer with S there.
-static void add_straightening(const Stepper *s, double *gradient)
+// What lies straight behind the mouth gets longer with S there. `scale` of the tangent as of elements; less of it where a border would push the tool on.
+static void add_straightening(const Stepper *s, double scale, double *gradient)
 {
+    int n = s->chain.size;
+    double *d = s->chain.diag + block_of(s, s->first_free - 1);
     int tool[STEP_TOOLS_MAX];
     CoaxialInput in = mouth_input(s, tool);
     Way way[NODAL + COAXIAL_COLUMNS];
     mouth_ways(s, &in, tool, way);
     for (int i = 0; i < in.count; i++) {
         const Way *w = &way[NODAL + 4 * i + COAXIAL_S1];
-        for (int j = 0; j < w->count; j++)
-            gradient[w->at[j]] += straightening(&s->tool[tool[i]], in.span[i].s1) * w->by[j];
+        double slope, force = straightening(&s->tool[tool[i]], in.span[i].s1, &slope);
+        for (int j = 0; j < w->count; j++) {
+            gradient[w->at[j]] += force * w->by[j];
+            for (int k = 0; k < w->count; k++)
+                d[n * w->at[j] + w->at[k]] += scale * fmax(0, slope) * w->by[j] * w->by[k];
+        }
     }
 }
 
@@ -990,7 +1017,7 @@ static void add_element(Stepper *s, int c, double scale)
     if (s->is_iterate && scale != 1)
         add_damping(s, c, scale, gradient);
     if (c + 1 == s->first_free)
-        add_straightening(s, gradient);
+        add_straightening(s, scale, gradient);
     for (int i = 0; i < 2 * s->chain.size; i++)
         b[i] -= gradient[i];
 }

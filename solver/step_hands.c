@@ -22,10 +22,28 @@ static double holds(const Stepper *s, int k, int about)
     return about || hand->limit == 0 ? HUGE_VAL : hand->limit;
 }
 
+// What a tool moves by at the hub, from node 0's unknowns. The hub of a rig does not move.
+static double tool_moves(const Stepper *s, int k, int about, const double *u)
+{
+    double hub = s->has_sheath ? u[3 * about] : 0;
+    return k == 0 ? hub : about ? hub + u[unknown_of(k) + 1] : hub - u[unknown_of(k)];
+}
+
+// [mm] that a tool's hub can go before it meets the hub around it, or the sheath.
+static double hub_room(const Stepper *s, int k)
+{
+    if (k == 0)
+        return s->has_sheath ? vec3_dot(vec3_sub(s->mouth, s->start_position[0]), s->axis[0]) : HUGE_VAL;
+    int around = tools_around(s, 0, k);
+    return s->start_slide[k - 1] - (around > 0 ? s->start_slide[around - 1] : 0);
+}
+
 // What the hand's unknown moves by in this step where the hand holds.
 static double wanted(const Stepper *s, int k, int about)
 {
     const Hand *hand = &s->hand[k];
+    if (!about && hand->is_stopped)
+        return hub_room(s, k) + (k > 0 && !rides(s, k) ? tool_moves(s, tools_around(s, 0, k), 0, s->u) : 0);
     if (hand->is_released)
         return 0;
     if (k == 0)
@@ -36,13 +54,6 @@ static double wanted(const Stepper *s, int k, int about)
         return t->twist + s->tool_command[k].twist - s->state.twist - s->start_angle[k - 1];
     double hub = s->has_sheath ? vec3_dot(vec3_sub(s->start_position[0], s->mouth), s->axis[0]) : 0;
     return t->inserted + s->tool_command[k].advance - (t->wire.total_length + hub - s->start_slide[k - 1]);
-}
-
-// What a tool moves by at the hub, from node 0's unknowns. The hub of a rig does not move.
-static double tool_moves(const Stepper *s, int k, int about, const double *u)
-{
-    double hub = s->has_sheath ? u[3 * about] : 0;
-    return k == 0 ? hub : about ? hub + u[unknown_of(k) + 1] : hub - u[unknown_of(k)];
 }
 
 // The hand's unknown.
@@ -164,7 +175,15 @@ double hand_force(const Stepper *s, int k, int about)
 
 static bool misjudges(Stepper *s, int k, int about)
 {
-    int *slips = &s->hand[k].slips[about], was = *slips;
+    Hand *hand = &s->hand[k];
+    int *slips = &hand->slips[about], was = *slips;
+    if (!about && hand->is_stopped)
+        return false;
+    if (!about && was != 0 && tool_moves(s, k, 0, s->u) - (k > 0 ? tool_moves(s, tools_around(s, 0, k), 0, s->u) : 0) > hub_room(s, k)) {
+        hand->is_stopped = true;
+        *slips = 0;
+        return true;
+    }
     double most = holds(s, k, about), force = hand_force(s, k, about);
     if (!(most < HUGE_VAL))
         *slips = 0;
@@ -191,6 +210,7 @@ void hands_feed(Stepper *s, unsigned released)
         StepCommand *command = &s->tool_command[k];
         hand->is_released = released >> k & 1;
         hand->slips[0] = hand->slips[1] = 0;
+        hand->is_stopped = false;
         if (hand->is_released && k > 0)  // goes where its valve goes, or nearly
             *command = s->tool_command[tools_around(s, 0, k)];
         else if (hand->is_released || !isfinite(command->advance) || !isfinite(command->twist))

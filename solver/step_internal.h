@@ -31,6 +31,7 @@ typedef struct Hand {
     // of this step
     bool is_released;        // no hand holds it
     int slips[2];            // along, about: 0 holds, 1 slips on a tool that it pushes, -1 that it pulls
+    bool is_stopped;         // the tool's hub has come to the hub of the tool around it, or to the sheath
 } Hand;
 
 // One of several coaxial tools. Its own elements do not change; which of its nodes are nodes of the chain does (step_tools.c).
@@ -45,6 +46,7 @@ typedef struct Tool {
     int *slot_start;         // (E + 1)
     double hand_limit, valve_friction;
     double friction_inside;  // of its lumen
+    double border;           // [mm] over which a border of its rest shape passes the sheath's mouth
     double lumen, widest;    // [mm] least inner and largest outer diameter
     double friction, clearance;    // with the tool around it; [mm] between them, radial
     // what changes

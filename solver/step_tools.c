@@ -11,6 +11,7 @@ static const double JOIN = 0.05, LEAVE = 0.04;
 // A tip that ended past its element's end would be cut there, so it passes the node this share of the element early, and on the way back late: more than
 // strain and friction keep it from where the hands would have it. What lies past its tip does not bend.
 static const double EARLY = 0.01;
+static const double MOUTH_BORDER = 0.1;          // of a tool's shortest element: the way over which a border of its rest shape passes the sheath's mouth
 static const double TAKE_BACK = 0.002;           // of an element's length past the tip around it: a node that would end nearer to it leaves the chain
 
 // --- creation ---
@@ -54,6 +55,10 @@ static bool make_tool(Tool *t, const WireOptions *o, char *why, int capacity)
         for (int k = 0; k < count; k++)
             t->slot[t->slot_start[i] + k] = slot_make((int)i, t->wire.length[i], k, count, section->diameter / 2, section->friction);
     }
+    double shortest = HUGE_VAL;
+    for (size_t i = 0; i < e; i++)
+        shortest = fmin(shortest, t->wire.length[i]);
+    t->border = MOUTH_BORDER * shortest;
     t->inserted = fmin(o->inserted, t->wire.total_length);
     t->hand_limit = o->hand_limit;
     t->valve_friction = o->valve_friction;
