@@ -339,13 +339,19 @@ static const H5FD_class_t driver_class = {
     .fl_map = H5FD_FLMAP_DICHOTOMY,
 };
 
+// Kept until the program ends: a file that holds the driver last has HDF5 free it, and then call it to close the file (1.10.8, H5FD_close).
+static hid_t driver_id(void)
+{
+    static hid_t driver = -1;
+    if (driver < 0 || H5Iis_valid(driver) <= 0)
+        driver = H5FDregister(&driver_class);
+    return driver;
+}
+
 hid_t ordered_file_create(const char *path, hid_t creation, hid_t access)
 {
-    hid_t driver = H5FDregister(&driver_class);
-    hid_t file = driver >= 0 && H5Pset_driver(access, driver, NULL) >= 0 ? H5Fcreate(path, H5F_ACC_TRUNC, creation, access) : -1;
-    if (driver >= 0)
-        H5FDunregister(driver);   // the file and the list hold it
-    return file;
+    hid_t driver = driver_id();
+    return driver >= 0 && H5Pset_driver(access, driver, NULL) >= 0 ? H5Fcreate(path, H5F_ACC_TRUNC, creation, access) : -1;
 }
 
 OrderedFile *ordered_file_of(hid_t file)
