@@ -174,11 +174,26 @@ static const Pair arc[17] = {
     {0x1.4978fa3269ee1p-1, 0x1.2419a87f2a458p-56}, {0x1.5d58987169b18p-1, 0x1.0028e4bc5e7cap-57}, {0x1.700a7c5784634p-1, -0x1.8c34d25aadef6p-56},
     {0x1.819d0b7158a4dp-1, -0x1.bf76229d3b917p-56}, {0x1.921fb54442d18p-1, 0x1.1a62633145c07p-55}};
 
+// z - atan z, |z| below 1 / 31.
+static double beyond_arc(double z)
+{
+    double q = z * z;
+    return z * q * (1.0 / 3 - q * (1.0 / 5 - q * (1.0 / 7 - q * (1.0 / 9 - q * (1.0 / 11)))));
+}
+
 // With t = least / most = i / 16 + d: atan t = atan(i / 16) + atan z, z = (least - i / 16 most) / (most + i / 16 least), |z| below 1 / 31.
 double same_atan2(double y, double x)
 {
     double least = fabs(y), most = fabs(x);
     bool steep = least > most;
+    // what most calls ask for, the twist of an element: as below with i = 0, in half the time
+    if (least < 0x1p-5 * x && x < 0x1p1000 && x > 0x1p-900) {
+        if (y == 0)
+            return y;
+        double z = least / x, inverse = 1 / x;
+        Pair back = product_of(z, x);
+        return copysign(z + (((least - back.high) - back.low) * inverse - beyond_arc(z)), y);
+    }
     if (!(least <= HUGE_VAL && most <= HUGE_VAL))
         return x + y;
     if (steep)
@@ -192,13 +207,12 @@ double same_atan2(double y, double x)
     int i = (int)(16 * (least / most) + 0.5);
     double c = i * 0.0625, half = first_half(most);                   // c half and c (most - half) are exact
     Pair z = pair_div(sum_of(least - c * half, -c * (most - half)), quick_sum(most, c * least));
-    double q = z.high * z.high, series = z.high * q * (1.0 / 3 - q * (1.0 / 5 - q * (1.0 / 7 - q * (1.0 / 9 - q * (1.0 / 11)))));
     // the angle is start + sign (arc + z)
     bool behind = signbit(x) != 0;
     Pair start = steep ? half_pi : behind ? pi : (Pair){0, 0};
     double sign = steep != behind ? -1 : 1;
     Pair turn = sum_of(start.high, sign * arc[i].high), at = sum_of(turn.high, sign * z.high);
-    double angle = at.high + (at.low + (turn.low + start.low + sign * (arc[i].low + (z.low - series))));
+    double angle = at.high + (at.low + (turn.low + start.low + sign * (arc[i].low + (z.low - beyond_arc(z.high)))));
     return copysign(angle, y);
 }
 
