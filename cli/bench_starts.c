@@ -66,20 +66,20 @@ static double centreline_distance(const VesselTree *tree, Vec3 x, double *radius
 }
 
 // In the trunk, between three and seven tenths of its length, up to 0.4 radii off its axis; or a place seven radii and more from every vessel's axis.
-static bool click_of(const Kind *kind, const VesselTree *truth, const TrackBranch *trunk, const Volume *volume, uint64_t *state, Vec3 *click)
+static bool click_of(const Kind *kind, const VesselTree *truth, const TrackBranch *trunk, const Volume *volume, Random *random, Vec3 *click)
 {
     if (kind->is_beside) {
         for (int i = 0; i < 1000; i++) {
             double radius, margin = 0.15, u[3];
             for (int k = 0; k < 3; k++)
-                u[k] = (margin + (1 - 2 * margin) * random_uniform(state)) * (volume->size[k] - 1);
+                u[k] = (margin + (1 - 2 * margin) * random_open(random)) * (volume->size[k] - 1);
             *click = volume_point_of(volume, vec3(u[0], u[1], u[2]));
             if (centreline_distance(truth, *click, &radius) > 3 * kind->radius)
                 return true;
         }
         return false;
     }
-    double share = 0.3 + 0.4 * random_uniform(state), left = (1 - share) * trunk->length, off = 0.4 * random_uniform(state), angle = 2 * PI * random_uniform(state);
+    double share = 0.3 + 0.4 * random_open(random), left = (1 - share) * trunk->length, off = 0.4 * random_open(random), angle = 2 * PI * random_open(random);
     int at = trunk->last_node;
     for (; truth->parent[at] != trunk->first_node && left > 0; at = truth->parent[at])
         left -= vec3_distance(truth->center[at], truth->center[truth->parent[at]]);
@@ -170,12 +170,12 @@ static void run_trial(void *context, long index)
     Volume *volume = truth ? shape_volume_with(shape, &o, faults) : NULL;
     TrackTruth known = {.tree = truth, .voxel_mm = 1};
     TrackScore plan;
-    uint64_t state = 77 * (uint64_t)seed + (uint64_t)(index / session->seeds);
+    Random random = {77 * (uint64_t)seed + (uint64_t)(index / session->seeds)};
     RbtSeed click = {.line = 1};
     RbtReport report = {0};
     trial->failed = true;
     if (volume && track_score(&known, NULL, &plan)) {
-        trial->failed = !click_of(kind, truth, &plan.branch[0], volume, &state, &click.start);
+        trial->failed = !click_of(kind, truth, &plan.branch[0], volume, &random, &click.start);
         track_score_free(&plan);
     }
     if (!trial->failed) {

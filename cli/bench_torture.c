@@ -1,4 +1,5 @@
 // seldinger bench torture: random hands, tools and vessels, judged by the true wall. Every run is a scene file made from its seed (torture_scene.h).
+#define _XOPEN_SOURCE 700   // realpath
 #include "cli/bench.h"
 #include "cli/output.h"
 #include "cli/torture_scene.h"
@@ -8,6 +9,7 @@
 #include "sim/drive.h"
 
 #include <getopt.h>
+#include <limits.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
@@ -308,7 +310,7 @@ static bool print_table(const Torture *torture, cJSON *list)
         add_run(&row[torture->outcome[i].vessel][torture->outcome[i].tool], &torture->outcome[i]);
         add_run(&all, &torture->outcome[i]);
     }
-    fprintf(out, "vessel  tool                 runs      steps   deepest  not said    gained     cut    not conv. kinked | deep silent  NaN energy stuck/of  refused\n"
+    fprintf(out, "vessel  tool                 runs      steps   deepest    unrep.    gained     cut    not conv. kinked | deep unrep.  NaN energy stuck/of  refused\n"
                  "                                                  [mm]      [mm]   of work   [steps]  [steps]   runs | runs that failed\n");
     for (int v = 0; v < TORTURE_VESSELS; v++)
         for (int t = 0; t < TORTURE_TOOLS; t++)
@@ -377,16 +379,14 @@ static int parse(int argc, char **argv, Torture *torture)
 // The radius of each model at its root, and its path from anywhere.
 static bool look_at_models(Torture *torture, Faults *faults)
 {
-    static char whole[MODELS_MOST][4096 + 512];
-    char here[4096] = "";
+    static char whole[MODELS_MOST][PATH_MAX];
     for (int i = 0; i < torture->model_count; i++) {
         VesselTree *tree = tree_file_load(torture->model[i], NULL, faults);
-        if (!tree || !vessel_tree_is_model(tree) || !getcwd(here, sizeof here)) {
+        if (!tree || !vessel_tree_is_model(tree) || !realpath(torture->model[i], whole[i])) {
             faults_add(faults, torture->model[i], 0, 0, "is no fitted model; `seldinger fit` makes one");
             vessel_tree_free(tree);
             return false;
         }
-        snprintf(whole[i], sizeof whole[i], "%s%s%.500s", *torture->model[i] == '/' ? "" : here, *torture->model[i] == '/' ? "" : "/", torture->model[i]);
         torture->model[i] = whole[i];
         torture->lumen[i] = tree->radius[0];
         vessel_tree_free(tree);

@@ -30,9 +30,9 @@ static const struct Verb {
     {"export", verb_export, "FILE -o OUT", "surface, centreline or recording for other programs"},
     {"info", verb_info, "FILE", "what a file is and its figures"},
     {"replay", verb_replay, "REC.h5 [--verify]", "a recording shown, simulated again and compared, or made into a scene"},
-    {"report", verb_report, "SESSION.json", "a page about a trainee's session: points, errors, plots, path, earlier sessions; HTML or PDF"},
+    {"report", verb_report, "SESSION.json|REC.h5", "a page about a trainee's session: points, errors, plots, path, earlier sessions; HTML or PDF"},
     {"devices", verb_devices, "", "what is plugged in, what of it drives the tool, and why the rest does not"},
-    {"bench", verb_bench, "step|fit|track|peer|collision|drawing", "timing tables, each row measured in the same run"},
+    {"bench", verb_bench, "TABLE", "step, fit, track, peer, collision, drawing, wall: timed, each row in the same run; torture: random runs"},
 };
 enum { VERB_COUNT = sizeof verbs / sizeof verbs[0] };
 

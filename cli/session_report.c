@@ -454,6 +454,7 @@ static bool write_pdf(const char *path, const char *page, size_t length, Faults 
 
 typedef struct ReportOptions {
     const char *session, *html, *pdf, *with;
+    const char *recording;   // NULL where a session file was given
     bool quiet;
     char own_html[4096], own_folder[4096], beside[4096];
 } ReportOptions;
@@ -493,19 +494,23 @@ static int parse_options(int argc, char **argv, ReportOptions *options)
     return -1;
 }
 
-// Of a recording: its session file, made by simulating it again where it has none.
-static bool find_session_file(ReportOptions *options, Faults *faults)
+// Of a recording: the session file beside it, which may have to be made first.
+static void name_session_file(ReportOptions *options)
 {
     if (file_kind(options->session) != FILE_RECORDING)
-        return true;
+        return;
     trainer_file_beside(options->session, ".json", options->beside, sizeof options->beside);
-    bool is_there = access(options->beside, F_OK) == 0;
-    if (!is_there && !options->quiet)
-        fprintf(stderr, "%s has no session file; simulating it again\n", options->session);
-    if (!is_there && !recover_session(options->session, NULL, NULL, faults))
-        return false;
+    options->recording = options->session;
     options->session = options->beside;
-    return true;
+}
+
+static bool make_session_file(const ReportOptions *options, Faults *faults)
+{
+    if (!options->recording || access(options->session, F_OK) == 0)
+        return true;
+    if (!options->quiet)
+        fprintf(stderr, "%s has no session file; simulating it again\n", options->recording);
+    return recover_session(options->recording, NULL, NULL, faults);
 }
 
 int verb_report(int argc, char **argv)
@@ -519,12 +524,14 @@ int verb_report(int argc, char **argv)
     faults_clear(&faults);
     Session *session = calloc(1, sizeof *session);
     char *page = NULL;
+    name_session_file(&options);
     OutputPlan plan = {.faults = &faults};
     output_plan_write(&plan, "--html", options.html);
     output_plan_write_file(&plan, "--pdf", options.pdf);
     output_plan_read(&plan, "the session", options.session);
+    output_plan_read(&plan, "the recording", options.recording);
     output_plan_read_folder(&plan, "the session", options.with, ".json");
-    bool good = session && faults.count == 0 && find_session_file(&options, &faults) && session_load(options.session, session, &faults);
+    bool good = session && faults.count == 0 && make_session_file(&options, &faults) && session_load(options.session, session, &faults);
     page = good ? make_page(options.session, session, options.with, &length, &faults) : NULL;
     good = page && (!options.html || output_write(options.html, page, length, &faults));
     good = good && (!options.pdf || write_pdf(options.pdf, page, length, &faults));

@@ -1,5 +1,7 @@
 #include "cli/torture_scene.h"
 
+#include "geom/random.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -20,7 +22,7 @@ static const struct {
 enum { SHAPES = sizeof shape / sizeof shape[0] };
 
 typedef struct Draws {
-    uint64_t state;
+    Random random;
     FILE *out;
     double lumen;            // [mm] radius at the inlet
     double finer;            // 1, or 2: twice the elements, half the step
@@ -28,12 +30,7 @@ typedef struct Draws {
 
 static double draw(Draws *draws, double low, double high)
 {
-    // SplitMix64 (Steele, Lea and Flood 2014): neighbouring seeds give runs that have nothing in common
-    uint64_t z = draws->state += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
-    z ^= z >> 31;
-    return low + (high - low) * (double)(z >> 11) / 9007199254740992.0;
+    return low + (high - low) * random_unit(&draws->random);
 }
 
 static double draw_log(Draws *draws, double low, double high) { return exp(draw(draws, log(low), log(high))); }
@@ -174,7 +171,7 @@ static TortureScene make(uint64_t seed, int64_t steps, int model_count, const ch
     static const double step_ms[] = {0.5, 1, 1, 2, 4};
     TortureScene scene = {0};
     size_t length = 0;
-    Draws draws = {.state = seed << 32, .finer = finer};
+    Draws draws = {.random = {seed << 32}, .finer = finer};
     draws.out = open_memstream(&scene.text, &length);
     if (!draws.out)
         return scene;

@@ -1,6 +1,7 @@
 // Measurements of a model for `bench wall`: points to wall, junctions against truth, noise.
 #include "cli/wall_bench.h"
 
+#include "geom/random.h"
 #include "geom/sort_doubles.h"
 #include "recon/phantom.h"
 #include "recon/tree_file.h"
@@ -115,28 +116,13 @@ TruthFigures wall_judge_junctions(const VesselTree *model, const Reach *reach, c
     return out;
 }
 
-// splitmix64, and Box and Muller's transformation.
-static double uniform(uint64_t *state)
-{
-    uint64_t z = (*state += UINT64_C(0x9e3779b97f4a7c15));
-    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return ((double)((z ^ (z >> 31)) >> 11) + 0.5) * 0x1p-53;
-}
-
-static double gauss(uint64_t *state)
-{
-    double u = uniform(state), v = uniform(state);
-    return sqrt(-2 * log(u)) * cos(2 * PI * v);
-}
-
 bool wall_write_jittered(const char *tree_path, double sigma_mm, uint64_t seed, const char *out_path, Faults *faults)
 {
     TreeFileInfo info = {0};
     VesselTree *tree = tree_file_load(tree_path, &info, faults);
-    uint64_t state = seed * 1000003;
+    Random random = {seed * 1000003};
     for (int64_t k = 0; tree && k < tree->point_count; k++) {
-        double x = gauss(&state), y = gauss(&state), z = gauss(&state);
+        double x = random_normal(&random), y = random_normal(&random), z = random_normal(&random);
         tree->point[k] = vec3_add_scaled(tree->point[k], sigma_mm, vec3(x, y, z));
     }
     bool good = tree && tree_file_save(tree, &info, out_path, faults);

@@ -4,6 +4,7 @@
 
 #include "base/same_math.h"
 #include "geom/blobby.h"
+#include "geom/random.h"
 #include "geom/sort_doubles.h"
 
 #include <stdlib.h>
@@ -27,20 +28,6 @@ struct LimTrialShape {
 };
 
 static const double ISO_LEVEL = 0.1;
-
-static double next_uniform(uint64_t *state)
-{
-    uint64_t z = (*state += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return ((double)((z ^ (z >> 31)) >> 11) + 0.5) / 9007199254740992.0;
-}
-
-static double next_normal(uint64_t *state)
-{
-    double u = next_uniform(state), v = next_uniform(state);
-    return sqrt(-2 * same_log(u)) * same_cos(2 * PI * v);
-}
 
 // Skeleton at s in [0, 1]; `size`: the width of all primitives, then the skeleton's own measures.
 static Vec3 skeleton(int which, int branch, double s, const double *size)
@@ -101,10 +88,10 @@ LimTrialShape *lim_trial_create(int which)
         return NULL;
     }
     Blobby truth = truth_of(shape);
-    uint64_t seed = 77 + (uint64_t)which;
+    Random random = {77 + (uint64_t)which};
     while (shape->pool_count < POOL) {
-        int j = (int)(next_uniform(&seed) * shape->blob_count);
-        double z = 2 * next_uniform(&seed) - 1, angle = 2 * PI * next_uniform(&seed), ring = sqrt(1 - z * z);
+        int j = (int)(random_open(&random) * shape->blob_count);
+        double z = 2 * random_open(&random) - 1, angle = 2 * PI * random_open(&random), ring = sqrt(1 - z * z);
         Vec3 x = vec3_add(shape->center[j], vec3(ring * same_cos(angle), ring * same_sin(angle), z));
         SurfacePoint foot = blobby_project(&truth, x, x);
         if (foot.converged && (which != 1 || fabs(foot.foot.x) <= 0.5 * size[1]))
@@ -132,14 +119,14 @@ void lim_trial_free(LimTrialShape *shape)
 }
 
 // Farthest point sampling from a random point of the pool, in a random half of it.
-static bool spread_points(const LimTrialShape *shape, uint64_t *seed, Vec3 *point)
+static bool spread_points(const LimTrialShape *shape, Random *random, Vec3 *point)
 {
     double *far = malloc(POOL * sizeof *far);
     if (!far)
         return false;
     for (int i = 0; i < POOL; i++)
-        far[i] = next_uniform(seed) < 0.5 ? 1e9 : -1;
-    int next = (int)(next_uniform(seed) * POOL);
+        far[i] = random_open(random) < 0.5 ? 1e9 : -1;
+    int next = (int)(random_open(random) * POOL);
     for (int k = 0; k < LIM_TRIAL_POINTS; k++) {
         Vec3 p = point[k] = shape->pool[next];
         int best = 0;
@@ -266,14 +253,15 @@ bool lim_trial_run(const LimTrialShape *shape, double sigma, uint64_t seed, cons
     *out = (LimTrial){0};
     LimFitOptions options = *given;
     options.target_mm = 3 * sigma;
+    Random random = {seed};
     Vec3 exact[N], noisy[N], *center = calloc((size_t)options.max_blobs + 1, sizeof *center);
     double noise[N], distance[N], approximate[N], *width = calloc((size_t)options.max_blobs + 1, sizeof *width);
-    bool good = center && width && spread_points(shape, &seed, exact);
+    bool good = center && width && spread_points(shape, &random, exact);
     Blobby truth = truth_of(shape);
     for (int i = 0; i < N && good; i++) {
         Vec3 g;
         blobby_gradient(&truth, exact[i], &g);
-        noise[i] = sigma * next_normal(&seed);
+        noise[i] = sigma * random_normal(&random);
         noisy[i] = vec3_add_scaled(exact[i], -noise[i], vec3_unit(g));
     }
     if (good) {

@@ -167,11 +167,11 @@ static bool build_bone(Shape *shape, const ShapeOptions *o)
     double r = o->radius_mm, half = 24 * r;
     if (!add_wave(shape, o, half))
         return false;
-    uint64_t state = shape->seed;
+    Random random = {shape->seed};
     for (int i = 0; i < (int)o->blocks; i++) {
         // first one side, then the other, then round about
-        double x = half * ((i + 0.5) / o->blocks * 1.6 - 0.8), around = i * PI * (3 - sqrt(5)), size = (2 + 2 * random_uniform(&state)) * r;
-        if (!shape_add_block(shape, vec3(x, 0, wave(o, x)), vec3(0, same_cos(around), same_sin(around)), vec3(size, size, size), o->gap_mm, &state))
+        double x = half * ((i + 0.5) / o->blocks * 1.6 - 0.8), around = i * PI * (3 - sqrt(5)), size = (2 + 2 * random_open(&random)) * r;
+        if (!shape_add_block(shape, vec3(x, 0, wave(o, x)), vec3(0, same_cos(around), same_sin(around)), vec3(size, size, size), o->gap_mm, &random))
             return false;
     }
     return true;

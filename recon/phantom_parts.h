@@ -6,6 +6,7 @@
 #ifndef SELDINGER_RECON_PHANTOM_PARTS_H
 #define SELDINGER_RECON_PHANTOM_PARTS_H
 
+#include "geom/random.h"
 #include "recon/phantom.h"
 
 enum { KNOTS = 128 };
@@ -81,10 +82,5 @@ bool aorta_grow(Shape *shape);
 bool shape_finish(Shape *shape);
 // shape_field, and which part is the largest there and where on it.
 double shape_field_of_part(const Shape *shape, Vec3 x, int *part, double *at);
-
-// splitmix64, uniform in (0, 1), and normal
-uint64_t random_bits(uint64_t *state);
-double random_uniform(uint64_t *state);
-double random_normal(uint64_t *state);
 
 #endif

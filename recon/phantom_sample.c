@@ -6,21 +6,6 @@
 
 // --- Samples ---
 
-// splitmix64
-uint64_t random_bits(uint64_t *state)
-{
-    uint64_t z = *state += 0x9E3779B97F4A7C15u;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-    return z ^ (z >> 31);
-}
-double random_uniform(uint64_t *state) { return ((double)(random_bits(state) >> 11) + 0.5) / 9007199254740992.0; }
-double random_normal(uint64_t *state)   // Box-Muller, one of the pair
-{
-    double a = random_uniform(state), b = random_uniform(state);
-    return sqrt(-2 * same_log(a)) * same_cos(2 * PI * b);
-}
-
 // From a point inside out along unit d to the surface; false where it is further than `most`.
 static bool march_out(const Shape *shape, Vec3 x, Vec3 d, double most, Vec3 *hit)
 {
@@ -41,7 +26,7 @@ typedef struct Sampler {
     const Shape *shape;
     VesselTree *tree;        // points grow behind the nodes
     int64_t capacity;
-    uint64_t state;
+    Random random;
     bool failed;
 } Sampler;
 
@@ -51,7 +36,7 @@ static void add_sample(Sampler *s, Vec3 p)
     if (s->shape->noise > 0) {
         Vec3 g;
         shape_field(s->shape, p, &g);
-        p = vec3_add_scaled(p, s->shape->noise * random_normal(&s->state), vec3_unit_or(g, vec3(0, 0, 0)));
+        p = vec3_add_scaled(p, s->shape->noise * random_normal(&s->random), vec3_unit_or(g, vec3(0, 0, 0)));
     }
     if (tree->point_count == s->capacity) {
         int64_t capacity = 2 * s->capacity + 1024;
@@ -69,7 +54,7 @@ static void add_sample(Sampler *s, Vec3 p)
 // Across the vessel, evenly over the cylinder's side; rays that leave into a branch or sac find the wall too late and are dropped.
 static void sample_side(Sampler *s, const Part *part, double at, double height)
 {
-    double phase = 2 * PI * random_uniform(&s->state), last = part->at[part->knot_count - 1];
+    double phase = 2 * PI * random_open(&s->random), last = part->at[part->knot_count - 1];
     int n = s->shape->points;
     for (int k = 0; k < n; k++) {
         double t = at + height * ((k + 0.5) / n - 0.5), angle = phase + k * PI * (3 - sqrt(5));
@@ -87,7 +72,7 @@ static void sample_cap(Sampler *s, const Part *part, double at, double side)
 {
     Station station = part_at(part, at);
     Vec3 d = vec3_scale(vec3_unit(station.tangent), side), e1 = vec3_normal_to(d), e2 = vec3_cross(d, e1), hit;
-    double phase = 2 * PI * random_uniform(&s->state);
+    double phase = 2 * PI * random_open(&s->random);
     int n = s->shape->points / 2;
     for (int k = 0; k < n; k++) {
         double z = (k + 0.5) / n, ring = sqrt(1 - z * z), angle = phase + k * PI * (3 - sqrt(5));
@@ -101,7 +86,7 @@ static void sample_cap(Sampler *s, const Part *part, double at, double side)
 static void sample_sac(Sampler *s, const Part *part, double at)
 {
     Station station = part_at(part, at);
-    double phase = 2 * PI * random_uniform(&s->state);
+    double phase = 2 * PI * random_open(&s->random);
     int n = s->shape->sac_points;
     for (int k = 0; k < n; k++) {
         double z = 1 - (2 * k + 1.0) / n, ring = sqrt(1 - z * z), angle = phase + k * PI * (3 - sqrt(5)), t;
@@ -160,7 +145,7 @@ VesselTree *shape_sample(const Shape *shape, Faults *faults)
         first[p] = nodes;
         nodes += count[p] = place_nodes(shape, p, at[p], NODES_PER_PART);
     }
-    Sampler s = {.shape = shape, .tree = room ? vessel_tree_create(nodes, 0, 0) : NULL, .state = shape->seed};
+    Sampler s = {.shape = shape, .tree = room ? vessel_tree_create(nodes, 0, 0) : NULL, .random = {shape->seed}};
     VesselTree *tree = s.tree;
     for (int p = 0; tree && p < shape->part_count; p++) {
         const Part *part = &shape->part[p];

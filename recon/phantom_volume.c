@@ -217,8 +217,8 @@ typedef struct Band {        // a slab; its faces are as blurred as the vessels'
 static Band place_band(const Shape *shape, const VolumeOptions *o)
 {
     const Part *trunk = &shape->part[0];
-    uint64_t state = o->seed * 0x9E3779B97F4A7C15u + 1;
-    double share = 0.2 + 0.6 * random_uniform(&state), z = 2 * random_uniform(&state) - 1, angle = 2 * PI * random_uniform(&state), voxel2 = 0;
+    Random random = {o->seed * RANDOM_STEP + 1};
+    double share = 0.2 + 0.6 * random_open(&random), z = 2 * random_open(&random) - 1, angle = 2 * PI * random_open(&random), voxel2 = 0;
     for (int k = 0; k < 3; k++)
         voxel2 += same_square(o->voxel_mm[k]) / 3;
     double ring = sqrt(1 - z * z);
@@ -245,7 +245,7 @@ static void finish_slice(void *context, long index)
 {
     const Finish *f = context;
     size_t plane = (size_t)f->volume->size[0] * (size_t)f->volume->size[1], first = (size_t)index * plane;
-    uint64_t state = f->options->seed + 2 * first * 0x9E3779B97F4A7C15u;   // two numbers a voxel, each a step of splitmix64
+    Random random = {f->options->seed + 2 * first * RANDOM_STEP};   // two numbers a voxel
     float low = HUGE_VALF, high = -HUGE_VALF;
     for (size_t i = first; i < first + plane; i++) {
         float *value = &f->volume->value[i];
@@ -254,7 +254,7 @@ static void finish_slice(void *context, long index)
             *value += (float)(f->options->band * band_at(&f->band, volume_point_of(f->volume, vec3((double)(at % nx), (double)(at / nx), (double)index))));
         }
         if (f->options->noise > 0)
-            *value += (float)(f->options->noise * random_normal(&state));
+            *value += (float)(f->options->noise * random_normal(&random));
         *value = fminf((float)f->options->saturate, fmaxf((float)f->options->clip, *value));
         if (f->options->contrast_grey > 0)
             *value = (float)fmin(255, fmax(0, floor(f->options->background_grey + f->options->contrast_grey * (double)*value + 0.5)));

@@ -41,21 +41,21 @@ typedef struct Growth {
     Bead *bead;
     int way_count, segment_count, bead_count, bead_capacity;
     double clearance;
-    uint64_t state;
+    Random random;
 } Growth;
 
-static double random_between(uint64_t *state, double low, double high) { return low + (high - low) * random_uniform(state); }
+static double random_between(Random *random, double low, double high) { return low + (high - low) * random_open(random); }
 
-static Vec3 random_direction(uint64_t *state)
+static Vec3 random_direction(Random *random)
 {
-    double z = random_between(state, -1, 1), angle = random_between(state, 0, 2 * PI), ring = sqrt(1 - z * z);
+    double z = random_between(random, -1, 1), angle = random_between(random, 0, 2 * PI), ring = sqrt(1 - z * z);
     return vec3(ring * same_cos(angle), ring * same_sin(angle), z);
 }
 
 // From x along d: first turned by `turn` towards `side`, then wandering. The radius goes from r0 to r within three of r0.
-static void draw(uint64_t *state, Vec3 x, Vec3 d, Vec3 side, double turn, double r0, double r, Draft *out)
+static void draw(Random *random, Vec3 x, Vec3 d, Vec3 side, double turn, double r0, double r, Draft *out)
 {
-    double step = r, bend = 3 * r, length = random_between(state, 6, 11) * r + 1.5 * (r0 - r);
+    double step = r, bend = 3 * r, length = random_between(random, 6, 11) * r + 1.5 * (r0 - r);
     Vec3 curve = {0, 0, 0};
     *out = (Draft){.count = (int)ceil(length / step), .radius = r};
     for (int i = 0; i < out->count; i++) {
@@ -66,7 +66,7 @@ static void draw(uint64_t *state, Vec3 x, Vec3 d, Vec3 side, double turn, double
             d = vec3_unit(vec3_add(vec3_scale(d, same_cos(by)), vec3_scale(across, same_sin(by))));
             turn -= by;
         } else {
-            curve = vec3_add_scaled(vec3_scale(curve, 0.75), 0.12 / r, random_direction(state));
+            curve = vec3_add_scaled(vec3_scale(curve, 0.75), 0.12 / r, random_direction(random));
             double sharp = vec3_norm(curve) * 4 * r;   // no tighter than four radii
             d = vec3_unit(vec3_add_scaled(d, step / fmax(1, sharp), vec3_add_scaled(curve, -vec3_dot(curve, d), d)));
         }
@@ -152,12 +152,13 @@ static bool split(Growth *g, int tip, bool *failed)
     Vec3 x = knot_center(way->knot[parent.last]), d = parent.direction, e1 = vec3_normal_to(d), e2 = vec3_cross(d, e1);
     double r0 = parent.radius, zone = 5 * r0;
     for (int attempt = 0; attempt < 60 && way->count + SEGMENT_KNOTS < KNOTS; attempt++) {
-        double ratio = random_between(&g->state, 0.5, 1), r1 = r0 / same_cbrt(1 + ratio * ratio * ratio), r2 = ratio * r1;
-        double q0 = same_square(same_square(r0)), q1 = same_square(same_square(r1)), q2 = same_square(same_square(r2)), angle = random_between(&g->state, 0, 2 * PI);
+        double ratio = random_between(&g->random, 0.5, 1), r1 = r0 / same_cbrt(1 + ratio * ratio * ratio), r2 = ratio * r1;
+        double q0 = same_square(same_square(r0)), q1 = same_square(same_square(r1)), q2 = same_square(same_square(r2));
+        double angle = random_between(&g->random, 0, 2 * PI);
         Vec3 side = vec3_add(vec3_scale(e1, same_cos(angle)), vec3_scale(e2, same_sin(angle)));
         Draft one, two;
-        draw(&g->state, x, d, side, same_acos((q0 + q1 - q2) / (2 * r0 * r0 * r1 * r1)), r0, r1, &one);
-        draw(&g->state, x, d, vec3_negate(side), same_acos((q0 + q2 - q1) / (2 * r0 * r0 * r2 * r2)), r2, r2, &two);
+        draw(&g->random, x, d, side, same_acos((q0 + q1 - q2) / (2 * r0 * r0 * r1 * r1)), r0, r1, &one);
+        draw(&g->random, x, d, vec3_negate(side), same_acos((q0 + q2 - q1) / (2 * r0 * r0 * r2 * r2)), r2, r2, &two);
         if (!fits(g, &one, tip, zone, NULL) || !fits(g, &two, tip, zone, &one))
             continue;
         double first[4] = {x.x, x.y, x.z, r2};
@@ -172,14 +173,14 @@ static bool split(Growth *g, int tip, bool *failed)
 static bool add_sac(Growth *g, Shape *shape)
 {
     for (int attempt = 0; attempt < 300; attempt++) {
-        const Bead *seat = &g->bead[(int)(random_uniform(&g->state) * g->bead_count)];
+        const Bead *seat = &g->bead[(int)(random_open(&g->random) * g->bead_count)];
         const Segment *s = &g->segment[seat->segment];
-        double r = seat->radius, size = random_between(&g->state, 1.4, 2.2) * r, far = 1.35 * r + size;
+        double r = seat->radius, size = random_between(&g->random, 1.4, 2.2) * r, far = 1.35 * r + size;
         int k = s->first + (int)(seat->arc / s->radius + 0.5) - 1;
         if (seat->arc < 4 * r || s->length - seat->arc < 4 * r || k <= s->first || k >= s->last)
             continue;
         Vec3 along = vec3_unit(vec3_sub(knot_center(g->way[s->way].knot[k + 1]), knot_center(g->way[s->way].knot[k - 1])));
-        Vec3 side = random_direction(&g->state);
+        Vec3 side = random_direction(&g->random);
         side = vec3_unit(vec3_add_scaled(side, -vec3_dot(side, along), along));
         Bead ball = {.center = vec3_add_scaled(seat->center, far, side), .radius = size, .segment = seat->segment};
         bool good = true;
@@ -210,9 +211,9 @@ static bool add_sac(Growth *g, Shape *shape)
     return true;
 }
 
-bool shape_add_block(Shape *shape, Vec3 x, Vec3 d, Vec3 half, double gap_mm, uint64_t *state)
+bool shape_add_block(Shape *shape, Vec3 x, Vec3 d, Vec3 half, double gap_mm, Random *random)
 {
-    Vec3 turned = random_direction(state);
+    Vec3 turned = random_direction(random);
     ShapeBlock block = {.half = half, .axis = {d}};
     bool settled = false;
     block.axis[1] = vec3_unit(vec3_add_scaled(turned, -vec3_dot(turned, d), d));
@@ -237,12 +238,12 @@ bool shape_add_block(Shape *shape, Vec3 x, Vec3 d, Vec3 half, double gap_mm, uin
 bool random_tree_grow(Shape *shape, const RandomTreeOptions *o, const char *file, Faults *faults)
 {
     int most = o->branches + 2, before = faults->count;
-    Growth g = {.way = calloc((size_t)most, sizeof(Way)), .segment = calloc((size_t)most, sizeof(Segment)), .clearance = 0.5 * o->radius_mm, .state = o->seed};
+    Growth g = {.way = calloc((size_t)most, sizeof(Way)), .segment = calloc((size_t)most, sizeof(Segment)), .clearance = 0.5 * o->radius_mm, .random = {o->seed}};
     bool failed = !g.way || !g.segment;
     const double root[4] = {0, 0, 0, o->radius_mm};
     if (!failed) {
         Draft trunk;
-        draw(&g.state, vec3(0, 0, 0), vec3(0, 0, 1), vec3(1, 0, 0), 0, o->radius_mm, o->radius_mm, &trunk);
+        draw(&g.random, vec3(0, 0, 0), vec3(0, 0, 1), vec3(1, 0, 0), 0, o->radius_mm, o->radius_mm, &trunk);
         failed = !start_way(&g, -1, root, vec3(0, 0, 1)) || !take(&g, &trunk, 0, -1);
     }
     while (!failed && g.segment_count + 2 <= o->branches) {
@@ -265,12 +266,12 @@ bool random_tree_grow(Shape *shape, const RandomTreeOptions *o, const char *file
     for (int i = 0; i < o->sacs && !failed; i++)
         failed = !add_sac(&g, shape);
     for (int i = 0, left = 40; i < o->blocks && !failed; failed = left == 0) {
-        const Bead *seat = &g.bead[(int)(random_uniform(&g.state) * g.bead_count)];
+        const Bead *seat = &g.bead[(int)(random_open(&g.random) * g.bead_count)];
         double size = 2 * o->radius_mm;
         double half[3];   // drawn one after the other: compilers differ in the order within an initialiser
         for (int k = 0; k < 3; k++)
-            half[k] = random_between(&g.state, 0.5, 1.5) * size;
-        bool added = shape_add_block(shape, seat->center, random_direction(&g.state), vec3(half[0], half[1], half[2]), o->gap_mm, &g.state);
+            half[k] = random_between(&g.random, 0.5, 1.5) * size;
+        bool added = shape_add_block(shape, seat->center, random_direction(&g.random), vec3(half[0], half[1], half[2]), o->gap_mm, &g.random);
         i += added;
         left = added ? 40 : left - 1;
     }

@@ -6,6 +6,7 @@
 #ifndef SELDINGER_RECON_RANDOM_TREE_H
 #define SELDINGER_RECON_RANDOM_TREE_H
 
+#include "geom/random.h"
 #include "recon/phantom_parts.h"
 
 typedef struct RandomTreeOptions {
@@ -21,6 +22,6 @@ typedef struct RandomTreeOptions {
 bool random_tree_grow(Shape *shape, const RandomTreeOptions *options, const char *file, Faults *faults);
 // Puts a block beside a vessel: it is `gap_mm` from the nearest wall of the shape, near x in direction d of it. False where no such place is found or
 // memory lacks.
-bool shape_add_block(Shape *shape, Vec3 x, Vec3 d, Vec3 half, double gap_mm, uint64_t *state);
+bool shape_add_block(Shape *shape, Vec3 x, Vec3 d, Vec3 half, double gap_mm, Random *random);
 
 #endif

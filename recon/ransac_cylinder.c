@@ -18,28 +18,12 @@
 
 // --- random numbers ---
 
-static const uint64_t random_step = 0x9e3779b97f4a7c15u;
-
-uint64_t random_next(Random *random)
-{
-    uint64_t z = random->state += random_step;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-}
-
-// As after so many calls of random_next().
-static void random_skip(Random *random, int numbers) { random->state += (uint64_t)numbers * random_step; }
-
 Random random_from_seed(uint64_t seed, uint64_t stream)
 {
     Random random = {seed ^ (stream * 0xd1342543de82ef95u)};
     random.state = random_next(&random);
     return random;
 }
-
-int random_index(Random *random, int count) { return (int)(((random_next(random) >> 32) * (uint64_t)count) >> 32); }
-double random_unit(Random *random) { return (double)(random_next(random) >> 11) * 0x1p-53; }
 
 // --- circles ---
 

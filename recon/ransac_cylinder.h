@@ -4,6 +4,7 @@
 #define SELDINGER_RECON_RANSAC_CYLINDER_H
 
 #include "geom/linear.h"
+#include "geom/random.h"
 
 #include <stdint.h>
 
@@ -16,13 +17,7 @@ typedef struct Cylinder {
     double height;           // [mm]
 } Cylinder;
 
-typedef struct Random {      // splitmix64
-    uint64_t state;
-} Random;
-Random random_from_seed(uint64_t seed, uint64_t stream);
-uint64_t random_next(Random *random);
-int random_index(Random *random, int count);   // 0 … count-1, count >= 1
-double random_unit(Random *random);            // [0, 1)
+Random random_from_seed(uint64_t seed, uint64_t stream);   // series of the same seed have nothing in common
 
 typedef struct RansacOptions {
     double threshold;        // [mm] distance from the cylinder up to which a point is an inlier

@@ -46,16 +46,12 @@ double sheath_straightening(const BeamRest *rest, int index, double coordinate)
     return share > 0 ? own + share * (straightening(rest, index - 1) - own) : own;
 }
 
-// Rest length outside, kept above a hundredth of the element.
-static double outside_of(double length, double coordinate)
-{
-    return fmax(length + coordinate, 0.01 * length);
-}
+double sheath_outside(double length, double coordinate) { return fmax(length + coordinate, 0.01 * length); }
 
 void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction, double coordinate, Quat q1, Vec3 x2, Quat q2,
                     double ahead, SheathElement *element)
 {
-    double length = rest->length[index], outside = outside_of(length, coordinate + ahead), now = outside_of(length, coordinate);
+    double length = rest->length[index], outside = sheath_outside(length, coordinate + ahead), now = sheath_outside(length, coordinate);
     double bending = rest->bending[index], own = straightening(rest, index), stored = own * (length - outside), border = 0, sum, slope, near_slope, far_slope;
     double past = outside - length, share = share_behind(rest, index, past, &sum), softer = 0;
     Vec3 rest_here = own_curvature(rest, index), rest_outside = rest_here;

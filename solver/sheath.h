@@ -21,6 +21,9 @@ typedef struct SheathElement {       // the element across the mouth
 // the rest shape passes the mouth: what it takes to straighten the wire goes from the one element's to the other's.
 extern const double sheath_border_share;
 
+// [mm] rest length outside of an element of `length` whose inner node is at `coordinate`, kept above a hundredth of the element.
+double sheath_outside(double length, double coordinate);
+
 // `index`: the element. `coordinate` [mm] of its inner node along the line, 0 at the mouth, negative inside (a little past the mouth
 // is allowed); q1 of that node (aligned with the line); x2, q2 of the outer one. `ahead` [mm]: by how much the inner node will have moved
 // at the step's end; lengths, hence stiffness, are taken there, because near the mouth they change fast.

@@ -19,7 +19,7 @@
 static const double TURN_MAX = 0.3;              // [rad]
 // A chord turned by 0.02 rad stretches by 2e-4 in a linear step, which a free wire would keep as energy: another linearisation costs it 30 us.
 // Among contacts it costs a contact solve, and nothing is seen to gain below 0.04.
-static const double NEWTON_MOTION = 0.005, NEWTON_MOTION_IN_CONTACT = 0.04;      // [rad]
+static const double NEWTON_MOTION = 0.005, NEWTON_MOTION_IN_CONTACT = 0.04, NEWTON_MOTION_AT_MOUTH = 0.002;      // [rad]
 static const double SWING_MOTION = 1e-5;         // [rad] nothing turns: displaced and turned chords are the same
 enum { NEWTON_MAX = 4 };
 // A tip that snaps from one wall to another lands where nobody linearised: [mm] of true penetration that asks for another linearisation there, up to
@@ -649,6 +649,18 @@ static double largest_turn(const Stepper *s)
     return sqrt(largest);
 }
 
+// [rad] The turn of the chord from the mouth to the first node outside: a short one stretches by as much as a long one.
+static double turn_at_mouth(const Stepper *s)
+{
+    int i = s->first_free;
+    if (!s->has_sheath || i >= s->state.node_count)
+        return 0;
+    const double *u = s->u + row_of(s, i), *k = s->linearised + row_of(s, i);
+    Vec3 moves = vec3_cross(vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]), s->axis[0]);
+    double outside = vec3_dot(vec3_sub(s->state.position[i], s->mouth), s->axis[0]) + vec3_dot(vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]), s->axis[0]);
+    return vec3_norm(moves) / fmax(outside, sheath_border_share * s->wire.length[i - 1]);
+}
+
 // Where a border of the rest shape is at the mouth, straightening takes more on one side of it than on the other, and the wire may come to rest with the border
 // there. Is that force another one where the solution has the border than where it was taken? Then it is taken there, or first between the two.
 static bool misjudges_border(Stepper *s)
@@ -658,9 +670,9 @@ static bool misjudges_border(Stepper *s)
         return false;
     const BeamRest *rest = &s->beam.rest;
     double start = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]), width = sheath_border_share * rest->length[i];
-    double taken = start + s->mouth_ahead, ends = start + s->u[row_of(s, i)], least = 0.01 * rest->length[i];
+    double taken = start + s->mouth_ahead, ends = start + s->u[row_of(s, i)];
     // the tool has not gone as the hand was told to: the element's stiffness was that of another length
-    double length = fmax(rest->length[i] + taken, least), real = fmax(rest->length[i] + ends, least);
+    double length = sheath_outside(rest->length[i], taken), real = sheath_outside(rest->length[i], ends);
     if (s->hand[0].slips[0] && fabs(length - real) > MOUTH_LENGTH * fmin(length, real)) {
         s->mouth_ahead = ends - start;
         return true;
@@ -904,7 +916,7 @@ static void solve_system(Stepper *s)
 // the step's start on.
 static void take_back(Stepper *s)
 {
-    while (s->tool_count > 1 && tools_leave_back(s)) {
+    while (s->tool_count > 1 && (tools_leave_back(s) || tools_come_out(s))) {
         begin(s);
         solve_system(s);
     }
@@ -928,7 +940,8 @@ void step_contact(Stepper *s)
     solve_contained(s);
     take_back(s);
     for (int iteration = 1; iteration < 2 * s->newton_max && !s->has_failed && !is_spent(s); iteration++) {
-        bool turns = s->turn > (s->report.active > 0 ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION);
+        bool touches = s->report.active > 0;
+        bool turns = s->turn > (touches ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION) || (!touches && turn_at_mouth(s) > NEWTON_MOTION_AT_MOUTH);
         s->overshoots = stepper_overshoot(s) > OVERSHOOT || self_contact_depth(s, true) > SELF_OVERSHOOT;
         if (!(turns && iteration < s->newton_max) && !s->overshoots)
             break;

@@ -153,6 +153,7 @@ struct Stepper {
     double mouth_ahead;      // [mm] by how much the node behind the mouth is taken to move in this step
     double turn;             // [rad] largest of the solution against the iterate
     bool overshoots;         // the solution goes through the wall, or may
+    unsigned tips_changed;   // bit k: the node at the tip around tool k has come or gone since the step was fed
     bool blocked;            // no part of it could be followed
     double energy_before;    // [mJ] at x_n, elastic and kinetic; < 0: not asked for yet
     double depth;            // [mm] outside the wall at the iterate

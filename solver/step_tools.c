@@ -445,9 +445,43 @@ bool tools_leave_back(Stepper *s)
         double ends = s->start_slide[tip * s->state.inner_count + k - 1] + s->u[row_of(s, tip) + (size_t)unknown_of(k)];
         if (t->wire.s[t->first] - ends > TAKE_BACK * t->wire.length[t->first - 1])
             continue;
+        s->tips_changed |= 1u << k;
         stepper_go_back(s);
         s->first_free -= t->start < s->first_free;
         leave(s, k);
+        return true;
+    }
+    return false;
+}
+
+// The node of tool k that would come out next: the chain's node that is the tip around it (-1: the tool ends before that), and its own number.
+static int next_out(const Stepper *s, int k, int *own)
+{
+    const Tool *t = &s->tool[k];
+    bool carries = tools_carries(t);
+    *own = carries ? t->first - 1 : t->wire.node_count - 1;
+    if (carries)
+        return t->start - 1;
+    int tip = s->state.node_count - 1;
+    while (tip > 0 && s->carrier[tip] > k)
+        tip--;
+    return t->inside > tip ? tip : -1;
+}
+
+bool tools_come_out(Stepper *s)
+{
+    for (int k = 1; k < s->tool_count && !s->has_failed; k++) {
+        int j, tip = next_out(s, k, &j);
+        if (tip < s->first_free || j < 1 || s->tips_changed & 1u << k)
+            continue;
+        size_t i = (size_t)tip * (size_t)s->state.inner_count + (size_t)k - 1;
+        double end = s->tool[k].wire.s[j], length = s->tool[k].wire.length[j - 1];
+        double began = end - s->start_slide[i], ends = began - s->u[row_of(s, tip) + (size_t)unknown_of(k)];
+        if (ends < JOIN * length || began < 2 * TAKE_BACK * length)
+            continue;
+        s->tips_changed |= 1u << k;
+        stepper_go_back(s);
+        join(s, k, began);
         return true;
     }
     return false;
@@ -459,18 +493,15 @@ static void pass_tip(Stepper *s, int k, double ahead)
     Tool *t = &s->tool[k];
     for (;;) {
         bool carries = tools_carries(t);
-        int tip = carries ? t->start - 1 : s->state.node_count - 1, j = carries ? t->first - 1 : t->wire.node_count - 1;
-        if (!carries)
-            for (; tip > 0 && s->carrier[tip] > k; tip--)
-                ;
-        if (t->inside <= tip && !carries)
-            return;          // its tip is behind
+        int j, tip = next_out(s, k, &j);
+        if (tip < 0)
+            return;
         // by the hands' commands or by its last motion, whichever takes it further back: friction may hold it against its hand
         double out = *slide_of(s, tip, k), at = out - fmin(ahead, -slide_rate(s, tip, k) * s->dt);
         if (j > 0 && t->wire.s[j] - fmax(at, out) > JOIN * t->wire.length[j - 1])
             join(s, k, t->wire.s[j] - out);
-        else if (carries && t->wire.s[t->first] - at < LEAVE * t->wire.length[t->first - 1])
-            leave(s, k);
+        else if (carries && t->wire.s[t->first] - at < LEAVE * t->wire.length[t->first - 1] && vec3_norm2(s->force[t->start]) == 0)
+            leave(s, k);     // one that the wall holds would spring through it without its node
         else
             return;
     }
@@ -531,6 +562,7 @@ void tools_feed(Stepper *s)
         command->advance = fmin(most, fmax(least, command->advance));
         around = t->inserted + command->advance - t->wire.total_length;
     }
+    s->tips_changed = 0;
     pass(s);
 }
 

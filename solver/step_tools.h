@@ -56,6 +56,9 @@ double tools_friction_work(const Stepper *s);      // [mJ] that it took in this 
 
 // Does a node of the solution come to lie behind the tip that it came out of? Then it leaves the chain, and the step begins anew. Whether one did.
 bool tools_leave_back(Stepper *s);
+// Has a tip come out so far that it needs a node of its own, which meets the wall? Then that joins the chain where the step began, and the step begins anew.
+// Whether one did; once in a step for each tool, and not for one that has just left.
+bool tools_come_out(Stepper *s);
 // Unit rows where a tool is no unknown.
 void tools_leave_out(Stepper *s);
 // The linear system of coaxial tools, all but what contacts, loads and constraints add.

@@ -140,6 +140,9 @@ static void sessions_and_tables_are_kept(void **state)
     put("other.json", "{}");
     refused("report session.json --html session.json", "--html would overwrite the session session.json");
     refused("report session.json --html other.json", "--html would overwrite the session ./other.json");
+    must_run("run tube.yaml --duration-s 0.01 --record recording.h5 --quiet");
+    refused("report recording.h5 --html recording.h5", "--html would overwrite the recording recording.h5");
+    refused("report recording.h5 --html recording.json", "--html would overwrite the session recording.json");      // which is made first
     refused("report session.json --html h.pdf --pdf h.pdf", "--html and --pdf would write the same file");
     refused("bench collision --json c.svg --chart c.svg", "--json and --chart would write the same file");
     refused("bench fit --tables45 --tree tree.h5 --json tree.h5", "--json would overwrite --tree tree.h5");

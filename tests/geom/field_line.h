@@ -40,7 +40,7 @@ static inline VesselTree *field_tree_along(const Vec3 *line, int node_count, int
             t->blob_amplitude[at] = a;
         }
         for (int k = 0; k < extra; k++, at++) {
-            t->blob_center[at] = vec3_add_scaled(t->center[i], radius, random_unit(&seed));
+            t->blob_center[at] = vec3_add_scaled(t->center[i], radius, random_unit_vector(&seed));
             t->blob_width[at] = random_in(&seed, 0.5, 1.2) * radius;
             t->blob_amplitude[at] = random_in(&seed, -0.08, 0.08);
         }

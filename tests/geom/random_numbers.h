@@ -21,7 +21,7 @@ static inline Vec3 random_in_box(uint64_t *state, double half)
     return vec3(x, y, z);
 }
 
-static inline Vec3 random_unit(uint64_t *state)
+static inline Vec3 random_unit_vector(uint64_t *state)
 {
     for (;;) {
         Vec3 v = random_in_box(state, 1);

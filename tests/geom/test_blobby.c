@@ -126,13 +126,13 @@ static void sphere_is_exact(void **state)
     (void)state;
     uint64_t seed = 2;
     for (int trial = 0; trial < 500; trial++) {
-        Vec3 c = random_in_box(&seed, 5), u = random_unit(&seed);
+        Vec3 c = random_in_box(&seed, 5), u = random_unit_vector(&seed);
         double r = random_in(&seed, 0.2, 3), rho = blob_width_for_radius(r, 0.1), d = random_in(&seed, 0.001, 40) * (trial % 2 ? 1 : 0.02 * r);
         Blobby one = {.count = 1, .center = &c, .width = &rho, .iso_level = 0.1};
         Vec3 x = vec3_add_scaled(c, d, u);
         // from nowhere, and from a last contact somewhere else on the sphere
         for (int warm = 0; warm < 2; warm++) {
-            SurfacePoint s = blobby_project(&one, x, warm ? vec3_add_scaled(c, r, random_unit(&seed)) : x);
+            SurfacePoint s = blobby_project(&one, x, warm ? vec3_add_scaled(c, r, random_unit_vector(&seed)) : x);
             assert_true(s.converged);
             check_on_surface(&one, x, &s);
             assert_near(s.distance, r - d, 1e-9 * (1 + d));

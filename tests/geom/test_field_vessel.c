@@ -83,7 +83,7 @@ static void one_blob_is_a_sphere(void **state)
     Vessel *v = make(t, 0);
     uint64_t seed = 14;
     for (int trial = 0; trial < 1000; trial++) {
-        Vec3 u = random_unit(&seed);
+        Vec3 u = random_unit_vector(&seed);
         double d = random_in(&seed, 0.3, trial % 2 ? 2.5 : 30);
         u.x = u.x > -0.6 ? -0.6 - fabs(u.x) : u.x;   // downstream of the inlet, which looks along -x
         u = vec3_unit(u);
@@ -149,7 +149,7 @@ static Twin twin_of(const VesselTree *t, Vec3 x, int node)
     uint64_t seed = 77;
     for (int trial = 0; trial < 60; trial++) {
         int cell = node;
-        Vec3 start = vec3_add_scaled(x, trial == 0 ? 1e-3 : 1.2, random_unit(&seed));
+        Vec3 start = vec3_add_scaled(x, trial == 0 ? 1e-3 : 1.2, random_unit_vector(&seed));
         SurfacePoint s = {.foot = start};
         for (int k = 0; k < 5; k++) {
             Blobby blobs = blobby_of(t, cell);
@@ -302,7 +302,7 @@ static void derivatives_of_the_gap(void **state)
     int checked = 0;
     double worst_normal = 0, worst_bend = 0;
     for (int trial = 0; trial < 1500; trial++) {
-        Vec3 c = t->center[5 + trial % 50], x = vec3_add_scaled(c, random_in(&seed, 0.6, 1.2), random_unit(&seed));
+        Vec3 c = t->center[5 + trial % 50], x = vec3_add_scaled(c, random_in(&seed, 0.6, 1.2), random_unit_vector(&seed));
         VesselMemory memory = {.node = -1};
         VesselHit hit;
         for (int k = 0; k < 2; k++)    // the Hessian is that of the last evaluation: asked again, of the foot
@@ -510,7 +510,7 @@ static void nowhere_is_survived(void **state)
         vessel_query(v, 1, &x, 1, &memory, &hit);
         assert_true(hit.gap == hit.gap && vec3_is_finite(hit.normal));
         (void)v->locate(v, x, -1);
-        x = vec3_add_scaled(t->center[10], 0.8, random_unit(&seed));
+        x = vec3_add_scaled(t->center[10], 0.8, random_unit_vector(&seed));
         vessel_query(v, 1, &x, 5, &memory, &hit);
         VesselHit fresh = ask(v, x, 10, 5);
         assert_true(fabs(hit.gap - fresh.gap) < 1e-6);
@@ -524,7 +524,7 @@ static void nowhere_is_survived(void **state)
     }
     for (int trial = 0; trial < 300; trial++) {      // from outside, also of all supports, the answer leads home
         int node = 5 + trial % 50, steps = 0;
-        Vec3 x = vec3_add_scaled(t->center[node], random_in(&seed, 1.5, 6), random_unit(&seed));
+        Vec3 x = vec3_add_scaled(t->center[node], random_in(&seed, 1.5, 6), random_unit_vector(&seed));
         VesselMemory m = {.node = node};
         VesselHit hit;
         do {

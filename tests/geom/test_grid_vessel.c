@@ -134,8 +134,8 @@ static void turned_and_scaled(void **state)
     uint64_t seed = 5;
     for (int trial = 0; trial < 8; trial++) {
         double scale = trial % 4 == 1 ? 0.01 : trial % 4 == 2 ? 1000 : 1;
-        Vec3 n = trial == 3 ? vec3(0, -1, 0) : trial == 0 ? vec3(0, 1, 0) : random_unit(&seed);
-        Sampled *s = sample_bend(trial % 4 == 0 || trial == 3 ? vec3(1, 0, 0) : random_unit(&seed), n, true, scale, 0.1, 0.5);
+        Vec3 n = trial == 3 ? vec3(0, -1, 0) : trial == 0 ? vec3(0, 1, 0) : random_unit_vector(&seed);
+        Sampled *s = sample_bend(trial % 4 == 0 || trial == 3 ? vec3(1, 0, 0) : random_unit_vector(&seed), n, true, scale, 0.1, 0.5);
         Errors e = errors_of(s, 0.45 * scale);
         e.gap /= scale;
         check_bounds(&e, 0.1, 0.45);
@@ -151,7 +151,7 @@ static void sides_are_right(void **state)
     for (int trial = 0; trial < 4; trial++) {
         // cells so small that whole blocks lie within the lumen
         double cell = trial % 2 ? 0.03 : 0.11, band = trial % 2 ? 0.1 : 0.3, reach = trial < 2 ? 1e9 : 0.05;
-        Sampled *s = sample_bend(random_unit(&seed), random_unit(&seed), true, 1, cell, band);
+        Sampled *s = sample_bend(random_unit_vector(&seed), random_unit_vector(&seed), true, 1, cell, band);
         int inside = 0, outside = 0, far = 0, unsure = 0;
         for (int i = 0; i < 40000; i++) {
             Vec3 x = vec3_add(s->center[(int)random_in(&seed, 0, BALLS)], random_in_box(&seed, i % 3 ? 1.1 : i % 2 ? 5 : 200));
@@ -206,7 +206,7 @@ static void memory_changes_nothing(void **state)
     VesselMemory memory = {.node = -1};
     int far = 0, near = 0;
     for (int i = 0; i < 50000; i++) {
-        Vec3 step = vec3_scale(random_unit(&seed), i % 50 ? 0.01 : 0.3), next = vec3_add(x, step);
+        Vec3 step = vec3_scale(random_unit_vector(&seed), i % 50 ? 0.01 : 0.3), next = vec3_add(x, step);
         if (ask(s->exact, next, 1e9).gap > -0.2)
             x = next;
         VesselHit warm, fresh = ask(s->grid, x, 0.15), exact = ask(s->exact, x, 1e9);

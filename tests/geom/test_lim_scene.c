@@ -159,7 +159,7 @@ static double slide(const VesselTree *t, const Course *c, LimField field, Vec3 (
     for (int i = 0; i < POINTS; i++) {
         s[i] = 3 + (c->length[c->count - 1] - 18) * i / POINTS;
         x[i] = place(t, c, s[i]);
-        out[i] = random_unit(&seed);
+        out[i] = random_unit_vector(&seed);
         memory[i] = (VesselMemory){.node = -1};
     }
     for (int step = 0; step < STEPS; step++) {

@@ -169,7 +169,7 @@ static void one_blob_is_a_sphere(void **state)
     Vessel *v = lim_vessel_create(t);
     uint64_t seed = 14;
     for (int trial = 0; trial < 1000; trial++) {
-        Vec3 u = random_unit(&seed);
+        Vec3 u = random_unit_vector(&seed);
         double d = random_in(&seed, 0.3, trial % 2 ? 2.5 : 30);
         if (u.x > -0.6)
             u.x = -0.6 - fabs(u.x);   // downstream of the inlet, which looks along -x, and of the zone in which the section there is carried on
@@ -242,7 +242,7 @@ static void derivatives_of_the_gap(void **state)
     uint64_t seed = 16;
     int checked = 0;
     for (int trial = 0; trial < 2000; trial++) {
-        Vec3 c = t->center[5 + trial % 50], x = vec3_add_scaled(c, random_in(&seed, 0.6, 1.2), random_unit(&seed));
+        Vec3 c = t->center[5 + trial % 50], x = vec3_add_scaled(c, random_in(&seed, 0.6, 1.2), random_unit_vector(&seed));
         VesselHit hit = ask(v, x, -1, 5);
         // well inside its own focal distance, so that differences stay with one side
         if (fabs(hit.gap) > 0.4 || fabs(sym3_trace(&hit.hessian)) > 6)
@@ -282,7 +282,7 @@ static void back_from_outside(void **state)
         uint64_t seed = 17;
         for (int trial = 0; trial < 300; trial++) {
             int node = 5 + trial % 50;
-            Vec3 x = vec3_add_scaled(t->center[node], random_in(&seed, 1.5, 6), random_unit(&seed));
+            Vec3 x = vec3_add_scaled(t->center[node], random_in(&seed, 1.5, 6), random_unit_vector(&seed));
             VesselMemory memory = {.node = node};
             VesselHit hit;
             int steps = 0;
@@ -397,7 +397,7 @@ static void moved_and_mirrored_scenes(void **state)
             assert_near(hit[0].gap, hit[2].gap, 1e-11);
             assert_true(vec3_distance(quat_rotate(q, hit[0].normal), hit[1].normal) < 1e-7);
             assert_true(vec3_distance(mirrored(hit[0].normal), hit[2].normal) < 1e-10);
-            Vec3 u = random_unit(&seed);
+            Vec3 u = random_unit_vector(&seed);
             assert_near(sym3_quadratic(&hit[0].hessian, u), sym3_quadratic(&hit[1].hessian, quat_rotate(q, u)), 1e-4);   // of the last evaluation
             assert_near(sym3_quadratic(&hit[0].hessian, u), sym3_quadratic(&hit[2].hessian, mirrored(u)), 1e-8);
         }
@@ -542,7 +542,7 @@ static void far_is_far_in_a_taper(void **state)
         uint64_t seed = 23;
         int far = 0;
         for (int run = 0; run < 400; run++) {
-            Vec3 x = vec3(random_in(&seed, 2, N - 3), 0, 0), way = vec3_scale(random_unit(&seed), random_in(&seed, 0.01, 0.3));
+            Vec3 x = vec3(random_in(&seed, 2, N - 3), 0, 0), way = vec3_scale(random_unit_vector(&seed), random_in(&seed, 0.01, 0.3));
             VesselMemory memory = {.node = -1};
             double reach = random_in(&seed, 0.1, 1);
             for (int step = 0; step < 30; step++, x = vec3_add(x, way)) {
@@ -619,7 +619,7 @@ static void planes_against_walk(void **state)
     int moved = 0;
     for (int trial = 0; trial < 20000; trial++) {
         int node = 1 + trial % (ALL - 1), hops = lim_vessel_default_options().hops;
-        Vec3 x = vec3_add_scaled(t->center[node], t->radius[node] * random_in(&seed, 0, 1.19), random_unit(&seed));
+        Vec3 x = vec3_add_scaled(t->center[node], t->radius[node] * random_in(&seed, 0, 1.19), random_unit_vector(&seed));
         int walked = power_walk(t, x, node, hops), asked = ask(v, x, node, 0.5).node;
         double d = power_distance(x, t->center[walked], t->radius[walked]) - power_distance(x, t->center[asked], t->radius[asked]);
         assert_true(asked == walked || fabs(d) < 1e-5);   // planes are of single precision

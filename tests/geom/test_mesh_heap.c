@@ -34,7 +34,7 @@ static void questions_make_no_heap_call(void **state)
             long before = heap_calls();
             heap_watch(true);
             for (int i = 0; i < 2000; i++) {     // the first among them, and wide jumps
-                x = i % 100 ? vec3_add(x, vec3_scale(random_unit(&seed), 0.05)) : random_in_box(&seed, 3);
+                x = i % 100 ? vec3_add(x, vec3_scale(random_unit_vector(&seed), 0.05)) : random_in_box(&seed, 3);
                 vessel_query(vessel, 1, &x, i % 2 ? 0.2 : HUGE_VAL, &memory, &hit);
                 vessel->locate(vessel, x, i % 3 ? memory.node : -1);
             }

@@ -174,7 +174,7 @@ static void agrees_with_brute_force(void **state)
             if (i % 2) {
                 const int *c = m->triangle[(int)random_in(&seed, 0, m->triangle_count)];
                 x = vec3_mix(vec3_mix(m->vertex[c[0]], m->vertex[c[1]], random_in(&seed, 0, 1)), m->vertex[c[2]], random_in(&seed, 0, 1));
-                x = vec3_add(x, vec3_scale(random_unit(&seed), pow(10, random_in(&seed, -6, -0.5))));
+                x = vec3_add(x, vec3_scale(random_unit_vector(&seed), pow(10, random_in(&seed, -6, -0.5))));
             }
             double exact = true_gap(m, x);
             VesselHit full = ask_afresh(v.by[0], x);
@@ -206,7 +206,7 @@ static void memory_changes_nothing(void **state)
             Vec3 x = vec3_add(middle, random_in_box(&seed, 1.5));
             double step = pow(10, random_in(&seed, -3, -0.5));
             for (int i = 0; i < 200; i++) {
-                x = i % 50 == 49 ? vec3_add(middle, random_in_box(&seed, 3)) : vec3_add(x, vec3_scale(random_unit(&seed), step));
+                x = i % 50 == 49 ? vec3_add(middle, random_in_box(&seed, 3)) : vec3_add(x, vec3_scale(random_unit_vector(&seed), step));
                 VesselHit full = ask(v.by[0], x, &memory[0]);
                 for (int k = 1; k < SEARCHES; k++) {
                     VesselHit hit = ask(v.by[k], x, &memory[k]);
@@ -235,7 +235,7 @@ static void far_points_are_bounded(void **state)
         VesselMemory memory = {.node = -1};
         Vec3 x = {0, 0, 0};
         for (int i = 0; i < 3000; i++) {
-            Vec3 next = vec3_add(x, vec3_scale(random_unit(&seed), 0.05));
+            Vec3 next = vec3_add(x, vec3_scale(random_unit_vector(&seed), 0.05));
             x = i % 30 == 29 ? random_in_box(&seed, 1.5) : vec3_norm(next) < 1.3 ? next : vec3(0, 0, 0);     // jumps out of the mesh, too
             double reach = 0.2;
             VesselHit hit, exact = ask_afresh(full, x);
@@ -290,7 +290,7 @@ static void sign_is_right_at_edges_and_corners(void **state)
                 Vec3 at = m.vertex[m.triangle[t][i % 3]], x;
                 if (i % 2)
                     at = vec3_mix(at, m.vertex[m.triangle[t][(i + 1) % 3]], 0.5);
-                x = vec3_add(at, vec3_scale(random_unit(&seed), pow(10, random_in(&seed, -5, -0.7))));
+                x = vec3_add(at, vec3_scale(random_unit_vector(&seed), pow(10, random_in(&seed, -5, -0.7))));
                 double gap = true_gap(&m, x);
                 assert_near(ask_afresh(v, x).gap, gap, 1e-14);
                 inside += gap > 0;
@@ -387,7 +387,7 @@ static Vec3 random_inside(int kind, uint64_t *seed)
 {
     double off = random_in(seed, 0.05, 0.2), a = random_in(seed, 0, 2 * PI), b = random_in(seed, 0, 2 * PI);
     if (kind == 0)
-        return vec3_scale(random_unit(seed), 1 - off);
+        return vec3_scale(random_unit_vector(seed), 1 - off);
     double r = 0.5 - off;
     if (kind == 1)
         return vec3((2 + r * cos(b)) * cos(a), (2 + r * cos(b)) * sin(a), r * sin(b));
@@ -647,7 +647,7 @@ static void *walk_about(void *data)
     Vec3 x = {0, 0, 0};
     job->hash = 0;
     for (int i = 0; i < 5000; i++) {
-        Vec3 next = vec3_add(x, vec3_scale(random_unit(&seed), 0.05));
+        Vec3 next = vec3_add(x, vec3_scale(random_unit_vector(&seed), 0.05));
         x = vec3_norm(next) < 1.3 ? next : vec3(0, 0, 0);
         VesselHit hit = ask(job->vessel, x, &memory);
         uint64_t bits;

@@ -128,7 +128,7 @@ static void derivatives(void **state)
     uint64_t seed = 7;
     for (int trial = 0; trial < 500; trial++) {
         int k = trial < 20 ? 0 : trial < 40 ? count - 1 : (int)random_in(&seed, 0, count - 0.001);
-        Vec3 d = random_unit(&seed);
+        Vec3 d = random_unit_vector(&seed);
         check_derivatives(v, vec3_add_scaled(line[k], random_in(&seed, 0.3, 1.2), d));
     }
     v->destroy(v);
@@ -137,7 +137,7 @@ static void derivatives(void **state)
     v = make(&poly);
     for (int trial = 0; trial < 300; trial++) {
         Vec3 at = vec3_mix(corner[trial % 3], corner[trial % 3 + 1], random_in(&seed, 0.2, 0.8));
-        check_derivatives(v, vec3_add_scaled(at, random_in(&seed, 0.3, 0.9), random_unit(&seed)));
+        check_derivatives(v, vec3_add_scaled(at, random_in(&seed, 0.3, 0.9), random_unit_vector(&seed)));
     }
     // about a corner, on its convex side: a sphere
     VesselHit hit = ask(v, vec3(5.05, -0.5, 0), -1);
@@ -228,7 +228,7 @@ static void ends_are_smooth(void **state)
     int checked = 0;
     for (int trial = 0; trial < 400; trial++) {
         bool inlet = trial % 2 == 0;
-        Vec3 t = inlet ? d : along, at = inlet ? p : end, out = random_unit(&seed);
+        Vec3 t = inlet ? d : along, at = inlet ? p : end, out = random_unit_vector(&seed);
         out = vec3_unit(vec3_add_scaled(out, -vec3_dot(out, t), t));
         double rho = random_in(&seed, 0.15, inlet ? 0.6 : 0.9), h = 1e-5;
         VesselHit last = {.flags = VESSEL_OPEN_END};
@@ -289,7 +289,7 @@ static void rigid_motion_and_mirror(void **state)
         assert_near(a.gap, b.gap, 1e-11);
         assert_near(a.gap, c.gap, 1e-13);
         assert_true(vec3_distance(quat_rotate(q, a.normal), b.normal) < 1e-10 && vec3_distance(mirrored(a.normal), c.normal) < 1e-12);
-        Vec3 u = random_unit(&seed);
+        Vec3 u = random_unit_vector(&seed);
         double scale = 1 + fabs(sym3_trace(&a.hessian));
         assert_near(sym3_quadratic(&a.hessian, u), sym3_quadratic(&b.hessian, quat_rotate(q, u)), 1e-9 * scale);
         assert_near(sym3_quadratic(&a.hessian, u), sym3_quadratic(&c.hessian, mirrored(u)), 1e-11 * scale);

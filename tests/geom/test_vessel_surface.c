@@ -268,7 +268,7 @@ static void turned_tubes_are_the_same(void **state)
     uint64_t seed = 3;
     for (int trial = 0; trial < 16; trial++) {
         TubePiece piece[3];
-        Vec3 d = random_unit(&seed), n = random_unit(&seed);
+        Vec3 d = random_unit_vector(&seed), n = random_unit_vector(&seed);
         double scale = trial % 4 == 0 ? 0.01 : trial % 4 == 1 ? 1000 : 1;
         if (trial == 2)
             d = vec3(1, 0, 0), n = vec3(0, 1, 0);
@@ -319,7 +319,7 @@ static void open_ends_have_rims(void **state)
     uint64_t seed = 8;
     for (int trial = 0; trial < 10; trial++) {
         TubePiece piece[3];
-        TubeOptions o = hook(piece, random_unit(&seed), random_unit(&seed), false, 1);
+        TubeOptions o = hook(piece, random_unit_vector(&seed), random_unit_vector(&seed), false, 1);
         Tube *tube = make_tube(&o);
         double cell = trial % 2 ? 0.1 : 0.21;
         TriangleMesh *mesh = mesh_of(tube, cell);
@@ -483,7 +483,7 @@ static void thin_walls_stay_whole(void **state)
     for (int trial = 0; trial < 30; trial++) {
         double wall = random_in(&seed, 0.005, 0.1), cell = random_in(&seed, 0.1, 0.4);
         Balls balls = {.vessel = {.query = balls_query, .locate = balls_locate}, .count = 3, .radius = {1.3, 0.8, 1}};
-        Vec3 towards = trial == 0 ? vec3(1, 0, 0) : random_unit(&seed), across = vec3_normal_to(towards);
+        Vec3 towards = trial == 0 ? vec3(1, 0, 0) : random_unit_vector(&seed), across = vec3_normal_to(towards);
         balls.center[0] = random_in_box(&seed, 0.5);
         balls.center[1] = vec3_add_scaled(balls.center[0], balls.radius[0] + balls.radius[1] + wall, towards);
         balls.center[2] = vec3_add_scaled(balls.center[0], balls.radius[0] + balls.radius[2] + wall, across);

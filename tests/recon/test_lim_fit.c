@@ -139,7 +139,7 @@ static void capsule_of_table_3(void **state)
             Vec3 exact[N], noisy[N], center[101];
             double width[101], far[N];
             for (int i = 0; i < N; i++) {   // even over the capsule's area: caps 1/3, side 2/3
-                Vec3 d = random_unit(&seed), g;
+                Vec3 d = random_unit_vector(&seed), g;
                 double along = random_in(&seed, 0, 4), angle = random_in(&seed, 0, 2 * PI);
                 exact[i] = i % 3 == 0 ? vec3_add(d, vec3(d.x > 0 ? 4 : 0, 0, 0)) : vec3(along, cos(angle), sin(angle));
                 double gauss = sqrt(-2 * log(random_in(&seed, 1e-12, 1))) * cos(random_in(&seed, 0, 2 * PI));
