@@ -1,5 +1,6 @@
 // seldinger segment: RBT, a volume to a tree of centreline nodes with local point sets (recon/rbt_track.h).
 #include "cli/cli.h"
+#include "base/same_math.h"
 
 #include "cli/output.h"
 #include "cli/output_plan.h"
@@ -239,7 +240,7 @@ static void print_table(const VesselTree *tree, const RbtReport *report, double 
 static double edge_blur(const RbtParameters *parameters, const Volume *volume, double smoothing, const VesselTree *tree)
 {
     Volume *smooth = smoothing > 0 ? volume_smoothed(volume, smoothing, 0) : NULL;
-    double v2 = pow(volume_voxel_size(volume), 2), image = blurred_edge_measure(smooth ? smooth : volume, tree);
+    double v2 = same_square(volume_voxel_size(volume)), image = blurred_edge_measure(smooth ? smooth : volume, tree);
     volume_free(smooth);
     return sqrt((image > 0 ? image * image : blurred_edge_grid2(v2) + smoothing * smoothing) + blurred_edge_average2(parameters->ray_smoothing_voxels, v2));
 }

@@ -2,6 +2,8 @@
 // So lines, arcs and polylines need no geometry of their own here.
 #include "cli/tube_tree.h"
 
+#include "base/same_math.h"
+
 #include <stdlib.h>
 
 enum { SAMPLES = 48, MOST_NODES = 200000 };
@@ -77,7 +79,7 @@ static void sample_node(VesselTree *tree, const Vessel *tube, const TubeOptions 
     VesselMemory memory = {.node = tube->locate(tube, tree->center[i], -1)};
     for (int k = 0; k < SAMPLES; k++) {
         double angle = (k + i * SAMPLES) * golden;
-        Vec3 across = vec3_add(vec3_scale(e1, cos(angle)), vec3_scale(e2, sin(angle)));
+        Vec3 across = vec3_add(vec3_scale(e1, same_cos(angle)), vec3_scale(e2, same_sin(angle)));
         Vec3 at = vec3_add_scaled(tree->center[i], tree->height[i] * ((k + 0.5) / SAMPLES - 0.5), d);
         tree->point_count += sample(tube, at, across, r, &memory, &tree->point[tree->point_count]);
         if (end == 0 || !options->closed_ends)

@@ -12,6 +12,8 @@
 // points, and one Taubin step is up to 2.3 times too long.
 #include "geom/blobby.h"
 
+#include "base/same_math.h"
+
 // A blob's share of the field f, its gradient slope * d and its Hessian slope * I + bend * d d', d = x - centre.
 typedef struct BlobTerm {
     Vec3 d;
@@ -91,7 +93,7 @@ double blob_radius(double width, double iso_level)
 // Newton comes down monotonously.
 double blob_width_for_radius(double radius, double iso_level)
 {
-    double c = radius * radius / (5 * iso_level * iso_level), fifth = pow(c, 0.2);
+    double c = radius * radius / (5 * iso_level * iso_level), fifth = same_pow(c, 0.2);
     double s = 1 + (c < fifth ? c : fifth);
     for (int i = 0; i < 100; i++) {
         double s2 = s * s, next = s - (s2 * s2 * (s - 1) - c) / (s2 * s * (5 * s - 4));
@@ -235,7 +237,7 @@ static Vec3 tangential_step(const SurfaceFrame *frame, double *least, Vec3 *weak
     Vec3 t1 = vec3_normal_to(frame->normal), t2 = vec3_cross(frame->normal, t1), s1 = sym3_mul_vec(&frame->shape, t1);
     double a = 1 + frame->gap * vec3_dot(t1, s1), b = frame->gap * vec3_dot(t2, s1), c = 1 + frame->gap * sym3_quadratic(&frame->shape, t2);
     double mean = 0.5 * (a + c), spread = sqrt(0.25 * (a - c) * (a - c) + b * b), low = mean - spread, high = mean + spread;
-    double angle = 0.5 * atan2(2 * b, a - c), cs = cos(angle), sn = sin(angle);   // of the higher eigenvalue's direction
+    double angle = 0.5 * same_atan2(2 * b, a - c), cs = same_cos(angle), sn = same_sin(angle);   // of the higher eigenvalue's direction
     Vec3 e_high = vec3_add_scaled(vec3_scale(t1, cs), sn, t2), e_low = vec3_add_scaled(vec3_scale(t1, -sn), cs, t2);
     *least = low;
     *weak = e_low;

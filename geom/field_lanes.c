@@ -1,6 +1,8 @@
 // One kernel text, three compilations. See field_lanes.h for the layouts and why the bits agree, blobby.h for the equations.
 // Compiled with -fno-math-errno and -fno-trapping-math, which change no result, so that roots and selects vectorise.
 #include "geom/field_lanes.h"
+
+#include "base/same_math.h"
 #include "geom/simd.h"
 
 #include <stddef.h>
@@ -20,7 +22,7 @@ void field_directions(Vec3 *way, int count)
 {
     for (int k = 0; k < count; k++) {
         double z = 1 - (2 * k + 1) / (double)count, out = sqrt(1 - z * z), angle = k * PI * (3 - sqrt(5));
-        way[k] = vec3(out * cos(angle), out * sin(angle), z);
+        way[k] = vec3(out * same_cos(angle), out * same_sin(angle), z);
     }
 }
 

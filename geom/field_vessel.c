@@ -14,6 +14,7 @@
 // asked at X + (zeta(z) - z) d instead of at X: zeta = z downstream of h = r / 2, 0 upstream of -h, with a continuous second derivative between. So the
 // section at the root goes on upstream as a cylinder for ever, and wall, normal and Hessian are smooth across the plane.
 #include "geom/blob_flood.h"
+#include "base/same_math.h"
 #include "geom/blobby.h"
 #include "geom/field_lanes.h"
 #include "geom/power_blocks.h"
@@ -553,7 +554,7 @@ static Sheets project(const FieldVessel *field, Vec3 x, int node, double side)
         out = vec3_unit_or(vec3_sub(x, axis), vec3_normal_to(d));
         across = vec3_cross(d, out);
         for (int k = 0; k < AROUND; k++)
-            start[k] = vec3_add_scaled(vec3_add_scaled(axis, n->radius * cos(PI * k / 3), out), n->radius * sin(PI * k / 3), across);
+            start[k] = vec3_add_scaled(vec3_add_scaled(axis, n->radius * same_cos(PI * k / 3), out), n->radius * same_sin(PI * k / 3), across);
         double f = blobby_gradient(&blobs, asked_at(field, n, x), &g), slope = vec3_norm(g);
         double step = slope > 1e-100 ? fmax(-n->radius, fmin(n->radius, f / slope)) : 0;
         start[AROUND] = vec3_add_scaled(x, slope > 0 ? -step / slope : 0, g);
@@ -1116,7 +1117,7 @@ static double measure_reach(const FieldVessel *field, int node, const Vec3 way_a
     list_blobs(field, node, n->center, 3 * n->radius, &list);
     for (int k = 0; k < ROOM_WAYS + AROUND && part[size] > 0; k++) {
         double turn = 2 * PI * k / AROUND;
-        Vec3 wall[CROSSINGS], in, way = k < ROOM_WAYS ? way_all[k] : vec3_add(vec3_scale(across, cos(turn)), vec3_scale(side, sin(turn)));
+        Vec3 wall[CROSSINGS], in, way = k < ROOM_WAYS ? way_all[k] : vec3_add(vec3_scale(across, same_cos(turn)), vec3_scale(side, same_sin(turn)));
         int crossings = walls_along(field, &list, node, way, wall);
         for (int w = 0; w < crossings; w++, found++) {
             field_at(field, &list, wall[w], &in);

@@ -23,6 +23,7 @@
 // a prediction with the gap's change in it (nothing: what remains is the wall's own waviness), memories and hits turned over in registers (AVX2 slower),
 // lanes in the order of their models' size, blobs fetched ahead, cell tests of a whole batch in one call (nothing, 1 %), second steps side by side (1 %).
 #include "geom/foot_lanes.h"
+#include "base/same_math.h"
 #include "geom/power_blocks.h"
 #include "geom/power_walk.h"
 #include "geom/vessel.h"
@@ -892,7 +893,7 @@ static double measure_room(const LimVessel *lim, int node)
         return 0;
     for (int k = 0; k < 3 * AROUND; k++) {
         double angle = 2 * PI * k / AROUND, step = 0.5 * r;
-        Vec3 out = vec3_add(vec3_scale(e1, cos(angle)), vec3_scale(e2, sin(angle)));
+        Vec3 out = vec3_add(vec3_scale(e1, same_cos(angle)), vec3_scale(e2, same_sin(angle)));
         Vec3 foot = vec3_add_scaled(tree->center[node], (k / AROUND - 1) * reach, d), g;
         if (!(blobby_field(&blobs, foot) > 0))
             return 0;

@@ -6,6 +6,8 @@
 #ifndef SELDINGER_GEOM_LINEAR_H
 #define SELDINGER_GEOM_LINEAR_H
 
+#include "base/same_math.h"
+
 #include <math.h>
 #include <stdbool.h>
 
@@ -45,7 +47,7 @@ static inline double vec3_norm2(Vec3 a) { return vec3_dot(a, a); }
 static inline double vec3_norm(Vec3 a) { return sqrt(vec3_dot(a, a)); }
 static inline double vec3_distance(Vec3 a, Vec3 b) { return vec3_norm(vec3_sub(a, b)); }
 // [rad] between a and b, of any length, 0 to pi.
-static inline double vec3_angle(Vec3 a, Vec3 b) { return atan2(vec3_norm(vec3_cross(a, b)), vec3_dot(a, b)); }
+static inline double vec3_angle(Vec3 a, Vec3 b) { return same_atan2(vec3_norm(vec3_cross(a, b)), vec3_dot(a, b)); }
 static inline bool vec3_is_finite(Vec3 a) { return isfinite(a.x) && isfinite(a.y) && isfinite(a.z); }
 // The unit vector along a; `otherwise` where a is too short to have a direction.
 static inline Vec3 vec3_unit_or(Vec3 a, Vec3 otherwise)
@@ -160,8 +162,8 @@ static inline Quat quat_from_rotation_vector(Vec3 w)
 {
     double a = vec3_norm(w);
     // sin(a/2)/a by its series where a^4 is below rounding
-    double s = a > 1e-4 ? sin(a / 2) / a : 0.5 - a * a / 48;
-    return (Quat){cos(a / 2), s * w.x, s * w.y, s * w.z};
+    double s = a > 1e-4 ? same_sin(a / 2) / a : 0.5 - a * a / 48;
+    return (Quat){same_cos(a / 2), s * w.x, s * w.y, s * w.z};
 }
 // The rotation vector of the shorter way round, |w| <= pi.
 static inline Vec3 quat_to_rotation_vector(Quat q)
@@ -169,7 +171,7 @@ static inline Vec3 quat_to_rotation_vector(Quat q)
     if (q.w < 0)
         q = (Quat){-q.w, -q.x, -q.y, -q.z};
     double n = sqrt(q.x * q.x + q.y * q.y + q.z * q.z);
-    double s = n > 1e-8 ? 2 * atan2(n, q.w) / n : 2 / q.w;
+    double s = n > 1e-8 ? 2 * same_atan2(n, q.w) / n : 2 / q.w;
     return (Vec3){s * q.x, s * q.y, s * q.z};
 }
 

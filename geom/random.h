@@ -2,6 +2,7 @@
 #ifndef SELDINGER_GEOM_RANDOM_H
 #define SELDINGER_GEOM_RANDOM_H
 
+#include "base/same_math.h"
 #include "geom/linear.h"
 
 #include <stdint.h>
@@ -31,7 +32,7 @@ static inline double random_open(Random *random) { return ((double)(random_next(
 static inline double random_normal(Random *random)
 {
     double u = random_open(random), v = random_open(random);
-    return sqrt(-2 * log(u)) * cos(2 * PI * v);
+    return sqrt(-2 * same_log(u)) * same_cos(2 * PI * v);
 }
 
 #endif

@@ -6,6 +6,7 @@
 // neighbouring places of one station and of the next. It is run only where the line itself is shut.
 #include "geom/reach.h"
 
+#include "base/same_math.h"
 #include "geom/blobby.h"
 #include "geom/power_walk.h"
 #include "geom/vessel_branches.h"
@@ -188,7 +189,7 @@ static Vec3 link_place(const Flood *f, const Link *l, int station, int place)
     if (place == 0)
         return x;
     double angle = 2 * PI / RING * ((place - 1) % RING), far = f->options->aside * l->radius * (place <= RING ? 0.5 : 1);
-    return vec3_add_scaled(vec3_add_scaled(x, far * cos(angle), l->e1), far * sin(angle), l->e2);
+    return vec3_add_scaled(vec3_add_scaled(x, far * same_cos(angle), l->e1), far * same_sin(angle), l->e2);
 }
 
 // The share of the line on which the field is above 0, from the parent's centre on.

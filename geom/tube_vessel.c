@@ -15,6 +15,7 @@
 // at points that happen to lie in its plane. So a wire that leaves at an angle leans on the bell, tangent at first. There gap = D - L with D the distance
 // to the circle of radius (radius + L) in the end plane. Two radii beyond the end, where the bell is further than any tool's radius, there is no wall.
 #include "geom/vessel.h"
+#include "base/same_math.h"
 
 #include <stdlib.h>
 
@@ -145,7 +146,7 @@ static VesselHit hit_bell(const TubeVessel *tube, Vec3 x, Vec3 end, Vec3 tangent
 {
     double r = tube->radius, bell = r;
     Vec3 radial = vec3_add_scaled(vec3_sub(x, end), -z, tangent);
-    double rho = vec3_norm(radial), aside = r + bell - rho, far = hypot(z, aside);
+    double rho = vec3_norm(radial), aside = r + bell - rho, far = same_hypot(z, aside);
     if (z > 2 * bell || rho > r + 2 * bell)
         return open_end(memory, memory->node);
     VesselHit hit = {.node = memory->node, .flags = VESSEL_BEYOND};
@@ -307,7 +308,7 @@ static int add_arc(Segment *out, Vec3 *p, Vec3 *t, Vec3 *n, double arc_radius, d
 {
     int parts = (int)ceil(angle / (PI / 2) - 1e-9);
     parts = parts < 1 ? 1 : parts;
-    double part = angle / parts, cs = cos(part), sn = sin(part), half_cs = cos(0.5 * part), half_sn = sin(0.5 * part);
+    double part = angle / parts, cs = same_cos(part), sn = same_sin(part), half_cs = same_cos(0.5 * part), half_sn = same_sin(0.5 * part);
     for (int k = 0; k < parts; k++) {
         Segment s = {.start = *p, .tangent = *t, .normal = *n, .arc_radius = arc_radius, .angle = part,
                      .cosine = cs, .sine = sn, .half_cosine = half_cs, .half_sine = half_sn};

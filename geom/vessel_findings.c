@@ -1,5 +1,6 @@
 #include "geom/vessel_findings.h"
 
+#include "base/same_math.h"
 #include "geom/blobby.h"
 #include "geom/sort_doubles.h"
 
@@ -88,7 +89,7 @@ static double section_radius(const Blobby *model, Vec3 at, Vec3 axis, double lon
         return 0;
     for (int i = 0; i < RAYS; i++) {
         double angle = 2 * PI * i / RAYS, step = longest / 64, low = 0, high = step;
-        Vec3 way = vec3_add(vec3_scale(e1, cos(angle)), vec3_scale(e2, sin(angle)));
+        Vec3 way = vec3_add(vec3_scale(e1, same_cos(angle)), vec3_scale(e2, same_sin(angle)));
         while (high < longest && blobby_field(model, vec3_add_scaled(at, high, way)) > 0)
             low = high, high += step;
         if (!(high < longest))

@@ -1,5 +1,6 @@
 #include "input/force_feedback.h"
 
+#include "base/same_math.h"
 #include "input/map_state.h"
 
 #include <math.h>
@@ -114,7 +115,7 @@ static bool range_fits(const HidField *field)
 // [ms] of one count of the duration; 0x1001 and 0x1003 are seconds, without a unit milliseconds are meant.
 static double duration_unit_ms(const HidField *field)
 {
-    return 1000 * pow(10, field->unit == 0x1001 || field->unit == 0x1003 ? field->unit_exponent : -3);
+    return 1000 * same_pow(10, field->unit == 0x1001 || field->unit == 0x1003 ? field->unit_exponent : -3);
 }
 
 // An effect ends by itself and is started again before that: a program that dies or hangs lets the hand go.

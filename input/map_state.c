@@ -1,5 +1,6 @@
 #include "input/map_state.h"
 
+#include "base/same_math.h"
 #include "input/input.h"
 
 #include <math.h>
@@ -8,7 +9,7 @@
 double map_shape(double deflection, double dead_zone, double exponent)
 {
     double beyond = (fabs(deflection) - dead_zone) / (1 - dead_zone);
-    return beyond > 0 ? copysign(pow(fmin(beyond, 1), exponent), deflection) : 0;
+    return beyond > 0 ? copysign(same_pow(fmin(beyond, 1), exponent), deflection) : 0;
 }
 
 double map_deflection(double raw, double min, double centre, double max)

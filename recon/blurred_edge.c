@@ -1,5 +1,6 @@
 #include "recon/blurred_edge.h"
 
+#include "base/same_math.h"
 #include "geom/sort_doubles.h"
 #include "recon/bspline.h"
 
@@ -86,7 +87,7 @@ static double misfit(const double profile[PROFILE], double b, double *height)
 {
     double s1 = 0, s2 = 0, y1 = 0, y2 = 0, sy = 0;
     for (int k = 0; k < PROFILE; k++) {
-        double s = 0.5 * erfc((k - SIDE) / (b * sqrt(2))), y = profile[k];
+        double s = 0.5 - 0.5 * same_erf((k - SIDE) / (b * sqrt(2))), y = profile[k];
         s1 += s, s2 += s * s, y1 += y, y2 += y * y, sy += s * y;
     }
     double spread = s2 - s1 * s1 / PROFILE, with = sy - s1 * y1 / PROFILE;

@@ -9,6 +9,7 @@
 // They act only where they are violated. Without them a fit of signed blobs grows sheets where nothing speaks against them.
 #include "recon/field_rows.h"
 
+#include "base/same_math.h"
 #include "geom/power_blocks.h"
 #include "geom/power_walk.h"
 #include "recon/parallel.h"
@@ -185,7 +186,7 @@ static void guard_ring(const Job *job, int node, Draft *d)
     double r = tree->radius[node];
     for (int k = 0; k < RING; k++) {
         double angle = 2 * PI * k / RING;
-        Vec3 out = vec3_add(vec3_scale(e1, cos(angle)), vec3_scale(e2, sin(angle)));
+        Vec3 out = vec3_add(vec3_scale(e1, same_cos(angle)), vec3_scale(e2, same_sin(angle)));
         for (int far = 0; far < 2; far++) {
             Vec3 x = vec3_add_scaled(c, (1.6 + 0.6 * far) * r, out);
             if (is_outside(job, node, x, 0.4 * r))

@@ -5,6 +5,7 @@
 // them, so that a step that is accepted lowers the sum of squares of the whole tree, whatever the other regions do. Regions that share a node's rows are
 // solved one after the other, in the order of their colours: the result does not depend on the threads.
 #include "recon/field_model.h"
+#include "base/same_math.h"
 #include "recon/lim_energy.h"
 #include "recon/parallel.h"
 
@@ -186,7 +187,7 @@ static double energy_of_tile(const FieldModel *model, const TileWork *tw)
 
 static double prior_of(const FieldModel *model, const FieldBlob *b)
 {
-    double r = model->tree->radius[b->owner], p = PRIOR_PLACE * r, q = PRIOR_AMPLITUDE * r * b->amplitude, size = log(b->reach / b->birth_reach);
+    double r = model->tree->radius[b->owner], p = PRIOR_PLACE * r, q = PRIOR_AMPLITUDE * r * b->amplitude, size = same_log(b->reach / b->birth_reach);
     return p * p * (vec3_norm2(vec3_sub(b->center, b->birth)) / (b->birth_reach * b->birth_reach) + size * size) + q * q;
 }
 
@@ -288,7 +289,7 @@ static void add_priors(Work *w)
         double r = model->tree->radius[b->owner], p = PRIOR_PLACE * r, q = PRIOR_AMPLITUDE * r, share = b->reach / b->birth_reach;
         Vec3 off = vec3_scale(vec3_sub(b->center, b->birth), 1 / b->birth_reach);
         double weight[UNKNOWNS] = {q * q, p * p * share * share, p * p * share * share, p * p * share * share, p * p};
-        double slope[UNKNOWNS] = {q * q * b->amplitude, p * p * share * off.x, p * p * share * off.y, p * p * share * off.z, p * p * log(share)};
+        double slope[UNKNOWNS] = {q * q * b->amplitude, p * p * share * off.x, p * p * share * off.y, p * p * share * off.z, p * p * same_log(share)};
         for (int m = 0; m < UNKNOWNS; m++) {
             size_t at = (size_t)(UNKNOWNS * k + m);
             w->matrix[at * u + at] += weight[m];
@@ -323,7 +324,7 @@ static FieldBlob moved_by(const FieldBlob *b, const double *step, const FieldBlo
     double away = vec3_norm(off), furthest = (b->is_base ? 0.25 : 0.6) * b->birth_reach;
     if (away > furthest)
         to.center = vec3_add_scaled(b->birth, furthest / away, off);
-    double reach = b->reach * exp(bound(step[4], 0.2));
+    double reach = b->reach * same_exp(bound(step[4], 0.2));
     double least = (b->is_base ? 0.75 : 0.5) * b->birth_reach, largest = fmin((b->is_base ? 1.5 : 2) * b->birth_reach, 1.12 * b->reach);
     to.reach = fmax(least, fmin(reach, largest));
     Vec3 gone = vec3_sub(to.center, start->center);

@@ -4,6 +4,7 @@
 // where the centroid has half as much room again; near a curve's ends only the former. Moving every sample to the middle was tried and lost: it bends
 // exact curves at ends and ostia by half a radius.
 #include "recon/import_skeleton.h"
+#include "base/same_math.h"
 
 #include "geom/sort_doubles.h"
 
@@ -96,7 +97,7 @@ double section_radius(const MeshTree *tree, Vec3 p, Vec3 tangent, double reach, 
     int met = 0;
     for (int k = 0; k < SECTION_RAYS; k++) {
         double angle = 2 * PI * k / SECTION_RAYS;
-        Vec3 direction = vec3_add(vec3_scale(u, cos(angle)), vec3_scale(v, sin(angle)));
+        Vec3 direction = vec3_add(vec3_scale(u, same_cos(angle)), vec3_scale(v, same_sin(angle)));
         length[k] = mesh_tree_ray(tree, p, direction, reach, NULL);
         if (isfinite(length[k]))   // else through an opening
             sorted[met++] = length[k];
@@ -110,7 +111,7 @@ double section_radius(const MeshTree *tree, Vec3 p, Vec3 tangent, double reach, 
     for (int k = 0; k < SECTION_RAYS; k++) {
         // a branch's mouth is no part of the section
         double angle = 2 * PI * k / SECTION_RAYS, d = fmin(length[k], 1.6 * median);
-        moment = vec3_add_scaled(moment, d * d * d / 3, vec3_add(vec3_scale(u, cos(angle)), vec3_scale(v, sin(angle))));
+        moment = vec3_add_scaled(moment, d * d * d / 3, vec3_add(vec3_scale(u, same_cos(angle)), vec3_scale(v, same_sin(angle))));
         area += d * d / 2;
     }
     *least = sorted[0];

@@ -2,6 +2,7 @@
 // plane, square to the centreline, as large as the lumen, meeting the wall at an edge. A round blind end has no such region: within 20 degrees of
 // its pole lies an eighth of the lumen's area.
 #include "recon/import_skeleton.h"
+#include "base/same_math.h"
 
 #include "geom/disjoint_sets.h"
 #include "recon/mesh_edges.h"
@@ -37,7 +38,7 @@ static void mark_lid(const SurfaceMesh *mesh, const MeshTree *tree, int (*across
     Vec3 u = vec3_normal_to(outward), v = vec3_cross(outward, u);
     // from a radius back, lest the end lies beyond its lid; beside the axis too, for facets there may be slivers
     for (int k = 0; k < 6 && seed < 0; k++) {
-        Vec3 aside = vec3_add(vec3_scale(u, cos(2.4 * k)), vec3_scale(v, sin(2.4 * k)));
+        Vec3 aside = vec3_add(vec3_scale(u, same_cos(2.4 * k)), vec3_scale(v, same_sin(2.4 * k)));
         Vec3 from = vec3_add_scaled(vec3_add_scaled(end, -radius, outward), 0.06 * k * radius, aside);
         if (isfinite(mesh_tree_ray(tree, from, outward, 4 * radius, &seed)) && (lid[seed] || vec3_dot(vec3_unit(area_of(mesh, seed)), outward) < SQUARE_COSINE))
             seed = -1;

@@ -1,6 +1,7 @@
 // Rays from the node's centre to its own model's wall, as long as they stay in its cell, on rings about its direction; from there to the mixed wall.
 #include "recon/lim_agree.h"
 
+#include "base/same_math.h"
 #include "geom/blobby.h"
 #include "geom/power_walk.h"
 #include "geom/vessel.h"
@@ -79,7 +80,7 @@ static void agree_on_node(void *context, long index)
     for (int k = 0; good && k < RINGS * AROUND; k++) {
         // every other ring turned by half a step: the pattern is its own mirror image
         double z = 1 - (2 * (k / AROUND) + 1.0) / RINGS, ring = sqrt(1 - z * z), angle = 2 * PI * (k % AROUND + 0.5 * (k / AROUND % 2)) / AROUND;
-        Vec3 out = vec3_add(vec3_scale(e1, ring * cos(angle)), vec3_scale(e2, ring * sin(angle)));
+        Vec3 out = vec3_add(vec3_scale(e1, ring * same_cos(angle)), vec3_scale(e2, ring * same_sin(angle)));
         if (!find_wall(tree, node, &model, vec3_add_scaled(out, z, along), &wall))
             continue;
         VesselMemory memory = {.node = node};

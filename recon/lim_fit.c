@@ -12,6 +12,7 @@
 // Tried and lost: agreed points alone (the wall drifts 0.02 mm from the data, and out of the sac); starting afresh (1.3 times the jumps, more work).
 #include "recon/lim_fit.h"
 
+#include "base/same_math.h"
 #include "geom/blobby.h"
 #include "base/heap.h"
 #include "geom/power_walk.h"
@@ -278,13 +279,13 @@ static void guard_ring(const VesselTree *tree, int at, Gather *gather)
         double along = vec3_dot(p, d), x = vec3_dot(p, e1), y = vec3_dot(p, e2), across = sqrt(x * x + y * y);
         if (fabs(along) > 0.6 * radius || across > 2 * radius)
             continue;
-        int sector = (int)floor(atan2(y, x) / (2 * PI) * GUARD_ANGLES + 0.5);
+        int sector = (int)floor(same_atan2(y, x) / (2 * PI) * GUARD_ANGLES + 0.5);
         sector = (sector + GUARD_ANGLES) % GUARD_ANGLES;
         far[sector] = fmax(far[sector], across);
     }
     for (int m = 0; m < GUARD_ANGLES; m++) {
         double angle = 2 * PI * m / GUARD_ANGLES, out = far[m] > 0 ? far[m] + 0.5 * radius : 1.6 * radius;
-        Vec3 x = vec3_add_scaled(vec3_add_scaled(c, out * cos(angle), e1), out * sin(angle), e2);
+        Vec3 x = vec3_add_scaled(vec3_add_scaled(c, out * same_cos(angle), e1), out * same_sin(angle), e2);
         if (is_outside(tree, gather, x, 0.4 * radius))
             add_guard(gather, x, -0.4 * radius);
     }
@@ -297,7 +298,7 @@ static void guard_sphere(const VesselTree *tree, int at, Gather *gather)
     double radius = tree->radius[at];
     for (int m = 0; m < SPHERE_DIRECTIONS; m++) {
         double z = 1 - (2 * m + 1.0) / SPHERE_DIRECTIONS, ring = sqrt(1 - z * z), angle = m * PI * (3 - sqrt(5)), far = 0;
-        Vec3 d = {ring * cos(angle), ring * sin(angle), z};
+        Vec3 d = {ring * same_cos(angle), ring * same_sin(angle), z};
         for (int i = 0; i < gather->point_count; i++) {
             Vec3 p = vec3_sub(gather->point[i], c);
             double along = vec3_dot(p, d), length = vec3_norm(p);

@@ -8,6 +8,7 @@
 // comes back). Then a short pass over all blobs near the split: the paper has none, DESIGN.md asks for one; blob-wise descent converges badly
 // because neighbouring blobs are strongly coupled, so the pass is a damped Gauss-Newton step (Levenberg, Marquardt) in all their parameters.
 #include "recon/lim_fit.h"
+#include "base/same_math.h"
 
 #include "geom/blobby.h"
 #include "recon/lim_energy.h"
@@ -65,7 +66,7 @@ static bool fit_create(Fit *fit, const LimFitTask *task, const LimFitOptions *op
     int guards = options->guard_shape ? task->guard_count : 0;
     fit->capacity = options->max_blobs + 1;
     // E_a is about 1 / (4 r^2): below 1 mm its pull is kept in proportion to the vessel
-    fit->beta = options->beta * (options->weigh_distance ? fmin(1, pow(task->radius, 4)) : 1);
+    fit->beta = options->beta * (options->weigh_distance ? fmin(1, same_square(same_square(task->radius))) : 1);
     fit->uses_feet = options->weigh_distance && options->project_points;
     if (!lim_points_create(&fit->points, task->point_count + guards))
         return false;
@@ -518,7 +519,7 @@ static int near_blobs(const Fit *fit, int j, int *which)
     for (int k = 0; k < fit->model.count; k++) {
         double d2 = 0;
         for (int m = 0; m < 3; m++)
-            d2 += pow(fit->model.blob[k].center[m] - fit->model.blob[j].center[m], 2);
+            d2 += same_square(fit->model.blob[k].center[m] - fit->model.blob[j].center[m]);
         double key = k == j ? -1 : d2 / (fit->model.blob[k].width * fit->model.blob[k].width);
         int place = count;
         while (place > 0 && far[place - 1] > key)
@@ -569,7 +570,7 @@ static int select_blob(const Fit *fit, Vec3 p)
     for (int j = 0; j < fit->model.count; j++) {
         const LimBlob *blob = &fit->model.blob[j];
         double d2 = 0;
-        d2 += pow(p.x - blob->center[0], 2) + pow(p.y - blob->center[1], 2) + pow(p.z - blob->center[2], 2);
+        d2 += same_square(p.x - blob->center[0]) + same_square(p.y - blob->center[1]) + same_square(p.z - blob->center[2]);
         double rho = blob->width, u = 1 / (1 + d2 / (5 * rho * rho)), slope = 0.8 / rho * u * u * u * sqrt(d2);
         double far = fabs(rho * u * u - fit->options->iso_level) / fmax(slope, 1e-12);
         if (far < least)
@@ -750,7 +751,7 @@ static double attempt_fit(Fit *fit, bool retry, double *worst_of_best)
         // a loose target is met by models that still miss the wall by more than the noise
         bool within = worst_distance <= fit->target, reached = within;
         if (fit->uses_feet && options->give_up_splits > 0)
-            reached = within && mean_square <= fit->noise2 + pow(MISFIT * fit->target, 2);
+            reached = within && mean_square <= fit->noise2 + same_square(MISFIT * fit->target);
         bool better = mean_square < 0.96 * best_square || (worst_distance < 0.93 * best_worst && worst_distance > 4.5 * sqrt(mean_square));
         if ((within && (better || best_worst > fit->target)) || (better && best_worst > fit->target) || options->give_up_splits == 0) {
             best_square = fmin(best_square, mean_square);

@@ -2,6 +2,7 @@
 // points by H e, H = J (J'J)^-1 J', e the noise along the normals.
 #include "recon/lim_trial.h"
 
+#include "base/same_math.h"
 #include "geom/blobby.h"
 #include "geom/random.h"
 #include "geom/sort_doubles.h"
@@ -34,9 +35,9 @@ static Vec3 skeleton(int which, int branch, double s, const double *size)
     if (which < 2)
         return vec3(size[1] * (s - 0.5), 0, 0);
     if (which == 2)
-        return vec3(size[1] * cos(size[2] * (s - 0.5)), size[1] * sin(size[2] * (s - 0.5)), 0);
+        return vec3(size[1] * same_cos(size[2] * (s - 0.5)), size[1] * same_sin(size[2] * (s - 0.5)), 0);
     double angle = 0.5 * PI * s, r = size[1 + branch];
-    return vec3(r * sin(angle), (branch ? -1 : 1) * r * (1 - cos(angle)), 0);
+    return vec3(r * same_sin(angle), (branch ? -1 : 1) * r * (1 - same_cos(angle)), 0);
 }
 
 // Primitives along the skeleton; returns their number.
@@ -91,7 +92,7 @@ LimTrialShape *lim_trial_create(int which)
     while (shape->pool_count < POOL) {
         int j = (int)(random_open(&random) * shape->blob_count);
         double z = 2 * random_open(&random) - 1, angle = 2 * PI * random_open(&random), ring = sqrt(1 - z * z);
-        Vec3 x = vec3_add(shape->center[j], vec3(ring * cos(angle), ring * sin(angle), z));
+        Vec3 x = vec3_add(shape->center[j], vec3(ring * same_cos(angle), ring * same_sin(angle), z));
         SurfacePoint foot = blobby_project(&truth, x, x);
         if (foot.converged && (which != 1 || fabs(foot.foot.x) <= 0.5 * size[1]))
             shape->pool[shape->pool_count++] = foot.foot;

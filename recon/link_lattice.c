@@ -1,5 +1,7 @@
 // Dijkstra's search over 26 neighbours on slices across the link, the first at its start, the last at its end.
 #include "recon/link_lattice.h"
+
+#include "base/same_math.h"
 #include "recon/way_heap.h"
 
 #include <stdlib.h>
@@ -66,7 +68,7 @@ static bool lattice_create(Vec3 from, Vec3 to, double beside, double spacing, co
     for (size_t i = 0; i < n; i++) {
         int at[3];
         place_in(l, (int)i, at);
-        double aside = across * hypot(at[0] - l->half, at[1] - l->half);
+        double aside = across * same_hypot(at[0] - l->half, at[1] - l->half);
         l->clear[i] = aside > beside + 1e-9 ? -1 : (float)ground->clear(ground->context, point_of(l, at));
         l->cost[i] = HUGE_VALF;
     }

@@ -6,6 +6,7 @@
 // octree as small as each vessel asks for (as much of the arch, half as fast, short branches lost), and a start from any end (short trunks lost).
 #include "recon/mesh_centreline.h"
 
+#include "base/same_math.h"
 #include "recon/mesh_lumen.h"
 #include "recon/way_heap.h"
 
@@ -198,7 +199,7 @@ static void path_centre(const Finding *f, Path *path)
             if (vec3_distance(here, first) >= path->first_radius && vec3_distance(here, last) >= path->last_radius)
                 for (int k = 0; k < RAY_PAIRS; k++) {
                     double angle = PI * k / RAY_PAIRS;
-                    Vec3 d = vec3_add(vec3_scale(u, cos(angle)), vec3_scale(v, sin(angle)));
+                    Vec3 d = vec3_add(vec3_scale(u, same_cos(angle)), vec3_scale(v, same_sin(angle)));
                     double there = mesh_tree_ray(f->tree, here, d, limit, NULL), back = mesh_tree_ray(f->tree, here, vec3_negate(d), limit, NULL);
                     // a ray that leaves into a branch says nothing
                     if (isfinite(there) && isfinite(back))
@@ -225,7 +226,7 @@ static bool find_lid(const Finding *f, Vec3 from, Vec3 outward, double radius, V
         // even over the half sphere: turns of the golden angle, each with its opposite
         int pair = k / 2;
         double z = 1 - (2 * pair + 1.0) / LID_RAYS, side = sqrt(1 - z * z), angle = 2.399963229728653 * pair + PI * (k % 2);
-        Vec3 d = vec3_add_scaled(vec3_scale(outward, z), side, vec3_add(vec3_scale(u, cos(angle)), vec3_scale(v, sin(angle))));
+        Vec3 d = vec3_add_scaled(vec3_scale(outward, z), side, vec3_add(vec3_scale(u, same_cos(angle)), vec3_scale(v, same_sin(angle))));
         int triangle = 0;
         double there = mesh_tree_ray(f->tree, from, d, LID_REACH * radius, &triangle);
         const int *corner = f->mesh->triangle[triangle];

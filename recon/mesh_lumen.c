@@ -2,6 +2,7 @@
 // what passes through a common side and no row slips between them.
 #include "recon/mesh_lumen.h"
 
+#include "base/same_math.h"
 #include "geom/disjoint_sets.h"
 #include "base/heap.h"
 #include "recon/mesh_edges.h"
@@ -412,7 +413,7 @@ Lumen *lumen_create(const SurfaceMesh *mesh, const MeshTree *tree, int voxels_ma
         return NULL;
     double size = vec3_distance(low, high);
     // the grid of rows is bounded too
-    double h = fmax(smallest_radius(mesh, tree, size) / VOXELS_PER_RADIUS, cbrt(fabs(volume) / voxels_max));
+    double h = fmax(smallest_radius(mesh, tree, size) / VOXELS_PER_RADIUS, same_cbrt(fabs(volume) / voxels_max));
     l->h = fmax(h, size / 4000);
     // off the numbers that vertices like to have
     l->origin = vec3_add_scaled(low, -l->h, vec3(0.3819660113, 0.4142135624, 0.2679491924));

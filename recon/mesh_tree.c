@@ -2,6 +2,8 @@
 // (Ericson 2005, Real-Time Collision Detection, 5.1.5). Ray: Moeller and Trumbore 1997. Solid angle: Van Oosterom and Strackee 1983.
 #include "recon/mesh_tree.h"
 
+#include "base/same_math.h"
+
 #include <stdlib.h>
 
 enum { LEAF = 4, DEPTH = 64 };
@@ -283,7 +285,7 @@ double mesh_winding(const SurfaceMesh *mesh, Vec3 point)
              c = vec3_sub(mesh->vertex[mesh->triangle[t][2]], point);
         double la = vec3_norm(a), lb = vec3_norm(b), lc = vec3_norm(c);
         double under = la * lb * lc + vec3_dot(a, b) * lc + vec3_dot(b, c) * la + vec3_dot(a, c) * lb;
-        sum += 2 * atan2(vec3_dot(a, vec3_cross(b, c)), under);
+        sum += 2 * same_atan2(vec3_dot(a, vec3_cross(b, c)), under);
     }
     return sum / (4 * PI);
 }

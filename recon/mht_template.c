@@ -7,6 +7,8 @@
 // solved for at every trial: the same minimum in a third of the iterations.
 #include "recon/mht_template.h"
 
+#include "base/same_math.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -55,8 +57,8 @@ static bool reserve(MhtWindow *window, int capacity)
 
 int mht_window_open(MhtWindow *window, const Volume *volume, const MhtTemplate *about, double size)
 {
-    double across = size * about->radius, along = ALONG * across, reach2 = -log(CUT), reach = sqrt(reach2);
-    double spacing = cbrt(4.0 / 3 * PI * reach * reach * reach * across * across * along / MAX_VOXELS);
+    double across = size * about->radius, along = ALONG * across, reach2 = -same_log(CUT), reach = sqrt(reach2);
+    double spacing = same_cbrt(4.0 / 3 * PI * reach * reach * reach * across * across * along / MAX_VOXELS);
     Vec3 at = volume_voxel_of(volume, about->center), v = about->axis;
     double middle[3] = {at.x, at.y, at.z};
     int low[3], high[3], stride[3];
@@ -94,7 +96,7 @@ int mht_window_open(MhtWindow *window, const Volume *volume, const MhtTemplate *
                 double a = vec3_dot(q, v) / along, d2 = (vec3_norm2(q) - vec3_dot(q, v) * vec3_dot(q, v)) / (across * across), exponent = a * a + d2;
                 if (exponent > reach2)
                     continue;
-                float w = expf((float)-exponent);
+                float w = (float)same_exp(-exponent);
                 window->x[n] = (float)q.x;
                 window->y[n] = (float)q.y;
                 window->z[n] = (float)q.z;
@@ -293,14 +295,14 @@ static MhtTemplate moved(const MhtTemplate *t, const double step[SHAPE], const M
 {
     MhtTemplate out = *t;
     Vec3 e1 = vec3_normal_to(t->axis), e2 = vec3_cross(t->axis, e1);
-    out.radius = fmax(limits->radius_min, fmin(limits->radius_max, t->radius * exp(step[2])));
+    out.radius = fmax(limits->radius_min, fmin(limits->radius_max, t->radius * same_exp(step[2])));
     out.center = vec3_add_scaled(vec3_add_scaled(t->center, step[3] * t->radius, e1), step[4] * t->radius, e2);
     out.axis = vec3_unit(vec3_add_scaled(vec3_add_scaled(t->axis, step[5], e1), step[6], e2));
     if (limits->previous) {
         const MhtTemplate *p = limits->previous;
         double length = vec3_distance(t->center, p->center);
         out.center = vec3_add_scaled(p->center, length, vec3_unit(vec3_sub(out.center, p->center)));
-        if (vec3_dot(out.axis, p->axis) < cos(limits->max_angle))
+        if (vec3_dot(out.axis, p->axis) < same_cos(limits->max_angle))
             out.axis = t->axis;
     }
     return out;

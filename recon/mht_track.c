@@ -1,6 +1,8 @@
 // The growing tree of hypotheses: `leaf` are templates at the same number of steps from `root`, the branch's last node. Each turn the leaves are extended by
 // a step, the path of best mean score is chosen, the root moves one node along it, and leaves that do not descend from it are dropped.
 #include "recon/mht_track.h"
+
+#include "base/same_math.h"
 #include "recon/bspline.h"
 #include "recon/mht_template.h"
 
@@ -169,7 +171,7 @@ static int predict(Tracker *t, const MhtTemplate *from, MhtTemplate *out, int ca
             if (angle > widest * (1 + 1e-9))
                 continue;
             if (angle > 0)
-                guess->axis = vec3_unit(vec3_add_scaled(vec3_scale(from->axis, cos(angle)), sin(angle) / angle, vec3_add(vec3_scale(e1, a), vec3_scale(e2,
+                guess->axis = vec3_unit(vec3_add_scaled(vec3_scale(from->axis, same_cos(angle)), same_sin(angle) / angle, vec3_add(vec3_scale(e1, a), vec3_scale(e2,
                                                                                                                                                        b))));
             guess->center = vec3_add_scaled(from->center, p->step * from->radius, guess->axis);
             if (n > 0 && mht_window_open(t->window, t->volume, guess, p->window) > 0)
@@ -543,7 +545,7 @@ static VesselTree *finish_tree(const Tracker *t)
         tree->point_offset[i] = (int64_t)CIRCLE * i;
         for (int k = 0; k < CIRCLE; k++) {
             double a = 2 * PI * k / CIRCLE;
-            tree->point[CIRCLE * (int64_t)i + k] = vec3_add_scaled(vec3_add_scaled(n->center, n->radius * cos(a), e1), n->radius * sin(a), e2);
+            tree->point[CIRCLE * (int64_t)i + k] = vec3_add_scaled(vec3_add_scaled(n->center, n->radius * same_cos(a), e1), n->radius * same_sin(a), e2);
         }
     }
     tree->point_offset[chain->count] = (int64_t)CIRCLE * chain->count;

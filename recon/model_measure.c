@@ -3,6 +3,7 @@
 // r = 5 mm came to lie up to 0.5 mm outside, where another vessel's cell begins that no tool in the lumen meets (2 mm of "jump").
 #include "recon/model_measure.h"
 
+#include "base/same_math.h"
 #include "geom/blobby.h"
 #include "geom/power_walk.h"
 #include "geom/sort_doubles.h"
@@ -219,7 +220,7 @@ static void cast_rays_of(const Job *job, int node, NodeFigures *f)
     int rays = ray_count(tree, node);
     for (int k = 0; k < rays; k++) {
         double z = 1 - (2 * k + 1.0) / rays, ring = sqrt(1 - z * z), angle = k * PI * (3 - sqrt(5));
-        Vec3 d = {ring * cos(angle), ring * sin(angle), z};
+        Vec3 d = {ring * same_cos(angle), ring * same_sin(angle), z};
         bool in = blobby_field(&model, c) > 0, first = true;
         for (int i = 1; i * step < 3 * radius; i++) {
             Vec3 x = vec3_add_scaled(c, i * step, d);

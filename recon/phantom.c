@@ -1,5 +1,6 @@
 // The synthetic shapes by name, and their options.
 #include "recon/phantom_parts.h"
+#include "base/same_math.h"
 #include "recon/random_tree.h"
 
 #include <stdio.h>
@@ -27,7 +28,7 @@ static bool build_arc(Shape *shape, const ShapeOptions *o)
     double knot[N][4];
     for (int i = 0; i < N; i++) {
         double angle = PI * i / (N - 1);
-        memcpy(knot[i], (double[4]){o->bend_radius_mm * sin(angle), o->bend_radius_mm * (1 - cos(angle)), 0, o->radius_mm}, sizeof knot[i]);
+        memcpy(knot[i], (double[4]){o->bend_radius_mm * same_sin(angle), o->bend_radius_mm * (1 - same_cos(angle)), 0, o->radius_mm}, sizeof knot[i]);
     }
     const double tangent[2][4] = {{1, 0, 0, 0}, {-1, 0, 0, 0}};
     return shape_add(shape, (const double (*)[4])knot, N, true, true, -1, NODE_VESSEL, tangent);
@@ -40,8 +41,8 @@ static bool build_bifurcation(Shape *shape, const ShapeOptions *o)
     for (int side = 0; side < 2; side++) {
         double knot[N][4];
         for (int i = 0; i < N; i++) {
-            double angle = PI / 2 * i / (N - 1), across = o->bend_radius_mm * (1 - cos(angle));
-            memcpy(knot[i], (double[4]){o->bend_radius_mm * sin(angle), side ? -across : across, 0, o->radius_mm}, sizeof knot[i]);
+            double angle = PI / 2 * i / (N - 1), across = o->bend_radius_mm * (1 - same_cos(angle));
+            memcpy(knot[i], (double[4]){o->bend_radius_mm * same_sin(angle), side ? -across : across, 0, o->radius_mm}, sizeof knot[i]);
         }
         const double tangent[2][4] = {{1, 0, 0, 0}, {0, side ? -1 : 1, 0, 0}};
         if (!shape_add(shape, (const double (*)[4])knot, N, true, true, side - 1, NODE_VESSEL, tangent))
@@ -57,14 +58,14 @@ static bool build_spiral(Shape *shape, const ShapeOptions *o)
     double knot[N][4], tangent[2][4];
     for (int i = 0; i < N; i++) {
         // knots crowd where the spiral winds tightly
-        double u = (double)i / (N - 1), theta = PI * pow(4, u), polar = 15.75 / theta;
+        double u = (double)i / (N - 1), theta = PI * same_pow(4, u), polar = 15.75 / theta;
         double radius = 0.5 + (0.15 - 0.5) * (theta - PI) / (3 * PI);
-        memcpy(knot[i], (double[4]){polar * cos(theta), polar * sin(theta), u * o->rise_mm, radius}, sizeof knot[i]);
+        memcpy(knot[i], (double[4]){polar * same_cos(theta), polar * same_sin(theta), u * o->rise_mm, radius}, sizeof knot[i]);
     }
     for (int end = 0; end < 2; end++) {
-        double theta = end ? 4 * PI : PI, polar = 15.75 / theta, z = o->rise_mm / (theta * log(4));
+        double theta = end ? 4 * PI : PI, polar = 15.75 / theta, z = o->rise_mm / (theta * same_log(4));
         double along = sqrt(polar * polar * (1 + 1 / (theta * theta)) + z * z);   // ds / dtheta
-        double x = -polar / theta * cos(theta) - polar * sin(theta), y = -polar / theta * sin(theta) + polar * cos(theta);
+        double x = -polar / theta * same_cos(theta) - polar * same_sin(theta), y = -polar / theta * same_sin(theta) + polar * same_cos(theta);
         memcpy(tangent[end], (double[4]){x / along, y / along, z / along, (0.15 - 0.5) / (3 * PI) / along}, sizeof tangent[end]);
     }
     return shape_add(shape, (const double (*)[4])knot, N, true, false, -1, NODE_VESSEL, (const double (*)[4])tangent);
@@ -97,13 +98,13 @@ static bool build_phantom(Shape *shape)
 static bool build_helix(Shape *shape, const ShapeOptions *o)
 {
     enum { N = KNOTS };
-    double knot[N][4], tangent[2][4], turn = 2 * PI * o->turns, along = sqrt(pow(turn * o->bend_radius_mm, 2) + o->rise_mm * o->rise_mm);
+    double knot[N][4], tangent[2][4], turn = 2 * PI * o->turns, along = sqrt(same_square(turn * o->bend_radius_mm) + o->rise_mm * o->rise_mm);
     for (int i = 0; i < N; i++) {
         double u = (double)i / (N - 1);
-        memcpy(knot[i], (double[4]){o->bend_radius_mm * cos(turn * u), o->bend_radius_mm * sin(turn * u), o->rise_mm * u, o->radius_mm}, sizeof knot[i]);
+        memcpy(knot[i], (double[4]){o->bend_radius_mm * same_cos(turn * u), o->bend_radius_mm * same_sin(turn * u), o->rise_mm * u, o->radius_mm}, sizeof knot[i]);
     }
     for (int end = 0; end < 2; end++)
-        memcpy(tangent[end], (double[4]){-o->bend_radius_mm * turn * sin(end * turn) / along, o->bend_radius_mm * turn * cos(end * turn) / along,
+        memcpy(tangent[end], (double[4]){-o->bend_radius_mm * turn * same_sin(end * turn) / along, o->bend_radius_mm * turn * same_cos(end * turn) / along,
                                          o->rise_mm / along, 0}, sizeof tangent[end]);
     return shape_add(shape, (const double (*)[4])knot, N, true, true, -1, NODE_VESSEL, (const double (*)[4])tangent);
 }
@@ -113,7 +114,7 @@ static bool build_helix(Shape *shape, const ShapeOptions *o)
 static bool build_y(Shape *shape, const ShapeOptions *o)
 {
     enum { TRUNK = 17, ARM = 33 };
-    double r = o->radius_mm, small = r / cbrt(2), angle = o->angle_deg * PI / 180, bend = 3 * small, arc = bend * angle, length = fmax(o->length_mm, 4 * r);
+    double r = o->radius_mm, small = r / same_cbrt(2), angle = o->angle_deg * PI / 180, bend = 3 * small, arc = bend * angle, length = fmax(o->length_mm, 4 * r);
     for (int side = 0; side < 2; side++) {
         double knot[TRUNK + ARM][4];
         int n = 0;
@@ -121,10 +122,10 @@ static bool build_y(Shape *shape, const ShapeOptions *o)
             memcpy(knot[n++], (double[4]){length * ((double)i / (TRUNK - 1) - 1), 0, 0, r}, sizeof knot[0]);
         for (int i = 0; i < ARM; i++) {
             double s = (arc + length) * i / (ARM - 1), turned = fmin(s, arc) / bend, on = fmax(0, s - arc), u = fmin(1, s / (3 * r));
-            double x = bend * sin(turned) + on * cos(turned), y = bend * (1 - cos(turned)) + on * sin(turned);
+            double x = bend * same_sin(turned) + on * same_cos(turned), y = bend * (1 - same_cos(turned)) + on * same_sin(turned);
             memcpy(knot[n++], (double[4]){x, side ? -y : y, 0, r + (small - r) * u * u * (3 - 2 * u)}, sizeof knot[0]);
         }
-        const double tangent[2][4] = {{1, 0, 0, 0}, {cos(angle), side ? -sin(angle) : sin(angle), 0, 0}};
+        const double tangent[2][4] = {{1, 0, 0, 0}, {same_cos(angle), side ? -same_sin(angle) : same_sin(angle), 0, 0}};
         if (!shape_add(shape, (const double (*)[4])knot, n, side == 0, true, side - 1, NODE_VESSEL, tangent))
             return false;
     }
@@ -132,7 +133,7 @@ static bool build_y(Shape *shape, const ShapeOptions *o)
 }
 
 // A gentle wave in the plane y = 0. Its neighbours run in the plane y = const as far as they kiss: the distance of the two centrelines is exactly that.
-static double wave(const ShapeOptions *o, double x) { return 2 * o->radius_mm * sin(x / (8 * o->radius_mm)); }
+static double wave(const ShapeOptions *o, double x) { return 2 * o->radius_mm * same_sin(x / (8 * o->radius_mm)); }
 
 static bool add_wave(Shape *shape, const ShapeOptions *o, double half_length)
 {
@@ -155,8 +156,8 @@ static bool build_kissing(Shape *shape, const ShapeOptions *o)
         return false;
     for (int i = 0; i < N; i++) {
         double x = half * (2.0 * i / (N - 1) - 1), z = wave(o, x), far = fmax(0, fabs(x) - 6 * r) / r;
-        double y = 2 * r + o->gap_mm + r * 0.06 * pow(far, 2) * fmin(1, far / 3);
-        memcpy(knot[i], (double[4]){x * cos(turn) - z * sin(turn), y, x * sin(turn) + z * cos(turn), r}, sizeof knot[i]);
+        double y = 2 * r + o->gap_mm + r * 0.06 * same_square(far) * fmin(1, far / 3);
+        memcpy(knot[i], (double[4]){x * same_cos(turn) - z * same_sin(turn), y, x * same_sin(turn) + z * same_cos(turn), r}, sizeof knot[i]);
     }
     return shape_add(shape->neighbour, (const double (*)[4])knot, N, true, true, -1, NODE_VESSEL, NULL);
 }
@@ -170,7 +171,7 @@ static bool build_bone(Shape *shape, const ShapeOptions *o)
     for (int i = 0; i < (int)o->blocks; i++) {
         // first one side, then the other, then round about
         double x = half * ((i + 0.5) / o->blocks * 1.6 - 0.8), around = i * PI * (3 - sqrt(5)), size = (2 + 2 * random_open(&random)) * r;
-        if (!shape_add_block(shape, vec3(x, 0, wave(o, x)), vec3(0, cos(around), sin(around)), vec3(size, size, size), o->gap_mm, &random))
+        if (!shape_add_block(shape, vec3(x, 0, wave(o, x)), vec3(0, same_cos(around), same_sin(around)), vec3(size, size, size), o->gap_mm, &random))
             return false;
     }
     return true;
@@ -326,7 +327,7 @@ double shape_block_distance(const ShapeBlock *block, Vec3 x)
     double within = fmax(q[0], fmax(q[1], q[2]));
     if (within < 0)
         return -within;
-    return -sqrt(pow(fmax(q[0], 0), 2) + pow(fmax(q[1], 0), 2) + pow(fmax(q[2], 0), 2));
+    return -sqrt(same_square(fmax(q[0], 0)) + same_square(fmax(q[1], 0)) + same_square(fmax(q[2], 0)));
 }
 
 double shape_voxel_mm(const Shape *shape) { return fmax(0.05, 2 * shape->noise); }

@@ -2,6 +2,7 @@
 // model's, both as long as the ray stays in the node's power cell. 200 rays a node, Fibonacci directions.
 #include "recon/phantom_measure.h"
 
+#include "base/same_math.h"
 #include "geom/blobby.h"
 #include "geom/power_walk.h"
 #include "geom/sort_doubles.h"
@@ -102,7 +103,7 @@ bool shape_measure(const Shape *shape, const VesselTree *tree, ShapeMeasure *out
             out->least_clearance = fmin(out->least_clearance, 0);
         for (int k = 0; k < RAYS; k++) {
             double z = 1 - (2 * k + 1.0) / RAYS, ring = sqrt(1 - z * z), angle = k * PI * (3 - sqrt(5)), far = 0;
-            Vec3 d = {ring * cos(angle), ring * sin(angle), z};
+            Vec3 d = {ring * same_cos(angle), ring * same_sin(angle), z};
             if (first_crossing(shape, NULL, tree, node, d, &hit) && !shape_beyond_open_end(shape, hit)) {
                 double signed_distance = blobby_project(&model, hit, hit).distance;
                 out->bias += signed_distance;

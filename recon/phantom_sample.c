@@ -1,5 +1,6 @@
 // Truth of a synthetic shape as a tree: nodes on the centreline with points on the true surface.
 #include "recon/phantom_parts.h"
+#include "base/same_math.h"
 
 #include <stdlib.h>
 
@@ -61,7 +62,7 @@ static void sample_side(Sampler *s, const Part *part, double at, double height)
             continue;
         Station station = part_at(part, t);
         Vec3 d = vec3_unit(station.tangent), e1 = vec3_normal_to(d), e2 = vec3_cross(d, e1), hit;
-        Vec3 out = vec3_add(vec3_scale(e1, cos(angle)), vec3_scale(e2, sin(angle)));
+        Vec3 out = vec3_add(vec3_scale(e1, same_cos(angle)), vec3_scale(e2, same_sin(angle)));
         if (march_out(s->shape, station.center, out, 1.4 * station.radius, &hit))
             add_sample(s, hit);
     }
@@ -75,7 +76,7 @@ static void sample_cap(Sampler *s, const Part *part, double at, double side)
     int n = s->shape->points / 2;
     for (int k = 0; k < n; k++) {
         double z = (k + 0.5) / n, ring = sqrt(1 - z * z), angle = phase + k * PI * (3 - sqrt(5));
-        Vec3 out = vec3_add_scaled(vec3_add(vec3_scale(e1, ring * cos(angle)), vec3_scale(e2, ring * sin(angle))), z, d);
+        Vec3 out = vec3_add_scaled(vec3_add(vec3_scale(e1, ring * same_cos(angle)), vec3_scale(e2, ring * same_sin(angle))), z, d);
         if (march_out(s->shape, station.center, out, 1.4 * station.radius, &hit))
             add_sample(s, hit);
     }
@@ -90,7 +91,7 @@ static void sample_sac(Sampler *s, const Part *part, double at)
     for (int k = 0; k < n; k++) {
         double z = 1 - (2 * k + 1.0) / n, ring = sqrt(1 - z * z), angle = phase + k * PI * (3 - sqrt(5)), t;
         Vec3 hit, g;
-        if (!march_out(s->shape, station.center, vec3(ring * cos(angle), ring * sin(angle), z), 4 * station.radius, &hit))
+        if (!march_out(s->shape, station.center, vec3(ring * same_cos(angle), ring * same_sin(angle), z), 4 * station.radius, &hit))
             continue;
         double own = part_field(part, hit, -HUGE_VAL, false, &g, &t), parent = part_field(&s->shape->part[part->parent], hit, -HUGE_VAL, false, &g, &t);
         if (own >= parent)

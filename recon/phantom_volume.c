@@ -3,6 +3,7 @@
 // The share is taken as that of a box filter across the wall: 1/2 + f / w, w = (sum_k (n . a_k)^2)^(1/2) for the normal n and the grid's steps a_k, so
 // that its second moment w^2 / 12 is the voxel's own. It adds to the blur: b^2 = psf^2 + w^2 / 12.
 #include "recon/parallel.h"
+#include "base/same_math.h"
 #include "recon/phantom_parts.h"
 
 #include <stdlib.h>
@@ -83,7 +84,7 @@ static double voxel_value(const Painter *p, Vec3 x, const double *known)
                         (field_of(p, which, vec3_add(x, vec3(k == 0 ? 1e-6 : 0, k == 1 ? 1e-6 : 0, k == 2 ? 1e-6 : 0)), NULL, NULL, NULL) - f) / 1e-6;
             n = vec3_unit_or(n, vec3(1, 0, 0));
             for (int k = 0; k < 3; k++)
-                width += pow(vec3_dot(n, p->volume->axis[k]), 2);
+                width += same_square(vec3_dot(n, p->volume->axis[k]));
             width = sqrt(width);
         } else if (width == 0) {
             width = p->diagonal;
@@ -193,7 +194,7 @@ static bool blur_axis(Volume *volume, int axis, double sigma, int threads)
     bool good = blur.kernel && blur.failed;
     double sum = 0;
     for (int k = 0; good && k <= reach; k++)   // integrated over the voxel
-        sum += (k ? 2 : 1) * (blur.kernel[k] = 0.5 * (erf((k + 0.5) / (sigma * sqrt(2))) - erf((k - 0.5) / (sigma * sqrt(2)))));
+        sum += (k ? 2 : 1) * (blur.kernel[k] = 0.5 * (same_erf((k + 0.5) / (sigma * sqrt(2))) - same_erf((k - 0.5) / (sigma * sqrt(2)))));
     for (int k = 0; good && k <= reach; k++)
         blur.kernel[k] /= sum;
     if (good)
@@ -219,16 +220,16 @@ static Band place_band(const Shape *shape, const VolumeOptions *o)
     Random random = {o->seed * RANDOM_STEP + 1};
     double share = 0.2 + 0.6 * random_open(&random), z = 2 * random_open(&random) - 1, angle = 2 * PI * random_open(&random), voxel2 = 0;
     for (int k = 0; k < 3; k++)
-        voxel2 += pow(o->voxel_mm[k], 2) / 3;
+        voxel2 += same_square(o->voxel_mm[k]) / 3;
     double ring = sqrt(1 - z * z);
-    return (Band){part_at(trunk, share * trunk->at[trunk->knot_count - 1]).center, vec3(ring * cos(angle), ring * sin(angle), z), 0.5 * o->band_mm,
-                  sqrt(pow(o->psf_mm, 2) + voxel2 / 12)};
+    return (Band){part_at(trunk, share * trunk->at[trunk->knot_count - 1]).center, vec3(ring * same_cos(angle), ring * same_sin(angle), z), 0.5 * o->band_mm,
+                  sqrt(same_square(o->psf_mm) + voxel2 / 12)};
 }
 
 static double band_at(const Band *band, Vec3 x)
 {
     double d = vec3_dot(vec3_sub(x, band->center), band->normal), scale = sqrt(2) * band->blur;
-    return 0.5 * (erf((d + band->half) / scale) - erf((d - band->half) / scale));
+    return 0.5 * (same_erf((d + band->half) / scale) - same_erf((d - band->half) / scale));
 }
 
 // --- Noise, clipping, grey values ---
@@ -279,8 +280,8 @@ static Volume *make_grid(const Shape *shape, const VolumeOptions *o, Faults *fau
     double turn = o->rotate_deg * PI / 180, total = 1, grow = 0;
     for (int k = 0; k < 3; k++) {
         Vec3 e = vec3(k == 0, k == 1, k == 2);
-        unit[k] = turn == 0 ? e : vec3_add(vec3_add(vec3_scale(e, cos(turn)), vec3_scale(vec3_cross(about, e), sin(turn))),
-                                           vec3_scale(about, (1 - cos(turn)) * vec3_dot(about, e)));
+        unit[k] = turn == 0 ? e : vec3_add(vec3_add(vec3_scale(e, same_cos(turn)), vec3_scale(vec3_cross(about, e), same_sin(turn))),
+                                           vec3_scale(about, (1 - same_cos(turn)) * vec3_dot(about, e)));
     }
     for (int p = 0; (shape->neighbour || shape->block_count > 0) && p < shape->part_count; p++)
         grow = fmax(grow, 4 * shape->part[p].coordinate[3].value[0]);
@@ -318,7 +319,7 @@ Volume *shape_volume_with(const Shape *shape, const VolumeOptions *options, Faul
     bool even = true;
     for (int k = 0; k < 3; k++) {
         p.cells[k] = (volume->size[k] + CELL - 1) / CELL;
-        p.diagonal += pow(options->voxel_mm[k], 2);
+        p.diagonal += same_square(options->voxel_mm[k]);
         even = even && options->voxel_mm[k] == options->voxel_mm[0];
     }
     p.diagonal = sqrt(p.diagonal);

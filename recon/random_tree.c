@@ -1,5 +1,7 @@
 #include "recon/random_tree.h"
 
+#include "base/same_math.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -47,7 +49,7 @@ static double random_between(Random *random, double low, double high) { return l
 static Vec3 random_direction(Random *random)
 {
     double z = random_between(random, -1, 1), angle = random_between(random, 0, 2 * PI), ring = sqrt(1 - z * z);
-    return vec3(ring * cos(angle), ring * sin(angle), z);
+    return vec3(ring * same_cos(angle), ring * same_sin(angle), z);
 }
 
 // From x along d: first turned by `turn` towards `side`, then wandering. The radius goes from r0 to r within three of r0.
@@ -61,7 +63,7 @@ static void draw(Random *random, Vec3 x, Vec3 d, Vec3 side, double turn, double 
         if (turn > 0) {
             double by = fmin(turn, step / bend);
             Vec3 across = vec3_unit(vec3_add_scaled(side, -vec3_dot(side, d), d));
-            d = vec3_unit(vec3_add(vec3_scale(d, cos(by)), vec3_scale(across, sin(by))));
+            d = vec3_unit(vec3_add(vec3_scale(d, same_cos(by)), vec3_scale(across, same_sin(by))));
             turn -= by;
         } else {
             curve = vec3_add_scaled(vec3_scale(curve, 0.75), 0.12 / r, random_direction(random));
@@ -150,12 +152,13 @@ static bool split(Growth *g, int tip, bool *failed)
     Vec3 x = knot_center(way->knot[parent.last]), d = parent.direction, e1 = vec3_normal_to(d), e2 = vec3_cross(d, e1);
     double r0 = parent.radius, zone = 5 * r0;
     for (int attempt = 0; attempt < 60 && way->count + SEGMENT_KNOTS < KNOTS; attempt++) {
-        double ratio = random_between(&g->random, 0.5, 1), r1 = r0 / cbrt(1 + ratio * ratio * ratio), r2 = ratio * r1;
-        double q0 = pow(r0, 4), q1 = pow(r1, 4), q2 = pow(r2, 4), angle = random_between(&g->random, 0, 2 * PI);
-        Vec3 side = vec3_add(vec3_scale(e1, cos(angle)), vec3_scale(e2, sin(angle)));
+        double ratio = random_between(&g->random, 0.5, 1), r1 = r0 / same_cbrt(1 + ratio * ratio * ratio), r2 = ratio * r1;
+        double q0 = same_square(same_square(r0)), q1 = same_square(same_square(r1)), q2 = same_square(same_square(r2));
+        double angle = random_between(&g->random, 0, 2 * PI);
+        Vec3 side = vec3_add(vec3_scale(e1, same_cos(angle)), vec3_scale(e2, same_sin(angle)));
         Draft one, two;
-        draw(&g->random, x, d, side, acos((q0 + q1 - q2) / (2 * r0 * r0 * r1 * r1)), r0, r1, &one);
-        draw(&g->random, x, d, vec3_negate(side), acos((q0 + q2 - q1) / (2 * r0 * r0 * r2 * r2)), r2, r2, &two);
+        draw(&g->random, x, d, side, same_acos((q0 + q1 - q2) / (2 * r0 * r0 * r1 * r1)), r0, r1, &one);
+        draw(&g->random, x, d, vec3_negate(side), same_acos((q0 + q2 - q1) / (2 * r0 * r0 * r2 * r2)), r2, r2, &two);
         if (!fits(g, &one, tip, zone, NULL) || !fits(g, &two, tip, zone, &one))
             continue;
         double first[4] = {x.x, x.y, x.z, r2};
@@ -265,8 +268,10 @@ bool random_tree_grow(Shape *shape, const RandomTreeOptions *o, const char *file
     for (int i = 0, left = 40; i < o->blocks && !failed; failed = left == 0) {
         const Bead *seat = &g.bead[(int)(random_open(&g.random) * g.bead_count)];
         double size = 2 * o->radius_mm;
-        Vec3 half = {random_between(&g.random, 0.5, 1.5) * size, random_between(&g.random, 0.5, 1.5) * size, random_between(&g.random, 0.5, 1.5) * size};
-        bool added = shape_add_block(shape, seat->center, random_direction(&g.random), half, o->gap_mm, &g.random);
+        double half[3];   // drawn one after the other: compilers differ in the order within an initialiser
+        for (int k = 0; k < 3; k++)
+            half[k] = random_between(&g.random, 0.5, 1.5) * size;
+        bool added = shape_add_block(shape, seat->center, random_direction(&g.random), vec3(half[0], half[1], half[2]), o->gap_mm, &g.random);
         i += added;
         left = added ? 40 : left - 1;
     }

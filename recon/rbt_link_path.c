@@ -1,6 +1,8 @@
 // Beside a straight link the places are a lattice along it (link_lattice.h), half a voxel apart. In search of another parent they are the image's voxels,
 // with the same cost: the length of a step over the fourth power of the brightness between background (0) and the child's lumen (1).
 #include "recon/rbt_link_path.h"
+
+#include "base/same_math.h"
 #include "geom/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/way_heap.h"
@@ -194,7 +196,7 @@ static int search_box(const Tracker *t, Box *b, int start, double reach, double 
     WayHeap heap = {0};
     int found = -1, at[3];
     // the search may be charged for a path that is dim all along, not for a longer one
-    double most = reach / pow(least, 4);
+    double most = reach / same_square(same_square(least));
     g->cost[start] = 0;
     g->from[start] = -1;
     g->lit[start] = 1;

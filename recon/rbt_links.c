@@ -1,6 +1,8 @@
 // The way is the cheapest one over 26 neighbours, where a voxel costs its length over the cube of its brightness between background (0) and lumen
 // (1), mean of its own and the spline's: it keeps to the middle and crosses what is dim only where it must.
 #include "recon/rbt_links.h"
+
+#include "base/same_math.h"
 #include "recon/bspline.h"
 #include "recon/way_heap.h"
 
@@ -135,7 +137,7 @@ static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 
             if (tracker_is_forbidden(t, volume_point_of(v, voxel)) || bright < 0.7 * least_lit)
                 continue;
             bright = 0.5 * (bright + lit(light, voxel_value(v, voxel)));
-            float cost = here.way + length[n] / (float)pow(bright, 3);
+            float cost = here.way + length[n] / (float)(bright * bright * bright);
             if (cost < s.cost[k]) {
                 s.cost[k] = cost;
                 s.from[k] = here.place;

@@ -1,5 +1,7 @@
 // See rbt_ring.h. The level is half way between the background beside the vessel and the brightness at the ring's middle, so that a dim place has an edge too.
 #include "recon/rbt_ring.h"
+
+#include "base/same_math.h"
 #include "geom/sort_doubles.h"
 #include "recon/cast_rays.h"
 
@@ -18,7 +20,7 @@ void rbt_ring_cast(const Tracker *t, Vec3 x, Vec3 axis, const LinkLight *light, 
     double inside = fmin(tracker_brightness(t, x), light->inside);
     for (int k = 0; k < RING; k++) {
         double angle = 2 * PI * (k + 0.5) / RING;
-        direction[k] = vec3_add(vec3_scale(u, cos(angle)), vec3_scale(v, sin(angle)));
+        direction[k] = vec3_add(vec3_scale(u, same_cos(angle)), vec3_scale(v, same_sin(angle)));
     }
     cast_rays_level_edge(t->volume, x, direction, RING, &rays, light->outside + 0.5 * (inside - light->outside), distance);
 }

@@ -2,6 +2,8 @@
 // taken over radii, axes and places. The face of a bright band has half of the ring as bright as the inside, a band as wide as the tube a third of it: the search
 // takes the ring's third and fourth brightest twelfth for all of it, so that a neighbour may touch the vessel and a band scores nothing.
 #include "recon/rbt_scan.h"
+
+#include "base/same_math.h"
 #include "recon/volume_noise.h"
 
 #include <stdlib.h>
@@ -102,7 +104,7 @@ static void sort_falling(double value[SECTORS])
         }
 }
 
-static int sector_of(double u, double v) { return (int)fmin(SECTORS - 1, floor((atan2(v, u) + PI) * SECTORS / (2 * PI))); }
+static int sector_of(double u, double v) { return (int)fmin(SECTORS - 1, floor((same_atan2(v, u) + PI) * SECTORS / (2 * PI))); }
 
 RbtSight rbt_sight_of(const Volume *volume, double noise, const Cylinder *tube)
 {
@@ -186,12 +188,12 @@ static double template_contrast(const Volume *volume, Vec3 center, Vec3 axis, do
         inside += smooth_value(volume, x);
         for (int k = 0; k < 2 * INNER; k++) {
             double a = PI * k / INNER, rho = (k % 2 ? 0.85 : 0.5) * r;
-            inside += smooth_value(volume, vec3_add_scaled(vec3_add_scaled(x, rho * cos(a), e1), rho * sin(a), e2));
+            inside += smooth_value(volume, vec3_add_scaled(vec3_add_scaled(x, rho * same_cos(a), e1), rho * same_sin(a), e2));
         }
         for (int k = 0; k < OUTER; k++) {
             double a = 2 * PI * (k + 0.5) / OUTER, rho = (k % 2 ? 1.35 : 1.7) * r + 0.5 * voxel;
             ring[k * SECTORS / OUTER] +=
-                smooth_value(volume, vec3_add_scaled(vec3_add_scaled(x, rho * cos(a), e1), rho * sin(a), e2));
+                smooth_value(volume, vec3_add_scaled(vec3_add_scaled(x, rho * same_cos(a), e1), rho * same_sin(a), e2));
         }
     }
     sort_falling(ring);
@@ -224,7 +226,7 @@ static void scan_radius(void *context, long index)
                 Vec3 x = vec3_add_scaled(vec3_add_scaled(scan->x, 0.375 * i * r, e1), 0.375 * k * r, e2);
                 if (i * i + k * k > 4 || !tracker_is_inside(t->volume, x))
                     continue;
-                double score = template_contrast(volume, x, axis, r, t->voxel) * pow(r, 1.5);
+                double score = template_contrast(volume, x, axis, r, t->voxel) * r * sqrt(r);
                 if (score > scan->score[index]) {
                     scan->score[index] = score;
                     scan->best[index] = (Cylinder){x, r, axis, 2 * r};
@@ -252,7 +254,7 @@ int rbt_scan(Tracker *t, RbtLevels *levels, Vec3 x, double radius, const Vec3 *a
     for (int i = 0; i < count; i++) {   // by all voxels of each, not by the template's samples
         RbtSight sight = scan.score[i] > 0 ? rbt_sight_of(levels->volume, noise, &scan.best[i]) : (RbtSight){0, 0, 0};
         // a ball round many vessels is more certain than one of them, but fainter
-        double own = rbt_is_tube(&sight) ? fmin(sight.certainty, CERTAIN) * pow(sight.evenness * sight.contrast, 2) * scan.radius[i] : 0;
+        double own = rbt_is_tube(&sight) ? fmin(sight.certainty, CERTAIN) * same_square(sight.evenness * sight.contrast) * scan.radius[i] : 0;
         int k = found;
         if (!(own > 0))
             continue;

@@ -2,6 +2,7 @@
 // nearest to their middles, weighed by length^-4, is nearer to the middle of the lumen, and the direction across which they lie is the axis.
 #include "recon/rbt_start.h"
 
+#include "base/same_math.h"
 #include "geom/sort_doubles.h"
 
 #include <stdlib.h>
@@ -38,7 +39,7 @@ static void cast_chords(const Tracker *t, Vec3 x, double level, double reach, Ch
         c->ahead[i] = wall_distance(t, x, d, level, reach);
         c->behind[i] = wall_distance(t, x, vec3_negate(d), level, reach);
         c->nearest = fmin(c->nearest, fmin(c->ahead[i], c->behind[i]));
-        double length = fmax((c->ahead[i] + c->behind[i]) / t->voxel, 0.5), weight = pow(length, -4), part[3] = {d.x, d.y, d.z};
+        double length = fmax((c->ahead[i] + c->behind[i]) / t->voxel, 0.5), weight = 1 / same_square(same_square(length)), part[3] = {d.x, d.y, d.z};
         for (int m = 0; m < 3; m++)
             for (int n = 0; n < 3; n++)
                 c->across.m[m][n] += weight * part[m] * part[n];

@@ -1,6 +1,8 @@
 // Limits: a click lies within one radius of the axis of the vessel that it names, at most within two; half of the edge points lie on the cylinder; the vessel is
 // narrower than the volume; inside and outside differ by five standard errors (fewer turn up among all tubes that can be laid through pure noise: see test_starts).
 #include "recon/rbt_start_check.h"
+
+#include "base/same_math.h"
 #include "recon/rbt_start.h"
 #include "geom/sort_doubles.h"
 #include "recon/volume_noise.h"
@@ -40,7 +42,7 @@ static double drift_of(Vec3 click, const Cylinder *c)
 {
     Vec3 q = vec3_sub(click, c->center);
     double along = vec3_dot(q, c->axis), across = sqrt(fmax(0, vec3_norm2(q) - along * along));
-    return hypot(across, fmax(0, fabs(along) - 4 * c->radius));
+    return same_hypot(across, fmax(0, fabs(along) - 4 * c->radius));
 }
 
 // Of the copy that is tracked.

@@ -8,6 +8,8 @@
 // way is straight on into the sac, and the tracking ends at its bottom. Where a branch swells or ends, the lumen ahead is searched for tubes that
 // leave it (rbt_exits.h), and the branch goes on from the widest one that tracks.
 #include "recon/rbt_track.h"
+
+#include "base/same_math.h"
 #include "base/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/bspline.h"
@@ -102,7 +104,7 @@ static double contrast_of(const Tracker *t, const Cylinder *c)
         inside += tracker_brightness(t, vec3_add_scaled(c->center, 0.25 * i * c->radius, c->axis)) / 3;
     for (int i = 0; i < RING; i++) {
         double a = 2 * PI * i / RING;
-        ring[i] = tracker_brightness(t, vec3_add_scaled(vec3_add_scaled(c->center, radius * cos(a), e1), radius * sin(a), e2));
+        ring[i] = tracker_brightness(t, vec3_add_scaled(vec3_add_scaled(c->center, radius * same_cos(a), e1), radius * same_sin(a), e2));
     }
     sort_doubles(ring, RING);
     for (int i = 0; i < RING / 2; i++)
@@ -294,7 +296,7 @@ static bool is_progress(Tracker *t, const Track *branch, double step, bool is_re
             p->back_step * last->cylinder.radius)
             return false;
     t->why = "turns back";
-    double way = vec3_norm(move), least = cos(p->turn_deg * PI / 180) - 1e-9;
+    double way = vec3_norm(move), least = same_cos(p->turn_deg * PI / 180) - 1e-9;
     for (int i = branch->count - 1; i >= 0 && way < 2 * last->cylinder.radius; i--) {
         if (vec3_dot(next->cylinder.axis, branch->node[i].cylinder.axis) < least)
             return false;
@@ -959,13 +961,13 @@ static int make_hub(Tracker *t, const SacJob *job, const TrackNode *sac, int sac
                     square += vec3_norm2(vec3_sub(neck.place[i], hub.center)) - border;
                     used++;
                 }
-            hub.radius = sqrt(fmax(square / used, pow(tree->node[best].cylinder.radius, 2)));
+            hub.radius = sqrt(fmax(square / used, same_square(tree->node[best].cylinder.radius)));
             // neighbours that would lie in its cell are part of it
             grown = false;
-            if (follows(tree, lo) && power_of(&hub, tree->node[lo - 1].cylinder.center) < -pow(tree->node[lo - 1].cylinder.radius, 2))
+            if (follows(tree, lo) && power_of(&hub, tree->node[lo - 1].cylinder.center) < -same_square(tree->node[lo - 1].cylinder.radius))
                 grown = true, lo--;
             if (hi + 1 < tree->count && follows(tree, hi + 1) &&
-                power_of(&hub, tree->node[hi + 1].cylinder.center) < -pow(tree->node[hi + 1].cylinder.radius, 2))
+                power_of(&hub, tree->node[hi + 1].cylinder.center) < -same_square(tree->node[hi + 1].cylinder.radius))
                 grown = true, hi++;
             if (!grown) {
                 Vec3 from = tree->node[lo].cylinder.center, to = tree->node[hi].cylinder.center;

@@ -1,5 +1,7 @@
 // sigma = 1.4826 MAD / sqrt(2) for differences of independent values; the Gaussian is applied axis by axis.
 #include "recon/volume_noise.h"
+
+#include "base/same_math.h"
 #include "base/heap.h"
 #include "geom/sort_doubles.h"
 #include "recon/parallel.h"
@@ -77,7 +79,7 @@ static bool smooth_axis(Volume *volume, int axis, double sigma, int threads)
     Smoothing s = {volume, axis, reach, kernel, calloc(jobs, sizeof *s.failed)};
     bool good = kernel && s.failed;
     for (int k = 0; good && k <= reach; k++)
-        sum += (k ? 2 : 1) * (kernel[k] = exp(-0.5 * (k / sigma) * (k / sigma)));
+        sum += (k ? 2 : 1) * (kernel[k] = same_exp(-0.5 * (k / sigma) * (k / sigma)));
     for (int k = 0; good && k <= reach; k++)
         kernel[k] /= sum;
     if (good)

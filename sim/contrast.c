@@ -7,6 +7,7 @@
 // Where more is injected than flows, J > W, the branches between the tip and the first fork that carries more run backwards: they come first.
 #include "sim/contrast.h"
 
+#include "base/same_math.h"
 #include "sim/contrast_network.h"
 
 #include <stdlib.h>
@@ -330,7 +331,7 @@ static void read_nodes(Contrast *contrast)
 static double pulse_integral(const Contrast *contrast, double time_s)
 {
     double angle = contrast->heart_rad_s * time_s;
-    return time_s + 0.4 * contrast->pulsation / contrast->heart_rad_s * (sin(angle) + 0.25 * sin(2 * angle));
+    return time_s + 0.4 * contrast->pulsation / contrast->heart_rad_s * (same_sin(angle) + 0.25 * same_sin(2 * angle));
 }
 
 void contrast_advance(Contrast *contrast, double dt_s, int tip_node, double rate_ml_s)

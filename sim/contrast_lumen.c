@@ -1,5 +1,7 @@
 #include "sim/contrast_lumen.h"
 
+#include "base/same_math.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -51,7 +53,7 @@ double lumen_annulus_share(double ratio)
     if (ratio >= 1)
         return 0;
     double gap = 1 - ratio, open = 1 - ratio * ratio;
-    return gap < narrow ? 4.0 / 3 * gap * gap * gap * (1 - gap / 2) : 1 - ratio * ratio * ratio * ratio - open * open / -log(ratio);
+    return gap < narrow ? 4.0 / 3 * gap * gap * gap * (1 - gap / 2) : 1 - ratio * ratio * ratio * ratio - open * open / -same_log(ratio);
 }
 
 // --- the tools ---

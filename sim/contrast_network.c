@@ -3,6 +3,8 @@
 // a step moves the contents of each cell by nearly one cell, which upwind transport does without smearing, whatever the speeds are.
 #include "sim/contrast_network.h"
 
+#include "base/same_math.h"
+
 #include <stdlib.h>
 
 enum { LEAST_CELLS_MAX = 20000 };
@@ -313,7 +315,7 @@ static bool hang_sacs(Builder *b, FlowNetwork *network, const ContrastOptions *o
             FlowSac *sac = &network->sac[s];
             sac->volume = fmax(sac->volume, LEAST_SAC);
             // as much in a step as an exponential loses; no more than half of the vessel's
-            sac->exchange_flow = fmin(-expm1(-options->step_s / options->sac_residence_s) * sac->volume / options->step_s, branch->flow / 2);
+            sac->exchange_flow = fmin(-same_expm1(-options->step_s / options->sac_residence_s) * sac->volume / options->step_s, branch->flow / 2);
         }
         branch->sac_count = s - branch->first_sac;
     }

@@ -1,12 +1,14 @@
 #include "sim/score_tool.h"
 
+#include "base/same_math.h"
+
 #include <string.h>
 
 static const double MEAN_MS = 20;
 static const double REST_MS = 100;           // from when on a hand rests: what its own motion has set going has died down
 static const double HUB_MM = 1;
 
-double score_mean(double mean, double value, double elapsed_ms) { return mean + (value - mean) * -expm1(-elapsed_ms / MEAN_MS); }
+double score_mean(double mean, double value, double elapsed_ms) { return mean + (value - mean) * -same_expm1(-elapsed_ms / MEAN_MS); }
 
 // How far its proximal end is behind the hub of the tool around it, and its tip behind the tip.
 static void measure_ends(const ScoreTool *tool, const Stepper *stepper, ScoreToolFigures *f)

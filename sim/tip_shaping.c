@@ -14,6 +14,8 @@
 // ribbon lie lower, 0.006. The coil around the core keeps nothing and carries nothing here; bends before this one are taken as pressed straight.
 #include "sim/tip_shaping.h"
 
+#include "base/same_math.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -28,7 +30,7 @@ double tip_core_moment(double curvature)
         return curvature;
     double x = 1 / curvature, root = sqrt(1 - x * x);
     // its terms cancel to x^3 / 3 of x: a series below, as exact
-    double elastic = x > 0.01 ? (asin(x) - x * root * (1 - 2 * x * x)) / (8 * x) : x * x / 3 - x * x * x * x / 10;
+    double elastic = x > 0.01 ? (same_asin(x) - x * root * (1 - 2 * x * x)) / (8 * x) : x * x / 3 - x * x * x * x / 10;
     return 16 / PI * (elastic + root * root * root / 3);
 }
 
@@ -38,7 +40,7 @@ double tip_kept_curvature(double curvature, double core_diameter)
     return curvature > yield ? curvature - tip_core_moment(curvature / yield) * yield : 0;
 }
 
-double tip_core_diameter(const WireSection *section) { return pow(64 * wire_stiffness(section).bending / (PI * core_modulus), 0.25); }
+double tip_core_diameter(const WireSection *section) { return same_pow(64 * wire_stiffness(section).bending / (PI * core_modulus), 0.25); }
 
 // Appends a piece of a section; nothing of slivers.
 static void append(WireSection *out, int *count, const WireSection *section, double length, double curvature)

@@ -1,5 +1,6 @@
 // Measures the cases of a VerifyPlan while a simulator runs.
 #include "sim/simulator.h"
+#include "base/same_math.h"
 #include "sim/verify.h"
 
 #include <stdlib.h>
@@ -114,7 +115,7 @@ static double twist_between(VerifyMeasure *m, const VerifyCase *c)
         double length = node[i + 1].s - node[i].s, part = (fmin(c->s_mm, node[i + 1].s) - fmax(c->from_s_mm, node[i].s)) / length;
         Quat p = quat_mul(quat_conjugate(node[i].orientation), node[i + 1].orientation);
         if (part > 0)
-            sum += part * 2 * atan2(p.w < 0 ? -p.x : p.x, fabs(p.w));
+            sum += part * 2 * same_atan2(p.w < 0 ? -p.x : p.x, fabs(p.w));
     }
     return sum;
 }
@@ -242,7 +243,7 @@ double verify_measure_result(const VerifyMeasure *m, int index)
     case TAKE_MOST: value = t->most; break;
     case TAKE_JUMP: value = t->jump; break;
     case TAKE_FREQUENCY: value = t->crossings > 1 ? 0.5 * (t->crossings - 1) / (t->last_cross_s - t->first_cross_s) : NAN; break;
-    case TAKE_DECAY: value = t->peaks > 1 ? pow(t->last_peak / t->first_peak, 2.0 / (t->peaks - 1)) : NAN; break;
+    case TAKE_DECAY: value = t->peaks > 1 ? same_pow(t->last_peak / t->first_peak, 2.0 / (t->peaks - 1)) : NAN; break;
     }
     return value / c->scale;
 }

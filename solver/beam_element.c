@@ -1,5 +1,6 @@
 // One element: the equations of beam_equations.h, and what the chain and the sheath take from a length.
 #include "solver/beam_equations.h"
+#include "base/same_math.h"
 
 void beam_element(const BeamInput *in, BeamOutput *out)
 {
@@ -36,6 +37,6 @@ double beam_arc_rest(double length, double curvature, double *slope)
         *slope = -q * q / 24 * (1 - q / 30);
         return -length * q * q / 120 * (1 - q / 42);
     }
-    *slope = 1 - cos(half) - 0.5 * q;
-    return length * (1 - sin(half) / half - q / 6);
+    *slope = 1 - same_cos(half) - 0.5 * q;
+    return length * (1 - same_sin(half) / half - q / 6);
 }

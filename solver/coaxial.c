@@ -27,6 +27,7 @@
 // Left out: angle with length (torques), borders' second order, negative parts. Axial and torsion likewise: (dlen - dl - T df)^2, f = integral of dS / EA.
 #include "solver/coaxial.h"
 
+#include "base/same_math.h"
 #include "solver/beam_equations.h"
 
 #include <stddef.h>
@@ -48,8 +49,8 @@ INLINE double small_cosine(double angle, double *sine_over_angle)
 {
     double q = angle * angle;
     if (q > 4) {
-        *sine_over_angle = sin(angle) / angle;
-        return cos(angle);
+        *sine_over_angle = same_sin(angle) / angle;
+        return same_cos(angle);
     }
     double sine = 1 - q * (1.0 / 210) * (1 - q * (1.0 / 272) * (1 - q * (1.0 / 342)));
     sine = 1 - q * (1.0 / 42) * (1 - q * (1.0 / 72) * (1 - q * (1.0 / 110) * (1 - q * (1.0 / 156) * sine)));
@@ -188,7 +189,7 @@ static void add_piece(const CoaxialSpan *span, double a, double b, Parts *p, Coa
         double turn = span[k].phi2 - span[k].phi1, phi = span[k].phi1 + mid * turn;
         Two u = two_scale((Two){-c->curve[1], c->curve[0]}, c->bending);
         if (phi != 0)
-            u = two_add(two_scale(u, cos(phi)), sin(phi), two_turned(u));
+            u = two_add(two_scale(u, same_cos(phi)), same_sin(phi), two_turned(u));
         double cosine = 1, sine = 0;
         if (turn != 0)
             cosine = small_cosine(turn * reach, &sine), sine *= turn * reach;

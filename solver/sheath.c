@@ -11,6 +11,8 @@
 // whole. It is taken at the length of the step's end and at the curvature of its start, because curvature is what stays.
 #include "solver/sheath.h"
 
+#include "base/same_math.h"
+
 // Unit, in the node's frame: the axis about which rest curvature turns, e3 turned about e1; half_y and half_z hold it times a sine.
 static Vec3 bending_axis(const BeamRest *rest, int index)
 {
@@ -69,7 +71,7 @@ void sheath_element(const BeamRest *rest, int index, Vec3 mouth, Vec3 direction,
     double k0 = vec3_norm(rest_outside), quarter = 0.25 * k0 * outside;
     Vec3 plane = k0 > 0 ? vec3_scale(rest_outside, 1 / k0) : vec3(0, 0, 1);
     BeamInput in = {.x1 = mouth, .x2 = x2, .q1 = q1, .q2 = q2, .length = outside, .axial = rest->axial[index], .twist = rest->twist[index],
-                    .half_w = cos(quarter), .half_y = sin(quarter) * plane.y, .half_z = sin(quarter) * plane.z};
+                    .half_w = same_cos(quarter), .half_y = same_sin(quarter) * plane.y, .half_z = same_sin(quarter) * plane.z};
     in.extend = length - beam_arc_rest(outside, k0, &slope) + coordinate;
     beam_bending(outside, bending, rest->shear[index], &in.near, &in.far);
     beam_bending_slope(outside, bending, rest->shear[index], &near_slope, &far_slope);

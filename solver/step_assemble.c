@@ -6,6 +6,7 @@
 // Unknowns are six a node in space axes; for nodes in the sheath they are in the line's axes, so that "stays on the line" is unit rows.
 // Reactions are read from node 0's rows as they were before its constraints.
 #include "solver/step_tools.h"
+#include "base/same_math.h"
 
 #include <string.h>
 
@@ -85,7 +86,7 @@ static void sheath_nodes(Stepper *s, double scale, double inertia)
         double ka = s->beam.rest.axial[i], kt = s->beam.rest.twist[i];
         double strain = stepper_sheath_coordinate(s, i + 1) - stepper_sheath_coordinate(s, i) - s->beam.rest.length[i];
         Quat p = quat_mul(quat_conjugate(s->state.orientation[i]), s->state.orientation[i + 1]);
-        double tension = ka * (strain + (scale - 1) * (u[6] - u[0])), torque = kt * (2 * atan2(p.x, p.w) + (scale - 1) * (u[9] - u[3]));
+        double tension = ka * (strain + (scale - 1) * (u[6] - u[0])), torque = kt * (2 * same_atan2(p.x, p.w) + (scale - 1) * (u[9] - u[3]));
         double *l = s->chain.lower + block_of(s, i), *next = d + 36;
         b[0] += tension, b[3] += torque;
         b[6] -= tension, b[9] -= torque;

@@ -4,6 +4,7 @@
 // Mass: all tools at a node move together across the tangent t; along it each has its own velocity, t . dx/dt - dS/dt for one that lies inside, and its
 // own spin, t . omega + dphi/dt. What S carries from node to node (convection) is left out: of order v^2 dm/ds.
 #include "solver/coaxial_lanes.h"
+#include "base/same_math.h"
 #include "solver/step_tools.h"
 
 #include <string.h>
@@ -111,7 +112,7 @@ double tools_twist(const Stepper *s, int c)
     double turned = is_at_tip(s, c) ? angle_at(s, c, s->carrier[c + 1]) : 0;
     Quat q = quat_mul(s->state.orientation[c], quat_from_rotation_vector(vec3(remainder(turned, 2 * PI), 0, 0)));
     Quat p = quat_mul(quat_conjugate(q), s->state.orientation[c + 1]);
-    return turned + 2 * atan(p.x / p.w);
+    return turned + 2 * same_atan(p.x / p.w);
 }
 
 // Behind a tip the frames of the two nodes belong to two tools: there node 1 is given that of the one that goes on.

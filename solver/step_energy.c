@@ -1,5 +1,6 @@
 // Energies of a state, and what a step's motion has done to them: each force of the step's end times the motion, as implicit Euler has it.
 #include "solver/step_tools.h"
+#include "base/same_math.h"
 
 BeamInput stepper_beam(const Stepper *s, int i)
 {
@@ -17,7 +18,7 @@ static double element_energy(const Stepper *s, int i, int held)
     if (i + 1 < held) {
         double k0 = r->curvature[i], strain = stepper_sheath_coordinate(s, i + 1) - stepper_sheath_coordinate(s, i) - r->length[i];
         Quat p = quat_mul(quat_conjugate(w->orientation[i]), w->orientation[i + 1]);
-        double twist = 2 * atan2(p.x, p.w);
+        double twist = 2 * same_atan2(p.x, p.w);
         return 0.5 * (r->axial[i] * strain * strain + r->twist[i] * twist * twist + r->bending[i] * k0 * k0 * r->length[i]);
     }
     if (i + 1 == held) {

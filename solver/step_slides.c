@@ -5,6 +5,7 @@
 // rods in contact give; else a couple at the end of a bend would bear a friction that grows without bound as elements shrink.
 
 #include "solver/step_tools.h"
+#include "base/same_math.h"
 
 static const double FOLLOWS = 7.3;
 static const double GIVE = 1e-4;         // [mm] by which tools that stick on each other follow a force, elastically
@@ -78,7 +79,7 @@ void tools_slides(Stepper *s)
                 continue;
             const double *last = s->state.slide_force + 3 * (c * inner + k - 1), bound = t->friction * pressure_at(s, c, k, window[k], turn, near);
             // what slid goes on sliding: by the new bound
-            bool slid = hypot(last[0], last[1]) > 0.999999 * last[2];
+            bool slid = same_hypot(last[0], last[1]) > 0.999999 * last[2];
             double change = slid && last[2] > 0 ? bound / last[2] : 1;
             double slip[2], radius = t->wire.radius[0];
             last_slip(s, c, k, tangent, slip);

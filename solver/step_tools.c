@@ -3,6 +3,8 @@
 // As tools slide, nodes come and go at the tips (where a tool leaves the one around it), and unknowns where an inner tip passes a node.
 #include "solver/step_tools.h"
 
+#include "base/same_math.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -41,7 +43,7 @@ static bool make_tool(Tool *t, const WireOptions *o, char *why, int capacity)
         WireStiffness stiffness = wire_stiffness(section);
         end += section->length;
         t->section[i] = (CoaxialSection){end, stiffness.bending, stiffness.axial, stiffness.torsion, stiffness.shear,
-                                         {section->rest_curvature * cos(section->rest_plane), section->rest_curvature * sin(section->rest_plane)}};
+                                         {section->rest_curvature * same_cos(section->rest_plane), section->rest_curvature * same_sin(section->rest_plane)}};
         t->line_mass[i] = stiffness.line_mass;
         t->line_inertia[i] = stiffness.line_inertia;
     }
@@ -328,7 +330,7 @@ void tools_exchange_outermost(Stepper *s, const Tool *next)
     Inside *old = s->inside;
     for (int c = 0; c < old_nodes; c++) {
         Quat p = c > 0 ? quat_mul(quat_conjugate(w->orientation[c - 1]), w->orientation[c]) : (Quat){1, 0, 0, 0};
-        old[c] = inside_at_node(s, c, turn += 2 * atan2(p.x, p.w));
+        old[c] = inside_at_node(s, c, turn += 2 * same_atan2(p.x, p.w));
     }
     Quat hub = w->orientation[0];
     Vec3 velocity = w->velocity[0], spin = w->spin[0];

@@ -5,6 +5,7 @@
 // about the axis), which is small but keeps the rotational blocks positive definite.
 #include "solver/wire.h"
 
+#include "base/same_math.h"
 #include "solver/beam_element.h"
 
 #include <stdio.h>
@@ -262,13 +263,13 @@ void wire_rest(const Wire *wire, const WireOptions *options, BeamRest *rest)
         beam_bending(length, stiffness.bending, stiffness.shear, &rest->near[i], &rest->far[i]);
         // from the proximal tangent to the chord: half the arc's angle about e3 turned by `plane`
         double quarter = 0.25 * curvature * length;
-        rest->half_w[i] = cos(quarter);
-        rest->half_y[i] = -sin(quarter) * sin(plane);
-        rest->half_z[i] = sin(quarter) * cos(plane);
+        rest->half_w[i] = same_cos(quarter);
+        rest->half_y[i] = -same_sin(quarter) * same_sin(plane);
+        rest->half_z[i] = same_sin(quarter) * same_cos(plane);
         // what the element's own formula gives at rest, so that rest is free of force to rounding
-        double half = 2 * quarter, chord = half > 0 ? length * sin(half) / half : length;
-        BeamInput in = {.x2 = {chord, 0, 0}, .q1 = {cos(quarter), 0, 0, -sin(quarter)}, .q2 = {cos(quarter), 0, 0, sin(quarter)},
-                        .length = length, .half_w = cos(quarter), .half_z = sin(quarter)};
+        double half = 2 * quarter, chord = half > 0 ? length * same_sin(half) / half : length;
+        BeamInput in = {.x2 = {chord, 0, 0}, .q1 = {same_cos(quarter), 0, 0, -same_sin(quarter)}, .q2 = {same_cos(quarter), 0, 0, same_sin(quarter)},
+                        .length = length, .half_w = same_cos(quarter), .half_z = same_sin(quarter)};
         BeamOutput out;
         beam_element(&in, &out);
         rest->extend[i] = chord + out.bow;

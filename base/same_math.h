@@ -1,0 +1,37 @@
+// Elementary functions that give the same bits with every compiler, instruction set, processor and C library, which the C library's own do not: glibc
+// picks other code where the processor has fused multiplication. They are made of +, -, *, / and sqrt alone, each of which IEEE 754 rounds in one way
+// only, without fused multiplication and without reassociation (-ffp-contract=off). What decides a state, a model or a score calls these;
+// tests/cli/test_same_builds.c finds who calls the C library's.
+//
+// Arguments and results in radians. Special values as in C17, annex F, but no floating-point exception and no errno is promised. Each is a pure function.
+// Errors are the largest seen against 80-bit arithmetic (tests/base/test_same_math.c), in units in the last place of the result.
+#ifndef SELDINGER_BASE_SAME_MATH_H
+#define SELDINGER_BASE_SAME_MATH_H
+
+#include <math.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+double same_sin(double x);                 // 0.8, of any size of x
+double same_cos(double x);                 // 0.8, of any size of x
+double same_atan(double x);                // 0.6
+double same_atan2(double y, double x);     // 0.7
+double same_asin(double x);                // 2; not a number beyond -1 to 1
+double same_acos(double x);                // 1.4; the same
+double same_exp(double x);                 // 0.8
+double same_expm1(double x);               // 1.2; exp(x) - 1
+double same_log(double x);                 // 0.9
+double same_pow(double x, double y);       // 0.7
+double same_cbrt(double x);                // 0.6
+double same_erf(double x);                 // 12
+// Of lengths: squares that overflow or vanish (beyond 1e150, below 1e-150) are not looked after.
+static inline double same_hypot(double x, double y) { return sqrt(x * x + y * y); }
+static inline double same_square(double x) { return x * x; }
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
