@@ -106,6 +106,8 @@ static bool is_survived(Hdf5Source *source)
 // Takes the source's file.
 static Hdf5Reader *open_source(const Hdf5Source *source, bool has_rehearsal, const char *name, const char *needs, Faults *faults)
 {
+    if (!heap_has_room(HEAP_ROOM_OF_HDF5))
+        heap_is_empty(HEAP_ROOM_OF_HDF5, __FILE__);
     Hdf5Reader *reader = HEAP_ZEROED(1, sizeof *reader);
     *reader = (Hdf5Reader){.source = *source, .file = -1, .name = name, .needs = needs, .faults = faults, .faults_before = faults->count,
                            .left = source->length < HDF5_READER_MOST_BYTES ? source->length : HDF5_READER_MOST_BYTES};

@@ -1,6 +1,8 @@
 #define _GNU_SOURCE   // locks of an open file, not of a process
 #include "sim/ordered_file.h"
 
+#include "base/heap.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <stdint.h>
@@ -348,6 +350,12 @@ static const H5FD_class_t driver_class = {
 
 hid_t ordered_file_create(const char *path, hid_t creation, hid_t access)
 {
+    // 12 MB until the first chunks are there, of each of which a B-tree is made (H5B_create)
+    if (!heap_has_room(4 * HEAP_ROOM_OF_HDF5)) {
+        errno = ENOMEM;
+        return -1;
+    }
+    errno = 0;
     hid_t driver = H5FDregister(&driver_class);
     hid_t file = driver >= 0 && H5Pset_driver(access, driver, NULL) >= 0 ? H5Fcreate(path, H5F_ACC_TRUNC, creation, access) : -1;
     if (driver >= 0)
