@@ -209,7 +209,7 @@ typedef struct Disturbance {
     long value;
 } Disturbance;
 
-enum { MOST_WORDS = 32, SIGNALLED = 1000, LATE = 2000, PATIENCE_S = 60 };
+enum { MOST_WORDS = 32, SIGNALLED = 1000, LATE = 2000, PATIENCE_S = 300 };
 
 static void set_number(const char *name, long number)
 {
@@ -741,7 +741,7 @@ static const struct Limit {
 
 static long next_value(const struct Limit *limit, long value)
 {
-    return limit->factor ? value * limit->factor : limit->set == address_space ? value + value / 8 : value + 1;
+    return limit->factor ? value * limit->factor : limit->set == address_space ? value + value / 50 : value + 1;
 }
 
 static long torture_by_limits(const Case *c, const Reference *reference)
