@@ -815,6 +815,8 @@ static void clean_up(void)
         fprintf(stderr, "torture: %s stays\n", here);
 }
 
+static void stop(int number) { exit(128 + number); }      // the folder and the display with it
+
 static void make_inputs(const char *const *input)
 {
     for (; *input; input++)
@@ -849,6 +851,8 @@ int main(int argc, char **argv)
     if (!mkdtemp(here) || chmod(here, 0755) != 0 || !realpath(argv[1], program) || !realpath(argv[2], calls))
         give_up("cannot make a folder, or no such program: ", argv[1]);
     atexit(clean_up);
+    signal(SIGINT, stop);
+    signal(SIGTERM, stop);
     shell("cd '%s' && mkdir in work cache in/check && cp '%s' seldinger && cp '%s' calls.so", here, program, calls);
     snprintf(program, sizeof program, "%s", in(".", "seldinger"));
     snprintf(calls, sizeof calls, "%s", in(".", "calls.so"));
