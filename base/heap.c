@@ -23,6 +23,14 @@ void heap_is_empty(size_t bytes, const char *file)
     _exit(2);
 }
 
+bool heap_has_room(size_t bytes)
+{
+    void *volatile room = malloc(bytes);      // volatile: not to be optimised away
+    bool has = room != NULL;
+    free(room);
+    return has;
+}
+
 static size_t bytes_of(size_t count, size_t size) { return size > 0 && count > SIZE_MAX / size ? SIZE_MAX : count * size; }
 
 void *heap_zeroed(size_t count, size_t size, const char *file)

@@ -3,6 +3,7 @@
 #ifndef SELDINGER_BASE_HEAP_H
 #define SELDINGER_BASE_HEAP_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #ifdef __cplusplus
@@ -18,6 +19,10 @@ void *heap_grown(void *old, size_t count, size_t size, const char *file);
 // A copy of a text.
 char *heap_text(const char *text, const char *file);
 #define HEAP_TEXT(text) heap_text(text, __FILE__)
+// Whether this much could be had in one piece now: to be asked before a library is called that ends by a signal where it has less.
+bool heap_has_room(size_t bytes);
+// What the HDF5 library (1.10) takes at once for a file's cache (H5AC_create), four times.
+#define HEAP_ROOM_OF_HDF5 ((size_t)8 << 20)
 // What cannot be had: says so and ends the program.
 __attribute__((noreturn)) void heap_is_empty(size_t bytes, const char *file);
 

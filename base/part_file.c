@@ -1,3 +1,4 @@
+#define _GNU_SOURCE   // a stream of our own
 #include "base/part_file.h"
 
 #include <errno.h>
@@ -129,12 +130,6 @@ bool part_file_begin(PartFile *part, const char *path)
     return true;
 }
 
-FILE *part_file_stream(PartFile *part)
-{
-    if (!part->stream)
-        part->stream = fdopen(part->descriptor, "wb");
-    return part->stream;
-}
 
 bool part_file_write(PartFile *part, const void *bytes, size_t length)
 {
@@ -148,6 +143,22 @@ bool part_file_write(PartFile *part, const void *bytes, size_t length)
         length -= (size_t)n;
     }
     return true;
+}
+
+static ssize_t write_stream(void *descriptor, const char *bytes, size_t length)
+{
+    PartFile part = {.descriptor = (int)(intptr_t)descriptor};
+    return part_file_write(&part, bytes, length) ? (ssize_t)length : 0;
+}
+
+static int close_stream(void *descriptor) { return close((int)(intptr_t)descriptor); }
+
+// The library's own streams take a write that a signal interrupted for one that failed.
+FILE *part_file_stream(PartFile *part)
+{
+    if (!part->stream)
+        part->stream = fopencookie((void *)(intptr_t)part->descriptor, "wb", (cookie_io_functions_t){.write = write_stream, .close = close_stream});
+    return part->stream;
 }
 
 static bool close_part(PartFile *part)

@@ -31,9 +31,12 @@ size_t regular_file_read(int descriptor, void *bytes, size_t capacity)
         ssize_t n = read(descriptor, (char *)bytes + got, capacity - got);
         if (n < 0 && errno == EINTR)
             continue;
-        if (n <= 0)
+        if (n < 0)
+            return got;
+        if (n == 0)
             break;
         got += (size_t)n;
     }
+    errno = 0;
     return got;
 }

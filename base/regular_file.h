@@ -7,7 +7,7 @@
 
 // A descriptor of the regular file `path` for reading, closed on exec; never waits. -1 with the reason in *why.
 int regular_file_open(const char *path, struct stat *status, const char **why);
-// At most `capacity` bytes; fewer at the end of the file, or where reading fails.
+// At most `capacity` bytes; fewer at the end of the file, or where reading fails: errno is 0 but there.
 size_t regular_file_read(int descriptor, void *bytes, size_t capacity);
 
 #endif

@@ -33,7 +33,8 @@ bool check_has_verify(const char *path)
     size_t length;
     faults_clear(&ignored);
     char *text = text_file_read(path, &length, &ignored);
-    bool found = text && (!strncmp(text, "verify:", 7) || strstr(text, "\nverify:"));
+    // one that cannot be read is not left out: whoever opens it says why
+    bool found = !text || !strncmp(text, "verify:", 7) || strstr(text, "\nverify:");
     free(text);
     return found;
 }

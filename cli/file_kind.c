@@ -5,6 +5,7 @@
 #include "recon/surface_file.h"
 #include "recon/volume.h"
 
+#include <errno.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
@@ -16,10 +17,10 @@ static FileKind kind_of_hdf5(const char *path)
     Faults unread = {0};
     Hdf5Reader *reader = hdf5_reader_open(path, "", &unread);
     if (!reader)
-        return FILE_TREE;   // cut off or damaged: the reader of trees says so
+        return errno ? FILE_MISSING : FILE_TREE;   // cut off or damaged: the reader of trees says so
     FileKind kind = hdf5_has(reader, "/nodes") ? FILE_TREE : hdf5_has(reader, "/wire") ? FILE_RECORDING : FILE_UNKNOWN;
     hdf5_reader_close(reader);
-    return kind;
+    return unread.count == 0 ? kind : FILE_MISSING;
 }
 
 FileKind file_kind(const char *path)
@@ -33,7 +34,10 @@ FileKind file_kind(const char *path)
     if (file < 0)
         return FILE_MISSING;
     size_t length = regular_file_read(file, head, sizeof head - 1);
+    bool is_unread = errno != 0;
     close(file);
+    if (is_unread)
+        return FILE_MISSING;
     const char *text = (const char *)head;
     if (length >= 8 && !memcmp(head, "\x89HDF\r\n\x1a\n", 8))
         return kind_of_hdf5(path);

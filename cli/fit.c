@@ -393,8 +393,11 @@ static VesselTree *run_fit(FitCommand *command, TreeFileInfo *info, double *seco
             return tree;
         if (command->edge_blur < 0)      // a model's points are where its fit has put them
             command->edge_blur = vessel_tree_is_model(tree) || !strcmp(command->preset, "paper") ? 0 : fmax(tree_file_number(info, "edge_blur_mm", 0), 0);
-        if (!blurred_edge_correct(tree, command->edge_blur))
+        if (!blurred_edge_correct(tree, command->edge_blur)) {
             faults_add(faults, command->tree, 0, 0, "not enough memory");
+            vessel_tree_free(tree);
+            return NULL;
+        }
         ProgressBar bar;
         Progress progress = progress_bar(&bar, "fit", command->quiet);
         double begin = seconds_now();

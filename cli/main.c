@@ -1,4 +1,5 @@
 // seldinger: the table of verbs and what the verbs share.
+#define _GNU_SOURCE   // the stack of all threads
 #include "cli/cli.h"
 
 #include "base/part_file.h"
@@ -7,9 +8,11 @@
 #include <cjson/cJSON.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <pthread.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 static const struct Verb {
@@ -118,6 +121,27 @@ static void fill_standard_streams(void)
             _exit(EXIT_BAD_INPUT);
 }
 
+// What is usual, for all threads: with less a program ends by a signal in the middle of its work.
+static bool take_stack(void)
+{
+    enum { USUAL = 8 << 20, LEAST = 1 << 20 };
+    struct rlimit stack;
+    pthread_attr_t thread;
+    if (getrlimit(RLIMIT_STACK, &stack) != 0 || stack.rlim_cur >= USUAL)      // RLIM_INFINITY is the largest of all
+        return true;
+    stack.rlim_cur = stack.rlim_max < USUAL ? stack.rlim_max : USUAL;
+    if (stack.rlim_cur < LEAST || setrlimit(RLIMIT_STACK, &stack) != 0) {
+        fprintf(stderr, "seldinger: the stack may have %ld kB; at least %d are needed (`ulimit -s`)\n", (long)(stack.rlim_cur >> 10), LEAST >> 10);
+        return false;
+    }
+    if (pthread_attr_init(&thread) == 0) {
+        if (pthread_attr_setstacksize(&thread, (size_t)stack.rlim_cur) == 0)
+            pthread_setattr_default_np(&thread);
+        pthread_attr_destroy(&thread);
+    }
+    return true;
+}
+
 // The library's JSON is otherwise silently without what it had no memory for.
 static void *json_memory(size_t bytes) { return HEAP_ZEROED(bytes, 1); }
 
@@ -125,6 +149,8 @@ int main(int argc, char **argv)
 {
     cJSON_InitHooks(&(cJSON_Hooks){.malloc_fn = json_memory, .free_fn = free});
     fill_standard_streams();
+    if (!take_stack())
+        return EXIT_BAD_INPUT;
     install_stop(SIGINT);
     install_stop(SIGTERM);
     install_stop(SIGHUP);

@@ -402,16 +402,20 @@ static int simulate(const RunOptions *options, const Scene *scene, OpenVessel *o
         if (options->picture && options->moment_count == 0)
             take_moment(&watch.moment[0], simulator, &(ToolCommands){0});
         bool whole = !watch.recording || recording_close(watch.recording, simulator, faults);
-        whole &= write_files(options, simulator, &report, node, faults);
-        whole &= write_score(options, &watch, scene, faults);
+        // what a recording that could not go on has broken off is another run than was asked for
+        bool is_this_run = !watch.recording_failed;
+        if (is_this_run) {
+            whole &= write_files(options, simulator, &report, node, faults);
+            whole &= write_score(options, &watch, scene, faults);
+        }
         if (!options->quiet)
             run_print(options->summary && !strcmp(options->summary, "-") ? stderr : stdout, simulator, &report, node);
         say_untrusted(simulator, &report);
 #ifdef SELDINGER_RENDER
-        whole = (!options->picture || draw_picture(options, &watch, simulator, open, faults)) && whole;
+        whole = (!is_this_run || !options->picture || draw_picture(options, &watch, simulator, open, faults)) && whole;
 #endif
         char message[512];
-        if (options->chart && !run_chart_draw(watch.chart, simulator, options->chart, message, sizeof message)) {
+        if (is_this_run && options->chart && !run_chart_draw(watch.chart, simulator, options->chart, message, sizeof message)) {
             faults_add(faults, options->chart, 0, 0, "no chart: %s", message);
             whole = false;
         }

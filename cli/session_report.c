@@ -7,6 +7,7 @@
 #include "cli/recover.h"
 #include "cli/report.h"
 #include "cli/trainer_files.h"
+#include "base/heap.h"
 #include "cli/tube_tree.h"
 #include "input/text_file.h"
 #include "recon/whole_file.h"
@@ -324,6 +325,8 @@ static char *make_page(const char *path, const Session *session, const char *wit
         Scene *scene = open_scene(run, &open, &tree, gone);
         Session *earlier = session_list(with, session->trainee, session->title, &page.earlier_count, &page.broken, gone);
         say(gone);
+        if (page.broken > 0)
+            fprintf(stderr, "seldinger report: %s: %d session file%s could not be read\n", with, page.broken, page.broken == 1 ? "" : "s");
         page.run = run;
         page.run_is_its = run && session_is_of(session, run);
         page.scene = scene;
@@ -522,7 +525,7 @@ int verb_report(int argc, char **argv)
     if (code >= 0)
         return code;
     faults_clear(&faults);
-    Session *session = calloc(1, sizeof *session);
+    Session *session = HEAP_ZEROED(1, sizeof *session);
     char *page = NULL;
     name_session_file(&options);
     OutputPlan plan = {.faults = &faults};
@@ -531,7 +534,7 @@ int verb_report(int argc, char **argv)
     output_plan_read(&plan, "the session", options.session);
     output_plan_read(&plan, "the recording", options.recording);
     output_plan_read_folder(&plan, "the session", options.with, ".json");
-    bool good = session && faults.count == 0 && make_session_file(&options, &faults) && session_load(options.session, session, &faults);
+    bool good = faults.count == 0 && make_session_file(&options, &faults) && session_load(options.session, session, &faults);
     page = good ? make_page(options.session, session, options.with, &length, &faults) : NULL;
     good = page && (!options.html || output_write(options.html, page, length, &faults));
     good = good && (!options.pdf || write_pdf(options.pdf, page, length, &faults));

@@ -76,6 +76,7 @@ bool trainer_save_session(const Scene *scene, const char *trainee, const char *d
     RecordedRun *run = recorded_run_load_series(recording, faults);
     Session *session = run ? calloc(1, sizeof *session) : NULL;
     char *text = NULL;
+    bool is_read = run != NULL;
     if (session) {
         session_begin(session, scene, trainee, device, date);
         session_set_score(session, score);
@@ -86,7 +87,8 @@ bool trainer_save_session(const Scene *scene, const char *trainee, const char *d
     free(session);
     trainer_file_beside(recording, ".json", path, sizeof path);
     if (!text) {
-        faults_add(faults, path, 0, 0, "no session file could be made");
+        if (is_read)
+            faults_add(faults, path, 0, 0, "no session file could be made: no memory");
         return false;
     }
     bool good = output_write(path, text, strlen(text), faults);

@@ -2,6 +2,7 @@
 
 #include "base/regular_file.h"
 
+#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -25,6 +26,12 @@ char *text_file_read(const char *path, size_t *length, Faults *faults)
     if (text) {
         *length = regular_file_read(file, text, size);
         text[*length] = 0;
+    }
+    // less than it has would be another text
+    if (text && *length < size) {
+        faults_add(faults, path, 0, 0, "cannot be read to its end: %s", errno ? strerror(errno) : "it has become shorter");
+        free(text);
+        text = NULL;
     }
     close(file);
     return text;

@@ -21,6 +21,7 @@ struct Hdf5Reader {
     hid_t file;
     const char *name, *needs;
     Faults *faults;
+    int faults_before;
     hsize_t left;            // [bytes] of the file that no dataset has taken yet
     H5E_auto2_t handler;     // of the library's own messages, as it was
     void *handler_data;
@@ -105,8 +106,10 @@ static bool is_survived(Hdf5Source *source)
 // Takes the source's file.
 static Hdf5Reader *open_source(const Hdf5Source *source, bool has_rehearsal, const char *name, const char *needs, Faults *faults)
 {
+    if (!heap_has_room(HEAP_ROOM_OF_HDF5))
+        heap_is_empty(HEAP_ROOM_OF_HDF5, __FILE__);
     Hdf5Reader *reader = HEAP_ZEROED(1, sizeof *reader);
-    *reader = (Hdf5Reader){.source = *source, .file = -1, .name = name, .needs = needs, .faults = faults,
+    *reader = (Hdf5Reader){.source = *source, .file = -1, .name = name, .needs = needs, .faults = faults, .faults_before = faults->count,
                            .left = source->length < HDF5_READER_MOST_BYTES ? source->length : HDF5_READER_MOST_BYTES};
     be_silent(reader);
     H5PLset_loading_state(0);
@@ -114,8 +117,10 @@ static Hdf5Reader *open_source(const Hdf5Source *source, bool has_rehearsal, con
     reader->file = is_sound ? hdf5_source_open(&reader->source) : -1;
     if (reader->file >= 0)
         return reader;
+    int reason = reader->source.reason;
     faults_add_at_byte(faults, name, 0, "is not a readable HDF5 file (cut off, damaged or of another kind); %s", needs);
     hdf5_reader_close(reader);
+    errno = reason;
     return NULL;
 }
 
@@ -123,10 +128,12 @@ Hdf5Reader *hdf5_reader_open(const char *path, const char *needs, Faults *faults
 {
     struct stat status;
     int file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);     // not to wait for a pipe's other end
+    int reason = file < 0 ? errno : 0;
     if (file < 0 || fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
         faults_add(faults, path, 0, 0, "cannot be opened as a regular file; %s", needs);
         if (file >= 0)
             close(file);
+        errno = reason;
         return NULL;
     }
     return open_source(&(Hdf5Source){.file = file, .length = (size_t)status.st_size}, true, path, needs, faults);
@@ -145,6 +152,11 @@ void hdf5_reader_close(Hdf5Reader *reader)
         H5Fclose(reader->file);
     if (reader->source.file >= 0)
         close(reader->source.file);
+    // what seemed to lack, or to be damaged, was not read
+    if (reader->source.reason) {
+        reader->faults->count = reader->faults_before;
+        faults_add(reader->faults, reader->name, 0, 0, "cannot be read: %s", strerror(reader->source.reason));
+    }
     H5Eset_auto2(H5E_DEFAULT, reader->handler, reader->handler_data);
     free(reader);
 }

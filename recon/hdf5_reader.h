@@ -31,11 +31,11 @@ typedef struct Hdf5Dataset {
     bool is_finite;          // NaN and infinity are refused
 } Hdf5Dataset;
 
-// NULL with a fault. `needs` ends the message on a dataset that lacks: "a recording has it". Both it and `path` are kept, not copied.
+// NULL with a fault, and errno where the system could not read it, 0 where it is what it is. `needs` ends the message on a dataset that lacks: "a recording has it". Both it and `path` are kept, not copied.
 Hdf5Reader *hdf5_reader_open(const char *path, const char *needs, Faults *faults);
 // The same from memory, which must stay until the reader is closed; `name` stands in the messages. Without the rehearsal a fuzzer is fifty times as fast.
 Hdf5Reader *hdf5_reader_parse(const void *bytes, size_t length, bool has_rehearsal, const char *name, const char *needs, Faults *faults);
-// Also where it is NULL.
+// Also where it is NULL. Where a part of the file could not be read from the disk, that is the one fault then, also where what lacks is not needed.
 void hdf5_reader_close(Hdf5Reader *reader);
 
 // Whether there is a link of this name behind hard links, of whatever kind; no fault where there is none.

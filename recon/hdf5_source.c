@@ -45,14 +45,16 @@ static haddr_t driver_get_eof(const H5FD_t *driver, H5FD_mem_t type)
     return ((const Hdf5Source *)driver)->length;
 }
 
-static bool read_file(int file, char *data, size_t size, haddr_t address)
+static bool read_file(Hdf5Source *source, char *data, size_t size, haddr_t address)
 {
     while (size > 0) {
-        ssize_t got = pread(file, data, size, (off_t)address);
+        ssize_t got = pread(source->file, data, size, (off_t)address);
         if (got < 0 && errno == EINTR)
             continue;
-        if (got <= 0)
+        if (got <= 0) {
+            source->reason = got < 0 ? errno : EIO;      // shorter than it was
             return false;
+        }
         data += got, address += (haddr_t)got, size -= (size_t)got;
     }
     return true;
@@ -61,11 +63,11 @@ static bool read_file(int file, char *data, size_t size, haddr_t address)
 static herr_t driver_read(H5FD_t *driver, H5FD_mem_t type, hid_t transfer, haddr_t address, size_t size, void *data)
 {
     (void)type, (void)transfer;
-    const Hdf5Source *source = (const Hdf5Source *)driver;
+    Hdf5Source *source = (Hdf5Source *)driver;
     if (size > source->length || address > source->length - size)
         return -1;
     if (source->file >= 0)
-        return read_file(source->file, data, size, address) ? 0 : -1;
+        return read_file(source, data, size, address) ? 0 : -1;
     memcpy(data, (const char *)source->bytes + address, size);
     return 0;
 }

@@ -12,6 +12,7 @@ typedef struct Hdf5Source {
     int file;                // an open descriptor, -1: memory
     const void *bytes;
     size_t length;           // of either
+    int reason;              // errno of a read that failed; 0: none has
 } Hdf5Source;
 
 // Opens it for reading; the source must stay, where it is, until the file is closed. Negative where the library refuses it.

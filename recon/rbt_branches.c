@@ -222,7 +222,8 @@ static void track_limb(void *context, long index)
         found->is_sac = true;
         found->radius = t->estimate.node.cylinder.radius;
         found->why = "aneurysm";
-        found->good = track_append(&found->out, &t->estimate.node, t->estimate.point) && rbt_fill_sac(t, round->paint, limb, &found->out);
+        t->out_of_memory = !track_append(&found->out, &t->estimate.node, t->estimate.point);
+        found->good = !t->out_of_memory && rbt_fill_sac(t, round->paint, limb, &found->out);
     } else if (seed_on_limb(t, limb, round->share, &seed) && rbt_paint_node(round->paint, seed.center) < 0) {
         found->why = "does not lead back to its parent";
         Cylinder behind = seed;

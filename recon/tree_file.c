@@ -313,6 +313,10 @@ static size_t image_length(const Image *image)
 
 bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char *path, Faults *faults)
 {
+    if (!heap_has_room(HEAP_ROOM_OF_HDF5)) {
+        faults_add(faults, path, 0, 0, "cannot be written: no memory for the HDF5 library");
+        return false;
+    }
     Silence kept = silence_begin();
     Image image = {0};
     H5FD_file_image_callbacks_t callbacks = {image_malloc, image_copy, image_realloc, image_free, image_keep, image_forget, &image};

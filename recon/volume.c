@@ -106,9 +106,13 @@ bool file_bytes_read(const char *path, size_t most, FileBytes *out, Faults *faul
     size_t whole = (size_t)status.st_size, length = whole < most ? whole : most;
     uint8_t *byte = malloc(length + 1);
     size_t got = byte ? regular_file_read(file, byte, length) : 0;
+    int reason = errno;
     close(file);
     if (!byte || got < length) {
-        faults_add(faults, path, 0, 0, byte ? "cannot be read to its end" : "is larger than the memory that is free");
+        if (byte)
+            faults_add(faults, path, 0, 0, "cannot be read to its end: %s", reason ? strerror(reason) : "it has become shorter");
+        else
+            faults_add(faults, path, 0, 0, "is larger than the memory that is free");
         free(byte);
         return false;
     }

@@ -13,6 +13,7 @@
 #include <ctype.h>
 #include <dirent.h>
 #include <stdio.h>
+#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -715,18 +716,19 @@ static char **list_folder(const char *folder, int *count)
     return name;
 }
 
-// A regular file whose first bytes are DICOM's: other files of a folder are not read whole.
-static bool looks_like_dicom(const char *path)
+// A regular file whose first bytes are DICOM's, or cannot be read (whoever reads it whole says why): other files of a folder are not read whole.
+static bool may_be_dicom(const char *path)
 {
     uint8_t head[PREAMBLE + 16];
-    struct stat status;
+    struct stat status = {0};
     const char *why;
     int file = regular_file_open(path, &status, &why);
     if (file < 0)
-        return false;
+        return S_ISREG(status.st_mode);
     FileBytes bytes = {.byte = head, .length = regular_file_read(file, head, sizeof head), .path = path};
+    bool is_unread = errno != 0;
     close(file);
-    return volume_is_dicom(&bytes);
+    return is_unread || volume_is_dicom(&bytes);
 }
 
 // Images of the folder into the series: those of `wanted`, or all. Files without an image (reports, DICOMDIR) are passed over; what is damaged
@@ -745,7 +747,7 @@ static bool gather_folder(const char *folder, const DicomImage *wanted, Series *
         DicomImage image;
         Faults own;
         faults_clear(&own);
-        if (wrote < 0 || wrote >= (int)sizeof path || !looks_like_dicom(path) || !dicom_bytes_read(path, &file, faults))
+        if (wrote < 0 || wrote >= (int)sizeof path || !may_be_dicom(path) || !dicom_bytes_read(path, &file, faults))
             continue;
         bool good = read_image(&file, &image, &own), is_other = wanted && image.series[0] && strcmp(image.series, wanted->series) != 0;
         if (!good && !is_other && !(image.is_walked && !image.has_pixels))

@@ -28,9 +28,10 @@ char *whole_file_read_most(const char *path, size_t most, size_t *length, Faults
     }
     char *bytes = malloc(size + 1);
     size_t got = bytes ? regular_file_read(file, bytes, size) : 0;
+    int reason = errno;
     close(file);
     if (!bytes || got < size) {
-        faults_add(faults, path, 0, 0, "cannot be read: %s", bytes ? "it ends early" : "not enough memory");
+        faults_add(faults, path, 0, 0, "cannot be read: %s", !bytes ? "not enough memory" : reason ? strerror(reason) : "it ends early");
         free(bytes);
         return NULL;
     }

@@ -1,6 +1,8 @@
 #define _GNU_SOURCE   // locks of an open file, not of a process
 #include "sim/ordered_file.h"
 
+#include "base/heap.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <stdint.h>
@@ -98,12 +100,19 @@ static haddr_t length_of(int descriptor)
     return fstat(descriptor, &status) == 0 ? (haddr_t)status.st_size : HADDR_UNDEF;
 }
 
+static bool set_length(int descriptor, haddr_t size)
+{
+    while (ftruncate(descriptor, (off_t)size) != 0)
+        if (errno != EINTR)
+            return false;
+    return true;
+}
+
 // To `size` and, where the disk has it, `more` beyond.
 static bool grow(int descriptor, haddr_t size, haddr_t more)
 {
     haddr_t now = length_of(descriptor);
-    return now != HADDR_UNDEF && (now >= size + more || ftruncate(descriptor, (off_t)(size + more)) == 0 || now >= size ||
-                                  ftruncate(descriptor, (off_t)size) == 0);
+    return now != HADDR_UNDEF && (now >= size + more || set_length(descriptor, size + more) || now >= size || set_length(descriptor, size));
 }
 
 // --- the end that the superblock states ---
@@ -196,7 +205,7 @@ static herr_t driver_close(H5FD_t *driver)
     if (file->sealed) {
         // whoever closes has committed: only the end is still ahead
         put_little_endian(superblock_of(file)->wanted + end_field(superblock_of(file)), file->end);
-        good = write_end(file) && ftruncate(file->descriptor, (off_t)file->end) == 0;
+        good = write_end(file) && set_length(file->descriptor, file->end);
     }
     for (int i = 0; i < file->block_count; i++) {
         Block *block = &file->block[i];
@@ -350,6 +359,12 @@ static hid_t driver_id(void)
 
 hid_t ordered_file_create(const char *path, hid_t creation, hid_t access)
 {
+    // 12 MB until the first chunks are there, of each of which a B-tree is made (H5B_create)
+    if (!heap_has_room(4 * HEAP_ROOM_OF_HDF5)) {
+        errno = ENOMEM;
+        return -1;
+    }
+    errno = 0;
     hid_t driver = driver_id();
     return driver >= 0 && H5Pset_driver(access, driver, NULL) >= 0 ? H5Fcreate(path, H5F_ACC_TRUNC, creation, access) : -1;
 }
@@ -493,8 +508,8 @@ static bool write_extents(OrderedFile *file, haddr_t start)
     if (last == 0)
         return true;
     watch(false);
-    // one call; a short one (a full disk cannot be the reason: the page is there) must not be followed by a second
-    return pwrite(file->descriptor, file->page + first, last - first, (off_t)(start + first)) == (ssize_t)(last - first);
+    // one call where the system takes it whole; a part alone would never become a whole
+    return write_all(file->descriptor, file->page + first, last - first, start + first);
 }
 
 bool ordered_file_commit(OrderedFile *file)

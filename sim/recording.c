@@ -1,5 +1,6 @@
 #include "sim/recording.h"
 
+#include "base/heap.h"
 #include "base/part_file.h"
 #include "sim/ordered_file.h"
 #include "sim/sha256.h"
@@ -77,6 +78,8 @@ RecordingOptions recording_default_options(void) { return (RecordingOptions){.fr
 
 void recording_prepare_process(void)
 {
+    if (!heap_has_room(HEAP_ROOM_OF_HDF5))
+        heap_is_empty(HEAP_ROOM_OF_HDF5, __FILE__);
     H5dont_atexit();
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
 }

@@ -304,7 +304,9 @@ Session *session_list(const char *folder, const char *trainee, const char *title
             if (text && session_parse(text, length, path, at, own))
                 *count += !strcmp(at->trainee, trainee) && !strcmp(at->title, title);
             else
-                *broken += text && says_session(text);
+                *broken += !text || says_session(text);
+        } else {
+            ++*broken;
         }
         free(text);
         free(path);

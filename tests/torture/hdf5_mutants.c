@@ -472,7 +472,7 @@ static Tally torture(int kind, bool is_structure, int count, uint64_t seed)
 
 int main(int argument_count, char **argument)
 {
-    int count = argument_count > 1 ? atoi(argument[1]) : 150, wrong = 0;
+    int count = argument_count > 1 ? atoi(argument[1]) : 150, wrong = 0, made = 0;
     uint64_t seed = argument_count > 2 ? strtoull(argument[2], NULL, 10) : 1;
     need(mkdtemp(folder), "make a folder");
     recording_prepare_process();
@@ -487,7 +487,9 @@ int main(int argument_count, char **argument)
             printf("%-20s %-10s %7d %8d %7d %8d %6d %7d %10.1f\n", kind_name[kind], structure ? "structure" : "bytes", t.made, t.refused, t.read, t.signals, t.late,
                    t.silent, (double)t.most_kb / 1000);
             wrong += t.signals + t.late + t.silent;
+            made += t.made;
         }
+    printf("hdf5_mutants: %d cases, %d found (signals, too late, without a reason)\n", made, wrong);
     char command[300];
     snprintf(command, sizeof command, "rm -rf '%s'", folder);
     return system(command) == 0 && wrong == 0 ? 0 : 1;
