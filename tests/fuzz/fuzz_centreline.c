@@ -1,4 +1,5 @@
 // Any bytes as centrelines: VTP, Markups, SWC.
+// Covers: recon/centreline_file.c recon/vtp_file.c
 #include "recon/centreline_file.h"
 
 #include <stdint.h>

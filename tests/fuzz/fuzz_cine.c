@@ -1,4 +1,5 @@
 // A cine file that is taken is written again as the same bytes; one of version 2 as version 3, and that as the same bytes.
+// Covers: render/cine.c
 #include "render/cine.h"
 
 #include <stdlib.h>

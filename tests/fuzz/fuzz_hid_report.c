@@ -1,5 +1,6 @@
 // Any bytes as a report descriptor and reports: length of the descriptor (2 bytes), it, then reports each with a length byte before it. What is taken
 // keeps its promises: fields within their reports, values within their bits, forces encoded whole, ports finite.
+// Covers: input/hid_report.c input/force_feedback.c input/map_state.c
 #include "input/force_feedback.h"
 #include "input/map_state.h"
 
