@@ -1,5 +1,5 @@
 // A scene that is taken can be run: the exact vessels of a scene and ten steps of its tools. Each node stays a number, or the step says that it diverged.
-// Covers: geom/tube_vessel.c geom/plane_vessel.c sim/simulator.c solver/wire.c solver/step_place.c
+// Covers: geom/tube_vessel.c geom/plane_vessel.c sim/simulator.c solver/wire.c
 #include "sim/simulator.h"
 
 #include <stdint.h>
