@@ -3,8 +3,8 @@
 
 #include "cli/output.h"
 #include "cli/output_plan.h"
+#include "cli/point_table.h"
 #include "recon/tree_file.h"
-#include "recon/whole_file.h"
 
 #include <getopt.h>
 #include <stdarg.h>
@@ -26,120 +26,6 @@ static int usage_fault(const char *message, const char *what)
 {
     fprintf(stderr, "seldinger query: %s%s; see `seldinger query --help`\n", message, what);
     return EXIT_BAD_INPUT;
-}
-
-// --- points ---
-
-enum { COLUMNS_MOST = 64, POINTS_BYTES_MOST = 1 << 30 };
-
-typedef struct PointTable {
-    int count, capacity;
-    Vec3 *point;
-} PointTable;
-
-static bool append(PointTable *table, Vec3 p)
-{
-    if (table->count == table->capacity) {
-        int capacity = table->capacity ? 2 * table->capacity : 1024;
-        Vec3 *more = realloc(table->point, (size_t)capacity * sizeof *more);
-        if (!more)
-            return false;
-        table->point = more;
-        table->capacity = capacity;
-    }
-    table->point[table->count++] = p;
-    return true;
-}
-
-// Cuts a line at its commas (in place), blanks around cells removed. Returns the number of cells, at most COLUMNS_MOST + 1.
-static int cut_cells(char *line, char *cell[COLUMNS_MOST + 1])
-{
-    int count = 0;
-    for (char *at = line; count <= COLUMNS_MOST;) {
-        char *end = strchr(at, ',');
-        if (end)
-            *end = '\0';
-        at += strspn(at, " \t\r");
-        size_t length = strlen(at);
-        while (length > 0 && strchr(" \t\r", at[length - 1]))
-            at[--length] = '\0';
-        cell[count++] = at;
-        if (!end)
-            break;
-        at = end + 1;
-    }
-    return count;
-}
-
-static bool read_header(char *const *cell, int count, int which[3], const char *path, int line, Faults *faults)
-{
-    static const char *const name[3] = {"x_mm", "y_mm", "z_mm"};
-    int before = faults->count;
-    for (int k = 0; k < 3; k++) {
-        which[k] = -1;
-        for (int i = 0; i < count; i++)
-            if (!strcmp(cell[i], name[k])) {
-                if (which[k] >= 0)
-                    faults_add(faults, path, line, 0, "column %s stands twice; once is valid", name[k]);
-                which[k] = i;
-            }
-        if (which[k] < 0)
-            faults_add(faults, path, line, 0, "the header has no column %s; valid: x_mm,y_mm,z_mm", name[k]);
-    }
-    return faults->count == before;
-}
-
-static bool read_points(const char *path, PointTable *table, Faults *faults)
-{
-    size_t length;
-    int before = faults->count, which[3], columns = 0, line = 0;
-    char *text = whole_file_read_most(path, POINTS_BYTES_MOST, &length, faults), *next = text;
-    if (text && memchr(text, '\0', length)) {
-        faults_add_at_byte(faults, path, strlen(text), "a zero byte; valid: text");
-        next = NULL;
-    }
-    if (next && !strncmp(next, "\xEF\xBB\xBF", 3))
-        next += 3;
-    while (next && *next && faults->count < FAULTS_CAPACITY) {
-        char *at = next, *cell[COLUMNS_MOST + 1];
-        char *end = strchr(at, '\n');
-        next = end ? end + 1 : at + strlen(at);
-        if (end)
-            *end = '\0';
-        line++;
-        at[strcspn(at, "#")] = '\0';
-        if (at[strspn(at, " \t\r")] == '\0')
-            continue;
-        char *line_begin = at;
-        int count = cut_cells(at, cell);
-        if (columns == 0) {
-            if (!read_header(cell, count, which, path, line, faults))
-                break;
-            columns = count;
-            continue;
-        }
-        double x[3];
-        bool good = count == columns;
-        if (!good)
-            faults_add(faults, path, line, 0, "%d cells; valid: %d, as in the header", count, columns);
-        for (int k = 0; k < 3 && good; k++) {
-            char *stop;
-            const char *from = cell[which[k]];
-            x[k] = strtod(from, &stop);
-            if (stop == from || *stop || !isfinite(x[k]) || fabs(x[k]) > 1e9) {
-                faults_add(faults, path, line, (int)(from - line_begin) + 1, "'%.40s' is no coordinate; valid: a finite number of mm", from);
-                good = false;
-            }
-        }
-        if (good && !append(table, vec3(x[0], x[1], x[2]))) {
-            faults_add(faults, path, line, 0, "not enough memory");
-            break;
-        }
-    }
-    if (text && columns == 0 && faults->count == before)
-        faults_add(faults, path, 1, 1, "is empty; a header x_mm,y_mm,z_mm is needed");
-    free(text);
-    return faults->count == before;
 }
 
 // --- answers ---
@@ -250,7 +136,7 @@ int verb_query(int argc, char **argv)
     VesselTree *tree = tree_file_load(argv[optind], NULL, &faults);
     if (tree && !vessel_tree_is_model(tree))
         faults_add(&faults, argv[optind], 0, 0, "is a tree without a model; make one with `seldinger fit`");
-    read_points(points, &table, &faults);
+    point_table_read(points, &table, &faults);
     bool good = faults.count == 0 && answer(tree, &table, (int)threads, output, &faults);
     if (good && !quiet && strcmp(output, "-"))
         printf("%d points\n", table.count);

@@ -579,7 +579,7 @@ void hid_usage_name(uint32_t usage, char *out, size_t capacity)
             snprintf(out, capacity, "%s", usage_names[i].name);
             return;
         }
-    if (usage >> 16 == 9)
+    if (usage >> 16 == 9 && (usage & 0xffff) > 0)
         snprintf(out, capacity, "button_%u", (unsigned)(usage & 0xffff));
     else
         snprintf(out, capacity, "0x%04x:0x%04x", (unsigned)(usage >> 16), (unsigned)(usage & 0xffff));

@@ -106,7 +106,8 @@ static char *edit_document(yaml_document_t *document, const char *text, const ch
         return map && add ? with_key(text, map, key, "", value, true, "") : NULL;
     size_t from = byte_of(text, node->start_mark.index), to = byte_of(text, node->end_mark.index);
     bool ends_line = to > from && text[to - 1] == '\n';   // a block's end is the next token
-    return spliced(text, from, to, "", value, true, ends_line ? "\n" : "");
+    // an empty value begins right behind its colon
+    return spliced(text, from, to, from == to ? " " : "", value, true, ends_line ? "\n" : "");
 }
 
 // Behind the last item's last line: what follows it, comments and blank lines, belongs to what comes next.
@@ -140,20 +141,54 @@ static char *append_item(yaml_document_t *document, const char *text, const char
     return spliced(text, end, end, before, item, false, "");
 }
 
-static char *edit(const char *text, const char *path, const char *value, bool add, bool is_item)
+static bool is_at_end(yaml_parser_t *parser)
+{
+    yaml_document_t next;
+    if (!yaml_parser_load(parser, &next))
+        return false;
+    bool ended = !yaml_document_get_root_node(&next);
+    yaml_document_delete(&next);
+    return ended;
+}
+
+// A text's only document, to be deleted.
+static bool load(const char *text, yaml_document_t *document)
 {
     yaml_parser_t parser;
-    yaml_document_t document;
-    char *out = NULL;
     if (!yaml_parser_initialize(&parser))
-        return NULL;
+        return false;
     yaml_parser_set_input_string(&parser, (const unsigned char *)text, strlen(text));
-    if (yaml_parser_load(&parser, &document)) {
-        out = is_item ? append_item(&document, text, path, value) : edit_document(&document, text, path, value, add);
-        yaml_document_delete(&document);
-    }
+    bool loaded = yaml_parser_load(&parser, document), good = loaded && is_at_end(&parser);
+    if (loaded && !good)
+        yaml_document_delete(document);
     yaml_parser_delete(&parser);
-    return out;
+    return good;
+}
+
+// Whether a text has what was put into it. Aliases of what was replaced, tags and keys that begin with `?` can leave something else, or no YAML.
+static bool has_value(const char *text, const char *path, const char *value, bool is_item)
+{
+    yaml_document_t document;
+    const char *key;
+    if (!load(text, &document))
+        return false;
+    const yaml_node_t *map = map_of(&document, path, &key), *node = map ? value_of(&document, map, key, strlen(key)) : NULL;
+    bool good = node && (is_item ? node->type == YAML_SEQUENCE_NODE : node->type == YAML_SCALAR_NODE && !strcmp((const char *)node->data.scalar.value, value));
+    yaml_document_delete(&document);
+    return good;
+}
+
+static char *edit(const char *text, const char *path, const char *value, bool add, bool is_item)
+{
+    yaml_document_t document;
+    if (!load(text, &document))
+        return NULL;
+    char *out = is_item ? append_item(&document, text, path, value) : edit_document(&document, text, path, value, add);
+    yaml_document_delete(&document);
+    if (out && has_value(out, path, value, is_item))
+        return out;
+    free(out);
+    return NULL;
 }
 
 char *yaml_edit(const char *text, const char *path, const char *value, bool add) { return edit(text, path, value, add, false); }

@@ -64,11 +64,23 @@ static void parse_counts(const char *text, size_t length, const char *file, Tool
     }
 }
 
+#define FARTHEST_MM 1e9
+
 static bool is_whole(double value, int most) { return value >= 0 && value <= most && value == floor(value); }
+
+// Rows are sorted by time, tool and node; times are printed with six digits.
+static double time_slack(double t_s) { return 1e-5 * fmax(1, fabs(t_s)); }
+
+static bool comes_before(const PathRow *row, const PathRow *want, double slack)
+{
+    bool same_time = fabs(row->t_s - want->t_s) <= slack;
+    return row->t_s < want->t_s - slack || (same_time && (row->tool < want->tool || (row->tool == want->tool && row->node < want->node)));
+}
 
 static void parse_rows(const NumberTable *table, const char *file, ToolPath *path, Faults *faults)
 {
     bool several = path->tool_count > 1;
+    int before = faults->count;
     path->row_count = path->row_capacity = table->row_count;
     for (int i = 0; i < table->row_count; i++) {
         const double *value = table->value + (size_t)i * (size_t)table->column_count, *place = value + (several ? 2 : 1);
@@ -77,8 +89,12 @@ static void parse_rows(const NumberTable *table, const char *file, ToolPath *pat
             faults_add(faults, file, table->line[i], 1, "tool %g is no whole number from 0 to %d", tool, path->tool_count - 1);
         else if (!is_whole(place[0], INT_MAX))
             faults_add(faults, file, table->line[i], 1, "node %g is no whole number of at least 0", place[0]);
+        else if (fabs(place[1]) > FARTHEST_MM || fabs(place[2]) > FARTHEST_MM || fabs(place[3]) > FARTHEST_MM)
+            faults_add(faults, file, table->line[i], 1, "a coordinate is beyond +-%g mm", FARTHEST_MM);
         else
             path->row[i] = (PathRow){value[0], (int)tool, (int)place[0], vec3(place[1], place[2], place[3])};
+        if (faults->count == before && i > 0 && !comes_before(&path->row[i - 1], &path->row[i], time_slack(value[0])))
+            faults_add(faults, file, table->line[i], 1, "the row does not come after the one before it; rows stand by time, then tool, then node, each once");
     }
     if (table->row_count == 0)
         faults_add(faults, file, 0, 0, "has no row; make the file with `seldinger check --update`");
@@ -229,13 +245,6 @@ static void compare_counts(const ToolPath *golden, const ToolPath *run, PathDiff
     difference->differs = difference->remark[0];
 }
 
-// Both are sorted by time, tool and node; times are printed with six digits.
-static bool comes_before(const PathRow *row, const PathRow *want, double slack)
-{
-    bool same_time = fabs(row->t_s - want->t_s) <= slack;
-    return row->t_s < want->t_s - slack || (same_time && (row->tool < want->tool || (row->tool == want->tool && row->node < want->node)));
-}
-
 PathDifference tool_path_compare(const ToolPath *golden, const ToolPath *run, double tolerance_mm)
 {
     PathDifference difference = {.first_node = -1};
@@ -244,7 +253,7 @@ PathDifference tool_path_compare(const ToolPath *golden, const ToolPath *run, do
     double first_missing = 0;
     for (int i = 0; i < golden->row_count; i++) {
         const PathRow *want = &golden->row[i];
-        double slack = 1e-5 * fmax(1, fabs(want->t_s));
+        double slack = time_slack(want->t_s);
         while (j < run->row_count && comes_before(&run->row[j], want, slack))
             j++;
         if (j == run->row_count || fabs(run->row[j].t_s - want->t_s) > slack || run->row[j].tool != want->tool || run->row[j].node != want->node) {

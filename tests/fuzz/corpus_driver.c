@@ -1,5 +1,6 @@
 // Runs a fuzz target without libFuzzer: every file of a corpus folder whole, cut at every length (at most 2,000 of them, evenly
 // spread), with a trailing byte, and with single bytes flipped (at most 2,000). Under ASan and UBSan this is the parsers' regression test.
+// usage: corpus_NAME [MOST] FOLDER...; MOST lengths and bytes instead of 2,000.
 #include <dirent.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -20,7 +21,7 @@ static void try_input(const uint8_t *data, size_t size)
     free(copy);
 }
 
-static void try_file(const char *path)
+static void try_file(const char *path, size_t most)
 {
     FILE *file = fopen(path, "rb");
     if (!file) {
@@ -35,7 +36,7 @@ static void try_file(const char *path)
     if (!data)
         exit(2);
     try_input(data, size);
-    size_t step = size / 2000 + 1;
+    size_t step = size / most + 1;
     for (size_t n = 0; n < size; n += step)
         try_input(data, n);
     data[size] = 'x';
@@ -52,7 +53,8 @@ static void try_file(const char *path)
 int main(int argc, char **argv)
 {
     int files = 0;
-    for (int i = 1; i < argc; i++) {
+    unsigned long most = argc > 1 ? strtoul(argv[1], NULL, 10) : 0;     // 0: a folder
+    for (int i = most ? 2 : 1; i < argc; i++) {
         DIR *folder = opendir(argv[i]);
         if (!folder) {
             fprintf(stderr, "%s: no such corpus folder\n", argv[i]);
@@ -63,7 +65,7 @@ int main(int argc, char **argv)
             if (entry->d_name[0] == '.')
                 continue;
             snprintf(path, sizeof path, "%s/%s", argv[i], entry->d_name);
-            try_file(path);
+            try_file(path, most ? most : 2000);
             files++;
         }
         closedir(folder);

@@ -1,4 +1,5 @@
 // Any bytes as a surface: STL, PLY, OBJ, VTP; what is read is mended.
+// Covers: recon/surface_file.c recon/vtp_file.c recon/mesh_check.c
 #include "recon/mesh_check.h"
 
 #include <stdint.h>

@@ -1,4 +1,5 @@
 // Any bytes as a trace file of `segment`.
+// Covers: recon/trace.c
 #include "recon/trace.h"
 
 #include <stdint.h>

@@ -1,5 +1,6 @@
 // Tree files as bytes: whatever they are, tree_file_parse returns a valid tree or faults. The HDF5 library itself is not ours: where it is
 // known to crash on damaged bytes the corpus stays away (its 1.10 metadata carry checksums, so flipped headers are refused by it).
+// Covers: recon/tree_file.c recon/hdf5_reader.c
 #include "recon/tree_file.h"
 
 #include <stdint.h>

@@ -1,4 +1,5 @@
 // Any bytes as a volume: NRRD, MetaImage, NIfTI headers and data. Detached files are looked for in a folder that is not there.
+// Covers: recon/volume.c recon/volume_nrrd.c recon/volume_metaimage.c recon/volume_nifti.c recon/volume_dicom.c
 #include "recon/volume.h"
 
 #include <stdint.h>

@@ -296,7 +296,7 @@ static void every_prefix_of_a_real_descriptor_is_whole_or_refused(void **state)
 static void usages_have_names_both_ways(void **state)
 {
     (void)state;
-    static const char *const names[] = {"X", "Rz", "wheel", "hat_switch", "button_12", "joystick", "multi_axis", "0xff00:0x0020"};
+    static const char *const names[] = {"X", "Rz", "wheel", "hat_switch", "button_12", "joystick", "multi_axis", "0xff00:0x0020", "0x0009:0x0000"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         char name[32];
         hid_usage_name(hid_usage_of_name(names[i]), name, sizeof name);

@@ -26,6 +26,8 @@ static void values_are_replaced_where_they_stand(void **state)
     becomes("tools:\n  - {device: a.yaml}\n  - {name: x, device: b.yaml}  # c\n", "tools.1.device", "d", "tools:\n  - {device: a.yaml}\n  - {name: x, device: \"d\"}  # c\n");
     becomes("script: [[0, 1, 2],\n  [3, 4, 5]]\nwire: 1\n", "script", "h", "script: \"h\"\nwire: 1\n");
     becomes("script:\n  - {t_s: 0}\n  - {t_s: 1}\nwire: 1\n", "script", "h", "script:\n  \"h\"\nwire: 1\n");
+    becomes("a:\nb: 1\n", "a", "2", "a: \"2\"\nb: 1\n");
+    becomes("x: {a: , b: 1}\n", "x.a", "2", "x: {a:  \"2\", b: 1}\n");
     becomes("\xEF\xBB\xBF# \xC3\xA4\xC3\xB6\na: \xC3\xBC\nb: 1\n", "b", "2", "\xEF\xBB\xBF# \xC3\xA4\xC3\xB6\na: \xC3\xBC\nb: \"2\"\n");
 }
 
@@ -74,6 +76,10 @@ static void what_cannot_be_edited_is_told(void **state)
         assert_null(yaml_edit("a: [{b: 1}, {b: 2}]\n", no_item[i], "2", false));
     assert_null(yaml_edit("a: [1\n", "a", "2", true));
     assert_null(yaml_edit("", "a", "2", true));
+    assert_null(yaml_edit("a: &x 1\nb: *x\n", "a", "2", true));
+    assert_null(yaml_edit("? a\n? b\n", "b", "2", true));
+    assert_null(yaml_edit("a: 1\n---\nb: 2\n", "a", "2", true));
+    assert_null(yaml_edit("a: 1\n", "a", "two\nlines", true));
 }
 
 int main(void)

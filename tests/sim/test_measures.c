@@ -189,7 +189,10 @@ static void a_broken_golden_is_a_fault(void **state)
                           "# tools: 5\n# nodes: 5\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n0,1,0,0,0\n",
                           "# tools: 2\n# nodes of tool 0: 5\n# duration_s: 1\nt_s,tool,node,x_mm,y_mm,z_mm\n0,0,1,0,0,0\n",
                           "# tools: 2\n# nodes of tool 0: 5\n# nodes of tool 1: 5\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n0,1,0,0,0\n",
-                          "# tools: 2\n# nodes of tool 0: 5\n# nodes of tool 1: 5\n# duration_s: 1\nt_s,tool,node,x_mm,y_mm,z_mm\n0,2,1,0,0,0\n"};
+                          "# tools: 2\n# nodes of tool 0: 5\n# nodes of tool 1: 5\n# duration_s: 1\nt_s,tool,node,x_mm,y_mm,z_mm\n0,2,1,0,0,0\n",
+                          "# nodes: 5\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n0.1,1,0,0,0\n0.05,1,0,0,0\n",
+                          "# nodes: 5\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n0.1,1,0,0,0\n0.1,1,0,0,0\n",
+                          "# nodes: 5\n# duration_s: 1\nt_s,node,x_mm,y_mm,z_mm\n0.1,1,0,1e90,0\n"};
     for (size_t i = 0; i < sizeof text / sizeof *text; i++) {
         faults_clear(&faults);
         assert_null(tool_path_parse(text[i], strlen(text[i]), "g.csv", &faults));

@@ -1,4 +1,5 @@
 // Any bytes as what an FTDI chip sends: the first two say the packet size and how the rest is cut into transfers.
+// Covers: input/ftdi_stream.c input/usb_encoder.c
 #include "input/usb_encoder.h"
 
 #include <stdlib.h>

@@ -1,5 +1,6 @@
 // Any bytes as a report descriptor and reports: length of the descriptor (2 bytes), it, then reports each with a length byte before it. What is taken
 // keeps its promises: fields within their reports, values within their bits, forces encoded whole, ports finite.
+// Covers: input/hid_report.c input/force_feedback.c input/map_state.c
 #include "input/force_feedback.h"
 #include "input/map_state.h"
 
@@ -24,7 +25,8 @@ static void check_fields(const HidDescriptor *descriptor)
             abort();
 }
 
-static void try_force(const HidDescriptor *descriptor)
+// `answer`: what the device says of a block and of its memory.
+static void try_force(const HidDescriptor *descriptor, const uint8_t *answer, size_t length)
 {
     PidLayout layout;
     PidMessage message;
@@ -42,7 +44,9 @@ static void try_force(const HidDescriptor *descriptor)
     pid_encode_effect(&layout, 1, 123, &message);
     pid_encode_start(&layout, 1, &message);
     pid_encode_stop(&layout, 1, &message);
-    if (pid_duration_ms(&layout) < 0)
+    int block = pid_decode_block_load(&layout, answer, length);
+    pid_needs_host(&layout, answer, length);
+    if (pid_duration_ms(&layout) < 0 || block < 0 || block > 255)
         abort();
 }
 
@@ -88,7 +92,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (!descriptor)
         return 0;
     check_fields(descriptor);
-    try_force(descriptor);
+    try_force(descriptor, data + 2 + length, size - 2 - length);
     for (int i = 0; i < 3; i++) {
         MapState state;
         HandPort port = {0};

@@ -1,4 +1,5 @@
 // Any bytes as a session: one within its ranges that is written and read alike, or faults.
+// Covers: sim/session.c sim/score_json.c
 #include "sim/session.h"
 
 #include <stdlib.h>

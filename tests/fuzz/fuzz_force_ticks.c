@@ -1,6 +1,7 @@
 // Force ticks against a lying device: each byte is a tick (when it comes, what is wanted, whether the simulation and the device live) and
 // what becomes of the reports sent in it. Whatever the bytes are: no effect is started but at a known zero or while it plays, none while the
 // guard says zero; a force never grows faster than its slew, nor beyond its limit; what ends a session is tried.
+// Covers: input/force_feedback.c input/force_guard.c
 #include "tests/input/hid_recordings.h"
 #include "tests/input/lying_device.h"
 

@@ -1,0 +1,29 @@
+// A volume whose samples lie in other files: its header, then the files that a header can name (a.raw, 1.raw, 2.raw, the pair's image).
+// Covers: recon/volume.c recon/volume_nrrd.c recon/volume_metaimage.c recon/volume_nifti.c
+#include "recon/volume.h"
+#include "tests/fuzz/given_files.h"
+
+#include <math.h>
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+static void count_file(void *context, const char *path)
+{
+    if (!*path || ++*(int *)context > 1000000)
+        abort();
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static const char *const names[] = {"v.hdr", "a.raw", "1.raw", "2.raw", "v.img", NULL};
+    static Faults faults;
+    int files = 0;
+    faults_clear(&faults);
+    given_files(data, size, names);
+    Volume *volume = volume_load(given_path(names[0]), &faults);
+    if (!volume != (faults.count > 0) || (volume && !(volume->minimum <= volume->maximum && isfinite(volume->minimum) && isfinite(volume->maximum))))
+        abort();
+    volume_each_data_file(given_path(names[0]), count_file, &files);
+    volume_free(volume);
+    return 0;
+}

@@ -1,0 +1,49 @@
+// Words of the command line and of devices: each line of the input as each of them. What is taken is within its range.
+// Covers: cli/arguments.c input/gamepad.c
+#include "cli/cli.h"
+#include "input/gamepad.h"
+#include "input/hid_report.h"
+
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+static void try_word(const char *word)
+{
+    double number = -1;
+    Vec3 point;
+    int width, height, view, vendor, product;
+    char name[32];
+    if (cli_number("--x", word, 0, 1e6, &number) && !(number >= 0 && number <= 1e6))
+        abort();
+    if (cli_whole_number("--n", word, -256, 256, &number) && (!(number >= -256 && number <= 256) || (double)(int)number != number))
+        abort();
+    if (cli_point("--start", word, &point) && !(vec3_is_finite(point) && vec3_norm(point) < 2e9))
+        abort();
+    if (cli_size(word, &width, &height) && (width < 320 || width > 8192 || height < 240 || height > 8192))
+        abort();
+    if (cli_view(word, &view) && (view < 0 || view > 3))
+        abort();
+    if (gamepad_ids_of_guid(word, &vendor, &product) && (vendor < 1 || vendor > 0xffff || product < 0 || product > 0xffff))
+        abort();
+    uint32_t usage = hid_usage_of_name(word);
+    hid_usage_name(usage, name, sizeof name);
+    if (usage && hid_usage_of_name(name) != usage)
+        abort();
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    char *copy = malloc(size + 1), *next = copy;
+    static FILE *nowhere;
+    if (!nowhere)
+        stderr = nowhere = fopen("/dev/null", "w");     // messages about what is not valid
+    memcpy(copy, data, size);
+    copy[size] = '\0';
+    for (char *line; (line = strsep(&next, "\n"));)
+        try_word(line);
+    free(copy);
+    return 0;
+}
