@@ -44,8 +44,10 @@ static void write_tube(Draws *draws)
     int arcs = 2 + draw_whole(draws, 6);
     draws->lumen = radius;
     fprintf(draws->out, "vessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], radius_mm: %.4f, path: [{line_mm: %.3f}", radius, draw(draws, 5, 30));
-    for (int i = 0; i < arcs; i++)
-        fprintf(draws->out, ", {arc: {radius_mm: %.4f, angle_deg: %.3f, plane_deg: %.3f}}", 1.15 * radius + draw_log(draws, 2, 60), draw(draws, 15, 150), draw(draws, -180, 180));
+    for (int i = 0; i < arcs; i++) {
+        double plane = draw(draws, -180, 180), angle = draw(draws, 15, 150), bend = 1.15 * radius + draw_log(draws, 2, 60);
+        fprintf(draws->out, ", {arc: {radius_mm: %.4f, angle_deg: %.3f, plane_deg: %.3f}}", bend, angle, plane);
+    }
     fprintf(draws->out, ", {line_mm: 60}]}, contact: tube");
 }
 
@@ -103,7 +105,7 @@ static void write_tool(Draws *draws, TortureTool tip, double diameter, double in
     soft += rest;
     fprintf(draws->out, "%selements: %.0f\n%ssections:\n", indent, elements * draws->finer, indent);
     fprintf(draws->out, "%s  - {length_mm: %.4f, diameter_mm: %.4f, inner_diameter_mm: %.4f, young_modulus_gpa: %.5g, poisson_ratio: 0.3, density_g_cm3: 6}\n", indent,
-            length - soft, diameter, inner, modulus);
+            fmax(length - soft, 20), diameter, inner, modulus);       // a wide stiff tool has a wide curve
     fprintf(draws->out, "%s  - {length_mm: %.4f, diameter_mm: %.4f, inner_diameter_mm: %.4f, young_modulus_gpa: %.5g, poisson_ratio: 0.3, density_g_cm3: 6}\n", indent, soft,
             diameter, inner, tip_modulus);
     if (*curve)
@@ -118,7 +120,9 @@ static int write_tools(Draws *draws, TortureTool kind)
         bool is_tube = kind == TORTURE_SIMMONS || kind == TORTURE_PIGTAIL;
         double diameter = draw_log(draws, 0.2, widest);
         fprintf(draws->out, "wire:\n");
-        write_tool(draws, kind, diameter, is_tube ? diameter * draw(draws, 0.5, 0.85) : 0, draw(draws, 180, 300), 60 + draw_whole(draws, 140), "  ");
+        int elements = 60 + draw_whole(draws, 140);
+        double length = draw(draws, 180, 300), inner = is_tube ? diameter * draw(draws, 0.5, 0.85) : 0;
+        write_tool(draws, kind, diameter, inner, length, elements, "  ");
         fprintf(draws->out, "sheath: {%s, inserted_mm: %.3f}\n", "inlet: root", inserted);
         return 1;
     }
@@ -141,7 +145,8 @@ static int write_tools(Draws *draws, TortureTool kind)
 static double draw_speed(Draws *draws, double most)
 {
     static const double share[] = {0, 0.1, 0.3, 1};
-    return most * share[draw_whole(draws, 4)] * draw(draws, -0.8, 1);
+    double part = share[draw_whole(draws, 4)];
+    return most * part * draw(draws, -0.8, 1);
 }
 
 // Each keeps a speed for a while; up to 100 mm/s and 1000 degrees a second, there and back.

@@ -10,6 +10,8 @@
 
 // A node that has left the tip around it joins the chain at this share of its element from it, and leaves the chain nearer than that.
 static const double JOIN = 0.05, LEAVE = 0.04;
+// … but a tool's last node leaves only here where the wall holds it, and joins from here on where it comes out far within a step: nothing else of it meets the wall.
+static const double LEAST_OUT = 0.01;
 // A tip that ended past its element's end would be cut there, so it passes the node this share of the element early, and on the way back late: more than
 // strain and friction keep it from where the hands would have it. What lies past its tip does not bend.
 static const double EARLY = 0.01;
@@ -477,12 +479,12 @@ bool tools_come_out(Stepper *s)
 {
     for (int k = 1; k < s->tool_count && !s->has_failed; k++) {
         int j, tip = next_out(s, k, &j);
-        if (tip < s->first_free || j < 1 || s->tips_changed & 1u << k)
+        if (tools_carries(&s->tool[k]) || tip < s->first_free || j < 1 || s->tips_changed & 1u << k)
             continue;
         size_t i = (size_t)tip * (size_t)s->state.inner_count + (size_t)k - 1;
         double end = s->tool[k].wire.s[j], length = s->tool[k].wire.length[j - 1];
         double began = end - s->start_slide[i], ends = began - s->u[row_of(s, tip) + (size_t)unknown_of(k)];
-        if (ends < JOIN * length || began < 2 * TAKE_BACK * length)
+        if (ends < JOIN * length || began < LEAST_OUT * length)
             continue;
         s->tips_changed |= 1u << k;
         stepper_go_back(s);
@@ -497,16 +499,17 @@ static void pass_tip(Stepper *s, int k, double ahead)
 {
     Tool *t = &s->tool[k];
     for (;;) {
-        bool carries = tools_carries(t);
         int j, tip = next_out(s, k, &j);
         if (tip < 0)
             return;
+        bool carries = tools_carries(t);
+        bool is_held = carries && t->first + 1 == t->wire.node_count && vec3_norm2(s->force[t->start]) > 0;
         // by the hands' commands or by its last motion, whichever takes it further back: friction may hold it against its hand
         double out = *slide_of(s, tip, k), at = out - fmin(ahead, -slide_rate(s, tip, k) * s->dt);
         if (j > 0 && t->wire.s[j] - fmax(at, out) > JOIN * t->wire.length[j - 1])
             join(s, k, t->wire.s[j] - out);
-        else if (carries && t->wire.s[t->first] - at < LEAVE * t->wire.length[t->first - 1] && vec3_norm2(s->force[t->start]) == 0)
-            leave(s, k);     // one that the wall holds would spring through it without its node
+        else if (carries && t->wire.s[t->first] - at < (is_held ? LEAST_OUT : LEAVE) * t->wire.length[t->first - 1])
+            leave(s, k);
         else
             return;
     }
