@@ -16,6 +16,7 @@
 
 static char folder[] = "/tmp/seldinger-hard-XXXXXX";
 #include "tests/folder.h"
+#include "tests/short_run.h"
 #include "tests/cli/json_file.h"
 
 // What holds of a run with up to 3 s of rest afterwards.
@@ -71,6 +72,7 @@ static void curved_tools_leave_the_mouth(void **state)
 static void what_is_let_go_is_not_cut_for_ever(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     cJSON_Delete(holds((HardCase){"let-go", 16, 0.2, 0, 10, true}));
 }
 
@@ -78,6 +80,7 @@ static void what_is_let_go_is_not_cut_for_ever(void **state)
 static void a_tool_rests_with_the_hand(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     cJSON_Delete(holds((HardCase){"rest-bend", 75, 0.005, 3, 0, true}));
     cJSON_Delete(holds((HardCase){"rest-bend-friction", 75, 0.02, 3, 0, true}));
     cJSON_Delete(holds((HardCase){"rest-straight", 60, 0.01, 0, 0, false}));
@@ -96,6 +99,7 @@ static void a_hand_slips_above_its_limit(void **state)
 static void twist_passes_a_clearance_of_5_um(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     cJSON *s = holds((HardCase){"clearance-5um", 0.1, 0.001, 0, 150, false});
     double torque = number(s, "proximal", "torque_n_mm");
     print_message("torque %.4f N mm\n", torque);
@@ -107,6 +111,7 @@ static void twist_passes_a_clearance_of_5_um(void **state)
 static void an_inner_hand_pushes_a_stiff_bend_out(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     cJSON *s = holds((HardCase){"j-wire", 25, 0.8, 40, 2, false});
     const cJSON *wire = cJSON_GetArrayItem(cJSON_GetObjectItem(s, "tools"), 1);
     assert_true(cJSON_GetObjectItem(wire, "inserted_mm")->valuedouble > 45);
@@ -131,6 +136,7 @@ static void a_hand_that_slips_makes_no_energy(void **state)
 static void a_guide_is_drawn_back_over_a_turned_wire(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     cJSON_Delete(holds((HardCase){"guide-withdrawn", 0.5, 0.25, 0, 0, true}));
 }
 
@@ -149,6 +155,7 @@ static void a_curl_is_drawn_into_the_sheath(void **state)
 static void an_inner_tip_stays_within_the_wall(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     cJSON *s = run("inner-tip-on-wall");
     double deepest = number(s, "penetration_mm", "max");
     print_message("inner-tip-on-wall    %.3f mm outside\n", deepest);
