@@ -173,13 +173,20 @@ double hand_force(const Stepper *s, int k, int about)
     return force;
 }
 
+// Does a tool that slips come to the hub around it? One that has further to go than an element does not get there in a step, whatever the linear system says.
+static bool reaches_hub(const Stepper *s, int k)
+{
+    double room = hub_room(s, k), moves = tool_moves(s, k, 0, s->u) - (k > 0 ? tool_moves(s, tools_around(s, 0, k), 0, s->u) : 0);
+    return room < s->wire.length[0] && moves > room;
+}
+
 static bool misjudges(Stepper *s, int k, int about)
 {
     Hand *hand = &s->hand[k];
     int *slips = &hand->slips[about], was = *slips;
     if (!about && hand->is_stopped)
         return false;
-    if (!about && was != 0 && tool_moves(s, k, 0, s->u) - (k > 0 ? tool_moves(s, tools_around(s, 0, k), 0, s->u) : 0) > hub_room(s, k)) {
+    if (!about && was != 0 && reaches_hub(s, k)) {
         hand->is_stopped = true;
         *slips = 0;
         return true;
