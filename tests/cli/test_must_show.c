@@ -24,6 +24,7 @@ static char folder[] = "/tmp/seldinger-must-XXXXXX";
 static Faults faults;
 #include "tests/folder.h"
 #include "tests/cli/program.h"
+#include "tests/short_run.h"
 
 // Runs `seldinger ARGUMENTS` in the folder; its words go to `output`. Fails where it does not end with 0.
 static void run(const char *arguments)
@@ -190,6 +191,7 @@ static const Motion still = {.turn = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, .sign 
 static void a_mirrored_scene_gives_the_mirrored_path(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     RecordedRun *plain = run_moved("plain", &still, AT_ENTRY, 5);
     for (int axis = 0; axis < 3; axis++) {
         Motion m = mirror(axis);
@@ -219,6 +221,7 @@ static void an_inlet_mirrors_too(void **state)
 static void a_turned_and_shifted_scene_gives_the_same_path_there(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     Vec3 e1 = vec3_unit(vec3(0.3, -0.8, 0.52)), e2 = vec3_unit(vec3_cross(e1, vec3(0.1, 0.2, 0.9)));
     Motion m = {.turn = mat3_from_columns(e1, e2, vec3_cross(e1, e2)), .shift = {-17.3, 41.1, 8.9}, .sign = 1};
     RecordedRun *plain = run_moved("plain", &still, AT_ENTRY_WITH_NORMAL, 1), *image = run_moved("image", &m, AT_ENTRY_WITH_NORMAL, 1);

@@ -15,6 +15,7 @@
 static char folder[] = "/tmp/seldinger-verify-XXXXXX";
 #include "tests/folder.h"
 #include "tests/cli/program.h"
+#include "tests/short_run.h"
 
 // The exit code of `check OPTIONS`; what it prints goes to `output`.
 static int check(const char *options)
@@ -37,6 +38,7 @@ static void write_scene(const char *name, const char *plan)
 static void every_case_passes(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     // without the golden paths, which are another test
     char command[600];
     snprintf(command, sizeof command, "cp -r '" SOURCE_DIR "/scenes/verify' '%s' && rm -f '%s'/verify/*.golden.csv", folder, folder);
@@ -128,6 +130,7 @@ static void a_case_names_its_tool(void **state)
 static void threads_change_nothing(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     static char one[sizeof output];
     write_scene("a.yaml", "verify: {elements: [5, 10, 15, 20], cases: [" DEFLECTION "reference: 0.71379152, tolerance: 0.01}]}\n");
     assert_int_equal(check("--threads 1 a.yaml"), 0);

@@ -13,6 +13,7 @@
 #include "recon/phantom.h"
 #include "solver/step_internal.h"
 #include "tube_scene.h"
+#include "tests/short_run.h"
 
 static Vec3 some(double *seed)
 {
@@ -98,6 +99,7 @@ static double deepest_of_curve(const Stepper *s, const Vessel *tube, double radi
 static void coarse_elements_stay_inside(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     static const struct {
         const char *name;
         double bend, radius, lead;
@@ -328,6 +330,7 @@ static Smoothness slow_push(double bend, double friction, double size)
 static void push_is_smooth(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     static const double bend[] = {8, 20}, friction[] = {0, 0.1};
     for (int k = 0; k < 2; k++)
         for (int j = 0; j < 2; j++) {
@@ -345,6 +348,7 @@ static void push_is_smooth(void **state)
 static void push_through_local_models_is_smooth(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     enum { FAST = 2000, SETTLE = 50, SLOW = 8000 };
     LimFitOptions fit = lim_fit_default_options();
     Faults faults = {0};

@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "tube_scene.h"
+#include "tests/short_run.h"
 
 // A pinned strut at the height h over a wall, pushed against it (Feodosyev's problem; small slopes: h = L/100). k^2 = P/EI.
 //   Pcr < P < 4 Pcr    one contact: y = A sin kx + B x up to the middle, y(L/2) = h, y'(L/2) = 0; wall force 2 P B
@@ -82,6 +83,7 @@ static void strut_over_a_wall(void **state)
 static void sinusoidal_buckling_under_weight(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     enum { MOST = 80 };
     const double bending = EI_STANDARD / 80, weight = 6.45e-3 * PI / 4 * 0.36 * 0.36 * 9.81e-3, r = 1;      // 1 GPa
     const double p = pow(weight / (bending * r), 0.25), length = PI / p, critical = 2 * sqrt(bending * weight / r), q = 1e-5 * weight;
@@ -164,6 +166,7 @@ static double whip_tip(const Stepper *s, double end)
 static void whip(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     static const double clearance[] = {0.04, 0.02, 0.01};
     for (int q = 0; q < 2; q++) {
         const WhipCase *c = &WHIP[q];
@@ -238,6 +241,7 @@ static Coil coil_of(Stepper *s, double length, double r)
 static void helix_in_a_cylinder(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();
     enum { LENGTH = 200, BEHIND = 20, ELEMENTS = LENGTH + BEHIND };
     const double r = 0.5, psi = 0.15, sine = sin(psi), force = 2 * EI_STANDARD * sine * sine * cos(psi) / (r * r), pitch = 2 * PI * r / tan(psi), mu = 0.1;
     TubePiece piece = line_piece(2 * LENGTH);
