@@ -368,6 +368,12 @@ static void leave_touch(Stepper *s, int point)
     s->touch_next[point] = 0;
 }
 
+// Has a projection that began at a foot known from elsewhere ended at a wall much further off than that foot? The wall is no further than that.
+static bool has_strayed(const VesselMemory *before, Vec3 x, const VesselHit *hit)
+{
+    return before->node >= 0 && vec3_norm2(before->foot) > 0 && fabs(hit->gap) > 2 * vec3_distance(x, before->foot) + 1;
+}
+
 // Questions first to count-1, the answers judged: what is too far goes to sleep, candidates keep their question's number.
 static int answer(Stepper *s, int first, int count, int *candidate)
 {
@@ -383,6 +389,10 @@ static int answer(Stepper *s, int first, int count, int *candidate)
     for (int k = first; k < count; k++) {
         int point = s->query_which[k];
         const VesselHit *hit = &s->query_hit[k];
+        if (has_strayed(&s->place[point], s->query_point[k], hit)) {
+            s->query_place[k] = (VesselMemory){.node = s->vessel->locate(s->vessel, s->query_point[k], s->place[point].node)};
+            vessel_query(s->vessel, 1, &s->query_point[k], 2 * reach, &s->query_place[k], &s->query_hit[k]);
+        }
         double gap = hit->gap - radius_of(s, point), own_reach = reach_of(s, point);
         s->place[point] = s->query_place[k];
         if (!(hit->flags & (VESSEL_FAR | VESSEL_OPEN_END)))
