@@ -29,6 +29,9 @@ static double tool_moves(const Stepper *s, int k, int about, const double *u)
     return k == 0 ? hub : about ? hub + u[unknown_of(k) + 1] : hub - u[unknown_of(k)];
 }
 
+// [mm] by which the hub around a tool's moves; the sheath does not.
+static double around_moves(const Stepper *s, int k) { return k > 0 ? tool_moves(s, tools_around(s, 0, k), 0, s->u) : 0; }
+
 // [mm] that a tool's hub can go before it meets the hub around it, or the sheath.
 static double hub_room(const Stepper *s, int k)
 {
@@ -43,7 +46,7 @@ static double wanted(const Stepper *s, int k, int about)
 {
     const Hand *hand = &s->hand[k];
     if (!about && hand->is_stopped)
-        return hub_room(s, k) + (k > 0 && !rides(s, k) ? tool_moves(s, tools_around(s, 0, k), 0, s->u) : 0);
+        return hub_room(s, k) + (rides(s, k) ? 0 : around_moves(s, k));
     if (hand->is_released)
         return 0;
     if (k == 0)
@@ -176,8 +179,8 @@ double hand_force(const Stepper *s, int k, int about)
 // Does a tool that slips come to the hub around it? One that has further to go than an element does not get there in a step, whatever the linear system says.
 static bool reaches_hub(const Stepper *s, int k)
 {
-    double room = hub_room(s, k), moves = tool_moves(s, k, 0, s->u) - (k > 0 ? tool_moves(s, tools_around(s, 0, k), 0, s->u) : 0);
-    return room < s->wire.length[0] && moves > room;
+    double room = hub_room(s, k);
+    return room < s->wire.length[0] && tool_moves(s, k, 0, s->u) - around_moves(s, k) > room;
 }
 
 static bool misjudges(Stepper *s, int k, int about)
