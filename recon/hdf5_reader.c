@@ -1,4 +1,5 @@
 // The rules stand in the header. What of the library is relied upon: creation lists, links and types are read without reading data or opening files.
+#define ZLIB_CONST
 #include "recon/hdf5_reader.h"
 
 #include "base/heap.h"
@@ -15,6 +16,7 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <zlib.h>
 
 struct Hdf5Reader {
     Hdf5Source source;
@@ -23,6 +25,7 @@ struct Hdf5Reader {
     Faults *faults;
     int faults_before;
     hsize_t left;            // [bytes] of the file that no dataset has taken yet
+    hsize_t left_unpacked;   // [bytes] of memory that packed datasets may still take
     H5E_auto2_t handler;     // of the library's own messages, as it was
     void *handler_data;
 };
@@ -110,7 +113,9 @@ static Hdf5Reader *open_source(const Hdf5Source *source, bool has_rehearsal, con
         heap_is_empty(HEAP_ROOM_OF_HDF5, __FILE__);
     Hdf5Reader *reader = HEAP_ZEROED(1, sizeof *reader);
     *reader = (Hdf5Reader){.source = *source, .file = -1, .name = name, .needs = needs, .faults = faults, .faults_before = faults->count,
-                           .left = source->length < HDF5_READER_MOST_BYTES ? source->length : HDF5_READER_MOST_BYTES};
+                           .left = source->length < HDF5_READER_MOST_BYTES ? source->length : HDF5_READER_MOST_BYTES,
+                           .left_unpacked = source->length < HDF5_READER_MOST_BYTES / HDF5_READER_MOST_RATIO ? source->length * HDF5_READER_MOST_RATIO
+                                                                                                             : HDF5_READER_MOST_BYTES};
     be_silent(reader);
     H5PLset_loading_state(0);
     bool is_sound = !has_rehearsal || is_survived(&reader->source);
@@ -287,32 +292,91 @@ static bool lies_in_file(const Hdf5Reader *reader, haddr_t address, hsize_t byte
     return address != HADDR_UNDEF && bytes <= reader->source.length && address <= reader->source.length - bytes;
 }
 
+// How a dataset's chunks are packed: not at all, by deflate, or by shuffle and then deflate.
+typedef struct Packing {
+    int filter_count;
+    bool is_shuffled;
+} Packing;
+
+// NULL, or what is wrong. A chunk says with a bit for each filter whether it was left out.
+static const char *find_packing(hid_t creation, size_t value_bytes, Packing *packing)
+{
+    static const char *const other = "is packed by other filters than deflate, or shuffle and then deflate (`h5repack -f NONE IN OUT` unpacks it)";
+    *packing = (Packing){.filter_count = H5Pget_nfilters(creation)};
+    if (packing->filter_count < 0 || packing->filter_count > 2)
+        return other;
+    packing->is_shuffled = packing->filter_count == 2;
+    for (int i = 0; i < packing->filter_count; i++) {
+        unsigned flags, parameter[2] = {0}, config;
+        size_t count = 2;
+        H5Z_filter_t filter = H5Pget_filter2(creation, (unsigned)i, &flags, &count, parameter, 0, NULL, &config);
+        bool is_last = i == packing->filter_count - 1;
+        if (filter != (is_last ? H5Z_FILTER_DEFLATE : H5Z_FILTER_SHUFFLE) || count != 1 || (!is_last && parameter[0] != value_bytes))
+            return other;
+    }
+    return NULL;
+}
+
+static const char huge[] = "has more or larger chunks than the file, or than are read (262144, 16 GiB)";
+
+// Of a dataset, in values and bytes.
+typedef struct Chunks {
+    hsize_t size[3], bytes, count;       // of one, of one, of all
+} Chunks;
+
+static const char *count_chunks(hid_t creation, const Hdf5Dataset *dataset, hsize_t value_bytes, Chunks *chunks)
+{
+    *chunks = (Chunks){.bytes = value_bytes, .count = 1};
+    if (H5Pget_chunk(creation, 3, chunks->size) != dataset->rank)
+        return "has chunks of another rank";
+    for (int i = 0; i < dataset->rank; i++) {
+        if (chunks->size[i] == 0)
+            return "has empty chunks";
+        chunks->bytes = times(chunks->bytes, chunks->size[i]);
+        chunks->count = times(chunks->count, (dataset->size[i] - 1) / chunks->size[i] + 1);
+    }
+    return chunks->count > HDF5_READER_MOST_CHUNKS ? huge : NULL;
+}
+
+static void next_chunk(const Chunks *chunks, const Hdf5Dataset *dataset, hsize_t at[3])
+{
+    for (int k = dataset->rank - 1; k >= 0 && (at[k] += chunks->size[k]) >= dataset->size[k]; k--)
+        at[k] = 0;
+}
+
+// No chunk of deflate's is much longer than its bytes: a longer one is none.
+static hsize_t most_stored(const Chunks *chunks) { return chunks->bytes + chunks->bytes / 1000 + 100; }
+
 // Each chunk is there with all its bytes: the library takes as many as the index says, and reads as many as the shape says. NULL, or what is wrong.
 static const char *chunk_trouble(Hdf5Reader *reader, hid_t set, hid_t creation, const Hdf5Dataset *dataset, hsize_t value_bytes)
 {
-    static const char *const huge = "has more or larger chunks than the file, or than are read (4096, 16 GiB)";
-    hsize_t chunk[3] = {0}, at[3] = {0}, bytes = value_bytes, count = 1;
-    if (H5Pget_chunk(creation, 3, chunk) != dataset->rank)
-        return "has chunks of another rank";
-    for (int i = 0; i < dataset->rank; i++) {
-        if (chunk[i] == 0)
-            return "has empty chunks";
-        bytes = times(bytes, chunk[i]);
-        count = times(count, (dataset->size[i] - 1) / chunk[i] + 1);
-    }
-    if (count > HDF5_READER_MOST_CHUNKS || times(bytes, count) > reader->left)
+    hsize_t at[3] = {0}, all_stored = 0, wide = value_bytes > sizeof(double) ? value_bytes : sizeof(double);
+    Packing packing;
+    Chunks chunks;
+    const char *trouble = find_packing(creation, value_bytes, &packing);
+    trouble = trouble ? trouble : count_chunks(creation, dataset, value_bytes, &chunks);
+    if (trouble)
+        return trouble;
+    bool is_packed = packing.filter_count > 0;
+    hsize_t unpacked = times(times(chunks.bytes / value_bytes, chunks.count), wide);
+    if (is_packed && (unpacked > reader->left_unpacked || chunks.bytes > UINT32_MAX))
+        return "unpacks to more than 256 times the file, or than is read (16 GiB)";
+    if (!is_packed && times(chunks.bytes, chunks.count) > reader->left)
         return huge;
-    for (hsize_t i = 0; i < count; i++) {
+    for (hsize_t i = 0; i < chunks.count; i++) {
         hsize_t stored = 0;
         haddr_t address = HADDR_UNDEF;
-        if (H5Dget_chunk_info_by_coord(set, at, NULL, &address, &stored) < 0 || address == HADDR_UNDEF)
+        unsigned left_out = 0;
+        if (H5Dget_chunk_info_by_coord(set, at, &left_out, &address, &stored) < 0 || address == HADDR_UNDEF)
             return "has chunks that were never written";
-        if (stored != bytes || !lies_in_file(reader, address, stored))
+        if ((is_packed ? stored > most_stored(&chunks) : stored != chunks.bytes) || !lies_in_file(reader, address, stored))
             return "has chunks that are cut off";
-        for (int k = dataset->rank - 1; k >= 0 && (at[k] += chunk[k]) >= dataset->size[k]; k--)
-            at[k] = 0;
+        if ((all_stored += stored) > reader->left)
+            return huge;
+        next_chunk(&chunks, dataset, at);
     }
-    reader->left -= bytes * count;
+    reader->left -= all_stored;
+    reader->left_unpacked -= is_packed ? unpacked : 0;
     return NULL;
 }
 
@@ -339,8 +403,8 @@ static const char *storage_trouble(Hdf5Reader *reader, hid_t set, const Hdf5Data
         trouble = "is stored in another file";
     else if (layout == H5D_VIRTUAL)
         trouble = "is put together from other files";
-    else if (H5Pget_nfilters(creation) != 0)
-        trouble = "is packed (`h5repack -f NONE IN OUT` unpacks it)";
+    else if (H5Pget_nfilters(creation) != 0 && layout != H5D_CHUNKED)
+        trouble = "is packed, but not in chunks";
     else if (values > 0 && layout == H5D_CHUNKED)
         trouble = chunk_trouble(reader, set, creation, dataset, value_bytes);
     else if (values > 0)
@@ -362,7 +426,7 @@ static bool inspect_open(Hdf5Reader *reader, hid_t set, hid_t type, hid_t space,
         return false;
     const char *trouble = storage_trouble(reader, set, dataset, H5Tget_size(type));
     if (trouble)
-        faults_add(reader->faults, reader->name, 0, 0, "%s promises %" PRIu64 " values, but %s; valid: plain bytes in this file", dataset->path, value_count(dataset),
+        faults_add(reader->faults, reader->name, 0, 0, "%s promises %" PRIu64 " values, but %s; valid: bytes in this file, plain or packed by deflate", dataset->path, value_count(dataset),
                    trouble);
     return !trouble;
 }
@@ -395,11 +459,134 @@ static bool is_finite(const Hdf5Reader *reader, const Hdf5Dataset *dataset, cons
     return true;
 }
 
+// --- unpacking ---
+
+// Of exactly as many bytes, by zlib itself: the library's filter takes what a stream claims. False where it gives fewer or more, or has a tail.
+static bool inflate_exactly(const void *packed, size_t packed_bytes, unsigned char *out, size_t bytes)
+{
+    unsigned char beyond;
+    z_stream stream = {.next_in = packed, .avail_in = (uInt)packed_bytes, .next_out = out, .avail_out = (uInt)bytes};
+    if (inflateInit(&stream) != Z_OK)
+        return false;
+    int end = inflate(&stream, Z_FINISH);
+    if (end == Z_BUF_ERROR && stream.avail_out == 0) {        // all that is due is there; whether it is all there is shows with room for one byte more
+        stream.next_out = &beyond;
+        stream.avail_out = 1;
+        end = inflate(&stream, Z_FINISH);
+    }
+    bool good = end == Z_STREAM_END && stream.total_out == bytes && stream.avail_in == 0;
+    inflateEnd(&stream);
+    return good;
+}
+
+// The bytes of `count` values of which all first bytes stand first, then all second ones …
+static void unshuffle(const unsigned char *from, size_t count, size_t value_bytes, unsigned char *to)
+{
+    for (size_t byte = 0; byte < value_bytes; byte++)
+        for (size_t i = 0; i < count; i++)
+            to[i * value_bytes + byte] = from[byte * count + i];
+}
+
+// A chunk's values to where they belong among the dataset's; at its ends chunks are cut off. Dimensions that a dataset does not have count as 1.
+static void place_chunk(const Hdf5Dataset *dataset, const Chunks *chunks, const hsize_t at[3], size_t value_bytes, const unsigned char *chunk, unsigned char *out)
+{
+    hsize_t size[3] = {1, 1, 1}, part[3] = {1, 1, 1}, used[3], first[3] = {0};
+    for (int i = 0; i < dataset->rank; i++) {
+        int k = 3 - dataset->rank + i;
+        size[k] = dataset->size[i];
+        part[k] = chunks->size[i];
+        first[k] = at[i];
+    }
+    for (int k = 0; k < 3; k++)
+        used[k] = size[k] - first[k] < part[k] ? size[k] - first[k] : part[k];
+    for (hsize_t i = 0; i < used[0]; i++)
+        for (hsize_t j = 0; j < used[1]; j++)
+            memcpy(out + (((first[0] + i) * size[1] + first[1] + j) * size[2] + first[2]) * value_bytes, chunk + (i * part[1] + j) * part[2] * value_bytes,
+                   used[2] * value_bytes);
+}
+
+// What one chunk passes through: as it is stored, inflated, in order.
+typedef struct Unpacking {
+    Packing packing;
+    Chunks chunks;
+    size_t value_bytes;
+    unsigned char *stored, *shuffled, *plain;
+} Unpacking;
+
+// `at`: its first value. False where it is damaged.
+static bool unpack_chunk(const Unpacking *u, hid_t set, const hsize_t at[3])
+{
+    const unsigned deflated = 1U << (u->packing.filter_count - 1);
+    uint32_t left_out = 0;
+    hsize_t stored = 0;
+    if (H5Dget_chunk_storage_size(set, at, &stored) < 0 || stored > most_stored(&u->chunks) ||
+        H5Dread_chunk(set, H5P_DEFAULT, at, &left_out, u->stored) < 0)
+        return false;
+    bool is_shuffled = u->packing.is_shuffled && !(left_out & 1);
+    unsigned char *inflated = is_shuffled ? u->shuffled : u->plain;
+    bool is_plain = left_out & deflated;
+    if (is_plain && stored == u->chunks.bytes)
+        memcpy(inflated, u->stored, stored);
+    else if (is_plain || !inflate_exactly(u->stored, stored, inflated, u->chunks.bytes))
+        return false;
+    if (is_shuffled)
+        unshuffle(u->shuffled, u->chunks.bytes / u->value_bytes, u->value_bytes, u->plain);
+    return true;
+}
+
+static bool unpack_all(Unpacking *u, hid_t set, const Hdf5Dataset *dataset, unsigned char *out)
+{
+    hsize_t at[3] = {0};
+    u->stored = malloc(most_stored(&u->chunks));
+    u->shuffled = malloc(u->chunks.bytes);
+    u->plain = malloc(u->chunks.bytes);
+    bool good = u->stored && u->shuffled && u->plain;
+    for (hsize_t i = 0; good && i < u->chunks.count; i++) {
+        good = unpack_chunk(u, set, at);
+        if (good)
+            place_chunk(dataset, &u->chunks, at, u->value_bytes, u->plain, out);
+        next_chunk(&u->chunks, dataset, at);
+    }
+    free(u->stored);
+    free(u->shuffled);
+    free(u->plain);
+    return good;
+}
+
+// Values as they are stored, then in the type that is wanted, both in the same memory.
+static bool read_packed(hid_t set, hid_t creation, const Hdf5Dataset *dataset, void *out)
+{
+    hid_t type = H5Dget_type(set), wanted = memory_type(dataset->type);
+    uint64_t values = value_count(dataset);
+    size_t from = H5Tget_size(type), to = H5Tget_size(wanted);
+    Unpacking u = {.value_bytes = from};
+    bool good = !find_packing(creation, from, &u.packing) && !count_chunks(creation, dataset, from, &u.chunks);
+    void *stage = good && from > to ? malloc(values * from) : out;
+    good = good && stage && unpack_all(&u, set, dataset, stage) && H5Tconvert(type, wanted, values, stage, NULL, H5P_DEFAULT) >= 0;
+    if (good && stage != out)
+        memcpy(out, stage, values * to);
+    if (stage != out)
+        free(stage);
+    H5Tclose(type);
+    return good;
+}
+
+static bool read_values(hid_t set, const Hdf5Dataset *dataset, void *out)
+{
+    hid_t creation = H5Dget_create_plist(set);
+    bool is_packed = creation >= 0 && H5Pget_nfilters(creation) != 0;
+    bool good = creation >= 0 && (is_packed ? read_packed(set, creation, dataset, out)
+                                            : H5Dread(set, memory_type(dataset->type), H5S_ALL, H5S_ALL, H5P_DEFAULT, out) >= 0);
+    if (creation >= 0)
+        H5Pclose(creation);
+    return good;
+}
+
 bool hdf5_read_into(Hdf5Reader *reader, const Hdf5Dataset *dataset, void *out)
 {
     uint64_t values = value_count(dataset);
     hid_t set = H5Dopen2(reader->file, dataset->path, H5P_DEFAULT);
-    bool good = set >= 0 && (values == 0 || H5Dread(set, memory_type(dataset->type), H5S_ALL, H5S_ALL, H5P_DEFAULT, out) >= 0);
+    bool good = set >= 0 && (values == 0 || read_values(set, dataset, out));
     if (set >= 0)
         H5Dclose(set);
     if (!good)

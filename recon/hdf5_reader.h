@@ -1,9 +1,10 @@
 // The one way in which an HDF5 file is read: trees, models and recordings. A file is data from anywhere, so that it is held to what our own files are:
 //   - datasets and groups behind hard links only: no other file is opened, by a link, external storage or a virtual dataset;
-//   - plain bytes: no filter, so that no plug-in is loaded and nothing unpacks (the library, 1.10, reads beyond chunks that unpack to less than they should);
+//   - plain bytes, or chunks packed by deflate, or by shuffle and then deflate; no other filter, and no plug-in is loaded. The library, 1.10, reads beyond chunks that
+//     unpack to less than they should: it hands out the packed bytes, zlib inflates them into exactly the chunk's bytes (one more or less is a fault), and we unshuffle;
 //   - plain numbers, little- or big-endian integers and IEEE floats, and texts: no conversion by code of the file's own making;
 //   - each byte that a shape promises is in the file, and all datasets together take no more of it than it has, nor than HDF5_READER_MOST_BYTES: N bytes of file
-//     take at most 8 N of memory (a byte read into a word);
+//     take at most 8 N of memory (a byte read into a word), and packed ones HDF5_READER_MOST_RATIO N: a recording of idle hands has about 100;
 //   - no more than HDF5_READER_MOST_CHUNKS chunks a dataset, which the library looks up one by one;
 //   - the library survives it: a child process looks at the whole structure first (a fork and some milliseconds), as the library (1.10) overruns its memory where
 //     sizes in old headers are damaged.
@@ -16,8 +17,8 @@
 
 #include <stdint.h>
 
-enum { HDF5_READER_MOST_CHUNKS = 4096, HDF5_READER_MOST_TEXT = 1 << 27 };     // [bytes] of one text
-#define HDF5_READER_MOST_BYTES ((uint64_t)1 << 34)      // eight hours of a recording
+enum { HDF5_READER_MOST_CHUNKS = 1 << 18, HDF5_READER_MOST_RATIO = 256, HDF5_READER_MOST_TEXT = 1 << 27 };     // [bytes] of one text
+#define HDF5_READER_MOST_BYTES ((uint64_t)1 << 34)      // four hours of a recording
 
 typedef struct Hdf5Reader Hdf5Reader;
 

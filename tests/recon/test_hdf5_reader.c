@@ -1,4 +1,5 @@
-// The guarded reader of HDF5: a dataset as ours are is read; whatever lies elsewhere, is packed, is no number or promises what is not there is refused by name.
+// The guarded reader of HDF5: a dataset as ours are is read; whatever lies elsewhere, is packed otherwise than by
+// deflate, is no number or promises what is not there is refused by name.
 #include "recon/hdf5_reader.h"
 
 #include <setjmp.h>
@@ -14,6 +15,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <zlib.h>
 
 static Faults faults;
 static char folder[] = "/tmp/seldinger-hdf5-reader-XXXXXX";
@@ -144,29 +146,176 @@ static void data_elsewhere_are_not_read(void **state)
     hdf5_reader_close(reader);
 }
 
+// --- packed chunks ---
+
+enum { PART = 20 };          // values a chunk: the last of the three is cut off at ROWS
+static hid_t packed(bool is_shuffled)
+{
+    hid_t creation = chunks(PART);
+    if (is_shuffled)
+        H5Pset_shuffle(creation);
+    H5Pset_deflate(creation, 6);
+    return creation;
+}
+
+static double wave(int i) { return i % 7 ? 0.1 * i : -1e-300 * i; }
+
+// As the library packs them, in each type, rank and byte order.
+static void what_is_packed_is_read(void **state)
+{
+    (void)state;
+    const hid_t stored[] = {H5T_IEEE_F64LE, H5T_IEEE_F64BE, H5T_IEEE_F32LE, H5T_STD_I16BE, H5T_STD_U8LE, H5T_STD_I64LE};
+    const hsize_t size[3] = {11, 5, 3}, part[3] = {4, 2, 3};
+    double values[11 * 5 * 3];
+    for (int i = 0; i < 165; i++)
+        values[i] = wave(i);
+    for (int t = 0; t < 6; t++)
+        for (int rank = 1; rank <= 3; rank++)
+            for (int shuffled = 0; shuffled < 2; shuffled++) {
+                bool is_float = t < 3;
+                hid_t file = new_file(), space = H5Screate_simple(rank, size, NULL), creation = H5Pcreate(H5P_DATASET_CREATE);
+                H5Pset_chunk(creation, rank, part);
+                if (shuffled)
+                    H5Pset_shuffle(creation);
+                H5Pset_deflate(creation, (unsigned)(1 + t));
+                hid_t set = H5Dcreate2(file, "/x", stored[t], space, H5P_DEFAULT, creation, H5P_DEFAULT);
+                assert_true(H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0);
+                double expected[165];        // as the library reads it
+                int32_t expected_counts[165];
+                assert_true(H5Dread(set, is_float ? H5T_NATIVE_DOUBLE : H5T_NATIVE_INT32, H5S_ALL, H5S_ALL, H5P_DEFAULT, is_float ? (void *)expected : expected_counts) >= 0);
+                H5Dclose(set);
+                H5Sclose(space);
+                H5Pclose(creation);
+                Hdf5Reader *reader = open_file(file);
+                Hdf5Dataset x = {"/x", is_float ? HDF5_DOUBLE : HDF5_INT32, rank, {0}, is_float};
+                void *read = hdf5_read(reader, &x);
+                if (!read)
+                    fail_msg("type %d, rank %d: %s", t, rank, faults.text[0]);
+                size_t count = rank == 1 ? 11 : rank == 2 ? 55 : 165;
+                assert_memory_equal(read, is_float ? (void *)expected : expected_counts, count * (is_float ? sizeof(double) : sizeof(int32_t)));
+                free(read);
+                hdf5_reader_close(reader);
+            }
+}
+
 static size_t pass_filter(unsigned flags, size_t parameter_count, const unsigned parameters[], size_t bytes, size_t *size, void **buffer)
 {
     (void)flags, (void)parameter_count, (void)parameters, (void)size, (void)buffer;
     return bytes;
 }
 
-static void what_is_packed_is_refused(void **state)
+static void other_packings_are_refused(void **state)
 {
     (void)state;
     static const H5Z_class2_t own = {H5Z_CLASS_T_VERS, 300, 1, 1, "own", NULL, NULL, pass_filter};
-    hid_t file = new_file(), creation = chunks(ROWS);
-    H5Pset_deflate(creation, 6);
-    put_with(file, "/x", H5T_IEEE_F64LE, ROWS, creation, numbers);
-    refused(file, plain, "is packed");
-    creation = chunks(ROWS);
     assert_true(H5Zregister(&own) >= 0);
-    H5Pset_filter(creation, 300, H5Z_FLAG_OPTIONAL, 0, NULL);
-    file = new_file();
-    put_with(file, "/x", H5T_IEEE_F64LE, ROWS, creation, numbers);
-    refused(file, plain, "is packed");
+    for (int i = 0; i < 7; i++) {
+        hid_t file = new_file(), creation = chunks(PART);
+        if (i == 0)
+            H5Pset_filter(creation, 300, H5Z_FLAG_OPTIONAL, 0, NULL);
+        if (i == 1)
+            H5Pset_fletcher32(creation);
+        if (i == 2)
+            H5Pset_shuffle(creation);
+        if (i == 3 || i == 4)
+            H5Pset_deflate(creation, 6);
+        if (i == 3)
+            H5Pset_shuffle(creation);            // in the wrong order
+        if (i == 4)
+            H5Pset_deflate(creation, 6);         // twice
+        if (i == 5)
+            H5Pset_scaleoffset(creation, H5Z_SO_FLOAT_DSCALE, 2);
+        if (i == 6) {
+            H5Pset_shuffle(creation);
+            H5Pset_deflate(creation, 6);
+            H5Pset_fletcher32(creation);
+        }
+        put_with(file, "/x", H5T_IEEE_F64LE, ROWS, creation, numbers);
+        refused(file, plain, "is packed by other filters than deflate");
+    }
     unsigned may_load = 1;
     H5PLget_loading_state(&may_load);
     assert_int_equal(may_load, 0);
+}
+
+// A dataset whose first chunk holds these bytes, the others whole ones.
+static hid_t with_chunk(const void *bytes, size_t length, unsigned left_out)
+{
+    hid_t file = new_file();
+    double values[ROWS];
+    for (int i = 0; i < ROWS; i++)
+        values[i] = wave(i);
+    put_with(file, "/x", H5T_IEEE_F64LE, ROWS, packed(true), values);
+    hid_t set = H5Dopen2(file, "/x", H5P_DEFAULT);
+    assert_true(H5Dwrite_chunk(set, H5P_DEFAULT, left_out, (const hsize_t[]){0}, length, bytes) >= 0);
+    H5Dclose(set);
+    return file;
+}
+
+static void damaged_chunks_are_refused(void **state)
+{
+    (void)state;
+    enum { BYTES = PART * sizeof(double) };
+    unsigned char values[BYTES + 1], stream[1000];
+    for (int i = 0; i <= BYTES; i++)
+        values[i] = (unsigned char)(i * 37 % 251);
+    uLongf length = sizeof stream;
+    assert_int_equal(compress(stream, &length, values, BYTES), Z_OK);
+    // whole it is read; of each prefix, with a byte behind it, or with a bit turned over it is not
+    Hdf5Reader *reader = open_file(with_chunk(stream, length, 0));
+    Hdf5Dataset x = plain;
+    void *read = hdf5_read(reader, &x);
+    assert_non_null(read);
+    free(read);
+    hdf5_reader_close(reader);
+    for (size_t cut = 1; cut < length; cut += 7)
+        refused(with_chunk(stream, cut, 0), plain, "damaged or cut off");
+    stream[length] = 0;
+    refused(with_chunk(stream, length + 1, 0), plain, "damaged or cut off");
+    for (size_t i = 0; i < length; i += 11) {
+        stream[i] ^= 4;
+        refused(with_chunk(stream, length, 0), plain, "damaged or cut off");
+        stream[i] ^= 4;
+    }
+    // a byte less and a byte more than the chunk has
+    for (int more = -1; more <= 1; more += 2) {
+        length = sizeof stream;
+        assert_int_equal(compress(stream, &length, values, (uLong)(BYTES + more)), Z_OK);
+        refused(with_chunk(stream, length, 0), plain, "damaged or cut off");
+    }
+    // a chunk whose filters were left out holds its plain bytes, no more and no less
+    reader = open_file(with_chunk(values, BYTES, 3));
+    x = plain;
+    double *same = hdf5_read(reader, &x);
+    assert_non_null(same);
+    assert_memory_equal(same, values, BYTES);
+    free(same);
+    hdf5_reader_close(reader);
+    refused(with_chunk(values, BYTES - 1, 3), plain, "damaged or cut off");
+    refused(with_chunk(values, BYTES, 0), plain, "damaged or cut off");
+    // longer than deflate makes any chunk of this size
+    refused(with_chunk(stream, sizeof stream, 0), plain, "cut off");
+}
+
+// Little that unpacks to much: deflate gives up to 1032 bytes for one.
+static void bombs_are_refused(void **state)
+{
+    (void)state;
+    const hsize_t rows = 1 << 24;
+    unsigned char *zeros = calloc(rows, sizeof(double));
+    hid_t file = new_file(), creation = chunks(rows);
+    H5Pset_deflate(creation, 9);
+    put_with(file, "/x", H5T_STD_U8LE, rows, creation, zeros);
+    Hdf5Dataset x = {"/x", HDF5_UINT8, 1, {0}, false};
+    refused(file, x, "unpacks to more than 256 times the file");
+    file = new_file();
+    put_with(file, "/x", H5T_IEEE_F64LE, (hsize_t)1 << 40, chunks(1 << 20), NULL);
+    refused(file, plain, "more or larger chunks");
+    // chunks that were never written promise as much, and are not there
+    file = new_file();
+    put_with(file, "/x", H5T_IEEE_F64LE, ROWS, packed(false), NULL);
+    refused(file, plain, "never written");
+    free(zeros);
 }
 
 static void what_is_not_there_is_refused(void **state)
@@ -284,7 +433,8 @@ int main(void)
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_plain_is_read),        cmocka_unit_test(links_out_are_not_followed), cmocka_unit_test(data_elsewhere_are_not_read),
-        cmocka_unit_test(what_is_packed_is_refused),    cmocka_unit_test(what_is_not_there_is_refused),
+        cmocka_unit_test(what_is_packed_is_read),       cmocka_unit_test(other_packings_are_refused), cmocka_unit_test(damaged_chunks_are_refused),
+        cmocka_unit_test(bombs_are_refused),            cmocka_unit_test(what_is_not_there_is_refused),
         cmocka_unit_test(what_is_no_number_is_refused), cmocka_unit_test(attributes_are_texts_or_numbers),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
