@@ -4,9 +4,6 @@
 
 #include <string.h>
 
-// As often as a film or the eye takes one; an hour of them takes 1.7 GB for 200 elements.
-static const double frame_ms = 33;
-
 typedef struct TakeOver {
     LiveSession *session;
     const LiveSessionOptions *options;
@@ -52,8 +49,7 @@ bool live_session_open(LiveSession *session, const Scene *scene, const OpenVesse
     if (session->simulator && !session->lesson)
         faults_add(faults, scene->path, 0, 0, "no memory for a session");
     if (session->lesson && options->record_path) {
-        RecordingOptions record = recording_default_options();
-        record.frame_ms = frame_ms;
+        RecordingOptions record = recording_session_options();
         record.trainee = options->trainee;
         record.date = options->date;
         snprintf(session->record_path, sizeof session->record_path, "%s", options->record_path);

@@ -11,30 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { WORD = 8, MOST_BLOCKS = 512, MOST_PAGES = 2, NODE_HEAD = 24 };
-
-// A piece of metadata that the library writes as one.
-typedef struct Block {
-    haddr_t address;
-    size_t size;
-    H5FD_mem_t type;
-    unsigned char *wanted, *disk;   // after sealing
-    bool dirty;
-} Block;
-
-struct OrderedFile {
-    H5FD_t driver;   // the library's part, first
-    int descriptor;
-    haddr_t end;     // of what is allocated
-    haddr_t ahead;   // the stated end is later than that by this, the file's length by twice this
-    bool sealed;
-    int index_entries, block_count;
-    Block block[MOST_BLOCKS];
-    int page_count;
-    haddr_t page_start[MOST_PAGES];   // of those that hold headers
-    unsigned char *page;   // page aligned: no fault in the middle of the kernel's copy
-    const char *fault;
-};
+enum { WORD = 8, MOST_PAGES = 24, NODE_HEAD = 24, MOST_KEY = 48, MOST_HEADER = 1024 };
 
 static void (*watch_write)(void *context, bool done);
 static void *watch_context;
@@ -49,12 +26,6 @@ static void watch(bool done)
 {
     if (watch_write)
         watch_write(watch_context, done);
-}
-
-static bool refuse(OrderedFile *file, const char *why)
-{
-    file->fault = why;
-    return false;
 }
 
 // --- plain reading and writing ---
@@ -114,9 +85,6 @@ static bool grow(int descriptor, haddr_t size, haddr_t more)
     haddr_t now = length_of(descriptor);
     return now != HADDR_UNDEF && (now >= size + more || set_length(descriptor, size + more) || now >= size || set_length(descriptor, size));
 }
-
-// --- the end that the superblock states ---
-
 static uint64_t little_endian(const unsigned char *data, int bytes)
 {
     uint64_t value = 0;
@@ -125,96 +93,38 @@ static uint64_t little_endian(const unsigned char *data, int bytes)
     return value;
 }
 
-static void put_little_endian(unsigned char *data, uint64_t value)
+static void put_little_endian(unsigned char *data, uint64_t value, int bytes)
 {
-    for (int i = 0; i < WORD; i++)
+    for (int i = 0; i < bytes; i++)
         data[i] = (unsigned char)(value >> 8 * i);
 }
 
-// Behind version 0's 24 bytes of sizes, or version 1's 28, and two addresses.
-static size_t end_field(const Block *superblock) { return superblock->disk[8] == 0 ? 40 : 44; }
+// --- building: a driver that gives addresses of whole words, one after the other ---
 
-static Block *superblock_of(OrderedFile *file)
-{
-    for (int i = 0; i < file->block_count; i++)
-        if (file->block[i].type == H5FD_MEM_SUPER && file->block[i].address == 0)
-            return &file->block[i];
-    return NULL;
-}
-
-// What is to be stated, after the file has grown: ahead as far as it is long, and never less than before.
-static void state_end_ahead(OrderedFile *file)
-{
-    Block *block = superblock_of(file);
-    size_t field = end_field(block);
-    haddr_t length = length_of(file->descriptor), end = file->end + file->ahead, before = little_endian(block->disk + field, WORD);
-    end = length < end ? length : end;
-    put_little_endian(block->wanted + field, end > before ? end : before);
-    block->dirty = true;
-}
-
-static bool write_end(OrderedFile *file)
-{
-    Block *block = superblock_of(file);
-    size_t field = end_field(block);
-    if (memcmp(block->wanted + field, block->disk + field, WORD) == 0)
-        return true;
-    if (!write_all(file->descriptor, block->wanted + field, WORD, block->address + field))
-        return false;
-    memcpy(block->disk + field, block->wanted + field, WORD);
-    return true;
-}
-
-// --- what the library calls ---
-
-bool ordered_file_is_being_written(const char *path)
-{
-    struct flock lock = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
-    int descriptor = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-    bool is_locked = descriptor >= 0 && fcntl(descriptor, F_OFD_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
-    if (descriptor >= 0)
-        close(descriptor);
-    return is_locked;
-}
+typedef struct Build {
+    H5FD_t driver;   // the library's part, first
+    int descriptor;
+    haddr_t end;     // of what is allocated
+} Build;
 
 static H5FD_t *driver_open(const char *name, unsigned flags, hid_t access, haddr_t most)
 {
     (void)access;
     (void)most;
-    if (!(flags & H5F_ACC_TRUNC))
-        return NULL;
-    OrderedFile *file = calloc(1, sizeof *file);
+    Build *file = flags & H5F_ACC_TRUNC ? calloc(1, sizeof *file) : NULL;
     if (!file)
         return NULL;
-    file->page = aligned_alloc(ORDERED_FILE_PAGE, ORDERED_FILE_PAGE);
-    file->descriptor = file->page ? open(name, O_RDWR | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0666) : -1;
+    file->descriptor = open(name, O_RDWR | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0666);
     if (file->descriptor >= 0)
-        (void)fcntl(file->descriptor, F_OFD_SETLK, &(struct flock){.l_type = F_WRLCK, .l_whence = SEEK_SET});   // some file systems have none
-    if (file->descriptor < 0) {
-        free(file->page);
-        free(file);
-        return NULL;
-    }
-    return &file->driver;
+        return &file->driver;
+    free(file);
+    return NULL;
 }
 
 static herr_t driver_close(H5FD_t *driver)
 {
-    OrderedFile *file = (OrderedFile *)driver;
-    bool good = true;
-    if (file->sealed) {
-        // whoever closes has committed: only the end is still ahead
-        put_little_endian(superblock_of(file)->wanted + end_field(superblock_of(file)), file->end);
-        good = write_end(file) && set_length(file->descriptor, file->end);
-    }
-    for (int i = 0; i < file->block_count; i++) {
-        Block *block = &file->block[i];
-        good = good && (!block->dirty || memcmp(block->wanted, block->disk, block->size) == 0);
-        free(block->wanted);
-        free(block->disk);
-    }
-    good = close(file->descriptor) == 0 && good;
-    free(file->page);
+    Build *file = (Build *)driver;
+    bool good = close(file->descriptor) == 0;
     free(file);
     return good ? 0 : -1;
 }
@@ -222,7 +132,7 @@ static herr_t driver_close(H5FD_t *driver)
 static herr_t driver_query(const H5FD_t *driver, unsigned long *flags)
 {
     (void)driver;
-    // no accumulator and no aggregation: every structure comes as its own write with its own type
+    // no accumulator and no aggregation: headers lie where they are allocated
     *flags = H5FD_FEAT_DEFAULT_VFD_COMPATIBLE;
     return 0;
 }
@@ -231,7 +141,7 @@ static haddr_t driver_alloc(H5FD_t *driver, H5FD_mem_t type, hid_t transfer, hsi
 {
     (void)type;
     (void)transfer;
-    OrderedFile *file = (OrderedFile *)driver;
+    Build *file = (Build *)driver;
     haddr_t address = (file->end + WORD - 1) / WORD * WORD;
     file->end = address + size;
     return address;
@@ -240,20 +150,20 @@ static haddr_t driver_alloc(H5FD_t *driver, H5FD_mem_t type, hid_t transfer, hsi
 static haddr_t driver_get_eoa(const H5FD_t *driver, H5FD_mem_t type)
 {
     (void)type;
-    return ((const OrderedFile *)driver)->end;
+    return ((const Build *)driver)->end;
 }
 
 static herr_t driver_set_eoa(H5FD_t *driver, H5FD_mem_t type, haddr_t end)
 {
     (void)type;
-    ((OrderedFile *)driver)->end = end;
+    ((Build *)driver)->end = end;
     return 0;
 }
 
 static haddr_t driver_get_eof(const H5FD_t *driver, H5FD_mem_t type)
 {
     (void)type;
-    return length_of(((const OrderedFile *)driver)->descriptor);
+    return length_of(((const Build *)driver)->descriptor);
 }
 
 static herr_t driver_get_handle(H5FD_t *driver, hid_t access, void **handle)
@@ -265,65 +175,24 @@ static herr_t driver_get_handle(H5FD_t *driver, hid_t access, void **handle)
 
 static herr_t driver_read(H5FD_t *driver, H5FD_mem_t type, hid_t transfer, haddr_t address, size_t size, void *data)
 {
+    (void)type;
     (void)transfer;
-    OrderedFile *file = (OrderedFile *)driver;
-    if (!read_all(file->descriptor, data, size, address))
-        return -1;
-    if (!file->sealed || type == H5FD_MEM_DRAW)
-        return 0;
-    for (int i = 0; i < file->block_count; i++) {
-        const Block *block = &file->block[i];
-        haddr_t from = block->address > address ? block->address : address, to = block->address + block->size;
-        to = to < address + size ? to : address + size;
-        if (from < to)
-            memcpy((unsigned char *)data + (from - address), block->wanted + (from - block->address), to - from);
-    }
-    return 0;
-}
-
-static bool remember(OrderedFile *file, H5FD_mem_t type, haddr_t address, size_t size)
-{
-    int kept = 0;
-    for (int i = 0; i < file->block_count; i++)   // what is written over is another structure now
-        if (file->block[i].address + file->block[i].size <= address || address + size <= file->block[i].address)
-            file->block[kept++] = file->block[i];
-    file->block_count = kept;
-    if (file->block_count == MOST_BLOCKS)
-        return refuse(file, "more structures than a recording has");
-    file->block[file->block_count++] = (Block){.address = address, .size = size, .type = type};
-    return true;
-}
-
-static bool hold(OrderedFile *file, H5FD_mem_t type, haddr_t address, size_t size, const void *data)
-{
-    for (int i = 0; i < file->block_count; i++) {
-        Block *block = &file->block[i];
-        if (block->address == address && block->size == size && block->type == type) {
-            memcpy(block->wanted, data, size);
-            block->dirty = true;
-            return true;
-        }
-    }
-    return refuse(file, "the file's index is full");
+    return read_all(((Build *)driver)->descriptor, data, size, address) ? 0 : -1;
 }
 
 static herr_t driver_write(H5FD_t *driver, H5FD_mem_t type, hid_t transfer, haddr_t address, size_t size, const void *data)
 {
+    (void)type;
     (void)transfer;
-    OrderedFile *file = (OrderedFile *)driver;
-    if (file->sealed && type != H5FD_MEM_DRAW)
-        return hold(file, type, address, size, data) ? 0 : -1;
-    if (type != H5FD_MEM_DRAW && !remember(file, type, address, size))
-        return -1;
-    return write_all(file->descriptor, data, size, address) ? 0 : -1;
+    return write_all(((Build *)driver)->descriptor, data, size, address) ? 0 : -1;
 }
 
 static herr_t driver_truncate(H5FD_t *driver, hid_t transfer, hbool_t closing)
 {
     (void)transfer;
     (void)closing;
-    OrderedFile *file = (OrderedFile *)driver;
-    return file->sealed || grow(file->descriptor, file->end, 0) ? 0 : -1;
+    Build *file = (Build *)driver;
+    return grow(file->descriptor, file->end, 0) ? 0 : -1;
 }
 
 static const H5FD_class_t driver_class = {
@@ -369,165 +238,305 @@ hid_t ordered_file_create(const char *path, hid_t creation, hid_t access)
     return driver >= 0 && H5Pset_driver(access, driver, NULL) >= 0 ? H5Fcreate(path, H5F_ACC_TRUNC, creation, access) : -1;
 }
 
-OrderedFile *ordered_file_of(hid_t file)
+void ordered_file_start_page(hid_t file)
 {
     void *handle = NULL;
-    return H5Fget_vfd_handle(file, H5P_DEFAULT, &handle) >= 0 ? handle : NULL;
+    if (H5Fget_vfd_handle(file, H5P_DEFAULT, &handle) < 0)
+        return;
+    Build *build = handle;
+    build->end = (build->end + ORDERED_FILE_PAGE - 1) / ORDERED_FILE_PAGE * ORDERED_FILE_PAGE;
 }
+
+bool ordered_file_is_being_written(const char *path)
+{
+    struct flock lock = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
+    int descriptor = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    bool is_locked = descriptor >= 0 && fcntl(descriptor, F_OFD_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
+    if (descriptor >= 0)
+        close(descriptor);
+    return is_locked;
+}
+// --- growing ---
+
+// A dataset and its index.
+typedef struct Set {
+    haddr_t extent, root_field;              // addresses in its header
+    int rank;
+    hsize_t chunk_rows, chunks;              // appended
+    haddr_t root, leaf;                      // nodes; of the leaves the last one
+} Set;
+
+// A page that holds extents, as it is on the disk and as it is to be.
+typedef struct Page {
+    haddr_t start;
+    unsigned char *disk, *wanted;            // page aligned: no fault in the middle of the kernel's copy
+} Page;
+
+struct OrderedFile {
+    int descriptor;
+    size_t end_field;                        // where the superblock states the end
+    haddr_t end, stated, ahead;              // of what is used, of what the superblock says
+    int fan;                                 // children of a node at most
+    int set_count, page_count;
+    Set set[ORDERED_FILE_MOST_SETS];
+    Page page[MOST_PAGES];
+    unsigned char *node;                     // scratch
+    const char *fault;
+};
 
 const char *ordered_file_fault(const OrderedFile *file) { return file->fault; }
 
-void ordered_file_start_page(OrderedFile *file)
+static bool refuse(OrderedFile *file, const char *why)
 {
-    file->end = (file->end + ORDERED_FILE_PAGE - 1) / ORDERED_FILE_PAGE * ORDERED_FILE_PAGE;
-    if (file->page_count < MOST_PAGES)
-        file->page_start[file->page_count++] = file->end;
+    file->fault = why;
+    return false;
 }
 
-bool ordered_file_seal(OrderedFile *file, int index_entries, hsize_t ahead)
+// Of a chunk's key: its bytes and filter mask, and the offset of its first value in each dimension and within a value.
+static size_t key_bytes(const Set *set) { return WORD + WORD * (size_t)(set->rank + 1); }
+static size_t node_bytes(const OrderedFile *file, const Set *set) { return NODE_HEAD + (size_t)file->fan * WORD + (size_t)(file->fan + 1) * key_bytes(set); }
+static haddr_t key_address(const Set *set, haddr_t node, uint64_t i) { return node + NODE_HEAD + i * (key_bytes(set) + WORD); }
+
+OrderedFile *ordered_file_open(const char *path, int half_fan, hsize_t ahead)
 {
-    file->index_entries = index_entries;
+    static const unsigned char signature[8] = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
+    unsigned char super[64];
+    OrderedFile *file = calloc(1, sizeof *file);
+    if (!file)
+        return NULL;
+    file->fan = 2 * half_fan;
     file->ahead = ahead;
-    for (int i = 0; i < file->block_count; i++) {
-        Block *block = &file->block[i];
-        if (block->address % WORD != 0)
-            return refuse(file, "a structure does not start at a word");
-        block->wanted = calloc(block->size + WORD, 1);   // whole words
-        block->disk = calloc(block->size + WORD, 1);
-        if (!block->wanted || !block->disk || !read_all(file->descriptor, block->disk, block->size, block->address))
-            return false;
-        memcpy(block->wanted, block->disk, block->size);
+    file->node = calloc(1, NODE_HEAD + (size_t)file->fan * (MOST_KEY + WORD) + MOST_KEY);
+    file->descriptor = open(path, O_RDWR | O_NOFOLLOW | O_CLOEXEC);
+    bool good = file->node && file->descriptor >= 0 && read_all(file->descriptor, super, sizeof super, 0) && !memcmp(super, signature, sizeof signature) &&
+                super[8] <= 1;
+    if (good) {
+        (void)fcntl(file->descriptor, F_OFD_SETLK, &(struct flock){.l_type = F_WRLCK, .l_whence = SEEK_SET});   // some file systems have none
+        file->end_field = super[8] == 0 ? 40 : 44;      // behind version 0's 24 bytes of sizes, or version 1's 28, and two addresses
+        file->end = file->stated = little_endian(super + file->end_field, WORD);
+        return file;
     }
-    if (!superblock_of(file) || superblock_of(file)->disk[8] > 1)
-        return refuse(file, "an unknown superblock");
-    file->sealed = true;
-    if (!grow(file->descriptor, file->end, 2 * ahead))
-        return false;
-    state_end_ahead(file);
-    return write_end(file);
+    ordered_file_close(file, false);
+    return NULL;
 }
 
-// --- committing ---
-
-// The first changed word at or after the byte `from`, or the block's size.
-static size_t next_change(const Block *block, size_t from)
+static Page *page_of(OrderedFile *file, haddr_t address)
 {
-    while (from < block->size && memcmp(block->wanted + from, block->disk + from, WORD) == 0)
-        from += WORD;
-    return from < block->size ? from : block->size;
-}
-
-// Rule 1: the end of file grows, nothing else changes.
-static bool superblock_fits(const Block *block)
-{
-    size_t field = end_field(block), rest = field + WORD;
-    return block->disk[8] <= 1 && block->size > rest && memcmp(block->wanted, block->disk, field) == 0 &&
-           memcmp(block->wanted + rest, block->disk + rest, block->size - rest) == 0 &&
-           little_endian(block->wanted + field, WORD) >= little_endian(block->disk + field, WORD);
-}
-
-// Rules 2 and 3: a node (signature 4, type 1, level 1, entries 2, siblings 16, then key, child, key, …, key) gets entries at its end.
-static bool node_fits(const OrderedFile *file, const Block *block)
-{
-    if (next_change(block, 0) == block->size)
-        return true;
-    size_t children = (size_t)file->index_entries * WORD, keys = (size_t)file->index_entries + 1;
-    if (block->size < NODE_HEAD + children + keys || (block->size - NODE_HEAD - children) % keys != 0)
-        return false;
-    size_t key = (block->size - NODE_HEAD - children) / keys;
-    uint64_t before = little_endian(block->disk + 6, 2), after = little_endian(block->wanted + 6, 2);
-    if (memcmp(block->disk, "TREE", 4) != 0 || memcmp(block->disk, block->wanted, 6) != 0 || before < 1 || after < before ||
-        after > (uint64_t)file->index_entries)
-        return false;
-    // the leading index (after a key's first word) of key n: above the last chunk's afterwards, and never falling
-    size_t bound = NODE_HEAD + (size_t)before * (key + WORD), leading = bound + WORD, last = leading - key - WORD;
-    uint64_t new = little_endian(block->wanted + leading, WORD);
-    return next_change(block, WORD) >= bound && new > little_endian(block->disk + last, WORD) && new >= little_endian(block->disk + leading, WORD);
-}
-
-static bool lies_in(haddr_t address, haddr_t page_start) { return address >= page_start && address < page_start + ORDERED_FILE_PAGE; }
-
-// Rule 4: one word of each header, in a started page.
-static bool header_fits(const OrderedFile *file, const Block *block)
-{
-    size_t change = next_change(block, 0);
-    bool inside = change == block->size;
+    haddr_t start = address / ORDERED_FILE_PAGE * ORDERED_FILE_PAGE;
     for (int i = 0; i < file->page_count; i++)
-        inside |= lies_in(block->address + change, file->page_start[i]);
-    return inside && next_change(block, change + WORD) == block->size;
-}
-
-static bool all_fits(OrderedFile *file)
-{
-    for (int i = 0; i < file->block_count; i++) {
-        const Block *block = &file->block[i];
-        bool good = !block->dirty || (block->type == H5FD_MEM_SUPER   ? superblock_fits(block)
-                                      : block->type == H5FD_MEM_BTREE ? node_fits(file, block)
-                                      : block->type == H5FD_MEM_OHDR  ? header_fits(file, block)
-                                                                      : next_change(block, 0) == block->size);
-        if (!good)
-            return refuse(file, "the file's structure would change");
+        if (file->page[i].start == start)
+            return &file->page[i];
+    Page page = {.start = start};
+    if (file->page_count == MOST_PAGES)
+        return NULL;
+    page.disk = aligned_alloc(ORDERED_FILE_PAGE, 2 * ORDERED_FILE_PAGE);
+    if (!page.disk || !read_all(file->descriptor, page.disk, ORDERED_FILE_PAGE, start)) {
+        free(page.disk);
+        return NULL;
     }
-    return true;
+    page.wanted = page.disk + ORDERED_FILE_PAGE;
+    memcpy(page.wanted, page.disk, ORDERED_FILE_PAGE);
+    file->page[file->page_count] = page;
+    return &file->page[file->page_count++];
 }
 
-// The changed words of all blocks of a type, one write each, in the order of their addresses within a block.
-static bool write_words(OrderedFile *file, H5FD_mem_t type, size_t from, size_t to)
+// An object header of version 1: 16 bytes, then messages of a type, a size, flags and data. Sought: the first dimension of a dataspace of version 1, and the
+// address in a layout of version 3.
+int ordered_file_add(OrderedFile *file, haddr_t header, int rank, hsize_t chunk_rows)
 {
-    for (int i = 0; i < file->block_count; i++) {
-        Block *block = &file->block[i];
-        if (!block->dirty || block->type != type)
-            continue;
-        size_t end = to < block->size ? to : block->size;
-        for (size_t at = next_change(block, from); at < end; at = next_change(block, at)) {
-            watch(false);
-            if (!write_all(file->descriptor, block->wanted + at, WORD, block->address + at))
-                return false;
-            memcpy(block->disk + at, block->wanted + at, WORD);
-        }
+    enum { DATASPACE = 1, LAYOUT = 8, CHUNKED = 2, HEAD = 16, MESSAGE = 8 };
+    unsigned char bytes[MOST_HEADER];
+    Set set = {.rank = rank, .chunk_rows = chunk_rows};
+    if (file->set_count == ORDERED_FILE_MOST_SETS || !read_all(file->descriptor, bytes, sizeof bytes, header) || bytes[0] != 1)
+        return -1;
+    size_t size = HEAD + little_endian(bytes + 8, 4);
+    for (size_t at = HEAD; at + MESSAGE <= size && size <= MOST_HEADER;) {
+        unsigned type = (unsigned)little_endian(bytes + at, 2), length = (unsigned)little_endian(bytes + at + 2, 2);
+        const unsigned char *data = bytes + at + MESSAGE;
+        if (type == DATASPACE && data[0] == 1 && data[1] == rank)
+            set.extent = header + at + MESSAGE + 8;
+        if (type == LAYOUT && data[0] == 3 && data[1] == CHUNKED)
+            set.root_field = header + at + MESSAGE + 3;
+        at += MESSAGE + length;
     }
-    return true;
+    if (set.extent == 0 || set.root_field == 0 || set.extent % WORD != 0 || !page_of(file, set.extent))
+        return -1;
+    file->set[file->set_count] = set;
+    return file->set_count++;
 }
 
-static bool write_extents(OrderedFile *file, haddr_t start)
+// So that a reader finds the end behind all that is used.
+static bool state_end(OrderedFile *file, haddr_t end)
 {
-    size_t first = ORDERED_FILE_PAGE, last = 0;
-    if (!read_all(file->descriptor, file->page, ORDERED_FILE_PAGE, start))
+    unsigned char word[WORD];
+    haddr_t length;
+    if (!grow(file->descriptor, end, file->ahead) || (length = length_of(file->descriptor)) == HADDR_UNDEF)
         return false;
-    for (int i = 0; i < file->block_count; i++) {
-        Block *block = &file->block[i];
-        size_t change = block->dirty && block->type == H5FD_MEM_OHDR ? next_change(block, 0) : block->size;
-        if (change == block->size || !lies_in(block->address + change, start))
-            continue;
-        size_t at = (size_t)(block->address + change - start);
-        memcpy(file->page + at, block->wanted + change, WORD);
-        memcpy(block->disk + change, block->wanted + change, WORD);
-        first = at < first ? at : first;
-        last = at + WORD > last ? at + WORD : last;
-    }
-    if (last == 0)
+    end = length < end ? length : end;
+    if (end <= file->stated)
+        return true;
+    put_little_endian(word, end, WORD);
+    watch(false);
+    file->stated = end;
+    return write_all(file->descriptor, word, WORD, file->end_field);
+}
+
+// The address of new space, 0 where there is none.
+static haddr_t take_space(OrderedFile *file, size_t bytes)
+{
+    haddr_t address = (file->end + WORD - 1) / WORD * WORD;
+    if (address + bytes > file->stated && !state_end(file, address + bytes + file->ahead) && !state_end(file, address + bytes))
+        return 0;
+    file->end = address + bytes;
+    return address;
+}
+
+static void put_key(const Set *set, unsigned char *key, uint64_t bytes, hsize_t row)
+{
+    memset(key, 0, key_bytes(set));
+    put_little_endian(key, bytes, 4);
+    put_little_endian(key + WORD, row, WORD);
+}
+
+// A key, its child, and the key that bounds the child from above.
+static size_t put_entry(const Set *set, unsigned char *at, uint64_t bytes, hsize_t row, haddr_t child, hsize_t next_row)
+{
+    put_key(set, at, bytes, row);
+    put_little_endian(at + key_bytes(set), child, WORD);
+    put_key(set, at + key_bytes(set) + WORD, 0, next_row);
+    return 2 * key_bytes(set) + WORD;
+}
+
+static void put_node_head(unsigned char *node, int level, uint64_t count)
+{
+    memcpy(node, "TREE", 4);
+    node[4] = 1;      // of chunks
+    node[5] = (unsigned char)level;
+    put_little_endian(node + 6, count, 2);
+}
+
+// A new node with one entry. 0 where there is no space.
+static haddr_t make_node(OrderedFile *file, const Set *set, int level, haddr_t left, uint64_t bytes, hsize_t row, haddr_t child, hsize_t next_row)
+{
+    size_t size = node_bytes(file, set);
+    haddr_t address = take_space(file, size);
+    memset(file->node, 0, size);
+    put_node_head(file->node, level, 1);
+    put_little_endian(file->node + 8, left, WORD);
+    put_little_endian(file->node + 16, HADDR_UNDEF, WORD);
+    put_entry(set, file->node + NODE_HEAD, bytes, row, child, next_row);
+    watch(false);
+    return address && write_all(file->descriptor, file->node, size, address) ? address : 0;
+}
+
+// Entry `i` of a node that has as many.
+static bool add_entry(OrderedFile *file, const Set *set, haddr_t node, int level, uint64_t i, uint64_t bytes, hsize_t row, haddr_t child, hsize_t next_row)
+{
+    unsigned char entry[2 * MOST_KEY + WORD], head[WORD];
+    size_t size = put_entry(set, entry, bytes, row, child, next_row);
+    put_node_head(head, level, i + 1);
+    watch(false);
+    if (!write_all(file->descriptor, entry, size, key_address(set, node, i)))
+        return false;
+    watch(false);
+    return write_all(file->descriptor, head, WORD, node);
+}
+
+static bool write_word(OrderedFile *file, haddr_t address, uint64_t value)
+{
+    unsigned char word[WORD];
+    put_little_endian(word, value, WORD);
+    watch(false);
+    return write_all(file->descriptor, word, WORD, address);
+}
+
+// The index of a dataset without chunks: a root, a leaf, and the address in the header. Of a file that nobody reads yet.
+static bool make_index(OrderedFile *file, Set *set, size_t bytes, haddr_t chunk)
+{
+    const hsize_t leaf_rows = (hsize_t)file->fan * set->chunk_rows;
+    Page *page = page_of(file, set->root_field);
+    set->leaf = make_node(file, set, 0, HADDR_UNDEF, bytes, 0, chunk, set->chunk_rows);
+    set->root = set->leaf ? make_node(file, set, 1, HADDR_UNDEF, bytes, 0, set->leaf, leaf_rows) : 0;
+    if (!page || set->root == 0 || !write_word(file, set->root_field, set->root))
+        return false;
+    for (size_t i = 0; i < WORD; i++)      // it lies where it likes, and a page's copy has to know it
+        if ((page = page_of(file, set->root_field + i)))
+            page->disk[(set->root_field + i) % ORDERED_FILE_PAGE] = page->wanted[(set->root_field + i) % ORDERED_FILE_PAGE] = (unsigned char)(set->root >> 8 * i);
+    return page != NULL;
+}
+
+static bool add_leaf(OrderedFile *file, Set *set, uint64_t leaf, size_t bytes, hsize_t row, haddr_t chunk)
+{
+    const hsize_t leaf_rows = (hsize_t)file->fan * set->chunk_rows;
+    haddr_t node = make_node(file, set, 0, set->leaf, bytes, row, chunk, row + set->chunk_rows);
+    if (node == 0 || !write_word(file, set->leaf + 16, node))
+        return false;
+    set->leaf = node;
+    return add_entry(file, set, set->root, 1, leaf, bytes, row, node, row + leaf_rows);
+}
+
+bool ordered_file_append(OrderedFile *file, int number, const void *chunk, size_t bytes)
+{
+    Set *set = &file->set[number];
+    uint64_t fan = (uint64_t)file->fan, leaf = set->chunks / fan, i = set->chunks % fan;
+    hsize_t row = set->chunks * set->chunk_rows;
+    if (file->fault)
+        return false;
+    if (leaf == fan)
+        return refuse(file, "the file's index is full");
+    haddr_t address = take_space(file, bytes);
+    if (address == 0 || !write_all(file->descriptor, chunk, bytes, address))
+        return false;
+    bool good = set->chunks == 0 ? make_index(file, set, bytes, address)
+                : i == 0         ? add_leaf(file, set, leaf, bytes, row, address)
+                                 : add_entry(file, set, set->leaf, 0, i, bytes, row, address, row + set->chunk_rows);
+    set->chunks += good;
+    return good;
+}
+
+void ordered_file_set_rows(OrderedFile *file, int number, hsize_t rows)
+{
+    const Set *set = &file->set[number];
+    Page *page = page_of(file, set->extent);
+    put_little_endian(page->wanted + set->extent % ORDERED_FILE_PAGE, rows, WORD);
+}
+
+static bool write_page(OrderedFile *file, Page *page)
+{
+    size_t first = 0, end = ORDERED_FILE_PAGE;
+    while (first < end && page->wanted[first] == page->disk[first])
+        first++;
+    while (end > first && page->wanted[end - 1] == page->disk[end - 1])
+        end--;
+    if (first == end)
         return true;
     watch(false);
-    // one call where the system takes it whole; a part alone would never become a whole
-    return write_all(file->descriptor, file->page + first, last - first, start + first);
+    memcpy(page->disk + first, page->wanted + first, end - first);
+    // one call; a short one (a full disk cannot be the reason: the page is there) must not be followed by a second
+    return pwrite(file->descriptor, page->wanted + first, end - first, (off_t)(page->start + first)) == (ssize_t)(end - first);
 }
 
 bool ordered_file_commit(OrderedFile *file)
 {
     if (file->fault)
         return false;
-    watch(false);
-    if (!grow(file->descriptor, file->end, 2 * file->ahead))
-        return false;
-    state_end_ahead(file);
-    if (!all_fits(file))
-        return false;
-    watch(false);
-    bool good = write_end(file) && write_words(file, H5FD_MEM_BTREE, WORD, SIZE_MAX) && write_words(file, H5FD_MEM_BTREE, 0, WORD);
+    bool good = state_end(file, file->end + file->ahead);
     for (int i = 0; good && i < file->page_count; i++)
-        good = write_extents(file, file->page_start[i]);
-    for (int i = 0; good && i < file->block_count; i++)
-        file->block[i].dirty = false;
+        good = write_page(file, &file->page[i]);
     watch(true);
+    return good;
+}
+
+bool ordered_file_close(OrderedFile *file, bool is_whole)
+{
+    bool good = true;
+    if (is_whole)
+        good = write_word(file, file->end_field, file->end) && ftruncate(file->descriptor, (off_t)file->end) == 0;
+    if (file->descriptor >= 0)
+        good &= close(file->descriptor) == 0;
+    for (int i = 0; i < file->page_count; i++)
+        free(file->page[i].disk);
+    free(file->node);
+    free(file);
     return good;
 }

@@ -14,6 +14,7 @@ typedef struct Reader {
     const char *path;
     Faults *faults;
     bool is_finite;          // what is read now holds no NaN and no infinity
+    bool has_motion;         // frames come from there
 } Reader;
 
 // Reads a dataset of `rank` dimensions whose trailing ones are shape[1 …] (0: any, filled in); shape[0] is filled in. NULL with a fault.
@@ -31,6 +32,84 @@ static void *read_dataset(const Reader *reader, const char *name, Hdf5Type type,
 static int64_t least(int64_t a, uint64_t b) { return (uint64_t)a < b ? a : (int64_t)b; }
 
 static bool has(const Reader *reader, const char *name) { return hdf5_has(reader->file, name); }
+
+// --- motion: what a session keeps between its frames (sim/recording.h) ---
+
+// What 1 stands for in a dataset's motion.
+static double unit_of(const Reader *reader, const char *name)
+{
+    static const struct {
+        const char *leaf, *unit;
+    } known[] = {{"position", "motion_length_mm"}, {"gap_mm", "motion_length_mm"},    {"s_mm", "motion_length_mm"},
+                 {"quaternion", "motion_turn"},    {"force_n", "motion_force_n"}, {"radius_mm", "motion_radius_mm"}};
+    const char *leaf = strrchr(name, '/') + 1;
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+        if (!strcmp(leaf, known[i].leaf))
+            return hdf5_number(reader->file, known[i].unit, 1);
+    return 1;
+}
+
+static size_t bytes_of(Hdf5Type type) { return type == HDF5_DOUBLE ? sizeof(double) : type == HDF5_INT8 ? 1 : sizeof(float); }
+
+static void put_units(Hdf5Type type, void *values, size_t i, int32_t units, double unit)
+{
+    double value = fabs((double)units) < MOTION_MOST ? units * unit : copysign(INFINITY, units);
+    if (type == HDF5_DOUBLE)
+        ((double *)values)[i] = value;
+    else if (type == HDF5_FLOAT)
+        ((float *)values)[i] = (float)value;
+    else if (type == HDF5_INT32)
+        ((int32_t *)values)[i] = units;
+    else
+        ((int8_t *)values)[i] = (int8_t)units;
+}
+
+// Sums up the changes. Of a frame they are (parts, nodes), its values (nodes, parts).
+static void add_up(const uint32_t *change, uint64_t frames, uint64_t nodes, uint64_t parts, Hdf5Type type, double unit, uint32_t *now, void *values)
+{
+    for (uint64_t k = 0; k < frames; k++)
+        for (uint64_t part = 0; part < parts; part++)
+            for (uint64_t node = 0; node < nodes; node++) {
+                uint32_t moved = *change++, *at = &now[part * nodes + node];
+                *at += moved >> 1 ^ (moved & 1 ? UINT32_MAX : 0);
+                put_units(type, values, (k * nodes + node) * parts + part, (int32_t)*at, unit);
+            }
+}
+
+// The frames' dataset `name` as motion has it: `shape` as of read_dataset. NULL with a fault.
+static void *read_motion(const Reader *reader, const char *name, Hdf5Type type, int rank, uint64_t *shape)
+{
+    char path[64];
+    uint64_t changes[3] = {0, rank == 3 ? shape[2] : shape[1], shape[1]};
+    snprintf(path, sizeof path, "/motion%s", name);
+    uint32_t *change = read_dataset(reader, path, HDF5_UINT32, rank, changes);
+    if (!change)
+        return NULL;
+    shape[0] = changes[0];
+    if (rank > 1)
+        shape[1] = changes[rank - 1];
+    uint64_t nodes = rank > 1 ? shape[1] : 1, parts = rank == 3 ? changes[1] : 1;
+    if (changes[0] == 0)     // a shape without values promises nothing
+        nodes = 0;
+    uint32_t *now = calloc(nodes * parts + 1, sizeof *now);
+    void *values = calloc(changes[0] * nodes * parts + 1, bytes_of(type));
+    if (now && values) {
+        add_up(change, changes[0], nodes, parts, type, unit_of(reader, name), now, values);
+    } else {
+        faults_add(reader->faults, reader->path, 0, 0, "%s needs more memory than there is", path);
+        free(values);
+        values = NULL;
+    }
+    free(now);
+    free(change);
+    return values;
+}
+
+// What is there once a frame.
+static void *read_frames_of(const Reader *reader, const char *name, Hdf5Type type, int rank, uint64_t *shape)
+{
+    return reader->has_motion ? read_motion(reader, name, type, rank, shape) : read_dataset(reader, name, type, rank, shape);
+}
 
 // --- several tools ---
 
@@ -129,9 +208,9 @@ static int64_t read_tool_frames(const Reader *reader, const char *group, bool is
     tool->radius = read_dataset(reader, name[1], HDF5_DOUBLE, rank, radius);
     uint64_t nodes = s[rank - 1], devices = is_exchanged ? s[0] : 1;
     position[1] = quaternion[1] = carrier[1] = nodes;
-    tool->position = read_dataset(reader, name[2], HDF5_DOUBLE, 3, position);
-    tool->quaternion = read_dataset(reader, name[3], HDF5_DOUBLE, 3, quaternion);
-    tool->carrier = read_dataset(reader, name[4], HDF5_INT8, 2, carrier);
+    tool->position = read_frames_of(reader, name[2], HDF5_DOUBLE, 3, position);
+    tool->quaternion = read_frames_of(reader, name[3], HDF5_DOUBLE, 3, quaternion);
+    tool->carrier = read_frames_of(reader, name[4], HDF5_INT8, 2, carrier);
     if (nodes < 2 || nodes > 100000 || radius[rank - 1] != nodes || radius[0] != s[0]) {
         faults_add(reader->faults, reader->path, 0, 0, "%s holds %llu nodes and %llu radii; 2 to 100000 of each", group, (unsigned long long)nodes,
                    (unsigned long long)radius[rank - 1]);
@@ -197,9 +276,9 @@ static int64_t read_series(const Reader *reader, RecordedRun *run)
 static int64_t read_tools_frames(const Reader *reader, uint64_t nodes, RecordedRun *run)
 {
     uint64_t count[1] = {0}, s[2] = {0, nodes}, radius[2] = {0, nodes};
-    run->frame_nodes = read_dataset(reader, "/wire/count", HDF5_INT32, 1, count);
-    run->s = read_dataset(reader, "/wire/s_mm", HDF5_DOUBLE, 2, s);
-    run->radius = read_dataset(reader, "/wire/radius_mm", HDF5_DOUBLE, 2, radius);
+    run->frame_nodes = read_frames_of(reader, "/wire/count", HDF5_INT32, 1, count);
+    run->s = read_frames_of(reader, "/wire/s_mm", HDF5_DOUBLE, 2, s);
+    run->radius = read_frames_of(reader, "/wire/radius_mm", HDF5_DOUBLE, 2, radius);
     int64_t frames = least(least((int64_t)count[0], s[0]), radius[0]);
     for (int k = 0; k < run->tool_count; k++) {
         char group[GROUP_NAME];
@@ -275,17 +354,31 @@ static void check_frames(const Reader *reader, const RecordedRun *run)
             }
 }
 
-static void read_frames(const Reader *reader, RecordedRun *run)
+// Motion has numbers where there is no node: what it had last.
+static void clear_beyond(RecordedRun *run)
 {
+    for (int64_t k = 0; run->frame_nodes && k < run->frame_count; k++)
+        for (int64_t i = k * run->node_count + run->frame_nodes[k]; i < (k + 1) * run->node_count; i++) {
+            run->position[i] = vec3(NAN, NAN, NAN);
+            run->quaternion[i] = (Quat){NAN, NAN, NAN, NAN};
+            run->force[3 * i] = run->force[3 * i + 1] = run->force[3 * i + 2] = run->gap[i] = NAN;
+            run->vessel_node[i] = -1;
+            run->s[i] = run->radius[i] = NAN;
+        }
+}
+
+static void read_frames(Reader *reader, RecordedRun *run)
+{
+    reader->has_motion = has(reader, "/motion");
     int before = reader->faults->count;
     uint64_t step[1] = {0}, position[3] = {0, 0, 3}, quaternion[3] = {0, 0, 4}, force[3] = {0, 0, 3}, gap[2] = {0, 0}, node[2] = {0, 0};
-    run->frame_step = read_dataset(reader, "/wire/step", HDF5_INT64, 1, step);
-    run->position = read_dataset(reader, "/wire/position", HDF5_DOUBLE, 3, position);
+    run->frame_step = read_dataset(reader, reader->has_motion ? "/motion/wire/step" : "/wire/step", HDF5_INT64, 1, step);
+    run->position = read_frames_of(reader, "/wire/position", HDF5_DOUBLE, 3, position);
     quaternion[1] = force[1] = gap[1] = node[1] = position[1];
-    run->quaternion = read_dataset(reader, "/wire/quaternion", HDF5_DOUBLE, 3, quaternion);
-    run->force = read_dataset(reader, "/contact/force_n", HDF5_FLOAT, 3, force);
-    run->gap = read_dataset(reader, "/contact/gap_mm", HDF5_FLOAT, 2, gap);
-    run->vessel_node = read_dataset(reader, "/contact/vessel_node", HDF5_INT32, 2, node);
+    run->quaternion = read_frames_of(reader, "/wire/quaternion", HDF5_DOUBLE, 3, quaternion);
+    run->force = read_frames_of(reader, "/contact/force_n", HDF5_FLOAT, 3, force);
+    run->gap = read_frames_of(reader, "/contact/gap_mm", HDF5_FLOAT, 2, gap);
+    run->vessel_node = read_frames_of(reader, "/contact/vessel_node", HDF5_INT32, 2, node);
     if (reader->faults->count == before && (position[1] < 2 || position[1] > 100000))
         faults_add(reader->faults, reader->path, 0, 0, "holds %llu nodes; 2 to 100000", (unsigned long long)position[1]);
     if (reader->faults->count > before)
@@ -298,6 +391,8 @@ static void read_frames(const Reader *reader, RecordedRun *run)
     while (run->frame_count > 0 && run->frame_step[run->frame_count - 1] >= run->step_count)
         run->frame_count--;
     check_frames(reader, run);
+    if (reader->faults->count == before && reader->has_motion)
+        clear_beyond(run);
     if (reader->faults->count == before)
         check_numbers(reader, run);
 }

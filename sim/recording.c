@@ -15,20 +15,28 @@
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
+#include <zlib.h>
 
-enum { STEP_RING = 4096, FRAME_RING = 128, MOST_STEP_ROWS = 32768, FRAME_CHUNK_BYTES = 8 << 20 };
+enum { STEP_RING = 4096, FRAME_RING = 128, LEVEL_OF_SESSIONS = 6, LEVEL_OF_RUNS = 1 /* they may go many times as fast, and what is exact hardly packs better */ };
 
-// A dataset's chunk index is one node that never splits: twice as many chunks as this. Known: 256 times what is expected; unknown: hours.
-enum { HALF_RANK_KNOWN = 128, HALF_RANK_UNKNOWN = 2048 };
+// What the values of a session's recording are rounded to: powers of two, so that rounding is exact and the rest of a double is zeros.
+static const double length_grid_mm = 1.0 / 256, turn_grid = 1.0 / 1024, node_force_grid_n = 1.0 / 4096, radius_grid_mm = 1.0 / 1024,
+                    figure_grid = 1.0 / 16384 /* of step figures in mm, N and N mm */, eight_bits = -8 /* of each value */;
 
-// A dataset that grows by rows, with its ring.
+// A dataset that grows by rows; its rows wait in a ring, then in a chunk.
 typedef struct Column {
-    char name[40];
+    char name[48];
     int rank;                // of a row: 0 scalar, 1, 2
     hsize_t shape[2];
-    size_t row_bytes;
-    unsigned char *ring;     // (ring length, row_bytes)
+    size_t value_bytes, row_bytes;
+    double grid;             // values are rounded to its multiples; 0: stay as they are; < 0: keep as many bits
+    unsigned char *ring;     // (ring length, row_bytes); NULL where rows come from another column
+    unsigned char *chunk;    // (chunk_rows, row_bytes)
+    hsize_t chunk_rows, rows;        // rows: taken so far
+    int32_t *before;         // of motion: the last row, in units
     hid_t type, dataset;
+    haddr_t header;
+    int set;                 // of the ordered file
 } Column;
 
 // What each tool has in every step comes first: the first tool's stands at the root, that of the others behind all else.
@@ -49,7 +57,6 @@ typedef struct Ring {
     int length, column_count;
     Column *column;
     atomic_llong head, tail;
-    hsize_t chunk_rows;
 } Ring;
 
 struct Recording {
@@ -62,11 +69,15 @@ struct Recording {
     NodeReport *node;        // (M) scratch of the simulation thread
     ToolNode *own;           // of a tool's nodes, the same
     int64_t frame_every, last_frame_step;
-    Column step_column[MOST_STEP_COLUMNS], frame_column[MOST_FRAME_COLUMNS];
+    int64_t key_every;       // how many of a session's poses make a frame; 0: no session, each is a frame
+    Column step_column[MOST_STEP_COLUMNS], frame_column[MOST_FRAME_COLUMNS], motion_column[MOST_FRAME_COLUMNS];
     Ring steps, frames;
-    hid_t file;
-    OrderedFile *ordered;
-    int half_rank;           // of the chunk indices
+    hid_t file;              // while it is built
+    OrderedFile *ordered;    // afterwards
+    int half_fan;            // of the chunk indices
+    unsigned char *shuffled, *packed;        // scratch of the writer, for the largest chunk
+    size_t packed_bytes;
+    hsize_t stated_steps;    // of the last flush
     bool named;              // renamed to its path
     pthread_t writer;
     bool started;
@@ -75,6 +86,7 @@ struct Recording {
 };
 
 RecordingOptions recording_default_options(void) { return (RecordingOptions){.frame_ms = 10, .flush_s = 0.2}; }
+RecordingOptions recording_session_options(void) { return (RecordingOptions){.frame_ms = 1000, .pose_ms = 10, .flush_s = 0.2}; }
 
 void recording_prepare_process(void)
 {
@@ -90,7 +102,8 @@ static Column column_of(const char *group, const char *name, hid_t type, int ran
 {
     Column column = {.type = type, .rank = rank, .shape = {first, second}, .dataset = -1};
     snprintf(column.name, sizeof column.name, "%s/%s", group, name);
-    column.row_bytes = H5Tget_size(type) * (size_t)first * (size_t)second;
+    column.value_bytes = H5Tget_size(type);
+    column.row_bytes = column.value_bytes * (size_t)first * (size_t)second;
     return column;
 }
 
@@ -148,33 +161,79 @@ static void describe_columns(Recording *recording)
         step[exchange_column(recording)] = column_of("", "exchange", H5T_NATIVE_UINT8, 2, (hsize_t)recording->tool_count, 2);
 }
 
-static bool make_ring(Ring *ring, int length, int column_count, Column *column, hsize_t chunk_rows)
+// What the columns of a session are rounded to; of frames also the units of motion.
+static void round_columns(Recording *recording)
+{
+    Column *step = recording->step_column, *frame = recording->frame_column;
+    step[PENETRATION].grid = step[WALL_FORCE].grid = figure_grid;
+    step[RESIDUAL].grid = eight_bits;
+    frame[POSITION].grid = frame[GAP].grid = frame[ARC].grid = length_grid_mm;
+    frame[QUATERNION].grid = turn_grid;
+    frame[FORCE].grid = node_force_grid_n;
+    frame[RADIUS].grid = radius_grid_mm;
+    for (int k = 0; k < recording->tool_count; k++) {
+        step[step_column_of(k, PROXIMAL)].grid = step[step_column_of(k, INSERTED)].grid = figure_grid;
+        frame[frame_column_of(k, OWN_POSITION)].grid = length_grid_mm;
+        frame[frame_column_of(k, OWN_QUATERNION)].grid = turn_grid;
+    }
+}
+
+// Each of a frame's columns has one of the same name below /motion: its changes, each coordinate's values side by side.
+static void describe_motion(Recording *recording)
+{
+    for (int i = 0; i < frame_columns(recording); i++) {
+        const Column *from = &recording->frame_column[i];
+        Column *to = &recording->motion_column[i];
+        const char *name = from->name;
+        *to = i == FRAME_STEP ? column_of("/motion", name + 1, from->type, 0, 1, 1)
+                              : column_of("/motion", name + 1, H5T_STD_U32LE, from->rank, from->shape[from->rank == 2], from->shape[from->rank != 2]);
+    }
+}
+
+static bool make_ring(Ring *ring, int length, int column_count, Column *column)
 {
     ring->length = length;
     ring->column_count = column_count;
     ring->column = column;
-    ring->chunk_rows = chunk_rows;
     for (int i = 0; i < column_count; i++)
         if (!(column[i].ring = calloc((size_t)length, column[i].row_bytes)))
             return false;
     return true;
 }
 
-static bool create_dataset(hid_t file, Column *column, hsize_t chunk_rows)
+static bool make_chunks(Recording *recording, Column *column, int count, hsize_t chunk_rows)
+{
+    bool good = true;
+    for (int i = 0; good && i < count; i++) {
+        size_t bytes = column[i].row_bytes * chunk_rows;
+        column[i].chunk_rows = chunk_rows;
+        column[i].chunk = calloc(1, bytes);
+        column[i].before = calloc(column[i].row_bytes / column[i].value_bytes, sizeof *column->before);
+        good = column[i].chunk && column[i].before;
+        recording->packed_bytes = bytes > recording->packed_bytes ? bytes : recording->packed_bytes;
+    }
+    return good;
+}
+
+static bool create_dataset(hid_t file, Column *column)
 {
     hsize_t none[3] = {0, column->shape[0], column->shape[1]}, most[3] = {H5S_UNLIMITED, column->shape[0], column->shape[1]};
-    hsize_t chunk[3] = {chunk_rows, column->shape[0], column->shape[1]};
+    hsize_t chunk[3] = {column->chunk_rows, column->shape[0], column->shape[1]};
+    H5O_info_t info;
     hid_t space = H5Screate_simple(column->rank + 1, none, most), creation = H5Pcreate(H5P_DATASET_CREATE), access = H5Pcreate(H5P_DATASET_ACCESS);
     H5Pset_chunk(creation, column->rank + 1, chunk);
+    H5Pset_shuffle(creation);
+    H5Pset_deflate(creation, LEVEL_OF_SESSIONS);
     H5Pset_fill_time(creation, H5D_FILL_TIME_NEVER);
     H5Pset_obj_track_times(creation, false);
-    H5Pset_chunk_cache(access, 0, 0, 0);
     H5Pset_dset_no_attrs_hint(creation, true);   // small headers: all of them share a page
     column->dataset = H5Dcreate_anon(file, column->type, space, creation, access);
     H5Pclose(access);
     H5Pclose(creation);
     H5Sclose(space);
-    return column->dataset >= 0;
+    bool good = column->dataset >= 0 && H5Oget_info(column->dataset, &info) >= 0;
+    column->header = good ? info.addr : HADDR_UNDEF;
+    return good;
 }
 
 static bool write_text(hid_t place, const char *attribute, const char *dataset, const char *text)
@@ -343,45 +402,47 @@ static bool write_scene(Recording *recording, const Scene *scene)
 static bool open_part(Recording *recording)
 {
     hid_t creation = H5Pcreate(H5P_FILE_CREATE), access = H5Pcreate(H5P_FILE_ACCESS);
-    H5Pset_istore_k(creation, (unsigned)recording->half_rank);
+    H5Pset_istore_k(creation, (unsigned)recording->half_fan);
     H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
     H5Pset_file_locking(access, false, true);
     recording->file = ordered_file_create(recording->part.name, creation, access);
-    recording->ordered = recording->file >= 0 ? ordered_file_of(recording->file) : NULL;
     H5Pclose(access);
     H5Pclose(creation);
-    return recording->ordered != NULL;
+    return recording->file >= 0;
 }
 
-static bool create_ring_datasets(Recording *recording, Ring *ring)
+static bool create_all(hid_t file, Column *column, int count)
 {
     bool good = true;
-    for (int i = 0; good && i < ring->column_count; i++)
-        good = create_dataset(recording->file, &ring->column[i], ring->chunk_rows);
+    for (int i = 0; good && i < count; i++)
+        good = create_dataset(file, &column[i]);
     return good;
 }
 
-static bool link_ring_datasets(Recording *recording, const Ring *ring)
+static bool link_all(hid_t file, const Column *column, int count)
 {
     bool good = true;
-    for (int i = 0; good && i < ring->column_count; i++)
-        good = H5Olink(ring->column[i].dataset, recording->file, ring->column[i].name, H5P_DEFAULT, H5P_DEFAULT) >= 0;
+    for (int i = 0; good && i < count; i++)
+        good = H5Olink(column[i].dataset, file, column[i].name, H5P_DEFAULT, H5P_DEFAULT) >= 0;
     return good;
 }
+
+static int motion_columns(const Recording *recording) { return recording->key_every > 0 ? frame_columns(recording) : 0; }
 
 // Made without names one after the other, so that their headers lie side by side; then named.
 static bool create_datasets(Recording *recording)
 {
-    ordered_file_start_page(recording->ordered);
-    bool good = create_ring_datasets(recording, &recording->steps);
-    if (has_several(recording))
-        ordered_file_start_page(recording->ordered);     // those of both kinds do not fit one page
-    good = good && create_ring_datasets(recording, &recording->frames);
-    good = good && link_ring_datasets(recording, &recording->steps) && link_ring_datasets(recording, &recording->frames);
+    hid_t file = recording->file;
+    int steps = step_columns(recording), frames = frame_columns(recording), motions = motion_columns(recording);
+    ordered_file_start_page(file);
+    bool good = create_all(file, recording->step_column, steps);
+    ordered_file_start_page(file);
+    good = good && create_all(file, recording->frame_column, frames) && create_all(file, recording->motion_column, motions);
+    good = good && link_all(file, recording->step_column, steps) && link_all(file, recording->frame_column, frames) && link_all(file, recording->motion_column, motions);
     for (int i = 0; good && has_several(recording) && i < TOOL_STEP_COLUMNS; i++) {
         char name[40];
         snprintf(name, sizeof name, "/tools/0/%s", tool_step_name[i]);
-        good = H5Olink(recording->step_column[i].dataset, recording->file, name, H5P_DEFAULT, H5P_DEFAULT) >= 0;
+        good = H5Olink(recording->step_column[i].dataset, file, name, H5P_DEFAULT, H5P_DEFAULT) >= 0;
     }
     return good;
 }
@@ -392,17 +453,31 @@ static bool create_group(hid_t file, const char *name)
     return group >= 0 && H5Gclose(group) >= 0;
 }
 
-static bool create_groups(const Recording *recording)
+static bool create_groups(const Recording *recording, const char *above)
 {
-    bool good = create_group(recording->file, "/wire") && create_group(recording->file, "/contact") && create_group(recording->file, "/report");
+    static const char *const always[] = {"/wire", "/contact", "/report"};
+    char group[48];
+    bool good = true;
+    for (int i = 0; good && i < 3; i++) {
+        snprintf(group, sizeof group, "%s%s", above, always[i]);
+        good = (*above && i == 2) || create_group(recording->file, group);
+    }
+    snprintf(group, sizeof group, "%s/tools", above);
     if (has_several(recording))
-        good = good && create_group(recording->file, "/tools");
+        good = good && create_group(recording->file, group);
     for (int k = 0; good && has_several(recording) && k < recording->tool_count; k++) {
-        char group[GROUP_NAME];
-        tool_group(k, group);
+        snprintf(group, sizeof group, "%s/tools/%d", above, k);
         good = create_group(recording->file, group);
     }
     return good;
+}
+
+static bool create_motion(const Recording *recording)
+{
+    hid_t file = recording->file;
+    return recording->key_every == 0 || (create_group(file, "/motion") && create_groups(recording, "/motion") && write_number(file, "motion_ms", recording->options.pose_ms) &&
+                                         write_number(file, "motion_length_mm", length_grid_mm) && write_number(file, "motion_turn", turn_grid) &&
+                                         write_number(file, "motion_force_n", node_force_grid_n) && write_number(file, "motion_radius_mm", radius_grid_mm));
 }
 
 static bool build_file(Recording *recording, const Scene *scene)
@@ -410,63 +485,190 @@ static bool build_file(Recording *recording, const Scene *scene)
     if (!open_part(recording))
         return false;
     hid_t file = recording->file;
-    bool good = write_text(file, "format", NULL, "seldinger-recording") && write_number(file, "version", 1) &&
+    bool good = write_text(file, "format", NULL, "seldinger-recording") && write_number(file, "version", 2) &&
                 write_text(file, "created_by", NULL, "seldinger " SELDINGER_VERSION) && write_number(file, "step_ms", scene->dt) &&
                 write_number(file, "frame_ms", recording->options.frame_ms);
-    return good && create_groups(recording) && create_datasets(recording) && write_tools(recording, scene) && write_scene(recording, scene);
+    return good && create_groups(recording, "") && create_motion(recording) && create_datasets(recording) && write_tools(recording, scene) && write_scene(recording, scene);
 }
 
 // --- the writer's thread ---
 
-static bool append_rows(Column *column, hsize_t from, hsize_t count, const void *data)
+// As the filter `shuffle` has it: the first bytes of all values, then the second ones …
+static void shuffle(const unsigned char *from, size_t count, size_t value_bytes, unsigned char *to)
 {
-    hsize_t extent[3] = {from + count, column->shape[0], column->shape[1]}, start[3] = {from, 0, 0}, size[3] = {count, column->shape[0], column->shape[1]};
-    if (H5Dset_extent(column->dataset, extent) < 0)
-        return false;
-    hid_t target = H5Dget_space(column->dataset), memory = H5Screate_simple(column->rank + 1, size, NULL);
-    bool good = H5Sselect_hyperslab(target, H5S_SELECT_SET, start, NULL, size, NULL) >= 0 &&
-                H5Dwrite(column->dataset, column->type, memory, target, H5P_DEFAULT, data) >= 0;
-    H5Sclose(memory);
-    H5Sclose(target);
+    for (size_t byte = 0; byte < value_bytes; byte++)
+        for (size_t i = 0; i < count; i++)
+            *to++ = from[i * value_bytes + byte];
+}
+
+static bool pack_chunk(Recording *recording, const Column *column)
+{
+    size_t bytes = column->chunk_rows * column->row_bytes;
+    uLongf length = compressBound(recording->packed_bytes);
+    shuffle(column->chunk, bytes / column->value_bytes, column->value_bytes, recording->shuffled);
+    return compress2(recording->packed, &length, recording->shuffled, bytes, recording->key_every > 0 ? LEVEL_OF_SESSIONS : LEVEL_OF_RUNS) == Z_OK &&
+           ordered_file_append(recording->ordered, column->set, recording->packed, length);
+}
+
+static double rounded(double value, double grid)
+{
+    int exponent;
+    if (grid > 0 || value == 0 || !isfinite(value))
+        return grid > 0 ? rint(value / grid) * grid : value;
+    frexp(value, &exponent);
+    double unit = ldexp(1, exponent + (int)grid);
+    return rint(value / unit) * unit;
+}
+
+static void round_row(const Column *column, unsigned char *row)
+{
+    size_t count = column->row_bytes / column->value_bytes;
+    for (size_t i = 0; i < count && column->value_bytes == sizeof(double); i++)
+        ((double *)(void *)row)[i] = rounded(((double *)(void *)row)[i], column->grid);
+    for (size_t i = 0; i < count && column->value_bytes == sizeof(float); i++)
+        ((float *)(void *)row)[i] = (float)rounded((double)((float *)(void *)row)[i], column->grid);
+}
+
+// The place of the next row.
+static unsigned char *next_row(const Column *column) { return column->chunk + column->rows % column->chunk_rows * column->row_bytes; }
+
+static bool end_row(Recording *recording, Column *column) { return ++column->rows % column->chunk_rows != 0 || pack_chunk(recording, column); }
+
+static bool take_row(Recording *recording, Column *column, const unsigned char *row)
+{
+    unsigned char *to = next_row(column);
+    memcpy(to, row, column->row_bytes);
+    if (column->grid != 0)
+        round_row(column, to);
+    return end_row(recording, column);
+}
+
+// A value in units. What is no number, the node not being there, is as the node before it: then it costs nothing, and comes from nearby.
+static int32_t in_units(const Column *column, const unsigned char *row, size_t i, int32_t otherwise)
+{
+    double value = column->value_bytes == 1                 ? (double)((const int8_t *)row)[i]
+                   : column->grid == 0                      ? (double)((const int32_t *)(const void *)row)[i]
+                   : column->value_bytes == sizeof(double) ? ((const double *)(const void *)row)[i] / column->grid
+                                                            : (double)((const float *)(const void *)row)[i] / column->grid;
+    return isnan(value) ? otherwise : (int32_t)fmax(-MOTION_MOST, fmin(MOTION_MOST, rint(value)));
+}
+
+// Changes since the row before, as whole numbers without a sign: 0, -1, 1, -2, 2 … are 0, 1, 2, 3, 4 …
+static bool take_motion(Recording *recording, const Column *from, Column *to, const unsigned char *row)
+{
+    uint32_t *change = (uint32_t *)(void *)next_row(to);
+    size_t parts = from->rank == 2 ? from->shape[1] : 1, nodes = from->rank == 0 ? 1 : from->shape[0];
+    for (size_t part = 0; part < parts; part++)
+        for (size_t node = 0; node < nodes; node++) {
+            size_t at = part * nodes + node;
+            int32_t now = in_units(from, row, node * parts + part, node > 0 ? to->before[at - 1] : 0);
+            uint32_t moved = (uint32_t)now - (uint32_t)to->before[at];
+            to->before[at] = now;
+            change[at] = moved << 1 ^ (moved >> 31 ? UINT32_MAX : 0);
+        }
+    return end_row(recording, to);
+}
+
+static const unsigned char *row_in_ring(const Ring *ring, const Column *column, long long row)
+{
+    return column->ring + (size_t)(row % ring->length) * column->row_bytes;
+}
+
+static bool take_steps(Recording *recording, long long row)
+{
+    const Ring *ring = &recording->steps;
+    bool good = true;
+    for (int i = 0; good && i < ring->column_count; i++)
+        good = take_row(recording, &ring->column[i], row_in_ring(ring, &ring->column[i], row));
     return good;
 }
 
-static bool drain(Ring *ring, long long head)
+// Of a session each pose is one of motion; each so many a frame too.
+static bool take_frame(Recording *recording, long long row)
 {
-    long long tail = atomic_load_explicit(&ring->tail, memory_order_relaxed);
-    while (tail < head) {
-        // up to the end of the ring, where the rows stop being contiguous
-        long long slot = tail % ring->length, part = ring->length - slot < head - tail ? ring->length - slot : head - tail;
-        for (int i = 0; i < ring->column_count; i++) {
-            Column *column = &ring->column[i];
-            if (!append_rows(column, (hsize_t)tail, (hsize_t)part, column->ring + (size_t)slot * column->row_bytes))
-                return false;
-        }
-        tail += part;
-        atomic_store_explicit(&ring->tail, tail, memory_order_release);
+    const Ring *ring = &recording->frames;
+    bool good = true, is_key = recording->key_every == 0 || row % recording->key_every == 0;
+    for (int i = 0; good && i < ring->column_count; i++) {
+        Column *frame = &ring->column[i], *motion = &recording->motion_column[i];
+        const unsigned char *values = row_in_ring(ring, frame, row);
+        if (recording->key_every > 0)
+            good = i == FRAME_STEP ? take_row(recording, motion, values) : take_motion(recording, frame, motion, values);
+        good = good && (!is_key || take_row(recording, frame, values));
     }
-    return true;
+    return good;
 }
 
-// Of a chunk of each column.
-static hsize_t chunk_bytes(const Ring *ring)
+static void set_tail(Ring *ring, long long tail) { atomic_store_explicit(&ring->tail, tail, memory_order_release); }
+
+static bool drain(Recording *recording, long long steps, long long frames)
 {
-    hsize_t bytes = 0;
-    for (int i = 0; i < ring->column_count; i++)
-        bytes += ring->chunk_rows * ring->column[i].row_bytes + 8;
-    return bytes;
+    bool good = true;
+    for (long long i = atomic_load_explicit(&recording->steps.tail, memory_order_relaxed); good && i < steps; i++) {
+        good = take_steps(recording, i);
+        set_tail(&recording->steps, i + 1);
+    }
+    for (long long i = atomic_load_explicit(&recording->frames.tail, memory_order_relaxed); good && i < frames; i++) {
+        good = take_frame(recording, i);
+        set_tail(&recording->frames, i + 1);
+    }
+    return good;
 }
 
-static bool flush(Recording *recording)
+// The step, from 0, that a row of a column shows, where `every` steps lie between two rows.
+static hsize_t step_of(hsize_t row, int64_t every) { return row == 0 ? 0 : row * (hsize_t)every - 1; }
+
+// How many rows of whole chunks show steps before `steps`.
+static hsize_t whole_rows(const Column *column, int64_t every, hsize_t steps)
 {
-    if (H5Fflush(recording->file, H5F_SCOPE_LOCAL) < 0)
+    hsize_t rows = column->rows / column->chunk_rows * column->chunk_rows;
+    while (rows > 0 && step_of(rows - 1, every) >= steps)
+        rows -= column->chunk_rows;
+    return rows;
+}
+
+static void state_rows(const Recording *recording, const Column *column, int count, hsize_t rows)
+{
+    for (int i = 0; i < count; i++)
+        ordered_file_set_rows(recording->ordered, column[i].set, rows);
+}
+
+// The chunk that has begun, with what it has.
+static bool end_chunks(Recording *recording, Column *column, int count)
+{
+    bool good = true;
+    for (int i = 0; good && i < count; i++) {
+        size_t used = column[i].rows % column[i].chunk_rows * column[i].row_bytes;
+        memset(column[i].chunk + used, 0, column[i].chunk_rows * column[i].row_bytes - used);
+        good = used == 0 || pack_chunk(recording, &column[i]);
+    }
+    return good;
+}
+
+static bool name_file(Recording *recording)
+{
+    recording->named = recording->named || part_file_finish(&recording->part);
+    return recording->named;
+}
+
+// States the rows of all whole chunks, in the end of those begun too. Nothing to be done where there is no further one.
+static bool flush(Recording *recording, bool is_last)
+{
+    Column *step = recording->step_column, *frame = recording->frame_column, *motion = recording->motion_column;
+    int steps = step_columns(recording), frames = frame_columns(recording), motions = motion_columns(recording);
+    int64_t key_every = recording->key_every > 0 ? recording->key_every : 1;
+    if (is_last && !(end_chunks(recording, step, steps) && end_chunks(recording, frame, frames) && end_chunks(recording, motion, motions)))
         return false;
-    if (recording->named)
-        return ordered_file_commit(recording->ordered);
-    hsize_t ahead = 2 * (chunk_bytes(&recording->steps) + chunk_bytes(&recording->frames));
-    if (!ordered_file_seal(recording->ordered, 2 * recording->half_rank, ahead) || !part_file_finish(&recording->part))
+    hsize_t step_rows = is_last ? step->rows : step->rows / step->chunk_rows * step->chunk_rows;
+    hsize_t frame_rows = is_last ? frame->rows : whole_rows(frame, recording->frame_every * key_every, step_rows);
+    hsize_t motion_rows = motions == 0 ? 0 : is_last ? motion->rows : whole_rows(motion, recording->frame_every, step_rows);
+    if (!is_last && (step_rows == recording->stated_steps || frame_rows == 0 || (motions > 0 && motion_rows == 0)))
+        return true;
+    state_rows(recording, step, steps, step_rows);
+    state_rows(recording, frame, frames, frame_rows);
+    state_rows(recording, motion, motions, motion_rows);
+    if (!ordered_file_commit(recording->ordered) || !name_file(recording))
         return false;
-    recording->named = true;
+    recording->stated_steps = step_rows;
     return true;
 }
 
@@ -483,7 +685,6 @@ static void *write_rings(void *argument)
 {
     Recording *recording = argument;
     int64_t flushed = 0;
-    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);   // each thread has its own
     for (bool last = false; !last;) {
         last = atomic_load(&recording->finish);
         if (atomic_load(&recording->abandoned))
@@ -492,14 +693,14 @@ static void *write_rings(void *argument)
         long long frames = atomic_load_explicit(&recording->frames.head, memory_order_acquire);
         long long steps = atomic_load_explicit(&recording->steps.head, memory_order_acquire);
         errno = 0;
-        bool good = drain(&recording->steps, steps) && drain(&recording->frames, frames);
-        if (good && (last || (frames > 0 && (double)(now_ns() - flushed) >= recording->options.flush_s * 1e9))) {
-            good = flush(recording);
+        bool good = drain(recording, steps, frames);
+        if (good && (last || (double)(now_ns() - flushed) >= recording->options.flush_s * 0.5e9)) {
+            good = flush(recording, last);
             flushed = now_ns();
         }
         if (!good) {
             const char *fault = ordered_file_fault(recording->ordered);
-            snprintf(recording->reason, sizeof recording->reason, "%s", fault ? fault : errno ? strerror(errno) : "the HDF5 library could not write");
+            snprintf(recording->reason, sizeof recording->reason, "%s", fault ? fault : errno ? strerror(errno) : "a chunk could not be packed");
             atomic_store(&recording->failed, true);
             break;
         }
@@ -642,12 +843,22 @@ bool recording_step(Recording *recording, Simulator *simulator, const ToolComman
     return step % recording->frame_every != 0 && step != 1 ? true : push_frame(recording, simulator);
 }
 
+static void free_columns(Column *column, int count)
+{
+    for (int i = 0; i < count; i++) {
+        free(column[i].ring);
+        free(column[i].chunk);
+        free(column[i].before);
+    }
+}
+
 static void recording_free(Recording *recording)
 {
-    for (int i = 0; i < MOST_STEP_COLUMNS; i++)
-        free(recording->step_column[i].ring);
-    for (int i = 0; i < MOST_FRAME_COLUMNS; i++)
-        free(recording->frame_column[i].ring);
+    free_columns(recording->step_column, MOST_STEP_COLUMNS);
+    free_columns(recording->frame_column, MOST_FRAME_COLUMNS);
+    free_columns(recording->motion_column, MOST_FRAME_COLUMNS);
+    free(recording->shuffled);
+    free(recording->packed);
     free(recording->node);
     free(recording->own);
     free(recording->path);
@@ -655,34 +866,84 @@ static void recording_free(Recording *recording)
     free(recording);
 }
 
-static bool close_datasets(const Ring *ring)
+static bool close_datasets(Column *column, int count)
 {
     bool good = true;
-    for (int i = 0; i < ring->column_count; i++)
-        good &= ring->column[i].dataset < 0 || H5Dclose(ring->column[i].dataset) >= 0;
+    for (int i = 0; i < count; i++) {
+        good &= column[i].dataset <= 0 || H5Dclose(column[i].dataset) >= 0;
+        column[i].dataset = -1;
+    }
     return good;
 }
 
-static bool close_file(Recording *recording)
+// As the library builds it.
+static bool close_built(Recording *recording)
 {
-    bool good = close_datasets(&recording->steps) & close_datasets(&recording->frames);
-    return (recording->file < 0 || H5Fclose(recording->file) >= 0) && good;
+    bool good = close_datasets(recording->step_column, MOST_STEP_COLUMNS) & close_datasets(recording->frame_column, MOST_FRAME_COLUMNS) &
+                close_datasets(recording->motion_column, MOST_FRAME_COLUMNS);
+    good &= recording->file < 0 || H5Fclose(recording->file) >= 0;
+    recording->file = -1;
+    return good;
 }
 
-// One chunk for a run of known length, so that no unused tail is left; half the index holds what is expected, however long.
-static void size_chunks(Recording *recording, int64_t expected_steps, hsize_t *step_rows, hsize_t *frame_rows)
+static bool add_sets(Recording *recording, Column *column, int count)
 {
-    *step_rows = MOST_STEP_ROWS;
-    *frame_rows = (hsize_t)(FRAME_CHUNK_BYTES / recording->frame_column[POSITION].row_bytes) + 1;
-    recording->half_rank = HALF_RANK_UNKNOWN;
-    if (expected_steps <= 1)
-        return;
-    hsize_t steps = (hsize_t)expected_steps, frames = steps / (hsize_t)recording->frame_every + 2;
-    if (steps <= *step_rows * HALF_RANK_KNOWN && frames <= *frame_rows * HALF_RANK_KNOWN)
-        recording->half_rank = HALF_RANK_KNOWN;
-    hsize_t half = (hsize_t)recording->half_rank, most_steps = *step_rows, most_frames = *frame_rows;
-    *step_rows = steps < most_steps ? steps : most_steps > steps / half + 1 ? most_steps : steps / half + 1;
-    *frame_rows = frames < most_frames ? frames : most_frames > frames / half + 1 ? most_frames : frames / half + 1;
+    for (int i = 0; i < count; i++)
+        if ((column[i].set = ordered_file_add(recording->ordered, column[i].header, column[i].rank + 1, column[i].chunk_rows)) < 0)
+            return false;
+    return true;
+}
+
+static size_t chunk_bytes(const Column *column, int count)
+{
+    size_t bytes = 0;
+    for (int i = 0; i < count; i++)
+        bytes += column[i].chunk_rows * column[i].row_bytes;
+    return bytes;
+}
+
+// From here on it grows.
+static bool open_built(Recording *recording)
+{
+    enum { INDICES_AHEAD = 1 << 17, SHORT_STEPS = 10000 };
+    bool is_short = recording->options.expected_steps > 1 && recording->options.expected_steps < SHORT_STEPS;
+    size_t late = is_short ? 2 : 64;     // by how many chunks of each dataset a reader may be late
+    Column *step = recording->step_column, *frame = recording->frame_column, *motion = recording->motion_column;
+    int steps = step_columns(recording), frames = frame_columns(recording), motions = motion_columns(recording);
+    size_t ahead = late * (chunk_bytes(step, steps) + chunk_bytes(frame, frames) + chunk_bytes(motion, motions)) + INDICES_AHEAD;
+    recording->ordered = ordered_file_open(recording->part.name, recording->half_fan, ahead);
+    return recording->ordered && add_sets(recording, step, steps) && add_sets(recording, frame, frames) && add_sets(recording, motion, motions);
+}
+
+// A chunk lasts as long as a flush is to wait, so that a flush has whole ones alone. An index has room for four times what is expected, or for hours.
+static void size_chunks(Recording *recording, int64_t expected_steps, double dt, hsize_t *step_rows, hsize_t *frame_rows)
+{
+    static const int half_fans[] = {8, 24, 96, 256};
+    hsize_t due = (hsize_t)fmax(1, rint(recording->options.flush_s * 1000 / dt)), expected = expected_steps > 1 ? (hsize_t)expected_steps : 0;
+    const hsize_t most_chunks = 4 * 256 * 256;
+    *step_rows = expected > 0 && expected < due ? expected : due;
+    if (expected > 0 && 2 * expected / *step_rows > most_chunks)
+        *step_rows = 2 * expected / most_chunks + 1;
+    *frame_rows = *step_rows / (hsize_t)recording->frame_every;
+    *frame_rows = *frame_rows > 0 ? *frame_rows : 1;
+    hsize_t chunks = expected / *step_rows + 1, frames = expected / (hsize_t)recording->frame_every / *frame_rows + 2;
+    chunks = frames > chunks ? frames : chunks;
+    int i = expected > 0 ? 0 : 3;
+    while (i < 3 && 4 * (hsize_t)half_fans[i] * (hsize_t)half_fans[i] < 4 * chunks)
+        i++;
+    recording->half_fan = half_fans[i];
+}
+
+static bool make_buffers(Recording *recording, hsize_t step_rows, hsize_t frame_rows)
+{
+    bool good = make_ring(&recording->steps, STEP_RING, step_columns(recording), recording->step_column) &&
+                make_ring(&recording->frames, FRAME_RING, frame_columns(recording), recording->frame_column) &&
+                make_chunks(recording, recording->step_column, step_columns(recording), step_rows) &&
+                make_chunks(recording, recording->frame_column, frame_columns(recording), recording->key_every > 0 ? 1 : frame_rows) &&
+                make_chunks(recording, recording->motion_column, motion_columns(recording), frame_rows);
+    recording->shuffled = malloc(recording->packed_bytes);
+    recording->packed = malloc(compressBound(recording->packed_bytes));
+    return good && recording->shuffled && recording->packed;
 }
 
 Recording *recording_create(const char *path, Simulator *simulator, const RecordingOptions *options, Faults *faults)
@@ -708,22 +969,29 @@ Recording *recording_create(const char *path, Simulator *simulator, const Record
         recording->tool_nodes[k] = scene_most_nodes(scene, k);
         most_own = recording->tool_nodes[k] > most_own ? recording->tool_nodes[k] : most_own;
     }
-    recording->frame_every = (int64_t)fmax(1, floor(options->frame_ms / scene->dt + 0.5));
+    double every_ms = options->pose_ms > 0 ? options->pose_ms : options->frame_ms;
+    recording->frame_every = (int64_t)fmax(1, floor(every_ms / scene->dt + 0.5));
+    recording->key_every = options->pose_ms > 0 ? (int64_t)fmax(1, floor(options->frame_ms / options->pose_ms + 0.5)) : 0;
     describe_columns(recording);
+    if (recording->key_every > 0) {
+        round_columns(recording);
+        describe_motion(recording);
+    }
     hsize_t step_rows, frame_rows;
-    size_chunks(recording, options->expected_steps, &step_rows, &frame_rows);
+    size_chunks(recording, options->expected_steps, scene->dt, &step_rows, &frame_rows);
     recording->node = calloc((size_t)recording->node_count, sizeof *recording->node);
     recording->own = calloc((size_t)most_own, sizeof *recording->own);
-    bool good = recording->node && recording->own && make_ring(&recording->steps, STEP_RING, step_columns(recording), recording->step_column, step_rows) &&
-                make_ring(&recording->frames, FRAME_RING, frame_columns(recording), recording->frame_column, frame_rows);
+    bool good = recording->node && recording->own && make_buffers(recording, step_rows, frame_rows);
     errno = 0;
     good = good && part_file_begin(&recording->part, path) && build_file(recording, scene);
+    good = close_built(recording) && good && open_built(recording);
     int reason = errno;
     recording->started = good && pthread_create(&recording->writer, NULL, write_rings, recording) == 0;
     if (!recording->started) {
         faults_add(faults, path, 0, 0, "cannot be recorded: %s; a folder with write permission and free space is needed",
                    reason ? strerror(reason) : "the HDF5 library could not make the file");
-        close_file(recording);
+        if (recording->ordered)
+            ordered_file_close(recording->ordered, false);
         recording_free(recording);
         return NULL;
     }
@@ -738,14 +1006,13 @@ bool recording_close(Recording *recording, Simulator *simulator, Faults *faults)
     atomic_store(&recording->finish, true);
     pthread_join(recording->writer, NULL);
     bool failed = atomic_load(&recording->failed);
-    // after a failed write the library's view is ahead of the disk's: closing would publish rows that are not there
-    if (!failed && !close_file(recording)) {
+    if (!ordered_file_close(recording->ordered, !failed) && !failed) {
         failed = true;
         snprintf(recording->reason, sizeof recording->reason, "%s", strerror(errno));
     }
     if (failed) {
         faults_add(faults, recording->path, 0, 0, "recording stopped after %.3f s: %s; %s, free some space or record elsewhere",
-                   (double)atomic_load(&recording->steps.tail) * simulator_scene(simulator)->dt / 1000, recording->reason,
+                   (double)recording->stated_steps * simulator_scene(simulator)->dt / 1000, recording->reason,
                    recording->named ? "the file is whole up to its last flush" : "no file was made");
     }
     recording_free(recording);
@@ -758,7 +1025,7 @@ void recording_abandon(Recording *recording)
         return;
     atomic_store(&recording->abandoned, true);
     pthread_join(recording->writer, NULL);
-    close_file(recording);
+    ordered_file_close(recording->ordered, false);
     if (recording->named)
         unlink(recording->path);
     recording_free(recording);

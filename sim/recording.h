@@ -1,15 +1,25 @@
 // A run as an HDF5 file (shared/CONTRACT.md "Recording"): scalars of every step, the wire every 10 ms of simulated time.
 //
-// The simulation thread copies into rings; a thread of the recording's own drains them and flushes about every 0.2 s, so no step sees a file.
+// The simulation thread copies into rings; a thread of the recording's own drains them, packs whole chunks of 0.2 s (shuffle, then deflate; any HDF5 reader unpacks
+// them) and states them about as often, so no step sees a file.
 // The file opens in any HDF5 reader while it is written and after a kill, complete up to the last flush. How:
-//   - it is built beside and renamed once its first rows are flushed, so its structure is on the disk before it has its name;
-//   - after that datasets grow only, and a flush writes metadata in an order of which every prefix is a whole file (sim/ordered_file.h);
+//   - it is built beside and renamed once its first chunks are flushed, so its structure is on the disk before it has its name;
+//   - after that datasets grow only, by whole chunks, in an order of writes of which every prefix is a whole file (sim/ordered_file.h);
 //   - superblock version 1 and object headers of version 1: no checksums and no "open for writing" mark, so no figure depends on another's bytes;
-//   - the extents of all datasets lie in one page and change in one write: after a kill all have the S, and all the K, of the same flush.
-//     Of several tools those with S rows have one page and those with K another, written in this order: S may be one flush ahead of K.
-// Only a reader that opens the file while it is written can meet datasets of two flushes, as it reads one after the other: it takes the
-// least S and K, and of the frames those whose step is below S.
+//   - the extents of datasets that lie in one page change in one write: of a single tool all with S rows, and all with K or P. S is written first and may be one
+//     flush ahead of the others; of several tools those of a kind may lie in two pages, and differ by a flush.
+// A reader of a file that was killed, or is being written, takes the least S, K and P, and of the frames those whose step is below S.
 // After a failed write (full disk, full index) nothing more is written, the file stays as the last flush left it.
+//
+// Two kinds. A run's (`run --record`; recording_default_options) is exact, every value as the simulator has it. A session's (`nav`; recording_session_options) is small:
+// commands, times, state hashes and whole numbers are exact, so that each step can be simulated again to the bit; the rest is rounded, to multiples of 2^-14 in step
+// figures (mm, N, N mm; the residual to 8 bits) and 2^-8 mm, 2^-10 (quaternions), 2^-12 N in frames. Frames stand each second; between them /motion has poses (P)
+// each 10 ms: to each of the frames' datasets X a dataset /motion/X, as whole numbers: its change since the pose before, from zero, in the unit that the file's
+// attribute motion_length_mm (position, gap_mm, s_mm), motion_turn (quaternion), motion_force_n or motion_radius_mm says, else 1; 0, -1, 1, -2, 2 … stand as
+// 0, 1, 2, 3, 4 …, and the last two dimensions are exchanged: (P,M,3) is (P,3,M). With h5py:
+//   c = file["/motion/wire/position"][:].astype("i8")
+//   position = numpy.cumsum((c >> 1) ^ -(c & 1), axis=0).swapaxes(1, 2) * file.attrs["motion_length_mm"]
+// Values beyond 2^30 units are infinite; nodes that are not there (/wire/count) repeat another's; /motion/wire/step is the row itself.
 //
 // Rows: /time_s (S) time at the end of each step, /command (S,2), /proximal (S,2), /state_hash (S), /inserted_mm (S), /released (S) 1 where no hand holds the tool,
 // /xray (S,17: sim/xray.h; 16 in recordings from before contrast agent had a tool), /report/penetration_mm, contacts (with force), iterations
@@ -33,13 +43,18 @@
 
 typedef struct RecordingOptions {
     double frame_ms;         // simulated time between frames, default 10
-    double flush_s;          // wall time between flushes, default 0.2
+    double pose_ms;          // > 0, of a session: simulated time between its poses (/motion), of which some are frames; and all is rounded. Default 0: all is exact
+    double flush_s;          // simulated time in a chunk; flushes wait for whole ones, and half as long [wall time] at least. Default 0.2
     const char *trainee, *date;      // of a session (session_date()), else NULL
-    int64_t expected_steps;  // sizes the chunks and their index; 0 or 1: unknown
+    int64_t expected_steps;  // sizes the chunks and their index; 0 or 1: unknown, 14 hours at the most
     int file_count;          // further files that the run depends on, besides what the scene names
     const char *const *file;
 } RecordingOptions;
-RecordingOptions recording_default_options(void);
+RecordingOptions recording_default_options(void);    // a run's: every value exact
+RecordingOptions recording_session_options(void);    // the trainer's: poses at 100 Hz, frames at 1 Hz, at most 200 MB an hour of 120 nodes
+
+// Of /motion: values are within this many units of zero.
+#define MOTION_MOST 1073741824.0
 
 typedef struct Recording Recording;
 
@@ -50,7 +65,7 @@ Recording *recording_create(const char *path, Simulator *simulator, const Record
 // After a step. Allocates nothing, calls no file; waits where the disk is slower than the simulation. False once writing failed.
 // `xray` may be NULL: nobody sees the run; what its script injects is kept.
 bool recording_step(Recording *recording, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
-// Adds the last state as a frame, writes what is left, ends. False with a fault where writing failed; always frees.
+// Adds the last state as a frame (of a session as a pose), writes what is left, ends. False with a fault where writing failed; always frees.
 bool recording_close(Recording *recording, Simulator *simulator, Faults *faults);
 // Ends without a file: of a run that never was. NULL: none.
 void recording_abandon(Recording *recording);

@@ -1,4 +1,4 @@
-// Mutants of each kind of HDF5 file that is read: trees, models, recordings of one tool and of several. Each is changed in its structure (links, shapes, types,
+// Mutants of each kind of HDF5 file that is read: trees, models, recordings of one tool and of several, sessions (the last three are packed). Each is changed in its structure (links, shapes, types,
 // storage, attributes, values) through the HDF5 library, or in its bytes, and read in a process of its own that may use little memory and time. Reading must end
 // well: with faults, or with data of which each byte can be looked at; never by a signal, nor with more memory than the reader states.
 // usage: hdf5_mutants [COUNT [SEED]]; COUNT mutants of each kind, default 150.
@@ -48,9 +48,9 @@ static uint64_t next(void)
 static int below(int count) { return (int)(next() % (uint64_t)count); }
 
 // --- the files ---
-enum { TREE, MODEL, RECORDING, TOOLS_RECORDING, KINDS };
-static const char *const kind_name[KINDS] = {"tree", "model", "recording", "recording of tools"};
-static const char *const file_name[KINDS] = {"tree.h5", "model.h5", "run.h5", "tools.h5"};
+enum { TREE, MODEL, RECORDING, TOOLS_RECORDING, SESSION, KINDS };
+static const char *const kind_name[KINDS] = {"tree", "model", "recording", "recording of tools", "session"};
+static const char *const file_name[KINDS] = {"tree.h5", "model.h5", "run.h5", "tools.h5", "session.h5"};
 
 static const char one_tool[] = "seldinger: 1\n"
                                "wire: {elements: 10, sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
@@ -67,13 +67,13 @@ static const char two_tools[] =
 
 static bool record_step(void *recording, Simulator *simulator, const ToolCommands *commands) { return recording_step(recording, simulator, commands, NULL); }
 
-static void make_recording(const char *text, const char *path)
+static void make_recording(const char *text, RecordingOptions options, const char *path)
 {
     Scene *scene = scene_parse(text, strlen(text), "r.yaml", &faults);
     Simulator *simulator = scene ? simulator_create(scene, NULL, &faults) : NULL;
     need(simulator, "make a simulator");
-    RecordingOptions options = recording_default_options();
-    options.expected_steps = 20;     // less than there are: several chunks
+    options.flush_s = 0.02;          // less than it lasts: several chunks
+    options.expected_steps = 60;
     Recording *recording = recording_create(path, simulator, &options, &faults);
     need(recording, "make a recording");
     DriveOptions drive = drive_default_options();
@@ -478,8 +478,9 @@ int main(int argument_count, char **argument)
     recording_prepare_process();
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
     make_trees();
-    make_recording(one_tool, in_folder(file_name[RECORDING]));
-    make_recording(two_tools, in_folder(file_name[TOOLS_RECORDING]));
+    make_recording(one_tool, recording_default_options(), in_folder(file_name[RECORDING]));
+    make_recording(two_tools, recording_default_options(), in_folder(file_name[TOOLS_RECORDING]));
+    make_recording(two_tools, recording_session_options(), in_folder(file_name[SESSION]));
     printf("%-20s %-10s %7s %8s %7s %8s %6s %7s %10s\n", "kind", "change", "mutants", "refused", "read", "signals", "late", "silent", "most MB");
     for (int kind = 0; kind < KINDS; kind++)
         for (int structure = 1; structure >= 0; structure--) {
