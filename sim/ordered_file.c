@@ -85,6 +85,7 @@ static bool grow(int descriptor, haddr_t size, haddr_t more)
     haddr_t now = length_of(descriptor);
     return now != HADDR_UNDEF && (now >= size + more || set_length(descriptor, size + more) || now >= size || set_length(descriptor, size));
 }
+
 static uint64_t little_endian(const unsigned char *data, int bytes)
 {
     uint64_t value = 0;
@@ -256,6 +257,7 @@ bool ordered_file_is_being_written(const char *path)
         close(descriptor);
     return is_locked;
 }
+
 // --- growing ---
 
 // A dataset and its index.

@@ -68,12 +68,15 @@ static void put_units(Hdf5Type type, void *values, size_t i, int32_t units, doub
 static void add_up(const uint32_t *change, uint64_t frames, uint64_t nodes, uint64_t parts, Hdf5Type type, double unit, uint32_t *now, void *values)
 {
     for (uint64_t k = 0; k < frames; k++)
-        for (uint64_t part = 0; part < parts; part++)
+        for (uint64_t part = 0; part < parts; part++) {
+            uint32_t moved = 0;      // by the node before
             for (uint64_t node = 0; node < nodes; node++) {
-                uint32_t moved = *change++, *at = &now[part * nodes + node];
-                *at += moved >> 1 ^ (moved & 1 ? UINT32_MAX : 0);
+                uint32_t relative = *change++, *at = &now[part * nodes + node];
+                moved += relative >> 1 ^ (relative & 1 ? UINT32_MAX : 0);
+                *at += moved;
                 put_units(type, values, (k * nodes + node) * parts + part, (int32_t)*at, unit);
             }
+        }
 }
 
 // The frames' dataset `name` as motion has it: `shape` as of read_dataset. NULL with a fault.

@@ -20,7 +20,7 @@
 enum { STEP_RING = 4096, FRAME_RING = 128, LEVEL_OF_SESSIONS = 6, LEVEL_OF_RUNS = 1 /* they may go many times as fast, and what is exact hardly packs better */ };
 
 // What the values of a session's recording are rounded to: powers of two, so that rounding is exact and the rest of a double is zeros.
-static const double length_grid_mm = 1.0 / 256, turn_grid = 1.0 / 1024, node_force_grid_n = 1.0 / 4096, radius_grid_mm = 1.0 / 1024,
+static const double length_grid_mm = 1.0 / 128, turn_grid = 1.0 / 512, node_force_grid_n = 1.0 / 2048, radius_grid_mm = 1.0 / 1024,
                     figure_grid = 1.0 / 16384 /* of step figures in mm, N and N mm */, eight_bits = -8 /* of each value */;
 
 // A dataset that grows by rows; its rows wait in a ring, then in a chunk.
@@ -553,19 +553,23 @@ static int32_t in_units(const Column *column, const unsigned char *row, size_t i
     return isnan(value) ? otherwise : (int32_t)fmax(-MOTION_MOST, fmin(MOTION_MOST, rint(value)));
 }
 
-// Changes since the row before, as whole numbers without a sign: 0, -1, 1, -2, 2 … are 0, 1, 2, 3, 4 …
+// Changes since the row before, less the change of the node before: nodes that follow each other move nearly alike. As whole numbers without a sign: 0, -1, 1,
+// -2, 2 … are 0, 1, 2, 3, 4 …
 static bool take_motion(Recording *recording, const Column *from, Column *to, const unsigned char *row)
 {
     uint32_t *change = (uint32_t *)(void *)next_row(to);
     size_t parts = from->rank == 2 ? from->shape[1] : 1, nodes = from->rank == 0 ? 1 : from->shape[0];
-    for (size_t part = 0; part < parts; part++)
+    for (size_t part = 0; part < parts; part++) {
+        uint32_t neighbours = 0;
         for (size_t node = 0; node < nodes; node++) {
             size_t at = part * nodes + node;
             int32_t now = in_units(from, row, node * parts + part, node > 0 ? to->before[at - 1] : 0);
-            uint32_t moved = (uint32_t)now - (uint32_t)to->before[at];
+            uint32_t moved = (uint32_t)now - (uint32_t)to->before[at], relative = moved - neighbours;
             to->before[at] = now;
-            change[at] = moved << 1 ^ (moved >> 31 ? UINT32_MAX : 0);
+            neighbours = moved;
+            change[at] = relative << 1 ^ (relative >> 31 ? UINT32_MAX : 0);
         }
+    }
     return end_row(recording, to);
 }
 

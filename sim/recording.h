@@ -13,12 +13,12 @@
 //
 // Two kinds. A run's (`run --record`; recording_default_options) is exact, every value as the simulator has it. A session's (`nav`; recording_session_options) is small:
 // commands, times, state hashes and whole numbers are exact, so that each step can be simulated again to the bit; the rest is rounded, to multiples of 2^-14 in step
-// figures (mm, N, N mm; the residual to 8 bits) and 2^-8 mm, 2^-10 (quaternions), 2^-12 N in frames. Frames stand each second; between them /motion has poses (P)
-// each 10 ms: to each of the frames' datasets X a dataset /motion/X, as whole numbers: its change since the pose before, from zero, in the unit that the file's
-// attribute motion_length_mm (position, gap_mm, s_mm), motion_turn (quaternion), motion_force_n or motion_radius_mm says, else 1; 0, -1, 1, -2, 2 … stand as
-// 0, 1, 2, 3, 4 …, and the last two dimensions are exchanged: (P,M,3) is (P,3,M). With h5py:
+// figures (mm, N, N mm; the residual to 8 bits) and 2^-7 mm, 2^-9 (quaternions), 2^-11 N in frames. Frames stand each second; between them /motion has poses (P)
+// each 10 ms: to each of the frames' datasets X a dataset /motion/X, as whole numbers: its change since the pose before, from zero, less that of the node before, in the
+// unit that the file's attribute motion_length_mm (position, gap_mm, s_mm), motion_turn (quaternion), motion_force_n or motion_radius_mm says, else 1; 0, -1, 1, -2,
+// 2 … stand as 0, 1, 2, 3, 4 …, and the last two dimensions are exchanged: (P,M,3) is (P,3,M). With h5py:
 //   c = file["/motion/wire/position"][:].astype("i8")
-//   position = numpy.cumsum((c >> 1) ^ -(c & 1), axis=0).swapaxes(1, 2) * file.attrs["motion_length_mm"]
+//   position = numpy.cumsum((c >> 1) ^ -(c & 1), axis=-1).cumsum(axis=0).swapaxes(1, 2) * file.attrs["motion_length_mm"]
 // Values beyond 2^30 units are infinite; nodes that are not there (/wire/count) repeat another's; /motion/wire/step is the row itself.
 //
 // Rows: /time_s (S) time at the end of each step, /command (S,2), /proximal (S,2), /state_hash (S), /inserted_mm (S), /released (S) 1 where no hand holds the tool,
