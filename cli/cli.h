@@ -14,8 +14,6 @@ typedef int VerbFunction(int argc, char **argv);   // argv[0] is "seldinger VERB
 VerbFunction verb_run, verb_check, verb_segment, verb_import, verb_fit, verb_synth, verb_query, verb_export, verb_info, verb_bench, verb_replay,
     verb_devices, verb_nav, verb_report;
 
-// The handler of a signal that ends the program: no unfinished file is left.
-void cli_stop(int signal_number);
 // Prints all faults to standard error; returns EXIT_BAD_INPUT.
 int cli_bad_input(const Faults *faults);
 void cli_notes(FILE *out, const char *path, const char *text);   // each line of `text` after "PATH: "

@@ -3,6 +3,7 @@
 
 #include "cli/output.h"
 #include "cli/output_plan.h"
+#include "cli/process.h"
 #include "cli/run_chart.h"
 #include "cli/run_files.h"
 #include "cli/run_hands.h"
@@ -66,7 +67,7 @@ static void request_stop(int signal_number)
 {
     // a second one ends the program at once
     if (stop_requested)
-        cli_stop(signal_number);
+        process_stop(signal_number);
     stop_requested = 1;
 }
 
