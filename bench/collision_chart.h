@@ -2,7 +2,7 @@
 #ifndef SELDINGER_BENCH_COLLISION_CHART_H
 #define SELDINGER_BENCH_COLLISION_CHART_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 
 #include <cJSON.h>
 #include <stdbool.h>

@@ -3,7 +3,7 @@
 #ifndef SELDINGER_BENCH_COLLISION_GROWTH_H
 #define SELDINGER_BENCH_COLLISION_GROWTH_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 
 #include <cJSON.h>
 #include <stdbool.h>

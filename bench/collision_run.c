@@ -1,7 +1,7 @@
 #include "bench/collision_run.h"
 
 #include "base/heap.h"
-#include "geom/sort_doubles.h"
+#include "base/sort_doubles.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,11 +1,11 @@
 // seldinger bench fit: tables 3, 4 and 5 of Kerrien et al. 2017 beside the paper's figures, and the cost of a local model.
 #include "bench/bench.h"
 
+#include "base/simd.h"
+#include "base/sort_doubles.h"
 #include "bench/lim_trial.h"
 #include "cli/output_plan.h"
 #include "geom/isosurface.h"
-#include "geom/simd.h"
-#include "geom/sort_doubles.h"
 #include "recon/phantom.h"
 #include "recon/rbt_track.h"
 #include "recon/trace.h"

@@ -3,9 +3,9 @@
 #include "bench/lim_trial.h"
 
 #include "base/same_math.h"
+#include "base/sort_doubles.h"
 #include "geom/blobby.h"
 #include "geom/random.h"
-#include "geom/sort_doubles.h"
 
 #include <stdlib.h>
 #include <string.h>

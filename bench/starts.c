@@ -2,8 +2,8 @@
 // and four fifths of its length; where noise hides the trunk, or the click is beside all vessels, a refusal; and where a result is wrong, a warning with it.
 #include "bench/starts.h"
 
+#include "base/parallel.h"
 #include "bench/track_score.h"
-#include "recon/parallel.h"
 #include "recon/phantom_parts.h"
 #include "recon/rbt_track.h"
 

@@ -8,9 +8,9 @@
 //   kernels      assembly, factor and solve, detection alone, against the budgets (DESIGN.md section 7)
 #include "bench/tools.h"
 
-#include "cli/output.h"
 #include "base/heap.h"
-#include "geom/simd.h"
+#include "base/simd.h"
+#include "cli/output.h"
 #include "solver/block_chain.h"
 
 #include <getopt.h>

@@ -7,10 +7,10 @@
 #include "bench/starts.h"
 #include "cli/output.h"
 
+#include "base/parallel.h"
 #include "bench/mht_track.h"
 #include "bench/track_score.h"
 #include "recon/blurred_edge.h"
-#include "recon/parallel.h"
 
 #include <getopt.h>
 #include <stdlib.h>

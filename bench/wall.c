@@ -3,10 +3,10 @@
 // Trees and models are made by the commands of `seldinger`, which lies beside this program, as a user makes them (their command is printed), or named on the command line.
 #include "bench/wall.h"
 
+#include "base/heap.h"
+#include "base/simd.h"
 #include "cli/output.h"
 #include "cli/output_plan.h"
-#include "base/heap.h"
-#include "geom/simd.h"
 #include "recon/model_measure.h"
 #include "recon/tree_file.h"
 

@@ -1,9 +1,9 @@
 // Measurements of a model for `bench wall`: points to wall, junctions against truth, noise.
 #include "bench/wall.h"
 
-#include "cli/process.h"
+#include "base/process.h"
+#include "base/sort_doubles.h"
 #include "geom/random.h"
-#include "geom/sort_doubles.h"
 #include "recon/phantom.h"
 #include "recon/tree_file.h"
 

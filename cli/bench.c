@@ -1,7 +1,7 @@
 // seldinger bench: the benchmarks are a program of their own, which lies beside this one.
 #include "cli/cli.h"
 
-#include "cli/process.h"
+#include "base/process.h"
 
 #include <errno.h>
 #include <limits.h>

@@ -2,10 +2,10 @@
 // every scene with a `verify:` key is measured against its references (check_verify.c).
 #include "cli/check_verify.h"
 
+#include "base/heap.h"
+#include "base/text_file.h"
 #include "cli/output.h"
 #include "cli/output_plan.h"
-#include "base/heap.h"
-#include "input/text_file.h"
 #include "sim/compare.h"
 #include "sim/drive.h"
 

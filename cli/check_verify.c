@@ -3,7 +3,7 @@
 // no further: the order is then at least what brought it there.
 #include "cli/check_verify.h"
 
-#include "input/text_file.h"
+#include "base/text_file.h"
 #include "sim/drive.h"
 
 #include <stdlib.h>

@@ -2,13 +2,12 @@
 #ifndef SELDINGER_CLI_CLI_H
 #define SELDINGER_CLI_CLI_H
 
+#include "base/parallel.h"
+#include "base/process.h"
 #include "geom/geom.h"
-#include "recon/parallel.h"
 #include "sim/scene.h"
 
 #include <stdio.h>
-
-enum { EXIT_DONE = 0, EXIT_DIFFERENT = 1, EXIT_BAD_INPUT = 2, EXIT_UNTRUSTED = 3 };
 
 typedef int VerbFunction(int argc, char **argv);   // argv[0] is "seldinger VERB"
 VerbFunction verb_run, verb_check, verb_segment, verb_import, verb_fit, verb_synth, verb_query, verb_export, verb_info, verb_bench, verb_replay,

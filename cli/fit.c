@@ -1,12 +1,12 @@
 // seldinger fit: a tree of point sets to a model (LIM), with the figures of the paper's tables 3 and 4.
 #include "cli/cli.h"
 
+#include "base/heap.h"
+#include "base/sort_doubles.h"
 #include "cli/junction_sheets.h"
 #include "cli/output.h"
 #include "cli/output_plan.h"
 #include "cli/reach_report.h"
-#include "base/heap.h"
-#include "geom/sort_doubles.h"
 #include "recon/blurred_edge.h"
 #include "recon/field_fit.h"
 #include "recon/lim_fit.h"

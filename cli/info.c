@@ -1,13 +1,13 @@
 // seldinger info: what a file is and its figures, for people or as JSON. The figures are gathered once as JSON; the text is that, printed plainly.
 #include "cli/cli.h"
 
+#include "base/heap.h"
+#include "base/sort_doubles.h"
 #include "cli/file_kind.h"
 #include "cli/junction_sheets.h"
 #include "cli/output_plan.h"
 #include "cli/reach_report.h"
 #include "cli/report.h"
-#include "base/heap.h"
-#include "geom/sort_doubles.h"
 #include "recon/mesh_check.h"
 #include "recon/tree_file.h"
 #include "recon/volume.h"

@@ -1,7 +1,7 @@
 // seldinger: the table of verbs.
 #include "cli/cli.h"
 
-#include "cli/process.h"
+#include "base/process.h"
 
 #include <string.h>
 

@@ -1,7 +1,7 @@
 #include "cli/output.h"
 
 #include "base/part_file.h"
-#include "recon/whole_file.h"
+#include "base/whole_file.h"
 
 #include <ctype.h>
 #include <errno.h>

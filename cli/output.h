@@ -3,7 +3,7 @@
 #ifndef SELDINGER_CLI_OUTPUT_H
 #define SELDINGER_CLI_OUTPUT_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 
 #include <stdbool.h>
 #include <stddef.h>

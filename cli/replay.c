@@ -1,9 +1,9 @@
 // seldinger replay: a recording shown, simulated again, made into a scene.
 #include "cli/cli.h"
 
+#include "base/sha256.h"
 #include "cli/output_plan.h"
 #include "cli/replay_scene.h"
-#include "sim/sha256.h"
 #ifdef SELDINGER_RENDER
 #include "cli/film.h"
 #include "cli/replay_window.h"

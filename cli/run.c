@@ -1,13 +1,13 @@
 // seldinger run: a scene headless, with what it leaves: summary, final state, recording, picture.
 #include "cli/cli.h"
 
+#include "base/heap.h"
+#include "base/process.h"
 #include "cli/output.h"
 #include "cli/output_plan.h"
-#include "cli/process.h"
 #include "cli/run_chart.h"
 #include "cli/run_files.h"
 #include "cli/run_hands.h"
-#include "base/heap.h"
 #include "sim/lesson.h"
 #include "sim/pose.h"
 #include "sim/recording.h"

@@ -1,7 +1,7 @@
 #include "cli/scene_views.h"
 
 #include "base/heap.h"
-#include "geom/sort_doubles.h"
+#include "base/sort_doubles.h"
 #include "recon/volume.h"
 
 #include <stdlib.h>

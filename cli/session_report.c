@@ -1,16 +1,16 @@
 // seldinger report: a session's file, its recording beside it and earlier sessions of the same trainee as one page, and that printed by a browser.
 #include "cli/session_report.h"
 
+#include "base/heap.h"
+#include "base/text_file.h"
+#include "base/whole_file.h"
 #include "cli/file_kind.h"
 #include "cli/output.h"
 #include "cli/output_plan.h"
 #include "cli/recover.h"
 #include "cli/report.h"
 #include "cli/trainer_files.h"
-#include "base/heap.h"
 #include "cli/tube_tree.h"
-#include "input/text_file.h"
-#include "recon/whole_file.h"
 #include "sim/recording.h"
 
 #include <getopt.h>

@@ -1,7 +1,7 @@
 #include "cli/trainer_cine.h"
 
+#include "base/whole_file.h"
 #include "cli/output.h"
-#include "recon/whole_file.h"
 #include "render/gl_canvas.h"
 
 #include <stdio.h>

@@ -1,6 +1,6 @@
 #include "cli/tray_devices.h"
 
-#include "input/yaml_edit.h"
+#include "base/yaml_edit.h"
 
 #include <dirent.h>
 #include <math.h>

@@ -2,6 +2,7 @@
 // triangles or a grid where `contact:` asks for that.
 #include "cli/cli.h"
 
+#include "base/sha256.h"
 #include "cli/contact_surface.h"
 #include "cli/tube_tree.h"
 #include "geom/mesh_vessel.h"
@@ -9,7 +10,6 @@
 #include "recon/lim_fit.h"
 #include "recon/phantom.h"
 #include "recon/tree_file.h"
-#include "sim/sha256.h"
 #ifdef SELDINGER_RENDER
 #include "render/picture.h"
 #endif

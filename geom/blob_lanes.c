@@ -1,7 +1,7 @@
 // One kernel text, three compilations. See blob_lanes.h and foot_lanes.h for the layouts and why the bits agree, blobby.c for the equations.
 // Compiled with -fno-math-errno and -fno-trapping-math, which change no result, so that roots and selects vectorise.
+#include "base/simd.h"
 #include "geom/foot_lanes.h"
-#include "geom/simd.h"
 
 #include <string.h>
 

@@ -8,7 +8,7 @@
 #ifndef SELDINGER_INPUT_HAND_H
 #define SELDINGER_INPUT_HAND_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 #include "input/device_map.h"
 #include "input/hand_port.h"
 #include "input/hid_device.h"

@@ -1,7 +1,7 @@
 #include "recon/blurred_edge.h"
 
 #include "base/same_math.h"
-#include "geom/sort_doubles.h"
+#include "base/sort_doubles.h"
 #include "recon/bspline.h"
 
 #include <math.h>

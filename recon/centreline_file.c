@@ -1,8 +1,8 @@
 // See centreline_file.h. SWC: `id type x y z radius parent` a line (Cannon et al. 1998); a curve runs from a branching to the next or to an end.
 #include "recon/centreline_file.h"
 
+#include "base/whole_file.h"
 #include "recon/vtp_file.h"
-#include "recon/whole_file.h"
 
 #include <cjson/cJSON.h>
 #include <limits.h>

@@ -1,8 +1,8 @@
 #include "recon/field_fit.h"
 
-#include "geom/blobby.h"
 #include "base/heap.h"
-#include "geom/sort_doubles.h"
+#include "base/sort_doubles.h"
+#include "geom/blobby.h"
 #include "recon/field_refine.h"
 
 #include <stdlib.h>

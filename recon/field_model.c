@@ -1,7 +1,7 @@
 #include "recon/field_model.h"
 
+#include "base/parallel.h"
 #include "geom/blob_flood.h"
-#include "recon/parallel.h"
 
 #include <stdlib.h>
 #include <string.h>

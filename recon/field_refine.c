@@ -3,8 +3,8 @@
 // of the residuals about their mean over a third of the radius: over more, what the field misses at a crotch passes for noise, and no blob comes to mend it. Residuals count as they do in the fit: those beyond the loss's knee less and less. Candidates beyond tolerance and noise are taken by size, none within 0.8 R of one taken before.
 #include "recon/field_refine.h"
 
-#include "geom/sort_doubles.h"
-#include "recon/parallel.h"
+#include "base/parallel.h"
+#include "base/sort_doubles.h"
 
 #include <stdlib.h>
 

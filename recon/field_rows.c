@@ -9,10 +9,10 @@
 // They act only where they are violated. Without them a fit of signed blobs grows sheets where nothing speaks against them.
 #include "recon/field_rows.h"
 
+#include "base/parallel.h"
 #include "base/same_math.h"
 #include "geom/power_blocks.h"
 #include "geom/power_walk.h"
-#include "recon/parallel.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -4,10 +4,10 @@
 // |g| and the direction of g. A region is some two dozen blobs that follow each other along the tree; its rows are those of all nodes that see one of
 // them, so that a step that is accepted lowers the sum of squares of the whole tree, whatever the other regions do. Regions that share a node's rows are
 // solved one after the other, in the order of their colours: the result does not depend on the threads.
-#include "recon/field_model.h"
+#include "base/parallel.h"
 #include "base/same_math.h"
+#include "recon/field_model.h"
 #include "recon/lim_energy.h"
-#include "recon/parallel.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 #include "recon/fit_lanes.h"
 
-#include "geom/simd.h"
+#include "base/simd.h"
 
 #include <string.h>
 

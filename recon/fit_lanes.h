@@ -1,4 +1,4 @@
-// The inner loops of the whole-tree fit, over one node's rows, compiled for each instruction set (geom/simd.h); all give the same bits.
+// The inner loops of the whole-tree fit, over one node's rows, compiled for each instruction set (base/simd.h); all give the same bits.
 #ifndef SELDINGER_RECON_FIT_LANES_H
 #define SELDINGER_RECON_FIT_LANES_H
 

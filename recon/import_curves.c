@@ -6,7 +6,7 @@
 #include "recon/import_skeleton.h"
 #include "base/same_math.h"
 
-#include "geom/sort_doubles.h"
+#include "base/sort_doubles.h"
 
 #include <stdlib.h>
 

@@ -5,7 +5,7 @@
 // and a half of its radii inside the parent's wall on.
 #include "recon/import_ostia.h"
 
-#include "geom/sort_doubles.h"
+#include "base/sort_doubles.h"
 #include "recon/link_lattice.h"
 
 #include <stdlib.h>

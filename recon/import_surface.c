@@ -7,9 +7,9 @@
 #include "recon/import_surface.h"
 
 #include "base/heap.h"
+#include "base/parallel.h"
 #include "recon/import_ostia.h"
 #include "recon/mesh_tree.h"
-#include "recon/parallel.h"
 
 #include <stdlib.h>
 #include <string.h>

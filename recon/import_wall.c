@@ -4,7 +4,7 @@
 #include "recon/import_skeleton.h"
 #include "base/same_math.h"
 
-#include "geom/disjoint_sets.h"
+#include "base/disjoint_sets.h"
 #include "recon/mesh_edges.h"
 
 #include <stdlib.h>

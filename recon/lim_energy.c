@@ -9,7 +9,7 @@
 //   dkappa = dN / (2|g|^3) - 3 kappa g.dg / |g|^2
 #include "recon/lim_energy.h"
 
-#include "geom/simd.h"
+#include "base/simd.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -18,7 +18,7 @@ enum { ARRAYS = 20 };
 // a gradient as short as this has no direction: its curvature counts nothing much
 static const float LEAST_GRADIENT2 = 1e-8f;
 
-// One kernel text, three compilations: geom/simd.h says which runs. No fused multiply-add (-ffp-contract=off), one accumulator a lane: same bits.
+// One kernel text, three compilations: base/simd.h says which runs. No fused multiply-add (-ffp-contract=off), one accumulator a lane: same bits.
 typedef struct LimKernels {
     void (*add)(LimPoints *, const LimBlob *, double);
     void (*sum)(LimPoints *, const LimBlob *, int, double);

@@ -12,11 +12,11 @@
 // Tried and lost: agreed points alone (the wall drifts 0.02 mm from the data, and out of the sac); starting afresh (1.3 times the jumps, more work).
 #include "recon/lim_fit.h"
 
-#include "base/same_math.h"
-#include "geom/blobby.h"
 #include "base/heap.h"
+#include "base/same_math.h"
+#include "base/sort_doubles.h"
+#include "geom/blobby.h"
 #include "geom/power_walk.h"
-#include "geom/sort_doubles.h"
 #include "recon/lim_agree.h"
 
 #include <stdlib.h>

@@ -7,8 +7,8 @@
 #ifndef SELDINGER_RECON_LIM_FIT_H
 #define SELDINGER_RECON_LIM_FIT_H
 
+#include "base/parallel.h"
 #include "geom/vessel_tree.h"
-#include "recon/parallel.h"
 
 typedef struct LimFitOptions {
     // Table 1 of the paper by name

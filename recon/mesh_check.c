@@ -2,7 +2,7 @@
 // two triangles, then each component is turned outwards by the sign of its volume, openings closed by fans about their loops' middles.
 #include "recon/mesh_check.h"
 
-#include "geom/disjoint_sets.h"
+#include "base/disjoint_sets.h"
 #include "recon/mesh_edges.h"
 
 #include <stdarg.h>

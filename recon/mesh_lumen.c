@@ -2,11 +2,11 @@
 // what passes through a common side and no row slips between them.
 #include "recon/mesh_lumen.h"
 
-#include "base/same_math.h"
-#include "geom/disjoint_sets.h"
+#include "base/disjoint_sets.h"
 #include "base/heap.h"
+#include "base/parallel.h"
+#include "base/same_math.h"
 #include "recon/mesh_edges.h"
-#include "recon/parallel.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -3,9 +3,9 @@
 #include "recon/phantom_measure.h"
 
 #include "base/same_math.h"
+#include "base/sort_doubles.h"
 #include "geom/blobby.h"
 #include "geom/power_walk.h"
-#include "geom/sort_doubles.h"
 
 #include <stdlib.h>
 

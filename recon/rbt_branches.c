@@ -4,7 +4,7 @@
 // Limbs of a round are tracked at the same time on the tree as it was, and adopted widest first; what lies in a tube that was adopted before is left out.
 #include "recon/rbt_branches.h"
 #include "base/heap.h"
-#include "geom/sort_doubles.h"
+#include "base/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/rbt_links.h"
 #include "recon/rbt_sacs.h"

@@ -3,7 +3,7 @@
 #include "recon/rbt_link_path.h"
 
 #include "base/same_math.h"
-#include "geom/sort_doubles.h"
+#include "base/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/way_heap.h"
 

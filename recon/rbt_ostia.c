@@ -8,7 +8,7 @@
 // What was tried before (one-field.md): without nodes on the links 31 to 40 of 131 ostia stayed shut; a cylinder of the child's radius on the straight
 // link opened them, but not where the image has the mouth.
 #include "recon/rbt_ostia.h"
-#include "geom/sort_doubles.h"
+#include "base/sort_doubles.h"
 #include "recon/lumen_lines.h"
 #include "recon/rbt_link_path.h"
 #include "recon/rbt_ring.h"

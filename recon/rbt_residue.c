@@ -3,7 +3,7 @@
 // so on; short ones are ragged edges.
 #include "recon/rbt_residue.h"
 #include "base/heap.h"
-#include "geom/sort_doubles.h"
+#include "base/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/way_heap.h"
 

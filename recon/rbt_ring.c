@@ -2,7 +2,7 @@
 #include "recon/rbt_ring.h"
 
 #include "base/same_math.h"
-#include "geom/sort_doubles.h"
+#include "base/sort_doubles.h"
 #include "recon/cast_rays.h"
 
 enum { SAMPLES_MOST = 160, SCALE_NODES = 8, ROUNDS = 2 };

@@ -6,7 +6,7 @@
 // whose inscribed ball sticks out furthest of the other centres' balls, until none does by much. A ball stays alone.
 #include "recon/rbt_sacs.h"
 #include "base/heap.h"
-#include "geom/sort_doubles.h"
+#include "base/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/cast_rays.h"
 

@@ -3,7 +3,7 @@
 #include "recon/rbt_start.h"
 
 #include "base/same_math.h"
-#include "geom/sort_doubles.h"
+#include "base/sort_doubles.h"
 
 #include <stdlib.h>
 

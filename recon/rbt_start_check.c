@@ -3,8 +3,8 @@
 #include "recon/rbt_start_check.h"
 
 #include "base/same_math.h"
+#include "base/sort_doubles.h"
 #include "recon/rbt_start.h"
-#include "geom/sort_doubles.h"
 #include "recon/volume_noise.h"
 
 #include <stdio.h>

@@ -9,9 +9,9 @@
 // leave it (rbt_exits.h), and the branch goes on from the widest one that tracks.
 #include "recon/rbt_track.h"
 
-#include "base/same_math.h"
 #include "base/heap.h"
-#include "geom/sort_doubles.h"
+#include "base/same_math.h"
+#include "base/sort_doubles.h"
 #include "recon/bspline.h"
 #include "recon/cast_rays.h"
 #include "recon/ransac_cylinder.h"
@@ -19,8 +19,8 @@
 #include "recon/rbt_exits.h"
 #include "recon/rbt_limits.h"
 #include "recon/rbt_links.h"
-#include "recon/rbt_ostia.h"
 #include "recon/rbt_loops.h"
+#include "recon/rbt_ostia.h"
 #include "recon/rbt_residue.h"
 #include "recon/rbt_start.h"
 #include "recon/rbt_start_check.h"

@@ -7,8 +7,8 @@
 #ifndef SELDINGER_RECON_RBT_TRACK_H
 #define SELDINGER_RECON_RBT_TRACK_H
 
+#include "base/parallel.h"
 #include "geom/vessel_tree.h"
-#include "recon/parallel.h"
 #include "recon/ransac_cylinder.h"
 #include "recon/volume.h"
 

@@ -1,8 +1,8 @@
 // See surface_file.h. Text formats run a cursor over a NUL-ended copy; one that turned bad stays bad.
 #include "recon/surface_file.h"
 
+#include "base/whole_file.h"
 #include "recon/vtp_file.h"
-#include "recon/whole_file.h"
 
 #include <limits.h>
 #include <stdint.h>

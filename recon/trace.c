@@ -2,8 +2,8 @@
 // unknown keys, several documents).
 #include "recon/trace.h"
 #include "base/heap.h"
+#include "base/whole_file.h"
 #include "recon/cast_rays.h"
-#include "recon/whole_file.h"
 
 #include <stdio.h>
 #include <stdlib.h>

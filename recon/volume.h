@@ -8,7 +8,7 @@
 #ifndef SELDINGER_RECON_VOLUME_H
 #define SELDINGER_RECON_VOLUME_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 #include "geom/linear.h"
 
 #include <stddef.h>

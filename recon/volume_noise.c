@@ -1,10 +1,10 @@
 // sigma = 1.4826 MAD / sqrt(2) for differences of independent values; the Gaussian is applied axis by axis.
 #include "recon/volume_noise.h"
 
-#include "base/same_math.h"
 #include "base/heap.h"
-#include "geom/sort_doubles.h"
-#include "recon/parallel.h"
+#include "base/parallel.h"
+#include "base/same_math.h"
+#include "base/sort_doubles.h"
 
 #include <stdlib.h>
 #include <string.h>

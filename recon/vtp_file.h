@@ -4,7 +4,7 @@
 #ifndef SELDINGER_RECON_VTP_FILE_H
 #define SELDINGER_RECON_VTP_FILE_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 #include "geom/linear.h"
 
 typedef struct VtpCells {

@@ -2,8 +2,9 @@
 // One function a part of the file; each reads on after a fault, so one pass finds all.
 #include "sim/scene_reading.h"
 
-#include "input/number_table.h"
-#include "input/text_file.h"
+#include "base/number_table.h"
+#include "base/text_file.h"
+#include "sim/yaml_vector.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 // Section 5.3.2 in small: each shape at three levels of noise, five runs. Medians of 15 runs; the whole table is `seldinger bench fit --table3`.
+#include "base/sort_doubles.h"
 #include "bench/lim_trial.h"
-#include "geom/sort_doubles.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

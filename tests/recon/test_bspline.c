@@ -1,6 +1,6 @@
 // Cubic B-spline approximation: against a plain double reference, and the laws it must obey (reproduces straight lines, smooths by 1/sqrt(3) voxel).
+#include "base/simd.h"
 #include "recon/bspline.h"
-#include "geom/simd.h"
 #include "recon/ransac_cylinder.h"
 
 #include <setjmp.h>

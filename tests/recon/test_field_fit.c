@@ -5,8 +5,8 @@
 #include <stddef.h>
 #include <cmocka.h>
 
+#include "base/simd.h"
 #include "geom/blobby.h"
-#include "geom/simd.h"
 #include "recon/field_fit.h"
 #include "recon/model_measure.h"
 #include "tests/recon/fitted_shape.h"

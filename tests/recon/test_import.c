@@ -2,8 +2,8 @@
 // patient frame, with normals into the lumen, open; curves beside the middle or with wrong radii; what has no centreline; other vessels' curves.
 #include "recon/import_surface.h"
 
+#include "base/sort_doubles.h"
 #include "recon/phantom.h"
-#include "geom/sort_doubles.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

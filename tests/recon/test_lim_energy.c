@@ -2,8 +2,8 @@
 // twin. Single precision sums of some hundred terms: 1e-5 of the energy; slopes 1e-4 of the largest.
 #include "recon/lim_energy.h"
 
+#include "base/simd.h"
 #include "geom/blobby.h"
-#include "geom/simd.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

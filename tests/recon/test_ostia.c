@@ -1,6 +1,6 @@
 // Ostia of tracked trees against truth: synthetic trees with and without noise, and links that the image must refuse.
+#include "base/sort_doubles.h"
 #include "bench/track_score.h"
-#include "geom/sort_doubles.h"
 #include "recon/phantom.h"
 #include "recon/rbt_link_path.h"
 #include "recon/rbt_ostia.h"

@@ -1,6 +1,6 @@
 // Changes one value in a YAML text, or adds an item to a list, and leaves the rest of it as it is, comments and layout too.
-#ifndef SELDINGER_INPUT_YAML_EDIT_H
-#define SELDINGER_INPUT_YAML_EDIT_H
+#ifndef SELDINGER_BASE_YAML_EDIT_H
+#define SELDINGER_BASE_YAML_EDIT_H
 
 #include <stdbool.h>
 

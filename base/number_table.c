@@ -1,4 +1,4 @@
-#include "input/number_table.h"
+#include "base/number_table.h"
 
 #include <limits.h>
 #include <math.h>

@@ -1,4 +1,4 @@
-#include "input/yaml_edit.h"
+#include "base/yaml_edit.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-#include "input/nearest_name.h"
+#include "base/nearest_name.h"
 
 #include <ctype.h>
 #include <string.h>

@@ -2,9 +2,9 @@
 //
 // A parser gets a Faults, adds what is wrong, and returns false when it added any; its output is then untouched.
 // Printed form: `FILE:LINE:COL: what is wrong; what is valid`, or `FILE:byte OFFSET: …` for binary files, or `FILE: …`.
-// Not thread-safe; one owner. Lives in geom because it is the bottom of the tree, it sees no file itself.
-#ifndef SELDINGER_GEOM_FAULTS_H
-#define SELDINGER_GEOM_FAULTS_H
+// Not thread-safe; one owner. It sees no file itself.
+#ifndef SELDINGER_BASE_FAULTS_H
+#define SELDINGER_BASE_FAULTS_H
 
 #include <stdbool.h>
 #include <stddef.h>

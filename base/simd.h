@@ -1,6 +1,6 @@
 // Which of a kernel's forms to run: one answer for the whole program, so that a level can be forced and compared. All forms give the same bits.
-#ifndef SELDINGER_GEOM_SIMD_H
-#define SELDINGER_GEOM_SIMD_H
+#ifndef SELDINGER_BASE_SIMD_H
+#define SELDINGER_BASE_SIMD_H
 
 typedef enum { SIMD_SSE2, SIMD_AVX2, SIMD_AVX512, SIMD_COUNT } SimdLevel;
 extern const char *const simd_name[SIMD_COUNT];      // "sse2", "avx2", "avx512": the baseline is whatever the compiler takes for granted

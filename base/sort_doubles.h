@@ -1,6 +1,6 @@
 // Numbers in rising order, for medians and percentiles.
-#ifndef SELDINGER_GEOM_SORT_DOUBLES_H
-#define SELDINGER_GEOM_SORT_DOUBLES_H
+#ifndef SELDINGER_BASE_SORT_DOUBLES_H
+#define SELDINGER_BASE_SORT_DOUBLES_H
 
 #include <stddef.h>
 #include <stdlib.h>

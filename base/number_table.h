@@ -1,8 +1,8 @@
 // CSV of numbers: a header that names the columns, `#` comments, blank lines, one row a line. All faults in one pass.
-#ifndef SELDINGER_INPUT_NUMBER_TABLE_H
-#define SELDINGER_INPUT_NUMBER_TABLE_H
+#ifndef SELDINGER_BASE_NUMBER_TABLE_H
+#define SELDINGER_BASE_NUMBER_TABLE_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 
 #include <stdbool.h>
 #include <stddef.h>

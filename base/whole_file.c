@@ -1,4 +1,4 @@
-#include "recon/whole_file.h"
+#include "base/whole_file.h"
 
 #include "base/part_file.h"
 #include "base/regular_file.h"

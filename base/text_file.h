@@ -1,8 +1,8 @@
 // A text file as one block of memory. Refuses what is no regular file (a device or a pipe could block or never end) and what is too long.
-#ifndef SELDINGER_INPUT_TEXT_FILE_H
-#define SELDINGER_INPUT_TEXT_FILE_H
+#ifndef SELDINGER_BASE_TEXT_FILE_H
+#define SELDINGER_BASE_TEXT_FILE_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 
 #include <stddef.h>
 

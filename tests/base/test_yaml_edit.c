@@ -6,7 +6,7 @@
 
 #include <cmocka.h>
 
-#include "input/yaml_edit.h"
+#include "base/yaml_edit.h"
 
 #include <stdlib.h>
 

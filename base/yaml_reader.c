@@ -1,10 +1,11 @@
 // libyaml's document API keeps the line and column of every node but accepts duplicate keys; they are refused here.
-#include "input/yaml_reader.h"
+#include "base/yaml_reader.h"
 
-#include "input/nearest_name.h"
-#include "input/number_table.h"
+#include "base/nearest_name.h"
+#include "base/number_table.h"
 
 #include <ctype.h>
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -434,39 +435,6 @@ bool yaml_boolean(YamlValue value, bool *answer)
     return choice >= 0;
 }
 
-bool yaml_vector(YamlValue value, double largest, Vec3 *vector)
-{
-    double component[3];
-    if (!value.node)
-        return false;
-    if (yaml_is_list(value) && yaml_count(value, 3, 3) < 0)
-        return false;
-    if (!yaml_is_list(value)) {
-        yaml_fault(value, "'%s' is no list of three numbers; [x, y, z]", value.name);
-        return false;
-    }
-    bool good = true;
-    for (int i = 0; i < 3; i++)
-        good &= yaml_number(yaml_item(value, i), (NumberRange){-largest, largest, false}, &component[i]);
-    if (good)
-        *vector = vec3(component[0], component[1], component[2]);
-    return good;
-}
-
-bool yaml_unit_vector(YamlValue value, Vec3 *vector)
-{
-    Vec3 read;
-    if (!yaml_vector(value, 1e6, &read))
-        return false;
-    double length = vec3_norm(read);
-    if (length < 1e-9) {
-        yaml_fault(value, "'%s' has no length; a direction such as [1, 0, 0]", value.name);
-        return false;
-    }
-    *vector = vec3_scale(read, 1 / length);
-    return true;
-}
-
 int yaml_choice(YamlValue value, const char *const *names)
 {
     const char *text;
@@ -484,14 +452,4 @@ int yaml_choice(YamlValue value, const char *const *names)
 bool yaml_map_number(const YamlMap *map, const char *key, bool required, NumberRange range, double *number)
 {
     return yaml_number(yaml_get(map, key, required), range, number);
-}
-
-bool yaml_map_vector(const YamlMap *map, const char *key, bool required, double largest, Vec3 *vector)
-{
-    return yaml_vector(yaml_get(map, key, required), largest, vector);
-}
-
-bool yaml_map_unit_vector(const YamlMap *map, const char *key, bool required, Vec3 *vector)
-{
-    return yaml_unit_vector(yaml_get(map, key, required), vector);
 }

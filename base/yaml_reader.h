@@ -1,11 +1,10 @@
 // Reads a YAML document by a schema that the caller walks: a map is opened with the list of its valid keys, then asked for each value by
 // type and range. Everything that is wrong becomes a fault with file:line:col; reading goes on, so one pass finds all.
 // Aliases are followed. A walk of bounded depth cannot run into a cycle; a budget of visited nodes bounds repeated aliases.
-#ifndef SELDINGER_INPUT_YAML_READER_H
-#define SELDINGER_INPUT_YAML_READER_H
+#ifndef SELDINGER_BASE_YAML_READER_H
+#define SELDINGER_BASE_YAML_READER_H
 
-#include "geom/faults.h"
-#include "geom/linear.h"
+#include "base/faults.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -54,14 +53,10 @@ bool yaml_text(YamlValue value, const char **text);        // a fault where it i
 bool yaml_number(YamlValue value, NumberRange range, double *number);
 bool yaml_integer(YamlValue value, int least, int most, int *number);
 bool yaml_boolean(YamlValue value, bool *answer);
-bool yaml_vector(YamlValue value, double largest, Vec3 *vector);       // [x, y, z], each within +-largest
-bool yaml_unit_vector(YamlValue value, Vec3 *vector);                  // made unit; zero is a fault
 // One of `names` (NULL-terminated): its index, or -1 with a fault.
 int yaml_choice(YamlValue value, const char *const *names);
 
 // The same by key: false where the key is absent (a fault with `required`) or wrong; the output then keeps its value.
 bool yaml_map_number(const YamlMap *map, const char *key, bool required, NumberRange range, double *number);
-bool yaml_map_vector(const YamlMap *map, const char *key, bool required, double largest, Vec3 *vector);
-bool yaml_map_unit_vector(const YamlMap *map, const char *key, bool required, Vec3 *vector);
 
 #endif

@@ -1,4 +1,4 @@
-#include "geom/faults.h"
+#include "base/faults.h"
 
 #include <stdarg.h>
 #include <stdio.h>

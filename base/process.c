@@ -1,9 +1,8 @@
 #define _GNU_SOURCE   // the stack of all threads
-#include "cli/process.h"
+#include "base/process.h"
 
 #include "base/heap.h"
 #include "base/part_file.h"
-#include "cli/cli.h"
 
 #include <cjson/cJSON.h>
 #include <errno.h>

@@ -1,6 +1,6 @@
 // SHA-256 (FIPS 180-4), to name the files that a recording was made from.
-#ifndef SELDINGER_SIM_SHA256_H
-#define SELDINGER_SIM_SHA256_H
+#ifndef SELDINGER_BASE_SHA256_H
+#define SELDINGER_BASE_SHA256_H
 
 #include <stdbool.h>
 #include <stddef.h>

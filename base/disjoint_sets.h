@@ -1,7 +1,7 @@
 // Sets of things that are joined pair by pair (union-find): parent[i] leads to the lowest member of i's set, which is its own parent. At first
 // parent[i] = i.
-#ifndef SELDINGER_GEOM_DISJOINT_SETS_H
-#define SELDINGER_GEOM_DISJOINT_SETS_H
+#ifndef SELDINGER_BASE_DISJOINT_SETS_H
+#define SELDINGER_BASE_DISJOINT_SETS_H
 
 static inline int disjoint_root(int *parent, int i)
 {

@@ -1,8 +1,8 @@
 // Whole files: read at once, and written so that no half file is ever left (base/part_file.h).
-#ifndef SELDINGER_RECON_WHOLE_FILE_H
-#define SELDINGER_RECON_WHOLE_FILE_H
+#ifndef SELDINGER_BASE_WHOLE_FILE_H
+#define SELDINGER_BASE_WHOLE_FILE_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 
 // The bytes of a regular file, NUL-terminated beyond `length`; NULL with a fault. The caller frees.
 char *whole_file_read(const char *path, size_t *length, Faults *faults);

@@ -1,4 +1,4 @@
-#include "geom/simd.h"
+#include "base/simd.h"
 
 #include <stdlib.h>
 #include <string.h>
