@@ -1,7 +1,7 @@
 // seldinger bench: the table of benchmarks, and how a run is measured.
 #include "bench/bench.h"
 
-#include "cli/output.h"
+#include "base/output.h"
 
 #include <getopt.h>
 #include <inttypes.h>
@@ -173,7 +173,7 @@ bool bench_open(const char *path, int threads, BenchScene *out, Faults *faults)
 {
     *out = (BenchScene){0};
     out->scene = scene_load(path, faults);
-    return out->scene && open_vessel(out->scene, threads, true, &out->open, faults) && open_vessel_inlet(out->scene, &out->open, faults);
+    return out->scene && cli_open_vessel(out->scene, threads, true, &out->open, faults) && open_vessel_inlet(out->scene, &out->open, faults);
 }
 
 void bench_close(BenchScene *scene)

@@ -2,7 +2,7 @@
 // same way everywhere. Representations differ by colour (Okabe and Ito's, told apart by the colour-blind) and by shape.
 #include "bench/collision_chart.h"
 
-#include "cli/output.h"
+#include "base/output.h"
 #include "cli/report.h"
 
 #include <math.h>

@@ -5,13 +5,13 @@
 #include "bench/collision_course.h"
 #include "bench/collision_surface.h"
 #include "bench/shape_vessel.h"
-#include "cli/contact_surface.h"
-#include "cli/tube_tree.h"
 #include "geom/grid_vessel.h"
 #include "geom/mesh_vessel.h"
 #include "recon/lim_fit.h"
 #include "recon/phantom.h"
 #include "recon/tree_file.h"
+#include "sim/contact_surface.h"
+#include "sim/tube_tree.h"
 
 #include <stdlib.h>
 #include <unistd.h>
@@ -70,7 +70,7 @@ typedef struct Figures {
 static TriangleMesh *mesh_wall(Wall *wall, double triangles, Faults *faults)
 {
     double cell = wall->area > 0 ? sqrt(wall->area / triangles) : contact_surface_cell(wall->nodes, triangles);
-    TriangleMesh *mesh = contact_surface_mesh(wall->near_exact ? wall->near_exact : wall->exact, wall->nodes, false, cell, wall->name, faults);
+    TriangleMesh *mesh = contact_surface_mesh(wall->near_exact ? wall->near_exact : wall->exact, wall->nodes, false, cell, wall->name, cli_note, faults);
     if (mesh)
         wall->area = cell * cell * mesh->triangle_count;
     for (int i = 0; mesh && wall->shape && i < mesh->vertex_count; i++)

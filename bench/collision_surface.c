@@ -3,13 +3,13 @@
 #include "bench/collision_surface.h"
 
 #include "bench/shape_vessel.h"
-#include "cli/contact_surface.h"
-#include "cli/tube_tree.h"
 #include "geom/grid_vessel.h"
 #include "geom/mesh_vessel.h"
 #include "recon/field_fit.h"
 #include "recon/lim_fit.h"
 #include "recon/tree_file.h"
+#include "sim/contact_surface.h"
+#include "sim/tube_tree.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -272,7 +272,7 @@ void collision_surface_close(CollisionSurface *s)
 static TriangleMesh *mesh_of(const CollisionSurface *s, const Vessel *wall, double cell_mm, Faults *faults)
 {
     bool open_end = s->scene->source == SOURCE_TUBE && !s->of->convolution_capsule && !s->scene->tube.closed_ends;
-    return contact_surface_mesh(wall, s->nodes, open_end, cell_mm, s->of->name, faults);
+    return contact_surface_mesh(wall, s->nodes, open_end, cell_mm, s->of->name, cli_note, faults);
 }
 
 // Moves all vertices onto the wall, to 1e-9 mm. False where one would go further than half a cell, or does not get there.

@@ -1,12 +1,12 @@
 // seldinger bench drawing: what a picture of the trainer costs, and whether drawing disturbs the 1 kHz thread.
 #include "bench/bench.h"
 
-#include "cli/live_session.h"
 #include "cli/scene_views.h"
 #include "cli/trainer_panel.h"
 #include "render/gl_canvas.h"
 #include "render/gl_context.h"
 #include "sim/clock.h"
+#include "sim/live_session.h"
 
 #include <getopt.h>
 #include <stdlib.h>

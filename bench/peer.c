@@ -3,7 +3,7 @@
 // machine and on meshes of the same tubes: its times are printed to give the order of magnitude.
 #include "bench/bench.h"
 
-#include "cli/output.h"
+#include "base/output.h"
 #include "geom/mesh_vessel.h"
 
 #include <stdlib.h>
@@ -82,7 +82,7 @@ static bool run_row(Row *row, int64_t most_steps, int threads, Faults *faults)
     bool good = s.scene != NULL;
     if (good) {
         s.scene->contact = surfaces[row->surface];
-        good = open_vessel(s.scene, threads, true, &s.open, faults);
+        good = cli_open_vessel(s.scene, threads, true, &s.open, faults);
     }
     row->wanted_steps = good ? bench_steps(s.scene, most_steps) : 0;
     size_t room = (size_t)row->wanted_steps + 1;

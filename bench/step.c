@@ -9,8 +9,8 @@
 #include "bench/tools.h"
 
 #include "base/heap.h"
+#include "base/output.h"
 #include "base/simd.h"
-#include "cli/output.h"
 #include "solver/block_chain.h"
 
 #include <getopt.h>

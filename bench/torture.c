@@ -1,9 +1,9 @@
 // seldinger bench torture: random hands, tools and vessels, judged by the true wall. Every run is a scene file made from its seed (torture_scene.h).
 #define _XOPEN_SOURCE 700   // realpath
+#include "base/output.h"
 #include "bench/bench.h"
 #include "bench/shape_vessel.h"
 #include "bench/torture_scene.h"
-#include "cli/output.h"
 #include "recon/phantom.h"
 #include "recon/tree_file.h"
 #include "sim/drive.h"
@@ -191,7 +191,7 @@ static void run_text(Torture *torture, const char *text, const char *name, Outco
     Shape *shape = NULL;
     pthread_mutex_lock(&torture->files);
     Scene *scene = scene_parse(text, strlen(text), name, faults);
-    bool good = scene && open_vessel(scene, torture->common.threads, true, &open, faults) && open_vessel_inlet(scene, &open, faults);
+    bool good = scene && cli_open_vessel(scene, torture->common.threads, true, &open, faults) && open_vessel_inlet(scene, &open, faults);
     if (good && scene->source == SOURCE_SHAPE)
         shape = shape_create(scene->shape_name, scene->shape_option_count, (const char(*)[2][64])scene->shape_option, name, faults);
     pthread_mutex_unlock(&torture->files);

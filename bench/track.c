@@ -3,9 +3,9 @@
 // Per row all trees of a kind: random trees at four noise levels, and what the paper names as trouble: vessels in contact, bone, aneurysms, anisotropic
 // voxels, contrast that fades, clipped brightness. "from one click" tracks the whole tree from the root's start. The others are run as the authors ran
 // them (5.2.1): one run a branch, started in it with the true point, direction and radius, and judged on that branch alone.
+#include "base/output.h"
 #include "bench/bench.h"
 #include "bench/starts.h"
-#include "cli/output.h"
 
 #include "base/parallel.h"
 #include "bench/mht_track.h"

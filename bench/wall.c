@@ -4,8 +4,8 @@
 #include "bench/wall.h"
 
 #include "base/heap.h"
+#include "base/output.h"
 #include "base/simd.h"
-#include "cli/output.h"
 #include "cli/output_plan.h"
 #include "recon/model_measure.h"
 #include "recon/tree_file.h"

@@ -38,3 +38,12 @@ Progress progress_bar(ProgressBar *bar, const char *label, bool quiet)
     bar->shown = !quiet && isatty(STDERR_FILENO);
     return (Progress){.call = bar->shown ? draw_bar : NULL, .context = bar};
 }
+
+void cli_note(const char *path, const char *text) { cli_notes(stderr, path, text); }
+
+bool cli_open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults)
+{
+    ProgressBar bar;
+    Progress progress = progress_bar(&bar, "fit", quiet);
+    return open_vessel(scene, &(OpenVesselOptions){.threads = threads, .progress = &progress, .note = cli_note}, out, faults);
+}

@@ -5,7 +5,7 @@
 #include "base/parallel.h"
 #include "base/process.h"
 #include "geom/geom.h"
-#include "sim/scene.h"
+#include "sim/open_vessel.h"
 
 #include <stdio.h>
 
@@ -31,17 +31,8 @@ bool cli_size(const char *text, int *width, int *height);
 // A view by name, its index: fluoroscopy, 3d, angioscopy, all; else a message and false.
 bool cli_view(const char *text, int *view);
 
-// Opens what a scene's `vessel:` names (recon is not below sim): loads a model, fits a shape (cached), builds a tube or plane.
-typedef struct OpenVessel {
-    Vessel *vessel;          // NULL for SOURCE_NONE
-    VesselTree *tree;        // LIM only
-    TriangleMesh *mesh;      // the wall where that is triangles, else filled on demand by open_vessel_mesh
-} OpenVessel;
-bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults);
-// The vessel's surface for pictures; NULL for planes.
-const TriangleMesh *open_vessel_mesh(const Scene *scene, OpenVessel *open);
-// Where the scene says `inlet: root`: start and direction of the tool from the vessel's inlet. False with a fault where it has none.
-bool open_vessel_inlet(Scene *scene, const OpenVessel *open, Faults *faults);
-void open_vessel_close(OpenVessel *open);
+// open_vessel() with a progress bar and notes on standard error.
+bool cli_open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults);
+void cli_note(const char *path, const char *text);   // cli_notes() to standard error
 
 #endif

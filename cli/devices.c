@@ -2,7 +2,7 @@
 #include "cli/cli.h"
 
 #include "cli/devices.h"
-#include "cli/output.h"
+#include "base/output.h"
 #include "cli/output_plan.h"
 #include "input/force_feedback.h"
 #include "input/hand.h"

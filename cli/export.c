@@ -1,10 +1,10 @@
 // seldinger export: surfaces, centrelines and recordings for other programs.
 #include "cli/cli.h"
 
-#include "cli/file_kind.h"
-#include "cli/output.h"
-#include "cli/output_plan.h"
 #include "base/heap.h"
+#include "base/output.h"
+#include "cli/file_kind.h"
+#include "cli/output_plan.h"
 #include "geom/surface_parts.h"
 #include "recon/tree_file.h"
 #include "sim/recording.h"

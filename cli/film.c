@@ -1,13 +1,13 @@
 #include "cli/film.h"
 
 #include "cli/playback.h"
-#include "cli/rescore.h"
 #include "cli/scene_views.h"
 #include "cli/trainer_panel.h"
 #include "render/gl_canvas.h"
 #include "render/gl_context.h"
 #include "render/movie_file.h"
 #include "render/png_file.h"
+#include "sim/rescore.h"
 
 #include <math.h>
 #include <stdlib.h>

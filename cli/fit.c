@@ -2,9 +2,9 @@
 #include "cli/cli.h"
 
 #include "base/heap.h"
+#include "base/output.h"
 #include "base/sort_doubles.h"
 #include "cli/junction_sheets.h"
-#include "cli/output.h"
 #include "cli/output_plan.h"
 #include "cli/reach_report.h"
 #include "recon/blurred_edge.h"

@@ -1,9 +1,9 @@
 // seldinger import: a surface, with centrelines or alone, to the tree of nodes and local points that `fit` takes (recon/import_surface.h).
 #include "cli/cli.h"
 
-#include "cli/output.h"
-#include "cli/output_plan.h"
 #include "base/heap.h"
+#include "base/output.h"
+#include "cli/output_plan.h"
 #include "recon/centreline_file.h"
 #include "recon/import_surface.h"
 #include "recon/mesh_centreline.h"

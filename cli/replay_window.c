@@ -1,12 +1,12 @@
 #include "cli/replay_window.h"
 
 #include "cli/playback.h"
-#include "cli/rescore.h"
 #include "cli/scene_views.h"
 #include "cli/trainer_panel.h"
 #include "render/timeline.h"
 #include "render/window.h"
 #include "sim/clock.h"
+#include "sim/rescore.h"
 
 #include <stdlib.h>
 

@@ -1,6 +1,6 @@
 #include "cli/report.h"
 
-#include "cli/output.h"
+#include "base/output.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -2,8 +2,8 @@
 #include "cli/cli.h"
 
 #include "base/heap.h"
+#include "base/output.h"
 #include "base/process.h"
-#include "cli/output.h"
 #include "cli/output_plan.h"
 #include "cli/run_chart.h"
 #include "cli/run_files.h"
@@ -452,7 +452,7 @@ int verb_run(int argc, char **argv)
     if (!scene)
         return cli_bad_input(&faults);
     code = EXIT_BAD_INPUT;
-    if (open_vessel(scene, options.threads, options.quiet, &open, &faults) && open_vessel_inlet(scene, &open, &faults))
+    if (cli_open_vessel(scene, options.threads, options.quiet, &open, &faults) && open_vessel_inlet(scene, &open, &faults))
         code = simulate(&options, scene, &open, &faults);
     if (faults.count > 0)
         cli_bad_input(&faults);

@@ -2,9 +2,9 @@
 #include "cli/cli.h"
 #include "base/same_math.h"
 
-#include "cli/output.h"
-#include "cli/output_plan.h"
 #include "base/heap.h"
+#include "base/output.h"
+#include "cli/output_plan.h"
 #include "recon/blurred_edge.h"
 #include "recon/rbt_track.h"
 #include "recon/trace.h"

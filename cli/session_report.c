@@ -2,16 +2,16 @@
 #include "cli/session_report.h"
 
 #include "base/heap.h"
+#include "base/output.h"
 #include "base/text_file.h"
 #include "base/whole_file.h"
 #include "cli/file_kind.h"
-#include "cli/output.h"
 #include "cli/output_plan.h"
-#include "cli/recover.h"
 #include "cli/report.h"
-#include "cli/trainer_files.h"
-#include "cli/tube_tree.h"
 #include "sim/recording.h"
+#include "sim/recover.h"
+#include "sim/session_files.h"
+#include "sim/tube_tree.h"
 
 #include <getopt.h>
 #include <signal.h>
@@ -290,7 +290,7 @@ static Scene *open_scene(const RecordedRun *run, OpenVessel *open, VesselTree **
     if (scene->source == SOURCE_MODEL || scene->source == SOURCE_SHAPE)
         scene->contact = CONTACT_LIM;            // the tree is wanted, not the wall
     if (scene->source == SOURCE_MODEL || scene->source == SOURCE_SHAPE || scene->source == SOURCE_TUBE)
-        open_vessel(scene, 0, true, open, faults);
+        cli_open_vessel(scene, 0, true, open, faults);
     *tree = open->tree;
     if (scene->source == SOURCE_TUBE && open->vessel)
         *tree = tube_tree(open->vessel, &scene->tube, scene->path, faults);
@@ -502,7 +502,7 @@ static void name_session_file(ReportOptions *options)
 {
     if (file_kind(options->session) != FILE_RECORDING)
         return;
-    trainer_file_beside(options->session, ".json", options->beside, sizeof options->beside);
+    session_file_beside(options->session, ".json", options->beside, sizeof options->beside);
     options->recording = options->session;
     options->session = options->beside;
 }
@@ -513,7 +513,7 @@ static bool make_session_file(const ReportOptions *options, Faults *faults)
         return true;
     if (!options->quiet)
         fprintf(stderr, "%s has no session file; simulating it again\n", options->recording);
-    return recover_session(options->recording, NULL, NULL, faults);
+    return recover_session(options->recording, &(OpenVesselOptions){.note = cli_note}, NULL, NULL, faults);
 }
 
 int verb_report(int argc, char **argv)

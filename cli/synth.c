@@ -1,7 +1,7 @@
 // seldinger synth: synthetic shapes with known truth, as point sets, surfaces or noisy volumes; and a fitted model measured against truth.
 #include "cli/cli.h"
 
-#include "cli/output.h"
+#include "base/output.h"
 #include "cli/output_plan.h"
 #include "recon/lim_fit.h"
 #include "recon/phantom_measure.h"

@@ -1,10 +1,7 @@
 #include "cli/trainer.h"
 
-#include "cli/live_session.h"
-#include "cli/recover.h"
 #include "cli/scene_views.h"
 #include "cli/trainer_cine.h"
-#include "cli/trainer_files.h"
 #include "cli/trainer_panel.h"
 #include "cli/trainer_tray.h"
 #include "input/gamepad.h"
@@ -13,6 +10,9 @@
 #include "render/png_file.h"
 #include "render/pulse_clock.h"
 #include "sim/clock.h"
+#include "sim/live_session.h"
+#include "sim/recover.h"
+#include "sim/session_files.h"
 
 #include <stdarg.h>
 #include <stdlib.h>
@@ -119,7 +119,7 @@ static bool is_answered_yes(Trainer *trainer, PanelQuestion question)
 static void offer_recovery(Trainer *trainer)
 {
     char text[300];
-    CutOff found = trainer_find_cut_off(trainer->options->folder);
+    CutOff found = session_find_cut_off(trainer->options->folder);
     Faults *faults = found.count > 0 ? calloc(1, sizeof *faults) : NULL;
     if (faults) {
         const char *slash = strrchr(found.path[found.count - 1], '/');
@@ -129,14 +129,14 @@ static void offer_recovery(Trainer *trainer)
         trainer->progress = "Simulating the session again";
         for (int i = 0; wanted && i < found.count; i++) {
             faults_clear(faults);
-            if (recover_session(found.path[i], show_progress, trainer, faults))
+            if (recover_session(found.path[i], &(OpenVesselOptions){.note = cli_note}, show_progress, trainer, faults))
                 say(trainer, MARK_GOOD, "recovered; seldinger report %s", found.path[i]);
             else
                 say(trainer, MARK_BAD, "%s", faults->text[0]);
         }
     }
     free(faults);
-    trainer_free_cut_off(&found);
+    session_free_cut_off(&found);
 }
 
 static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *faults)
@@ -152,7 +152,7 @@ static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *f
     for (int i = 0; trainer->hands && i < HANDS_MOST * MAP_HANDS; i++)
         hand[count++] = hands_port(trainer->hands, i / MAP_HANDS) + i % MAP_HANDS;
     trainer->desk.grip = (HandGrip){.chosen = trainer->desk.grip.chosen};    // a new session: nothing is locked or let go
-    trainer_file_name(options->folder, trainer->scene->path, ".h5", path, sizeof path);
+    session_file_name(options->folder, trainer->scene->path, ".h5", path, sizeof path);
     LiveSessionOptions session = {.record_path = options->is_recorded ? path : NULL, .trainee = trainer->trainee, .date = trainer->date, .hand_count = count, .hand = hand, .grip = trainer->desk.grip, .xray = trainer->desk.xray,
                                   .resume = resume, .resume_s = resume == options->resume ? options->resume_s : SCRIPT_LONGEST_S, .paused = trainer->is_paused,
                                   .progress = trainer->figures->frames > 0 ? show_progress : NULL, .progress_context = trainer};
@@ -203,7 +203,7 @@ static bool end_session(Trainer *trainer, Faults *faults)
     snprintf(figures->recording, sizeof figures->recording, "%s", session->record_path);
     name_devices(trainer, device);
     if (whole && session->record_path[0])
-        whole = trainer_save_session(trainer->scene, trainer->trainee, device, trainer->date, lesson_score(session->lesson), session->record_path, faults);
+        whole = session_files_save(trainer->scene, trainer->trainee, device, trainer->date, lesson_score(session->lesson), session->record_path, faults);
     live_session_free(session);
     return whole;
 }
@@ -482,7 +482,7 @@ static void take_screenshot(Trainer *trainer, const WindowInput *input)
 {
     char path[4096], message[256];
     uint8_t *rgb = malloc((size_t)input->width * (size_t)input->height * 3);
-    trainer_file_name(trainer->options->folder, trainer->scene->path, ".png", path, sizeof path);
+    session_file_name(trainer->options->folder, trainer->scene->path, ".png", path, sizeof path);
     if (rgb)
         gl_framebuffer_read(0, input->width, input->height, rgb);
     if (rgb && png_file_write(path, input->width, input->height, rgb, message, sizeof message))
@@ -501,7 +501,7 @@ static void obey_cine(Trainer *trainer, const PanelActions *actions, Faults *fau
         say(trainer, MARK_NONE, "%s", told);
     if (!actions->pressed[ACTION_CINE_SAVE])
         return;
-    trainer_file_name(trainer->options->folder, trainer->scene->path, "", stem, sizeof stem);
+    session_file_name(trainer->options->folder, trainer->scene->path, "", stem, sizeof stem);
     bool good = trainer_cine_save(&trainer->cine, trainer->views, stem, told, sizeof told, faults);
     say(trainer, good ? MARK_GOOD : MARK_WARNING, "%s", told);
     faults_clear(faults);

@@ -1,7 +1,7 @@
 #include "cli/trainer_cine.h"
 
+#include "base/output.h"
 #include "base/whole_file.h"
-#include "cli/output.h"
 #include "render/gl_canvas.h"
 
 #include <stdio.h>

@@ -2,9 +2,9 @@
 #ifndef SELDINGER_CLI_TRAINER_TRAY_H
 #define SELDINGER_CLI_TRAINER_TRAY_H
 
-#include "cli/tray_devices.h"
 #include "render/panel.h"
 #include "sim/pose.h"
+#include "sim/tray_devices.h"
 
 enum { TRAY_WORDS = 320 };
 

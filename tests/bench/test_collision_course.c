@@ -8,7 +8,7 @@
 
 #include "bench/bench.h"
 #include "bench/collision_course.h"
-#include "cli/tube_tree.h"
+#include "sim/tube_tree.h"
 
 #include <stdlib.h>
 

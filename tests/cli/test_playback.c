@@ -7,10 +7,10 @@
 #include <cmocka.h>
 
 #include "cli/playback.h"
-#include "cli/rescore.h"
-#include "tests/cli/trainer_scene.h"
+#include "sim/rescore.h"
 #include "tests/geom/near.h"
 #include "tests/geom/random_numbers.h"
+#include "tests/sim/trainer_scene.h"
 
 #include <stdlib.h>
 #include <unistd.h>

@@ -1,6 +1,6 @@
 // A recording becomes a regression scene: a folder with the scene's text, the recorded hand as its script, and the golden tool path.
-#ifndef SELDINGER_CLI_REPLAY_SCENE_H
-#define SELDINGER_CLI_REPLAY_SCENE_H
+#ifndef SELDINGER_SIM_REPLAY_SCENE_H
+#define SELDINGER_SIM_REPLAY_SCENE_H
 
 #include "sim/compare.h"
 #include "sim/replay.h"

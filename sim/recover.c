@@ -1,9 +1,8 @@
-#include "cli/recover.h"
+#include "sim/recover.h"
 
-#include "cli/cli.h"
-#include "cli/rescore.h"
-#include "cli/trainer_files.h"
 #include "sim/replay.h"
+#include "sim/rescore.h"
+#include "sim/session_files.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -32,13 +31,13 @@ static bool save(const RecordedRun *run, const Scene *scene, const OpenVessel *o
         faults_add(faults, recording, 0, 0, "cannot be scored: step %lld gives another state than it holds; `seldinger replay --verify` says more",
                    (long long)rescore_first_different(rescore));
     else
-        good = trainer_save_session(scene, run->trainee ? run->trainee : "", "not known: the session was cut off",
+        good = session_files_save(scene, run->trainee ? run->trainee : "", "not known: the session was cut off",
                                     date, rescore_score(rescore), recording, faults);
     rescore_free(rescore);
     return good;
 }
 
-bool recover_session(const char *recording, void (*progress)(void *context, double part), void *context, Faults *faults)
+bool recover_session(const char *recording, const OpenVesselOptions *options, void (*progress)(void *context, double part), void *context, Faults *faults)
 {
     OpenVessel open = {0};
     int before = faults->count;
@@ -46,7 +45,7 @@ bool recover_session(const char *recording, void (*progress)(void *context, doub
     if (run && run->step_count < 1)
         faults_add(faults, recording, 0, 0, "holds no step to be scored");
     Scene *scene = run && faults->count == before ? replay_scene(run, recording, faults) : NULL;
-    bool good = scene && open_vessel(scene, 0, true, &open, faults) && open_vessel_inlet(scene, &open, faults) &&
+    bool good = scene && open_vessel(scene, options, &open, faults) && open_vessel_inlet(scene, &open, faults) &&
                 save(run, scene, &open, recording, progress, context, faults);
     open_vessel_close(&open);
     scene_free(scene);

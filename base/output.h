@@ -1,7 +1,7 @@
 // Output files named on the command line: "-" is standard output, a device or pipe is written as it is, anything else is written beside
 // and renamed, so that no half file is left.
-#ifndef SELDINGER_CLI_OUTPUT_H
-#define SELDINGER_CLI_OUTPUT_H
+#ifndef SELDINGER_BASE_OUTPUT_H
+#define SELDINGER_BASE_OUTPUT_H
 
 #include "base/faults.h"
 

@@ -1,7 +1,7 @@
 // What lies on the tray for a tool: its devices in the scene, and those of a folder that would fit. A device that is not in the scene yet, or whose tip is
 // shaped by hand, is written into the scene's text under `exchange:`, so that a session's recording holds all that it was made from.
-#ifndef SELDINGER_CLI_TRAY_DEVICES_H
-#define SELDINGER_CLI_TRAY_DEVICES_H
+#ifndef SELDINGER_SIM_TRAY_DEVICES_H
+#define SELDINGER_SIM_TRAY_DEVICES_H
 
 #include "sim/scene.h"
 

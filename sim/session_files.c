@@ -1,6 +1,6 @@
-#include "cli/trainer_files.h"
+#include "sim/session_files.h"
 
-#include "cli/output.h"
+#include "base/output.h"
 #include "recon/hdf5_reader.h"
 #include "sim/ordered_file.h"
 
@@ -31,7 +31,7 @@ static bool make_folders(char *path)
     return false;
 }
 
-bool trainer_folder(const char *wanted, char *out, size_t capacity, Faults *faults)
+bool session_folder(const char *wanted, char *out, size_t capacity, Faults *faults)
 {
     const char *data = getenv("XDG_DATA_HOME"), *home = getenv("HOME");
     int length = wanted         ? snprintf(out, capacity, "%s", wanted)
@@ -47,7 +47,7 @@ bool trainer_folder(const char *wanted, char *out, size_t capacity, Faults *faul
     return false;
 }
 
-void trainer_file_name(const char *folder, const char *scene_path, const char *extension, char *out, size_t capacity)
+void session_file_name(const char *folder, const char *scene_path, const char *extension, char *out, size_t capacity)
 {
     const char *name = strrchr(scene_path, '/');
     name = name ? name + 1 : scene_path;
@@ -61,14 +61,14 @@ void trainer_file_name(const char *folder, const char *scene_path, const char *e
         snprintf(out, capacity, "%s/%.*s-%s-%d%s", folder, stem < 100 ? stem : 100, name, when, i, extension);
 }
 
-void trainer_file_beside(const char *recording, const char *extension, char *out, size_t capacity)
+void session_file_beside(const char *recording, const char *extension, char *out, size_t capacity)
 {
     const char *dot = strrchr(recording, '.'), *slash = strrchr(recording, '/');
     int stem = dot && (!slash || dot > slash) ? (int)(dot - recording) : (int)strlen(recording);
     snprintf(out, capacity, "%.*s%s", stem, recording, extension);
 }
 
-bool trainer_save_session(const Scene *scene, const char *trainee, const char *device, const char *date, const Score *score, const char *recording,
+bool session_files_save(const Scene *scene, const char *trainee, const char *device, const char *date, const Score *score, const char *recording,
                           Faults *faults)
 {
     char path[4096];
@@ -85,7 +85,7 @@ bool trainer_save_session(const Scene *scene, const char *trainee, const char *d
     }
     recorded_run_free(run);
     free(session);
-    trainer_file_beside(recording, ".json", path, sizeof path);
+    session_file_beside(recording, ".json", path, sizeof path);
     if (!text) {
         if (is_read)
             faults_add(faults, path, 0, 0, "no session file could be made: no memory");
@@ -101,7 +101,7 @@ bool trainer_save_session(const Scene *scene, const char *trainee, const char *d
 static bool has_session_file(const char *recording)
 {
     char path[4200];
-    trainer_file_beside(recording, ".json", path, sizeof path);
+    session_file_beside(recording, ".json", path, sizeof path);
     return access(path, F_OK) == 0;
 }
 
@@ -121,7 +121,7 @@ static bool is_cut_off(const char *recording)
 
 static int compare_paths(const void *a, const void *b) { return strcmp(a, b); }
 
-CutOff trainer_find_cut_off(const char *folder)
+CutOff session_find_cut_off(const char *folder)
 {
     CutOff found = {0};
     DIR *directory = opendir(folder);
@@ -143,7 +143,7 @@ CutOff trainer_find_cut_off(const char *folder)
     return found;
 }
 
-void trainer_free_cut_off(CutOff *found)
+void session_free_cut_off(CutOff *found)
 {
     free(found->path);
     *found = (CutOff){0};

@@ -1,4 +1,4 @@
-#include "cli/output.h"
+#include "base/output.h"
 
 #include "base/part_file.h"
 #include "base/whole_file.h"

@@ -1,6 +1,6 @@
 // An exact tube as a tree with surface samples, so that the local blobby models can be compared with the exact answer on the same scene.
-#ifndef SELDINGER_CLI_TUBE_TREE_H
-#define SELDINGER_CLI_TUBE_TREE_H
+#ifndef SELDINGER_SIM_TUBE_TREE_H
+#define SELDINGER_SIM_TUBE_TREE_H
 
 #include "geom/vessel.h"
 

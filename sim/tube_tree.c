@@ -1,6 +1,6 @@
 // The axis is followed by the tube's own answers: a probe beside the axis gets gap and normal, and the axis lies at x + (r - gap) normal.
 // So lines, arcs and polylines need no geometry of their own here.
-#include "cli/tube_tree.h"
+#include "sim/tube_tree.h"
 
 #include "base/same_math.h"
 

@@ -7,10 +7,10 @@
 
 #include <cmocka.h>
 
-#include "cli/live_session.h"
+#include "sim/live_session.h"
 #include "sim/replay.h"
-#include "tests/cli/trainer_scene.h"
 #include "tests/geom/near.h"
+#include "tests/sim/trainer_scene.h"
 
 #include <stdlib.h>
 #include <time.h>

@@ -1,11 +1,12 @@
-#include "cli/contact_surface.h"
+#include "sim/contact_surface.h"
 
-#include "cli/cli.h"
 #include "geom/grid_vessel.h"
 #include "geom/mesh_vessel.h"
 #include "geom/tree_surface.h"
 #include "recon/mesh_check.h"
 
+#include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 // Balls about the nodes that cover the wall. Upstream of the root there are some more where the wall goes on there.
@@ -71,22 +72,35 @@ static double thinnest_radius(const VesselTree *nodes)
     return thinnest;
 }
 
+static void tell(NoteFunction note, const char *name, const char *format, ...) __attribute__((format(printf, 3, 4)));
+static void tell(NoteFunction note, const char *name, const char *format, ...)
+{
+    char text[200];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    if (note)
+        note(name, text);
+}
+
 // Where neighbouring local models disagree little bubbles of wall hang in the lumen: smaller than a ball of the thinnest radius they are no vessel.
-static void drop_specks(TriangleMesh *mesh, double thinnest, const char *name)
+static void drop_specks(TriangleMesh *mesh, double thinnest, const char *name, NoteFunction note)
 {
     int dropped = surface_drop_specks(mesh, 4 * PI / 3 * thinnest * thinnest * thinnest);
     if (dropped > 0)
-        fprintf(stderr, "%s: %d specks of its mesh were left out: neighbouring local models disagree there\n", name, dropped);
+        tell(note, name, "%d specks of its mesh were left out: neighbouring local models disagree there", dropped);
 }
 
-TriangleMesh *contact_surface_mesh(const Vessel *exact, const VesselTree *nodes, bool open_end, double cell_mm, const char *name, Faults *faults)
+TriangleMesh *contact_surface_mesh(const Vessel *exact, const VesselTree *nodes, bool open_end, double cell_mm, const char *name, NoteFunction note,
+                                   Faults *faults)
 {
     static const double COARSE = 0.6;        // radii
     Balls balls;
     TriangleMesh *mesh = NULL;
     double thinnest = thinnest_radius(nodes);
     if (cell_mm > COARSE * thinnest)
-        fprintf(stderr, "%s: its mesh has cells of %g mm, which are coarse for a radius of %g mm: thin vessels lose their shape\n", name, cell_mm, thinnest);
+        tell(note, name, "its mesh has cells of %g mm, which are coarse for a radius of %g mm: thin vessels lose their shape", cell_mm, thinnest);
     if (fill_balls(&balls, exact, nodes, open_end, cell_mm))
         mesh = isosurface_of_vessel(exact, balls.count, balls.center, balls.reach, balls.from, cell_mm);
     if (!mesh)
@@ -97,7 +111,7 @@ TriangleMesh *contact_surface_mesh(const Vessel *exact, const VesselTree *nodes,
         mesh = NULL;
     }
     if (mesh)
-        drop_specks(mesh, thinnest, name);
+        drop_specks(mesh, thinnest, name, note);
     free(balls.center);
     free(balls.reach);
     free(balls.from);
@@ -153,7 +167,7 @@ static void add_normals(TriangleMesh *mesh)
         mesh->normal[i] = vec3_unit_or(mesh->normal[i], vec3(1, 0, 0));
 }
 
-TriangleMesh *contact_surface_load(const char *path, double scale, Faults *faults)
+TriangleMesh *contact_surface_load(const char *path, double scale, NoteFunction note, Faults *faults)
 {
     MeshCheck check;
     SurfaceMesh *surface = mesh_load_mended(path, scale, "mesh_scale: ", &check, faults);
@@ -161,7 +175,8 @@ TriangleMesh *contact_surface_load(const char *path, double scale, Faults *fault
         return NULL;
     char text[4096];
     mesh_check_text(&check, true, text, sizeof text);
-    cli_notes(stderr, path, text);
+    if (note)
+        note(path, text);
     TriangleMesh *mesh = NULL;
     if (check.nonmanifold_edges.count)
         faults_add(faults, path, 0, 0, "has %d edges of three triangles or more, first at triangle %d: inside and outside cannot be told; an edge has "

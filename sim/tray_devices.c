@@ -1,4 +1,4 @@
-#include "cli/tray_devices.h"
+#include "sim/tray_devices.h"
 
 #include "base/yaml_edit.h"
 

@@ -1,5 +1,7 @@
 // Surfaces of vessels that are no trees: rings along a tube's centreline, and a square of a plane.
-#include "render/picture.h"
+#include "geom/tube_mesh.h"
+
+#include "base/same_math.h"
 
 #include <stdlib.h>
 
@@ -55,8 +57,8 @@ static void lay_pieces(Path *path, const TubeOptions *tube)
         int parts = (int)fmin(fmax(ceil(piece->angle / 0.06), 2), 20000);
         for (int k = 0; k <= parts; k++) {
             double a = piece->angle * k / parts;
-            t = vec3_add_scaled(vec3_scale(t0, cos(a)), sin(a), n0);
-            n = vec3_add_scaled(vec3_scale(n0, cos(a)), -sin(a), t0);
+            t = vec3_add_scaled(vec3_scale(t0, same_cos(a)), same_sin(a), n0);
+            n = vec3_add_scaled(vec3_scale(n0, same_cos(a)), -same_sin(a), t0);
             p = vec3_add_scaled(center, -piece->arc_radius, n);
             add_station(path, p, t);
         }
@@ -123,7 +125,7 @@ static TriangleMesh *sweep(const Path *path, double radius)
         Vec3 binormal = vec3_cross(t, normal);
         for (int k = 0; k < SIDES; k++) {
             double a = 2 * PI * k / SIDES;
-            Vec3 out = vec3_add_scaled(vec3_scale(normal, cos(a)), sin(a), binormal);
+            Vec3 out = vec3_add_scaled(vec3_scale(normal, same_cos(a)), same_sin(a), binormal);
             mesh->vertex[i * SIDES + k] = vec3_add_scaled(path->point[i], radius, out);
             mesh->normal[i * SIDES + k] = out;
         }
@@ -138,7 +140,7 @@ static TriangleMesh *sweep(const Path *path, double radius)
     return mesh;
 }
 
-TriangleMesh *picture_mesh_of_tube(const TubeOptions *tube)
+TriangleMesh *triangle_mesh_of_tube(const TubeOptions *tube)
 {
     if (!tube || !(tube->radius > 0) || !isfinite(tube->radius))
         return NULL;
@@ -153,7 +155,7 @@ TriangleMesh *picture_mesh_of_tube(const TubeOptions *tube)
     return mesh;
 }
 
-TriangleMesh *picture_mesh_of_plane(Vec3 point, Vec3 normal, double half_width)
+TriangleMesh *triangle_mesh_of_plane(Vec3 point, Vec3 normal, double half_width)
 {
     enum { PARTS = 24 };
     if (!(half_width > 0) || !(vec3_norm(normal) > 0))

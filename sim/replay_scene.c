@@ -1,8 +1,8 @@
 #define _XOPEN_SOURCE 700   // realpath
-#include "cli/replay_scene.h"
+#include "sim/replay_scene.h"
 
+#include "base/output.h"
 #include "base/yaml_edit.h"
-#include "cli/output.h"
 
 #include <errno.h>
 #include <limits.h>

@@ -6,8 +6,8 @@
 
 #include <cmocka.h>
 
-#include "cli/trainer_files.h"
-#include "tests/cli/trainer_scene.h"
+#include "sim/session_files.h"
+#include "tests/sim/trainer_scene.h"
 
 #include <stdlib.h>
 #include <sys/stat.h>
@@ -28,19 +28,19 @@ static void the_folder_is_made_where_it_is_wanted(void **state)
     char out[4096], home[200];
     faults_clear(&faults);
     for (int again = 0; again < 2; again++) {   // there or not
-        assert_true(trainer_folder(in_folder("a/b c/d"), out, sizeof out, &faults));
+        assert_true(session_folder(in_folder("a/b c/d"), out, sizeof out, &faults));
         assert_string_equal(out, in_folder("a/b c/d"));
         assert_true(is_folder(out));
     }
-    assert_true(trainer_folder(in_folder("e/"), out, sizeof out, &faults) && is_folder(in_folder("e")));
+    assert_true(session_folder(in_folder("e/"), out, sizeof out, &faults) && is_folder(in_folder("e")));
     // without a wish: as the desktop's rules say
     snprintf(home, sizeof home, "%s", in_folder("home"));
     setenv("HOME", home, 1);
     setenv("XDG_DATA_HOME", in_folder("data"), 1);
-    assert_true(trainer_folder(NULL, out, sizeof out, &faults));
+    assert_true(session_folder(NULL, out, sizeof out, &faults));
     assert_string_equal(out, in_folder("data/seldinger/sessions"));
     setenv("XDG_DATA_HOME", "", 1);
-    assert_true(trainer_folder(NULL, out, sizeof out, &faults));
+    assert_true(session_folder(NULL, out, sizeof out, &faults));
     assert_string_equal(out, in_folder("home/.local/share/seldinger/sessions"));
     assert_true(is_folder(out));
     assert_int_equal(faults.count, 0);
@@ -56,15 +56,15 @@ static void what_is_no_folder_is_refused(void **state)
     static const char *const wrong[] = {"file", "file/inside", "e/../file"};
     for (int i = 0; i < 3; i++) {
         faults_clear(&faults);
-        assert_false(trainer_folder(in_folder(wrong[i]), out, sizeof out, &faults));
+        assert_false(session_folder(in_folder(wrong[i]), out, sizeof out, &faults));
         assert_int_equal(faults.count, 1);
         assert_non_null(strstr(faults.text[0], "cannot take sessions: Not a directory"));
     }
     faults_clear(&faults);
-    assert_false(trainer_folder(far_too_long, out, sizeof out, &faults));
+    assert_false(session_folder(far_too_long, out, sizeof out, &faults));
     assert_non_null(strstr(faults.text[0], "too long"));
     faults_clear(&faults);
-    assert_false(trainer_folder("/proc/seldinger", out, sizeof out, &faults));
+    assert_false(session_folder("/proc/seldinger", out, sizeof out, &faults));
     assert_int_equal(faults.count, 1);
 }
 
@@ -73,7 +73,7 @@ static void no_name_is_taken_twice(void **state)
     (void)state;
     char name[20][4096];
     for (int i = 0; i < 20; i++) {
-        trainer_file_name(folder, "/some/where/arch.v2.yaml", ".h5", name[i], sizeof name[i]);
+        session_file_name(folder, "/some/where/arch.v2.yaml", ".h5", name[i], sizeof name[i]);
         assert_memory_equal(name[i], folder, strlen(folder));
         assert_memory_equal(name[i] + strlen(folder), "/arch-20", 8);
         assert_string_equal(name[i] + strlen(name[i]) - 3, ".h5");
@@ -81,21 +81,21 @@ static void no_name_is_taken_twice(void **state)
         put(name[i] + strlen(folder) + 1, "");
     }
     char beside[4096];
-    trainer_file_beside("/a.b/c.d.h5", ".json", beside, sizeof beside);
+    session_file_beside("/a.b/c.d.h5", ".json", beside, sizeof beside);
     assert_string_equal(beside, "/a.b/c.d.json");
-    trainer_file_beside("/a.b/c", ".json", beside, sizeof beside);
+    session_file_beside("/a.b/c", ".json", beside, sizeof beside);
     assert_string_equal(beside, "/a.b/c.json");
-    trainer_file_beside("c", ".json", beside, sizeof beside);
+    session_file_beside("c", ".json", beside, sizeof beside);
     assert_string_equal(beside, "c.json");
 }
 
 static void expect_cut_off(int count)
 {
-    CutOff found = trainer_find_cut_off(folder);
+    CutOff found = session_find_cut_off(folder);
     assert_int_equal(found.count, count);
     for (int i = 0; i < count; i++)
         assert_string_equal(found.path[i], in_folder("bend.h5"));
-    trainer_free_cut_off(&found);
+    session_free_cut_off(&found);
 }
 
 static void the_session_file_is_of_its_recording(void **state)
@@ -121,7 +121,7 @@ static void the_session_file_is_of_its_recording(void **state)
     }
     expect_cut_off(0);           // it is being written
     assert_true(recording_close(recording, simulator, &faults));
-    assert_true(trainer_save_session(it.scene, "Ada \"the hand\"", "keyboard", "2023-11-14T22:13:20Z", score, path, &faults));
+    assert_true(session_files_save(it.scene, "Ada \"the hand\"", "keyboard", "2023-11-14T22:13:20Z", score, path, &faults));
     static Session session;
     assert_true(session_load(in_folder("bend.json"), &session, &faults));
     assert_string_equal(session.trainee, "Ada \"the hand\"");
@@ -149,7 +149,7 @@ static void the_session_file_is_of_its_recording(void **state)
     assert_memory_equal(&session, &saved, sizeof session);
     // a recording that is not there
     faults_clear(&faults);
-    assert_false(trainer_save_session(it.scene, "Ada", "keyboard", "2023-11-14T22:13:20Z", score, in_folder("nowhere.h5"), &faults));
+    assert_false(session_files_save(it.scene, "Ada", "keyboard", "2023-11-14T22:13:20Z", score, in_folder("nowhere.h5"), &faults));
     assert_true(faults.count > 0);
     assert_int_equal(access(in_folder("nowhere.json"), F_OK), -1);
     score_free(score);

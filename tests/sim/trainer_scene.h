@@ -2,11 +2,11 @@
 #ifndef SELDINGER_TESTS_TRAINER_SCENE_H
 #define SELDINGER_TESTS_TRAINER_SCENE_H
 
-#include "cli/cli.h"
-#include "cli/tube_tree.h"
 #include "recon/lim_fit.h"
 #include "sim/lesson.h"
+#include "sim/open_vessel.h"
 #include "sim/recording.h"
+#include "sim/tube_tree.h"
 
 #include <string.h>
 

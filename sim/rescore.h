@@ -1,10 +1,10 @@
 // The score of a recording, by simulating it again beside what is shown: the figures at any second of it that was reached.
-#ifndef SELDINGER_CLI_RESCORE_H
-#define SELDINGER_CLI_RESCORE_H
+#ifndef SELDINGER_SIM_RESCORE_H
+#define SELDINGER_SIM_RESCORE_H
 
-#include "cli/cli.h"
-#include "sim/score.h"
+#include "sim/open_vessel.h"
 #include "sim/recording.h"
+#include "sim/score.h"
 
 typedef struct Rescore Rescore;
 

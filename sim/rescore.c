@@ -1,4 +1,4 @@
-#include "cli/rescore.h"
+#include "sim/rescore.h"
 
 #include "sim/clock.h"
 #include "sim/lesson.h"

@@ -1,10 +1,10 @@
 // One session at the trainer: a simulator with its score and contrast agent, stepped by the 1 kHz thread, recorded from the first step on.
 // Headless too: `run --device` is a session without a window.
-#ifndef SELDINGER_CLI_LIVE_SESSION_H
-#define SELDINGER_CLI_LIVE_SESSION_H
+#ifndef SELDINGER_SIM_LIVE_SESSION_H
+#define SELDINGER_SIM_LIVE_SESSION_H
 
-#include "cli/cli.h"
 #include "sim/lesson.h"
+#include "sim/open_vessel.h"
 #include "sim/realtime.h"
 
 typedef struct LiveSession {

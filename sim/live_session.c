@@ -1,7 +1,8 @@
-#include "cli/live_session.h"
+#include "sim/live_session.h"
 
 #include "sim/replay.h"
 
+#include <stdio.h>
 #include <string.h>
 
 // As often as a film or the eye takes one; an hour of them takes 1.7 GB for 200 elements.
