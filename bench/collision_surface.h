@@ -3,7 +3,7 @@
 #define SELDINGER_BENCH_COLLISION_SURFACE_H
 
 #include "cli/cli.h"
-#include "recon/phantom.h"
+#include "recon/phantom/phantom.h"
 
 enum { SURFACE_MESHES = 3, WALLS_MOST = 6 + 5 * SURFACE_MESHES };
 

@@ -6,11 +6,11 @@
 #include "bench/lim_trial.h"
 #include "cli/output_plan.h"
 #include "geom/isosurface.h"
-#include "recon/phantom.h"
-#include "recon/rbt_track.h"
-#include "recon/trace.h"
+#include "recon/phantom/phantom.h"
+#include "recon/track/rbt_track.h"
+#include "recon/track/trace.h"
 #include "recon/tree_file.h"
-#include "recon/volume.h"
+#include "recon/volume/volume.h"
 
 #include <getopt.h>
 #include <stdlib.h>

@@ -12,7 +12,7 @@
 #ifndef SELDINGER_BENCH_LIM_TRIAL_H
 #define SELDINGER_BENCH_LIM_TRIAL_H
 
-#include "recon/lim_fit.h"
+#include "recon/fit/lim_fit.h"
 
 #include <stdint.h>
 

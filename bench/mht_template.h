@@ -6,7 +6,7 @@
 #ifndef SELDINGER_BENCH_MHT_TEMPLATE_H
 #define SELDINGER_BENCH_MHT_TEMPLATE_H
 
-#include "recon/volume.h"
+#include "recon/volume/volume.h"
 
 typedef struct MhtTemplate {
     Vec3 center, axis;       // axis: unit

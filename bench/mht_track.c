@@ -4,7 +4,7 @@
 
 #include "base/same_math.h"
 #include "bench/mht_template.h"
-#include "recon/bspline.h"
+#include "recon/volume/bspline.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -18,7 +18,7 @@
 #ifndef SELDINGER_BENCH_MHT_TRACK_H
 #define SELDINGER_BENCH_MHT_TRACK_H
 
-#include "recon/rbt_track.h"
+#include "recon/track/rbt_track.h"
 
 typedef struct MhtParameters {
     // the method's own

@@ -2,7 +2,7 @@
 // is asked as if it stood LENGTH radii upstream.
 #include "bench/shape_vessel.h"
 
-#include "recon/phantom_parts.h"
+#include "recon/phantom/phantom_parts.h"
 
 #include <stdlib.h>
 

@@ -8,7 +8,7 @@
 #define SELDINGER_BENCH_SHAPE_VESSEL_H
 
 #include "geom/vessel.h"
-#include "recon/phantom.h"
+#include "recon/phantom/phantom.h"
 
 // Borrows the shape. The inlet is that of shape_sample's node 0. NULL where memory lacks.
 Vessel *shape_vessel_create(const Shape *shape);

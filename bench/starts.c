@@ -4,8 +4,8 @@
 
 #include "base/parallel.h"
 #include "bench/track_score.h"
-#include "recon/phantom_parts.h"
-#include "recon/rbt_track.h"
+#include "recon/phantom/phantom_parts.h"
+#include "recon/track/rbt_track.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -4,7 +4,7 @@
 #include "bench/bench.h"
 #include "bench/shape_vessel.h"
 #include "bench/torture_scene.h"
-#include "recon/phantom.h"
+#include "recon/phantom/phantom.h"
 #include "recon/tree_file.h"
 #include "sim/drive.h"
 

@@ -10,7 +10,7 @@
 #include "base/parallel.h"
 #include "bench/mht_track.h"
 #include "bench/track_score.h"
-#include "recon/blurred_edge.h"
+#include "recon/volume/blurred_edge.h"
 
 #include <getopt.h>
 #include <stdlib.h>

@@ -2,7 +2,7 @@
 // it leaves, a run begins that goes on to the run's last node. A short run that comes back to where it left is an excursion, no leak.
 #include "bench/track_score.h"
 
-#include "recon/blurred_edge.h"
+#include "recon/volume/blurred_edge.h"
 
 #include <stdlib.h>
 

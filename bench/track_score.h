@@ -10,7 +10,7 @@
 #ifndef SELDINGER_BENCH_TRACK_SCORE_H
 #define SELDINGER_BENCH_TRACK_SCORE_H
 
-#include "recon/phantom.h"
+#include "recon/phantom/phantom.h"
 
 typedef enum TrackLabel { TRACK_ST, TRACK_PS, TRACK_WT, TRACK_KV, TRACK_KB, TRACK_KA, TRACK_LB, TRACK_BT, TRACK_LABELS } TrackLabel;
 extern const char *const track_label_name[TRACK_LABELS];

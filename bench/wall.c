@@ -7,7 +7,7 @@
 #include "base/output.h"
 #include "base/simd.h"
 #include "cli/output_plan.h"
-#include "recon/model_measure.h"
+#include "recon/fit/model_measure.h"
 #include "recon/tree_file.h"
 
 #include <getopt.h>

@@ -4,7 +4,7 @@
 #include "base/process.h"
 #include "base/sort_doubles.h"
 #include "geom/random.h"
-#include "recon/phantom.h"
+#include "recon/phantom/phantom.h"
 #include "recon/tree_file.h"
 
 #include <errno.h>

@@ -3,7 +3,7 @@
 
 #include "bench/collision_run.h"
 #include "bench/shape_vessel.h"
-#include "recon/phantom.h"
+#include "recon/phantom/phantom.h"
 #include "recon/tree_file.h"
 
 #include <stdlib.h>

@@ -7,11 +7,11 @@
 #include "cli/junction_sheets.h"
 #include "cli/output_plan.h"
 #include "cli/reach_report.h"
-#include "recon/blurred_edge.h"
-#include "recon/field_fit.h"
-#include "recon/lim_fit.h"
-#include "recon/model_measure.h"
+#include "recon/fit/field_fit.h"
+#include "recon/fit/lim_fit.h"
+#include "recon/fit/model_measure.h"
 #include "recon/tree_file.h"
+#include "recon/volume/blurred_edge.h"
 #ifdef SELDINGER_RENDER
 #include "render/picture.h"
 #endif

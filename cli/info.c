@@ -8,9 +8,9 @@
 #include "cli/output_plan.h"
 #include "cli/reach_report.h"
 #include "cli/report.h"
-#include "recon/mesh_check.h"
+#include "recon/surface/mesh_check.h"
 #include "recon/tree_file.h"
-#include "recon/volume.h"
+#include "recon/volume/volume.h"
 #include "sim/recording.h"
 #ifdef SELDINGER_RENDER
 #include "render/picture.h"

@@ -3,8 +3,8 @@
 
 #include "base/output.h"
 #include "cli/output_plan.h"
-#include "recon/lim_fit.h"
-#include "recon/phantom_measure.h"
+#include "recon/fit/lim_fit.h"
+#include "recon/phantom/phantom_measure.h"
 #include "recon/tree_file.h"
 
 #include <cjson/cJSON.h>

@@ -26,7 +26,7 @@ typedef struct FluoroscopeOptions {
     const VesselTree *tree;        // NULL: the whole lumen is one node, 0
     const ToolLooks *tools;        // borrowed; NULL: none
     const Pose *pose;              // any of these tools: how many nodes they have at most. Borrowed during create only
-    // anatomy: a volume (recon/volume.h), or none: value NULL. Then a plain head, or a trunk where the vessel is larger than a head
+    // anatomy: a volume (recon/volume/volume.h), or none: value NULL. Then a plain head, or a trunk where the vessel is larger than a head
     int anatomy_size[3];
     Vec3 anatomy_origin;           // [mm] centre of voxel (0,0,0)
     Vec3 anatomy_axis[3];          // [mm] step from voxel to voxel

@@ -3,7 +3,7 @@
 #include "geom/grid_vessel.h"
 #include "geom/mesh_vessel.h"
 #include "geom/tree_surface.h"
-#include "recon/mesh_check.h"
+#include "recon/surface/mesh_check.h"
 
 #include <stdarg.h>
 #include <stdio.h>

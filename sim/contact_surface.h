@@ -22,7 +22,7 @@ double contact_surface_edge(const TriangleMesh *mesh);      // [mm] the triangle
 // A vessel of `kind` (mesh, smooth_mesh, flat_mesh, grid) from the mesh; the grid samples `exact` on the mesh's cell. Inlet from `exact`. NULL with a fault.
 Vessel *contact_surface_vessel(ContactKind kind, const Vessel *exact, const TriangleMesh *mesh, double cell_mm, const char *name, Faults *faults);
 
-// A surface from a file as a wall: read, mended (recon/mesh_check.h) and scaled. `note` (may be NULL) is told what was found wrong, a line each. NULL with
+// A surface from a file as a wall: read, mended (recon/surface/mesh_check.h) and scaled. `note` (may be NULL) is told what was found wrong, a line each. NULL with
 // faults: unreadable, edges of three triangles, one side only, not millimetres.
 // `scale` 0: not given, the file must then be in mm.
 TriangleMesh *contact_surface_load(const char *path, double scale, NoteFunction note, Faults *faults);

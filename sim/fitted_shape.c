@@ -2,8 +2,8 @@
 #include "sim/fitted_shape.h"
 
 #include "base/sha256.h"
-#include "recon/field_fit.h"
-#include "recon/phantom.h"
+#include "recon/fit/field_fit.h"
+#include "recon/phantom/phantom.h"
 #include "recon/tree_file.h"
 
 #include <errno.h>

@@ -3,7 +3,7 @@
 #define SELDINGER_SIM_FITTED_SHAPE_H
 
 #include "base/parallel.h"
-#include "recon/lim_fit.h"
+#include "recon/fit/lim_fit.h"
 #include "sim/scene.h"
 
 // The scene's shape as a model, from the user's cache ($SELDINGER_CACHE, else below $XDG_CACHE_HOME or ~/.cache) where this program has fitted it before.

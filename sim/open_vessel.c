@@ -4,8 +4,8 @@
 
 #include "geom/mesh_vessel.h"
 #include "geom/tube_mesh.h"
-#include "recon/lim_fit.h"
-#include "recon/phantom.h"
+#include "recon/fit/lim_fit.h"
+#include "recon/phantom/phantom.h"
 #include "recon/tree_file.h"
 #include "sim/contact_surface.h"
 #include "sim/fitted_shape.h"

@@ -2,7 +2,7 @@
 // best with another one. What that is follows from a least squares fit of the two radial profiles, done here in one dimension.
 #include "bench/mht_template.h"
 #include "bench/mht_track.h"
-#include "recon/ransac_cylinder.h"
+#include "recon/track/ransac_cylinder.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

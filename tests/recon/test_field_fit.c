@@ -7,8 +7,8 @@
 
 #include "base/simd.h"
 #include "geom/blobby.h"
-#include "recon/field_fit.h"
-#include "recon/model_measure.h"
+#include "recon/fit/field_fit.h"
+#include "recon/fit/model_measure.h"
 #include "tests/recon/fitted_shape.h"
 
 #include <string.h>

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_TESTS_TRAINER_SCENE_H
 #define SELDINGER_TESTS_TRAINER_SCENE_H
 
-#include "recon/lim_fit.h"
+#include "recon/fit/lim_fit.h"
 #include "sim/lesson.h"
 #include "sim/open_vessel.h"
 #include "sim/recording.h"

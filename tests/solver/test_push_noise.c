@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "bench/shape_vessel.h"
-#include "recon/phantom.h"
+#include "recon/phantom/phantom.h"
 #include "tests/short_run.h"
 #include "tube_scene.h"
 
