@@ -9,8 +9,6 @@
 
 VerbFunction bench_step, bench_peer, bench_track, bench_fit, bench_collision, bench_wall, bench_torture, bench_drawing;
 
-int bench_call(int argc, char **argv);      // the table that argv[1] names
-
 typedef struct Spread {
     double median, p99, p999, max;
 } Spread;

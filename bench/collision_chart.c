@@ -3,7 +3,7 @@
 #include "bench/collision_chart.h"
 
 #include "base/output.h"
-#include "cli/report.h"
+#include "render/page.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -162,9 +162,9 @@ static void draw_mark(const Chart *chart, const char *class, const cJSON *row, d
         return;
     draw_shape(chart->out, class, kind, x, y);
     fprintf(chart->out, "><title>");
-    report_text(chart->out, text_at(row, "surface"));
+    page_text(chart->out, text_at(row, "surface"));
     fprintf(chart->out, ", ");
-    report_text(chart->out, text_at(row, "representation"));
+    page_text(chart->out, text_at(row, "representation"));
     if (number_at(row, "triangles") > 0)
         fprintf(chart->out, " of %.0f triangles", number_at(row, "triangles"));
     fprintf(chart->out, ": %.6g %s</title></path>\n", value, unit);
@@ -192,7 +192,7 @@ static double draw_legend(const Chart *chart, double top)
         if (k == chart->representations.count + 1)
             fprintf(out, "<path class=\"lost\" d=\"M%.1f %.1fl14 -14m0 14l-14 -14\"/>", x - 7, y + 3);
         fprintf(out, "<text x=\"%.1f\" y=\"%.1f\">", x + 12, y);
-        report_text(out, name);
+        page_text(out, name);
         fprintf(out, "</text>\n");
         x += wide;
     }
@@ -242,7 +242,7 @@ static double draw_detection(const Chart *chart, double top)
             if (k % 2 == 0)
                 fprintf(out, "<rect class=\"band\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"/>", x.from, begin + k * band, x.to - x.from, band);
             fprintf(out, "<text text-anchor=\"end\" x=\"%.1f\" y=\"%.1f\">", x.from - 10, begin + (k + 0.5) * band + 4);
-            report_text(out, chart->surfaces.name[k]);
+            page_text(out, chart->surfaces.name[k]);
             fprintf(out, "</text>\n");
         }
         draw_axis(out, &x, false, begin, end, "microseconds for 80 points");
@@ -421,7 +421,7 @@ static void draw_list(const Chart *chart, const char *id, const char *title, con
             if (k % 2 == 0)
                 fprintf(chart->out, "<rect class=\"band\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"22\"/>", x.from, y - 11, x.to - x.from);
             fprintf(chart->out, "<text text-anchor=\"end\" x=\"%.1f\" y=\"%.1f\">", x.from - 10, y + 4);
-            report_text(chart->out, chart->representations.name[k]);
+            page_text(chart->out, chart->representations.name[k]);
             fprintf(chart->out, "</text>\n");
         }
         draw_axis(chart->out, &x, false, begin, end, name);

@@ -10,7 +10,7 @@
 #include "recon/track/rbt_track.h"
 #include "recon/track/trace.h"
 #include "recon/tree_file.h"
-#include "recon/volume/volume.h"
+#include "recon/volume/volume_file.h"
 
 #include <getopt.h>
 #include <stdlib.h>

@@ -1,11 +1,12 @@
 // seldinger bench wall: the wall of fitted trees in one table, each line with what it must and should be.
 //
 // Trees and models are made by the commands of `seldinger`, which lies beside this program, as a user makes them (their command is printed), or named on the command line.
-#include "bench/wall.h"
+#include "bench/wall_measures.h"
 
 #include "base/heap.h"
 #include "base/output.h"
 #include "base/simd.h"
+#include "bench/wall_runs.h"
 #include "cli/output_plan.h"
 #include "recon/fit/model_measure.h"
 #include "recon/tree_file.h"
@@ -33,6 +34,24 @@ static const char help[] =
     "  --quick        only what is given, no synthetic angiograms, stiff wires for 1 s\n"
     "  --json F       all lines as JSON; - is standard output\n\n"
     "Exit codes: 0 done; 1 a line missed what it must be; 2 wrong usage or bad input.\n";
+
+typedef struct WallLimits {
+    double must, aim;        // NAN: none
+    bool at_least;           // otherwise: at most
+} WallLimits;
+
+typedef struct WallLine {
+    char row[24], on[32], what[64], unit[16], note[160];
+    double value;            // NAN: could not be measured, the note says why
+    WallLimits limits;
+} WallLine;
+
+typedef struct WallTable {
+    int count, capacity;
+    WallLine *line;
+    FILE *out;
+    const char *row, *on;    // of the lines that are added
+} WallTable;
 
 typedef struct WallModel {
     char name[32], tree[PATH], path[PATH];   // "" where there is none
@@ -75,7 +94,8 @@ static void format_limit(char text[16], double value)
         snprintf(text, 16, "%.4g", value);
 }
 
-void wall_add(WallTable *table, const char *what, double value, const char *unit, WallLimits limits, const char *note)
+// Adds a line and prints it. `note` may be NULL.
+static void wall_add(WallTable *table, const char *what, double value, const char *unit, WallLimits limits, const char *note)
 {
     if (table->count == table->capacity) {
         int capacity = 2 * table->capacity + 64;
@@ -96,7 +116,8 @@ void wall_add(WallTable *table, const char *what, double value, const char *unit
     fflush(table->out);
 }
 
-void wall_skip(WallTable *table, const char *why) { fprintf(table->out, "%-10s %-22s left out: %s\n", table->row, table->on, why); }
+// Says that a row is left out, and why.
+static void wall_skip(WallTable *table, const char *why) { fprintf(table->out, "%-10s %-22s left out: %s\n", table->row, table->on, why); }
 
 // --- Trees and models ---
 

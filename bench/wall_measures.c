@@ -1,5 +1,5 @@
 // Measurements of a model for `bench wall`: points to wall, junctions against truth, noise.
-#include "bench/wall.h"
+#include "bench/wall_measures.h"
 
 #include "base/process.h"
 #include "base/sort_doubles.h"

@@ -1,5 +1,5 @@
 // Tools in a model for `bench wall`: a stiff wire pushed in, and what the hand feels of the wall without friction.
-#include "bench/wall.h"
+#include "bench/wall_runs.h"
 
 #include "bench/collision_run.h"
 #include "bench/shape_vessel.h"

@@ -3,7 +3,7 @@
 #include "base/regular_file.h"
 #include "recon/hdf5_reader.h"
 #include "recon/surface/surface_file.h"
-#include "recon/volume/volume.h"
+#include "recon/volume/volume_file.h"
 
 #include <errno.h>
 #include <stdbool.h>

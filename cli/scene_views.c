@@ -2,7 +2,7 @@
 
 #include "base/heap.h"
 #include "base/sort_doubles.h"
-#include "recon/volume/volume.h"
+#include "recon/volume/volume_file.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -9,7 +9,7 @@
 #include "recon/track/trace.h"
 #include "recon/tree_file.h"
 #include "recon/volume/blurred_edge.h"
-#include "recon/volume/volume.h"
+#include "recon/volume/volume_file.h"
 #include "recon/volume/volume_noise.h"
 #ifdef SELDINGER_RENDER
 #include "render/picture.h"

@@ -6,6 +6,7 @@
 #include "recon/fit/lim_fit.h"
 #include "recon/phantom/phantom_measure.h"
 #include "recon/tree_file.h"
+#include "recon/volume/volume_file.h"
 
 #include <cjson/cJSON.h>
 #include <getopt.h>

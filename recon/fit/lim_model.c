@@ -7,9 +7,9 @@
 // solution. The new blob is optimised by Polak-Ribiere descent, centre before width (the other order shrinks the twin to nothing, and it never
 // comes back). Then a short pass over all blobs near the split: the paper has none, DESIGN.md asks for one; blob-wise descent converges badly
 // because neighbouring blobs are strongly coupled, so the pass is a damped Gauss-Newton step (Levenberg, Marquardt) in all their parameters.
-#include "base/same_math.h"
-#include "recon/fit/lim_fit.h"
+#include "recon/fit/lim_model.h"
 
+#include "base/same_math.h"
 #include "geom/blobby.h"
 #include "recon/fit/lim_energy.h"
 

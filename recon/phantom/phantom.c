@@ -1,4 +1,6 @@
 // The synthetic shapes by name, and their options.
+#include "recon/phantom/phantom.h"
+
 #include "base/same_math.h"
 #include "recon/phantom/phantom_parts.h"
 #include "recon/phantom/random_tree.h"
@@ -316,18 +318,6 @@ const ShapeBlock *shape_blocks(const Shape *shape, int *count)
 {
     *count = shape->block_count;
     return shape->block;
-}
-
-// Exact outside; inside the distance to the nearest face.
-double shape_block_distance(const ShapeBlock *block, Vec3 x)
-{
-    Vec3 d = vec3_sub(x, block->center);
-    double q[3] = {fabs(vec3_dot(d, block->axis[0])) - block->half.x, fabs(vec3_dot(d, block->axis[1])) - block->half.y,
-                   fabs(vec3_dot(d, block->axis[2])) - block->half.z};
-    double within = fmax(q[0], fmax(q[1], q[2]));
-    if (within < 0)
-        return -within;
-    return -sqrt(same_square(fmax(q[0], 0)) + same_square(fmax(q[1], 0)) + same_square(fmax(q[2], 0)));
 }
 
 double shape_voxel_mm(const Shape *shape) { return fmax(0.05, 2 * shape->noise); }

@@ -30,11 +30,11 @@
 
 #include "geom/isosurface.h"
 #include "geom/vessel_tree.h"
+#include "recon/phantom/phantom_block.h"
+#include "recon/phantom/phantom_field.h"
 #include "recon/volume/volume.h"
 
 #include <stdint.h>
-
-typedef struct Shape Shape;
 
 // The names, separated by ", ", for messages and help.
 const char *shape_names(void);
@@ -48,25 +48,7 @@ double shape_options_voxel_mm(int option_count, const char (*option)[2][64]);
 
 // What an angiogram shows and the truth does not contain: a kissing neighbour (NULL: none), and bone.
 const Shape *shape_neighbour(const Shape *shape);
-typedef struct ShapeBlock {  // a box
-    Vec3 center, axis[3];    // unit, at right angles
-    Vec3 half;               // edges along them [mm]
-} ShapeBlock;
 const ShapeBlock *shape_blocks(const Shape *shape, int *count);
-double shape_block_distance(const ShapeBlock *block, Vec3 x);   // signed, > 0 inside
-
-// The field whose zero is the surface: > 0 inside, gradient of length <= 1, the distance itself away from joints.
-double shape_field(const Shape *shape, Vec3 x, Vec3 *gradient);
-// The same with open ends cut off flat: the field of the closed body that is meshed.
-double shape_field_cut(const Shape *shape, Vec3 x);
-// Signed distance to the true surface [mm], > 0 inside; `foot` (may be NULL) is the closest surface point. Near the medial axis the
-// local one that projection finds, never less than the field.
-double shape_distance(const Shape *shape, Vec3 x, Vec3 *foot);
-// Whether x lies beyond an open end (open-capsule, arc, bifurcation, spiral, phantom and aorta are open at the inlet; open-capsule at both
-// ends): the surface there is no truth, the tube goes on.
-bool shape_beyond_open_end(const Shape *shape, Vec3 x);
-// Axis-aligned box around the surface.
-void shape_bounds(const Shape *shape, Vec3 *low, Vec3 *high);
 
 // Centreline nodes with surface samples, no model. Linked and valid.
 VesselTree *shape_sample(const Shape *shape, Faults *faults);

@@ -2,6 +2,8 @@
 //   smax(a, b) = max(a, b) + (k/6) h^3, h = max(0, 1 - |a - b| / k)
 // and the shape is the plain maximum over parts and joints: kissing parts do not blend. Union and blend keep |grad f| <= 1, so that f may
 // be marched along (it never oversteps the surface).
+#include "recon/phantom/phantom_field.h"
+
 #include "recon/phantom/phantom_parts.h"
 
 #include <stdlib.h>

@@ -7,7 +7,10 @@
 #define SELDINGER_RECON_PHANTOM_PHANTOM_PARTS_H
 
 #include "geom/random.h"
-#include "recon/phantom/phantom.h"
+#include "geom/vessel_tree.h"
+#include "recon/phantom/phantom_block.h"
+
+#include <stdint.h>
 
 enum { KNOTS = 128 };
 
@@ -38,6 +41,7 @@ typedef struct Cell {        // of the octree over the shape: the parts that can
     int first, count;        // of its parts in `cell_part`
 } Cell;
 
+typedef struct Shape Shape;
 struct Shape {
     char name[32];
     int part_count, part_capacity;

@@ -2,6 +2,8 @@
 //
 // The share is taken as that of a box filter across the wall: 1/2 + f / w, w = (sum_k (n . a_k)^2)^(1/2) for the normal n and the grid's steps a_k, so
 // that its second moment w^2 / 12 is the voxel's own. It adds to the blur: b^2 = psf^2 + w^2 / 12.
+#include "recon/phantom/phantom.h"
+
 #include "base/parallel.h"
 #include "base/same_math.h"
 #include "recon/phantom/phantom_parts.h"

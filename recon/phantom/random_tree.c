@@ -1,6 +1,7 @@
 #include "recon/phantom/random_tree.h"
 
 #include "base/same_math.h"
+#include "recon/phantom/phantom_field.h"
 
 #include <stdlib.h>
 #include <string.h>

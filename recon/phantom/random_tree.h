@@ -6,6 +6,7 @@
 #ifndef SELDINGER_RECON_PHANTOM_RANDOM_TREE_H
 #define SELDINGER_RECON_PHANTOM_RANDOM_TREE_H
 
+#include "base/faults.h"
 #include "geom/random.h"
 #include "recon/phantom/phantom_parts.h"
 

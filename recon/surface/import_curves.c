@@ -3,9 +3,9 @@
 // the lumen (16 rays square to the curve) where that has its wall at less than 0.15 of its median radius on one side, or at less than half of it
 // where the centroid has half as much room again; near a curve's ends only the former. Moving every sample to the middle was tried and lost: it bends
 // exact curves at ends and ostia by half a radius.
-#include "base/same_math.h"
-#include "recon/surface/import_skeleton.h"
+#include "recon/surface/import_curves.h"
 
+#include "base/same_math.h"
 #include "base/sort_doubles.h"
 
 #include <stdlib.h>

@@ -1,10 +1,10 @@
 // The wall: a surface with the flat lids over its vessels' ends taken off. A lid is what a centreline's end points at: triangles of nearly one
 // plane, square to the centreline, as large as the lumen, meeting the wall at an edge. A round blind end has no such region: within 20 degrees of
 // its pole lies an eighth of the lumen's area.
-#include "base/same_math.h"
-#include "recon/surface/import_skeleton.h"
+#include "recon/surface/import_wall.h"
 
 #include "base/disjoint_sets.h"
+#include "base/same_math.h"
 #include "recon/surface/mesh_edges.h"
 
 #include <stdlib.h>

@@ -5,8 +5,10 @@
 #include "recon/track/rbt_branches.h"
 #include "base/heap.h"
 #include "base/sort_doubles.h"
+#include "recon/track/rbt_branch.h"
 #include "recon/track/rbt_links.h"
 #include "recon/track/rbt_sacs.h"
+#include "recon/track/rbt_trunk.h"
 #include "recon/volume/bspline.h"
 
 #include <stdlib.h>
@@ -129,19 +131,12 @@ static bool seed_on_limb(Tracker *t, const RbtLimb *limb, double share, Cylinder
     return false;
 }
 
-static double segment_distance(Vec3 x, Vec3 a, Vec3 b)
-{
-    Vec3 ab = vec3_sub(b, a);
-    double l2 = vec3_norm2(ab), s = l2 > 0 ? fmax(0, fmin(1, vec3_dot(vec3_sub(x, a), ab) / l2)) : 0;
-    return vec3_distance(x, vec3_add_scaled(a, s, ab));
-}
-
 // From the limb's way down to the contact's node.
 static double distance_from_limb(const Tracker *t, const RbtLimb *limb, Vec3 x)
 {
-    double least = segment_distance(x, t->tree.node[limb->contact].cylinder.center, limb->place[0]);
+    double least = tracker_segment_distance(x, t->tree.node[limb->contact].cylinder.center, limb->place[0]);
     for (int i = 1; i < limb->count; i++)
-        least = fmin(least, segment_distance(x, limb->place[i - 1], limb->place[i]));
+        least = fmin(least, tracker_segment_distance(x, limb->place[i - 1], limb->place[i]));
     return least;
 }
 

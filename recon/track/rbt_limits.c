@@ -3,6 +3,7 @@
 #include "recon/track/rbt_limits.h"
 #include "recon/track/rbt_start.h"
 #include "recon/track/rbt_start_check.h"
+#include "recon/track/rbt_trunk.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -3,6 +3,7 @@
 #include "recon/track/rbt_links.h"
 
 #include "base/same_math.h"
+#include "recon/track/rbt_branch.h"
 #include "recon/track/way_heap.h"
 #include "recon/volume/bspline.h"
 

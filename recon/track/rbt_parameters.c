@@ -1,5 +1,5 @@
 // The parameters of the tracking: defaults, the paper's values, and the table that trace files and --help read.
-#include "recon/track/rbt_track.h"
+#include "recon/track/rbt_parameters.h"
 
 #include "base/heap.h"
 

@@ -10,106 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-// --- paint ---
-
-static size_t voxel_index(const Volume *v, const int at[3])
-{
-    return ((size_t)at[2] * (size_t)v->size[1] + (size_t)at[1]) * (size_t)v->size[0] + (size_t)at[0];
-}
-
-RbtPaint *rbt_paint_create(const Volume *volume)
-{
-    RbtPaint *paint = calloc(1, sizeof *paint);
-    size_t voxels = (size_t)volume->size[0] * (size_t)volume->size[1] * (size_t)volume->size[2];
-    if (paint)
-        *paint = (RbtPaint){volume, calloc(voxels, sizeof *paint->owner)};
-    if (paint && !paint->owner) {
-        free(paint);
-        return NULL;
-    }
-    return paint;
-}
-
-void rbt_paint_free(RbtPaint *paint)
-{
-    if (paint)
-        free(paint->owner);
-    free(paint);
-}
-
-typedef struct Box {
-    int low[3], high[3];
-} Box;
-
-// Voxels that a ball may meet; empty (high < low) where it lies outside.
-static Box box_of_ball(const Volume *v, Vec3 center, double radius)
-{
-    Vec3 c = volume_voxel_of(v, center);
-    double at[3] = {c.x, c.y, c.z};
-    Box box;
-    for (int i = 0; i < 3; i++) {
-        // extent of the ball along the voxel axis: the row of the inverse gives it for oblique grids too
-        Vec3 row = vec3(v->to_voxel.m[i][0], v->to_voxel.m[i][1], v->to_voxel.m[i][2]);
-        double half = radius * vec3_norm(row);
-        box.low[i] = (int)fmax(0, ceil(at[i] - half));
-        box.high[i] = (int)fmin(v->size[i] - 1, floor(at[i] + half));
-    }
-    return box;
-}
-
-static double rim_of(const Volume *v, double radius) { return 1.15 * radius + volume_voxel_size(v); }
-
-static void paint_ball(RbtPaint *paint, const Track *tree, int node, Vec3 center, double radius)
-{
-    const Volume *v = paint->volume;
-    double rim = rim_of(v, radius);
-    Box box = box_of_ball(v, center, rim);
-    int at[3];
-    for (at[2] = box.low[2]; at[2] <= box.high[2]; at[2]++)
-        for (at[1] = box.low[1]; at[1] <= box.high[1]; at[1]++)
-            for (at[0] = box.low[0]; at[0] <= box.high[0]; at[0]++) {
-                Vec3 x = volume_point_of(v, vec3(at[0], at[1], at[2]));
-                double d2 = vec3_norm2(vec3_sub(x, center));
-                if (d2 > rim * rim)
-                    continue;
-                int32_t *owner = &paint->owner[voxel_index(v, at)];
-                if (*owner > 0) {
-                    const Cylinder *other = &tree->node[*owner - 1].cylinder;
-                    if (vec3_norm2(vec3_sub(x, other->center)) / (other->radius * other->radius) <=
-                        vec3_norm2(vec3_sub(x, tree->node[node].cylinder.center)) / (radius * radius))
-                        continue;
-                }
-                *owner = node + 1;
-            }
-}
-
-void rbt_paint_nodes(RbtPaint *paint, const Track *tree, int first, int end)
-{
-    for (int i = first; i < end; i++) {
-        const TrackNode *n = &tree->node[i];
-    // a sac is no ball: what sticks out of it is looked at
-        paint_ball(paint, tree, i, n->cylinder.center, (n->kind == NODE_ANEURYSM ? 0.8 : 1) * n->cylinder.radius);
-        if (n->parent < 0)
-            continue;
-        const Cylinder *p = &tree->node[n->parent].cylinder;
-        double radius = fmin(n->cylinder.radius, p->radius), gap = vec3_distance(p->center, n->cylinder.center);
-        int steps = (int)(gap / fmax(radius, 0.5 * volume_voxel_size(paint->volume)));
-        for (int k = 1; k < steps && k < 1000; k++)
-            paint_ball(paint, tree, i, vec3_mix(n->cylinder.center, p->center, (double)k / steps), radius);
-    }
-}
-
-int rbt_paint_node(const RbtPaint *paint, Vec3 x)
-{
-    const Volume *v = paint->volume;
-    Vec3 c = volume_voxel_of(v, x);
-    int at[3] = {(int)floor(c.x + 0.5), (int)floor(c.y + 0.5), (int)floor(c.z + 0.5)};
-    for (int i = 0; i < 3; i++)
-        if (at[i] < 0 || at[i] >= v->size[i])
-            return -1;
-    return paint->owner[voxel_index(v, at)] - 1;
-}
-
 // --- flood ---
 
 typedef struct Wet {         // a voxel of the residue
@@ -139,17 +39,17 @@ static int find_wet(const Flood *f, const int at[3])
 {
     if (f->slots == 0)
         return -1;
-    size_t voxel = voxel_index(f->volume, at);
+    size_t voxel = rbt_voxel_index(f->volume, at);
     for (unsigned s = slot_of(f, voxel);; s = (s + 1) & (unsigned)(f->slots - 1)) {
         int i = f->slot[s] - 1;
-        if (i < 0 || voxel_index(f->volume, f->wet[i].at) == voxel)
+        if (i < 0 || rbt_voxel_index(f->volume, f->wet[i].at) == voxel)
             return i;
     }
 }
 
 static void put_in_slot(Flood *f, int wet)
 {
-    unsigned s = slot_of(f, voxel_index(f->volume, f->wet[wet].at));
+    unsigned s = slot_of(f, rbt_voxel_index(f->volume, f->wet[wet].at));
     while (f->slot[s])
         s = (s + 1) & (unsigned)(f->slots - 1);
     f->slot[s] = wet + 1;
@@ -199,7 +99,7 @@ typedef struct Border {      // of the residue beside a node
 
 static bool is_residue(const Tracker *t, const RbtPaint *paint, const int at[3], const Border *border)
 {
-    if (paint->owner[voxel_index(t->volume, at)])
+    if (paint->owner[rbt_voxel_index(t->volume, at)])
         return false;
     Vec3 x = vec3(at[0], at[1], at[2]);
     double value = (double)bspline_sample(t->volume, x);
@@ -272,7 +172,7 @@ static Piece *cut_into_pieces(Flood *f, double thickness, int *piece_count)
             p->count++;
             p->sum = vec3_add(p->sum, volume_point_of(f->volume, vec3(w->at[0], w->at[1], w->at[2])));
             if (w->way > f->wet[p->farthest].way ||
-                (w->way == f->wet[p->farthest].way && voxel_index(f->volume, w->at) < voxel_index(f->volume, f->wet[p->farthest].at)))
+                (w->way == f->wet[p->farthest].way && rbt_voxel_index(f->volume, w->at) < rbt_voxel_index(f->volume, f->wet[p->farthest].at)))
                 p->farthest = here;
             for (int n = 0; n < 27; n++) {
                 if (!neighbour_of(f->volume, w->at, n, next))
@@ -318,7 +218,7 @@ static RbtLimb *gather_limbs(const Flood *f, Piece *piece, int piece_count, cons
     RbtLimb *limb = NULL;
     int capacity = 0, used = 0;
     for (int i = 0; i < piece_count; i++)
-        order[i] = (Order){piece[i].shell, i, voxel_index(v, f->wet[piece[i].farthest].at)};
+        order[i] = (Order){piece[i].shell, i, rbt_voxel_index(v, f->wet[piece[i].farthest].at)};
     qsort(order, (size_t)piece_count, sizeof *order, compare_depth);
     for (int k = 0; k < piece_count; k++) {
         int leaf = order[k].index, length = 0, top = leaf;
@@ -348,7 +248,7 @@ static RbtLimb *gather_limbs(const Flood *f, Piece *piece, int piece_count, cons
                        .level = b->level,
                        .ceiling = b->ceiling,
                        .depth = (double)f->wet[piece[leaf].farthest].way,
-                       .key = voxel_index(v, f->wet[piece[leaf].farthest].at),
+                       .key = rbt_voxel_index(v, f->wet[piece[leaf].farthest].at),
                        .stem = -1};
         l->is_cut = l->depth > b->reach - 2 * thickness;
         int above = piece[top].parent;
@@ -411,14 +311,14 @@ RbtLimb *rbt_find_limbs(const Tracker *t, const RbtPaint *paint, int first, int 
     set_borders(t, first, end, share, noise, border);
     for (int i = first; i < end; i++) {
         const Cylinder *c = &t->tree.node[i].cylinder;
-        double reach = rim_of(v, c->radius) + 1.5 * t->voxel;
-        Box box = box_of_ball(v, c->center, reach);
+        double reach = rbt_rim_of(v, c->radius) + 1.5 * t->voxel;
+        RbtBox box = rbt_box_of_ball(v, c->center, reach);
         int at[3];
         thickness = fmax(thickness, border[i - first].reach / (RBT_LIMB_PLACES - 2));
         for (at[2] = box.low[2]; at[2] <= box.high[2]; at[2]++)
             for (at[1] = box.low[1]; at[1] <= box.high[1]; at[1]++)
                 for (at[0] = box.low[0]; at[0] <= box.high[0]; at[0]++) {
-                    if (paint->owner[voxel_index(v, at)] || vec3_distance(volume_point_of(v, vec3(at[0], at[1], at[2])), c->center) > reach ||
+                    if (paint->owner[rbt_voxel_index(v, at)] || vec3_distance(volume_point_of(v, vec3(at[0], at[1], at[2])), c->center) > reach ||
                         !is_residue(t, paint, at, &border[i - first]) || find_wet(&f, at) >= 0 ||
                         tracker_is_stopped(t, c->center, volume_point_of(v, vec3(at[0], at[1], at[2]))))
                         continue;

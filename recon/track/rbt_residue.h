@@ -3,21 +3,7 @@
 #ifndef SELDINGER_RECON_TRACK_RBT_RESIDUE_H
 #define SELDINGER_RECON_TRACK_RBT_RESIDUE_H
 
-#include "recon/track/rbt_tracker.h"
-
-// Node + 1 for each voxel of a tube and of its blurred rim: the node that is nearest in its own radii. 0: none. Pages that no tube meets are
-// never touched, so that the memory used grows with the tree, not with the volume.
-typedef struct RbtPaint {
-    const Volume *volume;
-    int32_t *owner;          // (size[2], size[1], size[0])
-} RbtPaint;
-
-RbtPaint *rbt_paint_create(const Volume *volume);   // NULL: out of memory
-void rbt_paint_free(RbtPaint *paint);
-// Paints the tubes of nodes first … end-1 and of their links.
-void rbt_paint_nodes(RbtPaint *paint, const Track *tree, int first, int end);
-// The node whose tube x lies in, or -1.
-int rbt_paint_node(const RbtPaint *paint, Vec3 x);
+#include "recon/track/rbt_paint.h"
 
 // What is brighter than the vessel beside it by more than this share of its contrast is bone, metal, not vessel.
 #define RBT_BRIGHTER 0.12

@@ -3,6 +3,7 @@
 // takes the ring's third and fourth brightest twelfth for all of it, so that a neighbour may touch the vessel and a band scores nothing.
 #include "recon/track/rbt_scan.h"
 
+#include "base/parallel.h"
 #include "base/same_math.h"
 #include "recon/volume/volume_noise.h"
 
@@ -155,6 +156,11 @@ RbtSight rbt_sight_of(const Volume *volume, double noise, const Cylinder *tube)
 }
 
 bool rbt_is_tube(const RbtSight *sight) { return sight->evenness >= least_evenness; }
+
+bool rbt_node_stands_out(const Tracker *t, const RbtLevels *levels, const Cylinder *tube)
+{
+    return rbt_sight_of(levels->volume, t->check.noise, tube).certainty >= RBT_NODE_CERTAINTY;
+}
 
 // --- the search ---
 

@@ -30,6 +30,10 @@ typedef struct RbtSight {    // how a tube stands out of the volume
 // Over a piece of the tube as long as it is wide, by the voxels of the volume as it is.
 RbtSight rbt_sight_of(const Volume *volume, double noise, const Cylinder *tube);
 
+// In a noisy volume: whether a node's tube stands out of it by itself. Less is asked than of a start: it has neighbours.
+#define RBT_NODE_CERTAINTY 3.5
+bool rbt_node_stands_out(const Tracker *t, const RbtLevels *levels, const Cylinder *tube);
+
 enum { RBT_SCANS = 12 };
 bool rbt_is_tube(const RbtSight *sight);   // even enough
 

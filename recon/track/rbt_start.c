@@ -4,6 +4,7 @@
 
 #include "base/same_math.h"
 #include "base/sort_doubles.h"
+#include "recon/track/rbt_branch.h"
 
 #include <stdlib.h>
 

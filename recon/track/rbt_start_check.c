@@ -4,15 +4,14 @@
 
 #include "base/same_math.h"
 #include "base/sort_doubles.h"
+#include "recon/track/rbt_scan.h"
 #include "recon/track/rbt_start.h"
 #include "recon/volume/volume_noise.h"
 
 #include <stdio.h>
 #include <string.h>
 
-const char *const rbt_doubt_name[RBT_DOUBTS] = {"drift", "inliers", "radius", "shape", "noise", "background", "length"};
-
-static const double least_certainty = 5, least_inliers = 0.5, least_contrast = 4, certain_contrast = 8, least_evenness = 0.5, least_length = 6, node_certainty = 3.5;
+static const double least_certainty = 5, least_inliers = 0.5, least_contrast = 4, certain_contrast = 8, least_evenness = 0.5, least_length = 6;
 enum { NOISE_LAG = 3 };      // voxels: neighbours may share their noise
 
 static void doubt(RbtStartCheck *check, RbtDoubt kind, double measured, double limit, const char *text)
@@ -262,11 +261,6 @@ bool rbt_check_given(Tracker *t, RbtLevels *levels, const RbtSeed *seed, const T
     return !t->refusal[0];
 }
 
-bool rbt_node_stands_out(const Tracker *t, const RbtLevels *levels, const Cylinder *tube)
-{
-    return rbt_sight_of(levels->volume, t->check.noise, tube).certainty >= node_certainty;
-}
-
 // A bright band or bone across the first branch: what is found from it is compared with its brightness, and lost where that does not hold.
 static void judge_background(Tracker *t, int count)
 {
@@ -321,7 +315,7 @@ void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
         sum += n->inlier_rate;
         root += i < ROOT ? n->inlier_rate : 0;
         length += i > 0 ? vec3_distance(n->cylinder.center, tree->node[i - 1].cylinder.center) : 0;
-        faint += t->check.noise > 0 && rbt_sight_of(levels->volume, t->check.noise, &n->cylinder).certainty < node_certainty;
+        faint += t->check.noise > 0 && rbt_sight_of(levels->volume, t->check.noise, &n->cylinder).certainty < RBT_NODE_CERTAINTY;
     }
     if (count == 0)
         return;
@@ -341,7 +335,7 @@ void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
         doubt(&t->check, RBT_LENGTH, length / radius, least_length, text);
     }
     if (faint > 0.2 * count) {
-        snprintf(text, sizeof text, "%.0f %% of the first branch does not stand out of the noise by %g standard errors", 100.0 * faint / count, node_certainty);
+        snprintf(text, sizeof text, "%.0f %% of the first branch does not stand out of the noise by %g standard errors", 100.0 * faint / count, RBT_NODE_CERTAINTY);
         doubt(&t->check, RBT_NOISE, (double)faint / count, 0.2, text);
     }
 }

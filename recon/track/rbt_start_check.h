@@ -17,8 +17,6 @@ bool rbt_first_start(Tracker *t, RbtLevels *levels, const RbtSeed *seed, Cylinde
 bool rbt_suit_given(Tracker *t, RbtLevels *levels, const Cylinder *given);
 // Judges the first node that was tracked from a start that was given whole. False: refused.
 bool rbt_check_given(Tracker *t, RbtLevels *levels, const RbtSeed *seed, const TrackNode *first);
-// In a noisy volume: whether a node's tube stands out of it by itself. Less is asked than of a start: it has neighbours.
-bool rbt_node_stands_out(const Tracker *t, const RbtLevels *levels, const Cylinder *tube);
 // Adds to t->check what the first branch (nodes 0 … count-1 of the tree) leaves to be doubted.
 void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count);
 

@@ -1,10 +1,13 @@
-// Internal to recon: the state of one tracking and its steps, shared by rbt_track.c (branches, aneurysms), rbt_branches.c (the whole tree) and rbt_links.c.
+// Internal to recon: the state of one tracking, and what all its steps ask of it.
 // A tracker belongs to one thread; several may read one tree (`tree` is then a shallow copy and nothing is appended to it).
 #ifndef SELDINGER_RECON_TRACK_RBT_TRACKER_H
 #define SELDINGER_RECON_TRACK_RBT_TRACKER_H
 
+#include "geom/vessel_tree.h"
 #include "recon/track/ransac_cylinder.h"
-#include "recon/track/rbt_track.h"
+#include "recon/track/rbt_parameters.h"
+#include "recon/track/rbt_report.h"
+#include "recon/volume/volume.h"
 
 enum { MAX_RAYS = 2562, MAX_AXES = 321 };
 
@@ -72,29 +75,20 @@ typedef struct Tracker {
 
 bool track_append(Track *track, const TrackNode *node, const Vec3 *point);   // false: out of memory
 void track_cut(Track *track, int count);
+// Keeps the nodes for which keep[i] is true; nothing that stays may hang on one that goes. `place`: room for as many.
+void track_keep(Track *track, const bool *keep, int *place);
 void track_free(Track *track);
 
 double tracker_usual_radius(const Track *branch);   // the median of its last nodes: what the vessel is like
+double tracker_segment_distance(Vec3 x, Vec3 a, Vec3 b);
 double tracker_brightness(const Tracker *t, Vec3 point);   // the spline's value
+Vec3 tracker_in_mm(const Volume *volume, Vec3 x, bool is_voxel);
 bool tracker_is_inside(const Volume *volume, Vec3 x);
 bool tracker_is_forbidden(const Tracker *t, Vec3 x);   // by the trace
 bool tracker_is_stopped(const Tracker *t, Vec3 a, Vec3 b);   // does the way from a to b pass a point of `until`?
-// A node of the finished tree whose centre is nearer to x than `share` of its radius, or -1.
-int tracker_node_around(const Tracker *t, Vec3 x, double share);
+// Brightness of the darkest place on the straight way from a to b.
+double tracker_darkest(const Tracker *t, Vec3 a, Vec3 b);
 // Darkest place on the straight way from a to b, as a share of the lumen's brightness at both ends.
 double tracker_link_brightness(const Tracker *t, Vec3 a, Vec3 b);
-// The estimation step from a predicted cylinder; the node goes to t->estimate, false with t->why.
-bool tracker_estimate(Tracker *t, const Cylinder *predicted, double relative_threshold);
-// Tracks from an estimate of the first node until the vessel ends; `until_tree`: on its way back to its parent, ends inside another branch's tube.
-void tracker_run(Tracker *t, const Cylinder *start, Track *branch, bool until_tree);
-// Turns the node at `c` into one whose points are the first walls that rays meet nearby, in t->estimate.
-void tracker_opening(Tracker *t, const Cylinder *c, double contrast);
-// Tracks from a cylinder both ways into the empty tree; nodes follow each other from the root on. False where nothing was found, or out of memory.
-bool tracker_both_ways(Tracker *t, const RbtSeed *seed, const Cylinder *start, int number);
-// Keeps the nodes for which keep[i] is true; nothing that stays may hang on one that goes. `place`: room for as many.
-void track_keep(Track *track, const bool *keep, int *place);
-int tracker_attachment(const Tracker *t, Vec3 x, int node_count);
-// Captures a sac (section 3.4) as branch `number`; false where it is none (a fault) or memory lacks.
-bool track_aneurysm(Tracker *t, const RbtAneurysm *aneurysm, const Vec3 *center, int number, int threads, Faults *faults, const char *path);
 
 #endif

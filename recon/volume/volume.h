@@ -1,9 +1,7 @@
-// Volumes: scalar voxel grids in patient coordinates. NRRD (raw, gzip; attached and detached), MetaImage, NIfTI,
-// uncompressed DICOM (a folder, one file of a series, or a multi-frame file).
+// Volumes: scalar voxel grids in patient coordinates (files: volume_file.h).
 //
 // Voxel (i, j, k), i fastest, lies at origin + i axis[0] + j axis[1] + k axis[2] [mm]; axes may be oblique and anisotropic. The frame (RAS, LPS)
-// is kept as the header says, never converted. Values are held as float. Every header figure is checked before memory is taken: a lying
-// header is a fault with its line (or byte) and what would be valid. So is a voxel that is not a finite number: a NaN would pass silently
+// is kept as the header says, never converted. Values are held as float and finite: a NaN would pass silently
 // through every interpolation, and only the user knows which background it stands for.
 #ifndef SELDINGER_RECON_VOLUME_VOLUME_H
 #define SELDINGER_RECON_VOLUME_VOLUME_H
@@ -24,20 +22,11 @@ typedef struct Volume {
     char format[16];         // "nrrd", "metaimage", "nifti", "dicom"
 } Volume;
 
-// By content, not by extension. A folder is taken for that of a DICOM series; of a series' file the others are found beside it. NULL with faults.
-Volume *volume_load(const char *path, Faults *faults);
-// The same from memory; `path` stands in messages, and detached data files are looked for in its folder.
-Volume *volume_parse(const void *bytes, size_t length, const char *path, Faults *faults);
-// Whether a file that begins with these bytes (4096 tell) is one for volume_load; by `path` the samples of a NIfTI pair.
-bool volume_is_known(const void *bytes, size_t length, const char *path);
-// Calls for each file, there or not, from which volume_load(path) would take samples besides `path` itself: those that a header names, the other half
-// of a NIfTI pair, every file of a DICOM series' folder.
-void volume_each_data_file(const char *path, void (*call)(void *context, const char *path), void *context);
+// of all voxels
+#define VOLUME_VOXELS_MOST ((size_t)1 << 31)
 // A volume of the given grid, values zero. NULL where size is not positive or memory lacks.
 Volume *volume_create(const int size[3], Vec3 origin, const Vec3 axis[3]);
 void volume_free(Volume *volume);
-// Writes .nrrd (gzip, float or uint8 / int16 as `type` says: "float", "uint8", "int16").
-bool volume_save_nrrd(const Volume *volume, const char *path, const char *type, Faults *faults);
 static inline double volume_voxel_size(const Volume *v)   // mean edge [mm]
 {
     return (vec3_norm(v->axis[0]) + vec3_norm(v->axis[1]) + vec3_norm(v->axis[2])) / 3;

@@ -7,8 +7,9 @@
 // samples bright: its samples are turned round within their range first, so that bright is bright.
 //
 // Two passes: headers of all files of the folder, then the samples file by file, so that no more than one file is in memory beside the volume.
+#include "recon/volume/volume_dicom.h"
+
 #include "base/regular_file.h"
-#include "recon/volume/volume_format.h"
 
 #include <ctype.h>
 #include <dirent.h>

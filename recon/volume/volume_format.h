@@ -11,6 +11,8 @@ typedef enum VoxelType {
     VOXEL_NONE, VOXEL_INT8, VOXEL_UINT8, VOXEL_INT16, VOXEL_UINT16, VOXEL_INT32, VOXEL_UINT32, VOXEL_INT64, VOXEL_UINT64, VOXEL_FLOAT, VOXEL_DOUBLE
 } VoxelType;
 
+enum { VOLUME_HEADER_MOST = 1 << 20 };  // bytes
+
 typedef enum VoxelEncoding { ENCODING_RAW, ENCODING_DEFLATE, ENCODING_TEXT } VoxelEncoding;
 
 typedef struct VolumeHeader {
@@ -62,8 +64,6 @@ bool volume_inflate_head(const FileBytes *data, uint8_t *out, size_t wanted, Fau
 // The first bytes of a regular file, at most `most`, to be freed (file_bytes_free).
 bool file_bytes_read(const char *path, size_t most, FileBytes *out, Faults *faults);
 void file_bytes_free(FileBytes *file);
-// A whole DICOM file, which has 4 GB at most.
-bool dicom_bytes_read(const char *path, FileBytes *out, Faults *faults);
 // Reads of the data file that a detached header names what it promises. It must lie in the header's folder or below: a header cannot point anywhere
 // else unseen.
 bool file_bytes_read_beside(const char *header_path, int line, const char *name, size_t name_length, const VolumeHeader *header, FileBytes *out,
@@ -72,18 +72,8 @@ bool file_bytes_read_beside(const char *header_path, int line, const char *name,
 // Raw samples in several files of equal share, one after the other: either numbered, where `text` is `NAME%03d.raw FIRST LAST [STEP [N]]`, or `LIST [N]`, where
 // `names` holds a name a line (of the file `header_path`). `line` is that of `text`.
 bool data_names_several(const char *text, size_t length);
+// Calls for each name of them, there or not, as far as they can be read.
+void data_names_each(const char *text, size_t length, LineCursor names, void (*call)(void *context, const char *name, size_t length), void *context);
 Volume *volume_decode_several(const VolumeHeader *header, const char *header_path, int line, const char *text, size_t length, LineCursor names, Faults *faults);
-
-bool volume_is_nrrd(const FileBytes *file);
-bool volume_is_metaimage(const FileBytes *file);
-bool volume_is_nifti(const FileBytes *file);
-bool volume_is_dicom(const FileBytes *file);
-Volume *volume_parse_nrrd(const FileBytes *file, Faults *faults);
-Volume *volume_parse_metaimage(const FileBytes *file, Faults *faults);
-Volume *volume_parse_nifti(const FileBytes *file, Faults *faults);
-// A multi-frame file alone; a slice with the other files of its series, which stand beside it.
-Volume *volume_parse_dicom(const FileBytes *file, Faults *faults);
-// The only series of a folder; several are a fault that lists them.
-Volume *volume_load_dicom_folder(const char *path, Faults *faults);
 
 #endif

@@ -2,7 +2,7 @@
 // LIST (names follow, one a line) or numbered names.
 //
 // Voxel (i, j, k) lies at Offset + sum_a index_a ElementSpacing_a D_a, where D_a is the a-th triple of TransformMatrix.
-#include "recon/volume/volume_format.h"
+#include "recon/volume/volume_metaimage.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -2,7 +2,7 @@
 // Read here and not by libnifti, which trusts the sizes of a header and prints its own messages.
 //
 // Grid: sform where its code is > 0 (rows srow_x, srow_y, srow_z), else qform (quaternion and qfac), else pixdim alone. The frame is RAS by rule.
-#include "recon/volume/volume_format.h"
+#include "recon/volume/volume_nifti.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -2,7 +2,7 @@
 // the samples, or the samples in detached files. Raw, gzip and text encodings.
 //
 // Fields are gathered first and read afterwards, so that their order does not matter. An unknown or repeated field is a fault, as the format demands.
-#include "recon/volume/volume_format.h"
+#include "recon/volume/volume_nrrd.h"
 
 #include <ctype.h>
 #include <stdio.h>

@@ -3,7 +3,7 @@
 #include "cli/file_kind.h"
 #include "recon/surface/surface_file.h"
 #include "recon/tree_file.h"
-#include "recon/volume/volume.h"
+#include "recon/volume/volume_file.h"
 #include "sim/scene.h"
 #include "tests/fuzz/given_files.h"
 

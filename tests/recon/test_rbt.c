@@ -4,6 +4,7 @@
 // spline's (1/sqrt(3) voxel) add up in squares, and so does the moving average along the rays (w^2 / 12) for rays across the axis.
 #include "recon/track/ransac_cylinder.h"
 #include "recon/track/rbt_track.h"
+#include "recon/volume/volume_file.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -3,6 +3,7 @@
 #include "recon/track/ransac_cylinder.h"
 #include "recon/track/rbt_track.h"
 #include "recon/volume/bspline.h"
+#include "recon/volume/volume_file.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

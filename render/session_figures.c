@@ -1,9 +1,10 @@
-// The session report's figures: strips over time, the tip's path in the C-arm's view, points over sessions. Colours are classes of report_style or, for
+// The session report's figures: strips over time, the tip's path in the C-arm's view, points over sessions. Colours are classes of page_style or, for
 // the path, steps of viridis' darker part, whose lightness grows with time: told apart by the colour-blind, and in print.
-#include "cli/report.h"
-#include "cli/session_report.h"
+#include "render/session_figures.h"
+
 #include "render/c_arm.h"
 #include "render/camera.h"
+#include "render/page.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -54,7 +55,7 @@ static void draw_strip(FILE *out, const RecordedRun *run, const Strip *strip, in
         most = fmax(most, high[c]);
         columns = c + 1;
     }
-    double range = fmax(most - least, 1e-6), tick = report_tick_step(range, 4), floor_at = tick * floor(least / tick), scale;
+    double range = fmax(most - least, 1e-6), tick = page_tick_step(range, 4), floor_at = tick * floor(least / tick), scale;
     range = fmax(tick * ceil(most / tick) - floor_at, tick);
     scale = STRIP / range;
     fprintf(out, "<text x=\"%d\" y=\"%d\">%s</text>\n", STRIP_LEFT, top - 6, strip->name);
@@ -127,7 +128,7 @@ void session_time_figure(const SessionPage *page)
         draw_bars(out, run, &axis, "contrast", contrast_of, 1, bottom + 6 + BARS + 8);
     }
     draw_errors(page, &axis, foot + 4);
-    double tick = report_tick_step(axis.end_s, 10);
+    double tick = page_tick_step(axis.end_s, 10);
     for (int k = 0; k * tick <= axis.end_s * (1 + 1e-9); k++)
         fprintf(out, "<path class=\"axis\" d=\"M%.1f %d v4\"/><text class=\"tick\" text-anchor=\"middle\" x=\"%.1f\" y=\"%d\">%g</text>\n",
                 at_time(&axis, k * tick), foot + 4, at_time(&axis, k * tick), foot + 19, k * tick);
@@ -323,7 +324,7 @@ static void draw_marks(const SessionPage *page, const RoadMap *map)
         fprintf(out, "<g class=\"o2\"><circle class=\"mark\" cx=\"%.1f\" cy=\"%.1f\" r=\"%.1f\"/><path class=\"mark\" d=\"M%.1f %.1fh-6m%.1f 0h6\"/></g>"
                      "<text class=\"label\" text-anchor=\"%s\" x=\"%.1f\" y=\"%.1f\">", x, y, r, x - r, y, 2 * r + 6,
                 x > 0.6 * VIEW_WIDTH ? "end" : "start", x > 0.6 * VIEW_WIDTH ? x - r - 9 : x + r + 9, y + 4);
-        report_text(out, target->name);
+        page_text(out, target->name);
         fprintf(out, "</text>\n");
     }
     double last_x = -1e9, last_y = -1e9, shift = 0;
@@ -351,7 +352,7 @@ void session_path_figure(const SessionPage *page)
     if (!run || run->frame_count < 1)
         return;
     RoadMap map = frame_path(page);
-    double bar = report_tick_step(VIEW_WIDTH / map.mm, 5), foot = map.height + 44, end_s = run->time_s[run->step_count - 1];
+    double bar = page_tick_step(VIEW_WIDTH / map.mm, 5), foot = map.height + 44, end_s = run->time_s[run->step_count - 1];
     fprintf(out,
             "<figure id=\"figure-path\"><svg role=\"img\" aria-labelledby=\"path-t path-d\" viewBox=\"0 0 %d %.0f\" width=\"%d\" height=\"%.0f\">\n"
             "<title id=\"path-t\">Path of the tip over the vessel</title><desc id=\"path-d\">The way of the tool's tip in %.1f s, seen in %s, over the "

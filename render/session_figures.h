@@ -1,10 +1,10 @@
-// The report of a trainee's session (`seldinger report`): one HTML5 page that stands alone, as cli/report.h's, in its style: points and their parts,
-// errors, plots over time, the tip's path over the vessel, earlier sessions. What cannot be had (recording, vessel, scene) is left out and said.
-#ifndef SELDINGER_CLI_SESSION_REPORT_H
-#define SELDINGER_CLI_SESSION_REPORT_H
+// The figures of a session's page (session_page.h), and what they are drawn from.
+#ifndef SELDINGER_RENDER_SESSION_FIGURES_H
+#define SELDINGER_RENDER_SESSION_FIGURES_H
 
-#include "cli/cli.h"
 #include "sim/session.h"
+
+#include <stdio.h>
 
 typedef struct SessionPage {
     FILE *out;
@@ -18,10 +18,7 @@ typedef struct SessionPage {
     int earlier_count, broken;
 } SessionPage;
 
-// Writes the whole page to page->out.
-void session_page(const SessionPage *page);
-
-// Figures, inline SVG (session_figures.c); nothing where there is no recording.
+// Figures, inline SVG; nothing where there is no recording.
 void session_time_figure(const SessionPage *page);
 void session_path_figure(const SessionPage *page);
 void session_trend_figure(const SessionPage *page);

@@ -1,7 +1,8 @@
 // The report's figures. Colours are classes that the page's style sheet sets for light, dark and paper.
-#include "cli/report.h"
+#include "render/tree_figures.h"
 
 #include "base/heap.h"
+#include "render/page.h"
 
 #include <stdlib.h>
 
@@ -10,10 +11,13 @@ static const char *const finding_class[] = {"stenosis", "dilatation", "aneurysm"
 
 static int order_class(int order) { return order < 6 ? order : 6; }
 
-double report_tick_step(double range, int most)
+void tree_page_label(const Report *report, int finding, char label[16])
 {
-    double step = pow(10, floor(log10(range / most)));
-    return range / step <= most ? step : range / (2 * step) <= most ? 2 * step : range / (5 * step) <= most ? 5 * step : 10 * step;
+    FindingKind kind = report->finding[finding].kind;
+    int number = 0;
+    for (int i = 0; i <= finding; i++)
+        number += report->finding[i].kind == kind;
+    snprintf(label, 16, "%c%d", "SDA"[kind], number);
 }
 
 // --- the tree ---
@@ -66,7 +70,7 @@ static void draw_projection(const Report *report, const Projection *p, int numbe
     FILE *out = report->out;
     const VesselTree *tree = report->tree;
     double width = p->scale * (p->high[p->across] - p->low[p->across]), height = p->scale * (p->high[p->up] - p->low[p->up]);
-    double bar = report_tick_step(width / p->scale, 4);
+    double bar = page_tick_step(width / p->scale, 4);
     double(*side)[2] = HEAP_ZEROED(2 * (size_t)tree->node_count, sizeof *side);
     fprintf(out,
             "<svg class=\"tree\" role=\"img\" aria-labelledby=\"tree%d-t tree%d-d\" viewBox=\"-12 -24 %.1f %.1f\" width=\"%.0f\" height=\"%.0f\">\n"
@@ -89,7 +93,7 @@ static void draw_projection(const Report *report, const Projection *p, int numbe
     for (int i = 0; i < report->finding_count; i++) {
         char label[16];
         double x = place_x(p, tree->center[report->finding[i].node]), y = place_y(p, tree->center[report->finding[i].node]);
-        report_label(report, i, label);
+        tree_page_label(report, i, label);
         fprintf(out, "<g class=\"%s\"><circle class=\"mark\" cx=\"%.1f\" cy=\"%.1f\" r=\"6\"/><text class=\"label\" x=\"%.1f\" y=\"%.1f\">%s</text></g>\n",
                 finding_class[report->finding[i].kind], x, y, x + 8, y - 5, label);
     }
@@ -100,7 +104,7 @@ static void draw_projection(const Report *report, const Projection *p, int numbe
     free(side);
 }
 
-void report_tree_figure(const Report *report)
+void tree_page_branches_figure(const Report *report)
 {
     static const int plane[3][2] = {{0, 1}, {0, 2}, {1, 2}};
     const VesselTree *tree = report->tree;
@@ -132,18 +136,18 @@ static double chart_y(const Chart *c, double y) { return c->top + c->height * (1
 
 static void draw_axes(FILE *out, const Chart *c, int ticks_x, int ticks_y, const char *x_name)
 {
-    double step = report_tick_step(c->x_high, ticks_x);
+    double step = page_tick_step(c->x_high, ticks_x);
     fprintf(out, "<path class=\"axis\" d=\"M%.1f %.1f v%.1f h%.1f\"/>\n", c->left, c->top, c->height, c->width);
     for (int k = 0; k * step <= c->x_high * (1 + 1e-9); k++)
         fprintf(out, "<text class=\"tick\" text-anchor=\"middle\" x=\"%.1f\" y=\"%.1f\">%g</text>\n", chart_x(c, k * step), c->top + c->height + 14, k * step);
-    step = report_tick_step(c->y_high, ticks_y);
+    step = page_tick_step(c->y_high, ticks_y);
     for (int k = 0; k * step <= c->y_high * (1 + 1e-9); k++)
         fprintf(out, "<path class=\"grid\" d=\"M%.1f %.1f h%.1f\"/><text class=\"tick\" text-anchor=\"end\" x=\"%.1f\" y=\"%.1f\">%g</text>\n", c->left,
                 chart_y(c, k * step), c->width, c->left - 4, chart_y(c, k * step) + 4, k * step);
     fprintf(out, "<text class=\"tick\" text-anchor=\"end\" x=\"%.1f\" y=\"%.1f\">%s</text>\n", c->left + c->width, c->top + c->height + 28, x_name);
 }
 
-void report_radius_figure(const Report *report, int branch)
+void tree_page_radius_figure(const Report *report, int branch)
 {
     FILE *out = report->out;
     const VesselTree *tree = report->tree;
@@ -168,7 +172,7 @@ void report_radius_figure(const Report *report, int branch)
         char label[16];
         if (f->branch != branch)
             continue;
-        report_label(report, i, label);
+        tree_page_label(report, i, label);
         double x = chart_x(&c, f->along), y = chart_y(&c, fmin(f->kind == FINDING_ANEURYSM ? f->reference : f->radius, c.y_high));
         fprintf(out, "<g class=\"%s\">", finding_class[f->kind]);
         if (f->kind != FINDING_ANEURYSM)
@@ -179,7 +183,7 @@ void report_radius_figure(const Report *report, int branch)
     fprintf(out, "</svg>\n");
 }
 
-void report_error_figure(const Report *report)
+void tree_page_error_figure(const Report *report)
 {
     static const double border[3] = {0.5, 1, 2};
     FILE *out = report->out;

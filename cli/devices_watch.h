@@ -1,6 +1,6 @@
 // What `seldinger devices` knows of each HID device: shared by the list and --watch.
-#ifndef SELDINGER_CLI_DEVICES_H
-#define SELDINGER_CLI_DEVICES_H
+#ifndef SELDINGER_CLI_DEVICES_WATCH_H
+#define SELDINGER_CLI_DEVICES_WATCH_H
 
 #include "input/device_map.h"
 #include "input/hid_device.h"
