@@ -87,3 +87,27 @@ void output_extension(const char *path, char extension[16])
         extension[i] = (char)tolower((unsigned char)dot[i]);
     extension[length] = 0;
 }
+
+bool output_text_open(OutputText *text)
+{
+    *text = (OutputText){0};
+    text->stream = open_memstream(&text->bytes, &text->length);
+    return text->stream != NULL;
+}
+
+bool output_text_write(OutputText *text, const char *path, Faults *faults)
+{
+    bool whole = !ferror(text->stream) && fclose(text->stream) == 0;
+    if (!whole)
+        faults_add(faults, path, 0, 0, "cannot be written: no memory");
+    whole = whole && output_write(path, text->bytes, text->length, faults);
+    free(text->bytes);
+    return whole;
+}
+
+bool output_text_forget(OutputText *text)
+{
+    fclose(text->stream);
+    free(text->bytes);
+    return false;
+}

@@ -7,6 +7,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdio.h>
 
 // Before long work: a fault where `path` (NULL: nothing to check) will not be writable. Leaves nothing behind.
 bool output_check(const char *path, Faults *faults);
@@ -15,6 +16,15 @@ bool output_check_file(const char *path, Faults *faults);
 bool output_write(const char *path, const void *bytes, size_t length, Faults *faults);
 // `text` and a newline; takes it over and frees it. NULL is a fault: no memory.
 bool output_write_line(const char *path, char *text, Faults *faults);
+// A text that grows in memory, then is written at once.
+typedef struct OutputText {
+    FILE *stream;
+    char *bytes;
+    size_t length;
+} OutputText;
+bool output_text_open(OutputText *text);                 // false: out of memory
+bool output_text_write(OutputText *text, const char *path, Faults *faults);      // and closes it
+bool output_text_forget(OutputText *text);               // closes it; false
 // The last extension in lower case, with its dot; "" where there is none or it is long.
 void output_extension(const char *path, char extension[16]);
 

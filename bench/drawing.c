@@ -1,10 +1,10 @@
 // seldinger bench drawing: what a picture of the trainer costs, and whether drawing disturbs the 1 kHz thread.
 #include "bench/bench.h"
 
-#include "cli/scene_views.h"
-#include "cli/trainer_panel.h"
 #include "render/gl_canvas.h"
 #include "render/gl_context.h"
+#include "render/scene_views.h"
+#include "render/trainer_panel.h"
 #include "sim/clock.h"
 #include "sim/live_session.h"
 

@@ -2,7 +2,6 @@
 #include "cli/cli.h"
 
 #include <string.h>
-#include <unistd.h>
 
 void cli_notes(FILE *out, const char *path, const char *text)
 {
@@ -19,24 +18,6 @@ int cli_bad_input(const Faults *faults)
     faults_print(faults, text, sizeof text);
     fputs(text, stderr);
     return EXIT_BAD_INPUT;
-}
-
-static void draw_bar(void *context, long done, long total)
-{
-    ProgressBar *bar = context;
-    enum { WIDTH = 40 };
-    int filled = total > 0 ? (int)(done * WIDTH / total) : WIDTH;
-    fprintf(stderr, "\r%s [%.*s%.*s] %ld/%ld", bar->label, filled, "########################################", WIDTH - filled,
-            "                                        ", done, total);
-    if (done >= total)
-        fputc('\n', stderr);
-}
-
-Progress progress_bar(ProgressBar *bar, const char *label, bool quiet)
-{
-    bar->label = label;
-    bar->shown = !quiet && isatty(STDERR_FILENO);
-    return (Progress){.call = bar->shown ? draw_bar : NULL, .context = bar};
 }
 
 void cli_note(const char *path, const char *text) { cli_notes(stderr, path, text); }

@@ -4,6 +4,7 @@
 
 #include "base/parallel.h"
 #include "base/process.h"
+#include "base/progress_bar.h"
 #include "geom/geom.h"
 #include "sim/open_vessel.h"
 
@@ -16,12 +17,6 @@ VerbFunction verb_run, verb_check, verb_segment, verb_import, verb_fit, verb_syn
 // Prints all faults to standard error; returns EXIT_BAD_INPUT.
 int cli_bad_input(const Faults *faults);
 void cli_notes(FILE *out, const char *path, const char *text);   // each line of `text` after "PATH: "
-// A progress bar on standard error: drawn where that is a terminal and not --quiet, else nothing.
-typedef struct ProgressBar {
-    const char *label;
-    bool shown;
-} ProgressBar;
-Progress progress_bar(ProgressBar *bar, const char *label, bool quiet);
 // Number options: the whole text must be a finite number within [least, most]; else a message that names the option and the range, and false.
 bool cli_number(const char *option, const char *text, double least, double most, double *value);
 bool cli_point(const char *option, const char *text, Vec3 *point);   // X,Y,Z [mm], finite and below 1e9

@@ -6,10 +6,10 @@
 #include "base/sort_doubles.h"
 #include "cli/junction_sheets.h"
 #include "cli/output_plan.h"
-#include "cli/reach_report.h"
 #include "recon/fit/field_fit.h"
 #include "recon/fit/lim_fit.h"
 #include "recon/fit/model_measure.h"
+#include "recon/fit/reach_report.h"
 #include "recon/tree_file.h"
 #include "recon/volume/blurred_edge.h"
 #ifdef SELDINGER_RENDER

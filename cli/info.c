@@ -6,11 +6,11 @@
 #include "cli/file_kind.h"
 #include "cli/junction_sheets.h"
 #include "cli/output_plan.h"
-#include "cli/reach_report.h"
-#include "render/tree_page.h"
+#include "recon/fit/reach_report.h"
 #include "recon/surface/mesh_check.h"
 #include "recon/tree_file.h"
 #include "recon/volume/volume_file.h"
+#include "render/tree_page.h"
 #include "sim/recording.h"
 #ifdef SELDINGER_RENDER
 #include "render/picture.h"

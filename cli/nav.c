@@ -1,7 +1,9 @@
 // seldinger nav: the trainer.
+#include "cli/cli.h"
+
 #include "base/output.h"
 #include "cli/output_plan.h"
-#include "cli/trainer.h"
+#include "render/trainer.h"
 #include "sim/replay.h"
 #include "sim/session_files.h"
 
@@ -162,6 +164,7 @@ static int steer(const NavOptions *options, Scene *scene, OpenVessel *open, cons
     if (trainer.is_recorded)
         session_folder(options->sessions, folder, sizeof folder, faults);
     trainer.folder = folder;
+    trainer.note = cli_note;
     trainer.map = map;
     trainer.resume = resume;
     if (faults->count == 0) {

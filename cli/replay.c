@@ -5,9 +5,9 @@
 #include "cli/output_plan.h"
 #include "sim/replay_scene.h"
 #ifdef SELDINGER_RENDER
-#include "cli/film.h"
-#include "cli/replay_window.h"
-#include "cli/trainer.h"
+#include "render/film.h"
+#include "render/replay_window.h"
+#include "render/trainer.h"
 #include "sim/session_files.h"
 #endif
 
@@ -239,7 +239,7 @@ static int show(const ReplayOptions *options, const RecordedRun *run, Scene *sce
         return EXIT_DONE;
     char folder[4096];
     TrainerFigures figures = {0};
-    TrainerOptions trainer = {.folder = folder, .is_recorded = true, .trainee = "", .has_built_in_maps = true, .resume = run, .resume_s = resume_s,
+    TrainerOptions trainer = {.folder = folder, .note = cli_note, .is_recorded = true, .trainee = "", .has_built_in_maps = true, .resume = run, .resume_s = resume_s,
                               .width = options->width, .height = options->height, .view = window.view, .duration_s = options->duration_s};
     if (!session_folder(options->sessions, folder, sizeof folder, faults))
         return EXIT_BAD_INPUT;

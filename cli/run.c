@@ -6,11 +6,11 @@
 #include "base/process.h"
 #include "cli/output_plan.h"
 #include "cli/run_chart.h"
-#include "cli/run_files.h"
 #include "cli/run_hands.h"
 #include "sim/lesson.h"
 #include "sim/pose.h"
 #include "sim/recording.h"
+#include "sim/run_summary.h"
 #ifdef SELDINGER_RENDER
 #include "render/picture.h"
 #endif

@@ -1,4 +1,4 @@
-#include "cli/trainer_cine.h"
+#include "render/trainer_cine.h"
 
 #include "base/output.h"
 #include "base/whole_file.h"

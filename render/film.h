@@ -1,9 +1,9 @@
 // What a trainee saw, off screen: a moment of a recording as the trainer's window shows it, to a picture or to the frames of a film.
-#ifndef SELDINGER_CLI_FILM_H
-#define SELDINGER_CLI_FILM_H
+#ifndef SELDINGER_RENDER_FILM_H
+#define SELDINGER_RENDER_FILM_H
 
-#include "cli/cli.h"
 #include "render/panel.h"
+#include "sim/open_vessel.h"
 #include "sim/recording.h"
 
 typedef struct FilmOptions {

@@ -1,4 +1,4 @@
-#include "cli/run_files.h"
+#include "sim/run_summary.h"
 
 #include "base/heap.h"
 

@@ -1,6 +1,6 @@
 // What a run leaves: the summary as JSON, the final state as CSV, a few lines for people.
-#ifndef SELDINGER_CLI_RUN_FILES_H
-#define SELDINGER_CLI_RUN_FILES_H
+#ifndef SELDINGER_SIM_RUN_SUMMARY_H
+#define SELDINGER_SIM_RUN_SUMMARY_H
 
 #include "sim/drive.h"
 

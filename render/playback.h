@@ -1,7 +1,7 @@
 // A recording as something to look at: what was seen at any moment of it, forwards and back. Poses come from its frames, controls from its steps; contrast
 // agent and X-ray pulses are gone through again, from the nearest of some places kept on the way. Lengths mm, times simulated seconds.
-#ifndef SELDINGER_CLI_PLAYBACK_H
-#define SELDINGER_CLI_PLAYBACK_H
+#ifndef SELDINGER_RENDER_PLAYBACK_H
+#define SELDINGER_RENDER_PLAYBACK_H
 
 #include "render/pulse_clock.h"
 #include "sim/contrast_injection.h"

@@ -1,6 +1,6 @@
 // The tray in the trainer's window: the chosen tool's devices as the panel shows them, and what stands in the way of putting one in.
-#ifndef SELDINGER_CLI_TRAINER_TRAY_H
-#define SELDINGER_CLI_TRAINER_TRAY_H
+#ifndef SELDINGER_RENDER_TRAINER_TRAY_H
+#define SELDINGER_RENDER_TRAINER_TRAY_H
 
 #include "render/panel.h"
 #include "sim/pose.h"

@@ -1,4 +1,4 @@
-#include "cli/playback.h"
+#include "render/playback.h"
 
 #include <stdlib.h>
 #include <string.h>

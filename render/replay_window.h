@@ -1,9 +1,9 @@
 // A recording at the trainer's window: played, stopped, searched; and gone on from.
-#ifndef SELDINGER_CLI_REPLAY_WINDOW_H
-#define SELDINGER_CLI_REPLAY_WINDOW_H
+#ifndef SELDINGER_RENDER_REPLAY_WINDOW_H
+#define SELDINGER_RENDER_REPLAY_WINDOW_H
 
-#include "cli/cli.h"
 #include "render/panel.h"
+#include "sim/open_vessel.h"
 #include "sim/recording.h"
 
 typedef struct ReplayWindowOptions {

@@ -1,15 +1,17 @@
-#include "cli/film.h"
+#include "render/film.h"
 
-#include "cli/playback.h"
-#include "cli/scene_views.h"
-#include "cli/trainer_panel.h"
+#include "base/progress_bar.h"
 #include "render/gl_canvas.h"
 #include "render/gl_context.h"
 #include "render/movie_file.h"
+#include "render/playback.h"
 #include "render/png_file.h"
+#include "render/scene_views.h"
+#include "render/trainer_panel.h"
 #include "sim/rescore.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 typedef struct Film {

@@ -1,6 +1,6 @@
 // What the panel shows, made from a moment of a session (or of a recording): figures of the score, errors, devices, warnings, the image's mode.
-#ifndef SELDINGER_CLI_TRAINER_PANEL_H
-#define SELDINGER_CLI_TRAINER_PANEL_H
+#ifndef SELDINGER_RENDER_TRAINER_PANEL_H
+#define SELDINGER_RENDER_TRAINER_PANEL_H
 
 #include "render/desk.h"
 #include "render/views.h"

@@ -1,13 +1,14 @@
-#include "cli/replay_window.h"
+#include "render/replay_window.h"
 
-#include "cli/playback.h"
-#include "cli/scene_views.h"
-#include "cli/trainer_panel.h"
+#include "render/playback.h"
+#include "render/scene_views.h"
 #include "render/timeline.h"
+#include "render/trainer_panel.h"
 #include "render/window.h"
 #include "sim/clock.h"
 #include "sim/rescore.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 
 // Real time that a frame may spend on simulating the recording again, and simulated seconds that a held arrow key goes in one.

@@ -6,7 +6,7 @@
 
 #include <cmocka.h>
 
-#include "cli/trainer_tray.h"
+#include "render/trainer_tray.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,20 +1,21 @@
-#include "cli/trainer.h"
+#include "render/trainer.h"
 
-#include "cli/scene_views.h"
-#include "cli/trainer_cine.h"
-#include "cli/trainer_panel.h"
-#include "cli/trainer_tray.h"
 #include "input/gamepad.h"
 #include "input/hand.h"
 #include "render/gl_canvas.h"
 #include "render/png_file.h"
 #include "render/pulse_clock.h"
+#include "render/scene_views.h"
+#include "render/trainer_cine.h"
+#include "render/trainer_panel.h"
+#include "render/trainer_tray.h"
 #include "sim/clock.h"
 #include "sim/live_session.h"
 #include "sim/recover.h"
 #include "sim/session_files.h"
 
 #include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -129,7 +130,7 @@ static void offer_recovery(Trainer *trainer)
         trainer->progress = "Simulating the session again";
         for (int i = 0; wanted && i < found.count; i++) {
             faults_clear(faults);
-            if (recover_session(found.path[i], &(OpenVesselOptions){.note = cli_note}, show_progress, trainer, faults))
+            if (recover_session(found.path[i], &(OpenVesselOptions){.note = trainer->options->note}, show_progress, trainer, faults))
                 say(trainer, MARK_GOOD, "recovered; seldinger report %s", found.path[i]);
             else
                 say(trainer, MARK_BAD, "%s", faults->text[0]);

@@ -1,10 +1,11 @@
 // The trainer's window: a session is driven by keys, gamepads and devices, seen in three views, until the user quits.
-#ifndef SELDINGER_CLI_TRAINER_H
-#define SELDINGER_CLI_TRAINER_H
+#ifndef SELDINGER_RENDER_TRAINER_H
+#define SELDINGER_RENDER_TRAINER_H
 
-#include "cli/cli.h"
+#include "base/process.h"
 #include "input/device_map.h"
 #include "render/panel.h"
+#include "sim/open_vessel.h"
 #include "sim/recording.h"
 
 enum { TRAINER_MAPS = 8 };
@@ -25,6 +26,7 @@ typedef struct TrainerOptions {
     bool is_full_screen;
     double duration_s;               // ends by itself after this much real time; 0: never
     int threads;
+    NoteFunction note;               // told what is worth knowing of the vessel of a session that is recovered; NULL: nobody asks
 } TrainerOptions;
 
 // What a session was like on this machine: for `nav --figures`.

@@ -1,6 +1,6 @@
 // The cine loop of a session at the window: recorded while the X-ray is on, shown again in its place, saved as bytes and as a film.
-#ifndef SELDINGER_CLI_TRAINER_CINE_H
-#define SELDINGER_CLI_TRAINER_CINE_H
+#ifndef SELDINGER_RENDER_TRAINER_CINE_H
+#define SELDINGER_RENDER_TRAINER_CINE_H
 
 #include "render/cine.h"
 #include "render/panel.h"

@@ -1,9 +1,10 @@
-#include "cli/scene_views.h"
+#include "render/scene_views.h"
 
 #include "base/heap.h"
 #include "base/sort_doubles.h"
 #include "recon/volume/volume_file.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

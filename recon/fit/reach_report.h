@@ -1,6 +1,6 @@
 // What `info` and `fit` say of where a tool gets to from the inlet (geom/reach.h), as text and as JSON.
-#ifndef SELDINGER_CLI_REACH_REPORT_H
-#define SELDINGER_CLI_REACH_REPORT_H
+#ifndef SELDINGER_RECON_FIT_REACH_REPORT_H
+#define SELDINGER_RECON_FIT_REACH_REPORT_H
 
 #include "geom/reach.h"
 

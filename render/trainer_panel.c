@@ -1,4 +1,4 @@
-#include "cli/trainer_panel.h"
+#include "render/trainer_panel.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,4 +1,4 @@
-#include "cli/trainer_tray.h"
+#include "render/trainer_tray.h"
 
 #include <math.h>
 #include <stdio.h>

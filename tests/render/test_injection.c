@@ -6,7 +6,7 @@
 
 #include <cmocka.h>
 
-#include "cli/playback.h"
+#include "render/playback.h"
 #include "sim/lesson.h"
 #include "sim/replay.h"
 #include "sim/session.h"

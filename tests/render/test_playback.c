@@ -6,7 +6,7 @@
 
 #include <cmocka.h>
 
-#include "cli/playback.h"
+#include "render/playback.h"
 #include "sim/rescore.h"
 #include "tests/geom/near.h"
 #include "tests/geom/random_numbers.h"

@@ -1,5 +1,5 @@
 // See reach_report.h.
-#include "cli/reach_report.h"
+#include "recon/fit/reach_report.h"
 
 #include "geom/ghost_lumens.h"
 #include "base/heap.h"
