@@ -12,7 +12,7 @@
 void heap_is_empty(size_t bytes, const char *file)
 {
     const char *folder = strrchr(file, '/'), *from = folder;
-    while (from && from > file && from[-1] != '/')      // with the folder that it is in: "recon/field_fit.c"
+    while (from && from > file && from[-1] != '/')      // with the folder that it is in: "fit/field_fit.c"
         from--;
     char message[200];
     int length = snprintf(message, sizeof message, "seldinger: out of memory (asked for %zu bytes in %.100s); free some, or give it less to do\n", bytes,

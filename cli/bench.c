@@ -1,230 +1,24 @@
-// seldinger bench: the table of benchmarks, and how a run is measured.
-#include "cli/bench.h"
+// seldinger bench: the benchmarks are a program of their own, which lies beside this one.
+#include "cli/cli.h"
 
-#include "cli/output.h"
+#include "base/process.h"
 
-#include <getopt.h>
-#include <inttypes.h>
-#include <stdlib.h>
+#include <errno.h>
+#include <limits.h>
 #include <string.h>
-#include <time.h>
-
-static const char help[] =
-    "Usage: seldinger bench collision|step|fit|track|wall|torture|peer|drawing [options]\n\n"
-    "Timing tables, each row measured in the same run.\n\n"
-    "  collision  local models against meshes searched by Embree, the exact wall and a sampled distance: cost, error, friction that is not there\n"
-    "  step       a simulation step: spiral at 100 GPa, phantom, aneurism; growth with the elements; SIMD levels; budgets; --tools: coaxial tools\n"
-    "  fit        local models: the paper's tables 3, 4 and 5 beside its figures\n"
-    "  track      trackers on synthetic angiograms with truth: the labels of the paper's Table 2, errors, times\n"
-    "  wall       one table of what the wall of fitted trees is worth: agreement, accuracy, ostia, reach, tools in it\n"
-    "  torture    random hands, tools and vessels, judged by the true wall\n"
-    "  peer       the scenes on which SOFA with BeamAdapter was measured, beside its figures\n"
-    "  drawing    the trainer's pictures: CPU time, and the 1 kHz thread with and without them\n\n"
-    "`seldinger bench NAME --help` explains the options.\n"
-    "Exit codes: 0 done; 1 a comparison failed; 2 wrong usage or bad input.\n";
+#include <unistd.h>
 
 int verb_bench(int argc, char **argv)
 {
-    static const struct {
-        const char *name;
-        VerbFunction *call;
-    } table[] = {{"step", bench_step}, {"peer", bench_peer}, {"collision", bench_collision}, {"fit", bench_fit}, {"track", bench_track}, {"wall", bench_wall}, {"torture", bench_torture},
-#ifdef SELDINGER_RENDER
-                 {"drawing", bench_drawing},
-#endif
-    };
-    const char *name = argc > 1 ? argv[1] : "";
-    if (!strcmp(name, "--help") || !strcmp(name, "-h")) {
-        fputs(help, stdout);
-        return EXIT_DONE;
+    char program[PATH_MAX] = "";
+    (void)argc;
+    if (process_beside("seldinger-bench", program, sizeof program)) {
+        argv[0] = program;
+        execv(program, argv);
     }
-    for (size_t i = 0; i < sizeof table / sizeof table[0]; i++) {
-        if (!strcmp(name, table[i].name))
-            return table[i].call(argc - 1, argv + 1);
-    }
-    fprintf(stderr, "seldinger bench: %s%s%s; valid: collision, step, fit, track, wall, torture, peer, drawing\n", *name ? "no table '" : "lacks the name of a table", name, *name ? "'" : "");
+    if (errno == ENOENT)
+        fprintf(stderr, "seldinger bench: the benchmarks are not installed: there is no %s; build the target seldinger-bench\n", program);
+    else
+        fprintf(stderr, "seldinger bench: seldinger-bench, beside this program, cannot be started: %s\n", strerror(errno));
     return EXIT_BAD_INPUT;
-}
-
-int64_t bench_cpu_ns(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
-}
-
-const char *bench_processor(void)
-{
-    static char name[128] = "unknown processor";
-    FILE *file = fopen("/proc/cpuinfo", "r");
-    char line[256];
-    while (file && fgets(line, sizeof line, file))
-        if (sscanf(line, "model name : %127[^\n]", name) == 1)
-            break;
-    if (file)
-        fclose(file);
-    return name;
-}
-
-Spread bench_spread(const TimeHistogram *histogram, double unit)
-{
-    return (Spread){histogram_quantile(histogram, 0.5) / unit, histogram_quantile(histogram, 0.99) / unit, histogram_quantile(histogram, 0.999) / unit,
-                    (double)histogram->largest / unit};
-}
-
-void bench_add_spread(cJSON *object, const char *name, Spread s)
-{
-    cJSON *at = cJSON_AddObjectToObject(object, name);
-    cJSON_AddNumberToObject(at, "median", s.median);
-    cJSON_AddNumberToObject(at, "p99", s.p99);
-    cJSON_AddNumberToObject(at, "p999", s.p999);
-    cJSON_AddNumberToObject(at, "max", s.max);
-}
-
-cJSON *bench_figures_json(const StepFigures *run)
-{
-    cJSON *at = cJSON_CreateObject();
-    char hash[17];
-    snprintf(hash, sizeof hash, "%016" PRIx64, run->hash);
-    cJSON_AddNumberToObject(at, "steps", (double)run->steps);
-    cJSON_AddNumberToObject(at, "real_time_factor", run->simulated_s / run->cpu_s);
-    bench_add_spread(at, "step_us", run->step_us);
-    cJSON *stages = cJSON_AddObjectToObject(at, "stage_us");
-    for (int k = 0; k < STAGE_COUNT; k++)
-        bench_add_spread(stages, stage_name[k], run->stage_us[k]);
-    bench_add_spread(at, "candidates", run->candidates);
-    bench_add_spread(at, "contacts", run->contacts);
-    bench_add_spread(at, "iterations", run->iterations);
-    bench_add_spread(at, "penetration_um", run->penetration_um);
-    cJSON_AddNumberToObject(at, "not_converged_steps", (double)run->not_converged);
-    cJSON_AddNumberToObject(at, "linearised_again_steps", (double)run->linearised_again);
-    cJSON_AddNumberToObject(at, "limited_steps", (double)run->limited);
-    cJSON_AddNumberToObject(at, "residual_max", run->residual_max);
-    cJSON_AddNumberToObject(at, "stalled_mm", run->stalled_mm);
-    cJSON_AddStringToObject(at, "state_hash", hash);
-    return at;
-}
-
-Command bench_command(const Scene *scene, int64_t step, int *cursor)
-{
-    return scene->script ? script_at(scene->script, (double)step * scene->dt / 1000, cursor) : (Command){0, 0};
-}
-
-int64_t bench_steps(const Scene *scene, int64_t most)
-{
-    int64_t steps = scene->script ? (int64_t)ceil(script_duration_s(scene->script) * 1000 / scene->dt - 1e-6) : 0;
-    return steps < most ? steps : most;
-}
-
-void bench_figures(const Simulator *simulator, double cpu_s, StepFigures *figures)
-{
-    figures->cpu_s = cpu_s;
-    const StepProfile *profile = simulator_profile(simulator);
-    const RunTotals *totals = simulator_totals(simulator);
-    figures->steps = totals->steps;
-    figures->simulated_s = simulator_time_s(simulator);
-    figures->step_us = bench_spread(&profile->step, 1000);
-    for (int k = 0; k < STAGE_COUNT; k++)
-        figures->stage_us[k] = bench_spread(&profile->stage[k], 1000);
-    figures->candidates = bench_spread(&profile->candidates, 1);
-    figures->contacts = bench_spread(&profile->contacts, 1);
-    figures->iterations = bench_spread(&profile->iterations, 1);
-    figures->penetration_um = bench_spread(&profile->penetration_nm, 1000);
-    figures->not_converged = totals->not_converged_steps;
-    figures->linearised_again = totals->further_linearisations;
-    figures->limited = totals->limited_steps;
-    figures->residual_max = totals->residual_max;
-    figures->flags = totals->flags;
-    figures->last = *simulator_last(simulator);
-    figures->inserted_mm = simulator_state(simulator)->inserted;
-    figures->hash = simulator_hash(simulator);
-}
-
-bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, const StepTrace *trace, StepFigures *figures, Faults *faults)
-{
-    *figures = (StepFigures){0};
-    Simulator *simulator = simulator_create(scene, vessel, faults);
-    if (!simulator)
-        return false;
-    int64_t steps = bench_steps(scene, most), begin = bench_cpu_ns();
-    int cursor = 0, crowd = -1;
-    double fed = simulator_state(simulator)->inserted, length = wire_length(&scene->wire);
-    for (int64_t i = 0; i < steps && !(simulator_last(simulator)->flags & STEP_DIVERGED); i++) {
-        int64_t start = trace ? bench_cpu_ns() : 0;
-        Command command = bench_command(scene, i, &cursor);
-        simulator_step(simulator, command);
-        fed = fmin(length, fmax(0, fed + command.push_mm_s * scene->dt / 1000));
-        if (trace) {
-            trace->us[i] = (double)(bench_cpu_ns() - start) / 1000;
-            trace->contacts[i] = simulator_last(simulator)->active;
-        }
-        if (crowd < 80 && simulator_last(simulator)->candidates > crowd) {
-            crowd = simulator_last(simulator)->candidates;
-            figures->crowded_step = i;
-        }
-    }
-    bench_figures(simulator, (double)(bench_cpu_ns() - begin) * 1e-9, figures);
-    figures->stalled_mm = scene->wire.has_sheath ? fed - figures->inserted_mm : 0;
-    simulator_destroy(simulator);
-    return true;
-}
-
-bool bench_open(const char *path, int threads, BenchScene *out, Faults *faults)
-{
-    *out = (BenchScene){0};
-    out->scene = scene_load(path, faults);
-    return out->scene && open_vessel(out->scene, threads, true, &out->open, faults) && open_vessel_inlet(out->scene, &out->open, faults);
-}
-
-void bench_close(BenchScene *scene)
-{
-    open_vessel_close(&scene->open);
-    scene_free(scene->scene);
-    *scene = (BenchScene){0};
-}
-
-int bench_take(int choice, const char *table, const char *table_help, BenchOptions *options)
-{
-    double number;
-    switch (choice) {
-    case 'j': options->json = optarg; return -1;
-    case 'q': options->quick = true; return -1;
-    case 't':
-        if (!cli_whole_number("--threads", optarg, 0, 256, &number))
-            return EXIT_BAD_INPUT;
-        options->threads = (int)number;
-        return -1;
-    case 'h': fputs(table_help, stdout); return EXIT_DONE;
-    default: fprintf(stderr, "seldinger bench %s: unknown option or lacking value; see --help\n", table); return EXIT_BAD_INPUT;
-    }
-}
-
-int bench_parse(int argc, char **argv, const char *table, const char *table_help, BenchOptions *options)
-{
-    static const struct option list[] = {{"json", required_argument, NULL, 'j'}, {"quick", no_argument, NULL, 'q'},
-                                         {"threads", required_argument, NULL, 't'}, {"help", no_argument, NULL, 'h'}, {0}};
-    *options = (BenchOptions){0};
-    optind = 1;
-    for (int choice, code; (choice = getopt_long(argc, argv, "h", list, NULL)) != -1;)
-        if ((code = bench_take(choice, table, table_help, options)) >= 0)
-            return code;
-    if (optind < argc) {
-        fprintf(stderr, "seldinger bench %s: takes no '%s'; see --help\n", table, argv[optind]);
-        return EXIT_BAD_INPUT;
-    }
-    return -1;
-}
-
-FILE *bench_text(const BenchOptions *options) { return options->json && !strcmp(options->json, "-") ? stderr : stdout; }
-
-bool bench_write_json(const BenchOptions *options, const cJSON *root, Faults *faults)
-{
-    if (!options->json)
-        return true;
-    char *text = cJSON_Print(root);
-    if (!text)
-        faults_add(faults, options->json, 0, 0, "cannot be written: no memory");
-    bool good = text && output_write(options->json, text, strlen(text), faults);
-    free(text);
-    return good;
 }

@@ -2,10 +2,10 @@
 // every scene with a `verify:` key is measured against its references (check_verify.c).
 #include "cli/check_verify.h"
 
-#include "cli/output.h"
-#include "cli/output_plan.h"
 #include "base/heap.h"
-#include "input/text_file.h"
+#include "base/output.h"
+#include "base/text_file.h"
+#include "cli/output_plan.h"
 #include "sim/compare.h"
 #include "sim/drive.h"
 
@@ -125,7 +125,7 @@ static ToolPath *run_path(Scene *scene, double duration_s, const CheckOptions *o
     OpenVessel open = {0};
     Sampling sampling = {0};
     Simulator *simulator = NULL;
-    if (open_vessel(scene, options->threads, options->quiet, &open, faults) && open_vessel_inlet(scene, &open, faults))
+    if (cli_open_vessel(scene, options->threads, options->quiet, &open, faults) && open_vessel_inlet(scene, &open, faults))
         simulator = simulator_create(scene, open.vessel, faults);
     if (simulator && (sampling.path = tool_path_create(simulator, duration_s))) {
         DriveOptions drive = drive_default_options();

@@ -3,7 +3,7 @@
 // no further: the order is then at least what brought it there.
 #include "cli/check_verify.h"
 
-#include "input/text_file.h"
+#include "base/text_file.h"
 #include "sim/drive.h"
 
 #include <stdlib.h>
@@ -197,7 +197,7 @@ static bool open_scene(const char *path, int threads, bool quiet, VerifyScene *o
         printf("# %s: skipped, %s is not there\n", path, needed);
         return false;
     }
-    return open_vessel(scene, threads, quiet, &out->open, faults) && open_vessel_inlet(scene, &out->open, faults) && faults->count == before;
+    return cli_open_vessel(scene, threads, quiet, &out->open, faults) && open_vessel_inlet(scene, &out->open, faults) && faults->count == before;
 }
 
 int check_verify(int count, char *const *path, int threads, bool quiet, Faults *faults)

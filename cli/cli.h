@@ -2,29 +2,21 @@
 #ifndef SELDINGER_CLI_CLI_H
 #define SELDINGER_CLI_CLI_H
 
+#include "base/parallel.h"
+#include "base/process.h"
+#include "base/progress_bar.h"
 #include "geom/geom.h"
-#include "recon/parallel.h"
-#include "sim/scene.h"
+#include "sim/open_vessel.h"
 
 #include <stdio.h>
-
-enum { EXIT_DONE = 0, EXIT_DIFFERENT = 1, EXIT_BAD_INPUT = 2, EXIT_UNTRUSTED = 3 };
 
 typedef int VerbFunction(int argc, char **argv);   // argv[0] is "seldinger VERB"
 VerbFunction verb_run, verb_check, verb_segment, verb_import, verb_fit, verb_synth, verb_query, verb_export, verb_info, verb_bench, verb_replay,
     verb_devices, verb_nav, verb_report;
 
-// The handler of a signal that ends the program: no unfinished file is left.
-void cli_stop(int signal_number);
 // Prints all faults to standard error; returns EXIT_BAD_INPUT.
 int cli_bad_input(const Faults *faults);
 void cli_notes(FILE *out, const char *path, const char *text);   // each line of `text` after "PATH: "
-// A progress bar on standard error: drawn where that is a terminal and not --quiet, else nothing.
-typedef struct ProgressBar {
-    const char *label;
-    bool shown;
-} ProgressBar;
-Progress progress_bar(ProgressBar *bar, const char *label, bool quiet);
 // Number options: the whole text must be a finite number within [least, most]; else a message that names the option and the range, and false.
 bool cli_number(const char *option, const char *text, double least, double most, double *value);
 bool cli_point(const char *option, const char *text, Vec3 *point);   // X,Y,Z [mm], finite and below 1e9
@@ -34,17 +26,8 @@ bool cli_size(const char *text, int *width, int *height);
 // A view by name, its index: fluoroscopy, 3d, angioscopy, all; else a message and false.
 bool cli_view(const char *text, int *view);
 
-// Opens what a scene's `vessel:` names (recon is not below sim): loads a model, fits a shape (cached), builds a tube or plane.
-typedef struct OpenVessel {
-    Vessel *vessel;          // NULL for SOURCE_NONE
-    VesselTree *tree;        // LIM only
-    TriangleMesh *mesh;      // the wall where that is triangles, else filled on demand by open_vessel_mesh
-} OpenVessel;
-bool open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults);
-// The vessel's surface for pictures; NULL for planes.
-const TriangleMesh *open_vessel_mesh(const Scene *scene, OpenVessel *open);
-// Where the scene says `inlet: root`: start and direction of the tool from the vessel's inlet. False with a fault where it has none.
-bool open_vessel_inlet(Scene *scene, const OpenVessel *open, Faults *faults);
-void open_vessel_close(OpenVessel *open);
+// open_vessel() with a progress bar and notes on standard error.
+bool cli_open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults);
+void cli_note(const char *path, const char *text);   // cli_notes() to standard error
 
 #endif

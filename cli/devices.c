@@ -1,8 +1,8 @@
 // seldinger devices: what is plugged in, what of it can drive the tool, and why the rest cannot.
 #include "cli/cli.h"
 
-#include "cli/devices.h"
-#include "cli/output.h"
+#include "base/output.h"
+#include "cli/devices_watch.h"
 #include "cli/output_plan.h"
 #include "input/force_feedback.h"
 #include "input/hand.h"

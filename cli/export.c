@@ -1,15 +1,17 @@
 // seldinger export: surfaces, centrelines and recordings for other programs.
 #include "cli/cli.h"
 
-#include "cli/file_kind.h"
-#include "cli/output.h"
-#include "cli/output_plan.h"
 #include "base/heap.h"
+#include "base/output.h"
+#include "cli/file_kind.h"
+#include "cli/output_plan.h"
 #include "geom/surface_parts.h"
+#include "recon/surface/centreline_write.h"
+#include "recon/surface/surface_write.h"
 #include "recon/tree_file.h"
 #include "sim/recording.h"
+#include "sim/recording_export.h"
 
-#include <cJSON.h>
 #include <getopt.h>
 #include <inttypes.h>
 #include <stdlib.h>
@@ -41,184 +43,6 @@ typedef struct ExportOptions {
     double cell_mm;          // 0: automatic
     bool open_inlet, keep_floating, quiet;
 } ExportOptions;
-
-// --- text that grows in memory, then one write ---
-
-typedef struct Text {
-    FILE *stream;
-    char *bytes;
-    size_t length;
-} Text;
-
-static bool text_open(Text *text)
-{
-    *text = (Text){0};
-    text->stream = open_memstream(&text->bytes, &text->length);
-    return text->stream != NULL;
-}
-
-static bool text_write(Text *text, const char *path, Faults *faults)
-{
-    bool whole = !ferror(text->stream) && fclose(text->stream) == 0;
-    if (!whole)
-        faults_add(faults, path, 0, 0, "cannot be written: no memory");
-    whole = whole && output_write(path, text->bytes, text->length, faults);
-    free(text->bytes);
-    return whole;
-}
-
-static bool text_forget(Text *text)
-{
-    fclose(text->stream);
-    free(text->bytes);
-    return false;
-}
-
-// --- surfaces ---
-
-typedef struct Surface {
-    TriangleMesh *mesh;
-    double *error, *distance;   // (V) [mm], both NULL where the tree has no points
-} Surface;
-
-static void put_float(FILE *out, double value)
-{
-    float single = (float)value;
-    uint32_t bits;
-    memcpy(&bits, &single, sizeof bits);
-    for (int i = 0; i < 4; i++)
-        fputc((int)(bits >> (8 * i) & 0xff), out);
-}
-
-static void put_vector(FILE *out, Vec3 v)
-{
-    put_float(out, v.x);
-    put_float(out, v.y);
-    put_float(out, v.z);
-}
-
-static void print_stl(FILE *out, const Surface *surface)
-{
-    const TriangleMesh *mesh = surface->mesh;
-    char head[81] = "seldinger " SELDINGER_VERSION ", mm";
-    fwrite(head, 1, 80, out);
-    for (int i = 0; i < 4; i++)
-        fputc((int)((unsigned)mesh->triangle_count >> (8 * i) & 0xff), out);
-    for (int i = 0; i < mesh->triangle_count; i++) {
-        Vec3 corner[3];
-        for (int j = 0; j < 3; j++)
-            corner[j] = mesh->vertex[mesh->triangle[i][j]];
-        put_vector(out, vec3_unit_or(vec3_cross(vec3_sub(corner[1], corner[0]), vec3_sub(corner[2], corner[0])), vec3(0, 0, 0)));
-        for (int j = 0; j < 3; j++)
-            put_vector(out, corner[j]);
-        fputc(0, out);
-        fputc(0, out);
-    }
-}
-
-static void print_ply(FILE *out, const Surface *surface)
-{
-    const TriangleMesh *mesh = surface->mesh;
-    fprintf(out,
-            "ply\nformat ascii 1.0\ncomment seldinger " SELDINGER_VERSION ", mm\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\n"
-            "property float nx\nproperty float ny\nproperty float nz\nproperty int node\n%selement face %d\nproperty list uchar int vertex_indices\n"
-            "end_header\n",
-            mesh->vertex_count, surface->error ? "property float error_mm\nproperty float data_mm\n" : "", mesh->triangle_count);
-    for (int i = 0; i < mesh->vertex_count; i++) {
-        fprintf(out, "%.9g %.9g %.9g %.6g %.6g %.6g %d", mesh->vertex[i].x, mesh->vertex[i].y, mesh->vertex[i].z, mesh->normal[i].x, mesh->normal[i].y,
-                mesh->normal[i].z, mesh->node[i]);
-        if (surface->error)
-            fprintf(out, " %.6g %.6g", surface->error[i], surface->distance[i]);
-        fputc('\n', out);
-    }
-    for (int i = 0; i < mesh->triangle_count; i++)
-        fprintf(out, "3 %d %d %d\n", mesh->triangle[i][0], mesh->triangle[i][1], mesh->triangle[i][2]);
-}
-
-static void print_obj(FILE *out, const Surface *surface)
-{
-    const TriangleMesh *mesh = surface->mesh;
-    fprintf(out, "# seldinger " SELDINGER_VERSION ", mm\n");
-    for (int i = 0; i < mesh->vertex_count; i++)
-        fprintf(out, "v %.9g %.9g %.9g\n", mesh->vertex[i].x, mesh->vertex[i].y, mesh->vertex[i].z);
-    for (int i = 0; i < mesh->vertex_count; i++)
-        fprintf(out, "vn %.6g %.6g %.6g\n", mesh->normal[i].x, mesh->normal[i].y, mesh->normal[i].z);
-    for (int i = 0; i < mesh->triangle_count; i++) {
-        const int *t = mesh->triangle[i];
-        fprintf(out, "f %d//%d %d//%d %d//%d\n", t[0] + 1, t[0] + 1, t[1] + 1, t[1] + 1, t[2] + 1, t[2] + 1);
-    }
-}
-
-// --- VTP: XML with the numbers as text, which every reader takes ---
-
-static void vtp_begin(FILE *out, int points, int lines, int polygons)
-{
-    fprintf(out,
-            "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"LittleEndian\">\n<PolyData>\n"
-            "<Piece NumberOfPoints=\"%d\" NumberOfVerts=\"0\" NumberOfLines=\"%d\" NumberOfStrips=\"0\" NumberOfPolys=\"%d\">\n",
-            points, lines, polygons);
-}
-
-static void vtp_array(FILE *out, const char *type, const char *name, int components)
-{
-    fprintf(out, "<DataArray type=\"%s\" Name=\"%s\" NumberOfComponents=\"%d\" format=\"ascii\">\n", type, name, components);
-}
-
-static void vtp_array_end(FILE *out) { fprintf(out, "</DataArray>\n"); }
-
-static void vtp_numbers(FILE *out, const char *name, const double *value, int count)
-{
-    vtp_array(out, "Float64", name, 1);
-    for (int i = 0; i < count; i++)
-        fprintf(out, "%.9g\n", value[i]);
-    vtp_array_end(out);
-}
-
-static void vtp_vectors(FILE *out, const char *name, const Vec3 *value, int count)
-{
-    vtp_array(out, "Float64", name, 3);
-    for (int i = 0; i < count; i++)
-        fprintf(out, "%.9g %.9g %.9g\n", value[i].x, value[i].y, value[i].z);
-    vtp_array_end(out);
-}
-
-static void vtp_points(FILE *out, const Vec3 *value, int count)
-{
-    fprintf(out, "<Points>\n");
-    vtp_vectors(out, "Points", value, count);
-    fprintf(out, "</Points>\n");
-}
-
-static void vtp_end(FILE *out) { fprintf(out, "</Piece>\n</PolyData>\n</VTKFile>\n"); }
-
-static void print_surface_vtp(FILE *out, const Surface *surface)
-{
-    const TriangleMesh *mesh = surface->mesh;
-    vtp_begin(out, mesh->vertex_count, 0, mesh->triangle_count);
-    fprintf(out, "<PointData Normals=\"Normals\" Scalars=\"%s\">\n", surface->error ? "error_mm" : "node");
-    vtp_vectors(out, "Normals", mesh->normal, mesh->vertex_count);
-    vtp_array(out, "Int32", "node", 1);
-    for (int i = 0; i < mesh->vertex_count; i++)
-        fprintf(out, "%d\n", mesh->node[i]);
-    vtp_array_end(out);
-    if (surface->error) {
-        vtp_numbers(out, "error_mm", surface->error, mesh->vertex_count);
-        vtp_numbers(out, "data_mm", surface->distance, mesh->vertex_count);
-    }
-    fprintf(out, "</PointData>\n");
-    vtp_points(out, mesh->vertex, mesh->vertex_count);
-    fprintf(out, "<Polys>\n");
-    vtp_array(out, "Int64", "connectivity", 1);
-    for (int i = 0; i < mesh->triangle_count; i++)
-        fprintf(out, "%d %d %d\n", mesh->triangle[i][0], mesh->triangle[i][1], mesh->triangle[i][2]);
-    vtp_array_end(out);
-    vtp_array(out, "Int64", "offsets", 1);
-    for (int i = 0; i < mesh->triangle_count; i++)
-        fprintf(out, "%d\n", 3 * (i + 1));
-    vtp_array_end(out);
-    fprintf(out, "</Polys>\n");
-    vtp_end(out);
-}
 
 static void print_census(const SurfaceCensus *c, double cell_mm, int bubbles)
 {
@@ -281,7 +105,7 @@ static bool drop_parts(const ExportOptions *options, double cell, const VesselTr
 }
 
 // The surface as it will be written, what there is to say of it told. False with faults.
-static bool make_surface(const ExportOptions *options, bool with_error, const VesselTree *tree, Surface *surface, Faults *faults)
+static bool make_surface(const ExportOptions *options, bool with_error, const VesselTree *tree, SurfaceFigures *surface, Faults *faults)
 {
     double cell = options->cell_mm > 0 ? options->cell_mm : isosurface_cell_for(tree);
     TriangleMesh *mesh = surface->mesh = isosurface_of_tree(tree, cell);
@@ -311,20 +135,20 @@ static bool make_surface(const ExportOptions *options, bool with_error, const Ve
 
 static bool export_surface(const ExportOptions *options, const char *extension, const VesselTree *tree, Faults *faults)
 {
-    Surface surface = {0};
-    Text text;
+    SurfaceFigures surface = {0};
+    OutputText text;
     bool good = make_surface(options, !strcmp(extension, ".ply") || !strcmp(extension, ".vtp"), tree, &surface, faults);
-    if (good && !text_open(&text)) {
+    if (good && !output_text_open(&text)) {
         faults_add(faults, options->out, 0, 0, "cannot be written: no memory");
         good = false;
     }
     if (good) {
-        void (*print)(FILE *, const Surface *) = !strcmp(extension, ".stl")   ? print_stl
-                                                 : !strcmp(extension, ".ply") ? print_ply
-                                                 : !strcmp(extension, ".obj") ? print_obj
-                                                                              : print_surface_vtp;
+        void (*print)(FILE *, const SurfaceFigures *) = !strcmp(extension, ".stl")   ? surface_print_stl
+                                                 : !strcmp(extension, ".ply") ? surface_print_ply
+                                                 : !strcmp(extension, ".obj") ? surface_print_obj
+                                                                              : surface_print_vtp;
         print(text.stream, &surface);
-        good = text_write(&text, options->out, faults);
+        good = output_text_write(&text, options->out, faults);
     }
     triangle_mesh_free(surface.mesh);
     free(surface.error);
@@ -332,171 +156,19 @@ static bool export_surface(const ExportOptions *options, const char *extension, 
     return good;
 }
 
-// --- centrelines ---
-
-// The branches of a tree: a branch is a chain from a child of a fork (or the root) to the next fork or end; it begins with the fork's node, so
-// that lines join. Calls `branch(context, nodes, count)` for each.
-static void each_branch(const VesselTree *tree, void (*branch)(void *context, const int *node, int count), void *context)
-{
-    size_t nodes = (size_t)tree->node_count;
-    int *children = HEAP_ZEROED(nodes, sizeof *children), *only = HEAP_ZEROED(nodes, sizeof *only), *chain = HEAP_ZEROED(nodes + 1, sizeof *chain);
-    for (int i = 1; i < tree->node_count; i++) {
-        children[tree->parent[i]]++;
-        only[tree->parent[i]] = i;
-    }
-    for (int i = 0; i < tree->node_count; i++) {
-        int parent = tree->parent[i], count = 0;
-        if (parent >= 0 && children[parent] == 1)
-            continue;
-        if (parent >= 0)
-            chain[count++] = parent;
-        for (int at = i;; at = only[at]) {
-            chain[count++] = at;
-            if (children[at] != 1)
-                break;
-        }
-        branch(context, chain, count);
-    }
-    free(children);
-    free(only);
-    free(chain);
-}
-
-typedef struct Lines {
-    FILE *connectivity, *offsets;
-    int count;
-    int64_t points;
-} Lines;
-
-static void add_line(void *context, const int *node, int count)
-{
-    Lines *lines = context;
-    for (int i = 0; i < count; i++)
-        fprintf(lines->connectivity, "%d%c", node[i], i + 1 < count ? ' ' : '\n');
-    lines->points += count;
-    lines->count++;
-    fprintf(lines->offsets, "%" PRId64 "\n", lines->points);
-}
-
-static bool print_centreline_vtp(FILE *out, const VesselTree *tree)
-{
-    Text connectivity, offsets;
-    bool first = text_open(&connectivity), second = text_open(&offsets), good = first && second;
-    Lines lines = {.connectivity = connectivity.stream, .offsets = offsets.stream};
-    if (good)
-        each_branch(tree, add_line, &lines);
-    good &= !first || fclose(connectivity.stream) == 0;
-    good &= !second || fclose(offsets.stream) == 0;
-    if (good) {
-        vtp_begin(out, tree->node_count, lines.count, 0);
-        fprintf(out, "<PointData Scalars=\"Radius\">\n");
-        vtp_array(out, "Float64", "Radius", 1);
-        for (int i = 0; i < tree->node_count; i++)
-            fprintf(out, "%.9g\n", tree->radius[i]);
-        vtp_array_end(out);
-        vtp_array(out, "Int32", "kind", 1);
-        for (int i = 0; i < tree->node_count; i++)
-            fprintf(out, "%d\n", tree->kind[i]);
-        vtp_array_end(out);
-        fprintf(out, "</PointData>\n");
-        vtp_points(out, tree->center, tree->node_count);
-        fprintf(out, "<Lines>\n");
-        vtp_array(out, "Int64", "connectivity", 1);
-        fputs(connectivity.bytes, out);
-        vtp_array_end(out);
-        vtp_array(out, "Int64", "offsets", 1);
-        fputs(offsets.bytes, out);
-        vtp_array_end(out);
-        fprintf(out, "</Lines>\n");
-        vtp_end(out);
-    }
-    free(connectivity.bytes);
-    free(offsets.bytes);
-    return good;
-}
-
-static bool print_swc(FILE *out, const VesselTree *tree)
-{
-    fprintf(out, "# seldinger " SELDINGER_VERSION ", mm: id type x y z radius parent; type 0: vessel, 5: aneurysm\n");
-    for (int i = 0; i < tree->node_count; i++)
-        fprintf(out, "%d %d %.9g %.9g %.9g %.9g %d\n", i + 1, tree->kind[i] == NODE_ANEURYSM ? 5 : 0, tree->center[i].x, tree->center[i].y,
-                tree->center[i].z, tree->radius[i], tree->parent[i] < 0 ? -1 : tree->parent[i] + 1);
-    return true;
-}
-
-typedef struct Curves {
-    const VesselTree *tree;
-    const char *frame;
-    cJSON *list;
-} Curves;
-
-static void add_curve(void *context, const int *node, int count)
-{
-    Curves *curves = context;
-    const VesselTree *tree = curves->tree;
-    cJSON *curve = cJSON_CreateObject(), *points, *measurements, *radius, *values;
-    char name[48];
-    snprintf(name, sizeof name, "branch at node %d", node[count > 1 ? 1 : 0]);
-    cJSON_AddStringToObject(curve, "type", "Curve");
-    cJSON_AddStringToObject(curve, "name", name);
-    cJSON_AddStringToObject(curve, "coordinateSystem", curves->frame);
-    cJSON_AddStringToObject(curve, "coordinateUnits", "mm");
-    cJSON_AddBoolToObject(curve, "locked", false);
-    cJSON_AddStringToObject(curve, "labelFormat", "%N-%d");
-    cJSON_AddNumberToObject(curve, "lastUsedControlPointNumber", count);
-    points = cJSON_AddArrayToObject(curve, "controlPoints");
-    values = cJSON_CreateArray();
-    for (int i = 0; i < count; i++) {
-        cJSON *point = cJSON_CreateObject();
-        Vec3 x = tree->center[node[i]];
-        char id[16];
-        snprintf(id, sizeof id, "%d", i + 1);
-        cJSON_AddStringToObject(point, "id", id);
-        cJSON_AddStringToObject(point, "label", id);
-        cJSON_AddItemToObject(point, "position", cJSON_CreateDoubleArray((double[]){x.x, x.y, x.z}, 3));
-        cJSON_AddStringToObject(point, "positionStatus", "defined");
-        cJSON_AddItemToArray(points, point);
-        cJSON_AddItemToArray(values, cJSON_CreateNumber(tree->radius[node[i]]));
-    }
-    measurements = cJSON_AddArrayToObject(curve, "measurements");
-    radius = cJSON_CreateObject();
-    cJSON_AddStringToObject(radius, "name", "Radius");
-    cJSON_AddBoolToObject(radius, "enabled", true);
-    cJSON_AddStringToObject(radius, "units", "mm");
-    cJSON_AddItemToObject(radius, "controlPointValues", values);
-    cJSON_AddItemToArray(measurements, radius);
-    cJSON_AddItemToArray(curves->list, curve);
-}
-
-static bool print_markups(FILE *out, const VesselTree *tree, const char *frame)
-{
-    cJSON *root = cJSON_CreateObject();
-    cJSON_AddStringToObject(root, "@schema",
-                            "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/Resources/Schema/markups-schema-v1.0.3.json#");
-    Curves curves = {.tree = tree, .frame = frame, .list = cJSON_AddArrayToObject(root, "markups")};
-    if (curves.list)
-        each_branch(tree, add_curve, &curves);
-    char *text = curves.list ? cJSON_Print(root) : NULL;
-    if (text)
-        fprintf(out, "%s\n", text);
-    free(text);
-    cJSON_Delete(root);
-    return text != NULL;
-}
-
 static bool export_centreline(const ExportOptions *options, const char *extension, const VesselTree *tree, Faults *faults)
 {
-    Text text;
-    if (!text_open(&text)) {
+    OutputText text;
+    if (!output_text_open(&text)) {
         faults_add(faults, options->out, 0, 0, "cannot be written: no memory");
         return false;
     }
-    bool good = !strcmp(extension, ".vtp")   ? print_centreline_vtp(text.stream, tree)
-                : !strcmp(extension, ".swc") ? print_swc(text.stream, tree)
-                                             : print_markups(text.stream, tree, options->frame);
+    bool good = !strcmp(extension, ".vtp")   ? centreline_print_vtp(text.stream, tree)
+                : !strcmp(extension, ".swc") ? centreline_print_swc(text.stream, tree)
+                                             : centreline_print_markups(text.stream, tree, options->frame);
     if (!good)
         faults_add(faults, options->out, 0, 0, "cannot be written: no memory");
-    return good ? text_write(&text, options->out, faults) : text_forget(&text);
+    return good ? output_text_write(&text, options->out, faults) : output_text_forget(&text);
 }
 
 static bool export_tree(const ExportOptions *options, const char *extension, Faults *faults)
@@ -521,163 +193,6 @@ static bool export_tree(const ExportOptions *options, const char *extension, Fau
     return good;
 }
 
-// --- recordings ---
-
-static void print_place(FILE *out, Vec3 x, Quat q) { fprintf(out, "%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", x.x, x.y, x.z, q.w, q.x, q.y, q.z); }
-
-static void print_frame_rows(FILE *out, const RecordedRun *run, int64_t frame)
-{
-    RecordedFrame at = recorded_run_frame(run, frame);
-    int64_t step = run->frame_step[frame];
-    for (int i = 0; i < at.node_count; i++) {
-        fprintf(out, "%.9g,%" PRId64 ",%d,", run->time_s[step], step, i);
-        print_place(out, at.position[i], at.quaternion[i]);
-        fputc('\n', out);
-    }
-}
-
-// Of several tools all their own nodes, as in the final state that `run` writes.
-static void print_tool_rows(FILE *out, const RecordedRun *run, int64_t frame)
-{
-    int64_t step = run->frame_step[frame];
-    for (int k = 0; k < run->tool_count; k++) {
-        const RecordedToolFrame at = recorded_run_tool_frame(run, k, frame);
-        for (int i = 0; i < at.node_count; i++) {
-            fprintf(out, "%.9g,%" PRId64 ",%s,%d,", run->time_s[step], step, run->tool[k].name, i);
-            print_place(out, at.position[i], at.quaternion[i]);
-            fprintf(out, ",%s", at.carrier[i] < 0 ? "-" : run->tool[at.carrier[i]].name);
-            if (run->exchange)
-                fprintf(out, ",%d", recorded_run_fitted(run, k, step));
-            fputc('\n', out);
-        }
-    }
-}
-
-static bool export_rows(const ExportOptions *options, const RecordedRun *run, Faults *faults)
-{
-    Text text;
-    bool several = run->tool_count > 1;
-    if (!text_open(&text)) {
-        faults_add(faults, options->out, 0, 0, "cannot be written: no memory");
-        return false;
-    }
-    fprintf(text.stream, "t_s,step,%snode,x_mm,y_mm,z_mm,qw,qx,qy,qz%s%s\n", several ? "tool," : "", several ? ",carrier" : "", run->exchange ? ",exchange" : "");
-    for (int64_t k = 0; k < run->frame_count; k++)
-        (several ? print_tool_rows : print_frame_rows)(text.stream, run, k);
-    return text_write(&text, options->out, faults);
-}
-
-// A line of a frame: the single tool, or one of several with all its own nodes.
-typedef struct FrameLine {
-    int count;
-    const Vec3 *position;
-    const double *radius;
-    const int8_t *carrier;   // NULL: a single tool
-} FrameLine;
-
-static int lines_of(const RecordedRun *run, int64_t frame, FrameLine line[STEP_TOOLS_MAX])
-{
-    RecordedFrame at = recorded_run_frame(run, frame);
-    line[0] = (FrameLine){at.node_count, at.position, at.radius, NULL};
-    for (int k = 0; run->tool_count > 1 && k < run->tool_count; k++) {
-        const RecordedToolFrame own = recorded_run_tool_frame(run, k, frame);
-        line[k] = (FrameLine){own.node_count, own.position, own.radius, own.carrier};
-    }
-    return run->tool_count;
-}
-
-static void print_tool_numbers(FILE *out, const FrameLine *line, int lines)
-{
-    vtp_array(out, "Int32", "tool", 1);
-    for (int k = 0; k < lines; k++)
-        for (int i = 0; i < line[k].count; i++)
-            fprintf(out, "%d\n", k);
-    vtp_array_end(out);
-    vtp_array(out, "Int32", "carrier", 1);
-    for (int k = 0; k < lines; k++)
-        for (int i = 0; i < line[k].count; i++)
-            fprintf(out, "%d\n", line[k].carrier[i]);
-    vtp_array_end(out);
-}
-
-static void print_frame_vtp(FILE *out, const RecordedRun *run, int64_t frame)
-{
-    FrameLine line[STEP_TOOLS_MAX];
-    int lines = lines_of(run, frame, line), points = 0, end = 0;
-    for (int k = 0; k < lines; k++)
-        points += line[k].count;
-    vtp_begin(out, points, lines, 0);
-    fprintf(out, "<PointData Scalars=\"Radius\">\n");
-    vtp_array(out, "Float64", "Radius", 1);
-    for (int k = 0; k < lines; k++)
-        for (int i = 0; i < line[k].count; i++)
-            fprintf(out, "%.9g\n", line[k].radius[i]);
-    vtp_array_end(out);
-    if (line[0].carrier)
-        print_tool_numbers(out, line, lines);
-    fprintf(out, "</PointData>\n<Points>\n");
-    vtp_array(out, "Float64", "Points", 3);
-    for (int k = 0; k < lines; k++)
-        for (int i = 0; i < line[k].count; i++)
-            fprintf(out, "%.9g %.9g %.9g\n", line[k].position[i].x, line[k].position[i].y, line[k].position[i].z);
-    vtp_array_end(out);
-    fprintf(out, "</Points>\n<Lines>\n");
-    vtp_array(out, "Int64", "connectivity", 1);
-    for (int i = 0; i < points; i++)
-        fprintf(out, "%d\n", i);
-    vtp_array_end(out);
-    vtp_array(out, "Int64", "offsets", 1);
-    for (int k = 0; k < lines; k++)
-        fprintf(out, "%d\n", end += line[k].count);
-    vtp_array_end(out);
-    fprintf(out, "</Lines>\n");
-    vtp_end(out);
-}
-
-static bool export_frame(const char *path, const RecordedRun *run, int64_t frame, Faults *faults)
-{
-    Text text;
-    if (!text_open(&text)) {
-        faults_add(faults, path, 0, 0, "cannot be written: no memory");
-        return false;
-    }
-    print_frame_vtp(text.stream, run, frame);
-    return text_write(&text, path, faults);
-}
-
-// OUT.pvd names OUT_00000.vtp and on, each with its time; the .pvd comes last, so what it names is there.
-static bool export_series(const ExportOptions *options, const RecordedRun *run, Faults *faults)
-{
-    int stem = (int)(strlen(options->out) - 4);
-    size_t room = strlen(options->out) + 32;
-    char *path = malloc(room);
-    const char *slash = strrchr(options->out, '/'), *name = slash ? slash + 1 : options->out;
-    Text list;
-    bool good = path && text_open(&list);
-    if (!good) {
-        faults_add(faults, options->out, 0, 0, "cannot be written: no memory");
-        free(path);
-        return false;
-    }
-    fprintf(list.stream, "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n<Collection>\n");
-    for (int64_t k = 0; good && k < run->frame_count; k++) {
-        snprintf(path, room, "%.*s_%05" PRId64 ".vtp", stem, options->out, k);
-        good = export_frame(path, run, k, faults);
-        fprintf(list.stream, "<DataSet timestep=\"%.9g\" group=\"\" part=\"0\" file=\"%.*s_%05" PRId64 ".vtp\"/>\n", run->time_s[run->frame_step[k]],
-                stem - (int)(name - options->out), name, k);
-    }
-    fprintf(list.stream, "</Collection>\n</VTKFile>\n");
-    snprintf(path, room, "%.*s.pvd", stem, options->out);
-    if (good) {
-        good = text_write(&list, path, faults);
-    } else {
-        fclose(list.stream);
-        free(list.bytes);
-    }
-    free(path);
-    return good;
-}
-
 static bool export_recording(const ExportOptions *options, const char *extension, Faults *faults)
 {
     bool rows = !strcmp(extension, ".csv"), series = !strcmp(extension, ".vtp") || !strcmp(extension, ".pvd");
@@ -687,7 +202,7 @@ static bool export_recording(const ExportOptions *options, const char *extension
         return false;
     }
     RecordedRun *run = recorded_run_load(options->in, faults);
-    bool good = run && (rows ? export_rows(options, run, faults) : export_series(options, run, faults));
+    bool good = run && (rows ? recording_export_rows(run, options->out, faults) : recording_export_series(run, options->out, faults));
     recorded_run_free(run);
     return good;
 }

@@ -2,8 +2,8 @@
 
 #include "base/regular_file.h"
 #include "recon/hdf5_reader.h"
-#include "recon/surface_file.h"
-#include "recon/volume.h"
+#include "recon/surface/surface_file.h"
+#include "recon/volume/volume_file.h"
 
 #include <errno.h>
 #include <stdbool.h>

@@ -1,17 +1,17 @@
 // seldinger fit: a tree of point sets to a model (LIM), with the figures of the paper's tables 3 and 4.
 #include "cli/cli.h"
 
-#include "cli/junction_sheets.h"
-#include "cli/output.h"
-#include "cli/output_plan.h"
-#include "cli/reach_report.h"
 #include "base/heap.h"
-#include "geom/sort_doubles.h"
-#include "recon/blurred_edge.h"
-#include "recon/field_fit.h"
-#include "recon/lim_fit.h"
-#include "recon/model_measure.h"
+#include "base/output.h"
+#include "base/sort_doubles.h"
+#include "cli/junction_sheets.h"
+#include "cli/output_plan.h"
+#include "recon/fit/field_fit.h"
+#include "recon/fit/lim_fit.h"
+#include "recon/fit/model_measure.h"
+#include "recon/fit/reach_report.h"
 #include "recon/tree_file.h"
+#include "recon/volume/blurred_edge.h"
 #ifdef SELDINGER_RENDER
 #include "render/picture.h"
 #endif

@@ -1,12 +1,12 @@
-// seldinger import: a surface, with centrelines or alone, to the tree of nodes and local points that `fit` takes (recon/import_surface.h).
+// seldinger import: a surface, with centrelines or alone, to the tree of nodes and local points that `fit` takes (recon/surface/import_surface.h).
 #include "cli/cli.h"
 
-#include "cli/output.h"
-#include "cli/output_plan.h"
 #include "base/heap.h"
-#include "recon/centreline_file.h"
-#include "recon/import_surface.h"
-#include "recon/mesh_centreline.h"
+#include "base/output.h"
+#include "cli/output_plan.h"
+#include "recon/surface/centreline_file.h"
+#include "recon/surface/import_surface.h"
+#include "recon/surface/mesh_centreline.h"
 #include "recon/tree_file.h"
 
 #include <cjson/cJSON.h>

@@ -1,16 +1,16 @@
 // seldinger info: what a file is and its figures, for people or as JSON. The figures are gathered once as JSON; the text is that, printed plainly.
 #include "cli/cli.h"
 
+#include "base/heap.h"
+#include "base/sort_doubles.h"
 #include "cli/file_kind.h"
 #include "cli/junction_sheets.h"
 #include "cli/output_plan.h"
-#include "cli/reach_report.h"
-#include "cli/report.h"
-#include "base/heap.h"
-#include "geom/sort_doubles.h"
-#include "recon/mesh_check.h"
+#include "recon/fit/reach_report.h"
+#include "recon/surface/mesh_check.h"
 #include "recon/tree_file.h"
-#include "recon/volume.h"
+#include "recon/volume/volume_file.h"
+#include "render/tree_page.h"
 #include "sim/recording.h"
 #ifdef SELDINGER_RENDER
 #include "render/picture.h"
@@ -145,7 +145,7 @@ static bool describe_tree(cJSON *object, const char *path, TreeWishes *wishes, F
     if (info.created_by)
         cJSON_AddStringToObject(object, "created_by", info.created_by);
     bool good = add_reach(object, path, tree, wishes, faults);
-    good = good && (!wishes->report || report_write(wishes->report, path, tree, &info, faults));
+    good = good && (!wishes->report || tree_page_write(wishes->report, path, tree, &info, faults));
     wishes->junctions.tool_radius = wishes->tool_radius;
     good = good && junction_sheets_draw(&wishes->junctions, path, tree, faults);
     good = good && (!wishes->picture || draw_model(wishes->picture, path, tree, &info, faults));

@@ -3,7 +3,7 @@
 
 #include "geom/reach.h"
 #include "recon/tree_file.h"
-#include "recon/volume.h"
+#include "recon/volume/volume_file.h"
 #ifdef SELDINGER_RENDER
 #include "render/picture.h"
 #endif

@@ -2,7 +2,7 @@
 #ifndef SELDINGER_CLI_JUNCTION_SHEETS_H
 #define SELDINGER_CLI_JUNCTION_SHEETS_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 #include "geom/vessel_tree.h"
 
 typedef struct JunctionSheets {

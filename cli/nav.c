@@ -1,9 +1,11 @@
 // seldinger nav: the trainer.
-#include "cli/output.h"
+#include "cli/cli.h"
+
+#include "base/output.h"
 #include "cli/output_plan.h"
-#include "cli/trainer.h"
-#include "cli/trainer_files.h"
+#include "render/trainer.h"
 #include "sim/replay.h"
+#include "sim/session_files.h"
 
 #include <cJSON.h>
 #include <getopt.h>
@@ -160,8 +162,9 @@ static int steer(const NavOptions *options, Scene *scene, OpenVessel *open, cons
         if ((map[i] = device_map_load(options->map[i], faults)) && device_map_find_tools(map[i], &tools, faults))
             trainer.map_count++;
     if (trainer.is_recorded)
-        trainer_folder(options->sessions, folder, sizeof folder, faults);
+        session_folder(options->sessions, folder, sizeof folder, faults);
     trainer.folder = folder;
+    trainer.note = cli_note;
     trainer.map = map;
     trainer.resume = resume;
     if (faults->count == 0) {
@@ -196,7 +199,7 @@ int verb_nav(int argc, char **argv)
     RecordedRun *resume = scene && options.resume ? recorded_run_load_series(options.resume, &faults) : NULL;
     code = EXIT_BAD_INPUT;
     if (scene && (!resume || is_same_scene(resume, scene, options.resume, &faults)) && faults.count == 0 &&
-        open_vessel(scene, options.trainer.threads, options.quiet, &open, &faults) && open_vessel_inlet(scene, &open, &faults))
+        cli_open_vessel(scene, options.trainer.threads, options.quiet, &open, &faults) && open_vessel_inlet(scene, &open, &faults))
         code = steer(&options, scene, &open, resume, &faults);
     if (faults.count > 0) {
         int bad = cli_bad_input(&faults);

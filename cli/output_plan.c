@@ -1,7 +1,7 @@
 #define _XOPEN_SOURCE 700   // realpath
 #include "cli/output_plan.h"
 
-#include "recon/volume.h"
+#include "recon/volume/volume_file.h"
 
 #include <dirent.h>
 #include <stdio.h>

@@ -3,7 +3,7 @@
 #ifndef SELDINGER_CLI_OUTPUT_PLAN_H
 #define SELDINGER_CLI_OUTPUT_PLAN_H
 
-#include "cli/output.h"
+#include "base/output.h"
 #include "sim/scene.h"
 
 #include <limits.h>

@@ -1,6 +1,6 @@
 #include "cli/point_table.h"
 
-#include "recon/whole_file.h"
+#include "base/whole_file.h"
 
 #include <math.h>
 #include <stdlib.h>

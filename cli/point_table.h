@@ -2,7 +2,7 @@
 #ifndef SELDINGER_CLI_POINT_TABLE_H
 #define SELDINGER_CLI_POINT_TABLE_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 #include "geom/linear.h"
 
 #include <stdbool.h>

@@ -1,7 +1,7 @@
 // seldinger query: field, gradient and Taubin distance of a model at points (CSV in, CSV out).
 #include "cli/cli.h"
 
-#include "cli/output.h"
+#include "base/output.h"
 #include "cli/output_plan.h"
 #include "cli/point_table.h"
 #include "recon/tree_file.h"

@@ -1,14 +1,14 @@
 // seldinger replay: a recording shown, simulated again, made into a scene.
 #include "cli/cli.h"
 
+#include "base/sha256.h"
 #include "cli/output_plan.h"
-#include "cli/replay_scene.h"
-#include "sim/sha256.h"
+#include "sim/replay_scene.h"
 #ifdef SELDINGER_RENDER
-#include "cli/film.h"
-#include "cli/replay_window.h"
-#include "cli/trainer.h"
-#include "cli/trainer_files.h"
+#include "render/film.h"
+#include "render/replay_window.h"
+#include "render/trainer.h"
+#include "sim/session_files.h"
 #endif
 
 #include <getopt.h>
@@ -239,9 +239,9 @@ static int show(const ReplayOptions *options, const RecordedRun *run, Scene *sce
         return EXIT_DONE;
     char folder[4096];
     TrainerFigures figures = {0};
-    TrainerOptions trainer = {.folder = folder, .is_recorded = true, .trainee = "", .has_built_in_maps = true, .resume = run, .resume_s = resume_s,
+    TrainerOptions trainer = {.folder = folder, .note = cli_note, .is_recorded = true, .trainee = "", .has_built_in_maps = true, .resume = run, .resume_s = resume_s,
                               .width = options->width, .height = options->height, .view = window.view, .duration_s = options->duration_s};
-    if (!trainer_folder(options->sessions, folder, sizeof folder, faults))
+    if (!session_folder(options->sessions, folder, sizeof folder, faults))
         return EXIT_BAD_INPUT;
     int code = trainer_run(scene, open, &trainer, &figures, faults);
     if (figures.recording[0] && !options->quiet)
@@ -286,7 +286,7 @@ int verb_replay(int argc, char **argv)
     Scene *scene = run ? replay_scene(run, options.recording, &faults) : NULL;
     code = EXIT_BAD_INPUT;
     plan_outputs(&options, run, scene, &faults);
-    if (scene && faults.count == 0 && open_vessel(scene, options.threads, options.quiet, &open, &faults) && open_vessel_inlet(scene, &open, &faults)) {
+    if (scene && faults.count == 0 && cli_open_vessel(scene, options.threads, options.quiet, &open, &faults) && open_vessel_inlet(scene, &open, &faults)) {
         code = EXIT_DONE;
         if (options.verify || options.scene_folder)
             code = simulate_again(&options, run, scene, &open, &faults);

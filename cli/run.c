@@ -1,15 +1,16 @@
 // seldinger run: a scene headless, with what it leaves: summary, final state, recording, picture.
 #include "cli/cli.h"
 
-#include "cli/output.h"
+#include "base/heap.h"
+#include "base/output.h"
+#include "base/process.h"
 #include "cli/output_plan.h"
 #include "cli/run_chart.h"
-#include "cli/run_files.h"
 #include "cli/run_hands.h"
-#include "base/heap.h"
 #include "sim/lesson.h"
 #include "sim/pose.h"
 #include "sim/recording.h"
+#include "sim/run_summary.h"
 #ifdef SELDINGER_RENDER
 #include "render/picture.h"
 #endif
@@ -66,7 +67,7 @@ static void request_stop(int signal_number)
 {
     // a second one ends the program at once
     if (stop_requested)
-        cli_stop(signal_number);
+        process_stop(signal_number);
     stop_requested = 1;
 }
 
@@ -451,7 +452,7 @@ int verb_run(int argc, char **argv)
     if (!scene)
         return cli_bad_input(&faults);
     code = EXIT_BAD_INPUT;
-    if (open_vessel(scene, options.threads, options.quiet, &open, &faults) && open_vessel_inlet(scene, &open, &faults))
+    if (cli_open_vessel(scene, options.threads, options.quiet, &open, &faults) && open_vessel_inlet(scene, &open, &faults))
         code = simulate(&options, scene, &open, &faults);
     if (faults.count > 0)
         cli_bad_input(&faults);

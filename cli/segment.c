@@ -1,16 +1,16 @@
-// seldinger segment: RBT, a volume to a tree of centreline nodes with local point sets (recon/rbt_track.h).
+// seldinger segment: RBT, a volume to a tree of centreline nodes with local point sets (recon/track/rbt_track.h).
 #include "cli/cli.h"
 #include "base/same_math.h"
 
-#include "cli/output.h"
-#include "cli/output_plan.h"
 #include "base/heap.h"
-#include "recon/blurred_edge.h"
-#include "recon/rbt_track.h"
-#include "recon/trace.h"
+#include "base/output.h"
+#include "cli/output_plan.h"
+#include "recon/track/rbt_track.h"
+#include "recon/track/trace.h"
 #include "recon/tree_file.h"
-#include "recon/volume.h"
-#include "recon/volume_noise.h"
+#include "recon/volume/blurred_edge.h"
+#include "recon/volume/volume_file.h"
+#include "recon/volume/volume_noise.h"
 #ifdef SELDINGER_RENDER
 #include "render/picture.h"
 #endif

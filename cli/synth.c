@@ -1,11 +1,12 @@
 // seldinger synth: synthetic shapes with known truth, as point sets, surfaces or noisy volumes; and a fitted model measured against truth.
 #include "cli/cli.h"
 
-#include "cli/output.h"
+#include "base/output.h"
 #include "cli/output_plan.h"
-#include "recon/lim_fit.h"
-#include "recon/phantom_measure.h"
+#include "recon/fit/lim_fit.h"
+#include "recon/phantom/phantom_measure.h"
 #include "recon/tree_file.h"
+#include "recon/volume/volume_file.h"
 
 #include <cjson/cJSON.h>
 #include <getopt.h>

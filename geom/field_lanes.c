@@ -3,7 +3,7 @@
 #include "geom/field_lanes.h"
 
 #include "base/same_math.h"
-#include "geom/simd.h"
+#include "base/simd.h"
 
 #include <stddef.h>
 #if defined(__x86_64__) && defined(__GNUC__)

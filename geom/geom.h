@@ -3,12 +3,12 @@
 #ifndef SELDINGER_GEOM_GEOM_H
 #define SELDINGER_GEOM_GEOM_H
 
+#include "base/faults.h"
+#include "base/simd.h"
 #include "geom/blobby.h"
-#include "geom/faults.h"
 #include "geom/isosurface.h"
 #include "geom/linear.h"
 #include "geom/power_walk.h"
-#include "geom/simd.h"
 #include "geom/tree_surface.h"
 #include "geom/vessel.h"
 #include "geom/vessel_branches.h"

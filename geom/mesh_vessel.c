@@ -33,7 +33,7 @@ Vessel *mesh_vessel_create(const TriangleMesh *mesh, const MeshVesselOptions *op
 
 #else
 
-#include "geom/disjoint_sets.h"
+#include "base/disjoint_sets.h"
 #include "geom/tree_surface.h"
 #include "geom/triangle_groups.h"
 

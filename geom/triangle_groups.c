@@ -2,7 +2,7 @@
 // instruction set, with -fno-math-errno and -fno-trapping-math, which change no result, so that the selects vectorise.
 #include "geom/triangle_groups.h"
 
-#include "geom/simd.h"
+#include "base/simd.h"
 
 #define ALWAYS static inline __attribute__((always_inline))
 

@@ -1,8 +1,8 @@
 #include "geom/vessel_findings.h"
 
 #include "base/same_math.h"
+#include "base/sort_doubles.h"
 #include "geom/blobby.h"
-#include "geom/sort_doubles.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -10,7 +10,7 @@
 #ifndef SELDINGER_GEOM_VESSEL_TREE_H
 #define SELDINGER_GEOM_VESSEL_TREE_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 #include "geom/linear.h"
 
 #include <stdbool.h>

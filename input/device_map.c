@@ -1,9 +1,9 @@
 #include "input/device_map.h"
 
+#include "base/text_file.h"
+#include "base/yaml_reader.h"
 #include "input/hand_port.h"
 #include "input/hid_report.h"
-#include "input/text_file.h"
-#include "input/yaml_reader.h"
 
 #include <math.h>
 #include <stdio.h>

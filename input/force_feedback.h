@@ -10,6 +10,7 @@
 #define SELDINGER_INPUT_FORCE_FEEDBACK_H
 
 #include "input/device_map.h"
+#include "input/force_guard.h"
 #include "input/hand_port.h"
 #include "input/hid_device.h"
 #include "input/hid_report.h"
@@ -75,16 +76,6 @@ int pid_duration_ms(const PidLayout *layout);
 // Direction of the reaction to a push along a stick's axis: it comes from where the stick goes when the tool is pushed.
 // X: 90 (270 inverted), Y: 180 (0 inverted: stick away from the user pushes, the force comes from north); NaN for other axes.
 double force_direction_deg(const DeviceMap *map, bool is_twist);
-
-typedef struct ForceGuard {
-    double sent[2];                  // force [N], torque [N mm]
-    int64_t last_us, step, step_grew_us;
-    bool has_started;
-    const char *why_zero;            // "" while forces may be sent
-} ForceGuard;
-
-// What may be sent now: `wanted` force [N] and torque [N mm] -> guard->sent. `step`: HandPort.step. `report_us`: when the device last said something.
-void force_guard(ForceGuard *guard, const MapForce *map, const double wanted[2], int64_t step, int64_t now_us, int64_t report_us, bool paused);
 
 typedef struct ForceFeedback {
     PidLayout layout;

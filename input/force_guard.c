@@ -1,4 +1,4 @@
-#include "input/force_feedback.h"
+#include "input/force_guard.h"
 
 #include <math.h>
 

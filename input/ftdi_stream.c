@@ -1,4 +1,4 @@
-#include "input/usb_encoder.h"
+#include "input/ftdi_stream.h"
 
 #include <string.h>
 

@@ -8,15 +8,16 @@
 #ifndef SELDINGER_INPUT_HAND_H
 #define SELDINGER_INPUT_HAND_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 #include "input/device_map.h"
+#include "input/hand_info.h"
 #include "input/hand_port.h"
 #include "input/hid_device.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { HANDS_MOST = 8, HAND_MESSAGE_LENGTH = 400 };
+enum { HANDS_MOST = 8 };
 
 typedef struct Hands Hands;
 
@@ -39,17 +40,6 @@ HandPort *hands_port(Hands *hands, int index);           // the first of a devic
 // Force to zero while paused (rates and ways go on being read); any thread.
 void hands_pause(Hands *hands, bool paused);
 
-typedef struct HandInfo {
-    HandState state;
-    char name[96];                   // product, "" while absent
-    int vendor_id, product_id;
-    char map[MAP_NAME];
-    int hand_count;                  // ports in use (hands_port)
-    char force[160];                 // "constant force, 255 steps for 8 N" or why there is none
-    int64_t reports, bad_reports;    // read; short or of unknown id
-    double report_hz;                // over the last second or so
-    double force_n;                  // sent now
-} HandInfo;
 void hands_info(Hands *hands, int index, HandInfo *info);    // any thread but the 1 kHz one (takes a lock)
 
 // Whether a port here belongs to this device: then GLFW's joystick of the same ids is left alone, or it would count twice (gamepad_ids_of_guid).

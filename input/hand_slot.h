@@ -3,7 +3,7 @@
 #define SELDINGER_INPUT_HAND_SLOT_H
 
 #include "input/force_feedback.h"
-#include "input/hand.h"
+#include "input/hand_info.h"
 #include "input/map_state.h"
 #include "input/usb_encoder.h"
 

@@ -6,7 +6,7 @@
 #ifndef SELDINGER_INPUT_HID_REPORT_H
 #define SELDINGER_INPUT_HID_REPORT_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -1,9 +1,9 @@
 // input: what the hand does, as one command (push, twist) for each tool from a script here, or as a port that gamepads (gamepad.h), HID and USB devices (hand.h)
-// write by a device map (device_map.h). Uses geom/faults.h only.
+// write by a device map (device_map.h). Uses base/faults.h only.
 #ifndef SELDINGER_INPUT_INPUT_H
 #define SELDINGER_INPUT_INPUT_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 
 #include <stdbool.h>
 #include <stddef.h>

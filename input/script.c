@@ -1,8 +1,8 @@
 #include "input/input.h"
 
-#include "input/nearest_name.h"
-#include "input/number_table.h"
-#include "input/text_file.h"
+#include "base/nearest_name.h"
+#include "base/number_table.h"
+#include "base/text_file.h"
 
 #include <math.h>
 #include <stdio.h>

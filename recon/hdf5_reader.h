@@ -13,7 +13,7 @@
 #ifndef SELDINGER_RECON_HDF5_READER_H
 #define SELDINGER_RECON_HDF5_READER_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 
 #include <stdint.h>
 

@@ -4,8 +4,8 @@
 #include "recon/tree_file.h"
 
 #include "base/heap.h"
+#include "base/whole_file.h"
 #include "recon/hdf5_reader.h"
-#include "recon/whole_file.h"
 
 #include <hdf5.h>
 #include <inttypes.h>

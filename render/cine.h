@@ -6,7 +6,7 @@
 #ifndef SELDINGER_RENDER_CINE_H
 #define SELDINGER_RENDER_CINE_H
 
-#include "geom/faults.h"
+#include "base/faults.h"
 #include "sim/pose.h"
 
 typedef struct CineFrame {

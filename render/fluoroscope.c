@@ -4,8 +4,9 @@
 //   anything of these, blades, mode, mask: the base is baked from the layers.
 //   always: the base is copied back where the tools were, and the tools multiplied in.
 // Showing adds the noise of the pulse; that alone is done where the picture is held.
-#include "render/fluoroscope_parts.h"
+#include "render/fluoroscope.h"
 
+#include "render/fluoroscope_parts.h"
 #include "render/message.h"
 
 #include <epoxy/gl.h>

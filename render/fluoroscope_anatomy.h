@@ -3,7 +3,7 @@
 #define SELDINGER_RENDER_FLUOROSCOPE_ANATOMY_H
 
 #include "geom/mesh_closure.h"
-#include "render/fluoroscope.h"
+#include "render/fluoroscope_options.h"
 
 enum { ELLIPSOIDS_MOST = 40 };
 

@@ -20,6 +20,7 @@ typedef struct PictureLayers {
     Layer bare, base, picture;   // without the lumen; with it; with the tools
 } PictureLayers;
 
+typedef struct Fluoroscope Fluoroscope;
 struct Fluoroscope {
     FluoroscopeOptions options;  // what it points to is gone
     int tool_count;

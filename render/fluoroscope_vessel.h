@@ -7,7 +7,7 @@
 #define SELDINGER_RENDER_FLUOROSCOPE_VESSEL_H
 
 #include "geom/mesh_closure.h"
-#include "render/fluoroscope.h"
+#include "render/fluoroscope_options.h"
 
 typedef struct LumenMesh {
     unsigned array, vertices, indices;

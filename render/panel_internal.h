@@ -2,8 +2,9 @@
 #ifndef SELDINGER_RENDER_PANEL_INTERNAL_H
 #define SELDINGER_RENDER_PANEL_INTERNAL_H
 
-#include "render/panel.h"
+#include "render/panel_state.h"
 #include "render/plot.h"
+#include "render/window.h"
 
 typedef enum { BRIEFING_AT_BEGIN, BRIEFING_OPEN, BRIEFING_CLOSED } Briefing;   // AT_BEGIN: until the tool or the X-ray is used
 typedef enum { DIALOGUE_NONE, DIALOGUE_QUIT, DIALOGUE_RESTART, DIALOGUE_TRAINEE, DIALOGUE_QUESTION, DIALOGUE_TRAY } Dialogue;
@@ -15,6 +16,7 @@ typedef struct PanelMessage {
     char text[200];
 } PanelMessage;
 
+typedef struct Panel Panel;
 struct Panel {
     Gui *gui;
     KeyState keys;

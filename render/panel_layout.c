@@ -1,4 +1,4 @@
-#include "render/panel.h"
+#include "render/panel_layout.h"
 
 #include <math.h>
 

@@ -1,4 +1,6 @@
 // The tray: what may take the chosen tool's place, with its shape when nothing holds it and its stiffness along it; the tip of a wire is shaped here.
+#include "render/panel_tray.h"
+
 #include "render/panel_internal.h"
 
 #include <math.h>
@@ -170,4 +172,11 @@ void panel_draw_tray(Panel *panel, const WindowInput *input, const PanelState *s
     gui_window_begin(gui, "tray device", right, GUI_ON_TOP);
     draw_device(panel, tray, right);
     panel->tray_over = gui_window_end(gui);
+}
+
+void panel_move_in_tray(Panel *panel, int devices)
+{
+    int wanted = panel->tray.device + devices, last = panel->tray_count - 1;
+    panel->tray.device = wanted < 0 ? 0 : wanted > last ? last : wanted;
+    panel->tray.is_shaped &= devices == 0;
 }

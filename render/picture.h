@@ -66,10 +66,6 @@ bool picture_of_run(const char *path, const PictureOptions *options, const Pictu
 bool picture_of_moments(const char *path, const PictureOptions *options, const PictureScene *scene, int tool_count, const PictureTool *tool,
                         char *message, size_t capacity);
 
-// Surfaces for scenes whose vessel is no tree; free with triangle_mesh_free. NULL where memory lacks or the options describe nothing.
-TriangleMesh *picture_mesh_of_tube(const TubeOptions *tube);
-TriangleMesh *picture_mesh_of_plane(Vec3 point, Vec3 normal, double half_width);
-
 // --- an angiogram and its tree ---
 typedef struct PictureProjection {
     int width, height;

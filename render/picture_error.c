@@ -1,6 +1,6 @@
 // A model's surface coloured by its distance to the data, and the paper's Table 4 as a histogram.
+#include "base/sort_doubles.h"
 #include "render/message.h"
-#include "geom/sort_doubles.h"
 #include "render/sheet.h"
 
 #include <stdlib.h>

@@ -1,9 +1,22 @@
 // The vessel tree as contrast agent sees it: branches between forks, cut into cells of equal transit time, and sacs that hang on them.
-// Internal to sim/contrast.c. Volumes mm3, flows mm3/s.
+// Volumes mm3, flows mm3/s.
 #ifndef SELDINGER_SIM_CONTRAST_NETWORK_H
 #define SELDINGER_SIM_CONTRAST_NETWORK_H
 
-#include "sim/contrast.h"
+#include "geom/vessel_tree.h"
+
+typedef struct ContrastOptions {
+    double step_s;           // [s] the cells are this long in transit time, 0.001 to 0.1, default 0.005
+    double inlet_flow_ml_s;  // [ml/s] mean; 0 (default): from the inlet's radius
+    int inlet_node;          // an end of the tree where the blood comes in; -1 (default): contrast_find_inlet
+    double pulsation;        // 0 (steady) to 1 (default: as measured)
+    double heart_rate_min;   // [1/min] 30 to 200, default 65
+    double sac_residence_s;  // [s] volume of a sac / flow through its neck, 0.1 to 100, default 1.5
+} ContrastOptions;
+
+// Where the blood comes in: the root, or the end of the widest end branch where that is wider by a tenth and longer than 1.5 radii (the ascending
+// aorta, where the tool comes from the leg). -1 without a tree.
+int contrast_find_inlet(const VesselTree *tree);
 
 // From behind one fork to the next, or to an end. Upstream branches stand before downstream ones, children of one branch beside each other.
 typedef struct FlowBranch {

@@ -33,8 +33,8 @@
 #ifndef SELDINGER_SIM_EXERCISE_H
 #define SELDINGER_SIM_EXERCISE_H
 
+#include "base/yaml_reader.h"
 #include "input/input.h"
-#include "input/yaml_reader.h"
 
 enum { EXERCISE_TITLE = 96, EXERCISE_TEXT_MOST = 4000 };
 

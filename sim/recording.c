@@ -2,8 +2,8 @@
 
 #include "base/heap.h"
 #include "base/part_file.h"
+#include "base/sha256.h"
 #include "sim/ordered_file.h"
-#include "sim/sha256.h"
 
 #include <errno.h>
 #include <hdf5.h>

@@ -1,6 +1,6 @@
 // A scene: YAML text to options in internal units. shared/CONTRACT.md "Scene" is the format's specification; every fault of a
 // file is reported in one pass. Sees the scene file and its script, but not volumes or models: what `vessel:` names is opened by
-// cli/vessel_source.c, because recon is not below sim.
+// sim/open_vessel.h.
 #ifndef SELDINGER_SIM_SCENE_H
 #define SELDINGER_SIM_SCENE_H
 

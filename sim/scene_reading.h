@@ -2,7 +2,7 @@
 #ifndef SELDINGER_SIM_SCENE_READING_H
 #define SELDINGER_SIM_SCENE_READING_H
 
-#include "input/yaml_reader.h"
+#include "base/yaml_reader.h"
 #include "sim/scene.h"
 
 typedef struct ToolReading { // what the rules that tie one tool to another need to know of how it was read

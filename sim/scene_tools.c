@@ -5,7 +5,7 @@
 // beyond the start with its whole length, a_o = L_o.
 #include "sim/scene_reading.h"
 
-#include "input/text_file.h"
+#include "base/text_file.h"
 #include "sim/rest_shape.h"
 
 #include <ctype.h>
@@ -22,9 +22,6 @@ static const double valve_n = 0.2;           // of a haemostatic valve that is o
 // A lumen lined with PTFE. Handbooks give PTFE on steel 0.04 to 0.1; of the wires that Schroeder measured (Cardiovasc Intervent Radiol 1993;16:93-97) a
 // PTFE coat halved the friction of bare steel and a hydrophilic one brought it to a sixth.
 static const double friction_inside = 0.05;
-
-const char *const tool_kind_name[TOOL_KIND_COUNT + 1] = {"guide_catheter", "catheter", "microcatheter", "wire", NULL};
-const char *const tool_core_name[CORE_COUNT + 1] = {"steel", "nitinol", NULL};
 
 // Where a tool's keys come from: those beside it override its device file's.
 typedef struct ToolSource {
@@ -456,58 +453,4 @@ void scene_settle_tools(Reading *reading, bool placed)
         around = scene->tool[k].wire.inserted;
     }
     check_exchanges(reading);
-}
-
-WireOptions scene_tool_wire(const Scene *scene, int tool) { return tool == 0 ? scene->wire : scene_placed_wire(scene, &scene->tool[tool].wire); }
-
-WireOptions scene_placed_wire(const Scene *scene, const WireOptions *own)
-{
-    WireOptions wire = *own;
-    wire.has_sheath = scene->wire.has_sheath;
-    wire.start = scene->wire.start;
-    wire.direction = scene->wire.direction;
-    wire.normal = scene->wire.normal;
-    wire.gravity = scene->wire.gravity;
-    return wire;
-}
-
-const SceneTool *scene_device(const Scene *scene, int tool, int which)
-{
-    if (which == 0)
-        return tool < scene->tool_count ? &scene->tool[tool] : NULL;
-    for (int i = 0; i < scene->exchange_count; i++)
-        if (scene->exchange[i].tool == tool && --which == 0)
-            return &scene->exchange[i].device;
-    return NULL;
-}
-
-WireOptions scene_device_wire(const Scene *scene, int tool, int which)
-{
-    return which == 0 ? scene_tool_wire(scene, tool) : scene_placed_wire(scene, &scene_device(scene, tool, which)->wire);
-}
-
-int scene_device_count(const Scene *scene, int tool)
-{
-    int count = 0;
-    while (scene_device(scene, tool, count))
-        count++;
-    return count;
-}
-
-int scene_most_nodes(const Scene *scene, int tool)
-{
-    int most = 0;
-    for (int i = 0; i < scene_device_count(scene, tool); i++) {
-        int nodes = scene_device_wire(scene, tool, i).elements + 1;
-        most = nodes > most ? nodes : most;
-    }
-    return most;
-}
-
-ToolNames scene_tool_names(const Scene *scene)
-{
-    ToolNames names = {.count = scene->tool_count};
-    for (int k = 0; k < scene->tool_count; k++)
-        names.name[k] = scene->tool[k].name, names.kind[k] = tool_kind_name[scene->tool[k].kind];
-    return names;
 }

@@ -2,9 +2,10 @@
 #ifndef SELDINGER_SIM_SCORE_TOOL_H
 #define SELDINGER_SIM_SCORE_TOOL_H
 
-#include "sim/score.h"
+#include "sim/score_figures.h"
 #include "sim/score_sheath.h"
 #include "sim/score_tip.h"
+#include "sim/simulator.h"
 
 typedef struct ScoreEpisode {
     bool is_on;

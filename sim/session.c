@@ -1,8 +1,8 @@
 #include "sim/session.h"
 
-#include "input/text_file.h"
+#include "base/sha256.h"
+#include "base/text_file.h"
 #include "sim/score_json.h"
-#include "sim/sha256.h"
 
 #include <dirent.h>
 #include <inttypes.h>

@@ -41,7 +41,7 @@ void session_set_score(Session *session, const Score *score);
 void session_set_run(Session *session, const RecordedRun *run, const char *path);
 // Whether `run` is the session's: its digest.
 bool session_is_of(const Session *session, const RecordedRun *run);
-// The file's text, to be written beside and renamed (cli/output.h); the caller frees. NULL where memory lacks.
+// The file's text, to be written beside and renamed (base/output.h); the caller frees. NULL where memory lacks.
 char *session_json(const Session *session);
 
 // `text` need not be NUL-terminated. False with all faults at once: no JSON, bytes after it, unknown, repeated or lacking keys, wrong types and ranges;

@@ -6,9 +6,9 @@
 #ifndef SELDINGER_SIM_VERIFY_H
 #define SELDINGER_SIM_VERIFY_H
 
+#include "base/yaml_reader.h"
 #include "geom/linear.h"
 #include "input/input.h"
-#include "input/yaml_reader.h"
 
 enum { VERIFY_MOST_ELEMENTS = 8, VERIFY_MOST_CASES = 100, VERIFY_NAME = 64 };
 

@@ -1,6 +1,8 @@
 // The `verify:` key: YAML to a VerifyPlan. Format: scenes/verify/README.md.
 #include "sim/verify.h"
 
+#include "sim/yaml_vector.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

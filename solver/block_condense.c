@@ -6,7 +6,7 @@
 // Interleaved as in block_chain.c, and for the same reason.
 #include "solver/block_condense.h"
 
-#include "geom/simd.h"
+#include "base/simd.h"
 #include "solver/block_lanes.h"
 
 #include <float.h>

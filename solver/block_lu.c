@@ -5,7 +5,7 @@
 // The right-hand side travels as one more column of B. Backward: x = V^-1 (T^-1 b - Y x'), x' of the neighbour towards the middle.
 #include "solver/block_lu.h"
 
-#include "geom/simd.h"
+#include "base/simd.h"
 #include "solver/block_lanes.h"
 
 #include <float.h>

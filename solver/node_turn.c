@@ -1,7 +1,7 @@
 // exp(r/2) = (cos(a/2), sin(a/2) r/a), a = |r|, by series in (a/2)^2: what is cut is below 1e-16 at 2.5 rad.
 #include "solver/node_turn.h"
 
-#include "geom/simd.h"
+#include "base/simd.h"
 
 #if defined(__GNUC__) && !defined(__clang__)
 #define INLINE static inline __attribute__((always_inline))

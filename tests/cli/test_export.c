@@ -7,8 +7,8 @@
 
 #include <cmocka.h>
 
-#include "recon/centreline_file.h"
-#include "recon/mesh_check.h"
+#include "recon/surface/centreline_file.h"
+#include "recon/surface/mesh_check.h"
 #include "recon/tree_file.h"
 
 #include <expat.h>

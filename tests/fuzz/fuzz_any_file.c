@@ -1,9 +1,9 @@
 // A file of which nobody said what it is, as `info` opens it: its kind by its content, then by the reader of that kind.
-// Covers: cli/file_kind.c input/text_file.c recon/whole_file.c
+// Covers: cli/file_kind.c base/text_file.c base/whole_file.c
 #include "cli/file_kind.h"
-#include "recon/surface_file.h"
+#include "recon/surface/surface_file.h"
 #include "recon/tree_file.h"
-#include "recon/volume.h"
+#include "recon/volume/volume_file.h"
 #include "sim/scene.h"
 #include "tests/fuzz/given_files.h"
 

@@ -1,6 +1,6 @@
 // Any bytes as centrelines: VTP, Markups, SWC. What is taken is written as each of them, and read again.
-// Covers: recon/centreline_file.c recon/vtp_file.c
-#include "recon/centreline_file.h"
+// Covers: recon/surface/centreline_file.c recon/surface/vtp_file.c
+#include "recon/surface/centreline_file.h"
 
 #include <stdint.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 // Any bytes as a device map: a map within its ranges, or faults.
-// Covers: input/device_map.c input/device_map_tools.c input/map_state.c input/yaml_reader.c
+// Covers: input/device_map.c input/device_map_tools.c input/map_state.c base/yaml_reader.c
 #include "input/map_state.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 // Up to four files as the folder of a DICOM series, and the first of them as one of its slices.
-// Covers: recon/volume_dicom.c
-#include "recon/volume.h"
+// Covers: recon/volume/volume_dicom.c
+#include "recon/volume/volume_file.h"
 #include "tests/fuzz/given_files.h"
 
 #include <math.h>

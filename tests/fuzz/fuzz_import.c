@@ -1,6 +1,6 @@
 // A surface and its centrelines: what `import` makes of them. A tree that is valid, or faults. Centrelines of a surface alone take seconds, whatever it is.
-// Covers: recon/import_surface.c recon/import_skeleton.c recon/import_ostia.c recon/import_wall.c recon/mesh_tree.c
-#include "recon/import_surface.h"
+// Covers: recon/surface/import_surface.c recon/surface/import_skeleton.c recon/surface/import_ostia.c recon/surface/import_wall.c recon/surface/mesh_tree.c
+#include "recon/surface/import_surface.h"
 #include "tests/fuzz/given_files.h"
 
 enum { MOST_TRIANGLES = 300 };

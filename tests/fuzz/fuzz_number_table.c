@@ -1,6 +1,6 @@
 // Any bytes as a table of points. A table has its columns and finite numbers alone, which read again from their digits are the same.
-// Covers: input/number_table.c
-#include "input/number_table.h"
+// Covers: base/number_table.c
+#include "base/number_table.h"
 
 #include <math.h>
 #include <stdint.h>

@@ -1,5 +1,5 @@
 // Any bytes as a scene: a scene within its ranges, or faults.
-// Covers: sim/scene.c sim/scene_tools.c sim/exercise.c sim/verify_read.c input/yaml_reader.c
+// Covers: sim/scene.c sim/scene_tools.c sim/exercise.c sim/verify_read.c base/yaml_reader.c
 #include "sim/scene.h"
 
 #include <stdint.h>

@@ -1,5 +1,5 @@
 // Any bytes as a script: a script that keeps its promises, or faults.
-// Covers: input/script.c input/number_table.c
+// Covers: input/script.c base/number_table.c
 #include "input/input.h"
 
 #include <stdint.h>

@@ -1,6 +1,6 @@
 // Any bytes as a surface: STL, PLY, OBJ, VTP; what is read is mended.
-// Covers: recon/surface_file.c recon/vtp_file.c recon/mesh_check.c
-#include "recon/mesh_check.h"
+// Covers: recon/surface/surface_file.c recon/surface/vtp_file.c recon/surface/mesh_check.c
+#include "recon/surface/mesh_check.h"
 
 #include <stdint.h>
 

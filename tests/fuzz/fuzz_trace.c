@@ -1,6 +1,6 @@
 // Any bytes as a trace file of `segment`.
-// Covers: recon/trace.c
-#include "recon/trace.h"
+// Covers: recon/track/trace.c
+#include "recon/track/trace.h"
 
 #include <stdint.h>
 

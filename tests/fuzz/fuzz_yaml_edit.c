@@ -1,7 +1,7 @@
 // The input's first two lines are a path of plain keys and a value, the rest is a text in which they are put. What was one YAML document stays one.
-// Covers: input/yaml_edit.c
-#include "input/yaml_edit.h"
-#include "input/yaml_reader.h"
+// Covers: base/yaml_edit.c
+#include "base/yaml_edit.h"
+#include "base/yaml_reader.h"
 
 #include <stdint.h>
 #include <stdlib.h>

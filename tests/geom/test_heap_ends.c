@@ -26,7 +26,7 @@ static int ask(size_t count, size_t size, char said[2000])
     assert_true(child >= 0);
     if (child == 0) {
         dup2(ends[1], STDERR_FILENO);
-        char *memory = heap_zeroed(count, size, "/somewhere/recon/field_fit.c");
+        char *memory = heap_zeroed(count, size, "/somewhere/recon/fit/field_fit.c");
         _exit(memory && memory[0] == 0 ? 0 : 1);
     }
     close(ends[1]);
@@ -44,7 +44,7 @@ static void what_cannot_be_had_ends_the_program(void **state)
     (void)state;
     char said[2000];
     assert_int_equal(ask((size_t)1 << 60, 1, said), 2);
-    assert_non_null(strstr(said, "seldinger: out of memory (asked for 1152921504606846976 bytes in recon/field_fit.c); free some, or give it less to do\n"));
+    assert_non_null(strstr(said, "seldinger: out of memory (asked for 1152921504606846976 bytes in fit/field_fit.c); free some, or give it less to do\n"));
     assert_int_equal(ask(SIZE_MAX / 4, 24, said), 2);     // more than a size can say
     assert_non_null(strstr(said, "asked for 18446744073709551615 bytes"));
     assert_int_equal(ask(100, 24, said), 0);

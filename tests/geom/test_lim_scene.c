@@ -1,6 +1,6 @@
 // The wall of a real model as a tool feels it: its jump where the point's node changes, the same answers on every instruction set, and what 80 points
 // sliding along it cost. test_lim_scene [MODEL.h5 ...] (default: scenes/aneurism/aneurism-local.h5; skipped where that was not made).
-#include "geom/simd.h"
+#include "base/simd.h"
 #include "geom/vessel.h"
 #include "random_numbers.h"
 #include "recon/tree_file.h"

@@ -1,10 +1,10 @@
 // Contact with a fitted tree: the lanes against their plain twin on every instruction set, gaps against the slow projection, derivatives,
 // points that must not be called far, ways back from outside, the inlet, motion and mirroring of the scene, the wall's jump between nodes.
+#include "base/simd.h"
 #include "blob_tube.h"
 #include "geom/foot_lanes.h"
 #include "geom/power_blocks.h"
 #include "geom/power_walk.h"
-#include "geom/simd.h"
 #include "geom/vessel.h"
 #include "random_numbers.h"
 

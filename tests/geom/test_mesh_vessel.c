@@ -1,7 +1,7 @@
 // A mesh as a vessel against brute force (closest point by Voronoi regions, inside by the winding number) and against exact shapes.
 #include "geom/mesh_vessel.h"
 
-#include "geom/simd.h"
+#include "base/simd.h"
 #include "geom/triangle_groups.h"
 
 #include <pthread.h>

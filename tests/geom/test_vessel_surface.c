@@ -1,7 +1,7 @@
 // The wall of a vessel as triangles: closed and facing out, area and volume of exact tubes by Pappus, orders of convergence, rims at open ends, refinement,
 // no slivers, kissing vessels and thin walls, thin beside wide, turned, mirrored and scaled shapes, fitted models, and what cannot be meshed.
+#include "base/disjoint_sets.h"
 #include "blob_tube.h"
-#include "geom/disjoint_sets.h"
 #include "geom/isosurface.h"
 #include "geom/tree_surface.h"
 #include "random_numbers.h"

@@ -6,8 +6,8 @@
 
 #include <cmocka.h>
 
+#include "base/number_table.h"
 #include "input/input.h"
-#include "input/number_table.h"
 
 #include <math.h>
 #include <stdio.h>

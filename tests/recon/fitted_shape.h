@@ -2,8 +2,8 @@
 #ifndef SELDINGER_TESTS_RECON_FITTED_SHAPE_H
 #define SELDINGER_TESTS_RECON_FITTED_SHAPE_H
 
-#include "recon/lim_fit.h"
-#include "recon/phantom.h"
+#include "recon/fit/lim_fit.h"
+#include "recon/phantom/phantom.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 static const bool is_slow = true;    // the small shapes alone: the figures are the release build's business

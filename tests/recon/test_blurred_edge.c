@@ -1,6 +1,6 @@
 // Edges of blurred vessels: the closed form against the profile, its inverse, the image's blur found from volumes of known blur, and a tracked tree
 // set right against the vessel itself.
-#include "recon/blurred_edge.h"
+#include "recon/volume/blurred_edge.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -11,8 +11,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "recon/phantom.h"
-#include "recon/rbt_track.h"
+#include "recon/phantom/phantom.h"
+#include "recon/track/rbt_track.h"
 #include "tests/geom/near.h"
 
 // Against the profile itself, P(x) = int phi_b(x - u) erf((R^2 - u^2)^(1/2) / (b sqrt 2)) du, and the two limits.

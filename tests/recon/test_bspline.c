@@ -1,7 +1,7 @@
 // Cubic B-spline approximation: against a plain double reference, and the laws it must obey (reproduces straight lines, smooths by 1/sqrt(3) voxel).
-#include "recon/bspline.h"
-#include "geom/simd.h"
-#include "recon/ransac_cylinder.h"
+#include "base/simd.h"
+#include "recon/track/ransac_cylinder.h"
+#include "recon/volume/bspline.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

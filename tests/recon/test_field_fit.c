@@ -5,10 +5,10 @@
 #include <stddef.h>
 #include <cmocka.h>
 
+#include "base/simd.h"
 #include "geom/blobby.h"
-#include "geom/simd.h"
-#include "recon/field_fit.h"
-#include "recon/model_measure.h"
+#include "recon/fit/field_fit.h"
+#include "recon/fit/model_measure.h"
 #include "tests/recon/fitted_shape.h"
 
 #include <string.h>

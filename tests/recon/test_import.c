@@ -1,9 +1,9 @@
 // A surface with its centrelines to a tree: shapes whose truth is known, as they stand, turned and mirrored, in metres, with the curves in the other
 // patient frame, with normals into the lumen, open; curves beside the middle or with wrong radii; what has no centreline; other vessels' curves.
-#include "recon/import_surface.h"
+#include "recon/surface/import_surface.h"
 
-#include "recon/phantom.h"
-#include "geom/sort_doubles.h"
+#include "base/sort_doubles.h"
+#include "recon/phantom/phantom.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

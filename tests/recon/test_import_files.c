@@ -1,7 +1,7 @@
 // The same box from every surface format, the same curves from every centreline format, and what is said of broken ones.
-#include "recon/centreline_file.h"
-#include "recon/mesh_check.h"
-#include "recon/surface_file.h"
+#include "recon/surface/centreline_file.h"
+#include "recon/surface/mesh_check.h"
+#include "recon/surface/surface_file.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

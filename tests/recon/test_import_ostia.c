@@ -1,7 +1,7 @@
 // Ostia of imported trees against truth: nodes on every link, inside; no point where a tool passes; vessels that touch stay apart.
-#include "recon/import_surface.h"
+#include "recon/surface/import_surface.h"
 
-#include "recon/phantom.h"
+#include "recon/phantom/phantom.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

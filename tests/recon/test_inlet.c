@@ -1,8 +1,8 @@
 // The inlet of a surface alone: open tubes with a stenosis near the inlet, tapered, flared, cut obliquely, turned and mirrored have an open root; a capsule's
 // rounded end is closed.
-#include "recon/import_surface.h"
-#include "recon/mesh_centreline.h"
-#include "recon/phantom.h"
+#include "recon/phantom/phantom.h"
+#include "recon/surface/import_surface.h"
+#include "recon/surface/mesh_centreline.h"
 #include "tests/short_run.h"
 
 #include <setjmp.h>

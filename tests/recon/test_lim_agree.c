@@ -1,9 +1,9 @@
 // Whole trees: neighbouring local models agree as a tool meets them, mirrored and turned trees give the same walls, no voxel gives no scale.
-#include "recon/lim_fit.h"
+#include "recon/fit/lim_fit.h"
 
 #include "geom/blobby.h"
-#include "recon/model_measure.h"
-#include "recon/phantom_measure.h"
+#include "recon/fit/model_measure.h"
+#include "recon/phantom/phantom_measure.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

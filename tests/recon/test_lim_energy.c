@@ -1,9 +1,9 @@
 // The fused single-precision loops against a plain double twin written from eq. (3) to (7), and its slopes against central differences of the
 // twin. Single precision sums of some hundred terms: 1e-5 of the energy; slopes 1e-4 of the largest.
-#include "recon/lim_energy.h"
+#include "recon/fit/lim_energy.h"
 
+#include "base/simd.h"
 #include "geom/blobby.h"
-#include "geom/simd.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

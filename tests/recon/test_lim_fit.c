@@ -1,9 +1,9 @@
 // LIM: the split's table, single spheres, shapes against their truth with and without noise, the paper's preset, threads, bad options.
-#include "recon/lim_fit.h"
+#include "recon/fit/lim_fit.h"
 
 #include "geom/blobby.h"
 #include "geom/power_walk.h"
-#include "recon/phantom_measure.h"
+#include "recon/phantom/phantom_measure.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

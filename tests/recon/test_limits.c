@@ -1,6 +1,6 @@
 // Where a tree ends: points that the tracking does not pass, vessels that are not wanted, and the loops that a tree cannot hold. On volumes with truth, mirrored,
 // and with several seeds of the noise.
-#include "recon/rbt_track.h"
+#include "recon/track/rbt_track.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

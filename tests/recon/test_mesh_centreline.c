@@ -1,8 +1,8 @@
 // Centrelines computed from surfaces alone, against the shapes' own: as many ends and branches, near them, with their radii; the same when turned and
 // mirrored, and with any number of threads; what encloses nothing is refused.
-#include "recon/import_surface.h"
-#include "recon/mesh_centreline.h"
-#include "recon/phantom.h"
+#include "recon/phantom/phantom.h"
+#include "recon/surface/import_surface.h"
+#include "recon/surface/mesh_centreline.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

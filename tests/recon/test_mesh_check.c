@@ -1,5 +1,5 @@
 // A closed box of 12 triangles, spoilt one way at a time: what is told, and that the mended mesh has the box's volume again.
-#include "recon/mesh_check.h"
+#include "recon/surface/mesh_check.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

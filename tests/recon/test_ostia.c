@@ -1,10 +1,10 @@
 // Ostia of tracked trees against truth: synthetic trees with and without noise, and links that the image must refuse.
-#include "geom/sort_doubles.h"
-#include "recon/phantom.h"
-#include "recon/rbt_link_path.h"
-#include "recon/rbt_ostia.h"
-#include "recon/rbt_track.h"
-#include "recon/track_score.h"
+#include "base/sort_doubles.h"
+#include "bench/track_score.h"
+#include "recon/phantom/phantom.h"
+#include "recon/track/rbt_link_path.h"
+#include "recon/track/rbt_ostia.h"
+#include "recon/track/rbt_track.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,6 +1,6 @@
 // The shapes' truth: closed forms for capsule and arc, |grad f| <= 1, projection, samples, the phantom's promises, mesh and volume against each other.
-#include "recon/phantom.h"
-#include "recon/phantom_measure.h"
+#include "recon/phantom/phantom.h"
+#include "recon/phantom/phantom_measure.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,7 +1,7 @@
 // The pieces of an estimation step: directions on the sphere, random numbers, RANSAC circles among outliers, least squares (Gauss-Newton against
 // Powell's method), spheres.
-#include "recon/cast_rays.h"
-#include "recon/ransac_cylinder.h"
+#include "recon/track/cast_rays.h"
+#include "recon/track/ransac_cylinder.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

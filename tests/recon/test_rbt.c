@@ -2,8 +2,9 @@
 //
 // A disc of radius R blurred by a Gaussian of standard deviation b has its steepest edge at R - b^2 / (2 R) (references.md). The image's own blur and the
 // spline's (1/sqrt(3) voxel) add up in squares, and so does the moving average along the rays (w^2 / 12) for rays across the axis.
-#include "recon/ransac_cylinder.h"
-#include "recon/rbt_track.h"
+#include "recon/track/ransac_cylinder.h"
+#include "recon/track/rbt_track.h"
+#include "recon/volume/volume_file.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

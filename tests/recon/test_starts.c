@@ -1,9 +1,9 @@
 // Honest starts: noise is measured, a vessel in noise is found where it can be seen and refused where it cannot, clear volumes are not warned of. Rates over
 // several seeds; `bench track --only-starts` has more of them.
-#include "recon/phantom.h"
-#include "recon/rbt_scan.h"
-#include "recon/rbt_track.h"
-#include "recon/volume_noise.h"
+#include "recon/phantom/phantom.h"
+#include "recon/track/rbt_scan.h"
+#include "recon/track/rbt_track.h"
+#include "recon/volume/volume_noise.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

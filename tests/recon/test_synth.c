@@ -1,6 +1,6 @@
 // The angiogram shapes and their volumes: closed forms, promises of the random tree, the octree against all parts, partial volume, noise, threads, frames.
-#include "recon/phantom_parts.h"
-#include "recon/track_score.h"
+#include "bench/track_score.h"
+#include "recon/phantom/phantom_parts.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,5 @@
 // Trace files: what is read, and that every fault is told with its line and column in one pass.
-#include "recon/trace.h"
+#include "recon/track/trace.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,6 +1,6 @@
 // Tree files: what is saved is loaded again, the same content gives the same bytes, and every broken rule is named.
+#include "base/whole_file.h"
 #include "recon/tree_file.h"
-#include "recon/whole_file.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

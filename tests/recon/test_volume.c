@@ -1,6 +1,6 @@
 // Volume readers and the writer: every sample type in both byte orders, every placement of the grid, every way to skip and to be detached;
 // truncated and lying headers. The truth is the file that the test builds itself, byte by byte.
-#include "recon/volume.h"
+#include "recon/volume/volume_file.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,6 +1,6 @@
 // DICOM series, from files that the test builds byte by byte: encodings, sample layouts, places, what is refused. A volume's truth is a function of the
 // point in space, so that order, orientation and spacing are checked at once.
-#include "recon/volume.h"
+#include "recon/volume/volume_file.h"
 #include "tests/recon/dicom_file.h"
 
 #include <setjmp.h>

@@ -1,8 +1,9 @@
 // Oblique, anisotropic and left-handed grids: whatever the file's format, the same point in space has the same brightness, and the same vessel gives the
 // same tree.
-#include "recon/bspline.h"
-#include "recon/ransac_cylinder.h"
-#include "recon/rbt_track.h"
+#include "recon/track/ransac_cylinder.h"
+#include "recon/track/rbt_track.h"
+#include "recon/volume/bspline.h"
+#include "recon/volume/volume_file.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,6 +1,6 @@
 // The whole tree from one start: what is found, what is refused, and that corrections change nothing else.
-#include "recon/phantom.h"
-#include "recon/rbt_track.h"
+#include "recon/phantom/phantom.h"
+#include "recon/track/rbt_track.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

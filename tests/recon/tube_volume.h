@@ -2,7 +2,7 @@
 #ifndef SELDINGER_TESTS_RECON_TUBE_VOLUME_H
 #define SELDINGER_TESTS_RECON_TUBE_VOLUME_H
 
-#include "recon/volume.h"
+#include "recon/volume/volume.h"
 
 // A union of tubes of brightness 1 on background 0, with a plain blurred edge and noise from the voxels' numbers.
 static inline Volume *dark_volume(int nx, int ny, int nz, double voxel)

@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "../geom/small_meshes.h"
-#include "geom/sort_doubles.h"
+#include "base/sort_doubles.h"
 #include "xray_room.h"
 
 #include <time.h>

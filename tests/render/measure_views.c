@@ -2,6 +2,7 @@
 //
 // The vessel is a coiled tube of some 93,000 triangles, the tool a wire of 200 nodes along it that moves at each frame.
 #include "geom/mesh_decimate.h"
+#include "geom/tube_mesh.h"
 #include "render/angioscope.h"
 #include "render/vessel_scene.h"
 #include "view_stage.h"
@@ -30,7 +31,7 @@ static bool set_up(Bench *bench)
     TubeOptions tube = {.direction = {1, 0, 0}, .normal = {0, 1, 0}, .radius = 2, .piece_count = TURNS, .piece = piece};
     Faults faults;
     faults_clear(&faults);
-    TriangleMesh *mesh = picture_mesh_of_tube(&tube);
+    TriangleMesh *mesh = triangle_mesh_of_tube(&tube);
     bench->vessel = tube_vessel_create(&tube, "tube", &faults);
     bench->mesh = mesh && bench->vessel && mesh->triangle_count < 93000 ? triangle_mesh_refine(mesh, bench->vessel) : NULL;
     if (mesh && bench->mesh)

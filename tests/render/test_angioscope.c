@@ -1,5 +1,6 @@
 // Angioscopy, pixel by pixel: an exact tube is evenly round, its far end lies where its axis is seen, mirrored scenes give mirrored pictures, normals are the
 // vessel's, the eye stays inside; broken input.
+#include "geom/tube_mesh.h"
 #include "render/angioscope.h"
 #include "view_stage.h"
 #include "../geom/near.h"
@@ -21,7 +22,7 @@ static TubeScene open_tube(Vec3 start, Vec3 direction, double length, double rad
     Faults faults;
     faults_clear(&faults);
     char message[256] = "";
-    TubeScene scene = {.mesh = picture_mesh_of_tube(&tube), .vessel = tube_vessel_create(&tube, "tube", &faults)};
+    TubeScene scene = {.mesh = triangle_mesh_of_tube(&tube), .vessel = tube_vessel_create(&tube, "tube", &faults)};
     assert_non_null(scene.mesh);
     assert_non_null(scene.vessel);
     scene.scope = angioscope_create(scene.mesh, scene.vessel, NULL, message, sizeof message);
@@ -162,7 +163,7 @@ static void a_mirrored_scene_gives_a_mirrored_picture(void **state)
     Faults faults;
     faults_clear(&faults);
     Vessel *vessel[2] = {tube_vessel_create(&tube, "a", &faults), tube_vessel_create(&reflected, "b", &faults)};
-    TriangleMesh *mesh = picture_mesh_of_tube(&tube);
+    TriangleMesh *mesh = triangle_mesh_of_tube(&tube);
     Vec3 up = vec3_unit(vec3_add_scaled(tube.normal, 0.4, vec3_cross(tube.direction, tube.normal)));
     Vec3 from = vec3_add_scaled(vec3_add_scaled(tube.start, 6, tube.direction), 0.9, tube.normal);
     Pose *pose = straight_pose(12, from, tube.direction, up, 0.8, tool_radius);

@@ -2,7 +2,9 @@
 // SELDINGER_PICTURES=FOLDER keeps a picture of each size and state, to be looked at.
 #include "render/gl_canvas.h"
 #include "render/gl_context.h"
+#include "render/panel.h"
 #include "render/panel_internal.h"
+#include "render/panel_tray.h"
 #include "render/png_file.h"
 
 #include <setjmp.h>

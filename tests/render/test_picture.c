@@ -1,4 +1,5 @@
 // Whole pictures: bytes, files, bad input, and things that must be where the numbers say. Skipped by name where no EGL is.
+#include "geom/tube_mesh.h"
 #include "render/color_map.h"
 #include "render/picture.h"
 
@@ -110,7 +111,7 @@ typedef struct Run {
 static void run_open(Run *run)
 {
     TubeOptions tube = tube_options();
-    *run = (Run){.vessel = picture_mesh_of_tube(&tube), .options = picture_default_options()};
+    *run = (Run){.vessel = triangle_mesh_of_tube(&tube), .options = picture_default_options()};
     assert_non_null(run->vessel);
     for (int i = 0; i < NODES; i++) {
         run->position[i] = vec3(1, 2, 3 + 0.35 * i);
@@ -327,7 +328,7 @@ static void the_tube_drawn_is_the_tube_touched(void **state)
     Faults faults;
     faults_clear(&faults);
     Vessel *vessel = tube_vessel_create(&tube, "test", &faults);
-    TriangleMesh *mesh = picture_mesh_of_tube(&tube);
+    TriangleMesh *mesh = triangle_mesh_of_tube(&tube);
     assert_non_null(vessel);
     assert_non_null(mesh);
     for (int i = 0; i < mesh->vertex_count; i++) {
@@ -348,9 +349,9 @@ static void the_tube_drawn_is_the_tube_touched(void **state)
     triangle_mesh_free(mesh);
     vessel->destroy(vessel);
     tube.radius = 0;
-    assert_null(picture_mesh_of_tube(&tube));
-    assert_null(picture_mesh_of_plane(vec3(0, 0, 0), vec3(0, 0, 0), 1));
-    mesh = picture_mesh_of_plane(vec3(1, 2, 3), vec3(0, 0, 2), 5);
+    assert_null(triangle_mesh_of_tube(&tube));
+    assert_null(triangle_mesh_of_plane(vec3(0, 0, 0), vec3(0, 0, 0), 1));
+    mesh = triangle_mesh_of_plane(vec3(1, 2, 3), vec3(0, 0, 2), 5);
     assert_non_null(mesh);
     for (int i = 0; i < mesh->vertex_count; i++)
         assert_true(fabs(mesh->vertex[i].z - 3) < 1e-12 && mesh->normal[i].z < -0.99);

@@ -1,5 +1,6 @@
 // The live 3D view, pixel by pixel: what moves lies where the projection says, cached walls are those drawn afresh, sections, arrows, broken input.
 #include "geom/blobby.h"
+#include "geom/tube_mesh.h"
 #include "render/vessel_scene.h"
 #include "view_stage.h"
 
@@ -19,7 +20,7 @@ static TriangleMesh *tube_mesh(Vec3 start, Vec3 direction, double length, double
     const TubePiece piece = {.length = length};
     const TubeOptions tube = {.start = start, .direction = direction, .normal = vec3_normal_to(direction), .radius = radius, .piece_count = 1, .piece = &piece,
                               .closed_ends = true};
-    TriangleMesh *mesh = picture_mesh_of_tube(&tube);
+    TriangleMesh *mesh = triangle_mesh_of_tube(&tube);
     assert_non_null(mesh);
     return mesh;
 }

@@ -2,6 +2,7 @@
 #ifndef SELDINGER_TESTS_XRAY_ROOM_H
 #define SELDINGER_TESTS_XRAY_ROOM_H
 
+#include "render/fluoroscope.h"
 #include "render/fluoroscope_parts.h"
 #include "render/gl_canvas.h"
 #include "render/gl_context.h"

@@ -7,8 +7,8 @@
 
 #include <cmocka.h>
 
-#include "recon/lim_fit.h"
-#include "recon/phantom.h"
+#include "recon/fit/lim_fit.h"
+#include "recon/phantom/phantom.h"
 #include "sim/recording.h"
 
 #include "../heap_calls.h"

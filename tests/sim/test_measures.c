@@ -6,8 +6,8 @@
 
 #include <cmocka.h>
 
+#include "base/sha256.h"
 #include "sim/compare.h"
-#include "sim/sha256.h"
 #include "sim/time_histogram.h"
 
 #include <stdio.h>

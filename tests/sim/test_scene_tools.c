@@ -6,8 +6,8 @@
 
 #include <cmocka.h>
 
-#include "input/text_file.h"
-#include "input/yaml_reader.h"
+#include "base/text_file.h"
+#include "base/yaml_reader.h"
 #include "sim/scene.h"
 
 #include <dirent.h>

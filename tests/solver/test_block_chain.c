@@ -1,6 +1,6 @@
 // Block-tridiagonal systems against dense Cholesky: random chains of many sizes and conditions, and the chain's own laws. Compiled for every
 // size N of the blocks.
-#include "geom/simd.h"
+#include "base/simd.h"
 #include "solver/block_chain.h"
 #include "solver/block_condense.h"
 #include "solver/block_lu.h"

@@ -1,5 +1,5 @@
 // Coaxial tools on one centreline: laws of the element, and chains of them against exact references.
-#include "geom/simd.h"
+#include "base/simd.h"
 #include "solver/coaxial.h"
 #include "solver/coaxial_lanes.h"
 #include "solver/wire.h"

@@ -9,11 +9,11 @@
 
 #include <cmocka.h>
 
-#include "recon/lim_fit.h"
-#include "recon/phantom.h"
+#include "recon/fit/lim_fit.h"
+#include "recon/phantom/phantom.h"
 #include "solver/step_internal.h"
-#include "tube_scene.h"
 #include "tests/short_run.h"
+#include "tube_scene.h"
 
 static Vec3 some(double *seed)
 {

@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "geom/simd.h"
+#include "base/simd.h"
 #include "solver/beam_element.h"
 #include "wire_scene.h"
 

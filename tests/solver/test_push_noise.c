@@ -8,8 +8,8 @@
 
 #include <cmocka.h>
 
-#include "recon/phantom.h"
-#include "recon/shape_vessel.h"
+#include "bench/shape_vessel.h"
+#include "recon/phantom/phantom.h"
 #include "tests/short_run.h"
 #include "tube_scene.h"
 

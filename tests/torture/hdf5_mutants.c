@@ -2,8 +2,8 @@
 // storage, attributes, values) through the HDF5 library, or in its bytes, and read in a process of its own that may use little memory and time. Reading must end
 // well: with faults, or with data of which each byte can be looked at; never by a signal, nor with more memory than the reader states.
 // usage: hdf5_mutants [COUNT [SEED]]; COUNT mutants of each kind, default 150.
+#include "base/whole_file.h"
 #include "recon/tree_file.h"
-#include "recon/whole_file.h"
 #include "sim/drive.h"
 #include "sim/recording.h"
 

@@ -1,0 +1,57 @@
+#include "base/parallel.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <time.h>
+#include <unistd.h>
+
+typedef struct Pool {
+    atomic_long next, done;
+    long count;
+    void (*job)(void *, long);
+    void *context;
+} Pool;
+
+enum { MAX_THREADS = 256 };
+
+static void *work(void *argument)
+{
+    Pool *pool = argument;
+    for (long index; (index = atomic_fetch_add(&pool->next, 1)) < pool->count;) {
+        pool->job(pool->context, index);
+        atomic_fetch_add(&pool->done, 1);
+    }
+    return NULL;
+}
+
+int parallel_thread_count(int threads)
+{
+    if (threads <= 0)
+        threads = (int)sysconf(_SC_NPROCESSORS_ONLN);
+    return threads < 1 ? 1 : threads > MAX_THREADS ? MAX_THREADS : threads;
+}
+
+void parallel_for(int threads, long count, void (*job)(void *, long), void *context, const Progress *progress)
+{
+    Pool pool = {.count = count, .job = job, .context = context};
+    pthread_t thread[MAX_THREADS];
+    int wanted = parallel_thread_count(threads), started = 0;
+    if (wanted > count)
+        wanted = count > 0 ? (int)count : 1;
+    // with progress the calling thread watches; without it, it works
+    int extra = progress && progress->call ? wanted : wanted - 1;
+    while (started < extra && pthread_create(&thread[started], NULL, work, &pool) == 0)
+        started++;
+    if (progress && progress->call && started > 0) {
+        for (long done; (done = atomic_load(&pool.done)) < count;) {
+            progress->call(progress->context, done, count);
+            nanosleep(&(struct timespec){.tv_nsec = 50000000}, NULL);
+        }
+    } else {
+        work(&pool);
+    }
+    for (int i = 0; i < started; i++)
+        pthread_join(thread[i], NULL);
+    if (progress && progress->call)
+        progress->call(progress->context, count, count);
+}

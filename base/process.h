@@ -1,0 +1,18 @@
+// How a program of ours begins and ends: its streams, stack and signals, and what it leaves behind when it is stopped.
+#ifndef SELDINGER_BASE_PROCESS_H
+#define SELDINGER_BASE_PROCESS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+// What a program of ours ends with. EXIT_UNTRUSTED: a simulation that could not be trusted.
+enum { EXIT_DONE = 0, EXIT_DIFFERENT = 1, EXIT_BAD_INPUT = 2, EXIT_UNTRUSTED = 3 };
+
+// From main(): sets the process up, calls `call` and returns its exit code. EXIT_BAD_INPUT where the stack is too small.
+int process_run(int argc, char **argv, int (*call)(int argc, char **argv));
+// The handler of a signal that ends the program: no unfinished file is left.
+void process_stop(int signal_number);
+// The path of the program `name` in this program's own folder, there or not. False where this program's path cannot be had or is too long.
+bool process_beside(const char *name, char *path, size_t capacity);
+
+#endif

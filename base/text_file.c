@@ -1,0 +1,51 @@
+#include "base/text_file.h"
+
+#include "base/regular_file.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+char *text_file_read(const char *path, size_t *length, Faults *faults)
+{
+    struct stat status;
+    const char *why;
+    int file = regular_file_open(path, &status, &why);
+    if (file < 0) {
+        faults_add(faults, path, 0, 0, "cannot be opened: %s; give a text file that can be read", why);
+        return NULL;
+    }
+    size_t size = (size_t)status.st_size;
+    char *text = NULL;
+    if (size > TEXT_FILE_LIMIT)
+        faults_add(faults, path, 0, 0, "is %zu bytes long; at most %d are read", size, TEXT_FILE_LIMIT);
+    else if (!(text = malloc(size + 1)))
+        faults_add(faults, path, 0, 0, "needs %zu bytes of memory; there are not so many", size);
+    if (text) {
+        *length = regular_file_read(file, text, size);
+        text[*length] = 0;
+    }
+    // less than it has would be another text
+    if (text && *length < size) {
+        faults_add(faults, path, 0, 0, "cannot be read to its end: %s", errno ? strerror(errno) : "it has become shorter");
+        free(text);
+        text = NULL;
+    }
+    close(file);
+    return text;
+}
+
+char *text_file_beside(const char *base, const char *name)
+{
+    const char *slash = strrchr(base, '/');
+    size_t folder = name[0] == '/' || !slash ? 0 : (size_t)(slash - base) + 1;
+    size_t length = strlen(name);
+    char *path = malloc(folder + length + 1);
+    if (path) {
+        memcpy(path, base, folder);
+        memcpy(path + folder, name, length + 1);
+    }
+    return path;
+}

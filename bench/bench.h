@@ -1,0 +1,75 @@
+// What the timing tables share: a scene run to the end of its script, and its figures.
+#ifndef SELDINGER_BENCH_BENCH_H
+#define SELDINGER_BENCH_BENCH_H
+
+#include "cli/cli.h"
+#include "sim/simulator.h"
+
+#include <cJSON.h>
+
+VerbFunction bench_step, bench_peer, bench_track, bench_fit, bench_collision, bench_wall, bench_torture, bench_drawing;
+
+typedef struct Spread {
+    double median, p99, p999, max;
+} Spread;
+
+typedef struct StepFigures { // of all steps of a run; times are the thread's CPU time
+    int64_t steps;
+    double simulated_s, cpu_s;
+    Spread step_us, stage_us[STAGE_COUNT];
+    Spread candidates, contacts, iterations, penetration_um;
+    int64_t not_converged, linearised_again, limited;
+    double residual_max;
+    unsigned flags;
+    int64_t crowded_step;    // the first with 80 candidates, or else the most
+    StepReport last;
+    double inserted_mm, stalled_mm;      // at the end; what the hand fed and the tool did not take
+    uint64_t hash;
+} StepFigures;
+
+int64_t bench_cpu_ns(void);
+// What a simulator tells at the end of a run; all but `crowded_step` and `stalled_mm`. cpu_s: what the run took.
+void bench_figures(const Simulator *simulator, double cpu_s, StepFigures *figures);
+Spread bench_spread(const TimeHistogram *histogram, double unit);
+void bench_add_spread(cJSON *object, const char *name, Spread s);
+cJSON *bench_figures_json(const StepFigures *figures);
+// The command of step i, from the scene's script.
+Command bench_command(const Scene *scene, int64_t step, int *cursor);
+int64_t bench_steps(const Scene *scene, int64_t most);   // of the script, but not more than `most`
+typedef struct StepTrace {   // of each step; arrays of the caller with room for bench_steps()
+    double *us;
+    int *contacts;
+} StepTrace;
+// Runs the script, at most `most` steps of it; stops where a step diverges. `trace` may be NULL. False with a fault.
+bool bench_run(const Scene *scene, const Vessel *vessel, int64_t most, const StepTrace *trace, StepFigures *figures, Faults *faults);
+
+// Detection of up to 80 points nearest to the wall at that step of the script [us], and how many they were.
+void bench_detection(const Scene *scene, const Vessel *vessel, int64_t step, double *detection_us, int *points, Faults *faults);
+
+// A scene with its vessel, opened; false with faults.
+typedef struct BenchScene {
+    Scene *scene;
+    OpenVessel open;
+} BenchScene;
+bool bench_open(const char *path, int threads, BenchScene *out, Faults *faults);
+void bench_close(BenchScene *scene);
+
+// The processor's name for the head of a table.
+const char *bench_processor(void);
+
+// What all tables take: --quick, --threads N, --json F, --help.
+typedef struct BenchOptions {
+    bool quick;
+    int threads;
+    const char *json;
+} BenchOptions;
+// One of these (or an unknown one) in a table's own getopt loop. -1: go on; otherwise the exit code.
+int bench_take(int choice, const char *table, const char *help, BenchOptions *options);
+// All of them where a table has no others. -1: go on; otherwise the exit code.
+int bench_parse(int argc, char **argv, const char *table, const char *help, BenchOptions *options);
+// Where the text goes: not where the JSON goes.
+FILE *bench_text(const BenchOptions *options);
+// Nothing where no --json was given.
+bool bench_write_json(const BenchOptions *options, const cJSON *root, Faults *faults);
+
+#endif

@@ -1,0 +1,75 @@
+// What `bench collision` measures: a recorded motion asked of any wall, and runs in closed loop judged by where the wall truly is.
+#ifndef SELDINGER_BENCH_COLLISION_RUN_H
+#define SELDINGER_BENCH_COLLISION_RUN_H
+
+#include "bench/bench.h"
+
+// Where all free nodes were at the end of each step of a run.
+typedef struct CollisionMotion {
+    int node_count;
+    double *radius;          // (M) [mm] of the tool
+    int steps, step_capacity;
+    int *first_node;         // (S) the first free node; all from there to the tip are free
+    size_t *offset;          // (S+1) into the points
+    double *reach;           // (S) [mm] what the solver asks for at that step
+    size_t point_capacity;
+    Vec3 *point;             // (P)
+    double *gap;             // (P) the truth [mm]; +HUGE_VAL where it is beyond reach or there is no wall
+    Vec3 *normal;            // (P) the truth
+} CollisionMotion;
+
+void collision_motion_free(CollisionMotion *motion);
+// Fills gap and normal by asking `truth`. False where memory lacks.
+bool collision_motion_judge(CollisionMotion *motion, const Vessel *truth);
+
+typedef struct ErrorFigures {
+    double rms, max;
+} ErrorFigures;
+
+typedef struct CollisionReplay {
+    int64_t steps, near_points;      // near: gap less the tool's radius below the reach of half a question, as of the solver's candidates
+    double points_per_step, us_per_step, us_per_80_points;
+    int64_t judged, lost;            // near points compared; those for which the wall had no answer
+    ErrorFigures gap_um, normal_deg; // over judged points; the normal where the wall is nearer than half of the tool's room
+} CollisionReplay;
+
+// Each node with its own memory, as the solver asks. Times are CPU times of the queries, the least of `repeats` replays. False where memory lacks.
+bool collision_replay(const Vessel *wall, const CollisionMotion *motion, int repeats, CollisionReplay *out);
+
+typedef struct CollisionLoop {
+    int64_t steps, wanted;
+    Spread step_us;
+    double detect_us, contact_us;    // medians
+    double candidates, candidates_max, contacts, contacts_max;   // near enough to touch, and with force; medians and largest
+    double iterations;               // factorisations or sweeps, median
+    int64_t not_converged;
+    double penetration_um;           // deepest node outside the true wall
+    double fed_mm, stalled_mm;
+    bool survived;
+    int64_t failed_step;             // -1
+    char why[96];                    // what failed first
+    // measured where asked for
+    double work_n;                   // [mJ/mm] lost along the true wall for each millimetre fed
+    double work_mu;                  // the same over the work of the wall's forces taken as normal ones: a coefficient of friction
+} CollisionLoop;
+
+typedef struct LoopOptions {
+    int64_t most_steps;
+    bool without_friction;           // mu = 0 everywhere, and the work is measured
+    bool stop_at_failure;
+    ContactOptions contact;
+    CollisionMotion *record;         // NULL: not recorded
+    double *push_n;                  // (bench_steps) proximal force at each step; NULL
+} LoopOptions;
+
+// `truth_gap` answers the same gaps as `truth` and perhaps nothing else; depths are asked of it.
+bool collision_loop(const Scene *scene, const Vessel *wall, const Vessel *truth, const Vessel *truth_gap, const LoopOptions *options, CollisionLoop *out,
+                    Faults *faults);
+
+typedef struct PushFigures {
+    double mean_n, reference_n;      // over the steps that both runs took
+    double jitter_rms, jitter_p99;   // change of the push from step to step over its mean
+} PushFigures;
+PushFigures collision_push(const double *push_n, int64_t steps, const double *reference_n, int64_t reference_steps);
+
+#endif

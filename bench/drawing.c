@@ -1,0 +1,319 @@
+// seldinger bench drawing: what a picture of the trainer costs, and whether drawing disturbs the 1 kHz thread.
+#include "bench/bench.h"
+
+#include "render/gl_canvas.h"
+#include "render/gl_context.h"
+#include "render/scene_views.h"
+#include "render/trainer_panel.h"
+#include "sim/clock.h"
+#include "sim/live_session.h"
+
+#include <getopt.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char help[] =
+    "Usage: seldinger bench drawing [SCENE] [options]\n\n"
+    "Draws the trainer off screen (EGL), views and panels together, from moments of the scene's script: CPU time of all drawing threads for a picture, with\n"
+    "C-arm and camera still and turning. Then the 1 kHz thread beside 30 pictures a second and beside none, in turns: how late it wakes, what a step costs.\n"
+    "SCENE: default scenes/phantom/scene.yaml.\n\n"
+    "  --seconds S  of each turn of the second table; default 10\n"
+    "  --quick      a third of the pictures, turns of 3 s\n"
+    "  --threads N  threads of fitting a shape; default 0: all cores\n"
+    "  --json F     all figures; - is standard output\n\n"
+    "Exit codes: 0 done; 2 wrong usage, bad input, or no EGL.\n";
+
+enum { MOMENTS = 60, PICTURES = 90, WARM_UP = 10, TURNS = 4 };
+
+typedef struct Studio {
+    const BenchOptions *options;
+    BenchScene scene;
+    GlContext *context;
+    GlCanvas canvas;
+    Views *views;
+    Panel *panel;
+    Desk desk;
+    TrainerPanel shown;
+    LessonView *lesson;              // (MOMENTS, stride)
+    size_t stride;
+    Pose *pose[MOMENTS];
+    uint32_t pulse;
+} Studio;
+
+static LessonView *lesson_of(const Studio *studio, int moment) { return (LessonView *)(void *)((char *)studio->lesson + (size_t)moment * studio->stride); }
+
+// Moments 33 ms apart, the last ones of the script where it is that long; contrast flows all the while.
+static bool take_moments(Studio *studio, Faults *faults)
+{
+    const Scene *scene = studio->scene.scene;
+    Simulator *simulator = simulator_create(scene, studio->scene.open.vessel, faults);
+    Lesson *lesson = simulator ? lesson_create(simulator, studio->scene.open.tree) : NULL;
+    XrayControl xray = studio->desk.xray;
+    int cursor = 0;
+    xray.pedal = 1;
+    xray.contrast_ml_s = 3;
+    studio->stride = lesson ? (lesson_view_bytes(lesson) + 63) / 64 * 64 : 0;
+    studio->lesson = lesson ? calloc(MOMENTS, studio->stride) : NULL;
+    bool good = studio->lesson != NULL;
+    int64_t steps = bench_steps(scene, 6000), first = steps > MOMENTS * 33 ? steps - MOMENTS * 33 : 0;
+    for (int64_t i = 0, taken = 0; good && taken < MOMENTS; i++) {
+        ToolCommands commands = scene->script ? script_tools_at(scene->script, (double)i * scene->dt / 1000, &cursor) : (ToolCommands){0};
+        simulator_step_tools(simulator, &commands);
+        lesson_step(lesson, simulator, &commands, &xray);
+        if (i < first || (i - first) % 33 != 0)
+            continue;
+        good = (studio->pose[taken] = pose_create_for(simulator)) != NULL;
+        if (good) {
+            pose_take(studio->pose[taken], simulator, &commands, &xray);
+            lesson_publish(lesson, lesson_of(studio, (int)taken));
+        }
+        taken++;
+    }
+    lesson_free(lesson);
+    simulator_destroy(simulator);
+    return good;
+}
+
+typedef struct Case {
+    const char *name;
+    PanelView view;
+    int width, height;
+    bool flows, arm_turns, camera_turns;
+    double must_ms;                  // issue 6; 0: none
+    int only;                        // 0: everything; else 1 + the one view that is drawn, or ONLY_PANELS
+} Case;
+
+enum { ONLY_PANELS = 1 + VIEW_COUNT };
+
+static const Case cases[] = {
+    {"fluoroscopy", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 12, 0},
+    {"fluoroscopy", VIEW_FLUOROSCOPY, 1920, 1080, false, false, false, 20, 0},
+    {"fluoroscopy, contrast flows", VIEW_FLUOROSCOPY, 1280, 720, true, false, false, 12, 0},
+    {"fluoroscopy, contrast flows", VIEW_FLUOROSCOPY, 1920, 1080, true, false, false, 20, 0},
+    {"fluoroscopy, C-arm turns", VIEW_FLUOROSCOPY, 1280, 720, true, true, false, 40, 0},
+    {"fluoroscopy, C-arm turns", VIEW_FLUOROSCOPY, 1920, 1080, true, true, false, 40, 0},
+    {"3D", VIEW_3D, 1280, 720, true, false, false, 0, 0},
+    {"3D, camera turns", VIEW_3D, 1280, 720, true, false, true, 0, 0},
+    {"angioscopy", VIEW_ANGIOSCOPY, 1280, 720, true, false, false, 33, 0},
+    {"all three", VIEW_ALL, 1280, 720, true, false, false, 33, 0},
+    {"- of the first: panels", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 0, ONLY_PANELS},
+    {"- fluoroscopy", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 0, 1 + VIEW_FLUOROSCOPY},
+    {"- 3D, inset", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 0, 1 + VIEW_3D},
+    {"- angioscopy, inset", VIEW_FLUOROSCOPY, 1280, 720, false, false, false, 0, 1 + VIEW_ANGIOSCOPY},
+};
+enum { CASES = sizeof cases / sizeof cases[0] };
+
+static void draw(Studio *studio, const Case *what, int frame)
+{
+    int at = frame % (2 * MOMENTS - 2), moment = at < MOMENTS ? at : 2 * MOMENTS - 2 - at;   // to and fro
+    const Pose *pose = studio->pose[moment];
+    LessonView *lesson = lesson_of(studio, moment);
+    XrayControl xray = pose->xray;
+    xray.lao_deg = what->arm_turns ? (float)(frame % 60) : 0;
+    if (what->camera_turns)
+        free_camera_orbit(&studio->desk.look.camera, 3, 0);
+    PanelLayout layout = panel_layout(what->width, what->height, 1, what->view, true);
+    ViewsFrame views = {.pose = pose, .xray = &xray, .contrast = what->flows && lesson->node_count ? lesson->concentration : NULL,
+                        .filling = what->flows ? lesson->concentration + lesson->node_count : NULL, .pulse = ++studio->pulse,
+                        .look = &studio->desk.look};
+    WindowInput input = {.width = what->width, .height = what->height, .scale = 1, .mouse_x = -1, .mouse_y = -1, .has_focus = true};
+    for (int i = 0; what->only && i < VIEW_COUNT; i++)
+        if (what->only != 1 + i)
+            layout.view[i].width = 0;
+    views_draw(studio->views, &views, &layout, what->width, what->height, studio->canvas.framebuffer);
+    trainer_panel_show(&studio->shown, studio->scene.scene, pose, &lesson->score, NULL, &xray);
+    studio->shown.state.now_s = studio->shown.state.time_s = frame / 30.0;
+    studio->desk.view = what->view;
+    trainer_panel_views(&studio->shown, &studio->desk, studio->views, &xray);
+    if (what->only == 0 || what->only == ONLY_PANELS)
+        panel_draw(studio->panel, &input, &studio->shown.state, studio->canvas.framebuffer);
+    gl_canvas_finish();
+}
+
+static bool make_canvas(Studio *studio, int width, int height, Faults *faults)
+{
+    char message[256];
+    gl_canvas_destroy(&studio->canvas);
+    if (gl_canvas_create(&studio->canvas, width, height, 1, message, sizeof message))
+        return true;
+    faults_add(faults, "EGL", 0, 0, "%s", message);
+    return false;
+}
+
+static bool measure_pictures(Studio *studio, FILE *text, cJSON *root, Faults *faults)
+{
+    cJSON *rows = cJSON_AddArrayToObject(root, "pictures");
+    int pictures = studio->options->quick ? PICTURES / 3 : PICTURES;
+    fprintf(text, "\nCPU time of a picture, all drawing threads [ms]; at 30 pictures a second there are 33.3\n");
+    fprintf(text, "%-28s %-11s %8s %8s %8s %8s\n", "view with panels", "size", "median", "p99", "max", "must");
+    for (int i = 0; i < CASES; i++) {
+        const Case *what = &cases[i];
+        static TimeHistogram cpu;
+        memset(&cpu, 0, sizeof cpu);
+        if (!make_canvas(studio, what->width, what->height, faults))
+            return false;
+        for (int k = 0; k < pictures + WARM_UP; k++) {
+            double begin = clock_s(CLOCK_PROCESS_CPUTIME_ID);
+            draw(studio, what, k);
+            if (k >= WARM_UP)
+                histogram_add(&cpu, (int64_t)((clock_s(CLOCK_PROCESS_CPUTIME_ID) - begin) * 1e9));
+        }
+        Spread ms = bench_spread(&cpu, 1e6);
+        char size[32], must[16] = "";
+        snprintf(size, sizeof size, "%dx%d", what->width, what->height);
+        if (what->must_ms > 0)
+            snprintf(must, sizeof must, "%.0f", what->must_ms);
+        fprintf(text, "%-28s %-11s %8.1f %8.1f %8.1f %8s%s\n", what->name, size, ms.median, ms.p99, ms.max, must,
+                what->must_ms > 0 && ms.median > what->must_ms ? "  MISSED" : "");
+        cJSON *row = cJSON_CreateObject();
+        cJSON_AddStringToObject(row, "view", what->name);
+        cJSON_AddStringToObject(row, "size", size);
+        cJSON_AddNumberToObject(row, "median_ms", ms.median);
+        cJSON_AddNumberToObject(row, "p99_ms", ms.p99);
+        cJSON_AddItemToArray(rows, row);
+    }
+    return true;
+}
+
+typedef struct Turn {
+    RealtimeFigures real;
+    int pictures;
+    double seconds;
+} Turn;
+
+// A session driven by the scene's script, `seconds` long, with pictures beside it or without.
+static bool take_turn(Studio *studio, double seconds, bool draws, Turn *turn, Faults *faults)
+{
+    static HandPort hand[TOOLS_MOST];
+    HandPort *hands[TOOLS_MOST];
+    for (int k = 0; k < TOOLS_MOST; k++) {
+        hands[k] = &hand[k];
+        atomic_store(&hand[k].drives, DRIVES_TOOL + k);
+    }
+    LiveSession session;
+    LiveSessionOptions options = {.hand_count = studio->scene.scene->tool_count, .hand = hands, .xray = studio->desk.xray};
+    if (!live_session_open(&session, studio->scene.scene, &studio->scene.open, &options, faults))
+        return false;
+    double begin = clock_s(CLOCK_MONOTONIC), next = begin;
+    int cursor = 0, frame = 0;
+    while (clock_s(CLOCK_MONOTONIC) < begin + seconds) {
+        const Moment *moment = realtime_moment(session.realtime);
+        ToolCommands commands = {0};
+        if (studio->scene.scene->script && moment)
+            commands = script_tools_at(studio->scene.scene->script, moment->pose->time_s, &cursor);
+        for (int k = 0; k < options.hand_count; k++) {
+            atomic_store(&hand[k].push_mm_s, commands.tool[k].push_mm_s);
+            atomic_store(&hand[k].twist_deg_s, commands.tool[k].twist_deg_s);
+        }
+        if (draws)
+            draw(studio, &cases[0], frame);
+        frame++;
+        next = fmax(next + 1.0 / 30, clock_s(CLOCK_MONOTONIC));
+        struct timespec until = {.tv_sec = (time_t)next, .tv_nsec = (long)((next - floor(next)) * 1e9)};
+        clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL);
+    }
+    turn->pictures = draws ? frame : 0;
+    turn->seconds = clock_s(CLOCK_MONOTONIC) - begin;
+    bool whole = live_session_stop(&session, &turn->real, faults);
+    live_session_free(&session);
+    return whole;
+}
+
+static bool measure_disturbance(Studio *studio, double seconds, FILE *text, cJSON *root, Faults *faults)
+{
+    cJSON *rows = cJSON_AddArrayToObject(root, "real_time");
+    fprintf(text, "\nThe 1 kHz thread beside pictures of 1280x720 and beside none, %.0f s each\n", seconds);
+    fprintf(text, "%-12s %12s %24s %30s %8s %10s\n", "", "pictures/s", "woke late by [us]", "CPU time of a step [us]", "missed", "SCHED_FIFO");
+    fprintf(text, "%-12s %12s %8s %7s %7s %10s %9s %9s\n", "", "", "median", "p99", "max", "median", "p99.9", "max");
+    if (!make_canvas(studio, cases[0].width, cases[0].height, faults))
+        return false;
+    for (int i = 0; i < TURNS; i++) {
+        Turn turn;
+        bool draws = i & 1;
+        if (!take_turn(studio, seconds, draws, &turn, faults))
+            return false;
+        const RealtimeFigures *real = &turn.real;
+        fprintf(text, "%-12s %12.1f %8.0f %7.0f %7.0f %10.0f %9.0f %9.0f %8lld %10s\n", draws ? "drawing" : "not drawing", turn.pictures / turn.seconds,
+                real->late_us[0], real->late_us[1], real->late_us[2], real->step_us[0], real->step_us[1], real->step_us[2], (long long)real->deadline_misses,
+                real->real_time_priority ? "yes" : "no");
+        cJSON *row = cJSON_CreateObject();
+        cJSON_AddBoolToObject(row, "drawing", draws);
+        cJSON_AddNumberToObject(row, "pictures_s", turn.pictures / turn.seconds);
+        cJSON_AddNumberToObject(row, "late_median_us", real->late_us[0]);
+        cJSON_AddNumberToObject(row, "late_p99_us", real->late_us[1]);
+        cJSON_AddNumberToObject(row, "step_median_us", real->step_us[0]);
+        cJSON_AddNumberToObject(row, "step_p999_us", real->step_us[1]);
+        cJSON_AddNumberToObject(row, "deadline_misses", (double)real->deadline_misses);
+        cJSON_AddBoolToObject(row, "real_time_priority", real->real_time_priority);
+        cJSON_AddItemToArray(rows, row);
+    }
+    return true;
+}
+
+static bool set_studio(Studio *studio, const char *path, Faults *faults)
+{
+    char message[512] = "";
+    if (!bench_open(path, studio->options->threads, &studio->scene, faults))
+        return false;
+    studio->context = gl_context_create(message, sizeof message);
+    studio->panel = studio->context ? panel_create(message, sizeof message) : NULL;
+    if (!studio->panel) {
+        faults_add(faults, path, 0, 0, "nothing can be drawn: %s", message);
+        return false;
+    }
+    studio->views = scene_views_create(studio->scene.scene, &studio->scene.open, &studio->desk, message, sizeof message, faults);
+    if (!studio->views)
+        return false;
+    trainer_panel_begin(&studio->shown, studio->scene.scene, "");
+    return take_moments(studio, faults);
+}
+
+int bench_drawing(int argc, char **argv)
+{
+    enum { SECONDS = 600 };
+    static const struct option table[] = {{"seconds", required_argument, NULL, SECONDS}, {"quick", no_argument, NULL, 'q'}, {"threads", required_argument, NULL, 't'},
+                                          {"json", required_argument, NULL, 'j'},        {"help", no_argument, NULL, 'h'},  {0}};
+    BenchOptions options = {0};
+    double seconds = 0;
+    static Faults faults;
+    optind = 1;
+    for (int choice; (choice = getopt_long(argc, argv, "h", table, NULL)) != -1;) {
+        if (choice == SECONDS) {
+            if (!cli_number("--seconds", optarg, 1, 3600, &seconds))
+                return EXIT_BAD_INPUT;
+            continue;
+        }
+        int code = bench_take(choice, "drawing", help, &options);
+        if (code >= 0)
+            return code;
+    }
+    if (optind < argc - 1) {
+        fprintf(stderr, "seldinger bench drawing: one scene at a time, not also %s\n", argv[optind + 1]);
+        return EXIT_BAD_INPUT;
+    }
+    Studio studio = {.options = &options};
+    cJSON *root = cJSON_CreateObject();
+    FILE *text = bench_text(&options);
+    const char *path = optind < argc ? argv[optind] : "scenes/phantom/scene.yaml";
+    faults_clear(&faults);
+    bool good = set_studio(&studio, path, &faults);
+    if (good) {
+        fprintf(text, "%s, %s, %s\n", path, bench_processor(), gl_context_renderer(studio.context));
+        cJSON_AddStringToObject(root, "scene", path);
+        cJSON_AddStringToObject(root, "renderer", gl_context_renderer(studio.context));
+        good = measure_pictures(&studio, text, root, &faults) &&
+               measure_disturbance(&studio, seconds > 0 ? seconds : options.quick ? 3 : 10, text, root, &faults) && bench_write_json(&options, root, &faults);
+    }
+    cJSON_Delete(root);
+    for (int i = 0; i < MOMENTS; i++)
+        pose_free(studio.pose[i]);
+    free(studio.lesson);
+    views_destroy(studio.views);
+    if (studio.panel)
+        panel_destroy(studio.panel);
+    if (studio.context)
+        gl_canvas_destroy(&studio.canvas);
+    gl_context_destroy(studio.context);
+    bench_close(&studio.scene);
+    return good && faults.count == 0 ? EXIT_DONE : cli_bad_input(&faults);
+}

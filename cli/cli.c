@@ -1,0 +1,30 @@
+// What the verbs share: how faults, notes and progress are printed.
+#include "cli/cli.h"
+
+#include <string.h>
+
+void cli_notes(FILE *out, const char *path, const char *text)
+{
+    while (*text) {
+        size_t n = strcspn(text, "\n");
+        fprintf(out, "%s: %.*s\n", path, (int)n, text);
+        text += n + (text[n] == '\n');
+    }
+}
+
+int cli_bad_input(const Faults *faults)
+{
+    static char text[(FAULTS_CAPACITY + 1) * FAULT_LENGTH];
+    faults_print(faults, text, sizeof text);
+    fputs(text, stderr);
+    return EXIT_BAD_INPUT;
+}
+
+void cli_note(const char *path, const char *text) { cli_notes(stderr, path, text); }
+
+bool cli_open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults)
+{
+    ProgressBar bar;
+    Progress progress = progress_bar(&bar, "fit", quiet);
+    return open_vessel(scene, &(OpenVesselOptions){.threads = threads, .progress = &progress, .note = cli_note}, out, faults);
+}

@@ -1,0 +1,158 @@
+// The tree's derived lists: neighbours, near nodes, who sees which blob. See vessel_tree.h.
+#include "geom/vessel_tree.h"
+
+#include "geom/blob_flood.h"
+
+#include <limits.h>
+#include <stdlib.h>
+
+static void link_neighbours(VesselTree *tree)
+{
+    int n = tree->node_count, *offset = tree->neighbour_offset;
+    for (int i = 0; i <= n; i++)
+        offset[i] = 0;
+    // count, sum, fill, as in counting sort; offset[i + 1] serves as node i's fill position and ends as its end
+    for (int i = 1; i < n; i++) {
+        int p = tree->parent[i];
+        if (p >= 0 && p < i) {
+            offset[i + 1]++;
+            offset[p + 1]++;
+        }
+    }
+    int sum = 0;
+    for (int i = 0; i < n; i++) {
+        int own = offset[i + 1];
+        offset[i + 1] = sum;
+        sum += own;
+    }
+    // a node's own parent comes before any of its children do, because parents stand before children
+    for (int i = 1; i < n; i++) {
+        int p = tree->parent[i];
+        if (p >= 0 && p < i) {
+            tree->neighbour[offset[i + 1]++] = p;
+            tree->neighbour[offset[p + 1]++] = i;
+        }
+    }
+}
+
+// A way through the tree from a node, as far as it has been followed.
+typedef struct Way {
+    int node, from, top;     // top: the common ancestor of both ends
+} Way;
+
+typedef struct NearSearch {
+    const VesselTree *tree;
+    double *along;           // (N) [mm] from the root
+    double largest;          // radius
+    double part;             // of the distances that count as near: 1, or less where a tree is too crowded
+    Way *way;                // (N) a tree has one way to each node
+    int64_t visits;
+    int *near;               // all nodes' lists
+    size_t count, capacity;
+} NearSearch;
+
+// More than any vessel has; a broken file's nodes, all in one place, would be near each other in pairs.
+static const int64_t VISITS_MAX = (int64_t)1 << 27;
+static const size_t NEAR_MAX = (size_t)1 << 24;
+
+static bool add_near(NearSearch *s, int node)
+{
+    if (s->count == s->capacity) {
+        size_t capacity = 2 * s->capacity + 1024;
+        int *more = realloc(s->near, capacity * sizeof *more);
+        if (!more)
+            return false;
+        s->near = more;
+        s->capacity = capacity;
+    }
+    s->near[s->count++] = node;
+    return true;
+}
+
+// The length of a way is the same from both of its ends, to the bit: so is who is near whom.
+static double way_length(const NearSearch *s, int from, Way way)
+{
+    return (s->along[from] - s->along[way.top]) + (s->along[way.node] - s->along[way.top]);
+}
+
+// How long a way and how far apart near nodes are at most, in sums of their radii: see vessel_tree_link.
+typedef struct NearLimits {
+    double way, apart;
+} NearLimits;
+
+static const NearLimits near_most = {3, 1.5}, near_local_sac = {2, 1.5}, near_local = {1.5, 1.2};
+
+static NearLimits near_limits(const VesselTree *tree, int a, int b)
+{
+    bool local_models = vessel_tree_is_model(tree) && !vessel_tree_is_shared(tree);
+    if (!local_models)
+        return near_most;
+    bool at_sac = tree->kind[a] != NODE_VESSEL || tree->kind[b] != NODE_VESSEL;
+    return at_sac ? near_local_sac : near_local;
+}
+
+// The nodes near `node`, its neighbours always among them. Breadth first, so that the order is that of links, then of indices. False where there is
+// no memory.
+static bool collect_near(NearSearch *s, int node)
+{
+    const VesselTree *tree = s->tree;
+    int known = 1;
+    double farthest = s->part * near_most.way * (tree->radius[node] + s->largest);
+    s->way[0] = (Way){node, -1, node};
+    for (int w = 0; w < known; w++, s->visits++) {
+        Way at = s->way[w];
+        double reach = s->part * (tree->radius[node] + tree->radius[at.node]);
+        NearLimits most = near_limits(tree, node, at.node);
+        bool is_near = way_length(s, node, at) < most.way * reach && vec3_distance(tree->center[node], tree->center[at.node]) < most.apart * reach;
+        if (w > 0 && (at.from == node || is_near) && !add_near(s, at.node))
+            return false;
+        for (int k = tree->neighbour_offset[at.node]; k < tree->neighbour_offset[at.node + 1]; k++) {
+            int next = tree->neighbour[k];
+            Way way = {next, at.node, next < at.node ? next : at.top};
+            if (next != at.from && (w == 0 || way_length(s, node, way) < farthest))
+                s->way[known++] = way;
+        }
+    }
+    return true;
+}
+
+static bool link_near(VesselTree *tree, NearSearch *s)
+{
+    int n = tree->node_count;
+    for (int i = 0; i < n; i++) {
+        s->largest = fmax(s->largest, tree->radius[i]);
+        int p = tree->parent[i];
+        s->along[i] = p >= 0 && p < i ? s->along[p] + vec3_distance(tree->center[i], tree->center[p]) : 0;
+    }
+    for (s->part = 1;; s->part = s->part > 0.1 ? 0.5 * s->part : 0) {
+        s->visits = 0;
+        s->count = 0;
+        int i = 0;
+        for (; i < n && (s->part == 0 || (s->visits < VISITS_MAX && s->count < NEAR_MAX)); i++) {
+            if (!collect_near(s, i))
+                return false;
+            tree->near_offset[i + 1] = (int)s->count;
+        }
+        if (i == n)
+            return true;
+    }
+}
+
+bool vessel_tree_link(VesselTree *tree)
+{
+    size_t n = (size_t)tree->node_count;
+    link_neighbours(tree);
+    free(tree->near_offset);
+    free(tree->near);
+    tree->near = NULL;
+    tree->near_offset = calloc(n + 1, sizeof *tree->near_offset);
+    NearSearch search = {.tree = tree, .along = calloc(n, sizeof *search.along), .way = calloc(n, sizeof *search.way)};
+    bool good = tree->near_offset && search.along && search.way && link_near(tree, &search);
+    free(search.along);
+    free(search.way);
+    if (search.near)
+        tree->near = realloc(search.near, search.count * sizeof *search.near);
+    else
+        tree->near = calloc(1, sizeof *tree->near);
+    return good && tree->near && (!vessel_tree_is_shared(tree) || blob_flood_list(tree));
+}

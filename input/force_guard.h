@@ -1,0 +1,20 @@
+// What of a force may be sent to a haptic device now: scale, clamp, slew limit, and zero where the simulation stands or the device is silent.
+#ifndef SELDINGER_INPUT_FORCE_GUARD_H
+#define SELDINGER_INPUT_FORCE_GUARD_H
+
+#include "input/device_map.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct ForceGuard {
+    double sent[2];                  // force [N], torque [N mm]
+    int64_t last_us, step, step_grew_us;
+    bool has_started;
+    const char *why_zero;            // "" while forces may be sent
+} ForceGuard;
+
+// What may be sent now: `wanted` force [N] and torque [N mm] -> guard->sent. `step`: HandPort.step. `report_us`: when the device last said something.
+void force_guard(ForceGuard *guard, const MapForce *map, const double wanted[2], int64_t step, int64_t now_us, int64_t report_us, bool paused);
+
+#endif

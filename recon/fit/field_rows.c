@@ -1,0 +1,435 @@
+// Which rows there are.
+//
+// Data: the nodes' points, each in the cell that it lies in; the root's once more upstream of an open inlet, so that the wall is a tube through its plane.
+// A point well inside another node's tube (half its radius) is no wall: rays cast from a parent hit the far wall of a child's mouth, and the reverse.
+//
+// Guards inside: every node's centre, and along a lumen's link; between a point and its axis. Their bound is half of what a round vessel's scaled field,
+// 1 - (d/r)^2, has there, at most; in a cell wider than the link the field rises as slowly as that cell's, 2/r a millimetre.
+// Guards outside: beyond a point, along the normal, where neither a tube nor data of a node near by are; and on a ring where a section has no points.
+// They act only where they are violated. Without them a fit of signed blobs grows sheets where nothing speaks against them.
+#include "recon/fit/field_rows.h"
+
+#include "base/parallel.h"
+#include "base/same_math.h"
+#include "geom/power_blocks.h"
+#include "geom/power_walk.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+// Inside the field stays near the scaled distance's 0 to 1 in this direction, too: large amplitudes that cancel at the wall leave hollows beside the axis.
+static const double MOST_INSIDE = 1.5;
+// Of a tube's radius: points nearer to its axis are not wall.
+static const double LUMEN_POINT = 0.5;
+// A sac is no ball: only this share of it is lumen for certain, beyond that its data say where it ends.
+static const double SAC_BALL = 0.6;
+// Cosine of the angle about a direction from a sac's centre within which a point of its wall says how far it reaches there.
+static const double SAC_CONE = 0.97;
+// What a guard outside asks for, at most: enough that no sheet closes there. Between two walls a smooth field gets no deeper, and guards that ask for the
+// scaled distance there push the walls apart.
+static const double OUTSIDE = 0.15;
+enum { GUARD_EVERY = 3, RING = 12, LINK_GUARDS = 4 };
+
+typedef struct Draft {       // rows of a node while they are collected
+    int data, guards, data_room, guard_room;
+    Vec3 *point, *at;
+    float (*bound)[2];
+    bool failed;
+} Draft;
+
+typedef struct Job {
+    const VesselTree *tree;
+    PowerBlocks blocks;
+    Draft *draft;            // (N) what each node's points and tube give …
+    int **cell;              // … (N) and the cells that those rows lie in, data first
+    FieldRows *rows;
+    int64_t *dropped;        // (N)
+} Job;
+
+bool field_link_is_lumen(const VesselTree *tree, int node)
+{
+    int parent = tree->parent[node];
+    bool at_sac = parent >= 0 && (tree->kind[node] != NODE_VESSEL || tree->kind[parent] != NODE_VESSEL);
+    return parent >= 0 && vec3_distance(tree->center[node], tree->center[parent]) <= (at_sac ? 1.5 : 1) * (tree->radius[node] + tree->radius[parent]);
+}
+
+static void add_point(Draft *d, Vec3 x)
+{
+    if (d->data == d->data_room) {
+        int room = 2 * d->data_room + 64;
+        Vec3 *more = realloc(d->point, (size_t)room * sizeof *more);
+        if (!more) {
+            d->failed = true;
+            return;
+        }
+        d->point = more;
+        d->data_room = room;
+    }
+    d->point[d->data++] = x;
+}
+
+static void add_guard(Draft *d, Vec3 x, double low, double high)
+{
+    if (d->guards == d->guard_room) {
+        int room = 2 * d->guard_room + 64;
+        Vec3 *more = realloc(d->at, (size_t)room * sizeof *more);
+        d->at = more ? more : d->at;
+        float(*bound)[2] = realloc(d->bound, (size_t)room * sizeof *bound);
+        d->bound = bound ? bound : d->bound;
+        if (!more || !bound) {
+            d->failed = true;
+            return;
+        }
+        d->guard_room = room;
+    }
+    d->at[d->guards] = x;
+    d->bound[d->guards][0] = (float)low;
+    d->bound[d->guards++][1] = (float)high;
+}
+
+// Distance of x from the axis of node's link to its parent (its own centre, where that is no lumen), as a share of the radius there.
+static double share_of_tube(const VesselTree *tree, int node, Vec3 x)
+{
+    int parent = tree->parent[node];
+    Vec3 b = tree->center[node];
+    if (!field_link_is_lumen(tree, node))
+        return vec3_distance(x, b) / tree->radius[node];
+    Vec3 a = tree->center[parent], e = vec3_sub(b, a);
+    double length2 = vec3_norm2(e), t = length2 > 0 ? fmax(0, fmin(1, vec3_dot(vec3_sub(x, a), e) / length2)) : 1;
+    // a narrow branch's link does not widen towards its parent's axis
+    double r = tree->radius[node] + (1 - t) * fmin(0, tree->radius[parent] - tree->radius[node]);
+    return vec3_distance(x, vec3_mix(a, b, t)) / r;
+}
+
+static bool is_in_lumen(const VesselTree *tree, int node, Vec3 x)
+{
+    for (int k = tree->near_offset[node] - 1; k < tree->near_offset[node + 1]; k++) {
+        int at = k < tree->near_offset[node] ? node : tree->near[k];
+        if (tree->kind[at] == NODE_VESSEL && share_of_tube(tree, at, x) < LUMEN_POINT)
+            return true;
+    }
+    return false;
+}
+
+// Whether a sac's wall, seen from its centre, lies behind x: a vessel's guards reach far into a sac that stands on it.
+static bool is_between(Vec3 x, Vec3 wall)
+{
+    double along = vec3_dot(x, wall), x2 = vec3_norm2(x), wall2 = vec3_norm2(wall);
+    return along > 0 && wall2 > x2 && along * along > SAC_CONE * SAC_CONE * wall2 * x2;
+}
+
+// Whether x is clear by `clear` of every tube and of all data near the node.
+static bool is_clear(const VesselTree *tree, int node, Vec3 x, double clear)
+{
+    for (int k = tree->near_offset[node] - 1; k < tree->near_offset[node + 1]; k++) {
+        int at = k < tree->near_offset[node] ? node : tree->near[k];
+        double r = tree->radius[at], share = tree->kind[at] == NODE_VESSEL ? 1.1 : SAC_BALL;
+        if (share_of_tube(tree, at, x) * r < share * r + 0.5 * clear)
+            return false;
+        if (vec3_distance(x, tree->center[at]) > r + tree->height[at] + 2 * clear + 1.5 * r)
+            continue;
+        Vec3 out = vec3_sub(x, tree->center[at]);
+        for (int64_t i = tree->point_offset[at]; i < tree->point_offset[at + 1]; i++) {
+            if (vec3_norm2(vec3_sub(x, tree->point[i])) < clear * clear)
+                return false;
+            if (tree->kind[at] != NODE_VESSEL && is_between(out, vec3_sub(tree->point[i], tree->center[at])))
+                return false;
+        }
+    }
+    return true;
+}
+
+// The same near the node whose cell of the whole tree x lies in: just beyond a vessel's wall another's lumen may begin, a sibling's or that of the
+// vessel's own way back, which are not near in the tree but share blobs with it.
+static bool is_outside(const Job *job, int node, Vec3 x, double clear)
+{
+    if (!is_clear(job->tree, node, x, clear))
+        return false;
+    int cell = power_blocks_nearest(&job->blocks, x);
+    return cell == node || is_clear(job->tree, cell, x, clear);
+}
+
+static Vec3 axis_point(const VesselTree *tree, int node, Vec3 p)
+{
+    Vec3 c = tree->center[node], d = tree->direction[node];
+    double along = tree->kind[node] == NODE_VESSEL ? vec3_dot(vec3_sub(p, c), d) : 0, most = 0.5 * tree->height[node];
+    return vec3_add_scaled(c, fmax(-most, fmin(most, along)), d);
+}
+
+// The bound of a place at `clear` mm from the wall in a vessel of radius r.
+static double low_bound(double clear, double r) { return 0.5 * fmin(1, 2 * clear / r); }
+
+static void guard_around_point(const Job *job, int node, Vec3 p, Draft *d)
+{
+    const VesselTree *tree = job->tree;
+    Vec3 axis = axis_point(tree, node, p), out = vec3_sub(p, axis);
+    double r = tree->radius[node], far = vec3_norm(out);
+    if (!(far > 0.2 * r))
+        return;
+    out = vec3_scale(out, 1 / far);
+    for (int k = 1; k <= 2; k++) {
+        double in = far * k / 3;
+        add_guard(d, vec3_add_scaled(p, -in, out), low_bound(0.5 * in, r), MOST_INSIDE);
+    }
+    for (int k = 0; k < 3; k++) {
+        static const double away[3] = {0.35, 0.8, 1.4};
+        Vec3 x = vec3_add_scaled(p, away[k] * r, out);
+        if (is_outside(job, node, x, 0.3 * r))
+            add_guard(d, x, -HUGE_VAL, -OUTSIDE * fmin(1, away[k]));
+    }
+}
+
+static void guard_ring(const Job *job, int node, Draft *d)
+{
+    const VesselTree *tree = job->tree;
+    Vec3 c = tree->center[node], axis = tree->direction[node], e1 = vec3_normal_to(axis), e2 = vec3_cross(axis, e1);
+    double r = tree->radius[node];
+    for (int k = 0; k < RING; k++) {
+        double angle = 2 * PI * k / RING;
+        Vec3 out = vec3_add(vec3_scale(e1, same_cos(angle)), vec3_scale(e2, same_sin(angle)));
+        for (int far = 0; far < 2; far++) {
+            Vec3 x = vec3_add_scaled(c, (1.6 + 0.6 * far) * r, out);
+            if (is_outside(job, node, x, 0.4 * r))
+                add_guard(d, x, -HUGE_VAL, -0.8 * OUTSIDE);
+        }
+    }
+}
+
+static void guard_axis(const VesselTree *tree, int node, Draft *d)
+{
+    int parent = tree->parent[node];
+    double r = tree->radius[node];
+    add_guard(d, tree->center[node], low_bound(0.5 * r, r), MOST_INSIDE);
+    if (!field_link_is_lumen(tree, node))
+        return;
+    Vec3 a = tree->center[parent], b = tree->center[node], axis = vec3_unit_or(vec3_sub(b, a), tree->direction[node]);
+    Vec3 e1 = vec3_normal_to(axis), e2 = vec3_cross(axis, e1);
+    int steps = vec3_distance(a, b) > 0.3 * r ? LINK_GUARDS : 1;
+    for (int k = 0; k < steps; k++) {
+        double t = (k + 0.5) / steps, free = fmin(r, tree->radius[parent]);
+        Vec3 x = vec3_mix(a, b, t);
+        add_guard(d, x, low_bound(0.5 * free, free), MOST_INSIDE);
+        for (int around = 0; around < 4; around++) {
+            Vec3 side = around < 2 ? e1 : e2;
+            add_guard(d, vec3_add_scaled(x, (around % 2 ? 0.4 : -0.4) * free, side), low_bound(0.3 * free, free), MOST_INSIDE);
+        }
+    }
+}
+
+// The root's own points again, upstream by their extent along the axis.
+static void extend_inlet(const VesselTree *tree, Draft *d)
+{
+    Vec3 root = tree->center[0], up = vec3_negate(tree->direction[0]);
+    double r = tree->radius[0], least = HUGE_VAL, most = -HUGE_VAL;
+    int own = d->data, slab_points = 0;
+    for (int i = 0; i < own; i++) {
+        double t = vec3_dot(vec3_sub(d->point[i], root), up);
+        least = fmin(least, t), most = fmax(most, t);
+    }
+    double slab = fmin(most - least, 0.4 * r);
+    if (own < 12 || most - least < 0.2 * r)
+        return;
+    for (int i = 0; i < own; i++)
+        slab_points += vec3_dot(vec3_sub(d->point[i], root), up) >= most - slab;
+    slab = slab_points < 12 ? most - least : slab;
+    for (int copy = 1; copy < 16 && most + (copy - 1) * slab < FIELD_INLET_RADII * r; copy++)
+        for (int i = 0; i < own; i++) {
+            Vec3 p = d->point[i];
+            double t = vec3_dot(vec3_sub(p, root), up);
+            if (t >= most - slab && t + copy * slab < FIELD_INLET_RADII * r)
+                add_point(d, vec3_add_scaled(p, copy * slab, up));
+        }
+    for (int k = 1; k <= 4; k++)
+        add_guard(d, vec3_add_scaled(root, 0.5 * k * r, up), low_bound(0.5 * r, r), MOST_INSIDE);
+}
+
+static void draft_node(void *context, long index)
+{
+    Job *job = context;
+    const VesselTree *tree = job->tree;
+    int node = (int)index, root_open = node == 0 && vessel_tree_root_is_open(tree);
+    Draft *d = &job->draft[node];
+    for (int64_t i = tree->point_offset[node]; i < tree->point_offset[node + 1]; i++) {
+        Vec3 p = tree->point[i];
+        if (is_in_lumen(tree, node, p))
+            job->dropped[node]++;
+        else
+            add_point(d, p);
+    }
+    for (int i = (node * 3) % GUARD_EVERY; i < d->data; i += GUARD_EVERY)
+        guard_around_point(job, node, d->point[i], d);
+    if (root_open)
+        extend_inlet(tree, d);
+    guard_axis(tree, node, d);
+    if (tree->kind[node] == NODE_VESSEL)
+        guard_ring(job, node, d);
+    if (d->failed)
+        return;
+    job->cell[node] = malloc(((size_t)(d->data + d->guards) + 1) * sizeof **job->cell);
+    if (!job->cell[node]) {
+        d->failed = true;
+        return;
+    }
+    for (int i = 0; i < d->data; i++)
+        job->cell[node][i] = power_walk(tree, d->point[i], node, 8);
+    for (int i = 0; i < d->guards; i++)
+        job->cell[node][d->data + i] = power_walk(tree, d->at[i], node, 8);
+}
+
+// --- Tiles ---
+
+typedef struct Row {
+    float x[3], low, high;
+    bool is_data;
+} Row;
+
+// Where a node's rows are halved: the middle of the longest axis, counted in rows.
+static int compare_rows(const void *a, const void *b, int axis)
+{
+    float x = ((const Row *)a)->x[axis], y = ((const Row *)b)->x[axis];
+    return (x > y) - (x < y);
+}
+static int by_x(const void *a, const void *b) { return compare_rows(a, b, 0); }
+static int by_y(const void *a, const void *b) { return compare_rows(a, b, 1); }
+static int by_z(const void *a, const void *b) { return compare_rows(a, b, 2); }
+
+static int padded(int count) { return (count + FIELD_LANES - 1) / FIELD_LANES * FIELD_LANES; }
+
+// Halves until a tile holds no more than it may; counts them, or with `tile` fills them, their numbers going to `memory`.
+static void split_rows(Row *row, int count, int node, RowTile **tile, float **memory, int *tiles, size_t *floats)
+{
+    int data = 0;
+    float low[3] = {HUGE_VALF, HUGE_VALF, HUGE_VALF}, high[3] = {-HUGE_VALF, -HUGE_VALF, -HUGE_VALF};
+    for (int i = 0; i < count; i++) {
+        data += row[i].is_data;
+        for (int k = 0; k < 3; k++)
+            low[k] = fminf(low[k], row[i].x[k]), high[k] = fmaxf(high[k], row[i].x[k]);
+    }
+    if (count == 0)
+        return;
+    if (data > FIELD_TILE || count - data > GUARD_TILE) {
+        int axis = high[1] - low[1] > high[0] - low[0] ? 1 : 0;
+        axis = high[2] - low[2] > high[axis] - low[axis] ? 2 : axis;
+        qsort(row, (size_t)count, sizeof *row, axis == 0 ? by_x : axis == 1 ? by_y : by_z);
+        split_rows(row, count / 2, node, tile, memory, tiles, floats);
+        split_rows(row + count / 2, count - count / 2, node, tile, memory, tiles, floats);
+        return;
+    }
+    int d = padded(data), g = padded(count - data);
+    *tiles += 1;
+    *floats += (size_t)(3 * (d + g) + d + 2 * g);
+    if (!tile)
+        return;
+    float *next = *memory;
+    RowTile *to = (*tile)++;
+    *to = (RowTile){.node = node, .data_padded = d, .guards_padded = g, .x = next, .y = next + d + g, .z = next + 2 * (d + g), .weight = next + 3 * (d + g)};
+    to->low = to->weight + d, to->high = to->low + g;
+    *memory = to->high + g;
+    for (int k = 0; k < 3; k++)
+        to->middle[k] = 0.5f * (low[k] + high[k]);
+    for (int i = 0; i < count; i++) {
+        int at = row[i].is_data ? to->data++ : d + to->guards++;
+        to->x[at] = row[i].x[0], to->y[at] = row[i].x[1], to->z[at] = row[i].x[2];
+        if (row[i].is_data)
+            to->weight[at] = 1;
+        else
+            to->low[at - d] = row[i].low, to->high[at - d] = row[i].high;
+        float dx = row[i].x[0] - to->middle[0], dy = row[i].x[1] - to->middle[1], dz = row[i].x[2] - to->middle[2];
+        to->radius = fmaxf(to->radius, sqrtf(dx * dx + dy * dy + dz * dz));
+    }
+}
+
+// All rows, those of a cell side by side: (M), first (N+1).
+static Row *collect_rows(const Job *job, int *first)
+{
+    const VesselTree *tree = job->tree;
+    int n = tree->node_count, total = 0;
+    for (int i = 0; i < n; i++) {
+        const Draft *d = &job->draft[i];
+        if (d->failed)
+            return NULL;
+        for (int k = 0; k < d->data + d->guards; k++)
+            first[job->cell[i][k] + 1]++;
+        total += d->data + d->guards;
+    }
+    Row *row = malloc(((size_t)total + 1) * sizeof *row);
+    int sum = 0;
+    for (int i = 0; i < n; i++) {   // first[i + 1] becomes where the next row of cell i goes, at last its end
+        int own = first[i + 1];
+        first[i + 1] = sum;
+        sum += own;
+    }
+    for (int i = 0; i < n && row; i++) {
+        const Draft *d = &job->draft[i];
+        for (int k = 0; k < d->data + d->guards; k++) {
+            bool is_data = k < d->data;
+            int cell = job->cell[i][k];
+            Vec3 x = vec3_sub(is_data ? d->point[k] : d->at[k - d->data], tree->center[cell]);
+            // in a cell wider than the vessel that the guard is of, its field rises more slowly
+            float scale = (float)fmin(1, tree->radius[i] / tree->radius[cell]), low = is_data ? 0 : d->bound[k - d->data][0], high = is_data ? 0 : d->bound[k - d->data][1];
+            row[first[cell + 1]++] = (Row){{(float)x.x, (float)x.y, (float)x.z}, low * scale, high < 0 ? high * scale : high, is_data};
+        }
+    }
+    return row;
+}
+
+static bool make_tiles(const Job *job)
+{
+    FieldRows *rows = job->rows;
+    int n = rows->node_count, *first = calloc((size_t)n + 1, sizeof *first);
+    Row *row = first ? collect_rows(job, first) : NULL;
+    size_t floats = 0;
+    int tiles = 0;
+    for (int i = 0; i < n && row; i++) {
+        rows->first[i] = tiles;
+        split_rows(row + first[i], first[i + 1] - first[i], i, NULL, NULL, &tiles, &floats);
+    }
+    rows->first[n] = tiles;
+    rows->tile = calloc((size_t)tiles + 1, sizeof *rows->tile);
+    rows->memory = aligned_alloc(64, (floats + FIELD_LANES) / FIELD_LANES * 64);
+    bool good = row && rows->tile && rows->memory;
+    if (good) {
+        memset(rows->memory, 0, floats * sizeof(float));
+        RowTile *tile = rows->tile;
+        float *memory = rows->memory;
+        for (int i = 0; i < n; i++)
+            split_rows(row + first[i], first[i + 1] - first[i], i, &tile, &memory, &tiles, &floats);
+    }
+    free(first);
+    free(row);
+    return good;
+}
+
+bool field_rows_create(FieldRows *rows, const VesselTree *tree, int threads)
+{
+    size_t n = (size_t)tree->node_count;
+    *rows = (FieldRows){.node_count = tree->node_count, .first = calloc(n + 1, sizeof *rows->first)};
+    Job job = {.tree = tree, .draft = calloc(n, sizeof *job.draft), .cell = calloc(n, sizeof *job.cell), .rows = rows, .dropped = calloc(n, sizeof *job.dropped)};
+    bool good = power_blocks_create(&job.blocks, tree) && rows->first && job.draft && job.cell && job.dropped;
+    if (good) {
+        parallel_for(threads, tree->node_count, draft_node, &job, NULL);
+        good = make_tiles(&job);
+    }
+    for (int i = 0; i < tree->node_count && job.draft && job.cell && job.dropped; i++) {
+        rows->dropped += job.dropped[i];
+        free(job.draft[i].point);
+        free(job.draft[i].at);
+        free(job.draft[i].bound);
+        free(job.cell[i]);
+    }
+    free(job.draft);
+    free(job.cell);
+    free(job.dropped);
+    power_blocks_free(&job.blocks);
+    if (!good)
+        field_rows_free(rows);
+    return good;
+}
+
+void field_rows_free(FieldRows *rows)
+{
+    free(rows->first);
+    free(rows->tile);
+    free(rows->memory);
+    *rows = (FieldRows){0};
+}

@@ -1,0 +1,18 @@
+// What `info` and `fit` say of where a tool gets to from the inlet (geom/reach.h), as text and as JSON.
+#ifndef SELDINGER_RECON_FIT_REACH_REPORT_H
+#define SELDINGER_RECON_FIT_REACH_REPORT_H
+
+#include "geom/reach.h"
+
+#include <cJSON.h>
+#include <stdio.h>
+
+// A tree without a model has no such report: nothing is printed or added, and that is no fault. False with a fault where there is no memory.
+// `json` may be NULL, `out` too. `tool_radius` [mm].
+bool reach_report(const VesselTree *tree, const char *file, double tool_radius, FILE *out, cJSON *json, Faults *faults);
+
+void reach_print(FILE *out, const VesselTree *tree, const Reach *reach);
+// Adds an object "reach".
+void reach_add_json(cJSON *object, const VesselTree *tree, const Reach *reach);
+
+#endif

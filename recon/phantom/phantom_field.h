@@ -1,0 +1,24 @@
+// The field of a synthetic shape (phantom.h): where its surface is. Lengths mm.
+#ifndef SELDINGER_RECON_PHANTOM_PHANTOM_FIELD_H
+#define SELDINGER_RECON_PHANTOM_PHANTOM_FIELD_H
+
+#include "geom/linear.h"
+
+#include <stdbool.h>
+
+typedef struct Shape Shape;
+
+// The field whose zero is the surface: > 0 inside, gradient of length <= 1, the distance itself away from joints.
+double shape_field(const Shape *shape, Vec3 x, Vec3 *gradient);
+// The same with open ends cut off flat: the field of the closed body that is meshed.
+double shape_field_cut(const Shape *shape, Vec3 x);
+// Signed distance to the true surface [mm], > 0 inside; `foot` (may be NULL) is the closest surface point. Near the medial axis the
+// local one that projection finds, never less than the field.
+double shape_distance(const Shape *shape, Vec3 x, Vec3 *foot);
+// Whether x lies beyond an open end (open-capsule, arc, bifurcation, spiral, phantom and aorta are open at the inlet; open-capsule at both
+// ends): the surface there is no truth, the tube goes on.
+bool shape_beyond_open_end(const Shape *shape, Vec3 x);
+// Axis-aligned box around the surface.
+void shape_bounds(const Shape *shape, Vec3 *low, Vec3 *high);
+
+#endif

@@ -1,0 +1,90 @@
+// The parts that a synthetic shape is made of (phantom.h says what a shape is). Inside recon only.
+//
+// A part is the union of spheres of radius r(t) along a curve C(t), both cubic splines of arc length (chord length at the knots), straight beyond
+// open ends:
+//   f_part(X) = max_t r(t) - |X - C(t)|      exact signed distance of the swept surface (outside everywhere, inside up to the medial axis)
+#ifndef SELDINGER_RECON_PHANTOM_PHANTOM_PARTS_H
+#define SELDINGER_RECON_PHANTOM_PHANTOM_PARTS_H
+
+#include "geom/random.h"
+#include "geom/vessel_tree.h"
+#include "recon/phantom/phantom_block.h"
+
+#include <stdint.h>
+
+enum { KNOTS = 128 };
+
+typedef struct Spline {      // one coordinate: value and second derivative at each knot
+    double value[KNOTS], bend[KNOTS];
+} Spline;
+
+typedef struct Part {
+    int knot_count;
+    double at[KNOTS];        // knot parameter [mm of chord]
+    Spline coordinate[4];    // x, y, z, r
+    bool open_start, open_end;   // straight on beyond, instead of a cap
+    double low, high;        // parameter range with the straight pieces
+    int parent;              // part it grows from, or -1
+    uint8_t kind;            // of its nodes
+    int sample_count;        // coarse samples to start the search from …
+    Vec3 *sample;
+    double *sample_radius, *sample_at;
+    int block_count;         // … and spheres around each eight of them
+    Vec3 *block_center;
+    int *block_sample;       // the middle one, its radius and parameter
+    double *block_radius, *block_at;
+    double *block_reach;     // largest |C - center| + r in the block: f <= reach - |X - center|
+} Part;
+
+typedef struct Cell {        // of the octree over the shape: the parts that can matter anywhere in it
+    int child;               // first of eight in a row, or -1
+    int first, count;        // of its parts in `cell_part`
+} Cell;
+
+typedef struct Shape Shape;
+struct Shape {
+    char name[32];
+    int part_count, part_capacity;
+    Part *part;
+    double widest_joint;
+    double blend;            // 0: 0.6 times the child's first radius
+    int points, sac_points;
+    double noise, spacing;
+    uint64_t seed;
+    Shape *neighbour;        // vessels that are seen in the volume and are no part of the truth, or NULL
+    int block_count;         // and bone
+    ShapeBlock *block;
+
+    Vec3 cell_low;           // octree: a cube of edge `cell_edge` from there
+    double cell_edge;
+    int cell_count, cell_capacity, cell_part_count, cell_part_capacity;
+    Cell *cell;
+    int *cell_part;
+};
+
+typedef struct Station {     // of a part at parameter t
+    Vec3 center, tangent;    // tangent is dC/dt, nearly unit
+    double radius, taper;    // taper is dr/dt; radius is constant beyond open ends
+} Station;
+
+Station part_at(const Part *part, double t);
+// Through `count` <= KNOTS knots (x, y, z, r). `end_slope`: tangents (dx, dy, dz, dr per mm) at both ends, or NULL: natural. False where memory lacks.
+bool part_build(Part *part, const double (*knot)[4], int count, bool open_start, bool open_end, int parent, uint8_t kind,
+                const double (*end_slope)[4]);
+void part_free(Part *part);
+// The same part made larger or smaller about the origin.
+bool part_scale(Part *part, double scale);
+// f_part, its gradient and the parameter of the sphere that makes it. `enough`: parts whose f is below it may answer any lower bound.
+// `cut`: without the straight pieces beyond open ends.
+double part_field(const Part *part, Vec3 x, double enough, bool cut, Vec3 *gradient, double *at);
+
+// Appends a part; false where memory lacks.
+bool shape_add(Shape *shape, const double (*knot)[4], int count, bool open_start, bool open_end, int parent, uint8_t kind, const double (*end_slope)[4]);
+// The parts of the shape `aorta`.
+bool aorta_grow(Shape *shape);
+// After the last part: joints and octree. False where memory lacks.
+bool shape_finish(Shape *shape);
+// shape_field, and which part is the largest there and where on it.
+double shape_field_of_part(const Shape *shape, Vec3 x, int *part, double *at);
+
+#endif

@@ -1,0 +1,14 @@
+// Centrelines of a tree for other programs. False: out of memory.
+#ifndef SELDINGER_RECON_SURFACE_CENTRELINE_WRITE_H
+#define SELDINGER_RECON_SURFACE_CENTRELINE_WRITE_H
+
+#include "geom/vessel_tree.h"
+
+#include <stdio.h>
+
+bool centreline_print_vtp(FILE *out, const VesselTree *tree);
+bool centreline_print_swc(FILE *out, const VesselTree *tree);
+// Markups of 3D Slicer, a curve a branch; `frame`: "RAS" or "LPS".
+bool centreline_print_markups(FILE *out, const VesselTree *tree, const char *frame);
+
+#endif

@@ -1,0 +1,21 @@
+// From a surface and centrelines to the tree that `fit` takes: the part of RBT (Kerrien 2017, section 3) for vessels that somebody segmented.
+//
+// Curves are set in the mesh's frame, joined to one tree (curves may overlap, or begin on another; a loop is cut where it closes), and resampled to
+// nodes; flat lids over the ends of a closed surface are taken off, so that inlets and outlets are open; the surface is sampled evenly for each
+// local radius, and each point goes to the node that is nearest by power distance among those that see it. Lengths mm.
+#ifndef SELDINGER_RECON_SURFACE_IMPORT_SURFACE_H
+#define SELDINGER_RECON_SURFACE_IMPORT_SURFACE_H
+
+#include "geom/vessel_tree.h"
+#include "recon/surface/centreline_file.h"
+#include "recon/surface/import_curves.h"
+#include "recon/surface/import_report.h"
+#include "recon/surface/mesh_check.h"
+
+ImportOptions import_default_options(void);
+
+// NULL with faults. `name` stands in messages.
+VesselTree *import_surface(const SurfaceMesh *mesh, const CurveSet *set, const ImportOptions *options, ImportReport *report, const char *name,
+                           Faults *faults);
+
+#endif

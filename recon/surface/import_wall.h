@@ -1,0 +1,27 @@
+// Internal to import: the wall, a surface with the flat lids over its vessels' ends taken off.
+#ifndef SELDINGER_RECON_SURFACE_IMPORT_WALL_H
+#define SELDINGER_RECON_SURFACE_IMPORT_WALL_H
+
+#include "recon/surface/centreline_file.h"
+#include "recon/surface/mesh_check.h"
+#include "recon/surface/mesh_tree.h"
+
+typedef struct Opening {     // a loop of open edges of the wall
+    Vec3 center, normal;     // normal: unit, out of the vessel
+    double radius;           // [mm] of the circle of the same area
+} Opening;
+
+typedef struct Wall {        // the surface without lids
+    SurfaceMesh mesh;
+    MeshTree *tree;
+    Opening *opening;
+    int opening_count, lid_count;
+} Wall;
+
+// Takes flat lids off where a curve's end points at one. False where memory lacks.
+bool wall_open(const SurfaceMesh *mesh, const CurveSet *set, Wall *wall);
+void wall_close(Wall *wall);
+// The opening at which a vessel of that radius ends that runs to `end` along `outward`; -1 where there is none.
+int wall_opening_near(const Wall *wall, Vec3 end, Vec3 outward, double radius);
+
+#endif

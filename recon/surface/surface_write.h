@@ -1,0 +1,19 @@
+// Surfaces as text or bytes for other programs: STL, PLY, OBJ, VTP.
+#ifndef SELDINGER_RECON_SURFACE_SURFACE_WRITE_H
+#define SELDINGER_RECON_SURFACE_SURFACE_WRITE_H
+
+#include "geom/isosurface.h"
+
+#include <stdio.h>
+
+typedef struct SurfaceFigures {
+    TriangleMesh *mesh;
+    double *error, *distance;   // (V) [mm], both NULL where the tree has no points
+} SurfaceFigures;
+
+void surface_print_stl(FILE *out, const SurfaceFigures *surface);
+void surface_print_ply(FILE *out, const SurfaceFigures *surface);
+void surface_print_obj(FILE *out, const SurfaceFigures *surface);
+void surface_print_vtp(FILE *out, const SurfaceFigures *surface);
+
+#endif

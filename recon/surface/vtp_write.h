@@ -1,0 +1,17 @@
+// VTP as text: XML with the numbers as text, which every reader takes. Sections of a file in the order in which they are called.
+#ifndef SELDINGER_RECON_SURFACE_VTP_WRITE_H
+#define SELDINGER_RECON_SURFACE_VTP_WRITE_H
+
+#include "geom/linear.h"
+
+#include <stdio.h>
+
+void vtp_begin(FILE *out, int points, int lines, int polygons);
+void vtp_array(FILE *out, const char *type, const char *name, int components);   // the caller prints the numbers
+void vtp_array_end(FILE *out);
+void vtp_numbers(FILE *out, const char *name, const double *value, int count);
+void vtp_vectors(FILE *out, const char *name, const Vec3 *value, int count);
+void vtp_points(FILE *out, const Vec3 *value, int count);
+void vtp_end(FILE *out);
+
+#endif

@@ -1,0 +1,31 @@
+// Candidate points on a vessel's surface: rays from a centre, each giving the place where the image falls most steeply along it.
+// Kerrien et al. 2017, 3.1.1 and 3.2. Nothing here keeps state; the caller owns the arrays.
+#ifndef SELDINGER_RECON_TRACK_CAST_RAYS_H
+#define SELDINGER_RECON_TRACK_CAST_RAYS_H
+
+#include "recon/volume/volume.h"
+
+enum { MAX_RAY_SAMPLES = 1024 };
+
+typedef struct RayOptions {
+    double length;           // [mm] of a ray
+    int samples;             // along it, 8 … MAX_RAY_SAMPLES
+    double smoothing;        // [mm] width of the moving average along the ray; 0: none
+    double edge;             // least fall per voxel, as a share of the brightness range around the centre; 0 keeps every ray
+} RayOptions;
+
+// The vertices of an icosahedron whose edges were halved `level` times: 12, 42, 162, 642, 2562 unit vectors (level 0 … 4). `out` holds as many.
+int sphere_direction_count(int level);
+void sphere_directions(int level, Vec3 *out);
+// The level that has `count` vertices, or -1.
+int sphere_level_of(int count);
+
+// The steepest fall along each ray, to a fraction of a sample. Writes the points of the rays that have an edge, in the order of the rays;
+// returns their number.
+int cast_rays(const Volume *volume, Vec3 center, const Vec3 *direction, int count, const RayOptions *options, Vec3 *point);
+// The first fall through a brightness, moved to the steepest place within a voxel: distance[i] [mm], 0 where ray i has none.
+void cast_rays_level_edge(const Volume *volume, Vec3 center, const Vec3 *direction, int count, const RayOptions *options, double level, double *distance);
+// The same with the level half way between the centre's brightness and the volume's minimum: for sacs, whose rays may go on into other vessels.
+void cast_rays_first_edge(const Volume *volume, Vec3 center, const Vec3 *direction, int count, const RayOptions *options, double *distance);
+
+#endif

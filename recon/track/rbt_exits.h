@@ -1,0 +1,25 @@
+// Where a vessel goes on beyond a place that is no cylinder: a sac, a wide bifurcation. Not in Kerrien et al. 2017; the tracking asks here when a branch
+// ends or swells.
+#ifndef SELDINGER_RECON_TRACK_RBT_EXITS_H
+#define SELDINGER_RECON_TRACK_RBT_EXITS_H
+
+#include "recon/volume/volume.h"
+
+enum { RBT_EXIT_PLACES = 6 };
+typedef struct RbtExit {
+    int count;               // places down the tube, from where it leaves the wide part
+    Vec3 center[RBT_EXIT_PLACES], direction[RBT_EXIT_PLACES];
+    double radius;           // [mm] from the area of its cross-section
+} RbtExit;
+
+typedef struct RbtBlock {    // a ball of the way that was tracked already: not entered (near the start: not behind it)
+    Vec3 center;
+    double radius;
+} RbtBlock;
+
+// Tubes that leave the lumen (brighter than `level`) around `start` within the way `reach` [mm], widest first; returns their number, at most `capacity`.
+// `radius` is the vessel's at the start, `direction` its axis: the balls of `block` are closed.
+int rbt_find_exits(const Volume *volume, Vec3 start, Vec3 direction, double radius, double reach, double level, const RbtBlock *block, int block_count,
+                   RbtExit *out, int capacity);
+
+#endif

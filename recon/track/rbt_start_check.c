@@ -1,0 +1,341 @@
+// Limits: a click lies within one radius of the axis of the vessel that it names, at most within two; half of the edge points lie on the cylinder; the vessel is
+// narrower than the volume; inside and outside differ by five standard errors (fewer turn up among all tubes that can be laid through pure noise: see test_starts).
+#include "recon/track/rbt_start_check.h"
+
+#include "base/same_math.h"
+#include "base/sort_doubles.h"
+#include "recon/track/rbt_scan.h"
+#include "recon/track/rbt_start.h"
+#include "recon/volume/volume_noise.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static const double least_certainty = 5, least_inliers = 0.5, least_contrast = 4, certain_contrast = 8, least_evenness = 0.5, least_length = 6;
+enum { NOISE_LAG = 3 };      // voxels: neighbours may share their noise
+
+static void doubt(RbtStartCheck *check, RbtDoubt kind, double measured, double limit, const char *text)
+{
+    if (check->warning_count == RBT_MAX_WARNINGS)
+        return;
+    RbtWarning *w = &check->warning[check->warning_count++];
+    *w = (RbtWarning){.kind = kind, .measured = measured, .limit = limit};
+    snprintf(w->text, sizeof w->text, "%s", text);
+}
+
+static double least_extent(const Volume *volume)
+{
+    double least = HUGE_VAL;
+    for (int i = 0; i < 3; i++)
+        least = fmin(least, vec3_norm(volume->axis[i]) * volume->size[i]);
+    return least;
+}
+
+typedef struct Verdict {
+    RbtStartCheck check;
+    char refusal[300];       // empty: it is not refused
+} Verdict;
+
+// The place along the tube counts only beyond four radii: the cylinder may be looked for further along the vessel.
+static double drift_of(Vec3 click, const Cylinder *c)
+{
+    Vec3 q = vec3_sub(click, c->center);
+    double along = vec3_dot(q, c->axis), across = sqrt(fmax(0, vec3_norm2(q) - along * along));
+    return same_hypot(across, fmax(0, fabs(along) - 4 * c->radius));
+}
+
+// Of the copy that is tracked.
+static double level_noise(const Tracker *t, RbtLevels *levels)
+{
+    for (int i = RBT_LEVELS - 1; i > 0; i--)
+        if (levels->smooth[i] == t->volume)
+            return rbt_level_noise(levels, i);
+    return rbt_level_noise(levels, 0);
+}
+
+static Verdict judge(Tracker *t, RbtLevels *levels, Vec3 click, const Cylinder *c, double inlier_rate)
+{
+    Verdict v = {.check = {.click = click, .cylinder = *c, .drift = drift_of(click, c), .inlier_rate = inlier_rate, .noise = rbt_level_noise(levels, 0)}};
+    RbtSight sight = rbt_sight_of(levels->volume, v.check.noise, c);
+    double extent = least_extent(t->volume);
+    char text[240];
+    v.check.contrast = sight.contrast;
+    v.check.certainty = sight.certainty;
+    v.check.smoothing_mm = t->check.smoothing_mm;
+    if (v.check.drift > 2 * c->radius + t->voxel)
+        snprintf(v.refusal, sizeof v.refusal, "the vessel found there runs %.2f mm from the click at a radius of %.2f mm; a click within one radius of its axis",
+                 v.check.drift, c->radius);
+    else if (2 * c->radius > extent)
+        snprintf(v.refusal, sizeof v.refusal, "the radius found there, %.2f mm, is more than half of the volume's least extent of %.1f mm; a click in a vessel, or its radius_mm",
+                 c->radius, extent);
+    else if (v.check.noise > 0 && v.check.certainty < least_certainty)
+        snprintf(v.refusal, sizeof v.refusal,
+                 "noise hides the edge: the tube found there (radius %.2f mm) is %.3g grey values brighter than what is beside it at a noise of %.3g, %.1f standard "
+                 "errors; a place with at least %g, or a less noisy volume",
+                 c->radius, sight.contrast, v.check.noise, v.check.certainty, least_certainty);
+    else if (t->is_noisy && sight.contrast < least_contrast * level_noise(t, levels))
+        snprintf(v.refusal, sizeof v.refusal,
+                 "noise hides the edge: the tube found there (radius %.2f mm) is %.3g grey values brighter than what is beside it, the smoothed copy that suits it has a noise "
+                 "of %.3g; %g times that, or a less noisy volume",
+                 c->radius, sight.contrast, level_noise(t, levels), least_contrast);
+    if (v.check.drift > c->radius + 0.5 * t->voxel) {
+        snprintf(text, sizeof text, "the click lies %.2f mm from the axis of the vessel that was found, outside of its radius of %.2f mm", v.check.drift, c->radius);
+        doubt(&v.check, RBT_DRIFT, v.check.drift, c->radius, text);
+    }
+    if (inlier_rate < least_inliers) {
+        snprintf(text, sizeof text, "%.0f %% of the edge points at the start lie on its cylinder; a vessel has %.0f %% or more", 100 * inlier_rate, 100 * least_inliers);
+        doubt(&v.check, RBT_INLIERS, inlier_rate, least_inliers, text);
+    }
+    if (4 * c->radius > extent && 2 * c->radius <= extent) {
+        snprintf(text, sizeof text, "the radius found at the start, %.2f mm, is more than a quarter of the volume's least extent of %.1f mm", c->radius, extent);
+        doubt(&v.check, RBT_RADIUS, c->radius, extent / 4, text);
+    }
+    if (sight.evenness < least_evenness) {
+        snprintf(text, sizeof text, "what was found at the start is bright on both sides too (its wall shows %.0f %% of its contrast there): a band or a sheet, or vessels that touch",
+                 100 * fmax(0, sight.evenness));
+        doubt(&v.check, RBT_SHAPE, sight.evenness, least_evenness, text);
+    }
+    return v;
+}
+
+static void refuse(Tracker *t, const Verdict *v)
+{
+    t->check = v->check;
+    memcpy(t->refusal, v->refusal, sizeof t->refusal);
+}
+
+static int scan_at(Tracker *t, RbtLevels *levels, const RbtSeed *seed, Cylinder *out)
+{
+    Vec3 axis = seed->has_toward ? vec3_unit_or(vec3_sub(seed->toward, seed->start), vec3(0, 0, 1)) : vec3(0, 0, 1);
+    return rbt_scan(t, levels, seed->start, seed->radius, seed->has_toward ? &axis : NULL, out);
+}
+
+bool rbt_look_at_noise(Tracker *t, RbtLevels *levels, const RbtSeed *first)
+{
+    double noise = rbt_level_noise(levels, 0);
+    t->check.noise = noise;
+    if (!(noise > 0) || tracker_brightness(t, first->start) - t->background > certain_contrast * noise)
+        return true;
+    t->scan_count = scan_at(t, levels, first, t->scan);
+    if (t->out_of_memory)
+        return false;
+    RbtSight best = {0, 0, 0};
+    double radius = 0;
+    for (int i = 0; i < t->scan_count; i++) {
+        RbtSight sight = rbt_sight_of(levels->volume, noise, &t->scan[i]);
+        if (sight.certainty >= least_certainty && sight.evenness * sight.contrast >= least_contrast * noise)
+            return true;
+        if (sight.certainty > best.certainty) {
+            best = sight;
+            radius = t->scan[i].radius;
+        }
+    }
+    if (best.certainty < least_certainty && tracker_brightness(t, first->start) < t->dark)
+        return true;   // background: said where all starts are looked at
+    t->is_noisy = true;
+    if (best.certainty < least_certainty) {
+        snprintf(t->refusal, sizeof t->refusal,
+                 "noise hides the edge: of all tubes around it the one that stands out most (radius %.2f mm) is %.3g grey values brighter than what is beside it at a "
+                 "noise of %.3g, %.1f standard errors; a place with at least %g, or a less noisy volume",
+                 radius, best.contrast, noise, best.certainty, least_certainty);
+        return false;
+    }
+    return true;
+}
+
+// What is tracked from now on: the copy that suits this tube.
+static bool take_level(Tracker *t, RbtLevels *levels, const Cylinder *tube)
+{
+    int level = t->is_noisy ? rbt_level_for(levels, tube) : 0;
+    const Volume *volume = rbt_level(levels, level);
+    t->out_of_memory = !volume;
+    t->volume = volume ? volume : levels->volume;
+    t->check.smoothing_mm = rbt_level_voxels[level] * t->voxel;
+    return volume != NULL;
+}
+
+bool rbt_stands_out(Tracker *t, RbtLevels *levels, const RbtSeed *seed)
+{
+    Cylinder tubes[RBT_SCANS];
+    double noise = rbt_level_noise(levels, 0);
+    if (scan_at(t, levels, seed, tubes) == 0)
+        return false;
+    Cylinder tube = tubes[0];
+    RbtSight sight = rbt_sight_of(levels->volume, noise, &tube);
+    double beside = tracker_brightness(t, tube.center) - sight.contrast;
+    bool is_inside = tracker_brightness(t, seed->start) > beside + 0.4 * sight.contrast;
+    return sight.certainty >= least_certainty && (t->is_noisy || (is_inside && sight.contrast > 0.02 * ((double)t->volume->maximum - (double)t->volume->minimum)));
+}
+
+// Noise is no reason to refuse what is doubtful anyhow, but it is worth a word.
+static void say_noise(Tracker *t)
+{
+    char text[240];
+    RbtStartCheck *check = &t->check;
+    if (!t->is_noisy || !(check->noise > 0))
+        return;
+    snprintf(text, sizeof text, "at the start the contrast is %.3g at a noise of %.3g grey values a voxel (%.0f standard errors): a copy smoothed by %.2f mm was tracked, "
+             "thin branches are lost",
+             check->contrast, check->noise, check->certainty, check->smoothing_mm);
+    doubt(check, RBT_NOISE, check->contrast / check->noise, least_contrast, text);
+}
+
+// Is there a tube around the click that stands out much more than the one that was found, or much thinner within it? What was found is then, for example, a
+// band that the vessel lies in: inside of a wide vessel hardly anything
+// stands out.
+static bool is_outdone(Tracker *t, RbtLevels *levels, const RbtSeed *seed, RbtStartCheck *check)
+{
+    char text[240];
+    RbtSight own = rbt_sight_of(levels->volume, check->noise, &check->cylinder);
+    // the search takes a while: not where the click lies in the middle of a good cylinder
+    bool is_good = check->drift < 0.6 * check->cylinder.radius && check->inlier_rate > 0.6 && own.evenness > 0.6;
+    if (!(check->noise > 0) || (t->scan_count < 0 && is_good))
+        return false;
+    if (t->scan_count < 0)
+        t->scan_count = scan_at(t, levels, seed, t->scan);
+    for (int i = 0; i < t->scan_count; i++) {
+        RbtSight sight = rbt_sight_of(levels->volume, check->noise, &t->scan[i]);
+        bool is_thin = t->scan[i].radius < 0.5 * check->cylinder.radius;
+        double share = is_thin && check->drift > 0.6 * check->cylinder.radius ? 0.2 : is_thin ? 0.5 : 1.5;
+        if (sight.certainty < certain_contrast || sight.evenness * sight.contrast < share * own.evenness * own.contrast)
+            continue;
+        snprintf(text, sizeof text, "a tube of radius %.2f mm stands out at the click, other than the one of %.2f mm that was found (%.3g and %.3g grey values)",
+                 t->scan[i].radius, check->cylinder.radius, sight.evenness * sight.contrast, own.evenness * own.contrast);
+        doubt(check, RBT_RADIUS, check->cylinder.radius, t->scan[i].radius, text);
+        return true;
+    }
+    return false;
+}
+
+bool rbt_first_start(Tracker *t, RbtLevels *levels, const RbtSeed *seed, Cylinder *out)
+{
+    Verdict best;
+    Cylinder c;
+    double rate;
+    bool found = false;
+    if (!t->is_noisy && rbt_estimate_start(t, seed, &c, &rate)) {
+        best = judge(t, levels, seed->start, &c, rate);
+        *out = c;
+        found = true;
+    }
+    if (t->out_of_memory)
+        return false;
+    bool is_clean = found && !best.refusal[0] && best.check.warning_count == 0 && !is_outdone(t, levels, seed, &best.check);
+    const Cylinder *suited = NULL;
+    if (!is_clean && t->scan_count < 0)
+        t->scan_count = scan_at(t, levels, seed, t->scan);
+    for (int i = 0; !is_clean && i < t->scan_count; i++) {
+        if (!take_level(t, levels, &t->scan[i]))
+            return false;
+        double beside = tracker_brightness(t, t->scan[i].center) - 0.5 * rbt_sight_of(t->volume, 0, &t->scan[i]).contrast;
+        if (!rbt_refine_start(t, &t->scan[i], seed->radius > 0, beside, &c, &rate))
+            continue;
+        Verdict other = judge(t, levels, seed->start, &c, rate);
+        if (!found || (best.refusal[0] && !other.refusal[0]) ||
+            (!best.refusal[0] == !other.refusal[0] && other.check.warning_count < best.check.warning_count)) {
+            best = other;
+            *out = c;
+            suited = &t->scan[i];
+        }
+        found = true;
+        is_clean = !best.refusal[0] && best.check.warning_count == 0;
+    }
+    if (!found) {
+        t->why = "no tube around it";
+        return false;
+    }
+    if (suited && !take_level(t, levels, suited))
+        return false;
+    refuse(t, &best);
+    say_noise(t);
+    return !t->refusal[0];
+}
+
+bool rbt_suit_given(Tracker *t, RbtLevels *levels, const Cylinder *given) { return take_level(t, levels, given); }
+
+bool rbt_check_given(Tracker *t, RbtLevels *levels, const RbtSeed *seed, const TrackNode *first)
+{
+    Verdict v = judge(t, levels, seed->start, &first->cylinder, first->inlier_rate);
+    refuse(t, &v);
+    say_noise(t);
+    return !t->refusal[0];
+}
+
+// A bright band or bone across the first branch: what is found from it is compared with its brightness, and lost where that does not hold.
+static void judge_background(Tracker *t, int count)
+{
+    enum { MOST = 512 };
+    double beside[MOST], contrast[MOST];
+    char text[240];
+    int n = 0, stride = count / MOST + 1;
+    for (int i = 0; i < count && n < MOST; i += stride) {
+        contrast[n] = t->tree.node[i].contrast;
+        beside[n++] = tracker_brightness(t, t->tree.node[i].cylinder.center) - t->tree.node[i].contrast;
+    }
+    sort_doubles(beside, (size_t)n);
+    sort_doubles(contrast, (size_t)n);
+    double low = beside[n / 10], high = beside[n - 1 - n / 10];
+    if (high - low <= contrast[n / 2])
+        return;
+    snprintf(text, sizeof text, "beside the first branch the volume changes from %.3g to %.3g grey values, by more than its contrast of %.3g (a bright band?): it may end early there, and branches may be lost",
+             low, high, contrast[n / 2]);
+    doubt(&t->check, RBT_BACKGROUND, high - low, contrast[n / 2], text);
+}
+
+// It ends before something much brighter than itself, such as the face of a band that it may go on in.
+static void judge_ends(Tracker *t, int count)
+{
+    char text[240];
+    for (int end = 0; end < 2 && count > 3; end++) {
+        const TrackNode *n = &t->tree.node[end ? count - 1 : 0], *before = &t->tree.node[end ? count - 4 : 3];
+        Vec3 ahead = vec3_unit_or(vec3_sub(n->cylinder.center, before->cylinder.center), n->cylinder.axis), c = n->cylinder.center;
+        double brighter = 0;
+        for (int k = 2; k <= 5; k++) {
+            Vec3 x = vec3_add_scaled(c, k * n->cylinder.radius, ahead);
+            if (tracker_is_inside(t->volume, x))
+                brighter = fmax(brighter, tracker_brightness(t, x) - tracker_brightness(t, before->cylinder.center));
+        }
+        if (brighter <= 1.5 * before->contrast + 4 * level_noise(t, t->levels))
+            continue;
+        snprintf(text, sizeof text, "the first branch ends at (%.1f, %.1f, %.1f) mm before what is %.3g grey values brighter than itself, its contrast being %.3g (a bright band?): it may go on there",
+                 c.x, c.y, c.z, brighter, before->contrast);
+        doubt(&t->check, RBT_BACKGROUND, brighter, 1.5 * before->contrast, text);
+    }
+}
+
+void rbt_judge_branch(Tracker *t, RbtLevels *levels, int count)
+{
+    enum { ROOT = 3 };
+    double sum = 0, root = 0, length = 0;
+    int faint = 0;
+    char text[240];
+    const Track *tree = &t->tree;
+    for (int i = 0; i < count; i++) {
+        const TrackNode *n = &tree->node[i];
+        sum += n->inlier_rate;
+        root += i < ROOT ? n->inlier_rate : 0;
+        length += i > 0 ? vec3_distance(n->cylinder.center, tree->node[i - 1].cylinder.center) : 0;
+        faint += t->check.noise > 0 && rbt_sight_of(levels->volume, t->check.noise, &n->cylinder).certainty < RBT_NODE_CERTAINTY;
+    }
+    if (count == 0)
+        return;
+    if (sum < least_inliers * count) {
+        snprintf(text, sizeof text, "over the first branch %.0f %% of the edge points lie on its cylinders; a vessel has %.0f %% or more", 100 * sum / count, 100 * least_inliers);
+        doubt(&t->check, RBT_INLIERS, sum / count, least_inliers, text);
+    } else if (root < least_inliers * (count < ROOT ? count : ROOT)) {
+        snprintf(text, sizeof text, "at the root %.0f %% of the edge points lie on its cylinders; a vessel has %.0f %% or more", 100 * root / (count < ROOT ? count : ROOT),
+                 100 * least_inliers);
+        doubt(&t->check, RBT_INLIERS, root / (count < ROOT ? count : ROOT), least_inliers, text);
+    }
+    judge_background(t, count);
+    judge_ends(t, count);
+    double radius = tree->node[count / 2].cylinder.radius;
+    if (length < least_length * radius) {
+        snprintf(text, sizeof text, "the first branch is %.1f mm long, %.1f of its radii; a vessel is %g or more", length, length / radius, least_length);
+        doubt(&t->check, RBT_LENGTH, length / radius, least_length, text);
+    }
+    if (faint > 0.2 * count) {
+        snprintf(text, sizeof text, "%.0f %% of the first branch does not stand out of the noise by %g standard errors", 100.0 * faint / count, RBT_NODE_CERTAINTY);
+        doubt(&t->check, RBT_NOISE, (double)faint / count, 0.2, text);
+    }
+}

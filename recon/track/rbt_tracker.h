@@ -1,0 +1,94 @@
+// Internal to recon: the state of one tracking, and what all its steps ask of it.
+// A tracker belongs to one thread; several may read one tree (`tree` is then a shallow copy and nothing is appended to it).
+#ifndef SELDINGER_RECON_TRACK_RBT_TRACKER_H
+#define SELDINGER_RECON_TRACK_RBT_TRACKER_H
+
+#include "geom/vessel_tree.h"
+#include "recon/track/ransac_cylinder.h"
+#include "recon/track/rbt_parameters.h"
+#include "recon/track/rbt_report.h"
+#include "recon/volume/volume.h"
+
+enum { MAX_RAYS = 2562, MAX_AXES = 321 };
+
+typedef struct TrackNode {
+    Cylinder cylinder;
+    double inlier_rate, contrast;
+    int parent, kind, branch;
+    bool retried, is_junction;
+    bool is_on_voxels;       // set along a path through the image's voxels (rbt_links.h), not measured
+    bool is_link;            // between the parent's axis and the branch's first node (rbt_ostia.h)
+    int64_t point_start;
+    int point_count;
+} TrackNode;
+
+typedef struct Estimate {    // a node before it is accepted
+    TrackNode node;
+    Vec3 point[MAX_RAYS];
+} Estimate;
+
+typedef struct Track {       // nodes with their points, growing
+    TrackNode *node;
+    int count, capacity;
+    Vec3 *point;
+    int64_t point_count, point_capacity;
+} Track;
+
+typedef struct RbtStop {     // of `until`: a disc across a vessel
+    Vec3 center, axis;
+    double radius, half;     // of the disc, half of its thickness
+} RbtStop;
+
+typedef struct Tracker {
+    const Volume *volume;
+    const RbtParameters *parameters;
+    double voxel;            // [mm]
+    double background;       // brightness of most of the volume
+    double dark;             // brightness below which a start lies on background
+    int ray_count, axis_count;
+    Vec3 ray[MAX_RAYS];
+    Vec3 axis[MAX_AXES];     // half a sphere about +z in order of angle with it
+    Random random;
+    Vec3 candidate[MAX_RAYS];
+    int inlier[MAX_RAYS];
+    double along[MAX_RAYS];
+    Estimate estimate;
+    Track tree;
+    const struct RbtPaint *paint;  // of the tree, for fast looks around; NULL: all nodes are looked at
+    bool is_guarded;         // a branch that was found, not clicked: it must neither swell nor brighten past its vessel
+    double longest;          // [mm] a branch may become
+    double noise;            // four standard deviations of the spline's values in the background
+    double floor, ceiling;   // brightness below which a guarded branch has ended; above which nothing is vessel
+    double usual_inliers;    // mean inlier rate of the first branch
+    bool out_of_memory;
+    const char *why;         // the last estimate was refused
+    char start[256];         // what was estimated at the first start; empty: nothing
+    struct RbtLevels *levels;// the volume and its smoothed copies, for the first start
+    bool is_noisy;           // single voxels are noisier than the first vessel is bright
+    int scan_count;          // tubes around the first start that stand out, best first; -1: not looked for
+    Cylinder scan[12];
+    RbtStartCheck check;
+    RbtStop *stop;           // (parameters->until_count)
+    int stop_count;
+    char refusal[300];       // why the first start is refused; empty: it is not
+} Tracker;
+
+bool track_append(Track *track, const TrackNode *node, const Vec3 *point);   // false: out of memory
+void track_cut(Track *track, int count);
+// Keeps the nodes for which keep[i] is true; nothing that stays may hang on one that goes. `place`: room for as many.
+void track_keep(Track *track, const bool *keep, int *place);
+void track_free(Track *track);
+
+double tracker_usual_radius(const Track *branch);   // the median of its last nodes: what the vessel is like
+double tracker_segment_distance(Vec3 x, Vec3 a, Vec3 b);
+double tracker_brightness(const Tracker *t, Vec3 point);   // the spline's value
+Vec3 tracker_in_mm(const Volume *volume, Vec3 x, bool is_voxel);
+bool tracker_is_inside(const Volume *volume, Vec3 x);
+bool tracker_is_forbidden(const Tracker *t, Vec3 x);   // by the trace
+bool tracker_is_stopped(const Tracker *t, Vec3 a, Vec3 b);   // does the way from a to b pass a point of `until`?
+// Brightness of the darkest place on the straight way from a to b.
+double tracker_darkest(const Tracker *t, Vec3 a, Vec3 b);
+// Darkest place on the straight way from a to b, as a share of the lumen's brightness at both ends.
+double tracker_link_brightness(const Tracker *t, Vec3 a, Vec3 b);
+
+#endif

@@ -1,0 +1,41 @@
+// Volumes: scalar voxel grids in patient coordinates (files: volume_file.h).
+//
+// Voxel (i, j, k), i fastest, lies at origin + i axis[0] + j axis[1] + k axis[2] [mm]; axes may be oblique and anisotropic. The frame (RAS, LPS)
+// is kept as the header says, never converted. Values are held as float and finite: a NaN would pass silently
+// through every interpolation, and only the user knows which background it stands for.
+#ifndef SELDINGER_RECON_VOLUME_VOLUME_H
+#define SELDINGER_RECON_VOLUME_VOLUME_H
+
+#include "base/faults.h"
+#include "geom/linear.h"
+
+#include <stddef.h>
+
+typedef struct Volume {
+    int size[3];
+    Vec3 origin;             // [mm] centre of voxel (0,0,0)
+    Vec3 axis[3];            // [mm] step from voxel to voxel
+    Mat3 to_voxel;           // inverse of the axes: voxel = to_voxel (x - origin)
+    float *value;            // (size[2], size[1], size[0])
+    float minimum, maximum;
+    char frame[32];          // "RAS", "LPS", … or "" where the header does not say
+    char format[16];         // "nrrd", "metaimage", "nifti", "dicom"
+} Volume;
+
+// of all voxels
+#define VOLUME_VOXELS_MOST ((size_t)1 << 31)
+// A volume of the given grid, values zero. NULL where size is not positive or memory lacks.
+Volume *volume_create(const int size[3], Vec3 origin, const Vec3 axis[3]);
+void volume_free(Volume *volume);
+static inline double volume_voxel_size(const Volume *v)   // mean edge [mm]
+{
+    return (vec3_norm(v->axis[0]) + vec3_norm(v->axis[1]) + vec3_norm(v->axis[2])) / 3;
+}
+// Continuous voxel coordinates of a point and back.
+static inline Vec3 volume_voxel_of(const Volume *v, Vec3 x) { return mat3_mul_vec(&v->to_voxel, vec3_sub(x, v->origin)); }
+static inline Vec3 volume_point_of(const Volume *v, Vec3 voxel)
+{
+    return vec3_add_scaled(vec3_add_scaled(vec3_add_scaled(v->origin, voxel.x, v->axis[0]), voxel.y, v->axis[1]), voxel.z, v->axis[2]);
+}
+
+#endif

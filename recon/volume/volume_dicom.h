@@ -1,0 +1,15 @@
+// The reader of uncompressed DICOM. Internal to recon: volume_file.h chooses it.
+#ifndef SELDINGER_RECON_VOLUME_VOLUME_DICOM_H
+#define SELDINGER_RECON_VOLUME_VOLUME_DICOM_H
+
+#include "recon/volume/volume_format.h"
+
+bool volume_is_dicom(const FileBytes *file);
+// A multi-frame file alone; a slice with the other files of its series, which stand beside it.
+Volume *volume_parse_dicom(const FileBytes *file, Faults *faults);
+// A whole DICOM file, which has 4 GB at most.
+bool dicom_bytes_read(const char *path, FileBytes *out, Faults *faults);
+// The only series of a folder; several are a fault that lists them.
+Volume *volume_load_dicom_folder(const char *path, Faults *faults);
+
+#endif

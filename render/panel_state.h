@@ -1,0 +1,151 @@
+// What the trainer's panels show and what their user wants: plain data.
+#ifndef SELDINGER_RENDER_PANEL_STATE_H
+#define SELDINGER_RENDER_PANEL_STATE_H
+
+#include "input/hand_port.h"
+#include "render/key_table.h"
+#include "render/panel_layout.h"
+#include "sim/xray.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef enum { PANEL_LIVE, PANEL_LIH, PANEL_DSA, PANEL_ROADMAP, PANEL_CINE } PanelMode;   // LIH: last image hold
+typedef enum { MARK_NONE, MARK_GOOD, MARK_WARNING, MARK_BAD } PanelMark;                  // shown by a sign and a colour
+
+enum { PANEL_TOOLS = 4 };
+enum { WARN_OUTSIDE = 1, WARN_NOT_CONVERGED = 2, WARN_SLOW = 4, WARN_NO_FIFO = 8, WARN_DEVICE_LOST = 16, WARN_STALLED = 32 }; // bits of `warnings`
+
+typedef struct PanelFigure {       // one line of the score or of the exercise
+    const char *label;
+    double value;                  // NaN: not known yet, shown as a dash
+    const char *unit;              // "s", "ml", "" …
+    int decimals;
+    PanelMark mark;
+} PanelFigure;
+
+typedef struct PanelTool {         // one of the coaxial tools
+    const char *name;              // one word, where there are several
+    const char *what;              // "catheter 0.70 mm x 160 mm"
+    Color color;                   // as in the 3D view
+    double inserted_mm, turned_deg, push_mm_s, twist_deg_s;
+    double force_n, torque_n_mm;   // of its hand, of the sheath, on it
+    PanelMark mark;                // of the note
+    const char *note;              // "let go" …, or NULL
+} PanelTool;
+
+typedef struct PanelDevice {
+    const char *name;
+    HandState state;
+    const char *note;              // what it does or what is wrong; may be NULL
+} PanelDevice;
+
+typedef struct PanelLabel {        // words beside something in the 3D view; pixels from the view's upper left corner
+    double x, y, radius;           // its centre, and of what is drawn there
+    const char *text;
+} PanelLabel;
+
+// A device on the tray: of the scene, or one that may be added to it.
+enum { TRAY_POINTS = 160, TRAY_STEPS = 64 };
+typedef struct PanelTrayDevice {
+    const char *name;
+    const char *what;              // kind, diameters, length
+    const char *note;              // why it cannot be put in, or NULL
+    const char *remark;            // what is to be said of it besides, or NULL
+    bool is_in;                    // it is the tool now
+    int point_count;
+    double point[TRAY_POINTS][2];  // [mm] (x, y) of its distal part when nothing holds it, the tip last; y up
+    int step_count;
+    double end_mm[TRAY_STEPS];     // rising: where each stretch ends, from the proximal end
+    double bending_n_mm2[TRAY_STEPS];   // of each stretch
+    bool can_be_shaped;            // a wire whose core keeps a bend
+} PanelTrayDevice;
+
+typedef struct PanelTray {         // the chosen tool's devices, while the tray is open
+    const char *tool;
+    const char *note;              // what to do before anything can be put in, or NULL
+    int device_count;
+    const PanelTrayDevice *device; // (device_count)
+    const PanelTrayDevice *shaped; // the chosen one with its tip as PanelActions.tray asks for, or NULL; where it does not stay, its note says why
+} PanelTray;
+
+// What is shown. Strings are borrowed for the call; NULL is an empty one. NaN in a figure shows as a dash.
+typedef struct PanelState {
+    double now_s;                  // wall clock of the session, for messages and hints
+    double time_s;                 // simulated
+    bool is_paused;
+    // exercise
+    const char *title;
+    const char *instructions;      // its first line is always shown, the whole of it in a box at the beginning and when asked for
+    const char *trainee;
+    const char *target;            // name of the one to reach now
+    double hold_s, hold_needed_s;  // progress of holding the target; hold_needed_s 0: no target
+    bool is_finished;              // the exercise is over; `instructions` says how it ended
+    int figure_count, error_count;
+    const PanelFigure *figure;     // (figure_count) score so far
+    const char *const *error;      // (error_count) handling errors so far, newest last
+    // tools
+    int tool_count, chosen_tool;   // outermost first; the one that is shown in full
+    PanelTool tool[PANEL_TOOLS];
+    bool is_pair_locked, is_let_go;  // the chosen tool and its partner; the chosen one
+    const PanelTray *tray;         // NULL: closed, or not known yet
+    double wall_max_n, wall_sum_n; // of all
+    // X-ray
+    XrayControl xray;
+    PanelMode mode;
+    bool is_pedal_latched, is_roadmap_ready, is_recording_cine;
+    double fluoro_s, contrast_ml;
+    int cine_frame, cine_frames;
+    // views
+    PanelView view;
+    bool is_following, has_section, has_model, has_arrows;
+    int label_count;
+    const PanelLabel *label;       // (label_count) of the 3D view
+    double bar_mm, bar_pixels;     // its scale bar; 0: none
+    double force_full_scale_n;     // top of its colours; 0: no legend
+    // machine
+    double step_median_us, step_p999_us, real_time_factor, frame_ms;
+    int64_t missed_deadlines;
+    unsigned warnings;             // WARN_ bits
+    const char *warning;           // one more line of warning, or NULL
+    int device_count;
+    const PanelDevice *device;
+} PanelState;
+
+// What the mouse does in a view (dragging keeps to the view where it began).
+typedef struct PanelMouse {
+    int view;                      // PanelView, or -1 outside all
+    double x, y;                   // [0, 1] in the view, y up
+    double drag_x, drag_y;         // since the last frame, as parts of the view's height, y up
+    unsigned buttons;              // WINDOW_MOUSE_ bits of a press that began in the view
+    double scroll;
+} PanelMouse;
+
+// What the tray's user has chosen, while it is open.
+typedef struct PanelTrayChoice {
+    bool is_open;
+    int device;                    // of PanelTray.device
+    bool is_shaped;                // with its tip shaped: from the tip back to the bend, the angle that stays, the mandrel's radius
+    double length_mm, angle_deg, mandrel_mm;
+    bool is_taken;                 // in this frame: put it in
+} PanelTrayChoice;
+
+typedef struct PanelActions {
+    bool held[ACTION_COUNT];       // by key or by the mouse on a button
+    int pressed[ACTION_COUNT];     // times since the last frame. RESTART and QUIT only when confirmed; SIGINT, SIGTERM: QUIT at once
+    bool xray_set;                 // a slider was moved: `xray` holds what the state showed with the new value in it
+    XrayControl xray;
+    bool trainee_set;
+    char trainee[64];              // UTF-8, printable, no control characters, trimmed
+    PanelMouse mouse;
+    PanelTrayChoice tray;
+    int answer;                    // to panel_ask(): 1 yes, -1 no, 0 none in this frame
+} PanelActions;
+
+// Texts are the caller's and live until it is answered.
+typedef struct PanelQuestion {
+    const char *title, *text, *yes, *no;
+} PanelQuestion;
+
+#endif

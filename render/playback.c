@@ -1,0 +1,226 @@
+#include "render/playback.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+// Contrast goes on in steps of this many recorded steps; places to go on from are kept every so many of those.
+enum { STRIDE = 10, KEEP_EVERY = 500, MOST_KEPT = 1024 };
+
+typedef struct Place {
+    int64_t step;
+    PulseClock pulses;
+    double injected_ml;          // since the last whole stride
+    ContrastInjection *injection;
+} Place;
+
+struct Playback {
+    const RecordedRun *run;
+    const Scene *scene;
+    const VesselTree *tree;
+    XrayControl unseen, control;     // control: of the step that was asked for last
+    float *concentration;            // of the moment: at the tree's nodes, then at the tools'
+    bool is_seen;
+    Pose *pose;
+    Place now;
+    double flow_ml_s;                // of contrast agent, at the moment
+    int kept_count;
+    int64_t keep_steps;          // between places
+    Place kept[MOST_KEPT];
+};
+
+static const XrayControl *control(Playback *playback, int64_t step)
+{
+    const RecordedRun *run = playback->run;
+    playback->control = playback->is_seen ? run->xray[step] : playback->unseen;
+    if (!playback->is_seen && run->xray) {
+        playback->control.contrast_ml_s = run->xray[step].contrast_ml_s;
+        playback->control.contrast_tool = run->xray[step].contrast_tool;
+    }
+    return &playback->control;
+}
+
+static int64_t frame_at(const RecordedRun *run, int64_t step)
+{
+    int64_t low = 0, high = run->frame_count - 1;
+    while (low < high) {
+        int64_t middle = (low + high + 1) / 2;
+        if (run->frame_step[middle] <= step)
+            low = middle;
+        else
+            high = middle - 1;
+    }
+    return low;
+}
+
+// The tree's node at the shared centreline's node nearest to x.
+static int node_at(const RecordedFrame *frame, Vec3 x)
+{
+    int nearest = frame->node_count - 1;
+    for (int i = nearest - 1; i >= 0; i--)
+        if (vec3_distance(frame->position[i], x) < vec3_distance(frame->position[nearest], x))
+            nearest = i;
+    return frame->vessel_node[nearest];
+}
+
+static void find_inserted(const RecordedRun *run, int64_t step, double *inserted)
+{
+    for (int k = 0; k < run->tool_count; k++)
+        inserted[k] = run->tool[k].inserted[step];
+}
+
+static TipPlaces find_tips(const RecordedRun *run, int64_t step)
+{
+    int64_t at = frame_at(run, step);
+    RecordedFrame frame = recorded_run_frame(run, at);
+    TipPlaces places = {.foremost_node = frame.vessel_node[frame.node_count - 1]};
+    find_inserted(run, step, places.inserted);
+    for (int k = 0; k < run->tool_count; k++) {
+        const RecordedTool *tool = &run->tool[k];
+        places.node[k] = places.foremost_node;
+        if (tool->position) {
+            RecordedToolFrame own = recorded_run_tool_frame(run, k, at);
+            places.node[k] = node_at(&frame, own.position[own.node_count - 1]);
+        }
+    }
+    return places;
+}
+
+static ContrastInjection *create_injection(const Playback *playback)
+{
+    const RecordedRun *run = playback->run;
+    int count[TOOLS_MOST] = {run->node_count};
+    const double *s[TOOLS_MOST] = {run->s};
+    for (int k = 0; run->tool_count > 1 && k < run->tool_count; k++) {
+        count[k] = run->tool[k].device_nodes[0];
+        s[k] = run->tool[k].s;
+    }
+    return contrast_injection_create(playback->tree, playback->scene, count, s);
+}
+
+// What flows at a step.
+static double flow_at(Playback *playback, int64_t step)
+{
+    double inserted[TOOLS_MOST] = {0};
+    find_inserted(playback->run, step, inserted);
+    return contrast_injection_flow(playback->now.injection, control(playback, step), inserted);
+}
+
+// Keeps the place reached where it is the next one to keep.
+static void keep(Playback *playback)
+{
+    if (playback->kept_count == MOST_KEPT || playback->now.step != playback->kept_count * playback->keep_steps)
+        return;
+    Place *place = &playback->kept[playback->kept_count];
+    ContrastInjection *injection = create_injection(playback);
+    if (!injection)
+        return;
+    contrast_injection_copy(injection, playback->now.injection);
+    *place = playback->now;
+    place->injection = injection;
+    playback->kept_count++;
+}
+
+// Contrast goes on in whole strides only, as in the session: else what is seen would depend on where one stopped on the way.
+static void go_on(Playback *playback, int64_t step)
+{
+    const RecordedRun *run = playback->run;
+    Place *now = &playback->now;
+    double dt = run->step_ms / 1000, stride_s = STRIDE * dt;
+    while (now->step < step) {
+        const XrayControl *xray = control(playback, now->step);
+        pulse_clock_advance(&now->pulses, run->time_s[now->step], xray);
+        int fitted[TOOLS_MOST] = {0};
+        for (int k = 0; k < run->tool_count; k++)
+            fitted[k] = recorded_run_fitted(run, k, now->step);
+        contrast_injection_fit(now->injection, fitted);
+        now->injected_ml += flow_at(playback, now->step) * dt;
+        if (++now->step % STRIDE != 0)
+            continue;
+        TipPlaces places = find_tips(run, now->step - 1);
+        contrast_injection_advance(now->injection, stride_s, xray, now->injected_ml, &places);
+        now->injected_ml = 0;
+        keep(playback);
+    }
+}
+
+Playback *playback_open(const RecordedRun *run, const Scene *scene, const VesselTree *tree, const XrayControl *unseen)
+{
+    Playback *playback = run->step_count > 0 && run->frame_count > 0 ? calloc(1, sizeof *playback) : NULL;
+    if (!playback)
+        return NULL;
+    playback->run = run;
+    playback->scene = scene;
+    playback->tree = tree;
+    playback->unseen = *unseen;
+    playback->is_seen = recorded_run_was_watched(run);
+    int64_t strides = (run->step_count / MOST_KEPT + 1) / STRIDE + 1;
+    playback->keep_steps = STRIDE * (strides > KEEP_EVERY ? strides : KEEP_EVERY);
+    playback->pose = pose_create_for_run(run);
+    playback->now = (Place){.pulses = pulse_clock_start(0), .injection = create_injection(playback)};
+    if (playback->now.injection)
+        playback->concentration = calloc((size_t)contrast_injection_node_count(playback->now.injection) + 1, sizeof *playback->concentration);
+    if (!playback->pose || !playback->concentration) {
+        playback_close(playback);
+        return NULL;
+    }
+    keep(playback);
+    playback_seek(playback, 0);
+    return playback;
+}
+
+void playback_close(Playback *playback)
+{
+    if (!playback)
+        return;
+    for (int i = 0; i < playback->kept_count; i++)
+        contrast_injection_free(playback->kept[i].injection);
+    contrast_injection_free(playback->now.injection);
+    free(playback->concentration);
+    pose_free(playback->pose);
+    free(playback);
+}
+
+bool playback_seek(Playback *playback, double time_s)
+{
+    const RecordedRun *run = playback->run;
+    Place *now = &playback->now;
+    double dt = run->step_ms / 1000, first = run->time_s[0] - dt;
+    int64_t step = (int64_t)fmax(1, fmin(floor((time_s - first) / dt + 1e-6), (double)run->step_count)), before = now->step;
+    int nearest = 0;
+    while (nearest + 1 < playback->kept_count && playback->kept[nearest + 1].step <= step)
+        nearest++;
+    if (playback->kept_count > 0 && (step < now->step || playback->kept[nearest].step > now->step)) {
+        ContrastInjection *injection = now->injection;
+        *now = playback->kept[nearest];
+        now->injection = injection;
+        contrast_injection_copy(injection, playback->kept[nearest].injection);
+    }
+    go_on(playback, step);
+    contrast_injection_read(now->injection, playback->concentration);
+    int64_t row = step - 1;
+    pose_from_run(playback->pose, playback->scene, run, frame_at(run, row));
+    pose_figures_from_run(playback->pose, run, row);
+    playback->pose->xray = *control(playback, row);
+    playback->flow_ml_s = flow_at(playback, row);
+    return step < before || (double)(step - before) * dt > 1;
+}
+
+double playback_time_s(const Playback *playback) { return playback->pose->time_s; }
+double playback_end_s(const Playback *playback) { return playback->run->time_s[playback->run->step_count - 1]; }
+const Pose *playback_pose(const Playback *playback) { return playback->pose; }
+const float *playback_contrast(const Playback *playback) { return playback->tree ? playback->concentration : NULL; }
+const float *playback_filling(const Playback *playback) { return playback->concentration + contrast_injection_tree_nodes(playback->now.injection); }
+double playback_injected_ml(const Playback *playback) { return contrast_injection_injected_ml(playback->now.injection); }
+int playback_contrast_tool(const Playback *playback) { return contrast_injection_tool(playback->now.injection, &playback->pose->xray); }
+double playback_flow_ml_s(const Playback *playback) { return playback->flow_ml_s; }
+const PulseClock *playback_pulses(const Playback *playback) { return &playback->now.pulses; }
+
+int playback_bookmarks(const Playback *playback, double *time_s, int capacity)
+{
+    const RecordedRun *run = playback->run;
+    int count = 0;
+    for (int64_t i = 1; run->xray && i < run->step_count && count < capacity; i++)
+        if (run->xray[i].bookmark != run->xray[i - 1].bookmark)
+            time_s[count++] = run->time_s[i];
+    return count;
+}

@@ -1,0 +1,174 @@
+#include "render/replay_window.h"
+
+#include "render/playback.h"
+#include "render/scene_views.h"
+#include "render/timeline.h"
+#include "render/trainer_panel.h"
+#include "render/window.h"
+#include "sim/clock.h"
+#include "sim/rescore.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+// Real time that a frame may spend on simulating the recording again, and simulated seconds that a held arrow key goes in one.
+static const double rescore_budget_s = 0.01, scrub_s_s = 4;
+
+typedef struct ReplayWindow {
+    const ReplayWindowOptions *options;
+    const RecordedRun *run;
+    Scene *scene;
+    Window *window;
+    Panel *panel;
+    Timeline *timeline;
+    Views *views;
+    Desk desk;
+    Playback *playback;
+    Rescore *rescore;
+    TrainerPanel shown;
+    TimelineState line;
+    bool resumes, has_told_difference;
+    double begun_s;
+} ReplayWindow;
+
+static bool replay_open(ReplayWindow *replay, OpenVessel *open, Faults *faults)
+{
+    char message[512] = "", title[300];
+    int before = faults->count;
+    const ReplayWindowOptions *options = replay->options;
+    snprintf(title, sizeof title, "Seldinger replay: %.200s", options->name);
+    bool good = (replay->window = window_create(title, options->width, options->height, 0, message, sizeof message)) &&
+                (replay->panel = panel_create(message, sizeof message)) && (replay->timeline = timeline_create(message, sizeof message)) &&
+                (replay->views = scene_views_create(replay->scene, open, &replay->desk, message, sizeof message, faults)) &&
+                (replay->rescore = rescore_create(replay->run, replay->scene, open, faults));
+    if (good) {
+        XrayControl watched = replay->desk.xray;
+        watched.pedal = 1;
+        if (!isnan(options->lao_deg))
+            watched.lao_deg = (float)options->lao_deg;
+        if (!isnan(options->cra_deg))
+            watched.cra_deg = (float)options->cra_deg;
+        replay->playback = playback_open(replay->run, replay->scene, open->tree, &watched);
+        snprintf(message, sizeof message, "the recording holds no frame");
+        good = replay->playback != NULL;
+    }
+    if (!good && faults->count == before)
+        faults_add(faults, options->name, 0, 0, "no window: %s", message);
+    if (!good)
+        return false;
+    replay->desk.view = options->view;
+    panel_show_hints(replay->panel, false);
+    trainer_panel_begin(&replay->shown, replay->scene, "");
+    replay->line = (TimelineState){.end_s = playback_end_s(replay->playback), .is_playing = true, .speed = 1, .note = options->name};
+    replay->line.mark_count = playback_bookmarks(replay->playback, replay->line.mark_s, TIMELINE_MARKS);
+    playback_seek(replay->playback, options->at_s);
+    return true;
+}
+
+static void replay_close(ReplayWindow *replay)
+{
+    playback_close(replay->playback);
+    rescore_free(replay->rescore);
+    views_destroy(replay->views);
+    timeline_destroy(replay->timeline);
+    if (replay->panel)
+        panel_destroy(replay->panel);
+    if (replay->window)
+        window_destroy(replay->window);
+}
+
+static void seek(ReplayWindow *replay, double time_s)
+{
+    if (playback_seek(replay->playback, fmax(0, fmin(time_s, replay->line.end_s)))) {
+        fluoroscope_forget(views_fluoroscope(replay->views));
+        panel_forget_samples(replay->panel);
+    }
+}
+
+static void obey(ReplayWindow *replay, const PanelActions *actions, double passed_s)
+{
+    TimelineState *line = &replay->line;
+    double now = playback_time_s(replay->playback), held = (double)actions->held[ACTION_TWIST_RIGHT] - (double)actions->held[ACTION_TWIST_LEFT];
+    if (actions->pressed[ACTION_PAUSE] & 1)
+        line->is_playing = !line->is_playing;
+    if (actions->pressed[ACTION_FULL_SCREEN] & 1)
+        window_set_full_screen(replay->window, !window_is_full_screen(replay->window));
+    replay->resumes |= actions->pressed[ACTION_SAVE] > 0;
+    if (held != 0)
+        seek(replay, now + held * scrub_s_s * passed_s);
+    else if (line->is_playing)
+        seek(replay, now + passed_s * (double)line->speed);
+    if (playback_time_s(replay->playback) >= line->end_s)
+        line->is_playing = false;
+}
+
+static const ScoreFigures *score_now(ReplayWindow *replay)
+{
+    rescore_advance(replay->rescore, playback_pose(replay->playback)->step, rescore_budget_s);
+    int64_t different = rescore_first_different(replay->rescore);
+    if (different >= 0 && !replay->has_told_difference) {
+        replay->has_told_difference = true;
+        panel_message(replay->panel, clock_s(CLOCK_MONOTONIC) - replay->begun_s, MARK_WARNING, "simulated again, the recording gives another state: the score stops there");
+    }
+    return rescore_at(replay->rescore, playback_time_s(replay->playback));
+}
+
+static void draw(ReplayWindow *replay, const WindowInput *input, const PanelLayout *layout)
+{
+    const Pose *pose = playback_pose(replay->playback);
+    ViewsFrame frame = {.pose = pose, .xray = &pose->xray, .contrast = playback_contrast(replay->playback), .filling = playback_filling(replay->playback),
+                        .pulse = (uint32_t)playback_pulses(replay->playback)->count, .look = &replay->desk.look, .scope_tool = replay->desk.grip.chosen + 1};
+    views_draw(replay->views, &frame, layout, input->width, input->height, 0);
+    trainer_panel_show(&replay->shown, replay->scene, pose, score_now(replay), NULL, &pose->xray);
+    PanelState *state = &replay->shown.state;
+    state->now_s = clock_s(CLOCK_MONOTONIC) - replay->begun_s;
+    trainer_panel_views(&replay->shown, &replay->desk, replay->views, &pose->xray);
+    trainer_panel_injection(&replay->shown, replay->scene, playback_contrast_tool(replay->playback), playback_flow_ml_s(replay->playback), &pose->xray);
+    state->is_paused = !replay->line.is_playing;
+    state->step_median_us = state->step_p999_us = state->real_time_factor = NAN;
+    panel_draw(replay->panel, input, state, 0);
+    replay->line.time_s = pose->time_s;
+    TimelineActions asked = timeline_draw(replay->timeline, input, &replay->line, layout->scale, layout->bottom, 0);
+    replay->line.is_playing ^= asked.toggle_play;
+    replay->line.speed = asked.speed;
+    replay->resumes |= asked.resume;
+    if (asked.seek)
+        seek(replay, asked.seek_s);
+}
+
+static void run_window(ReplayWindow *replay)
+{
+    const WindowInput *input;
+    PanelActions actions = {0};
+    double last = clock_s(CLOCK_MONOTONIC);
+    for (bool goes_on = true; goes_on;) {
+        bool visible = window_next_frame(replay->window, &input);
+        double now = clock_s(CLOCK_MONOTONIC), passed = fmin(now - last, 0.1);
+        last = now;
+        panel_take_input(replay->panel, input, &actions);
+        PanelLayout layout = panel_layout(input->width, input->height, input->scale, replay->desk.view, true);
+        desk_obey(&replay->desk, views_scene(replay->views), &actions, &layout, passed);
+        obey(replay, &actions, passed);
+        goes_on = !replay->resumes && !actions.pressed[ACTION_QUIT] && input->close != WINDOW_ENDED &&
+                  !(replay->options->duration_s > 0 && now - replay->begun_s > replay->options->duration_s);
+        if (!goes_on || !visible)
+            continue;
+        layout = panel_layout(input->width, input->height, input->scale, replay->desk.view, true);
+        draw(replay, input, &layout);
+        window_swap(replay->window);
+    }
+}
+
+bool replay_window_run(const ReplayWindowOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, bool *resumes, double *resume_s,
+                       Faults *faults)
+{
+    ReplayWindow replay = {.options = options, .run = run, .scene = scene, .begun_s = clock_s(CLOCK_MONOTONIC)};
+    bool good = replay_open(&replay, open, faults);
+    if (good) {
+        run_window(&replay);
+        *resumes = replay.resumes;
+        *resume_s = playback_time_s(replay.playback);
+    }
+    replay_close(&replay);
+    return good;
+}

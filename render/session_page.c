@@ -1,0 +1,250 @@
+#include "render/session_page.h"
+
+#include "render/page.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static const char own_style[] =
+    ".points{font-size:2.6rem;font-weight:700;line-height:1;font-variant-numeric:tabular-nums}\n"
+    ".points small{font-size:1rem;font-weight:400;color:var(--muted)}\n"
+    ".top{display:flex;flex-wrap:wrap;gap:.5rem 2.5rem;align-items:center;margin:1rem 0}\n"
+    ".state{font-weight:600;padding:.15rem .6rem;border:2px solid currentColor;border-radius:1rem}\n"
+    ".state.reached{color:var(--o3)}.state.time_out,.state.running,.state.waiting{color:var(--bad)}\n"
+    ".bar{fill:currentColor}.error{stroke:var(--bad);fill:none;stroke-dasharray:3 3}text.error{stroke:var(--panel);stroke-dasharray:none}\n"
+    "svg text.error{fill:var(--bad)}circle.error{stroke-width:2;stroke-dasharray:none}\n"
+    ".vessel path{fill:none;stroke:var(--muted);stroke-linecap:round}.vessel circle{fill:var(--muted)}.vessel{opacity:.32}svg.view{margin:0;max-width:none}\n"
+    ".halo{fill:none;stroke:#fff;stroke-width:5;stroke-linejoin:round;stroke-linecap:round}.way{fill:none;stroke-width:2.6;stroke-linejoin:round}\n"
+    ".tool{fill:none;stroke:var(--ink);stroke-width:1}.held{fill:currentColor}.missed{fill:var(--panel);stroke:currentColor;stroke-width:2}\n"
+    "tr.own{background:var(--panel);font-weight:600}td.mark-letter{color:var(--bad);font-weight:700}meter{width:7rem}\n"
+    "@media print{body{font-size:10pt}section{break-inside:auto}figure{max-width:100%}}\n";
+
+static const char *const part_words[PART_COUNT] = {"Time",           "Fluoroscopy time",   "Contrast agent",
+                                                   "Way of the tip", "Largest wall force", "Wall force over time"};
+static const char *const part_unit[PART_COUNT] = {"s", "s", "ml", "times the straight way", "N", "N s"};
+
+static void figures_of(const ScoreFigures *f, double figure[PART_COUNT])
+{
+    figure[PART_TIME] = f->time_s;
+    figure[PART_FLUOROSCOPY] = f->fluoroscopy_s;
+    figure[PART_CONTRAST] = f->contrast_ml;
+    figure[PART_PATH] = f->way_mm > 0 ? f->path_mm / f->way_mm : 0;
+    figure[PART_WALL_FORCE] = f->wall_force_peak_n;
+    figure[PART_WALL_IMPULSE] = f->wall_impulse_n_s;
+}
+
+static void item(FILE *out, const char *term, const char *text)
+{
+    fprintf(out, "<dt>%s</dt><dd>", term);
+    page_text(out, *text ? text : "not said");
+    fprintf(out, "</dd>\n");
+}
+
+static void print_top(const SessionPage *page)
+{
+    static const char *const words[] = {"not begun", "target not held", "target held", "out of time"};
+    FILE *out = page->out;
+    const Session *s = page->session;
+    const ScoreFigures *f = &s->figures;
+    fprintf(out, "<section id=\"summary\"><div class=\"top\">");
+    if (f->has_exercise)
+        fprintf(out, "<div class=\"points\">%.0f <small>of 100 points</small></div><div class=\"state %s\">%s</div>", f->points, score_state_name[f->state],
+                words[f->state]);
+    fprintf(out, "</div>\n<dl>\n");
+    item(out, "Trainee", s->trainee);
+    item(out, "Date", s->date);
+    item(out, "Device", s->device);
+    item(out, "Target", s->target);
+    fprintf(out, "</dl></section>\n");
+}
+
+static void print_parts(const SessionPage *page)
+{
+    FILE *out = page->out;
+    const ScoreFigures *f = &page->session->figures;
+    const Exercise *e = page->scene ? page->scene->exercise : NULL;
+    double figure[PART_COUNT], weights = 0;
+    figures_of(f, figure);
+    if (!f->has_exercise)
+        return;
+    for (int i = 0; e && i < PART_COUNT; i++)
+        weights += e->par[i] > 0 ? e->weight[i] : 0;
+    fprintf(out, "<section id=\"parts\"><h2>Points</h2>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Part</th><th scope=\"col\">Measured</th><th "
+                 "scope=\"col\">Full points up to</th><th scope=\"col\">Weight</th><th scope=\"col\" class=\"words\">Reached</th></tr></thead><tbody>\n");
+    for (int i = 0; i < PART_COUNT; i++) {
+        bool judged = !e || (e->par[i] > 0 && e->weight[i] > 0);
+        fprintf(out, "<tr><th scope=\"row\">%s [%s]</th><td>%.2f</td>", part_words[i], part_unit[i], figure[i]);
+        if (e && judged)
+            fprintf(out, "<td>%g</td><td>%.0f %%</td>", e->par[i], 100 * e->weight[i] / weights);
+        else
+            fprintf(out, "<td>%s</td><td>–</td>", e ? "not judged" : "not known");
+        if (judged)
+            fprintf(out, "<td class=\"words\"><meter min=\"0\" max=\"1\" value=\"%.3f\">%.0f %%</meter> %.0f %%</td></tr>\n", f->part[i], 100 * f->part[i],
+                    100 * f->part[i]);
+        else
+            fprintf(out, "<td class=\"words\">–</td></tr>\n");
+    }
+    fprintf(out, "</tbody></table></div>\n<p>What was reached counts by weight, ");
+    if (f->state == SCORE_REACHED)
+        fprintf(out, "in full since the target was held");
+    else
+        fprintf(out, "times half of the part of the way that was covered (%.0f %%), since the target was not held",
+                f->way_mm > 0 ? 100 * fmax(1 - f->least_remaining_mm / f->way_mm, 0) : 0);
+    if (e && f->error_total > 0)
+        fprintf(out, "; less %g points for each of %d error%s", e->error_points, f->error_total, f->error_total == 1 ? "" : "s");
+    fprintf(out, ".</p></section>\n");
+}
+
+static void print_figures(const SessionPage *page)
+{
+    FILE *out = page->out;
+    const ScoreFigures *f = &page->session->figures;
+    fprintf(out,
+            "<section id=\"figures\"><h2>Figures</h2>\n<dl>\n<dt>Way of the tip</dt><dd>%.0f mm; straight way to the target %.0f mm; efficiency %.0f %%</dd>\n"
+            "<dt>%s</dt><dd>pushed in %.0f mm, pulled back %.0f mm in all</dd>\n<dt>Forces</dt><dd>wall at most %.3f N, over time %.2f N s; tip at most %.3f "
+            "N (mean over 20 ms)</dd>\n",
+            f->path_mm, f->way_mm, 100 * f->efficiency, f->tool_count > 1 ? "Tools" : "Tool", f->inserted_mm, f->withdrawn_mm, f->wall_force_peak_n, f->wall_impulse_n_s, f->tip_force_peak_n);
+    if (f->has_xray)
+        fprintf(out, "<dt>X-rays</dt><dd>%.1f s, %lld pulses, %.0f cm² of open field summed over pulses; contrast agent %.1f ml</dd>\n", f->fluoroscopy_s,
+                (long long)f->pulses, f->dose_area_cm2, f->contrast_ml);
+    else
+        fprintf(out, "<dt>X-rays</dt><dd>nobody watched: a run without a screen</dd>\n");
+    fprintf(out, "</dl></section>\n");
+}
+
+static void print_tools(const SessionPage *page)
+{
+    FILE *out = page->out;
+    const ScoreFigures *f = &page->session->figures;
+    if (f->tool_count < 2)
+        return;
+    fprintf(out, "<section id=\"tools\"><h2>Tools</h2>\n<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Tool</th>"
+                 "<th scope=\"col\">Pushed in [mm]</th>"
+                 "<th scope=\"col\">Pulled back [mm]</th><th scope=\"col\">Tip force [N]</th><th scope=\"col\">Tip's speed, hand at rest [mm/s]</th>"
+                 "<th scope=\"col\">Tip behind the one around it [mm]</th></tr></thead><tbody>\n");
+    for (int k = 0; k < f->tool_count; k++) {
+        const ScoreToolFigures *tool = &f->tool[k];
+        fprintf(out, "<tr><th scope=\"row\">");
+        page_text(out, tool->name);
+        fprintf(out, "</th><td>%.0f</td><td>%.0f</td><td>%.3f</td><td>%.0f</td>", tool->inserted_mm, tool->withdrawn_mm, tool->tip_force_peak_n,
+                tool->kick_peak_mm_s);
+        if (k > 0)
+            fprintf(out, "<td>%.1f</td></tr>\n", tool->behind_mm);
+        else
+            fprintf(out, "<td>–</td></tr>\n");
+    }
+    fprintf(out, "</tbody></table></div><p>Forces and speeds are the largest of the session; where the tip is, is at its end.</p></section>\n");
+}
+
+static void print_errors(const SessionPage *page)
+{
+    FILE *out = page->out;
+    const Session *s = page->session;
+    fprintf(out, "<section id=\"errors\"><h2>Handling errors</h2>\n");
+    if (s->figures.error_total == 0) {
+        fprintf(out, "<p>None.</p></section>\n");
+        return;
+    }
+    fprintf(out, "<div class=\"scroll\"><table><thead><tr><th scope=\"col\">Mark</th><th scope=\"col\" class=\"words\">Error</th><th "
+                 "scope=\"col\">Times</th><th scope=\"col\" class=\"words\">Begun at [s]</th></tr></thead><tbody>\n");
+    for (int kind = 0; kind < ERROR_COUNT; kind++) {
+        if (s->figures.error[kind].count == 0)
+            continue;
+        const char *comma = "";
+        fprintf(out, "<tr><td class=\"mark-letter\">%c</td><td class=\"words\">%s</td><td>%d</td><td class=\"words\">", session_error_letter((ScoreError)kind),
+                score_error_words[kind], s->figures.error[kind].count);
+        for (int i = 0; i < s->event_count; i++)
+            if (s->event[i].kind == (ScoreError)kind) {
+                fprintf(out, "%s%.2f", comma, s->event[i].time_s);
+                if (s->figures.tool_count > 1 && s->event[i].tool >= 0) {
+                    fprintf(out, " (");
+                    page_text(out, s->figures.tool[s->event[i].tool].name);
+                    fprintf(out, ")");
+                }
+                comma = ", ";
+            }
+        fprintf(out, "</td></tr>\n");
+    }
+    fprintf(out, "</tbody></table></div></section>\n");
+}
+
+static void print_earlier(const SessionPage *page)
+{
+    FILE *out = page->out;
+    fprintf(out, "<section id=\"earlier\"><h2>Sessions of this trainee at this exercise</h2>\n");
+    if (page->broken > 0)
+        fprintf(out, "<p>%d session file%s in the folder could not be read and %s left out.</p>\n", page->broken, page->broken == 1 ? "" : "s",
+                page->broken == 1 ? "is" : "are");
+    if (page->earlier_count < 2) {
+        fprintf(out, "<p>This is the only one that was found.</p></section>\n");
+        return;
+    }
+    session_trend_figure(page);
+    fprintf(out, "<div class=\"scroll\"><table><thead><tr><th scope=\"col\">No.</th><th scope=\"col\" class=\"words\">Date</th><th "
+                 "scope=\"col\">Points</th><th scope=\"col\" class=\"words\">Target</th><th scope=\"col\">Time [s]</th><th scope=\"col\">X-rays [s]</th><th "
+                 "scope=\"col\">Contrast [ml]</th><th scope=\"col\">Way / straight</th>"
+                 "<th scope=\"col\">Wall force [N]</th><th scope=\"col\">Errors</th></tr></thead><tbody>\n");
+    for (int i = 0; i < page->earlier_count; i++) {
+        const Session *s = &page->earlier[i];
+        bool own = !strcmp(s->date, page->session->date) && !strcmp(s->series_sha256, page->session->series_sha256);
+        fprintf(out,
+                "<tr%s><th scope=\"row\">%d</th><td class=\"words\">%s</td><td>%.0f</td><td "
+                "class=\"words\">%s</td><td>%.1f</td><td>%.1f</td><td>%.1f</td><td>%.2f</td><td>%.3f</td>"
+                "<td>%d</td></tr>\n",
+                own ? " class=\"own\"" : "", i + 1, s->date, s->figures.points, s->figures.state == SCORE_REACHED ? "held" : "not held", s->figures.time_s,
+                s->figures.fluoroscopy_s, s->figures.contrast_ml, s->figures.way_mm > 0 ? s->figures.path_mm / s->figures.way_mm : 0,
+                s->figures.wall_force_peak_n, s->figures.error_total);
+    }
+    fprintf(out, "</tbody></table></div></section>\n");
+}
+
+static void print_origin(const SessionPage *page)
+{
+    FILE *out = page->out;
+    const Session *s = page->session;
+    char steps[96];
+    snprintf(steps, sizeof steps, "%lld steps of %g ms, last state %016llx", (long long)s->steps, s->step_ms, (unsigned long long)s->state_hash);
+    fprintf(out, "<footer><section id=\"origin\"><h2>Where it comes from</h2>\n<dl>\n");
+    item(out, "Session", page->path);
+    item(out, "Scene", s->scene_path);
+    item(out, "Recording", s->recording_path);
+    item(out, "Recorded", steps);
+    fprintf(out, "<dt>Recording is this session's</dt><dd>%s</dd>\n",
+            !page->run         ? "not there: no plots"
+            : page->run_is_its ? "yes, its series have the session's sum"
+                               : "no");
+    item(out, "Made by", s->version);
+    fprintf(out, "</dl>\n<p>Written by seldinger " SELDINGER_VERSION ".</p></section></footer>");
+}
+
+void session_page(const SessionPage *page)
+{
+    FILE *out = page->out;
+    const Session *s = page->session;
+    const char *title = *s->title ? s->title : "Session without an exercise";
+    fprintf(out, "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
+                 "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\"/>\n<title>Session: ");
+    page_text(out, title);
+    fprintf(out, "</title>\n<style>\n%s%s</style></head>\n<body><header><h1>", page_style, own_style);
+    page_text(out, title);
+    fprintf(out, "</h1>\n<p class=\"notice\" role=\"note\"><strong>For training and research. Not a medical device:</strong> points compare sessions at this "
+                 "simulator; they say nothing about the treatment of patients.</p>\n");
+    if (page->run && !page->run_is_its)
+        fprintf(out, "<p class=\"notice\" role=\"alert\">The recording beside this session is another one: plots and path below are not this session's.</p>\n");
+    fprintf(out, "</header>\n<main>\n");
+    print_top(page);
+    print_parts(page);
+    print_errors(page);
+    fprintf(out, "<section id=\"time\"><h2>Over time</h2>\n");
+    session_time_figure(page);
+    fprintf(out, "%s</section>\n<section id=\"path\"><h2>Path of the tip</h2>\n", page->run ? "" : "<p>The recording was not found.</p>");
+    session_path_figure(page);
+    fprintf(out, "%s</section>\n",
+            !page->run ? "<p>The recording was not found.</p>" : page->run->frame_count < 1 ? "<p>The recording is too long for it, or holds no pictures.</p>" : "");
+    print_figures(page);
+    print_tools(page);
+    print_earlier(page);
+    fprintf(out, "</main>\n");
+    print_origin(page);
+    fprintf(out, "</body></html>\n");
+}

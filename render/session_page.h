@@ -1,0 +1,11 @@
+// The page of a trainee's session: one HTML5 page that stands alone: points and their parts,
+// errors, plots over time, the tip's path over the vessel, earlier sessions. What cannot be had (recording, vessel, scene) is left out and said.
+#ifndef SELDINGER_RENDER_SESSION_PAGE_H
+#define SELDINGER_RENDER_SESSION_PAGE_H
+
+#include "render/session_figures.h"
+
+// Writes the whole page to page->out.
+void session_page(const SessionPage *page);
+
+#endif

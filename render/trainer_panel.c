@@ -1,0 +1,243 @@
+#include "render/trainer_panel.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+// Further outside the wall than any run that can be trusted (cli/run.c).
+static const double outside_mm = 0.2;
+// Below this part of real time the hand feels that the tool is slow.
+static const double slow_factor = 0.97;
+
+static void name_device(TrainerPanel *panel, const Scene *scene, int k, int which)
+{
+    const WireOptions wire = scene_device_wire(scene, k, which);
+    const WireSection *tip = wire.section_count ? &wire.section[wire.section_count - 1] : NULL;
+    const char *title = scene_device(scene, k, which)->title;
+    snprintf(panel->tool[k], sizeof panel->tool[k], "%s%s%s %.2f mm x %.0f mm%s", title, title[0] ? ": " : "", tip && tip->inner_diameter > 0 ? "catheter" : "wire",
+             tip ? tip->diameter : 0, wire_length(&wire), tip && tip->rest_curvature != 0 ? ", curved tip" : "");
+    panel->fitted[k] = which;
+}
+
+void trainer_panel_begin(TrainerPanel *panel, const Scene *scene, const char *trainee)
+{
+    memset(panel, 0, sizeof *panel);
+    PanelState *state = &panel->state;
+    ToolKind kind[TOOLS_MOST];
+    Color color[TOOLS_MOST];
+    state->tool_count = scene->tool_count;
+    for (int k = 0; k < scene->tool_count; k++)
+        kind[k] = scene->tool[k].kind;
+    tool_colors(scene->tool_count, kind, false, color);
+    for (int k = 0; k < scene->tool_count; k++) {
+        name_device(panel, scene, k, 0);
+        state->tool[k] = (PanelTool){.name = scene->tool[k].name, .what = panel->tool[k], .color = color[k]};
+    }
+    state->trainee = trainee;
+    state->title = scene->exercise ? scene->exercise->title : "Free practice";
+    state->instructions = scene->exercise ? scene->exercise->instructions : "No exercise is set in this scene: go where you like.";
+    if (scene->exercise) {
+        snprintf(panel->target, sizeof panel->target, "%s", scene->target[scene->exercise->target].name);
+        state->target = panel->target;
+        state->hold_needed_s = scene->exercise->hold_s;
+    }
+}
+
+static void add_figure(TrainerPanel *panel, const char *label, double value, const char *unit, int decimals, PanelMark mark)
+{
+    if (panel->state.figure_count < PANEL_FIGURES)
+        panel->figure[panel->state.figure_count++] = (PanelFigure){label, value, unit, decimals, mark};
+}
+
+static PanelMark mark_of_part(const Scene *scene, const ScoreFigures *score, ScorePart part)
+{
+    if (!scene->exercise || scene->exercise->par[part] <= 0)
+        return MARK_NONE;
+    return score->part[part] >= 1 ? MARK_GOOD : score->part[part] > 0.6 ? MARK_WARNING : MARK_BAD;
+}
+
+static void show_score(TrainerPanel *panel, const Scene *scene, const ScoreFigures *score)
+{
+    PanelState *state = &panel->state;
+    state->figure_count = state->error_count = 0;
+    state->figure = panel->figure;
+    if (scene->exercise)
+        add_figure(panel, "Points", score->points, "", 0, MARK_NONE);
+    add_figure(panel, "Time", score->time_s, "s", 0, mark_of_part(scene, score, PART_TIME));
+    add_figure(panel, "X-ray time", score->fluoroscopy_s, "s", 0, mark_of_part(scene, score, PART_FLUOROSCOPY));
+    add_figure(panel, "Contrast", score->contrast_ml, "ml", 1, mark_of_part(scene, score, PART_CONTRAST));
+    add_figure(panel, "Tip path", score->path_mm, "mm", 0, mark_of_part(scene, score, PART_PATH));
+    if (scene->exercise) {
+        add_figure(panel, "Way left", score->remaining_mm, "mm", 0, MARK_NONE);
+        add_figure(panel, "Efficiency", 100 * score->efficiency, "%", 0, MARK_NONE);
+    }
+    add_figure(panel, "Wall force, peak", score->wall_force_peak_n, "N", 2, mark_of_part(scene, score, PART_WALL_FORCE));
+    add_figure(panel, "Wall impulse", score->wall_impulse_n_s, "N s", 1, mark_of_part(scene, score, PART_WALL_IMPULSE));
+    add_figure(panel, "Tip force", score->tip_force_n, "N", 2, score->error[ERROR_TIP_FORCE].is_on ? MARK_BAD : MARK_NONE);
+    state->error = panel->error;
+    for (int i = 0; i < ERROR_COUNT && state->error_count < PANEL_ERRORS; i++) {
+        const ScoreErrorFigures *error = &score->error[i];
+        if (error->count == 0)
+            continue;
+        char *text = panel->error_text[state->error_count];
+        snprintf(text, sizeof panel->error_text[0], "%s%s: %d, last at %.1f s", error->is_on ? "NOW " : "", score_error_words[i], error->count, error->last_s);
+        panel->error[state->error_count++] = text;
+    }
+    state->hold_s = score->held_s;
+    state->is_finished = score->state == SCORE_REACHED || score->state == SCORE_TIME_OUT;
+    if (state->is_finished) {
+        snprintf(panel->instructions, sizeof panel->instructions, "%s: %.0f points in %.0f s with %d handling error%s. F4 begins anew; Esc ends.",
+                 score->state == SCORE_REACHED ? "Target reached and held" : "The time is over", score->points, score->time_s, score->error_total,
+                 score->error_total == 1 ? "" : "s");
+        state->instructions = panel->instructions;
+    }
+    state->fluoro_s = score->fluoroscopy_s;
+    state->contrast_ml = score->contrast_ml;
+}
+
+static void warn(TrainerPanel *panel, const Pose *pose, const RealtimeFigures *figures)
+{
+    PanelState *state = &panel->state;
+    const StepReport *report = &pose->report;
+    state->warnings = 0;
+    state->warning = NULL;
+    if (report->penetration > outside_mm || (report->flags & (STEP_DEEP | STEP_OUT_OF_VESSEL)))
+        state->warnings |= WARN_OUTSIDE;
+    if (report->flags & STEP_NOT_CONVERGED)
+        state->warnings |= WARN_NOT_CONVERGED;
+    const char *line = report->flags & STEP_FULLY_INSERTED ? "The whole tool is in: there is no more to push"
+                       : report->flags & STEP_HAND_SLIPS   ? "The hand slips along the tool: it asks for more force than the hand holds"
+                       : report->flags & STEP_LIMITED      ? "The tool takes less than the hand feeds: it is jammed, or it snaps"
+                                                           : NULL;
+    if (figures) {
+        if (figures->state == REALTIME_RUNNING && figures->real_time_factor > 0 && figures->real_time_factor < slow_factor)
+            state->warnings |= WARN_SLOW;
+        if (!figures->real_time_priority && pose->step > 0)
+            state->warnings |= WARN_NO_FIFO;
+        if (figures->state == REALTIME_DIVERGED)
+            line = "The simulation diverged: the session has ended with the last good state. F4 begins anew";
+        else if (figures->state == REALTIME_UNRECORDED)
+            line = "The recording could not be written (disk full?): the session has ended. F4 begins anew";
+    }
+    if (line) {
+        snprintf(panel->warning, sizeof panel->warning, "%s", line);
+        state->warning = panel->warning;
+    }
+}
+
+void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pose, const ScoreFigures *score, const RealtimeFigures *figures,
+                        const XrayControl *xray)
+{
+    PanelState *state = &panel->state;
+    state->time_s = pose->time_s;
+    for (int k = 0; k < state->tool_count && k < pose->tool_count; k++) {
+        const PoseTool *from = &pose->tool[k];
+        PanelTool *tool = &state->tool[k];
+        if (from->fitted != panel->fitted[k])
+            name_device(panel, scene, k, from->fitted);
+        tool->inserted_mm = from->inserted_mm;
+        tool->turned_deg = from->turned_deg;
+        tool->push_mm_s = from->command.push_mm_s;
+        tool->twist_deg_s = from->command.twist_deg_s;
+        tool->force_n = from->push_n;
+        tool->torque_n_mm = from->torque_n_mm;
+        bool is_in = from->node_count > 0 && from->inserted_mm >= from->node[from->node_count - 1].s - 1e-6;
+        tool->note = from->is_let_go ? "let go" : is_in && scene->wire.has_sheath ? "all of it is in" : NULL;
+        tool->mark = tool->note ? MARK_WARNING : MARK_NONE;
+    }
+    state->wall_max_n = pose->report.wall_force_max;
+    state->wall_sum_n = pose->report.wall_force_sum;
+    state->xray = *xray;
+    state->mode = xray->mode == XRAY_DSA ? PANEL_DSA : xray->mode == XRAY_ROADMAP ? PANEL_ROADMAP : xray->pedal > 0 ? PANEL_LIVE : PANEL_LIH;
+    if (figures) {
+        state->is_paused = figures->state == REALTIME_PAUSED;
+        state->step_median_us = figures->step_us[0];
+        state->step_p999_us = figures->step_us[1];
+        state->real_time_factor = figures->real_time_factor;
+        state->missed_deadlines = figures->deadline_misses;
+    }
+    show_score(panel, scene, score);
+    warn(panel, pose, figures);
+}
+
+// What lies where in the 3D view: targets with their distance from the tip, the sheath's mouth.
+static void label_scene(TrainerPanel *panel, const Desk *desk, const VesselScene *scene)
+{
+    PanelState *state = &panel->state;
+    VesselSceneLabel found[PANEL_LABELS];
+    int count = vessel_scene_labels(scene, found, PANEL_LABELS);
+    state->label_count = 0;
+    state->label = panel->label;
+    for (int i = 0; i < count && i < PANEL_LABELS; i++) {
+        const VesselSceneLabel *it = &found[i];
+        if (!it->is_in_view || (it->kind == LABEL_TIP && state->tool_count < 2) || (it->kind == LABEL_TARGET && !desk->look.show_targets))
+            continue;
+        char *text = panel->label_text[state->label_count];
+        if (it->kind == LABEL_TARGET && isfinite(it->distance_mm))
+            snprintf(text, sizeof panel->label_text[0], "%.63s, %.0f mm", it->name, it->distance_mm);
+        else
+            snprintf(text, sizeof panel->label_text[0], "%.63s", it->name);
+        panel->label[state->label_count++] = (PanelLabel){it->x, it->y, it->radius, text};
+    }
+    ScaleBar bar = vessel_scene_scale_bar(scene, 140);
+    state->bar_mm = bar.length_mm;
+    state->bar_pixels = bar.pixels;
+    state->force_full_scale_n = desk->look.force_full_scale_n;
+}
+
+void trainer_panel_views(TrainerPanel *panel, const Desk *desk, Views *views, const XrayControl *xray)
+{
+    PanelState *state = &panel->state;
+    FluoroscopeState fluoroscope = fluoroscope_state(views_fluoroscope(views));
+    label_scene(panel, desk, views_scene(views));
+    state->chosen_tool = desk->grip.chosen;
+    state->view = desk->view;
+    state->is_following = desk->look.follow_tip;
+    state->has_section = desk->look.section;
+    state->has_model = desk->look.show_model;
+    state->has_arrows = desk->look.show_arrows;
+    state->is_pedal_latched = desk->pedal_latched;
+    const char *line = fluoroscope.is_out_of_beam ? "Part of the vessel lies beside the beam: no contrast is drawn. Move the table or the C-arm back"
+                       : xray->mode == XRAY_DSA && fluoroscope.mask_has_moved ? "C-arm, table or field have moved since the mask was taken: M takes a new one"
+                                                                              : NULL;
+    if (line && !state->warning) {
+        snprintf(panel->warning, sizeof panel->warning, "%s", line);
+        state->warning = panel->warning;
+    }
+    state->is_roadmap_ready = xray->mode == XRAY_DSA ? fluoroscope.has_mask : fluoroscope.has_roadmap;
+}
+
+void trainer_panel_injection(TrainerPanel *panel, const Scene *scene, int tool, double flow_ml_s, const XrayControl *xray)
+{
+    const double well = 0.9;     // of what is asked for
+    double asked = (double)xray->contrast_ml_s;
+    if (!(asked > 0) || tool < 0 || flow_ml_s >= well * asked || panel->state.warning)
+        return;
+    const char *name = scene->tool[tool].name, *way = tool + 1 < scene->tool_count ? "; more once what lies in it is drawn back" : "";
+    if (flow_ml_s < 0.01 * asked)
+        snprintf(panel->warning, sizeof panel->warning, "Next to no contrast agent goes through %s: its lumen is full%s", name, way);
+    else
+        snprintf(panel->warning, sizeof panel->warning, "The injector's pressure brings %.2g of %.2g ml/s through the lumen of %s%s", flow_ml_s, asked, name, way);
+    panel->state.warning = panel->warning;
+}
+
+void trainer_panel_grip(TrainerPanel *panel, const HandGrip *grip)
+{
+    PanelState *state = &panel->state;
+    double force[PANEL_TOOLS], torque[PANEL_TOOLS];
+    for (int k = 0; k < state->tool_count; k++)
+        force[k] = state->tool[k].force_n, torque[k] = state->tool[k].torque_n_mm;
+    for (int k = 0; k < state->tool_count; k++) {
+        int first = hand_grip_lead(grip, k), last = k;
+        while (last + 1 < state->tool_count && hand_grip_lead(grip, last + 1) == first)
+            last++;
+        if (last == first || state->tool[k].note)
+            continue;
+        snprintf(panel->tool_note[k], sizeof panel->tool_note[k], "locked %d%s%d", first + 1, last > first + 1 ? " to " : " and ", last + 1);
+        state->tool[k].note = panel->tool_note[k];
+        state->tool[k].force_n = hand_grip_sum(grip, state->tool_count, k, force);
+        state->tool[k].torque_n_mm = hand_grip_sum(grip, state->tool_count, k, torque);
+    }
+    state->is_pair_locked = hand_grip_pair_is_locked(grip, state->tool_count);
+    state->is_let_go = grip->released >> grip->chosen & 1;
+}

@@ -1,0 +1,128 @@
+// What is wrong with the cache is never an error: the shape is then fitted.
+#include "sim/fitted_shape.h"
+
+#include "base/sha256.h"
+#include "recon/fit/field_fit.h"
+#include "recon/phantom/phantom.h"
+#include "recon/tree_file.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { CACHE_PATH = 4096 };
+
+// The folder of the cache, made where it is not there; false where there is none to be had.
+static bool cache_folder(char folder[CACHE_PATH])
+{
+    const char *own = getenv("SELDINGER_CACHE"), *xdg = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
+    int length = -1;
+    if (own && *own)
+        length = snprintf(folder, CACHE_PATH, "%s", own);
+    else if (xdg && *xdg)
+        length = snprintf(folder, CACHE_PATH, "%s/seldinger", xdg);
+    else if (home && *home)
+        length = snprintf(folder, CACHE_PATH, "%s/.cache/seldinger", home);
+    if (length <= 0 || length >= CACHE_PATH - 128)
+        return false;
+    for (char *at = folder + 1; *at; at++) {
+        if (*at != '/')
+            continue;
+        *at = 0;
+        bool made = mkdir(folder, 0777) == 0 || errno == EEXIST;
+        *at = '/';
+        if (!made)
+            return false;
+    }
+    return (mkdir(folder, 0777) == 0 || errno == EEXIST) && access(folder, R_OK | W_OK | X_OK) == 0;
+}
+
+// The key holds all that the fit depends on: the shape with its options, the fit's options, and the program itself, so that a newer program
+// never takes an older one's fit.
+static void cache_key(const Scene *scene, const LimFitOptions *options, char hex[65])
+{
+    bool local = contact_is_local(scene->contact);
+    Sha256 sha;
+    char program[65] = SELDINGER_VERSION;
+    sha256_of_file("/proc/self/exe", program);
+    double figures[] = {options->alpha,
+                        options->beta,
+                        options->s,
+                        options->iso_level,
+                        options->max_blobs,
+                        options->target_mm,
+                        options->topological_distance,
+                        options->max_loops,
+                        options->line_searches,
+                        options->voxel_mm,
+                        options->weigh_distance,
+                        options->project_points,
+                        options->sweep_all_blobs,
+                        options->give_up_splits,
+                        options->extend_inlet,
+                        options->guard_shape,
+                        options->max_points};
+    sha256_begin(&sha);
+    sha256_add(&sha, program, strlen(program));
+    sha256_add(&sha, figures, sizeof figures);
+    sha256_add(&sha, &local, sizeof local);
+    sha256_add(&sha, scene->shape_name, strlen(scene->shape_name) + 1);
+    for (int i = 0; i < scene->shape_option_count; i++)
+        for (int j = 0; j < 2; j++)
+            sha256_add(&sha, scene->shape_option[i][j], strlen(scene->shape_option[i][j]) + 1);
+    sha256_end(&sha, hex);
+}
+
+VesselTree *fit_samples(const VesselTree *sampled, ContactKind contact, const LimFitOptions *options, const Progress *progress, Faults *faults)
+{
+    if (contact_is_local(contact))
+        return lim_fit(sampled, options, progress, faults);
+    FieldFitOptions shared = field_fit_default_options();
+    shared.voxel_mm = options->voxel_mm;
+    shared.threads = options->threads;
+    return field_fit(sampled, &shared, progress, faults);
+}
+
+static VesselTree *fit_shape(const Scene *scene, const LimFitOptions *options, const Progress *progress, Faults *faults)
+{
+    VesselTree *sampled =
+        shape_tree(scene->shape_name, scene->shape_option_count, (const char(*)[2][64])scene->shape_option, scene->path, faults);
+    VesselTree *model = sampled ? fit_samples(sampled, scene->contact, options, progress, faults) : NULL;
+    vessel_tree_free(sampled);
+    return model;
+}
+
+VesselTree *fitted_shape(const Scene *scene, int threads, const Progress *progress, Faults *faults)
+{
+    LimFitOptions options = lim_fit_default_options();
+    // exact samples deserve a tighter fit than an angiogram's
+    options.voxel_mm = shape_options_voxel_mm(scene->shape_option_count, (const char(*)[2][64])scene->shape_option);
+    options.threads = threads;
+    char folder[CACHE_PATH], path[CACHE_PATH] = "", hex[65];
+    Faults *ignored = calloc(1, sizeof *ignored);
+    VesselTree *model = NULL;
+    if (ignored && cache_folder(folder)) {
+        cache_key(scene, &options, hex);
+        snprintf(path, sizeof path, "%.4000s/fit-%.32s.h5", folder, hex);
+        if (access(path, R_OK) == 0)
+            model = tree_file_load(path, NULL, ignored);
+        if (model && !vessel_tree_is_model(model)) {
+            vessel_tree_free(model);
+            model = NULL;
+        }
+    }
+    if (!model) {
+        model = fit_shape(scene, &options, progress, faults);
+        char source[sizeof scene->shape_name];
+        strcpy(source, scene->shape_name);
+        char created_by[] = "seldinger " SELDINGER_VERSION, parameters[] = "";
+        TreeFileInfo info = {.source = source, .parameters = parameters, .created_by = created_by};
+        if (model && *path)
+            tree_file_save(model, &info, path, ignored);
+    }
+    free(ignored);
+    return model;
+}

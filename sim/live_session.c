@@ -1,0 +1,100 @@
+#include "sim/live_session.h"
+
+#include "sim/replay.h"
+
+#include <stdio.h>
+#include <string.h>
+
+typedef struct TakeOver {
+    LiveSession *session;
+    const LiveSessionOptions *options;
+    int64_t done, steps;
+} TakeOver;
+
+static bool take_over_step(void *context, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray)
+{
+    enum { TELL_EVERY = 64 };
+    TakeOver *take_over = context;
+    LiveSession *session = take_over->session;
+    if (take_over->options->progress && ++take_over->done % TELL_EVERY == 0)
+        take_over->options->progress(take_over->options->progress_context, (double)take_over->done / (double)take_over->steps);
+    lesson_step(session->lesson, simulator, commands, xray);
+    session->resumed_released = commands->released;
+    memcpy(session->resumed_fitted, commands->fitted, sizeof session->resumed_fitted);
+    return !session->recording || recording_step(session->recording, simulator, commands, xray);
+}
+
+static bool take_over(LiveSession *session, const LiveSessionOptions *options, Faults *faults)
+{
+    const RecordedRun *run = options->resume;
+    int64_t steps = 0;
+    if (!replay_fits(run, session->simulator, faults))
+        return false;
+    while (steps < run->step_count && run->time_s[steps] <= options->resume_s + 1e-9)
+        steps++;
+    TakeOver through = {session, options, 0, steps};
+    ReplayVerdict verdict = replay_verify(session->simulator, run, steps, false, take_over_step, &through);
+    session->resumed_s = simulator_time_s(session->simulator);
+    if (verdict.first_different < 0)
+        return true;
+    faults_add(faults, session->scene->path, 0, 0, "the recording cannot be resumed: step %lld gives another state than it holds; `seldinger replay --verify` says more",
+               (long long)verdict.first_different);
+    return false;
+}
+
+bool live_session_open(LiveSession *session, const Scene *scene, const OpenVessel *open, const LiveSessionOptions *options, Faults *faults)
+{
+    *session = (LiveSession){.scene = scene};
+    session->simulator = simulator_create(scene, open->vessel, faults);
+    session->lesson = session->simulator ? lesson_create(session->simulator, open->tree) : NULL;
+    if (session->simulator && !session->lesson)
+        faults_add(faults, scene->path, 0, 0, "no memory for a session");
+    if (session->lesson && options->record_path) {
+        RecordingOptions record = recording_session_options();
+        record.trainee = options->trainee;
+        record.date = options->date;
+        snprintf(session->record_path, sizeof session->record_path, "%s", options->record_path);
+        session->recording = recording_create(options->record_path, session->simulator, &record, faults);
+    }
+    bool good = session->lesson && (session->recording || !options->record_path) && (!options->resume || take_over(session, options, faults));
+    if (good) {
+        RealtimeOptions realtime = realtime_default_options();
+        realtime.simulator = session->simulator;
+        realtime.recording = session->recording;
+        realtime.hand_count = options->hand_count;
+        realtime.hand = options->hand;
+        realtime.grip = options->grip;
+        realtime.grip.released |= session->resumed_released;
+        if (options->resume)
+            memcpy(realtime.grip.fitted, session->resumed_fitted, sizeof session->resumed_fitted);
+        realtime.xray = options->xray;
+        realtime.paused = options->paused;
+        realtime.after_step = lesson_step;
+        realtime.publish = lesson_publish;
+        realtime.context = session->lesson;
+        realtime.extra_bytes = lesson_view_bytes(session->lesson);
+        session->realtime = realtime_start(&realtime, faults);
+        good = session->realtime != NULL;
+    }
+    if (good)
+        return true;
+    recording_abandon(session->recording);
+    live_session_free(session);
+    return false;
+}
+
+bool live_session_stop(LiveSession *session, RealtimeFigures *figures, Faults *faults)
+{
+    *figures = realtime_stop(session->realtime);
+    session->realtime = NULL;
+    bool whole = !session->recording || recording_close(session->recording, session->simulator, faults);
+    session->recording = NULL;
+    return whole;
+}
+
+void live_session_free(LiveSession *session)
+{
+    lesson_free(session->lesson);
+    simulator_destroy(session->simulator);
+    *session = (LiveSession){0};
+}

@@ -1,0 +1,176 @@
+// What a scene's `vessel:` names, opened: a fitted model, a shape that is fitted on the fly and cached, an exact tube, a plane, a mesh; and turned into
+// triangles or a grid where `contact:` asks for that.
+#include "sim/open_vessel.h"
+
+#include "geom/mesh_vessel.h"
+#include "geom/tube_mesh.h"
+#include "recon/fit/lim_fit.h"
+#include "recon/phantom/phantom.h"
+#include "recon/tree_file.h"
+#include "sim/contact_surface.h"
+#include "sim/fitted_shape.h"
+#include "sim/tube_tree.h"
+
+#include <stdlib.h>
+
+enum { CELLS_ROUND_TUBE = 40 };
+
+static bool open_tree(VesselTree *tree, ContactKind contact, const char *path, OpenVessel *out, Faults *faults)
+{
+    if (!tree)
+        return false;
+    out->tree = tree;
+    if (!vessel_tree_is_model(tree)) {
+        faults_add(faults, path, 0, 0, "is a tree without a model; make one with `seldinger fit`");
+        return false;
+    }
+    if (contact_is_local(contact) && vessel_tree_is_shared(tree)) {
+        faults_add(faults, path, 0, 0, "holds one field of shared blobs, where contact '%s' needs a local model for each node; `seldinger fit --preset local` makes "
+                   "these, contact 'lim' takes either", contact_name[contact]);
+        return false;
+    }
+    LimVesselOptions local = lim_vessel_default_options();
+    local.field = contact == CONTACT_LIM_SWITCH ? LIM_SWITCH : LIM_BLEND;
+    out->vessel = vessel_tree_is_shared(tree) ? field_vessel_create(tree) : lim_vessel_create_with(tree, &local);
+    if (!out->vessel)
+        faults_add(faults, path, 0, 0, "not enough memory for its contact");
+    return out->vessel != NULL;
+}
+
+// Contact 'lim' of a tube: the exact tube gives the samples, its fit takes its place.
+static bool fit_tube(const Scene *scene, const OpenVesselOptions *options, OpenVessel *out, Faults *faults)
+{
+    LimFitOptions fit = lim_fit_default_options();
+    fit.voxel_mm = shape_options_voxel_mm(0, NULL);
+    fit.threads = options->threads;
+    VesselTree *sampled = tube_tree(out->vessel, &scene->tube, scene->path, faults);
+    VesselTree *model = sampled ? fit_samples(sampled, scene->contact, &fit, options->progress, faults) : NULL;
+    vessel_tree_free(sampled);
+    out->vessel->destroy(out->vessel);
+    out->vessel = NULL;
+    return open_tree(model, scene->contact, scene->path, out, faults);
+}
+
+// The wall of the open vessel as triangles or a grid, in its place. A tree stays: it says where the vessel runs.
+static bool turn_into_surface(const Scene *scene, const OpenVesselOptions *options, OpenVessel *out, Faults *faults)
+{
+    bool is_tube = scene->source == SOURCE_TUBE;
+    Vessel *exact = out->vessel;
+    VesselTree *nodes = is_tube ? tube_tree(exact, &scene->tube, scene->path, faults) : out->tree;
+    double cell = scene->mesh_cell;
+    if (nodes && !(cell > 0))
+        cell = is_tube ? 2 * PI * scene->tube.radius / CELLS_ROUND_TUBE : isosurface_cell_for(nodes);
+    out->mesh = nodes ? contact_surface_mesh(exact, nodes, is_tube && !scene->tube.closed_ends, cell, scene->path, options->note, faults) : NULL;
+    out->vessel = out->mesh ? contact_surface_vessel(scene->contact, exact, out->mesh, cell, scene->path, faults) : NULL;
+    exact->destroy(exact);
+    if (is_tube)
+        vessel_tree_free(nodes);
+    return out->vessel != NULL;
+}
+
+// The sheath's mouth must lie in the lumen: with a mesh of another frame or unit it does not.
+static bool entry_is_inside(const Scene *scene, const Vessel *vessel, Faults *faults)
+{
+    Vec3 x = vec3_add_scaled(scene->wire.start, fmax(scene->wire.inserted, 0.5), scene->wire.direction);
+    VesselMemory memory = {.node = vessel->locate(vessel, x, -1)};
+    VesselHit hit;
+    if (!scene->wire.has_sheath)
+        return true;
+    vessel_query(vessel, 1, &x, 1, &memory, &hit);
+    if (!(hit.flags & VESSEL_OPEN_END) && hit.gap > 0)
+        return true;
+    faults_add(faults, scene->path, 0, 0, "the tool's tip at the start, (%g, %g, %g) mm, is not inside of the mesh %s; put the sheath's entry into its lumen",
+               x.x, x.y, x.z, scene->mesh_path);
+    return false;
+}
+
+static bool open_mesh(const Scene *scene, const OpenVesselOptions *options, OpenVessel *out, Faults *faults)
+{
+    out->mesh = contact_surface_load(scene->mesh_path, scene->mesh_scale, options->note, faults);
+    if (!out->mesh)
+        return false;
+    ContactKind kind = scene->contact == CONTACT_GRID ? CONTACT_MESH : scene->contact;
+    Vessel *mesh = out->vessel = contact_surface_vessel(kind, NULL, out->mesh, 0, scene->mesh_path, faults);
+    if (mesh && scene->contact == CONTACT_GRID) {
+        double cell = scene->mesh_cell > 0 ? scene->mesh_cell : contact_surface_edge(out->mesh);
+        out->vessel = contact_surface_vessel(CONTACT_GRID, mesh, out->mesh, cell, scene->mesh_path, faults);
+        mesh->destroy(mesh);
+    }
+    return out->vessel && entry_is_inside(scene, out->vessel, faults);
+}
+
+static bool open_source(const Scene *scene, const OpenVesselOptions *options, OpenVessel *out, Faults *faults)
+{
+    switch (scene->source) {
+    case SOURCE_NONE: return true;
+    case SOURCE_MODEL: return open_tree(tree_file_load(scene->model_path, NULL, faults), scene->contact, scene->model_path, out, faults);
+    case SOURCE_SHAPE: return open_tree(fitted_shape(scene, options->threads, options->progress, faults), scene->contact, scene->path, out, faults);
+    case SOURCE_MESH: return open_mesh(scene, options, out, faults);
+    case SOURCE_TUBE:
+        out->vessel = tube_vessel_create(&scene->tube, scene->path, faults);
+        return out->vessel && (!contact_is_fitted(scene->contact) || fit_tube(scene, options, out, faults));
+    case SOURCE_PLANE:
+        out->vessel = plane_vessel_create(scene->plane_point, scene->plane_normal);
+        if (!out->vessel)
+            faults_add(faults, scene->path, 0, 0, "no memory for the plane");
+        return out->vessel != NULL;
+    }
+    return false;
+}
+
+bool open_vessel(const Scene *scene, const OpenVesselOptions *options, OpenVessel *out, Faults *faults)
+{
+    int before = faults->count;
+    *out = (OpenVessel){0};
+    bool as_mesh = scene->contact == CONTACT_MESH || scene->contact == CONTACT_SMOOTH_MESH || scene->contact == CONTACT_FLAT_MESH,
+          as_surface = as_mesh || scene->contact == CONTACT_GRID;
+    bool exact = scene->source == SOURCE_TUBE || scene->source == SOURCE_PLANE;
+    const char *name = contact_name[scene->contact];
+    if (scene->source == SOURCE_NONE)
+        return true;
+    if (scene->contact == CONTACT_TUBE && !exact)
+        faults_add(faults, scene->path, 0, 0, "contact 'tube' needs the source 'tube'; a model or shape has lim, lim_blend, lim_switch, mesh, smooth_mesh, "
+                   "flat_mesh and grid, a mesh the last four");
+    else if (contact_is_fitted(scene->contact) && scene->source == SOURCE_MESH)
+        faults_add(faults, scene->path, 0, 0, "contact '%s' needs a fitted model: make it with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh, "
+                   "flat_mesh and grid", name);
+    else if (as_surface && scene->source == SOURCE_PLANE)
+        faults_add(faults, scene->path, 0, 0, "contact '%s' needs a wall that ends somewhere; a plane has 'tube', which is the plane itself", name);
+    else if ((as_mesh || scene->source == SOURCE_MESH) && !mesh_vessel_available())
+        faults_add(faults, scene->path, 0, 0, "contact '%s' of this vessel needs Embree, and this program was built without it; install libembree-dev and "
+                   "build again, or take another contact", name);
+    return faults->count == before && open_source(scene, options, out, faults) &&
+           (!as_surface || scene->source == SOURCE_MESH || turn_into_surface(scene, options, out, faults));
+}
+
+const TriangleMesh *open_vessel_mesh(const Scene *scene, OpenVessel *open)
+{
+    if (open->mesh)
+        return open->mesh;
+    if (open->tree)
+        open->mesh = isosurface_of_tree(open->tree, isosurface_cell_for(open->tree));
+    else if (scene->source == SOURCE_TUBE)
+        open->mesh = triangle_mesh_of_tube(&scene->tube);
+    else if (scene->source == SOURCE_PLANE)
+        open->mesh = triangle_mesh_of_plane(scene->plane_point, scene->plane_normal, 50);
+    return open->mesh;
+}
+
+bool open_vessel_inlet(Scene *scene, const OpenVessel *open, Faults *faults)
+{
+    if (!scene->inlet_is_root)
+        return true;
+    if (open->vessel && open->vessel->inlet && open->vessel->inlet(open->vessel, &scene->wire.start, &scene->wire.direction))
+        return true;
+    faults_add(faults, scene->path, 0, 0, "'inlet: root' finds no inlet in this vessel; give 'entry_mm' and 'direction'");
+    return false;
+}
+
+void open_vessel_close(OpenVessel *open)
+{
+    if (open->vessel)
+        open->vessel->destroy(open->vessel);
+    vessel_tree_free(open->tree);
+    triangle_mesh_free(open->mesh);
+    *open = (OpenVessel){0};
+}

@@ -1,0 +1,20 @@
+// What a run leaves: the summary as JSON, the final state as CSV, a few lines for people.
+#ifndef SELDINGER_SIM_RUN_SUMMARY_H
+#define SELDINGER_SIM_RUN_SUMMARY_H
+
+#include "sim/drive.h"
+
+#include <stdio.h>
+
+// How far the last state's deepest node is outside the wall [mm], from a node report.
+double run_final_penetration_mm(const NodeReport *node, int node_count);
+// A node left the vessel: beyond an open end, or so far outside the wall that the wall no longer holds it.
+bool run_left_vessel(const RunTotals *totals);
+
+// Text of the summary (shared/CONTRACT.md, plus "targets"); the caller frees it. NULL where memory lacks.
+char *run_summary_json(Simulator *simulator, const DriveReport *drive, const NodeReport *node);
+// Text of the final state, one row a node.
+char *run_final_csv(Simulator *simulator, const NodeReport *node, size_t *length);
+void run_print(FILE *out, Simulator *simulator, const DriveReport *drive, const NodeReport *node);
+
+#endif

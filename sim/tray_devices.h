@@ -1,0 +1,32 @@
+// What lies on the tray for a tool: its devices in the scene, and those of a folder that would fit. A device that is not in the scene yet, or whose tip is
+// shaped by hand, is written into the scene's text under `exchange:`, so that a session's recording holds all that it was made from.
+#ifndef SELDINGER_SIM_TRAY_DEVICES_H
+#define SELDINGER_SIM_TRAY_DEVICES_H
+
+#include "sim/scene.h"
+
+enum { TRAY_DEVICES = 48, TRAY_TITLE = 120 };
+
+typedef struct TrayDevice {
+    SceneTool tool;          // its sections are the tray's
+    int which;               // 0 as the scene has it, 1, 2, … under its `exchange:`; -1: the scene does not have it yet
+    char title[TRAY_TITLE];
+} TrayDevice;
+
+typedef struct TrayDevices {
+    int tool;                // of the scene, outermost first
+    int count;
+    TrayDevice device[TRAY_DEVICES];
+} TrayDevices;
+
+// Finds them. `library`: a folder of device files (*.yaml), or NULL for the scene's own devices alone; each is cut to the length and divided into the elements of
+// the scene's tool, and left out where it is of another kind, does not fit the tools around it and within it, or cannot be read. False when out of memory.
+bool tray_devices_find(TrayDevices *tray, const Scene *scene, int tool, const char *library);
+void tray_devices_free(TrayDevices *tray);
+// `from` with its tip shaped. False with the reason in `why` where it does not keep that shape.
+bool tray_device_shape(const TrayDevice *from, const TipShaping *tip, TrayDevice *shaped, char *why, size_t capacity);
+void tray_device_free(TrayDevice *device);
+// The scene with this device as the last one that may take the place of `tool`; `tip` (length 0: none) is written with it. NULL with faults.
+Scene *tray_scene_with(const Scene *scene, int tool, const TrayDevice *device, const TipShaping *tip, Faults *faults);
+
+#endif
