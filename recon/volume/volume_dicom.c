@@ -1,5 +1,6 @@
 // DICOM (PS3.5 encoding, PS3.3 C.7.6 image modules): a series of single-frame files, or one multi-frame file with a place for each frame (enhanced
-// CT, MR, XA 3D). Uncompressed: implicit and explicit little endian, explicit big endian; with or without the preamble.
+// CT, MR, XA 3D). Implicit and explicit little endian, explicit big endian; with or without the preamble. Compressed pixels are unpacked by a program of
+// their own, seldinger-dicom (volume_dicom_pixels.h); what says where they lie is read here.
 //
 // Voxel (i, j) of slice k lies at ImagePositionPatient_k + i dx u + j dy v, where ImageOrientationPatient = (u, v) and PixelSpacing = (dy, dx). Slices are
 // put in order of their place along u x v; the step between them is that of the places (SliceThickness says how thick, not how far apart), so that a
@@ -10,6 +11,7 @@
 #include "recon/volume/volume_dicom.h"
 
 #include "base/regular_file.h"
+#include "recon/volume/volume_dicom_pixels.h"
 
 #include <ctype.h>
 #include <dirent.h>
@@ -355,18 +357,15 @@ static bool take_meta(Cursor *c, DicomImage *image)
     return true;
 }
 
+// Uncompressed.
+static size_t bytes_of_pixels(const DicomImage *m) { return (size_t)m->rows * (size_t)m->columns * (size_t)m->frames * (size_t)(m->allocated / 8); }
+
 static bool check_image(const Cursor *c, const DicomImage *m)
 {
     const char *path = c->path;
     Faults *faults = c->faults;
     if (!m->has_pixels || m->rows < 1 || m->columns < 1) {
         faults_add_at_byte(faults, path, c->offset + c->at, "a DICOM file without an image (rows, columns, pixel data); the files of an image series");
-        return false;
-    }
-    if (m->is_encapsulated) {
-        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "the pixels are compressed (transfer syntax %s); uncompressed: `gdcmconv --raw "
-                           "IN.dcm OUT.dcm`",
-                           m->syntax[0] ? m->syntax : "not named");
         return false;
     }
     int before = faults->count;
@@ -383,10 +382,10 @@ static bool check_image(const Cursor *c, const DicomImage *m)
     if (faults->count > before)
         return false;
     // rows and columns have 16 bits, frames 31: no overflow
-    size_t needed = (size_t)m->rows * (size_t)m->columns * (size_t)m->frames * (size_t)(m->allocated / 8), there = c->length - m->pixel_place;
+    size_t needed = bytes_of_pixels(m), there = c->length - m->pixel_place;
     if (there > m->pixel_length)
         there = m->pixel_length;
-    if (needed > there) {
+    if (needed > there && !m->is_encapsulated) {
         faults_add_at_byte(faults, path, c->offset + m->pixel_place + there, "the pixels end after %zu of %zu bytes (%ld x %ld, %ld frames, %ld "
                            "bits); the whole file",
                            there, needed, m->columns, m->rows, m->frames, m->allocated);
@@ -622,7 +621,55 @@ bool dicom_bytes_read(const char *path, FileBytes *out, Faults *faults)
     return false;
 }
 
+// A file whose slices are taken, its pixels uncompressed.
+typedef struct OpenFile {
+    const DicomFile *file;
+    DicomImage image;        // how the pixels of `from` lie; its planes are none of ours
+    FileBytes own;
+    const FileBytes *from;
+} OpenFile;
+
+static void file_close(OpenFile *open)
+{
+    file_bytes_free(&open->own);
+    *open = (OpenFile){0};
+}
+
+static bool unpack(OpenFile *open, Faults *faults)
+{
+    enum { HEADER_ROOM = 1 << 20 };      // more than a header grows when it is written anew
+    const DicomImage *m = &open->file->image;
+    DicomImage plain;
+    if (!dicom_unpack(open->file->path, m->pixel_place, m->syntax, m->pixel_place + bytes_of_pixels(m) + HEADER_ROOM, &open->own, faults) ||
+        !read_image(&open->own, &plain, faults))
+        return false;
+    image_free(&plain);
+    open->from = &open->own;
+    // what the bits of a sample mean says the file's own header: a decoder widens them to what the compressed stream could hold
+    open->image = *m;
+    open->image.pixel_place = plain.pixel_place;
+    open->image.big_endian = plain.big_endian;
+    open->image.is_words = plain.is_words;
+    if (!plain.is_encapsulated && plain.rows == m->rows && plain.columns == m->columns && plain.frames == m->frames && plain.allocated == m->allocated)
+        return true;
+    faults_add_at_byte(faults, open->file->path, m->pixel_place, "the compressed pixels unpack to an image of another size than its header says; an intact file");
+    return false;
+}
+
 // `whole`: the bytes of the only file, or NULL where they are read file by file.
+static bool file_open(OpenFile *open, const DicomFile *file, const FileBytes *whole, Faults *faults)
+{
+    if (open->file == file)
+        return true;
+    file_close(open);
+    open->file = file;
+    if (file->image.is_encapsulated)
+        return unpack(open, faults);
+    open->image = file->image;
+    open->from = whole ? whole : &open->own;
+    return whole || dicom_bytes_read(file->path, &open->own, faults);
+}
+
 static Volume *assemble(const Series *series, const FileBytes *whole, Faults *faults)
 {
     size_t total = 0;
@@ -659,21 +706,19 @@ static Volume *assemble(const Series *series, const FileBytes *whole, Faults *fa
         good = volume_header_check(&header, first->path, 0, faults) && (volume = volume_of_header(&header, first->path, faults)) != NULL;
     }
     size_t voxels = good ? (size_t)header.size[0] * (size_t)header.size[1] : 0;
+    OpenFile open = {0};
     for (int i = 0; good && i < count; i++) {
         const DicomFile *file = slice[i].file;
-        FileBytes bytes = {0};
-        good = whole || dicom_bytes_read(file->path, &bytes, faults);
-        const FileBytes *from = whole ? whole : &bytes;
-        size_t length = voxels * (size_t)(file->image.allocated / 8), start = file->image.pixel_place + (size_t)slice[i].frame * length;
-        if (good && (start > from->length || from->length - start < length)) {
-            faults_add_at_byte(faults, file->path, from->length, "the file became shorter while it was read");
-            good = false;
-        }
+        if (!(good = file_open(&open, file, whole, faults)))
+            break;
+        size_t length = voxels * (size_t)(open.image.allocated / 8), start = open.image.pixel_place + (size_t)slice[i].frame * length;
+        good = start <= open.from->length && open.from->length - start >= length;
         if (good)
-            convert_slice(&file->image, &slice[i].plane, from->byte + start, volume->value + (size_t)i * voxels);
-        if (!whole)
-            file_bytes_free(&bytes);
+            convert_slice(&open.image, &slice[i].plane, open.from->byte + start, volume->value + (size_t)i * voxels);
+        else
+            faults_add_at_byte(faults, file->path, open.from->length, "the file became shorter while it was read");
     }
+    file_close(&open);
     if (good) {
         FileBytes data = {.path = first->path};
         good = volume_finish_values(volume, &data, first->image.pixel_place, 0, faults);

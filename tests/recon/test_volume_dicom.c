@@ -1,7 +1,9 @@
 // DICOM series, from files that the test builds byte by byte: encodings, sample layouts, places, what is refused. A volume's truth is a function of the
 // point in space, so that order, orientation and spacing are checked at once.
+#include "base/process.h"
 #include "recon/volume/volume_file.h"
 #include "tests/recon/dicom_file.h"
+#include "tests/short_run.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -13,7 +15,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { NX = 5, NY = 4, NZ = 6 };
+enum { NX = 33, NY = 32, NZ = 6 };     // JPEG 2000 as gdcmconv writes it takes no less
 
 typedef struct Setting {
     DicomEncoding encoding;
@@ -46,8 +48,8 @@ static Vec3 place_of(const Setting *s, int i, int j, int k)
     return vec3_add_scaled(vec3_add_scaled(p, k * dz + (k >= 3 ? s->gap : 0), w), k * s->shear, u);
 }
 
-// A whole number from 0 to 230 that says where one is.
-static int truth(int i, int j, int k) { return 10 + i + 7 * j + 29 * k; }
+// A whole number from 0 to 230 that differs from all neighbours.
+static int truth(int i, int j, int k) { return 10 + i + 3 * j + 17 * k; }
 
 static void decimals(DicomBytes *d, uint32_t tag, int count, const double *x)
 {
@@ -138,6 +140,13 @@ static void build_slice(DicomBytes *d, const Setting *s, int k)
     }
     dicom_head(d, 0x7fe00010u, "OW", NX * NY * s->allocated / 8);
     put_samples(d, s, k, slope, intercept);
+}
+
+static const char *in_folder(const char *name)
+{
+    static char path[256];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    return path;
 }
 
 static void write_file(const char *name, const DicomBytes *d, size_t length)
@@ -349,7 +358,7 @@ static void what_is_refused(void **state)
     s.series = "1.2.4";
     write_series(&s, "other");
     assert_null(load(""));
-    assert_true(has_fault("several series") && has_fault("im0: a series of 6 files, 5 x 4 pixels, CT") && has_fault("other0: a series of 6 files"));
+    assert_true(has_fault("several series") && has_fault("im0: a series of 6 files, 33 x 32 pixels, CT") && has_fault("other0: a series of 6 files"));
     volume = load("other4");
     assert_true_volume(volume, &s);
     volume_free(volume);
@@ -357,7 +366,7 @@ static void what_is_refused(void **state)
     build_slice(&d, &s, 3);
     write_file("other1", &d, d.length - 1);
     assert_null(load("other0"));
-    assert_true(has_fault("other1:byte") && has_fault("the pixels end after 39 of 40 bytes"));
+    assert_true(has_fault("other1:byte") && has_fault("the pixels end after 2111 of 2112 bytes"));
     volume = load("im0");
     assert_true_volume(volume, &plain);
     volume_free(volume);
@@ -381,8 +390,10 @@ static void what_is_refused(void **state)
     dicom_head(&d, 0x7fe00010u, "OB", 0xffffffffu);
     dicom_head(&d, 0xfffee000u, "", 0);
     write_file("im0", &d, d.length);
+    write_slice("im1", &s, 1);
     assert_null(load("im0"));
-    assert_true(has_fault("gdcmconv --raw"));
+    assert_true(has_fault("the compressed pixels") || has_fault("the pixels are compressed"));
+    empty_folder();
     s.syntax = "1.2.840.10008.1.2.1.99";
     write_slice("im0", &s, 0);
     assert_null(load("im0"));
@@ -398,6 +409,106 @@ static void what_is_refused(void **state)
         assert_null(volume_parse(d.byte, cut, "/nowhere/cut", &faults));
         assert_true(faults.count > 0);
     }
+}
+
+// --- compressed pixels ---
+
+static int convert(const char *how, const char *from, const char *to)
+{
+    char command[600];
+    snprintf(command, sizeof command, "gdcmconv %s '%s/%s' '%s/%s' >/dev/null 2>&1", how, folder, from, folder, to);
+    return system(command);
+}
+
+static bool can_unpack(void)
+{
+    char program[4096];
+    return process_beside("seldinger-dicom", program, sizeof program) && access(program, X_OK) == 0 && system("command -v gdcmconv >/dev/null 2>&1") == 0;
+}
+
+static const char *const compressed[] = {"--jpeg", "--jpegls", "--j2k", "--rle"};
+
+// Lossless: the same values, of 8 to 16 bits, signed too, by series and by frames.
+static void what_is_compressed_is_the_same(void **state)
+{
+    (void)state;
+    if (!can_unpack()) {
+        print_message("skipped: there is no seldinger-dicom (built with libgdcm-dev), or no gdcmconv (libgdcm-tools)\n");
+        skip();
+    }
+    for (int i = 0; i < 4; i++)
+        for (int form = 0; form < (i == 0 ? 4 : 1); form++) {
+            Setting s = plain;
+            if (form == 1)
+                s.allocated = s.stored = 8, s.high_bit = 7;
+            if (form == 2)
+                s.allocated = s.stored = 16, s.high_bit = 15, s.is_signed = 1;
+            if (form == 3)
+                s.photometric = "MONOCHROME1";
+            empty_folder();
+            for (int k = 0; k < NZ; k++) {
+                char name[32];
+                write_slice("plain", &s, k);
+                snprintf(name, sizeof name, "im%d", (k * 5 + 2) % NZ);
+                assert_int_equal(convert(compressed[i], "plain", name), 0);
+            }
+            remove(in_folder("plain"));
+            Volume *volume = load("im3");
+            assert_true_volume(volume, &s);
+            volume_free(volume);
+        }
+}
+
+// Frames of one file, whose places are in functional groups.
+static void compressed_frames(void **state)
+{
+    (void)state;
+    if (!can_unpack())
+        skip();
+    static DicomBytes d;
+    empty_folder();
+    build_multi_frame(&d, &plain, true, NZ);
+    write_file("plain", &d, d.length);
+    assert_int_equal(convert("--jpegls", "plain", "many"), 0);
+    remove(in_folder("plain"));
+    Volume *volume = load("many");
+    assert_true_volume(volume, &plain);
+    volume_free(volume);
+}
+
+// Damaged in any byte: a fault or a volume, never more.
+static void what_is_damaged_is_refused(void **state)
+{
+    (void)state;
+    if (!can_unpack())
+        skip();
+    static uint8_t byte[1 << 16];
+    int read = 0, refused = 0;
+    for (int i = 0; i < 4; i++) {
+        empty_folder();
+        write_slice("plain", &plain, 0);
+        assert_int_equal(convert(compressed[i], "plain", "im0"), 0);
+        write_slice("im1", &plain, 1);
+        remove(in_folder("plain"));
+        FILE *file = fopen(in_folder("im0"), "rb");
+        assert_non_null(file);
+        size_t length = fread(byte, 1, sizeof byte, file);
+        fclose(file);
+        for (int change = 0; change < WHOLE_OR_SHORT(20, 5); change++) {
+            size_t at = length - 1 - (size_t)change * 7 % (length / 2);
+            byte[at] ^= 0x55;
+            file = fopen(in_folder("im0"), "wb");
+            assert_int_equal(fwrite(byte, 1, change % 5 == 4 ? at : length, file), change % 5 == 4 ? at : length);
+            fclose(file);
+            byte[at] ^= 0x55;
+            Volume *volume = load("im1");
+            assert_true(volume || faults.count > 0);
+            read += volume != NULL, refused += !volume;
+            volume_free(volume);
+        }
+    }
+    print_message("%d read, %d refused\n", read, refused);
+    assert_true(refused > 0);
 }
 
 static int make_folder(void **state)
@@ -417,6 +528,7 @@ static int remove_folder(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(encodings_and_layouts), cmocka_unit_test(multi_frame), cmocka_unit_test(what_is_refused)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(encodings_and_layouts), cmocka_unit_test(multi_frame), cmocka_unit_test(what_is_refused),
+                                       cmocka_unit_test(what_is_compressed_is_the_same), cmocka_unit_test(compressed_frames), cmocka_unit_test(what_is_damaged_is_refused)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

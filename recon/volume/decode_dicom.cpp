@@ -1,0 +1,36 @@
+// seldinger-dicom: unpacks the pixels of a DICOM image. Standard input is the file, standard output the same image in explicit little endian, uncompressed.
+// A program of its own, as what it reads comes from anywhere and GDCM reads it: whoever starts it bounds its memory and time (volume_dicom_pixels.c), and a
+// crash is one fault more. GDCM reads JPEG (8 to 16 bits, lossless too), JPEG-LS, JPEG 2000 and RLE.
+// Exit code 0; 1 where the image cannot be read, 2 where its pixels cannot be unpacked, 3 where the answer cannot be written.
+#include <gdcmImageChangeTransferSyntax.h>
+#include <gdcmImageReader.h>
+#include <gdcmImageWriter.h>
+
+#include <cstdio>
+#include <sstream>
+
+int main()
+{
+    try {
+        gdcm::ImageReader reader;
+        reader.SetFileName("/dev/stdin");
+        if (!reader.Read())
+            return 1;
+        gdcm::ImageChangeTransferSyntax change;
+        change.SetTransferSyntax(gdcm::TransferSyntax::ExplicitVRLittleEndian);
+        change.SetInput(reader.GetImage());
+        if (!change.Change())
+            return 2;
+        std::ostringstream answer;
+        gdcm::ImageWriter writer;
+        writer.SetFile(reader.GetFile());
+        writer.SetImage(change.GetOutput());
+        writer.SetStream(answer);
+        if (!writer.Write())
+            return 2;
+        const std::string bytes = answer.str();
+        return std::fwrite(bytes.data(), 1, bytes.size(), stdout) == bytes.size() && std::fflush(stdout) == 0 ? 0 : 3;
+    } catch (...) {     // no memory, mostly
+        return 2;
+    }
+}

@@ -1,0 +1,109 @@
+#include "recon/volume/volume_dicom_pixels.h"
+#include "base/process.h"
+#include "base/regular_file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+// What the program may take: it holds the compressed file, the pixels and the answer at once, twice each.
+enum { LIBRARIES_BYTES = 1 << 28, COPIES = 6, SLOWEST_BYTES_S = 1 << 20, LEAST_S = 20 };
+
+// In the child. Its streams are set; everything else is closed, nothing is written but the answer.
+static void start(const char *program, int file, int answer, size_t most)
+{
+    rlim_t memory = (rlim_t)LIBRARIES_BYTES + COPIES * (rlim_t)most, seconds = LEAST_S + (rlim_t)(most / SLOWEST_BYTES_S);
+    int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
+    if (nowhere < 0 || dup2(file, STDIN_FILENO) < 0 || dup2(answer, STDOUT_FILENO) < 0 || dup2(nowhere, STDERR_FILENO) < 0)
+        _exit(127);
+    setrlimit(RLIMIT_AS, &(struct rlimit){memory, memory});
+    setrlimit(RLIMIT_CPU, &(struct rlimit){seconds, seconds});
+    setrlimit(RLIMIT_CORE, &(struct rlimit){0, 0});
+    setrlimit(RLIMIT_FSIZE, &(struct rlimit){0, 0});
+    alarm((unsigned)(10 * seconds));
+    execv(program, (char *const[]){(char *)program, NULL});
+    _exit(127);
+}
+
+// All that the program says, up to `most` bytes; false where there is more, or no memory.
+static bool take_answer(int answer, size_t most, uint8_t **byte, size_t *length)
+{
+    size_t room = 0;
+    *byte = NULL;
+    *length = 0;
+    for (;;) {
+        if (*length == room) {
+            room = room ? 2 * room : (size_t)1 << 20;
+            uint8_t *more = room / 2 <= most ? realloc(*byte, room) : NULL;
+            if (!more)
+                return false;
+            *byte = more;
+        }
+        ssize_t part = read(answer, *byte + *length, room - *length);
+        if (part == 0)
+            return *length <= most;
+        if (part < 0 && errno != EINTR)
+            return false;
+        *length += part > 0 ? (size_t)part : 0;
+    }
+}
+
+static bool run(const char *program, int file, size_t most, FileBytes *out)
+{
+    int pipes[2], status = -1;
+    uint8_t *byte = NULL;
+    size_t length = 0;
+    if (pipe(pipes) != 0)
+        return false;
+    fcntl(pipes[0], F_SETFD, FD_CLOEXEC);
+    fcntl(pipes[1], F_SETFD, FD_CLOEXEC);
+    pid_t child = fork();
+    if (child == 0)
+        start(program, file, pipes[1], most);
+    close(pipes[1]);
+    bool good = child > 0 && take_answer(pipes[0], most, &byte, &length);
+    close(pipes[0]);
+    if (child > 0 && !good)
+        kill(child, SIGKILL);
+    while (child > 0 && waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    }
+    good = good && WIFEXITED(status) && WEXITSTATUS(status) == 0;
+    if (good) {
+        out->byte = byte;
+        out->length = out->whole = length;
+    } else {
+        free(byte);
+    }
+    return good;
+}
+
+bool dicom_unpack(const char *path, size_t place, const char *syntax, size_t most, FileBytes *out, Faults *faults)
+{
+    char program[4096];
+    struct stat status;
+    const char *why;
+    *out = (FileBytes){.path = path};
+    if (!process_beside("seldinger-dicom", program, sizeof program) || access(program, X_OK) != 0) {
+        faults_add_at_byte(faults, path, place, "the pixels are compressed (transfer syntax %s), and seldinger-dicom, which unpacks them, is not installed beside "
+                           "this program; uncompressed: `gdcmconv --raw IN.dcm OUT.dcm`", syntax);
+        return false;
+    }
+    int file = regular_file_open(path, &status, &why);
+    if (file < 0) {
+        faults_add(faults, path, 0, 0, "cannot be opened: %s; a readable file", why);
+        return false;
+    }
+    bool good = run(program, file, most, out);
+    close(file);
+    if (!good)
+        faults_add_at_byte(faults, path, place, "the compressed pixels (transfer syntax %s) cannot be unpacked; an intact file in JPEG, JPEG-LS, JPEG 2000 or RLE",
+                           syntax);
+    return good;
+}
