@@ -52,7 +52,7 @@ static void be_expendable(void)
     setrlimit(RLIMIT_CORE, &(struct rlimit){0, 0});
     setrlimit(RLIMIT_FSIZE, &(struct rlimit){0, 0});
     setrlimit(RLIMIT_CPU, &(struct rlimit){5, 5});
-    alarm(10);      // a broken heap can also leave it waiting for ever
+    alarm(60);      // a broken heap can also leave it waiting for ever; a starved machine takes seconds for milliseconds of work
 }
 
 static herr_t look_at_attribute(hid_t object, const char *name, const H5A_info_t *info, void *context)

@@ -83,7 +83,9 @@ static void add_up(const uint32_t *change, uint64_t frames, uint64_t nodes, uint
 static void *read_motion(const Reader *reader, const char *name, Hdf5Type type, int rank, uint64_t *shape)
 {
     char path[64];
-    uint64_t changes[3] = {0, rank == 3 ? shape[2] : shape[1], shape[1]};
+    uint64_t changes[3] = {0};
+    for (int i = 1; i < rank; i++)
+        changes[i] = shape[rank - i];
     snprintf(path, sizeof path, "/motion%s", name);
     uint32_t *change = read_dataset(reader, path, HDF5_UINT32, rank, changes);
     if (!change)

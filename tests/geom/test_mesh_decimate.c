@@ -221,11 +221,62 @@ static void rims_and_limits_hold(void **state)
     mesh_clear(&ball), mesh_clear(&none);
 }
 
+// A corner over each face, at which three triangles meet.
+static TriangleMesh with_pyramids(TriangleMesh mesh, double height)
+{
+    TriangleMesh all = mesh_room(mesh.vertex_count + mesh.triangle_count, 3 * mesh.triangle_count);
+    for (int v = 0; v < mesh.vertex_count; v++)
+        mesh_vertex(&all, mesh.vertex[v], mesh.normal[v]);
+    for (int t = 0; t < mesh.triangle_count; t++) {
+        const int *c = mesh.triangle[t];
+        Vec3 middle = vec3_scale(vec3_add(vec3_add(mesh.vertex[c[0]], mesh.vertex[c[1]]), mesh.vertex[c[2]]), 1.0 / 3);
+        int top = mesh_vertex(&all, vec3_scale(middle, 1 + height), vec3_unit(middle));
+        for (int k = 0; k < 3; k++)
+            mesh_triangle(&all, c[k], c[(k + 1) % 3], top);
+    }
+    mesh_clear(&mesh);
+    return all;
+}
+
+static int corners_in_common(const int a[3], const int b[3])
+{
+    int count = 0;
+    for (int i = 0; i < 9; i++)
+        count += a[i / 3] == b[i % 3];
+    return count;
+}
+
+// However few triangles are asked for: three or more meet at each corner, and no two have the same corners (a pocket of two faces is closed as well).
+static void nothing_folds_flat(void **state)
+{
+    (void)state;
+    TriangleMesh shape[] = {sphere_mesh(6), torus_mesh(5, 1, 40, 20), with_pyramids(sphere_mesh(4), 0.05)};
+    for (int i = 0; i < 3; i++)
+        for (int triangles = 4; triangles <= 64; triangles *= 2) {
+            TriangleMesh *less = mesh_decimate(&shape[i], triangles, HUGE_VAL);
+            assert_non_null(less);
+            int *met = calloc((size_t)less->vertex_count, sizeof *met);
+            for (int t = 0; t < less->triangle_count; t++)
+                for (int k = 0; k < 3; k++)
+                    met[less->triangle[t][k]]++;
+            for (int v = 0; v < less->vertex_count; v++)
+                assert_true(met[v] >= 3);
+            for (int t = 0; t < less->triangle_count; t++)
+                for (int u = 0; u < t; u++)
+                    assert_true(corners_in_common(less->triangle[t], less->triangle[u]) < 3);
+            free(met);
+            triangle_mesh_free(less);
+        }
+    for (int i = 0; i < 3; i++)
+        mesh_clear(&shape[i]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(closed_surfaces_are_known), cmocka_unit_test(rims_get_lids),      cmocka_unit_test(spheres_keep_their_volume),
         cmocka_unit_test(genus_parts_and_nodes_stay), cmocka_unit_test(thin_branches_stay), cmocka_unit_test(rims_and_limits_hold),
+        cmocka_unit_test(nothing_folds_flat),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -111,6 +111,32 @@ static void degrees_are_those_made(void **state)
     free(f);
 }
 
+// Beside a place of another width the mean of both sides says little: a run is narrow, or wide, against the nearer-by side too, by half the bound.
+static double change_between, width_beyond;
+static double beside(double s) { return s > 33 ? width_beyond : s > 20 && s < 26 ? 2 + change_between : 2; }
+
+static void count_beside(double change, double beyond, int expected, FindingKind kind)
+{
+    int count, of_kind = 0;
+    change_between = change, width_beyond = beyond;
+    Finding *f = findings_of(beside, &count);
+    for (int i = 0; i < count; i++)
+        of_kind += f[i].kind == kind && f[i].along < 33;
+    assert_int_equal(of_kind, expected);
+    free(f);
+}
+
+static void another_width_beside_is_no_finding(void **state)
+{
+    (void)state;
+    count_beside(0, 4.4, 0, FINDING_STENOSIS);         // 0.63 of the mean
+    count_beside(-0.2, 4.4, 0, FINDING_STENOSIS);      // 0.9 of the near side: above 0.85
+    count_beside(-0.4, 4.4, 1, FINDING_STENOSIS);      // 0.8 of it
+    count_beside(0, 0.6, 0, FINDING_DILATATION);       // 1.54 of the mean
+    count_beside(0.4, 0.6, 0, FINDING_DILATATION);     // 1.2 of the near side: below 1.25
+    count_beside(0.6, 0.6, 1, FINDING_DILATATION);     // 1.3 of it
+}
+
 static void a_sac_has_the_neck_of_its_section(void **state)
 {
     (void)state;
@@ -148,6 +174,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_y_has_two_branches),
+        cmocka_unit_test(another_width_beside_is_no_finding),
         cmocka_unit_test(degrees_are_those_made),
         cmocka_unit_test(a_sac_has_the_neck_of_its_section),
     };

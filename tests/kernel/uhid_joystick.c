@@ -5,6 +5,7 @@
 //   axis X DIAL      from now on the stick is at X (-32767..32767) and the dial turns by DIAL counts a report
 //   yield K          the hand yields: X becomes X + K * force / 100, the force as the device plays it (-10000..10000, > 0 to greater X)
 //   every MS         from now on the reports' interval
+//   swing N          from now on X swings once to and fro in N reports and the dial turns by 1 count a report: its sum tells how many were read
 //   quiet | loud     no reports although open; reports again
 //   flood N          N reports as fast as the kernel takes them, the last with the dial at 0
 //   short            one report of 2 bytes, where the descriptor says 6
@@ -12,7 +13,7 @@
 //   wait WHAT [N]    answers when WHAT has happened: opened, closed, force (the device plays one), rest (none any more), reports (N more have
 //                    gone out), written (N output and feature reports have come in all); gives up after 25 s
 //   quit
-// LOG: one event a line, `TIME_US KIND ...`: axis X (when it changes), force F (what the motor does, when it changes), effect ... and fault TEXT
+// LOG: one event a line, `TIME_US KIND ...`: axis X (when it changes), sent X (each report of a swing, in place of axis), force F (what the motor does, when it changes), effect ... and fault TEXT
 // (a report that the device class definition does not allow, USB HID PID 1.0: an effect that was never created, a wrong length ...).
 // The device follows that definition by itself, sharing no code with the program under test: Create New Effect, PID Block Load, Set Effect,
 // Set Constant Force, Effect Operation, PID Device Control, Device Gain, Block Free; its motor plays magnitude * gain while the effect runs.
@@ -93,6 +94,7 @@ typedef struct {
     int device_gain, last_made;   // last_made: index that PID Block Load tells, 0 after a failure
     Effect effects[EFFECTS + 1];
     int base, dial, yield, axis, force, interval_ms;
+    int swing;               // reports of one swing; 0: none
     long reports, written;
     long long next_us;
 } Device;
@@ -177,9 +179,11 @@ static void update_force(Device *device)
 static void send_report(Device *device, int dial, int size)
 {
     update_force(device);
+    if (device->swing) device->base = (int)lround(32767 * sin((double)(device->reports % device->swing) / device->swing * 2 * 3.14159265358979));
     int axis = device->base + device->yield * device->force / 100;
     axis = axis > 32767 ? 32767 : axis < -32767 ? -32767 : axis;
-    if (axis != device->axis) note(device, "axis %d", axis);
+    if (device->swing) note(device, "sent %d", axis);
+    else if (axis != device->axis) note(device, "axis %d", axis);
     device->axis = axis;
     struct uhid_event event = {.type = UHID_INPUT2};
     const unsigned char report[INPUT_SIZE] = {INPUT, (unsigned char)axis, (unsigned char)(axis >> 8), (unsigned char)dial, (unsigned char)(dial >> 8), 0};
@@ -352,7 +356,10 @@ static bool obey(Device *device, char *line)
         device->dial = (int)b;
     } else if (!strcmp(verb, "yield") && sscanf(rest, "%ld", &a) == 1) device->yield = (int)a;
     else if (!strcmp(verb, "every") && sscanf(rest, "%ld", &a) == 1 && a > 0) device->interval_ms = (int)a;
-    else if (!strcmp(verb, "quiet") || !strcmp(verb, "loud")) device->quiet = verb[0] == 'q';
+    else if (!strcmp(verb, "swing") && sscanf(rest, "%ld", &a) == 1 && a > 0) {
+        device->swing = (int)a;
+        device->dial = 1;
+    } else if (!strcmp(verb, "quiet") || !strcmp(verb, "loud")) device->quiet = verb[0] == 'q';
     else if (!strcmp(verb, "flood") && sscanf(rest, "%ld", &a) == 1) {
         long long begin = now_us();
         for (long i = 0; i < a; i++) send_report(device, i + 1 < a ? device->dial : 0, INPUT_SIZE);

@@ -340,6 +340,38 @@ static void every_node_sees_the_bolus_in_its_time(void **state)
     assert_true(seen > 50);
 }
 
+// Nodes that a front which has come in at the root has reached.
+static int reached(Contrast *contrast, double seconds)
+{
+    int count = 0;
+    for (int i = 0; i < (int)lround(seconds * 2000); i++)
+        contrast_advance(contrast, 0.0005, 0, 5);
+    for (int i = 0; i < contrast_node_count(contrast); i++)
+        count += contrast_concentration(contrast)[i] > 0.5f;
+    return count;
+}
+
+// The pulse moves blood by the integral of its speed, 1 + 0.4 (cos a + cos 2a / 2), a the heart's angle: a front is where it would be in steady flow after so long.
+static void the_pulse_moves_by_its_integral(void **state)
+{
+    (void)state;
+    VesselTree *tree = tube(1000, 100, 1.5);
+    ContrastOptions even = steady(0.3), beating;
+    even.step_s = 0.001;
+    beating = even;
+    beating.pulsation = 1;
+    beating.heart_rate_min = 60;
+    for (int i = 1; i < 24; i++) {
+        const double until_s = 0.05 * i, angle = 2 * PI * until_s, moved_s = until_s + 0.4 / (2 * PI) * (sin(angle) + 0.25 * sin(2 * angle));
+        Contrast *a = make(tree, &beating), *b = make(tree, &even);
+        int pulsed = reached(a, until_s), steadily = reached(b, moved_s);
+        assert_true(steadily > 10 && abs(pulsed - steadily) <= 2);     // of 0.1 mm; half a millisecond is 0.2
+        contrast_free(a);
+        contrast_free(b);
+    }
+    vessel_tree_free(tree);
+}
+
 // --- invariances ---
 
 static void run_bolus(Contrast *contrast, int tip, double until_s)
@@ -595,6 +627,7 @@ int main(void)
         cmocka_unit_test(what_does_not_go_on_goes_back),
         cmocka_unit_test(a_sac_washes_out_exponentially),
         cmocka_unit_test(every_node_sees_the_bolus_in_its_time),
+        cmocka_unit_test(the_pulse_moves_by_its_integral),
         cmocka_unit_test(a_mirrored_tree_fills_alike),
         cmocka_unit_test(a_finer_tree_fills_alike),
         cmocka_unit_test(the_same_calls_give_the_same_bits),

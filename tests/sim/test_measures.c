@@ -163,6 +163,22 @@ static void a_comparison_names_first_time_node_and_distance(void **state)
     tool_path_free(golden);
 }
 
+// A place is compared with that of the same node of the same tool alone, however near another's is.
+static void another_node_in_its_place_is_no_counterpart(void **state)
+{
+    (void)state;
+    ToolPath *golden = path_of_tools(2, 4, 5, 0), *run = path_of_tools(2, 4, 5, 0);
+    run->row[39].node = 4;
+    assert_string_equal(tool_path_compare(golden, run, 1).remark, "1 of 40 golden rows have no counterpart, the first at 0.25 s");
+    run->row[39].node = 3;
+    assert_false(tool_path_compare(golden, run, 0).differs);
+    for (int i = 36; i < 40; i++)
+        run->row[i].tool = 2;
+    assert_string_equal(tool_path_compare(golden, run, 1).remark, "4 of 40 golden rows have no counterpart, the first at 0.25 s");
+    tool_path_free(run);
+    tool_path_free(golden);
+}
+
 static void a_comparison_of_several_tools_names_the_tool(void **state)
 {
     (void)state;
@@ -209,7 +225,7 @@ int main(void)
         cmocka_unit_test(quantiles_are_exact_to_one_per_cent), cmocka_unit_test(small_counts_and_the_largest_are_exact),
         cmocka_unit_test(sha256_gives_the_standards_vectors),  cmocka_unit_test(printing_and_parsing_keeps_a_path),
         cmocka_unit_test(a_comparison_names_first_time_node_and_distance),
-        cmocka_unit_test(a_comparison_of_several_tools_names_the_tool), cmocka_unit_test(a_broken_golden_is_a_fault),
+        cmocka_unit_test(another_node_in_its_place_is_no_counterpart), cmocka_unit_test(a_comparison_of_several_tools_names_the_tool), cmocka_unit_test(a_broken_golden_is_a_fault),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

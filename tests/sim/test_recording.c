@@ -28,6 +28,7 @@
 static Faults faults;
 static char folder[] = "/tmp/seldinger-recording-XXXXXX";
 #include "tests/folder.h"
+#include "tests/short_run.h"
 
 static const char scene_text[] = "seldinger: 1\n"
                                  "wire: {elements: 20, sections: [{length_mm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\n"
@@ -942,6 +943,7 @@ static void every_state_in_a_flush_is_a_whole_file(void **state)
 static void so_it_is_with_several_tools(void **state)
 {
     (void)state;
+    NEED_WHOLE_RUNS();       // five thousand states
     const RecordingOptions run = recording_default_options();
     RecordingOptions session = recording_session_options();
     session.frame_ms = 50;
@@ -994,7 +996,7 @@ static void kill_recordings(int trials)
 static void a_kill_leaves_a_file_that_opens(void **state)
 {
     (void)state;
-    kill_recordings(8);
+    kill_recordings(WHOLE_OR_SHORT(8, 4));
 }
 
 static void a_full_index_leaves_what_was_flushed(void **state)
