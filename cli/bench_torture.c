@@ -48,7 +48,7 @@ typedef struct Outcome {
     unsigned failed;
     int64_t steps, cut, not_converged;
     double deepest, unreported;      // [mm] in the true wall; by how much more than reported
-    double deepest_s, gained, work;  // when; [mJ]
+    double deepest_s, gained, gained_end, gained_mean, work;  // when; [mJ]
     double not_taken;                // [mm] that the hands fed and no tool took
     bool was_compared, kinks;
     char reason[FAULT_TEXT];         // FAILED_REFUSED
@@ -169,6 +169,8 @@ static void drive(const Scene *scene, const Vessel *contact, const Vessel *truth
         outcome->cut = totals->limited_steps;
         outcome->not_converged = totals->not_converged_steps;
         outcome->gained = simulator_energy(simulator)->gained;
+        outcome->gained_end = simulator_energy(simulator)->gained_end;
+        outcome->gained_mean = simulator_energy(simulator)->gained_mean;
         outcome->work = simulator_energy(simulator)->work;
         for (int k = 0; k < tools; k++)
             outcome->not_taken = fmax(outcome->not_taken, fabs(inserted[k] + witness.fed[k] - stepper_tool_inserted(witness.stepper, k)));
@@ -257,7 +259,7 @@ static void run_seed(void *context, long index)
 
 typedef struct Row {
     int64_t runs, steps, cut, not_converged, compared, kinked;
-    int64_t failed[FAILURES];
+    int64_t failed[FAILURES], by_end, by_mean;     // by_: runs that gain energy by one count alone (simulator.h)
     double deepest, unreported, gained_share;
 } Row;
 
@@ -272,15 +274,18 @@ static void add_run(Row *row, const Outcome *o)
     row->deepest = fmax(row->deepest, o->deepest);
     row->unreported = fmax(row->unreported, o->unreported);
     row->gained_share = fmax(row->gained_share, o->work > 0 && !o->kinks ? o->gained / o->work : 0);
+    double allowed = energy_gain_share * o->work + 1e-6;
+    row->by_end += !o->kinks && o->gained_end > allowed;
+    row->by_mean += !o->kinks && o->gained_mean > allowed;
     for (int i = 0; i < FAILURES; i++)
         row->failed[i] += o->failed >> i & 1;
 }
 
 static void print_row(FILE *out, const char *vessel, const char *tool, const Row *row)
 {
-    fprintf(out, "%-7s %-18s %6lld %10lld %9.3f %9.3f %9.1e %8lld %8lld %6lld |%5lld %5lld %5lld %5lld %5lld/%-4lld %5lld\n", vessel, tool, (long long)row->runs, (long long)row->steps,
+    fprintf(out, "%-7s %-18s %6lld %10lld %9.3f %9.3f %9.1e %8lld %8lld %6lld |%5lld %5lld %5lld %5lld (%lld, %lld) %5lld/%-4lld %5lld\n", vessel, tool, (long long)row->runs, (long long)row->steps,
             row->deepest, row->unreported, row->gained_share, (long long)row->cut, (long long)row->not_converged, (long long)row->kinked, (long long)row->failed[0], (long long)row->failed[1],
-            (long long)row->failed[2], (long long)row->failed[3], (long long)row->failed[4], (long long)row->compared, (long long)row->failed[5]);
+            (long long)row->failed[2], (long long)row->failed[3], (long long)row->by_end, (long long)row->by_mean, (long long)row->failed[4], (long long)row->compared, (long long)row->failed[5]);
 }
 
 static cJSON *row_json(const char *vessel, const char *tool, const Row *row)
@@ -290,7 +295,8 @@ static cJSON *row_json(const char *vessel, const char *tool, const Row *row)
         const char *name;
         double value;
     } figure[] = {{"runs", (double)row->runs}, {"steps", (double)row->steps}, {"deepest_mm", row->deepest}, {"unreported_mm", row->unreported}, {"gained_share", row->gained_share},
-                  {"cut_steps", (double)row->cut}, {"not_converged_steps", (double)row->not_converged}, {"compared", (double)row->compared}, {"kinked", (double)row->kinked}};
+                  {"cut_steps", (double)row->cut}, {"not_converged_steps", (double)row->not_converged}, {"compared", (double)row->compared}, {"kinked", (double)row->kinked},
+                  {"gained_by_end", (double)row->by_end}, {"gained_by_mean", (double)row->by_mean}};
     cJSON_AddStringToObject(at, "vessel", vessel);
     cJSON_AddStringToObject(at, "tool", tool);
     for (size_t i = 0; i < sizeof figure / sizeof figure[0]; i++)
@@ -310,7 +316,7 @@ static bool print_table(const Torture *torture, cJSON *list)
         add_run(&row[torture->outcome[i].vessel][torture->outcome[i].tool], &torture->outcome[i]);
         add_run(&all, &torture->outcome[i]);
     }
-    fprintf(out, "vessel  tool                 runs      steps   deepest    unrep.    gained     cut    not conv. kinked | deep unrep.  NaN energy stuck/of  refused\n"
+    fprintf(out, "vessel  tool                 runs      steps   deepest    unrep.    gained     cut    not conv. kinked | deep unrep.  NaN energy (by end, by mean) stuck/of  refused\n"
                  "                                                  [mm]      [mm]   of work   [steps]  [steps]   runs | runs that failed\n");
     for (int v = 0; v < TORTURE_VESSELS; v++)
         for (int t = 0; t < TORTURE_TOOLS; t++)

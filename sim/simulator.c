@@ -120,7 +120,8 @@ static void balance_energy(Simulator *simulator)
     EnergyBalance *sum = &simulator->energy;
     StepEnergy e = stepper_energy(simulator->stepper);
     double elastic = e.elastic - simulator->before.elastic, kinetic = e.kinetic - simulator->before.kinetic;
-    double numerical = e.hand + e.load - e.friction - e.damping - elastic - kinetic, gained = -numerical - e.wall;
+    double numerical = e.hand + e.load - e.friction - e.damping - elastic - kinetic, contact = e.wall - e.friction;
+    double by_end = -numerical - e.wall, by_mean = by_end + 0.5 * (e.hand + contact - e.hand_start - e.contact_start), gained = fmin(by_end, by_mean);
     simulator->before = e;
     sum->hand += e.hand;
     sum->load += e.load;
@@ -132,6 +133,8 @@ static void balance_energy(Simulator *simulator)
     sum->numerical += numerical;
     sum->work += fabs(e.hand) + fabs(e.load);
     sum->gained += fmax(0, gained);
+    sum->gained_end += fmax(0, by_end);
+    sum->gained_mean += fmax(0, by_mean);
     if (gained > sum->gained_most) {
         sum->gained_most = gained;
         sum->gained_at_s = simulator_time_s(simulator);

@@ -13,6 +13,7 @@ struct Checkpoint {
     size_t memory_count;
     double time, inserted, twist;
     StepReport report;
+    double hand_force[STEP_TOOLS_MAX][2];
     VesselMemory *place;
     double *memory;
     size_t self_bytes;
@@ -56,6 +57,8 @@ Checkpoint *stepper_save(const Stepper *s, Checkpoint *reuse)
     c->inserted = s->state.inserted;
     c->twist = s->state.twist;
     c->report = s->report;
+    for (int k = 0; k < s->tool_count; k++)
+        memcpy(c->hand_force[k], s->hand[k].force, sizeof c->hand_force[k]);
     for (int k = 0; s->tool_count > 1 && k < s->tool_count; k++) {
         c->first[k] = s->tool[k].first;
         c->fitted[k] = s->fitted[k];
@@ -78,6 +81,8 @@ void stepper_restore(Stepper *s, const Checkpoint *c)
     s->state.inserted = c->inserted;
     s->state.twist = c->twist;
     s->report = c->report;
+    for (int k = 0; k < s->tool_count; k++)
+        memcpy(s->hand[k].force, c->hand_force[k], sizeof c->hand_force[k]);
     tools_refit(s, c->fitted);
     for (int k = 0; s->tool_count > 1 && k < s->tool_count; k++) {
         s->tool[k].first = c->first[k];

@@ -155,7 +155,8 @@ CoaxialSprings coaxial_springs(const CoaxialSpan *span)
     CoaxialRest rest;
     rest.strained_length[0] = fmax(span->s2 - span->s1, LENGTH_MIN);
     strain(span, 0, &rest);
-    return (CoaxialSprings){rest.strained_length[0], rest.axial[0], rest.torsion[0]};
+    return (CoaxialSprings){rest.strained_length[0], rest.axial[0], rest.torsion[0],
+                            {rest.axial_end[0][1] - rest.axial_end[0][0], rest.torsion_end[0][1] - rest.torsion_end[0][0]}};
 }
 
 // A piece's tools: what they add to the element, and the derivatives of that.

@@ -118,6 +118,7 @@ void coaxial_rest(const CoaxialSpan *span, int count, CoaxialRest *rest);
 // One tool alone, straight, without its tip: as `strained_length`, `axial` and `torsion` of the element.
 typedef struct CoaxialSprings {
     double length, axial, torsion;
+    double drawn[2];         // [1/N], [1/(N mm2)] by which their compliances grow per mm that the tool goes through with both ends of the length
 } CoaxialSprings;
 CoaxialSprings coaxial_springs(const CoaxialSpan *span);
 

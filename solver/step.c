@@ -130,6 +130,7 @@ static bool allocate(Stepper *s)
     s->tried = calloc(points, sizeof *s->tried);
     s->fixed = calloc(m, sizeof *s->fixed);
     s->start_position = calloc(m, sizeof *s->start_position);
+    s->start_force = calloc(points, sizeof *s->start_force);
     s->start_orientation = calloc(m, sizeof *s->start_orientation);
     s->slot_place = calloc(points, sizeof *s->slot_place);
     s->query_point = calloc(2 * points, sizeof *s->query_point);
@@ -143,7 +144,7 @@ static bool allocate(Stepper *s)
     s->set.slide = calloc(inner + 1, sizeof *s->set.slide);
     s->solver = contact_solver_create(s->wire.node_count, size, s->set.capacity + (int)inner);
     s->carrier = calloc(m, sizeof *s->carrier);
-    if (!s->memory || !s->place || !s->trial || !s->tried || !s->fixed || !s->start_position || !s->start_orientation || !s->slot_place || !s->query_point || !s->query_place ||
+    if (!s->memory || !s->place || !s->trial || !s->tried || !s->fixed || !s->start_position || !s->start_force || !s->start_orientation || !s->slot_place || !s->query_point || !s->query_place ||
         !s->query_hit || !s->query_which || !s->room || !s->set.point || !s->factor || !s->solver || !s->carrier || !s->set.slide || !block_chain_create(&s->chain, s->wire.node_count, size) ||
         !allocate_scratch(s))
         return false;
@@ -350,6 +351,7 @@ void stepper_destroy(Stepper *s)
     free(s->fixed);
     free(s->load);
     free(s->start_position);
+    free(s->start_force);
     free(s->start_orientation);
     free(s->query_point);
     free(s->query_place);
@@ -516,6 +518,7 @@ static void feed(Stepper *s, unsigned released)
     for (int i = s->first_free - 1; i >= held; i--)
         let_go(s, i);
     s->first_free = held;
+    memcpy(s->start_force, s->force, (size_t)s->point_count * sizeof *s->force);
     begin(s);
 }
 

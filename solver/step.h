@@ -166,6 +166,9 @@ typedef struct StepEnergy {
     double load;                 // work of gravity and of a rig's loads
     double wall;                 // work of the wall's pressure: 0 but where a point was outside
     double friction, damping;    // taken by friction, by Rayleigh damping
+    // The same motion by the forces of the step's start: the hands, and the walls, friction and valves together. Between smooth states the mean of start and
+    // end is right to the second order, the end alone to the first.
+    double hand_start, contact_start;
 } StepEnergy;
 // Of the step that step_correct() has ended. Costs about as much as an assembly.
 StepEnergy stepper_energy(Stepper *stepper);

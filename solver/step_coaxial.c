@@ -452,6 +452,7 @@ Vec3 tools_tip_curvature(const Stepper *s)
 typedef struct Spring {
     int a, b[2];             // unknowns of the two nodes; b < 0: none
     double side, stiffness, force;   // 1 or -1, [N/mm] or [N mm], [N] or [N mm]
+    double drawn;            // [N] of the tool along S at node 1: a border of its sections inside changes the stiffness as it goes through
 } Spring;
 
 // Returns their number, at most two a tool. spring: NULL where the energy alone is wanted.
@@ -478,9 +479,10 @@ static int sheath_springs(const Stepper *s, int c, double scale, Spring *spring,
             continue;
         for (int k = 0; k < tool[i]; k++)
             s->inner_tension[c * inner + k] += own.axial * strain;
+        double tension = own.axial * strain, torque = own.torsion * turn, drawn = -0.5 * (tension * tension * own.drawn[0] + torque * torque * own.drawn[1]);
         int b = p->is_fixed ? -1 : at, beyond = i == 0 ? -1 : at;     // beyond a tip the tool that goes on is the node itself
-        spring[count++] = (Spring){0, {b, beyond}, 1, scale * own.axial, own.axial * strain};
-        spring[count++] = (Spring){3, {b < 0 ? -1 : b + 1, beyond < 0 ? -1 : beyond + 1}, -1, scale * own.torsion, own.torsion * turn};
+        spring[count++] = (Spring){0, {b, beyond}, 1, scale * own.axial, own.axial * strain, drawn};
+        spring[count++] = (Spring){3, {b < 0 ? -1 : b + 1, beyond < 0 ? -1 : beyond + 1}, -1, scale * own.torsion, own.torsion * turn, 0};
     }
     return count;
 }
@@ -517,6 +519,8 @@ static void sheath_element_of_tools(const Stepper *s, int c, double scale, bool 
     for (const Spring *p = spring; p < spring + count; p++) {
         add_slopes(gradient, p, 0, p->force);
         add_slopes(gradient + n, p, 1, -p->force);
+        if (p->b[1] >= 0)
+            gradient[n + p->b[1]] += p->drawn;
         if (product) {
             double more = u[n + p->a] - u[p->a] + (p->b[0] >= 0 ? p->side * u[p->b[0]] : 0) - (p->b[1] >= 0 ? p->side * u[n + p->b[1]] : 0);
             add_slopes(product, p, 0, p->stiffness * more);

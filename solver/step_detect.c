@@ -639,6 +639,29 @@ void stepper_wall_work(const Stepper *s, double *wall, double *friction)
     self_contact_work(s, wall, friction);
 }
 
+double stepper_start_work(const Stepper *s)
+{
+    double work = 0;
+    for (int p = s->first_free; p < s->point_count; p++) {
+        if (p == s->state.node_count)
+            p = first_slot(s);
+        if (p == s->point_count)
+            break;
+        Vec3 force = s->start_force[p], normal = s->met[p].normal;
+        if (vec3_norm2(force) == 0)
+            continue;
+        if (vec3_norm2(normal) == 0)
+            normal = vec3_unit(force);
+        Vec3 moved = done_at(s, p, vec3_scale(normal, -radius_of(s, p)));
+        if (p >= s->state.node_count && at_mouth(s, s->slot[p - s->state.node_count].element)) {
+            const SlotPlace *place = &s->slot_place[p - s->state.node_count];
+            moved = vec3_add_scaled(moved, (1 - place->weight) * s->linearised[row_of(s, s->slot[p - s->state.node_count].element)], place->tangent);
+        }
+        work += vec3_dot(force, moved);
+    }
+    return work;
+}
+
 // In the order of the chain: a node, the slots behind it, the next node.
 static void collect(Stepper *s, const int *candidate, int node_count, int slot_count)
 {

@@ -1,4 +1,5 @@
 // Energies of a state, and what a step's motion has done to them: each force of the step's end times the motion, as implicit Euler has it.
+#include "solver/self_contact.h"
 #include "solver/step_tools.h"
 #include "base/same_math.h"
 
@@ -112,5 +113,10 @@ StepEnergy stepper_energy(Stepper *s)
     e.damping = of_mass_damping(s) + stepper_stiffness_damping(s);
     stepper_wall_work(s, &e.wall, &e.friction);
     e.friction += hands_valve_work(s);
+    e.hand_start = hands_start_work(s, false);
+    e.contact_start = stepper_start_work(s) - tools_friction_start_work(s) + hands_start_work(s, true);
+    double pairs[2] = {0, 0};
+    self_contact_work(s, &pairs[0], &pairs[1]);
+    e.contact_start += pairs[0] - pairs[1];
     return e;
 }

@@ -221,6 +221,7 @@ void hands_feed(Stepper *s, unsigned released)
         hand->is_released = released >> k & 1;
         hand->slips[0] = hand->slips[1] = 0;
         hand->is_stopped = false;
+        memcpy(hand->start, hand->force, sizeof hand->start);
         if (hand->is_released && k > 0)  // goes where its valve goes, or nearly
             *command = s->tool_command[tools_around(s, 0, k)];
         else if (hand->is_released || !isfinite(command->advance) || !isfinite(command->twist))
@@ -232,9 +233,12 @@ void hands_report(Stepper *s)
 {
     StepReport *r = &s->report;
     for (int k = 0; k < s->tool_count; k++) {
-        bool feels = has_hand(s, k) && !s->hand[k].is_released;
-        r->push[k] = feels ? hand_force(s, k, 0) : 0;
-        r->torque[k] = feels ? hand_force(s, k, 1) : 0;
+        Hand *hand = &s->hand[k];
+        bool feels = has_hand(s, k) && !hand->is_released;
+        for (int about = 0; about < 2; about++)
+            hand->force[about] = has_hand(s, k) ? hand_force(s, k, about) : 0;
+        r->push[k] = feels ? hand->force[0] : 0;
+        r->torque[k] = feels ? hand->force[1] : 0;
     }
     if (!s->has_sheath) {        // the rig holds the hub: what it bears, less what the hands do
         r->push[0] = r->proximal_force;
@@ -280,6 +284,15 @@ double hands_valve_work(const Stepper *s)
     for (int k = 0; k < s->tool_count; k++)
         for (int about = 0; has_hand(s, k) && s->hand[k].is_released && about < 2; about++)
             work -= hand_force(s, k, about) * hand_moved(s, k, about);
+    return work;
+}
+
+double hands_start_work(const Stepper *s, bool valves)
+{
+    double work = 0;
+    for (int k = 0; k < s->tool_count; k++)
+        for (int about = 0; has_hand(s, k) && s->hand[k].is_released == valves && about < 2; about++)
+            work += s->hand[k].start[about] * hand_moved(s, k, about);
     return work;
 }
 

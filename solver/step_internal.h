@@ -32,6 +32,7 @@ typedef struct Hand {
     bool is_released;        // no hand holds it
     int slips[2];            // along, about: 0 holds, 1 slips on a tool that it pushes, -1 that it pulls
     bool is_stopped;         // the tool's hub has come to the hub of the tool around it, or to the sheath
+    double start[2], force[2];       // [N], [N mm] what it, or the valve, pushes along and turns about the line with at the step's start and end
 } Hand;
 
 // One of several coaxial tools. Its own elements do not change; which of its nodes are nodes of the chain does (step_tools.c).
@@ -129,6 +130,7 @@ struct Stepper {
     double *kept;            // (M, 13) an iterate to go back to: position, orientation, displacement
     double grip_diag[BLOCK_LARGEST * BLOCK_LARGEST], grip_lower[BLOCK_LARGEST * BLOCK_LARGEST], grip_b[BLOCK_LARGEST];    // rows of node 0 before its constraints
     Vec3 *start_position;    // (M) x_n
+    Vec3 *start_force;       // (P) [N] of the wall there
     Quat *start_orientation;
     SlotPlace *slot_place;   // (K) where the iterate has them
     Vec3 *query_point;       // (P)
@@ -235,6 +237,7 @@ bool stepper_load(const Stepper *s, const LoadPlace *place, int end, double time
 double stepper_stiffness_damping(Stepper *s);
 // … and what the wall's pressure gave and its friction took.
 void stepper_wall_work(const Stepper *s, double *wall, double *friction);
+double stepper_start_work(const Stepper *s);   // [mJ] of the walls' forces of the step's start, friction's included, over this step's motion
 double stepper_sheath_coordinate(const Stepper *s, int node);
 // [mm] displacement of node 0 in this step that the command asks for.
 double stepper_wanted(const Stepper *s);
@@ -259,6 +262,7 @@ double hand_moved(const Stepper *s, int tool, int about);     // … in this ste
 double hands_work_bound(const Stepper *s);
 double hands_work(const Stepper *s);           // [mJ] that the hands have done in this step …
 double hands_valve_work(const Stepper *s);     // … and that the valves have taken
+double hands_start_work(const Stepper *s, bool valves);     // … by their forces of the step's start; what valves give is negative
 // [mm] of a cut advance that later steps make up.
 static const double HAND_OWED_MAX = 0.2;
 // [N] push that the tool's strain at the hand asks for.

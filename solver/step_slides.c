@@ -139,13 +139,17 @@ double tools_slipped(const Stepper *s, int c, int k, int about)
     return u[unknown_of(k) + about] - (out > 0 ? u[unknown_of(out) + about] : 0);
 }
 
-double tools_friction_work(const Stepper *s)
+static double friction_work(const Stepper *s, bool at_start)
 {
     double work = 0;
     for (int i = 0; s->tool_count > 1 && i < s->set.slide_count; i++) {
         const ContactSlide *slide = &s->set.slide[i];
+        const double *force = at_start ? slide->held : slide->force;
         for (int j = 0; j < 2; j++)
-            work -= slide->force[j] * (j ? slide->radius : 1) * tools_slipped(s, slide->node, 1 + (slide->unknown - 6) / 2, j);
+            work -= force[j] * (j ? slide->radius : 1) * tools_slipped(s, slide->node, 1 + (slide->unknown - 6) / 2, j);
     }
     return work;
 }
+
+double tools_friction_work(const Stepper *s) { return friction_work(s, false); }
+double tools_friction_start_work(const Stepper *s) { return friction_work(s, true); }

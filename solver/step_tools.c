@@ -282,7 +282,7 @@ static void shift_at(Stepper *s, int node, int nodes, int slot, int slots)
         size_t size;
     } by_node[] = {{w->position, sizeof(Vec3)}, {w->orientation, sizeof(Quat)}, {w->velocity, sizeof(Vec3)}, {w->spin, sizeof(Vec3)},
                    {w->slide, inner}, {w->angle, inner}, {w->slide_velocity, inner}, {w->slide_spin, inner}, {w->slide_force, 3 * inner}},
-      by_point[] = {{s->force, sizeof(Vec3)}, {s->clearance, sizeof(double)}, {s->met, sizeof(WallMet)}, {s->place, sizeof(VesselMemory)}};
+      by_point[] = {{s->force, sizeof(Vec3)}, {s->start_force, sizeof(Vec3)}, {s->clearance, sizeof(double)}, {s->met, sizeof(WallMet)}, {s->place, sizeof(VesselMemory)}};
     for (size_t i = 0; i < sizeof by_node / sizeof *by_node; i++)
         change_gap(by_node[i].base, by_node[i].size, count, node, nodes);
     for (size_t i = 0; i < sizeof by_point / sizeof *by_point; i++) {
