@@ -57,7 +57,7 @@ static const char help[] =
     "  --quiet            no summary, no progress\n\n"
     "Scene defaults: 200 elements, poisson_ratio 0.3, density 6.45 g/cm3, no damping, no friction, no gravity, inserted 0 mm, step 1 ms,\n"
     "contact tolerance 1e-6, `normal` (where a rest curvature with plane 0 bends) the coordinate axis after the direction's largest component, made\n"
-    "perpendicular. The README describes every key of a scene.\n"
+    "perpendicular. docs/scene-format.md describes every key of a scene.\n"
     "Exit codes: 0 done (also when stopped by SIGINT or SIGTERM); 2 wrong usage or bad input; 3 the run diverged, left the vessel, or a file\n"
     "could not be written to its end.\n";
 
