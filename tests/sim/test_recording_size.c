@@ -121,7 +121,7 @@ static void an_hour_takes_at_most_200_mb(void **unused)
     (void)unused;
     OpenVessel open = {0};
     Scene *scene = open_scene();
-    assert_true(open_vessel(scene, 0, true, &open, &faults) && open_vessel_inlet(scene, &open, &faults));
+    assert_true(open_vessel(scene, &(OpenVesselOptions){0}, &open, &faults) && open_vessel_inlet(scene, &open, &faults));
     clock_t from = clock();
     double mb = record(in_folder("size.h5"), scene, open.vessel, pushing_s, seconds);
     print_message("%.1f MB an hour (%.0f s, %.1f s of CPU time)\n", mb, pushing_s + seconds, (double)(clock() - from) / CLOCKS_PER_SEC);
