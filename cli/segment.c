@@ -94,7 +94,7 @@ static error_t parse_option(int key, char *text, struct argp_state *state)
 
 static const char intro[] =
     "Tracks vessels through an angiogram (RBT, Kerrien et al. 2017, section 3): VOLUME to a tree of cylinders, each with its points on the wall.\v"
-    "VOLUME is NRRD (raw, gzip or text, attached or detached), MetaImage, NIfTI-1, or uncompressed DICOM (the folder of a series, one of its files, or a "
+    "VOLUME is NRRD (raw, gzip or text, attached or detached), MetaImage, NIfTI-1, or DICOM (the folder of a series, one of its files, or a "
     "multi-frame file), recognised by its content.\n\n"
     "The trace is YAML. The first branch needs a start; its direction (toward, a point further down the vessel) and radius_mm are estimated where they are "
     "not given. It becomes the root of the tree, and without a toward one of its two ends does, at the volume's border or wider than the other. Where it is "
