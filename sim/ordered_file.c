@@ -514,8 +514,8 @@ static bool write_page(OrderedFile *file, Page *page)
         return true;
     watch(false);
     memcpy(page->disk + first, page->wanted + first, end - first);
-    // one call; a short one (a full disk cannot be the reason: the page is there) must not be followed by a second
-    return pwrite(file->descriptor, page->wanted + first, end - first, (off_t)(page->start + first)) == (ssize_t)(end - first);
+    // one call where the system takes it whole; a part alone would never become a whole
+    return write_all(file->descriptor, page->wanted + first, end - first, page->start + first);
 }
 
 bool ordered_file_commit(OrderedFile *file)
@@ -533,7 +533,7 @@ bool ordered_file_close(OrderedFile *file, bool is_whole)
 {
     bool good = true;
     if (is_whole)
-        good = write_word(file, file->end_field, file->end) && ftruncate(file->descriptor, (off_t)file->end) == 0;
+        good = write_word(file, file->end_field, file->end) && set_length(file->descriptor, file->end);
     if (file->descriptor >= 0)
         good &= close(file->descriptor) == 0;
     for (int i = 0; i < file->page_count; i++)
