@@ -3,6 +3,7 @@
 #include "recon/hdf5_reader.h"
 
 #include "base/heap.h"
+#include "base/process.h"
 #include "recon/hdf5_source.h"
 
 #include <errno.h>
@@ -12,7 +13,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -44,16 +44,8 @@ static void be_silent(Hdf5Reader *reader)
 
 // --- rehearsal ---
 
-// A child that does what the library may not survive: it says nothing, writes nothing and has its time.
-static void be_expendable(void)
-{
-    int nowhere = open("/dev/null", O_WRONLY);
-    dup2(nowhere, STDERR_FILENO);     // what is said of a broken heap
-    setrlimit(RLIMIT_CORE, &(struct rlimit){0, 0});
-    setrlimit(RLIMIT_FSIZE, &(struct rlimit){0, 0});
-    setrlimit(RLIMIT_CPU, &(struct rlimit){5, 5});
-    alarm(60);      // a broken heap can also leave it waiting for ever; a starved machine takes seconds for milliseconds of work
-}
+// For a child that does what the library may not survive. A broken heap can also leave it waiting for ever; a starved machine takes seconds for milliseconds of work.
+static void be_expendable(void) { process_be_expendable(5, 60); }
 
 static herr_t look_at_attribute(hid_t object, const char *name, const H5A_info_t *info, void *context)
 {

@@ -1,33 +1,28 @@
 #include "recon/volume/volume_dicom_pixels.h"
+
 #include "base/process.h"
 #include "base/regular_file.h"
 
 #include <errno.h>
 #include <fcntl.h>
-#include <poll.h>
 #include <signal.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 // What the program may take: it holds the compressed file, the pixels and the answer at once, twice each.
 enum { LIBRARIES_BYTES = 1 << 28, COPIES = 6, SLOWEST_BYTES_S = 1 << 20, LEAST_S = 20 };
 
-// In the child. Its streams are set; everything else is closed, nothing is written but the answer.
+// In the child: it reads the file and writes its answer.
 static void start(const char *program, int file, int answer, size_t most)
 {
-    rlim_t memory = (rlim_t)LIBRARIES_BYTES + COPIES * (rlim_t)most, seconds = LEAST_S + (rlim_t)(most / SLOWEST_BYTES_S);
-    int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
-    if (nowhere < 0 || dup2(file, STDIN_FILENO) < 0 || dup2(answer, STDOUT_FILENO) < 0 || dup2(nowhere, STDERR_FILENO) < 0)
+    rlim_t memory = (rlim_t)LIBRARIES_BYTES + COPIES * (rlim_t)most;
+    unsigned seconds = LEAST_S + (unsigned)(most / SLOWEST_BYTES_S);
+    if (dup2(file, STDIN_FILENO) < 0 || dup2(answer, STDOUT_FILENO) < 0)
         _exit(127);
+    process_be_expendable(seconds, 10 * seconds);
     setrlimit(RLIMIT_AS, &(struct rlimit){memory, memory});
-    setrlimit(RLIMIT_CPU, &(struct rlimit){seconds, seconds});
-    setrlimit(RLIMIT_CORE, &(struct rlimit){0, 0});
-    setrlimit(RLIMIT_FSIZE, &(struct rlimit){0, 0});
-    alarm((unsigned)(10 * seconds));
     execv(program, (char *const[]){(char *)program, NULL});
     _exit(127);
 }
