@@ -26,8 +26,8 @@ enum { HIT_ROW = 10 };               // gap, normal, Hessian
 
 // Points in the unit ball, on two spheres about its middle.
 #define CLEAR_OUTER 0.95
-#define CLEAR_INNER 0.5
-enum { CLEAR_ON_OUTER = 80, CLEAR_ON_INNER = 16, CLEAR_POINTS = CLEAR_ON_OUTER + CLEAR_ON_INNER };
+#define CLEAR_INNER 0.8
+enum { CLEAR_ON_OUTER = 128, CLEAR_ON_INNER = 64, CLEAR_POINTS = CLEAR_ON_OUTER + CLEAR_ON_INNER };
 typedef struct ClearPoints {
     float x[CLEAR_POINTS], y[CLEAR_POINTS], z[CLEAR_POINTS];
 } ClearPoints;
@@ -49,7 +49,6 @@ typedef struct FieldBlock {
     FieldLane straight_x, straight_y, straight_z;    // where the foot should be but for the last prediction's miss
     FieldLane held_x, held_y, held_z, held_for2, bound_x, bound_y, bound_z, bound_for, down, up, trusted;
     FieldLane trust;                 // what is left of it
-    FieldLane room;                  // gaps in the lumen up to this are the closest wall's
 } FieldBlock;
 
 typedef struct FieldKernels {

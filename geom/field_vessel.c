@@ -30,14 +30,12 @@ typedef struct FieldNode {
     double radius, bend;     // [mm], and its inverse
     double skin;             // [mm] about the foot in which blobs are held
     double clear;            // [mm] the wall is certainly at least this far from the centre; < 0: not known
-    double room;             // [mm] of a point in the lumen that is nearer than that to a foot in the cell no wall is nearer …
-    double reach;            // … as far as its own walls tell: see measure_reach; HUGE_VAL where it has none
     const int32_t *seen;     // its blobs
     int seen_count;
     bool carried;            // near the inlet: goes on upstream
 } FieldNode;
 
-enum { WAYS = 32, ROOM_WAYS = 64 };
+enum { WAYS = 64 };
 typedef struct FieldVessel {
     Vessel vessel;           // first: a Vessel * to us is a FieldVessel *
     const VesselTree *tree;
@@ -372,6 +370,12 @@ static int settle(const FieldVessel *field, Vec3 x, int node, const Vec3 *start,
 
 // --- Looking around ---
 
+static int walk(const FieldVessel *field, Vec3 x, int from, int hops)
+{
+    bool known = from >= 0 && from < field->tree->node_count;
+    return known ? power_walk(field->tree, x, from, hops) : power_blocks_nearest(&field->blocks, x);
+}
+
 static double field_here(const FieldVessel *field, int node, Vec3 x)
 {
     const FieldNode *n = &field->node[node];
@@ -412,6 +416,20 @@ static double bend_radius(const Foot *foot)
     return 0.15 / fmax(sqrt(bend2), 1e-3);
 }
 
+// Does the wall at a foot bend no more than a round vessel's does? Only there do the few points of room_about tell of its surroundings. In the lumen h is
+// the bend of the wall's offset through X, h / (1 - g h) that of the wall.
+static bool bends_gently(const Foot *foot, double radius)
+{
+    static const double HOLLOW = 1.3, BULGE = 0.3;       // of the inverse radius
+    const Sym3 *h = &foot->hessian;
+    double half = 0.5 * (h->xx + h->yy + h->zz);
+    double norm2 = h->xx * h->xx + h->yy * h->yy + h->zz * h->zz + 2 * (h->xy * h->xy + h->xz * h->xz + h->yz * h->yz);
+    double apart = sqrt(fmax(0, 0.5 * norm2 - half * half)), most = half + apart, least = half - apart;
+    if (!(foot->gap * most < 1) || !(foot->gap * least < 1))
+        return false;
+    return least / (1 - foot->gap * least) > -HOLLOW / radius && most / (1 - foot->gap * most) < BULGE / radius;
+}
+
 // Is all on x's side in a ball that touches the wall at the foot and is wider than the gap by up to half a radius? Looks at points on two spheres in it: a
 // flat wall that comes nearer to the middle than 0.92 of the ball's radius shows at one of 80. Returns how far x may go [mm] until another wall than the
 // foot's could be the closest; 0: no such ball.
@@ -421,6 +439,8 @@ static double room_about(const FieldVessel *field, double side, const Foot *foot
     enum { TRIES = sizeof wider / sizeof wider[0] };
     const FieldNode *node = &field->node[foot->node];
     double size = fabs(foot->gap);
+    if (!bends_gently(foot, node->radius))
+        return 0;
     for (int t = 0; t < TRIES; t++) {
         double ball = size + wider[t] * node->radius, room = 0.55 * (0.92 * ball - size);
         Vec3 middle = vec3_add_scaled(foot->at, side * ball, foot->normal);
@@ -459,7 +479,7 @@ static void add_sheet(Sheets *s, const Foot *foot)
 static bool settle_crossings(const FieldVessel *field, Vec3 x, int node, double side, const double *near_f, const double *far_f, double near, double far,
                              Sheets *sheets)
 {
-    static const double ASIDE = 0.8;         // cosine
+    static const double ASIDE = 0.9;         // cosine
     Vec3 start[FOOT_BLOCK];
     double at[WAYS];
     int count = 0;
@@ -485,22 +505,30 @@ static bool settle_crossings(const FieldVessel *field, Vec3 x, int node, double 
     return count > 0;
 }
 
-// Looks for walls nearer than the foot, or hardly farther.
-static void look_for_rivals(const FieldVessel *field, Vec3 x, double side, Sheets *sheets)
+// Looks on one node's wall for feet nearer than `gap`, or hardly farther. At the gap itself too: a thin septum may be crossed before the last distance.
+static void look_on_node(const FieldVessel *field, Vec3 x, int node, double side, double gap, Sheets *sheets)
 {
-    static const double part[] = {0.35, 0.7};
-    enum { PARTS = sizeof part / sizeof part[0] + 1 };
-    int node = sheets->foot.node;
-    double near_f[WAYS], far_f[WAYS], near = 0, gap = fabs(sheets->foot.gap), here = side;
+    const double all[] = {0.7 * gap, gap, gap + 2 * TRUST * field->node[node].radius};
+    double near_f[WAYS], far_f[WAYS], near = 0;
     for (int k = 0; k < WAYS; k++)
-        near_f[k] = here;
-    for (int p = 0; p < PARTS; p++) {
-        double far = p + 1 < PARTS ? part[p] * gap : gap + 2 * TRUST * field->node[node].radius;
+        near_f[k] = side;
+    for (size_t p = 0; p < sizeof all / sizeof all[0]; p++) {
+        double far = all[p];
         look_around(field, x, node, far, far_f);
         settle_crossings(field, x, node, side, near_f, far_f, near, far, sheets);
         memcpy(near_f, far_f, sizeof near_f);
         near = far;
     }
+}
+
+// Looks for walls nearer than the foot, or hardly farther: those that the foot's node sees, and those that the node of x sees.
+static void look_for_rivals(const FieldVessel *field, Vec3 x, double side, Sheets *sheets)
+{
+    int node = sheets->foot.node, own = walk(field, x, node, 4);
+    double gap = fabs(sheets->foot.gap);
+    look_on_node(field, x, node, side, gap, sheets);
+    if (own != node)
+        look_on_node(field, x, own, side, gap, sheets);
 }
 
 // Feet of x on the wall of one node, from scratch.
@@ -572,12 +600,6 @@ static Sheets project(const FieldVessel *field, Vec3 x, int node, double side)
 
 // --- Queries ---
 
-static int walk(const FieldVessel *field, Vec3 x, int from, int hops)
-{
-    bool known = from >= 0 && from < field->tree->node_count;
-    return known ? power_walk(field->tree, x, from, hops) : power_blocks_nearest(&field->blocks, x);
-}
-
 // A ball about x of at most `most` that is certainly lumen, f(x + v) >= f(x) - |grad f| |v| - M |v|^2 / 2 > 0; 0: none. Not where the inlet bends the field.
 static double clear_ball(const FieldVessel *field, const FieldNode *node, Vec3 x, double most, const BlobList *list)
 {
@@ -609,8 +631,6 @@ static bool is_closest(const FieldVessel *field, Vec3 x, const Foot *foot, const
     const FieldNode *node = &field->node[foot->node];
     if (is_at_inlet(field, node, x, size))
         return false;
-    if (foot->gap > 0 && foot->gap < node->room)
-        return true;
     return vec3_distance(x, m->bound_at) + size <= m->bound_for && (foot->gap > 0 ? m->down : m->up) * size < 0.97 * foot->slope;
 }
 
@@ -754,12 +774,8 @@ static void answer_around(const FieldVessel *field, Vec3 x, const Foot *foot, Ve
 {
     BlobList list;
     list_about(field, x, foot, &list);
-    // in the ball of its last gap it has met no wall
-    double before = vec3_dot(vec3_sub(m->place, m->foot), m->normal), travel = vec3_distance(x, m->place), side = before > 0 ? 1 : -1;
-    if (!(travel < fabs(before))) {
-        Vec3 g;
-        side = field_at(field, &list, asked_at(field, &field->node[foot->node], x), &g) > 0 ? 1 : -1;
-    }
+    Vec3 g;
+    double travel = vec3_distance(x, m->place), side = field_at(field, &list, asked_at(field, &field->node[foot->node], x), &g) > 0 ? 1 : -1;
     if (side * foot->gap < -1e-9) {
         answer_afresh(field, x, m, hit);
         return;
@@ -870,7 +886,6 @@ static void fill_lane(const FieldVessel *field, FieldBlock *b, int i, const Batc
     VesselMemory *m = &batch->memory[point];
     const FieldNode *n = &field->node[m->node];
     set_lane(field, b, i, m->node, n->carried && (seek || inlet_height(field, m->foot) < inlet_zone(field) + REACH * n->radius));
-    b->room[i] = n->room;
     b->point[i] = &batch->point[point].x;
     b->memory[i] = &m->foot.x;
     b->list[i] = m->blob, b->count[i] = m->blobs;
@@ -1065,97 +1080,6 @@ static double clear_about_center(const FieldVessel *field, int i)
     return clear > 0 ? clear : -HUGE_VAL;
 }
 
-// Where the wall is met on a line from a node's centre, to a 250th of the radius, out to two radii and no further than the cell; through it, too: what is
-// behind it may be lumen again. Returns how often.
-enum { CROSSINGS = 4 };
-static int walls_along(const FieldVessel *field, const BlobList *list, int node, Vec3 way, Vec3 wall[CROSSINGS])
-{
-    enum { LOOKS = 2, PLACES = LOOKS * FOOT_BLOCK };
-    const FieldNode *n = &field->node[node];
-    const double step = 2 * n->radius / PLACES, fine = step / FOOT_BLOCK;
-    double f[PLACES + 1] = {1}, between[FOOT_BLOCK];
-    FieldLane x, y, z;
-    int count = 0;
-    for (int k = 0; k < PLACES; k++) {
-        Vec3 q = vec3_add_scaled(n->center, (k + 1) * step, way);
-        int i = k % FOOT_BLOCK;
-        x[i] = q.x, y[i] = q.y, z[i] = q.z;
-        if (i == FOOT_BLOCK - 1)
-            field->kernels->look(field->row, list->blob, list->count, x, y, z, f + 1 + k - i);
-    }
-    for (int k = 0; k < PLACES && count < CROSSINGS; k++) {
-        if ((f[k] > 0) == (f[k + 1] > 0))
-            continue;
-        int at = 0;
-        for (int i = 0; i < FOOT_BLOCK; i++) {
-            Vec3 q = vec3_add_scaled(n->center, k * step + (i + 1) * fine, way);
-            x[i] = q.x, y[i] = q.y, z[i] = q.z;
-        }
-        field->kernels->look(field->row, list->blob, list->count, x, y, z, between);
-        while (at < FOOT_BLOCK - 1 && (between[at] > 0) == (f[k] > 0))
-            at++;
-        double before = at > 0 ? between[at - 1] : f[k], part = before / (before - between[at]);
-        wall[count] = vec3_add_scaled(n->center, k * step + (at + part) * fine, way);
-        count += cell_of(field, wall[count], node) == node;
-    }
-    return count;
-}
-
-// The wall's reach in a node's cell: how large a ball may be that touches the wall from within and meets no other part of it, at feet all around, the least of
-// all: what a cleft lets no ball into says little of the walls beside it alone. A point whose foot is nearer than that lies in such a ball with all that is
-// as near to it. Looks all around, and around the axis, as most of what is about a node may lie in other cells,
-// and through walls, as a cleft is not seen from the centre.
-static double measure_reach(const FieldVessel *field, int node, const Vec3 way_all[ROOM_WAYS])
-{
-    static const double part[] = {1.1, 1.05, 1, 0.95, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0};
-    static const double SHARE = 0.92;        // of a ball that is clear at the points at which it is looked at: see room_about
-    enum { AROUND = 16 };
-    const FieldNode *n = &field->node[node];
-    BlobList list;
-    int size = 0, found = 0;
-    Vec3 d = field->tree->direction[node], across = vec3_normal_to(d), side = vec3_cross(d, across);
-    list_blobs(field, node, n->center, 3 * n->radius, &list);
-    for (int k = 0; k < ROOM_WAYS + AROUND && part[size] > 0; k++) {
-        double turn = 2 * PI * k / AROUND;
-        Vec3 wall[CROSSINGS], in, way = k < ROOM_WAYS ? way_all[k] : vec3_add(vec3_scale(across, same_cos(turn)), vec3_scale(side, same_sin(turn)));
-        int crossings = walls_along(field, &list, node, way, wall);
-        for (int w = 0; w < crossings; w++, found++) {
-            field_at(field, &list, wall[w], &in);
-            in = vec3_unit_or(in, vec3_negate(way));
-            // a ball that reaches to where the inlet bends the field is nobody's
-            bool limits = false;
-            int at = size;
-            for (; part[at] > 0; at++) {
-                double ball = part[at] * n->radius;
-                Vec3 middle = vec3_add_scaled(wall[w], ball, in);
-                if (is_at_inlet(field, n, middle, ball))
-                    continue;
-                if (is_clear(field, &list, middle, ball, 1))
-                    break;
-                limits = true;
-            }
-            size = limits ? at : size;
-        }
-    }
-    return found > 0 ? SHARE * part[size] * n->radius : HUGE_VAL;
-}
-
-// The least of what is known of a node's wall and of those within half a radius: a cleft or a groove goes on from cell to cell, and looks that miss it in one meet
-// it in the next. Where there are any, or no wall was met at all, nothing is taken for granted.
-static double least_reach(const FieldVessel *field, int node)
-{
-    static const double CLEFT = 0.3, BESIDE = 0.5;   // of the radius
-    const VesselTree *tree = field->tree;
-    const FieldNode *n = &field->node[node];
-    double least = n->reach;
-    for (int k = tree->near_offset[node]; k < tree->near_offset[node + 1]; k++) {
-        const FieldNode *other = &field->node[tree->near[k]];
-        if (vec3_distance(n->center, other->center) < BESIDE * n->radius)
-            least = fmin(least, other->reach);
-    }
-    return least < CLEFT * n->radius || least == HUGE_VAL ? 0 : least;
-}
-
 static void fill_nodes(FieldVessel *field)
 {
     const VesselTree *tree = field->tree;
@@ -1173,14 +1097,8 @@ static void fill_nodes(FieldVessel *field)
         Blobby blobs = blobby_of(tree, node);
         field->node[node].carried = blobby_field(&blobs, tree->center[0]) > 0;
     }
-    Vec3 way[ROOM_WAYS];
-    field_directions(way, ROOM_WAYS);
-    for (int i = 0; i < tree->node_count; i++) {
-        field->node[i].clear = clear_about_center(field, i);
-        field->node[i].reach = measure_reach(field, i, way);
-    }
     for (int i = 0; i < tree->node_count; i++)
-        field->node[i].room = least_reach(field, i);
+        field->node[i].clear = clear_about_center(field, i);
 }
 
 Vessel *field_vessel_create_with(const VesselTree *tree, int isa)
