@@ -35,12 +35,19 @@ static void add_vector(cJSON *object, const char *name, Vec3 v)
 static void add_times(cJSON *summary, const StepProfile *profile)
 {
     static const char *const names[] = {"median", "p99", "p999", "max"};
-    cJSON *step = cJSON_AddObjectToObject(summary, "step_us"), *stages = cJSON_AddObjectToObject(summary, "stage_us");
+    static const struct {
+        const char *name;
+        double share;
+    } spread[] = {{"stage_us", 0.5}, {"stage_p99_us", 0.99}, {"stage_p999_us", 0.999}};
+    cJSON *step = cJSON_AddObjectToObject(summary, "step_us");
     double value[4] = {histogram_quantile(&profile->step, 0.5) / 1000, histogram_quantile(&profile->step, 0.99) / 1000,
                        histogram_quantile(&profile->step, 0.999) / 1000, (double)profile->step.largest / 1000};
     add_numbers(step, 4, names, value);
-    for (int i = 0; i < STAGE_COUNT; i++)
-        cJSON_AddNumberToObject(stages, stage_name[i], histogram_quantile(&profile->stage[i], 0.5) / 1000);
+    for (size_t k = 0; k < sizeof spread / sizeof *spread; k++) {
+        cJSON *stages = cJSON_AddObjectToObject(summary, spread[k].name);
+        for (int i = 0; i < STAGE_COUNT; i++)
+            cJSON_AddNumberToObject(stages, stage_name[i], histogram_quantile(&profile->stage[i], spread[k].share) / 1000);
+    }
 }
 
 static const char *const energy_name[] = {"hand", "load", "elastic", "kinetic", "friction", "damping", "numerical", "wall", "gained", "gained_most_in_a_step",

@@ -5,7 +5,7 @@
 #ifndef SELDINGER_SIM_SCORE_TIP_H
 #define SELDINGER_SIM_SCORE_TIP_H
 
-#include "solver/beam_element.h"
+#include "solver/beam.h"
 #include "solver/solver.h"
 
 typedef struct ScoreTip {

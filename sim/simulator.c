@@ -5,7 +5,7 @@
 #include <string.h>
 #include <time.h>
 
-const char *const stage_name[STAGE_COUNT] = {"feed", "detect", "assemble", "factor", "contact", "correct"};
+const char *const stage_name[STAGE_COUNT] = {"feed", "detect", "assemble", "factor", "contact", "judge", "correct"};
 const char *const step_flag_name[STEP_FLAG_COUNT] = {"diverged",        "not_converged", "deep",            "fully_inserted",
                                                      "fully_withdrawn", "out_of_vessel", "detection_unsure", "limited",
                                                      "model_disagrees", "hand_slips"};
@@ -91,12 +91,31 @@ static int64_t thread_cpu_ns(void)
     return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
 }
 
-// Ends a stage that began at *since.
-static void timed(StepProfile *profile, Stage stage, int64_t *since)
+// What a step spends in each of its stages, some of which it may repeat.
+typedef struct StageClock {
+    int64_t start, since, spent[STAGE_COUNT];
+} StageClock;
+
+static StageClock start_clock(void)
 {
     int64_t now = thread_cpu_ns();
-    histogram_add(&profile->stage[stage], now - *since);
-    *since = now;
+    return (StageClock){.start = now, .since = now};
+}
+
+static void lap(StageClock *clock, Stage stage)
+{
+    int64_t now = thread_cpu_ns();
+    clock->spent[stage] += now - clock->since;
+    clock->since = now;
+}
+
+static void keep_times(Simulator *simulator, const StageClock *clock)
+{
+    StepProfile *profile = &simulator->profile;
+    for (int k = 0; k < STAGE_COUNT; k++)
+        histogram_add(&profile->stage[k], clock->spent[k]);
+    simulator->step_ns = clock->since - clock->start;
+    histogram_add(&profile->step, simulator->step_ns);
 }
 
 const double energy_gain_share = 1e-3;
@@ -200,28 +219,33 @@ void simulator_step_tools(Simulator *simulator, const ToolCommands *commands)
 {
     exchange(simulator, commands);
     Stepper *stepper = simulator->stepper;
-    StepProfile *profile = &simulator->profile;
     double seconds = simulator->dt / 1000;
-    int64_t start = thread_cpu_ns(), since = start;
-
+    StageClock clock = start_clock();
     StepCommand command[STEP_TOOLS_MAX];
     for (int k = 0; k < STEP_TOOLS_MAX; k++)
         command[k] = (StepCommand){.advance = commands->tool[k].push_mm_s * seconds, .twist = commands->tool[k].twist_deg_s * seconds * PI / 180};
     step_feed_tools(stepper, command, commands->released);
-    timed(profile, STAGE_FEED, &since);
-    step_detect(stepper);
-    timed(profile, STAGE_DETECT, &since);
-    step_assemble(stepper);
-    timed(profile, STAGE_ASSEMBLE, &since);
-    step_factor(stepper);
-    timed(profile, STAGE_FACTOR, &since);
-    step_contact(stepper);
-    timed(profile, STAGE_CONTACT, &since);
+    lap(&clock, STAGE_FEED);
+    for (unsigned needs = STEP_NEEDS_ALL; needs != 0;) {
+        if (needs & STEP_NEEDS_WALLS) {
+            step_detect(stepper);
+            lap(&clock, STAGE_DETECT);
+        }
+        if (needs & STEP_NEEDS_SYSTEM) {
+            step_assemble(stepper);
+            lap(&clock, STAGE_ASSEMBLE);
+            step_factor(stepper);
+            lap(&clock, STAGE_FACTOR);
+        }
+        step_contact(stepper);
+        lap(&clock, STAGE_CONTACT);
+        needs = step_judge(stepper);
+        lap(&clock, STAGE_JUDGE);
+    }
     step_correct(stepper);
-    timed(profile, STAGE_CORRECT, &since);
+    lap(&clock, STAGE_CORRECT);
 
-    simulator->step_ns = since - start;
-    histogram_add(&profile->step, simulator->step_ns);
+    keep_times(simulator, &clock);
     accumulate(simulator);
     if (simulator->energy.watched)
         balance_energy(simulator);

@@ -1,4 +1,4 @@
-// The simulator: a scene and its vessel, stepped by commands. One step is the solver's six stages, each timed with the thread's CPU clock.
+// The simulator: a scene and its vessel, stepped by commands. One step is the solver's stages, some of them repeated where it is linearised again, each timed with the thread's CPU clock.
 // Inside mm, g, ms, N, rad; commands and totals carry their unit in the name. A step allocates nothing. One thread owns a simulator;
 // it borrows scene and vessel, which must outlive it.
 #ifndef SELDINGER_SIM_SIMULATOR_H
@@ -9,7 +9,7 @@
 #include "sim/time_histogram.h"
 #include "solver/solver.h"
 
-typedef enum { STAGE_FEED, STAGE_DETECT, STAGE_ASSEMBLE, STAGE_FACTOR, STAGE_CONTACT, STAGE_CORRECT, STAGE_COUNT } Stage;
+typedef enum { STAGE_FEED, STAGE_DETECT, STAGE_ASSEMBLE, STAGE_FACTOR, STAGE_CONTACT, STAGE_JUDGE, STAGE_CORRECT, STAGE_COUNT } Stage;
 extern const char *const stage_name[STAGE_COUNT];
 
 // Of all steps so far: thread CPU time [ns], counts, depths.

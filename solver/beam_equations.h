@@ -27,7 +27,7 @@
 #ifndef SELDINGER_SOLVER_BEAM_EQUATIONS_H
 #define SELDINGER_SOLVER_BEAM_EQUATIONS_H
 
-#include "solver/beam_element.h"
+#include "solver/beam.h"
 
 #if defined(__GNUC__) && !defined(__clang__)
 #define INLINE static inline __attribute__((always_inline))

@@ -10,7 +10,7 @@
 #ifndef SELDINGER_SOLVER_COAXIAL_H
 #define SELDINGER_SOLVER_COAXIAL_H
 
-#include "solver/beam_element.h"
+#include "solver/beam.h"
 
 enum {
     COAXIAL_TOOLS_MAX = 4,

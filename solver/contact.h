@@ -88,4 +88,30 @@ void contact_add_curvature(const ContactSet *set, struct BlockChain *chain, doub
 bool contact_is_free(const struct BlockChain *chain, int node, int dof);
 unsigned contact_free_dofs(const struct BlockChain *chain, int node);        // of the first six
 
+// --- what a solve (contact_solve.h) is asked, and says ---
+
+typedef enum { CONTACT_BLOCK = 0, CONTACT_POINTWISE = 1 } ContactForm;
+
+typedef struct ContactOptions {
+    ContactForm form;        // default CONTACT_BLOCK
+    int max_iterations;      // sweeps, default 200; a factorisation of the block form counts as eight of them, or down to four on a
+                             // condensed chain (block_condense.h), so that a step's cost is bounded
+    double tolerance;        // on the residual below, default 1e-6
+} ContactOptions;
+
+typedef struct ContactReport {
+    int iterations;          // sweeps or factorisations used
+    bool converged;
+    double residual;         // natural residual: largest over contacts of |force - project_K(force - r * violation)| over the largest force (at
+                             // least 1e-3 N). Forces have been cut to their cones by no more than this; also in a solve that stopped
+                             // early no contact overlaps by more than residual * largest force / stiffness of its node
+    double largest;          // [N] that largest force
+    double cone_violation;   // largest (|force_t| - mu force_n)+ over force_n, or (|force| - bound)+ over a slide's bound
+    int active;              // contacts with the wall that bear force
+    int pairs;               // … and contacts of the tool with itself
+    bool singular;           // the chain is not positive definite: nothing was solved
+} ContactReport;
+
+typedef struct ContactSolver ContactSolver;   // work space
+
 #endif

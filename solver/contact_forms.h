@@ -5,9 +5,9 @@
 #include "solver/block_condense.h"
 #include "solver/block_lu.h"
 #include "solver/contact_rows.h"
-#include "solver/gauss_seidel.h"
 
 enum { CONTACT_SWEEPS_PER_FACTOR = 8 };
+static const double LEAST_FORCE = 1e-3;  // [N] that errors are measured against
 
 // What a contact does in one Newton iteration: f = force - C (further motion), C acting in space.
 typedef struct ContactLaw {
@@ -77,6 +77,8 @@ Mat3 contact_pairs_block(const ContactPairs *pairs, int k, int l);
 // s->delta, which is what the rows of the chain give without the pairs that are not open, becomes that with them. False: singular.
 bool contact_pairs_step(ContactSolver *solver, int count, bool reuse, bool whole, ContactSolve solve);
 
+// The block form on the chain of the contacts' nodes. False where these are not few, or the chain is not positive definite.
+bool contact_condensed(ContactSolver *solver, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u, ContactReport *report);
 // The contacts [0, count) with the wall on a chain that is not factored yet. False where it is not positive definite.
 bool contact_walls(ContactSolver *solver, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u, ContactReport *report);
 // The same after b has changed by `change` (M, n), with the same matrix and states, which is quick and good where little changes. False where it cannot.

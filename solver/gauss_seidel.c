@@ -1,380 +1,523 @@
-// What both forms of the contact solve share: the contacts in the order of the chain, and the measure of how well they are solved.
+// The pointwise form: Gauss-Seidel over the contacts along the chain, forth and back (Kerrien 2017, 6.3; Duriez 2006).
 //
-// Residual of a contact (Alart and Curnier's map), with its own stiffness k_n, k_t of the node alone in front of the violation:
-//   normal      f_n - (f_n - k_n (gap + d_n))+
-//   tangential  f_t - P(f_t - k_t d_t), P onto the disc of radius mu f_n, or of a slide's bound
-// The node's own stiffness is the strictest sensible scale: the operator W between forces and motion is never smaller than 1/(4 k), so a
-// residual of 1e-6 is a force error of about 1e-6 also where a stiff straight wire carries many contacts and W is nearly singular.
-#include "solver/gauss_seidel.h"
-
+// W = J A^-1 J^T is never formed. Seen from node i the chain to its left and to its right act through two 6-vectors:
+//   u_i = S_i (p_i + q_i + r_i),  r_i = b_i + (J^T f)_i,  S_i = (A^-1)_ii
+//   p_(i+1) = -E_i (p_i + r_i),     E_i = L_i D_i^-1,            D_i the pivots of an elimination from the left
+//   q_(i-1) = -F_i (q_i + r_i),     F_i = L_(i-1)^T B_i^-1,      B_i of one from the right,   S_i = (D_i + B_i - A_ii)^-1
+// A pass from left to right needs p only of forces that it has set already and q of forces that it has not reached; a pass back the other way
+// round. So a pass costs one 6x6 product a node and one local problem a contact. A contact between nodes i and i+1 sees both:
+//   u_j = S_j (p_j + q_j + r_j),  u_i = D_i^-1 (p_i + r_i) - E_i^T u_j,  j = i+1
+//
+// The local problem, three unknowns, is solved exactly: open, stick, or slip with f_t = -(W_tt' + g)^-1 c, the scalar g > 0 such that
+// |f_t| = mu f_n. At least one such g exists for any mu (the difference of both sides changes sign between 0 and infinity).
+// A slide has two unknowns and a bound that is given: there is exactly one g.
 #include "solver/contact_forms.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-// Condensing costs about as much as two factorisations of what goes: it pays unless nearly all nodes stay.
-static const double FULL_SHARE = 1.25;
-static const double LEAST_FORCE = 1e-3;  // [N] that errors are measured against
+// What a pass needs of a contact.
+typedef struct Local {
+    Vec3 axis[3];            // normal, two tangents
+    Mat3 w;                  // own 3x3 of W on these axes
+    double response[3][2 * BLOCK_LARGEST];  // motion of its one or two nodes under a unit force along an axis
+    double g;                // of its last slip: where the next search starts
+    Vec3 offset;             // what the recursion lacks against the factor's solution, by rounding
+} Local;
 
-ContactOptions contact_default_options(void)
+struct PointwiseWork {
+    int size;                // n
+    double *left, *right;    // (M, n, n) E_i, F_i
+    double *inverse, *pivot; // (M, n, n) S_i, D_i^-1
+    double *p, *q, *r;       // (M, n)
+    Local *local;            // (capacity)
+};
+
+PointwiseWork *pointwise_work_create(int node_count, int size, int capacity)
 {
-    return (ContactOptions){.form = CONTACT_BLOCK, .max_iterations = 200, .tolerance = 1e-6};
-}
-
-static Sym3 block_at(const double *d, int n) { return (Sym3){d[0], d[n], d[2 * n], d[n + 1], d[2 * n + 1], d[2 * n + 2]}; }
-
-// The stiffness that a contact sees: its node's own, or of two nodes and their turns in series, each with its share.
-static void own_stiffness(const BlockChain *chain, ContactRow *c)
-{
-    double kn = 0, kt = 0, yields = 0, give_n = 0, give_t = 0;
-    Vec3 n = c->normal;
-    for (int e = 0; e < c->nodes; e++) {
-        const int size = chain->size;
-        const double *d = chain->diag + (size_t)(size * size) * (size_t)(c->node + e), w = c->weight[e];
-        unsigned mask = c->mask[e] = contact_free_dofs(chain, c->node + e);
-        Sym3 k = block_at(d, size), turn = block_at(d + 3 * (size + 1), size);
-        double normal = sym3_quadratic(&k, n), free = (mask & 1 ? n.x * n.x : 0) + (mask & 2 ? n.y * n.y : 0) + (mask & 4 ? n.z * n.z : 0);
-        yields += w * w * free;
-        kn += normal;
-        kt += (sym3_trace(&k) - normal) / 2;
-        double levered = mask >> 3 == 7 ? 3 * vec3_norm2(c->lever[e]) / sym3_trace(&turn) : 0;
-        give_n += w * w * free / normal + levered;
-        give_t += w * w * 2 / (sym3_trace(&k) - normal) + levered;
-    }
-    c->stiffness_n = c->nodes == 1 ? kn : 1 / give_n;
-    c->stiffness_t = c->nodes == 1 ? kt : 1 / give_t;
-    c->inert = !(yields > 1e-8) || !isfinite(c->gap) || !vec3_is_finite(n);
-}
-
-// The mean over the directions in which it can move, as along a wall.
-static void slide_stiffness(const BlockChain *chain, double give, ContactRow *c)
-{
-    const size_t n = (size_t)chain->size, at = (size_t)c->slide;
-    const double *d = chain->diag + n * n * (size_t)c->node + (n + 1) * at;
-    c->mask[0] = (contact_is_free(chain, c->node, c->slide) ? 1u : 0) | (c->radius > 0 && contact_is_free(chain, c->node, c->slide + 1) ? 2u : 0);
-    double s = c->mask[0] & 1 ? d[0] : 0, phi = c->mask[0] & 2 ? d[n + 1] / (c->radius * c->radius) : 0;
-    c->stiffness_n = c->stiffness_t = (s + phi) / (c->mask[0] == 3 ? 2 : 1);
-    c->inert = c->mask[0] == 0 || !(c->bound > 0) || !isfinite(c->bound) || !isfinite(c->radius);
-    c->spring = c->inert ? 0 : c->bound / give;
-}
-
-// Both ends give way.
-static void pair_stiffness(const BlockChain *chain, ContactRow *c, ContactRow *far)
-{
-    double give_n = 0, give_t = 0;
-    ContactRow *end[2] = {c, far};
-    for (int e = 0; e < 2; e++) {
-        own_stiffness(chain, end[e]);
-        give_n += end[e]->inert ? 0 : 1 / end[e]->stiffness_n;
-        give_t += end[e]->inert ? 0 : 1 / end[e]->stiffness_t;
-    }
-    c->inert &= far->inert;
-    c->stiffness_n = 1 / give_n;
-    c->stiffness_t = 1 / give_t;
-}
-
-static ContactRow pair_end(const ContactPair *p, int e, int stride)
-{
-    const ContactEnd *end = &p->end[e];
-    double sign = e ? -1 : 1;
-    ContactRow c = {.node = end->node, .chain_node = end->node, .stride = stride, .nodes = 2, .normal = p->normal, .gap = p->gap, .radius = sign * end->radius,
-                    .friction = fmax(0, p->friction)};
-    for (int k = 0; k < 2; k++) {
-        c.weight[k] = sign * end->weight[k];
-        c.lever[k] = vec3_scale(end->lever[k], sign);
-    }
-    return c;
-}
-
-static void insert(ContactRow *row, int k, const ContactRow *c)
-{
-    for (; k > 0 && (row[k - 1].node > c->node || (row[k - 1].node == c->node && row[k - 1].weight[1] > c->weight[1])); k--)
-        row[k] = row[k - 1];
-    row[k] = *c;
-}
-
-int contact_rows_fill(const ContactSet *set, const BlockChain *chain, bool slides_apart, ContactRow *row, ContactRow *far)
-{
-    const Vec3 none = {0, 0, 0};
-    int count = set->count, behind = set->count + set->pair_count;
-    for (int i = 0; i < set->count; i++) {
-        const ContactPoint *p = &set->point[i];
-        ContactRow c = {.node = p->node, .chain_node = p->node, .stride = chain->size, .point = i, .nodes = p->xi > 0 && p->node + 1 < chain->count ? 2 : 1, .weight = {1, 0},
-                        .normal = p->normal, .gap = p->gap, .radius = p->tool_radius, .friction = fmax(0, p->friction)};
-        if (c.nodes == 2)
-            for (int e = 0; e < 2; e++) {
-                c.weight[e] = e ? p->xi : 1 - p->xi;
-                c.lever[e] = p->lever[e];
-            }
-        own_stiffness(chain, &c);
-        if (c.inert)
-            c.gap = HUGE_VAL;
-        c.force = c.inert || !vec3_is_finite(p->force) ? none : contact_project(&c, p->force);
-        insert(row, i, &c);
-    }
-    for (int i = 0; i < set->slide_count; i++) {
-        const ContactSlide *p = &set->slide[i];
-        ContactRow c = {.node = p->node, .chain_node = p->node, .stride = chain->size, .slide = p->unknown, .point = i, .nodes = 1, .weight = {1, 0},
-                        .normal = {0, 0, 1}, .radius = p->radius, .bound = p->bound};
-        slide_stiffness(chain, p->give, &c);
-        Vec3 force = vec3(c.mask[0] & 1 ? p->force[0] : 0, c.mask[0] & 2 ? p->force[1] : 0, 0);
-        c.force = c.inert || !vec3_is_finite(force) ? none : contact_project(&c, force);
-        Vec3 held = vec3(c.mask[0] & 1 ? p->held[0] : 0, c.mask[0] & 2 ? p->held[1] : 0, 0);
-        c.held = c.inert || !vec3_is_finite(held) ? none : contact_project(&c, held);
-        if (slides_apart)
-            row[behind++] = c;
-        else
-            insert(row, count++, &c);
-    }
-    for (int i = 0; i < set->pair_count; i++) {
-        const ContactPair *p = &set->pair[i];
-        far[i] = pair_end(p, 1, chain->size);
-        ContactRow c = pair_end(p, 0, chain->size);
-        c.point = i;
-        c.far = &far[i];
-        pair_stiffness(chain, &c, &far[i]);
-        if (c.inert)
-            c.gap = HUGE_VAL;
-        c.force = c.inert || !vec3_is_finite(p->force) ? none : contact_project(&c, p->force);
-        row[count + i] = c;
-    }
-    return count + set->pair_count;
-}
-
-double contact_residual(const ContactRow *row, int count, const Vec3 *motion, ContactReport *report)
-{
-    double worst = 0, top = LEAST_FORCE * LEAST_FORCE, cone = 0; // squares, the first two
-    int active = 0, pairs = 0;
-    for (int i = 0; i < count; i++) {
-        const ContactRow *c = &row[i];
-        if (c->inert || contact_row_is_idle(c, motion[i]))
-            continue;
-        double fn = vec3_dot(c->force, c->normal);
-        Vec3 error = contact_error(c, c->force, motion[i], 1);
-        double off = vec3_norm2(error), force = vec3_norm2(c->force);
-        worst = off > worst ? off : worst;
-        top = force > top ? force : top;
-        *(c->far ? &pairs : &active) += fn > 0;
-        if (fn > 0 || c->slide)
-            cone = fmax(cone, contact_row_excess(c));
-    }
-    report->active = active;
-    report->pairs = pairs;
-    report->largest = sqrt(top);
-    report->cone_violation = cone;
-    return report->residual = sqrt(worst) / report->largest;
-}
-
-void contact_balance(ContactSolver *s, const BlockFactor *factor, const double *b, int count, double *u)
-{
-    memcpy(s->rhs, b, (size_t)(s->matrix.count * s->matrix.size) * sizeof *b);
-    for (int i = 0; i < count; i++)
-        contact_row_push(&s->row[i], s->row[i].force, s->rhs);
-    block_factor_solve(factor, s->rhs, u);
-    for (int i = 0; i < count; i++)
-        s->motion[i] = contact_row_motion(&s->row[i], u);
-}
-
-ContactSolver *contact_solver_create(int node_count, int size, int contact_capacity)
-{
-    ContactSolver *s = calloc(1, sizeof *s);
-    if (!s || node_count < 1 || !block_size_is_known(size) || contact_capacity < 0) {
-        free(s);
+    PointwiseWork *w = calloc(1, sizeof *w);
+    if (!w)
+        return NULL;
+    size_t n = (size_t)size, m = (size_t)node_count;
+    w->size = size;
+    double **block[] = {&w->left, &w->right, &w->inverse, &w->pivot}, **vector[] = {&w->p, &w->q, &w->r};
+    bool ok = true;
+    for (int i = 0; i < 4; i++)
+        ok &= (*block[i] = calloc(m * n * n, sizeof(double))) != NULL;
+    for (int i = 0; i < 3; i++)
+        ok &= (*vector[i] = calloc(m * n, sizeof(double))) != NULL;
+    w->local = calloc((size_t)capacity + 1, sizeof *w->local);
+    if (!ok || !w->local) {
+        pointwise_work_destroy(w);
         return NULL;
     }
-    size_t n = (size_t)node_count * (size_t)size, blocks = block_doubles(node_count, size), k = (size_t)contact_capacity + 1;
-    s->node_count = node_count;
-    s->capacity = contact_capacity;
-    s->row = calloc(k, sizeof *s->row);
-    s->spare = calloc(k, sizeof *s->spare);
-    s->motion = calloc(k, sizeof *s->motion);
-    s->law = calloc(k, sizeof *s->law);
-    s->best = calloc(k, sizeof *s->best);
-    s->best_u = calloc(n, sizeof *s->best_u);
-    s->flag = calloc(k, sizeof *s->flag);
-    s->wall = calloc(k, sizeof *s->wall);
-    s->rhs = calloc(n, sizeof *s->rhs);
-    s->delta = calloc(n, sizeof *s->delta);
-    s->turned = calloc(blocks, sizeof *s->turned);
-    s->turned_chain = calloc(blocks, sizeof *s->turned_chain);
-    s->small_u = calloc(n, sizeof *s->small_u);
-    s->side = calloc(n, sizeof *s->side);
-    s->braced_factor = block_factor_create(node_count, size);
-    s->lu = block_lu_create(node_count, size);
-    s->condenser = block_condenser_create(node_count, size);
-    s->factor = block_factor_create(node_count, size);
-    s->pointwise = pointwise_work_create(node_count, size, contact_capacity);
-    bool ok = block_chain_create(&s->matrix, node_count, size) && s->pointwise && s->condenser && s->small_u && s->turned_chain && s->side && s->braced_factor;
-    if (!s->row || !s->spare || !s->motion || !s->law || !s->best || !s->best_u || !s->flag || !s->wall || !s->rhs || !s->delta || !s->turned || !s->lu || !s->factor || !ok) {
-        contact_solver_destroy(s);
-        return NULL;
-    }
-    return s;
+    return w;
 }
 
-bool contact_solver_reserve_pairs(ContactSolver *s, int pairs)
+void pointwise_work_destroy(PointwiseWork *w)
 {
-    size_t k = (size_t)s->capacity + (size_t)pairs + 1;
-    free(s->row), free(s->motion), free(s->law), free(s->best), free(s->flag), free(s->wall);
-    pointwise_work_destroy(s->pointwise);
-    s->row = calloc(k, sizeof *s->row);
-    s->motion = calloc(k, sizeof *s->motion);
-    s->law = calloc(k, sizeof *s->law);
-    s->best = calloc(k, sizeof *s->best);
-    s->flag = calloc(k, sizeof *s->flag);
-    s->wall = calloc(k, sizeof *s->wall);
-    s->pointwise = pointwise_work_create(s->node_count, s->matrix.size, s->capacity + pairs);
-    contact_pairs_destroy(s->pairs);
-    s->pairs = contact_pairs_create(s->node_count, s->matrix.size, pairs);
-    return s->row && s->motion && s->law && s->best && s->flag && s->wall && s->pointwise && s->pairs;
-}
-
-void contact_solver_destroy(ContactSolver *s)
-{
-    if (!s)
+    if (!w)
         return;
-    free(s->row);
-    free(s->spare);
-    free(s->motion);
-    free(s->law);
-    free(s->best);
-    free(s->best_u);
-    free(s->flag);
-    free(s->wall);
-    free(s->rhs);
-    free(s->delta);
-    free(s->turned);
-    free(s->small_u);
-    free(s->side);
-    block_factor_destroy(s->braced_factor);
-    free(s->turned_chain);
-    block_condenser_destroy(s->condenser);
-    block_lu_destroy(s->lu);
-    pointwise_work_destroy(s->pointwise);
-    contact_pairs_destroy(s->pairs);
-    block_factor_destroy(s->factor);
-    block_chain_destroy(&s->matrix);
-    free(s);
+    free(w->left);
+    free(w->right);
+    free(w->inverse);
+    free(w->pivot);
+    free(w->p);
+    free(w->q);
+    free(w->r);
+    free(w->local);
+    free(w);
 }
 
-// Does the block form on the chain of the contacts' nodes, where these are few. False where it cannot.
-static bool solve_condensed(ContactSolver *s, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u,
-                            ContactReport *report)
+// inverse = d^-1 of a symmetric positive definite block; false where it is not.
+static bool invert(int n, const double *d, double *inverse)
 {
-    bool *keep = block_condenser_keep(s->condenser);
-    int kept = 0;
-    for (int i = 0; i < count; i++)
-        for (int e = 0; e < s->row[i].nodes; e++) {
-            bool *flag = &keep[s->row[i].chain_node + e];
-            kept += !*flag;
-            *flag = true;
+    double l[BLOCK_LARGEST][BLOCK_LARGEST], y[BLOCK_LARGEST][BLOCK_LARGEST];
+    for (int j = 0; j < n; j++)
+        for (int i = j; i < n; i++) {
+            double sum = d[n * i + j];
+            for (int k = 0; k < j; k++)
+                sum -= l[i][k] * l[j][k];
+            if (i == j && !(sum > 0))
+                return false;
+            l[i][j] = i == j ? sqrt(sum) : sum / l[j][j];
         }
-    for (int i = s->banded; i < count; i++)
-        for (int e = 0; e < 2; e++) {
-            bool *flag = &keep[s->row[i].far->chain_node + e];
-            kept += !*flag;
-            *flag = true;
+    for (int c = 0; c < n; c++) // y = l^-1 by columns
+        for (int i = c; i < n; i++) {
+            double sum = i == c;
+            for (int k = c; k < i; k++)
+                sum -= l[i][k] * y[k][c];
+            y[i][c] = sum / l[i][i];
         }
-    if (FULL_SHARE * kept > chain->count) {
-        memset(keep, 0, (size_t)chain->count * sizeof *keep);
-        return false;
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j <= i; j++) {
+            double sum = 0;
+            for (int k = i; k < n; k++)
+                sum += y[k][i] * y[k][j];
+            inverse[n * i + j] = inverse[n * j + i] = sum;
+        }
+    return true;
+}
+
+// y += s a x, or y += s a^T x
+static void add_product(int n, const double *a, double s, const double *x, double *y)
+{
+    for (int i = 0; i < n; i++) {
+        const double *r = a + n * i;
+        double sum = r[0] * x[0] + r[1] * x[1];
+        for (int k = 2; k < n; k += 2)
+            sum += r[k] * x[k] + r[k + 1] * x[k + 1];
+        y[i] += s * sum;
     }
-    const BlockChain *small = block_condense(s->condenser, chain, b);
-    if (!small || !(s->is_positive || block_chain_factor(small, s->factor)))
-        return false;
-    for (int i = 0; i < count; i++)
-        s->row[i].node = block_condenser_place(s->condenser, s->row[i].chain_node);
-    for (int i = s->banded; i < count; i++)
-        s->row[i].far->node = block_condenser_place(s->condenser, s->row[i].far->chain_node);
-    // an iteration costs what is left of the chain: up to twice as many are in the same bound
-    ContactOptions longer = *options;
-    longer.max_iterations = (int)(options->max_iterations * fmin(2, (double)chain->count / small->count));
-    s->small = small;
-    *report = contact_newton(s, small, s->factor, block_condenser_side(s->condenser), count, &longer, s->small_u);
-    block_condenser_expand(s->condenser, s->small_u, u);
-    return true;
 }
 
-bool contact_walls(ContactSolver *s, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u, ContactReport *report)
+static void add_product_transposed(int n, const double *a, double s, const double *x, double *y)
 {
-    *report = (ContactReport){.converged = true, .largest = LEAST_FORCE};
-    s->small = NULL;
-    if (count == 0)
-        return block_chain_factor_solve(chain, s->factor, b, u);
-    if (solve_condensed(s, chain, b, count, options, u, report))
-        return true;
-    if (!block_chain_factor(chain, s->braced_factor))
-        return false;
-    for (int i = 0; i < count; i++)
-        s->row[i].node = s->row[i].chain_node;
-    for (int i = s->banded; i < count; i++)
-        s->row[i].far->node = s->row[i].far->chain_node;
-    *report = contact_newton(s, chain, s->braced_factor, b, count, options, u);
-    return true;
+    for (int j = 0; j < n; j++)
+        for (int i = 0; i < n; i++)
+            y[j] += s * a[n * i + j] * x[i];
 }
 
-bool contact_walls_again(ContactSolver *s, const BlockChain *chain, const double *change, int count, double *u, ContactReport *report)
+// Eliminations from both ends: E, F, S and D^-1.
+static bool prepare(PointwiseWork *w, const BlockChain *a)
 {
-    double *more = s->best_u;    // not in use between solves
-    if (!s->small && count > 0)
-        return false;
-    if (!s->small) {
-        block_factor_solve(s->factor, change, more);
-        report->residual = 0;
-    } else {
-        block_condenser_turn_to(s->condenser, change);
-        if (!contact_newton_again(s, s->small, block_condenser_side(s->condenser), count, s->small_u, report))
+    const int m = a->count, n = w->size, block = n * n;
+    const size_t bytes = (size_t)block * sizeof(double);
+    double d[BLOCK_LARGEST * BLOCK_LARGEST], inverse[BLOCK_LARGEST * BLOCK_LARGEST];
+    for (int i = 0; i < m; i++) { // d = A_ii - L_(i-1) D_(i-1)^-1 L_(i-1)^T
+        memcpy(d, a->diag + (size_t)block * (size_t)i, bytes);
+        for (int r = 0; i > 0 && r < n; r++)
+            for (int c = 0; c < n; c++)
+                for (int k = 0; k < n; k++)
+                    d[n * r + c] -= w->left[block * (i - 1) + n * r + k] * a->lower[block * (i - 1) + n * c + k];
+        memcpy(w->inverse + (size_t)block * (size_t)i, d, bytes);
+        if (!invert(n, d, w->pivot + (size_t)block * (size_t)i))
             return false;
-        block_condenser_expand(s->condenser, s->delta, more);
+        for (int r = 0; i + 1 < m && r < n; r++)
+            for (int c = 0; c < n; c++) {
+                double sum = 0;
+                for (int k = 0; k < n; k++)
+                    sum += a->lower[block * i + n * r + k] * w->pivot[block * i + n * k + c];
+                w->left[block * i + n * r + c] = sum;
+            }
     }
-    for (int i = 0; i < chain->size * chain->count; i++)
-        u[i] += more[i];
+    for (int i = m - 1; i >= 0; i--) { // d = A_ii - L_i^T B_(i+1)^-1 L_i
+        memcpy(d, a->diag + (size_t)block * (size_t)i, bytes);
+        for (int r = 0; i + 1 < m && r < n; r++)
+            for (int c = 0; c < n; c++)
+                for (int k = 0; k < n; k++)
+                    d[n * r + c] -= w->right[block * (i + 1) + n * r + k] * a->lower[block * i + n * k + c];
+        if (!invert(n, d, inverse))
+            return false;
+        for (int r = 0; i > 0 && r < n; r++)
+            for (int c = 0; c < n; c++) {
+                double sum = 0;
+                for (int k = 0; k < n; k++)
+                    sum += a->lower[block * (i - 1) + n * k + r] * inverse[n * k + c];
+                w->right[block * i + n * r + c] = sum;
+            }
+        for (int k = 0; k < block; k++)
+            d[k] += w->inverse[block * i + k] - a->diag[block * i + k];
+        if (!invert(n, d, w->inverse + (size_t)block * (size_t)i))
+            return false;
+    }
     return true;
 }
 
-bool contact_needs_factor(const ContactSet *set, const ContactOptions *options)
+// Motion of a contact's nodes (2 n, the second half unused at a node) under loads g on them.
+static void respond(const PointwiseWork *w, const ContactRow *c, const double *g, double *v)
 {
-    return set->slide_count == 0 || options->form == CONTACT_POINTWISE;
+    const int n = w->size;
+    const size_t i = (size_t)c->node, block = (size_t)(n * n), bytes = (size_t)n * sizeof *v;
+    memset(v, 0, 2 * bytes);
+    if (c->nodes == 1) {
+        add_product(n, w->inverse + block * i, 1, g, v);
+        return;
+    }
+    double load[BLOCK_LARGEST];
+    memcpy(load, g + n, bytes);
+    add_product(n, w->left + block * i, -1, g, load);
+    add_product(n, w->inverse + block * (i + 1), 1, load, v + n);
+    add_product(n, w->pivot + block * i, 1, g, v);
+    add_product_transposed(n, w->left + block * i, -1, v + n, v);
 }
 
-ContactReport contact_solve(ContactSolver *solver, const BlockChain *chain, const BlockFactor *factor, const double *b, ContactSet *set,
-                            const ContactOptions *options, double *u)
+static void prepare_local(const PointwiseWork *w, const ContactRow *c, Local *l)
 {
-    bool by_points = options->form == CONTACT_POINTWISE;
-    int count = contact_rows_fill(set, chain, !by_points, solver->row, contact_pairs_far(solver->pairs)), all = set->count + set->slide_count + set->pair_count;
-    solver->banded = count - set->pair_count;
-    solver->wall_count = 0;
-    for (int i = 0; i < solver->banded; i++)
-        if (!solver->row[i].slide)
-            solver->wall[solver->wall_count++] = i;
-    ContactReport report;
-    if (!by_points)
-        block_condenser_survey(solver->condenser, chain);
-    for (int i = count; i < all; i++) {
-        const double *slip = set->slide[solver->row[i].point].slip;
-        bool known = isfinite(slip[0]) && isfinite(slip[1]);
-        solver->motion[i] = vec3(known && solver->row[i].mask[0] & 1 ? slip[0] : 0, known && solver->row[i].mask[0] & 2 ? slip[1] : 0, 0);
+    l->g = 0;
+    l->axis[0] = c->normal;
+    l->axis[1] = c->slide ? vec3(1, 0, 0) : vec3_normal_to(c->normal);
+    l->axis[2] = vec3_cross(c->normal, l->axis[1]);
+    ContactRow here = *c;
+    here.node = 0;
+    for (int a = 0; a < 3; a++) {
+        double g[2 * BLOCK_LARGEST] = {0};
+        contact_row_push(&here, l->axis[a], g);
+        respond(w, c, g, l->response[a]);
+        Vec3 d = contact_row_motion(&here, l->response[a]);
+        for (int k = 0; k < 3; k++)
+            l->w.m[k][a] = vec3_dot(d, l->axis[k]);
     }
-    if (by_points)
-        report = contact_pointwise(solver, chain, factor, b, count, options, u);
-    else if (count < all)
-        report = contact_slides(solver, chain, b, count, all, options, u);
-    else if (!solve_condensed(solver, chain, b, count, options, u, &report))
-        report = contact_newton(solver, chain, factor, b, count, options, u);
-    if (!by_points)
-        contact_cut(solver, count, &report);
-    for (int i = 0; i < all; i++) {
-        const ContactRow *c = &solver->row[i];
-        if (c->far) {
-            set->pair[c->point].force = c->force;
-        } else if (c->slide) {
-            set->slide[c->point].slip[0] = solver->motion[i].x;
-            set->slide[c->point].slip[1] = solver->motion[i].y;
-            set->slide[c->point].force[0] = c->force.x;
-            set->slide[c->point].force[1] = c->force.y;
-        } else {
-            set->point[c->point].force = c->force;
+}
+
+// f_t = -(a + g)^-1 c of the condensed tangential problem, f_n from the normal row.
+static void slide_force(const Mat3 *w, const double *d, const double a[3], const double *c, double g, double *f)
+{
+    double xx = a[0] + g, yy = a[2] + g, det = xx * yy - a[1] * a[1];
+    f[1] = -(yy * c[0] - a[1] * c[1]) / det;
+    f[2] = -(xx * c[1] - a[1] * c[0]) / det;
+    f[0] = -(d[0] + w->m[0][1] * f[1] + w->m[0][2] * f[2]) / w->m[0][0];
+}
+
+static double slide_excess(const double *f, double mu) { return sqrt(f[1] * f[1] + f[2] * f[2]) - mu * f[0]; }
+
+// Signorini and Coulomb of one contact: d + w f, d[0] with the gap.
+static void solve_local(const Mat3 *w, const double *d, double mu, double *start, double *f)
+{
+    f[0] = f[1] = f[2] = 0;
+    if (d[0] >= 0)
+        return;
+    f[0] = -d[0] / w->m[0][0];
+    const double a[3] = {w->m[1][1] - w->m[1][0] * w->m[0][1] / w->m[0][0], w->m[1][2] - w->m[1][0] * w->m[0][2] / w->m[0][0], w->m[2][2] - w->m[2][0] * w->m[0][2] / w->m[0][0]};
+    const double c[2] = {d[1] - w->m[1][0] * d[0] / w->m[0][0], d[2] - w->m[2][0] * d[0] / w->m[0][0]};
+    double scale = a[0] + a[2];
+    if (!(mu > 0) || !(scale > 0))
+        return;
+    double low = 1e-13 * scale; // fixed tangential directions have no motion: keeps the 2x2 regular
+    slide_force(w, d, a, c, low, f);
+    double h_low = slide_excess(f, mu);
+    if (h_low <= 0)
+        return;
+    double high = *start > 0 ? *start : scale * 1e-3, h_high = 1, grow = 1e-4;
+    for (int k = 0; k < 80 && h_high > 0; k++) {
+        if (k > 0) {
+            low = high;
+            h_low = h_high;
+            high *= 1 + grow;
+            grow = fmin(3, 8 * grow);
         }
+        slide_force(w, d, a, c, high, f);
+        h_high = slide_excess(f, mu);
+        if (k == 0 && h_high < 0) { // the last g lies beyond the root: look just below it first
+            double near = high * (1 - 1e-4);
+            slide_force(w, d, a, c, near, f);
+            double h = slide_excess(f, mu);
+            if (h > 0) {
+                low = near;
+                h_low = h;
+            }
+        }
+    }
+    for (int k = 0; k < 80 && high - low > 1e-14 * high; k++) { // false position, a stuck end halved (Illinois)
+        double mid = (low * h_high - high * h_low) / (h_high - h_low);
+        if (!(mid > low && mid < high))
+            mid = (low + high) / 2;
+        slide_force(w, d, a, c, mid, f);
+        double h = slide_excess(f, mu);
+        *start = mid;
+        if (fabs(h) <= 4e-16 * fabs(mu * f[0]))
+            break;
+        if (h > 0) {
+            low = mid;
+            h_low = h;
+            h_high /= 2;
+        } else {
+            high = mid;
+            h_high = h;
+            h_low /= 2;
+        }
+    }
+    f[0] = fmax(0, f[0]);
+    double size = sqrt(f[1] * f[1] + f[2] * f[2]);
+    if (size > 0) {
+        f[1] *= mu * f[0] / size;
+        f[2] *= mu * f[0] / size;
+    }
+}
+
+// One slide: d + w f. The search is Newton's on 1/|f|, which is concave in g and meets the root from below, at once where both directions give alike.
+// What a slide gives is a spring in series.
+static void solve_slide(const ContactRow *c, const Mat3 *own, const double *motion, double *f)
+{
+    const double bound = c->bound, soft = 1 / c->spring;
+    const double d[3] = {0, motion[1] - soft * c->held.x, motion[2] - soft * c->held.y};
+    Mat3 spring = *own, *w = &spring;
+    spring.m[1][1] += soft, spring.m[2][2] += soft;
+    double scale = w->m[1][1] + w->m[2][2], g = 1e-13 * scale; // a direction that is held has no motion: keeps the 2x2 regular
+    f[0] = f[1] = f[2] = 0;
+    for (int k = 0; k < 50 && scale > 0; k++) {
+        double xx = w->m[1][1] + g, xy = w->m[1][2], yy = w->m[2][2] + g, det = xx * yy - xy * xy;
+        f[1] = -(yy * d[1] - xy * d[2]) / det;
+        f[2] = -(xx * d[2] - xy * d[1]) / det;
+        double size2 = f[1] * f[1] + f[2] * f[2], size = sqrt(size2), excess = size / bound - 1;
+        if (!(excess > 1e-15))
+            return;
+        double fall = (yy * f[1] * f[1] - 2 * xy * f[1] * f[2] + xx * f[2] * f[2]) / det; // f (w + g)^-1 f
+        g += size2 / fall * excess;
+        f[1] *= bound / size;
+        f[2] *= bound / size;
+    }
+}
+
+// Motion of a place's one or two nodes under all forces.
+static void place_motion(const PointwiseWork *w, const ContactRow *first, double *v)
+{
+    const size_t i = (size_t)first->node, n = (size_t)w->size, block = n * n;
+    const int size = w->size;
+    double load[BLOCK_LARGEST], left[BLOCK_LARGEST];
+    memset(v, 0, 2 * n * sizeof *v);
+    for (size_t k = 0; k < n; k++) {
+        left[k] = w->p[n * i + k] + w->r[n * i + k];
+        load[k] = first->nodes == 1 ? left[k] + w->q[n * i + k] : w->q[n * i + n + k] + w->r[n * i + n + k];
+    }
+    if (first->nodes == 1) {
+        add_product(size, w->inverse + block * i, 1, load, v);
+        return;
+    }
+    add_product(size, w->left + block * i, -1, left, load);
+    add_product(size, w->inverse + block * (i + 1), 1, load, v + n);
+    add_product(size, w->pivot + block * i, 1, left, v);
+    add_product_transposed(size, w->left + block * i, -1, v + n, v);
+}
+
+// The contacts [from, to) at one place, in turn; their nodes' motion is found once and kept up to date.
+static void visit(PointwiseWork *w, ContactRow *row, int from, int to, bool reverse)
+{
+    double v[2 * BLOCK_LARGEST];
+    place_motion(w, &row[from], v);
+    for (int n = 0; n < to - from; n++) {
+        int k = reverse ? to - 1 - n : from + n;
+        ContactRow *c = &row[k];
+        Local *l = &w->local[k];
+        if (c->inert)
+            continue;
+        ContactRow here = *c;
+        here.node = 0;
+        Vec3 motion = vec3_add(contact_row_motion(&here, v), l->offset);
+        double old[3], d[3], f[3];
+        for (int a = 0; a < 3; a++)
+            old[a] = vec3_dot(c->force, l->axis[a]);
+        for (int a = 0; a < 3; a++)
+            d[a] = vec3_dot(motion, l->axis[a]) - l->w.m[a][0] * old[0] - l->w.m[a][1] * old[1] - l->w.m[a][2] * old[2];
+        d[0] += c->gap;
+        if (c->slide)
+            solve_slide(c, &l->w, d, f);
+        else
+            solve_local(&l->w, d, c->friction, &l->g, f);
+        Vec3 force = vec3_add_scaled(vec3_add_scaled(vec3_scale(l->axis[0], f[0]), f[1], l->axis[1]), f[2], l->axis[2]);
+        contact_row_push(c, vec3_sub(force, c->force), w->r);
+        for (int a = 0; a < 3; a++)
+            for (int e = 0; e < w->size * c->nodes; e++)
+                v[e] += l->response[a][e] * (f[a] - old[a]);
+        c->force = force;
+    }
+}
+
+// Contacts of one place: the same node, or all between it and the next.
+static int place_end(const ContactRow *row, int count, int from)
+{
+    int to = from + 1;
+    while (to < count && row[to].node == row[from].node && row[to].nodes == row[from].nodes)
+        to++;
+    return to;
+}
+
+static void pass_forth(PointwiseWork *w, ContactRow *row, int count, int m)
+{
+    const int n = w->size;
+    int k = 0;
+    memset(w->p, 0, (size_t)n * sizeof *w->p);
+    for (int i = 0; i < m; i++) {
+        while (k < count && row[k].node == i) {
+            int to = place_end(row, count, k);
+            visit(w, row, k, to, false);
+            k = to;
+        }
+        if (i + 1 == m)
+            break;
+        double sum[BLOCK_LARGEST], *next = w->p + n * (i + 1);
+        for (int e = 0; e < n; e++) {
+            sum[e] = w->p[n * i + e] + w->r[n * i + e];
+            next[e] = 0;
+        }
+        add_product(n, w->left + (ptrdiff_t)(n * n) * i, -1, sum, next);
+    }
+}
+
+static void pass_back(PointwiseWork *w, ContactRow *row, int count, int m)
+{
+    const int n = w->size;
+    int k = count;
+    memset(w->q + n * (m - 1), 0, (size_t)n * sizeof *w->q);
+    for (int i = m - 1; i >= 0; i--) {
+        bool moved = i + 1 == m;
+        for (;;) {
+            int from = k;
+            while (from > 0 && row[from - 1].node == i && row[from - 1].nodes == row[k - 1].nodes)
+                from--;
+            bool node = from < k && row[from].nodes == 1;
+            if ((from == k || node) && !moved) { // contacts between i and i+1 see q_(i+1); those at i need q_i
+                double sum[BLOCK_LARGEST], *next = w->q + n * i;
+                for (int e = 0; e < n; e++) {
+                    sum[e] = w->q[n * (i + 1) + e] + w->r[n * (i + 1) + e];
+                    next[e] = 0;
+                }
+                add_product(n, w->right + (ptrdiff_t)(n * n) * (i + 1), -1, sum, next);
+                moved = true;
+            }
+            if (from == k)
+                break;
+            visit(w, row, from, k, true);
+            k = from;
+        }
+    }
+}
+
+// p and q of the present forces, and what is missing in the motion that they give.
+static void refresh(ContactSolver *s, int count, int m)
+{
+    PointwiseWork *w = s->pointwise;
+    double v[2 * BLOCK_LARGEST];
+    memcpy(w->r, s->rhs, (size_t)(m * w->size) * sizeof *w->r);
+    pass_forth(w, s->row, 0, m);
+    pass_back(w, s->row, 0, m);
+    for (int k = 0; k < count; k++) {
+        ContactRow here = s->row[k];
+        place_motion(w, &here, v);
+        here.node = 0;
+        w->local[k].offset = vec3_sub(s->motion[k], contact_row_motion(&here, v));
+    }
+}
+
+static void solve_chain(const ContactSolver *s, const BlockFactor *factor, double *b, double *x)
+{
+    (void)s;
+    block_factor_solve(factor, b, x);
+}
+
+// The pairs in turn, W being known; the contacts' motions follow only among them.
+static void visit_pairs(ContactSolver *s, const int *pair, int count)
+{
+    for (int k = 0; k < count; k++) {
+        ContactRow *c = &s->row[pair[k]];
+        Local *l = &s->pointwise->local[pair[k]];
+        if (c->inert)
+            continue;
+        double d[3], f[3];
+        for (int a = 0; a < 3; a++)
+            d[a] = vec3_dot(s->motion[pair[k]], l->axis[a]);
+        for (int a = 0; a < 3; a++)
+            for (int b = 0; b < 3; b++)
+                d[a] -= l->w.m[a][b] * vec3_dot(c->force, l->axis[b]);
+        d[0] += c->gap;
+        solve_local(&l->w, d, c->friction, &l->g, f);
+        Vec3 force = vec3_add_scaled(vec3_add_scaled(vec3_scale(l->axis[0], f[0]), f[1], l->axis[1]), f[2], l->axis[2]);
+        Vec3 change = vec3_sub(force, c->force);
+        for (int j = 0; j < count; j++) {
+            Mat3 w = contact_pairs_block(s->pairs, j, k);
+            s->motion[pair[j]] = vec3_add(s->motion[pair[j]], mat3_mul_vec(&w, change));
+        }
+        c->force = force;
+    }
+}
+
+static int prepare_pairs(ContactSolver *s, const BlockFactor *factor, int count, int *pair)
+{
+    int pairs = 0;
+    for (int i = s->banded; i < count; i++)
+        pair[pairs++] = i;
+    if (pairs > 0)
+        contact_pairs_compliance(s, factor, solve_chain, pair, pairs);
+    for (int k = 0; k < pairs; k++) {
+        Local *l = &s->pointwise->local[pair[k]];
+        l->g = 0;
+        l->axis[0] = s->row[pair[k]].normal;
+        l->axis[1] = vec3_normal_to(l->axis[0]);
+        l->axis[2] = vec3_cross(l->axis[0], l->axis[1]);
+        Mat3 w = contact_pairs_block(s->pairs, k, k);
+        for (int a = 0; a < 3; a++)
+            for (int b = 0; b < 3; b++)
+                l->w.m[a][b] = vec3_dot(l->axis[a], mat3_mul_vec(&w, l->axis[b]));
+    }
+    return pairs;
+}
+
+ContactReport contact_pointwise(ContactSolver *s, const BlockChain *chain, const BlockFactor *factor, const double *b, int count,
+                                const ContactOptions *options, double *u)
+{
+    ContactReport report = {0};
+    PointwiseWork *w = s->pointwise;
+    int m = s->matrix.count = chain->count;
+    contact_balance(s, factor, b, count, u);
+    contact_residual(s->row, count, s->motion, &report);
+    report.converged = report.residual <= options->tolerance;
+    if (report.converged || count == 0 || !prepare(w, chain))
+        return report;
+    int banded = s->banded, *pair = s->wall + s->wall_count, pairs = prepare_pairs(s, factor, count, pair);
+    for (int k = 0; k < banded; k++)
+        if (!s->row[k].inert)
+            prepare_local(w, &s->row[k], &w->local[k]);
+    refresh(s, banded, m);
+    while (report.iterations < options->max_iterations && !report.converged) {
+        if (report.iterations % 2 == 0)
+            pass_forth(w, s->row, banded, m);
+        else
+            pass_back(w, s->row, banded, m);
+        report.iterations++;
+        if (pairs > 0) {         // they see the whole chain
+            contact_balance(s, factor, b, count, u);
+            for (int k = 0; k < 4; k++)
+                visit_pairs(s, pair, pairs);
+            contact_balance(s, factor, b, count, u);
+            refresh(s, banded, m);
+        }
+        // the residual costs two passes: look rarely
+        if (report.iterations % 16 && report.iterations < options->max_iterations)
+            continue;
+        contact_balance(s, factor, b, count, u);
+        refresh(s, banded, m);
+        contact_residual(s->row, count, s->motion, &report);
+        report.converged = report.residual <= options->tolerance;
     }
     return report;
 }

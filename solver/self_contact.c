@@ -16,7 +16,7 @@
 // changed sides count as deep in each other (self_contact_depth). The sheath is no obstacle, and where it holds the tool nothing touches it.
 #include "solver/self_contact.h"
 
-#include "solver/step_tools.h"
+#include "solver/tools_internal.h"
 
 #include <stdlib.h>
 #include <string.h>

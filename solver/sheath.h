@@ -3,7 +3,7 @@
 #ifndef SELDINGER_SOLVER_SHEATH_H
 #define SELDINGER_SOLVER_SHEATH_H
 
-#include "solver/beam_element.h"
+#include "solver/beam.h"
 
 typedef struct SheathElement {       // the element across the mouth
     double outside;          // [mm] l, rest length of the part outside, > 0

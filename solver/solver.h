@@ -5,7 +5,7 @@
 
 #include "solver/block_chain.h"
 #include "solver/contact.h"
-#include "solver/gauss_seidel.h"
+#include "solver/contact_solve.h"
 #include "solver/step.h"
 #include "solver/wire.h"
 

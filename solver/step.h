@@ -1,17 +1,18 @@
 // One implicit Euler step, in the stages in which the simulator calls and times them (sim/simulator.c reads like the paper). First order in dt: the hand's
 // work in the phantom is 3.5 % more at 1 ms than at 0.25 ms, 4.1 % without friction; with `follows_touch` 0.9 and 1.4 %.
 //   step_feed      take the command: advance and rotation of the driven node become this step's prescribed displacement
-//   step_detect    candidates and gaps at x_n from the vessel
-//   step_assemble  (M/h^2 + D/h + K) u = M v/h + f(x_n) + ..., with tension and curvature terms, constraints as unit rows
+//   step_detect    candidates and gaps at the iterate, at first x_n, from the vessel
+//   step_assemble  (M/h^2 + D/h + K) u = M v/h + f(x) + ..., with tension and curvature terms, constraints as unit rows
 //   step_factor
-//   step_contact   free motion, Gauss-Seidel
+//   step_contact   u with the contacts: Newton's method on their conditions
+//   step_judge     the iterate moves to the solution; which stages are needed again? None: the step is solved
 //   step_correct   x_{n+1}, v_{n+1}, reactions; on non-finite or absurd motion keeps x_n, sets STEP_DIVERGED
 // A step allocates nothing, reads no clock. One thread per Stepper; several Steppers may share a vessel.
 #ifndef SELDINGER_SOLVER_STEP_H
 #define SELDINGER_SOLVER_STEP_H
 
 #include "geom/vessel.h"
-#include "solver/gauss_seidel.h"
+#include "solver/contact_solve.h"
 #include "solver/wire.h"
 
 enum { STEP_TOOLS_MAX = 4, STEP_SPARES_MAX = 4 };
@@ -109,7 +110,10 @@ void step_detect(Stepper *stepper);
 void step_assemble(Stepper *stepper);
 void step_factor(Stepper *stepper);
 void step_contact(Stepper *stepper);
+enum { STEP_NEEDS_WALLS = 1, STEP_NEEDS_SYSTEM = 2, STEP_NEEDS_CONTACT = 4, STEP_NEEDS_ALL = 7 };    // step_detect; step_assemble and step_factor; step_contact
+unsigned step_judge(Stepper *stepper);
 void step_correct(Stepper *stepper);
+void step_solve(Stepper *stepper);       // all of it after step_feed()
 const StepReport *step_report(const Stepper *stepper);
 
 // State. The pointer stays valid; write through stepper_restore only.

@@ -5,15 +5,10 @@
 //
 // Unknowns are six a node in space axes; for nodes in the sheath they are in the line's axes, so that "stays on the line" is unit rows.
 // Reactions are read from node 0's rows as they were before its constraints.
-#include "solver/step_tools.h"
+#include "solver/tools_internal.h"
 #include "base/same_math.h"
 
 #include <string.h>
-
-double stepper_sheath_coordinate(const Stepper *s, int node)
-{
-    return vec3_dot(vec3_sub(s->state.position[node], s->mouth), s->axis[0]);
-}
 
 static void load_pose(const Vec3 *restrict position, const Quat *restrict orientation, int first, int count, const BeamPose *pose)
 {
@@ -131,6 +126,18 @@ static void mouth_element(Stepper *s, double scale)
         }
 }
 
+double stepper_tip_straightening(const Stepper *s)
+{
+    int last = s->state.node_count - 1;
+    return s->tool_count > 1 ? tools_tip_straightening(s) : sheath_straightening(&s->beam.rest, last - 1, stepper_sheath_coordinate(s, last - 1));
+}
+
+Vec3 stepper_tip_curvature(const Stepper *s)
+{
+    int last = s->state.node_count - 1;
+    return s->tool_count > 1 ? tools_tip_curvature(s) : sheath_rest_curvature(&s->beam.rest, last - 1, s->state.orientation[last]);
+}
+
 bool stepper_load(const Stepper *s, const LoadPlace *place, int end, double time, Vec3 *force, Vec3 *moment)
 {
     const WireLoad *load = &place->load;
@@ -161,39 +168,6 @@ static void add_load(Stepper *s, const LoadPlace *place, int end)
         add_vec(b, force);
         add_vec(b + 3, moment);
     }
-}
-
-void stepper_prescribe(Stepper *s, int node, int dof, double value)
-{
-    int n = s->chain.size;
-    double *d = s->chain.diag + block_of(s, node), *b = s->b + row_of(s, node);
-    for (int r = 0; r < n; r++) {
-        b[r] -= d[n * r + dof] * value;
-        d[n * r + dof] = d[n * dof + r] = 0;
-    }
-    if (node + 1 < s->chain.count) {
-        double *l = s->chain.lower + block_of(s, node);
-        for (int r = 0; r < n; r++) {
-            b[n + r] -= l[n * r + dof] * value;
-            l[n * r + dof] = 0;
-        }
-    }
-    if (node > 0) {
-        double *l = s->chain.lower + block_of(s, node - 1);
-        for (int c = 0; c < n; c++) {
-            b[c - n] -= l[n * dof + c] * value;
-            l[n * dof + c] = 0;
-        }
-    }
-    d[(n + 1) * dof] = 1;
-    b[dof] = value;
-}
-
-double stepper_wanted(const Stepper *s)
-{
-    // to where the command says, whatever has been lost to rounding before
-    double coordinate = s->state.inserted + s->command.advance - s->wire.total_length;
-    return coordinate - vec3_dot(vec3_sub(s->start_position[0], s->mouth), s->axis[0]);
 }
 
 static void constraints(Stepper *s)
@@ -308,14 +282,3 @@ double stepper_strain_force(const Stepper *s)
     return e.axial_gradient;
 }
 
-double stepper_reaction(const Stepper *s, int dof)
-{
-    int n = s->chain.size;
-    double sum = -s->grip_b[dof];
-    for (int c = 0; c < n; c++) {
-        sum += s->grip_diag[n * dof + c] * s->u[c];
-        if (s->chain.count > 1)
-            sum += s->grip_lower[n * c + dof] * s->u[n + c];
-    }
-    return sum;
-}

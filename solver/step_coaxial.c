@@ -5,7 +5,7 @@
 // own spin, t . omega + dphi/dt. What S carries from node to node (convection) is left out: of order v^2 dm/ds.
 #include "solver/coaxial_lanes.h"
 #include "base/same_math.h"
-#include "solver/step_tools.h"
+#include "solver/tools_internal.h"
 
 #include <string.h>
 
@@ -13,7 +13,6 @@ enum { NODAL = 12 };
 static const double SHORTEST = 0.01;     // of an element: what is left of it outside a mouth or a tip
 static const double SOFT = 0.02;         // … over which, to either side, a border of one tool passes one of another. Less than where a node joins the chain
 
-static bool is_at_tip(const Stepper *s, int c) { return s->carrier[c] != s->carrier[c + 1]; }
 
 // Does the section of the tool that carries node c change there, or end?
 static bool is_border(const Stepper *s, int c)
@@ -67,12 +66,6 @@ static int spans(const Stepper *s, int c, CoaxialSpan *span, int *tool)
     return count;
 }
 
-double tools_span_length(const Stepper *s, int c)
-{
-    int k = s->carrier[c + 1];
-    return s->wire.s[c + 1] - (s->carrier[c] == k ? s->wire.s[c] : slide_at(s, c, k));
-}
-
 // For the friction between tools: what the tools from each one inwards bear at the middle of an element.
 static void keep_inner(const Stepper *s, int c, const CoaxialInput *in, const CoaxialOutput *out, const int *tool)
 {
@@ -104,15 +97,6 @@ static void keep_inner(const Stepper *s, int c, const CoaxialInput *in, const Co
             s->inner_tension[c * inner + k - 1] = tension;
         }
     }
-}
-
-double tools_twist(const Stepper *s, int c)
-{
-    // whole turns of the tool that goes on at a tip count
-    double turned = is_at_tip(s, c) ? angle_at(s, c, s->carrier[c + 1]) : 0;
-    Quat q = quat_mul(s->state.orientation[c], quat_from_rotation_vector(vec3(remainder(turned, 2 * PI), 0, 0)));
-    Quat p = quat_mul(quat_conjugate(q), s->state.orientation[c + 1]);
-    return turned + 2 * same_atan(p.x / p.w);
 }
 
 // Behind a tip the frames of the two nodes belong to two tools: there node 1 is given that of the one that goes on.

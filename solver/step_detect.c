@@ -8,7 +8,7 @@
 // Where a lumen is hardly wider than the tool, one linearised wall sends the point through the one across, and the next sends it back, for ever. So a point
 // remembers the wall that faces the one it sees, and has both (WallMet).
 #include "solver/self_contact.h"
-#include "solver/step_tools.h"
+#include "solver/tools_internal.h"
 
 #include <string.h>
 
@@ -25,7 +25,7 @@ static const double DIP_MAX = 0.01;      // … and before it is asked again
 static const double GUARD_MAX = 0.3;     // [mm] of travel after which the wall between two nodes is another
 static const double LINGER = 0.9, LINGER_MAX = 0.006;     // of a gap, [mm]
 static const double MET_FAR = 0.2;       // [mm] from where it was met a wall across is remembered: as far as a plane stands for it
-static const double LACK_MAX = 0.045;    // [mm] of room between two walls that the wire may take, DEPTH_LAST of step.c
+static const double LACK_MAX = 0.045;    // [mm] of room between two walls that the wire may take, DEPTH_LAST of step_follow.c
 static const double TOUCH_REACH = 0.05;  // [mm] of gap: further from the wall a point may touch as it is (step_touch.c)
 static const double NOTHING_KNOWN = -1;  // as a clearance: neither place nor force is held
 // A contact between one free node and the sheath is one between nodes with no share for the second.

@@ -1,16 +1,7 @@
 // Energies of a state, and what a step's motion has done to them: each force of the step's end times the motion, as implicit Euler has it.
 #include "solver/self_contact.h"
-#include "solver/step_tools.h"
+#include "solver/tools_internal.h"
 #include "base/same_math.h"
-
-BeamInput stepper_beam(const Stepper *s, int i)
-{
-    const BeamRest *r = &s->beam.rest;
-    const WireState *w = &s->state;
-    return (BeamInput){.x1 = w->position[i], .x2 = w->position[i + 1], .q1 = w->orientation[i], .q2 = w->orientation[i + 1], .length = r->length[i],
-                       .extend = r->extend[i], .axial = r->axial[i], .near = r->near[i], .far = r->far[i], .twist = r->twist[i], .half_w = r->half_w[i],
-                       .half_y = r->half_y[i], .half_z = r->half_z[i]};
-}
 
 static double element_energy(const Stepper *s, int i, int held)
 {
@@ -31,18 +22,6 @@ static double element_energy(const Stepper *s, int i, int held)
     BeamOutput out;
     beam_element(&in, &out);
     return out.energy;
-}
-
-double stepper_tip_straightening(const Stepper *s)
-{
-    int last = s->state.node_count - 1;
-    return s->tool_count > 1 ? tools_tip_straightening(s) : sheath_straightening(&s->beam.rest, last - 1, stepper_sheath_coordinate(s, last - 1));
-}
-
-Vec3 stepper_tip_curvature(const Stepper *s)
-{
-    int last = s->state.node_count - 1;
-    return s->tool_count > 1 ? tools_tip_curvature(s) : sheath_rest_curvature(&s->beam.rest, last - 1, s->state.orientation[last]);
 }
 
 double stepper_elastic_energy(const Stepper *s)

@@ -1,6 +1,6 @@
 // Exchange at the hub: a tool that has been drawn back to its tip goes, and another takes its place around the tools within it, which stay where they are.
 // All that a step needs of the spare tools is made at the start, so that an exchange allocates nothing.
-#include "solver/step_tools.h"
+#include "solver/tools_internal.h"
 
 #include <string.h>
 

@@ -4,7 +4,7 @@
 //
 // A tool that no hand holds is held by the friction of the valve that it goes through, at the hub of the tool around it or at the sheath: its unknown is then
 // its slip through the valve, and that hub's hand feels what the valve takes.
-#include "solver/step_tools.h"
+#include "solver/tools_internal.h"
 
 #include <string.h>
 

@@ -1,8 +1,8 @@
-// What step.c, step_assemble.c, step_detect.c and checkpoint.c share: the stepper's inside. Not for users of the solver.
+// What the files of a step and checkpoint.c share: the stepper's inside. Not for users of the solver.
 #ifndef SELDINGER_SOLVER_STEP_INTERNAL_H
 #define SELDINGER_SOLVER_STEP_INTERNAL_H
 
-#include "solver/beam_element.h"
+#include "solver/beam.h"
 #include "solver/coaxial.h"
 #include "solver/sheath.h"
 #include "solver/slot.h"
@@ -165,6 +165,11 @@ struct Stepper {
     double wall_force_max, wall_force_sum;   // [N] of the step before
     bool has_failed;
     bool was_held;           // some solve of the step was held to its iterate
+    // how far the step has come (step_judge)
+    int linearisations;      // that have been judged
+    int looks;               // of this one, for walls that the solution goes beyond
+    int hand_tries;          // since the last look, of what hands and mouth do
+    bool is_held_back;       // in this linearisation the sheath has taken a node back
     bool is_iterate;         // linearised about something else than x_n
 };
 
@@ -178,8 +183,22 @@ static inline bool stepper_presses(const Stepper *s, int point)
     return f.x != 0 || f.y != 0 || f.z != 0;
 }
 
+// [rad] Nothing is seen to gain energy among contacts where an element turns by less.
+static const double NEWTON_MOTION_IN_CONTACT = 0.04;
+// The step begins at the state's pose.
+void stepper_begin(Stepper *s);
 // The pose is that of the step's start again.
 void stepper_go_back(Stepper *s);
+// Nodes up to the mouth are held, and a little further; one that the hand brings back in this step is held from now on.
+int stepper_count_held(const Stepper *s, double advance);
+// Puts a node that comes back on the sheath's line.
+void stepper_hold(Stepper *s, int node);
+// The share of its length by which the tool is squeezed between hand and mouth, where it slides freely.
+double stepper_squeeze(const Stepper *s, const Vec3 *position);
+bool stepper_is_spent(const Stepper *s);         // so many contact iterations that the step looks no further
+double stepper_largest_turn(const Stepper *s);   // [rad] of an element's chord or a node against the iterate; not about the axis
+// Moves the iterate towards the solution, half of it at most where `halfway`; returns the share that was followed.
+double stepper_follow(Stepper *s, bool halfway);
 void stepper_detect(Stepper *s);
 // Forces of the solved set go to their points.
 void stepper_keep_forces(Stepper *s);

@@ -1,5 +1,5 @@
 // Where a point of a tool is, how it moves, and what the wall does to the tool's end: for whoever watches a run step by step. No question to the vessel.
-#include "solver/step_tools.h"
+#include "solver/tools_internal.h"
 
 static bool is_carrier(const Stepper *s, int c, int k) { return s->tool_count == 1 || s->carrier[c] == k; }
 static double material_at(const Stepper *s, int c, int k) { return is_carrier(s, c, k) ? s->wire.s[c] : slide_at(s, c, k); }

@@ -4,7 +4,7 @@
 // M' over it, less T times the turn. Tools with clearance do not follow a jump of curvature at once: M is averaged over l = 7.3 sqrt(c / kappa), which the two
 // rods in contact give; else a couple at the end of a bend would bear a friction that grows without bound as elements shrink.
 
-#include "solver/step_tools.h"
+#include "solver/tools_internal.h"
 #include "base/same_math.h"
 
 static const double FOLLOWS = 7.3;

@@ -1,7 +1,7 @@
 // Coaxial tools on one chain of nodes. The chain's nodes are those of the outermost tool from its hub to its tip, then those of the next that reaches
 // further, and so on: a node belongs to its carrier. Where a tool lies inside another its place at a node is two unknowns, material coordinate and angle.
 // As tools slide, nodes come and go at the tips (where a tool leaves the one around it), and unknowns where an inner tip passes a node.
-#include "solver/step_tools.h"
+#include "solver/tools_internal.h"
 
 #include "base/same_math.h"
 

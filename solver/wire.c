@@ -6,7 +6,7 @@
 #include "solver/wire.h"
 
 #include "base/same_math.h"
-#include "solver/beam_element.h"
+#include "solver/beam.h"
 
 #include <stdio.h>
 #include <stdlib.h>

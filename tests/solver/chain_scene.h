@@ -1,4 +1,4 @@
-// A small wire in an exact tube, written independently of solver/wire.c and step.c: it makes the contact problems on which
+// A small wire in an exact tube, written independently of solver/wire.c and the step: it makes the contact problems on which
 // the two forms of contact_solve are compared. Linear strain elements about the present chords, matrices as B^T C B, no speed.
 #ifndef SELDINGER_TESTS_CHAIN_SCENE_H
 #define SELDINGER_TESTS_CHAIN_SCENE_H
@@ -6,7 +6,7 @@
 #include "geom/vessel.h"
 #include "solver/block_chain.h"
 #include "solver/contact.h"
-#include "solver/gauss_seidel.h"
+#include "solver/contact_solve.h"
 
 typedef struct ChainSceneOptions {
     int elements;

@@ -1,6 +1,6 @@
 // Laws of the beam element: no force at rest, force = -dE/dx, invariance, symmetry, tangent against the force's derivative.
 #include "base/simd.h"
-#include "solver/beam_element.h"
+#include "solver/beam.h"
 #include "solver/sheath.h"
 #include "solver/wire.h"
 

@@ -62,11 +62,7 @@ static void start(Coaxial *c, int inner_count, bool sheath)
 static const StepReport *step_released(Stepper *s, const StepCommand *command, unsigned released)
 {
     step_feed_tools(s, command, released);
-    step_detect(s);
-    step_assemble(s);
-    step_factor(s);
-    step_contact(s);
-    step_correct(s);
+    step_solve(s);
     return step_report(s);
 }
 
@@ -591,11 +587,7 @@ static void events_leave_the_energy(void **state)
         events += after != before;
         most[i >= 6000] = fmax(most[i >= 6000], fabs(after - before));
         highest = fmax(highest, after);
-        step_detect(c.stepper);
-        step_assemble(c.stepper);
-        step_factor(c.stepper);
-        step_contact(c.stepper);
-        step_correct(c.stepper);
+        step_solve(c.stepper);
         assert_int_equal(step_report(c.stepper)->flags, 0);
     }
     // the tip is held until it is a fiftieth of an element past the mouth: by what it takes to straighten that much of both

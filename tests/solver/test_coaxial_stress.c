@@ -127,11 +127,7 @@ static bool is_finite(const Stepper *s)
 static void step(Stepper *s, const Hands *hands)
 {
     step_feed_tools(s, hands->command, hands->released);
-    step_detect(s);
-    step_assemble(s);
-    step_factor(s);
-    step_contact(s);
-    step_correct(s);
+    step_solve(s);
 }
 
 static Outcome drive(Run *run, Random *random, bool speaks)

@@ -12,7 +12,7 @@
 #include <cmocka.h>
 
 #include "base/simd.h"
-#include "solver/beam_element.h"
+#include "solver/beam.h"
 #include "wire_scene.h"
 
 static uint64_t seed = 11;

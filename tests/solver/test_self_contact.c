@@ -392,11 +392,7 @@ static void two_tools_coil(void **state)
             // the wire ahead, the catheter after it
             StepCommand command[STEP_TOOLS_MAX] = {{.advance = k > 300 ? 0.04 : 0}, {.advance = 0.05}};
             step_feed_tools(sac.stepper, command, 0);
-            step_detect(sac.stepper);
-            step_assemble(sac.stepper);
-            step_factor(sac.stepper);
-            step_contact(sac.stepper);
-            step_correct(sac.stepper);
+            step_solve(sac.stepper);
             const StepReport *report = step_report(sac.stepper);
             assert_false(report->flags & STEP_DIVERGED);
             coil.contacts = report->self_contacts > coil.contacts ? report->self_contacts : coil.contacts;

@@ -55,11 +55,7 @@ static inline Stepper *bench_make(const Bench *b)
 static inline const StepReport *step_once(Stepper *s, double advance, double twist)
 {
     step_feed(s, (StepCommand){.advance = advance, .twist = twist});
-    step_detect(s);
-    step_assemble(s);
-    step_factor(s);
-    step_contact(s);
-    step_correct(s);
+    step_solve(s);
     return step_report(s);
 }
 

@@ -6,37 +6,12 @@
 //              (contact_newton.c), of the nodes that carry contacts where these are few: the others are eliminated once (block_condense.h).
 // Warm start: ContactPoint.force of the same material point from the step before, as it is; zero for a new point. What presses in it is taken
 // as active, so stale forces on points that have left the wall cost iterations: drop them with the candidate. Nothing else is remembered.
-#ifndef SELDINGER_SOLVER_GAUSS_SEIDEL_H
-#define SELDINGER_SOLVER_GAUSS_SEIDEL_H
+#ifndef SELDINGER_SOLVER_CONTACT_SOLVE_H
+#define SELDINGER_SOLVER_CONTACT_SOLVE_H
 
 #include "solver/block_chain.h"
 #include "solver/contact.h"
 
-#include <stdbool.h>
-
-typedef enum { CONTACT_BLOCK = 0, CONTACT_POINTWISE = 1 } ContactForm;
-
-typedef struct ContactOptions {
-    ContactForm form;        // default CONTACT_BLOCK
-    int max_iterations;      // sweeps, default 200; a factorisation of the block form counts as eight of them, or down to four on a
-                             // condensed chain (block_condense.h), so that a step's cost is bounded
-    double tolerance;        // on the residual below, default 1e-6
-} ContactOptions;
-
-typedef struct ContactReport {
-    int iterations;          // sweeps or factorisations used
-    bool converged;
-    double residual;         // natural residual: largest over contacts of |force - project_K(force - r * violation)| over the largest force (at
-                             // least 1e-3 N). Forces have been cut to their cones by no more than this; also in a solve that stopped
-                             // early no contact overlaps by more than residual * largest force / stiffness of its node
-    double largest;          // [N] that largest force
-    double cone_violation;   // largest (|force_t| - mu force_n)+ over force_n, or (|force| - bound)+ over a slide's bound
-    int active;              // contacts with the wall that bear force
-    int pairs;               // … and contacts of the tool with itself
-    bool singular;           // the chain is not positive definite: nothing was solved
-} ContactReport;
-
-typedef struct ContactSolver ContactSolver;   // work space
 // Of chains with blocks of `size`; the capacity is that of contacts with the wall and slides together.
 ContactSolver *contact_solver_create(int node_count, int size, int contact_capacity);
 void contact_solver_destroy(ContactSolver *solver);

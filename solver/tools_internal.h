@@ -1,6 +1,6 @@
 // Coaxial tools of a stepper: internal to solver. See step_tools.c and step_coaxial.c.
-#ifndef SELDINGER_SOLVER_STEP_TOOLS_H
-#define SELDINGER_SOLVER_STEP_TOOLS_H
+#ifndef SELDINGER_SOLVER_TOOLS_INTERNAL_H
+#define SELDINGER_SOLVER_TOOLS_INTERNAL_H
 
 #include "solver/step_internal.h"
 
@@ -17,6 +17,7 @@ void tools_chain(Stepper *s);
 static inline bool is_inside(const Stepper *s, int c, int k) { return k > s->carrier[c] && c < s->tool[k].inside; }
 static inline double slide_at(const Stepper *s, int c, int k) { return s->state.slide[c * s->state.inner_count + k - 1]; }
 static inline double angle_at(const Stepper *s, int c, int k) { return s->state.angle[c * s->state.inner_count + k - 1]; }
+static inline bool is_at_tip(const Stepper *s, int c) { return s->carrier[c] != s->carrier[c + 1]; }    // another tool carries the next node
 static inline int unknown_of(int k) { return 6 + 2 * (k - 1); }
 static inline bool tools_carries(const Tool *t) { return t->first < t->wire.node_count; }
 

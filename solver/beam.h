@@ -3,8 +3,8 @@
 //
 // Arrays are one per quantity (lanes are elements, so that loops over elements vectorise); the caller owns all of them.
 // Nothing here allocates. Kernels give the same bits on every instruction set (no contraction, one order per lane).
-#ifndef SELDINGER_SOLVER_BEAM_ELEMENT_H
-#define SELDINGER_SOLVER_BEAM_ELEMENT_H
+#ifndef SELDINGER_SOLVER_BEAM_H
+#define SELDINGER_SOLVER_BEAM_H
 
 #include "geom/linear.h"
 #include "solver/block_chain.h"

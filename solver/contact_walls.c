@@ -1,0 +1,82 @@
+// The block form of the contacts with the wall, on the chain of their nodes where these are few.
+#include "solver/contact_forms.h"
+
+#include <string.h>
+
+// Condensing costs about as much as two factorisations of what goes: it pays unless nearly all nodes stay.
+static const double FULL_SHARE = 1.25;
+
+// Does the block form on the chain of the contacts' nodes, where these are few. False where it cannot.
+bool contact_condensed(ContactSolver *s, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u,
+                            ContactReport *report)
+{
+    bool *keep = block_condenser_keep(s->condenser);
+    int kept = 0;
+    for (int i = 0; i < count; i++)
+        for (int e = 0; e < s->row[i].nodes; e++) {
+            bool *flag = &keep[s->row[i].chain_node + e];
+            kept += !*flag;
+            *flag = true;
+        }
+    for (int i = s->banded; i < count; i++)
+        for (int e = 0; e < 2; e++) {
+            bool *flag = &keep[s->row[i].far->chain_node + e];
+            kept += !*flag;
+            *flag = true;
+        }
+    if (FULL_SHARE * kept > chain->count) {
+        memset(keep, 0, (size_t)chain->count * sizeof *keep);
+        return false;
+    }
+    const BlockChain *small = block_condense(s->condenser, chain, b);
+    if (!small || !(s->is_positive || block_chain_factor(small, s->factor)))
+        return false;
+    for (int i = 0; i < count; i++)
+        s->row[i].node = block_condenser_place(s->condenser, s->row[i].chain_node);
+    for (int i = s->banded; i < count; i++)
+        s->row[i].far->node = block_condenser_place(s->condenser, s->row[i].far->chain_node);
+    // an iteration costs what is left of the chain: up to twice as many are in the same bound
+    ContactOptions longer = *options;
+    longer.max_iterations = (int)(options->max_iterations * fmin(2, (double)chain->count / small->count));
+    s->small = small;
+    *report = contact_newton(s, small, s->factor, block_condenser_side(s->condenser), count, &longer, s->small_u);
+    block_condenser_expand(s->condenser, s->small_u, u);
+    return true;
+}
+
+bool contact_walls(ContactSolver *s, const BlockChain *chain, const double *b, int count, const ContactOptions *options, double *u, ContactReport *report)
+{
+    *report = (ContactReport){.converged = true, .largest = LEAST_FORCE};
+    s->small = NULL;
+    if (count == 0)
+        return block_chain_factor_solve(chain, s->factor, b, u);
+    if (contact_condensed(s, chain, b, count, options, u, report))
+        return true;
+    if (!block_chain_factor(chain, s->braced_factor))
+        return false;
+    for (int i = 0; i < count; i++)
+        s->row[i].node = s->row[i].chain_node;
+    for (int i = s->banded; i < count; i++)
+        s->row[i].far->node = s->row[i].far->chain_node;
+    *report = contact_newton(s, chain, s->braced_factor, b, count, options, u);
+    return true;
+}
+
+bool contact_walls_again(ContactSolver *s, const BlockChain *chain, const double *change, int count, double *u, ContactReport *report)
+{
+    double *more = s->best_u;    // not in use between solves
+    if (!s->small && count > 0)
+        return false;
+    if (!s->small) {
+        block_factor_solve(s->factor, change, more);
+        report->residual = 0;
+    } else {
+        block_condenser_turn_to(s->condenser, change);
+        if (!contact_newton_again(s, s->small, block_condenser_side(s->condenser), count, s->small_u, report))
+            return false;
+        block_condenser_expand(s->condenser, s->delta, more);
+    }
+    for (int i = 0; i < chain->size * chain->count; i++)
+        u[i] += more[i];
+    return true;
+}

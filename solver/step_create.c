@@ -1,0 +1,320 @@
+// A stepper and its arrays: all that a step will need is allocated here.
+#include "solver/self_contact.h"
+#include "solver/tools_internal.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { NEWTON_MAX = 4 };
+
+static double *take(double **from, size_t count)
+{
+    double *p = *from;
+    *from += count;
+    return p;
+}
+
+static bool allocate_scratch(Stepper *s)
+{
+    size_t m = (size_t)s->wire.node_count, padded = m + BEAM_PADDING;
+    s->scratch = calloc((BEAM_REST_ARRAYS + 2 * BEAM_POSE_ARRAYS + BEAM_INERTIA_ARRAYS + 1) * padded + (5 * (size_t)s->chain.size + 7 + (size_t)s->chain.size + 8 * (size_t)s->state.inner_count + 2) * m,
+                        sizeof *s->scratch);
+    if (!s->scratch)
+        return false;
+    double *at = s->scratch;
+    BeamRest *r = &s->beam.rest;
+    BeamPose *p = &s->beam.pose, *q = &s->start_pose;
+    BeamInertia *i = &s->beam.inertia;
+    double **array[] = {&r->length, &r->extend, &r->axial, &r->near, &r->far, &r->twist, &r->half_w, &r->half_y, &r->half_z, &r->curvature, &r->bending,
+                        &r->shear, &p->x, &p->y, &p->z, &p->qw, &p->qx, &p->qy, &p->qz, &q->x, &q->y, &q->z, &q->qw, &q->qx, &q->qy, &q->qz,
+                        &i->mass, &i->lateral, &i->excess, &i->ax, &i->ay, &i->az, &i->tx, &i->ty, &i->tz, &s->beam.drag};
+    for (size_t k = 0; k < sizeof array / sizeof *array; k++)
+        *array[k] = take(&at, padded);
+    for (size_t k = 0; k < m; k++) {
+        i->mass[k] = s->wire.mass[k];
+        i->lateral[k] = s->wire.inertia_lateral[k];
+        i->excess[k] = s->wire.inertia_axial[k] - s->wire.inertia_lateral[k];
+    }
+    size_t rows = (size_t)s->chain.size * m, inner = (size_t)s->state.inner_count * m;
+    s->b = take(&at, rows);
+    s->u = take(&at, rows);
+    s->linearised = take(&at, rows);
+    s->seen = take(&at, rows);
+    s->product = take(&at, rows);
+    s->kept = take(&at, 7 * m + rows + 2 * inner);
+    s->start_slide = take(&at, inner);
+    s->start_angle = take(&at, inner);
+    s->inner_moment = (Vec3 *)take(&at, 3 * inner);
+    s->inner_tension = take(&at, inner);
+    s->middle = take(&at, m);
+    s->bent = take(&at, m);
+    return true;
+}
+
+static bool make_slots(Stepper *s, const WireOptions *o)
+{
+    const Wire *w = &s->wire;
+    s->slot_start = calloc((size_t)w->node_count, sizeof *s->slot_start);
+    if (!s->slot_start)
+        return false;
+    if (s->tool_count > 1) {         // room for all; which of them there are: tools_chain()
+        s->point_count = w->node_count + s->slot_count;
+        return (s->slot = calloc((size_t)s->slot_count + 1, sizeof *s->slot)) != NULL;
+    }
+    for (int i = 0; i < w->element_count; i++)
+        s->slot_start[i + 1] = s->slot_start[i] + slot_count_of(w->length[i]);
+    s->slot_count = s->slot_start[w->element_count];
+    s->point_count = w->node_count + s->slot_count;
+    s->slot = calloc((size_t)s->slot_count + 1, sizeof *s->slot);
+    if (!s->slot)
+        return false;
+    for (int i = 0; i < w->element_count; i++) {
+        const WireSection *section = &o->section[w->section[i]];
+        int first = s->slot_start[i], count = s->slot_start[i + 1] - first;
+        for (int k = 0; k < count; k++)
+            s->slot[first + k] = slot_make(i, w->length[i], k, count, section->diameter / 2, section->friction);
+    }
+    return true;
+}
+
+static bool allocate(Stepper *s)
+{
+    s->point_capacity = s->point_count;
+    size_t m = (size_t)s->wire.node_count, points = (size_t)s->point_count, inner = (size_t)s->state.inner_count * m;
+    int size = 6 + 2 * s->state.inner_count;
+    s->memory_count = 13 * m + (5 + WALL_MET_DOUBLES) * points + 7 * inner;
+    s->memory = calloc(s->memory_count, sizeof *s->memory);
+    s->place = calloc(points, sizeof *s->place);
+    s->trial = calloc(points, sizeof *s->trial);
+    s->tried = calloc(points, sizeof *s->tried);
+    s->fixed = calloc(m, sizeof *s->fixed);
+    s->start_position = calloc(m, sizeof *s->start_position);
+    s->start_force = calloc(points, sizeof *s->start_force);
+    s->start_orientation = calloc(m, sizeof *s->start_orientation);
+    s->slot_place = calloc(points, sizeof *s->slot_place);
+    s->query_point = calloc(2 * points, sizeof *s->query_point);
+    s->query_place = calloc(2 * points, sizeof *s->query_place);
+    s->query_hit = calloc(2 * points, sizeof *s->query_hit);
+    s->query_which = calloc(4 * points + m, sizeof *s->query_which);
+    s->room = calloc(4 * points + m, sizeof *s->room);
+    s->set.point = calloc(2 * points, sizeof *s->set.point);
+    s->set.capacity = 2 * s->point_count;       // each with the wall across
+    s->factor = block_factor_create(s->wire.node_count, size);
+    s->set.slide = calloc(inner + 1, sizeof *s->set.slide);
+    s->solver = contact_solver_create(s->wire.node_count, size, s->set.capacity + (int)inner);
+    s->carrier = calloc(m, sizeof *s->carrier);
+    if (!s->memory || !s->place || !s->trial || !s->tried || !s->fixed || !s->start_position || !s->start_force || !s->start_orientation || !s->slot_place || !s->query_point || !s->query_place ||
+        !s->query_hit || !s->query_which || !s->room || !s->set.point || !s->factor || !s->solver || !s->carrier || !s->set.slide || !block_chain_create(&s->chain, s->wire.node_count, size) ||
+        !allocate_scratch(s))
+        return false;
+    s->state.node_count = s->wire.node_count;
+    s->state.position = (Vec3 *)s->memory;
+    s->state.velocity = (Vec3 *)(s->memory + 3 * m);
+    s->state.spin = (Vec3 *)(s->memory + 6 * m);
+    s->state.orientation = (Quat *)(s->memory + 9 * m);
+    s->force = (Vec3 *)(s->memory + 13 * m);
+    s->clearance = s->memory + 13 * m + 3 * points;
+    s->met = (WallMet *)(s->clearance + points);
+    s->touch = (double *)(s->met + points);
+    s->state.slide = s->touch + points;
+    s->state.angle = s->state.slide + inner;
+    s->state.slide_velocity = s->state.angle + inner;
+    s->state.slide_spin = s->state.slide_velocity + inner;
+    s->state.slide_force = s->state.slide_spin + inner;
+    s->linger = s->room + points;
+    s->lack = s->linger + points;
+    s->touch_next = s->lack + points;
+    s->range = s->touch_next + points;
+    s->query_near = s->query_which + points;
+    s->candidate = s->query_near + points;
+    s->answer_of = s->candidate + 2 * points;
+    for (size_t k = 0; k < points; k++)
+        s->place[k].node = -1;
+    return true;
+}
+
+// Nothing would tell a straight wire on the axis of a straight tube, pushed against its end, which way to buckle. So its last element is not quite
+// straight: it turns by this at rest, towards e2. Hardly more than rounding does to a wire that lies askew; 1e-7 would lift a stiff tip off a plane.
+// Without walls a wire is as straight as it says: rolled up by an end moment that keeps its direction it would leave the plane.
+static const double IMPERFECTION = 1e-12;    // [rad]
+
+static void make_imperfect(const Wire *wire, BeamRest *rest)
+{
+    int tip = wire->element_count - 1;
+    if (rest->curvature[tip] > 0)
+        return;
+    rest->curvature[tip] = IMPERFECTION / wire->length[tip];
+    rest->half_w[tip] = nextafter(1, 0);      // below 1 marks an element that is curved at rest
+    rest->half_z[tip] = 0.25 * IMPERFECTION;
+}
+
+static int nearest_node(const Wire *wire, double at)
+{
+    int best = 0;
+    for (int i = 1; i < wire->node_count; i++)
+        if (fabs(wire->s[i] - at) < fabs(wire->s[best] - at))
+            best = i;
+    return best;
+}
+
+static bool place_rig(Stepper *s, const WireOptions *o)
+{
+    for (int i = 0; i < o->fix_count; i++)
+        s->fixed[nearest_node(&s->wire, o->fix[i].s)] |= o->fix[i].dof;
+    s->can_swing = true;
+    for (int i = 1; i < s->wire.node_count; i++)
+        s->can_swing &= (s->fixed[i] & DOF_POSITION) == 0;
+    s->load_count = o->load_count;
+    s->load = calloc((size_t)o->load_count + 1, sizeof *s->load);
+    if (!s->load)
+        return false;
+    for (int i = 0; i < o->load_count; i++) {
+        int node = 0;
+        while (node + 2 < s->wire.node_count && s->wire.s[node + 1] <= o->load[i].s)
+            node++;
+        double weight = fmin(1, fmax(0, (o->load[i].s - s->wire.s[node]) / s->wire.length[node]));
+        if (weight < 1e-9)
+            weight = 0;
+        if (weight > 1 - 1e-9)
+            weight = 1;
+        s->load[i] = (LoadPlace){.load = o->load[i], .node = node, .weight = weight};
+    }
+    return true;
+}
+
+static void place_wire(Stepper *s, const WireOptions *o)
+{
+    if (s->tool_count > 1) {
+        s->state.inserted = s->tool[0].inserted;
+        tools_place(s);
+        return;
+    }
+    s->state.inserted = o->has_sheath ? fmin(o->inserted, s->wire.total_length) : s->wire.total_length;
+    double behind = s->wire.total_length - s->state.inserted;
+    for (int i = 0; i < s->wire.node_count; i++) {
+        s->state.position[i] = vec3_add_scaled(s->mouth, s->wire.s[i] - behind, s->axis[0]);
+        s->state.orientation[i] = s->line;
+    }
+}
+
+static bool check_options(const StepperOptions *o, char *why, int capacity)
+{
+    if (!(o->dt >= 1e-6 && o->dt <= 1e9)) {
+        snprintf(why, (size_t)capacity, "time step is %g ms; valid: 1e-6 to 1e9 ms", o->dt);
+        return false;
+    }
+    if (!(o->wall_friction >= 0 && o->wall_friction <= 10)) {
+        snprintf(why, (size_t)capacity, "friction of the wall is %g; valid: 0 to 10", o->wall_friction);
+        return false;
+    }
+    if (!(o->contact.tolerance >= 0 && o->contact.tolerance <= 1) || o->contact.max_iterations < 0) {
+        snprintf(why, (size_t)capacity, "contact tolerance %g or iterations %d; valid: 0 to 1, and not negative", o->contact.tolerance,
+                 o->contact.max_iterations);
+        return false;
+    }
+    return true;
+}
+
+Stepper *stepper_create(const StepperOptions *options, char *why, int capacity)
+{
+    StepperOptions o = *options;
+    if (o.dt == 0)
+        o.dt = 1;
+    if (!check_options(&o, why, capacity))
+        return NULL;
+    Stepper *s = calloc(1, sizeof *s);
+    if (!s) {
+        snprintf(why, (size_t)capacity, "no memory for a stepper");
+        return NULL;
+    }
+    if (!wire_create(&s->wire, &o.wire, why, capacity)) {
+        stepper_destroy(s);
+        return NULL;
+    }
+    s->tool_count = 1 + o.inner_count;
+    s->state.inner_count = o.inner_count;
+    if (s->tool_count > 1 && !(tools_create(s, &o, why, capacity) && wire_reserve(&s->wire, s->capacity))) {
+        if (!why[0])
+            snprintf(why, (size_t)capacity, "no memory for %d tools", s->tool_count);
+        stepper_destroy(s);
+        return NULL;
+    }
+    if (!make_slots(s, &o.wire) || !allocate(s) || !place_rig(s, &o.wire)) {
+        snprintf(why, (size_t)capacity, "no memory for a wire of %d elements", o.wire.elements);
+        stepper_destroy(s);
+        return NULL;
+    }
+    if ((o.self_contact == SELF_CONTACT_ON || (o.self_contact == SELF_CONTACT_AUTO && o.vessel)) && !self_contact_create(s)) {
+        snprintf(why, (size_t)capacity, "no memory for a tool that meets itself");
+        stepper_destroy(s);
+        return NULL;
+    }
+    if (s->tool_count == 1)
+        wire_rest(&s->wire, &o.wire, &s->beam.rest);
+    s->gravity = o.wire.gravity;
+    s->damping_mass = o.wire.damping_mass;
+    s->damping_stiffness = o.wire.damping_stiffness;
+    s->dt = o.dt;
+    s->has_sheath = o.wire.has_sheath;
+    for (int k = 0; k < s->tool_count; k++) {
+        const WireOptions *own = k == 0 ? &o.wire : &o.inner[k - 1];
+        s->hand[k] = (Hand){.limit = own->hand_limit, .valve = own->valve_friction};
+    }
+    s->mouth = o.wire.start;
+    s->line = wire_start_frame(&o.wire);
+    Mat3 frame = quat_to_mat3(s->line);
+    for (int k = 0; k < 3; k++)
+        s->axis[k] = mat3_column(&frame, k);
+    s->vessel = o.vessel;
+    if (s->vessel && s->tool_count == 1)
+        make_imperfect(&s->wire, &s->beam.rest);
+    s->wall_friction = o.wall_friction;
+    ContactOptions usual = contact_default_options();
+    s->contact = o.contact;
+    if (s->contact.max_iterations == 0)
+        s->contact.max_iterations = usual.max_iterations;
+    if (s->contact.tolerance == 0)
+        s->contact.tolerance = usual.tolerance;
+    s->newton_max = o.newton_max > 0 ? o.newton_max : NEWTON_MAX;
+    s->is_slender = o.follows_touch && stepper_is_slender(s);
+    place_wire(s, &o.wire);
+    s->first_free = stepper_count_held(s, 0);
+    return s;
+}
+
+void stepper_destroy(Stepper *s)
+{
+    if (!s)
+        return;
+    tools_destroy(s);
+    free(s->carrier);
+    wire_destroy(&s->wire);
+    block_chain_destroy(&s->chain);
+    if (s->factor)
+        block_factor_destroy(s->factor);
+    if (s->solver)
+        contact_solver_destroy(s->solver);
+    free(s->memory);
+    free(s->place);
+    free(s->fixed);
+    free(s->load);
+    free(s->start_position);
+    free(s->start_force);
+    free(s->start_orientation);
+    free(s->query_point);
+    free(s->query_place);
+    free(s->trial);
+    free(s->tried);
+    free(s->query_hit);
+    free(s->query_which);
+    free(s->slot_place);
+    free(s->slot);
+    free(s->slot_start);
+    free(s->room);
+    free(s->set.slide);
+    free(s->set.point);
+    free(s->set.pair);
+    self_contact_destroy(s->self);
+    free(s->scratch);
+    free(s);
+}

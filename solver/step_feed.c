@@ -1,0 +1,175 @@
+// What the hands do in a step, and what of the tool comes out of the sheath or goes in.
+#include "solver/tools_internal.h"
+
+#include <string.h>
+
+// A tool that is squeezed by more than this share of its length is beyond what its elements describe (and would have yielded): the hand stalls.
+static const double SQUEEZE_MAX = 0.03;
+static const double LET_GO_TURN = 0.1;           // [rad] by which a node that is let go at the mouth is turned at most
+static const double SPRUNG = 0.1;                // of an element's length past the mouth: a node of several tools that has sprung so far stays on the line
+
+// The frame turned the short way until e1 is the line's direction.
+static Quat on_line(const Stepper *s, Quat q)
+{
+    Vec3 e = quat_rotate(q, vec3(1, 0, 0)), axis = vec3_cross(e, s->axis[0]);
+    return quat_unit(quat_mul((Quat){1 + vec3_dot(e, s->axis[0]), axis.x, axis.y, axis.z}, q));
+}
+
+// A node that comes back is put on the line. One that is let go, a fiftieth of an element from the mouth, takes the place that the short piece behind it,
+// from now on the one across the mouth, has under the moment there: with the curve of its own element, which at a section's border may be ten times as
+// soft, the piece would spring.
+void stepper_hold(Stepper *s, int node)
+{
+    WireState *w = &s->state;
+    double along = stepper_sheath_coordinate(s, node);
+    w->position[node] = vec3_add_scaled(s->mouth, along, s->axis[0]);
+    w->orientation[node] = on_line(s, w->orientation[node]);
+    w->velocity[node] = vec3_scale(s->axis[0], vec3_dot(w->velocity[node], s->axis[0]));
+    w->spin[node] = vec3_scale(s->axis[0], vec3_dot(w->spin[node], s->axis[0]));
+}
+
+static Vec3 mouth_curvature(const Stepper *s, int node)
+{
+    const WireState *w = &s->state;
+    const BeamRest *r = &s->beam.rest;
+    SheathElement e;
+    sheath_element(r, node, s->mouth, s->axis[0], stepper_sheath_coordinate(s, node), w->orientation[node], w->position[node + 1], w->orientation[node + 1], 0, &e);
+    Vec3 moment = vec3_add_scaled(e.out.moment1, -vec3_dot(e.out.moment1, s->axis[0]), s->axis[0]);
+    return vec3_add_scaled(sheath_rest_curvature(r, node - 1, w->orientation[node]), -1 / r->bending[node - 1], moment);
+}
+
+static void let_go(Stepper *s, int node)
+{
+    WireState *w = &s->state;
+    bool is_tip = node + 1 >= s->state.node_count;
+    double along = stepper_sheath_coordinate(s, node);
+    if (s->tool_count > 1 && !is_tip) {
+        if (along > SPRUNG * s->wire.length[node - 1])
+            return;
+        ToolNode further = tools_further(s, node, along);
+        w->position[node] = further.position;
+        w->orientation[node] = further.orientation;
+        return;
+    }
+    Vec3 curvature = is_tip ? stepper_tip_curvature(s) : mouth_curvature(s, node);
+    double bend = vec3_norm(curvature) * along;
+    if (bend > LET_GO_TURN)          // sprang out of the sheath: no curve is known that far
+        curvature = vec3_scale(curvature, LET_GO_TURN / bend);
+    w->position[node] = vec3_add_scaled(w->position[node], 0.5 * along * along, vec3_cross(curvature, s->axis[0]));
+    w->orientation[node] = quat_unit(quat_mul(quat_from_rotation_vector(vec3_scale(curvature, along)), w->orientation[node]));
+}
+
+// Nodes up to the mouth are held, and a little further (sheath_border_share); one that the hand brings back in this step is held from now on.
+int stepper_count_held(const Stepper *s, double advance)
+{
+    if (!s->has_sheath)
+        return 0;
+    int k = 1;
+    while (k < s->state.node_count && stepper_sheath_coordinate(s, k) + fmin(advance, 0) <= sheath_border_share * s->wire.length[k - 1])
+        k++;
+    return k;
+}
+
+// The share of its length by which the tool is squeezed between hand and mouth, where it slides freely.
+double stepper_squeeze(const Stepper *s, const Vec3 *position)
+{
+    return 1 - vec3_distance(position[1], position[0]) / s->wire.length[0];
+}
+
+// The command with what is owed from before; no advance into a tool that is squeezed too much.
+static StepCommand stalled(Stepper *s, StepCommand command)
+{
+    if (!s->has_sheath)
+        return command;
+    double actual = s->wire.total_length + stepper_sheath_coordinate(s, 0), owed = s->state.inserted - actual;
+    if (fabs(owed) > 1e-9) {
+        command.advance += owed;
+        s->state.inserted = actual;
+    }
+    if (command.advance > 0 && stepper_squeeze(s, s->state.position) > SQUEEZE_MAX) {
+        command.advance = 0;
+        s->report.flags |= STEP_LIMITED;
+    }
+    return command;
+}
+
+// A contact solve with coaxial tools begins with what it expects the motion to be: that of the step before.
+static void expect_last_motion(Stepper *s)
+{
+    memset(s->u, 0, row_of(s, s->state.node_count) * sizeof *s->u);
+    for (int i = s->first_free; i < s->state.node_count; i++) {
+        double *u = s->u + row_of(s, i);
+        Vec3 moves = vec3_scale(s->state.velocity[i], s->dt), turns = vec3_scale(s->state.spin[i], s->dt);
+        u[0] = moves.x, u[1] = moves.y, u[2] = moves.z;
+        u[3] = turns.x, u[4] = turns.y, u[5] = turns.z;
+    }
+}
+
+// The step begins at the state's pose.
+void stepper_begin(Stepper *s)
+{
+    size_t nodes = (size_t)s->state.node_count;
+    memcpy(s->start_position, s->state.position, nodes * sizeof *s->start_position);
+    memcpy(s->start_orientation, s->state.orientation, nodes * sizeof *s->start_orientation);
+    size_t inner = nodes * (size_t)s->state.inner_count * sizeof(double);
+    memcpy(s->start_slide, s->state.slide, inner);
+    memcpy(s->start_angle, s->state.angle, inner);
+    memset(s->linearised, 0, row_of(s, s->state.node_count) * sizeof *s->linearised);
+    memset(s->seen, 0, row_of(s, s->state.node_count) * sizeof *s->seen);
+    s->is_iterate = s->overshoots = s->blocked = false;
+    s->hand_tries = s->looks = 0;
+    s->energy_before = -1;
+    s->mouth_ahead = s->command.advance;
+    s->slides = stepper_slides(s);
+    if (s->tool_count > 1)
+        expect_last_motion(s);
+}
+
+static void feed(Stepper *s, unsigned released)
+{
+    hands_feed(s, released);
+    StepCommand command = s->tool_command[0];
+    s->wall_force_max = s->report.wall_force_max;
+    s->wall_force_sum = s->report.wall_force_sum;
+    s->report = (StepReport){0};
+    s->has_failed = s->was_held = s->knows_motion = false;
+    s->linearisations = 0;
+    s->is_held_back = false;
+    if (!s->has_sheath)
+        command = (StepCommand){0};
+    double inserted = s->state.inserted + command.advance, total = s->wire.total_length;
+    if (inserted > total) {
+        s->report.flags |= STEP_FULLY_INSERTED;
+        command.advance = total - s->state.inserted;
+    } else if (inserted < 0) {
+        s->report.flags |= STEP_FULLY_WITHDRAWN;
+        command.advance = -s->state.inserted;
+    }
+    s->command = stalled(s, command);
+    command = s->command;
+    s->tool_command[0] = command;
+    if (s->tool_count > 1)
+        tools_feed(s);
+    int held = stepper_count_held(s, command.advance);
+    for (int i = s->first_free; i < held; i++) {
+        stepper_hold(s, i);
+        stepper_forget(s, i);
+    }
+    for (int i = s->first_free - 1; i >= held; i--)
+        let_go(s, i);
+    s->first_free = held;
+    memcpy(s->start_force, s->force, (size_t)s->point_count * sizeof *s->force);
+    stepper_begin(s);
+}
+
+void step_feed_tools(Stepper *s, const StepCommand *command, unsigned released)
+{
+    memcpy(s->tool_command, command, (size_t)s->tool_count * sizeof *command);
+    feed(s, released);
+}
+
+void step_feed(Stepper *s, StepCommand command)
+{
+    StepCommand all[STEP_TOOLS_MAX] = {command};
+    step_feed_tools(s, all, 0);
+}

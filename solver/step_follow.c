@@ -1,0 +1,214 @@
+// From the iterate towards the solution, as far as that is good.
+#include "solver/node_turn.h"
+#include "solver/self_contact.h"
+#include "solver/tools_internal.h"
+
+#include <string.h>
+
+static const double TURN_MAX = 0.3;              // [rad]
+static const double SWING_MOTION = 1e-5;         // [rad] nothing turns: displaced and turned chords are the same
+// Where a motion is followed in halves: [mm] of depth that it may leave, and where nothing else goes; halves at most, and
+// how often linear walls are moved before.
+static const double DEPTH_MAX = 0.02, DEPTH_LAST = 0.045;
+enum { HALVES_MAX = 6, MEETINGS_MAX = 2 };
+static const double JAMMED = 0.002;              // share of its length by which a tool is squeezed that has a reason to be stuck
+static const double LOST = 0.1;                  // residual of a contact solve that says nothing
+static const double MOUTH_TRAVEL = 1;            // of an element's length that the tool springs through the mouth in a step, besides what the hand feeds
+
+// The largest turn of an element's chord or of a node against the iterate [rad]; a node's turn about the axis does not count.
+double stepper_largest_turn(const Stepper *s)
+{
+    double largest = 0;
+    Vec3 before = vec3(0, 0, 0);         // what the node before moves by
+    for (int i = s->first_free; i < s->state.node_count; i++) {
+        const double *u = s->u + row_of(s, i), *k = s->linearised + row_of(s, i);
+        Vec3 turn = vec3(u[3] - k[3], u[4] - k[4], u[5] - k[5]), moves = vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]);
+        Quat q = s->state.orientation[i];
+        Vec3 axis = vec3(1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y));
+        double node = vec3_norm2(vec3_cross(turn, axis)), chord = 0;
+        if (i > 0) {
+            // from the mouth: over the whole element, however little of it is outside
+            bool from_mouth = i == s->first_free;
+            Vec3 c = vec3_sub(s->state.position[i], from_mouth ? s->mouth : s->state.position[i - 1]);
+            double length2 = vec3_norm2(c), over = from_mouth ? s->wire.length[i - 1] * s->wire.length[i - 1] : length2;
+            chord = vec3_norm2(vec3_cross(c, vec3_sub(moves, before))) / (length2 * over);
+        }
+        before = moves;
+        largest = largest > node ? largest : node;
+        largest = largest > chord ? largest : chord;
+    }
+    return sqrt(largest);
+}
+
+// A wire that nothing holds: its mass centre goes where the linear solution, which keeps momentum, takes it.
+static void keep_mass_centre(Stepper *s, double part)
+{
+    Vec3 away = vec3(0, 0, 0);
+    double mass = 0;
+    for (int i = 0; i < s->state.node_count; i++) {
+        const double *u = s->u + row_of(s, i), *k = s->linearised + row_of(s, i);
+        Vec3 linear = vec3(k[0] + part * (u[0] - k[0]), k[1] + part * (u[1] - k[1]), k[2] + part * (u[2] - k[2]));
+        Vec3 real = vec3_sub(s->state.position[i], s->start_position[i]);
+        away = vec3_add_scaled(away, s->wire.mass[i], vec3_sub(linear, real));
+        mass += s->wire.mass[i];
+    }
+    for (int i = 0; i < s->state.node_count; i++)
+        s->state.position[i] = vec3_add_scaled(s->state.position[i], 1 / mass, away);
+}
+
+// Moves the free nodes' positions by `part` of the change, chord by chord from the proximal end on: a chord c that the solution makes s = c + change
+// becomes s (c.s)/(|c||s|), as long as the linear solution thinks it is. With s itself a turn of 0.005 rad would stretch the wire by 1e-5, which in
+// steel is 0.1 N. Not where the rig holds a node further along.
+static void swing(Stepper *s, double part)
+{
+    Vec3 from = s->mouth, moved = s->mouth, shift = vec3(0, 0, 0);
+    for (int i = s->first_free; i < s->state.node_count; i++) {
+        const double *u = s->u + row_of(s, i), *k = s->linearised + row_of(s, i);
+        Vec3 own = vec3_scale(vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]), part), here = s->state.position[i];
+        if (i == 0) {
+            moved = vec3_add(here, own);
+        } else {
+            Vec3 chord = vec3_sub(here, from), sum = vec3_add(chord, vec3_sub(own, shift));
+            double product = vec3_dot(chord, sum);
+            moved = vec3_add_scaled(moved, product > 0 ? product / sqrt(vec3_norm2(chord) * vec3_norm2(sum)) : 1, sum);
+        }
+        from = here;
+        shift = own;
+        s->state.position[i] = moved;
+    }
+    if (s->first_free == 0 && (s->fixed[0] & DOF_POSITION) == 0)
+        keep_mass_centre(s, part);
+}
+
+static void displace(Stepper *s, double part)
+{
+    for (int i = s->first_free; i < s->state.node_count; i++) {
+        const double *u = s->u + row_of(s, i), *k = s->linearised + row_of(s, i);
+        Vec3 d = part < 1 ? vec3(k[0] + part * (u[0] - k[0]), k[1] + part * (u[1] - k[1]), k[2] + part * (u[2] - k[2])) : vec3(u[0], u[1], u[2]);
+        s->state.position[i] = vec3_add(s->start_position[i], d);
+    }
+}
+
+// The iterate moves to `part` of the way from where it is to x_n + u, nodes in the sheath too: a tool that is held back is not fed.
+static void move(Stepper *s, double part)
+{
+    WireState *w = &s->state;
+    int nodes = w->node_count, held = s->first_free;
+    double *rx = s->product, *ry = rx + nodes, *rz = ry + nodes;     // how far a node turns, an assembly's scratch
+    if (s->turn > SWING_MOTION && s->can_swing)
+        swing(s, part);
+    else
+        displace(s, part);
+    for (int i = 0; i < held; i++) {
+        // on the line exactly, whatever rounding does
+        const double *u = s->u + row_of(s, i);
+        double *k = s->linearised + row_of(s, i), turn = part * (u[3] - k[3]);
+        k[0] = part < 1 ? k[0] + part * (u[0] - k[0]) : u[0];
+        k[3] += turn;
+        double along = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]) + k[0];
+        w->position[i] = vec3_add_scaled(s->mouth, along, s->axis[0]);
+        rx[i] = turn * s->axis[0].x, ry[i] = turn * s->axis[0].y, rz[i] = turn * s->axis[0].z;
+    }
+    for (int i = held; i < nodes; i++) {
+        const double *u = s->u + row_of(s, i);
+        double *k = s->linearised + row_of(s, i);
+        k[0] = w->position[i].x - s->start_position[i].x;
+        k[1] = w->position[i].y - s->start_position[i].y;
+        k[2] = w->position[i].z - s->start_position[i].z;
+        Vec3 turn = vec3_scale(vec3(u[3] - k[3], u[4] - k[4], u[5] - k[5]), part);
+        double angle2 = vec3_norm2(turn);
+        if (angle2 > NODE_TURN_MAX * NODE_TURN_MAX)
+            turn = vec3_scale(turn, NODE_TURN_MAX / sqrt(angle2));
+        k[3] += turn.x, k[4] += turn.y, k[5] += turn.z;
+        rx[i] = turn.x, ry[i] = turn.y, rz[i] = turn.z;
+    }
+    node_turn(nodes, rx, ry, rz, w->orientation);
+    if (s->tool_count > 1)
+        tools_move(s, part);
+}
+
+static double energy_bound(const Stepper *s)
+{
+    const Wire *w = &s->wire;
+    double work = 0, bound = s->energy_before;
+    for (int i = s->first_free; i < w->node_count; i++)
+        work += w->mass[i] * fabs(vec3_dot(s->gravity, vec3(s->u[row_of(s, i)], s->u[row_of(s, i) + 1], s->u[row_of(s, i) + 2])));
+    for (int k = 0; k < s->set.count; k++)
+        work += fmax(0, -s->set.point[k].gap) * vec3_norm(s->set.point[k].force);
+    for (int k = 0; k < s->set.pair_count; k++)
+        work += fmax(0, -s->set.pair[k].gap) * vec3_norm(s->set.pair[k].force);
+    work += hands_work_bound(s);
+    return bound + 2 * work + 1e-6;
+}
+
+static void copy_iterate(Stepper *s, bool back)
+{
+    size_t m = (size_t)s->state.node_count, rows = row_of(s, (int)m), inner = m * (size_t)s->state.inner_count;
+    size_t size[5] = {m * sizeof(Vec3), m * sizeof(Quat), rows * sizeof(double), inner * sizeof(double), inner * sizeof(double)};
+    void *live[5] = {s->state.position, s->state.orientation, s->linearised, s->state.slide, s->state.angle};
+    void *kept[5] = {s->kept, s->kept + 3 * m, s->kept + 7 * m, s->kept + 7 * m + rows, s->kept + 7 * m + rows + inner};
+    for (int i = 0; i < 5; i++)
+        memcpy(back ? live[i] : kept[i], back ? kept[i] : live[i], size[i]);
+}
+
+// The part of the way to a displacement `to` at which one of `from` reaches `most`.
+static double part_until(double from, double to, double most)
+{
+    if (fabs(to) <= most)
+        return 1;
+    return fmax(0, fmin(1, ((to > 0 ? most : -most) - from) / (to - from)));
+}
+
+// No element turns by more than TURN_MAX, and no more of the tool springs through the mouth than one element describes.
+static double largest_part(const Stepper *s)
+{
+    double part = s->turn > TURN_MAX ? TURN_MAX / s->turn : 1;
+    if (s->tool_count > 1)
+        part = fmin(part, tools_largest_part(s));
+    int i = s->first_free - 1;
+    if (i < 0 || i + 1 >= s->state.node_count)
+        return part;
+    size_t k = row_of(s, i);
+    return fmin(part, part_until(s->linearised[k], s->u[k], fabs(s->command.advance) + MOUTH_TRAVEL * s->wire.length[i]));
+}
+
+// The share of the solution that was followed. A quiet step goes all the way, and so does a wire without walls but for TURN_MAX. Else only as far as
+// no node is driven through the wall and the wire is not left with energy that nobody gave it. Where the wall is not where its linear form has it,
+// the form is first moved there and the contacts solved again (a second-order correction); then by halves, from places that are good.
+double stepper_follow(Stepper *s, bool halfway)
+{
+    double part = halfway ? fmin(0.5, largest_part(s)) : largest_part(s);
+    bool is_trusted = !s->was_held && s->report.residual < LOST;
+    if ((!s->vessel && !self_contact_is_near(s)) || (s->turn <= NEWTON_MOTION_IN_CONTACT && !s->overshoots && is_trusted)) {
+        move(s, part);
+        return part;
+    }
+    if (s->energy_before < 0)         // of x_n, or of an iterate beside it
+        s->energy_before = stepper_elastic_energy(s) + stepper_kinetic_energy(s);
+    double bound = s->has_sheath && s->load_count == 0 ? energy_bound(s) : HUGE_VAL;
+    copy_iterate(s, false);
+    double most = fmax(DEPTH_MAX, s->depth);
+    int tries = stepper_squeeze(s, s->start_position) < JAMMED ? 2 * HALVES_MAX : HALVES_MAX;
+    for (int k = 0; k < tries; k++) {
+        if (k == HALVES_MAX) {        // no jam: rather a little deeper than stuck for ever where neighbouring models disagree about the wall
+            part = largest_part(s);
+            most = fmax(most, DEPTH_LAST);
+        }
+        move(s, part);
+        double depth = fmax(stepper_depth(s), self_contact_depth(s, false));
+        bool contained = depth <= most;
+        if (contained && stepper_elastic_energy(s) <= bound)
+            return part;
+        bool meets = !contained && k < MEETINGS_MAX && !stepper_is_spent(s) && stepper_meet_walls(s, part) + self_contact_meet(s, part) > 0;
+        copy_iterate(s, true);
+        part /= 2;
+        if (meets) {
+            step_contact(s);
+            if (s->has_failed)
+                return 0;
+            s->turn = stepper_largest_turn(s);
+            part = largest_part(s);
+        }
+    }
+    return 0;
+}

@@ -1,0 +1,295 @@
+// When an implicit Euler step (step.h) is solved, and its end. Kerrien 2017 section 6.1 with what DESIGN sections 3 and 4 add.
+//
+// The system is linear about x_n. A step that turns an element by more than NEWTON_MOTION is linearised again about what came out, with the
+// unknown still the whole displacement from x_n, so that inertia, damping, gaps and friction keep their meaning: Newton's method on the
+// implicit step. Inside an iteration no element may turn by more than TURN_MAX: a wire that springs back does so faster than
+// any step (10 mJ move 0.02 g at 30 m/s), and a linear displacement of that size would stretch it.
+//
+// Never through the wall, and never energy from nowhere: every place that a step stops at is good, because the motion to it is halved until it is
+// (step_follow.c). The whole wire is held back together, what the hand feeds included. What is not done after the last iteration is flagged
+// STEP_LIMITED and left to the next steps; so is an advance into a tool that is squeezed by more than SQUEEZE_MAX: the hand stalls.
+#include "solver/self_contact.h"
+#include "solver/tools_internal.h"
+
+#include <string.h>
+
+// A chord turned by 0.02 rad stretches by 2e-4 in a linear step, which a free wire would keep as energy: another linearisation costs it 30 us.
+static const double NEWTON_MOTION = 0.005, NEWTON_MOTION_AT_MOUTH = 0.002;      // [rad]
+// A tip that snaps from one wall to another lands where nobody linearised: [mm] of true penetration that asks for another linearisation there, up to
+// twice as many of them as otherwise.
+static const double OVERSHOOT = 0.015, SELF_OVERSHOOT = 0.005;
+static const double TAKE_BACK = 0.002;           // of an element's length past the mouth: a free node that would end nearer to it is held
+static const double BORDER_FORCE = 1e-3;         // of what straightening takes at the mouth: good enough
+static const double MOUTH_LENGTH = 0.1;          // share by which the length outside may end otherwise than it was taken, where the hand slips
+enum { HAND_TRIES = 6, LOOKS_MAX = 2 };
+
+// --- after a solve: what is still wrong with it? ---
+
+// [rad] The turn of the chord from the mouth to the first node outside: a short one stretches by as much as a long one. Where the hand holds the tool; one that
+// springs through the mouth changes that chord's length by more.
+static double turn_at_mouth(const Stepper *s)
+{
+    int i = s->first_free;
+    if (!s->has_sheath || i >= s->state.node_count || s->hand[0].is_released || s->hand[0].slips[0])
+        return 0;
+    const double *u = s->u + row_of(s, i), *k = s->linearised + row_of(s, i);
+    Vec3 moves = vec3(u[0] - k[0], u[1] - k[1], u[2] - k[2]), ends = vec3_add(vec3_sub(s->state.position[i], s->mouth), moves);
+    return vec3_norm(vec3_cross(moves, s->axis[0])) / fmax(vec3_dot(ends, s->axis[0]), sheath_border_share * s->wire.length[i - 1]);
+}
+
+// Where a border of the rest shape is at the mouth, straightening takes more on one side of it than on the other, and the wire may come to rest with the border
+// there. Is that force another one where the solution has the border than where it was taken? Then it is taken there, or first between the two.
+static bool misjudges_border(Stepper *s)
+{
+    int i = s->first_free - 1;
+    if (s->tool_count > 1 || i < 0 || i + 1 >= s->state.node_count || s->has_failed)
+        return false;
+    const BeamRest *rest = &s->beam.rest;
+    double start = vec3_dot(vec3_sub(s->start_position[i], s->mouth), s->axis[0]), width = sheath_border_share * rest->length[i];
+    double taken = start + s->mouth_ahead, ends = start + s->u[row_of(s, i)];
+    // the tool has not gone as the hand was told to: the element's stiffness was that of another length
+    double length = sheath_outside(rest->length[i], taken), real = sheath_outside(rest->length[i], ends);
+    if (s->hand[0].slips[0] && fabs(length - real) > MOUTH_LENGTH * fmin(length, real)) {
+        s->mouth_ahead = ends - start;
+        return true;
+    }
+    double there = sheath_straightening(rest, i, ends), linear = sheath_straightening(rest, i, taken) - s->mouth_element.border * (ends - taken);
+    if (fabs(there - linear) < BORDER_FORCE * fmax(there, sheath_straightening(rest, i, taken)) + 1e-9)
+        return false;
+    bool crosses = fmin(taken, ends) < 0 && fmax(taken, ends) > 0, is_within = fabs(ends) <= 0.5 * width;
+    s->mouth_ahead = (crosses && !is_within ? 0 : ends) - start;
+    return true;
+}
+
+// Does the solution go back to where the iterate came from? Over an edge of the wall two linearisations each send a tip to the other's place for ever:
+// the answer lies between.
+static bool goes_back(const Stepper *s)
+{
+    const double *before = s->kept + 7 * (size_t)s->state.node_count;
+    double along = 0, came = 0;
+    for (int i = s->first_free; i < s->state.node_count; i++)
+        for (size_t k = row_of(s, i); k < row_of(s, i) + 3; k++) {
+            double d = s->linearised[k] - before[k];
+            along += d * (s->u[k] - s->linearised[k]);
+            came += d * d;
+        }
+    return along < -0.5 * came;
+}
+
+// What the hand and the mouth do follows from the solution.
+static unsigned judge_hand(Stepper *s)
+{
+    if (s->hand_tries >= HAND_TRIES || !(misjudges_border(s) || hands_misjudge(s)))
+        return 0;
+    s->hand_tries++;
+    return STEP_NEEDS_SYSTEM | STEP_NEEDS_CONTACT;
+}
+
+// A wire that springs goes further than anybody looked: look that far, and solve again.
+static unsigned judge_reach(Stepper *s)
+{
+    if (s->looks >= LOOKS_MAX || s->has_failed || stepper_is_spent(s))
+        return 0;
+    bool escapes = stepper_escapes(s), misses = self_contact_misses(s);
+    if (!misses && !escapes)
+        return 0;
+    s->looks++;
+    s->hand_tries = 0;
+    s->knows_motion = escapes;
+    return (escapes ? STEP_NEEDS_WALLS : 0) | STEP_NEEDS_CONTACT;
+}
+
+// The length of the mouth's element has no sign: the first free node must not come to lie behind it. Where the solution has it there, the sheath holds it from
+// the step's start on.
+static unsigned judge_mouth(Stepper *s)
+{
+    if (s->tool_count > 1 && !s->is_held_back && (tools_leave_back(s) || tools_come_out(s))) {
+        stepper_begin(s);
+        return STEP_NEEDS_ALL;
+    }
+    int node = s->first_free;
+    if (!s->has_sheath || s->has_failed || node >= s->state.node_count)
+        return 0;
+    const double *u = s->u + row_of(s, node);
+    double ends = vec3_dot(vec3_sub(vec3_add(s->start_position[node], vec3(u[0], u[1], u[2])), s->mouth), s->axis[0]);
+    double began = vec3_dot(vec3_sub(s->start_position[node], s->mouth), s->axis[0]);
+    if (ends >= TAKE_BACK * s->wire.length[node - 1] || began > s->wire.length[node - 1] + fabs(s->command.advance))
+        return 0;
+    stepper_go_back(s);
+    stepper_hold(s, node);
+    stepper_forget(s, node);
+    s->first_free++;
+    s->is_held_back = true;
+    stepper_begin(s);
+    return STEP_NEEDS_ALL;
+}
+
+// Newton's method: the solution is the next place to linearise about, where it turns or goes further than a linear step may.
+static unsigned judge_motion(Stepper *s)
+{
+    if (s->linearisations > 0) {
+        s->report.newton = s->linearisations;
+        s->overshoots = true;
+    }
+    int next = ++s->linearisations;
+    if (next >= 2 * s->newton_max || s->has_failed || stepper_is_spent(s))
+        return 0;
+    bool touches = s->report.active > 0;
+    bool turns = s->turn > (touches ? NEWTON_MOTION_IN_CONTACT : NEWTON_MOTION) || (!touches && turn_at_mouth(s) > NEWTON_MOTION_AT_MOUTH);
+    s->overshoots = stepper_overshoot(s) > OVERSHOOT || self_contact_depth(s, true) > SELF_OVERSHOOT;
+    if (!(turns && next < s->newton_max) && !s->overshoots)
+        return 0;
+    if (stepper_follow(s, next > 1 && s->vessel && goes_back(s)) == 0) {
+        s->blocked = true;
+        stepper_doubt(s);
+        return 0;
+    }
+    stepper_use_clearance(s);
+    s->is_iterate = true;
+    s->is_held_back = false;
+    s->hand_tries = s->looks = 0;
+    return STEP_NEEDS_ALL;
+}
+
+unsigned step_judge(Stepper *s)
+{
+    unsigned needs = judge_hand(s);
+    if (needs == 0)
+        needs = judge_reach(s);
+    if (needs != 0)
+        return needs;
+    s->turn = s->has_failed ? 0 : stepper_largest_turn(s);
+    needs = judge_mouth(s);
+    if (needs == 0)
+        needs = judge_motion(s);
+    if (needs == 0)
+        s->overshoots |= stepper_is_spent(s);        // nobody has looked
+    return needs;
+}
+
+void step_solve(Stepper *s)
+{
+    for (unsigned needs = STEP_NEEDS_ALL; needs != 0; needs = step_judge(s)) {
+        if (needs & STEP_NEEDS_WALLS)
+            step_detect(s);
+        if (needs & STEP_NEEDS_SYSTEM) {
+            step_assemble(s);
+            step_factor(s);
+        }
+        step_contact(s);
+    }
+    step_correct(s);
+}
+
+// --- the end of a step ---
+
+static void keep_last_state(Stepper *s)
+{
+    size_t nodes = (size_t)s->state.node_count, inner = nodes * (size_t)s->state.inner_count * sizeof(double);
+    stepper_go_back(s);
+    memset(s->state.velocity, 0, nodes * sizeof *s->state.velocity);
+    memset(s->state.spin, 0, nodes * sizeof *s->state.spin);
+    memset(s->force, 0, (size_t)s->point_count * sizeof *s->force);
+    memset(s->clearance, 0, (size_t)s->point_count * sizeof *s->clearance);
+    memset(s->touch, 0, (size_t)s->point_count * sizeof *s->touch);
+    self_contact_forget(s);
+    memset(s->state.slide_velocity, 0, inner);
+    memset(s->state.slide_spin, 0, inner);
+    s->report.flags |= STEP_DIVERGED;
+}
+
+static void set_velocities(Stepper *s)
+{
+    WireState *w = &s->state;
+    double rate = 1 / s->dt;
+    for (int i = 0; i < w->node_count; i++) {
+        const double *u = s->linearised + row_of(s, i);      // what has been done, cut or not
+        if (i < s->first_free) {
+            w->velocity[i] = vec3_scale(s->axis[0], u[0] * rate);
+            w->spin[i] = vec3_scale(s->axis[0], u[3] * rate);
+            continue;
+        }
+        w->velocity[i] = vec3(u[0] * rate, u[1] * rate, u[2] * rate);
+        w->spin[i] = vec3(u[3] * rate, u[4] * rate, u[5] * rate);
+    }
+    if (s->tool_count > 1) {
+        tools_set_velocities(s);
+        tools_keep_slides(s);
+    }
+    stepper_use_clearance(s);
+    touch_keep(s);
+}
+
+static void report_forces(Stepper *s)
+{
+    if (!s->has_sheath) {
+        Vec3 force = vec3(0, 0, 0), torque = vec3(0, 0, 0);
+        double *f[] = {&force.x, &force.y, &force.z, &torque.x, &torque.y, &torque.z};
+        for (int k = 0; k < 6; k++)
+            if (s->fixed[0] >> k & 1)
+                *f[k] = stepper_reaction(s, k);
+        s->report.proximal_force = vec3_dot(force, s->axis[0]);
+        s->report.proximal_torque = vec3_dot(torque, s->axis[0]);
+    }
+    hands_report(s);
+    for (int k = 0; k < s->set.count; k++) {
+        double force = vec3_norm(s->force[s->candidate[k]]);
+        s->report.wall_force_max = fmax(s->report.wall_force_max, force);
+        s->report.wall_force_sum += force;
+    }
+}
+
+// A motion that was cut short has not had the forces of the whole one: the hand feels the strain that there is, and the wall has come as far as the motion.
+static void report_cut_forces(Stepper *s, double part)
+{
+    s->report.flags |= STEP_LIMITED;
+    s->report.wall_force_max = s->wall_force_max + part * (s->report.wall_force_max - s->wall_force_max);
+    s->report.wall_force_sum = s->wall_force_sum + part * (s->report.wall_force_sum - s->wall_force_sum);
+    if (!s->has_sheath)
+        return;
+    double force = stepper_strain_force(s), most = s->hand[0].limit > 0 ? s->hand[0].limit : HUGE_VAL;
+    s->report.proximal_force = fmax(-most, fmin(most, force));
+}
+
+void step_correct(Stepper *s)
+{
+    s->state.time += s->dt;
+    if (!s->has_failed) {
+        report_forces(s);
+        if (s->was_held)
+            s->report.flags |= STEP_NOT_CONVERGED;
+        double part = s->blocked ? 0 : stepper_follow(s, false);
+        if (part < 1)
+            report_cut_forces(s, part);
+        set_velocities(s);
+        hands_count(s);
+    }
+    if (s->has_failed)
+        keep_last_state(s);
+}
+
+const StepReport *step_report(const Stepper *s) { return &s->report; }
+const WireState *stepper_state(const Stepper *s) { return &s->state; }
+
+// --- questions ---
+
+void stepper_node_report(Stepper *s, NodeReport *node)
+{
+    int nodes = s->state.node_count, held = stepper_count_held(s, 0);
+    for (int i = 0; i < nodes; i++) {
+        node[i] = (NodeReport){.s = s->wire.s[i], .radius = s->wire.radius[i], .gap = HUGE_VAL, .vessel_node = -1};
+        if (i < held || !s->vessel)
+            continue;
+        // a copy of the memory: a question must not change the next step
+        VesselMemory place = s->place[i];
+        if (place.node < 0)
+            place = (VesselMemory){.node = s->vessel->locate(s->vessel, s->state.position[i], i > held ? node[i - 1].vessel_node : -1)};
+        VesselHit hit;
+        vessel_query(s->vessel, 1, &s->state.position[i], HUGE_VAL, &place, &hit);   // no bound will do: the gap itself is asked for
+        node[i].force = s->force[i];
+        node[i].vessel_node = hit.node;
+        if (!(hit.flags & (VESSEL_FAR | VESSEL_OPEN_END)))
+            node[i].gap = hit.gap - s->wire.radius[i];
+    }
+    stepper_share_forces(s, node);
+}

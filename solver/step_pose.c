@@ -1,0 +1,44 @@
+// What the iterate's pose says, and the way back to the step's start.
+#include "solver/tools_internal.h"
+
+#include "base/same_math.h"
+
+#include <string.h>
+
+double stepper_sheath_coordinate(const Stepper *s, int node)
+{
+    return vec3_dot(vec3_sub(s->state.position[node], s->mouth), s->axis[0]);
+}
+
+void stepper_go_back(Stepper *s)
+{
+    size_t nodes = (size_t)s->state.node_count, inner = nodes * (size_t)s->state.inner_count * sizeof(double);
+    memcpy(s->state.position, s->start_position, nodes * sizeof *s->start_position);
+    memcpy(s->state.orientation, s->start_orientation, nodes * sizeof *s->start_orientation);
+    memcpy(s->state.slide, s->start_slide, inner);
+    memcpy(s->state.angle, s->start_angle, inner);
+}
+
+BeamInput stepper_beam(const Stepper *s, int i)
+{
+    const BeamRest *r = &s->beam.rest;
+    const WireState *w = &s->state;
+    return (BeamInput){.x1 = w->position[i], .x2 = w->position[i + 1], .q1 = w->orientation[i], .q2 = w->orientation[i + 1], .length = r->length[i],
+                       .extend = r->extend[i], .axial = r->axial[i], .near = r->near[i], .far = r->far[i], .twist = r->twist[i], .half_w = r->half_w[i],
+                       .half_y = r->half_y[i], .half_z = r->half_z[i]};
+}
+
+double tools_span_length(const Stepper *s, int c)
+{
+    int k = s->carrier[c + 1];
+    return s->wire.s[c + 1] - (s->carrier[c] == k ? s->wire.s[c] : slide_at(s, c, k));
+}
+
+double tools_twist(const Stepper *s, int c)
+{
+    // whole turns of the tool that goes on at a tip count
+    double turned = is_at_tip(s, c) ? angle_at(s, c, s->carrier[c + 1]) : 0;
+    Quat q = quat_mul(s->state.orientation[c], quat_from_rotation_vector(vec3(remainder(turned, 2 * PI), 0, 0)));
+    Quat p = quat_mul(quat_conjugate(q), s->state.orientation[c + 1]);
+    return turned + 2 * same_atan(p.x / p.w);
+}

@@ -1,0 +1,106 @@
+// The linear system of a step with its contacts.
+#include "solver/self_contact.h"
+#include "solver/tools_internal.h"
+
+static const double FIRMEST = 1e5;               // share of its stiffness by which an unknown is held to the iterate at most, where nothing less will do
+// Contact iterations after which a step looks no further, neither for walls nor for another place to linearise about: a jammed stiff tool would use hundreds a
+// step and not come further. What it then has is followed as far as it is good. Not where a tool meets itself: what nobody has looked for overlaps; nor with
+// several tools, which snap over more rounds and came to lie 1.3 mm outside.
+enum { ITERATIONS_ENOUGH = 60 };
+
+void step_detect(Stepper *s)
+{
+    stepper_detect(s);
+    if (!s->knows_motion)
+        self_contact_detect(s);
+    s->knows_motion = false;
+}
+
+void step_assemble(Stepper *s) { stepper_assemble(s); }
+
+// The iterate in the unknowns that are solved for: hands at node 0, slips elsewhere.
+static double solved_for(const Stepper *s, int c, int unknown)
+{
+    int k = unknown < 6 ? 0 : 1 + (unknown - 6) / 2;
+    if (k == 0 || !is_inside(s, c, k))
+        return s->linearised[row_of(s, c) + (size_t)unknown];
+    return c == 0 ? hand_moved(s, k, unknown % 2) : tools_slipped(s, c, k, unknown % 2);
+}
+
+static bool is_unit_row(const double *row, int n, int unknown)
+{
+    for (int i = 0; i < n; i++)
+        if (row[i] != (i == unknown))
+            return false;
+    return true;
+}
+
+// Holds the solution to the iterate by a share of each unknown's own stiffness.
+static void hold_to_iterate(Stepper *s, double share)
+{
+    int n = s->chain.size;
+    for (int c = 0; c < s->chain.count; c++)
+        for (int i = 0; i < n; i++) {
+            double *row = s->chain.diag + block_of(s, c) + n * i, more = share * fabs(row[i]);
+            if (is_unit_row(row, n, i))
+                continue;
+            row[i] += more;
+            s->b[row_of(s, c) + (size_t)i] += more * solved_for(s, c, i);
+        }
+}
+
+// A matrix that is not positive definite (a tool springs, and nothing holds it) is made so: by ever larger shares, from 0 on.
+static bool firmer(Stepper *s, double *share)
+{
+    *share = *share > 0 ? 10 * *share : 0.01;
+    if (!(*share < FIRMEST))
+        return false;
+    hold_to_iterate(s, *share);
+    return s->was_held = true;
+}
+
+void step_factor(Stepper *s)
+{
+    if (!contact_needs_factor(&s->set, &s->contact))
+        return;
+    double share = 0;
+    while (!s->has_failed && !block_chain_factor(&s->chain, s->factor))
+        s->has_failed = !firmer(s, &share);
+}
+
+void step_contact(Stepper *s)
+{
+    if (s->has_failed)
+        return;
+    ContactReport report = {.converged = true};
+    if (s->set.count + s->set.slide_count + s->set.pair_count > 0) {
+        double share = 0;
+        do
+            report = contact_solve(s->solver, &s->chain, s->factor, s->b, &s->set, &s->contact, s->u);
+        while (report.singular && firmer(s, &share));
+        s->has_failed = report.singular;
+        if (s->has_failed)
+            return;
+    } else {
+        block_factor_solve(s->factor, s->b, s->u);
+    }
+    if (s->tool_count > 1)
+        tools_from_slips(s);
+    hands_solved(s);
+    s->report.iterations += report.iterations;
+    s->report.residual = report.residual;
+    s->report.cone_violation = report.cone_violation;
+    s->report.active = report.active;
+    s->report.self_contacts = report.pairs;
+    s->report.flags &= ~(unsigned)STEP_NOT_CONVERGED;
+    if (!report.converged)
+        s->report.flags |= STEP_NOT_CONVERGED;
+    stepper_keep_forces(s);
+    self_contact_keep_forces(s);
+    double sum = 0;
+    for (size_t i = 0; i < row_of(s, s->state.node_count); i++)
+        sum += s->u[i] * 0;          // 0, or not a number
+    s->has_failed |= sum != 0;
+}
+
+bool stepper_is_spent(const Stepper *s) { return s->tool_count == 1 && s->report.iterations >= ITERATIONS_ENOUGH && s->set.pair_count == 0; }
