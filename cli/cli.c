@@ -1,6 +1,9 @@
 // What the verbs share: how faults, notes and progress are printed.
 #include "cli/cli.h"
 
+#include "base/heap.h"
+
+#include <stdlib.h>
 #include <string.h>
 
 void cli_notes(FILE *out, const char *path, const char *text)
@@ -18,6 +21,21 @@ int cli_bad_input(const Faults *faults)
     faults_print(faults, text, sizeof text);
     fputs(text, stderr);
     return EXIT_BAD_INPUT;
+}
+
+int cli_call(const Verb *verb, int argc, char **argv)
+{
+    static Faults faults;
+    void *options = HEAP_ZEROED(1, verb->options.size);
+    int code = options_parse(&verb->options, argc, argv, options);
+    if (code < 0)
+        code = verb->call(options, &faults);
+    if (faults.count > 0) {
+        int bad = cli_bad_input(&faults);
+        code = code < bad ? bad : code;
+    }
+    free(options);
+    return code;
 }
 
 void cli_note(const char *path, const char *text) { cli_notes(stderr, path, text); }

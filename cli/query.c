@@ -6,26 +6,29 @@
 #include "cli/point_table.h"
 #include "recon/tree_file.h"
 
-#include <getopt.h>
 #include <stdarg.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const char help[] =
-    "Usage: seldinger query MODEL.h5 --points F.csv -o F.csv\n\n"
-    "Evaluates a fitted model at points: the node by power distance over the whole tree, field f (> 0 inside), its gradient, and the signed\n"
-    "Taubin distance f / |grad f| (> 0 inside).\n\n"
-    "  --points F.csv   a header with x_mm,y_mm,z_mm (any order, other columns are ignored), a point a line; # begins a comment;\n"
-    "                   at most 1 GB\n"
-    "  -o, --output F   x_mm,y_mm,z_mm,node,f,gx,gy,gz,distance_mm,inside; - is standard output\n"
-    "  --threads N      default 0: all cores; the answers do not depend on it\n"
-    "  --quiet          no summary\n\n"
-    "Exit codes: 0 done; 2 wrong usage or bad input.\n";
+typedef struct QueryOptions {
+    const char *model, *points, *output;
+    int threads;
+    bool quiet;
+} QueryOptions;
 
-static int usage_fault(const char *message, const char *what)
+static const Option options[] = {
+    {"points", "F.csv", OPTION_FILE, OPTION_AT(QueryOptions, points),
+     "a header with x_mm,y_mm,z_mm (any order, other columns are ignored), a point a line; # begins a comment; at most 1 GB"},
+    {"output", "F.csv", OPTION_FILE, OPTION_AT(QueryOptions, output), "x_mm,y_mm,z_mm,node,f,gx,gy,gz,distance_mm,inside; - is standard output", .letter = 'o'},
+    CLI_THREADS(QueryOptions, threads),
+    CLI_QUIET(QueryOptions, quiet, "no summary"),
+};
+
+static const char *check(void *structure)
 {
-    fprintf(stderr, "seldinger query: %s%s; see `seldinger query --help`\n", message, what);
-    return EXIT_BAD_INPUT;
+    const QueryOptions *query = structure;
+    return !query->points ? "lacks --points F.csv" : !query->output ? "lacks -o F.csv" : NULL;
 }
 
 // --- answers ---
@@ -100,47 +103,35 @@ static bool answer(const VesselTree *tree, const PointTable *table, int threads,
     return good;
 }
 
-int verb_query(int argc, char **argv)
+static int query(void *structure, Faults *faults)
 {
-    enum { POINTS = 256, QUIET, THREADS };
-    static const struct option options[] = {{"points", required_argument, NULL, POINTS}, {"output", required_argument, NULL, 'o'},
-                                            {"quiet", no_argument, NULL, QUIET},          {"threads", required_argument, NULL, THREADS},
-                                            {"help", no_argument, NULL, 'h'},             {0}};
-    static Faults faults;
-    const char *points = NULL, *output = NULL;
-    bool quiet = false;
-    double threads = 0;
-    optind = 1;
-    for (int choice; (choice = getopt_long(argc, argv, "o:h", options, NULL)) != -1;) {
-        switch (choice) {
-        case POINTS: points = optarg; break;
-        case 'o': output = optarg; break;
-        case QUIET: quiet = true; break;
-        case THREADS:
-            if (!cli_whole_number("--threads", optarg, 0, 256, &threads))
-                return EXIT_BAD_INPUT;
-            break;
-        case 'h': fputs(help, stdout); return EXIT_DONE;
-        default: return usage_fault("unknown option or lacking value", "");
-        }
-    }
-    if (optind != argc - 1)
-        return usage_fault(optind < argc ? "one model at a time, not also " : "lacks the model", optind < argc ? argv[optind + 1] : "");
-    if (!points || !output)
-        return usage_fault(points ? "lacks -o F.csv" : "lacks --points F.csv", "");
+    const QueryOptions *query = structure;
     PointTable table = {0};
-    OutputPlan plan = {.faults = &faults};
-    output_plan_write(&plan, "-o", output);
-    output_plan_read(&plan, "the model", argv[optind]);
-    output_plan_read(&plan, "--points", points);
-    VesselTree *tree = tree_file_load(argv[optind], NULL, &faults);
+    OutputPlan plan = {.faults = faults};
+    output_plan_write(&plan, "-o", query->output);
+    output_plan_read(&plan, "the model", query->model);
+    output_plan_read(&plan, "--points", query->points);
+    VesselTree *tree = tree_file_load(query->model, NULL, faults);
     if (tree && !vessel_tree_is_model(tree))
-        faults_add(&faults, argv[optind], 0, 0, "is a tree without a model; make one with `seldinger fit`");
-    point_table_read(points, &table, &faults);
-    bool good = faults.count == 0 && answer(tree, &table, (int)threads, output, &faults);
-    if (good && !quiet && strcmp(output, "-"))
+        faults_add(faults, query->model, 0, 0, "is a tree without a model; make one with `seldinger fit`");
+    point_table_read(query->points, &table, faults);
+    bool good = faults->count == 0 && answer(tree, &table, query->threads, query->output, faults);
+    if (good && !query->quiet && strcmp(query->output, "-"))
         printf("%d points\n", table.count);
     vessel_tree_free(tree);
     free(table.point);
-    return good ? EXIT_DONE : cli_bad_input(&faults);
+    return EXIT_DONE;
 }
+
+const Verb query_verb = {
+    .options = {.program = "seldinger query",
+                .does = "field, gradient and distance of a model at points",
+                .usage = "MODEL.h5 --points F.csv -o F.csv",
+                .intro = "Evaluates a fitted model at points: the node by power distance over the whole tree, field f (> 0 inside), its gradient, and the signed "
+                         "Taubin distance f / |grad f| (> 0 inside).\n",
+                .exits = CLI_BAD_INPUT_EXITS,
+                .option = options, .option_count = sizeof options / sizeof *options,
+                .size = sizeof(QueryOptions), .check = check,
+                .takes_argument = true, .argument = offsetof(QueryOptions, model),
+                .lacks = "lacks the model", .too_many = "one model at a time, not also "},
+    .call = query};
