@@ -38,7 +38,7 @@ void option_range(const Option *option, char *text, size_t capacity)
     if (option_is_number(option) && !option->take)
         snprintf(text, capacity, "a %snumber from %.16g to %.16g", option->type == OPTION_NUMBER ? "" : "whole ", option->least, option->most);
     for (int i = 0; option->type == OPTION_CHOICE && option->choices[i] && used < capacity; i++)
-        used += (size_t)snprintf(text + used, capacity - used, "%s%s", i == 0 ? "" : option->choices[i + 1] ? ", " : " or ", option->choices[i]);
+        used += (size_t)snprintf(text + used, capacity - used, "%s%s", i == 0 ? "valid: " : ", ", option->choices[i]);
 }
 
 void *options_defaults(const OptionTable *table)

@@ -74,7 +74,7 @@ void option_default(const Option *option, const void *defaults, char *text, size
 void *options_defaults(const OptionTable *table);
 // The option's help with its unit and default.
 void option_sentence(const Option *option, const void *defaults, char *text, size_t capacity);
-// What may be given, in words: "a number from 0 to 1", "lim, mesh or grid". "" where anything may.
+// What may be given, in words: "a number from 0 to 1", "valid: lim, mesh, grid". "" where anything may.
 void option_range(const Option *option, char *text, size_t capacity);
 
 bool option_is_number(const Option *option);

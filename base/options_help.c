@@ -113,7 +113,8 @@ void options_help(const OptionTable *table, FILE *out)
     print_paragraphs(out, more);
     if (table->notes || more)
         fputc('\n', out);
-    fprintf(out, "Exit codes: %s.\n", table->exits);
+    fputs("Exit codes: ", out);
+    print_words(out, table->exits, 12, 0);
     free(more);
     free(defaults);
 }

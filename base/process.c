@@ -25,6 +25,24 @@ void process_stop(int number)
     raise(number);
 }
 
+static volatile sig_atomic_t stop_requested;
+
+static void request_stop(int number)
+{
+    // a second one ends the program at once
+    if (stop_requested)
+        process_stop(number);
+    stop_requested = 1;
+}
+
+const volatile sig_atomic_t *process_stop_in_order(void)
+{
+    struct sigaction stop = {.sa_handler = request_stop, .sa_flags = SA_RESTART};
+    sigaction(SIGINT, &stop, NULL);
+    sigaction(SIGTERM, &stop, NULL);
+    return &stop_requested;
+}
+
 static void install_stop(int number)
 {
     struct sigaction former;

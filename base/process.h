@@ -2,6 +2,7 @@
 #ifndef SELDINGER_BASE_PROCESS_H
 #define SELDINGER_BASE_PROCESS_H
 
+#include <signal.h>
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -12,6 +13,8 @@ enum { EXIT_DONE = 0, EXIT_DIFFERENT = 1, EXIT_BAD_INPUT = 2, EXIT_UNTRUSTED = 3
 int process_run(int argc, char **argv, int (*call)(int argc, char **argv));
 // The handler of a signal that ends the program: no unfinished file is left.
 void process_stop(int signal_number);
+// From now on SIGINT and SIGTERM ask the program to end in order: what is returned becomes 1. A second one is process_stop().
+const volatile sig_atomic_t *process_stop_in_order(void);
 // From a child process that reads what may break it: it says nothing on standard error, writes no file and no core, and ends by a signal after so much time.
 void process_be_expendable(unsigned processor_s, unsigned wall_s);
 // The path of the program `name` in this program's own folder, there or not. False where this program's path cannot be had or is too long.

@@ -26,8 +26,8 @@ int cli_bad_input(const Faults *faults)
 int cli_call(const Verb *verb, int argc, char **argv)
 {
     static Faults faults;
-    void *options = HEAP_ZEROED(1, verb->options.size);
-    int code = options_parse(&verb->options, argc, argv, options);
+    void *options = HEAP_ZEROED(1, verb->options->size);
+    int code = options_parse(verb->options, argc, argv, options);
     if (code < 0)
         code = verb->call(options, &faults);
     if (faults.count > 0) {
@@ -45,4 +45,9 @@ bool cli_open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *ou
     ProgressBar bar;
     Progress progress = progress_bar(&bar, "fit", quiet);
     return open_vessel(scene, &(OpenVesselOptions){.threads = threads, .progress = &progress, .note = cli_note}, out, faults);
+}
+
+bool cli_open_scene(Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults)
+{
+    return cli_open_vessel(scene, threads, quiet, out, faults) && open_vessel_inlet(scene, out, faults);
 }

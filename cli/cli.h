@@ -12,20 +12,21 @@
 #include <stdio.h>
 
 typedef int VerbFunction(int argc, char **argv);   // argv[0] is "seldinger VERB"
-VerbFunction verb_run, verb_check, verb_segment, verb_import, verb_fit, verb_synth, verb_export, verb_info, verb_bench, verb_replay,
+VerbFunction verb_check, verb_segment, verb_import, verb_fit, verb_synth, verb_export, verb_info, verb_bench, verb_replay,
     verb_devices, verb_nav, verb_report;
 
 // A verb: its options, and what it does with them. `call` returns an exit code; faults that it adds are printed afterwards, and make it EXIT_BAD_INPUT at least.
 typedef struct Verb {
-    OptionTable options;
+    const OptionTable *options;
     int (*call)(void *options, Faults *faults);
 } Verb;
-extern const Verb query_verb;
+extern const Verb run_verb, query_verb;
 int cli_call(const Verb *verb, int argc, char **argv);
 // Rows of the table that many verbs have.
 #define CLI_THREADS(structure, member) \
     {"threads", "N", OPTION_INT, OPTION_AT(structure, member), "threads; the result does not depend on them", .most = 256, .otherwise = "0: all cores"}
 #define CLI_QUIET(structure, member, text) {"quiet", NULL, OPTION_FLAG, OPTION_AT(structure, member), text}
+#define CLI_OPTIONS(rows, structure) .option = rows, .option_count = sizeof rows / sizeof *rows, .size = sizeof(structure)
 #define CLI_BAD_INPUT_EXITS "0 done; 2 wrong usage or bad input"
 
 // Prints all faults to standard error; returns EXIT_BAD_INPUT.
@@ -42,6 +43,8 @@ bool cli_view(const char *text, int *view);
 
 // open_vessel() with a progress bar and notes on standard error.
 bool cli_open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults);
+// The same, and where the tool enters.
+bool cli_open_scene(Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults);
 void cli_note(const char *path, const char *text);   // cli_notes() to standard error
 
 #endif

@@ -14,7 +14,7 @@ typedef struct Entry {
 } Entry;
 
 static const Entry verbs[] = {
-    {NULL, "run", verb_run, "SCENE", "runs a scene headless: summary, final state, recording, picture"},
+    {.verb = &run_verb},
 #ifdef SELDINGER_RENDER
     {NULL, "nav", verb_nav, "SCENE", "the trainer: a window, keys and devices steer the tool, sessions are recorded and scored"},
 #endif
@@ -33,14 +33,14 @@ static const Entry verbs[] = {
 };
 enum { VERB_COUNT = sizeof verbs / sizeof verbs[0] };
 
-static const char *name_of(const Entry *entry) { return entry->verb ? strrchr(entry->verb->options.program, ' ') + 1 : entry->name; }
+static const char *name_of(const Entry *entry) { return entry->verb ? strrchr(entry->verb->options->program, ' ') + 1 : entry->name; }
 
 static void print_help(FILE *out)
 {
     fprintf(out, "Usage: seldinger VERB ARGUMENTS\n\nSeldinger %s, a catheter navigation simulator for training and research, not a medical device.\n\n",
             SELDINGER_VERSION);
     for (int i = 0; i < VERB_COUNT; i++) {
-        const OptionTable *options = verbs[i].verb ? &verbs[i].verb->options : NULL;
+        const OptionTable *options = verbs[i].verb ? verbs[i].verb->options : NULL;
         const char *form = options ? options->usage : verbs[i].arguments;
         fprintf(out, "  %-8s %-34.*s %s\n", name_of(&verbs[i]), (int)strcspn(form, "\n"), form, options ? options->does : verbs[i].does);
     }
@@ -72,7 +72,7 @@ static int print_manual(const char *name)
     const Entry *entry = find_verb(name);
     if (!entry || !entry->verb)
         return refuse_name("manual page of a verb", name);
-    options_manual(&entry->verb->options, SELDINGER_VERSION, stdout);
+    options_manual(entry->verb->options, SELDINGER_VERSION, stdout);
     return EXIT_DONE;
 }
 
@@ -82,7 +82,7 @@ static int print_completion(void)
     int count = 0;
     for (int i = 0; i < VERB_COUNT; i++)
         if (verbs[i].verb)
-            table[count++] = &verbs[i].verb->options;
+            table[count++] = verbs[i].verb->options;
     options_completion("seldinger", table, stdout);
     return EXIT_DONE;
 }

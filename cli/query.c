@@ -123,15 +123,19 @@ static int query(void *structure, Faults *faults)
     return EXIT_DONE;
 }
 
-const Verb query_verb = {
-    .options = {.program = "seldinger query",
-                .does = "field, gradient and distance of a model at points",
-                .usage = "MODEL.h5 --points F.csv -o F.csv",
-                .intro = "Evaluates a fitted model at points: the node by power distance over the whole tree, field f (> 0 inside), its gradient, and the signed "
-                         "Taubin distance f / |grad f| (> 0 inside).\n",
-                .exits = CLI_BAD_INPUT_EXITS,
-                .option = options, .option_count = sizeof options / sizeof *options,
-                .size = sizeof(QueryOptions), .check = check,
-                .takes_argument = true, .argument = offsetof(QueryOptions, model),
-                .lacks = "lacks the model", .too_many = "one model at a time, not also "},
-    .call = query};
+static const OptionTable table = {
+    .program = "seldinger query",
+    .does = "field, gradient and distance of a model at points",
+    .usage = "MODEL.h5 --points F.csv -o F.csv",
+    .intro = "Evaluates a fitted model at points: the node by power distance over the whole tree, field f (> 0 inside), its gradient, and the signed Taubin "
+             "distance f / |grad f| (> 0 inside).",
+    .exits = CLI_BAD_INPUT_EXITS,
+    CLI_OPTIONS(options, QueryOptions),
+    .check = check,
+    .takes_argument = true,
+    .argument = offsetof(QueryOptions, model),
+    .lacks = "lacks the model",
+    .too_many = "one model at a time, not also ",
+};
+
+const Verb query_verb = {.options = &table, .call = query};

@@ -8,6 +8,8 @@
 #include <string.h>
 #include <time.h>
 
+static const double patience_s = 5;      // for the first device
+
 struct RunHands {
     Hands *hands;
     HandSet set;
@@ -69,7 +71,7 @@ static Hands *open_devices(int map_count, const char *const *path, const ToolNam
     return hands;
 }
 
-RunHands *run_hands_open(int map_count, const char *const *map, const Scene *scene, double patience_s, Faults *faults)
+RunHands *run_hands_open(int map_count, const char *const *map, const Scene *scene, Faults *faults)
 {
     RunHands *hands = calloc(1, sizeof *hands);
     const ToolNames tools = scene_tool_names(scene);

@@ -10,8 +10,8 @@ typedef struct RunHands RunHands;
 
 enum { RUN_MAPS = 8 };
 
-// `map`: files of device maps; "auto" stands for the built-in ones. Waits up to `patience_s` for the first device. NULL with faults.
-RunHands *run_hands_open(int map_count, const char *const *map, const Scene *scene, double patience_s, Faults *faults);
+// `map`: files of device maps; "auto" stands for the built-in ones. Waits up to 5 s for the first device. NULL with faults.
+RunHands *run_hands_open(int map_count, const char *const *map, const Scene *scene, Faults *faults);
 ToolCommands run_hands_command(void *hands);          // of the next step, as DriveOptions.hand wants it: `context` is the RunHands
 void run_hands_answer(RunHands *hands, const StepReport *report, int64_t step);
 void run_hands_close(RunHands *hands);           // NULL is fine

@@ -1,6 +1,7 @@
 #include "sim/run_summary.h"
 
 #include "base/heap.h"
+#include "base/output.h"
 
 #include <cJSON.h>
 #include <inttypes.h>
@@ -273,4 +274,48 @@ void run_print(FILE *out, Simulator *simulator, const DriveReport *drive, const 
     for (int i = 0; i < scene->target_count; i++)
         fprintf(out, "target %s: %s, nearest %.2f mm (radius %.2f), at %.3f s\n", scene->target[i].name, reach[i].reached ? "reached" : "NOT reached",
                 reach[i].distance, scene->target[i].radius, reach[i].time_s);
+}
+
+// No node of a run that can be shown is further outside the wall than this.
+static const double deep_mm = 0.2;
+
+void run_print_warnings(FILE *out, const Simulator *simulator, const DriveReport *drive)
+{
+    const RunTotals *totals = simulator_totals(simulator);
+    const char *path = simulator_scene(simulator)->path;
+    if (drive->end == DRIVE_DIVERGED)
+        fprintf(out, "%s: diverged at %.3f s; the last good state is kept. Smaller step_ms, shorter elements or slower motion may help\n", path,
+                simulator_time_s(simulator));
+    if (run_left_vessel(totals))
+        fprintf(out, "%s: the tool left the vessel (deepest %.3f mm outside the wall); the run cannot be trusted\n", path, totals->penetration_max);
+    else if (totals->penetration_max > deep_mm)
+        fprintf(out, "%s: warning: a node was %.3f mm outside the wall\n", path, totals->penetration_max);
+    if (totals->flags & STEP_OUT_OF_VESSEL)
+        fprintf(out, "%s: warning: the tool passed an open end of the vessel\n", path);
+    if (totals->disagreeing_steps > 0)
+        fprintf(out, "%s: warning: in %lld of %lld steps two parts of the vessel's model put the wall at different places; "
+                        "fit the model again with this version\n", path, (long long)totals->disagreeing_steps, (long long)totals->steps);
+    const EnergyBalance *energy = simulator_energy(simulator);
+    if (simulator_gains_energy(simulator))
+        fprintf(out, "%s: warning: single steps gained %.3g mJ that nobody gave, of %.4g mJ of work (most: %.3g mJ at %.3f s)\n", path, energy->gained,
+                energy->work, energy->gained_most, energy->gained_at_s);
+    if (totals->not_converged_steps > 0)
+        fprintf(out, "%s: warning: the contact solve of %lld of %lld steps stopped at its cap (residual at most %.2g)\n", path,
+                (long long)totals->not_converged_steps, (long long)totals->steps, totals->residual_max);
+}
+
+bool run_write_summary(const char *path, Simulator *simulator, const DriveReport *drive, const NodeReport *node, Faults *faults)
+{
+    return output_write_line(path, run_summary_json(simulator, drive, node), faults);
+}
+
+bool run_write_final(const char *path, Simulator *simulator, const NodeReport *node, Faults *faults)
+{
+    size_t length;
+    char *text = run_final_csv(simulator, node, &length);
+    if (!text)
+        faults_add(faults, path, 0, 0, "cannot be written: no memory");
+    bool good = text && output_write(path, text, length, faults);
+    free(text);
+    return good;
 }

@@ -15,6 +15,11 @@ bool run_left_vessel(const RunTotals *totals);
 char *run_summary_json(Simulator *simulator, const DriveReport *drive, const NodeReport *node);
 // Text of the final state, one row a node.
 char *run_final_csv(Simulator *simulator, const NodeReport *node, size_t *length);
+// The same into files ("-": standard output); false with a fault.
+bool run_write_summary(const char *path, Simulator *simulator, const DriveReport *drive, const NodeReport *node, Faults *faults);
+bool run_write_final(const char *path, Simulator *simulator, const NodeReport *node, Faults *faults);
 void run_print(FILE *out, Simulator *simulator, const DriveReport *drive, const NodeReport *node);
+// What makes the run doubtful, a line each; nothing where nothing does.
+void run_print_warnings(FILE *out, const Simulator *simulator, const DriveReport *drive);
 
 #endif

@@ -1,6 +1,8 @@
 // What a scene holds, asked for and freed; scene_read.c makes it.
 #include "sim/scene.h"
 
+#include "base/heap.h"
+
 #include <stdlib.h>
 
 const char *const contact_name[CONTACT_COUNT + 1] = {"lim", "mesh", "tube", "smooth_mesh", "flat_mesh", "grid", "lim_blend", "lim_switch", NULL};
@@ -87,6 +89,21 @@ int scene_most_nodes(const Scene *scene, int tool)
         most = nodes > most ? nodes : most;
     }
     return most;
+}
+
+bool scene_use_script(Scene *scene, const char *path, Faults *faults)
+{
+    ToolNames tools = scene ? scene_tool_names(scene) : (ToolNames){0};
+    Script *script = script_load_tools(path, scene ? &tools : NULL, faults);
+    if (!scene || !script) {
+        script_free(script);
+        return false;
+    }
+    script_free(scene->script);
+    free(scene->script_path);
+    scene->script = script;
+    scene->script_path = HEAP_TEXT(path);
+    return true;
 }
 
 ToolNames scene_tool_names(const Scene *scene)

@@ -112,6 +112,8 @@ WireOptions scene_device_wire(const Scene *scene, int tool, int which);
 int scene_device_count(const Scene *scene, int tool);      // 1 where it cannot be exchanged
 int scene_most_nodes(const Scene *scene, int tool);        // of whichever device is in
 ToolNames scene_tool_names(const Scene *scene);      // as scripts know them; lives as long as the scene
+// Replaces its script by a file's. NULL: the file is only checked. False with faults.
+bool scene_use_script(Scene *scene, const char *path, Faults *faults);
 // [1/mm] by which the first tool, or any, takes X-rays away at arc length s from its proximal end.
 double scene_attenuation(const Scene *scene, double s);
 double scene_tool_attenuation(const Scene *scene, int tool, double s);

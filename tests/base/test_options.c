@@ -128,7 +128,7 @@ static void what_is_wrong_is_named(void **state)
         {"a --start 1,2", "--start takes a point"},
         {"a --start 1,2,3,4", "--start takes a point"},
         {"a --start 1,2,inf", "--start takes a point"},
-        {"a --kind msh", "--kind: 'msh' is not valid; lim, mesh or grid"},
+        {"a --kind msh", "--kind: 'msh' is not valid; valid: lim, mesh, grid"},
         {"a --at 1 --at 2 --at 3", "--at: given more than 2 times"},
         {"a --curve 1 2 3 4", "--curve: given more than 3 times"},
         {"a --width 0", "--width: '0' is not valid; WIDTH above 0"},
@@ -194,7 +194,7 @@ static void help_shows_units_and_defaults(void **state)
     has(text, "of the noise; default the trace's\n");
     has(text, "machine\n  --threads N        threads; 0: all cores; default 3\n");
     has(text, "of contact; default mesh\n");
-    has(text, "Exit codes: 0 done; 2 wrong usage.\n");
+    has(text, "Exit codes: 0 done; 2 wrong usage\n");
     assert_null(strstr(text, "kurve"));
     free(text);
 }

@@ -1,0 +1,17 @@
+// What `run` leaves: the recording, figures, the last state, pictures.
+#ifndef SELDINGER_CLI_RUN_FILES_H
+#define SELDINGER_CLI_RUN_FILES_H
+
+#include "cli/output_plan.h"
+#include "cli/run_chart.h"
+#include "sim/headless.h"
+
+typedef struct RunFiles {    // NULL: not wanted
+    const char *record, *summary, *final, *score, *picture, *chart;
+} RunFiles;
+
+void run_files_plan(const RunFiles *files, OutputPlan *plan);
+// After the run. False with faults where one could not be written. `contact`: what was asked for, for the title of the picture; NULL: the scene's.
+bool run_files_write(const RunFiles *files, HeadlessRun *run, OpenVessel *open, const RunChart *chart, const char *contact, Faults *faults);
+
+#endif

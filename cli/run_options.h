@@ -1,0 +1,22 @@
+// What can be asked of `run`.
+#ifndef SELDINGER_CLI_RUN_OPTIONS_H
+#define SELDINGER_CLI_RUN_OPTIONS_H
+
+#include "base/option_table.h"
+#include "cli/run_files.h"
+#include "cli/run_hands.h"
+
+typedef struct RunOptions {
+    const char *scene, *script, *device[RUN_MAPS];
+    RunFiles files;
+    HeadlessOptions headless;
+    int device_count, threads;
+    int contact;                     // of run_contact; -1: the scene's
+    bool quiet;
+} RunOptions;
+
+extern const char *const run_contact[];      // as they are written …
+extern const ContactKind run_contact_kind[]; // … and what they stand for
+extern const OptionTable run_options;
+
+#endif
