@@ -141,7 +141,7 @@ static const Option *find_letter(const OptionTable *table, char letter)
     for (int i = 0; i < table->option_count; i++)
         if (table->option[i].letter == letter)
             return &table->option[i];
-    return letter == 'h' ? &help_option : NULL;
+    return letter == 'h' || letter == '?' ? &help_option : NULL;
 }
 
 static int refuse_unknown(const OptionTable *table, const char *name, size_t length, bool is_ambiguous)

@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "base/heap.h"
+#include "base/output.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -51,3 +52,15 @@ bool cli_open_scene(Scene *scene, int threads, bool quiet, OpenVessel *out, Faul
 {
     return cli_open_vessel(scene, threads, quiet, out, faults) && open_vessel_inlet(scene, out, faults);
 }
+
+bool cli_write_json(const char *path, const cJSON *root, Faults *faults)
+{
+    char *text = cJSON_Print(root);
+    if (!text)
+        faults_add(faults, path, 0, 0, "not enough memory");
+    bool good = text && output_write(path, text, strlen(text), faults);
+    cJSON_free(text);
+    return good;
+}
+
+bool cli_is_standard_output(const char *path) { return path && !strcmp(path, "-"); }

@@ -9,10 +9,11 @@
 #include "geom/geom.h"
 #include "sim/open_vessel.h"
 
+#include <cJSON.h>
 #include <stdio.h>
 
 typedef int VerbFunction(int argc, char **argv);   // argv[0] is "seldinger VERB"
-VerbFunction verb_check, verb_segment, verb_import, verb_fit, verb_synth, verb_export, verb_info, verb_bench, verb_replay,
+VerbFunction verb_check, verb_import, verb_synth, verb_export, verb_info, verb_bench, verb_replay,
     verb_devices, verb_nav, verb_report;
 
 // A verb: its options, and what it does with them. `call` returns an exit code; faults that it adds are printed afterwards, and make it EXIT_BAD_INPUT at least.
@@ -20,7 +21,7 @@ typedef struct Verb {
     const OptionTable *options;
     int (*call)(void *options, Faults *faults);
 } Verb;
-extern const Verb run_verb, query_verb;
+extern const Verb run_verb, query_verb, fit_verb, segment_verb;
 int cli_call(const Verb *verb, int argc, char **argv);
 // Rows of the table that many verbs have.
 #define CLI_THREADS(structure, member) \
@@ -41,6 +42,8 @@ bool cli_size(const char *text, int *width, int *height);
 // A view by name, its index: fluoroscopy, 3d, angioscopy, all; else a message and false.
 bool cli_view(const char *text, int *view);
 
+bool cli_write_json(const char *path, const cJSON *root, Faults *faults);
+bool cli_is_standard_output(const char *path);   // "-"; NULL is not
 // open_vessel() with a progress bar and notes on standard error.
 bool cli_open_vessel(const Scene *scene, int threads, bool quiet, OpenVessel *out, Faults *faults);
 // The same, and where the tool enters.

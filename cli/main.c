@@ -19,9 +19,9 @@ static const Entry verbs[] = {
     {NULL, "nav", verb_nav, "SCENE", "the trainer: a window, keys and devices steer the tool, sessions are recorded and scored"},
 #endif
     {NULL, "check", verb_check, "PATH...", "runs every scene that has a golden tool path and compares"},
-    {NULL, "segment", verb_segment, "VOLUME --start X,Y,Z -o TREE.h5", "RBT: an angiogram, from one click or --trace F.yaml, to a tree of nodes with local points"},
+    {.verb = &segment_verb},
     {NULL, "import", verb_import, "--surface F -o TREE.h5", "the same tree from a surface, with centrelines or alone"},
-    {NULL, "fit", verb_fit, "TREE.h5 -o MODEL.h5", "LIM: a local blobby model for each node"},
+    {.verb = &fit_verb},
     {NULL, "synth", verb_synth, "SHAPE -o F", "synthetic shapes with known truth"},
     {.verb = &query_verb},
     {NULL, "export", verb_export, "FILE -o OUT", "surface, centreline or recording for other programs"},

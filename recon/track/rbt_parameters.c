@@ -94,3 +94,18 @@ char *rbt_parameters_text(const RbtParameters *parameters, double voxel_mm)
     snprintf(text + used, capacity - used, "]\n");
     return text;
 }
+
+char *rbt_parameters_help(void)
+{
+    enum { LINE = 260 };
+    RbtParameters ours = rbt_default_parameters(), paper = rbt_paper_parameters();
+    size_t capacity = LINE * (size_t)(rbt_parameter_count + 2), used = 0;
+    char *text = HEAP_ZEROED(capacity, 1);
+    for (int i = 0; i < rbt_parameter_count; i++) {
+        const RbtParameterName *p = &rbt_parameter_table[i];
+        double a = *(const double *)(const void *)((const char *)&ours + p->offset), b = *(const double *)(const void *)((const char *)&paper + p->offset);
+        used += (size_t)snprintf(text + used, capacity - used, "  %-20s %s (%g; %g)\n", p->name, p->meaning, a, b);
+    }
+    snprintf(text + used, capacity - used, "  %-20s %s\n", "retry_steps", "multiples of the step after a failed one ([1.7, 2.4, 3.1]; [])");
+    return text;
+}

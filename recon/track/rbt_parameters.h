@@ -81,4 +81,7 @@ extern const int rbt_parameter_count;
 // "name: value" a line, for the tree file, the volume's voxel size first (the fit's target depends on it); to be freed.
 char *rbt_parameters_text(const RbtParameters *parameters, double voxel_mm);
 
+// A line for each parameter with its meaning, our default and the paper's; to be freed.
+char *rbt_parameters_help(void);
+
 #endif

@@ -1,0 +1,18 @@
+// What can be asked of `fit`.
+#ifndef SELDINGER_CLI_FIT_OPTIONS_H
+#define SELDINGER_CLI_FIT_OPTIONS_H
+
+#include "base/option_table.h"
+#include "cli/junction_sheets.h"
+#include "recon/fit/reach_report.h"
+#include "recon/fit/tree_fit.h"
+
+typedef struct FitCommand {
+    const char *tree, *output, *json, *picture;
+    TreeFitOptions fit;
+    JunctionSheets junctions;    // and the radius of the tool that is led through the model
+    bool has_alpha, has_beta, has_max_blobs, has_max_points, quiet, measure;
+} FitCommand;
+extern const OptionTable fit_options;
+
+#endif

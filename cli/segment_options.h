@@ -1,0 +1,20 @@
+// What can be asked of `segment`.
+#ifndef SELDINGER_CLI_SEGMENT_OPTIONS_H
+#define SELDINGER_CLI_SEGMENT_OPTIONS_H
+
+#include "base/option_table.h"
+#include "geom/linear.h"
+
+enum { SEGMENT_POINTS = 64 };
+
+typedef struct SegmentCommand {
+    const char *volume, *trace, *start, *out, *json, *picture;
+    Vec3 start_mm, until[SEGMENT_POINTS], rival[SEGMENT_POINTS];
+    int until_count, rival_count;
+    int threads;
+    double seed;             // -1: the trace's
+    bool quiet;
+} SegmentCommand;
+extern const OptionTable segment_options;
+
+#endif

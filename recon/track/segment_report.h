@@ -1,0 +1,15 @@
+// What tracking found (recon/track/rbt_report.h), for people and as JSON.
+#ifndef SELDINGER_RECON_TRACK_SEGMENT_REPORT_H
+#define SELDINGER_RECON_TRACK_SEGMENT_REPORT_H
+
+#include "geom/vessel_tree.h"
+#include "recon/track/rbt_report.h"
+
+#include <cJSON.h>
+#include <stdio.h>
+
+// A row a branch, then junctions that the image does not clearly support, loops, what was left out, sums. Times [s].
+void segment_report_print(FILE *out, const VesselTree *tree, const RbtReport *report, double load_s, double track_s);
+void segment_report_add(cJSON *root, const VesselTree *tree, const RbtReport *report, double load_s, double track_s);
+
+#endif

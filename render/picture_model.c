@@ -1,0 +1,35 @@
+#include "render/picture_model.h"
+
+#include "geom/isosurface.h"
+#include "geom/tree_surface.h"
+#include "render/picture.h"
+
+#include <stdlib.h>
+
+bool picture_model_fit(const char *path, const VesselTree *model, Faults *faults)
+{
+    char message[256] = "";
+    TriangleMesh *mesh = isosurface_of_tree(model, isosurface_cell_for(model));
+    PictureOptions options = picture_default_options();
+    bool drawn = picture_of_fit(path, &options, model, mesh, NULL, message, sizeof message);
+    if (!drawn)
+        faults_add(faults, path, 0, 0, "no picture: %s", message);
+    triangle_mesh_free(mesh);
+    return drawn;
+}
+
+bool picture_model_error(const char *path, const char *title, const VesselTree *model, double voxel_mm, Faults *faults)
+{
+    char message[512] = "the tree has no fitted model to draw";
+    TriangleMesh *mesh = vessel_tree_is_model(model) ? isosurface_of_tree(model, isosurface_cell_for(model)) : NULL;
+    double *error = mesh ? malloc(((size_t)mesh->vertex_count + 1) * sizeof *error) : NULL;
+    PictureOptions options = picture_default_options();
+    options.title = title;
+    bool drawn = error && surface_point_error(mesh, model, error, NULL) &&
+                 picture_of_error(path, &options, model, mesh, error, voxel_mm, message, sizeof message);
+    if (!drawn)
+        faults_add(faults, path, 0, 0, "no picture: %s", message);
+    free(error);
+    triangle_mesh_free(mesh);
+    return drawn;
+}
