@@ -1,0 +1,14 @@
+// What a recording, a scene or a script is: its figures as JSON, for `info`.
+#ifndef SELDINGER_SIM_DESCRIBE_RUN_H
+#define SELDINGER_SIM_DESCRIBE_RUN_H
+
+#include "base/faults.h"
+
+#include <cJSON.h>
+
+// Of a file; false with faults.
+bool describe_recording(cJSON *object, const char *path, Faults *faults);
+bool describe_scene(cJSON *object, const char *path, Faults *faults);
+bool describe_script(cJSON *object, const char *path, Faults *faults);
+
+#endif
