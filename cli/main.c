@@ -28,7 +28,7 @@ static const Entry verbs[] = {
     {.verb = &info_verb},
     {NULL, "replay", verb_replay, "REC.h5 [--verify]", "a recording shown, simulated again and compared, or made into a scene"},
     {NULL, "report", verb_report, "SESSION.json|REC.h5", "a page about a trainee's session: points, errors, plots, path, earlier sessions; HTML or PDF"},
-    {NULL, "devices", verb_devices, "", "what is plugged in, what of it drives the tool, and why the rest does not"},
+    {.verb = &devices_verb},
     {NULL, "bench", verb_bench, "TABLE", "step, fit, track, peer, collision, drawing, wall: timed, each row in the same run; torture: random runs"},
 };
 enum { VERB_COUNT = sizeof verbs / sizeof verbs[0] };

@@ -6,7 +6,7 @@
 
 #include <cmocka.h>
 
-#include "cli/devices_watch.h"
+#include "input/devices_watch.h"
 #include "input/hand.h"
 #include "tests/input/fake_hid.h"
 #include "tests/input/hid_recordings.h"

@@ -1,5 +1,5 @@
 // devices --watch: raw values as they come, with their least and most, and what the map makes of them.
-#include "cli/devices_watch.h"
+#include "input/devices_watch.h"
 
 #include "input/map_state.h"
 

@@ -1,0 +1,12 @@
+// A list of devices (input/device_list.h), for people and as JSON.
+#ifndef SELDINGER_INPUT_DEVICE_REPORT_H
+#define SELDINGER_INPUT_DEVICE_REPORT_H
+
+#include "input/device_list.h"
+
+#include <stdio.h>
+
+void device_list_print(FILE *out, const DeviceList *list);
+char *device_list_json(const DeviceList *list);      // to be freed; NULL: no memory
+
+#endif
