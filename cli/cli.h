@@ -13,7 +13,7 @@
 #include <stdio.h>
 
 typedef int VerbFunction(int argc, char **argv);   // argv[0] is "seldinger VERB"
-VerbFunction verb_check, verb_import, verb_export, verb_bench, verb_replay,
+VerbFunction verb_check, verb_export, verb_bench, verb_replay,
     verb_nav, verb_report;
 
 // A verb: its options, and what it does with them. `call` returns an exit code; faults that it adds are printed afterwards, and make it EXIT_BAD_INPUT at least.
@@ -21,7 +21,7 @@ typedef struct Verb {
     const OptionTable *options;
     int (*call)(void *options, Faults *faults);
 } Verb;
-extern const Verb run_verb, query_verb, fit_verb, segment_verb, synth_verb, info_verb, devices_verb;
+extern const Verb run_verb, query_verb, fit_verb, segment_verb, synth_verb, info_verb, devices_verb, import_verb;
 int cli_call(const Verb *verb, int argc, char **argv);
 // Rows of the table that many verbs have.
 #define CLI_THREADS(structure, member) \

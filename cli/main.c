@@ -20,7 +20,7 @@ static const Entry verbs[] = {
 #endif
     {NULL, "check", verb_check, "PATH...", "runs every scene that has a golden tool path and compares"},
     {.verb = &segment_verb},
-    {NULL, "import", verb_import, "--surface F -o TREE.h5", "the same tree from a surface, with centrelines or alone"},
+    {.verb = &import_verb},
     {.verb = &fit_verb},
     {.verb = &synth_verb},
     {.verb = &query_verb},

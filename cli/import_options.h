@@ -1,0 +1,20 @@
+// What can be asked of `import`.
+#ifndef SELDINGER_CLI_IMPORT_OPTIONS_H
+#define SELDINGER_CLI_IMPORT_OPTIONS_H
+
+#include "base/option_table.h"
+#include "recon/surface/import_surface.h"
+
+enum { IMPORT_FILES = 1024 };
+
+typedef struct ImportCommand {
+    const char *surface, *output, *json, *centreline_out;
+    const char *centreline[IMPORT_FILES];
+    int centreline_count;
+    ImportOptions options;
+    double scale;
+    bool has_scale, quiet;
+} ImportCommand;
+extern const OptionTable import_options;
+
+#endif
