@@ -2,6 +2,7 @@
 
 #include "base/heap.h"
 
+#include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -70,5 +71,5 @@ void option_sentence(const Option *option, const void *defaults, char *text, siz
     char value[200];
     option_default(option, defaults, value, sizeof value);
     snprintf(text, capacity, "%s%s%s%s%s%s", option->help, option->unit ? " [" : "", option->unit ? option->unit : "", option->unit ? "]" : "",
-             *value ? "; default " : "", value);
+             !*value ? "" : isalpha((unsigned char)*value) && option->otherwise ? "; default: " : "; default ", value);
 }

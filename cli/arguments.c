@@ -2,7 +2,6 @@
 #include "cli/cli.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 bool cli_number(const char *option, const char *text, double least, double most, double *value)
 {
@@ -46,21 +45,15 @@ bool cli_whole_number(const char *option, const char *text, double least, double
     return true;
 }
 
-bool cli_size(const char *text, int *width, int *height)
-{
-    char rest;
-    if (sscanf(text, "%dx%d%c", width, height, &rest) == 2 && *width >= 320 && *height >= 240 && *width <= 8192 && *height <= 8192)
-        return true;
-    fprintf(stderr, "--size: '%s' is not valid; WIDTHxHEIGHT from 320x240 to 8192x8192\n", text);
-    return false;
-}
+const char *const cli_view_name[] = {"fluoroscopy", "3d", "angioscopy", "all", NULL};
 
-bool cli_view(const char *text, int *view)
+const char *cli_take_size(void *structure, const Option *option, const char *text)
 {
-    static const char *const name[] = {"fluoroscopy", "3d", "angioscopy", "all"};
-    for (*view = 0; *view < 4; ++*view)
-        if (!strcmp(text, name[*view]))
-            return true;
-    fprintf(stderr, "--view: '%s' is not valid; fluoroscopy, 3d, angioscopy or all\n", text);
-    return false;
+    int *size = (int *)(void *)((char *)structure + option->at), width, height;
+    char rest;
+    if (sscanf(text, "%dx%d%c", &width, &height, &rest) != 2 || width < 320 || height < 240 || width > 8192 || height > 8192)
+        return "WIDTHxHEIGHT from 320x240 to 8192x8192";
+    size[0] = width;
+    size[1] = height;
+    return NULL;
 }

@@ -13,15 +13,14 @@
 #include <stdio.h>
 
 typedef int VerbFunction(int argc, char **argv);   // argv[0] is "seldinger VERB"
-VerbFunction verb_check, verb_export, verb_bench, verb_replay,
-    verb_nav, verb_report;
+VerbFunction verb_check, verb_export, verb_bench, verb_report;
 
 // A verb: its options, and what it does with them. `call` returns an exit code; faults that it adds are printed afterwards, and make it EXIT_BAD_INPUT at least.
 typedef struct Verb {
     const OptionTable *options;
     int (*call)(void *options, Faults *faults);
 } Verb;
-extern const Verb run_verb, query_verb, fit_verb, segment_verb, synth_verb, info_verb, devices_verb, import_verb;
+extern const Verb run_verb, query_verb, fit_verb, segment_verb, synth_verb, info_verb, devices_verb, import_verb, replay_verb, nav_verb;
 int cli_call(const Verb *verb, int argc, char **argv);
 // Rows of the table that many verbs have.
 #define CLI_THREADS(structure, member) \
@@ -37,10 +36,13 @@ void cli_notes(FILE *out, const char *path, const char *text);   // each line of
 bool cli_number(const char *option, const char *text, double least, double most, double *value);
 bool cli_point(const char *option, const char *text, Vec3 *point);   // X,Y,Z [mm], finite and below 1e9
 bool cli_whole_number(const char *option, const char *text, double least, double most, double *value);
-// WIDTHxHEIGHT, 320x240 to 8192x8192; else a message and false.
-bool cli_size(const char *text, int *width, int *height);
-// A view by name, its index: fluoroscopy, 3d, angioscopy, all; else a message and false.
-bool cli_view(const char *text, int *view);
+// Views in the order of PanelView.
+extern const char *const cli_view_name[];
+#define CLI_VIEW(structure, member, text) \
+    {"view", "V", OPTION_CHOICE, OPTION_AT(structure, member), text ": fluoroscopy, 3d, angioscopy or all", .choices = cli_view_name}
+// WIDTHxHEIGHT, 320x240 to 8192x8192, into two int that follow each other.
+OptionTaker cli_take_size;
+#define CLI_SIZE(structure, width, text) {"size", "WxH", OPTION_TEXT, OPTION_AT(structure, width), text " [pixel]", .take = cli_take_size, .otherwise = "1280x720"}
 
 bool cli_write_json(const char *path, const cJSON *root, Faults *faults);
 bool cli_is_standard_output(const char *path);   // "-"; NULL is not

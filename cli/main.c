@@ -16,7 +16,7 @@ typedef struct Entry {
 static const Entry verbs[] = {
     {.verb = &run_verb},
 #ifdef SELDINGER_RENDER
-    {NULL, "nav", verb_nav, "SCENE", "the trainer: a window, keys and devices steer the tool, sessions are recorded and scored"},
+    {.verb = &nav_verb},
 #endif
     {NULL, "check", verb_check, "PATH...", "runs every scene that has a golden tool path and compares"},
     {.verb = &segment_verb},
@@ -26,7 +26,7 @@ static const Entry verbs[] = {
     {.verb = &query_verb},
     {NULL, "export", verb_export, "FILE -o OUT", "surface, centreline or recording for other programs"},
     {.verb = &info_verb},
-    {NULL, "replay", verb_replay, "REC.h5 [--verify]", "a recording shown, simulated again and compared, or made into a scene"},
+    {.verb = &replay_verb},
     {NULL, "report", verb_report, "SESSION.json|REC.h5", "a page about a trainee's session: points, errors, plots, path, earlier sessions; HTML or PDF"},
     {.verb = &devices_verb},
     {NULL, "bench", verb_bench, "TABLE", "step, fit, track, peer, collision, drawing, wall: timed, each row in the same run; torture: random runs"},

@@ -191,7 +191,7 @@ static void help_shows_units_and_defaults(void **state)
     has(text, "Usage: seldinger try SCENE [options]\n       seldinger try SCENE --quiet\n\nOne paragraph.\n  as it is\n");
     has(text, "  -o, --output F.h5  what is written\n");
     has(text, "edge of a voxel [mm]; default 0.2\n");
-    has(text, "of the noise; default the trace's\n");
+    has(text, "of the noise; default: the trace's\n");
     has(text, "machine\n  --threads N        threads; 0: all cores; default 3\n");
     has(text, "of contact; default mesh\n");
     has(text, "Exit codes: 0 done; 2 wrong usage\n");

@@ -14,7 +14,8 @@ static void try_word(const char *word)
 {
     double number = -1;
     Vec3 point;
-    int width, height, view, vendor, product;
+    int size[2] = {0}, vendor, product;
+    const Option whole = {.name = "size"};
     char name[32];
     if (cli_number("--x", word, 0, 1e6, &number) && !(number >= 0 && number <= 1e6))
         abort();
@@ -22,9 +23,7 @@ static void try_word(const char *word)
         abort();
     if (cli_point("--start", word, &point) && !(vec3_is_finite(point) && vec3_norm(point) < 2e9))
         abort();
-    if (cli_size(word, &width, &height) && (width < 320 || width > 8192 || height < 240 || height > 8192))
-        abort();
-    if (cli_view(word, &view) && (view < 0 || view > 3))
+    if (!cli_take_size(size, &whole, word) && (size[0] < 320 || size[0] > 8192 || size[1] < 240 || size[1] > 8192))
         abort();
     if (gamepad_ids_of_guid(word, &vendor, &product) && (vendor < 1 || vendor > 0xffff || product < 0 || product > 0xffff))
         abort();

@@ -1,0 +1,16 @@
+// What can be asked of `replay`.
+#ifndef SELDINGER_CLI_REPLAY_OPTIONS_H
+#define SELDINGER_CLI_REPLAY_OPTIONS_H
+
+#include "base/option_table.h"
+
+typedef struct ReplayOptions {
+    const char *recording, *scene_folder, *picture, *movie, *sessions;
+    double duration_s, at_s, from_s, to_s, fps, speed, lao_deg, cra_deg, close_up_mm;
+    int width, height, view;         // of cli_view_name
+    int threads;
+    bool verify, quiet, no_panels;
+} ReplayOptions;
+extern const OptionTable replay_options;
+
+#endif
