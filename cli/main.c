@@ -24,10 +24,10 @@ static const Entry verbs[] = {
     {.verb = &fit_verb},
     {.verb = &synth_verb},
     {.verb = &query_verb},
-    {NULL, "export", verb_export, "FILE -o OUT", "surface, centreline or recording for other programs"},
+    {.verb = &export_verb},
     {.verb = &info_verb},
     {.verb = &replay_verb},
-    {NULL, "report", verb_report, "SESSION.json|REC.h5", "a page about a trainee's session: points, errors, plots, path, earlier sessions; HTML or PDF"},
+    {.verb = &report_verb},
     {.verb = &devices_verb},
     {NULL, "bench", verb_bench, "TABLE", "step, fit, track, peer, collision, drawing, wall: timed, each row in the same run; torture: random runs"},
 };

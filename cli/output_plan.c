@@ -1,6 +1,6 @@
-#define _XOPEN_SOURCE 700   // realpath
 #include "cli/output_plan.h"
 
+#include "base/path_resolve.h"
 #include "recon/volume/volume_file.h"
 
 #include <dirent.h>
@@ -10,45 +10,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { MOST_LINKS = 40 };
-
-// The folder is resolved, the name in it stays: `path` is not there.
-static bool resolve_folder(const char *path, char whole[PATH_MAX])
-{
-    char folder[PATH_MAX], resolved[PATH_MAX];
-    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
-    int length = slash == path ? 1 : (int)(name - path) - (slash != NULL);
-    if ((size_t)length >= sizeof folder)
-        return false;
-    snprintf(folder, sizeof folder, "%.*s", slash ? length : 1, slash ? path : ".");
-    if (!realpath(folder, resolved))
-        return false;
-    return snprintf(whole, PATH_MAX, "%s%s%s", resolved, resolved[1] ? "/" : "", name) < PATH_MAX;
-}
-
-// A link that leads nowhere yet would be the file at its end.
-static bool resolve(const char *path, char whole[PATH_MAX])
-{
-    char at[PATH_MAX], target[PATH_MAX];
-    if (realpath(path, whole))
-        return true;
-    if (strlen(path) >= sizeof at)
-        return false;
-    strcpy(at, path);
-    for (int i = 0; i < MOST_LINKS; i++) {
-        ssize_t length = readlink(at, target, sizeof target - 1);
-        if (length <= 0)
-            return resolve_folder(at, whole);
-        target[length] = 0;
-        char *slash = strrchr(at, '/');
-        size_t folder = target[0] == '/' || !slash ? 0 : (size_t)(slash - at) + 1;
-        if (folder + (size_t)length >= sizeof at)
-            return false;
-        memcpy(at + folder, target, (size_t)length + 1);
-    }
-    return false;
-}
-
 static bool is_same_file(const PlannedOutput *output, const char *path)
 {
     struct stat a, b;
@@ -57,7 +18,7 @@ static bool is_same_file(const PlannedOutput *output, const char *path)
         return false;
     if (stat(output->whole, &a) == 0)
         return stat(path, &b) == 0 && a.st_dev == b.st_dev && a.st_ino == b.st_ino;
-    return resolve(path, whole) && !strcmp(whole, output->whole);
+    return path_resolve(path, whole) && !strcmp(whole, output->whole);
 }
 
 // NAME, a number after - or _, the ending.
@@ -66,7 +27,7 @@ static bool is_of_series(const PlannedOutput *output, const char *path)
     char whole[PATH_MAX];
     const char *slash = strrchr(output->whole, '/'), *dot = strrchr(output->whole, '.');
     size_t stem = dot && dot > slash ? (size_t)(dot - output->whole) : strlen(output->whole);
-    if (!output->ending || !output->whole[0] || !resolve(path, whole) || strncmp(whole, output->whole, stem) != 0)
+    if (!output->ending || !output->whole[0] || !path_resolve(path, whole) || strncmp(whole, output->whole, stem) != 0)
         return false;
     const char *rest = whole + stem;
     size_t number = strspn(rest, "-_0123456789");
@@ -87,7 +48,7 @@ static void add(OutputPlan *plan, const char *option, const char *path, bool is_
     output->path = path;
     output->ending = NULL;
     output->whole[0] = 0;
-    if (!special && !resolve(path, output->whole))
+    if (!special && !path_resolve(path, output->whole))
         output->whole[0] = 0;
 }
 
