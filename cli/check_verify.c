@@ -3,109 +3,13 @@
 // no further: the order is then at least what brought it there.
 #include "cli/check_verify.h"
 
-#include "base/text_file.h"
-#include "sim/drive.h"
+#include "sim/scene_list.h"
+#include "sim/simulator.h"
+#include "sim/verify_run.h"
 
+#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
-
-static const double rest_hold_s = 0.1;           // a pause shorter than this is a turning point
-enum { REST_HOLD_STEPS = 3 };
-
-typedef struct VerifyScene {
-    Scene *scene;
-    OpenVessel open;
-} VerifyScene;
-
-typedef struct VerifyRun {   // a scene with one number of elements
-    const VerifyScene *of;
-    int elements;
-    double result[VERIFY_MOST_CASES];
-    unsigned flags;
-    bool diverged, rested;
-    Faults faults;
-} VerifyRun;
-
-bool check_has_verify(const char *path)
-{
-    static Faults ignored;
-    size_t length;
-    faults_clear(&ignored);
-    char *text = text_file_read(path, &length, &ignored);
-    // one that cannot be read is not left out: whoever opens it says why
-    bool found = !text || !strncmp(text, "verify:", 7) || strstr(text, "\nverify:");
-    free(text);
-    return found;
-}
-
-// --- one run ---
-
-typedef struct Watch {
-    VerifyMeasure *measure;
-    const VerifyPlan *plan;
-    double driven_s, at_rest_s, hold_s, step_s, ramp_s;
-    bool rested;
-} Watch;
-
-static bool after_step(void *context, Simulator *simulator, const ToolCommands *commands)
-{
-    (void)commands;
-    Watch *watch = context;
-    double time_s = simulator_time_s(simulator);
-    verify_measure_step(watch->measure, false);
-    bool slow = simulator_fastest_mm_s(simulator) <= watch->plan->rest_speed_mm_s;
-    watch->at_rest_s = slow ? watch->at_rest_s + watch->step_s : 0;
-    watch->rested = watch->at_rest_s >= watch->hold_s && time_s >= watch->ramp_s;
-    return !(watch->rested && time_s >= watch->driven_s - watch->step_s / 2);
-}
-
-static void drive(VerifyRun *run, const Scene *scene, Simulator *simulator)
-{
-    const VerifyPlan *plan = &scene->verify;
-    Watch watch = {.measure = verify_measure_create(plan, simulator), .plan = plan, .step_s = scene->dt / 1000};
-    if (!watch.measure) {
-        faults_add(&run->faults, scene->path, 0, 0, "no memory");
-        return;
-    }
-    watch.hold_s = fmax(rest_hold_s, REST_HOLD_STEPS * watch.step_s) - watch.step_s / 2;
-    watch.driven_s = plan->duration_s >= 0 ? plan->duration_s : scene->script ? script_duration_s(scene->script) : 0;
-    for (int i = 0; i < scene->wire.load_count; i++)
-        watch.ramp_s = fmax(watch.ramp_s, scene->wire.load[i].ramp / 1000);
-    DriveOptions options = drive_default_options();
-    options.script = scene->script;
-    options.duration_s = watch.driven_s;
-    // rest is found by after_step, which is stricter than what `run` takes for it
-    bool settles = plan->rest_s > 0;
-    options.context = &watch;
-    options.after_step = after_step;
-    verify_measure_step(watch.measure, false);
-    if (settles)
-        options.duration_s += plan->rest_s;
-    else
-        watch.driven_s = HUGE_VAL;
-    run->diverged = simulator_drive(simulator, &options).end == DRIVE_DIVERGED;
-    run->rested = !settles || watch.rested;
-    run->flags = simulator_totals(simulator)->flags;
-    verify_measure_step(watch.measure, true);
-    for (int i = 0; i < plan->case_count; i++)
-        run->result[i] = verify_measure_result(watch.measure, i);
-    verify_measure_free(watch.measure);
-}
-
-static void run_job(void *context, long index)
-{
-    VerifyRun *run = &((VerifyRun *)context)[index];
-    const Scene *read = run->of->scene;
-    Scene scene = *read;     // shares all but the numbers of elements
-    scene.wire.elements = run->elements;
-    for (int k = 1; k < scene.tool_count; k++)
-        scene.tool[k].wire.elements = (int)fmax(1, floor((double)read->tool[k].wire.elements * run->elements / read->wire.elements + 0.5));
-    Simulator *simulator = simulator_create(&scene, run->of->open.vessel, &run->faults);
-    if (simulator)
-        drive(run, &scene, simulator);
-    simulator_destroy(simulator);
-}
 
 // --- the table ---
 
@@ -205,7 +109,7 @@ int check_verify(int count, char *const *path, int threads, bool quiet, Faults *
     VerifyScene *scene = calloc((size_t)count + 1, sizeof *scene);
     int scenes = 0, runs = 0, code = EXIT_DONE;
     for (int i = 0; scene && i < count; i++) {
-        if (!check_has_verify(path[i]))
+        if (!scene_has_verify(path[i]))
             continue;
         if (open_scene(path[i], threads, quiet, &scene[scenes], faults) && scene[scenes].scene->verify.case_count > 0)
             runs += runs_of(scene[scenes++].scene);
@@ -227,7 +131,7 @@ int check_verify(int count, char *const *path, int threads, bool quiet, Faults *
     ProgressBar bar;
     Progress progress = progress_bar(&bar, "verify", quiet);
     if (run && runs > 0) {
-        parallel_for(threads, runs, run_job, run, &progress);
+        parallel_for(threads, runs, verify_run_job, run, &progress);
         if (!quiet)
             print_heading();
         for (int i = 0, k = 0; i < scenes; k += runs_of(scene[i].scene), i++) {

@@ -4,8 +4,6 @@
 
 #include "cli/cli.h"
 
-// Does the file's text hold the key, at the start of a line?
-bool check_has_verify(const char *path);
 // Runs those of the scenes that have it, on `threads` threads (0: all cores), and prints the table; with `quiet` only rows that fail. An exit code.
 int check_verify(int count, char *const *path, int threads, bool quiet, Faults *faults);
 

@@ -13,14 +13,14 @@
 #include <stdio.h>
 
 typedef int VerbFunction(int argc, char **argv);   // argv[0] is "seldinger VERB"
-VerbFunction verb_check, verb_bench;
+VerbFunction verb_bench;
 
 // A verb: its options, and what it does with them. `call` returns an exit code; faults that it adds are printed afterwards, and make it EXIT_BAD_INPUT at least.
 typedef struct Verb {
     const OptionTable *options;
     int (*call)(void *options, Faults *faults);
 } Verb;
-extern const Verb run_verb, query_verb, fit_verb, segment_verb, synth_verb, info_verb, devices_verb, import_verb, replay_verb, nav_verb, export_verb, report_verb;
+extern const Verb run_verb, query_verb, fit_verb, segment_verb, synth_verb, info_verb, devices_verb, import_verb, replay_verb, nav_verb, export_verb, report_verb, check_verb;
 int cli_call(const Verb *verb, int argc, char **argv);
 // Rows of the table that many verbs have.
 #define CLI_THREADS(structure, member) \

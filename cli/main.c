@@ -18,7 +18,7 @@ static const Entry verbs[] = {
 #ifdef SELDINGER_RENDER
     {.verb = &nav_verb},
 #endif
-    {NULL, "check", verb_check, "PATH...", "runs every scene that has a golden tool path and compares"},
+    {.verb = &check_verb},
     {.verb = &segment_verb},
     {.verb = &import_verb},
     {.verb = &fit_verb},
