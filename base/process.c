@@ -53,7 +53,7 @@ static void install_stop(int number)
 
 static int exit_code = EXIT_DONE;
 
-// However the program ends (argp's --help ends it by itself). Some file systems tell only at the end that they are full; a standard output that was
+// However the program ends. Some file systems tell only at the end that they are full; a standard output that was
 // closed from the start has lost nothing that was not written.
 static void check_output(void)
 {

@@ -1,34 +1,14 @@
-// Numbers, points and words of the command line.
+// Values of the command line that many verbs take.
 #include "cli/cli.h"
-
-#include <stdlib.h>
 
 bool cli_number(const char *option, const char *text, double least, double most, double *value)
 {
-    char *end;
-    double number = strtod(text, &end);
-    if (end == text || *end || !isfinite(number) || number < least || number > most) {
+    double number;
+    if (!option_number(text, &number) || number < least || number > most) {
         fprintf(stderr, "%s: '%s' is not valid; a number from %g to %g\n", option, text, least, most);
         return false;
     }
     *value = number;
-    return true;
-}
-
-bool cli_point(const char *option, const char *text, Vec3 *point)
-{
-    double v[3];
-    char *end = (char *)(size_t)text;
-    for (int k = 0; k < 3; k++) {
-        const char *at = end;
-        v[k] = strtod(at, &end);
-        if (end == at || !isfinite(v[k]) || fabs(v[k]) > 1e9 || *end != (k < 2 ? ',' : '\0')) {
-            fprintf(stderr, "%s: '%s' is not valid; three numbers X,Y,Z in mm\n", option, text);
-            return false;
-        }
-        end += k < 2;
-    }
-    *point = vec3(v[0], v[1], v[2]);
     return true;
 }
 

@@ -27,6 +27,8 @@ int cli_bad_input(const Faults *faults)
 int cli_call(const Verb *verb, int argc, char **argv)
 {
     static Faults faults;
+    if (verb->forward)
+        return verb->forward(argc, argv);
     void *options = HEAP_ZEROED(1, verb->options->size);
     int code = options_parse(verb->options, argc, argv, options);
     if (code < 0)

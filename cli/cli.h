@@ -12,15 +12,16 @@
 #include <cJSON.h>
 #include <stdio.h>
 
-typedef int VerbFunction(int argc, char **argv);   // argv[0] is "seldinger VERB"
-VerbFunction verb_bench;
+typedef int VerbFunction(int argc, char **argv);   // argv[0] is the name that stands in messages
 
 // A verb: its options, and what it does with them. `call` returns an exit code; faults that it adds are printed afterwards, and make it EXIT_BAD_INPUT at least.
 typedef struct Verb {
     const OptionTable *options;
     int (*call)(void *options, Faults *faults);
+    VerbFunction *forward;   // instead: another program reads the options
 } Verb;
-extern const Verb run_verb, query_verb, fit_verb, segment_verb, synth_verb, info_verb, devices_verb, import_verb, replay_verb, nav_verb, export_verb, report_verb, check_verb;
+extern const Verb run_verb, nav_verb, check_verb, segment_verb, import_verb, fit_verb, synth_verb, query_verb, export_verb, info_verb, replay_verb, report_verb,
+    devices_verb, bench_verb;
 int cli_call(const Verb *verb, int argc, char **argv);
 // Rows of the table that many verbs have.
 #define CLI_THREADS(structure, member) \
@@ -34,7 +35,6 @@ int cli_bad_input(const Faults *faults);
 void cli_notes(FILE *out, const char *path, const char *text);   // each line of `text` after "PATH: "
 // Number options: the whole text must be a finite number within [least, most]; else a message that names the option and the range, and false.
 bool cli_number(const char *option, const char *text, double least, double most, double *value);
-bool cli_point(const char *option, const char *text, Vec3 *point);   // X,Y,Z [mm], finite and below 1e9
 bool cli_whole_number(const char *option, const char *text, double least, double most, double *value);
 // Views in the order of PanelView.
 extern const char *const cli_view_name[];

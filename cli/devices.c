@@ -37,7 +37,7 @@ static const char *check(void *structure)
 static const OptionTable table = {
     .program = "seldinger devices",
     .does = "what is plugged in, what of it drives the tool, and why the rest does not",
-    .usage = "[--map F.yaml]... [--json F] [--quiet] [--watch [--duration-s S]]",
+    .usage = "[options]",
     .intro = "Lists HID devices, USB serial encoders and joysticks: which can drive the tool, by which map, with force or not, and why not.",
     .exits = "0 done, also where no device is there; 2 wrong usage or a map with faults",
     CLI_OPTIONS(options, DevicesCommand),

@@ -32,7 +32,7 @@ static const char *check(void *structure)
 const OptionTable import_options = {
     .program = "seldinger import",
     .does = "the same tree from a surface, with centrelines or alone",
-    .usage = "--surface F [--centerline F...] -o TREE.h5 [options]",
+    .usage = "--surface F -o TREE.h5 [options]",
     .intro = "A vessel's surface and its centrelines become the tree that `seldinger fit` takes. Without centrelines they are computed; a result that leaves out more "
              "than 10 % of the surface is refused. Narrow branches that no centreline runs into are left out.\n"
              "Surface: STL, PLY, OBJ or VTK PolyData (.vtp), open or closed; flat lids over the ends of a closed one are taken off.\n"

@@ -41,7 +41,7 @@ static void set_defaults(void *structure) { *(InfoCommand *)structure = (InfoCom
 static const OptionTable table = {
     .program = "seldinger info",
     .does = "what a file is and its figures",
-    .usage = "FILE [--json] [--report F.html] [--picture F.png]",
+    .usage = "FILE [options]",
     .intro = "Says what FILE is (volume or folder of a DICOM series, surface, tree, model, recording, scene or script) and its figures. Lengths mm.\n"
              "Of a model also where a tool gets to from the inlet, and what is shut and why.",
     .exits = CLI_BAD_INPUT_EXITS,

@@ -6,43 +6,25 @@
 
 #include <string.h>
 
-typedef struct Entry {
-    const Verb *verb;        // NULL: `call` reads its own options
-    const char *name;
-    VerbFunction *call;
-    const char *arguments, *does;
-} Entry;
-
-static const Entry verbs[] = {
-    {.verb = &run_verb},
+static const Verb *const verbs[] = {
+    &run_verb,
 #ifdef SELDINGER_RENDER
-    {.verb = &nav_verb},
+    &nav_verb,
 #endif
-    {.verb = &check_verb},
-    {.verb = &segment_verb},
-    {.verb = &import_verb},
-    {.verb = &fit_verb},
-    {.verb = &synth_verb},
-    {.verb = &query_verb},
-    {.verb = &export_verb},
-    {.verb = &info_verb},
-    {.verb = &replay_verb},
-    {.verb = &report_verb},
-    {.verb = &devices_verb},
-    {NULL, "bench", verb_bench, "TABLE", "step, fit, track, peer, collision, drawing, wall: timed, each row in the same run; torture: random runs"},
+    &check_verb, &segment_verb, &import_verb, &fit_verb,     &synth_verb,   &query_verb,
+    &export_verb, &info_verb,   &replay_verb, &report_verb, &devices_verb, &bench_verb,
 };
 enum { VERB_COUNT = sizeof verbs / sizeof verbs[0] };
 
-static const char *name_of(const Entry *entry) { return entry->verb ? strrchr(entry->verb->options->program, ' ') + 1 : entry->name; }
+static const char *name_of(const Verb *verb) { return strrchr(verb->options->program, ' ') + 1; }
 
 static void print_help(FILE *out)
 {
     fprintf(out, "Usage: seldinger VERB ARGUMENTS\n\nSeldinger %s, a catheter navigation simulator for training and research, not a medical device.\n\n",
             SELDINGER_VERSION);
     for (int i = 0; i < VERB_COUNT; i++) {
-        const OptionTable *options = verbs[i].verb ? verbs[i].verb->options : NULL;
-        const char *form = options ? options->usage : verbs[i].arguments;
-        fprintf(out, "  %-8s %-34.*s %s\n", name_of(&verbs[i]), (int)strcspn(form, "\n"), form, options ? options->does : verbs[i].does);
+        const char *form = verbs[i]->options->usage;
+        fprintf(out, "  %-8s %-34.*s %s\n", name_of(verbs[i]), (int)strcspn(form, "\n"), form, verbs[i]->options->does);
     }
     fprintf(out, "\n`seldinger VERB --help` explains every option with its unit and default; `seldinger --manual VERB` prints the same as a manual page, and\n"
                  "`seldinger --completion` a script by which bash completes verbs and options.\n"
@@ -50,39 +32,37 @@ static void print_help(FILE *out)
                  "Stopped by the user (SIGINT, SIGTERM, SIGHUP) a verb leaves no unfinished file and ends by that signal (130, 143 or 129); `run` ends in order.\n");
 }
 
-static int refuse_name(const char *what, const char *name)
+static int refuse_name(const char *name)
 {
-    fprintf(stderr, "seldinger: no %s '%s'; valid:", what, name);
+    fprintf(stderr, "seldinger: no verb '%s'; valid:", name);
     for (int i = 0; i < VERB_COUNT; i++)
-        fprintf(stderr, " %s", name_of(&verbs[i]));
+        fprintf(stderr, " %s", name_of(verbs[i]));
     fprintf(stderr, "\n");
     return EXIT_BAD_INPUT;
 }
 
-static const Entry *find_verb(const char *name)
+static const Verb *find_verb(const char *name)
 {
     for (int i = 0; i < VERB_COUNT; i++)
-        if (!strcmp(name, name_of(&verbs[i])))
-            return &verbs[i];
+        if (!strcmp(name, name_of(verbs[i])))
+            return verbs[i];
     return NULL;
 }
 
 static int print_manual(const char *name)
 {
-    const Entry *entry = find_verb(name);
-    if (!entry || !entry->verb)
-        return refuse_name("manual page of a verb", name);
-    options_manual(entry->verb->options, SELDINGER_VERSION, stdout);
+    const Verb *verb = find_verb(name);
+    if (!verb)
+        return refuse_name(name);
+    options_manual(verb->options, SELDINGER_VERSION, stdout);
     return EXIT_DONE;
 }
 
 static int print_completion(void)
 {
     const OptionTable *table[VERB_COUNT + 1] = {0};
-    int count = 0;
     for (int i = 0; i < VERB_COUNT; i++)
-        if (verbs[i].verb)
-            table[count++] = verbs[i].verb->options;
+        table[i] = verbs[i]->options;
     options_completion("seldinger", table, stdout);
     return EXIT_DONE;
 }
@@ -106,15 +86,8 @@ static int call_verb(int argc, char **argv)
         return print_manual(argc > 2 ? argv[2] : "");
     if (!strcmp(name, "--completion"))
         return print_completion();
-    const Entry *entry = find_verb(name);
-    if (!entry)
-        return refuse_name("verb", name);
-    if (entry->verb)
-        return cli_call(entry->verb, argc - 1, argv + 1);
-    char program[64];
-    snprintf(program, sizeof program, "seldinger %s", name);
-    argv[1] = program;
-    return entry->call(argc - 1, argv + 1);
+    const Verb *verb = find_verb(name);
+    return verb ? cli_call(verb, argc - 1, argv + 1) : refuse_name(name);
 }
 
 int main(int argc, char **argv) { return process_run(argc, argv, call_verb); }

@@ -47,7 +47,7 @@ static const char *check(void *structure)
 static const OptionTable table = {
     .program = "seldinger report",
     .does = "a page about a trainee's session: points, errors, plots, path, earlier sessions; HTML or PDF",
-    .usage = "SESSION.json|RECORDING.h5 [options]",
+    .usage = "SESSION.json|REC.h5 [options]",
     .intro = "A page about a trainee's session: points and how they came about, errors, plots over time, the tip's path over the vessel, and earlier sessions of the same "
              "trainee at the same exercise. The recording is looked for where the session says, beside it. Of a recording without a session file, as of a program "
              "that was killed, the session file is made first, by simulating it again.",

@@ -31,9 +31,10 @@ static const char *take_voxel(void *structure, const Option *option, const char 
 {
     double *edge = ((SynthCommand *)structure)->files.volume.voxel_mm;
     char part[3][64];
+    (void)option;
     int count = sscanf(text, "%63[^,],%63[^,],%63s", part[0], part[1], part[2]);
     for (int k = 0; k < 3; k++)
-        if (!option_number(count == 3 ? part[k] : text, &edge[k]) || edge[k] < option->least || edge[k] > option->most)
+        if (!option_number(count == 3 ? part[k] : text, &edge[k]) || edge[k] < 0.01 || edge[k] > 10)
             return "a number from 0.01 to 10, or three X,Y,Z";
     return NULL;
 }
@@ -67,8 +68,7 @@ static const Option options[] = {
     SHAPE("crossing-deg", "0: side by side", "kissing: angle of the two vessels"),
     SHAPE("scale", "1", "of the whole shape"),
     {"cell-mm", "X", OPTION_NUMBER, AT(files.cell_mm), "grid of the triangles", .least = 0.005, .most = 10, .unit = "mm", .group = "surface"},
-    {"voxel-mm", "X|X,Y,Z", OPTION_NUMBER, AT(files.volume.voxel_mm), "edges along the grid's axes", .least = 0.01, .most = 10, .unit = "mm", .otherwise = "0.2",
-     .take = take_voxel, .group = "volume"},
+    {"voxel-mm", "X|X,Y,Z", OPTION_NUMBER, AT(files.volume.voxel_mm), "edges along the grid's axes", .unit = "mm", .otherwise = "0.2", .take = take_voxel, .group = "volume"},
     {"psf-mm", "X", OPTION_NUMBER, AT(files.volume.psf_mm), "standard deviation of the blur", .most = 10, .unit = "mm"},
     {"noise", "X", OPTION_NUMBER, AT(files.volume.noise), "standard deviation of the noise in contrasts (vessel 1, background 0)", .most = 10},
     {"rotate-deg", "X", OPTION_NUMBER, AT(files.volume.rotate_deg), "the grid is turned by this much about (1, 2, 3)", .least = -180, .most = 180},
@@ -79,12 +79,10 @@ static const Option options[] = {
     {"contrast-grey", "X", OPTION_NUMBER, AT(files.volume.contrast_grey),
      "grey values: whole numbers from 0 to 255, vessels so many levels brighter than the background", .least = 1, .most = 255, .otherwise = "not"},
     {"background-grey", "X", OPTION_NUMBER, AT(background_grey), "grey value of the background; needs --contrast-grey", .most = 255, .otherwise = "60"},
-    {"noise-grey", "X", OPTION_NUMBER, AT(noise_grey), "standard deviation of the noise in grey values instead of --noise; needs --contrast-grey", .most = 255,
-     .otherwise = ""},
+    {"noise-grey", "X", OPTION_NUMBER, AT(noise_grey), "standard deviation of the noise in grey values instead of --noise; needs --contrast-grey", .most = 255, .otherwise = ""},
     {"band-grey", "X", OPTION_NUMBER, AT(band_grey), "a slab across the trunk is brighter by so many grey values; needs --contrast-grey", .least = -255, .most = 255,
      .otherwise = "0: none"},
-    {"band-mm", "X", OPTION_NUMBER, AT(files.volume.band_mm), "thickness of this slab, whose place and direction come from the seed", .least = 0.01, .most = 1000,
-     .unit = "mm"},
+    {"band-mm", "X", OPTION_NUMBER, AT(files.volume.band_mm), "thickness of this slab, placed by the seed", .least = 0.01, .most = 1000, .unit = "mm"},
     CLI_THREADS(SynthCommand, files.volume.threads),
 };
 

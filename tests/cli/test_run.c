@@ -340,15 +340,26 @@ static void check_passes_on_identity_and_fails_on_one_per_cent(void **state)
 static void help_names_every_option(void **state)
 {
     (void)state;
-    const char *verbs[] = {"run", "check", "export", "info"};
-    for (int i = 0; i < 4; i++) {
-        char arguments[40];
+    const char *verbs[] = {"run", "check", "segment", "import", "fit", "synth", "query", "export", "info", "replay", "report", "devices"};
+    for (size_t i = 0; i < sizeof verbs / sizeof *verbs; i++) {
+        char arguments[80], head[80];
         snprintf(arguments, sizeof arguments, "%s --help", verbs[i]);
         assert_int_equal(run(arguments), 0);
-        assert_non_null(strstr(output, "Usage: seldinger"));
+        snprintf(head, sizeof head, "Usage: seldinger %s ", verbs[i]);
+        assert_non_null(strstr(output, head));
         snprintf(arguments, sizeof arguments, "%s --banana x", verbs[i]);
         assert_int_equal(run(arguments), 2);
+        assert_non_null(strstr(output, "unknown option '--banana'"));
+        snprintf(arguments, sizeof arguments, "%s --quite", verbs[i]);
+        assert_int_equal(run(arguments), 2);
+        assert_non_null(strstr(output, "did you mean '--quiet'?"));
+        snprintf(arguments, sizeof arguments, "--manual %s", verbs[i]);
+        assert_int_equal(run(arguments), 0);
+        assert_non_null(strstr(output, ".SH EXIT STATUS"));
+        assert_non_null(strstr(output, "\\fB\\-\\-quiet\\fR"));
     }
+    assert_int_equal(run("--manual banana"), 2);
+    assert_int_equal(run("--completion | bash -n"), 0);
 }
 
 int main(void)

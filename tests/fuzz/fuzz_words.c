@@ -1,5 +1,5 @@
 // Words of the command line and of devices: each line of the input as each of them. What is taken is within its range.
-// Covers: cli/arguments.c input/gamepad.c
+// Covers: base/option_table.c cli/arguments.c input/gamepad.c
 #include "cli/cli.h"
 #include "input/gamepad.h"
 #include "input/hid_report.h"
@@ -12,18 +12,17 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static void try_word(const char *word)
 {
-    double number = -1;
-    Vec3 point;
+    double number = -1, point[3];
     int size[2] = {0}, vendor, product;
-    const Option whole = {.name = "size"};
+    const Option option = {.name = "size"};
     char name[32];
     if (cli_number("--x", word, 0, 1e6, &number) && !(number >= 0 && number <= 1e6))
         abort();
     if (cli_whole_number("--n", word, -256, 256, &number) && (!(number >= -256 && number <= 256) || (double)(int)number != number))
         abort();
-    if (cli_point("--start", word, &point) && !(vec3_is_finite(point) && vec3_norm(point) < 2e9))
+    if (option_point(word, point) && !(vec3_is_finite(vec3(point[0], point[1], point[2])) && fabs(point[0]) <= 1e9))
         abort();
-    if (!cli_take_size(size, &whole, word) && (size[0] < 320 || size[0] > 8192 || size[1] < 240 || size[1] > 8192))
+    if (!cli_take_size(size, &option, word) && (size[0] < 320 || size[0] > 8192 || size[1] < 240 || size[1] > 8192))
         abort();
     if (gamepad_ids_of_guid(word, &vendor, &product) && (vendor < 1 || vendor > 0xffff || product < 0 || product > 0xffff))
         abort();
