@@ -13,6 +13,9 @@ set(ROOM_bench base geom solver recon input sim render cli)
 # what the headers of the first include of the second stays behind them: they are found from each other's folder, not from the room
 set(ROOM_BEHIND_render sim solver)
 
+# what libseldinger.so is made of
+set(LIBRARY_ROOMS base geom solver recon input sim)
+
 # The headers of `room` as links in `folder`.
 function(link_headers room folder)
   file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${CMAKE_SOURCE_DIR}/${room} ${CMAKE_SOURCE_DIR}/${room}/*.h)
@@ -49,6 +52,9 @@ function(seldinger_room target room)
   set(folder ${CMAKE_BINARY_DIR}/rooms/${room})
   target_include_directories(${target} PRIVATE ${folder})
   target_compile_options(${target} PRIVATE "-ffile-prefix-map=${folder}/=")
+  if(room IN_LIST LIBRARY_ROOMS)
+    set_target_properties(${target} PROPERTIES SELDINGER_SHARED ON)
+  endif()
   # for tests/tools/arrows: all the folders that the target looks for headers in
   set(folders "$<TARGET_PROPERTY:${target},INCLUDE_DIRECTORIES>")
   file(GENERATE OUTPUT ${CMAKE_BINARY_DIR}/rooms/${target}.flags CONTENT "-I$<JOIN:${folders},\n-I>\n")
