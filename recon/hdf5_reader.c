@@ -4,6 +4,7 @@
 
 #include "base/heap.h"
 #include "base/process.h"
+#include "recon/hdf5_silence.h"
 #include "recon/hdf5_source.h"
 
 #include <errno.h>
@@ -26,8 +27,8 @@ struct Hdf5Reader {
     int faults_before;
     hsize_t left;            // [bytes] of the file that no dataset has taken yet
     hsize_t left_unpacked;   // [bytes] of memory that packed datasets may still take
-    H5E_auto2_t handler;     // of the library's own messages, as it was
-    void *handler_data;
+    Hdf5Silence silence;
+    unsigned plugins;        // which kinds the library may load, as it was
 };
 
 enum { MOST_PATH = 256 };
@@ -38,8 +39,7 @@ enum { MOST_PATH = 256 };
 static void be_silent(Hdf5Reader *reader)
 {
     H5dont_atexit();      // where it is not in use yet
-    H5Eget_auto2(H5E_DEFAULT, &reader->handler, &reader->handler_data);
-    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+    reader->silence = hdf5_silence_begin();
 }
 
 // --- rehearsal ---
@@ -109,6 +109,8 @@ static Hdf5Reader *open_source(const Hdf5Source *source, bool has_rehearsal, con
                            .left_unpacked = source->length < HDF5_READER_MOST_BYTES / HDF5_READER_MOST_RATIO ? source->length * HDF5_READER_MOST_RATIO
                                                                                                              : HDF5_READER_MOST_BYTES};
     be_silent(reader);
+    if (H5PLget_loading_state(&reader->plugins) < 0)
+        reader->plugins = 0;
     H5PLset_loading_state(0);
     bool is_sound = !has_rehearsal || is_survived(&reader->source);
     reader->file = is_sound ? hdf5_source_open(&reader->source) : -1;
@@ -154,7 +156,8 @@ void hdf5_reader_close(Hdf5Reader *reader)
         reader->faults->count = reader->faults_before;
         faults_add(reader->faults, reader->name, 0, 0, "cannot be read: %s", strerror(reader->source.reason));
     }
-    H5Eset_auto2(H5E_DEFAULT, reader->handler, reader->handler_data);
+    H5PLset_loading_state(reader->plugins);
+    hdf5_silence_end(reader->silence);
     free(reader);
 }
 

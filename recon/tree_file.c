@@ -6,6 +6,7 @@
 #include "base/heap.h"
 #include "base/whole_file.h"
 #include "recon/hdf5_reader.h"
+#include "recon/hdf5_silence.h"
 
 #include <hdf5.h>
 #include <inttypes.h>
@@ -169,21 +170,6 @@ VesselTree *tree_file_load(const char *path, TreeFileInfo *info, Faults *faults)
 
 // --- writing ---
 
-// The library prints nothing of its own while we work; the user's handler is put back.
-typedef struct Silence {
-    H5E_auto2_t handler;
-    void *data;
-} Silence;
-
-static Silence silence_begin(void)
-{
-    Silence kept = {0};
-    H5Eget_auto2(H5E_DEFAULT, &kept.handler, &kept.data);
-    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
-    return kept;
-}
-static void silence_end(Silence kept) { H5Eset_auto2(H5E_DEFAULT, kept.handler, kept.data); }
-
 static bool write_column(hid_t file, const char *path, hid_t type, int rank, int64_t rows, const void *data)
 {
     hsize_t size[2] = {(hsize_t)rows, 3};
@@ -317,7 +303,7 @@ bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char
         faults_add(faults, path, 0, 0, "cannot be written: no memory for the HDF5 library");
         return false;
     }
-    Silence kept = silence_begin();
+    Hdf5Silence kept = hdf5_silence_begin();
     Image image = {0};
     H5FD_file_image_callbacks_t callbacks = {image_malloc, image_copy, image_realloc, image_free, image_keep, image_forget, &image};
     hid_t access = H5Pcreate(H5P_FILE_ACCESS), create = H5Pcreate(H5P_FILE_CREATE);
@@ -331,7 +317,7 @@ bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char
         built = H5Fclose(file) >= 0 && built;
     H5Pclose(create);
     H5Pclose(access);
-    silence_end(kept);
+    hdf5_silence_end(kept);
     size_t length = built ? image_length(&image) : 0;
     if (length == 0)
         faults_add(faults, path, 0, 0, "cannot be written: the HDF5 library failed (memory?)");

@@ -3,6 +3,7 @@
 #include "base/heap.h"
 #include "base/part_file.h"
 #include "base/sha256.h"
+#include "recon/hdf5_silence.h"
 #include "sim/ordered_file.h"
 
 #include <errno.h>
@@ -950,7 +951,7 @@ static bool make_buffers(Recording *recording, hsize_t step_rows, hsize_t frame_
     return good && recording->shuffled && recording->packed;
 }
 
-Recording *recording_create(const char *path, Simulator *simulator, const RecordingOptions *options, Faults *faults)
+static Recording *create(const char *path, Simulator *simulator, const RecordingOptions *options, Faults *faults)
 {
     const Scene *scene = simulator_scene(simulator);
     Recording *recording = calloc(1, sizeof *recording);
@@ -960,7 +961,6 @@ Recording *recording_create(const char *path, Simulator *simulator, const Record
             recording_free(recording);
         return NULL;
     }
-    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
     recording->options = *options;
     recording->file = -1;
     recording->last_frame_step = -1;
@@ -999,6 +999,15 @@ Recording *recording_create(const char *path, Simulator *simulator, const Record
         recording_free(recording);
         return NULL;
     }
+    return recording;
+}
+
+// HDF5 only builds the file; the writer's thread does without.
+Recording *recording_create(const char *path, Simulator *simulator, const RecordingOptions *options, Faults *faults)
+{
+    Hdf5Silence silence = hdf5_silence_begin();
+    Recording *recording = create(path, simulator, options, faults);
+    hdf5_silence_end(silence);
     return recording;
 }
 

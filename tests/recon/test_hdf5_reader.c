@@ -233,9 +233,17 @@ static void other_packings_are_refused(void **state)
         put_with(file, "/x", H5T_IEEE_F64LE, ROWS, creation, numbers);
         refused(file, plain, "is packed by other filters than deflate");
     }
+    // while it is open no plug-in may be loaded; afterwards the program's own settings hold again
+    const unsigned set = H5PL_FILTER_PLUGIN;
     unsigned may_load = 1;
+    H5PLset_loading_state(set);
+    Hdf5Reader *reader = open_file(new_file());
+    assert_non_null(reader);
     H5PLget_loading_state(&may_load);
     assert_int_equal(may_load, 0);
+    hdf5_reader_close(reader);
+    H5PLget_loading_state(&may_load);
+    assert_int_equal(may_load, set);
 }
 
 // A dataset whose first chunk holds these bytes, the others whole ones.
