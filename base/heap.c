@@ -2,15 +2,44 @@
 
 #include "base/part_file.h"
 
+#include <setjmp.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+typedef struct Trial {
+    struct Trial *around;
+    jmp_buf back;
+    size_t lacking;
+} Trial;
+
+static _Thread_local Trial *trial;
+
+// No value of this function is needed after the jump but those that lie in memory.
+bool heap_try(void (*call)(void *context), void *context, size_t *lacking)
+{
+    Trial own = {.around = trial};
+    trial = &own;
+    bool is_whole = setjmp(own.back) == 0;
+    if (is_whole)
+        call(context);
+    else
+        *lacking = own.lacking;
+    trial = own.around;
+    return is_whole;
+}
+
+bool heap_is_tried(void) { return trial != NULL; }
+
 // Other threads may be at work: nothing that they use is taken down.
 void heap_is_empty(size_t bytes, const char *file)
 {
+    if (trial) {
+        trial->lacking = bytes > 0 ? bytes : 1;      // 0 stands for nothing lacking
+        longjmp(trial->back, 1);
+    }
     const char *folder = strrchr(file, '/'), *from = folder;
     while (from && from > file && from[-1] != '/')      // with the folder that it is in: "fit/field_fit.c"
         from--;

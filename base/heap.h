@@ -23,7 +23,12 @@ char *heap_text(const char *text, const char *file);
 bool heap_has_room(size_t bytes);
 // What the HDF5 library (1.10) takes at once for a file's cache (H5AC_create), four times.
 #define HEAP_ROOM_OF_HDF5 ((size_t)8 << 20)
-// What cannot be had: says so and ends the program.
+// For a library, which must not end the program: calls `call`. False where memory that could not be had broke it off; `*lacking` is then what was asked for [bytes], 1 where
+// that is not known.
+// Its threads of base/parallel.h are broken off too. What the call had taken until then, memory and open files, is not given back.
+bool heap_try(void (*call)(void *context), void *context, size_t *lacking);
+bool heap_is_tried(void);            // by this thread, now
+// What cannot be had: breaks off the innermost heap_try() of this thread, else says so and ends the program.
 __attribute__((noreturn)) void heap_is_empty(size_t bytes, const char *file);
 
 #ifdef __cplusplus
