@@ -17,7 +17,10 @@ void process_stop(int signal_number);
 const volatile sig_atomic_t *process_stop_in_order(void);
 // From a child process that reads what may break it: it says nothing on standard error, writes no file and no core, and ends by a signal after so much time.
 void process_be_expendable(unsigned processor_s, unsigned wall_s);
-// The path of the program `name` in this program's own folder, there or not. False where this program's path cannot be had or is too long.
+// The path of the program `name` in this program's own folder, there or not; in a library, where it is not there, that in `bin` beside the library's folder or
+// the one above it. False where this program's path cannot be had or is too long.
 bool process_beside(const char *name, char *path, size_t capacity);
+// The file that this code was loaded from: the program, or the library where it is one. False where that cannot be had.
+bool process_code_file(char *path, size_t capacity);
 
 #endif

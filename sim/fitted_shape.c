@@ -1,6 +1,7 @@
 // What is wrong with the cache is never an error: the shape is then fitted.
 #include "sim/fitted_shape.h"
 
+#include "base/process.h"
 #include "base/sha256.h"
 #include "recon/fit/field_fit.h"
 #include "recon/phantom/phantom.h"
@@ -40,14 +41,15 @@ static bool cache_folder(char folder[CACHE_PATH])
     return (mkdir(folder, 0777) == 0 || errno == EEXIST) && access(folder, R_OK | W_OK | X_OK) == 0;
 }
 
-// The key holds all that the fit depends on: the shape with its options, the fit's options, and the program itself, so that a newer program
-// never takes an older one's fit.
+// The key holds all that the fit depends on: the shape with its options, the fit's options, and the program or library itself, so that a
+// newer one never takes an older one's fit.
 static void cache_key(const Scene *scene, const LimFitOptions *options, char hex[65])
 {
     bool local = contact_is_local(scene->contact);
     Sha256 sha;
-    char program[65] = SELDINGER_VERSION;
-    sha256_of_file("/proc/self/exe", program);
+    char program[65] = SELDINGER_VERSION, path[CACHE_PATH];
+    if (process_code_file(path, sizeof path))
+        sha256_of_file(path, program);
     double figures[] = {options->alpha,
                         options->beta,
                         options->s,
