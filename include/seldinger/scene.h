@@ -26,6 +26,13 @@ typedef struct SelHand {
     int contrast_tool;           // … through this tool, 1 the outermost; 0: none
 } SelHand;
 
+// All zero.
+static inline SelHand sel_hand_still(void)
+{
+    static SelHand still;
+    return still;
+}
+
 // --- a scene in code ---
 
 typedef enum SelVesselSource {
