@@ -1,5 +1,5 @@
 // The host's allocator: all of the library's memory comes from it and goes back to it, and where it refuses some the call fails and the program goes on.
-// usage: test_library_memory [REFUSALS]: how many refusals of each story are tried, spread over all of its allocations; default 6
+// usage: test_library_memory [REFUSALS]: how many refusals of each story are tried, spread over all of its allocations; default 4
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -183,7 +183,7 @@ static SelStatus reconstruct(SelContext *context)
 typedef SelStatus (*Story)(SelContext *context);
 static const Story story[] = {simulate, replay, reconstruct};
 enum { STORIES = sizeof story / sizeof *story };
-static int refusals = 6;
+static int refusals = 4;
 
 // --- tests ---
 
@@ -214,6 +214,41 @@ static void all_memory_comes_from_the_host_and_goes_back(void **state)
             assert_int_equal(rename(in_folder("run.h5"), in_folder("kept.h5")), 0);
     }
     assert_false(is_foreign);
+}
+
+// A step, with its score and its recording, and what is read of it.
+static void a_step_allocates_nothing(void **state)
+{
+    (void)state;
+    SelContext *context = NULL;
+    SelScene *scene = NULL;
+    SelSimulator *simulator = NULL;
+    SelReport report;
+    SelScore score;
+    SelNode node[31];
+    SelContact contact[31];
+    int count;
+    assert_int_equal(sel_context_create(NULL, &context), SEL_OK);
+    assert_int_equal(sel_scene_parse(context, tube, sizeof tube - 1, "tube.yaml", NULL, &scene), SEL_OK);
+    assert_int_equal(sel_simulator_create(context, scene, NULL, &simulator), SEL_OK);
+    assert_int_equal(sel_simulator_record(simulator, in_folder("step.h5"), NULL), SEL_OK);
+    long before = asked;
+    for (int i = 0; i < 500; i++) {
+        SelHand hand;
+        sel_simulator_script_hand(simulator, &hand);
+        assert_int_equal(sel_simulator_step(simulator, &hand), SEL_OK);
+        assert_int_equal(sel_simulator_report(simulator, &report, sizeof report), SEL_OK);
+        assert_int_equal(sel_simulator_score(simulator, &score, sizeof score), SEL_OK);
+        assert_int_equal(sel_simulator_nodes(simulator, 0, node, 31, &count), SEL_OK);
+        assert_int_equal(sel_simulator_contacts(simulator, contact, 31, &count), SEL_OK);
+    }
+    assert_int_equal(asked, before);
+    assert_true(report.contacts > 0);
+    assert_int_equal(sel_simulator_end_recording(simulator), SEL_OK);
+    sel_simulator_destroy(simulator);
+    sel_scene_destroy(scene);
+    sel_context_destroy(context);
+    assert_int_equal(live, 0);
 }
 
 static void it_cannot_be_changed_later(void **state)
@@ -265,6 +300,7 @@ int main(int argc, char **argv)
         refusals = atoi(argv[1]);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(all_memory_comes_from_the_host_and_goes_back),
+        cmocka_unit_test(a_step_allocates_nothing),
         cmocka_unit_test(it_cannot_be_changed_later),
         cmocka_unit_test(a_refusal_is_an_error),
     };
