@@ -585,6 +585,50 @@ static void a_volume_becomes_a_model(void **state)
     sel_volume_destroy(volume);
 }
 
+static void call_program(const char *arguments)
+{
+    char command[2000];
+    snprintf(command, sizeof command, "cd '%s' && '%s' %s", folder, SELDINGER_PROGRAM, arguments);
+    if (system(command) != 0)
+        fail_msg("failed: %s", arguments);
+}
+
+static void expect_same_file(const char *one, const char *other)
+{
+    char command[1000];
+    snprintf(command, sizeof command, "cmp '%s' '%s'", in_folder(one), in_folder(other));
+    assert_int_equal(system(command), 0);
+}
+
+// The verbs and the library write the same trees and models, byte for byte, with what stands in them about their making.
+static void files_are_those_of_the_program(void **state)
+{
+    (void)state;
+    SelVolume *volume = NULL;
+    SelTree *tree = NULL, *model = NULL;
+    SelSegmentOptions options = sel_segment_defaults();
+    char here[1000];
+    call_program("synth y --length-mm 10 --noise 0.05 -o y.nrrd --quiet");
+    call_program("segment y.nrrd --start=-3,0,0 -o y.h5 --quiet");
+    call_program("fit y.h5 -o y-model.h5 --quiet");
+    assert_non_null(getcwd(here, sizeof here));
+    assert_int_equal(chdir(folder), 0);
+    SelStatus status = sel_volume_open(context, "y.nrrd", &volume);
+    assert_int_equal(chdir(here), 0);
+    good(status);
+    options.start_mm[0] = -3;
+    options.threads = 2;
+    good(sel_segment(context, volume, &options, &tree));
+    good(sel_fit(context, tree, NULL, &model));
+    good(sel_tree_save(context, tree, in_folder("own.h5")));
+    good(sel_tree_save(context, model, in_folder("own-model.h5")));
+    expect_same_file("y.h5", "own.h5");
+    expect_same_file("y-model.h5", "own-model.h5");
+    sel_tree_destroy(model);
+    sel_tree_destroy(tree);
+    sel_volume_destroy(volume);
+}
+
 static void bad_volumes_are_refused(void **state)
 {
     (void)state;
@@ -629,6 +673,7 @@ int main(void)
         cmocka_unit_test(a_recording_is_replayed_bit_for_bit),
         cmocka_unit_test(an_unwritable_recording_is_an_error),
         cmocka_unit_test(a_volume_becomes_a_model),
+        cmocka_unit_test(files_are_those_of_the_program),
         cmocka_unit_test(bad_volumes_are_refused),
     };
     return cmocka_run_group_tests(tests, open_phantom, close_phantom);
