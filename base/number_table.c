@@ -103,7 +103,7 @@ static bool read_header(Cursor *cursor, int *column_count)
     *column_count = split_fields(cursor->header, cursor->header + strlen(cursor->header), want, NUMBER_TABLE_COLUMNS);
     const char *line, *end;
     if (!next_line(cursor, &line, &end)) {
-        faults_add(cursor->faults, cursor->file, cursor->line ? cursor->line : 1, 1, "is empty; its first line is '%s'", cursor->header);
+        faults_add(cursor->faults, cursor->file, cursor->line ? cursor->line : 1, 1, "is empty; expected the first line '%s'", cursor->header);
         return false;
     }
     int count = split_fields(line, end, got, NUMBER_TABLE_COLUMNS);
@@ -113,7 +113,7 @@ static bool read_header(Cursor *cursor, int *column_count)
             continue;
         int column = i < count && i < NUMBER_TABLE_COLUMNS ? got[i].column : (int)(end - line) + 1;
         int shown = i < count && i < NUMBER_TABLE_COLUMNS ? (int)(got[i].length < 40 ? got[i].length : 40) : 0;
-        faults_add(cursor->faults, cursor->file, cursor->line, column, "column %d is headed '%.*s'; the header is '%s'", i + 1, shown,
+        faults_add(cursor->faults, cursor->file, cursor->line, column, "column %d is headed '%.*s'; expected the header '%s'", i + 1, shown,
                    shown ? got[i].name : "", cursor->header);
         return false;
     }
@@ -161,13 +161,13 @@ NumberTable *number_table_parse(const char *text, size_t length, const char *fil
         double row[NUMBER_TABLE_COLUMNS];
         int count = split_fields(line, end, field, NUMBER_TABLE_COLUMNS);
         if (count != table->column_count) {
-            faults_add(faults, file, cursor.line, 1, "has %d fields; each row has %d: %s", count, table->column_count, header);
+            faults_add(faults, file, cursor.line, 1, "has %d fields; expected %d: %s", count, table->column_count, header);
             continue;
         }
         bool good = true;
         for (int i = 0; i < count; i++)
             if (!number_of_text(field[i].name, field[i].length, &row[i])) {
-                faults_add(faults, file, cursor.line, field[i].column, "'%.*s' is not a number; a finite decimal number such as 1.5 or 2e-3",
+                faults_add(faults, file, cursor.line, field[i].column, "'%.*s' is not a number; expected a finite decimal number such as 1.5 or 2e-3",
                            (int)(field[i].length < 40 ? field[i].length : 40), field[i].name);
                 good = false;
             }

@@ -42,7 +42,7 @@ bool output_check(const char *path, Faults *faults)
 bool output_check_file(const char *path, Faults *faults)
 {
     if (path && is_special(path)) {
-        faults_add(faults, path, 0, 0, "is no regular file; this format needs one");
+        faults_add(faults, path, 0, 0, "is not a regular file; this format needs one");
         return false;
     }
     return output_check(path, faults);
@@ -58,7 +58,7 @@ bool output_write(const char *path, const void *bytes, size_t length, Faults *fa
     if (file && file != stdout && fclose(file) != 0 && good)
         good = false, reason = errno;
     if (!good)
-        faults_add(faults, path, 0, 0, "cannot be written: %s; write to a place with free space", strerror(reason));
+        faults_add(faults, path, 0, 0, "cannot be written: %s; choose a place with free space", strerror(reason));
     return good;
 }
 

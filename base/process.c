@@ -63,7 +63,7 @@ static void check_output(void)
     lost = (fclose(stdout) != 0 && errno != EBADF) || lost;
     if (!lost)
         return;
-    fprintf(stderr, "-: standard output cannot be written to its end; a place with free space\n");
+    fprintf(stderr, "-: cannot write to standard output (disk full?)\n");
     _exit(exit_code != EXIT_DONE ? exit_code : EXIT_BAD_INPUT);
 }
 
@@ -85,7 +85,7 @@ static bool take_stack(void)
         return true;
     stack.rlim_cur = stack.rlim_max < USUAL ? stack.rlim_max : USUAL;
     if (stack.rlim_cur < LEAST || setrlimit(RLIMIT_STACK, &stack) != 0) {
-        fprintf(stderr, "seldinger: the stack may have %ld kB; at least %d are needed (`ulimit -s`)\n", (long)(stack.rlim_cur >> 10), LEAST >> 10);
+        fprintf(stderr, "seldinger: the stack limit is %ld kB; expected at least %d kB (`ulimit -s`)\n", (long)(stack.rlim_cur >> 10), LEAST >> 10);
         return false;
     }
     if (pthread_attr_init(&thread) == 0) {

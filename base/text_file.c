@@ -14,22 +14,22 @@ char *text_file_read(const char *path, size_t *length, Faults *faults)
     const char *why;
     int file = regular_file_open(path, &status, &why);
     if (file < 0) {
-        faults_add(faults, path, 0, 0, "cannot be opened: %s; give a text file that can be read", why);
+        faults_add(faults, path, 0, 0, "cannot be opened: %s; expected a readable text file", why);
         return NULL;
     }
     size_t size = (size_t)status.st_size;
     char *text = NULL;
     if (size > TEXT_FILE_LIMIT)
-        faults_add(faults, path, 0, 0, "is %zu bytes long; at most %d are read", size, TEXT_FILE_LIMIT);
+        faults_add(faults, path, 0, 0, "is %zu bytes long; expected at most %d", size, TEXT_FILE_LIMIT);
     else if (!(text = malloc(size + 1)))
-        faults_add(faults, path, 0, 0, "needs %zu bytes of memory; there are not so many", size);
+        faults_add(faults, path, 0, 0, "needs %zu bytes of memory, more than is available", size);
     if (text) {
         *length = regular_file_read(file, text, size);
         text[*length] = 0;
     }
     // less than it has would be another text
     if (text && *length < size) {
-        faults_add(faults, path, 0, 0, "cannot be read to its end: %s", errno ? strerror(errno) : "it has become shorter");
+        faults_add(faults, path, 0, 0, "cannot be read completely: %s", errno ? strerror(errno) : "the file became shorter");
         free(text);
         text = NULL;
     }

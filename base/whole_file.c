@@ -17,12 +17,12 @@ char *whole_file_read_most(const char *path, size_t most, size_t *length, Faults
     const char *why;
     int file = regular_file_open(path, &status, &why);
     if (file < 0) {
-        faults_add(faults, path, 0, 0, "cannot be opened: %s; an existing readable file is needed", why);
+        faults_add(faults, path, 0, 0, "cannot be opened: %s; expected a readable file", why);
         return NULL;
     }
     size_t size = (size_t)status.st_size;
     if (size > most) {
-        faults_add(faults, path, 0, 0, "is %zu bytes long; at most %zu are read of a file of this kind", size, most);
+        faults_add(faults, path, 0, 0, "is %zu bytes long; expected at most %zu for a file of this kind", size, most);
         close(file);
         return NULL;
     }
@@ -66,7 +66,7 @@ bool whole_file_write(const char *path, const void *bytes, size_t length, Faults
         part_file_drop(&part);
     }
     if (!written)
-        faults_add(faults, path, 0, 0, "cannot be written: %s; a %s is needed", strerror(errno),
-                   is_through ? "device with free space, or a regular file," : "folder with write permission and free space");
+        faults_add(faults, path, 0, 0, "cannot be written: %s; expected a %s", strerror(errno),
+                   is_through ? "device with free space, or a regular file" : "writable folder with free space");
     return written;
 }

@@ -78,11 +78,11 @@ static void fault_unknown_key(YamlValue key, const char *name, const char *map_n
     for (int i = 0; keys[i]; i++)
         if (same_stem(name, keys[i])) {
             if (stem_length(name) == strlen(name))
-                yaml_fault(key, "key '%s' lacks its unit; it is '%s'", name, keys[i]);
+                yaml_fault(key, "key '%s' has no unit; expected '%s'", name, keys[i]);
             else if (stem_length(keys[i]) == strlen(keys[i]))
-                yaml_fault(key, "key '%s' has a unit too many; it is '%s'", name, keys[i]);
+                yaml_fault(key, "key '%s' has a unit; expected '%s'", name, keys[i]);
             else
-                yaml_fault(key, "key '%s' has the wrong unit; it is '%s'", name, keys[i]);
+                yaml_fault(key, "key '%s' has the wrong unit; expected '%s'", name, keys[i]);
             return;
         }
     int nearest = nearest_name(name, keys);
@@ -92,7 +92,7 @@ static void fault_unknown_key(YamlValue key, const char *name, const char *map_n
     }
     char all[320];
     list_names(keys, all, sizeof all);
-    yaml_fault(key, "unknown key '%.60s' in '%s'; valid: %s", name, map_name, all);
+    yaml_fault(key, "unknown key '%.60s' in '%s'; expected %s", name, map_name, all);
 }
 
 // --- the document ---
@@ -109,7 +109,7 @@ static void fault_syntax(const yaml_parser_t *parser, const char *text, size_t l
 {
     const char *problem = parser->problem ? parser->problem : "it cannot be read";
     if (parser->error == YAML_READER_ERROR)
-        faults_add(faults, file, line_of_offset(text, length, parser->problem_offset), 1, "is not YAML: %s (byte %zu); valid: UTF-8 text", problem,
+        faults_add(faults, file, line_of_offset(text, length, parser->problem_offset), 1, "is not YAML: %s (byte %zu); expected UTF-8 text", problem,
                    parser->problem_offset);
     else if (parser->error == YAML_MEMORY_ERROR)
         faults_add(faults, file, 0, 0, "no memory to read it");
@@ -141,7 +141,7 @@ static bool check_depth(const char *text, size_t length, const char *file, Fault
         depth -= event.type == YAML_SEQUENCE_END_EVENT || event.type == YAML_MAPPING_END_EVENT;
         if (depth > DEEPEST) {
             faults_add(faults, file, (int)event.start_mark.line + 1, (int)event.start_mark.column + 1,
-                       "lists and maps are nested more than %d deep; a scene needs 6", DEEPEST);
+                       "lists and maps are nested more than %d deep; expected at most 6", DEEPEST);
             good = false;
         }
         ended = event.type == YAML_STREAM_END_EVENT;
@@ -170,7 +170,7 @@ YamlReader *yaml_reader_open(const char *text, size_t length, const char *file, 
     if (!loaded)
         fault_syntax(&parser, text, length, file, faults);
     else if (!yaml_document_get_root_node(&reader->document))
-        faults_add(faults, file, 1, 1, "is empty; a scene begins with 'seldinger: 1'");
+        faults_add(faults, file, 1, 1, "is empty; expected a first line such as 'seldinger: 1'");
     else {
         yaml_document_t second;
         int line = (int)parser.mark.line + 1;
@@ -179,7 +179,7 @@ YamlReader *yaml_reader_open(const char *text, size_t length, const char *file, 
         } else {
             good = !yaml_document_get_root_node(&second);
             if (!good)
-                faults_add(faults, file, line, 1, "a second document begins; a file holds one");
+                faults_add(faults, file, line, 1, "a second document begins; expected one");
             yaml_document_delete(&second);
         }
     }
@@ -236,7 +236,7 @@ void yaml_fault(YamlValue value, const char *format, ...)
 static bool may_visit(YamlValue value)
 {
     if (value.reader->visits++ == VISIT_BUDGET)
-        yaml_fault(value, "the file is too large or its aliases repeat too much; at most %d values are read", VISIT_BUDGET);
+        yaml_fault(value, "the file is too large or its aliases repeat too much; expected at most %d values", VISIT_BUDGET);
     return value.reader->visits <= VISIT_BUDGET;
 }
 
@@ -256,13 +256,13 @@ YamlMap yaml_map(YamlValue value, const char *const *keys)
         return map;
     if (!may_visit(value) || node->type != YAML_MAPPING_NODE) {
         if (node->type != YAML_MAPPING_NODE)
-            yaml_fault(value, "'%s' is no map; keys and values are expected", value.name);
+            yaml_fault(value, "'%s' is not a map; expected keys and values", value.name);
         map.value.node = 0;
         return map;
     }
     int count = (int)(node->data.mapping.pairs.top - node->data.mapping.pairs.start);
     if (count > MOST_KEYS) {
-        yaml_fault(value, "'%s' has %d keys; at most %d", value.name, count, MOST_KEYS);
+        yaml_fault(value, "'%s' has %d keys; expected at most %d", value.name, count, MOST_KEYS);
         map.value.node = 0;
         return map;
     }
@@ -270,7 +270,7 @@ YamlMap yaml_map(YamlValue value, const char *const *keys)
         YamlValue key = {.reader = value.reader, .node = node->data.mapping.pairs.start[i].key};
         const char *name = yaml_scalar(key);
         if (!name) {
-            yaml_fault(key, "a key of '%s' is no text", value.name);
+            yaml_fault(key, "a key of '%s' is not a string", value.name);
             continue;
         }
         for (int j = 0; j < i; j++) {
@@ -280,7 +280,7 @@ YamlMap yaml_map(YamlValue value, const char *const *keys)
             if (!other || strcmp(other, name))
                 continue;
             yaml_place(before, &line, &column);
-            yaml_fault(key, "key '%.60s' stands a second time in '%s'; the first is on line %d", name, value.name, line);
+            yaml_fault(key, "duplicate key '%.60s' in '%s'; the first is on line %d", name, value.name, line);
             break;
         }
         bool known = !keys;
@@ -312,7 +312,7 @@ YamlValue yaml_get(const YamlMap *map, const char *key, bool required)
         if (name && !strcmp(name, key))
             return value;
     if (required && map->value.node)
-        yaml_fault(map->value, "'%s' lacks the key '%s'", map->value.name, key);
+        yaml_fault(map->value, "'%s' has no key '%s'; it is required", map->value.name, key);
     value = child(map->value, 0, key);
     return value;
 }
@@ -337,12 +337,12 @@ int yaml_count(YamlValue value, int least, int most)
     if (!node)
         return -1;
     if (node->type != YAML_SEQUENCE_NODE) {
-        yaml_fault(value, "'%s' is no list; valid: [a, b, …] or lines that begin with '- '", value.name);
+        yaml_fault(value, "'%s' is not a list; expected [a, b, …] or lines that begin with '- '", value.name);
         return -1;
     }
     long count = (long)(node->data.sequence.items.top - node->data.sequence.items.start);
     if (count < least || count > most) {
-        yaml_fault(value, "'%s' has %ld entries; %d to %d", value.name, count, least, most);
+        yaml_fault(value, "'%s' has %ld entries; expected %d to %d", value.name, count, least, most);
         return -1;
     }
     return (int)count;
@@ -372,7 +372,7 @@ bool yaml_text(YamlValue value, const char **text)
     if (!node || !may_visit(value))
         return false;
     if (node->type != YAML_SCALAR_NODE || node->data.scalar.length == 0 || strlen((const char *)node->data.scalar.value) != node->data.scalar.length) {
-        yaml_fault(value, "'%s' is no text; one word or a quoted text", value.name);
+        yaml_fault(value, "'%s' is not a string; expected one word or a quoted string", value.name);
         return false;
     }
     *text = (const char *)node->data.scalar.value;
@@ -389,9 +389,9 @@ static bool scalar_number(YamlValue value, const char *valid, double *number)
         number_of_text((const char *)node->data.scalar.value, node->data.scalar.length, number))
         return true;
     if (node->type != YAML_SCALAR_NODE)
-        yaml_fault(value, "'%s' is a %s; %s", value.name, node->type == YAML_SEQUENCE_NODE ? "list" : "map", valid);
+        yaml_fault(value, "'%s' is a %s; expected %s", value.name, node->type == YAML_SEQUENCE_NODE ? "list" : "map", valid);
     else
-        yaml_fault(value, "'%s' is '%.40s', not a number; %s (the unit is part of the key)", value.name, (const char *)node->data.scalar.value,
+        yaml_fault(value, "'%s' is '%.40s', not a number; expected %s (the unit is part of the key)", value.name, (const char *)node->data.scalar.value,
                    valid);
     return false;
 }
@@ -404,7 +404,7 @@ bool yaml_number(YamlValue value, NumberRange range, double *number)
     if (!scalar_number(value, valid, &read))
         return false;
     if (read < range.least || read > range.most || (range.above && read == range.least)) {
-        yaml_fault(value, "'%s' is %g, out of range; %s", value.name, read, valid);
+        yaml_fault(value, "'%s' is %g, out of range; expected %s", value.name, read, valid);
         return false;
     }
     *number = read;
@@ -419,7 +419,7 @@ bool yaml_integer(YamlValue value, int least, int most, int *number)
     if (!scalar_number(value, valid, &read))
         return false;
     if (read != floor(read) || read < least || read > most) {
-        yaml_fault(value, "'%s' is %.12g; %s", value.name, read, valid);
+        yaml_fault(value, "'%s' is %.12g; expected %s", value.name, read, valid);
         return false;
     }
     *number = (int)read;
@@ -445,7 +445,7 @@ int yaml_choice(YamlValue value, const char *const *names)
             return i;
     char all[200];
     list_names(names, all, sizeof all);
-    yaml_fault(value, "'%s' is '%.40s'; one of: %s", value.name, text, all);
+    yaml_fault(value, "'%s' is '%.40s'; expected one of: %s", value.name, text, all);
     return -1;
 }
 

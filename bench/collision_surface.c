@@ -218,7 +218,7 @@ static bool open_source(CollisionSurface *s, Faults *faults)
             faults_add(faults, scene->model_path, 0, 0, "is a tree without a model; make one with `seldinger fit`");
         return s->model && vessel_tree_is_model(s->model);
     }
-    faults_add(faults, scene->path, 0, 0, "has no vessel that can be compared; valid: tube, shape, model");
+    faults_add(faults, scene->path, 0, 0, "has no vessel that can be compared; expected tube, shape or model");
     return false;
 }
 

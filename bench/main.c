@@ -8,7 +8,7 @@
 static const char help[] =
     "Usage: seldinger bench collision|step|fit|track|wall|torture|peer|drawing [options]\n\n"
     "Timing tables, each row measured in the same run.\n\n"
-    "  collision  local models against meshes searched by Embree, the exact wall and a sampled distance: cost, error, friction that is not there\n"
+    "  collision  local models against meshes searched by Embree, the exact wall and a sampled distance: cost, error, spurious friction\n"
     "  step       a simulation step: spiral at 100 GPa, phantom, aneurism; growth with the elements; SIMD levels; budgets; --tools: coaxial tools\n"
     "  fit        local models: the paper's tables 3, 4 and 5 beside its figures\n"
     "  track      trackers on synthetic angiograms with truth: the labels of the paper's Table 2, errors, times\n"
@@ -38,7 +38,7 @@ static int call_bench(int argc, char **argv)
         if (!strcmp(name, table[i].name))
             return table[i].call(argc - 1, argv + 1);
     }
-    fprintf(stderr, "seldinger bench: %s%s%s; valid: collision, step, fit, track, wall, torture, peer, drawing\n", *name ? "no table '" : "lacks the name of a table", name, *name ? "'" : "");
+    fprintf(stderr, "seldinger bench: %s%s%s; expected collision, step, fit, track, wall, torture, peer, drawing\n", *name ? "unknown table '" : "the name of a table is missing", name, *name ? "'" : "");
     return EXIT_BAD_INPUT;
 }
 

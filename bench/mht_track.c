@@ -496,17 +496,17 @@ static bool check_seed(const Tracker *t, RbtSeed *seed, int number, const char *
         extent = fmax(extent, vec3_norm(t->volume->axis[i]) * size[i]);
     if (!inside_volume(t->volume, seed->start))
         faults_add(faults, path, seed->line, seed->column,
-                   "the start of branch %d (%g, %g, %g) mm lies outside the volume; voxels (0, 0, 0) to (%d, %d, %d)", number + 1,
+                   "the start of branch %d (%g, %g, %g) mm lies outside the volume; expected voxel (0, 0, 0) to (%d, %d, %d)", number + 1,
                    seed->start.x, seed->start.y, seed->start.z, size[0] - 1, size[1] - 1, size[2] - 1);
     if (number == 0 && !seed->has_toward)
-        faults_add(faults, path, seed->line, seed->column, "the first branch has no direction; a point further down the vessel");
+        faults_add(faults, path, seed->line, seed->column, "the first branch has no direction; expected a point further down the vessel");
     if (seed->has_toward && !(vec3_distance(seed->start, seed->toward) > 1e-6 * t->voxel))
         faults_add(faults, path, seed->line, seed->column,
-                   "the start of branch %d and its toward are the same point; toward is a point further down the vessel", number + 1);
+                   "the start and the toward of branch %d are the same point; expected a toward further down the vessel", number + 1);
     if (number == 0 && !(seed->radius > 0))
-        faults_add(faults, path, seed->line, seed->column, "the first branch has no radius; about that of the vessel at its start");
+        faults_add(faults, path, seed->line, seed->column, "the first branch has no radius; expected about that of the vessel at its start");
     if (seed->radius > extent / 2)
-        faults_add(faults, path, seed->line, seed->column, "the radius %g mm of branch %d is larger than the volume; at most %g mm", seed->radius,
+        faults_add(faults, path, seed->line, seed->column, "the radius %g mm of branch %d is larger than the volume; expected at most %g mm", seed->radius,
                    number + 1, extent / 2);
     return faults->count == before;
 }
@@ -515,15 +515,15 @@ static bool check_parameters(const MhtParameters *p, const char *path, Faults *f
 {
     int before = faults->count;
     if (!(p->step >= 0.01 && p->step <= 5))
-        faults_add(faults, path, 0, 0, "the step is %g radii; 0.01 to 5", p->step);
+        faults_add(faults, path, 0, 0, "the step is %g radii; expected 0.01 to 5", p->step);
     if (!(p->window >= 1 && p->window <= 10))
-        faults_add(faults, path, 0, 0, "the window is %g radii; 1 to 10", p->window);
+        faults_add(faults, path, 0, 0, "the window is %g radii; expected 1 to 10", p->window);
     if (!(p->radius_min > 0 && p->radius_min <= p->radius_max))
-        faults_add(faults, path, 0, 0, "the radius ranges from %g to %g; above 0, and the first not above the second", p->radius_min, p->radius_max);
+        faults_add(faults, path, 0, 0, "the radius ranges from %g to %g; expected above 0, and the first not above the second", p->radius_min, p->radius_max);
     if (!(p->max_angle_deg > 0 && p->max_angle_deg <= 90))
-        faults_add(faults, path, 0, 0, "the largest angle is %g degrees; above 0, at most 90", p->max_angle_deg);
+        faults_add(faults, path, 0, 0, "the largest angle is %g degrees; expected above 0, at most 90", p->max_angle_deg);
     if (p->search_angles < 0 || p->search_angles > MAX_ANGLES || p->search_depth < 1 || p->search_depth > MAX_DEPTH)
-        faults_add(faults, path, 0, 0, "search angles %d, depth %d; 0 to %d and 1 to %d", p->search_angles, p->search_depth, MAX_ANGLES, MAX_DEPTH);
+        faults_add(faults, path, 0, 0, "search angles %d, depth %d; expected 0 to %d and 1 to %d", p->search_angles, p->search_depth, MAX_ANGLES, MAX_DEPTH);
     return faults->count == before;
 }
 
@@ -578,7 +578,7 @@ static bool track_all(Tracker *t, const RbtSeed *seed, int seed_count, const Pro
         }
         if (!found) {
             faults_add(faults, path, seed[i].line, seed[i].column,
-                       "nothing could be tracked from the start of branch %d (%s); a point well inside the vessel, about its "
+                       "nothing could be tracked from the start of branch %d (%s); expected a point well inside the vessel, about its "
                        "true radius and direction", i + 1, t->why);
             return false;
         }
@@ -602,7 +602,7 @@ VesselTree *mht_track(const Volume *volume, const MhtParameters *parameters, con
     if (!t.window || !seed || !own.branch)
         faults_add(faults, path, 0, 0, "out of memory");
     else if (seed_count < 1)
-        faults_add(faults, path, 0, 0, "there is no branch to track; `branches` with at least one start");
+        faults_add(faults, path, 0, 0, "there is no branch to track; expected `branches` with at least one start");
     else if (check_parameters(parameters, path, faults)) {
         memcpy(seed, given, (size_t)seed_count * sizeof *seed);
         for (int i = 0; i < seed_count; i++)

@@ -206,6 +206,6 @@ int bench_peer(int argc, char **argv)
     if (!good)
         return cli_bad_input(&faults);
     if (!contained)
-        fprintf(stderr, "seldinger bench peer: a run on tube or models was not contained to %.0f um, or not to its end\n", contained_um);
+        fprintf(stderr, "seldinger bench peer: a run on tube or models left the wall by more than %.0f um, or did not finish\n", contained_um);
     return contained ? EXIT_DONE : EXIT_DIFFERENT;
 }

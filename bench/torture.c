@@ -389,7 +389,7 @@ static bool look_at_models(Torture *torture, Faults *faults)
     for (int i = 0; i < torture->model_count; i++) {
         VesselTree *tree = tree_file_load(torture->model[i], NULL, faults);
         if (!tree || !vessel_tree_is_model(tree) || !realpath(torture->model[i], whole[i])) {
-            faults_add(faults, torture->model[i], 0, 0, "is no fitted model; `seldinger fit` makes one");
+            faults_add(faults, torture->model[i], 0, 0, "is not a fitted model; make one with `seldinger fit`");
             vessel_tree_free(tree);
             return false;
         }

@@ -523,7 +523,7 @@ static bool row_felt(WallBench *bench, bool spiral, Faults *faults)
     if (!good)
         return false;
     bench->table.on = spiral ? "spiral" : "phantom";
-    snprintf(note, sizeof note, "without friction; %.3g %% on the exact wall%s", 100 * felt.exact_rms, felt.survived ? "" : "; the run did not stay sound to its end");
+    snprintf(note, sizeof note, "without friction; %.3g %% on the exact wall%s", 100 * felt.exact_rms, felt.survived ? "" : "; the run failed before its end");
     if (spiral)
         wall_add(&bench->table, felt.over_exact < 0 ? "push below exact" : "push over exact", 100 * fabs(felt.over_exact), "%", (WallLimits){3, 0.5, false}, note);
     else
@@ -691,7 +691,7 @@ static bool make_work(WallBench *bench, Faults *faults)
     if (*bench->work) {
         if (access(bench->work, W_OK) == 0)
             return true;
-        faults_add(faults, bench->work, 0, 0, "is no folder that can be written to");
+        faults_add(faults, bench->work, 0, 0, "is not a writable folder");
         return false;
     }
     const char *folder = getenv("TMPDIR");

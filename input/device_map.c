@@ -46,7 +46,7 @@ static void read_id(YamlValue value, int least, int most, int *id)
     char *end;
     unsigned long number = strtoul(text, &end, is_hex ? 16 : 10);
     if (text[0] < '0' || text[0] > '9' || *end || end == text || number < (unsigned long)least || number > (unsigned long)most)
-        yaml_fault(value, "'%s' is '%.20s'; a number from %d to 0x%x, 0x%s before hexadecimal digits", value.name, text, least, (unsigned)most, "…");
+        yaml_fault(value, "'%s' is '%.20s'; expected a number from %d to 0x%x (0x%s for hexadecimal)", value.name, text, least, (unsigned)most, "…");
     else
         *id = (int)number;
 }
@@ -72,7 +72,7 @@ static void read_device(YamlValue value, DeviceMap *map)
         if (page > 0 && usage > 0)
             out->usage = HID_USAGE(page, usage);
     } else if (yaml_text(usage_value, &text) && !(out->usage = hid_usage_of_name(text)))
-        yaml_fault(usage_value, "'%s' is '%.40s', no usage known here; joystick, gamepad, multi_axis, mouse … or 0x0001:0x0004", usage_value.name, text);
+        yaml_fault(usage_value, "'%s' is '%.40s', an unknown usage; expected joystick, gamepad, multi_axis, mouse … or 0x0001:0x0004", usage_value.name, text);
     if (yaml_has(&device, "gamepad") && yaml_boolean(yaml_get(&device, "gamepad", false), &gamepad) && gamepad)
         out->kind = MAP_GAMEPAD;
     if (yaml_has(&device, "joystick")) {
@@ -87,9 +87,9 @@ static void read_device(YamlValue value, DeviceMap *map)
         yaml_fault(value, "'device' is one of gamepad, joystick and usb");
     bool has_ids = yaml_has(&device, "vendor_id") || yaml_has(&device, "product_id") || yaml_has(&device, "serial");
     if (out->kind == MAP_HID && !has_ids && !yaml_has(&device, "usage"))
-        yaml_fault(value, "'device' names none; vendor_id and product_id, or usage, or gamepad: true, joystick: \"name\", usb: ftdi");
+        yaml_fault(value, "'device' selects no device; expected vendor_id and product_id, or usage, or gamepad: true, joystick: \"name\", usb: ftdi");
     if ((out->kind == MAP_GAMEPAD || out->kind == MAP_JOYSTICK) && (has_ids || yaml_has(&device, "usage")))
-        yaml_fault(value, "GLFW's gamepads and joysticks have no ids or usages here; joystick: \"part of its name\" picks one");
+        yaml_fault(value, "gamepads and joysticks read through GLFW have no ids or usages; select one by joystick: \"part of its name\"");
     if (out->kind == MAP_FTDI && yaml_has(&device, "usage"))
         yaml_fault(usage_value, "'%s' goes with HID devices", usage_value.name);
 }
@@ -105,9 +105,9 @@ static void read_tool(YamlValue value, MapHand *hand)
     yaml_place(value, &hand->line, &hand->column);
     long number = strtol(text, &end, 10);
     if (!*end && (number < 1 || number > TOOLS_MOST))
-        yaml_fault(value, "'%s' is %.20s; 1 to %d, outermost first, or a tool's name", value.name, text, TOOLS_MOST);
+        yaml_fault(value, "'%s' is %.20s; expected 1 to %d, outermost first, or a tool's name", value.name, text, TOOLS_MOST);
     else if (strpbrk(text, "., \t") || strlen(text) >= sizeof hand->tool)
-        yaml_fault(value, "'%s' is '%.40s'; chosen, outer, inner, outermost, innermost, 1 to %d, a tool's name or its kind", value.name, text, TOOLS_MOST);
+        yaml_fault(value, "'%s' is '%.40s'; expected chosen, outer, inner, outermost, innermost, 1 to %d, a tool's name or its kind", value.name, text, TOOLS_MOST);
     else
         snprintf(hand->tool, sizeof hand->tool, "%s", text);
     hand->drives = !strcmp(text, "outer") ? DRIVES_OUTER : !strcmp(text, "inner") ? DRIVES_INNER : DRIVES_CHOSEN;
@@ -123,7 +123,7 @@ static int hand_for(const YamlMap *control, DeviceMap *map, const MapHand *usual
         if (!strcmp(map->hand[i].tool, hand.tool))
             return i;
     if (map->hand_count == MAP_HANDS) {
-        yaml_fault(control->value, "'%s' would move a fifth tool; a device moves up to %d", control->value.name, MAP_HANDS);
+        yaml_fault(control->value, "'%s' would move one tool too many; expected at most %d per device", control->value.name, MAP_HANDS);
         return 0;
     }
     map->hand[map->hand_count] = hand;
@@ -164,7 +164,7 @@ static void read_source(const DeviceMap *map, const YamlMap *control, MapSource 
     yaml_place(value, &source->line, &source->column);
     if (map->device.kind == MAP_GAMEPAD || map->device.kind == MAP_JOYSTICK) {
         if (!plain_source(map, text, source))
-            yaml_fault(value, "'%s' is '%.40s'; axis_0, button_0 …%s", value.name, text,
+            yaml_fault(value, "'%s' is '%.40s'; expected axis_0, button_0 …%s", value.name, text,
                        map->device.kind == MAP_GAMEPAD ? " or left_x, left_y, right_x, right_y, left_trigger, right_trigger, a, b, x, y, dpad_up …" : "");
     } else if (map->device.kind == MAP_FTDI) {
         source->kind = SOURCE_COUNT;
@@ -175,7 +175,7 @@ static void read_source(const DeviceMap *map, const YamlMap *control, MapSource 
     } else if (!strcmp(text, "hat_x") || !strcmp(text, "hat_y")) {
         source->kind = text[4] == 'x' ? SOURCE_HID_HAT_X : SOURCE_HID_HAT_Y;
     } else if (!(source->usage = hid_usage_of_name(text))) {
-        yaml_fault(value, "'%s' is '%.40s', no usage known here; X, Y, Z, Rx, Ry, Rz, slider, dial, wheel, button_1, hat_x, hat_y … or 0x0001:0x0031",
+        yaml_fault(value, "'%s' is '%.40s', an unknown usage; expected X, Y, Z, Rx, Ry, Rz, slider, dial, wheel, button_1, hat_x, hat_y … or 0x0001:0x0031",
                    value.name, text);
     }
     if (map->device.kind == MAP_HID && yaml_has(control, "index"))
@@ -199,7 +199,7 @@ static void read_calibration(const YamlMap *control, MapAxis *axis)
     yaml_map_number(control, "logical_centre", false, raw_range, &axis->logical_centre);
     yaml_map_number(control, "logical_max", false, raw_range, &axis->logical_max);
     if (axis->logical_min >= axis->logical_max || axis->logical_min > axis->logical_centre || axis->logical_centre > axis->logical_max)
-        yaml_fault(control->value, "'%s' has logical_min, logical_centre, logical_max that do not grow; invert: true turns an axis round", control->value.name);
+        yaml_fault(control->value, "logical_min, logical_centre and logical_max of '%s' do not increase; use invert: true to reverse an axis", control->value.name);
 }
 
 // What goes only with a rate, or only with counts.
@@ -210,9 +210,9 @@ static void check_kind(const YamlMap *control, const DeviceMap *map, const MapAx
         if (yaml_has(control, of_rates[i]))
             yaml_fault(yaml_get(control, of_rates[i], false), "'%s' goes with a deflection (mm_s, deg_s), not with counts", of_rates[i]);
     if (axis->is_rate && (axis->kind == AXIS_RELATIVE || axis->kind == AXIS_COUNTER))
-        yaml_fault(yaml_get(control, "kind", false), "'kind' of a rate is deflection; counts take mm_per_count or deg_per_count");
+        yaml_fault(yaml_get(control, "kind", false), "a rate needs 'kind: deflection'; counts need mm_per_count or deg_per_count");
     if (!axis->is_rate && axis->kind == AXIS_DEFLECTION)
-        yaml_fault(yaml_get(control, "kind", false), "'kind' of counts is relative or counter; a deflection takes mm_s or deg_s");
+        yaml_fault(yaml_get(control, "kind", false), "counts need 'kind: relative' or 'kind: counter'; a deflection needs mm_s or deg_s");
     if (axis->is_rate && yaml_has(control, "counts_per_wrap"))
         yaml_fault(yaml_get(control, "counts_per_wrap", false), "'counts_per_wrap' goes with counts");
     if (axis->is_rate && map->device.kind == MAP_FTDI)
@@ -301,7 +301,7 @@ static void read_force(YamlValue value, DeviceMap *map)
     if (!force.value.node)
         return;
     if (map->device.kind != MAP_HID)
-        yaml_fault(value, "'force' goes through HID (PID effects); GLFW and serial lines have none");
+        yaml_fault(value, "'force' needs a HID device (PID effects); GLFW and serial devices have none");
     *out = (MapForce){.is_wanted = true, .slew_n_s = 200, .direction_deg = NAN, .stall_ms = 50, .quiet_ms = 200};
     yaml_map_number(&force, "full_scale_n", true, (NumberRange){0, 100, true}, &out->full_scale_n);
     out->max_n = out->full_scale_n;
@@ -358,7 +358,7 @@ static void read_map(YamlReader *reader, DeviceMap *map)
                  {"exchange", HAND_EXCHANGE}};
     YamlValue root = yaml_root(reader);
     if (!yaml_is_map(root))
-        yaml_fault(root, "is no device map; it begins with 'seldinger_device: 1'");
+        yaml_fault(root, "is not a device map; expected 'seldinger_device: 1' on the first line");
     YamlMap top = yaml_map(root, keys);
     MapHand usual = {.tool = "chosen", .drives = DRIVES_CHOSEN};
     int version;
@@ -383,7 +383,7 @@ static void read_map(YamlReader *reader, DeviceMap *map)
         read_controls(yaml_get(&top, buttons[i].key, false), map, &usual, false, buttons[i].bit);
     read_force(yaml_get(&top, "force", false), map);
     if (!yaml_has(&top, "push") && !yaml_has(&top, "twist") && map->button_count == 0)
-        yaml_fault(root, "has none of push, twist, pedal, contrast, stop, mark, choose_outer, choose_inner, lock, let_go, exchange; a map gives the device something to do");
+        yaml_fault(root, "has none of push, twist, pedal, contrast, stop, mark, choose_outer, choose_inner, lock, let_go, exchange; expected at least one of these");
 }
 
 DeviceMap *device_map_parse(const char *text, size_t length, const char *file, Faults *faults)

@@ -400,7 +400,7 @@ bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor
     for (int i = 0; i < 2; i++)
         force->direction_deg[i] = force_direction_deg(map, i == 1);
     if (isnan(force->direction_deg[0])) {
-        snprintf(force->text, sizeof force->text, "none: push comes from neither X nor Y; give force.direction_deg");
+        snprintf(force->text, sizeof force->text, "none: push is neither on X nor on Y; give force.direction_deg");
         return false;
     }
     if (needs_host(&force->layout, transport, device)) {
@@ -425,8 +425,8 @@ bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor
     const HidField *field = &force->layout.magnitude.field;
     snprintf(force->text, sizeof force->text, "constant force, %lld steps for %g N, at most %g N%s%s", (long long)field->logical_max,
              map->force.full_scale_n, map->force.max_n,
-             has_torque ? ", and torque" : map->force.full_scale_n_mm > 0 ? "; no torque, it has no second effect or axis" : "",
-             field->logical_min < 0 ? "" : "; one way only, its magnitude has no sign");
+             has_torque ? ", and torque" : map->force.full_scale_n_mm > 0 ? "; no torque: no second effect or axis" : "",
+             field->logical_min < 0 ? "" : "; one direction only: no sign");
     return true;
 }
 

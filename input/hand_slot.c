@@ -126,7 +126,7 @@ void *hand_run_hid(void *argument)
             reports_then = slot->state.reports;
         }
         if (!has_told_bad && slot->state.bad_reports > 0) {
-            hand_say(shared, "%s sends reports that its descriptor does not describe (too short or of unknown id); they are left out", slot->info.name);
+            hand_say(shared, "%s sends reports that its descriptor does not describe (too short or of unknown id); they are ignored", slot->info.name);
             has_told_bad = true;
         }
         if (now - informed >= INFO_US) {
@@ -142,7 +142,7 @@ void *hand_run_hid(void *argument)
     shared->transport.close(shared->transport.context, slot->device);
     slot->device = NULL;
     if (!is_there)
-        hand_say(shared, "%s was unplugged: the tool stops; plug it in again to go on", slot->info.name);
+        hand_say(shared, "%s was unplugged: the tool stops; plug it in again to continue", slot->info.name);
     atomic_store(&slot->has_ended, true);
     return NULL;
 }
@@ -170,7 +170,7 @@ void *hand_run_encoder(void *argument)
         if (slot->state.reports > lines)
             map_publish(slot->map, &slot->state, slot->port);
         if (!has_told_bad && stream->bad_lines > 3 && stream->lines == 0) {
-            hand_say(shared, "%s sends no line of counts as its map says; look at serial: {baud, counts}", slot->info.name);
+            hand_say(shared, "%s sends no line of counts as its map expects; check serial: {baud, counts}", slot->info.name);
             has_told_bad = true;
         }
         if (now - counted_from >= COUNT_RATE_US) {
@@ -189,7 +189,7 @@ void *hand_run_encoder(void *argument)
     usb_encoder_close(slot->encoder);
     slot->encoder = NULL;
     if (!is_there)
-        hand_say(shared, "%s was unplugged: the tool stops; plug it in again to go on", slot->info.name);
+        hand_say(shared, "%s was unplugged: the tool stops; plug it in again to continue", slot->info.name);
     atomic_store(&slot->has_ended, true);
     return NULL;
 }

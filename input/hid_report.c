@@ -94,7 +94,7 @@ static void read_local(Reading *reading, int tag, uint32_t value, int size)
         }
         reading->has_usage_min = false;
         if ((value & 0xffff) < (reading->usage_min & 0xffff) || (has_page && reading->usage_min_has_page && value >> 16 != reading->usage_min >> 16))
-            refuse(reading, "usages from 0x%x to 0x%x; the maximum is not below the minimum and of the same page", (unsigned)reading->usage_min,
+            refuse(reading, "usages from 0x%x to 0x%x; expected a rising range on one page", (unsigned)reading->usage_min,
                    (unsigned)value);
         else if (has_page || reading->usage_min_has_page) {
             uint32_t page = has_page ? value & 0xffff0000u : reading->usage_min & 0xffff0000u;
@@ -143,7 +143,7 @@ static void read_global(Reading *reading, int tag, uint32_t value, int64_t as_si
     switch (tag) {
     case GLOBAL_PAGE:
         if (value == 0 || value > 0xffff)
-            refuse(reading, "usage page 0x%x; 1 to 0xffff", (unsigned)value);
+            refuse(reading, "usage page 0x%x; expected 1 to 0xffff", (unsigned)value);
         else
             global->page = value;
         break;
@@ -157,9 +157,9 @@ static void read_global(Reading *reading, int tag, uint32_t value, int64_t as_si
     case GLOBAL_SIZE: global->size = value; break;
     case GLOBAL_ID:
         if (value == 0 || value > 255)
-            refuse(reading, "report id %u; 1 to 255", (unsigned)value);
+            refuse(reading, "report id %u; expected 1 to 255", (unsigned)value);
         else if (reading->has_field_without_id)
-            refuse(reading, "report id %u after fields without one; either all reports have ids or none", (unsigned)value);
+            refuse(reading, "report id %u after fields without one; expected ids for all reports or for none", (unsigned)value);
         else
             global->report_id = (int)value, reading->out->uses_ids = true;
         break;
@@ -260,15 +260,15 @@ static void read_fields(Reading *reading, HidReportKind kind, uint32_t flags)
     if (global->count == 0)
         return;
     if (global->size == 0) {
-        refuse(reading, "fields of 0 bits; a report size comes before them");
+        refuse(reading, "fields of 0 bits; expected a report size before them");
         return;
     }
     if (global->size > 32 && !is_constant) {
-        refuse(reading, "fields of %lld bits; at most 32", (long long)global->size);
+        refuse(reading, "fields of %lld bits; expected at most 32", (long long)global->size);
         return;
     }
     if (global->size > HID_REPORT_BITS || global->count > HID_REPORT_BITS || global->size * global->count > HID_REPORT_BITS) {
-        refuse(reading, "%lld fields of %lld bits; a report has at most %d bits", (long long)global->count, (long long)global->size, HID_REPORT_BITS);
+        refuse(reading, "%lld fields of %lld bits; expected at most %d bits in a report", (long long)global->count, (long long)global->size, HID_REPORT_BITS);
         return;
     }
     HidReport *report = find_report(reading->out, kind, global->report_id);
@@ -278,7 +278,7 @@ static void read_fields(Reading *reading, HidReportKind kind, uint32_t flags)
         return;
     }
     if (report->bits + bits > HID_REPORT_BITS) {
-        refuse(reading, "report %d grows to %d bits; at most %d", report->id, report->bits + bits, HID_REPORT_BITS);
+        refuse(reading, "report %d grows to %d bits; expected at most %d", report->id, report->bits + bits, HID_REPORT_BITS);
         return;
     }
     HidField field = {.kind = kind, .report_id = global->report_id, .bit = report->bits, .size = (int)global->size, .count = (int)global->count,
@@ -289,7 +289,7 @@ static void read_fields(Reading *reading, HidReportKind kind, uint32_t flags)
     choose_sign(global->logical_min, global->logical_max, &field.logical_min, &field.logical_max);
     choose_sign(global->physical_min, global->physical_max, &field.physical_min, &field.physical_max);
     if (field.logical_min > field.logical_max && !is_constant) {
-        refuse(reading, "a logical range from %lld to %lld; the minimum is not above the maximum", (long long)field.logical_min, (long long)field.logical_max);
+        refuse(reading, "a logical range from %lld to %lld; expected a minimum no greater than the maximum", (long long)field.logical_min, (long long)field.logical_max);
         return;
     }
     // 0 to 0, the state at the start, means that the physical range is the logical one (section 6.2.2.7)
@@ -354,7 +354,7 @@ static size_t read_item(Reading *reading, const uint8_t *bytes, size_t length)
     }
     size_t size = (item[0] & 3) == 3 ? 4 : (size_t)(item[0] & 3);
     if (left < 1 + size) {
-        refuse(reading, "an item of %zu bytes is cut short; %zu are left", 1 + size, left);
+        refuse(reading, "an item of %zu bytes is truncated; %zu bytes are left", 1 + size, left);
         return 0;
     }
     uint32_t value = 0;
@@ -397,7 +397,7 @@ HidDescriptor *hid_descriptor_parse(const uint8_t *bytes, size_t length, const c
     }
     *reading = (Reading){.name = name, .faults = faults, .out = out, .good = true};
     if (length == 0 || length > HID_DESCRIPTOR_LIMIT)
-        refuse(reading, "a report descriptor of %zu bytes; 1 to %d", length, HID_DESCRIPTOR_LIMIT);
+        refuse(reading, "a report descriptor of %zu bytes; expected 1 to %d", length, HID_DESCRIPTOR_LIMIT);
     while (reading->good && reading->at < length)
         reading->at += read_item(reading, bytes, length);
     if (reading->good && reading->open_count > 0)
@@ -405,7 +405,7 @@ HidDescriptor *hid_descriptor_parse(const uint8_t *bytes, size_t length, const c
     if (reading->good && reading->push_count > 0)
         refuse(reading, "%d pushes are not popped", reading->push_count);
     if (reading->good && out->field_count == 0)
-        refuse(reading, "no field; a device has at least one input, output or feature");
+        refuse(reading, "no field; expected at least one input, output or feature");
     bool good = reading->good;
     free(reading);
     if (!good) {

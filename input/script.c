@@ -27,7 +27,7 @@ static void check_speed(double speed, int fastest, const char *name, const char 
 {
     bool named = tools && tools->count > 1;
     if (fabs(speed) > fastest)
-        faults_add(faults, file, line, column, "%s%s%s %g is out of range; -%d to %d %s", named ? tools->name[tool] : "", named ? "." : "", name, speed, fastest,
+        faults_add(faults, file, line, column, "%s%s%s %g is out of range; expected -%d to %d %s", named ? tools->name[tool] : "", named ? "." : "", name, speed, fastest,
                    fastest, unit);
 }
 
@@ -35,21 +35,21 @@ bool script_check_row(const ScriptRow *row, const ScriptRow *before, const ToolN
 {
     int already = faults->count, injecting = 0;
     if (row->t_s < 0)
-        faults_add(faults, file, line, column, "t_s %g is negative; a script starts at 0 or later", row->t_s);
+        faults_add(faults, file, line, column, "t_s %g is negative; expected 0 or more", row->t_s);
     if (before && row->t_s <= before->t_s)
-        faults_add(faults, file, line, column, "t_s %g does not follow %g; times grow from row to row", row->t_s, before->t_s);
+        faults_add(faults, file, line, column, "t_s %g does not follow %g; expected rising times", row->t_s, before->t_s);
     if (row->t_s > SCRIPT_LONGEST_S)
-        faults_add(faults, file, line, column, "t_s %g is too late; at most %g s", row->t_s, (double)SCRIPT_LONGEST_S);
+        faults_add(faults, file, line, column, "t_s %g is too late; expected at most %g s", row->t_s, (double)SCRIPT_LONGEST_S);
     for (int k = 0; k < (tools ? tools->count : 1); k++) {
         const Command *command = k == 0 ? &row->command : &row->inner[k - 1];
         check_speed(command->push_mm_s, SCRIPT_FASTEST_MM_S, quantity[0], "mm/s", tools, k, file, line, column, faults);
         check_speed(command->twist_deg_s, SCRIPT_FASTEST_DEG_S, quantity[1], "deg/s", tools, k, file, line, column, faults);
         injecting += row->contrast_ml_s[k] > 0;
         if (!(row->contrast_ml_s[k] >= 0 && row->contrast_ml_s[k] <= SCRIPT_MOST_ML_S))
-            faults_add(faults, file, line, column, "contrast_ml_s %g is out of range; 0 to %d ml/s", row->contrast_ml_s[k], SCRIPT_MOST_ML_S);
+            faults_add(faults, file, line, column, "contrast_ml_s %g is out of range; expected 0 to %d ml/s", row->contrast_ml_s[k], SCRIPT_MOST_ML_S);
     }
     if (injecting > 1)
-        faults_add(faults, file, line, column, "contrast agent goes through %d tools at once; there is one injector, so one tool a row", injecting);
+        faults_add(faults, file, line, column, "contrast agent is injected through %d tools at once; expected one tool per row, since there is one injector", injecting);
     return faults->count == already;
 }
 
@@ -106,17 +106,17 @@ static bool read_columns(const NumberColumn *field, int count, int line, const T
     int before = faults->count, place[TOOLS_MOST][QUANTITIES] = {{0}};
     size_t used = (size_t)snprintf(columns->header, sizeof columns->header, "t_s");
     if (count > NUMBER_TABLE_COLUMNS) {
-        faults_add(faults, file, line, 1, "has %d columns; t_s and up to five for each of the scene's %d tools", count, tools->count);
+        faults_add(faults, file, line, 1, "has %d columns; expected t_s and up to five for each of the scene's %d tools", count, tools->count);
         return false;
     }
     if (!is_word(field[0].name, field[0].length, "t_s"))
-        faults_add(faults, file, line, field[0].column, "column 1 is headed '%.*s'; it is 't_s'", (int)(field[0].length < 40 ? field[0].length : 40), field[0].name);
+        faults_add(faults, file, line, field[0].column, "column 1 is headed '%.*s'; expected 't_s'", (int)(field[0].length < 40 ? field[0].length : 40), field[0].name);
     for (int i = 1; i < count; i++) {
         int tool, which;
         if (!read_column(&field[i], line, tools, file, &tool, &which, faults))
             continue;
         if (place[tool][which]) {
-            faults_add(faults, file, line, field[i].column, "'%s.%s' stands a second time; once", tools->name[tool], quantity[which]);
+            faults_add(faults, file, line, field[i].column, "duplicate column '%s.%s'", tools->name[tool], quantity[which]);
             continue;
         }
         place[tool][which] = field[i].column;
@@ -127,7 +127,7 @@ static bool read_columns(const NumberColumn *field, int count, int line, const T
     for (int k = 0; k < tools->count; k++)
         for (int q = PUSH; q <= TWIST; q++)
             if (place[k][q] && !place[k][1 - q])
-                faults_add(faults, file, line, place[k][q], "'%s.%s' lacks its other half; '%s.%s' is a column too", tools->name[k], quantity[q], tools->name[k],
+                faults_add(faults, file, line, place[k][q], "'%s.%s' needs the column '%s.%s' too", tools->name[k], quantity[q], tools->name[k],
                            quantity[1 - q]);
     return faults->count == before;
 }
@@ -177,7 +177,7 @@ Script *script_parse_tools(const char *text, size_t length, const char *file, co
     if (!script || !script->row)
         faults_add(faults, file, 0, 0, "no memory for its rows");
     else if (table->row_count == 0)
-        faults_add(faults, file, 1, 1, "has no row; at least one '%s', the last row's time ends the script", columns.header);
+        faults_add(faults, file, 1, 1, "has no row; expected at least one '%s' (the last row's time ends the script)", columns.header);
     else
         for (int i = 0; i < table->row_count; i++) {
             const double *value = table->value + (size_t)i * (size_t)table->column_count;
@@ -186,9 +186,9 @@ Script *script_parse_tools(const char *text, size_t length, const char *file, co
             for (int c = 0; c < columns.count; c++) {
                 put_value(row, columns.tool[c], columns.quantity[c], value[1 + c]);
                 if (columns.quantity[c] == RELEASED && value[1 + c] != 0 && value[1 + c] != 1)
-                    faults_add(faults, file, table->line[i], 1, "released is %g; 0 where a hand holds the tool, 1 where none does", value[1 + c]);
+                    faults_add(faults, file, table->line[i], 1, "released is %g; expected 0 (the tool is held) or 1 (it is released)", value[1 + c]);
                 if (columns.quantity[c] == EXCHANGE && (value[1 + c] < 0 || value[1 + c] > EXCHANGES_MOST || value[1 + c] != floor(value[1 + c])))
-                    faults_add(faults, file, table->line[i], 1, "exchange is %g; 0 for the scene's tool, 1 to %d for those under its 'exchange:'", value[1 + c], EXCHANGES_MOST);
+                    faults_add(faults, file, table->line[i], 1, "exchange is %g; expected 0 (the scene's tool) or 1 to %d (those under its 'exchange:')", value[1 + c], EXCHANGES_MOST);
             }
             script_check_row(row, i ? row - 1 : NULL, tools, file, table->line[i], 1, faults);
             script->count = i + 1;

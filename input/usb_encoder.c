@@ -55,7 +55,7 @@ static void read_strings(libusb_device *device, const struct libusb_device_descr
     info->may_open = code == 0;
     if (code == LIBUSB_ERROR_ACCESS)
         snprintf(info->why, sizeof info->why,
-                 "no permission; a udev rule helps: SUBSYSTEM==\"usb\", ATTR{idVendor}==\"%04x\", TAG+=\"uaccess\"", (unsigned)descriptor->idVendor);
+                 "no permission; add the udev rule SUBSYSTEM==\"usb\", ATTR{idVendor}==\"%04x\", TAG+=\"uaccess\"", (unsigned)descriptor->idVendor);
     else if (code != 0)
         snprintf(info->why, sizeof info->why, "%s", libusb_strerror((enum libusb_error)code));
     if (code != 0)
@@ -101,7 +101,7 @@ static libusb_device_handle *open_path(UsbContext *context, const char *path, ch
     libusb_device **all;
     libusb_device_handle *handle = NULL;
     ssize_t listed = libusb_get_device_list(context->libusb, &all);
-    snprintf(why, capacity, "%s is not there any more", path);
+    snprintf(why, capacity, "%s was disconnected", path);
     for (ssize_t i = 0; i < listed; i++) {
         char at[32];
         device_path(all[i], at, sizeof at);

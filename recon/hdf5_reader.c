@@ -117,7 +117,7 @@ static Hdf5Reader *open_source(const Hdf5Source *source, bool has_rehearsal, con
     if (reader->file >= 0)
         return reader;
     int reason = reader->source.reason;
-    faults_add_at_byte(faults, name, 0, "is not a readable HDF5 file (cut off, damaged or of another kind); %s", needs);
+    faults_add_at_byte(faults, name, 0, "is not a readable HDF5 file (truncated, damaged or of another kind); %s", needs);
     hdf5_reader_close(reader);
     errno = reason;
     return NULL;
@@ -193,11 +193,11 @@ static hid_t open_dataset(const Hdf5Reader *reader, const char *path)
     LinkKind kind = link_kind(reader, path);
     hid_t set = kind == LINK_HARD ? H5Dopen2(reader->file, path, H5P_DEFAULT) : -1;
     if (kind == LINK_NONE)
-        faults_add(reader->faults, reader->name, 0, 0, "lacks the dataset %s; %s", path, reader->needs);
+        faults_add(reader->faults, reader->name, 0, 0, "has no dataset %s; %s", path, reader->needs);
     else if (kind == LINK_OTHER)
-        faults_add(reader->faults, reader->name, 0, 0, "%s is a soft or external link; valid: a dataset of this file", path);
+        faults_add(reader->faults, reader->name, 0, 0, "%s is a soft or external link; expected a dataset of this file", path);
     else if (set < 0)
-        faults_add(reader->faults, reader->name, 0, 0, "%s cannot be opened; valid: a dataset whose header is whole", path);
+        faults_add(reader->faults, reader->name, 0, 0, "%s cannot be opened; expected a dataset with an intact header", path);
     return set;
 }
 
@@ -261,7 +261,7 @@ static bool has_shape(const Hdf5Reader *reader, hid_t space, Hdf5Dataset *datase
         print_size(valid, dataset->rank, dataset->size);
         if (rank >= 0 && rank <= 3)
             print_size(is, rank, (const uint64_t[]){found[0], found[1], found[2]});
-        faults_add(reader->faults, reader->name, 0, 0, "%s has the wrong shape %s; valid: %s", dataset->path, is, valid);
+        faults_add(reader->faults, reader->name, 0, 0, "%s has the wrong shape %s; expected %s", dataset->path, is, valid);
         return false;
     }
     for (int i = 0; i < rank; i++)
@@ -296,7 +296,7 @@ typedef struct Packing {
 // NULL, or what is wrong. A chunk says with a bit for each filter whether it was left out.
 static const char *find_packing(hid_t creation, size_t value_bytes, Packing *packing)
 {
-    static const char *const other = "is packed by other filters than deflate, or shuffle and then deflate (`h5repack -f NONE IN OUT` unpacks it)";
+    static const char *const other = "is compressed by filters other than deflate, or shuffle followed by deflate (`h5repack -f NONE IN OUT` decompresses it)";
     *packing = (Packing){.filter_count = H5Pget_nfilters(creation)};
     if (packing->filter_count < 0 || packing->filter_count > 2)
         return other;
@@ -312,7 +312,7 @@ static const char *find_packing(hid_t creation, size_t value_bytes, Packing *pac
     return NULL;
 }
 
-static const char huge[] = "has more or larger chunks than the file, or than are read (262144, 16 GiB)";
+static const char huge[] = "has more or larger chunks than the file holds, or than the limits (262144, 16 GiB)";
 
 // Of a dataset, in values and bytes.
 typedef struct Chunks {
@@ -323,7 +323,7 @@ static const char *count_chunks(hid_t creation, const Hdf5Dataset *dataset, hsiz
 {
     *chunks = (Chunks){.bytes = value_bytes, .count = 1};
     if (H5Pget_chunk(creation, 3, chunks->size) != dataset->rank)
-        return "has chunks of another rank";
+        return "has chunks of a different rank";
     for (int i = 0; i < dataset->rank; i++) {
         if (chunks->size[i] == 0)
             return "has empty chunks";
@@ -355,7 +355,7 @@ static const char *chunk_trouble(Hdf5Reader *reader, hid_t set, hid_t creation, 
     bool is_packed = packing.filter_count > 0;
     hsize_t unpacked = times(times(chunks.bytes / value_bytes, chunks.count), wide);
     if (is_packed && (unpacked > reader->left_unpacked || chunks.bytes > UINT32_MAX))
-        return "unpacks to more than 256 times the file, or than is read (16 GiB)";
+        return "decompresses to more than 256 times the file's size, or to more than the limit (16 GiB)";
     if (!is_packed && times(chunks.bytes, chunks.count) > reader->left)
         return huge;
     for (hsize_t i = 0; i < chunks.count; i++) {
@@ -365,7 +365,7 @@ static const char *chunk_trouble(Hdf5Reader *reader, hid_t set, hid_t creation, 
         if (H5Dget_chunk_info_by_coord(set, at, &left_out, &address, &stored) < 0 || address == HADDR_UNDEF)
             return "has chunks that were never written";
         if ((is_packed ? stored > most_stored(&chunks) : stored != chunks.bytes) || !lies_in_file(reader, address, stored))
-            return "has chunks that are cut off";
+            return "has truncated chunks";
         if ((all_stored += stored) > reader->left)
             return huge;
         next_chunk(&chunks, dataset, at);
@@ -378,9 +378,9 @@ static const char *chunk_trouble(Hdf5Reader *reader, hid_t set, hid_t creation, 
 static const char *contiguous_trouble(Hdf5Reader *reader, hid_t set, uint64_t bytes, bool is_compact)
 {
     if (H5Dget_storage_size(set) != bytes)
-        return "does not have as many bytes as its shape needs";
+        return "has fewer bytes than its shape needs";
     if (bytes > reader->left || (!is_compact && !lies_in_file(reader, H5Dget_offset(set), bytes)))
-        return "has more bytes than the file, or than are read (16 GiB)";
+        return "has more bytes than the file, or than the limit (16 GiB)";
     reader->left -= bytes;
     return NULL;
 }
@@ -390,16 +390,16 @@ static const char *storage_trouble(Hdf5Reader *reader, hid_t set, const Hdf5Data
 {
     hid_t creation = H5Dget_create_plist(set);
     if (creation < 0)
-        return "does not say how it is stored";
+        return "has no storage layout";
     uint64_t values = value_count(dataset);
     H5D_layout_t layout = H5Pget_layout(creation);
     const char *trouble = NULL;
     if (H5Pget_external_count(creation) != 0)
         trouble = "is stored in another file";
     else if (layout == H5D_VIRTUAL)
-        trouble = "is put together from other files";
+        trouble = "is a virtual dataset (assembled from other files)";
     else if (H5Pget_nfilters(creation) != 0 && layout != H5D_CHUNKED)
-        trouble = "is packed, but not in chunks";
+        trouble = "is compressed but not chunked";
     else if (values > 0 && layout == H5D_CHUNKED)
         trouble = chunk_trouble(reader, set, creation, dataset, value_bytes);
     else if (values > 0)
@@ -413,7 +413,7 @@ static const char *storage_trouble(Hdf5Reader *reader, hid_t set, const Hdf5Data
 static bool inspect_open(Hdf5Reader *reader, hid_t set, hid_t type, hid_t space, Hdf5Dataset *dataset)
 {
     if (type < 0 || !(is_float(dataset->type) ? is_plain_float(type) : is_plain_integer(type))) {
-        faults_add(reader->faults, reader->name, 0, 0, "%s has the wrong type; valid: %s", dataset->path,
+        faults_add(reader->faults, reader->name, 0, 0, "%s has the wrong type; expected %s", dataset->path,
                    is_float(dataset->type) ? "IEEE floats of 32 or 64 bits" : "integers of 8 to 64 bits");
         return false;
     }
@@ -421,7 +421,7 @@ static bool inspect_open(Hdf5Reader *reader, hid_t set, hid_t type, hid_t space,
         return false;
     const char *trouble = storage_trouble(reader, set, dataset, H5Tget_size(type));
     if (trouble)
-        faults_add(reader->faults, reader->name, 0, 0, "%s promises %" PRIu64 " values, but %s; valid: bytes in this file, plain or packed by deflate", dataset->path, value_count(dataset),
+        faults_add(reader->faults, reader->name, 0, 0, "%s promises %" PRIu64 " values, but %s; expected data in this file, plain or compressed by deflate", dataset->path, value_count(dataset),
                    trouble);
     return !trouble;
 }
@@ -447,7 +447,7 @@ static bool is_finite(const Hdf5Reader *reader, const Hdf5Dataset *dataset, cons
     for (uint64_t i = 0; i < count; i++) {
         double value = dataset->type == HDF5_FLOAT ? (double)((const float *)values)[i] : ((const double *)values)[i];
         if (!isfinite(value)) {
-            faults_add(reader->faults, reader->name, 0, 0, "%s holds %g in row %" PRIu64 "; valid: finite numbers", dataset->path, value, i / (count / dataset->size[0]));
+            faults_add(reader->faults, reader->name, 0, 0, "%s holds %g in row %" PRIu64 "; expected finite numbers", dataset->path, value, i / (count / dataset->size[0]));
             return false;
         }
     }
@@ -585,7 +585,7 @@ bool hdf5_read_into(Hdf5Reader *reader, const Hdf5Dataset *dataset, void *out)
     if (set >= 0)
         H5Dclose(set);
     if (!good)
-        faults_add(reader->faults, reader->name, 0, 0, "%s cannot be read: its data are damaged or cut off", dataset->path);
+        faults_add(reader->faults, reader->name, 0, 0, "%s cannot be read: its data are damaged or truncated", dataset->path);
     return good && (!dataset->is_finite || !is_float(dataset->type) || is_finite(reader, dataset, out));
 }
 
@@ -595,7 +595,7 @@ void *hdf5_read(Hdf5Reader *reader, Hdf5Dataset *dataset)
         return NULL;
     void *values = calloc(value_count(dataset) + 1, H5Tget_size(memory_type(dataset->type)));
     if (!values)
-        faults_add(reader->faults, reader->name, 0, 0, "%s needs more memory than there is (%" PRIu64 " values)", dataset->path, value_count(dataset));
+        faults_add(reader->faults, reader->name, 0, 0, "not enough memory for %s (%" PRIu64 " values)", dataset->path, value_count(dataset));
     else if (hdf5_read_into(reader, dataset, values))
         return values;
     free(values);
@@ -674,7 +674,7 @@ char *hdf5_text(Hdf5Reader *reader, const char *path)
         !storage_trouble(reader, set, &(Hdf5Dataset){.path = path, .rank = 0}, H5Tget_size(type)))
         text = fixed_text(reader, type, set, -1);
     if (!text)
-        faults_add(reader->faults, reader->name, 0, 0, "%s is no text; valid: one text of fixed length, stored in this file", path);
+        faults_add(reader->faults, reader->name, 0, 0, "%s is not a string; expected one string of fixed length, stored in this file", path);
     if (space >= 0)
         H5Sclose(space);
     if (type >= 0)
@@ -702,7 +702,7 @@ char *hdf5_text_attribute(Hdf5Reader *reader, const char *object, const char *na
     if (type >= 0 && space >= 0 && is_one_text(type, space))
         text = H5Tis_variable_str(type) > 0 ? variable_text(type, attribute) : fixed_text(reader, type, -1, attribute);
     if (!text)
-        faults_add(reader->faults, reader->name, 0, 0, "attribute %s of %s is not a text; valid: one text", name, object);
+        faults_add(reader->faults, reader->name, 0, 0, "attribute %s of %s is not a string; expected one string", name, object);
     if (space >= 0)
         H5Sclose(space);
     if (type >= 0)
@@ -720,7 +720,7 @@ double hdf5_number(Hdf5Reader *reader, const char *name, double otherwise)
     hid_t type = H5Aget_type(attribute), space = H5Aget_space(attribute);
     bool is_number = type >= 0 && space >= 0 && (is_plain_float(type) || is_plain_integer(type)) && H5Sget_simple_extent_npoints(space) == 1;
     if (!is_number || H5Aread(attribute, H5T_NATIVE_DOUBLE, &value) < 0) {
-        faults_add(reader->faults, reader->name, 0, 0, "attribute %s is not a number; valid: one number", name);
+        faults_add(reader->faults, reader->name, 0, 0, "attribute %s is not a number; expected one number", name);
         value = otherwise;
     }
     if (space >= 0)

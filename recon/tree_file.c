@@ -46,7 +46,7 @@ static bool expect_rows(const Reader *reader, const Hdf5Dataset *column, uint64_
 {
     if (column->size[0] == rows)
         return true;
-    faults_add(reader->faults, reader->name, 0, 0, "%s has %" PRIu64 " rows; valid: %" PRIu64 ", %s", column->path, column->size[0], rows, meaning);
+    faults_add(reader->faults, reader->name, 0, 0, "%s has %" PRIu64 " rows; expected %" PRIu64 ", %s", column->path, column->size[0], rows, meaning);
     return false;
 }
 
@@ -65,7 +65,7 @@ static int read_kernel(const Reader *reader)
     char *text = read_text(reader, "kernel");
     int kernel = text && strcmp(text, kernel_name[KERNEL_COMPACT]) == 0 ? KERNEL_COMPACT : KERNEL_CAUCHY;
     if (text && text[0] && strcmp(text, kernel_name[kernel]))
-        faults_add(reader->faults, reader->name, 0, 0, "attribute kernel is '%.40s'; valid: cauchy (a local model a node), compact (shared blobs)", text);
+        faults_add(reader->faults, reader->name, 0, 0, "attribute kernel is '%.40s'; expected cauchy (one local model per node) or compact (shared blobs)", text);
     free(text);
     return kernel;
 }
@@ -77,9 +77,9 @@ static double read_attributes(const Reader *reader, TreeFileInfo *info)
     info->created_by = read_text(reader, "created_by");
     double version = hdf5_number(reader->file, "version", FORMAT_VERSION), iso_level = hdf5_number(reader->file, "iso_level", 0.1);
     if (version != FORMAT_VERSION)
-        faults_add(reader->faults, reader->name, 0, 0, "attribute version is %g; valid: %d", version, FORMAT_VERSION);
+        faults_add(reader->faults, reader->name, 0, 0, "attribute version is %g; expected %d", version, FORMAT_VERSION);
     if (!(iso_level > 0 && iso_level < 1e6)) {
-        faults_add(reader->faults, reader->name, 0, 0, "attribute iso_level is %g; valid: a positive number", iso_level);
+        faults_add(reader->faults, reader->name, 0, 0, "attribute iso_level is %g; expected a positive number", iso_level);
         iso_level = 0.1;
     }
     return iso_level;
@@ -108,15 +108,15 @@ static VesselTree *read_tree(const Reader *reader, TreeFileInfo *info)
         if (seen[i] && (i == BLOB_WIDTH || i == BLOB_AMPLITUDE))
             expect_rows(reader, &found[i], blobs, "the number of blobs");
     if (seen[CENTER] && (nodes < 1 || nodes > INT32_MAX - 1))
-        faults_add(reader->faults, reader->name, 0, 0, "/nodes/center has %llu rows; valid: 1 to %d", (unsigned long long)nodes, INT32_MAX - 1);
+        faults_add(reader->faults, reader->name, 0, 0, "/nodes/center has %llu rows; expected 1 to %d", (unsigned long long)nodes, INT32_MAX - 1);
     if (is_model && seen[BLOB_CENTER] && blobs < 1)
-        faults_add(reader->faults, reader->name, 0, 0, "/blobs/center is empty; a model has blobs, a tree no /blobs");
+        faults_add(reader->faults, reader->name, 0, 0, "/blobs/center is empty; expected blobs (a model), or no /blobs at all (a tree)");
     if (reader->faults->count > before)
         return NULL;
 
     VesselTree *tree = (is_shared ? vessel_tree_create_shared : vessel_tree_create)((int)nodes, (int64_t)points, (int64_t)blobs);
     if (!tree) {
-        faults_add(reader->faults, reader->name, 0, 0, "needs more memory than there is (%llu nodes, %llu points)", (unsigned long long)nodes,
+        faults_add(reader->faults, reader->name, 0, 0, "needs more memory than is available (%llu nodes, %llu points)", (unsigned long long)nodes,
                    (unsigned long long)points);
         return NULL;
     }
@@ -133,7 +133,7 @@ static VesselTree *read_tree(const Reader *reader, TreeFileInfo *info)
     if (good && vessel_tree_validate(tree, reader->name, reader->faults)) {
         if (vessel_tree_link(tree))
             return tree;
-        faults_add(reader->faults, reader->name, 0, 0, "no memory for the links of %d nodes and for who sees %lld blobs; free some, or fit the tree again",
+        faults_add(reader->faults, reader->name, 0, 0, "not enough memory for the links of %d nodes and their lists of %lld blobs; free some, or fit the tree again",
                    tree->node_count, (long long)tree->blob_count);
     }
     vessel_tree_free(tree);
@@ -143,7 +143,7 @@ static VesselTree *read_tree(const Reader *reader, TreeFileInfo *info)
 static VesselTree *parse(const void *bytes, size_t length, bool has_rehearsal, const char *name, TreeFileInfo *info, Faults *faults)
 {
     TreeFileInfo held = {0};
-    Reader reader = {.file = hdf5_reader_parse(bytes, length, has_rehearsal, name, "a tree has /nodes and /points, a model /blobs too", faults),
+    Reader reader = {.file = hdf5_reader_parse(bytes, length, has_rehearsal, name, "expected a tree (/nodes and /points) or a model (/blobs too)", faults),
                      .name = name, .faults = faults};
     VesselTree *tree = reader.file ? read_tree(&reader, &held) : NULL;
     hdf5_reader_close(reader.file);
@@ -300,7 +300,7 @@ static size_t image_length(const Image *image)
 bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char *path, Faults *faults)
 {
     if (!heap_has_room(HEAP_ROOM_OF_HDF5)) {
-        faults_add(faults, path, 0, 0, "cannot be written: no memory for the HDF5 library");
+        faults_add(faults, path, 0, 0, "cannot be written: the HDF5 library is out of memory");
         return false;
     }
     Hdf5Silence kept = hdf5_silence_begin();
@@ -320,7 +320,7 @@ bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char
     hdf5_silence_end(kept);
     size_t length = built ? image_length(&image) : 0;
     if (length == 0)
-        faults_add(faults, path, 0, 0, "cannot be written: the HDF5 library failed (memory?)");
+        faults_add(faults, path, 0, 0, "cannot be written: the HDF5 library failed (out of memory?)");
     built = length > 0 && whole_file_write(path, image.bytes, length, faults);
     free(image.bytes);
     return built;

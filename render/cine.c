@@ -472,7 +472,7 @@ Cine *cine_unpack(const uint8_t *bytes, size_t length, const char *name, Faults 
     CineShape shape = {0};
     walk_head(&cursor, &shape, &count);
     if (!cursor.good || cursor.version < ONE_TOOL || cursor.version > SEVERAL_TOOLS) {
-        faults_add_at_byte(faults, name, 0, "is no cine loop of version %d to %d; a file that the trainer saved is expected", ONE_TOOL, SEVERAL_TOOLS);
+        faults_add_at_byte(faults, name, 0, "is not a cine loop of version %d to %d; expected a file saved by the trainer is expected", ONE_TOOL, SEVERAL_TOOLS);
         return NULL;
     }
     if (count < 0 || cine_bytes(&shape, count > 0 ? count : 1) == 0 || (cursor.version > ONE_TOOL && shape.tool_count < 2)) {
@@ -504,9 +504,9 @@ Cine *cine_unpack(const uint8_t *bytes, size_t length, const char *name, Faults 
     uint64_t sum = 0;
     WALK(&cursor, sum);
     if (fault)
-        faults_add_at_byte(faults, name, at, "an image that cannot be drawn: %s; the file is damaged", fault);
+        faults_add_at_byte(faults, name, at, "an image cannot be drawn: %s; the file is damaged", fault);
     else if (cursor.at != length || sum != checksum(bytes, length - sizeof sum))
-        faults_add_at_byte(faults, name, length - sizeof sum, "has another checksum than it says; the file is damaged");
+        faults_add_at_byte(faults, name, length - sizeof sum, "the checksum does not match; the file is damaged");
     else {
         cine->count = count;
         return cine;

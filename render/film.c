@@ -224,7 +224,7 @@ bool film_movie(const char *path, const FilmOptions *options, const RecordedRun 
     }
     good = movie_file_close(movie, message, sizeof message) && good;
     if (!good)
-        faults_add(faults, "--movie", 0, 0, "%s", *message ? message : "the film could not be written to its end");
+        faults_add(faults, "--movie", 0, 0, "%s", *message ? message : "the film could not be written completely");
     film_close(&film);
     return good;
 }

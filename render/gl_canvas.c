@@ -13,7 +13,7 @@ bool gl_canvas_create(GlCanvas *canvas, int width, int height, int samples, char
     glGetIntegerv(GL_MAX_SAMPLES, &most_samples);
     glGetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &most_pixels);
     if (width < 1 || height < 1 || width > most_pixels || height > most_pixels)
-        return message_fail(message, capacity, "a picture of %d x %d pixels cannot be drawn here; 64 to %d", width, height, (int)most_pixels);
+        return message_fail(message, capacity, "a picture of %d x %d pixels cannot be drawn; expected 64 to %d per side", width, height, (int)most_pixels);
     if (samples > most_samples)
         samples = most_samples;
 

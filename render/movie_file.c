@@ -114,15 +114,15 @@ MovieFile *movie_file_create(const char *path, int width, int height, double fps
 {
     struct stat status;
     if (width < LEAST_SIDE || height < LEAST_SIDE || width > MOST_SIDE || height > MOST_SIDE) {
-        message_fail(message, capacity, "%s: a movie of %d x %d pixels; sides of %d to %d are valid", path, width, height, LEAST_SIDE, MOST_SIDE);
+        message_fail(message, capacity, "%s: a movie of %d x %d pixels; expected sides of %d to %d", path, width, height, LEAST_SIDE, MOST_SIDE);
         return NULL;
     }
     if (!(fps >= 0.001) || fps > 1000) {
-        message_fail(message, capacity, "%s: %g frames a second; above 0 to 1000 are valid", path, fps);
+        message_fail(message, capacity, "%s: %g frames a second; expected above 0 to 1000", path, fps);
         return NULL;
     }
     if (stat(path, &status) == 0 && !S_ISREG(status.st_mode)) {
-        message_fail(message, capacity, "%s: is there and no regular file; give another name", path);
+        message_fail(message, capacity, "%s: exists and is not a regular file; give another name", path);
         return NULL;
     }
     MovieFile *movie = calloc(1, sizeof *movie);
@@ -146,7 +146,7 @@ MovieFile *movie_file_create(const char *path, int width, int height, double fps
         message_fail(message, capacity, "%s: cannot be written: %s; give a file in a folder with write permission", path, strerror(errno));
     } else if (!start_encoder(movie, fps)) {
         if (errno == ENOENT)
-            message_fail(message, capacity, "%s: the program ffmpeg, which makes movies, is not there: install ffmpeg", path);
+            message_fail(message, capacity, "%s: the program ffmpeg, which encodes movies, was not found: install ffmpeg", path);
         else
             message_fail(message, capacity, "%s: ffmpeg cannot be started: %s", path, strerror(errno));
     } else {
@@ -276,7 +276,7 @@ bool movie_file_close(MovieFile *movie, char *message, size_t capacity)
     if (movie->late)
         message_fail(message, capacity, "%s: ffmpeg took no frame for %d s; no movie was made", movie->path, PATIENCE_S);
     else if (movie->count == 0 && !movie->failed)
-        message_fail(message, capacity, "%s: a movie of no frames; at least one is needed", movie->path);
+        message_fail(message, capacity, "%s: the movie has no frames; expected at least one", movie->path);
     else if (WIFSIGNALED(ended))
         message_fail(message, capacity, "%s: ffmpeg was ended by signal %d after %d frames; no movie was made", movie->path, WTERMSIG(ended), movie->count);
     else if (movie->failed || !WIFEXITED(ended) || WEXITSTATUS(ended) != 0 || words[0])

@@ -96,7 +96,7 @@ bool picture_of_error(const char *path, const PictureOptions *options, const Ves
     if (!tree || !vessel_tree_is_model(tree) || !mesh || mesh->vertex_count < 1 || !error)
         return message_fail(message, capacity, "no surface of a fitted model to draw");
     if (!(voxel_mm > 0) || !isfinite(voxel_mm))
-        return message_fail(message, capacity, "a voxel of %g mm; above 0", voxel_mm);
+        return message_fail(message, capacity, "a voxel of %g mm; expected above 0", voxel_mm);
     for (int v = 0; v < mesh->vertex_count; v++)
         if (!vec3_is_finite(mesh->vertex[v]))
             return message_fail(message, capacity, "vertex %d is not a finite number: nothing is drawn", v);

@@ -29,10 +29,10 @@ static const Color TARGET_COLOR = {0, 114, 178, 255}, ARROW_COLOR = {0, 120, 105
 static bool check_input(const PictureScene *scene, int tool_count, const PictureTool *tool, char *message, size_t capacity)
 {
     if (tool_count < 1 || tool_count > 6)
-        return message_fail(message, capacity, "a picture of %d moments; 1 to 6", tool_count);
+        return message_fail(message, capacity, "a picture of %d moments; expected 1 to 6", tool_count);
     for (int k = 0; k < tool_count; k++) {
         if (tool[k].node_count < 2 || !tool[k].position || !tool[k].radius)
-            return message_fail(message, capacity, "a tool of %d nodes cannot be drawn; at least 2", tool[k].node_count);
+            return message_fail(message, capacity, "a tool of %d nodes cannot be drawn; expected at least 2", tool[k].node_count);
         for (int i = 0; i < tool[k].node_count; i++)
             if (!vec3_is_finite(tool[k].position[i]) || !isfinite(tool[k].radius[i]) || (tool[k].force && !vec3_is_finite(tool[k].force[i])))
                 return message_fail(message, capacity, "node %d of the tool is not a finite number: nothing is drawn", i);

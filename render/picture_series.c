@@ -171,7 +171,7 @@ bool picture_of_series(const char *path, const PictureOptions *options, int coun
                        int event_count, const PictureEvent *event, char *message, size_t capacity)
 {
     if (count < 2 || panel_count < 1 || panel_count > 12)
-        return message_fail(message, capacity, "a chart of %d samples in %d panels; at least 2 in 1 to 12", count, panel_count);
+        return message_fail(message, capacity, "a chart of %d samples in %d panels; expected at least 2 samples in 1 to 12 panels", count, panel_count);
     for (int i = 0; i < count; i++)
         if (!isfinite(time_s[i]) || (i > 0 && time_s[i] < time_s[i - 1]))
             return message_fail(message, capacity, "time %d of a chart is not a number or goes backwards: nothing is drawn", i);

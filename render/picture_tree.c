@@ -19,14 +19,14 @@ static bool check_projections(int count, const PictureProjection *projection, in
                               size_t capacity)
 {
     if (count < 1 || count > 6)
-        return message_fail(message, capacity, "a picture of %d projections; 1 to 6", count);
+        return message_fail(message, capacity, "a picture of %d projections; expected 1 to 6", count);
     for (int k = 0; k < count; k++) {
         const PictureProjection *p = &projection[k];
         if (p->width < 1 || p->height < 1 || p->width > 16384 || p->height > 16384 || !p->value)
-            return message_fail(message, capacity, "projection %d has %d x %d pixels; 1 to 16384 each way", k, p->width, p->height);
+            return message_fail(message, capacity, "projection %d has %d x %d pixels; expected 1 to 16384 per side", k, p->width, p->height);
         if (!vec3_is_finite(p->origin) || !vec3_is_finite(p->across) || !vec3_is_finite(p->up) || !(vec3_norm(p->across) > 0) ||
             !(vec3_norm(p->up) > 0))
-            return message_fail(message, capacity, "projection %d has no pixel size; steps across and up above 0 mm", k);
+            return message_fail(message, capacity, "projection %d has no pixel size; expected steps above 0 mm", k);
     }
     for (int k = 0; k < polyline_count; k++)
         for (int i = 0; i < polyline[k].count; i++)
@@ -336,7 +336,7 @@ bool picture_of_tree(const char *path, const PictureOptions *options, const int 
     bool drawn = true;
     for (int k = 0; k < 3; k++)
         if (size[k] < 1 || size[k] > 16384)
-            return message_fail(message, capacity, "a volume of %d x %d x %d voxels; 1 to 16384 each way", size[0], size[1], size[2]);
+            return message_fail(message, capacity, "a volume of %d x %d x %d voxels; expected 1 to 16384 per side", size[0], size[1], size[2]);
     for (int k = 0; k < 3; k++) {
         int a = plane[k][0], b = plane[k][1];
         size_t pixels = (size_t)size[a] * (size_t)size[b];

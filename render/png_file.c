@@ -49,7 +49,7 @@ static bool write_pixels(FILE *file, int width, int height, const uint8_t *rgb)
 bool png_file_write(const char *path, int width, int height, const uint8_t *rgb, char *message, size_t capacity)
 {
     if (part_file_is_through(path))
-        return message_fail(message, capacity, "%s: is there and no regular file; give another name", path);
+        return message_fail(message, capacity, "%s: exists and is not a regular file; give another name", path);
     PartFile part;
     errno = 0;
     bool written = part_file_begin(&part, path);

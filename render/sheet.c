@@ -21,7 +21,7 @@ bool sheet_open(Sheet *sheet, const PictureOptions *options, int height, char *m
     int used = height < 64 ? 64 : height < options->height ? height : options->height;
     *sheet = (Sheet){.width = options->width, .height = used, .message = message, .capacity = capacity};
     if (options->width < 64 || options->width > 8192 || options->height < 64 || options->height > 8192)
-        return message_fail(message, capacity, "a picture of %d x %d pixels; each side 64 to 8192", options->width, options->height);
+        return message_fail(message, capacity, "a picture of %d x %d pixels; expected 64 to 8192 per side", options->width, options->height);
     sheet->scale = sheet_scale_of(options);
     sheet->context = gl_context_create(message, capacity);
     if (!sheet->context)
@@ -30,7 +30,7 @@ bool sheet_open(Sheet *sheet, const PictureOptions *options, int height, char *m
     if (made) {
         sheet->overlay = overlay_create(sheet->width, sheet->height, (float)sheet->scale);
         if (!sheet->overlay)
-            made = message_fail(message, capacity, "the text renderer does not start; is libgl1 installed?");
+            made = message_fail(message, capacity, "cannot start the text renderer; is libgl1 installed?");
     }
     if (made) {
         sheet->view = surface_view_create(message, capacity);

@@ -105,7 +105,7 @@ static void warn(TrainerPanel *panel, const Pose *pose, const RealtimeFigures *f
         state->warnings |= WARN_OUTSIDE;
     if (report->flags & STEP_NOT_CONVERGED)
         state->warnings |= WARN_NOT_CONVERGED;
-    const char *line = report->flags & STEP_FULLY_INSERTED ? "The whole tool is in: there is no more to push"
+    const char *line = report->flags & STEP_FULLY_INSERTED ? "The whole tool is in: nothing is left to push"
                        : report->flags & STEP_HAND_SLIPS   ? "The hand slips along the tool: it asks for more force than the hand holds"
                        : report->flags & STEP_LIMITED      ? "The tool takes less than the hand feeds: it is jammed, or it snaps"
                                                            : NULL;

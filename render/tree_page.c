@@ -54,7 +54,7 @@ static void print_tree(const Report *report)
     for (int i = 1; i <= highest && i <= 6; i++)
         fprintf(out, "<span class=\"o%d\">%d%s</span>", i, i, i == 6 && highest > 6 ? " and more" : "");
     fprintf(out, "</p>\n<figcaption>Projections along the three axes. Numbers are branches, the ring is the root; S narrow places, D wide places, A aneurysms. A "
-                 "branch goes on at a fork through the wider child; what leaves it is one order higher.</figcaption></figure></section>\n");
+                 "branch continues at a fork through the wider child; what leaves it is one order higher.</figcaption></figure></section>\n");
 }
 
 static void print_finding(const Report *report, int index)

@@ -50,7 +50,7 @@ static void parse_counts(const char *text, size_t length, const char *file, Tool
     double tools = comment_figure(text, length, "tools", 1);
     char key[40];
     if (tools < 1 || tools > STEP_TOOLS_MAX || tools != floor(tools)) {
-        faults_add(faults, file, 1, 1, "has the comment '# tools: %g'; 1 to %d", tools, STEP_TOOLS_MAX);
+        faults_add(faults, file, 1, 1, "has the comment '# tools: %g'; expected 1 to %d", tools, STEP_TOOLS_MAX);
         return;
     }
     path->tool_count = (int)tools;
@@ -58,7 +58,7 @@ static void parse_counts(const char *text, size_t length, const char *file, Tool
         const char *name = nodes_key(path, k, key);
         double nodes = comment_figure(text, length, name, -1);
         if (nodes < 2 || nodes > 1e6 || nodes != floor(nodes))
-            faults_add(faults, file, 1, 1, "lacks the comment '# %s: N' with the tool's number of nodes; make the file with `seldinger check --update`", name);
+            faults_add(faults, file, 1, 1, "has no comment '# %s: N' with the tool's number of nodes; make the file with `seldinger check --update`", name);
         else
             path->node_count[k] = (int)nodes;
     }
@@ -86,15 +86,15 @@ static void parse_rows(const NumberTable *table, const char *file, ToolPath *pat
         const double *value = table->value + (size_t)i * (size_t)table->column_count, *place = value + (several ? 2 : 1);
         double tool = several ? value[1] : 0;
         if (!is_whole(tool, path->tool_count - 1))
-            faults_add(faults, file, table->line[i], 1, "tool %g is no whole number from 0 to %d", tool, path->tool_count - 1);
+            faults_add(faults, file, table->line[i], 1, "tool is %g; expected a whole number from 0 to %d", tool, path->tool_count - 1);
         else if (!is_whole(place[0], INT_MAX))
-            faults_add(faults, file, table->line[i], 1, "node %g is no whole number of at least 0", place[0]);
+            faults_add(faults, file, table->line[i], 1, "node is %g; expected a whole number of at least 0", place[0]);
         else if (fabs(place[1]) > FARTHEST_MM || fabs(place[2]) > FARTHEST_MM || fabs(place[3]) > FARTHEST_MM)
             faults_add(faults, file, table->line[i], 1, "a coordinate is beyond +-%g mm", FARTHEST_MM);
         else
             path->row[i] = (PathRow){value[0], (int)tool, (int)place[0], vec3(place[1], place[2], place[3])};
         if (faults->count == before && i > 0 && !comes_before(&path->row[i - 1], &path->row[i], time_slack(value[0])))
-            faults_add(faults, file, table->line[i], 1, "the row does not come after the one before it; rows stand by time, then tool, then node, each once");
+            faults_add(faults, file, table->line[i], 1, "the row is out of order; expected rows sorted by time, tool and node, each once");
     }
     if (table->row_count == 0)
         faults_add(faults, file, 0, 0, "has no row; make the file with `seldinger check --update`");
@@ -114,7 +114,7 @@ ToolPath *tool_path_parse(const char *text, size_t length, const char *file, Fau
     if (table && path->row) {
         path->duration_s = comment_figure(text, length, "duration_s", -1);
         if (path->duration_s < 0 || path->duration_s > SCRIPT_LONGEST_S)
-            faults_add(faults, file, 1, 1, "lacks the comment '# duration_s: S'; make the file with `seldinger check --update`");
+            faults_add(faults, file, 1, 1, "has no comment '# duration_s: S'; make the file with `seldinger check --update`");
         parse_rows(table, file, path, faults);
     }
     number_table_free(table);

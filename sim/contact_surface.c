@@ -106,7 +106,7 @@ TriangleMesh *contact_surface_mesh(const Vessel *exact, const VesselTree *nodes,
     if (!mesh)
         faults_add(faults, name, 0, 0, "cannot be meshed with cells of %g mm: not enough memory, or the cell is too small for this vessel", cell_mm);
     else if (mesh->triangle_count == 0) {
-        faults_add(faults, name, 0, 0, "has no wall to be meshed with cells of %g mm; take smaller ones", cell_mm);
+        faults_add(faults, name, 0, 0, "has no wall to mesh with cells of %g mm; use smaller cells", cell_mm);
         triangle_mesh_free(mesh);
         mesh = NULL;
     }
@@ -179,7 +179,7 @@ TriangleMesh *contact_surface_load(const char *path, double scale, NoteFunction 
         note(path, text);
     TriangleMesh *mesh = NULL;
     if (check.nonmanifold_edges.count)
-        faults_add(faults, path, 0, 0, "has %d edges of three triangles or more, first at triangle %d: inside and outside cannot be told; an edge has "
+        faults_add(faults, path, 0, 0, "has %d edges of three triangles or more, first at triangle %d: inside and outside cannot be distinguished; an edge has "
                    "one or two", check.nonmanifold_edges.count, check.nonmanifold_edges.first);
     else if ((mesh = calloc(1, sizeof *mesh)) != NULL) {
         *mesh = (TriangleMesh){.vertex_count = surface->vertex_count, .triangle_count = surface->triangle_count, .vertex = surface->vertex,

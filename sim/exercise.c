@@ -29,7 +29,7 @@ static int read_name(YamlValue value, const char *what, int count, const char *c
         if (!strcmp(name, names[i]))
             return i;
     if (count > 0)
-        yaml_fault(value, "'%.60s' is no %s of this scene; the first of its %d is '%s'", name, what, count, names[0]);
+        yaml_fault(value, "'%.60s' is not a %s of this scene; it has %d, the first is '%s'", name, what, count, names[0]);
     return -1;
 }
 

@@ -79,7 +79,7 @@ static bool entry_is_inside(const Scene *scene, const Vessel *vessel, Faults *fa
     vessel_query(vessel, 1, &x, 1, &memory, &hit);
     if (!(hit.flags & VESSEL_OPEN_END) && hit.gap > 0)
         return true;
-    faults_add(faults, scene->path, 0, 0, "the tool's tip at the start, (%g, %g, %g) mm, is not inside of the mesh %s; put the sheath's entry into its lumen",
+    faults_add(faults, scene->path, 0, 0, "the tool's tip at the start, (%g, %g, %g) mm, is not inside the mesh %s; put the sheath's entry into its lumen",
                x.x, x.y, x.z, scene->mesh_path);
     return false;
 }
@@ -135,7 +135,7 @@ bool open_vessel(const Scene *scene, const OpenVesselOptions *options, OpenVesse
         faults_add(faults, scene->path, 0, 0, "contact '%s' needs a fitted model: make it with `seldinger import` and `fit`; a mesh has mesh, smooth_mesh, "
                    "flat_mesh and grid", name);
     else if (as_surface && scene->source == SOURCE_PLANE)
-        faults_add(faults, scene->path, 0, 0, "contact '%s' needs a wall that ends somewhere; a plane has 'tube', which is the plane itself", name);
+        faults_add(faults, scene->path, 0, 0, "contact '%s' needs a bounded wall; use 'tube' for a plane, which is the exact plane", name);
     else if ((as_mesh || scene->source == SOURCE_MESH) && !mesh_vessel_available())
         faults_add(faults, scene->path, 0, 0, "contact '%s' of this vessel needs Embree, and this program was built without it; install libembree-dev and "
                    "build again, or take another contact", name);
@@ -162,7 +162,7 @@ bool open_vessel_inlet(Scene *scene, const OpenVessel *open, Faults *faults)
         return true;
     if (open->vessel && open->vessel->inlet && open->vessel->inlet(open->vessel, &scene->wire.start, &scene->wire.direction))
         return true;
-    faults_add(faults, scene->path, 0, 0, "'inlet: root' finds no inlet in this vessel; give 'entry_mm' and 'direction'");
+    faults_add(faults, scene->path, 0, 0, "'inlet: root' needs a vessel with an inlet; give 'entry_mm' and 'direction'");
     return false;
 }
 

@@ -133,7 +133,7 @@ static void copy_attribute(const Reader *reader, const char *group, const char *
     if (read && is_name(read))
         strcpy(text, read);
     else
-        faults_add(reader->faults, reader->path, 0, 0, "%s lacks its text attribute '%s', a word of at most %d letters", group, name, TOOL_NAME_SIZE - 1);
+        faults_add(reader->faults, reader->path, 0, 0, "%s has no string attribute '%s' of at most %d letters", group, name, TOOL_NAME_SIZE - 1);
     free(read);
 }
 
@@ -180,7 +180,7 @@ static int64_t read_exchanges(const Reader *reader, RecordedRun *run)
     run->exchange = read_dataset(reader, "/exchange", HDF5_UINT8, 3, size);
     for (uint64_t i = 0; run->exchange && i < 2 * size[0] * size[1]; i++)
         if (run->exchange[i] > EXCHANGES_MOST) {
-            faults_add(reader->faults, reader->path, 0, 0, "/exchange names device %d in step %llu; 0 to %d", run->exchange[i], (unsigned long long)(i / size[1] / 2),
+            faults_add(reader->faults, reader->path, 0, 0, "/exchange names device %d in step %llu; expected 0 to %d", run->exchange[i], (unsigned long long)(i / size[1] / 2),
                        EXCHANGES_MOST);
             break;
         }
@@ -196,7 +196,7 @@ static void count_device_nodes(const Reader *reader, const char *group, Recorded
         while (*count < tool->node_count && !isnan(s[*count]))
             ++*count;
         if (*count < 2)
-            faults_add(reader->faults, reader->path, 0, 0, "%s/s_mm holds %d nodes of device %d; at least 2", group, *count, i);
+            faults_add(reader->faults, reader->path, 0, 0, "%s/s_mm holds %d nodes of device %d; expected at least 2", group, *count, i);
     }
 }
 
@@ -217,10 +217,10 @@ static int64_t read_tool_frames(const Reader *reader, const char *group, bool is
     tool->quaternion = read_frames_of(reader, name[3], HDF5_DOUBLE, 3, quaternion);
     tool->carrier = read_frames_of(reader, name[4], HDF5_INT8, 2, carrier);
     if (nodes < 2 || nodes > 100000 || radius[rank - 1] != nodes || radius[0] != s[0]) {
-        faults_add(reader->faults, reader->path, 0, 0, "%s holds %llu nodes and %llu radii; 2 to 100000 of each", group, (unsigned long long)nodes,
+        faults_add(reader->faults, reader->path, 0, 0, "%s holds %llu nodes and %llu radii; expected 2 to 100000 of each", group, (unsigned long long)nodes,
                    (unsigned long long)radius[rank - 1]);
     } else if (devices < 1 || devices > 1 + EXCHANGES_MOST) {
-        faults_add(reader->faults, reader->path, 0, 0, "%s/s_mm has %llu devices; 1 to %d", group, (unsigned long long)devices, 1 + EXCHANGES_MOST);
+        faults_add(reader->faults, reader->path, 0, 0, "%s/s_mm has %llu devices; expected 1 to %d", group, (unsigned long long)devices, 1 + EXCHANGES_MOST);
     } else if (tool->s) {
         tool->node_count = (int)nodes;
         tool->device_count = (int)devices;
@@ -241,7 +241,7 @@ static XrayControl *read_xray(const Reader *reader, uint64_t *count)
         return (XrayControl *)value;
     XrayControl *xray = shape[1] == XRAY_VALUES_BEFORE_TOOLS ? calloc((size_t)shape[0] + 1, sizeof *xray) : NULL;
     if (!xray)
-        faults_add(reader->faults, reader->path, 0, 0, "/xray has rows of %llu values; %d, or %d in older recordings", (unsigned long long)shape[1], XRAY_VALUES,
+        faults_add(reader->faults, reader->path, 0, 0, "/xray has rows of %llu values; expected %d, or %d in older recordings", (unsigned long long)shape[1], XRAY_VALUES,
                    XRAY_VALUES_BEFORE_TOOLS);
     for (uint64_t i = 0; xray && i < shape[0]; i++)
         memcpy(&xray[i], value + i * XRAY_VALUES_BEFORE_TOOLS, XRAY_VALUES_BEFORE_TOOLS * sizeof *value);
@@ -299,7 +299,7 @@ static int64_t read_nodes(const Reader *reader, uint64_t nodes, RecordedRun *run
     run->s = read_dataset(reader, "/wire/s_mm", HDF5_DOUBLE, 1, s);
     run->radius = read_dataset(reader, "/wire/radius_mm", HDF5_DOUBLE, 1, radius);
     if (run->s && run->radius && (radius[0] != nodes || s[0] != nodes))
-        faults_add(reader->faults, reader->path, 0, 0, "holds %llu nodes and %llu radii; as many of each", (unsigned long long)nodes, (unsigned long long)radius[0]);
+        faults_add(reader->faults, reader->path, 0, 0, "holds %llu nodes and %llu radii; expected equal numbers", (unsigned long long)nodes, (unsigned long long)radius[0]);
     return INT64_MAX;
 }
 
@@ -324,7 +324,7 @@ static void check_numbers(const Reader *reader, const RecordedRun *run)
                    are_numbers(own.radius, own.node_count);
         }
         if (!good) {
-            faults_add(reader->faults, reader->path, 0, 0, "frame %lld has a node that is not a number; valid: finite positions, turns, lengths and radii", (long long)i);
+            faults_add(reader->faults, reader->path, 0, 0, "frame %lld has a node that is not a number; expected finite positions, rotations, lengths and radii", (long long)i);
             return;
         }
     }
@@ -335,11 +335,11 @@ static void check_frames(const Reader *reader, const RecordedRun *run)
 {
     for (int64_t i = 0; i < run->frame_count; i++) {
         if (i ? run->frame_step[i] <= run->frame_step[i - 1] : run->frame_step[i] < 0) {
-            faults_add(reader->faults, reader->path, 0, 0, "frame %lld names step %lld; steps grow from 0", (long long)i, (long long)run->frame_step[i]);
+            faults_add(reader->faults, reader->path, 0, 0, "frame %lld refers to step %lld; expected rising steps from 0", (long long)i, (long long)run->frame_step[i]);
             return;
         }
         if (run->frame_nodes && (run->frame_nodes[i] < 2 || run->frame_nodes[i] > run->node_count)) {
-            faults_add(reader->faults, reader->path, 0, 0, "frame %lld has %d nodes; 2 to %d", (long long)i, run->frame_nodes[i], run->node_count);
+            faults_add(reader->faults, reader->path, 0, 0, "frame %lld has %d nodes; expected 2 to %d", (long long)i, run->frame_nodes[i], run->node_count);
             return;
         }
     }
@@ -353,7 +353,7 @@ static void check_frames(const Reader *reader, const RecordedRun *run)
     for (int k = 0; run->frame_nodes && k < run->tool_count; k++)
         for (int64_t i = 0; i < run->frame_count * run->tool[k].node_count; i++)
             if (run->tool[k].carrier[i] < -1 || run->tool[k].carrier[i] >= run->tool_count) {
-                faults_add(reader->faults, reader->path, 0, 0, "/tools/%d/carrier names tool %d; -1 to %d", k, run->tool[k].carrier[i],
+                faults_add(reader->faults, reader->path, 0, 0, "/tools/%d/carrier names tool %d; expected -1 to %d", k, run->tool[k].carrier[i],
                            run->tool_count - 1);
                 return;
             }
@@ -385,7 +385,7 @@ static void read_frames(Reader *reader, RecordedRun *run)
     run->gap = read_frames_of(reader, "/contact/gap_mm", HDF5_FLOAT, 2, gap);
     run->vessel_node = read_frames_of(reader, "/contact/vessel_node", HDF5_INT32, 2, node);
     if (reader->faults->count == before && (position[1] < 2 || position[1] > 100000))
-        faults_add(reader->faults, reader->path, 0, 0, "holds %llu nodes; 2 to 100000", (unsigned long long)position[1]);
+        faults_add(reader->faults, reader->path, 0, 0, "holds %llu nodes; expected 2 to 100000", (unsigned long long)position[1]);
     if (reader->faults->count > before)
         return;
     int64_t others = run->tool_count > 1 ? read_tools_frames(reader, position[1], run) : read_nodes(reader, position[1], run);
@@ -410,7 +410,7 @@ static void check_times(const Reader *reader, const RecordedRun *run)
         double due = (i > 0 ? run->time_s[0] : dt) + (double)i * dt;
         bool is_due = i > 0 ? fabs(run->time_s[i] - due) < 0.01 * dt : run->time_s[0] > 0 && run->time_s[0] < MOST_TIME_S;
         if (!is_due) {
-            faults_add(reader->faults, reader->path, 0, 0, "/time_s holds %g s in row %lld; valid: rows %g s apart from %g s on", run->time_s[i], (long long)i, dt,
+            faults_add(reader->faults, reader->path, 0, 0, "/time_s holds %g s in row %lld; expected rows %g s apart, starting at %g s", run->time_s[i], (long long)i, dt,
                        i > 0 ? run->time_s[0] : dt);
             return;
         }
@@ -429,7 +429,7 @@ static void check_xray(const Reader *reader, const RecordedRun *run)
         memcpy(value, &run->xray[i], sizeof value);
         for (int k = 0; k < XRAY_VALUES; k++)
             if (!(value[k] >= valid[k].least && value[k] <= valid[k].most)) {
-                faults_add(reader->faults, reader->path, 0, 0, "/xray holds %g in row %lld, column %d; valid: %g to %g", (double)value[k], (long long)i, k,
+                faults_add(reader->faults, reader->path, 0, 0, "/xray holds %g in row %lld, column %d; expected %g to %g", (double)value[k], (long long)i, k,
                            (double)valid[k].least, (double)valid[k].most);
                 return;
             }
@@ -440,7 +440,7 @@ static double read_step_ms(const Reader *reader)
 {
     double step_ms = hdf5_number(reader->file, "step_ms", 1);
     if (!(step_ms >= 0.001 && step_ms <= 100))
-        faults_add(reader->faults, reader->path, 0, 0, "has steps of %g ms; 0.001 to 100", step_ms);
+        faults_add(reader->faults, reader->path, 0, 0, "has steps of %g ms; expected 0.001 to 100", step_ms);
     return step_ms;
 }
 

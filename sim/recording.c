@@ -992,7 +992,7 @@ static Recording *create(const char *path, Simulator *simulator, const Recording
     int reason = errno;
     recording->started = good && pthread_create(&recording->writer, NULL, write_rings, recording) == 0;
     if (!recording->started) {
-        faults_add(faults, path, 0, 0, "cannot be recorded: %s; a folder with write permission and free space is needed",
+        faults_add(faults, path, 0, 0, "cannot be recorded: %s; expected a writable folder with free space",
                    reason ? strerror(reason) : "the HDF5 library could not make the file");
         if (recording->ordered)
             ordered_file_close(recording->ordered, false);

@@ -28,7 +28,7 @@ static bool save(const RecordedRun *run, const Scene *scene, const OpenVessel *o
     else
         session_date(stat(recording, &file) == 0 ? file.st_mtime : 0, date);
     if (!good)
-        faults_add(faults, recording, 0, 0, "cannot be scored: step %lld gives another state than it holds; `seldinger replay --verify` says more",
+        faults_add(faults, recording, 0, 0, "cannot be scored: step %lld gives another state than the recorded one; see `seldinger replay --verify`",
                    (long long)rescore_first_different(rescore));
     else
         good = session_files_save(scene, run->trainee ? run->trainee : "", "not known: the session was cut off",

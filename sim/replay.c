@@ -7,7 +7,7 @@
 Scene *replay_scene(const RecordedRun *run, const char *path, Faults *faults)
 {
     if (!run->scene_text || !run->scene_path) {
-        faults_add(faults, path, 0, 0, "lacks its scene's text or path; a recording that `seldinger run --record` or `nav` wrote holds both");
+        faults_add(faults, path, 0, 0, "has no scene text or no scene path; expected a recording made by `seldinger run --record` or `nav`");
         return NULL;
     }
     Scene *scene = scene_parse(run->scene_text, strlen(run->scene_text), run->scene_path, faults);

@@ -41,7 +41,7 @@ static bool rename_file(char **text, const char *key, const char *file, const ch
     if (!file)
         return true;
     if (!realpath(file, whole)) {
-        faults_add(faults, file, 0, 0, "cannot be found: %s; the recording's scene names it", strerror(errno));
+        faults_add(faults, file, 0, 0, "cannot be found: %s; the recording's scene refers to it", strerror(errno));
         return false;
     }
     relative_path(whole, folder, named, sizeof named);
@@ -74,7 +74,7 @@ bool replay_write_scene(const RecordedRun *run, const Scene *scene, const char *
 {
     char whole[PATH_MAX];
     if ((mkdir(folder, 0777) != 0 && errno != EEXIST) || !realpath(folder, whole)) {
-        faults_add(faults, folder, 0, 0, "cannot be made: %s; a folder's path with write permission", strerror(errno));
+        faults_add(faults, folder, 0, 0, "cannot be created: %s; expected a path in a writable folder", strerror(errno));
         return false;
     }
     size_t length = 0;

@@ -58,7 +58,7 @@ static void read_polyline(Reading *reading, YamlValue value)
     char *text = path ? text_file_read(path, &length, reading->faults) : NULL;
     NumberTable *table = text ? number_table_parse(text, length, path, "x_mm,y_mm,z_mm", reading->faults) : NULL;
     if (table && table->row_count < 2)
-        faults_add(reading->faults, path, 1, 1, "has %d points; a polyline has at least 2", table->row_count);
+        faults_add(reading->faults, path, 1, 1, "has %d points; expected at least 2", table->row_count);
     Vec3 *point = table ? scene_zeroed(reading, table->row_count, sizeof *point) : NULL;
     if (point) {
         for (int i = 0; i < table->row_count; i++) {
@@ -67,7 +67,7 @@ static void read_polyline(Reading *reading, YamlValue value)
             if (fabs(row[0]) > farthest_mm || fabs(row[1]) > farthest_mm || fabs(row[2]) > farthest_mm)
                 faults_add(reading->faults, path, table->line[i], 1, "a coordinate is beyond +-%g mm", farthest_mm);
             if (i && vec3_distance(point[i], point[i - 1]) < 1e-9)
-                faults_add(reading->faults, path, table->line[i], 1, "the point repeats the one before it; neighbours differ");
+                faults_add(reading->faults, path, table->line[i], 1, "the point repeats the one before it; expected distinct points");
         }
         tube->point = point;
         tube->point_count = table->row_count;
@@ -89,7 +89,7 @@ static void read_tube(Reading *reading, YamlValue value)
     yaml_map_unit_vector(&map, "direction", false, &tube->direction);
     tube->normal = vec3_normal_to(tube->direction);
     if (yaml_map_unit_vector(&map, "normal", false, &tube->normal) && vec3_norm(vec3_cross(tube->normal, tube->direction)) < 1e-6)
-        yaml_fault(yaml_get(&map, "normal", false), "'normal' lies along 'direction'; arcs turn towards it, so it points elsewhere");
+        yaml_fault(yaml_get(&map, "normal", false), "'normal' is parallel to 'direction'; arcs bend towards it, so expected another direction");
     yaml_map_number(&map, "radius_mm", true, length_range, &tube->radius);
     tube->closed_ends = yaml_has(&map, "ends") && yaml_choice(yaml_get(&map, "ends", false), ends) == 1;
     if (map.value.node && yaml_has(&map, "path") == yaml_has(&map, "points")) {
@@ -108,7 +108,7 @@ static void read_tube(Reading *reading, YamlValue value)
     for (int i = 0; piece && i < count; i++) {
         YamlValue item = yaml_item(list, i);
         if (scene_read_piece(item, &piece[i]) && piece[i].angle > 0 && tube->radius > 0 && piece[i].arc_radius <= tube->radius)
-            yaml_fault(item, "an arc of radius %g mm is tighter than the lumen's radius %g mm; make it larger", piece[i].arc_radius, tube->radius);
+            yaml_fault(item, "an arc of radius %g mm is tighter than the lumen's radius %g mm; use a larger radius", piece[i].arc_radius, tube->radius);
     }
 }
 
@@ -151,11 +151,11 @@ static void read_vessel(Reading *reading, YamlValue value)
         if (!yaml_has(&map, keys[i]))
             continue;
         if (++sources > 1)
-            yaml_fault(yaml_get(&map, keys[i], false), "a second source '%s'; a vessel has exactly one of model, shape, tube, plane, mesh", keys[i]);
+            yaml_fault(yaml_get(&map, keys[i], false), "a second source '%s'; expected exactly one of model, shape, tube, plane, mesh", keys[i]);
         scene->source = source[i];
     }
     if (sources == 0)
-        yaml_fault(value, "'vessel' has no source; exactly one of model, shape, tube, plane, mesh");
+        yaml_fault(value, "'vessel' has no source; expected exactly one of model, shape, tube, plane, mesh");
     const char *text;
     if (yaml_has(&map, "model") && yaml_text(yaml_get(&map, "model", false), &text))
         scene->model_path = scene_resolved(reading, text);
@@ -181,7 +181,7 @@ static void read_vessel(Reading *reading, YamlValue value)
 static void read_normal(const YamlMap *map, WireOptions *wire)
 {
     if (yaml_map_unit_vector(map, "normal", false, &wire->normal) && vec3_norm(vec3_cross(wire->normal, wire->direction)) < 1e-6)
-        yaml_fault(yaml_get(map, "normal", false), "'normal' lies along 'direction'; it points across the tool");
+        yaml_fault(yaml_get(map, "normal", false), "'normal' is parallel to 'direction'; expected a direction across the tool");
 }
 
 static void read_sheath(Reading *reading, YamlValue value)
@@ -198,16 +198,16 @@ static void read_sheath(Reading *reading, YamlValue value)
     else if (yaml_has(&map, "inlet"))
         reading->scene->inlet_is_root = yaml_choice(yaml_get(&map, "inlet", false), inlets) == 0;
     else if (!yaml_has(&map, "entry_mm"))
-        yaml_fault(value, "'sheath' lacks its place; 'entry_mm' with 'direction', or 'inlet: root'");
+        yaml_fault(value, "'sheath' has no position; expected 'entry_mm' with 'direction', or 'inlet: root'");
     if (yaml_has(&map, "inlet") && yaml_has(&map, "direction"))
-        yaml_fault(yaml_get(&map, "direction", false), "'direction' goes with 'entry_mm'; 'inlet: root' brings its own");
+        yaml_fault(yaml_get(&map, "direction", false), "'direction' belongs to 'entry_mm'; 'inlet: root' sets its own");
     yaml_map_vector(&map, "entry_mm", false, farthest_mm, &wire->start);
     yaml_map_unit_vector(&map, "direction", yaml_has(&map, "entry_mm"), &wire->direction);
     read_normal(&map, wire);
     double most = reading->total_length > 0 ? reading->total_length : 1e5;
     yaml_map_number(&map, "inserted_mm", false, (NumberRange){0, most, false}, &wire->inserted);
     if (reading->scene->inlet_is_root && (reading->scene->source == SOURCE_NONE || reading->scene->source == SOURCE_PLANE))
-        yaml_fault(yaml_get(&map, "inlet", false), "'inlet: root' needs a vessel with an inlet; a plane or nothing has none");
+        yaml_fault(yaml_get(&map, "inlet", false), "'inlet: root' needs a vessel with an inlet; a plane has none");
 }
 
 // s_mm: a number from 0 to the wire's length, or `end`.
@@ -350,7 +350,7 @@ static bool read_row(YamlValue item, const RowKeys *keys, int tools, ScriptRow *
         Command *command = script_row_command(row, k);
         bool has_push = yaml_map_number(&map, push, false, any, &command->push_mm_s), has_twist = yaml_map_number(&map, twist, false, any, &command->twist_deg_s);
         if (yaml_has(&map, push) != yaml_has(&map, twist))
-            yaml_fault(item, "'%s' lacks its other half; give '%s' too", yaml_has(&map, push) ? push : twist, yaml_has(&map, push) ? twist : push);
+            yaml_fault(item, "'%s' needs '%s' too", yaml_has(&map, push) ? push : twist, yaml_has(&map, push) ? twist : push);
         bool has_release = read_released(&map, key[2], k, row);
         bool has_contrast = yaml_map_number(&map, key[4], false, any, &row->contrast_ml_s[k]);
         YamlValue exchange = yaml_get(&map, key[3], false);
@@ -450,7 +450,7 @@ static void read_fluoroscopy(Reading *reading, YamlValue value)
     Vec3 anterior = {0}, superior = {0};
     bool has_anterior = yaml_map_unit_vector(&map, "anterior", false, &anterior), has_superior = yaml_map_unit_vector(&map, "superior", false, &superior);
     if (yaml_has(&map, "anterior") != yaml_has(&map, "superior"))
-        yaml_fault(value, "'anterior' and 'superior' say together how the patient lies; both of them, or none");
+        yaml_fault(value, "'anterior' and 'superior' together give the patient's orientation; expected both or neither");
     else if (has_anterior && has_superior && fabs(vec3_dot(anterior, superior)) > 0.01)
         yaml_fault(value, "'anterior' and 'superior' are not perpendicular");
     else if (has_anterior && has_superior) {
@@ -477,9 +477,9 @@ static void read_scene(Reading *reading)
         read_vessel(reading, yaml_get(&map, "vessel", false));
     bool several = yaml_has(&map, "tools");
     if (several && yaml_has(&map, "wire"))
-        yaml_fault(yaml_get(&map, "tools", false), "the scene has 'wire' and 'tools'; one of them: 'wire' for one tool, 'tools' for up to %d", TOOLS_MOST);
+        yaml_fault(yaml_get(&map, "tools", false), "the scene has 'wire' and 'tools'; expected either 'wire' (one tool) or 'tools' (up to %d)", TOOLS_MOST);
     else if (!several && !yaml_has(&map, "wire"))
-        yaml_fault(root, "'%s' lacks the key 'wire', or 'tools' for several of them", root.name);
+        yaml_fault(root, "'%s' has neither 'wire' (one tool) nor 'tools' (several)", root.name);
     if (several)
         scene_read_tools(reading, yaml_get(&map, "tools", false));
     else
@@ -491,7 +491,7 @@ static void read_scene(Reading *reading)
     bool placed = yaml_has(&map, "sheath") || yaml_has(&map, "rig");
     scene_settle_tools(reading, placed);
     if (!placed)
-        yaml_fault(root, "the scene has neither 'sheath' nor 'rig'; one of them says where the wire starts");
+        yaml_fault(root, "the scene has neither 'sheath' nor 'rig'; expected one of them to give the wire's start");
     read_simulation(reading, yaml_get(&map, "simulation", false));
     read_script(reading, yaml_get(&map, "script", false));
     if (yaml_has(&map, "targets"))
@@ -508,7 +508,7 @@ Scene *scene_parse(const char *text, size_t length, const char *path, Faults *fa
 {
     int before = faults->count;
     if (length > TEXT_FILE_LIMIT) {
-        faults_add(faults, path, 0, 0, "is %zu bytes long; at most %d are read", length, TEXT_FILE_LIMIT);
+        faults_add(faults, path, 0, 0, "is %zu bytes long; expected at most %d", length, TEXT_FILE_LIMIT);
         return NULL;
     }
     YamlReader *reader = yaml_reader_open(text, length, path, faults);

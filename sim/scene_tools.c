@@ -63,7 +63,7 @@ static void read_section(YamlValue value, ToolKind kind, WireSection *section)
     yaml_map_number(&map, "density_g_cm3", false, (NumberRange){0, 100, true}, &density);
     bool bent = yaml_map_number(&map, "rest_curvature_1_mm", false, (NumberRange){-10, 10, false}, &section->rest_curvature);
     if (bent && fabs(section->rest_curvature) * section->diameter / 2 >= 1)
-        yaml_fault(yaml_get(&map, "rest_curvature_1_mm", false), "a rest bend of radius %g mm is tighter than the tool's own radius %g mm; a curvature below %g 1/mm",
+        yaml_fault(yaml_get(&map, "rest_curvature_1_mm", false), "a rest bend of radius %g mm is tighter than the tool's own radius %g mm; expected a curvature below %g 1/mm",
                    1 / fabs(section->rest_curvature), section->diameter / 2, 2 / section->diameter);
     yaml_map_number(&map, "rest_curvature_plane_deg", false, (NumberRange){-36000, 36000, false}, &plane);
     yaml_map_number(&map, "friction", false, friction_range, &section->friction);
@@ -83,14 +83,14 @@ static void read_rest(Reading *reading, YamlValue list, SceneTool *tool, double 
     for (int i = 0; i < wire->section_count; i++) {
         thickest = fmax(thickest, wire->section[i].diameter);
         if (wire->section[i].rest_curvature != 0)
-            yaml_fault(list, "'rest' and 'rest_curvature_1_mm' of section %d both give a shape; one of them", i);
+            yaml_fault(list, "'rest' and 'rest_curvature_1_mm' of section %d both give a shape; expected only one", i);
     }
     for (int i = 0; piece && i < count; i++)
         if (scene_read_piece(yaml_item(list, i), &piece[i]) && piece[i].angle > 0 && piece[i].arc_radius < thickest)
-            yaml_fault(yaml_item(list, i), "an arc of radius %g mm is tighter than the tool is thick, %g mm; make it larger", piece[i].arc_radius, thickest);
+            yaml_fault(yaml_item(list, i), "an arc of radius %g mm is smaller than the tool's diameter, %g mm; use a larger radius", piece[i].arc_radius, thickest);
     double length = piece ? rest_shape_length(piece, count) : 0;
     if (total > 0 && length > total + 0.01)
-        yaml_fault(list, "'rest' is %g mm long, the %s %g mm; at most as long, what it leaves at the proximal end is straight", length,
+        yaml_fault(list, "'rest' is %g mm long, the %s %g mm; expected at most the tool's length (the rest of it stays straight)", length,
                    tool->kind == TOOL_WIRE ? "wire" : "tool", total);
     if (piece && wire->section_count > 0 && reading->faults->count == before) {
         WireSection *cut = rest_shape_sections(wire->section, wire->section_count, piece, count, &wire->section_count);
@@ -109,7 +109,7 @@ static bool read_length(YamlValue value, WireSection *first, double *total)
     if (!yaml_number(value, length_range, &wanted))
         return !value.node;
     if (wanted <= beyond) {
-        yaml_fault(value, "'%s' is %g, but the sections beyond the first are %g mm long; it sets the first one's length, so more than that", value.name, wanted, beyond);
+        yaml_fault(value, "'%s' is %g, but the sections beyond the first are %g mm long; expected more than that, since it sets the first one's length", value.name, wanted, beyond);
         return false;
     }
     first->length = wanted - beyond;
@@ -129,11 +129,11 @@ static void read_shaped_tip(YamlValue value, SceneTool *tool)
     bool good = yaml_map_number(&map, "length_mm", true, length_range, &tip.length) && yaml_map_number(&map, "angle_deg", true, (NumberRange){0, 360, true}, &angle) &&
                 yaml_map_number(&map, "mandrel_mm", true, (NumberRange){0, 100, true}, &tip.mandrel);
     if (tool->kind != TOOL_WIRE) {
-        yaml_fault(value, "'%s' of a %s; only a wire's tip is shaped by hand, a catheter's shape is given by 'rest'", value.name, tool_kind_name[tool->kind]);
+        yaml_fault(value, "'%s' of a %s; only a wire's tip can be shaped by hand; a catheter's shape is given by 'rest'", value.name, tool_kind_name[tool->kind]);
         return;
     }
     if (tool->core == CORE_NITINOL) {
-        yaml_fault(value, "'%s' of a core of nitinol, which springs back from any such bend; a wire with 'core: steel', or a shape of its maker's by 'rest'", value.name);
+        yaml_fault(value, "'%s' of a core of nitinol, which springs back from any such bend; expected 'core: steel', or a preshaped tip by 'rest'", value.name);
         return;
     }
     if (!good || wire->section_count == 0)
@@ -269,7 +269,7 @@ static void check_device(const ToolSource *source, const SceneTool *tool, bool s
         return;
     double bending = wire_stiffness(&tool->wire.section[0]).bending;
     if (fabs(bending - quoted) > 0.01 * quoted)
-        yaml_fault(yaml_get(device, "bending_n_mm2", false), "'bending_n_mm2' is %g, but modulus and diameters of the first section give %.4g; within 1 %%", quoted, bending);
+        yaml_fault(yaml_get(device, "bending_n_mm2", false), "'bending_n_mm2' is %g, but modulus and diameters of the first section give %.4g; expected agreement within 1 %%", quoted, bending);
 }
 
 static void read_name(Reading *reading, YamlValue value, int index)
@@ -292,7 +292,7 @@ static void read_name(Reading *reading, YamlValue value, int index)
         if (!strcmp(name, scene->tool[k].name)) {
             int line, column;
             yaml_place(reading->tool[k].whole, &line, &column);
-            yaml_fault(value, "the name '%s' is that of the tool on line %d; each tool has its own", name, line);
+            yaml_fault(value, "the name '%s' is already used on line %d; expected distinct names", name, line);
             return;
         }
     strcpy(scene->tool[index].name, name);
@@ -366,7 +366,7 @@ void scene_read_tools(Reading *reading, YamlValue value)
     Scene *scene = reading->scene;
     int count = yaml_count(value, 1, 1000);
     if (count > TOOLS_MOST)
-        yaml_fault(yaml_item(value, TOOLS_MOST), "'%s' has %d tools; at most %d, from the outermost to the innermost", value.name, count, TOOLS_MOST);
+        yaml_fault(yaml_item(value, TOOLS_MOST), "'%s' has %d tools; expected at most %d, from the outermost to the innermost", value.name, count, TOOLS_MOST);
     scene->tool_count = count < 0 ? 0 : count < TOOLS_MOST ? count : TOOLS_MOST;
     scene->exchange = scene_zeroed(reading, TOOLS_MOST * EXCHANGES_MOST, sizeof *scene->exchange);
     if (!scene->exchange)
@@ -394,7 +394,7 @@ static void check_lumen(const ToolReading *read, const SceneTool *inner, const T
         yaml_fault(read->whole, "'%s' lies in '%s', which is solid; give each section of '%s' an 'inner_diameter_mm' above %g", inner_name, outer_name, outer_name,
                    thickest);
     else if (thickest >= narrowest)
-        yaml_fault(read->whole, "'%s' is up to %g mm thick, but the lumen of '%s' around it is %g mm wide at its narrowest; a thinner tool, or one with a wider lumen",
+        yaml_fault(read->whole, "'%s' is up to %g mm thick, but the lumen of '%s' around it is only %g mm wide; expected a thinner tool, or a wider lumen",
                    inner_name, thickest, outer_name, narrowest);
 }
 
@@ -440,7 +440,7 @@ void scene_settle_tools(Reading *reading, bool placed)
     if (first->inserted_known && scene->wire.has_sheath)
         scene->wire.inserted = first->inserted_mm;
     else if (first->inserted.node && placed && !scene->wire.has_sheath)
-        yaml_fault(first->inserted, "'%s' needs a sheath; in a rig the first tool lies beyond the start with its whole length", first->inserted.name);
+        yaml_fault(first->inserted, "'%s' needs a sheath; in a rig the whole first tool lies beyond the start", first->inserted.name);
     scene->tool[0].wire = scene->wire;
     double around = scene->wire.has_sheath ? scene->wire.inserted : first->length;
     for (int k = 1; k < scene->tool_count; k++) {

@@ -108,7 +108,7 @@ char *score_json(const ScoreFigures *figures, const Scene *scene)
 bool json_keys(const JsonReading *reading, const cJSON *object, const char *where, const char *const *keys)
 {
     if (!cJSON_IsObject(object)) {
-        faults_add(reading->faults, reading->file, 0, 0, "'%s' is no object or is not there", where);
+        faults_add(reading->faults, reading->file, 0, 0, "'%s' is missing or not an object", where);
         return false;
     }
     for (const cJSON *member = object->child; member; member = member->next) {
@@ -116,10 +116,10 @@ bool json_keys(const JsonReading *reading, const cJSON *object, const char *wher
         for (int i = 0; keys[i]; i++)
             known |= !strcmp(keys[i], member->string);
         if (!known)
-            faults_add(reading->faults, reading->file, 0, 0, "unknown key '%.60s' in '%s'; its first is '%s'", member->string, where, keys[0]);
+            faults_add(reading->faults, reading->file, 0, 0, "unknown key '%.60s' in '%s'; the first valid key is '%s'", member->string, where, keys[0]);
         for (const cJSON *before = object->child; known && before != member; before = before->next)
             if (!strcmp(before->string, member->string))
-                faults_add(reading->faults, reading->file, 0, 0, "'%s.%.60s' stands there twice", where, member->string);
+                faults_add(reading->faults, reading->file, 0, 0, "duplicate key '%s.%.60s'", where, member->string);
     }
     return true;
 }
@@ -130,9 +130,9 @@ double json_number(const JsonReading *reading, const cJSON *object, const char *
     if (cJSON_IsNumber(item) && item->valuedouble >= least && item->valuedouble <= most)
         return item->valuedouble;
     if (cJSON_IsNumber(item))
-        faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is %g; %g to %g", where, key, item->valuedouble, least, most);
+        faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is %g; expected %g to %g", where, key, item->valuedouble, least, most);
     else
-        faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is no number or is not there; %g to %g", where, key, least, most);
+        faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is missing or not a number; expected %g to %g", where, key, least, most);
     return least;
 }
 
@@ -140,7 +140,7 @@ int64_t json_count(const JsonReading *reading, const cJSON *object, const char *
 {
     double number = json_number(reading, object, where, key, 0, (double)most);
     if (number != floor(number))
-        faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is %g; a whole number", where, key, number);
+        faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is %g; expected a whole number", where, key, number);
     return (int64_t)number;
 }
 
@@ -150,7 +150,7 @@ int json_choice(const JsonReading *reading, const cJSON *object, const char *whe
     for (int i = 0; text && names[i]; i++)
         if (!strcmp(text, names[i]))
             return i;
-    faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is '%.60s'; '%s' or what goes with it", where, key, text ? text : "", names[0]);
+    faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is '%.60s'; expected '%s' or another value of that list", where, key, text ? text : "", names[0]);
     return 0;
 }
 
@@ -161,7 +161,7 @@ void json_text(const JsonReading *reading, const cJSON *object, const char *wher
     if (value && strlen(value) < capacity)
         strcpy(text, value);
     else
-        faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is no text, is not there or has more than %zu bytes", where, key, capacity - 1);
+        faults_add(reading->faults, reading->file, 0, 0, "'%s.%s' is missing or not a string of at most %zu bytes", where, key, capacity - 1);
 }
 
 static bool read_flag(const JsonReading *reading, const cJSON *object, const char *key)
@@ -190,7 +190,7 @@ static void read_tools(const JsonReading *reading, const cJSON *list, ScoreFigur
         keys[i + 1] = tool_table[i].name;
     int count = cJSON_IsArray(list) ? cJSON_GetArraySize(list) : 0;
     if (list && (count < 2 || count > TOOLS_MOST)) {
-        faults_add(reading->faults, reading->file, 0, 0, "'score.tools' is no list of 2 to %d", TOOLS_MOST);
+        faults_add(reading->faults, reading->file, 0, 0, "'score.tools' is not a list of 2 to %d entries", TOOLS_MOST);
         return;
     }
     f->tool_count = list ? count : 1;
@@ -238,5 +238,5 @@ void score_read_json(const JsonReading *reading, const cJSON *object, ScoreFigur
         sum += f->error[i].count;
     }
     if (sum != f->error_total)
-        faults_add(reading->faults, reading->file, 0, 0, "'score.error_total' is %d; the errors' counts make %lld", f->error_total, (long long)sum);
+        faults_add(reading->faults, reading->file, 0, 0, "'score.error_total' is %d; expected %lld, the sum of the error counts", f->error_total, (long long)sum);
 }

@@ -193,7 +193,7 @@ static void read_events(const JsonReading *reading, const cJSON *list, Session *
     static const char *const keys[] = {"kind", "time_s", "tool", NULL};
     int count = cJSON_IsArray(list) ? cJSON_GetArraySize(list) : -1;
     if (count < 0 || count > SCORE_EVENTS_MOST) {
-        faults_add(reading->faults, reading->file, 0, 0, "'events' is no list of at most %d", SCORE_EVENTS_MOST);
+        faults_add(reading->faults, reading->file, 0, 0, "'events' is not a list of at most %d entries", SCORE_EVENTS_MOST);
         return;
     }
     for (const cJSON *event = list->child; event; event = event->next) {
@@ -217,7 +217,7 @@ static void read_session(const JsonReading *reading, const cJSON *root, Session 
     json_text(reading, root, "session", "version", sizeof s->version, s->version);
     json_text(reading, root, "session", "date", sizeof s->date, s->date);
     if (!session_is_date(s->date))
-        faults_add(reading->faults, reading->file, 0, 0, "'date' is '%.24s'; as in 2025-11-21T22:05:00Z", s->date);
+        faults_add(reading->faults, reading->file, 0, 0, "'date' is '%.24s'; expected the form 2025-11-21T22:05:00Z", s->date);
     const cJSON *scene = cJSON_GetObjectItemCaseSensitive(root, "scene");
     if (json_keys(reading, scene, "scene", scene_keys)) {
         json_text(reading, scene, "scene", "path", sizeof s->scene_path, s->scene_path);
@@ -235,7 +235,7 @@ bool session_parse(const char *text, size_t length, const char *path, Session *s
     const char *end = NULL;
     int before = faults->count;
     if (length > SESSION_BYTES_MOST) {
-        faults_add(faults, path, 0, 0, "is %zu bytes long; a session has at most %d", length, SESSION_BYTES_MOST);
+        faults_add(faults, path, 0, 0, "is %zu bytes long; expected at most %d", length, SESSION_BYTES_MOST);
         return false;
     }
     cJSON *root = cJSON_ParseWithLengthOpts(text, length, &end, false);
@@ -243,12 +243,12 @@ bool session_parse(const char *text, size_t length, const char *path, Session *s
         if (!strchr(" \t\r\n", text[i]) || !text[i])
             faults_add_at_byte(faults, path, i, "something stands after the session");
     if (!root)
-        faults_add_at_byte(faults, path, end ? (size_t)(end - text) : 0, "is no JSON");
+        faults_add_at_byte(faults, path, end ? (size_t)(end - text) : 0, "is not JSON");
     Session *read = root && faults->count == before ? calloc(1, sizeof *read) : NULL;
     if (read)
         read_session(&(JsonReading){path, faults}, root, read);
     else if (faults->count == before)
-        faults_add(faults, path, 0, 0, "no memory");
+        faults_add(faults, path, 0, 0, "not enough memory");
     bool good = faults->count == before;
     if (good)
         *session = *read;
@@ -315,7 +315,7 @@ Session *session_list(const char *folder, const char *trainee, const char *title
     free(entry);
     free(own);
     if (!list)
-        faults_add(faults, folder, 0, 0, found < 0 ? "is no folder that can be read" : "no memory");
+        faults_add(faults, folder, 0, 0, found < 0 ? "is not a readable folder" : "not enough memory");
     else
         qsort(list, (size_t)*count, sizeof *list, by_date);
     return list;

@@ -43,7 +43,7 @@ bool session_folder(const char *wanted, char *out, size_t capacity, Faults *faul
         errno = ENAMETOOLONG;
     if (fits && make_folders(out) && access(out, W_OK | X_OK) == 0)
         return true;
-    faults_add(faults, wanted ? wanted : out, 0, 0, "cannot take sessions: %s; a folder with write permission, by --sessions FOLDER", strerror(errno));
+    faults_add(faults, wanted ? wanted : out, 0, 0, "cannot store sessions: %s; give a writable folder by --sessions FOLDER", strerror(errno));
     return false;
 }
 

@@ -75,7 +75,7 @@ WireSection *tip_shaped_sections(const WireSection *section, int count, const Ti
     *shaped_count = 0;
     *shaped = (TipShaped){0};
     if (!(shaping->length <= total)) {
-        snprintf(why, capacity, "a tip of %g mm is to be shaped, but the wire is %g mm long; at most all of it", shaping->length, total);
+        snprintf(why, capacity, "a tip of %g mm is to be shaped, but the wire is %g mm long; expected at most the wire's length", shaping->length, total);
         return NULL;
     }
     WireSection *out = calloc(2 * (size_t)count + 1, sizeof *out);
@@ -97,9 +97,9 @@ WireSection *tip_shaped_sections(const WireSection *section, int count, const Ti
     free(out);
     const double per_degree = PI / 180;
     if (angle_left >= shaping->angle)
-        snprintf(why, capacity, "a mandrel of radius %g mm does not make the core yield: it springs back to what it was; a thinner mandrel", shaping->mandrel);
+        snprintf(why, capacity, "a mandrel of radius %g mm does not make the core yield, so it springs back; use a thinner mandrel", shaping->mandrel);
     else
-        snprintf(why, capacity, "%g mm of the tip, bent round a mandrel of radius %g mm, keep %.0f degrees, not %.0f; a longer tip, a smaller angle or a thinner mandrel",
+        snprintf(why, capacity, "%g mm of the tip, bent round a mandrel of radius %g mm, keep %.0f degrees, not %.0f; use a longer tip, a smaller angle or a thinner mandrel",
                  shaping->length, shaping->mandrel, (shaping->angle - angle_left) / per_degree, shaping->angle / per_degree);
     return NULL;
 }

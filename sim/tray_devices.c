@@ -70,7 +70,7 @@ static Scene *scene_with_entry(const Scene *scene, int tool, const char *entry, 
     char *text = yaml_edit_append(scene->text, path, entry);
     Scene *extended = text ? scene_parse(text, strlen(text), scene->path, faults) : NULL;
     if (!text)
-        faults_add(faults, scene->path, 0, 0, "no device can be added to '%s' of this scene's text; write it under its 'exchange:'", scene->tool[tool].name);
+        faults_add(faults, scene->path, 0, 0, "cannot add a device to '%s' in this scene's text; write it under its 'exchange:'", scene->tool[tool].name);
     free(text);
     return extended;
 }

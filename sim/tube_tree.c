@@ -96,7 +96,7 @@ VesselTree *tube_tree(const Vessel *tube, const TubeOptions *options, const char
     Axis axis = {0};
     VesselTree *tree = trace_axis(tube, options, &axis) ? vessel_tree_create(axis.count, (int64_t)axis.count * SAMPLES * 2, 0) : NULL;
     if (!tree) {
-        faults_add(faults, file, 0, 0, "the tube cannot be fitted: its axis has %d points; make it longer, or take contact 'tube'", axis.count);
+        faults_add(faults, file, 0, 0, "the tube cannot be fitted: its axis has %d points; make it longer, or use contact 'tube'", axis.count);
         free(axis.point);
         return NULL;
     }

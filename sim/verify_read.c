@@ -35,7 +35,7 @@ static const Needs needs[] = {
 static void refuse(const YamlMap *map, const char *key, const char *because)
 {
     if (yaml_has(map, key))
-        yaml_fault(yaml_get(map, key, false), "'%s' says nothing here; %s", key, because);
+        yaml_fault(yaml_get(map, key, false), "'%s' has no effect here; %s", key, because);
 }
 
 // A number from 0 to the tool's length, or `end`.
@@ -109,7 +109,7 @@ static void read_tolerance(const YamlMap *map, const VerifyPlan *plan, VerifyCas
 {
     bool percent = yaml_has(map, "tolerance_percent");
     if (percent && yaml_has(map, "tolerance"))
-        yaml_fault(yaml_get(map, "tolerance", false), "a second tolerance; one of 'tolerance' and 'tolerance_percent'");
+        yaml_fault(yaml_get(map, "tolerance", false), "a second tolerance; expected either 'tolerance' or 'tolerance_percent'");
     YamlValue value = yaml_get(map, percent ? "tolerance_percent" : "tolerance", true);
     int runs = plan->element_count > 0 ? plan->element_count : 1, count = yaml_is_list(value) ? yaml_count(value, runs, runs) : 1;
     for (int i = 0; i < count; i++) {
@@ -119,7 +119,7 @@ static void read_tolerance(const YamlMap *map, const VerifyPlan *plan, VerifyCas
     }
     c->tolerance_count = count > 0 ? count : 1;
     if (percent && c->reference == 0)
-        yaml_fault(value, "no per cent of the reference 0; 'tolerance' is absolute");
+        yaml_fault(value, "a percentage of a reference of 0 is meaningless; use 'tolerance', which is absolute");
 }
 
 static void read_case(YamlValue value, const VerifyTools *tools, const VerifyPlan *plan, VerifyCase *c)
@@ -172,7 +172,7 @@ void verify_read(YamlValue value, const VerifyTools *tools, bool has_script, Ver
     int count = elements.node ? yaml_count(elements, 1, VERIFY_MOST_ELEMENTS) : 0;
     for (int i = 0; i < count; i++)
         if (yaml_integer(yaml_item(elements, i), 1, 10000, &plan->element[i]) && i > 0 && plan->element[i] <= plan->element[i - 1])
-            yaml_fault(yaml_item(elements, i), "'elements' falls from %d to %d; from coarse to fine", plan->element[i - 1], plan->element[i]);
+            yaml_fault(yaml_item(elements, i), "'elements' falls from %d to %d; expected rising numbers", plan->element[i - 1], plan->element[i]);
     plan->element_count = count > 0 ? count : 0;
 
     YamlValue list = yaml_get(&map, "cases", true);

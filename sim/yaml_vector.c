@@ -8,7 +8,7 @@ static bool read_vector(YamlValue value, double largest, Vec3 *vector)
     if (yaml_is_list(value) && yaml_count(value, 3, 3) < 0)
         return false;
     if (!yaml_is_list(value)) {
-        yaml_fault(value, "'%s' is no list of three numbers; [x, y, z]", value.name);
+        yaml_fault(value, "'%s' is not a list of three numbers; expected [x, y, z]", value.name);
         return false;
     }
     bool good = true;
@@ -26,7 +26,7 @@ static bool read_unit_vector(YamlValue value, Vec3 *vector)
         return false;
     double length = vec3_norm(read);
     if (length < 1e-9) {
-        yaml_fault(value, "'%s' has no length; a direction such as [1, 0, 0]", value.name);
+        yaml_fault(value, "'%s' has no length; expected a direction such as [1, 0, 0]", value.name);
         return false;
     }
     *vector = vec3_scale(read, 1 / length);

@@ -32,7 +32,7 @@ static bool check_options(const FieldFitOptions *o, Faults *faults)
                  {"target-mm", o->target_mm, 0, 100}, {"significance", o->significance, 0, 100}, {"levels", o->levels, 0, LEVELS}};
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
         if (!(range[i].value >= range[i].least && range[i].value <= range[i].most))
-            faults_add(faults, "fit", 0, 0, "%s is %g; valid: %g to %g", range[i].name, range[i].value, range[i].least, range[i].most);
+            faults_add(faults, "fit", 0, 0, "%s is %g; expected %g to %g", range[i].name, range[i].value, range[i].least, range[i].most);
     return faults->count == before;
 }
 
@@ -213,7 +213,7 @@ VesselTree *field_fit(const VesselTree *tree, const FieldFitOptions *options, co
     if (!check_options(options, faults))
         return NULL;
     if (tree->point_count < 4) {
-        faults_add(faults, "fit", 0, 0, "the tree has %lld points; at least 4 points on the wall are needed", (long long)tree->point_count);
+        faults_add(faults, "fit", 0, 0, "the tree has %lld points; expected at least 4 points on the wall", (long long)tree->point_count);
         return NULL;
     }
     FieldRows rows = {0};

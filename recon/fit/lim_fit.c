@@ -62,7 +62,7 @@ static bool check_options(const LimFitOptions *o, Faults *faults)
                  {"give-up-splits", o->give_up_splits, 0, 1000}, {"max-points", o->max_points, 50, 100000}};
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
         if (!(range[i].value >= range[i].least && range[i].value <= range[i].most))
-            faults_add(faults, "fit", 0, 0, "%s is %g; valid: %g to %g", range[i].name, range[i].value, range[i].least, range[i].most);
+            faults_add(faults, "fit", 0, 0, "%s is %g; expected %g to %g", range[i].name, range[i].value, range[i].least, range[i].most);
     return faults->count == before;
 }
 
@@ -692,7 +692,7 @@ VesselTree *lim_fit(const VesselTree *tree, const LimFitOptions *options, const 
     if (!check_options(options, faults))
         return NULL;
     if (tree->node_count < 1 || tree->point_count < 4) {
-        faults_add(faults, "fit", 0, 0, "the tree has %d nodes and %lld points; valid: at least 1 node and 4 points", tree->node_count,
+        faults_add(faults, "fit", 0, 0, "the tree has %d nodes and %lld points; expected at least 1 node and 4 points", tree->node_count,
                    (long long)tree->point_count);
         return NULL;
     }

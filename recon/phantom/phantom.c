@@ -216,7 +216,7 @@ static bool parse_options(int count, const char (*option)[2][64], const char *fi
             k++;
         if (k == n) {
             faults_add(faults, file, 0, 0,
-                       "a shape has no option '%s'; valid: points, sac_points, noise_mm, seed, spacing, blend_mm, length_mm, radius_mm, "
+                       "unknown shape option '%s'; expected points, sac_points, noise_mm, seed, spacing, blend_mm, length_mm, radius_mm, "
                        "bend_radius_mm, rise_mm, scale, turns, angle_deg, branches, sacs, blocks, gap_mm, crossing_deg, twig_radius_mm",
                        option[i][0]);
             continue;
@@ -224,7 +224,7 @@ static bool parse_options(int count, const char (*option)[2][64], const char *fi
         char *end;
         double value = strtod(option[i][1], &end);
         if (end == option[i][1] || *end || !(value >= known[k].least && value <= known[k].most))
-            faults_add(faults, file, 0, 0, "shape option %s is '%s'; valid: a number from %g to %g", known[k].key, option[i][1], known[k].least,
+            faults_add(faults, file, 0, 0, "shape option %s is '%s'; expected a number from %g to %g", known[k].key, option[i][1], known[k].least,
                        known[k].most);
         else
             *known[k].value = value;
@@ -262,7 +262,7 @@ Shape *shape_create(const char *name, int option_count, const char (*option)[2][
     while (which < SHAPES && strcmp(name, names[which]))
         which++;
     if (which == SHAPES)
-        faults_add(faults, file, 0, 0, "there is no shape '%s'; valid: %s", name, shape_names());
+        faults_add(faults, file, 0, 0, "unknown shape '%s'; expected %s", name, shape_names());
     // what suits a shape where nothing is said
     o.rise_mm = which == HELIX ? 12 : 0;
     o.gap_mm = which == KISSING ? 0.2 : 0;

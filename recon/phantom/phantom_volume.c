@@ -308,7 +308,7 @@ static Volume *make_grid(const Shape *shape, const VolumeOptions *o, Faults *fau
     }
     Volume *volume = total < 1e9 ? volume_create(size, origin, axis) : NULL;
     if (!volume)
-        faults_add(faults, shape->name, 0, 0, "a volume of %.3g voxels does not fit; use a larger voxel than %g mm", total, o->voxel_mm[0]);
+        faults_add(faults, shape->name, 0, 0, "a volume of %.3g voxels is too large; use voxels larger than %g mm", total, o->voxel_mm[0]);
     return volume;
 }
 

@@ -253,7 +253,7 @@ bool random_tree_grow(Shape *shape, const RandomTreeOptions *o, const char *file
             if (g.segment[i].is_tip && (tip < 0 || g.segment[i].radius > g.segment[tip].radius))
                 tip = i;
         if (tip < 0) {
-            faults_add(faults, file, 0, 0, "no room for %d branches, %d fit; another seed may do", o->branches, g.segment_count);
+            faults_add(faults, file, 0, 0, "no space for %d branches, only %d fit; try another seed", o->branches, g.segment_count);
             break;
         }
         if (!split(&g, tip, &failed))

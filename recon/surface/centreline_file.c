@@ -116,15 +116,15 @@ static void parse_markup(const cJSON *markup, int index, const char *name, Curve
     const cJSON *unit = cJSON_GetObjectItemCaseSensitive(markup, "coordinateUnits");
     int count = cJSON_IsArray(list) ? cJSON_GetArraySize(list) : 0, k = 0;
     if (!cJSON_IsString(type) || strcmp(type->valuestring, "Curve")) {
-        faults_add(faults, name, 0, 0, "markup %d has type '%s'; Curve is valid", index, cJSON_IsString(type) ? type->valuestring : "none");
+        faults_add(faults, name, 0, 0, "markup %d has type '%s'; expected Curve", index, cJSON_IsString(type) ? type->valuestring : "none");
         return;
     }
     if (cJSON_IsString(unit) && strcmp(unit->valuestring, "mm")) {
-        faults_add(faults, name, 0, 0, "markup %d is in '%s'; mm is valid", index, unit->valuestring);
+        faults_add(faults, name, 0, 0, "markup %d is in '%s'; expected mm", index, unit->valuestring);
         return;
     }
     if (count < 2) {
-        faults_add(faults, name, 0, 0, "markup %d has %d control points; two or more are valid", index, count);
+        faults_add(faults, name, 0, 0, "markup %d has %d control points; expected two or more", index, count);
         return;
     }
     Vec3 *point = calloc((size_t)count, sizeof *point);
@@ -173,13 +173,13 @@ static void parse_json(const char *text, size_t length, const char *name, CurveS
             column = *at == '\n' ? 1 : column + 1;
             line += *at == '\n';
         }
-        faults_add(faults, name, line, column, "is no JSON here");
+        faults_add(faults, name, line, column, "is not valid JSON");
         return;
     }
     const cJSON *list = cJSON_GetObjectItemCaseSensitive(root, "markups"), *markup;
     int index = 0;
     if (!cJSON_IsArray(list) || cJSON_GetArraySize(list) == 0)
-        faults_add(faults, name, 0, 0, "has no markups; a 3D Slicer Markups file with a Curve is valid");
+        faults_add(faults, name, 0, 0, "has no markups; expected a 3D Slicer Markups file with a Curve");
     else
         cJSON_ArrayForEach(markup, list) parse_markup(markup, index++, name, set, faults);
     cJSON_Delete(root);
@@ -285,7 +285,7 @@ static void parse_swc(const char *text, const char *name, CurveSet *set, Faults 
                 sample = grown;
             }
             if (!parse_swc_line(start, &sample[count])) {
-                faults_add(faults, name, line, 0, "is no SWC; seven numbers (id type x y z radius parent) are valid");
+                faults_add(faults, name, line, 0, "is not an SWC file; expected seven numbers (id type x y z radius parent)");
                 free(sample);
                 return;
             }
@@ -298,12 +298,12 @@ static void parse_swc(const char *text, const char *name, CurveSet *set, Faults 
         qsort(sample, (size_t)count, sizeof *sample, compare_samples);
     for (int i = 0; i < count; i++) {
         if (i > 0 && sample[i].id == sample[i - 1].id)
-            faults_add(faults, name, sample[i].line, 0, "id %ld stands twice", sample[i].id);
+            faults_add(faults, name, sample[i].line, 0, "duplicate id %ld", sample[i].id);
         if (sample[i].parent_id < 0)
             continue;
         sample[i].parent = find_sample(sample, count, sample[i].parent_id);
         if (sample[i].parent < 0 || sample[i].parent == i) {
-            faults_add(faults, name, sample[i].line, 0, "parent %ld is not there", sample[i].parent_id);
+            faults_add(faults, name, sample[i].line, 0, "parent %ld does not exist", sample[i].parent_id);
             sample[i].parent = -1;
         } else
             sample[sample[i].parent].children++;
@@ -346,7 +346,7 @@ bool centreline_parse(const void *bytes, size_t length, const char *name, CurveS
     else if (*start == '#' || *start == '-' || (*start >= '0' && *start <= '9'))
         parse_swc(text, name, set, own);
     else
-        faults_add(own, name, 0, 0, "is no centreline that is known; VTK XML PolyData (.vtp), 3D Slicer Markups (.mrk.json) and SWC are valid");
+        faults_add(own, name, 0, 0, "is not a known centreline format; expected VTK XML PolyData (.vtp), 3D Slicer Markups (.mrk.json) or SWC");
     if (own->count == 0 && set->curve_count == curves)
         faults_add(own, name, 0, 0, "has no line of two points");
     bool good = own->count == 0;
@@ -437,7 +437,7 @@ char *centreline_text(const CurveSet *set, const char *name, size_t *length, Fau
                                               : name_ends(name, ".swc")      ? write_swc
                                                                               : NULL;
     if (!write) {
-        faults_add(faults, name, 0, 0, "has no known extension for a centreline; .vtp, .mrk.json and .swc are valid");
+        faults_add(faults, name, 0, 0, "has no known centreline extension; expected .vtp, .mrk.json or .swc");
         return NULL;
     }
     char *text = NULL;

@@ -411,7 +411,7 @@ static bool sample_wall(Sampling *s, int threads, ImportReport *report, const ch
         total += s->weight[t];
     }
     if (total > POINTS_MAX) {
-        faults_add(faults, name, 0, 0, "would take %.0f points: the centrelines leave wide parts of the surface out; a centreline in every vessel is valid", total);
+        faults_add(faults, name, 0, 0, "would take %.0f points: the centrelines leave wide parts of the surface out; expected a centreline in every vessel", total);
         return false;
     }
     s->point = calloc((size_t)total + 2, sizeof *s->point);

@@ -633,7 +633,7 @@ CurveSet *mesh_centreline(const SurfaceMesh *mesh, const ImportOptions *options,
     if (!l || !good)
         faults_add(faults, name, 0, 0, "not enough memory");
     else if (!set || set->curve_count == 0) {
-        faults_add(faults, name, 0, 0, "no centreline was found: the surface encloses no lumen; a closed tube, or one that is open at its ends, is valid");
+        faults_add(faults, name, 0, 0, "no centreline was found: the surface encloses no lumen; expected a closed tube, or one that is open at its ends");
         curve_set_free(set);
         set = NULL;
     }

@@ -413,7 +413,7 @@ SurfaceMesh *mesh_load_mended(const char *path, double scale, const char *option
         faults_add(faults, path, 0, 0, "not enough memory");
     else if (check->unit_is_doubtful && !(scale > 0)) {
         Vec3 e = vec3_sub(check->high, check->low);
-        faults_add(faults, path, 0, 0, "is %g x %g x %g across, which are no millimetres of a vessel; %s1000 takes metres, %s0.001 micrometres, %s1 takes it "
+        faults_add(faults, path, 0, 0, "is %g x %g x %g across, which cannot be the size of a vessel in mm; %s1000 takes metres, %s0.001 micrometres, %s1 takes it "
                    "as it is", e.x, e.y, e.z, option, option, option);
     } else if (check->one_sided_edges.count)
         faults_add(faults, path, 0, 0, "has one side only (first at triangle %d): inside and outside cannot be told", check->one_sided_edges.first);

@@ -80,7 +80,7 @@ static bool add_triangle(Growing *g, int a, int b, int c)
 
 static bool good_point(Vec3 p) { return vec3_is_finite(p) && fabs(p.x) < COORDINATE_MAX && fabs(p.y) < COORDINATE_MAX && fabs(p.z) < COORDINATE_MAX; }
 
-static const char *const bad_coordinate = "a coordinate is no finite number below 1e9; three numbers are valid";
+static const char *const bad_coordinate = "a coordinate is not a finite number below 1e9; expected three numbers";
 
 // --- text ---
 
@@ -167,14 +167,14 @@ static void parse_stl_text(Growing *g, const char *text)
         } else if (take_word(&c, "endsolid")) {
             ended = true;
         } else if (!take_word(&c, "facet") && !take_word(&c, "outer") && !take_word(&c, "endloop"))
-            fault_line(g, c.line, "no word of STL; facet, outer loop, vertex, endloop, endfacet, endsolid are valid");
+            fault_line(g, c.line, "not an STL keyword; expected facet, outer loop, vertex, endloop, endfacet, endsolid");
         if (!g->bad)
             skip_line(&c);
     }
     if (corner != 0)
         fault_line(g, c.line, "ends within a facet");
     else if (!ended)
-        fault_line(g, c.line, "ends without endsolid: it was cut short");
+        fault_line(g, c.line, "ends without endsolid: it is truncated");
 }
 
 static float float_at(const unsigned char *bytes, bool big)
@@ -244,7 +244,7 @@ static void parse_obj(Growing *g, const char *text)
             for (skip_blanks(&c); *c.at && *c.at != '\n' && *c.at != '#' && !g->bad; skip_blanks(&c)) {
                 int at = take_obj_index(&c, g->mesh.vertex_count);
                 if (at < 0 || (*c.at && !strchr(" \t\r\n", *c.at)))
-                    fault_line(g, c.line, "a face names a vertex that is not there; indices from 1, or from -1 backwards, of the vertices above are valid");
+                    fault_line(g, c.line, "a face refers to a vertex that does not exist; expected indices from 1, or from -1 backwards, of the vertices above");
                 else if (++corners >= 3)
                     add_triangle(g, first, before, at);
                 first = corners == 1 ? at : first;
@@ -308,7 +308,7 @@ static void ply_header_property(Growing *g, Cursor *c, PlyElement *e)
     skip_blanks(c);
     bool is_list = take_word(c, "list");
     if ((is_list && (!ply_type(c, &p.list_size, &unused, &p.list_signed) || unused)) || !ply_type(c, &p.size, &p.is_float, &p.is_signed)) {
-        fault_line(g, c->line, "a property has no known type; char uchar short ushort int uint float double are valid");
+        fault_line(g, c->line, "a property has an unknown type; expected char uchar short ushort int uint float double");
         return;
     }
     skip_blanks(c);
@@ -352,7 +352,7 @@ static int ply_header(Growing *g, Cursor *c, PlyElement *element, int *format)
         }
     }
     if (!g->bad && *format < 0)
-        fault_line(g, 2, "no known format; ascii, binary_little_endian and binary_big_endian are valid");
+        fault_line(g, 2, "unknown format; expected ascii, binary_little_endian or binary_big_endian");
     return count;
 }
 
@@ -393,16 +393,16 @@ static void ply_entry(Growing *g, PlyBody *body, const PlyElement *e, int vertex
         const PlyProperty *p = &e->property[k];
         double entries = 1;
         if (p->list_size && (!ply_value(body, p->list_size, false, p->list_signed, &entries) || !(entries >= 0 && entries <= COUNT_MAX))) {
-            ply_fault(g, body, "is cut short, or a list has no count");
+            ply_fault(g, body, "is truncated, or a list has no count");
             return;
         }
         int first = -1, before = -1;
         for (int i = 0; !g->bad && i < (int)entries; i++) {
             if (!ply_value(body, p->size, p->is_float, p->is_signed, &number))
-                ply_fault(g, body, "is cut short or holds something that is no number");
+                ply_fault(g, body, "is truncated or holds something that is not a number");
             else if (e->kind == 1 && p->role == 3) {
                 if (!(number >= 0 && number < vertex_count) || floor(number) != number) {
-                    ply_fault(g, body, "a face names a vertex that is not there");
+                    ply_fault(g, body, "a face refers to a vertex that does not exist");
                     break;
                 }
                 int at = (int)number;
@@ -443,7 +443,7 @@ static void parse_ply(Growing *g, const char *text, size_t length)
     for (int t = 0; t < g->mesh.triangle_count && !g->bad; t++)
         for (int k = 0; k < 3 && !g->bad; k++)
             if (g->mesh.triangle[t][k] >= g->mesh.vertex_count)
-                fault_line(g, 0, "a face names a vertex that is not there");
+                fault_line(g, 0, "a face refers to a vertex that does not exist");
     free(element);
 }
 
@@ -522,7 +522,7 @@ SurfaceMesh *surface_parse(const void *bytes, size_t length, const char *name, F
         case KIND_PLY: parse_ply(&g, text, length); break;
         case KIND_OBJ: parse_obj(&g, text); break;
         case KIND_VTP: parse_vtp(&g, text, length); break;
-        default: fault_line(&g, 0, "is no surface that is known; STL, PLY, OBJ and VTK XML PolyData (.vtp) are valid");
+        default: fault_line(&g, 0, "is not a known surface format; expected STL, PLY, OBJ or VTK XML PolyData (.vtp)");
         }
     }
     if (!g.bad && g.mesh.triangle_count == 0)

@@ -83,9 +83,9 @@ static void start_file(Reader *reader, const char **list)
     reader->is_compressed = *compressor != '\0';
     reader->header_size = !strcmp(header, "UInt64") ? 8 : 4;
     if (!reader->is_polydata)
-        faults_add(reader->faults, reader->name, line_of(reader), 0, "VTKFile type is '%s'; PolyData is valid", type);
+        faults_add(reader->faults, reader->name, line_of(reader), 0, "VTKFile type is '%s'; expected PolyData", type);
     if (reader->is_compressed && strcmp(compressor, "vtkZLibDataCompressor"))
-        faults_add(reader->faults, reader->name, line_of(reader), 0, "is compressed by %s; vtkZLibDataCompressor or none is valid: save it again so", compressor);
+        faults_add(reader->faults, reader->name, line_of(reader), 0, "is compressed by %s; expected vtkZLibDataCompressor or no compression", compressor);
     if (!reader->is_polydata || (reader->is_compressed && strcmp(compressor, "vtkZLibDataCompressor")))
         stop(reader);
 }
@@ -122,7 +122,7 @@ static void start_array(Reader *reader, const char **list)
     Array array = {.section = reader->section, .role = role, .piece = reader->piece, .line = line_of(reader)};
     array.format = !strcmp(format, "binary") ? FORMAT_BASE64 : !strcmp(format, "appended") ? FORMAT_APPENDED : FORMAT_ASCII;
     if (!number_type(attribute(list, "type"), &array.number)) {
-        faults_add(reader->faults, reader->name, line_of(reader), 0, "array '%s' has type '%s'; Float32, Float64, Int8 … UInt64 are valid", name,
+        faults_add(reader->faults, reader->name, line_of(reader), 0, "array '%s' has type '%s'; expected Float32, Float64, Int8 … UInt64", name,
                    attribute(list, "type"));
         stop(reader);
         return;
@@ -152,7 +152,7 @@ static void start_element(void *context, const char *element, const char **list)
     if (reader->stopped)
         return;
     if (reader->depth++ == 0 && strcmp(element, "VTKFile")) {
-        faults_add(reader->faults, reader->name, line_of(reader), 0, "the outermost element is '%s'; VTKFile is valid", element);
+        faults_add(reader->faults, reader->name, line_of(reader), 0, "the outermost element is '%s'; expected VTKFile", element);
         stop(reader);
         return;
     }
@@ -283,8 +283,8 @@ static bool body_take(Body *body, size_t count, unsigned char *out)
     return true;
 }
 
-static const char *const cut_short = "array data are cut short or damaged";
-static const char *const too_many = "array data hold more values than the head of their piece promises, or more than 67 million in all";
+static const char *const cut_short = "the array data are truncated or damaged";
+static const char *const too_many = "the array data hold more values than the piece's header promises, or more than 67 million in all";
 
 static const char *decode_compressed(const Reader *reader, Body body, size_t most, unsigned char **bytes, size_t *length)
 {
@@ -318,7 +318,7 @@ static const char *decode_compressed(const Reader *reader, Body body, size_t mos
         size_t size = (size_t)word_at(sizes + (3 + (size_t)b) * w, (int)w, big);
         uLongf room = b + 1 == blocks && last ? (uLongf)last : (uLongf)block, expected = room;
         if (uncompress(out + done, &room, packed + from, (uLong)size) != Z_OK || room != expected)
-            fault = "compressed array data are damaged";
+            fault = "the compressed array data are damaged";
         from += size;
         done += expected;
     }
@@ -371,7 +371,7 @@ static const char *decode_ascii(Array *array)
             break;
         double value = strtod(at, &end);
         if (end == at || array->count == capacity)
-            return "array text holds something that is no number";
+            return "the array text holds something that is not a number";
         array->value[array->count++] = value;
     }
     return NULL;
@@ -384,7 +384,7 @@ static const char *decode_array(Reader *reader, Array *array, const char *append
     Body body = {array->text, array->length, true};
     if (array->format == FORMAT_APPENDED) {
         if (!appended || array->offset >= appended_length)
-            return "array data lie beyond the end of the file";
+            return "the array data lie beyond the end of the file";
         body = (Body){appended + array->offset, appended_length - array->offset, reader->appended_base64};
     } else if (array->text) {
         while (body.length && strchr(" \t\r\n", *body.text))
@@ -436,14 +436,14 @@ static const char *take_cells(const Reader *reader, int piece, int section, int 
     for (size_t i = 0; i < index->count; i++) {
         double v = index->value[i];
         if (!(v >= 0 && v < piece_points) || floor(v) != v)
-            return "connectivity names a point that is not there";
+            return "the connectivity refers to a point that does not exist";
         cells->index[(size_t)before + i] = first_point + (int)v;
     }
     double last = 0;
     for (size_t i = 0; i < offset->count; i++) {
         double v = offset->value[i];
         if (!(v >= last && v <= (double)index->count) || floor(v) != v)
-            return "offsets must rise and end within the connectivity";
+            return "the offsets must rise and end within the connectivity";
         last = v;
         cells->offset[++cells->count] = before + (int)v;
     }
@@ -457,7 +457,7 @@ static const char *take_piece(const Reader *reader, int piece, VtpData *data)
         return NULL;
     size_t count = points->count / 3;
     if (points->count % 3 || count > INT_MAX / 4 - (size_t)data->point_count)
-        return "points must be triples";
+        return "the points must be triples";
     Vec3 *grown = realloc(data->point, ((size_t)data->point_count + count) * sizeof *grown);
     if (!grown)
         return "not enough memory";
@@ -502,7 +502,7 @@ static void build(Reader *reader, const char *appended, size_t appended_length, 
         }
     }
     if (data->point_count == 0)
-        faults_add(reader->faults, reader->name, 0, 0, "holds no points; a PolyData with Points is valid");
+        faults_add(reader->faults, reader->name, 0, 0, "holds no points; expected a PolyData with Points");
 }
 
 // Offset of the byte behind the `_` of appended data; `length` where there is none.
@@ -538,7 +538,7 @@ VtpData *vtp_parse(const void *bytes, size_t length, const char *name, Faults *f
     XML_SetElementHandler(reader.parser, start_element, end_element);
     XML_SetCharacterDataHandler(reader.parser, take_text);
     if (XML_Parse(reader.parser, bytes, (int)start, whole) != XML_STATUS_OK && !reader.stopped)
-        faults_add(faults, name, line_of(&reader), (int)XML_GetCurrentColumnNumber(reader.parser) + 1, "is no whole XML: %s",
+        faults_add(faults, name, line_of(&reader), (int)XML_GetCurrentColumnNumber(reader.parser) + 1, "is not complete XML: %s",
                    XML_ErrorString(XML_GetErrorCode(reader.parser)));
     XML_ParserFree(reader.parser);
     if (faults->count == before)

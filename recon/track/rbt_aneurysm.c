@@ -255,7 +255,7 @@ bool track_aneurysm(Tracker *t, const RbtAneurysm *aneurysm, const Vec3 *center,
         good = count >= rays / 8 && sphere_fit(own, count, &middle, &radius);
         if (!good) {
             faults_add(faults, path, aneurysm->line, aneurysm->column,
-                       "centre %d of the aneurysm sees no wall around it (%d of %d rays within %g mm); a point well "
+                       "no wall found around centre %d of the aneurysm (%d of %d rays within %g mm); expected a point well "
                        "inside the sac, or a longer aneurysm_reach_mm",
                        i + 1, count, rays, t->parameters->aneurysm_reach_mm);
             break;

@@ -167,14 +167,14 @@ static bool check_point(Tracker *t, Vec3 x, const RbtSeed *seed, const char *wha
     const int *size = t->volume->size;
     if (!tracker_is_inside(t->volume, x)) {
         faults_add(faults, path, line, column,
-                   "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies outside the volume; voxels (0, 0, 0) to (%d, %d, %d)", what, x.x, x.y, x.z,
+                   "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies outside the volume; expected voxel (0, 0, 0) to (%d, %d, %d)", what, x.x, x.y, x.z,
                    v.x, v.y, v.z, size[0] - 1, size[1] - 1, size[2] - 1);
         return false;
     }
     double value = tracker_brightness(t, x), low = (double)t->volume->minimum, high = (double)t->volume->maximum;
     if (!(high > low) || (value < fmax(low + 0.1 * (high - low), t->dark) && !(seed ? rbt_stands_out(t, t->levels, seed) : t->is_noisy))) {
         faults_add(faults, path, line, column,
-                   "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies on background (%g in a volume of %g to %g); a point inside a vessel, above %g",
+                   "%s (%g, %g, %g) mm, voxel (%.1f, %.1f, %.1f), lies on background (%g in a volume of %g to %g); expected a point inside a vessel, above %g",
                    what, x.x, x.y, x.z, v.x, v.y, v.z, value, low, high, fmax(low + 0.1 * (high - low), t->dark));
         return false;
     }
@@ -188,15 +188,15 @@ static bool check_seed(Tracker *t, RbtSeed *seed, int number, const char *path, 
     snprintf(what, sizeof what, "the start of branch %d", number + 1);
     check_point(t, seed->start, seed, what, seed->line, seed->column, path, faults);
     if (tracker_is_forbidden(t, seed->start))
-        faults_add(faults, path, seed->line, seed->column, "the start of branch %d lies in a region of `forbid`; a start outside of it", number + 1);
+        faults_add(faults, path, seed->line, seed->column, "the start of branch %d lies in a region of `forbid`; expected a start outside it", number + 1);
     if (seed->has_toward && !(vec3_distance(seed->start, seed->toward) > 1e-6 * t->voxel))
         faults_add(faults, path, seed->line, seed->column,
-                   "the start of branch %d and its toward are the same point; toward is a point further down the vessel", number + 1);
+                   "the start and the toward of branch %d are the same point; expected a toward further down the vessel", number + 1);
     double extent = 0;
     for (int i = 0; i < 3; i++)
         extent = fmax(extent, vec3_norm(t->volume->axis[i]) * t->volume->size[i]);
     if (seed->radius > extent / 2)
-        faults_add(faults, path, seed->line, seed->column, "the radius %g mm of branch %d is larger than the volume; at most %g mm", seed->radius,
+        faults_add(faults, path, seed->line, seed->column, "the radius %g mm of branch %d is larger than the volume; expected at most %g mm", seed->radius,
                    number + 1, extent / 2);
     return faults->count == before;
 }
@@ -274,7 +274,7 @@ static bool run_seed(Tracker *t, const Job *job, int i)
     if (t->refusal[0])
         return start_is_refused(t, &job->seed[i], i, job->path, job->faults);
     faults_add(job->faults, job->path, job->seed[i].line, job->seed[i].column,
-               "nothing could be tracked from the start of branch %d (%s); a point well inside the vessel, "
+               "nothing could be tracked from the start of branch %d (%s); expected a point well inside the vessel, "
                "about its true radius and direction",
                i + 1, t->why);
     return false;
@@ -394,7 +394,7 @@ static bool make_cuts(Tracker *t, const Job *job)
         }
         double radius = tree->node[nearest].cylinder.radius;
         if (nearest == 0 || distance > 2 * radius + 3 * t->voxel) {
-            faults_add(job->faults, job->path, cut->line, cut->column, "the cut at (%g, %g, %g) mm %s; a point on the branch that is to be cut", x.x, x.y, x.z,
+            faults_add(job->faults, job->path, cut->line, cut->column, "the cut at (%g, %g, %g) mm %s; expected a point on the branch to cut", x.x, x.y, x.z,
                        nearest == 0 ? "leaves nothing of the tree" : "is on no branch");
             good = false;
         } else {
@@ -472,7 +472,7 @@ static bool drop_rivals(Tracker *t, const Job *job, const RbtEnds *ends, RbtRepo
         if (has_nodes || ends->seed[b] < 0)
             continue;
         const RbtSeed *seed = &job->seed[ends->seed[b]];
-        faults_add(job->faults, job->path, seed->line, seed->column, "branch %d hangs on a vessel that `not` names; a start on the tree's own side, or another `not`",
+        faults_add(job->faults, job->path, seed->line, seed->column, "branch %d is attached to a vessel excluded by `not`; expected a start on the tree's own side, or another `not`",
                    ends->seed[b] + 1);
         return false;
     }
@@ -577,7 +577,7 @@ VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, con
     if (!good)
         faults_add(faults, path, 0, 0, "out of memory");
     if (good && seed_count < 1)
-        faults_add(faults, path, 0, 0, "there is no branch to track; `branches` with at least one start");
+        faults_add(faults, path, 0, 0, "there is no branch to track; expected `branches` with at least one start");
     if (good) {
         *t = (Tracker){.volume = volume, .parameters = parameters, .voxel = volume_voxel_size(volume), .ray_count = (int)parameters->n_r,
                        .axis_count = (int)parameters->n_d, .longest = HUGE_VAL, .scan_count = -1};

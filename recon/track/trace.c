@@ -37,14 +37,14 @@ static const char *key_of(const Walk *w, const yaml_node_t *map, int i, yaml_nod
     *value = node_at(w, map->data.mapping.pairs.start[i].value);
     const char *name = key ? scalar_of(key) : NULL;
     if (!key || !*value || !name) {
-        FAULT(w, map, "a key that is no text; `name: value`");
+        FAULT(w, map, "a key is not a string; expected `name: value`");
         return NULL;
     }
     for (int k = 0; k < i; k++) {
         yaml_node_t *other = node_at(w, map->data.mapping.pairs.start[k].key);
         const char *text = other ? scalar_of(other) : NULL;
         if (text && !strcmp(text, name)) {
-            FAULT(w, key, "'%.40s' stands on line %d already; each key once", name, (int)other->start_mark.line + 1);
+            FAULT(w, key, "duplicate key '%.40s'; the first is on line %d", name, (int)other->start_mark.line + 1);
             return NULL;
         }
     }
@@ -57,7 +57,7 @@ static bool read_number(const Walk *w, const yaml_node_t *node, const char *name
     char *end = NULL;
     double x = text ? strtod(text, &end) : 0;
     if (!text || end == text || *end || !(x >= least && x <= most) || (is_whole && floor(x) != x)) {
-        FAULT(w, node, "%s '%.40s' is not valid; a%s number from %g to %g", name, text ? text : "(no number)", is_whole ? " whole" : "", least, most);
+        FAULT(w, node, "%s '%.40s' is not valid; expected a%s number from %g to %g", name, text ? text : "(no number)", is_whole ? " whole" : "", least, most);
         return false;
     }
     *out = x;
@@ -68,7 +68,7 @@ static bool read_vector(const Walk *w, const yaml_node_t *node, const char *name
 {
     double x[3];
     if (node->type != YAML_SEQUENCE_NODE || item_count(node) != 3) {
-        FAULT(w, node, "%s is not valid; a list of three numbers [x, y, z]", name);
+        FAULT(w, node, "%s is not valid; expected a list of three numbers [x, y, z]", name);
         return false;
     }
     for (int i = 0; i < 3; i++) {
@@ -84,7 +84,7 @@ static void read_name(const Walk *w, const yaml_node_t *node, char out[32])
 {
     const char *text = scalar_of(node);
     if (!text || strlen(text) > 31)
-        FAULT(w, node, "the name is not valid; a text of at most 31 bytes");
+        FAULT(w, node, "the name is not valid; expected at most 31 bytes");
     else
         memcpy(out, text, strlen(text) + 1);
 }
@@ -93,7 +93,7 @@ static void read_name(const Walk *w, const yaml_node_t *node, char out[32])
 static void read_place(const Walk *w, const yaml_node_t *node, const char *key, bool is_voxel, bool *given, Vec3 *out, bool *out_is_voxel)
 {
     if (*given)
-        FAULT(w, node, "'%s' is given twice, in mm and in voxels; one of them", key);
+        FAULT(w, node, "'%s' is given twice, in mm and in voxels; expected one of them", key);
     *given = true;
     *out_is_voxel = is_voxel;
     read_vector(w, node, key, out);
@@ -104,7 +104,7 @@ static void read_branch(const Walk *w, const yaml_node_t *map, RbtSeed *out)
     *out = (RbtSeed){.line = (int)map->start_mark.line + 1, .column = (int)map->start_mark.column + 1};
     bool has_start = false;
     if (map->type != YAML_MAPPING_NODE) {
-        FAULT(w, map, "a branch is not valid; {start_mm: [x, y, z], toward_mm: [x, y, z], radius_mm: r}");
+        FAULT(w, map, "a branch is not valid; expected {start_mm: [x, y, z], toward_mm: [x, y, z], radius_mm: r}");
         return;
     }
     for (int i = 0; i < pair_count(map); i++) {
@@ -121,17 +121,17 @@ static void read_branch(const Walk *w, const yaml_node_t *map, RbtSeed *out)
         else if (!strcmp(key, "name"))
             read_name(w, value, out->name);
         else
-            FAULT(w, value, "'%.40s' is no key of a branch; start_mm or start_voxel, toward_mm or toward_voxel, radius_mm, name", key);
+            FAULT(w, value, "unknown key '%.40s' in a branch; expected start_mm or start_voxel, toward_mm or toward_voxel, radius_mm, name", key);
     }
     if (!has_start)
-        FAULT(w, map, "the branch has no start; start_mm (or start_voxel)");
+        FAULT(w, map, "the branch has no start; expected start_mm (or start_voxel)");
 }
 
 static void read_aneurysm(const Walk *w, const yaml_node_t *map, RbtAneurysm *out)
 {
     *out = (RbtAneurysm){.line = (int)map->start_mark.line + 1, .column = (int)map->start_mark.column + 1};
     if (map->type != YAML_MAPPING_NODE) {
-        FAULT(w, map, "an aneurysm is not valid; {centers_mm: [[x, y, z], ...]}");
+        FAULT(w, map, "an aneurysm is not valid; expected {centers_mm: [[x, y, z], ...]}");
         return;
     }
     for (int i = 0; i < pair_count(map); i++) {
@@ -142,11 +142,11 @@ static void read_aneurysm(const Walk *w, const yaml_node_t *map, RbtAneurysm *ou
         if (!strcmp(key, "name")) {
             read_name(w, value, out->name);
         } else if (strcmp(key, "centers_mm") && strcmp(key, "centers_voxel")) {
-            FAULT(w, value, "'%.40s' is no key of an aneurysm; centers_mm or centers_voxel, name", key);
+            FAULT(w, value, "unknown key '%.40s' in an aneurysm; expected centers_mm or centers_voxel, name", key);
         } else if (out->center) {
-            FAULT(w, value, "the centres are given twice, in mm and in voxels; one of them");
+            FAULT(w, value, "the centres are given twice, in mm and in voxels; expected one of them");
         } else if (value->type != YAML_SEQUENCE_NODE || item_count(value) < 1 || item_count(value) > MAX_ENTRIES) {
-            FAULT(w, value, "%s is not valid; a list of points [[x, y, z], ...], 1 to %d of them", key, MAX_ENTRIES);
+            FAULT(w, value, "%s is not valid; expected a list of points [[x, y, z], ...], 1 to %d of them", key, MAX_ENTRIES);
         } else {
             int n = item_count(value);
             out->is_voxel = key[8] == 'v';
@@ -160,14 +160,14 @@ static void read_aneurysm(const Walk *w, const yaml_node_t *map, RbtAneurysm *ou
         }
     }
     if (!out->center)
-        FAULT(w, map, "the aneurysm has no centres; centers_mm (or centers_voxel), points inside the sac");
+        FAULT(w, map, "the aneurysm has no centres; expected centers_mm (or centers_voxel), points inside the sac");
 }
 
 static void read_list(const Walk *w, const yaml_node_t *list, bool is_branches, Trace *trace)
 {
     const char *what = is_branches ? "branches" : "aneurysms";
     if (list->type != YAML_SEQUENCE_NODE || item_count(list) > MAX_ENTRIES) {
-        FAULT(w, list, "%s is not valid; a list of at most %d entries", what, MAX_ENTRIES);
+        FAULT(w, list, "%s is not valid; expected a list of at most %d entries", what, MAX_ENTRIES);
         return;
     }
     int n = item_count(list);
@@ -213,7 +213,7 @@ static void read_region(const Walk *w, const yaml_node_t *map, const PlaceKind *
     *out = (RbtRegion){.line = (int)map->start_mark.line + 1, .column = (int)map->start_mark.column + 1};
     bool has_center = false;
     if (map->type != YAML_MAPPING_NODE) {
-        FAULT(w, map, "a %s is not valid; {%s: [x, y, z]%s}", kind->what, kind->mm, kind->has_radius ? ", radius_mm: r" : "");
+        FAULT(w, map, "a %s is not valid; expected {%s: [x, y, z]%s}", kind->what, kind->mm, kind->has_radius ? ", radius_mm: r" : "");
         return;
     }
     for (int i = 0; i < pair_count(map); i++) {
@@ -226,12 +226,12 @@ static void read_region(const Walk *w, const yaml_node_t *map, const PlaceKind *
         else if (kind->has_radius && !strcmp(key, "radius_mm"))
             read_number(w, value, key, 1e-3, 1e3, false, &out->radius);
         else
-            FAULT(w, value, "'%.40s' is no key of a %s; %s or %s%s", key, kind->what, kind->mm, kind->voxel, kind->has_radius ? ", radius_mm" : "");
+            FAULT(w, value, "unknown key '%.40s' in a %s; expected %s or %s%s", key, kind->what, kind->mm, kind->voxel, kind->has_radius ? ", radius_mm" : "");
     }
     if (!has_center)
-        FAULT(w, map, "the %s has no place; %s (or %s)", kind->what, kind->mm, kind->voxel);
+        FAULT(w, map, "the %s has no position; expected %s (or %s)", kind->what, kind->mm, kind->voxel);
     if (kind->has_radius && !(out->radius > 0))
-        FAULT(w, map, "the %s has no radius; radius_mm", kind->what);
+        FAULT(w, map, "the %s has no radius; expected radius_mm", kind->what);
 }
 
 // Where the trace keeps the places of a kind.
@@ -246,7 +246,7 @@ static RbtRegion **places_of(Trace *trace, int kind, int **count)
 static void read_regions(const Walk *w, const yaml_node_t *list, int kind, Trace *trace)
 {
     if (list->type != YAML_SEQUENCE_NODE || item_count(list) > MAX_ENTRIES) {
-        FAULT(w, list, "%s is not valid; a list of at most %d entries", place_kinds[kind].key, MAX_ENTRIES);
+        FAULT(w, list, "%s is not valid; expected a list of at most %d entries", place_kinds[kind].key, MAX_ENTRIES);
         return;
     }
     int n = item_count(list), *count;
@@ -267,7 +267,7 @@ static void read_regions(const Walk *w, const yaml_node_t *list, int kind, Trace
 static void read_retry_steps(const Walk *w, const yaml_node_t *list, RbtParameters *p)
 {
     if (list->type != YAML_SEQUENCE_NODE || item_count(list) > RBT_MAX_RETRIES) {
-        FAULT(w, list, "retry_steps is not valid; a list of at most %d multiples of the step", RBT_MAX_RETRIES);
+        FAULT(w, list, "retry_steps is not valid; expected a list of at most %d multiples of the step", RBT_MAX_RETRIES);
         return;
     }
     p->retry_count = item_count(list);
@@ -282,9 +282,9 @@ static void read_retry_steps(const Walk *w, const yaml_node_t *list, RbtParamete
 static void check_counts(const Walk *w, const yaml_node_t *node, const char *name, double value)
 {
     if ((!strcmp(name, "N_r") || !strcmp(name, "aneurysm_rays")) && sphere_level_of((int)value) < 1)
-        FAULT(w, node, "%s %g is not valid; 42, 162, 642 or 2562 (a subdivided icosahedron)", name, value);
+        FAULT(w, node, "%s %g is not valid; expected 42, 162, 642 or 2562 (a subdivided icosahedron)", name, value);
     if (!strcmp(name, "N_d") && sphere_level_of(2 * (int)value) < 1)
-        FAULT(w, node, "%s %g is not valid; 21, 81 or 321 (half of a subdivided icosahedron)", name, value);
+        FAULT(w, node, "%s %g is not valid; expected 21, 81 or 321 (half of a subdivided icosahedron)", name, value);
 }
 
 static void read_parameter(const Walk *w, const char *key, const yaml_node_t *value, RbtParameters *p)
@@ -301,14 +301,14 @@ static void read_parameter(const Walk *w, const char *key, const yaml_node_t *va
         return;
     }
     FAULT(w, value,
-          "'%.40s' is no key of a trace; branches, aneurysms, forbid, cut, until, not, parameters (default or paper), or a parameter that `segment --help` lists",
+          "unknown key '%.40s' in a trace; expected branches, aneurysms, forbid, cut, until, not, parameters (default or paper), or a parameter that `segment --help` lists",
           key);
 }
 
 static void read_root(const Walk *w, const yaml_node_t *root, Trace *trace)
 {
     if (root->type != YAML_MAPPING_NODE) {
-        FAULT(w, root, "a trace is a map; `branches: [...]`");
+        FAULT(w, root, "the trace is not a map; expected `branches: [...]`");
         return;
     }
     bool has_branches = false, has_automatic = false;
@@ -321,7 +321,7 @@ static void read_root(const Walk *w, const yaml_node_t *root, Trace *trace)
         if (set && !strcmp(set, "paper"))
             trace->parameters = rbt_paper_parameters();
         else if (!set || strcmp(set, "default"))
-            FAULT(w, (value ? value : root), "the set of parameters is not valid; default or paper");
+            FAULT(w, (value ? value : root), "the parameter set is not valid; expected default or paper");
     }
     for (int i = 0; i < pair_count(root); i++) {
         yaml_node_t *value;
@@ -345,9 +345,9 @@ static void read_root(const Walk *w, const yaml_node_t *root, Trace *trace)
     if (!has_automatic)
         trace->parameters.automatic = trace->branch_count == 1;
     if (!has_branches || trace->branch_count < 1)
-        FAULT(w, root, "there is no branch; `branches` with at least one start");
+        FAULT(w, root, "there is no branch; expected `branches` with at least one start");
     if (trace->parameters.n_max < trace->parameters.n_min)
-        FAULT(w, root, "N_max %g is less than N_min %g; at least as many", trace->parameters.n_max, trace->parameters.n_min);
+        FAULT(w, root, "N_max %g is less than N_min %g; expected at least as many", trace->parameters.n_max, trace->parameters.n_min);
 }
 
 void trace_free(Trace *trace)
@@ -367,7 +367,7 @@ void trace_free(Trace *trace)
 
 static void yaml_fault(const yaml_parser_t *parser, const char *path, Faults *faults)
 {
-    faults_add(faults, path, (int)parser->problem_mark.line + 1, (int)parser->problem_mark.column + 1, "is no YAML: %s; a map such as `branches: [...]`",
+    faults_add(faults, path, (int)parser->problem_mark.line + 1, (int)parser->problem_mark.column + 1, "is not YAML: %s; expected a map such as `branches: [...]`",
                parser->problem ? parser->problem : "unreadable");
 }
 
@@ -417,7 +417,7 @@ Trace *trace_parse(const char *text, size_t length, const char *path, Faults *fa
         if (root)
             read_root(&walk, root, trace);
         else
-            faults_add(faults, path, 1, 1, "the file is empty; a map such as `branches: [...]`");
+            faults_add(faults, path, 1, 1, "the file is empty; expected a map such as `branches: [...]`");
         bool has_root = root != NULL;
         yaml_document_delete(&document);
         if (has_root && !yaml_parser_load(&parser, &document)) {
@@ -425,7 +425,7 @@ Trace *trace_parse(const char *text, size_t length, const char *path, Faults *fa
         } else if (has_root) {
             root = yaml_document_get_root_node(&document);
             if (root)
-                FAULT(&walk, root, "a second document; one");
+                FAULT(&walk, root, "a second document begins; expected one");
             yaml_document_delete(&document);
         }
     }

@@ -106,7 +106,7 @@ static bool fail(const Cursor *c, size_t at, const char *what)
 // what is missing is told later, in pixels).
 static bool take_element(Cursor *c, size_t end, bool is_top, Element *e)
 {
-    static const char cut[] = "the file ends within an element; the whole file";
+    static const char cut[] = "the file ends within an element; expected the whole file";
     e->place = c->at;
     if (end - c->at < 8)
         return fail(c, c->at, cut);
@@ -119,7 +119,7 @@ static bool take_element(Cursor *c, size_t end, bool is_top, Element *e)
     } else {
         memcpy(e->vr, c->byte + c->at + 4, 2);
         if (!isupper((unsigned char)e->vr[0]) || !isupper((unsigned char)e->vr[1]))
-            return fail(c, c->at + 4, "no type of value (VR) where one must stand; a DICOM file in the encoding that its header names");
+            return fail(c, c->at + 4, "a value representation (VR) is missing; expected a DICOM file in the encoding that its header names");
         if (has_long_length(e->vr)) {
             if (end - c->at < 12)
                 return fail(c, c->at, cut);
@@ -131,7 +131,7 @@ static bool take_element(Cursor *c, size_t end, bool is_top, Element *e)
         }
     }
     if (e->length != UNDEFINED_LENGTH && e->length > end - c->at && !may_be_cut) {
-        faults_add_at_byte(c->faults, c->path, c->offset + e->place, "the element (%04x,%04x) promises %u bytes, %zu are left; the whole file", e->tag >> 16,
+        faults_add_at_byte(c->faults, c->path, c->offset + e->place, "the element (%04x,%04x) has a length of %u bytes, but %zu are left; expected the whole file", e->tag >> 16,
                            e->tag & 0xffff, e->length, end - c->at);
         return false;
     }
@@ -168,7 +168,7 @@ static bool take_decimals(const Cursor *c, const Element *e, int count, double *
     for (int i = 0; good && i < count; i++)
         good = isfinite(value[i]);
     if (!good) {
-        faults_add_at_byte(c->faults, c->path, c->offset + c->at, "the element (%04x,%04x) is not valid; %d numbers, separated by \\", e->tag >> 16,
+        faults_add_at_byte(c->faults, c->path, c->offset + c->at, "the element (%04x,%04x) is not valid; expected %d numbers, separated by \\", e->tag >> 16,
                            e->tag & 0xffff, count);
         return false;
     }
@@ -180,7 +180,7 @@ static bool take_decimals(const Cursor *c, const Element *e, int count, double *
 static bool take_short(const Cursor *c, const Element *e, long *out)
 {
     if (e->length != 2)
-        return fail(c, c->at, "a whole number that is not of two bytes; an intact image header");
+        return fail(c, c->at, "a whole number does not have two bytes; expected an intact image header");
     *out = (long)bits_at(c, c->at, 2);
     return true;
 }
@@ -218,7 +218,7 @@ static bool take_value(const Cursor *c, const Element *e, DicomImage *image)
         if (!take_decimals(c, e, 1, &frames, &has_frames))
             return false;
         if (has_frames && (!(frames >= 1 && frames <= INT32_MAX) || floor(frames) != frames))
-            return fail(c, c->at, "the number of frames is not valid; a whole number from 1");
+            return fail(c, c->at, "the number of frames is not valid; expected a whole number from 1");
         image->frames = has_frames ? (long)frames : image->frames;
         return true;
     default: return take_plane(c, e, &image->file);
@@ -248,7 +248,7 @@ static bool walk_items(Cursor *c, size_t end, const Element *sequence, Scope sco
     bool is_open = sequence->length == UNDEFINED_LENGTH;
     size_t stop = is_open ? end : c->at + sequence->length;
     if (depth > MAX_DEPTH)
-        return fail(c, sequence->place, "sequences within sequences more than 24 deep; an intact file");
+        return fail(c, sequence->place, "sequences are nested more than 24 deep; expected an intact file");
     while (is_open || c->at < stop) {
         Element item;
         if (!take_element(c, stop, false, &item))
@@ -256,10 +256,10 @@ static bool walk_items(Cursor *c, size_t end, const Element *sequence, Scope sco
         if (item.tag == T_SEQUENCE_END && is_open)
             return true;
         if (item.tag != T_ITEM)
-            return fail(c, item.place, "a sequence holds something that is no item; an intact file");
+            return fail(c, item.place, "a sequence holds something other than an item; expected an intact file");
         Plane *own = scope == SCOPE_SHARED && sequence->tag == T_SHARED ? &image->shared : plane;
         if (scope == SCOPE_PER_FRAME && sequence->tag == T_PER_FRAME && !(own = next_frame(image)))
-            return fail(c, item.place, "more frames than memory holds");
+            return fail(c, item.place, "not enough memory for all frames");
         bool open_item = item.length == UNDEFINED_LENGTH;
         size_t item_end = open_item ? stop : c->at + item.length;
         if (!open_item && scope == SCOPE_OTHER)
@@ -349,7 +349,7 @@ static bool take_meta(Cursor *c, DicomImage *image)
         if (!take_element(c, c->length, false, &e))
             return false;
         if (e.length == UNDEFINED_LENGTH)
-            return fail(c, e.place, "a header element of undefined length; an intact file");
+            return fail(c, e.place, "a header element of undefined length; expected an intact file");
         if (e.tag == T_TRANSFER_SYNTAX)
             take_text(c, &e, image->syntax, sizeof image->syntax);
         c->at += e.length;
@@ -365,18 +365,18 @@ static bool check_image(const Cursor *c, const DicomImage *m)
     const char *path = c->path;
     Faults *faults = c->faults;
     if (!m->has_pixels || m->rows < 1 || m->columns < 1) {
-        faults_add_at_byte(faults, path, c->offset + c->at, "a DICOM file without an image (rows, columns, pixel data); the files of an image series");
+        faults_add_at_byte(faults, path, c->offset + c->at, "the DICOM file has no image (rows, columns, pixel data); expected the files of an image series");
         return false;
     }
     int before = faults->count;
     if (m->samples != 1)
-        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "%ld samples a pixel (colour); one", m->samples);
+        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "%ld samples per pixel (colour); expected one", m->samples);
     else if (strcmp(m->photometric, "MONOCHROME2") && strcmp(m->photometric, "MONOCHROME1"))
-        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "the photometric interpretation '%s' is not read; MONOCHROME1 or MONOCHROME2",
+        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "the photometric interpretation '%s' is not supported; expected MONOCHROME1 or MONOCHROME2",
                            m->photometric);
     if ((m->allocated != 8 && m->allocated != 16) || m->stored < 1 || m->stored > m->allocated || m->high_bit + 1 < m->stored || m->high_bit >= m->allocated ||
         m->is_signed > 1)
-        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "%ld bits allocated, %ld stored, high bit %ld, representation %ld are not read; "
+        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "%ld bits allocated, %ld stored, high bit %ld, representation %ld are not supported; expected "
                            "8 or 16 bits "
                            "allocated, the stored ones within, representation 0 or 1", m->allocated, m->stored, m->high_bit, m->is_signed);
     if (faults->count > before)
@@ -387,12 +387,12 @@ static bool check_image(const Cursor *c, const DicomImage *m)
         there = m->pixel_length;
     if (needed > there && !m->is_encapsulated) {
         faults_add_at_byte(faults, path, c->offset + m->pixel_place + there, "the pixels end after %zu of %zu bytes (%ld x %ld, %ld frames, %ld "
-                           "bits); the whole file",
+                           "bits); expected the whole file",
                            there, needed, m->columns, m->rows, m->frames, m->allocated);
         return false;
     }
     if (m->frame_count > 0 && m->frame_count != m->frames) {
-        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "%ld frames, but the places of %d; one for each", m->frames, m->frame_count);
+        faults_add_at_byte(faults, path, c->offset + m->pixel_place, "%ld frames, but %d positions; expected one for each", m->frames, m->frame_count);
         return false;
     }
     return true;
@@ -421,7 +421,7 @@ static bool read_image(const FileBytes *file, DicomImage *image, Faults *faults)
         if (!is_explicit && strcmp(image->syntax, implicit_little)) {
             // what is compressed has explicit little-endian headers; only a deflated file is compressed as a whole
             if (!strcmp(image->syntax, "1.2.840.10008.1.2.1.99")) {
-                faults_add_at_byte(faults, file->path, c.offset + c.at, "the file is deflated; uncompressed: `gdcmconv --raw IN.dcm OUT.dcm`");
+                faults_add_at_byte(faults, file->path, c.offset + c.at, "the file is deflated; decompress it with `gdcmconv --raw IN.dcm OUT.dcm`");
                 return false;
             }
             is_explicit = true;
@@ -429,7 +429,7 @@ static bool read_image(const FileBytes *file, DicomImage *image, Faults *faults)
     } else if (!bare) {
         FileBytes rest = {.byte = file->byte + c.at, .length = file->length - c.at, .path = file->path};
         if (!begins_bare(&rest, &is_explicit, &is_big))
-            return fail(&c, c.at, "no transfer syntax, and nothing that tells the encoding; an intact DICOM file");
+            return fail(&c, c.at, "there is no transfer syntax and the encoding cannot be guessed; expected an intact DICOM file");
     }
     c.explicit_vr = is_explicit;
     c.big_endian = image->big_endian = is_big;
@@ -523,27 +523,27 @@ static bool check_slice(const Slice *s, const Slice *first, Faults *faults)
     const DicomImage *m = &s->file->image, *n = &first->file->image;
     if (!p->has_position || !p->has_orientation || !p->has_spacing) {
         faults_add_at_byte(faults, path, m->pixel_place, "frame %d has no %s: not a slice of a volume (a projection, a cine run, a secondary "
-                           "capture); images with "
+                           "capture); expected images with "
                            "ImagePositionPatient, ImageOrientationPatient and PixelSpacing", s->frame + 1,
                            !p->has_position ? "position" : !p->has_orientation ? "orientation" : "pixel spacing");
         return false;
     }
     if (m->rows != n->rows || m->columns != n->columns) {
-        faults_add_at_byte(faults, path, m->pixel_place, "has %ld x %ld pixels, %s %ld x %ld; one size for the series: move the odd file away",
+        faults_add_at_byte(faults, path, m->pixel_place, "has %ld x %ld pixels, %s %ld x %ld; expected one size for the series: move the odd file away",
                            m->columns, m->rows,
                            first->file->path, n->columns, n->rows);
         return false;
     }
     Vec3 u = vec3_of(p->orientation), v = vec3_of(p->orientation + 3);
     if (!(p->spacing[0] > 0 && p->spacing[1] > 0) || !(fabs(vec3_norm(u) - 1) < 0.01 && fabs(vec3_norm(v) - 1) < 0.01 && fabs(vec3_dot(u, v)) < 0.01)) {
-        faults_add_at_byte(faults, path, m->pixel_place, "frame %d: pixel spacing %g, %g or orientation (%g,%g,%g) (%g,%g,%g) is not valid; spacings "
+        faults_add_at_byte(faults, path, m->pixel_place, "frame %d: pixel spacing %g, %g or orientation (%g,%g,%g) (%g,%g,%g) is not valid; expected spacings "
                            "above 0, two unit "
                            "vectors at right angles", s->frame + 1, p->spacing[0], p->spacing[1], u.x, u.y, u.z, v.x, v.y, v.z);
         return false;
     }
     double turn = vec3_distance(u, vec3_of(q->orientation)) + vec3_distance(v, vec3_of(q->orientation + 3));
     if (turn > 2e-3 || fabs(p->spacing[0] / q->spacing[0] - 1) > 1e-3 || fabs(p->spacing[1] / q->spacing[1] - 1) > 1e-3) {
-        faults_add_at_byte(faults, path, m->pixel_place, "frame %d is turned or spaced otherwise than the first of %s; parallel slices of one "
+        faults_add_at_byte(faults, path, m->pixel_place, "frame %d has another orientation or spacing than the first of %s; expected parallel slices of one "
                            "spacing: move the odd file "
                            "(a localizer?) away", s->frame + 1, first->file->path);
         return false;
@@ -564,7 +564,7 @@ static bool check_places(Slice *slice, int *count, Vec3 *step, Faults *faults)
     *count = kept;
     const char *path = slice[0].file->path;
     if (kept < 2) {
-        faults_add(faults, path, 0, 0, "one slice only; a series of two or more, in one folder");
+        faults_add(faults, path, 0, 0, "there is only one slice; expected a series of two or more, in one folder");
         return false;
     }
     double steps[2] = {HUGE_VAL, 0}, mean = (slice[kept - 1].along - slice[0].along) / (kept - 1);
@@ -572,9 +572,9 @@ static bool check_places(Slice *slice, int *count, Vec3 *step, Faults *faults)
     for (int i = 1; i < kept; i++) {
         double d = slice[i].along - slice[i - 1].along;
         if (!(d > 1e-4)) {
-            faults_add_at_byte(faults, slice[i].file->path, slice[i].file->image.pixel_place, "frame %d lies where frame %d of %s lies (several times "
+            faults_add_at_byte(faults, slice[i].file->path, slice[i].file->image.pixel_place, "frame %d has the same position as frame %d of %s (several times "
                                "or echoes in one "
-                               "series?); one slice at each place", slice[i].frame + 1, slice[i - 1].frame + 1, slice[i - 1].file->path);
+                               "series?); expected one slice at each place", slice[i].frame + 1, slice[i - 1].frame + 1, slice[i - 1].file->path);
             return false;
         }
         steps[0] = fmin(steps[0], d);
@@ -587,7 +587,7 @@ static bool check_places(Slice *slice, int *count, Vec3 *step, Faults *faults)
         if (vec3_distance(place, vec3_of(slice[i].plane.position)) > 0.05 * mean) {
             faults_add_at_byte(faults, slice[widest].file->path, slice[widest].file->image.pixel_place,
                                "frame %d lies %.4g mm behind frame %d of %s, others lie %.4g mm "
-                               "apart: slices are missing or unevenly placed; all slices, at even steps", slice[widest].frame + 1, steps[1],
+                               "apart: slices are missing or unevenly spaced; expected all slices, evenly spaced", slice[widest].frame + 1, steps[1],
                                slice[widest - 1].frame + 1, slice[widest - 1].file->path, steps[0]);
             return false;
         }
@@ -617,7 +617,7 @@ bool dicom_bytes_read(const char *path, FileBytes *out, Faults *faults)
     struct stat status;
     if (stat(path, &status) != 0 || (size_t)status.st_size <= DICOM_BYTES_MOST)
         return file_bytes_read(path, DICOM_BYTES_MOST, out, faults);
-    faults_add(faults, path, 0, 0, "is %zu bytes long; at most %zu are read of a DICOM file", (size_t)status.st_size, (size_t)DICOM_BYTES_MOST);
+    faults_add(faults, path, 0, 0, "is %zu bytes long; the limit for a DICOM file is %zu", (size_t)status.st_size, (size_t)DICOM_BYTES_MOST);
     return false;
 }
 
@@ -652,7 +652,7 @@ static bool unpack(OpenFile *open, Faults *faults)
     open->image.is_words = plain.is_words;
     if (!plain.is_encapsulated && plain.rows == m->rows && plain.columns == m->columns && plain.frames == m->frames && plain.allocated == m->allocated)
         return true;
-    faults_add_at_byte(faults, open->file->path, m->pixel_place, "the compressed pixels unpack to an image of another size than its header says; an intact file");
+    faults_add_at_byte(faults, open->file->path, m->pixel_place, "the compressed pixels decode to an image of another size than the header says; expected an intact file");
     return false;
 }
 
@@ -680,7 +680,7 @@ static Volume *assemble(const Series *series, const FileBytes *whole, Faults *fa
     int count = 0;
     bool good = slice != NULL;
     if (!good)
-        faults_add(faults, series->file[0].path, 0, 0, "%zu slices need more memory than is free", total);
+        faults_add(faults, series->file[0].path, 0, 0, "not enough memory for %zu slices", total);
     for (int i = 0; good && i < series->count; i++)
         for (int k = 0; good && k < series->file[i].image.frames; k++) {
             Slice *s = &slice[count++];
@@ -785,7 +785,7 @@ static bool gather_folder(const char *folder, const DicomImage *wanted, Series *
     char **name = list_folder(folder, &count);
     int before = faults->count;
     if (count < 0)
-        faults_add(faults, folder, 0, 0, "cannot be read; a folder with the files of a series");
+        faults_add(faults, folder, 0, 0, "cannot be read; expected a folder with the files of a series");
     for (int i = 0; i < count; i++) {
         char path[4096];
         int wrote = snprintf(path, sizeof path, "%s/%s", folder, name[i]);
@@ -804,7 +804,7 @@ static bool gather_folder(const char *folder, const DicomImage *wanted, Series *
         if (is_other || (wanted && image.frames > 1)) {
             image_free(&image);
         } else if (!series_add(series, path, &image)) {
-            faults_add(faults, path, 0, 0, "more files than memory holds");
+            faults_add(faults, path, 0, 0, "not enough memory for the list of files");
             image_free(&image);
         }
     }
@@ -830,7 +830,7 @@ Volume *volume_load_dicom_folder(const char *path, Faults *faults)
     snprintf(folder, sizeof folder, "%.*s", (int)(n < sizeof folder ? n : sizeof folder - 1), path);
     bool good = gather_folder(folder, NULL, &series, faults);
     if (good && series.count == 0) {
-        faults_add(faults, path, 0, 0, "a folder without DICOM images; the folder of a series, or a volume's file");
+        faults_add(faults, path, 0, 0, "the folder has no DICOM images; expected the folder of a series, or a volume's file");
         good = false;
     }
     bool is_one = true;
@@ -870,7 +870,7 @@ Volume *volume_parse_dicom(const FileBytes *file, Faults *faults)
         good = series_add(&series, file->path, &image);
         if (!good) {
             image_free(&image);
-            faults_add(faults, file->path, 0, 0, "needs more memory than is free");
+            faults_add(faults, file->path, 0, 0, "needs more memory than is available");
         }
     } else {
         char folder[4096];
@@ -880,7 +880,7 @@ Volume *volume_parse_dicom(const FileBytes *file, Faults *faults)
         good = gather_folder(folder, &image, &series, faults);
         image_free(&image);
         if (good && series.count == 0) {   // the file went away meanwhile
-            faults_add(faults, file->path, 0, 0, "cannot be opened; a readable file");
+            faults_add(faults, file->path, 0, 0, "cannot be opened; expected a readable file");
             good = false;
         }
     }

@@ -86,19 +86,19 @@ bool dicom_unpack(const char *path, size_t place, const char *syntax, size_t mos
     const char *why;
     *out = (FileBytes){.path = path};
     if (!process_beside("seldinger-dicom", program, sizeof program) || access(program, X_OK) != 0) {
-        faults_add_at_byte(faults, path, place, "the pixels are compressed (transfer syntax %s), and seldinger-dicom, which unpacks them, is not installed beside "
-                           "this program; uncompressed: `gdcmconv --raw IN.dcm OUT.dcm`", syntax);
+        faults_add_at_byte(faults, path, place, "the pixels are compressed (transfer syntax %s), and seldinger-dicom, which decodes them, is not installed next to "
+                           "this program; decompress the file with `gdcmconv --raw IN.dcm OUT.dcm`", syntax);
         return false;
     }
     int file = regular_file_open(path, &status, &why);
     if (file < 0) {
-        faults_add(faults, path, 0, 0, "cannot be opened: %s; a readable file", why);
+        faults_add(faults, path, 0, 0, "cannot be opened: %s; expected a readable file", why);
         return false;
     }
     bool good = run(program, file, most, out);
     close(file);
     if (!good)
-        faults_add_at_byte(faults, path, place, "the compressed pixels (transfer syntax %s) cannot be unpacked; an intact file in JPEG, JPEG-LS, JPEG 2000 or RLE",
+        faults_add_at_byte(faults, path, place, "cannot decode the compressed pixels (transfer syntax %s); expected an intact file in JPEG, JPEG-LS, JPEG 2000 or RLE",
                            syntax);
     return good;
 }

@@ -148,7 +148,7 @@ static Volume *parse(const FileBytes *file, Faults *faults)
         return volume_parse_metaimage(file, faults);
     if (volume_is_dicom(file))
         return volume_parse_dicom(file, faults);
-    faults_add_at_byte(faults, file->path, 0, "is no volume that can be read; NRRD (.nrrd .nhdr), MetaImage (.mha .mhd), NIfTI (.nii .nii.gz .hdr) or DICOM");
+    faults_add_at_byte(faults, file->path, 0, "is not a supported volume format; expected NRRD (.nrrd .nhdr), MetaImage (.mha .mhd), NIfTI (.nii .nii.gz .hdr) or DICOM");
     return NULL;
 }
 
@@ -219,7 +219,7 @@ static uint8_t *encode_samples(const Volume *volume, size_t count, const struct 
 {
     uint8_t *out = malloc(count * type->size);
     if (!out) {
-        faults_add(faults, path, 0, 0, "needs %zu bytes of memory, more than is free", count * type->size);
+        faults_add(faults, path, 0, 0, "needs %zu bytes of memory, more than is available", count * type->size);
         return NULL;
     }
     for (size_t i = 0; i < count; i++) {
@@ -275,11 +275,11 @@ bool volume_save_nrrd(const Volume *volume, const char *path, const char *type_n
         if (!strcmp(save_types[i].name, type_name))
             type = &save_types[i];
     if (!type) {
-        faults_add(faults, path, 0, 0, "'%s' is no sample type; float, uint8 or int16", type_name);
+        faults_add(faults, path, 0, 0, "unknown sample type '%s'; expected float, uint8 or int16", type_name);
         return false;
     }
     if (part_file_is_through(path)) {
-        faults_add(faults, path, 0, 0, "is there and no regular file; another name");
+        faults_add(faults, path, 0, 0, "exists and is not a regular file; give another name");
         return false;
     }
     size_t count = (size_t)volume->size[0] * (size_t)volume->size[1] * (size_t)volume->size[2];
@@ -307,6 +307,6 @@ bool volume_save_nrrd(const Volume *volume, const char *path, const char *type_n
     free(sample);
     good = good && file;
     if (!good)
-        faults_add(faults, path, 0, 0, "cannot be written: %s; a folder that exists, may be written to, and has room", strerror(reason));
+        faults_add(faults, path, 0, 0, "cannot be written: %s; expected a writable folder with free space", strerror(reason));
     return good;
 }

@@ -97,7 +97,7 @@ bool file_bytes_read(const char *path, size_t most, FileBytes *out, Faults *faul
     const char *why;
     int file = regular_file_open(path, &status, &why);
     if (file < 0) {
-        faults_add(faults, path, 0, 0, "cannot be opened: %s; a readable file on disk", why);
+        faults_add(faults, path, 0, 0, "cannot be opened: %s; expected a readable file on disk", why);
         return false;
     }
     size_t whole = (size_t)status.st_size, length = whole < most ? whole : most;
@@ -107,9 +107,9 @@ bool file_bytes_read(const char *path, size_t most, FileBytes *out, Faults *faul
     close(file);
     if (!byte || got < length) {
         if (byte)
-            faults_add(faults, path, 0, 0, "cannot be read to its end: %s", reason ? strerror(reason) : "it has become shorter");
+            faults_add(faults, path, 0, 0, "cannot be read completely: %s", reason ? strerror(reason) : "the file became shorter");
         else
-            faults_add(faults, path, 0, 0, "is larger than the memory that is free");
+            faults_add(faults, path, 0, 0, "is larger than the available memory");
         free(byte);
         return false;
     }
@@ -141,7 +141,7 @@ static bool is_not_too_long(const VolumeHeader *header, const FileBytes *file, F
 {
     if (file->whole <= file->length || (header->byte_skip >= 0 && header->line_skip == 0))
         return true;
-    faults_add(faults, file->path, 0, 0, "is %zu bytes long where its header promises %zu; at most %d more are read over", file->whole,
+    faults_add(faults, file->path, 0, 0, "is %zu bytes long, but its header promises %zu; at most %d extra bytes are ignored", file->whole,
                data_most(header) - SLACK, SLACK);
     return false;
 }
@@ -154,7 +154,7 @@ bool file_bytes_read_beside(const char *header_path, int line, const char *name,
     while (length > 0 && isspace((unsigned char)name[length - 1]))
         length--;
     if (length == 0 || length > 1024 || memchr(name, 0, length)) {
-        faults_add(faults, header_path, line, 0, "no name of a data file; the name of a file in the header's folder");
+        faults_add(faults, header_path, line, 0, "the name of the data file is missing; expected the name of a file in the header's folder");
         return false;
     }
     if (length > 2 && name[0] == '.' && name[1] == '/')
@@ -163,7 +163,7 @@ bool file_bytes_read_beside(const char *header_path, int line, const char *name,
     for (size_t i = 0; i + 1 < length; i++)
         leaves = leaves || (name[i] == '.' && name[i + 1] == '.' && (i == 0 || name[i - 1] == '/') && (i + 2 == length || name[i + 2] == '/'));
     if (leaves) {
-        faults_add(faults, header_path, line, 0, "the data file '%.*s' lies outside the header's folder; move it beside the header and give its name alone",
+        faults_add(faults, header_path, line, 0, "the data file '%.*s' lies outside the header's folder; move it next to the header and give its name alone",
                    (int)length, name);
         return false;
     }
@@ -171,7 +171,7 @@ bool file_bytes_read_beside(const char *header_path, int line, const char *name,
     int folder = slash ? (int)(slash - header_path) + 1 : 0;
     int wrote = snprintf(path, 4096, "%.*s%.*s", folder, header_path, (int)length, name);
     if (wrote < 0 || wrote >= 4096 || access(path, R_OK)) {
-        faults_add(faults, header_path, line, 0, "the data file '%.*s' is not there; it must stand in the header's folder", (int)length, name);
+        faults_add(faults, header_path, line, 0, "the data file '%.*s' does not exist; it must be in the header's folder", (int)length, name);
         return false;
     }
     return file_bytes_read(path, data_most(header), out, faults);
@@ -190,7 +190,7 @@ bool volume_header_check(const VolumeHeader *header, const char *path, int line,
     size_t count = 1;
     for (int i = 0; i < 3; i++) {
         if (header->size[i] < 1 || (size_t)header->size[i] > VOLUME_VOXELS_MOST / count) {
-            faults_add(faults, path, line, 0, "size %d x %d x %d is not valid; each at least 1, at most 2^31 voxels in all", header->size[0],
+            faults_add(faults, path, line, 0, "size %d x %d x %d is not valid; expected at least 1 each and at most 2^31 voxels in all", header->size[0],
                        header->size[1], header->size[2]);
             return false;
         }
@@ -199,12 +199,12 @@ bool volume_header_check(const VolumeHeader *header, const char *path, int line,
     Vec3 a = header->axis[0], b = header->axis[1], c = header->axis[2];
     double volume = fabs(vec3_dot(a, vec3_cross(b, c))), box = vec3_norm(a) * vec3_norm(b) * vec3_norm(c);
     if (!vec3_is_finite(header->origin) || !isfinite(volume) || !isfinite(box) || !(volume > 1e-6 * box) || !(box > 1e-24) || !(box < 1e24)) {
-        faults_add(faults, path, line, 0, "the axes (%g,%g,%g) (%g,%g,%g) (%g,%g,%g) span no grid; three independent directions, finite and not 0, and a "
+        faults_add(faults, path, line, 0, "the axes (%g,%g,%g) (%g,%g,%g) (%g,%g,%g) span no grid; expected three independent directions, finite and not 0, and a "
                    "finite origin", a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z);
         return false;
     }
     if (!isfinite(header->slope) || !isfinite(header->intercept)) {
-        faults_add(faults, path, line, 0, "the scale of the values (slope %g, intercept %g) is not finite; slope 1 and intercept 0 for none",
+        faults_add(faults, path, line, 0, "the scale of the values (slope %g, intercept %g) is not finite; expected slope 1 and intercept 0 for none",
                    header->slope, header->intercept);
         return false;
     }
@@ -254,9 +254,9 @@ static void say_short(const Inflater *inflater, size_t made, size_t wanted, Faul
 {
     const FileBytes *data = inflater->data;
     if (inflater->state == Z_DATA_ERROR || inflater->state == Z_NEED_DICT)
-        faults_add_at_byte(faults, data->path, data->offset + inflater->in, "the compressed data is damaged; an intact gzip or zlib stream");
+        faults_add_at_byte(faults, data->path, data->offset + inflater->in, "the compressed data is damaged; expected an intact gzip or zlib stream");
     else
-        faults_add_at_byte(faults, data->path, data->offset + inflater->in, "the data ends after %zu of %zu bytes; the whole file, or a header with the true sizes",
+        faults_add_at_byte(faults, data->path, data->offset + inflater->in, "the data ends after %zu of %zu bytes; expected the whole file, or a header with the true sizes",
                            made, wanted);
 }
 
@@ -264,7 +264,7 @@ static bool can_hold(const FileBytes *data, size_t wanted, Faults *faults)
 {
     if (wanted / DEFLATE_GROWTH <= data->length)
         return true;
-    faults_add_at_byte(faults, data->path, data->offset, "%zu compressed bytes cannot hold the %zu bytes that the header promises; a header and data "
+    faults_add_at_byte(faults, data->path, data->offset, "%zu compressed bytes cannot hold the %zu bytes that the header promises; expected a header and data "
                        "that belong together", data->length, wanted);
     return false;
 }
@@ -275,7 +275,7 @@ bool volume_inflate_head(const FileBytes *data, uint8_t *out, size_t wanted, Fau
     if (!can_hold(data, wanted, faults))
         return false;
     if (!inflater_open(&inflater, data)) {
-        faults_add(faults, data->path, 0, 0, "needs more memory than is free");
+        faults_add(faults, data->path, 0, 0, "needs more memory than is available");
         return false;
     }
     size_t made = inflater_read(&inflater, out, wanted);
@@ -345,7 +345,7 @@ Volume *volume_of_header(const VolumeHeader *header, const char *path, Faults *f
 {
     Volume *volume = volume_create(header->size, header->origin, header->axis);
     if (!volume) {
-        faults_add(faults, path, 0, 0, "%d x %d x %d voxels need more memory than is free", header->size[0], header->size[1], header->size[2]);
+        faults_add(faults, path, 0, 0, "%d x %d x %d voxels need more memory than is available", header->size[0], header->size[1], header->size[2]);
         return NULL;
     }
     memcpy(volume->frame, header->frame, sizeof volume->frame);
@@ -356,7 +356,7 @@ Volume *volume_of_header(const VolumeHeader *header, const char *path, Faults *f
 static Volume *decode_text(const VolumeHeader *header, const FileBytes *data, size_t count, Faults *faults)
 {
     if (count / 2 > data->length) {
-        faults_add_at_byte(faults, data->path, data->offset, "%zu bytes of text cannot hold %zu numbers; all numbers, or the true sizes", data->length, count);
+        faults_add_at_byte(faults, data->path, data->offset, "%zu bytes of text cannot hold %zu numbers; expected all numbers, or the true sizes", data->length, count);
         return NULL;
     }
     Volume *volume = volume_of_header(header, data->path, faults);
@@ -365,7 +365,7 @@ static Volume *decode_text(const VolumeHeader *header, const FileBytes *data, si
     for (size_t i = 0; volume && i < count; i++) {
         double x;
         if (!take_number(&text, &left, &x)) {
-            faults_add_at_byte(faults, data->path, data->offset + data->length - left, "value %zu of %zu is missing or no number; numbers separated by blanks",
+            faults_add_at_byte(faults, data->path, data->offset + data->length - left, "value %zu of %zu is missing or not a number; expected numbers separated by blanks",
                                i + 1, count);
             volume_free(volume);
             return NULL;
@@ -386,7 +386,7 @@ static bool inflate_values(const VolumeHeader *header, const FileBytes *data, si
     size_t sample = voxel_type_size(header->type), wanted = skip + count * sample, made = 0, got = 0;
     uint8_t *piece = malloc(PIECE), excess;
     if (!piece || !inflater_open(&inflater, data)) {
-        faults_add(faults, data->path, 0, 0, "needs more memory than is free");
+        faults_add(faults, data->path, 0, 0, "needs more memory than is available");
         free(piece);
         return false;
     }
@@ -404,7 +404,7 @@ static bool inflate_values(const VolumeHeader *header, const FileBytes *data, si
     if (!good) {
         say_short(&inflater, made + got, wanted, faults);
     } else if (inflater_read(&inflater, &excess, 1) > 0) {
-        faults_add_at_byte(faults, data->path, data->offset, "the compressed data holds more than the %zu bytes that the header promises; a header and data "
+        faults_add_at_byte(faults, data->path, data->offset, "the compressed data holds more than the %zu bytes that the header promises; expected a header and data "
                            "that belong together", wanted);
         good = false;
     }
@@ -426,7 +426,7 @@ static Volume *decode_deflate(const VolumeHeader *header, const FileBytes *data,
 {
     size_t skip = (size_t)header->byte_skip, bytes = count * voxel_type_size(header->type);
     if (skip > SIZE_MAX - bytes) {
-        faults_add(faults, data->path, 0, 0, "the byte skip %zu is not valid; a skip within the file", skip);
+        faults_add(faults, data->path, 0, 0, "the byte skip %zu is not valid; expected a skip within the file", skip);
         return NULL;
     }
     if (!can_hold(data, skip + bytes, faults))
@@ -443,7 +443,7 @@ static bool skip_lines(FileBytes *data, long lines, Faults *faults)
         const char *text;
         size_t length;
         if (!line_cursor_next(&cursor, &text, &length)) {
-            faults_add(faults, data->path, 0, 0, "has %ld lines, fewer than the header's line skip of %ld; a skip within the file", i, lines);
+            faults_add(faults, data->path, 0, 0, "has %ld lines, fewer than the header's line skip of %ld; expected a skip within the file", i, lines);
             return false;
         }
     }
@@ -469,14 +469,14 @@ Volume *volume_decode(const VolumeHeader *header, const FileBytes *file, Faults 
     if (header->byte_skip < 0)
         skip = data.length > bytes ? data.length - bytes : 0;
     if (skip > data.length) {
-        faults_add_at_byte(faults, data.path, data.offset, "the byte skip %zu goes past the end; at most %zu", skip, data.length);
+        faults_add_at_byte(faults, data.path, data.offset, "the byte skip %zu goes past the end; expected at most %zu", skip, data.length);
         return NULL;
     }
     data = (FileBytes){.byte = data.byte + skip, .length = data.length - skip, .offset = data.offset + skip, .path = data.path};
     if (header->encoding == ENCODING_TEXT)
         return decode_text(header, &data, count, faults);
     if (data.length < bytes) {
-        faults_add_at_byte(faults, data.path, data.offset + data.length, "the data ends after %zu of %zu bytes (%d x %d x %d voxels of %zu); the "
+        faults_add_at_byte(faults, data.path, data.offset + data.length, "the data ends after %zu of %zu bytes (%d x %d x %d voxels of %zu); expected the "
                            "whole file, "
                            "or a header with the true sizes", data.length, bytes, header->size[0], header->size[1], header->size[2], sample);
         return NULL;
@@ -569,12 +569,12 @@ Volume *volume_decode_several(const VolumeHeader *header, const char *header_pat
     bool by_list = is_list(text, length);
     char name[1200], path[4096];
     if (!by_list && !read_numbered(text, length, &numbered)) {
-        faults_add(faults, header_path, line, 0, "not a numbered name; `NAME%%03d.raw FIRST LAST STEP`, or LIST and a name a line");
+        faults_add(faults, header_path, line, 0, "not a file name pattern; expected `NAME%%03d.raw FIRST LAST STEP`, or LIST followed by one name per line");
         return NULL;
     }
     const NumberedName *how = by_list ? NULL : &numbered;
     if (header->encoding != ENCODING_RAW || header->line_skip > 0) {
-        faults_add(faults, header_path, line, 0, "several data files that are compressed, text or begin with lines are not read; raw data, or one data file");
+        faults_add(faults, header_path, line, 0, "several data files are supported only for raw data without a line skip; expected raw data, or one data file");
         return NULL;
     }
     size_t bytes = (size_t)header->size[0] * (size_t)header->size[1] * (size_t)header->size[2] * voxel_type_size(header->type), files = 0, done = 0;
@@ -583,7 +583,7 @@ Volume *volume_decode_several(const VolumeHeader *header, const char *header_pat
     while (files <= (size_t)header->size[2] && next_name(how, &counting, (long)files, name, &at))
         files++;
     if (files == 0 || files > (size_t)header->size[2] || (size_t)header->size[2] % files != 0) {
-        faults_add(faults, header_path, line, 0, "%zu%s data files for %d slices; as many, or a divisor of that", files,
+        faults_add(faults, header_path, line, 0, "%zu%s data files for %d slices; expected as many, or a divisor of that number", files,
                    files > (size_t)header->size[2] ? " or more" : "",
                    header->size[2]);
         return NULL;
@@ -603,7 +603,7 @@ Volume *volume_decode_several(const VolumeHeader *header, const char *header_pat
         if (!good)
             faults_add_at_byte(faults, path, data.length, "the data ends after %zu of %zu bytes", data.length, skip + share);
         else if (!joined && !(joined = malloc(bytes)))   // one file has shown that the sizes are not mere words
-            faults_add(faults, header_path, line, 0, "needs %zu bytes of memory, more than is free", bytes);
+            faults_add(faults, header_path, line, 0, "needs %zu bytes of memory, more than is available", bytes);
         good = good && joined;
         if (good)
             memcpy(joined + done, data.byte + skip, share);

@@ -62,7 +62,7 @@ static bool gather(const FileBytes *file, KeyValue value[KEY_COUNT], size_t *end
     int before = faults->count;
     while (!value[DATA_FILE].line) {
         if (!line_cursor_next(&cursor, &text, &length)) {
-            faults_add_at_byte(faults, file->path, file->length, "the header ends without ElementDataFile; `ElementDataFile = LOCAL` or a file's name as its last "
+            faults_add_at_byte(faults, file->path, file->length, "the header ends without ElementDataFile; expected `ElementDataFile = LOCAL` or a file name as its last "
                                "line");
             return false;
         }
@@ -70,7 +70,7 @@ static bool gather(const FileBytes *file, KeyValue value[KEY_COUNT], size_t *end
         if (!equals && length == 0)
             continue;
         if (!equals) {
-            faults_add(faults, file->path, cursor.line, 1, "not a line of the header; `Key = Value`");
+            faults_add(faults, file->path, cursor.line, 1, "not a header line; expected `Key = Value`");
             return false;
         }
         size_t named = (size_t)(equals - text);
@@ -80,7 +80,7 @@ static bool gather(const FileBytes *file, KeyValue value[KEY_COUNT], size_t *end
                 continue;
             KeyValue *v = &value[key_names[i].key];
             if (v->line && key_names[i].key != BIG_ENDIAN_KEY)
-                faults_add(faults, file->path, cursor.line, 1, "'%s' is given on line %d already; each once", key_names[i].name, v->line);
+                faults_add(faults, file->path, cursor.line, 1, "duplicate key '%s'; the first is on line %d", key_names[i].name, v->line);
             *v = (KeyValue){equals + 1, length - named - 1, cursor.line};
         }
     }
@@ -94,14 +94,14 @@ static bool read_flag(const KeyValue *v, bool otherwise, const char *path, Fault
         return otherwise;
     bool is_true = header_text_is(v->text, v->length, "True") || header_text_is(v->text, v->length, "1");
     if (!is_true && !header_text_is(v->text, v->length, "False") && !header_text_is(v->text, v->length, "0"))
-        faults_add(faults, path, v->line, 0, "not a truth value; True or False");
+        faults_add(faults, path, v->line, 0, "not a boolean; expected True or False");
     return is_true;
 }
 
 static void read_numbers(const KeyValue *v, int count, double *out, const char *path, Faults *faults)
 {
     if (v->line && !header_numbers(v->text, v->length, count, out))
-        faults_add(faults, path, v->line, 0, "not valid; %d numbers", count);
+        faults_add(faults, path, v->line, 0, "not valid; expected %d numbers", count);
 }
 
 static bool read_grid(const KeyValue *value, const char *path, VolumeHeader *out, Faults *faults)
@@ -109,12 +109,12 @@ static bool read_grid(const KeyValue *value, const char *path, VolumeHeader *out
     int before = faults->count;
     double n[3], size[4] = {0, 0, 0, 1}, spacing[4] = {1, 1, 1, 1}, offset[4] = {0}, matrix[16] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     if (!value[NDIMS].line || !header_numbers(value[NDIMS].text, value[NDIMS].length, 1, n) || (n[0] != 3 && n[0] != 4)) {
-        faults_add(faults, path, value[NDIMS].line, 0, "NDims is missing or not valid; 3");
+        faults_add(faults, path, value[NDIMS].line, 0, "NDims is missing or not valid; expected 3");
         return false;
     }
     int d = (int)n[0];
     if (!value[DIM_SIZE].line)
-        faults_add(faults, path, 0, 0, "the header has no DimSize; three sizes");
+        faults_add(faults, path, 0, 0, "the header has no DimSize; expected three sizes");
     read_numbers(&value[DIM_SIZE], d, size, path, faults);
     read_numbers(value[SPACING].line ? &value[SPACING] : &value[ELEMENT_SIZE], d, spacing, path, faults);
     read_numbers(&value[OFFSET], d, offset, path, faults);
@@ -125,7 +125,7 @@ static bool read_grid(const KeyValue *value, const char *path, VolumeHeader *out
         return false;
     for (int i = 0; i < d; i++)
         if (!(size[i] >= 1 && size[i] <= INT32_MAX) || floor(size[i]) != size[i] || (i == 3 && size[i] > 1)) {
-            faults_add(faults, path, value[DIM_SIZE].line, 0, "size %g of axis %d is not valid; a whole number from 1 (1 for a fourth axis)", size[i], i);
+            faults_add(faults, path, value[DIM_SIZE].line, 0, "size %g of axis %d is not valid; expected a whole number from 1 (1 for a fourth axis)", size[i], i);
             return false;
         }
     for (int i = 0; i < 3; i++) {
@@ -144,22 +144,22 @@ static bool read_encoding(const KeyValue *value, const char *path, VolumeHeader 
         if (type->line && header_text_is(type->text, type->length, type_names[i].name))
             out->type = type_names[i].type;
     if (out->type == VOXEL_NONE)
-        faults_add(faults, path, type->line, 0, "ElementType is missing or not valid; MET_CHAR, MET_UCHAR, MET_SHORT … MET_DOUBLE");
+        faults_add(faults, path, type->line, 0, "ElementType is missing or not valid; expected MET_CHAR, MET_UCHAR, MET_SHORT … MET_DOUBLE");
     if (value[OBJECT_TYPE].line && !header_text_is(value[OBJECT_TYPE].text, value[OBJECT_TYPE].length, "Image"))
-        faults_add(faults, path, value[OBJECT_TYPE].line, 0, "the object is no image; ObjectType = Image");
+        faults_add(faults, path, value[OBJECT_TYPE].line, 0, "the object is not an image; expected ObjectType = Image");
     double one[1] = {1};
     read_numbers(&value[CHANNELS], 1, one, path, faults);
     if (one[0] != 1)
-        faults_add(faults, path, value[CHANNELS].line, 0, "%g values a voxel; one", one[0]);
+        faults_add(faults, path, value[CHANNELS].line, 0, "%g values per voxel; expected one", one[0]);
     read_numbers(&value[SLOPE], 1, &out->slope, path, faults);
     read_numbers(&value[INTERCEPT], 1, &out->intercept, path, faults);
     out->big_endian = read_flag(&value[BIG_ENDIAN_KEY], false, path, faults);
     bool compressed = read_flag(&value[COMPRESSED], false, path, faults);
     out->encoding = compressed ? ENCODING_DEFLATE : read_flag(&value[BINARY], true, path, faults) ? ENCODING_RAW : ENCODING_TEXT;
     if (value[HEADER_SIZE].line && !header_integer(value[HEADER_SIZE].text, value[HEADER_SIZE].length, -1, 1L << 52, &out->byte_skip))
-        faults_add(faults, path, value[HEADER_SIZE].line, 0, "HeaderSize is not valid; a whole number from 0, or -1");
+        faults_add(faults, path, value[HEADER_SIZE].line, 0, "HeaderSize is not valid; expected a whole number from 0, or -1");
     if (out->byte_skip < 0 && out->encoding != ENCODING_RAW)
-        faults_add(faults, path, value[HEADER_SIZE].line, 0, "HeaderSize -1 with compressed or text data; -1 is for raw data alone");
+        faults_add(faults, path, value[HEADER_SIZE].line, 0, "HeaderSize -1 with compressed or text data; -1 is for raw data only");
     return faults->count == before;
 }
 

@@ -59,13 +59,13 @@ static bool read_grid(const NiftiBytes *h, const char *path, VolumeHeader *out, 
 {
     int dimension = short_at(h, AT_DIM);
     if (dimension < 3 || dimension > 7) {
-        faults_add_at_byte(faults, path, AT_DIM, "%d dimensions; 3 (further ones must have one sample)", dimension);
+        faults_add_at_byte(faults, path, AT_DIM, "the volume has %d dimensions; expected 3 (further ones must have one sample)", dimension);
         return false;
     }
     for (int i = 1; i <= dimension; i++) {
         int size = short_at(h, AT_DIM + 2 * i);
         if (size < 1 || (i > 3 && size > 1)) {
-            faults_add_at_byte(faults, path, (size_t)(AT_DIM + 2 * i), "size %d of axis %d is not valid; from 1 (1 beyond the third: one value a voxel)", size, i - 1);
+            faults_add_at_byte(faults, path, (size_t)(AT_DIM + 2 * i), "size %d of axis %d is not valid; expected 1 or more (1 beyond the third axis: one value per voxel)", size, i - 1);
             return false;
         }
         if (i <= 3)
@@ -74,7 +74,7 @@ static bool read_grid(const NiftiBytes *h, const char *path, VolumeHeader *out, 
     static const double unit_mm[8] = {1, 1000, 1, 1e-3, 0, 0, 0, 0};
     double mm = unit_mm[h->byte[AT_UNITS] & 7];
     if (mm <= 0) {
-        faults_add_at_byte(faults, path, AT_UNITS, "the unit of length %d is unknown; 1 (m), 2 (mm) or 3 (um)", h->byte[AT_UNITS] & 7);
+        faults_add_at_byte(faults, path, AT_UNITS, "the unit of length %d is unknown; expected 1 (m), 2 (mm) or 3 (um)", h->byte[AT_UNITS] & 7);
         return false;
     }
     double p[3] = {float_at(h, AT_PIXDIM + 4), float_at(h, AT_PIXDIM + 8), float_at(h, AT_PIXDIM + 12)};
@@ -109,7 +109,7 @@ static bool read_grid(const NiftiBytes *h, const char *path, VolumeHeader *out, 
     faults_clear(&inner);
     if (volume_header_check(out, path, 0, &inner))
         return true;
-    faults_add_at_byte(faults, path, place, "the grid is not valid; independent axes that are finite and not 0, finite origin and scale, at most 2^31 voxels");
+    faults_add_at_byte(faults, path, place, "the grid is not valid; expected independent axes that are finite and not 0, finite origin and scale, at most 2^31 voxels");
     return false;
 }
 
@@ -122,18 +122,18 @@ static bool read_header(const FileBytes *file, NiftiBytes *h, VolumeHeader *out,
     if (bits_at(h, 0, 4) != HEADER_BYTES) {
         h->big_endian = bits_at(h, 0, 4) == NIFTI2_BYTES;
         if (bits_at(h, 0, 4) == NIFTI2_BYTES)
-            faults_add_at_byte(faults, path, 0, "is NIfTI-2; NIfTI-1, NRRD or MetaImage");
+            faults_add_at_byte(faults, path, 0, "is NIfTI-2; expected NIfTI-1, NRRD or MetaImage");
         else
-            faults_add_at_byte(faults, path, 0, "no NIfTI volume is in this compressed file; .nii.gz, or NRRD with its own gzip encoding");
+            faults_add_at_byte(faults, path, 0, "the compressed file holds no NIfTI volume; expected .nii.gz, or NRRD with its own gzip encoding");
         return false;
     }
     if (file->length < HEADER_BYTES) {
-        faults_add_at_byte(faults, path, file->length, "the header ends after %zu bytes; %d", file->length, HEADER_BYTES);
+        faults_add_at_byte(faults, path, file->length, "the header ends after %zu bytes; expected %d", file->length, HEADER_BYTES);
         return false;
     }
     *is_pair = !memcmp(file->byte + AT_MAGIC, "ni1", 4);
     if (!*is_pair && memcmp(file->byte + AT_MAGIC, "n+1", 4)) {
-        faults_add_at_byte(faults, path, AT_MAGIC, "the magic is neither 'n+1' nor 'ni1' (an ANALYZE file says nothing of its orientation); NIfTI-1");
+        faults_add_at_byte(faults, path, AT_MAGIC, "the magic is neither 'n+1' nor 'ni1' (an ANALYZE file has no orientation); expected NIfTI-1");
         return false;
     }
     int code = short_at(h, AT_DATATYPE), bits = short_at(h, AT_BITPIX);
@@ -141,18 +141,18 @@ static bool read_header(const FileBytes *file, NiftiBytes *h, VolumeHeader *out,
         if (data_types[i].code == code)
             out->type = data_types[i].type;
     if (out->type == VOXEL_NONE) {
-        faults_add_at_byte(faults, path, AT_DATATYPE, "the data type %d is not read; whole numbers of 8 to 64 bits, float32 or float64", code);
+        faults_add_at_byte(faults, path, AT_DATATYPE, "the data type %d is not supported; expected whole numbers of 8 to 64 bits, float32 or float64", code);
         return false;
     }
     if (bits != 8 * (int)voxel_type_size(out->type)) {
-        faults_add_at_byte(faults, path, AT_BITPIX, "%d bits a voxel do not go with data type %d; %d", bits, code, 8 * (int)voxel_type_size(out->type));
+        faults_add_at_byte(faults, path, AT_BITPIX, "%d bits per voxel do not match data type %d; expected %d", bits, code, 8 * (int)voxel_type_size(out->type));
         return false;
     }
     double offset = float_at(h, AT_VOX_OFFSET), least = *is_pair ? 0 : DATA_START;
     if (offset == 0)
         offset = least;   // common in pairs, tolerated in single files
     if (!(offset >= least && offset < 1e9) || floor(offset) != offset) {
-        faults_add_at_byte(faults, path, AT_VOX_OFFSET, "the samples' offset %g is not valid; a whole number from %g", offset, least);
+        faults_add_at_byte(faults, path, AT_VOX_OFFSET, "the data offset %g is not valid; expected a whole number from %g", offset, least);
         return false;
     }
     *start = (size_t)offset;
@@ -189,7 +189,7 @@ static Volume *read_pair(const FileBytes *file, VolumeHeader *header, size_t sta
         memcpy(name + n, ".gz", 4);
         found = file_bytes_read_beside(file->path, 0, name, n + 3, header, &data, path, &first);
         if (!found) {
-            faults_add(faults, file->path, 0, 0, "the samples' file '%.*s' is not there; it must stand beside the header", (int)n, name);
+            faults_add(faults, file->path, 0, 0, "the data file '%.*s' does not exist; it must be next to the header", (int)n, name);
             return NULL;
         }
     }

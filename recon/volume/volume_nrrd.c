@@ -77,13 +77,13 @@ static bool gather(const FileBytes *file, NrrdHeader *header, Faults *faults)
     int before = faults->count;
     line_cursor_next(&cursor, &text, &length);
     if (length < 8 || text[7] < '1' || text[7] > '5')
-        faults_add(faults, file->path, 1, 8, "an unknown version of the format; NRRD0001 to NRRD0005");
+        faults_add(faults, file->path, 1, 8, "unknown version of the format; expected NRRD0001 to NRRD0005");
     while (line_cursor_next(&cursor, &text, &length) && length > 0) {
         const char *colon = memchr(text, ':', length);
         if (text[0] == '#')
             continue;
         if (!colon || (size_t)(colon - text) + 1 >= length || (colon[1] != ' ' && colon[1] != '=')) {
-            faults_add(faults, file->path, cursor.line, 1, "neither a field, a key nor a comment; `field: value`, `key:=value`, or an empty line before the data");
+            faults_add(faults, file->path, cursor.line, 1, "neither a field, a key nor a comment; expected `field: value`, `key:=value`, or an empty line before the data");
             return false;   // most likely the data: going on would only repeat this
         }
         if (colon[1] == '=')
@@ -95,10 +95,10 @@ static bool gather(const FileBytes *file, NrrdHeader *header, Faults *faults)
                 name = &field_names[i];
         FieldValue *value = name ? &header->field[name->field] : NULL;
         if (!name)
-            faults_add(faults, file->path, cursor.line, 1, "'%.*s' is no field of the format; a field of NRRD, or `key:=value` for notes of your own",
+            faults_add(faults, file->path, cursor.line, 1, "unknown field '%.*s'; expected a field of NRRD, or `key:=value` for notes of your own",
                        named < 60 ? (int)named : 60, text);
         else if (value->line && name->field != IGNORED)
-            faults_add(faults, file->path, cursor.line, 1, "'%s' stands on line %d already; each field once", name->name, value->line);
+            faults_add(faults, file->path, cursor.line, 1, "duplicate field '%s'; the first is on line %d", name->name, value->line);
         else
             *value = (FieldValue){colon + 2, length - named - 2, cursor.line};
         if (name && name->field == DATA_FILE && data_names_several(colon + 1, length - named - 1) && !memchr(colon, '%', length - named))
@@ -157,7 +157,7 @@ static double unit_scale(const FieldValue *value, const char *path, Faults *faul
             if (header_text_is(open + 1, (size_t)(close - open - 1), units[i].name))
                 mm = units[i].mm;
         if (mm <= 0 || (scale > 0 && mm != scale)) {   // == of table entries
-            faults_add(faults, path, value->line, 0, "units that are unknown or differ between axes; \"mm\" (or \"m\", \"cm\", \"um\") for each");
+            faults_add(faults, path, value->line, 0, "the units are unknown or differ between axes; expected \"mm\" (or \"m\", \"cm\", \"um\") for each");
             return 0;
         }
         scale = mm;
@@ -175,7 +175,7 @@ static bool choose_axes(const NrrdHeader *h, int dimension, const double *size, 
     for (int i = 0; i < dimension; i++) {
         bool drop = has_directions ? is_none[i] : spare > 0 && size[i] < 2;   // sizes are whole numbers >= 1 here
         if (drop && size[i] >= 2) {
-            faults_add(faults, path, h->field[SIZES].line, 0, "axis %d has no direction in space but %.0f samples: %.0f values a voxel; one value a voxel, axes of "
+            faults_add(faults, path, h->field[SIZES].line, 0, "axis %d has no direction in space but %.0f samples: %.0f values per voxel; expected one value per voxel, axes of "
                        "space only", i, size[i], size[i]);
             return false;
         }
@@ -188,7 +188,7 @@ static bool choose_axes(const NrrdHeader *h, int dimension, const double *size, 
     }
     (void)direction;
     if (n != 3)
-        faults_add(faults, path, h->field[DIMENSION].line, 0, "%d axes of space; three", n);
+        faults_add(faults, path, h->field[DIMENSION].line, 0, "%d spatial axes; expected three", n);
     return n == 3;
 }
 
@@ -199,40 +199,40 @@ static bool read_grid(const NrrdHeader *h, const char *path, VolumeHeader *out, 
     double size[MAX_DIMENSION], spacing[MAX_DIMENSION], direction[MAX_DIMENSION][3] = {{0}}, least[MAX_DIMENSION];
     bool is_none[MAX_DIMENSION] = {false};
     if (!header_integer(f[DIMENSION].text, f[DIMENSION].length, 3, MAX_DIMENSION, &dimension)) {
-        faults_add(faults, path, f[DIMENSION].line, 0, "the dimension is not valid; 3 (further axes must have one sample)");
+        faults_add(faults, path, f[DIMENSION].line, 0, "the dimension is not valid; expected 3 (further axes must have one sample)");
         return false;
     }
     int n = (int)dimension, chosen[3];
     if (!header_numbers(f[SIZES].text, f[SIZES].length, n, size)) {
-        faults_add(faults, path, f[SIZES].line, 0, "the sizes are not valid; %d whole numbers", n);
+        faults_add(faults, path, f[SIZES].line, 0, "the sizes are not valid; expected %d whole numbers", n);
         return false;
     }
     for (int i = 0; i < n; i++)
         if (!(size[i] >= 1 && size[i] <= INT32_MAX) || floor(size[i]) != size[i]) {
-            faults_add(faults, path, f[SIZES].line, 0, "size %g of axis %d is not valid; a whole number from 1", size[i], i);
+            faults_add(faults, path, f[SIZES].line, 0, "size %g of axis %d is not valid; expected a whole number from 1", size[i], i);
             return false;
         }
     if (f[SPACE_DIRECTIONS].line) {
         FieldValue list = f[SPACE_DIRECTIONS];
         for (int i = 0; i < n; i++)
             if (!take_vector(&list, direction[i], &is_none[i])) {
-                faults_add(faults, path, list.line, 0, "direction %d of %d is missing or not valid; `(x,y,z)` for each axis of space, `none` for others", i + 1, n);
+                faults_add(faults, path, list.line, 0, "direction %d of %d is missing or not valid; expected `(x,y,z)` for each spatial axis, `none` for others", i + 1, n);
                 return false;
             }
     }
     if (f[SPACINGS].line && !header_numbers(f[SPACINGS].text, f[SPACINGS].length, n, spacing)) {
-        faults_add(faults, path, f[SPACINGS].line, 0, "the spacings are not valid; %d numbers, nan for axes that have none", n);
+        faults_add(faults, path, f[SPACINGS].line, 0, "the spacings are not valid; expected %d numbers, nan for axes that have none", n);
         return false;
     }
     if (f[AXIS_MINS].line && !header_numbers(f[AXIS_MINS].text, f[AXIS_MINS].length, n, least)) {
-        faults_add(faults, path, f[AXIS_MINS].line, 0, "the axis mins are not valid; %d numbers", n);
+        faults_add(faults, path, f[AXIS_MINS].line, 0, "the axis mins are not valid; expected %d numbers", n);
         return false;
     }
     if (!choose_axes(h, n, size, (const double(*)[3])direction, is_none, chosen, path, faults))
         return false;
     bool by_direction = f[SPACE_DIRECTIONS].line > 0;
     if (!by_direction && !f[SPACINGS].line && f[AXIS_MAXS].line) {
-        faults_add(faults, path, f[AXIS_MAXS].line, 0, "axis maxs without spacings; `spacings` or `space directions`");
+        faults_add(faults, path, f[AXIS_MAXS].line, 0, "axis maxs without spacings; expected `spacings` or `space directions`");
         return false;
     }
     const FieldValue *units = by_direction ? &f[SPACE_UNITS] : &f[UNITS];
@@ -252,7 +252,7 @@ static bool read_grid(const NrrdHeader *h, const char *path, VolumeHeader *out, 
     if (f[SPACE_ORIGIN].line) {
         FieldValue origin = f[SPACE_ORIGIN];
         if (!take_vector(&origin, start, &none) || none) {
-            faults_add(faults, path, origin.line, 0, "the space origin is not valid; `(x,y,z)`");
+            faults_add(faults, path, origin.line, 0, "the space origin is not valid; expected `(x,y,z)`");
             return false;
         }
     }
@@ -265,7 +265,7 @@ static bool read_space(const NrrdHeader *h, const char *path, VolumeHeader *out,
     const FieldValue *space = &h->field[SPACE], *dimension = &h->field[SPACE_DIMENSION];
     long n = 3;
     if (dimension->line && !header_integer(dimension->text, dimension->length, 3, 3, &n)) {
-        faults_add(faults, path, dimension->line, 0, "the space dimension is not valid; 3");
+        faults_add(faults, path, dimension->line, 0, "the space dimension is not valid; expected 3");
         return false;
     }
     if (!space->line)
@@ -275,7 +275,7 @@ static bool read_space(const NrrdHeader *h, const char *path, VolumeHeader *out,
             snprintf(out->frame, sizeof out->frame, "%s", space_names[i].frame);
             return true;
         }
-    faults_add(faults, path, space->line, 0, "the space '%.*s' is unknown; right-anterior-superior, left-posterior-superior, left-anterior-superior, scanner-xyz or "
+    faults_add(faults, path, space->line, 0, "the space '%.*s' is unknown; expected right-anterior-superior, left-posterior-superior, left-anterior-superior, scanner-xyz or "
                "3D-right-handed", space->length < 60 ? (int)space->length : 60, space->text);
     return false;
 }
@@ -288,7 +288,7 @@ static bool read_encoding(const NrrdHeader *h, const char *path, VolumeHeader *o
         if (header_text_is(type->text, type->length, type_names[i].name))
             out->type = type_names[i].type;
     if (out->type == VOXEL_NONE)
-        faults_add(faults, path, type->line, 0, "the type '%.*s' is not valid; int8 to uint64, float or double", type->length < 60 ? (int)type->length : 60, type->text);
+        faults_add(faults, path, type->line, 0, "the type '%.*s' is not valid; expected int8 to uint64, float or double", type->length < 60 ? (int)type->length : 60, type->text);
     if (header_text_is(encoding->text, encoding->length, "raw"))
         out->encoding = ENCODING_RAW;
     else if (header_text_is(encoding->text, encoding->length, "gzip") || header_text_is(encoding->text, encoding->length, "gz"))
@@ -297,21 +297,21 @@ static bool read_encoding(const NrrdHeader *h, const char *path, VolumeHeader *o
              header_text_is(encoding->text, encoding->length, "ascii"))
         out->encoding = ENCODING_TEXT;
     else
-        faults_add(faults, path, encoding->line, 0, "the encoding '%.*s' is not read; raw, gzip or text: `unu save -f nrrd -e gzip` converts",
+        faults_add(faults, path, encoding->line, 0, "the encoding '%.*s' is not supported; expected raw, gzip or text (convert with `unu save -f nrrd -e gzip`)",
                    encoding->length < 60 ? (int)encoding->length : 60, encoding->text);
     if (endian->line) {
         out->big_endian = header_text_is(endian->text, endian->length, "big");
         if (!out->big_endian && !header_text_is(endian->text, endian->length, "little"))
-            faults_add(faults, path, endian->line, 0, "the endian '%.*s' is not valid; little or big", endian->length < 60 ? (int)endian->length : 60, endian->text);
+            faults_add(faults, path, endian->line, 0, "the endian '%.*s' is not valid; expected little or big", endian->length < 60 ? (int)endian->length : 60, endian->text);
     } else if (voxel_type_size(out->type) > 1 && out->encoding != ENCODING_TEXT) {
-        faults_add(faults, path, type->line, 0, "samples of several bytes without their order; a line `endian: little` or `endian: big`");
+        faults_add(faults, path, type->line, 0, "samples of several bytes have no byte order; expected a line `endian: little` or `endian: big`");
     }
     if (f[LINE_SKIP].line && !header_integer(f[LINE_SKIP].text, f[LINE_SKIP].length, 0, 1L << 30, &out->line_skip))
-        faults_add(faults, path, f[LINE_SKIP].line, 0, "the line skip is not valid; a whole number from 0");
+        faults_add(faults, path, f[LINE_SKIP].line, 0, "the line skip is not valid; expected a whole number from 0");
     if (f[BYTE_SKIP].line && !header_integer(f[BYTE_SKIP].text, f[BYTE_SKIP].length, -1, 1L << 52, &out->byte_skip))
-        faults_add(faults, path, f[BYTE_SKIP].line, 0, "the byte skip is not valid; a whole number from 0, or -1 for raw data at the end of the file");
+        faults_add(faults, path, f[BYTE_SKIP].line, 0, "the byte skip is not valid; expected a whole number from 0, or -1 for raw data at the end of the file");
     else if (out->byte_skip < 0 && out->encoding != ENCODING_RAW)
-        faults_add(faults, path, f[BYTE_SKIP].line, 0, "byte skip -1 with this encoding; -1 is for raw data alone");
+        faults_add(faults, path, f[BYTE_SKIP].line, 0, "byte skip -1 with this encoding; -1 is for raw data only");
     return faults->count == before;
 }
 
@@ -328,7 +328,7 @@ Volume *volume_parse_nrrd(const FileBytes *file, Faults *faults)
         return NULL;
     for (size_t i = 0; i < COUNT(required); i++)
         if (!h.field[required[i].field].line)
-            faults_add(faults, file->path, 1, 0, "the header has no field '%s'; type, dimension, sizes and encoding are needed", required[i].name);
+            faults_add(faults, file->path, 1, 0, "the header has no field '%s'; expected type, dimension, sizes and encoding", required[i].name);
     if (faults->count > before)
         return NULL;
     bool good = read_space(&h, file->path, &header, faults);
@@ -339,7 +339,7 @@ Volume *volume_parse_nrrd(const FileBytes *file, Faults *faults)
     const FieldValue *detached = &h.field[DATA_FILE];
     if (!detached->line) {
         if (!h.has_end) {
-            faults_add_at_byte(faults, file->path, file->length, "the file ends within the header; an empty line and the data after it, or `data file: NAME`");
+            faults_add_at_byte(faults, file->path, file->length, "the file ends within the header; expected an empty line and the data after it, or `data file: NAME`");
             return NULL;
         }
         FileBytes data = {.byte = file->byte + h.end, .length = file->length - h.end, .offset = h.end, .path = file->path,

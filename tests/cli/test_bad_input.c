@@ -75,9 +75,9 @@ static void volumes_cut_off_or_lying(void **state)
     put("trace.yaml", "branches: [{start_mm: [1, 1, 1], toward_mm: [2, 2, 2], radius_mm: 1}]\n");
     static const char *const files[][2] = {
         {"short.nii", "short.nii:byte "}, {"cut.nii", "cut.nii:byte 200"}, {"lie.nii", "lie.nii:byte 42"}, {"two.nii", "two.nii:byte 0: is NIfTI-2"},
-        {"analyze.hdr", "analyze.hdr:byte 344: "}, {"beside.mhd", "beside.mhd:5: the data file 'a?[2Jb.raw' is not there"}, {"short.mha", "short.mha:byte "},
+        {"analyze.hdr", "analyze.hdr:byte 344: "}, {"beside.mhd", "beside.mhd:5: the data file 'a?[2Jb.raw' does not exist"}, {"short.mha", "short.mha:byte "},
         {"lie.mha", "lie.mha:3"},         {"short.nrrd", "short.nrrd:byte "}, {"lie.nrrd", "lie.nrrd:4"}, {"head.nrrd", "head.nrrd:"},
-        {"nowhere.nrrd", "nowhere.nrrd: cannot be opened"}, {".", "a folder without DICOM images"}, {"tree.h5", "tree.h5:byte 0"}};
+        {"nowhere.nrrd", "nowhere.nrrd: cannot be opened"}, {".", "the folder has no DICOM images"}, {"tree.h5", "tree.h5:byte 0"}};
     for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
         char arguments[200];
         snprintf(arguments, sizeof arguments, "segment %s --trace trace.yaml -o out.h5 --json out.json", files[i][0]);
@@ -95,9 +95,9 @@ static void traces(void **state)
     (void)state;
     static const char *const texts[][2] = {
         {"branches: [{start_mm: [90, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\n", "t.yaml:1:12: the start of branch 1 (90, 0, 0) mm"},
-        {"branches: [{start_mm: [90, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\n", "lies outside the volume; voxels (0, 0, 0) to"},
+        {"branches: [{start_mm: [90, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\n", "lies outside the volume; expected voxel (0, 0, 0) to"},
         {"branches: [{start_mm: [0, 3, 3], toward_mm: [2, 0, 0], radius_mm: 1}]\n", "lies on background"},
-        {"branches: [{start_cm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\n", "t.yaml:1:23: 'start_cm'"},
+        {"branches: [{start_cm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\n", "t.yaml:1:23: unknown key 'start_cm'"},
         {"branches: [{start_mm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 0}]\n", "t.yaml:1:67: radius_mm '0'"},
         {"branches: [{start_mm: [0, 0, 0], toward_mm: [2, 0, 0], radius_mm: 1}]\nbanana: 1\n", "t.yaml:2:9: 'banana'"},
         {"branches: [{start_mm: [0, 0, 0]}]\nforbid: [{center_mm: [0, 0, 0], radius_mm: 2}]\n",
@@ -173,8 +173,8 @@ static void words_of_the_command_line(void **state)
         {"query model.h5 --points nowhere.csv -o out.csv --threads 1.5", "--threads: '1.5' is not valid; a whole number"},
         {"query model.h5 --points nowhere.csv -o out.csv", "nowhere.csv: cannot be opened"},
         {"synth", "lacks a shape"},
-        {"synth banana -o out.h5", "no shape 'banana'; valid: capsule"},
-        {"synth capsule --radius-mm 0 -o out.h5", "radius_mm is '0'; valid: a number from"},
+        {"synth banana -o out.h5", "unknown shape 'banana'; expected capsule"},
+        {"synth capsule --radius-mm 0 -o out.h5", "radius_mm is '0'; expected a number from"},
         {"synth capsule --noise-grey 11 -o out.nrrd", "need --contrast-grey"},
         {"synth capsule --contrast-grey 0 -o out.nrrd", "--contrast-grey: '0' is not valid"},
         {"synth capsule -o out.xyz", "valid: .h5, .stl, .ply, .nrrd"},
@@ -211,15 +211,15 @@ static void verbs_of_the_trainer(void **state)
     static const char *const lines[][2] = {
         {"replay free.h5 --verify --banana", "see `seldinger replay --help`"},
         {"replay free.yaml --verify", "free.yaml:byte 0: is not a readable HDF5 file"},
-        {"replay tree.h5 --verify", "tree.h5: lacks the dataset"},
+        {"replay tree.h5 --verify", "tree.h5: has no dataset"},
         {"replay cut.h5 --scene out", "cut.h5:byte 0: is not a readable HDF5 file"},
-        {"replay free.h5 --scene nowhere/out", "nowhere/out: cannot be made: No such file or directory"},
+        {"replay free.h5 --scene nowhere/out", "nowhere/out: cannot be created: No such file or directory"},
         {"replay free.h5 --at -1 --picture out.png", "--at: '-1' is not valid"},
         {"report", "takes one session file"},
         {"report empty.json empty.json", "takes one session file"},
         {"report nowhere.json", "nowhere.json: cannot be opened"},
-        {"report noise.bin --html out.html", "noise.bin:byte 0: is no JSON"},
-        {"report empty.json --html out.html", "empty.json: 'score' is no object or is not there"},
+        {"report noise.bin --html out.html", "noise.bin:byte 0: is not JSON"},
+        {"report empty.json --html out.html", "empty.json: 'score' is missing or not an object"},
         {"report empty.json --banana", "see `seldinger report --help`"},
         {"devices noise.bin", "takes no file but by --map"},
         {"devices --banana", "see `seldinger devices --help`"},
@@ -245,10 +245,10 @@ static void verbs_of_the_trainer(void **state)
         {"nav free.yaml --no-record --device guide.yaml", "guide.yaml:4:52: 'tool' is 'guide', but the scene has no such tool; write wire, outermost, innermost"},
         {"nav free.yaml --no-record --figures nowhere/out.json", "nowhere/out.json: cannot be written"},
         {"nav free.yaml --no-record --resume nowhere.h5", "nowhere.h5: cannot be opened"},
-        {"nav free.yaml --no-record --resume tree.h5", "tree.h5: lacks the dataset"},
+        {"nav free.yaml --no-record --resume tree.h5", "tree.h5: has no dataset"},
         {"nav other.yaml --no-record --resume free.h5", "free.h5: is a recording of another scene than other.yaml"},
-        {"nav free.yaml --sessions noise.bin", "noise.bin: cannot take sessions: Not a directory"},
-        {"nav free.yaml --sessions noise.bin/out", "noise.bin/out: cannot take sessions: Not a directory"},
+        {"nav free.yaml --sessions noise.bin", "noise.bin: cannot store sessions: Not a directory"},
+        {"nav free.yaml --sessions noise.bin/out", "noise.bin/out: cannot store sessions: Not a directory"},
 #endif
     };
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)
@@ -354,7 +354,7 @@ static void pipes_and_devices_stay_what_they_are(void **state)
     static const char *const lines[] = {"synth capsule -o pipe.nrrd", "fit tree.h5 -o pipe.nrrd", "segment capsule.nrrd --trace trace.yaml -o pipe.nrrd",
                                         "fit tree.h5 -o out.h5 --picture pipe.nrrd"};
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)
-        refused(lines[i], "pipe.nrrd: is no regular file");
+        refused(lines[i], "pipe.nrrd: is not a regular file");
     assert_int_equal(run_in("{ timeout 10 cat pipe.nrrd > heard.csv & } ;", "query model.h5 --points ok.csv -o pipe.nrrd --quiet; wait; grep -q '^0,0,2,' heard.csv"), 0);
     struct stat status;
     assert_true(stat(path, &status) == 0 && S_ISFIFO(status.st_mode));

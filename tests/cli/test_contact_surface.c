@@ -186,7 +186,7 @@ static void a_mesh_that_cannot_be_the_vessel_is_refused(void **state)
     static Pipe good;
     start_with(&good);
     scene_write("mesh: pipe.obj", "[0.5, 3, 0]");
-    refused("is not inside of the mesh");
+    refused("is not inside the mesh");
     scene_write("mesh: nothing.obj", "[0.5, 0, 0]");
     refused("nothing.obj");
     scene_write("mesh: pipe.obj, contact: lim", "[0.5, 0, 0]");
@@ -198,7 +198,7 @@ static void a_mesh_that_cannot_be_the_vessel_is_refused(void **state)
     scene_write("mesh: pipe.obj, mesh_scale: -1", "[0.5, 0, 0]");
     refused("mesh_scale");
     scene_write("plane: {normal: [0, 0, 1]}, contact: mesh", "[0.5, 0, 0]");
-    refused("needs a wall that ends somewhere");
+    refused("needs a bounded wall");
 }
 
 // Every surface of one tube holds the same wire: where the exact tube holds it, to what its cells leave.

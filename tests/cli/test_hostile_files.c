@@ -187,13 +187,13 @@ static void long_files_are_not_read_whole(void **state)
     ends_in_little_memory("info long.nrrd", 0, "");
     ends_in_little_memory("info long.nhdr", 0, "");
     ends_in_little_memory("info long.mhd", 0, "");
-    ends_in_little_memory("info long.dcm", 2, "are read of a DICOM file");
-    ends_in_little_memory("info tail.nrrd", 2, "where its header promises");
-    ends_in_little_memory("segment fits.nrrd --trace long.yaml -o out.h5", 2, "at most 1048576 are read");
-    ends_in_little_memory("query model.h5 --points long.csv -o out.csv", 2, "at most 1073741824 are read");
-    ends_in_little_memory("import --surface surface.stl --centreline long.swc -o out.h5", 2, "at most 268435456 are read");
-    ends_in_little_memory("import --surface long.obj -o out.h5", 2, "at most 2147483647 are read");
-    ends_in_little_memory("run long.yaml", 2, "at most 67108864 are read");
+    ends_in_little_memory("info long.dcm", 2, "the limit for a DICOM file");
+    ends_in_little_memory("info tail.nrrd", 2, "but its header promises");
+    ends_in_little_memory("segment fits.nrrd --trace long.yaml -o out.h5", 2, "expected at most 1048576");
+    ends_in_little_memory("query model.h5 --points long.csv -o out.csv", 2, "expected at most 1073741824");
+    ends_in_little_memory("import --surface surface.stl --centreline long.swc -o out.h5", 2, "expected at most 268435456");
+    ends_in_little_memory("import --surface long.obj -o out.h5", 2, "expected at most 2147483647");
+    ends_in_little_memory("run long.yaml", 2, "expected at most 67108864");
 }
 
 static const char vtp_head[] = "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" byte_order=\"LittleEndian\" header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n"
@@ -228,7 +228,7 @@ static void packed_arrays_hold_what_their_piece_promises(void **state)
     (void)state;
     put_vtp("few.vtp", "3");
     put_vtp("many.vtp", "44739242");    // as many as there are
-    ends_in_little_memory("import --surface few.vtp -o out.h5", 2, "more values than the head of their piece promises");
+    ends_in_little_memory("import --surface few.vtp -o out.h5", 2, "more values than the piece's header promises");
     ends_in_little_memory("import --surface many.vtp -o out.h5", 2, "more than 67 million in all");
 }
 

@@ -180,16 +180,16 @@ static void what_is_no_recording_is_refused(void **state)
     put("noise.h5", "no file of any kind");
     ends(2, "nowhere.h5: cannot be opened", "$S replay nowhere.h5 --verify");
     ends(2, "noise.h5:byte 0: is not a readable HDF5 file", "$S replay noise.h5 --verify");
-    ends(2, "models/tree.h5: lacks the dataset", "$S replay models/tree.h5 --verify");
+    ends(2, "models/tree.h5: has no dataset", "$S replay models/tree.h5 --verify");
     ends(2, "scenes: cannot be opened", "$S replay scenes --verify");
     ends(2, "", "head -c 20000 bend.h5 > cut.h5 && $S replay cut.h5 --verify");
     hid_t file = open_copy("bend.h5", "bare.h5");
     H5Ldelete(file, "/scene", H5P_DEFAULT);
     H5Fclose(file);
-    ends(2, "bare.h5: lacks its scene's text", "$S replay bare.h5 --verify");
+    ends(2, "bare.h5: has no scene text", "$S replay bare.h5 --verify");
     int64_t step = INT64_MAX;
     change_row("bend.h5", "frame.h5", "/wire/step", 3, 1, H5T_NATIVE_INT64, &step);
-    ends(2, "steps grow from 0", "$S replay frame.h5 --verify");
+    ends(2, "expected rising steps from 0", "$S replay frame.h5 --verify");
     // the window counts rows by time
     static const double bad_time[] = {(double)NAN, (double)INFINITY, 1e300};
     for (int i = 0; i < 3; i++) {

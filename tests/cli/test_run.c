@@ -77,10 +77,10 @@ static void bad_input_ends_with_2_and_says_where(void **state)
     put("cut.h5", "\x89HDF\r\n\x1a\n");
     expect_bad(SCENE("80", "0.68", "40", "  contakt: tube\n", SCRIPT), "run bad.yaml", "bad.yaml:5:3: unknown key 'contakt'; did you mean 'contact'?");
     expect_bad("seldinger: 1\nwire: {sections: [{length_cm: 40, diameter_mm: 0.36, young_modulus_gpa: 80}]}\nrig: {}\n", "run bad.yaml --duration-s 1",
-               "bad.yaml:2:20: key 'length_cm' has the wrong unit; it is 'length_mm'");
+               "bad.yaml:2:20: key 'length_cm' has the wrong unit; expected 'length_mm'");
     expect_bad(SCENE("80", "0", "40", "", SCRIPT), "run bad.yaml", "radius_mm");
     expect_bad(SCENE("80", "-1", "40", "", SCRIPT), "run bad.yaml", "radius_mm");
-    expect_bad(SCENE("80", "0.68", "0", "", SCRIPT), "run bad.yaml", "bad.yaml:6:13: 'wire.elements' is 0; a whole number from 1 to 10000");
+    expect_bad(SCENE("80", "0.68", "0", "", SCRIPT), "run bad.yaml", "bad.yaml:6:13: 'wire.elements' is 0; expected a whole number from 1 to 10000");
     expect_bad(SCENE("80", "0.68", "100000", "", SCRIPT), "run bad.yaml", "bad.yaml:6:13: 'wire.elements' is 100000");
     expect_bad(SCENE("80", "0.68", "40", "", "back.csv"), "run bad.yaml", "back.csv:4:1: t_s 1 does not follow 2");
     expect_bad(GOOD, "run bad.yaml --script back.csv", "back.csv:4:1: t_s 1 does not follow 2");

@@ -227,13 +227,13 @@ static void a_script_exchanges_tools(void **state)
     put("early.csv", "t_s,microcatheter.exchange,wire.exchange\n0,0,0\n0.1,1,0\n0.2,1,1\n0.3,1,3\n0.4,1,3\n");
     ends(0, "3 exchanges were refused, the last because the scene has no such tool", "run scenes/coaxial/exchange.yaml --script $D/early.csv");
     put("wrong.csv", "t_s,wire.exchange\n0,0.5\n1,0\n");
-    ends(2, "wrong.csv:2:1: exchange is 0.5; 0 for the scene's tool, 1 to 4 for those under its 'exchange:'", "run scenes/coaxial/exchange.yaml --script $D/wrong.csv");
+    ends(2, "wrong.csv:2:1: exchange is 0.5; expected 0 (the scene's tool) or 1 to 4 (those under its 'exchange:')", "run scenes/coaxial/exchange.yaml --script $D/wrong.csv");
     put("wide.yaml", "seldinger: 1\nvessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 60}]}}\ntools:\n"
                      "  - {name: tube, kind: catheter, sections: [{length_mm: 60, diameter_mm: 1, inner_diameter_mm: 0.5, young_modulus_gpa: 1}]}\n"
                      "  - {name: wire, kind: wire, sections: [{length_mm: 160, diameter_mm: 0.36, young_modulus_gpa: 20}],\n"
                      "     exchange: [{sections: [{length_mm: 160, diameter_mm: 0.6, young_modulus_gpa: 20}]}]}\n"
                      "sheath: {entry_mm: [1, 0, 0], direction: [1, 0, 0]}\n");
-    ends(2, "wide.yaml:6:17: 'wire' is up to 0.6 mm thick, but the lumen of 'tube' around it is 0.5 mm wide", "run $D/wide.yaml --duration-s 0.1");
+    ends(2, "wide.yaml:6:17: 'wire' is up to 0.6 mm thick, but the lumen of 'tube' around it is only 0.5 mm wide", "run $D/wide.yaml --duration-s 0.1");
     put("single.yaml", "seldinger: 1\nvessel: {tube: {start_mm: [0, 0, 0], direction: [1, 0, 0], normal: [0, 1, 0], radius_mm: 2, path: [{line_mm: 60}]}}\ntools:\n"
                        "  - {name: wire, kind: wire, sections: [{length_mm: 160, diameter_mm: 0.36, young_modulus_gpa: 20}],\n"
                        "     exchange: [{sections: [{length_mm: 160, diameter_mm: 0.3, young_modulus_gpa: 20}]}]}\n"

@@ -81,31 +81,31 @@ static void what_does_not_fit_together_is_said(void **state)
 {
     (void)state;
     expect_fault("", "empty");
-    expect_fault("[1, 2]", "no device map");
-    expect_fault(TOP "device: {}\npush: {source: X, mm_s: 1}\n", "names none");
-    expect_fault(HID, "something to do");
+    expect_fault("[1, 2]", "not a device map");
+    expect_fault(TOP "device: {}\npush: {source: X, mm_s: 1}\n", "selects no device");
+    expect_fault(HID, "at least one of these");
     expect_fault(HID "push: {source: X}\n", "one of mm_s and mm_per_count");
     expect_fault(HID "push: {source: X, mm_s: 1, mm_per_count: 1}\n", "one of mm_s and mm_per_count");
     expect_fault(HID "push: {source: X, mm_per_count: 1, dead_zone: 0.1}\n", "goes with a deflection");
     expect_fault(HID "push: {source: X, mm_s: 1, counts_per_wrap: 16}\n", "goes with counts");
-    expect_fault(HID "push: {source: X, mm_s: 1, kind: counter}\n", "is deflection");
+    expect_fault(HID "push: {source: X, mm_s: 1, kind: counter}\n", "kind: deflection");
     expect_fault(HID "push: {source: X, mm_s: 1, kind: circular}\n", "one of");
-    expect_fault(HID "push: {source: X, mm_s: 1, logical_min: 5, logical_max: 5}\n", "do not grow");
-    expect_fault(HID "push: {source: X, mm_s: 1, logical_min: 0, logical_centre: 9, logical_max: 5}\n", "do not grow");
+    expect_fault(HID "push: {source: X, mm_s: 1, logical_min: 5, logical_max: 5}\n", "do not increase");
+    expect_fault(HID "push: {source: X, mm_s: 1, logical_min: 0, logical_centre: 9, logical_max: 5}\n", "do not increase");
     expect_fault(HID "push: {source: X, mm_s: 2000}\n", "out of range");
     expect_fault(HID "push: {source: X, cm_s: 2}\n", "mm_s");
     expect_fault(HID "push: {source: X, mm_s: 2}\nforce: {full_scale_n: 2, max_n: 3}\n", "above");
     expect_fault(TOP "device: {gamepad: true}\npush: {source: left_y, mm_per_count: 2}\n", "deflections");
     expect_fault(TOP "device: {gamepad: true}\npush: {source: X, mm_s: 2}\n", "left_x");
     expect_fault(TOP "device: {gamepad: true, joystick: \"*\"}\npush: {source: axis_0, mm_s: 2}\n", "is one of");
-    expect_fault(TOP "device: {gamepad: true}\npush: {source: left_y, mm_s: 2}\nforce: {full_scale_n: 1}\n", "through HID");
+    expect_fault(TOP "device: {gamepad: true}\npush: {source: left_y, mm_s: 2}\nforce: {full_scale_n: 1}\n", "needs a HID device");
     expect_fault(TOP "device: {usb: ftdi}\npush: {source: B, mm_per_count: 2}\n", "not among");
     expect_fault(TOP "device: {usb: ftdi}\npush: {source: A, mm_s: 2}\n", "gives counts");
     expect_fault(TOP "device: {usb: ftdi}\nserial: {counts: [A1, A1]}\npush: {source: A1, mm_per_count: 2}\n", "letters without digits");
     expect_fault(TOP "device: {usb: ftdi}\nserial: {counts: [A, A]}\npush: {source: A, mm_per_count: 2}\n", "twice");
     expect_fault(TOP "device: {usb: ftdi}\npedal: {source: A}\n", "no buttons");
     expect_fault(TOP "device: {vendor_id: 046d}\npush: {source: X, mm_s: 2}\n", "0x");
-    expect_fault(HID "push: {source: X, mm_s: 2}\npush: {source: Y, mm_s: 2}\n", "second time");
+    expect_fault(HID "push: {source: X, mm_s: 2}\npush: {source: Y, mm_s: 2}\n", "duplicate");
     expect_fault(HID "tool: 0\npush: {source: X, mm_s: 2}\n", "1 to 4");
     expect_fault(HID "tool: 5\npush: {source: X, mm_s: 2}\n", "1 to 4");
     expect_fault(HID "tool: -1\npush: {source: X, mm_s: 2}\n", "1 to 4");
@@ -115,7 +115,7 @@ static void what_does_not_fit_together_is_said(void **state)
     expect_fault(HID "tool: [wire]\npush: {source: X, mm_s: 2}\n", "tool");
     expect_fault(HID "pedal: {source: button_1, tool: wire}\n", "tool");
     expect_fault(HID "push: [{source: X, mm_s: 2, tool: 1}, {source: Y, mm_s: 2, tool: 2}, {source: Z, mm_s: 2, tool: 3}, {source: Rx, mm_s: 2, tool: 4},"
-                     " {source: Ry, mm_s: 2, tool: wire}]\n", "fifth tool");
+                     " {source: Ry, mm_s: 2, tool: wire}]\n", "one tool too many");
 }
 
 static const ToolNames three = {.count = 3, .name = {"guide", "micro", "thread"}, .kind = {"catheter", "catheter", "wire"}};
@@ -141,7 +141,7 @@ static void tools_are_found_in_the_scene(void **state)
     }
     static const struct {
         const char *tool, *said;
-    } bad[] = {{"4", "the scene has no such tool; write guide, micro, thread, outermost"}, {"microcatheter", "no such tool"}, {"catheter", "2 of that kind; say which: guide, micro, thread"}};
+    } bad[] = {{"4", "the scene has no such tool; write guide, micro, thread, outermost"}, {"microcatheter", "no such tool"}, {"catheter", "2 of that kind; choose one: guide, micro, thread"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         snprintf(text, sizeof text, HID "twist: {source: X, deg_s: 2, tool: %s}\n", bad[i].tool);
         DeviceMap *map = must_parse(text);

@@ -165,7 +165,7 @@ static void lies_are_refused_with_the_reason(void **state)
     static const struct { const char *hex, *words; } cases[] = {
         {"", "0 bytes"},
         {"0501", "no field"},
-        {"05010904a1", "cut short"},
+        {"05010904a1", "truncated"},
         {"05010904a10115002501750095010930810 2c0", "0 bits"},
         {"05010904a101150025017521950109308102c0", "at most 32"},
         {"05010904a101150a2505750895010930810 2c0", "range from 10 to 5"},
@@ -181,7 +181,7 @@ static void lies_are_refused_with_the_reason(void **state)
         {"05010904a10115002501750897ffffffff09308102c0", "at most 65536 bits"},
         {"05010904a101150025017520960004093081029600040931810296000409328102c0", "grows to"},
         {"05010904a1012933c0", "maximum without a minimum"},
-        {"05010904a101193329308102c0", "not below the minimum"},
+        {"05010904a101193329308102c0", "expected a rising range"},
         {"05010904a101a90109308102c0", "not closed"},
         {"05000904a101c0", "usage page 0x0"},
         {"05010904a1010dc0", "reserved type"},

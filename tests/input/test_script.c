@@ -82,7 +82,7 @@ static void each_fault_has_its_place(void **state)
     expect_fault(HEADER "0,1,0x10\n1,0,0\n", "2:5", "0x10");
     expect_fault(HEADER "0,1,1e999\n1,0,0\n", "2:5", "1e999");
     expect_fault(HEADER "0,1,0\n2,1,0\n1,0,0\n", "4:1", "does not follow 2");
-    expect_fault(HEADER "0,1,0\n0,1,0\n", "3:1", "grow");
+    expect_fault(HEADER "0,1,0\n0,1,0\n", "3:1", "rising");
     expect_fault(HEADER "-1,1,0\n0,1,0\n", "2:1", "negative");
     expect_fault(HEADER "0,1001,0\n1,0,0\n", "2:1", "push_mm_s");
     expect_fault(HEADER "0,1,-36001\n1,0,0\n", "2:1", "twist_deg_s");
@@ -148,7 +148,7 @@ static void a_hand_lets_go(void **state)
     commands = script_tools_at(script, 3, &cursor);
     assert_true(commands.fitted[2] == 1 && commands.fitted[0] == 0 && commands.tool[2].push_mm_s == 0);
     script_free(script);
-    expect_fault("t_s,push_mm_s,twist_deg_s,released\n0,1,0,0.5\n1,0,0,0\n", "2:1", "released is 0.5; 0 where a hand holds the tool");
+    expect_fault("t_s,push_mm_s,twist_deg_s,released\n0,1,0,0.5\n1,0,0,0\n", "2:1", "released is 0.5; expected 0 (the tool is held)");
     expect_fault("t_s,push_mm_s,twist_deg_s,released\n0,1,0,-1\n1,0,0,0\n", "2:1", "released is -1");
     expect_fault("t_s,push_mm_s,released,twist_deg_s\n0,1,0,0\n1,0,0,0\n", "1:15", "twist_deg_s");
 }
@@ -172,7 +172,7 @@ static void one_injector_goes_through_one_tool(void **state)
     assert_null(script_parse_tools(both, strlen(both), "s.csv", &tools, &faults));
     assert_int_equal(faults.count, 3);
     assert_non_null(strstr(faults.text[0], "2 tools at once"));
-    assert_non_null(strstr(faults.text[1], "contrast_ml_s 51 is out of range; 0 to 50"));
+    assert_non_null(strstr(faults.text[1], "contrast_ml_s 51 is out of range; expected 0 to 50"));
     assert_non_null(strstr(faults.text[2], "contrast_ml_s -1 is out of range"));
 }
 

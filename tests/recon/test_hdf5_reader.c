@@ -115,7 +115,7 @@ static void links_out_are_not_followed(void **state)
     file = new_file();
     H5Gclose(H5Gcreate2(file, "/x", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
     refused(file, plain, "cannot be opened");
-    refused(new_file(), plain, "lacks the dataset /x; a test has it");
+    refused(new_file(), plain, "has no dataset /x; a test has it");
 }
 
 static void data_elsewhere_are_not_read(void **state)
@@ -132,7 +132,7 @@ static void data_elsewhere_are_not_read(void **state)
     H5Sclose(space);
     file = new_file();
     put_with(file, "/x", H5T_IEEE_F64LE, ROWS, creation, NULL);
-    refused(file, plain, "is put together from other files");
+    refused(file, plain, "assembled from other files");
     creation = H5Pcreate(H5P_DATASET_CREATE);
     H5Pset_external(creation, "/etc/passwd", 0, 400);
     hid_t text = H5Tcopy(H5T_C_S1);
@@ -142,7 +142,7 @@ static void data_elsewhere_are_not_read(void **state)
     H5Tclose(text);
     Hdf5Reader *reader = open_file(file);
     assert_null(hdf5_text(reader, "/text"));
-    assert_true(faults.count == 1 && strstr(faults.text[0], "/text is no text"));
+    assert_true(faults.count == 1 && strstr(faults.text[0], "/text is not a string"));
     hdf5_reader_close(reader);
 }
 
@@ -231,7 +231,7 @@ static void other_packings_are_refused(void **state)
             H5Pset_fletcher32(creation);
         }
         put_with(file, "/x", H5T_IEEE_F64LE, ROWS, creation, numbers);
-        refused(file, plain, "is packed by other filters than deflate");
+        refused(file, plain, "is compressed by filters other than deflate");
     }
     // while it is open no plug-in may be loaded; afterwards the program's own settings hold again
     const unsigned set = H5PL_FILTER_PLUGIN;
@@ -277,19 +277,19 @@ static void damaged_chunks_are_refused(void **state)
     free(read);
     hdf5_reader_close(reader);
     for (size_t cut = 1; cut < length; cut += 7)
-        refused(with_chunk(stream, cut, 0), plain, "damaged or cut off");
+        refused(with_chunk(stream, cut, 0), plain, "damaged or truncated");
     stream[length] = 0;
-    refused(with_chunk(stream, length + 1, 0), plain, "damaged or cut off");
+    refused(with_chunk(stream, length + 1, 0), plain, "damaged or truncated");
     for (size_t i = 0; i < length; i += 11) {
         stream[i] ^= 4;
-        refused(with_chunk(stream, length, 0), plain, "damaged or cut off");
+        refused(with_chunk(stream, length, 0), plain, "damaged or truncated");
         stream[i] ^= 4;
     }
     // a byte less and a byte more than the chunk has
     for (int more = -1; more <= 1; more += 2) {
         length = sizeof stream;
         assert_int_equal(compress(stream, &length, values, (uLong)(BYTES + more)), Z_OK);
-        refused(with_chunk(stream, length, 0), plain, "damaged or cut off");
+        refused(with_chunk(stream, length, 0), plain, "damaged or truncated");
     }
     // a chunk whose filters were left out holds its plain bytes, no more and no less
     reader = open_file(with_chunk(values, BYTES, 3));
@@ -299,10 +299,10 @@ static void damaged_chunks_are_refused(void **state)
     assert_memory_equal(same, values, BYTES);
     free(same);
     hdf5_reader_close(reader);
-    refused(with_chunk(values, BYTES - 1, 3), plain, "damaged or cut off");
-    refused(with_chunk(values, BYTES, 0), plain, "damaged or cut off");
+    refused(with_chunk(values, BYTES - 1, 3), plain, "damaged or truncated");
+    refused(with_chunk(values, BYTES, 0), plain, "damaged or truncated");
     // longer than deflate makes any chunk of this size
-    refused(with_chunk(stream, sizeof stream, 0), plain, "cut off");
+    refused(with_chunk(stream, sizeof stream, 0), plain, "truncated");
 }
 
 // Little that unpacks to much: deflate gives up to 1032 bytes for one.
@@ -315,7 +315,7 @@ static void bombs_are_refused(void **state)
     H5Pset_deflate(creation, 9);
     put_with(file, "/x", H5T_STD_U8LE, rows, creation, zeros);
     Hdf5Dataset x = {"/x", HDF5_UINT8, 1, {0}, false};
-    refused(file, x, "unpacks to more than 256 times the file");
+    refused(file, x, "decompresses to more than 256 times the file");
     file = new_file();
     put_with(file, "/x", H5T_IEEE_F64LE, (hsize_t)1 << 40, chunks(1 << 20), NULL);
     refused(file, plain, "more or larger chunks");
@@ -331,7 +331,7 @@ static void what_is_not_there_is_refused(void **state)
     (void)state;
     hid_t file = new_file();
     put_with(file, "/x", H5T_IEEE_F64LE, (hsize_t)1 << 40, H5P_DEFAULT, NULL);
-    refused(file, plain, "does not have as many bytes");
+    refused(file, plain, "has fewer bytes");
     file = new_file();
     put_with(file, "/x", H5T_IEEE_F64LE, ROWS, chunks(10), NULL);
     refused(file, plain, "never written");
@@ -367,24 +367,24 @@ static void what_is_no_number_is_refused(void **state)
     for (int i = 0; i < 6; i++) {
         hid_t file = new_file();
         put_with(file, "/x", type[i], ROWS, H5P_DEFAULT, NULL);
-        refused(file, plain, "wrong type; valid: IEEE floats");
+        refused(file, plain, "wrong type; expected IEEE floats");
     }
     hid_t file = new_file();
     put_numbers(file, "/x", H5T_IEEE_F64LE);
-    refused(file, (Hdf5Dataset){"/x", HDF5_INT32, 1, {0}, false}, "wrong type; valid: integers");
+    refused(file, (Hdf5Dataset){"/x", HDF5_INT32, 1, {0}, false}, "wrong type; expected integers");
     file = new_file();
     put_numbers(file, "/x", H5T_IEEE_F64LE);
-    refused(file, (Hdf5Dataset){"/x", HDF5_DOUBLE, 1, {ROWS - 1}, false}, "wrong shape (50); valid: (49)");
+    refused(file, (Hdf5Dataset){"/x", HDF5_DOUBLE, 1, {ROWS - 1}, false}, "wrong shape (50); expected (49)");
     file = new_file();
     put_numbers(file, "/x", H5T_IEEE_F64LE);
-    refused(file, (Hdf5Dataset){"/x", HDF5_DOUBLE, 2, {0, 3}, false}, "wrong shape (50); valid: (any, 3)");
+    refused(file, (Hdf5Dataset){"/x", HDF5_DOUBLE, 2, {0, 3}, false}, "wrong shape (50); expected (any, 3)");
     static const double bad[] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
     for (int i = 0; i < 3; i++) {
         double some[ROWS] = {0};
         some[17] = bad[i];
         file = new_file();
         put_with(file, "/x", i ? H5T_IEEE_F32BE : H5T_IEEE_F64LE, ROWS, H5P_DEFAULT, some);
-        refused(file, (Hdf5Dataset){"/x", i ? HDF5_FLOAT : HDF5_DOUBLE, 1, {0}, true}, "in row 17; valid: finite numbers");
+        refused(file, (Hdf5Dataset){"/x", i ? HDF5_FLOAT : HDF5_DOUBLE, 1, {0}, true}, "in row 17; expected finite numbers");
     }
     H5Tclose(odd);
     H5Tclose(pair);

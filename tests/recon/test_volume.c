@@ -257,7 +257,7 @@ static void detached(void **state)
     header(&b, "short", "endian: little\nencoding: raw\ndata file: b.raw\n");
     write_file("missing.nhdr", &b);
     assert_null(load("missing.nhdr"));
-    assert_true(has_fault("'b.raw' is not there"));
+    assert_true(has_fault("'b.raw' does not exist"));
     assert_true(has_fault("missing.nhdr:7"));
     header(&b, "short", "endian: little\nencoding: raw\ndata file: ../a.raw\n");
     write_file("above.nhdr", &b);
@@ -384,9 +384,9 @@ static void nifti(void **state)
     b.byte[344] = 0;   // ANALYZE
     refused(&b, "magic");
     nifti_header(&b, false, 128, 24, 1, 0, "n+1", 352);
-    refused(&b, "data type 128 is not read");
+    refused(&b, "data type 128 is not supported");
     nifti_header(&b, false, 4, 8, 1, 0, "n+1", 352);
-    refused(&b, "8 bits a voxel");
+    refused(&b, "8 bits per voxel");
     nifti_header(&b, false, 4, 16, 1, 0, "n+1", 3e9f);
     refused(&b, "offset");
 }
@@ -399,11 +399,11 @@ static void lies(void **state)
         const char *more, *words;
     } cases[] = {
         {"endian: little\nencoding: raw\n\n", "ends after 0 of 48 bytes"},
-        {"encoding: raw\n\n", "without their order"},
+        {"encoding: raw\n\n", "have no byte order"},
         {"endian: middle\nencoding: raw\n\n", "endian"},
-        {"endian: little\nencoding: hex\n\n", "the encoding 'hex' is not read"},
-        {"endian: little\nencoding: raw\nsizes: 2 2 2\n\n", "stands on line 4 already"},
-        {"endian: little\nencoding: raw\nsise: 2\n\n", "is no field"},
+        {"endian: little\nencoding: hex\n\n", "the encoding 'hex' is not supported"},
+        {"endian: little\nencoding: raw\nsizes: 2 2 2\n\n", "the first is on line 4"},
+        {"endian: little\nencoding: raw\nsise: 2\n\n", "unknown field"},
         {"endian: little\nencoding: raw\nspace: mars\n\n", "the space"},
         {"endian: little\nencoding: raw\nspace directions: (1,0,0) (0,1,0) (1,1,0)\n\n", "span no grid"},
         {"endian: little\nencoding: raw\nspace directions: (1,0,0) (0,1,0) (0,0,nan)\n\n", "span no grid"},
@@ -413,15 +413,15 @@ static void lies(void **state)
         {"endian: little\nencoding: gzip\nbyte skip: -1\n\n", "byte skip -1"},
         {"endian: little\nencoding: raw\nbyte skip: 100\n\n", "goes past the end"},
         {"endian: little\nencoding: raw\nline skip: 5\n\n", "line skip"},
-        {"endian: little\nencoding: raw\ndata file: LIST\nnot-there.raw\n", "the data file 'not-there.raw' is not there"},
+        {"endian: little\nencoding: raw\ndata file: LIST\nnot-there.raw\n", "the data file 'not-there.raw' does not exist"},
         {"endian: little\nencoding: raw\ndata file: LIST\n", "0 data files for 4 slices"},
-        {"endian: little\nencoding: gzip\ndata file: LIST\na\nb\n", "several data files that are compressed"},
+        {"endian: little\nencoding: gzip\ndata file: LIST\na\nb\n", "several data files are supported only"},
         {"endian: little\nencoding: raw\ndata file: a%03d.raw 1 3\n", "3 data files for 4 slices"},
-        {"endian: little\nencoding: raw\ndata file: a%s.raw 1 4 1\n", "not a numbered name"},
-        {"endian: little\nencoding: raw\ndata file: a%d%d.raw 1 4 1\n", "not a numbered name"},
-        {"endian: little\nencoding: raw\ndata file: a%99999999999d.raw 1 4 1\n", "not a numbered name"},
-        {"endian: little\nencoding: raw\ndata file: a%d.raw 1 1e300 1\n", "not a numbered name"},
-        {"endian: little\nencoding: raw\ndata file: a%03d.raw 1 4 1\n", "the data file 'a001.raw' is not there"},
+        {"endian: little\nencoding: raw\ndata file: a%s.raw 1 4 1\n", "not a file name pattern"},
+        {"endian: little\nencoding: raw\ndata file: a%d%d.raw 1 4 1\n", "not a file name pattern"},
+        {"endian: little\nencoding: raw\ndata file: a%99999999999d.raw 1 4 1\n", "not a file name pattern"},
+        {"endian: little\nencoding: raw\ndata file: a%d.raw 1 1e300 1\n", "not a file name pattern"},
+        {"endian: little\nencoding: raw\ndata file: a%03d.raw 1 4 1\n", "the data file 'a001.raw' does not exist"},
         {"encoding: text\n\n1 2 3", "cannot hold 24 numbers"},
         {"encoding: text\n\n1 2 3 x 5 6 7 8 9 10 11 12 13", "value 4 of 24"},
         {"endian: little\nencoding: raw\n", "ends within the header"},
@@ -443,12 +443,12 @@ static void lies(void **state)
         put_sample(&b, i == 7 ? 0x7fc00000u : 0, 4, false);
     refused(&b, "1 voxels are not finite numbers (NaN or too large), the first at (1, 0, 1)");
     b.length = 0;
-    refused(&b, "no volume that can be read");
+    refused(&b, "not a supported volume format");
     put_text(&b, "NRRD0009\ntype: uchar\ndimension: 3\nsizes: 1 1 1\nencoding: raw\n\nx");
     refused(&b, "unknown version");
     b.length = 0;
     put_text(&b, "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 3 1 1 1\nspace dimension: 3\nspace directions: none (1,0,0) (0,1,0) (0,0,1)\nencoding: raw\n\nxyz");
-    refused(&b, "3 values a voxel");
+    refused(&b, "3 values per voxel");
     b.length = 0;
     put_text(&b, "NRRD0004\ntype: uchar\ndimension: 2\nsizes: 1 1\nencoding: raw\n\nx");
     refused(&b, "dimension is not valid");

@@ -193,15 +193,15 @@ static const struct {
 } broken_script[] = {
     {"t_s,wir.push_mm_s,wir.twist_deg_s\n0,1,0\n", "1:5", "did you mean 'wire'"},
     {"t_s,balloon.push_mm_s,balloon.twist_deg_s\n0,1,0\n", "1:5", "it has: guide, micro, wire"},
-    {"t_s,wire.push_mm_s\n0,1\n", "1:5", "'wire.push_mm_s' lacks its other half; 'wire.twist_deg_s'"},
-    {"t_s,micro.push_mm_s,micro.twist_deg_s,wire.twist_deg_s\n0,1,0,0\n", "1:39", "'wire.twist_deg_s' lacks its other half; 'wire.push_mm_s'"},
-    {"t_s,wire.push_mm_s,wire.push_mm_s,wire.twist_deg_s\n0,1,0,0\n", "1:20", "second time"},
+    {"t_s,wire.push_mm_s\n0,1\n", "1:5", "'wire.push_mm_s' needs the column 'wire.twist_deg_s' too"},
+    {"t_s,micro.push_mm_s,micro.twist_deg_s,wire.twist_deg_s\n0,1,0,0\n", "1:39", "'wire.twist_deg_s' needs the column 'wire.push_mm_s' too"},
+    {"t_s,wire.push_mm_s,wire.push_mm_s,wire.twist_deg_s\n0,1,0,0\n", "1:20", "duplicate"},
     {"t_s,wire.push_cm_s,wire.twist_deg_s\n0,1,0\n", "1:5", "such as 'wire.push_mm_s'"},
     {"t_s,push_mm_s,twist_deg_s,wire.push_mm_s,wire.twist_deg_s\n0,1,0,1,0\n", "1:5", "beside named tools"},
-    {"t,wire.push_mm_s,wire.twist_deg_s\n0,1,0\n", "1:1", "it is 't_s'"},
+    {"t,wire.push_mm_s,wire.twist_deg_s\n0,1,0\n", "1:1", "expected 't_s'"},
     {"t_s,wire.push_mm_s,wire.twist_deg_s\n0,1\n", "2:1", "2 fields"},
-    {"t_s,wire.released\n0,2\n", "2:1", "released is 2; 0 where a hand"},
-    {"t_s,wire.released,wire.released\n0,1,1\n", "1:19", "second time"},
+    {"t_s,wire.released\n0,2\n", "2:1", "released is 2; expected 0 (the tool is held)"},
+    {"t_s,wire.released,wire.released\n0,1,1\n", "1:19", "duplicate"},
     {"t_s,wire.push_mm_s,wire.twist_deg_s\n0,1,0\n1,2000,0\n", "3:1", "wire.push_mm_s 2000 is out of range"},
     {"t_s,wire.push_mm_s,wire.twist_deg_s\n", "1:1", "no row"},
 };
@@ -246,33 +246,33 @@ typedef struct Broken {
 #define NAMED(name) WITH("name: " name ", kind: wire, " SECTION("700", "0.36", "0"))
 
 static const Broken broken[] = {
-    {VERSION SHEATH "tools:\n" GUIDE "wire: {" SECTION("300", "0.36", "0") "}\n", "4:3", "one of them"},
-    {VERSION SHEATH, "1:1", "lacks the key 'wire', or 'tools'"},
+    {VERSION SHEATH "tools:\n" GUIDE "wire: {" SECTION("300", "0.36", "0") "}\n", "4:3", "expected either 'wire'"},
+    {VERSION SHEATH, "1:1", "neither 'wire' (one tool) nor 'tools'"},
     {VERSION SHEATH "tools: []\n", "3:8", "0 entries"},
-    {VERSION SHEATH "tools: {name: a}\n", "3:8", "no list"},
-    {TOOLS(GUIDE GUIDE GUIDE GUIDE WIRE), "8:5", "5 tools; at most 4"},
+    {VERSION SHEATH "tools: {name: a}\n", "3:8", "not a list"},
+    {TOOLS(GUIDE GUIDE GUIDE GUIDE WIRE), "8:5", "5 tools; expected at most 4"},
     // keys
-    {WITH("kind: wire, " SECTION("700", "0.36", "0")), "5:5", "lacks the key 'name'"},
-    {WITH("name: a, " SECTION("700", "0.36", "0")), "5:5", "lacks the key 'kind'"},
-    {WITH("name: a, kind: wire"), "5:5", "lacks the key 'sections'"},
+    {WITH("kind: wire, " SECTION("700", "0.36", "0")), "5:5", "has no key 'name'"},
+    {WITH("name: a, " SECTION("700", "0.36", "0")), "5:5", "has no key 'kind'"},
+    {WITH("name: a, kind: wire"), "5:5", "has no key 'sections'"},
     {WITH("name: a, kind: balloon, " SECTION("700", "0.36", "0")), "5:21", "one of: guide_catheter, catheter, microcatheter, wire"},
     {WITH("name: a, kind: wire, insert_mm: 3, " SECTION("700", "0.36", "0")), "5:27", "did you mean 'inserted_mm'"},
     {WITH("name: a, kind: wire, friction_inside: -1, " SECTION("700", "0.36", "0")), "5:44", "out of range"},
     // names
-    {NAMED("\"\""), "5:12", "no text"},
+    {NAMED("\"\""), "5:12", "not a string"},
     {NAMED("a.b"), "5:12", "a dot, a comma or a space"},
     {NAMED("\"a,b\""), "5:12", "a dot, a comma or a space"},
     {NAMED("a b"), "5:12", "a dot, a comma or a space"},
     {NAMED("\"a\\tb\""), "5:12", "a dot, a comma or a space"},
-    {NAMED("guide"), "5:12", "the tool on line 4"},
+    {NAMED("guide"), "5:12", "already used on line 4"},
     {NAMED("abcdefghijklmnopqrstuvwxyzabcdef"), "5:12", "at most 31 letters"},
     // lumen
-    {WITH("name: a, kind: wire, " SECTION("700", "1.8", "0")), "5:5", "1.8 mm wide at its narrowest"},
+    {WITH("name: a, kind: wire, " SECTION("700", "1.8", "0")), "5:5", "only 1.8 mm wide"},
     {WITH("name: a, kind: wire, sections: [{length_mm: 650, diameter_mm: 1, young_modulus_gpa: 1}, {length_mm: 50, diameter_mm: 1.9, young_modulus_gpa: 1}]"), "5:5",
      "'a' is up to 1.9 mm thick"},
     {TOOLS("  - {name: a, kind: catheter, " SECTION("300", "2", "0") "}\n" WIRE), "5:5", "which is solid"},
     {TOOLS("  - {name: a, kind: catheter, sections: [{length_mm: 250, diameter_mm: 2, inner_diameter_mm: 1.8, young_modulus_gpa: 1},"
-           " {length_mm: 50, diameter_mm: 2, inner_diameter_mm: 0.3, young_modulus_gpa: 1}]}\n" WIRE), "5:5", "0.3 mm wide at its narrowest"},
+           " {length_mm: 50, diameter_mm: 2, inner_diameter_mm: 0.3, young_modulus_gpa: 1}]}\n" WIRE), "5:5", "only 0.3 mm wide"},
     // lengths
     {WITH("name: a, kind: wire, " SECTION("249", "0.36", "0")), "5:5", "make it at least 300 mm long"},
     {WITH("name: a, kind: wire, " SECTION("310", "0.36", "0") ", inserted_mm: 61"), "5:133", "make it at least 311 mm long or insert at most 60 mm"},
@@ -286,13 +286,13 @@ static const Broken broken[] = {
     {VERSION "rig: {start_mm: [0, 0, 0]}\ntools:\n" GUIDE "  - {name: a, kind: wire, " SECTION("299", "0.36", "0") "}\n", "5:5", "insert at most 299 mm"},
     // rest shapes
     {WITH("name: a, kind: wire, sections: [{length_mm: 700, diameter_mm: 1, young_modulus_gpa: 1, rest_curvature_1_mm: -2}]"), "5:114", "tighter than the tool's own radius 0.5 mm"},
-    {WITH("name: a, kind: wire, " SECTION("400", "0.36", "0") ", rest: [{arc: {radius_mm: 0.3, angle_deg: 10}}]"), "5:127", "tighter than the tool is thick"},
+    {WITH("name: a, kind: wire, " SECTION("400", "0.36", "0") ", rest: [{arc: {radius_mm: 0.3, angle_deg: 10}}]"), "5:127", "smaller than the tool's diameter"},
     {WITH("name: a, kind: catheter, " SECTION("400", "0.36", "0") ", rest: [{line_mm: 401}]"), "5:130", "the tool 400 mm"},
     // a device that is not there
     {WITH("name: a, device: nowhere.yaml"), "", "nowhere.yaml"},
     // scripts in place
     {THREE "script: [{t_s: 0, wir.push_mm_s: 1, wire.twist_deg_s: 0}]\n", "7:19", "did you mean 'wire.push_mm_s'"},
-    {THREE "script: [{t_s: 0, wire.push_mm_s: 1}]\n", "7:10", "give 'wire.twist_deg_s' too"},
+    {THREE "script: [{t_s: 0, wire.push_mm_s: 1}]\n", "7:10", "needs 'wire.twist_deg_s' too"},
     {THREE "script: [{t_s: 0, push_mm_s: 1, wire.push_mm_s: 1, wire.twist_deg_s: 0}]\n", "7:10", "not both"},
     {THREE "script: [{t_s: 0, wire.push_mm_s: 1001, wire.twist_deg_s: 0}]\n", "7:10", "wire.push_mm_s 1001 is out of range"},
     {TOOLS(GUIDE "  - {name: wire, kind: wire, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, angle_deg: 45, mandrel_mm: 50}}\n"), "5:113", "does not make the core yield"},
@@ -301,7 +301,7 @@ static const Broken broken[] = {
     {TOOLS(GUIDE "  - {name: wire, kind: wire, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, mandrel_mm: 1}}\n"), "", "'angle_deg'"},
     {TOOLS(GUIDE "  - {name: wire, kind: wire, core: nitinol, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, angle_deg: 45, mandrel_mm: 1}}\n"), "", "springs back from any such bend"},
     {TOOLS(GUIDE "  - {name: wire, kind: wire, core: gold, sections: [{length_mm: 700, diameter_mm: 0.36, young_modulus_gpa: 1}], shaped_tip: {length_mm: 5, angle_deg: 45, mandrel_mm: 1}}\n"), "", "steel, nitinol"},
-    {TOOLS("  - {name: guide, kind: guide_catheter, shaped_tip: {length_mm: 5, angle_deg: 45, mandrel_mm: 1}, " SECTION("300", "2", "1.8") "}\n" WIRE), "", "only a wire's tip is shaped by hand"},
+    {TOOLS("  - {name: guide, kind: guide_catheter, shaped_tip: {length_mm: 5, angle_deg: 45, mandrel_mm: 1}, " SECTION("300", "2", "1.8") "}\n" WIRE), "", "only a wire's tip can be shaped by hand"},
 };
 
 static void a_tip_is_shaped_by_hand(void **state)
@@ -359,7 +359,7 @@ static void all_faults_come_in_one_pass(void **state)
     assert_null(parse(TOOLS("  - {name: a b, kind: balloon, " SECTION("300", "2", "0.5") ", inserted_mm: 301}\n"
                             "  - {name: c, kind: wire, " SECTION("100", "0.8", "0") "}\n"
                             "  - {name: c, kind: wire, sections: [{length_mm: 100}]}\n") "script: [{t_s: 0, d.push_mm_s: 1}]\n"));
-    const char *const words[] = {"'a b'", "'balloon'", "0.5 mm wide", "at most 300", "has 250 mm outside", "tool on line 5", "'diameter_mm'", "'young_modulus_gpa'", "d.push_mm_s"};
+    const char *const words[] = {"'a b'", "'balloon'", "0.5 mm wide", "at most 300", "has 250 mm outside", "used on line 5", "'diameter_mm'", "'young_modulus_gpa'", "d.push_mm_s"};
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
         if (!says("", words[i]))
             fail_msg("no fault says '%s'", words[i]);
@@ -370,7 +370,7 @@ static void a_fault_hides_no_other_and_makes_none(void **state)
 {
     (void)state;
     assert_null(parse(TOOLS(GUIDE "  - {name: a, kind: wire, length_mm: -5, sections: [{length_mm: 400, diameter_mm: 3}]}\n")));
-    assert_true(says("", "a number above 0") && says("", "lacks the key 'young_modulus_gpa'") && says("", "1.8 mm wide"));
+    assert_true(says("", "a number above 0") && says("", "has no key 'young_modulus_gpa'") && says("", "1.8 mm wide"));
     assert_int_equal(faults.count, 3);
     assert_null(parse(TOOLS("  - {name: a, kind: catheter, " SECTION("300", "2", "wide") "}\n" WIRE)));
     assert_int_equal(faults.count, 1);

@@ -197,10 +197,10 @@ static void each_wrong_value_is_told(void **state)
     } cases[] = {
         {"\"seldinger_session\":\t1", "\"seldinger_session\":\t2", "1 to 1"},
         {"\"trainee\":", "\"trainer\":", "unknown key 'trainer'"},
-        {"\"device\":", "\"trainee\":", "stands there twice"},
+        {"\"device\":", "\"trainee\":", "duplicate key"},
         {"2025-11-01T12", "2025-11-1T12:", "'date' is"},
         {"\"steps\":\t1200", "\"steps\":\t12.5", "a whole number"},
-        {"\"steps\":\t1200", "\"steps\":\t-3", "is -3; 0 to"},
+        {"\"steps\":\t1200", "\"steps\":\t-3", "is -3; expected 0 to"},
         {"\"steps\":\t1200", "\"steps\":\t1e400", "'recording.steps'"},
         {"\"step_ms\":\t1", "\"step_ms\":\t0", "'recording.step_ms'"},
         {"\"state\":\t\"reached\"", "\"state\":\t\"won\"", "'score.state' is 'won'"},
@@ -208,8 +208,8 @@ static void each_wrong_value_is_told(void **state)
         {"\"kind\":\t\"contrast\"", "\"kind\":\t\"laughter\"", "'events.kind'"},
         {"\"path_mm\":", "\"path_m\":", "unknown key 'path_m'"},
         {"\"efficiency\":\t", "\"efficiency\":\t9", "'score.efficiency'"},
-        {"\"error_total\":\t", "\"error_total\":\t7", "the errors' counts make"},
-        {"\"buckling\":\t{", "\"buckling\":\t[{", "is no JSON"},
+        {"\"error_total\":\t", "\"error_total\":\t7", "the sum of the error counts"},
+        {"\"buckling\":\t{", "\"buckling\":\t[{", "is not JSON"},
     };
     static Session got;
     int wrong = 0;

@@ -58,7 +58,7 @@ static void what_is_no_folder_is_refused(void **state)
         faults_clear(&faults);
         assert_false(session_folder(in_folder(wrong[i]), out, sizeof out, &faults));
         assert_int_equal(faults.count, 1);
-        assert_non_null(strstr(faults.text[0], "cannot take sessions: Not a directory"));
+        assert_non_null(strstr(faults.text[0], "cannot store sessions: Not a directory"));
     }
     faults_clear(&faults);
     assert_false(session_folder(far_too_long, out, sizeof out, &faults));
