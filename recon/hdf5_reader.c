@@ -1,4 +1,4 @@
-// The rules stand in the header. What of the library is relied upon: creation lists, links and types are read without reading data or opening files.
+// The rules are in the header. They rely on the library reading creation lists, links and types without reading data or opening files.
 #define ZLIB_CONST
 #include "recon/hdf5_reader.h"
 
@@ -35,7 +35,7 @@ enum { MOST_PATH = 256 };
 
 // --- opening ---
 
-// The library's closing at exit, which writes nothing of what was read, stumbles over what it leaves of a damaged file ("infinite loop closing library").
+// The library's clean-up at exit, which writes nothing, can fail on what remains of a damaged file ("infinite loop closing library").
 static void be_silent(Hdf5Reader *reader)
 {
     H5dont_atexit();      // where it is not in use yet
@@ -44,7 +44,8 @@ static void be_silent(Hdf5Reader *reader)
 
 // --- rehearsal ---
 
-// For a child that does what the library may not survive. A broken heap can also leave it waiting for ever; a starved machine takes seconds for milliseconds of work.
+// Time limit of the child process that does what the library may not survive: a corrupted heap can also make it hang, and a loaded machine needs
+// seconds for milliseconds of work.
 static void be_expendable(void) { process_be_expendable(5, 60); }
 
 static herr_t look_at_attribute(hid_t object, const char *name, const H5A_info_t *info, void *context)
@@ -79,7 +80,8 @@ static herr_t look_at_object(hid_t file, const char *name, const H5O_info_t *inf
     return 0;
 }
 
-// Whether the library (1.10) survives the file's structure: of damaged sizes in headers without checksums it overruns its memory. A child looks at all of it first.
+// Whether the library (1.10) survives the file's structure: damaged sizes in headers without checksums make it overrun its memory. A child process
+// reads the whole structure first.
 static bool is_survived(Hdf5Source *source)
 {
     int status = 0;
@@ -95,10 +97,10 @@ static bool is_survived(Hdf5Source *source)
     }
     while (child > 0 && waitpid(child, &status, 0) < 0 && errno == EINTR)
         continue;
-    return child < 0 || (WIFEXITED(status) && WEXITSTATUS(status) == 0);      // where no child can be made, there is no rehearsal
+    return child < 0 || (WIFEXITED(status) && WEXITSTATUS(status) == 0);      // without a child process there is no rehearsal
 }
 
-// Takes the source's file.
+// Takes ownership of the source's file.
 static Hdf5Reader *open_source(const Hdf5Source *source, bool has_rehearsal, const char *name, const char *needs, Faults *faults)
 {
     if (!heap_has_room(HEAP_ROOM_OF_HDF5))
@@ -126,7 +128,7 @@ static Hdf5Reader *open_source(const Hdf5Source *source, bool has_rehearsal, con
 Hdf5Reader *hdf5_reader_open(const char *path, const char *needs, Faults *faults)
 {
     struct stat status;
-    int file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);     // not to wait for a pipe's other end
+    int file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);     // do not block on a pipe
     int reason = file < 0 ? errno : 0;
     if (file < 0 || fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
         faults_add(faults, path, 0, 0, "cannot be opened as a regular file; %s", needs);
@@ -151,7 +153,7 @@ void hdf5_reader_close(Hdf5Reader *reader)
         H5Fclose(reader->file);
     if (reader->source.file >= 0)
         close(reader->source.file);
-    // what seemed to lack, or to be damaged, was not read
+    // datasets that seemed missing or damaged were only unreadable
     if (reader->source.reason) {
         reader->faults->count = reader->faults_before;
         faults_add(reader->faults, reader->name, 0, 0, "cannot be read: %s", strerror(reader->source.reason));
@@ -248,7 +250,7 @@ static void print_size(char text[80], int rank, const uint64_t *size)
     snprintf(text + used, 80 - (size_t)used, ")");
 }
 
-// Fills in what was found.
+// Fills in the shape found.
 static bool has_shape(const Hdf5Reader *reader, hid_t space, Hdf5Dataset *dataset)
 {
     hsize_t found[H5S_MAX_RANK] = {0};
@@ -287,13 +289,13 @@ static bool lies_in_file(const Hdf5Reader *reader, haddr_t address, hsize_t byte
     return address != HADDR_UNDEF && bytes <= reader->source.length && address <= reader->source.length - bytes;
 }
 
-// How a dataset's chunks are packed: not at all, by deflate, or by shuffle and then deflate.
+// How a dataset's chunks are compressed: not at all, by deflate, or by shuffle followed by deflate.
 typedef struct Packing {
     int filter_count;
     bool is_shuffled;
 } Packing;
 
-// NULL, or what is wrong. A chunk says with a bit for each filter whether it was left out.
+// NULL, or what is wrong. Each chunk has a bit for each filter that was skipped.
 static const char *find_packing(hid_t creation, size_t value_bytes, Packing *packing)
 {
     static const char *const other = "is compressed by filters other than deflate, or shuffle followed by deflate (`h5repack -f NONE IN OUT` decompresses it)";
@@ -314,9 +316,9 @@ static const char *find_packing(hid_t creation, size_t value_bytes, Packing *pac
 
 static const char huge[] = "has more or larger chunks than the file holds, or than the limits (262144, 16 GiB)";
 
-// Of a dataset, in values and bytes.
+// Sizes of a dataset, in values and bytes.
 typedef struct Chunks {
-    hsize_t size[3], bytes, count;       // of one, of one, of all
+    hsize_t size[3], bytes, count;       // of a value, of a chunk, of the whole
 } Chunks;
 
 static const char *count_chunks(hid_t creation, const Hdf5Dataset *dataset, hsize_t value_bytes, Chunks *chunks)
@@ -339,10 +341,10 @@ static void next_chunk(const Chunks *chunks, const Hdf5Dataset *dataset, hsize_t
         at[k] = 0;
 }
 
-// No chunk of deflate's is much longer than its bytes: a longer one is none.
+// Deflate never makes a chunk much longer than its contents, so a longer one is refused.
 static hsize_t most_stored(const Chunks *chunks) { return chunks->bytes + chunks->bytes / 1000 + 100; }
 
-// Each chunk is there with all its bytes: the library takes as many as the index says, and reads as many as the shape says. NULL, or what is wrong.
+// Checks that each chunk exists with all its bytes: the library allocates by the index and reads by the shape. NULL, or what is wrong.
 static const char *chunk_trouble(Hdf5Reader *reader, hid_t set, hid_t creation, const Hdf5Dataset *dataset, hsize_t value_bytes)
 {
     hsize_t at[3] = {0}, all_stored = 0, wide = value_bytes > sizeof(double) ? value_bytes : sizeof(double);
@@ -385,7 +387,7 @@ static const char *contiguous_trouble(Hdf5Reader *reader, hid_t set, uint64_t by
     return NULL;
 }
 
-// NULL, or why a dataset's bytes do not lie in this file as a recording's and a tree's do.
+// NULL, or why a dataset's bytes are not stored in this file in a supported layout.
 static const char *storage_trouble(Hdf5Reader *reader, hid_t set, const Hdf5Dataset *dataset, size_t value_bytes)
 {
     hid_t creation = H5Dget_create_plist(set);
@@ -454,9 +456,10 @@ static bool is_finite(const Hdf5Reader *reader, const Hdf5Dataset *dataset, cons
     return true;
 }
 
-// --- unpacking ---
+// --- decompression ---
 
-// Of exactly as many bytes, by zlib itself: the library's filter takes what a stream claims. False where it gives fewer or more, or has a tail.
+// Inflates to exactly `length` bytes with zlib itself, since the library's filter trusts the stream. False if the stream gives fewer or more bytes,
+// or has a tail.
 static bool inflate_exactly(const void *packed, size_t packed_bytes, unsigned char *out, size_t bytes)
 {
     unsigned char beyond;
@@ -464,7 +467,7 @@ static bool inflate_exactly(const void *packed, size_t packed_bytes, unsigned ch
     if (inflateInit(&stream) != Z_OK)
         return false;
     int end = inflate(&stream, Z_FINISH);
-    if (end == Z_BUF_ERROR && stream.avail_out == 0) {        // all that is due is there; whether it is all there is shows with room for one byte more
+    if (end == Z_BUF_ERROR && stream.avail_out == 0) {        // all expected bytes are there; one more byte of space shows whether the stream ends here
         stream.next_out = &beyond;
         stream.avail_out = 1;
         end = inflate(&stream, Z_FINISH);
@@ -474,7 +477,7 @@ static bool inflate_exactly(const void *packed, size_t packed_bytes, unsigned ch
     return good;
 }
 
-// The bytes of `count` values of which all first bytes stand first, then all second ones …
+// Undoes `shuffle`: the input holds the first bytes of all `count` values, then all second bytes, and so on.
 static void unshuffle(const unsigned char *from, size_t count, size_t value_bytes, unsigned char *to)
 {
     for (size_t byte = 0; byte < value_bytes; byte++)
@@ -482,7 +485,7 @@ static void unshuffle(const unsigned char *from, size_t count, size_t value_byte
             to[i * value_bytes + byte] = from[byte * count + i];
 }
 
-// A chunk's values to where they belong among the dataset's; at its ends chunks are cut off. Dimensions that a dataset does not have count as 1.
+// Copies a chunk's values to their place in the dataset; chunks at its ends are clipped. Missing dimensions count as 1.
 static void place_chunk(const Hdf5Dataset *dataset, const Chunks *chunks, const hsize_t at[3], size_t value_bytes, const unsigned char *chunk, unsigned char *out)
 {
     hsize_t size[3] = {1, 1, 1}, part[3] = {1, 1, 1}, used[3], first[3] = {0};
@@ -500,7 +503,7 @@ static void place_chunk(const Hdf5Dataset *dataset, const Chunks *chunks, const 
                    used[2] * value_bytes);
 }
 
-// What one chunk passes through: as it is stored, inflated, in order.
+// Buffers of one chunk: as stored, inflated, unshuffled.
 typedef struct Unpacking {
     Packing packing;
     Chunks chunks;
@@ -508,7 +511,7 @@ typedef struct Unpacking {
     unsigned char *stored, *shuffled, *plain;
 } Unpacking;
 
-// `at`: its first value. False where it is damaged.
+// `at`: its first value. False if it is damaged.
 static bool unpack_chunk(const Unpacking *u, hid_t set, const hsize_t at[3])
 {
     const unsigned deflated = 1U << (u->packing.filter_count - 1);
@@ -548,7 +551,7 @@ static bool unpack_all(Unpacking *u, hid_t set, const Hdf5Dataset *dataset, unsi
     return good;
 }
 
-// Values as they are stored, then in the type that is wanted, both in the same memory.
+// Values as stored, converted in place to the requested type.
 static bool read_packed(hid_t set, hid_t creation, const Hdf5Dataset *dataset, void *out)
 {
     hid_t type = H5Dget_type(set), wanted = memory_type(dataset->type);
@@ -619,7 +622,7 @@ static char *fixed_text(const Hdf5Reader *reader, hid_t type, hid_t set, hid_t a
     return NULL;
 }
 
-// In the other process: what the library reads goes into the pipe, ended by a zero byte as a sign that it is whole.
+// In the child process: writes what the library reads into the pipe; a zero byte marks the end.
 static _Noreturn void send_variable_text(hid_t type, hid_t attribute, int end)
 {
     char *text = NULL;
@@ -645,8 +648,8 @@ static char *receive_text(int end)
     return NULL;
 }
 
-// As other writers have it (h5py). It lies in a heap without a checksum, and sizes that are wrong there make the library (1.10) write beyond its memory: it is read by
-// a process of its own, which may end as it likes.
+// A string of variable length, as h5py writes it. Its heap has no checksum, and wrong sizes there make the library (1.10) write beyond its memory, so
+// a child process reads it.
 static char *variable_text(hid_t type, hid_t attribute)
 {
     int ends[2];
@@ -683,7 +686,7 @@ char *hdf5_text(Hdf5Reader *reader, const char *path)
     return text;
 }
 
-// -1 where there is none.
+// -1 if there is none.
 static hid_t open_attribute(const Hdf5Reader *reader, const char *object, const char *name)
 {
     bool is_here = strcmp(object, "/") == 0 || link_kind(reader, object) == LINK_HARD;

@@ -1,5 +1,5 @@
-// What the guarded reader lets the HDF5 library see of a file: bytes at an address, from a file or from memory, never written, never beyond the end. A driver of our
-// own, because the library's keep a buffer of metadata (H5F__accum_read) that damaged sizes lead to a null pointer.
+// The HDF5 library's access to a file in the guarded reader: bytes at an address, from a file or memory, read only, never beyond the end. It is our
+// own driver, because the library's drivers keep a metadata buffer (H5F__accum_read) in which damaged sizes lead to a null pointer.
 #ifndef SELDINGER_RECON_HDF5_SOURCE_H
 #define SELDINGER_RECON_HDF5_SOURCE_H
 
@@ -12,10 +12,10 @@ typedef struct Hdf5Source {
     int file;                // an open descriptor, -1: memory
     const void *bytes;
     size_t length;           // of either
-    int reason;              // errno of a read that failed; 0: none has
+    int reason;              // errno of a failed read; 0: none
 } Hdf5Source;
 
-// Opens it for reading; the source must stay, where it is, until the file is closed. Negative where the library refuses it.
+// Opens the source for reading; it must neither move nor end before the file is closed. Negative if the library refuses it.
 hid_t hdf5_source_open(Hdf5Source *source);
 
 #endif

@@ -1,6 +1,6 @@
-// Trees and models in HDF5. Both directions go through memory (writing by the core driver, whose image we keep): a full disk is then our own write's
-// error and not one in the middle of the library, the same code serves the fuzz target, and a file cannot change under us.
-// Metadata are written in the 1.8 format, whose checksums make the library refuse damaged headers.
+// Trees and models in HDF5. Both directions go through memory (writing by the core driver, whose image we keep): a full disk is then an error of our
+// own write rather than one inside the library, the same code serves the fuzz target, and the file cannot change meanwhile. Metadata are written in
+// the 1.8 format, whose checksums make the library refuse damaged headers.
 #include "recon/tree_file.h"
 
 #include "base/heap.h"
@@ -24,7 +24,7 @@ typedef struct Reader {
 } Reader;
 
 enum { CENTER, RADIUS, DIRECTION, HEIGHT, PARENT, KIND, POINT, POINT_OFFSET, BLOB_CENTER, BLOB_WIDTH, BLOB_OFFSET, ERROR_MM, BLOB_AMPLITUDE, COLUMN_COUNT };
-static const Hdf5Dataset columns[COLUMN_COUNT] = {     // as the contract says them
+static const Hdf5Dataset columns[COLUMN_COUNT] = {     // as docs/file-formats.md specifies
     [CENTER] = {"/nodes/center", HDF5_DOUBLE, 2, {0, 3}, false},
     [RADIUS] = {"/nodes/radius", HDF5_DOUBLE, 1, {0}, false},
     [DIRECTION] = {"/nodes/direction", HDF5_DOUBLE, 2, {0, 3}, false},
@@ -50,7 +50,7 @@ static bool expect_rows(const Reader *reader, const Hdf5Dataset *column, uint64_
     return false;
 }
 
-// An empty text where there is none.
+// An empty string if absent.
 static char *read_text(const Reader *reader, const char *key)
 {
     char *text = hdf5_text_attribute(reader->file, "/", key);
@@ -174,7 +174,7 @@ static bool write_column(hid_t file, const char *path, hid_t type, int rank, int
 {
     hsize_t size[2] = {(hsize_t)rows, 3};
     hid_t space = H5Screate_simple(rank, size, NULL), plist = H5Pcreate(H5P_DATASET_CREATE);
-    bool good = space >= 0 && plist >= 0 && H5Pset_obj_track_times(plist, false) >= 0;   // no clock in the file: same content, same bytes
+    bool good = space >= 0 && plist >= 0 && H5Pset_obj_track_times(plist, false) >= 0;   // no time stamps: same content, same bytes
     hid_t dataset = good ? H5Dcreate2(file, path, type, space, H5P_DEFAULT, plist, H5P_DEFAULT) : -1;
     good = dataset >= 0 && (rows == 0 || H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0);
     if (dataset >= 0)
@@ -246,8 +246,8 @@ static bool write_tree(hid_t file, const VesselTree *tree, const TreeFileInfo *i
     return good;
 }
 
-// The core driver frees the file's memory when the file is closed: by then it is complete. We take it instead. (H5Fget_file_image of an
-// open file clears the superblock's flags without renewing its checksum; what it returns opens nowhere.)
+// The core driver frees the file's memory when the file is closed: by then it is complete, so we take the memory over. (H5Fget_file_image of an open
+// file clears the superblock's flags without renewing its checksum; no program opens what it returns.)
 typedef struct Image {
     unsigned char *bytes;
     size_t capacity;

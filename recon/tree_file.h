@@ -1,23 +1,23 @@
-// Trees and models as HDF5 files (shared/CONTRACT.md "Tree and model"), float64, mm. Loading checks every size, type and rule of
-// vessel_tree_validate before it trusts the file; saving writes beside and renames, so that no half file is left.
+// Trees and models as HDF5 files (docs/file-formats.md, "Trees and models"), float64, mm. Loading checks every size, type and rule of
+// vessel_tree_validate before it trusts the file; saving writes a temporary file and renames it, so no partial file remains.
 #ifndef SELDINGER_RECON_TREE_FILE_H
 #define SELDINGER_RECON_TREE_FILE_H
 
 #include "geom/vessel_tree.h"
 
 typedef struct TreeFileInfo {  // root attributes
-    char *source;            // what it was made from
+    char *source;            // the input files
     char *parameters;        // YAML text of all parameters
     char *created_by;        // "seldinger VERSION segment" …
 } TreeFileInfo;
 
 // NULL with faults. `info` may be NULL; free it with tree_file_info_free.
 VesselTree *tree_file_load(const char *path, TreeFileInfo *info, Faults *faults);
-// The same from memory, without the rehearsal by a child process (recon/hdf5_reader.h); `name` stands in the messages.
+// The same from memory, without the rehearsal by a child process (recon/hdf5_reader.h); `name` is used in messages.
 VesselTree *tree_file_parse(const void *bytes, size_t length, const char *name, TreeFileInfo *info, Faults *faults);
 bool tree_file_save(const VesselTree *tree, const TreeFileInfo *info, const char *path, Faults *faults);
 void tree_file_info_free(TreeFileInfo *info);
-// The number on the line `key: number` of the parameters (any indentation); `otherwise` where there is none.
+// The number on the line `key: number` of the parameters (any indentation); `otherwise` if absent.
 double tree_file_number(const TreeFileInfo *info, const char *key, double otherwise);
 
 #endif

@@ -9,10 +9,10 @@
 #include <string.h>
 
 static const double BASE_APART = 0.75, BASE_REACH = 2;   // of the base blobs, in local radii: alone on a line or about a centre they have slope 2/r
-// The mean distance that is aimed at where single points are to be within target_mm.
+// The target for mean distances, if single points are to be within target_mm.
 static const double TARGET_SHARE = 0.2;
 static const double level_reach[] = {1.4, 1.4, 1, 1, 0.7, 0.7, 0.5, 0.35};
-// The loss gets sharper from level to level: with a sharp one from the start a wall that the base misses by much is an outlier for ever.
+// The loss gets sharper from level to level: with a sharp one from the start, a wall far from the base remains an outlier.
 static const double base_knee = 1, level_knee[] = {0.35, 0.35, 0.35, 0.25, 0.25, 0.25, 0.25, 0.25};
 enum { LEVELS = sizeof level_reach / sizeof level_reach[0], LAST_SWEEPS = 4 };
 
@@ -38,7 +38,7 @@ static bool check_options(const FieldFitOptions *o, Faults *faults)
 
 // --- The base ---
 
-// Whether a base blob of a near node stands too close to x for another one.
+// Whether a base blob of a nearby node is too close to x for another one.
 static bool is_crowded(const FieldModel *model, const int *first, const int *next, int node, Vec3 x)
 {
     const VesselTree *tree = model->tree;
@@ -127,7 +127,7 @@ static bool fit(FieldModel *model, const FieldFitOptions *options, const Progres
         return false;
     all_due(model);
     model->knee = base_knee;
-    // the amplitudes alone come first: places that start out far from the solution end up in bad ones, which no finer blob mends
+    // first the amplitudes alone: centres that start far from the solution end in bad minima that no finer blob corrects
     for (int k = 0; k < 3; k++) {
         model->amplitudes_only = k < 2;
         sweep(&s, 3);

@@ -3,9 +3,10 @@
 // 1. A base: blobs of R = 2 r every 0.75 r along the tree (sacs 1.5 r), and upstream of an open inlet.
 // 2. Levels of ever smaller blobs, R = 1.4 r to 0.35 r: one where the residual, averaged over its support, is more than the tolerance and than the noise.
 // 3. After each level amplitudes, centres and radii of all blobs are fitted to all rows by Levenberg and Marquardt's method, region by region; each region
-//    accepts its own steps, so that no part of a tree waits for, or suffers from, another.
-// Rows are the data (distance f / |grad f|), their slope (|grad f| near 2/r keeps the field near a scaled distance) and one-sided guards: in the lumen
-// along the tree and between axis and wall, outside where neither tube nor data are. A link longer than the sum of its two radii is no lumen and stays shut.
+//    accepts its own steps, so that no part of a tree delays or degrades another.
+// Rows are the data (distance f / |grad f|), their slope (|grad f| near 2/r keeps the field near a scaled distance) and one-sided guards: in the
+// lumen along the tree and between axis and wall, outside where neither tube nor data are. A link longer than the sum of its two radii is not lumen
+// and stays closed.
 #ifndef SELDINGER_RECON_FIT_FIELD_FIT_H
 #define SELDINGER_RECON_FIT_FIELD_FIT_H
 
@@ -16,15 +17,15 @@ typedef struct FieldFitOptions {
     // The mean residual below which no blob is added: a fifth of target_mm where that is given, else the larger of tolerance_voxels and tolerance; without a
     // voxel tolerance_unknown
     double target_mm;        // [mm] that points should be near the wall; 0: not given
-    double voxel_mm;         // of the angiogram; 0: not known, as of a mesh
+    double voxel_mm;         // of the angiogram; 0: unknown (for example, a mesh)
     double tolerance_voxels; // 0.05
     double tolerance;        // in local radii, 0.004
     double tolerance_unknown;   // in local radii, 0.02
-    double least_reach_voxels;  // no blob's reach is less than what the image resolves; 0.8
-    double significance;     // a mean residual counts above this many standard deviations of the noise's mean; 6.5
+    double least_reach_voxels;  // smallest reach of a blob, in voxels (image resolution); 0.8
+    double significance;     // significance of a mean residual, in standard deviations of the noise's mean; 6.5
     int levels;              // of refinement, 0 to 8; 8
     int threads;             // 0: all cores; the result does not depend on it
-    int64_t *left_out;       // set to the number of points that lie in another vessel's lumen, which are not fitted; NULL: not asked
+    int64_t *left_out;       // receives the number of points in another vessel's lumen, which are not fitted; may be NULL
 } FieldFitOptions;
 
 FieldFitOptions field_fit_default_options(void);

@@ -1,6 +1,8 @@
-// A candidate stands on each data point p: the residuals of the data near by, weighted by what a blob of reach R at p would be there, w = (1 - d^2/R^2)^3,
-// have the mean m = sum w e / sum w and, for noise of standard deviation s, the deviation s sqrt(sum w^2) / sum w. s is measured at each node, as the spread
-// of the residuals about their mean over a third of the radius: over more, what the field misses at a crotch passes for noise, and no blob comes to mend it. Residuals count as they do in the fit: those beyond the loss's knee less and less. Candidates beyond tolerance and noise are taken by size, none within 0.8 R of one taken before.
+// Each data point p is a candidate: the residuals of the data near by, weighted by what a blob of reach R at p would be there, w = (1 - d^2/R^2)^3,
+// have the mean m = sum w e / sum w and, for noise of standard deviation s, the deviation s sqrt(sum w^2) / sum w. s is measured at each node, as the
+// spread of the residuals about their mean over a third of the radius: over a larger region, misfit at a bifurcation would count as noise and no blob
+// would be added. Residuals count as they do in the fit: those beyond the loss's knee less and less. Candidates beyond tolerance and noise are taken
+// by size, none within 0.8 R of one taken before.
 #include "recon/fit/field_refine.h"
 
 #include "base/parallel.h"
@@ -10,7 +12,7 @@
 
 // A blob's centre stands this share of its reach inside the wall, and no two of a level nearer than this share.
 static const double INSIDE = 0.25, APART = 0.8;
-// Where fewer points than this are to be had for each blob, more blobs would only follow the noise.
+// With fewer points than this per blob, more blobs would only fit the noise.
 static const double POINTS_A_BLOB = 3;
 // Over which the noise is measured, in local radii; twice that where points are few.
 static const double NOISE_REACH = 0.35;
@@ -102,7 +104,7 @@ static int data_of(const Job *job, int node)
     return data;
 }
 
-// How many points of equal weight the mean is worth.
+// The effective number of points of the weighted mean.
 static double points_of(const Mean *m) { return m->weight * m->weight / fmax(m->weight2, 1e-12); }
 
 static void measure_noise(void *context, long index)
@@ -161,7 +163,7 @@ static void find_candidates(void *context, long index)
                 list[found++] = (Candidate){fabs(mean) / least, node, x, mean};
         }
     }
-    // those that a larger one of the same node stands too near to are out in any case
+    // candidates too near to a larger one of the same node are excluded anyway
     if (found > 1)
         qsort(list, (size_t)found, sizeof *list, compare_candidates);
     int kept = 0;

@@ -1,12 +1,13 @@
-// Which rows there are.
+// The rows of the fit.
 //
-// Data: the nodes' points, each in the cell that it lies in; the root's once more upstream of an open inlet, so that the wall is a tube through its plane.
-// A point well inside another node's tube (half its radius) is no wall: rays cast from a parent hit the far wall of a child's mouth, and the reverse.
+// Data: the nodes' points, each in the cell that it lies in; the root's once more upstream of an open inlet, so that the wall is a tube through its
+// plane. A point well inside another node's tube (half its radius) is not wall: rays cast from a parent hit the far wall of a child's mouth, and vice
+// versa.
 //
-// Guards inside: every node's centre, and along a lumen's link; between a point and its axis. Their bound is half of what a round vessel's scaled field,
-// 1 - (d/r)^2, has there, at most; in a cell wider than the link the field rises as slowly as that cell's, 2/r a millimetre.
-// Guards outside: beyond a point, along the normal, where neither a tube nor data of a node near by are; and on a ring where a section has no points.
-// They act only where they are violated. Without them a fit of signed blobs grows sheets where nothing speaks against them.
+// Guards inside: every node's centre, and along a lumen's link; between a point and its axis. Their bound is half of what a round vessel's scaled
+// field, 1 - (d/r)^2, has there, at most; in a cell wider than the link the field rises as slowly as that cell's, 2/r a millimetre. Guards outside:
+// beyond a point, along the normal, where neither a tube nor data of a node near by are; and on a ring where a section has no points. They act only
+// where they are violated. Without them a fit of signed blobs grows spurious sheets where there are no data.
 #include "recon/fit/field_rows.h"
 
 #include "base/parallel.h"
@@ -21,12 +22,12 @@
 static const double MOST_INSIDE = 1.5;
 // Of a tube's radius: points nearer to its axis are not wall.
 static const double LUMEN_POINT = 0.5;
-// A sac is no ball: only this share of it is lumen for certain, beyond that its data say where it ends.
+// An aneurysm is not a ball: only this share of its radius is certainly lumen; beyond that its data decide.
 static const double SAC_BALL = 0.6;
 // Cosine of the angle about a direction from a sac's centre within which a point of its wall says how far it reaches there.
 static const double SAC_CONE = 0.97;
-// What a guard outside asks for, at most: enough that no sheet closes there. Between two walls a smooth field gets no deeper, and guards that ask for the
-// scaled distance there push the walls apart.
+// The largest bound of an outside guard: enough to prevent a closed sheet there. Between two walls a smooth field is not deeper, and guards that
+// demand the scaled distance would push the walls apart.
 static const double OUTSIDE = 0.15;
 enum { GUARD_EVERY = 3, RING = 12, LINK_GUARDS = 4 };
 
@@ -96,7 +97,7 @@ static double share_of_tube(const VesselTree *tree, int node, Vec3 x)
         return vec3_distance(x, b) / tree->radius[node];
     Vec3 a = tree->center[parent], e = vec3_sub(b, a);
     double length2 = vec3_norm2(e), t = length2 > 0 ? fmax(0, fmin(1, vec3_dot(vec3_sub(x, a), e) / length2)) : 1;
-    // a narrow branch's link does not widen towards its parent's axis
+    // do not widen a narrow branch's link towards its parent's axis
     double r = tree->radius[node] + (1 - t) * fmin(0, tree->radius[parent] - tree->radius[node]);
     return vec3_distance(x, vec3_mix(a, b, t)) / r;
 }
@@ -140,7 +141,7 @@ static bool is_clear(const VesselTree *tree, int node, Vec3 x, double clear)
 }
 
 // The same near the node whose cell of the whole tree x lies in: just beyond a vessel's wall another's lumen may begin, a sibling's or that of the
-// vessel's own way back, which are not near in the tree but share blobs with it.
+// vessel's own return path, which are not near in the tree but share blobs with it.
 static bool is_outside(const Job *job, int node, Vec3 x, double clear)
 {
     if (!is_clear(job->tree, node, x, clear))
@@ -354,7 +355,7 @@ static Row *collect_rows(const Job *job, int *first)
     }
     Row *row = malloc(((size_t)total + 1) * sizeof *row);
     int sum = 0;
-    for (int i = 0; i < n; i++) {   // first[i + 1] becomes where the next row of cell i goes, at last its end
+    for (int i = 0; i < n; i++) {   // first[i + 1] becomes the position of the next row of cell i, finally its end
         int own = first[i + 1];
         first[i + 1] = sum;
         sum += own;

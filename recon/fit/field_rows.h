@@ -1,7 +1,7 @@
-// The rows of the whole-tree fit, node by node: what the field should be at data points and at guards. Inside recon; see field_fit.h.
+// The rows of the whole-tree fit, node by node: the target values of the field at data points and guards. Internal to recon; see field_fit.h.
 //
-// A row belongs to the node in whose power cell it lies, because that node's field answers there. Single precision, relative to the node's centre,
-// structure of arrays; data and guards are each padded to whole lanes by rows of weight 0.
+// A row belongs to the node in whose power cell it lies, because that node's field is evaluated there. Single precision, relative to the node's
+// centre, structure of arrays; data and guards are each padded to whole lanes by rows of weight 0.
 #ifndef SELDINGER_RECON_FIT_FIELD_ROWS_H
 #define SELDINGER_RECON_FIT_FIELD_ROWS_H
 
@@ -25,12 +25,12 @@ typedef struct FieldRows {
     int *first;              // (N+1) node i has tiles first[i] … first[i+1]-1
     RowTile *tile;
     float *memory;           // of all tiles
-    int64_t dropped;         // data points left out: inside another tube's lumen
+    int64_t dropped;         // data points left out because they lie in another tube's lumen
 } FieldRows;
 
-// A link of the tree is lumen where its two balls meet; a sac is no ball and may reach half as far again.
+// A link of the tree is lumen if its two balls meet; an aneurysm is not a ball and may reach half as far again.
 bool field_link_is_lumen(const VesselTree *tree, int node);
-// How far upstream of an open inlet the wall is carried on, in the root's radii.
+// How far the wall is continued upstream of an open inlet, in the root's radii.
 #define FIELD_INLET_RADII 2.2
 bool field_rows_create(FieldRows *rows, const VesselTree *tree, int threads);
 void field_rows_free(FieldRows *rows);

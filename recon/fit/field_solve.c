@@ -1,9 +1,9 @@
-// Levenberg and Marquardt's method on a region's blobs at a time, the others standing still.
+// Levenberg and Marquardt's method on one region's blobs at a time, with the others fixed.
 //
-// Rows, in mm: data  e = f/|g|, by Geman and McClure's loss;  slope  e = s r (r |g| / 2 - 1);  guards  e = w r/2 (f - clamp(f, low, high)). A linearisation holds
-// |g| and the direction of g. A region is some two dozen blobs that follow each other along the tree; its rows are those of all nodes that see one of
-// them, so that a step that is accepted lowers the sum of squares of the whole tree, whatever the other regions do. Regions that share a node's rows are
-// solved one after the other, in the order of their colours: the result does not depend on the threads.
+// Rows, in mm: data e = f/|g|, by Geman and McClure's loss; slope e = s r (r |g| / 2 - 1); guards e = w r/2 (f - clamp(f, low, high)). A
+// linearisation holds |g| and the direction of g. A region is some two dozen blobs that follow each other along the tree; its rows are those of all
+// nodes that see one of them, so an accepted step lowers the sum of squares of the whole tree, independently of the other regions. Regions that share
+// a node's rows are solved one after the other, in the order of their colours: the result does not depend on the threads.
 #include "base/parallel.h"
 #include "base/same_math.h"
 #include "recon/fit/field_model.h"
@@ -14,7 +14,7 @@
 
 enum { REGION_BLOBS = 28, UNKNOWNS = 5};
 static const double LEAST_SLOPE = 0.5;
-// Priors: a blob's place and size are held to where it was put, as firmly as a few points a hundredth of a radius off would.
+// Priors: a blob's position and size are tied to their initial values, as strongly as by a few points a hundredth of a radius off.
 static const double PRIOR_PLACE = 0.02, PRIOR_AMPLITUDE = 0.03, LEAST_BASE = 0.1;
 
 typedef struct TileWork {    // a tile's part in a region's solution
@@ -81,7 +81,7 @@ static int find_blobs(const Sweep *sweep, int region, const RowTile *tile, int *
     return count;
 }
 
-// The sums of the blobs that stand still.
+// The sums of the fixed blobs.
 static void sum_still(const Sweep *sweep, int region, TileWork *tw)
 {
     const FieldModel *model = sweep->model;
@@ -205,13 +205,13 @@ static double energy(const Work *w, const FieldBlob *blob)
 
 // --- Normal equations ---
 
-// A tile's rows as they count in a linearisation: data, and those guards that are violated.
+// A tile's active rows in a linearisation: data, and violated guards.
 typedef struct Weighed {
     int data, rows;          // padded: D, D + guards
     float x[POINTS_MAX], y[POINTS_MAX], z[POINTS_MAX], scale[POINTS_MAX], bend[FIELD_TILE], n[3][FIELD_TILE];
 } Weighed;
 
-// Sums made; the residuals go to `residual` as the columns stand: data, guards, slopes.
+// Computes the sums; writes the residuals to `residual` in the order of the columns: data, guards, slopes.
 static void weigh_rows(const FieldModel *model, const TileWork *tw, Weighed *to, float *residual)
 {
     const RowTile *tile = tw->tile;
@@ -244,7 +244,7 @@ static void weigh_rows(const FieldModel *model, const TileWork *tw, Weighed *to,
 // A pair of blobs' block of the product, to the upper triangle of the matrix.
 static void add_pair(Work *w, int a, int b, const float *block, int stride)
 {
-    bool turned = a > b;     // as the numbers of a tile's blobs need not rise
+    bool turned = a > b;     // because the numbers of a tile's blobs need not be sorted
     double *to = w->matrix + (size_t)(UNKNOWNS * (turned ? b : a)) * (size_t)w->unknowns + (size_t)(UNKNOWNS * (turned ? a : b));
     for (int i = 0; i < UNKNOWNS; i++)
         for (int k = a == b ? i : 0; k < UNKNOWNS; k++)
@@ -311,7 +311,8 @@ static void linearise(Work *w)
 
 static double bound(double value, double most) { return fmax(-most, fmin(most, value)); }
 
-// `start`: the blob as the sweep found it, whose rows are known to FIELD_ROOM times its reach: beyond that the step would be judged without the rows it spoils.
+// `start`: the blob at the start of the sweep, whose rows are known up to FIELD_ROOM times its reach; beyond that the step would be judged without
+// the rows it worsens.
 static FieldBlob moved_by(const FieldBlob *b, const double *step, const FieldBlob *start)
 {
     FieldBlob to = *b;
@@ -423,7 +424,7 @@ static int compare_places(const void *a, const void *b)
     return (p->blob > q->blob) - (p->blob < q->blob);
 }
 
-// Neighbours in space get near numbers: a sac's many blobs all belong to one node.
+// Gives spatial neighbours near numbers, because an aneurysm's many blobs all belong to one node.
 static unsigned morton_of(const VesselTree *tree, const FieldBlob *b)
 {
     Vec3 x = vec3_scale(vec3_sub(b->birth, tree->center[b->owner]), 1 / tree->radius[b->owner]);
@@ -487,7 +488,7 @@ static bool is_due(const Sweep *s, const Region *region)
     return false;
 }
 
-// Colours: a region takes the first that none before it has on any of its nodes. `used` (N, WORDS) holds each node's colours as bits.
+// Graph colouring: a region takes the first colour not used on any of its nodes. `used` (N, WORDS) holds each node's colours as bits.
 static int colour_regions(const Sweep *s)
 {
     enum { WORDS = 4 };
@@ -506,7 +507,7 @@ static int colour_regions(const Sweep *s)
                 taken[word] |= used[(size_t)region->node[k] * WORDS + (size_t)word];
         while (colour < 64 * WORDS && taken[colour / 64] >> (colour % 64) & 1)
             colour++;
-        region->colour = colour;   // 64 * WORDS: alone, after all others
+        region->colour = colour;   // 64 * WORDS: processed alone, after all others
         for (int k = 0; k < region->nodes && colour < 64 * WORDS; k++)
             used[(size_t)region->node[k] * WORDS + (size_t)(colour / 64)] |= (uint64_t)1 << (colour % 64);
         colours = colour + 1 > colours ? colour + 1 : colours;

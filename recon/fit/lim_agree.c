@@ -39,7 +39,7 @@ void lim_frame(const VesselTree *tree, int node, Vec3 *e1, Vec3 *e2)
     *e2 = vec3_cross(d, *e1);
 }
 
-// From c along d to the wall; false where that is beyond the cell.
+// From c along d to the wall; false if that is beyond the cell.
 static bool find_wall(const VesselTree *tree, int node, const Blobby *model, Vec3 d, Vec3 *wall)
 {
     Vec3 c = tree->center[node];

@@ -15,7 +15,7 @@
 #include <string.h>
 
 enum { ARRAYS = 20 };
-// a gradient as short as this has no direction: its curvature counts nothing much
+// a gradient this short has no direction, so its curvature gets almost no weight
 static const float LEAST_GRADIENT2 = 1e-8f;
 
 // One kernel text, three compilations: base/simd.h says which runs. No fused multiply-add (-ffp-contract=off), one accumulator a lane: same bits.

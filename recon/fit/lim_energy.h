@@ -19,7 +19,7 @@ typedef struct LimPoints {
     float *g[3], *h[6];      // (padded) its gradient; its Hessian xx xy xz yy yz zz
     float *weight;           // (padded) of the residual's square in E_d
     float *bend;             // (padded) of kappa^2 in E_a
-    float *low, *high;       // (padded) where the field is welcome
+    float *low, *high;       // (padded) target interval of the field
     float *given[3];         // (padded) the data where they were measured, for lim_points_approach
     float *memory;           // all of the above
 } LimPoints;
@@ -35,25 +35,25 @@ typedef struct LimEnergy {
     double distance_slope[4], bend_slope[4];
 } LimEnergy;
 
-// All fields zero but bounds (0, 0). False where memory lacks. Points are to be set by the caller up to `count`.
+// All fields zero but bounds (0, 0). False if out of memory. Points are to be set by the caller up to `count`.
 bool lim_points_create(LimPoints *points, int count);
 void lim_points_free(LimPoints *points);
 // Sets the sums to -T, then adds what blob_add adds.
 void lim_points_reset(LimPoints *points, double iso_level);
-// Adds the blob's field, gradient and Hessian to the sums (sign 1), or takes it out (sign -1).
+// Adds the blob's field, gradient and Hessian to the sums (sign 1), or subtracts them (sign -1).
 void lim_points_add(LimPoints *points, const LimBlob *blob, double sign);
 // lim_points_reset and lim_points_add of all blobs, in one pass.
 void lim_points_sum(LimPoints *points, const LimBlob *blobs, int count, double iso_level);
 // Signed Taubin distance at each point from the sums as they are (all blobs added).
 void lim_points_taubin(const LimPoints *points, float *distance);
 
-// One step of every point (x, y, z) towards the foot of `given` on f = 0: down the gradient by f / |g|, no further than `longest`, then `slide`
-// times the way to `given` in the tangent plane. The sums are then to be made again.
+// One step of every point (x, y, z) towards the foot of `given` on f = 0: down the gradient by f / |g|, no further than `longest`, then by `slide`
+// times the offset to `given` in the tangent plane. The sums must be recomputed afterwards.
 void lim_points_approach(LimPoints *points, double longest, double slide);
 
-// After that, with the sums made: offset (padded), the signed distance of `given` from the foot, > 0 inside, 0 where no foot was found (further than 0.6
-// radii, aside of the normal, or off the surface by more than 0.05 radii); slope (padded), |grad f| at the foot, -1 where none was found; sets
-// low = high = -offset slope. The guards' bounds are to be set again.
+// After that, with the sums recomputed: offset (padded), the signed distance of `given` from the foot, > 0 inside, 0 if no foot was found (further
+// than 0.6 radii, aside of the normal, or off the surface by more than 0.05 radii); slope (padded), |grad f| at the foot, -1 if none was found; sets
+// low = high = -offset slope. The guards' bounds must be set again.
 void lim_points_feet(LimPoints *points, double radius, float *offset, float *slope);
 
 // With `blob` on top of the sums.
@@ -68,7 +68,7 @@ void lim_energy_residuals(const LimPoints *points, double beta, float *residual)
 // Dot products of four rows with four columns that stand `stride` apart, all of `length` entries, a multiple of LIM_LANES: dot (4, dot_stride), the
 // first four of each row are set.
 void lim_energy_gram(const float *rows, const float *columns, size_t stride, int length, double *dot, size_t dot_stride);
-// Solves by Cholesky: the matrix's upper triangle in factor (size, stride), lost; step (size): in the right-hand side, out the solution. False where it
+// Solves by Cholesky: the matrix's upper triangle in factor (size, stride), lost; step (size): in the right-hand side, out the solution. False if it
 // is not positive definite.
 bool lim_solve(double *factor, int size, int stride, double *step);
 // Dot product of two columns of `padded` entries.

@@ -1,15 +1,14 @@
-// The tree's side of LIM (Kerrien et al. 2017, 4.5): which points a node's model is fitted to, where it starts, and one job a node.
+// The tree's side of LIM (Kerrien et al. 2017, 4.5): the points to which a node's model is fitted, its start, and one job per node.
 //
-// Points are concatenated up to topological distance 2; where nodes stand closer than half a radius, as on imported centrelines, up to one
-// radius along the tree, so that overlap does not depend on spacing. The root's points are repeated upstream: without that a model
-// closes 1.4 to 1.7 r before the inlet.
-// Guards (ours): the centres of the nodes must be in the lumen, and a ring of points beyond the wall outside of it. They act only where violated;
-// they stop constrictions on the tool's way, and ghost lobes where points are missing, such as at the mouth of an untracked branch, which
-// one model would open and its neighbour cap.
-// Agreement (ours): on noisy points with holes neighbouring models stop at different places, one a bulge richer than the next. The second pass starts
-// from the first's models and adds points of the mixed wall, which all models around see, where the first's wall is further than AGREES from it.
-// Redoing every model instead costs a third more and gains little: p99 of the jump as a tool meets it on the angiogram's tubes 0.003 mm both ways.
-// Tried and lost: agreed points alone (the wall drifts 0.02 mm from the data, and out of the sac); starting afresh (1.3 times the jumps, more work).
+// Points are concatenated up to topological distance 2; where nodes stand closer than half a radius, as on imported centrelines, up to one radius
+// along the tree, so that overlap does not depend on spacing. The root's points are repeated upstream: without that a model closes 1.4 to 1.7 r
+// before the inlet. Guards (ours): the centres of the nodes must be in the lumen, and a ring of points beyond the wall outside it. They act only
+// where violated; they prevent constrictions in the tool's path, and ghost lobes where points are missing, for example at the mouth of an untracked
+// branch that one model would open and its neighbour close. Agreement (ours): on noisy points with holes neighbouring models stop at different
+// places, one a bulge richer than the next. The second pass starts from the first's models and adds points of the mixed wall, which all models around
+// see, where the first's wall is further than AGREES from it. Redoing every model instead costs a third more and gains little: p99 of the jump as a
+// tool meets it on the angiogram's tubes 0.003 mm both ways. Tried and rejected: agreed points alone (the wall drifts 0.02 mm from the data, and out
+// of the aneurysm); starting from scratch (1.3 times the jumps, more work).
 #include "recon/fit/lim_fit.h"
 
 #include "base/heap.h"
@@ -24,7 +23,7 @@
 
 enum { NEAR_CAPACITY = 256, GUARD_ANGLES = 12, GUARD_NODES = 6, SPHERE_DIRECTIONS = 48, LEAST_POINTS = 24 };
 
-// Models whose wall is nowhere further than this from what is agreed on stay as they are, in radii.
+// Models whose wall is within this distance of the agreed wall everywhere stay unchanged, in radii.
 static const double AGREES = 0.03;
 
 LimFitOptions lim_fit_default_options(void)
@@ -41,7 +40,7 @@ LimFitOptions lim_fit_paper_options(void)
     options.beta = 1e-3;
     options.target_mm = 0.3;
     options.max_loops = 5;
-    options.line_searches = 20;   // with 4 the repulsion's throw is never taken back and the new blob shrinks to nothing outside
+    options.line_searches = 20;   // with 4 the repulsion's displacement is never undone and the new blob vanishes outside
     options.weigh_distance = options.project_points = options.sweep_all_blobs = options.extend_inlet = options.guard_shape = options.agree = false;
     options.give_up_splits = 0;
     options.max_points = 1500;
@@ -76,7 +75,7 @@ typedef struct Near {
 typedef struct Gather {      // the memory of one job
     Near near[NEAR_CAPACITY];
     int near_count;
-    int own_count;           // the first of `near` give points
+    int own_count;           // the first of `near` contribute points
     Vec3 *point;
     int point_count, point_capacity;
     float *weight;           // (point_count), or NULL
@@ -90,10 +89,10 @@ typedef struct Gather {      // the memory of one job
     LimTube tube[NEAR_CAPACITY + 1];
     int tube_count;
     bool is_extended;        // the inlet's points were repeated upstream
-    double reach;            // points further from the node are left to other models
+    double reach;            // points further from the node belong to other models
 } Gather;
 
-// Breadth first, so `near` is sorted by hops; those that give points are moved to the front, order kept.
+// Breadth first, so `near` is sorted by hops; nodes that contribute points are moved to the front, in order.
 static void find_near(const VesselTree *tree, int node, const LimFitOptions *options, int hops, Gather *gather)
 {
     double radius = tree->radius[node], own_path = 0.5 * hops * radius, wide_path = 5 * radius;
@@ -162,7 +161,7 @@ static bool extend_inlet(const VesselTree *tree, Gather *gather, Vec3 center)
     for (int copy = 1; copy < 12 && most + (copy - 1) * slab < 2.2 * radius; copy++)
         for (int64_t i = first; i < last; i++) {
             Vec3 p = vec3_add_scaled(tree->point[i], copy * slab, upstream);
-            // a bent vessel's further points would bring its sag along, 0.1 mm on an arc of radius 4
+            // further points of a bent vessel would add its sagitta, 0.1 mm on an arc of radius 4
             if (vec3_dot(vec3_sub(tree->point[i], root), upstream) >= most - slab && vec3_dot(vec3_sub(p, root), upstream) < 2.2 * radius &&
                 vec3_distance(p, center) < gather->reach && !add_point(gather, p))
                 return false;
@@ -182,7 +181,7 @@ static int thin_points(Vec3 *point, int count, int most)
     return kept;
 }
 
-// An aneurysm near a node takes more points to describe: it is wide, and neither round nor a tube.
+// An aneurysm near a node needs more points: it is wide, and neither round nor a tube.
 static bool is_at_sac(const VesselTree *tree, const Gather *gather)
 {
     bool at_sac = false;
@@ -198,7 +197,7 @@ static bool gather_points(const VesselTree *tree, int node, const LimFitOptions 
     double widest = 0;
     for (int k = 0; k < gather->own_count; k++)
         widest = fmax(widest, tree->radius[gather->near[k].node]);
-    // what lies beyond is never asked of this model: its power cell ends before
+    // this model is never evaluated beyond: its power cell ends before
     gather->reach = options->guard_shape ? fmax(3.5 * tree->radius[node], 1.5 * widest) : HUGE_VAL;
     gather->point_count = 0;
     gather->is_extended = false;
@@ -254,7 +253,7 @@ static void guard_lumen(const VesselTree *tree, int node, bool extended, Gather 
             add_guard(gather, vec3_add_scaled(tree->center[0], -0.5 * k * tree->radius[0], tree->direction[0]), 0.5 * tree->radius[0]);
 }
 
-// Whether x may be called outside: clear of all data and of all tubes that the tree has there.
+// Whether x is certainly outside: clear of all nearby data and tubes.
 static bool is_outside(const VesselTree *tree, const Gather *gather, Vec3 x, double clearance)
 {
     for (int k = 0; k < gather->near_count; k++) {
@@ -333,7 +332,7 @@ static void gather_guards(const VesselTree *tree, int node, bool extended, Gathe
     }
 }
 
-// Where blobs may be: the tubes between the nodes around and their parents, a little thinner than the vessel; sacs are seldom round.
+// The region for blobs: the tubes between nearby nodes and their parents, slightly thinner than the vessel; aneurysms are seldom round.
 static void gather_tubes(const VesselTree *tree, Gather *gather)
 {
     const double inside = 0.9;
@@ -350,7 +349,7 @@ static void gather_tubes(const VesselTree *tree, Gather *gather)
     }
 }
 
-// Blobs on the nodes around, where they do not crowd: for a second attempt.
+// Blobs on nearby nodes, without crowding, for a second attempt.
 static void gather_retry(const VesselTree *tree, int node, Gather *gather)
 {
     gather->retry_count = 0;
@@ -426,7 +425,7 @@ static bool add_agreed(const Job *job, int node, Gather *gather)
 static bool gather_node(const Job *job, int node, Gather *gather)
 {
     const LimFitOptions *options = job->options;
-    // a node with hardly any points of its own or near it looks further along the tree
+    // a node with hardly any points nearby searches further along the tree
     for (int more = 0; more <= 8; more++) {
         find_near(job->tree, node, options, options->topological_distance + more, gather);
         if (!gather_points(job->tree, node, options, gather))
@@ -434,15 +433,15 @@ static bool gather_node(const Job *job, int node, Gather *gather)
         if (gather->point_count >= LEAST_POINTS)
             break;
     }
-    if (options->guard_shape && gather->point_count >= 4) {   // both by the data, not by what was made of them
+    if (options->guard_shape && gather->point_count >= 4) {   // both from the data, not from derived points
         gather_guards(job->tree, node, gather->is_extended, gather);
         gather_tubes(job->tree, gather);
     }
     return !job->first || add_agreed(job, node, gather);
 }
 
-// The model is asked in the node's cell, where few blobs bulge: fitted evenly to five nodes' points they stood 0.01 mm too wide there. So points weigh
-// the less the further they are beyond the node's ball, as power distance has it. Not at a sac, whose cells reach far from their balls.
+// The model is evaluated in the node's cell, where a few blobs bulge: fitted evenly to five nodes' points they were 0.01 mm too wide there. So points
+// lose weight with their power distance beyond the node's ball, except at an aneurysm, whose cells reach far from their balls.
 static bool weigh_points(const VesselTree *tree, int node, Gather *gather)
 {
     const double least = 0.3;
@@ -493,7 +492,7 @@ static LimFitTask task_of(const Job *job, int node, Gather *gather, double *star
     return task;
 }
 
-// Of the second pass: the first's model as it is.
+// In the second pass: copies the first pass's model.
 static void keep_first(const VesselTree *first, int node, NodeModel *model)
 {
     int64_t at = first->blob_offset[node];
@@ -526,7 +525,7 @@ static void fit_node(void *context, long index)
     bool good = gather && center && width && start_radius && gather_node(job, node, gather);
     if (job->first && options.give_up_splits > 1)
         options.give_up_splits = 1;
-    // neighbours at a sac agree no better than each meets the data: 0.19 mm with the usual t_g, 0.06 with half of it
+    // neighbours at an aneurysm agree only as well as each fits the data: 0.19 mm with the usual t_g, 0.06 with half of it
     if (good && gather->at_sac)
         options.voxel_mm *= 0.5;
     if (good && options.target_mm == 0 && options.voxel_mm == 0)
@@ -607,7 +606,7 @@ static int compare_sizes(const void *a, const void *b)
     return x->points != y->points ? (x->points < y->points) - (x->points > y->points) : (x->node > y->node) - (x->node < y->node);
 }
 
-// Nodes by the points around them, most first: a sac's model, the longest job and often the last node, must not keep one core waiting for it.
+// Nodes by the number of points around them, most first, so that the longest job, usually an aneurysm, does not run last on one core.
 static int *order_by_size(const VesselTree *tree)
 {
     int n = tree->node_count, *order = calloc((size_t)n, sizeof *order);
@@ -641,7 +640,7 @@ static void pass_on(void *context, long done, long total)
     pass->of_all->call(pass->of_all->context, pass->before + done, pass->total);
 }
 
-// All nodes once; NULL where memory lacks.
+// All nodes once; NULL if out of memory.
 static VesselTree *fit_pass(Job *job, const Progress *progress)
 {
     const VesselTree *tree = job->tree;
@@ -696,7 +695,7 @@ VesselTree *lim_fit(const VesselTree *tree, const LimFitOptions *options, const 
                    (long long)tree->point_count);
         return NULL;
     }
-    // T is a length: where none is known from an angiogram it goes with the vessels, and so do the shapes that blobs can take
+    // T is a length: without an angiogram it scales with the vessels, and so do the possible shapes of blobs
     LimFitOptions scaled = *options;
     double radius = 0;
     for (int i = 0; i < tree->node_count; i++)

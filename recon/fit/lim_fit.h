@@ -1,4 +1,4 @@
-// LIM: a local blobby model for every node of a tree. Kerrien et al. 2017, section 4, with the mends of DESIGN.md section 2.
+// LIM: a local blobby model for every node of a tree. Kerrien et al. 2017, section 4, with the departures listed in LimFitOptions.
 //
 // For each node: concatenate the points up to topological distance 2, start from two blobs along the vessel, then
 // select (worst point, its nearest blob), split, optimise (Polak-Ribiere, centre then width) until every point lies within the

@@ -4,9 +4,9 @@
 //   its blob       j* = argmin |f_j(P_i*) - T| / |grad f_j(P_i*)|, f_j = rho_j phi(|P - C_j| / rho_j)        (eq. 9, 10 corrected)
 //   split          rho'^2 (sqrt(2 rho'/c) - 1) = rho^2 (sqrt(rho/c) - 1): the level set of value c = f_j(P_i*) stays
 // The paper matches the level T; in a model of many blobs a blob contributes less than T at the surface, and for rho <= T that equation has no
-// solution. The new blob is optimised by Polak-Ribiere descent, centre before width (the other order shrinks the twin to nothing, and it never
-// comes back). Then a short pass over all blobs near the split: the paper has none, DESIGN.md asks for one; blob-wise descent converges badly
-// because neighbouring blobs are strongly coupled, so the pass is a damped Gauss-Newton step (Levenberg, Marquardt) in all their parameters.
+// solution. The new blob is optimised by Polak-Ribiere descent, centre before width (in the other order the new blob vanishes and never recovers).
+// Then a short pass over all blobs near the split: not in the paper; blob-wise descent converges badly because neighbouring blobs are strongly
+// coupled, so the pass is a damped Gauss-Newton step (Levenberg, Marquardt) in all their parameters.
 #include "recon/fit/lim_model.h"
 
 #include "base/same_math.h"
@@ -18,8 +18,8 @@
 
 enum { NOISE_PAIRS = 128, ROUNDS = 4, SWEEP_BLOBS = 16, SWEEP_SIZE = 4 * SWEEP_BLOBS, LINE_EVALUATIONS = 8 };
 
-// E_a's weight is this many times the variance of the noise times r^2 [mm^4]: exact points are not smoothed, noisy ones are. The noise
-// is what neighbours' distances differ by; the distances themselves hold the misfit too, which smoothing would keep alive.
+// E_a's weight is this many times the variance of the noise times r^2 [mm^4]: exact points are not smoothed, noisy ones are. The noise is what
+// neighbours' distances differ by; the distances themselves include the misfit, which smoothing would preserve.
 static const double BEND_OF_NOISE = 1;
 
 // A model within t_g is done when its mean square distance exceeds the noise's by no more than the square of this share of t_g.
@@ -44,7 +44,7 @@ typedef struct Fit {
     int pair_count, pair[NOISE_PAIRS][2];   // of neighbouring data: what their distances differ by is noise, not misfit
     double noise2;           // variance of the noise, from these pairs [mm^2]
     double alpha;            // weight of E_c at the moment
-    double reach;            // no blob's centre goes further from the node [mm]
+    double reach;            // largest distance of a blob's centre from the node [mm]
     float *distance;         // (padded) of the data
     float *offset;           // (padded) signed distance of a point from its foot, > 0 inside
     float *column;           // (SWEEP_SIZE, 2 padded) of the Gauss-Newton pass
@@ -137,7 +137,7 @@ static void fit_set_points(Fit *fit)
     int data = task->point_count;
     for (int i = 0; i < points->count; i++) {
         Vec3 p = vec3_sub(i < data ? task->point[i] : task->guard[i - data], task->center);
-        // beyond the points a blob only bends the field from afar: seen, a chain of them 9 r out, and the model fell apart without them
+        // beyond the points a blob only bends the field from afar (once seen: a chain of them 9 r out, without which the model was invalid)
         if (i < data)
             fit->reach = fmax(fit->reach, 1.2 * vec3_norm(p));
         points->x[i] = (float)p.x;
@@ -169,9 +169,9 @@ static double between_slope(const LimPoints *points, int i)
     return fmin(fmax(between, 0.4 * slope), 2.5 * slope);
 }
 
-// Moves the data to their feet on the surface as it is, and bounds each so that its residual is its distance times the slope there: then least
-// squares are those of true distances, and noise along the normal leaves no bias. A point whose foot is not found stays where it was measured.
-// Not afresh: from the feet of last time, with the sums as they are there; two steps then do.
+// Moves the data to their feet on the present surface, and bounds each so that its residual is its distance times the slope there: then least squares
+// are those of true distances, and noise along the normal leaves no bias. A point whose foot is not found stays where it was measured. Starts from
+// the previous feet with the sums there, so two steps suffice.
 static void find_feet(Fit *fit, bool afresh)
 {
     const int steps = afresh ? 3 : 2;
@@ -276,8 +276,8 @@ static Trial evaluate(Fit *fit, int j, LimBlob blob)
     return trial;
 }
 
-// A blob is a piece of the vessel's inside: its centre, left outside all tubes, is drawn back to the one that it left least. Without that
-// noisy points grow lobes: blobs outside the wall that hold one outlier each and eat into the lumen in between.
+// A blob is a piece of the vessel's inside: its centre, left outside all tubes, is drawn back to the one that it left least. Without that, noisy
+// points grow lobes: blobs outside the wall that fit one outlier each and narrow the lumen in between.
 static void keep_in_tubes(const LimFitTask *task, LimBlob *blob)
 {
     Vec3 x = vec3_add(task->center, vec3(blob->center[0], blob->center[1], blob->center[2])), foot = x;
@@ -325,8 +325,8 @@ static double slope_along(const Trial *trial, const double *direction)
     return sum;
 }
 
-// The least energy found along `direction` (downhill at `at`), first step `step`, none longer than `longest`: the Lennard-Jones term
-// is 1e9 at a tenth of the width, an uncapped first step throws the twin out of the vessel.
+// The least energy found along `direction` (downhill at `at`), first step `step`, none longer than `longest`: the Lennard-Jones term is 1e9 at a
+// tenth of the width, an uncapped first step throws the new blob out of the vessel.
 static double line_search(Fit *fit, int j, LimBlob *blob, Trial *at, const double *direction, double step, double longest)
 {
     double a = 0, ea = at->energy, sa = slope_along(at, direction), s0 = sa, b = 0, eb = 0, sb = 0, taken = 0;
@@ -407,7 +407,7 @@ static void optimise_blob(Fit *fit, int j)
     for (int loop = 0; loop < fit->options->max_loops; loop++) {
         fit->alpha = fit->options->alpha;
         descend(fit, j, 0, fit->options->line_searches);
-        // a width would shrink to nothing under the repulsion of its twin: there E_c moves centres only
+        // a width would vanish under the repulsion of the twin, so there E_c moves centres only
         if (fit->options->sweep_all_blobs)
             fit->alpha = 0;
         descend(fit, j, 3, fit->options->line_searches);
@@ -427,8 +427,8 @@ static double total_energy(Fit *fit)
     return isfinite(energy) ? energy : HUGE_VAL;
 }
 
-// (J'J + ...) and the downhill side of the blobs `which`: E_d and E_a by Gauss-Newton; E_c by its slope and a stiffness that lets it alone move a
-// blob no further than a third of its width.
+// (J'J + ...) and the downhill side of the blobs `which`: E_d and E_a by Gauss-Newton; E_c by its slope and a stiffness that limits its motion of a
+// blob to a third of its width.
 static void build_normal(Fit *fit, const int *which, int count, double *side)
 {
     int length = fit->points.padded * (fit->beta > 0 ? 2 : 1), size = 4 * count;
@@ -452,10 +452,10 @@ static void build_normal(Fit *fit, const int *which, int count, double *side)
     }
 }
 
-// Cholesky of (normal + lambda diag) and the solution; false where it is not positive.
+// Cholesky of (normal + lambda diag) and the solution; false if it is not positive.
 static bool solve_damped(Fit *fit, int size, double lambda, const double *side, double *step)
 {
-    double *u = fit->factor, floor = 0;   // upper triangle, changed row by row: the innermost loop has no sum to wait for
+    double *u = fit->factor, floor = 0;   // upper triangle, updated row by row: the innermost loop has no dependent sum
     for (int a = 0; a < size; a++)
         floor = fmax(floor, fit->normal[a * SWEEP_SIZE + a]);
     for (int a = 0; a < size; a++) {
@@ -603,7 +603,7 @@ static void split_blob(Fit *fit, int j, Vec3 p)
     Vec3 away = vec3_sub(p, vec3(old->center[0], old->center[1], old->center[2]));
     double rho = old->width, u = 1 / (1 + vec3_norm2(away) / (5 * rho * rho));
     Vec3 shift = vec3_scale(vec3_unit_or(away, fit->task->direction), 0.1 * rho);
-    // the paper keeps the level T where that can be done
+    // the paper preserves the level T if possible
     double level = !fit->options->weigh_distance && rho > fit->options->iso_level ? fit->options->iso_level : rho * u * u;
     old->width = lim_split_width(rho, level);
     *new = *old;
@@ -612,8 +612,8 @@ static void split_blob(Fit *fit, int j, Vec3 p)
     new->center[2] += shift.z;
 }
 
-// Keeps blob j and adds a new one three quarters of the way to p, just wide enough to bring the surface there. For points far outside
-// (a branch that the model has not seen yet) the split alone stays: the field is flat there and does not pull.
+// Keeps blob j and adds a new one three quarters of the way to p, just wide enough to bring the surface there. For points far outside (a branch not
+// modelled yet) only the split is kept: the field is flat there and does not pull.
 static void reach_out(Fit *fit, int j, Vec3 p, double lack)
 {
     const LimBlob *old = &fit->model.blob[j];
@@ -708,7 +708,7 @@ static void optimise_all(Fit *fit, int newest, int iterations, double least_gain
     }
 }
 
-// Blobs that shrank to nothing: adding less than a thousandth of T at any point. (None goes astray: see `reach`.)
+// Removes vanished blobs: those that add less than a thousandth of T at any point. (None strays: see `reach`.)
 static void clean_up(Fit *fit)
 {
     Model *model = &fit->model;
@@ -748,7 +748,7 @@ static double attempt_fit(Fit *fit, bool retry, double *worst_of_best)
         fit_refresh_sums(fit);
         fit_refresh_weights(fit, true);
         int worst = worst_point(fit, &worst_distance, &mean_square);
-        // a loose target is met by models that still miss the wall by more than the noise
+        // a loose target is met by models whose error still exceeds the noise
         bool within = worst_distance <= fit->target, reached = within;
         if (fit->uses_feet && options->give_up_splits > 0)
             reached = within && mean_square <= fit->noise2 + same_square(MISFIT * fit->target);
@@ -763,7 +763,7 @@ static double attempt_fit(Fit *fit, bool retry, double *worst_of_best)
         } else {
             idle++;
         }
-        // a worst point among some hundred noisy ones may need blobs of its own, which do not show in the mean
+        // the worst of some hundred noisy points may need its own blobs, which do not show in the mean
         int patience = options->give_up_splits * (best_worst > fit->target ? 2 : 1);
         if (reached || fit->model.count >= options->max_blobs || (options->give_up_splits > 0 && idle >= patience))
             break;
@@ -776,7 +776,7 @@ static double attempt_fit(Fit *fit, bool retry, double *worst_of_best)
 static void fit_run(Fit *fit)
 {
     double worst, square = attempt_fit(fit, false, &worst);
-    // far from the target, and not for noise, whose worst of some hundred points is 3 to 4 times its mean
+    // far from the target, and not because of noise, whose maximum over some hundred points is 3 to 4 times its mean
     if (fit->task->retry_count > 0 && worst > 1.4 * fit->target && (worst > 4.5 * sqrt(square) || sqrt(square) > fit->target)) {
         Model kept = {malloc((size_t)fit->capacity * sizeof(LimBlob)), 0};
         if (kept.blob) {

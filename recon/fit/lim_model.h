@@ -19,22 +19,22 @@ typedef struct LimFitOptions {
     int topological_distance;   // points are concatenated up to this many steps along the tree, 2
     int max_loops;           // centre-width loops per optimisation; paper 5, default 2
     int line_searches;       // Polak-Ribiere steps per loop; paper 20 (not said there), default 4
-    // departures (DESIGN.md section 2); the paper preset turns them off
-    double voxel_mm;         // for the automatic target, 0.2; 0: not known, as where the tree comes from a mesh
+    // departures from the paper; the paper preset turns them off
+    double voxel_mm;         // for the automatic target, 0.2; 0: unknown (for example, a tree from a mesh)
     bool weigh_distance;     // weigh E_d by mean g^2 / g_i^2: distances instead of field values; and points beyond the node's cell less
     bool project_points;     // measure points beyond the target by projection, not by Taubin's one step
     bool sweep_all_blobs;    // a short pass over all blobs after each split
     int give_up_splits;      // stop when this many splits bring nothing, twice as many before t_g is met; 0: never. 3; 1 in the second pass
-    bool extend_inlet;       // the root's points are repeated outwards so that the vessel is tubular through the inlet plane
+    bool extend_inlet;       // repeat the root's points outwards, so that the vessel is tubular through the inlet plane
     bool guard_shape;        // no constriction on the centreline, no ghost lobes away from the points
     bool agree;              // a second fit of each model, from the first, to its points and to what the models around agree on (recon/fit/lim_agree.h)
     int max_points;          // a node's points are thinned evenly to this many for speed, 300, five times as many near an aneurysm; paper 1500
     int threads;             // 0: all cores
 } LimFitOptions;
 
-// One local model: points, the node's tube, and what the guards need. Blobs are written to center, width (capacity max_blobs).
-// Returns the number of blobs, 0 where memory lacks. At least 4 points.
-typedef struct LimTube {     // a piece of lumen as the tree knows it: a cone between two spheres
+// Input of one local model: points, the node's tube, and data for the guards. Blobs are written to center, width (capacity max_blobs). Returns the
+// number of blobs, 0 if out of memory. At least 4 points.
+typedef struct LimTube {     // a piece of the tree's lumen: a cone between two spheres
     Vec3 a, b;
     double radius_a, radius_b;
 } LimTube;
@@ -52,7 +52,7 @@ typedef struct LimFitTask {
     int start_count;         // 0: the paper's pair on either side of the centre; else start from these blobs
     const Vec3 *start;       // (start_count) centres …
     const double *start_radius;   // … and the radii of their spheres
-    int retry_count;         // where the first attempt gives up far from the target, another starts from these; the better one stays
+    int retry_count;         // if the first attempt stops far from the target, another starts from these; the better one is kept
     const Vec3 *retry;       // (retry_count); 0: no second attempt
     const double *retry_radius;
 } LimFitTask;

@@ -170,7 +170,7 @@ static void add_join(const Job *job, int node, int other, Vec3 x, Vec3 across, N
                                  {vec3_angle(p.normal, q.normal), vec3_angle(before.normal, behind.normal), vec3_angle(before.normal, fresh.normal)}};
 }
 
-// Moves x in the plane across `across` to the model's wall; false where that is further than `far` off after some steps.
+// Moves x in the plane across `across` to the model's wall; false if that is further than `far` off after some steps.
 static bool slide_to_wall(const Blobby *model, Vec3 across, double far, Vec3 *x)
 {
     for (int i = 0; i < 6; i++) {

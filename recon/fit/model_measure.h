@@ -1,9 +1,8 @@
-// How well the local models of a tree agree with each other where a tool passes from one to the next, and, where the truth is known, with it.
+// Measures how well the local models of a tree agree with each other where a tool passes from one to the next and, if known, with the truth.
 //
-// Places: a link of the tree is a tube, unless a sac, a branching or an end is near it along the tree.
-// A join is a point on the wall at the border of two nodes' power cells, in no third node's. Raw: what the fields of the two nodes say there (the paper's
-// switch). As met: what the vessel answers (geom/vessel.h) to a point that passes the border, just before and just behind it. Cold: the same where the
-// answer behind it is sought from scratch.
+// Places: a link of the tree is a tube, unless a sac, a branching or an end is near it along the tree. A join is a point on the wall at the border of
+// two nodes' power cells, in no third node's. Raw: by the fields of the two nodes (the paper's switch). As met: by vessel queries (geom/vessel.h) for
+// a point that passes the border, just before and just behind it. Cold: the same with a search from scratch behind it.
 #ifndef SELDINGER_RECON_FIT_MODEL_MEASURE_H
 #define SELDINGER_RECON_FIT_MODEL_MEASURE_H
 
@@ -26,9 +25,9 @@ typedef struct WallRow {     // signed distances of the wall as met to the truth
 typedef struct ModelMeasure {
     JumpRow raw[PLACES], met[PLACES], cold[PLACES];
     WallRow wall[PLACES];    // counts 0 without a truth
-    // Walls that no data point supports: further than 0.6 r from all points around. Bare: what the lumen ends at, over a hole in the data (ends have
-    // such caps and are left out). Ghost: a further sheet beyond that wall, inside the node's power cell and within 3 r of its centre.
-    int bare_nodes, ghost_nodes;                     // nodes that have some
+    // Walls that no data point supports: further than 0.6 r from all points around. Bare: wall that closes the lumen over a hole in the data (ends
+    // have such caps and are left out). Ghost: a further sheet beyond that wall, inside the node's power cell and within 3 r of its centre.
+    int bare_nodes, ghost_nodes;                     // nodes with such walls
     int bare_worst, ghost_worst;                     // the node with the point furthest from data; -1
     double bare_most_mm, ghost_most_mm;
     // Links between a node and its parent, sampled at 5 places: clearance of the wall as met over the radius there.
@@ -37,7 +36,7 @@ typedef struct ModelMeasure {
     int narrowest_node;
 } ModelMeasure;
 
-// False where memory lacks or the tree has no model. `truth` may be NULL. The result does not depend on `threads` (0: all cores).
+// False if out of memory or the tree has no model. `truth` may be NULL. The result does not depend on `threads` (0: all cores).
 bool model_measure(const VesselTree *model, const Shape *truth, int threads, ModelMeasure *out);
 
 #endif

@@ -1,4 +1,4 @@
-// What `info` and `fit` say of where a tool gets to from the inlet (geom/reach.h), as text and as JSON.
+// The report of `info` and `fit` on which parts of a model a tool can reach from the inlet (geom/reach.h), as text and JSON.
 #ifndef SELDINGER_RECON_FIT_REACH_REPORT_H
 #define SELDINGER_RECON_FIT_REACH_REPORT_H
 
@@ -7,8 +7,8 @@
 #include <cJSON.h>
 #include <stdio.h>
 
-// A tree without a model has no such report: nothing is printed or added, and that is no fault. False with a fault where there is no memory.
-// `json` may be NULL, `out` too. `tool_radius` [mm].
+// A tree without a model has no such report: nothing is printed or added, without a fault. False with a fault if out of memory. `json` may be NULL,
+// `out` too. `tool_radius` [mm].
 bool reach_report(const VesselTree *tree, const char *file, double tool_radius, FILE *out, cJSON *json, Faults *faults);
 
 void reach_print(FILE *out, const VesselTree *tree, const Reach *reach);

@@ -36,7 +36,7 @@ static bool build_arc(Shape *shape, const ShapeOptions *o)
     return shape_add(shape, (const double (*)[4])knot, N, true, true, -1, NODE_VESSEL, tangent);
 }
 
-// Two quarter arcs that leave the same point the same way and part to either side.
+// Two quarter arcs that start in the same direction and diverge to both sides.
 static bool build_bifurcation(Shape *shape, const ShapeOptions *o)
 {
     enum { N = 33 };
@@ -59,7 +59,7 @@ static bool build_spiral(Shape *shape, const ShapeOptions *o)
     enum { N = 64 };
     double knot[N][4], tangent[2][4];
     for (int i = 0; i < N; i++) {
-        // knots crowd where the spiral winds tightly
+        // knots are denser where the spiral winds tightly
         double u = (double)i / (N - 1), theta = PI * same_pow(4, u), polar = 15.75 / theta;
         double radius = 0.5 + (0.15 - 0.5) * (theta - PI) / (3 * PI);
         memcpy(knot[i], (double[4]){polar * same_cos(theta), polar * same_sin(theta), u * o->rise_mm, radius}, sizeof knot[i]);
@@ -73,7 +73,7 @@ static bool build_spiral(Shape *shape, const ShapeOptions *o)
     return shape_add(shape, (const double (*)[4])knot, N, true, false, -1, NODE_VESSEL, (const double (*)[4])tangent);
 }
 
-// An internal carotid with its siphon, going on as the middle cerebral artery; anterior cerebral artery; two branches each, of which the anterior
+// An internal carotid with its siphon, continuing as the middle cerebral artery; anterior cerebral artery; two branches each, of which the anterior
 // ones kiss; a saccular aneurysm on the outer side of the siphon's anterior knee. x lateral, y anterior, z up [mm].
 static bool build_phantom(Shape *shape)
 {
@@ -263,7 +263,7 @@ Shape *shape_create(const char *name, int option_count, const char (*option)[2][
         which++;
     if (which == SHAPES)
         faults_add(faults, file, 0, 0, "unknown shape '%s'; expected %s", name, shape_names());
-    // what suits a shape where nothing is said
+    // defaults that depend on the shape
     o.rise_mm = which == HELIX ? 12 : 0;
     o.gap_mm = which == KISSING ? 0.2 : 0;
     o.blocks = which == BONE ? 6 : 0;

@@ -1,9 +1,9 @@
 // Synthetic vessels with known truth: capsule, open-capsule, arc, bifurcation, spiral, phantom; helix, y, kissing, bone, twig, tree, aorta.
 //
-// A shape is a set of parts: tubes (the union of spheres of smoothly varying radius along a smooth curve) and ellipsoids (sacs). Each
-// part's field is its signed distance, > 0 inside; parts that belong together are joined by a smooth maximum of width `blend_mm`, parts
-// that only lie side by side (kissing vessels) are not. The surface is the zero of that field; it is C1, and its distance is
-// found by projection to 1e-10 mm, so truth is exact also at the joints. Lengths mm.
+// A shape is a set of parts: tubes (the union of spheres of smoothly varying radius along a smooth curve) and ellipsoids (sacs). Each part's field is
+// its signed distance, > 0 inside; parts that belong together are joined by a smooth maximum of width `blend_mm`, parts that only lie side by side
+// (touching vessels) are not. The surface is the zero of that field; it is C1, and its distance is found by projection to 1e-10 mm, so truth is exact
+// also at the joints. Lengths mm.
 //
 // Options come as text pairs, from a scene's `shape: {name: …, key: value}` or from `synth --key value`:
 //   points       samples per node of a vessel (default 108)
@@ -38,7 +38,7 @@
 
 // The names, separated by ", ", for messages and help.
 const char *shape_names(void);
-// NULL with a fault for each unknown key, value out of range or unknown name; `file` is what messages begin with.
+// NULL with a fault for each unknown key, value out of range or unknown name; `file` is the prefix of messages.
 Shape *shape_create(const char *name, int option_count, const char (*option)[2][64], const char *file, Faults *faults);
 void shape_free(Shape *shape);
 // The voxel size that stands for the samples' accuracy when a shape is fitted (LimFitOptions.voxel_mm): 0.05 mm, or twice the noise.
@@ -46,17 +46,17 @@ double shape_voxel_mm(const Shape *shape);
 // The same from a scene's text options, before or without a shape (unknown or bad values count as absent).
 double shape_options_voxel_mm(int option_count, const char (*option)[2][64]);
 
-// What an angiogram shows and the truth does not contain: a kissing neighbour (NULL: none), and bone.
+// Objects visible in an angiogram but not part of the truth: a touching neighbour (NULL: none), and bone.
 const Shape *shape_neighbour(const Shape *shape);
 const ShapeBlock *shape_blocks(const Shape *shape, int *count);
 
 // Centreline nodes with surface samples, no model. Linked and valid.
 VesselTree *shape_sample(const Shape *shape, Faults *faults);
-// shape_create and shape_sample in one: what a scene's `shape:` needs.
+// shape_create and shape_sample in one: for a scene's `shape:`.
 VesselTree *shape_tree(const char *name, int option_count, const char (*option)[2][64], const char *file, Faults *faults);
 // The surface as a closed mesh (open ends flat), marching tetrahedra with vertices projected onto it; every node is 0.
 TriangleMesh *shape_surface(const Shape *shape, double cell_mm, Faults *faults);
-// How the angiogram is taken. Vessels are 1, background 0.
+// Options of the simulated angiogram. Vessels are 1, background 0.
 typedef struct VolumeOptions {
     double voxel_mm[3];      // edges along the grid's axes
     double psf_mm;           // standard deviation of the Gaussian blur
@@ -64,7 +64,7 @@ typedef struct VolumeOptions {
     uint64_t seed;           // of the noise
     double rotate_deg;       // the grid is turned by this much about (1, 2, 3); patient coordinates stay the shape's
     double clip, saturate;   // values below and above are cut, after the noise; -HUGE_VAL, HUGE_VAL: none
-    double fade;             // share of the brightness that is lost on the way from the root to the furthest tip
+    double fade;             // fraction of the brightness lost between the root and the furthest tip
     double bone;             // brightness of blocks (1.2)
     double band;             // a slab across the trunk is brighter by so many contrasts (0: none), vessels in it too …
     double band_mm;          // … its thickness [mm]; its place and direction come from the seed

@@ -1,7 +1,7 @@
-// The way from the groin to the head: left iliac artery, aorta with the other iliac artery, arch, and the neck's arteries as far as the skull.
+// The path from the groin to the head: left iliac artery, aorta with the other iliac artery, arch, and the neck's arteries as far as the skull.
 //
-// Drawn by hand: no patient's curve, an idealised one of the dimensions of the vessel in stEVE_bench's DualDeviceNav (15 branches, measured with `info` and
-// `export` on the model that scenes/arch/prepare makes of it), so that the two-device task runs without that file:
+// Drawn by hand: an idealised course with the dimensions of the vessel in stEVE_bench's DualDeviceNav (15 branches, measured with `info` and `export`
+// on the model that scenes/arch/prepare makes of it), so that the two-device task runs without that file:
 //                                   there, length and mean radius [mm]   here
 //   left iliac artery to the other            70, 6.1                        86, 4.9
 //   aorta to the end of what is drawn        436, 12.7 (5.0 to 16.5)        432, 11.9 (7.0 to 15.0)
@@ -9,8 +9,8 @@
 //   left vertebral and basilar               258, 3.1                       248, 2.8
 //   brachiocephalic to its fork               46, 7.7                        38, 6.5
 //   left, right carotid into the skull       292, 3.1; 245, 3.3             242, 3.2; 222, 3.1
-// The summit of the arch has a radius of 31 mm. Left out: what turns back within the skull, and the right vertebral's way into the basilar artery, since a
-// tree has no loops. x to the patient's left, y to the front, z to the head.
+// The summit of the arch has a radius of 31 mm. Left out: vessels that turn back within the skull, and the right vertebral's junction with the
+// basilar artery, since a tree has no loops. x to the patient's left, y to the front, z to the head.
 #include "recon/phantom/phantom_parts.h"
 
 bool aorta_grow(Shape *shape)

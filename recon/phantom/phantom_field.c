@@ -226,7 +226,7 @@ static double join(const Shape *shape, Vec3 x, bool cut, const int *list, int co
     double best = -HUGE_VAL, highest, t;
     Vec3 best_gradient = {0, 0, 0};
     for (int i = 0; i < count; i++) {
-        // a part further below the best than the joints are wide cannot matter
+        // a part further below the best than the width of the joints cannot matter
         int p = list ? list[i] : i;
         f[i] = part_field(&shape->part[p], x, best - shape->widest_joint, cut, &g[i], &t);
         if (f[i] > best)
@@ -253,7 +253,7 @@ static double join(const Shape *shape, Vec3 x, bool cut, const int *list, int co
     return highest;
 }
 
-// Apart, so that the usual few parts do not pay for a large frame.
+// Separate, so that the usual few parts do not pay for a large stack frame.
 __attribute__((noinline)) static double join_many(const Shape *shape, Vec3 x, bool cut, const int *list, int count, Vec3 *gradient, int *which, double *at)
 {
     double f[MOST_PARTS];

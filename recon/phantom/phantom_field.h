@@ -15,8 +15,8 @@ double shape_field_cut(const Shape *shape, Vec3 x);
 // Signed distance to the true surface [mm], > 0 inside; `foot` (may be NULL) is the closest surface point. Near the medial axis the
 // local one that projection finds, never less than the field.
 double shape_distance(const Shape *shape, Vec3 x, Vec3 *foot);
-// Whether x lies beyond an open end (open-capsule, arc, bifurcation, spiral, phantom and aorta are open at the inlet; open-capsule at both
-// ends): the surface there is no truth, the tube goes on.
+// Whether x lies beyond an open end (open-capsule, arc, bifurcation, spiral, phantom and aorta are open at the inlet; open-capsule at both ends):
+// there the surface is not part of the truth, since the tube continues.
 bool shape_beyond_open_end(const Shape *shape, Vec3 x);
 // Axis-aligned box around the surface.
 void shape_bounds(const Shape *shape, Vec3 *low, Vec3 *high);

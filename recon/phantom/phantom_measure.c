@@ -32,8 +32,8 @@ static MeasureRow row_of(List *list)
     return row;
 }
 
-// From the node's centre along d to the first change of sign of the model's field (NULL: the shape's). False where that is not in the node's
-// cell; cells are convex, so only the end of the ray need be looked at.
+// From the node's centre along d to the first change of sign of the model's field (NULL: the shape's). False if that is not in the node's cell; cells
+// are convex, so only the end of the ray need be looked at.
 static bool first_crossing(const Shape *shape, const Blobby *model, const VesselTree *tree, int node, Vec3 d, Vec3 *hit)
 {
     Vec3 c = tree->center[node];

@@ -18,7 +18,7 @@ typedef struct ShapeMeasure {
     int worst_node;
 } ShapeMeasure;
 
-// False where memory lacks or the model has no blobs.
+// False if out of memory or the model has no blobs.
 bool shape_measure(const Shape *shape, const VesselTree *model, ShapeMeasure *out);
 
 #endif

@@ -22,7 +22,7 @@ typedef struct Part {
     int knot_count;
     double at[KNOTS];        // knot parameter [mm of chord]
     Spline coordinate[4];    // x, y, z, r
-    bool open_start, open_end;   // straight on beyond, instead of a cap
+    bool open_start, open_end;   // continued straight, instead of a cap
     double low, high;        // parameter range with the straight pieces
     int parent;              // part it grows from, or -1
     uint8_t kind;            // of its nodes
@@ -51,7 +51,7 @@ struct Shape {
     int points, sac_points;
     double noise, spacing;
     uint64_t seed;
-    Shape *neighbour;        // vessels that are seen in the volume and are no part of the truth, or NULL
+    Shape *neighbour;        // vessels visible in the volume but not part of the truth, or NULL
     int block_count;         // and bone
     ShapeBlock *block;
 
@@ -68,7 +68,7 @@ typedef struct Station {     // of a part at parameter t
 } Station;
 
 Station part_at(const Part *part, double t);
-// Through `count` <= KNOTS knots (x, y, z, r). `end_slope`: tangents (dx, dy, dz, dr per mm) at both ends, or NULL: natural. False where memory lacks.
+// Through `count` <= KNOTS knots (x, y, z, r). `end_slope`: tangents (dx, dy, dz, dr per mm) at both ends, or NULL: natural. False if out of memory.
 bool part_build(Part *part, const double (*knot)[4], int count, bool open_start, bool open_end, int parent, uint8_t kind,
                 const double (*end_slope)[4]);
 void part_free(Part *part);
@@ -78,11 +78,11 @@ bool part_scale(Part *part, double scale);
 // `cut`: without the straight pieces beyond open ends.
 double part_field(const Part *part, Vec3 x, double enough, bool cut, Vec3 *gradient, double *at);
 
-// Appends a part; false where memory lacks.
+// Appends a part; false if out of memory.
 bool shape_add(Shape *shape, const double (*knot)[4], int count, bool open_start, bool open_end, int parent, uint8_t kind, const double (*end_slope)[4]);
 // The parts of the shape `aorta`.
 bool aorta_grow(Shape *shape);
-// After the last part: joints and octree. False where memory lacks.
+// After the last part: joints and octree. False if out of memory.
 bool shape_finish(Shape *shape);
 // shape_field, and which part is the largest there and where on it.
 double shape_field_of_part(const Shape *shape, Vec3 x, int *part, double *at);

@@ -8,7 +8,7 @@
 
 // --- Samples ---
 
-// From a point inside out along unit d to the surface; false where it is further than `most`.
+// From a point inside out along unit d to the surface; false if it is further than `most`.
 static bool march_out(const Shape *shape, Vec3 x, Vec3 d, double most, Vec3 *hit)
 {
     double t = 0;
@@ -84,7 +84,7 @@ static void sample_cap(Sampler *s, const Part *part, double at, double side)
     }
 }
 
-// All round a sac's centre; what belongs to the parent's wall is left to the parent.
+// All round a sac's centre; points on the parent's wall are left to the parent.
 static void sample_sac(Sampler *s, const Part *part, double at)
 {
     Station station = part_at(part, at);

@@ -46,7 +46,7 @@ typedef struct Painter {
     Volume *volume;
     Layer layer[2];          // vessel and neighbour
     int cells[3];
-    double diagonal, width;  // of a voxel; the width is 0 where it depends on the direction
+    double diagonal, width;  // of a voxel; the width is 0 if it depends on the direction
 } Painter;
 
 static double field_of(const Painter *p, int which, Vec3 x, Vec3 *gradient, int *part, double *at)

@@ -20,7 +20,7 @@ typedef struct Segment {     // from bifurcation to bifurcation
     bool is_tip;
 } Segment;
 
-typedef struct Bead {        // of a segment: what others must keep away from
+typedef struct Bead {        // of a segment: space that others must keep clear of
     Vec3 center;
     double radius, arc;      // from the segment's start
     int segment;
@@ -86,7 +86,8 @@ static bool collides(const Bead *a, const Bead *b, double clearance)
     return vec3_norm2(vec3_sub(a->center, b->center)) < least * least;
 }
 
-// Whether the draft, grown from segment `parent`, keeps away from all but what it must touch: itself, its parent and `sister` near the bifurcation.
+// Whether the draft, grown from segment `parent`, keeps clear of everything except what it must touch: itself, its parent and `sister` near the
+// bifurcation.
 static bool fits(const Growth *g, const Draft *draft, int parent, double zone, const Draft *sister)
 {
     for (int i = 0; i < draft->count; i++) {
@@ -145,7 +146,7 @@ static bool start_way(Growth *g, int parent, const double knot[4], Vec3 directio
     return true;
 }
 
-// Splits the tip; false where nothing fits, `*failed` where memory lacks.
+// Splits the tip; false if nothing fits, `*failed` if memory runs out.
 static bool split(Growth *g, int tip, bool *failed)
 {
     Segment parent = g->segment[tip];
@@ -269,7 +270,7 @@ bool random_tree_grow(Shape *shape, const RandomTreeOptions *o, const char *file
     for (int i = 0, left = 40; i < o->blocks && !failed; failed = left == 0) {
         const Bead *seat = &g.bead[(int)(random_open(&g.random) * g.bead_count)];
         double size = 2 * o->radius_mm;
-        double half[3];   // drawn one after the other: compilers differ in the order within an initialiser
+        double half[3];   // drawn in separate statements, because the order within an initialiser is unspecified
         for (int k = 0; k < 3; k++)
             half[k] = random_between(&g.random, 0.5, 1.5) * size;
         bool added = shape_add_block(shape, seat->center, random_direction(&g.random), vec3(half[0], half[1], half[2]), o->gap_mm, &g.random);

@@ -1,6 +1,6 @@
 // A random vascular tree as a synthetic shape. A branch splits in two by Murray's law: r0^3 = r1^3 + r2^3, angles of least work
 //   cos t1 = (r0^4 + r1^4 - r2^4) / (2 r0^2 r1^2)
-// (Murray, J. Gen. Physiol. 9, 1926). Branches are smooth curves whose curvature wanders, 6 to 11 of their radii long; the wider daughter goes on as
+// (Murray, J. Gen. Physiol. 9, 1926). Branches are smooth curves whose curvature wanders, 6 to 11 of their radii long; the wider daughter continues
 // the same part, the other is a new part that starts on the parent's centreline with the parent's direction. A split that would come near another
 // vessel is drawn again; where none fits, the branch ends. The widest tip splits first.
 #ifndef SELDINGER_RECON_PHANTOM_RANDOM_TREE_H
@@ -19,10 +19,10 @@ typedef struct RandomTreeOptions {
     double gap_mm;           // … at this distance from their walls
 } RandomTreeOptions;
 
-// Adds parts, and blocks, to an empty shape. False with a fault where so many do not fit or memory lacks.
+// Adds parts, and blocks, to an empty shape. False with a fault where so many do not fit or memory runs out.
 bool random_tree_grow(Shape *shape, const RandomTreeOptions *options, const char *file, Faults *faults);
-// Puts a block beside a vessel: it is `gap_mm` from the nearest wall of the shape, near x in direction d of it. False where no such place is found or
-// memory lacks.
+// Puts a block beside a vessel: it is `gap_mm` from the nearest wall of the shape, near x in direction d of it. False if no such place is found or
+// memory runs out.
 bool shape_add_block(Shape *shape, Vec3 x, Vec3 d, Vec3 half, double gap_mm, Random *random);
 
 #endif

@@ -316,7 +316,7 @@ static void parse_swc(const char *text, const char *name, CurveSet *set, Faults 
     free(sample);
 }
 
-// A fault that is already in words.
+// Adds a fault from a complete message.
 static void faults_add_text(Faults *faults, const char *text)
 {
     if (faults->count < FAULTS_CAPACITY)

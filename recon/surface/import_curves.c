@@ -1,8 +1,8 @@
-// Curves set in the mesh's frame and in its lumen. A given curve is kept as it is but where the surface contradicts it: a stretch that runs out of
-// the lumen sideways goes back to the middle, one that runs out over a vessel's end is cut there, and a sample goes to the centroid of its section of
-// the lumen (16 rays square to the curve) where that has its wall at less than 0.15 of its median radius on one side, or at less than half of it
-// where the centroid has half as much room again; near a curve's ends only the former. Moving every sample to the middle was tried and lost: it bends
-// exact curves at ends and ostia by half a radius.
+// Curves set in the mesh's frame and in its lumen. A given curve is kept except where the surface contradicts it: a stretch that runs out of the
+// lumen sideways goes back to the middle, one that runs out over a vessel's end is cut there, and a sample goes to the centroid of its section of the
+// lumen (16 rays square to the curve) where that has its wall at less than 0.15 of its median radius on one side, or at less than half of it where
+// the centroid has half as much clearance again; near a curve's ends only the former. Moving every sample to the middle was tried and rejected: it
+// bends exact curves at ends and ostia by half a radius.
 #include "recon/surface/import_curves.h"
 
 #include "base/same_math.h"
@@ -16,7 +16,7 @@ static const double STEP = 0.3, GRAZE = 0.15, BESIDE = 0.5, GAIN = 1.5;
 
 static double inside_share(const SurfaceMesh *mesh, const CurveSet *set, double sx, double scale)
 {
-    // winding numbers cost all triangles each
+    // each winding number visits all triangles
     int wanted = (int)fmin(fmax(2e7 / (mesh->triangle_count + 1), 20), 400), step = set->point_count / wanted + 1, inside = 0, count = 0;
     for (int i = 0; i < set->point_count; i += step, count++) {
         Vec3 p = set->point[i];
@@ -44,7 +44,7 @@ bool import_place_curves(const SurfaceMesh *mesh, double scale, CurveSet *set, I
     double least_extent = 0.01 * extent(mesh->vertex, mesh->vertex_count), curves = extent(set->point, set->point_count);
     for (int f = 0; f < (scale != 1 ? 4 : 2); f++) {
         double share = curves * frame[f][1] < least_extent ? 0 : inside_share(mesh, set, frame[f][0], frame[f][1]);
-        // as they stand, unless that is clearly wrong
+        // unchanged, unless that is clearly wrong
         if (share > most + (f ? 0.25 : 0)) {
             most = share;
             best = f;
@@ -109,7 +109,7 @@ double section_radius(const MeshTree *tree, Vec3 p, Vec3 tangent, double reach, 
     sort_doubles(sorted, (size_t)met);
     double median = 0.5 * (sorted[(met - 1) / 2] + sorted[met / 2]);
     for (int k = 0; k < SECTION_RAYS; k++) {
-        // a branch's mouth is no part of the section
+        // a branch's mouth does not belong to the section
         double angle = 2 * PI * k / SECTION_RAYS, d = fmin(length[k], 1.6 * median);
         moment = vec3_add_scaled(moment, d * d * d / 3, vec3_add(vec3_scale(u, same_cos(angle)), vec3_scale(v, same_sin(angle))));
         area += d * d / 2;
@@ -119,7 +119,7 @@ double section_radius(const MeshTree *tree, Vec3 p, Vec3 tangent, double reach, 
     return median;
 }
 
-// The middle of the chord that starts square to the wall at the nearest point; false where the wall lies along the curve (it left over an end).
+// The middle of the chord that starts square to the wall at the nearest point; false if the wall lies along the curve (it left over an end).
 static bool back_into_lumen(const SurfaceMesh *mesh, const MeshTree *tree, Vec3 tangent, double radius, Vec3 *p)
 {
     Vec3 foot = *p;
@@ -148,7 +148,7 @@ static int clear_sample(const SurfaceMesh *mesh, const MeshTree *tree, Vec3 tang
         double least;
         Vec3 centroid, foot;
         int t = 0;
-        // a lid that the curve ends at is no graze
+        // a lid at the curve's end does not count as grazing
         if (isfinite(mesh_tree_nearest(tree, *p, wide, &foot, &t)) && fabs(vec3_dot(normal_of(mesh, t), tangent)) > 0.7)
             break;
         double median = section_radius(tree, *p, tangent, 4 * wide, &least, &centroid);
@@ -163,7 +163,7 @@ static int clear_sample(const SurfaceMesh *mesh, const MeshTree *tree, Vec3 tang
     return moved ? MOVED : KEPT;
 }
 
-// Samples curve c in steps of STEP widths into arrays of `room`; returns their number.
+// Samples curve c in steps of STEP widths into arrays of `room` entries; returns their number.
 static int sample_curve(const CurveSet *set, const MeshTree *tree, int c, double floor_step, int room, Vec3 *point, double *given, double *wide)
 {
     int n = 0;

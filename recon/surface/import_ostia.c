@@ -1,8 +1,8 @@
-// The surface decides. Nodes in the parent's lumen see no wall of their own and were left out, so that a branch began with a link from the parent's axis.
-// Where the skeleton crosses a wall there, a path beside it is looked for, within the branch's radius; where there is none the link is refused,
-// however thin the wall: vessels that touch are apart. Sheets inside the lumen, of vessels made of parts that overlap, are no walls: winding numbers tell.
-// How narrow the path is, as a share of the branch's radius, says how well it is supported. Nodes stand on it every half radius of the branch from one
-// and a half of its radii inside the parent's wall on.
+// The surface decides. Nodes in the parent's lumen see no wall of their own and were left out, so that a branch began with a link from the parent's
+// axis. Where the skeleton crosses a wall there, a path near it is searched, within the branch's radius; if there is none the link is refused,
+// however thin the wall: touching vessels are separate. Sheets inside the lumen, of vessels made of parts that overlap, are not walls; winding
+// numbers distinguish them. How narrow the path is, as a share of the branch's radius, says how well it is supported. Nodes stand on it every half
+// radius of the branch from one and a half of its radii inside the parent's wall on.
 #include "recon/surface/import_ostia.h"
 
 #include "base/sort_doubles.h"
@@ -18,7 +18,7 @@ static const double SPACING = 0.5, INSIDE = 1.5,   // in radii of the branch
 typedef struct Link {
     int node, parent;
     double radius, length;
-    bool is_inner;           // no branch begins here: it is looked at only where a wall crosses it
+    bool is_inner;           // not the start of a branch: checked only where a wall crosses it
     bool is_moved, is_refused;
     Vec3 place;
     LinkPath path;
@@ -83,7 +83,7 @@ static double root_radius(const Nodes *n, const int *first_child, int node)
 
 // --- the surface ---
 
-typedef struct Room {        // what a path may use
+typedef struct Room {        // the lattice of a path
     const Wall *wall;
     double radius;           // of the branch
 } Room;
@@ -201,8 +201,8 @@ static void mark_hanging(const Nodes *n, int node, bool *hangs)
         hangs[i] = n->parent[i] >= 0 && hangs[n->parent[i]];
 }
 
-// The nearest node before it in plain sight, by the distance that lies outside both vessels, in link->path. Nodes stand behind what they hang on: later
-// ones are not looked at. False: out of memory.
+// The nearest earlier node in line of sight, by the distance outside both vessels, in link->path. Nodes come after their parents, so later ones are
+// not considered. False: out of memory.
 static bool attach_elsewhere(const Nodes *n, const Wall *wall, Link *link)
 {
     Room room = {wall, link->radius};
@@ -243,7 +243,7 @@ static Link *collect_links(const Nodes *n, int *first_child, int *count)
     return link;
 }
 
-// A refused link within a branch is one more junction: of two vessels that the curves take for one.
+// A refused link within a branch is another junction: between two vessels that the curves treat as one.
 static void report_link(const Nodes *n, const Link *link, ImportReport *report)
 {
     if (link->is_inner && !link->is_refused && !link->is_moved)
@@ -318,7 +318,7 @@ bool nodes_open_ostia(Nodes *nodes, const Skeleton *skeleton, const Wall *wall, 
         stations += link[l].station_count;
     }
     for (int l = 0; good && l < count; l++) {
-        bool is_lost = dropped[link[l].node] || dropped[link[l].parent];   // with what it hangs on
+        bool is_lost = dropped[link[l].node] || dropped[link[l].parent];   // with its parent
         if (!is_lost)
             report_link(nodes, &link[l], report);
         if (!is_lost && !link[l].is_refused)

@@ -1,4 +1,4 @@
-// Internal to import: the nodes of the tree to be, and where its branches leave their parents.
+// Internal to import: the nodes of the future tree, and where its branches leave their parents.
 #ifndef SELDINGER_RECON_SURFACE_IMPORT_OSTIA_H
 #define SELDINGER_RECON_SURFACE_IMPORT_OSTIA_H
 
@@ -17,10 +17,10 @@ typedef struct Nodes {
 
 bool nodes_create(Nodes *nodes, size_t room);   // false: out of memory
 void nodes_free(Nodes *nodes);
-// Puts nodes on the links between branches and their parents. What the surface says is counted in the report: a link without a path inside it is refused,
-// and the branch hangs on another node in plain sight or goes. False: out of memory.
+// Puts nodes on the links between branches and their parents. The report counts the results: a link without a path inside the surface is refused, and
+// the branch is attached to another node in line of sight or dropped. False: out of memory.
 bool nodes_open_ostia(Nodes *nodes, const Skeleton *skeleton, const Wall *wall, ImportReport *report);
-// The lines inside of which no point is wall. NULL where memory lacks.
+// The lines within whose clearance no point is wall. NULL if out of memory.
 LumenLines *nodes_lumen_lines(const Nodes *nodes);
 
 #endif

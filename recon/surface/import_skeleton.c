@@ -21,8 +21,8 @@ typedef struct Fine {        // the curves, sampled
 
 typedef struct Growing {
     Skeleton *s;
-    double *way;             // from the root along the tree
-    int *children;           // how many hang on it
+    double *way;             // distance from the root along the tree
+    int *children;           // number of children
     int capacity;
 } Growing;
 
@@ -183,7 +183,7 @@ static bool choose_root(const Fine *fine, const Wall *wall, const ImportOptions 
 static int grow(Growing *g, Vec3 point, double radius, double given, int parent)
 {
     Skeleton *s = g->s;
-    int i = s->count++;          // room for every sample and two openings' lines a curve was made before
+    int i = s->count++;          // space for every sample and two openings' lines per curve was allocated before
     s->point[i] = point;
     s->radius[i] = radius;
     s->given[i] = given;
@@ -233,7 +233,7 @@ static bool grow_run(Growing *g, Fine *fine, int at, int step, int end, ImportRe
         length += i != from ? vec3_distance(fine->point[i], fine->point[i - step]) : 0;
         clear = fmax(clear, fine->distance[i] - g->s->radius[fine->nearest[i]]);
     }
-    // what never leaves the tree's own spheres is the same vessel drawn twice, or a stub
+    // a curve that never leaves the tree's spheres is the same vessel drawn twice, or a stub
     bool stub = clear < 0.5 * fine->radius[closes ? from : last - step] && (closes || length < 2 * g->s->radius[parent]);
     for (int i = from; i != last; i += step) {
         fine->done[i] = true;

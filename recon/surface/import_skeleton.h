@@ -1,4 +1,4 @@
-// Internal to import: curves joined to one rooted tree of fine samples, its ends at the openings of the wall.
+// Internal to import: joins curves to one rooted tree of fine samples with its ends at the openings of the wall.
 #ifndef SELDINGER_RECON_SURFACE_IMPORT_SKELETON_H
 #define SELDINGER_RECON_SURFACE_IMPORT_SKELETON_H
 
@@ -9,7 +9,7 @@ typedef struct Skeleton {
     int count;
     Vec3 *point;
     double *radius;          // inscribed [mm]
-    double *given;           // the curve's own [mm], 0 where it has none
+    double *given;           // the curve's own [mm], 0 if it has none
     int *parent;             // -1 at 0, parents before children
     bool *is_open_end;       // at an opening
 } Skeleton;

@@ -1,9 +1,9 @@
-// See import_surface.h. Nodes stand every `spacing` inscribed radii along the skeleton. The wall's triangles are sampled with a density of
+// See import_surface.h. Nodes are spaced `spacing` inscribed radii along the skeleton. The wall's triangles are sampled with a density of
 // points_per_node / (2 pi r spacing r), r of the nearest node, by a low-discrepancy sequence (Roberts' R2, folded into the triangle), and the samples
-// are set where the surface would be that coarse facets stand for. A node that gets fewer than eight points lies within its parent's lumen and is left
-// out: its children hang on the parent. A node's radius is the median distance of the wall square to the curve, between 1 and 1.6 times the inscribed
-// radius (ostia and kissing walls pull the median away), or the curve's own on pieces where most of those agree with it. At a blind end, where inscribed
-// spheres shrink, it is that of the last sphere that reaches the end.
+// are moved to the smooth surface that the facets approximate. A node that gets fewer than eight points lies within its parent's lumen and is left
+// out: its children are attached to the parent. A node's radius is the median distance of the wall square to the curve, between 1 and 1.6 times the
+// inscribed radius (ostia and kissing walls pull the median away), or the curve's own on pieces where most of those agree with it. At a blind end,
+// where inscribed spheres shrink, it is that of the last sphere that reaches the end.
 #include "recon/surface/import_surface.h"
 
 #include "base/heap.h"
@@ -65,13 +65,13 @@ static void limit_slope(const Skeleton *s, const int *children, double *radius)
             double step = STEEP * vec3_distance(s->point[i], s->point[up]);
             if (pass == 0)
                 radius[i] = fmax(fmin(radius[i], radius[up] + step), s->radius[i]);
-            else if (children[up] == 1)   // a branch says nothing of its trunk
+            else if (children[up] == 1)   // a branch gives no information on its trunk
                 radius[up] = fmax(fmin(radius[up], radius[i] + step), s->radius[up]);
         }
 }
 
-// The curves' own radii on pieces between branchings where most agree with `radius` (S), but where they are far off. Agreement is narrow, for cells are
-// by power distance: trunks with radii a tenth too small lose their wall to branches. False where memory lacks.
+// The curves' own radii on pieces between branchings where most agree with `radius` (S), but where they are far off. Agreement is narrow, for cells
+// are by power distance: trunks with radii a tenth too small lose their wall to branches. False if out of memory.
 static bool take_given(const Skeleton *s, const int *children, double *radius)
 {
     size_t room = (size_t)s->count + 1;
@@ -146,7 +146,7 @@ static bool choose_nodes(Skeleton *s, const Wall *wall, double spacing, Nodes *n
         if (!is_end && since < spacing * s->radius[i])
             continue;
         int n = nodes->count;
-        // a leaf too near to the node before it takes that node's place
+        // a leaf too near to the node before it replaces that node
         if (up >= 0 && !has_child[i] && since < 0.5 * spacing * s->radius[i] && node[up] == n - 1 && !nodes->is_end[n - 1])
             nodes->count = n = n - 1;
         else
@@ -165,9 +165,9 @@ static bool choose_nodes(Skeleton *s, const Wall *wall, double spacing, Nodes *n
     return good;
 }
 
-// Along the vessel: from the parent, and to the child that goes on straightest.
-// To the first node a radius on, along the children that most nodes hang on: the curve of a surface alone may come to the middle of its opening from the
-// side, where a stenosis follows, or leave a stub in the opening's corner, and the inlet would then look closed.
+// Along the vessel: from the parent, and to the child that continues straightest. To the first node a radius on, along the children that most nodes
+// hang on: the curve of a surface alone may come to the middle of its opening from the side, where a stenosis follows, or leave a stub in the
+// opening's corner, and the inlet would then look closed.
 static Vec3 root_direction(const Nodes *nodes)
 {
     int at = 0;
@@ -263,7 +263,7 @@ static void weigh_triangle(void *context, long t)
     int node;
     Vec3 middle = vec3_scale(vec3_add(a, vec3_add(b, c)), 1.0 / 3);
     nearest_nodes(s->nodes, middle, 1, &node);
-    // far from every node the vessel is wider than that node's, or has none
+    // far from every node the vessel is wider than the node's, or has no node
     double r = fmax(s->nodes->radius[node], vec3_distance(middle, s->nodes->center[node]) / PULLED);
     s->weight[t] = area * s->points_per_node / (2 * PI * r * r * s->spacing);
 }

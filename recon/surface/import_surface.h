@@ -1,4 +1,4 @@
-// From a surface and centrelines to the tree that `fit` takes: the part of RBT (Kerrien 2017, section 3) for vessels that somebody segmented.
+// From a surface and centrelines to the tree that `fit` takes: the part of RBT (Kerrien 2017, section 3) for vessels that are already segmented.
 //
 // Curves are set in the mesh's frame, joined to one tree (curves may overlap, or begin on another; a loop is cut where it closes), and resampled to
 // nodes; flat lids over the ends of a closed surface are taken off, so that inlets and outlets are open; the surface is sampled evenly for each
@@ -14,7 +14,7 @@
 
 ImportOptions import_default_options(void);
 
-// NULL with faults. `name` stands in messages.
+// NULL with faults. `name` is used in messages.
 VesselTree *import_surface(const SurfaceMesh *mesh, const CurveSet *set, const ImportOptions *options, ImportReport *report, const char *name,
                            Faults *faults);
 

@@ -1,6 +1,6 @@
-// The wall: a surface with the flat lids over its vessels' ends taken off. A lid is what a centreline's end points at: triangles of nearly one
-// plane, square to the centreline, as large as the lumen, meeting the wall at an edge. A round blind end has no such region: within 20 degrees of
-// its pole lies an eighth of the lumen's area.
+// The wall: the surface without the flat lids over its vessels' ends. A lid is the region at which a centreline's end points: triangles of nearly one
+// plane, square to the centreline, as large as the lumen, meeting the wall at an edge. A round blind end has no such region: within 20 degrees of its
+// pole lies an eighth of the lumen's area.
 #include "recon/surface/import_wall.h"
 
 #include "base/disjoint_sets.h"
@@ -89,7 +89,7 @@ static void mark_lid(const SurfaceMesh *mesh, const MeshTree *tree, int (*across
         normal = vec3_unit_or(sum, normal);
     }
     double area = vec3_norm(sum);
-    // one facet of a coarse round end may be as large, but it is no disc
+    // one facet of a coarse round end may be as large, but it is not a disc
     bool is_lid = area > 0.5 * PI * radius * radius && area < 4 * PI * radius * radius && sharp > 0.4 * border && area > ROUND * PI * widest * widest;
     for (int i = 0; i < tail; i++) {
         seen[queue[i]] = false;
@@ -119,7 +119,7 @@ static void end_of_curve(const CurveSet *set, int curve, bool last, const MeshTr
     *outward = vec3_unit(vec3_sub(*end, far));
 }
 
-// Whether another curve goes on, or aside, from this one's end: it is then no vessel's end.
+// Whether another curve continues, or aside, from this one's end: then it is not the end of a vessel.
 static bool is_junction(const CurveSet *set, int curve, Vec3 end, Vec3 outward, double radius)
 {
     for (int c = 0; c < set->curve_count; c++) {
@@ -203,7 +203,7 @@ int wall_opening_near(const Wall *wall, Vec3 end, Vec3 outward, double radius)
         const Opening *opening = &wall->opening[o];
         Vec3 to = vec3_sub(opening->center, end);
         double along = vec3_dot(to, outward), aside = sqrt(fmax(0, vec3_norm2(to) - along * along));
-        // slits that a bad mesh has elsewhere are no ends: neither their size nor their direction fits
+        // slits in a bad mesh are not ends: neither their size nor their direction fits
         if (opening->radius > 0.4 * radius && opening->radius < 3 * radius && vec3_dot(opening->normal, outward) > 0.3 && fabs(along) < 4 * radius &&
             aside < 1.5 * opening->radius && vec3_norm(to) < least) {
             least = vec3_norm(to);

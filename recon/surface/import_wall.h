@@ -1,4 +1,4 @@
-// Internal to import: the wall, a surface with the flat lids over its vessels' ends taken off.
+// Internal to import: the wall, i.e. the surface without the flat lids over its vessels' ends.
 #ifndef SELDINGER_RECON_SURFACE_IMPORT_WALL_H
 #define SELDINGER_RECON_SURFACE_IMPORT_WALL_H
 
@@ -18,10 +18,10 @@ typedef struct Wall {        // the surface without lids
     int opening_count, lid_count;
 } Wall;
 
-// Takes flat lids off where a curve's end points at one. False where memory lacks.
+// Removes flat lids at which a curve's end points. False if out of memory.
 bool wall_open(const SurfaceMesh *mesh, const CurveSet *set, Wall *wall);
 void wall_close(Wall *wall);
-// The opening at which a vessel of that radius ends that runs to `end` along `outward`; -1 where there is none.
+// The opening at which a vessel of that radius ends that runs to `end` along `outward`; -1 if there is none.
 int wall_opening_near(const Wall *wall, Vec3 end, Vec3 outward, double radius);
 
 #endif

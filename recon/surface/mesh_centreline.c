@@ -1,9 +1,11 @@
-// See mesh_centreline.h. Symbols: d distance to the wall, s along a way, r the largest d of a way beyond the curves' spheres. A way counts where
+// See mesh_centreline.h. Symbols: d distance to the wall, s arc length along a path, r the largest d of a path beyond the curves' spheres. A path is
+// accepted if
 //   integral (d / r)^2 ds > 1.0 r
-// which is length less about 0.7 r for a tube, 0.5 to 0.6 r in the corners of lids, 0.33 cot(angle) r in a wedge; a sac, where d rises again beyond its
-// neck, has 0.7 r or more and gives one curve. Tried and lost: centres of balls that touch the wall twice, joined as the wall's triangles are (facets
-// of coarse surfaces tear them apart: 279 curves of the aortic arch), covering by spheres 1.5 d wide (they reach into kissing vessels), cells of an
-// octree as small as each vessel asks for (as much of the arch, half as fast, short branches lost), and a start from any end (short trunks lost).
+// which is length less about 0.7 r for a tube, 0.5 to 0.6 r in the corners of lids, 0.33 cot(angle) r in a wedge; a sac, where d rises again beyond
+// its neck, has 0.7 r or more and gives one curve. Tried and rejected: centres of balls that touch the wall twice, joined as the wall's triangles are
+// (facets of coarse surfaces tear them apart: 279 curves of the aortic arch), covering by spheres 1.5 d wide (they reach into kissing vessels), cells
+// of an octree as small as each vessel asks for (as much of the arch, half as fast, short branches lost), and a start from any end (short trunks
+// lost).
 #include "recon/surface/mesh_centreline.h"
 
 #include "base/same_math.h"
@@ -37,7 +39,7 @@ typedef struct Finding {
     int *end_point;          // … and the curve's point a radius before it
 } Finding;
 
-// --- ways ---
+// --- paths ---
 
 static int compare_tips(const void *a, const void *b)
 {
@@ -186,7 +188,7 @@ static void path_free(Path *path)
 static void path_centre(const Finding *f, Path *path)
 {
     for (int pass = 0; pass < CENTRING_PASSES; pass++) {
-        // a free end goes where its neighbours go, before the last passes let it be
+        // a free end follows its neighbours, except in the last passes
         double smoothing = pass < CENTRING_PASSES - 3 ? 0.4 : 0.15;
         Vec3 before = path->point[0], first = path->point[0], last = path->point[path->count - 1];
         for (int i = 0; i < path->count; i++) {
@@ -201,7 +203,7 @@ static void path_centre(const Finding *f, Path *path)
                     double angle = PI * k / RAY_PAIRS;
                     Vec3 d = vec3_add(vec3_scale(u, same_cos(angle)), vec3_scale(v, same_sin(angle)));
                     double there = mesh_tree_ray(f->tree, here, d, limit, NULL), back = mesh_tree_ray(f->tree, here, vec3_negate(d), limit, NULL);
-                    // a ray that leaves into a branch says nothing
+                    // a ray into a branch gives no information
                     if (isfinite(there) && isfinite(back))
                         shift = vec3_add_scaled(shift, (there - back) / RAY_PAIRS, d);
                 }
@@ -256,7 +258,7 @@ static bool find_lid(const Finding *f, Vec3 from, Vec3 outward, double radius, V
     return most > LID_SHARE * LID_RAYS;
 }
 
-// Leads the last point on to the lid ahead, which is about a radius off; false where memory lacks.
+// Leads the last point on to the lid ahead, which is about a radius off; false if out of memory.
 static bool path_lead_out(const Finding *f, Path *path)
 {
     int tip = path->count - 1, back = tip;
@@ -287,7 +289,7 @@ static void path_trim(Path *path)
     // the corner of a lid that was cut obliquely, or of a flare, is sharper: its widest sphere lies up to three radii off
     if (path->radius[tip] < 0.5 * in_wedge)
         widest = in_wedge;
-    // once only: a vessel that tapers would be eaten up
+    // only once, else a tapering vessel would be consumed
     while (keep > 1 && path->radius[tip] < 0.9 * widest && path->radius[keep] < 0.95 * widest)
         keep--;
     path->count = keep + 1;
@@ -340,7 +342,7 @@ static bool add_curve(Finding *f, Path *path, int *tip, int *front)
     return true;
 }
 
-// Where the way from a voxel first is well within a curve's sphere, or the start.
+// Where the path from a voxel first is well within a curve's sphere, or the start.
 static int way_joins(const Finding *f, int voxel)
 {
     while (f->from[voxel] >= 0 && !(f->owner[voxel] >= 0 && f->depth[voxel] < ATTACHED))
@@ -348,7 +350,7 @@ static int way_joins(const Finding *f, int voxel)
     return voxel;
 }
 
-// Whether the way from a tip leaves the curves so far as a vessel or a sac does, by more than a few voxels.
+// Whether the path from a tip leaves the curves as far as a vessel or an aneurysm does, by more than a few voxels.
 static bool is_branch(const Finding *f, int tip)
 {
     const float *d = f->lumen->distance;
@@ -365,7 +367,7 @@ static bool is_branch(const Finding *f, int tip)
         return false;
     if (sum > BRANCH * widest || (widest > SAC_WIDENS * d[entry] && sum > SAC * widest))
         return true;
-    // a short wide stub, where it is no flattened vessel's end
+    // a short wide stub, unless it is the end of a flattened vessel
     int own = f->owner[entry];
     bool is_stub = own >= 0 && widest > STUB_WIDTH * f->set->radius[own] && sum > STUB * widest;
     for (int e = 0; is_stub && e < f->end_count; e++)
@@ -373,7 +375,7 @@ static bool is_branch(const Finding *f, int tip)
     return is_stub;
 }
 
-// A voxel beside the tip whose way comes from elsewhere: the tip is where a loop closes. -1 where there is none. `join`: where the tip's way joins.
+// A voxel next to the tip whose path comes from elsewhere: a loop closes at the tip. -1 if there is none. `join`: where the tip's path joins.
 static int beyond_loop(const Finding *f, int tip, int join)
 {
     int place[3], best = -1;
@@ -526,7 +528,7 @@ static bool find_curves(Finding *f, int start)
 
 // --- components ---
 
-// Numbers the lumens; the one that is wanted, -1 where memory lacks or there is none. `last`: a voxel of it at one of its ends.
+// Numbers the lumens; returns the requested one, -1 if out of memory or there is none. `last`: a voxel of it at one of its ends.
 static int label(const Lumen *l, const ImportOptions *options, int *component, int *last)
 {
     int *queue = malloc(((size_t)l->count + 1) * sizeof *queue), count = 0, most = 0, wanted = -1, widest = -1, nearest = -1;
@@ -605,7 +607,7 @@ CurveSet *mesh_centreline(const SurfaceMesh *mesh, const ImportOptions *options,
                      .from = malloc(n * sizeof(int)), .owner = malloc(n * sizeof(int)), .depth = malloc(n * sizeof(float))};
         good = component && f.cost && f.length && f.from && f.owner && f.depth;
         f.wanted = good ? label(l, options, component, &start) : -1;
-        // once from any end to learn of the ends, then from the one that is the root
+        // once from any end to find the ends, then from the root
         if (good && f.wanted >= 0) {
             good = find_curves(&f, start);
             int root = good && f.end_count ? choose_start(&f, options) : start;

@@ -1,17 +1,17 @@
-// Centrelines of a surface alone (Sato et al. 2000, TEASAR, with local radii). The inside of the closed surface is cut into voxels (mesh_lumen.h). From
-// one end the cheapest ways by length / distance to the wall^2 run along the middle (Antiga, Ene-Iordache and Remuzzi 2003 use 1 / radius). The way to
-// the farthest voxel is the first curve; every other voxel that is farther than all around it may be the end of a branch, and is one where its way
-// leaves the inscribed spheres of the curves so far by more than a tube's, not by a bump's or a corner's length. A vessel that closes a loop is met from
-// both sides: its curve goes through, unless it is pinched there (vessels that touch). Curves are then smoothed and
-// centred between the walls around them, on the surface itself, and led on to flat lids.
+// Centrelines of a surface alone (Sato et al. 2000, TEASAR, with local radii). The inside of the closed surface is cut into voxels (mesh_lumen.h).
+// From one end the cheapest paths by length / distance to the wall^2 run along the middle (Antiga, Ene-Iordache and Remuzzi 2003 use 1 / radius). The
+// path to the farthest voxel is the first curve; every other local maximum of distance may be the end of a branch, and is one if its path leaves the
+// inscribed spheres of the existing curves by the length of a tube, not of a bump or corner. A vessel that closes a loop is reached from both sides:
+// its curve passes through, unless it is pinched there (touching vessels). Curves are then smoothed and centred between the walls around them, on the
+// surface itself, and led on to flat lids.
 #ifndef SELDINGER_RECON_SURFACE_MESH_CENTRELINE_H
 #define SELDINGER_RECON_SURFACE_MESH_CENTRELINE_H
 
 #include "recon/surface/import_surface.h"
 
 // Curves with inscribed radii, each but the first beginning at a point of an earlier one; the first begins at the widest end, or that nearest to
-// options->root. `mesh` is mended. Of several lumens the largest is taken, or that which is nearest to options->root. Pinched loops are
-// added to the report's. NULL with faults: no memory, no lumen found.
+// options->root. `mesh` is repaired. Of several lumens the largest is used, or the nearest to options->root. Pinched loops are added to the report's.
+// NULL with faults: no memory, no lumen found.
 CurveSet *mesh_centreline(const SurfaceMesh *mesh, const ImportOptions *options, ImportReport *report, const char *name, Faults *faults);
 
 #endif

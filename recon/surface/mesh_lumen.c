@@ -141,7 +141,7 @@ static bool is_left(const SurfaceMesh *mesh, int a, int b, double y, double z)
     return a < b ? left : !left;
 }
 
-// The crossings of all rows with the wall, sorted; NULL where memory lacks.
+// The crossings of all rows with the wall, sorted; NULL if out of memory.
 static Crossing *find_crossings(const SurfaceMesh *mesh, const Lumen *l, size_t *count)
 {
     size_t room = 1 << 16;
@@ -314,8 +314,8 @@ static void measure_near(void *context, long r)
     }
 }
 
-// What is farther from the wall takes the nearest of its neighbours' triangles, to and fro until nothing changes (Danielsson 1980): a tree has to look at
-// all triangles around a vessel's middle.
+// Voxels farther from the wall take the nearest of their neighbours' triangles, in alternating sweeps until nothing changes (Danielsson 1980),
+// because a tree search would visit all triangles around a vessel's middle.
 static void measure_far(const Measuring *m)
 {
     Lumen *l = m->lumen;
@@ -348,7 +348,7 @@ static void measure_far(const Measuring *m)
     }
 }
 
-// Whether the way between two voxels' middles leaves the lumen. A way that meets no wall within both distances needs no ray.
+// Whether the line between two voxels' middles leaves the lumen. No ray is needed if both distances to the wall cover it.
 static bool is_walled(const Measuring *m, int a, int b, int winding, double steps)
 {
     const Lumen *l = m->lumen;
@@ -415,7 +415,7 @@ Lumen *lumen_create(const SurfaceMesh *mesh, const MeshTree *tree, int voxels_ma
     // the grid of rows is bounded too
     double h = fmax(smallest_radius(mesh, tree, size) / VOXELS_PER_RADIUS, same_cbrt(fabs(volume) / voxels_max));
     l->h = fmax(h, size / 4000);
-    // off the numbers that vertices like to have
+    // offset from round coordinates, which vertices often have
     l->origin = vec3_add_scaled(low, -l->h, vec3(0.3819660113, 0.4142135624, 0.2679491924));
     Vec3 extent = vec3_sub(high, l->origin);
     l->size[0] = (int)ceil(extent.x / l->h) + 1;

@@ -1,6 +1,6 @@
-// The inside of a closed surface as a sparse grid of cubic voxels, each with its exact distance to the wall. A row of voxels along x is inside where the
-// winding number is: entries less exits of the wall before it, so that parts of a surface that overlap are one lumen. Voxels are no neighbours where the
-// way between their middles leaves the lumen: vessels that touch stay apart, however thin the wall.
+// The inside of a closed surface as a sparse grid of cubic voxels, each with its exact distance to the wall. A row of voxels along x is inside where
+// the winding number is: entries less exits of the wall before it, so that parts of a surface that overlap are one lumen. Voxels are not neighbours
+// if the line between their middles leaves the lumen: touching vessels stay separate, however thin the wall.
 #ifndef SELDINGER_RECON_SURFACE_MESH_LUMEN_H
 #define SELDINGER_RECON_SURFACE_MESH_LUMEN_H
 
@@ -28,14 +28,14 @@ typedef struct Lumen {
     int spoilt_rows;         // with as many entries as exits nowhere: taken from the row before
 } Lumen;
 
-// The surface with a fan over every opening (loop of open edges); `mesh` is mended. False where memory lacks.
+// The surface with a fan over every opening (loop of open edges); `mesh` is repaired. False if out of memory.
 bool mesh_close(const SurfaceMesh *mesh, SurfaceMesh *closed);
-// Voxels a sixth as wide as the smallest radii, or so wide that there are about `voxels_max`. `tree` is of `mesh`. NULL where memory lacks.
+// Voxels a sixth as wide as the smallest radii, or so wide that there are about `voxels_max`. `tree` is of `mesh`. NULL if out of memory.
 Lumen *lumen_create(const SurfaceMesh *mesh, const MeshTree *tree, int voxels_max, int threads);
 void lumen_free(Lumen *lumen);
 void lumen_place(const Lumen *lumen, int voxel, int place[3]);
 Vec3 lumen_middle(const Lumen *lumen, int voxel);
-// The voxel at a place, -1 outside.
+// The voxel at a point, -1 outside.
 int lumen_voxel(const Lumen *lumen, int x, int y, int z);
 // The voxels that share a corner with this one and no wall between, and how far their middles are [voxels]; returns how many.
 int lumen_neighbours(const Lumen *lumen, int voxel, int other[LUMEN_NEIGHBOURS], float step[LUMEN_NEIGHBOURS]);

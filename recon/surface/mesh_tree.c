@@ -217,7 +217,7 @@ static double ray_triangle(Vec3 from, Vec3 d, Vec3 a, Vec3 b, Vec3 c)
     return u >= -1e-9 && v >= -1e-9 && u + v <= 1 + 1e-9 && t > 0 ? t : INFINITY;
 }
 
-// How far the ray goes before the box; INFINITY where it misses it.
+// How far the ray goes before the box; INFINITY if it misses it.
 static double ray_enters(const Box *box, const double from[3], const double direction[3], const double inverse[3], double reach)
 {
     const double low[3] = {box->low.x, box->low.y, box->low.z}, high[3] = {box->high.x, box->high.y, box->high.z};

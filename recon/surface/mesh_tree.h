@@ -6,17 +6,17 @@
 
 typedef struct MeshTree MeshTree;
 
-// The mesh must outlive the tree. NULL where memory lacks.
+// The mesh must outlive the tree. NULL if out of memory.
 MeshTree *mesh_tree_create(const SurfaceMesh *mesh);
 void mesh_tree_free(MeshTree *tree);
 // Distance to the nearest point `foot` of triangle `triangle` [mm]; INFINITY and the outputs untouched where none is within `reach`.
 double mesh_tree_nearest(const MeshTree *tree, Vec3 point, double reach, Vec3 *foot, int *triangle);
 // Distance to a triangle, and its nearest point.
 double mesh_triangle_nearest(const SurfaceMesh *mesh, int triangle, Vec3 point, Vec3 *foot);
-// Distance along unit `direction` to the first hit within `reach`; INFINITY where there is none. `triangle` may be NULL.
+// Distance along unit `direction` to the first hit within `reach`; INFINITY if there is none. `triangle` may be NULL.
 double mesh_tree_ray(const MeshTree *tree, Vec3 from, Vec3 direction, double reach, int *triangle);
 // Solid angle of the surface seen from the point in units of 4 pi: 1 inside a closed surface with outward normals, 0 outside, between them near
-// openings. Cost: all triangles.
+// openings. Visits all triangles.
 double mesh_winding(const SurfaceMesh *mesh, Vec3 point);
 
 #endif

@@ -1,4 +1,4 @@
-// See surface_file.h. Text formats run a cursor over a NUL-ended copy; one that turned bad stays bad.
+// See surface_file.h. Text formats are read by a cursor over a NUL-terminated copy; once bad it stays bad.
 #include "recon/surface/surface_file.h"
 
 #include "base/whole_file.h"
@@ -13,7 +13,7 @@
 static const double COORDINATE_MAX = 1e9;
 enum { COUNT_MAX = 100000000, SURFACE_BYTES_MOST = INT_MAX };
 
-// A mesh that grows while it is read.
+// A mesh being read.
 typedef struct Growing {
     SurfaceMesh mesh;
     int vertex_capacity, triangle_capacity;
@@ -214,7 +214,7 @@ static void parse_stl_binary(Growing *g, const unsigned char *bytes, size_t leng
 
 // --- OBJ ---
 
-// The vertex of `7`, `7/1`, `7/1/3`, `-1`: from 0; -1 where it is none.
+// The vertex of `7`, `7/1`, `7/1/3`, `-1`: from 0; -1 if it is none.
 static int take_obj_index(Cursor *c, int vertex_count)
 {
     char *end;
@@ -467,7 +467,7 @@ static void parse_vtp(Growing *g, const char *bytes, size_t length)
     vtp_free(data);
 }
 
-// --- which ---
+// --- format detection ---
 
 typedef enum { KIND_NONE, KIND_STL_TEXT, KIND_STL_BINARY, KIND_PLY, KIND_OBJ, KIND_VTP } Kind;
 
@@ -477,7 +477,7 @@ static bool name_ends(const char *name, const char *end)
     return n >= m && !strcasecmp(name + n - m, end);
 }
 
-// `whole`: all of the file is here.
+// `whole`: the bytes are the complete file.
 static Kind kind_of(const char *text, size_t length, const char *name, bool whole)
 {
     Cursor c = {text, 1};

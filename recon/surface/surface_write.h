@@ -8,7 +8,7 @@
 
 typedef struct SurfaceFigures {
     TriangleMesh *mesh;
-    double *error, *distance;   // (V) [mm], both NULL where the tree has no points
+    double *error, *distance;   // (V) [mm], both NULL if the tree has no points
 } SurfaceFigures;
 
 void surface_print_stl(FILE *out, const SurfaceFigures *surface);

@@ -21,7 +21,7 @@ typedef struct Number {      // type of an array's entries
     bool is_float, is_signed;
 } Number;
 
-typedef struct Array {       // an array that is wanted
+typedef struct Array {       // a requested array
     int section, role, piece, format;
     Number number;
     long line;
@@ -100,7 +100,7 @@ static void start_piece(Reader *reader, const char **list)
     }
 }
 
-// Values that an array may hold; how many indices the cells have, no head says.
+// Values that an array may hold; the number of cell indices is not declared.
 static size_t promised_values(const Reader *reader, int role)
 {
     size_t count = reader->promised[reader->section], most = role == ROLE_CONNECTIVITY ? VALUES_MOST : role == ROLE_POINTS ? 3 * count : count;
@@ -290,7 +290,7 @@ static const char *decode_compressed(const Reader *reader, Body body, size_t mos
 {
     unsigned char head[24];
     size_t w = (size_t)reader->header_size;
-    // a base64 header is one text of 3 + blocks words: its first three words are looked at, then it is read again as a whole
+    // a base64 header is one string of 3 + blocks words: read the first three words, then all of it again
     Body peek = body;
     if (!body_take(&peek, 3 * w, head))
         return cut_short;

@@ -1,6 +1,6 @@
-// VTK XML PolyData (.vtp), as far as surfaces and centrelines need it: points, lines, polygons, strips and the scalar point arrays of all
-// pieces. Arrays may be ascii, base64 or appended (raw or base64), plain or compressed by zlib; lz4 and lzma are refused with a hint.
-// Source: VTK File Formats, "XML file formats" (VTK user's guide). The caller owns the data.
+// VTK XML PolyData (.vtp), as far as surfaces and centrelines need it: points, lines, polygons, strips and the scalar point arrays of all pieces.
+// Arrays may be ascii, base64 or appended (raw or base64), uncompressed or compressed by zlib; lz4 and lzma are refused with a hint. Source: VTK File
+// Formats, "XML file formats" (VTK user's guide). The caller owns the data.
 #ifndef SELDINGER_RECON_SURFACE_VTP_FILE_H
 #define SELDINGER_RECON_SURFACE_VTP_FILE_H
 
@@ -16,7 +16,7 @@ typedef struct VtpCells {
 typedef struct VtpData {
     int point_count;         // P
     Vec3 *point;             // (P) finite
-    double *radius;          // (P) a scalar point array named MaximumInscribedSphereRadius, Radius or radius; NULL where a piece has none
+    double *radius;          // (P) a scalar point array named MaximumInscribedSphereRadius, Radius or radius; NULL if a piece has none
     VtpCells line, polygon, strip;
 } VtpData;
 

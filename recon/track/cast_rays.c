@@ -1,8 +1,8 @@
-// Along a ray x(t) = C + t u the image is sampled by cubic B-spline approximation at t_i = i L / (N - 1), smoothed by a moving average where
-// noise asks for it, and differentiated by central differences; a parabola through the smallest difference and its neighbours places the edge.
+// Along a ray x(t) = C + t u the image is sampled by cubic B-spline approximation at t_i = i L / (N - 1), smoothed by a moving average if the image
+// is noisy, and differentiated by central differences; a parabola through the smallest difference and its neighbours places the edge.
 //
-// A ray that runs along the lumen has no edge: what it reports is noise, and every such point lowers the inlier rate of the truth. Rays whose
-// steepest fall is below `edge` times the brightness range around the centre are discarded.
+// A ray along the lumen has no edge: its result is noise, and each such point lowers the inlier rate of the true cylinder. Rays whose steepest fall
+// is below `edge` times the brightness range around the centre are discarded.
 #include "recon/track/cast_rays.h"
 #include "recon/volume/bspline.h"
 
@@ -22,7 +22,7 @@ int sphere_level_of(int count)
 
 enum { MAX_DIRECTIONS = 2562 };
 
-// A vertex once only: an edge's middle is met from both of its faces.
+// Each midpoint once: an edge belongs to two faces.
 static int add_direction(Vec3 *out, int *count, Vec3 v)
 {
     for (int i = 0; i < *count; i++)
@@ -97,7 +97,7 @@ static void smooth_ray(RayProfile *ray, double width)
 
 static double fall(const RayProfile *ray, int i) { return (double)ray->value[i + 1] - (double)ray->value[i - 1]; }
 
-// The steepest place among samples [first, last], refined; its fall per mm goes to *slope (negative).
+// The steepest place among samples [first, last], refined; *slope is its (negative) gradient per mm.
 static double steepest(const RayProfile *ray, int first, int last, double *slope)
 {
     double shift = 0, b = fall(ray, first);

@@ -1,5 +1,5 @@
-// Candidate points on a vessel's surface: rays from a centre, each giving the place where the image falls most steeply along it.
-// Kerrien et al. 2017, 3.1.1 and 3.2. Nothing here keeps state; the caller owns the arrays.
+// Candidate points on a vessel's surface: rays from a centre, each with the point of steepest descent of the image along it. Kerrien et al. 2017,
+// 3.1.1 and 3.2. No state is kept; the caller owns the arrays.
 #ifndef SELDINGER_RECON_TRACK_CAST_RAYS_H
 #define SELDINGER_RECON_TRACK_CAST_RAYS_H
 
@@ -14,7 +14,7 @@ typedef struct RayOptions {
     double edge;             // least fall per voxel, as a share of the brightness range around the centre; 0 keeps every ray
 } RayOptions;
 
-// The vertices of an icosahedron whose edges were halved `level` times: 12, 42, 162, 642, 2562 unit vectors (level 0 … 4). `out` holds as many.
+// The vertices of an icosahedron subdivided `level` times (0 to 4): 12, 42, 162, 642 or 2562 unit vectors. `out` has space for all of them.
 int sphere_direction_count(int level);
 void sphere_directions(int level, Vec3 *out);
 // The level that has `count` vertices, or -1.
@@ -25,7 +25,8 @@ int sphere_level_of(int count);
 int cast_rays(const Volume *volume, Vec3 center, const Vec3 *direction, int count, const RayOptions *options, Vec3 *point);
 // The first fall through a brightness, moved to the steepest place within a voxel: distance[i] [mm], 0 where ray i has none.
 void cast_rays_level_edge(const Volume *volume, Vec3 center, const Vec3 *direction, int count, const RayOptions *options, double level, double *distance);
-// The same with the level half way between the centre's brightness and the volume's minimum: for sacs, whose rays may go on into other vessels.
+// The same with the level halfway between the centre's brightness and the volume's minimum: for aneurysms, whose rays may continue into other
+// vessels.
 void cast_rays_first_edge(const Volume *volume, Vec3 center, const Vec3 *direction, int count, const RayOptions *options, double *distance);
 
 #endif

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 
 enum { ACROSS_MOST = 6, ALONG_MOST = 400, SMOOTHINGS = 3 };
-static const double LEAST_CLEAR = 0.05;   // that a step is charged for
+static const double LEAST_CLEAR = 0.05;   // minimal step length that is charged
 
 typedef struct Lattice {
     Vec3 from, step[3];      // step[2] along the link
@@ -15,7 +15,7 @@ typedef struct Lattice {
     int size[3];
     float *clear;            // (size[2], size[1], size[0]) < 0: no place
     float *cost;
-    int *before;             // the place that the path comes from
+    int *before;             // predecessor on the path
 } Lattice;
 
 float link_step_cost(float length, double a, double b)

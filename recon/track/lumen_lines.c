@@ -1,4 +1,4 @@
-// Cubic cells hashed by their place; a line stands in every cell that the box around its capsule meets. Cells are as wide as the usual capsule is.
+// A spatial hash of cubic cells; a line is listed in every cell that its capsule's bounding box meets. Cells are as wide as the usual capsule is.
 #include "recon/track/lumen_lines.h"
 
 #include <stdint.h>
@@ -36,7 +36,7 @@ static Range range_of(const LumenLine *line, double cell)
     return range;
 }
 
-// Counts the entries of each slot, or with `fill` puts them there: start[s] is then the next free place of slot s.
+// Counts the entries of each slot or, with `fill`, stores them; start[s] is then the next free position of slot s.
 static void each_cell(LumenLines *lines, int count, bool fill)
 {
     for (int i = 0; i < count; i++) {
@@ -53,7 +53,7 @@ static void each_cell(LumenLines *lines, int count, bool fill)
     }
 }
 
-// The median is not needed, the mean is near enough; no line may fill more than a few thousand cells.
+// The mean is close enough to the median; no line may fill more than a few thousand cells.
 static double cell_size(const LumenLine *line, int count)
 {
     double sum = 0, longest = 0;
@@ -90,7 +90,7 @@ LumenLines *lumen_lines_create(const LumenLine *line, int count)
         return NULL;
     }
     each_cell(lines, count, true);
-    for (size_t s = slots; s > 0; s--)   // filling moved each start to the slot's end
+    for (size_t s = slots; s > 0; s--)   // filling advanced each start to the slot's end
         lines->start[s] = lines->start[s - 1];
     lines->start[0] = 0;
     return lines;

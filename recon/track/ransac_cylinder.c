@@ -1,15 +1,15 @@
 // A point P at q = P - C has the distance rho = |q - (q.d) d| from the axis (C, d); its residual is e = rho - r. With n the unit radial vector and
 // e1, e2 across d, moving C by a e1 + b e2 and tilting d by p e1 + t e2 changes it by
 //   de = -(n.e1) a - (n.e2) b - (q.d) ((n.e1) p + (n.e2) t) - dr,
-// which is all that Gauss-Newton needs. It reaches the minimum that Powell's method finds (a test compares them) in a tenth of the time, and
-// keeps no state between calls as NLopt's PRAXIS does.
+// which is all that Gauss-Newton needs. It reaches the minimum of Powell's method (a test compares them) in a tenth of the time and, unlike NLopt's
+// PRAXIS, keeps no state between calls.
 #include "recon/track/ransac_cylinder.h"
 
 #include <math.h>
 #include <nlopt.h>
 #include <string.h>
 
-// Kernels compiled for several instruction sets; the sanitizers do not know how to start them.
+// Kernels compiled for several instruction sets; the sanitizers cannot start them.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define ISA_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
@@ -38,7 +38,7 @@ ISA_CLONES static int count_ring(const float *u, const float *v, int count, floa
     return inside;
 }
 
-// Trials are drawn and their circles computed in batches: what a batch drew beyond the last trial is not used.
+// Trials are drawn and computed in batches; surplus draws of the last batch are discarded.
 enum { BATCH = 16 };
 typedef struct Circles {
     double u0[BATCH], v0[BATCH], ax[BATCH], ay[BATCH], bx[BATCH], by[BATCH];   // first point; the others as seen from it
@@ -46,7 +46,7 @@ typedef struct Circles {
     int fits[BATCH];         // not on a line, and about within the limits
 } Circles;
 
-// A trial takes three numbers, whatever comes of it.
+// Each trial consumes three random numbers, whatever its outcome.
 static void draw_triples(Circles *c, const float *u, const float *v, int count, Random *random)
 {
     for (int k = 0; k < BATCH; k++) {
@@ -150,7 +150,7 @@ static Cylinder moved(const Cylinder *c, Vec3 e1, Vec3 e2, const double x[5])
                       vec3_unit(vec3_add_scaled(vec3_add_scaled(c->axis, x[2], e1), x[3], e2)), c->height};
 }
 
-// A x = b for a symmetric positive definite 5 x 5 matrix by Cholesky; false where it is not.
+// A x = b for a symmetric positive definite 5 x 5 matrix by Cholesky; false if it is not.
 static bool solve5(double a[5][5], double b[5])
 {
     for (int j = 0; j < 5; j++) {
@@ -248,7 +248,7 @@ static Cylinder refine_powell(const Cylinder *start, const Vec3 *point, const in
     nlopt_set_xtol_rel(powell, 1e-7);
     nlopt_set_xtol_abs1(powell, 1e-8);
     nlopt_set_maxeval(powell, 4000);
-    nlopt_optimize(powell, x, &energy);   // whatever it says, x is the best point it saw
+    nlopt_optimize(powell, x, &energy);   // whatever it returns, x is the best point found
     nlopt_destroy(powell);
     return moved(start, e1, problem.e2, x);
 }
@@ -262,7 +262,7 @@ double cylinder_refine(Cylinder *cylinder, const Vec3 *point, const int *inlier,
         *good = vec3_is_finite(c.center) && vec3_is_finite(c.axis) && c.radius > 0 && isfinite(c.radius);
     }
     if (*good) {
-        // a tilt swings the centre about nothing in particular: put it back beside the old one
+        // a tilt moves the centre along the axis: project it back next to the old one
         c.center = vec3_add_scaled(c.center, vec3_dot(vec3_sub(cylinder->center, c.center), c.axis), c.axis);
         *cylinder = c;
     }

@@ -49,7 +49,7 @@ static bool is_in_consensus(const Tracker *t, Vec3 x, int node_count)
 
 static double power_of(const Cylinder *c, Vec3 x) { return vec3_norm2(vec3_sub(x, c->center)) - c->radius * c->radius; }
 
-// Does a vessel's node own x rather than the sac? Such points were seen through the neck and lie on the vessel's wall.
+// Does a vessel's node own x rather than the sac? Such points were reached through the neck and lie on the vessel's wall.
 static bool is_vessels(const Tracker *t, Vec3 x, int node_count, const TrackNode *sac, int sac_count)
 {
     double least = HUGE_VAL;
@@ -121,7 +121,7 @@ static void neck_free(Neck *neck)
 
 static bool follows(const Track *tree, int i) { return i > 0 && tree->node[i].parent == i - 1 && tree->node[i].branch == tree->node[i - 1].branch; }
 
-// Nodes lo … hi of a branch become one, at lo; every link to them leads there. Their points are its points.
+// Merges nodes lo … hi of a branch into node lo, with their links and points.
 static bool merge_nodes(Track *tree, int lo, int hi, const Cylinder *hub)
 {
     TrackNode node = tree->node[lo];
@@ -140,7 +140,7 @@ static bool merge_nodes(Track *tree, int lo, int hi, const Cylinder *hub)
     }
     node.point_start = used;
     node.point_count = (int)points;
-    for (int i = lo; i <= hi; i++) {   // a copy at the end: the old places are left unused
+    for (int i = lo; i <= hi; i++) {   // a copy at the end: the old space stays unused
         memcpy(tree->point + used, tree->point + tree->node[i].point_start, (size_t)tree->node[i].point_count * sizeof *tree->point);
         used += tree->node[i].point_count;
     }
@@ -158,9 +158,10 @@ static bool merge_nodes(Track *tree, int lo, int hi, const Cylinder *hub)
     return true;
 }
 
-// The node that the sac hangs on, and the centre that hangs there: -1 where no ray finds a neck. A tool that follows its node from neighbour to neighbour
-// must find the way from every vessel cell that borders on the sac's into it and out again, but the tree has one link: the vessel nodes along the neck
-// become one. It stands where they stood, weighted by their share of the neck, and its radius keeps the border between vessel and sac where it was.
+// The node to which the sac is attached, and the centre attached there: -1 if no ray finds a neck. A tool that follows its node from neighbour to
+// neighbour must find its way from every vessel cell that borders on the sac's into it and out again, but the tree has one link: the vessel nodes
+// along the neck become one. It stands where they stood, weighted by their share of the neck, and its radius keeps the border between vessel and sac
+// where it was.
 static int make_hub(Tracker *t, const SacJob *job, const TrackNode *sac, int sac_count, int *center)
 {
     Neck neck;
@@ -179,7 +180,7 @@ static int make_hub(Tracker *t, const SacJob *job, const TrackNode *sac, int sac
             best = i;
     if (best >= 0) {
         int lo = best, hi = best;
-        // vessels that touch the sac elsewhere are no part of its neck
+        // vessels that touch the sac elsewhere do not belong to its neck
         while (follows(tree, lo) && rays[lo - 1] >= 0.1 * rays[best])
             lo--;
         while (hi + 1 < tree->count && follows(tree, hi + 1) && rays[hi + 1] >= 0.1 * rays[best])
@@ -276,8 +277,8 @@ bool track_aneurysm(Tracker *t, const RbtAneurysm *aneurysm, const Vec3 *center,
         sac[i].point_count = kept;
         sac[i].inlier_rate = (double)kept / rays;
     }
-    // Prim's tree over the centres, from the one that hangs on the vessel
-    // a hub that took much of the neck changes who else borders on it: once or twice more
+    // Prim's spanning tree over the centres, from the one attached to the vessel merging much of the neck changes which nodes border on it, so repeat
+    // once or twice
     int root_center = 0, root = -1, before = 0;
     for (int i = 0; good && i < MAX_HUB_ROUNDS && before != t->tree.count && !t->out_of_memory; i++) {
         before = t->tree.count;

@@ -1,12 +1,12 @@
 // Prediction, eq. (1), (2): C* = C + s h/2 d, and r, d, h stay. Estimation: rays from C* give candidate points; for axis directions in order of their
-// angle with d* a RANSAC circle across each gives a cylinder, the first valid one is kept; refinement by least squares; the centre goes to the median of
-// the consensus set along the axis; new rays from there give the node's points and its height. Kerrien et al. 2017, section 3.
+// angle with d*, a RANSAC circle across each gives a cylinder, and the first valid one is kept; refinement by least squares; the centre goes to the
+// median of the consensus set along the axis; new rays from there give the node's points and its height. Kerrien et al. 2017, section 3.
 //
-// What was tried and lost: the paper as written stalls at bifurcations and beside a sac, where the consensus lies upstream and the median pulls the
-// centre back to where it came from. A failed step is repeated from the last good node with longer steps, which look past such a place; then the
-// radius and the contrast must agree with the vessel, or branches are invented off open ends. That does not suffice at a giant aneurysm: the natural
-// way is straight on into the sac, and the tracking ends at its bottom. Where a branch swells or ends, the lumen ahead is searched for tubes that
-// leave it (rbt_exits.h), and the branch goes on from the widest one that tracks.
+// What was tried and rejected: the paper's method as written stalls at bifurcations and beside a sac, where the consensus lies upstream and the
+// median pulls the centre back to where it came from. A failed step is repeated from the last good node with longer steps, which look past such a
+// place; then the radius and the contrast must agree with the vessel, or spurious branches grow from open ends. That does not suffice at a giant
+// aneurysm: the natural path is straight into the sac, and the tracking ends at its bottom. Where a branch swells or ends, the lumen ahead is
+// searched for tubes that leave it (rbt_exits.h), and the branch continues from the widest one that tracks.
 #include "recon/track/rbt_branch.h"
 
 #include "base/heap.h"
@@ -26,13 +26,13 @@ enum { CONTRAST_MEMORY = 8, MAX_NODES = 200000 };
 
 // --- estimation, section 3.1 ---
 
-// Half of the sphere's vertices, +z first, then by angle with it: the directions of a RANSAC are these, turned so that +z is the predicted axis.
+// Half of the sphere's vertices, +z first, then by angle with it: RANSAC uses these directions, rotated so that +z is the predicted axis.
 void tracker_prepare_axes(Tracker *t)
 {
     Vec3 all[2 * MAX_AXES];
     int level = sphere_level_of(2 * t->axis_count), used = 0;
     sphere_directions(level, all);
-    // turn vertex 0 onto z, then keep the upper half; on the equator one of two opposite vertices
+    // turn vertex 0 onto z, then keep the upper half; of two opposite vertices on the equator keep one
     Vec3 z = all[0], x = vec3_normal_to(z), y = vec3_cross(z, x);
     for (int i = 0; i < 2 * t->axis_count; i++) {
         Vec3 a = vec3(vec3_dot(all[i], x), vec3_dot(all[i], y), vec3_dot(all[i], z));
@@ -40,14 +40,14 @@ void tracker_prepare_axes(Tracker *t)
         if (!upper || used == t->axis_count)
             continue;
         int k = used++;
-        for (; k > 0 && t->axis[k - 1].z < a.z - 1e-9; k--)   // insertion keeps the order of equals
+        for (; k > 0 && t->axis[k - 1].z < a.z - 1e-9; k--)   // insertion sort is stable
             t->axis[k] = t->axis[k - 1];
         t->axis[k] = a;
     }
     t->axis_count = used;
 }
 
-// Lumen on the axis less the darker half of a ring outside the wall: a neighbour in contact must not hide the vessel.
+// Brightness on the axis minus that of the darker half of a ring outside the wall, so that a touching neighbour does not hide the vessel.
 static double contrast_of(const Tracker *t, const Cylinder *c)
 {
     enum { RING = 16 };
@@ -65,8 +65,8 @@ static double contrast_of(const Tracker *t, const Cylinder *c)
     return inside - outside;
 }
 
-// RANSAC over the axis directions in order of their angle with the predicted one: the first valid cylinder, or the best of all if that is above
-// the relaxed rate. Returns its inlier rate, 0 where there is none.
+// RANSAC over the axis directions in order of their angle with the predicted one: the first valid cylinder, or the best of all if that is above the
+// relaxed rate. Returns its inlier rate, 0 if there is none.
 static double search_axes(Tracker *t, const Cylinder *predicted, int candidates, double threshold, Cylinder *out)
 {
     const RbtParameters *p = t->parameters;
@@ -95,13 +95,13 @@ static double median_along(Tracker *t, const Cylinder *c, int inliers)
     return inliers % 2 ? t->along[inliers / 2] : 0.5 * (t->along[inliers / 2 - 1] + t->along[inliers / 2]);
 }
 
-// The whole of the estimation step. False where no cylinder is valid (t->why says which part failed); else t->estimate holds the node.
+// The complete estimation step. False if no cylinder is valid (t->why says which part failed); else t->estimate holds the node.
 bool tracker_estimate(Tracker *t, const Cylinder *predicted, double relative_threshold)
 {
     const RbtParameters *p = t->parameters;
     RayOptions rays = {p->ray_length * predicted->radius, (int)p->n_p, p->ray_smoothing_voxels * t->voxel, p->ray_edge};
     double threshold = fmax(relative_threshold * predicted->radius, p->r_t_voxels * t->voxel);
-    int least = t->ray_count / 8;   // fewer edges than this are no tube
+    int least = t->ray_count / 8;   // fewer edges than this cannot be a tube
     Cylinder c;
     int n = cast_rays(t->volume, predicted->center, t->ray, t->ray_count, &rays, t->candidate);
     t->why = "too few rays meet a wall";
@@ -112,7 +112,7 @@ bool tracker_estimate(Tracker *t, const Cylinder *predicted, double relative_thr
         return false;
     if (vec3_dot(c.axis, predicted->axis) < 0)
         c.axis = vec3_negate(c.axis);
-    // refine, and select the consensus anew: the axis of the discrete set lags otherwise
+    // refine, and select the consensus again: otherwise the axis of the discrete set lags
     int inliers = cylinder_inliers(&c, t->candidate, n, threshold, t->inlier);
     for (int i = 0; i <= (int)p->refits; i++) {
         bool good;
@@ -243,7 +243,7 @@ static bool next_node(Tracker *t, const Track *branch, bool may_overlap)
     return false;
 }
 
-// --- past what is no cylinder ---
+// --- across openings where no cylinder fits ---
 
 void tracker_opening(Tracker *t, const Cylinder *c, double contrast)
 {
@@ -259,7 +259,7 @@ void tracker_opening(Tracker *t, const Cylinder *c, double contrast)
     t->estimate.node.inlier_rate = (double)kept / t->ray_count;
 }
 
-// Nodes on the straight way between two cylinders, in an opening where no cylinder fits: their points are the first walls that rays meet nearby.
+// Nodes on the straight line between two cylinders, in an opening where no cylinder fits: their points are the first walls that rays meet nearby.
 static bool append_junction(Tracker *t, Track *branch, const Cylinder *from, const Cylinder *to)
 {
     Vec3 way = vec3_sub(to->center, from->center);
@@ -277,8 +277,8 @@ static bool append_junction(Tracker *t, Track *branch, const Cylinder *from, con
 
 static bool next_node(Tracker *t, const Track *branch, bool may_overlap);
 
-// From an exit back towards the branch, until that is met or the tube widens into what is to be passed. Then joins: the branch up to `keep` nodes, the
-// junction, the way back turned round. False where the exit is no vessel or cannot be seen from the branch.
+// From an exit back towards the branch, until it is met or the tube widens into the opening. Then joins the branch up to `keep` nodes, the junction,
+// and the return path reversed. False if the exit is not a vessel or is not in line of sight of the branch.
 static bool join_exit(Tracker *t, Track *branch, int keep, const RbtExit *exit, int place)
 {
     const RbtParameters *p = t->parameters;
@@ -292,14 +292,14 @@ static bool join_exit(Tracker *t, Track *branch, int keep, const RbtExit *exit, 
         return false;
     t->estimate.node.cylinder.axis = vec3_negate(t->estimate.node.cylinder.axis);
     bool good = true;
-    int joined = -1;   // the node of the way back that is nearest to the branch and in plain sight of it
+    int joined = -1;   // the node of the return path nearest to the branch and in its line of sight
     double nearest = HUGE_VAL, brightest = 0.5;
     for (int i = 0; good && i < 40; i++) {
         const Cylinder *c = &t->estimate.node.cylinder;
         double link = tracker_link_brightness(t, last.center, c->center), distance = vec3_distance(c->center, last.center);
-        if (t->is_guarded && tracker_darkest(t, last.center, c->center) < t->floor)   // no leap over what is too faint for a vessel
+        if (t->is_guarded && tracker_darkest(t, last.center, c->center) < t->floor)   // do not bridge regions too faint for a vessel
             link = 0;
-        // it has met the branch, has come into the wide part, or has passed by
+        // it has met the branch, entered the wide part, or passed by
         if (i > 0 && (distance < last.radius || c->radius > 1.35 * tracker_usual_radius(&back) || (brightest >= 0.9 && link < 0.5)))
             break;
         good = track_append(&back, &t->estimate.node, t->estimate.point);
@@ -327,7 +327,7 @@ static bool join_exit(Tracker *t, Track *branch, int keep, const RbtExit *exit, 
     return good;
 }
 
-// The branch has swelled or ended: looks ahead for its continuation and joins the widest one that tracks.
+// The branch widens or ends: searches ahead for its continuation and joins the widest candidate that can be tracked.
 static bool look_ahead(Tracker *t, Track *branch)
 {
     enum { MAX_EXITS = 16 };
@@ -360,17 +360,17 @@ static double branch_length(const Track *branch)
     return length;
 }
 
-// Tracks from an estimate of the first node until the vessel ends. The branch's nodes are appended to `branch`, without parents.
-// `until_tree`: it is on its way back to its parent and ends inside another branch's tube.
+// Tracks from an estimate of the first node until the vessel ends. The branch's nodes are appended to `branch`, without parents. `until_tree`: the
+// branch is tracked back towards its parent and ends inside another branch's tube.
 void tracker_run(Tracker *t, const Cylinder *start, Track *branch, bool until_tree)
 {
     const RbtParameters *p = t->parameters;
     double length = 0;
-    bool left = tracker_node_around(t, start->center, 1) < 0;   // it may start within its parent's tube, and be there until it has left it
+    bool left = tracker_node_around(t, start->center, 1) < 0;   // it may start inside its parent's tube
     Cylinder predicted = *start;
     if (!tracker_estimate(t, &predicted, p->r_t) && !(p->r_t_second > 0 && tracker_estimate(t, &predicted, p->r_t_second)))
         return;
-    int rest = 0;   // nodes until it looks ahead again
+    int rest = 0;   // nodes until the next look ahead
     for (bool found = true; found;) {
         if (!track_append(branch, &t->estimate.node, t->estimate.point)) {
             t->out_of_memory = true;
@@ -393,7 +393,7 @@ void tracker_run(Tracker *t, const Cylinder *start, Track *branch, bool until_tr
         rest -= rest > 0;
         if (p->look_ahead > 0 && !t->is_noisy && !until_tree && left && branch->count >= 6 && rest == 0 && (swells || !found)) {
             rest = 12;
-            Estimate *kept = malloc(sizeof *kept);   // the search uses the tracker's own
+            Estimate *kept = malloc(sizeof *kept);   // the search overwrites the tracker's estimate
             if (!kept) {
                 t->out_of_memory = true;
                 return;

@@ -4,15 +4,16 @@
 
 #include "recon/track/rbt_tracker.h"
 
-extern const char rbt_enters_forbidden[];     // Tracker.why of a branch that ended so
+extern const char rbt_enters_forbidden[];     // value of Tracker.why for this kind of end
 
-// Before all others: the directions of a RANSAC search.
+// To be called first: prepares the directions of the RANSAC search.
 void tracker_prepare_axes(Tracker *t);
 // The estimation step from a predicted cylinder; the node goes to t->estimate, false with t->why.
 bool tracker_estimate(Tracker *t, const Cylinder *predicted, double relative_threshold);
-// Tracks from an estimate of the first node until the vessel ends; `until_tree`: on its way back to its parent, ends inside another branch's tube.
+// Tracks from an estimate of the first node until the vessel ends; `until_tree`: tracked back towards the parent, it ends inside another branch's
+// tube.
 void tracker_run(Tracker *t, const Cylinder *start, Track *branch, bool until_tree);
-// Turns the node at `c` into one whose points are the first walls that rays meet nearby, in t->estimate.
+// Makes t->estimate a node at `c` whose points are the first walls that rays meet nearby.
 void tracker_opening(Tracker *t, const Cylinder *c, double contrast);
 
 #endif

@@ -1,5 +1,5 @@
-// A limb is tracked back first. At an ostium the way back ends in the parent's tube; where vessels kiss it goes past the contact, and the limb is
-// refused: its vessel has another parent, from which it is found later, or none. Then the way out is tracked.
+// A limb is tracked back first. At an ostium the return path ends in the parent's tube; where vessels touch it runs past the contact, and the limb is
+// rejected: its vessel has another parent, from which it is found later, or none. Then the outgoing path is tracked.
 //
 // Limbs of a round are tracked at the same time on the tree as it was, and adopted widest first; what lies in a tube that was adopted before is left out.
 #include "recon/track/rbt_branches.h"
@@ -14,15 +14,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WAVE = 8 };          // limbs that are tracked at the same time; the tree depends on it, not on the threads
+enum { WAVE = 8 };          // limbs tracked concurrently; the tree depends on this number, not on the number of threads
 static const double least_tube = 0.7;   // mean inlier rate of a branch, as a share of the first one's
 
-typedef struct Found {       // what became of a limb
+typedef struct Found {       // outcome of a limb
     Track out, back;
     const char *why;
     double radius;           // of its first nodes
     int limb;
-    bool good, is_sac;       // a sac is one node in `out`
+    bool good, is_sac;       // an aneurysm is one node in `out`
     bool out_of_memory;
 } Found;
 
@@ -68,11 +68,11 @@ static bool is_upstream(const Tracker *t, const RbtLimb *limb)
     return along < 0 && along > -4 * root->radius - 4 * t->voxel && vec3_norm(vec3_add_scaled(way, -along, root->axis)) < root->radius;
 }
 
-// The blurred rim of a dense neighbour passes through every brightness: beside most of the limb lies what is too bright for a vessel.
+// The blurred rim of a dense neighbour takes every brightness: then most of the limb lies next to something too bright for a vessel.
 static bool is_rim(const Tracker *t, const RbtLimb *limb)
 {
     int beside = 0;
-    double bright = limb->ceiling - RBT_NOISE_SHARE * t->noise;   // one sample may be noise, two are hardly
+    double bright = limb->ceiling - RBT_NOISE_SHARE * t->noise;   // one sample may be noise, two hardly
     for (int i = 0; i < limb->count; i++) {
         int count = 0;
         for (int k = 0; k < 18; k++) {
@@ -85,7 +85,7 @@ static bool is_rim(const Tracker *t, const RbtLimb *limb)
     return 2 * beside > limb->count;
 }
 
-// Bone passes the ceiling of single samples where noise darkens them, not that of a median.
+// Noise may darken single samples of bone below the ceiling, but not their median.
 static bool is_dense(const Tracker *t, const RbtLimb *limb, const Track *track)
 {
     enum { MOST = 256 };
@@ -131,7 +131,7 @@ static bool seed_on_limb(Tracker *t, const RbtLimb *limb, double share, Cylinder
     return false;
 }
 
-// From the limb's way down to the contact's node.
+// Along the limb back to the contact's node.
 static double distance_from_limb(const Tracker *t, const RbtLimb *limb, Vec3 x)
 {
     double least = tracker_segment_distance(x, t->tree.node[limb->contact].cylinder.center, limb->place[0]);
@@ -140,7 +140,7 @@ static double distance_from_limb(const Tracker *t, const RbtLimb *limb, Vec3 x)
     return least;
 }
 
-// The darkest place on the way from a node to one of the tree, between background (0) and the dimmer of both lumens (1).
+// The darkest place between a node and one of the tree, between background (0) and the dimmer of both lumens (1).
 static double neck_of(const Tracker *t, const TrackNode *parent, const TrackNode *node)
 {
     Vec3 x = node->cylinder.center, c = parent->cylinder.center;
@@ -152,7 +152,8 @@ static double neck_of(const Tracker *t, const TrackNode *parent, const TrackNode
     return least;
 }
 
-// Does the way back end at the wall of a vessel, further on than where the limb touches the tree, and point into it? Vessels that kiss lie side by side.
+// Does the return path end at the wall of a vessel, further on than where the limb touches the tree, and point into it? Vessels that kiss lie side by
+// side.
 static bool meets_wall(const Tracker *t, const RbtPaint *paint, const TrackNode *end)
 {
     int node = rbt_paint_node(paint, end->cylinder.center);
@@ -162,7 +163,7 @@ static bool meets_wall(const Tracker *t, const RbtPaint *paint, const TrackNode 
     return vec3_dot(in, end->cylinder.axis) > 0.5 && neck_of(t, &t->tree.node[node], end) >= 0.8;
 }
 
-// Does the way back come out where the limb begins? Cuts off what goes past it.
+// Does the return path end where the limb begins? Cuts off what runs past it.
 static bool meets_parent(const Tracker *t, const RbtPaint *paint, const RbtLimb *limb, Track *back)
 {
     const Cylinder *end = &back->node[back->count - 1].cylinder;
@@ -173,7 +174,7 @@ static bool meets_parent(const Tracker *t, const RbtPaint *paint, const RbtLimb 
     for (int i = 0; i < back->count; i++)
         if (vec3_distance(back->node[i].cylinder.center, contact) < vec3_distance(back->node[nearest].cylinder.center, contact))
             nearest = i;
-    // it left the limb's way, into a sibling that lies straighter on: so far it was right
+    // it left the limb for a sibling straight ahead: up to there it was right
     if (distance_from_limb(t, limb, back->node[nearest].cylinder.center) > 2 * fmax(back->node[nearest].cylinder.radius, t->voxel))
         for (nearest = 0; nearest + 1 < back->count; nearest++)
             if (distance_from_limb(t, limb, back->node[nearest + 1].cylinder.center) > 2 * fmax(back->node[nearest + 1].cylinder.radius, t->voxel))
@@ -264,7 +265,7 @@ bool rbt_ends_add(RbtEnds *ends, const char *why, int seed)
     return true;
 }
 
-// Where a branch hangs: the node that its first one lies in, else the one that is attached to best.
+// Where a branch is attached: the node that contains its first node, else the best attachment.
 static int parent_of(const Tracker *t, const RbtPaint *paint, const Cylinder *first)
 {
     int inside = rbt_paint_node(paint, first->center);
@@ -278,7 +279,7 @@ static bool adopt(Tracker *t, RbtPaint *paint, const Found *found, RbtEnds *ends
     const TrackNode **node = malloc((size_t)total * sizeof *node);
     const Vec3 **point = malloc((size_t)total * sizeof *point);
     bool good = node && point;
-    for (int i = 0; good && i < total; i++) {   // the first node of the way back is that of the way out, seen the other way
+    for (int i = 0; good && i < total; i++) {   // the first node of both paths is the same, in opposite directions
         bool is_back = i < found->back.count - 1;
         const Track *from = is_back ? &found->back : &found->out;
         node[i] = &from->node[is_back ? found->back.count - 1 - i : i - (found->back.count - 1)];
@@ -289,7 +290,7 @@ static bool adopt(Tracker *t, RbtPaint *paint, const Found *found, RbtEnds *ends
     if (good) {
         while (first < seed && tracker_node_around(t, node[first]->cylinder.center, 1) >= 0)
             first++;
-        // one vessel may be met by two limbs: the second ends where the first is
+        // two limbs may lead to one vessel: the second ends at the first
         int outside = seed;
         while (outside < total && !is_painted(paint, node[outside]->cylinder.center))
             outside++;
@@ -309,7 +310,7 @@ static bool adopt(Tracker *t, RbtPaint *paint, const Found *found, RbtEnds *ends
             }
             bool is_joined = false;
             good = good && rbt_mend_links(t, paint, before, &is_joined);
-            if (good && is_joined && !is_tube(t, t->tree.node + before, t->tree.count - before)) {   // with the way that joins it
+            if (good && is_joined && !is_tube(t, t->tree.node + before, t->tree.count - before)) {   // with the path that joins it
                 track_cut(&t->tree, before);
                 is_joined = false;
             }
@@ -323,7 +324,7 @@ static bool adopt(Tracker *t, RbtPaint *paint, const Found *found, RbtEnds *ends
     return good || total == 0;
 }
 
-// A sac hangs on the node beside it; one sac may be met by several limbs. False: out of memory.
+// An aneurysm is attached to the nearest node; several limbs may lead to one aneurysm. False: out of memory.
 static bool adopt_sac(Tracker *t, RbtPaint *paint, const RbtLimb *limb, const Found *found, RbtEnds *ends)
 {
     int before = t->tree.count;
@@ -343,7 +344,7 @@ static bool adopt_sac(Tracker *t, RbtPaint *paint, const RbtLimb *limb, const Fo
     return true;
 }
 
-// Wider ones first: what narrower ones find is then seen to be tracked.
+// Wider limbs first, so that narrower ones stop at vessels already tracked.
 static int compare_limbs(const void *a, const void *b)
 {
     const RbtLimb *x = a, *y = b;
@@ -406,7 +407,8 @@ static double noise_of(const Tracker *t)
     return 1.4826 * value[n / 2];
 }
 
-// Medians of brightness and contrast over the first branch say what is too faint and what is too bright; its inliers how well cylinders fit in this volume.
+// Medians of brightness and contrast over the first branch set the limits for too faint and too bright; its inlier rate shows how well cylinders fit
+// in this volume.
 static void measure_root(Tracker *t, double noise)
 {
     enum { MOST = 512 };

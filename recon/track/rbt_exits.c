@@ -1,7 +1,7 @@
-// The shortest way through the lumen from the start to each of its voxels (Dijkstra over 26 neighbours) cuts the lumen into shells of equal way. In a
-// tube a shell is one disc; where tubes part, a shell falls apart into as many pieces; a sac's bottom is a piece that ends. A piece's volume over the
-// shell's thickness is its cross-section. A piece that is followed by sections like its own over three times its width is a tube; the first such piece
-// after one that is none is an exit. (Walking back from the last pieces instead lost the exits that soon fork.)
+// The shortest path through the lumen from the start to each voxel (Dijkstra over 26 neighbours) divides the lumen into shells of equal path length.
+// In a tube a shell is one disc; where tubes divide, a shell splits into as many pieces; a sac's bottom is a piece that ends. A piece's volume over
+// the shell's thickness is its cross-section. A piece that is followed by sections like its own over three times its width is a tube; the first such
+// piece after one that is none is an exit. (Walking back from the last pieces instead missed exits that soon fork.)
 #include "recon/track/rbt_exits.h"
 
 #include "base/heap.h"
@@ -77,7 +77,7 @@ static float value_at(const Flood *f, const int at[3])
 
 static bool is_blocked(Vec3 x, Vec3 start, Vec3 direction, double radius, const RbtBlock *block, int count)
 {
-    // the balls near the start reach past it: they close what is behind it alone
+    // the balls near the start reach past it: they block only what is behind it
     bool is_behind = vec3_dot(vec3_sub(x, start), direction) <= -0.3 * radius;
     for (int i = 0; i < count; i++)
         if (vec3_norm2(vec3_sub(x, block[i].center)) < block[i].radius * block[i].radius &&
@@ -129,7 +129,7 @@ static void flood(Flood *f, int32_t first, Vec3 start, Vec3 direction, double ra
     }
 }
 
-// Connected voxels of one shell are a piece; its parent is the piece that its first voxel was reached from. Pieces are numbered by shells.
+// Connected voxels of one shell form a piece; its parent is the piece from which its first voxel was reached. Pieces are numbered by shell.
 static Piece *cut_into_pieces(Flood *f, double thickness, int shells, int *piece_count)
 {
     int box = f->size[0] * f->size[1] * f->size[2], count = 0, capacity = 256;
@@ -143,7 +143,7 @@ static Piece *cut_into_pieces(Flood *f, double thickness, int shells, int *piece
             piece = HEAP_GROWN(piece, (size_t)capacity, sizeof *piece);
         }
         int shell = (int)((double)f->way[i] / thickness), held = 0;
-        piece[count] = (Piece){.shell = shell < shells ? shell : shells - 1, .parent = i};   // for now: one of its voxels
+        piece[count] = (Piece){.shell = shell < shells ? shell : shells - 1, .parent = i};   // temporarily: one of its voxels
         f->piece[i] = count;
         stack[held++] = i;
         while (held > 0) {
@@ -171,8 +171,8 @@ static Piece *cut_into_pieces(Flood *f, double thickness, int shells, int *piece
     return piece;
 }
 
-// How many pieces follow `top` on the longest way down whose sections are like that of `first`; *next is the first of them. There are some
-// hundred pieces: looking through the list for the children costs nothing.
+// How many pieces follow `top` on the longest path down whose sections are like that of `first`; *next is the first of them. With some hundred pieces
+// a linear search for the children is cheap enough.
 static int tube_below(const Piece *piece, int count, int first, int top, int limit, int *next)
 {
     int longest = 0;
@@ -229,7 +229,7 @@ int rbt_find_exits(const Volume *volume, Vec3 start, Vec3 direction, double radi
             return 0;
         box *= (size_t)f.size[i];
     }
-    if (box > ((size_t)1 << 27))   // a reach that large looks at nothing local
+    if (box > ((size_t)1 << 27))   // such a large reach would not be local
         return 0;
     int found = 0, piece_count = 0;
     double thickness = fmax(0.5 * radius, 1.5 * volume_voxel_size(volume));

@@ -1,5 +1,5 @@
-// Where a vessel goes on beyond a place that is no cylinder: a sac, a wide bifurcation. Not in Kerrien et al. 2017; the tracking asks here when a branch
-// ends or swells.
+// Finds where a vessel continues beyond a place where no cylinder fits: an aneurysm or a wide bifurcation. Not in Kerrien et al. 2017; used when a
+// branch ends or widens.
 #ifndef SELDINGER_RECON_TRACK_RBT_EXITS_H
 #define SELDINGER_RECON_TRACK_RBT_EXITS_H
 
@@ -12,13 +12,13 @@ typedef struct RbtExit {
     double radius;           // [mm] from the area of its cross-section
 } RbtExit;
 
-typedef struct RbtBlock {    // a ball of the way that was tracked already: not entered (near the start: not behind it)
+typedef struct RbtBlock {    // a ball of the path tracked so far: not entered (near the start: not behind it)
     Vec3 center;
     double radius;
 } RbtBlock;
 
-// Tubes that leave the lumen (brighter than `level`) around `start` within the way `reach` [mm], widest first; returns their number, at most `capacity`.
-// `radius` is the vessel's at the start, `direction` its axis: the balls of `block` are closed.
+// Tubes that leave the lumen (brighter than `level`) around `start` within the path length `reach` [mm], widest first; returns their number, at most
+// `capacity`. `radius` is the vessel's at the start, `direction` its axis: the balls of `block` are not entered.
 int rbt_find_exits(const Volume *volume, Vec3 start, Vec3 direction, double radius, double reach, double level, const RbtBlock *block, int block_count,
                    RbtExit *out, int capacity);
 

@@ -1,5 +1,6 @@
-// A rival's branches are grown in the same rounds as the tree's, widest first, and a limb ends where it meets what was tracked before: so every vessel goes to the
-// tree that reaches it by the wider ways. Only the first branches, which are tracked without knowing of each other, are divided here.
+// A rival's branches are grown in the same rounds as the tree's, widest first, and a limb ends where it meets what was tracked before: so every
+// vessel belongs to the tree that reaches it through the wider path. Only the first branches, which are tracked without knowing of each other, are
+// divided here.
 #include "recon/track/rbt_limits.h"
 #include "recon/track/rbt_start.h"
 #include "recon/track/rbt_start_check.h"
@@ -12,7 +13,7 @@ enum { RIVAL_STREAM = 1 << 20 };     // of random numbers
 
 static Vec3 point_of(const Tracker *t, const RbtRegion *region) { return region->is_voxel ? volume_point_of(t->volume, region->center) : region->center; }
 
-// A fault where x is no place in a vessel; `what` names the key.
+// A fault if x is not in a vessel; `what` is the key.
 static bool vessel_at(Tracker *t, const RbtRegion *region, const char *what, const char *path, Faults *faults, RbtSeed *seed, Cylinder *out)
 {
     double rate;
@@ -49,7 +50,7 @@ bool rbt_place_stops(Tracker *t, Vec3 start, const char *path, Faults *faults)
             continue;
         }
         Vec3 q = vec3_sub(seed.start, c.center);
-        // across the vessel at the point itself, not where a cylinder fitted best
+        // across the vessel at the point itself, not at the best-fitting cylinder
         *stop = (RbtStop){vec3_add_scaled(c.center, vec3_dot(q, c.axis), c.axis), c.axis, 1.5 * c.radius + t->voxel, fmax(0.5 * c.radius, t->voxel)};
         if (vec3_distance(start, stop->center) < 2 * stop->half) {
             faults_add(faults, path, seed.line, seed.column, "the point of `until` (%g, %g, %g) mm lies at the first start; expected a point further along the vessel",
@@ -75,7 +76,7 @@ static int node_at(const TrackNode *node, int count, Vec3 x, double share)
     return best;
 }
 
-// From `from` to `to` (either may be first) the narrowest node that is two radii away from both; the middle one where there is none.
+// The narrowest node between `from` and `to` (in either order) that is two radii away from both; the middle one if there is none.
 static int narrowest_between(const TrackNode *node, int from, int to)
 {
     int low = from < to ? from : to, high = from < to ? to : from, best = (low + high) / 2;
@@ -91,7 +92,7 @@ static int narrowest_between(const TrackNode *node, int from, int to)
     return best;
 }
 
-// The nodes low … high alone, the first of them the root.
+// Keeps only nodes low … high, the first of them as root.
 static bool keep_range(Track *chain, int low, int high)
 {
     bool *keep = malloc(((size_t)chain->count + 1) * sizeof *keep);
@@ -127,7 +128,7 @@ static bool cut_beyond(Track *chain, int seed, int at)
     return at > seed ? keep_range(chain, 0, at - 1) : at < seed ? keep_range(chain, at + 1, chain->count - 1) : true;
 }
 
-// Nearest node, wherever x lies.
+// The nearest node, at any distance.
 static int nearest_node(const Track *chain, Vec3 x) { return node_at(chain->node, chain->count, x, HUGE_VAL); }
 
 static bool divide(Track *wanted, Vec3 start, Track *rival, Vec3 point)
@@ -177,7 +178,7 @@ bool rbt_add_rival(Tracker *t, const RbtRegion *point, Vec3 start, int number, c
     if (found && first == t->tree.count) {
         t->out_of_memory = !divide(&t->tree, start, &rival, seed.start);
     } else if (found) {
-        // against the first branch alone; nodes of earlier rivals keep theirs
+        // against the first branch only; nodes of earlier rivals stay
         Track chain = {0}, rest = {0};
         for (int i = 0; i < t->tree.count && !t->out_of_memory; i++)
             t->out_of_memory = !track_append(i < first ? &chain : &rest, &t->tree.node[i], t->tree.point + t->tree.node[i].point_start);

@@ -1,5 +1,5 @@
-// Beside a straight link the places are a lattice along it (link_lattice.h), half a voxel apart. In search of another parent they are the image's voxels,
-// with the same cost: the length of a step over the fourth power of the brightness between background (0) and the child's lumen (1).
+// Near a straight link the search runs on a lattice along it (link_lattice.h), half a voxel apart. The search for another parent runs on the image's
+// voxels, with the same cost: the length of a step over the fourth power of the brightness between background (0) and the child's lumen (1).
 #include "recon/track/rbt_link_path.h"
 
 #include "base/same_math.h"
@@ -23,7 +23,7 @@ LinkLight rbt_link_light(const Track *tree, const Tracker *t, int node)
     }
     sort_doubles(inside, (size_t)n);
     sort_doubles(contrast, (size_t)n);
-    // a sac that the trace names was not measured: the vessel it hangs on was
+    // an aneurysm given in the trace was not measured, but the vessel it is attached to was
     double c = contrast[n / 2] > 0 || first->parent < 0 ? contrast[n / 2] : tree->node[first->parent].contrast;
     return (LinkLight){inside[n / 2], inside[n / 2] - c};
 }
@@ -38,7 +38,7 @@ static double lit_at(const Tracker *t, const LinkLight *light, Vec3 x) { return 
 
 typedef struct Grid {
     int size[3];
-    float *lit;              // (size[2], size[1], size[0]) < 0: no place, or not yet looked at where `look` is set
+    float *lit;              // (size[2], size[1], size[0]) < 0: blocked, or not yet evaluated where `look` is set
     float *cost;
     int *from;
     float length[27];        // [mm] of a step to each neighbour
@@ -89,7 +89,7 @@ static void set_lengths(Grid *g, const Vec3 step[3])
     }
 }
 
-// The places from `goal` back to the start.
+// The path from `goal` back to the start.
 static int count_back(const Grid *g, int goal)
 {
     int count = 0;
@@ -98,7 +98,7 @@ static int count_back(const Grid *g, int goal)
     return count;
 }
 
-// --- beside the link ---
+// --- near the link ---
 
 typedef struct Lit {
     const Tracker *t;
@@ -122,7 +122,7 @@ bool rbt_link_path(const Tracker *t, Vec3 from, Vec3 to, double beside, const Li
 typedef struct Box {         // voxels low … low + size - 1
     Grid grid;
     int low[3];
-    int *owner;              // node + 1 that a path may end in, 0: none, -1: closed
+    int *owner;              // node + 1 in which a path may end, 0: none, -1: blocked
 } Box;
 
 static Vec3 box_point(const Tracker *t, const Box *b, const int at[3])
@@ -170,8 +170,8 @@ static bool box_create(const Tracker *t, int node, const bool *hangs, double rea
         return false;
     for (size_t i = 0; i < n; i++)
         b->grid.lit[i] = -1;
-    // what hangs on the child is closed with its blurred rim, but for the child's own beginning; vessels are marked last, for a path may end where they
-    // touch it
+    // the child's subtree is blocked with its blurred rim, except for the child's own beginning; vessels are marked last, because a path may end
+    // where they touch it
     for (int pass = 0; pass < 2; pass++)
         for (int i = 0; i < t->tree.count; i++) {
             const Cylinder *other = &t->tree.node[i].cylinder;
@@ -189,13 +189,13 @@ static void box_free(Box *b)
     free(b->owner);
 }
 
-// Returns the place in a vessel's tube that is reached first, -1: none. False in *good: out of memory.
+// Returns the first voxel reached in a vessel's tube, -1: none. False in *good: out of memory.
 static int search_box(const Tracker *t, Box *b, int start, double reach, double least, const LinkLight *light, bool *good)
 {
     Grid *g = &b->grid;
     WayHeap heap = {0};
     int found = -1, at[3];
-    // the search may be charged for a path that is dim all along, not for a longer one
+    // the cost limit allows a path that is dim throughout, but no longer one
     double most = reach / same_square(same_square(least));
     g->cost[start] = 0;
     g->from[start] = -1;
@@ -237,7 +237,7 @@ bool rbt_link_search(const Tracker *t, int node, const bool *hangs, double reach
     Box b;
     *out = (LinkPath){.share = 1};
     if (!box_create(t, node, hangs, reach, &b)) {
-        bool is_full = b.grid.size[0] > 0 && b.grid.size[1] > 0 && b.grid.size[2] > 0;   // else it lies outside of the image
+        bool is_full = b.grid.size[0] > 0 && b.grid.size[1] > 0 && b.grid.size[2] > 0;   // otherwise it lies outside the image
         box_free(&b);
         return !is_full;
     }

@@ -1,4 +1,4 @@
-// Internal to recon: the best path through the image from a vessel to the one it leaves, and how dark it gets there.
+// Internal to recon: the best path through the image between a vessel and its parent, and its darkest place.
 #ifndef SELDINGER_RECON_TRACK_RBT_LINK_PATH_H
 #define SELDINGER_RECON_TRACK_RBT_LINK_PATH_H
 
@@ -13,11 +13,11 @@ typedef struct LinkLight {   // of the child: 0 is the background beside it, 1 i
 LinkLight rbt_link_light(const Track *tree, const Tracker *t, int node);
 // Brightness as a share of the child's contrast, 0 … 1.
 double rbt_link_lit(const LinkLight *light, double value);
-// From the parent's axis to the child's first node, nowhere further than `beside` [mm] from the straight line. False: out of memory.
+// From the parent's axis to the child's first node, within `beside` [mm] of the straight line. False: out of memory.
 bool rbt_link_path(const Tracker *t, Vec3 from, Vec3 to, double beside, const LinkLight *light, LinkPath *out);
-// The shortest path by the image from the child `node` to any vessel or sac that does not hang on it, within `reach` [mm], lit by at least `least` all along;
-// none of it in tubes of what hangs on the child. `hangs[i]`: node i hangs on the child or is it. `met` is the node it leads to. Without a path
-// out->count is 0. False: out of memory.
+// The cheapest path through the image from the child `node` to any vessel or aneurysm outside its subtree, within `reach` [mm], with a brightness of
+// at least `least` throughout and outside the tubes of the child's subtree. `hangs[i]`: node i belongs to the child's subtree. `met` is the node
+// reached. Without a path out->count is 0. False: out of memory.
 bool rbt_link_search(const Tracker *t, int node, const bool *hangs, double reach, double least, const LinkLight *light, LinkPath *out, int *met);
 
 #endif

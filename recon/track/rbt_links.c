@@ -1,4 +1,4 @@
-// The way is the cheapest one over 26 neighbours, where a voxel costs its length over the cube of its brightness between background (0) and lumen
+// The path is the cheapest one over 26 neighbours, where a voxel costs its length over the cube of its brightness between background (0) and lumen
 // (1), mean of its own and the spline's: it keeps to the middle and crosses what is dim only where it must.
 #include "recon/track/rbt_links.h"
 
@@ -65,14 +65,14 @@ static Vec3 voxel_in(const Search *s, int i)
     return vec3(s->low[0] + at[0], s->low[1] + at[1], s->low[2] + at[2]);
 }
 
-// The spline blurs: half a voxel beside a thin vessel it is still bright.
+// The spline blurs: half a voxel outside a thin vessel it is still bright.
 static double voxel_value(const Volume *v, Vec3 voxel)
 {
     return (double)v->value[((size_t)voxel.z * (size_t)v->size[1] + (size_t)voxel.y) * (size_t)v->size[0] + (size_t)voxel.x];
 }
 
 // From `start` to `end`, or with `paint` to the nearest tube of a node before `before` whose centre is in sight; the places to way[0 … count-1],
-// start first, and the node met. Returns the count, 0 where there is no way, -1 where memory lacks.
+// start first, and the node met. Returns the count, 0 if there is no way, -1 if memory runs out.
 static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 start, Vec3 end, const Light *light, Vec3 *way, int *met)
 {
     const Volume *v = t->volume;
@@ -163,14 +163,14 @@ static int search_way(const Tracker *t, const RbtPaint *paint, int before, Vec3 
     return count;
 }
 
-// Nodes along the way from the parent's centre to the child's: each as far on as it is seen from the one before, not further than half a radius.
+// Nodes along the path from the parent's centre to the child's: each as far along as it is in line of sight of the one before, at most half a radius.
 static bool insert_nodes(Tracker *t, Track *out, const TrackNode *parent, const TrackNode *child, const Vec3 *way, int count, int number,
                          int parent_index, const Light *light)
 {
     Vec3 last = parent->cylinder.center;
     double radius = child->kind == NODE_ANEURYSM ? fmin(parent->cylinder.radius, child->cylinder.radius) : child->cylinder.radius,
            spacing = fmax(0.7 * radius, t->voxel);
-    for (int i = count - 1; i >= 0;) {   // the way runs from child to parent
+    for (int i = count - 1; i >= 0;) {   // the path runs from child to parent
         int next = i;
         while (next > 0 && vec3_distance(way[next - 1], last) <= spacing && darkest(t, last, way[next - 1], light) >= least_lit)
             next--;
@@ -200,7 +200,7 @@ bool rbt_mend_links(Tracker *t, const RbtPaint *paint, int first, bool *is_joine
 {
     Track *tree = &t->tree, new = {0};
     int count = tree->count - first;
-    int *place = malloc(((size_t)count + 1) * sizeof *place);   // where a node of the branch went, in the new part
+    int *place = malloc(((size_t)count + 1) * sizeof *place);   // new index of a node of the branch
     bool good = place != NULL;
     *is_joined = true;
     Vec3 way[MAX_WAY];
@@ -215,7 +215,7 @@ bool rbt_mend_links(Tracker *t, const RbtPaint *paint, int first, bool *is_joine
                 good = way_count >= 0;
                 if (way_count == 0) {
                     *is_joined = false;
-                    // what was tracked up to here stays, if it hangs on the tree
+                    // keep what was tracked up to here, if it is attached to the tree
                     break;
                 }
             }

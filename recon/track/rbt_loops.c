@@ -1,5 +1,5 @@
-// An end meets a node if it lies within reach of its tube, points at it, and the straight way there stays lumen; and if the way back along the tree is longer than
-// a bend of both vessels is: six times both radii. A ring that two ends close from both sides is one loop.
+// An end meets a node if it lies within reach of its tube, points at it, and the straight line there stays in the lumen; and if the path along the
+// tree is longer than a bend of both vessels: six times both radii. A ring that two ends close from both sides is one loop.
 #include "recon/track/rbt_loops.h"
 
 #include <stdlib.h>
@@ -16,7 +16,7 @@ static double lit_between(const Tracker *t, const TrackNode *a, const TrackNode 
     return least;
 }
 
-// Along the tree from a to b; parents come before children.
+// The distance along the tree from a to b; parents come before children.
 static double way_between(const Track *tree, const double *arc, int a, int b)
 {
     int x = a, y = b;

@@ -1,12 +1,12 @@
-// The image decides. The best path beside the straight link (within the child's radius, at least a voxel) is as good as its darkest place, as a share of the
-// child's contrast: from a half on the link is supported, below a quarter it is not, and the branch hangs elsewhere or goes. Along a
-// supported path nodes stand every half radius of the child from one and a half of its radii inside the parent's wall on. What they see of the wall is
-// cast square to the path and scaled by what the same rays make of the child's own first nodes, for an edge is not where a cylinder of least squares is.
-// The parent's wall and what a tool passes through are no wall of the mouth: points there are left out, the parent's own too, which the edges of the
-// ostium's far side have put across it.
+// The image decides. The best path near the straight link (within the child's radius, at least a voxel) is rated by its darkest place, as a share of
+// the child's contrast: from a half on the link is supported; below a quarter it is not, and the branch is attached elsewhere or dropped. Along a
+// supported path nodes stand every half radius of the child from one and a half of its radii inside the parent's wall on. Their wall points are found
+// by rays square to the path, scaled by the ratio that the same rays show at the child's own first nodes, because an image edge is not where a
+// least-squares cylinder lies. Points on the parent's wall or in a tool's path are not wall of the mouth and are left out, including the parent's own
+// points that edges on the ostium's far side have put across it.
 //
-// What was tried before (one-field.md): without nodes on the links 31 to 40 of 131 ostia stayed shut; a cylinder of the child's radius on the straight
-// link opened them, but not where the image has the mouth.
+// Tried before: without nodes on the links 31 to 40 of 131 ostia stayed closed; a cylinder of the child's radius on the straight link opened them,
+// but not where the image shows the mouth.
 #include "recon/track/rbt_ostia.h"
 #include "base/parallel.h"
 #include "base/sort_doubles.h"
@@ -21,10 +21,10 @@ enum { ROOT_NODES = 8, NEAR_MOST = 64, STATIONS_MOST = 2000 };
 static const double SPACING = 0.5,        // of the nodes, in radii of the child
                     INSIDE = 1.5,         // that far inside the parent's wall they begin, in radii of the child
                     NEAR_REACH = 3,       // of the parent's nodes about a mouth, in its radii
-                    IN_PARENT = 0.1;      // a wall point may lie so deep in the parent, in its radii
+                    IN_PARENT = 0.1;      // depth in the parent up to which a point may be wall, in its radii
 
 typedef struct Link {
-    int node, parent;        // of t->tree, as tracked, or where it hangs now
+    int node, parent;        // node of t->tree: as tracked, or the present parent
     bool is_inner;           // within a branch
     bool is_moved, is_named;
     double radius, length, share, scale;
@@ -38,7 +38,7 @@ typedef struct Link {
 
 // --- the vessel about a node ---
 
-// The nodes of the parent's branch within reach of `node`, and those that it hangs on; returns their number.
+// The nodes of the parent's branch within reach of `node`, and their ancestors; returns their number.
 static int nodes_about(const Track *tree, int node, int *list)
 {
     double reach = NEAR_REACH * tree->node[node].cylinder.radius, length = 0;
@@ -68,7 +68,7 @@ static double depth_in(const Track *tree, const int *list, int count, Vec3 x)
     double deepest = tree->node[list[0]].cylinder.radius - vec3_distance(x, tree->node[list[0]].cylinder.center);
     for (int i = 0; i < count; i++) {
         int parent = tree->node[list[i]].parent;
-        // a link that is longer than both radii is no lumen
+        // a link longer than both radii is not lumen
         bool is_tube = parent >= 0 && vec3_distance(tree->node[list[i]].cylinder.center, tree->node[parent].cylinder.center) <=
                                           tree->node[list[i]].cylinder.radius + tree->node[parent].cylinder.radius;
         if (is_tube)
@@ -104,7 +104,7 @@ static Vec3 path_at(const LinkPath *path, double arc)
     return path->point[path->count - 1];
 }
 
-// Arc from the parent's axis up to the last place that lies so deep in the parent; 0 where none does.
+// Arc length from the parent's axis to the last point that is `depth` deep in the parent; 0 if none is.
 static double arc_at_depth(const Track *tree, const int *list, int count, const LinkPath *path, double depth)
 {
     double arc = path_length(path);
@@ -116,7 +116,7 @@ static double arc_at_depth(const Track *tree, const int *list, int count, const 
     return 0;
 }
 
-// One node: its centre in the middle of what the rays see, its radius theirs, its points those that are wall of the mouth.
+// One node: its centre and radius are those of the section that the rays see; its points are those on the mouth's wall.
 static bool append_station(const Tracker *t, Link *link, Vec3 x, Vec3 axis, double spacing, const int *list, int near)
 {
     const TrackNode *child = &t->tree.node[link->node];
@@ -141,7 +141,7 @@ static bool append_station(const Tracker *t, Link *link, Vec3 x, Vec3 axis, doub
     return track_append(&link->nodes, &node, point);
 }
 
-// The parent's node that the first one hangs on best: that of least power distance.
+// The best parent node for the first one: that of least power distance.
 static void choose_parent(const Tracker *t, Link *link, const int *list, int near)
 {
     Vec3 x = link->nodes.count > 0 ? link->nodes.node[0].cylinder.center : t->tree.node[link->node].cylinder.center;
@@ -180,7 +180,7 @@ static bool make_nodes(const Tracker *t, Link *link)
 
 static RbtSupport support_of(double share) { return share >= 0.5 ? RBT_SUPPORTED : share >= 0.25 ? RBT_DOUBTFUL : RBT_REFUSED; }
 
-// Median over a vessel's first nodes: the first one may be widened by the mouth.
+// Median over a vessel's first nodes, because the mouth may widen the first one.
 static double root_radius(const Track *tree, int node)
 {
     double radius[ROOT_NODES];
@@ -243,7 +243,7 @@ static Link *collect_links(const Track *tree, const bool *is_named, int *count)
     return link;
 }
 
-// What hangs on `node`, itself included. Rounds until nothing is added: a branch may have been hung on a later one.
+// The subtree of `node`, itself included. Repeats until nothing is added, because a branch may be attached to a later one.
 static void mark_hanging(const Track *tree, int node, bool *hangs)
 {
     memset(hangs, 0, (size_t)tree->count * sizeof *hangs);
@@ -330,7 +330,7 @@ static bool append_node(Rebuild *r, int i)
     return good && track_append(&r->new, &node, tree->point + tree->node[i].point_start);
 }
 
-// A branch after the one that it hangs on.
+// Puts a branch after its parent branch.
 static bool append_branch(Rebuild *r, int branch)
 {
     const Track *tree = &r->t->tree;
@@ -347,7 +347,7 @@ static bool append_branch(Rebuild *r, int branch)
     return good;
 }
 
-// Points where a tool passes are no wall.
+// Points in a tool's path are not wall.
 static bool drop_inner_points(Track *tree, const LumenLine *line, int line_count)
 {
     LumenLines *lines = lumen_lines_create(line, line_count);
@@ -360,7 +360,7 @@ static bool drop_inner_points(Track *tree, const LumenLine *line, int line_count
         for (int k = 0; k < n->point_count; k++)
             if (!lumen_lines_hold(lines, point[k]))
                 point[kept++] = point[k];
-        n->point_count = kept;   // the places behind are left unused
+        n->point_count = kept;   // the space behind them stays unused
     }
     lumen_lines_free(lines);
     return true;
@@ -401,7 +401,7 @@ static bool rebuild_tree(Rebuild *r)
     return good;
 }
 
-// Refused links: the branch goes with what hangs on it, unless the trace names it or something that hangs on it.
+// Refused links: the branch is dropped with its subtree, unless the trace names it or part of the subtree.
 static void decide(const Track *tree, Link *link, int link_count, const bool *is_named, bool *hangs, bool *keep)
 {
     for (int i = 0; i < tree->count; i++)
@@ -428,7 +428,7 @@ static void report_link(const Track *tree, const Link *link, const bool *keep, R
         out->point_count += link->nodes.node[k].point_count;
 }
 
-// Nodes, and mm of centreline, that went with a refused link; what an earlier one took is not counted again.
+// Nodes and mm of centreline dropped with a refused link, without those of earlier refused links.
 static void count_dropped(const Track *tree, const Link *link, bool *hangs, bool *counted, RbtJunction *out)
 {
     mark_hanging(tree, link->node, hangs);
@@ -449,7 +449,7 @@ static bool list_junctions(const Track *tree, const Link *link, int link_count, 
     bool good = counted && out->junction;
     for (int l = 0; good && l < link_count; l++) {
         RbtJunction j;
-        if (link[l].support != RBT_REFUSED && !keep[link[l].node])   // it went with what it hangs on
+        if (link[l].support != RBT_REFUSED && !keep[link[l].node])   // dropped with its parent
             continue;
         report_link(tree, &link[l], keep, &j);
         if (link[l].support == RBT_REFUSED)

@@ -68,7 +68,7 @@ void rbt_paint_nodes(RbtPaint *paint, const Track *tree, int first, int end)
 {
     for (int i = first; i < end; i++) {
         const TrackNode *n = &tree->node[i];
-    // a sac is no ball: what sticks out of it is looked at
+    // an aneurysm is not a ball: parts that stick out of it are not painted
         paint_ball(paint, tree, i, n->cylinder.center, (n->kind == NODE_ANEURYSM ? 0.8 : 1) * n->cylinder.radius);
         if (n->parent < 0)
             continue;
@@ -94,7 +94,7 @@ int rbt_paint_node(const RbtPaint *paint, Vec3 x)
 // A node of the finished tree whose tube holds x near its middle, or -1.
 int tracker_node_around(const Tracker *t, Vec3 x, double share)
 {
-    if (t->paint) {   // the owner of a voxel is the nearest in its own radii; at a voxel's border it may be the one beside it
+    if (t->paint) {   // a voxel's owner is the nearest node in units of its radius; at a voxel's border it may be a neighbour
         int owner = rbt_paint_node(t->paint, x);
         for (int i = owner > 0 ? owner - 1 : owner; i >= 0 && i <= owner + 1 && i < t->tree.count; i++)
             if (vec3_distance(x, t->tree.node[i].cylinder.center) < share * t->tree.node[i].cylinder.radius)

@@ -1,11 +1,11 @@
-// The volume painted with the tree's tubes: which node a place belongs to.
+// The volume labelled with the tree's tubes: which node a voxel belongs to.
 #ifndef SELDINGER_RECON_TRACK_RBT_PAINT_H
 #define SELDINGER_RECON_TRACK_RBT_PAINT_H
 
 #include "recon/track/rbt_tracker.h"
 
-// Node + 1 for each voxel of a tube and of its blurred rim: the node that is nearest in its own radii. 0: none. Pages that no tube meets are
-// never touched, so that the memory used grows with the tree, not with the volume.
+// Node + 1 for each voxel of a tube and of its blurred rim: the node that is nearest in its own radii. 0: none. Memory pages without tubes are never
+// touched, so memory use grows with the tree, not with the volume.
 typedef struct RbtPaint {
     const Volume *volume;
     int32_t *owner;          // (size[2], size[1], size[0])

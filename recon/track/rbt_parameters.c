@@ -1,4 +1,4 @@
-// The parameters of the tracking: defaults, the paper's values, and the table that trace files and --help read.
+// The parameters of the tracking: defaults, the paper's values, and the table used by trace files and --help.
 #include "recon/track/rbt_parameters.h"
 
 #include "base/heap.h"
@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-// Kerrien et al. 2017, table 1 and section 3; every mend is off.
+// Kerrien et al. 2017, table 1 and section 3; all our extensions are off.
 RbtParameters rbt_paper_parameters(void)
 {
     return (RbtParameters){

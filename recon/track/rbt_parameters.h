@@ -1,5 +1,5 @@
-// The parameters of the tracking. The paper's values are rbt_paper_parameters(). The default ones differ where the paper's never get past a giant aneurysm or a symmetric
-// bifurcation: each field says so. The fields are listed by name, range and default in rbt_parameter_table, which the trace file and --help read.
+// The parameters of the tracking. The paper's values are rbt_paper_parameters(). The defaults differ where the paper's values never get past a giant
+// aneurysm or a symmetric bifurcation; each field says so. rbt_parameter_table lists name, range and default for trace files and --help.
 #ifndef SELDINGER_RECON_TRACK_RBT_PARAMETERS_H
 #define SELDINGER_RECON_TRACK_RBT_PARAMETERS_H
 
@@ -10,7 +10,7 @@
 
 enum { RBT_MAX_RETRIES = 8 };
 
-typedef struct RbtRegion {   // a ball; for a cut only its centre counts
+typedef struct RbtRegion {   // a ball; only the centre for a cut
     Vec3 center;             // [mm] or voxels
     bool is_voxel;
     double radius;           // [mm]
@@ -18,7 +18,7 @@ typedef struct RbtRegion {   // a ball; for a cut only its centre counts
 } RbtRegion;
 
 typedef struct RbtParameters {
-    // the paper's, table 1 and section 3
+    // the paper's parameters, table 1 and section 3
     double p_inl;            // inlier rate above which a cylinder is valid
     double r_t;              // inlier threshold, as a share of the predicted radius
     double n_r;              // rays: 42, 162, 642 or 2562
@@ -31,7 +31,7 @@ typedef struct RbtParameters {
     double back_step;        // a centre closer to the former centreline than this many radii is a step back
     double relaxed;          // where no direction is valid, the best one is, above relaxed * p_inl
     double powell;           // 1: refine by Powell's method (NLopt's PRAXIS), 0: by Gauss-Newton (same minimum)
-    // the mends
+    // our extensions
     double r_t_voxels;       // inlier threshold is at least this many voxels
     double r_t_second;       // threshold (share of the radius) of the second try; 0: none
     double refits;           // times that the consensus is selected again with the refined axis, and refitted
@@ -42,27 +42,27 @@ typedef struct RbtParameters {
     double ray_smoothing_voxels;   // moving average along the ray
     double ray_edge;         // rays whose fall per voxel is below this share of the brightness range are discarded
     double contrast;         // least contrast of a node as a share of the mean of its last eight predecessors
-    double turn_deg;         // the axis may turn by this much within two radii of way; 180: any turn (a vessel does not, a lost tracking does)
-    double look_ahead;       // where a branch swells or ends, the lumen is searched this many radii ahead for a vessel that goes on; 0: never
+    double turn_deg;         // largest turn of the axis within two radii of path; 180: any (vessels never turn sharply, lost tracking does)
+    double look_ahead;       // where a branch widens or ends, search the lumen this many radii ahead for its continuation; 0: never
     double overlap;          // a branch ends where its centre is closer than this many radii to the centre of another branch's node
     double max_length_mm;    // of a branch
     double aneurysm_rays;    // from each centre of an aneurysm: 162, 642 or 2562
     double aneurysm_reach_mm;// their length
     double seed;             // of the random numbers
     // the whole tree from the first start
-    double automatic;        // 1: branches and aneurysms that no seed names are looked for
-    double find_aneurysms;   // 1: so are aneurysms
-    double residue;          // a vessel's border is looked for at this share of the contrast of the vessel it leaves, after a half of it
+    double automatic;        // 1: also search for branches and aneurysms without a seed
+    double find_aneurysms;   // 1: also search for aneurysms
+    double residue;          // contrast of a vessel's border as a share of its parent's, tried after one half
     // where branches leave their parents
-    double ostia;            // 1: links are measured in the image and get nodes, or are refused; 0: they stay as tracked
-    // corrections by the trace; the owner of the parameters owns them
-    const RbtRegion *forbid; // no centre of a node lies in these, nor does the search go through them
+    double ostia;            // 1: measure links in the image, then give them nodes or refuse them; 0: leave them as tracked
+    // corrections from the trace; owned by the owner of the parameters
+    const RbtRegion *forbid; // regions without node centres, not searched either
     int forbid_count;
-    const RbtRegion *cut;    // the branch nearest to each is cut from there on, with what hangs on it
+    const RbtRegion *cut;    // the branch nearest to each point is cut there, with its subtree
     int cut_count;
-    const RbtRegion *until;  // points in vessels that the tracking does not pass: the tree ends there
+    const RbtRegion *until;  // points that the tracking does not pass: the tree ends there
     int until_count;
-    const RbtRegion *rival;  // `not`: points in vessels that are not wanted; these are tracked too, compete for the lumen and are left out
+    const RbtRegion *rival;  // `not`: points in excluded vessels; these are tracked too, compete for the lumen and are then left out
     int rival_count;
 } RbtParameters;
 
@@ -78,7 +78,7 @@ typedef struct RbtParameterName {
 } RbtParameterName;
 extern const RbtParameterName rbt_parameter_table[];
 extern const int rbt_parameter_count;
-// "name: value" a line, for the tree file, the volume's voxel size first (the fit's target depends on it); to be freed.
+// One "name: value" per line, for the tree file, the volume's voxel size first (the fit's target depends on it); the caller frees it.
 char *rbt_parameters_text(const RbtParameters *parameters, double voxel_mm);
 
 // A line for each parameter with its meaning, our default and the paper's; to be freed.

@@ -1,4 +1,4 @@
-// What the tracking is given besides the volume, and what it tells of the tree. Lengths mm.
+// Inputs of the tracking besides the volume, and its report on the tree. Lengths mm.
 #ifndef SELDINGER_RECON_TRACK_RBT_REPORT_H
 #define SELDINGER_RECON_TRACK_RBT_REPORT_H
 
@@ -31,26 +31,26 @@ typedef struct RbtBranchReport {
     int junction_count;      // nodes in openings where no cylinder fits (their inlier rate is the share of rays that meet a near wall)
     int link_count;          // nodes between the parent's axis and the first one that was tracked; in the counts and the length, in no mean
     bool is_aneurysm;
-    bool is_found;           // by the program, no seed named it
-    int parent, order;       // number of the branch that it hangs on, -1: none; 1 for the first, one more than its parent's
+    bool is_found;           // found by the program, without a seed
+    int parent, order;       // number of the parent branch, -1: none; order: 1 for the first, one more than the parent's
     double radius;           // [mm] mean over its nodes, of a sac over its centres
     Vec3 center;             // [mm] of its last node; of a sac, the middle of its widest ball
     char name[32];           // the seed's or the aneurysm's
     char end[96];            // why it ended
 } RbtBranchReport;
 
-// What the image says of a link between a branch and its parent: the darkest place of the best path, as a share of the child's contrast.
+// How well the image supports the link between a branch and its parent: the darkest place of the best path, as a share of the child's contrast.
 typedef enum RbtSupport {
     RBT_SUPPORTED,           // at least a half: it has nodes, none further from the next than the sum of their radii
-    RBT_DOUBTFUL,            // at least a quarter: the same, to be looked at
-    RBT_REFUSED,             // less: the branch was dropped with what hung on it
-    RBT_KEPT                 // less, but the trace names the branch: it stays, its link has no nodes, and no tool passes
+    RBT_DOUBTFUL,            // at least a quarter: the same, but should be checked
+    RBT_REFUSED,             // less: the branch was dropped with its subtree
+    RBT_KEPT                 // less, but the trace names the branch: it stays without nodes on its link, so no tool passes
 } RbtSupport;
 
 typedef struct RbtJunction {
     int branch, parent;      // numbers in the report; -1: dropped
-    bool is_inner;           // no junction but a gap within the branch
-    bool is_moved;           // it hangs on another parent than at first, which the image did not support
+    bool is_inner;           // not a junction but a gap within the branch
+    bool is_moved;           // attached to another parent, because the image did not support the first one
     Vec3 place;              // [mm] where the link leaves the parent's lumen; of one without a path, its middle
     double length;           // [mm] of the link, from the parent's axis to the first node that was tracked
     double share;            // 0 … 1
@@ -60,7 +60,7 @@ typedef struct RbtJunction {
     double dropped_mm;       // … and their length
 } RbtJunction;
 
-typedef enum RbtDoubt {      // what makes a result doubtful
+typedef enum RbtDoubt {      // reasons to doubt a result
     RBT_DRIFT,               // [mm] the click's distance from the axis of the vessel that was found; limit: its radius
     RBT_INLIERS,             // share of the edge points on the cylinder at the start, at the root or over the first branch
     RBT_RADIUS,              // [mm] against the volume's least extent
@@ -76,7 +76,7 @@ enum { RBT_MAX_WARNINGS = 12 };
 typedef struct RbtWarning {
     RbtDoubt kind;
     double measured, limit;
-    char text[240];          // what was measured, what is usual, what may help
+    char text[240];          // the measured value, the usual limit, and advice
 } RbtWarning;
 
 typedef struct RbtStartCheck {
@@ -92,10 +92,10 @@ typedef struct RbtStartCheck {
     RbtWarning warning[RBT_MAX_WARNINGS];
 } RbtStartCheck;
 
-typedef struct RbtLoop {     // the tree format has none: the branch ends where it meets the other
+typedef struct RbtLoop {     // the tree format cannot store loops: the branch ends where it meets the other
     Vec3 place;              // [mm] of its end
     int branch, meets;       // numbers in the report; may be the same
-    double length;           // [mm] once around, by the centrelines
+    double length;           // [mm] circumference along the centrelines
 } RbtLoop;
 
 typedef struct RbtReport {
@@ -103,11 +103,11 @@ typedef struct RbtReport {
     RbtBranchReport *branch; // in the order of the tree's nodes: one a seed, those found, one an aneurysm
     int junction_count;
     RbtJunction *junction;   // none with `ostia` 0
-    char start[256];         // what was estimated at the first start, and which end is the root; empty: it was given
+    char start[256];         // what was estimated at the first start, and which end is the root; empty if given
     RbtStartCheck check;
     int loop_count;
     RbtLoop *loop;           // where a branch's end meets another branch of the tree
-    int left_out_count;      // branches of the vessels that `not` names …
+    int left_out_count;      // branches of the vessels excluded by `not` …
     double left_out_length;  // … and their length [mm]
 } RbtReport;
 void rbt_report_free(RbtReport *report);

@@ -1,6 +1,6 @@
-// The shortest way through the residue from the paint to each of its voxels cuts it into shells; connected voxels of one shell are a piece, and pieces form
-// a forest by the way they were reached (as in rbt_exits.c). Its deepest leaf with the way down to a root is a limb, then the deepest of what is left, and
-// so on; short ones are ragged edges.
+// The shortest path through the residue from the labelled tubes to each voxel divides it into shells; connected voxels of one shell form a piece, and
+// the pieces form a forest by reachability (as in rbt_exits.c). The deepest leaf with its path to the root is a limb, then the deepest of the rest,
+// and so on; short ones are ragged edges.
 #include "recon/track/rbt_residue.h"
 #include "base/heap.h"
 #include "base/sort_doubles.h"
@@ -16,7 +16,7 @@ typedef struct Wet {         // a voxel of the residue
     int at[3];
     float way;               // [mm]
     int from, piece;         // -1: none
-    int node;                // that the way started from
+    int node;                // node at which the path started
 } Wet;
 
 typedef struct Flood {
@@ -231,7 +231,7 @@ static RbtLimb *gather_limbs(const Flood *f, Piece *piece, int piece_count, cons
             top = i;
         }
         width /= length;
-        // a ragged edge: what hangs on it stays free for others, itself does not
+        // a ragged edge: its subtree stays available to other limbs, the edge itself does not
         bool is_long = length * thickness >= fmax(3 * voxel, width);
         if (!is_long) {
             for (int i = leaf, n = 0; n < length; n++, i = piece[i].parent)
@@ -291,7 +291,7 @@ static void set_borders(const Tracker *t, int first, int end, double share, doub
         sort_doubles(outside, (size_t)n);
         double in = inside[n / 2], out = fmin(outside[n / 2], in);
         border[i - first].level = out + fmax(share * (in - out), noise);
-        // narrow vessels are dim: what leaves them need not be
+        // narrow vessels are dim, but their branches need not be
         border[i - first].ceiling = t->tree.node[i].cylinder.radius < 2 * t->voxel ? t->ceiling : in + RBT_BRIGHTER * (in - out) + RBT_NOISE_SHARE * noise;
         border[i - first].reach = fmax(14 * t->voxel, 3.5 * t->tree.node[i].cylinder.radius);
         brightest = fmax(brightest, border[i - first].ceiling);

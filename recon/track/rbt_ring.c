@@ -6,7 +6,7 @@
 #include "recon/track/cast_rays.h"
 
 enum { SAMPLES_MOST = 160, SCALE_NODES = 8, ROUNDS = 2 };
-static const double MOST_MOVED = 0.8;     // of a node that was set on voxels, in its radii, and a voxel at most
+static const double MOST_MOVED = 0.8;     // largest shift of a node placed on voxels, in its radii, and at most a voxel
 static const double NARROW = 2;           // voxels: such a node's radius, at most
 
 static double reach_of(const Tracker *t, double radius) { return 1.2 * RING_WIDEST * radius + 2 * t->voxel; }
@@ -79,7 +79,7 @@ bool rbt_ring_center(const Vec3 *direction, const double *distance, double most,
     return true;
 }
 
-// --- nodes that were set on the image's voxels ---
+// --- nodes placed on the image's voxels ---
 
 // In wide openings half a voxel is nothing, and rays in all directions see more.
 static bool is_set(const Track *tree, int i, double voxel)
@@ -89,7 +89,7 @@ static bool is_set(const Track *tree, int i, double voxel)
 
 static bool follows(const Track *tree, int i) { return i < tree->count && tree->node[i].parent == i - 1 && tree->node[i].branch == tree->node[i - 1].branch; }
 
-// To the middle of its own and the mean of its neighbours' places, half a voxel at most: a path from voxel to voxel is a staircase.
+// Moves a node halfway to the mean of its neighbours, by half a voxel at most, because a path from voxel to voxel is a staircase.
 static void straighten(Track *tree, double voxel)
 {
     Vec3 before = tree->count > 0 ? tree->node[0].cylinder.center : vec3(0, 0, 0);
@@ -122,8 +122,8 @@ static int measured_behind(const Track *tree, int from, double voxel)
     return is_set(tree, i, voxel) ? from : i;
 }
 
-// Centre, radius and points by rays square to the vessel. Walls across it, which rays in all directions saw where it is dim, are gone then. What is
-// open to the side, so that the ring is not closed, stays as it was.
+// Centre, radius and points by rays square to the vessel. This removes the spurious walls across the vessel that rays in all directions found in dim
+// places. Nodes whose ring is open to the side stay as they were.
 static void measure_set_node(const Tracker *t, TrackNode *n, Vec3 *point, double scale)
 {
     Cylinder *c = &n->cylinder;

@@ -1,9 +1,9 @@
-// From the widest place of the limb the centre climbs to that of the sphere of least squares through the first walls. It is a sac where even the nearest
-// walls (10th percentile) are further away than the vessel's radius by a good part, and rays that meet none within reach are few: bone and open background
-// go on, and a tube that is merely continued is no wider than itself.
+// From the widest place of the limb the centre climbs to that of the sphere of least squares through the first walls. It is a sac where even the
+// nearest walls (10th percentile) are further away than the vessel's radius by a good part, and rays that meet none within reach are few: bone and
+// open background continue, and a tube that is merely continued is no wider than itself.
 //
-// A sac that is no ball gets further centres (section 3.4 has several in a giant one): of the places between the first centre and its walls the one
-// whose inscribed ball sticks out furthest of the other centres' balls, until none does by much. A ball stays alone.
+// An aneurysm that is not spherical gets further centres (section 3.4 has several in a giant one): of the places between the first centre and its
+// walls the one whose inscribed ball sticks out furthest of the other centres' balls, until none does by much. A spherical one keeps a single centre.
 #include "recon/track/rbt_sacs.h"
 #include "base/heap.h"
 #include "base/sort_doubles.h"
@@ -17,7 +17,7 @@ static const double least_closed = 0.7;   // share of the rays that meet a wall
 // Of a further centre's inscribed ball, shares of the first one's radius: its radius, and how far it sticks out of the other balls.
 static const double least_lobe = 0.35;
 
-// What the vessel is like around its node, not what it swells to in front of the neck.
+// The vessel's radius around its node, without its widening in front of the neck.
 static double radius_beside(const Track *tree, int node)
 {
     enum { HALF = 24 };
@@ -43,7 +43,7 @@ static int see_walls(const Tracker *t, Vec3 x, const Vec3 *ray, int rays, double
     return met;
 }
 
-// What is within one and a half of the median is the sac's: rays down the vessels go far. The walls to point; their number.
+// Keeps walls within 1.5 times the median distance, because rays down the vessels go far. Writes them to `point` and returns their number.
 static int near_walls(Vec3 x, const Vec3 *ray, int rays, const double *distance, double median, Vec3 *point)
 {
     int kept = 0;
@@ -53,7 +53,7 @@ static int near_walls(Vec3 x, const Vec3 *ray, int rays, const double *distance,
     return kept;
 }
 
-// Walls that the vessels see are theirs.
+// Wall points visible from the vessels belong to them.
 static int drop_painted(const RbtPaint *paint, Vec3 *point, int count)
 {
     int kept = 0;

@@ -39,7 +39,7 @@ static void free_near(RbtLevels *levels)
     }
 }
 
-// The voxels around x to levels->near[0]. False: out of memory.
+// Copies the voxels around x to levels->near[0]. False: out of memory.
 static bool crop_near(RbtLevels *levels, Vec3 x)
 {
     enum { REACH = 84 };     // voxels: the widest template and its ring, and what smoothing looks at
@@ -77,11 +77,11 @@ static const Volume *near_level(RbtLevels *levels, int level)
 
 double rbt_level_noise(RbtLevels *levels, int level)
 {
-    // smoothed copies: of what is near, where there is such a one
+    // smoothed copies of the neighbourhood, if there is one
     const Volume *volume = level == 0 ? levels->volume : levels->near[0] ? near_level(levels, level) : rbt_level(levels, level);
     if (volume && levels->noise[level] < 0) {
         double noise = volume_noise(volume, (int)ceil(4 * rbt_level_voxels[level]) + 1);
-        // less is rounding, or the tail of a blur
+        // a smaller variance is rounding or the tail of a blur
         levels->noise[level] = noise > 1e-4 * ((double)levels->volume->maximum - (double)levels->volume->minimum) ? noise : 0;
     }
     return volume ? levels->noise[level] : 0;
@@ -257,9 +257,9 @@ int rbt_scan(Tracker *t, RbtLevels *levels, Vec3 x, double radius, const Vec3 *a
         return 0;
     parallel_for(levels->threads, count, scan_radius, &scan, NULL);
     double noise = fmax(rbt_level_noise(levels, 0), 1e-9);
-    for (int i = 0; i < count; i++) {   // by all voxels of each, not by the template's samples
+    for (int i = 0; i < count; i++) {   // measured over all voxels, not the template's samples
         RbtSight sight = scan.score[i] > 0 ? rbt_sight_of(levels->volume, noise, &scan.best[i]) : (RbtSight){0, 0, 0};
-        // a ball round many vessels is more certain than one of them, but fainter
+        // a ball around many vessels is more significant than one of them, but fainter
         double own = rbt_is_tube(&sight) ? fmin(sight.certainty, CERTAIN) * same_square(sight.evenness * sight.contrast) * scan.radius[i] : 0;
         int k = found;
         if (!(own > 0))

@@ -111,7 +111,7 @@ static Vec3 longest_of(const Tracker *t, const Chords *c)
     return t->ray[best];
 }
 
-// The cylinder of the highest inlier rate about the middle x, or somewhat further along. False where there is none.
+// The cylinder of the highest inlier rate about the middle x, or somewhat further along. False if there is none.
 static bool best_cylinder(Tracker *t, Vec3 x, const Vec3 *axis, int axis_count, double radius, bool is_known, double level, Cylinder *out,
                           double *inlier_rate)
 {

@@ -1,5 +1,6 @@
-// Limits: a click lies within one radius of the axis of the vessel that it names, at most within two; half of the edge points lie on the cylinder; the vessel is
-// narrower than the volume; inside and outside differ by five standard errors (fewer turn up among all tubes that can be laid through pure noise: see test_starts).
+// Limits: a click lies within one radius of the axis of its vessel, at most within two; half of the edge points lie on the cylinder; the vessel is
+// narrower than the volume; inside and outside differ by five standard errors (fewer turn up among all tubes that can be laid through pure noise: see
+// test_starts).
 #include "recon/track/rbt_start_check.h"
 
 #include "base/same_math.h"
@@ -131,7 +132,7 @@ bool rbt_look_at_noise(Tracker *t, RbtLevels *levels, const RbtSeed *first)
         }
     }
     if (best.certainty < least_certainty && tracker_brightness(t, first->start) < t->dark)
-        return true;   // background: said where all starts are looked at
+        return true;   // background: reported with all starts
     t->is_noisy = true;
     if (best.certainty < least_certainty) {
         snprintf(t->refusal, sizeof t->refusal,
@@ -143,7 +144,7 @@ bool rbt_look_at_noise(Tracker *t, RbtLevels *levels, const RbtSeed *first)
     return true;
 }
 
-// What is tracked from now on: the copy that suits this tube.
+// From now on the copy that suits this tube is tracked.
 static bool take_level(Tracker *t, RbtLevels *levels, const Cylinder *tube)
 {
     int level = t->is_noisy ? rbt_level_for(levels, tube) : 0;
@@ -167,7 +168,7 @@ bool rbt_stands_out(Tracker *t, RbtLevels *levels, const RbtSeed *seed)
     return sight.certainty >= least_certainty && (t->is_noisy || (is_inside && sight.contrast > 0.02 * ((double)t->volume->maximum - (double)t->volume->minimum)));
 }
 
-// Noise is no reason to refuse what is doubtful anyhow, but it is worth a word.
+// Noise alone is no reason to refuse a doubtful start, but deserves a warning.
 static void say_noise(Tracker *t)
 {
     char text[240];
@@ -180,14 +181,13 @@ static void say_noise(Tracker *t)
     doubt(check, RBT_NOISE, check->contrast / check->noise, least_contrast, text);
 }
 
-// Is there a tube around the click that stands out much more than the one that was found, or much thinner within it? What was found is then, for example, a
-// band that the vessel lies in: inside of a wide vessel hardly anything
-// stands out.
+// Is there a tube around the click that stands out much more than the one found, or a much thinner one inside it? The one found is then, for example,
+// a band that the vessel lies in: inside a wide vessel hardly anything stands out.
 static bool is_outdone(Tracker *t, RbtLevels *levels, const RbtSeed *seed, RbtStartCheck *check)
 {
     char text[240];
     RbtSight own = rbt_sight_of(levels->volume, check->noise, &check->cylinder);
-    // the search takes a while: not where the click lies in the middle of a good cylinder
+    // the search is slow: skip it if the click lies in the middle of a good cylinder
     bool is_good = check->drift < 0.6 * check->cylinder.radius && check->inlier_rate > 0.6 && own.evenness > 0.6;
     if (!(check->noise > 0) || (t->scan_count < 0 && is_good))
         return false;
@@ -261,7 +261,7 @@ bool rbt_check_given(Tracker *t, RbtLevels *levels, const RbtSeed *seed, const T
     return !t->refusal[0];
 }
 
-// A bright band or bone across the first branch: what is found from it is compared with its brightness, and lost where that does not hold.
+// A bright band or bone across the first branch: branches are compared with its brightness, and missed where that differs.
 static void judge_background(Tracker *t, int count)
 {
     enum { MOST = 512 };
@@ -282,7 +282,7 @@ static void judge_background(Tracker *t, int count)
     doubt(&t->check, RBT_BACKGROUND, high - low, contrast[n / 2], text);
 }
 
-// It ends before something much brighter than itself, such as the face of a band that it may go on in.
+// It ends before something much brighter than itself, such as the face of a band that it may continue in.
 static void judge_ends(Tracker *t, int count)
 {
     char text[240];

@@ -1,4 +1,4 @@
-// The tree from its seeds: what was clicked, then what is found from there, sacs, cuts and links, and the report.
+// Builds the tree from its seeds: clicked branches, branches found from them, aneurysms, cuts and links, and the report.
 #include "recon/track/rbt_track.h"
 
 #include "base/heap.h"
@@ -19,7 +19,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Nodes of a branch follow each other; a later aneurysm may have joined some of them. Nodes of links are counted, but say nothing of the vessel.
+// Nodes of a branch follow each other; a later aneurysm may have joined some of them. Nodes of links are counted but not used for the vessel's
+// statistics.
 static void report_branch(const Tracker *t, int number, double p_inl, RbtBranchReport *report)
 {
     int first = t->tree.count, end = 0, links = 0;
@@ -50,7 +51,7 @@ static void report_branch(const Tracker *t, int number, double p_inl, RbtBranchR
         sacs += is_sac;
         sac_radius += is_sac ? n->cylinder.radius : 0;
         report->radius += n->cylinder.radius / tracked;
-        if (!is_sac || n->cylinder.radius > widest)   // the widest of a sac's centres stands for it
+        if (!is_sac || n->cylinder.radius > widest)   // the widest of an aneurysm's centres represents it
             report->center = n->cylinder.center;
         widest = is_sac ? fmax(widest, n->cylinder.radius) : widest;
     }
@@ -160,7 +161,7 @@ static void brightness_range(const Volume *volume, double *low, double *high)
     }
 }
 
-// `seed` is NULL for points that are no starts.
+// `seed` is NULL for points other than starts.
 static bool check_point(Tracker *t, Vec3 x, const RbtSeed *seed, const char *what, int line, int column, const char *path, Faults *faults)
 {
     Vec3 v = volume_voxel_of(t->volume, x);
@@ -239,7 +240,7 @@ static VesselTree *finish_tree(const Track *track)
     return tree;
 }
 
-typedef struct Job {         // what rbt_track was asked for
+typedef struct Job {         // arguments of rbt_track
     RbtSeed *seed;
     int seed_count;
     const RbtAneurysm *aneurysm;
@@ -280,7 +281,7 @@ static bool run_seed(Tracker *t, const Job *job, int i)
     return false;
 }
 
-// The numbers of the branches in the order of their nodes: one that was hung on a later one stands behind it. Returns how many have nodes.
+// The numbers of the branches in the order of their nodes: a branch attached to a later one comes after it. Returns how many have nodes.
 static int order_branches(const Track *tree, int total, int *order)
 {
     int count = 0;
@@ -353,7 +354,7 @@ static double distance_to_node(const Tracker *t, int i, Vec3 x)
     return least;
 }
 
-// What is left of a branch after a cut is a stub where it does not reach two of its radii beyond its parent's wall: it goes too.
+// The rest of a branch after a cut is removed too if it reaches less than two of its radii beyond its parent's wall.
 static void drop_stub(const Track *tree, int branch, bool *keep)
 {
     int first = 0, last = -1;
@@ -369,7 +370,7 @@ static void drop_stub(const Track *tree, int branch, bool *keep)
             keep[i] = false;
 }
 
-// From the node nearest to each point on its branch goes, and all that hangs on what went. False with a fault where a point is on no branch.
+// Removes each branch from the node nearest to a cut point on, with its subtree. False with a fault where a point is on no branch.
 static bool make_cuts(Tracker *t, const Job *job)
 {
     Track *tree = &t->tree;
@@ -435,10 +436,10 @@ static bool drop_forbidden_stubs(Tracker *t, const RbtEnds *ends)
     return good;
 }
 
-// A node of the tree so far lies on this start: the branch was found already.
+// Whether a node of the tree lies on this start: the branch was found already.
 static bool is_found_already(const Tracker *t, const RbtSeed *seed) { return tracker_node_around(t, seed->start, 1) >= 0; }
 
-// What grows out of the nodes from `first` on.
+// Adds what grows from the nodes from `first` on.
 static bool grow(Tracker *t, const Job *job, RbtPaint *paint, int first, RbtEnds *ends)
 {
     return rbt_grow_branches(t, paint, first, job->threads, job->progress, ends) || out_of_memory_at(job, ends->count);
@@ -458,7 +459,7 @@ static bool add_rivals(Tracker *t, const Job *job, RbtEnds *ends)
     return true;
 }
 
-// What hangs on these goes; a branch that was named must not.
+// Removes their subtrees, which must not contain a named branch.
 static bool drop_rivals(Tracker *t, const Job *job, const RbtEnds *ends, RbtReport *report)
 {
     if (t->parameters->rival_count == 0)

@@ -10,10 +10,10 @@
 #include "recon/track/rbt_report.h"
 #include "recon/volume/volume.h"
 
-// Seeds first to last, then the aneurysms. The first seed gives the root and its direction (toward). Without a direction the
-// vessel is tracked both ways from it, and one of its ends becomes the root (rbt_start.h). A further one is projected to the tree tracked so far
-// (section 3.3) unless it has a `toward`: then it is tracked from its start in both directions, back to the parent. NULL with faults (`path` is the trace
-// file's) when a seed is unfit or nothing could be tracked from it; a branch that just ends early is no fault. `report` may be NULL.
+// Seeds first to last, then the aneurysms. The first seed gives the root and its direction (toward). Without a direction the vessel is tracked both
+// ways from it, and one of its ends becomes the root (rbt_start.h). A further one is projected to the tree tracked so far (section 3.3) unless it has
+// a `toward`: then it is tracked from its start in both directions, back to the parent. NULL with faults (`path` is the trace file's) if a seed is
+// unsuitable or nothing could be tracked from it; a branch that just ends early is no fault. `report` may be NULL.
 VesselTree *rbt_track(const Volume *volume, const RbtParameters *parameters, const RbtSeed *seed, int seed_count, const RbtAneurysm *aneurysm,
                       int aneurysm_count, int threads, const Progress *progress, RbtReport *report, const char *path, Faults *faults);
 

@@ -40,7 +40,7 @@ void track_cut(Track *track, int count)
     track->count = count;
 }
 
-// Node by node: those for which keep[i] is false go; nothing may hang on them that stays.
+// Removes the nodes for which keep[i] is false; no kept node may be attached to them.
 void track_keep(Track *tree, const bool *keep, int *place)
 {
     int used = 0;
@@ -107,7 +107,7 @@ bool tracker_is_stopped(const Tracker *t, Vec3 a, Vec3 b)
     return false;
 }
 
-// Darkest place on the way from a to b.
+// Darkest place between a and b.
 double tracker_darkest(const Tracker *t, Vec3 a, Vec3 b)
 {
     double least = HUGE_VAL;

@@ -1,5 +1,5 @@
-// Internal to recon: the state of one tracking, and what all its steps ask of it.
-// A tracker belongs to one thread; several may read one tree (`tree` is then a shallow copy and nothing is appended to it).
+// Internal to recon: the state of one tracking, and operations shared by its steps. A tracker belongs to one thread; several may read one tree
+// (`tree` is then a shallow copy and nothing is appended to it).
 #ifndef SELDINGER_RECON_TRACK_RBT_TRACKER_H
 #define SELDINGER_RECON_TRACK_RBT_TRACKER_H
 
@@ -27,7 +27,7 @@ typedef struct Estimate {    // a node before it is accepted
     Vec3 point[MAX_RAYS];
 } Estimate;
 
-typedef struct Track {       // nodes with their points, growing
+typedef struct Track {       // nodes with their points
     TrackNode *node;
     int count, capacity;
     Vec3 *point;
@@ -54,15 +54,15 @@ typedef struct Tracker {
     double along[MAX_RAYS];
     Estimate estimate;
     Track tree;
-    const struct RbtPaint *paint;  // of the tree, for fast looks around; NULL: all nodes are looked at
-    bool is_guarded;         // a branch that was found, not clicked: it must neither swell nor brighten past its vessel
+    const struct RbtPaint *paint;  // spatial index of the tree; NULL: search all nodes
+    bool is_guarded;         // a branch found automatically: it must not grow wider or brighter than its vessel
     double longest;          // [mm] a branch may become
     double noise;            // four standard deviations of the spline's values in the background
     double floor, ceiling;   // brightness below which a guarded branch has ended; above which nothing is vessel
     double usual_inliers;    // mean inlier rate of the first branch
     bool out_of_memory;
     const char *why;         // the last estimate was refused
-    char start[256];         // what was estimated at the first start; empty: nothing
+    char start[256];         // description of the estimate at the first start; may be empty
     struct RbtLevels *levels;// the volume and its smoothed copies, for the first start
     bool is_noisy;           // single voxels are noisier than the first vessel is bright
     int scan_count;          // tubes around the first start that stand out, best first; -1: not looked for
@@ -75,20 +75,20 @@ typedef struct Tracker {
 
 bool track_append(Track *track, const TrackNode *node, const Vec3 *point);   // false: out of memory
 void track_cut(Track *track, int count);
-// Keeps the nodes for which keep[i] is true; nothing that stays may hang on one that goes. `place`: room for as many.
+// Keeps the nodes for which keep[i] is true; no kept node may be attached to a removed one. `place`: space for as many.
 void track_keep(Track *track, const bool *keep, int *place);
 void track_free(Track *track);
 
-double tracker_usual_radius(const Track *branch);   // the median of its last nodes: what the vessel is like
+double tracker_usual_radius(const Track *branch);   // the median of its last nodes
 double tracker_segment_distance(Vec3 x, Vec3 a, Vec3 b);
 double tracker_brightness(const Tracker *t, Vec3 point);   // the spline's value
 Vec3 tracker_in_mm(const Volume *volume, Vec3 x, bool is_voxel);
 bool tracker_is_inside(const Volume *volume, Vec3 x);
 bool tracker_is_forbidden(const Tracker *t, Vec3 x);   // by the trace
-bool tracker_is_stopped(const Tracker *t, Vec3 a, Vec3 b);   // does the way from a to b pass a point of `until`?
-// Brightness of the darkest place on the straight way from a to b.
+bool tracker_is_stopped(const Tracker *t, Vec3 a, Vec3 b);   // does the line from a to b pass a point of `until`?
+// Brightness of the darkest place on the line from a to b.
 double tracker_darkest(const Tracker *t, Vec3 a, Vec3 b);
-// Darkest place on the straight way from a to b, as a share of the lumen's brightness at both ends.
+// Darkest place on the line from a to b, as a share of the lumen's brightness at both ends.
 double tracker_link_brightness(const Tracker *t, Vec3 a, Vec3 b);
 
 #endif

@@ -5,8 +5,8 @@
 
 #include <stdio.h>
 
-// Where a subtree that starts at x hangs on the tree: the node of least power distance whose straight link stays inside the lumen (at least half as
-// bright as its ends); if no link does, the brightest one among the near nodes.
+// Where to attach a subtree that starts at x: the node of least power distance whose straight link stays inside the lumen (at least half as bright as
+// its ends); if no link does, the brightest one among the near nodes.
 int tracker_attachment(const Tracker *t, Vec3 x, int node_count)
 {
     int best = -1, brightest = -1;
@@ -31,7 +31,7 @@ int tracker_attachment(const Tracker *t, Vec3 x, int node_count)
     return best >= 0 ? best : brightest;
 }
 
-// Appends a branch's nodes: those of the way back reversed, then those of the way out.
+// Appends a branch's nodes: those of the return path reversed, then those of the way out.
 bool tracker_adopt(Tracker *t, const Track *out, const Track *back, int number)
 {
     int before = t->tree.count;
@@ -62,7 +62,7 @@ void tracker_say_start(Tracker *t, const RbtSeed *seed, const Cylinder *start, c
              start->center.y, start->center.z, vec3_distance(start->center, seed->start), radius, direction, root);
 }
 
-// Nodes of `way` up to where it meets `other`, which starts at the same place: a ring of vessels closes there.
+// Number of nodes of `way` before it meets `other`, which starts at the same place: a loop of vessels closes there.
 static int nodes_before_meeting(const Track *way, const Track *other, double share)
 {
     double length = 0;
@@ -90,7 +90,7 @@ bool tracker_both_ways(Tracker *t, const RbtSeed *seed, const Cylinder *start, i
         track_cut(&way[1], nodes_before_meeting(&way[1], &way[0], t->parameters->overlap));
     int out = way[0].count == 0 || (way[1].count > 0 && rbt_root_is_at_end_of(t, &way[0], &way[1], &why));
     bool found = way[out].count > 0 && !t->out_of_memory;
-    // the first node of both is the same one, seen from either side
+    // the first node of both is the same, in opposite directions
     for (int i = 1; found && i < way[1 - out].count && !t->out_of_memory; i++)
         t->out_of_memory = !track_append(&back, &way[1 - out].node[i], way[1 - out].point + way[1 - out].node[i].point_start);
     if (found && !t->out_of_memory)

@@ -4,11 +4,11 @@
 
 #include "recon/track/rbt_tracker.h"
 
-// Where a subtree that starts at x hangs on the first `node_count` nodes of the tree.
+// Where to attach a subtree that starts at x to the first `node_count` nodes of the tree.
 int tracker_attachment(const Tracker *t, Vec3 x, int node_count);
-// Appends a branch's nodes: those of the way back reversed, then those of the way out. False: out of memory.
+// Appends a branch's nodes: those of the return path reversed, then those of the way out. False: out of memory.
 bool tracker_adopt(Tracker *t, const Track *out, const Track *back, int number);
-// Tracks from a cylinder both ways into the empty tree; nodes follow each other from the root on. False where nothing was found, or out of memory.
+// Tracks from a cylinder both ways into the empty tree; nodes follow each other from the root on. False if nothing was found, or out of memory.
 bool tracker_both_ways(Tracker *t, const RbtSeed *seed, const Cylinder *start, int number);
 // What was estimated at the first start, for the report.
 void tracker_say_start(Tracker *t, const RbtSeed *seed, const Cylinder *start, const char *root);

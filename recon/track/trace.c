@@ -1,4 +1,4 @@
-// YAML by libyaml's document interface: it keeps the line and column of every node, and this walker refuses what it lets pass (keys given twice,
+// YAML by libyaml's document interface: it keeps the line and column of every node, and this walker refuses what libyaml accepts (duplicate and
 // unknown keys, several documents).
 #include "recon/track/trace.h"
 #include "base/heap.h"
@@ -30,7 +30,7 @@ static int pair_count(const yaml_node_t *map) { return (int)(map->data.mapping.p
 
 static int item_count(const yaml_node_t *list) { return (int)(list->data.sequence.items.top - list->data.sequence.items.start); }
 
-// The key of pair `i`; NULL with a fault where it is no text or stands in the map before.
+// The key of pair `i`; NULL with a fault if it is not a string or is a duplicate.
 static const char *key_of(const Walk *w, const yaml_node_t *map, int i, yaml_node_t **value)
 {
     yaml_node_t *key = node_at(w, map->data.mapping.pairs.start[i].key);
@@ -89,7 +89,7 @@ static void read_name(const Walk *w, const yaml_node_t *node, char out[32])
         memcpy(out, text, strlen(text) + 1);
 }
 
-// One of a pair of keys in mm and in voxels; a fault where the other one is there.
+// One of a pair of keys in mm and in voxels; a fault if both are given.
 static void read_place(const Walk *w, const yaml_node_t *node, const char *key, bool is_voxel, bool *given, Vec3 *out, bool *out_is_voxel)
 {
     if (*given)
@@ -234,7 +234,7 @@ static void read_region(const Walk *w, const yaml_node_t *map, const PlaceKind *
         FAULT(w, map, "the %s has no radius; expected radius_mm", kind->what);
 }
 
-// Where the trace keeps the places of a kind.
+// The array of the trace for a kind of place.
 static RbtRegion **places_of(Trace *trace, int kind, int **count)
 {
     RbtRegion **list[PLACE_KINDS] = {&trace->forbid, &trace->cut, &trace->until, &trace->rival};
@@ -278,7 +278,7 @@ static void read_retry_steps(const Walk *w, const yaml_node_t *list, RbtParamete
     }
 }
 
-// Numbers of rays and directions are those of a subdivided icosahedron.
+// Ray and direction counts must be those of a subdivided icosahedron.
 static void check_counts(const Walk *w, const yaml_node_t *node, const char *name, double value)
 {
     if ((!strcmp(name, "N_r") || !strcmp(name, "aneurysm_rays")) && sphere_level_of((int)value) < 1)
@@ -312,7 +312,7 @@ static void read_root(const Walk *w, const yaml_node_t *root, Trace *trace)
         return;
     }
     bool has_branches = false, has_automatic = false;
-    // the set first, wherever it stands: single parameters change it
+    // the parameter set first, wherever it is: single parameters override it
     for (int i = 0; i < pair_count(root); i++) {
         yaml_node_t *key = node_at(w, root->data.mapping.pairs.start[i].key), *value = node_at(w, root->data.mapping.pairs.start[i].value);
         const char *name = key ? scalar_of(key) : NULL, *set = value ? scalar_of(value) : NULL;

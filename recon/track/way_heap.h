@@ -1,4 +1,4 @@
-// A heap of places by the way to them, shortest first; equal ways come out by place, so that results repeat.
+// A priority queue of voxels by path length, shortest first; ties are broken by voxel index, so results are reproducible.
 #ifndef SELDINGER_RECON_TRACK_WAY_HEAP_H
 #define SELDINGER_RECON_TRACK_WAY_HEAP_H
 

@@ -1,7 +1,7 @@
-// seldinger-dicom: unpacks the pixels of a DICOM image. Standard input is the file, standard output the same image in explicit little endian, uncompressed.
-// A program of its own, as what it reads comes from anywhere and GDCM reads it: whoever starts it bounds its memory and time (volume_dicom_pixels.c), and a
-// crash is one fault more. GDCM reads JPEG (8 to 16 bits, lossless too), JPEG-LS, JPEG 2000 and RLE.
-// Exit code 0; 1 where the image cannot be read, 2 where its pixels cannot be unpacked, 3 where the answer cannot be written.
+// seldinger-dicom: unpacks the pixels of a DICOM image. Standard input is the file, standard output the same image in explicit little endian,
+// uncompressed. A separate program, because GDCM reads untrusted data here: the caller limits its memory and time (volume_dicom_pixels.c), and a
+// crash is just another fault. GDCM reads JPEG (8 to 16 bits, lossless too), JPEG-LS, JPEG 2000 and RLE. Exit code 0; 1 where the image cannot be
+// read, 2 where its pixels cannot be unpacked, 3 where the answer cannot be written.
 #include <gdcmImageChangeTransferSyntax.h>
 #include <gdcmImageReader.h>
 #include <gdcmImageWriter.h>
@@ -30,7 +30,7 @@ int main()
             return 2;
         const std::string bytes = answer.str();
         return std::fwrite(bytes.data(), 1, bytes.size(), stdout) == bytes.size() && std::fflush(stdout) == 0 ? 0 : 3;
-    } catch (...) {     // no memory, mostly
+    } catch (...) {     // usually out of memory
         return 2;
     }
 }

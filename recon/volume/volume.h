@@ -1,8 +1,8 @@
 // Volumes: scalar voxel grids in patient coordinates (files: volume_file.h).
 //
-// Voxel (i, j, k), i fastest, lies at origin + i axis[0] + j axis[1] + k axis[2] [mm]; axes may be oblique and anisotropic. The frame (RAS, LPS)
-// is kept as the header says, never converted. Values are held as float and finite: a NaN would pass silently
-// through every interpolation, and only the user knows which background it stands for.
+// Voxel (i, j, k), i fastest, lies at origin + i axis[0] + j axis[1] + k axis[2] [mm]; axes may be oblique and anisotropic. The frame (RAS, LPS) of
+// the header is kept, never converted. Values are finite floats: a NaN would pass silently through every interpolation, and only the user knows which
+// background it represents.
 #ifndef SELDINGER_RECON_VOLUME_VOLUME_H
 #define SELDINGER_RECON_VOLUME_VOLUME_H
 
@@ -24,7 +24,7 @@ typedef struct Volume {
 
 // of all voxels
 #define VOLUME_VOXELS_MOST ((size_t)1 << 31)
-// A volume of the given grid, values zero. NULL where size is not positive or memory lacks.
+// A volume of the given grid, values zero. NULL if size is not positive or memory runs out.
 Volume *volume_create(const int size[3], Vec3 origin, const Vec3 axis[3]);
 void volume_free(Volume *volume);
 static inline double volume_voxel_size(const Volume *v)   // mean edge [mm]

@@ -1,11 +1,11 @@
-// DICOM (PS3.5 encoding, PS3.3 C.7.6 image modules): a series of single-frame files, or one multi-frame file with a place for each frame (enhanced
-// CT, MR, XA 3D). Implicit and explicit little endian, explicit big endian; with or without the preamble. Compressed pixels are unpacked by a program of
-// their own, seldinger-dicom (volume_dicom_pixels.h); what says where they lie is read here.
+// DICOM (PS3.5 encoding, PS3.3 C.7.6 image modules): a series of single-frame files, or one multi-frame file with a position for each frame (enhanced
+// CT, MR, XA 3D). Implicit and explicit little endian, explicit big endian; with or without the preamble. Compressed pixels are decoded by a separate
+// program, seldinger-dicom (volume_dicom_pixels.h); the geometry is read here.
 //
-// Voxel (i, j) of slice k lies at ImagePositionPatient_k + i dx u + j dy v, where ImageOrientationPatient = (u, v) and PixelSpacing = (dy, dx). Slices are
-// put in order of their place along u x v; the step between them is that of the places (SliceThickness says how thick, not how far apart), so that a
-// tilted gantry gives sheared axes. The frame is LPS by rule. value = slope sample + intercept, each slice with its own; MONOCHROME1 shows small
-// samples bright: its samples are turned round within their range first, so that bright is bright.
+// Voxel (i, j) of slice k lies at ImagePositionPatient_k + i dx u + j dy v, where ImageOrientationPatient = (u, v) and PixelSpacing = (dy, dx).
+// Slices are sorted by position along u x v; their spacing comes from the positions (SliceThickness is not the spacing), so that a tilted gantry
+// gives sheared axes. The frame is LPS by rule. value = slope sample + intercept, each slice with its own; MONOCHROME1 displays small samples as
+// bright: its samples are first inverted within their range.
 //
 // Two passes: headers of all files of the folder, then the samples file by file, so that no more than one file is in memory beside the volume.
 #include "recon/volume/volume_dicom.h"
@@ -44,7 +44,7 @@ enum Tag {
 #define T_ITEM_END TAG(0xfffeu, 0xe00d)
 #define T_SEQUENCE_END TAG(0xfffeu, 0xe0dd)
 
-// Where a slice lies and how its samples are scaled: said for the file, for all frames, or for each.
+// Position and scaling of a slice: given for the file, for all frames, or for each frame.
 typedef struct Plane {
     bool has_position, has_orientation, has_spacing, has_slope, has_intercept;
     double position[3], orientation[6], spacing[2], slope, intercept;
@@ -55,7 +55,7 @@ typedef struct DicomImage {
     long rows, columns, allocated, stored, high_bit, is_signed, samples, frames;
     Plane file, shared, *frame;
     int frame_count, frame_room;
-    bool is_walked;          // to its end, or to the pixels
+    bool is_walked;          // completely, or to the pixels
     bool has_pixels, is_encapsulated, big_endian, is_words;
     size_t pixel_place, pixel_length;
 } DicomImage;
@@ -74,7 +74,7 @@ typedef struct Element {
     size_t place;            // of the tag
 } Element;
 
-// What a walk is inside of; the values of other sequences are none of the image's.
+// The enclosing sequence; values of other sequences do not belong to the image.
 typedef enum Scope { SCOPE_FILE, SCOPE_SHARED, SCOPE_PER_FRAME, SCOPE_OTHER } Scope;
 
 // --- elements ---
@@ -102,8 +102,8 @@ static bool fail(const Cursor *c, size_t at, const char *what)
     return false;
 }
 
-// The next element's head; the cursor then stands at its value, which lies within `end` where its length is defined (pixels at the top may be cut:
-// what is missing is told later, in pixels).
+// The next element's head; the cursor then stands at its value, which lies within `end` where its length is defined (top-level pixels may be
+// truncated: the missing part is reported later, in pixels).
 static bool take_element(Cursor *c, size_t end, bool is_top, Element *e)
 {
     static const char cut[] = "the file ends within an element; expected the whole file";
@@ -270,7 +270,7 @@ static bool walk_items(Cursor *c, size_t end, const Element *sequence, Scope sco
     return true;
 }
 
-// The scope inside of a sequence that is met in `scope`.
+// The scope inside a sequence that is met in `scope`.
 static Scope scope_within(uint32_t tag, Scope scope)
 {
     if (scope == SCOPE_FILE)
@@ -468,7 +468,7 @@ static void series_free(Series *s)
     free(s->file);
 }
 
-// Takes the image over. False where memory lacks.
+// Takes the image over. False if out of memory.
 static bool series_add(Series *s, const char *path, const DicomImage *image)
 {
     if (s->count == s->room) {
@@ -486,7 +486,7 @@ static bool series_add(Series *s, const char *path, const DicomImage *image)
     return true;
 }
 
-// A frame's own word, else that for all frames, else the file's.
+// The frame's own value, else that for all frames, else the file's.
 static Plane plane_of(const DicomImage *m, int frame)
 {
     const Plane *said[3] = {m->frame_count > 0 ? &m->frame[frame] : &m->shared, &m->shared, &m->file};
@@ -515,7 +515,7 @@ static int compare_slices(const void *a, const void *b)
 
 static Vec3 vec3_of(const double *x) { return vec3(x[0], x[1], x[2]); }
 
-// All that a slice must have, and have in common with the first.
+// Checks what a slice must have, and share with the first.
 static bool check_slice(const Slice *s, const Slice *first, Faults *faults)
 {
     const Plane *p = &s->plane, *q = &first->plane;
@@ -551,7 +551,7 @@ static bool check_slice(const Slice *s, const Slice *first, Faults *faults)
     return true;
 }
 
-// Drops second copies of the same image; what else shares a place, or leaves a gap, is a fault.
+// Drops duplicates of an image; other slices at the same position, and gaps, are faults.
 static bool check_places(Slice *slice, int *count, Vec3 *step, Faults *faults)
 {
     int kept = 1;
@@ -621,7 +621,7 @@ bool dicom_bytes_read(const char *path, FileBytes *out, Faults *faults)
     return false;
 }
 
-// A file whose slices are taken, its pixels uncompressed.
+// A file whose slices are being read, with uncompressed pixels.
 typedef struct OpenFile {
     const DicomFile *file;
     DicomImage image;        // how the pixels of `from` lie; its planes are none of ours
@@ -637,7 +637,7 @@ static void file_close(OpenFile *open)
 
 static bool unpack(OpenFile *open, Faults *faults)
 {
-    enum { HEADER_ROOM = 1 << 20 };      // more than a header grows when it is written anew
+    enum { HEADER_ROOM = 1 << 20 };      // more than a header grows when it is written again
     const DicomImage *m = &open->file->image;
     DicomImage plain;
     if (!dicom_unpack(open->file->path, m->pixel_place, m->syntax, m->pixel_place + bytes_of_pixels(m) + HEADER_ROOM, &open->own, faults) ||
@@ -645,7 +645,7 @@ static bool unpack(OpenFile *open, Faults *faults)
         return false;
     image_free(&plain);
     open->from = &open->own;
-    // what the bits of a sample mean says the file's own header: a decoder widens them to what the compressed stream could hold
+    // the file's own header defines the bits of a sample: a decoder widens them to what the compressed stream could hold
     open->image = *m;
     open->image.pixel_place = plain.pixel_place;
     open->image.big_endian = plain.big_endian;
@@ -656,7 +656,7 @@ static bool unpack(OpenFile *open, Faults *faults)
     return false;
 }
 
-// `whole`: the bytes of the only file, or NULL where they are read file by file.
+// `whole`: the bytes of the only file, or NULL if they are read file by file.
 static bool file_open(OpenFile *open, const DicomFile *file, const FileBytes *whole, Faults *faults)
 {
     if (open->file == file)
@@ -735,7 +735,7 @@ static Volume *assemble(const Series *series, const FileBytes *whole, Faults *fa
 
 static int compare_names(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
 
-// The folder's entries by name; *count is -1 where it cannot be read.
+// The folder's entries by name; *count is -1 if it cannot be read.
 static char **list_folder(const char *folder, int *count)
 {
     DIR *directory = opendir(folder);
@@ -762,7 +762,7 @@ static char **list_folder(const char *folder, int *count)
     return name;
 }
 
-// A regular file whose first bytes are DICOM's, or cannot be read (whoever reads it whole says why): other files of a folder are not read whole.
+// A regular file whose first bytes are DICOM's, or cannot be read (reported when it is read): other files of a folder are not read completely.
 static bool may_be_dicom(const char *path)
 {
     uint8_t head[PREAMBLE + 16];
@@ -777,8 +777,8 @@ static bool may_be_dicom(const char *path)
     return is_unread || volume_is_dicom(&bytes);
 }
 
-// Images of the folder into the series: those of `wanted`, or all. Files without an image (reports, DICOMDIR) are passed over; what is damaged
-// is a fault unless it is known to be of another series.
+// Images of the folder into the series: those of `wanted`, or all. Files without an image (reports, DICOMDIR) are skipped; a damaged file is a fault
+// unless it is known to belong to another series.
 static bool gather_folder(const char *folder, const DicomImage *wanted, Series *series, Faults *faults)
 {
     int count;
@@ -814,7 +814,7 @@ static bool gather_folder(const char *folder, const DicomImage *wanted, Series *
     return faults->count == before;
 }
 
-// Multi-frame files stand for themselves.
+// Multi-frame files are series of their own.
 static bool is_same_series(const DicomFile *a, const DicomFile *b)
 {
     return a == b || (a->image.frames == 1 && b->image.frames == 1 && !strcmp(a->image.series, b->image.series));
@@ -879,7 +879,7 @@ Volume *volume_parse_dicom(const FileBytes *file, Faults *faults)
         snprintf(folder, sizeof folder, "%.*s", slash ? (n > 0 ? n : 1) : 1, slash ? file->path : ".");
         good = gather_folder(folder, &image, &series, faults);
         image_free(&image);
-        if (good && series.count == 0) {   // the file went away meanwhile
+        if (good && series.count == 0) {   // the file disappeared meanwhile
             faults_add(faults, file->path, 0, 0, "cannot be opened; expected a readable file");
             good = false;
         }

@@ -5,7 +5,7 @@
 #include "recon/volume/volume_format.h"
 
 bool volume_is_dicom(const FileBytes *file);
-// A multi-frame file alone; a slice with the other files of its series, which stand beside it.
+// Reads a multi-frame file alone, and a slice with the other files of its series in the same folder.
 Volume *volume_parse_dicom(const FileBytes *file, Faults *faults);
 // A whole DICOM file, which has 4 GB at most.
 bool dicom_bytes_read(const char *path, FileBytes *out, Faults *faults);

@@ -11,7 +11,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-// What the program may take: it holds the compressed file, the pixels and the answer at once, twice each.
+// The program's memory limit: it holds the compressed file, the pixels and the output at once, twice each.
 enum { LIBRARIES_BYTES = 1 << 28, COPIES = 6, SLOWEST_BYTES_S = 1 << 20, LEAST_S = 20 };
 
 // In the child: it reads the file and writes its answer.
@@ -27,7 +27,7 @@ static void start(const char *program, int file, int answer, size_t most)
     _exit(127);
 }
 
-// All that the program says, up to `most` bytes; false where there is more, or no memory.
+// Reads all output of the program, up to `most` bytes; false if there is more, or no memory.
 static bool take_answer(int answer, size_t most, uint8_t **byte, size_t *length)
 {
     size_t room = 0;

@@ -173,7 +173,7 @@ static bool read_promised(const char *path, FileBytes *out, Faults *faults)
     bool is_dicom = volume_is_dicom(&head) && !volume_is_nrrd(&head) && !volume_is_nifti(&head) && !volume_is_metaimage(&head);
     if (!is_dicom)
         parse(&head, &ignored);
-    if (!is_dicom && needed == 0)   // detached, or bad: the fault is found again
+    if (!is_dicom && needed == 0)   // detached, or bad: the fault is reported below
         return true;
     file_bytes_free(out);
     return is_dicom ? dicom_bytes_read(path, out, faults) : file_bytes_read(path, needed, out, faults);

@@ -1,14 +1,14 @@
 // Volumes from files and to them: NRRD (raw, gzip; attached and detached), MetaImage, NIfTI, uncompressed DICOM (a folder, one file of a series, or a
-// multi-frame file). Every header figure is checked before memory is taken: a lying header is a fault with its line (or byte) and what would be valid. So is a
-// voxel that is not a finite number.
+// multi-frame file). Every header figure is checked before memory is taken: an inconsistent header is a fault with its line (or byte) and what was
+// expected. So is a voxel that is not a finite number.
 #ifndef SELDINGER_RECON_VOLUME_VOLUME_FILE_H
 #define SELDINGER_RECON_VOLUME_VOLUME_FILE_H
 
 #include "recon/volume/volume.h"
 
-// By content, not by extension. A folder is taken for that of a DICOM series; of a series' file the others are found beside it. NULL with faults.
+// By content, not by extension. A folder is read as a DICOM series; for one file of a series the others are found in its folder. NULL with faults.
 Volume *volume_load(const char *path, Faults *faults);
-// The same from memory; `path` stands in messages, and detached data files are looked for in its folder.
+// The same from memory; `path` is used in messages, and detached data files are searched in its folder.
 Volume *volume_parse(const void *bytes, size_t length, const char *path, Faults *faults);
 // Whether a file that begins with these bytes (4096 tell) is one for volume_load; by `path` the samples of a NIfTI pair.
 bool volume_is_known(const void *bytes, size_t length, const char *path);

@@ -1,7 +1,7 @@
 // What the readers share: a header's text, the files that it names, and the one place where samples become voxels.
 //
-// A header can lie. Before memory is taken the promised samples are held against the bytes that are there: raw data must be there in full,
-// a deflate stream cannot grow by more than 1032 times, a number written as text takes two bytes. Nor is more of a file read than its header promises.
+// A header may be wrong. Before memory is allocated the promised samples are compared with the available bytes: raw data must be complete, a deflate
+// stream cannot grow by more than 1032 times, a number written as text takes two bytes. Nor is more of a file read than its header promises.
 #include "recon/volume/volume_format.h"
 
 #include "base/regular_file.h"
@@ -136,7 +136,7 @@ static size_t data_most(const VolumeHeader *header)
     return header->encoding == ENCODING_RAW && header->line_skip == 0 && header->byte_skip >= 0 ? bytes : bytes + bytes / 1000 + SLACK;
 }
 
-// Samples at the end of a file, or after lines, say nothing about where they are: a file much longer than they is another file.
+// Samples at the end of a file, or after skipped lines, have no known offset: a file much longer than expected is another file.
 static bool is_not_too_long(const VolumeHeader *header, const FileBytes *file, Faults *faults)
 {
     if (file->whole <= file->length || (header->byte_skip >= 0 && header->line_skip == 0))
@@ -213,7 +213,7 @@ bool volume_header_check(const VolumeHeader *header, const char *path, int line,
 
 // --- samples ---
 
-// A gzip or zlib stream; a gzip file may be several members on end.
+// A gzip or zlib stream; a gzip file may be several members end to end.
 typedef struct Inflater {
     z_stream stream;
     const FileBytes *data;
@@ -379,7 +379,8 @@ static Volume *decode_text(const VolumeHeader *header, const FileBytes *data, si
     return volume;
 }
 
-// Skips, then converts piece by piece: a stream takes no memory but the voxels'. One byte more than the header promises shows that they do not belong together.
+// Skips, then converts piecewise, so a stream needs no memory besides the voxels. One byte more than the header promises shows that they do not
+// belong together.
 static bool inflate_values(const VolumeHeader *header, const FileBytes *data, size_t skip, size_t count, Volume *volume, Faults *faults)
 {
     Inflater inflater;
@@ -432,7 +433,7 @@ static Volume *decode_deflate(const VolumeHeader *header, const FileBytes *data,
     if (!can_hold(data, skip + bytes, faults))
         return NULL;
     Volume *volume = volume_of_header(header, data->path, faults);
-    // bytes inside a compressed stream have no place in the file: tell where it starts
+    // bytes inside a compressed stream have no file offset: report its start
     return finished(volume, volume && inflate_values(header, data, skip, count, volume, faults), data, data->offset, 0, faults);
 }
 
@@ -602,7 +603,7 @@ Volume *volume_decode_several(const VolumeHeader *header, const char *header_pat
         good = skip <= data.length && data.length - skip >= share;
         if (!good)
             faults_add_at_byte(faults, path, data.length, "the data ends after %zu of %zu bytes", data.length, skip + share);
-        else if (!joined && !(joined = malloc(bytes)))   // one file has shown that the sizes are not mere words
+        else if (!joined && !(joined = malloc(bytes)))   // after one file the sizes are plausible
             faults_add(faults, header_path, line, 0, "needs %zu bytes of memory, more than is available", bytes);
         good = good && joined;
         if (good)

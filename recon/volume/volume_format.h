@@ -1,5 +1,5 @@
-// Inside the volume readers: what a header says, and the one place where samples become voxels.
-// A reader fills a VolumeHeader from text or bytes and hands the samples to volume_decode; every size is checked there once.
+// Internal to the volume readers: the contents of a header, and the conversion of samples to voxels. A reader fills a VolumeHeader from text or bytes
+// and hands the samples to volume_decode; every size is checked there once.
 #ifndef SELDINGER_RECON_VOLUME_VOLUME_FORMAT_H
 #define SELDINGER_RECON_VOLUME_VOLUME_FORMAT_H
 
@@ -34,7 +34,7 @@ typedef struct FileBytes {   // a file, or a part of one
     size_t offset;           // of byte[0] in the file, for messages
     const char *path;
     size_t whole;            // the file's length where less of it was read
-    size_t *needed;          // not NULL: nothing is decoded, the file's bytes that the header promises are told here
+    size_t *needed;          // not NULL: nothing is decoded; receives the number of file bytes that the header promises
 } FileBytes;
 
 // A line of a text header, without its end. False at the end of the bytes.
@@ -45,7 +45,7 @@ typedef struct LineCursor {
 } LineCursor;
 bool line_cursor_next(LineCursor *cursor, const char **text, size_t *length);
 
-// Numbers out of a header's text [text, text + length): exactly `count` of them, separated by blanks; false where not.
+// Numbers out of a header's text [text, text + length): exactly `count` of them, separated by blanks; false if not.
 bool header_numbers(const char *text, size_t length, int count, double *out);
 bool header_integer(const char *text, size_t length, long least, long most, long *out);
 bool header_text_is(const char *text, size_t length, const char *wanted);   // case-insensitive, blanks at both ends ignored
@@ -53,19 +53,19 @@ bool header_text_is(const char *text, size_t length, const char *wanted);   // c
 size_t voxel_type_size(VoxelType type);
 // Sizes positive and within the limit, axes finite and independent; else a fault at `line` (0: none).
 bool volume_header_check(const VolumeHeader *header, const char *path, int line, Faults *faults);
-// Samples to voxels, after the skips. Takes no memory before it is sure that `data` can hold what the header promises.
+// Samples to voxels, after the skips. Allocates nothing before it is certain that `data` can hold what the header promises.
 Volume *volume_decode(const VolumeHeader *header, const FileBytes *data, Faults *faults);
-// The header's grid with values zero; NULL with a fault where memory lacks.
+// The header's grid with values zero; NULL with a fault if memory runs out.
 Volume *volume_of_header(const VolumeHeader *header, const char *path, Faults *faults);
 // Sets minimum and maximum; a fault at the first voxel that is not finite. Samples of `sample_size` bytes begin at `start` of the file; 0: no byte to tell.
 bool volume_finish_values(Volume *volume, const FileBytes *data, size_t start, size_t sample_size, Faults *faults);
 // The first `wanted` bytes of a gzip or zlib stream.
 bool volume_inflate_head(const FileBytes *data, uint8_t *out, size_t wanted, Faults *faults);
-// The first bytes of a regular file, at most `most`, to be freed (file_bytes_free).
+// The first bytes of a regular file, at most `most`; the caller frees it (file_bytes_free).
 bool file_bytes_read(const char *path, size_t most, FileBytes *out, Faults *faults);
 void file_bytes_free(FileBytes *file);
-// Reads of the data file that a detached header names what it promises. It must lie in the header's folder or below: a header cannot point anywhere
-// else unseen.
+// Reads the promised part of the data file that a detached header refers to. It must lie in the header's folder or below, so that a header cannot
+// point elsewhere unnoticed.
 bool file_bytes_read_beside(const char *header_path, int line, const char *name, size_t name_length, const VolumeHeader *header, FileBytes *out,
                             char path[4096], Faults *faults);
 

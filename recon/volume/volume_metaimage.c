@@ -1,5 +1,5 @@
-// MetaImage (itk.org/Wiki/ITK/MetaIO): lines `Key = Value`, the last one ElementDataFile: LOCAL (the samples follow), a file,
-// LIST (names follow, one a line) or numbered names.
+// MetaImage (itk.org/Wiki/ITK/MetaIO): lines `Key = Value`, the last one ElementDataFile: LOCAL (the samples follow), a file, LIST (names follow, one
+// per line) or numbered names.
 //
 // Voxel (i, j, k) lies at Offset + sum_a index_a ElementSpacing_a D_a, where D_a is the a-th triple of TransformMatrix.
 #include "recon/volume/volume_metaimage.h"

@@ -1,5 +1,5 @@
-// NIfTI-1: a header of 348 bytes at fixed places, in either byte order, then the samples (.nii), or the samples in a .img beside the .hdr.
-// Read here and not by libnifti, which trusts the sizes of a header and prints its own messages.
+// NIfTI-1: a header of 348 bytes at fixed places, in either byte order, then the samples (.nii), or the samples in a .img beside the .hdr. libnifti
+// is not used, because it trusts the sizes of a header and prints its own messages.
 //
 // Grid: sform where its code is > 0 (rows srow_x, srow_y, srow_z), else qform (quaternion and qfac), else pixdim alone. The frame is RAS by rule.
 #include "recon/volume/volume_nifti.h"
@@ -89,7 +89,7 @@ static bool read_grid(const NiftiBytes *h, const char *path, VolumeHeader *out, 
         place = AT_SROW;
     } else if (short_at(h, AT_QFORM) > 0) {
         double b = float_at(h, AT_QUATERN), c = float_at(h, AT_QUATERN + 4), d = float_at(h, AT_QUATERN + 8), a2 = 1 - (b * b + c * c + d * d);
-        // b, c, d alone are stored: a is what is left; rounding may leave a little less than nothing
+        // only b, c, d are stored; 1 - b^2 - c^2 - d^2 may be slightly negative by rounding
         Mat3 rotation = quat_to_mat3(quat_unit((Quat){a2 > 0 ? sqrt(a2) : 0, b, c, d}));
         double qfac = float_at(h, AT_PIXDIM) < 0 ? -1 : 1;
         for (int i = 0; i < 3; i++)

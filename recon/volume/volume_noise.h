@@ -5,7 +5,7 @@
 #include "recon/volume/volume.h"
 
 // Standard deviation of the noise [grey values], from the differences of voxels `lag` (1 or more) apart along each axis: the median of their absolute
-// values about their median, so that vessels, edges and a slow shade of the background hardly count. 0 where most of the volume is one value.
+// values about their median, so vessels, edges and slow background variations hardly matter. 0 where most of the volume is one value.
 double volume_noise(const Volume *volume, int lag);
 // A copy blurred by a Gaussian of standard deviation `sigma_mm`; beyond the border the last voxel repeats. The same for any number of threads (0: all
 // cores). NULL: out of memory.

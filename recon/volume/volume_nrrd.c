@@ -1,7 +1,7 @@
 // NRRD, versions 1 to 5 (teem.sourceforge.net/nrrd/format.html): lines `field: value`, `key:=value` and `# comment` up to an empty line, then
 // the samples, or the samples in detached files. Raw, gzip and text encodings.
 //
-// Fields are gathered first and read afterwards, so that their order does not matter. An unknown or repeated field is a fault, as the format demands.
+// Fields are collected first and parsed afterwards, so their order does not matter. An unknown or repeated field is a fault, as the format demands.
 #include "recon/volume/volume_nrrd.h"
 
 #include <ctype.h>
@@ -84,7 +84,7 @@ static bool gather(const FileBytes *file, NrrdHeader *header, Faults *faults)
             continue;
         if (!colon || (size_t)(colon - text) + 1 >= length || (colon[1] != ' ' && colon[1] != '=')) {
             faults_add(faults, file->path, cursor.line, 1, "neither a field, a key nor a comment; expected `field: value`, `key:=value`, or an empty line before the data");
-            return false;   // most likely the data: going on would only repeat this
+            return false;   // most likely the data: continuing would only repeat this
         }
         if (colon[1] == '=')
             continue;
