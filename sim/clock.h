@@ -1,4 +1,4 @@
-// A clock in seconds, for waiting and measuring; what is simulated never reads one.
+// A clock in seconds, for waiting and measuring; the simulation itself never reads it.
 #ifndef SELDINGER_SIM_CLOCK_H
 #define SELDINGER_SIM_CLOCK_H
 

@@ -11,7 +11,7 @@ static const char header[] = "t_s,node,x_mm,y_mm,z_mm", tools_header[] = "t_s,to
 static const double sample_s = 0.05;
 enum { SAMPLED_NODES = 21 };
 
-// The figure of a comment line "# name: figure"; `missing` where there is none.
+// The value of a comment line "# name: value"; `missing` if there is none.
 static double comment_figure(const char *text, size_t length, const char *name, double missing)
 {
     char key[64];
@@ -218,7 +218,7 @@ bool tool_path_sample(ToolPath *path, Simulator *simulator, bool last)
     double dt_s = simulator_scene(simulator)->dt / 1000;
     int64_t steps = simulator_totals(simulator)->steps, every = (int64_t)fmax(1, floor(sample_s / dt_s + 0.5));
     bool due = steps % every == 0;
-    // the end is sampled where it falls between two samples
+    // also sample the end if it falls between two samples
     if (last ? due || steps == 0 : !due)
         return true;
     if (!make_room(path, SAMPLED_NODES * path->tool_count))
@@ -233,7 +233,7 @@ bool tool_path_sample(ToolPath *path, Simulator *simulator, bool last)
     return true;
 }
 
-// What differs in the tools' numbers of nodes.
+// Describes a difference in the tools' node counts.
 static void compare_counts(const ToolPath *golden, const ToolPath *run, PathDifference *difference)
 {
     size_t room = sizeof difference->remark;

@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-// Balls about the nodes that cover the wall. Upstream of the root there are some more where the wall goes on there.
+// Balls about the nodes that cover the wall. Upstream of the root there are some more where the wall continues there.
 enum { UPSTREAM = 8 };       // half radii
 
 typedef struct Balls {
@@ -53,7 +53,7 @@ static bool fill_balls(Balls *balls, const Vessel *exact, const VesselTree *node
         int before = nodes->parent[i] >= 0 ? balls->from[nodes->parent[i]] : -1;
         double reach = 1.2 * farthest_point(nodes, i) + 2 * cell;
         if (open_end && i == nodes->node_count - 1)
-            reach = fmax(reach, 2.2 * nodes->radius[i]);     // the bell in which an exact tube ends
+            reach = fmax(reach, 2.2 * nodes->radius[i]);     // the flared end of an exact tube
         add_ball(balls, nodes->center[i], reach, exact->locate(exact, nodes->center[i], before));
     }
     Vec3 inlet, direction;
@@ -84,7 +84,8 @@ static void tell(NoteFunction note, const char *name, const char *format, ...)
         note(name, text);
 }
 
-// Where neighbouring local models disagree little bubbles of wall hang in the lumen: smaller than a ball of the thinnest radius they are no vessel.
+// Where neighbouring local models disagree, small bubbles of wall float in the lumen: those smaller than a ball of the thinnest radius are not
+// vessels.
 static void drop_specks(TriangleMesh *mesh, double thinnest, const char *name, NoteFunction note)
 {
     int dropped = surface_drop_specks(mesh, 4 * PI / 3 * thinnest * thinnest * thinnest);

@@ -1,10 +1,10 @@
-// Finite volumes in the order of flow, one sweep a step. A cell of volume V and concentration c gets the volume U with the mean concentration m and
-// gives as much away:
+// Finite volumes in the order of flow, one sweep a step. A cell of volume V and concentration c receives the volume U with the mean concentration m
+// and releases the same volume:
 //   U <= V   the cell's own contents leave (upwind): out = c, c' = c + (m - c) U / V;
 //   U >  V   all of them leave, then what comes in passes through: c' = m, out = (V c + (U - V) m) / U.
 // What leaves is what was there plus what came, less what stays, so mass is conserved; c' and out are means of c and m, so both stay within 0 to 1;
-// at U = V contents move by exactly one cell. No length of step is too long, no cell too small, V = 0 included.
-// Where more is injected than flows, J > W, the branches between the tip and the first fork that carries more run backwards: they come first.
+// at U = V contents move by exactly one cell. The scheme is stable for any step length and any cell size, V = 0 included. Where more is injected than
+// flows, J > W, the branches between the tip and the first fork that carries more run backwards: they come first.
 #include "sim/contrast.h"
 
 #include "base/same_math.h"
@@ -25,12 +25,12 @@ struct Contrast {
     double pending;          // [mm3] injected since the last sweep
     double injected, gone;   // [mm3]
     bool clear;
-    int sweeps;              // since the last tidying
+    int sweeps;              // since cells were last cleared
     double *cell;            // (cells) concentration
     double *sac;             // (sacs)
-    double *outlet;          // (branches) concentration that goes on at its downstream end, in the sweep
-    double *back;            // (branches) volume that comes up into its downstream end, 0 outside of the sweep
-    bool *on_way;            // (branches) between inlet and tip, false outside of the sweep
+    double *outlet;          // (branches) concentration that continues at its downstream end, in the sweep
+    double *back;            // (branches) volume entering its downstream end backwards, 0 outside the sweep
+    bool *on_way;            // (branches) between inlet and tip, false outside the sweep
     float *node;             // (nodes)
 };
 
@@ -116,7 +116,7 @@ void contrast_copy(Contrast *to, const Contrast *from)
 
 // --- one sweep ---
 
-// See the head: returns the concentration of what leaves.
+// As at the head of the file; returns the concentration of the outflow.
 static double pass(double *cell, double volume, double through, double mean)
 {
     double out = *cell;
@@ -141,7 +141,7 @@ static double pass_cells(Contrast *contrast, double volume, int from, int to, do
 // What is injected in this sweep, and where.
 typedef struct Injection {
     int branch, cell;        // -1: nothing is
-    int sac;                 // whose sac it is that it flows into, -1
+    int sac;                 // sac into which it flows, -1: none
     double volume;
     double into_sac;         // of it
 } Injection;
@@ -290,7 +290,7 @@ static void sweep(Contrast *contrast, int tip_node, double volume)
     }
 }
 
-// What is as good as nothing goes, so that a vessel once washed out is clear.
+// Clears negligible concentrations, so that a washed-out vessel is clear.
 static void tidy(Contrast *contrast)
 {
     const FlowNetwork *network = &contrast->network;

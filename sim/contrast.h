@@ -1,14 +1,14 @@
-// Contrast agent in a vessel tree: what is injected at the tip travels with the blood and washes out.
+// Contrast agent in a vessel tree: agent injected at the tip travels with the blood and washes out.
 //
-// Blood flows from the inlet to the ends, steady but for the heart's pulse. At a fork it splits by Murray's law, as r^3 of the branches (Murray,
-// PNAS 12:207, 1926); with speed Q / (pi r^2) each piece of a branch has a transit time. The inlet's mean flow is 250 mm/s over its section, what
-// measured flows come to in internal carotid and middle cerebral arteries (275 ml/min: Ford et al., Physiol Meas 26:477, 2005; 1.8 ml a beat:
-// Enzmann et al., AJNR 15:123, 1994), and no more than the heart's 5 l/min. The pulse is 1.6 of the mean at systole, 0.7 at its least (Ford).
-// What is injected takes the place of blood from upstream, because the resistance lies beyond the tree, in the small vessels: the concentration
-// below the tip is injected / (injected + what still comes from upstream), and where more is injected than flows, the rest goes upstream, into the
-// branches of the forks above and out of the inlet. Sacs are well mixed and exchange with the vessel at their neck.
+// Blood flows from the inlet to the ends, steady but for the heart's pulse. At a fork it splits by Murray's law, as r^3 of the branches (Murray, PNAS
+// 12:207, 1926); with speed Q / (pi r^2) each piece of a branch has a transit time. The inlet's mean flow is 250 mm/s over its section, which matches
+// flows measured in internal carotid and middle cerebral arteries (275 ml/min: Ford et al., Physiol Meas 26:477, 2005; 1.8 ml a beat: Enzmann et al.,
+// AJNR 15:123, 1994), and no more than the heart's 5 l/min. The pulse is 1.6 of the mean at systole, 0.7 at its least (Ford). The injected agent
+// displaces blood from upstream, because the resistance lies beyond the tree, in the small vessels: the concentration below the tip is injected /
+// (injected + what still comes from upstream), and where more is injected than flows, the rest goes upstream, into the branches of the forks above
+// and out of the inlet. Sacs are well mixed and exchange with the vessel at their neck.
 //
-// A pure function of the calls: the same advances give the same bits. No call after create allocates. One thread at a time.
+// Deterministic: the same calls give the same bits. No call after create allocates. One thread at a time.
 #ifndef SELDINGER_SIM_CONTRAST_H
 #define SELDINGER_SIM_CONTRAST_H
 
@@ -18,8 +18,8 @@ ContrastOptions contrast_default_options(void);
 
 typedef struct Contrast Contrast;
 
-// Copies what it needs of the tree. `tree` may be NULL (what is injected is gone at once), `options` NULL (default); what is out of its range is
-// brought into it. NULL where memory lacks.
+// Copies what it needs of the tree. `tree` may be NULL (injected agent leaves at once), `options` NULL (default); values out of range are clamped.
+// NULL if out of memory.
 Contrast *contrast_create(const VesselTree *tree, const ContrastOptions *options);
 void contrast_free(Contrast *contrast);
 // No contrast anywhere, time 0, nothing injected.
@@ -27,8 +27,8 @@ void contrast_reset(Contrast *contrast);
 // Both made of the same tree with the same options.
 void contrast_copy(Contrast *to, const Contrast *from);
 
-// `dt_s` further (1 ms to 1 s; any works, a negative one is none), while `rate_ml_s` (0 to 100) flows out of a tip at `tip_node`; what is no node
-// (in the sheath) is the root, where the tool comes in.
+// Advances by `dt_s` (usually 1 ms to 1 s; negative values are ignored), while `rate_ml_s` (0 to 100) flows out of a tip at `tip_node`; an invalid
+// node (tip in the sheath) stands for the root, where the tool enters.
 void contrast_advance(Contrast *contrast, double dt_s, int tip_node, double rate_ml_s);
 
 int contrast_node_count(const Contrast *contrast);                 // N
@@ -36,9 +36,8 @@ const float *contrast_concentration(const Contrast *contrast);     // (N) 0 to 1
 double contrast_injected_ml(const Contrast *contrast);
 double contrast_within_ml(const Contrast *contrast);               // injected = within + gone
 double contrast_gone_ml(const Contrast *contrast);
-bool contrast_is_clear(const Contrast *contrast);                  // nothing is left
-// What the model is made of, for tests and charts: mean flow of the vessel at a node [ml/s] (0 in a sac), and the blood's mean transit time from
-// the inlet to it [s].
+bool contrast_is_clear(const Contrast *contrast);                  // no agent is left
+// For tests and charts: mean flow of the vessel at a node [ml/s] (0 in a sac), and the blood's mean transit time from the inlet to it [s].
 double contrast_flow_ml_s(const Contrast *contrast, int node);
 double contrast_transit_s(const Contrast *contrast, int node);
 

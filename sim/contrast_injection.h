@@ -1,12 +1,12 @@
-// An injection as it is seen: contrast agent goes in at the hub of a tool, down its lumen (sim/contrast_lumen.h), out at its tip and on with the blood
-// (sim/contrast.h). A session and a replay of it go through the same.
+// An injection: contrast agent enters at the hub of a tool, down its lumen (sim/contrast_lumen.h), out at its tip and on with the blood
+// (sim/contrast.h). A session and its replay use the same code.
 //
-// Through which tool: the one asked for, or the next around it that has a lumen (of a wire the catheter that it lies in). Where none has, as in scenes with a
-// wire alone, and in recordings from before a tool could be chosen, agent comes from the foremost tip at the asked rate, as if through a catheter that is
-// not there. The vessel takes from one tip at a time, whichever has most waiting: beside an injection the little that saline drives out of another tool comes
-// in bursts.
+// The agent flows through the requested tool, or the next one around it that has a lumen (for a wire, the catheter around it). Where none has, as in
+// scenes with a wire alone, and in recordings from before a tool could be chosen, agent comes from the foremost tip at the asked rate, as if through
+// an imaginary catheter. The vessel accepts agent from one tip at a time, the one with most waiting; during an injection the small amount that saline
+// drives out of another tool therefore arrives in bursts.
 //
-// A pure function of the calls; no call after create allocates. One thread at a time.
+// Deterministic; no call after create allocates. One thread at a time.
 #ifndef SELDINGER_SIM_CONTRAST_INJECTION_H
 #define SELDINGER_SIM_CONTRAST_INJECTION_H
 
@@ -28,16 +28,16 @@ ContrastInjection *contrast_injection_create(const VesselTree *tree, const Scene
 void contrast_injection_free(ContrastInjection *injection);
 void contrast_injection_copy(ContrastInjection *to, const ContrastInjection *from);   // both made of the same scene
 
-// Which device each tool is from now on (tool_count): what another held has gone with it.
+// Which device each tool is from now on (tool_count); agent in a replaced device leaves with it.
 void contrast_injection_fit(ContrastInjection *injection, const int *fitted);
-// The tool that `xray` injects through, -1: none, see above.
+// The tool through which `xray` injects, -1: none; see above.
 int contrast_injection_tool(const ContrastInjection *injection, const XrayControl *xray);
-// [ml/s] what flows of what `xray` asks for, at most what the tool's lumen passes.
+// [ml/s] the actual flow for the rate requested by `xray`, limited by the tool's lumen.
 double contrast_injection_flow(ContrastInjection *injection, const XrayControl *xray, const double *inserted);
-// `dt_s` on (some ms), while `volume_ml` flowed as contrast_injection_flow said, by the controls `xray`.
+// Advances by `dt_s` (some ms), while `volume_ml` flowed as given by contrast_injection_flow for the controls `xray`.
 void contrast_injection_advance(ContrastInjection *injection, double dt_s, const XrayControl *xray, double volume_ml, const TipPlaces *places);
 
-// Nodes of the tree, 0 without, and of all tools: of each as many as whichever of its devices has most.
+// Nodes of the tree, 0 without, and of all tools: of each tool as many as its device with the most nodes.
 int contrast_injection_tree_nodes(const ContrastInjection *injection);
 int contrast_injection_node_count(const ContrastInjection *injection);   // of both
 // Concentrations, 0 to 1: (tree nodes) in the vessel, then (tools' nodes) in the lumens, one tool after the other.

@@ -27,7 +27,7 @@ typedef struct Bore {                        // of one tool, by its sections
     double *s;
 } Bore;
 
-typedef struct Piece {                       // of a lumen, where nothing changes
+typedef struct Piece {                       // a stretch of lumen of constant section
     double end;
     double area, resistance;                 // open for flow [mm2]; [1/mm3], pressure over flow and viscosity
 } Piece;
@@ -35,8 +35,8 @@ typedef struct Piece {                       // of a lumen, where nothing change
 struct ContrastLumens {
     LumenOptions options;
     int tool_count, piece_count;
-    Bore device[TOOLS_MOST][1 + EXCHANGES_MOST];     // of each that may be this tool …
-    Bore bore[TOOLS_MOST];                   // … of the one that is in, whose arrays these are
+    Bore device[TOOLS_MOST][1 + EXCHANGES_MOST];     // of each device that may be this tool …
+    Bore bore[TOOLS_MOST];                   // … of the device inserted now, whose arrays these are
     int room[TOOLS_MOST];                    // nodes of whichever has most
     int fitted[TOOLS_MOST];
     Column column[TOOLS_MOST];
@@ -244,7 +244,7 @@ static void remove_slug(Column *column, int at)
     memmove(&column->slug[at], &column->slug[at + 1], (size_t)(column->count - at) * sizeof column->slug[0]);
 }
 
-// The two neighbours become one; the agent in them stays.
+// Merges two neighbours, keeping their agent.
 static void mix(Column *column, int at)
 {
     Slug *a = &column->slug[at], *b = a + 1;
@@ -255,7 +255,7 @@ static void mix(Column *column, int at)
     remove_slug(column, at + 1);
 }
 
-// Where there are more than there is room for, the two smallest neighbours are mixed.
+// If there are too many pieces, the two smallest neighbours are merged.
 static void limit(Column *column)
 {
     while (column->count > SLUGS) {
@@ -312,7 +312,7 @@ static double column_volume(const Column *column)
     return sum;
 }
 
-// The lumen is cut. As large as it is now: the rest leaves, what lacks comes in, both at the tip.
+// Adjusts the column to the lumen's present volume: surplus leaves and missing volume enters at the tip.
 static double fit(ContrastLumens *lumens, Column *column)
 {
     double more = volume_of(lumens) - column_volume(column);
@@ -394,7 +394,7 @@ int contrast_lumens_node_count(const ContrastLumens *lumens)
     return count;
 }
 
-// Of the whole lumen, what lies in it included.
+// Of the whole lumen, including the inner tool.
 static double bore_volume_to(const Bore *bore, double s)
 {
     double volume = 0, from = 0;

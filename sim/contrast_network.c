@@ -1,6 +1,6 @@
-// Steady flow in a tree: at each fork Q_child = Q r_child^3 / sum r^3 (Murray), along a branch the transit time of a piece is its volume / Q.
-// A branch's cells have equal transit times, as near to the step as a whole number of them allows and never shorter unless the branch is: then
-// a step moves the contents of each cell by nearly one cell, which upwind transport does without smearing, whatever the speeds are.
+// Steady flow in a tree: at each fork Q_child = Q r_child^3 / sum r^3 (Murray), along a branch the transit time of a piece is its volume / Q. A
+// branch's cells have equal transit times, as near to the step as a whole number of them allows and never shorter unless the branch is: then a step
+// moves the contents of each cell by nearly one cell, which upwind transport does without numerical diffusion at any speed.
 #include "sim/contrast_network.h"
 
 #include "base/same_math.h"
@@ -23,7 +23,7 @@ typedef struct Builder {
     int *first;        // (N + 1) downstream neighbours that flow …
     int *next;         // (N) … by node
     int *branch_of;    // (N)
-    int *sac_of;       // (N) -1 where none
+    int *sac_of;       // (N) -1 if none
     double *along;     // (N) [s] within its branch
 } Builder;
 
@@ -59,7 +59,7 @@ static bool builder_create(Builder *b, const VesselTree *tree)
 
 static bool is_sac(const Builder *b, int node) { return b->tree->kind[node] == NODE_ANEURYSM; }
 
-// Upstream of each node, seen from the inlet: on the way from the root to the inlet the tree's links turn round.
+// Upstream of each node, seen from the inlet: between the root and the inlet the tree's links are reversed.
 static void orient(Builder *b, int inlet)
 {
     const int32_t *parent = b->tree->parent;
@@ -68,9 +68,9 @@ static void orient(Builder *b, int inlet)
     b->up[inlet] = -1;
     for (int node = inlet; parent[node] >= 0; node = parent[node])
         b->up[parent[node]] = node;
-    // upstream first: the turned way, then all others, whose parents stand before them
+    // upstream first: the reversed path, then all others, whose parents come before them
     int count = 0;
-    bool *placed = b->flows;   // borrowed, set again below
+    bool *placed = b->flows;   // temporary, set again below
     for (int node = inlet; node >= 0; node = parent[node]) {
         b->order[count++] = node;
         placed[node] = true;
@@ -207,7 +207,7 @@ static bool make_branches(Builder *b, FlowNetwork *network, int inlet, double fl
     return true;
 }
 
-// A long slow branch may want more cells than are worth it: then all get fewer.
+// A long slow branch may need too many cells; then all branches get fewer.
 static void cut_cells(FlowNetwork *network, double step_s)
 {
     double wanted = 0, most = fmax(LEAST_CELLS_MAX, 4.0 * network->node_count);
@@ -216,7 +216,7 @@ static void cut_cells(FlowNetwork *network, double step_s)
     double share = fmin(1, most / fmax(wanted, 1));
     for (int i = 0; i < network->branch_count; i++) {
         FlowBranch *branch = &network->branch[i];
-        // a whole number of cells that rounding made one less
+        // a whole number of cells, rounded down by one
         double cells = fmin(branch->transit / step_s, most) * share * (1 + 1e-12);
         branch->first_cell = network->cell_count;
         branch->cell_count = cells > 1 ? (int)cells : 1;
@@ -358,7 +358,7 @@ void flow_network_free(FlowNetwork *network)
 
 // --- the inlet ---
 
-// Mean radius of the end branch at `end`, over at most ten of its radii; 0 where it is shorter than one and a half.
+// Mean radius of the end branch at `end`, over at most ten of its radii; 0 if it is shorter than one and a half.
 static double end_radius(const VesselTree *tree, const int *vessel_children, int end)
 {
     double reach = 10 * tree->radius[end], length = 0, sum = 0;

@@ -7,7 +7,8 @@
 #include <time.h>
 
 static const double rest_speed_mm_s = 0.01;
-// A swinging wire stands still at each turning point: only a pause this long is rest. What swings at 1 Hz and passes it moves 1.3 um.
+// A swinging wire is still at each turning point, so only a pause this long counts as rest. A swing of 1 Hz that passes this test has an amplitude of
+// 1.3 um.
 static const double rest_hold_s = 0.1;
 
 static int64_t wall_ns(void)
@@ -46,7 +47,7 @@ static void priority_restore(const Priority *before)
         pthread_setschedparam(pthread_self(), before->policy, &before->parameter);
 }
 
-// After a step of a paced run: late or not?
+// After a step of a paced run: counts a missed deadline.
 static void count_late(DriveReport *report, int64_t late)
 {
     report->deadline_misses++;
@@ -73,7 +74,7 @@ static double last_ramp_s(const Scene *scene)
     return end;
 }
 
-// No input: nobody moves anything, but what was exchanged stays in.
+// Without input nothing moves, but exchanged devices stay inserted.
 static ToolCommands settled(const ToolCommands *last)
 {
     ToolCommands commands = {0};

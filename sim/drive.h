@@ -1,5 +1,5 @@
-// Many steps: a script drives a simulator, as fast as it goes or paced at the simulated clock's speed. Input is sampled on simulated time,
-// so pacing changes no result.
+// Many steps: a script drives a simulator, as fast as possible or paced in real time. Input is sampled on simulated time, so pacing changes no
+// result.
 #ifndef SELDINGER_SIM_DRIVE_H
 #define SELDINGER_SIM_DRIVE_H
 
@@ -9,31 +9,31 @@
 
 typedef enum { DRIVE_DONE, DRIVE_STOPPED, DRIVE_DIVERGED } DriveEnd;
 
-// Paced: step i begins at base + i dt of real time and is due at base + (i + 1) dt, both absolute. One that ends later is a missed deadline;
-// the base then moves by as much as it is late. So simulated time falls behind real time for good, by slowed_s in all: no step is
-// skipped, and none is hurried afterwards, which a hand would feel as a jump.
+// Paced: step i begins at base + i dt of real time and is due at base + (i + 1) dt, both absolute. One that ends later is a missed deadline; the base
+// then moves by as much as it is late. So simulated time falls behind real time permanently, by slowed_s in total: no step is skipped or hurried,
+// which the operator would feel as a jump.
 typedef struct DriveReport {
     DriveEnd end;
     double wall_s;
     int64_t deadline_misses;
     double slowed_s;                 // by which simulated time fell behind
     double latest_s;                 // the worst single deadline was missed by this
-    bool real_time_priority;         // paced on SCHED_FIFO; false where that is not permitted: then other programs delay steps
+    bool real_time_priority;         // paced with SCHED_FIFO; false if not permitted, so that other programs may delay steps
     bool settled;                    // nothing was faster than 0.01 mm/s during the last 0.1 s
 } DriveReport;
 
 typedef struct DriveOptions {
     const Script *script;            // NULL: no input …
-    ToolCommands (*hand)(void *hand_context);   // … or this instead, asked once before each step
+    ToolCommands (*hand)(void *hand_context);   // … or this instead, called once before each step
     void *hand_context;
     double duration_s;               // < 0: the script's
-    double settle_s;                 // afterwards, without input, at most this long, until nothing is faster than 0.01 mm/s for 0.1 s
-    bool paced;                      // a step begins when the last one's millisecond is over, see below
-    const volatile sig_atomic_t *stop;   // NULL, or stops before the next step once it is not 0
+    double settle_s;                 // settling time after the script, at most: without input until nothing is faster than 0.01 mm/s for 0.1 s
+    bool paced;                      // real time: a step begins when the last one's millisecond is over, see above
+    const volatile sig_atomic_t *stop;   // NULL, or a flag: the run stops before the next step once it is not 0
     // After each step, on the simulation thread; false stops. May be NULL.
     bool (*after_step)(void *context, Simulator *simulator, const ToolCommands *commands);
-    DriveReport *live;               // NULL, or where deadlines of a paced run are counted while it goes; added to what is there
-    TimeHistogram *late_ns;          // NULL, or by how much each paced step began late
+    DriveReport *live;               // NULL, or counters of missed deadlines, updated (added to) during a paced run
+    TimeHistogram *late_ns;          // NULL, or a histogram of how late each paced step began
     void *context;
 } DriveOptions;
 

@@ -1,31 +1,31 @@
-// The `exercise:` key of a scene: what a trainee has to do there and how it is judged (sim/score.h). Numbers keep the file's units, which their
-// names carry: they are shown and compared as they were typed.
+// The `exercise:` key of a scene: the trainee's task and how it is scored (sim/score.h). Numbers keep the file's units, which are part of their
+// names, and are shown and compared as typed.
 //
 //   exercise:
 //     title: Reach the aneurysm             # required, at most 95 bytes
 //     instructions: |                       # text for the screen, at most 4000 bytes; default none
 //       Advance through the siphon …
 //     target: aneurysm                      # required: the name of one of the scene's targets
-//     tool: microcatheter                   # whose tip has to reach it; default: that of whichever tool is furthest in
+//     tool: microcatheter                   # whose tip has to reach it; default: the tool furthest in
 //     exchange: {wire: 1}                   # the target counts only while these devices are in: 0 the tool itself, 1, 2, … those of its `exchange:`; default: any
 //     stays: {tool: catheter, target: left carotid}     # once its tip has been in that target for hold_s it must not leave it; default: none
 //     hold_s: 2                             # 0 to 60: the tip stays within the target that long
 //     time_limit_s: 600                     # above 0, to 86,400: from the first movement or X-ray on
-//     rules:                                # what is counted as a handling error; 0: not judged
+//     rules:                                # limits of handling errors; 0: not checked
 //       tip_force_n: 0.5                    # on the last tip_length_mm of each tool, from the wall
 //       tip_length_mm: 5
 //       wall_force_n: 2                     # largest contact force anywhere
-//       wrong_branch_mm: 5                  # way into a branch that does not lead to the target, from its mouth
-//       blind_mm: 10                        # way that a tool is moved without X-rays
-//       contrast_ml: 30                     # contrast agent in all
-//       wire_behind_mm: 5                   # way by which an inner tool's tip lies behind the tip of the tool around it
-//       kick_mm_s: 100                      # speed of a tool's tip while its hand rests
+//       wrong_branch_mm: 5                  # distance into a branch that does not lead to the target, from its mouth
+//       blind_mm: 10                        # distance that a tool is moved without X-rays
+//       contrast_ml: 30                     # total contrast agent
+//       wire_behind_mm: 5                   # distance of an inner tool's tip behind the tip of the tool around it
+//       kick_mm_s: 100                      # speed of a tool's tip while the operator does not move it
 //       buckling: true                      # at the sheath, see score.h
-//     par:                                  # what is good enough for a part's full points; 0: the part is not judged
+//     par:                                  # value for a part's full points; 0: the part is not scored
 //       time_s: 60
 //       fluoroscopy_s: 40
 //       contrast_ml: 5
-//       path_ratio: 1.5                     # way of the tip over the straight way to the target
+//       path_ratio: 1.5                     # path of the tip over the shortest path to the target
 //       wall_force_n: 0.5
 //       wall_impulse_n_s: 10
 //     weights: {time: 1, fluoroscopy: 1, contrast: 1, path: 1, wall_force: 1, wall_impulse: 1}   # 0 to 1000, relative
@@ -42,7 +42,7 @@ enum { EXERCISE_TITLE = 96, EXERCISE_TEXT_MOST = 4000 };
 typedef enum { PART_TIME, PART_FLUOROSCOPY, PART_CONTRAST, PART_PATH, PART_WALL_FORCE, PART_WALL_IMPULSE, PART_COUNT } ScorePart;
 extern const char *const score_part_name[PART_COUNT + 1];      // "time", "fluoroscopy", …; NULL at the end
 
-typedef struct ExerciseRules {   // limits; 0: not judged
+typedef struct ExerciseRules {   // limits; 0: not checked
     double tip_force_n;
     double tip_length_mm;        // > 0
     double wall_force_n;
@@ -56,21 +56,21 @@ typedef struct ExerciseRules {   // limits; 0: not judged
 
 typedef struct Exercise {
     char title[EXERCISE_TITLE];
-    char *instructions;          // "" where there are none; owned
+    char *instructions;          // "" if none; owned
     int target;                  // index of the scene's targets; -1 in exercise_default
-    int tool;                    // index of the scene's tools; -1: whichever is furthest in
-    int device[TOOLS_MOST];      // that has to be in of each tool; -1: any
-    int stays, stays_at;         // the tool whose tip must not leave a target once it has come there, and which target; -1: none
+    int tool;                    // index of the scene's tools; -1: the tool furthest in
+    int device[TOOLS_MOST];      // device of each tool that must be inserted; -1: any
+    int stays, stays_at;         // the tool whose tip must stay in a target once there, and that target; -1: none
     double hold_s, time_limit_s;
     ExerciseRules rules;
-    double par[PART_COUNT];      // s, s, ml, ratio, N, N s; 0: not judged
+    double par[PART_COUNT];      // s, s, ml, ratio, N, N s; 0: not scored
     double weight[PART_COUNT];
     double error_points;
 } Exercise;
 
-// What holds where the scene says nothing: 2 s, 600 s, buckling only, no par, all weights 1, 5 points an error.
+// The defaults: 2 s, 600 s, buckling only, no par, all weights 1, 5 points an error.
 Exercise exercise_default(void);
-typedef struct ExerciseScene {   // what an exercise may name; counts are 0 where it could not be read
+typedef struct ExerciseScene {   // names that an exercise may refer to; counts are 0 if they could not be read
     int target_count, tool_count;
     const char *const *target, *tool[TOOLS_MOST];
     int device_count[TOOLS_MOST];

@@ -1,4 +1,4 @@
-// What is wrong with the cache is never an error: the shape is then fitted.
+// A problem with the cache is never an error: the shape is then fitted again.
 #include "sim/fitted_shape.h"
 
 #include "base/process.h"
@@ -16,7 +16,7 @@
 
 enum { CACHE_PATH = 4096 };
 
-// The folder of the cache, made where it is not there; false where there is none to be had.
+// The folder of the cache, created if it does not exist; false if none is available.
 static bool cache_folder(char folder[CACHE_PATH])
 {
     const char *own = getenv("SELDINGER_CACHE"), *xdg = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
@@ -100,7 +100,7 @@ static VesselTree *fit_shape(const Scene *scene, const LimFitOptions *options, c
 VesselTree *fitted_shape(const Scene *scene, int threads, const Progress *progress, Faults *faults)
 {
     LimFitOptions options = lim_fit_default_options();
-    // exact samples deserve a tighter fit than an angiogram's
+    // exact samples allow a tighter fit than an angiogram's
     options.voxel_mm = shape_options_voxel_mm(scene->shape_option_count, (const char(*)[2][64])scene->shape_option);
     options.threads = threads;
     char folder[CACHE_PATH], path[CACHE_PATH] = "", hex[65];

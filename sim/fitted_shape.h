@@ -1,4 +1,4 @@
-// Shapes and samples fitted on the fly, for scenes that name no fitted model.
+// Shapes and samples fitted on the fly, for scenes without a fitted model.
 #ifndef SELDINGER_SIM_FITTED_SHAPE_H
 #define SELDINGER_SIM_FITTED_SHAPE_H
 
@@ -6,8 +6,8 @@
 #include "recon/fit/lim_fit.h"
 #include "sim/scene.h"
 
-// The scene's shape as a model, from the user's cache ($SELDINGER_CACHE, else below $XDG_CACHE_HOME or ~/.cache) where this program has fitted it before.
-// `threads` 0: all cores; `progress` may be NULL. NULL with faults; the caller frees.
+// The scene's shape as a model, from the user's cache ($SELDINGER_CACHE, else below $XDG_CACHE_HOME or ~/.cache) if this program has fitted it
+// before. `threads` 0: all cores; `progress` may be NULL. NULL with faults; the caller frees.
 VesselTree *fitted_shape(const Scene *scene, int threads, const Progress *progress, Faults *faults);
 // Shared blobs, or a local model for each node where the contact asks for these. NULL with faults; the caller frees.
 VesselTree *fit_samples(const VesselTree *sampled, ContactKind contact, const LimFitOptions *options, const Progress *progress, Faults *faults);

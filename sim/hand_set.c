@@ -28,7 +28,7 @@ bool hand_set_add(HandSet *set, HandPort *port)
 
 static double limited(double value, double most) { return isfinite(value) ? fmax(-most, fmin(most, value)) : 0; }
 
-// Part of the way from `taken` to `total` that fits beside `moved`, both in one step; moves `taken` on.
+// The part of `total` - `taken` that may be fed in this step in addition to `moved`; advances `taken`.
 static double take_way(double total, double *taken, double moved, double most)
 {
     double way = total - *taken;
@@ -41,7 +41,7 @@ static double take_way(double total, double *taken, double moved, double most)
     return sum;
 }
 
-// What a port has still to feed is let fall.
+// Discards the outstanding displacement of a port.
 static void forget_way(HandSet *set, int i)
 {
     set->taken_mm[i] = atomic_load_explicit(&set->port[i]->advanced_mm, memory_order_relaxed);

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Contrast goes on in longer steps than the tool: what is seen of it changes slowly.
+// Contrast advances in longer steps than the tool, because its image changes slowly.
 enum { CONTRAST_EVERY = 10 };
 
 struct Lesson {
@@ -82,7 +82,7 @@ void lesson_step(void *context, Simulator *simulator, const ToolCommands *comman
     for (int k = 0; k < lesson->tool_count; k++)
         fitted[k] = stepper_fitted(stepper, k);
     contrast_injection_fit(lesson->injection, fitted);
-    XrayControl flowing = xray ? *xray : (XrayControl){0};   // what a lumen does not pass is not used up
+    XrayControl flowing = xray ? *xray : (XrayControl){0};   // agent that the lumen does not pass is not counted as used
     if (flowing.contrast_ml_s > 0) {
         double inserted[TOOLS_MOST] = {0};
         for (int k = 0; k < lesson->tool_count; k++)

@@ -1,5 +1,5 @@
-// What a scene's `vessel:` names, opened: a fitted model, a shape that is fitted on the fly and cached, an exact tube, a plane, a mesh; and turned into
-// triangles or a grid where `contact:` asks for that.
+// Opens what a scene's `vessel:` refers to: a fitted model, a shape that is fitted on the fly and cached, an exact tube, a plane, a mesh; and
+// converts it into triangles or a grid if `contact:` requires that.
 #include "sim/open_vessel.h"
 
 #include "geom/mesh_vessel.h"
@@ -37,7 +37,7 @@ static bool open_tree(VesselTree *tree, ContactKind contact, const char *path, O
     return out->vessel != NULL;
 }
 
-// Contact 'lim' of a tube: the exact tube gives the samples, its fit takes its place.
+// Contact 'lim' of a tube: samples the exact tube and replaces it by the fit.
 static bool fit_tube(const Scene *scene, const OpenVesselOptions *options, OpenVessel *out, Faults *faults)
 {
     LimFitOptions fit = lim_fit_default_options();
@@ -51,7 +51,7 @@ static bool fit_tube(const Scene *scene, const OpenVesselOptions *options, OpenV
     return open_tree(model, scene->contact, scene->path, out, faults);
 }
 
-// The wall of the open vessel as triangles or a grid, in its place. A tree stays: it says where the vessel runs.
+// Replaces the wall of the open vessel by triangles or a grid. A tree stays, because it describes the vessel's course.
 static bool turn_into_surface(const Scene *scene, const OpenVesselOptions *options, OpenVessel *out, Faults *faults)
 {
     bool is_tube = scene->source == SOURCE_TUBE;
@@ -68,7 +68,7 @@ static bool turn_into_surface(const Scene *scene, const OpenVesselOptions *optio
     return out->vessel != NULL;
 }
 
-// The sheath's mouth must lie in the lumen: with a mesh of another frame or unit it does not.
+// The sheath's mouth must lie in the lumen: it does not if the mesh has another frame or unit.
 static bool entry_is_inside(const Scene *scene, const Vessel *vessel, Faults *faults)
 {
     Vec3 x = vec3_add_scaled(scene->wire.start, fmax(scene->wire.inserted, 0.5), scene->wire.direction);

@@ -45,7 +45,7 @@ static bool write_all(int descriptor, const unsigned char *data, size_t size, ha
     return true;
 }
 
-// What lies beyond the file's end is zero.
+// Bytes beyond the file's end read as zero.
 static bool read_all(int descriptor, unsigned char *data, size_t size, haddr_t address)
 {
     while (size > 0) {
@@ -79,7 +79,7 @@ static bool set_length(int descriptor, haddr_t size)
     return true;
 }
 
-// To `size` and, where the disk has it, `more` beyond.
+// Grows the file to `size` and, if the disk has space, `more` beyond.
 static bool grow(int descriptor, haddr_t size, haddr_t more)
 {
     haddr_t now = length_of(descriptor);
@@ -229,7 +229,7 @@ static hid_t driver_id(void)
 
 hid_t ordered_file_create(const char *path, hid_t creation, hid_t access)
 {
-    // 12 MB until the first chunks are there, of each of which a B-tree is made (H5B_create)
+    // 12 MB until the first chunks exist, for each of which a B-tree is made (H5B_create)
     if (!heap_has_room(4 * HEAP_ROOM_OF_HDF5)) {
         errno = ENOMEM;
         return -1;
@@ -268,7 +268,7 @@ typedef struct Set {
     haddr_t root, leaf;                      // nodes; of the leaves the last one
 } Set;
 
-// A page that holds extents, as it is on the disk and as it is to be.
+// A page that holds extents: its content on disk and the new one.
 typedef struct Page {
     haddr_t start;
     unsigned char *disk, *wanted;            // page aligned: no fault in the middle of the kernel's copy
@@ -367,7 +367,7 @@ int ordered_file_add(OrderedFile *file, haddr_t header, int rank, hsize_t chunk_
     return file->set_count++;
 }
 
-// So that a reader finds the end behind all that is used.
+// Ensures that a reader finds the end of file behind all used bytes.
 static bool state_end(OrderedFile *file, haddr_t end)
 {
     unsigned char word[WORD];
@@ -383,7 +383,7 @@ static bool state_end(OrderedFile *file, haddr_t end)
     return write_all(file->descriptor, word, WORD, file->end_field);
 }
 
-// The address of new space, 0 where there is none.
+// The address of new space, 0 if there is none.
 static haddr_t take_space(OrderedFile *file, size_t bytes)
 {
     haddr_t address = (file->end + WORD - 1) / WORD * WORD;
@@ -417,7 +417,7 @@ static void put_node_head(unsigned char *node, int level, uint64_t count)
     put_little_endian(node + 6, count, 2);
 }
 
-// A new node with one entry. 0 where there is no space.
+// A new node with one entry. 0 if there is no space.
 static haddr_t make_node(OrderedFile *file, const Set *set, int level, haddr_t left, uint64_t bytes, hsize_t row, haddr_t child, hsize_t next_row)
 {
     size_t size = node_bytes(file, set);
@@ -461,7 +461,7 @@ static bool make_index(OrderedFile *file, Set *set, size_t bytes, haddr_t chunk)
     set->root = set->leaf ? make_node(file, set, 1, HADDR_UNDEF, bytes, 0, set->leaf, leaf_rows) : 0;
     if (!page || set->root == 0 || !write_word(file, set->root_field, set->root))
         return false;
-    for (size_t i = 0; i < WORD; i++)      // it lies where it likes, and a page's copy has to know it
+    for (size_t i = 0; i < WORD; i++)      // it may lie on a buffered page, whose copy must match
         if ((page = page_of(file, set->root_field + i)))
             page->disk[(set->root_field + i) % ORDERED_FILE_PAGE] = page->wanted[(set->root_field + i) % ORDERED_FILE_PAGE] = (unsigned char)(set->root >> 8 * i);
     return page != NULL;
@@ -514,7 +514,7 @@ static bool write_page(OrderedFile *file, Page *page)
         return true;
     watch(false);
     memcpy(page->disk + first, page->wanted + first, end - first);
-    // one call where the system takes it whole; a part alone would never become a whole
+    // one call if the system writes it in one piece; a partial write is completed
     return write_all(file->descriptor, page->wanted + first, end - first, page->start + first);
 }
 

@@ -75,7 +75,8 @@ void pose_copy(Pose *to, const Pose *from)
     }
 }
 
-// Behind the mouth lies what of the first tool, `length` [mm] long in all, is not inserted; s grows along the centreline, also from a tool to the one within. Without a sheath all is free.
+// Behind the mouth lies what of the first tool, `length` [mm] long in all, is not inserted; s grows along the centreline, also from a tool to the one
+// within. Without a sheath everything is free.
 static void find_first_free(Pose *pose, bool has_sheath, double length)
 {
     double hidden = has_sheath ? length - pose->inserted_mm : 0;

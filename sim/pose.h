@@ -1,5 +1,5 @@
-// A moment of a run, as everything that looks at one sees it: views, panel, files. Copied out of the simulator by the thread that owns it, or
-// out of a recording; after that it is plain data. Lengths mm, forces N, torque N mm, time s.
+// A snapshot of a run for views, panel and files. Copied from the simulator by the thread that owns it, or from a recording; plain data afterwards.
+// Lengths mm, forces N, torque N mm, time s.
 #ifndef SELDINGER_SIM_POSE_H
 #define SELDINGER_SIM_POSE_H
 
@@ -9,12 +9,12 @@
 typedef struct PoseTool {
     Command command;         // of the last step
     double inserted_mm;      // beyond the mouth
-    double turned_deg;       // by its hand, since the start
-    double push_n, torque_n_mm;      // that its hand feels
-    bool is_let_go;          // no hand holds it
-    int fitted;              // which of its devices is in: 0 the scene's, 1, 2, … those under its `exchange:`
+    double turned_deg;       // twist applied since the start
+    double push_n, torque_n_mm;      // reaction felt by the operator
+    bool is_let_go;          // released
+    int fitted;              // which of its devices is inserted: 0 the scene's, 1, 2, … those under its `exchange:`
     int node_capacity;       // at most, does not change during a run
-    int node_count;          // of the device that is in
+    int node_count;          // of the inserted device
     ToolNode *node;          // (node_count)
 } PoseTool;
 
@@ -30,7 +30,7 @@ typedef struct Pose {
     int64_t refused_exchanges;       // so far …
     StepExchange refusal;            // … and why the last one was; EXCHANGE_DONE: none
     // the shared centreline, which the wall touches
-    int node_capacity;       // M at most
+    int node_capacity;       // at most M
     int node_count;          // M, proximal to distal; with several tools nodes come and go
     int first_free_node;     // nodes below it lie in the sheath
     Vec3 *position;          // (M)
@@ -38,25 +38,25 @@ typedef struct Pose {
     NodeReport *node;        // (M) radius, wall force, gap, vessel node
 } Pose;
 
-Pose *pose_create(int node_count);   // for one tool with so many nodes; NULL where memory lacks
-// For at most `tool_nodes[k]` nodes of each tool, so many at first.
+Pose *pose_create(int node_count);   // for one tool with `node_count` nodes; NULL if out of memory
+// For at most `tool_nodes[k]` nodes of each tool, which is also the initial number.
 Pose *pose_create_tools(int node_capacity, int tool_count, const int *tool_nodes);
 Pose *pose_create_for(Simulator *simulator);
 void pose_free(Pose *pose);
 void pose_copy(Pose *to, const Pose *from);   // made for the same tools
-// Detects afresh (about 20 us): every 10 ms, not every step. Changes nothing that a later step depends on. Allocates nothing.
+// Detects from scratch (about 20 us): every 10 ms, not every step. Does not affect later steps. Allocates nothing.
 void pose_take(Pose *pose, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
-// Its one tool's nodes from the shared centreline, which it is.
+// Copies the only tool's nodes from the shared centreline, with which they coincide.
 void pose_fill_single_tool(Pose *pose);
 // Where a tool's tip lies on the shared centreline: a node's index and the part of the way to the next.
 double pose_tool_end(const Pose *pose, int tool);
-// [mm] from the proximal end of `tool`: where it passes the tip of `other`; its own length where `other` goes further.
+// [mm] from the proximal end of `tool`: where it passes the tip of `other`; its own length if `other` reaches further.
 double pose_tool_passes(const Pose *pose, int tool, int other);
 int pose_most_distal(const Pose *pose);      // the tool that reaches furthest
 Pose *pose_create_for_run(const RecordedRun *run);
-// Frame `frame` of a recording of `scene`; what it does not hold (contacts, iterations, refusals) is 0.
+// Frame `frame` of a recording of `scene`; values not recorded (contacts, iterations, refusals) are 0.
 void pose_from_run(Pose *pose, const Scene *scene, const RecordedRun *run, int64_t frame);
-// Time, commands, X-ray controls and forces of another step; nodes stay.
+// Sets time, commands, X-ray controls and forces of another step; nodes stay.
 void pose_figures_from_run(Pose *pose, const RecordedRun *run, int64_t step);
 
 #endif

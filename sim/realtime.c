@@ -8,7 +8,7 @@
 #include <string.h>
 #include <time.h>
 
-// How often the figures are made anew [moments]: quantiles of a histogram take a few us each.
+// How often the figures are recomputed [published poses]: quantiles of a histogram take a few us each.
 enum { FIGURES_EVERY = 20 };
 
 struct Realtime {

@@ -1,8 +1,8 @@
-// The 1 kHz thread: owns a simulator, takes commands from hands and controls from the operator, steps at the simulated clock's speed, and lets
-// moments out for whoever draws. No locks: hands write ports (input/hand_port.h), the operator's controls and grip and the moments go through triple
-// buffers. What it is given (simulator, recording) belongs to it from start to stop.
+// The 1 kHz thread: owns a simulator, takes commands from input devices and controls from the operator, steps in real time, and publishes poses for
+// drawing. No locks: devices write ports (input/hand_port.h); the operator's controls and grip and the poses go through triple buffers. Simulator and
+// recording belong to it from start to stop.
 //
-// A step that diverges ends the session: the state is the last good one, the moment says so. Nothing resets by itself.
+// A diverging step ends the session: the state is the last good one, and the pose reports it. Nothing resets automatically.
 #ifndef SELDINGER_SIM_REALTIME_H
 #define SELDINGER_SIM_REALTIME_H
 
@@ -18,13 +18,13 @@ typedef struct RealtimeOptions {
     Recording *recording;            // NULL: none
     int hand_count;                  // at most HANDS_SAMPLED
     HandPort *const *hand;           // (hand_count) borrowed, each with one writer
-    HandGrip grip;                   // before the operator sets any: default the first tool chosen, none locked or let go
+    HandGrip grip;                   // initial grip: default the first tool selected, none locked or released
     XrayControl xray;                // the same
-    double pose_ms;                  // simulated time between moments, default 10
+    double pose_ms;                  // simulated time between published poses, default 10
     bool paused;                     // at the start
     // On the thread, after each step; must not wait. May be NULL.
     void (*after_step)(void *context, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
-    // On the thread, with each moment: fills what else goes out with it (`extra_bytes`). May be NULL.
+    // On the thread, with each published pose: fills the additional data (`extra_bytes`). May be NULL.
     void (*publish)(void *context, void *extra);
     void *context;
     size_t extra_bytes;
@@ -39,8 +39,8 @@ typedef struct RealtimeFigures {
     double slowed_s, latest_s;       // see DriveReport
     bool real_time_priority;
     double step_us[3];               // CPU time of a step: median, p99.9, worst
-    double late_us[3];               // by which the thread woke late: median, p99, worst
-    double real_time_factor;         // simulated time over real time, of the last second that it ran
+    double late_us[3];               // wake-up latency of the thread: median, p99, worst
+    double real_time_factor;         // simulated time over real time, over the last second of running
 } RealtimeFigures;
 
 typedef struct Moment {
@@ -51,14 +51,14 @@ typedef struct Moment {
 
 // Starts the thread. NULL with a fault.
 Realtime *realtime_start(const RealtimeOptions *options, Faults *faults);
-// The calls from here on are of one thread, the window's.
+// The following calls are for one thread, the window's.
 void realtime_set_xray(Realtime *realtime, const XrayControl *xray);
 void realtime_set_grip(Realtime *realtime, const HandGrip *grip);
 void realtime_pause(Realtime *realtime, bool paused);
-// The newest moment; stays as it is until the next call. NULL before the first.
+// The newest published pose; unchanged until the next call. NULL before the first.
 const Moment *realtime_moment(Realtime *realtime);
 double realtime_cpu_s(const Realtime *realtime);   // CPU time of the thread so far [s]
-// Ends and joins the thread, gives the figures of the whole session; frees. The simulator and the recording are the caller's again.
+// Ends and joins the thread, returns the figures of the whole session, frees. Simulator and recording belong to the caller again.
 RealtimeFigures realtime_stop(Realtime *realtime);
 
 #endif

@@ -13,7 +13,7 @@ typedef struct Reader {
     Hdf5Reader *file;
     const char *path;
     Faults *faults;
-    bool is_finite;          // what is read now holds no NaN and no infinity
+    bool is_finite;          // refuse NaN and infinity in datasets read from here on
     bool has_motion;         // frames come from there
 } Reader;
 
@@ -33,9 +33,9 @@ static int64_t least(int64_t a, uint64_t b) { return (uint64_t)a < b ? a : (int6
 
 static bool has(const Reader *reader, const char *name) { return hdf5_has(reader->file, name); }
 
-// --- motion: what a session keeps between its frames (sim/recording.h) ---
+// --- motion: poses between a session's frames (sim/recording.h) ---
 
-// What 1 stands for in a dataset's motion.
+// The unit of a dataset's motion.
 static double unit_of(const Reader *reader, const char *name)
 {
     static const struct {
@@ -79,7 +79,7 @@ static void add_up(const uint32_t *change, uint64_t frames, uint64_t nodes, uint
         }
 }
 
-// The frames' dataset `name` as motion has it: `shape` as of read_dataset. NULL with a fault.
+// The frames' dataset `name` reconstructed from motion: `shape` as of read_dataset. NULL with a fault.
 static void *read_motion(const Reader *reader, const char *name, Hdf5Type type, int rank, uint64_t *shape)
 {
     char path[64];
@@ -94,7 +94,7 @@ static void *read_motion(const Reader *reader, const char *name, Hdf5Type type, 
     if (rank > 1)
         shape[1] = changes[rank - 1];
     uint64_t nodes = rank > 1 ? shape[1] : 1, parts = rank == 3 ? changes[1] : 1;
-    if (changes[0] == 0)     // a shape without values promises nothing
+    if (changes[0] == 0)     // a shape without values needs no data
         nodes = 0;
     uint32_t *now = calloc(nodes * parts + 1, sizeof *now);
     void *values = calloc(changes[0] * nodes * parts + 1, bytes_of(type));
@@ -110,7 +110,7 @@ static void *read_motion(const Reader *reader, const char *name, Hdf5Type type, 
     return values;
 }
 
-// What is there once a frame.
+// Reads what exists once per frame.
 static void *read_frames_of(const Reader *reader, const char *name, Hdf5Type type, int rank, uint64_t *shape)
 {
     return reader->has_motion ? read_motion(reader, name, type, rank, shape) : read_dataset(reader, name, type, rank, shape);
@@ -118,7 +118,7 @@ static void *read_frames_of(const Reader *reader, const char *name, Hdf5Type typ
 
 // --- several tools ---
 
-// As in a scene (sim/scene_tools.c): what a script's head, a CSV and a terminal can hold.
+// As in a scene (sim/scene_tools.c): names safe for script headers, CSV and terminals.
 static bool is_name(const char *text)
 {
     bool good = *text && strlen(text) < TOOL_NAME_SIZE;
@@ -156,7 +156,7 @@ static bool count_tools(const Reader *reader, RecordedRun *run)
     return true;
 }
 
-// What a tool has in every step; the first one's stands at the root too, where that of a single tool does.
+// A tool's values of every step; the first one's are also at the root, as for a single tool.
 static int64_t read_tool_series(const Reader *reader, const char *group, RecordedTool *tool)
 {
     uint64_t command[2] = {0, 2}, proximal[2] = {0, 2}, inserted[1] = {0}, released[1] = {0};
@@ -167,13 +167,13 @@ static int64_t read_tool_series(const Reader *reader, const char *group, Recorde
     tool->command = read_dataset(reader, name[0], HDF5_DOUBLE, 2, command);
     tool->proximal = read_dataset(reader, name[1], HDF5_DOUBLE, 2, proximal);
     tool->inserted = read_dataset(reader, name[2], HDF5_DOUBLE, 1, inserted);
-    bool knows_release = *group || has(reader, name[3]);      // not in recordings from before hands could let go
+    bool knows_release = *group || has(reader, name[3]);      // missing in recordings made before tools could be released
     tool->released = knows_release ? read_dataset(reader, name[3], HDF5_UINT8, 1, released) : NULL;
     int64_t count = least(least((int64_t)command[0], proximal[0]), inserted[0]);
     return knows_release ? least(count, released[0]) : count;
 }
 
-// Which device was asked for and which was in, in every step, where there were tools to exchange.
+// Which device was requested and which was inserted in every step, if tools could be exchanged.
 static int64_t read_exchanges(const Reader *reader, RecordedRun *run)
 {
     uint64_t size[3] = {0, (uint64_t)run->tool_count, 2};
@@ -187,7 +187,7 @@ static int64_t read_exchanges(const Reader *reader, RecordedRun *run)
     return (int64_t)size[0];
 }
 
-// How many nodes each device has: the profile holds no number beyond them.
+// How many nodes each device has: the profile is NaN beyond them.
 static void count_device_nodes(const Reader *reader, const char *group, RecordedTool *tool)
 {
     for (int i = 0; i < tool->device_count; i++) {
@@ -200,7 +200,7 @@ static void count_device_nodes(const Reader *reader, const char *group, Recorded
     }
 }
 
-// What a tool has in every frame, and its devices' profiles: of one that is not to be exchanged one, as a plain list.
+// What a tool has in every frame, and its devices' profiles: for a tool that cannot be exchanged a single one, as a plain list.
 static int64_t read_tool_frames(const Reader *reader, const char *group, bool is_exchanged, RecordedTool *tool)
 {
     int rank = is_exchanged ? 2 : 1;
@@ -231,7 +231,7 @@ static int64_t read_tool_frames(const Reader *reader, const char *group, bool is
 
 static int64_t smaller(int64_t a, int64_t b) { return a < b ? a : b; }
 
-// What was set at each step; rows from before contrast agent had a tool are one value shorter.
+// The controls of each step; older rows, without a tool for contrast agent, are one value shorter.
 static XrayControl *read_xray(const Reader *reader, uint64_t *count)
 {
     uint64_t shape[2] = {0, 0};
@@ -249,7 +249,7 @@ static XrayControl *read_xray(const Reader *reader, uint64_t *count)
     return xray;
 }
 
-// What every step has.
+// Reads what every step has.
 static int64_t read_series(const Reader *reader, RecordedRun *run)
 {
     uint64_t time[1] = {0}, hash[1] = {0}, flags[1] = {0}, wall[2] = {0, 2}, watched = 0;
@@ -261,7 +261,7 @@ static int64_t read_series(const Reader *reader, RecordedRun *run)
     run->state_hash = read_dataset(reader, "/state_hash", HDF5_UINT64, 1, hash);
     run->flags = read_dataset(reader, "/report/flags", HDF5_UINT32, 1, flags);
     run->wall_force = read_dataset(reader, "/report/wall_force_n", HDF5_DOUBLE, 2, wall);
-    bool was_seen = has(reader, "/xray");   // not in recordings of before the trainer
+    bool was_seen = has(reader, "/xray");   // missing in recordings made before the trainer existed
     run->xray = was_seen ? read_xray(reader, &watched) : NULL;
     count = least(least(least(count, hash[0]), flags[0]), wall[0]);
     bool several = count_tools(reader, run) && run->tool_count > 1;
@@ -311,7 +311,7 @@ static bool are_numbers(const double *value, int64_t count)
     return good;
 }
 
-// Of the nodes that are there; the rows beyond hold NaN.
+// Checks the existing nodes; the rows beyond hold NaN.
 static void check_numbers(const Reader *reader, const RecordedRun *run)
 {
     for (int64_t i = 0; i < run->frame_count; i++) {
@@ -330,7 +330,7 @@ static void check_numbers(const Reader *reader, const RecordedRun *run)
     }
 }
 
-// What a reader takes for granted: steps that grow, counts and carriers that are there.
+// Checks what users of a recording assume: rising steps, valid counts and carriers.
 static void check_frames(const Reader *reader, const RecordedRun *run)
 {
     for (int64_t i = 0; i < run->frame_count; i++) {
@@ -359,7 +359,7 @@ static void check_frames(const Reader *reader, const RecordedRun *run)
             }
 }
 
-// Motion has numbers where there is no node: what it had last.
+// Motion repeats the last value for nodes that do not exist.
 static void clear_beyond(RecordedRun *run)
 {
     for (int64_t k = 0; run->frame_nodes && k < run->frame_count; k++)
@@ -402,7 +402,7 @@ static void read_frames(Reader *reader, RecordedRun *run)
         check_numbers(reader, run);
 }
 
-// Steps of one length, as the simulator makes them: who plays the recording counts rows by time.
+// Checks for steps of equal length, as the simulator makes them: playback finds rows by time.
 static void check_times(const Reader *reader, const RecordedRun *run)
 {
     double dt = run->step_ms / 1000;
@@ -417,7 +417,7 @@ static void check_times(const Reader *reader, const RecordedRun *run)
     }
 }
 
-// What an X-ray system and an injector can be set to: wider than ours can, within what is counted and drawn.
+// Valid settings of X-ray system and injector: wider than our controls allow, but safe to count and draw.
 static void check_xray(const Reader *reader, const RecordedRun *run)
 {
     static const struct {
@@ -461,7 +461,7 @@ static void read_run(Reader *reader, RecordedRun *run, bool with_frames)
         read_frames(reader, run);
 }
 
-// Takes `name` over. CONTACT_COUNT where it is not known: then the scene's own.
+// Takes ownership of `name`. CONTACT_COUNT if unknown: then the scene's own.
 static ContactKind contact_of(char *name)
 {
     int kind = 0;

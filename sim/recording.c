@@ -18,20 +18,20 @@
 #include <unistd.h>
 #include <zlib.h>
 
-enum { STEP_RING = 4096, FRAME_RING = 128, LEVEL_OF_SESSIONS = 6, LEVEL_OF_RUNS = 1 /* they may go many times as fast, and what is exact hardly packs better */ };
+enum { STEP_RING = 4096, FRAME_RING = 128, LEVEL_OF_SESSIONS = 6, LEVEL_OF_RUNS = 1 /* many times faster, and exact data hardly compress better */ };
 
 // What the values of a session's recording are rounded to: powers of two, so that rounding is exact and the rest of a double is zeros.
 static const double length_grid_mm = 1.0 / 128, turn_grid = 1.0 / 512, node_force_grid_n = 1.0 / 2048, radius_grid_mm = 1.0 / 1024,
                     figure_grid = 1.0 / 16384 /* of step figures in mm, N and N mm */, eight_bits = -8 /* of each value */;
 
-// A dataset that grows by rows; its rows wait in a ring, then in a chunk.
+// A dataset that grows by rows; rows are buffered in a ring, then in a chunk.
 typedef struct Column {
     char name[48];
     int rank;                // of a row: 0 scalar, 1, 2
     hsize_t shape[2];
     size_t value_bytes, row_bytes;
-    double grid;             // values are rounded to its multiples; 0: stay as they are; < 0: keep as many bits
-    unsigned char *ring;     // (ring length, row_bytes); NULL where rows come from another column
+    double grid;             // rounding unit of the values; 0: exact; < 0: number of bits kept
+    unsigned char *ring;     // (ring length, row_bytes); NULL if rows come from another column
     unsigned char *chunk;    // (chunk_rows, row_bytes)
     hsize_t chunk_rows, rows;        // rows: taken so far
     int32_t *before;         // of motion: the last row, in units
@@ -40,12 +40,12 @@ typedef struct Column {
     int set;                 // of the ordered file
 } Column;
 
-// What each tool has in every step comes first: the first tool's stands at the root, that of the others behind all else.
+// Per-step values of each tool come first: the first tool's are at the root, those of the others after everything else.
 enum { COMMAND, PROXIMAL, INSERTED, RELEASED, TOOL_STEP_COLUMNS };
 enum { TIME = TOOL_STEP_COLUMNS, HASH, PENETRATION, CONTACTS, ITERATIONS, RESIDUAL, LINEARISATIONS, WALL_FORCE, FLAGS, XRAY, STEP_COLUMNS };
-// Behind those of all tools where any may be exchanged: the last that fits the page beside those of four.
+// After those of all tools if any may be exchanged: the last that fits on the page with those of four tools.
 static const char *const tool_step_name[TOOL_STEP_COLUMNS] = {"command", "proximal", "inserted_mm", "released"};
-// Of a frame; from COUNT on of several tools only, then for each of them …
+// Per frame; from COUNT on only with several tools, then for each of them …
 enum { FRAME_STEP, POSITION, QUATERNION, FORCE, GAP, VESSEL_NODE, ONE_TOOL_COLUMNS, COUNT = ONE_TOOL_COLUMNS, ARC, RADIUS, FRAME_COLUMNS };
 enum { OWN_POSITION, OWN_QUATERNION, OWN_CARRIER, TOOL_FRAME_COLUMNS };      // … these
 enum { MOST_STEP_COLUMNS = STEP_COLUMNS + (STEP_TOOLS_MAX - 1) * TOOL_STEP_COLUMNS + 1, MOST_FRAME_COLUMNS = FRAME_COLUMNS + STEP_TOOLS_MAX * TOOL_FRAME_COLUMNS };
@@ -64,13 +64,13 @@ struct Recording {
     char *path;
     PartFile part;           // until it is named
     RecordingOptions options;
-    int tool_count, tool_nodes[STEP_TOOLS_MAX];      // at most, whichever device is in
+    int tool_count, tool_nodes[STEP_TOOLS_MAX];      // at most, for any device
     bool has_exchanges;
     int node_count;          // at most
     NodeReport *node;        // (M) scratch of the simulation thread
     ToolNode *own;           // of a tool's nodes, the same
     int64_t frame_every, last_frame_step;
-    int64_t key_every;       // how many of a session's poses make a frame; 0: no session, each is a frame
+    int64_t key_every;       // number of a session's poses per frame; 0: not a session, each pose is a frame
     Column step_column[MOST_STEP_COLUMNS], frame_column[MOST_FRAME_COLUMNS], motion_column[MOST_FRAME_COLUMNS];
     Ring steps, frames;
     hid_t file;              // while it is built
@@ -280,7 +280,7 @@ static bool write_profile(hid_t file, const char *group, int devices, int count,
     return good;
 }
 
-// Of the device that is in, and of those that may be: each a row, filled up with what is no number.
+// Of the inserted device and of its alternatives: one row each, padded with NaN.
 static bool write_profiles(const Recording *recording, const Scene *scene, int tool, const char *group)
 {
     int devices = recording->has_exchanges ? scene_device_count(scene, tool) : 0, rows = devices > 0 ? devices : 1, count = recording->tool_nodes[tool];
@@ -304,7 +304,7 @@ static bool write_profiles(const Recording *recording, const Scene *scene, int t
     return good;
 }
 
-// What does not change during the run.
+// Writes what does not change during the run.
 static bool write_tools(Recording *recording, const Scene *scene)
 {
     bool good = true;
@@ -324,7 +324,7 @@ static bool write_tools(Recording *recording, const Scene *scene)
 
 enum { MOST_FILES = 64 };
 
-// A file as it is named from anywhere: a recording is replayed in other folders than the one it was made in.
+// An absolute path, because a recording may be replayed in another folder.
 static void write_whole_path(FILE *stream, const char *path)
 {
     char here[PATH_MAX];
@@ -352,7 +352,7 @@ static bool write_session(hid_t place, const RecordingOptions *options)
     return !options->trainee || (write_text(place, "trainee", NULL, options->trainee) && write_text(place, "date", NULL, options->date));
 }
 
-// /scene: the text, and path and sha256 of every file that the run was made from, one a line.
+// /scene: the text, and path and sha256 of every file that the run was made from, one per line.
 static bool write_scene(Recording *recording, const Scene *scene)
 {
     const char *file[MOST_FILES];
@@ -430,7 +430,7 @@ static bool link_all(hid_t file, const Column *column, int count)
 
 static int motion_columns(const Recording *recording) { return recording->key_every > 0 ? frame_columns(recording) : 0; }
 
-// Made without names one after the other, so that their headers lie side by side; then named.
+// Creates them anonymously one after the other, so that their headers are adjacent; then links them.
 static bool create_datasets(Recording *recording)
 {
     hid_t file = recording->file;
@@ -494,7 +494,7 @@ static bool build_file(Recording *recording, const Scene *scene)
 
 // --- the writer's thread ---
 
-// As the filter `shuffle` has it: the first bytes of all values, then the second ones …
+// Like the filter `shuffle`: the first bytes of all values, then the second ones …
 static void shuffle(const unsigned char *from, size_t count, size_t value_bytes, unsigned char *to)
 {
     for (size_t byte = 0; byte < value_bytes; byte++)
@@ -544,7 +544,7 @@ static bool take_row(Recording *recording, Column *column, const unsigned char *
     return end_row(recording, column);
 }
 
-// A value in units. What is no number, the node not being there, is as the node before it: then it costs nothing, and comes from nearby.
+// A value in units. NaN (the node does not exist) repeats the node before it, which compresses to nothing.
 static int32_t in_units(const Column *column, const unsigned char *row, size_t i, int32_t otherwise)
 {
     double value = column->value_bytes == 1                 ? (double)((const int8_t *)row)[i]
@@ -554,8 +554,8 @@ static int32_t in_units(const Column *column, const unsigned char *row, size_t i
     return isnan(value) ? otherwise : (int32_t)fmax(-MOTION_MOST, fmin(MOTION_MOST, rint(value)));
 }
 
-// Changes since the row before, less the change of the node before: nodes that follow each other move nearly alike. As whole numbers without a sign: 0, -1, 1,
-// -2, 2 … are 0, 1, 2, 3, 4 …
+// Changes since the row before, less the change of the node before: nodes that follow each other move nearly alike. Encoded as unsigned integers: 0,
+// -1, 1, -2, 2 … become 0, 1, 2, 3, 4 …
 static bool take_motion(Recording *recording, const Column *from, Column *to, const unsigned char *row)
 {
     uint32_t *change = (uint32_t *)(void *)next_row(to);
@@ -588,7 +588,7 @@ static bool take_steps(Recording *recording, long long row)
     return good;
 }
 
-// Of a session each pose is one of motion; each so many a frame too.
+// In a session each pose adds to /motion, and every few poses one is also a frame.
 static bool take_frame(Recording *recording, long long row)
 {
     const Ring *ring = &recording->frames;
@@ -637,7 +637,7 @@ static void state_rows(const Recording *recording, const Column *column, int cou
         ordered_file_set_rows(recording->ordered, column[i].set, rows);
 }
 
-// The chunk that has begun, with what it has.
+// Writes the partial chunk.
 static bool end_chunks(Recording *recording, Column *column, int count)
 {
     bool good = true;
@@ -655,7 +655,7 @@ static bool name_file(Recording *recording)
     return recording->named;
 }
 
-// States the rows of all whole chunks, in the end of those begun too. Nothing to be done where there is no further one.
+// Commits the rows of all whole chunks and, at the end, of partial ones. Does nothing without a new chunk.
 static bool flush(Recording *recording, bool is_last)
 {
     Column *step = recording->step_column, *frame = recording->frame_column, *motion = recording->motion_column;
@@ -694,7 +694,7 @@ static void *write_rings(void *argument)
         last = atomic_load(&recording->finish);
         if (atomic_load(&recording->abandoned))
             break;
-        // frames first: the rows that they name were pushed before them
+        // frames first: the rows they refer to were pushed before them
         long long frames = atomic_load_explicit(&recording->frames.head, memory_order_acquire);
         long long steps = atomic_load_explicit(&recording->steps.head, memory_order_acquire);
         errno = 0;
@@ -881,7 +881,7 @@ static bool close_datasets(Column *column, int count)
     return good;
 }
 
-// As the library builds it.
+// Phase 1: the library builds the file.
 static bool close_built(Recording *recording)
 {
     bool good = close_datasets(recording->step_column, MOST_STEP_COLUMNS) & close_datasets(recording->frame_column, MOST_FRAME_COLUMNS) &
@@ -907,12 +907,12 @@ static size_t chunk_bytes(const Column *column, int count)
     return bytes;
 }
 
-// From here on it grows.
+// Phase 2: the file grows.
 static bool open_built(Recording *recording)
 {
     enum { INDICES_AHEAD = 1 << 17, SHORT_STEPS = 10000 };
     bool is_short = recording->options.expected_steps > 1 && recording->options.expected_steps < SHORT_STEPS;
-    size_t late = is_short ? 2 : 64;     // by how many chunks of each dataset a reader may be late
+    size_t late = is_short ? 2 : 64;     // number of chunks of each dataset by which a reader may lag
     Column *step = recording->step_column, *frame = recording->frame_column, *motion = recording->motion_column;
     int steps = step_columns(recording), frames = frame_columns(recording), motions = motion_columns(recording);
     size_t ahead = late * (chunk_bytes(step, steps) + chunk_bytes(frame, frames) + chunk_bytes(motion, motions)) + INDICES_AHEAD;
@@ -920,7 +920,7 @@ static bool open_built(Recording *recording)
     return recording->ordered && add_sets(recording, step, steps) && add_sets(recording, frame, frames) && add_sets(recording, motion, motions);
 }
 
-// A chunk lasts as long as a flush is to wait, so that a flush has whole ones alone. An index has room for four times what is expected, or for hours.
+// A chunk covers one flush interval, so that a flush writes whole chunks only. An index has space for four times the expected length, or for hours.
 static void size_chunks(Recording *recording, int64_t expected_steps, double dt, hsize_t *step_rows, hsize_t *frame_rows)
 {
     static const int half_fans[] = {8, 24, 96, 256};

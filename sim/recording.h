@@ -1,11 +1,11 @@
-// A run as an HDF5 file (shared/CONTRACT.md "Recording"): scalars of every step, the wire every 10 ms of simulated time.
+// A run as an HDF5 file (docs/file-formats.md, "Recordings"): scalars of every step, the wire every 10 ms of simulated time.
 //
-// The simulation thread copies into rings; a thread of the recording's own drains them, packs whole chunks of 0.2 s (shuffle, then deflate; any HDF5 reader unpacks
-// them) and states them about as often, so no step sees a file.
-// The file opens in any HDF5 reader while it is written and after a kill, complete up to the last flush. How:
-//   - it is built beside and renamed once its first chunks are flushed, so its structure is on the disk before it has its name;
-//   - after that datasets grow only, by whole chunks, in an order of writes of which every prefix is a whole file (sim/ordered_file.h);
-//   - superblock version 1 and object headers of version 1: no checksums and no "open for writing" mark, so no figure depends on another's bytes;
+// The simulation thread copies into rings; a writer thread drains them, compresses whole chunks of 0.2 s (shuffle, then deflate; any HDF5 reader can
+// read them) and commits them about as often, so no step touches a file. The file opens in any HDF5 reader while it is written and after a kill,
+// complete up to the last flush. How:
+//   - it is built under a temporary name and renamed once its first chunks are flushed, so its structure is on disk before it gets its name;
+//   - after that datasets grow only, by whole chunks, in an order of writes of which every prefix is a valid file (sim/ordered_file.h);
+//   - superblock version 1 and object headers of version 1: no checksums and no "open for writing" mark, so no field depends on the bytes of another;
 //   - the extents of datasets that lie in one page change in one write: of a single tool all with S rows, and all with K or P. S is written first and may be one
 //     flush ahead of the others; of several tools those of a kind may lie in two pages, and differ by a flush.
 // A reader of a file that was killed, or is being written, takes the least S, K and P, and of the frames those whose step is below S.
@@ -19,22 +19,23 @@
 // 2 … stand as 0, 1, 2, 3, 4 …, and the last two dimensions are exchanged: (P,M,3) is (P,3,M). With h5py:
 //   c = file["/motion/wire/position"][:].astype("i8")
 //   position = numpy.cumsum((c >> 1) ^ -(c & 1), axis=-1).cumsum(axis=0).swapaxes(1, 2) * file.attrs["motion_length_mm"]
-// Values beyond 2^30 units are infinite; nodes that are not there (/wire/count) repeat another's; /motion/wire/step is the row itself.
+// Values beyond 2^30 units are infinite; nodes that do not exist (beyond /wire/count) repeat another's; /motion/wire/step is the row itself.
 //
-// Rows: /time_s (S) time at the end of each step, /command (S,2), /proximal (S,2), /state_hash (S), /inserted_mm (S), /released (S) 1 where no hand holds the tool,
-// /xray (S,17: sim/xray.h; 16 in recordings from before contrast agent had a tool), /report/penetration_mm, contacts (with force), iterations
-// and residual of the contact solve, linearisations (1 in a quiet step), flags (all S), wall_force_n (S,2): largest and sum;
-// frames: /wire/step (K) the row of the frame, /wire/position (K,M,3), /wire/quaternion (K,M,4) as w x y z, /contact/force_n (K,M,3),
-// /contact/gap_mm (K,M), /contact/vessel_node (K,M); once: /wire/s_mm (M), /wire/radius_mm (M), /scene (text; attributes path, contact, files, sha256,
-// of a session trainee and date, UTC as in its session file).
-// Several tools: /wire and /contact are those of the shared centreline, whose nodes come and go. M is the most there can be, /wire/count (K) how many there are; the
-// rows beyond hold NaN (vessel_node -1), and /wire/s_mm and radius_mm are (K,M). Tool N, 0 the outermost, has a group /tools/N with the attributes name and kind,
+// Rows: /time_s (S) time at the end of each step, /command (S,2), /proximal (S,2), /state_hash (S), /inserted_mm (S), /released (S) 1 while the tool
+// is released, /xray (S,17: sim/xray.h; 16 in recordings from before contrast agent had a tool), /report/penetration_mm, contacts (with force),
+// iterations and residual of the contact solve, linearisations (1 in a quiet step), flags (all S), wall_force_n (S,2): largest and sum; frames:
+// /wire/step (K) the row of the frame, /wire/position (K,M,3), /wire/quaternion (K,M,4) as w x y z, /contact/force_n (K,M,3), /contact/gap_mm (K,M),
+// /contact/vessel_node (K,M); once: /wire/s_mm (M), /wire/radius_mm (M), /scene (text; attributes path, contact, files, sha256, of a session trainee
+// and date, UTC as in its session file). Several tools: /wire and /contact are those of the shared centreline, whose number of nodes changes. M is
+// the largest possible number, /wire/count (K) the actual one; the rows beyond hold NaN (vessel_node -1), and /wire/s_mm and radius_mm are (K,M).
+// Tool N, 0 the outermost, has a group /tools/N with the attributes name and kind,
 //   rows: command (S,2), proximal (S,2), inserted_mm (S), released (S); of tool 0 they are links to those at the root;
 //   frames of its own nodes, inside other tools and behind the hub too: position (K,MN,3), quaternion (K,MN,4), carrier (K,MN) the outermost tool there, -1 in the
 //   sheath or behind the hub; once: s_mm (MN), radius_mm (MN).
-// Where the scene has tools to exchange, /exchange (S,T,2) says of each of the T tools in every step which of its devices was asked for and which is in (0 the
-//   scene's, 1, 2, … those under its `exchange:`). MN is the most that any of its D devices has, and s_mm and radius_mm are (D,MN); what is beyond a device's
-//   nodes is NaN, in the frames too (carrier -1).
+// Where the scene has tools to exchange, /exchange (S,T,2) says of each of the T tools in every step which of its devices was requested and which is
+// inserted (0 the
+//   scene's, 1, 2, … those under its `exchange:`). MN is the largest number of nodes of its D devices, and s_mm and radius_mm are (D,MN); values
+//   beyond a device's nodes are NaN, in the frames too (carrier -1).
 #ifndef SELDINGER_SIM_RECORDING_H
 #define SELDINGER_SIM_RECORDING_H
 
@@ -43,45 +44,45 @@
 
 typedef struct RecordingOptions {
     double frame_ms;         // simulated time between frames, default 10
-    double pose_ms;          // > 0, of a session: simulated time between its poses (/motion), of which some are frames; and all is rounded. Default 0: all is exact
-    double flush_s;          // simulated time in a chunk; flushes wait for whole ones, and half as long [wall time] at least. Default 0.2
+    double pose_ms;          // > 0 for a session: simulated time between its poses (/motion), some of which are frames; values are rounded. Default 0: everything is exact
+    double flush_s;          // simulated time in a chunk; flushes wait for whole chunks, and at least half as long in wall time. Default 0.2
     const char *trainee, *date;      // of a session (session_date()), else NULL
     int64_t expected_steps;  // sizes the chunks and their index; 0 or 1: unknown, 14 hours at the most
-    int file_count;          // further files that the run depends on, besides what the scene names
+    int file_count;          // further files that the run depends on, besides those of the scene
     const char *const *file;
 } RecordingOptions;
 RecordingOptions recording_default_options(void);    // a run's: every value exact
 RecordingOptions recording_session_options(void);    // the trainer's: poses at 100 Hz, frames at 1 Hz, at most 200 MB an hour of 120 nodes
 
-// Of /motion: values are within this many units of zero.
+// Values of /motion are within this many units of zero.
 #define MOTION_MOST 1073741824.0
 
 typedef struct Recording Recording;
 
-// Call before the first use of HDF5 in a program that records: after a full disk the library must not write at exit.
+// To be called before the first use of HDF5 in a program that records: after a full disk the library must not write at exit.
 void recording_prepare_process(void);
-// NULL with a fault where the file cannot be made.
+// NULL with a fault if the file cannot be created.
 Recording *recording_create(const char *path, Simulator *simulator, const RecordingOptions *options, Faults *faults);
-// After a step. Allocates nothing, calls no file; waits where the disk is slower than the simulation. False once writing failed.
-// `xray` may be NULL: nobody sees the run; what its script injects is kept.
+// To be called after each step. No allocation, no file access; waits if the disk is slower than the simulation. False once writing failed. `xray` may
+// be NULL (a run without a viewer); injections by its script are recorded anyway.
 bool recording_step(Recording *recording, Simulator *simulator, const ToolCommands *commands, const XrayControl *xray);
-// Adds the last state as a frame (of a session as a pose), writes what is left, ends. False with a fault where writing failed; always frees.
+// Adds the last state as a frame (in a session as a pose), writes the rest and closes. False with a fault if writing failed; always frees.
 bool recording_close(Recording *recording, Simulator *simulator, Faults *faults);
-// Ends without a file: of a run that never was. NULL: none.
+// Closes and removes the file. NULL is allowed.
 void recording_abandon(Recording *recording);
 
 // --- reading, for export, info and comparison ---
 typedef struct RecordedTool {
-    char name[TOOL_NAME_SIZE];       // "" where the file names none: a single tool
+    char name[TOOL_NAME_SIZE];       // "" if the file has none: a single tool
     char kind[TOOL_NAME_SIZE];
     double *command;         // (S, 2); those of the first tool are the run's
     double *proximal;        // (S, 2)
     double *inserted;        // (S) [mm]
     uint8_t *released;       // (S)
     double *turned;          // (S) [deg] since the start, the sum of the commands
-    // of several tools only
-    int node_count;          // N, the most that any of its devices has
-    int device_count;        // D, 1 where it was not to be exchanged
+    // with several tools only
+    int node_count;          // N, the largest number of its devices
+    int device_count;        // D, 1 if it could not be exchanged
     int device_nodes[1 + EXCHANGES_MOST];    // (D) of each
     Vec3 *position;          // (K, N)
     Quat *quaternion;        // (K, N)
@@ -97,9 +98,9 @@ typedef struct RecordedRun {
     uint64_t *state_hash;    // (S)
     int tool_count;          // outermost first
     RecordedTool tool[STEP_TOOLS_MAX];
-    uint8_t *exchange;       // (S, tool_count, 2) which device was asked for, which is in; NULL: none was to be exchanged
+    uint8_t *exchange;       // (S, tool_count, 2) device requested, device inserted; NULL: no tool could be exchanged
     int64_t frame_count;     // K
-    int node_count;          // M, of several tools the most that a frame can have
+    int node_count;          // M, with several tools the largest possible number
     int64_t *frame_step;     // (K)
     int32_t *frame_nodes;    // (K) nodes in use; NULL: all
     Vec3 *position;          // (K, M)
@@ -108,19 +109,19 @@ typedef struct RecordedRun {
     float *gap;              // (K, M) [mm]
     int32_t *vessel_node;    // (K, M)
     double *inserted;        // (S) [mm]
-    XrayControl *xray;       // (S); NULL in recordings from before there was one
+    XrayControl *xray;       // (S); NULL in older recordings
     uint32_t *flags;         // (S) STEP_ flags
     double *wall_force;      // (S, 2) [N] largest and sum
     double *s, *radius;      // (M) [mm], of several tools (K, M)
-    char *scene_text, *scene_path;   // NULL where the file lacks them
+    char *scene_text, *scene_path;   // NULL if the file lacks them
     char *trainee, *date;    // of a session, else NULL
-    char *files, *sha256;    // paths and sums of what the run was made from, one a line
-    ContactKind contact;     // CONTACT_COUNT: not said, the scene's
+    char *files, *sha256;    // paths and checksums of the run's input files, one per line
+    ContactKind contact;     // CONTACT_COUNT: not given, the scene's
     double step_ms;
 } RecordedRun;
-// NULL with faults where it is no recording or its sizes do not fit together.
+// NULL with faults if it is not a recording or its sizes are inconsistent.
 RecordedRun *recorded_run_load(const char *path, Faults *faults);
-// The same without frames and nodes, whose counts are 0: what every step has (an hour takes 0.6 GB instead of 2).
+// The same without frames and nodes, whose counts are 0 (an hour takes 0.6 GB instead of 2).
 RecordedRun *recorded_run_load_series(const char *path, Faults *faults);
 void recorded_run_free(RecordedRun *run);
 // The centreline in a frame: pointers into the run.
@@ -144,7 +145,7 @@ typedef struct RecordedToolFrame {
 RecordedToolFrame recorded_run_tool_frame(const RecordedRun *run, int tool, int64_t frame);
 int recorded_run_fitted(const RecordedRun *run, int tool, int64_t step);     // which of its devices is in
 ToolCommands recorded_run_commands(const RecordedRun *run, int64_t step);
-// Whether somebody saw the run: its steps have X-ray controls (`nav`). Else (`run --record`) nobody can have moved the tool blindly.
+// Whether the run had a viewer: its steps have X-ray controls (`nav`). Otherwise (`run --record`) moving without X-ray is not an error.
 bool recorded_run_was_watched(const RecordedRun *run);
 
 #endif

@@ -21,7 +21,7 @@ static void print_frame_rows(FILE *out, const RecordedRun *run, int64_t frame)
     }
 }
 
-// Of several tools all their own nodes, as in the final state that `run` writes.
+// With several tools, the nodes of all of them, as in the final state that `run` writes.
 static void print_tool_rows(FILE *out, const RecordedRun *run, int64_t frame)
 {
     int64_t step = run->frame_step[frame];
@@ -130,7 +130,7 @@ static bool export_frame(const char *path, const RecordedRun *run, int64_t frame
     return output_text_write(&text, path, faults);
 }
 
-// OUT.pvd names OUT_00000.vtp and on, each with its time; the .pvd comes last, so what it names is there.
+// OUT.pvd names OUT_00000.vtp and on, each with its time; the .pvd is written last, so the files it lists exist.
 bool recording_export_series(const RecordedRun *run, const char *path, Faults *faults)
 {
     int stem = (int)(strlen(path) - 4);

@@ -61,12 +61,12 @@ bool replay_fits(const RecordedRun *run, Simulator *simulator, Faults *faults)
     return fits;
 }
 
-// What the columns of a script have to say of each tool besides its motion, at some step.
+// Which columns besides its motion each tool needs in the script.
 typedef struct ScriptUse {
     bool releases[TOOLS_MOST], injects[TOOLS_MOST], exchanges[TOOLS_MOST];
 } ScriptUse;
 
-// A single tool has no name, under which alone a script can inject.
+// A single tool has no name, but a script can inject only through a named tool.
 static ScriptUse find_use(const RecordedRun *run)
 {
     ScriptUse use = {0};

@@ -11,7 +11,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-// `file` as it is named from `folder`, both absolute and without links: up to what they share, then down.
+// The path of `file` relative to `folder`, both absolute and without symbolic links.
 static void relative_path(const char *file, const char *folder, char *out, size_t capacity)
 {
     size_t shared = 0;
@@ -34,7 +34,7 @@ static void relative_path(const char *file, const char *folder, char *out, size_
     snprintf(out + used, capacity - used, "%s", down);
 }
 
-// Replaces the file named at `key` of the scene by the same file named from `folder`.
+// Replaces the path at `key` of the scene by the path relative to `folder`.
 static bool rename_file(char **text, const char *key, const char *file, const char *folder, Faults *faults)
 {
     char whole[PATH_MAX], named[PATH_MAX + 64];
@@ -47,7 +47,7 @@ static bool rename_file(char **text, const char *key, const char *file, const ch
     relative_path(whole, folder, named, sizeof named);
     char *edited = yaml_edit(*text, key, named, false);
     if (!edited)
-        return true;   // inline or not named by this key
+        return true;   // inline, or no path at this key
     free(*text);
     *text = edited;
     return true;

@@ -1,12 +1,12 @@
-// A recording becomes a regression scene: a folder with the scene's text, the recorded hand as its script, and the golden tool path.
+// Turns a recording into a regression scene: a folder with the scene's text, the recorded commands as its script, and the golden tool path.
 #ifndef SELDINGER_SIM_REPLAY_SCENE_H
 #define SELDINGER_SIM_REPLAY_SCENE_H
 
 #include "sim/compare.h"
 #include "sim/replay.h"
 
-// Writes FOLDER/scene.yaml and FOLDER/hand.csv; the folder is made where it is not there. The files that the scene names are named from there. False with
-// faults.
+// Writes FOLDER/scene.yaml and FOLDER/hand.csv; the folder is created if it does not exist. Paths in the scene are made relative to the folder. False
+// with faults.
 bool replay_write_scene(const RecordedRun *run, const Scene *scene, const char *folder, Faults *faults);
 // FOLDER/scene.golden.csv. False with faults.
 bool replay_write_golden(const ToolPath *path, const char *folder, Faults *faults);

@@ -1,14 +1,14 @@
-// The shape that a tool takes when nothing holds it, given by lines and arcs as a tube's path is: cut into sections of one curvature each.
+// A tool's stress-free shape, given by lines and arcs like a tube's path: divided into sections of constant curvature.
 #ifndef SELDINGER_SIM_REST_SHAPE_H
 #define SELDINGER_SIM_REST_SHAPE_H
 
 #include "geom/vessel.h"
 #include "solver/wire.h"
 
-// The pieces run to the tip; what they leave of the wire, at its proximal end, is straight. An arc's plane turns that of the arc before it. Cuts the
-// wire's sections at the pieces' borders and sets their rest curvature. A section's border nearer than 0.01 mm to a piece's moves
-// there: a sliver would be an element. Returns new sections, which the caller frees, and their count; NULL where memory lacks. The pieces are no
-// longer than the wire, or by less than 0.01 mm: then the first lacks it.
+// The pieces end at the tip; the rest of the wire, at its proximal end, is straight. An arc's plane turns that of the arc before it. Cuts the wire's
+// sections at the pieces' borders and sets their rest curvature. A section's border nearer than 0.01 mm to a piece's moves there: a sliver would be
+// an element. Returns new sections, which the caller frees, and their count; NULL if out of memory. The pieces are no longer than the wire, or by
+// less than 0.01 mm: then the first lacks it.
 WireSection *rest_shape_sections(const WireSection *section, int section_count, const TubePiece *piece, int piece_count, int *count);
 double rest_shape_length(const TubePiece *piece, int piece_count);      // [mm]
 

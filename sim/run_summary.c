@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// A tool deeper in the wall than this is held by nothing: it has left the vessel. (Through an open end it may leave; that is said, no failure.)
+// A tool deeper in the wall than this has left the vessel. (Leaving through an open end is reported but is not a failure.)
 static const double lost_mm = 1;
 
 double run_final_penetration_mm(const NodeReport *node, int node_count)
@@ -61,7 +61,7 @@ static void add_energy(cJSON *summary, const EnergyBalance *e)
     add_numbers(energy, (int)(sizeof value / sizeof *value), energy_name, value);
 }
 
-// Of a scene with several tools: what each hand feels and where each tip is.
+// For several tools: the reaction at each hub and the position of each tip.
 static void add_tools(cJSON *summary, Simulator *simulator)
 {
     const Scene *scene = simulator_scene(simulator);

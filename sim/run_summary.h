@@ -1,4 +1,4 @@
-// What a run leaves: the summary as JSON, the final state as CSV, a few lines for people.
+// Output of a run: the summary as JSON, the final state as CSV, and a few lines of text.
 #ifndef SELDINGER_SIM_RUN_SUMMARY_H
 #define SELDINGER_SIM_RUN_SUMMARY_H
 
@@ -11,9 +11,9 @@ double run_final_penetration_mm(const NodeReport *node, int node_count);
 // A node left the vessel: beyond an open end, or so far outside the wall that the wall no longer holds it.
 bool run_left_vessel(const RunTotals *totals);
 
-// Text of the summary (shared/CONTRACT.md, plus "targets"); the caller frees it. NULL where memory lacks.
+// Text of the summary (docs/scene-format.md, "The summary"); the caller frees it. NULL if out of memory.
 char *run_summary_json(Simulator *simulator, const DriveReport *drive, const NodeReport *node);
-// Text of the final state, one row a node.
+// Text of the final state, one row per node.
 char *run_final_csv(Simulator *simulator, const NodeReport *node, size_t *length);
 // The same into files ("-": standard output); false with a fault.
 bool run_write_summary(const char *path, Simulator *simulator, const DriveReport *drive, const NodeReport *node, Faults *faults);

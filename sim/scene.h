@@ -1,6 +1,5 @@
-// A scene: YAML text to options in internal units. shared/CONTRACT.md "Scene" is the format's specification; every fault of a
-// file is reported in one pass. Sees the scene file and its script, but not volumes or models: what `vessel:` names is opened by
-// sim/open_vessel.h.
+// A scene: YAML text to options in internal units. docs/scene-format.md specifies the format; all faults of a file are reported in one pass. Reads
+// the scene file and its script, but not volumes or models: sim/open_vessel.h opens the vessel.
 #ifndef SELDINGER_SIM_SCENE_H
 #define SELDINGER_SIM_SCENE_H
 
@@ -43,20 +42,20 @@ typedef enum { CORE_STEEL, CORE_NITINOL, CORE_COUNT } ToolCore;
 extern const char *const tool_core_name[CORE_COUNT + 1];           // as they are written; NULL at the end
 
 typedef struct SceneTool {
-    char name[TOOL_NAME_SIZE];   // heads its script columns; no dot, comma or space
-    char title[80];              // what the device is called, "" where nothing says; longer ones are cut
+    char name[TOOL_NAME_SIZE];   // prefix of its script columns; no dot, comma or space
+    char title[80];              // name of the device, "" if not given; truncated if too long
     ToolKind kind;
-    ToolCore core;               // of a wire: steel keeps a bend that is made by hand, nitinol does not
-    TipShaping tip;              // how its tip was shaped (`wire` has it in its sections); length 0: it was not …
-    TipShaped tip_shaped;        // … and what that took
-    WireOptions wire;            // as read, `inserted` included; scene_tool_wire has where it starts. Fixes and loads are the first tool's
+    ToolCore core;               // of a wire: steel keeps a bend shaped by hand, nitinol does not
+    TipShaping tip;              // how its tip was shaped (included in the sections of `wire`); length 0: not shaped …
+    TipShaped tip_shaped;        // … and the shaping steps
+    WireOptions wire;            // as read, including `inserted`; scene_tool_wire adds its start. Fixes and loads are the first tool's
     double friction_inside;      // Coulomb coefficient of its lumen against the tool within
     double marker_length, marker_attenuation;    // [mm], [1/mm] of the radio-opaque marker at the tip; length 0: none
-    char *device_path;           // the device file that its keys come from; NULL: none
+    char *device_path;           // the device file of its keys; NULL: none
 } SceneTool;
 
 typedef struct SceneExchange {
-    int tool;                // whose place it may take
+    int tool;                // tool that it may replace
     SceneTool device;        // its name is that tool's
 } SceneExchange;
 
@@ -69,44 +68,44 @@ typedef struct Scene {
     int shape_option_count;  // … and its other keys as text, checked by the synth code
     char (*shape_option)[2][64];
     TubeOptions tube;        // SOURCE_TUBE (pieces and points owned by the scene)
-    char *tube_points_path;  // its polyline's file; NULL where it has none
+    char *tube_points_path;  // its polyline's file; NULL if it has none
     Vec3 plane_point, plane_normal;
     char *mesh_path;         // SOURCE_MESH: resolved against the scene's folder
-    double mesh_scale;       // of its coordinates, to mm; 0: not given, they are in mm
-    double mesh_cell;        // [mm] of a mesh or grid that another source is turned into; 0: chosen from the vessel
+    double mesh_scale;       // factor from its coordinates to mm; 0: not given, they are in mm
+    double mesh_cell;        // [mm] cell edge of a mesh or grid made from another source; 0: chosen from the vessel
     ContactKind contact;
     double friction;
-    WireOptions wire;        // of the first tool; sections, fixes, loads owned by the scene. Whoever changes what is read does it here
+    WireOptions wire;        // of the first tool; sections, fixes, loads owned by the scene. To be changed here by options of the command line
     int tool_count;          // 1 to 4, outermost first; with `wire:` one named "wire"
     SceneTool tool[TOOLS_MOST];
-    bool inlet_is_root;      // sheath `inlet: root`: start and direction to be taken from vessel->inlet
+    bool inlet_is_root;      // sheath `inlet: root`: start and direction come from vessel->inlet
     ContactOptions contact_options;
     SelfContactMode self_contact;
-    bool follows_touch;              // contact points follow the place where the tool touches (StepperOptions)
+    bool follows_touch;              // contact points follow the actual place of contact (StepperOptions)
     double dt;               // [ms]
     Script *script;          // NULL: none
-    char *script_path;       // NULL where inline or none
-    int exchange_count;      // tools that may take the place of one of `tool`: the script's exchange column names them by their order under that tool
+    char *script_path;       // NULL if inline or none
+    int exchange_count;      // devices that may replace one of `tool`; the script's exchange column refers to them by their order under that tool
     SceneExchange *exchange;
     int target_count;
     SceneTarget *target;
     double marker_length, marker_attenuation;   // [mm], [1/mm] of the first tool's marker
-    Vec3 patient_anterior, patient_superior;     // unit, perpendicular, in the model's frame; zero: not said
+    Vec3 patient_anterior, patient_superior;     // unit, perpendicular, in the model's frame; zero: not given
     double lao, cra;         // [deg] of the C-arm at the start
     char *anatomy_path;      // volume whose bone and soft tissue lie behind the vessel in fluoroscopy; NULL: a plain head
-    Exercise *exercise;      // what a trainee has to do; NULL: nothing
+    Exercise *exercise;      // the trainee's exercise; NULL: none
     VerifyPlan verify;       // what `seldinger check` measures; case_count 0: nothing
 } Scene;
 
-// `text` need not be NUL-terminated; `path` is for messages and to resolve relative files. NULL with faults.
+// `text` need not be NUL-terminated; `path` is used in messages and to resolve relative paths. NULL with faults.
 Scene *scene_parse(const char *text, size_t length, const char *path, Faults *faults);
 Scene *scene_load(const char *path, Faults *faults);
 void scene_free(Scene *scene);
-// A tool's options as they are now: scene->wire for the first, and for the others their own with start, direction, normal, sheath and gravity of scene->wire
+// A tool's current options: scene->wire for the first; for the others their own, with start, direction, normal, sheath and gravity of scene->wire
 // (which `inlet: root` sets late).
 WireOptions scene_tool_wire(const Scene *scene, int tool);
 WireOptions scene_placed_wire(const Scene *scene, const WireOptions *own);
-// What tool `tool` is as its device `which`, counted as scripts do: 0 as the scene has it, 1, 2, … under its `exchange:`. NULL where there is none.
+// Device `which` of tool `tool`, counted as in scripts: 0 as the scene has it, 1, 2, … under its `exchange:`. NULL if there is none.
 const SceneTool *scene_device(const Scene *scene, int tool, int which);
 WireOptions scene_device_wire(const Scene *scene, int tool, int which);
 int scene_device_count(const Scene *scene, int tool);      // 1 where it cannot be exchanged
@@ -119,7 +118,7 @@ double scene_attenuation(const Scene *scene, double s);
 double scene_tool_attenuation(const Scene *scene, int tool, double s);
 double scene_device_attenuation(const Scene *scene, int tool, int which, double s);
 double scene_device_marker(const Scene *scene, int tool, int which);       // [mm] its length, 0: none
-// The file that the vessel comes from, a model or a mesh; NULL where it needs none.
+// The file that the vessel comes from, a model or a mesh; NULL if it needs none.
 static inline const char *scene_needed_file(const Scene *scene) { return scene->source == SOURCE_MODEL ? scene->model_path : scene->mesh_path; }
 
 #endif

@@ -1,5 +1,5 @@
-// YAML text to a Scene in internal units: mm, g, ms (N, MPa, mJ), rad. The only place where a scene's units are converted.
-// One function a part of the file; each reads on after a fault, so one pass finds all.
+// YAML text to a Scene in internal units: mm, g, ms (N, MPa, mJ), rad. The only place where a scene's units are converted. One function per part of
+// the file; each continues after a fault, so one pass finds all.
 #include "sim/scene_reading.h"
 
 #include "base/number_table.h"
@@ -257,8 +257,7 @@ static void read_load(Reading *reading, YamlValue value, WireLoad *load)
         yaml_fault(value, "'%s' has neither 'force_n' nor 'moment_n_mm'", value.name);
 }
 
-// With a sheath a rig's start_mm, direction and normal say nothing: the sheath's line is where the wire starts. Its fixes, loads and
-// gravity count.
+// With a sheath a rig's start_mm, direction and normal have no effect: the wire starts on the sheath's line. Its fixes, loads and gravity count.
 static void read_rig(Reading *reading, YamlValue value)
 {
     static const char *const keys[] = {"start_mm", "direction", "normal", "fix", "loads", "gravity_m_s2", NULL};
@@ -323,7 +322,7 @@ static void list_row_keys(const ToolNames *tools, RowKeys *keys)
     }
 }
 
-// 1 where no hand holds the tool. Whether the key is there.
+// Reads `released` (1: the tool is released). Returns whether the key is present.
 static bool read_released(const YamlMap *map, const char *key, int tool, ScriptRow *row)
 {
     YamlValue value = yaml_get(map, key, false);
@@ -440,7 +439,7 @@ static void read_verify(Reading *reading, YamlValue value, bool has_script)
     verify_read(value, &tools, has_script, &reading->scene->verify);
 }
 
-// What lies behind the vessel in the X-ray picture.
+// The anatomy behind the vessel in the X-ray picture.
 static void read_fluoroscopy(Reading *reading, YamlValue value)
 {
     static const char *const keys[] = {"volume", "anterior", "superior", "lao_deg", "cra_deg", NULL};

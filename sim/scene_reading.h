@@ -1,17 +1,17 @@
-// What the parts of a scene's reader share (scene.c, scene_tools.c); nobody else includes it.
+// Shared by the parts of the scene reader (scene.c, scene_tools.c); internal.
 #ifndef SELDINGER_SIM_SCENE_READING_H
 #define SELDINGER_SIM_SCENE_READING_H
 
 #include "base/yaml_reader.h"
 #include "sim/scene.h"
 
-typedef struct ToolReading { // what the rules that tie one tool to another need to know of how it was read
-    YamlValue whole, inserted;   // where it stands; its `inserted_mm`, node 0 where it has none
-    double inserted_mm;      // where `inserted_known`: it was given and in range
+typedef struct ToolReading { // how a tool was read, for the rules that relate tools
+    YamlValue whole, inserted;   // its YAML value; its `inserted_mm`, node 0 if it has none
+    double inserted_mm;      // `inserted_known`: it was given and in range
     bool inserted_known;
     double length;           // [mm] of all sections …
     bool length_known;       // … unless one of them, or `length_mm`, had a fault
-    bool sound;              // its sections and rest shape had no fault at all
+    bool sound;              // its sections and rest shape had no fault
 } ToolReading;
 
 typedef struct Reading {
@@ -33,13 +33,13 @@ static const double per_deg = PI / 180;        // rad
 enum { MOST_SECTIONS = 1000, MOST_PIECES = 10000, MOST_ELEMENTS = 10000 };
 
 void *scene_zeroed(Reading *reading, int count, size_t size);    // NULL with a fault
-char *scene_resolved(Reading *reading, const char *name);        // as seen from the scene's file; NULL with a fault
+char *scene_resolved(Reading *reading, const char *name);        // relative to the scene's file; NULL with a fault
 bool scene_read_piece(YamlValue value, TubePiece *piece);        // a line or an arc, of a tube's path or a rest shape
 
 // `wire:` becomes the scene's one tool, `tools:` up to four; scene->wire is the first one's. Before `sheath:` and `rig:` are read …
 void scene_read_wire(Reading *reading, YamlValue value);
 void scene_read_tools(Reading *reading, YamlValue value);
-// … and after them: what a tool takes from where the scene starts, how far each is inserted, and whether each fits into the one around it. `placed`: a
+// … and after them: what a tool inherits from the scene's start, how far each is inserted, and whether each fits into the one around it. `placed`: a
 // sheath or a rig was there.
 void scene_settle_tools(Reading *reading, bool placed);
 

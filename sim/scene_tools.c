@@ -16,8 +16,8 @@
 // Of a catheter: polymer with 20 % by weight of barium sulphate, 1.24 g/cm3, at 60 keV 5.10 cm2/g of the salt and 0.20 of the polymer (NIST XCOM): 0.15 /mm.
 // With 30 % it is 0.23; tungsten and bismuth go higher.
 static const double catheter_attenuation = 0.15;
-static const double wire_attenuation = 0.55, marker_attenuation = 1.2, marker_length = 3;   // DESIGN section 8, what convinced
-static const double hand_limit_n = 20;       // about what two fingers hold
+static const double wire_attenuation = 0.55, marker_attenuation = 1.2, marker_length = 3;   // [1/mm], [1/mm], [mm]: chosen by appearance (docs/design.md, "X-ray attenuation")
+static const double hand_limit_n = 20;       // about the grip of two fingers
 static const double valve_n = 0.2;           // of a haemostatic valve that is open for a tool to slide: an assumption
 // A lumen lined with PTFE. Handbooks give PTFE on steel 0.04 to 0.1; of the wires that Schroeder measured (Cardiovasc Intervent Radiol 1993;16:93-97) a
 // PTFE coat halved the friction of bare steel and a hydrophilic one brought it to a sixth.
@@ -54,7 +54,7 @@ static void read_section(YamlValue value, ToolKind kind, WireSection *section)
     yaml_map_number(&map, "diameter_mm", true, (NumberRange){0, 1000, true}, &section->diameter);
     bool tubular = yaml_map_number(&map, "inner_diameter_mm", false, (NumberRange){0, 1000, false}, &section->inner_diameter);
     if (!tubular && yaml_has(&map, "inner_diameter_mm"))
-        section->inner_diameter = NAN;   // not known, rather than solid
+        section->inner_diameter = NAN;   // unknown rather than solid
     if (tubular && section->diameter > 0 && section->inner_diameter >= section->diameter)
         yaml_fault(yaml_get(&map, "inner_diameter_mm", false), "'inner_diameter_mm' %g is not below 'diameter_mm' %g", section->inner_diameter,
                    section->diameter);
@@ -117,7 +117,7 @@ static bool read_length(YamlValue value, WireSection *first, double *total)
     return true;
 }
 
-// `shaped_tip`: bent by hand while the wire is out; the last part of its sections is made anew.
+// `shaped_tip`: bent by hand while the wire is out; the last part of its sections is made again.
 static void read_shaped_tip(YamlValue value, SceneTool *tool)
 {
     static const char *const keys[] = {"length_mm", "angle_deg", "mandrel_mm", NULL};
@@ -251,8 +251,8 @@ static YamlMap device_map_of(YamlReader *reader)
     return yaml_map(root, keys);
 }
 
-// What a device file says about itself. `bending_n_mm2` is the bending stiffness that its source gives for the first section: the section's modulus and
-// diameters must come to that.
+// A device file's description of itself. `bending_n_mm2` is the bending stiffness that its source gives for the first section: the section's modulus
+// and diameters must come to that.
 static void check_device(const ToolSource *source, const SceneTool *tool, bool sound)
 {
     static const char *const texts[] = {"source", "uncertainty", "goes_through", NULL};
@@ -311,7 +311,7 @@ static void read_device(Reading *reading, ToolSource *source, SceneTool *tool, T
         device = text ? yaml_reader_open(text, length, tool->device_path, reading->faults) : NULL;
         free(text);
         if (!device)
-            return;          // its keys are not known to lack
+            return;          // its keys may be missing
         source->device = device_map_of(device);
     }
     YamlValue kind = tool_get(source, "kind", needs_kind);

@@ -17,7 +17,7 @@ const char *const score_state_name[5] = {"waiting", "running", "reached", "time_
 static const double LOOK_MS = 10;            // between looks at where in the tree the tip is
 static const double CHORD_MM = 0.2;          // of the tip's path
 static const double QUIET_MS = 500;          // until an episode is over
-static const double FORCE_AGAIN = 0.8, AGAIN = 0.5;      // parts of a limit below which a measure is back
+static const double FORCE_AGAIN = 0.8, AGAIN = 0.5;      // fraction of a limit below which a measure counts as back
 enum { HOPS = 8 };
 
 struct Score {
@@ -41,7 +41,7 @@ struct Score {
     ScoreEvent event[SCORE_EVENTS_MOST];
 };
 
-// The tool that has to reach the target. Of tools that end at one place the outermost.
+// The tool that has to reach the target; of tools with coinciding tips the outermost.
 static int leader(const Score *score, const Stepper *stepper)
 {
     int foremost = 0;
@@ -53,7 +53,7 @@ static int leader(const Score *score, const Stepper *stepper)
     return foremost;
 }
 
-// The lumen's radius at the mouth: the tree's, the tube's, or as much room as the first free node has; HUGE_VAL where nothing says it.
+// The lumen's radius at the mouth: the tree's, the tube's, or as much room as the first free node has; HUGE_VAL if unknown.
 static double lumen_radius(const Scene *scene, Simulator *simulator, const VesselTree *tree)
 {
     if (scene->source == SOURCE_TUBE)
@@ -84,7 +84,7 @@ static int follow(const Score *score, const VesselTree *tree, int node)
     return next;
 }
 
-// By how much the vessel turns behind the mouth, which is where a tube begins. False where memory lacks.
+// By how much the vessel turns behind the mouth, which is where a tube begins. False if out of memory.
 static bool find_turn(Score *score, ScoreSheath *sheath, const VesselTree *tree)
 {
     const TubeOptions *tube = &score->scene->tube;
@@ -133,7 +133,7 @@ Score *score_create(Simulator *simulator, const VesselTree *tree)
     int at = score->exercise.target, led = leader(score, simulator_stepper(simulator));
     Vec3 tip = stepper_tool_place(simulator_stepper(simulator), led, stepper_tool_length(simulator_stepper(simulator), led)).position;
     Vec3 target = at >= 0 ? scene->target[at].point : tip;
-    // the way first: the vessel's turn behind the mouth is looked for along it
+    // the path first: the vessel's turn behind the mouth is measured along it
     if (!score_way_create(&score->way, tree, scene->wire.start, target, at >= 0 ? scene->target[at].radius : 0) || !create_tools(score, simulator, tree)) {
         score_free(score);
         return NULL;
@@ -157,7 +157,7 @@ void score_free(Score *score)
     free(score);
 }
 
-// An episode of `kind` begins when it is `over` its limit and ends once it was `back` for `quiet_ms`. Of `tool`, or (-1) of nobody alone.
+// An episode of `kind` begins when it is `over` its limit and ends once it was `back` for `quiet_ms`. By `tool`, or by no single tool (-1).
 static void judge(Score *score, ScoreError kind, int tool, bool over, bool back, double quiet_ms, double elapsed_ms, double now_s)
 {
     ScoreEpisode *episode = tool < 0 ? &score->episode[kind] : &score->tool[tool].episode[kind];
@@ -236,7 +236,7 @@ static bool has_its_devices(const Score *score)
     return true;
 }
 
-// The tool that stays: once its tip has come to its place, whether it keeps it.
+// The tool that must stay: once its tip has reached its target, whether it remains there.
 static void watch_stay(Score *score, double now_s)
 {
     int k = score->exercise.stays;
@@ -296,7 +296,7 @@ static void watch_tools(Score *score, const Stepper *stepper, const ToolCommands
         judge_limit(score, ERROR_KICK, k, own->kick_mm_s, rules->kick_mm_s, AGAIN, score->dt, now_s);
         if (k == 0)
             continue;
-        // one that may be exchanged comes out for that: what is lost is the way on for the tool around it
+        // an exchangeable tool comes out on purpose; the error is advancing the tool around it without it
         bool judged = rules->wire_behind_mm > 0 && (scene_device_count(score->scene, k) == 1 || tool->episode[ERROR_WIRE_LOST].is_on || commands->tool[k - 1].push_mm_s > 0);
         judge(score, ERROR_WIRE_LOST, k, own->spare_mm < tool->hub_limit || (judged && own->behind_mm > rules->wire_behind_mm),
               own->spare_mm > tool->hub_limit && !(judged && own->behind_mm > AGAIN * rules->wire_behind_mm), QUIET_MS, score->dt, now_s);
@@ -304,8 +304,8 @@ static void watch_tools(Score *score, const Stepper *stepper, const ToolCommands
     f->tip_force_peak_n = fmax(f->tip_force_peak_n, f->tip_force_n);
 }
 
-// The tip's node, from its last one. A tip that snaps from one branch's mouth into another may leave its node's reach between two looks: it is outside
-// of that node's ball then by half the radius, and inside another's.
+// The tip's node, from its last one. A tip that snaps from one branch's mouth into another may leave its node's reach between two looks: it is
+// outside that node's ball then by half the radius, and inside another's.
 static int find_node(const VesselTree *tree, Vec3 tip, int node)
 {
     if (!tree->near)
@@ -317,7 +317,7 @@ static int find_node(const VesselTree *tree, Vec3 tip, int node)
     return vec3_distance(tip, tree->center[nearest]) < tree->radius[nearest] ? nearest : node;
 }
 
-// Where a tool's tip is in the vessel: one that has been drawn out is at the sheath's mouth.
+// Where a tool's tip is in the vessel: a withdrawn tool is at the sheath's mouth.
 static Vec3 place_in_vessel(const Score *score, const Stepper *stepper, int k)
 {
     const WireOptions *wire = &score->scene->wire;
@@ -400,7 +400,7 @@ static bool is_moved(const Score *score, const ToolCommands *commands)
     return moves;
 }
 
-// What was exchanged in this step is another tool, and the others' hubs are elsewhere.
+// A tool exchanged in this step is another device, and the other hubs have moved.
 static void refit_tools(Score *score, Simulator *simulator)
 {
     bool was_exchanged = false;
@@ -424,7 +424,7 @@ void score_step(Score *score, Simulator *simulator, const ToolCommands *commands
     }
     refit_tools(score, simulator);
     double moved = watch_sheath(score, stepper, commands, now_s);
-    if (f->state == SCORE_WAITING)       // tools that settle by themselves are nobody's doing
+    if (f->state == SCORE_WAITING)       // initial settling of the tools is not an error of the trainee
         return;
     int led = leader(score, stepper);
     f->time_s = now_s - f->start_s;

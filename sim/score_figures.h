@@ -1,4 +1,4 @@
-// The figures of a run and the errors in it, as score.h explains them: plain data.
+// The figures and errors of a run, explained in score.h: plain data.
 #ifndef SELDINGER_SIM_SCORE_FIGURES_H
 #define SELDINGER_SIM_SCORE_FIGURES_H
 
@@ -17,27 +17,27 @@ extern const char *const score_state_name[5];                  // "waiting", "ru
 
 typedef struct ScoreErrorFigures {
     int count;
-    bool is_on;                  // an episode goes on now
-    double last_s;               // simulated time at which the last one began; 0 where there was none
+    bool is_on;                  // an episode is in progress
+    double last_s;               // simulated time at which the last one began; 0 if none
 } ScoreErrorFigures;
 
 // Of one tool. Names in files as here.
 typedef struct ScoreToolFigures {
     char name[TOOL_NAME_SIZE];
-    double inserted_mm, withdrawn_mm;    // fed in and pulled out in all, both >= 0
+    double inserted_mm, withdrawn_mm;    // total length fed in and pulled out, both >= 0
     double tip_force_n, tip_force_peak_n;    // means over 20 ms
-    double kick_mm_s, kick_peak_mm_s;    // of its tip while its hand rests, else 0
-    double lost_mm, lost_limit_mm;       // length lost next to the mouth and what may be (buckling); limit 0: not known yet
+    double kick_mm_s, kick_peak_mm_s;    // of its tip while it is not moved, else 0
+    double lost_mm, lost_limit_mm;       // length lost next to the mouth, and its limit (buckling); limit 0: not known yet
     double behind_mm;            // its tip lies so far behind the tip of the tool around it, >= 0
     double spare_mm;             // its proximal end lies so far behind that one's hub, >= 0
-    double strayed_mm;           // of the tool that stays: the most that its tip was away from where it had come to stay
+    double strayed_mm;           // of the tool that must stay: largest distance of its tip from its target
     int tip_node;                // node of the tree at which its tip is; -1 without tree
     double off_way_mm;           // beyond the mouth of a branch that leads elsewhere; 0 on the way
 } ScoreToolFigures;
 
 typedef struct ScoreFigures {
     ScoreState state;
-    bool has_exercise, has_xray;     // has_xray: someone watches (xray not NULL)
+    bool has_exercise, has_xray;     // has_xray: there is a viewer (xray not NULL)
     double points;               // 0 to 100; 0 without exercise
     double part[PART_COUNT];     // q of each part, 0 to 1; 1 where not judged
     double start_s;              // simulated time at which the clock began
@@ -46,11 +46,11 @@ typedef struct ScoreFigures {
     int64_t pulses;              // of X-rays
     double dose_area_cm2;        // pulses times the field's open area at the isocentre: proportional to the dose-area product
     double contrast_ml;
-    double path_mm;              // of the tip that has to reach the target, in chords of 0.2 mm: what trembles counts for nothing
-    double way_mm;               // from where the tip was at the start to the target, along the tree's centrelines; straight where there is no tree
+    double path_mm;              // of the tip that has to reach the target, in chords of 0.2 mm, so that tremor does not count
+    double way_mm;               // from where the tip was at the start to the target, along the tree's centrelines; straight without a tree
     double remaining_mm;         // of it, now
     double least_remaining_mm;
-    double efficiency;           // way gained over path, 0 to 1
+    double efficiency;           // distance gained over path length, 0 to 1
     double inserted_mm, withdrawn_mm;    // of all tools in sum
     double wall_force_peak_n;    // largest contact force of any step
     double wall_impulse_n_s;     // sum of all contact forces over time
@@ -58,8 +58,8 @@ typedef struct ScoreFigures {
     int tip_node;                // of the tool that has to reach the target
     double blind_mm;             // moved since the pedal was last down
     double target_distance_mm;   // from that tool's tip, straight
-    double held_s;               // within the target without a break
-    double reached_s;            // simulated time at which it had been held; 0 before
+    double held_s;               // time within the target without interruption
+    double reached_s;            // simulated time when the target had been held; 0 before
     int error_total;
     ScoreErrorFigures error[ERROR_COUNT];
     int tool_count;
@@ -68,9 +68,9 @@ typedef struct ScoreFigures {
 
 typedef struct ScoreEvent {
     ScoreError kind;
-    int tool;                    // whose it is; -1: nobody's alone (wall force, blind, contrast)
+    int tool;                    // tool concerned; -1: no single tool (wall force, blind, contrast)
     double time_s;               // simulated
 } ScoreEvent;
-enum { SCORE_EVENTS_MOST = 200 };    // later ones are counted, not listed
+enum { SCORE_EVENTS_MOST = 200 };    // further errors are counted but not listed
 
 #endif

@@ -5,12 +5,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The plain numbers of ScoreFigures, with what they may be.
+// The plain numbers of ScoreFigures with their ranges.
 static const struct Figure {
     const char *name;
     size_t offset;
     double most;                 // from 0
-    bool is_later;               // earlier versions did not know it
+    bool is_later;               // missing in older versions
 } figure_table[] = {
 #define FIGURE(name, most) {#name, offsetof(ScoreFigures, name), most, false}
     FIGURE(points, 100),
@@ -37,7 +37,7 @@ static const struct Figure {
 enum { FIGURES = sizeof figure_table / sizeof figure_table[0] };
 // after the numbers of the table; "tools" where there are several
 static const char *const other_key[] = {"state", "has_exercise", "has_xray", "pulses", "error_total", "parts", "errors", "tools"};
-// Of a tool. What goes on at the moment is not written.
+// Of a tool. An episode still in progress is not written.
 static const struct Figure tool_table[] = {
 #define FIGURE(name, most) {#name, offsetof(ScoreToolFigures, name), most, false}
     FIGURE(inserted_mm, 1e12), FIGURE(withdrawn_mm, 1e12), FIGURE(tip_force_peak_n, 1e12), FIGURE(kick_peak_mm_s, 1e12),
@@ -46,7 +46,7 @@ static const struct Figure tool_table[] = {
 #undef FIGURE
 };
 enum { TOOL_FIGURES = sizeof tool_table / sizeof tool_table[0] };
-// Errors that earlier versions did not know.
+// Errors missing in older versions.
 static bool is_later(ScoreError kind) { return kind > ERROR_CONTRAST; }
 enum { OTHERS = sizeof other_key / sizeof other_key[0] };
 

@@ -6,7 +6,7 @@
 
 #include <cJSON.h>
 
-// Adds all figures to an object; false where memory lacks.
+// Adds all figures to an object; false if out of memory.
 bool score_add_json(cJSON *object, const ScoreFigures *figures);
 
 // Reads an object by its keys; everything wrong becomes a fault of `file`.
@@ -16,7 +16,8 @@ typedef struct JsonReading {
 } JsonReading;
 void score_read_json(const JsonReading *reading, const cJSON *object, ScoreFigures *figures);
 
-// The members of `object`, called `where`, must be `keys` (NULL-terminated), each once. NULL or no object: a fault. False where it is none.
+// Checks that the members of `object`, called `where` in messages, are `keys` (NULL-terminated), each once. NULL or another type is a fault; then
+// false.
 bool json_keys(const JsonReading *reading, const cJSON *object, const char *where, const char *const *keys);
 double json_number(const JsonReading *reading, const cJSON *object, const char *where, const char *key, double least, double most);
 int64_t json_count(const JsonReading *reading, const cJSON *object, const char *where, const char *key, int64_t most);

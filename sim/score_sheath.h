@@ -1,5 +1,5 @@
-// Buckling of one tool at the sheath: the length that went in at the mouth and did not go on, over the first part of the tool beyond it. What is measured
-// and why says score.h.
+// Buckling of one tool at the sheath: the length that went in at the mouth and did not continue, over the first part of the tool beyond it. score.h
+// explains what is measured and why.
 #ifndef SELDINGER_SIM_SCORE_SHEATH_H
 #define SELDINGER_SIM_SCORE_SHEATH_H
 
@@ -14,21 +14,21 @@ typedef struct ScoreSheath {
     double straight;             // [mm] arc length up to which the tool is straight at rest
     double lost;                 // [mm] >= 0
     double turn;                 // [rad] by which the vessel turns over l
-    bool turn_is_known;          // else it is taken from the tool as long as that slides
+    bool turn_is_known;          // otherwise it is measured from the tool while it slides
     double last_inserted;        // [mm]
 } ScoreSheath;
 
 void score_sheath_start(ScoreSheath *sheath, const WireOptions *wire, double lumen_radius, double inserted);
-// Another tool in its place: mouth, lumen and the vessel's turn stay.
+// Replaces the tool; mouth, lumen and the vessel's turn stay.
 void score_sheath_refit(ScoreSheath *sheath, const WireOptions *wire, double inserted);
 // The vessel's centreline from the mouth on, `count` points: sets the turn, by chords of one lumen diameter.
 void score_sheath_set_line(ScoreSheath *sheath, const Vec3 *point, int count);
 // Tool `tool` after a step of `dt` [ms]. Returns what was fed in [mm].
 double score_sheath_step(ScoreSheath *sheath, const Stepper *stepper, int tool, double dt);
 void score_sheath_set_pieces(ScoreSheath *sheath, const TubePiece *piece, int count);   // the same of lines and arcs
-// Where the turn is not known: looks at the tool while next to nothing is lost.
+// If the turn is unknown: measures it from the tool while hardly any length is lost.
 void score_sheath_look(ScoreSheath *sheath, const Stepper *stepper, int tool);
-// [mm] that may be lost without a fold.
+// [mm] that may be lost without folding.
 double score_sheath_limit(const ScoreSheath *sheath);
 
 #endif

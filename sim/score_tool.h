@@ -1,4 +1,4 @@
-// What a score measures of one of the tools, each step. score.h says what the figures are.
+// What a score measures for each tool in each step. score.h explains the figures.
 #ifndef SELDINGER_SIM_SCORE_TOOL_H
 #define SELDINGER_SIM_SCORE_TOOL_H
 
@@ -26,14 +26,14 @@ typedef struct ScoreTool {
     ScoreEpisode episode[ERROR_COUNT];
 } ScoreTool;
 
-// `lumen_radius` [mm] of the vessel at the mouth, HUGE_VAL where nothing says it. False where memory lacks.
+// `lumen_radius` [mm] of the vessel at the mouth, HUGE_VAL if nothing says it. False if out of memory.
 bool score_tool_create(ScoreTool *tool, Simulator *simulator, int index, double lumen_radius, double tip_length, ScoreToolFigures *figures);
-// Between a step in which any tool was exchanged and score_tool_feed(): goes on from where the tools are then. Allocates nothing.
+// Between a step in which any tool was exchanged and score_tool_feed(): continues from where the tools are then. Allocates nothing.
 void score_tool_refit(ScoreTool *tool, Simulator *simulator, ScoreToolFigures *figures);
-// After a step of `dt` [ms]: what was fed [mm]. Sheath and ends only: a tool that settles by itself before anyone acts has no forces to answer for.
+// After a step of `dt` [ms]: what was fed [mm]. Sheath and ends only: forces while a tool settles before the first action do not count.
 double score_tool_feed(ScoreTool *tool, const Stepper *stepper, double dt, ScoreToolFigures *figures);
 void score_tool_watch(ScoreTool *tool, const Stepper *stepper, const ToolCommands *commands, double dt, ScoreToolFigures *figures);
-// The mean over 20 ms of what has been `value` for `elapsed_ms`.
+// Updates a 20 ms mean with `value`, which held for `elapsed_ms`.
 double score_mean(double mean, double value, double elapsed_ms);
 
 #endif

@@ -1,5 +1,5 @@
-// Parents stand before children, so one pass in index order reaches every node from its parent; what lies upstream of the way or the target is filled
-// in by climbing from there to the root first.
+// Parents stand before children, so one pass in index order reaches every node from its parent; nodes upstream of the path or the target are filled
+// in first by climbing from there to the root.
 #include "sim/score_way.h"
 
 #include "geom/power_walk.h"
@@ -17,7 +17,7 @@ static void measure_left(ScoreWay *way)
         way->toward[i] = -1;
     way->toward[way->goal] = way->goal;
     way->left[way->goal] = 0;
-    // the target need not be at its node's centre: what lies between them along the way is taken off or added for all that come from upstream
+    // the target need not be at its node's centre: the offset along the path is subtracted or added for all nodes upstream
     int before = tree->parent[way->goal];
     Vec3 along = before >= 0 ? vec3_unit(vec3_sub(tree->center[way->goal], tree->center[before])) : tree->direction[way->goal];
     double extra = vec3_dot(vec3_sub(way->target, tree->center[way->goal]), along), total = extra;
@@ -34,7 +34,7 @@ static void measure_left(ScoreWay *way)
         }
 }
 
-// `on`: 1 on the way. The way is what exactly one of the two chains to the root holds, and the fork where they meet.
+// `on`: 1 on the path. The path consists of the nodes on exactly one of the two chains to the root, and the fork where they meet.
 static void mark_way(const ScoreWay *way, uint8_t *on)
 {
     const VesselTree *tree = way->tree;
@@ -69,7 +69,7 @@ static void measure_off(ScoreWay *way, uint8_t *on, double *base, double target_
     int top = way->entry;
     while (tree->parent[top] >= 0 && on[tree->parent[top]])
         top = tree->parent[top];
-    for (int i = top; tree->parent[i] >= 0; i = tree->parent[i]) {       // upstream of the way
+    for (int i = top; tree->parent[i] >= 0; i = tree->parent[i]) {       // upstream of the path
         int up = tree->parent[i];
         way->off[up] = way->off[i] + link_length(tree, i);
         base[up] = base[top];

@@ -65,7 +65,7 @@ void session_set_score(Session *session, const Score *score)
     memcpy(session->event, event, (size_t)session->event_count * sizeof *event);
 }
 
-// The tool of the contrast agent counts where one was chosen: the sums of older sessions stay.
+// The tool of the contrast agent enters the digest only if one was chosen, so digests of older sessions stay valid.
 static void digest_xray(Sha256 *sha, const RecordedRun *run)
 {
     bool has_tool = false;
@@ -178,7 +178,7 @@ static void read_recording(const JsonReading *reading, const cJSON *object, Sess
     s->state_hash = strtoull(hash, NULL, 16);
 }
 
-// Whose an error is stands there where there are several tools and it is one's alone.
+// With several tools, the tool of an error is written if it is a single one.
 static int read_event_tool(const JsonReading *reading, const cJSON *event, const ScoreFigures *f)
 {
     const char *names[TOOLS_MOST + 1] = {0};
@@ -283,7 +283,7 @@ static int is_json(const struct dirent *entry)
     return length > 5 && !strcmp(entry->d_name + length - 5, ".json");
 }
 
-// A file of somebody else's (a run's summary) is none of ours; one that says it is a session and cannot be read is broken.
+// Other JSON files (a run's summary) are ignored; one that claims to be a session but cannot be read is broken.
 static bool says_session(const char *text) { return strstr(text, "\"seldinger_session\"") != NULL; }
 
 Session *session_list(const char *folder, const char *trainee, const char *title, int *count, int *broken, Faults *faults)

@@ -1,5 +1,5 @@
-// A trainee's session as a JSON file beside its recording: who, when, with what, the score, the errors with their times, and what proves that the
-// recording is the session's (digest of its time series, hash of its last state). Keys are those of the struct, times simulated seconds:
+// A trainee's session as a JSON file next to its recording: who, when, with what, the score, the errors with their times, and a proof that the
+// recording belongs to the session (digest of its time series, hash of its last state). Keys are those of the struct, times simulated seconds:
 //
 //   {"seldinger_session": 1, "trainee": "", "date": "2025-11-21T22:05:00Z", "device": "", "version": "",
 //    "scene": {"path": "", "sha256": "", "title": "", "target": ""},
@@ -22,34 +22,34 @@ typedef struct Session {
     char version[SESSION_NAME];  // of the program
     char scene_path[SESSION_PATH], scene_sha256[65];     // of its text
     char title[EXERCISE_TITLE], target[64];              // "" without exercise
-    char recording_path[SESSION_PATH];                   // as seen from the session's folder
+    char recording_path[SESSION_PATH];                   // relative to the session's folder
     int64_t steps;
     double step_ms;
     char series_sha256[65];      // of time, command, X-ray controls and state hash of all steps
     uint64_t state_hash;         // of the last step
-    ScoreFigures figures;        // those that are written; what goes on at the moment is 0
+    ScoreFigures figures;        // those that are written; 0 for an episode still in progress
     int event_count;
     ScoreEvent event[SCORE_EVENTS_MOST];
 } Session;
 
 void session_date(time_t when, char text[SESSION_DATE]);     // UTC, as in the file
 bool session_is_date(const char *text);
-// Who, when and where. Texts are cut to their room at a whole UTF-8 character.
+// Sets trainee, date and paths. Strings are truncated at a whole UTF-8 character.
 void session_begin(Session *session, const Scene *scene, const char *trainee, const char *device, const char *date);
 void session_set_score(Session *session, const Score *score);
-// What the recording holds, read back after it was closed; `path` as it shall stand in the file.
+// Sets the digest of the recording, read back after it was closed; `path` as written in the file.
 void session_set_run(Session *session, const RecordedRun *run, const char *path);
-// Whether `run` is the session's: its digest.
+// Whether `run` belongs to the session, by its digest.
 bool session_is_of(const Session *session, const RecordedRun *run);
-// The file's text, to be written beside and renamed (base/output.h); the caller frees. NULL where memory lacks.
+// The file's text, to be written beside and renamed (base/output.h); the caller frees. NULL if out of memory.
 char *session_json(const Session *session);
 
-// `text` need not be NUL-terminated. False with all faults at once: no JSON, bytes after it, unknown, repeated or lacking keys, wrong types and ranges;
-// the session is then untouched.
+// `text` need not be NUL-terminated. False with all faults at once: invalid JSON, trailing bytes, unknown, duplicate or missing keys, wrong types and
+// ranges; the session is then untouched.
 bool session_parse(const char *text, size_t length, const char *path, Session *session, Faults *faults);
 bool session_load(const char *path, Session *session, Faults *faults);
-// The sessions in a folder, oldest first, that have this trainee and title (the same exercise). Other files are passed over; sessions that cannot be read are
-// counted in *broken. The caller frees. NULL with a fault where the folder cannot be read or memory lacks.
+// The sessions in a folder, oldest first, that have this trainee and title (the same exercise). Other files are ignored; unreadable sessions are
+// counted in *broken. The caller frees. NULL with a fault where the folder cannot be read or memory runs out.
 Session *session_list(const char *folder, const char *trainee, const char *title, int *count, int *broken, Faults *faults);
 
 #endif

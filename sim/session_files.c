@@ -96,7 +96,7 @@ bool session_files_save(const Scene *scene, const char *trainee, const char *dev
     return good;
 }
 
-// --- sessions that were cut off ---
+// --- interrupted sessions ---
 
 static bool has_session_file(const char *recording)
 {

@@ -1,5 +1,5 @@
-// sim: a scene becomes a simulator, a hand drives it, what happens is recorded and compared. Uses geom, solver and input.
-// Reading order: scene.h (what is simulated), simulator.h (one step), drive.h (many steps), recording.h, compare.h; for a hand: hand_set.h, realtime.h.
+// sim: builds a simulator from a scene, drives it by input, records and compares runs. Uses geom, solver and input. Reading order: scene.h (what is
+// simulated), simulator.h (one step), drive.h (many steps), recording.h, compare.h; for a hand: hand_set.h, realtime.h.
 #ifndef SELDINGER_SIM_SIM_H
 #define SELDINGER_SIM_SIM_H
 

@@ -1,4 +1,4 @@
-// One step reads like the paper's loop: feed the sheath, detect, assemble, factor, free motion and contact, correct.
+// One step follows the paper's loop: feed the sheath, detect, assemble, factor, solve the contact, correct.
 #include "sim/simulator.h"
 
 #include <stdlib.h>
@@ -17,7 +17,7 @@ struct Simulator {
     int64_t step_ns;
     RunTotals totals;
     EnergyBalance energy;
-    StepEnergy before;       // of the state before
+    StepEnergy before;       // of the previous state
     TargetReach *target;
     double dt;               // [ms]
     int asked[TOOLS_MOST];   // which tools the last commands asked for
@@ -130,7 +130,7 @@ const EnergyBalance *simulator_energy(const Simulator *simulator) { return &simu
 
 bool simulator_gains_energy(const Simulator *simulator)
 {
-    // what a state of some mJ is rounded by is no gain
+    // rounding of a state of some mJ is not a gain
     return simulator->energy.gained > energy_gain_share * simulator->energy.work + 1e-6;
 }
 
@@ -192,7 +192,7 @@ void simulator_step(Simulator *simulator, Command command)
     simulator_step_tools(simulator, &(ToolCommands){.tool = {command}});
 }
 
-// A tool that cannot be exchanged is asked for once: until the command changes it stays refused.
+// A refused exchange is not retried until the command changes.
 static void exchange(Simulator *simulator, const ToolCommands *commands)
 {
     for (int k = 0; k < stepper_tool_count(simulator->stepper); k++) {
@@ -206,7 +206,7 @@ static void exchange(Simulator *simulator, const ToolCommands *commands)
         StepExchange outcome = stepper_exchange(simulator->stepper, k, asked);
         if (outcome == EXCHANGE_DONE) {
             simulator->totals.exchanges++;
-            // what the tools hold behind the hub, straight in the hand, is not the run's
+            // the energy of the tools behind the hub, straight in the hand, is excluded
             simulator->before.elastic += simulator->energy.watched ? stepper_elastic_energy(simulator->stepper) - before : 0;
         } else {
             simulator->totals.refused_exchanges++;
@@ -272,7 +272,7 @@ static void hash_doubles(HashLanes *hash, const void *data, size_t count)
         uint64_t word;
         memcpy(&word, byte + i * sizeof word, sizeof word);
         hash->lane[i % 4] = (hash->lane[i % 4] ^ word) * UINT64_C(0x100000001b3);
-        // FNV moves nothing downwards: without this a sign bit would reach one bit of the result only
+        // FNV only propagates upwards: without this a sign bit would affect only one bit of the result
         hash->lane[i % 4] ^= hash->lane[i % 4] >> 29;
     }
 }

@@ -1,6 +1,6 @@
-// The simulator: a scene and its vessel, stepped by commands. One step is the solver's stages, some of them repeated where it is linearised again, each timed with the thread's CPU clock.
-// Inside mm, g, ms, N, rad; commands and totals carry their unit in the name. A step allocates nothing. One thread owns a simulator;
-// it borrows scene and vessel, which must outlive it.
+// The simulator: a scene and its vessel, stepped by commands. One step is the solver's stages, some of them repeated when it is linearised again,
+// each timed with the thread's CPU clock. Internal units mm, g, ms, N, rad; commands and totals have their unit in the name. A step allocates
+// nothing. One thread owns a simulator; it borrows scene and vessel, which must outlive it.
 #ifndef SELDINGER_SIM_SIMULATOR_H
 #define SELDINGER_SIM_SIMULATOR_H
 
@@ -22,65 +22,65 @@ typedef struct StepProfile {
     TimeHistogram penetration_nm;    // deepest node of the state at the step's start
 } StepProfile;
 
-// What happened over all steps so far.
+// Totals over all steps so far.
 typedef struct RunTotals {
     int64_t steps;
     unsigned flags;                  // every STEP_ flag that was seen
     int64_t not_converged_steps;
-    int64_t further_linearisations;  // steps that took a second Newton iteration or more
-    int64_t disagreeing_steps;       // steps in which the vessel's model contradicted itself about the wall at a point of the tool
-    int64_t limited_steps;           // steps whose motion was cut; the next ones completed it
+    int64_t further_linearisations;  // steps that took two or more Newton iterations
+    int64_t disagreeing_steps;       // steps in which the vessel's model was inconsistent about the wall at a point of the tool
+    int64_t limited_steps;           // steps whose motion was shortened; the next ones completed it
     int64_t exchanges;               // of tools at the hub
-    int64_t refused_exchanges;       // that a command asked for where the tool was still in, or one too short: it stayed as it was …
+    int64_t refused_exchanges;       // exchanges refused because the tool was still in the vessel, or the new one too short …
     StepExchange refusal;            // … and why, of the last
-    int64_t hand_slip_steps;         // steps in which the tool asked for more force than the hand holds …
-    double hand_slipped;             // [mm] … and how far the hand slid along it, there and back
+    int64_t hand_slip_steps;         // steps in which the tool needed more force than the grip holds …
+    double hand_slipped;             // [mm] … and how far the grip slid along it, in both directions
     int contacts_max;                // contacts with force
-    int self_contacts_max;           // places where the tool presses on itself …
-    double self_overlap_max;         // [mm] … and how deep it was in itself
+    int self_contacts_max;           // self-contacts …
+    double self_overlap_max;         // [mm] … and their deepest penetration
     double penetration_max;          // [mm]
     double residual_max;
     double push_least, push_most;    // [N] at the hand
 } RunTotals;
 
-// Where the energy of a run has come from and gone to [mJ], once it is watched (solver/step.h, StepEnergy):
+// The energy balance of a run [mJ], while it is watched (solver/step.h, StepEnergy):
 //   hand + load = elastic + kinetic + friction + damping + numerical
 typedef struct EnergyBalance {
     bool watched;
     double hand, load, friction, damping;
     double elastic, kinetic;         // more than at the start
-    double numerical;                // what is left: taken by implicit Euler, less what …
-    double wall;                     // … the wall's pressure gave to points that were outside
+    double numerical;                // the remainder: dissipated by implicit Euler, less what …
+    double wall;                     // … the wall's pressure gave to points outside
     double work;                     // done by hand and loads, without sign
-    double gained;                   // sum of what single steps have gained that nobody gave, by the lesser of both counts below
+    double gained;                   // sum of the unexplained gains of single steps, by the smaller of both counts below
     double gained_most;              // in one step …
     double gained_at_s;              // … which ended then
-    // The same sum, with the work of hands, walls, friction and valves by the forces of each step's end alone, as implicit Euler has it, and by the mean of
-    // those at its start and end. The first calls it a gain where a force F falls in a step that moves by u: -dF u / 2. The second is right there to the third
-    // order, and off by as much, either way, where the force jumps: a hand that turns round, a tool that begins to touch. A force that is not the slope of the
-    // energy shows in both. In a step they differ by at most half of |dF| |u|.
+    // The same sum, with the work of hands, walls, friction and valves by the forces of each step's end alone, as implicit Euler has it, and by the
+    // mean of those at its start and end. The first counts a gain of -dF u / 2 when a force F falls in a step that moves by u. The second is then
+    // accurate to third order, but off by as much, either way, when the force jumps: a reversed hand, a tool that begins to touch. A force that is
+    // not the slope of the energy shows in both. In a step they differ by at most half of |dF| |u|.
     double gained_end, gained_mean;
 } EnergyBalance;
-// More than this share of the work is a gain that should be explained.
+// A gain of more than this share of the work needs an explanation.
 extern const double energy_gain_share;
 
-// How near the tip came to a target of the scene.
+// How close the tip came to a target of the scene.
 typedef struct TargetReach {
     double distance;                 // [mm] least distance of the tip so far
     double time_s;                   // when that was, or when the target was first reached
-    bool reached;                    // within its radius at some step
+    bool reached;                    // within its radius in some step
 } TargetReach;
 
 typedef struct Simulator Simulator;
 
-// `vessel` may be NULL (no walls). NULL with a fault where the solver refuses an option.
+// `vessel` may be NULL (no walls). NULL with a fault if the solver refuses an option.
 Simulator *simulator_create(const Scene *scene, const Vessel *vessel, Faults *faults);
 void simulator_destroy(Simulator *simulator);
 
-void simulator_step(Simulator *simulator, Command command);       // of several tools the inner ones are pinned
+void simulator_step(Simulator *simulator, Command command);       // with several tools the inner ones are pinned
 void simulator_step_tools(Simulator *simulator, const ToolCommands *commands);
 
-// Watches the energy from now on: about as much work a step as an assembly, outside the timed stages.
+// Watches the energy from now on: costs about one assembly per step, outside the timed stages.
 void simulator_watch_energy(Simulator *simulator);
 const EnergyBalance *simulator_energy(const Simulator *simulator);
 bool simulator_gains_energy(const Simulator *simulator);           // more than energy_gain_share of the work

@@ -1,5 +1,5 @@
-// A histogram of fixed size for durations [ns] or counts: 128 equal bins an octave, so a quantile is exact below 256 and within
-// 0.4 % above. Adding allocates nothing and takes a few ns.
+// A histogram of fixed size for durations [ns] or counts: 128 equal bins an octave, so a quantile is exact below 256 and within 0.4 % above. Adding a
+// value allocates nothing and takes a few ns.
 #ifndef SELDINGER_SIM_TIME_HISTOGRAM_H
 #define SELDINGER_SIM_TIME_HISTOGRAM_H
 

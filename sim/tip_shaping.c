@@ -7,7 +7,7 @@
 //
 //   kept curvature = k - M / (E I) = k - (M / My) e / r.
 //
-// No fibre yields again on the way back: the outermost goes from E e to E e (1 - M / My) >= -0.70 E e.
+// No fibre yields again on the return path: the outermost goes from E e to E e (1 - M / My) >= -0.70 E e.
 //
 // Yield strain of the core: ASTM A313 has hard-drawn stainless steel wire (302, 304) of up to 0.009 inch at 325 ksi = 2240 MPa at least; its elastic limit in
 // tension lies at 65 to 75 % of that (handbooks of spring design), its modulus at 193 GPa: 0.0075 to 0.0087. Cores that were heat-treated or ground to a
@@ -29,7 +29,7 @@ double tip_core_moment(double curvature)
     if (curvature <= 1)
         return curvature;
     double x = 1 / curvature, root = sqrt(1 - x * x);
-    // its terms cancel to x^3 / 3 of x: a series below, as exact
+    // its terms cancel to x^3 / 3; below this a series is as exact
     double elastic = x > 0.01 ? (same_asin(x) - x * root * (1 - 2 * x * x)) / (8 * x) : x * x / 3 - x * x * x * x / 10;
     return 16 / PI * (elastic + root * root * root / 3);
 }
@@ -42,7 +42,7 @@ double tip_kept_curvature(double curvature, double core_diameter)
 
 double tip_core_diameter(const WireSection *section) { return same_pow(64 * wire_stiffness(section).bending / (PI * core_modulus), 0.25); }
 
-// Appends a piece of a section; nothing of slivers.
+// Appends a piece of a section; skips slivers.
 static void append(WireSection *out, int *count, const WireSection *section, double length, double curvature)
 {
     if (length <= sliver)

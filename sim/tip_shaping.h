@@ -1,5 +1,5 @@
-// The tip of a wire, bent by hand round a mandrel while the wire is out: what bend its core keeps when it is let go. A steel core yields and keeps one, a core
-// of nitinol springs back. Units mm, N, rad.
+// The tip of a wire, bent by hand around a mandrel while the wire is outside: the bend that its core keeps when released. A steel core yields and
+// keeps a bend; a nitinol core springs back. Units mm, N, rad.
 #ifndef SELDINGER_SIM_TIP_SHAPING_H
 #define SELDINGER_SIM_TIP_SHAPING_H
 
@@ -12,10 +12,10 @@ extern const double tip_yield_strain;        // of a core of hard-drawn stainles
 typedef struct TipShaping {
     double length;           // [mm] > 0: from the tip back to where the bend begins. What lies distal to the bend is straight
     double angle;            // [rad] > 0: that the tip keeps after it has sprung back
-    double mandrel;          // [mm] > 0: radius of what it is bent round
+    double mandrel;          // [mm] > 0: radius of the mandrel
 } TipShaping;
 
-typedef struct TipShaped {   // what the hand does for it, and what remains
+typedef struct TipShaped {   // the bending by hand, and what remains
     double bent_angle;       // [rad] round the mandrel, before it springs back
     double arc;              // [mm] of the wire that is bent
     double rest_radius;      // [mm] of the bend that remains, at its distal end
@@ -24,12 +24,12 @@ typedef struct TipShaped {   // what the hand does for it, and what remains
 // The bending moment over the one at which the outermost fibre yields, of a round section of an elastic, perfectly plastic material that is bent to `curvature`
 // times that fibre's yield curvature (>= 0): the same number up to 1, then 16 / (3 pi) in the limit.
 double tip_core_moment(double curvature);
-// [1/mm] what a core of this diameter [mm] keeps of a curvature [1/mm] >= 0; 0 where it does not yield.
+// [1/mm] what a core of this diameter [mm] keeps of a curvature [1/mm] >= 0; 0 if it does not yield.
 double tip_kept_curvature(double curvature, double core_diameter);
 // [mm] of a solid steel core that is as stiff in bending as the section.
 double tip_core_diameter(const WireSection *section);
-// Copies the sections with the last `length` straight but for the bend, in the direction of plane angle 0. The caller frees them. NULL with a message in `why`
-// where the wire does not keep that: too short, a mandrel too thick to make it yield, or too little length for the angle.
+// Copies the sections with the last `length` straight but for the bend, in the direction of plane angle 0. The caller frees them. NULL with a message
+// in `why` if the wire cannot keep that shape: too short, a mandrel too thick to make it yield, or too little length for the angle.
 WireSection *tip_shaped_sections(const WireSection *section, int count, const TipShaping *shaping, int *shaped_count, TipShaped *shaped, char *why, size_t capacity);
 
 #endif

@@ -1,5 +1,5 @@
-// What lies on the tray for a tool: its devices in the scene, and those of a folder that would fit. A device that is not in the scene yet, or whose tip is
-// shaped by hand, is written into the scene's text under `exchange:`, so that a session's recording holds all that it was made from.
+// The devices available for a tool: those in the scene, and those of a folder that would fit. A device that is not in the scene yet, or whose tip is
+// shaped by hand, is written into the scene's text under `exchange:`, so that a session's recording holds all its inputs.
 #ifndef SELDINGER_SIM_TRAY_DEVICES_H
 #define SELDINGER_SIM_TRAY_DEVICES_H
 
@@ -23,10 +23,10 @@ typedef struct TrayDevices {
 // the scene's tool, and left out where it is of another kind, does not fit the tools around it and within it, or cannot be read. False when out of memory.
 bool tray_devices_find(TrayDevices *tray, const Scene *scene, int tool, const char *library);
 void tray_devices_free(TrayDevices *tray);
-// `from` with its tip shaped. False with the reason in `why` where it does not keep that shape.
+// `from` with its tip shaped. False with the reason in `why` if it cannot keep that shape.
 bool tray_device_shape(const TrayDevice *from, const TipShaping *tip, TrayDevice *shaped, char *why, size_t capacity);
 void tray_device_free(TrayDevice *device);
-// The scene with this device as the last one that may take the place of `tool`; `tip` (length 0: none) is written with it. NULL with faults.
+// The scene with this device as the last one that may replace `tool`; `tip` (length 0: none) is written with it. NULL with faults.
 Scene *tray_scene_with(const Scene *scene, int tool, const TrayDevice *device, const TipShaping *tip, Faults *faults);
 
 #endif

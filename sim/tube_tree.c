@@ -1,5 +1,5 @@
-// The axis is followed by the tube's own answers: a probe beside the axis gets gap and normal, and the axis lies at x + (r - gap) normal.
-// So lines, arcs and polylines need no geometry of their own here.
+// The axis is traced by queries to the tube: a probe beside the axis gets gap and normal, and the axis lies at x + (r - gap) normal. So lines, arcs
+// and polylines need no special code here.
 #include "sim/tube_tree.h"
 
 #include "base/same_math.h"
@@ -61,7 +61,7 @@ static bool trace_axis(const Vessel *tube, const TubeOptions *options, Axis *axi
     return axis->count >= 3;
 }
 
-// The surface's point beyond x in direction out; false where that is no wall.
+// The surface's point beyond x in direction out; false if that is no wall.
 static bool sample(const Vessel *tube, Vec3 x, Vec3 out, double r, VesselMemory *memory, Vec3 *surface)
 {
     Vec3 probe = vec3_add_scaled(x, 0.9 * r, out);

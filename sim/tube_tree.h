@@ -4,8 +4,8 @@
 
 #include "geom/vessel.h"
 
-// Nodes half a radius apart along the axis, 48 samples a node (and on closed ends), all exactly on the surface. `tube` is a tube vessel of
-// `options`. NULL with a fault where the axis cannot be followed or memory lacks.
+// Nodes half a radius apart along the axis, 48 samples a node (and on closed ends), all exactly on the surface. `tube` is a tube vessel of `options`.
+// NULL with a fault where the axis cannot be followed or memory runs out.
 VesselTree *tube_tree(const Vessel *tube, const TubeOptions *options, const char *file, Faults *faults);
 
 #endif

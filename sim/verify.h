@@ -1,5 +1,5 @@
-// The `verify:` key of a scene: what a run of it must measure, against a reference known from elsewhere, at several numbers of elements.
-// `seldinger check` runs it and prints the table (cli/check_verify.c). The format, quantity by quantity: scenes/verify/README.md.
+// The `verify:` key of a scene: quantities that a run must reproduce against an independent reference, at several numbers of elements. `seldinger
+// check` runs it and prints the table (cli/check_verify.c). The format, quantity by quantity: scenes/verify/README.md.
 //
 // A case is one quantity (what is measured at a moment) and how it is taken over time (at the end, its mean, its frequency, …). Numbers
 // here are in the file's units: mm, s, N, N mm, mJ, deg; they are compared with references as they are printed.
@@ -25,14 +25,14 @@ typedef struct VerifyCase {
     char name[VERIFY_NAME];
     VerifyQuantity quantity;
     VerifyTake take;
-    int tool;                // whose; of several the first unless it is named
+    int tool;                // tool; the first unless named
     double s_mm;             // where along the tool; the end of a range for quantities of a range …
     double from_s_mm;        // … which begins here
     bool has_axis;
     Vec3 axis;               // unit
     Vec3 origin;             // [mm]
     double t_s, from_t_s;    // the moment, or the end and the begin of the time it is taken over; t_s HUGE_VAL: the end of the run
-    double level;            // what it oscillates about
+    double level;            // level of oscillation
     double scale;            // the result is the measured value divided by it
     double reference;
     int tolerance_count;     // 1, or one for each number of elements
@@ -51,7 +51,7 @@ typedef struct VerifyPlan {  // case_count 0: the scene has none
     VerifyCase *cases;
 } VerifyPlan;
 
-// What of the scene's tools is known: their lengths [mm] are 0 where they are not.
+// What is known of the scene's tools; lengths [mm] are 0 if unknown.
 typedef struct VerifyTools {
     ToolNames names;
     double length[TOOLS_MOST];
@@ -63,11 +63,11 @@ void verify_read(YamlValue value, const VerifyTools *tools, bool has_script, Ver
 
 struct Simulator;
 typedef struct VerifyMeasure VerifyMeasure;
-VerifyMeasure *verify_measure_create(const VerifyPlan *plan, struct Simulator *simulator);   // NULL where memory lacks
+VerifyMeasure *verify_measure_create(const VerifyPlan *plan, struct Simulator *simulator);   // NULL if out of memory
 void verify_measure_free(VerifyMeasure *measure);
 // Before the first step, after each, and once more with `is_end` after the last.
 void verify_measure_step(VerifyMeasure *measure, bool is_end);
-// The result of a case, divided by its scale; NAN where its moment was not reached or nothing oscillated.
+// The result of a case, divided by its scale; NAN if its moment was not reached or nothing oscillated.
 double verify_measure_result(const VerifyMeasure *measure, int index);
 
 #endif

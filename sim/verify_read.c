@@ -14,7 +14,7 @@ const char *const verify_take_name[] = {"last", "change", "mean", "least", "most
 
 static const double longest_s = 1e5, largest = 1e12;
 
-// What a quantity is asked with; a key that would say nothing is a fault.
+// Which keys a quantity takes; a key without effect is a fault.
 typedef struct Needs {
     bool s, range, axis_must, axis_may, origin, tool;
 } Needs;

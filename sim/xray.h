@@ -1,4 +1,4 @@
-// What the operator sets at the X-ray system and the injector, sampled at each step and recorded beside the command: all floats, so that a row of the
+// The operator's settings of X-ray system and injector, sampled at each step and recorded with the command: all floats, so that a row of the
 // recording's /xray (S, XRAY_VALUES) is this struct.
 #ifndef SELDINGER_SIM_XRAY_H
 #define SELDINGER_SIM_XRAY_H
@@ -11,14 +11,14 @@ typedef struct XrayControl {
     float field_mm;          // magnification: side of the square seen at the isocentre, 40 to 400
     float table_mm[3];       // where the isocentre lies in the model's frame
     float collimator[4];     // left, right, bottom, top blade: part of half the field that it covers, 0 to 0.95
-    float contrast_ml_s;     // contrast agent that the injector is asked for now
+    float contrast_ml_s;     // requested flow of contrast agent
     float mode;              // XrayMode
-    float mask;              // counts the masks taken for DSA and roadmap: a change takes one
-    float bookmark;          // counts the bookmarks: a change marks the moment
-    float contrast_tool;     // through which tool: 1 the outermost, 2, …; 0: not said, see sim/contrast_injection.h
+    float mask;              // counter of masks for DSA and roadmap: a change takes a new one
+    float bookmark;          // counter of bookmarks: a change sets one
+    float contrast_tool;     // through which tool: 1 the outermost, 2, …; 0: not given, see sim/contrast_injection.h
 } XrayControl;
 
-enum { XRAY_VALUES = sizeof(XrayControl) / sizeof(float), XRAY_VALUES_BEFORE_TOOLS = XRAY_VALUES - 1 };   // the latter: a row until a tool could be chosen
+enum { XRAY_VALUES = sizeof(XrayControl) / sizeof(float), XRAY_VALUES_BEFORE_TOOLS = XRAY_VALUES - 1 };   // row length in older recordings, without the tool
 typedef enum { XRAY_LIVE, XRAY_DSA, XRAY_ROADMAP } XrayMode;
 
 static inline XrayControl xray_default_control(void) { return (XrayControl){.pulses_s = 15, .field_mm = 160}; }

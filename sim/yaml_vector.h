@@ -5,7 +5,7 @@
 #include "base/yaml_reader.h"
 #include "geom/linear.h"
 
-// [x, y, z], each within +-largest. False where the key is absent (a fault with `required`) or wrong; the output then keeps its value.
+// [x, y, z], each within +-largest. False if the key is absent (a fault with `required`) or wrong; the output then keeps its value.
 bool yaml_map_vector(const YamlMap *map, const char *key, bool required, double largest, Vec3 *vector);
 bool yaml_map_unit_vector(const YamlMap *map, const char *key, bool required, Vec3 *vector);     // the same, made unit; zero is a fault
 
