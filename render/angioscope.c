@@ -1,6 +1,6 @@
-// The wall is drawn in patches of neighbouring triangles (Morton order of their centroids), each with a ball around it: those outside of the view
-// or lost in the dark are left out, the others come near ones first, so that the depth test hides what lies behind a wall before it is shaded. Outer faces
-// are culled: the eye is inside. A patch asks the vessel for its normals when it is first seen.
+// The wall is drawn in patches of neighbouring triangles (Morton order of their centroids), each with a bounding ball: those outside the view or
+// beyond the light are skipped, the others are drawn near ones first, so that the depth test hides what lies behind a wall before it is shaded. Outer
+// faces are culled: the eye is inside. A patch queries the vessel for its normals when it is first seen.
 //
 // Light: with d the distance from lamp and eye and c the cosine between wall normal and ray, (ambient + c) / (1 + (d / 3 R)^2), R the lumen's radius at the tip,
 // and a fog exp(-(d / 8 R)^1.5) towards the dark.
@@ -185,7 +185,7 @@ static void measure(Angioscope *scope, const TriangleMesh *mesh)
         volume += vec3_dot(a, across) / 6;
         area += vec3_norm(across) / 2;
     }
-    // of a sheet that encloses nothing: some part of its width
+    // of an open sheet: a fraction of its width
     scope->mean_radius = area > 0 ? fmax(2 * volume / area, 0.02 * sqrt(area)) : 1;
 }
 
@@ -314,7 +314,7 @@ static int tool_around(const Angioscope *scope, const Pose *pose, int tool, doub
     return -1;
 }
 
-// Gap and inward normal at a point; false where there is no wall near, or none that is known.
+// Gap and inward normal at a point; false if there is no wall near, or none that is known.
 static bool wall_at(const Angioscope *scope, Vec3 x, int node, double reach, double *gap, Vec3 *normal)
 {
     if (!scope->vessel)
@@ -333,7 +333,7 @@ static Vec3 across(Vec3 v, Vec3 axis, Vec3 otherwise)
     return vec3_norm(flat) > 1e-6 ? vec3_unit(flat) : otherwise;
 }
 
-// The chosen tool, or the one that reaches furthest; NULL where there is nothing to look from.
+// The selected tool, or the one that reaches furthest; NULL if there is none.
 static const PoseTool *looks_from(const Pose *pose, int *tool)
 {
     if (!pose || pose->node_count < 2 || *tool >= pose->tool_count)
@@ -359,10 +359,10 @@ bool angioscope_view(const Angioscope *scope, const Pose *pose, int tool, Angios
     Vec3 up = across(upright, forward, vec3_normal_to(forward)), normal;
     double gap, room = beside + margin, lumen, ahead;
     int node = vessel_node_at_tip(pose, tool), around = tool_around(scope, pose, tool, back, &lumen, &ahead);
-    // midway between the two where another tool is around; rises to its place as it leaves that one's end behind
+    // midway between the two inside another tool; rises to its normal place after leaving it
     double out = fmin(fmax(ahead / (4 * radius), 0), 1), near_axis = fmin((radius + lumen) / 2, beside);
     beside = near_axis + (beside - near_axis) * out * out * (3 - 2 * out);
-    // near a wall the eye rises off it, in the open it stays above the tool's own frame; in between both have a say
+    // near a wall the eye rises off it, in the open it stays above the tool's own frame; in between both are blended
     if (around < 0 && wall_at(scope, behind, node, 2 * room, &gap, &normal)) {
         double t = fmin(fmax(2 - gap / room, 0), 1), weight = 2 * t * t * (3 - 2 * t) * out;
         up = across(vec3_add_scaled(up, weight, normal), forward, up);
@@ -412,7 +412,7 @@ static void ask_normals(Angioscope *scope, Patch *patch)
         VesselMemory memory = {.node = scope->node[i]};
         VesselHit hit;
         vessel_query(scope->vessel, 1, &p, 0.1 * scope->mean_radius, &memory, &hit);
-        // another wall that answers here, or none, leaves the mesh's
+        // if another wall answers here, or none, keep the mesh's normal
         if (!hit.flags && vec3_is_finite(hit.normal) && vec3_dot(hit.normal, n) > 0.5)
             v->normal[0] = (float)hit.normal.x, v->normal[1] = (float)hit.normal.y, v->normal[2] = (float)hit.normal.z;
     }
@@ -483,7 +483,7 @@ static void add_tool(Angioscope *scope, const Pose *pose, int k, bool is_own, Ve
     double radius[NODES], lumen[NODES], nearest = HUGE_VAL;
     Color color[NODES];
     int last = tool->node_count - 1, middle = last, count = 0;
-    // of the own tool the end, of another what lies around the eye
+    // the end of the own tool; of another tool the part around the eye
     for (int i = last; i >= 0 && !is_own; i--) {
         double distance = vec3_distance(tool->node[i].position, eye);
         middle = distance < nearest ? i : middle;
@@ -546,7 +546,7 @@ static void draw_inside(Angioscope *scope, const Pose *pose, int tool, ViewPort 
         return;
     double radius = lumen_radius(scope, pose, tool), fog = fog_reach * radius, reach = fog_end * fog;
     double aspect = (double)port.width / port.height, near = 0.04 * fmax(own->node[own->node_count - 1].radius, 1e-3);
-    // light comes on while the tip leaves the sheath
+    // the light fades in while the tip leaves the sheath
     double t = pose->first_free_node > 0 ? fmin(fmax(own->inserted_mm, 0), 1) : 1;
     float clip[16];
     view_matrix(&view, scope->origin, aspect, near, reach + near, clip);

@@ -1,10 +1,10 @@
-// The C-arm: where X-ray source and detector stand about the patient, and where a point lands in the picture.
+// The C-arm: the positions of X-ray source and detector around the patient, and the projection of points into the picture.
 //
-// A point source at C_ARM_SOURCE_MM from the isocentre shines through it onto the detector: a cone, so that what lies nearer to the source is larger, as in
-// the angio suite (a parallel picture would show no magnification with depth). The picture is what the detector sees, displayed as usual: in the frontal view
-// the patient's right is on the left, the head is up; LAO turns the detector to the patient's left about the long axis, CRA towards the head.
+// A point source at C_ARM_SOURCE_MM from the isocentre projects a cone onto the detector, so objects nearer to the source appear larger, as in the
+// angio suite. The picture is what the detector sees, displayed as usual: in the frontal view the patient's right is on the left, the head is up; LAO
+// turns the detector to the patient's left about the long axis, CRA towards the head.
 //
-// Models carry the frame of their volume, which no file of theirs says: the patient's axes are given by the caller, LPS unless they are.
+// Models use the frame of their volume, which their files do not name: the caller gives the patient's axes; default LPS.
 #ifndef SELDINGER_RENDER_C_ARM_H
 #define SELDINGER_RENDER_C_ARM_H
 
@@ -12,7 +12,7 @@
 #include "sim/xray.h"
 
 #define C_ARM_SOURCE_MM 785.0          // source to isocentre, as in common angiography systems
-#define C_ARM_NEAREST_MM 20.0          // what is to be seen must be further than this from the source's plane
+#define C_ARM_NEAREST_MM 20.0          // visible points must be further than this from the source's plane
 
 typedef struct PatientAxes {           // unit vectors in the model's frame, perpendicular to each other; a mirrored patient is left-handed
     Vec3 right, anterior, superior;
@@ -29,9 +29,10 @@ typedef struct CArm {
     double field_mm;                   // side of the square seen at the isocentre
 } CArm;
 
-// Angles, table and field as set, cut to LAO/RAO 90, CRA/CAU 45 degrees, field 40 to 400 mm (not a number: as by default).
+// Angles, table and field as set, clamped to LAO/RAO 90, CRA/CAU 45 degrees, field 40 to 400 mm (NaN: the default).
 CArm c_arm_place(const XrayControl *xray, const PatientAxes *axes);
-// Where a point lands: x, y in fields from the middle of the square (-0.5 to 0.5 inside, y up); z: depth [mm] from the isocentre's plane towards the detector.
+// The projection of a point: x, y in fields from the middle of the square (-0.5 to 0.5 inside, y up); z: depth [mm] from the isocentre's plane
+// towards the detector.
 Vec3 c_arm_project(const CArm *c_arm, Vec3 point);
 Vec3 c_arm_source(const CArm *c_arm);
 // Unit direction of the ray from the source that lands at x, y [field].

@@ -68,7 +68,7 @@ static Vec3 face_on(int count, const Vec3 *point)
     if (!(value[2] > 0) || value[2] - value[0] < alike * value[2])
         return front;
     if (value[1] - value[0] < alike * alike * value[2]) {
-        // a line: anything across it would do
+        // a line: any direction across it will do
         Vec3 across = vec3_add_scaled(front, -vec3_dot(front, axis[2]), axis[2]);
         if (vec3_norm(across) < 0.3)
             across = vec3_add_scaled(vec3(-1, 0, 0), axis[2].x, axis[2]);

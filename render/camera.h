@@ -1,4 +1,4 @@
-// A parallel projection: one millimetre is the same number of pixels anywhere, so a scale bar holds and a sphere's outline is its radius.
+// A parallel projection: one millimetre is the same number of pixels everywhere, so a scale bar is valid and a sphere's outline shows its radius.
 #ifndef SELDINGER_RENDER_CAMERA_H
 #define SELDINGER_RENDER_CAMERA_H
 
@@ -8,19 +8,19 @@ typedef struct Camera {
     Vec3 right, up, back;      // orthonormal, right-handed; back points towards the eye
     Vec3 center;               // lands in the middle of the view
     double mm_per_pixel;
-    double near_depth, far_depth;   // [mm] along back, relative to center: what lies between far < near is drawn
+    double near_depth, far_depth;   // [mm] along back, relative to center: depths between far < near are drawn
     int width, height;         // [pixel] of the view
 } Camera;
 
 // Axes for a view direction and an up vector; zero vectors are chosen: `view` face on to the points (the principal axis of least extent, signed so
 // that one looks along +y, -z or -x, a patient's front, top or left in LPS), `up` the coordinate axis best seen from there (z before y before x).
-// Points thin in two directions, or in none, leave a choice: then as near to +y as they allow.
+// Points thin in two directions, or in none, leave a choice: then as near to +y as possible.
 void camera_orient(Camera *camera, Vec3 view, Vec3 up, int count, const Vec3 *point);
 // Frames the points (each with `margin` mm around it) in a view of width x height, leaving `border` pixels at each side. Axes must be set.
 void camera_frame(Camera *camera, int width, int height, double border, int count, const Vec3 *point, double margin);
 // How many pixels high the points are in the view.
 double camera_height_of(const Camera *camera, int count, const Vec3 *point);
-// Frames a sphere; what is drawn in depth stays as it was.
+// Frames a sphere; the depth range stays.
 void camera_frame_sphere(Camera *camera, int width, int height, double border, Vec3 center, double radius);
 // Pixel (x right, y down, from the view's upper left corner); z: depth towards the eye [mm] relative to center.
 Vec3 camera_project(const Camera *camera, Vec3 point);

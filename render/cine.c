@@ -1,5 +1,6 @@
-// A ring of images in arrays taken at once. File, all little-endian: "SELDCINE", version, tool nodes, vessel nodes, images (4 bytes each); with several tools,
-// which is version 3, their number and the most nodes of each of four; the images, field by field in the order of walk_frame(); FNV-1a of all before (8 bytes).
+// A ring buffer of images in preallocated arrays. File, all little-endian: "SELDCINE", version, tool nodes, vessel nodes, images (4 bytes each); with
+// several tools, which is version 3, their number and the most nodes of each of four; the images, field by field in the order of walk_frame(); FNV-1a
+// of all before (8 bytes).
 #include "render/cine.h"
 
 #include "render/message.h"
@@ -48,7 +49,7 @@ bool cine_shapes_same(const CineShape *a, const CineShape *b)
     return same;
 }
 
-// 0 where a count is unfit.
+// 0 if a count is out of range.
 static int nodes_of(const CineShape *shape)
 {
     int sum = 0;
@@ -231,7 +232,7 @@ int cine_player_step(CinePlayer *player, const Cine *cine, int images)
 
 // --- files ---
 
-// Reads or writes; turns bad once, where bytes lack.
+// Reads or writes; turns bad permanently when bytes are missing.
 typedef struct Cursor {
     uint8_t *out;            // NULL: reads
     const uint8_t *in;
@@ -298,7 +299,7 @@ static void walk_tool(Cursor *cursor, PoseTool *tool)
     }
 }
 
-// Of the controls, what is seen of an image: not through which tool contrast agent is asked for.
+// The controls that affect an image: all but the tool for contrast agent.
 enum { XRAY_BYTES = XRAY_VALUES_BEFORE_TOOLS * (int)sizeof(float) };
 
 static void walk_frame(Cursor *cursor, Cine *cine, int place)
@@ -433,7 +434,7 @@ static bool tool_is_sound(const PoseTool *tool, int tools)
     return good;
 }
 
-// What drawing relies on. NULL or what is wrong.
+// Checks what drawing relies on. NULL, or what is wrong.
 static const char *frame_fault(const Cine *cine, int index)
 {
     const Pose *pose = &cine->pose[index];
@@ -531,7 +532,7 @@ bool cine_movie(const Cine *cine, const char *path, int width, int height, CineD
         return message_fail(message, capacity, "%s: not enough memory", path);
     }
     bool drawn = true, going = true;
-    double shown = 0;   // what is due by the end of each image decides how often it is written: no drift
+    double shown = 0;   // the number of repeats is computed from the end of each image, to avoid drift
     for (int i = 0; i < cine->count && drawn && going; i++) {
         CineFrame frame = cine_frame(cine, i);
         drawn = draw(context, &frame, rgb, message, capacity);

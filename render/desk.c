@@ -1,6 +1,6 @@
 #include "render/desk.h"
 
-// How fast things go while a key is held.
+// Speeds while a key is held.
 static const double arm_deg_s = 25, table_fields_s = 0.4, blade_s = 0.5, orbit_px_s = 220, section_mm_s = 15;
 static const float pulse_rates[] = {7.5F, 10, 15, 30};
 static const double field_step = 1.25;
@@ -29,7 +29,7 @@ static double held(const PanelActions *actions, ActionId more, ActionId less) { 
 
 static void obey_sliders(XrayControl *xray, const PanelActions *actions)
 {
-    float pedal = xray->pedal, contrast = xray->contrast_ml_s;   // these two are held, not set
+    float pedal = xray->pedal, contrast = xray->contrast_ml_s;   // these two are only valid while held
     *xray = actions->xray;
     xray->pedal = pedal;
     xray->contrast_ml_s = contrast;
@@ -42,7 +42,7 @@ static void obey_arm(XrayControl *xray, const PatientAxes *patient, const PanelA
     xray->cra_deg = clamped((double)xray->cra_deg + turn * held(actions, ACTION_CRA, ACTION_CAU), -45, 45);
     if (actions->pressed[ACTION_AP])
         xray->lao_deg = xray->cra_deg = 0;
-    // the patient goes where the key says, so the isocentre goes the other way
+    // the patient moves in the key's direction, so the isocentre moves the other way
     CArm arm = c_arm_place(xray, patient);
     double way = table_fields_s * (double)xray->field_mm * seconds;
     Vec3 moved = vec3_add(vec3_scale(arm.right, way * held(actions, ACTION_TABLE_LEFT, ACTION_TABLE_RIGHT)),
@@ -72,7 +72,7 @@ static void obey_xray(Desk *desk, const PanelActions *actions)
         desk->pedal_latched = !desk->pedal_latched;
     if (actions->pressed[ACTION_DSA] & 1) {
         xray->mode = xray->mode == XRAY_DSA ? XRAY_LIVE : XRAY_DSA;
-        xray->mask += xray->mode == XRAY_DSA;   // subtraction begins with a mask of its own
+        xray->mask += xray->mode == XRAY_DSA;   // subtraction starts with a new mask
     }
     if (actions->pressed[ACTION_ROADMAP] & 1) {
         xray->mode = xray->mode == XRAY_ROADMAP ? XRAY_LIVE : XRAY_ROADMAP;
@@ -94,14 +94,14 @@ static void obey_mouse(Desk *desk, const VesselScene *scene, const PanelActions 
             free_camera_orbit(camera, dx, dy);
         else if (mouse->buttons && (mouse->drag_x != 0 || mouse->drag_y != 0)) {
             if (desk->look.follow_tip)
-                *camera = vessel_scene_camera(scene);   // goes on from what is seen
+                *camera = vessel_scene_camera(scene);   // continues from the present view
             desk->look.follow_tip = false;
             free_camera_pan(camera, dx, dy, port->width, port->height);
         }
         if (mouse->scroll != 0)
             free_camera_zoom(camera, mouse->scroll, mouse->x * port->width, (1 - mouse->y) * port->height, port->width, port->height);
     } else if (mouse->view == VIEW_FLUOROSCOPY) {
-        // dragging turns the C-arm as if one had hold of the detector
+        // dragging turns the C-arm as if holding the detector
         if (mouse->buttons & WINDOW_MOUSE_LEFT) {
             desk->xray.lao_deg = clamped((double)desk->xray.lao_deg + 90 * mouse->drag_x, -90, 90);
             desk->xray.cra_deg = clamped((double)desk->xray.cra_deg + 90 * mouse->drag_y, -45, 45);
@@ -131,7 +131,7 @@ static void obey_views(Desk *desk, const PanelActions *actions, double seconds)
     free_camera_zoom(&look->camera, 8 * seconds * held(actions, ACTION_CAMERA_NEARER, ACTION_CAMERA_FARTHER), 50, 50, 100, 100);
 }
 
-// The last choice of a frame counts; what is pressed with it is done to that tool.
+// The last selection of a frame counts; other presses apply to that tool.
 static void obey_grip(Desk *desk, const PanelActions *actions)
 {
     for (int k = 0; k < desk->tool_count; k++)
@@ -145,7 +145,7 @@ static void obey_grip(Desk *desk, const PanelActions *actions)
 
 void desk_obey(Desk *desk, const VesselScene *scene, const PanelActions *actions, const PanelLayout *layout, double seconds)
 {
-    // first: they hold all controls as they were shown, and keys count on top of that
+    // first: sliders hold all controls as shown, and keys are applied on top
     if (actions->xray_set)
         obey_sliders(&desk->xray, actions);
     obey_arm(&desk->xray, &desk->patient, actions, seconds);

@@ -8,7 +8,7 @@
 
 // False with a reason where indices are out of range or numbers are not finite.
 bool drawable_mesh_check(const TriangleMesh *mesh, char *message, size_t capacity);
-// Position relative to `origin` and normal of each vertex, (vertex_count, 6) floats, to be freed. NULL with a reason where memory lacks.
+// Position relative to `origin` and normal of each vertex, (vertex_count, 6) floats; the caller frees it. NULL with a reason if memory runs out.
 float *drawable_mesh_floats(const TriangleMesh *mesh, Vec3 origin, char *message, size_t capacity);
 
 #endif

@@ -27,7 +27,7 @@ typedef struct Film {
     TrainerPanel shown;
     Rescore *rescore;
     bool has_told_difference;
-    double sampled_s;                // up to where the plots have samples
+    double sampled_s;                // time up to which the plots have samples
     uint8_t *rgb;                    // (height, width, 3)
 } Film;
 
@@ -122,7 +122,7 @@ static const ScoreFigures *score_now(Film *film)
     return rescore_at(film->rescore, playback_time_s(film->playback));
 }
 
-// Running plots as they stood at `time_s`: 20 samples a second from the recorded steps.
+// Running plots as at `time_s`: 20 samples a second from the recorded steps.
 static void sample_plots(Film *film, double time_s)
 {
     const RecordedRun *run = film->run;
@@ -159,7 +159,7 @@ static void film_draw(Film *film, double time_s)
     gl_canvas_read(&film->canvas, film->rgb);
 }
 
-// DSA and roadmap show what earlier pulses took: those of the last two minutes are gone through.
+// DSA and roadmap depend on earlier pulses: those of the last two minutes are simulated.
 static void take_earlier_pulses(Film *film, double time_s)
 {
     const double most_s = 120;
@@ -188,7 +188,7 @@ bool film_picture(const char *path, const FilmOptions *options, const RecordedRu
         return false;
     take_earlier_pulses(&film, options->from_s);
     film_draw(&film, options->from_s);
-    film_draw(&film, options->from_s);   // a panel's widths are known from its frame before
+    film_draw(&film, options->from_s);   // a panel's layout is known only from the previous frame
     bool good = png_file_write(path, options->width, options->height, film.rgb, message, sizeof message);
     if (!good)
         faults_add(faults, "--picture", 0, 0, "%s", message);

@@ -1,4 +1,4 @@
-// What a trainee saw, off screen: a moment of a recording as the trainer's window shows it, to a picture or to the frames of a film.
+// Renders the trainer's window off screen: a moment of a recording as a picture, or the frames of a film.
 #ifndef SELDINGER_RENDER_FILM_H
 #define SELDINGER_RENDER_FILM_H
 
@@ -11,10 +11,10 @@ typedef struct FilmOptions {
     PanelView view;
     bool has_panels;                 // figures and controls around the views
     double from_s, to_s;             // of a film; simulated time
-    double fps, speed;               // frames a second; simulated seconds a second of film
+    double fps, speed;               // frames per second; simulated seconds per second of film
     bool is_quiet;
-    double lao_deg, cra_deg;         // of a recording that nobody looked at; NaN: as the scene says
-    double close_up_mm;              // this much around the tools' tips at `from_s`: in 3D, and of a recording that nobody looked at in fluoroscopy; 0: all
+    double lao_deg, cra_deg;         // for a recording without a viewer; NaN: as in the scene
+    double close_up_mm;              // field around the tools' tips at `from_s`: in 3D, and for a recording without a viewer in fluoroscopy; 0: everything
 } FilmOptions;
 FilmOptions film_default_options(void);  // 1280x720, fluoroscopy with panels, all of it, 30 a second
 

@@ -1,6 +1,6 @@
-// When which layer is drawn. Each new pulse is compared with what the layers hold:
-//   C-arm, table or field moved: all afresh and coarse (half the resolution, the decimated lumen); fine with the first pulses at rest.
-//   contrast agent moved on: the lumen afresh, decimated; fine once it stays.
+// When each layer is drawn. Each new pulse is compared with the state of the layers:
+//   C-arm, table or field moved: all from scratch and coarse (half the resolution, the decimated lumen); fine with the first pulses at rest.
+//   contrast agent moved on: the lumen from scratch, decimated; fine once it stays.
 //   anything of these, blades, mode, mask: the base is baked from the layers.
 //   always: the base is copied back where the tools were, and the tools multiplied in.
 // Showing adds the noise of the pulse; that alone is done where the picture is held.
@@ -14,7 +14,7 @@
 #include <string.h>
 
 static const float least_contrast = 0.002f;      // concentration that can be seen
-static const double median_transmission = 0.27;  // that automatic exposure sees to: brightness 0.68
+static const double median_transmission = 0.27;  // target of the automatic exposure: brightness 0.68
 
 FluoroscopeOptions fluoroscope_default_options(void)
 {
@@ -66,7 +66,7 @@ static bool mesh_is_sound(const TriangleMesh *mesh, char *message, size_t capaci
     return mesh->triangle_count > 0;
 }
 
-// Whether rays through the wall can be right; a remark where lids were needed.
+// Whether rays through the wall can be evaluated; a remark if lids were needed.
 static bool wall_is_fit(const FluoroscopeOptions *options, MeshClosure *closure, MeshLids *lids, char *message, size_t capacity)
 {
     if (!options->vessel || !mesh_is_sound(options->vessel, message, capacity))
@@ -94,7 +94,7 @@ static bool wall_is_fit(const FluoroscopeOptions *options, MeshClosure *closure,
 
 static int lumen_nodes(const Fluoroscope *f) { return f->lumen.is_there ? f->lumen.node_count : 0; }
 
-// Of a tool that has as many nodes as ever in its place; NULL where it has another number of them than before, or memory lacks.
+// For a tool with an unchanged number of nodes; NULL if the number changed or memory runs out.
 static const RibbonPath *path_of(Fluoroscope *f, int k, const PoseTool *tool)
 {
     int fitted = tool->fitted >= 0 && tool->fitted <= EXCHANGES_MOST ? tool->fitted : 0;
@@ -251,7 +251,7 @@ static void take_exposure(Fluoroscope *f, const FluoroscopeFrame *frame)
     for (int n = 0; n < nodes; n++) {
         f->bolus[n] = fmaxf(f->bolus[n], f->shown.contrast[n]);
         float before = f->roadmap[n];
-        // a new mask begins with the bolus that was last seen, and takes on what comes
+        // a new mask starts with the last visible bolus and accumulates
         f->roadmap[n] = is_new && f->mask_count >= 0 ? f->bolus[n] : lroundf(frame->xray.mode) == XRAY_ROADMAP ? fmaxf(before, f->shown.contrast[n]) : before;
         f->roadmap_has_changed |= fabsf(f->roadmap[n] - before) > least_contrast;
     }
@@ -267,7 +267,7 @@ static bool c_arms_differ(const CArm *a, const CArm *b)
     return way > 1e-3 || vec3_distance(a->towards, b->towards) > 1e-5 || vec3_distance(a->up, b->up) > 1e-5;
 }
 
-// The mean attenuation of what stands in the beam, from rays between the blades: what automatic exposure makes up for.
+// The mean attenuation in the beam, from rays between the blades, which the automatic exposure compensates.
 static double find_exposure(const Fluoroscope *f, const CArm *c_arm)
 {
     double sum = 0;
@@ -295,7 +295,7 @@ static void draw_coarse_anatomy(Fluoroscope *f, const CArm *c_arm)
         layers_draw_anatomy(&f->programs, &f->anatomy, c_arm, &f->anatomy_layer, 0, side, ANATOMY_GRID / 2);
 }
 
-// The next strip of the fine anatomy, or all that is left of it. True where it is whole, and in place.
+// Draws the next strip of the fine anatomy, or all the rest. True if it is complete and in use.
 static bool draw_fine_anatomy(Fluoroscope *f, const CArm *c_arm, bool at_once)
 {
     int side = f->anatomy.level ? 256 : 384, rows = at_once ? side - f->anatomy_rows : side / ANATOMY_STRIPS;
@@ -334,8 +334,8 @@ typedef struct LayerChanges {
     bool anatomy, lumen;
 } LayerChanges;
 
-// Anatomy, lumen and roadmap brought up to the exposure. After a turn the anatomy becomes fine over the next pulses, in strips, then the lumen: no frame has to
-// wait for all of it.
+// Updates anatomy, lumen and roadmap to the exposure. After a turn the anatomy becomes fine over the next pulses, in strips, then the lumen: no frame
+// has to wait for all of it.
 static LayerChanges update_layers(Fluoroscope *f, bool is_fresh)
 {
     CArm c_arm = c_arm_place(&f->shown.xray, &f->options.patient);
@@ -481,7 +481,7 @@ static void fill(int x, int y, int width, int height, float red, float green, fl
     glClear(GL_COLOR_BUFFER_BIT);
 }
 
-// What lies beside the square, and the sign of a held picture: two bars, as of a player that pauses.
+// Draws the area outside the square, and the pause sign of a held picture (two bars).
 static void draw_surroundings(const Fluoroscope *f, ViewPort port, bool leaves_surroundings)
 {
     int x = f->corner[0], y = f->corner[1], side = f->side;

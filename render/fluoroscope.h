@@ -1,10 +1,10 @@
-// Fluoroscopy: the first view of the trainer, drawn from a Pose and what is set at the X-ray system.
+// Fluoroscopy: the first view of the trainer, drawn from a Pose and the settings of the X-ray system.
 //
-// Along each ray I = exp(-(anatomy + contrast + tools)); brightness 1.75 I^0.72, as an automatic exposure shows it; quantum noise whose sigma follows from I,
-// softened by the detector; four blades with a rounded soft edge. The picture is the largest square in the middle of the ViewPort; the rest stays dark.
-// Drawn in layers, each only when its input changes (DESIGN section 8):
+// Along each ray I = exp(-(anatomy + contrast + tools)); brightness 1.75 I^0.72, as an automatic exposure shows it; quantum noise whose sigma follows
+// from I, softened by the detector; four blades with a rounded soft edge. The picture is the largest square in the middle of the ViewPort; the rest
+// stays dark. Drawn in layers, each only when its input changes (docs/design.md, "Fluoroscopy"):
 //   anatomy and vessel thickness -> baked base (brightness, noise sigma) -> tools multiplied in -> noise by pulse.
-// While `xray.pedal` is 0, or `pulse` stays the same, the last picture stays, whatever else has changed (last image hold).
+// While `xray.pedal` is 0, or `pulse` is unchanged, the last picture stays, whatever else changes (last image hold).
 //
 // Needs a current OpenGL 3.3 context, the same in every call; one thread.
 #ifndef SELDINGER_RENDER_FLUOROSCOPE_H
@@ -18,7 +18,7 @@ typedef struct Fluoroscope Fluoroscope;
 
 FluoroscopeOptions fluoroscope_default_options(void);
 
-// NULL with the reason in `message`. Otherwise `message` is empty or says what the picture lacks (a mesh that is not closed …).
+// NULL with the reason in `message`. Otherwise `message` is empty or says what is missing in the picture (for example because a mesh is not closed).
 Fluoroscope *fluoroscope_create(const FluoroscopeOptions *options, char *message, size_t capacity);
 void fluoroscope_destroy(Fluoroscope *fluoroscope);
 
@@ -29,7 +29,7 @@ typedef struct FluoroscopeFrame {
     XrayControl xray;
     const float *contrast;         // (N of the tree) concentration of contrast agent, 0 to 1; NULL: none
     uint32_t pulse;                // number of the X-ray pulse: seeds the noise; the same pulse gives the same picture
-    bool leaves_surroundings;      // what lies beside the square has been cleared and stays as it is: saves 1 ms of CPU without a GPU
+    bool leaves_surroundings;      // the area outside the square is already cleared: saves 1 ms of CPU without a GPU
 } FluoroscopeFrame;
 
 void fluoroscope_draw(Fluoroscope *fluoroscope, const FluoroscopeFrame *frame, ViewPort port);
@@ -38,11 +38,11 @@ void fluoroscope_forget(Fluoroscope *fluoroscope);
 
 typedef struct FluoroscopeState {
     bool is_held;                  // the last draw showed an earlier pulse's picture with the pedal off
-    bool has_mask;                 // DSA: a mask is there …
-    bool mask_has_moved;           // … but C-arm, table or field were moved since, so that bones do not cancel
-    bool has_roadmap;              // an opacified lumen to overlay is there
-    bool is_out_of_beam;           // part of the vessel lies beside or behind the source as the C-arm and the table stand: no contrast is drawn
-    XrayControl shown;             // what the picture on the screen was taken with
+    bool has_mask;                 // DSA: there is a mask …
+    bool mask_has_moved;           // … but C-arm, table or field have moved since, so bones do not cancel
+    bool has_roadmap;              // there is an opacified lumen to overlay
+    bool is_out_of_beam;           // part of the vessel lies beside or behind the source at this position of C-arm and table: no contrast is drawn
+    XrayControl shown;             // settings of the picture on the screen
     int square[3];                 // x, y (from the port's lower left corner), side [pixel]: where the picture lies in the port
 } FluoroscopeState;
 FluoroscopeState fluoroscope_state(const Fluoroscope *fluoroscope);

@@ -1,5 +1,5 @@
-// Attenuation as it convinces on the screen (DESIGN section 8): 0.0045 / mm soft tissue, 0.028 / mm bone, a fifth and a half of what is physical, so that the
-// range of a picture without a doctor's window level is not exceeded.
+// Attenuation chosen by appearance (docs/design.md, "X-ray attenuation"): 0.0045 / mm soft tissue, 0.028 / mm bone, a fifth and a half of the
+// physical values, so that the range of a picture without a doctor's window level is not exceeded.
 //   CT numbers H: 0.0045 (1 + H / 1000) up to 150, then straight up to 0.028 at 1000 HU.
 //   other volumes (angiograms, mostly cut off at 0): straight from their least value, 0, to 0.028 at their greatest; in a plain head, as they hold no tissue.
 #include "render/fluoroscope_anatomy.h"
@@ -50,7 +50,7 @@ static void add_trunk(Anatomy *anatomy, Vec3 half)
         add_shell(anatomy, vec3(0, behind, 29.0 * k), vec3(20, 16, 12.5), 2, 0.45 * bone);
 }
 
-// In the middle of what is to be seen, half as wide as `half`, along the patient's axes.
+// In the middle of the visible region, with half widths `half`, along the patient's axes.
 static void add_plain_body(Anatomy *anatomy, Vec3 half)
 {
     if (half.x < 66 && half.y < 86 && half.z < 104)
@@ -68,8 +68,8 @@ static double tissue_of(double value, double least, double greatest)
     return greatest > least ? bone * (value - least) / (greatest - least) : 0;
 }
 
-// Cells that lie inside the lumen, by counting walls along the grid's third axis: crossings of the middle of each column of cells are summed with their
-// direction. The columns stand a little off the cells' middles, where no vertex lies.
+// Cells that lie inside the lumen, by counting walls along the grid's third axis: crossings of the middle of each column of cells are summed with
+// their direction. The columns are slightly off the cells' middles, to avoid vertices.
 static void count_walls(const Anatomy *anatomy, const Vec3 corner[3], int8_t *change)
 {
     const double off[2] = {0.5 + 1.2345e-7, 0.5 + 2.3456e-7};
@@ -100,7 +100,7 @@ static void count_walls(const Anatomy *anatomy, const Vec3 corner[3], int8_t *ch
         }
 }
 
-// 1 where a cell's middle is inside the lumen, or beside such a cell (its value is blurred into there).
+// 1 where a cell's middle is inside the lumen, or next to such a cell (blur spreads its value).
 static bool find_lumen(const Anatomy *anatomy, const TriangleMesh *mesh, const MeshLids *lids, uint8_t *inside)
 {
     const size_t nx = (size_t)anatomy->size[0], ny = (size_t)anatomy->size[1], nz = (size_t)anatomy->size[2], cells = nx * ny * nz;

@@ -1,4 +1,4 @@
-// What lies around the vessel in fluoroscopy: bone and soft tissue from a volume, or a plain head or trunk made of ellipsoids.
+// The anatomy around the vessel in fluoroscopy: bone and soft tissue from a volume, or a simple head or trunk made of ellipsoids.
 #ifndef SELDINGER_RENDER_FLUOROSCOPE_ANATOMY_H
 #define SELDINGER_RENDER_FLUOROSCOPE_ANATOMY_H
 
@@ -10,7 +10,7 @@ enum { ELLIPSOIDS_MOST = 40 };
 typedef struct Ellipsoid {
     Vec3 center;             // [mm] from Anatomy.middle, along right, anterior, superior
     Vec3 semi;               // [mm] semi-axes along the same
-    double attenuation;      // [1/mm], added to what others have there: a hollow is a second one with the sign turned
+    double attenuation;      // [1/mm], added to the others: a hollow is an ellipsoid with negative sign
 } Ellipsoid;
 
 typedef struct Anatomy {
@@ -28,7 +28,7 @@ typedef struct Anatomy {
 
 enum { ANATOMY_GRID = 128 };
 
-// `vessel`'s lumen (closed: `lids`) is taken out of the volume, which may hold it full of contrast agent. False with a message.
+// `vessel`'s lumen (closed: `lids`) is removed from the volume, where it may be full of contrast agent. False with a message.
 bool anatomy_create(Anatomy *anatomy, const FluoroscopeOptions *options, const MeshLids *lids, char *message, size_t capacity);
 void anatomy_free(Anatomy *anatomy);
 // Integral of the attenuation along a ray, in double precision (slow: for exposure and tests).

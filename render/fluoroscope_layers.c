@@ -2,8 +2,8 @@
 //   live: brightness 1.75 I^0.72; N = quanta I are detected, sigma_I = sqrt(I / quanta), so sigma of the brightness is 1.75 0.72 I^0.22 / sqrt(quanta)
 //   DSA: brightness 0.62 exp(-g D), D = attenuation now minus attenuation in the mask; sigma = brightness g sqrt(1 / N_now + 1 / N_mask): the part of the mask
 //   stays the same as long as the mask
-// The detector's blur is the 3 x 3 binomial kernel, on layers and on the noise; the noise has unit variance after it. It is taken of attenuation, not of
-// intensity: for what differs by 0.3 between neighbours that is 1 % of the difference.
+// The detector's blur is the 3 x 3 binomial kernel, on layers and on the noise; the noise has unit variance after it. It is applied to attenuation,
+// not to intensity: for neighbours that differ by 0.3 the error is 1 % of the difference.
 #include "render/fluoroscope_layers.h"
 
 #include "render/gl_canvas.h"
@@ -14,8 +14,8 @@
 #include <stdlib.h>
 
 static const double white = 1.75, live_power = 0.72, subtracted = 0.62;
-static const double weakest = 1.0 / 64;              // DSA: less than this part of white makes no more noise
-static const double room[2] = {8, 4};                // above white in the baked channels: what is brighter than white may yet be darkened
+static const double weakest = 1.0 / 64;              // DSA: below this fraction of white, noise does not grow further
+static const double room[2] = {8, 4};                // headroom above white in the baked channels, which may still be darkened
 
 static const char *const SQUARE_VERTEX = "#version 330 core\n"
                                          "out vec2 at;\n"   // 0..1 over the square
@@ -42,8 +42,8 @@ static const char *const ANATOMY_FRAGMENT =
     "      sum += grid * most * step * size; } }\n"
     "  result = max(sum, 0.0); }\n";
 
-// What the shaders that look at the lumen share. TAPS 4 is the detector's blur; a layer of half the resolution is blurred by its one tap. llvmpipe runs both
-// sides of a branch, so what differs is compiled apart.
+// Shared by the shaders that read the lumen. TAPS 4 is the detector's blur; a layer of half the resolution is blurred by its one tap. llvmpipe
+// executes both sides of a branch, so variants are compiled separately.
 #define TAPS_4                                                                                                                                             \
     "#version 330 core\n"                                                                                                                                  \
     "float tap(sampler2D layer, vec2 at) { vec2 h = 0.5 / vec2(textureSize(layer, 0));\n"                                                                  \
@@ -124,7 +124,7 @@ static uint64_t mix_bits(uint64_t x)
     return x ^ x >> 31;
 }
 
-// Where in the tile a pulse's noise begins, and whether it is turned.
+// Offset in the noise tile for a pulse, and whether it is rotated.
 static void noise_offset(uint32_t pulse, int offset[3])
 {
     uint64_t bits = mix_bits(pulse);
@@ -382,7 +382,7 @@ void layers_draw_total(const LayerPrograms *programs, const Layer *anatomy, cons
     draw_square(programs);
 }
 
-// By which powers of transmission brightness and noise go.
+// The exponents of transmission for brightness and noise.
 static void tone_powers(const LayerTone *tone, double power[2])
 {
     power[0] = tone->is_subtracted ? tone->gain : live_power;

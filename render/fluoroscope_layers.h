@@ -7,7 +7,7 @@
 
 typedef struct Layer {
     unsigned texture, framebuffer;
-    int side;                // [pixel], 0: none yet
+    int side;                // [pixel], 0: not created yet
 } Layer;
 
 typedef enum { LAYER_R32F, LAYER_RGBA16, LAYER_RGBA16_SMOOTH } LayerFormat;   // smooth: to be shown larger
@@ -35,10 +35,10 @@ typedef struct LayerTone {
     bool has_roadmap;
 } LayerTone;
 
-void layers_set_state(void);   // all of GL's that the passes rely on, once before them: each pass puts back what it changes
+void layers_set_state(void);   // the GL state that the passes rely on, once before them: each pass restores what it changes
 bool layers_create(LayerPrograms *programs, const Anatomy *anatomy, char *message, size_t capacity);
 void layers_destroy(LayerPrograms *programs);
-// Makes the layer anew where its side differs. False where the driver gives none.
+// Recreates the layer if its size differs. False if the driver fails.
 bool layer_fit(Layer *layer, int side, LayerFormat format);
 void layer_destroy(Layer *layer);
 void layer_begin(const Layer *layer);   // bound, cleared to 0, viewport set
@@ -46,10 +46,9 @@ void layer_begin(const Layer *layer);   // bound, cleared to 0, viewport set
 // Rows `first` to `first` + `rows` of the layer.
 void layers_draw_anatomy(const LayerPrograms *programs, const Anatomy *anatomy, const CArm *c_arm, const Layer *to, int first, int rows, int steps);
 
-// Layers that may be NULL are those that hold nothing.
-// Attenuation of anatomy and contrast agent, without exposure, into a float layer: DSA's mask.
+// Layers may be NULL if empty. Attenuation of anatomy and contrast agent, without exposure, into a float layer: DSA's mask.
 void layers_draw_total(const LayerPrograms *programs, const Layer *anatomy, const Layer *lumen, const CArm *c_arm, const LayerTone *tone, const Layer *to);
-// Without the lumen: brightness and noise sigma, each with room above white, nothing, how open the blades are.
+// Without the lumen: brightness and noise sigma, each with headroom above white; unused; opening of the blades.
 void layers_bake(const LayerPrograms *programs, const Layer *anatomy, const Layer *mask, const LayerTone *tone, const float blades[4], uint32_t mask_pulse,
                  const Layer *to);
 // A baked layer darkened by the lumen, with the roadmap's opacity (of the lumen's resolution) in its third channel, within a box [pixel]. A lumen of less than

@@ -1,16 +1,16 @@
-// Inside of a Fluoroscope, for its own files and tests.
+// Internals of a Fluoroscope, for its own files and tests.
 #ifndef SELDINGER_RENDER_FLUOROSCOPE_PARTS_H
 #define SELDINGER_RENDER_FLUOROSCOPE_PARTS_H
 
 #include "render/fluoroscope_layers.h"
 #include "render/fluoroscope_vessel.h"
 
-// What a picture was taken of.
+// The objects in a picture.
 typedef struct Exposure {
     XrayControl xray;
     uint32_t pulse;
     bool has_tools;
-    const RibbonPath *tool[TOOLS_MOST];  // of the devices that were in
+    const RibbonPath *tool[TOOLS_MOST];  // of the devices inserted
     Vec3 *position;              // (of all tools' nodes, one tool after the other)
     float *filling;              // (the same)
     float *contrast;             // (N)
@@ -22,7 +22,7 @@ typedef struct PictureLayers {
 
 typedef struct Fluoroscope Fluoroscope;
 struct Fluoroscope {
-    FluoroscopeOptions options;  // what it points to is gone
+    FluoroscopeOptions options;  // its pointers are invalid
     int tool_count;
     const ToolLooks *looks;
     int tool_room[TOOLS_MOST];   // nodes at most
@@ -31,13 +31,13 @@ struct Fluoroscope {
     Lumen lumen;
     LayerPrograms programs;
     Layer anatomy_layer, anatomy_next, lumen_layer, roadmap_layer, mask;
-    int anatomy_rows;            // drawn of anatomy_next, which takes the coarse one's place when it is whole
+    int anatomy_rows;            // rows drawn of anatomy_next, which replaces the coarse one when complete
     PictureLayers still, turning, *now;   // of full and half the resolution; which of them is shown
     Ribbon ribbon;
     int drawn_low[2], drawn_high[2];   // box of the tools in `picture`
     Exposure shown;
     bool has_picture;
-    // what the layers hold
+    // contents of the layers
     bool layers_are_stale, lumen_is_coarse, anatomy_is_coarse, lumen_is_empty, roadmap_is_empty, lumen_out_of_beam;
     CArm c_arm;                  // of the layers
     float *lumen_contrast;       // (N) of the lumen layer

@@ -1,8 +1,8 @@
-// Between two points of the tool the ray's way through it is the chord of the shadow's cross-section times L / l, with L their distance in space and l that of
-// their shadows, both in the same measure: what is seen foreshortened is darker, and the sum over the shadow stays mu pi r^2 L. Points whose shadows fall
-// within a pixel or the tool's radius are joined, so that a tool seen along its axis becomes a dark spot and no row of slivers; a border between stretches
-// stays unless it is foreshortened, so that a marker band is as long as it is.
-// A tube is an outer circle of its wall and an inner one that takes the wall away again and puts in what fills the lumen.
+// Between two points of the tool the ray's path through it is the chord of the shadow's cross-section times L / l, with L their distance in space and
+// l that of their shadows, both in the same measure: a foreshortened piece is darker, and the sum over the shadow stays mu pi r^2 L. Points whose
+// shadows fall within a pixel or the tool's radius are joined, so that a tool seen along its axis becomes a dark spot and no row of slivers; a border
+// between stretches stays unless it is foreshortened, so that a marker band is as long as it is. A tube is an outer circle of its wall and an inner
+// one that takes the wall away again and puts in what fills the lumen.
 #include "render/fluoroscope_tool.h"
 
 #include <stdlib.h>
@@ -16,7 +16,7 @@ typedef struct RibbonPoint {
     double way;                          // [pixel] in space, from the point before …
     double wall, filling;                // … and the integrals of the wall's attenuation and of the lumen's filling along it
     double radius, lumen;                // [mm] of what lies before it
-    bool begins;                         // nothing before it
+    bool begins;                         // first point of a stretch
 } RibbonPoint;
 
 // --- where there are points ---
@@ -82,7 +82,7 @@ static Vec3 between_nodes(int count, const Vec3 *position, int node, double u)
         int i = node - 1 + k;
         p[k] = position[i < 0 ? 0 : i < count ? i : count - 1];
     }
-    // straight where a neighbour has no place
+    // straight if a neighbour is missing
     if (u <= 0 || u >= 1 || !vec3_is_finite(p[0]) || !vec3_is_finite(p[3]))
         return u <= 0 ? p[1] : vec3_mix(p[1], p[2], u);
     Vec3 from = vec3_scale(vec3_sub(p[2], p[0]), node > 0 ? 0.5 : 1), to = vec3_scale(vec3_sub(p[3], p[1]), node + 2 < count ? 0.5 : 1);
@@ -92,7 +92,7 @@ static Vec3 between_nodes(int count, const Vec3 *position, int node, double u)
     return vec3_add_scaled(x, u * u * (u - 1), to);
 }
 
-// [pixel] Pieces shorter than they are thick would lie across each other where the shadow turns back.
+// [pixel] Pieces shorter than their thickness would overlap where the shadow turns back.
 static double least_length(const RibbonPoint *p) { return fmax(1, 1.5 * p->radius / p->pixel_mm); }
 static double shadow_length(const RibbonPoint *a, const RibbonPoint *b) { return hypot(b->x - a->x, b->y - a->y); }
 // Seen at more than 60 degrees from the side.
@@ -126,7 +126,7 @@ static int project_points(RibbonPoint *out, const CArm *c_arm, int side, const R
         last_filling = here;
         before = x;
         RibbonPoint point = {(p.x + 0.5) * side, (p.y + 0.5) * side, pixel_mm, way, wall, filled, place->radius, place->lumen, is_broken};
-        // joined to the point before: way and wall add up, the last place counts
+        // merged with the point before: path and wall add up, the last position counts
         bool is_near = !is_broken && shadow_length(&out[points - 1], &point) < least_length(&point);
         bool is_joined = is_near && i + 1 < path->count && (!place->is_border || is_foreshortened(&out[points - 1], &point));
         is_broken = false;
@@ -146,8 +146,8 @@ static void shadow_normal(const RibbonPoint *a, const RibbonPoint *b, double nor
     normal[1] = l > 1e-9 ? dx / l : 1;
 }
 
-// The mitre at b between a-b and b-c, as long as both sides need; their own normal where the way turns so sharply that the inner corner would lie behind the
-// other end of a piece.
+// The mitre at b between a-b and b-c, as long as both sides need; their own normal where the path turns so sharply that the inner corner would lie
+// behind the other end of a piece.
 static void mitre(const RibbonPoint *a, const RibbonPoint *b, const RibbonPoint *c, const double own[2], double out[2])
 {
     double n[2][2];

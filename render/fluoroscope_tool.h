@@ -1,4 +1,5 @@
-// The tools in fluoroscopy: one ribbon along each one's projection, as wide as its shadow, that carries how thick wall and lumen are along the rays.
+// The tools in fluoroscopy: one ribbon along each one's projection, as wide as its shadow, that carries the thickness of wall and lumen along the
+// rays.
 #ifndef SELDINGER_RENDER_FLUOROSCOPE_TOOL_H
 #define SELDINGER_RENDER_FLUOROSCOPE_TOOL_H
 
@@ -9,12 +10,12 @@ typedef struct RibbonVertex {
     float place[2];          // [pixel] of the square, y up
     float across;            // [pixel] from the tool's axis
     float radius, lumen;     // [pixel] of the shadow's two circles
-    float density[2];        // a ray through k pixels of the outer circle and m of the inner one is taken away by exp(-density[0] k - density[1] m)
+    float density[2];        // a ray through k pixels of the outer circle and m of the inner one is attenuated by exp(-density[0] k - density[1] m)
 } RibbonVertex;
 
 typedef struct RibbonPlace { // where the ribbon may have a point
     int node;                // after this one of the tool's nodes …
-    double u;                // … by this part of the way to the next
+    double u;                // … at this fraction of the distance to the next
     bool is_border;          // another stretch begins
     double radius, lumen;    // [mm] of what lies before it …
     double attenuation;      // [1/mm] … and of its wall
@@ -34,13 +35,13 @@ typedef struct Ribbon {      // zeroed: empty
     struct RibbonPoint *point;
 } Ribbon;
 
-// `s` (node_count) [mm] of the nodes. False where memory lacks.
+// `s` (node_count) [mm] of the nodes. False if out of memory.
 bool ribbon_path_make(RibbonPath *path, int node_count, const double *s, int stretch_count, const TubeStretch *stretch);
 void ribbon_path_free(RibbonPath *path);
 
 void ribbon_begin(Ribbon *ribbon);
-// `side` [pixel] of the square; `filling` (node_count) of the lumen at each node, 0 to 1, by what takes `attenuation` [1/mm]; NULL: none. Points nearer to the
-// source than C_ARM_NEAREST_MM and what is not a number are left out. False when out of memory.
+// `side` [pixel] of the square; `filling` (node_count) of the lumen at each node, 0 to 1, by what takes `attenuation` [1/mm]; NULL: none. Points
+// nearer to the source than C_ARM_NEAREST_MM and NaNs are skipped. False when out of memory.
 bool ribbon_add(Ribbon *ribbon, const CArm *c_arm, int side, const RibbonPath *path, const Vec3 *position, const float *filling, double attenuation);
 void ribbon_end(Ribbon *ribbon, int side);
 void ribbon_free(Ribbon *ribbon);

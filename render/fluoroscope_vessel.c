@@ -86,7 +86,7 @@ static int node_of_vertex(const FluoroscopeOptions *options, int v)
     return !tree ? 0 : node >= 0 && node < tree->node_count ? node : nearest_node(tree, options->vessel->vertex[v]);
 }
 
-// A copy with lids, whose nodes are known. NULL where memory lacks.
+// A copy with lids, whose nodes are known. NULL if out of memory.
 static TriangleMesh *closed_copy(const FluoroscopeOptions *options, const MeshLids *lids)
 {
     const TriangleMesh *mesh = options->vessel;

@@ -13,7 +13,7 @@ inline ImFont *font_add(float pixels, const ImWchar *letters, ImFontConfig confi
     config.SizePixels = pixels;
     ImFontAtlas *atlas = ImGui::GetIO().Fonts;
     for (const char *name : file)
-        if (FILE *probe = std::fopen(name, "rb")) {   // ImGui asserts on a file that is not there
+        if (FILE *probe = std::fopen(name, "rb")) {   // ImGui asserts on a file that does not exist
             std::fclose(probe);
             return atlas->AddFontFromFileTTF(name, pixels, &config, letters);
         }

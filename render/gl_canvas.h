@@ -1,5 +1,5 @@
-// What is drawn into: a framebuffer with colour and depth, multisampled or not, that ends as a texture or as pixels. And shader programs.
-// All of it needs a current GL context.
+// A framebuffer with colour and depth, multisampled or not, that is read as a texture or as pixels. And shader programs. All of it needs a current GL
+// context.
 #ifndef SELDINGER_RENDER_GL_CANVAS_H
 #define SELDINGER_RENDER_GL_CANVAS_H
 
@@ -17,7 +17,7 @@ typedef struct GlCanvas {
 
 // `samples` 1 or more (cut to what the driver has).
 bool gl_canvas_create(GlCanvas *canvas, int width, int height, int samples, char *message, size_t capacity);
-void gl_canvas_destroy(GlCanvas *canvas);   // a zeroed canvas is fine
+void gl_canvas_destroy(GlCanvas *canvas);   // a zeroed canvas is allowed
 void gl_canvas_begin(const GlCanvas *canvas, const float background[3]);
 void gl_canvas_resolve(const GlCanvas *canvas);
 // Rows from the top, 3 bytes a pixel, into `rgb` (height, width, 3); resolves first.

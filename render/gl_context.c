@@ -21,7 +21,7 @@ struct GlContext {
 
 static EGLDisplay open_display(char *message, size_t capacity)
 {
-    // epoxy ends the program on a function that does not exist, so ask for the extension before calling it
+    // epoxy aborts on a missing function, so check for the extension before calling it
     const char *extensions = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
     if (!extensions || !epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_EXT_platform_base") ||
         !epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_MESA_platform_surfaceless")) {

@@ -1,4 +1,4 @@
-// What counts on a software renderer: pixels blended and triangles. Buttons, rows and bars are drawn here rather than by ImGui's widgets, square and
+// On a software renderer the cost is blended pixels and triangles. Buttons, rows and bars are drawn here rather than by ImGui's widgets, square and
 // unsmoothed, for a third of the triangles. Windows that are KEPT are drawn into a texture, only when their vertices have changed, and copied from
 // there: 1 ms a frame instead of 5 at 1280x720.
 #include "render/gui.h"
@@ -142,7 +142,7 @@ extern "C" void gui_destroy(Gui *gui)
     delete gui;
 }
 
-// A key that came and went between two frames is down for one of them.
+// A key pressed and released between two frames is down for one of them.
 static void feed_keys(Gui *gui, ImGuiIO &io, const WindowInput *input)
 {
     for (int key = 0; key < WINDOW_KEYS; key++)
@@ -197,7 +197,7 @@ extern "C" void gui_begin(Gui *gui, const WindowInput *input, double scale, bool
     ImGui::NewFrame();
 }
 
-// ---- what is kept
+// ---- cached windows
 
 // A copy is plain memory, a third of the cost, where nothing has to be converted or turned over: a window's own buffer has its bytes in the order
 // BGRA and its rows going down, one off screen RGBA and up. (With the sized GL_RGBA8 Mesa does not take the order from the last arguments.)
@@ -333,7 +333,7 @@ static void draw_frame(Gui *gui, unsigned framebuffer)
         if (gui->kept[i].list)
             copy_kept(gui, &gui->kept[i]);
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
-    // the rest as it comes, over it
+    // the other windows on top, drawn directly
     ImVector<ImDrawList *> rest;
     for (int i = 0; i < data->CmdListsCount; i++) {
         bool is_kept = false;

@@ -1,6 +1,6 @@
-// A thin C border around Dear ImGui and its OpenGL 3 back end: windows at fixed places, text, buttons, sliders, tabs, a text field, and drawing.
-// Fed with WindowInput, so that it works the same in a window and off screen (and in tests); GLFW is not seen here. Pixels, y down.
-// Needs a current GL context. Other ImGui contexts (render/overlay.h) are left as they are: a Gui's own is current from gui_begin to gui_end only.
+// A thin C interface to Dear ImGui and its OpenGL 3 back end: windows at fixed places, text, buttons, sliders, tabs, a text field, and drawing. Fed
+// with WindowInput, so that it works the same in a window and off screen (and in tests); independent of GLFW. Pixels, y down. Needs a current GL
+// context. Other ImGui contexts (render/overlay.h) are left as they are: a Gui's own is current from gui_begin to gui_end only.
 #ifndef SELDINGER_RENDER_GUI_H
 #define SELDINGER_RENDER_GUI_H
 
@@ -18,7 +18,7 @@ typedef struct Gui Gui;
 typedef struct GuiRect { float x, y, width, height; } GuiRect;
 typedef enum { GUI_SMALL, GUI_NORMAL, GUI_LARGE, GUI_HUGE, GUI_FONTS } GuiFont;   // 13, 15, 19 and 28 pixels times the scale
 
-typedef struct GuiColors {     // of everything; the marks are told apart by the colour-blind, and no mark is told by colour alone
+typedef struct GuiColors {     // of everything; the marks are distinguishable for the colour-blind, and never shown by colour alone
     Color window, panel, frame, frame_hot, frame_on, line, text, dim, accent, good, warning, bad;
 } GuiColors;
 extern const GuiColors gui_colors;
@@ -26,27 +26,26 @@ extern const GuiColors gui_colors;
 Gui *gui_create(char *message, size_t capacity);
 void gui_destroy(Gui *gui);
 
-// A frame. `scale` of text and widgets; letters are made anew where it changes by more than a twentieth. `is_silent`: lays out, takes no input and
-// draws nothing (a window's contents are known from its frame before).
+// A frame. `scale` of text and widgets; letters are made again where it changes by more than a twentieth. `is_silent`: lays out without input or
+// drawing (a window's contents are known from the previous frame).
 void gui_begin(Gui *gui, const WindowInput *input, double scale, bool is_silent);
 // The last of them draws into `framebuffer`, which is `input->width` x `height` large and not multisampled. Leaves blending and scissor test off.
 void gui_end(Gui *gui, unsigned framebuffer);
 float gui_scale(const Gui *gui);        // of the current letters
 
-// Windows at a fixed place. Contents that do not fit scroll. NO_INPUT lets the mouse through; ON_TOP lies over the ones before and takes their clicks.
-// KEPT: opaque, overlapping no other but those on top; its pixels are kept and drawn anew only where its contents changed. SELDOM: a kept one whose
-// changes show in every third frame, for figures that nobody reads faster.
-// FRAMED: a line around it. VEIL: what lies below shines through.
+// Windows at a fixed place. Overflowing contents scroll. NO_INPUT lets the mouse through; ON_TOP lies over the ones before and takes their clicks.
+// KEPT: opaque, overlapping no other but those on top; its pixels are cached and redrawn only when its contents changed. SELDOM: a cached window
+// updated in every third frame, for figures that nobody reads faster. FRAMED: a line around it. VEIL: translucent.
 enum { GUI_NO_BACKGROUND = 1, GUI_NO_INPUT = 2, GUI_ON_TOP = 4, GUI_SCROLL_TO_END = 8, GUI_KEPT = 16, GUI_SELDOM = 32, GUI_FRAMED = 64, GUI_VEIL = 128 };
 void gui_window_begin(Gui *gui, const char *id, GuiRect at, unsigned flags);
-// The height [pixel] that the contents would need more than there is; negative: still free.
+// Missing height [pixel] of the contents; negative: free height.
 float gui_window_end(Gui *gui);
 
-// Flow: each thing goes below the last one, or beside it.
-GuiRect gui_place(Gui *gui, float width, float height);   // takes room (width 0: all there is) and says where it is, for drawing
+// Flow layout: each item goes below the last one, or next to it.
+GuiRect gui_place(Gui *gui, float width, float height);   // reserves space (width 0: all available) and returns its rectangle, for drawing
 void gui_beside(Gui *gui, float gap);
 void gui_space(Gui *gui, float height);
-void gui_scroll_here(Gui *gui);                           // brings the last thing into sight, where the contents scroll
+void gui_scroll_here(Gui *gui);                           // scrolls to the last item
 float gui_width(Gui *gui);                                // left in this line
 float gui_line_height(const Gui *gui, GuiFont font);
 
@@ -60,7 +59,7 @@ GuiPress gui_button(Gui *gui, const char *id, const char *label, const char *key
 // True while it is being moved. `format` as for printf of one double.
 bool gui_slider(Gui *gui, const char *id, float *value, float least, float most, const char *format, float width);
 void gui_progress(Gui *gui, double part, const char *text);
-// Over the last thing, once the mouse has rested on it. NULL texts are left out.
+// A tooltip for the last item. NULL texts are left out.
 void gui_tooltip(Gui *gui, const char *title, const char *text, const char *last);
 
 bool gui_tabs_begin(Gui *gui, const char *id);

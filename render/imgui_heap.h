@@ -1,4 +1,5 @@
-// Dear ImGui goes on with a null pointer where memory lacks: it is to ask where the program ends instead. C++ only; before a context is made.
+// Makes Dear ImGui end the program when memory runs out, instead of continuing with a null pointer. C++ only; to be included before a context is
+// made.
 #ifndef SELDINGER_RENDER_IMGUI_HEAP_H
 #define SELDINGER_RENDER_IMGUI_HEAP_H
 

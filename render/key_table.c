@@ -1,6 +1,6 @@
-// One row an action, in the order of ActionId. A trainee's left hand lies on A S D W, C, E and F (C-arm, contrast, X-ray), the right one on the
-// arrows (tool), as they lie on the table's controls and on the wire in the angio suite. With a second tool to move the left hand goes to U H J K, which lie as
-// the arrows do on every layout of Latin letters; what is set once in a while (table, blades) is a letter with Alt.
+// One row per action, in the order of ActionId. A trainee's left hand lies on A S D W, C, E and F (C-arm, contrast, X-ray), the right one on the
+// arrows (tool), as they lie on the table's controls and on the wire in the angio suite. With a second tool to move the left hand goes to U H J K,
+// which lie as the arrows do on every layout of Latin letters; what is set once in a while (table, blades) is a letter with Alt.
 #include "render/key_table.h"
 
 #include <stdio.h>
@@ -126,7 +126,7 @@ const char *key_table_text(ActionId id, char *text, size_t capacity)
     return text;
 }
 
-// Keys of one kind share a line.
+// Related keys share a line.
 static const struct {
     ActionId first, last;
     const char *help;
@@ -159,7 +159,7 @@ int key_table_line(ActionId first, char *keys, size_t capacity, const char **hel
         char text[32];
         const char *key = key_table_text((ActionId)id, text, sizeof text);
         if (id > (int)first && key_table[id].modifiers & WINDOW_ALT)
-            key += strlen("Alt+");       // said by the first one
+            key += strlen("Alt+");       // described by the first one
         used += (size_t)snprintf(keys + used, capacity - used, "%s%s", id > (int)first ? " " : "", key);
     }
     return last - (int)first + 1;
@@ -209,7 +209,7 @@ void key_state_feed(KeyState *state, const WindowInput *input, bool is_captured)
         switch (event->kind) {
         case WINDOW_KEY_DOWN_EVENT:
             is_keypad = event->key == WINDOW_KEY_KEYPAD_ADD || event->key == WINDOW_KEY_KEYPAD_SUBTRACT;
-            // a repeat begins nothing: what was released by loss of focus or a dialogue needs a new press
+            // a repeat starts nothing: actions released by loss of focus or a dialogue need a new press
             if (!event->is_repeat && ((!is_captured && !(event->modifiers & WINDOW_SUPER)) || passes_capture(event->key)))
                 key_down(state, event);
             break;

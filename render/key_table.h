@@ -1,5 +1,5 @@
-// What the user can do, in one table: the keys that are obeyed, the help overlay, the tooltips and the panel's buttons are all made from it, so
-// that nothing can be undocumented. And which actions are on now, from key events. Pure: no window, no GL, no clock.
+// All user actions in one table, from which keys, help overlay, tooltips and panel buttons are made, so that none is undocumented; and the state of
+// the actions, from key events. No window, no GL, no clock.
 #ifndef SELDINGER_RENDER_KEY_TABLE_H
 #define SELDINGER_RENDER_KEY_TABLE_H
 
@@ -30,7 +30,7 @@ typedef enum ActionId {
     ACTION_COUNT
 } ActionId;
 
-typedef enum { ACTION_HOLD, ACTION_PRESS } ActionKind;   // on while held; or done once at each press
+typedef enum { ACTION_HOLD, ACTION_PRESS } ActionKind;   // active while held, or triggered once per press
 typedef enum { GROUP_TOOL, GROUP_XRAY, GROUP_C_ARM, GROUP_VIEW, GROUP_SESSION, ACTION_GROUPS } ActionGroup;
 
 typedef struct KeyAction {
@@ -39,7 +39,7 @@ typedef struct KeyAction {
     ActionKind kind;
     int key;                 // WindowKey
     unsigned modifiers;      // WINDOW_ALT or 0: Shift and Ctrl only change the speed of the tool and are no part of a key
-    char character;          // typed, does the same wherever it lies on the keyboard; 0 none
+    char character;          // alternative typed character, independent of the layout; 0: none
     const char *name;        // on the button, at most 18 bytes
     const char *help;        // one line
 } KeyAction;
@@ -49,7 +49,7 @@ extern const char *const action_group_name[ACTION_GROUPS];
 
 // "Alt+Up", "F1 or ?", as shown to the user; returns text.
 const char *key_table_text(ActionId id, char *text, size_t capacity);
-// A line of the list of keys, from this action on: "Alt+Up Down" and what they do. Returns how many actions it tells of, 1 or more.
+// A line of the list of keys, from this action on: "Alt+Up Down" and its description. Returns the number of actions covered, 1 or more.
 int key_table_line(ActionId first, char *keys, size_t capacity, const char **help);
 
 // Which actions are on. Start from zeros.
@@ -58,9 +58,9 @@ typedef struct KeyState {
     int pressed[ACTION_COUNT];     // ACTION_PRESS: how often since key_state_begin
 } KeyState;
 
-void key_state_begin(KeyState *state);   // of a frame: forgets presses, keeps what is held
+void key_state_begin(KeyState *state);   // at the start of a frame: clears presses, keeps held actions
 // Feeds a window's events: keys, typed characters, loss of focus (releases everything). A key that went down with Alt keeps its meaning until it
-// comes up. `is_captured`: a text field has the keyboard; releases still count, presses do not, but for Escape and the function keys.
+// comes up. `is_captured`: a text field has the keyboard; releases still count, presses do not, except for Escape and the function keys.
 void key_state_feed(KeyState *state, const WindowInput *input, bool is_captured);
 void key_state_release(KeyState *state); // all keys up: the tool stops
 

@@ -1,6 +1,6 @@
-// The encoder writes into a file without a name, in the movie's folder: whoever ends first, nothing is left over. Frames go through a socket, so that
-// an encoder that has died is an error of a send and no SIGPIPE; what it says on its standard error is read beside, so that it never waits for us.
-// Colours are BT.709 in studio range and say so, as players expect of high definition.
+// The encoder writes into an unnamed file in the movie's folder, so nothing is left over, whichever process ends first. Frames go through a socket,
+// so that an encoder that has died is an error of a send and no SIGPIPE; its standard error is read concurrently, so that it never blocks. Colours
+// are BT.709 in studio range and say so, as players expect of high definition.
 #include "render/movie_file.h"
 
 #include "base/part_file.h"
@@ -24,7 +24,7 @@ struct MovieFile {
     char *path;
     int width, height;           // given
     int even_width, even_height;
-    uint8_t *even;               // (even_height, even_width, 3); NULL where the given size is even
+    uint8_t *even;               // (even_height, even_width, 3); NULL if the given size is even
     pid_t encoder;
     int frames, words, output;   // descriptors: our end of both sockets, the file without a name
     int count;
@@ -83,7 +83,7 @@ static int spawn_encoder(MovieFile *movie, double fps, int frames, int words)
     sigaddset(&plain, SIGTERM);
     posix_spawnattr_setsigmask(&attributes, &none);
     posix_spawnattr_setsigdefault(&attributes, &plain);
-    posix_spawnattr_setpgroup(&attributes, 0);   // Ctrl-C is for us: we may yet finish the movie
+    posix_spawnattr_setpgroup(&attributes, 0);   // Ctrl-C is for us: we may still finish the movie
     posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
     int why = posix_spawnp(&movie->encoder, argument[0], &actions, &attributes, argument, environ);
     posix_spawnattr_destroy(&attributes);
@@ -156,7 +156,7 @@ MovieFile *movie_file_create(const char *path, int width, int height, double fps
     return NULL;
 }
 
-// What the encoder has said so far, or (`wait`) until it ends; the last of it is kept.
+// Reads the encoder's output so far or, with `wait`, until it ends; keeps the last part.
 static void listen_to_encoder(MovieFile *movie, bool wait)
 {
     for (;;) {
@@ -173,7 +173,7 @@ static void listen_to_encoder(MovieFile *movie, bool wait)
     }
 }
 
-// Listens meanwhile, or an encoder that talks and we would wait for each other.
+// Reads the encoder's messages meanwhile, to avoid a deadlock.
 static bool send_all(MovieFile *movie, const uint8_t *bytes, size_t size)
 {
     struct pollfd ends[] = {{.fd = movie->frames, .events = POLLOUT}, {.fd = movie->words, .events = POLLIN}};
@@ -236,7 +236,7 @@ static int end_encoder(MovieFile *movie, bool kill_it)
     return status;
 }
 
-// The file without a name to its name. False with errno.
+// Links the unnamed file to its name. False with errno.
 static bool publish(const MovieFile *movie)
 {
     size_t room = 1 << 20;
@@ -256,7 +256,7 @@ static bool publish(const MovieFile *movie)
     return good;
 }
 
-// One line of the encoder's words, for a message: its last that says anything.
+// The last non-empty line of the encoder's output, for a message.
 static const char *last_line(MovieFile *movie)
 {
     char *text = movie->last_words;

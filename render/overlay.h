@@ -14,8 +14,8 @@ extern "C" {
 typedef struct Overlay Overlay;
 typedef enum { TEXT_SMALL, TEXT_NORMAL, TEXT_LARGE, TEXT_SIZES } TextSize;   // 14, 17 and 23 pixels times `scale`
 
-// `scale` of text, 1 for a page about 1000 pixels high. NULL where memory or the driver fails. The font is DejaVu Sans where it is installed
-// (package fonts-dejavu-core), else ImGui's own.
+// `scale` of text, 1 for a page about 1000 pixels high. NULL if memory or the driver fails. The font is DejaVu Sans where it is installed (package
+// fonts-dejavu-core), else ImGui's own.
 Overlay *overlay_create(int width, int height, float scale);
 void overlay_destroy(Overlay *overlay);
 void overlay_finish(Overlay *overlay);   // draws everything into the bound framebuffer; after it only destroy

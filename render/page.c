@@ -35,7 +35,7 @@ double page_tick_step(double range, int most)
     return range / step <= most ? step : range / (2 * step) <= most ? 2 * step : range / (5 * step) <= most ? 5 * step : 10 * step;
 }
 
-// The length of the UTF-8 character at s, 0 where there is none that HTML may hold.
+// The length of the UTF-8 character at s, 0 if there is none that HTML may hold.
 static int character_length(const unsigned char *s)
 {
     if (s[0] < 0x80)

@@ -1,4 +1,4 @@
-// Pages to read: HTML that stands alone, for the screen in light and dark and for paper. What they share.
+// Shared parts of report pages: self-contained HTML for the screen in light and dark and for paper.
 #ifndef SELDINGER_RENDER_PAGE_H
 #define SELDINGER_RENDER_PAGE_H
 

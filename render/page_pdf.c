@@ -31,7 +31,7 @@ static bool has_succeeded(pid_t child)
     return ended == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-// Runs a browser without a shell; its own chatter is not ours. False where it cannot be run or fails.
+// Runs a browser without a shell; its own chatter is not ours. False if it cannot be run or fails.
 static bool browser_prints(const char *browser, const char *html, const char *pdf, const sigset_t *signals)
 {
     char print[4200], url[4200], profile[4200];
@@ -66,7 +66,7 @@ static void remove_folder(const char *path)
         waitpid(child, NULL, 0);
 }
 
-// The PDF's bytes; NULL where no browser made it. The caller frees.
+// The PDF's bytes; NULL if no browser made it. The caller frees.
 static char *print_page(const char *folder, const char *path, const char *page, size_t length, const sigset_t *signals, size_t *pdf_length, Faults *faults)
 {
     static const char *const browsers[] = {"chromium", "chromium-browser", "google-chrome"};

@@ -1,11 +1,11 @@
-// A page on paper.
+// PDF output of a report page.
 #ifndef SELDINGER_RENDER_PAGE_PDF_H
 #define SELDINGER_RENDER_PAGE_PDF_H
 
 #include "base/faults.h"
 
-// Writes the page as PDF, printed by chromium. False with a fault: also where that is not installed. SIGINT, SIGTERM and SIGHUP wait until nothing of the
-// page is left elsewhere.
+// Writes the page as PDF, printed by chromium. False with a fault: also if chromium is not installed. SIGINT, SIGTERM and SIGHUP are deferred until
+// temporary copies of the page are removed.
 bool page_write_pdf(const char *path, const char *page, size_t length, Faults *faults);
 
 #endif

@@ -91,7 +91,7 @@ static int presses(const WindowInput *input, int key)
 
 static bool has_key(const WindowInput *input, int key) { return presses(input, key) > 0; }
 
-// X closes what X has opened.
+// X closes the box that X has opened.
 static void take_tray(Panel *panel, const WindowInput *input, PanelActions *actions)
 {
     bool is_closed = actions->pressed[ACTION_QUIT] > 0 || panel->answer < 0 || has_key(input, key_table[ACTION_EXCHANGE].key);
@@ -113,7 +113,7 @@ static void take_tray(Panel *panel, const WindowInput *input, PanelActions *acti
 static void take_dialogue(Panel *panel, const WindowInput *input, PanelActions *actions)
 {
     bool is_refused = actions->pressed[ACTION_QUIT] > 0 || panel->answer < 0;   // Escape, or the button
-    // a second click on the title bar's cross means it
+    // a second click on the title bar's cross confirms
     bool is_confirmed = panel->answer > 0 || (panel->dialogue != DIALOGUE_TRAINEE && has_key(input, WINDOW_KEY_ENTER)) ||
                         (panel->dialogue == DIALOGUE_QUIT && input->close == WINDOW_CLOSE_ASKED);
     if (panel->dialogue == DIALOGUE_TRAY)
@@ -134,7 +134,7 @@ static void take_dialogue(Panel *panel, const WindowInput *input, PanelActions *
     panel->answer = 0;
 }
 
-// The text of the exercise goes by itself once it has been followed a little.
+// The text of the exercise disappears by itself after the first actions.
 static void take_briefing(Panel *panel, PanelActions *actions)
 {
     static const ActionId follows[] = {ACTION_PUSH, ACTION_PULL, ACTION_TWIST_LEFT, ACTION_TWIST_RIGHT, ACTION_PEDAL, ACTION_PEDAL_LATCH};
@@ -152,7 +152,7 @@ static void take_briefing(Panel *panel, PanelActions *actions)
         panel->briefing = is_shown ? BRIEFING_CLOSED : BRIEFING_OPEN;
 }
 
-// What the panel itself does of what was pressed. Restart and quit are asked back first.
+// Handles the panel's own actions. Restart and quit ask for confirmation first.
 static void take_own_actions(Panel *panel, const WindowInput *input, PanelActions *actions)
 {
     int *pressed = actions->pressed;
@@ -262,7 +262,7 @@ void panel_take_input(Panel *panel, const WindowInput *input, PanelActions *acti
     memcpy(panel->held, actions->held, sizeof panel->held);
 }
 
-// ---- what it remembers
+// ---- state
 
 void panel_sample(Panel *panel, int tool, double time_s, double force_n, double torque_n_mm, double wall_max_n)
 {
@@ -327,7 +327,7 @@ void panel_draw(Panel *panel, const WindowInput *input, const PanelState *state,
     panel->height = input->height;
     if (is_new) {
         panel->is_dense = false;
-        // how much the contents need is known after they were laid out, and a scroll bar changes it
+        // the contents' size is known only after layout, and a scroll bar changes it
         for (int i = 0; i < 4; i++) {
             gui_begin(panel->gui, input, layout.scale, true);
             panel_draw_all(panel, input, state);

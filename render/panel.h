@@ -1,7 +1,7 @@
-// The trainer's panels around the views: figures, running plots, exercise, devices, controls, messages, help. Plain data in, actions out; draws
-// with Dear ImGui into a window or off screen (--picture, --movie), the same in both. A frame:
+// The trainer's panels around the views: figures, running plots, exercise, devices, controls, messages, help. Plain data in, actions out; draws with
+// Dear ImGui in a window or off screen (--picture, --movie), identically. A frame:
 //     input = window_next_frame            keys and mouse
-//     panel_take_input(panel, input, &a)   what the user wants; obey it before drawing
+//     panel_take_input(panel, input, &a)   user actions; apply them before drawing
 //     layout = panel_layout(...)           draw the views into layout.view[]
 //     panel_draw(panel, input, &state, 0)  over and around the views
 //     window_swap
@@ -22,13 +22,13 @@ void panel_destroy(Panel *panel);
 void panel_take_input(Panel *panel, const WindowInput *input, PanelActions *actions);
 void panel_draw(Panel *panel, const WindowInput *input, const PanelState *state, unsigned framebuffer);
 
-// A sample of a tool's running plots; panel_draw takes one itself, more often than that is welcome (peaks are kept). Time simulated [s].
+// Adds a sample to a tool's running plots; panel_draw adds one itself, but more frequent samples preserve peaks. Time simulated [s].
 void panel_sample(Panel *panel, int tool, double time_s, double force_n, double torque_n_mm, double wall_max_n);
 void panel_forget_samples(Panel *panel);         // after a restart or a jump in time
 
 void panel_message(Panel *panel, double now_s, PanelMark mark, const char *text);   // into the log; the last 100 are kept
 void panel_show_help(Panel *panel, bool is_shown);
-bool panel_has_panels(const Panel *panel);       // Tab hides them: pass to panel_layout
+bool panel_has_panels(const Panel *panel);       // Tab hides them: to be passed to panel_layout
 void panel_show_hints(Panel *panel, bool is_shown);
 bool panel_is_asking(const Panel *panel);        // a dialogue has the keyboard
 void panel_ask(Panel *panel, PanelQuestion question);    // Enter or Esc, a button: PanelActions.answer

@@ -14,7 +14,7 @@ void panel_reflow(const char *from, char *to, size_t capacity)
             to[length++] = *from++;
             continue;
         }
-        const char *next = from + 1 + strspn(from + 1, " \t\r");   // an indent is the editor's too
+        const char *next = from + 1 + strspn(from + 1, " \t\r");   // an indent comes from the editor too
         bool ends_sentence = length > 0 && strchr(".!?:\n", to[length - 1]);
         to[length++] = ends_sentence || !*next || strchr("\n-*0123456789", *next) ? '\n' : ' ';
         from = next;

@@ -51,7 +51,7 @@ static void draw_exercise(Panel *panel, const PanelState *state)
     }
 }
 
-// All tools in small: a dot for the one whose figures follow, how far it is in, what its hand feels, what is to be said of it.
+// All tools in small: a dot for the one whose figures follow, its insertion, its reaction, its note.
 static void draw_tools(Panel *panel, const PanelState *state)
 {
     char name[64], text[96], value[48], other[48];
@@ -111,7 +111,7 @@ static void draw_left(Panel *panel, const PanelState *state)
     draw_exercise(panel, state);
     draw_tool(panel, state);
     draw_hands(panel, state);
-    // the plots take what the rest leaves; where that is too little the rows become smaller, and last the column scrolls
+    // the plots take the remaining height; if that is too little the rows shrink, and finally the column scrolls
     float room = panel->plot_height * (float)panel->plots - gui_window_end(gui) - 2;
     panel->is_dense = panel->is_dense || room < 2 * least;   // until the window is resized: no flicker between the two
     panel->plots = room >= 3 * 70 * s ? 3 : 2;

@@ -1,4 +1,4 @@
-// Hints: what a new user needs next, until it was used.
+// Hints for new users, shown until the action was used.
 #include "render/panel_internal.h"
 
 #include <stdio.h>

@@ -1,4 +1,4 @@
-// What panel.c (input, dialogues, what the panel remembers) and panel_draw.c, panel_controls.c, panel_views.c, panel_boxes.c and panel_tray.c (what it looks like) share.
+// Shared by panel.c (input, dialogues, state) and by panel_draw.c, panel_controls.c, panel_views.c, panel_boxes.c and panel_tray.c (appearance).
 #ifndef SELDINGER_RENDER_PANEL_INTERNAL_H
 #define SELDINGER_RENDER_PANEL_INTERNAL_H
 
@@ -25,16 +25,16 @@ struct Panel {
     int width, height;
     // mouse on buttons and sliders, until the next panel_take_input
     bool mouse_held[ACTION_COUNT];
-    bool latched[ACTION_COUNT];    // Fast and Slow stay on by mouse: it has one button for two things
+    bool latched[ACTION_COUNT];    // Fast and Slow are toggled by mouse, which cannot hold two buttons
     int mouse_pressed[ACTION_COUNT];
     bool xray_set;
     XrayControl xray;
-    bool held[ACTION_COUNT];       // as last given out: buttons light up with their keys
+    bool held[ACTION_COUNT];       // as last returned: buttons light up with their keys
     // mouse in a view
     int drag_view;
     unsigned drag_buttons;
     double mouse_x, mouse_y, dragged;   // dragged: way since the press [pixel]
-    // what is open
+    // open boxes
     Dialogue dialogue;
     bool dialogue_is_new;
     PanelQuestion question;
@@ -42,11 +42,11 @@ struct Panel {
     char name[64];                 // the text field
     PanelTrayChoice tray;
     int tray_count, tray_shown;    // tray_shown: which was brought into sight
-    float tray_over;               // [pixel] that its contents lack, or < 0
+    float tray_over;               // [pixel] missing height of its contents; < 0: free
     float tray_value[3];           // of its sliders: length, angle, mandrel
     bool has_help, has_panels, has_hints;
     Briefing briefing;
-    bool is_interactive;           // somebody is there: panel_take_input was called
+    bool is_interactive;           // there is a user: panel_take_input was called
     GuiRect briefing_at;           // as last drawn; zero width: not shown
     double used_s[ACTION_COUNT];   // how long an action was held, or 1 s for each press: hints disappear with use
     // plots and log
@@ -58,7 +58,7 @@ struct Panel {
     PanelMessage message[PANEL_MESSAGES];
 };
 
-// The buttons of each tab, row by row: every action is in one (a test says so).
+// The buttons of each tab, row by row: every action is in one (a test reports it).
 typedef struct ButtonRow {
     int tab, count;
     ActionId action[BUTTONS_IN_ROW];
@@ -78,7 +78,7 @@ bool panel_has_more_lines(const char *text);
 bool panel_first_line(const char *text, char *line, size_t capacity);
 void panel_heading(Panel *panel, const char *text);
 
-// Where words may stand, at `wanted` or as little as may be above or below it: what lies close together has one line each.
+// Positions for labels, at `wanted` or as close as possible above or below it, without overlap.
 GuiRect panel_free_place(GuiRect wanted, const GuiRect *taken, int count);
 
 void panel_reflow(const char *from, char *to, size_t capacity);

@@ -1,4 +1,4 @@
-// What the trainer's panels show and what their user wants: plain data.
+// Input and output of the trainer's panels: what they show, and the user's actions. Plain data.
 #ifndef SELDINGER_RENDER_PANEL_STATE_H
 #define SELDINGER_RENDER_PANEL_STATE_H
 
@@ -30,18 +30,18 @@ typedef struct PanelTool {         // one of the coaxial tools
     const char *what;              // "catheter 0.70 mm x 160 mm"
     Color color;                   // as in the 3D view
     double inserted_mm, turned_deg, push_mm_s, twist_deg_s;
-    double force_n, torque_n_mm;   // of its hand, of the sheath, on it
+    double force_n, torque_n_mm;   // speed of its hand, friction of the sheath, force on it
     PanelMark mark;                // of the note
-    const char *note;              // "let go" …, or NULL
+    const char *note;              // "released" …, or NULL
 } PanelTool;
 
 typedef struct PanelDevice {
     const char *name;
     HandState state;
-    const char *note;              // what it does or what is wrong; may be NULL
+    const char *note;              // its state or problem; may be NULL
 } PanelDevice;
 
-typedef struct PanelLabel {        // words beside something in the 3D view; pixels from the view's upper left corner
+typedef struct PanelLabel {        // a label in the 3D view; pixels from the view's upper left corner
     double x, y, radius;           // its centre, and of what is drawn there
     const char *text;
 } PanelLabel;
@@ -51,9 +51,9 @@ enum { TRAY_POINTS = 160, TRAY_STEPS = 64 };
 typedef struct PanelTrayDevice {
     const char *name;
     const char *what;              // kind, diameters, length
-    const char *note;              // why it cannot be put in, or NULL
-    const char *remark;            // what is to be said of it besides, or NULL
-    bool is_in;                    // it is the tool now
+    const char *note;              // why it cannot be inserted, or NULL
+    const char *remark;            // an additional note, or NULL
+    bool is_in;                    // it is inserted now
     int point_count;
     double point[TRAY_POINTS][2];  // [mm] (x, y) of its distal part when nothing holds it, the tip last; y up
     int step_count;
@@ -64,24 +64,24 @@ typedef struct PanelTrayDevice {
 
 typedef struct PanelTray {         // the chosen tool's devices, while the tray is open
     const char *tool;
-    const char *note;              // what to do before anything can be put in, or NULL
+    const char *note;              // what to do before a device can be inserted, or NULL
     int device_count;
     const PanelTrayDevice *device; // (device_count)
-    const PanelTrayDevice *shaped; // the chosen one with its tip as PanelActions.tray asks for, or NULL; where it does not stay, its note says why
+    const PanelTrayDevice *shaped; // the chosen one with its tip as requested by PanelActions.tray, or NULL; if it cannot keep that shape, its note says why
 } PanelTray;
 
-// What is shown. Strings are borrowed for the call; NULL is an empty one. NaN in a figure shows as a dash.
+// The data shown. Strings are borrowed for the call; NULL is an empty string. NaN in a figure shows as a dash.
 typedef struct PanelState {
     double now_s;                  // wall clock of the session, for messages and hints
     double time_s;                 // simulated
     bool is_paused;
     // exercise
     const char *title;
-    const char *instructions;      // its first line is always shown, the whole of it in a box at the beginning and when asked for
+    const char *instructions;      // its first line is always shown, all of it in a box at the beginning and on request
     const char *trainee;
     const char *target;            // name of the one to reach now
     double hold_s, hold_needed_s;  // progress of holding the target; hold_needed_s 0: no target
-    bool is_finished;              // the exercise is over; `instructions` says how it ended
+    bool is_finished;              // the exercise is over; `instructions` holds the result
     int figure_count, error_count;
     const PanelFigure *figure;     // (figure_count) score so far
     const char *const *error;      // (error_count) handling errors so far, newest last
@@ -113,7 +113,7 @@ typedef struct PanelState {
     const PanelDevice *device;
 } PanelState;
 
-// What the mouse does in a view (dragging keeps to the view where it began).
+// Mouse input in a view (dragging stays with the view where it began).
 typedef struct PanelMouse {
     int view;                      // PanelView, or -1 outside all
     double x, y;                   // [0, 1] in the view, y up
@@ -122,13 +122,13 @@ typedef struct PanelMouse {
     double scroll;
 } PanelMouse;
 
-// What the tray's user has chosen, while it is open.
+// The user's choice in the tray, while it is open.
 typedef struct PanelTrayChoice {
     bool is_open;
     int device;                    // of PanelTray.device
     bool is_shaped;                // with its tip shaped: from the tip back to the bend, the angle that stays, the mandrel's radius
     double length_mm, angle_deg, mandrel_mm;
-    bool is_taken;                 // in this frame: put it in
+    bool is_taken;                 // in this frame: insert it
 } PanelTrayChoice;
 
 typedef struct PanelActions {

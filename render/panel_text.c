@@ -1,4 +1,4 @@
-// Words, numbers and signs as the panel shows them.
+// Formatting of words, numbers and signs for the panel.
 #include "render/panel_internal.h"
 
 #include <math.h>
@@ -41,7 +41,7 @@ bool panel_has_more_lines(const char *text)
     return end && end[strspn(end, " \n\r\t")];
 }
 
-// Of the instructions; false where there is none.
+// Of the instructions; false if there is none.
 bool panel_first_line(const char *text, char *line, size_t capacity)
 {
     snprintf(line, capacity, "%.*s", (int)strcspn(panel_text(text), "\n"), panel_text(text));

@@ -1,4 +1,4 @@
-// The tray: what may take the chosen tool's place, with its shape when nothing holds it and its stiffness along it; the tip of a wire is shaped here.
+// The tray: devices that may replace the selected tool, with their stress-free shape and stiffness; the tip of a wire is shaped here.
 #include "render/panel_tray.h"
 
 #include "render/panel_internal.h"
@@ -13,7 +13,7 @@ static void box(Gui *gui, GuiRect at, const char *title)
     gui_draw_text(gui, at.x + pad, at.y + pad / 2, GUI_SMALL, gui_colors.dim, title);
 }
 
-// The distal part to one scale both ways, its proximal end at the left; a bar says how large.
+// The distal part at equal scale on both axes, its proximal end at the left, with a scale bar.
 static void draw_shape(Gui *gui, GuiRect at, const PanelTrayDevice *device)
 {
     box(gui, at, "Shape of its end, when nothing holds it");

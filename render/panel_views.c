@@ -1,4 +1,4 @@
-// Letters over the views: the image's mode and angles as in an angio suite, warnings, the views' names.
+// Text over the views: the image's mode and angles as in an angio suite, warnings, the views' names.
 #include "render/panel_internal.h"
 
 #include "render/vessel_scene.h"
@@ -19,7 +19,7 @@ static const char *angles(char *text, size_t capacity, const XrayControl *xray)
     return text;
 }
 
-// Letters on a picture that may be white or black.
+// Text readable on light and dark pictures.
 static void label(Panel *panel, float x, float y, GuiFont font, Color color, const char *text)
 {
     Gui *gui = panel->gui;

@@ -1,12 +1,12 @@
 // Pictures off screen, each a PNG: a run, moments of a run, an angiogram's projections with the tree, a fit, time series.
 //
-// Plain arrays in, a file out. Lengths mm, forces N, torques N mm, times s (these are borders: names carry the unit where it is not mm).
-// All arrays stay the caller's and are only read. Every function makes its own GL context (EGL, surfaceless, no X needed) and takes it down
-// again; one call at a time in a process, the same bytes for the same input on the same machine.
+// Plain arrays in, a file out. Lengths mm, forces N, torques N mm, times s (names carry the unit if it is not mm). Arrays are borrowed and only read.
+// Every function creates and destroys its own GL context (EGL, surfaceless, no X needed); one call at a time per process; the same bytes for the same
+// input on the same machine.
 //
-// Return: true, or false with one line in `message` (which may be NULL): EGL or OpenGL 3.3 is not available (say so and go on: a picture is
-// never worth a failed run), the input has nothing to draw or numbers that are not finite, or the file cannot be written (it is written beside
-// and renamed, so an older picture stays whole).
+// Return: true, or false with one line in `message` (which may be NULL): EGL or OpenGL 3.3 is not available (report it and continue: a missing
+// picture should not fail a run), the input has nothing to draw or numbers that are not finite, or the file cannot be written (it is written to a
+// temporary file and renamed, so an older picture stays intact).
 #ifndef SELDINGER_RENDER_PICTURE_H
 #define SELDINGER_RENDER_PICTURE_H
 
@@ -31,7 +31,7 @@ typedef struct PictureOptions {
 } PictureOptions;
 PictureOptions picture_default_options(void);
 
-// Can pictures be made here at all? False with the reason.
+// Whether pictures can be made on this machine. False with the reason.
 bool picture_available(char *message, size_t capacity);
 
 // --- a run ---
@@ -47,19 +47,19 @@ typedef struct PictureTool {   // the tool at one moment
     int node_count;            // M >= 2
     const Vec3 *position;      // (M) proximal to distal
     const double *radius;      // (M) [mm] of the tool at each node
-    const Vec3 *force;         // (M) [N] what the wall exerts on each node; NULL: none
+    const Vec3 *force;         // (M) [N] force of the wall on each node; NULL: none
     int first_free_node;       // nodes below it lie in the sheath (0: all free)
     double time_s;
     double inserted_mm;
     double push_force_n;       // at the proximal end
     double torque_n_mm;
-    const char *label;         // NULL, or words for this moment ("past the neck")
+    const char *label;         // NULL, or a caption of this moment ("past the neck")
     const Pose *pose;          // several tools: all of them, the nodes above being those of its shared centreline; NULL: one
     const ToolLooks *looks;    // of the pose's tools
 } PictureTool;
 
-// Large view of the vessel (translucent) with the tool (coloured by wall force), arrows, targets, scale bar, legend, and a close-up of the tip. Of several tools
-// the half towards the eye is cut away where another lies in them; the legend names them with what their hands feel.
+// Large view of the vessel (translucent) with the tool (coloured by wall force), arrows, targets, scale bar, legend, and a close-up of the tip. With
+// several tools, the near half of a tool is cut away where another lies inside; the legend lists them with their reactions.
 bool picture_of_run(const char *path, const PictureOptions *options, const PictureScene *scene, const PictureTool *tool, char *message,
                     size_t capacity);
 // Up to 6 moments side by side, same camera, same colour scale.

@@ -1,6 +1,6 @@
 // Vessel and tool: the large view, the close-up of the tip, and several moments side by side.
 //
-// Several tools lie on one line and are swept along the same points, so that each lies in the middle of the one around it.
+// Several tools share one line and are swept along the same points, so each is centred in the one around it.
 //
 // Depth: the tool's tube, arrows and target spheres are opaque and write depth; the vessel's wall, back and front faces, is blended over them from
 // far to near, so a tool inside is seen through exactly the walls that lie before it.
@@ -52,7 +52,7 @@ static int first_free(const PictureTool *tool)
     return tool->first_free_node < 0 ? 0 : tool->first_free_node > tool->node_count - 2 ? tool->node_count - 2 : tool->first_free_node;
 }
 
-// What the camera frames: the vessel where there is one, else the free part of the tools; targets; the sheath's mouth.
+// The points framed by the camera: the vessel where there is one, else the free part of the tools; targets; the sheath's mouth.
 static bool gather_frame(RunDrawing *drawing, int tool_count, const PictureTool *tool)
 {
     const PictureScene *scene = drawing->scene;
@@ -82,7 +82,7 @@ static bool gather_frame(RunDrawing *drawing, int tool_count, const PictureTool 
     return true;
 }
 
-// All that is to be seen, with room in depth for tools as thick as they are drawn and for arrows: a plane tool has no depth of its own.
+// Everything visible, with extra depth for the tools' thickness and for arrows, since a planar tool has no depth.
 static void frame_all(const RunDrawing *drawing, Camera *camera, int width, int height, double border, double scale)
 {
     camera_frame(camera, width, height, border, drawing->frame_count, drawing->frame_point, 0);
@@ -282,7 +282,7 @@ static void label_panel(RunDrawing *drawing, const Camera *camera, double x, dou
     }
 }
 
-// How far across the lumen at the tip: the nearest wall and the wall opposite to it. 0 where there is no vessel.
+// Width of the lumen at the tip: the nearest wall and the wall opposite to it. 0 if there is no vessel.
 static double lumen_width_at(const TriangleMesh *mesh, Vec3 tip)
 {
     double near_wall = HUGE_VAL, far_wall = HUGE_VAL;
@@ -369,7 +369,7 @@ static double write_tools(RunDrawing *drawing, const PictureTool *tool, double x
     return 2 * line * tool->pose->tool_count + 6 * s;
 }
 
-// Returns the height of what it wrote.
+// Returns the height of the text.
 static double write_facts(RunDrawing *drawing, const PictureTool *tool, double x, double y, double width)
 {
     Sheet *sheet = drawing->sheet;

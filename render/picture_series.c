@@ -9,7 +9,7 @@ static const int LINE_COLOR[6] = {6, 4, 2, 5, 0, 1};   // of the qualitative map
 
 typedef struct Chart {
     double x, y, width, height;   // of the plotting area
-    double t0, t1, low, high;     // what it spans; log10 where logarithmic
+    double t0, t1, low, high;     // its range; log10 if logarithmic
     bool logarithmic;
 } Chart;
 
@@ -41,7 +41,7 @@ static void find_range(Chart *chart, int count, const PicturePanel *panel)
     }
     double room = high > low ? 0.06 * (high - low) : fmax(0.1 * fabs(high), 1e-3);
     chart->low = low == 0 ? 0 : low - room;
-    chart->high = high == 0 && low < 0 ? 0 : high + room;     // nothing but zeros has a range too
+    chart->high = high == 0 && low < 0 ? 0 : high + room;     // all zeros need a range too
 }
 
 // Cut at sharp turns: ImGui's mitred joints tear there, as noisy data shows.

@@ -1,7 +1,7 @@
 // An angiogram's maximum-intensity projections with the tracked tree drawn over them.
 //
 // A point X falls on pixel ((X - O) . a / |a|^2, (X - O) . b / |b|^2) with a, b the steps across and up: right for orthogonal voxel axes, oblique or
-// not. The images are kept darker than the lines over them.
+// not. The images are darker than the lines drawn over them.
 #include "render/message.h"
 #include "render/sheet.h"
 

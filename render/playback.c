@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Contrast goes on in steps of this many recorded steps; places to go on from are kept every so many of those.
+// Contrast is simulated in strides of this many recorded steps; a checkpoint is kept every few strides.
 enum { STRIDE = 10, KEEP_EVERY = 500, MOST_KEPT = 1024 };
 
 typedef struct Place {
@@ -97,7 +97,7 @@ static ContrastInjection *create_injection(const Playback *playback)
     return contrast_injection_create(playback->tree, playback->scene, count, s);
 }
 
-// What flows at a step.
+// The flow at a step.
 static double flow_at(Playback *playback, int64_t step)
 {
     double inserted[TOOLS_MOST] = {0};
@@ -105,7 +105,7 @@ static double flow_at(Playback *playback, int64_t step)
     return contrast_injection_flow(playback->now.injection, control(playback, step), inserted);
 }
 
-// Keeps the place reached where it is the next one to keep.
+// Stores a checkpoint if one is due.
 static void keep(Playback *playback)
 {
     if (playback->kept_count == MOST_KEPT || playback->now.step != playback->kept_count * playback->keep_steps)
@@ -120,7 +120,7 @@ static void keep(Playback *playback)
     playback->kept_count++;
 }
 
-// Contrast goes on in whole strides only, as in the session: else what is seen would depend on where one stopped on the way.
+// Contrast advances in whole strides only, as in the session; otherwise the picture would depend on where playback had stopped.
 static void go_on(Playback *playback, int64_t step)
 {
     const RecordedRun *run = playback->run;

@@ -1,5 +1,5 @@
-// A recording as something to look at: what was seen at any moment of it, forwards and back. Poses come from its frames, controls from its steps; contrast
-// agent and X-ray pulses are gone through again, from the nearest of some places kept on the way. Lengths mm, times simulated seconds.
+// Playback of a recording: its state at any moment, forwards and backwards. Poses come from its frames, controls from its steps; contrast agent and
+// X-ray pulses are simulated again from the nearest checkpoint. Lengths mm, times simulated seconds.
 #ifndef SELDINGER_RENDER_PLAYBACK_H
 #define SELDINGER_RENDER_PLAYBACK_H
 
@@ -9,12 +9,12 @@
 
 typedef struct Playback Playback;
 
-// All borrowed; `tree` NULL: contrast in the tools' lumens only. A recording that nobody looked at (`run --record`) is shown with `unseen` as the
-// controls of all its steps, but for what its script injected. NULL when out of memory or there is no frame.
+// All borrowed; `tree` NULL: contrast in the tools' lumens only. A recording without a viewer (`run --record`) is shown with `unseen` as the controls
+// of all its steps, except for the injections of its script. NULL when out of memory or there is no frame.
 Playback *playback_open(const RecordedRun *run, const Scene *scene, const VesselTree *tree, const XrayControl *unseen);
 void playback_close(Playback *playback);
 
-// The last step at or before a time; cut to the recording. True where this is no step forward from the last moment by less than a second: a jump.
+// Moves to the last step at or before a time, clamped to the recording. True for a jump: anything but a move forward by less than a second.
 bool playback_seek(Playback *playback, double time_s);
 double playback_time_s(const Playback *playback);
 double playback_end_s(const Playback *playback);
@@ -23,8 +23,8 @@ const Pose *playback_pose(const Playback *playback);
 const float *playback_contrast(const Playback *playback);        // (N of the tree); NULL without tree
 const float *playback_filling(const Playback *playback);         // (nodes of all tools) of their lumens
 double playback_injected_ml(const Playback *playback);
-int playback_contrast_tool(const Playback *playback);            // through whose lumen contrast agent is asked for, -1: nobody's
-double playback_flow_ml_s(const Playback *playback);             // what flows of it
+int playback_contrast_tool(const Playback *playback);            // tool for the requested contrast agent, -1: none
+double playback_flow_ml_s(const Playback *playback);             // its actual flow
 const PulseClock *playback_pulses(const Playback *playback);
 // Times at which bookmarks were set; at most `capacity`, returns how many.
 int playback_bookmarks(const Playback *playback, double *time_s, int capacity);

@@ -1,4 +1,4 @@
-// A running plot: the last seconds of one quantity, least and most of each bin kept so that no peak is lost. Plain numbers, then a drawing.
+// A running plot: the last seconds of one quantity, with minimum and maximum of each bin so that no peak is lost.
 #ifndef SELDINGER_RENDER_PLOT_H
 #define SELDINGER_RENDER_PLOT_H
 
@@ -17,14 +17,14 @@ typedef struct RunningPlot {
 } RunningPlot;
 
 void plot_clear(RunningPlot *plot);
-// Time may stand still (a pause); where it goes backwards, or on by more than the span, the plot begins anew. NaN is left out.
+// Time may stand still (a pause); if it goes backwards, or forwards by more than the span, the plot restarts. NaN is ignored.
 void plot_add(RunningPlot *plot, double time_s, double value);
-// Least and most of what is shown; false without a sample.
+// Minimum and maximum shown; false without a sample.
 bool plot_range(const RunningPlot *plot, double *least, double *most);
 // A round number of ticks: the step (1, 2 or 5 times a power of ten) that puts at most `most_ticks` steps into `span` > 0.
 double plot_tick_step(double span, int most_ticks);
-// Title and newest value with unit above, ticks with numbers at the left, a line each 5 s. `least_span`: the axis shows at least 0 to this, so that
-// noise is not blown up. `height` of all.
+// Title and newest value with unit above, ticks with numbers at the left, a line every 5 s. `least_span`: the axis shows at least 0 to this, so that
+// noise is not magnified. `height` of all.
 void plot_draw(const RunningPlot *plot, Gui *gui, const char *title, const char *unit, int decimals, double least_span, float height);
 
 #endif

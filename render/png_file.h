@@ -1,4 +1,4 @@
-// RGB pixels to a PNG file, written beside its place and renamed, so that an older file stays whole until the new one is.
+// Writes RGB pixels to a PNG file by way of a temporary file, so an older file stays intact until the new one is complete.
 #ifndef SELDINGER_RENDER_PNG_FILE_H
 #define SELDINGER_RENDER_PNG_FILE_H
 

@@ -1,6 +1,6 @@
-// When the X-ray tube pulses: on simulated time, from the recorded pedal and rate, so that window, movie and replay show the same images. The first
+// The timing of X-ray pulses in simulated time, from the recorded pedal and rate, so that window, movie and replay show the same images. The first
 // pulse comes at once with the pedal, the next ones at its rate; between pulses and after the pedal the last image stays (last image hold). The image
-// shows the state at its pulse. Pure functions of the calls.
+// shows the state at its pulse. Deterministic.
 #ifndef SELDINGER_RENDER_PULSE_CLOCK_H
 #define SELDINGER_RENDER_PULSE_CLOCK_H
 
@@ -21,10 +21,10 @@ typedef struct PulseClock {
 } PulseClock;
 
 PulseClock pulse_clock_start(double time_s);
-// To `time_s` (steps back start the pedal's press anew, as a seek does). True where a pulse is due at or before that time: draw the state of now.
-// More than one (a call every 100 ms at 30/s) are all counted.
+// Advances to `time_s` (going back restarts the pedal's press, as after a seek). True if a pulse was due by then: draw the present state. Several
+// pulses (a call every 100 ms at 30/s) are all counted.
 bool pulse_clock_advance(PulseClock *clock, double time_s, const XrayControl *xray);
-// [1/s] 7.5 to 30 of what the control asks for.
+// [1/s] the requested rate, clamped to 7.5 to 30.
 double pulse_clock_rate(const XrayControl *xray);
 
 #endif

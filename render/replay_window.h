@@ -1,4 +1,4 @@
-// A recording at the trainer's window: played, stopped, searched; and gone on from.
+// Replays a recording in the trainer's window: play, stop, seek, and resume.
 #ifndef SELDINGER_RENDER_REPLAY_WINDOW_H
 #define SELDINGER_RENDER_REPLAY_WINDOW_H
 
@@ -12,10 +12,11 @@ typedef struct ReplayWindowOptions {
     PanelView view;
     double at_s;                     // first moment
     double duration_s;               // ends by itself after this much real time; 0: never
-    double lao_deg, cra_deg;         // of a recording that nobody looked at; NaN: as the scene says
+    double lao_deg, cra_deg;         // for a recording without a viewer; NaN: as in the scene
 } ReplayWindowOptions;
 
-// Until the user quits, or wants to go on from a moment: then true in *resumes and its time in *resume_s. False with faults where no window can be had.
+// Runs until the user quits or wants to resume from a moment: then *resumes is true and *resume_s its time. False with faults if no window can be
+// opened.
 bool replay_window_run(const ReplayWindowOptions *options, const RecordedRun *run, Scene *scene, OpenVessel *open, bool *resumes, double *resume_s,
                        Faults *faults);
 

@@ -1,4 +1,4 @@
-// The views of a scene and the operator's desk before them, for the window and for pictures off screen.
+// The views of a scene and the operator's controls, for the window and for off-screen pictures.
 #ifndef SELDINGER_RENDER_SCENE_VIEWS_H
 #define SELDINGER_RENDER_SCENE_VIEWS_H
 
@@ -6,8 +6,8 @@
 #include "render/views.h"
 #include "sim/open_vessel.h"
 
-// Everything that is seen: the wall, the volume behind it where the scene names one, the tool as it stands at the start. Needs a current GL context.
-// NULL with faults. `note` (capacity bytes): empty, or what the pictures lack.
+// Everything visible: the wall, the volume behind it if the scene has one, the tool at the start. Needs a current GL context. NULL with faults.
+// `note` (capacity bytes): empty, or what is missing in the pictures.
 Views *scene_views_create(Scene *scene, OpenVessel *open, Desk *desk, char *note, size_t capacity, Faults *faults);
 
 #endif

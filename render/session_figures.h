@@ -1,4 +1,4 @@
-// The figures of a session's page (session_page.h), and what they are drawn from.
+// The figures of a session's page (session_page.h), and their data.
 #ifndef SELDINGER_RENDER_SESSION_FIGURES_H
 #define SELDINGER_RENDER_SESSION_FIGURES_H
 
@@ -10,10 +10,10 @@ typedef struct SessionPage {
     FILE *out;
     const char *path;            // of the session
     const Session *session;
-    const RecordedRun *run;      // NULL: not there
+    const RecordedRun *run;      // NULL: missing
     bool run_is_its;             // the recording's digest is the session's
-    const Scene *scene;          // as recorded; NULL: not there
-    const VesselTree *tree;      // NULL: none, or not there
+    const Scene *scene;          // as recorded; NULL: missing
+    const VesselTree *tree;      // NULL: none, or missing
     const Session *earlier;      // (earlier_count) of the same trainee and exercise, oldest first, this one among them
     int earlier_count, broken;
 } SessionPage;

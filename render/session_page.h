@@ -1,5 +1,5 @@
-// The page of a trainee's session: one HTML5 page that stands alone: points and their parts,
-// errors, plots over time, the tip's path over the vessel, earlier sessions. What cannot be had (recording, vessel, scene) is left out and said.
+// The page of a trainee's session: one HTML5 page that stands alone: points and their parts, errors, plots over time, the tip's path over the vessel,
+// earlier sessions. Missing parts (recording, vessel, scene) are left out with a note.
 #ifndef SELDINGER_RENDER_SESSION_PAGE_H
 #define SELDINGER_RENDER_SESSION_PAGE_H
 

@@ -1,5 +1,5 @@
-// The page of a picture: context, canvas, overlay, 3D panels placed on it, and what most pictures have (title, colour bar, scale bar).
-// Internal to render. One sheet at a time in a process.
+// The page of a picture: context, canvas, overlay, 3D panels, and common parts (title, colour bar, scale bar). Internal to render. One sheet at a
+// time in a process.
 #ifndef SELDINGER_RENDER_SHEET_H
 #define SELDINGER_RENDER_SHEET_H
 
@@ -40,7 +40,7 @@ void sheet_close(Sheet *sheet);
 // A multisampled panel: draw between begin and end; end puts it on the page with its upper left corner at (x, y). NULL with the message set.
 GlCanvas *sheet_begin_panel(Sheet *sheet, int width, int height);
 void sheet_end_panel(Sheet *sheet, const GlCanvas *panel, double x, double y);
-// A grey image as a texture that lives as long as the sheet; rows from the bottom. 0 where there is no room.
+// A grey image as a texture that lives as long as the sheet; rows from the bottom. 0 if there is no room.
 unsigned sheet_grey_texture(Sheet *sheet, int width, int height, const uint8_t *grey);
 
 void sheet_text(Sheet *sheet, double x, double y, TextSize size, Color color, const char *format, ...) __attribute__((format(printf, 6, 7)));

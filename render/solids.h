@@ -21,16 +21,15 @@ typedef struct Solids {
     SolidVertex *vertex;
     int index_count, index_capacity;
     uint32_t *index;           // three to a triangle, counter-clockwise from outside
-    bool is_short_of_memory;   // some shape was left out
+    bool is_short_of_memory;   // out of memory: some shape is missing
 } Solids;
 
 void solids_clear(Solids *solids);
-void solids_free(Solids *solids);   // a zeroed list is fine
+void solids_free(Solids *solids);   // a zeroed list is valid
 
 // A round tube through the points (smoothed by a Catmull-Rom spline) with hemispherical ends; radius and colour at each point.
 void solids_tube(Solids *solids, int count, const Vec3 *point, const double *radius, const Color *color);
-// The same with a lumen and flat ends; of the lumen's wall the colour is `inside`. With `open_towards` only the half on the far side: cut open to the eye that is
-// there.
+// The same with a lumen and flat ends; the lumen's wall has the colour `inside`. With `open_towards` only the half away from that direction is drawn.
 void solids_pipe(Solids *solids, int count, const Vec3 *point, const double *radius, const double *lumen, const Color *color, Color inside,
                  const Vec3 *open_towards);
 // The tip of the head lies at `tip`.

@@ -1,6 +1,6 @@
-// Translucency by a painter's sort: triangles are small beside the vessel, so far-to-near order of their centroids is right where it can be seen,
-// it needs one pass (depth peeling: one for each layer) and works with multisampling. A counting sort on 16 bits of depth costs 1 to 2 ms for
-// 100,000 triangles and keeps index order within a bucket, so the same scene gives the same pixels.
+// Translucency by a painter's sort: triangles are small compared with the vessel, so sorting them by their centroids is accurate enough, it needs one
+// pass (depth peeling: one for each layer) and works with multisampling. A counting sort on 16 bits of depth costs 1 to 2 ms for 100,000 triangles
+// and keeps index order within a bucket, so the same scene gives the same pixels.
 //
 // With n the unit normal in eye space and c = |n_z|: opacity = face + (rim - face) (1 - c)^p, so the lumen's outline stands out and its middle
 // lets the tool be seen. For two faces of one tube that is what a thin-walled glass tube does.

@@ -32,7 +32,7 @@ typedef struct ViewPoint {
 
 SurfaceView *surface_view_create(char *message, size_t capacity);
 void surface_view_destroy(SurfaceView *view);
-// Takes a copy. False where indices are out of range, numbers are not finite, or memory lacks.
+// Takes a copy. False if indices are out of range, numbers are not finite, or memory runs out.
 bool surface_view_set_mesh(SurfaceView *view, const TriangleMesh *mesh, char *message, size_t capacity);
 void surface_view_draw_solids(SurfaceView *view, const Camera *camera, const Solids *solids, const ShellStyle *style);
 void surface_view_draw_points(SurfaceView *view, const Camera *camera, Vec3 origin, int count, const ViewPoint *point);

@@ -1,4 +1,4 @@
-// The strip below the views where a recording is played, stopped, searched and gone on from. Draws with a Gui of its own over the panels' lower edge.
+// The strip below the views for playing, stopping, seeking and resuming a recording. Draws with a Gui of its own over the panels' lower edge.
 #ifndef SELDINGER_RENDER_TIMELINE_H
 #define SELDINGER_RENDER_TIMELINE_H
 
@@ -16,7 +16,7 @@ typedef struct TimelineState {
 } TimelineState;
 
 typedef struct TimelineActions {
-    bool seek, toggle_play, resume;  // resume: a session shall go on from here
+    bool seek, toggle_play, resume;  // resume the session from here
     double seek_s;
     float speed;                     // as set now
 } TimelineActions;

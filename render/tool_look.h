@@ -1,4 +1,4 @@
-// What the views know of a scene's tools besides their pose: names, colours, and where along each its width, lumen or attenuation changes.
+// Appearance of a scene's tools: names, colours, and the stretches of constant width, lumen and attenuation.
 #ifndef SELDINGER_RENDER_TOOL_LOOK_H
 #define SELDINGER_RENDER_TOOL_LOOK_H
 
@@ -7,7 +7,7 @@
 
 typedef struct TubeStretch {     // of a tool, from the border before it to `end`
     double end;                  // [mm] from the proximal end; the last one counts to the tip wherever it is
-    double radius, lumen;        // [mm] of its outer surface, > 0; of its inner one, 0 where it is solid
+    double radius, lumen;        // [mm] of its outer surface, > 0; of its inner one, 0 if it is solid
     double attenuation;          // [1/mm] of the wall, >= 0
 } TubeStretch;
 
@@ -21,18 +21,18 @@ typedef struct ToolLook {
 typedef struct ToolLooks {       // zeroed: none
     int count;
     ToolLook tool[TOOLS_MOST];   // outermost first
-    ToolLook spare[TOOLS_MOST][EXCHANGES_MOST];  // what may take their place, with the same name and colours; stretch_count 0: none
+    ToolLook spare[TOOLS_MOST][EXCHANGES_MOST];  // their replacements, with the same name and colours; stretch_count 0: none
 } ToolLooks;
 
-// Of `scene`, which must outlive them. False where memory lacks; free them all the same.
+// Of `scene`, which must outlive them. False if out of memory; free them all the same.
 bool tool_looks_make(ToolLooks *looks, const Scene *scene);
 void tool_looks_free(ToolLooks *looks);
-// Of the device that is in (PoseTool.fitted).
+// Of the inserted device (PoseTool.fitted).
 const ToolLook *tool_looks_of(const ToolLooks *looks, int tool, int fitted);
 // Where the arc length `s` lies; at a border what lies before it.
 const TubeStretch *tool_look_at(const ToolLook *look, double s);
-// Colours for tools of these kinds, told apart by the colour-blind too, on a dark ground or on paper: of each kind its own, of a kind that comes again one that
-// no other tool has.
+// Colours for tools of these kinds, distinguishable for the colour-blind, on a dark ground or on paper: one per kind, and an unused colour for a
+// repeated kind.
 void tool_colors(int count, const ToolKind *kind, bool is_on_paper, Color *color);
 
 #endif

@@ -25,7 +25,7 @@ enum { PADS = 4 };
 typedef struct Trainer {
     const TrainerOptions *options;
     Scene *scene;
-    Scene *own_scene;                // where devices were added from the tray: `scene`, then not the caller's
+    Scene *own_scene;                // after devices were added from the tray: owned copy behind `scene`
     int own_devices[TOOLS_MOST];     // of the caller's scene
     OpenVessel *open;
     Window *window;
@@ -45,14 +45,14 @@ typedef struct Trainer {
     double begun_s;                  // wall clock
     double frame_cpu_s;              // process CPU time at the last frame
     TrainerTray tray;
-    bool has_tray, is_tray_due;      // it is open; what was taken is put in after the next picture
-    double progress_s;               // when it was last shown how much of a session was gone through again
+    bool has_tray, is_tray_due;      // the tray is open; the chosen device is inserted after the next picture
+    double progress_s;               // time of the last progress update of a resumed session
     int fitted[TOOLS_MOST];          // as last reported, -1: not yet
     int64_t refused;
     bool is_paused, has_told_end;
     char trainee[64];
     char date[SESSION_DATE];         // of the session's begin
-    const char *progress;            // what is computed meanwhile
+    const char *progress;            // title of the present computation
     TimeHistogram frame_cpu_ns;
     TrainerFigures *figures;
 } Trainer;
@@ -71,7 +71,7 @@ __attribute__((format(printf, 3, 4))) static void say(Trainer *trainer, PanelMar
 
 // --- a session's start and end ---
 
-// While there is no session to be seen: the panel with a line of words, no views.
+// Without a session: the panel with a line of text, no views.
 static void draw_panel_alone(Trainer *trainer, const WindowInput *input, const char *line)
 {
     PanelState state = trainer->shown.state;
@@ -86,7 +86,7 @@ static void draw_panel_alone(Trainer *trainer, const WindowInput *input, const c
     window_swap(trainer->window);
 }
 
-// The window lives while a session is gone through again.
+// Keeps the window responsive while a session is simulated again.
 static void show_progress(void *context, double part)
 {
     Trainer *trainer = context;
@@ -116,7 +116,7 @@ static bool is_answered_yes(Trainer *trainer, PanelQuestion question)
     return actions.answer > 0;
 }
 
-// Sessions that were cut off: asked before the first one begins.
+// Offers to recover interrupted sessions before the first one begins.
 static void offer_recovery(Trainer *trainer)
 {
     char text[300];
@@ -169,7 +169,7 @@ static bool begin_session(Trainer *trainer, const RecordedRun *resume, Faults *f
     return true;
 }
 
-// Names of the hands that have given reports, for the session file.
+// Names of the devices that have sent reports, for the session file.
 static void name_devices(Trainer *trainer, char out[SESSION_NAME])
 {
     char all[2048] = "keyboard";
@@ -243,7 +243,7 @@ static void drive_by_pads(Trainer *trainer)
         int vendor, product;
         if (is_there && gamepad_ids_of_guid(pad.guid, &vendor, &product) && hands_drives(trainer->hands, vendor, product)) {
             if (was_there)
-                gamepad_lost(gamepad, trainer->pad[i]);   // its reports are read as they come: one hand, not two
+                gamepad_lost(gamepad, trainer->pad[i]);   // its HID reports are read directly: avoid counting the device twice
             gamepad->map = NULL;
             continue;
         }
@@ -278,7 +278,7 @@ static unsigned buttons_of_hands(const Trainer *trainer)
     return buttons;
 }
 
-// --- what is pressed ---
+// --- actions ---
 
 static void tell_grip(Trainer *trainer, const HandGrip *before, const PanelActions *actions)
 {
@@ -327,7 +327,7 @@ static void open_tray(Trainer *trainer, const Pose *pose)
         say(trainer, MARK_WARNING, "the scene has one tool: a tool is exchanged over the one within it or inside the one around it");
         return;
     }
-    // the scene's author chose what there is, or left it open
+    // the scene's author listed the devices, or left it open
     const char *folder = trainer->own_devices[tool] > 1 ? NULL : library(trainer, text, sizeof text);
     trainer->has_tray = trainer_tray_open(&trainer->tray, trainer->scene, tool, folder, pose, &in);
     if (trainer->has_tray)
@@ -343,8 +343,8 @@ static void close_tray(Trainer *trainer)
     trainer->has_tray = trainer->is_tray_due = false;
 }
 
-// The session with a scene that has one device more: all that was done is gone through again, as fast as it goes, and recorded anew. True where the session
-// lives on, in the old scene where the new one was refused.
+// Continues the session with a scene that has one more device: everything is simulated again, as fast as possible, and recorded again. True if the
+// session continues, in the old scene if the new one was refused.
 static bool go_on_in(Trainer *trainer, Scene *scene, bool has_begun, Faults *faults)
 {
     char path[sizeof trainer->session.record_path];
@@ -383,14 +383,14 @@ static void show_new_scene(Trainer *trainer, Faults *faults)
     }
 }
 
-// Puts a device into the scene that does not have it yet. False ends the session.
+// Adds a new device to the scene. False ends the session.
 static bool add_device(Trainer *trainer, bool has_begun, Faults *faults)
 {
     TrainerTray *tray = &trainer->tray;
     const TipShaping tip = trainer_tray_tip(tray);
     Scene *scene = tray_scene_with(trainer->scene, tray->devices.tool, &tray->devices.device[tray->choice.device], &tip, faults);
     if (scene)
-        scene->contact = trainer->scene->contact;    // a recording that is gone on from may have another than its text
+        scene->contact = trainer->scene->contact;    // a resumed recording may differ from its scene text
     bool good = scene && open_vessel_inlet(scene, trainer->open, faults), lives = !good || go_on_in(trainer, scene, has_begun, faults);
     bool is_taken = good && lives && trainer->scene == scene;
     if (is_taken)
@@ -436,7 +436,7 @@ static bool take_from_tray(Trainer *trainer, const Pose *pose, Faults *faults)
     return lives;
 }
 
-// What was pressed on devices goes to the tray while it is open. False ends the session.
+// Device buttons control the tray while it is open. False ends the session.
 static bool obey_tray(Trainer *trainer, const PanelActions *actions, unsigned pressed, Faults *faults)
 {
     const Moment *moment = realtime_moment(trainer->session.realtime);
@@ -461,7 +461,7 @@ static bool obey_tray(Trainer *trainer, const PanelActions *actions, unsigned pr
     return true;
 }
 
-// What came of an exchange, and what is now asked for: that which is in.
+// Reports the outcome of an exchange and requests the inserted device from now on.
 static void tell_exchanges(Trainer *trainer, const Pose *pose)
 {
     HandGrip *grip = &trainer->desk.grip;
@@ -550,7 +550,7 @@ static bool obey(Trainer *trainer, const PanelActions *actions, const WindowInpu
     return !actions->pressed[ACTION_QUIT] && input->close != WINDOW_ENDED;
 }
 
-// --- what is shown ---
+// --- display ---
 
 static void tell_news(Trainer *trainer, const Moment *moment)
 {
@@ -565,7 +565,7 @@ static void tell_news(Trainer *trainer, const Moment *moment)
     }
 }
 
-// "wire, microcatheter: " as a device's hands move them now.
+// "wire, microcatheter: ", the tools that a device moves now.
 static void name_moved(const Trainer *trainer, const HandPort *port, int hand_count, char *text, size_t capacity)
 {
     size_t used = 0;

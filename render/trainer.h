@@ -1,4 +1,4 @@
-// The trainer's window: a session is driven by keys, gamepads and devices, seen in three views, until the user quits.
+// The trainer's window: a session driven by keys, gamepads and devices and shown in three views, until the user quits.
 #ifndef SELDINGER_RENDER_TRAINER_H
 #define SELDINGER_RENDER_TRAINER_H
 
@@ -11,13 +11,13 @@
 enum { TRAINER_MAPS = 8 };
 
 typedef struct TrainerOptions {
-    const char *folder;              // where recordings, session files, films and screenshots go; made where it is not there
+    const char *folder;              // where recordings, session files, films and screenshots go; created if it does not exist
     bool is_recorded;
-    const char *trainee;             // "" where not known yet
+    const char *trainee;             // "" if not known yet
     int map_count;
     DeviceMap *const *map;           // (map_count) the user's device maps
     bool has_built_in_maps;
-    const RecordedRun *resume;       // NULL, or go on from there …
+    const RecordedRun *resume;       // NULL, or a recording to resume …
     double resume_s;
     const char *library;             // folder of devices for the tray; NULL: scenes/tools beside the program's build folder
     const char *cine;                // NULL, or a cine loop to begin with
@@ -26,10 +26,10 @@ typedef struct TrainerOptions {
     bool is_full_screen;
     double duration_s;               // ends by itself after this much real time; 0: never
     int threads;
-    NoteFunction note;               // told what is worth knowing of the vessel of a session that is recovered; NULL: nobody asks
+    NoteFunction note;               // receives remarks on the vessel of a recovered session; may be NULL
 } TrainerOptions;
 
-// What a session was like on this machine: for `nav --figures`.
+// Performance of a session on this machine, for `nav --figures`.
 typedef struct TrainerFigures {
     double first_picture_s;          // from the call to the first frame on the screen
     int64_t frames, frames_skipped;

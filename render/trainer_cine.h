@@ -1,4 +1,4 @@
-// The cine loop of a session at the window: recorded while the X-ray is on, shown again in its place, saved as bytes and as a film.
+// The cine loop of a session: recorded while the X-ray is on, replayed in place of the live picture, saved as a loop and as a film.
 #ifndef SELDINGER_RENDER_TRAINER_CINE_H
 #define SELDINGER_RENDER_TRAINER_CINE_H
 
@@ -16,11 +16,11 @@ typedef struct TrainerCine {
 // Room for half a minute at 30 images a second, or the loop in the file `path` where it is not NULL. False with faults.
 bool trainer_cine_open(TrainerCine *cine, const CineShape *shape, const char *path, Faults *faults);
 void trainer_cine_close(TrainerCine *cine);
-// Record and replay as pressed; true where the picture jumps, so that the held one must be forgotten. `told`: what happened, "" where nothing.
+// Record and replay as pressed; true if the picture jumps, so that the held one must be forgotten. `told` receives a message, "" if none.
 bool trainer_cine_obey(TrainerCine *cine, const PanelActions *actions, char *told, size_t capacity);
 // Sets the frame's contrast from `concentration`, at the vessel's nodes, then at the tools' (sim/contrast_injection.h); NULL: none.
 void trainer_cine_contrast(const TrainerCine *cine, const float *concentration, ViewsFrame *frame);
-// What is to be drawn: where the loop is shown its image in the place of `frame`'s pose, controls, contrast and pulse; else `frame` is added to it with this
+// During replay, replaces `frame`'s pose, controls, contrast and pulse by those of the loop's image; otherwise adds `frame` to the loop with this
 // concentration.
 void trainer_cine_frame(TrainerCine *cine, double passed_s, const float *concentration, ViewsFrame *frame);
 // STEM.cine and STEM.mp4. True with both names in `told`, false with the reason.

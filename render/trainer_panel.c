@@ -6,7 +6,7 @@
 
 // Further outside the wall than any run that can be trusted (cli/run.c).
 static const double outside_mm = 0.2;
-// Below this part of real time the hand feels that the tool is slow.
+// Below this fraction of real time the operator notices that the tool is slow.
 static const double slow_factor = 0.97;
 
 static void name_device(TrainerPanel *panel, const Scene *scene, int k, int which)
@@ -160,7 +160,7 @@ void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pos
     warn(panel, pose, figures);
 }
 
-// What lies where in the 3D view: targets with their distance from the tip, the sheath's mouth.
+// Labels of the 3D view: targets with their distance from the tip, the sheath's mouth.
 static void label_scene(TrainerPanel *panel, const Desk *desk, const VesselScene *scene)
 {
     PanelState *state = &panel->state;

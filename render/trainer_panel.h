@@ -1,4 +1,4 @@
-// What the panel shows, made from a moment of a session (or of a recording): figures of the score, errors, devices, warnings, the image's mode.
+// Fills the panel's data from a pose of a session or recording: figures of the score, errors, devices, warnings, the image's mode.
 #ifndef SELDINGER_RENDER_TRAINER_PANEL_H
 #define SELDINGER_RENDER_TRAINER_PANEL_H
 
@@ -23,16 +23,16 @@ typedef struct TrainerPanel {
     char instructions[4200];
 } TrainerPanel;
 
-// Scene, exercise, tool: what does not change in a session.
+// Scene, exercise, tool: constant data of a session.
 void trainer_panel_begin(TrainerPanel *panel, const Scene *scene, const char *trainee);
 // Pose, score and controls of now. `figures` NULL: no real time (a recording).
 void trainer_panel_show(TrainerPanel *panel, const Scene *scene, const Pose *pose, const ScoreFigures *score,
                         const RealtimeFigures *figures, const XrayControl *xray);
-// What the desk and the views are set to; after they were drawn.
+// Settings of the controls and the views; to be called after drawing them.
 void trainer_panel_views(TrainerPanel *panel, const Desk *desk, Views *views, const XrayControl *xray);
-// What flows of the contrast agent that is asked for, and through which tool (-1: none has a lumen); after trainer_panel_views.
+// Actual flow of the requested contrast agent, and the tool (-1: none has a lumen); to be called after trainer_panel_views.
 void trainer_panel_injection(TrainerPanel *panel, const Scene *scene, int tool, double flow_ml_s, const XrayControl *xray);
-// How the hands hold the tools now, in a session; after trainer_panel_show. Hands on locked tools feel their sum, so that is shown.
+// The present grip, in a session; to be called after trainer_panel_show. Locked tools share the sum of their reactions, which is shown.
 void trainer_panel_grip(TrainerPanel *panel, const HandGrip *grip);
 
 #endif

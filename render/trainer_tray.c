@@ -7,7 +7,7 @@
 static const double at_hub_mm = 1;       // solver/step_exchange.c
 static const double per_degree = PI / 180;
 
-// --- a device as it is shown ---
+// --- display of a device ---
 
 // The part from a little proximal to its first bend on, at least 40 mm and at most all of it.
 static double shown_length(const WireOptions *wire)
@@ -98,7 +98,7 @@ static void show_device(PanelTrayDevice *shown, const TrayDevice *device, char *
     draw_stiffness(shown, wire);
 }
 
-// --- what stands in the way ---
+// --- obstacles ---
 
 static double length_of(const Pose *pose, int tool)
 {
@@ -112,7 +112,7 @@ static double beyond_hub(const Pose *pose, int tool)
     return pose->tool[tool].inserted_mm + (tool > 0 ? length_of(pose, 0) - pose->tool[0].inserted_mm : 0);
 }
 
-// NULL where the tool is out.
+// NULL if the tool is withdrawn.
 static const char *why_still_in(char *text, const Scene *scene, const Pose *pose, int tool)
 {
     double beyond = beyond_hub(pose, tool), way = tool > 0 ? beyond - at_hub_mm : beyond;
@@ -200,7 +200,7 @@ static bool is_same_tip(const PanelTrayChoice *a, const PanelTrayChoice *b)
     return a->device == b->device && a->is_shaped == b->is_shaped && fabs(a->length_mm - b->length_mm) + fabs(a->angle_deg - b->angle_deg) + fabs(a->mandrel_mm - b->mandrel_mm) < 1e-9;
 }
 
-// The chosen wire as the sliders would have it; where it does not keep that, as it is, with the reason.
+// The chosen wire as set by the sliders; if it cannot keep that shape, unchanged, with the reason.
 static void shape_chosen(TrainerTray *tray)
 {
     char *why = tray->note[TRAY_DEVICES];
@@ -236,7 +236,7 @@ void trainer_tray_show(TrainerTray *tray, const Scene *scene, const Pose *pose, 
     tray->shown.shaped = &tray->shaped_shown;
 }
 
-// The tool that is still in comes last: what never fits is said first.
+// The tool that is still inserted comes last: permanent obstacles are reported first.
 const char *trainer_tray_obstacle(const TrainerTray *tray)
 {
     const PanelTrayChoice *choice = &tray->choice;

@@ -1,4 +1,4 @@
-// The tray in the trainer's window: the chosen tool's devices as the panel shows them, and what stands in the way of putting one in.
+// The tray in the trainer's window: the chosen tool's devices as the panel shows them, and what prevents inserting one.
 #ifndef SELDINGER_RENDER_TRAINER_TRAY_H
 #define SELDINGER_RENDER_TRAINER_TRAY_H
 
@@ -11,21 +11,21 @@ enum { TRAY_WORDS = 320 };
 typedef struct TrainerTray {
     PanelTray shown;             // what panel_draw takes; its strings lie below
     TrayDevices devices;
-    TrayDevice shaped;           // the chosen one as the sliders have it; without sections: none
+    TrayDevice shaped;           // the chosen one as set by the sliders; without sections: none
     PanelTrayDevice device[TRAY_DEVICES], shaped_shown;
     char what[TRAY_DEVICES + 1][160], note[TRAY_DEVICES + 2][TRAY_WORDS];
     char remark[160];
     PanelTrayChoice choice;      // of the last frame
 } TrainerTray;
 
-// Fills the tray for a tool, and says which of its devices is in. `library` as in tray_devices_find. False when out of memory.
+// Fills the tray for a tool and marks the inserted device. `library` as in tray_devices_find. False when out of memory.
 bool trainer_tray_open(TrainerTray *tray, const Scene *scene, int tool, const char *library, const Pose *pose, int *in);
 void trainer_tray_close(TrainerTray *tray);
-// Each frame while it is open: what the user has chosen, and how the tools stand now.
+// To be called in each frame while it is open, with the user's choice and the present pose.
 void trainer_tray_show(TrainerTray *tray, const Scene *scene, const Pose *pose, const PanelTrayChoice *choice);
-// Why the chosen device cannot be put in now, or NULL.
+// Why the chosen device cannot be inserted now, or NULL.
 const char *trainer_tray_obstacle(const TrainerTray *tray);
-// The tip as the user wants it, length 0 where it is left as it is.
+// The tip as the user wants it, length 0 if it is left as it is.
 TipShaping trainer_tray_tip(const TrainerTray *tray);
 
 #endif

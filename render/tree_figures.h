@@ -1,4 +1,4 @@
-// The figures of a tree's page (tree_page.h), and what they are drawn from.
+// The figures of a tree's page (tree_page.h), and their data.
 #ifndef SELDINGER_RENDER_TREE_FIGURES_H
 #define SELDINGER_RENDER_TREE_FIGURES_H
 

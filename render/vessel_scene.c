@@ -180,7 +180,7 @@ static LayersKey key_for(VesselScene *scene, const VesselSceneLook *look, ViewPo
     return key;
 }
 
-// Changing, or not yet still for long enough that a costly frame does not show as a stutter.
+// Changing, or not at rest long enough to hide an expensive frame.
 static bool is_moving(VesselScene *scene, const LayersKey *key)
 {
     const int enough = 4;
@@ -224,7 +224,7 @@ static Vec3 between(const Pose *pose, int i, double t)
     Vec3 a = pose->position[i], b = pose->position[i + 1], chord = vec3_sub(b, a);
     double length = vec3_norm(chord);
     Vec3 u = quat_rotate(pose->quaternion[i], vec3(length, 0, 0)), v = quat_rotate(pose->quaternion[i + 1], vec3(length, 0, 0));
-    // frames that do not follow the line are no help
+    // frames that do not follow the line are useless
     double least = 0.5 * length * length;
     if (!(vec3_dot(u, chord) > least && vec3_dot(v, chord) > least))
         u = v = chord;
@@ -299,8 +299,8 @@ static Color node_color(const Pose *pose, int i, bool touches_wall, Color own, d
     return i < pose->first_free_node ? SHEATH_COLOR : touches_wall ? vessel_scene_force_color(vec3_norm(pose->node[i].force), full_scale_n, own) : own;
 }
 
-// One tool along the line up to its end, coloured by wall force where it is the one that touches the wall. Where another lies in it its near wall is cut away:
-// its lumen is laid over it, and the other over that. However thin, each leaves a rim of the one around it.
+// One tool along the line up to its end, coloured by wall force where it touches the wall. Where another lies in it its near wall is cut away: its
+// lumen is laid over it, and the other over that. However thin, each leaves a rim of the one around it.
 static void add_tool(VesselScene *scene, const Pose *pose, int k, const double *end, int count, const VesselSceneLook *look, double line)
 {
     const PoseTool *tool = &pose->tool[k];
@@ -441,7 +441,7 @@ void vessel_scene_draw(VesselScene *scene, const Pose *pose, const VesselSceneLo
     strokes_draw(&scene->strokes, scene->layers, port);
 }
 
-// --- what was shown ---
+// --- labels and legend ---
 
 static VesselSceneLabel label_at(const VesselScene *scene, VesselSceneLabelKind kind, const char *name, Vec3 place, double radius)
 {

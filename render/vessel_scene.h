@@ -5,8 +5,8 @@
 //
 // Drawing: the walls nearest to the eye, outer and inner faces, are two layers kept as textures and redrawn only when camera, view size or section
 // plane change; a frame shows their composition, and whatever moves is drawn over it seen through the outer faces' layer, or, where it lies behind a
-// further vessel, through that too. While they change from frame to frame the layers come from a coarser mesh where one was given, without smooth edges;
-// all of it is drawn at the first frame and once four frames in a row stood still.
+// further vessel, through that too. While they change from frame to frame the layers use the coarser mesh, if given, without antialiasing; the full
+// mesh is drawn in the first frame and after four frames without change.
 #ifndef SELDINGER_RENDER_VESSEL_SCENE_H
 #define SELDINGER_RENDER_VESSEL_SCENE_H
 
@@ -37,12 +37,12 @@ typedef struct VesselSceneLook {
     bool show_model;                   // the local model at the tip
     bool show_arrows;                  // wall forces
     bool show_targets;
-    bool section;                      // a plane takes away all of the vessel that lies on its normal's side
+    bool section;                      // a clipping plane removes the part of the vessel on its normal's side
     bool section_at_tip;               // the plane goes through the tip, else through the scene's middle …
     double section_offset_mm;          // … moved this far along its normal
     Vec3 section_normal;               // zero: towards the eye, whichever way the camera turns
-    bool follow_tip;                   // keeps the tip in the view's middle third, whatever camera.focus says
-    bool full_detail;                  // never the coarser mesh: for pictures and films off screen
+    bool follow_tip;                   // keeps the tip in the view's middle third, overriding camera.focus
+    bool full_detail;                  // never use the coarser mesh: for off-screen pictures and films
     double force_full_scale_n;         // top of the colour map, and the force of an arrow of full length
     double font_scale;                 // of lines, 1 for 96 dpi
 } VesselSceneLook;
@@ -52,7 +52,7 @@ VesselSceneLook vessel_scene_default_look(const VesselScene *scene);
 // NULL with a reason: mesh with indices out of range or numbers that are not finite, memory, a driver that compiles no shader.
 VesselScene *vessel_scene_create(const VesselSceneOptions *options, char *message, size_t capacity);
 void vessel_scene_destroy(VesselScene *scene);
-// Draws all of the port's rectangle. `pose` NULL: no tool. Nodes that are not finite numbers are left out.
+// Draws all of the port's rectangle. `pose` NULL: no tool. Nodes that are not finite are skipped.
 void vessel_scene_draw(VesselScene *scene, const Pose *pose, const VesselSceneLook *look, ViewPort port);
 
 // --- what the last draw showed, for labels and legends; pixels from the view's upper left corner, x right, y down ---
@@ -74,7 +74,7 @@ typedef struct ScaleBar {
 ScaleBar vessel_scene_scale_bar(const VesselScene *scene, double most_pixels);
 // Colour of a wall force: the tool's own where there is none, then the sequential map from purple to yellow; full scale and above are yellow.
 Color vessel_scene_force_color(double force_n, double full_scale_n, Color without);
-// The projection and the camera that were used (with follow_tip the focus that was found): where a point is seen, and where to go on from when
+// The projection and the camera that were used (with follow_tip the focus that was found): where a point is seen, and where to continue from when
 // following ends.
 const Camera *vessel_scene_projection(const VesselScene *scene);
 FreeCamera vessel_scene_camera(const VesselScene *scene);

@@ -8,7 +8,7 @@
 typedef struct FreeCamera {
     Vec3 focus;                // lands in the middle of the view, and the view orbits around it
     Quat turn;                 // takes x, y, z to the directions right, up and towards the eye
-    double width_mm, height_mm;         // a rectangle around the focus that just fits into the view, > 0
+    double width_mm, height_mm;         // size of a rectangle around the focus that just fits into the view, > 0
     Vec3 low, high;            // the box of what there is to see …
     Vec3 home_focus;           // … and the view of it that free_camera_reset goes back to
     Quat home_turn;
@@ -31,7 +31,7 @@ FreeCamera free_camera_framing(int count, const Vec3 *point);
 void free_camera_orbit(FreeCamera *camera, double dx, double dy);
 // Turns the picture counter-clockwise [rad].
 void free_camera_roll(FreeCamera *camera, double angle);
-// What is under the mouse stays under it. width, height of the view [pixel].
+// The point under the mouse stays under it. width, height of the view [pixel].
 void free_camera_pan(FreeCamera *camera, double dx, double dy, int width, int height);
 // Nearer by a factor of 1.15 for each `notch` > 0 of the wheel; what lies at (x, y), from the view's upper left corner, stays where it is.
 // A view is at least 1/400 and at most 20 times as wide as home's.

@@ -1,5 +1,5 @@
-// One pass for the outer faces and one for the inner ones, each with the depth test alone: what is nearest stays, so no order is needed and no sort.
-// A wall seen face on is clear, edge on dense (1 - |n_z|)^p, as thin-walled glass is: outlines stand out, the middle lets the tool be seen.
+// One pass for the outer faces and one for the inner ones, each with the depth test only: the nearest surface wins, so no sorting is needed. A wall
+// seen face on is clear, edge on dense (1 - |n_z|)^p, as thin-walled glass is: outlines stand out, the middle lets the tool be seen.
 #include "render/vessel_scene_layers.h"
 
 #include "render/drawable_mesh.h"

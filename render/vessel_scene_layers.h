@@ -11,9 +11,9 @@
 
 typedef struct VesselLayers VesselLayers;
 
-typedef struct LayersKey {     // what the pictures depend on
+typedef struct LayersKey {     // the inputs of the pictures
     Camera camera;
-    bool is_quick;             // the coarser mesh where there is one, no smooth edges
+    bool is_quick;             // the coarser mesh if there is one, no antialiasing
     bool has_section;
     Vec3 section_normal;       // unit; walls with normal . x > offset are left out
     double section_offset;

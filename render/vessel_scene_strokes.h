@@ -1,5 +1,5 @@
-// What moves in the live 3D view: lines and thin tubes as ribbons that face the eye, with smooth edges whatever is drawn into, sorted from far to near.
-// Each is seen through the walls before it (vessel_scene_layers.h). Inside the live 3D view only.
+// Moving objects of the live 3D view: lines and thin tubes as ribbons that face the eye, antialiased in any framebuffer, sorted from far to near and
+// seen through the walls in front (vessel_scene_layers.h). Inside the live 3D view only.
 #ifndef SELDINGER_RENDER_VESSEL_SCENE_STROKES_H
 #define SELDINGER_RENDER_VESSEL_SCENE_STROKES_H
 
@@ -35,8 +35,8 @@ bool strokes_create(Strokes *strokes, char *message, size_t capacity);
 void strokes_destroy(Strokes *strokes);
 
 void strokes_begin(Strokes *strokes, const Camera *camera);
-// A tube through the points with round or flat ends; half widths in pixels, colours with alpha. Points that are not finite end it, and it begins anew after
-// them. Of two through the same points the later lies over the earlier.
+// A tube through the points with round or flat ends; half widths in pixels, colours with alpha. Points that are not finite end it, and it begins
+// again after them. Of two through the same points the later lies over the earlier.
 void strokes_polyline(Strokes *strokes, int count, const Vec3 *point, const double *half_pixels, const Color *color, bool has_round_ends);
 void strokes_line(Strokes *strokes, Vec3 a, Vec3 b, double half_pixels, Color color);
 // A circle around `center` across the unit `axis`; its far half is fainter.

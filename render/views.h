@@ -15,14 +15,14 @@ typedef struct ViewsOptions {        // borrowed during create, but for scene, v
     const Vessel *vessel;            // NULL: none
     const VesselTree *tree;          // NULL: the vessel is no tree
     const TriangleMesh *mesh;        // the wall, NULL: none
-    const Pose *pose;                // any of the scene's tools: how many nodes they have, at which arc lengths
+    const Pose *pose;                // any pose of the scene's tools, for numbers of nodes and arc lengths
     int anatomy_size[3];             // a volume behind the vessel, see FluoroscopeOptions; value NULL: none
     Vec3 anatomy_origin, anatomy_axis[3];
     const float *anatomy_value;
     PatientAxes patient;
 } ViewsOptions;
 
-// NULL with a reason. Otherwise `message` is empty or says what the pictures lack.
+// NULL with a reason. Otherwise `message` is empty or says what is missing in the pictures.
 Views *views_create(const ViewsOptions *options, char *message, size_t capacity);
 void views_destroy(Views *views);
 
@@ -34,10 +34,10 @@ typedef struct ViewsFrame {
     uint32_t pulse;                  // number of X-ray pulses so far
     const VesselSceneLook *look;
     int scope_tool;                  // from whose tip angioscopy looks, 1 to 4; 0: the one that reaches furthest
-    bool is_still;                   // a picture for itself: nothing is taken from the frame before
+    bool is_still;                   // an independent picture: nothing is reused from the previous frame
 } ViewsFrame;
 
-// Draws each view that the layout shows (the ones beside the main view in turn) into `framebuffer`, and dark ground into what lies between.
+// Draws each view of the layout (secondary views in turn) into `framebuffer`, and a dark background between them.
 void views_draw(Views *views, const ViewsFrame *frame, const PanelLayout *layout, int width, int height, unsigned framebuffer);
 const VesselScene *views_scene(const Views *views);
 Fluoroscope *views_fluoroscope(Views *views);

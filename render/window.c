@@ -1,5 +1,4 @@
-// Events are gathered by GLFW's callbacks and handed over once a frame. Joysticks are looked for at each poll: GLFW's own callback has no place
-// for a pointer to the window.
+// Events are gathered by GLFW's callbacks and handed over once a frame. Joysticks are polled, because GLFW's joystick callback takes no user pointer.
 #include "render/window.h"
 
 #include "render/message.h"
@@ -387,7 +386,7 @@ Window *window_create(const char *title, int width, int height, double hz, char 
     glfwSetWindowFocusCallback(window, on_focus);
 
     ended_by_signal = 0;
-    struct sigaction action = {.sa_handler = on_end_signal, .sa_flags = (int)SA_RESETHAND};   // a second one ends at once
+    struct sigaction action = {.sa_handler = on_end_signal, .sa_flags = (int)SA_RESETHAND};   // a second signal ends the program at once
     sigemptyset(&action.sa_mask);
     for (int i = 0; i < SIGNALS; i++)
         sigaction(end_signal[i], &action, &w->previous_action[i]);

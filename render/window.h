@@ -44,7 +44,7 @@ typedef enum { WINDOW_OPEN, WINDOW_CLOSE_ASKED, WINDOW_ENDED } WindowClose;   //
 
 enum { WINDOW_EVENTS = 256, WINDOW_GAMEPADS = 16, WINDOW_AXES = 16, WINDOW_BUTTONS = 64 };
 
-// What came in since the last poll. Filled by hand it drives the panel off screen as well: zeros with width, height and scale are a still frame.
+// Input since the last poll. It can also be filled by hand to drive the panel off screen: zeros with width, height and scale give a still frame.
 typedef struct WindowInput {
     int width, height;       // of the framebuffer [pixel]
     double scale;            // content scale: 1, 2 on a high-density display
@@ -74,15 +74,15 @@ void window_destroy(Window *window);   // signals and what was current are put b
 
 // Polls events and says what came. Valid until the next call.
 const WindowInput *window_poll(Window *window);
-// Sleeps to the next frame's deadline (absolute: a late frame does not shift the ones after it; whole periods are left out when it was later than
-// one), then polls. False where nothing should be drawn: iconified, or no pixel large.
+// Sleeps until the next frame's deadline (absolute: a late frame does not shift later ones; whole periods are skipped if needed), then polls. False
+// if nothing should be drawn: iconified or of zero size.
 bool window_next_frame(Window *window, const WindowInput **input);
 void window_swap(Window *window);   // the first time it also shows the window, which is hidden until then
 int64_t window_frames_skipped(const Window *window);   // periods left out because a frame took longer
 
-// A joystick as it is now, `index` 0 to 15. False where there is none.
+// A joystick as it is now, `index` 0 to 15. False if there is none.
 bool window_gamepad(Window *window, int index, WindowGamepad *out);
-const char *window_gamepad_name(const Window *window, int index);   // also of one that has just gone; "" where there never was one
+const char *window_gamepad_name(const Window *window, int index);   // also of one just removed; "" if there never was one
 
 void window_set_full_screen(Window *window, bool is_full);
 bool window_is_full_screen(const Window *window);
