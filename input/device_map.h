@@ -1,16 +1,16 @@
-// Device maps: which control of which device moves the tool, and how. YAML, or built in for gamepads, joysticks and haptic devices.
+// Device maps: how the controls of a device move the tools. YAML, or built in for gamepads, joysticks and haptic devices.
 //
 //   seldinger_device: 1
 //   name: roller
 //   device: {vendor_id: 0x1209, product_id: 0x0001, serial: A1}   # any of these; or {usage: joystick}, {usage_page: 1, usage: 4},
 //                                                                 # {gamepad: true}, {joystick: "part of its name, or *"} (GLFW), {usb: ftdi, serial: A1}
-//   tool: innermost             # what it moves: chosen (default), outer or inner (of the pair around the chosen one), outermost, innermost, 1 to 4 as the
-//                               # keys have it, a tool's name or its kind. Any control of push and twist may have a tool of its own
+//   tool: innermost             # tool it moves: the selected one (chosen, default), outer or inner (of the pair around it), outermost, innermost,
+//                               # 1 to 4 as for the keys, a tool's name or its kind. Each control of push and twist may have its own tool
 //   push:                       # one, or a list that is summed: > 0 into the patient
 //     source: Y                 # usage by name or 0x0001:0x0031; GLFW: left_y, axis_1, button_2; hat_x, hat_y; ftdi: a count's name
 //     index: 0                  # the second control of the same usage is 1
 //     mm_s: 40                  # at full deflection; or mm_per_count: 0.05 (a relative field, or a counter that wraps round)
-//     kind: deflection          # deflection, relative or counter; by default what scale and descriptor say
+//     kind: deflection          # deflection, relative or counter; default: by scale and descriptor
 //     logical_min: 0            # calibration; by default the descriptor's range and its middle
 //     logical_centre: 128
 //     logical_max: 255
@@ -18,18 +18,18 @@
 //     dead_zone: 0.1            # part of the deflection, 0 to 0.9; default 0.05
 //     exponent: 2               # 0.2 to 5; default 1
 //     invert: true
-//     optional: true            # a device without it is good too
+//     optional: true            # ignored if the device lacks it
 //   twist: {source: X, deg_s: 180}                                 # or deg_per_count; right-handed about the direction of advance
 //   pedal: {source: button_1}   # also contrast, stop, mark, choose_outer, choose_inner, lock, let_go, exchange (input/hand_port.h); one or a list; an axis with
 //                               # `above: 0.5` (part of full deflection)
 //   force:                      # HID PID (input/force_feedback.h), of the tool that the first control of push or twist moves
-//     full_scale_n: 8           # what the device gives at its largest magnitude
+//     full_scale_n: 8           # force at the device's largest magnitude
 //     max_n: 4
 //     slew_n_s: 200
 //     full_scale_n_mm: 100      # torque on the second axis; needed for it
-//     stall_ms: 50              # zero force where the simulation stands for this long
-//     quiet_ms: 200             # … or the device says nothing for this long; 0: it may be silent
-//     invert: true              # the other way round
+//     stall_ms: 50              # zero force when the simulation stalls for this long
+//     quiet_ms: 200             # … or the device is silent for this long; 0: it may be silent
+//     invert: true              # reversed
 //   serial: {baud: 115200, counts: [A, R], bits: 32}               # usb: ftdi (input/usb_encoder.h); bits of its counters, 0: never wrap
 //
 // A rate is full scale x deflection, where deflection = sign(d) ((|d| - dead_zone) / (1 - dead_zone))^exponent, d = (raw - centre) / (max - centre) above
@@ -45,11 +45,11 @@
 
 enum { MAP_AXES = 12, MAP_BUTTONS = 16, MAP_NAME = 64, MAP_HANDS = TOOLS_MOST };
 
-// One of the tools that a device moves, each by a HandPort of its own.
+// One of the tools that a device moves, each with its own HandPort.
 typedef struct MapHand {
     char tool[TOOL_NAME_SIZE];       // as it is written
     int drives;                      // HandDrives: of a name, a number or an end DRIVES_CHOSEN until device_map_find_tools
-    int line, column;                // where it stands, 0 where it does not
+    int line, column;                // its line, 0 if not given
 } MapHand;
 
 typedef enum { MAP_HID, MAP_GAMEPAD, MAP_JOYSTICK, MAP_FTDI } MapDeviceKind;
@@ -69,7 +69,7 @@ typedef struct MapSource {
     uint32_t usage;                  // SOURCE_HID_USAGE
     int index;                       // which of that usage; number of the axis, button or count
     bool optional;
-    int line, column;                // where it stands, 0 in built-in maps
+    int line, column;                // its line, 0 in built-in maps
 } MapSource;
 
 typedef enum { AXIS_BY_DESCRIPTOR, AXIS_DEFLECTION, AXIS_RELATIVE, AXIS_COUNTER } AxisKind;
@@ -104,7 +104,7 @@ typedef struct MapForce {
 
 typedef struct MapSerial {
     int baud;
-    char count[2][16];               // names that stand before the counts in a line; order: index 0, 1
+    char count[2][16];               // names before the counts in a line; order: index 0, 1
     int count_count;
     int bits;                        // of its counters, 0: never wrap
 } MapSerial;
@@ -121,10 +121,10 @@ typedef struct DeviceMap {
     MapSerial serial;
 } DeviceMap;
 
-// NULL with faults (all of them, FILE:LINE:COL) where it is wrong. Free with free().
+// NULL with all faults (FILE:LINE:COL). Free with free().
 DeviceMap *device_map_parse(const char *text, size_t length, const char *file, Faults *faults);
 DeviceMap *device_map_load(const char *path, Faults *faults);
-// Finds the tools that a map names in a scene. False with faults, as above, where it has none of that name or several of that kind.
+// Resolves the tools of a map in a scene. False with faults if a name is missing or a kind is ambiguous.
 bool device_map_find_tools(DeviceMap *map, const ToolNames *tools, Faults *faults);
 // "roller.yaml and stick.yaml both move wire …" where several of these maps name one tool, found before; else false.
 bool device_maps_share(const DeviceMap *const *map, int count, const ToolNames *tools, int tool, char *text, size_t capacity);

@@ -1,4 +1,4 @@
-// The maps for devices that the user gave none for. Forward (away from the user) pushes, right turns clockwise as the operator sees it from behind.
+// The default maps for devices. Forward (away from the user) pushes, right turns clockwise as seen from behind.
 #include "input/device_map.h"
 
 #include <string.h>

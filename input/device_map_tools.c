@@ -1,4 +1,4 @@
-// The tools that device maps name, in the scene that they are used with.
+// Resolves the tools of device maps in a scene.
 #include "input/device_map.h"
 
 #include "input/hand_port.h"

@@ -15,12 +15,12 @@ enum { SET_EFFECT = 0x21, BLOCK_INDEX = 0x22, EFFECT_TYPE = 0x25, CONSTANT_FORCE
        OP_START = 0x79, OP_STOP = 0x7b, LOOP_COUNT = 0x7c, DEVICE_GAIN = 0x7e, POOL = 0x7f,
        BLOCK_LOAD = 0x89, LOAD_SUCCESS = 0x8c, ENABLE_ACTUATORS = 0x97, STOP_ALL = 0x99,
        DEVICE_RESET = 0x9a, MANAGED = 0xa9, CREATE_NEW_EFFECT = 0xab };
-// once a millisecond; a tick that comes a little early after a late one is taken, or reports each millisecond would let through every other one
+// once a millisecond; a tick slightly early after a late one is accepted, else every other report would be dropped
 enum { EFFECT_MS = 500, SHORTEST_MS = 10, LONGEST_MS = 1000, PERIOD_US = 1000, LEAST_GAP_US = 750, LOAD_ATTEMPTS = 3, STOP_ATTEMPTS = 2, MOST_FAILURES = 20 };
 
 // --- finding ---
 
-// The data field called `usage` within a collection; of any kind but input.
+// The data field with `usage` within a collection; any kind but input.
 static PidControl find_number(const HidDescriptor *descriptor, uint32_t usage, int collection)
 {
     PidControl control = {0};
@@ -105,7 +105,7 @@ static PidControl in_report(const HidDescriptor *descriptor, int report, int usa
 
 static int64_t all_ones(const HidField *field) { return ((int64_t)1 << field->size) - 1; }
 
-// A value beyond the field's bits would be sent as some other one.
+// A value beyond the field's bits would be truncated to another one.
 static bool range_fits(const HidField *field)
 {
     int64_t half = (all_ones(field) + 1) / 2;
@@ -118,7 +118,7 @@ static double duration_unit_ms(const HidField *field)
     return 1000 * same_pow(10, field->unit == 0x1001 || field->unit == 0x1003 ? field->unit_exponent : -3);
 }
 
-// An effect ends by itself and is started again before that: a program that dies or hangs lets the hand go.
+// An effect ends by itself and is restarted before that, so the force ends if the program dies or hangs.
 static int64_t duration_value(const HidField *field)
 {
     // all ones would mean: without end
@@ -136,7 +136,7 @@ int pid_duration_ms(const PidLayout *layout)
     return ms >= 1 && ms < 1e9 ? (int)ms : 0;
 }
 
-// Why an effect would not end by itself soon after the program does; NULL: it would.
+// Why an effect would not end soon after the program; NULL: it would.
 static const char *why_endless(const PidLayout *layout)
 {
     if (!same_report(&layout->duration, &layout->effect_type))
@@ -200,7 +200,7 @@ bool pid_find(const HidDescriptor *descriptor, PidLayout *layout, char *why, siz
 
 // --- encoding ---
 
-// An empty message for the report that `control` belongs to; false where there is none or it is longer than any of this class.
+// An empty message for the report that `control` belongs to; false if there is none or it is longer than any of this class.
 static bool begin(const PidLayout *layout, const PidControl *control, PidMessage *out)
 {
     int id = control->field.report_id, length = control->is_there ? layout->report_bytes[control->field.kind][id] : 0;
@@ -342,11 +342,11 @@ static bool send(const PidMessage *message, const HidTransport *transport, void 
 {
     int sent = message->kind == HID_FEATURE ? transport->send_feature(transport->context, device, message->bytes, message->length)
                                             : transport->write(transport->context, device, message->bytes, message->length);
-    // a transfer cut short is none; some buses do not count the id of a report that has none
+    // a short transfer is a failure; some buses do not count the id byte of a report without id
     return sent >= message->length - (message->bytes[0] == 0);
 }
 
-// A fresh effect's block; 0: the device gives none.
+// Allocates an effect block; 0: the device refuses.
 static int create_effect(const PidLayout *layout, const HidTransport *transport, void *device)
 {
     PidMessage message;
@@ -430,7 +430,7 @@ bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor
     return true;
 }
 
-// Counted, so that a device that takes nothing is given up: each failure may keep the thread from reading for as long as a transfer may take.
+// Failures are counted, so that a device that accepts nothing is given up: each failure may block the thread for a whole transfer.
 static bool try_send(ForceFeedback *force, const PidMessage *message, const HidTransport *transport, void *device)
 {
     bool is_sent = send(message, transport, device);
@@ -439,7 +439,7 @@ static bool try_send(ForceFeedback *force, const PidMessage *message, const HidT
     return is_sent;
 }
 
-// The part of its full scale that an effect shall play, where the device is not known to hold it already.
+// Sends an effect's magnitude as a fraction of full scale, unless the device already has it.
 static bool write_force(ForceFeedback *force, int which, double part, const HidTransport *transport, void *device)
 {
     PidMessage message;
@@ -456,7 +456,7 @@ static bool write_force(ForceFeedback *force, int which, double part, const HidT
 static bool start_effects(ForceFeedback *force, int64_t now_us, const HidTransport *transport, void *device)
 {
     PidMessage message;
-    // also where the device denies it
+    // even if the device reports otherwise
     force->may_play = true;
     force->started_us = now_us;
     for (int i = 0; i < 2 && force->block[i]; i++)
@@ -465,7 +465,7 @@ static bool start_effects(ForceFeedback *force, int64_t now_us, const HidTranspo
     return true;
 }
 
-// Zero and stop of each effect; what fails keeps none of the rest from being tried.
+// Zero and stop for each effect; a failure does not prevent the others.
 static bool rest(ForceFeedback *force, const HidTransport *transport, void *device)
 {
     PidMessage message;
@@ -479,7 +479,7 @@ static bool rest(ForceFeedback *force, const HidTransport *transport, void *devi
     return good;
 }
 
-// An effect is started at a known zero alone: what the device held when it stopped was meant for then.
+// An effect is started only at a known zero, because the device's last magnitude is outdated.
 static bool play(ForceFeedback *force, int64_t now_us, const HidTransport *transport, void *device)
 {
     if (!force->may_play) {
@@ -517,7 +517,7 @@ void force_tick(ForceFeedback *force, const HandPort *port, int64_t now_us, int6
     double sign = force->map.invert ? -1 : 1;
     const double wanted[2] = {sign * atomic_load(&port->force_n), sign * atomic_load(&port->torque_n_mm)};
     int64_t writes = force->writes;
-    // an effect that has ended by itself while nobody looked holds nothing: the force grows from zero
+    // an effect that has ended by itself exerts no force: the force grows from zero
     bool has_ended = force->may_play && now_us - force->started_us >= force->effect_us;
     force_guard(&force->guard, &force->map, wanted, atomic_load(&port->step), now_us, report_us, paused);
     if (has_ended && !force->guard.why_zero[0])
@@ -536,7 +536,7 @@ void force_tick(ForceFeedback *force, const HandPort *port, int64_t now_us, int6
         force->due_us = force->due_us + PERIOD_US > now_us + LEAST_GAP_US ? force->due_us + PERIOD_US : now_us + LEAST_GAP_US;
 }
 
-// Said twice where it was not taken: nothing comes after it.
+// Retried once on failure, because nothing follows.
 static void insist(const PidMessage *message, const HidTransport *transport, void *device)
 {
     for (int i = 0; i < STOP_ATTEMPTS && !send(message, transport, device); i++)

@@ -1,11 +1,10 @@
-// Force back to the hand by HID PID (USB Device Class Definition for Physical Interface Devices 1.0, usage page 0x0F): two constant-force effects, one
-// along push, one along twist where the device has a second axis, played for half a second and started again
-// before that, so that a program that dies lets the hand go; only their magnitudes change, up to once a millisecond. A device on which an effect
-// cannot be made to end by itself is refused. An effect is started at zero alone; after a report that the device did not take, and after a
-// time in which the effect ended by itself, the force is zero and grows again by its slew.
+// Force feedback by HID PID (USB Device Class Definition for Physical Interface Devices 1.0, usage page 0x0F): two constant-force effects, one along
+// push, one along twist where the device has a second axis, played for half a second and restarted before that, so that the force ends if the program
+// dies; only their magnitudes change, up to once a millisecond. A device whose effects cannot be limited in time is refused. An effect always starts
+// at zero force; after a failed report, or after the effect ended by itself, the force restarts at zero and grows with its slew limit.
 //
-// What may be sent is decided by force_guard, a pure function: scale, clamp, slew limit, and zero at once when the simulation stands, the device is
-// silent, the session is paused or a number is not finite. What is sent is encoded by pid_ functions, pure too. force_ functions talk to a device.
+// force_guard, a pure function, limits the force: scale, clamp, slew limit, and zero at once when the simulation stalls, the device is silent, the
+// session is paused or a number is not finite. The pid_ functions, pure too, encode reports. The force_ functions access a device.
 #ifndef SELDINGER_INPUT_FORCE_FEEDBACK_H
 #define SELDINGER_INPUT_FORCE_FEEDBACK_H
 
@@ -28,7 +27,7 @@ typedef struct PidMessage {
     uint8_t bytes[PID_MESSAGE_BYTES];
 } PidMessage;
 
-// A field that takes a number, or (selector) the value that names one choice of it.
+// A numeric field or, for selectors, the value of one choice.
 typedef struct PidControl {
     bool is_there;
     HidField field;
@@ -48,7 +47,7 @@ typedef struct PidLayout {
     int report_bytes[3][256];        // of each kind and id, with the id byte, as the device's buffers want them
 } PidLayout;
 
-// False with the reason in `why` where constant forces cannot be played: "no constant force effect in the descriptor".
+// False with the reason in `why` if constant forces cannot be played: "no constant force effect in the descriptor".
 bool pid_find(const HidDescriptor *descriptor, PidLayout *layout, char *why, size_t capacity);
 bool pid_is_haptic(const HidDescriptor *descriptor);     // has anything of the PID page
 
@@ -83,23 +82,23 @@ typedef struct ForceFeedback {
     double direction_deg[2];
     int block[2];                    // of force and torque; 0: none
     int64_t value[2];                // magnitudes written last
-    bool is_known[2];                // the device took them
+    bool is_known[2];                // the device accepted them
     bool may_play;                   // started, and not known to be stopped
-    bool must_rest;                  // zero and stop were not taken yet
+    bool must_rest;                  // zero and stop were not accepted yet
     int64_t started_us, due_us;      // when the effects were started, when the next magnitude may go
     int64_t effect_us;               // how long they play
-    int64_t writes;                  // reports tried
+    int64_t writes;                  // reports attempted
     int failures;                    // writes that failed, one after the other; after 20 the effects are stopped, and no more are tried
     ForceGuard guard;
-    char text[160];                  // what it does, or why it does nothing
+    char text[160];                  // its state, or why it is unused
 } ForceFeedback;
 
-// Finds the effects and uploads them at zero force. False: `text` says why; the device's inputs are good all the same.
+// Finds the effects and uploads them at zero force. False: `text` says why; the device's inputs can be used all the same.
 bool force_start(ForceFeedback *force, const DeviceMap *map, const HidDescriptor *descriptor, const HidTransport *transport, void *device, int64_t now_us);
-// Sends what the port and the guard say where it changed; about once a millisecond at most. Nothing before force_start was true.
-// Where the guard says zero, or a report was not taken, zero and stop are sent, until they are taken.
+// Sends the port's force, limited by the guard, when it changed, at most about once a millisecond. Does nothing before force_start succeeded. If the
+// guard demands zero, or a report failed, sends zero and stop until they are accepted.
 void force_tick(ForceFeedback *force, const HandPort *port, int64_t now_us, int64_t report_us, bool paused, const HidTransport *transport, void *device);
-// Zero and stop, each tried again once where it was not taken; for the end of a session.
+// Sends zero and stop, each retried once on failure; for the end of a session.
 void force_stop(ForceFeedback *force, const HidTransport *transport, void *device);
 
 #endif

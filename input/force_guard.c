@@ -9,7 +9,7 @@ static double clamp(double value, double most) { return fmax(-most, fmin(most, v
 static const char *why_zero(ForceGuard *guard, const MapForce *map, const double wanted[2], int64_t step, int64_t now_us, int64_t report_us, bool paused)
 {
     if (!guard->has_started || step != guard->step) {
-        // the first look only learns where the simulation is: it must be seen to go on
+        // the first call only stores the step: the simulation must be seen to advance
         guard->step_grew_us = guard->has_started ? now_us : now_us - 1000 * (int64_t)map->stall_ms;
         guard->step = step;
         guard->has_started = true;
@@ -33,7 +33,7 @@ void force_guard(ForceGuard *guard, const MapForce *map, const double wanted[2],
     guard->why_zero = why_zero(guard, map, wanted, step, now_us, report_us, paused);
     guard->last_us = now_us;
     for (int i = 0; i < 2; i++) {
-        // a torque has the force's limits as parts of its own full scale
+        // a torque has the force's limits, relative to its own full scale
         double unit = i == 0 ? 1 : map->full_scale_n_mm / map->full_scale_n;
         double most = map->max_n * unit, change = map->slew_n_s * unit * 1e-6 * (double)gap;
         if (guard->why_zero[0])

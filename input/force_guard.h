@@ -1,4 +1,4 @@
-// What of a force may be sent to a haptic device now: scale, clamp, slew limit, and zero where the simulation stands or the device is silent.
+// Limits the force sent to a haptic device: scale, clamp, slew limit, and zero if the simulation stalls or the device is silent.
 #ifndef SELDINGER_INPUT_FORCE_GUARD_H
 #define SELDINGER_INPUT_FORCE_GUARD_H
 
@@ -14,7 +14,8 @@ typedef struct ForceGuard {
     const char *why_zero;            // "" while forces may be sent
 } ForceGuard;
 
-// What may be sent now: `wanted` force [N] and torque [N mm] -> guard->sent. `step`: HandPort.step. `report_us`: when the device last said something.
+// The force that may be sent now: `wanted` force [N] and torque [N mm] -> guard->sent. `step`: HandPort.step. `report_us`: time of the device's last
+// report.
 void force_guard(ForceGuard *guard, const MapForce *map, const double wanted[2], int64_t step, int64_t now_us, int64_t report_us, bool paused);
 
 #endif

@@ -141,7 +141,7 @@ void ftdi_stream_take(FtdiStream *stream, const MapSerial *serial, const uint8_t
         // line status: overrun, parity, framing, break
         if (bytes[packet + 1] & 0x1e) {
             stream->errors++;
-            stream->is_skipped = true;    // a letter is missing or wrong: the line is not to be trusted
+            stream->is_skipped = true;    // a character is missing or wrong: the line cannot be trusted
             stream->length = 0;
         }
         for (size_t i = packet + STATUS_BYTES; i < end; i++)

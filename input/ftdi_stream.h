@@ -1,5 +1,5 @@
-// What an FTDI FT232-type USB serial chip is told, and what its bytes mean: lines of counts, "A1234 R-56\n". Pure functions; usb_encoder.h has the device and
-// the sources.
+// The protocol of FTDI FT232-type USB serial chips: requests, and decoding of received bytes: lines of counts, "A1234 R-56\n". Pure functions;
+// usb_encoder.h has the device and the sources.
 #ifndef SELDINGER_INPUT_FTDI_STREAM_H
 #define SELDINGER_INPUT_FTDI_STREAM_H
 
@@ -18,8 +18,8 @@ typedef struct FtdiRequest {
 } FtdiRequest;
 
 enum { FTDI_SET_UP = 7 };
-// What sets a chip up: reset, both buffers emptied, `baud`, 8 data bits no parity one stop bit, no flow control, latency 1 ms. `index` low byte: the
-// port, 0 for chips with one, 1 for the first of several.
+// The requests that set up a chip: reset, both buffers emptied, `baud`, 8 data bits no parity one stop bit, no flow control, latency 1 ms. `index`
+// low byte: the port, 0 for chips with one, 1 for the first of several.
 void ftdi_set_up(int baud, int port, FtdiRequest request[FTDI_SET_UP]);
 // Value (low 16 bits) and index (bits 16 and up) of a baud rate: 3 MHz over a divisor in eighths; *actual: what comes out [baud].
 uint32_t ftdi_baud_divisor(int baud, double *actual);
@@ -27,24 +27,24 @@ uint32_t ftdi_baud_divisor(int baud, double *actual);
 typedef struct FtdiStream {
     char line[ENCODER_LINE];
     int length;
-    bool is_skipped;                 // the rest of this line is left out
+    bool is_skipped;                 // skip the rest of this line
     int64_t lines, bad_lines, errors;    // overruns, parity, framing, breaks
 } FtdiStream;
 
-// One line read: fresh[i] where count i stood in it.
+// One line: fresh[i] if it contained count i.
 typedef struct EncoderLine {
     int64_t count[ENCODER_COUNTS];
     bool fresh[ENCODER_COUNTS];
 } EncoderLine;
 
-// Names and whole numbers in any order, "A12 R-3" or "R=7,A=-2": false where something else stands in it, a name twice, a number beyond +-2^32, or none.
+// Names and whole numbers in any order, "A12 R-3" or "R=7,A=-2": false if something else stands in it, a name twice, a number beyond +-2^32, or none.
 bool encoder_parse_line(const MapSerial *serial, const char *line, size_t length, EncoderLine *out);
 
-// Takes what one bulk transfer gave: packets of `packet_size` bytes (64, or 512 of high-speed chips), the first two of each status. Each whole line goes
-// to `take`. A line may be cut anywhere; what comes before the first line end is left out, it may be half a line.
+// Decodes one bulk transfer: packets of `packet_size` bytes (64, or 512 of high-speed chips), the first two of each status. Each complete line is
+// passed to `take`. Lines may be split anywhere; bytes before the first line end are dropped, since they may be a partial line.
 typedef void EncoderTake(void *context, const EncoderLine *line);
 void ftdi_stream_take(FtdiStream *stream, const MapSerial *serial, const uint8_t *bytes, size_t length, size_t packet_size, EncoderTake *take, void *context);
-// As after opening: the first line may be a half one.
+// As after opening: the first line may be partial.
 void ftdi_stream_start(FtdiStream *stream);
 
 #endif

@@ -9,15 +9,15 @@ typedef struct Gamepad {
     MapState state;
 } Gamepad;
 
-// The first of `map` for a gamepad (GLFW has a layout for it) or for a joystick of this name; NULL where none is.
+// The first of `map` for a gamepad (GLFW has a layout for it) or for a joystick of this name; NULL if none is.
 const DeviceMap *gamepad_choose_map(const DeviceMap *const *map, int count, bool is_gamepad, const char *name);
-// False with faults where the map needs more than the device has.
+// False with faults if the map needs controls that the device lacks.
 bool gamepad_bind(Gamepad *gamepad, const DeviceMap *map, int axis_count, int button_count, const char *name, Faults *faults);
 // Once a frame: axes -1 to 1 (GLFWgamepadstate.axes or glfwGetJoystickAxes), buttons 0 or 1. `port`: MAP_HANDS of them; the first one's state becomes HAND_READY.
 void gamepad_update(Gamepad *gamepad, const float *axes, int axis_count, const unsigned char *buttons, int button_count, HandPort *port);
 // Unplugged: rates and buttons zero, HAND_LOST.
 void gamepad_lost(Gamepad *gamepad, HandPort *port);
-// Vendor and product id from glfwGetJoystickGUID; false where it names none (devices that are on no bus).
+// Vendor and product id from glfwGetJoystickGUID; false if it names none (devices that are on no bus).
 bool gamepad_ids_of_guid(const char *guid, int *vendor_id, int *product_id);
 
 #endif

@@ -10,7 +10,7 @@
 
 enum { DEVICES_LISTED = 64, MOST_MAPS = 16 };
 
-// A device that cannot be used: told once, forgotten when it is unplugged.
+// A device that cannot be used: reported once, forgotten when unplugged.
 typedef struct Refusal {
     HidDeviceInfo device;
     int attempts;
@@ -77,7 +77,7 @@ static void device_name(const HidDeviceInfo *device, char *out, size_t capacity)
         snprintf(out, capacity, "device %04x:%04x", device->vendor_id, device->product_id);
 }
 
-// The refusal of this device, a new one where there is none yet; NULL where too many are kept.
+// The refusal of this device, a new one where there is none yet; NULL if too many are kept.
 static Refusal *refusal_of(Hands *hands, const HidDeviceInfo *device)
 {
     Refusal *free_one = NULL;
@@ -104,7 +104,7 @@ static HidDescriptor *read_descriptor(const Hands *hands, const HidDeviceInfo *d
     return hid_descriptor_parse(bytes, (size_t)length, name, faults);
 }
 
-// A slot for the device: the one it had, else a fresh one; NULL where all are taken.
+// A slot for the device: its former one, else a free one; NULL if all are in use.
 static HandSlot *slot_for(Hands *hands, const HidDeviceInfo *device)
 {
     for (int i = 0; i < HANDS_MOST; i++) {
@@ -118,7 +118,7 @@ static HandSlot *slot_for(Hands *hands, const HidDeviceInfo *device)
     return NULL;
 }
 
-// An opened device goes on where the slot's last one stopped; starts its thread. False with a fault where there is none to start.
+// Takes over the slot of its predecessor and starts a thread for the device. False with a fault if no thread can be started.
 static bool start_slot(HandSlot *slot, const HidDeviceInfo *device, const DeviceMap *map, const MapState *fresh, const char *name, Faults *faults)
 {
     HandShared *shared = slot->shared;
@@ -133,7 +133,7 @@ static bool start_slot(HandSlot *slot, const HidDeviceInfo *device, const Device
     slot->identity = *device;
     slot->map = map;
     slot->is_used = true;
-    map_publish(map, &slot->state, slot->port);      // whose force it gives back is known before its first report
+    map_publish(map, &slot->state, slot->port);      // the tool whose force it feeds back is known before its first report
     atomic_store(&slot->has_ended, false);
     pthread_mutex_lock(&shared->lock);
     snprintf(slot->info.name, sizeof slot->info.name, "%s", name);
@@ -212,7 +212,7 @@ static void tell_refusal(Hands *hands, const HidDeviceInfo *device, const Faults
         return;
     refusal->is_listed = true;
     refusal->attempts += refusal->attempts < 3;
-    // permissions come a moment after the device: it is tried at each look and told at the second
+    // permissions are set shortly after the device appears: retry at each scan, report at the second
     for (int i = 0; refusal->attempts == 2 && i < faults->count && i < 4; i++)
         hand_say(&hands->shared, "not used: %s", faults->text[i]);
 }
@@ -249,7 +249,7 @@ static void look_for_encoders(Hands *hands)
         is_wanted |= hands->map[i]->device.kind == MAP_FTDI;
     if (!hands->use_usb || !is_wanted)
         return;
-    // libusb hears of new devices from udevd; where none runs (a container) only a fresh start sees them, and no open device may stand in its way
+    // libusb learns of new devices from udevd; without it (in a container) only a new libusb context sees them, which needs all devices closed
     for (int i = 0; i < HANDS_MOST; i++)
         is_one_open |= hands->slot[i].has_thread && hands->slot[i].encoder_runs;
     if (!is_one_open) {
@@ -323,7 +323,7 @@ static bool copy_maps(Hands *hands, const HandsOptions *options)
     return true;
 }
 
-// A signal that a hand's thread took would look like an unplugged device: its threads inherit a mask of all.
+// A signal delivered to a device thread would look like an unplugged device, so the threads block all signals.
 static bool start_scanner(Hands *hands)
 {
     sigset_t all, before;

@@ -1,4 +1,4 @@
-// What is known of one device of a session.
+// Information about one device of a session.
 #ifndef SELDINGER_INPUT_HAND_INFO_H
 #define SELDINGER_INPUT_HAND_INFO_H
 

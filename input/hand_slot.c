@@ -18,7 +18,7 @@ void hand_say(HandShared *shared, const char *format, ...)
 {
     va_list arguments;
     pthread_mutex_lock(&shared->lock);
-    if (shared->message_count == MESSAGES_KEPT) {    // the oldest gives way
+    if (shared->message_count == MESSAGES_KEPT) {    // drop the oldest
         shared->message_first = (shared->message_first + 1) % MESSAGES_KEPT;
         shared->message_count--;
     }
@@ -41,7 +41,7 @@ static void update_info(HandSlot *slot, HandState state, double report_hz)
     pthread_mutex_unlock(&slot->shared->lock);
 }
 
-// All that has come, at most DRAIN_MOST reports, so that a flood cannot keep the thread from its other work. How many; -1: the device is gone.
+// Reads all pending reports, at most DRAIN_MOST, so that a flood cannot block the thread. Returns their number; -1: the device is gone.
 static int drain(HandSlot *slot, int wait_ms)
 {
     const HidTransport *transport = &slot->shared->transport;
@@ -65,7 +65,7 @@ static void show_force(HandSlot *slot)
     pthread_mutex_unlock(&slot->shared->lock);
 }
 
-// Reports come when they like; a force that is due within the next millisecond is waited for, or it would wait for the report after next.
+// Reports arrive at any time; wait for a force due within the next millisecond, else it would wait for the report after next.
 static int64_t wait_for_force(const HandSlot *slot, int64_t now)
 {
     int64_t left = slot->force.block[0] ? slot->force.due_us - now : 0;
@@ -84,7 +84,7 @@ static void start_force(HandSlot *slot)
         hand_say(shared, "%s: force: %s", slot->info.name, slot->force.text);
 }
 
-// A force that the watchdog took away is told, but not again within TELL_AGAIN_US; and a device that takes no more, once.
+// Reports a force removed by the watchdog, at most once per TELL_AGAIN_US, and, once, a device that accepts nothing more.
 static void tell_watchdog(HandSlot *slot, double sent_before, bool played_before, int64_t now)
 {
     if (played_before && !slot->force.block[0]) {
@@ -136,7 +136,7 @@ void *hand_run_hid(void *argument)
     }
     map_release(slot->map, &slot->state);
     map_publish(slot->map, &slot->state, slot->port);
-    // also where reading failed: a device that is there after all must not go on pushing
+    // also after a read failure: a device still connected must stop pushing
     force_stop(&slot->force, &shared->transport, slot->device);
     update_info(slot, HAND_LOST, 0);
     shared->transport.close(shared->transport.context, slot->device);

@@ -11,7 +11,7 @@
 
 enum { MESSAGES_KEPT = 32 };
 
-// What all threads of a session share.
+// Shared by all threads of a session.
 typedef struct HandShared {
     HidTransport transport;
     pthread_mutex_t lock;            // HandInfo of each slot, and messages
@@ -32,10 +32,10 @@ typedef struct HandSlot {
     void *device;                    // while its thread runs; NULL for an encoder
     UsbEncoder *encoder;             // the same of an encoder
     ForceFeedback force;
-    int64_t tell_from_us;            // when the watchdog may be told of again
+    int64_t tell_from_us;            // when the watchdog may be reported again
     pthread_t thread;
     bool has_thread, encoder_runs;   // the scanner's: the thread is there, and for an encoder
-    _Atomic bool has_ended;          // the device went; the scanner joins the thread
+    _Atomic bool has_ended;          // the device was removed; the scanner joins the thread
     HandInfo info;                   // under the lock
 } HandSlot;
 

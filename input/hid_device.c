@@ -76,7 +76,7 @@ static int list(void *context, HidDeviceInfo *out, int capacity)
     return count;
 }
 
-// The rule that lets whoever sits at the machine use this device, and no other (a keyboard's reports are nobody's business).
+// The udev rule that gives the logged-in user access to this device, and to no other (keyboards must stay private).
 static void udev_rule(const char *path, char *out, size_t capacity)
 {
     char name[256], line[160];

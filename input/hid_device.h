@@ -1,4 +1,4 @@
-// How HID devices are reached: a table of functions, so that tests put a device of their own in the place of hidapi.
+// Access to HID devices by a table of functions, so that tests can replace hidapi.
 #ifndef SELDINGER_INPUT_HID_DEVICE_H
 #define SELDINGER_INPUT_HID_DEVICE_H
 
@@ -21,7 +21,7 @@ typedef struct HidTransport {
     void *context;
     int (*list)(void *context, HidDeviceInfo *out, int capacity);        // how many there are; each path once
     void *(*open)(void *context, const char *path, char *why, size_t capacity);     // NULL with a reason that says what helps
-    int (*descriptor)(void *context, const char *path, uint8_t *bytes, int capacity);    // need not be opened for it
+    int (*descriptor)(void *context, const char *path, uint8_t *bytes, int capacity);    // the device need not be open
     int (*read)(void *context, void *device, uint8_t *bytes, int capacity, int timeout_ms);   // one input report; 0: none in time
     int (*write)(void *context, void *device, const uint8_t *bytes, int length);         // an output report; byte 0 is its id, 0 for none
     int (*send_feature)(void *context, void *device, const uint8_t *bytes, int length);  // the same

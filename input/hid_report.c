@@ -340,7 +340,7 @@ static void read_main(Reading *reading, int tag, uint32_t value, size_t size)
 
 // --- the whole ---
 
-// One item at reading->at; its length in bytes, 0 where it is cut or refused.
+// One item at reading->at; its length in bytes, 0 if it is cut or refused.
 static size_t read_item(Reading *reading, const uint8_t *bytes, size_t length)
 {
     const uint8_t *item = bytes + reading->at;

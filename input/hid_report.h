@@ -1,8 +1,8 @@
 // HID report descriptors and reports (USB HID 1.11, sections 5 and 6.2.2; usages: HID Usage Tables 1.4). A descriptor becomes a list of fields that
 // say where each control lies in which report; a field's value is then taken from a report's bytes or written into one.
 //
-// The parser trusts nothing: a descriptor that contradicts itself is refused with the byte offset and the reason, never half used. Limits:
-// 4096 bytes, 1024 fields, 65,536 bits a report, 64 collections and 16 pushes deep. Pure functions; no allocation but the descriptor itself.
+// The parser trusts nothing: an inconsistent descriptor is refused with byte offset and reason, never used in part. Limits: 4096 bytes, 1024 fields,
+// 65,536 bits a report, 64 collections and 16 pushes deep. Pure functions; no allocation but the descriptor itself.
 #ifndef SELDINGER_INPUT_HID_REPORT_H
 #define SELDINGER_INPUT_HID_REPORT_H
 
@@ -29,7 +29,7 @@ typedef struct HidUsageRange {
     uint32_t first, last;    // both included, of one page
 } HidUsageRange;
 
-// One control, or `count` controls in a row that are all called the same, or an array of `count` slots that each name the usage which is on.
+// One control, or `count` consecutive controls with the same usage, or an array of `count` slots that each hold an active usage.
 typedef struct HidField {
     HidReportKind kind;
     int report_id;           // 0 where the descriptor has no ids
@@ -66,29 +66,29 @@ typedef struct HidDescriptor {
     HidUsageRange range[HID_RANGE_LIMIT];
 } HidDescriptor;
 
-// NULL with a fault (`name`:byte offset: reason) where the descriptor is refused: cut items, an unknown item, a count, size or range that cannot be
+// NULL with a fault (`name`:byte offset: reason) if the descriptor is refused: cut items, an unknown item, a count, size or range that cannot be
 // (size 0, over 32 bits, minimum > maximum), a report over HID_REPORT_BITS, reports with and without id, id 0, pops or collections without their
 // counterpart, more than the limits. Devices that write a maximum of 255 as one signed byte (-1) are understood. Free with free().
 HidDescriptor *hid_descriptor_parse(const uint8_t *bytes, size_t length, const char *name, Faults *faults);
 
-// What a report is: `bytes` as read from the device, id first where the descriptor has ids.
+// Classifies a report: `bytes` as read from the device, id first if the descriptor has ids.
 typedef enum { HID_REPORT_GOOD, HID_REPORT_SHORT, HID_REPORT_UNKNOWN_ID } HidReportCheck;
 // Good: `payload` and `payload_length` are what hid_field_read takes. Longer than described is good, the rest is not looked at.
 HidReportCheck hid_report_open(const HidDescriptor *descriptor, HidReportKind kind, const uint8_t *bytes, size_t length, const HidReport **report,
                                const uint8_t **payload, size_t *payload_length);
 const HidReport *hid_report_find(const HidDescriptor *descriptor, HidReportKind kind, int id);
 
-// Control `index` of a field (0 to count - 1); signed where logical_min < 0. False where it lies beyond `length` or `index` beyond the field.
+// Control `index` of a field (0 to count - 1); signed where logical_min < 0. False if it lies beyond `length` or `index` beyond the field.
 bool hid_field_read(const HidField *field, int index, const uint8_t *payload, size_t length, int64_t *value);
 // The low `size` bits of `value`; other bits stay. False as above.
 bool hid_field_write(const HidField *field, int index, uint8_t *payload, size_t length, int64_t value);
-// Whether a value says "no value" (null state), or lies outside what the descriptor promises.
+// Whether a value means "no value" (null state) or lies outside the declared range.
 bool hid_field_in_range(const HidField *field, int64_t value);
 
 // Number `index` (from 0) of the variable controls called `usage`, in the descriptor's order; which of the field's controls goes to `slot`.
-// `collection`: only within that one (-1: all). NULL where there is none.
+// `collection`: only within that one (-1: all). NULL if there is none.
 const HidField *hid_find_usage(const HidDescriptor *descriptor, HidReportKind kind, uint32_t usage, int index, int collection, int *slot);
-// The value that an array gives to a usage; false where the array has no such.
+// The value that an array gives to a usage; false if the array has no such.
 bool hid_array_value(const HidDescriptor *descriptor, const HidField *array, uint32_t usage, int64_t *value);
 // Whether any slot of an array field names `usage` in this report.
 bool hid_array_has(const HidDescriptor *descriptor, const HidField *array, uint32_t usage, const uint8_t *payload, size_t length);
@@ -96,7 +96,7 @@ bool hid_array_has(const HidDescriptor *descriptor, const HidField *array, uint3
 int hid_find_collection(const HidDescriptor *descriptor, uint32_t usage, int from);
 bool hid_is_within(const HidDescriptor *descriptor, int collection, int ancestor);
 
-// Names of usages: "X", "Y", "Rz", "wheel", "hat_switch", "button_3", "slider"; else "0xPPPP:0xUUUU". 0 where the text is no usage.
+// Names of usages: "X", "Y", "Rz", "wheel", "hat_switch", "button_3", "slider"; else "0xPPPP:0xUUUU". 0 if the text is not a usage.
 uint32_t hid_usage_of_name(const char *name);
 void hid_usage_name(uint32_t usage, char *out, size_t capacity);
 

@@ -60,7 +60,7 @@ static bool find_field(const HidDescriptor *descriptor, const MapSource *source,
 
 static double given_or(double value, double otherwise) { return isnan(value) ? otherwise : value; }
 
-// What the map leaves open comes from the device's range.
+// Values missing in the map come from the device's range.
 static void calibrate(const MapAxis *axis, double least, double most, BoundControl *bound)
 {
     bound->min = given_or(axis->logical_min, least);
@@ -198,7 +198,7 @@ static double hat_value(MapSourceKind kind, const HidField *field, int64_t value
     return kind == SOURCE_HID_HAT_X ? east[eighth] : east[(eighth + 2) & 7];
 }
 
-// The raw value of a bound control in a report; false where it says nothing (null state of an axis).
+// The raw value of a bound control in a report; false if it says nothing (null state of an axis).
 static bool raw_value(const HidDescriptor *descriptor, const MapSource *source, const BoundControl *bound, const uint8_t *payload, size_t length, double *raw)
 {
     int64_t value;

@@ -1,5 +1,5 @@
-// From a device's values to its HandPorts, by a map. Pure functions, no device: what a report, a gamepad or a line of counts says is put in, the port
-// gets rates and ways. Ways are whole counts times a scale, so none is lost or taken twice, however the reports are cut.
+// Maps a device's values to its HandPorts. Pure functions, no device: input is a report, a gamepad's state or a line of counts; output are rates and
+// displacements. Displacements are whole counts times a scale, so none is lost or counted twice, however the reports are divided.
 #ifndef SELDINGER_INPUT_MAP_STATE_H
 #define SELDINGER_INPUT_MAP_STATE_H
 
@@ -7,7 +7,7 @@
 #include "input/hand_port.h"
 #include "input/hid_report.h"
 
-// A control of the map with all that the device's descriptor added to it.
+// A control of the map, completed from the device's descriptor.
 typedef struct BoundControl {
     bool is_there;           // false: optional and missing
     AxisKind kind;           // of an axis: never AXIS_BY_DESCRIPTOR
@@ -35,24 +35,25 @@ typedef struct MapState {
 double map_shape(double deflection, double dead_zone, double exponent);
 // raw -> deflection: 0 at the centre, 1 at max, -1 at min, straight between; a centre at one end leaves that side 0
 double map_deflection(double raw, double min, double centre, double max);
-// The way from one value of a counter to the next, the shorter way round where it wraps.
+// The difference between two values of a counter, the shorter way round if it wraps.
 double map_counter_step(double previous, double now, double wrap);
 
-// Finds the map's controls in a device; false with faults (all) where one that is not optional is missing or fits badly. The state starts anew.
+// Finds the map's controls in a device; false with faults (all) where one that is not optional is missing or fits badly. The state starts again.
 bool map_bind_hid(const DeviceMap *map, const HidDescriptor *descriptor, const char *device_name, MapState *state, Faults *faults);
 // The same for gamepads and joysticks, and for lines of counts.
 bool map_bind_plain(const DeviceMap *map, int axis_count, int button_count, const char *device_name, MapState *state, Faults *faults);
 
-// One input report. False (and bad_reports + 1) where it is short or of unknown id: nothing else changes then.
+// One input report. False (and bad_reports + 1) if it is too short or of unknown id; nothing else changes then.
 bool map_take_report(const DeviceMap *map, const HidDescriptor *descriptor, const uint8_t *bytes, size_t length, MapState *state);
 // Axes in the range that the map says, or -1 to 1; buttons 0 or not.
 void map_take_plain(const DeviceMap *map, const float *axes, int axis_count, const unsigned char *buttons, int button_count, MapState *state);
 // Counts as an encoder sends them; `fresh[i]`: counts[i] was in this line.
 void map_take_counts(const DeviceMap *map, const int64_t *counts, const bool *fresh, int count, MapState *state);
 
-// Rates and ways to the map's ports, [hand_count] of them, with which tool each moves; buttons and the number of reports to the first.
+// Writes rates and displacements to the map's ports, [hand_count] of them, with the tool that each moves; buttons and the number of reports to the
+// first.
 void map_publish(const DeviceMap *map, const MapState *state, HandPort *port);
-// The device is gone: rates and buttons zero, ways stay; a counter's next value is where it goes on from, no step.
+// The device is gone: rates and buttons zero, displacements unchanged; a counter restarts from its next value without a step.
 void map_release(const DeviceMap *map, MapState *state);
 
 #endif

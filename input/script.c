@@ -216,7 +216,7 @@ Script *script_load_tools(const char *path, const ToolNames *tools, Faults *faul
 
 Script *script_load(const char *path, Faults *faults) { return script_load_tools(path, NULL, faults); }
 
-// The names before the dots of a header. More than there can be are left out: parsing then faults them.
+// The names before the dots of a header. Surplus names are skipped here; parsing reports them.
 static void find_names(const char *text, size_t length, ScriptTools *tools)
 {
     NumberColumn field[NUMBER_TABLE_COLUMNS];
@@ -265,7 +265,7 @@ ToolCommands script_tools_at(const Script *script, double t_s, int *cursor)
     while (i + 1 < script->count && script->row[i + 1].t_s <= t_s)
         i++;
     *cursor = i;
-    // before the first row and from the last row's time on nothing moves, but tools that were exchanged stay in
+    // before the first row and from the last row's time on nothing moves, but exchanged tools stay inserted
     ToolCommands commands = {0};
     if (script->count == 0 || t_s < script->row[0].t_s)
         return commands;

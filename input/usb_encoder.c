@@ -119,7 +119,7 @@ static libusb_device_handle *open_path(UsbContext *context, const char *path, ch
     return handle;
 }
 
-// The bulk endpoint of interface 0 to the computer. False where there is none: no serial chip.
+// The bulk endpoint of interface 0 to the computer. False if there is none: no serial chip.
 static bool find_endpoint(UsbEncoder *encoder, int *port)
 {
     struct libusb_config_descriptor *config;
@@ -158,7 +158,7 @@ UsbEncoder *usb_encoder_open(UsbContext *context, const char *path, const MapSer
         free(encoder);
         return NULL;
     }
-    // what the system cannot do here (no detaching) shows when the interface is claimed
+    // failures (no detaching) show when the interface is claimed
     libusb_set_auto_detach_kernel_driver(encoder->handle, 1);
     bool has_endpoint = find_endpoint(encoder, &port);
     if (!has_endpoint || (code = libusb_claim_interface(encoder->handle, 0)) != 0) {
@@ -191,7 +191,7 @@ void usb_encoder_close(UsbEncoder *encoder)
 {
     if (!encoder)
         return;
-    libusb_release_interface(encoder->handle, 0);    // gives ftdi_sio its port back
+    libusb_release_interface(encoder->handle, 0);    // returns the port to ftdi_sio
     libusb_close(encoder->handle);
     free(encoder);
 }
