@@ -1,5 +1,4 @@
-// Sets of things that are joined pair by pair (union-find): parent[i] leads to the lowest member of i's set, which is its own parent. At first
-// parent[i] = i.
+// Disjoint sets (union-find): parent[i] leads to the lowest member of i's set, which is its own parent. At first parent[i] = i.
 #ifndef SELDINGER_BASE_DISJOINT_SETS_H
 #define SELDINGER_BASE_DISJOINT_SETS_H
 

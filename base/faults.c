@@ -13,7 +13,7 @@ static void append(Faults *faults, const char *place, const char *format, va_lis
         int used = snprintf(text, FAULT_LENGTH, "%s: ", place);
         if (used > 0 && used < FAULT_LENGTH)
             vsnprintf(text + used, FAULT_LENGTH - (size_t)used, format, arguments);
-        for (; *text; text++)   // a damaged file's own words must not steer the terminal, nor break the line
+        for (; *text; text++)   // text from a damaged file must not contain terminal escapes or line breaks
             if ((unsigned char)*text < ' ' || *text == 127)
                 *text = '?';
     }

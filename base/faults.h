@@ -1,8 +1,7 @@
-// The faults found in one input, collected so that a user sees all of them in one pass.
+// The faults found in one input, collected so that a user sees all of them at once.
 //
-// A parser gets a Faults, adds what is wrong, and returns false when it added any; its output is then untouched.
-// Printed form: `FILE:LINE:COL: what is wrong; what is valid`, or `FILE:byte OFFSET: …` for binary files, or `FILE: …`.
-// Not thread-safe; one owner. It sees no file itself.
+// A parser gets a Faults, adds what is wrong, and returns false when it added any; its output is then untouched. Printed form: `FILE:LINE:COL: what
+// is wrong; expected …` (or what to do), or `FILE:byte OFFSET: …` for binary files, or `FILE: …`. Not thread-safe; one owner. Accesses no files.
 #ifndef SELDINGER_BASE_FAULTS_H
 #define SELDINGER_BASE_FAULTS_H
 
@@ -13,16 +12,16 @@
 #define FAULT_LENGTH 512
 
 typedef struct Faults {
-    int count;   // all that were added, also those beyond the capacity
+    int count;   // all faults added, including those beyond the capacity
     char text[FAULTS_CAPACITY][FAULT_LENGTH];
 } Faults;
 
 void faults_clear(Faults *faults);
 // `line` and `column` are 1-based; 0 leaves them out.
 void faults_add(Faults *faults, const char *file, int line, int column, const char *format, ...) __attribute__((format(printf, 5, 6)));
-// For binary files: the place is a byte offset.
+// For binary files: the position is a byte offset.
 void faults_add_at_byte(Faults *faults, const char *file, size_t offset, const char *format, ...) __attribute__((format(printf, 4, 5)));
-// All faults, a line each, into `out` (NUL-terminated, cut at `capacity`); says how many did not fit.
+// All faults, one line each, into `out` (NUL-terminated, truncated at `capacity`), with the number of those that did not fit.
 void faults_print(const Faults *faults, char *out, size_t capacity);
 
 #endif

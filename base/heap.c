@@ -41,7 +41,7 @@ void heap_is_empty(size_t bytes, const char *file)
         longjmp(trial->back, 1);
     }
     const char *folder = strrchr(file, '/'), *from = folder;
-    while (from && from > file && from[-1] != '/')      // with the folder that it is in: "fit/field_fit.c"
+    while (from && from > file && from[-1] != '/')      // with its folder: "fit/field_fit.c"
         from--;
     char message[200];
     int length = snprintf(message, sizeof message, "seldinger: out of memory (asked for %zu bytes in %.100s); free some, or give it less to do\n", bytes,
@@ -54,7 +54,7 @@ void heap_is_empty(size_t bytes, const char *file)
 
 bool heap_has_room(size_t bytes)
 {
-    void *volatile room = malloc(bytes);      // volatile: not to be optimised away
+    void *volatile room = malloc(bytes);      // volatile prevents the compiler from removing it
     bool has = room != NULL;
     free(room);
     return has;

@@ -1,5 +1,5 @@
-// Memory without which a computation cannot go on, for offline work deep in loops and callbacks that have no way to say that it lacks: a program that cannot have it
-// ends there, with one message and exit code 2, instead of going on with less. Not for a simulation's step, nor where a file is being written: those return faults.
+// Allocation for offline computations deep in loops and callbacks that cannot return an error: out of memory ends the program with a message and exit
+// code 2. Not for simulation steps or while a file is being written: those return faults.
 #ifndef SELDINGER_BASE_HEAP_H
 #define SELDINGER_BASE_HEAP_H
 
@@ -10,18 +10,18 @@
 extern "C" {
 #endif
 
-// `count` values of `size` bytes, all zero; never NULL, also for none. `file` stands in the message. The caller frees.
+// `count` values of `size` bytes, zeroed; never NULL, even for 0 values. `file` is used in the message. The caller frees.
 void *heap_zeroed(size_t count, size_t size, const char *file);
 #define HEAP_ZEROED(count, size) heap_zeroed(count, size, __FILE__)
-// The same, `old` made longer or shorter; what is new is not set.
+// Resizes `old`; new bytes are uninitialised.
 void *heap_grown(void *old, size_t count, size_t size, const char *file);
 #define HEAP_GROWN(old, count, size) heap_grown(old, count, size, __FILE__)
 // A copy of a text.
 char *heap_text(const char *text, const char *file);
 #define HEAP_TEXT(text) heap_text(text, __FILE__)
-// Whether this much could be had in one piece now: to be asked before a library is called that ends by a signal where it has less.
+// Whether a block of this size can be allocated now: to be checked before calling a library that crashes without it.
 bool heap_has_room(size_t bytes);
-// What the HDF5 library (1.10) takes at once for a file's cache (H5AC_create), four times.
+// Four times what the HDF5 library (1.10) allocates at once for a file's cache (H5AC_create).
 #define HEAP_ROOM_OF_HDF5 ((size_t)8 << 20)
 // For a library, which must not end the program: calls `call`. False where memory that could not be had broke it off; `*lacking` is then what was asked for [bytes], 1 where
 // that is not known.

@@ -80,7 +80,7 @@ static bool next_line(Cursor *cursor, const char **line, const char **end)
     return false;
 }
 
-// A byte-order mark is no part of the header.
+// A byte-order mark does not belong to the header.
 static void skip_mark(Cursor *cursor)
 {
     if (cursor->end - cursor->at >= 3 && !memcmp(cursor->at, "\xef\xbb\xbf", 3))

@@ -1,4 +1,4 @@
-// CSV of numbers: a header that names the columns, `#` comments, blank lines, one row a line. All faults in one pass.
+// CSV of numbers: a header that names the columns, `#` comments, blank lines, one row per line. All faults in one pass.
 #ifndef SELDINGER_BASE_NUMBER_TABLE_H
 #define SELDINGER_BASE_NUMBER_TABLE_H
 
@@ -15,9 +15,8 @@ typedef struct NumberTable {
     int *line;               // (row_count) 1-based line in the file
 } NumberTable;
 
-// `header` is the exact first line that is no comment, such as "t_s,push_mm_s,twist_deg_s" (spaces around names are allowed).
-// `text` need not be NUL-terminated. NULL with faults where the header differs, a field is no finite number or a row has
-// another number of fields.
+// `header` is the exact first line that is not a comment, such as "t_s,push_mm_s,twist_deg_s" (spaces around names are allowed). `text` need not be
+// NUL-terminated. NULL with faults if the header differs, a field is not a finite number or a row has another number of fields.
 NumberTable *number_table_parse(const char *text, size_t length, const char *file, const char *header, Faults *faults);
 void number_table_free(NumberTable *table);
 
@@ -26,7 +25,8 @@ typedef struct NumberColumn {    // a field of the header, without the spaces ar
     size_t length;
     int column;              // 1-based place in its line
 } NumberColumn;
-// The fields of the header, for whoever accepts more than one: how many there are (`capacity` of them written) and their line; 0 where there is no header.
+// Splits the header, for callers that accept several headers: returns the number of fields (at most `capacity` are written) and their line; 0 if
+// there is no header.
 int number_table_columns(const char *text, size_t length, NumberColumn *column, int capacity, int *line);
 
 // The whole of text[0, length) as a finite decimal number; no hexadecimal, no nan, no inf, no spaces.

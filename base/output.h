@@ -1,5 +1,5 @@
-// Output files named on the command line: "-" is standard output, a device or pipe is written as it is, anything else is written beside
-// and renamed, so that no half file is left.
+// Output files named on the command line: "-" is standard output, a device or pipe is written directly, anything else is written to a temporary file
+// and renamed, so no partial file remains.
 #ifndef SELDINGER_BASE_OUTPUT_H
 #define SELDINGER_BASE_OUTPUT_H
 
@@ -9,14 +9,14 @@
 #include <stddef.h>
 #include <stdio.h>
 
-// Before long work: a fault where `path` (NULL: nothing to check) will not be writable. Leaves nothing behind.
+// To be called before long work: a fault if `path` (NULL: nothing to check) is not writable. Leaves no file behind.
 bool output_check(const char *path, Faults *faults);
-// The same for what only whole files can hold (HDF5, PNG): a device, a pipe or "-" is a fault too.
+// The same for formats that need a regular file (HDF5, PNG): a device, a pipe or "-" is a fault too.
 bool output_check_file(const char *path, Faults *faults);
 bool output_write(const char *path, const void *bytes, size_t length, Faults *faults);
-// `text` and a newline; takes it over and frees it. NULL is a fault: no memory.
+// Writes `text` and a newline; takes ownership of it. NULL is a fault: out of memory.
 bool output_write_line(const char *path, char *text, Faults *faults);
-// A text that grows in memory, then is written at once.
+// A text built in memory, then written at once.
 typedef struct OutputText {
     FILE *stream;
     char *bytes;
@@ -25,7 +25,7 @@ typedef struct OutputText {
 bool output_text_open(OutputText *text);                 // false: out of memory
 bool output_text_write(OutputText *text, const char *path, Faults *faults);      // and closes it
 bool output_text_forget(OutputText *text);               // closes it; false
-// The last extension in lower case, with its dot; "" where there is none or it is long.
+// The last extension in lower case, with its dot; "" if there is none or it is too long.
 void output_extension(const char *path, char extension[16]);
 
 #endif

@@ -57,7 +57,7 @@ void parallel_for(int threads, long count, void (*job)(void *, long), void *cont
     int wanted = parallel_thread_count(threads), started = 0;
     if (wanted > count)
         wanted = count > 0 ? (int)count : 1;
-    // with progress the calling thread watches; without it, it works
+    // with progress the calling thread monitors; otherwise it works too
     int extra = progress && progress->call ? wanted : wanted - 1;
     while (started < extra && pthread_create(&thread[started], NULL, work, &pool) == 0)
         started++;

@@ -1,4 +1,4 @@
-#define _GNU_SOURCE   // a stream of our own
+#define _GNU_SOURCE   // fopencookie
 #include "base/part_file.h"
 
 #include <errno.h>
@@ -28,7 +28,7 @@ void part_files_remove(void)
             unlink(slots[i].name);
 }
 
-// Before the file is made: a stop between the two removes what is not there.
+// Registered before the file is created: a stop in between then removes nothing.
 static int take_slot(const char *name)
 {
     if (strlen(name) >= PATH_MAX)
@@ -116,7 +116,7 @@ bool part_file_begin(PartFile *part, const char *path)
         forget(part);
         return false;
     }
-    // where the owner cannot be kept, the group's rights would be another group's
+    // if the owner cannot be kept, the group's permissions would apply to another group
     if (replaces) {
         bool is_kept = fchown(part->descriptor, there.st_uid, there.st_gid) == 0;
         struct stat own;
@@ -153,7 +153,7 @@ static ssize_t write_stream(void *descriptor, const char *bytes, size_t length)
 
 static int close_stream(void *descriptor) { return close((int)(intptr_t)descriptor); }
 
-// The library's own streams take a write that a signal interrupted for one that failed.
+// stdio treats a write interrupted by a signal as failed.
 FILE *part_file_stream(PartFile *part)
 {
     if (!part->stream)
@@ -184,7 +184,7 @@ void part_file_drop(PartFile *part)
 static bool finish(PartFile *part, bool is_synced)
 {
     bool good = !part->stream || (!ferror(part->stream) && fflush(part->stream) == 0);
-    // EINVAL: a file system that cannot
+    // EINVAL: not supported by the file system
     good = good && (!is_synced || fsync(part->descriptor) == 0 || errno == EINVAL);
     if (good && close_part(part) && rename(part->name, part->path) == 0) {
         leave_slot(part);

@@ -1,4 +1,4 @@
-#define _GNU_SOURCE   // the stack of all threads
+#define _GNU_SOURCE   // the stack size of threads
 #include "base/process.h"
 
 #include "base/heap.h"
@@ -15,7 +15,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-// What is written is whole or not there (base/part_file.h); the exit status is the signal's, 130 in a shell for SIGINT.
+// Output files are complete or absent (base/part_file.h); the exit status is the signal's, 130 in a shell for SIGINT.
 void process_stop(int number)
 {
     part_files_remove();
@@ -47,7 +47,7 @@ const volatile sig_atomic_t *process_stop_in_order(void)
 static void install_stop(int number)
 {
     struct sigaction former;
-    // what a shell has a job in the background ignore stays ignored
+    // signals ignored by the shell for a background job stay ignored
     if (sigaction(number, NULL, &former) == 0 && former.sa_handler != SIG_IGN)
         sigaction(number, &(struct sigaction){.sa_handler = process_stop, .sa_flags = (int)SA_RESETHAND}, NULL);
 }
@@ -67,7 +67,7 @@ static void check_output(void)
     _exit(exit_code != EXIT_DONE ? exit_code : EXIT_BAD_INPUT);
 }
 
-// The number of a standard stream that is closed would be the next file's, which then got what is printed. Reading and writing fail as before.
+// Without this the next opened file would take the number of a closed standard stream and receive printed text. Reading and writing still fail.
 static void fill_standard_streams(void)
 {
     for (int i = 0; i < 3; i++)
@@ -75,7 +75,7 @@ static void fill_standard_streams(void)
             _exit(EXIT_BAD_INPUT);
 }
 
-// What is usual, for all threads: with less a program ends by a signal in the middle of its work.
+// The usual limit, for all threads: with less a program may crash in the middle of its work.
 static bool take_stack(void)
 {
     enum { USUAL = 8 << 20, LEAST = 1 << 20 };
@@ -96,7 +96,7 @@ static bool take_stack(void)
     return true;
 }
 
-// The library's JSON is otherwise silently without what it had no memory for.
+// Otherwise cJSON silently drops items when out of memory.
 static void *json_memory(size_t bytes) { return HEAP_ZEROED(bytes, 1); }
 
 int process_run(int argc, char **argv, int (*call)(int argc, char **argv))
@@ -108,7 +108,7 @@ int process_run(int argc, char **argv, int (*call)(int argc, char **argv))
     install_stop(SIGINT);
     install_stop(SIGTERM);
     install_stop(SIGHUP);
-    // a file-size limit is then a failed write with a message, and no part of a file is left
+    // a file-size limit then causes a failed write with a message, and no partial file remains
     sigaction(SIGXFSZ, &(struct sigaction){.sa_handler = SIG_IGN}, NULL);
     atexit(check_output);
     exit_code = call(argc, argv);

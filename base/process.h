@@ -1,4 +1,4 @@
-// How a program of ours begins and ends: its streams, stack and signals, and what it leaves behind when it is stopped.
+// Start and end of our programs: streams, stack, signals, and removal of unfinished files.
 #ifndef SELDINGER_BASE_PROCESS_H
 #define SELDINGER_BASE_PROCESS_H
 
@@ -6,12 +6,12 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-// What a program of ours ends with. EXIT_UNTRUSTED: a simulation that could not be trusted.
+// Exit codes. EXIT_UNTRUSTED: the simulation cannot be trusted.
 enum { EXIT_DONE = 0, EXIT_DIFFERENT = 1, EXIT_BAD_INPUT = 2, EXIT_UNTRUSTED = 3 };
 
-// From main(): sets the process up, calls `call` and returns its exit code. EXIT_BAD_INPUT where the stack is too small.
+// From main(): sets the process up, calls `call` and returns its exit code. EXIT_BAD_INPUT if the stack is too small.
 int process_run(int argc, char **argv, int (*call)(int argc, char **argv));
-// The handler of a signal that ends the program: no unfinished file is left.
+// Handler of terminating signals: removes unfinished files.
 void process_stop(int signal_number);
 // From now on SIGINT and SIGTERM ask the program to end in order: what is returned becomes 1. A second one is process_stop().
 const volatile sig_atomic_t *process_stop_in_order(void);

@@ -1,4 +1,4 @@
-// How far long work is, on a terminal.
+// Progress of long work, on a terminal.
 #ifndef SELDINGER_BASE_PROGRESS_BAR_H
 #define SELDINGER_BASE_PROGRESS_BAR_H
 

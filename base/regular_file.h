@@ -1,4 +1,4 @@
-// Files to read. What a user or a file names may be a pipe, a device or a folder: reading those could wait for ever or never end, so they are refused.
+// Opens regular files only: a pipe, a device or a folder could block or never end, so they are refused.
 #ifndef SELDINGER_BASE_REGULAR_FILE_H
 #define SELDINGER_BASE_REGULAR_FILE_H
 
@@ -7,7 +7,7 @@
 
 // A descriptor of the regular file `path` for reading, closed on exec; never waits. -1 with the reason in *why.
 int regular_file_open(const char *path, struct stat *status, const char **why);
-// At most `capacity` bytes; fewer at the end of the file, or where reading fails: errno is 0 but there.
+// Reads at most `capacity` bytes; fewer at the end of the file (errno 0) or if reading fails (errno set).
 size_t regular_file_read(int descriptor, void *bytes, size_t capacity);
 
 #endif

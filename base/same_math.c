@@ -186,7 +186,7 @@ double same_atan2(double y, double x)
 {
     double least = fabs(y), most = fabs(x);
     bool steep = least > most;
-    // what most calls ask for, the twist of an element: as below with i = 0, in half the time
+    // the common case, the twist of an element: as below with i = 0, in half the time
     if (least < 0x1p-5 * x && x < 0x1p1000 && x > 0x1p-900) {
         if (y == 0)
             return y;
@@ -247,7 +247,7 @@ static double power_of_e(Pair x)
 {
     Pair rest;
     if (!(x.high < 710))
-        return x.high + HUGE_VAL;                                     // what is not a number stays that
+        return x.high + HUGE_VAL;                                     // NaN stays NaN
     if (x.high < -750)
         return 0;
     int k = halvings(x, &rest);

@@ -1,7 +1,7 @@
-// Elementary functions that give the same bits with every compiler, instruction set, processor and C library, which the C library's own do not: glibc
-// picks other code where the processor has fused multiplication. They are made of +, -, *, / and sqrt alone, each of which IEEE 754 rounds in one way
-// only, without fused multiplication and without reassociation (-ffp-contract=off). What decides a state, a model or a score calls these;
-// tests/cli/test_same_builds.c finds who calls the C library's.
+// Elementary functions that give the same bits with every compiler, instruction set, processor and C library, unlike the C library's: glibc uses
+// other code on processors with fused multiplication. They use only +, -, *, / and sqrt, whose rounding IEEE 754 defines, without fused
+// multiplication and without reassociation (-ffp-contract=off). All code that determines a state, a model or a score must use these;
+// tests/cli/test_same_builds.c finds calls to the C library's.
 //
 // Arguments and results in radians. Special values as in C17, annex F, but no floating-point exception and no errno is promised. Each is a pure function.
 // Errors are the largest seen against 80-bit arithmetic (tests/base/test_same_math.c), in units in the last place of the result.
@@ -26,7 +26,7 @@ double same_log(double x);                 // 0.9
 double same_pow(double x, double y);       // 0.7
 double same_cbrt(double x);                // 0.6
 double same_erf(double x);                 // 12
-// Of lengths: squares that overflow or vanish (beyond 1e150, below 1e-150) are not looked after.
+// Of lengths: squares that overflow or vanish (beyond 1e150, below 1e-150) are not handled.
 static inline double same_hypot(double x, double y) { return sqrt(x * x + y * y); }
 static inline double same_square(double x) { return x * x; }
 

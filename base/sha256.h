@@ -1,4 +1,4 @@
-// SHA-256 (FIPS 180-4), to name the files that a recording was made from.
+// SHA-256 (FIPS 180-4), to identify the input files of a recording.
 #ifndef SELDINGER_BASE_SHA256_H
 #define SELDINGER_BASE_SHA256_H
 

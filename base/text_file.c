@@ -27,7 +27,7 @@ char *text_file_read(const char *path, size_t *length, Faults *faults)
         *length = regular_file_read(file, text, size);
         text[*length] = 0;
     }
-    // less than it has would be another text
+    // a partial text must not be used
     if (text && *length < size) {
         faults_add(faults, path, 0, 0, "cannot be read completely: %s", errno ? strerror(errno) : "the file became shorter");
         free(text);

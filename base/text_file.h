@@ -1,4 +1,4 @@
-// A text file as one block of memory. Refuses what is no regular file (a device or a pipe could block or never end) and what is too long.
+// Reads a text file into memory. Refuses anything but regular files (a device or a pipe could block or never end) and files that are too long.
 #ifndef SELDINGER_BASE_TEXT_FILE_H
 #define SELDINGER_BASE_TEXT_FILE_H
 
@@ -10,7 +10,7 @@ enum { TEXT_FILE_LIMIT = 64 * 1024 * 1024 };
 
 // NUL-terminated (the NUL is not counted in `length`); the caller frees it. NULL with a fault.
 char *text_file_read(const char *path, size_t *length, Faults *faults);
-// `name` as seen from the folder of file `base`; absolute names stay. The caller frees it.
+// `name` resolved relative to the folder of file `base`; absolute paths stay. The caller frees it.
 char *text_file_beside(const char *base, const char *name);
 
 #endif

@@ -1,4 +1,4 @@
-// Whole files: read at once, and written so that no half file is ever left (base/part_file.h).
+// Whole files: read at once, and written so that no partial file remains (base/part_file.h).
 #ifndef SELDINGER_BASE_WHOLE_FILE_H
 #define SELDINGER_BASE_WHOLE_FILE_H
 
@@ -8,7 +8,7 @@
 char *whole_file_read(const char *path, size_t *length, Faults *faults);
 // The same; a file of more than `most` bytes is a fault and not read.
 char *whole_file_read_most(const char *path, size_t most, size_t *length, Faults *faults);
-// False with a fault: `path` is then as it was before. What is there and no regular file (a device, a pipe) is written through, not replaced.
+// False with a fault: `path` is then unchanged. An existing device or pipe is written directly, not replaced.
 bool whole_file_write(const char *path, const void *bytes, size_t length, Faults *faults);
 
 #endif

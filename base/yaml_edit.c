@@ -5,7 +5,7 @@
 #include <string.h>
 #include <yaml.h>
 
-// The place in bytes of a mark, which counts characters and not the byte order mark.
+// The byte offset of a mark, which counts characters without the byte order mark.
 static size_t byte_of(const char *text, size_t characters)
 {
     size_t at = strncmp(text, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0;
@@ -49,7 +49,7 @@ static void write_quoted(FILE *stream, const char *value)
     fputc('"', stream);
 }
 
-// The bytes from `from` to `to` are replaced by `before`, the value (quoted where `is_quoted`) and `after`.
+// Replaces the bytes from `from` to `to` by `before`, the value (quoted if `is_quoted`) and `after`.
 static char *spliced(const char *text, size_t from, size_t to, const char *before, const char *value, bool is_quoted, const char *after)
 {
     char *out = NULL;
@@ -70,7 +70,7 @@ static char *spliced(const char *text, size_t from, size_t to, const char *befor
     return NULL;
 }
 
-// The map that holds the last key of a path, which becomes *key; NULL where it is not there.
+// The map that holds the last key of a path, which becomes *key; NULL if it is not there.
 static const yaml_node_t *map_of(yaml_document_t *document, const char *path, const char **key)
 {
     const yaml_node_t *map = yaml_document_get_root_node(document);
@@ -80,7 +80,7 @@ static const yaml_node_t *map_of(yaml_document_t *document, const char *path, co
     return map && map->type == YAML_MAPPING_NODE ? map : NULL;
 }
 
-// A key that is not there, before the others of its map.
+// Adds a missing key, before the others of its map.
 static char *with_key(const char *text, const yaml_node_t *map, const char *key, const char *opening, const char *value, bool is_quoted, const char *closing)
 {
     char before[256], after[300] = "";
@@ -92,7 +92,7 @@ static char *with_key(const char *text, const yaml_node_t *map, const char *key,
         snprintf(after, sizeof after, "%s%s", closing, map->data.mapping.pairs.start < map->data.mapping.pairs.top ? ", " : "");
         return spliced(text, at + 1, at + 1, before, value, is_quoted, after);
     }
-    // the next key stands below this one
+    // the next key is placed below this one
     int column = map->start_mark.column < 250 ? (int)map->start_mark.column : 250;
     snprintf(after, sizeof after, "%s\n%*s", closing, column, "");
     return spliced(text, at, at, before, value, is_quoted, after);
@@ -151,7 +151,7 @@ static bool is_at_end(yaml_parser_t *parser)
     return ended;
 }
 
-// A text's only document, to be deleted.
+// The only document of a text; the caller deletes it.
 static bool load(const char *text, yaml_document_t *document)
 {
     yaml_parser_t parser;
@@ -165,7 +165,8 @@ static bool load(const char *text, yaml_document_t *document)
     return good;
 }
 
-// Whether a text has what was put into it. Aliases of what was replaced, tags and keys that begin with `?` can leave something else, or no YAML.
+// Whether the edited text has the intended value. Aliases of the replaced value, tags and keys that begin with `?` can lead to something else, or to
+// invalid YAML.
 static bool has_value(const char *text, const char *path, const char *value, bool is_item)
 {
     yaml_document_t document;

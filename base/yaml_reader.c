@@ -21,7 +21,7 @@ struct YamlReader {
     long visits;
 };
 
-// --- names that are nearly right ---
+// --- suggestions for names ---
 
 static const char *const units[] = {"mm",    "cm",     "m",       "um",    "in",    "s",     "ms",     "us",    "min",    "gpa",    "mpa",
                                     "kpa",   "pa",     "n_mm2",   "g_cm3", "kg_m3", "g_mm3", "n",      "mn",    "n_mm",   "n_m",    "deg",
@@ -43,7 +43,7 @@ static bool is_unit(const char *text)
     return false;
 }
 
-// Length of the name without its unit: the shortest stem whose rest is one unit; the whole where there is none.
+// Length of the name without its unit: the shortest stem whose rest is one unit; the whole name if there is none.
 static size_t stem_length(const char *name)
 {
     for (const char *at = strchr(name, '_'); at; at = strchr(at + 1, '_'))
@@ -118,8 +118,8 @@ static void fault_syntax(const yaml_parser_t *parser, const char *text, size_t l
                    parser->context ? " " : "", parser->context ? parser->context : "");
 }
 
-// libyaml's time grows with the square of the depth of nested [ and {: a first pass over the events stops where it is too deep. False with a
-// fault then, or where the text is no YAML.
+// libyaml's time grows with the square of the depth of nested [ and {: a first pass over the events stops if they are too deep. False with a fault
+// then, or if the text is not YAML.
 static bool check_depth(const char *text, size_t length, const char *file, Faults *faults)
 {
     yaml_parser_t parser;
@@ -232,7 +232,7 @@ void yaml_fault(YamlValue value, const char *format, ...)
     faults_add(value.reader->faults, value.reader->file, line, column, "%s", text);
 }
 
-// Counts a visit; false (with one fault) once a document makes us visit far more nodes than a scene has.
+// Counts a visit; false (with one fault) once far more nodes are visited than a scene can have.
 static bool may_visit(YamlValue value)
 {
     if (value.reader->visits++ == VISIT_BUDGET)
@@ -379,7 +379,7 @@ bool yaml_text(YamlValue value, const char **text)
     return true;
 }
 
-// The scalar as a number; what is wrong becomes a fault that names what would be valid.
+// The scalar as a number; otherwise a fault with what was expected.
 static bool scalar_number(YamlValue value, const char *valid, double *number)
 {
     const yaml_node_t *node = node_of(value);

@@ -1,6 +1,6 @@
-// Reads a YAML document by a schema that the caller walks: a map is opened with the list of its valid keys, then asked for each value by
-// type and range. Everything that is wrong becomes a fault with file:line:col; reading goes on, so one pass finds all.
-// Aliases are followed. A walk of bounded depth cannot run into a cycle; a budget of visited nodes bounds repeated aliases.
+// Reads a YAML document by a schema in code: a map is opened with the list of its valid keys, then each value is read by type and range. Every error
+// becomes a fault with file:line:col; reading continues, so one pass finds all. Aliases are followed. A walk of bounded depth cannot run into a
+// cycle; a budget of visited nodes bounds repeated aliases.
 #ifndef SELDINGER_BASE_YAML_READER_H
 #define SELDINGER_BASE_YAML_READER_H
 
@@ -11,7 +11,7 @@
 
 typedef struct YamlReader YamlReader;
 
-// A value of the document, with what it is called in messages.
+// A value of the document, with its name for messages.
 typedef struct YamlValue {
     YamlReader *reader;
     int node;                // 0: absent
@@ -19,17 +19,17 @@ typedef struct YamlValue {
 } YamlValue;
 
 typedef struct YamlMap {
-    YamlValue value;         // node 0 where it was absent or no map: then every question below answers "absent" without a further fault
+    YamlValue value;         // node 0 if absent or not a map: then all values below count as absent without further faults
     const char *const *keys; // NULL-terminated
 } YamlMap;
 
-// What a number may be. `above`: `least` itself is excluded.
+// The range of a number. `above`: `least` itself is excluded.
 typedef struct NumberRange {
     double least, most;
     bool above;
 } NumberRange;
 
-// NULL with a fault where the text is no YAML, holds several documents or nothing. `text` is read during this call only.
+// NULL with a fault if the text is not YAML, holds several documents or none. `text` is used during this call only.
 YamlReader *yaml_reader_open(const char *text, size_t length, const char *file, Faults *faults);
 void yaml_reader_close(YamlReader *reader);
 YamlValue yaml_root(YamlReader *reader);
@@ -39,24 +39,24 @@ void yaml_fault(YamlValue value, const char *format, ...) __attribute__((format(
 // `keys`: the valid ones; another key is a fault with the nearest valid one or the right unit. NULL allows any key.
 YamlMap yaml_map(YamlValue value, const char *const *keys);
 bool yaml_has(const YamlMap *map, const char *key);
-// The value of a key; absent (node 0) where the map lacks it. With `required` its absence is a fault.
+// The value of a key; node 0 if absent, which is a fault if `required`.
 YamlValue yaml_get(const YamlMap *map, const char *key, bool required);
 // Key number `index` of a map of any keys, and its value; false past the end.
 bool yaml_pair(const YamlMap *map, int index, const char **key, YamlValue *value);
 
-int yaml_count(YamlValue value, int least, int most);      // length of a list; -1 with a fault where it is none or out of range
+int yaml_count(YamlValue value, int least, int most);      // length of a list; -1 with a fault if it is not a list or out of range
 YamlValue yaml_item(YamlValue list, int index);
 bool yaml_is_list(YamlValue value);
 bool yaml_is_map(YamlValue value);
 const char *yaml_scalar(YamlValue value);                  // the text of a scalar, NULL otherwise; no fault
-bool yaml_text(YamlValue value, const char **text);        // a fault where it is no scalar, or empty
+bool yaml_text(YamlValue value, const char **text);        // a fault if it is not a scalar, or empty
 bool yaml_number(YamlValue value, NumberRange range, double *number);
 bool yaml_integer(YamlValue value, int least, int most, int *number);
 bool yaml_boolean(YamlValue value, bool *answer);
 // One of `names` (NULL-terminated): its index, or -1 with a fault.
 int yaml_choice(YamlValue value, const char *const *names);
 
-// The same by key: false where the key is absent (a fault with `required`) or wrong; the output then keeps its value.
+// The same by key: false if the key is absent (a fault with `required`) or wrong; the output then keeps its value.
 bool yaml_map_number(const YamlMap *map, const char *key, bool required, NumberRange range, double *number);
 
 #endif
